@@ -1,0 +1,9 @@
+[
+  inputs: [
+    "{mix,native,.formatter}.exs",
+    "config/**/*.exs",
+    "test/**/*.exs",
+    "apps/*/{mix,.formatter}.exs",
+    "apps/*/{lib,test}/**/*.{ex,exs}"
+  ]
+]

@@ -1,0 +1,22 @@
+defmodule Hal.Camera do
+  @moduledoc """
+  A source of frames, run by `Hal.Device`. Newest wins: an implementation never queues frames,
+  it sends the next one when it is asked by `next/1`, which the device calls once it has handed
+  the last one on.
+  """
+
+  @type reading :: {:frame, Hal.Frame.t()}
+
+  @doc "Opens the source."
+  @callback init(keyword()) :: {:ok, state :: term()} | {:error, reason :: term()}
+
+  @doc "Asks for one frame; it arrives as a message, and `handle_message/2` makes the reading of it."
+  @callback next(state :: term()) :: {:ok, term()} | {:error, term(), term()}
+
+  @doc "Turns one raw message into readings; unknown messages give `[]`."
+  @callback handle_message(term(), state :: term()) ::
+              {:ok, [reading()], term()} | {:error, term(), term()}
+
+  @doc "Closes the source."
+  @callback terminate(state :: term()) :: :ok
+end

@@ -1,0 +1,34 @@
+defmodule Hal.Drive do
+  @moduledoc """
+  What a drive base can do, whoever built it. One wire carries the wheels and, with most bases,
+  the ranges, bumpers and the battery too, so a drive brings them all as readings.
+
+  `Hal.Device` runs an implementation: every callback is called in its process. A missing or
+  failing device is an error, which is retried with back-off; it is never a crash.
+  """
+
+  @typedoc """
+  A reading. Ranges are metres, in the order of the profile's sensor poses; no echo is the
+  profile's greatest range. Bumpers are the pressed segments, counted counter-clockwise from
+  the front. Power is in volts.
+  """
+  @type reading ::
+          {:odometry, Hal.Odometry.t()}
+          | {:sonar, [float()]}
+          | {:ir, [float()]}
+          | {:bumpers, [0..15]}
+          | {:power, float()}
+
+  @doc "Opens the line and stops the motors."
+  @callback init(keyword()) :: {:ok, state :: term()} | {:error, reason :: term()}
+
+  @doc "Sets the speed until the next call. The gate has limited it; a driver limits it again."
+  @callback drive(Hal.Twist.t(), state :: term()) :: {:ok, term()} | {:error, term(), term()}
+
+  @doc "Turns one raw message from the line into readings; unknown messages give `[]`."
+  @callback handle_message(term(), state :: term()) ::
+              {:ok, [reading()], term()} | {:error, term(), term()}
+
+  @doc "Stops the motors and closes the line."
+  @callback terminate(state :: term()) :: :ok
+end

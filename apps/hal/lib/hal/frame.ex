@@ -1,0 +1,79 @@
+defmodule Hal.Frame do
+  @moduledoc """
+  One camera picture. Rows run from the top, pixels from the left.
+
+  | format | bytes |
+  |---|---|
+  | `:yuyv` | Y0 U Y1 V for each pair of pixels; even width |
+  | `:i420` | plane Y, then U and V at half width and half height; even width and height |
+  | `:nv12` | plane Y, then interleaved U V at half width and half height; even width and height |
+  | `:yuv444` | planes Y, U, V, all of full size |
+  | `:rgb24` | R G B for each pixel |
+
+  `at_ms` is the time of exposure by the clock of the robot (monotonic, or the simulator's).
+  `pan` and `tilt` (radians, left and up positive) are where the camera looked at that moment.
+  """
+
+  @enforce_keys [:format, :width, :height, :bytes, :at_ms]
+  defstruct @enforce_keys ++ [pan: 0.0, tilt: 0.0]
+
+  @type format :: :yuyv | :i420 | :nv12 | :yuv444 | :rgb24
+  @type t :: %__MODULE__{
+          format: format(),
+          width: pos_integer(),
+          height: pos_integer(),
+          bytes: binary(),
+          at_ms: integer(),
+          pan: float(),
+          tilt: float()
+        }
+
+  @formats [:yuyv, :i420, :nv12, :yuv444, :rgb24]
+
+  @doc "All formats."
+  @spec formats() :: [format(), ...]
+  def formats, do: @formats
+
+  @doc """
+  How many bytes a frame of this format and size has; an error where the format cannot have the size.
+
+      iex> Hal.Frame.byte_size(:yuyv, 320, 240)
+      {:ok, 153_600}
+      iex> Hal.Frame.byte_size(:i420, 3, 2)
+      {:error, {:size, {3, 2}}}
+  """
+  @spec byte_size(format(), pos_integer(), pos_integer()) ::
+          {:ok, pos_integer()} | {:error, {:size, term()}}
+  def byte_size(:yuyv, w, h) when w > 0 and h > 0 and rem(w, 2) == 0, do: {:ok, 2 * w * h}
+
+  def byte_size(format, w, h)
+      when format in [:i420, :nv12] and w > 0 and h > 0 and rem(w, 2) == 0 and rem(h, 2) == 0,
+      do: {:ok, div(3 * w * h, 2)}
+
+  def byte_size(format, w, h) when format in [:yuv444, :rgb24] and w > 0 and h > 0,
+    do: {:ok, 3 * w * h}
+
+  def byte_size(_format, w, h), do: {:error, {:size, {w, h}}}
+
+  @doc """
+  A checked frame.
+
+      iex> {:error, {:bytes, 5, :expected, 12}} = Hal.Frame.new(:rgb24, 2, 2, <<1, 2, 3, 4, 5>>, 0)
+      iex> {:ok, frame} = Hal.Frame.new(:yuyv, 2, 1, <<1, 2, 3, 4>>, 7)
+      iex> frame.at_ms
+      7
+  """
+  @spec new(format(), pos_integer(), pos_integer(), binary(), integer()) ::
+          {:ok, t()}
+          | {:error, {:size, term()} | {:bytes, non_neg_integer(), :expected, pos_integer()}}
+  def new(format, width, height, bytes, at_ms) when format in @formats do
+    with {:ok, size} <- byte_size(format, width, height) do
+      if Kernel.byte_size(bytes) == size do
+        {:ok,
+         %__MODULE__{format: format, width: width, height: height, bytes: bytes, at_ms: at_ms}}
+      else
+        {:error, {:bytes, Kernel.byte_size(bytes), :expected, size}}
+      end
+    end
+  end
+end

@@ -1,0 +1,130 @@
+defmodule Hal.Pose do
+  @moduledoc """
+  A place and a heading in the plane: metres, and radians counter-clockwise from +x, in (-pi, pi].
+
+  Frames after REP-105: `map` (shared by the fleet), `odom` (one robot's wheels), `base_link`
+  (a robot's body: x forward, y left). Pure.
+  """
+
+  @enforce_keys [:x, :y, :heading]
+  defstruct @enforce_keys
+
+  @type t :: %__MODULE__{x: float(), y: float(), heading: float()}
+  @type point :: {x :: float(), y :: float()}
+
+  @pi :math.pi()
+  @two_pi 2 * :math.pi()
+
+  @doc """
+  A pose from numbers; the heading is wrapped.
+
+      iex> Hal.Pose.new(1, 2)
+      %Hal.Pose{x: 1.0, y: 2.0, heading: 0.0}
+  """
+  @spec new(number(), number(), number()) :: t()
+  def new(x, y, heading \\ 0.0),
+    do: %__MODULE__{x: x * 1.0, y: y * 1.0, heading: wrap(heading * 1.0)}
+
+  @doc """
+  The same angle in (-pi, pi].
+
+      iex> Hal.Pose.wrap(3 * :math.pi()) == :math.pi()
+      true
+      iex> Hal.Pose.wrap(-:math.pi()) == :math.pi()
+      true
+  """
+  @spec wrap(float()) :: float()
+  def wrap(angle) when angle > -@pi and angle <= @pi, do: angle
+
+  def wrap(angle) do
+    rest = :math.fmod(angle, @two_pi)
+
+    cond do
+      rest > @pi -> rest - @two_pi
+      rest <= -@pi -> rest + @two_pi
+      true -> rest
+    end
+  end
+
+  @doc """
+  The place of a pose.
+
+      iex> Hal.Pose.point(Hal.Pose.new(1, 2, 3))
+      {1.0, 2.0}
+  """
+  @spec point(t()) :: point()
+  def point(%__MODULE__{x: x, y: y}), do: {x, y}
+
+  @doc """
+  Distance between two places, in metres.
+
+      iex> Hal.Pose.distance({0.0, 0.0}, Hal.Pose.new(3, 4))
+      5.0
+  """
+  @spec distance(t() | point(), t() | point()) :: float()
+  def distance(a, b) do
+    {ax, ay} = xy(a)
+    {bx, by} = xy(b)
+    :math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
+  end
+
+  @doc """
+  Direction of a place seen from a pose, relative to its heading: 0 is ahead, positive is left.
+
+      iex> Hal.Pose.bearing(Hal.Pose.new(0, 0, :math.pi() / 2), {0.0, 2.0})
+      0.0
+  """
+  @spec bearing(t(), t() | point()) :: float()
+  def bearing(%__MODULE__{x: x, y: y, heading: heading}, place) do
+    {px, py} = xy(place)
+    wrap(:math.atan2(py - y, px - x) - heading)
+  end
+
+  @doc """
+  A pose given in the frame of `base`, in the frame that `base` is given in.
+
+      iex> Hal.Pose.compose(Hal.Pose.new(1, 2), Hal.Pose.new(2, 0, 0.5))
+      Hal.Pose.new(3, 2, 0.5)
+  """
+  @spec compose(t(), t()) :: t()
+  def compose(%__MODULE__{} = base, %__MODULE__{} = inner) do
+    {x, y} = place(base, {inner.x, inner.y})
+    %__MODULE__{x: x, y: y, heading: wrap(base.heading + inner.heading)}
+  end
+
+  @doc """
+  A point given in the frame of `base`, in the frame that `base` is given in.
+
+      iex> Hal.Pose.place(Hal.Pose.new(1, 1), {2.0, 0.5})
+      {3.0, 1.5}
+  """
+  @spec place(t(), point()) :: point()
+  def place(%__MODULE__{x: x, y: y, heading: heading}, {px, py}) do
+    c = :math.cos(heading)
+    s = :math.sin(heading)
+    {x + c * px - s * py, y + s * px + c * py}
+  end
+
+  @doc """
+  `pose` seen from `base`: the inverse of `compose/2`.
+
+      iex> Hal.Pose.relative(Hal.Pose.new(1, 1), Hal.Pose.new(3, 1, 0.5))
+      Hal.Pose.new(2, 0, 0.5)
+  """
+  @spec relative(t(), t()) :: t()
+  def relative(%__MODULE__{} = base, %__MODULE__{} = pose) do
+    c = :math.cos(base.heading)
+    s = :math.sin(base.heading)
+    dx = pose.x - base.x
+    dy = pose.y - base.y
+
+    %__MODULE__{
+      x: c * dx + s * dy,
+      y: c * dy - s * dx,
+      heading: wrap(pose.heading - base.heading)
+    }
+  end
+
+  defp xy(%__MODULE__{x: x, y: y}), do: {x, y}
+  defp xy({x, y}), do: {x, y}
+end

@@ -1,0 +1,127 @@
+defmodule Hal.Profile do
+  @moduledoc """
+  The body of a kind of robot: geometry, sensors, limits. SI units; sensor poses in `base_link`.
+
+  Sources: the thesis (R69 to R72) and the public rFLEX sample configurations. Accelerations are
+  ours: both bases brake at 0.5 m/s2 and 1 rad/s2 unless configured.
+  """
+  alias Hal.Pose
+
+  @enforce_keys [:name, :radius, :length, :width, :wheel_base, :max_linear, :max_turn, :sonars]
+  defstruct @enforce_keys ++
+              [
+                max_acceleration: 0.5,
+                max_turn_acceleration: 1.0,
+                height: 0.5,
+                sonar_min: 0.15,
+                sonar_max: 5.1,
+                sonar_cone: :math.pi() / 6,
+                irs: [],
+                ir_max: 0.8,
+                bumpers: 16,
+                camera: %{
+                  width: 320,
+                  height: 240,
+                  field_of_view: :math.pi() / 3,
+                  mount_height: 0.6,
+                  max_pan: 1.745,
+                  max_tilt: 0.436,
+                  pan_rate: 1.396,
+                  tilt_rate: 0.873
+                }
+              ]
+
+  @type t :: %__MODULE__{
+          name: :magellan | :atrv_mini,
+          radius: float(),
+          length: float(),
+          width: float(),
+          height: float(),
+          wheel_base: float(),
+          max_linear: float(),
+          max_turn: float(),
+          max_acceleration: float(),
+          max_turn_acceleration: float(),
+          sonars: [Pose.t()],
+          sonar_min: float(),
+          sonar_max: float(),
+          sonar_cone: float(),
+          irs: [Pose.t()],
+          ir_max: float(),
+          bumpers: 0..16,
+          camera: map()
+        }
+
+  @doc """
+  Magellan Pro: round, 0.40 m across, 16 sonars, 16 infrareds and 16 bumpers all round.
+
+      iex> length(Hal.Profile.magellan().sonars)
+      16
+  """
+  @spec magellan() :: t()
+  def magellan do
+    ring = for k <- 0..15, do: ring_pose(11 - k, 0.2)
+
+    %__MODULE__{
+      name: :magellan,
+      radius: 0.2,
+      length: 0.4,
+      width: 0.4,
+      wheel_base: 0.36,
+      max_linear: 0.5,
+      max_turn: 1.0,
+      sonars: ring,
+      irs: ring
+    }
+  end
+
+  @doc """
+  ATRV mini: four driven wheels, 0.5 by 0.3 m; 16 sonars, dense in front and at the sides, two
+  behind and none diagonally behind (R71). `radius` is the circle round its corners.
+
+      iex> Hal.Profile.atrv_mini().max_turn
+      0.8
+  """
+  @spec atrv_mini() :: t()
+  def atrv_mini do
+    left = [
+      {0.2, 0.1, 0.0},
+      {0.18, 0.11, 0.314},
+      {0.16, 0.13, 0.628},
+      {0.14, 0.14, 0.942},
+      {0.12, 0.15, 1.257},
+      {0.1, 0.15, 1.571},
+      {-0.2, 0.15, 1.571},
+      {-0.2, 0.15, :math.pi()}
+    ]
+
+    %__MODULE__{
+      name: :atrv_mini,
+      radius: 0.292,
+      length: 0.5,
+      width: 0.3,
+      wheel_base: 0.3,
+      max_linear: 0.5,
+      max_turn: 0.8,
+      sonars:
+        Enum.map(left, fn {x, y, angle} -> Pose.new(x, y, angle) end) ++
+          Enum.map(left, fn {x, y, angle} -> Pose.new(x, -y, -angle) end)
+    }
+  end
+
+  @doc """
+  The profile of a robot by the first letters of its name, as in the thesis: `mag1`, `min3`.
+
+      iex> Hal.Profile.of_kind(:mag).name
+      :magellan
+  """
+  @spec of_kind(:mag | :min) :: t()
+  def of_kind(:mag), do: magellan()
+  def of_kind(:min), do: atrv_mini()
+
+  # Index 11 looks straight ahead, indices grow clockwise (public sample configuration).
+  defp ring_pose(steps, radius) do
+    angle = steps * :math.pi() / 8
+    Pose.new(radius * :math.cos(angle), radius * :math.sin(angle), angle)
+  end
+end

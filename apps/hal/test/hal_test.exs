@@ -1,0 +1,7 @@
+defmodule HalTest do
+  use ExUnit.Case, async: true
+  doctest Hal.Pose
+  doctest Hal.Twist
+  doctest Hal.Frame
+  doctest Hal.Profile
+end

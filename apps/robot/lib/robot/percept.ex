@@ -1,0 +1,64 @@
+defmodule Robot.Percept do
+  @moduledoc """
+  All that a robot knows at one tick, frozen: behaviours and missions read nothing else.
+
+  Whatever was older than its limit when the percept was taken is `nil` (or `[]` for bumpers):
+  a behaviour never sees a stale reading. `blobs: nil` means that there is no fresh picture,
+  `blobs: []` that the picture shows nothing. `pose` is the robot's estimate in the `map` frame.
+  """
+  alias Hal.{Odometry, Pose, Profile, Twist}
+
+  @enforce_keys [:robot, :at_ms, :profile]
+  defstruct @enforce_keys ++
+              [
+                pose: nil,
+                odometry: nil,
+                sonar: nil,
+                ir: nil,
+                bumpers: [],
+                power: nil,
+                ptz: nil,
+                blobs: nil,
+                blobs_at_ms: nil,
+                blobs_pan: 0.0,
+                blobs_pose: nil,
+                peers: %{},
+                driving: nil
+              ]
+
+  @typedoc """
+  What another robot told: its pose and speed in the `map` frame, when it was heard, and its
+  body's radius (metres). `mode`: `:moving` avoids others too, `:holding` stands and gives no way,
+  `:dead` is a body that stayed where it was last heard of.
+  """
+  @type peer :: %{
+          pose: Pose.t(),
+          twist: Twist.t(),
+          radius: float(),
+          at_ms: integer(),
+          mode: :moving | :holding | :dead
+        }
+
+  @typedoc """
+  `blobs_pan` and `blobs_pose` are where the camera looked and where the robot stood (map frame)
+  when the picture was taken. `driving` is what the gate last let through, and why it limited it.
+  """
+  @type t :: %__MODULE__{
+          robot: atom(),
+          at_ms: integer(),
+          profile: Profile.t(),
+          pose: Pose.t() | nil,
+          odometry: Odometry.t() | nil,
+          sonar: [float()] | nil,
+          ir: [float()] | nil,
+          bumpers: [0..15],
+          power: float() | nil,
+          ptz: %{pan: float(), tilt: float(), field_of_view: float()} | nil,
+          blobs: [Vision.Blob.t()] | nil,
+          blobs_at_ms: integer() | nil,
+          blobs_pan: float(),
+          blobs_pose: Pose.t() | nil,
+          peers: %{atom() => peer()},
+          driving: %{twist: Twist.t(), limits: [atom()]} | nil
+        }
+end

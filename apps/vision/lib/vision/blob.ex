@@ -1,0 +1,30 @@
+defmodule Vision.Blob do
+  @moduledoc """
+  One coloured region of a frame, after CMVision and Player's blobfinder.
+
+  Pixels are counted from the top left; `left` and `top` are the first pixel inside, `right` and
+  `bottom` the last one **inside**. `x`, `y` are the centroid with pixel centres at whole
+  numbers. `share` is the area as a part of the frame's (R41). `clipped?` says that the box
+  touches the border of the frame, so that area and distance mean little. `distance` (metres, R43)
+  is `nil` where the colour has no distance constant, or where the blob fills more than half of the frame.
+  """
+
+  @enforce_keys [:colour, :area, :share, :x, :y, :left, :top, :right, :bottom, :width, :height]
+  defstruct @enforce_keys ++ [distance: nil, clipped?: false]
+
+  @type t :: %__MODULE__{
+          colour: String.t(),
+          area: pos_integer(),
+          share: float(),
+          x: float(),
+          y: float(),
+          left: non_neg_integer(),
+          top: non_neg_integer(),
+          right: non_neg_integer(),
+          bottom: non_neg_integer(),
+          width: pos_integer(),
+          height: pos_integer(),
+          distance: float() | nil,
+          clipped?: boolean()
+        }
+end
