@@ -2,7 +2,9 @@ import Config
 
 # The Logger's console settings changed their names in Elixir 1.15.
 if Version.match?(System.version(), ">= 1.15.0") do
-  config :logger, :default_formatter, format: "$time [$level] $metadata$message\n", metadata: [:robot]
+  config :logger, :default_formatter,
+    format: "$time [$level] $metadata$message\n",
+    metadata: [:robot]
 else
   config :logger, :console, format: "$time [$level] $metadata$message\n", metadata: [:robot]
 end

@@ -1,0 +1,65 @@
+defmodule Console.Fleet do
+  @moduledoc """
+  Which robots there are: `mag1`, `mag2`, … (Magellan Pro) and `min1`, `min2`, … (ATRV mini). Pure.
+  """
+
+  @most 100
+
+  @doc """
+  A fleet of `count` robots, half of each kind, one more Magellan when the count is odd.
+
+      iex> Console.Fleet.of(3)
+      [:mag1, :mag2, :min1]
+  """
+  @spec of(1..100) :: [atom()]
+  def of(count) when count in 1..@most do
+    mini = div(count, 2)
+    names("mag", count - mini) ++ names("min", mini)
+  end
+
+  @doc """
+  A fleet from its text.
+
+      iex> Console.Fleet.parse("mag:2,min:1")
+      {:ok, [:mag1, :mag2, :min1]}
+      iex> Console.Fleet.parse("dog:2")
+      {:error, "like mag:4,min:2 (kinds mag and min), 1 to 100 robots together"}
+  """
+  @spec parse(String.t()) :: {:ok, [atom()]} | {:error, String.t()}
+  def parse(text) do
+    parts = text |> String.split(",") |> Enum.map(&String.split(&1, ":"))
+    kinds = for [kind, _count] <- parts, do: kind
+
+    counts =
+      for [_kind, count] <- parts, {:ok, n} <- [Console.Values.whole(count, 0..@most)], do: n
+
+    if length(counts) == length(parts) and kinds -- ["mag", "min"] == [] and
+         Enum.sum(counts) in 1..@most do
+      {:ok, kinds |> Enum.zip(counts) |> Enum.sort() |> Enum.flat_map(&names/1)}
+    else
+      {:error, "like mag:4,min:2 (kinds mag and min), 1 to #{@most} robots together"}
+    end
+  end
+
+  @doc """
+  How people write a fleet's names in one line.
+
+      iex> Console.Fleet.describe([:mag1, :mag2, :mag3, :min1])
+      "mag1 to mag3, min1"
+  """
+  @spec describe([atom()]) :: String.t()
+  def describe(robots) do
+    robots
+    |> Enum.map(&Atom.to_string/1)
+    |> Enum.chunk_by(&String.slice(&1, 0, 3))
+    |> Enum.map_join(", ", fn
+      [only] -> only
+      names -> "#{hd(names)} to #{List.last(names)}"
+    end)
+  end
+
+  defp names({kind, count}), do: names(kind, count)
+
+  # At most a hundred names of each kind exist, so these atoms are bounded.
+  defp names(kind, count), do: for(k <- 1..count//1, do: :"#{kind}#{k}")
+end

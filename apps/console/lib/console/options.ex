@@ -1,0 +1,219 @@
+defmodule Console.Options do
+  @moduledoc """
+  What `mix demo` is told, checked once at the door. Pure; the options are one table, from which
+  the help is made too.
+  """
+  alias Console.{Arguments, Fleet, Suggest, Values}
+
+  defstruct robots: nil,
+            seed: 1,
+            map: "hall",
+            start: :spread,
+            landmark: :default,
+            moves: [],
+            kills: [],
+            loss: 0.0,
+            noise: :default,
+            formation: {:column, 1.0},
+            assign: :cost,
+            leader_change: true,
+            duration_s: nil,
+            blobs: :painted,
+            headless: false,
+            json: nil,
+            picture: nil,
+            help: false
+
+  @type t :: %__MODULE__{}
+
+  @maps ~w(hall hospital arena)
+
+  @doc """
+  Options from a command's arguments, or one line for each thing that is wrong with them.
+
+      iex> {:ok, options} = Console.Options.parse(~w(--robots 3 --landmark -2,1))
+      iex> {options.robots, options.landmark}
+      {[:mag1, :mag2, :min1], {-2.0, 1.0}}
+      iex> Console.Options.parse(~w(--robots -3))
+      {:error, [~s(--robots must be a whole number from 1 to 100, not "-3")]}
+  """
+  @spec parse([String.t()]) :: {:ok, t()} | {:error, [String.t()]}
+  def parse(arguments) do
+    arguments = Enum.map(arguments, &if(&1 == "-h", do: "--help", else: &1))
+
+    with {:ok, pairs} <- Arguments.parse(arguments, table()),
+         {:ok, options} <- fleet(pairs) do
+      pairs
+      |> Enum.reduce(options, &put/2)
+      |> check_kills()
+    end
+  end
+
+  @doc "The help text of `mix demo`."
+  @spec help() :: String.t()
+  def help do
+    """
+    A fleet of robots searches a landmark, elects a leader and follows it in formation.
+
+      bin/demo [options]        (or: mix demo [options])
+
+    #{Arguments.help(table())}
+
+    Examples
+      bin/demo                                              six robots, live in the terminal
+      bin/demo --robots 12 --formation wedge:1.2            twelve of them in a V
+      bin/demo --headless --kill leader@40 --seed 7         what happens when the leader dies?
+      bin/demo --headless --move 3,2@40 --picture run.svg   the landmark moves away; see the paths
+      bin/demo --headless --map hospital --json -           a report for another program
+
+    Exit status: 0 the fleet ended in formation, 2 it did not, 1 something was wrong with the input.
+    """
+  end
+
+  @doc "What `Sim.Trial.new/1` takes."
+  @spec trial(t()) :: map()
+  def trial(%__MODULE__{} = options) do
+    options
+    |> Map.take(
+      ~w(robots seed map start landmark moves kills loss noise formation assign leader_change blobs)a
+    )
+    |> Map.put(:duration_s, duration_s(options))
+  end
+
+  @doc """
+  How long the run may take, in simulated seconds.
+
+      iex> Console.Options.duration_s(%Console.Options{map: "hospital"})
+      180.0
+  """
+  @spec duration_s(t()) :: float()
+  def duration_s(%__MODULE__{duration_s: nil, map: "hospital"}), do: 180.0
+  def duration_s(%__MODULE__{duration_s: nil}), do: 120.0
+  def duration_s(%__MODULE__{duration_s: duration_s}), do: duration_s
+
+  defp table do
+    [
+      {"robots", "N", &Values.whole(&1, 1..100), "how many robots, 1 to 100 (6)"},
+      {"fleet", "mag:N,min:N", &Fleet.parse/1, "or how many of each kind"},
+      {"seed", "S", &Values.whole(&1, 0..4_294_967_295),
+       "chance starts here; same seed, same run (1)"},
+      {"map", "NAME", &map/1, "hall, hospital, arena, or FILE.png:WIDTHxHEIGHT in metres (hall)"},
+      {"start", "HOW", &Values.choice(&1, spread: :spread, same: :same),
+       "spread over the map, or all switched on at one pose: same (spread)"},
+      {"landmark", "X,Y|none", &landmark/1,
+       "where the landmark stands, in metres from the map's centre"},
+      {"move", "X,Y@T", &Values.at(&1, fn text -> Values.point(text) end, "X,Y@T"),
+       "the landmark glides there from second T; repeatable"},
+      {"kill", "WHO@T", &Values.at(&1, fn text -> who(text) end, "leader@T or NAME@T"),
+       "a robot dies at second T: leader, or a name; repeatable"},
+      {"loss", "P", &Values.number(&1, 0, 1), "share of radio messages lost, 0 to 1 (0)"},
+      {"noise", "HOW", &Values.choice(&1, off: :off, default: :default, slip: :slip),
+       "of wheels and pictures: off, default, slip (default)"},
+      {"formation", "KIND[:SPACING]", &Values.formation/1,
+       "column, line, wedge, triangle, diamond or circle;\nspacing 0.8 to 5 m (column:1)"},
+      {"assign", "HOW", &Values.choice(&1, chain: :chain, cost: :cost),
+       "who takes which place: chain by distance, or least cost (cost)"},
+      {"leader-change", "on|off", &Values.choice(&1, on: true, off: false),
+       "may another robot take over when it sees better? (on)"},
+      {"duration", "S", &Values.number(&1, 1, 3600),
+       "simulated seconds at most (120, hospital 180;\nlive on a terminal: until you quit)"},
+      {"headless", nil, nil, "no view, as fast as it goes"},
+      {"json", "FILE|-", &file(&1, ""), "write the report (- is standard output)"},
+      {"picture", "FILE.svg", &file(&1, ".svg"), "draw the paths and the formation error"},
+      {"blobs", "HOW", &Values.choice(&1, painted: :painted, direct: :direct),
+       "paint camera pictures, or skip the painting (painted)"},
+      {"help", nil, nil, "this text"}
+    ]
+  end
+
+  defp put({"fleet", _robots}, options), do: options
+  defp put({"robots", _count}, options), do: options
+  defp put({"move", move}, options), do: %{options | moves: options.moves ++ [move]}
+  defp put({"kill", kill}, options), do: %{options | kills: options.kills ++ [kill]}
+  defp put({"leader-change", on?}, options), do: %{options | leader_change: on?}
+  defp put({"duration", duration_s}, options), do: %{options | duration_s: duration_s}
+
+  defp put({name, value}, options),
+    do: Map.replace!(options, String.to_existing_atom(name), value)
+
+  defp fleet(pairs) do
+    case {List.keyfind(pairs, "robots", 0), List.keyfind(pairs, "fleet", 0)} do
+      {{_, _}, {_, _}} -> {:error, ["--robots and --fleet exclude each other; give one of them"]}
+      {_, {_, robots}} -> {:ok, %__MODULE__{robots: robots}}
+      {{_, count}, nil} -> {:ok, %__MODULE__{robots: Fleet.of(count)}}
+      {nil, nil} -> {:ok, %__MODULE__{robots: Fleet.of(6)}}
+    end
+  end
+
+  # Names become robots of the fleet only by comparison: a text never becomes an atom.
+  defp check_kills(options) do
+    results = Enum.map(options.kills, &named(&1, options.robots))
+
+    case for {:error, line} <- results, do: line do
+      [] -> {:ok, %{options | kills: for({:ok, kill} <- results, do: kill)}}
+      lines -> {:error, lines}
+    end
+  end
+
+  defp named({"leader", at_s}, _robots), do: {:ok, {:leader, at_s}}
+
+  defp named({name, at_s}, robots) do
+    case Enum.find(robots, &(Atom.to_string(&1) == name)) do
+      nil ->
+        hint = Suggest.hint(name, ["leader" | Enum.map(robots, &Atom.to_string/1)])
+
+        {:error,
+         "--kill names no robot: #{inspect(name)}; there are leader, #{Fleet.describe(robots)}#{hint}"}
+
+      robot ->
+        {:ok, {robot, at_s}}
+    end
+  end
+
+  defp who(""), do: {:error, "a name"}
+  defp who(text), do: {:ok, text}
+
+  defp landmark("none"), do: {:ok, :none}
+
+  defp landmark(text) do
+    with {:error, allowed} <- Values.point(text), do: {:error, allowed <> ", or none"}
+  end
+
+  defp map(name) when name in @maps, do: {:ok, name}
+
+  defp map(text) do
+    case Regex.run(~r/^(.+\.(?:png|pgm)):(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)$/i, text) do
+      [_, _file, width, height] -> sized(text, width, height)
+      nil -> {:error, "hall, hospital, arena or FILE.png:WIDTHxHEIGHT#{map_hint(text)}"}
+    end
+  end
+
+  defp sized(text, width, height) do
+    with {:ok, _} <- Values.number(width, 2, 1000), {:ok, _} <- Values.number(height, 2, 1000) do
+      {:ok, text}
+    else
+      _ -> {:error, "FILE.png:WIDTHxHEIGHT with sides from 2 to 1000 metres"}
+    end
+  end
+
+  defp map_hint(text) do
+    case Suggest.nearest(text, @maps) do
+      nil -> ""
+      near -> " (did you mean #{inspect(near)}?)"
+    end
+  end
+
+  defp file("-", ""), do: {:ok, "-"}
+
+  defp file(path, extension) do
+    folder = Path.dirname(path)
+
+    cond do
+      path == "" -> {:error, "the name of a file"}
+      not String.ends_with?(path, extension) -> {:error, "a file whose name ends in #{extension}"}
+      File.dir?(path) -> {:error, "a file, which a folder is not"}
+      not File.dir?(folder) -> {:error, "a file in a folder that exists"}
+      true -> {:ok, path}
+    end
+  end
+end

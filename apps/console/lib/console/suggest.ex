@@ -1,0 +1,40 @@
+defmodule Console.Suggest do
+  @moduledoc "What somebody may have meant by a word that nobody knows. Pure."
+
+  @near_enough 0.77
+
+  @doc """
+  The known word most like `word`, or `nil` when none is like it.
+
+      iex> Console.Suggest.nearest("fromation", ["formation", "landmark"])
+      "formation"
+      iex> Console.Suggest.nearest("xyz", ["formation", "landmark"])
+      nil
+  """
+  @spec nearest(String.t(), [String.t()]) :: String.t() | nil
+  def nearest(word, known) do
+    word = String.downcase(word)
+
+    known
+    |> Enum.map(&{String.jaro_distance(word, &1), &1})
+    |> Enum.filter(fn {likeness, _known} -> likeness > @near_enough end)
+    |> Enum.max_by(&elem(&1, 0), fn -> {0, nil} end)
+    |> elem(1)
+  end
+
+  @doc """
+  The half-sentence to put behind an error, empty when there is nothing to suggest.
+
+      iex> Console.Suggest.hint("hal", ["hall", "arena"])
+      ~s(; did you mean "hall"?)
+      iex> Console.Suggest.hint("moon", ["hall", "arena"])
+      ""
+  """
+  @spec hint(String.t(), [String.t()]) :: String.t()
+  def hint(word, known) do
+    case nearest(word, known) do
+      nil -> ""
+      near -> "; did you mean #{inspect(near)}?"
+    end
+  end
+end

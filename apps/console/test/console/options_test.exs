@@ -1,0 +1,105 @@
+defmodule Console.OptionsTest do
+  use ExUnit.Case, async: true
+  alias Console.Options
+
+  doctest Console.Suggest
+  doctest Console.Arguments
+  doctest Console.Values
+  doctest Console.Fleet
+  doctest Console.Options
+
+  defp parse(line), do: line |> OptionParser.split() |> Options.parse()
+
+  defp error(line) do
+    {:error, lines} = parse(line)
+    Enum.join(lines, "\n")
+  end
+
+  test "everything that can be said is understood" do
+    {:ok, options} =
+      parse(
+        "--fleet mag:4,min:2 --seed 7 --map hospital --start same --landmark=-2,1 --move -3,2@40 " <>
+          "--move 0,0@60 --kill leader@30 --kill min2@50.5 --loss 0.2 --noise slip --formation wedge:1.2 " <>
+          "--assign chain --leader-change off --duration 200 --headless --json - --picture a.svg --blobs direct"
+      )
+
+    assert options.robots == [:mag1, :mag2, :mag3, :mag4, :min1, :min2]
+    assert options.moves == [{{-3.0, 2.0}, 40.0}, {{0.0, 0.0}, 60.0}]
+    assert options.kills == [{:leader, 30.0}, {:min2, 50.5}]
+
+    assert Options.trial(options) == %{
+             robots: options.robots,
+             seed: 7,
+             map: "hospital",
+             start: :same,
+             landmark: {-2.0, 1.0},
+             moves: options.moves,
+             kills: options.kills,
+             loss: 0.2,
+             noise: :slip,
+             formation: {:wedge, 1.2},
+             assign: :chain,
+             leader_change: false,
+             duration_s: 200.0,
+             blobs: :direct
+           }
+  end
+
+  test "without options six robots in the hall" do
+    {:ok, options} = parse("")
+    assert length(options.robots) == 6
+    assert Options.trial(options).duration_s == 120.0
+  end
+
+  test "a wrong value is named, with what is allowed" do
+    for count <- ~w(0 -3 1e9 101 six 6.5 99999999999999999999) do
+      assert error("--robots #{count}") ==
+               "--robots must be a whole number from 1 to 100, not #{inspect(count)}"
+    end
+
+    for loss <- ~w(nan NaN inf -inf Infinity 1.1 -0.1 1e400 .5 0,2) do
+      assert error("--loss #{loss}") ==
+               "--loss must be a number from 0 to 1, not #{inspect(loss)}"
+    end
+
+    assert error("--map moon") =~ "hall, hospital, arena or FILE.png:WIDTHxHEIGHT"
+    assert error("--map hospitel") =~ ~s(did you mean "hospital")
+    assert error("--map a.png:1x12") =~ "sides from 2 to 1000"
+    assert error("--formation wegde") =~ ~s(did you mean "wedge")
+    assert error("--formation wedge:0.5") =~ "0.8 to 5"
+    assert error("--landmark 1") =~ "X,Y in metres"
+    assert error("--landmark nan,1") =~ "X,Y in metres"
+    assert error("--move 1,2") =~ "X,Y@T"
+    assert error("--kill leader") =~ "leader@T or NAME@T"
+    assert error("--picture a.png") =~ ".svg"
+    assert error("--json /no/such/folder/a.json") =~ "a folder that exists"
+    assert error("--duration 0") =~ "from 1 to 3600"
+    assert error("--seed -1") =~ "whole number"
+    assert error("--fleet mag:0,min:0") =~ "1 to 100 robots"
+    assert error("--fleet mag:101") =~ "1 to 100 robots"
+    assert error("--robots 3 --fleet mag:3") =~ "exclude each other"
+  end
+
+  test "a robot that does not exist is refused" do
+    assert error("--kill mag9@3") =~ ~s("mag9"; there are leader, mag1 to mag3, min1 to min3)
+  end
+
+  test "typing errors get a suggestion, and a missing value its form" do
+    assert error("--robot 3") == ~s(unknown option --robot; did you mean "--robots"?)
+    assert error("--headles") == ~s(unknown option --headles; did you mean "--headless"?)
+    assert error("headless") == ~s(unexpected argument "headless"; did you mean "--headless"?)
+    assert error("--map --headless") == "--map needs a value: NAME"
+    assert error("--headless=1") == "--headless takes no value"
+  end
+
+  test "every mistake has its own line" do
+    assert {:error, [_, _, _]} = parse("--robots 0 --loss 2 --mpa hall")
+  end
+
+  test "the help names every option" do
+    for name <- ~w(robots fleet seed map start landmark move kill loss noise formation assign
+                   leader-change duration headless json picture blobs) do
+      assert Options.help() =~ "--#{name}"
+    end
+  end
+end

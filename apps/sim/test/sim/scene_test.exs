@@ -1,0 +1,5 @@
+defmodule Sim.SceneTest do
+  use ExUnit.Case, async: true
+
+  doctest Sim.Scene
+end
