@@ -20,7 +20,7 @@ defmodule Hal.MixProject do
     ]
   end
 
-  def application, do: [extra_applications: [:logger, :crypto]]
+  def application, do: [mod: {Hal.Application, []}, extra_applications: [:logger, :crypto]]
 
   defp elixirc_paths(:test), do: ["lib", "test/support"]
   defp elixirc_paths(_env), do: ["lib"]

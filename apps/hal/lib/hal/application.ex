@@ -1,0 +1,19 @@
+defmodule Hal.Application do
+  @moduledoc false
+  use Application
+
+  # A supervisor without children never falls, so it is the one that owns the table of handlers.
+  defmodule Root do
+    @moduledoc false
+    use Supervisor
+
+    @impl Supervisor
+    def init(_) do
+      Hal.Event.create_table()
+      Supervisor.init([], strategy: :one_for_one)
+    end
+  end
+
+  @impl Application
+  def start(_type, _arguments), do: Supervisor.start_link(Root, [])
+end

@@ -1,0 +1,245 @@
+defmodule Hal.Device do
+  @moduledoc """
+  The one process round any driver (`Hal.Drive`, `Hal.Ptz`, `Hal.Camera`): it opens the driver
+  after its own start, hands readings on, and opens again what went wrong.
+
+  Options:
+
+    * `:kind` - `:drive`, `:ptz` or `:camera`
+    * `:driver` - `{module, options}`
+    * `:sinks` - `[{m, f, a}]`; each reading goes to `apply(m, f, a ++ [reading])`. A change of
+      health is the reading `{:health, device, {:online | {:offline, reason}, since_ms}}`
+    * `:device` - what it is called in its health, by default its kind
+    * `:name` - as in `GenServer`
+    * `:clock` - `{m, f, a}` giving integer milliseconds
+
+  ## When a driver fails
+
+  An error that a driver *returns* is expected: the device says so, closes the driver, and tries
+  again after 100 ms, 200 ms, … up to 5 s. The first reading after an opening brings the wait back
+  to 100 ms, so that a driver that opens well and then fails is not reopened ten times a second.
+
+  A driver that *raises* takes the device down, which its supervisor restarts. It closes the
+  driver and rests for 500 ms before it goes, so that a driver which falls over every message
+  cannot use up the supervisor's restarts, and with them the robot's other devices.
+
+  ## Wheels
+
+  A drive that hears no speed for 500 ms stops its wheels. This is the second line behind the
+  dead man's switch of whoever drives, for the case that this one is gone or stuck.
+  """
+  use GenServer
+  alias Hal.{Event, Twist}
+
+  @retry_ms 100
+  @longest_retry_ms 5_000
+  @watchdog_ms 500
+  @rest_ms 500
+
+  @enforce_keys [:kind, :device, :driver, :options, :sinks, :clock]
+  defstruct @enforce_keys ++
+              [inner: :closed, health: nil, retry_ms: @retry_ms, retry: nil, watchdog: nil]
+
+  @type kind :: :drive | :ptz | :camera
+  @type status :: {:online | {:offline, reason :: term()}, since_ms :: integer()}
+
+  @doc "Starts the device; it opens its driver afterwards. Wrong options raise `ArgumentError`."
+  @spec start_link(keyword()) :: GenServer.on_start()
+  def start_link(options) do
+    {name, options} = Keyword.split(options, [:name])
+    GenServer.start_link(__MODULE__, new!(options), name)
+  end
+
+  @doc "A child of a supervisor; several devices may have the same one."
+  @spec child_spec(keyword()) :: Supervisor.child_spec()
+  def child_spec(options) do
+    id = {__MODULE__, options[:device] || options[:kind]}
+    %{id: id, start: {__MODULE__, :start_link, [options]}}
+  end
+
+  @doc "Asks a drive for a speed. While it is offline, this is lost."
+  @spec drive(GenServer.server(), Twist.t()) :: :ok
+  def drive(device, %Twist{} = twist), do: GenServer.cast(device, {:drive, twist})
+
+  @doc "Asks a pan-tilt unit to look there (radians, left and up positive). While it is offline, this is lost."
+  @spec look(GenServer.server(), pan :: float(), tilt :: float()) :: :ok
+  def look(device, pan, tilt) when is_float(pan) and is_float(tilt),
+    do: GenServer.cast(device, {:look, pan, tilt})
+
+  @impl GenServer
+  def init(device) do
+    # So that `terminate/2` runs, and stops the wheels, when the supervisor ends us.
+    Process.flag(:trap_exit, true)
+    {:ok, device, {:continue, :open}}
+  end
+
+  @impl GenServer
+  def handle_continue(:open, s), do: {:noreply, open(s)}
+
+  @impl GenServer
+  def handle_cast({:drive, twist}, %{kind: :drive, inner: {:open, inner}} = s) do
+    s = arm(s, twist)
+    {:noreply, done(s, s.driver.drive(twist, inner))}
+  end
+
+  def handle_cast({:look, pan, tilt}, %{kind: :ptz, inner: {:open, inner}} = s),
+    do: {:noreply, done(s, s.driver.look(pan, tilt, inner))}
+
+  def handle_cast(_command, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info({:open, ref}, %{retry: ref} = s), do: {:noreply, open(%{s | retry: nil})}
+  def handle_info({:open, _old}, s), do: {:noreply, s}
+
+  def handle_info({:watchdog, ref}, %{watchdog: {_timer, ref}, inner: {:open, inner}} = s) do
+    Event.execute([:hal, :device, :watchdog], %{at_ms: now(s)}, about(s))
+    {:noreply, done(%{s | watchdog: nil}, s.driver.drive(Twist.zero(), inner))}
+  end
+
+  def handle_info({:watchdog, _old}, s), do: {:noreply, s}
+
+  def handle_info(message, %{inner: {:open, inner}} = s) do
+    case s.driver.handle_message(message, inner) do
+      {:ok, [], inner} ->
+        {:noreply, %{s | inner: {:open, inner}}}
+
+      {:ok, readings, inner} ->
+        for reading <- readings, do: hand_on(s, reading)
+        {:noreply, ask(%{s | inner: {:open, inner}, retry_ms: @retry_ms})}
+
+      {:error, reason, inner} ->
+        {:noreply, fail(s, reason, inner)}
+    end
+  end
+
+  # What a driver that is closed by now had asked for.
+  def handle_info(_late, s), do: {:noreply, s}
+
+  @impl GenServer
+  def terminate(reason, s) do
+    with {:open, inner} <- s.inner, do: s.driver.terminate(inner)
+
+    case reason do
+      :normal -> :ok
+      :shutdown -> :ok
+      {:shutdown, _} -> :ok
+      _crash -> rest()
+    end
+  end
+
+  # A shutdown asked for meanwhile is not kept waiting.
+  defp rest do
+    receive do
+      {:EXIT, _parent, :shutdown} -> :ok
+    after
+      @rest_ms -> :ok
+    end
+  end
+
+  defp open(s) do
+    case s.driver.init(s.options) do
+      {:ok, inner} -> ask(report(%{s | inner: {:open, inner}}, :online))
+      {:error, reason} -> retry(report(s, {:offline, reason}))
+    end
+  end
+
+  defp done(s, {:ok, inner}), do: %{s | inner: {:open, inner}}
+  defp done(s, {:error, reason, inner}), do: fail(s, reason, inner)
+
+  defp fail(s, reason, inner) do
+    s.driver.terminate(inner)
+    retry(report(%{disarm(s) | inner: :closed}, {:offline, reason}))
+  end
+
+  defp retry(s) do
+    ref = make_ref()
+    Process.send_after(self(), {:open, ref}, s.retry_ms)
+    %{s | retry: ref, retry_ms: min(2 * s.retry_ms, @longest_retry_ms)}
+  end
+
+  # A camera gives its next picture only once the last one was handed on.
+  defp ask(%{kind: :camera, inner: {:open, inner}} = s), do: done(s, s.driver.next(inner))
+  defp ask(s), do: s
+
+  defp arm(s, twist) do
+    s = disarm(s)
+
+    if Twist.zero?(twist) do
+      s
+    else
+      ref = make_ref()
+      %{s | watchdog: {Process.send_after(self(), {:watchdog, ref}, @watchdog_ms), ref}}
+    end
+  end
+
+  defp disarm(%{watchdog: nil} = s), do: s
+
+  defp disarm(%{watchdog: {timer, _ref}} = s) do
+    Process.cancel_timer(timer)
+    %{s | watchdog: nil}
+  end
+
+  defp report(%{health: {condition, _since}} = s, condition), do: s
+
+  defp report(s, condition) do
+    at_ms = now(s)
+
+    case condition do
+      :online ->
+        Event.execute([:hal, :device, :online], %{at_ms: at_ms}, about(s))
+
+      {:offline, reason} ->
+        about = Map.put(about(s), :reason, reason)
+        Event.execute([:hal, :device, :offline], %{at_ms: at_ms}, about)
+    end
+
+    health = {condition, since(s.health, condition, at_ms)}
+    hand_on(s, {:health, s.device, health})
+    %{s | health: health}
+  end
+
+  # Another reason to be offline is no new beginning.
+  defp since({{:offline, _}, since_ms}, {:offline, _}, _at_ms), do: since_ms
+  defp since(_before, _condition, at_ms), do: at_ms
+
+  defp hand_on(s, reading), do: for({m, f, a} <- s.sinks, do: apply(m, f, a ++ [reading]))
+
+  defp about(s), do: %{device: s.device, driver: s.driver}
+
+  defp now(%{clock: {m, f, a}}), do: apply(m, f, a)
+
+  defp new!(options) do
+    options =
+      Keyword.validate!(options, [
+        :kind,
+        :driver,
+        :device,
+        sinks: [],
+        clock: {System, :monotonic_time, [:millisecond]}
+      ])
+
+    unless options[:kind] in [:drive, :ptz, :camera],
+      do: refuse!(:kind, options[:kind], ":drive, :ptz or :camera")
+
+    {driver, driver_options} =
+      case options[:driver] do
+        {module, list} when is_atom(module) and is_list(list) -> {module, list}
+        other -> refuse!(:driver, other, "{module, options}")
+      end
+
+    struct!(__MODULE__,
+      kind: options[:kind],
+      device: options[:device] || options[:kind],
+      driver: driver,
+      options: driver_options,
+      sinks: options[:sinks],
+      clock: options[:clock]
+    )
+  end
+
+  @spec refuse!(atom(), term(), String.t()) :: no_return()
+  defp refuse!(option, value, allowed) do
+    raise ArgumentError,
+          "device option #{inspect(option)} cannot be #{inspect(value)}: it must be #{allowed}"
+  end
+end

@@ -1,0 +1,122 @@
+defmodule Hal.Event do
+  @moduledoc """
+  Events in telemetry's shape: what happened, numbers, and about whom. Libraries never log; they
+  emit events, and whoever wants to know attaches a function. Where `:telemetry` is loaded, every
+  event is handed on to it too.
+
+  Before the `:hal` application is started an event is simply lost.
+
+  | event | measurements | metadata |
+  |---|---|---|
+  | `[:hal, :device, :online]` | `at_ms` | `device`, `driver` |
+  | `[:hal, :device, :offline]` | `at_ms` | `device`, `driver`, `reason` |
+  | `[:hal, :device, :watchdog]` | `at_ms` | `device`, `driver`: no speed came in time, the wheels were stopped |
+  | `[:hal, :event, :failure]` | | `handler`, `event`, `kind`, `reason`: a handler failed and is detached |
+  | `[:robot, :gate, :start]` | `at_ms` | `robot`, `latched?` |
+  | `[:robot, :gate, :limits]` | `at_ms` | `robot`, `limits`: why the speed is limited has changed |
+  | `[:robot, :gate, :estop]`, `[:robot, :gate, :reset]` | `at_ms` | `robot` |
+  | `[:robot, :estop_file, :error]` | | `robot`, `reason`: the latch holds, but would not outlive a restart of the board |
+  | `[:robot, :executive, :start]` | `at_ms` | `robot`: the robot is idle |
+  | `[:robot, :executive, :slow]` | `at_ms`, `duration_ms` | `robot`: a tick took over 50 ms |
+  | `[:robot, :pilot, :phase]` | `at_ms` | `robot`, `state`: `:idle` or `{mission, phase}` |
+  | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and what the mission adds |
+  """
+  require Logger
+
+  @table __MODULE__
+
+  @type name :: [atom(), ...]
+  @type handler :: (name(), measurements :: map(), metadata :: map(), config :: term() -> term())
+
+  @doc """
+  Tells all handlers of this event, in the calling process.
+
+      iex> Hal.Event.execute([:nobody, :listens], %{at_ms: 5}, %{robot: :mag1})
+      :ok
+  """
+  @spec execute(name(), map(), map()) :: :ok
+  def execute(event, measurements, metadata \\ %{})
+      when is_list(event) and is_map(measurements) and is_map(metadata) do
+    for {_key, id, function, config} <- handlers(event) do
+      run(id, function, event, measurements, metadata, config)
+    end
+
+    # Not a dependency: a project that has telemetry gets our events there.
+    if :erlang.function_exported(:telemetry, :execute, 3),
+      do: apply(:telemetry, :execute, [event, measurements, metadata])
+
+    :ok
+  end
+
+  @doc """
+  Calls `function.(event, measurements, metadata, config)` at each such event, until detached.
+  A function that raises, throws or exits is detached.
+
+      iex> Hal.Event.attach(:doc, [:doc, :event], fn _, %{n: n}, _, to -> send(to, n) end, self())
+      :ok
+      iex> Hal.Event.attach(:doc, [:doc, :event], fn _, _, _, _ -> :ok end, nil)
+      {:error, :already_exists}
+      iex> Hal.Event.execute([:doc, :event], %{n: 7})
+      iex> receive do n -> n end
+      7
+      iex> Hal.Event.detach(:doc)
+      :ok
+  """
+  @spec attach(id :: term(), name(), handler(), config :: term()) ::
+          :ok | {:error, :already_exists}
+  def attach(id, [first | _] = event, function, config)
+      when is_atom(first) and is_function(function, 4) do
+    if :ets.insert_new(@table, {{:id, id}, event}) do
+      :ets.insert(@table, {{:event, event}, id, function, config})
+      :ok
+    else
+      {:error, :already_exists}
+    end
+  end
+
+  @doc """
+  Ends a handler.
+
+      iex> Hal.Event.detach(:never_attached)
+      {:error, :not_found}
+  """
+  @spec detach(id :: term()) :: :ok | {:error, :not_found}
+  def detach(id) do
+    case :ets.take(@table, {:id, id}) do
+      [{_key, event}] ->
+        :ets.match_delete(@table, {{:event, event}, id, :_, :_})
+        :ok
+
+      [] ->
+        {:error, :not_found}
+    end
+  end
+
+  @doc false
+  def create_table do
+    # A bag, so that one lookup finds all handlers of an event; `insert_new` keeps ids unique.
+    :ets.new(@table, [:bag, :public, :named_table, read_concurrency: true])
+  end
+
+  defp handlers(event) do
+    case :ets.whereis(@table) do
+      :undefined -> []
+      table -> :ets.lookup(table, {:event, event})
+    end
+  end
+
+  # The handler is somebody else's code running in, say, the gate: whatever it does must not stop
+  # a robot. This is the one place that catches everything.
+  defp run(id, function, event, measurements, metadata, config) do
+    function.(event, measurements, metadata, config)
+  catch
+    kind, reason ->
+      detach(id)
+      Logger.error("event handler #{inspect(id)} detached: #{inspect({kind, reason})}")
+
+      if event != [:hal, :event, :failure] do
+        failure = %{handler: id, event: event, kind: kind, reason: reason}
+        execute([:hal, :event, :failure], %{}, failure)
+      end
+  end
+end

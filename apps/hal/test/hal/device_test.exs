@@ -1,0 +1,124 @@
+defmodule Hal.DeviceTest do
+  use ExUnit.Case, async: true
+  import ExUnit.CaptureLog
+  alias Hal.{Device, Frame, Twist}
+
+  @modules [drive: Hal.FakeDrive, ptz: Hal.FakePtz, camera: Hal.FakeCamera]
+
+  defp device(kind, options \\ []) do
+    driver = {@modules[kind], [test: self(), device: kind] ++ options}
+    options = [kind: kind, driver: driver, sinks: [{Kernel, :send, [self()]}]]
+    start_supervised!({Device, options})
+  end
+
+  defp answers(list) do
+    {:ok, agent} = Agent.start_link(fn -> list end)
+
+    fn ->
+      Agent.get_and_update(agent, fn
+        [last] -> {last, [last]}
+        [next | rest] -> {next, rest}
+      end)
+    end
+  end
+
+  test "opens, says so, hands readings on, and drives" do
+    pid = device(:drive)
+    assert_receive {:drive, :init, ^pid}
+    assert_receive {:health, :drive, {:online, since}} when is_integer(since)
+
+    send(pid, {:readings, [{:bumpers, [3]}, {:power, 24.0}]})
+    assert_receive {:bumpers, [3]}
+    assert_receive {:power, 24.0}
+
+    twist = Twist.new(0.3, 0.1)
+    assert Device.drive(pid, twist) == :ok
+    assert_receive {:drive, {:drive, ^twist}, ^pid}
+  end
+
+  test "a drive that hears no more speeds stops its wheels, once" do
+    pid = device(:drive)
+    twist = Twist.new(0.3, 0.0)
+    zero = Twist.zero()
+    Device.drive(pid, twist)
+    assert_receive {:drive, {:drive, ^twist}, ^pid}
+    refute_receive {:drive, {:drive, ^zero}, ^pid}, 400
+    assert_receive {:drive, {:drive, ^zero}, ^pid}, 200
+    refute_receive {:drive, {:drive, _}, ^pid}, 600
+  end
+
+  test "a missing device is tried again, ever more slowly" do
+    device(:drive, open: answers([{:error, :enoent}, {:error, :enoent}, {:error, :ebusy}, :ok]))
+    assert_receive {:health, :drive, {{:offline, :enoent}, since}}
+    assert_receive {:drive, :init, _}
+    assert_receive {:drive, :init, _}, 200
+    refute_receive {:drive, :init, _}, 150
+    assert_receive {:health, :drive, {{:offline, :ebusy}, ^since}}, 200
+    assert_receive {:health, :drive, {:online, later}} when later > since, 600
+  end
+
+  test "a driver that reports an error is closed and opened again" do
+    pid = device(:drive)
+    assert_receive {:health, :drive, {:online, _}}
+    send(pid, {:fail, :eio})
+    assert_receive {:drive, :terminate, ^pid}
+    assert_receive {:health, :drive, {{:offline, :eio}, _}}
+    # Nobody is there to drive meanwhile, and that is no error.
+    Device.drive(pid, Twist.new(0.1, 0.0))
+    assert_receive {:health, :drive, {:online, _}}, 300
+    refute_received {:drive, {:drive, _}, _}
+  end
+
+  test "a driver that raises is closed, and its device restarted" do
+    log =
+      capture_log(fn ->
+        pid = device(:drive)
+        assert_receive {:drive, :init, ^pid}
+        monitor = Process.monitor(pid)
+        send(pid, :raise)
+        assert_receive {:drive, :terminate, ^pid}
+        refute_receive {:DOWN, ^monitor, _, _, _}, 300
+        assert_receive {:DOWN, ^monitor, _, _, _}, 500
+        assert_receive {:drive, :init, other} when other != pid
+      end)
+
+    assert log =~ "was told to"
+  end
+
+  test "ends with its supervisor, and stops the motors first" do
+    pid = device(:drive)
+    assert_receive {:drive, :init, ^pid}
+    stop_supervised!({Device, :drive})
+    assert_received {:drive, :terminate, ^pid}
+  end
+
+  test "a pan-tilt unit looks" do
+    pid = device(:ptz)
+    Device.look(pid, 0.5, 0.0)
+    assert_receive {:ptz, {:look, 0.5, 0.0}, ^pid}
+    Device.drive(pid, Twist.zero())
+    send(pid, {:readings, [{:ptz, %{pan: 0.5, tilt: 0.0, field_of_view: 1.0}}]})
+    assert_receive {:ptz, %{pan: 0.5}}
+  end
+
+  test "a camera is asked for the next frame when the last was handed on" do
+    pid = device(:camera)
+    assert_receive {:camera, :next, ^pid}
+    send(pid, :something_unknown)
+    refute_receive {:camera, :next, ^pid}, 50
+    {:ok, frame} = Frame.new(:yuyv, 2, 1, <<1, 2, 3, 4>>, 7)
+    send(pid, {:readings, [{:frame, frame}]})
+    assert_receive {:frame, ^frame}
+    assert_receive {:camera, :next, ^pid}
+  end
+
+  test "wrong options are named" do
+    assert_raise ArgumentError, ~r/:kind cannot be :wheels: .*:drive, :ptz or :camera/, fn ->
+      Device.start_link(kind: :wheels, driver: {Hal.FakeDrive, []})
+    end
+
+    assert_raise ArgumentError, ~r/:driver cannot be Hal.FakeDrive/, fn ->
+      Device.start_link(kind: :drive, driver: Hal.FakeDrive)
+    end
+  end
+end

@@ -1,0 +1,97 @@
+defmodule Hal.Fake do
+  @moduledoc """
+  Drivers for tests, which tell the test process what they are asked to do, as
+  `{device, what, pid of the device's process}`.
+
+  Options: `:test` (pid), `:device` (what it calls itself), `:open` (a function of no arguments
+  that gives `:ok`, `{:error, reason}` or raises; asked at each opening).
+
+  A device process that runs one does as it is told by messages: `{:readings, list}`,
+  `{:fail, reason}`, `:raise`.
+  """
+
+  @doc "Opens."
+  def init(options) do
+    tell(options, :init)
+
+    case Keyword.get(options, :open, fn -> :ok end).() do
+      :ok -> {:ok, options}
+      {:error, reason} -> {:error, reason}
+    end
+  end
+
+  @doc "Does what the message says."
+  def handle_message({:readings, readings}, options), do: {:ok, readings, options}
+  def handle_message({:fail, reason}, options), do: {:error, reason, options}
+  def handle_message(:raise, options), do: raise("#{inspect(options[:device])} was told to")
+  def handle_message(_other, options), do: {:ok, [], options}
+
+  @doc "Closes."
+  def terminate(options) do
+    tell(options, :terminate)
+    :ok
+  end
+
+  @doc "Tells the test."
+  def tell(options, what), do: send(options[:test], {options[:device], what, self()})
+end
+
+defmodule Hal.FakeDrive do
+  @moduledoc "See `Hal.Fake`. Tells `{:drive, twist}`."
+  @behaviour Hal.Drive
+
+  @impl Hal.Drive
+  defdelegate init(options), to: Hal.Fake
+
+  @impl Hal.Drive
+  def drive(twist, options) do
+    Hal.Fake.tell(options, {:drive, twist})
+    {:ok, options}
+  end
+
+  @impl Hal.Drive
+  defdelegate handle_message(message, options), to: Hal.Fake
+
+  @impl Hal.Drive
+  defdelegate terminate(options), to: Hal.Fake
+end
+
+defmodule Hal.FakePtz do
+  @moduledoc "See `Hal.Fake`. Tells `{:look, pan, tilt}`."
+  @behaviour Hal.Ptz
+
+  @impl Hal.Ptz
+  defdelegate init(options), to: Hal.Fake
+
+  @impl Hal.Ptz
+  def look(pan, tilt, options) do
+    Hal.Fake.tell(options, {:look, pan, tilt})
+    {:ok, options}
+  end
+
+  @impl Hal.Ptz
+  defdelegate handle_message(message, options), to: Hal.Fake
+
+  @impl Hal.Ptz
+  defdelegate terminate(options), to: Hal.Fake
+end
+
+defmodule Hal.FakeCamera do
+  @moduledoc "See `Hal.Fake`. Tells `:next`."
+  @behaviour Hal.Camera
+
+  @impl Hal.Camera
+  defdelegate init(options), to: Hal.Fake
+
+  @impl Hal.Camera
+  def next(options) do
+    Hal.Fake.tell(options, :next)
+    {:ok, options}
+  end
+
+  @impl Hal.Camera
+  defdelegate handle_message(message, options), to: Hal.Fake
+
+  @impl Hal.Camera
+  defdelegate terminate(options), to: Hal.Fake
+end
