@@ -13,7 +13,7 @@ defmodule Vision.MixProject do
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
       compilers: [:native | Mix.compilers()],
-      native: [],
+      native: [nifs: [blobs: ["blobs.c", "blobs_nif.c"]]],
       elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
       deps: [{:hal, in_umbrella: true}]

@@ -1,0 +1,88 @@
+defmodule Vision do
+  @moduledoc """
+  Finds coloured regions in camera frames: `blobs/2`. What is a colour says `Vision.Colours`,
+  what is a region `Vision.Backend`; `Vision.Filter` chooses among blobs.
+  """
+  alias Hal.Frame
+  alias Vision.{Backend, Blob, Colours}
+
+  @doc """
+  The blobs of a frame: by colour in the order of the colour file, largest first.
+
+  The backend is the fastest that reads the format, unless one is given. The error is the frame's
+  (`{:bytes, got, :expected, n}`, `{:size, {w, h}}`), `{:format, format}` where the given backend does
+  not read it, or `:memory`.
+
+      iex> yellow = %{name: "Yellow", y: {170, 240}, u: {60, 90}, v: {130, 145}}
+      iex> {:ok, colours} = Vision.Colours.new([yellow], min_area: 2)
+      iex> {:ok, frame} = Hal.Frame.new(:yuyv, 4, 1, <<200, 70, 200, 140, 0, 128, 0, 128>>, 0)
+      iex> {:ok, [blob]} = Vision.blobs(frame, colours)
+      iex> {blob.colour, blob.area, blob.x, blob.left, blob.right, blob.share, blob.clipped?}
+      {"Yellow", 2, 0.5, 0, 1, 0.5, true}
+  """
+  @spec blobs(Frame.t(), Colours.t(), module() | nil) :: {:ok, [Blob.t()]} | {:error, term()}
+  def blobs(%Frame{} = frame, %Colours{} = colours, backend \\ nil) do
+    with :ok <- check(frame),
+         {:ok, backend} <- backend(frame.format, backend),
+         {:ok, regions} <- backend.regions(frame, colours) do
+      classes = List.to_tuple(colours.classes)
+      {:ok, Enum.map(regions, &blob(&1, classes, frame))}
+    end
+  end
+
+  @doc """
+  Distance in metres of a blob that fills this share of the frame, by the constant of its colour.
+
+  The share falls with the square of the distance. Above one half the blob is larger than the
+  picture and tells nothing but "near".
+
+      iex> Vision.distance(0.0651, 0.0651)
+      1.0
+      iex> Vision.distance(0.0651, 0.6)
+      nil
+      iex> Vision.distance(nil, 0.01)
+      nil
+  """
+  @spec distance(constant :: number() | nil, share :: float()) :: float() | nil
+  def distance(nil, _share), do: nil
+  def distance(_constant, share) when share > 0.5, do: nil
+  def distance(constant, share), do: :math.sqrt(constant / share)
+
+  defp check(%Frame{format: format, width: width, height: height, bytes: bytes}) do
+    case Frame.byte_size(format, width, height) do
+      {:ok, size} when byte_size(bytes) == size -> :ok
+      {:ok, size} -> {:error, {:bytes, byte_size(bytes), :expected, size}}
+      {:error, reason} -> {:error, reason}
+    end
+  end
+
+  defp backend(format, nil),
+    do: {:ok, if(Backend.Native.reads?(format), do: Backend.Native, else: Backend.Reference)}
+
+  defp backend(format, backend),
+    do: if(backend.reads?(format), do: {:ok, backend}, else: {:error, {:format, format}})
+
+  defp blob({k, area, sum_x, sum_y, left, top, right, bottom}, classes, %Frame{
+         width: w,
+         height: h
+       }) do
+    class = elem(classes, k)
+    share = area / (w * h)
+
+    %Blob{
+      colour: class.name,
+      area: area,
+      share: share,
+      x: sum_x / area,
+      y: sum_y / area,
+      left: left,
+      top: top,
+      right: right,
+      bottom: bottom,
+      width: w,
+      height: h,
+      distance: distance(class.distance, share),
+      clipped?: left == 0 or top == 0 or right == w - 1 or bottom == h - 1
+    }
+  end
+end

@@ -1,0 +1,49 @@
+defmodule Vision.Backend.Native do
+  @moduledoc """
+  The blob finder in C, for yuyv, i420 and nv12. It makes no label image: runs of equal masks are
+  joined to those of the row above, and only runs and regions take memory. Runs on a dirty
+  scheduler, because a large or noisy frame may take more than a millisecond.
+  """
+  @behaviour Vision.Backend
+  @on_load :load
+  alias Hal.Frame
+  alias Vision.Colours
+
+  # As in blobs.c: areas fit into 32 bits.
+  @largest 32_768
+  @formats %{yuyv: 0, i420: 1, nv12: 2}
+
+  @doc false
+  def load do
+    # Without the library the stubs remain, and the reference does the work.
+    _ = :erlang.load_nif(to_charlist(Application.app_dir(:vision, "priv/blobs")), 0)
+    :ok
+  end
+
+  @doc "Whether the C library was built and loaded."
+  @spec loaded?() :: boolean()
+  def loaded?, do: false
+
+  @impl Vision.Backend
+  def reads?(format), do: is_map_key(@formats, format) and loaded?()
+
+  @impl Vision.Backend
+  def regions(%Frame{width: width, height: height}, _colours)
+      when width > @largest or height > @largest,
+      do: {:error, {:size, {width, height}}}
+
+  def regions(%Frame{} = frame, %Colours{} = colours) do
+    find(
+      Map.fetch!(@formats, frame.format),
+      frame.width,
+      frame.height,
+      frame.bytes,
+      colours.tables,
+      colours.min_area,
+      colours.max_area
+    )
+  end
+
+  defp find(_format, _width, _height, _bytes, _tables, _min_area, _max_area),
+    do: :erlang.nif_error(:nif_not_loaded)
+end

@@ -1,0 +1,159 @@
+defmodule Vision.Colours.Text do
+  @moduledoc false
+  # CMVision's reader is a machine with three states: it looks for a header, or it is inside one
+  # of the two sections. This is that machine; it also remembers which line ended a section, to
+  # be able to say why something is missing.
+
+  @longest 255
+  @colour_form "(R,G,B) merge expected Name with R, G, B from 0 to 255"
+  @threshold_form "(Ylo:Yhi,Ulo:Uhi,Vlo:Vhi) with whole numbers"
+
+  @type line_error :: {pos_integer(), String.t()} | String.t()
+
+  @spec classes(binary()) :: {:ok, [map()]} | {:error, line_error()}
+  def classes(text) do
+    with :ok <- check_text(text),
+         {:ok, scan} <- scan(text),
+         :ok <- check_counts(scan) do
+      {:ok,
+       Enum.zip_with(Enum.reverse(scan.colours), Enum.reverse(scan.thresholds), &Map.merge/2)}
+    end
+  end
+
+  defp check_text(text) do
+    cond do
+      not String.valid?(text) or String.contains?(text, <<0>>) ->
+        {:error, "not a text file"}
+
+      String.trim(text) == "" ->
+        {:error, "is empty: it needs a [Colors] and a [Thresholds] section"}
+
+      true ->
+        :ok
+    end
+  end
+
+  defp scan(text) do
+    start = %{section: nil, seen: [], colours: [], thresholds: [], swallowed: nil, ended: %{}}
+
+    text
+    |> String.split("\n")
+    |> Enum.with_index(1)
+    |> Enum.reduce_while({:ok, start}, fn {line, number}, {:ok, scan} ->
+      case read_line(String.trim_trailing(line, "\r"), number, scan) do
+        {:error, reason} -> {:halt, {:error, {number, reason}}}
+        scan -> {:cont, {:ok, scan}}
+      end
+    end)
+  end
+
+  defp read_line(line, _number, _scan) when byte_size(line) > @longest,
+    do: {:error, "#{byte_size(line)} bytes long, #{@longest} are allowed"}
+
+  defp read_line(line, number, %{section: nil} = scan) do
+    case header(line) do
+      nil -> scan
+      section -> if section in scan.seen, do: again(section), else: enter(scan, section, number)
+    end
+  end
+
+  defp read_line(line, number, %{section: :colours} = scan) do
+    case Regex.run(
+           ~r/^\(\s*([+-]?\d+),\s*([+-]?\d+),\s*([+-]?\d+)\)\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s+([+-]?\d+)\s*(\S+)/,
+           line
+         ) do
+      [_, r, g, b, merge, expected, name] -> colour(scan, {r, g, b}, merge, expected, name)
+      nil -> leave(scan, line, number, @colour_form)
+    end
+  end
+
+  defp read_line(line, number, %{section: :thresholds} = scan) do
+    case Regex.run(
+           ~r/^\(\s*([+-]?\d+):\s*([+-]?\d+),\s*([+-]?\d+):\s*([+-]?\d+),\s*([+-]?\d+):\s*([+-]?\d+)/,
+           line
+         ) do
+      [_ | numbers] -> thresholds(scan, Enum.map(numbers, &String.to_integer/1))
+      nil -> leave(scan, line, number, @threshold_form)
+    end
+  end
+
+  defp enter(scan, section, _number), do: %{scan | section: section, seen: [section | scan.seen]}
+
+  defp again(section), do: {:error, "a second #{title(section)} section: one is allowed"}
+
+  # A line in brackets was meant for the section: a broken one must not pass for its end.
+  defp leave(_scan, "(" <> _ = line, _number, form),
+    do: {:error, "#{inspect(line)} is not of the form #{form}"}
+
+  defp leave(scan, line, number, _form) do
+    ended = Map.put(scan.ended, scan.section, number)
+    swallowed = scan.swallowed || (header(line) && {number, header(line)})
+    %{scan | section: nil, ended: ended, swallowed: swallowed}
+  end
+
+  defp header(line) do
+    lower = String.downcase(line)
+
+    cond do
+      String.starts_with?(lower, "[colors]") -> :colours
+      String.starts_with?(lower, "[thresholds]") -> :thresholds
+      true -> nil
+    end
+  end
+
+  defp colour(scan, {r, g, b}, merge, expected, name) do
+    rgb = {String.to_integer(r), String.to_integer(g), String.to_integer(b)}
+
+    with true <- Enum.all?(Tuple.to_list(rgb), &(&1 in 0..255)),
+         {merge, ""} <- Float.parse(merge) do
+      colour = %{name: name, rgb: rgb, merge: merge, expected: String.to_integer(expected)}
+      %{scan | colours: [colour | scan.colours]}
+    else
+      _other -> {:error, "the colour #{name} is not of the form #{@colour_form}"}
+    end
+  end
+
+  defp thresholds(scan, [_, _, _, _, _, _] = limits) do
+    pairs = limits |> Enum.chunk_every(2) |> Enum.zip(~w(Y U V))
+
+    case Enum.find(pairs, fn {[lowest, highest], _channel} ->
+           lowest < 0 or highest > 255 or lowest > highest
+         end) do
+      nil ->
+        [y, u, v] = limits |> Enum.chunk_every(2) |> Enum.map(&List.to_tuple/1)
+        %{scan | thresholds: [%{y: y, u: u, v: v} | scan.thresholds]}
+
+      {[lowest, highest], channel} ->
+        {:error,
+         "threshold #{channel} #{lowest}:#{highest} is out of range: 0 to 255 is allowed, the lower number first"}
+    end
+  end
+
+  defp check_counts(%{swallowed: {number, section}}) do
+    {:error,
+     {number,
+      "the #{title(section)} header needs a blank line before it, or it is taken for the end of #{title(other(section))}"}}
+  end
+
+  defp check_counts(%{colours: [], thresholds: []}),
+    do: {:error, "no colours found: it needs a [Colors] and a [Thresholds] section"}
+
+  defp check_counts(%{colours: colours, thresholds: thresholds, ended: ended})
+       when length(colours) != length(thresholds) do
+    hint =
+      for section <- [:colours, :thresholds], line = ended[section] do
+        "; #{title(section)} ended at line #{line}"
+      end
+
+    {:error,
+     "#{length(colours)} colours but #{length(thresholds)} thresholds: one line each is needed#{hint}"}
+  end
+
+  defp check_counts(_scan), do: :ok
+
+  defp title(:colours), do: "[Colors]"
+  defp title(:thresholds), do: "[Thresholds]"
+
+  defp other(:colours), do: :thresholds
+  defp other(:thresholds), do: :colours
+end

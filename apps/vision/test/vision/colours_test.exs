@@ -1,0 +1,124 @@
+defmodule Vision.ColoursTest do
+  use ExUnit.Case, async: true
+  doctest Vision.Colours
+  alias Vision.Colours
+
+  @good """
+  # a comment before any section is skipped
+  [Colors]
+  (255,255,0) 0.500000 10 YellowLandmark
+  ( 255, 0, 0) 1 1 RedRobot
+
+  [Unknown]
+  [Thresholds]
+  (170:240, 60: 90,130:145)
+  (20:170,80:120,150:240)
+  """
+
+  defp error(text), do: text |> Colours.parse(file: "f") |> elem(1)
+
+  test "reads classes in order, with display colour and limits" do
+    assert {:ok, %Colours{classes: [yellow, red], min_area: 20, max_area: 0}} =
+             Colours.parse(@good)
+
+    assert yellow == %{
+             name: "YellowLandmark",
+             rgb: {255, 255, 0},
+             merge: 0.5,
+             expected: 10,
+             y: {170, 240},
+             u: {60, 90},
+             v: {130, 145},
+             distance: nil
+           }
+
+    assert {red.name, red.merge, red.v} == {"RedRobot", 1.0, {150, 240}}
+  end
+
+  test "headers in any case, lines ended by CR LF, no last line end" do
+    text =
+      @good |> String.upcase() |> String.replace("\n", "\r\n") |> String.trim_trailing("\r\n")
+
+    assert {:ok, %Colours{classes: [%{name: "YELLOWLANDMARK"}, _red]}} = Colours.parse(text)
+  end
+
+  test "the tables hold each class's bit within its limits only" do
+    {:ok, colours} = Colours.parse(@good)
+    assert Colours.mask(colours, {170, 60, 130}) == 0b01
+    assert Colours.mask(colours, {240, 90, 145}) == 0b01
+    assert Colours.mask(colours, {241, 90, 145}) == 0
+    assert Colours.mask(colours, {170, 59, 130}) == 0
+    assert Colours.mask(colours, {20, 120, 240}) == 0b10
+  end
+
+  test "32 classes are read, the last has the highest bit; 33 are not" do
+    {:ok, colours} = many(32) |> Colours.parse()
+    assert Colours.mask(colours, {31, 1, 1}) == 0x80000000
+    assert error(many(33)) == "f: 33 colours: 1 to 32 are allowed"
+  end
+
+  test "a missing blank line is told as such" do
+    text = String.replace(@good, "\n\n[Unknown]", "")
+
+    assert error(text) ==
+             "f:5: the [Thresholds] header needs a blank line before it, or it is taken for the end of [Colors]"
+  end
+
+  test "limits out of range, the wrong way round or broken are named" do
+    for {limits, said} <- [
+          {"(-5:240,60:90,130:145)", "f:8: threshold Y -5:240 is out of range"},
+          {"(170:240,60:300,130:145)", "f:8: threshold U 60:300 is out of range"},
+          {"(170:240,60:90,145:130)", "f:8: threshold V 145:130 is out of range"},
+          {"(170:abc,60:90,130:145)",
+           "f:8: \"(170:abc,60:90,130:145)\" is not of the form (Ylo:Yhi"}
+        ] do
+      text = String.replace(@good, "(170:240, 60: 90,130:145)", limits)
+      assert error(text) =~ said
+      assert error(text) |> String.split("\n") |> length() == 1
+    end
+  end
+
+  test "thresholds missing or left over say which line ended a section" do
+    assert error(String.replace(@good, "(20:170,80:120,150:240)\n", "")) =~
+             "f: 2 colours but 1 thresholds: one line each is needed; [Colors] ended at line 5"
+
+    assert error(String.replace(@good, "\n( 255", "\n# red\n( 255")) =~ "[Colors] ended at line 4"
+  end
+
+  test "other wrong files" do
+    assert error("") =~ "f: is empty"
+    assert error("hello\nworld\n") =~ "f: no colours found"
+    assert error(<<0, 255, 17, 3>>) == "f: not a text file"
+    assert error(@good <> "\n[Colors]\n") == "f:11: a second [Colors] section: one is allowed"
+    assert error(String.duplicate("x", 300)) == "f:1: 300 bytes long, 255 are allowed"
+
+    assert error(String.replace(@good, "(255,255,0)", "(256,255,0)")) =~
+             "f:3: the colour YellowLandmark"
+
+    assert error(String.replace(@good, "(255,255,0)", "(255,255)")) =~
+             "is not of the form (R,G,B)"
+
+    assert Colours.read("/") == {:error, "/: illegal operation on a directory"}
+  end
+
+  test "options are checked" do
+    assert {:error,
+            "colour file: distance for Blue, but the colours are YellowLandmark, RedRobot"} =
+             Colours.parse(@good, distance: %{"Blue" => 1.0})
+
+    assert {:error, "colour file: distance for RedRobot cannot be 0:" <> _} =
+             Colours.parse(@good, distance: %{"RedRobot" => 0})
+
+    assert {:error, "colour file: min_area cannot be 0: whole numbers from 1 are allowed"} =
+             Colours.parse(@good, min_area: 0)
+
+    assert {:error, _} = Colours.parse(@good, max_area: -1)
+    assert {:error, _} = Colours.parse(@good, min_area: 2.5)
+  end
+
+  defp many(n) do
+    colours = for k <- 1..n, do: "(1,2,3) 0.5 1 C#{k}\n"
+    limits = for k <- 1..n, do: "(#{k - 1}:#{k - 1},0:9,0:9)\n"
+    "[Colors]\n#{colours}\n[Thresholds]\n#{limits}"
+  end
+end

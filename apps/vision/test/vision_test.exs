@@ -1,0 +1,102 @@
+defmodule VisionTest do
+  use ExUnit.Case, async: true
+  doctest Vision
+  doctest Vision.Rgb
+  doctest Vision.Pixels
+  alias Hal.Frame
+  alias Vision.Backend.{Native, Reference}
+  alias Vision.{Colours, Rgb}
+
+  @yellow %{name: "YellowLandmark", y: {170, 240}, u: {60, 90}, v: {130, 145}}
+
+  # Drawn in RGB (220, 205, 90) on black; what the original CMVision makes of it was recorded.
+  @shapes [
+    {100..139, 50..79},
+    {140..149, 80..89},
+    {10..13, 10..14},
+    {20..22, 10..15},
+    {201..210, 100..100},
+    {201..203, 101..120},
+    {208..210, 101..120}
+  ]
+  @recorded [
+    {1200, 100, 139, 50, 79, {119.5, 64.5}},
+    {100, 140, 149, 80, 89, {144.5, 84.5}},
+    {88, 202, 209, 100, 120, {205.5, 109.545}},
+    {20, 10, 13, 10, 14, {11.5, 12.0}}
+  ]
+
+  setup_all do
+    assert Native.loaded?()
+    {:ok, colours} = Colours.new([@yellow], distance: %{"YellowLandmark" => 0.0651})
+    %{colours: colours}
+  end
+
+  defp drawing do
+    for y <- 0..239 do
+      for x <- 0..319 do
+        if Enum.any?(@shapes, fn {xs, ys} -> x in xs and y in ys end),
+          do: {220, 205, 90},
+          else: {0, 0, 0}
+      end
+    end
+  end
+
+  defp yuyv(rows) do
+    for row <- rows, [{y0, u, v}, {y1, _, _}] <- Enum.chunk_every(Rgb.row(row), 2), into: <<>> do
+      <<y0, u, y1, v>>
+    end
+  end
+
+  test "the recorded drawing, by both backends and from RGB", %{colours: colours} do
+    rows = drawing()
+    rgb = for row <- rows, {r, g, b} <- row, into: <<>>, do: <<r, g, b>>
+    {:ok, rgb} = Frame.new(:rgb24, 320, 240, rgb, 0)
+    {:ok, yuyv} = Frame.new(:yuyv, 320, 240, yuyv(rows), 0)
+
+    for {frame, backend} <- [{rgb, nil}, {yuyv, Reference}, {yuyv, Native}] do
+      assert {:ok, blobs} = Vision.blobs(frame, colours, backend)
+
+      assert @recorded ==
+               for(
+                 b <- blobs,
+                 do: {b.area, b.left, b.right, b.top, b.bottom, {b.x, Float.round(b.y, 3)}}
+               )
+
+      assert [%{colour: "YellowLandmark", share: share, clipped?: false, distance: metres} | _] =
+               blobs
+
+      assert_in_delta share, 1200 / 76_800, 1.0e-12
+      assert_in_delta metres, :math.sqrt(0.0651 / share), 1.0e-12
+    end
+  end
+
+  test "a blob at the border is clipped, one that fills the frame has no distance", %{
+    colours: colours
+  } do
+    {:ok, frame} = Frame.new(:yuyv, 8, 6, String.duplicate(<<200, 70, 200, 140>>, 24), 0)
+    assert {:ok, [%{clipped?: true, distance: nil, share: 1.0}]} = Vision.blobs(frame, colours)
+  end
+
+  test "a frame whose bytes do not fit is an error in each backend", %{colours: colours} do
+    frame = %Frame{format: :yuyv, width: 4, height: 2, bytes: <<1, 2, 3>>, at_ms: 0}
+
+    for backend <- [nil, Reference, Native] do
+      assert Vision.blobs(frame, colours, backend) == {:error, {:bytes, 3, :expected, 16}}
+      assert {:error, {:size, {3, 2}}} = Vision.blobs(%{frame | width: 3}, colours, backend)
+      assert {:error, {:size, {0, 2}}} = Vision.blobs(%{frame | width: 0}, colours, backend)
+    end
+  end
+
+  test "a format that the backend does not read is an error", %{colours: colours} do
+    {:ok, frame} = Frame.new(:rgb24, 1, 1, <<1, 2, 3>>, 0)
+    assert Vision.blobs(frame, colours, Native) == {:error, {:format, :rgb24}}
+    assert Vision.blobs(frame, colours) == {:ok, []}
+  end
+
+  test "a frame too large for the native backend is an error", %{colours: colours} do
+    bytes = :binary.copy(<<0>>, 2 * 40_000)
+    {:ok, frame} = Frame.new(:yuyv, 40_000, 1, bytes, 0)
+    assert Vision.blobs(frame, colours, Native) == {:error, {:size, {40_000, 1}}}
+  end
+end
