@@ -19,7 +19,19 @@ defmodule Robot.Behaviour do
   @doc "One tick."
   @callback tick(Percept.t(), state :: term()) :: result()
 
+  @doc "The same running behaviour with some options changed, as a target that moves every tick."
+  @callback update(keyword(), state :: term()) :: t()
+
+  @optional_callbacks update: 2
+
   @doc "One tick of a running behaviour."
   @spec tick(t(), Percept.t()) :: result()
   def tick({module, state}, %Percept{} = percept), do: module.tick(percept, state)
+
+  @doc "Changes options of a running behaviour; one that has nothing to change stays as it is."
+  @spec update(t(), keyword()) :: t()
+  def update({module, state} = behaviour, options) do
+    # Loaded already: the pair was made by its `new/1`.
+    if function_exported?(module, :update, 2), do: module.update(options, state), else: behaviour
+  end
 end

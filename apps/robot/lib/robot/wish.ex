@@ -3,27 +3,37 @@ defmodule Robot.Wish do
   What a behaviour proposes for the next tick: a speed, how much it matters (0 to 1), and,
   if it cares, where the camera should look (`look`, pan in radians, left positive).
 
+  A behaviour that wants to get somewhere also says the planar `velocity` it would like (map
+  frame, m/s) and the place it wants to reach (`goal`), so that `Robot.Behaviour.Avoid` can bend
+  the way round others before it becomes a speed of the wheels. Without a velocity the wish is
+  never bent, only slowed down. `reverse?` allows driving backwards.
+
   `by` names the behaviour, so that a person can ask why a robot did what it did.
   """
   alias Hal.Twist
 
   @enforce_keys [:by, :twist, :weight]
-  defstruct @enforce_keys ++ [look: nil]
+  defstruct @enforce_keys ++ [look: nil, velocity: nil, goal: nil, reverse?: false]
 
   @type t :: %__MODULE__{
           by: atom(),
           twist: Twist.t(),
           weight: float(),
-          look: float() | nil
+          look: float() | nil,
+          velocity: {vx :: float(), vy :: float()} | nil,
+          goal: {x :: float(), y :: float()} | nil,
+          reverse?: boolean()
         }
 
   @doc """
-  A wish.
+  A wish; the optional fields by name.
 
       iex> Robot.Wish.new(:stop, Hal.Twist.zero(), 0.1).weight
       0.1
+      iex> Robot.Wish.new(:goto, Hal.Twist.zero(), 0.5, velocity: {0.3, 0.0}).velocity
+      {0.3, 0.0}
   """
-  @spec new(atom(), Twist.t(), float()) :: t()
-  def new(by, %Twist{} = twist, weight) when weight >= 0 and weight <= 1,
-    do: %__MODULE__{by: by, twist: twist, weight: weight * 1.0}
+  @spec new(atom(), Twist.t(), number(), keyword()) :: t()
+  def new(by, %Twist{} = twist, weight, fields \\ []) when weight >= 0 and weight <= 1,
+    do: struct!(%__MODULE__{by: by, twist: twist, weight: weight * 1.0}, fields)
 end

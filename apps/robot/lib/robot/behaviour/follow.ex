@@ -1,0 +1,130 @@
+defmodule Robot.Behaviour.Follow do
+  @moduledoc """
+  Takes and keeps a place that may move, as a slot of a formation does (R34, R49): goes with the
+  place's own velocity and adds what closes the gap. In place it turns to the target's heading
+  and stands; it leaves again only when it is clearly off, so that it never chatters. It has no
+  outcome: following ends when it is told something else.
+
+  Options: `target` (`Hal.Pose`, required), `velocity` of the target (`{vx, vy}`, map frame, m/s,
+  default still), `tolerance` (metres, default 0.06), `leave` (metres off before it moves again,
+  default 0.12), `heading_tolerance` (radians, default 0.05), `speed` (m/s, default the profile's).
+  All may be changed by `update/2` at any tick.
+  """
+  @behaviour Robot.Behaviour
+  alias Hal.{Pose, Twist}
+  alias Robot.{Steering, Wish}
+  alias Robot.Behaviour.Options
+
+  # Nearer than this it backs up rather than turn round.
+  @back_up 0.6
+  # A target slower than this counts as standing.
+  @still 0.03
+
+  @impl Robot.Behaviour
+  def new(options) do
+    options =
+      Keyword.validate!(options, [
+        :target,
+        velocity: {0.0, 0.0},
+        tolerance: 0.06,
+        leave: 0.12,
+        heading_tolerance: 0.05,
+        speed: nil
+      ])
+
+    state = %{
+      target: Options.check!(options, :target, &match?(%Pose{}, &1), "a %Hal.Pose{}"),
+      velocity: Options.check!(options, :velocity, &velocity?/1, "{vx, vy} in m/s"),
+      tolerance: Options.number!(options, :tolerance, 0.005, 10.0),
+      leave: Options.number!(options, :leave, 0.005, 10.0),
+      heading_tolerance: Options.number!(options, :heading_tolerance, 0.005, 3.2),
+      speed: Options.optional!(options, :speed, 0.01, 10.0),
+      mode: :going,
+      turning?: true,
+      distance: nil
+    }
+
+    {__MODULE__, state}
+  end
+
+  defp velocity?({vx, vy}), do: is_number(vx) and is_number(vy) and abs(vx) + abs(vy) < 100
+  defp velocity?(_), do: false
+
+  @options [:target, :velocity, :tolerance, :leave, :heading_tolerance, :speed]
+
+  @impl Robot.Behaviour
+  def update(options, state) do
+    {_, fresh} = new(state |> Map.take(@options) |> Map.to_list() |> Keyword.merge(options))
+    {__MODULE__, Map.merge(state, Map.take(fresh, @options))}
+  end
+
+  @impl Robot.Behaviour
+  def tick(%{pose: nil}, state),
+    do: {:running, Wish.new(:follow, Twist.zero(), 0.5), {__MODULE__, state}}
+
+  def tick(%{pose: pose, profile: profile}, state) do
+    distance = Pose.distance(pose, state.target)
+    {vx, vy} = state.velocity
+    still? = :math.sqrt(vx * vx + vy * vy) < @still
+    state = %{state | mode: mode(state, distance, still?), distance: distance}
+
+    if state.mode == :in_place,
+      do: hold(pose, profile, state),
+      else: go(pose, profile, distance, still?, state)
+  end
+
+  defp mode(_state, _distance, false), do: :going
+
+  defp mode(%{mode: :in_place} = state, distance, true),
+    do: if(distance > state.leave, do: :going, else: :in_place)
+
+  # Half the tolerance is the aim; inside it, the moment the gap grows again is as good as it gets.
+  defp mode(%{mode: :going} = state, distance, true) do
+    receding? = state.distance != nil and distance > state.distance + 0.001
+
+    if distance < state.tolerance / 2 or (distance < state.tolerance and receding?),
+      do: :in_place,
+      else: :going
+  end
+
+  defp hold(pose, profile, state) do
+    error = Steering.turn_error(state.target.heading - pose.heading)
+    limit = if state.turning?, do: state.heading_tolerance / 3, else: state.heading_tolerance
+    turning? = abs(error) > limit
+    turn = if turning?, do: Steering.turn_rate(error, profile), else: 0.0
+
+    wish =
+      Wish.new(:follow, Twist.new(0, turn), 0.5,
+        velocity: {0.0, 0.0},
+        goal: Pose.point(state.target)
+      )
+
+    {:running, wish, {__MODULE__, %{state | turning?: turning?}}}
+  end
+
+  defp go(pose, profile, distance, still?, state) do
+    {vx, vy} = state.velocity
+    top = state.speed || profile.max_linear
+    closing = min(Steering.approach(distance, profile), top)
+    scale = if distance > 1.0e-6, do: closing / distance, else: 0.0
+    ux = vx + scale * (state.target.x - pose.x)
+    uy = vy + scale * (state.target.y - pose.y)
+    {ux, uy} = clip({ux, uy}, top)
+    reverse? = distance < @back_up
+    twist = Steering.twist({ux, uy}, pose.heading, profile, reverse: reverse?)
+
+    wish =
+      Wish.new(:follow, twist, 0.5,
+        velocity: {ux, uy},
+        goal: Pose.point(state.target),
+        reverse?: reverse?
+      )
+
+    {:running, wish, {__MODULE__, %{state | turning?: still?}}}
+  end
+
+  defp clip({x, y}, top) do
+    size = :math.sqrt(x * x + y * y)
+    if size > top, do: {x * top / size, y * top / size}, else: {x, y}
+  end
+end

@@ -1,0 +1,97 @@
+defmodule Robot.Behaviour.Goto do
+  @moduledoc """
+  Goes to a place and, when asked to, turns to a heading there (R33). It turns until it points at
+  the place, drives, and turns again only when it points clearly aside: two thresholds, so that it
+  does not chatter between both.
+
+  Options: `x`, `y` (map frame, metres, required), `heading` (radians, default none), `tolerance`
+  (metres, default 0.1), `heading_tolerance` (radians, default 0.05), `speed` (m/s, default the
+  profile's). Outcome 1: there. Without a pose it stands and waits.
+  """
+  @behaviour Robot.Behaviour
+  alias Hal.{Pose, Twist}
+  alias Robot.{Steering, Wish}
+  alias Robot.Behaviour.Options
+
+  @points_there 0.09
+  @points_aside 0.26
+
+  @impl Robot.Behaviour
+  def new(options) do
+    options =
+      Keyword.validate!(options, [
+        :x,
+        :y,
+        heading: nil,
+        tolerance: 0.1,
+        heading_tolerance: 0.05,
+        speed: nil
+      ])
+
+    state = %{
+      x: Options.number!(options, :x),
+      y: Options.number!(options, :y),
+      heading: Options.optional!(options, :heading),
+      tolerance: Options.number!(options, :tolerance, 0.005, 10.0),
+      heading_tolerance: Options.number!(options, :heading_tolerance, 0.005, 3.2),
+      speed: Options.optional!(options, :speed, 0.01, 10.0),
+      mode: :turning
+    }
+
+    {__MODULE__, state}
+  end
+
+  @impl Robot.Behaviour
+  def update(options, state) do
+    kept = Map.take(state, [:x, :y, :heading, :tolerance, :heading_tolerance, :speed])
+    {_, fresh} = new(Keyword.merge(Map.to_list(kept), options))
+    {__MODULE__, %{fresh | mode: state.mode}}
+  end
+
+  @impl Robot.Behaviour
+  def tick(%{pose: nil}, state), do: {:running, stand(), {__MODULE__, state}}
+
+  def tick(%{pose: pose, profile: profile}, state) do
+    distance = Pose.distance(pose, {state.x, state.y})
+    # Once there, a robot that only turns may not be sent off again by a wobble of its pose.
+    near = if state.mode == :aligning, do: 2 * state.tolerance, else: state.tolerance
+
+    if distance < near,
+      do: arrive(pose, profile, state),
+      else: approach(pose, profile, distance, state)
+  end
+
+  defp arrive(_pose, _profile, %{heading: nil}), do: {:done, 1, stand()}
+
+  defp arrive(pose, profile, state) do
+    error = Steering.turn_error(state.heading - pose.heading)
+
+    if abs(error) < state.heading_tolerance do
+      {:done, 1, stand()}
+    else
+      wish = Wish.new(:goto, Twist.new(0, Steering.turn_rate(error, profile)), 0.5)
+      {:running, wish, {__MODULE__, %{state | mode: :aligning}}}
+    end
+  end
+
+  defp approach(pose, profile, distance, state) do
+    direction = :math.atan2(state.y - pose.y, state.x - pose.x)
+    error = Steering.turn_error(direction - pose.heading)
+    mode = mode(state.mode, abs(error))
+    speed = min(Steering.approach(distance, profile), state.speed || profile.max_linear)
+    linear = if mode == :driving, do: speed * Steering.alignment(error), else: 0.0
+
+    wish =
+      Wish.new(:goto, Twist.new(linear, Steering.turn_rate(error, profile)), 0.5,
+        velocity: {speed * :math.cos(direction), speed * :math.sin(direction)},
+        goal: {state.x, state.y}
+      )
+
+    {:running, wish, {__MODULE__, %{state | mode: mode}}}
+  end
+
+  defp mode(:driving, error), do: if(error > @points_aside, do: :turning, else: :driving)
+  defp mode(_turning, error), do: if(error < @points_there, do: :driving, else: :turning)
+
+  defp stand, do: Wish.new(:goto, Twist.zero(), 0.5)
+end

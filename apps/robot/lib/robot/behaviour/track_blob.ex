@@ -1,0 +1,189 @@
+defmodule Robot.Behaviour.TrackBlob do
+  @moduledoc """
+  Keeps a coloured thing in front of the body and at its distance (R36, R37): the leader's errand.
+  Never ends.
+
+  Pictures wobble (R44), so direction and distance are filtered, and both have two thresholds: the
+  robot starts to turn when clearly off and stops when well centred, and likewise for the
+  distance; in between it stands really still. When the thing is lost it turns to where it was
+  last seen, then on to that side for one full turn, and then waits.
+
+  Options: `colour` (default any), `min_share` (default 0.0003), `near` and `far` (metres, default
+  1.0 and 1.5), `max_turn` (rad/s, default 0.4, so that followers keep up), `speed` (m/s, default 0.3).
+  """
+  @behaviour Robot.Behaviour
+  alias Hal.{Pose, Twist}
+  alias Robot.Behaviour.{Options, Sighting}
+  alias Robot.{Steering, Wish}
+
+  # Radians: where turning begins, and where it is good enough.
+  @off_centre 0.04
+  @centred 0.012
+  # Only drive while the thing is about ahead.
+  @ahead 0.3
+  # Share of a new picture in the filtered value, while standing and while moving.
+  @calm 0.3
+  @lively 0.7
+  @lost_ms 700
+  # A thing that fills the picture is too near to be measured.
+  @too_near_share 0.3
+
+  @impl Robot.Behaviour
+  def new(options) do
+    options =
+      Keyword.validate!(options,
+        colour: nil,
+        min_share: 0.0003,
+        near: 1.0,
+        far: 1.5,
+        max_turn: 0.4,
+        speed: 0.3
+      )
+
+    state = %{
+      colour: Options.check!(options, :colour, &(is_nil(&1) or is_binary(&1)), "a colour's name"),
+      min_share: Options.number!(options, :min_share, 0.0, 1.0),
+      near: Options.number!(options, :near, 0.1, 20.0),
+      far: Options.number!(options, :far, 0.1, 20.0),
+      max_turn: Options.number!(options, :max_turn, 0.01, 10.0),
+      speed: Options.number!(options, :speed, 0.01, 10.0),
+      error: nil,
+      side: 1,
+      distance: nil,
+      heading: nil,
+      picture_ms: nil,
+      seen_ms: nil,
+      turning?: false,
+      driving: 0,
+      searched: 0.0
+    }
+
+    if state.near > state.far,
+      do: raise(ArgumentError, "option near cannot be #{state.near}: at most far is allowed")
+
+    {__MODULE__, state}
+  end
+
+  @options [:colour, :min_share, :near, :far, :max_turn, :speed]
+
+  @impl Robot.Behaviour
+  def update(options, state) do
+    {_, fresh} = new(state |> Map.take(@options) |> Map.to_list() |> Keyword.merge(options))
+    {__MODULE__, Map.merge(state, Map.take(fresh, @options))}
+  end
+
+  @impl Robot.Behaviour
+  def tick(percept, state) do
+    state = state |> carry(percept) |> look(percept)
+
+    cond do
+      state.error == nil -> stand(state)
+      percept.at_ms - state.seen_ms <= @lost_ms -> hold(percept, state)
+      true -> search(percept, state)
+    end
+  end
+
+  # The remembered direction is relative to the body, so it moves when the body turns. Wheels
+  # tell this better than the pose, which may jump when it is corrected.
+  defp carry(state, percept) do
+    heading = heading(percept)
+
+    if state.heading && heading && state.error do
+      step = Pose.wrap(heading - state.heading)
+      error = Pose.wrap(state.error - step)
+      %{state | heading: heading, error: error, searched: state.searched + abs(step)}
+    else
+      %{state | heading: heading}
+    end
+  end
+
+  defp heading(%{odometry: %{pose: pose}}), do: pose.heading
+  defp heading(%{pose: %Pose{heading: heading}}), do: heading
+  defp heading(_percept), do: nil
+
+  # One picture counts once, however many ticks it is fresh.
+  defp look(%{picture_ms: at_ms} = state, %{blobs_at_ms: at_ms}) when at_ms != nil, do: state
+
+  defp look(state, percept) do
+    state = %{state | picture_ms: percept.blobs_at_ms}
+
+    case Sighting.largest(percept, state.colour, state.min_share) do
+      nil ->
+        state
+
+      sighting ->
+        part = if state.turning? or state.driving != 0, do: @lively, else: @calm
+        fresh? = state.seen_ms == nil or percept.at_ms - state.seen_ms > @lost_ms
+        part = if fresh?, do: 1.0, else: part
+        error = filter_angle(state.error, sighting.bearing, part)
+
+        %{
+          state
+          | error: error,
+            side: if(error < 0, do: -1, else: 1),
+            distance: filter(state.distance, distance(sighting, state), part),
+            seen_ms: percept.at_ms,
+            searched: 0.0
+        }
+    end
+  end
+
+  defp distance(%{share: share}, state) when share > @too_near_share, do: state.near * 0.5
+  defp distance(%{distance: distance}, _state), do: distance
+
+  defp filter_angle(nil, new, _part), do: new
+  defp filter_angle(old, new, part), do: Pose.wrap(old + part * Pose.wrap(new - old))
+  defp filter(old, nil, _part), do: old
+  defp filter(nil, new, _part), do: new
+  defp filter(old, new, part), do: old + part * (new - old)
+
+  defp hold(percept, state) do
+    limit = if state.turning?, do: @centred, else: @off_centre
+    turning? = abs(state.error) > limit
+    turn = if turning?, do: turn(state.error, percept, state), else: 0.0
+    driving = driving(state.driving, state.distance, state)
+    state = %{state | turning?: turning?, driving: driving}
+    running(Twist.new(linear(percept, state), turn), state)
+  end
+
+  # Which way it drives: it starts outside the range and stops a little inside it.
+  defp driving(_driving, nil, _state), do: 0
+
+  defp driving(driving, distance, %{near: near, far: far}) do
+    inside = min(0.1, (far - near) / 4)
+
+    cond do
+      distance > far + 0.05 -> 1
+      distance < near - 0.05 -> -1
+      driving == 1 and distance > far - inside -> 1
+      driving == -1 and distance < near + inside -> -1
+      true -> 0
+    end
+  end
+
+  defp linear(_percept, %{driving: 0}), do: 0.0
+  defp linear(_percept, %{error: error}) when abs(error) > @ahead, do: 0.0
+
+  defp linear(percept, state) do
+    goal = if state.driving == 1, do: state.far - 0.15, else: state.near + 0.15
+    speed = Steering.approach(abs(state.distance - goal), percept.profile)
+    state.driving * min(speed, state.speed)
+  end
+
+  defp search(percept, %{searched: searched} = state) when searched < 7.0 do
+    # First to where it was, then on to the side where it went.
+    error = if abs(state.error) > 0.1 and searched < 3.2, do: state.error, else: state.side * 3.0
+    running(Twist.new(0, turn(error, percept, state)), %{state | driving: 0, turning?: true})
+  end
+
+  defp search(_percept, state), do: stand(%{state | driving: 0, turning?: false})
+
+  defp turn(error, percept, state),
+    do:
+      error |> Steering.turn_rate(percept.profile) |> min(state.max_turn) |> max(-state.max_turn)
+
+  defp stand(state), do: running(Twist.zero(), state)
+
+  defp running(twist, state),
+    do: {:running, Wish.new(:track_blob, twist, 0.5, look: 0.0), {__MODULE__, state}}
+end

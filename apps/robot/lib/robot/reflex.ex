@@ -1,0 +1,206 @@
+defmodule Robot.Reflex do
+  @moduledoc """
+  The gate before the wheels as a function: whatever is wished, what comes out is safe. It is no
+  part of the market of wishes; it limits whoever won there. Pure: `wish/3` and `sense/3` tell it
+  what happened, `step/2` (every 50 ms) says what the wheels may do now, and why it is less than wished.
+
+  In this order, each with its name in `limits`:
+
+  | limit | what it does |
+  |---|---|
+  | `:estop` | latched: stands until `reset/1`; wishes from before are forgotten |
+  | `:dead_man` | no wish for 200 ms: stands |
+  | `:refused` | the wish was no number, or absurdly large: stands |
+  | `:speed` | the profile's greatest speeds |
+  | `:bumper` | no driving toward a touched side; away and turning are free |
+  | `:near` | slow enough to stop 0.15 m before what the sonars see in the direction of motion |
+  | `:corner` | a robot longer than wide turns its corners into nothing |
+  | `:blind` | no sonar reading for 500 ms, though it has sonars: at most 0.1 m/s |
+  | `:acceleration` | the profile's accelerations; braking before a near thing may be twice as hard |
+
+  `:estop`, `:dead_man`, `:refused` and `:bumper` set the speed to zero at once: how hard the wheels
+  then brake is the base's own affair. Everything else is continuous.
+  """
+  alias Hal.{Profile, Twist}
+  alias Robot.Reflex.Body
+
+  @dead_man_ms 200
+  @blind_ms 500
+  @blind_speed 0.1
+  # No base drives or turns this fast: such a number is a fault of the one who wished.
+  @absurd 100.0
+  # The step that accelerations are counted with is never longer than this, whatever the clock did.
+  @longest_step_ms 200
+
+  @enforce_keys [:profile]
+  defstruct @enforce_keys ++
+              [
+                wish: nil,
+                wish_at_ms: nil,
+                sonar: [],
+                sonar_at_ms: nil,
+                bumpers: [],
+                latched?: false,
+                twist: %Twist{linear: 0.0, turn: 0.0},
+                at_ms: nil
+              ]
+
+  @type t :: %__MODULE__{
+          profile: Profile.t(),
+          wish: {float(), float()} | :refused | nil,
+          wish_at_ms: integer() | nil,
+          sonar: [Body.point()],
+          sonar_at_ms: integer() | nil,
+          bumpers: [0..15],
+          latched?: boolean(),
+          twist: Twist.t(),
+          at_ms: integer() | nil
+        }
+
+  @type limit ::
+          :estop
+          | :dead_man
+          | :refused
+          | :speed
+          | :bumper
+          | :near
+          | :corner
+          | :blind
+          | :acceleration
+
+  @doc "A gate that stands. Options: `latched?` (default false), for a latch that survived a restart."
+  @spec new(Profile.t(), keyword()) :: t()
+  def new(%Profile{} = profile, options \\ []) do
+    options = Keyword.validate!(options, latched?: false)
+    %__MODULE__{profile: profile, latched?: options[:latched?] == true}
+  end
+
+  @doc "Takes a wish. Anything at all may come: what is no sensible number counts as a wish to stop."
+  @spec wish(t(), Twist.t() | term(), integer()) :: t()
+  def wish(%__MODULE__{latched?: true} = reflex, _twist, _at_ms), do: reflex
+
+  def wish(%__MODULE__{} = reflex, %{linear: linear, turn: turn}, at_ms) do
+    wish = if sane?(linear) and sane?(turn), do: {linear * 1.0, turn * 1.0}, else: :refused
+    %{reflex | wish: wish, wish_at_ms: at_ms}
+  end
+
+  def wish(%__MODULE__{} = reflex, _other, at_ms),
+    do: %{reflex | wish: :refused, wish_at_ms: at_ms}
+
+  defp sane?(number), do: is_number(number) and number > -@absurd and number < @absurd
+
+  @doc "Takes a reading; those that no limit needs are ignored."
+  @spec sense(t(), Hal.Drive.reading() | term(), integer()) :: t()
+  def sense(%__MODULE__{} = reflex, {:sonar, ranges}, at_ms) when is_list(ranges),
+    do: %{reflex | sonar: Body.points(reflex.profile, ranges), sonar_at_ms: at_ms}
+
+  def sense(%__MODULE__{} = reflex, {:bumpers, pressed}, _at_ms) when is_list(pressed),
+    do: %{reflex | bumpers: pressed}
+
+  def sense(%__MODULE__{} = reflex, _reading, _at_ms), do: reflex
+
+  @doc "Latches the emergency stop."
+  @spec estop(t()) :: t()
+  def estop(%__MODULE__{} = reflex),
+    do: %{reflex | latched?: true, wish: nil, wish_at_ms: nil}
+
+  @doc "Releases the latch. The robot still stands until a new wish comes."
+  @spec reset(t()) :: t()
+  def reset(%__MODULE__{} = reflex), do: %{reflex | latched?: false}
+
+  @doc "What the wheels may do from now until the next step, and which limits made it less than wished."
+  @spec step(t(), integer()) :: {Twist.t(), [limit()], t()}
+  def step(%__MODULE__{} = reflex, at_ms) do
+    {twist, limits} =
+      case wanted(reflex, at_ms) do
+        {:stop, limit} -> {Twist.zero(), [limit]}
+        {linear, turn} -> limit(reflex, linear, turn, at_ms)
+      end
+
+    {twist, limits, %{reflex | twist: twist, at_ms: at_ms}}
+  end
+
+  defp wanted(%{latched?: true}, _at_ms), do: {:stop, :estop}
+  defp wanted(%{wish: nil}, _at_ms), do: {:stop, :dead_man}
+
+  defp wanted(%{wish_at_ms: wish_at_ms}, at_ms) when at_ms - wish_at_ms > @dead_man_ms,
+    do: {:stop, :dead_man}
+
+  defp wanted(%{wish: :refused}, _at_ms), do: {:stop, :refused}
+  defp wanted(%{wish: wish}, _at_ms), do: wish
+
+  defp limit(reflex, linear, turn, at_ms) do
+    %{profile: profile, twist: last} = reflex
+    {linear, turn, limits} = speed(linear, turn, profile, [])
+    {safe_linear, limits} = linear |> near(reflex, at_ms, limits)
+    {safe_turn, limits} = corner(turn, reflex, limits)
+    seconds = step_s(reflex.at_ms, at_ms)
+
+    {ramped, limits} = ramp(last.linear, safe_linear, profile.max_acceleration * seconds, limits)
+
+    {turned, limits} = ramp(last.turn, safe_turn, profile.max_turn_acceleration * seconds, limits)
+
+    # A touched side is no matter of ramps.
+    {ramped, limits} = bumper(ramped, reflex, limits)
+    {Twist.new(ramped, turned), Enum.reverse(limits)}
+  end
+
+  defp speed(linear, turn, profile, limits) do
+    safe_linear = clamp(linear, profile.max_linear)
+    safe_turn = clamp(turn, profile.max_turn)
+    changed? = safe_linear != linear or safe_turn != turn
+    {safe_linear, safe_turn, if(changed?, do: [:speed | limits], else: limits)}
+  end
+
+  defp near(linear, reflex, at_ms, limits) do
+    if blind?(reflex, at_ms),
+      do: lower(linear, @blind_speed, :blind, limits),
+      else: lower(linear, Body.free_speed(reflex.profile, reflex.sonar, linear), :near, limits)
+  end
+
+  defp blind?(%{profile: %{sonars: []}}, _at_ms), do: false
+  defp blind?(%{sonar_at_ms: nil}, _at_ms), do: true
+  defp blind?(%{sonar_at_ms: sonar_at_ms}, at_ms), do: at_ms - sonar_at_ms > @blind_ms
+
+  defp corner(turn, reflex, limits),
+    do: lower(turn, Body.free_turn(reflex.profile, reflex.sonar, turn), :corner, limits)
+
+  defp bumper(linear, %{bumpers: []}, limits), do: {linear, limits}
+
+  defp bumper(linear, reflex, limits) do
+    count = max(reflex.profile.bumpers, 1)
+
+    toward? =
+      Enum.any?(reflex.bumpers, fn segment ->
+        is_integer(segment) and
+          :math.cos(2 * :math.pi() * segment / count) * linear > 0.05 * abs(linear)
+      end)
+
+    if toward? and linear != 0.0, do: {0.0, [:bumper | limits]}, else: {linear, limits}
+  end
+
+  defp lower(value, limit, name, limits) do
+    if abs(value) > limit, do: {clamp(value, limit), [name | limits]}, else: {value, limits}
+  end
+
+  # Braking may be twice as hard as speeding up: what comes near is noticed late by as much.
+  defp ramp(from, to, most, limits) do
+    low = if from > 0, do: max(from - 2 * most, min(-most, 0.0)), else: from - most
+    high = if from < 0, do: min(from + 2 * most, max(most, 0.0)), else: from + most
+
+    cond do
+      to < low -> {low, [:acceleration | limits]}
+      to > high -> {high, [:acceleration | limits]}
+      true -> {to, limits}
+    end
+  end
+
+  defp step_s(nil, _at_ms), do: 0.05
+
+  defp step_s(last_ms, at_ms),
+    do: (at_ms - last_ms) |> max(0) |> min(@longest_step_ms) |> Kernel./(1000)
+
+  defp clamp(value, limit) when value > limit, do: limit * 1.0
+  defp clamp(value, limit) when value < -limit, do: -limit * 1.0
+  defp clamp(value, _limit), do: value
+end

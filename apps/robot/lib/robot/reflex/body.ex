@@ -1,0 +1,111 @@
+defmodule Robot.Reflex.Body do
+  @moduledoc """
+  How fast a body may move beside what its sonars see. Pure; points in `base_link`.
+
+  A round body is a disc; one longer than wide is a box for driving, and for turning the circle
+  round its corners matters.
+  """
+  alias Hal.Profile
+
+  @type point :: {x :: float(), y :: float()}
+
+  @clearance 0.15
+  # Things that would only be grazed keep this much to the side.
+  @side 0.03
+
+  @doc """
+  The places that a sonar ring sees: no echo, and what is no range at all, gives none.
+
+      iex> profile = Hal.Profile.magellan()
+      iex> silent = List.duplicate(profile.sonar_max, 16)
+      iex> Robot.Reflex.Body.points(profile, silent)
+      []
+      iex> [{x, y}] = Robot.Reflex.Body.points(profile, List.replace_at(silent, 11, 1.0))
+      iex> {Float.round(x, 3), Float.round(y, 3)}
+      {1.2, 0.0}
+  """
+  @spec points(Profile.t(), [number()]) :: [point()]
+  def points(%Profile{sonars: sonars, sonar_max: most}, ranges), do: points(sonars, ranges, most)
+
+  defp points([pose | poses], [range | ranges], most)
+       when is_number(range) and range >= 0 and range < most do
+    x = pose.x + range * :math.cos(pose.heading)
+    y = pose.y + range * :math.sin(pose.heading)
+    [{x, y} | points(poses, ranges, most)]
+  end
+
+  defp points([_ | poses], [_ | ranges], most), do: points(poses, ranges, most)
+  defp points(_, _, _most), do: []
+
+  @doc """
+  The greatest speed (m/s) in the direction of `linear` from which the body can stop before
+  what is in its way. Straight ahead it keeps 0.15 m; what it would only graze, less.
+
+      iex> profile = Hal.Profile.magellan()
+      iex> Robot.Reflex.Body.free_speed(profile, [{0.35, 0.0}], 0.5)
+      0.0
+      iex> Robot.Reflex.Body.free_speed(profile, [{0.35, 0.0}], -0.5) > 10
+      true
+      iex> Robot.Reflex.Body.free_speed(profile, [{0.3, 0.5}], 0.5) > 10
+      true
+  """
+  @spec free_speed(Profile.t(), [point()], float()) :: float()
+  def free_speed(%Profile{max_acceleration: braking} = profile, points, linear) do
+    sign = if linear < 0, do: -1.0, else: 1.0
+    free = Enum.reduce(points, 1.0e6, fn {x, y}, free -> min(free, gap(profile, sign * x, y)) end)
+    :math.sqrt(2 * braking * max(free, 0.0))
+  end
+
+  defp gap(%Profile{length: length, width: width} = profile, x, y) do
+    half = if(length == width, do: profile.radius, else: width / 2) + @side
+
+    cond do
+      x <= 0 or abs(y) >= half ->
+        1.0e6
+
+      length == width ->
+        ahead = :math.sqrt(half * half - y * y)
+        x - (ahead - @side) - @clearance * ahead / half
+
+      true ->
+        x - length / 2 - @clearance
+    end
+  end
+
+  @doc """
+  The greatest turn rate (rad/s) in the direction of `turn` at which no corner swings into a point.
+
+      iex> Robot.Reflex.Body.free_turn(Hal.Profile.magellan(), [{0.0, 0.21}], 1.0) > 10
+      true
+      iex> mini = Hal.Profile.atrv_mini()
+      iex> Robot.Reflex.Body.free_turn(mini, [{0.22, 0.155}], 0.5)
+      0.0
+      iex> Robot.Reflex.Body.free_turn(mini, [{0.22, 0.155}], -0.5) > 0.5
+      true
+  """
+  @spec free_turn(Profile.t(), [point()], float()) :: float()
+  def free_turn(%Profile{length: length, width: width}, _points, _turn) when length == width,
+    do: 1.0e6
+
+  def free_turn(_profile, _points, turn) when turn == 0, do: 1.0e6
+
+  def free_turn(%Profile{} = profile, points, turn) do
+    corner = :math.atan2(profile.width, profile.length)
+    corners = [corner, :math.pi() - corner, corner - :math.pi(), -corner]
+
+    free =
+      for {x, y} <- points, x * x + y * y < profile.radius * profile.radius, reduce: 1.0e6 do
+        free ->
+          angle = :math.atan2(y, x)
+          Enum.reduce(corners, free, &min(&2, swing(&1, angle, turn)))
+      end
+
+    :math.sqrt(2 * profile.max_turn_acceleration * max(free - 0.1, 0.0))
+  end
+
+  # How far (radians) a corner may turn this way before it meets the angle.
+  defp swing(corner, angle, turn) do
+    ahead = if turn > 0, do: angle - corner, else: corner - angle
+    :math.fmod(ahead + 4 * :math.pi(), 2 * :math.pi())
+  end
+end

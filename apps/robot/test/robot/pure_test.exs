@@ -1,0 +1,8 @@
+defmodule Robot.PureTest do
+  use ExUnit.Case, async: true
+  doctest Robot.Wish
+  doctest Robot.Arbiter
+  doctest Robot.Steering
+  doctest Robot.Reflex.Body
+  doctest Robot.Behaviour.Options
+end

@@ -1,0 +1,99 @@
+defmodule Robot.Body do
+  @moduledoc false
+  # One body on a plane for tests: the gate's output moves it, its percepts feed a mind.
+  alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Robot.{Mind, Percept, Reflex}
+
+  def new(pose, profile \\ Profile.magellan()) do
+    reflex = Reflex.new(profile)
+
+    %{
+      pose: pose,
+      twist: Twist.zero(),
+      at_ms: 0,
+      reflex: reflex,
+      mind: Mind.new(profile: profile),
+      profile: profile
+    }
+  end
+
+  @doc "Runs the mind for some ticks; `change` may change each percept; gives outcome and body."
+  def run(body, ticks, change \\ & &1)
+  def run(body, 0, _change), do: {nil, body}
+
+  def run(body, ticks, change) do
+    {wish, outcome, mind} = Mind.tick(body.mind, change.(percept(body)))
+    body = %{body | mind: mind} |> act(wish)
+    if outcome, do: {outcome, body}, else: run(body, ticks - 1, change)
+  end
+
+  def percept(body) do
+    %Percept{
+      robot: :mag1,
+      at_ms: body.at_ms,
+      profile: body.profile,
+      pose: body.pose,
+      odometry: %Odometry{pose: body.pose, twist: body.twist},
+      sonar: silence(body.profile),
+      driving: %{twist: body.twist, limits: []}
+    }
+  end
+
+  def silence(profile), do: List.duplicate(profile.sonar_max, length(profile.sonars))
+
+  defp act(body, wish) do
+    reflex =
+      body.reflex
+      |> Reflex.wish(wish.twist, body.at_ms)
+      |> Reflex.sense({:sonar, silence(body.profile)}, body.at_ms)
+
+    Enum.reduce(1..2, %{body | reflex: reflex}, fn _, body ->
+      {twist, _limits, reflex} = Reflex.step(body.reflex, body.at_ms)
+      pose = move(body.pose, twist, 0.05)
+      %{body | reflex: reflex, twist: twist, pose: pose, at_ms: body.at_ms + 50}
+    end)
+  end
+
+  @doc "The pose after driving so for some seconds."
+  def move(pose, twist, seconds) do
+    middle = pose.heading + twist.turn * seconds / 2
+    x = pose.x + twist.linear * seconds * :math.cos(middle)
+    y = pose.y + twist.linear * seconds * :math.sin(middle)
+    Pose.new(x, y, pose.heading + twist.turn * seconds)
+  end
+
+  @doc "A blob as the camera of this body shows it, of a thing at this place; nil outside the picture."
+  def blob(body, {x, y}, colour \\ "Yellow") do
+    bearing = Pose.bearing(body.pose, {x, y})
+    distance = Pose.distance(body.pose, {x, y})
+    focal = 160 / :math.tan(:math.pi() / 6)
+
+    if abs(bearing) < :math.pi() / 6 do
+      share = min(0.5, 0.0651 / (distance * distance))
+      cx = 159.5 - focal * :math.tan(bearing)
+      at = round(cx)
+
+      %Vision.Blob{
+        colour: colour,
+        area: round(share * 76_800),
+        share: share,
+        x: cx,
+        y: 120.0,
+        left: at,
+        right: at,
+        top: 110,
+        bottom: 130,
+        width: 1,
+        height: 21,
+        distance: distance
+      }
+    end
+  end
+
+  @doc "A percept changer that shows a thing at this place."
+  def see(percept, place, wobble \\ 0.0) do
+    blob = blob(%{pose: percept.pose}, place)
+    blobs = if blob, do: [%{blob | x: blob.x + wobble}], else: []
+    %{percept | blobs: blobs, blobs_at_ms: percept.at_ms, blobs_pose: percept.pose}
+  end
+end
