@@ -1,0 +1,178 @@
+defmodule Robot.Config do
+  @moduledoc """
+  What one robot is started with, checked once.
+
+    * `:id` - an atom, as `:mag1`
+    * `:profile` - its body, `%Hal.Profile{}`
+    * `:drive` - `{driver, options}`, an implementation of `Hal.Drive`
+    * `:ptz`, `:camera` - the same of `Hal.Ptz` and `Hal.Camera`, or `nil` for none (the default)
+    * `:start` - where it is switched on, in the `map` frame; `%Hal.Pose{}`, default the origin
+    * `:colours` - what the camera looks for, `%Vision.Colours{}`; needed with a camera
+    * `:limits` - what to lower in the profile, as `[max_linear: 0.3]`: `:max_linear` (m/s), `:max_turn`
+      (rad/s), `:max_acceleration` (m/s2), `:max_turn_acceleration` (rad/s2)
+    * `:mind` - options of `Robot.Mind`, a keyword list
+    * `:mission` - `{module, options}` that `Robot.Pilot.start/1` starts, or `nil`
+    * `:companions` - `[{module, options}]`, each a `Robot.Companion`
+    * `:send` - `{m, f, a}`; what the mission says goes to `apply(m, f, a ++ [to, message])`; or
+      `nil`: nobody hears it
+    * `:clock` - `{m, f, a}` giving integer milliseconds, default the monotonic time
+    * `:estop_file` - where the e-stop latch outlives the machine, or `nil`
+    * `:trace` - `{m, f, a}` that is told all that goes in and out, see `Robot.Trace`, or `nil`
+  """
+  alias Hal.{Pose, Profile}
+
+  @limits [:max_linear, :max_turn, :max_acceleration, :max_turn_acceleration]
+
+  @enforce_keys [:id, :profile, :drive]
+  defstruct @enforce_keys ++
+              [
+                ptz: nil,
+                camera: nil,
+                start: nil,
+                colours: nil,
+                limits: [],
+                mind: [],
+                mission: nil,
+                companions: [],
+                send: nil,
+                clock: {System, :monotonic_time, [:millisecond]},
+                estop_file: nil,
+                trace: nil
+              ]
+
+  @type module_options :: {module(), keyword()}
+  @type call :: {module(), atom(), list()}
+
+  @type t :: %__MODULE__{
+          id: atom(),
+          profile: Profile.t(),
+          drive: module_options(),
+          ptz: module_options() | nil,
+          camera: module_options() | nil,
+          start: Pose.t(),
+          colours: struct() | nil,
+          limits: keyword(),
+          mind: keyword(),
+          mission: module_options() | nil,
+          companions: [module_options()],
+          send: call() | nil,
+          clock: call(),
+          estop_file: Path.t() | nil,
+          trace: call() | nil
+        }
+
+  @doc """
+  A checked config.
+
+      iex> {:ok, config} =
+      ...>   Robot.Config.new(id: :mag1, profile: Hal.Profile.magellan(), drive: {Some.Drive, []})
+      iex> config.start
+      Hal.Pose.new(0, 0)
+      iex> Robot.Config.new(id: "mag1", profile: Hal.Profile.magellan(), drive: {Some.Drive, []})
+      {:error, "robot option :id cannot be \\"mag1\\": it must be an atom such as :mag1"}
+      iex> {:ok, config} = Robot.Config.new(id: :mag1, profile: Hal.Profile.magellan(),
+      ...>   drive: {Some.Drive, []}, limits: [max_linear: 0.3])
+      iex> config.profile.max_linear
+      0.3
+      iex> Robot.Config.new(id: :mag1, wheels: 4)
+      {:error, "unknown robot option :wheels"}
+  """
+  @spec new(keyword()) :: {:ok, t()} | {:error, line :: String.t()}
+  def new(options) do
+    known = %__MODULE__{id: nil, profile: nil, drive: nil, start: Pose.new(0, 0)}
+
+    case Enum.find(options, fn {key, _} -> key == :__struct__ or not is_map_key(known, key) end) do
+      nil -> check(struct!(known, options))
+      {key, _value} -> {:error, "unknown robot option #{inspect(key)}"}
+    end
+  end
+
+  @doc "The same, or `ArgumentError` with that line."
+  @spec new!(keyword()) :: t()
+  def new!(options) do
+    case new(options) do
+      {:ok, config} -> config
+      {:error, line} -> raise ArgumentError, line
+    end
+  end
+
+  @doc "The time by this robot's clock, in milliseconds."
+  @spec now(t()) :: integer()
+  def now(%__MODULE__{clock: {m, f, a}}), do: apply(m, f, a)
+
+  defp check(config) do
+    wrong =
+      config
+      |> Map.from_struct()
+      |> Enum.sort()
+      |> Enum.find(fn {option, value} -> not valid?(option, value) end)
+
+    case wrong do
+      nil when config.camera != nil and config.colours == nil ->
+        {:error, "robot option :colours cannot be nil: a robot with a camera must have colours"}
+
+      nil ->
+        limit(config)
+
+      {option, value} ->
+        {:error,
+         "robot option #{inspect(option)} cannot be #{inspect(value)}: it must be #{allowed(option)}"}
+    end
+  end
+
+  # A limit may be lower than what the body can do, never higher.
+  defp limit(%{profile: profile, limits: limits} = config) do
+    case Enum.find(limits, fn {name, value} -> value > Map.fetch!(profile, name) end) do
+      nil ->
+        {:ok, %{config | profile: struct!(profile, limits)}}
+
+      {name, value} ->
+        {:error,
+         "robot option :limits cannot set #{inspect(name)} to #{inspect(value)}: " <>
+           "a #{profile.name} can do #{Map.fetch!(profile, name)} at most"}
+    end
+  end
+
+  defp valid?(:id, id), do: is_atom(id) and id not in [nil, true, false]
+  defp valid?(:profile, profile), do: is_struct(profile, Profile)
+  defp valid?(:drive, driver), do: module_options?(driver)
+
+  defp valid?(option, value) when option in [:ptz, :camera, :mission],
+    do: value == nil or module_options?(value)
+
+  defp valid?(:start, pose), do: is_struct(pose, Pose)
+  defp valid?(:colours, colours), do: colours == nil or is_struct(colours, Vision.Colours)
+  defp valid?(:mind, list), do: Keyword.keyword?(list)
+
+  defp valid?(:limits, list) do
+    Keyword.keyword?(list) and
+      Enum.all?(list, fn {name, value} -> name in @limits and is_float(value) and value > 0 end)
+  end
+
+  defp valid?(:companions, list),
+    do: is_list(list) and Enum.all?(list, &module_options?/1)
+
+  defp valid?(:clock, clock), do: call?(clock)
+  defp valid?(option, value) when option in [:send, :trace], do: value == nil or call?(value)
+  defp valid?(:estop_file, path), do: path == nil or is_binary(path)
+
+  defp allowed(:id), do: "an atom such as :mag1"
+  defp allowed(:profile), do: "a %Hal.Profile{}"
+  defp allowed(:drive), do: "{driver, options}"
+  defp allowed(option) when option in [:ptz, :camera], do: "{driver, options} or nil"
+  defp allowed(:mission), do: "{module, options} or nil"
+  defp allowed(:start), do: "a %Hal.Pose{}"
+  defp allowed(:colours), do: "a %Vision.Colours{} or nil"
+  defp allowed(:mind), do: "a keyword list"
+  defp allowed(:limits), do: "a keyword list of positive floats for #{Enum.join(@limits, ", ")}"
+  defp allowed(:companions), do: "a list of {module, options}"
+  defp allowed(:clock), do: "{module, function, arguments}"
+  defp allowed(option) when option in [:send, :trace], do: "{module, function, arguments} or nil"
+  defp allowed(:estop_file), do: "the path of a file or nil"
+
+  defp module_options?({module, options}), do: is_atom(module) and Keyword.keyword?(options)
+  defp module_options?(_other), do: false
+
+  defp call?({m, f, a}), do: is_atom(m) and is_atom(f) and is_list(a)
+  defp call?(_other), do: false
+end

@@ -1,0 +1,36 @@
+defmodule Robot.Mission do
+  @moduledoc """
+  What a robot is up to over minutes: a pure state machine, run by `Robot.Pilot` in real time and
+  by simulations in lockstep. It sends nothing, keeps no timers and reads no clock: deadlines are
+  integers, compared with `percept.at_ms` at each tick.
+  """
+
+  @type event ::
+          {:tick, Robot.Percept.t()}
+          | {:message, struct()}
+          | {:outcome, tag :: term(), integer()}
+          | {:command, command :: term()}
+
+  @typedoc """
+    * `{:goal, tag, {module, options} | nil}` - what to do from now on. The same tag again changes
+      the options of the running behaviour, another one starts afresh; `nil` is idling
+    * `{:anchors, list}` - references for the estimate of the pose
+    * `{:send, to, message}` - say something to one robot, to several, or to `:all`
+    * `{:claim, map}` - what the robot says of itself until further notice
+    * `{:stage, name, map}` - something worth telling people happened
+  """
+  @type effect ::
+          {:goal, tag :: term(), Robot.Behaviour.t() | {module(), keyword()} | nil}
+          | {:anchors, list()}
+          | {:send, to :: atom() | [atom()] | :all, struct()}
+          | {:claim, map()}
+          | {:stage, atom(), map()}
+
+  @type result :: {phase :: term(), mission :: term(), [effect()]}
+
+  @doc "Starts the mission of this robot."
+  @callback init(robot :: atom(), keyword()) :: result()
+
+  @doc "What happens next."
+  @callback handle(event(), mission :: term()) :: result()
+end

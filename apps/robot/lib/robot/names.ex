@@ -1,0 +1,32 @@
+defmodule Robot.Names do
+  @moduledoc """
+  Names the parts of all robots of this node: a `Registry` keyed `{robot, role}`, so that any
+  number of robots live beside each other, and no name is made up at run time.
+
+  Roles: `:robot` (the supervisor), `:board`, `:drive`, `:ptz`, `:camera`, `:eye`, `:gate`,
+  `:executive`, `:pilot`, and what companions call themselves.
+  """
+
+  @doc "The child that must run before any robot."
+  @spec child_spec(term()) :: Supervisor.child_spec()
+  def child_spec(_options), do: Registry.child_spec(keys: :unique, name: __MODULE__)
+
+  @doc """
+  A name to start a process with, or to send to.
+
+      iex> Robot.Names.via(:mag1, :gate)
+      {:via, Registry, {Robot.Names, {:mag1, :gate}}}
+  """
+  @spec via(robot :: atom(), role :: term()) :: {:via, module(), term()}
+  def via(robot, role), do: {:via, Registry, {__MODULE__, {robot, role}}}
+
+  @doc "The process in that role, if there is one."
+  @spec whereis(robot :: atom(), role :: term()) :: pid() | nil
+  def whereis(robot, role), do: GenServer.whereis(via(robot, role))
+
+  @doc "The robots that run on this node, sorted."
+  @spec robots() :: [atom()]
+  def robots do
+    __MODULE__ |> Registry.select([{{{:"$1", :robot}, :_, :_}, [], [:"$1"]}]) |> Enum.sort()
+  end
+end

@@ -1,0 +1,51 @@
+defmodule Robot.Percept.Snapshot do
+  @moduledoc """
+  Takes a percept from the board: what every part of the robot last wrote, unless it is too old.
+
+  | reading | too old after |
+  |---|---|
+  | odometry, sonar, infrared, bumpers, what the gate did | 300 ms |
+  | pan-tilt, blobs | 500 ms |
+  | battery | 5 s |
+
+  Peers have no limit here: whoever writes them says what became of them. The pose is not on it:
+  it is estimated from this percept.
+  """
+  alias Robot.{Board, Percept}
+
+  @limits [
+    odometry: 300,
+    sonar: 300,
+    ir: 300,
+    bumpers: 300,
+    driving: 300,
+    ptz: 500,
+    power: 5_000
+  ]
+  @blobs_ms 500
+
+  @doc "The percept of this moment."
+  @spec take(Board.t(), Hal.Profile.t(), at_ms :: integer()) :: Percept.t()
+  def take(%Board{} = board, profile, at_ms) do
+    percept = %Percept{
+      robot: board.robot,
+      at_ms: at_ms,
+      profile: profile,
+      peers: Board.peers(board)
+    }
+
+    @limits
+    |> Enum.reduce(percept, fn {key, limit_ms}, percept ->
+      case Board.fetch(board, key, limit_ms, at_ms) do
+        {:ok, value, _at_ms} -> Map.replace!(percept, key, value)
+        :error -> percept
+      end
+    end)
+    |> see(Board.fetch(board, :blobs, @blobs_ms, at_ms))
+  end
+
+  defp see(percept, {:ok, %{blobs: blobs, pan: pan}, at_ms}),
+    do: %{percept | blobs: blobs, blobs_at_ms: at_ms, blobs_pan: pan}
+
+  defp see(percept, :error), do: percept
+end

@@ -1,0 +1,99 @@
+defmodule Robot.BoardTest do
+  use Robot.Case, async: false
+  alias Robot.{Board, Percept}
+
+  @moduletag :tmp_dir
+
+  defp board(id, options \\ []) do
+    start_supervised!({Board, config(id, options)}, id: id)
+    Board.find!(id)
+  end
+
+  test "readers say how old is too old" do
+    board = board(:board1)
+    Board.put(board, :drive, :sonar, [1.0], 1_000)
+    assert Board.fetch(board, :sonar, 300, 1_300) == {:ok, [1.0], 1_000}
+    assert Board.fetch(board, :sonar, 300, 1_301) == :error
+    assert Board.fetch(board, :sonar, :infinity, 99_999) == {:ok, [1.0], 1_000}
+    assert Board.fetch(board, :ir, 300, 1_000) == :error
+  end
+
+  test "each key has one writer" do
+    board = board(:board2)
+    assert_raise ArgumentError, fn -> Board.put(board, :executive, :sonar, [], 0) end
+    assert_raise ArgumentError, fn -> Board.put(board, :drive, :nonsense, [], 0) end
+    assert_raise ArgumentError, fn -> Board.put(board, :ptz, {:health, :drive}, :online, 0) end
+    assert Board.put(board, :link, {:peer, :mag2}, %{}, 0) == :ok
+    assert Board.peers(board) == %{mag2: %{}}
+    assert Board.delete(board, :link, {:peer, :mag2}) == :ok
+    assert Board.peers(board) == %{}
+  end
+
+  test "is a device's sink" do
+    board = board(:board3)
+    Board.sense(board, :drive, {:power, 24.0})
+    Board.sense(board, :drive, {:health, :drive, {{:offline, :enoent}, 5}})
+    assert {:ok, 24.0, _now} = Board.fetch(board, :power, 1_000)
+    assert {:ok, {:offline, :enoent}, 5} = Board.fetch(board, {:health, :drive}, :infinity)
+    assert %{power: {24.0, age_ms}} = Board.entries(board)
+    assert age_ms in 0..1_000
+  end
+
+  test "two robots of one name cannot be" do
+    board(:board4)
+
+    assert {:error, {{:already_started, _pid}, _}} =
+             start_supervised({Board, config(:board4)}, id: :other)
+
+    assert Board.find(:nobody) == :error
+  end
+
+  test "the latch outlives everything where it has a file", %{tmp_dir: dir} do
+    file = Path.join(dir, "estop")
+    board = board(:board5, estop_file: file)
+    refute Board.latched?(board)
+    Board.latch(board)
+    assert Board.latched?(board)
+    stop_supervised!(:board5)
+
+    board = board(:board5, estop_file: file)
+    assert Board.latched?(board)
+    Board.unlatch(board)
+    refute Board.latched?(board)
+    stop_supervised!(:board5)
+    refute Board.latched?(board(:board5, estop_file: file))
+  end
+
+  test "a file that cannot be written is told, and the latch holds", %{tmp_dir: dir} do
+    tell = fn _event, _measurements, metadata, test -> send(test, metadata) end
+    :ok = Hal.Event.attach(:board6, [:robot, :estop_file, :error], tell, self())
+    on_exit(fn -> Hal.Event.detach(:board6) end)
+    board = board(:board6, estop_file: Path.join(dir, "missing/estop"))
+    Board.latch(board)
+    assert_received %{robot: :board6, reason: :enoent}
+    assert Board.latched?(board)
+  end
+
+  test "a percept holds what is fresh, and nothing else" do
+    board = board(:board7)
+    profile = Hal.Profile.magellan()
+
+    assert Percept.Snapshot.take(board, profile, 7) ==
+             %Percept{robot: :board7, at_ms: 7, profile: profile}
+
+    Board.put(board, :drive, :sonar, [1.0], 1_000)
+    Board.put(board, :drive, :bumpers, [3], 900)
+    Board.put(board, :drive, :power, 24.0, 0)
+    Board.put(board, :eye, :blobs, %{blobs: [], pan: 0.5}, 800)
+    Board.put(board, :link, {:peer, :mag2}, %{mode: :dead}, 0)
+
+    assert %Percept{sonar: [1.0], bumpers: [3], power: 24.0, blobs: [], blobs_at_ms: 800} =
+             percept = Percept.Snapshot.take(board, profile, 1_200)
+
+    assert percept.blobs_pan == 0.5
+    assert percept.peers == %{mag2: %{mode: :dead}}
+
+    assert %Percept{sonar: nil, bumpers: [], power: 24.0, blobs: nil, blobs_at_ms: nil} =
+             Percept.Snapshot.take(board, profile, 1_301)
+  end
+end

@@ -1,0 +1,48 @@
+defmodule Robot.ConfigTest do
+  use ExUnit.Case, async: true
+  alias Robot.Config
+  doctest Robot.Config
+  doctest Robot.Names
+
+  @good [id: :mag1, profile: Hal.Profile.magellan(), drive: {Some.Drive, []}]
+
+  test "each wrong option is named, in one line, with what is allowed" do
+    for {option, value} <- [
+          id: nil,
+          id: "mag1",
+          profile: :magellan,
+          drive: Some.Drive,
+          drive: nil,
+          ptz: {Some.Ptz, :fast},
+          camera: "/dev/video0",
+          start: {0, 0},
+          colours: "colours.txt",
+          limits: [max_linear: :fast],
+          limits: [wheels: 3.0],
+          limits: [max_linear: -0.1],
+          limits: [max_linear: 5.0],
+          mind: nil,
+          mission: Some.Mission,
+          companions: [Some.Link],
+          send: &send/2,
+          clock: nil,
+          estop_file: :file,
+          trace: self()
+        ] do
+      assert {:error, line} = Config.new(Keyword.put(@good, option, value))
+      assert line =~ "option #{inspect(option)} cannot"
+      refute line =~ "\n"
+      assert_raise ArgumentError, line, fn -> Config.new!(Keyword.put(@good, option, value)) end
+    end
+  end
+
+  test "a robot with a camera must know colours" do
+    assert {:error, line} = Config.new(@good ++ [camera: {Some.Camera, []}])
+    assert line =~ ":colours"
+  end
+
+  test "what is missing is named" do
+    assert {:error, line} = Config.new(id: :mag1, profile: Hal.Profile.magellan())
+    assert line =~ ":drive"
+  end
+end
