@@ -55,7 +55,8 @@ defmodule Robot.Behaviour.TrackBlob do
       seen_ms: nil,
       turning?: false,
       driving: 0,
-      searched: 0.0
+      searched: 0.0,
+      there?: false
     }
 
     if state.near > state.far,
@@ -123,7 +124,8 @@ defmodule Robot.Behaviour.TrackBlob do
             side: if(error < 0, do: -1, else: 1),
             distance: filter(state.distance, distance(sighting, state), part),
             seen_ms: percept.at_ms,
-            searched: 0.0
+            searched: 0.0,
+            there?: false
         }
     end
   end
@@ -171,9 +173,11 @@ defmodule Robot.Behaviour.TrackBlob do
   end
 
   defp search(percept, %{searched: searched} = state) when searched < 7.0 do
-    # First to where it was, then on to the side where it went.
-    error = if abs(state.error) > 0.1 and searched < 3.2, do: state.error, else: state.side * 3.0
-    running(Twist.new(0, turn(error, percept, state)), %{state | driving: 0, turning?: true})
+    # First to where it was; from there on to the side where it went, and never back.
+    there? = state.there? or abs(state.error) < 0.1
+    error = if there?, do: state.side * 3.0, else: state.error
+    state = %{state | driving: 0, turning?: true, there?: there?}
+    running(Twist.new(0, turn(error, percept, state)), state)
   end
 
   defp search(_percept, state), do: stand(%{state | driving: 0, turning?: false})
