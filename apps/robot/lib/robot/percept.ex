@@ -29,14 +29,15 @@ defmodule Robot.Percept do
   @typedoc """
   What another robot told: its pose and speed in the `map` frame, when it was heard, and its
   body's radius (metres). `mode`: `:moving` avoids others too, `:holding` stands and gives no way,
-  `:dead` is a body that stayed where it was last heard of.
+  `:dead` is a body that stayed where it was last heard of. `beat` is all that it told last.
   """
   @type peer :: %{
-          pose: Pose.t(),
-          twist: Twist.t(),
-          radius: float(),
-          at_ms: integer(),
-          mode: :moving | :holding | :dead
+          required(:pose) => Pose.t(),
+          required(:twist) => Twist.t(),
+          required(:radius) => float(),
+          required(:at_ms) => integer(),
+          required(:mode) => :moving | :holding | :dead,
+          optional(:beat) => struct()
         }
 
   @typedoc """

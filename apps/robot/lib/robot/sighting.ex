@@ -1,0 +1,53 @@
+defmodule Robot.Sighting do
+  @moduledoc """
+  From a blob in a picture to a direction and a place: pinhole camera, landmarks upright. Pure.
+  """
+  alias Hal.Pose
+  alias Robot.Percept
+  alias Vision.Blob
+
+  @doc """
+  Direction of a blob's centre seen from the robot's body, in radians, left positive: where the
+  camera looked, and the angle within the picture.
+
+      iex> blob = %Vision.Blob{colour: "Y", area: 100, share: 0.01, x: 159.5, y: 1.0, left: 0, top: 0,
+      ...>   right: 1, bottom: 1, width: 320, height: 240}
+      iex> Robot.Sighting.bearing(blob, 0.25, 1.0)
+      0.25
+  """
+  @spec bearing(Blob.t(), pan :: float(), field_of_view :: float()) :: float()
+  def bearing(%Blob{x: x, width: width}, pan, field_of_view) do
+    focal = width / 2 / :math.tan(field_of_view / 2)
+    Pose.wrap(pan + :math.atan(((width - 1) / 2 - x) / focal))
+  end
+
+  @doc """
+  Where a blob at `distance` (metres) in direction `bearing` stands, seen from `pose`.
+
+      iex> {x, y} = Robot.Sighting.place(Hal.Pose.new(1, 0, 0), 0.0, 2.0)
+      iex> {x, y}
+      {3.0, 0.0}
+  """
+  @spec place(Pose.t(), float(), float()) :: Pose.point()
+  def place(%Pose{} = pose, bearing, distance),
+    do:
+      Pose.place(pose, {
+        distance * :math.cos(bearing),
+        distance * :math.sin(bearing)
+      })
+
+  @doc "The horizontal field of view of the robot's camera: what the unit says, or the profile's."
+  @spec field_of_view(Percept.t()) :: float()
+  def field_of_view(%Percept{ptz: %{field_of_view: angle}}), do: angle
+  def field_of_view(%Percept{profile: profile}), do: profile.camera.field_of_view
+
+  @doc "The largest blob of a colour in a percept, or `nil`."
+  @spec largest(Percept.t(), String.t()) :: Blob.t() | nil
+  def largest(%Percept{blobs: nil}, _colour), do: nil
+
+  def largest(%Percept{blobs: blobs}, colour) do
+    blobs
+    |> Enum.filter(&(&1.colour == colour))
+    |> Enum.max_by(&{&1.area, -&1.top, -&1.left}, fn -> nil end)
+  end
+end

@@ -1,0 +1,170 @@
+defmodule Swarm.Formation do
+  @moduledoc """
+  Where each robot stands, seen from its leader. Pure; metres and radians.
+
+  A slot is a pose in the leader's frame (+x ahead, +y left); the leader has slot 0 and is not
+  in the list. Slot headings are the leader's, but for `:circle`, where all look at the landmark.
+
+  | kind | slots |
+  |---|---|
+  | `:column` | one behind the other |
+  | `:line` | abreast, left and right in turn |
+  | `:wedge` | a V of 90 degrees, the leader at its tip |
+  | `:triangle` | filled rows of 1, 2, 3, … |
+  | `:diamond` | rows of 1, 2, …, m, …, 2, 1 |
+  | `:circle` | a ring of all round the landmark, the leader at its own bearing |
+  """
+  alias Hal.Pose
+
+  @kinds [:column, :line, :wedge, :triangle, :diamond, :circle]
+  @least_spacing 0.8
+  @greatest_spacing 5.0
+  # The nearest that a ring comes to the landmark: robots there still see all of it.
+  @least_ring 1.6
+
+  @type kind :: :column | :line | :wedge | :triangle | :diamond | :circle
+  @type t :: {kind(), spacing :: float()}
+
+  @doc "All kinds."
+  @spec kinds() :: [kind(), ...]
+  def kinds, do: @kinds
+
+  @doc """
+  A checked formation. `length:` is the whole length of a line, `side:` the side of the triangle;
+  both need the number of robots.
+
+      iex> Swarm.Formation.new(:wedge, spacing: 1.2)
+      {:ok, {:wedge, 1.2}}
+      iex> Swarm.Formation.new(:line, length: 4.0, robots: 5)
+      {:ok, {:line, 1.0}}
+      iex> Swarm.Formation.new(:triangle, side: 3.0, robots: 6)
+      {:ok, {:triangle, 1.5}}
+      iex> Swarm.Formation.new(:column, spacing: 0.1)
+      {:error, "spacing cannot be 0.1: 0.8 to 5.0 m"}
+      iex> Swarm.Formation.new(:heart, [])
+      {:error, "formation cannot be :heart: column, line, wedge, triangle, diamond or circle"}
+  """
+  @spec new(kind() | term(), keyword()) :: {:ok, t()} | {:error, String.t()}
+  def new(kind, options \\ [])
+
+  def new(kind, options) when kind in @kinds do
+    case Keyword.keys(options) -- allowed(kind) do
+      [] -> kind |> spacing(options) |> check(kind)
+      [key | _] -> {:error, "#{kind} takes no #{inspect(key)}: #{Enum.join(allowed(kind), ", ")}"}
+    end
+  end
+
+  def new(kind, _options) do
+    {:error,
+     "formation cannot be #{inspect(kind)}: column, line, wedge, triangle, diamond or circle"}
+  end
+
+  defp allowed(:line), do: [:spacing, :length, :robots]
+  defp allowed(:triangle), do: [:spacing, :side, :robots]
+  defp allowed(_kind), do: [:spacing, :robots]
+
+  defp spacing(kind, options) do
+    robots = options[:robots] || 2
+
+    cond do
+      kind == :line and is_number(options[:length]) -> options[:length] / max(robots - 1, 1)
+      kind == :triangle and is_number(options[:side]) -> options[:side] / max(rows(robots) - 1, 1)
+      true -> Keyword.get(options, :spacing, 1.0)
+    end
+  end
+
+  defp check(spacing, kind)
+       when is_number(spacing) and spacing >= @least_spacing and spacing <= @greatest_spacing,
+       do: {:ok, {kind, spacing * 1.0}}
+
+  defp check(spacing, _kind),
+    do:
+      {:error,
+       "spacing cannot be #{inspect(spacing)}: #{@least_spacing} to #{@greatest_spacing} m"}
+
+  @doc "The least spacing, to which a shape closes up where there is little room."
+  @spec least_spacing() :: float()
+  def least_spacing, do: @least_spacing
+
+  @doc """
+  The slots of the followers of a group of `robots`, in the leader's frame. A circle needs the
+  distance of the landmark ahead of the leader.
+
+      iex> Swarm.Formation.slots({:column, 1.5}, 3)
+      [Hal.Pose.new(-1.5, 0), Hal.Pose.new(-3, 0)]
+      iex> Swarm.Formation.slots({:line, 1.0}, 4) |> Enum.map(& &1.y)
+      [1.0, -1.0, 2.0]
+      iex> Swarm.Formation.slots({:wedge, 1.0}, 1)
+      []
+  """
+  @spec slots(t(), pos_integer(), float()) :: [Pose.t()]
+  def slots(formation, robots, landmark_distance \\ @least_ring)
+
+  def slots({:circle, _spacing} = formation, robots, distance) when robots > 1 do
+    radius = ring(formation, robots)
+
+    for k <- 1..(robots - 1)//1 do
+      # Seen from the landmark the leader is at angle pi.
+      angle = :math.pi() + 2 * :math.pi() * k / robots
+
+      Pose.new(
+        distance + radius * :math.cos(angle),
+        radius * :math.sin(angle),
+        angle + :math.pi()
+      )
+    end
+  end
+
+  def slots({kind, d}, robots, _distance),
+    do: for(k <- 1..(robots - 1)//1, do: slot(kind, k, robots) |> scale(d))
+
+  @doc """
+  The radius of the ring of `robots` round the landmark, the leader included.
+
+      iex> Swarm.Formation.ring({:circle, 1.0}, 12) |> Float.round(3)
+      1.932
+  """
+  @spec ring(t(), pos_integer()) :: float()
+  def ring({:circle, _spacing}, 1), do: @least_ring
+
+  def ring({:circle, spacing}, robots),
+    do: max(@least_ring, spacing / (2 * :math.sin(:math.pi() / robots)))
+
+  defp slot(:column, k, _robots), do: {-k * 1.0, 0.0}
+  defp slot(:line, k, _robots), do: {0.0, side(k) * arm(k)}
+
+  defp slot(:wedge, k, _robots) do
+    j = arm(k) * :math.sqrt(0.5)
+    {-j, side(k) * j}
+  end
+
+  defp slot(:triangle, k, _robots) do
+    row = trunc((:math.sqrt(8 * k + 1) - 1) / 2)
+    place = k - div(row * (row + 1), 2)
+    {-row * :math.sqrt(3) / 2, row / 2 - place}
+  end
+
+  defp slot(:diamond, k, robots) do
+    widest = widest(robots)
+    {row, place} = diamond_row(k, 1, widest)
+    here = min(row_width(row, widest), robots - (k - place))
+    {-(row - 1) * 1.0, (here - 1) / 2 - place}
+  end
+
+  # The row (from 1) of robot k in rows of 1, 2, …, widest, …, 2, 1, and its place in it (from 0).
+  defp diamond_row(k, row, widest) do
+    width = row_width(row, widest)
+    if k < width, do: {row, k}, else: diamond_row(k - width, row + 1, widest)
+  end
+
+  defp row_width(row, widest), do: max(widest - abs(widest - row), 1)
+
+  # m rows up and m - 1 down hold m * m robots.
+  defp widest(robots), do: robots |> :math.sqrt() |> ceil()
+
+  defp rows(robots), do: trunc((:math.sqrt(8 * max(robots - 1, 0) + 1) - 1) / 2) + 1
+
+  defp arm(k), do: div(k + 1, 2) * 1.0
+  defp side(k), do: if(rem(k, 2) == 1, do: 1.0, else: -1.0)
+  defp scale({x, y}, d), do: Pose.new(x * d, y * d)
+end

@@ -1,0 +1,77 @@
+defmodule Swarm.Heartbeat do
+  @moduledoc """
+  What a robot tells all others five times a second: where it is, what it is at, whom it hears,
+  whom it follows. Whole numbers only: mm, mrad, mm/s, mrad/s, millionths of a picture.
+
+  `sight` is its newest view of the landmark: relative size and estimated distance, `nil` where it
+  does not see it. `anchor` is there in the leader's heartbeats only.
+  """
+
+  @enforce_keys [:boot, :sequence, :pose, :twist]
+  defstruct @enforce_keys ++
+              [
+                radius: 200,
+                phase: :idle,
+                epoch: 0,
+                leader: nil,
+                heard: [],
+                sight: nil,
+                standing: false,
+                in_place: false,
+                blocked: false,
+                estop: false,
+                anchor: nil
+              ]
+
+  @type t :: %__MODULE__{
+          boot: integer(),
+          sequence: non_neg_integer(),
+          pose: {x :: integer(), y :: integer(), heading :: integer()},
+          twist: {linear :: integer(), turn :: integer()},
+          radius: pos_integer(),
+          phase: atom(),
+          epoch: non_neg_integer(),
+          leader: atom() | nil,
+          heard: [atom()],
+          sight: %{size_ppm: pos_integer(), distance: pos_integer() | nil} | nil,
+          standing: boolean(),
+          in_place: boolean(),
+          blocked: boolean(),
+          estop: boolean(),
+          anchor: Swarm.Anchor.t() | nil
+        }
+
+  @far 1_000_000_000
+
+  @doc """
+  Whether a term from outside is a heartbeat with sane numbers.
+
+      iex> Swarm.Heartbeat.valid?(%Swarm.Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}})
+      true
+      iex> Swarm.Heartbeat.valid?(%Swarm.Heartbeat{boot: 1, sequence: 1, pose: {0, 1.5, 0}, twist: {0, 0}})
+      false
+  """
+  @spec valid?(term()) :: boolean()
+  def valid?(%__MODULE__{pose: {x, y, heading}, twist: {linear, turn}} = beat) do
+    Enum.all?([x, y, heading, linear, turn], &(is_integer(&1) and abs(&1) < @far)) and
+      is_integer(beat.boot) and is_integer(beat.sequence) and beat.sequence >= 0 and
+      beat.radius in 50..2000 and is_atom(beat.phase) and is_integer(beat.epoch) and
+      beat.epoch >= 0 and is_atom(beat.leader) and names?(beat.heard) and sight?(beat.sight) and
+      Enum.all?(
+        [beat.standing, beat.in_place, beat.blocked, beat.estop],
+        &is_boolean/1
+      ) and (beat.anchor == nil or Swarm.Anchor.valid?(beat.anchor))
+  end
+
+  def valid?(_term), do: false
+
+  defp names?(list),
+    do: is_list(list) and List.improper?(list) == false and Enum.all?(list, &is_atom/1)
+
+  defp sight?(nil), do: true
+
+  defp sight?(%{size_ppm: size, distance: distance}),
+    do: size in 0..1_000_000 and (distance == nil or distance in 0..1_000_000)
+
+  defp sight?(_other), do: false
+end

@@ -1,0 +1,270 @@
+defmodule Swarm.Missions.Landmark do
+  @moduledoc """
+  The main job (R58 to R60): search for the landmark, agree on who sees it largest, and follow
+  that robot in formation while a person moves the landmark. Pure: events in, effects out; its
+  phases are the table of `Swarm.Missions.Landmark.Phases`, its parts are modules of their own:
+
+  | part | decides |
+  |---|---|
+  | `Sight` | where the landmark is, by the robot's own eyes |
+  | `Council` | when a round is opened, what is reported in it, what comes of it |
+  | `Lead` | what the leader tells: the anchor, the order, whether the shape is formed |
+  | `Attend` | what a follower does: its slot, its gaze, its child |
+
+  Time is `percept.at_ms`, compared with whole numbers; there are no timers.
+  """
+  alias Hal.Twist
+  alias Robot.Behaviour
+  alias Swarm.{Anchor, Formation, Message, Round}
+  alias Swarm.Missions.Landmark.{Attend, Council, Lead, Phases, Sight}
+
+  @behaviour Robot.Mission
+
+  @colour "YellowLandmark"
+  @sight_ms 700
+  @roam_ms 6_000
+  @tries 3
+
+  @enforce_keys [:me, :formation, :assign, :leader_change?]
+  defstruct @enforce_keys ++
+              [
+                colour: @colour,
+                percept: nil,
+                now_ms: 0,
+                phase: :idle,
+                since_ms: 0,
+                started?: false,
+                scan: nil,
+                sight: nil,
+                tries: 0,
+                round: nil,
+                verdict: nil,
+                rescan?: false,
+                order: [],
+                epoch: 0,
+                leader: nil,
+                founded: nil,
+                size_ppm: nil,
+                anchor: nil,
+                anchor_ms: nil,
+                lead: nil,
+                attend: nil,
+                challenge: nil
+              ]
+
+  @type t :: %__MODULE__{}
+
+  @doc """
+  A robot's mission. Options: `formation:` (`{kind, spacing}`), `assign:` (`:chain` or `:cost`),
+  `leader_change:` (whether a robot that is nearer takes over), `colour:` of the landmark.
+  """
+  @impl Robot.Mission
+  def init(robot, options \\ []) do
+    mission = %__MODULE__{
+      me: robot,
+      formation: Keyword.get(options, :formation, {:column, 1.0}),
+      assign: Keyword.get(options, :assign, :chain),
+      leader_change?: Keyword.get(options, :leader_change, true),
+      colour: Keyword.get(options, :colour, @colour),
+      round: Round.new(robot),
+      lead: Lead.new(),
+      attend: Attend.new()
+    }
+
+    {mission.phase, mission, []}
+  end
+
+  @impl Robot.Mission
+  def handle({:command, :start}, mission), do: still(%{mission | started?: true})
+  def handle({:command, :stop}, mission), do: still(%{mission | started?: false})
+
+  def handle({:command, {:formation, kind, spacing}}, mission) do
+    case Formation.new(kind, spacing: spacing) do
+      {:ok, formation} -> still(Lead.reshape(%{mission | formation: formation}))
+      {:error, _line} -> still(mission)
+    end
+  end
+
+  def handle({:command, _other}, mission), do: still(mission)
+
+  def handle({:outcome, {:search, _since}, result}, %{phase: :search} = mission),
+    do: still(%{mission | scan: if(result == 1, do: :found, else: :nothing)})
+
+  def handle({:outcome, _tag, _result}, mission), do: still(mission)
+
+  def handle({:message, %Message{kind: :round, from: from, body: letter}}, mission),
+    do: still(Council.hear(mission, from, letter))
+
+  def handle({:message, %Message{kind: :place, body: anchor}}, mission),
+    do: still(hear_anchor(mission, anchor))
+
+  def handle({:message, _other}, mission), do: still(mission)
+
+  def handle({:tick, percept}, mission) do
+    mission = %{
+      mission
+      | percept: percept,
+        now_ms: percept.at_ms,
+        sight: Sight.update(mission.sight, percept, mission.colour)
+    }
+
+    {mission, letters} = mission |> hear_beats() |> Council.tick()
+    {mission, stages} = step(mission)
+    {mission, effects} = act(Phases.activity(mission.phase), mission)
+    {mission.phase, mission, letters ++ stages ++ effects ++ [{:claim, claim(mission)}]}
+  end
+
+  @doc "Whether the landmark is in this robot's picture."
+  @spec sees?(t()) :: boolean()
+  def sees?(mission), do: Sight.fresh?(mission.sight, mission.now_ms, @sight_ms)
+
+  defp still(mission), do: {mission.phase, mission, []}
+
+  # The leader's heartbeats carry the anchor too.
+  defp hear_beats(mission) do
+    Enum.reduce(mission.percept.peers, mission, fn
+      {_id, %{beat: %{anchor: %Anchor{} = anchor}}}, mission -> hear_anchor(mission, anchor)
+      _silent, mission -> mission
+    end)
+  end
+
+  # Only an anchor of this or a later epoch counts, and only one that is news.
+  defp hear_anchor(%{me: me} = mission, %Anchor{leader: leader} = anchor) when leader != me do
+    known = mission.anchor
+
+    if anchor.epoch >= mission.epoch and
+         (known == nil or {anchor.epoch, anchor.sequence} > {known.epoch, known.sequence}),
+       do: %{mission | anchor: anchor, anchor_ms: mission.now_ms, formation: anchor.formation},
+       else: mission
+  end
+
+  defp hear_anchor(mission, _own), do: mission
+
+  # From phase to phase along the table; a row that leads on at once is followed at once.
+  defp step(mission, stages \\ []) do
+    case Phases.next(mission.phase, &holds?(&1, mission)) do
+      phase when phase == mission.phase -> {mission, stages}
+      phase -> mission |> enter(phase) |> step(stages ++ stage(phase, mission))
+    end
+  end
+
+  defp holds?(:started, m), do: m.started?
+  defp holds?(:stopped, m), do: not m.started?
+  defp holds?(:elected, m), do: m.verdict == {:leader, m.me}
+  defp holds?(:led, m), do: match?({:leader, other} when other != m.me, m.verdict) or joined?(m)
+  defp holds?(:nobody, m), do: m.verdict == :nobody
+  defp holds?(:nobody_again, m), do: m.verdict == :nobody and m.tries + 1 >= @tries
+  defp holds?(:scanned, m), do: m.scan != nil
+  defp holds?(:scan_wanted, m), do: m.scan == nil and Council.search?(m)
+  defp holds?(:sighted, m), do: sees?(m) or Council.search?(m)
+  defp holds?(:roamed, m), do: m.now_ms - m.since_ms >= @roam_ms
+  defp holds?(:deposed, m), do: Lead.deposed?(m)
+  defp holds?(:round_open, m), do: Round.open?(m.round)
+
+  # A robot that comes late, or missed the end of a round, joins the leader who names it.
+  defp joined?(%{anchor: nil}), do: false
+
+  defp joined?(m),
+    do:
+      m.anchor.epoch > m.epoch and m.me in m.anchor.order and m.now_ms - m.anchor_ms < 500 and
+        not Round.open?(m.round)
+
+  defp enter(mission, phase) do
+    mission = %{mission | since_ms: mission.now_ms}
+
+    case phase do
+      :idle ->
+        %{
+          mission
+          | phase: :idle,
+            scan: nil,
+            tries: 0,
+            verdict: nil,
+            leader: nil,
+            anchor: nil,
+            round: Round.new(mission.me) |> Map.put(:highest, mission.round.highest)
+        }
+
+      :search ->
+        %{mission | phase: :search, scan: nil, verdict: nil, rescan?: false}
+
+      :wander ->
+        %{mission | phase: :wander, verdict: nil, scan: nil, tries: mission.tries + 1}
+
+      :rest ->
+        %{mission | phase: :rest, verdict: nil, scan: :nothing, tries: 0}
+
+      :agree ->
+        %{mission | phase: :agree, leader: nil}
+
+      :lead ->
+        Lead.begin(%{mission | phase: :lead, verdict: nil, tries: 0, leader: mission.me})
+
+      :follow ->
+        follow(%{mission | phase: :follow, tries: 0})
+    end
+  end
+
+  defp follow(%{verdict: {:leader, leader}} = mission),
+    do: Attend.begin(%{mission | verdict: nil, leader: leader})
+
+  defp follow(mission),
+    do:
+      Attend.begin(%{
+        mission
+        | leader: mission.anchor.leader,
+          epoch: mission.anchor.epoch,
+          verdict: nil
+      })
+
+  defp stage(:search, _mission), do: [{:stage, :search, %{}}]
+
+  defp stage(:lead, mission),
+    do: [{:stage, :elected, %{epoch: mission.epoch, size_ppm: mission.size_ppm}}]
+
+  defp stage(_phase, _mission), do: []
+
+  defp act(:stand, mission), do: {mission, [{:goal, :stand, {Behaviour.Stop, []}}, {:look, 0.0}]}
+
+  defp act(:scan, mission) do
+    options = [colour: mission.colour]
+    {mission, [{:goal, {:search, mission.since_ms}, {Behaviour.FindBlob, options}}, {:look, 0.0}]}
+  end
+
+  defp act(:roam, mission),
+    do: {mission, [{:goal, :roam, {Behaviour.Wander, []}}, {:look, 0.0}]}
+
+  defp act(:lead, mission), do: Lead.act(mission)
+  defp act(:follow, mission), do: Attend.act(mission)
+
+  # What the heartbeat tells of the mission.
+  defp claim(mission) do
+    leading? = mission.phase == :lead
+
+    %{
+      phase: mission.phase,
+      epoch: mission.epoch,
+      leader: mission.leader,
+      sight:
+        if(sees?(mission),
+          do: %{
+            size_ppm: mission.sight.size_ppm,
+            distance: mission.sight.distance && round(mission.sight.distance * 1000)
+          }
+        ),
+      standing: standing?(mission),
+      in_place: mission.phase == :follow and mission.attend.in_place?,
+      blocked: mission.phase == :follow and mission.attend.blocked?,
+      anchor: if(leading?, do: mission.anchor)
+    }
+  end
+
+  defp standing?(%{phase: :lead, percept: percept}), do: slow?(percept, 0.05)
+  defp standing?(%{phase: :follow} = mission), do: mission.attend.holding?
+  defp standing?(%{phase: phase}), do: phase in [:idle, :search, :agree, :rest]
+
+  @doc "Whether a robot moves slower than `limit` m/s, as far as its wheels say."
+  @spec slow?(Robot.Percept.t(), float()) :: boolean()
+  def slow?(%{odometry: %{twist: %Twist{linear: linear}}}, limit), do: abs(linear) < limit
+  def slow?(_percept, _limit), do: true
+end

@@ -1,0 +1,137 @@
+defmodule Swarm.Missions.Landmark.Attend do
+  @moduledoc """
+  What a follower does: drive to its slot, keep an eye on what it can correct its pose by, and
+  pass the anchor on to its child. Pure.
+
+  Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard).
+  """
+  alias Hal.Pose
+  alias Robot.Behaviour
+  alias Swarm.{Chain, Message}
+  alias Swarm.Missions.Landmark
+  alias Swarm.Missions.Landmark.Places
+
+  @lease_ms 1_000
+  @in_place 0.25
+  @near 0.15
+  @slow 0.05
+  # The camera looks at the landmark and at the robot ahead in turn.
+  @gaze_ms 1_500
+  @landmark_radius 0.15
+  @robot_colour "RedRobot"
+  # How well the leader knows the landmark's place when it stands, and while it moves, in metres.
+  @still_sd 0.08
+  @moving_sd 0.5
+  @robot_sd 0.1
+
+  defstruct in_place?: false, holding?: false, blocked?: false, told: {0, 0}, error: nil
+
+  @type t :: %__MODULE__{}
+
+  @doc "Not attending anybody yet."
+  @spec new() :: t()
+  def new, do: %__MODULE__{}
+
+  @doc "Begins to follow."
+  @spec begin(Landmark.t()) :: Landmark.t()
+  def begin(mission), do: %{mission | attend: new(), scan: nil}
+
+  @doc "One tick of following."
+  @spec act(Landmark.t()) :: {Landmark.t(), [tuple()]}
+  def act(mission) do
+    age_ms = mission.now_ms - (mission.anchor_ms || mission.now_ms)
+    place = mission.anchor && Places.slot(mission.anchor, mission.me, age_ms)
+
+    if place == nil or age_ms > @lease_ms or mission.percept.pose == nil do
+      {%{mission | attend: %{mission.attend | in_place?: false, holding?: true}},
+       [{:goal, :stand, {Behaviour.Stop, []}}, {:look, 0.0}]}
+    else
+      attend(mission, place, age_ms)
+    end
+  end
+
+  defp attend(mission, {slot, velocity}, age_ms) do
+    error = Pose.distance(mission.percept.pose, slot)
+    slow? = Landmark.slow?(mission.percept, @slow)
+    {vx, vy} = velocity
+    resting? = slow? and vx * vx + vy * vy < @slow * @slow
+
+    {told, place} = pass_on(mission)
+
+    mission = %{
+      mission
+      | attend: %{
+          mission.attend
+          | in_place?: slow? and error <= @in_place,
+            holding?: resting? and error <= @near,
+            error: error,
+            told: told
+        }
+    }
+
+    options = [target: slot, velocity: velocity, discs: discs(mission.anchor)]
+    goal = {:goal, {:slot, mission.epoch}, {Behaviour.Follow, options}}
+
+    {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, references(mission)}]}
+  end
+
+  # From parent to child: n - 1 messages for the whole group (R28, R53).
+  defp pass_on(%{anchor: anchor, attend: attend} = mission) do
+    news = {anchor.epoch, anchor.sequence}
+    child = Chain.child([anchor.leader | anchor.order], mission.me)
+
+    if news > attend.told and child != nil,
+      do: {news, [{:send, [child], Message.new(mission.me, :place, anchor)}]},
+      else: {attend.told, []}
+  end
+
+  # Nobody drives through the landmark.
+  defp discs(anchor) do
+    case Places.landmark(anchor) do
+      nil -> []
+      {x, y} -> [{x, y, @landmark_radius}]
+    end
+  end
+
+  # Only those ahead in the order: corrections run one way, from the leader down.
+  defp references(%{anchor: anchor, percept: percept} = mission) do
+    {leader, _twist} = Places.leader(anchor, mission.now_ms - mission.anchor_ms)
+    ahead = Enum.take_while(anchor.order, &(&1 != mission.me))
+
+    robots =
+      [{anchor.leader, leader} | for(id <- ahead, peer = percept.peers[id], do: {id, peer.pose})]
+      |> Enum.map(fn {_id, pose} ->
+        %{colour: @robot_colour, at: Pose.point(pose), sd: @robot_sd, range?: false}
+      end)
+
+    case Places.landmark(anchor) do
+      nil ->
+        robots
+
+      place ->
+        sd = if anchor.still, do: @still_sd, else: @moving_sd
+        [%{colour: mission.colour, at: place, sd: sd, range?: true} | robots]
+    end
+  end
+
+  # Pan towards the landmark or towards the robot ahead, whichever's turn it is and can be seen.
+  defp look(%{anchor: anchor, percept: percept} = mission, age_ms) do
+    {leader, _twist} = Places.leader(anchor, age_ms)
+    limit = percept.profile.camera.max_pan
+    targets = [Places.landmark(anchor) || Pose.point(leader), ahead(mission, leader)]
+    turn = rem(div(mission.now_ms, @gaze_ms), 2)
+    {first, [second]} = List.pop_at(targets, turn)
+
+    Enum.find_value([first, second], 0.0, fn place ->
+      bearing = Pose.bearing(percept.pose, place)
+      if abs(bearing) <= limit, do: bearing
+    end)
+  end
+
+  defp ahead(%{anchor: anchor, percept: percept} = mission, leader) do
+    case anchor.order |> Enum.take_while(&(&1 != mission.me)) |> List.last() do
+      nil -> Pose.point(leader)
+      id -> if peer = percept.peers[id], do: Pose.point(peer.pose), else: Pose.point(leader)
+    end
+  end
+end

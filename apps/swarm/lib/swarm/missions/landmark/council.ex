@@ -1,0 +1,203 @@
+defmodule Swarm.Missions.Landmark.Council do
+  @moduledoc """
+  A robot's part in the rounds of the landmark mission: when it opens one, what it reports, and
+  what it makes of the record. Pure.
+
+  A round is opened for two purposes. `:search`: everybody reports after its scan. `:change`:
+  everybody reports at once what it sees now, because the leader is gone, or another robot has
+  come clearly nearer to the landmark (R76). While a round is open all stand still.
+  """
+  alias Swarm.{Assignment, Chain, Election, Formation, Message, Peers, Round}
+  alias Swarm.Missions.Landmark
+  alias Swarm.Missions.Landmark.{Challenge, Sight}
+
+  # Heartbeats come at 5 Hz: after this time the view has settled.
+  @settle_ms 600
+  @late_ms 1_500
+  @search_ms 30_000
+  @change_ms 2_000
+  @fresh_ms 1_000
+  @lost_ms 2_000
+
+  @doc "Hears a letter. A robot that is not started takes no part."
+  @spec hear(Landmark.t(), atom(), Round.Letter.t()) :: Landmark.t()
+  def hear(%{started?: false} = mission, _from, _letter), do: mission
+
+  def hear(mission, from, letter),
+    do: %{mission | round: Round.hear(mission.round, from, letter, mission.now_ms)}
+
+  @doc "Whether a round waits for this robot's scan."
+  @spec search?(Landmark.t()) :: boolean()
+  def search?(%{round: round, rescan?: rescan?}),
+    do: rescan? or (round.phase == :collect and round.purpose == :search and round.report == :busy)
+
+  @doc "One tick: the letters to send, as effects, and the verdict of a round that has committed."
+  @spec tick(Landmark.t()) :: {Landmark.t(), [tuple()]}
+  def tick(%{phase: :idle} = mission), do: {mission, []}
+
+  def tick(mission) do
+    mission = mission |> Challenge.update() |> open() |> report()
+    {round, letters, event} = Round.tick(mission.round, mission.now_ms)
+    mission = conclude(event, %{mission | round: round})
+    to = List.delete(round.view, mission.me)
+
+    effects =
+      for letter <- letters, to != [], do: {:send, to, Message.new(mission.me, :round, letter)}
+
+    {mission, effects}
+  end
+
+  @doc "All that take part in the mission and are not gone, this robot too, sorted."
+  @spec view(Landmark.t()) :: [atom()]
+  def view(mission) do
+    others =
+      for {id, beat} <- Peers.taking_part(mission.percept.peers, mission.now_ms),
+          beat.phase != :idle,
+          do: id
+
+    Enum.sort([mission.me | others])
+  end
+
+  @doc "Whether another robot leads, as far as this one hears."
+  @spec led?(Landmark.t()) :: boolean()
+  def led?(mission) do
+    mission.percept.peers
+    |> Peers.taking_part(mission.now_ms)
+    |> Enum.any?(fn {_id, beat} -> beat.phase == :lead end)
+  end
+
+  defp open(mission) do
+    view = view(mission)
+    since = mission.now_ms - mission.since_ms
+
+    cond do
+      Round.open?(mission.round) -> reopen(mission, view)
+      mission.challenge == :open -> start(mission, view, :change)
+      mission.phase == :lead and led?(mission) -> start(mission, view, :change)
+      mission.phase == :follow and leader_lost?(mission) -> start(mission, view, :change)
+      mission.verdict != nil or led?(mission) -> mission
+      mission.phase == :search and turn?(mission, view, since) -> start(mission, view, :search)
+      mission.phase == :agree and turn?(mission, view, since) -> start(mission, view, purpose(mission))
+      true -> mission
+    end
+  end
+
+  # The first of the view opens; were it deaf or frozen, another one does a little later.
+  defp turn?(mission, view, since),
+    do: (since >= @settle_ms and hd(view) == mission.me) or since >= @late_ms
+
+  defp purpose(%{scan: nil}), do: :change
+  defp purpose(_scanned), do: :search
+
+  # A member that is gone would be waited for in vain, and one that came would be left out.
+  defp reopen(%{round: round} = mission, view) do
+    gone? = Enum.any?(round.view, &(&1 not in view))
+    came? = round.phase == :collect and hd(view) == mission.me and view -- round.view != []
+
+    if gone? or came?,
+      do: start(mission, view, round.purpose),
+      else: mission
+  end
+
+  defp start(mission, view, purpose) do
+    length = if purpose == :search, do: @search_ms, else: @change_ms
+    same? = Round.open?(mission.round)
+    epoch = if same?, do: elem(mission.round.id, 0), else: mission.epoch + 1
+    round = Round.open(mission.round, epoch, view, purpose, length, mission.now_ms)
+    %{mission | round: round, challenge: nil}
+  end
+
+  # The anchor is the leader's sign of life, by whatever way it comes; a leader whom others still
+  # hear is not gone, and its anchor will come along the chain.
+  defp leader_lost?(%{anchor_ms: at_ms, now_ms: now} = mission) do
+    now - max(at_ms || mission.since_ms, mission.since_ms) >= @lost_ms and
+      not heard_by_others?(mission)
+  end
+
+  defp heard_by_others?(mission) do
+    peers = Peers.taking_part(mission.percept.peers, mission.now_ms)
+
+    case peers[mission.leader] do
+      nil -> Enum.any?(peers, fn {_id, beat} -> mission.leader in beat.heard end)
+      beat -> beat.phase == :lead
+    end
+  end
+
+  defp report(%{round: %{phase: :collect, report: :busy} = round} = mission) do
+    case round.purpose do
+      :change -> put_report(mission, Sight.fresh?(mission.sight, mission.now_ms, @fresh_ms))
+      :search when mission.scan == nil -> mission
+      :search -> put_report(mission, mission.scan == :found or Landmark.sees?(mission))
+    end
+  end
+
+  defp report(mission), do: mission
+
+  defp put_report(%{percept: %{pose: nil}} = mission, _found?), do: mission
+
+  defp put_report(mission, found?) do
+    found? = found? and mission.sight != nil
+    size = if found?, do: mission.sight.size_ppm, else: 0
+    report = %{found: found?, size_ppm: size, pose: millimetres(mission.percept.pose)}
+    %{mission | round: Round.report(mission.round, report)}
+  end
+
+  defp conclude({:commit, record}, mission) do
+    case Election.leader(record.reports) do
+      {:ok, leader} ->
+        {epoch, _counter, _initiator} = record.id
+
+        %{
+          mission
+          | verdict: {:leader, leader},
+            epoch: epoch,
+            founded: mission.now_ms,
+            size_ppm: record.reports[leader].size_ppm,
+            order: plan(mission, record.reports, leader),
+            rescan?: false,
+            anchor: nil,
+            anchor_ms: nil
+        }
+
+      :nobody when mission.round.purpose == :search ->
+        %{mission | verdict: :nobody, rescan?: false}
+
+      :nobody ->
+        %{mission | scan: nil, rescan?: true}
+    end
+  end
+
+  defp conclude({:failed, _reason}, mission), do: start(mission, view(mission), mission.round.purpose)
+  defp conclude(nil, mission), do: mission
+
+  # All compute the same order from the same record.
+  defp plan(mission, reports, leader) do
+    present = for {id, report} <- Enum.sort(reports), report != nil, do: {id, report.pose}
+    {x, y, heading} = reports[leader].pose
+    followers = for {id, {fx, fy, _heading}} <- present, id != leader, do: {id, {fx, fy}}
+
+    case mission.assign do
+      :chain ->
+        Chain.order(followers, {x, y})
+
+      :cost ->
+        pose = Hal.Pose.new(x / 1000, y / 1000, heading / 1000)
+        slots = slots(mission.formation, pose, length(present))
+        Assignment.order(:cost, followers, {x, y}, slots)
+    end
+  end
+
+  @doc "The slots round a leader's pose, in whole millimetres."
+  @spec slots(Formation.t(), Hal.Pose.t(), pos_integer(), float()) :: [{integer(), integer()}]
+  def slots(formation, pose, robots, landmark_distance \\ 1.6) do
+    for slot <- Formation.slots(formation, robots, landmark_distance) do
+      {x, y, _heading} = pose |> Hal.Pose.compose(slot) |> millimetres()
+      {x, y}
+    end
+  end
+
+  @doc "A pose in whole millimetres and milliradians, as robots tell it."
+  @spec millimetres(Hal.Pose.t()) :: {integer(), integer(), integer()}
+  def millimetres(pose),
+    do: {round(pose.x * 1000), round(pose.y * 1000), round(pose.heading * 1000)}
+end

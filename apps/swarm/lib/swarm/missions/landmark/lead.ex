@@ -1,0 +1,213 @@
+defmodule Swarm.Missions.Landmark.Lead do
+  @moduledoc """
+  What the leader does besides tracking the landmark: it tells where it is supposed to be (the
+  anchor), keeps the order of the slots whole when robots go and come, and judges whether the
+  shape is formed. Pure.
+  """
+  alias Robot.Behaviour
+  alias Swarm.{Anchor, Assignment, Chain, Formation, Message, Peers}
+  alias Swarm.Missions.Landmark
+  alias Swarm.Missions.Landmark.{Council, Places, Sight}
+
+  # The landmark's foot leaves the picture below 1.4 m, and its size with it.
+  @near 1.5
+  @far 1.9
+  @ring_slack 0.15
+  @formed_ms 1_000
+  @unformed_ms 500
+  @lost_ms 3_000
+  @scan_ms 5_000
+  @unheard_ms 1_500
+  @settled_ms 1_000
+
+  defstruct sequence: 0,
+            good_ms: nil,
+            bad_ms: nil,
+            formed?: false,
+            lost?: false,
+            heard_ms: nil,
+            restless?: false
+
+  @type t :: %__MODULE__{}
+
+  @doc "Nothing led yet."
+  @spec new() :: t()
+  def new, do: %__MODULE__{}
+
+  @doc "Takes the lead with the order that the round's record gave."
+  @spec begin(Landmark.t()) :: Landmark.t()
+  def begin(mission) do
+    %{
+      mission
+      | lead: %__MODULE__{sequence: mission.lead.sequence, heard_ms: mission.now_ms},
+        scan: nil,
+        anchor: nil
+    }
+  end
+
+  @doc "Takes up a new shape, which everyone learns from the anchor; `:cost` deals the slots anew."
+  @spec reshape(Landmark.t()) :: Landmark.t()
+  def reshape(%{phase: :lead, assign: :cost} = mission), do: mission |> deal() |> unformed()
+  def reshape(mission), do: unformed(mission)
+
+  defp unformed(mission),
+    do: %{mission | lead: %{mission.lead | formed?: false, good_ms: nil, bad_ms: nil}}
+
+  @doc """
+  Whether a leader is one no more: others follow a higher epoch, or nobody has heard it for 1.5 s
+  though it is not alone.
+  """
+  @spec deposed?(Landmark.t()) :: boolean()
+  def deposed?(mission) do
+    peers = Peers.taking_part(mission.percept.peers, mission.now_ms)
+    higher? = Enum.any?(peers, fn {_id, beat} -> beat.epoch > mission.epoch end)
+
+    higher? or
+      (mission.order != [] and mission.now_ms - mission.lead.heard_ms >= @unheard_ms)
+  end
+
+  @doc "One tick of leading."
+  @spec act(Landmark.t()) :: {Landmark.t(), [tuple()]}
+  def act(mission) do
+    mission = mission |> hear() |> muster() |> tell()
+    {mission, formed} = judge(mission)
+    {mission, lost} = miss(mission)
+    child = List.first(mission.order)
+
+    place =
+      for id <- List.wrap(child),
+          do: {:send, [id], Message.new(mission.me, :place, mission.anchor)}
+
+    {mission, formed ++ lost ++ place ++ [goal(mission), {:look, 0.0}, {:anchors, []}]}
+  end
+
+  defp hear(mission) do
+    heard? =
+      mission.percept.peers
+      |> Peers.taking_part(mission.now_ms)
+      |> Enum.any?(fn {_id, beat} -> mission.me in beat.heard end)
+
+    if heard?, do: put_in(mission.lead.heard_ms, mission.now_ms), else: mission
+  end
+
+  # The gone leave their slots and those behind move up (R53 with healing); who comes joins the tail.
+  defp muster(mission) do
+    view = List.delete(Council.view(mission), mission.me)
+    kept = Chain.heal(mission.order, view)
+    came = if mission.now_ms - mission.since_ms >= @settled_ms, do: view -- kept, else: []
+
+    case kept ++ came do
+      order when order == mission.order -> mission
+      order when mission.assign == :cost -> deal(%{mission | order: order})
+      order -> %{mission | order: order}
+    end
+  end
+
+  # Deals the slots by squared cost from where the robots say they are.
+  defp deal(mission) do
+    beats = Peers.taking_part(mission.percept.peers, mission.now_ms)
+    known = for id <- mission.order, beat = beats[id], do: {id, beat.pose}
+    {x, y, _heading} = Council.millimetres(mission.percept.pose)
+    distance = if mission.anchor, do: Places.landmark_distance(mission.anchor), else: @near
+    robots = length(known) + 1
+    slots = Council.slots(mission.formation, mission.percept.pose, robots, distance)
+    followers = for {id, {px, py, _heading}} <- known, do: {id, {px, py}}
+    dealt = Assignment.order(:cost, followers, {x, y}, slots)
+    %{mission | order: dealt ++ (mission.order -- dealt)}
+  end
+
+  defp tell(%{percept: percept, lead: lead} = mission) do
+    sequence = lead.sequence + 1
+    place = mission.sight && mission.sight.place
+
+    anchor = %Anchor{
+      leader: mission.me,
+      epoch: mission.epoch,
+      sequence: sequence,
+      pose: Council.millimetres(percept.pose),
+      twist: twist(percept),
+      formation: mission.formation,
+      order: mission.order,
+      landmark: place && point(place),
+      still: Landmark.sees?(mission) and not mission.sight.moving?
+    }
+
+    %{mission | anchor: anchor, lead: %{lead | sequence: sequence}}
+  end
+
+  # A crawl is told as standing still, so that no slot trembles.
+  defp twist(%{odometry: %{twist: %{linear: linear, turn: turn}}}) do
+    if abs(linear) < 0.02 and abs(turn) < 0.02,
+      do: {0, 0},
+      else: {round(linear * 1000), round(turn * 1000)}
+  end
+
+  defp point({x, y}), do: {round(x * 1000), round(y * 1000)}
+
+  # All followers in place, and the leader still in front of the landmark, for a second.
+  defp judge(mission) do
+    good? =
+      Landmark.sees?(mission) and Landmark.slow?(mission.percept, 0.05) and
+        Enum.all?(mission.order, &in_place?(mission, &1))
+
+    now = mission.now_ms
+    lead = mission.lead
+
+    lead =
+      if good?,
+        do: %{lead | good_ms: lead.good_ms || now, bad_ms: nil},
+        else: %{lead | bad_ms: lead.bad_ms || now, good_ms: nil}
+
+    cond do
+      not lead.formed? and good? and now - lead.good_ms >= @formed_ms ->
+        {%{mission | lead: %{lead | formed?: true}},
+         [{:stage, :formed, %{epoch: mission.epoch, size_ppm: mission.sight.size_ppm}}]}
+
+      lead.formed? and not good? and now - lead.bad_ms >= @unformed_ms ->
+        {%{mission | lead: %{lead | formed?: false}}, []}
+
+      true ->
+        {%{mission | lead: lead}, []}
+    end
+  end
+
+  defp in_place?(mission, id) do
+    case mission.percept.peers do
+      %{^id => %{beat: beat, at_ms: at_ms}} ->
+        beat.in_place and beat.epoch == mission.epoch and mission.now_ms - at_ms < 1_000
+
+      _unknown ->
+        false
+    end
+  end
+
+  defp miss(mission) do
+    seen_ms = (mission.sight && mission.sight.at_ms) || mission.since_ms
+    lost? = mission.now_ms - max(seen_ms, mission.since_ms) >= @lost_ms
+
+    stage =
+      if lost? and not mission.lead.lost?, do: [{:stage, :lost, %{epoch: mission.epoch}}], else: []
+
+    {put_in(mission.lead.lost?, lost?), stage}
+  end
+
+  # A leader that has not seen the landmark for long looks all round for it.
+  defp goal(mission) do
+    if Sight.fresh?(mission.sight, mission.now_ms, @scan_ms) or
+         mission.now_ms - mission.since_ms < @scan_ms do
+      {near, far} = range(mission)
+      options = [colour: mission.colour, near: near, far: far]
+      {:goal, {:track, mission.epoch}, {Behaviour.TrackBlob, options}}
+    else
+      turn = div(mission.now_ms, 20_000)
+      {:goal, {:seek, mission.epoch, turn}, {Behaviour.FindBlob, [colour: mission.colour]}}
+    end
+  end
+
+  defp range(%{formation: {:circle, _d} = formation, order: order}) do
+    ring = Formation.ring(formation, length(order) + 1)
+    {ring - @ring_slack, ring + @ring_slack}
+  end
+
+  defp range(_mission), do: {@near, @far}
+end

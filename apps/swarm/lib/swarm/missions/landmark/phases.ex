@@ -1,0 +1,84 @@
+defmodule Swarm.Missions.Landmark.Phases do
+  @moduledoc """
+  The mission as one table (R59): what a robot does in each phase, and what leads out of it.
+  Conditions are asked in the order of the row; the first that holds wins. To insert a phase,
+  insert a row.
+
+  | phase | does | |
+  |---|---|---|
+  | `:idle` | stands | until it is started |
+  | `:search` | turns once round, looking for the landmark, and listens | the thesis's parallel state |
+  | `:agree` | stands, report in, until the round commits | report and collect |
+  | `:wander` | roams a little | after a round in which nobody had found it |
+  | `:rest` | stands | the landmark is nowhere; starts again when it sees one |
+  | `:lead` | tracks the landmark, tells the others where it is | |
+  | `:follow` | drives to its slot, tells its child | |
+  """
+
+  @table [
+    idle: {:stand, started: :search},
+    search:
+      {:scan,
+       stopped: :idle,
+       elected: :lead,
+       led: :follow,
+       nobody_again: :rest,
+       nobody: :wander,
+       scanned: :agree},
+    agree:
+      {:stand,
+       stopped: :idle,
+       elected: :lead,
+       led: :follow,
+       nobody_again: :rest,
+       nobody: :wander,
+       scan_wanted: :search},
+    wander: {:roam, stopped: :idle, led: :follow, sighted: :search, roamed: :search},
+    rest: {:stand, stopped: :idle, led: :follow, sighted: :search, scan_wanted: :search},
+    lead: {:lead, stopped: :idle, deposed: :agree, round_open: :agree},
+    follow: {:follow, stopped: :idle, round_open: :agree, elected: :lead}
+  ]
+
+  @type phase :: :idle | :search | :agree | :wander | :rest | :lead | :follow
+  @type activity :: :stand | :scan | :roam | :lead | :follow
+  @type condition ::
+          :started
+          | :stopped
+          | :elected
+          | :led
+          | :nobody
+          | :nobody_again
+          | :scanned
+          | :scan_wanted
+          | :sighted
+          | :roamed
+          | :deposed
+          | :round_open
+
+  @doc "The phases in the order of the table."
+  @spec phases() :: [phase()]
+  def phases, do: Keyword.keys(@table)
+
+  @doc """
+  What a robot does in a phase.
+
+      iex> Swarm.Missions.Landmark.Phases.activity(:search)
+      :scan
+  """
+  @spec activity(phase()) :: activity()
+  def activity(phase), do: @table |> Keyword.fetch!(phase) |> elem(0)
+
+  @doc """
+  The phase that follows, given what holds.
+
+      iex> Swarm.Missions.Landmark.Phases.next(:agree, &(&1 == :led))
+      :follow
+      iex> Swarm.Missions.Landmark.Phases.next(:rest, fn _ -> false end)
+      :rest
+  """
+  @spec next(phase(), (condition() -> boolean())) :: phase()
+  def next(phase, holds?) do
+    {_activity, exits} = Keyword.fetch!(@table, phase)
+    Enum.find_value(exits, phase, fn {condition, next} -> holds?.(condition) && next end)
+  end
+end

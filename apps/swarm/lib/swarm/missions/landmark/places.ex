@@ -1,0 +1,66 @@
+defmodule Swarm.Missions.Landmark.Places do
+  @moduledoc """
+  From the leader's anchor to the place of one robot: its slot in the map frame, and how fast that
+  slot moves. Pure.
+
+  A robot follows where the leader is supposed to be (R53): the anchor's pose carried on by its
+  speed for as long as it has been under way, half a second at most.
+  """
+  alias Hal.{Pose, Twist}
+  alias Swarm.{Anchor, Formation}
+
+  @ahead_ms 500
+  @default_distance 1.2
+
+  @doc "The leader's pose and speed out of an anchor that is `age_ms` old."
+  @spec leader(Anchor.t(), non_neg_integer()) :: {Pose.t(), Twist.t()}
+  def leader(%Anchor{pose: {x, y, heading}, twist: {linear, turn}}, age_ms) do
+    pose = Pose.new(x / 1000, y / 1000, heading / 1000)
+    twist = Twist.new(linear / 1000, turn / 1000)
+    dt = min(age_ms, @ahead_ms) / 1000
+    middle = pose.heading + twist.turn * dt / 2
+
+    {Pose.new(
+       pose.x + twist.linear * dt * :math.cos(middle),
+       pose.y + twist.linear * dt * :math.sin(middle),
+       pose.heading + twist.turn * dt
+     ), twist}
+  end
+
+  @doc "How far ahead of the leader the landmark stands, in metres."
+  @spec landmark_distance(Anchor.t()) :: float()
+  def landmark_distance(%Anchor{landmark: nil}), do: @default_distance
+
+  def landmark_distance(%Anchor{landmark: {lx, ly}, pose: {x, y, _heading}}),
+    do: Pose.distance({x / 1000, y / 1000}, {lx / 1000, ly / 1000})
+
+  @doc "The place of the landmark in an anchor, in metres, or `nil`."
+  @spec landmark(Anchor.t()) :: Pose.point() | nil
+  def landmark(%Anchor{landmark: nil}), do: nil
+  def landmark(%Anchor{landmark: {x, y}}), do: {x / 1000, y / 1000}
+
+  @doc "The slot of a robot and its velocity; `nil` where the anchor does not name it."
+  @spec slot(Anchor.t(), atom(), non_neg_integer()) :: {Pose.t(), {float(), float()}} | nil
+  def slot(%Anchor{order: order} = anchor, robot, age_ms) do
+    case Enum.find_index(order, &(&1 == robot)) do
+      nil ->
+        nil
+
+      index ->
+        slot =
+          anchor.formation
+          |> Formation.slots(length(order) + 1, landmark_distance(anchor))
+          |> Enum.at(index)
+
+        {pose, twist} = leader(anchor, age_ms)
+        place = Pose.compose(pose, slot)
+        {place, velocity(pose, twist, place)}
+    end
+  end
+
+  # A point of a turning body: v_L + w x r.
+  defp velocity(pose, twist, place) do
+    {twist.linear * :math.cos(pose.heading) - twist.turn * (place.y - pose.y),
+     twist.linear * :math.sin(pose.heading) + twist.turn * (place.x - pose.x)}
+  end
+end

@@ -1,0 +1,262 @@
+defmodule Swarm.Round do
+  @moduledoc """
+  Agreement on shared inputs: in the end every member of a view holds the same record, and knows
+  that the others do. Pure; time is passed in, in milliseconds.
+
+      collect --all reports, or the deadline--> echo --200 ms--> digest --all digests equal--> committed
+
+  No process can know what the last message did, so time-outs give progress and digests give
+  safety: each member freezes what it holds, signs it with a digest that is final for the round's
+  id, and commits only when it has the same digest of the whole view. A different digest, or a
+  member that is gone, opens a new round with a higher id; the highest id heard wins everywhere.
+
+  Ids are `{epoch, counter, initiator}`: the epoch is that of the leadership which the round will
+  found, the counter grows with each new try.
+  """
+  alias Swarm.Round.Letter
+
+  @version 1
+  @repeat_ms 100
+  @echo_ms 200
+  @ask_ms 400
+  @give_up_ms 2_500
+  # After its commit a member goes on answering, for those that missed the last digest.
+  @linger_ms 2_000
+
+  @enforce_keys [:me]
+  defstruct @enforce_keys ++
+              [
+                id: nil,
+                view: [],
+                phase: :none,
+                purpose: :search,
+                deadline_ms: 0,
+                since_ms: 0,
+                said_ms: nil,
+                report: :busy,
+                reports: %{},
+                digests: %{},
+                digest: nil,
+                echo?: false,
+                highest: {0, 0}
+              ]
+
+  @type phase :: :none | :collect | :echo | :digest | :committed
+  @type t :: %__MODULE__{me: atom(), phase: phase()}
+  @type record :: %{
+          id: Letter.id(),
+          view: [atom()],
+          reports: %{atom() => Swarm.Election.report()},
+          digest: binary()
+        }
+
+  @doc "No round yet."
+  @spec new(atom()) :: t()
+  def new(me), do: %__MODULE__{me: me}
+
+  @doc """
+  Opens a round among `view` (which holds the opener), for the leadership of `epoch`. Its counter
+  is above any that was heard of.
+  """
+  @spec open(t(), pos_integer(), [atom()], :search | :change, pos_integer(), integer()) :: t()
+  def open(round, epoch, view, purpose, length_ms, now_ms) do
+    {top, counter} = fenced(round).highest
+    counter = if epoch >= top, do: counter, else: 0
+    epoch = max(epoch, top)
+    enter(round, {epoch, counter + 1, round.me}, view, purpose, length_ms, now_ms)
+  end
+
+  @doc "Sets the own report: `:busy` while the scan goes on, then the result, which is final for this id."
+  @spec report(t(), :busy | Swarm.Election.report()) :: t()
+  def report(%{phase: :collect, report: :busy} = round, report) when is_map(report),
+    do: %{round | report: report, reports: Map.put(round.reports, round.me, report), said_ms: nil}
+
+  def report(round, _report), do: round
+
+  @doc "Whether a round is under way."
+  @spec open?(t()) :: boolean()
+  def open?(round), do: round.phase in [:collect, :echo, :digest]
+
+  @doc "Hears a letter. A higher id takes this robot along if it is in the view; a lower one is dropped."
+  @spec hear(t(), atom(), Letter.t(), integer()) :: t()
+  def hear(%{me: me} = round, from, %Letter{} = letter, now_ms) when from != me do
+    round = note(round, letter.id)
+
+    cond do
+      letter.id == round.id -> take(round, from, letter)
+      above?(letter.id, round) and me in letter.view -> join(round, from, letter, now_ms)
+      true -> round
+    end
+  end
+
+  def hear(round, _from, _letter, _now_ms), do: round
+
+  @doc """
+  One tick: the letters to send to all of the view, and whether something came of it.
+
+  `{:commit, record}` comes once. `{:failed, :mismatch | :timeout}` asks for a new round.
+  """
+  @spec tick(t(), integer()) ::
+          {t(), [Letter.t()], nil | {:commit, record()} | {:failed, :mismatch | :timeout}}
+  def tick(%{phase: :none} = round, _now_ms), do: {round, [], nil}
+
+  def tick(round, now_ms) do
+    round = advance(round, now_ms)
+    {round, letters} = speak(round, now_ms)
+
+    cond do
+      round.phase == :digest and agreed?(round) ->
+        {%{round | phase: :committed, since_ms: now_ms}, letters, {:commit, record(round)}}
+
+      round.phase == :digest and differing?(round) ->
+        {%{fenced(round) | phase: :none}, letters, {:failed, :mismatch}}
+
+      round.phase == :digest and now_ms - round.since_ms > @give_up_ms ->
+        {%{fenced(round) | phase: :none}, letters, {:failed, :timeout}}
+
+      true ->
+        {round, letters, nil}
+    end
+  end
+
+  @doc "The frozen record of a round that has its reports."
+  @spec record(t()) :: record()
+  def record(round),
+    do: %{id: round.id, view: round.view, reports: frozen(round), digest: round.digest}
+
+  defp enter(round, id, view, purpose, length_ms, now_ms) do
+    round
+    |> note(id)
+    |> Map.merge(%{
+      id: id,
+      view: Enum.sort(view),
+      purpose: purpose,
+      phase: :collect,
+      deadline_ms: now_ms + length_ms,
+      since_ms: now_ms,
+      said_ms: nil,
+      report: :busy,
+      reports: %{},
+      digests: %{},
+      digest: nil,
+      echo?: false
+    })
+  end
+
+  defp join(round, from, letter, now_ms) do
+    round
+    |> enter(letter.id, letter.view, letter.purpose, max(letter.remaining_ms, 0), now_ms)
+    |> take(from, letter)
+  end
+
+  # The first report of a robot in a round is final; reports are frozen once the digest is out.
+  defp take(round, from, letter) do
+    round = if letter.digest, do: put_digest(round, from, letter.digest), else: round
+    round = if letter.ask, do: %{round | said_ms: nil, echo?: true}, else: round
+
+    if round.phase in [:collect, :echo] do
+      heard = if is_map(letter.report), do: %{from => letter.report}, else: %{}
+      known = (letter.known || %{}) |> Map.merge(heard) |> Map.take(round.view)
+      known = for {id, report} <- known, report != nil, into: %{}, do: {id, report}
+      %{round | reports: Map.merge(known, round.reports)}
+    else
+      round
+    end
+  end
+
+  defp put_digest(round, from, digest),
+    do: %{round | digests: Map.put_new(round.digests, from, digest)}
+
+  defp advance(%{phase: :collect} = round, now_ms) do
+    all? = Enum.all?(round.view, &is_map_key(round.reports, &1))
+
+    if all? or now_ms >= round.deadline_ms,
+      do: %{round | phase: :echo, since_ms: now_ms, said_ms: nil, echo?: true},
+      else: round
+  end
+
+  defp advance(%{phase: :echo} = round, now_ms) do
+    if now_ms - round.since_ms >= @echo_ms do
+      digest = digest(round)
+
+      %{round | phase: :digest, since_ms: now_ms, said_ms: nil, digest: digest, echo?: false}
+      |> put_digest(round.me, digest)
+    else
+      %{round | echo?: true}
+    end
+  end
+
+  defp advance(round, _now_ms), do: round
+
+  defp speak(%{phase: :committed} = round, now_ms) do
+    if now_ms - round.since_ms <= @linger_ms,
+      do: say(round, now_ms),
+      else: {round, []}
+  end
+
+  defp speak(round, now_ms), do: say(round, now_ms)
+
+  defp say(round, now_ms) do
+    if round.said_ms == nil or now_ms - round.said_ms >= @repeat_ms do
+      letter = %Letter{
+        id: round.id,
+        view: round.view,
+        purpose: round.purpose,
+        remaining_ms: round.deadline_ms - now_ms,
+        report: round.report,
+        known: if(round.echo?, do: round.reports),
+        digest: round.digest,
+        ask: round.phase == :digest and now_ms - round.since_ms >= @ask_ms
+      }
+
+      {%{round | said_ms: now_ms, echo?: false}, [letter]}
+    else
+      {round, []}
+    end
+  end
+
+  defp agreed?(round),
+    do: Enum.all?(round.view, &(Map.get(round.digests, &1) == round.digest))
+
+  defp differing?(round), do: Enum.any?(round.digests, fn {_id, d} -> d != round.digest end)
+
+  # Who was silent until the deadline is in the record as nil.
+  defp frozen(round), do: Map.new(round.view, &{&1, Map.get(round.reports, &1)})
+
+  # Over a fixed layout of whole numbers and names, sorted by name: never over a term's own bytes.
+  defp digest(round) do
+    {epoch, counter, initiator} = round.id
+
+    lines =
+      for {id, report} <- round |> frozen() |> Enum.sort() do
+        case report do
+          nil ->
+            [Atom.to_string(id), ":-;"]
+
+          %{found: found, size_ppm: size, pose: {x, y, heading}} ->
+            [Atom.to_string(id), ":", if(found, do: "1", else: "0")] ++
+              for(n <- [size, x, y, heading], do: [",", Integer.to_string(n)]) ++ [";"]
+        end
+      end
+
+    :crypto.hash(:sha256, [
+      "#{@version}/#{epoch}/#{counter}/",
+      Atom.to_string(initiator),
+      "/",
+      lines
+    ])
+  end
+
+  # A round whose digest is out may have been committed by others: what follows it is a new epoch.
+  defp fenced(%{phase: phase, id: {epoch, _counter, initiator}} = round)
+       when phase in [:digest, :committed],
+       do: note(round, {epoch + 1, 0, initiator})
+
+  defp fenced(round), do: round
+
+  defp note(round, {epoch, counter, _initiator}),
+    do: %{round | highest: max(round.highest, {epoch, counter})}
+
+  defp above?(id, %{id: nil}), do: id != nil
+  defp above?(id, round), do: id > round.id
+end

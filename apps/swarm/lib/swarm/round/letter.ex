@@ -1,0 +1,52 @@
+defmodule Swarm.Round.Letter do
+  @moduledoc """
+  What is said in a round. Every letter carries the round's id, its view and the time that is
+  left (no shared clock is needed), the sender's own report, and, once it is final, its digest.
+  `known` is the map of all reports that the sender holds, sent as an echo when the reports are
+  in, or when somebody asked. `purpose` says why the round is held.
+  """
+
+  @enforce_keys [:id, :view, :remaining_ms, :purpose]
+  defstruct @enforce_keys ++ [report: nil, known: nil, digest: nil, ask: false]
+
+  @type id :: {epoch :: pos_integer(), counter :: pos_integer(), initiator :: atom()}
+  @type t :: %__MODULE__{
+          id: id(),
+          view: [atom()],
+          remaining_ms: integer(),
+          purpose: :search | :change,
+          report: :busy | Swarm.Election.report(),
+          known: %{atom() => Swarm.Election.report()} | nil,
+          digest: binary() | nil,
+          ask: boolean()
+        }
+
+  @doc "Whether a term from outside is a letter."
+  @spec valid?(term()) :: boolean()
+  def valid?(%__MODULE__{id: {epoch, counter, initiator}} = letter) do
+    is_integer(epoch) and epoch > 0 and epoch < 1_000_000_000 and is_integer(counter) and
+      counter > 0 and counter < 1_000_000_000 and is_atom(initiator) and
+      is_integer(letter.remaining_ms) and letter.remaining_ms <= 120_000 and
+      letter.purpose in [:search, :change] and is_list(letter.view) and
+      Enum.all?(letter.view, &is_atom/1) and
+      (letter.report == :busy or report?(letter.report)) and
+      (letter.known == nil or known?(letter.known)) and
+      (letter.digest == nil or is_binary(letter.digest)) and is_boolean(letter.ask)
+  end
+
+  def valid?(_term), do: false
+
+  defp known?(known) when is_map(known),
+    do: Enum.all?(known, fn {id, report} -> is_atom(id) and report?(report) end)
+
+  defp known?(_other), do: false
+
+  defp report?(nil), do: true
+
+  defp report?(%{found: found, size_ppm: size, pose: {x, y, heading}}) do
+    is_boolean(found) and is_integer(size) and size in 0..1_000_000 and
+      Enum.all?([x, y, heading], &(is_integer(&1) and abs(&1) < 1_000_000_000))
+  end
+
+  defp report?(_other), do: false
+end
