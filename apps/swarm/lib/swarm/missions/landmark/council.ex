@@ -29,7 +29,8 @@ defmodule Swarm.Missions.Landmark.Council do
   @doc "Whether a round waits for this robot's scan."
   @spec search?(Landmark.t()) :: boolean()
   def search?(%{round: round, rescan?: rescan?}),
-    do: rescan? or (round.phase == :collect and round.purpose == :search and round.report == :busy)
+    do:
+      rescan? or (round.phase == :collect and round.purpose == :search and round.report == :busy)
 
   @doc "One tick: the letters to send, as effects, and the verdict of a round that has committed."
   @spec tick(Landmark.t()) :: {Landmark.t(), [tuple()]}
@@ -71,14 +72,29 @@ defmodule Swarm.Missions.Landmark.Council do
     since = mission.now_ms - mission.since_ms
 
     cond do
-      Round.open?(mission.round) -> reopen(mission, view)
-      mission.challenge == :open -> start(mission, view, :change)
-      mission.phase == :lead and led?(mission) -> start(mission, view, :change)
-      mission.phase == :follow and leader_lost?(mission) -> start(mission, view, :change)
-      mission.verdict != nil or led?(mission) -> mission
-      mission.phase == :search and turn?(mission, view, since) -> start(mission, view, :search)
-      mission.phase == :agree and turn?(mission, view, since) -> start(mission, view, purpose(mission))
-      true -> mission
+      Round.open?(mission.round) ->
+        reopen(mission, view)
+
+      mission.challenge == :open ->
+        start(mission, view, :change)
+
+      mission.phase == :lead and led?(mission) ->
+        start(mission, view, :change)
+
+      mission.phase == :follow and leader_lost?(mission) ->
+        start(mission, view, :change)
+
+      mission.verdict != nil or led?(mission) ->
+        mission
+
+      mission.phase == :search and turn?(mission, view, since) ->
+        start(mission, view, :search)
+
+      mission.phase == :agree and turn?(mission, view, since) ->
+        start(mission, view, purpose(mission))
+
+      true ->
+        mission
     end
   end
 
@@ -167,7 +183,9 @@ defmodule Swarm.Missions.Landmark.Council do
     end
   end
 
-  defp conclude({:failed, _reason}, mission), do: start(mission, view(mission), mission.round.purpose)
+  defp conclude({:failed, _reason}, mission),
+    do: start(mission, view(mission), mission.round.purpose)
+
   defp conclude(nil, mission), do: mission
 
   # All compute the same order from the same record.

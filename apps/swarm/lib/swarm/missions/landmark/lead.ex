@@ -186,7 +186,9 @@ defmodule Swarm.Missions.Landmark.Lead do
     lost? = mission.now_ms - max(seen_ms, mission.since_ms) >= @lost_ms
 
     stage =
-      if lost? and not mission.lead.lost?, do: [{:stage, :lost, %{epoch: mission.epoch}}], else: []
+      if lost? and not mission.lead.lost?,
+        do: [{:stage, :lost, %{epoch: mission.epoch}}],
+        else: []
 
     {put_in(mission.lead.lost?, lost?), stage}
   end
