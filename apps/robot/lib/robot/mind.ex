@@ -12,11 +12,12 @@ defmodule Robot.Mind do
   round, in the map frame, metres.
   """
   alias Hal.Profile
-  alias Robot.{Arbiter, Behaviour, Percept, Wish}
+  alias Robot.{Arbiter, Behaviour, Localiser, Percept, Wish}
   alias Robot.Behaviour.{Avoid, Escape, Rest}
 
   @enforce_keys [:profile, :escape, :rest]
-  defstruct @enforce_keys ++ [tag: nil, module: nil, goal: nil, last_by: nil]
+  defstruct @enforce_keys ++
+              [tag: nil, module: nil, goal: nil, last_by: nil, localiser: nil, percept: nil]
 
   @type t :: %__MODULE__{
           profile: Profile.t(),
@@ -25,15 +26,27 @@ defmodule Robot.Mind do
           tag: term(),
           module: module() | nil,
           goal: Behaviour.t() | nil,
-          last_by: atom()
+          last_by: atom(),
+          localiser: Localiser.t() | nil,
+          percept: Percept.t() | nil
         }
 
-  @doc "A mind without a goal. Options: `profile` (required)."
+  @doc """
+  A mind without a goal. Options: `profile` (required), and `start`, the pose in the map frame at
+  which the odometry says zero; with it the mind keeps the percept's pose by `Robot.Localiser`.
+  """
   @spec new(keyword()) :: t()
   def new(options) do
-    case Keyword.validate!(options, [:profile])[:profile] do
+    options = Keyword.validate!(options, [:profile, start: nil])
+
+    case options[:profile] do
       %Profile{} = profile ->
-        %__MODULE__{profile: profile, escape: Escape.new([]), rest: Rest.new([])}
+        %__MODULE__{
+          profile: profile,
+          escape: Escape.new([]),
+          rest: Rest.new([]),
+          localiser: options[:start] && Localiser.new(options[:start])
+        }
 
       other ->
         raise ArgumentError,
@@ -57,11 +70,23 @@ defmodule Robot.Mind do
     %{mind | tag: tag, module: module, goal: goal}
   end
 
+  @doc "References for the estimate of the pose, from now on."
+  @spec anchors(t(), [Localiser.anchor()]) :: t()
+  def anchors(%__MODULE__{localiser: nil} = mind, _anchors), do: mind
+
+  def anchors(%__MODULE__{} = mind, anchors),
+    do: %{mind | localiser: Localiser.anchors(mind.localiser, anchors)}
+
+  @doc "The percept of the last tick, with the pose that the mind made of it."
+  @spec percept(t()) :: Percept.t() | nil
+  def percept(%__MODULE__{percept: percept}), do: percept
+
   @doc """
   One tick: the chosen wish (its `by` says whose), and the goal's outcome at the tick it ends.
   """
   @spec tick(t(), Percept.t()) :: {Wish.t(), {tag :: term(), integer()} | nil, t()}
   def tick(%__MODULE__{} = mind, %Percept{} = percept) do
+    {percept, mind} = locate(mind, percept)
     {escaping, escape, nil} = run(mind.escape, percept)
     {resting, rest, nil} = run(mind.rest, percept)
     {wanted, goal, outcome} = run(mind.goal, percept)
@@ -70,6 +95,13 @@ defmodule Robot.Mind do
     wish = if wish.look == nil and wanted != nil, do: %{wish | look: wanted.look}, else: wish
     mind = %{mind | escape: escape, rest: rest, goal: goal, last_by: wish.by}
     {wish, outcome && {mind.tag, outcome}, mind}
+  end
+
+  defp locate(%{localiser: nil} = mind, percept), do: {percept, %{mind | percept: percept}}
+
+  defp locate(mind, percept) do
+    {percept, localiser} = Localiser.update(mind.localiser, percept)
+    {percept, %{mind | localiser: localiser, percept: percept}}
   end
 
   defp run(nil, _percept), do: {nil, nil, nil}
