@@ -13,7 +13,7 @@ defmodule Hal.MixProject do
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
       compilers: [:native | Mix.compilers()],
-      native: [],
+      native: [programs: [newest_frame: ["newest_frame.c", "y4m.c"]]],
       elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
       deps: []

@@ -1,0 +1,164 @@
+defmodule Hal.Camera.FFmpeg do
+  @moduledoc """
+  A camera that is whatever ffmpeg reads: a V4L2 device, a stream, a video file, a picture, a
+  test picture (`Hal.Camera.Source`).
+
+  Options:
+
+    * `:source` - what to read
+    * `:format` - `:yuyv` (default) or `:i420`; always full range, BT.601
+    * `:size` - `{width, height}`, even; by default the source's own, less an odd last column
+      (and for `:i420` an odd last row)
+    * `:every` - `false`: the newest frame wins, files run in real time. `true`: each frame in
+      turn, as fast as it is asked for, and timed by its place in the file
+    * `:loop` - `true`: start a file again at its end
+    * `:rate` - frames a second to ask of a V4L2 device
+
+  ffmpeg runs behind the port program `newest_frame`, which keeps one frame and gives it out when
+  `next/1` asks; nothing queues, and ffmpeg ends with this process or its VM, however they end.
+
+  Errors: `:no_ffmpeg`, `:enoent` (no such file or device), `:eisdir`, `:eof` (the source ended
+  after at least one frame), `{:unreadable, what ffmpeg says}`, `{:exit, status}`.
+  """
+  @behaviour Hal.Camera
+  alias Hal.Camera.Source
+  alias Hal.Frame
+
+  @enforce_keys [:port, :format, :every]
+  defstruct @enforce_keys
+
+  @opaque t :: %__MODULE__{port: port(), format: Frame.format(), every: boolean()}
+
+  @impl Hal.Camera
+  def init(options) do
+    options = check!(options)
+
+    with :ok <- Source.check(options[:source]),
+         {:ok, ffmpeg} <- find_ffmpeg(options) do
+      arguments = [
+        if(options[:every], do: "every", else: "newest"),
+        ffmpeg | Source.arguments(options[:source], options)
+      ]
+
+      program = Application.app_dir(:hal, "priv/newest_frame")
+      settings = [:binary, :exit_status, packet: 4, args: arguments]
+      port = Port.open({:spawn_executable, program}, settings)
+      {:ok, %__MODULE__{port: port, format: options[:format], every: options[:every]}}
+    end
+  end
+
+  @impl Hal.Camera
+  def next(%__MODULE__{port: port} = state) do
+    # The program may have ended by itself; its last message is then under way to us.
+    send(port, {self(), {:command, "n"}})
+    {:ok, state}
+  end
+
+  @impl Hal.Camera
+  def handle_message({port, {:data, <<?F, picture::binary>>}}, %__MODULE__{port: port} = state),
+    do: {:ok, [{:frame, frame(picture, state)}], state}
+
+  def handle_message(
+        {port, {:data, <<?E, status, count::64, words::binary>>}},
+        %{port: port} = state
+      ),
+      do: {:error, end_reason(status, count, words), state}
+
+  def handle_message({port, {:exit_status, status}}, %__MODULE__{port: port} = state),
+    do: {:error, {:exit, status}, state}
+
+  def handle_message({:EXIT, port, reason}, %__MODULE__{port: port} = state),
+    do: {:error, {:exit, reason}, state}
+
+  def handle_message(_other, state), do: {:ok, [], state}
+
+  @impl Hal.Camera
+  def terminate(%__MODULE__{port: port}) do
+    send(port, {self(), :close})
+    :ok
+  end
+
+  @doc """
+  An error in a person's words, for one line.
+
+      iex> Hal.Camera.FFmpeg.explain(:enoent)
+      "no such file or device"
+  """
+  @spec explain(reason :: term()) :: String.t()
+  def explain(:enoent), do: "no such file or device"
+  def explain(:eisdir), do: "is a folder"
+  def explain(:no_ffmpeg), do: "the program ffmpeg is missing (on Debian: apt install ffmpeg)"
+  def explain(:eof), do: "ended"
+  def explain({:unreadable, words}), do: "not a readable picture, video or stream (#{words})"
+  def explain({:exit, reason}), do: "the reader ended (#{inspect(reason)})"
+
+  defp frame(picture, state) do
+    <<_chroma, width::32, height::32, rate::32, per::32, number::64, age_us::64, bytes::binary>> =
+      picture
+
+    at_ms =
+      if state.every and rate > 0,
+        do: div(number * per * 1000 + div(rate, 2), rate),
+        else: System.monotonic_time(:millisecond) - div(age_us, 1000)
+
+    {:ok, frame} = Frame.new(state.format, width, height, bytes, at_ms)
+    frame
+  end
+
+  defp end_reason(0, count, _words) when count > 0, do: :eof
+  defp end_reason(127, 0, ""), do: :no_ffmpeg
+
+  defp end_reason(status, _count, words) do
+    case words |> printable() |> String.split("\n", trim: true) |> Enum.reject(&hint?/1) do
+      [] -> {:unreadable, "status #{status}, no frame"}
+      lines -> {:unreadable, lines |> List.last() |> String.trim()}
+    end
+  end
+
+  defp hint?(line), do: String.starts_with?(line, "To ignore this")
+
+  # Names of files come in any encoding.
+  defp printable(words),
+    do: for(<<byte <- words>>, byte in 32..126 or byte == ?\n, into: "", do: <<byte>>)
+
+  defp find_ffmpeg(options) do
+    case options[:ffmpeg] || System.find_executable("ffmpeg") do
+      nil -> {:error, :no_ffmpeg}
+      path -> {:ok, path}
+    end
+  end
+
+  defp check!(options) do
+    options =
+      Keyword.validate!(options, [
+        :source,
+        :size,
+        :rate,
+        :ffmpeg,
+        format: :yuyv,
+        every: false,
+        loop: false
+      ])
+
+    Enum.each(options, &check_option!/1)
+    if options[:source] == nil, do: raise(ArgumentError, "camera option :source is missing")
+    options
+  end
+
+  defp check_option!({:source, source}) when is_binary(source) and source != "", do: :ok
+  defp check_option!({:format, format}) when format in [:yuyv, :i420], do: :ok
+
+  defp check_option!({option, value}) when option in [:every, :loop] and is_boolean(value),
+    do: :ok
+
+  defp check_option!({option, nil}) when option in [:size, :rate, :ffmpeg], do: :ok
+  defp check_option!({:rate, rate}) when is_number(rate) and rate > 0, do: :ok
+  defp check_option!({:ffmpeg, path}) when is_binary(path), do: :ok
+
+  defp check_option!({:size, {width, height}})
+       when width in 2..32_768//2 and height in 2..32_768//2,
+       do: :ok
+
+  defp check_option!({option, value}),
+    do: raise(ArgumentError, "camera option #{inspect(option)} cannot be #{inspect(value)}")
+end

@@ -1,0 +1,102 @@
+defmodule Hal.Camera.Source do
+  @moduledoc """
+  What a camera can be told to read, and how ffmpeg is told to. Pure but for asking whether a
+  file exists.
+
+  | source | is |
+  |---|---|
+  | `"/dev/video0"` | a V4L2 camera |
+  | `"rtsp://…"`, any `scheme://` | a stream |
+  | `"testsrc"` | ffmpeg's test picture, 320 by 240, 10 a second |
+  | `"lavfi:GRAPH"` | any other of ffmpeg's generators |
+  | anything else | a video file or a picture |
+  """
+
+  @type kind :: :device | :stream | :generator | :file
+
+  @doc """
+  The kind of a source.
+
+      iex> Enum.map(["/dev/video0", "rtsp://cam/1", "testsrc", "a/b.png"], &Hal.Camera.Source.kind/1)
+      [:device, :stream, :generator, :file]
+  """
+  @spec kind(String.t()) :: kind()
+  def kind("/dev/" <> _device), do: :device
+  def kind("testsrc"), do: :generator
+  def kind("lavfi:" <> _graph), do: :generator
+
+  def kind(source), do: if(source =~ ~r/^[A-Za-z][A-Za-z0-9+.-]*:\/\//, do: :stream, else: :file)
+
+  @doc """
+  Whether the source can be opened as far as one sees from outside.
+
+      iex> Hal.Camera.Source.check("no/such.png")
+      {:error, :enoent}
+      iex> Hal.Camera.Source.check("testsrc")
+      :ok
+  """
+  @spec check(String.t()) :: :ok | {:error, :enoent | :eisdir}
+  def check(source) do
+    cond do
+      kind(source) in [:stream, :generator] -> :ok
+      File.dir?(source) -> {:error, :eisdir}
+      File.exists?(source) -> :ok
+      true -> {:error, :enoent}
+    end
+  end
+
+  @doc "The arguments of ffmpeg for a yuv4mpeg stream of that source on its output; options as in `Hal.Camera.FFmpeg`."
+  @spec arguments(String.t(), keyword()) :: [String.t()]
+  def arguments(source, options) do
+    ~w(-nostdin -hide_banner -loglevel error) ++
+      pace(kind(source), options) ++
+      input(kind(source), source, options) ++
+      ~w(-map 0:v:0 -vf) ++
+      [filters(options)] ++ ~w(-fps_mode passthrough -f yuv4mpegpipe pipe:1)
+  end
+
+  # A file takes the place of a camera, so it runs in real time unless every frame is wanted.
+  defp pace(kind, options) when kind in [:file, :generator],
+    do: if(options[:every], do: [], else: ["-re"]) ++ if(options[:loop], do: loop(kind), else: [])
+
+  defp pace(:stream, options),
+    do: if(options[:every], do: [], else: ~w(-fflags nobuffer -flags low_delay))
+
+  defp pace(:device, _options), do: []
+
+  defp loop(:file), do: ~w(-stream_loop -1)
+  defp loop(:generator), do: []
+
+  defp input(:device, source, options) do
+    {width, height} = options[:size] || {nil, nil}
+    size = if width, do: ["-video_size", "#{width}x#{height}"], else: []
+    rate = if options[:rate], do: ["-framerate", "#{options[:rate]}"], else: []
+    ~w(-f v4l2) ++ size ++ rate ++ ["-i", source]
+  end
+
+  defp input(:generator, "testsrc", _options),
+    do: ~w(-f lavfi -i testsrc=size=320x240:rate=10)
+
+  defp input(:generator, "lavfi:" <> graph, _options), do: ["-f", "lavfi", "-i", graph]
+  defp input(:stream, source, _options), do: ["-i", source]
+  # Otherwise a colon in a file's name would make it a protocol.
+  defp input(:file, source, _options), do: ["-i", "file:" <> source]
+
+  # Full range and BT.601 is what colour files are made for; ffmpeg would give 16 to 235.
+  defp filters(options) do
+    size =
+      case options[:size] do
+        {width, height} -> "scale=#{width}:#{height}"
+        nil -> crop(options[:format])
+      end
+
+    "#{size},scale=out_color_matrix=bt601:out_range=full,format=#{pixel_format(options[:format])}"
+  end
+
+  # Chroma is shared by pairs, so an odd last column (and with i420, row) falls away.
+  defp crop(:yuyv), do: "crop=trunc(iw/2)*2:ih:0:0"
+  defp crop(:i420), do: "crop=trunc(iw/2)*2:trunc(ih/2)*2:0:0"
+
+  defp pixel_format(:yuyv), do: "yuv422p"
+  defp pixel_format(:i420), do: "yuv420p"
+end

@@ -1,0 +1,145 @@
+defmodule Hal.Camera.FFmpegTest do
+  use ExUnit.Case, async: true
+  doctest Hal.Camera.Source
+  doctest Hal.Camera.FFmpeg
+  alias Hal.Camera.FFmpeg
+
+  @moduletag if(System.find_executable("ffmpeg"), do: [], else: [skip: "ffmpeg is missing"])
+
+  defp open(options) do
+    {:ok, camera} = FFmpeg.init(options)
+    camera
+  end
+
+  # What comes for one credit: a frame or an error.
+  defp take(camera) do
+    {:ok, camera} = FFmpeg.next(camera)
+    wait(camera)
+  end
+
+  defp wait(camera) do
+    assert_receive message, 10_000
+
+    case FFmpeg.handle_message(message, camera) do
+      {:ok, [], camera} -> wait(camera)
+      {:ok, [{:frame, frame}], _camera} -> frame
+      {:error, reason, _camera} -> reason
+    end
+  end
+
+  defp all(camera, taken \\ []) do
+    case take(camera) do
+      %Hal.Frame{} = frame -> all(camera, [frame | taken])
+      reason -> {Enum.reverse(taken), reason}
+    end
+  end
+
+  test "each frame of a source, in order, timed by its rate, then the end" do
+    source = "lavfi:testsrc=size=32x24:rate=20:duration=1"
+    {frames, :eof} = all(open(source: source, every: true))
+    assert Enum.map(frames, & &1.at_ms) == Enum.to_list(0..950//50)
+    assert [%{width: 32, height: 24, format: :yuyv} | _] = frames
+  end
+
+  test "both formats carry the same colours, in full range" do
+    source = "lavfi:color=color=white:size=4x4:rate=1:duration=1"
+    {[yuyv], :eof} = all(open(source: source, every: true))
+    {[i420], :eof} = all(open(source: source, every: true, format: :i420))
+    assert yuyv.bytes == :binary.copy(<<255, 128>>, 16)
+    assert i420.bytes == :binary.copy(<<255>>, 16) <> :binary.copy(<<128>>, 8)
+  end
+
+  test "odd sizes lose their last column, a given size scales" do
+    source = "lavfi:testsrc=size=33x25:rate=1:duration=1"
+    assert {[%{width: 32, height: 25}], :eof} = all(open(source: source, every: true))
+
+    assert {[%{width: 32, height: 24}], :eof} =
+             all(open(source: source, every: true, format: :i420))
+
+    assert {[%{width: 16, height: 12}], :eof} =
+             all(open(source: source, every: true, size: {16, 12}))
+  end
+
+  test "nothing comes without credit, and then the newest" do
+    camera = open(source: "lavfi:testsrc=size=32x24:rate=100")
+    first = take(camera)
+    refute_receive {_port, {:data, _}}, 200
+    asked = System.monotonic_time(:millisecond)
+    second = take(camera)
+    # An old frame would be 200 ms old; a slow machine may take a while.
+    assert second.at_ms > asked - 150
+    assert second.at_ms > first.at_ms
+    FFmpeg.terminate(camera)
+  end
+
+  test "ffmpeg ends with its camera" do
+    camera = open(source: "testsrc")
+    assert %Hal.Frame{} = take(camera)
+    {:os_pid, program} = Port.info(camera.port, :os_pid)
+    [ffmpeg] = children(program)
+    FFmpeg.terminate(camera)
+    assert gone?(program) and gone?(ffmpeg)
+  end
+
+  test "ffmpeg ends with a port program that is killed" do
+    camera = open(source: "testsrc")
+    assert %Hal.Frame{} = take(camera)
+    {:os_pid, program} = Port.info(camera.port, :os_pid)
+    [ffmpeg] = children(program)
+    {_, 0} = System.cmd("kill", ["-9", "#{program}"])
+    assert take(camera) == {:exit, 137}
+    assert gone?(ffmpeg)
+  end
+
+  test "every wrong source is an error with its reason" do
+    assert FFmpeg.init(source: "no/such/file.png") == {:error, :enoent}
+    assert FFmpeg.init(source: "/dev/video77") == {:error, :enoent}
+    assert FFmpeg.init(source: "lib") == {:error, :eisdir}
+    assert {:unreadable, words} = take(open(source: "mix.exs"))
+    assert words =~ "Invalid data"
+    assert {:unreadable, "Stream map" <> _} = take(open(source: "lavfi:anullsrc"))
+    assert take(open(source: "testsrc", ffmpeg: "/no/such/ffmpeg")) == :no_ffmpeg
+    assert take(open(source: "testsrc", ffmpeg: "/bin/echo")) |> elem(0) == :unreadable
+  end
+
+  test "every reason has words" do
+    for reason <- [:enoent, :eisdir, :no_ffmpeg, :eof, {:unreadable, "x"}, {:exit, 1}] do
+      assert FFmpeg.explain(reason) =~ ~r/^[^\n]+$/
+    end
+  end
+
+  test "wrong options are named" do
+    for option <- [size: {3, 2}, format: :rgb24, every: 1, rate: 0, source: ""] do
+      assert_raise ArgumentError, ~r/#{elem(option, 0)}/, fn ->
+        FFmpeg.init([{:source, "testsrc"}, option] |> Enum.uniq_by(&elem(&1, 0)) |> put(option))
+      end
+    end
+
+    assert_raise ArgumentError, ~r/:source is missing/, fn -> FFmpeg.init([]) end
+  end
+
+  defp put(options, {key, value}), do: Keyword.put(options, key, value)
+
+  defp children(pid) do
+    "/proc/#{pid}/task/#{pid}/children" |> File.read!() |> String.split()
+  end
+
+  # Waits until the process is no more, or only its entry in the table.
+  defp gone?(pid, left_ms \\ 5_000)
+  defp gone?(_pid, left_ms) when left_ms <= 0, do: false
+
+  defp gone?(pid, left_ms) do
+    case File.read("/proc/#{pid}/stat") do
+      {:error, _} ->
+        true
+
+      {:ok, stat} ->
+        stat =~ ~r/\) Z / or
+          receive do
+            :never -> false
+          after
+            20 -> gone?(pid, left_ms - 20)
+          end
+    end
+  end
+end

@@ -1,0 +1,60 @@
+defmodule Vision.Filter do
+  @moduledoc """
+  Chooses among blobs: lists in, lists out, so that filters are chained with `|>`.
+
+      blobs
+      |> Vision.Filter.real({320, 240})
+      |> Vision.Filter.colour("YellowLandmark")
+      |> Vision.Filter.least_share(0.0005)
+      |> Vision.Filter.largest()
+  """
+  alias Vision.Blob
+
+  @doc """
+  Drops phantoms (R38): blobs whose frame has another size than the camera's, that are larger
+  than their frame, or whose box lies outside it. An old simulator reports one of 22648 by 5
+  pixels whenever it sees nothing.
+
+      iex> blob = %Vision.Blob{colour: "Red", area: 30, share: 0.1, x: 4.0, y: 2.0, left: 2, top: 0,
+      ...>                     right: 6, bottom: 4, width: 20, height: 15}
+      iex> phantom = %{blob | width: 22648, height: 5}
+      iex> Vision.Filter.real([phantom, blob], {20, 15}) == [blob]
+      true
+      iex> Vision.Filter.real([%{blob | area: 301}, %{blob | right: 20}], {20, 15})
+      []
+  """
+  @spec real([Blob.t()], {pos_integer(), pos_integer()}) :: [Blob.t()]
+  def real(blobs, {width, height}) do
+    Enum.filter(blobs, fn blob ->
+      {blob.width, blob.height} == {width, height} and blob.area in 1..(width * height) and
+        blob.left in 0..blob.right//1 and blob.right < width and
+        blob.top in 0..blob.bottom//1 and blob.bottom < height
+    end)
+  end
+
+  @doc """
+  Keeps one colour (R39): a camera sees the other robots too.
+
+      iex> Vision.Filter.colour([], "YellowLandmark")
+      []
+  """
+  @spec colour([Blob.t()], String.t()) :: [Blob.t()]
+  def colour(blobs, name), do: Enum.filter(blobs, &(&1.colour == name))
+
+  @doc "Drops blobs of fewer pixels (R40): the noise of the camera."
+  @spec least_area([Blob.t()], non_neg_integer()) :: [Blob.t()]
+  def least_area(blobs, area), do: Enum.filter(blobs, &(&1.area >= area))
+
+  @doc "Drops blobs of a smaller share of their frame (R41), which means the same for cameras of any size."
+  @spec least_share([Blob.t()], float()) :: [Blob.t()]
+  def least_share(blobs, share), do: Enum.filter(blobs, &(&1.share >= share))
+
+  @doc """
+  The largest blob by its share (R40); the first of equals, `nil` of none.
+
+      iex> Vision.Filter.largest([])
+      nil
+  """
+  @spec largest([Blob.t()]) :: Blob.t() | nil
+  def largest(blobs), do: Enum.max_by(blobs, & &1.share, fn -> nil end)
+end
