@@ -1,0 +1,137 @@
+defmodule Sim.Blobs do
+  @moduledoc """
+  The blobs that the blob finder would find in a robot's picture, from geometry alone: no pixel is
+  painted. For large fleets; the tests hold it against painting. Pure.
+  """
+  alias Sim.{Kernel, Noise, Palette, Sight}
+  alias Vision.Blob
+
+  @least_area 20
+
+  @doc """
+  The blobs a camera sees of these poles, largest first. `noise` is `{seed, robot, step}`, or `nil` for none.
+  """
+  @spec see(Sim.Map.t(), Sight.t(), [Sight.pole()], {integer(), integer(), integer()} | nil) ::
+          [Blob.t()]
+  def see(map, %Sight{} = sight, poles, noise) do
+    poles
+    |> Enum.flat_map(fn pole ->
+      for range <- [Sight.columns(sight, pole)], range, do: {range, pole}
+    end)
+    |> pieces(map, sight)
+    |> regions()
+    |> Enum.filter(fn {_kind, pieces} -> area(pieces) >= @least_area end)
+    |> Enum.with_index()
+    |> Enum.map(fn {region, k} -> blob(region, sight, noise, k) end)
+    |> Enum.filter(&(&1.area >= @least_area))
+    |> Enum.sort_by(&(-&1.area))
+  end
+
+  # Columns from the left, each with its visible pieces `{kind, first row, last row}`.
+  defp pieces([], _map, _sight), do: []
+
+  defp pieces(seen, map, sight) do
+    {first, last} =
+      Enum.reduce(seen, {sight.width, 0}, fn {{a, b}, _}, {f, l} -> {min(a, f), max(b, l)} end)
+
+    for column <- first..last//1,
+        here = for({{a, b}, pole} <- seen, column >= a and column <= b, do: pole),
+        here != [],
+        do: {column, column(map, sight, column, here)}
+  end
+
+  defp column(map, sight, column, poles) do
+    {rx, ry} = ray = Sight.direction(sight, column)
+
+    hits = for pole <- poles, depth = Sight.meet(sight, ray, pole), do: {depth, pole}
+
+    case Enum.sort(hits) do
+      [] ->
+        []
+
+      hits ->
+        {farthest, _pole} = List.last(hits)
+        {wall, _axis} = Kernel.wall(map, sight.x, sight.y, rx, ry, farthest)
+        visible(hits, wall, sight, ray, sight.height)
+    end
+  end
+
+  # All stand on the floor, so what is nearer hides everything below its upper edge.
+  defp visible([{depth, {_, _, _, height, kind} = pole} | rest], wall, sight, ray, covered)
+       when depth <= wall do
+    {top, bottom} = Sight.rows(sight, depth, height)
+    bottom = min(bottom, covered - 1)
+    more = visible(rest, wall, sight, ray, min(covered, top))
+
+    if top <= bottom and found?(kind, Sight.shade(sight, ray, depth, pole)),
+      do: [{kind, top, bottom} | more],
+      else: more
+  end
+
+  defp visible(_hits, _wall, _sight, _ray, _covered), do: []
+
+  defp found?(kind, shade) do
+    %{paint: {y, _u, _v}, thresholds: {{least, _most}, _, _}} = Palette.of(kind)
+    y * shade >= least
+  end
+
+  # Pieces that touch from column to column, or in one column, are one region.
+  defp regions(columns) do
+    {open, closed, _last} =
+      Enum.reduce(columns, {[], [], nil}, fn {column, pieces}, {open, closed, last} ->
+        {open, closed} = if last == column - 1, do: {open, closed}, else: {[], open ++ closed}
+        {next, still} = Enum.reduce(pieces, {[], open}, &join(&1, &2, column))
+        {next, closed ++ still, column}
+      end)
+
+    for {kind, _edge, pieces} <- open ++ closed, do: {kind, pieces}
+  end
+
+  # A region is `{kind, its rows in the newest column, all its {column, first, last}}`.
+  defp join({kind, top, bottom}, {next, open}, column) do
+    touches? = fn {k, rows, _}, gap ->
+      k == kind and Enum.any?(rows, fn {t, b} -> t <= bottom + gap and b >= top - gap end)
+    end
+
+    {beside, open} = Enum.split_with(open, &touches?.(&1, 0))
+    {above, next} = Enum.split_with(next, &touches?.(&1, 1))
+    rows = [{top, bottom} | Enum.flat_map(above, &elem(&1, 1))]
+    pieces = Enum.flat_map(beside ++ above, &elem(&1, 2))
+    {[{kind, rows, [{column, top, bottom} | pieces]} | next], open}
+  end
+
+  defp area(pieces),
+    do: Enum.reduce(pieces, 0, fn {_, top, bottom}, sum -> sum + bottom - top + 1 end)
+
+  defp blob({kind, pieces}, sight, noise, k) do
+    exact = area(pieces)
+    {left, right} = pieces |> Enum.map(&elem(&1, 0)) |> Enum.min_max()
+    top = pieces |> Enum.map(&elem(&1, 1)) |> Enum.min()
+    bottom = pieces |> Enum.map(&elem(&1, 2)) |> Enum.max()
+    x = Enum.reduce(pieces, 0, fn {c, t, b}, sum -> sum + c * (b - t + 1) end) / exact
+    y = Enum.reduce(pieces, 0, fn {_, t, b}, sum -> sum + (t + b) * (b - t + 1) / 2 end) / exact
+    area = max(round(exact * (1 + 0.01 * draw(noise, 3 * k))), 1)
+    share = area / (sight.width * sight.height)
+
+    %Blob{
+      colour: Palette.of(kind).name,
+      area: area,
+      share: share,
+      x: x + 0.1 * draw(noise, 3 * k + 1),
+      y: y + 0.1 * draw(noise, 3 * k + 2),
+      left: left,
+      right: right,
+      top: top,
+      bottom: bottom,
+      width: right - left + 1,
+      height: bottom - top + 1,
+      distance: Palette.distance(kind, share),
+      clipped?: left == 0 or top == 0 or right == sight.width - 1 or bottom == sight.height - 1
+    }
+  end
+
+  defp draw(nil, _use), do: 0.0
+
+  defp draw({seed, robot, step}, use),
+    do: Noise.gauss(Noise.hash(seed, step, robot, 0xB10B00 + use))
+end

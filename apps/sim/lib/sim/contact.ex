@@ -1,0 +1,105 @@
+defmodule Sim.Contact do
+  @moduledoc """
+  Bodies are discs: how far one may go before it touches a wall or another, and who touches whom. Pure.
+  """
+  alias Hal.Pose
+  alias Sim.Map
+
+  # A move is tested at points no further apart than this, so that nothing thin is jumped.
+  @stride 0.05
+  @halvings 12
+  @touch 0.001
+  @apart 0.01
+
+  @type disc :: {x :: float(), y :: float(), radius :: float()}
+
+  @doc """
+  The last place on the straight way `{dx, dy}` where the disc still touches nothing, and the share
+  of the way to it. A disc that already overlaps something may only move away from it.
+  """
+  @spec move(Map.t(), disc(), {float(), float()}, [disc()]) :: {Pose.point(), share :: float()}
+  def move(_map, {x, y, _r}, {dx, dy}, _others) when dx == 0.0 and dy == 0.0, do: {{x, y}, 1.0}
+
+  def move(map, {x, y, r}, {dx, dy}, others) do
+    way = :math.sqrt(dx * dx + dy * dy)
+    near = for {ox, oy, o} = other <- others, near?(ox - x, oy - y, r + o + way), do: other
+
+    floors =
+      {min(Map.clearance(map, {x, y}, r), r), Enum.map(near, &min(gap({x, y, r}, &1), 0.0))}
+
+    fits? = fn share -> fits?(map, {x + share * dx, y + share * dy, r}, near, floors) end
+    strides = trunc(way / @stride) + 1
+
+    share =
+      case Enum.find(1..strides, &(not fits?.(&1 / strides))) do
+        nil -> 1.0
+        k -> halve(fits?, (k - 1) / strides, k / strides, @halvings)
+      end
+
+    {{x + share * dx, y + share * dy}, share}
+  end
+
+  defp fits?(map, {x, y, r} = disc, near, {wall, gaps}) do
+    Map.clearance(map, {x, y}, r) >= wall and
+      near |> Enum.zip(gaps) |> Enum.all?(fn {other, gap} -> gap(disc, other) >= gap end)
+  end
+
+  defp halve(_fits?, good, _bad, 0), do: good
+
+  defp halve(fits?, good, bad, n) do
+    middle = (good + bad) / 2
+
+    if fits?.(middle),
+      do: halve(fits?, middle, bad, n - 1),
+      else: halve(fits?, good, middle, n - 1)
+  end
+
+  @doc "The gap between the edges of two discs; negative where they overlap."
+  @spec gap(disc(), disc()) :: float()
+  def gap({ax, ay, ar}, {bx, by, br}) do
+    dx = bx - ax
+    dy = by - ay
+    :math.sqrt(dx * dx + dy * dy) - ar - br
+  end
+
+  defp near?(dx, dy, reach), do: dx * dx + dy * dy <= reach * reach
+
+  @typedoc "Two bodies, or a body and `:wall`."
+  @type pair :: {non_neg_integer(), non_neg_integer() | :wall}
+
+  @doc """
+  Which pairs touch (gap at most 1 mm), which are still together (at most 1 cm), and the least
+  gap of any two of the first `count` discs.
+  """
+  @spec pairs([{non_neg_integer(), disc()}], non_neg_integer()) ::
+          {touching :: [pair()], together :: [pair()], least :: float() | nil}
+  def pairs(discs, count), do: pairs(discs, count, {[], [], nil})
+
+  defp pairs([], _count, found), do: found
+
+  defp pairs([{i, a} | rest], count, found) do
+    found =
+      Enum.reduce(rest, found, fn {j, b}, {touching, together, least} ->
+        gap = gap(a, b)
+        # `nil` is greater than any number.
+        least = if j < count and gap < least, do: gap, else: least
+
+        cond do
+          gap <= @touch -> {[{i, j} | touching], [{i, j} | together], least}
+          gap <= @apart -> {touching, [{i, j} | together], least}
+          true -> {touching, together, least}
+        end
+      end)
+
+    pairs(rest, count, found)
+  end
+
+  @doc "The points of the walls that a disc touches, and whether it is still within 1 cm of one."
+  @spec walls(Map.t(), disc()) :: {[Pose.point()], together? :: boolean()}
+  def walls(map, {x, y, r}) do
+    case Map.near(map, {x, y}, r + @apart) do
+      [] -> {[], false}
+      near -> {for({distance, point} <- near, distance <= r + @touch, do: point), true}
+    end
+  end
+end

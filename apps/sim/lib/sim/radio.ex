@@ -1,0 +1,117 @@
+defmodule Sim.Radio do
+  @moduledoc """
+  A radio that delays, loses, repeats and is cut in two, all from a seed. Pure.
+
+  What becomes of a message depends on its number alone, so the same sends give the same
+  deliveries, in the order of their time and then of their number. Every copy is its own draw:
+  one message to five robots can reach three of them. A message may overtake an earlier one.
+  """
+  alias Sim.Noise
+
+  @enforce_keys [:seed, :loss, :delay_ms, :duplicates]
+  defstruct @enforce_keys ++ [cut: MapSet.new(), queue: :gb_sets.new(), next: 0, sent: 0, lost: 0]
+
+  @type id :: atom()
+  @type t :: %__MODULE__{
+          seed: integer(),
+          loss: float(),
+          delay_ms: {non_neg_integer(), non_neg_integer()},
+          duplicates: float(),
+          cut: MapSet.t({id(), id()}),
+          queue: :gb_sets.set({integer(), non_neg_integer(), id(), id(), term()}),
+          next: non_neg_integer(),
+          sent: non_neg_integer(),
+          lost: non_neg_integer()
+        }
+
+  @doc """
+  A radio. `:loss` and `:duplicates` are probabilities for each recipient, `:delay_ms` the least
+  and greatest delay, `:cut` the pairs that cannot hear each other. Wrong options raise `ArgumentError`.
+
+      iex> Sim.Radio.new(seed: 1, loss: 2.0)
+      ** (ArgumentError) radio option :loss cannot be 2.0: a probability from 0 to 1
+  """
+  @spec new(keyword()) :: t()
+  def new(options) do
+    options =
+      Keyword.validate!(options, [:seed, loss: 0.0, delay_ms: {5, 50}, duplicates: 0.0, cut: []])
+
+    unless is_integer(options[:seed]), do: wrong!(:seed, options[:seed], "an integer")
+    Enum.each([:loss, :duplicates], &probability!(&1, options[&1]))
+
+    case options[:delay_ms] do
+      {least, most}
+      when is_integer(least) and is_integer(most) and 0 <= least and least <= most ->
+        :ok
+
+      other ->
+        wrong!(:delay_ms, other, "{least, greatest} in whole milliseconds")
+    end
+
+    {cut, options} = Keyword.pop!(options, :cut)
+    cut(struct!(__MODULE__, options), cut)
+  end
+
+  @doc "From now on these pairs cannot hear each other, and all others can."
+  @spec cut(t(), [{id(), id()}]) :: t()
+  def cut(%__MODULE__{} = radio, pairs) do
+    %{radio | cut: for({a, b} <- pairs, pair <- [{a, b}, {b, a}], into: MapSet.new(), do: pair)}
+  end
+
+  @doc """
+  Sends a message to some robots; `sent` and `lost` count each of them.
+
+      iex> radio = Sim.Radio.new(seed: 1, delay_ms: {5, 5}, cut: [{:mag1, :mag3}])
+      iex> radio = Sim.Radio.send(radio, 0, :mag1, [:mag2, :mag3], :hello)
+      iex> {[{:mag2, :mag1, :hello}], radio} = Sim.Radio.receive(radio, 5)
+      iex> {radio.sent, radio.lost}
+      {2, 1}
+  """
+  @spec send(t(), integer(), id(), [id()], term()) :: t()
+  def send(%__MODULE__{} = radio, at_ms, from, to_ids, message),
+    do: Enum.reduce(to_ids, radio, &send_one(&2, at_ms, from, &1, message))
+
+  @doc "What has arrived by now as `{to, from, message}`, and the radio without it."
+  @spec receive(t(), integer()) :: {[{id(), id(), term()}], t()}
+  def receive(%__MODULE__{} = radio, at_ms), do: take(radio, at_ms, [])
+
+  defp send_one(radio, at_ms, from, to, message) do
+    number = radio.next
+    radio = %{radio | next: number + 1, sent: radio.sent + 1}
+
+    if MapSet.member?(radio.cut, {from, to}) or draw(radio, number, 0) < radio.loss do
+      %{radio | lost: radio.lost + 1}
+    else
+      copies = if draw(radio, number, 1) < radio.duplicates, do: [2, 3], else: [2]
+      {least, most} = radio.delay_ms
+
+      Enum.reduce(copies, radio, fn copy, radio ->
+        delay = least + trunc(draw(radio, number, copy) * (most - least + 1))
+        entry = {at_ms + delay, 2 * number + copy, to, from, message}
+        %{radio | queue: :gb_sets.add(entry, radio.queue)}
+      end)
+    end
+  end
+
+  defp draw(radio, number, use), do: Noise.unit(Noise.hash(radio.seed, 0x7AD10, number, use))
+
+  defp take(radio, at_ms, taken) do
+    if :gb_sets.is_empty(radio.queue) do
+      {Enum.reverse(taken), radio}
+    else
+      {{due, _number, to, from, message}, rest} = :gb_sets.take_smallest(radio.queue)
+
+      if due <= at_ms,
+        do: take(%{radio | queue: rest}, at_ms, [{to, from, message} | taken]),
+        else: {Enum.reverse(taken), radio}
+    end
+  end
+
+  defp probability!(_name, value) when is_number(value) and value >= 0 and value <= 1, do: :ok
+  defp probability!(name, value), do: wrong!(name, value, "a probability from 0 to 1")
+
+  defp wrong!(name, value, allowed) do
+    raise ArgumentError,
+          "radio option #{inspect(name)} cannot be #{inspect(value)}: #{allowed}"
+  end
+end

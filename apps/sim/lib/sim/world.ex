@@ -1,0 +1,323 @@
+defmodule Sim.World do
+  @moduledoc """
+  A world of robots, walls and one landmark, as a value. Pure: the same calls give the same world.
+
+  `step/2` acts, moves and senses. Every sensor is fresh after every step: the sonars fire all at
+  once and do not disturb each other. A body is a disc of the profile's radius; it stops at
+  contact and is never inside a wall or another body. The landmark is a yellow pole, 0.15 m in
+  radius and 1 m high, and as solid.
+
+  `collisions` counts new contacts of a robot with a robot or a wall, dead ones too; a contact lasts until the two
+  are more than 1 cm apart. `min_separation` is the least gap between two robots so far, edge to
+  edge, `nil` with fewer than two.
+  """
+  alias Hal.{Pose, Twist}
+  alias Sim.{Blobs, Body, Contact, Kernel, Map, Sight}
+
+  @landmark_radius 0.15
+  @landmark_height 1.0
+  @glide 0.3
+  @polite 0.5
+
+  @enforce_keys [:map, :seed, :noise, :at_ms, :order, :robots]
+  defstruct @enforce_keys ++
+              [
+                step: 0,
+                landmark: nil,
+                goal: nil,
+                collisions: 0,
+                min_separation: nil,
+                together: MapSet.new()
+              ]
+
+  @type id :: atom()
+  @type t :: %__MODULE__{
+          map: Map.t(),
+          seed: integer(),
+          noise: Body.noise(),
+          at_ms: integer(),
+          order: [id()],
+          robots: %{id() => Body.t()},
+          step: non_neg_integer(),
+          landmark: Pose.point() | nil,
+          goal: Pose.point() | nil,
+          collisions: non_neg_integer(),
+          min_separation: float() | nil,
+          together: MapSet.t(Contact.pair())
+        }
+
+  @doc """
+  A world. `:robots` are `%{id:, profile:, pose:}` with the true pose, and `odometry:`, the first
+  reading of the wheels (0, 0, 0 unless given). Wrong options raise `ArgumentError`.
+  """
+  @spec new!(keyword()) :: t()
+  def new!(options) do
+    options =
+      Keyword.validate!(options, [
+        :map,
+        :robots,
+        landmark: nil,
+        seed: 0,
+        noise: :default,
+        start_ms: 0
+      ])
+
+    %Map{} = map = options[:map]
+    noise = options[:noise]
+
+    unless noise in [:off, :default, :slip],
+      do:
+        raise(
+          ArgumentError,
+          "world option :noise cannot be #{inspect(noise)}: :off, :default or :slip"
+        )
+
+    ids = Enum.map(options[:robots], & &1.id)
+
+    unless ids == Enum.uniq(ids),
+      do: raise(ArgumentError, "world option :robots names a robot twice")
+
+    bodies =
+      for {robot, index} <- Enum.with_index(options[:robots]),
+          do: Body.new(robot, index, options[:seed], noise)
+
+    %__MODULE__{
+      map: map,
+      seed: options[:seed],
+      noise: noise,
+      at_ms: options[:start_ms],
+      order: ids,
+      robots: Elixir.Map.new(bodies, &{&1.id, &1})
+    }
+    |> place_landmark(options[:landmark])
+    |> sense()
+  end
+
+  @doc "The speed a robot wants until it wants another; a dead one wants nothing."
+  @spec drive(t(), id(), Twist.t()) :: t()
+  def drive(%__MODULE__{} = world, id, %Twist{} = twist),
+    do: update(world, id, &if(&1.alive, do: %{&1 | wanted: twist}, else: &1))
+
+  @doc "Where a robot wants its camera to look: pan to the left, tilt upwards, in radians."
+  @spec look(t(), id(), number(), number()) :: t()
+  def look(%__MODULE__{} = world, id, pan, tilt),
+    do: update(world, id, &if(&1.alive, do: %{&1 | look: {pan * 1.0, tilt * 1.0}}, else: &1))
+
+  @doc "Stops a robot for ever; its body stays where it is."
+  @spec kill(t(), id()) :: t()
+  def kill(%__MODULE__{} = world, id) do
+    still = %{
+      alive: false,
+      wanted: Twist.zero(),
+      ramp: {0.0, 0.0},
+      speed: {0.0, 0.0},
+      measured: Twist.zero()
+    }
+
+    update(world, id, &struct!(&1, still))
+  end
+
+  @doc "Lifts a robot to another pose; its odometry does not notice. There must be no wall."
+  @spec displace(t(), id(), Pose.t()) :: t()
+  def displace(%__MODULE__{} = world, id, %Pose{} = pose) do
+    body = Elixir.Map.fetch!(world.robots, id)
+
+    unless Map.free?(world.map, Pose.point(pose), body.profile.radius),
+      do: raise(ArgumentError, "#{id} cannot stand at #{pose.x},#{pose.y}: there is a wall")
+
+    world |> update(id, &%{&1 | pose: pose, speed: {0.0, 0.0}, ramp: {0.0, 0.0}}) |> sense()
+  end
+
+  @doc """
+  Lets the landmark glide there at 0.3 m/s, in a straight line. It waits before a robot in its way,
+  0.5 m from edge to edge, and stops before a wall.
+  """
+  @spec move_landmark(t(), {number(), number()}) :: t()
+  def move_landmark(%__MODULE__{landmark: nil} = world, place), do: place_landmark(world, place)
+  def move_landmark(%__MODULE__{} = world, {x, y}), do: %{world | goal: {x * 1.0, y * 1.0}}
+
+  @doc "Puts the landmark there at once, or takes it away."
+  @spec place_landmark(t(), {number(), number()} | nil) :: t()
+  def place_landmark(%__MODULE__{} = world, nil), do: %{world | landmark: nil, goal: nil}
+
+  def place_landmark(%__MODULE__{} = world, {x, y}),
+    do: %{world | landmark: {x * 1.0, y * 1.0}, goal: nil}
+
+  @doc "The world `dt_ms` later (1 to 100)."
+  @spec step(t(), 1..100) :: t()
+  def step(%__MODULE__{} = world, dt_ms \\ 50) when dt_ms in 1..100 do
+    world
+    |> glide(dt_ms)
+    |> move(dt_ms)
+    |> Elixir.Map.update!(:at_ms, &(&1 + dt_ms))
+    |> Elixir.Map.update!(:step, &(&1 + 1))
+    |> touch()
+    |> sense()
+  end
+
+  @doc "What a robot's devices say now; nothing when it is dead."
+  @spec readings(t(), id()) :: [Hal.Drive.reading() | Hal.Ptz.reading()]
+  def readings(%__MODULE__{} = world, id) do
+    case Elixir.Map.fetch!(world.robots, id) do
+      %Body{alive: false} -> []
+      body -> Body.readings(body, world.at_ms)
+    end
+  end
+
+  @doc "The blobs of a robot's picture by geometry, without painting it."
+  @spec blobs(t(), id()) :: [Vision.Blob.t()]
+  def blobs(%__MODULE__{} = world, id) do
+    body = Elixir.Map.fetch!(world.robots, id)
+    noise = if world.noise != :off, do: {world.seed, body.index, world.step}
+    Blobs.see(world.map, Sight.of(body), poles(world, id), noise)
+  end
+
+  @doc "Where a robot really is."
+  @spec truth(t(), id()) :: Pose.t()
+  def truth(%__MODULE__{} = world, id), do: Elixir.Map.fetch!(world.robots, id).pose
+
+  @doc "Whether a robot lives."
+  @spec alive?(t(), id()) :: boolean()
+  def alive?(%__MODULE__{} = world, id), do: Elixir.Map.fetch!(world.robots, id).alive
+
+  @doc "Everything upright that robot `id` can see."
+  @spec poles(t(), id()) :: [Sight.pole()]
+  def poles(%__MODULE__{} = world, id) do
+    robots =
+      for other <- world.order, other != id do
+        %Body{pose: pose, profile: profile} = world.robots[other]
+        {pose.x, pose.y, profile.radius, profile.height, :robot}
+      end
+
+    case world.landmark do
+      nil -> robots
+      {x, y} -> [{x, y, @landmark_radius, @landmark_height, :landmark} | robots]
+    end
+  end
+
+  defp update(world, id, change),
+    do: %{world | robots: Elixir.Map.update!(world.robots, id, change)}
+
+  defp bodies(world), do: Enum.map(world.order, &Elixir.Map.fetch!(world.robots, &1))
+
+  defp disc(%Body{pose: pose, profile: profile}), do: {pose.x, pose.y, profile.radius}
+
+  defp pole(%__MODULE__{landmark: nil}), do: []
+  defp pole(%__MODULE__{landmark: {x, y}}), do: [{x, y, @landmark_radius}]
+
+  defp glide(%__MODULE__{goal: nil} = world, _dt_ms), do: world
+
+  defp glide(%__MODULE__{landmark: {x, y} = here, goal: {gx, gy} = goal} = world, dt_ms) do
+    way = @glide * dt_ms / 1000
+    left = Pose.distance(here, goal)
+    next = if left <= way, do: goal, else: {x + (gx - x) * way / left, y + (gy - y) * way / left}
+    discs = Enum.map(bodies(world), &disc/1)
+
+    blocked? =
+      Enum.any?(discs, fn robot ->
+        gap = Contact.gap(landmark(next), robot)
+        gap < @polite and gap < Contact.gap(landmark(here), robot)
+      end) or not Map.free?(world.map, next, @landmark_radius)
+
+    cond do
+      blocked? -> world
+      next == goal -> %{world | landmark: goal, goal: nil}
+      true -> %{world | landmark: next}
+    end
+  end
+
+  defp landmark({x, y}), do: {x, y, @landmark_radius}
+
+  # One after the other: each goes as far as those before it, already moved, and those after it, not yet, let it.
+  defp move(world, dt_ms) do
+    bodies = bodies(world)
+    discs = bodies |> Enum.map(&{&1.index, disc(&1)}) |> Elixir.Map.new()
+
+    {bodies, _discs} =
+      Enum.map_reduce(bodies, discs, fn body, discs ->
+        body = body |> Body.accelerate(dt_ms) |> Body.slew(dt_ms)
+        {body, way, along, turn} = Body.intend(body, dt_ms, world.seed, world.noise)
+        others = pole(world) ++ (discs |> Elixir.Map.delete(body.index) |> Elixir.Map.values())
+        {place, share} = Contact.move(world.map, discs[body.index], way, others)
+
+        body =
+          Body.arrive(
+            body,
+            place,
+            share,
+            {along, turn},
+            dt_ms,
+            {world.seed, world.step},
+            world.noise
+          )
+
+        {body, Elixir.Map.put(discs, body.index, disc(body))}
+      end)
+
+    %{world | robots: Elixir.Map.new(bodies, &{&1.id, &1})}
+  end
+
+  # Contacts, the count of new ones, bumpers.
+  defp touch(world) do
+    bodies = bodies(world)
+    count = length(bodies)
+    discs = Enum.map(bodies, &{&1.index, disc(&1)}) ++ Enum.map(pole(world), &{count, &1})
+    {touching, together, least} = Contact.pairs(discs, count)
+
+    walls = for {index, disc} <- discs, index < count, do: {index, Contact.walls(world.map, disc)}
+    at_wall = for {index, {[_ | _], _}} <- walls, do: {index, :wall}
+    near_wall = for {index, {_, true}} <- walls, do: {index, :wall}
+
+    # The landmark is the last disc: touching it presses bumpers but is no collision.
+    now = MapSet.new(at_wall ++ for({_, j} = pair <- touching, j < count, do: pair))
+    near = MapSet.new(near_wall ++ together)
+    new = now |> MapSet.difference(world.together) |> MapSet.size()
+    places = Elixir.Map.new(discs)
+
+    bodies =
+      for {body, {_, {points, _}}} <- Enum.zip(bodies, walls) do
+        others =
+          for {i, j} <- touching,
+              i == body.index or j == body.index,
+              do: if(i == body.index, do: j, else: i)
+
+        points =
+          points ++
+            Enum.map(others, fn j ->
+              {x, y, _} = places[j]
+              {x, y}
+            end)
+
+        Body.press(body, points, world.at_ms)
+      end
+
+    %{
+      world
+      | robots: Elixir.Map.new(bodies, &{&1.id, &1}),
+        collisions: world.collisions + new,
+        together: world.together |> MapSet.union(now) |> MapSet.intersection(near),
+        # `nil` is greater than any number.
+        min_separation: min(world.min_separation, least)
+    }
+  end
+
+  defp sense(world) do
+    bodies = bodies(world)
+    discs = Enum.map(bodies, &disc/1) ++ pole(world)
+    living = Enum.filter(bodies, & &1.alive)
+
+    rings =
+      for %Body{pose: pose, profile: profile} = body <- living do
+        {c, s} = Sim.Trig.cos_sin(pose.heading)
+        {body.index, pose.x, pose.y, c, s, profile.sonar_min, profile.sonar_max, body.geometry}
+      end
+
+    noise = if world.noise != :off, do: {world.seed, world.step}
+
+    living
+    |> Enum.zip(Kernel.sonar(world.map, discs, rings, noise))
+    |> Enum.reduce(world, fn {body, sonar}, world ->
+      update(world, body.id, &%{&1 | sonar: sonar})
+    end)
+  end
+end

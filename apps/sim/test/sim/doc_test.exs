@@ -1,0 +1,8 @@
+defmodule Sim.DocTest do
+  use ExUnit.Case, async: true
+  doctest Sim.Map
+  doctest Sim.Noise
+  doctest Sim.Palette
+  doctest Sim.Radio
+  doctest Sim.Trig
+end
