@@ -89,10 +89,13 @@ defmodule Robot.Board do
     :ok
   end
 
-  @doc "A sink for `Hal.Device`: writes a reading, now."
+  @doc "A sink for `Hal.Device` and `Vision.Eye`: writes a reading, now, or blobs at the time of their picture."
   @spec sense(t(), writer(), reading :: tuple()) :: :ok
   def sense(board, device, {:health, device, {condition, since_ms}}),
     do: put(board, device, {:health, device}, condition, since_ms)
+
+  def sense(board, :eye, {:blobs, blobs, %{at_ms: at_ms, pan: pan}}),
+    do: put(board, :eye, :blobs, %{blobs: blobs, pan: pan}, at_ms)
 
   def sense(board, device, {key, value}), do: put(board, device, key, value, now(board))
 

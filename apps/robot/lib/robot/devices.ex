@@ -1,0 +1,66 @@
+defmodule Robot.Devices do
+  @moduledoc """
+  What a robot senses and acts with, each beside the others, so that each falls alone:
+
+      Robot.Devices (one_for_one)
+      |-- Vision.Eye           the newest frame to blobs (only with a camera)
+      |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and at once to the gate
+      |-- Hal.Device :ptz      --> board
+      `-- Hal.Device :camera   --> eye --> board
+
+  The eye is here, and not above the gate, because a picture that it falls over must not take the
+  executive along: the blobs on the board grow old, and the robot drives on.
+
+  The budget, 200 restarts in 5 s, lies above what poisoned input can cause: a camera gives at
+  most 30 pictures a second for the eye to fall over, and a device rests half a second before it
+  falls. Whoever falls more often has something that no restart cures, and the robot goes down with it.
+  """
+  use Supervisor
+  alias Robot.{Board, Config, Gate, Names}
+
+  @doc "Starts the devices of a robot whose board is running."
+  @spec start_link(Config.t()) :: Supervisor.on_start()
+  def start_link(%Config{} = config), do: Supervisor.start_link(__MODULE__, config)
+
+  @impl Supervisor
+  def init(%Config{id: id} = config) do
+    board = Board.find!(id)
+    write = fn writer -> {Board, :sense, [board, writer]} end
+    to_eye = {Vision.Eye, :frame, [Names.via(id, :eye)]}
+
+    children =
+      eye(config, write.(:eye)) ++
+        device(config, :drive, [write.(:drive), {Gate, :sense, [id]}]) ++
+        device(config, :ptz, [write.(:ptz)]) ++
+        device(config, :camera, [{__MODULE__, :health, [board]}, to_eye])
+
+    Supervisor.init(children, strategy: :one_for_one, max_restarts: 200, max_seconds: 5)
+  end
+
+  @doc "A sink for the camera: its frames are for the eye, its health for the board."
+  @spec health(Board.t(), tuple()) :: :ok
+  def health(board, {:health, device, _status} = reading), do: Board.sense(board, device, reading)
+  def health(_board, _frame), do: :ok
+
+  defp eye(%Config{camera: nil}, _sink), do: []
+
+  defp eye(config, sink),
+    do: [{Vision.Eye, colours: config.colours, sink: sink, name: Names.via(config.id, :eye)}]
+
+  defp device(config, kind, sinks) do
+    case Map.fetch!(config, kind) do
+      nil ->
+        []
+
+      driver ->
+        [
+          {Hal.Device,
+           kind: kind,
+           driver: driver,
+           sinks: sinks,
+           clock: config.clock,
+           name: Names.via(config.id, kind)}
+        ]
+    end
+  end
+end

@@ -1,0 +1,115 @@
+defmodule Robot.Executive do
+  @moduledoc """
+  Ten times a second: reads the board once, lets `Robot.Mind` think, hands its wish to the gate
+  and the percept to the pilot. It never calls anyone, so nobody can hold it up; whatever takes
+  long (vision, planning) is a process of its own that writes to the board.
+
+  It starts idle: goals live here, and are gone when it falls.
+  """
+  use GenServer
+  alias Hal.{Device, Event}
+  alias Robot.{Board, Config, Gate, Mind, Names, Percept, Pilot, Trace}
+
+  @period_ms 100
+  @slow_us 50_000
+
+  @doc "Starts the executive of a robot."
+  @spec start_link(Config.t()) :: GenServer.on_start()
+  def start_link(%Config{} = config),
+    do: GenServer.start_link(__MODULE__, config, name: Names.via(config.id, :executive))
+
+  @doc "Sets, changes or (`nil`) drops the goal, as in `Robot.Mind.goal/3`."
+  @spec goal(robot :: atom(), tag :: term(), {module(), keyword()} | nil) :: :ok
+  def goal(robot, tag, goal), do: cast(robot, {:goal, tag, goal})
+
+  @doc "Sets the references that the estimate of the pose is corrected by."
+  @spec anchors(robot :: atom(), list()) :: :ok
+  def anchors(robot, anchors), do: cast(robot, {:anchors, anchors})
+
+  defp cast(robot, message), do: GenServer.cast(Names.via(robot, :executive), message)
+
+  @impl GenServer
+  def init(%Config{id: id} = config) do
+    board = Board.find!(id)
+    at_ms = Config.now(config)
+    Board.put(board, :executive, :doing, %{by: :idle, weight: 0.0, outcome: nil}, at_ms)
+    Event.execute([:robot, :executive, :start], %{at_ms: at_ms}, %{robot: id})
+
+    s = %{
+      config: config,
+      board: board,
+      mind: Mind.new([profile: config.profile] ++ config.mind),
+      next: System.monotonic_time(:millisecond)
+    }
+
+    {:ok, schedule(s)}
+  end
+
+  @impl GenServer
+  def handle_cast({:goal, tag, goal} = input, s) do
+    Trace.input(s.config, :executive, input, Config.now(s.config))
+    {:noreply, %{s | mind: Mind.goal(s.mind, tag, goal)}}
+  end
+
+  def handle_cast({:anchors, _anchors} = input, s) do
+    Trace.input(s.config, :executive, input, Config.now(s.config))
+    {:noreply, s}
+  end
+
+  @impl GenServer
+  def handle_info(:tick, s) do
+    begun = System.monotonic_time(:microsecond)
+    s = tick(s, Config.now(s.config))
+    took = System.monotonic_time(:microsecond) - begun
+
+    if took > @slow_us do
+      measured = %{at_ms: Config.now(s.config), duration_ms: div(took, 1_000)}
+      Event.execute([:robot, :executive, :slow], measured, %{robot: s.config.id})
+    end
+
+    {:noreply, schedule(s)}
+  end
+
+  def handle_info(_other, s), do: {:noreply, s}
+
+  defp tick(%{config: config, board: board} = s, at_ms) do
+    raw = Percept.Snapshot.take(board, config.profile, at_ms)
+    Trace.input(config, :executive, {:tick, raw}, at_ms)
+    {wish, outcome, mind} = Mind.tick(s.mind, raw)
+    percept = raw
+
+    Gate.wish(config.id, wish.twist)
+    Trace.effect(config, :executive, {:wish, wish}, at_ms)
+    look(wish.look, config, at_ms)
+
+    doing = %{by: wish.by, weight: wish.weight, outcome: outcome}
+    Board.put(board, :executive, :doing, doing, at_ms)
+    if percept.pose, do: Board.put(board, :executive, :pose, percept.pose, at_ms)
+
+    Pilot.tick(config.id, percept)
+    Trace.effect(config, :executive, {:tick, percept}, at_ms)
+    report(outcome, config, at_ms)
+    %{s | mind: mind}
+  end
+
+  defp look(pan, %{ptz: ptz} = config, at_ms) when pan != nil and ptz != nil do
+    Device.look(Names.via(config.id, :ptz), pan, 0.0)
+    Trace.effect(config, :executive, {:look, pan}, at_ms)
+  end
+
+  defp look(_pan, _config, _at_ms), do: :ok
+
+  defp report(nil, _config, _at_ms), do: :ok
+
+  defp report({tag, outcome}, config, at_ms) do
+    Pilot.outcome(config.id, tag, outcome)
+    Trace.effect(config, :executive, {:outcome, tag, outcome}, at_ms)
+  end
+
+  # At absolute times, so that the pace does not drift; ticks that were missed are not made up for.
+  defp schedule(s) do
+    next = max(s.next + @period_ms, System.monotonic_time(:millisecond))
+    Process.send_after(self(), :tick, next, abs: true)
+    %{s | next: next}
+  end
+end

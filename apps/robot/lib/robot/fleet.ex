@@ -1,0 +1,39 @@
+defmodule Robot.Fleet do
+  @moduledoc """
+  The robots of this node: one on a real machine, any number in a simulation.
+
+  A simulated robot that ends for good is a wreck, and the others live on (`:temporary`). A real
+  one is `:permanent`: the fleet has no restarts to give, ends with it, and so does the
+  application, so that whatever started the machine's software starts all of it afresh.
+  """
+  use DynamicSupervisor
+  alias Robot.{Config, Names}
+
+  @doc "Starts a fleet without robots. `:name` as in `GenServer`."
+  @spec start_link(keyword()) :: Supervisor.on_start()
+  def start_link(options),
+    do: DynamicSupervisor.start_link(__MODULE__, [], Keyword.take(options, [:name]))
+
+  @doc "Starts a robot. `restart` says whether its end is the fleet's, see above."
+  @spec start_robot(Supervisor.supervisor(), Config.t(), :temporary | :permanent) ::
+          {:ok, pid()} | {:error, {:already_started, pid()} | term()}
+  def start_robot(fleet, %Config{} = config, restart \\ :temporary)
+      when restart in [:temporary, :permanent] do
+    child = Supervisor.child_spec({Robot.Supervisor, config}, restart: restart)
+    DynamicSupervisor.start_child(fleet, child)
+  end
+
+  @doc "Ends a robot; its wheels are stopped."
+  @spec stop_robot(Supervisor.supervisor(), robot :: atom()) :: :ok | {:error, :unknown}
+  def stop_robot(fleet, robot) do
+    with pid when is_pid(pid) <- Names.whereis(robot, :robot),
+         :ok <- DynamicSupervisor.terminate_child(fleet, pid) do
+      :ok
+    else
+      _none_or_another_fleets -> {:error, :unknown}
+    end
+  end
+
+  @impl DynamicSupervisor
+  def init([]), do: DynamicSupervisor.init(strategy: :one_for_one, max_restarts: 0)
+end

@@ -1,0 +1,185 @@
+defmodule Robot.Pilot do
+  @moduledoc """
+  Runs one robot's mission. A `gen_statem` whose state is `:idle` or `{mission, phase}`, so that
+  `:sys.get_state/1` shows what the robot is up to. It carries the mission's effects out and
+  decides nothing.
+
+  It starts idle, and tells the executive so: after a failure in the mission the robot stands
+  until a person starts it again.
+
+  | effect | goes to |
+  |---|---|
+  | `{:goal, tag, goal}`, `{:anchors, list}` | the executive |
+  | `{:send, to, message}` | the config's `:send`; lost without one |
+  | `{:claim, map}` | the board, under `:mission`, for the heartbeat to carry |
+  | `{:stage, name, map}` | the event `[:robot, :stage]` |
+  """
+  @behaviour :gen_statem
+  alias Hal.Event
+  alias Robot.{Board, Config, Executive, Names, Percept, Trace}
+
+  @call_ms 1_000
+
+  @doc "A child of the robot's supervisor."
+  @spec child_spec(Config.t()) :: Supervisor.child_spec()
+  def child_spec(config), do: %{id: __MODULE__, start: {__MODULE__, :start_link, [config]}}
+
+  @doc "Starts the pilot of a robot."
+  @spec start_link(Config.t()) :: :gen_statem.start_ret()
+  def start_link(%Config{} = config),
+    do: :gen_statem.start_link(Names.via(config.id, :pilot), __MODULE__, config, [])
+
+  @doc "Starts the mission of the robot's config, in place of a running one."
+  @spec start(robot :: atom()) :: :ok | {:error, :no_mission}
+  def start(robot), do: call(robot, :start)
+
+  @doc "Starts a mission, in place of a running one."
+  @spec start(robot :: atom(), module(), keyword()) :: :ok | {:error, :no_mission}
+  def start(robot, module, options), do: call(robot, {:start, module, options})
+
+  @doc "Ends the mission; the robot stands."
+  @spec stop(robot :: atom()) :: :ok
+  def stop(robot), do: call(robot, :stop)
+
+  @doc "Hands a command to the mission. `:ok` means that it has it, not that it is done."
+  @spec command(robot :: atom(), command :: term()) :: :ok | {:error, :idle}
+  def command(robot, command), do: call(robot, {:command, command})
+
+  @doc "A tick of the executive. Of several that wait, only the newest is handled."
+  @spec tick(robot :: atom(), Percept.t()) :: :ok
+  def tick(robot, percept), do: cast(robot, {:tick, percept})
+
+  @doc "A goal came to its end."
+  @spec outcome(robot :: atom(), tag :: term(), integer()) :: :ok
+  def outcome(robot, tag, outcome), do: cast(robot, {:outcome, tag, outcome})
+
+  @doc "A message from another robot, checked by whoever heard it."
+  @spec message(robot :: atom(), struct()) :: :ok
+  def message(robot, message), do: cast(robot, {:message, message})
+
+  defp call(robot, request), do: :gen_statem.call(Names.via(robot, :pilot), request, @call_ms)
+  defp cast(robot, event), do: :gen_statem.cast(Names.via(robot, :pilot), event)
+
+  @impl :gen_statem
+  def callback_mode, do: :handle_event_function
+
+  @impl :gen_statem
+  def init(%Config{} = config) do
+    data = %{config: config, board: Board.find!(config.id), mission: nil, claim: %{}}
+    # The executive may still follow a goal of the mission that failed.
+    rest(data)
+    told(:idle, data)
+    {:ok, :idle, data}
+  end
+
+  @impl :gen_statem
+  def handle_event({:call, from}, :start, _state, %{config: %{mission: nil}}),
+    do: {:keep_state_and_data, [{:reply, from, {:error, :no_mission}}]}
+
+  def handle_event({:call, from}, :start, state, %{config: %{mission: {module, options}}} = data),
+    do: handle_event({:call, from}, {:start, module, options}, state, data)
+
+  def handle_event({:call, from}, {:start, module, options} = input, state, data) do
+    if Code.ensure_loaded?(module) and function_exported?(module, :init, 2) do
+      heard(input, data)
+      rest(data)
+      result = module.init(data.config.id, options)
+      follow(result, module, state, %{data | claim: %{}}, [{:reply, from, :ok}])
+    else
+      {:keep_state_and_data, [{:reply, from, {:error, :no_mission}}]}
+    end
+  end
+
+  def handle_event({:call, from}, :stop, state, data) do
+    heard(:stop, data)
+    rest(data)
+    data = %{data | mission: nil, claim: %{}}
+    changed(state, :idle, data)
+    {:next_state, :idle, data, [{:reply, from, :ok}]}
+  end
+
+  def handle_event({:call, from}, {:command, _command}, :idle, _data),
+    do: {:keep_state_and_data, [{:reply, from, {:error, :idle}}]}
+
+  def handle_event({:call, from}, {:command, _command} = event, {module, _} = state, data),
+    do: follow(handle(event, module, data), module, state, data, [{:reply, from, :ok}])
+
+  def handle_event(:cast, _event, :idle, _data), do: :keep_state_and_data
+
+  def handle_event(:cast, event, {module, _phase} = state, data),
+    do: event |> newest() |> handle(module, data) |> follow(module, state, data, [])
+
+  def handle_event(:info, _unknown, _state, _data), do: :keep_state_and_data
+
+  # Percepts that came in meanwhile are further down in our own mailbox.
+  defp newest({:tick, _percept} = tick) do
+    receive do
+      {:"$gen_cast", {:tick, _newer} = newer} -> newest(newer)
+    after
+      0 -> tick
+    end
+  end
+
+  defp newest(event), do: event
+
+  defp handle(event, module, data) do
+    heard(event, data)
+    module.handle(event, data.mission)
+  end
+
+  defp follow({phase, mission, effects}, module, state, data, replies) do
+    data = Enum.reduce(effects, %{data | mission: mission}, &carry_out/2)
+    changed(state, {module, phase}, data)
+    {:next_state, {module, phase}, data, replies}
+  end
+
+  defp carry_out(effect, data) do
+    Trace.effect(data.config, :pilot, effect, Config.now(data.config))
+    carry_out(effect, data.config, data)
+  end
+
+  defp carry_out({:goal, tag, goal}, config, data) do
+    Executive.goal(config.id, tag, goal)
+    data
+  end
+
+  defp carry_out({:anchors, anchors}, config, data) do
+    Executive.anchors(config.id, anchors)
+    data
+  end
+
+  defp carry_out({:send, _to, _message}, %{send: nil}, data), do: data
+
+  defp carry_out({:send, to, message}, %{send: {m, f, a}}, data) do
+    apply(m, f, a ++ [to, message])
+    data
+  end
+
+  defp carry_out({:claim, claim}, _config, data), do: %{data | claim: claim}
+
+  defp carry_out({:stage, stage, about}, config, data) do
+    about = Map.merge(about, %{robot: config.id, stage: stage})
+    Event.execute([:robot, :stage], %{at_ms: Config.now(config)}, about)
+    data
+  end
+
+  defp rest(data), do: Executive.goal(data.config.id, :idle, nil)
+
+  defp heard(input, data), do: Trace.input(data.config, :pilot, input, Config.now(data.config))
+
+  defp changed(state, state, data), do: written(state, data)
+  defp changed(_before, state, data), do: told(state, data)
+
+  defp told(state, data) do
+    at_ms = written(state, data)
+    Trace.effect(data.config, :pilot, {:phase, state}, at_ms)
+    about = %{robot: data.config.id, state: state}
+    Event.execute([:robot, :pilot, :phase], %{at_ms: at_ms}, about)
+  end
+
+  defp written(state, data) do
+    at_ms = Config.now(data.config)
+    Board.put(data.board, :pilot, :mission, %{state: state, claim: data.claim}, at_ms)
+    at_ms
+  end
+end
