@@ -10,7 +10,6 @@ defmodule Robot.Config do
     * `:colours` - what the camera looks for, `%Vision.Colours{}`; needed with a camera
     * `:limits` - what to lower in the profile, as `[max_linear: 0.3]`: `:max_linear` (m/s), `:max_turn`
       (rad/s), `:max_acceleration` (m/s2), `:max_turn_acceleration` (rad/s2)
-    * `:mind` - options of `Robot.Mind`, a keyword list
     * `:mission` - `{module, options}` that `Robot.Pilot.start/1` starts, or `nil`
     * `:companions` - `[{module, options}]`, each a `Robot.Companion`
     * `:send` - `{m, f, a}`; what the mission says goes to `apply(m, f, a ++ [to, message])`; or
@@ -31,7 +30,6 @@ defmodule Robot.Config do
                 start: nil,
                 colours: nil,
                 limits: [],
-                mind: [],
                 mission: nil,
                 companions: [],
                 send: nil,
@@ -52,7 +50,6 @@ defmodule Robot.Config do
           start: Pose.t(),
           colours: struct() | nil,
           limits: keyword(),
-          mind: keyword(),
           mission: module_options() | nil,
           companions: [module_options()],
           send: call() | nil,
@@ -142,7 +139,6 @@ defmodule Robot.Config do
 
   defp valid?(:start, pose), do: is_struct(pose, Pose)
   defp valid?(:colours, colours), do: colours == nil or is_struct(colours, Vision.Colours)
-  defp valid?(:mind, list), do: Keyword.keyword?(list)
 
   defp valid?(:limits, list) do
     Keyword.keyword?(list) and
@@ -163,7 +159,6 @@ defmodule Robot.Config do
   defp allowed(:mission), do: "{module, options} or nil"
   defp allowed(:start), do: "a %Hal.Pose{}"
   defp allowed(:colours), do: "a %Vision.Colours{} or nil"
-  defp allowed(:mind), do: "a keyword list"
   defp allowed(:limits), do: "a keyword list of positive floats for #{Enum.join(@limits, ", ")}"
   defp allowed(:companions), do: "a list of {module, options}"
   defp allowed(:clock), do: "{module, function, arguments}"

@@ -26,6 +26,10 @@ defmodule Robot.Executive do
   @spec anchors(robot :: atom(), list()) :: :ok
   def anchors(robot, anchors), do: cast(robot, {:anchors, anchors})
 
+  @doc "Where the camera looks while no behaviour cares; `nil` leaves it where it is."
+  @spec look(robot :: atom(), pan :: float() | nil) :: :ok
+  def look(robot, pan), do: cast(robot, {:look, pan})
+
   defp cast(robot, message), do: GenServer.cast(Names.via(robot, :executive), message)
 
   @impl GenServer
@@ -38,7 +42,8 @@ defmodule Robot.Executive do
     s = %{
       config: config,
       board: board,
-      mind: Mind.new([profile: config.profile] ++ config.mind),
+      mind: Mind.new(profile: config.profile, start: config.start),
+      look: nil,
       next: System.monotonic_time(:millisecond)
     }
 
@@ -51,9 +56,14 @@ defmodule Robot.Executive do
     {:noreply, %{s | mind: Mind.goal(s.mind, tag, goal)}}
   end
 
-  def handle_cast({:anchors, _anchors} = input, s) do
+  def handle_cast({:anchors, anchors} = input, s) do
     Trace.input(s.config, :executive, input, Config.now(s.config))
-    {:noreply, s}
+    {:noreply, %{s | mind: Mind.anchors(s.mind, anchors)}}
+  end
+
+  def handle_cast({:look, pan} = input, s) do
+    Trace.input(s.config, :executive, input, Config.now(s.config))
+    {:noreply, %{s | look: pan}}
   end
 
   @impl GenServer
@@ -76,19 +86,20 @@ defmodule Robot.Executive do
     raw = Percept.Snapshot.take(board, config.profile, at_ms)
     Trace.input(config, :executive, {:tick, raw}, at_ms)
     {wish, outcome, mind} = Mind.tick(s.mind, raw)
-    percept = raw
+    percept = Mind.percept(mind)
 
     Gate.wish(config.id, wish.twist)
     Trace.effect(config, :executive, {:wish, wish}, at_ms)
-    look(wish.look, config, at_ms)
+    look(wish.look || s.look, config, at_ms)
 
     doing = %{by: wish.by, weight: wish.weight, outcome: outcome}
     Board.put(board, :executive, :doing, doing, at_ms)
     if percept.pose, do: Board.put(board, :executive, :pose, percept.pose, at_ms)
 
+    # The outcome first: the mission knows what came of its goal when it sees the next percept.
+    report(outcome, config, at_ms)
     Pilot.tick(config.id, percept)
     Trace.effect(config, :executive, {:tick, percept}, at_ms)
-    report(outcome, config, at_ms)
     %{s | mind: mind}
   end
 

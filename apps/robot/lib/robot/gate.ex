@@ -36,7 +36,7 @@ defmodule Robot.Gate do
   @spec estop(robot :: atom()) :: :ok
   def estop(robot), do: GenServer.call(Names.via(robot, :gate), :estop)
 
-  @doc "Clears the e-stop; the robot stands until it is told something new."
+  @doc "Clears the e-stop: wishes count again. Whoever resets has looked where the robot would go."
   @spec reset(robot :: atom()) :: :ok
   def reset(robot), do: GenServer.call(Names.via(robot, :gate), :reset)
 

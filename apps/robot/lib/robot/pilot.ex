@@ -9,7 +9,7 @@ defmodule Robot.Pilot do
 
   | effect | goes to |
   |---|---|
-  | `{:goal, tag, goal}`, `{:anchors, list}` | the executive |
+  | `{:goal, tag, goal}`, `{:anchors, list}`, `{:look, pan}` | the executive |
   | `{:send, to, message}` | the config's `:send`; lost without one |
   | `{:claim, map}` | the board, under `:mission`, for the heartbeat to carry |
   | `{:stage, name, map}` | the event `[:robot, :stage]` |
@@ -148,6 +148,11 @@ defmodule Robot.Pilot do
     data
   end
 
+  defp carry_out({:look, pan}, config, data) do
+    Executive.look(config.id, pan)
+    data
+  end
+
   defp carry_out({:send, _to, _message}, %{send: nil}, data), do: data
 
   defp carry_out({:send, to, message}, %{send: {m, f, a}}, data) do
@@ -163,7 +168,11 @@ defmodule Robot.Pilot do
     data
   end
 
-  defp rest(data), do: Executive.goal(data.config.id, :idle, nil)
+  defp rest(%{config: %{id: id}}) do
+    Executive.goal(id, :idle, nil)
+    Executive.anchors(id, [])
+    Executive.look(id, nil)
+  end
 
   defp heard(input, data), do: Trace.input(data.config, :pilot, input, Config.now(data.config))
 

@@ -21,7 +21,6 @@ defmodule Robot.ConfigTest do
           limits: [wheels: 3.0],
           limits: [max_linear: -0.1],
           limits: [max_linear: 5.0],
-          mind: nil,
           mission: Some.Mission,
           companions: [Some.Link],
           send: &send/2,

@@ -4,16 +4,20 @@ defmodule Robot.Case do
   do. Robots of all tests live in one registry, so each test uses ids of its own.
   """
   use ExUnit.CaseTemplate
+  alias Hal.Twist
+  alias Robot.Names
 
   using do
     quote do
       import Robot.Case
+      alias Hal.Twist
+      alias Robot.{Acts, Board, Executive, Gate, Names, Pilot}
     end
   end
 
   setup do
     # In the umbrella one VM runs the tests of all apps, and a fleet may be running already.
-    if Process.whereis(Robot.Names) == nil, do: start_supervised!(Robot.Names)
+    if Process.whereis(Names) == nil, do: start_supervised!(Names)
     :ok
   end
 
@@ -26,5 +30,71 @@ defmodule Robot.Case do
     ]
     |> Keyword.merge(options)
     |> Robot.Config.new!()
+  end
+
+  @doc "A running robot; it ends with the test."
+  def robot(id, options \\ []) do
+    start_supervised!({Robot.Supervisor, config(id, options)}, id: id, restart: :temporary)
+    id
+  end
+
+  @doc "A robot whose mission lets it roll."
+  def rolling(id, options \\ []) do
+    goal = {:goal, :roll, {Robot.Acts.Roll, twist: Twist.new(0.1, 0.0)}}
+    mission = {Robot.Acts.Mission, effects: [goal]}
+    robot(id, Keyword.put_new(options, :mission, mission))
+    :ok = Robot.Pilot.start(id)
+    id
+  end
+
+  @doc "Sends `{event, metadata}` to the test at each such event of this robot."
+  def listen(id, event) do
+    handler = {__MODULE__, id, event}
+    :ok = Hal.Event.attach(handler, event, &__MODULE__.forward/4, {id, self()})
+    on_exit(fn -> Hal.Event.detach(handler) end)
+  end
+
+  @doc false
+  def forward(event, _measurements, %{robot: id} = metadata, {id, test}),
+    do: send(test, {event, metadata})
+
+  def forward(_event, _measurements, _another_robots, _config), do: :ok
+
+  @doc "The processes of the robot in these roles."
+  def parts(id, roles), do: Enum.map(roles, &Names.whereis(id, &1))
+
+  @doc "Ends a part as nothing can stop it, and waits until it is gone."
+  def kill(id, role) do
+    pid = Names.whereis(id, role)
+    monitor = Process.monitor(pid)
+    Process.exit(pid, :kill)
+    assert_receive {:DOWN, ^monitor, _, _, :killed}
+    pid
+  end
+
+  @doc "Waits until the wheels roll."
+  def rolls(ms \\ 400) do
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v > 0, ms
+    forget_drives()
+  end
+
+  @doc "Checks that the wheels are told nothing but to stand, from now on for so long."
+  def stands(ms) do
+    forget_drives()
+
+    receive do
+      {:drive, {:drive, %Twist{linear: v}}, _} when v != 0 -> flunk("rolls at #{v} m/s")
+    after
+      ms -> :ok
+    end
+  end
+
+  @doc "Forgets all speeds that the drive was told so far."
+  def forget_drives do
+    receive do
+      {:drive, {:drive, _twist}, _pid} -> forget_drives()
+    after
+      0 -> :ok
+    end
   end
 end

@@ -1,0 +1,79 @@
+defmodule Robot.GateTest do
+  use Robot.Case, async: false
+  @moduletag :capture_log
+
+  @zero Twist.zero()
+
+  # What the gate did next, in the order of its own trace.
+  defp after_sense(ranges) do
+    receive do
+      {:gate, :input, {:sense, {:sonar, ^ranges}}, at_ms} ->
+        assert_receive {:gate, kind1, what1, ^at_ms}
+        assert_receive {:gate, kind2, what2, ^at_ms}
+        [{kind1, what1, at_ms}, {kind2, what2, at_ms}]
+
+      {:gate, _kind, _what, _at_ms} ->
+        after_sense(ranges)
+    after
+      500 -> flunk("the gate did not hear the sonar")
+    end
+  end
+
+  test "a touched bumper stops the wheels within 50 ms" do
+    id = rolling(:gate1)
+    rolls()
+    send(Names.whereis(id, :drive), {:readings, [{:bumpers, [0]}]})
+    assert_receive {:drive, {:drive, %Twist{linear: 0.0}}, _}, 50
+    {:ok, %{limits: limits}, _} = Board.fetch(Board.find!(id), :driving, 100)
+    assert :bumper in limits
+  end
+
+  test "a near sonar stops the wheels when it arrives, not at the next step" do
+    test = self()
+    id = rolling(:gate2, trace: {Kernel, :send, [test]})
+    rolls()
+    near = List.duplicate(5.1, 16) |> List.replace_at(11, 0.1)
+    send(Names.whereis(id, :drive), {:readings, [{:sonar, near}]})
+    assert [{:input, :step, at_ms}, {:effect, {:drive, twist, limits}, at_ms}] = after_sense(near)
+    assert :near in limits
+    assert twist.linear < 0.1
+  end
+
+  test "e-stop is latched, survives the gate and the executive, and only a reset clears it" do
+    id = rolling(:gate3)
+    rolls()
+    listen(id, [:robot, :gate, :start])
+    listen(id, [:robot, :pilot, :phase])
+    assert Gate.estop(id) == :ok
+    assert Board.latched?(Board.find!(id))
+    stands(250)
+
+    kill(id, :gate)
+    assert_receive {[:robot, :gate, :start], %{latched?: true}}
+    assert_receive {[:robot, :pilot, :phase], %{state: :idle}}
+    assert Pilot.start(id) == :ok
+    stands(250)
+
+    assert {:ok, %{twist: @zero, limits: [:estop]}, _} =
+             Board.fetch(Board.find!(id), :driving, 100)
+
+    assert Gate.reset(id) == :ok
+    refute Board.latched?(Board.find!(id))
+    rolls()
+  end
+
+  test "whatever is wished, only sane speeds come out" do
+    id = robot(:gate4)
+    assert_receive {:drive, {:drive, @zero}, _}
+    :ok = :sys.suspend(Names.whereis(id, :executive))
+
+    for wish <- [%{linear: :nan, turn: 0.0}, %{linear: 1.0e308, turn: 0.0}, :nonsense] do
+      Gate.wish(id, wish)
+      forget_drives()
+      assert_receive {:drive, {:drive, %Twist{linear: 0.0}}, _}, 200
+    end
+
+    Gate.wish(id, Twist.new(50.0, 0.0))
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v > 0 and v <= 0.1, 200
+  end
+end

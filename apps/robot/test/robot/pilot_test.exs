@@ -1,0 +1,92 @@
+defmodule Robot.PilotTest do
+  use Robot.Case, async: false
+  @moduletag :capture_log
+
+  defp flown(id, options \\ []) do
+    robot(id, Keyword.put(options, :mission, {Acts.Mission, test: self()}))
+    :ok = Pilot.start(id)
+    assert_receive {:mission, {:init, ^id}}
+    id
+  end
+
+  test "is idle until told, and says so" do
+    id = robot(:pilot1)
+    assert Pilot.command(id, :anything) == {:error, :idle}
+    assert Pilot.start(id) == {:error, :no_mission}
+    assert Pilot.start(id, No.Such.Mission, []) == {:error, :no_mission}
+    assert {:idle, _} = :sys.get_state(Names.whereis(id, :pilot))
+    assert Pilot.start(id, Acts.Mission, test: self()) == :ok
+    assert {{Acts.Mission, :ready}, _} = :sys.get_state(Names.whereis(id, :pilot))
+    assert Pilot.stop(id) == :ok
+    assert {:idle, _} = :sys.get_state(Names.whereis(id, :pilot))
+  end
+
+  test "hands ticks, outcomes, messages and commands to the mission" do
+    id = flown(:pilot2)
+    assert_receive {:mission, {:tick, %Robot.Percept{robot: ^id}}}, 200
+    Pilot.message(id, %{hello: 1})
+    assert_receive {:mission, {:message, %{hello: 1}}}
+    assert Pilot.command(id, :go) == :ok
+    assert_receive {:mission, {:command, :go}}
+    goal = {:goal, :soon, {Acts.Roll, outcome: 7, twist: Twist.zero()}}
+    assert Pilot.command(id, {:do, :ready, [goal]}) == :ok
+    assert_receive {:mission, {:outcome, :soon, 7}}, 200
+    assert_receive {:mission, {:tick, _}}, 200
+  end
+
+  test "carries out every kind of effect" do
+    ptz = {Hal.FakePtz, test: self(), device: :ptz}
+
+    id =
+      flown(:pilot3,
+        send: {Kernel, :send, [self()]} |> then(fn _ -> {__MODULE__, :say, [self()]} end),
+        ptz: ptz
+      )
+
+    listen(id, [:robot, :stage])
+    listen(id, [:robot, :pilot, :phase])
+
+    effects = [
+      {:goal, :roll, {Acts.Roll, twist: Twist.new(0.1, 0.0)}},
+      {:send, :all, %{epoch: 1}},
+      {:claim, %{slot: 2}},
+      {:stage, :elected, %{epoch: 1}}
+    ]
+
+    assert Pilot.command(id, {:do, :lead, effects}) == :ok
+    assert_received {:said, :all, %{epoch: 1}}
+    assert_received {[:robot, :stage], %{robot: ^id, stage: :elected, epoch: 1}}
+    assert_received {[:robot, :pilot, :phase], %{state: {Acts.Mission, :lead}}}
+    {:ok, %{claim: %{slot: 2}}, _} = Board.fetch(Board.find!(id), :mission, 1_000)
+    rolls()
+    assert_receive {:ptz, {:look, 0.25, _}, _}, 200
+
+    assert Pilot.command(id, {:do, :lead, [{:goal, :none, nil}, {:look, -0.5}]}) == :ok
+    assert_receive {:ptz, {:look, -0.5, _}, _}, 300
+  end
+
+  @doc false
+  def say(test, to, message), do: send(test, {:said, to, message})
+
+  test "of the ticks that wait only the newest is handled" do
+    id = flown(:pilot4)
+    [pilot, executive] = parts(id, [:pilot, :executive])
+    :ok = :sys.suspend(executive)
+    :ok = :sys.suspend(pilot)
+    ticks = for n <- 1..9, do: %Robot.Percept{robot: id, at_ms: n, profile: nil}
+    Enum.each(ticks, &Pilot.tick(id, &1))
+    :ok = :sys.resume(pilot)
+    assert_receive {:mission, {:tick, %{at_ms: 9}}}
+    for n <- 1..8, do: refute_received({:mission, {:tick, %{at_ms: ^n}}})
+  end
+
+  test "another mission takes the place of a running one" do
+    id = flown(:pilot5)
+    goal = {:goal, :roll, {Acts.Roll, twist: Twist.new(0.1, 0.0)}}
+    :ok = Pilot.command(id, {:do, :ready, [goal]})
+    rolls()
+    :ok = Pilot.start(id)
+    zero = Twist.zero()
+    assert_receive {:drive, {:drive, ^zero}, _}, 400
+  end
+end

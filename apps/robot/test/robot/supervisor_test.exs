@@ -1,0 +1,214 @@
+defmodule Robot.SupervisorTest do
+  @moduledoc "Who falls, and what happens: each row of the architecture's table within one robot."
+  use Robot.Case, async: false
+  @moduletag :capture_log
+  import ExUnit.CaptureLog
+
+  @zero Twist.zero()
+  @above [:executive, :pilot]
+
+  defp open_of(list) do
+    {:ok, agent} = Agent.start_link(fn -> list end)
+
+    fn ->
+      Agent.get_and_update(agent, fn
+        [last] -> {last, [last]}
+        [next | rest] -> {next, rest}
+      end)
+    end
+  end
+
+  defp idle?(id) do
+    assert_receive {[:robot, :executive, :start], %{robot: ^id}}
+    assert_receive {[:robot, :pilot, :phase], %{state: :idle}}
+    {:ok, %{state: :idle}, _} = Board.fetch(Board.find!(id), :mission, 1_000)
+  end
+
+  defp listen(id) do
+    listen(id, [:robot, :executive, :start])
+    listen(id, [:robot, :pilot, :phase])
+    listen(id, [:robot, :gate, :start])
+  end
+
+  test "a robot starts idle, and its wheels are told to stand before anything else" do
+    id = robot(:fall0)
+    assert_receive {:drive, first, _}
+    assert first == :init
+    assert_receive {:drive, {:drive, @zero}, _}
+    stands(150)
+    board = Board.find!(id)
+    assert {:ok, %{twist: @zero}, _} = Board.fetch(board, :driving, 100)
+    assert {:ok, %{state: :idle}, _} = Board.fetch(board, :mission, :infinity)
+    assert {:ok, :online, _} = Board.fetch(board, {:health, :drive}, :infinity)
+  end
+
+  test "a behaviour raises: executive, pilot and companions restart idle, the gate stops" do
+    test = self()
+    id = rolling(:fall1, companions: [{Acts.Companion, test: test}])
+    rolls()
+    assert_receive {:companion, ^id, companion}
+    [gate, drive] = parts(id, [:gate, :drive])
+    before = parts(id, @above)
+    listen(id)
+
+    log =
+      capture_log(fn ->
+        Executive.goal(id, :roll, {Acts.Roll, raise: "a bad behaviour"})
+        idle?(id)
+        assert_receive {:companion, ^id, other} when other != companion
+      end)
+
+    assert log =~ "a bad behaviour"
+    forget_drives()
+    assert_receive {:drive, {:drive, @zero}, _}, 300
+    stands(150)
+    assert parts(id, [:gate, :drive]) == [gate, drive]
+    assert Enum.zip_with(before, parts(id, @above), &(&1 != &2)) == [true, true]
+  end
+
+  test "a mission raises: the pilot restarts, the executive drops its goal" do
+    id = rolling(:fall2)
+    rolls()
+    executive = Names.whereis(id, :executive)
+    listen(id)
+
+    capture_log(fn ->
+      catch_exit(Pilot.command(id, :raise))
+      assert_receive {[:robot, :pilot, :phase], %{state: :idle}}
+    end)
+
+    assert Names.whereis(id, :executive) == executive
+    assert_receive {:drive, {:drive, @zero}, _}, 400
+    stands(150)
+  end
+
+  test "the executive is stuck: zero is at the driver within 0.3 s" do
+    id = rolling(:fall3)
+    rolls()
+    :ok = :sys.suspend(Names.whereis(id, :executive))
+    forget_drives()
+    assert_receive {:drive, {:drive, @zero}, _}, 300
+    {:ok, %{limits: [:dead_man]}, _} = Board.fetch(Board.find!(id), :driving, 100)
+    :ok = :sys.resume(Names.whereis(id, :executive))
+    rolls()
+  end
+
+  test "the executive is killed: zero is at the driver within 0.3 s" do
+    id = rolling(:fall4)
+    rolls()
+    listen(id)
+    kill(id, :executive)
+    forget_drives()
+    assert_receive {:drive, {:drive, @zero}, _}, 300
+    idle?(id)
+  end
+
+  test "the gate is killed: all above restarts idle, and stop is sent first" do
+    id = rolling(:fall5)
+    rolls()
+    [drive | above] = parts(id, [:drive | @above])
+    listen(id)
+    kill(id, :gate)
+    assert_receive {[:robot, :gate, :start], %{latched?: false}}
+    idle?(id)
+    forget_drives()
+    assert_receive {:drive, {:drive, @zero}, ^drive}
+    stands(200)
+    assert Names.whereis(id, :drive) == drive
+    refute Enum.any?(parts(id, @above), &(&1 in above))
+  end
+
+  test "the gate is stuck: the drive's own watchdog stops the wheels" do
+    id = rolling(:fall6)
+    rolls()
+    :ok = :sys.suspend(Names.whereis(id, :gate))
+    forget_drives()
+    assert_receive {:drive, {:drive, @zero}, _}, 600
+  end
+
+  test "a missing drive is retried; nobody else falls" do
+    open = open_of([{:error, :enoent}, {:error, :enoent}, :ok])
+    id = rolling(:fall7, drive: {Hal.FakeDrive, test: self(), device: :drive, open: open})
+    parts = parts(id, [:gate | @above])
+
+    assert {:ok, {:offline, :enoent}, _} =
+             Board.fetch(Board.find!(id), {:health, :drive}, :infinity)
+
+    rolls(800)
+    assert {:ok, :online, _} = Board.fetch(Board.find!(id), {:health, :drive}, :infinity)
+    assert parts(id, [:gate | @above]) == parts
+  end
+
+  test "a drive that reports an error is opened again alone, and rolls on" do
+    id = rolling(:fall8)
+    rolls()
+    [drive | _] = parts = parts(id, [:drive, :gate | @above])
+    send(drive, {:fail, :eio})
+    assert_receive {:drive, :terminate, ^drive}
+    forget_drives()
+    assert_receive {:drive, :init, ^drive}, 300
+    rolls()
+    assert parts(id, [:drive, :gate | @above]) == parts
+  end
+
+  test "a drive that crashes restarts alone; its start stops the motors before a speed comes" do
+    id = rolling(:fall9)
+    rolls()
+    [drive | parts] = parts(id, [:drive, :gate | @above])
+
+    capture_log(fn ->
+      send(drive, :raise)
+      assert_receive {:drive, :terminate, ^drive}
+      forget_drives()
+      assert_receive {:drive, first, again} when again != drive, 1_000
+      assert first == :init
+      rolls()
+    end)
+
+    assert parts(id, [:gate | @above]) == parts
+  end
+
+  test "a drive that crashes over every message does not take the robot down" do
+    id = rolling(:fall10)
+    parts = parts(id, [:gate | @above])
+
+    capture_log(fn ->
+      for _ <- 1..5 do
+        assert_receive {:drive, :init, drive}, 1_000
+        send(drive, :raise)
+      end
+
+      assert_receive {:drive, :init, _}, 1_000
+    end)
+
+    assert parts(id, [:gate | @above]) == parts
+  end
+
+  test "the board is killed: all starts afresh" do
+    id = rolling(:fall11)
+    rolls()
+    before = parts(id, [:drive, :gate | @above])
+    listen(id)
+    kill(id, :board)
+    idle?(id)
+
+    assert Enum.all?(Enum.zip(before, parts(id, [:drive, :gate | @above])), fn {a, b} ->
+             a != b
+           end)
+  end
+
+  test "the fourth failure within 5 s ends the robot" do
+    id = robot(:fall12)
+    robot = Process.monitor(Names.whereis(id, :robot))
+    listen(id)
+
+    for _ <- 1..3 do
+      kill(id, :gate)
+      assert_receive {[:robot, :gate, :start], _}
+      idle?(id)
+    end
+
+    kill(id, :gate)
+    assert_receive {:DOWN, ^robot, _, _, :shutdown}
+  end
+end
