@@ -15,6 +15,7 @@ defmodule Robot.Mission do
     * `{:goal, tag, {module, options} | nil}` - what to do from now on. The same tag again changes
       the options of the running behaviour, another one starts afresh; `nil` is idling
     * `{:anchors, list}` - references for the estimate of the pose
+    * `{:look, pan}` - where the camera looks, radians, left positive, unless the behaviour cares
     * `{:send, to, message}` - say something to one robot, to several, or to `:all`
     * `{:claim, map}` - what the robot says of itself until further notice
     * `{:stage, name, map}` - something worth telling people happened
@@ -22,6 +23,7 @@ defmodule Robot.Mission do
   @type effect ::
           {:goal, tag :: term(), Robot.Behaviour.t() | {module(), keyword()} | nil}
           | {:anchors, list()}
+          | {:look, pan :: float()}
           | {:send, to :: atom() | [atom()] | :all, struct()}
           | {:claim, map()}
           | {:stage, atom(), map()}

@@ -3,7 +3,7 @@ defmodule Swarm.Heartbeat do
   What a robot tells all others five times a second: where it is, what it is at, whom it hears,
   whom it follows. Whole numbers only: mm, mrad, mm/s, mrad/s, millionths of a picture.
 
-  `sight` is its newest view of the landmark: relative size and estimated distance, `nil` where it
+  `estop` is the number of the last emergency stop that it knows, 0 for none. `sight` is its newest view of the landmark: relative size and estimated distance, `nil` where it
   does not see it. `anchor` is there in the leader's heartbeats only.
   """
 
@@ -19,7 +19,8 @@ defmodule Swarm.Heartbeat do
                 standing: false,
                 in_place: false,
                 blocked: false,
-                estop: false,
+                formed: false,
+                estop: 0,
                 anchor: nil
               ]
 
@@ -37,11 +38,34 @@ defmodule Swarm.Heartbeat do
           standing: boolean(),
           in_place: boolean(),
           blocked: boolean(),
-          estop: boolean(),
+          formed: boolean(),
+          estop: non_neg_integer(),
           anchor: Swarm.Anchor.t() | nil
         }
 
   @far 1_000_000_000
+
+  @doc """
+  The heartbeat of a robot: what it perceives, what its mission claims, whom it hears. A percept
+  without odometry stands still.
+  """
+  @spec new({integer(), non_neg_integer()}, Robot.Percept.t(), map(), [atom()], non_neg_integer()) ::
+          t()
+  def new({boot, sequence}, %Robot.Percept{pose: pose} = percept, claim, heard, estop) do
+    twist = if percept.odometry, do: percept.odometry.twist, else: Hal.Twist.zero()
+
+    beat = %__MODULE__{
+      boot: boot,
+      sequence: sequence,
+      pose: {round(pose.x * 1000), round(pose.y * 1000), round(pose.heading * 1000)},
+      twist: {round(twist.linear * 1000), round(twist.turn * 1000)},
+      radius: round(percept.profile.radius * 1000),
+      heard: heard,
+      estop: estop
+    }
+
+    struct!(beat, claim)
+  end
 
   @doc """
   Whether a term from outside is a heartbeat with sane numbers.
@@ -58,9 +82,10 @@ defmodule Swarm.Heartbeat do
       beat.radius in 50..2000 and is_atom(beat.phase) and is_integer(beat.epoch) and
       beat.epoch >= 0 and is_atom(beat.leader) and names?(beat.heard) and sight?(beat.sight) and
       Enum.all?(
-        [beat.standing, beat.in_place, beat.blocked, beat.estop],
+        [beat.standing, beat.in_place, beat.blocked, beat.formed],
         &is_boolean/1
-      ) and (beat.anchor == nil or Swarm.Anchor.valid?(beat.anchor))
+      ) and beat.estop in 0..1_000_000 and
+      (beat.anchor == nil or Swarm.Anchor.valid?(beat.anchor))
   end
 
   def valid?(_term), do: false

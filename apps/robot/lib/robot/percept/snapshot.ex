@@ -24,24 +24,31 @@ defmodule Robot.Percept.Snapshot do
   ]
   @blobs_ms 500
 
-  @doc "The percept of this moment."
+  @typedoc "Looks up a key that may be so many milliseconds old."
+  @type fetch ::
+          (key :: atom(), max_age_ms :: pos_integer() ->
+             {:ok, term(), at_ms :: integer()} | :error)
+
+  @doc "The percept of this moment, from the board."
   @spec take(Board.t(), Hal.Profile.t(), at_ms :: integer()) :: Percept.t()
   def take(%Board{} = board, profile, at_ms) do
-    percept = %Percept{
-      robot: board.robot,
-      at_ms: at_ms,
-      profile: profile,
-      peers: Board.peers(board)
-    }
+    build(
+      %Percept{robot: board.robot, at_ms: at_ms, profile: profile, peers: Board.peers(board)},
+      &Board.fetch(board, &1, &2, at_ms)
+    )
+  end
 
+  @doc "Fills an empty percept from wherever the readings are kept. Pure where `fetch` is."
+  @spec build(Percept.t(), fetch()) :: Percept.t()
+  def build(%Percept{} = percept, fetch) do
     @limits
     |> Enum.reduce(percept, fn {key, limit_ms}, percept ->
-      case Board.fetch(board, key, limit_ms, at_ms) do
+      case fetch.(key, limit_ms) do
         {:ok, value, _at_ms} -> Map.replace!(percept, key, value)
         :error -> percept
       end
     end)
-    |> see(Board.fetch(board, :blobs, @blobs_ms, at_ms))
+    |> see(fetch.(:blobs, @blobs_ms))
   end
 
   defp see(percept, {:ok, %{blobs: blobs, pan: pan}, at_ms}),

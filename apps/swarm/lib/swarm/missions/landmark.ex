@@ -255,6 +255,7 @@ defmodule Swarm.Missions.Landmark do
       standing: standing?(mission),
       in_place: mission.phase == :follow and mission.attend.in_place?,
       blocked: mission.phase == :follow and mission.attend.blocked?,
+      formed: leading? and mission.lead.formed?,
       anchor: if(leading?, do: mission.anchor)
     }
   end

@@ -1,0 +1,87 @@
+defmodule Sim.Trial.Ledger do
+  @moduledoc """
+  What is written down of a run as it goes: its stages, its leaders, how long it was in formation.
+  Pure; fed every 100 ms with what the living robots claim.
+  """
+
+  defstruct stages: [],
+            leader: nil,
+            epoch: 0,
+            leaders_at_once_max: 0,
+            elections: 0,
+            searching?: false,
+            ticks: 0,
+            formed_ticks: 0,
+            formed_ms: nil,
+            rest_ms: nil,
+            formation: nil
+
+  @type t :: %__MODULE__{}
+
+  @doc "An empty ledger."
+  @spec new() :: t()
+  def new, do: %__MODULE__{}
+
+  @doc "Writes a stage; a search that others have begun already is not a new one."
+  @spec stage(t(), integer(), atom(), atom() | nil, map()) :: t()
+  def stage(%{searching?: true} = ledger, _at_ms, :search, _robot, _facts), do: ledger
+
+  def stage(ledger, at_ms, name, robot, facts) do
+    entry = Map.merge(%{stage: name, at_s: at_ms / 1000, robot: robot}, facts)
+    entry = if name == :search, do: %{entry | robot: nil}, else: entry
+    ledger = %{ledger | stages: [entry | ledger.stages]}
+
+    case name do
+      :search -> %{ledger | searching?: true}
+      :elected -> %{ledger | elections: ledger.elections + 1}
+      _other -> ledger
+    end
+  end
+
+  @doc "One tick of claims."
+  @spec note(t(), integer(), [{atom(), map()}]) :: t()
+  def note(ledger, at_ms, claims) do
+    leaders = for {id, %{phase: :lead} = claim} <- claims, do: {id, claim}
+    phases = for {_id, claim} <- claims, do: claim[:phase]
+    formed? = Enum.any?(leaders, fn {_id, claim} -> claim.formed end)
+    elected? = ledger.elections > 0
+
+    %{
+      ledger
+      | leader: leader(leaders),
+        epoch:
+          Enum.reduce(claims, ledger.epoch, fn {_id, claim}, e -> max(e, claim[:epoch] || 0) end),
+        leaders_at_once_max: max(ledger.leaders_at_once_max, length(leaders)),
+        searching?: :search in phases,
+        ticks: ledger.ticks + if(elected?, do: 1, else: 0),
+        formed_ticks: ledger.formed_ticks + if(elected? and formed?, do: 1, else: 0),
+        formed_ms: if(formed?, do: ledger.formed_ms || at_ms),
+        rest_ms:
+          if(phases != [] and Enum.all?(phases, &(&1 == :rest)), do: ledger.rest_ms || at_ms)
+    }
+  end
+
+  @doc "Who leads now: of several the one of the highest epoch."
+  @spec leader(t()) :: atom() | nil
+  def leader(%__MODULE__{leader: leader}), do: leader
+
+  def leader(leaders) when is_list(leaders) do
+    case Enum.max_by(leaders, fn {id, claim} -> {claim.epoch, id} end, fn -> nil end) do
+      nil -> nil
+      {id, _claim} -> id
+    end
+  end
+
+  @doc "Since when the fleet has been in formation, or at rest without a landmark; `nil` if it is not."
+  @spec calm_since_ms(t()) :: integer() | nil
+  def calm_since_ms(ledger), do: ledger.formed_ms || ledger.rest_ms
+
+  @doc "The stages, oldest first."
+  @spec stages(t()) :: [map()]
+  def stages(ledger), do: Enum.reverse(ledger.stages)
+
+  @doc "The share of the time since the first election that the fleet was in formation."
+  @spec share_formed(t()) :: float()
+  def share_formed(%{ticks: 0}), do: 0.0
+  def share_formed(ledger), do: ledger.formed_ticks / ledger.ticks
+end

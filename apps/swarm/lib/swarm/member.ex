@@ -1,0 +1,197 @@
+defmodule Swarm.Member do
+  @moduledoc """
+  One robot of a fleet as one pure function: the peers it hears, its mission, its mind and its
+  gate, composed. `Sim.Trial` folds it in lockstep; live, the processes of `Robot.Supervisor` and
+  `Swarm.Link` run the same parts in the same order, so both do the same on the same input.
+
+  | input | from |
+  |---|---|
+  | `{:reading, reading, at_ms}` | the drive, the pan-tilt unit |
+  | `{:blobs, blobs, %{at_ms:, pan:}}` | the eye |
+  | `{:message, term, at_ms}` | another robot |
+  | `{:command, command, at_ms}` | a person |
+  | `{:tick, at_ms}` | the clock, 10 Hz: mind, then mission, then (5 Hz) the heartbeat |
+  | `{:reflex, at_ms}` | the clock, 20 Hz: the gate |
+
+  Effects: `{:drive, twist}`, `{:look, pan, tilt}`, `{:send, to, message}`, `{:stage, name, map}`.
+  """
+  alias Hal.{Pose, Profile, Twist}
+  alias Robot.{Mind, Percept, Reflex}
+  alias Swarm.{Heartbeat, Message, Peers}
+
+  @beat_ms 200
+
+  @enforce_keys [:id, :profile, :boot, :module, :mission, :mind, :reflex, :peers]
+  defstruct @enforce_keys ++
+              [
+                phase: :idle,
+                entries: %{},
+                claim: %{},
+                look: nil,
+                stop: 0,
+                cleared: 0,
+                sequence: 0,
+                beat_ms: nil,
+                rejected: %{}
+              ]
+
+  @type t :: %__MODULE__{id: atom(), profile: Profile.t(), rejected: %{atom() => pos_integer()}}
+
+  @type input ::
+          {:reading, Hal.Drive.reading() | Hal.Ptz.reading(), integer()}
+          | {:blobs, [Vision.Blob.t()], %{at_ms: integer(), pan: float()}}
+          | {:message, term(), integer()}
+          | {:command, term(), integer()}
+          | {:tick, integer()}
+          | {:reflex, integer()}
+
+  @type effect ::
+          {:drive, Twist.t()}
+          | {:look, float(), float()}
+          | {:send, atom() | [atom()] | :all, Message.t()}
+          | {:stage, atom(), map()}
+
+  @doc """
+  A member. Options: `id`, `profile`, `start` (`Hal.Pose`, where the odometry says zero), `mission`
+  (`{module, options}`), `boot` (a number that grows with every start, default 1).
+  """
+  @spec new(keyword()) :: t()
+  def new(options) do
+    options = Keyword.validate!(options, [:id, :profile, :start, :mission, boot: 1])
+    {module, mission_options} = options[:mission]
+    {phase, mission, []} = module.init(options[:id], mission_options)
+
+    %__MODULE__{
+      id: options[:id],
+      profile: options[:profile],
+      boot: options[:boot],
+      module: module,
+      mission: mission,
+      phase: phase,
+      mind: Mind.new(profile: options[:profile], start: options[:start]),
+      reflex: Reflex.new(options[:profile]),
+      peers: Peers.new(options[:id])
+    }
+  end
+
+  @doc "What a member does about one input."
+  @spec step(t(), input()) :: {t(), [effect()]}
+  def step(member, {:reading, {key, value} = reading, at_ms}) do
+    reflex = Reflex.sense(member.reflex, reading, at_ms)
+    {%{put(member, key, value, at_ms) | reflex: reflex}, []}
+  end
+
+  def step(member, {:blobs, blobs, %{at_ms: at_ms, pan: pan}}),
+    do: {put(member, :blobs, %{blobs: blobs, pan: pan}, at_ms), []}
+
+  def step(member, {:message, term, at_ms}) do
+    case Message.check(term) do
+      {:ok, %Message{kind: :heartbeat} = message} -> hear(member, message, at_ms)
+      {:ok, message} -> handle(member, {:message, message})
+      {:error, reason} -> {%{member | rejected: count(member.rejected, reason)}, []}
+    end
+  end
+
+  def step(member, {:command, :estop, _at_ms}),
+    do: {estop(member, max(member.stop, member.cleared) + 1), []}
+
+  def step(member, {:command, :reset, _at_ms}),
+    do: {%{member | reflex: Reflex.reset(member.reflex), cleared: member.stop}, []}
+
+  def step(member, {:command, command, _at_ms}), do: handle(member, {:command, command})
+
+  def step(member, {:tick, at_ms}) do
+    {wish, outcome, mind} = Mind.tick(member.mind, percept(member, at_ms))
+    reflex = Reflex.wish(member.reflex, wish.twist, at_ms)
+    member = %{member | mind: mind, reflex: reflex}
+    {member, done} = if outcome, do: handle(member, outcome(outcome)), else: {member, []}
+    {member, effects} = handle(member, {:tick, Mind.percept(mind)})
+    {member, beats} = beat(member, at_ms)
+    look = for pan <- List.wrap(wish.look || member.look), do: {:look, pan, 0.0}
+    {member, look ++ done ++ effects ++ beats}
+  end
+
+  def step(member, {:reflex, at_ms}) do
+    {twist, limits, reflex} = Reflex.step(member.reflex, at_ms)
+    member = put(%{member | reflex: reflex}, :driving, %{twist: twist, limits: limits}, at_ms)
+    {member, [{:drive, twist}]}
+  end
+
+  @doc "The pose that the robot believes to have, or `nil`."
+  @spec pose(t()) :: Pose.t() | nil
+  def pose(member) do
+    percept = Mind.percept(member.mind)
+    percept && percept.pose
+  end
+
+  @doc "What the robot's mission says of it: its phase and the fields of `Swarm.Heartbeat`."
+  @spec claim(t()) :: map()
+  def claim(member), do: member.claim
+
+  defp put(member, key, value, at_ms),
+    do: %{member | entries: Map.put(member.entries, key, {value, at_ms})}
+
+  defp percept(member, at_ms) do
+    Percept.Snapshot.build(
+      %Percept{
+        robot: member.id,
+        at_ms: at_ms,
+        profile: member.profile,
+        peers: Peers.percepts(member.peers, at_ms)
+      },
+      fn key, limit_ms ->
+        case member.entries do
+          %{^key => {value, then_ms}} when at_ms - then_ms <= limit_ms -> {:ok, value, then_ms}
+          _none_or_old -> :error
+        end
+      end
+    )
+  end
+
+  # An e-stop spreads with every heartbeat. Stops are numbered, so that one that a person has
+  # cleared here is not caught again from a robot that has not been reset yet.
+  defp hear(member, %Message{from: from, body: beat}, at_ms) do
+    member = %{member | peers: Peers.hear(member.peers, from, beat, at_ms)}
+    if beat.estop > member.stop, do: {estop(member, beat.estop), []}, else: {member, []}
+  end
+
+  defp estop(%{cleared: cleared} = member, stop) when stop <= cleared, do: %{member | stop: stop}
+  defp estop(member, stop), do: %{member | reflex: Reflex.estop(member.reflex), stop: stop}
+
+  defp outcome({tag, result}), do: {:outcome, tag, result}
+
+  defp handle(member, event) do
+    {phase, mission, effects} = member.module.handle(event, member.mission)
+    Enum.reduce(effects, {%{member | phase: phase, mission: mission}, []}, &carry_out/2)
+  end
+
+  defp carry_out({:goal, tag, goal}, {member, out}),
+    do: {%{member | mind: Mind.goal(member.mind, tag, goal)}, out}
+
+  defp carry_out({:anchors, anchors}, {member, out}),
+    do: {%{member | mind: Mind.anchors(member.mind, anchors)}, out}
+
+  defp carry_out({:look, pan}, {member, out}), do: {%{member | look: pan}, out}
+  defp carry_out({:claim, claim}, {member, out}), do: {%{member | claim: claim}, out}
+  defp carry_out(effect, {member, out}), do: {member, out ++ [effect]}
+
+  defp beat(%{beat_ms: last} = member, at_ms) when last != nil and at_ms - last < @beat_ms,
+    do: {member, []}
+
+  defp beat(member, at_ms) do
+    case Mind.percept(member.mind) do
+      %Percept{pose: %Pose{}} = percept ->
+        heard = Peers.heard(member.peers, at_ms)
+        sender = {member.boot, member.sequence + 1}
+        beat = Heartbeat.new(sender, percept, member.claim, heard, member.stop)
+
+        {%{member | sequence: member.sequence + 1, beat_ms: at_ms},
+         [{:send, :all, Message.new(member.id, :heartbeat, beat)}]}
+
+      _lost ->
+        {member, []}
+    end
+  end
+
+  defp count(rejected, reason), do: Map.update(rejected, reason, 1, &(&1 + 1))
+end

@@ -1,0 +1,11 @@
+defmodule SwarmPureTest do
+  use ExUnit.Case, async: true
+  doctest Swarm.Formation
+  doctest Swarm.Assignment
+  doctest Swarm.Chain
+  doctest Swarm.Election
+  doctest Swarm.Message
+  doctest Swarm.Heartbeat
+  doctest Swarm.Anchor
+  doctest Swarm.Missions.Landmark.Phases
+end
