@@ -163,7 +163,7 @@ defmodule Sim.Trial do
       members: members,
       script: Script.new(options.moves, options.kills),
       ledger: Ledger.new(),
-      colours: World.colours()
+      colours: nil
     }
 
     command(trial, :all, :start)
@@ -224,22 +224,19 @@ defmodule Sim.Trial do
     end)
   end
 
-  defp look(%{options: %{blobs: :direct}} = trial) do
-    each(trial, fn id, trial ->
-      blobs(trial, id, World.blobs(trial.world, id), World.pan(trial.world, id))
-    end)
-  end
-
   defp look(trial) do
     each(trial, fn id, trial ->
-      frame = World.frame(trial.world, id)
-      {:ok, blobs} = Vision.blobs(frame, trial.colours)
-      blobs(trial, id, blobs, frame.pan)
+      blobs(trial, id, World.blobs(trial.world, id), pan(trial.world, id))
     end)
   end
 
   defp blobs(trial, id, blobs, pan),
     do: input(trial, id, {:blobs, blobs, %{at_ms: trial.at_ms, pan: pan}})
+
+  defp pan(world, id) do
+    {:ptz, %{pan: pan}} = world |> World.readings(id) |> List.keyfind(:ptz, 0)
+    pan
+  end
 
   defp inputs(trial, make),
     do: each(trial, fn id, trial -> input(trial, id, make.(trial.at_ms)) end)

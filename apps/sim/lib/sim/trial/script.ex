@@ -43,7 +43,7 @@ defmodule Sim.Trial.Script do
 
   @doc "Whether nothing more is to come, and the landmark stands."
   @spec over?(t(), Sim.World.t()) :: boolean()
-  def over?(script, world), do: script.pending == [] and not Sim.World.gliding?(world)
+  def over?(script, world), do: script.pending == [] and world.goal == nil
 
   @doc "When the last thing was done."
   @spec last_ms(t()) :: integer()

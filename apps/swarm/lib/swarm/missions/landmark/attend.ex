@@ -24,7 +24,12 @@ defmodule Swarm.Missions.Landmark.Attend do
   @moving_sd 0.5
   @robot_sd 0.1
 
-  defstruct in_place?: false, holding?: false, blocked?: false, told: {0, 0}, error: nil
+  defstruct in_place?: false,
+            holding?: false,
+            blocked?: false,
+            told: {0, 0},
+            error: nil,
+            landmark: nil
 
   @type t :: %__MODULE__{}
 
@@ -65,7 +70,9 @@ defmodule Swarm.Missions.Landmark.Attend do
           | in_place?: slow? and error <= @in_place,
             holding?: resting? and error <= @near,
             error: error,
-            told: told
+            told: told,
+            # Where the landmark stood when this robot was last in place, or began to follow.
+            landmark: landmark(mission, slow? and error <= @in_place)
         }
     }
 
@@ -74,6 +81,9 @@ defmodule Swarm.Missions.Landmark.Attend do
 
     {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, references(mission)}]}
   end
+
+  defp landmark(%{anchor: anchor, attend: attend}, in_place?),
+    do: if(in_place? or attend.landmark == nil, do: anchor.landmark, else: attend.landmark)
 
   # From parent to child: n - 1 messages for the whole group (R28, R53).
   defp pass_on(%{anchor: anchor, attend: attend} = mission) do

@@ -2,7 +2,9 @@ defmodule Swarm.Missions.Landmark.Challenge do
   @moduledoc """
   When a follower asks for a new leader (R76): it sees the landmark nearer than the leader does, by
   0.5 m or a fifth of the distance, for 2 s; or the leader has not seen it for 3 s while this robot
-  does. No leader is challenged in its first 10 s, so that leadership cannot swing to and fro. Pure.
+  does. No leader is challenged in its first 10 s, so that leadership cannot swing to and fro; and
+  as long as the landmark has not moved, a robot that passes it on the way to its slot is no
+  challenger. Pure.
   """
   alias Swarm.Missions.Landmark
   alias Swarm.Peers
@@ -12,6 +14,7 @@ defmodule Swarm.Missions.Landmark.Challenge do
   @reign_ms 10_000
   @least 500
   @share 0.2
+  @moved 1.0
 
   @doc "`challenge` becomes `:open` when it is time to open a round."
   @spec update(Landmark.t()) :: Landmark.t()
@@ -40,7 +43,8 @@ defmodule Swarm.Missions.Landmark.Challenge do
          %{distance: mine} when mine != nil <- mission.sight,
          %{phase: :lead} = leader <- peers[mission.leader],
          mine = round(mine * 1000),
-         true <- nearest?(mine, mission.me, peers) do
+         true <- nearest?(mine, mission.me, peers),
+         true <- mission.attend.in_place? or moved?(mission) or leader.sight == nil do
       case leader.sight do
         nil -> :blind
         %{distance: nil} -> nil
@@ -50,6 +54,15 @@ defmodule Swarm.Missions.Landmark.Challenge do
       _unfit -> nil
     end
   end
+
+  defp moved?(%{attend: %{landmark: place}, anchor: %{landmark: now}})
+       when place != nil and now != nil do
+    {x, y} = place
+    {nx, ny} = now
+    Hal.Pose.distance({x / 1000, y / 1000}, {nx / 1000, ny / 1000}) > @moved
+  end
+
+  defp moved?(_mission), do: false
 
   # Of several that could, the nearest asks.
   defp nearest?(mine, me, peers) do
