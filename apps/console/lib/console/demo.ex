@@ -1,0 +1,117 @@
+defmodule Console.Demo do
+  @moduledoc """
+  The demo without a view: the run in lockstep, its stages as lines, then report, picture and summary.
+  """
+  alias Console.{Fleet, Options, Output, Picture, Progress, Report, Track, Words}
+
+  @progress_ms 100
+
+  @doc """
+  Runs `options` with a trial module (`Sim.Trial`) and returns the exit status: 0 when the fleet
+  ended in formation, 2 when it did not, 1 when the run cannot be made.
+  """
+  @spec run(Options.t(), module()) :: 0 | 1 | 2
+  def run(%Options{} = options, trial_module) do
+    # With `--json -` the standard output belongs to the report alone.
+    output = Output.to(if(options.json == "-", do: :stderr, else: :stdio))
+
+    case trial_module.new(Options.trial(options)) do
+      {:ok, trial} ->
+        Output.line(output, heading(options))
+        started = System.monotonic_time(:millisecond)
+        scene = trial_module.scene(trial)
+
+        run =
+          play(
+            %{
+              module: trial_module,
+              trial: trial,
+              track: track(options, scene),
+              told: 0,
+              drawn_ms: started,
+              output: output,
+              duration_s: Options.duration_s(options)
+            },
+            scene
+          )
+
+        Output.finish(output)
+        finish(run, options, (System.monotonic_time(:millisecond) - started) / 1000)
+
+      {:error, line} ->
+        IO.puts(:stderr, "demo: #{line}")
+        1
+    end
+  end
+
+  @doc "The first line of a run: who, where, and from which seed."
+  @spec heading(Options.t()) :: String.t()
+  def heading(options) do
+    {kind, spacing} = options.formation
+
+    "#{Words.count(length(options.robots), "robot")} (#{Fleet.describe(options.robots)}) in " <>
+      "#{options.map}, seed #{options.seed}, #{kind} with #{Words.decimals(spacing, 1)} m spacing"
+  end
+
+  # Paths are kept only for a picture.
+  defp track(%Options{picture: nil}, _scene), do: nil
+  defp track(_options, scene), do: Track.new(scene)
+
+  defp play(run, scene) do
+    run = run |> tell(scene) |> draw(scene)
+
+    if run.module.done?(run.trial) do
+      run
+    else
+      trial = run.module.step(run.trial)
+      scene = run.module.scene(trial)
+      play(%{run | trial: trial, track: run.track && Track.add(run.track, scene)}, scene)
+    end
+  end
+
+  defp tell(run, scene) do
+    new = Enum.drop(scene.stages, run.told)
+    Enum.each(new, &Output.line(run.output, Words.stage(&1)))
+    %{run | told: run.told + length(new)}
+  end
+
+  defp draw(%{output: %Output{columns: nil}} = run, _scene), do: run
+
+  defp draw(run, scene) do
+    now = System.monotonic_time(:millisecond)
+
+    if now - run.drawn_ms >= @progress_ms do
+      line =
+        Progress.line(scene.at_ms / 1000, run.duration_s, note(scene), run.output.columns - 1)
+
+      Output.progress(run.output, line)
+      %{run | drawn_ms: now}
+    else
+      run
+    end
+  end
+
+  defp note(%{leader: nil}), do: "no leader yet"
+  defp note(%{error: nil} = scene), do: "#{scene.leader} leads"
+
+  defp note(%{error: {mean, _max}} = scene),
+    do: "#{scene.leader} leads, formation error #{Words.decimals(mean, 2)} m"
+
+  defp finish(run, options, wall_s) do
+    result = run.module.result(run.trial)
+    formed? = run.module.scene(run.trial).formed?
+    Enum.each(Report.summary(result, formed?, wall_s), &Output.line(run.output, &1))
+
+    title = Picture.title(length(options.robots), options.map, options.seed)
+    drawing = run.track && fn -> Picture.draw(run.track, title) end
+
+    case Report.write(options, Report.json(result, wall_s), drawing, run.output) do
+      :ok ->
+        if formed?, do: 0, else: 2
+
+      {:error, line} ->
+        IO.puts(:stderr, "demo: #{line}")
+        1
+    end
+  end
+end

@@ -1,0 +1,27 @@
+defmodule Console.Live do
+  @moduledoc """
+  A fleet that can be watched and commanded while it runs, whoever runs it.
+
+  A view asks for the `scene/1` whenever it wants to draw, and hands on what people type as a
+  command that `Console.Prompt` has checked.
+  """
+  alias Hal.Pose
+
+  @type target :: :all | [atom()]
+  @type command ::
+          {:kill, :leader | atom()}
+          | {:formation, {atom(), float() | nil}}
+          | {:landmark, Pose.point() | :none}
+          | {:tell, target(), String.t()}
+          | :estop
+          | :reset
+
+  @doc "The fleet as it is now."
+  @callback scene(live :: term()) :: Sim.Scene.t()
+
+  @doc "Carries a command out, or says in one line why not."
+  @callback command(live :: term(), command()) :: {:ok, String.t()} | {:error, String.t()}
+
+  @doc "The result for the report, as `Sim.Trial.result/1` gives it."
+  @callback result(live :: term()) :: map()
+end

@@ -1,0 +1,25 @@
+defmodule Console.Picture.Colours do
+  @moduledoc """
+  One colour a robot, told apart by the colour-blind too. Pure.
+
+  The first seven are Okabe and Ito's; larger fleets repeat them with other dash patterns.
+  """
+
+  @colours ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#5B3A8C"]
+  @dashes [nil, "7 3", "2 3", "9 3 2 3", "14 4", "4 2 1 2"]
+
+  @doc """
+  Colour and dash pattern of the robot at an index.
+
+      iex> Console.Picture.Colours.at(0)
+      {"#0072B2", nil}
+      iex> Console.Picture.Colours.at(7)
+      {"#0072B2", "7 3"}
+  """
+  @spec at(non_neg_integer()) :: {String.t(), String.t() | nil}
+  def at(index) do
+    count = length(@colours)
+    dash = Enum.at(@dashes, rem(div(index, count), length(@dashes)))
+    {Enum.at(@colours, rem(index, count)), dash}
+  end
+end

@@ -1,0 +1,133 @@
+defmodule Console.Report do
+  @moduledoc """
+  The report of a run: fixed keys in a fixed order, and the summary for people.
+
+  Lengths, angles and times are rounded to three decimals. Two runs from one seed give the same
+  bytes, except for `wall_s`, the only key that tells of the machine.
+  """
+  alias Console.{Output, Words}
+
+  @version Mix.Project.config()[:version]
+
+  @keys ~w(version seed map robots simulated_s wall_s stages leader leaders_at_once_max
+           leader_changes formation landmark_distance_m collisions min_separation_m messages fleet)a
+  @stage ~w(stage at_s robot epoch size_ppm)a
+  @formation ~w(kind spacing_m error_mean_m error_max_m share_of_time_formed)a
+  @messages ~w(sent lost)a
+  @robot ~w(name alive state x y theta slot error_m size_ppm)a
+
+  @doc """
+  The report as a term for `Hal.Json.encode!/1`, from a trial's result.
+  """
+  @spec term(map(), float()) :: {:object, [{atom(), term()}]}
+  def term(result, wall_s) do
+    result
+    |> Map.merge(%{
+      version: @version,
+      wall_s: wall_s,
+      stages: Enum.map(result.stages, &stage/1),
+      formation: object(result.formation, @formation),
+      messages: object(result.messages, @messages),
+      fleet: Enum.map(result.fleet, &object(&1, @robot))
+    })
+    |> object(@keys)
+  end
+
+  @doc "The report as JSON, one line with its line end."
+  @spec json(map(), float()) :: iodata()
+  def json(result, wall_s), do: [Hal.Json.encode!(term(result, wall_s)), "\n"]
+
+  @doc "The end of a run in a few lines for people."
+  @spec summary(map(), boolean(), float()) :: [String.t()]
+  def summary(result, formed?, wall_s) do
+    [
+      outcome(result, formed?),
+      safety(result),
+      leadership(result),
+      "#{Words.decimals(result.simulated_s, 1)} s simulated in #{Words.decimals(wall_s, 1)} s" <>
+        " (#{Words.decimals(result.simulated_s / max(wall_s, 0.001), 0)} times real time)"
+    ]
+  end
+
+  @doc """
+  Writes the report and the picture where the options say; the drawing is made only if it is wanted.
+  """
+  @spec write(Console.Options.t(), iodata(), (() -> iodata()) | nil, Output.t()) ::
+          :ok | {:error, String.t()}
+  def write(options, json, drawing, output) do
+    with :ok <- put("--json", options.json, fn -> json end, output),
+         do: put("--picture", options.picture, drawing, output)
+  end
+
+  defp put(_option, nil, _content, _output), do: :ok
+  defp put("--json", "-", content, _output), do: IO.write(content.())
+
+  defp put(option, path, content, output) do
+    case File.write(path, content.()) do
+      :ok ->
+        Output.line(output, "Wrote #{path}")
+
+      {:error, reason} ->
+        {:error, "#{option} #{path} cannot be written: #{:file.format_error(reason)}"}
+    end
+  end
+
+  defp stage(stage) do
+    keys = Enum.filter(@stage, &(Map.get(stage, &1) != nil))
+    object(stage, keys)
+  end
+
+  defp object(map, keys), do: {:object, for(key <- keys, do: {key, value(Map.fetch!(map, key))})}
+
+  defp value(float) when is_float(float), do: tidy(Float.round(float, 3))
+  defp value({:object, _pairs} = object), do: object
+  defp value({x, y}), do: [value(x), value(y)]
+  defp value(list) when is_list(list), do: Enum.map(list, &value/1)
+  defp value(other), do: other
+
+  # -0.0 and 0.0 are one number and must be one text.
+  defp tidy(zero) when zero == 0.0, do: 0.0
+  defp tidy(float), do: float
+
+  defp outcome(%{leader: nil} = result, _formed?),
+    do: "No formation: #{Words.count(result.robots, "robot")}, and none of them leads."
+
+  defp outcome(%{formation: formation} = result, true) do
+    living = Enum.count(result.fleet, & &1.alive)
+
+    "In formation: #{formation.kind} of #{living} led by #{result.leader}" <>
+      error(formation) <> distance(result.landmark_distance_m) <> "."
+  end
+
+  defp outcome(%{formation: formation} = result, false),
+    do: "Not in formation: #{formation.kind} led by #{result.leader}#{error(formation)}."
+
+  defp error(%{error_mean_m: nil}), do: ""
+
+  defp error(formation) do
+    ", off their places by #{Words.decimals(formation.error_mean_m, 2)} m in the mean" <>
+      " and #{Words.decimals(formation.error_max_m, 2)} m at most"
+  end
+
+  defp distance(nil), do: ""
+  defp distance(metres), do: ", #{Words.decimals(metres, 2)} m from the landmark"
+
+  defp safety(result) do
+    collisions = result.collisions |> Words.count("collision") |> String.capitalize()
+
+    case result.min_separation_m do
+      nil ->
+        "#{collisions}."
+
+      metres ->
+        "#{collisions}; nobody came nearer to another than #{Words.decimals(metres, 2)} m."
+    end
+  end
+
+  defp leadership(result) do
+    changes = result.leader_changes |> Words.count("change") |> String.capitalize()
+
+    "#{changes} of leader, at most #{result.leaders_at_once_max} at once; " <>
+      "#{Words.count(result.messages.sent, "message")}, #{result.messages.lost} lost."
+  end
+end

@@ -1,0 +1,138 @@
+defmodule Console.Terminal do
+  @moduledoc """
+  The full-screen view of a fleet as a function: a scene and a screen size give the text to write. Pure.
+
+  From the top: what is going on, the map beside the robots' table, what happened last, answers
+  to commands, three things to try, the prompt.
+  """
+  alias Console.{Floorplan, Words}
+  alias Console.Terminal.{Canvas, Editor, Style, Table}
+  alias Sim.Scene
+
+  @try "Try:  kill leader  ·  formation wedge 1.2  ·  landmark 3,2  ·  help  ·  quit"
+
+  defstruct columns: 80, rows: 24, editor: %Editor{}, messages: [], overlay: nil, floor: nil
+
+  @typedoc "What the view knows beside the scene; `messages` are answers, the newest first."
+  @type t :: %__MODULE__{
+          columns: pos_integer(),
+          rows: pos_integer(),
+          editor: Editor.t(),
+          messages: [{String.t(), atom()}],
+          overlay: [String.t()] | nil,
+          floor: Canvas.floor() | nil
+        }
+
+  @doc "What switches the terminal to a screen of our own."
+  @spec enter() :: String.t()
+  def enter, do: "\e[?1049h\e[?7l\e[2J"
+
+  @doc "What gives the terminal back as it was."
+  @spec leave() :: String.t()
+  def leave, do: "\e[0m\e[?7h\e[?25h\e[?1049l"
+
+  @doc "The whole screen, and the view to go on with."
+  @spec frame(Scene.t(), t()) :: {iodata(), t()}
+  def frame(%Scene{} = scene, %__MODULE__{} = view) do
+    {rows, view} = rows(scene, view)
+
+    text =
+      rows
+      |> Enum.with_index(1)
+      |> Enum.map(fn {row, number} -> ["\e[#{number};1H", Style.row(row, view.columns)] end)
+
+    # The cursor hides while the frame is written, so that it does not flicker over the map.
+    {["\e[?25l", text, cursor(view), "\e[?25h"], view}
+  end
+
+  @doc "The screen's rows as styled text, as many as the screen has."
+  @spec rows(Scene.t(), t()) :: {[[{String.t(), atom()}]], t()}
+  def rows(%Scene{} = scene, %__MODULE__{} = view) do
+    spare = view.rows - 24
+    answers = if spare >= 12, do: 4, else: 2
+    happened = if spare >= 12, do: 4, else: 1
+    body_rows = max(view.rows - 3 - answers - happened, 1)
+    {body, view} = body(scene, view, body_rows)
+
+    rows =
+      [header(scene, view.columns)] ++
+        body ++
+        happened(scene, happened) ++ answers(view, answers) ++ [[{@try, :dim}], prompt(view)]
+
+    {Enum.take(rows, -view.rows), view}
+  end
+
+  defp header(scene, columns) do
+    {kind, spacing} = scene.formation
+    ground = Floorplan.of(scene.map)
+    name = Path.basename(ground.name)
+
+    place =
+      if columns >= 100,
+        do: "#{name} #{Words.decimals(ground.width, 0)} x #{Words.decimals(ground.height, 0)} m",
+        else: name
+
+    [
+      {" Convoy ", :title},
+      {" #{place}  #{Words.decimals(scene.at_ms / 1000, 1)} s ", :bar},
+      {" #{kind} #{Words.decimals(spacing, 1)} m ", :bar},
+      {" #{leader(scene)} ", :bar},
+      {" #{error(scene)} ", :bar}
+    ]
+  end
+
+  defp leader(%{leader: nil}), do: "no leader"
+  defp leader(scene), do: "#{scene.leader} leads, epoch #{scene.epoch}"
+
+  defp error(%{error: nil}), do: ""
+
+  defp error(%{error: {mean, max}} = scene) do
+    word = if scene.formed?, do: "formed", else: "error"
+    "#{word} #{Words.decimals(mean, 2)}/#{Words.decimals(max, 2)} m"
+  end
+
+  defp body(_scene, %{overlay: lines} = view, rows) when is_list(lines) do
+    {Enum.take(Enum.map(["" | lines], &[{"  " <> &1, :plain}]) ++ List.duplicate([], rows), rows),
+     view}
+  end
+
+  defp body(scene, view, rows) do
+    table? = view.columns >= 72
+    columns = if table?, do: view.columns - Table.width() - 1, else: view.columns
+    floor = Canvas.floor(view.floor, Floorplan.of(scene.map), scene, columns, rows)
+    map = Canvas.draw(floor, scene)
+
+    body =
+      if table?,
+        do:
+          map
+          |> Enum.zip(Table.draw(scene, rows))
+          |> Enum.map(fn {m, t} -> m ++ [{" ", :plain} | t] end),
+        else: map
+
+    {body, %{view | floor: floor}}
+  end
+
+  defp happened(scene, count) do
+    lines = scene.stages |> Enum.take(-count) |> Enum.map(&[{Words.stage(&1), :plain}])
+    List.duplicate([], count - length(lines)) ++ lines
+  end
+
+  defp answers(view, count) do
+    lines =
+      view.messages
+      |> Enum.take(count)
+      |> Enum.reverse()
+      |> Enum.map(fn {text, style} -> [{" " <> text, style}] end)
+
+    List.duplicate([], count - length(lines)) ++ lines
+  end
+
+  # A line longer than the screen scrolls, so that the cursor stays in sight.
+  defp prompt(view),
+    do: [{"> ", :prompt}, {String.slice(Editor.text(view.editor), shift(view)..-1//1), :plain}]
+
+  defp cursor(view), do: "\e[#{view.rows};#{3 + Editor.cursor(view.editor) - shift(view)}H"
+
+  defp shift(view), do: max(0, Editor.cursor(view.editor) - (view.columns - 4))
+end

@@ -1,0 +1,120 @@
+defmodule Console.Terminal.Editor do
+  @moduledoc """
+  The line that somebody types, key by key: moving, deleting, earlier lines, completion. Pure.
+
+  The view draws it, so the terminal itself must not echo.
+  """
+
+  defstruct before: "", behind: "", history: [], older: [], newer: [], escape: nil, words: []
+
+  @type t :: %__MODULE__{}
+
+  @doc """
+  One character; a finished line or the wish to leave comes back beside the editor.
+
+      iex> editor = Console.Terminal.Editor.new(["kill"])
+      iex> {nil, editor} = Console.Terminal.Editor.key(editor, "k")
+      iex> {nil, editor} = Console.Terminal.Editor.key(editor, "\\t")
+      iex> Console.Terminal.Editor.text(editor)
+      "kill "
+      iex> {line, _editor} = Console.Terminal.Editor.key(editor, "\\r")
+      iex> line
+      {:line, "kill "}
+  """
+  @spec key(t(), String.t()) :: {nil | {:line, String.t()} | :quit, t()}
+  def key(%__MODULE__{escape: nil} = editor, "\e"), do: {nil, %{editor | escape: ""}}
+
+  def key(%__MODULE__{escape: escape} = editor, char) when is_binary(escape) do
+    case escape <> char do
+      "[" ->
+        {nil, %{editor | escape: "["}}
+
+      "O" ->
+        {nil, %{editor | escape: "["}}
+
+      "[" <> rest = sequence ->
+        if rest =~ ~r/[A-Za-z~]$/,
+          do: {nil, move(%{editor | escape: nil}, rest)},
+          else: {nil, %{editor | escape: sequence}}
+
+      _other ->
+        {nil, %{editor | escape: nil}}
+    end
+  end
+
+  def key(editor, enter) when enter in ["\r", "\n"], do: finish(editor)
+  def key(editor, <<3>>), do: {:quit, editor}
+  def key(%{before: "", behind: ""} = editor, <<4>>), do: {:quit, editor}
+
+  def key(editor, delete) when delete in [<<127>>, "\b"],
+    do: {nil, %{editor | before: String.slice(editor.before, 0..-2//1)}}
+
+  def key(editor, <<1>>), do: {nil, move(editor, "H")}
+  def key(editor, <<5>>), do: {nil, move(editor, "F")}
+  def key(editor, <<11>>), do: {nil, %{editor | behind: ""}}
+  def key(editor, <<21>>), do: {nil, %{editor | before: ""}}
+
+  def key(editor, <<23>>),
+    do: {nil, %{editor | before: String.replace(editor.before, ~r/\S*\s*$/, "")}}
+
+  def key(editor, "\t"), do: {nil, complete(editor)}
+
+  def key(editor, char) do
+    if String.printable?(char),
+      do: {nil, %{editor | before: editor.before <> char}},
+      else: {nil, editor}
+  end
+
+  @doc "An editor that completes these words."
+  @spec new([String.t()]) :: t()
+  def new(words), do: %__MODULE__{words: words}
+
+  @doc "The whole line."
+  @spec text(t()) :: String.t()
+  def text(editor), do: editor.before <> editor.behind
+
+  @doc "How many characters stand before the cursor."
+  @spec cursor(t()) :: non_neg_integer()
+  def cursor(editor), do: String.length(editor.before)
+
+  defp finish(editor) do
+    line = text(editor)
+    history = if String.trim(line) == "", do: editor.history, else: [line | editor.history]
+    {{:line, line}, %{new(editor.words) | history: history, older: history}}
+  end
+
+  defp move(%{older: [line | older]} = editor, "A"),
+    do: %{editor | before: line, behind: "", older: older, newer: [text(editor) | editor.newer]}
+
+  defp move(%{newer: [line | newer]} = editor, "B"),
+    do: %{editor | before: line, behind: "", newer: newer, older: [text(editor) | editor.older]}
+
+  defp move(%{behind: <<next::utf8, rest::binary>>} = editor, "C"),
+    do: %{editor | before: editor.before <> <<next::utf8>>, behind: rest}
+
+  defp move(%{before: before} = editor, "D") when before != "" do
+    {before, last} = String.split_at(before, -1)
+    %{editor | before: before, behind: last <> editor.behind}
+  end
+
+  defp move(editor, home) when home in ["H", "1~"],
+    do: %{editor | before: "", behind: text(editor)}
+
+  defp move(editor, last) when last in ["F", "4~"],
+    do: %{editor | before: text(editor), behind: ""}
+
+  defp move(%{behind: <<_::utf8, rest::binary>>} = editor, "3~"), do: %{editor | behind: rest}
+  defp move(editor, _other), do: editor
+
+  defp complete(editor) do
+    [stem | _] = editor.before |> String.split(" ") |> Enum.reverse()
+
+    case Enum.filter(editor.words, &String.starts_with?(&1, stem)) do
+      [only] when stem != "" ->
+        %{editor | before: String.replace_suffix(editor.before, stem, only) <> " "}
+
+      _none_or_many ->
+        editor
+    end
+  end
+end

@@ -1,0 +1,82 @@
+defmodule Console.Terminal.Table do
+  @moduledoc "The robots as a table that never has more rows than there is room for. Pure."
+  alias Console.Words
+  alias Sim.Scene
+
+  @width 31
+
+  @doc "The table's width in characters."
+  @spec width() :: pos_integer()
+  def width, do: @width
+
+  @doc "Exactly `rows` styled rows; whoever finds no room is counted in the last one."
+  @spec draw(Scene.t(), pos_integer()) :: [[{String.t(), atom()}]]
+  def draw(scene, rows) do
+    robots = Enum.sort_by(scene.robots, &rank/1)
+    room = max(rows - 1, 0)
+
+    shown =
+      if length(robots) <= room do
+        Enum.map(robots, &row/1)
+      else
+        {shown, hidden} = Enum.split(robots, max(room - 1, 0))
+        Enum.map(shown, &row/1) ++ [rest(hidden)]
+      end
+
+    Enum.take([heading() | shown] ++ List.duplicate([], rows), rows)
+  end
+
+  # The leader, then those who need attention, then by name as given.
+  defp rank(%{leader?: true}), do: 0
+  defp rank(%{state: :blocked}), do: 1
+  defp rank(%{alive: false}), do: 3
+  defp rank(_robot), do: 2
+
+  defp heading, do: [{"  robot  does        off  sees", :dim}]
+
+  defp row(robot) do
+    [
+      {if(robot.leader?, do: "★ ", else: "  "), :leader},
+      {String.pad_trailing("#{robot.id}", 7), name(robot)},
+      {String.pad_trailing(does(robot), 9), state(robot)},
+      {String.pad_leading(off(robot), 6), off_style(robot)},
+      {"  ", :plain},
+      sees(robot)
+    ]
+  end
+
+  defp rest(hidden) do
+    counts = Enum.frequencies_by(hidden, &does/1)
+    text = Enum.map_join(counts, ", ", fn {does, count} -> "#{count} #{does}" end)
+    [{"  … and #{length(hidden)}: #{text}", :dim}]
+  end
+
+  defp does(%{alive: false}), do: "dead"
+  defp does(robot), do: robot.state |> Atom.to_string() |> String.slice(0, 8)
+
+  defp off(robot) do
+    case Scene.slot_error(robot) do
+      nil -> ""
+      metres -> Words.decimals(metres, 2)
+    end
+  end
+
+  defp off_style(robot) do
+    case Scene.slot_error(robot) do
+      metres when is_float(metres) and metres <= 0.25 -> :good
+      _far_or_none -> :plain
+    end
+  end
+
+  defp sees(%{alive: false}), do: {"", :dim}
+  defp sees(%{size_ppm: nil}), do: {"–", :dim}
+  defp sees(%{size_ppm: ppm}), do: {"◆ #{Words.decimals(ppm / 10_000, 1)} %", :landmark}
+
+  defp name(%{alive: false}), do: :dead
+  defp name(%{leader?: true}), do: :leader
+  defp name(_robot), do: :name
+
+  defp state(%{alive: false}), do: :dead
+  defp state(%{state: :blocked}), do: :bad
+  defp state(_robot), do: :plain
+end

@@ -1,0 +1,49 @@
+defmodule Console.PictureTest do
+  use ExUnit.Case, async: true
+  alias Console.{Picture, Runs}
+
+  doctest Console.Ground
+  doctest Console.Floorplan
+  doctest Console.Svg
+  doctest Console.Picture
+  doctest Console.Picture.Colours
+
+  # Raises on anything that is no well-formed XML.
+  defp parse(drawing) do
+    {document, []} =
+      drawing |> IO.iodata_to_binary() |> :binary.bin_to_list() |> :xmerl_scan.string(quiet: true)
+
+    document
+  end
+
+  defp count(document, path), do: length(:xmerl_xpath.string(to_charlist(path), document))
+
+  test "everybody has a way, the landmark too, and stages are marked on floor and plot" do
+    document =
+      "--move 3,2@30 --kill mag2@60"
+      |> Runs.track()
+      |> Picture.draw("a <title> & more")
+      |> parse()
+
+    assert count(document, "/svg") == 1
+    # Six ways, the landmark's, and the two curves of the error.
+    assert count(document, "//polyline") >= 9
+    assert count(document, "//text[.='killed: mag2']") == 1
+    assert count(document, "//text[.='formation error (m)']") == 1
+    assert count(document, "//text[.='simulated time (s)']") == 1
+    assert count(document, "//text[.='a <title> & more']") == 1
+  end
+
+  test "fleets of one and of a hundred, with and without a landmark" do
+    for line <- ["--robots 1", "--robots 100 --duration 20", "--landmark none --duration 20"] do
+      track = Runs.track(line)
+      document = track |> Picture.draw(line) |> parse()
+      assert count(document, "//polyline") >= length(track.last.robots)
+    end
+  end
+
+  test "long waits add no points to a way" do
+    short = Runs.track("--landmark none --duration 10")
+    assert Enum.all?(Map.values(short.ways), &(length(&1) < 5))
+  end
+end

@@ -1,0 +1,71 @@
+defmodule Console.ReportTest do
+  use ExUnit.Case, async: true
+  alias Console.{FakeTrial, Options, Report, Runs}
+
+  doctest Console.Words
+
+  defp result(line) do
+    {:ok, trial} = line |> Runs.options() |> Options.trial() |> FakeTrial.new()
+
+    trial
+    |> Stream.iterate(&FakeTrial.step/1)
+    |> Enum.find(&FakeTrial.done?/1)
+    |> FakeTrial.result()
+  end
+
+  defp keys({:object, pairs}), do: Enum.map(pairs, &elem(&1, 0))
+  defp fetch({:object, pairs}, key), do: Keyword.fetch!(pairs, key)
+
+  test "keys and their order are fixed" do
+    report = Report.term(result("--kill mag2@8"), 1.5)
+
+    assert keys(report) ==
+             ~w(version seed map robots simulated_s wall_s stages leader leaders_at_once_max
+                leader_changes formation landmark_distance_m collisions min_separation_m messages fleet)a
+
+    assert keys(fetch(report, :formation)) ==
+             ~w(kind spacing_m error_mean_m error_max_m share_of_time_formed)a
+
+    assert keys(fetch(report, :messages)) == ~w(sent lost)a
+
+    for robot <- fetch(report, :fleet),
+        do: assert(keys(robot) == ~w(name alive state x y theta slot error_m size_ppm)a)
+
+    assert Enum.map(fetch(report, :stages), &keys/1) == [
+             [:stage, :at_s],
+             [:stage, :at_s, :robot, :epoch, :size_ppm],
+             [:stage, :at_s, :robot],
+             [:stage, :at_s]
+           ]
+  end
+
+  test "one seed gives the same bytes, figures have three decimals and no negative zero" do
+    json = fn -> IO.iodata_to_binary(Report.json(result("--seed 5"), 0.25)) end
+    assert json.() == json.()
+    refute json.() =~ ~r/\.\d{4}/
+    refute json.() =~ "-0.0,"
+    assert json.() =~ ~s("wall_s":0.25,)
+    assert String.ends_with?(json.(), "}\n")
+
+    tiny = Report.term(%{result("") | landmark_distance_m: -0.0001}, 0.1)
+    assert :erlang.float_to_binary(fetch(tiny, :landmark_distance_m), [:short]) == "0.0"
+  end
+
+  test "a run without a leader has a report and a summary too" do
+    result = result("--landmark none --duration 20")
+    json = IO.iodata_to_binary(Report.json(result, 0.1))
+    assert json =~ ~s("leader":null)
+    assert json =~ ~s("error_mean_m":null)
+    assert [first | _] = Report.summary(result, false, 0.1)
+    assert first =~ "No formation: 6 robots"
+  end
+
+  test "the summary tells a formation from none" do
+    result = result("")
+    assert hd(Report.summary(result, true, 2.0)) =~ "In formation: column of 6 led by"
+    assert hd(Report.summary(result, false, 2.0)) =~ "Not in formation"
+
+    assert List.last(Report.summary(%{result | simulated_s: 60.0}, true, 2.0)) =~
+             "30 times real time"
+  end
+end

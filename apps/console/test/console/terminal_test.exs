@@ -1,0 +1,106 @@
+defmodule Console.TerminalTest do
+  use ExUnit.Case, async: true
+  alias Console.{Ground, Runs, Terminal}
+  alias Console.Terminal.{Canvas, Editor, Style}
+
+  doctest Console.Prompt
+  doctest Console.Progress
+  doctest Console.Terminal.Canvas
+  doctest Console.Terminal.Editor
+  doctest Console.Terminal.Style
+
+  defp screen(scene, columns, rows, more \\ []) do
+    view = struct!(%Terminal{columns: columns, rows: rows}, more)
+    {rows, _view} = Terminal.rows(scene, view)
+    Enum.map(rows, &Style.plain/1)
+  end
+
+  test "fills every size exactly, with any fleet" do
+    for count <- [1, 6, 100], {columns, rows} <- [{80, 24}, {60, 20}, {200, 60}, {40, 12}] do
+      scene = Runs.scene("--robots #{count}", 12)
+      {text, _view} = Terminal.frame(scene, %Terminal{columns: columns, rows: rows})
+      text = IO.iodata_to_binary(text)
+      assert length(screen(scene, columns, rows)) == rows
+
+      places =
+        Regex.scan(~r/\e\[(\d+);1H/, text) |> Enum.map(fn [_, row] -> String.to_integer(row) end)
+
+      assert Enum.take(places, rows) == Enum.to_list(1..rows)
+
+      for row <- String.split(text, ~r/\e\[\d+;1H/) |> tl() |> Enum.take(rows) do
+        assert row |> String.replace(~r/\e\[[?\d;]*[A-Za-z]/, "") |> String.length() == columns
+      end
+    end
+  end
+
+  test "shows leader, epoch, error, robots and the landmark" do
+    text = "" |> Runs.scene(12) |> screen(80, 24) |> Enum.join("\n")
+
+    for word <- [
+          "mag1 leads, epoch 1",
+          "error ",
+          "column 1.0 m",
+          "◆",
+          "★ mag1",
+          "min3",
+          "█",
+          "12.0 s"
+        ],
+        do: assert(text =~ word)
+
+    assert text =~ "Try:  kill leader"
+  end
+
+  test "the dead are shown where they lie" do
+    text = "--kill mag2@3" |> Runs.scene(12) |> screen(80, 24) |> Enum.join("\n")
+    assert text =~ "✗"
+    assert text =~ ~r/mag2\s+dead/
+  end
+
+  test "of a hundred robots those without a row are counted" do
+    text = "--robots 100" |> Runs.scene(12) |> screen(80, 24) |> Enum.join("\n")
+    assert text =~ ~r/… and \d+: \d+ follow/
+  end
+
+  test "the last line is what is typed, its end in sight" do
+    editor =
+      Enum.reduce(String.graphemes("goto mag1 1,2"), Editor.new([]), &elem(Editor.key(&2, &1), 1))
+
+    assert List.last(screen(Runs.scene("", 1), 80, 24, editor: editor)) == "> goto mag1 1,2"
+
+    long =
+      Enum.reduce(1..100, Editor.new([]), fn _, editor -> elem(Editor.key(editor, "x"), 1) end)
+
+    assert String.length(List.last(screen(Runs.scene("", 1), 40, 24, editor: long))) < 40
+  end
+
+  test "the floor is made once as long as nothing changes" do
+    scene = Runs.scene("", 1)
+    room = Ground.room("hall", 16.0, 12.0)
+    floor = Canvas.floor(nil, room, scene, 40, 15)
+    assert Canvas.floor(floor, room, scene, 40, 15) == floor
+    refute Canvas.floor(floor, room, scene, 50, 15) == floor
+  end
+
+  test "on a floor too large for the screen only the fleet's part is shown" do
+    scene = Runs.scene("", 1)
+    floor = Canvas.floor(nil, Ground.room("huge", 300.0, 200.0), scene, 40, 15)
+    assert floor.scale < 1.0
+  end
+
+  test "keys edit the line" do
+    type = fn keys ->
+      Enum.reduce(keys, Editor.new(["formation"]), &elem(Editor.key(&2, &1), 1)) |> Editor.text()
+    end
+
+    assert type.(["a", "b", "\e", "[", "D", "x"]) == "axb"
+    assert type.(["a", "b", <<127>>]) == "a"
+    assert type.(["a", " ", "b", <<23>>]) == "a "
+    assert type.(["a", "b", <<21>>]) == ""
+    assert type.(["f", "o", "\t"]) == "formation "
+    assert type.(["a", "\r", "\e", "[", "A"]) == "a"
+    assert type.(["a", "\e", "[", "H", "\e", "[", "3", "~", "ü"]) == "ü"
+    assert {:quit, _editor} = Editor.key(Editor.new([]), <<3>>)
+    assert {:quit, _editor} = Editor.key(Editor.new([]), <<4>>)
+  end
+end

@@ -1,0 +1,34 @@
+defmodule Console.Runs do
+  @moduledoc "Runs of the fake trial for the tests of the views."
+  alias Console.{FakeTrial, Options, Track}
+
+  @doc "Options from one line as typed."
+  @spec options(String.t()) :: Options.t()
+  def options(line) do
+    {:ok, options} = line |> OptionParser.split() |> Options.parse()
+    options
+  end
+
+  @doc "The scene after some simulated seconds."
+  @spec scene(String.t(), number()) :: Sim.Scene.t()
+  def scene(line, at_s) do
+    {:ok, trial} = line |> options() |> Options.trial() |> FakeTrial.new()
+
+    trial
+    |> Stream.iterate(&FakeTrial.step/1)
+    |> Enum.at(round(at_s * 10))
+    |> FakeTrial.scene()
+  end
+
+  @doc "The track of a whole run."
+  @spec track(String.t()) :: Track.t()
+  def track(line) do
+    {:ok, trial} = line |> options() |> Options.trial() |> FakeTrial.new()
+    follow(FakeTrial.step(trial), Track.new(FakeTrial.scene(trial)))
+  end
+
+  defp follow(trial, track) do
+    track = Track.add(track, FakeTrial.scene(trial))
+    if FakeTrial.done?(trial), do: track, else: follow(FakeTrial.step(trial), track)
+  end
+end
