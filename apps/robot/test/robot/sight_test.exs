@@ -1,0 +1,90 @@
+defmodule Robot.SightTest do
+  @moduledoc "What the robot sees, and that it drives on when it does not."
+  use Robot.Case, async: false
+  @moduletag :capture_log
+
+  defp seeing(id) do
+    {:ok, colours} =
+      Vision.Colours.new([%{name: "Yellow", y: {170, 240}, u: {60, 90}, v: {130, 145}}],
+        min_area: 2
+      )
+
+    goal = {:goal, :roll, {Acts.Roll, twist: Twist.new(0.1, 0.0)}}
+
+    rolling(id,
+      camera: {Hal.FakeCamera, test: self(), device: :camera},
+      colours: colours,
+      mission: {Acts.Mission, test: self(), effects: [goal]}
+    )
+  end
+
+  defp show(id) do
+    {:ok, frame} =
+      Hal.Frame.new(
+        :yuyv,
+        2,
+        1,
+        <<200, 70, 200, 140>>,
+        System.monotonic_time(:millisecond)
+      )
+
+    send(Names.whereis(id, :camera), {:readings, [{:frame, %{frame | pan: 0.5}}]})
+    frame.at_ms
+  end
+
+  defp sees(id) do
+    at_ms = show(id)
+
+    assert_receive {:mission,
+                    {:tick, %{blobs: [%{colour: "Yellow"}], blobs_at_ms: ^at_ms} = percept}},
+                   300
+
+    assert percept.blobs_pan == 0.5
+  end
+
+  # The first percept without a picture, after one with.
+  defp blind, do: assert_receive({:mission, {:tick, %{blobs: nil, blobs_at_ms: nil}}}, 1_000)
+
+  defp forget_ticks do
+    receive do
+      {:mission, {:tick, _}} -> forget_ticks()
+    after
+      0 -> :ok
+    end
+  end
+
+  test "a picture becomes blobs in the percept, and then the next one is asked for" do
+    id = seeing(:sight1)
+    assert_receive {:camera, :next, camera}
+    sees(id)
+    assert_receive {:camera, :next, ^camera}
+  end
+
+  for fallen <- [:eye, :camera] do
+    test "#{fallen} is killed: blobs grow old, driving goes on, and it sees again" do
+      id = seeing(:"sight_#{unquote(fallen)}")
+      sees(id)
+      roles = [:drive, :gate, :executive, :pilot]
+      parts = parts(id, roles)
+      old = kill(id, unquote(fallen))
+      forget_ticks()
+      blind()
+      rolls()
+      assert parts(id, roles) == parts
+      assert Names.whereis(id, unquote(fallen)) != old
+      sees(id)
+    end
+  end
+
+  test "a camera that crashes rests, restarts alone, and sees again" do
+    id = seeing(:sight4)
+    assert_receive {:camera, :init, camera}
+    parts = parts(id, [:eye, :gate, :executive])
+    send(camera, :raise)
+    assert_receive {:camera, :init, other} when other != camera, 1_000
+    assert parts(id, [:eye, :gate, :executive]) == parts
+    assert_receive {:camera, :next, ^other}
+    sees(id)
+    {:ok, :online, _} = Board.fetch(Board.find!(id), {:health, :camera}, :infinity)
+  end
+end
