@@ -1,0 +1,114 @@
+defmodule Mix.Tasks.Blobs do
+  @shortdoc "Finds coloured blobs in a picture, video, stream or camera"
+  @moduledoc """
+  Finds coloured blobs in a picture, video, stream or camera.
+
+      mix blobs SOURCE --colours FILE [options]
+
+  SOURCE is a picture or video file, a stream (`rtsp://…`), a camera (`/dev/video0`), `testsrc`
+  (ffmpeg's test picture, 50 frames of it) or `lavfi:GRAPH` (any other of ffmpeg's generators).
+
+  Options:
+
+    * `--colours FILE` - CMVision colour file
+    * `--every N` - look at each N-th frame (1)
+    * `--frames N` - end after N frames looked at; cameras and streams go on without it
+    * `--json FILE` - one JSON object a frame, each on its own line; `-` is standard output, and
+      then nothing else goes there
+    * `--picture FILE` - the last frame with its blobs drawn in, `.png` or `.jpg`
+    * `--min-area N` - smallest blob in pixels (20)
+    * `--distance NAME=K` - metres for the blobs of a colour, `sqrt(K / share of the frame)`;
+      may be given for each colour
+    * `--help` - this text
+
+  Pixels count from the top left; `right` and `bottom` are the last inside. An odd last column
+  of a picture falls away. The exit status is 1, with one line, for wrong options or input.
+
+  Examples:
+
+      mix blobs photo.jpg --colours sweets.txt --picture found.png
+      mix blobs tour.avi --colours landmark.txt --distance YellowLandmark=0.0651 --every 5
+      mix blobs /dev/video0 --colours landmark.txt --json - --frames 100
+  """
+  use Mix.Task
+  alias Vision.Blobs.{Options, Report}
+  alias Vision.{Blobs, Colours, Picture}
+
+  @impl Mix.Task
+  def run(words) do
+    with {:ok, options} <- Options.parse(words),
+         {:ok, colours} <-
+           Colours.read(options.colours, distance: options.distance, min_area: options.min_area),
+         {:ok, output} <- open(options.json),
+         {:ok, summary} <- look(options, colours, output),
+         :ok <- draw(options.picture, summary.last, colours) do
+      close(output)
+      conclude(options, summary)
+    else
+      :help ->
+        Mix.shell().info(@moduledoc)
+
+      {:error, line} ->
+        Mix.shell().error(line)
+        exit({:shutdown, 1})
+    end
+  end
+
+  defp look(options, colours, output) do
+    terminal? = output != :table and match?({:ok, _columns}, :io.columns(:standard_error))
+
+    report = fn seen ->
+      write(output, seen)
+      if terminal? and options.json != "-", do: progress(seen)
+    end
+
+    result =
+      Blobs.run(
+        options.source,
+        colours,
+        report,
+        Map.to_list(Map.take(options, [:every, :frames]))
+      )
+
+    if terminal?, do: IO.write(:stderr, "\r\e[K")
+    result
+  end
+
+  defp open(nil), do: {:ok, :table}
+  defp open("-"), do: {:ok, :stdio}
+
+  defp open(path) do
+    case File.open(path, [:write, :delayed_write]) do
+      {:ok, file} -> {:ok, {:file, file}}
+      {:error, reason} -> {:error, "#{path}: #{:file.format_error(reason)}"}
+    end
+  end
+
+  defp write(:table, seen), do: IO.write(Report.table(seen))
+  defp write(:stdio, seen), do: IO.write([Report.json(seen), ?\n])
+  defp write({:file, file}, seen), do: IO.binwrite(file, [Report.json(seen), ?\n])
+
+  defp close({:file, file}), do: File.close(file)
+  defp close(_output), do: :ok
+
+  defp progress(seen) do
+    if rem(seen.number, 10) == 0,
+      do:
+        IO.write(
+          :stderr,
+          "\rframe #{seen.number}, #{Report.count(length(seen.blobs), "blob")}\e[K"
+        )
+  end
+
+  defp draw(nil, _last, _colours), do: :ok
+  defp draw(_path, nil, _colours), do: {:error, "no frame to draw into"}
+  defp draw(path, last, colours), do: Picture.write(path, last.frame, last.blobs, colours)
+
+  defp conclude(%{json: "-"}, _summary), do: :ok
+
+  defp conclude(options, summary) do
+    written = for path <- [options.json, options.picture], path != nil, do: ", #{path} written"
+    frames = Report.count(summary.frames, "frame")
+    Mix.shell().info("#{frames}, #{Report.count(summary.blobs, "blob")}#{written}")
+  end
+end

@@ -1,0 +1,97 @@
+defmodule Vision.Blobs do
+  @moduledoc """
+  Finds the blobs in each frame of a picture, video, stream or camera: what `mix blobs` does.
+  """
+  alias Hal.Camera.{FFmpeg, Source}
+  alias Hal.Frame
+  alias Vision.{Blob, Colours}
+
+  @typedoc "One frame that was looked at; `at_s` counts from the first frame."
+  @type seen :: %{
+          number: non_neg_integer(),
+          at_s: float(),
+          frame: Frame.t(),
+          blobs: [Blob.t()]
+        }
+  @type summary :: %{frames: non_neg_integer(), blobs: non_neg_integer(), last: seen() | nil}
+
+  @patience_ms 10_000
+
+  @doc """
+  Looks at the frames of `source` and calls `report` with each `t:seen/0`.
+
+  Options: `:every` (1) looks at each n-th frame only; `:frames` (no limit) ends after so many
+  looked at; `:patience_ms` (10,000) is the longest wait for a frame.
+
+  A file gives each of its frames, as fast as they are looked at; a device or stream the newest.
+  The error is one line. A source that ends after at least one frame is no error.
+  """
+  @spec run(String.t(), Colours.t(), (seen() -> term()), keyword()) ::
+          {:ok, summary()} | {:error, String.t()}
+  def run(source, %Colours{} = colours, report, options \\ []) do
+    options = Keyword.validate!(options, every: 1, frames: nil, patience_ms: @patience_ms)
+    job = Map.merge(Map.new(options), %{source: source, colours: colours, report: report})
+
+    # A process of its own has a mailbox of its own, and its end closes the camera.
+    fn -> look(job) end |> Task.async() |> Task.await(:infinity)
+  end
+
+  defp look(job) do
+    every_frame? = Source.kind(job.source) in [:file, :generator]
+
+    case FFmpeg.init(source: job.source, every: every_frame?) do
+      {:ok, camera} ->
+        next(camera, job, %{number: 0, start_ms: nil, summary: %{frames: 0, blobs: 0, last: nil}})
+
+      {:error, reason} ->
+        {:error, explain(job, reason)}
+    end
+  end
+
+  defp next(camera, %{frames: limit}, %{summary: %{frames: limit} = summary}) do
+    FFmpeg.terminate(camera)
+    {:ok, summary}
+  end
+
+  defp next(camera, job, progress) do
+    {:ok, camera} = FFmpeg.next(camera)
+    wait(camera, job, progress)
+  end
+
+  defp wait(camera, job, progress) do
+    receive do
+      message ->
+        case FFmpeg.handle_message(message, camera) do
+          {:ok, [], camera} -> wait(camera, job, progress)
+          {:ok, [{:frame, frame}], camera} -> next(camera, job, take(frame, job, progress))
+          {:error, :eof, _camera} -> {:ok, progress.summary}
+          {:error, reason, _camera} -> {:error, explain(job, reason)}
+        end
+    after
+      job.patience_ms ->
+        FFmpeg.terminate(camera)
+        {:error, "#{job.source}: no frame for #{job.patience_ms / 1000} s"}
+    end
+  end
+
+  defp take(frame, job, %{number: number, summary: summary} = progress) do
+    start_ms = progress.start_ms || frame.at_ms
+    progress = %{progress | number: number + 1, start_ms: start_ms}
+
+    if rem(number, job.every) == 0 do
+      {:ok, blobs} = Vision.blobs(frame, job.colours)
+      at_s = (frame.at_ms - start_ms) / 1000
+      seen = %{number: number, at_s: at_s, frame: frame, blobs: blobs}
+      job.report.(seen)
+
+      %{
+        progress
+        | summary: %{frames: summary.frames + 1, blobs: summary.blobs + length(blobs), last: seen}
+      }
+    else
+      progress
+    end
+  end
+
+  defp explain(job, reason), do: "#{job.source}: #{FFmpeg.explain(reason)}"
+end

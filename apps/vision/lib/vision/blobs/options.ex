@@ -1,0 +1,148 @@
+defmodule Vision.Blobs.Options do
+  @moduledoc "The command line of `mix blobs`: words in, a checked map or one clear line out."
+
+  @type t :: %{
+          source: String.t(),
+          colours: Path.t(),
+          every: pos_integer(),
+          frames: pos_integer() | nil,
+          json: Path.t() | nil,
+          picture: Path.t() | nil,
+          min_area: pos_integer(),
+          distance: %{String.t() => float()}
+        }
+
+  @switches [
+    colours: :string,
+    every: :integer,
+    frames: :integer,
+    json: :string,
+    picture: :string,
+    min_area: :integer,
+    distance: :keep,
+    help: :boolean
+  ]
+  @most 1_000_000_000
+  # Frames of the endless test picture, unless told otherwise.
+  @test_frames 50
+
+  @doc """
+  Reads the words of the command line.
+
+      iex> {:ok, options} = Vision.Blobs.Options.parse(~w(a.png --colours c.txt --distance Red=0.02))
+      iex> {options.source, options.every, options.distance}
+      {"a.png", 1, %{"Red" => 0.02}}
+      iex> Vision.Blobs.Options.parse(~w(a.png --colors c.txt))
+      {:error, "unknown option --colors; did you mean --colours?"}
+      iex> Vision.Blobs.Options.parse(["--help"])
+      :help
+  """
+  @spec parse([String.t()]) :: {:ok, t()} | :help | {:error, String.t()}
+  def parse(words) do
+    {given, sources, invalid} = OptionParser.parse(words, strict: @switches, aliases: [h: :help])
+
+    cond do
+      given[:help] -> :help
+      invalid != [] -> {:error, invalid |> hd() |> complain()}
+      true -> check(given, sources)
+    end
+  end
+
+  defp check(given, sources) do
+    with {:ok, source} <- one_source(sources),
+         :ok <- needed(given[:colours]),
+         :ok <- positive("--every", given[:every]),
+         :ok <- positive("--frames", given[:frames]),
+         :ok <- positive("--min-area", given[:min_area]),
+         :ok <- picture(given[:picture]),
+         :ok <- writable("--picture", given[:picture]),
+         :ok <- writable("--json", given[:json]),
+         {:ok, distance} <- distances(Keyword.get_values(given, :distance)) do
+      {:ok,
+       %{
+         source: source,
+         colours: given[:colours],
+         every: given[:every] || 1,
+         frames: given[:frames] || if(source == "testsrc", do: @test_frames),
+         json: given[:json],
+         picture: given[:picture],
+         min_area: given[:min_area] || 20,
+         distance: distance
+       }}
+    end
+  end
+
+  defp complain({option, value}) do
+    known = Enum.map(Keyword.keys(@switches), &("--" <> String.replace("#{&1}", "_", "-")))
+
+    cond do
+      option in known and value == nil -> "#{option} needs a value"
+      option in known -> "#{option} cannot be #{inspect(value)}: a whole number is allowed"
+      true -> "unknown option #{option}" <> suggestion(option, known)
+    end
+  end
+
+  defp suggestion(option, known) do
+    best = Enum.max_by(known, &String.jaro_distance(option, &1))
+
+    if String.jaro_distance(option, best) > 0.8,
+      do: "; did you mean #{best}?",
+      else: "; known are #{Enum.join(known, ", ")}"
+  end
+
+  defp one_source([""]), do: one_source([])
+  defp one_source([source]), do: {:ok, source}
+
+  defp one_source([]),
+    do: {:error, "no source: give a picture, video file, stream, /dev/video0 or testsrc"}
+
+  defp one_source(many),
+    do: {:error, "#{length(many)} sources (#{Enum.join(many, ", ")}): one is allowed"}
+
+  defp needed(nil), do: {:error, "--colours FILE is missing: a CMVision colour file"}
+  defp needed(_path), do: :ok
+
+  defp positive(_option, nil), do: :ok
+  defp positive(_option, value) when value in 1..@most, do: :ok
+
+  defp positive(option, value),
+    do: {:error, "#{option} cannot be #{value}: whole numbers from 1 to #{@most} are allowed"}
+
+  defp picture(nil), do: :ok
+
+  defp picture(path) do
+    if String.downcase(Path.extname(path)) in [".png", ".jpg", ".jpeg"],
+      do: :ok,
+      else:
+        {:error, "--picture cannot be #{inspect(path)}: names ending in .png or .jpg are allowed"}
+  end
+
+  defp writable(_option, path) when path in [nil, "-"], do: :ok
+
+  defp writable(option, path) do
+    cond do
+      File.dir?(path) ->
+        {:error, "#{option} cannot be #{inspect(path)}: it is a folder"}
+
+      not File.dir?(Path.dirname(path)) ->
+        {:error, "#{option} #{path}: no folder #{Path.dirname(path)}"}
+
+      true ->
+        :ok
+    end
+  end
+
+  defp distances(texts) do
+    Enum.reduce_while(texts, {:ok, %{}}, fn text, {:ok, distances} ->
+      with [name, number] <- String.split(text, "=", parts: 2),
+           {constant, ""} when constant > 0 <- Float.parse(number) do
+        {:cont, {:ok, Map.put(distances, name, constant)}}
+      else
+        _other ->
+          {:halt,
+           {:error,
+            "--distance cannot be #{inspect(text)}: NAME=K with K above 0 is allowed, as in Yellow=0.0651"}}
+      end
+    end)
+  end
+end

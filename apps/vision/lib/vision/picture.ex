@@ -1,0 +1,80 @@
+defmodule Vision.Picture do
+  @moduledoc """
+  Draws blobs into their frame, for people: a box in the colour's own colour with a dark edge, a
+  cross at the centroid, and a label. The picture is written by ffmpeg.
+  """
+  alias Hal.Frame
+  alias Vision.{Blob, Colours, Pixels, Rgb}
+  alias Vision.Picture.Letters
+
+  @black {0, 0, 0}
+  @white {255, 255, 255}
+
+  @doc "The frame as RGB bytes with the blobs drawn in."
+  @spec draw(Frame.t(), [Blob.t()], Colours.t()) :: binary()
+  def draw(%Frame{width: width} = frame, blobs, %Colours{classes: classes}) do
+    shown = Map.new(classes, &{&1.name, &1.rgb})
+    # Largest last, so that its label stays readable.
+    ink =
+      blobs |> Enum.reverse() |> Enum.flat_map(&strokes(&1, shown[&1.colour], width)) |> Map.new()
+
+    for {yuv, index} <- Enum.with_index(Pixels.yuv(frame)), into: <<>> do
+      place = {rem(index, width), div(index, width)}
+      {r, g, b} = Map.get_lazy(ink, place, fn -> Rgb.from_yuv(yuv) end)
+      <<r, g, b>>
+    end
+  end
+
+  @doc "Writes the picture as PNG or JPEG by the ending of `path`; the error is one line."
+  @spec write(Path.t(), Frame.t(), [Blob.t()], Colours.t()) :: :ok | {:error, String.t()}
+  def write(path, %Frame{} = frame, blobs, %Colours{} = colours) do
+    raw =
+      Path.join(
+        System.tmp_dir!(),
+        "blobs-#{System.pid()}-#{System.unique_integer([:positive])}.rgb"
+      )
+
+    try do
+      File.write!(raw, draw(frame, blobs, colours))
+      encode(raw, path, frame)
+    after
+      File.rm(raw)
+    end
+  end
+
+  defp encode(raw, path, frame) do
+    arguments =
+      ~w(-nostdin -hide_banner -loglevel error -y -f rawvideo -pix_fmt rgb24 -video_size) ++
+        ["#{frame.width}x#{frame.height}", "-i", raw, "-frames:v", "1"] ++
+        ~w(-update 1 -q:v 2) ++ ["file:" <> path]
+
+    case System.cmd("ffmpeg", arguments, stderr_to_stdout: true) do
+      {_words, 0} ->
+        :ok
+
+      {words, _status} ->
+        {:error, "#{path}: #{words |> String.split("\n", trim: true) |> List.last()}"}
+    end
+  end
+
+  defp strokes(%Blob{} = blob, rgb, width) do
+    scale = if width >= 300, do: 2, else: 1
+
+    text =
+      if blob.distance, do: "#{blob.colour} #{Float.round(blob.distance, 2)}m", else: blob.colour
+
+    top = max(blob.top - 7 * scale, 0)
+
+    box(blob.left - 1, blob.top - 1, blob.right + 1, blob.bottom + 1, @black) ++
+      box(blob.left, blob.top, blob.right, blob.bottom, rgb) ++
+      cross(round(blob.x), round(blob.y)) ++
+      Letters.strokes(text, {blob.left, top}, scale, @white, @black)
+  end
+
+  defp box(left, top, right, bottom, rgb) do
+    for(x <- left..right, y <- [top, bottom], do: {{x, y}, rgb}) ++
+      for y <- top..bottom, x <- [left, right], do: {{x, y}, rgb}
+  end
+
+  defp cross(x, y), do: for(d <- -3..3, place <- [{x + d, y}, {x, y + d}], do: {place, @white})
+end
