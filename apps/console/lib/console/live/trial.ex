@@ -37,11 +37,8 @@ defmodule Console.Live.Trial do
   def handle_call(:result, _from, state), do: {:reply, state.module.result(state.trial), state}
 
   def handle_call({:command, command}, _from, state) do
-    with true <- function_exported?(state.module, :command, 2),
-         {:ok, trial} <- state.module.command(state.trial, command) do
-      {:reply, {:ok, "done"}, %{state | trial: trial}}
-    else
-      false -> {:reply, {:error, "this run takes no commands"}, state}
+    case carry_out(command, state) do
+      {:ok, trial} -> {:reply, {:ok, "done"}, %{state | trial: trial}}
       {:error, line} -> {:reply, {:error, line}, state}
     end
   end
@@ -53,6 +50,43 @@ defmodule Console.Live.Trial do
     Process.send_after(self(), :step, next_ms, abs: true)
     {:noreply, %{state | trial: trial, next_ms: next_ms}}
   end
+
+  defp carry_out({:kill, :leader}, %{module: module, trial: trial}) do
+    case module.scene(trial).leader do
+      nil -> {:error, "there is no leader to kill yet"}
+      leader -> {:ok, module.kill(trial, leader)}
+    end
+  end
+
+  defp carry_out({:kill, robot}, %{module: module, trial: trial}) do
+    if robot in module.living(trial),
+      do: {:ok, module.kill(trial, robot)},
+      else: {:error, "#{robot} is dead already"}
+  end
+
+  defp carry_out({:landmark, :none}, _state),
+    do: {:error, "here the landmark can be moved, but not taken away"}
+
+  defp carry_out({:landmark, place}, %{module: module, trial: trial}),
+    do: module.move(trial, place)
+
+  defp carry_out({:formation, {kind, spacing}}, %{module: module, trial: trial}) do
+    {_kind, present} = module.scene(trial).formation
+    {:ok, module.command(trial, :all, {:formation, kind, spacing || present})}
+  end
+
+  defp carry_out({:tell, target, "stop"}, state), do: tell(target, :stop, state)
+  defp carry_out({:tell, target, "start"}, state), do: tell(target, :start, state)
+  defp carry_out(latch, state) when latch in [:estop, :reset], do: tell(:all, latch, state)
+
+  defp carry_out({:tell, _target, text}, _state),
+    do: {:error, "robots on this mission take stop and start, not #{text}"}
+
+  defp tell(:all, command, %{module: module, trial: trial}),
+    do: {:ok, module.command(trial, :all, command)}
+
+  defp tell(robots, command, %{module: module, trial: trial}),
+    do: {:ok, Enum.reduce(robots, trial, &module.command(&2, &1, command))}
 
   defp now, do: System.monotonic_time(:millisecond)
 end

@@ -3,7 +3,7 @@ defmodule Console.Terminal.Table do
   alias Console.Words
   alias Sim.Scene
 
-  @width 31
+  @width 32
 
   @doc "The table's width in characters."
   @spec width() :: pos_integer()
@@ -32,7 +32,7 @@ defmodule Console.Terminal.Table do
   defp rank(%{alive: false}), do: 3
   defp rank(_robot), do: 2
 
-  defp heading, do: [{"  robot  does        off  sees", :dim}]
+  defp heading, do: [{"  robot  does        off  sees %", :dim}]
 
   defp row(robot) do
     [
@@ -70,7 +70,7 @@ defmodule Console.Terminal.Table do
 
   defp sees(%{alive: false}), do: {"", :dim}
   defp sees(%{size_ppm: nil}), do: {"–", :dim}
-  defp sees(%{size_ppm: ppm}), do: {"◆ #{Words.decimals(ppm / 10_000, 1)} %", :landmark}
+  defp sees(%{size_ppm: ppm}), do: {"◆ #{Words.decimals(ppm / 10_000, 1)}", :landmark}
 
   defp name(%{alive: false}), do: :dead
   defp name(%{leader?: true}), do: :leader

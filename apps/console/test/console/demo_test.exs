@@ -1,0 +1,51 @@
+defmodule Console.DemoTest do
+  use ExUnit.Case, async: true
+  import ExUnit.CaptureIO
+  alias Console.{Demo, FakeTrial, Runs}
+
+  defp demo(line) do
+    {status, text} = with_io(fn -> Demo.run(Runs.options(line), FakeTrial) end)
+    {status, text}
+  end
+
+  test "tells each stage once, then the outcome" do
+    {status, text} = demo("--kill mag2@40")
+    assert status == 0
+    lines = String.split(text, "\n", trim: true)
+    assert hd(lines) =~ "6 robots (mag1 to mag3, min1 to min3) in hall, seed 1"
+    assert Enum.count(lines, &(&1 =~ "elected ")) == 1
+    assert Enum.count(lines, &(&1 =~ "killed ")) == 1
+    assert text =~ "In formation"
+    refute text =~ "\e["
+  end
+
+  test "ends with 2 when there is no formation" do
+    assert {2, text} = demo("--landmark none --duration 10")
+    assert text =~ "No formation"
+  end
+
+  test "refuses in one line what the trial refuses" do
+    options = %{Runs.options("") | map: "nowhere"}
+
+    assert capture_io(:stderr, fn -> assert Demo.run(options, FakeTrial) == 1 end) ==
+             "demo: the map \"nowhere\" cannot be read\n"
+  end
+
+  @tag :tmp_dir
+  test "writes report and picture", %{tmp_dir: folder} do
+    json = Path.join(folder, "run.json")
+    svg = Path.join(folder, "run.svg")
+    assert {0, text} = demo("--json #{json} --picture #{svg}")
+    assert text =~ "Wrote #{json}"
+    assert File.read!(json) =~ ~s({"version":")
+    assert File.read!(svg) =~ "<svg"
+  end
+
+  test "with --json - the standard output is the report alone" do
+    told = capture_io(:stderr, fn -> send(self(), demo("--json -")) end)
+    assert_received {0, text}
+    assert [json] = String.split(text, "\n", trim: true)
+    assert json =~ ~r/^\{"version".*\}$/
+    assert told =~ "elected"
+  end
+end
