@@ -1,13 +1,48 @@
 defmodule Robot.Behaviour.Avoid do
-  @moduledoc false
+  @moduledoc """
+  Lets another behaviour run, and bends or slows what it wishes so that nobody is touched (R85).
+
+  A wish with a velocity is bent: round standing robots and discs on the shortest way
+  (`Robot.Detour`), past moving ones by `Robot.Orca`, a little to the right of those who come, and
+  away from what only the sonars see. A wish without one is only slowed down (`.Brake`).
+  Who gets no nearer for some seconds steps aside (`.Progress`). A robot with nobody
+  about gets its wish unchanged.
+
+  Options: `inner`, the behaviour (required); `discs`, `[{x, y, radius}]` in the map frame, metres:
+  further standing things.
+  """
   @behaviour Robot.Behaviour
-  alias Robot.Behaviour
+  alias Hal.{Pose, Twist}
+  alias Robot.{Behaviour, Detour, Orca, Percept, Steering, Wish}
+  alias Robot.Behaviour.Avoid.{Brake, Neighbours, Progress}
+  alias Robot.Behaviour.Options
+
+  # Metres kept to others: by plan round standing ones, and by reaction to standing and moving ones.
+  @detour_margin 0.1
+  @standing_margin 0.06
+  @moving_margin 0.12
+  @tightest 0.03
+  @horizon_s 2.5
+  @standing_horizon_s 1.2
+  @to_the_right :math.pi() / 12
 
   @impl Behaviour
   def new(options) do
     options = Keyword.validate!(options, [:inner, discs: []])
-    {__MODULE__, %{inner: options[:inner], discs: options[:discs]}}
+
+    state = %{
+      inner: Options.check!(options, :inner, &match?({_, _}, &1), "a behaviour"),
+      discs: Options.check!(options, :discs, &discs?/1, "[{x, y, radius}]"),
+      progress: nil
+    }
+
+    {__MODULE__, state}
   end
+
+  defp discs?(list) when is_list(list),
+    do: Enum.all?(list, &match?({x, y, r} when is_number(x) and is_number(y) and r > 0, &1))
+
+  defp discs?(_), do: false
 
   @impl Behaviour
   def update(options, state) do
@@ -18,8 +53,172 @@ defmodule Robot.Behaviour.Avoid do
   @impl Behaviour
   def tick(percept, state) do
     case Behaviour.tick(state.inner, percept) do
-      {:running, wish, inner} -> {:running, wish, {__MODULE__, %{state | inner: inner}}}
-      done -> done
+      {:running, wish, inner} ->
+        {wish, state} = safe(wish, percept, %{state | inner: inner})
+        {:running, wish, {__MODULE__, state}}
+
+      done ->
+        done
     end
   end
+
+  defp safe(nil, _percept, state), do: {nil, state}
+  defp safe(wish, %Percept{pose: nil}, state), do: {wish, state}
+
+  defp safe(%Wish{velocity: nil} = wish, percept, state) do
+    robots = percept |> Neighbours.robots() |> Neighbours.near()
+    {brake(wish, wish.twist, percept, robots), state}
+  end
+
+  defp safe(%Wish{velocity: {vx, vy}} = wish, percept, state) do
+    speed = :math.sqrt(vx * vx + vy * vy)
+
+    if speed < 0.02,
+      do: {wish, %{state | progress: nil}},
+      else: bend(wish, speed, percept, state)
+  end
+
+  defp bend(wish, speed, percept, state) do
+    all = Neighbours.robots(percept)
+    robots = Neighbours.near(all)
+    bodies = Enum.map(all, fn %{at: {x, y}, radius: radius} -> {x, y, radius} end)
+    things = Neighbours.unknown(percept, bodies ++ state.discs)
+    way = way(wish, percept, all, state.discs)
+
+    {aside, progress} =
+      Progress.note(state.progress, length_of(way, percept), percept.robot, percept.at_ms)
+
+    preferred =
+      wish.velocity
+      |> toward(way, wish, speed, percept)
+      |> keep_right(aside, way, robots, percept)
+
+    planes = planes(percept, robots, things ++ standing(state.discs, percept))
+    velocity = Orca.solve(planes, preferred, percept.profile.max_linear)
+    twist = twist(wish, velocity, preferred, percept)
+    {brake(wish, twist, percept, robots), %{state | progress: progress}}
+  end
+
+  # The corners of the way round what stands; where there is none, the straight one.
+  defp way(%Wish{goal: nil}, _percept, _robots, _discs), do: nil
+
+  defp way(%Wish{goal: goal}, percept, robots, discs) do
+    from = Pose.point(percept.pose)
+    fixed = for %{fixed?: true, at: {x, y}, radius: r} <- robots, do: {x, y, r}
+
+    waiting =
+      for %{fixed?: false, standing?: true, at: {x, y}, radius: r} <- robots, do: {x, y, r}
+
+    own = percept.profile.radius
+    round = fn bodies, margin -> Enum.map(bodies, &grow(&1, own, margin, from, goal)) end
+
+    Detour.way(from, goal, round.(waiting ++ fixed ++ discs, @detour_margin)) ||
+      Detour.way(from, goal, round.(waiting ++ fixed ++ discs, @tightest)) ||
+      Detour.way(from, goal, round.(fixed ++ discs, @detour_margin)) || [goal]
+  end
+
+  # A body by its margin larger, unless we or our goal are nearer than that: then as large as may be.
+  defp grow({x, y, radius}, own, margin, from, goal) do
+    tight = own + radius + min(margin, @tightest)
+    room = min(Pose.distance(from, {x, y}), Pose.distance(goal, {x, y})) - 0.01
+    {x, y, (own + radius + margin) |> min(room) |> max(min(tight, room))}
+  end
+
+  defp length_of(nil, _percept), do: nil
+
+  defp length_of(way, percept) do
+    {length, _} =
+      Enum.reduce(way, {0.0, Pose.point(percept.pose)}, fn place, {length, from} ->
+        {length + Pose.distance(from, place), place}
+      end)
+
+    length
+  end
+
+  defp toward(velocity, [_goal], _wish, _speed, _percept), do: velocity
+  defp toward(velocity, nil, _wish, _speed, _percept), do: velocity
+
+  # Round a corner the wished velocity points to the wrong side; its size remains.
+  defp toward(_velocity, [{x, y} | _], _wish, speed, percept) do
+    angle = :math.atan2(y - percept.pose.y, x - percept.pose.x)
+    {speed * :math.cos(angle), speed * :math.sin(angle)}
+  end
+
+  defp keep_right(velocity, aside, _way, _robots, _percept) when aside != nil,
+    do: turn(velocity, aside)
+
+  defp keep_right(velocity, nil, way, robots, percept) do
+    far? = way != nil and Pose.distance(percept.pose, hd(way)) > 1.0
+
+    if far? and Enum.any?(robots, &coming?(&1, velocity, percept)),
+      do: turn(velocity, -@to_the_right),
+      else: velocity
+  end
+
+  # Somebody who moves, is ahead, and gets nearer.
+  defp coming?(%{standing?: true}, _velocity, _percept), do: false
+
+  defp coming?(%{at: {x, y}, velocity: {ox, oy}, gap: gap}, {vx, vy}, percept) do
+    dx = x - percept.pose.x
+    dy = y - percept.pose.y
+
+    gap < 3.0 and dx * vx + dy * vy > 0 and dx * (vx - ox) + dy * (vy - oy) > 0 and
+      ox * vx + oy * vy < 0
+  end
+
+  defp turn({vx, vy}, angle) do
+    c = :math.cos(angle)
+    s = :math.sin(angle)
+    {c * vx - s * vy, s * vx + c * vy}
+  end
+
+  defp standing(discs, percept) do
+    for {x, y, radius} <- discs do
+      gap = Pose.distance(percept.pose, {x, y}) - radius - percept.profile.radius
+      %{at: {x, y}, velocity: {0.0, 0.0}, radius: radius, share: 1.0, standing?: true, gap: gap}
+    end
+  end
+
+  defp planes(percept, robots, things) do
+    at = Pose.point(percept.pose)
+    own = own_velocity(percept)
+    nearest = things |> Enum.filter(&(&1.gap < 1.5)) |> Enum.sort_by(& &1.gap) |> Enum.take(8)
+
+    for %{gap: gap} = other <- nearest ++ robots do
+      margin = if other.standing?, do: @standing_margin, else: @moving_margin
+      horizon_s = if other.standing?, do: @standing_horizon_s, else: @horizon_s
+      # The margin is a wish; only what is nearer than the tightest is pushed away from.
+      margin = max(@tightest, min(margin, gap - 0.01))
+      radius = percept.profile.radius + other.radius + margin
+      Orca.half_plane(at, own, other.at, other.velocity, radius, horizon_s, other.share)
+    end
+  end
+
+  defp own_velocity(%{odometry: %{twist: twist}, pose: pose}),
+    do: {twist.linear * :math.cos(pose.heading), twist.linear * :math.sin(pose.heading)}
+
+  defp own_velocity(_percept), do: {0.0, 0.0}
+
+  defp twist(wish, velocity, preferred, percept) do
+    cond do
+      near?(velocity, wish.velocity) ->
+        wish.twist
+
+      size(velocity) < 0.05 ->
+        # No way now: look already where it will go on.
+        {px, py} = preferred
+        error = Steering.turn_error(:math.atan2(py, px) - percept.pose.heading)
+        Twist.new(0, Steering.turn_rate(error, percept.profile))
+
+      true ->
+        reverse? = wish.reverse? or size(velocity) < 0.15
+        Steering.twist(velocity, percept.pose.heading, percept.profile, reverse: reverse?)
+    end
+  end
+
+  defp near?({ax, ay}, {bx, by}), do: abs(ax - bx) + abs(ay - by) < 1.0e-3
+  defp size({x, y}), do: :math.sqrt(x * x + y * y)
+
+  defp brake(wish, twist, percept, robots),
+    do: %{wish | twist: Brake.twist(twist, percept.pose, percept.profile, robots)}
 end

@@ -1,0 +1,86 @@
+defmodule Robot.Behaviour.Avoid.Brake do
+  @moduledoc """
+  The last look before a speed goes out: would a robot that drives on for a moment and then brakes
+  come too near to anybody, who does the same? If so it drives slower, or not at all. Turning is free. Pure.
+
+  Steering cannot follow a wished velocity at once; this is what makes the difference harmless.
+  """
+  alias Hal.{Pose, Profile, Twist}
+  alias Robot.Behaviour.Avoid.Neighbours
+
+  # How long a decision holds: a tick, the age of what was heard, the lag of wheels.
+  @delay_s 0.35
+  @samples [0.2, 0.4, 0.6, 0.8, 1.0, 1.3]
+  @margin 0.05
+  @parts [1.0, 0.7, 0.45, 0.2]
+
+  @doc "The same speed, or as much of its linear part as is safe."
+  @spec twist(Twist.t(), Pose.t(), Profile.t(), [Neighbours.t()]) :: Twist.t()
+  def twist(%Twist{linear: linear} = twist, _pose, _profile, _neighbours) when linear == 0.0,
+    do: twist
+
+  def twist(%Twist{} = twist, pose, profile, neighbours) do
+    case Enum.filter(neighbours, &(&1.gap < 1.2)) do
+      [] ->
+        twist
+
+      near ->
+        paths = Enum.map(near, &path(&1, pose, profile))
+        part = Enum.find(@parts, 0.0, &safe?(&1 * twist.linear, twist.turn, profile, paths))
+        %{twist | linear: part * twist.linear}
+    end
+  end
+
+  # Where the other will be, relative to this body, at each sample; it brakes too.
+  defp path(%{at: {x, y}, velocity: {vx, vy}, radius: radius}, pose, profile) do
+    dx = x - pose.x
+    dy = y - pose.y
+    c = :math.cos(pose.heading)
+    s = :math.sin(pose.heading)
+    speed = :math.sqrt(vx * vx + vy * vy)
+    bx = c * dx + s * dy
+    by = c * dy - s * dx
+    bvx = c * vx + s * vy
+    bvy = c * vy - s * vx
+
+    places =
+      for t <- @samples do
+        k =
+          if speed > 1.0e-6, do: travelled(speed, t, profile.max_acceleration) / speed, else: 0.0
+
+        {bx + k * bvx, by + k * bvy}
+      end
+
+    limit = profile.radius + radius + @margin
+    {places, limit, :math.sqrt(bx * bx + by * by)}
+  end
+
+  defp safe?(linear, turn, profile, paths) do
+    own =
+      for t <- @samples do
+        s = travelled(abs(linear), t, profile.max_acceleration)
+        s = if linear < 0, do: -s, else: s
+        # Half of the turn made by then: the chord of the arc.
+        angle = turn * min(t, 0.6) / 2
+        {s * :math.cos(angle), s * :math.sin(angle)}
+      end
+
+    Enum.all?(paths, fn {places, limit, now} -> clear?(own, places, min(limit, now + 0.005)) end)
+  end
+
+  defp clear?([], [], _limit), do: true
+
+  defp clear?([{ax, ay} | own], [{bx, by} | other], limit) do
+    dx = ax - bx
+    dy = ay - by
+    dx * dx + dy * dy >= limit * limit and clear?(own, other, limit)
+  end
+
+  # Metres after t seconds: on for the delay, then braking to a stand.
+  defp travelled(speed, t, _braking) when t <= @delay_s, do: speed * t
+
+  defp travelled(speed, t, braking) do
+    brake_s = min(t - @delay_s, speed / braking)
+    speed * @delay_s + speed * brake_s - braking * brake_s * brake_s / 2
+  end
+end
