@@ -15,17 +15,14 @@ defmodule Robot.Hall do
   Runs a fleet of n, leader included, from seeded random starts into a shape behind (or round)
   the holding leader. Options: `shape`, `assign` (:chain or :cost), `limit_s`, `kinds`, `dead` (how many wrecks).
   """
-  def form(n, seed, options) do
+  def form(n, seed, options),
+    do: n |> start(seed, options) |> run(Keyword.get(options, :limit_s, 180) * 1000)
+
+  @doc "The fleet at its start."
+  def start(n, seed, options) do
     :rand.seed(:exsss, {seed, n, 7})
-
-    options =
-      Keyword.merge(
-        [shape: :column, assign: :cost, limit_s: 180, kinds: :mixed, dead: 0, spacing: 1.0],
-        options
-      )
-
-    hall = build(n, options)
-    run(hall, options[:limit_s] * 1000)
+    defaults = [shape: :column, assign: :cost, limit_s: 180, kinds: :mixed, dead: 0, spacing: 1.0]
+    build(n, Keyword.merge(defaults, options))
   end
 
   defp build(n, options) do
@@ -47,7 +44,7 @@ defmodule Robot.Hall do
 
     {poses, _} =
       Enum.map_reduce(tl(ids) ++ wrecks, taken, fn _id, taken ->
-        place = start(taken, min(half_w, 8.0 + n / 6) - 0.6, min(half_h, 6.0 + n / 6) - 0.6)
+        place = free(taken, min(half_w, 8.0 + n / 6) - 0.6, min(half_h, 6.0 + n / 6) - 0.6)
         {place, [{place, 0.3} | taken]}
       end)
 
@@ -107,7 +104,8 @@ defmodule Robot.Hall do
       min_gap: 100.0,
       formed_ms: nil,
       good_ms: nil,
-      tick_us: []
+      tick_us: [],
+      events: []
     }
   end
 
@@ -115,12 +113,12 @@ defmodule Robot.Hall do
   defp profile(:mag), do: Profile.magellan()
   defp profile(:min), do: Profile.atrv_mini()
 
-  defp start(taken, w, h) do
+  defp free(taken, w, h) do
     place = {w * (2 * :rand.uniform() - 1), h * (2 * :rand.uniform() - 1)}
 
     if Enum.all?(taken, fn {t, _} -> Pose.distance(t, place) > 1.0 end),
       do: place,
-      else: start(taken, w, h)
+      else: free(taken, w, h)
   end
 
   defp slots(:column, n, d, _), do: for(k <- 1..(n - 1)//1, do: {{-k * d, 0.0}, 0.0})
@@ -367,6 +365,7 @@ defmodule Robot.Hall do
       | robots: robots,
         touching: touching,
         contacts: hall.contacts + MapSet.size(new),
+        events: for(pair <- new, do: {hall.at_ms, pair}) ++ hall.events,
         min_gap: min_gap
     }
   end
@@ -390,6 +389,7 @@ defmodule Robot.Hall do
       formed_s: hall.formed_ms && hall.formed_ms / 1000,
       contacts: hall.contacts,
       min_gap: Float.round(hall.min_gap, 3),
+      events: hall.events,
       error: Float.round(Enum.sum(errors) / max(length(errors), 1), 3),
       off: for({id, r} <- hall.robots, r.slot, Pose.distance(est(r), r.slot) > 0.25, do: id),
       tick_us: us |> Enum.at(div(length(us), 2)) |> round(),

@@ -96,7 +96,9 @@ defmodule Robot.Behaviour.Avoid do
     planes = planes(percept, robots, things ++ standing(state.discs, percept))
     velocity = Orca.solve(planes, preferred, percept.profile.max_linear)
     twist = twist(wish, velocity, preferred, percept)
-    {brake(wish, twist, percept, robots), %{state | progress: progress}}
+    braked = brake(wish, twist, percept, robots)
+    hindered? = braked.twist != twist or far?(velocity, preferred) or stopped?(percept)
+    {braked, %{state | progress: Progress.hindered(progress, hindered?)}}
   end
 
   # The corners of the way round what stands; where there is none, the straight one.
@@ -216,6 +218,9 @@ defmodule Robot.Behaviour.Avoid do
     end
   end
 
+  defp far?({ax, ay}, {bx, by}), do: abs(ax - bx) + abs(ay - by) > 0.05
+  defp stopped?(%{driving: %{limits: limits}}), do: :near in limits or :bumper in limits
+  defp stopped?(_percept), do: false
   defp near?({ax, ay}, {bx, by}), do: abs(ax - bx) + abs(ay - by) < 1.0e-3
   defp size({x, y}), do: :math.sqrt(x * x + y * y)
 

@@ -6,11 +6,13 @@ defmodule Robot.Behaviour.Avoid.Progress do
   """
 
   @enforce_keys [:best, :since_ms]
-  defstruct @enforce_keys ++ [tries: 0, until_ms: nil, angle: 0.0]
+  defstruct @enforce_keys ++ [seen_ms: 0, hindered?: false, tries: 0, until_ms: nil, angle: 0.0]
 
   @type t :: %__MODULE__{
           best: float(),
           since_ms: integer(),
+          seen_ms: integer(),
+          hindered?: boolean(),
           tries: non_neg_integer(),
           until_ms: integer() | nil,
           angle: float()
@@ -30,6 +32,14 @@ defmodule Robot.Behaviour.Avoid.Progress do
   def note(_progress, nil, _robot, _at_ms), do: {nil, nil}
   def note(nil, left, _robot, at_ms), do: {nil, %__MODULE__{best: left, since_ms: at_ms}}
 
+  # Time in which nobody was in the way is no time without progress: it turned, or its goal runs.
+  def note(%{hindered?: false, until_ms: nil} = progress, left, _robot, at_ms) do
+    waited_ms = max(progress.seen_ms - progress.since_ms, 0)
+
+    {nil,
+     %{progress | best: min(progress.best, left), since_ms: at_ms - waited_ms, seen_ms: at_ms}}
+  end
+
   def note(%{until_ms: until_ms} = progress, left, _robot, at_ms) when until_ms != nil do
     if at_ms < until_ms,
       do: {progress.angle, progress},
@@ -37,6 +47,8 @@ defmodule Robot.Behaviour.Avoid.Progress do
   end
 
   def note(progress, left, robot, at_ms) do
+    progress = %{progress | seen_ms: at_ms}
+
     cond do
       left < progress.best - 1.0 ->
         {nil, %{progress | best: left, since_ms: at_ms, tries: 0}}
@@ -57,4 +69,9 @@ defmodule Robot.Behaviour.Avoid.Progress do
         {angle, %{progress | until_ms: until_ms, angle: angle, tries: progress.tries + 1}}
     end
   end
+
+  @doc "Notes whether somebody was in the way at this tick."
+  @spec hindered(t() | nil, boolean()) :: t() | nil
+  def hindered(nil, _hindered?), do: nil
+  def hindered(progress, hindered?), do: %{progress | hindered?: hindered?}
 end
