@@ -18,10 +18,13 @@ defmodule Robot.Behaviour.Avoid do
   alias Robot.Behaviour.Options
 
   # Metres kept to others: by plan round standing ones, and by reaction to standing and moving ones.
-  @detour_margin 0.1
-  @standing_margin 0.06
-  @moving_margin 0.12
-  @tightest 0.03
+  @detour_margin 0.2
+  @tight_margin 0.1
+  @standing_margin 0.12
+  @moving_margin 0.15
+  @tightest 0.06
+  # A roomy way may be this much longer (metres) than a tight one.
+  @roomy 2.0
   @horizon_s 2.5
   @standing_horizon_s 1.2
   @to_the_right :math.pi() / 12
@@ -86,7 +89,12 @@ defmodule Robot.Behaviour.Avoid do
     way = way(wish, percept, all, state.discs)
 
     {aside, progress} =
-      Progress.note(state.progress, length_of(way, percept), percept.robot, percept.at_ms)
+      Progress.note(
+        state.progress,
+        length_of(way, Pose.point(percept.pose)),
+        percept.robot,
+        percept.at_ms
+      )
 
     preferred =
       wish.velocity
@@ -114,10 +122,25 @@ defmodule Robot.Behaviour.Avoid do
     own = percept.profile.radius
     round = fn bodies, margin -> Enum.map(bodies, &grow(&1, own, margin, from, goal)) end
 
-    Detour.way(from, goal, round.(waiting ++ fixed ++ discs, @detour_margin)) ||
+    roomy(from, goal, round.(waiting ++ fixed ++ discs, @detour_margin), fn ->
+      Detour.way(from, goal, round.(waiting ++ fixed ++ discs, @tight_margin))
+    end) ||
       Detour.way(from, goal, round.(waiting ++ fixed ++ discs, @tightest)) ||
-      Detour.way(from, goal, round.(fixed ++ discs, @detour_margin)) || [goal]
+      Detour.way(from, goal, round.(fixed ++ discs, @tight_margin)) || [goal]
   end
+
+  defp roomy(from, goal, discs, tight) do
+    way = Detour.way(from, goal, discs)
+
+    cond do
+      way == nil -> tight.()
+      length_of(way, from) < Pose.distance(from, goal) + @roomy -> way
+      true -> Enum.min_by([{way, 0.0}, {tight.(), @roomy}], &cost(&1, from)) |> elem(0)
+    end
+  end
+
+  defp cost({nil, _}, _from), do: 1.0e9
+  defp cost({way, extra}, from), do: length_of(way, from) + extra
 
   # A body by its margin larger, unless we or our goal are nearer than that: then as large as may be.
   defp grow({x, y, radius}, own, margin, from, goal) do
@@ -126,11 +149,11 @@ defmodule Robot.Behaviour.Avoid do
     {x, y, (own + radius + margin) |> min(room) |> max(min(tight, room))}
   end
 
-  defp length_of(nil, _percept), do: nil
+  defp length_of(nil, _from), do: nil
 
-  defp length_of(way, percept) do
+  defp length_of(way, from) do
     {length, _} =
-      Enum.reduce(way, {0.0, Pose.point(percept.pose)}, fn place, {length, from} ->
+      Enum.reduce(way, {0.0, from}, fn place, {length, from} ->
         {length + Pose.distance(from, place), place}
       end)
 

@@ -2,8 +2,8 @@ defmodule Robot.Reflex.Body do
   @moduledoc """
   How fast a body may move beside what its sonars see. Pure; points in `base_link`.
 
-  A round body is a disc; one longer than wide is a box for driving, and for turning the circle
-  round its corners matters.
+  For driving every body counts as the circle round its corners; for turning, one longer than wide
+  is a box whose corners may swing into something.
   """
   alias Hal.Profile
 
@@ -56,19 +56,16 @@ defmodule Robot.Reflex.Body do
     :math.sqrt(2 * braking * max(free, 0.0))
   end
 
-  defp gap(%Profile{length: length, width: width} = profile, x, y) do
-    half = if(length == width, do: profile.radius, else: width / 2) + @side
+  # How far it may go until it stands before the point. The circle round its corners stands for
+  # every body: a longer one is a little narrower, but it may turn on its way.
+  defp gap(%Profile{radius: radius}, x, y) do
+    half = radius + @side
 
-    cond do
-      x <= 0 or abs(y) >= half ->
-        1.0e6
-
-      length == width ->
-        ahead = :math.sqrt(half * half - y * y)
-        x - (ahead - @side) - @clearance * ahead / half
-
-      true ->
-        x - length / 2 - @clearance
+    if x <= 0 or abs(y) >= half do
+      1.0e6
+    else
+      ahead = :math.sqrt(half * half - y * y)
+      x - (ahead - @side) - @clearance * ahead / half
     end
   end
 

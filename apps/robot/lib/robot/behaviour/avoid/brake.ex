@@ -11,7 +11,8 @@ defmodule Robot.Behaviour.Avoid.Brake do
   # How long a decision holds: a tick, the age of what was heard, the lag of wheels.
   @delay_s 0.35
   @samples [0.2, 0.4, 0.6, 0.8, 1.0, 1.3]
-  @margin 0.05
+  @margin 0.08
+  @parting 0.02
   @parts [1.0, 0.7, 0.45, 0.2]
 
   @doc "The same speed, or as much of its linear part as is safe."
@@ -65,16 +66,18 @@ defmodule Robot.Behaviour.Avoid.Brake do
         {s * :math.cos(angle), s * :math.sin(angle)}
       end
 
-    Enum.all?(paths, fn {places, limit, now} -> clear?(own, places, min(limit, now + 0.005)) end)
+    Enum.all?(paths, fn {places, limit, now} ->
+      clear?(own, places, min(limit, now), min(limit, now + @parting))
+    end)
   end
 
-  defp clear?([], [], _limit), do: true
+  # Never nearer than the limit; those who already are, no nearer than now, and in the end apart.
+  defp clear?([{ax, ay}], [{bx, by}], _limit, last), do: apart?(ax - bx, ay - by, last)
 
-  defp clear?([{ax, ay} | own], [{bx, by} | other], limit) do
-    dx = ax - bx
-    dy = ay - by
-    dx * dx + dy * dy >= limit * limit and clear?(own, other, limit)
-  end
+  defp clear?([{ax, ay} | own], [{bx, by} | other], limit, last),
+    do: apart?(ax - bx, ay - by, limit) and clear?(own, other, limit, last)
+
+  defp apart?(dx, dy, limit), do: dx * dx + dy * dy >= limit * limit
 
   # Metres after t seconds: on for the delay, then braking to a stand.
   defp travelled(speed, t, _braking) when t <= @delay_s, do: speed * t
