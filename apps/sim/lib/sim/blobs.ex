@@ -9,78 +9,29 @@ defmodule Sim.Blobs do
   @least_area 20
 
   @doc """
-  The blobs a camera sees of these poles, largest first. `noise` is `{seed, robot, step}`, or `nil` for none.
+  The blobs a camera sees of these poles, in the order of the blob finder. `noise` is `{seed, robot, step}`, or `nil` for none.
   """
   @spec see(Sim.Map.t(), Sight.t(), [Sight.pole()], {integer(), integer(), integer()} | nil) ::
           [Blob.t()]
   def see(map, %Sight{} = sight, poles, noise) do
-    poles
-    |> Enum.flat_map(fn pole ->
-      for range <- [Sight.columns(sight, pole)], range, do: {range, pole}
-    end)
-    |> pieces(map, sight)
+    map
+    |> Kernel.look(sight, poles)
+    |> Enum.filter(fn {_column, kind, _top, _bottom, luma} -> luma >= Palette.least_luma(kind) end)
+    |> Enum.chunk_by(&elem(&1, 0))
     |> regions()
-    |> Enum.filter(fn {_kind, pieces} -> area(pieces) >= @least_area end)
     |> Enum.with_index()
     |> Enum.map(fn {region, k} -> blob(region, sight, noise, k) end)
     |> Enum.filter(&(&1.area >= @least_area))
-    |> Enum.sort_by(&(-&1.area))
-  end
-
-  # Columns from the left, each with its visible pieces `{kind, first row, last row}`.
-  defp pieces([], _map, _sight), do: []
-
-  defp pieces(seen, map, sight) do
-    {first, last} =
-      Enum.reduce(seen, {sight.width, 0}, fn {{a, b}, _}, {f, l} -> {min(a, f), max(b, l)} end)
-
-    for column <- first..last//1,
-        here = for({{a, b}, pole} <- seen, column >= a and column <= b, do: pole),
-        here != [],
-        do: {column, column(map, sight, column, here)}
-  end
-
-  defp column(map, sight, column, poles) do
-    {rx, ry} = ray = Sight.direction(sight, column)
-
-    hits = for pole <- poles, depth = Sight.meet(sight, ray, pole), do: {depth, pole}
-
-    case Enum.sort(hits) do
-      [] ->
-        []
-
-      hits ->
-        {farthest, _pole} = List.last(hits)
-        {wall, _axis} = Kernel.wall(map, sight.x, sight.y, rx, ry, farthest)
-        visible(hits, wall, sight, ray, sight.height)
-    end
-  end
-
-  # All stand on the floor, so what is nearer hides everything below its upper edge.
-  defp visible([{depth, {_, _, _, height, kind} = pole} | rest], wall, sight, ray, covered)
-       when depth <= wall do
-    {top, bottom} = Sight.rows(sight, depth, height)
-    bottom = min(bottom, covered - 1)
-    more = visible(rest, wall, sight, ray, min(covered, top))
-
-    if top <= bottom and found?(kind, Sight.shade(sight, ray, depth, pole)),
-      do: [{kind, top, bottom} | more],
-      else: more
-  end
-
-  defp visible(_hits, _wall, _sight, _ray, _covered), do: []
-
-  defp found?(kind, shade) do
-    %{paint: {y, _u, _v}, thresholds: {{least, _most}, _, _}} = Palette.of(kind)
-    y * shade >= least
+    |> Enum.sort_by(&{&1.colour != "YellowLandmark", -&1.area, &1.left, &1.top})
   end
 
   # Pieces that touch from column to column, or in one column, are one region.
   defp regions(columns) do
     {open, closed, _last} =
-      Enum.reduce(columns, {[], [], nil}, fn {column, pieces}, {open, closed, last} ->
+      Enum.reduce(columns, {[], [], nil}, fn [{column, _, _, _, _} | _] = pieces,
+                                             {open, closed, last} ->
         {open, closed} = if last == column - 1, do: {open, closed}, else: {[], open ++ closed}
-        {next, still} = Enum.reduce(pieces, {[], open}, &join(&1, &2, column))
+        {next, still} = Enum.reduce(pieces, {[], open}, &join/2)
         {next, closed ++ still, column}
       end)
 
@@ -88,7 +39,7 @@ defmodule Sim.Blobs do
   end
 
   # A region is `{kind, its rows in the newest column, all its {column, first, last}}`.
-  defp join({kind, top, bottom}, {next, open}, column) do
+  defp join({column, kind, top, bottom, _luma}, {next, open}) do
     touches? = fn {k, rows, _}, gap ->
       k == kind and Enum.any?(rows, fn {t, b} -> t <= bottom + gap and b >= top - gap end)
     end

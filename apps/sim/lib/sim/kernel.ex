@@ -1,18 +1,109 @@
 defmodule Sim.Kernel do
-  @moduledoc "The heavy work of a world: rays."
-  alias Sim.Kernel.Reference
+  @moduledoc """
+  The heavy work of a world: distance fields, sonar rays, camera pictures. In C where the library was
+  built, else in Elixir; both give the same bits, because every operation is an addition,
+  multiplication, division or square root of doubles in the same order.
+  """
+  alias Sim.Kernel.{Native, Reference}
+  alias Sim.{Palette, Sight}
 
-  @typedoc "One robot's sensors: body number, place, cosine and sine of its heading, range limits, geometry."
+  @typedoc "What noise is drawn for; `nil` for none."
+  @type noise :: {seed :: integer(), step :: integer(), robot :: non_neg_integer()} | nil
+
+  @typedoc "A body: place and radius."
+  @type disc :: {float(), float(), float()}
+
+  @typedoc """
+  One robot's sonars: which of the discs it is itself, its place, cosine and sine of its heading, limits
+  of range, and for each sensor 12 doubles: place and the five directions of its cone.
+  """
   @type ring ::
           {index :: non_neg_integer(), x :: float(), y :: float(), cosine :: float(),
            sine :: float(), least :: float(), most :: float(), geometry :: binary()}
 
-  @doc "The sonar ranges of all robots."
-  @spec sonar(Sim.Map.t(), [{float(), float(), float()}], [ring()], {integer(), integer()} | nil) ::
-          [[float()]]
-  defdelegate sonar(map, bodies, rings, noise), to: Reference
+  @typedoc """
+  What a column of a picture shows of one pole: its rows and brightness.
+  """
+  @type piece ::
+          {column :: non_neg_integer(), Palette.kind(), first :: non_neg_integer(),
+           last :: non_neg_integer(), luma :: byte()}
 
-  @doc "How far a ray goes before it meets a wall, and on which side."
-  @spec wall(Sim.Map.t(), float(), float(), float(), float(), float()) :: {float(), 0..2}
-  defdelegate wall(map, x, y, rx, ry, most), to: Reference
+  # More robots than this may take longer than a normal scheduler should be held.
+  @few 32
+
+  @table 4096
+  @widest 4096
+
+  @doc "The field of a plan, one byte a cell, 0 free: see `Sim.Map`."
+  @spec field(binary(), pos_integer(), pos_integer()) :: binary()
+  def field(walls, width, height) when byte_size(walls) == width * height,
+    do: module().field(walls, width, height)
+
+  @doc """
+  The sonar ranges of all rings. Noise is N(0, 0.01 + 0.01 r), for robot and sensor; its robot
+  is each ring's own.
+  """
+  @spec sonar(Sim.Map.t(), [disc()], [ring()], noise()) :: [[float()]]
+  def sonar(map, discs, rings, noise) do
+    packed =
+      for {x, y, r} <- discs,
+          into: <<>>,
+          do: <<x::float-native, y::float-native, r::float-native>>
+
+    sonar(module(), pack(map), packed, rings, narrow(noise))
+  end
+
+  defp sonar(Native, map, discs, rings, noise) when length(rings) <= @few,
+    do: Native.sonar_few(map, discs, rings, noise)
+
+  defp sonar(Native, map, discs, rings, noise), do: Native.sonar_many(map, discs, rings, noise)
+  defp sonar(module, map, discs, rings, noise), do: module.sonar_few(map, discs, rings, noise)
+
+  @doc "The pieces of poles that a camera sees, by columns from the left, the nearest first."
+  @spec look(Sim.Map.t(), Sight.t(), [Sight.pole()]) :: [piece()]
+  def look(map, %Sight{} = sight, poles) do
+    pieces = module().look(pack(map), pack(sight), pack(poles))
+
+    for <<column::16-native, top::16-native, bottom::16-native, kind, luma <- pieces>>,
+      do: {column, Palette.kind(kind), top, bottom, luma}
+  end
+
+  @doc "The bytes of an I420 picture."
+  @spec paint(Sim.Map.t(), Sight.t(), [Sight.pole()], noise()) :: binary()
+  def paint(map, %Sight{} = sight, poles, noise),
+    do: module().paint(pack(map), pack(sight), pack(poles), narrow(noise), tables())
+
+  # A picture's noise: sd 3 for luma, 2 for chroma. A row starts anywhere in the first @table draws.
+  @tables (for {sd, use} <- [{3, 0}, {2, 1}], k <- 0..(@table + @widest - 1), into: <<>> do
+             <<round(sd * Sim.Noise.gauss(Sim.Noise.hash(0, 0x9A17, use, rem(k, @table))))::8-signed>>
+           end)
+
+  @doc "The draws that pictures are blurred with, as `paint` takes them."
+  @spec tables() :: binary()
+  def tables, do: @tables
+
+  @doc "The arguments of the kernels as they take them."
+  @spec pack(Sim.Map.t() | Sight.t() | [Sight.pole()]) :: tuple() | binary()
+  def pack(%Sim.Map{} = map), do: {map.field, map.width, map.height, map.cell}
+
+  def pack(%Sight{} = s),
+    do: {s.x, s.y, s.cosine, s.sine, s.eye, s.focal, s.horizon, s.width, s.height}
+
+  def pack(poles) when is_list(poles) do
+    for {x, y, r, height, kind} <- poles, into: <<>> do
+      %{paint: {luma, u, v}} = Palette.of(kind)
+
+      <<x::float-native, y::float-native, r::float-native, height::float-native,
+        Palette.index(kind), luma, u, v>>
+    end
+  end
+
+  defp narrow(nil), do: nil
+
+  defp narrow({seed, step, robot}) do
+    import Bitwise
+    {seed &&& 0xFFFFFFFF, step &&& 0xFFFFFFFF, robot}
+  end
+
+  defp module, do: if(Native.loaded?(), do: Native, else: Reference)
 end

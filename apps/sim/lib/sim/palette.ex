@@ -47,18 +47,43 @@ defmodule Sim.Palette do
     }
   end
 
-  @doc "The demo's colour file in CMVision's format."
-  @spec file() :: String.t()
-  def file do
-    kinds = Enum.map([:landmark, :robot], &of/1)
+  @kinds [:landmark, :robot]
 
-    colours = for %{rgb: {r, g, b}, name: name} <- kinds, do: "(#{r},#{g},#{b}) 0.5 10 #{name}\n"
+  @doc """
+  The number of a kind in packed arguments, and back.
 
-    thresholds =
-      for %{thresholds: {{yl, yh}, {ul, uh}, {vl, vh}}} <- kinds,
-          do: "(#{yl}:#{yh},#{ul}:#{uh},#{vl}:#{vh})\n"
+      iex> Sim.Palette.kind(Sim.Palette.index(:robot))
+      :robot
+  """
+  @spec index(kind()) :: byte()
+  def index(:landmark), do: 0
+  def index(:robot), do: 1
 
-    IO.iodata_to_binary(["[Colors]\n", colours, "\n[Thresholds]\n", thresholds])
+  @doc "See `index/1`."
+  @spec kind(byte()) :: kind()
+  def kind(0), do: :landmark
+  def kind(1), do: :robot
+
+  @doc "The least brightness at which a kind is still found."
+  @spec least_luma(kind()) :: byte()
+  def least_luma(kind), do: of(kind).thresholds |> elem(0) |> elem(0)
+
+  @doc """
+  All colours, for the blob finder.
+
+      iex> Enum.map(Sim.Palette.colours().classes, & &1.name)
+      ["YellowLandmark", "RedRobot"]
+  """
+  @spec colours() :: Vision.Colours.t()
+  def colours do
+    classes =
+      for kind <- @kinds,
+          %{thresholds: {y, u, v}} = paint = of(kind),
+          do: %{name: paint.name, rgb: paint.rgb, y: y, u: u, v: v}
+
+    distances = Map.new(@kinds, &{of(&1).name, of(&1).constant})
+    {:ok, colours} = Vision.Colours.new(classes, distance: distances)
+    colours
   end
 
   @doc """
@@ -68,6 +93,5 @@ defmodule Sim.Palette do
       nil
   """
   @spec distance(kind(), float()) :: float() | nil
-  def distance(_kind, share) when share > 0.5, do: nil
-  def distance(kind, share), do: :math.sqrt(of(kind).constant / share)
+  def distance(kind, share), do: Vision.distance(of(kind).constant, share)
 end

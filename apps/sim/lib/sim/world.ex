@@ -172,6 +172,28 @@ defmodule Sim.World do
     Blobs.see(world.map, Sight.of(body), poles(world, id), noise)
   end
 
+  @doc "The picture of a robot's camera, where it looks now."
+  @spec frame(t(), id()) :: Hal.Frame.t()
+  def frame(%__MODULE__{} = world, id) do
+    body = Elixir.Map.fetch!(world.robots, id)
+    sight = Sight.of(body)
+    noise = if world.noise != :off, do: {world.seed, world.step, body.index}
+
+    %Hal.Frame{
+      format: :i420,
+      width: sight.width,
+      height: sight.height,
+      bytes: Kernel.paint(world.map, sight, poles(world, id), noise),
+      at_ms: world.at_ms,
+      pan: body.pan,
+      tilt: body.tilt
+    }
+  end
+
+  @doc "The colours of the landmark, `YellowLandmark`, and of robots, `RedRobot`."
+  @spec colours() :: Vision.Colours.t()
+  defdelegate colours, to: Sim.Palette
+
   @doc "Where a robot really is."
   @spec truth(t(), id()) :: Pose.t()
   def truth(%__MODULE__{} = world, id), do: Elixir.Map.fetch!(world.robots, id).pose
@@ -309,10 +331,12 @@ defmodule Sim.World do
     rings =
       for %Body{pose: pose, profile: profile} = body <- living do
         {c, s} = Sim.Trig.cos_sin(pose.heading)
-        {body.index, pose.x, pose.y, c, s, profile.sonar_min, profile.sonar_max, body.geometry}
+
+        {body.index, pose.x, pose.y, c, s, profile.sonar_min * 1.0, profile.sonar_max * 1.0,
+         body.geometry}
       end
 
-    noise = if world.noise != :off, do: {world.seed, world.step}
+    noise = if world.noise != :off, do: {world.seed, world.step, 0}
 
     living
     |> Enum.zip(Kernel.sonar(world.map, discs, rings, noise))

@@ -3,6 +3,7 @@ defmodule Sim.DocTest do
   doctest Sim.Map
   doctest Sim.Noise
   doctest Sim.Palette
+  doctest Sim.Scene
   doctest Sim.Radio
   doctest Sim.Trig
 end

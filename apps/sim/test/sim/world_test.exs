@@ -134,7 +134,7 @@ defmodule Sim.WorldTest do
     focal = 160 / :math.tan(:math.pi() / 6)
     assert_in_delta :math.atan((159.5 - blob.x) / focal), :math.atan(0.5 / 4), 0.01
     hidden = world([robot(:mag1, 0, 0), robot(:mag2, 2, 0.25)], landmark: {4.0, 0.5})
-    assert [%{colour: "RedRobot"}, behind] = World.blobs(hidden, :mag1)
+    assert [behind, %{colour: "RedRobot"}] = World.blobs(hidden, :mag1)
     assert behind.area < 0.7 * blob.area
     assert behind.top == blob.top and behind.bottom < blob.bottom
   end

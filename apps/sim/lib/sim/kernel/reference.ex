@@ -1,150 +1,147 @@
 defmodule Sim.Kernel.Reference do
-  @moduledoc "What the kernels mean, in plain Elixir: every operation and its order is the same in C."
+  @moduledoc """
+  What the kernels mean, in plain Elixir, with the arguments of `Sim.Kernel.Native`. Every operation and
+  its order is the same in C. Pure.
+  """
+  alias Sim.Kernel.{Columns, Rays}
   alias Sim.Noise
 
-  @rays 5
+  @doc "See `Sim.Kernel.field/3`. Two sweeps: from below and the left, from above and the right."
+  @spec field(binary(), pos_integer(), pos_integer()) :: binary()
+  def field(walls, width, _height) do
+    rows =
+      for <<row::binary-size(width) <- walls>>,
+        do: for(<<cell <- row>>, do: if(cell == 0, do: 255, else: 0))
+
+    edge = List.duplicate(0, width)
+    down = rows |> sweep(edge) |> Enum.map(&Enum.reverse/1)
+    # The second sweep runs over the plan turned by half a turn.
+    down
+    |> Enum.reverse()
+    |> sweep(edge)
+    |> Enum.map(&Enum.reverse/1)
+    |> Enum.reverse()
+    |> IO.iodata_to_binary()
+  end
+
+  defp sweep(rows, edge) do
+    {rows, _last} =
+      Enum.map_reduce(rows, edge, fn row, before ->
+        row = sweep_row(row, [0 | before], 0)
+        {row, row}
+      end)
+
+    rows
+  end
+
+  defp sweep_row([], _before, _last), do: []
+
+  defp sweep_row([value | row], [a | [b | after_b] = before], last) do
+    c = if after_b == [], do: 0, else: hd(after_b)
+    value = min(value, min(last, min(a, min(b, c))) + 1)
+    [value | sweep_row(row, before, value)]
+  end
 
   @doc "See `Sim.Kernel.sonar/4`."
-  @spec sonar(
-          Sim.Map.t(),
-          [{float(), float(), float()}],
-          [Sim.Kernel.ring()],
-          {integer(), integer()} | nil
-        ) :: [[float()]]
-  def sonar(map, bodies, rings, noise), do: Enum.map(rings, &ring(map, bodies, &1, noise))
+  @spec sonar_few(tuple(), binary(), [Sim.Kernel.ring()], Sim.Kernel.noise()) :: [[float()]]
+  def sonar_few(map, discs, rings, noise) do
+    discs = for <<x::float-native, y::float-native, r::float-native <- discs>>, do: {x, y, r}
 
-  defp ring(map, bodies, {index, x, y, c, s, least, most, geometry}, noise) do
-    others = List.delete_at(bodies, index)
-    ring = {map, others, index, x, y, c, s, least, most, noise}
-    sensors(geometry, 0, ring)
-  end
+    Enum.map(rings, fn {index, _x, _y, _c, _s, least, most, geometry} = ring ->
+      others = List.delete_at(discs, index)
 
-  defp sensors(<<>>, _k, _ring), do: []
-
-  defp sensors(
-         <<sx::float-native, sy::float-native, rays::binary-size(80), rest::binary>>,
-         k,
-         {map, others, index, x, y, c, s, least, most, noise} = ring
-       ) do
-    ox = x + c * sx - s * sy
-    oy = y + s * sx + c * sy
-    near = near(others, ox, oy, most)
-    range = cone(rays, @rays, map, near, ox, oy, c, s, most)
-    [blur(range, noise, index, k, least, most) | sensors(rest, k + 1, ring)]
-  end
-
-  defp cone(_rays, 0, _map, _near, _ox, _oy, _c, _s, best), do: best
-
-  defp cone(
-         <<dx::float-native, dy::float-native, rest::binary>>,
-         n,
-         map,
-         near,
-         ox,
-         oy,
-         c,
-         s,
-         best
-       ) do
-    rx = c * dx - s * dy
-    ry = s * dx + c * dy
-    best = discs(near, rx, ry, best)
-    {t, _axis} = wall(map, ox, oy, rx, ry, best)
-    cone(rest, n - 1, map, near, ox, oy, c, s, min(t, best))
-  end
-
-  # Discs as seen from a sensor: offset, and squared distance to their edge.
-  defp near(discs, ox, oy, most) do
-    for {bx, by, r} <- discs,
-        mx = bx - ox,
-        my = by - oy,
-        m2 = mx * mx + my * my,
-        m2 <= (most + r) * (most + r),
-        do: {mx, my, m2 - r * r}
-  end
-
-  defp discs([], _rx, _ry, best), do: best
-
-  defp discs([{mx, my, c2} | rest], rx, ry, best) do
-    b = mx * rx + my * ry
-    under = b * b - c2
-
-    best =
-      cond do
-        c2 <= 0.0 -> 0.0
-        b <= 0.0 or under < 0.0 -> best
-        true -> min(best, b - :math.sqrt(under))
+      for {<<sensor::binary-size(96)>>, k} <- Enum.with_index(chunks(geometry)) do
+        map |> Rays.sensor(others, ring, sensor) |> blur(noise, index, k, least, most)
       end
-
-    discs(rest, rx, ry, best)
+    end)
   end
 
-  @doc """
-  How far a ray goes before it meets a wall, as a multiple of its direction, at most `most`; and
-  whether it met a side that looks along x (0) or y (1), or none (2).
+  defp chunks(geometry), do: for(<<sensor::binary-size(96) <- geometry>>, do: sensor)
 
-  In a cell whose nearest wall is d steps away, the square of d - 1 cells round it is free: the
-  ray goes on to the edge of that square. Each jump crosses at least one cell along one axis and never goes back.
-  """
-  @spec wall(Sim.Map.t(), float(), float(), float(), float(), float()) :: {float(), 0..2}
-  def wall(map, x, y, rx, ry, most) do
-    px = x + map.width * map.cell / 2
-    py = y + map.height * map.cell / 2
-    ix = if abs(rx) < 1.0e-12, do: 0.0, else: 1.0 / rx
-    iy = if abs(ry) < 1.0e-12, do: 0.0, else: 1.0 / ry
-    ray = {map.field, map.width, map.height, map.cell, px, py, rx, ry, ix, iy, most}
-    march(ray, floor(px / map.cell), floor(py / map.cell), 0.0, 2)
+  defp blur(range, {seed, step, _robot}, index, k, least, most) when range < most do
+    g = Noise.gauss(Noise.hash(seed, step, index, k))
+    (range + (0.01 + 0.01 * range) * g) |> max(least) |> min(most)
   end
 
-  defp march({field, w, h, cell, px, py, rx, ry, ix, iy, most} = ray, i, j, t, axis) do
-    d = if i < 0 or j < 0 or i >= w or j >= h, do: 0, else: :binary.at(field, j * w + i)
+  defp blur(range, _noise, _index, _k, least, most), do: range |> max(least) |> min(most)
 
-    if d == 0 do
-      {t, axis}
-    else
-      tx = leave(ix, i, d, cell, px)
-      ty = leave(iy, j, d, cell, py)
+  @doc "See `Sim.Kernel.look/3`: pieces of 8 bytes."
+  @spec look(tuple(), tuple(), binary()) :: binary()
+  def look(map, sight, poles) do
+    poles = Columns.poles(sight, poles)
 
-      cond do
-        min(tx, ty) >= most ->
-          {most, 2}
+    for column <- 0..(elem(sight, 7) - 1),
+        {_wall, pieces} = Columns.column(map, sight, poles, column, :poles),
+        {top, bottom, {kind, _, _, _}, luma} <- pieces,
+        into: <<>>,
+        do: <<column::16-native, top::16-native, bottom::16-native, kind, luma>>
+  end
 
-        tx <= ty ->
-          tx = max(tx, t)
-          march(ray, beyond(ix, i, d), aside(iy, ry, py, j, d, cell, tx), tx, 0)
+  @doc "See `Sim.Kernel.paint/4`."
+  @spec paint(tuple(), tuple(), binary(), Sim.Kernel.noise(), binary()) :: binary()
+  def paint(map, {_, _, _, _, _, _, _, width, height} = sight, poles, noise, tables) do
+    poles = Columns.poles(sight, poles)
+    columns = for u <- 0..(width - 1), do: Columns.column(map, sight, poles, u, :walls)
+    half = Enum.take_every(columns, 2)
+    size = div(byte_size(tables), 2)
+    <<luma::binary-size(size), chroma::binary>> = tables
 
-        true ->
-          ty = max(ty, t)
-          march(ray, aside(ix, rx, px, i, d, cell, ty), beyond(iy, j, d), ty, 1)
-      end
+    [
+      for(v <- 0..(height - 1), do: row(columns, v, height, noise, 0x40000 + v, luma)),
+      for(v <- 0..(div(height, 2) - 1), do: tint(half, v, 1, noise, 0x50000 + v, chroma)),
+      for(v <- 0..(div(height, 2) - 1), do: tint(half, v, 2, noise, 0x60000 + v, chroma))
+    ]
+    |> IO.iodata_to_binary()
+  end
+
+  defp row(columns, v, height, noise, use, table) do
+    ceiling = 185 - div(20 * v, height)
+    ground = 75 + div(45 * v, height)
+    draws = draws(noise, use, table)
+
+    for {{{top, bottom, wall}, pieces}, u} <- Enum.with_index(columns), into: <<>> do
+      base =
+        case piece(pieces, v) do
+          {_, _, _, luma} -> luma
+          nil when v < top -> ceiling
+          nil when v <= bottom -> wall
+          nil -> ground
+        end
+
+      <<base + draws.(u)>>
     end
   end
 
-  # When the ray leaves the free square along one axis.
-  defp leave(inverse, _i, _d, _cell, _p) when inverse == 0.0, do: 1.0e30
-  defp leave(inverse, i, d, cell, p) when inverse > 0.0, do: ((i + d) * cell - p) * inverse
-  defp leave(inverse, i, d, cell, p), do: ((i - d + 1) * cell - p) * inverse
+  # The darker, the greyer.
+  defp tint(columns, v, channel, noise, use, table) do
+    draws = draws(noise, use, table)
 
-  defp beyond(inverse, i, d) when inverse > 0.0, do: i + d
-  defp beyond(_inverse, i, d), do: i - d
+    for {{_room, pieces}, u} <- Enum.with_index(columns), into: <<>> do
+      base =
+        case piece(pieces, 2 * v) do
+          nil ->
+            128
 
-  # The cell along the other axis: inside the free square, and never backwards.
-  defp aside(inverse, _r, _p, j, _d, _cell, _t) when inverse == 0.0, do: j
+          {_top, _bottom, {_kind, paint, _, _} = kind, luma} ->
+            full = max(paint, 1)
+            128 + div((elem(kind, channel + 1) - 128) * (luma + full), 2 * full)
+        end
 
-  defp aside(inverse, r, p, j, d, cell, t) when inverse > 0.0,
-    do: floor((p + r * t) / cell) |> max(j) |> min(j + d - 1)
+      <<base + draws.(u)>>
+    end
+  end
 
-  defp aside(_inverse, r, p, j, d, cell, t),
-    do: floor((p + r * t) / cell) |> min(j) |> max(j - d + 1)
+  defp piece(pieces, v),
+    do: Enum.find(pieces, fn {top, bottom, _, _} -> v >= top and v <= bottom end)
 
-  defp blur(range, nil, _index, _k, least, most), do: range |> max(least) |> min(most)
+  defp draws(nil, _use, _table), do: fn _u -> 0 end
 
-  defp blur(range, {seed, step}, index, k, least, most) do
-    if range < most do
-      g = Noise.gauss(Noise.hash(seed, step, index, k))
-      (range + (0.01 + 0.01 * range) * g) |> max(least) |> min(most)
-    else
-      most
+  defp draws({seed, step, robot}, use, table) do
+    start = rem(Noise.hash(seed, step, robot, use), 4096)
+
+    fn u ->
+      <<_::binary-size(start + u), draw::8-signed, _::binary>> = table
+      draw
     end
   end
 end

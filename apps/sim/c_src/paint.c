@@ -1,0 +1,238 @@
+/* Camera pictures: columns of floor, wall and ceiling, poles before them, and noise. */
+#include <math.h>
+#include <string.h>
+
+#include "kernel.h"
+
+#define NEAREST 0.01
+#define FARTHEST 1.0e6
+#define WALL_HEIGHT 2.5
+/* The lamp rides beside the camera, 12 degrees to its left. */
+#define LAMP_COSINE 0.9781476007338057
+#define LAMP_SINE 0.20791169081775934
+
+static inline int64_t floored(double x)
+{
+    int64_t i = (int64_t)x;
+    return i - (x < (double)i);
+}
+
+static inline int64_t ceiled(double x)
+{
+    int64_t i = (int64_t)x;
+    return i + (x > (double)i);
+}
+
+static inline int64_t clamped(int64_t value, int64_t least, int64_t most)
+{
+    return value < least ? least : value > most ? most : value;
+}
+
+/* The columns a pole can cover, rather too many than too few. */
+static sim_span columns(const sim_sight *sight, const sim_pole *pole)
+{
+    double dx = pole->x - sight->x, dy = pole->y - sight->y, r = pole->radius;
+    double depth = sight->cosine * dx + sight->sine * dy;
+    double side = sight->cosine * dy - sight->sine * dx;
+    double middle = (double)(sight->width - 1) / 2;
+
+    if (depth <= -r)
+        return (sim_span){1, 0};
+    if (depth <= 2 * r)
+        return (sim_span){0, sight->width - 1};
+    double left = middle - sight->focal * ((side + r) / (side + r < 0.0 ? depth + r : depth - r));
+    double right = middle - sight->focal * ((side - r) / (side - r < 0.0 ? depth - r : depth + r));
+    return (sim_span){clamped(floored(left) - 1, 0, sight->width),
+                      clamped(ceiled(right) + 1, -1, sight->width - 1)};
+}
+
+/* The depth at which a ray meets a pole, negative where it does not. */
+static double meet(const sim_sight *sight, const sim_pole *pole, double rx, double ry)
+{
+    double mx = pole->x - sight->x, my = pole->y - sight->y, r = pole->radius;
+    double a = rx * rx + ry * ry, b = mx * rx + my * ry;
+    double under = b * b - a * (mx * mx + my * my - r * r);
+    if (!(b > 0.0 && under >= 0.0))
+        return -1.0;
+    double t = (b - sqrt(under)) / a;
+    return t < NEAREST ? NEAREST : t;
+}
+
+static uint8_t luma(const sim_sight *sight, const sim_pole *pole, double rx, double ry,
+                    double depth)
+{
+    double nx = (sight->x + rx * depth - pole->x) / pole->radius;
+    double ny = (sight->y + ry * depth - pole->y) / pole->radius;
+    double length = sqrt(rx * rx + ry * ry);
+    double lx = (ry * LAMP_SINE - rx * LAMP_COSINE) / length;
+    double ly = (0.0 - rx * LAMP_SINE - ry * LAMP_COSINE) / length;
+    double shade = 0.6 + 0.4 * (nx * lx + ny * ly);
+    return (uint8_t)clamped((int64_t)(pole->paint[0] * shade + 0.5), 0, 255);
+}
+
+static void ray(const sim_sight *sight, int64_t column, double *rx, double *ry)
+{
+    double k = ((double)(sight->width - 1) / 2 - (double)column) / sight->focal;
+    *rx = sight->cosine - sight->sine * k;
+    *ry = sight->sine + sight->cosine * k;
+}
+
+/* The poles that a column's ray meets, nearest first. */
+static size_t meet_all(const sim_sight *sight, const sim_pole *poles, size_t count, int64_t column,
+                       double rx, double ry, const sim_scratch *scratch)
+{
+    size_t found = 0;
+
+    for (size_t k = 0; k < count; k++) {
+        if (column < scratch->spans[k].first || column > scratch->spans[k].last)
+            continue;
+        double depth = meet(sight, poles + k, rx, ry);
+        if (depth < 0.0)
+            continue;
+        size_t n = found++;
+        for (; n > 0 && scratch->hits[n - 1].depth > depth; n--)
+            scratch->hits[n] = scratch->hits[n - 1];
+        scratch->hits[n] = (sim_hit){depth, (uint32_t)k};
+    }
+    return found;
+}
+
+/* All stand on the floor, so what is nearer hides everything below its upper edge. */
+static size_t cut(const sim_sight *sight, const sim_pole *poles, size_t found, double wall,
+                  int64_t column, double rx, double ry, const sim_scratch *scratch, size_t made)
+{
+    int64_t covered = sight->height;
+
+    for (size_t k = 0; k < found && covered > 0 && scratch->hits[k].depth <= wall; k++) {
+        const double depth = scratch->hits[k].depth;
+        const sim_pole *pole = poles + scratch->hits[k].pole;
+        int64_t top = ceiled(sight->horizon - sight->focal * (pole->height - sight->eye) / depth);
+        int64_t bottom = floored(sight->horizon + sight->focal * sight->eye / depth);
+        top = top < 0 ? 0 : top;
+        bottom = bottom > covered - 1 ? covered - 1 : bottom;
+        if (top <= bottom) {
+            scratch->pieces[made++] =
+                (sim_piece){(uint16_t)column, (uint16_t)top, (uint16_t)bottom, pole->kind,
+                            luma(sight, pole, rx, ry, depth)};
+            covered = top;
+        }
+    }
+    return made;
+}
+
+size_t sim_look(const sim_map *map, const sim_sight *sight, const sim_pole *poles, size_t count,
+                const sim_scratch *scratch)
+{
+    int64_t first = sight->width, last = -1;
+    size_t made = 0;
+
+    for (size_t k = 0; k < count; k++) {
+        sim_span span = scratch->spans[k] = columns(sight, poles + k);
+        if (span.first <= span.last) {
+            first = span.first < first ? span.first : first;
+            last = span.last > last ? span.last : last;
+        }
+    }
+    for (int64_t column = first; column <= last; column++) {
+        double rx, ry;
+        int axis;
+        ray(sight, column, &rx, &ry);
+        size_t found = meet_all(sight, poles, count, column, rx, ry, scratch);
+        if (found > 0) {
+            double far = scratch->hits[found - 1].depth;
+            double wall = sim_wall(map, sight->x, sight->y, rx, ry, far, &axis);
+            made = cut(sight, poles, found, wall, column, rx, ry, scratch, made);
+        }
+    }
+    return made;
+}
+
+static void blur(uint8_t *restrict plane, int64_t width, int64_t height, const sim_noise *noise,
+                 uint32_t first, const int8_t *restrict table)
+{
+    for (int64_t v = 0; v < height; v++, plane += width) {
+        const int8_t *restrict draws =
+            table + sim_hash(noise->seed, noise->step, noise->robot, first + (uint32_t)v) %
+                        SIM_TABLE;
+        for (int64_t u = 0; u < width; u++)
+            plane[u] = (uint8_t)(plane[u] + draws[u]);
+    }
+}
+
+static void room(const sim_sight *sight, const sim_scratch *scratch, uint8_t *restrict picture)
+{
+    const int16_t *restrict tops = scratch->tops, *restrict bottoms = scratch->bottoms;
+    const uint8_t *restrict lumas = scratch->lumas;
+
+    for (int64_t v = 0; v < sight->height; v++, picture += sight->width) {
+        const uint8_t ceiling = (uint8_t)(185 - 20 * v / sight->height);
+        const uint8_t ground = (uint8_t)(75 + 45 * v / sight->height);
+        const int16_t row = (int16_t)v;
+        for (int64_t u = 0; u < sight->width; u++) {
+            uint8_t below = row <= bottoms[u] ? lumas[u] : ground;
+            picture[u] = row < tops[u] ? ceiling : below;
+        }
+    }
+}
+
+static void put(const sim_sight *sight, const sim_piece *piece, const uint8_t *paint,
+                uint8_t *picture)
+{
+    const int64_t width = sight->width, half = width / 2;
+    uint8_t *u = picture + width * sight->height, *v = u + half * (sight->height / 2);
+
+    for (int64_t row = piece->top; row <= piece->bottom; row++)
+        picture[row * width + piece->column] = piece->luma;
+    if (piece->column % 2 == 0) {
+        /* The darker, the greyer. */
+        int full = paint[0] < 1 ? 1 : paint[0], sum = piece->luma + full;
+        uint8_t cu = (uint8_t)(128 + (paint[1] - 128) * sum / (2 * full));
+        uint8_t cv = (uint8_t)(128 + (paint[2] - 128) * sum / (2 * full));
+        for (int64_t row = (piece->top + 1) / 2; row <= piece->bottom / 2; row++) {
+            u[row * half + piece->column / 2] = cu;
+            v[row * half + piece->column / 2] = cv;
+        }
+    }
+}
+
+void sim_paint(const sim_map *map, const sim_sight *sight, const sim_pole *poles, size_t count,
+               const sim_noise *noise, const int8_t *tables, const sim_scratch *scratch,
+               uint8_t *picture)
+{
+    const int64_t width = sight->width, height = sight->height;
+    const uint8_t *paints[256] = {0};
+    size_t made = 0;
+
+    for (size_t k = 0; k < count; k++) {
+        scratch->spans[k] = columns(sight, poles + k);
+        paints[poles[k].kind] = poles[k].paint;
+    }
+    for (int64_t column = 0; column < width; column++) {
+        double rx, ry;
+        int axis;
+        ray(sight, column, &rx, &ry);
+        double wall = sim_wall(map, sight->x, sight->y, rx, ry, FARTHEST, &axis);
+        size_t found = meet_all(sight, poles, count, column, rx, ry, scratch);
+        made = cut(sight, poles, found, wall, column, rx, ry, scratch, made);
+
+        wall = wall < NEAREST ? NEAREST : wall;
+        int64_t top = ceiled(sight->horizon - sight->focal * (WALL_HEIGHT - sight->eye) / wall);
+        int64_t bottom = floored(sight->horizon + sight->focal * sight->eye / wall);
+        int64_t dark = (int64_t)(wall * 4);
+        scratch->tops[column] = (int16_t)clamped(top, 0, height);
+        scratch->bottoms[column] = (int16_t)clamped(bottom, -1, height - 1);
+        scratch->lumas[column] =
+            (uint8_t)(150 - (dark > 70 ? 70 : dark) - (axis == 1 ? 14 : 0));
+    }
+    room(sight, scratch, picture);
+    memset(picture + width * height, 128, (size_t)(width * height / 2));
+    for (size_t k = 0; k < made; k++)
+        put(sight, scratch->pieces + k, paints[scratch->pieces[k].kind], picture);
+    if (noise->on) {
+        const int8_t *chroma = tables + SIM_TABLE + SIM_WIDEST;
+        uint8_t *u = picture + width * height, *v = u + width * height / 4;
+        blur(picture, width, height, noise, 0x40000u, tables);
+        blur(u, width / 2, height / 2, noise, 0x50000u, chroma);
+        blur(v, width / 2, height / 2, noise, 0x60000u, chroma);
+    }
+}

@@ -1,0 +1,178 @@
+/* Noise, distance fields, and rays among walls and discs. */
+#include <math.h>
+#include <string.h>
+
+#include "kernel.h"
+
+static uint32_t mix(uint32_t x)
+{
+    x += 0x9E3779B9u;
+    x = (x ^ (x >> 16)) * 0x5BD1E95u;
+    x = (x ^ (x >> 13)) * 0x6C8E9CFu;
+    return x ^ (x >> 16);
+}
+
+uint32_t sim_hash(uint32_t seed, uint32_t a, uint32_t b, uint32_t c)
+{
+    return mix(mix(mix(mix(seed) ^ a) ^ b) ^ c);
+}
+
+double sim_gauss(uint32_t hash)
+{
+    int sum = (int)((hash & 255) + ((hash >> 8) & 255) + ((hash >> 16) & 255) + (hash >> 24));
+    return (sum - 510) / 147.8;
+}
+
+static uint8_t least3(uint8_t a, uint8_t b, uint8_t c)
+{
+    uint8_t m = a < b ? a : b;
+    return m < c ? m : c;
+}
+
+/* One row of a pass: from the row before it, and from the cells already done in this one. */
+static void sweep(const uint8_t *before, uint8_t *row, int64_t width, int64_t step)
+{
+    int64_t i = step > 0 ? 0 : width - 1;
+    uint8_t last = 0;
+
+    for (int64_t n = 0; n < width; n++, i += step) {
+        uint8_t m = last;
+        if (before != NULL)
+            m = least3(m, i > 0 ? before[i - 1] : 0, i < width - 1 ? before[i + 1] : 0);
+        if (before == NULL || before[i] < m)
+            m = before == NULL ? 0 : before[i];
+        if (m < 255)
+            m++;
+        if (m < row[i])
+            row[i] = m;
+        last = row[i];
+    }
+}
+
+void sim_field(const uint8_t *walls, int64_t width, int64_t height, uint8_t *field)
+{
+    for (int64_t k = 0; k < width * height; k++)
+        field[k] = walls[k] ? 0 : 255;
+    for (int64_t j = 0; j < height; j++)
+        sweep(j > 0 ? field + (j - 1) * width : NULL, field + j * width, width, 1);
+    for (int64_t j = height - 1; j >= 0; j--)
+        sweep(j < height - 1 ? field + (j + 1) * width : NULL, field + j * width, width, -1);
+}
+
+static inline int64_t floored(double x)
+{
+    int64_t i = (int64_t)x;
+    return i - (x < (double)i);
+}
+
+/* When the ray leaves the free square along one axis. */
+static inline double leave(double inverse, int64_t i, int64_t d, double cell, double p)
+{
+    if (inverse == 0.0)
+        return 1.0e30;
+    if (inverse > 0.0)
+        return ((double)(i + d) * cell - p) * inverse;
+    return ((double)(i - d + 1) * cell - p) * inverse;
+}
+
+/* The cell along the other axis: inside the free square, and never backwards. */
+static inline int64_t aside(double inverse, double r, double p, int64_t j, int64_t d, double cell,
+                            double t)
+{
+    if (inverse == 0.0)
+        return j;
+    int64_t to = floored((p + r * t) / cell);
+    if (inverse > 0.0)
+        return to < j ? j : to > j + d - 1 ? j + d - 1 : to;
+    return to > j ? j : to < j - d + 1 ? j - d + 1 : to;
+}
+
+double sim_wall(const sim_map *map, double x, double y, double rx, double ry, double most,
+                int *axis)
+{
+    const double cell = map->cell;
+    const double px = x + (double)map->width * cell / 2;
+    const double py = y + (double)map->height * cell / 2;
+    const double ix = fabs(rx) < 1.0e-12 ? 0.0 : 1.0 / rx;
+    const double iy = fabs(ry) < 1.0e-12 ? 0.0 : 1.0 / ry;
+    int64_t i = floored(px / cell), j = floored(py / cell);
+    double t = 0.0;
+
+    *axis = 2;
+    /* Each jump goes at least one cell on along one axis: more than these cannot be. */
+    for (int64_t cap = map->width + map->height + 2; cap > 0; cap--) {
+        int64_t d = i < 0 || j < 0 || i >= map->width || j >= map->height
+                        ? 0
+                        : map->field[j * map->width + i];
+        if (d == 0)
+            return t;
+
+        double tx = leave(ix, i, d, cell, px), ty = leave(iy, j, d, cell, py);
+        if ((tx < ty ? tx : ty) >= most)
+            break;
+        if (tx <= ty) {
+            t = tx > t ? tx : t;
+            i = ix > 0.0 ? i + d : i - d;
+            j = aside(iy, ry, py, j, d, cell, t);
+            *axis = 0;
+        } else {
+            t = ty > t ? ty : t;
+            i = aside(ix, rx, px, i, d, cell, t);
+            j = iy > 0.0 ? j + d : j - d;
+            *axis = 1;
+        }
+    }
+    *axis = 2;
+    return most;
+}
+
+static double meet_discs(const sim_disc *near, size_t count, double rx, double ry, double best)
+{
+    for (size_t k = 0; k < count; k++) {
+        /* An offset, and the squared distance to the edge. */
+        double b = near[k].x * rx + near[k].y * ry, under = b * b - near[k].radius;
+        if (near[k].radius <= 0.0)
+            best = 0.0;
+        else if (b > 0.0 && under >= 0.0) {
+            double t = b - sqrt(under);
+            best = t < best ? t : best;
+        }
+    }
+    return best;
+}
+
+void sim_sonar(const sim_map *map, const sim_disc *discs, size_t count, const sim_ring *ring,
+               const sim_noise *noise, sim_disc *near, double *ranges)
+{
+    const double c = ring->cosine, s = ring->sine, most = ring->most;
+
+    for (size_t k = 0; k < ring->sensors; k++) {
+        const double *sensor = ring->geometry + k * SIM_SENSOR;
+        double ox = ring->x + c * sensor[0] - s * sensor[1];
+        double oy = ring->y + s * sensor[0] + c * sensor[1];
+        double best = most;
+        size_t found = 0;
+
+        for (size_t n = 0; n < count; n++) {
+            double mx = discs[n].x - ox, my = discs[n].y - oy, r = discs[n].radius;
+            double m2 = mx * mx + my * my;
+            if (n != ring->self && m2 <= (most + r) * (most + r))
+                near[found++] = (sim_disc){mx, my, m2 - r * r};
+        }
+        for (size_t n = 0; n < SIM_RAYS; n++) {
+            double dx = sensor[2 + 2 * n], dy = sensor[3 + 2 * n];
+            double rx = c * dx - s * dy, ry = s * dx + c * dy;
+            int axis;
+            best = meet_discs(near, found, rx, ry, best);
+            double t = sim_wall(map, ox, oy, rx, ry, best, &axis);
+            best = t < best ? t : best;
+        }
+        if (noise->on && best < most) {
+            uint32_t hash =
+                sim_hash(noise->seed, noise->step, (uint32_t)ring->self, (uint32_t)k);
+            best = best + (0.01 + 0.01 * best) * sim_gauss(hash);
+        }
+        best = best < ring->least ? ring->least : best;
+        ranges[k] = best > most ? most : best;
+    }
+}
