@@ -18,7 +18,8 @@ defmodule Vision.Blobs do
   @patience_ms 10_000
 
   @doc """
-  Looks at the frames of `source` and calls `report` with each `t:seen/0`.
+  Looks at the frames of `source` and calls `report` with each `t:seen/0`; when that returns
+  `:halt`, the answer is `:halted`.
 
   Options: `:every` (1) looks at each n-th frame only; `:frames` (no limit) ends after so many
   looked at; `:patience_ms` (10,000) is the longest wait for a frame.
@@ -26,8 +27,8 @@ defmodule Vision.Blobs do
   A file gives each of its frames, as fast as they are looked at; a device or stream the newest.
   The error is one line. A source that ends after at least one frame is no error.
   """
-  @spec run(String.t(), Colours.t(), (seen() -> term()), keyword()) ::
-          {:ok, summary()} | {:error, String.t()}
+  @spec run(String.t(), Colours.t(), (seen() -> :halt | term()), keyword()) ::
+          {:ok, summary()} | :halted | {:error, String.t()}
   def run(source, %Colours{} = colours, report, options \\ []) do
     options = Keyword.validate!(options, every: 1, frames: nil, patience_ms: @patience_ms)
     job = Map.merge(Map.new(options), %{source: source, colours: colours, report: report})
@@ -63,7 +64,7 @@ defmodule Vision.Blobs do
       message ->
         case FFmpeg.handle_message(message, camera) do
           {:ok, [], camera} -> wait(camera, job, progress)
-          {:ok, [{:frame, frame}], camera} -> next(camera, job, take(frame, job, progress))
+          {:ok, [{:frame, frame}], camera} -> take(frame, camera, job, progress)
           {:error, :eof, _camera} -> {:ok, progress.summary}
           {:error, reason, _camera} -> {:error, explain(job, reason)}
         end
@@ -74,23 +75,25 @@ defmodule Vision.Blobs do
     end
   end
 
-  defp take(frame, job, %{number: number, summary: summary} = progress) do
+  defp take(frame, camera, job, %{number: number} = progress) do
     start_ms = progress.start_ms || frame.at_ms
-    progress = %{progress | number: number + 1, start_ms: start_ms}
+    further = %{progress | number: number + 1, start_ms: start_ms}
 
     if rem(number, job.every) == 0 do
       {:ok, blobs} = Vision.blobs(frame, job.colours)
-      at_s = (frame.at_ms - start_ms) / 1000
-      seen = %{number: number, at_s: at_s, frame: frame, blobs: blobs}
-      job.report.(seen)
+      seen = %{number: number, at_s: (frame.at_ms - start_ms) / 1000, frame: frame, blobs: blobs}
 
-      %{
-        progress
-        | summary: %{frames: summary.frames + 1, blobs: summary.blobs + length(blobs), last: seen}
-      }
+      case job.report.(seen) do
+        :halt -> :halted
+        _other -> next(camera, job, %{further | summary: add(progress.summary, seen)})
+      end
     else
-      progress
+      next(camera, job, further)
     end
+  end
+
+  defp add(summary, seen) do
+    %{frames: summary.frames + 1, blobs: summary.blobs + length(seen.blobs), last: seen}
   end
 
   defp explain(job, reason), do: "#{job.source}: #{FFmpeg.explain(reason)}"

@@ -33,6 +33,10 @@ defmodule Vision.BlobsTest do
     assert summary.frames == 2
   end
 
+  test "a report may halt the run", %{colours: colours} do
+    assert Blobs.run("testsrc", colours, fn _seen -> :halt end) == :halted
+  end
+
   test "a source that cannot be read is one line", %{colours: colours} do
     for {source, said} <- [
           {"no/such.png", "no/such.png: no such file or device"},

@@ -14,6 +14,8 @@ defmodule Hal.Camera.Source do
 
   @type kind :: :device | :stream | :generator | :file
 
+  @pictures ~w(.png .jpg .jpeg .bmp .ppm .pgm .tif .tiff .webp)
+
   @doc """
   The kind of a source.
 
@@ -80,7 +82,14 @@ defmodule Hal.Camera.Source do
   defp input(:generator, "lavfi:" <> graph, _options), do: ["-f", "lavfi", "-i", graph]
   defp input(:stream, source, _options), do: ["-i", source]
   # Otherwise a colon in a file's name would make it a protocol.
-  defp input(:file, source, _options), do: ["-i", "file:" <> source]
+  defp input(:file, source, _options), do: literal(source) ++ ["-i", "file:" <> source]
+
+  # A per cent sign in a picture's name would make it a pattern for numbered pictures.
+  defp literal(source) do
+    if String.contains?(source, "%") and String.downcase(Path.extname(source)) in @pictures,
+      do: ~w(-f image2 -pattern_type none),
+      else: []
+  end
 
   # Full range and BT.601 is what colour files are made for; ffmpeg would give 16 to 235.
   defp filters(options) do

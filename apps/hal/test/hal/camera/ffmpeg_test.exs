@@ -91,6 +91,37 @@ defmodule Hal.Camera.FFmpegTest do
     assert gone?(ffmpeg)
   end
 
+  test "ffmpeg ends with its VM, even when that is killed" do
+    code = """
+    {:ok, camera} = Hal.Camera.FFmpeg.init(source: "testsrc")
+    {:ok, _} = Hal.Camera.FFmpeg.next(camera)
+    receive do {_port, {:data, _frame}} -> :ok end
+    {:os_pid, program} = Port.info(camera.port, :os_pid)
+    IO.puts("\#{System.pid()} \#{program}")
+    receive do :never -> :ok end
+    """
+
+    arguments = ["-pa", Application.app_dir(:hal, "ebin"), "-e", code]
+    elixir = System.find_executable("elixir")
+    vm = Port.open({:spawn_executable, elixir}, [:binary, line: 100, args: arguments])
+    assert_receive {^vm, {:data, {:eol, line}}}, 20_000
+    [node, program] = String.split(line)
+    [ffmpeg] = children(program)
+    {_, 0} = System.cmd("kill", ["-9", node])
+    assert gone?(program) and gone?(ffmpeg)
+  end
+
+  @tag :tmp_dir
+  test "a looped picture goes on", %{tmp_dir: folder} do
+    picture = Path.join(folder, "a: b%d.png")
+    words = ~w(-loglevel error -f lavfi -i testsrc=size=32x24 -frames:v 1 -update 1)
+    {_, 0} = System.cmd("ffmpeg", words ++ ["file:" <> picture])
+    camera = open(source: picture, loop: true)
+    for _ <- 1..3, do: assert(%Hal.Frame{width: 32} = take(camera))
+    FFmpeg.terminate(camera)
+    assert {[_one], :eof} = all(open(source: picture))
+  end
+
   test "every wrong source is an error with its reason" do
     assert FFmpeg.init(source: "no/such/file.png") == {:error, :enoent}
     assert FFmpeg.init(source: "/dev/video77") == {:error, :enoent}

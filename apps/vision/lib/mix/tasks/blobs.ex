@@ -48,6 +48,9 @@ defmodule Mix.Tasks.Blobs do
       :help ->
         Mix.shell().info(@moduledoc)
 
+      :halted ->
+        exit({:shutdown, 1})
+
       {:error, line} ->
         Mix.shell().error(line)
         exit({:shutdown, 1})
@@ -58,8 +61,8 @@ defmodule Mix.Tasks.Blobs do
     terminal? = output != :table and match?({:ok, _columns}, :io.columns(:standard_error))
 
     report = fn seen ->
-      write(output, seen)
       if terminal? and options.json != "-", do: progress(seen)
+      write(output, seen)
     end
 
     result =
@@ -84,9 +87,17 @@ defmodule Mix.Tasks.Blobs do
     end
   end
 
-  defp write(:table, seen), do: IO.write(Report.table(seen))
-  defp write(:stdio, seen), do: IO.write([Report.json(seen), ?\n])
+  defp write(:table, seen), do: print(Report.table(seen))
+  defp write(:stdio, seen), do: print([Report.json(seen), ?\n])
   defp write({:file, file}, seen), do: IO.binwrite(file, [Report.json(seen), ?\n])
+
+  # Who reads us may have seen enough, as `head` does; then we end without a word.
+  defp print(text) do
+    IO.write(text)
+  rescue
+    error in ErlangError ->
+      if error.original == :terminated, do: :halt, else: reraise(error, __STACKTRACE__)
+  end
 
   defp close({:file, file}), do: File.close(file)
   defp close(_output), do: :ok

@@ -1,0 +1,122 @@
+// sources: ../c_src/blobs.c
+/* Random pictures through the blob finder, each compared with a flood fill, under sanitizers.
+   The bytes are in blocks of exactly their size, so that a read beyond them is seen. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "blobs.h"
+
+static uint32_t seed = 1;
+
+static uint32_t random_below(uint32_t n)
+{
+    seed = seed * 1664525u + 1013904223u;
+    return (seed >> 8) % n;
+}
+
+static void fail(const char *what)
+{
+    fprintf(stderr, "blobs_test: %s (seed %u)\n", what, seed);
+    exit(1);
+}
+
+static uint32_t mask_at(const struct blobs_picture *p, const uint32_t *tables, uint32_t x, uint32_t y)
+{
+    size_t chroma = y / p->chroma_rows * p->chroma_row + x / 2 * p->chroma_step;
+
+    return tables[p->y[y * p->y_row + x * p->y_step]] & tables[256 + p->u[chroma]] &
+           tables[512 + p->v[chroma]];
+}
+
+/* The regions of at least min_area by flooding: their number, pixels, and sum of x + y. */
+static void flood(const struct blobs_picture *p, const uint32_t *tables, uint32_t min_area,
+                  uint64_t totals[3])
+{
+    uint32_t w = p->width, h = p->height, *masks = malloc((size_t)w * h * 4);
+    uint32_t *open = malloc((size_t)w * h * 4);
+
+    memset(totals, 0, 3 * sizeof *totals);
+    for (uint32_t k = 0; k < w * h; k++)
+        masks[k] = mask_at(p, tables, k % w, k / w);
+    for (uint32_t k = 0; k < w * h; k++) {
+        uint32_t mask = masks[k], count = 0, area = 0;
+        uint64_t sum = 0;
+
+        if (mask == 0)
+            continue;
+        masks[k] = 0;
+        open[count++] = k;
+        while (count > 0) {
+            uint32_t at = open[--count], x = at % w, y = at / w;
+
+            area++;
+            sum += x + y;
+            if (x > 0 && masks[at - 1] == mask)
+                masks[at - 1] = 0, open[count++] = at - 1;
+            if (x + 1 < w && masks[at + 1] == mask)
+                masks[at + 1] = 0, open[count++] = at + 1;
+            if (y > 0 && masks[at - w] == mask)
+                masks[at - w] = 0, open[count++] = at - w;
+            if (y + 1 < h && masks[at + w] == mask)
+                masks[at + w] = 0, open[count++] = at + w;
+        }
+        if (area >= min_area)
+            totals[0]++, totals[1] += area, totals[2] += sum;
+    }
+    free(masks);
+    free(open);
+}
+
+static void one_picture(int format, uint32_t width, uint32_t height, uint32_t levels)
+{
+    size_t size = format == BLOBS_YUYV ? 2u * width * height : 3u * width * height / 2;
+    uint8_t *bytes = malloc(size);
+    uint32_t tables[768], min_area = 1 + random_below(5);
+    struct blobs_picture picture;
+    struct blobs_regions found;
+    uint64_t totals[3], sums[3] = { 0 };
+
+    for (size_t k = 0; k < size; k++)
+        bytes[k] = (uint8_t)random_below(levels);
+    for (int k = 0; k < 768; k++)
+        tables[k] = random_below(4) ? 1u << random_below(32) | random_below(8) : 0xFFFFFFFF;
+    if (blobs_lay(format, width, height, bytes, size, &picture) != 0)
+        fail("a right size was refused");
+    if (blobs_lay(format, width, height, bytes, size - 1, &picture) == 0 ||
+        blobs_lay(format, width + 1, height, bytes, size, &picture) == 0)
+        fail("a wrong size was taken");
+    blobs_lay(format, width, height, bytes, size, &picture);
+    if (blobs_find(&picture, tables, min_area, 0, &found) != 0)
+        fail("no memory");
+    flood(&picture, tables, min_area, totals);
+    for (size_t k = 0; k < found.count; k++) {
+        struct blobs_region *r = found.at + k;
+
+        if (r->left > r->right || r->right >= width || r->top > r->bottom || r->bottom >= height)
+            fail("a box lies outside");
+        if (k > 0 && __builtin_ctz(r[-1].mask) > __builtin_ctz(r->mask))
+            fail("out of order");
+        sums[0]++;
+        sums[1] += r->area;
+        sums[2] += r->sum_x + r->sum_y;
+    }
+    if (memcmp(sums, totals, sizeof sums) != 0)
+        fail("not what the flood found");
+    free(found.at);
+    free(bytes);
+}
+
+int main(void)
+{
+    for (int k = 0; k < 3000; k++) {
+        int format = k % 3;
+        uint32_t width = 2 * (1 + random_below(40)), height = 1 + random_below(30);
+
+        one_picture(format, width, format == BLOBS_YUYV ? height : 2 * height,
+                    k % 2 ? 256 : 1 + random_below(3));
+    }
+    one_picture(BLOBS_YUYV, 640, 480, 2);
+    one_picture(BLOBS_I420, 640, 480, 256);
+    return 0;
+}
