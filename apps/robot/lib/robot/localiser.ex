@@ -32,8 +32,17 @@ defmodule Robot.Localiser do
   defstruct @enforce_keys ++
               [odometry: nil, pose: nil, covariance: nil, history: [], seen_ms: nil, anchors: []]
 
-  @typedoc "Something of a colour at a place (map frame); `sd` is how well the place is known, in metres."
-  @type anchor :: %{colour: String.t(), at: Pose.point(), sd: float(), range?: boolean()}
+  @typedoc """
+  Something of a colour at a place (map frame); `sd` is how well the place is known, in metres.
+  With a `radius` only a blob as wide as that is taken for it; `range?`: its distance counts too.
+  """
+  @type anchor :: %{
+          colour: String.t(),
+          at: Pose.point(),
+          sd: float(),
+          range?: boolean(),
+          radius: float() | nil
+        }
   @type t :: %__MODULE__{start: Pose.t(), pose: Pose.t() | nil, anchors: [anchor()]}
 
   @doc "A robot that was switched on at `start`, where its odometry said zero."
@@ -106,7 +115,7 @@ defmodule Robot.Localiser do
     Enum.reduce(localiser.anchors, localiser, fn anchor, localiser ->
       case match(anchor, localiser.anchors, percept, exposed, view) do
         nil -> localiser
-        blob -> correct(localiser, anchor, blob, exposed, percept.blobs_pan, view)
+        blob -> correct(localiser, anchor, blob, exposed, percept, view)
       end
     end)
   end
@@ -133,7 +142,7 @@ defmodule Robot.Localiser do
   defp gate(%{range?: true}), do: 0.5
   defp gate(_robot), do: @match
 
-  defp correct(localiser, anchor, blob, exposed, pan, view) do
+  defp correct(localiser, anchor, blob, exposed, percept, view) do
     {ax, ay} = anchor.at
     dx = ax - exposed.x
     dy = ay - exposed.y
@@ -144,19 +153,23 @@ defmodule Robot.Localiser do
       localiser
     else
       bearing_error =
-        Pose.wrap(Sighting.bearing(blob, pan, view) - Pose.bearing(exposed, anchor.at))
+        Pose.wrap(
+          Sighting.bearing(blob, percept.blobs_pan, view) - Pose.bearing(exposed, anchor.at)
+        )
 
       bearing_noise = :math.pow(@bearing_sd, 2) + :math.pow(anchor.sd / distance, 2)
 
       localiser =
         scalar(localiser, bearing_error, {dy / square, -dx / square, -1.0}, bearing_noise)
 
-      if anchor.range? and blob.distance != nil do
+      range = anchor.range? && Sighting.distance(blob, percept.blobs)
+
+      if range do
         range_noise = :math.pow(@range_share * distance + @range_sd, 2) + :math.pow(anchor.sd, 2)
 
         scalar(
           localiser,
-          blob.distance - distance,
+          range - distance,
           {-dx / distance, -dy / distance, 0.0},
           range_noise
         )

@@ -36,6 +36,40 @@ defmodule Robot.Sighting do
         distance * :math.sin(bearing)
       })
 
+  @doc """
+  The distance of a blob, or `nil` where nothing can be said: no constant for the colour, the blob
+  clipped by the picture's border, or something of another colour in front of it (boxes that
+  touch), which hides a part of its area.
+  """
+  @spec distance(Blob.t(), [Blob.t()]) :: float() | nil
+  def distance(%Blob{clipped?: true}, _blobs), do: nil
+
+  def distance(%Blob{} = blob, blobs) do
+    if Enum.any?(blobs, &(&1.colour != blob.colour and touch?(&1, blob))),
+      do: nil,
+      else: blob.distance
+  end
+
+  @touch 3
+  defp touch?(a, b) do
+    a.left <= b.right + @touch and b.left <= a.right + @touch and a.top <= b.bottom + @touch and
+      b.top <= a.bottom + @touch
+  end
+
+  @doc """
+  Whether a blob is as wide as an upright cylinder of this radius at this distance would be, within
+  a quarter: what is half hidden, or several things in one, is not.
+  """
+  @spec fits?(Blob.t(), radius :: float(), distance :: float(), field_of_view :: float()) ::
+          boolean()
+  def fits?(%Blob{} = blob, radius, distance, field_of_view) when distance > radius do
+    focal = blob.width / 2 / :math.tan(field_of_view / 2)
+    expected = 2 * focal * :math.tan(:math.asin(radius / distance))
+    abs((blob.right - blob.left + 1) / expected - 1) < 0.25
+  end
+
+  def fits?(_blob, _radius, _distance, _field_of_view), do: false
+
   @doc "The horizontal field of view of the robot's camera: what the unit says, or the profile's."
   @spec field_of_view(Percept.t()) :: float()
   def field_of_view(%Percept{ptz: %{field_of_view: angle}}), do: angle

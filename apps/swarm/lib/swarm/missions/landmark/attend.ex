@@ -109,10 +109,17 @@ defmodule Swarm.Missions.Landmark.Attend do
     ahead = Enum.take_while(anchor.order, &(&1 != mission.me))
 
     robots =
-      [{anchor.leader, leader} | for(id <- ahead, peer = percept.peers[id], do: {id, peer.pose})]
-      |> Enum.map(fn {_id, pose} ->
-        %{colour: @robot_colour, at: Pose.point(pose), sd: @robot_sd, range?: false}
-      end)
+      for id <- [anchor.leader | ahead], peer = percept.peers[id] do
+        at = if id == anchor.leader, do: leader, else: peer.pose
+
+        %{
+          colour: @robot_colour,
+          at: Pose.point(at),
+          sd: @robot_sd,
+          range?: false,
+          radius: peer.radius
+        }
+      end
 
     case Places.landmark(anchor) do
       nil ->
@@ -120,7 +127,7 @@ defmodule Swarm.Missions.Landmark.Attend do
 
       place ->
         sd = if anchor.still, do: @still_sd, else: @moving_sd
-        [%{colour: mission.colour, at: place, sd: sd, range?: true} | robots]
+        [%{colour: mission.colour, at: place, sd: sd, range?: true, radius: nil} | robots]
     end
   end
 

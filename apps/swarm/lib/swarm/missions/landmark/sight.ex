@@ -38,9 +38,8 @@ defmodule Swarm.Missions.Landmark.Sight do
         view = Sighting.field_of_view(percept)
         bearing = Sighting.bearing(blob, percept.blobs_pan, view)
 
-        seen =
-          blob.distance &&
-            Sighting.place(percept.blobs_pose, bearing, blob.distance)
+        distance = Sighting.distance(blob, percept.blobs)
+        seen = distance && Sighting.place(percept.blobs_pose, bearing, distance)
 
         place = smooth(old && old.place, seen)
 
@@ -48,7 +47,7 @@ defmodule Swarm.Missions.Landmark.Sight do
           at_ms: percept.blobs_at_ms,
           size_ppm: max(round(blob.share * 1_000_000), 1),
           bearing: Pose.bearing(percept.pose, Sighting.place(percept.blobs_pose, bearing, 5.0)),
-          distance: blob.distance,
+          distance: distance,
           place: place,
           moving?: seen != nil and place != nil and Pose.distance(seen, place) > @moving
         }
