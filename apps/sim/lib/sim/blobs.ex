@@ -74,8 +74,8 @@ defmodule Sim.Blobs do
       right: right,
       top: top,
       bottom: bottom,
-      width: right - left + 1,
-      height: bottom - top + 1,
+      width: sight.width,
+      height: sight.height,
       distance: Palette.distance(kind, share),
       clipped?: left == 0 or top == 0 or right == sight.width - 1 or bottom == sight.height - 1
     }

@@ -4,7 +4,7 @@ defmodule Vision.Blob do
 
   Pixels are counted from the top left; `left` and `top` are the first pixel inside, `right` and
   `bottom` the last one **inside**. `x`, `y` are the centroid with pixel centres at whole
-  numbers. `share` is the area as a part of the frame's (R41). `clipped?` says that the box
+  numbers. `width` and `height` are those of the picture. `share` is the area as a part of the frame's (R41). `clipped?` says that the box
   touches the border of the frame, so that area and distance mean little. `distance` (metres, R43)
   is `nil` where the colour has no distance constant, or where the blob fills more than half of the frame.
   """

@@ -109,7 +109,7 @@ defmodule Swarm.Missions.Landmark.Attend do
     ahead = Enum.take_while(anchor.order, &(&1 != mission.me))
 
     robots =
-      for id <- [anchor.leader | ahead], peer = percept.peers[id] do
+      for id <- [anchor.leader | ahead], peer = percept.peers[id], standing?(peer) do
         at = if id == anchor.leader, do: leader, else: peer.pose
 
         %{
@@ -130,6 +130,12 @@ defmodule Swarm.Missions.Landmark.Attend do
         [%{colour: mission.colour, at: place, sd: sd, range?: true, radius: nil} | robots]
     end
   end
+
+  # What a moving robot told is where it was.
+  defp standing?(%{mode: :moving, twist: twist}),
+    do: abs(twist.linear) < @slow and abs(twist.turn) < @slow
+
+  defp standing?(_holding), do: true
 
   # Pan towards the landmark or towards the robot ahead, whichever's turn it is and can be seen.
   defp look(%{anchor: anchor, percept: percept} = mission, age_ms) do
