@@ -163,7 +163,7 @@ defmodule Sim.Trial do
       members: members,
       script: Script.new(options.moves, options.kills),
       ledger: Ledger.new(),
-      colours: nil
+      colours: World.colours()
     }
 
     command(trial, :all, :start)
@@ -224,9 +224,17 @@ defmodule Sim.Trial do
     end)
   end
 
-  defp look(trial) do
+  defp look(%{options: %{blobs: :direct}} = trial) do
     each(trial, fn id, trial ->
       blobs(trial, id, World.blobs(trial.world, id), pan(trial.world, id))
+    end)
+  end
+
+  defp look(trial) do
+    each(trial, fn id, trial ->
+      frame = World.frame(trial.world, id)
+      {:ok, blobs} = Vision.blobs(frame, trial.colours)
+      blobs(trial, id, blobs, frame.pan)
     end)
   end
 
