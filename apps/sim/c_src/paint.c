@@ -7,9 +7,9 @@
 #define NEAREST 0.01
 #define FARTHEST 1.0e6
 #define WALL_HEIGHT 2.5
-/* The lamp rides beside the camera, 12 degrees to its left. */
-#define LAMP_COSINE 0.9781476007338057
-#define LAMP_SINE 0.20791169081775934
+/* The lamp rides beside the camera, 8 degrees to its left. */
+#define LAMP_COSINE 0.9902680687415704
+#define LAMP_SINE 0.13917310096006544
 
 static inline int64_t floored(double x)
 {
@@ -165,11 +165,12 @@ static void room(const sim_sight *sight, const sim_scratch *scratch, uint8_t *re
     const uint8_t *restrict lumas = scratch->lumas;
 
     for (int64_t v = 0; v < sight->height; v++, picture += sight->width) {
-        const uint8_t ceiling = (uint8_t)(185 - 20 * v / sight->height);
+        const uint8_t ceiling = (uint8_t)(145 - 20 * v / sight->height);
         const uint8_t ground = (uint8_t)(75 + 45 * v / sight->height);
         const int16_t row = (int16_t)v;
         for (int64_t u = 0; u < sight->width; u++) {
-            uint8_t below = row <= bottoms[u] ? lumas[u] : ground;
+            const uint8_t wall = lumas[u];
+            const uint8_t below = row <= bottoms[u] ? wall : ground;
             picture[u] = row < tops[u] ? ceiling : below;
         }
     }

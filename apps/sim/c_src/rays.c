@@ -29,23 +29,32 @@ static uint8_t least3(uint8_t a, uint8_t b, uint8_t c)
     return m < c ? m : c;
 }
 
-/* One row of a pass: from the row before it, and from the cells already done in this one. */
-static void sweep(const uint8_t *before, uint8_t *row, int64_t width, int64_t step)
+static uint8_t further(uint8_t steps)
 {
-    int64_t i = step > 0 ? 0 : width - 1;
+    return steps < 255 ? steps + 1 : 255;
+}
+
+/* One row of a pass: first from the row before it, which any order will do for, then from the
+ * cell before each in this row. Beyond the border is wall. */
+static void sweep(const uint8_t *restrict before, uint8_t *restrict row, int64_t width,
+                  int64_t step)
+{
     uint8_t last = 0;
 
-    for (int64_t n = 0; n < width; n++, i += step) {
-        uint8_t m = last;
-        if (before != NULL)
-            m = least3(m, i > 0 ? before[i - 1] : 0, i < width - 1 ? before[i + 1] : 0);
-        if (before == NULL || before[i] < m)
-            m = before == NULL ? 0 : before[i];
-        if (m < 255)
-            m++;
-        if (m < row[i])
-            row[i] = m;
-        last = row[i];
+    if (before == NULL) {
+        for (int64_t i = 0; i < width; i++)
+            row[i] = row[i] < 1 ? row[i] : 1;
+        return;
+    }
+    row[0] = row[0] < 1 ? row[0] : 1;
+    row[width - 1] = row[width - 1] < 1 ? row[width - 1] : 1;
+    for (int64_t i = 1; i < width - 1; i++) {
+        uint8_t m = further(least3(before[i - 1], before[i], before[i + 1]));
+        row[i] = m < row[i] ? m : row[i];
+    }
+    for (int64_t n = 0, i = step > 0 ? 0 : width - 1; n < width; n++, i += step) {
+        uint8_t m = further(last);
+        row[i] = last = m < row[i] ? m : row[i];
     }
 }
 

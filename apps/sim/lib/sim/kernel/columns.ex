@@ -5,9 +5,9 @@ defmodule Sim.Kernel.Columns do
   @nearest 0.01
   @farthest 1.0e6
   @wall_height 2.5
-  # The lamp rides beside the camera, 12 degrees to its left.
-  @lamp_cosine 0.9781476007338057
-  @lamp_sine 0.20791169081775934
+  # The lamp rides beside the camera, 8 degrees to its left.
+  @lamp_cosine 0.9902680687415704
+  @lamp_sine 0.13917310096006544
 
   @type paint :: {kind :: byte(), luma :: byte(), u :: byte(), v :: byte()}
   @type pole :: {x :: float(), y :: float(), radius :: float(), height :: float(), paint()}

@@ -95,7 +95,7 @@ defmodule Sim.Kernel.Reference do
   end
 
   defp row(columns, v, height, noise, use, table) do
-    ceiling = 185 - div(20 * v, height)
+    ceiling = 145 - div(20 * v, height)
     ground = 75 + div(45 * v, height)
     draws = draws(noise, use, table)
 
