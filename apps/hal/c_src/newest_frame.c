@@ -334,5 +334,8 @@ int main(int argc, char **argv)
             break;
     }
     send_end(child_status());
-    return 0;
+    /* A credit may be under way. Were we gone, the VM would take its failed write for the news,
+       and could miss our last words. It closes our input when it has read them. */
+    for (;;)
+        read_credit();
 }

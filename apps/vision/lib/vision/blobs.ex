@@ -38,6 +38,8 @@ defmodule Vision.Blobs do
   end
 
   defp look(job) do
+    # A killed port program is then an error to report, not our end.
+    Process.flag(:trap_exit, true)
     every_frame? = Source.kind(job.source) in [:file, :generator]
 
     case FFmpeg.init(source: job.source, every: every_frame?) do
@@ -61,6 +63,9 @@ defmodule Vision.Blobs do
 
   defp wait(camera, job, progress) do
     receive do
+      {:EXIT, caller, reason} when is_pid(caller) ->
+        exit(reason)
+
       message ->
         case FFmpeg.handle_message(message, camera) do
           {:ok, [], camera} -> wait(camera, job, progress)

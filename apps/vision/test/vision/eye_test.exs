@@ -40,6 +40,22 @@ defmodule Vision.EyeTest do
     refute_received {:blobs, _, _}
   end
 
+  @tag if(System.find_executable("ffmpeg"), do: [], else: [skip: "ffmpeg is missing"])
+  test "a camera's device feeds it, and its end or health is nothing to it", %{eye: eye} do
+    source = "lavfi:color=color=0xDCCD5A:size=32x24:rate=50:duration=0.1"
+
+    start_supervised!(
+      {Hal.Device,
+       kind: :camera,
+       driver: {Hal.Camera.FFmpeg, source: source},
+       sinks: [{Eye, :frame, [eye]}, {Kernel, :send, [self()]}]}
+    )
+
+    assert_receive {:blobs, [%{colour: "Yellow", share: 1.0}], _meta}, 10_000
+    assert_receive {:health, :camera, {{:offline, :eof}, _since_ms}}, 10_000
+    assert Eye.status(eye).wrong == 0
+  end
+
   test "wrong options are named", %{colours: colours} do
     assert_raise ArgumentError, ~r/:colours/, fn -> Eye.start_link(sink: {Kernel, :send, []}) end
 

@@ -17,6 +17,9 @@ defmodule Hal.Camera.FFmpeg do
   ffmpeg runs behind the port program `newest_frame`, which keeps one frame and gives it out when
   `next/1` asks; nothing queues, and ffmpeg ends with this process or its VM, however they end.
 
+  The process that calls `init/1` gets the messages and is linked to the port program. To see the
+  end of a killed one as an error, it traps exits, as `Hal.Device` does.
+
   Errors: `:no_ffmpeg`, `:enoent` (no such file or device), `:eisdir`, `:eof` (the source ended
   after at least one frame), `{:unreadable, what ffmpeg says}`, `{:exit, status}`.
   """

@@ -63,12 +63,9 @@ defmodule Hal.Camera.FFmpegTest do
   test "nothing comes without credit, and then the newest" do
     camera = open(source: "lavfi:testsrc=size=32x24:rate=100")
     first = take(camera)
-    refute_receive {_port, {:data, _}}, 200
-    asked = System.monotonic_time(:millisecond)
-    second = take(camera)
-    # An old frame would be 200 ms old; a slow machine may take a while.
-    assert second.at_ms > asked - 150
-    assert second.at_ms > first.at_ms
+    refute_receive {_port, {:data, _}}, 400
+    # Of a queue this would be the frame 10 ms later.
+    assert take(camera).at_ms > first.at_ms + 100
     FFmpeg.terminate(camera)
   end
 
@@ -86,8 +83,10 @@ defmodule Hal.Camera.FFmpegTest do
     assert %Hal.Frame{} = take(camera)
     {:os_pid, program} = Port.info(camera.port, :os_pid)
     [ffmpeg] = children(program)
+    Process.flag(:trap_exit, true)
     {_, 0} = System.cmd("kill", ["-9", "#{program}"])
-    assert take(camera) == {:exit, 137}
+    # The second when our credit finds it gone before its end is told.
+    assert take(camera) in [{:exit, 137}, {:exit, :epipe}]
     assert gone?(ffmpeg)
   end
 
