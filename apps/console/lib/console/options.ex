@@ -30,6 +30,7 @@ defmodule Console.Options do
 
   @doc """
   Options from a command's arguments, or one line for each thing that is wrong with them.
+  Names of files are meant from `folder`.
 
       iex> {:ok, options} = Console.Options.parse(~w(--robots 3 --landmark -2,1))
       iex> {options.robots, options.landmark}
@@ -37,11 +38,11 @@ defmodule Console.Options do
       iex> Console.Options.parse(~w(--robots -3))
       {:error, [~s(--robots must be a whole number from 1 to 100, not "-3")]}
   """
-  @spec parse([String.t()]) :: {:ok, t()} | {:error, [String.t()]}
-  def parse(arguments) do
+  @spec parse([String.t()], Path.t()) :: {:ok, t()} | {:error, [String.t()]}
+  def parse(arguments, folder \\ ".") do
     arguments = Enum.map(arguments, &if(&1 == "-h", do: "--help", else: &1))
 
-    with {:ok, pairs} <- Arguments.parse(arguments, table()),
+    with {:ok, pairs} <- Arguments.parse(arguments, table(folder)),
          {:ok, options} <- fleet(pairs) do
       pairs
       |> Enum.reduce(options, &put/2)
@@ -57,7 +58,7 @@ defmodule Console.Options do
 
       bin/demo [options]        (or: mix demo [options])
 
-    #{Arguments.help(table())}
+    #{Arguments.help(table("."))}
 
     Examples
       bin/demo                                              six robots, live in the terminal
@@ -91,13 +92,14 @@ defmodule Console.Options do
   def duration_s(%__MODULE__{duration_s: nil}), do: 120.0
   def duration_s(%__MODULE__{duration_s: duration_s}), do: duration_s
 
-  defp table do
+  defp table(folder) do
     [
       {"robots", "N", &Values.whole(&1, 1..100), "how many robots, 1 to 100 (6)"},
       {"fleet", "mag:N,min:N", &Fleet.parse/1, "or how many of each kind"},
       {"seed", "S", &Values.whole(&1, 0..4_294_967_295),
        "chance starts here; same seed, same run (1)"},
-      {"map", "NAME", &map/1, "hall, hospital, arena, or FILE.png:WIDTHxHEIGHT in metres (hall)"},
+      {"map", "NAME", &map(&1, folder),
+       "hall, hospital, arena, or FILE.png:WIDTHxHEIGHT in metres (hall)"},
       {"start", "HOW", &Values.choice(&1, spread: :spread, same: :same),
        "spread over the map, or all switched on at one pose: same (spread)"},
       {"landmark", "X,Y|none", &landmark/1,
@@ -118,8 +120,9 @@ defmodule Console.Options do
       {"duration", "S", &Values.number(&1, 1, 3600),
        "simulated seconds at most (120, hospital 180;\nlive on a terminal: until you quit)"},
       {"headless", nil, nil, "no view, as fast as it goes"},
-      {"json", "FILE|-", &file(&1, ""), "write the report (- is standard output)"},
-      {"picture", "FILE.svg", &file(&1, ".svg"), "draw the paths and the formation error"},
+      {"json", "FILE|-", &file(&1, "", folder), "write the report (- is standard output)"},
+      {"picture", "FILE.svg", &file(&1, ".svg", folder),
+       "draw the paths and the formation error"},
       {"blobs", "HOW", &Values.choice(&1, painted: :painted, direct: :direct),
        "paint camera pictures, or skip the painting (painted)"},
       {"help", nil, nil, "this text"}
@@ -179,18 +182,18 @@ defmodule Console.Options do
     with {:error, allowed} <- Values.point(text), do: {:error, allowed <> ", or none"}
   end
 
-  defp map(name) when name in @maps, do: {:ok, name}
+  defp map(name, _folder) when name in @maps, do: {:ok, name}
 
-  defp map(text) do
+  defp map(text, folder) do
     case Regex.run(~r/^(.+\.(?:png|pgm)):(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)$/i, text) do
-      [_, _file, width, height] -> sized(text, width, height)
+      [_, file, width, height] -> sized(from(file, folder), width, height)
       nil -> {:error, "hall, hospital, arena or FILE.png:WIDTHxHEIGHT#{map_hint(text)}"}
     end
   end
 
-  defp sized(text, width, height) do
+  defp sized(file, width, height) do
     with {:ok, _} <- Values.number(width, 2, 1000), {:ok, _} <- Values.number(height, 2, 1000) do
-      {:ok, text}
+      {:ok, "#{file}:#{width}x#{height}"}
     else
       _ -> {:error, "FILE.png:WIDTHxHEIGHT with sides from 2 to 1000 metres"}
     end
@@ -203,17 +206,20 @@ defmodule Console.Options do
     end
   end
 
-  defp file("-", ""), do: {:ok, "-"}
+  defp file("-", "", _folder), do: {:ok, "-"}
+  defp file("", _extension, _folder), do: {:error, "the name of a file"}
 
-  defp file(path, extension) do
-    folder = Path.dirname(path)
+  defp file(text, extension, folder) do
+    path = from(text, folder)
 
     cond do
-      path == "" -> {:error, "the name of a file"}
       not String.ends_with?(path, extension) -> {:error, "a file whose name ends in #{extension}"}
       File.dir?(path) -> {:error, "a file, which a folder is not"}
-      not File.dir?(folder) -> {:error, "a file in a folder that exists"}
+      not File.dir?(Path.dirname(path)) -> {:error, "a file in a folder that exists"}
       true -> {:ok, path}
     end
   end
+
+  defp from(path, "."), do: path
+  defp from(path, folder), do: Path.expand(path, folder)
 end

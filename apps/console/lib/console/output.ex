@@ -18,8 +18,8 @@ defmodule Console.Output do
   @spec columns(:stdio | :stderr) :: pos_integer() | nil
   def columns(device) do
     case :io.columns(if(device == :stdio, do: :standard_io, else: :standard_error)) do
-      {:ok, columns} -> columns
-      {:error, :enotsup} -> nil
+      {:ok, columns} when columns > 0 -> columns
+      _no_terminal -> nil
     end
   end
 

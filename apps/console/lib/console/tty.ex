@@ -12,9 +12,9 @@ defmodule Console.Tty do
   @doc "Switches to single keys; `:error` where standard input and output are no terminal."
   @spec open() :: {:ok, saved()} | :error
   def open do
-    with {:ok, _columns} <- :io.columns(:standard_io),
-         {:ok, device} <- File.read_link("/proc/self/fd/0"),
-         true <- device != "/dev/null" and String.starts_with?(device, "/dev/"),
+    # Not by asking for the columns: a terminal may not know its size.
+    with {:ok, device} <- terminal("/proc/self/fd/0"),
+         {:ok, _device} <- terminal("/proc/self/fd/1"),
          {:ok, settings} <- stty(device, ["-g"]),
          {:ok, _nothing} <- stty(device, @raw) do
       {:ok, {device, settings}}
@@ -34,8 +34,16 @@ defmodule Console.Tty do
   @spec size() :: {pos_integer(), pos_integer()}
   def size do
     case {:io.columns(:standard_io), :io.rows(:standard_io)} do
-      {{:ok, columns}, {:ok, rows}} -> {columns, rows}
+      {{:ok, columns}, {:ok, rows}} when columns > 0 and rows > 0 -> {columns, rows}
       _none -> {80, 24}
+    end
+  end
+
+  defp terminal(descriptor) do
+    case File.read_link(descriptor) do
+      {:ok, "/dev/null"} -> :error
+      {:ok, "/dev/" <> _ = device} -> {:ok, device}
+      _pipe_or_file_or_unknown -> :error
     end
   end
 

@@ -1,6 +1,6 @@
 defmodule Console.Picture.Colours do
   @moduledoc """
-  One colour a robot, told apart by the colour-blind too. Pure.
+  What a robot is drawn with: one colour each, told apart by the colour-blind too, and its size. Pure.
 
   The first seven are Okabe and Ito's; larger fleets repeat them with other dash patterns.
   """
@@ -22,4 +22,13 @@ defmodule Console.Picture.Colours do
     dash = Enum.at(@dashes, rem(div(index, count), length(@dashes)))
     {Enum.at(@colours, rem(index, count)), dash}
   end
+
+  @doc """
+  The radius a robot is drawn with, in pixels: to scale, but never too small to be seen.
+
+      iex> {Console.Picture.Colours.size(%{radius: 0.2}, 50.0), Console.Picture.Colours.size(%{radius: 0.2}, 5.0)}
+      {10.0, 4.0}
+  """
+  @spec size(%{:radius => float(), optional(atom()) => term()}, float()) :: float()
+  def size(robot, scale), do: max(robot.radius * scale, 4.0)
 end

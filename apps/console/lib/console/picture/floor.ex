@@ -170,7 +170,7 @@ defmodule Console.Picture.Floor do
   defp robot(%{alive: false} = robot, colours, at, scale) do
     {colour, _dash} = colours[robot.id]
     {x, y} = at.(Pose.point(robot.pose))
-    r = 0.7 * size(robot, scale)
+    r = 0.7 * Colours.size(robot, scale)
     cross = "M#{-r},#{-r} L#{r},#{r} M#{-r},#{r} L#{r},#{-r}"
 
     [
@@ -193,7 +193,7 @@ defmodule Console.Picture.Floor do
         Svg.element(:circle,
           cx: x,
           cy: y,
-          r: size(robot, scale) + 4,
+          r: Colours.size(robot, scale) + 4,
           fill: "none",
           stroke: @ink,
           stroke_width: 2
@@ -208,7 +208,7 @@ defmodule Console.Picture.Floor do
   # A disc to scale with a stroke from its middle to its front.
   defp body(robot, at, scale, look) do
     {x, y} = at.(Pose.point(robot.pose))
-    r = size(robot, scale)
+    r = Colours.size(robot, scale)
     heading = robot.pose.heading
     nose = if look[:fill] == "#FFFFFF", do: look[:stroke], else: "#FFFFFF"
 
@@ -226,10 +226,6 @@ defmodule Console.Picture.Floor do
     ]
   end
 
-  @doc "The radius a robot is drawn with: to scale, but never too small to be seen."
-  @spec size(Sim.Scene.robot(), float()) :: float()
-  def size(robot, scale), do: max(robot.radius * scale, 4.0)
-
   defp slots(scene, at, scale) do
     for %{slot: {_x, _y} = slot} = robot <- scene.robots do
       {x, y} = at.(slot)
@@ -237,7 +233,7 @@ defmodule Console.Picture.Floor do
       Svg.element(:circle,
         cx: x,
         cy: y,
-        r: size(robot, scale) + 2.5,
+        r: Colours.size(robot, scale) + 2.5,
         fill: "none",
         stroke: @ink,
         stroke_width: 1,

@@ -1,7 +1,7 @@
 defmodule Console.Picture.Labels do
   @moduledoc "Names and numbered stages on a run's picture, placed so that they hide little. Pure."
   alias Console.{Svg, Track}
-  alias Console.Picture.Floor
+  alias Console.Picture.Colours
   alias Hal.Pose
 
   @ink "#22262B"
@@ -70,7 +70,7 @@ defmodule Console.Picture.Labels do
   # Where a name may stand: right, left, above or below its robot; each as a box.
   defp spots(robot, at, scale, width) do
     {x, y} = at.(Pose.point(robot.pose))
-    r = Floor.size(robot, scale) + 7
+    r = Colours.size(robot, scale) + 7
     wide = 34
 
     for {left, top} <- [
@@ -86,7 +86,7 @@ defmodule Console.Picture.Labels do
   defp obstacles(scene, at, scale) do
     for robot <- scene.robots do
       {x, y} = at.(Pose.point(robot.pose))
-      r = Floor.size(robot, scale) + 3
+      r = Colours.size(robot, scale) + 3
       {x - r, y - r, 2 * r, 2 * r}
     end
   end

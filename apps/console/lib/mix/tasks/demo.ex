@@ -12,7 +12,7 @@ defmodule Mix.Tasks.Demo do
   def run(arguments) do
     # No application is started: a run needs neither nodes nor servers of ours.
     status =
-      case Options.parse(arguments) do
+      case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
         {:ok, %Options{help: true}} -> IO.write(Options.help())
         {:ok, %Options{headless: true} = options} -> Demo.run(options, Sim.Trial)
         {:ok, options} -> Session.run(options, Live.Trial, &Live.Trial.start_link(Sim.Trial, &1))

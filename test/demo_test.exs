@@ -1,0 +1,133 @@
+defmodule System.DemoTest do
+  @moduledoc "The demo as a command: what people type, what they get, and how it ends."
+  use ExUnit.Case, async: true
+
+  @moduletag timeout: 300_000
+  @root Path.expand("..", __DIR__)
+
+  # Everything on standard output, everything on standard error, and the exit status.
+  defp run(command, arguments, options) do
+    folder = Keyword.get(options, :cd, @root)
+    errors = Path.join(System.tmp_dir!(), "convoy-#{System.unique_integer([:positive])}.err")
+    input = Keyword.get(options, :input, "")
+
+    script = ~s(printf '%s' "$INPUT" | "$COMMAND" "$@" 2>"$ERRORS")
+
+    env =
+      [{"INPUT", input}, {"COMMAND", command}, {"ERRORS", errors}] ++
+        Keyword.get(options, :env, [])
+
+    {output, status} = System.cmd("sh", ["-c", script, "sh" | arguments], cd: folder, env: env)
+    told = File.read!(errors)
+    File.rm!(errors)
+    {output, told, status}
+  end
+
+  defp demo(line, options \\ []), do: run("mix", ["demo" | OptionParser.split(line)], options)
+
+  defp without_wall_time(json), do: String.replace(json, ~r/"wall_s":[^,]+,/, "")
+
+  test "the help names the options and ends well" do
+    assert {help, "", 0} = demo("--help")
+    assert help =~ "--leader-change"
+    assert help =~ "Exit status"
+  end
+
+  for {line, complaint} <- [
+        {"--robots 0", "--robots must be a whole number from 1 to 100"},
+        {"--robots -3", "--robots must be"},
+        {"--robots 1e9", "--robots must be"},
+        {"--map moon", "--map must be hall, hospital, arena or FILE.png:WIDTHxHEIGHT"},
+        {"--headless --map mix.exs.png:10x10", "mix.exs.png"},
+        {"--headless --landmark 500,0", "landmark"},
+        {"--loss nan", "--loss must be a number from 0 to 1"},
+        {"--kill mag9@3", ~s("mag9")},
+        {"--headles", ~s(did you mean "--headless"?)},
+        {"--picture /no/such/place/a.svg", "a folder that exists"}
+      ] do
+    test "refuses #{line} in clear words" do
+      assert {"", told, 1} = demo(unquote(line))
+      assert told =~ unquote(complaint)
+      assert told =~ ~r/^demo: /
+      refute told =~ "** ("
+      refute told =~ ".ex:"
+    end
+  end
+
+  @tag :tmp_dir
+  test "a PNG that is no PNG is refused", %{tmp_dir: folder} do
+    File.write!(Path.join(folder, "floor.png"), "not a picture")
+    path = Path.join(folder, "floor.png")
+    assert {"", told, 1} = demo("--headless --map #{path}:10x10")
+    assert told =~ "floor.png"
+    refute told =~ "** ("
+  end
+
+  test "one seed, run twice: the same report to the byte, but for the wall time" do
+    line = "--headless --robots 3 --seed 4 --duration 20 --json -"
+    {first, told, status} = demo(line)
+    {second, _told, ^status} = demo(line)
+    assert status in [0, 2]
+    assert [_one_line] = String.split(first, "\n", trim: true)
+    assert without_wall_time(first) == without_wall_time(second)
+    assert told =~ "search"
+
+    keys = Regex.scan(~r/"(\w+)":/, first) |> Enum.map(&List.last/1)
+    assert Enum.take(keys, 6) == ~w(version seed map robots simulated_s wall_s)
+  end
+
+  test "another seed is another run" do
+    {first, _told, _status} = demo("--headless --robots 2 --seed 1 --duration 5 --json -")
+    {second, _told, _status} = demo("--headless --robots 2 --seed 2 --duration 5 --json -")
+
+    assert without_wall_time(first) !=
+             without_wall_time(String.replace(second, ~s("seed":2), ~s("seed":1)))
+  end
+
+  @tag :tmp_dir
+  test "bin/demo writes report and picture where it was called", %{tmp_dir: folder} do
+    line = "--headless --robots 1 --duration 60 --json run.json --picture run.svg"
+
+    {output, _told, status} =
+      run(Path.join(@root, "bin/demo"), OptionParser.split(line), cd: folder)
+
+    assert status in [0, 2]
+    assert output =~ "1 robot (mag1) in hall"
+    assert File.read!(Path.join(folder, "run.json")) =~ ~s("robots":1,)
+    {svg, []} = :xmerl_scan.file(to_charlist(Path.join(folder, "run.svg")), quiet: true)
+    assert elem(svg, 1) == :svg
+  end
+
+  test "without a landmark the fleet says so and the status is 2" do
+    assert {output, "", 2} = demo("--headless --robots 2 --landmark none --duration 60")
+    assert output =~ "search"
+    assert output =~ "No formation"
+  end
+
+  test "live without a terminal: plain lines, commands from standard input" do
+    {output, _told, _status} =
+      demo("--robots 2 --blobs direct --duration 30", input: "staus\nstatus\nkill mag1\nquit\n")
+
+    assert output =~ ~s(did you mean "status"?)
+    assert output =~ "mag1: search"
+    assert output =~ "kill mag1: done"
+    refute output =~ "\e["
+  end
+
+  # `script` gives the command a terminal.
+  if System.find_executable("script") do
+    test "live on a terminal: a full screen, given back at the end" do
+      # The input waits, so that the first picture has been drawn before the keys come.
+      command =
+        "(sleep 3; printf 'kil\\tmag1\\r'; sleep 1; printf '\\003') | script -qec 'mix demo --robots 2 --blobs direct' /dev/null"
+
+      {output, 0} = System.cmd("sh", ["-c", command], cd: @root, env: [{"TERM", "xterm"}])
+      assert output =~ "\e[?1049h"
+      assert output =~ "Convoy"
+      assert output =~ "Try:  kill leader"
+      assert output =~ "kill mag1: done"
+      assert output =~ "\e[?1049l"
+      refute output =~ "** ("
+    end
+  end
+end
