@@ -6,10 +6,12 @@ defmodule Mix.Tasks.Demo do
   Exit status: 0 the fleet ended in formation, 2 it did not, 1 something was wrong with the input.
   """
   use Mix.Task
-  alias Console.{Demo, Live, Options, Session}
+  alias Console.{Build, Demo, Live, Options, Session}
 
   @impl Mix.Task
   def run(arguments) do
+    Build.update()
+
     # No application is started: a run needs neither nodes nor servers of ours.
     status =
       case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
