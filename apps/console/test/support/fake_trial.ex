@@ -22,6 +22,7 @@ defmodule Console.FakeTrial do
   def new(%{map: "nowhere"}), do: {:error, "the map \"nowhere\" cannot be read"}
 
   def new(options) do
+    options = Map.merge(Console.Options.trial(%Console.Options{robots: [:mag1]}), options)
     landmark = %{none: nil, default: {0.0, 0.0}}[options.landmark] || point(options.landmark)
     count = length(options.robots)
 
@@ -68,6 +69,7 @@ defmodule Console.FakeTrial do
     trial |> run_script() |> glide() |> elect() |> drive() |> judge()
   end
 
+  def formed?(trial), do: trial.formed_ms != nil
   def kill(trial, who), do: act(trial, {:kill, who})
   def move(_trial, {x, _y}) when x > 8, do: {:error, "there is a wall"}
   def move(trial, place), do: {:ok, act(trial, {:move, place})}
@@ -132,13 +134,18 @@ defmodule Console.FakeTrial do
             x: r.pose.x,
             y: r.pose.y,
             theta: r.pose.heading,
-            slot: r.slot,
+            slot: slot(trial, r),
             error_m: Scene.slot_error(r),
             size_ppm: r.size_ppm
           }
         end
     }
   end
+
+  defp slot(_trial, %{slot: nil}), do: nil
+
+  defp slot(trial, robot),
+    do: Enum.find_index(living(trial) -- [trial.leader], &(&1 == robot.id)) + 1
 
   defp run_script(%{script: [{at_ms, act} | rest], at_ms: now} = trial) when at_ms <= now,
     do: run_script(act(%{trial | script: rest}, act))

@@ -1,0 +1,68 @@
+defmodule Console.Bench.Table do
+  @moduledoc "Measured runs as a table in Markdown. Pure."
+  alias Console.Words
+
+  @heads [
+    "case",
+    "map",
+    "runs",
+    "formed in time",
+    "time to formed: median / 95 % / max (s)",
+    "error mean: median / 90 % / max (m)",
+    "error max: median / 90 % / max (m)",
+    "collisions",
+    "leaders at once",
+    "leader changes: mean / max",
+    "x real time"
+  ]
+
+  @doc "The table of rows `{says, map, limit_s, measured}`."
+  @spec draw([{String.t(), String.t(), number(), [Console.Bench.Run.measured()]}]) :: String.t()
+  def draw(rows) do
+    lines = [@heads, Enum.map(@heads, fn _ -> "---" end)] ++ Enum.map(rows, &row/1)
+    Enum.map_join(lines, "\n", &("| " <> Enum.join(&1, " | ") <> " |")) <> "\n"
+  end
+
+  @doc """
+  The value below which this share of the values lies (nearest rank); `nil` of none.
+
+      iex> Console.Bench.Table.quantile([4, 1, 3, 2], 0.5)
+      2
+      iex> Console.Bench.Table.quantile([], 0.5)
+      nil
+  """
+  @spec quantile([number()], float()) :: number() | nil
+  def quantile([], _share), do: nil
+
+  def quantile(values, share) do
+    rank = max(ceil(share * length(values)), 1)
+    values |> Enum.sort() |> Enum.at(rank - 1)
+  end
+
+  defp row({says, map, limit_s, runs}) do
+    times = for %{formed_s: s} when s != nil <- runs, do: s
+    means = for %{error: {mean, _max}} <- runs, do: mean
+    maxima = for %{error: {_mean, max}} <- runs, do: max
+    changes = Enum.map(runs, & &1.changes)
+    within = Enum.count(runs, & &1.within?)
+
+    [
+      says,
+      map,
+      "#{length(runs)}",
+      "#{within} of #{length(runs)} (#{limit_s} s)",
+      figures(times, [0.5, 0.95, 1.0], 1),
+      figures(means, [0.5, 0.9, 1.0], 3),
+      figures(maxima, [0.5, 0.9, 1.0], 3),
+      "#{runs |> Enum.map(& &1.collisions) |> Enum.sum()}",
+      "#{runs |> Enum.map(& &1.leaders) |> Enum.max(fn -> 0 end)}",
+      "#{Words.decimals(Enum.sum(changes) / max(length(runs), 1), 1)} / #{Enum.max(changes, fn -> 0 end)}",
+      figures(Enum.map(runs, & &1.speed), [0.5], 0)
+    ]
+  end
+
+  defp figures([], _shares, _decimals), do: "–"
+
+  defp figures(values, shares, decimals),
+    do: Enum.map_join(shares, " / ", &Words.decimals(quantile(values, &1), decimals))
+end

@@ -1,0 +1,101 @@
+defmodule Mix.Tasks.Bench do
+  @shortdoc "Measures the demo over many seeds"
+  @moduledoc """
+  `mix bench demo` runs the cases of the main job over many seeds and prints a table in Markdown.
+
+  Two runs go at a time; the figures but for the speed are the same on every machine.
+  """
+  use Mix.Task
+  alias Console.{Arguments, Bench, Build, Output, Progress, Values}
+
+  @impl Mix.Task
+  def run(["demo" | arguments]) do
+    Build.update()
+
+    case Arguments.parse(arguments, table()) do
+      {:ok, pairs} -> pairs |> Map.new() |> measure()
+      {:error, lines} -> refuse(lines)
+    end
+  end
+
+  def run(arguments) when arguments in [["--help"], ["-h"]], do: help()
+  def run(_other), do: refuse(["bench what? There is: mix bench demo [options]"])
+
+  defp measure(%{"help" => true}), do: help()
+
+  defp measure(given) do
+    output = Output.to(:stderr)
+    cases = Map.get(given, "cases", Bench.cases())
+    maps = Map.get(given, "maps", ["hall", "hospital"])
+    seeds = Map.get(given, "seeds", 1..40)
+    blobs = Map.get(given, "blobs", :painted)
+    jobs = for case <- cases, map <- maps, seed <- seeds, do: {case, map, seed}
+    count = length(jobs)
+
+    results =
+      jobs
+      |> Task.async_stream(&{&1, job(&1, blobs)}, max_concurrency: 2, timeout: :infinity)
+      |> Enum.with_index(1)
+      |> Enum.map(fn {{:ok, {{case, map, seed}, _result} = result}, done} ->
+        note = "#{case.name} in #{map}, seed #{seed}"
+        Output.progress(output, Progress.line(done, count, note, (output.columns || 80) - 1))
+        result
+      end)
+
+    Output.finish(output)
+
+    for {{case, map, seed}, {:error, line}} <- results,
+        do: Output.line(output, "bench: #{case.name} in #{map}, seed #{seed}: #{line}")
+
+    text = results |> rows(cases, maps) |> Bench.Table.draw()
+    IO.write(text)
+    write(given["markdown"], text)
+  end
+
+  defp job({case, map, seed}, blobs), do: Bench.Run.run(case, map, seed, blobs, Sim.Trial)
+
+  defp rows(results, cases, maps) do
+    for case <- cases,
+        map <- maps,
+        runs = for({{^case, ^map, _seed}, {:ok, run}} <- results, do: run),
+        runs != [],
+        do: {"#{case.name}: #{case.says}", map, Bench.limit_s(case, map), runs}
+  end
+
+  defp write(nil, _text), do: :ok
+
+  defp write(path, text) do
+    with {:error, reason} <- File.write(path, text),
+         do: refuse(["--markdown #{path} cannot be written: #{:file.format_error(reason)}"])
+  end
+
+  defp table do
+    [
+      {"seeds", "A-B", &Values.span(&1, 0..100_000), "which seeds (1-40)"},
+      {"cases", "NAME,NAME", &Bench.choose/1, "which cases (all)"},
+      {"maps", "NAME,NAME", &maps/1, "which maps (hall,hospital)"},
+      {"blobs", "HOW", &Values.choice(&1, painted: :painted, direct: :direct),
+       "painted or direct (painted)"},
+      {"markdown", "FILE", &{:ok, &1}, "write the table there too"},
+      {"help", nil, nil, "this text"}
+    ]
+  end
+
+  defp maps(text) do
+    maps = String.split(text, ",")
+
+    if maps -- ["hall", "hospital", "arena"] == [],
+      do: {:ok, maps},
+      else: {:error, "some of hall, hospital, arena, with commas between"}
+  end
+
+  defp help do
+    cases = Enum.map_join(Bench.cases(), "\n", &"  #{String.pad_trailing(&1.name, 18)}#{&1.says}")
+    IO.puts("  mix bench demo [options]\n\n#{Arguments.help(table())}\n\nCases\n#{cases}")
+  end
+
+  defp refuse(lines) do
+    Enum.each(lines, &IO.puts(:stderr, "bench: #{&1}"))
+    exit({:shutdown, 1})
+  end
+end

@@ -1,0 +1,38 @@
+defmodule Console.BenchTest do
+  use ExUnit.Case, async: true
+  alias Console.{Bench, FakeTrial}
+
+  doctest Console.Bench
+  doctest Console.Bench.Table
+
+  defp run(name) do
+    {:ok, [case]} = Bench.choose(name)
+    {:ok, measured} = Bench.Run.run(case, "hall", 3, :direct, FakeTrial)
+    measured
+  end
+
+  test "a plain run counts from the start, one with a deed from the deed" do
+    plain = run("six")
+    assert plain.within? and plain.formed_s > 5
+    assert {mean, max} = plain.error
+    assert mean <= max
+
+    for name <- ["move", "kill-leader", "kill-middle"] do
+      measured = run(name)
+      assert measured.formed_s != nil, name
+      assert measured.formed_s < 60
+    end
+  end
+
+  test "a fleet that never forms is counted as such" do
+    assert %{formed_s: nil, within?: false, error: nil} = run("none")
+  end
+
+  test "the table has a line for each row, and all its columns" do
+    rows = [{"six", "hall", 120, [run("six"), run("none")]}, {"none", "hall", 120, [run("none")]}]
+    lines = rows |> Bench.Table.draw() |> String.split("\n", trim: true)
+    assert length(lines) == 4
+    assert lines |> Enum.map(&length(String.split(&1, "|"))) |> Enum.uniq() |> length() == 1
+    assert Enum.at(lines, 2) =~ "1 of 2 (120 s)"
+  end
+end
