@@ -3,6 +3,7 @@
 #include <string.h>
 
 #define LARGEST 32768u
+#define MOST_PIXELS (64u << 20)
 #define MAGIC "YUV4MPEG2 "
 
 /* A number of at most nine digits; moves *at behind it. -1 where there is none. */
@@ -58,7 +59,8 @@ int y4m_header(const char *line, size_t length, struct y4m *header)
     if (header->per == 0)
         header->per = 1;
     if (header->width == 0 || header->height == 0 || header->width > LARGEST ||
-        header->height > LARGEST || header->width % 2)
+        header->height > LARGEST || header->width % 2 ||
+        (uint64_t)header->width * header->height > MOST_PIXELS)
         return -1;
     return header->chroma == Y4M_420 && header->height % 2 ? -1 : 0;
 }

@@ -59,9 +59,19 @@ static ERL_NIF_TERM find(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
     return result;
 }
 
+/* The module may be loaded again; there is no state to carry over. */
+static int upgrade(ErlNifEnv *env, void **data, void **old_data, ERL_NIF_TERM info)
+{
+    (void)env;
+    (void)data;
+    (void)old_data;
+    (void)info;
+    return 0;
+}
+
 static ErlNifFunc functions[] = {
     { "loaded?", 0, loaded, 0 },
     { "find", 7, find, ERL_NIF_DIRTY_JOB_CPU_BOUND },
 };
 
-ERL_NIF_INIT(Elixir.Vision.Backend.Native, functions, NULL, NULL, NULL, NULL)
+ERL_NIF_INIT(Elixir.Vision.Backend.Native, functions, NULL, NULL, upgrade, NULL)

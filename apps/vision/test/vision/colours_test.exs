@@ -64,6 +64,17 @@ defmodule Vision.ColoursTest do
              "f:5: the [Thresholds] header needs a blank line before it, or it is taken for the end of [Colors]"
   end
 
+  test "a header that was taken for an end does no harm when it comes again" do
+    assert {:ok, _} =
+             @good |> String.replace("\n\n[Unknown]\n", "\n[Thresholds]\n") |> Colours.parse()
+  end
+
+  test "numbers as C reads them" do
+    text = String.replace(@good, ") 0.500000 10 ", ").5 +10 ")
+    assert {:ok, %{classes: [%{merge: 0.5, expected: 10}, _]}} = Colours.parse(text)
+    assert {:ok, _} = @good |> String.replace(" 1 1 ", " 1. 1 ") |> Colours.parse()
+  end
+
   test "limits out of range, the wrong way round or broken are named" do
     for {limits, said} <- [
           {"(-5:240,60:90,130:145)", "f:8: threshold Y -5:240 is out of range"},

@@ -111,6 +111,10 @@ defmodule Hal.Camera.FFmpeg do
   defp end_reason(0, count, _words) when count > 0, do: :eof
   defp end_reason(127, 0, ""), do: :no_ffmpeg
 
+  # The port program could not make sense of the stream: see y4m.c for its limits.
+  defp end_reason(255, _count, ""),
+    do: {:unreadable, "no frames, or above 64 million pixels or 32768 a side"}
+
   defp end_reason(status, _count, words) do
     case words |> printable() |> String.split("\n", trim: true) |> Enum.reject(&hint?/1) do
       [] -> {:unreadable, "status #{status}, no frame"}

@@ -14,6 +14,7 @@ defmodule Vision.Backend.Native do
   @formats %{yuyv: 0, i420: 1, nv12: 2}
 
   @doc false
+  @spec load() :: :ok
   def load do
     # Without the library the stubs remain, and the reference does the work.
     _ = :erlang.load_nif(to_charlist(Application.app_dir(:vision, "priv/blobs")), 0)

@@ -59,7 +59,7 @@ defmodule Vision.Colours.Text do
 
   defp read_line(line, number, %{section: :colours} = scan) do
     case Regex.run(
-           ~r/^\(\s*([+-]?\d+),\s*([+-]?\d+),\s*([+-]?\d+)\)\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s+([+-]?\d+)\s*(\S+)/,
+           ~r/^\(\s*([+-]?\d+),\s*([+-]?\d+),\s*([+-]?\d+)\)\s*([\d.]+(?:[eE][+-]?\d+)?)\s+([+-]?\d+)\s*(\S+)/,
            line
          ) do
       [_, r, g, b, merge, expected, name] -> colour(scan, {r, g, b}, merge, expected, name)
@@ -105,7 +105,8 @@ defmodule Vision.Colours.Text do
     rgb = {String.to_integer(r), String.to_integer(g), String.to_integer(b)}
 
     with true <- Enum.all?(Tuple.to_list(rgb), &(&1 in 0..255)),
-         {merge, ""} <- Float.parse(merge) do
+         # As C reads them: "5." and ".5" too.
+         {merge, rest} when rest in ["", "."] <- Float.parse("0" <> merge) do
       colour = %{name: name, rgb: rgb, merge: merge, expected: String.to_integer(expected)}
       %{scan | colours: [colour | scan.colours]}
     else
@@ -129,10 +130,10 @@ defmodule Vision.Colours.Text do
     end
   end
 
-  defp check_counts(%{swallowed: {number, section}}) do
+  defp check_counts(%{swallowed: {number, section}, seen: [only]}) when only != section do
     {:error,
      {number,
-      "the #{title(section)} header needs a blank line before it, or it is taken for the end of #{title(other(section))}"}}
+      "the #{title(section)} header needs a blank line before it, or it is taken for the end of #{title(only)}"}}
   end
 
   defp check_counts(%{colours: [], thresholds: []}),
@@ -153,7 +154,4 @@ defmodule Vision.Colours.Text do
 
   defp title(:colours), do: "[Colors]"
   defp title(:thresholds), do: "[Thresholds]"
-
-  defp other(:colours), do: :thresholds
-  defp other(:thresholds), do: :colours
 end
