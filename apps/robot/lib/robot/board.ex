@@ -12,6 +12,8 @@ defmodule Robot.Board do
   | `:blobs` | `:eye` | `%{blobs: [blob], pan: radians}`, at the time of the picture |
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, since when |
   | `{:peer, id}` | `:link` | as in `Robot.Percept` |
+  | `:estop` | `:link` | the number of the last e-stop, and of the last one cleared here |
+  | `:radio` | `:link` | what was sent, heard, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
   | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil}` |
   | `:pose` | `:executive` | the estimate in the `map` frame |
@@ -52,7 +54,9 @@ defmodule Robot.Board do
     driving: :gate,
     doing: :executive,
     pose: :executive,
-    mission: :pilot
+    mission: :pilot,
+    estop: :link,
+    radio: :link
   }
 
   @doc "Starts the board of a robot."

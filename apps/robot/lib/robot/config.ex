@@ -15,6 +15,8 @@ defmodule Robot.Config do
     * `:send` - `{m, f, a}`; what the mission says goes to `apply(m, f, a ++ [to, message])`; or
       `nil`: nobody hears it
     * `:clock` - `{m, f, a}` giving integer milliseconds, default the monotonic time
+    * `:pace` - `:clock`, or `:manual`: gate and executive act when they are sent `:step` and `:tick`
+      and not by themselves, so that a test decides the order of everything
     * `:estop_file` - where the e-stop latch outlives the machine, or `nil`
     * `:trace` - `{m, f, a}` that is told all that goes in and out, see `Robot.Trace`, or `nil`
   """
@@ -34,6 +36,7 @@ defmodule Robot.Config do
                 companions: [],
                 send: nil,
                 clock: {System, :monotonic_time, [:millisecond]},
+                pace: :clock,
                 estop_file: nil,
                 trace: nil
               ]
@@ -54,6 +57,7 @@ defmodule Robot.Config do
           companions: [module_options()],
           send: call() | nil,
           clock: call(),
+          pace: :clock | :manual,
           estop_file: Path.t() | nil,
           trace: call() | nil
         }
@@ -149,6 +153,7 @@ defmodule Robot.Config do
     do: is_list(list) and Enum.all?(list, &module_options?/1)
 
   defp valid?(:clock, clock), do: call?(clock)
+  defp valid?(:pace, pace), do: pace in [:clock, :manual]
   defp valid?(option, value) when option in [:send, :trace], do: value == nil or call?(value)
   defp valid?(:estop_file, path), do: path == nil or is_binary(path)
 
@@ -161,6 +166,7 @@ defmodule Robot.Config do
   defp allowed(:colours), do: "a %Vision.Colours{} or nil"
   defp allowed(:limits), do: "a keyword list of positive floats for #{Enum.join(@limits, ", ")}"
   defp allowed(:companions), do: "a list of {module, options}"
+  defp allowed(:pace), do: ":clock or :manual"
   defp allowed(:clock), do: "{module, function, arguments}"
   defp allowed(option) when option in [:send, :trace], do: "{module, function, arguments} or nil"
   defp allowed(:estop_file), do: "the path of a file or nil"

@@ -44,6 +44,7 @@ defmodule Robot.Executive do
       board: board,
       mind: Mind.new(profile: config.profile, start: config.start),
       look: nil,
+      behaviour_looks?: false,
       next: System.monotonic_time(:millisecond)
     }
 
@@ -62,7 +63,10 @@ defmodule Robot.Executive do
   end
 
   def handle_cast({:look, pan} = input, s) do
-    Trace.input(s.config, :executive, input, Config.now(s.config))
+    at_ms = Config.now(s.config)
+    Trace.input(s.config, :executive, input, at_ms)
+    # The mission looks by the percept of this tick: its word is not for the next one.
+    unless s.behaviour_looks? or pan == s.look, do: look(pan, s.config, at_ms)
     {:noreply, %{s | look: pan}}
   end
 
@@ -100,7 +104,7 @@ defmodule Robot.Executive do
     report(outcome, config, at_ms)
     Pilot.tick(config.id, percept)
     Trace.effect(config, :executive, {:tick, percept}, at_ms)
-    %{s | mind: mind}
+    %{s | mind: mind, behaviour_looks?: wish.look != nil}
   end
 
   defp look(pan, %{ptz: ptz} = config, at_ms) when pan != nil and ptz != nil do
@@ -118,6 +122,8 @@ defmodule Robot.Executive do
   end
 
   # At absolute times, so that the pace does not drift; ticks that were missed are not made up for.
+  defp schedule(%{config: %{pace: :manual}} = s), do: s
+
   defp schedule(s) do
     next = max(s.next + @period_ms, System.monotonic_time(:millisecond))
     Process.send_after(self(), :tick, next, abs: true)

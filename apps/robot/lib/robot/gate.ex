@@ -113,6 +113,8 @@ defmodule Robot.Gate do
   end
 
   # At absolute times, so that the pace does not drift; steps that were missed are not made up for.
+  defp schedule(%{config: %{pace: :manual}} = s), do: s
+
   defp schedule(s) do
     next = max(s.next + @period_ms, System.monotonic_time(:millisecond))
     Process.send_after(self(), :step, next, abs: true)

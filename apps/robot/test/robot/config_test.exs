@@ -25,6 +25,7 @@ defmodule Robot.ConfigTest do
           companions: [Some.Link],
           send: &send/2,
           clock: nil,
+          pace: :fast,
           estop_file: :file,
           trace: self()
         ] do

@@ -45,7 +45,7 @@ defmodule Robot.TraceTest do
     entries = for {_order, entry} <- :ets.tab2list(table), do: entry
     assert compare(entries, :gate, Reflex.new(profile), &gate/3) > 20
     mind = Mind.new(profile: profile, start: start)
-    assert compare(entries, :executive, {mind, nil}, &executive/3) > 20
+    assert compare(entries, :executive, {mind, nil, false}, &executive/3) > 20
     assert compare(entries, :pilot, nil, &pilot/3) == 6
   end
 
@@ -80,19 +80,23 @@ defmodule Robot.TraceTest do
     {[{:drive, twist, limits}], reflex}
   end
 
-  defp executive({:goal, tag, goal}, _at_ms, {mind, look}),
-    do: {[], {Mind.goal(mind, tag, goal), look}}
+  defp executive({:goal, tag, goal}, _at_ms, {mind, look, looks?}),
+    do: {[], {Mind.goal(mind, tag, goal), look, looks?}}
 
-  defp executive({:anchors, anchors}, _at_ms, {mind, look}),
-    do: {[], {Mind.anchors(mind, anchors), look}}
+  defp executive({:anchors, anchors}, _at_ms, {mind, look, looks?}),
+    do: {[], {Mind.anchors(mind, anchors), look, looks?}}
 
-  defp executive({:look, pan}, _at_ms, {mind, _look}), do: {[], {mind, pan}}
+  defp executive({:look, pan}, _at_ms, {mind, look, looks?}) do
+    news = if looks? or pan in [nil, look], do: [], else: [{:look, pan}]
+    {news, {mind, pan, looks?}}
+  end
 
-  defp executive({:tick, percept}, _at_ms, {mind, look}) do
+  defp executive({:tick, percept}, _at_ms, {mind, look, _looks?}) do
     {wish, outcome, mind} = Mind.tick(mind, percept)
     looks = for pan <- List.wrap(wish.look || look), do: {:look, pan}
     outcomes = for {tag, outcome} <- List.wrap(outcome), do: {:outcome, tag, outcome}
-    {[{:wish, wish}] ++ looks ++ outcomes ++ [{:tick, Mind.percept(mind)}], {mind, look}}
+    effects = [{:wish, wish}] ++ looks ++ outcomes ++ [{:tick, Mind.percept(mind)}]
+    {effects, {mind, look, wish.look != nil}}
   end
 
   defp pilot({:start, module, options}, _at_ms, nil) do
