@@ -16,7 +16,7 @@ defmodule Swarm.MixProject do
     ]
   end
 
-  def application, do: [extra_applications: [:logger, :crypto]]
+  def application, do: [mod: {Swarm.Application, []}, extra_applications: [:logger, :crypto]]
 
   defp elixirc_paths(:test), do: ["lib", "test/support"]
   defp elixirc_paths(_env), do: ["lib"]

@@ -1,0 +1,68 @@
+defmodule Swarm.Directory do
+  @moduledoc """
+  Who is where: groups of processes over all connected nodes, on `:pg`. Groups hold robots (their
+  links), not nodes, so that a hundred robots on one node or on a hundred look alike.
+
+  | group | holds |
+  |---|---|
+  | `{:robot, :mag1}` | the link of that robot |
+  | `:robots` | the links of all robots |
+  | `{:team, :blue}`, `{:service, :camera}` | whoever entered |
+
+  A directory that restarts is empty, and one that is down cannot be entered: who entered watches
+  it (`monitor/0`), and enters again.
+  """
+
+  @type group :: :robots | {:robot, atom()} | {:team, atom()} | {:service, atom()}
+
+  @doc "The scope as a child."
+  @spec child_spec(term()) :: Supervisor.child_spec()
+  def child_spec(_options), do: %{id: __MODULE__, start: {:pg, :start_link, [__MODULE__]}}
+
+  @doc "Enters a local process into groups."
+  @spec enter(pid(), [group()]) :: :ok | {:error, :down}
+  def enter(pid, groups) do
+    Enum.each(groups, &(:ok = :pg.join(__MODULE__, &1, pid)))
+  catch
+    :exit, {:noproc, _call} -> {:error, :down}
+  end
+
+  @doc "Takes a local process out of groups."
+  @spec leave(pid(), [group()]) :: :ok | {:error, :down}
+  def leave(pid, groups) do
+    Enum.each(groups, &:pg.leave(__MODULE__, &1, pid))
+  catch
+    :exit, {:noproc, _call} -> {:error, :down}
+  end
+
+  @doc "Watches the directory of this node: a `:DOWN` message comes when it ends, at once if there is none."
+  @spec monitor() :: reference()
+  def monitor, do: Process.monitor(__MODULE__)
+
+  @doc "The link of a robot, or `nil`. One on this node is preferred."
+  @spec whereis(robot :: atom()) :: pid() | nil
+  def whereis(robot) do
+    case sorted({:robot, robot}) do
+      [] -> nil
+      [first | _] = pids -> Enum.find(pids, first, &(node(&1) == node()))
+    end
+  end
+
+  @doc "All members of a group."
+  @spec members(group()) :: [pid()]
+  def members(group), do: sorted(group)
+
+  @doc "The names of all robots, sorted."
+  @spec robots() :: [atom()]
+  def robots do
+    if running?(),
+      do: Enum.sort(for {:robot, robot} <- :pg.which_groups(__MODULE__), do: robot),
+      else: []
+  end
+
+  # The groups are read from a table that is gone with the scope.
+  defp sorted(group),
+    do: if(running?(), do: Enum.sort(:pg.get_members(__MODULE__, group)), else: [])
+
+  defp running?, do: :ets.whereis(__MODULE__) != :undefined
+end

@@ -1,0 +1,320 @@
+defmodule Swarm.Link do
+  @moduledoc """
+  A robot's ear and mouth, a companion of its pilot (`Robot.Companion`).
+
+  Ear: whatever arrives passes `Swarm.Message.check/1`; what is malformed is dropped and counted.
+  Heartbeats become peers on the robot's board, everything else goes to the pilot. Mouth: what the
+  mission says goes out, and five times a second a heartbeat, with what the board says of the robot.
+
+  An e-stop spreads with the heartbeats, numbered, so that one which a person has cleared here is
+  not caught again from a robot that is still to be reset.
+
+  `join/2` makes a config with a link. Its options:
+
+    * `:transport` - `{m, f, a}`; a message goes to `apply(m, f, a ++ [from, ids, message])`, and
+      arrives by `hear/2`. Default: straight to the links of these robots, wherever they are
+    * `:boot` - a number that grows with every start; default the time of day
+
+  Messages between nodes are sent so that nothing ever waits for a robot that has gone silent.
+  """
+  use GenServer
+  alias Hal.Event
+  alias Robot.{Board, Config, Gate, Names, Percept, Pilot}
+  alias Swarm.{Directory, Heartbeat, Message, Peers}
+  alias Swarm.Missions.Manual
+
+  @behaviour Robot.Companion
+
+  @tick_ms 100
+  @beat_every 2
+  @rivals_every 10
+  @retry_ms 100
+  @longest_retry_ms 5_000
+
+  @doc "The config of a robot that talks: with a link, which its mission speaks through."
+  @spec join(Config.t(), keyword()) :: Config.t()
+  def join(%Config{} = config, options \\ []) do
+    options = Keyword.validate!(options, [:boot, transport: {__MODULE__, :transmit, []}])
+    companions = config.companions ++ [{__MODULE__, options}]
+    %{config | send: {__MODULE__, :say, [config.id]}, companions: companions}
+  end
+
+  @impl Robot.Companion
+  def child_spec({config, options}),
+    do: %{id: __MODULE__, start: {__MODULE__, :start_link, [config, options]}}
+
+  @doc "Starts the link of a robot, as its supervisor does."
+  @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
+  def start_link(%Config{} = config, options),
+    do: GenServer.start_link(__MODULE__, {config, options}, name: Names.via(config.id, :link))
+
+  @doc "Sends a message to one robot, to several, or to all others."
+  @spec say(robot :: atom(), to :: atom() | [atom()] | :all, Message.t()) :: :ok
+  def say(robot, to, message), do: GenServer.cast(Names.via(robot, :link), {:say, to, message})
+
+  @doc "Something arrived for a robot of this node, by whatever transport."
+  @spec hear(robot :: atom(), term()) :: :ok
+  def hear(robot, term), do: GenServer.cast(Names.via(robot, :link), {:hear, term})
+
+  @doc "The transport between links: lost where a robot is not to be reached now."
+  @spec transmit(from :: atom(), [atom()], Message.t()) :: :ok
+  def transmit(_from, ids, message) do
+    for id <- ids, link <- Directory.members({:robot, id}), do: post(link, {:hear, message})
+    :ok
+  end
+
+  # Without these options a send waits for a full buffer, or dials a robot that is gone.
+  defp post(link, message) do
+    :erlang.send(link, {:"$gen_cast", message}, [:nosuspend, :noconnect])
+    :ok
+  end
+
+  @impl GenServer
+  def init({%Config{id: id} = config, options}) do
+    board = Board.find!(id)
+
+    {stop, cleared} =
+      case Board.fetch(board, :estop, :infinity) do
+        {:ok, numbers, _at_ms} -> numbers
+        :error -> {0, 0}
+      end
+
+    s = %{
+      config: config,
+      id: id,
+      board: board,
+      transport: options[:transport] || {__MODULE__, :transmit, []},
+      boot: options[:boot] || System.system_time(:millisecond),
+      peers: Peers.new(id),
+      stop: stop,
+      cleared: cleared,
+      ticks: 0,
+      sequence: 0,
+      counts: %{sent: 0, heard: 0, rejected: %{}},
+      scope: nil,
+      gave_way?: false,
+      retry_ms: @retry_ms,
+      next: System.monotonic_time(:millisecond)
+    }
+
+    {:ok, schedule(s), {:continue, :enter}}
+  end
+
+  @impl GenServer
+  def handle_continue(:enter, s) do
+    # A stop that was written down by the link before this one may not have reached the gate.
+    if s.stop > s.cleared, do: :ok = Gate.estop(s.id)
+    {:noreply, enter(s)}
+  end
+
+  @impl GenServer
+  def handle_cast({:say, to, message}, s), do: {:noreply, speak(s, to, message)}
+
+  def handle_cast({:hear, term}, s) do
+    case Message.check(term) do
+      {:ok, message} -> {:noreply, heard(count(s, :heard), message)}
+      {:error, reason} -> {:noreply, reject(s, reason)}
+    end
+  end
+
+  def handle_cast({:command, command, reply_to}, s) do
+    {answer, s} = obey(command, s)
+    :erlang.send(reply_to, {reply_to, answer}, [:nosuspend, :noconnect])
+    {:noreply, s}
+  end
+
+  def handle_cast({:rival, other, link}, s), do: {:noreply, rival(s, other, link)}
+  def handle_cast(_unknown, s), do: {:noreply, reject(s, :not_a_message)}
+
+  @impl GenServer
+  def handle_info(:tick, s), do: {:noreply, s |> tick(Config.now(s.config)) |> schedule()}
+  def handle_info(:enter, s), do: {:noreply, enter(s)}
+
+  def handle_info({:DOWN, scope, :process, _scope, _reason}, %{scope: scope} = s),
+    do: {:noreply, retry(%{s | scope: nil})}
+
+  def handle_info(_unknown, s), do: {:noreply, reject(s, :not_a_message)}
+
+  defp heard(s, %Message{kind: :heartbeat, from: from, body: beat}) do
+    at_ms = Config.now(s.config)
+    s = show(%{s | peers: Peers.hear(s.peers, from, beat, at_ms)}, at_ms)
+    if beat.estop > s.stop, do: estop(s, beat.estop), else: s
+  end
+
+  defp heard(s, message) do
+    Pilot.message(s.id, message)
+    s
+  end
+
+  # How others are grows old by itself, so what the board shows of them is written anew each time.
+  defp tick(s, at_ms) do
+    s = show(%{s | ticks: s.ticks + 1}, at_ms)
+    Board.put(s.board, :link, :radio, s.counts, at_ms)
+    if rem(s.ticks, @rivals_every) == 0, do: challenge(s)
+    if rem(s.ticks, @beat_every) == 0, do: beat(s, at_ms), else: s
+  end
+
+  defp show(s, at_ms) do
+    for {id, peer} <- Peers.percepts(s.peers, at_ms),
+        do: Board.put(s.board, :link, {:peer, id}, peer, peer.at_ms)
+
+    s
+  end
+
+  # A robot that has no pose yet has nothing to say; one whose executive fell stands where it was.
+  defp beat(s, at_ms) do
+    case Board.fetch(s.board, :pose, :infinity, at_ms) do
+      {:ok, pose, _then} ->
+        percept = %{Percept.Snapshot.take(s.board, s.config.profile, at_ms) | pose: pose}
+        sender = {s.boot, s.sequence + 1}
+        heard = Peers.heard(s.peers, at_ms)
+        beat = Heartbeat.new(sender, percept, claim(s.board), heard, s.stop)
+        message = Message.new(s.id, :heartbeat, beat)
+        speak(%{s | sequence: s.sequence + 1}, :all, message)
+
+      :error ->
+        s
+    end
+  end
+
+  defp claim(board) do
+    case Board.fetch(board, :mission, :infinity) do
+      {:ok, %{state: :idle}, _at_ms} -> %{standing: true}
+      {:ok, %{claim: claim}, _at_ms} -> claim
+      :error -> %{}
+    end
+  end
+
+  defp speak(%{gave_way?: true} = s, _to, _message), do: s
+
+  defp speak(s, to, message) do
+    ids = addressed(to) -- [s.id]
+    {m, f, a} = s.transport
+    apply(m, f, a ++ [s.id, ids, message])
+    count(s, :sent, length(ids))
+  end
+
+  defp addressed(:all), do: Directory.robots()
+  defp addressed(ids) when is_list(ids), do: ids
+  defp addressed(id), do: [id]
+
+  defp obey(:estop, s), do: {:ok, estop(s, max(s.stop, s.cleared) + 1)}
+
+  defp obey(:reset, s) do
+    :ok = Gate.reset(s.id)
+    {:ok, numbered(%{s | cleared: s.stop})}
+  end
+
+  defp obey(:status, s), do: {{:ok, Board.entries(s.board)}, s}
+  defp obey(:start, s), do: {run(s, s.config.mission, :start), s}
+
+  # A robot that has no mission stands already.
+  defp obey(:stop, s) do
+    case Pilot.command(s.id, :stop) do
+      {:error, :idle} -> {:ok, s}
+      answer -> {answer, s}
+    end
+  end
+
+  defp obey(command, s) do
+    cond do
+      Manual.command?(command) -> {run(s, {Manual, []}, command), s}
+      running(s.board) == :idle -> {{:error, :idle}, s}
+      true -> {Pilot.command(s.id, command), s}
+    end
+  end
+
+  # A mission that is running already is not begun anew: it takes the command as it is.
+  defp run(_s, nil, _command), do: {:error, :no_mission}
+
+  defp run(s, {module, options}, command) do
+    with :ok <- if(running(s.board) == module, do: :ok, else: Pilot.start(s.id, module, options)),
+         do: Pilot.command(s.id, command)
+  end
+
+  defp running(board) do
+    case Board.fetch(board, :mission, :infinity) do
+      {:ok, %{state: {module, _phase}}, _at_ms} -> module
+      _idle_or_none -> :idle
+    end
+  end
+
+  defp estop(%{cleared: cleared} = s, stop) when stop <= cleared, do: numbered(%{s | stop: stop})
+
+  # Written down first: a link that restarts in between knows that there is something to spread.
+  defp estop(s, stop) do
+    s = numbered(%{s | stop: stop})
+    :ok = Gate.estop(s.id)
+    s
+  end
+
+  defp numbered(s) do
+    Board.put(s.board, :link, :estop, {s.stop, s.cleared}, Config.now(s.config))
+    s
+  end
+
+  defp groups(s), do: [:robots, {:robot, s.id}]
+
+  defp enter(%{gave_way?: true} = s), do: s
+
+  defp enter(s) do
+    scope = Directory.monitor()
+
+    case Directory.enter(self(), groups(s)) do
+      :ok ->
+        challenge(s)
+        %{s | scope: scope, retry_ms: @retry_ms}
+
+      {:error, :down} ->
+        Process.demonitor(scope, [:flush])
+        retry(s)
+    end
+  end
+
+  defp retry(s) do
+    Process.send_after(self(), :enter, s.retry_ms)
+    %{s | retry_ms: min(2 * s.retry_ms, @longest_retry_ms)}
+  end
+
+  # Two robots of one name: both tell each other who they are, and the later one gives way.
+  defp challenge(s) do
+    for link <- Directory.members({:robot, s.id}),
+        link != self(),
+        not s.gave_way?,
+        do: post(link, {:rival, {s.boot, node()}, self()})
+  end
+
+  defp rival(s, other, link) do
+    mine = {s.boot, node()}
+
+    cond do
+      mine > other ->
+        Directory.leave(self(), groups(s))
+        Pilot.stop(s.id)
+        Event.execute([:swarm, :link, :duplicate_id], %{}, %{robot: s.id, other: node(link)})
+        %{s | gave_way?: true}
+
+      mine < other ->
+        post(link, {:rival, mine, self()})
+        s
+
+      true ->
+        s
+    end
+  end
+
+  defp count(s, what, n \\ 1), do: %{s | counts: Map.update!(s.counts, what, &(&1 + n))}
+
+  defp reject(s, reason) do
+    rejected = Map.update(s.counts.rejected, reason, 1, &(&1 + 1))
+    %{s | counts: %{s.counts | rejected: rejected}}
+  end
+
+  defp schedule(%{config: %{pace: :manual}} = s), do: s
+
+  defp schedule(s) do
+    next = max(s.next + @tick_ms, System.monotonic_time(:millisecond))
+    Process.send_after(self(), :tick, next, abs: true)
+    %{s | next: next}
+  end
+end

@@ -1,0 +1,39 @@
+defmodule Swarm.Supervisor do
+  @moduledoc """
+  What a node has one of, however many robots live on it.
+
+      Swarm.Supervisor (no restarts to give)
+      |-- Robot.Names            who is who on this node
+      |-- Swarm.Parts (one_for_one)
+      |   `-- Swarm.Directory    who is where in the fleet
+      `-- Robot.Fleet            the robots
+
+  Robots do without the directory: they drive on, and enter a new one by themselves. A fleet that
+  ended, and names that are gone, cannot be replaced by empty ones, under which the node would look
+  well without its robots: then the application ends, and the machine's supervisor starts it afresh.
+  """
+  use Supervisor
+
+  defmodule Parts do
+    @moduledoc false
+    use Supervisor
+
+    @doc false
+    def start_link(_options), do: Supervisor.start_link(__MODULE__, [])
+
+    @impl Supervisor
+    def init([]) do
+      Supervisor.init([Swarm.Directory], strategy: :one_for_one, max_restarts: 5, max_seconds: 5)
+    end
+  end
+
+  @doc "Starts the node's parts, without a robot."
+  @spec start_link(keyword()) :: Supervisor.on_start()
+  def start_link(_options), do: Supervisor.start_link(__MODULE__, [])
+
+  @impl Supervisor
+  def init([]) do
+    children = [Robot.Names, Parts, {Robot.Fleet, name: Robot.Fleet}]
+    Supervisor.init(children, strategy: :rest_for_one, max_restarts: 0)
+  end
+end
