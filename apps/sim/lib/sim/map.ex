@@ -41,7 +41,8 @@ defmodule Sim.Map do
 
   @doc "Width and height in metres."
   @spec size(t()) :: {float(), float()}
-  def size(%__MODULE__{} = map), do: {map.width * map.cell, map.height * map.cell}
+  def size(%__MODULE__{} = map),
+    do: {Float.round(map.width * map.cell, 6), Float.round(map.height * map.cell, 6)}
 
   @doc """
   Whether there is wall at this point.

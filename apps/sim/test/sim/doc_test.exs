@@ -1,6 +1,7 @@
 defmodule Sim.DocTest do
   use ExUnit.Case, async: true
   doctest Sim.Map
+  doctest Sim.Map.Pgm
   doctest Sim.Noise
   doctest Sim.Palette
   doctest Sim.Scene
