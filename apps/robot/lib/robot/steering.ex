@@ -11,18 +11,17 @@ defmodule Robot.Steering do
 
   # A part of the true braking power: the rest is for the lag of wheels and of a tick.
   @braking 0.6
-  @half_pi :math.pi() / 2
 
   @doc """
-  The speed of a robot with this heading that wants the velocity. With `reverse: true` it may
-  drive backwards instead of turning round.
+  The speed of a robot with this heading that wants the velocity. With `reverse_from:` it
+  drives backwards instead of turning round when it would have to turn by more than that (radians).
 
       iex> profile = Hal.Profile.magellan()
       iex> Robot.Steering.twist({0.3, 0.0}, 0.0, profile)
       %Hal.Twist{linear: 0.3, turn: 0.0}
       iex> Robot.Steering.twist({-0.3, 0.0}, 0.0, profile).linear
       0.0
-      iex> Robot.Steering.twist({-0.3, 0.0}, 0.0, profile, reverse: true)
+      iex> Robot.Steering.twist({-0.3, 0.0}, 0.0, profile, reverse_from: 2.0)
       %Hal.Twist{linear: -0.3, turn: 0.0}
   """
   @spec twist({float(), float()}, float(), Profile.t(), keyword()) :: Twist.t()
@@ -35,7 +34,7 @@ defmodule Robot.Steering do
       error = turn_error(:math.atan2(vy, vx) - heading)
       speed = min(speed, profile.max_linear)
 
-      if Keyword.get(options, :reverse, false) and abs(error) > @half_pi do
+      if abs(error) > Keyword.get(options, :reverse_from, :infinity) do
         toward(-speed, Pose.wrap(error + :math.pi()), profile)
       else
         toward(speed, error, profile)

@@ -36,7 +36,10 @@ defmodule Robot.Behaviour.Avoid do
     state = %{
       inner: Options.check!(options, :inner, &match?({_, _}, &1), "a behaviour"),
       discs: Options.check!(options, :discs, &discs?/1, "[{x, y, radius}]"),
-      progress: nil
+      progress: nil,
+      standing: %{},
+      backing?: false,
+      velocity: nil
     }
 
     {__MODULE__, state}
@@ -77,12 +80,12 @@ defmodule Robot.Behaviour.Avoid do
     speed = :math.sqrt(vx * vx + vy * vy)
 
     if speed < 0.02,
-      do: {wish, %{state | progress: nil}},
+      do: {wish, %{state | progress: nil, velocity: nil}},
       else: bend(wish, speed, percept, state)
   end
 
   defp bend(wish, speed, percept, state) do
-    all = Neighbours.robots(percept)
+    {all, standing} = percept |> Neighbours.robots() |> Neighbours.steady(state.standing)
     robots = Neighbours.near(all)
     bodies = Enum.map(all, fn %{at: {x, y}, radius: radius} -> {x, y, radius} end)
     things = Neighbours.unknown(percept, bodies ++ state.discs)
@@ -102,11 +105,25 @@ defmodule Robot.Behaviour.Avoid do
       |> keep_right(aside, way, robots, percept)
 
     planes = planes(percept, robots, things ++ standing(state.discs, percept))
-    velocity = Orca.solve(planes, preferred, percept.profile.max_linear)
-    twist = twist(wish, velocity, preferred, percept)
+
+    velocity =
+      planes
+      |> Orca.solve(preferred, percept.profile.max_linear)
+      |> calm(preferred, state.velocity)
+
+    twist = twist(wish, velocity, preferred, percept, state.backing?)
     braked = brake(wish, twist, percept, robots)
     hindered? = braked.twist != twist or far?(velocity, preferred) or stopped?(percept)
-    {braked, %{state | progress: Progress.hindered(progress, hindered?)}}
+
+    state = %{
+      state
+      | progress: Progress.hindered(progress, hindered?),
+        standing: standing,
+        velocity: velocity,
+        backing?: if(twist.linear == 0.0, do: state.backing?, else: twist.linear < 0)
+    }
+
+    {braked, state}
   end
 
   # The corners of the way round what stands; where there is none, the straight one.
@@ -200,7 +217,16 @@ defmodule Robot.Behaviour.Avoid do
   defp standing(discs, percept) do
     for {x, y, radius} <- discs do
       gap = Pose.distance(percept.pose, {x, y}) - radius - percept.profile.radius
-      %{at: {x, y}, velocity: {0.0, 0.0}, radius: radius, share: 1.0, standing?: true, gap: gap}
+
+      %{
+        id: nil,
+        at: {x, y},
+        velocity: {0.0, 0.0},
+        radius: radius,
+        share: 1.0,
+        standing?: true,
+        gap: gap
+      }
     end
   end
 
@@ -224,7 +250,7 @@ defmodule Robot.Behaviour.Avoid do
 
   defp own_velocity(_percept), do: {0.0, 0.0}
 
-  defp twist(wish, velocity, preferred, percept) do
+  defp twist(wish, velocity, preferred, percept, backing?) do
     cond do
       near?(velocity, wish.velocity) ->
         wish.twist
@@ -237,13 +263,24 @@ defmodule Robot.Behaviour.Avoid do
 
       true ->
         reverse? = wish.reverse? or size(velocity) < 0.15
-        Steering.twist(velocity, percept.pose.heading, percept.profile, reverse: reverse?)
+        from = if backing?, do: 1.2, else: 2.0
+        from = if reverse?, do: from, else: :infinity
+        Steering.twist(velocity, percept.pose.heading, percept.profile, reverse_from: from)
     end
   end
 
   defp far?({ax, ay}, {bx, by}), do: abs(ax - bx) + abs(ay - by) > 0.05
   defp stopped?(%{driving: %{limits: limits}}), do: :near in limits or :bumper in limits
   defp stopped?(_percept), do: false
+  # What is bent is smoothed: what others tell of themselves wobbles, and wheels turn slowly.
+  defp calm(velocity, _preferred, nil), do: velocity
+
+  defp calm({vx, vy} = velocity, preferred, {lx, ly}) do
+    if near?(velocity, preferred),
+      do: velocity,
+      else: {0.5 * vx + 0.5 * lx, 0.5 * vy + 0.5 * ly}
+  end
+
   defp near?({ax, ay}, {bx, by}), do: abs(ax - bx) + abs(ay - by) < 1.0e-3
   defp size({x, y}), do: :math.sqrt(x * x + y * y)
 

@@ -41,6 +41,7 @@ defmodule Robot.Behaviour.Follow do
       speed: Options.optional!(options, :speed, 0.01, 10.0),
       mode: :going,
       turning?: true,
+      backing?: false,
       distance: nil
     }
 
@@ -111,7 +112,8 @@ defmodule Robot.Behaviour.Follow do
     uy = vy + scale * (state.target.y - pose.y)
     {ux, uy} = clip({ux, uy}, top)
     reverse? = distance < @back_up
-    twist = Steering.twist({ux, uy}, pose.heading, profile, reverse: reverse?)
+    from = reverse_from(reverse?, state.backing?)
+    twist = Steering.twist({ux, uy}, pose.heading, profile, reverse_from: from)
 
     wish =
       Wish.new(:follow, twist, 0.5,
@@ -120,8 +122,15 @@ defmodule Robot.Behaviour.Follow do
         reverse?: reverse?
       )
 
-    {:running, wish, {__MODULE__, %{state | turning?: still?}}}
+    {:running, wish, {__MODULE__, %{state | turning?: still?, backing?: backing?(twist, state)}}}
   end
+
+  # Who backs up goes on with it, or it would turn to and fro where both are equally good.
+  defp reverse_from(false, _backing?), do: :infinity
+  defp reverse_from(true, backing?), do: if(backing?, do: 1.2, else: 2.0)
+
+  defp backing?(%Twist{linear: linear}, state) when linear == 0.0, do: state.backing?
+  defp backing?(%Twist{linear: linear}, _state), do: linear < 0
 
   defp clip({x, y}, top) do
     size = :math.sqrt(x * x + y * y)

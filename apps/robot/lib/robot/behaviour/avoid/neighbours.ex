@@ -8,6 +8,7 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
 
   @typedoc "`share`: the part of the evasion that is ours."
   @type t :: %{
+          id: atom(),
           at: Pose.point(),
           velocity: {float(), float()},
           radius: float(),
@@ -21,6 +22,9 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   @range 4.0
   @most 10
   @standing 0.05
+  # Share of the latest in the mean place of one that stands, and how far off (metres) it has moved after all.
+  @recent 0.15
+  @moved 0.25
   # A pose that was not renewed for this long (seconds) is no longer carried on.
   @carry_s 0.5
   @sonar_range 1.5
@@ -32,15 +36,39 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   @spec robots(Percept.t()) :: [t()]
   def robots(%Percept{pose: pose} = percept) do
     percept.peers
-    |> Enum.map(fn {_id, peer} -> disc(peer, pose, percept) end)
+    |> Enum.map(fn {id, peer} -> disc(id, peer, pose, percept) end)
     |> Enum.sort_by(& &1.gap)
+  end
+
+  @doc """
+  The same, where those that stand are taken to stand at the mean of what they lately told:
+  what they tell wobbles, they do not. Gives the means to hand in again at the next tick.
+  """
+  @spec steady([t()], %{atom() => Pose.point()}) :: {[t()], %{atom() => Pose.point()}}
+  def steady(robots, means) do
+    Enum.map_reduce(robots, %{}, fn
+      %{standing?: true, id: id, at: at} = robot, kept ->
+        mean = mean(means[id], at)
+        {%{robot | at: mean}, Map.put(kept, id, mean)}
+
+      robot, kept ->
+        {robot, kept}
+    end)
+  end
+
+  defp mean(nil, at), do: at
+
+  defp mean({mx, my} = mean, {x, y} = at) do
+    if Pose.distance(mean, at) > @moved,
+      do: at,
+      else: {mx + @recent * (x - mx), my + @recent * (y - my)}
   end
 
   @doc "The nearest of them, as many as matter for the next seconds."
   @spec near([t()]) :: [t()]
   def near(robots), do: robots |> Enum.take_while(&(&1.gap < @range)) |> Enum.take(@most)
 
-  defp disc(peer, pose, percept) do
+  defp disc(id, peer, pose, percept) do
     %{pose: at, twist: %Twist{linear: linear}, radius: radius, mode: mode} = peer
     age_s = max(percept.at_ms - peer.at_ms, 0) / 1000
     linear = if mode == :dead, do: 0.0, else: linear
@@ -53,6 +81,7 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
     grown = abs(linear) * min(max(age_s - @carry_s, 0.0), 1.0)
 
     %{
+      id: id,
       at: place,
       velocity: {vx, vy},
       radius: radius + grown,
@@ -78,6 +107,7 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
         {x, y} = Pose.place(pose, point),
         not Enum.any?(known, &explains?(&1, x, y)) do
       %{
+        id: nil,
         at: {x, y},
         velocity: {0.0, 0.0},
         radius: @sonar_radius,
