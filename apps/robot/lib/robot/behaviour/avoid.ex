@@ -5,8 +5,8 @@ defmodule Robot.Behaviour.Avoid do
   A wish with a velocity is bent: round standing robots and discs on the shortest way
   (`Robot.Detour`), past moving ones by `Robot.Orca`, a little to the right of those who come, and
   away from what only the sonars see. A wish without one is only slowed down (`.Brake`).
-  Who gets no nearer for some seconds steps aside (`.Progress`). A robot with nobody
-  about gets its wish unchanged.
+  Who gets no nearer for some seconds goes another way for a while (`.Progress`), and who stands in
+  another's way makes room (`.Yield`). A robot with nobody about gets its wish unchanged.
 
   Options: `inner`, the behaviour (required); `discs`, `[{x, y, radius}]` in the map frame, metres:
   further standing things.
@@ -14,7 +14,7 @@ defmodule Robot.Behaviour.Avoid do
   @behaviour Robot.Behaviour
   alias Hal.{Pose, Twist}
   alias Robot.{Behaviour, Detour, Orca, Percept, Steering, Wish}
-  alias Robot.Behaviour.Avoid.{Brake, Neighbours, Progress}
+  alias Robot.Behaviour.Avoid.{Brake, Neighbours, Progress, Yield}
   alias Robot.Behaviour.Options
 
   # Metres kept to others: by plan round standing ones, and by reaction to standing and moving ones.
@@ -23,8 +23,11 @@ defmodule Robot.Behaviour.Avoid do
   @standing_margin 0.12
   @moving_margin 0.15
   @tightest 0.06
+  @closest 0.04
   # A roomy way may be this much longer (metres) than a tight one.
   @roomy 2.0
+  # m/s of one who makes way.
+  @aside 0.2
   @horizon_s 2.5
   @standing_horizon_s 1.2
   @to_the_right :math.pi() / 12
@@ -39,7 +42,8 @@ defmodule Robot.Behaviour.Avoid do
       progress: nil,
       standing: %{},
       backing?: false,
-      velocity: nil
+      velocity: nil,
+      yield: nil
     }
 
     {__MODULE__, state}
@@ -79,9 +83,34 @@ defmodule Robot.Behaviour.Avoid do
   defp safe(%Wish{velocity: {vx, vy}} = wish, percept, state) do
     speed = :math.sqrt(vx * vx + vy * vy)
 
-    if speed < 0.02,
-      do: {wish, %{state | progress: nil, velocity: nil}},
+    if speed < 0.02 or Yield.now?(state.yield, percept.at_ms),
+      do: stay(wish, percept, %{state | progress: nil, velocity: nil}),
       else: bend(wish, speed, percept, state)
+  end
+
+  # In its place it stands, unless somebody cannot get by.
+  defp stay(wish, percept, state) do
+    robots = percept |> Neighbours.robots() |> Neighbours.near()
+
+    case Yield.note(state.yield, robots, percept.pose, percept.at_ms) do
+      {nil, yield} ->
+        {wish, %{state | yield: yield}}
+
+      {{x, y}, yield} ->
+        velocity = {@aside * x, @aside * y}
+        twist = Steering.twist(velocity, percept.pose.heading, percept.profile, reverse_from: 1.6)
+
+        wish = %{
+          wish
+          | by: :make_way,
+            twist: twist,
+            velocity: velocity,
+            goal: nil,
+            reverse?: true
+        }
+
+        bend(wish, @aside, percept, %{state | yield: yield})
+    end
   end
 
   defp bend(wish, speed, percept, state) do
@@ -239,7 +268,7 @@ defmodule Robot.Behaviour.Avoid do
       margin = if other.standing?, do: @standing_margin, else: @moving_margin
       horizon_s = if other.standing?, do: @standing_horizon_s, else: @horizon_s
       # The margin is a wish; only what is nearer than the tightest is pushed away from.
-      margin = max(@tightest, min(margin, gap - 0.01))
+      margin = max(@closest, min(margin, gap - 0.01))
       radius = percept.profile.radius + other.radius + margin
       Orca.half_plane(at, own, other.at, other.velocity, radius, horizon_s, other.share)
     end

@@ -11,7 +11,9 @@ defmodule Robot.Behaviour.Avoid.Brake do
   # How long a decision holds: a tick, the age of what was heard, the lag of wheels.
   @delay_s 0.35
   @samples [0.2, 0.4, 0.6, 0.8, 1.0, 1.3]
+  # Metres between bodies; one who stands is where he said, and tight places must be passed.
   @margin 0.08
+  @standing_margin 0.03
   @parting 0.02
   @parts [1.0, 0.7, 0.45, 0.2]
 
@@ -33,7 +35,7 @@ defmodule Robot.Behaviour.Avoid.Brake do
   end
 
   # Where the other will be, relative to this body, at each sample; it brakes too.
-  defp path(%{at: {x, y}, velocity: {vx, vy}, radius: radius}, pose, profile) do
+  defp path(%{at: {x, y}, velocity: {vx, vy}, radius: radius} = other, pose, profile) do
     dx = x - pose.x
     dy = y - pose.y
     c = :math.cos(pose.heading)
@@ -52,7 +54,8 @@ defmodule Robot.Behaviour.Avoid.Brake do
         {bx + k * bvx, by + k * bvy}
       end
 
-    limit = profile.radius + radius + @margin
+    margin = if other.standing?, do: @standing_margin, else: @margin
+    limit = profile.radius + radius + margin
     {places, limit, :math.sqrt(bx * bx + by * by)}
   end
 

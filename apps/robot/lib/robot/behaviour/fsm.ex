@@ -1,0 +1,67 @@
+defmodule Robot.Behaviour.Fsm do
+  @moduledoc """
+  A finite state machine of behaviours, whose outcomes pick the transition (R11, R12).
+
+      Fsm.new(
+        start: :search,
+        states: %{search: {FindBlob, colour: "Yellow"}, go: {TrackBlob, []}, rest: {Rest, []}},
+        next: %{{:search, 1} => :go, {:search, 0} => :rest}
+      )
+
+  A state is entered afresh each time. An outcome without a row in `next` ends the machine with
+  that outcome; `{state, :any}` is the row for outcomes without one of their own.
+  """
+  @behaviour Robot.Behaviour
+  alias Robot.Behaviour
+  alias Robot.Behaviour.Options
+
+  # Transitions within one tick; more is a machine that turns in circles and takes the next tick.
+  @most 8
+
+  @impl Behaviour
+  def new(options) do
+    options = Keyword.validate!(options, [:start, :states, next: %{}])
+    states = Options.check!(options, :states, &is_map/1, "a map of states")
+    next = Options.check!(options, :next, &is_map/1, "a map of transitions")
+    start = Options.check!(options, :start, &is_map_key(states, &1), "one of the states")
+
+    for {{from, _outcome}, to} <- next, state <- [from, to], not is_map_key(states, state) do
+      raise ArgumentError, "option next names #{inspect(state)}, which is no state"
+    end
+
+    {__MODULE__, %{states: states, next: next, at: start, running: enter(states, start)}}
+  end
+
+  defp enter(states, name) do
+    {module, options} = Map.fetch!(states, name)
+    module.new(options)
+  end
+
+  @doc "The name of the present state."
+  @spec at(Behaviour.t()) :: term()
+  def at({__MODULE__, %{at: at}}), do: at
+
+  @impl Behaviour
+  def tick(percept, state), do: tick(percept, state, @most)
+
+  defp tick(percept, state, left) do
+    case Behaviour.tick(state.running, percept) do
+      {:running, wish, running} -> {:running, wish, {__MODULE__, %{state | running: running}}}
+      {:done, outcome, wish} -> follow(percept, state, outcome, wish, left)
+    end
+  end
+
+  defp follow(percept, state, outcome, wish, left) do
+    case Map.get(state.next, {state.at, outcome}) || Map.get(state.next, {state.at, :any}) do
+      nil ->
+        {:done, outcome, wish}
+
+      to ->
+        state = %{state | at: to, running: enter(state.states, to)}
+
+        if left > 0,
+          do: tick(percept, state, left - 1),
+          else: {:running, wish, {__MODULE__, state}}
+    end
+  end
+end

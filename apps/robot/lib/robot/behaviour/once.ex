@@ -1,0 +1,21 @@
+defmodule Robot.Behaviour.Once do
+  @moduledoc """
+  Runs a function of the percept once and ends with the outcome it gives (R11): for checks and
+  for choosing between ways. Options: `run`, `(Robot.Percept.t() -> integer)` (required).
+  """
+  @behaviour Robot.Behaviour
+  alias Robot.Behaviour.Options
+
+  @impl Robot.Behaviour
+  def new(options) do
+    options = Keyword.validate!(options, [:run])
+    {__MODULE__, Options.check!(options, :run, &is_function(&1, 1), "a function of a percept")}
+  end
+
+  @impl Robot.Behaviour
+  def tick(percept, run) do
+    outcome = run.(percept)
+    true = is_integer(outcome)
+    {:done, outcome, nil}
+  end
+end

@@ -1,0 +1,36 @@
+defmodule Robot.Behaviour.Parallel do
+  @moduledoc """
+  Runs behaviours side by side (R11); the heaviest of their wishes counts. It ends when all have
+  ended, or with `ends: :any` when the first has. Outcome: the last, or first, one's.
+
+  Options: `parts`, a list of behaviours (required, at least one); `ends`, `:all` (default) or `:any`.
+  """
+  @behaviour Robot.Behaviour
+  alias Robot.{Arbiter, Behaviour}
+  alias Robot.Behaviour.Options
+
+  @impl Behaviour
+  def new(options) do
+    options = Keyword.validate!(options, [:parts, ends: :all])
+    parts = Options.check!(options, :parts, &match?([_ | _], &1), "a list of behaviours")
+    ends = Options.check!(options, :ends, &(&1 in [:all, :any]), ":all or :any")
+    {__MODULE__, %{parts: parts, ends: ends, last_by: nil}}
+  end
+
+  @impl Behaviour
+  def tick(percept, state) do
+    results = Enum.map(state.parts, &Behaviour.tick(&1, percept))
+    wish = results |> Enum.map(&wish/1) |> Arbiter.choose(state.last_by)
+    outcomes = for {:done, outcome, _wish} <- results, do: outcome
+    running = for {:running, _wish, behaviour} <- results, do: behaviour
+
+    case {state.ends, outcomes, running} do
+      {:any, [outcome | _], _running} -> {:done, outcome, wish}
+      {_ends, [_ | _], []} -> {:done, List.last(outcomes), wish}
+      _ -> {:running, wish, {__MODULE__, %{state | parts: running, last_by: wish && wish.by}}}
+    end
+  end
+
+  defp wish({:running, wish, _behaviour}), do: wish
+  defp wish({:done, _outcome, wish}), do: wish
+end

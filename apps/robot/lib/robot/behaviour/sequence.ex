@@ -1,0 +1,36 @@
+defmodule Robot.Behaviour.Sequence do
+  @moduledoc """
+  Runs behaviours one after another (R11). Its outcome is the last one's. With `while` (default
+  none), an outcome, it ends as soon as one ends otherwise, with that one's outcome.
+
+  Options: `steps`, a list of behaviours (required, at least one), `while`.
+  """
+  @behaviour Robot.Behaviour
+  alias Robot.Behaviour
+  alias Robot.Behaviour.Options
+
+  @impl Behaviour
+  def new(options) do
+    options = Keyword.validate!(options, [:steps, while: nil])
+    steps = Options.check!(options, :steps, &match?([_ | _], &1), "a list of behaviours")
+    while = Options.check!(options, :while, &(&1 == nil or is_integer(&1)), "an integer")
+    {__MODULE__, %{steps: steps, while: while}}
+  end
+
+  @impl Behaviour
+  def tick(percept, %{steps: [step | rest]} = state) do
+    case Behaviour.tick(step, percept) do
+      {:running, wish, step} -> {:running, wish, {__MODULE__, %{state | steps: [step | rest]}}}
+      {:done, outcome, wish} -> next(outcome, wish, rest, percept, state)
+    end
+  end
+
+  # The next one takes over within the same tick, so that no tick is lost between them.
+  defp next(outcome, wish, [], _percept, _state), do: {:done, outcome, wish}
+
+  defp next(outcome, wish, _rest, _percept, %{while: while})
+       when while != nil and outcome != while,
+       do: {:done, outcome, wish}
+
+  defp next(_outcome, _wish, rest, percept, state), do: tick(percept, %{state | steps: rest})
+end

@@ -1,0 +1,42 @@
+defmodule Robot.Behaviour.Wander do
+  @moduledoc """
+  Drives about without an aim: straight on, and away from what comes near. Which way it turns in
+  the open follows from its name and the time, so that it is repeatable. Never ends.
+
+  Options: `speed` (m/s, default 0.3).
+  """
+  @behaviour Robot.Behaviour
+  alias Hal.Twist
+  alias Robot.{Reflex, Wish}
+  alias Robot.Behaviour.Options
+
+  # Metres at which something ahead makes it turn, and seconds between turns in the open.
+  @near 0.7
+  @leg_ms 6000
+
+  @impl Robot.Behaviour
+  def new(options \\ []) do
+    options = Keyword.validate!(options, speed: 0.3)
+    {__MODULE__, %{speed: Options.number!(options, :speed, 0.0, 10.0), side: nil}}
+  end
+
+  @impl Robot.Behaviour
+  def tick(percept, state) do
+    half = percept.profile.radius + 0.1
+    points = Reflex.Body.points(percept.profile, percept.sonar || [])
+
+    case for({x, y} <- points, x > 0, x < half + @near, abs(y) < half + 0.1, do: {x, y}) do
+      [] ->
+        leg = :erlang.phash2({percept.robot, div(percept.at_ms, @leg_ms)}, 100)
+        running(Twist.new(state.speed, (leg - 50) / 250), %{state | side: nil})
+
+      near ->
+        # It keeps to the side it chose first, or it would shake its head in a corner.
+        {_, y} = Enum.min_by(near, fn {x, y} -> x * x + y * y end)
+        side = state.side || if(y > 0, do: -1, else: 1)
+        running(Twist.new(0, side * 0.6 * percept.profile.max_turn), %{state | side: side})
+    end
+  end
+
+  defp running(twist, state), do: {:running, Wish.new(:wander, twist, 0.3), {__MODULE__, state}}
+end
