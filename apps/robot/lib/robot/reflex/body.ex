@@ -10,6 +10,8 @@ defmodule Robot.Reflex.Body do
   @type point :: {x :: float(), y :: float()}
 
   @clearance 0.15
+  # A step of the gate and the lag of wheels.
+  @reaction_s 0.15
   # Things that would only be grazed keep this much to the side.
   @side 0.03
 
@@ -53,7 +55,9 @@ defmodule Robot.Reflex.Body do
   def free_speed(%Profile{max_acceleration: braking} = profile, points, linear) do
     sign = if linear < 0, do: -1.0, else: 1.0
     free = Enum.reduce(points, 1.0e6, fn {x, y}, free -> min(free, gap(profile, sign * x, y)) end)
-    :math.sqrt(2 * braking * max(free, 0.0))
+    # What it still drives before it brakes, v * reaction, counts as well: solved for v.
+    lost = braking * @reaction_s
+    :math.sqrt(2 * braking * max(free, 0.0) + lost * lost) - lost
   end
 
   # How far it may go until it stands before the point. The circle round its corners stands for

@@ -1,0 +1,189 @@
+defmodule Robot.Command do
+  @moduledoc """
+  What a person may tell a robot in words, after the thesis's colon notation (R24, R25): keyword and
+  arguments, case does not matter. Pure; never makes an atom of what it reads, and never raises.
+
+  | text | command |
+  |---|---|
+  | `stop` | `:stop` |
+  | `move:V:W` | `{:move, v, w}`, m/s and rad/s |
+  | `goto:X:Y` or `goto:X:Y:THETA` | `{:goto, x, y, theta or nil}`, metres, radians |
+  | `followtheleader:NAME` | `{:follow_the_leader, id}` |
+  | `findblob` or `findblob:COLOUR` | `{:find_blob, colour or nil}` |
+  | `subscribe:NAME`, `unsubscribe:NAME` | `{:subscribe, id}`, `{:unsubscribe, id}` |
+  | `position:X:Y:THETA`, `follow:X:Y:THETA` | `{:position, pose}`, `{:follow, pose}` |
+  | `blob:X:Y:THETA:SIZE:FOUND` | `{:blob, pose, size, found?}`; FOUND is 0 or 1 |
+  | `lead`, `start`, `ping` | `:lead`, `:start`, `:ping` |
+  """
+  alias Hal.Pose
+  alias Robot.Command.Words
+
+  @type t ::
+          :stop
+          | :lead
+          | :start
+          | :ping
+          | {:move, float(), float()}
+          | {:goto, float(), float(), float() | nil}
+          | {:follow_the_leader, atom()}
+          | {:find_blob, String.t() | nil}
+          | {:subscribe, atom()}
+          | {:unsubscribe, atom()}
+          | {:position, Pose.t()}
+          | {:follow, Pose.t()}
+          | {:blob, Pose.t(), float(), boolean()}
+
+  # Keyword, the arguments it must have, those it may have besides.
+  @grammar [
+    {"stop", [], []},
+    {"move", [:v, :w], []},
+    {"goto", [:x, :y], [:theta]},
+    {"followtheleader", [:name], []},
+    {"findblob", [], [:colour]},
+    {"subscribe", [:name], []},
+    {"unsubscribe", [:name], []},
+    {"position", [:x, :y, :theta], []},
+    {"blob", [:x, :y, :theta, :size, :found], []},
+    {"follow", [:x, :y, :theta], []},
+    {"lead", [], []},
+    {"start", [], []},
+    {"ping", [], []}
+  ]
+
+  @keywords Enum.map(@grammar, &elem(&1, 0))
+  # No text that means something is longer.
+  @longest 500
+
+  @doc "All keywords."
+  @spec keywords() :: [String.t(), ...]
+  def keywords, do: @keywords
+
+  @doc """
+  The command that a text means, or one line that says what is wrong with it and what is allowed.
+  Robots are named as in `known`.
+
+      iex> Robot.Command.parse("GoTo:2.0:-1", [:mag1])
+      {:ok, {:goto, 2.0, -1.0, nil}}
+      iex> Robot.Command.parse("followtheleader:mag1", [:mag1, :min1])
+      {:ok, {:follow_the_leader, :mag1}}
+      iex> Robot.Command.parse("goto:abc:1", [])
+      {:error, ~s(goto: x cannot be "abc": a number is allowed, as in 2, -0.5 or 1.0e-3)}
+      iex> Robot.Command.parse("goto:1", [])
+      {:error, "goto: y is missing: goto:X:Y or goto:X:Y:THETA is allowed"}
+      iex> Robot.Command.parse("goot:1:2", [])
+      {:error, ~s(unknown command "goot": did you mean goto?)}
+  """
+  @spec parse(term(), [atom()]) :: {:ok, t()} | {:error, String.t()}
+  def parse(text, known) when is_binary(text) and byte_size(text) <= @longest do
+    if String.printable?(text),
+      do: text |> String.trim() |> String.split(":") |> command(known),
+      else: {:error, "a command cannot have bytes that are no text"}
+  end
+
+  def parse(text, _known) when is_binary(text),
+    do: {:error, "a command cannot be longer than #{@longest} bytes"}
+
+  def parse(_text, _known), do: {:error, "a command must be text, as in goto:2.0:1.0"}
+
+  defp command([""], _known),
+    do: {:error, "an empty command: one of #{Enum.join(@keywords, ", ")} is allowed"}
+
+  defp command([word | arguments], known) do
+    keyword = word |> String.trim() |> String.downcase()
+
+    case List.keyfind(@grammar, keyword, 0) do
+      nil ->
+        {:error, "unknown command #{inspect(word)}: #{suggestion(keyword)}"}
+
+      {keyword, must, may} ->
+        with {:ok, values} <- arguments(keyword, must, may, arguments, known),
+             do: {:ok, build(keyword, values)}
+    end
+  end
+
+  defp suggestion(word) do
+    case Words.nearest(word, @keywords) do
+      nil -> "one of #{Enum.join(@keywords, ", ")} is allowed"
+      near -> "did you mean #{near}?"
+    end
+  end
+
+  defp arguments(keyword, must, may, arguments, known) do
+    names = must ++ may
+    count = length(arguments)
+
+    cond do
+      count < length(must) ->
+        {:error, "#{keyword}: #{Enum.at(must, count)} is missing: #{usage(keyword)} is allowed"}
+
+      count > length(names) ->
+        extra = Enum.at(arguments, length(names))
+        {:error, "#{keyword}: #{inspect(extra)} is too much: #{usage(keyword)} is allowed"}
+
+      true ->
+        values(keyword, Enum.zip(names, arguments), known, [])
+    end
+  end
+
+  defp values(_keyword, [], _known, values), do: {:ok, Enum.reverse(values)}
+
+  defp values(keyword, [{name, text} | rest], known, values) do
+    case Words.value(name, String.trim(text), known) do
+      {:ok, value} ->
+        values(keyword, rest, known, [value | values])
+
+      {:error, allowed} ->
+        {:error, "#{keyword}: #{name} cannot be #{inspect(text)}: #{allowed}"}
+    end
+  end
+
+  defp usage(keyword) do
+    {keyword, must, may} = List.keyfind(@grammar, keyword, 0)
+    form = fn names -> Enum.join([keyword | Enum.map(names, &String.upcase("#{&1}"))], ":") end
+    if may == [], do: form.(must), else: "#{form.(must)} or #{form.(must ++ may)}"
+  end
+
+  defp build("stop", []), do: :stop
+  defp build("lead", []), do: :lead
+  defp build("start", []), do: :start
+  defp build("ping", []), do: :ping
+  defp build("move", [v, w]), do: {:move, v, w}
+  defp build("goto", [x, y]), do: {:goto, x, y, nil}
+  defp build("goto", [x, y, theta]), do: {:goto, x, y, theta}
+  defp build("followtheleader", [id]), do: {:follow_the_leader, id}
+  defp build("findblob", []), do: {:find_blob, nil}
+  defp build("findblob", [colour]), do: {:find_blob, colour}
+  defp build("subscribe", [id]), do: {:subscribe, id}
+  defp build("unsubscribe", [id]), do: {:unsubscribe, id}
+  defp build("position", [x, y, theta]), do: {:position, Pose.new(x, y, theta)}
+  defp build("follow", [x, y, theta]), do: {:follow, Pose.new(x, y, theta)}
+
+  defp build("blob", [x, y, theta, size, found]),
+    do: {:blob, Pose.new(x, y, theta), size, found}
+
+  @doc """
+  The text of a command; `parse/2` of it gives the command again.
+
+      iex> Robot.Command.to_text({:goto, 2.0, 1.0, nil})
+      "goto:2.0:1.0"
+      iex> Robot.Command.to_text({:blob, Hal.Pose.new(1, 2), 0.01, true})
+      "blob:1.0:2.0:0.0:0.01:1"
+  """
+  @spec to_text(t()) :: String.t()
+  def to_text(word) when word in [:stop, :lead, :start, :ping], do: Atom.to_string(word)
+  def to_text({:move, v, w}), do: join("move", [v, w])
+  def to_text({:goto, x, y, nil}), do: join("goto", [x, y])
+  def to_text({:goto, x, y, theta}), do: join("goto", [x, y, theta])
+  def to_text({:follow_the_leader, id}), do: join("followtheleader", [id])
+  def to_text({:find_blob, nil}), do: "findblob"
+  def to_text({:find_blob, colour}), do: join("findblob", [colour])
+  def to_text({:subscribe, id}), do: join("subscribe", [id])
+  def to_text({:unsubscribe, id}), do: join("unsubscribe", [id])
+  def to_text({:position, %Pose{} = p}), do: join("position", [p.x, p.y, p.heading])
+  def to_text({:follow, %Pose{} = p}), do: join("follow", [p.x, p.y, p.heading])
+
+  def to_text({:blob, %Pose{} = p, size, found?}),
+    do: join("blob", [p.x, p.y, p.heading, size, if(found?, do: 1, else: 0)])
+
+  defp join(keyword, arguments), do: Enum.join([keyword | arguments], ":")
+end

@@ -1,0 +1,118 @@
+defmodule Robot.CommandTest do
+  use ExUnit.Case, async: true
+  alias Hal.Pose
+  alias Robot.Command
+  doctest Robot.Command
+  doctest Robot.Command.Words
+
+  @known [:mag1, :min1, :player1]
+
+  test "reads the whole grammar in any case" do
+    for {text, command} <- [
+          {"stop", :stop},
+          {" Stop ", :stop},
+          {"MOVE:0.3:-0.1", {:move, 0.3, -0.1}},
+          {"goto:2:1", {:goto, 2.0, 1.0, nil}},
+          {"goto: 2 : 1 :1.5", {:goto, 2.0, 1.0, 1.5}},
+          {"followtheleader:player1", {:follow_the_leader, :player1}},
+          {"FindBlob", {:find_blob, nil}},
+          {"findblob:YellowLandmark", {:find_blob, "YellowLandmark"}},
+          {"subscribe:min1", {:subscribe, :min1}},
+          {"unsubscribe:min1", {:unsubscribe, :min1}},
+          {"position:1:2:0.5", {:position, Pose.new(1, 2, 0.5)}},
+          {"follow:1:2:0.5", {:follow, Pose.new(1, 2, 0.5)}},
+          {"blob:1:2:0:0.01:1", {:blob, Pose.new(1, 2), 0.01, true}},
+          {"blob:1:2:0:0:0", {:blob, Pose.new(1, 2), 0.0, false}},
+          {"lead", :lead},
+          {"start", :start},
+          {"ping", :ping},
+          {"move:.5:+1.", {:move, 0.5, 1.0}},
+          {"move:1e-400:0e400", nil},
+          {"move:1e-99:0e99", {:move, 0.0, 0.0}}
+        ] do
+      if command, do: assert({:ok, command} == Command.parse(text, @known), text)
+    end
+  end
+
+  test "what is wrong is named, with what is allowed" do
+    for {text, line} <- [
+          {"", ~r/empty command/},
+          {"goto:nan:1", ~r/x cannot be "nan": a number/},
+          {"goto:1:inf", ~r/y cannot be "inf"/},
+          {"goto:1:-Infinity", ~r/y cannot be/},
+          {"goto:1e400:1", ~r/x cannot be/},
+          {"goto:1e99:1", ~r/-1000000 to 1000000/},
+          {"goto:9999999:1", ~r/-1000000 to 1000000/},
+          {"goto:1,5:1", ~r/x cannot be "1,5"/},
+          {"goto:0x10:1", ~r/x cannot be/},
+          {"goto:1_0:1", ~r/x cannot be/},
+          {"goto::1", ~r/x cannot be ""/},
+          {"goto:1:2:3:4", ~r/"4" is too much: goto:X:Y or goto:X:Y:THETA/},
+          {"stop:1", ~r/"1" is too much: stop is allowed/},
+          {"move:1", ~r/w is missing: move:V:W/},
+          {"followtheleader:a:b", ~r/"b" is too much/},
+          {"followtheleader:nobody", ~r/one of mag1, min1, player1 is allowed/},
+          {"followtheleader:", ~r/name cannot be ""/},
+          {"blob:1:2:0:-1:1", ~r/size cannot be "-1"/},
+          {"blob:1:2:0:1:yes", ~r/0 or 1/},
+          {"halt", ~r/unknown command "halt"/},
+          {"folow:1:2:3", ~r/did you mean follow\?/},
+          {"qqqq", ~r/one of stop, move/},
+          {<<255, 1>>, ~r/no text/},
+          {String.duplicate("a", 501), ~r/longer than 500/},
+          {:stop, ~r/must be text/}
+        ] do
+      assert {:error, message} = Command.parse(text, @known)
+      assert message =~ line
+      refute message =~ "\n"
+    end
+  end
+
+  test "what is written is read again" do
+    for _ <- 1..500 do
+      n = fn -> (:rand.uniform() - 0.5) * :math.pow(10, :rand.uniform(10) - 5) end
+      pose = Pose.new(n.(), n.(), n.())
+
+      command =
+        Enum.random([
+          :stop,
+          {:move, n.(), n.()},
+          {:goto, n.(), n.(), nil},
+          {:goto, n.(), n.(), n.()},
+          {:follow_the_leader, Enum.random(@known)},
+          {:find_blob, "Red"},
+          {:subscribe, :mag1},
+          {:position, pose},
+          {:follow, pose},
+          {:blob, pose, abs(n.()), true}
+        ])
+
+      assert {:ok, command} == Command.parse(Command.to_text(command), @known)
+    end
+  end
+
+  test "rubbish neither crashes nor makes atoms" do
+    Command.parse("goto:1:2", @known)
+
+    pieces =
+      Command.keywords() ++
+        ["1", "-", ".", "e", "1e9999999", "nan", "mag1", "ä", " ", "\n", <<200>>]
+
+    before = :erlang.system_info(:atom_count)
+
+    for k <- 1..3000 do
+      text =
+        for _ <- 1..:rand.uniform(6),
+            into: "",
+            do: Enum.random(pieces) <> Enum.random([":", "", "::"])
+
+      text = if rem(k, 3) == 0, do: :crypto.strong_rand_bytes(:rand.uniform(40)), else: text
+      assert {kind, _} = Command.parse(text, @known)
+      assert kind in [:ok, :error]
+      Command.parse("new#{k}:newer#{k}", @known)
+    end
+
+    # Other tests run beside this one and may load modules; thousands would be ours.
+    assert :erlang.system_info(:atom_count) - before < 1000
+  end
+end
