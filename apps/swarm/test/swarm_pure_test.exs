@@ -4,6 +4,8 @@ defmodule SwarmPureTest do
   doctest Swarm.Assignment
   doctest Swarm.Chain
   doctest Swarm.Election
+  doctest Swarm.Trail
+  doctest Swarm.Room
   doctest Swarm.Message
   doctest Swarm.Heartbeat
   doctest Swarm.Anchor

@@ -7,13 +7,15 @@ defmodule Swarm.Anchor do
   fences off leaders of the past.
 
   Poses are `{x_mm, y_mm, mrad}` in the leader's map frame; `landmark` is `{x_mm, y_mm}` or `nil`,
-  `still` says that it does not move. `order` names the followers by slot; `chain` the same with
-  the leader first, in the order in which each passes the anchor on to its child. `trail?` makes
-  the shape a column along the leader's trail.
+  `still` says that it does not move. `order` names the followers by slot, which is also
+  the order in which each passes the anchor on to its child. `formation` is
+  the shape as there is room for it, `asked` the one that was asked for; `size` and `places` say which
+  slots of it are used (`Swarm.Room`), `trail` gives them pose by pose where the shape is a column
+  along the leader's trail.
   """
 
-  @enforce_keys [:leader, :epoch, :sequence, :pose, :twist, :formation, :order]
-  defstruct @enforce_keys ++ [landmark: nil, still: false, trail?: false, hold: false]
+  @enforce_keys [:leader, :epoch, :sequence, :pose, :twist, :formation, :order, :size, :places]
+  defstruct @enforce_keys ++ [asked: nil, landmark: nil, still: false, trail: nil]
 
   @type t :: %__MODULE__{
           leader: atom(),
@@ -25,17 +27,20 @@ defmodule Swarm.Anchor do
           order: [atom()],
           landmark: {integer(), integer()} | nil,
           still: boolean(),
-          trail?: boolean(),
-          hold: boolean()
+          size: pos_integer(),
+          places: [pos_integer()],
+          asked: Swarm.Formation.t() | nil,
+          trail: [{integer(), integer(), integer()}] | nil
         }
 
   @far 1_000_000_000
+  @most 1_000
 
   @doc """
   Which of two anchors a follower believes: higher epoch, then newer sequence.
 
       iex> old = %Swarm.Anchor{leader: :mag1, epoch: 1, sequence: 9, pose: {0, 0, 0}, twist: {0, 0},
-      ...>   formation: {:column, 1.0}, order: []}
+      ...>   formation: {:column, 1.0}, order: [], size: 1, places: []}
       iex> Swarm.Anchor.newest(old, %{old | epoch: 2, sequence: 0}).epoch
       2
       iex> Swarm.Anchor.newest(nil, old) == old
@@ -49,22 +54,38 @@ defmodule Swarm.Anchor do
 
   @doc "Whether a term from outside is an anchor with sane numbers."
   @spec valid?(term()) :: boolean()
-  def valid?(%__MODULE__{pose: {x, y, heading}, twist: {v, w}, formation: {kind, d}} = anchor) do
-    Enum.all?([x, y, heading, v, w], &(is_integer(&1) and abs(&1) < @far)) and
+  def valid?(%__MODULE__{twist: {v, w}, order: order, places: places} = anchor) do
+    pose?(anchor.pose) and whole?(v) and whole?(w) and
       is_atom(anchor.leader) and is_integer(anchor.epoch) and anchor.epoch > 0 and
-      is_integer(anchor.sequence) and kind in Swarm.Formation.kinds() and is_float(d) and
-      d >= Swarm.Formation.least_spacing() and d < 100 and
-      is_list(anchor.order) and Enum.all?(anchor.order, &is_atom/1) and
-      landmark?(anchor.landmark) and
-      Enum.all?([anchor.still, anchor.trail?, anchor.hold], &is_boolean/1)
+      is_integer(anchor.sequence) and formation?(anchor.formation) and
+      (anchor.asked == nil or formation?(anchor.asked)) and
+      list?(order, &is_atom/1) and anchor.size in 1..@most and
+      list?(places, &(&1 in 1..@most and &1 < anchor.size)) and length(places) == length(order) and
+      landmark?(anchor.landmark) and is_boolean(anchor.still) and
+      (anchor.trail == nil or
+         (list?(anchor.trail, &pose?/1) and length(anchor.trail) == length(order)))
   end
 
   def valid?(_term), do: false
 
+  defp formation?({kind, spacing}),
+    do:
+      kind in Swarm.Formation.kinds() and is_float(spacing) and
+        spacing >= Swarm.Formation.least_spacing() and spacing < 100
+
+  defp formation?(_other), do: false
+
+  defp list?(list, check) when is_list(list),
+    do: not List.improper?(list) and Enum.all?(list, check)
+
+  defp list?(_other, _check), do: false
+
+  defp pose?({x, y, heading}), do: whole?(x) and whole?(y) and whole?(heading)
+  defp pose?(_other), do: false
+
   defp landmark?(nil), do: true
-
-  defp landmark?({x, y}),
-    do: is_integer(x) and is_integer(y) and abs(x) < @far and abs(y) < @far
-
+  defp landmark?({x, y}), do: whole?(x) and whole?(y)
   defp landmark?(_other), do: false
+
+  defp whole?(n), do: is_integer(n) and abs(n) < @far
 end

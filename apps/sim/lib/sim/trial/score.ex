@@ -7,7 +7,7 @@ defmodule Sim.Trial.Score do
   alias Sim.{Scene, World}
   alias Sim.Trial
   alias Sim.Trial.Ledger
-  alias Swarm.{Formation, Member}
+  alias Swarm.{Anchor, Formation, Member}
 
   @doc "What a viewer sees."
   @spec scene(Trial.t()) :: Scene.t()
@@ -100,19 +100,33 @@ defmodule Sim.Trial.Score do
 
   defp slots(trial, leader) do
     case Member.claim(trial.members[leader]) do
-      %{anchor: %{formation: formation, order: order}} ->
+      %{anchor: %Anchor{} = anchor} ->
         pose = World.truth(trial.world, leader)
         landmark = trial.world.landmark
         distance = if landmark, do: Pose.distance(pose, landmark), else: 1.6
 
-        formation
-        |> Formation.slots(length(order) + 1, distance)
-        |> Enum.zip(order)
-        |> Enum.with_index(1)
-        |> Map.new(fn {{slot, id}, index} -> {id, {index, Pose.compose(pose, slot)}} end)
+        anchor
+        |> true_slots(pose, distance)
+        |> Enum.zip(anchor.order)
+        |> Map.new(fn {{place, slot}, id} -> {id, {place, slot}} end)
 
       _no_anchor ->
         %{}
+    end
+  end
+
+  # The slots as the leader means them, hung from where it really stands.
+  defp true_slots(%Anchor{trail: nil} = anchor, pose, distance) do
+    slots = anchor.formation |> Formation.slots(anchor.size, distance) |> List.to_tuple()
+    for place <- anchor.places, do: {place, Pose.compose(pose, elem(slots, place - 1))}
+  end
+
+  defp true_slots(%Anchor{trail: trail, pose: {x, y, heading}}, pose, _distance) do
+    believed = Pose.new(x / 1000, y / 1000, heading / 1000)
+
+    for {{sx, sy, sh}, place} <- Enum.with_index(trail, 1) do
+      slot = Pose.relative(believed, Pose.new(sx / 1000, sy / 1000, sh / 1000))
+      {place, Pose.compose(pose, slot)}
     end
   end
 

@@ -9,13 +9,14 @@ defmodule Swarm.Missions.Landmark do
   | `Sight` | where the landmark is, by the robot's own eyes |
   | `Council` | when a round is opened, what is reported in it, what comes of it |
   | `Lead` | what the leader tells: the anchor, the order, whether the shape is formed |
+  | `Shape` | a shape that there is room for |
   | `Attend` | what a follower does: its slot, its gaze, its child |
 
   Time is `percept.at_ms`, compared with whole numbers; there are no timers.
   """
   alias Hal.Twist
   alias Robot.Behaviour
-  alias Swarm.{Anchor, Formation, Message, Round}
+  alias Swarm.{Anchor, Formation, Message, Round, Trail}
   alias Swarm.Missions.Landmark.{Attend, Council, Lead, Phases, Sight}
 
   @behaviour Robot.Mission
@@ -47,6 +48,7 @@ defmodule Swarm.Missions.Landmark do
                 size_ppm: nil,
                 anchor: nil,
                 anchor_ms: nil,
+                trail: [],
                 lead: nil,
                 attend: nil,
                 challenge: nil
@@ -105,7 +107,8 @@ defmodule Swarm.Missions.Landmark do
       mission
       | percept: percept,
         now_ms: percept.at_ms,
-        sight: Sight.update(mission.sight, percept, mission.colour)
+        sight: Sight.update(mission.sight, percept, mission.colour),
+        trail: if(percept.pose, do: Trail.note(mission.trail, percept.pose), else: mission.trail)
     }
 
     {mission, letters} = mission |> hear_beats() |> Council.tick()
@@ -134,7 +137,12 @@ defmodule Swarm.Missions.Landmark do
 
     if anchor.epoch >= mission.epoch and
          (known == nil or {anchor.epoch, anchor.sequence} > {known.epoch, known.sequence}),
-       do: %{mission | anchor: anchor, anchor_ms: mission.now_ms, formation: anchor.formation},
+       do: %{
+         mission
+         | anchor: anchor,
+           anchor_ms: mission.now_ms,
+           formation: anchor.asked || anchor.formation
+       },
        else: mission
   end
 

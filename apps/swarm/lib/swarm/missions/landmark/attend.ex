@@ -7,6 +7,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   """
   alias Hal.Pose
   alias Robot.Behaviour
+  alias Robot.Behaviour.Avoid.Neighbours
   alias Swarm.{Chain, Message}
   alias Swarm.Missions.Landmark
   alias Swarm.Missions.Landmark.Places
@@ -23,6 +24,13 @@ defmodule Swarm.Missions.Landmark.Attend do
   @still_sd 0.08
   @moving_sd 0.5
   @robot_sd 0.1
+
+  # A slot is blocked when something unknown stands in it for so long, or no way leads nearer.
+  @obstacle_ms 2_000
+  @stuck_ms 8_000
+  @progress 0.1
+  @reach 2.0
+  @clear 0.1
 
   defstruct in_place?: false,
             holding?: false,
@@ -76,10 +84,49 @@ defmodule Swarm.Missions.Landmark.Attend do
         }
     }
 
+    mission = %{mission | attend: block(mission, slot, error)}
     options = [target: slot, velocity: velocity, discs: discs(mission.anchor)]
     goal = {:goal, {:slot, mission.epoch}, {Behaviour.Follow, options}}
 
     {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, references(mission)}]}
+  end
+
+  defp block(%{attend: %{in_place?: true} = attend} = mission, slot, error),
+    do: fresh(attend, slot, error, mission.now_ms)
+
+  defp block(%{attend: attend, now_ms: now} = mission, slot, error) do
+    cond do
+      attend.slot == nil or Pose.distance(attend.slot, slot) > 0.2 ->
+        fresh(attend, slot, error, now)
+
+      error < attend.best - @progress ->
+        %{watch(attend, mission, slot, error) | best: error, best_ms: now}
+
+      true ->
+        attend = watch(attend, mission, slot, error)
+        obstacle? = attend.obstacle_ms != nil and now - attend.obstacle_ms >= @obstacle_ms
+        stuck? = error < @reach and now - attend.best_ms >= @stuck_ms
+        %{attend | blocked?: obstacle? or stuck?}
+    end
+  end
+
+  defp fresh(attend, slot, error, now) do
+    %{attend | slot: slot, best: error, best_ms: now, obstacle_ms: nil, blocked?: false}
+  end
+
+  defp watch(attend, mission, slot, error) do
+    if error < @reach and obstacle?(mission, slot),
+      do: %{attend | obstacle_ms: attend.obstacle_ms || mission.now_ms},
+      else: %{attend | obstacle_ms: nil}
+  end
+
+  # Something that the sonars see where this robot should stand, and that nobody has told of.
+  defp obstacle?(%{percept: percept, anchor: anchor}, slot) do
+    robots = for {_id, peer} <- percept.peers, do: {peer.pose.x, peer.pose.y, peer.radius}
+
+    percept
+    |> Neighbours.unknown(robots ++ discs(anchor))
+    |> Enum.any?(&(Pose.distance(slot, &1.at) < percept.profile.radius + @clear))
   end
 
   defp landmark(%{anchor: anchor, attend: attend}, in_place?),

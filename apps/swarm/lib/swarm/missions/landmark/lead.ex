@@ -7,7 +7,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   alias Robot.Behaviour
   alias Swarm.{Anchor, Assignment, Chain, Formation, Message, Peers}
   alias Swarm.Missions.Landmark
-  alias Swarm.Missions.Landmark.{Council, Places, Sight}
+  alias Swarm.Missions.Landmark.{Council, Shape, Sight}
 
   # The landmark's foot leaves the picture below 1.4 m, and its size with it.
   @near 1.5
@@ -26,7 +26,7 @@ defmodule Swarm.Missions.Landmark.Lead do
             formed?: false,
             lost?: false,
             heard_ms: nil,
-            restless?: false
+            shape: %Shape{}
 
   @type t :: %__MODULE__{}
 
@@ -47,11 +47,10 @@ defmodule Swarm.Missions.Landmark.Lead do
 
   @doc "Takes up a new shape, which everyone learns from the anchor; `:cost` deals the slots anew."
   @spec reshape(Landmark.t()) :: Landmark.t()
-  def reshape(%{phase: :lead, assign: :cost} = mission), do: mission |> deal() |> unformed()
-  def reshape(mission), do: unformed(mission)
-
-  defp unformed(mission),
-    do: %{mission | lead: %{mission.lead | formed?: false, good_ms: nil, bad_ms: nil}}
+  def reshape(mission) do
+    lead = %{mission.lead | formed?: false, good_ms: nil, bad_ms: nil, shape: Shape.new()}
+    %{mission | lead: lead}
+  end
 
   @doc """
   Whether a leader is one no more: others follow a higher epoch, or nobody has heard it for 1.5 s
@@ -69,7 +68,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   @doc "One tick of leading."
   @spec act(Landmark.t()) :: {Landmark.t(), [tuple()]}
   def act(mission) do
-    mission = mission |> hear() |> muster() |> tell()
+    mission = mission |> hear() |> muster() |> shape() |> tell()
     {mission, formed} = judge(mission)
     {mission, lost} = miss(mission)
     child = List.first(mission.order)
@@ -96,24 +95,40 @@ defmodule Swarm.Missions.Landmark.Lead do
     kept = Chain.heal(mission.order, view)
     came = if mission.now_ms - mission.since_ms >= @settled_ms, do: view -- kept, else: []
 
-    case kept ++ came do
-      order when order == mission.order -> mission
-      order when mission.assign == :cost -> deal(%{mission | order: order})
-      order -> %{mission | order: order}
-    end
+    %{mission | order: kept ++ came}
   end
+
+  # Where the shape has changed, `:cost` deals its slots anew.
+  defp shape(%{lead: lead} = mission) do
+    shape = Shape.update(lead.shape, mission, landmark_distance(mission))
+    new? = {shape.formation, shape.room} != {lead.shape.formation, lead.shape.room}
+    mission = %{mission | lead: %{lead | shape: shape}}
+    first? = lead.shape.room == nil and mission.now_ms == mission.since_ms
+    if new? and not first? and mission.assign == :cost, do: deal(mission), else: mission
+  end
+
+  defp landmark_distance(%{sight: %{place: place}, percept: percept}) when place != nil,
+    do: Hal.Pose.distance(percept.pose, place)
+
+  defp landmark_distance(_mission), do: @near
 
   # Deals the slots by squared cost from where the robots say they are.
   defp deal(mission) do
     beats = Peers.taking_part(mission.percept.peers, mission.now_ms)
-    known = for id <- mission.order, beat = beats[id], do: {id, beat.pose}
+    followers = for id <- mission.order, {x, y, _heading} = beats[id].pose, do: {id, {x, y}}
     {x, y, _heading} = Council.millimetres(mission.percept.pose)
-    distance = if mission.anchor, do: Places.landmark_distance(mission.anchor), else: @near
-    robots = length(known) + 1
-    slots = Council.slots(mission.formation, mission.percept.pose, robots, distance)
-    followers = for {id, {px, py, _heading}} <- known, do: {id, {px, py}}
-    dealt = Assignment.order(:cost, followers, {x, y}, slots)
-    %{mission | order: dealt ++ (mission.order -- dealt)}
+    {size, places} = mission.lead.shape.room
+
+    slots =
+      Council.slots(
+        mission.lead.shape.formation,
+        mission.percept.pose,
+        size,
+        landmark_distance(mission)
+      )
+
+    used = for place <- places, do: Enum.at(slots, place - 1)
+    %{mission | order: Assignment.order(:cost, followers, {x, y}, used)}
   end
 
   defp tell(%{percept: percept, lead: lead} = mission) do
@@ -126,8 +141,12 @@ defmodule Swarm.Missions.Landmark.Lead do
       sequence: sequence,
       pose: Council.millimetres(percept.pose),
       twist: twist(percept),
-      formation: mission.formation,
+      formation: lead.shape.formation,
+      asked: mission.formation,
       order: mission.order,
+      size: elem(lead.shape.room, 0),
+      places: elem(lead.shape.room, 1),
+      trail: Shape.trail(lead.shape, mission),
       landmark: place && point(place),
       still: Landmark.sees?(mission) and not mission.sight.moving?
     }

@@ -43,19 +43,26 @@ defmodule Swarm.Missions.Landmark.Places do
   @spec slot(Anchor.t(), atom(), non_neg_integer()) :: {Pose.t(), {float(), float()}} | nil
   def slot(%Anchor{order: order} = anchor, robot, age_ms) do
     case Enum.find_index(order, &(&1 == robot)) do
-      nil ->
-        nil
-
-      index ->
-        slot =
-          anchor.formation
-          |> Formation.slots(length(order) + 1, landmark_distance(anchor))
-          |> Enum.at(index)
-
-        {pose, twist} = leader(anchor, age_ms)
-        place = Pose.compose(pose, slot)
-        {place, velocity(pose, twist, place)}
+      nil -> nil
+      index -> slot_at(anchor, index, age_ms)
     end
+  end
+
+  # A trail lies still, whatever the leader does on it.
+  defp slot_at(%Anchor{trail: [_ | _] = trail}, index, _age_ms) do
+    {x, y, heading} = Enum.at(trail, index)
+    {Pose.new(x / 1000, y / 1000, heading / 1000), {0.0, 0.0}}
+  end
+
+  defp slot_at(anchor, index, age_ms) do
+    slot =
+      anchor.formation
+      |> Formation.slots(anchor.size, landmark_distance(anchor))
+      |> Enum.at(Enum.at(anchor.places, index) - 1)
+
+    {pose, twist} = leader(anchor, age_ms)
+    place = Pose.compose(pose, slot)
+    {place, velocity(pose, twist, place)}
   end
 
   # A point of a turning body: v_L + w x r.
