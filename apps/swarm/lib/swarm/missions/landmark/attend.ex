@@ -37,7 +37,11 @@ defmodule Swarm.Missions.Landmark.Attend do
             blocked?: false,
             told: {0, 0},
             error: nil,
-            landmark: nil
+            landmark: nil,
+            slot: nil,
+            best: nil,
+            best_ms: 0,
+            obstacle_ms: nil
 
   @type t :: %__MODULE__{}
 
