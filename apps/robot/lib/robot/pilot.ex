@@ -163,7 +163,7 @@ defmodule Robot.Pilot do
   defp carry_out({:claim, claim}, _config, data), do: %{data | claim: claim}
 
   defp carry_out({:stage, stage, about}, config, data) do
-    about = Map.merge(about, %{robot: config.id, stage: stage})
+    about = Map.merge(%{robot: config.id, stage: stage}, about)
     Event.execute([:robot, :stage], %{at_ms: Config.now(config)}, about)
     data
   end

@@ -151,7 +151,7 @@ defmodule Swarm.Link do
     s = show(%{s | ticks: s.ticks + 1}, at_ms)
     Board.put(s.board, :link, :radio, s.counts, at_ms)
     if rem(s.ticks, @rivals_every) == 0, do: challenge(s)
-    if rem(s.ticks, @beat_every) == 0, do: beat(s, at_ms), else: s
+    if rem(s.ticks, @beat_every) == 1, do: beat(s, at_ms), else: s
   end
 
   defp show(s, at_ms) do
