@@ -26,11 +26,22 @@ defmodule Robot.Localiser do
   @gate 9.0
   # A robot that is seen must be the one that is expected: no other expected one within this angle.
   @match 0.12
+  # After so many pictures in a row that contradict the estimate, it is the estimate that is doubted.
+  @doubt 8
+  @doubt_sd {0.3, 0.3, 0.3}
   @history 12
 
   @enforce_keys [:start]
   defstruct @enforce_keys ++
-              [odometry: nil, pose: nil, covariance: nil, history: [], seen_ms: nil, anchors: []]
+              [
+                odometry: nil,
+                pose: nil,
+                covariance: nil,
+                history: [],
+                seen_ms: nil,
+                anchors: [],
+                refused: 0
+              ]
 
   @typedoc """
   Something of a colour at a place (map frame); `sd` is how well the place is known, in metres.
@@ -139,7 +150,8 @@ defmodule Robot.Localiser do
     if alone?, do: Enum.max_by(near, & &1.area, fn -> nil end)
   end
 
-  defp gate(%{range?: true}), do: 0.5
+  # There is one landmark: whatever has its colour is it.
+  defp gate(%{range?: true}), do: 2 * :math.pi()
   defp gate(_robot), do: @match
 
   defp correct(localiser, anchor, blob, exposed, percept, view) do
@@ -188,7 +200,7 @@ defmodule Robot.Localiser do
     s = a * px + b * py + c * ph + noise
 
     if error * error > @gate * s do
-      localiser
+      refuse(localiser)
     else
       {kx, ky, kh} = {px / s, py / s, ph / s}
       pose = localiser.pose
@@ -206,6 +218,17 @@ defmodule Robot.Localiser do
           }
       }
     end
+  end
+
+  # Wheels that slip take the estimate farther than odometry admits; then it has to be found again.
+  defp refuse(%{refused: refused} = localiser) when refused < @doubt,
+    do: %{localiser | refused: refused + 1}
+
+  defp refuse(localiser) do
+    {xx, xy, xh, yy, yh, hh} = localiser.covariance
+    {x, y, heading} = @doubt_sd
+    covariance = {xx + x * x, xy, xh, yy + y * y, yh, hh + heading * heading}
+    %{localiser | refused: 0, covariance: covariance}
   end
 
   defp remember(localiser, at_ms) do
