@@ -1,0 +1,155 @@
+defmodule Sim.TrialTest do
+  @moduledoc "Whole missions in lockstep: every layer but the processes."
+  use ExUnit.Case, async: true
+  alias Sim.Trial
+
+  defp run(options) do
+    {:ok, trial} = Trial.new(Map.merge(%{blobs: :direct}, options))
+    to_the_end(trial)
+  end
+
+  defp to_the_end(trial),
+    do: if(Trial.done?(trial), do: trial, else: to_the_end(Trial.step(trial)))
+
+  defp until(trial, condition),
+    do: if(condition.(trial), do: trial, else: until(Trial.step(trial), condition))
+
+  defp stages(trial), do: Enum.map(Trial.result(trial).stages, & &1.stage)
+
+  defp assert_formed(trial) do
+    result = Trial.result(trial)
+    assert Trial.formed?(trial)
+    assert result.collisions == 0
+    assert result.leaders_at_once_max == 1
+    assert result.formation.error_max_m == nil or result.formation.error_max_m < 0.6
+    trial
+  end
+
+  test "six robots, by painted pictures, search, elect and form" do
+    trial = assert_formed(run(%{seed: 1, blobs: :painted}))
+    assert [:search, :elected, :formed | _] = stages(trial)
+    assert Trial.result(trial).simulated_s < 90
+    assert Trial.result(trial).formation.error_mean_m < 0.15
+  end
+
+  test "the leader is the one that saw the landmark largest, of those in the record" do
+    for seed <- 1..4 do
+      {:ok, trial} = Trial.new(%{seed: seed, blobs: :direct})
+      trial = until(trial, &(Sim.Trial.Ledger.leader(&1.ledger) != nil))
+      leader = Sim.Trial.Ledger.leader(trial.ledger)
+      reports = trial.members[leader].mission.round.reports
+      assert map_size(reports) == 6
+      assert reports[leader].found
+
+      assert Enum.all?(reports, fn {_id, report} ->
+               report.size_ppm <= reports[leader].size_ppm
+             end)
+
+      assert [%{size_ppm: size}] =
+               for(%{stage: :elected} = s <- Trial.result(trial).stages, do: s)
+
+      assert size == reports[leader].size_ppm
+    end
+  end
+
+  test "one seed, one run; another seed, another" do
+    digest = fn seed ->
+      trial = run(%{seed: seed, blobs: :painted, loss: 0.1, duration_s: 15})
+      :crypto.hash(:sha256, inspect(Trial.result(trial), limit: :infinity))
+    end
+
+    assert digest.(5) == digest.(5)
+    refute digest.(5) == digest.(6)
+  end
+
+  test "without noise all stand within a quarter of a metre of their slots" do
+    result = run(%{seed: 3, noise: :off}) |> assert_formed() |> Trial.result()
+    assert result.formation.error_mean_m <= 0.10
+    assert result.formation.error_max_m <= 0.25
+  end
+
+  test "a fleet of any number forms" do
+    for n <- [1, 2, 3, 9] do
+      robots = for i <- 1..n, do: :"mag#{i}"
+      assert_formed(run(%{seed: 2, robots: robots, duration_s: 180}))
+    end
+  end
+
+  test "every shape forms" do
+    for kind <- Swarm.Formation.kinds() do
+      trial = assert_formed(run(%{seed: 1, formation: {kind, 1.0}}))
+      assert Trial.result(trial).formation.kind == kind
+    end
+  end
+
+  test "the fleet elects another leader when its leader is killed" do
+    trial = assert_formed(run(%{seed: 1, kills: [{:leader, 35}]}))
+    result = Trial.result(trial)
+    assert [:search, :elected, :formed, :killed, :elected, :formed] = stages(trial)
+    assert result.leader_changes == 1
+    assert Enum.count(result.fleet, & &1.alive) == 5
+    [first, second] = for %{stage: :elected, epoch: epoch} <- result.stages, do: epoch
+    assert second > first
+  end
+
+  test "a gap in the middle closes, without a new election" do
+    {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct, kills: []})
+    trial = until(trial, &Trial.formed?/1)
+    leader = Sim.Trial.Ledger.leader(trial.ledger)
+    second = Enum.at(trial.members[leader].mission.order, 1)
+    trial = trial |> Trial.kill(second) |> to_the_end() |> assert_formed()
+    assert Trial.result(trial).leader_changes == 0
+    assert Trial.result(trial).leader == leader
+  end
+
+  test "the shape follows a landmark that is moved; in the thesis's way the leader stays" do
+    options = %{seed: 1, assign: :chain, leader_change: false, moves: [{{0.0, 3.0}, 35}]}
+    trial = assert_formed(run(options))
+    result = Trial.result(trial)
+    assert [:search, :elected | rest] = stages(trial)
+    assert List.last(rest) == :formed and :landmark_moved in rest
+    assert result.leader_changes == 0
+    assert result.landmark_distance_m < 2.5
+  end
+
+  test "a fifth of all messages lost changes nothing but the time" do
+    for seed <- 1..3, do: assert_formed(run(%{seed: seed, loss: 0.2}))
+  end
+
+  test "without a landmark the fleet searches, stands still, and nobody leads" do
+    trial = run(%{seed: 1, landmark: :none})
+    result = Trial.result(trial)
+    assert result.leader == nil and result.leaders_at_once_max == 0
+    assert Enum.uniq(stages(trial)) == [:search]
+    assert Enum.all?(result.fleet, &(&1.state == :rest))
+    assert result.collisions == 0
+    refute Trial.formed?(trial)
+  end
+
+  test "all switched on at one place form as well" do
+    assert_formed(run(%{seed: 1, start: :same}))
+  end
+
+  test "an e-stop of one reaches all by their heartbeats, and only a reset of each frees it" do
+    {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct})
+    trial = Enum.reduce(1..120, trial, fn _, trial -> Trial.step(trial) end)
+    trial = Trial.command(trial, :mag1, :estop)
+    trial = Enum.reduce(1..40, trial, fn _, trial -> Trial.step(trial) end)
+    before = poses(trial)
+    trial = Enum.reduce(1..30, trial, fn _, trial -> Trial.step(trial) end)
+    assert poses(trial) == before
+    trial = Trial.command(trial, :all, :reset)
+    trial = Enum.reduce(1..30, trial, fn _, trial -> Trial.step(trial) end)
+    refute poses(trial) == before
+  end
+
+  defp poses(trial),
+    do: for(id <- trial.options.robots, do: Sim.World.truth(trial.world, id))
+
+  test "what cannot be is refused in one line" do
+    assert {:error, line} = Trial.new(%{map: "moon"})
+    assert line =~ "moon" and line =~ "hall"
+    assert {:error, line} = Trial.new(%{landmark: {1.0e6, 0.0}})
+    refute line =~ "\n"
+  end
+end
