@@ -68,30 +68,48 @@ defmodule Sim.Contact do
   @type pair :: {non_neg_integer(), non_neg_integer() | :wall}
 
   @doc """
-  Which pairs touch (gap at most 1 mm), which are still together (at most 1 cm), and the least
-  gap of any two of the first `count` discs.
+  All pairs whose gap is at most `reach`, the lower number first. Sweeps from left to right, so that bodies
+  far apart along x never meet.
+
+      iex> Sim.Contact.close([{0, {0.0, 0.0, 0.2}}, {1, {1.0, 0.0, 0.3}}, {2, {9.0, 0.0, 0.2}}], 1.0)
+      [{0, 1, 0.5}]
   """
-  @spec pairs([{non_neg_integer(), disc()}], non_neg_integer()) ::
+  @spec close([{non_neg_integer(), disc()}], number()) :: [
+          {non_neg_integer(), non_neg_integer(), float()}
+        ]
+  def close(discs, reach) do
+    widest = discs |> Enum.map(fn {_, {_, _, r}} -> r end) |> Enum.max(fn -> 0.0 end)
+    discs |> Enum.sort_by(fn {_, {x, _, _}} -> x end) |> sweep(reach, widest, [])
+  end
+
+  defp sweep([], _reach, _widest, found), do: found
+
+  defp sweep([{i, {x, _, r} = disc} | rest], reach, widest, found),
+    do: sweep(rest, reach, widest, ahead(rest, i, disc, x + r + widest + reach, reach, found))
+
+  defp ahead([{j, {x, _, _} = other} | rest], i, disc, last, reach, found) when x <= last do
+    gap = gap(disc, other)
+    found = if gap <= reach, do: [{min(i, j), max(i, j), gap} | found], else: found
+    ahead(rest, i, disc, last, reach, found)
+  end
+
+  defp ahead(_rest, _i, _disc, _last, _reach, found), do: found
+
+  @doc """
+  Which pairs touch (gap at most 1 mm), which are still together (at most 1 cm), and the least
+  gap of any two of the first `count` discs, or `least` where none is less.
+  """
+  @spec pairs([{non_neg_integer(), disc()}], non_neg_integer(), float() | nil) ::
           {touching :: [pair()], together :: [pair()], least :: float() | nil}
-  def pairs(discs, count), do: pairs(discs, count, {[], [], nil})
+  def pairs(discs, count, least) do
+    # `nil` is greater than any number; all pairs matter until there is a least gap.
+    near = close(discs, if(least == nil, do: 1.0e9, else: max(least, @apart)))
 
-  defp pairs([], _count, found), do: found
-
-  defp pairs([{i, a} | rest], count, found) do
-    found =
-      Enum.reduce(rest, found, fn {j, b}, {touching, together, least} ->
-        gap = gap(a, b)
-        # `nil` is greater than any number.
-        least = if j < count and gap < least, do: gap, else: least
-
-        cond do
-          gap <= @touch -> {[{i, j} | touching], [{i, j} | together], least}
-          gap <= @apart -> {touching, [{i, j} | together], least}
-          true -> {touching, together, least}
-        end
-      end)
-
-    pairs(rest, count, found)
+    Enum.reduce(near, {[], [], least}, fn {i, j, gap}, {touching, together, least} ->
+      touching = if gap <= @touch, do: [{i, j} | touching], else: touching
+      together = if gap <= @apart, do: [{i, j} | together], else: together
+      {touching, together, if(j < count, do: min(gap, least), else: least)}
+    end)
   end
 
   @doc "The points of the walls that a disc touches, and whether it is still within 1 cm of one."

@@ -253,13 +253,14 @@ defmodule Sim.World do
   # One after the other: each goes as far as those before it, already moved, and those after it, not yet, let it.
   defp move(world, dt_ms) do
     bodies = bodies(world)
-    discs = bodies |> Enum.map(&{&1.index, disc(&1)}) |> Elixir.Map.new()
+    discs = Elixir.Map.new(bodies, &{&1.index, disc(&1)})
+    neighbours = neighbours(bodies, discs, dt_ms)
 
     {bodies, _discs} =
       Enum.map_reduce(bodies, discs, fn body, discs ->
         body = body |> Body.accelerate(dt_ms) |> Body.slew(dt_ms)
         {body, way, along, turn} = Body.intend(body, dt_ms, world.seed, world.noise)
-        others = pole(world) ++ (discs |> Elixir.Map.delete(body.index) |> Elixir.Map.values())
+        others = pole(world) ++ for j <- Elixir.Map.get(neighbours, body.index, []), do: discs[j]
         {place, share} = Contact.move(world.map, discs[body.index], way, others)
 
         body =
@@ -279,12 +280,24 @@ defmodule Sim.World do
     %{world | robots: Elixir.Map.new(bodies, &{&1.id, &1})}
   end
 
+  # Whom each can meet in this step, should both drive as fast as they can.
+  defp neighbours(bodies, discs, dt_ms) do
+    fastest = bodies |> Enum.map(& &1.profile.max_linear) |> Enum.max(fn -> 0.0 end)
+
+    for {i, j, _gap} <-
+          Contact.close(Elixir.Map.to_list(discs), 0.01 + 2 * fastest * dt_ms / 1000),
+        {a, b} <- [{i, j}, {j, i}],
+        reduce: %{} do
+      near -> Elixir.Map.update(near, a, [b], &[b | &1])
+    end
+  end
+
   # Contacts, the count of new ones, bumpers.
   defp touch(world) do
     bodies = bodies(world)
     count = length(bodies)
     discs = Enum.map(bodies, &{&1.index, disc(&1)}) ++ Enum.map(pole(world), &{count, &1})
-    {touching, together, least} = Contact.pairs(discs, count)
+    {touching, together, least} = Contact.pairs(discs, count, world.min_separation)
 
     walls = for {index, disc} <- discs, index < count, do: {index, Contact.walls(world.map, disc)}
     at_wall = for {index, {[_ | _], _}} <- walls, do: {index, :wall}
@@ -318,8 +331,7 @@ defmodule Sim.World do
       | robots: Elixir.Map.new(bodies, &{&1.id, &1}),
         collisions: world.collisions + new,
         together: world.together |> MapSet.union(now) |> MapSet.intersection(near),
-        # `nil` is greater than any number.
-        min_separation: min(world.min_separation, least)
+        min_separation: least
     }
   end
 

@@ -1,5 +1,6 @@
 defmodule Sim.DocTest do
   use ExUnit.Case, async: true
+  doctest Sim.Contact
   doctest Sim.Map
   doctest Sim.Map.Pgm
   doctest Sim.Noise
