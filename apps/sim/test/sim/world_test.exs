@@ -207,6 +207,63 @@ defmodule Sim.WorldTest do
     end
   end
 
+  test "nobody is ever inside the walls of a hospital, nor jumps through them" do
+    {:ok, map} = Map.open("hospital", 1)
+    # In the corridors and doors, where walls are near.
+    poses = for k <- 0..5, do: Pose.new(9.5, k * 2.0 - 5.0, k)
+
+    robots =
+      for {pose, k} <- Enum.with_index(poses),
+          do: %{
+            id: :"min#{k}",
+            profile: %{Profile.atrv_mini() | max_linear: 2.0, max_acceleration: 4.0},
+            pose: pose
+          }
+
+    world = World.new!(map: map, robots: robots, seed: 2)
+    draw = fn -> Twist.new(:rand.uniform() * 3.0 - 1.0, :rand.uniform() * 1.6 - 0.8) end
+    world = wander(outside!(world), 1_500, draw)
+    assert world.collisions > 5
+  end
+
+  test "a thin wall is not jumped, however fast" do
+    {:ok, map} = Map.open("hospital", 1)
+
+    fast = %{
+      Profile.magellan()
+      | radius: 0.05,
+        max_linear: 30.0,
+        max_acceleration: 300.0,
+        sonars: []
+    }
+
+    world =
+      World.new!(
+        map: map,
+        robots: [%{id: :mag1, profile: fast, pose: Pose.new(0, 3)}],
+        noise: :off
+      )
+
+    world =
+      Enum.reduce(1..100, World.drive(world, :mag1, Twist.new(30.0, 0.0)), fn _, w ->
+        w |> World.step(100) |> outside!()
+      end)
+
+    assert_in_delta World.truth(world, :mag1).x, 7.95, 0.001
+  end
+
+  test "bodies put into each other come apart again" do
+    world =
+      world([robot(:mag1, 0, 0), robot(:mag2, 0.3, 0)])
+      |> World.drive(:mag1, Twist.new(0.3, 0.0))
+      |> steps(20)
+
+    assert World.truth(world, :mag1).x == 0.0
+    away = world |> World.drive(:mag1, Twist.new(-0.3, 0.0)) |> steps(60)
+    assert World.truth(away, :mag1).x < -0.3
+    assert away.collisions == 1
+  end
+
   test "the same seed gives the same world" do
     run = fn seed ->
       world([robot(:mag1, 0, 0), robot(:mag2, 2, 1)], noise: :slip, seed: seed)
