@@ -38,20 +38,20 @@ defmodule Console.Ground do
     do: {-width / 2, -height / 2, width / 2, height / 2}
 
   @doc """
-  The box round some places with a margin, grown to a least size, kept within the map.
+  The box round some places with a margin, grown to a least width and height, kept within the map.
 
       iex> room = Console.Ground.room("hall", 16.0, 12.0)
-      iex> Console.Ground.around(room, [{7.0, 0.0}], 1.0, 4.0)
+      iex> Console.Ground.around(room, [{7.0, 0.0}], 1.0, {4.0, 4.0})
       {4.0, -2.0, 8.0, 2.0}
   """
-  @spec around(t(), [{float(), float()}], float(), float()) :: box()
+  @spec around(t(), [{float(), float()}], float(), {float(), float()}) :: box()
   def around(ground, [], _margin, _least), do: box(ground)
 
-  def around(ground, places, margin, least) do
+  def around(ground, places, margin, {wide, high}) do
     {x0, x1} = places |> Enum.map(&elem(&1, 0)) |> Enum.min_max()
     {y0, y1} = places |> Enum.map(&elem(&1, 1)) |> Enum.min_max()
-    {left, right} = span(x0 - margin, x1 + margin, least, ground.width / 2)
-    {bottom, top} = span(y0 - margin, y1 + margin, least, ground.height / 2)
+    {left, right} = span(x0 - margin, x1 + margin, wide, ground.width / 2)
+    {bottom, top} = span(y0 - margin, y1 + margin, high, ground.height / 2)
     {left, bottom, right, top}
   end
 

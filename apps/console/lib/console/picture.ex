@@ -100,7 +100,9 @@ defmodule Console.Picture do
     ]
   end
 
-  defp short(%{stage: stage, robot: robot}) when robot != nil, do: "#{words(stage)}: #{robot}"
+  defp short(%{stage: stage, robot: robot}) when robot != nil and stage != :formed,
+    do: "#{words(stage)}: #{robot}"
+
   defp short(%{stage: stage}), do: words(stage)
 
   defp words(stage), do: stage |> Atom.to_string() |> String.replace("_", " ")

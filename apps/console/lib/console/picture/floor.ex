@@ -4,21 +4,27 @@ defmodule Console.Picture.Floor do
   alias Console.Picture.{Colours, Labels}
   alias Hal.Pose
 
+  @aspect 1.25
   @wall "#4A4F57"
   @ink "#22262B"
   @landmark "#F2C200"
 
   @doc """
   The part of the map worth showing: all of it, or what lies round the ways when they fill
-  less than half of it.
+  less than most of it.
   """
   @spec box(Ground.t(), Track.t()) :: Ground.box()
   def box(ground, track) do
     places = List.flatten(Map.values(track.ways)) ++ track.landmark
     slots = for %{slot: {_x, _y} = slot} <- track.last.robots, do: slot
-    {left, bottom, right, top} = box = Ground.around(ground, places ++ slots, 1.0, 5.0)
+    around = &Ground.around(ground, places ++ slots, 1.0, &1)
+    {left, bottom, right, top} = around.({5.0, 5.0})
+    {wide, high} = {right - left, top - bottom}
+    # As wide in proportion as the place it is drawn in, where the map has the room.
+    {left, bottom, right, top} =
+      box = around.({max(wide, @aspect * high), max(high, wide / @aspect)})
 
-    if (right - left) * (top - bottom) > 0.5 * ground.width * ground.height,
+    if (right - left) * (top - bottom) > 0.8 * ground.width * ground.height,
       do: Ground.box(ground),
       else: box
   end

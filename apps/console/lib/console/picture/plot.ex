@@ -101,7 +101,7 @@ defmodule Console.Picture.Plot do
         stroke_width: 1,
         stroke_dasharray: "6 4"
       ),
-      Svg.text("#{@limit} m: formed", width - 6, at - 4, label(font_size: 10, text_anchor: "end"))
+      Svg.text("formed: #{@limit} m", 6, at - 4, label(font_size: 10))
     ]
   end
 

@@ -74,7 +74,7 @@ defmodule Console.Terminal.Canvas do
         for(%{alive: true} = robot <- scene.robots, do: Pose.point(robot.pose)) ++
           List.wrap(scene.landmark)
 
-      {left, bottom, right, top} = Ground.around(ground, places, 1.0, 8.0)
+      {left, bottom, right, top} = Ground.around(ground, places, 1.0, {8.0, 8.0})
       {outward(left, -1), outward(bottom, -1), outward(right, 1), outward(top, 1)}
     end
   end
