@@ -21,6 +21,7 @@ defmodule Swarm do
 
   A command to `:all` or to a list answers a map of these, by robot.
   """
+  alias Robot.Command
   alias Swarm.{Directory, Formation}
   alias Swarm.Missions.Manual
 
@@ -56,7 +57,7 @@ defmodule Swarm do
   """
   @spec goto(robot(), {number(), number()} | {number(), number(), number()}) :: answer()
   def goto(robot, {x, y}) when is_number(x) and is_number(y),
-    do: manual(robot, {:goto, x * 1.0, y * 1.0})
+    do: manual(robot, {:goto, x * 1.0, y * 1.0, nil})
 
   def goto(robot, {x, y, heading}) when is_number(x) and is_number(y) and is_number(heading),
     do: manual(robot, {:goto, x * 1.0, y * 1.0, heading * 1.0})
@@ -66,7 +67,7 @@ defmodule Swarm do
   def follow(robot, leader) when is_atom(leader) do
     if robot == leader,
       do: {:error, "#{robot} cannot follow itself"},
-      else: manual(robot, {:follow, leader})
+      else: manual(robot, {:follow_the_leader, leader})
   end
 
   @doc """
@@ -82,6 +83,20 @@ defmodule Swarm do
 
     with {:ok, {kind, spacing}} <- Formation.new(kind, sized(kind, options, length(robots))),
          do: ask(robots, {:formation, kind, spacing})
+  end
+
+  @doc """
+  Tells a command in words (`Robot.Command`) to one robot, to a list, or to `:all`. A text that is
+  wrong reaches nobody.
+
+      Swarm.tell(:mag1, "goto:2.0:1.0")
+      Swarm.tell([:mag2, :mag3], "followtheleader:mag1")
+      Swarm.tell(:all, "start")
+  """
+  @spec tell(robot(), String.t()) :: answer()
+  @spec tell([robot()] | :all, String.t()) :: answers() | {:error, line :: String.t()}
+  def tell(who, text) do
+    with {:ok, command} <- Command.parse(text, robots()), do: ask(who, command)
   end
 
   @doc "Stops all robots at once, until `reset/0`. Spreads from robot to robot, too."
@@ -126,7 +141,7 @@ defmodule Swarm do
   defp manual(robot, command) do
     if Manual.command?(command),
       do: ask(robot, command),
-      else: {:error, "cannot #{inspect(command)}: numbers within 100 km and 10 m/s are allowed"}
+      else: {:error, "cannot #{inspect(command)}: numbers from -1000000 to 1000000 are allowed"}
   end
 
   # An alias: an answer that comes too late finds no mailbox.

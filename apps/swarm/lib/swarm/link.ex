@@ -206,6 +206,7 @@ defmodule Swarm.Link do
   end
 
   defp obey(:status, s), do: {{:ok, Board.entries(s.board)}, s}
+  defp obey(:ping, s), do: {:ok, s}
   defp obey(:start, s), do: {run(s, s.config.mission, :start), s}
 
   # A robot that has no mission stands already.

@@ -165,7 +165,7 @@ defmodule Swarm.LinkTest do
       assert Swarm.goto(id, {2, 1}) == :ok
       assert Swarm.goto(:nobody, {2, 1}) == {:error, :unknown}
       assert {:error, line} = Swarm.goto(id, {1.0e9, 0})
-      assert line =~ "100 km"
+      assert line =~ "1000000"
       rolls_of(id)
       assert %{mission: {%{state: {Swarm.Missions.Manual, :goto}}, _}} = Swarm.status(id)
       assert Swarm.stop(id) == :ok
@@ -175,6 +175,20 @@ defmodule Swarm.LinkTest do
       assert Swarm.follow(id, :door9) == :ok
       assert Swarm.start(id) == {:error, :no_mission}
       assert Swarm.status(:nobody) == {:error, :unknown}
+    end
+
+    test "commands in words" do
+      for id <- [:door6, :door7], do: talking(id)
+      assert Swarm.tell(:door6, "goto:2.0:1.0") == :ok
+      assert Swarm.tell([:door6, :door7], "ping") == %{door6: :ok, door7: :ok}
+      assert Swarm.tell(:all, "stop") == %{door6: :ok, door7: :ok}
+      assert Swarm.tell(:door6, "followtheleader:door7") == :ok
+      assert {:error, line} = Swarm.tell(:door6, "followtheleader:mag77")
+      assert line =~ "mag77"
+      assert {:error, line} = Swarm.tell(:all, "goto:abc:1")
+      assert line =~ "abc"
+      assert {:error, _line} = Swarm.tell(:door6, nil)
+      assert Swarm.tell(:door7, "subscribe:door6") == {:error, :idle}
     end
 
     test "all begin their mission, take a shape, and stop" do

@@ -2,16 +2,20 @@ defmodule Swarm.Missions.Manual do
   @moduledoc """
   One robot does what a person tells it, one command at a time. Pure.
 
+  Its commands are of `Robot.Command`:
+
   | command | does |
   |---|---|
-  | `{:goto, x, y}`, `{:goto, x, y, heading}` | goes there (metres, radians) |
+  | `{:goto, x, y, heading or nil}` | goes there (metres, radians) |
   | `{:move, linear, turn}` | drives at this speed (m/s, rad/s) until told otherwise |
-  | `{:follow, robot}` | keeps 1 m behind that robot; stands while it is not heard |
+  | `{:follow, pose}` | takes that place and keeps it |
+  | `{:follow_the_leader, robot}` | keeps 1 m behind that robot; stands while it is not heard |
   | `{:find_blob, colour}` | turns until the camera shows the colour (`nil`: any) |
+  | `:lead` | keeps the blob that it sees ahead and near, wherever it is carried |
   | `:stop` | stands |
   """
   alias Hal.Pose
-  alias Robot.Behaviour.{FindBlob, Follow, Goto, Move}
+  alias Robot.Behaviour.{FindBlob, Follow, Goto, Move, TrackBlob}
 
   @behaviour Robot.Mission
 
@@ -22,33 +26,30 @@ defmodule Swarm.Missions.Manual do
   defstruct @enforce_keys ++ [phase: :ready, number: 0, leader: nil]
 
   @type t :: %__MODULE__{robot: atom(), phase: atom(), number: non_neg_integer()}
-  @type command ::
-          {:goto, float(), float()}
-          | {:goto, float(), float(), float()}
-          | {:move, float(), float()}
-          | {:follow, atom()}
-          | {:find_blob, String.t() | nil}
-
   @doc """
   Whether a command is one for this mission, with numbers that make sense.
 
-      iex> Swarm.Missions.Manual.command?({:goto, 2.0, 1.0})
+      iex> Swarm.Missions.Manual.command?({:goto, 2.0, 1.0, nil})
       true
-      iex> Swarm.Missions.Manual.command?({:goto, 2.0, "far"})
+      iex> Swarm.Missions.Manual.command?({:goto, 2.0, "far", nil})
       false
       iex> Swarm.Missions.Manual.command?({:formation, :wedge, 1.0})
       false
   """
   @spec command?(term()) :: boolean()
-  def command?({:goto, x, y}), do: place?(x) and place?(y)
-  def command?({:goto, x, y, heading}), do: place?(x) and place?(y) and place?(heading)
-  def command?({:move, linear, turn}), do: speed?(linear) and speed?(turn)
-  def command?({:follow, robot}), do: is_atom(robot) and robot != nil
-  def command?({:find_blob, colour}), do: colour == nil or is_binary(colour)
-  def command?(_other), do: false
+  def command?({:goto, x, y, nil}), do: number?(x) and number?(y)
+  def command?({:goto, x, y, heading}), do: number?(x) and number?(y) and number?(heading)
 
-  defp place?(value), do: is_float(value) and abs(value) < 1.0e5
-  defp speed?(value), do: is_float(value) and abs(value) < 10
+  def command?({:follow, %Pose{x: x, y: y, heading: heading}}),
+    do: command?({:goto, x, y, heading})
+
+  def command?({:move, linear, turn}), do: number?(linear) and number?(turn)
+  def command?({:follow_the_leader, robot}), do: is_atom(robot) and robot != nil
+  def command?({:find_blob, colour}), do: colour == nil or is_binary(colour)
+  def command?(command), do: command == :lead
+
+  # As in `Robot.Command`. How fast is fast enough is the gate's to say.
+  defp number?(value), do: is_float(value) and abs(value) <= 1.0e6
 
   @impl Robot.Mission
   def init(robot, _options), do: ready(%__MODULE__{robot: robot})
@@ -56,12 +57,12 @@ defmodule Swarm.Missions.Manual do
   @impl Robot.Mission
   def handle({:command, :stop}, mission), do: ready(mission)
 
-  def handle({:command, {:follow, robot}}, mission),
-    do: begin(%{mission | leader: robot}, :follow, nil)
+  def handle({:command, {:follow_the_leader, robot}}, mission),
+    do: begin(%{mission | leader: robot}, :follow_the_leader, nil)
 
   def handle({:command, command}, mission) do
     if command?(command),
-      do: begin(mission, elem(command, 0), goal(command)),
+      do: begin(mission, name(command), goal(command)),
       else: {mission.phase, mission, []}
   end
 
@@ -69,8 +70,8 @@ defmodule Swarm.Missions.Manual do
   def handle({:outcome, {phase, number}, _outcome}, %{phase: phase, number: number} = mission),
     do: ready(mission)
 
-  def handle({:tick, percept}, %{phase: :follow} = mission),
-    do: {:follow, mission, [{:goal, {:follow, mission.number}, behind(mission, percept)}]}
+  def handle({:tick, percept}, %{phase: :follow_the_leader = phase} = mission),
+    do: {phase, mission, [{:goal, {phase, mission.number}, behind(mission, percept)}]}
 
   def handle(_event, mission), do: {mission.phase, mission, []}
 
@@ -84,7 +85,12 @@ defmodule Swarm.Missions.Manual do
 
   defp claim(phase, standing), do: {:claim, %{phase: phase, standing: standing}}
 
-  defp goal({:goto, x, y}), do: {Goto, x: x, y: y}
+  defp name(:lead), do: :lead
+  defp name(command), do: elem(command, 0)
+
+  defp goal(:lead), do: {TrackBlob, []}
+  defp goal({:follow, pose}), do: {Follow, target: pose}
+  defp goal({:goto, x, y, nil}), do: {Goto, x: x, y: y}
   defp goal({:goto, x, y, heading}), do: {Goto, x: x, y: y, heading: Pose.wrap(heading)}
   defp goal({:move, linear, turn}), do: {Move, linear: linear, turn: turn}
   defp goal({:find_blob, colour}), do: {FindBlob, colour: colour}
