@@ -6,8 +6,8 @@ defmodule Swarm.Link do
   Heartbeats become peers on the robot's board, everything else goes to the pilot. Mouth: what the
   mission says goes out, and five times a second a heartbeat, with what the board says of the robot.
 
-  An e-stop spreads with the heartbeats, numbered, so that one which a person has cleared here is
-  not caught again from a robot that is still to be reset.
+  What people command (`Swarm`) is `Swarm.Link.Orders`, and so is the e-stop, which spreads with the
+  heartbeats.
 
   `join/2` makes a config with a link. Its options:
 
@@ -19,9 +19,9 @@ defmodule Swarm.Link do
   """
   use GenServer
   alias Hal.Event
-  alias Robot.{Board, Config, Gate, Names, Percept, Pilot}
+  alias Robot.{Board, Config, Names, Percept, Pilot}
   alias Swarm.{Directory, Heartbeat, Message, Peers}
-  alias Swarm.Missions.Manual
+  alias Swarm.Link.Orders
 
   @behaviour Robot.Companion
 
@@ -73,11 +73,7 @@ defmodule Swarm.Link do
   def init({%Config{id: id} = config, options}) do
     board = Board.find!(id)
 
-    {stop, cleared} =
-      case Board.fetch(board, :estop, :infinity) do
-        {:ok, numbers, _at_ms} -> numbers
-        :error -> {0, 0}
-      end
+    {stop, cleared} = Orders.stops(board)
 
     s = %{
       config: config,
@@ -102,8 +98,7 @@ defmodule Swarm.Link do
 
   @impl GenServer
   def handle_continue(:enter, s) do
-    # A stop that was written down by the link before this one may not have reached the gate.
-    if s.stop > s.cleared, do: :ok = Gate.estop(s.id)
+    Orders.resume(s)
     {:noreply, enter(s)}
   end
 
@@ -118,7 +113,7 @@ defmodule Swarm.Link do
   end
 
   def handle_cast({:command, command, reply_to}, s) do
-    {answer, s} = obey(command, s)
+    {answer, s} = Orders.obey(command, s)
     :erlang.send(reply_to, {reply_to, answer}, [:nosuspend, :noconnect])
     {:noreply, s}
   end
@@ -137,8 +132,9 @@ defmodule Swarm.Link do
 
   defp heard(s, %Message{kind: :heartbeat, from: from, body: beat}) do
     at_ms = Config.now(s.config)
-    s = show(%{s | peers: Peers.hear(s.peers, from, beat, at_ms)}, at_ms)
-    if beat.estop > s.stop, do: estop(s, beat.estop), else: s
+    s = %{s | peers: Peers.hear(s.peers, from, beat, at_ms)}
+    show(%{s.peers | rows: Map.take(s.peers.rows, [from])}, s.board, at_ms)
+    if beat.estop > s.stop, do: Orders.estop(s, beat.estop), else: s
   end
 
   defp heard(s, message) do
@@ -148,17 +144,16 @@ defmodule Swarm.Link do
 
   # How others are grows old by itself, so what the board shows of them is written anew each time.
   defp tick(s, at_ms) do
-    s = show(%{s | ticks: s.ticks + 1}, at_ms)
+    s = %{s | ticks: s.ticks + 1}
+    show(s.peers, s.board, at_ms)
     Board.put(s.board, :link, :radio, s.counts, at_ms)
     if rem(s.ticks, @rivals_every) == 0, do: challenge(s)
     if rem(s.ticks, @beat_every) == 1, do: beat(s, at_ms), else: s
   end
 
-  defp show(s, at_ms) do
-    for {id, peer} <- Peers.percepts(s.peers, at_ms),
-        do: Board.put(s.board, :link, {:peer, id}, peer, peer.at_ms)
-
-    s
+  defp show(peers, board, at_ms) do
+    for {id, peer} <- Peers.percepts(peers, at_ms),
+        do: Board.put(board, :link, {:peer, id}, peer, peer.at_ms)
   end
 
   # A robot that has no pose yet has nothing to say; one whose executive fell stands where it was.
@@ -197,62 +192,6 @@ defmodule Swarm.Link do
   defp addressed(:all), do: Directory.robots()
   defp addressed(ids) when is_list(ids), do: ids
   defp addressed(id), do: [id]
-
-  defp obey(:estop, s), do: {:ok, estop(s, max(s.stop, s.cleared) + 1)}
-
-  defp obey(:reset, s) do
-    :ok = Gate.reset(s.id)
-    {:ok, numbered(%{s | cleared: s.stop})}
-  end
-
-  defp obey(:status, s), do: {{:ok, Board.entries(s.board)}, s}
-  defp obey(:ping, s), do: {:ok, s}
-  defp obey(:start, s), do: {run(s, s.config.mission, :start), s}
-
-  # A robot that has no mission stands already.
-  defp obey(:stop, s) do
-    case Pilot.command(s.id, :stop) do
-      {:error, :idle} -> {:ok, s}
-      answer -> {answer, s}
-    end
-  end
-
-  defp obey(command, s) do
-    cond do
-      Manual.command?(command) -> {run(s, {Manual, []}, command), s}
-      running(s.board) == :idle -> {{:error, :idle}, s}
-      true -> {Pilot.command(s.id, command), s}
-    end
-  end
-
-  # A mission that is running already is not begun anew: it takes the command as it is.
-  defp run(_s, nil, _command), do: {:error, :no_mission}
-
-  defp run(s, {module, options}, command) do
-    with :ok <- if(running(s.board) == module, do: :ok, else: Pilot.start(s.id, module, options)),
-         do: Pilot.command(s.id, command)
-  end
-
-  defp running(board) do
-    case Board.fetch(board, :mission, :infinity) do
-      {:ok, %{state: {module, _phase}}, _at_ms} -> module
-      _idle_or_none -> :idle
-    end
-  end
-
-  defp estop(%{cleared: cleared} = s, stop) when stop <= cleared, do: numbered(%{s | stop: stop})
-
-  # Written down first: a link that restarts in between knows that there is something to spread.
-  defp estop(s, stop) do
-    s = numbered(%{s | stop: stop})
-    :ok = Gate.estop(s.id)
-    s
-  end
-
-  defp numbered(s) do
-    Board.put(s.board, :link, :estop, {s.stop, s.cleared}, Config.now(s.config))
-    s
-  end
 
   defp groups(s), do: [:robots, {:robot, s.id}]
 
