@@ -28,6 +28,8 @@ defmodule Robot.Behaviour.Avoid do
   @roomy 2.0
   # m/s of one who makes way.
   @aside 0.2
+  # m/s away from what is close, at contact.
+  @drift 0.25
   @horizon_s 2.5
   @standing_horizon_s 1.2
   @to_the_right :math.pi() / 12
@@ -118,6 +120,7 @@ defmodule Robot.Behaviour.Avoid do
     robots = Neighbours.near(all)
     bodies = Enum.map(all, fn %{at: {x, y}, radius: radius} -> {x, y, radius} end)
     things = Neighbours.unknown(percept, bodies ++ state.discs)
+    fixed = things ++ standing(state.discs, percept)
     way = way(wish, percept, all, state.discs)
 
     {aside, progress} =
@@ -132,8 +135,9 @@ defmodule Robot.Behaviour.Avoid do
       wish.velocity
       |> toward(way, wish, speed, percept)
       |> keep_right(aside, way, robots, percept)
+      |> spread(robots ++ fixed, wish.goal, percept)
 
-    planes = planes(percept, robots, things ++ standing(state.discs, percept))
+    planes = planes(percept, robots, fixed)
 
     velocity =
       planes
@@ -235,6 +239,27 @@ defmodule Robot.Behaviour.Avoid do
 
     gap < 3.0 and dx * vx + dy * vy > 0 and dx * (vx - ox) + dy * (vy - oy) > 0 and
       ox * vx + oy * vy < 0
+  end
+
+  # Close along something it gets on only slowly, so it drifts off it, into the middle of a narrow
+  # place; but not from what stands by its goal.
+  defp spread(velocity, others, goal, percept) do
+    Enum.reduce(others, velocity, fn %{at: {x, y}} = other, {vx, vy} = velocity ->
+      if other.standing? and other.gap < @detour_margin and not by_goal?(other, goal, percept) do
+        push = @drift * (1 - max(other.gap, 0.0) / @detour_margin)
+        distance = max(Pose.distance(percept.pose, {x, y}), 0.01)
+        {vx + push * (percept.pose.x - x) / distance, vy + push * (percept.pose.y - y) / distance}
+      else
+        velocity
+      end
+    end)
+  end
+
+  defp by_goal?(_other, nil, _percept), do: true
+
+  defp by_goal?(%{at: at, radius: radius}, goal, percept) do
+    Pose.distance(percept.pose, goal) < 0.8 and
+      Pose.distance(at, goal) < percept.profile.radius + radius + @detour_margin + 0.05
   end
 
   defp turn({vx, vy}, angle) do
