@@ -3,7 +3,7 @@ defmodule Robot.Behaviour.Avoid do
   Lets another behaviour run, and bends or slows what it wishes so that nobody is touched (R85).
 
   A wish with a velocity is bent: round standing robots and discs on the shortest way
-  (`Robot.Detour`), past moving ones by `Robot.Orca`, a little to the right of those who come, and
+  (`.Way`), past moving ones by `Robot.Orca`, a little to the right of those who come, and
   away from what only the sonars see. A wish without one is only slowed down (`.Brake`).
   Who gets no nearer for some seconds goes another way for a while (`.Progress`), and who stands in
   another's way makes room (`.Yield`). A robot with nobody about gets its wish unchanged.
@@ -13,23 +13,19 @@ defmodule Robot.Behaviour.Avoid do
   """
   @behaviour Robot.Behaviour
   alias Hal.{Pose, Twist}
-  alias Robot.{Behaviour, Detour, Orca, Percept, Steering, Wish}
-  alias Robot.Behaviour.Avoid.{Brake, Neighbours, Progress, Yield}
+  alias Robot.{Behaviour, Orca, Percept, Steering, Wish}
+  alias Robot.Behaviour.Avoid.{Brake, Neighbours, Progress, Way, Yield}
   alias Robot.Behaviour.Options
 
-  # Metres kept to others: by plan round standing ones, and by reaction to standing and moving ones.
-  @detour_margin 0.2
-  @tight_margin 0.1
+  # Metres kept to others by reaction; to standing ones less when there is no more room.
   @standing_margin 0.12
   @moving_margin 0.15
-  @tightest 0.06
   @closest 0.04
-  # A roomy way may be this much longer (metres) than a tight one.
-  @roomy 2.0
   # m/s of one who makes way.
   @aside 0.2
-  # m/s away from what is close, at contact.
+  # m/s away from what is close, at contact; and how close that is.
   @drift 0.25
+  @close 0.16
   @horizon_s 2.5
   @standing_horizon_s 1.2
   @to_the_right :math.pi() / 12
@@ -42,6 +38,7 @@ defmodule Robot.Behaviour.Avoid do
       inner: Options.check!(options, :inner, &match?({_, _}, &1), "a behaviour"),
       discs: Options.check!(options, :discs, &discs?/1, "[{x, y, radius}]"),
       progress: nil,
+      way: nil,
       standing: %{},
       backing?: false,
       velocity: nil,
@@ -86,7 +83,7 @@ defmodule Robot.Behaviour.Avoid do
     speed = :math.sqrt(vx * vx + vy * vy)
 
     if speed < 0.02 or Yield.now?(state.yield, percept.at_ms),
-      do: stay(wish, percept, %{state | progress: nil, velocity: nil}),
+      do: stay(wish, percept, %{state | progress: nil, velocity: nil, way: nil}),
       else: bend(wish, speed, percept, state)
   end
 
@@ -121,20 +118,21 @@ defmodule Robot.Behaviour.Avoid do
     bodies = Enum.map(all, fn %{at: {x, y}, radius: radius} -> {x, y, radius} end)
     things = Neighbours.unknown(percept, bodies ++ state.discs)
     fixed = things ++ standing(state.discs, percept)
-    way = way(wish, percept, all, state.discs)
+    way = wish.goal && Way.round(state.way, wish.goal, percept, all, state.discs)
+    corners = way && way.corners
 
     {aside, progress} =
       Progress.note(
         state.progress,
-        length_of(way, Pose.point(percept.pose)),
+        way && Way.left(way, Pose.point(percept.pose)),
         percept.robot,
         percept.at_ms
       )
 
     preferred =
       wish.velocity
-      |> toward(way, wish, speed, percept)
-      |> keep_right(aside, way, robots, percept)
+      |> toward(corners, wish, speed, percept)
+      |> keep_right(aside, corners, robots, percept)
       |> spread(robots ++ fixed, wish.goal, percept)
 
     planes = planes(percept, robots, fixed)
@@ -152,62 +150,12 @@ defmodule Robot.Behaviour.Avoid do
       state
       | progress: Progress.hindered(progress, hindered?),
         standing: standing,
+        way: way,
         velocity: velocity,
         backing?: if(twist.linear == 0.0, do: state.backing?, else: twist.linear < 0)
     }
 
     {braked, state}
-  end
-
-  # The corners of the way round what stands; where there is none, the straight one.
-  defp way(%Wish{goal: nil}, _percept, _robots, _discs), do: nil
-
-  defp way(%Wish{goal: goal}, percept, robots, discs) do
-    from = Pose.point(percept.pose)
-    fixed = for %{fixed?: true, at: {x, y}, radius: r} <- robots, do: {x, y, r}
-
-    waiting =
-      for %{fixed?: false, standing?: true, at: {x, y}, radius: r} <- robots, do: {x, y, r}
-
-    own = percept.profile.radius
-    round = fn bodies, margin -> Enum.map(bodies, &grow(&1, own, margin, from, goal)) end
-
-    roomy(from, goal, round.(waiting ++ fixed ++ discs, @detour_margin), fn ->
-      Detour.way(from, goal, round.(waiting ++ fixed ++ discs, @tight_margin))
-    end) ||
-      Detour.way(from, goal, round.(waiting ++ fixed ++ discs, @tightest)) ||
-      Detour.way(from, goal, round.(fixed ++ discs, @tight_margin)) || [goal]
-  end
-
-  defp roomy(from, goal, discs, tight) do
-    way = Detour.way(from, goal, discs)
-
-    cond do
-      way == nil -> tight.()
-      length_of(way, from) < Pose.distance(from, goal) + @roomy -> way
-      true -> Enum.min_by([{way, 0.0}, {tight.(), @roomy}], &cost(&1, from)) |> elem(0)
-    end
-  end
-
-  defp cost({nil, _}, _from), do: 1.0e9
-  defp cost({way, extra}, from), do: length_of(way, from) + extra
-
-  # A body by its margin larger, unless we or our goal are nearer than that: then as large as may be.
-  defp grow({x, y, radius}, own, margin, from, goal) do
-    tight = own + radius + min(margin, @tightest)
-    room = min(Pose.distance(from, {x, y}), Pose.distance(goal, {x, y})) - 0.01
-    {x, y, (own + radius + margin) |> min(room) |> max(min(tight, room))}
-  end
-
-  defp length_of(nil, _from), do: nil
-
-  defp length_of(way, from) do
-    {length, _} =
-      Enum.reduce(way, {0.0, from}, fn place, {length, from} ->
-        {length + Pose.distance(from, place), place}
-      end)
-
-    length
   end
 
   defp toward(velocity, [_goal], _wish, _speed, _percept), do: velocity
@@ -245,8 +193,8 @@ defmodule Robot.Behaviour.Avoid do
   # place; but not from what stands by its goal.
   defp spread(velocity, others, goal, percept) do
     Enum.reduce(others, velocity, fn %{at: {x, y}} = other, {vx, vy} = velocity ->
-      if other.standing? and other.gap < @detour_margin and not by_goal?(other, goal, percept) do
-        push = @drift * (1 - max(other.gap, 0.0) / @detour_margin)
+      if other.standing? and other.gap < @close and not by_goal?(other, goal, percept) do
+        push = @drift * (1 - max(other.gap, 0.0) / @close)
         distance = max(Pose.distance(percept.pose, {x, y}), 0.01)
         {vx + push * (percept.pose.x - x) / distance, vy + push * (percept.pose.y - y) / distance}
       else
@@ -259,7 +207,7 @@ defmodule Robot.Behaviour.Avoid do
 
   defp by_goal?(%{at: at, radius: radius}, goal, percept) do
     Pose.distance(percept.pose, goal) < 0.8 and
-      Pose.distance(at, goal) < percept.profile.radius + radius + @detour_margin + 0.05
+      Pose.distance(at, goal) < percept.profile.radius + radius + 0.25
   end
 
   defp turn({vx, vy}, angle) do
