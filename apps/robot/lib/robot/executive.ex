@@ -8,15 +8,18 @@ defmodule Robot.Executive do
   """
   use GenServer
   alias Hal.{Device, Event}
-  alias Robot.{Board, Config, Gate, Mind, Names, Percept, Pilot, Trace}
+  alias Robot.{Board, Config, Gate, Mind, Names, Percept, Trace}
 
   @period_ms 100
   @slow_us 50_000
 
-  @doc "Starts the executive of a robot."
-  @spec start_link(Config.t()) :: GenServer.on_start()
-  def start_link(%Config{} = config),
-    do: GenServer.start_link(__MODULE__, config, name: Names.via(config.id, :executive))
+  @doc """
+  Starts the executive of a robot. It knows nobody above: what it perceived goes, as `{:tick, percept}`,
+  and what came of a goal, as `{:outcome, tag, integer}`, to the sink: `apply(m, f, a ++ [event])`.
+  """
+  @spec start_link({Config.t(), sink :: Config.call()}) :: GenServer.on_start()
+  def start_link({%Config{} = config, {_m, _f, _a} = sink}),
+    do: GenServer.start_link(__MODULE__, {config, sink}, name: Names.via(config.id, :executive))
 
   @doc "Sets, changes or (`nil`) drops the goal, as in `Robot.Mind.goal/3`."
   @spec goal(robot :: atom(), tag :: term(), {module(), keyword()} | nil) :: :ok
@@ -33,7 +36,7 @@ defmodule Robot.Executive do
   defp cast(robot, message), do: GenServer.cast(Names.via(robot, :executive), message)
 
   @impl GenServer
-  def init(%Config{id: id} = config) do
+  def init({%Config{id: id} = config, sink}) do
     board = Board.find!(id)
     at_ms = Config.now(config)
     Board.put(board, :executive, :doing, %{by: :idle, weight: 0.0, outcome: nil}, at_ms)
@@ -42,6 +45,7 @@ defmodule Robot.Executive do
     s = %{
       config: config,
       board: board,
+      sink: sink,
       mind: Mind.new(profile: config.profile, start: config.start),
       look: nil,
       behaviour_looks?: false,
@@ -101,9 +105,8 @@ defmodule Robot.Executive do
     if percept.pose, do: Board.put(board, :executive, :pose, percept.pose, at_ms)
 
     # The outcome first: the mission knows what came of its goal when it sees the next percept.
-    report(outcome, config, at_ms)
-    Pilot.tick(config.id, percept)
-    Trace.effect(config, :executive, {:tick, percept}, at_ms)
+    with {tag, outcome} <- outcome, do: tell(s, {:outcome, tag, outcome}, at_ms)
+    tell(s, {:tick, percept}, at_ms)
     %{s | mind: mind, behaviour_looks?: wish.look != nil}
   end
 
@@ -114,11 +117,9 @@ defmodule Robot.Executive do
 
   defp look(_pan, _config, _at_ms), do: :ok
 
-  defp report(nil, _config, _at_ms), do: :ok
-
-  defp report({tag, outcome}, config, at_ms) do
-    Pilot.outcome(config.id, tag, outcome)
-    Trace.effect(config, :executive, {:outcome, tag, outcome}, at_ms)
+  defp tell(%{sink: {m, f, a}} = s, event, at_ms) do
+    apply(m, f, a ++ [event])
+    Trace.effect(s.config, :executive, event, at_ms)
   end
 
   # At absolute times, so that the pace does not drift; ticks that were missed are not made up for.

@@ -16,7 +16,7 @@ defmodule Robot.Pilot do
   """
   @behaviour :gen_statem
   alias Hal.Event
-  alias Robot.{Board, Config, Executive, Names, Percept, Trace}
+  alias Robot.{Board, Config, Executive, Names, Trace}
 
   @call_ms 1_000
 
@@ -45,20 +45,14 @@ defmodule Robot.Pilot do
   @spec command(robot :: atom(), command :: term()) :: :ok | {:error, :idle}
   def command(robot, command), do: call(robot, {:command, command})
 
-  @doc "A tick of the executive. Of several that wait, only the newest is handled."
-  @spec tick(robot :: atom(), Percept.t()) :: :ok
-  def tick(robot, percept), do: cast(robot, {:tick, percept})
-
-  @doc "A goal came to its end."
-  @spec outcome(robot :: atom(), tag :: term(), integer()) :: :ok
-  def outcome(robot, tag, outcome), do: cast(robot, {:outcome, tag, outcome})
-
-  @doc "A message from another robot, checked by whoever heard it."
-  @spec message(robot :: atom(), struct()) :: :ok
-  def message(robot, message), do: cast(robot, {:message, message})
+  @doc """
+  An event of `Robot.Mission`: a tick or an outcome from the executive, a message from another robot,
+  checked by whoever heard it. Of several ticks that wait, only the newest is handled.
+  """
+  @spec hear(robot :: atom(), Robot.Mission.event()) :: :ok
+  def hear(robot, event), do: :gen_statem.cast(Names.via(robot, :pilot), event)
 
   defp call(robot, request), do: :gen_statem.call(Names.via(robot, :pilot), request, @call_ms)
-  defp cast(robot, event), do: :gen_statem.cast(Names.via(robot, :pilot), event)
 
   @impl :gen_statem
   def callback_mode, do: :handle_event_function

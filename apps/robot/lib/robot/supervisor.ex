@@ -37,7 +37,14 @@ defmodule Robot.Supervisor do
 
   @impl Supervisor
   def init(%Config{} = config) do
-    parts = for part <- [Board, Devices, Gate, Executive, Pilot], do: {part, config}
+    parts = [
+      {Board, config},
+      {Devices, config},
+      {Gate, config},
+      {Executive, {config, {Pilot, :hear, [config.id]}}},
+      {Pilot, config}
+    ]
+
     companions = for {module, options} <- config.companions, do: {module, {config, options}}
 
     Supervisor.init(parts ++ companions, strategy: :rest_for_one, max_restarts: 3, max_seconds: 5)

@@ -24,7 +24,7 @@ defmodule Robot.PilotTest do
   test "hands ticks, outcomes, messages and commands to the mission" do
     id = flown(:pilot2)
     assert_receive {:mission, {:tick, %Robot.Percept{robot: ^id}}}, 200
-    Pilot.message(id, %{hello: 1})
+    Pilot.hear(id, {:message, %{hello: 1}})
     assert_receive {:mission, {:message, %{hello: 1}}}
     assert Pilot.command(id, :go) == :ok
     assert_receive {:mission, {:command, :go}}
@@ -39,7 +39,7 @@ defmodule Robot.PilotTest do
 
     id =
       flown(:pilot3,
-        send: {Kernel, :send, [self()]} |> then(fn _ -> {__MODULE__, :say, [self()]} end),
+        send: {__MODULE__, :say, [self()]},
         ptz: ptz
       )
 
@@ -74,7 +74,7 @@ defmodule Robot.PilotTest do
     :ok = :sys.suspend(executive)
     :ok = :sys.suspend(pilot)
     ticks = for n <- 1..9, do: %Robot.Percept{robot: id, at_ms: n, profile: nil}
-    Enum.each(ticks, &Pilot.tick(id, &1))
+    Enum.each(ticks, &Pilot.hear(id, {:tick, &1}))
     :ok = :sys.resume(pilot)
     assert_receive {:mission, {:tick, %{at_ms: 9}}}
     for n <- 1..8, do: refute_received({:mission, {:tick, %{at_ms: ^n}}})

@@ -31,7 +31,7 @@ defmodule Robot.TraceTest do
     :ok = Pilot.command(id, {:do, :ready, [roll.(0.2), {:stage, :faster, %{}}]})
     two_ticks()
     send(drive, {:readings, [odometry.(0.2), {:bumpers, [0, 1]}, {:sonar, free}]})
-    Pilot.message(id, %{hello: 1})
+    Pilot.hear(id, {:message, %{hello: 1}})
     two_ticks()
     :ok = Gate.estop(id)
     two_ticks()

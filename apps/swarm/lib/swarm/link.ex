@@ -138,7 +138,7 @@ defmodule Swarm.Link do
   end
 
   defp heard(s, message) do
-    Pilot.message(s.id, message)
+    Pilot.hear(s.id, {:message, message})
     s
   end
 
