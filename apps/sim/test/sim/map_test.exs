@@ -82,6 +82,22 @@ defmodule Sim.MapTest do
              ~r/\Ano free place left for mag\d+: 30 robots do not fit into the start room of map .*\z/
   end
 
+  test "nobody starts behind a wall that the fleet cannot pass", %{tmp_dir: dir} do
+    # A wall all across, one metre right of the centre.
+    rows =
+      for _ <- 1..20,
+          into: <<>>,
+          do: :binary.copy(<<255>>, 22) <> <<0>> <> :binary.copy(<<255>>, 17)
+
+    file = write(dir, "cut.pgm", "P5 40 20 255\n" <> rows)
+    {:ok, map} = Map.open("#{file}:16x8", 6)
+
+    for seed <- 1..10, side <- [{-3.0, 0.0}, {4.0, 0.0}] do
+      {:ok, poses} = Map.starts(map, for(k <- 1..6, do: {:"mag#{k}", 0.2}), seed, side)
+      assert Enum.all?(poses, &(&1.x > 1.0 == elem(side, 0) > 1.0))
+    end
+  end
+
   test "clearance is the distance to the nearest wall" do
     {:ok, map} = Map.open("hospital", 6)
 
