@@ -122,10 +122,10 @@ defmodule Robot.AvoidTest do
     end
   end
 
-  describe "Avoid" do
-    defp peer(pose, linear \\ 0.0, mode \\ :moving),
-      do: %{pose: pose, twist: Twist.new(linear, 0), radius: 0.2, at_ms: 0, mode: mode}
+  defp peer(pose, linear \\ 0.0, mode \\ :moving),
+    do: %{pose: pose, twist: Twist.new(linear, 0), radius: 0.2, at_ms: 0, mode: mode}
 
+  describe "Avoid" do
     defp tick(inner, pose, change \\ & &1, discs \\ []) do
       percept = pose |> Body.new() |> Body.percept() |> change.()
       {:running, wish, _} = Behaviour.tick(Avoid.new(inner: inner, discs: discs), percept)
@@ -178,6 +178,23 @@ defmodule Robot.AvoidTest do
         assert outcome == {:go, 1}
         assert nearest > 0.41
       end
+    end
+  end
+
+  test "where a wreck stands in its place, a robot stands beside it and says so" do
+    wreck = &%{&1 | peers: %{a: %{peer(Pose.new(3, 0), 0.0, :dead) | at_ms: &1.at_ms}}}
+
+    for place <- [Pose.new(3, 0), Pose.new(3.2, 0.2)] do
+      body = Body.new(Pose.new(0, 0.5, 2.0))
+      mind = Robot.Mind.goal(body.mind, :slot, {Follow, target: place})
+      {nil, body} = Body.run(%{body | mind: mind}, 250, wreck)
+      assert body.mind.last_by == :blocked
+      assert Twist.zero?(body.twist)
+      distance = Pose.distance(body.pose, {3.0, 0.0})
+      assert distance > 0.42 and distance < 0.62
+      # It goes in when the place becomes free.
+      {nil, body} = Body.run(body, 100)
+      assert Pose.distance(body.pose, place) < 0.05
     end
   end
 

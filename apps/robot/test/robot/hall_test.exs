@@ -33,4 +33,12 @@ defmodule Robot.HallTest do
     assert form.formed_s < 60
     assert form.contacts == 0
   end
+
+  test "a column keeps its shape behind a leader that drives" do
+    {mean, worst, stood_s, report} = Hall.travel(6, 1, 12, Hal.Twist.new(0.3, 0.05))
+    assert mean < 0.05
+    assert worst < 0.15
+    assert stood_s < 5
+    assert report.contacts == 0
+  end
 end

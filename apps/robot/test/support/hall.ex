@@ -81,6 +81,7 @@ defmodule Robot.Hall do
            reflex: Reflex.new(profile),
            mind: mind,
            slot: assigned[id],
+           velocity: {0.0, 0.0},
            bias: {@bias * :math.cos(b), @bias * :math.sin(b)},
            phase: :rand.uniform(4) - 1,
            mail: [],
@@ -174,6 +175,60 @@ defmodule Robot.Hall do
     if better == map, do: map, else: swap(better, poses, ids)
   end
 
+  @doc """
+  Forms a column, then the leader drives on for some seconds at this speed and turn rate;
+  gives the mean and greatest error on the way after the first 5 s, and the report of standing again.
+  """
+  def travel(n, seed, seconds, twist) do
+    %{hall: hall} = form(n, seed, shape: :column)
+
+    offsets =
+      Map.new(hall.robots, fn {id, r} ->
+        {id, r.slot && Pose.relative(hall.robots[hall.leader].pose, r.slot)}
+      end)
+
+    hall = %{hall | half: {60.0, 60.0}, landmark: {50.0, 50.0}}
+
+    {hall, errors} =
+      Enum.reduce(1..(20 * seconds), {hall, []}, fn k, {hall, errors} ->
+        hall = hall |> lead(twist, offsets) |> step()
+        now = for {_, r} <- hall.robots, r.slot, do: Pose.distance(est(r), r.slot)
+        {hall, if(k > 100, do: now ++ errors, else: errors)}
+      end)
+
+    stop = lead(hall, Twist.zero(), offsets)
+    report = run(%{stop | formed_ms: nil, good_ms: nil}, hall.at_ms + 60_000)
+
+    {Enum.sum(errors) / max(length(errors), 1), Enum.max(errors, fn -> 0.0 end),
+     report.formed_s && report.formed_s - hall.at_ms / 1000, report}
+  end
+
+  # The leader's wheels obey at once; slots move rigidly with it.
+  defp lead(hall, twist, offsets) do
+    robots =
+      Map.new(hall.robots, fn {id, r} ->
+        if r.slot do
+          slot = Pose.compose(hall.robots[hall.leader].pose, offsets[id])
+          lead = hall.robots[hall.leader].pose
+          c = twist.linear * :math.cos(lead.heading)
+          s = twist.linear * :math.sin(lead.heading)
+          velocity = {c - twist.turn * (slot.y - lead.y), s + twist.turn * (slot.x - lead.x)}
+          {id, %{r | slot: slot, velocity: velocity}}
+        else
+          mind =
+            Mind.goal(
+              r.mind,
+              {:drive, twist},
+              {Robot.Behaviour.Move, linear: twist.linear, turn: twist.turn}
+            )
+
+          {id, %{r | mind: mind}}
+        end
+      end)
+
+    %{hall | robots: robots}
+  end
+
   defp run(hall, limit_ms) do
     cond do
       hall.formed_ms -> report(hall)
@@ -247,7 +302,12 @@ defmodule Robot.Hall do
 
         mind =
           if r.slot,
-            do: Mind.goal(r.mind, :slot, {Follow, target: r.slot, discs: discs}),
+            do:
+              Mind.goal(
+                r.mind,
+                :slot,
+                {Follow, target: r.slot, velocity: r.velocity, discs: discs}
+              ),
             else: r.mind
 
         {took, {wish, _, mind}} = :timer.tc(fn -> Mind.tick(mind, percept) end)

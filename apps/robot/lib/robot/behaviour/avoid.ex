@@ -6,7 +6,8 @@ defmodule Robot.Behaviour.Avoid do
   (`.Way`), past moving ones by `Robot.Orca`, a little to the right of those who come, and
   away from what only the sonars see. A wish without one is only slowed down (`.Brake`).
   Who gets no nearer for some seconds goes another way for a while (`.Progress`), and who stands in
-  another's way makes room (`.Yield`). A robot with nobody about gets its wish unchanged.
+  another's way makes room (`.Yield`). Where a body that will not move stands in the goal, it stands
+  as near as may be, and its wish says `by: :blocked`. A robot with nobody about gets its wish unchanged.
 
   Options: `inner`, the behaviour (required); `discs`, `[{x, y, radius}]` in the map frame, metres:
   further standing things.
@@ -21,6 +22,8 @@ defmodule Robot.Behaviour.Avoid do
   @standing_margin 0.12
   @moving_margin 0.15
   @closest 0.04
+  # Metres from the nearest place to a taken goal that count as there.
+  @beside 0.08
   # m/s of one who makes way.
   @aside 0.2
   # m/s away from what is close, at contact; and how close that is.
@@ -39,6 +42,7 @@ defmodule Robot.Behaviour.Avoid do
       discs: Options.check!(options, :discs, &discs?/1, "[{x, y, radius}]"),
       progress: nil,
       way: nil,
+      blocked?: false,
       standing: %{},
       backing?: false,
       velocity: nil,
@@ -113,6 +117,31 @@ defmodule Robot.Behaviour.Avoid do
   end
 
   defp bend(wish, speed, percept, state) do
+    case Way.taken(wish.goal, percept, Neighbours.robots(percept), state.discs) do
+      nil -> bend_round(wish, speed, percept, state)
+      near -> beside(wish, near, speed, percept, state)
+    end
+  end
+
+  # Something stands where the goal is: as near as may be is the goal then.
+  defp beside(wish, near, speed, percept, state) do
+    distance = Pose.distance(percept.pose, near)
+    leave = if state.blocked?, do: 2 * @beside, else: @beside
+
+    if distance < leave do
+      wish = %{wish | by: :blocked, twist: Twist.zero(), velocity: {0.0, 0.0}}
+      {wish, %{state | blocked?: true, progress: nil, velocity: nil, way: nil}}
+    else
+      {x, y} = near
+      speed = min(speed, Steering.approach(distance, percept.profile)) / distance
+      velocity = {speed * (x - percept.pose.x), speed * (y - percept.pose.y)}
+      twist = Steering.twist(velocity, percept.pose.heading, percept.profile)
+      wish = %{wish | goal: near, velocity: velocity, twist: twist, reverse?: false}
+      bend_round(wish, speed * distance, percept, %{state | blocked?: false})
+    end
+  end
+
+  defp bend_round(wish, speed, percept, state) do
     {all, standing} = percept |> Neighbours.robots() |> Neighbours.steady(state.standing)
     robots = Neighbours.near(all)
     bodies = Enum.map(all, fn %{at: {x, y}, radius: radius} -> {x, y, radius} end)

@@ -25,6 +25,31 @@ defmodule Robot.Behaviour.Avoid.Way do
   # A goal that moved farther than this is another one.
   @same_goal 0.4
 
+  @doc """
+  Where to stand instead of a goal in which something stands that will not move (a dead or
+  holding robot, a disc): the place nearest to us beside it. `nil` where the goal is free.
+  """
+  @spec taken(Pose.point() | nil, Percept.t(), [Neighbours.t()], [Detour.disc()]) ::
+          Pose.point() | nil
+  def taken(nil, _percept, _robots, _discs), do: nil
+
+  def taken(goal, percept, robots, discs) do
+    fixed = for(r <- robots, r.fixed?, do: body(r)) ++ discs
+    own = percept.profile.radius
+
+    Enum.find_value(fixed, fn {x, y, radius} ->
+      limit = own + radius + @tightest
+      distance = Pose.distance(goal, {x, y})
+
+      if distance < limit - 0.02 do
+        # On the side of the goal where it is off the body's middle, else on ours.
+        side = if distance > 0.15, do: goal, else: Pose.point(percept.pose)
+        angle = :math.atan2(elem(side, 1) - y, elem(side, 0) - x)
+        {x + (limit + 0.04) * :math.cos(angle), y + (limit + 0.04) * :math.sin(angle)}
+      end
+    end)
+  end
+
   @doc "The corners still ahead, the goal last; where there is no way, the straight one."
   @spec round(t() | nil, Pose.point(), Percept.t(), [Neighbours.t()], [Detour.disc()]) :: t()
   def round(old, goal, percept, robots, discs) do
