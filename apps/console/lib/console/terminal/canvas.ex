@@ -10,6 +10,9 @@ defmodule Console.Terminal.Canvas do
 
   @arrows {"→", "↗", "↑", "↖", "←", "↙", "↓", "↘"}
 
+  # Outside of the map all is wall: this much of it is shown.
+  @edge 0.3
+
   @type cell :: {String.t(), atom()}
   @type floor :: %{
           key: term(),
@@ -67,8 +70,11 @@ defmodule Console.Terminal.Canvas do
   # The whole map, as long as a robot's length still moves it by about one character; else the
   # part where the living robots and the landmark are, in whole steps of 2 m so that it rests.
   defp part(ground, scene, columns, rows) do
-    if scale(Ground.box(ground), columns, rows) <= 0.5 do
-      Ground.box(ground)
+    {left, bottom, right, top} = Ground.box(ground)
+    whole = {left - @edge, bottom - @edge, right + @edge, top + @edge}
+
+    if scale(whole, columns, rows) <= 0.5 do
+      whole
     else
       places =
         for(%{alive: true} = robot <- scene.robots, do: Pose.point(robot.pose)) ++
@@ -110,8 +116,8 @@ defmodule Console.Terminal.Canvas do
   # A thin wall must not fall between two samples.
   defp wall?(ground, x, y, scale) do
     inside? =
-      abs(x + scale / 2) <= ground.width / 2 + scale and
-        abs(y - scale / 2) <= ground.height / 2 + scale
+      abs(x + scale / 2) <= ground.width / 2 + @edge and
+        abs(y - scale / 2) <= ground.height / 2 + @edge
 
     inside? and
       Enum.any?(1..3, fn i ->
