@@ -110,6 +110,7 @@ defmodule System.DemoTest do
 
     assert output =~ ~s(did you mean "status"?)
     assert output =~ "mag1: search"
+    assert output =~ "Try:  kill leader"
     assert output =~ "kill mag1: done"
     refute output =~ "\e["
   end

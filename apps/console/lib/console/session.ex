@@ -68,7 +68,11 @@ defmodule Console.Session do
   end
 
   defp begin(%{mode: :screen}, _options), do: IO.write(Terminal.enter())
-  defp begin(session, options), do: Output.line(session.output, Demo.heading(options))
+
+  defp begin(session, options) do
+    Output.line(session.output, Demo.heading(options))
+    Output.line(session.output, Terminal.hint())
+  end
 
   # Reading waits, so it has a process of its own.
   defp reader(:screen, session), do: fn -> keys(session) end

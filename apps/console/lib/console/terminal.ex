@@ -31,6 +31,10 @@ defmodule Console.Terminal do
   @spec leave() :: String.t()
   def leave, do: "\e[0m\e[?7h\e[?25h\e[?1049l"
 
+  @doc "Three things to try."
+  @spec hint() :: String.t()
+  def hint, do: @try
+
   @doc "The whole screen, and the view to go on with."
   @spec frame(Scene.t(), t()) :: {iodata(), t()}
   def frame(%Scene{} = scene, %__MODULE__{} = view) do

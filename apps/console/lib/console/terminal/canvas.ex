@@ -73,7 +73,7 @@ defmodule Console.Terminal.Canvas do
     {left, bottom, right, top} = Ground.box(ground)
     whole = {left - @edge, bottom - @edge, right + @edge, top + @edge}
 
-    if scale(whole, columns, rows) <= 0.5 do
+    if scale(whole, columns, rows) <= 0.6 do
       whole
     else
       places =
