@@ -5,6 +5,7 @@ defmodule Console.Prompt do
   Names become robots by comparison; a text never becomes an atom.
   """
   alias Console.{Fleet, Suggest, Values}
+  alias Robot.Command
 
   @words ~w(kill formation landmark move goto follow stop estop reset start status tell help quit)
 
@@ -129,7 +130,10 @@ defmodule Console.Prompt do
     with {:ok, robot} <- robot(name, robots), do: checked([robot], Enum.join(text, ":"), robots)
   end
 
-  defp checked(target, text, _robots), do: {:ok, {:tell, target, text}}
+  defp checked(target, text, robots) do
+    with {:ok, command} <- Command.parse(text, robots),
+         do: {:ok, {:tell, target, Command.to_text(command)}}
+  end
 
   defp unknown(word, robots) do
     known = @words ++ ["all"] ++ Enum.map(robots, &to_string/1)

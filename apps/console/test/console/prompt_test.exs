@@ -31,8 +31,9 @@ defmodule Console.PromptTest do
     assert ok("stop min1") == {:tell, [:min1], "stop"}
     assert ok("start") == {:tell, :all, "start"}
     assert ok("mag2 move:0.2:0.1") == {:tell, [:mag2], "move:0.2:0.1"}
+    assert ok("mag2 MOVE 0.2 0.1") == {:tell, [:mag2], "move:0.2:0.1"}
     assert ok("all findblob") == {:tell, :all, "findblob"}
-    assert ok("goto:1:2") == {:tell, :all, "goto:1:2"}
+    assert ok("goto:1:2") == {:tell, :all, "goto:1.0:2.0"}
     assert ok("estop") == :estop
     assert ok("reset") == :reset
     assert ok("status") == :status
@@ -53,6 +54,10 @@ defmodule Console.PromptTest do
     assert error("goto mag1") =~ "goto mag1 1,2"
     assert error("goto mag1 inf,0") =~ "X,Y in metres"
     assert error("follow mag1 mag1") =~ "itself"
+    assert error("mag1 goto:abc:1") =~ ~s(x cannot be "abc")
+    assert error("goto:1") =~ "y is missing"
+    assert error("all fly:1") =~ "unknown command"
+    assert error("mag1 followtheleader:mag9") =~ "mag9"
     assert error("xyzzy") =~ "help"
   end
 end
