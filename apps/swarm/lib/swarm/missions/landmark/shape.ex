@@ -15,6 +15,7 @@ defmodule Swarm.Missions.Landmark.Shape do
   @step_ms 3_000
   @step 0.1
   @elsewhere 1.0
+  @landmark_radius 0.15
 
   defstruct formation: nil, trail?: false, room: nil, squeeze: 0, squeezed_ms: nil, at: nil
 
@@ -128,9 +129,16 @@ defmodule Swarm.Missions.Landmark.Shape do
       else: {{:column, min(spacing, 1.0)}, true}
   end
 
+  # What stays where it is: dead robots, and the landmark.
   defp bodies(mission) do
-    for {_id, %{mode: :dead, pose: pose, radius: radius}} <- Enum.sort(mission.percept.peers),
-        do: {pose.x, pose.y, radius}
+    dead =
+      for {_id, %{mode: :dead, pose: pose, radius: radius}} <- Enum.sort(mission.percept.peers),
+          do: {pose.x, pose.y, radius}
+
+    case mission.sight do
+      %{place: {x, y}} -> [{x, y, @landmark_radius} | dead]
+      _unknown -> dead
+    end
   end
 
   defp radius(mission) do
