@@ -142,13 +142,20 @@ defmodule Robot.Localiser do
 
     near =
       Enum.filter(percept.blobs, fn blob ->
+        bearing = Sighting.bearing(blob, percept.blobs_pan, view)
+
         blob.colour == anchor.colour and not blob.clipped? and
-          abs(Pose.wrap(Sighting.bearing(blob, percept.blobs_pan, view) - expected)) <
-            gate(anchor)
+          abs(Pose.wrap(bearing - expected)) < gate(anchor) and
+          fits?(blob, anchor, Pose.distance(exposed, anchor.at), view)
       end)
 
     if alone?, do: Enum.max_by(near, & &1.area, fn -> nil end)
   end
+
+  defp fits?(_blob, %{radius: nil}, _distance, _view), do: true
+
+  defp fits?(blob, anchor, distance, view),
+    do: Sighting.fits?(blob, anchor.radius, distance, view)
 
   # There is one landmark: whatever has its colour is it.
   defp gate(%{range?: true}), do: 2 * :math.pi()

@@ -126,6 +126,13 @@ defmodule Sim.TrialTest do
     refute Trial.formed?(trial)
   end
 
+  test "where a wall stands in the shape, it closes up and follows the leader's trail" do
+    options = %{seed: 2, formation: {:line, 1.0}, landmark: {6.8, 0.0}}
+    result = run(options) |> assert_formed() |> Trial.result()
+    assert result.formation.kind == :column
+    assert result.collisions == 0
+  end
+
   test "all switched on at one place form as well" do
     assert_formed(run(%{seed: 1, start: :same}))
   end

@@ -1,0 +1,131 @@
+defmodule Robot.LocaliserTest do
+  use ExUnit.Case, async: true
+  doctest Robot.Sighting
+  alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Robot.{Localiser, Percept, Sighting}
+  alias Vision.Blob
+
+  @view :math.pi() / 3
+  @focal 160 / :math.tan(:math.pi() / 6)
+
+  defp percept(odometry, at_ms, blobs \\ nil) do
+    %Percept{
+      robot: :mag1,
+      at_ms: at_ms,
+      profile: Profile.magellan(),
+      odometry: %Odometry{pose: odometry, twist: Twist.zero()},
+      ptz: %{pan: 0.0, tilt: 0.0, field_of_view: @view},
+      blobs: blobs,
+      blobs_at_ms: blobs && at_ms
+    }
+  end
+
+  # What a camera at `pose` sees of a pole: painted by the same pinhole, from the outside.
+  defp blob(colour, pose, place, radius) do
+    bearing = Pose.bearing(pose, place)
+    distance = Pose.distance(pose, place)
+    x = 159.5 - @focal * :math.tan(bearing)
+    half = @focal * radius / distance
+
+    %Blob{
+      colour: colour,
+      area: 500,
+      share: 0.0065,
+      x: x,
+      y: 120.0,
+      left: max(round(x - half), 0),
+      right: round(x + half) - 1,
+      top: 60,
+      bottom: 180,
+      width: 320,
+      height: 240,
+      distance: distance
+    }
+  end
+
+  @landmark %{colour: "Y", at: {4.0, 0.0}, sd: 0.05, range?: true, radius: nil}
+  @leader %{colour: "R", at: {2.5, 0.8}, sd: 0.05, range?: false, radius: 0.2}
+
+  defp settle(localiser, truth, anchors, ticks) do
+    Enum.reduce(1..ticks, {nil, Localiser.anchors(localiser, anchors)}, fn k, {_, localiser} ->
+      blobs = [blob("Y", truth, {4.0, 0.0}, 0.15), blob("R", truth, {2.5, 0.8}, 0.2)]
+      Localiser.update(localiser, percept(Pose.new(0, 0), 100 * k, blobs))
+    end)
+  end
+
+  test "without references the pose is the odometry's, from the start pose" do
+    localiser = Localiser.new(Pose.new(1, 2, :math.pi() / 2))
+    {percept, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0), 0))
+    assert percept.pose == Pose.new(1, 2, :math.pi() / 2)
+    {percept, _} = Localiser.update(localiser, percept(Pose.new(1, 0.5, 0.1), 100))
+    assert_in_delta percept.pose.x, 0.5, 1.0e-9
+    assert_in_delta percept.pose.y, 3.0, 1.0e-9
+    assert_in_delta percept.pose.heading, :math.pi() / 2 + 0.1, 1.0e-9
+  end
+
+  test "without odometry there is no pose" do
+    {percept, _} =
+      Localiser.update(Localiser.new(Pose.new(0, 0)), %{
+        percept(Pose.new(0, 0), 0)
+        | odometry: nil
+      })
+
+    assert percept.pose == nil
+  end
+
+  test "what agrees with the references stays" do
+    {percept, _} = settle(Localiser.new(Pose.new(0, 0)), Pose.new(0, 0), [@landmark, @leader], 50)
+    assert Pose.distance(percept.pose, {0.0, 0.0}) < 0.01
+    assert abs(percept.pose.heading) < 0.01
+  end
+
+  test "a wrong estimate comes near the truth by two references, for many errors" do
+    for _ <- 1..50 do
+      truth = Pose.new(0.2 * (:rand.uniform() - 0.5), 0.2 * (:rand.uniform() - 0.5), 0.0)
+      believed = Pose.new(0, 0, 0.16 * (:rand.uniform() - 0.5))
+      localiser = Localiser.new(believed)
+      # Odometry that has driven a little admits an error of its own.
+      {_, localiser} = Localiser.update(localiser, percept(Pose.new(-2, 0, 1), 0))
+      {percept, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0), 1))
+      before = Pose.distance(percept.pose, truth) + abs(percept.pose.heading)
+      {percept, _} = settle(localiser, truth, [@landmark, @leader], 80)
+      later = Pose.distance(percept.pose, truth) + abs(percept.pose.heading)
+      assert later < max(before / 2, 0.12)
+    end
+  end
+
+  test "an estimate that pictures contradict for long is found again" do
+    localiser = Localiser.new(Pose.new(0, 0, 0.5))
+    {percept, _} = settle(localiser, Pose.new(0, 0), [@landmark], 100)
+    assert abs(percept.pose.heading) < 0.25
+  end
+
+  test "a robot of the wrong size is not taken for the one that is expected" do
+    thin = %{@leader | radius: 0.5}
+    localiser = Localiser.new(Pose.new(0, 0, 0.1))
+    {with_it, _} = settle(localiser, Pose.new(0, 0), [thin], 30)
+    assert_in_delta with_it.pose.heading, 0.1, 1.0e-9
+  end
+
+  test "a picture is counted once, and by where the robot stood when it was taken" do
+    localiser = Localiser.anchors(Localiser.new(Pose.new(0, 0)), [@landmark])
+    {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0, 0.0), 0))
+    {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0, 0.2), 100))
+    blobs = [blob("Y", Pose.new(0, 0), {4.0, 0.0}, 0.15)]
+    old = %{percept(Pose.new(0, 0, 0.4), 200, blobs) | blobs_at_ms: 0}
+    {percept, localiser} = Localiser.update(localiser, old)
+    assert_in_delta percept.pose.heading, 0.4, 1.0e-6
+    assert_in_delta percept.blobs_pose.heading, 0.0, 1.0e-6
+    covariance = localiser.covariance
+    {_, localiser} = Localiser.update(localiser, %{old | at_ms: 201})
+    assert localiser.covariance == covariance
+  end
+
+  test "nothing is said of the distance of what is hidden in part" do
+    yellow = blob("Y", Pose.new(0, 0), {4.0, 0.0}, 0.15)
+    assert Sighting.distance(yellow, [yellow]) == 4.0
+    red = %{yellow | colour: "R", top: 170, bottom: 230}
+    assert Sighting.distance(yellow, [yellow, red]) == nil
+    assert Sighting.distance(%{yellow | clipped?: true}, [yellow]) == nil
+  end
+end
