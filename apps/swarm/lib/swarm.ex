@@ -1,183 +1,172 @@
 defmodule Swarm do
   @moduledoc """
-  The door for people: command robots from `iex`, on whichever node they are.
+  The door for people: commands to robots, wherever in the connected nodes they are.
 
-      Swarm.start()                        # all begin their mission: find, elect, follow
-      Swarm.formation(:wedge, spacing: 1.2)
-      Swarm.goto(:mag1, {2.0, 1.0})
-      Swarm.follow(:mag2, :mag1)
-      Swarm.status(:mag1)
-      Swarm.estop()                        # everything stands, until
-      Swarm.reset()
+      iex> Swarm.goto(:mag1, {2.0, 1.0})
+      :ok
+      iex> Swarm.follow(:min1, :mag1)
+      :ok
+      iex> Swarm.start(formation: {:wedge, 1.2})
+      :ok
+      iex> Swarm.formation(:line, length: 4.0)
+      :ok
+      iex> Swarm.status()
+      [#mag1 lead (0.02, -1.63, 90 deg) 0.00 m/s by track_blob, leader mag1, hears 5, age 12 ms, …]
+      iex> Swarm.stop(:mag1)
+      :ok
+      iex> Swarm.estop()
+      :ok
 
-  A command to one robot answers `:ok`, which means accepted and not done, or an error:
+  Every command answers within half a second: `:ok`, which means accepted, not done, or `{:error, line}`
+  that names what was wrong and what is allowed. Nothing raises, whatever it is given. A command
+  to several robots is `:ok` when all have accepted it.
 
-  | error | means |
-  |---|---|
-  | `:unknown` | no robot of that name is in the directory |
-  | `:no_answer` | it did not answer within 500 ms |
-  | `:idle` | it has no mission that could take this command |
-  | `:no_mission` | it was configured without one |
-
-  A command to `:all` or to a list answers a map of these, by robot.
+  Robots are atoms (`:mag1`), or their names as text.
   """
   alias Robot.Command
-  alias Swarm.{Directory, Formation}
+  alias Swarm.{Directory, Door, Formation, Status}
   alias Swarm.Missions.Manual
 
-  @answer_ms 500
-
-  @type robot :: atom()
-  @type error :: {:error, :unknown | :no_answer | :idle | :no_mission | (line :: String.t())}
-  @type answer :: :ok | error()
-  @type answers :: %{robot() => answer()}
-
-  @doc "All robots that can be reached, sorted."
-  @spec robots() :: [robot()]
-  def robots, do: Directory.robots()
-
-  @doc "Begins the mission of all robots."
-  @spec start() :: answers()
-  def start, do: start(:all)
-
-  @doc "Begins the mission of one robot, of some, or of `:all`."
-  @spec start(robot()) :: answer()
-  @spec start([robot()] | :all) :: answers()
-  def start(who), do: ask(who, :start)
-
-  @doc "Stops what a robot is doing; it stands and waits for what comes next."
-  @spec stop(robot()) :: answer()
-  @spec stop([robot()] | :all) :: answers()
-  def stop(who), do: ask(who, :stop)
+  @type robot :: atom() | String.t()
+  @type answer :: :ok | {:error, line :: String.t()}
 
   @doc """
-  Sends a robot to a place, `{x, y}` or `{x, y, heading}` in the `map` frame.
+  Drives a robot to a place in the map (metres), and turns it there if a heading (radians) is given.
 
       Swarm.goto(:mag1, {2.0, 1.0})
+      Swarm.goto(:mag1, {2.0, 1.0, 1.57})
   """
-  @spec goto(robot(), {number(), number()} | {number(), number(), number()}) :: answer()
-  def goto(robot, {x, y}) when is_number(x) and is_number(y),
-    do: manual(robot, {:goto, x * 1.0, y * 1.0, nil})
+  @spec goto(robot(), {number(), number()} | {number(), number(), number()} | Hal.Pose.t()) ::
+          answer()
+  def goto(robot, {x, y}), do: command(robot, {:goto, x, y, nil})
+  def goto(robot, {x, y, heading}), do: command(robot, {:goto, x, y, heading})
+  def goto(robot, %Hal.Pose{x: x, y: y, heading: heading}), do: goto(robot, {x, y, heading})
 
-  def goto(robot, {x, y, heading}) when is_number(x) and is_number(y) and is_number(heading),
-    do: manual(robot, {:goto, x * 1.0, y * 1.0, heading * 1.0})
+  def goto(_robot, place),
+    do:
+      {:error,
+       "#{inspect(place)} is no place; write {x, y} or {x, y, heading} in metres and radians"}
 
-  @doc "Lets a robot drive 1 m behind another."
+  @doc """
+  Lets a robot follow another, one metre behind it, until told otherwise.
+
+      Swarm.follow(:min1, :mag1)
+  """
   @spec follow(robot(), leader :: robot()) :: answer()
-  def follow(robot, leader) when is_atom(leader) do
-    if robot == leader,
-      do: {:error, "#{robot} cannot follow itself"},
-      else: manual(robot, {:follow_the_leader, leader})
+  def follow(robot, leader) do
+    with {:ok, [leader]} <- Door.robots([leader]),
+         do: command(robot, {:follow_the_leader, leader})
   end
 
   @doc """
-  Changes the shape that the fleet takes, as in `Swarm.Formation.new/2`.
+  Starts the group's mission: find the landmark, elect who leads, follow in formation. Options:
+  `formation` (`:wedge` or `{:wedge, 1.2}`), `assign` (`:chain` or `:cost`), `leader_change` (whether
+  another robot may take over), `robots` (who takes part, default `:all`).
 
-      Swarm.formation(:line)
-      Swarm.formation(:wedge, spacing: 1.2)
-      Swarm.formation(:line, length: 5.0)
+      Swarm.start()
+      Swarm.start(formation: {:diamond, 1.0}, robots: [:mag1, :mag2, :min1])
   """
-  @spec formation(Formation.kind(), keyword()) :: answers() | {:error, line :: String.t()}
-  def formation(kind, options \\ []) do
-    robots = robots()
-
-    with {:ok, {kind, spacing}} <- Formation.new(kind, sized(kind, options, length(robots))),
-         do: ask(robots, {:formation, kind, spacing})
+  @spec start(keyword()) :: answer()
+  def start(options \\ []) do
+    with {:ok, robots, options} <- Door.start(options), do: Door.tell(robots, {:start, options})
   end
 
   @doc """
-  Tells a command in words (`Robot.Command`) to one robot, to a list, or to `:all`. A text that is
-  wrong reaches nobody.
+  Changes the formation of the running mission. Options: `spacing` (0.8 to 5 m, default 1), `length`
+  of a line, `side` of a triangle.
+
+      Swarm.formation(:wedge)
+      Swarm.formation(:column, spacing: 1.5)
+      Swarm.formation(:line, length: 4.0)
+  """
+  @spec formation(Formation.kind(), keyword()) :: answer()
+  def formation(kind, options \\ []) do
+    with {:ok, {kind, spacing}} <- Door.formation(kind, options),
+         {:ok, robots} <- Door.robots(:all) do
+      Door.any(robots, {:formation, kind, spacing})
+    end
+  end
+
+  @doc """
+  Gives a text command (`Robot.Command`) to a robot, to a list of them, or to `:all`.
 
       Swarm.tell(:mag1, "goto:2.0:1.0")
-      Swarm.tell([:mag2, :mag3], "followtheleader:mag1")
-      Swarm.tell(:all, "start")
+      Swarm.tell([:mag1, :mag2], "move:0.2:0.1")
+      Swarm.tell(:all, "stop")
   """
-  @spec tell(robot(), String.t()) :: answer()
-  @spec tell([robot()] | :all, String.t()) :: answers() | {:error, line :: String.t()}
-  def tell(who, text) do
-    with {:ok, command} <- Command.parse(text, robots()), do: ask(who, command)
+  @spec tell(robot() | [robot()] | :all, String.t()) :: answer()
+  def tell(to, text) when is_binary(text) do
+    with {:ok, command} <- Command.parse(text, Directory.robots()), do: command(to, command)
   end
 
-  @doc "Stops all robots at once, until `reset/0`. Spreads from robot to robot, too."
-  @spec estop() :: answers()
-  def estop, do: ask(:all, :estop)
+  def tell(_to, other),
+    do: {:error, "#{inspect(other)} is no command; write one as text, such as \"goto:2.0:1.0\""}
 
-  @doc "Clears the emergency stop of all robots. Look where they would go, first."
-  @spec reset() :: answers()
-  def reset, do: ask(:all, :reset)
+  @doc "How all robots are, one line each in `iex`."
+  @spec status() :: [Status.t()]
+  def status do
+    robots = Directory.robots()
+    answers = Door.ask(robots, :status)
 
-  @doc "What all robots are doing."
-  @spec status() :: %{robot() => map() | error()}
-  def status, do: Map.new(robots(), &{&1, status(&1)})
+    for id <- robots do
+      case answers do
+        %{^id => %Status{} = status} -> status
+        _silent -> %Status{robot: id, state: :no_answer}
+      end
+    end
+  end
 
   @doc """
-  What a robot is doing: all entries of its board (`Robot.Board`) with their ages in milliseconds.
-  A robot of this node is not even asked.
+  How one robot is.
+
+      Swarm.status(:mag1)
+      Swarm.status(:mag1).rejected
   """
-  @spec status(robot()) :: %{term() => {term(), age_ms :: integer()}} | error()
+  @spec status(robot()) :: Status.t() | {:error, String.t()}
   def status(robot) do
-    with :error <- Robot.Board.find(robot), {:ok, entries} <- ask(robot, :status) do
-      entries
+    with {:ok, [id]} <- Door.robots(robot) do
+      case Door.ask([id], :status) do
+        %{^id => %Status{} = status} -> status
+        _silent -> {:error, "#{id} does not answer"}
+      end
     else
-      {:ok, board} -> Robot.Board.entries(board)
+      {:ok, _several} -> {:error, "status/1 takes one robot; status/0 shows all"}
       error -> error
     end
   end
 
+  @doc """
+  Stops all robots, one, or a list of them. They stand until they are told something else.
+
+      Swarm.stop()
+      Swarm.stop(:mag1)
+  """
+  @spec stop(robot() | [robot()] | :all) :: answer()
+  def stop(robots \\ :all), do: command(robots, :stop)
+
+  @doc """
+  Emergency stop: all robots stop and are held until `reset/0`. Each that hears of it tells the
+  others, again and again, so that it also reaches those that this node does not. The hardware's
+  own emergency stop stays the last resort: this one is software.
+  """
+  @spec estop() :: answer()
+  def estop, do: command(:all, :estop)
+
+  @doc "Releases the emergency stop. Look first where the robots would go."
+  @spec reset() :: answer()
+  def reset, do: command(:all, :reset)
+
   @doc false
-  @spec ask(robot() | [robot()] | :all, term()) :: term()
-  def ask(:all, command), do: ask(robots(), command)
+  @spec ask(atom(), term()) :: term()
+  def ask(robot, request), do: Door.ask([robot], request)[robot]
 
-  # To all at once, so that a silent robot holds up nobody else's answer.
-  def ask(robots, command) when is_list(robots) do
-    deadline = System.monotonic_time(:millisecond) + @answer_ms
-    asked = for robot <- robots, do: {robot, post(robot, command)}
-    Map.new(asked, fn {robot, ref} -> {robot, answer(ref, deadline)} end)
+  defp command(to, request) when request in [:estop, :reset] do
+    with {:ok, robots} <- Door.robots(to), do: Door.tell(robots, request)
   end
 
-  def ask(robot, command) when is_atom(robot), do: ask([robot], command)[robot]
-
-  defp manual(robot, command) do
-    if Manual.command?(command),
-      do: ask(robot, command),
-      else: {:error, "cannot #{inspect(command)}: numbers from -1000000 to 1000000 are allowed"}
+  defp command(to, request) do
+    with {:ok, robots} <- Door.robots(to),
+         {:ok, request} <- Manual.check(request),
+         do: Door.tell(robots, request)
   end
-
-  # An alias: an answer that comes too late finds no mailbox.
-  defp post(robot, command) do
-    case Directory.whereis(robot) do
-      nil ->
-        :unknown
-
-      link ->
-        ref = :erlang.alias([:reply])
-        message = {:"$gen_cast", {:command, command, ref}}
-        :erlang.send(link, message, [:nosuspend, :noconnect])
-        ref
-    end
-  end
-
-  defp answer(:unknown, _deadline), do: {:error, :unknown}
-
-  defp answer(ref, deadline) do
-    receive do
-      {^ref, answer} -> answer
-    after
-      max(deadline - System.monotonic_time(:millisecond), 0) ->
-        :erlang.unalias(ref)
-
-        # It may have come just before the alias was gone.
-        receive do
-          {^ref, answer} -> answer
-        after
-          0 -> {:error, :no_answer}
-        end
-    end
-  end
-
-  defp sized(kind, options, robots) when kind in [:line, :triangle],
-    do: Keyword.put_new(options, :robots, max(robots, 2))
-
-  defp sized(_kind, options, _robots), do: options
 end

@@ -13,6 +13,7 @@ defmodule Swarm.Anchor do
   slots of it are used (`Swarm.Room`), `trail` gives them pose by pose where the shape is a column
   along the leader's trail.
   """
+  alias Swarm.Shape
 
   @enforce_keys [:leader, :epoch, :sequence, :pose, :twist, :formation, :order, :size, :places]
   defstruct @enforce_keys ++ [asked: nil, landmark: nil, still: false, trail: nil]
@@ -55,7 +56,7 @@ defmodule Swarm.Anchor do
   @doc "Whether a term from outside is an anchor with sane numbers."
   @spec valid?(term()) :: boolean()
   def valid?(%__MODULE__{twist: {v, w}, order: order, places: places} = anchor) do
-    pose?(anchor.pose) and whole?(v) and whole?(w) and
+    Shape.whole?(anchor, __MODULE__) and pose?(anchor.pose) and whole?(v) and whole?(w) and
       is_atom(anchor.leader) and is_integer(anchor.epoch) and anchor.epoch > 0 and
       is_integer(anchor.sequence) and formation?(anchor.formation) and
       (anchor.asked == nil or formation?(anchor.asked)) and

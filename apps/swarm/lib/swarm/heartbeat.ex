@@ -3,9 +3,11 @@ defmodule Swarm.Heartbeat do
   What a robot tells all others five times a second: where it is, what it is at, whom it hears,
   whom it follows. Whole numbers only: mm, mrad, mm/s, mrad/s, millionths of a picture.
 
-  `estop` is the number of the last emergency stop that it knows, 0 for none. `sight` is its newest view of the landmark: relative size and estimated distance, `nil` where it
+  `estop` is the number of the last emergency stop that it knows, 0 for none, and `latched` says
+  whether its own latch is set (`Swarm.Stop`). `sight` is its newest view of the landmark: relative size and estimated distance, `nil` where it
   does not see it. `anchor` is there in the leader's heartbeats only.
   """
+  alias Swarm.Shape
 
   @enforce_keys [:boot, :sequence, :pose, :twist]
   defstruct @enforce_keys ++
@@ -21,6 +23,7 @@ defmodule Swarm.Heartbeat do
                 blocked: false,
                 formed: false,
                 estop: 0,
+                latched: false,
                 anchor: nil
               ]
 
@@ -40,6 +43,7 @@ defmodule Swarm.Heartbeat do
           blocked: boolean(),
           formed: boolean(),
           estop: non_neg_integer(),
+          latched: boolean(),
           anchor: Swarm.Anchor.t() | nil
         }
 
@@ -49,9 +53,9 @@ defmodule Swarm.Heartbeat do
   The heartbeat of a robot: what it perceives, what its mission claims, whom it hears. A percept
   without odometry stands still.
   """
-  @spec new({integer(), non_neg_integer()}, Robot.Percept.t(), map(), [atom()], non_neg_integer()) ::
+  @spec new({integer(), non_neg_integer()}, Robot.Percept.t(), map(), [atom()], Swarm.Stop.t()) ::
           t()
-  def new({boot, sequence}, %Robot.Percept{pose: pose} = percept, claim, heard, estop) do
+  def new({boot, sequence}, %Robot.Percept{pose: pose} = percept, claim, heard, stop) do
     twist = if percept.odometry, do: percept.odometry.twist, else: Hal.Twist.zero()
 
     beat = %__MODULE__{
@@ -61,7 +65,8 @@ defmodule Swarm.Heartbeat do
       twist: {round(twist.linear * 1000), round(twist.turn * 1000)},
       radius: round(percept.profile.radius * 1000),
       heard: heard,
-      estop: estop
+      estop: stop.known,
+      latched: stop.latched?
     }
 
     struct!(beat, claim)
@@ -77,21 +82,19 @@ defmodule Swarm.Heartbeat do
   """
   @spec valid?(term()) :: boolean()
   def valid?(%__MODULE__{pose: {x, y, heading}, twist: {linear, turn}} = beat) do
-    Enum.all?([x, y, heading, linear, turn], &(is_integer(&1) and abs(&1) < @far)) and
+    Shape.whole?(beat, __MODULE__) and
+      Enum.all?([x, y, heading, linear, turn], &(is_integer(&1) and abs(&1) < @far)) and
       is_integer(beat.boot) and is_integer(beat.sequence) and beat.sequence >= 0 and
       beat.radius in 50..2000 and is_atom(beat.phase) and is_integer(beat.epoch) and
-      beat.epoch >= 0 and is_atom(beat.leader) and names?(beat.heard) and sight?(beat.sight) and
+      beat.epoch >= 0 and is_atom(beat.leader) and Shape.names?(beat.heard) and sight?(beat.sight) and
       Enum.all?(
-        [beat.standing, beat.in_place, beat.blocked, beat.formed],
+        [beat.standing, beat.in_place, beat.blocked, beat.formed, beat.latched],
         &is_boolean/1
       ) and beat.estop in 0..1_000_000 and
       (beat.anchor == nil or Swarm.Anchor.valid?(beat.anchor))
   end
 
   def valid?(_term), do: false
-
-  defp names?(list),
-    do: is_list(list) and List.improper?(list) == false and Enum.all?(list, &is_atom/1)
 
   defp sight?(nil), do: true
 

@@ -6,8 +6,11 @@ defmodule Swarm.Link do
   Heartbeats become peers on the robot's board, everything else goes to the pilot. Mouth: what the
   mission says goes out, and five times a second a heartbeat, with what the board says of the robot.
 
-  What people command (`Swarm`) is `Swarm.Link.Orders`, and so is the e-stop, which spreads with the
-  heartbeats.
+  An e-stop spreads with the heartbeats (`Swarm.Stop`), also one that was pressed on the robot's
+  gate. Of two robots of one name the later one leaves the directory, stops and falls silent, with
+  the event `[:swarm, :link, :duplicate_id]`.
+
+  What people ask is answered by `Swarm.Link.Desk`; what is heard is judged by `Swarm.Link.Ear`.
 
   `join/2` makes a config with a link. Its options:
 
@@ -19,15 +22,16 @@ defmodule Swarm.Link do
   """
   use GenServer
   alias Hal.Event
-  alias Robot.{Board, Config, Names, Percept, Pilot}
-  alias Swarm.{Directory, Heartbeat, Message, Peers}
-  alias Swarm.Link.Orders
+  alias Robot.{Board, Config, Gate, Names, Percept, Pilot}
+  alias Swarm.{Directory, Heartbeat, Message, Peers, Stop}
+  alias Swarm.Link.{Desk, Ear}
 
   @behaviour Robot.Companion
 
   @tick_ms 100
   @beat_every 2
   @rivals_every 10
+  @odometry_ms 300
   @retry_ms 100
   @longest_retry_ms 5_000
 
@@ -48,9 +52,16 @@ defmodule Swarm.Link do
   def start_link(%Config{} = config, options),
     do: GenServer.start_link(__MODULE__, {config, options}, name: Names.via(config.id, :link))
 
-  @doc "Sends a message to one robot, to several, or to all others."
-  @spec say(robot :: atom(), to :: atom() | [atom()] | :all, Message.t()) :: :ok
-  def say(robot, to, message), do: GenServer.cast(Names.via(robot, :link), {:say, to, message})
+  @doc """
+  Says something to one robot, to several, or to all others, and returns who is addressed: of `:all`
+  those that the directory knows. Nobody is waited for, and nobody says whether it was heard.
+  """
+  @spec say(robot :: atom(), to :: atom() | [atom()] | :all, Message.t()) :: [atom()]
+  def say(robot, to, message) do
+    ids = List.delete(addressed(to), robot)
+    GenServer.cast(Names.via(robot, :link), {:say, ids, message})
+    ids
+  end
 
   @doc "Something arrived for a robot of this node, by whatever transport."
   @spec hear(robot :: atom(), term()) :: :ok
@@ -73,7 +84,11 @@ defmodule Swarm.Link do
   def init({%Config{id: id} = config, options}) do
     board = Board.find!(id)
 
-    {stop, cleared} = Orders.stops(board)
+    stop =
+      case Board.fetch(board, :estop, :infinity) do
+        {:ok, stop, _at_ms} -> stop
+        :error -> Stop.new(Board.latched?(board))
+      end
 
     s = %{
       config: config,
@@ -81,12 +96,11 @@ defmodule Swarm.Link do
       board: board,
       transport: options[:transport] || {__MODULE__, :transmit, []},
       boot: options[:boot] || System.system_time(:millisecond),
-      peers: Peers.new(id),
-      stop: stop,
-      cleared: cleared,
+      ear: Ear.new(id, stop),
+      gone: MapSet.new(),
       ticks: 0,
       sequence: 0,
-      counts: %{sent: 0, heard: 0, rejected: %{}},
+      sent: 0,
       scope: nil,
       gave_way?: false,
       retry_ms: @retry_ms,
@@ -98,28 +112,29 @@ defmodule Swarm.Link do
 
   @impl GenServer
   def handle_continue(:enter, s) do
-    Orders.resume(s)
+    # A stop that was written down by the link before this one may not have reached the gate.
+    if s.ear.stop.latched?, do: :ok = Gate.estop(s.id)
     {:noreply, enter(s)}
   end
 
   @impl GenServer
-  def handle_cast({:say, to, message}, s), do: {:noreply, speak(s, to, message)}
+  def handle_cast({:say, ids, message}, s), do: {:noreply, speak(s, ids, message)}
 
   def handle_cast({:hear, term}, s) do
-    case Message.check(term) do
-      {:ok, message} -> {:noreply, heard(count(s, :heard), message)}
-      {:error, reason} -> {:noreply, reject(s, reason)}
-    end
+    at_ms = Config.now(s.config)
+    {heard, ear} = Ear.hear(s.ear, term, at_ms)
+    {:noreply, s |> stop(ear) |> heard(heard, at_ms)}
   end
 
   def handle_cast({:command, command, reply_to}, s) do
-    {answer, s} = Orders.obey(command, s)
+    {answer, ear} = Desk.answer(command, s.config, s.board, s.ear)
+    s = stop(s, ear)
     :erlang.send(reply_to, {reply_to, answer}, [:nosuspend, :noconnect])
     {:noreply, s}
   end
 
   def handle_cast({:rival, other, link}, s), do: {:noreply, rival(s, other, link)}
-  def handle_cast(_unknown, s), do: {:noreply, reject(s, :not_a_message)}
+  def handle_cast(_unknown, s), do: {:noreply, reject(s)}
 
   @impl GenServer
   def handle_info(:tick, s), do: {:noreply, s |> tick(Config.now(s.config)) |> schedule()}
@@ -128,47 +143,71 @@ defmodule Swarm.Link do
   def handle_info({:DOWN, scope, :process, _scope, _reason}, %{scope: scope} = s),
     do: {:noreply, retry(%{s | scope: nil})}
 
-  def handle_info(_unknown, s), do: {:noreply, reject(s, :not_a_message)}
+  def handle_info(_unknown, s), do: {:noreply, reject(s)}
 
-  defp heard(s, %Message{kind: :heartbeat, from: from, body: beat}) do
-    at_ms = Config.now(s.config)
-    s = %{s | peers: Peers.hear(s.peers, from, beat, at_ms)}
-    show(%{s.peers | rows: Map.take(s.peers.rows, [from])}, s.board, at_ms)
-    if beat.estop > s.stop, do: Orders.estop(s, beat.estop), else: s
+  # One row for each heartbeat: a hundred robots tell each other fifty thousand times a second.
+  defp heard(s, {:peer, id}, at_ms) do
+    show(s, id, at_ms)
+    %{s | gone: MapSet.delete(s.gone, id)}
   end
 
-  defp heard(s, message) do
+  defp heard(s, {:message, message}, _at_ms) do
     Pilot.hear(s.id, {:message, message})
     s
   end
 
-  # How others are grows old by itself, so what the board shows of them is written anew each time.
+  defp heard(s, :nothing, at_ms), do: count(s, at_ms)
+
   defp tick(s, at_ms) do
-    s = %{s | ticks: s.ticks + 1}
-    show(s.peers, s.board, at_ms)
-    Board.put(s.board, :link, :radio, s.counts, at_ms)
+    s =
+      %{s | ticks: s.ticks + 1} |> stop(Ear.follow(s.ear, Board.latched?(s.board))) |> age(at_ms)
+
+    count(s, at_ms)
     if rem(s.ticks, @rivals_every) == 0, do: challenge(s)
     if rem(s.ticks, @beat_every) == 1, do: beat(s, at_ms), else: s
   end
 
-  defp show(peers, board, at_ms) do
-    for {id, peer} <- Peers.percepts(peers, at_ms),
-        do: Board.put(board, :link, {:peer, id}, peer, peer.at_ms)
+  # Of a robot that is gone nothing arrives, so somebody has to write down that it is.
+  defp age(s, at_ms) do
+    for id <- Peers.gone(s.ear.peers, at_ms), id not in s.gone, reduce: s do
+      s ->
+        show(s, id, at_ms)
+        %{s | gone: MapSet.put(s.gone, id)}
+    end
+  end
+
+  defp show(s, id, at_ms) do
+    peer = Peers.percept(s.ear.peers, id, at_ms)
+    Board.put(s.board, :link, {:peer, id}, peer, peer.at_ms)
   end
 
   # A robot that has no pose yet has nothing to say; one whose executive fell stands where it was.
   defp beat(s, at_ms) do
     case Board.fetch(s.board, :pose, :infinity, at_ms) do
       {:ok, pose, _then} ->
-        percept = %{Percept.Snapshot.take(s.board, s.config.profile, at_ms) | pose: pose}
+        percept = %Percept{
+          robot: s.id,
+          at_ms: at_ms,
+          profile: s.config.profile,
+          pose: pose,
+          odometry: odometry(s.board, at_ms)
+        }
+
         sender = {s.boot, s.sequence + 1}
-        heard = Peers.heard(s.peers, at_ms)
-        beat = Heartbeat.new(sender, percept, claim(s.board), heard, s.stop)
+        heard = Peers.heard(s.ear.peers, at_ms)
+        beat = Heartbeat.new(sender, percept, claim(s.board), heard, s.ear.stop)
         message = Message.new(s.id, :heartbeat, beat)
-        speak(%{s | sequence: s.sequence + 1}, :all, message)
+        speak(%{s | sequence: s.sequence + 1}, List.delete(Directory.robots(), s.id), message)
 
       :error ->
         s
+    end
+  end
+
+  defp odometry(board, at_ms) do
+    case Board.fetch(board, :odometry, @odometry_ms, at_ms) do
+      {:ok, odometry, _then} -> odometry
+      :error -> nil
     end
   end
 
@@ -180,18 +219,27 @@ defmodule Swarm.Link do
     end
   end
 
-  defp speak(%{gave_way?: true} = s, _to, _message), do: s
+  defp speak(%{gave_way?: true} = s, _ids, _message), do: s
 
-  defp speak(s, to, message) do
-    ids = addressed(to) -- [s.id]
+  defp speak(s, ids, message) do
     {m, f, a} = s.transport
     apply(m, f, a ++ [s.id, ids, message])
-    count(s, :sent, length(ids))
+    %{s | sent: s.sent + length(ids)}
   end
 
   defp addressed(:all), do: Directory.robots()
   defp addressed(ids) when is_list(ids), do: ids
   defp addressed(id), do: [id]
+
+  # Written down before the gate is told: a link that restarts in between knows that there is a
+  # stop to spread.
+  defp stop(%{ear: %{stop: stop}} = s, %{stop: stop} = ear), do: %{s | ear: ear}
+
+  defp stop(s, ear) do
+    Board.put(s.board, :link, :estop, ear.stop, Config.now(s.config))
+    if ear.stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id)
+    %{s | ear: ear}
+  end
 
   defp groups(s), do: [:robots, {:robot, s.id}]
 
@@ -243,12 +291,13 @@ defmodule Swarm.Link do
     end
   end
 
-  defp count(s, what, n \\ 1), do: %{s | counts: Map.update!(s.counts, what, &(&1 + n))}
-
-  defp reject(s, reason) do
-    rejected = Map.update(s.counts.rejected, reason, 1, &(&1 + 1))
-    %{s | counts: %{s.counts | rejected: rejected}}
+  defp count(s, at_ms) do
+    counts = %{sent: s.sent, heard: s.ear.heard, rejected: s.ear.rejected}
+    Board.put(s.board, :link, :radio, counts, at_ms)
+    s
   end
+
+  defp reject(s), do: count(%{s | ear: Ear.reject(s.ear, :not_a_message)}, Config.now(s.config))
 
   defp schedule(%{config: %{pace: :manual}} = s), do: s
 

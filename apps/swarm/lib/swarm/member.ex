@@ -17,7 +17,7 @@ defmodule Swarm.Member do
   """
   alias Hal.{Pose, Profile, Twist}
   alias Robot.{Mind, Percept, Reflex}
-  alias Swarm.{Heartbeat, Message, Peers}
+  alias Swarm.{Heartbeat, Message, Peers, Stop}
 
   @beat_ms 200
 
@@ -28,8 +28,7 @@ defmodule Swarm.Member do
                 entries: %{},
                 claim: %{},
                 look: nil,
-                stop: 0,
-                cleared: 0,
+                stop: %Stop{},
                 sequence: 0,
                 beat_ms: nil,
                 rejected: %{}
@@ -93,10 +92,10 @@ defmodule Swarm.Member do
   end
 
   def step(member, {:command, :estop, _at_ms}),
-    do: {estop(member, max(member.stop, member.cleared) + 1), []}
+    do: {latch(member, Stop.press(member.stop)), []}
 
   def step(member, {:command, :reset, _at_ms}),
-    do: {%{member | reflex: Reflex.reset(member.reflex), cleared: member.stop}, []}
+    do: {%{member | reflex: Reflex.reset(member.reflex), stop: Stop.reset(member.stop)}, []}
 
   def step(member, {:command, command, _at_ms}), do: handle(member, {:command, command})
 
@@ -148,15 +147,16 @@ defmodule Swarm.Member do
     )
   end
 
-  # An e-stop spreads with every heartbeat. Stops are numbered, so that one that a person has
-  # cleared here is not caught again from a robot that has not been reset yet.
+  # An e-stop spreads with every heartbeat.
   defp hear(member, %Message{from: from, body: beat}, at_ms) do
     member = %{member | peers: Peers.hear(member.peers, from, beat, at_ms)}
-    if beat.estop > member.stop, do: {estop(member, beat.estop), []}, else: {member, []}
+    {latch(member, Stop.hear(member.stop, beat.estop, beat.latched)), []}
   end
 
-  defp estop(%{cleared: cleared} = member, stop) when stop <= cleared, do: %{member | stop: stop}
-  defp estop(member, stop), do: %{member | reflex: Reflex.estop(member.reflex), stop: stop}
+  defp latch(%{stop: %{latched?: false}} = member, %{latched?: true} = stop),
+    do: %{member | reflex: Reflex.estop(member.reflex), stop: stop}
+
+  defp latch(member, stop), do: %{member | stop: stop}
 
   defp outcome({tag, result}), do: {:outcome, tag, result}
 

@@ -13,7 +13,9 @@ defmodule Swarm.Message do
   | `:place` | `Swarm.Anchor`: a parent tells its child where the leader is supposed to be |
   | `:command` | a `Robot.Command` for the mission |
   """
-  alias Swarm.{Anchor, Heartbeat, Round}
+  alias Swarm.{Anchor, Heartbeat, Round, Shape}
+
+  @kinds [:heartbeat, :round, :place, :command]
 
   @enforce_keys [:from, :kind, :body]
   defstruct @enforce_keys
@@ -40,9 +42,10 @@ defmodule Swarm.Message do
   """
   @spec check(term()) :: {:ok, t()} | {:error, :not_a_message | kind()}
   def check(%__MODULE__{from: from, kind: kind, body: body} = message) when is_atom(from) do
-    case valid?(kind, body) do
+    case Shape.whole?(message, __MODULE__) and valid?(kind, body) do
       true -> {:ok, message}
-      false -> {:error, kind}
+      false when kind in @kinds -> {:error, kind}
+      false -> {:error, :not_a_message}
       :unknown -> {:error, :not_a_message}
     end
   end

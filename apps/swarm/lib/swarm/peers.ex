@@ -60,6 +60,11 @@ defmodule Swarm.Peers do
     Enum.sort([peers.me | others])
   end
 
+  @doc "The names of those that are gone."
+  @spec gone(t(), integer()) :: [atom()]
+  def gone(peers, now_ms),
+    do: for({id, %{at_ms: at_ms}} <- peers.rows, now_ms - at_ms >= @gone_ms, do: id)
+
   @doc "The names of those heard within the last second, sorted; this is what a heartbeat lists as heard."
   @spec heard(t(), integer()) :: [atom()]
   def heard(peers, now_ms) do
@@ -85,21 +90,25 @@ defmodule Swarm.Peers do
 
   @doc "The peers as a percept shows them, for the avoidance."
   @spec percepts(t(), integer()) :: %{atom() => Robot.Percept.peer()}
-  def percepts(peers, now_ms) do
-    Map.new(peers.rows, fn {id, %{beat: beat, at_ms: at_ms}} ->
-      {x, y, heading} = beat.pose
-      {linear, turn} = beat.twist
+  def percepts(peers, now_ms),
+    do: Map.new(peers.rows, fn {id, row} -> {id, percept(row, now_ms)} end)
 
-      {id,
-       %{
-         pose: Pose.new(x / 1000, y / 1000, heading / 1000),
-         twist: Twist.new(linear / 1000, turn / 1000),
-         radius: beat.radius / 1000,
-         at_ms: at_ms,
-         mode: mode(beat, now_ms - at_ms),
-         beat: beat
-       }}
-    end)
+  @doc "One of them; of a robot that was heard once."
+  @spec percept(t(), atom(), integer()) :: Robot.Percept.peer()
+  def percept(peers, id, now_ms), do: percept(Map.fetch!(peers.rows, id), now_ms)
+
+  defp percept(%{beat: beat, at_ms: at_ms}, now_ms) do
+    {x, y, heading} = beat.pose
+    {linear, turn} = beat.twist
+
+    %{
+      pose: Pose.new(x / 1000, y / 1000, heading / 1000),
+      twist: Twist.new(linear / 1000, turn / 1000),
+      radius: beat.radius / 1000,
+      at_ms: at_ms,
+      mode: mode(beat, now_ms - at_ms),
+      beat: beat
+    }
   end
 
   @doc "The newest heartbeats of all in a percept's peers that are not gone, by name."

@@ -77,7 +77,8 @@ defmodule Swarm.LinkTest do
       )
     end)
 
-    assert %{radio: {%{rejected: %{heartbeat: 1}}, _age}} = Swarm.status(id)
+    assert %{rejected: %{heartbeat: 1}} = Swarm.status(id)
+    assert inspect(Swarm.status(id)) =~ "dropped 9 messages"
     assert Names.whereis(id, :link) == link
   end
 
@@ -159,67 +160,46 @@ defmodule Swarm.LinkTest do
   @doc false
   def carry(test, from, ids, message), do: send(test, {:carried, from, ids, message})
 
-  describe "the door" do
-    test "one robot is sent, stopped, asked" do
-      id = talking(:door1)
-      assert Swarm.goto(id, {2, 1}) == :ok
-      assert Swarm.goto(:nobody, {2, 1}) == {:error, :unknown}
-      assert {:error, line} = Swarm.goto(id, {1.0e9, 0})
-      assert line =~ "1000000"
-      rolls_of(id)
-      assert %{mission: {%{state: {Swarm.Missions.Manual, :goto}}, _}} = Swarm.status(id)
-      assert Swarm.stop(id) == :ok
-      assert %{mission: {%{state: {Swarm.Missions.Manual, :ready}}, _}} = Swarm.status(id)
-      assert {:error, line} = Swarm.follow(id, id)
-      assert line =~ "itself"
-      assert Swarm.follow(id, :door9) == :ok
-      assert Swarm.start(id) == {:error, :no_mission}
-      assert Swarm.status(:nobody) == {:error, :unknown}
+  test "says who is addressed" do
+    ids = for id <- [:link12, :link13, :link14], do: talking(id)
+    message = Message.new(:link12, :command, :start)
+    all = Link.say(:link12, :all, message)
+    assert all -- ids == all -- [:link13, :link14]
+    assert Link.say(:link12, :link13, message) == [:link13]
+    assert Link.say(:link12, [:link12, :link14], message) == [:link14]
+  end
+
+  test "a stop pressed on a robot's own gate spreads, and a newcomer is not stopped by a cleared one" do
+    ids = for id <- [:link15, :link16], do: talking(id)
+    until(:link16, &is_map_key(Board.peers(&1), :link15))
+    :ok = Gate.estop(:link15)
+    for id <- ids, do: until(id, &Board.latched?/1)
+    assert Swarm.reset() == :ok
+    talking(:link17)
+    until(:link17, &match?(%{link15: %{beat: %{estop: n}}} when n > 0, Board.peers(&1)))
+    refute Board.latched?(Board.find!(:link17))
+
+    # It has the same number as the others, so that its own stop is news to them.
+    assert Swarm.ask(:link17, :estop) == :ok
+    assert Board.latched?(Board.find!(:link17))
+    for id <- ids, do: until(id, &Board.latched?/1)
+    assert Swarm.reset() == :ok
+  end
+
+  test "many robots of one node hear each other, five times a second" do
+    ids = for k <- 1..12, do: talking(:"linkmany#{k}")
+    [first, second | _] = Swarm.Case.standing(ids)
+
+    beat = fn ->
+      case Board.peers(Board.find!(first)) do
+        %{^second => %{beat: beat}} -> beat
+        _not_yet -> %{sequence: 0, heard: []}
+      end
     end
 
-    test "commands in words" do
-      for id <- [:door6, :door7], do: talking(id)
-      assert Swarm.tell(:door6, "goto:2.0:1.0") == :ok
-      assert Swarm.tell([:door6, :door7], "ping") == %{door6: :ok, door7: :ok}
-      assert Swarm.tell(:all, "stop") == %{door6: :ok, door7: :ok}
-      assert Swarm.tell(:door6, "followtheleader:door7") == :ok
-      assert {:error, line} = Swarm.tell(:door6, "followtheleader:mag77")
-      assert line =~ "mag77"
-      assert {:error, line} = Swarm.tell(:all, "goto:abc:1")
-      assert line =~ "abc"
-      assert {:error, _line} = Swarm.tell(:door6, nil)
-      assert Swarm.tell(:door7, "subscribe:door6") == {:error, :idle}
-    end
-
-    test "all begin their mission, take a shape, and stop" do
-      mission = {Acts.Mission, test: self()}
-      ids = for id <- [:door2, :door3], do: talking(id, mission: mission)
-      assert Swarm.formation(:wedge) == %{door2: {:error, :idle}, door3: {:error, :idle}}
-      assert Swarm.start() == %{door2: :ok, door3: :ok}
-      for _ <- ids, do: assert_receive({:mission, {:command, :start}})
-      # Once more does not begin it anew.
-      for _ <- ids, do: assert_received({:mission, {:init, _}})
-      assert Swarm.start([:door2, :nobody]) == %{door2: :ok, nobody: {:error, :unknown}}
-      refute_received {:mission, {:init, _}}
-      assert Swarm.formation(:wedge, spacing: 1.2) == %{door2: :ok, door3: :ok}
-      for _ <- ids, do: assert_receive({:mission, {:command, {:formation, :wedge, 1.2}}})
-      assert {:error, line} = Swarm.formation(:heart)
-      assert line =~ "heart"
-      assert Swarm.stop(:all) == %{door2: :ok, door3: :ok}
-      for _ <- ids, do: assert_receive({:mission, {:command, :stop}})
-      assert %{door2: %{mission: _}, door3: %{mission: _}} = Swarm.status()
-    end
-
-    test "a robot that does not answer holds up nobody, and its late answer finds no mailbox" do
-      for id <- [:door4, :door5], do: talking(id)
-      link = Names.whereis(:door4, :link)
-      :ok = :sys.suspend(link)
-      assert Swarm.estop() == %{door4: {:error, :no_answer}, door5: :ok}
-      :ok = :sys.resume(link)
-      until(:door4, &Board.latched?/1)
-      assert Swarm.reset() == %{door4: :ok, door5: :ok}
-      {:messages, messages} = Process.info(self(), :messages)
-      refute Enum.any?(messages, &match?({ref, _} when is_reference(ref), &1))
-    end
+    until(first, fn _ -> ids -- [second | beat.().heard] == [] end)
+    {begun, from} = {System.monotonic_time(:millisecond), beat.().sequence}
+    until(first, fn _ -> beat.().sequence >= from + 6 end)
+    assert (System.monotonic_time(:millisecond) - begun) in 900..1_800
   end
 end

@@ -1,111 +1,161 @@
 defmodule Swarm.Missions.Manual do
   @moduledoc """
-  One robot does what a person tells it, one command at a time. Pure.
+  One robot does what a person tells it (`Robot.Command`), one command at a time (R16, R31 to R36):
+  the pilot runs it while no group mission is on. Pure.
 
-  Its commands are of `Robot.Command`:
+  In its heartbeats the robot stays `:idle`, so that no group waits for it, and names whom it
+  follows, so that nobody can close a circle of followers.
 
-  | command | does |
-  |---|---|
-  | `{:goto, x, y, heading or nil}` | goes there (metres, radians) |
-  | `{:move, linear, turn}` | drives at this speed (m/s, rad/s) until told otherwise |
-  | `{:follow, pose}` | takes that place and keeps it |
-  | `{:follow_the_leader, robot}` | keeps 1 m behind that robot; stands while it is not heard |
-  | `{:find_blob, colour}` | turns until the camera shows the colour (`nil`: any) |
-  | `:lead` | keeps the blob that it sees ahead and near, wherever it is carried |
-  | `:stop` | stands |
+  Whoever is followed need not do anything: its heartbeats are the position updates that a
+  subscription asked for (R27, R35). A follower keeps 1 m behind its leader, stands when it has
+  not heard it for a second, and goes on when it hears it again (R34).
   """
-  alias Hal.Pose
-  alias Robot.Behaviour.{FindBlob, Follow, Goto, Move, TrackBlob}
+  alias Hal.{Pose, Twist}
+  alias Robot.{Behaviour, Command, Percept}
 
   @behaviour Robot.Mission
 
   @behind 1.0
   @silent_ms 1_000
+  # Farther than any floor, and faster than any robot: a slip of the finger.
+  @farthest 10_000
+  @fastest 10
 
-  @enforce_keys [:robot]
-  defstruct @enforce_keys ++ [phase: :ready, number: 0, leader: nil]
+  @enforce_keys [:me]
+  defstruct @enforce_keys ++ [count: 0, command: :stop, result: nil]
 
-  @type t :: %__MODULE__{robot: atom(), phase: atom(), number: non_neg_integer()}
+  @type t :: %__MODULE__{
+          me: atom(),
+          count: non_neg_integer(),
+          command: Command.t(),
+          result: integer() | nil
+        }
+
   @doc """
-  Whether a command is one for this mission, with numbers that make sense.
+  A command that a person gave, with numbers that make sense, or one line that says which does not.
 
-      iex> Swarm.Missions.Manual.command?({:goto, 2.0, 1.0, nil})
-      true
-      iex> Swarm.Missions.Manual.command?({:goto, 2.0, "far", nil})
-      false
-      iex> Swarm.Missions.Manual.command?({:formation, :wedge, 1.0})
-      false
+      iex> Swarm.Missions.Manual.check({:goto, 1, 2.0, nil})
+      {:ok, {:goto, 1.0, 2.0, nil}}
+      iex> Swarm.Missions.Manual.check({:goto, :far, 2.0, nil})
+      {:error, "goto cannot take :far: a number from -10000 to 10000 is allowed"}
+      iex> Swarm.Missions.Manual.check({:move, 99, 0})
+      {:error, "move cannot take 99: a number from -10 to 10 is allowed"}
   """
-  @spec command?(term()) :: boolean()
-  def command?({:goto, x, y, nil}), do: number?(x) and number?(y)
-  def command?({:goto, x, y, heading}), do: number?(x) and number?(y) and number?(heading)
+  @spec check(Command.t() | term()) :: {:ok, Command.t()} | {:error, line :: String.t()}
+  def check({:goto, x, y, nil}), do: numbers(:goto, [x, y], @farthest, &{:goto, &1, &2, nil})
 
-  def command?({:follow, %Pose{x: x, y: y, heading: heading}}),
-    do: command?({:goto, x, y, heading})
+  def check({:goto, x, y, h}),
+    do: numbers(:goto, [x, y, h], @farthest, &{:goto, &1, &2, turn(&3)})
 
-  def command?({:move, linear, turn}), do: number?(linear) and number?(turn)
-  def command?({:follow_the_leader, robot}), do: is_atom(robot) and robot != nil
-  def command?({:find_blob, colour}), do: colour == nil or is_binary(colour)
-  def command?(command), do: command == :lead
+  def check({:move, v, w}), do: numbers(:move, [v, w], @fastest, &{:move, &1, &2})
 
-  # As in `Robot.Command`. How fast is fast enough is the gate's to say.
-  defp number?(value), do: is_float(value) and abs(value) <= 1.0e6
+  def check({:follow, %Pose{x: x, y: y, heading: h}}),
+    do: numbers(:follow, [x, y, h], @farthest, &{:follow, Pose.new(&1, &2, &3)})
+
+  def check(command), do: {:ok, command}
+
+  defp turn(heading), do: Pose.wrap(heading)
+
+  # NaN and the infinities are no numbers of this language, so they cannot come.
+  defp numbers(word, list, most, build) do
+    case Enum.reject(list, &(is_number(&1) and abs(&1) <= most)) do
+      [] ->
+        {:ok, apply(build, Enum.map(list, &(&1 * 1.0)))}
+
+      [wrong | _] ->
+        {:error,
+         "#{word} cannot take #{inspect(wrong)}: a number from -#{most} to #{most} is allowed"}
+    end
+  end
+
+  @doc """
+  Whether a robot may follow another: not itself, and nobody who follows it, over however many.
+  `leaders` says whom each robot follows.
+
+      iex> Swarm.Missions.Manual.follow(:min1, :mag1, %{mag1: nil})
+      :ok
+      iex> Swarm.Missions.Manual.follow(:mag1, :mag1, %{})
+      {:error, "mag1 cannot follow itself"}
+      iex> Swarm.Missions.Manual.follow(:min1, :mag1, %{mag1: :mag2, mag2: :min1})
+      {:error, "min1 cannot follow mag1, who follows min1 (mag1 -> mag2 -> min1)"}
+  """
+  @spec follow(atom(), atom(), %{atom() => atom() | nil}) :: :ok | {:error, String.t()}
+  def follow(me, me, _leaders), do: {:error, "#{me} cannot follow itself"}
+
+  def follow(me, leader, leaders) do
+    chain = chain([leader], leaders)
+
+    if me in chain,
+      do:
+        {:error, "#{me} cannot follow #{leader}, who follows #{me} (#{Enum.join(chain, " -> ")})"},
+      else: :ok
+  end
+
+  defp chain([last | _] = seen, leaders) do
+    case leaders[last] do
+      nil -> Enum.reverse(seen)
+      next -> if next in seen, do: Enum.reverse(seen), else: chain([next | seen], leaders)
+    end
+  end
 
   @impl Robot.Mission
-  def init(robot, _options), do: ready(%__MODULE__{robot: robot})
+  def init(robot, _options),
+    do: {:ready, %__MODULE__{me: robot}, [{:claim, %{phase: :idle, standing: true}}]}
 
   @impl Robot.Mission
-  def handle({:command, :stop}, mission), do: ready(mission)
-
-  def handle({:command, {:follow_the_leader, robot}}, mission),
-    do: begin(%{mission | leader: robot}, :follow_the_leader, nil)
+  # What robots tell each other travels in their heartbeats already.
+  def handle({:command, command}, mission)
+      when is_tuple(command) and elem(command, 0) in [:subscribe, :unsubscribe, :position, :blob],
+      do: result(mission, [])
 
   def handle({:command, command}, mission) do
-    if command?(command),
-      do: begin(mission, name(command), goal(command)),
-      else: {mission.phase, mission, []}
+    mission = %{mission | command: command, count: mission.count + 1, result: nil}
+    goal = {:goal, {:command, mission.count}, goal(command, nil)}
+    result(mission, [goal, {:look, 0.0}, {:claim, claim(mission)}])
   end
 
   # How a command ended, as a number (R12), is known to whoever asks for the robot's status.
-  def handle({:outcome, {phase, number}, _outcome}, %{phase: phase, number: number} = mission),
-    do: ready(mission)
+  def handle({:outcome, {:command, count}, outcome}, %{count: count} = mission),
+    do: result(%{mission | result: outcome}, [{:claim, %{phase: :idle, standing: true}}])
 
-  def handle({:tick, percept}, %{phase: :follow_the_leader = phase} = mission),
-    do: {phase, mission, [{:goal, {phase, mission.number}, behind(mission, percept)}]}
+  # The one followed moves, and may fall silent.
+  def handle({:tick, percept}, %{command: {:follow_the_leader, _leader} = command} = mission),
+    do: result(mission, [{:goal, {:command, mission.count}, goal(command, percept)}])
 
-  def handle(_event, mission), do: {mission.phase, mission, []}
+  def handle(_event, mission), do: result(mission, [])
 
-  defp ready(mission),
-    do: {:ready, %{mission | phase: :ready}, [{:goal, :ready, nil}, claim(:ready, true)]}
+  defp result(%{command: :stop} = mission, effects), do: {:ready, mission, effects}
 
-  defp begin(mission, phase, goal) do
-    mission = %{mission | phase: phase, number: mission.number + 1}
-    {phase, mission, [{:goal, {phase, mission.number}, goal}, claim(phase, false)]}
+  defp result(%{result: nil} = mission, effects),
+    do: {phase(mission.command), mission, effects}
+
+  defp result(mission, effects), do: {:done, mission, effects}
+
+  defp phase(command) when is_atom(command), do: command
+  defp phase(command), do: elem(command, 0)
+
+  defp claim(%{command: {:follow_the_leader, leader}}), do: %{phase: :idle, leader: leader}
+  defp claim(%{command: command}), do: %{phase: :idle, standing: command == :stop}
+
+  defp goal({:move, linear, turn}, _percept), do: {Behaviour.Move, linear: linear, turn: turn}
+  defp goal({:goto, x, y, nil}, _percept), do: {Behaviour.Goto, x: x, y: y}
+  defp goal({:goto, x, y, heading}, _percept), do: {Behaviour.Goto, x: x, y: y, heading: heading}
+  defp goal({:follow, %Pose{} = place}, _percept), do: {Behaviour.Follow, target: place}
+  defp goal({:find_blob, colour}, _percept), do: {Behaviour.FindBlob, colour: colour}
+
+  defp goal({:follow_the_leader, leader}, %Percept{peers: peers, at_ms: now_ms}) do
+    case peers do
+      %{^leader => %{at_ms: at_ms} = peer} when now_ms - at_ms < @silent_ms -> behind(peer)
+      _silent -> {Behaviour.Stop, []}
+    end
   end
 
-  defp claim(phase, standing), do: {:claim, %{phase: phase, standing: standing}}
+  # Whatever is carried before its camera leads it, and others follow (R35).
+  defp goal(:lead, _percept), do: {Behaviour.TrackBlob, []}
+  defp goal(_command, _percept), do: {Behaviour.Stop, []}
 
-  defp name(:lead), do: :lead
-  defp name(command), do: elem(command, 0)
-
-  defp goal(:lead), do: {TrackBlob, []}
-  defp goal({:follow, pose}), do: {Follow, target: pose}
-  defp goal({:goto, x, y, nil}), do: {Goto, x: x, y: y}
-  defp goal({:goto, x, y, heading}), do: {Goto, x: x, y: y, heading: Pose.wrap(heading)}
-  defp goal({:move, linear, turn}), do: {Move, linear: linear, turn: turn}
-  defp goal({:find_blob, colour}), do: {FindBlob, colour: colour}
-
-  defp behind(%{leader: leader}, percept) do
-    case percept.peers do
-      %{^leader => %{pose: pose, twist: twist, at_ms: at_ms}}
-      when percept.at_ms - at_ms < @silent_ms ->
-        {x, y} = Pose.place(pose, {-@behind, 0.0})
-        {ahead, aside} = {:math.cos(pose.heading), :math.sin(pose.heading)}
-        velocity = {twist.linear * ahead, twist.linear * aside}
-        {Follow, target: Pose.new(x, y, pose.heading), velocity: velocity}
-
-      _silent ->
-        nil
-    end
+  defp behind(%{pose: pose, twist: %Twist{linear: linear}}) do
+    velocity = {linear * :math.cos(pose.heading), linear * :math.sin(pose.heading)}
+    {Behaviour.Follow, target: Pose.compose(pose, Pose.new(-@behind, 0)), velocity: velocity}
   end
 end

@@ -5,6 +5,7 @@ defmodule Swarm.Round.Letter do
   `known` is the map of all reports that the sender holds, sent as an echo when the reports are
   in, or when somebody asked. `purpose` says why the round is held.
   """
+  alias Swarm.Shape
 
   @enforce_keys [:id, :view, :remaining_ms, :purpose]
   defstruct @enforce_keys ++ [report: nil, known: nil, digest: nil, ask: false]
@@ -24,11 +25,11 @@ defmodule Swarm.Round.Letter do
   @doc "Whether a term from outside is a letter."
   @spec valid?(term()) :: boolean()
   def valid?(%__MODULE__{id: {epoch, counter, initiator}} = letter) do
-    is_integer(epoch) and epoch > 0 and epoch < 1_000_000_000 and is_integer(counter) and
+    Shape.whole?(letter, __MODULE__) and is_integer(epoch) and epoch > 0 and epoch < 1_000_000_000 and
+      is_integer(counter) and
       counter > 0 and counter < 1_000_000_000 and is_atom(initiator) and
       is_integer(letter.remaining_ms) and letter.remaining_ms <= 120_000 and
-      letter.purpose in [:search, :change] and is_list(letter.view) and
-      Enum.all?(letter.view, &is_atom/1) and
+      letter.purpose in [:search, :change] and Shape.names?(letter.view) and
       (letter.report == :busy or report?(letter.report)) and
       (letter.known == nil or known?(letter.known)) and
       (letter.digest == nil or is_binary(letter.digest)) and is_boolean(letter.ask)
@@ -36,7 +37,7 @@ defmodule Swarm.Round.Letter do
 
   def valid?(_term), do: false
 
-  defp known?(known) when is_map(known),
+  defp known?(known) when is_map(known) and not is_struct(known),
     do: Enum.all?(known, fn {id, report} -> is_atom(id) and report?(report) end)
 
   defp known?(_other), do: false

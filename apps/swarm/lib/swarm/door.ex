@@ -1,0 +1,203 @@
+defmodule Swarm.Door do
+  @moduledoc false
+  # What `Swarm` needs: who is meant, is it allowed, and what do they answer.
+  alias Robot.Command.Words
+  alias Swarm.{Directory, Formation}
+
+  @answer_ms 500
+
+  @doc "The ids of the robots meant, which all exist, or one line."
+  @spec robots(term()) :: {:ok, [atom(), ...]} | {:error, String.t()}
+  def robots(:all) do
+    case Directory.robots() do
+      [] -> {:error, "there are no robots here"}
+      robots -> {:ok, robots}
+    end
+  end
+
+  def robots([]), do: {:error, "[] names no robot; write a name, a list of names or :all"}
+
+  def robots(names) when is_list(names) do
+    known = Directory.robots()
+
+    with false <- List.improper?(names),
+         {:ok, ids} <- named(names, known) do
+      {:ok, Enum.uniq(ids)}
+    else
+      true -> {:error, "#{inspect(names)} is no list of robots"}
+      error -> error
+    end
+  end
+
+  def robots(name), do: robots([name])
+
+  defp named(names, known) do
+    Enum.reduce_while(names, {:ok, []}, fn name, {:ok, ids} ->
+      case Enum.find(known, &(&1 == name or Atom.to_string(&1) == name)) do
+        nil -> {:halt, {:error, unknown(name, known)}}
+        id -> {:cont, {:ok, ids ++ [id]}}
+      end
+    end)
+  end
+
+  defp unknown(name, known) do
+    there = if known == [], do: "none", else: Enum.join(known, ", ")
+    word = if is_binary(name), do: name, else: String.trim_leading(inspect(name), ":")
+
+    "no robot #{inspect(name)}; there are #{there}" <>
+      hint(word, Enum.map(known, &Atom.to_string/1))
+  end
+
+  defp hint(word, known) do
+    case Words.nearest(word, known) do
+      nil -> ""
+      near -> "; did you mean #{near}?"
+    end
+  end
+
+  @doc "Checks the options of a start: who takes part, and the mission's own."
+  @spec start(term()) :: {:ok, [atom()], keyword()} | {:error, String.t()}
+  def start(options) do
+    with :ok <- keyword(options, "formation, assign, leader_change, robots"),
+         {:ok, robots} <- robots(Keyword.get(options, :robots, :all)),
+         {:ok, options} <- mission(Keyword.delete(options, :robots), length(robots)),
+         do: {:ok, robots, options}
+  end
+
+  @doc "Checks a formation."
+  @spec formation(term(), term()) :: {:ok, Formation.t()} | {:error, String.t()}
+  def formation(kind, options, robots \\ nil)
+
+  def formation(kind, options, robots) do
+    with :ok <- keyword(options, "spacing, length or side"),
+         {:ok, kind} <- kind(kind),
+         :ok <- numbers(options),
+         do: Formation.new(kind, fleet(kind, options, robots || length(Directory.robots())))
+  end
+
+  @doc "Tells the robots; `:ok` when all accept, else one line about those that do not."
+  @spec tell([atom()], term()) :: Swarm.answer()
+  def tell(robots, request) do
+    answers = ask(robots, request)
+
+    case for(id <- robots, answers[id] != :ok, do: refusal(id, answers[id])) do
+      [] -> :ok
+      lines -> {:error, lines |> Enum.uniq() |> Enum.join("; ")}
+    end
+  end
+
+  @doc "The same, but one that accepts is enough."
+  @spec any([atom()], term()) :: Swarm.answer()
+  def any(robots, request) do
+    answers = ask(robots, request)
+    if Enum.any?(robots, &(answers[&1] == :ok)), do: :ok, else: {:error, no_mission(answers)}
+  end
+
+  @doc """
+  What the robots answer within half a second; who does not is not in the map. All are asked at once,
+  so that a silent robot holds up nobody else's answer.
+  """
+  @spec ask([atom()], term()) :: %{atom() => term()}
+  def ask(robots, request) do
+    deadline = System.monotonic_time(:millisecond) + @answer_ms
+    asked = for id <- robots, link = Directory.whereis(id), do: {id, post(link, request)}
+    for {id, ref} <- asked, {:ok, answer} <- [answer(ref, deadline)], into: %{}, do: {id, answer}
+  end
+
+  # An alias: an answer that comes too late finds no mailbox.
+  defp post(link, request) do
+    ref = :erlang.alias([:reply])
+    :erlang.send(link, {:"$gen_cast", {:command, request, ref}}, [:nosuspend, :noconnect])
+    ref
+  end
+
+  defp answer(ref, deadline) do
+    receive do
+      {^ref, answer} -> {:ok, answer}
+    after
+      max(deadline - System.monotonic_time(:millisecond), 0) ->
+        :erlang.unalias(ref)
+
+        # It may have come just before the alias was gone.
+        receive do
+          {^ref, answer} -> {:ok, answer}
+        after
+          0 -> :error
+        end
+    end
+  end
+
+  defp refusal(id, nil), do: "#{id} does not answer"
+  defp refusal(_id, {:error, line}) when is_binary(line), do: line
+  defp refusal(id, {:error, reason}), do: "#{id} refuses: #{inspect(reason)}"
+
+  defp no_mission(answers) when answers == %{}, do: "no robot answers"
+
+  defp no_mission(_refusals), do: "no robot is on a mission that has a formation; start it first"
+
+  defp mission(options, robots) do
+    Enum.reduce_while(options, {:ok, []}, fn option, {:ok, checked} ->
+      case option(option, robots) do
+        {:ok, option} -> {:cont, {:ok, checked ++ [option]}}
+        {:error, line} -> {:halt, {:error, line}}
+      end
+    end)
+  end
+
+  defp option({:formation, {kind, spacing}}, robots) do
+    with {:ok, formation} <- formation(kind, [spacing: spacing], robots),
+         do: {:ok, {:formation, formation}}
+  end
+
+  defp option({:formation, kind}, robots) do
+    with {:ok, formation} <- formation(kind, [], robots), do: {:ok, {:formation, formation}}
+  end
+
+  defp option({:assign, how} = option, _robots) when how in [:chain, :cost], do: {:ok, option}
+
+  defp option({:assign, other}, _robots),
+    do: {:error, "assign cannot be #{inspect(other)}: :chain or :cost"}
+
+  defp option({:leader_change, on?} = option, _robots) when is_boolean(on?), do: {:ok, option}
+
+  defp option({:leader_change, other}, _robots),
+    do: {:error, "leader_change cannot be #{inspect(other)}: true or false"}
+
+  defp option({key, _value}, _robots) do
+    {:error,
+     "unknown option #{inspect(key)}: formation, assign, leader_change or robots" <>
+       hint(Atom.to_string(key), ~w(formation assign leader_change robots))}
+  end
+
+  defp kind(kind) do
+    kinds = Formation.kinds()
+
+    case Enum.find(kinds, &(&1 == kind or Atom.to_string(&1) == kind)) do
+      nil ->
+        {:error, line} = Formation.new(kind)
+        word = if is_binary(kind), do: kind, else: String.trim_leading(inspect(kind), ":")
+        {:error, line <> hint(word, Enum.map(kinds, &Atom.to_string/1))}
+
+      known ->
+        {:ok, known}
+    end
+  end
+
+  defp numbers(options) do
+    case Enum.reject(options, fn {_key, value} -> is_number(value) end) do
+      [] -> :ok
+      [{key, value} | _] -> {:error, "#{key} cannot be #{inspect(value)}: a number of metres"}
+    end
+  end
+
+  # Only a whole length or side needs to know how many there are.
+  defp fleet(_kind, options, robots) do
+    if options[:length] || options[:side], do: options ++ [robots: robots], else: options
+  end
+
+  defp keyword(options, allowed) do
+    if Keyword.keyword?(options),
+      do: :ok,
+      else: {:error, "#{inspect(options)} are no options; allowed are #{allowed}"}
+  end
+end

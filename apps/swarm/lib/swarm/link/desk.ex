@@ -1,0 +1,78 @@
+defmodule Swarm.Link.Desk do
+  @moduledoc """
+  What a robot answers to people (`Swarm`): it accepts or refuses, in one line. It runs in the
+  robot's link, so that people on any node reach it by the directory.
+
+  | request | answer |
+  |---|---|
+  | `:status` | `Swarm.Status` |
+  | `:estop`, `:reset` | `:ok`, when it is done |
+  | `:start`, `{:start, options}` | the group mission begins; anew where there are options |
+  | `:stop` | the robot stands, whatever it was at |
+  | `{:formation, kind, spacing}` | for the running mission |
+  | a `Robot.Command` | for this robot alone, while no group mission is on |
+  """
+  alias Robot.{Board, Config, Gate, Pilot}
+  alias Swarm.{Missions.Landmark, Missions.Manual, Status, Stop}
+  alias Swarm.Link.Ear
+
+  @type answer :: :ok | {:error, String.t()} | Status.t()
+
+  @doc "Answers, and what has become of the ear by that."
+  @spec answer(term(), Config.t(), Board.t(), Ear.t()) :: {answer(), Ear.t()}
+  def answer(:status, config, board, ear), do: {Status.of(config, board, ear), ear}
+  def answer(:estop, _config, _board, ear), do: {:ok, %{ear | stop: Stop.press(ear.stop)}}
+
+  def answer(:reset, config, _board, ear) do
+    :ok = Gate.reset(config.id)
+    {:ok, %{ear | stop: Stop.reset(ear.stop)}}
+  end
+
+  def answer(request, config, board, ear),
+    do: {obey(request, doing(board), config, ear), ear}
+
+  defp doing(board) do
+    case Board.fetch(board, :mission, :infinity) do
+      {:ok, %{state: {Manual, phase}}, _} -> {:alone, phase}
+      {:ok, %{state: {_module, phase}}, _} -> {:group, phase}
+      _idle -> :idle
+    end
+  end
+
+  defp obey(:start, doing, config, ear), do: obey({:start, []}, doing, config, ear)
+  defp obey({:start, []}, {:group, _phase}, config, _ear), do: Pilot.command(config.id, :start)
+
+  defp obey({:start, options}, _doing, config, _ear) do
+    {module, defaults} = config.mission || {Landmark, []}
+    :ok = Pilot.start(config.id, module, Keyword.merge(defaults, options))
+    Pilot.command(config.id, :start)
+  end
+
+  # A robot that is at nothing stands already.
+  defp obey(:stop, :idle, _config, _ear), do: :ok
+  defp obey(:stop, _doing, config, _ear), do: Pilot.command(config.id, :stop)
+  defp obey(:ping, _doing, _config, _ear), do: :ok
+
+  defp obey({:formation, _kind, _spacing} = command, {:group, _phase}, config, _ear),
+    do: Pilot.command(config.id, command)
+
+  defp obey({:formation, _kind, _spacing}, _doing, config, _ear),
+    do: {:error, "#{config.id} is on no mission that has a formation; start it first"}
+
+  defp obey(_command, {:group, phase}, config, _ear) when phase != :idle,
+    do: {:error, "#{config.id} is on the group's mission; stop it first"}
+
+  defp obey({:follow_the_leader, leader} = command, doing, %{id: id} = config, ear) do
+    with :ok <- Manual.follow(id, leader, Ear.leaders(ear, Config.now(config))),
+         do: alone(command, doing, config)
+  end
+
+  defp obey(command, doing, config, _ear), do: alone(command, doing, config)
+
+  defp alone(command, {:alone, _phase}, config), do: Pilot.command(config.id, command)
+
+  defp alone(command, _idle, config) do
+    :ok = Pilot.start(config.id, Manual, [])
+    Pilot.command(config.id, command)
+  end
+end

@@ -1,0 +1,78 @@
+defmodule Swarm.Link.Ear do
+  @moduledoc """
+  What a robot's link makes of what it hears, as a function: who is there, how the emergency stop
+  stands, and what was dropped. Pure; the same in the same order as `Swarm.Member`.
+  """
+  alias Swarm.{Message, Peers, Stop}
+
+  @enforce_keys [:me, :peers, :stop]
+  defstruct @enforce_keys ++ [heard: 0, rejected: %{}]
+
+  @type t :: %__MODULE__{
+          me: atom(),
+          peers: Peers.t(),
+          stop: Stop.t(),
+          heard: non_neg_integer(),
+          rejected: %{atom() => pos_integer()}
+        }
+
+  @typedoc """
+    * `{:peer, id}` - a heartbeat, by which the peers and perhaps the stop have changed
+    * `{:message, message}` - for the mission
+    * `:nothing` - dropped
+  """
+  @type heard :: {:peer, atom()} | {:message, Message.t()} | :nothing
+
+  @doc "Nothing heard yet; the emergency stop is as it was left."
+  @spec new(atom(), Stop.t()) :: t()
+  def new(me, stop \\ %Stop{}), do: %__MODULE__{me: me, peers: Peers.new(me), stop: stop}
+
+  @doc """
+  Hears a term from outside, whatever it is.
+
+      iex> {heard, ear} = Swarm.Link.Ear.hear(Swarm.Link.Ear.new(:mag1), "junk", 0)
+      iex> {heard, ear.rejected}
+      {:nothing, %{not_a_message: 1}}
+  """
+  @spec hear(t(), term(), integer()) :: {heard(), t()}
+  def hear(%__MODULE__{me: me} = ear, term, now_ms) do
+    case Message.check(term) do
+      # From another robot of this name: which of the two gives way is settled elsewhere.
+      {:ok, %Message{from: ^me}} ->
+        {:nothing, ear}
+
+      {:ok, %Message{kind: :heartbeat, from: from, body: beat}} ->
+        peers = Peers.hear(ear.peers, from, beat, now_ms)
+        stop = Stop.hear(ear.stop, beat.estop, beat.latched)
+        {{:peer, from}, %{ear | peers: peers, stop: stop, heard: ear.heard + 1}}
+
+      {:ok, message} ->
+        {{:message, message}, %{ear | heard: ear.heard + 1}}
+
+      {:error, reason} ->
+        {:nothing, reject(ear, reason)}
+    end
+  end
+
+  @doc "Counts what is no message at all."
+  @spec reject(t(), atom()) :: t()
+  def reject(ear, reason),
+    do: %{ear | rejected: Map.update(ear.rejected, reason, 1, &(&1 + 1))}
+
+  @doc """
+  Follows the latch on the board, which others set and clear too: a stop pressed on the robot
+  itself spreads like any other.
+  """
+  @spec follow(t(), latched? :: boolean()) :: t()
+  def follow(%__MODULE__{stop: %{latched?: latched?}} = ear, latched?), do: ear
+  def follow(ear, true), do: %{ear | stop: Stop.press(ear.stop)}
+  def follow(ear, false), do: %{ear | stop: Stop.reset(ear.stop)}
+
+  @doc "Whom each robot that is not gone follows, or says that it leads it."
+  @spec leaders(t(), integer()) :: %{atom() => atom() | nil}
+  def leaders(ear, now_ms) do
+    for {id, beat} <- Peers.beats(ear.peers, now_ms), into: %{} do
+      {id, if(beat.leader != id, do: beat.leader)}
+    end
+  end
+end

@@ -1,0 +1,132 @@
+defmodule Swarm.Status do
+  @moduledoc """
+  How a robot is, for people. In `iex` it is one line:
+
+      #mag1 follow (1.20, -0.35, 90 deg) 0.31 m/s by follow, hears 5, age 40 ms
+
+  `age_ms` is how old its newest reading is; `rejected` counts malformed messages by kind.
+  """
+  alias Hal.Pose
+  alias Robot.{Board, Config}
+  alias Swarm.Link.Ear
+  alias Swarm.{Missions, Peers}
+
+  @enforce_keys [:robot]
+  defstruct @enforce_keys ++
+              [
+                node: nil,
+                state: :idle,
+                by: nil,
+                pose: nil,
+                speed: 0.0,
+                limits: [],
+                estop: false,
+                leader: nil,
+                power: nil,
+                health: %{},
+                peers: %{},
+                rejected: %{},
+                age_ms: nil
+              ]
+
+  @type t :: %__MODULE__{
+          robot: atom(),
+          node: node() | nil,
+          state: atom(),
+          by: atom(),
+          pose: Pose.t() | nil,
+          speed: float(),
+          limits: [atom()],
+          estop: boolean(),
+          leader: atom() | nil,
+          power: float() | nil,
+          health: %{atom() => :online | {:offline, term()}},
+          peers: %{atom() => Peers.status()},
+          rejected: %{atom() => pos_integer()},
+          age_ms: non_neg_integer() | nil
+        }
+
+  @doc "The status of a robot of this node, from its board and its ear."
+  @spec of(Config.t(), Board.t(), Ear.t()) :: t()
+  def of(config, board, ear) do
+    entries = Board.entries(board)
+    driving = value(entries, :driving)
+    mission = value(entries, :mission)
+    now_ms = Config.now(config)
+
+    %__MODULE__{
+      robot: config.id,
+      node: node(),
+      state: state(mission),
+      by: entries |> value(:doing) |> field(:by),
+      pose: value(entries, :pose),
+      speed: if(driving, do: driving.twist.linear, else: 0.0),
+      limits: field(driving, :limits) || [],
+      estop: Board.latched?(board),
+      leader: mission |> field(:claim) |> field(:leader),
+      power: value(entries, :power),
+      health:
+        for({{:health, device}, {condition, _age}} <- entries, into: %{}, do: {device, condition}),
+      peers: Map.new(ear.peers.rows, fn {id, _} -> {id, Peers.status(ear.peers, id, now_ms)} end),
+      rejected: ear.rejected,
+      age_ms: age(entries)
+    }
+  end
+
+  defp value(entries, key) do
+    case entries do
+      %{^key => {value, _age_ms}} -> value
+      _none -> nil
+    end
+  end
+
+  defp field(nil, _key), do: nil
+  defp field(map, key), do: Map.get(map, key)
+
+  defp state(%{state: {Missions.Manual, :ready}}), do: :idle
+  defp state(%{state: {_module, phase}}), do: phase
+  defp state(_idle), do: :idle
+
+  defp age(%{odometry: {_value, age_ms}}), do: age_ms
+  defp age(_no_wheels), do: nil
+
+  defimpl Inspect do
+    def inspect(status, _options) do
+      "#" <>
+        Enum.join(
+          ["#{status.robot} #{status.state}", place(status.pose), speed(status)] ++
+            remarks(status),
+          " "
+        )
+    end
+
+    defp place(nil), do: "(pose unknown)"
+
+    defp place(%{x: x, y: y, heading: heading}),
+      do: "(#{fixed(x)}, #{fixed(y)}, #{round(heading * 180 / :math.pi())} deg)"
+
+    defp speed(status),
+      do: "#{fixed(status.speed)} m/s" <> if(status.by, do: " by #{status.by}", else: "")
+
+    defp remarks(status) do
+      hears = Enum.count(status.peers, fn {_id, how} -> how == :alive end)
+      offline = for {device, {:offline, _reason}} <- status.health, do: "#{device} offline"
+      dropped = status.rejected |> Map.values() |> Enum.sum()
+
+      [
+        status.estop && "E-STOP",
+        status.leader && "leader #{status.leader}",
+        "hears #{hears}",
+        dropped > 0 && "dropped #{dropped} messages",
+        "age #{status.age_ms || "?"} ms"
+      ]
+      |> Enum.filter(& &1)
+      |> Kernel.++(offline)
+      |> Enum.map_join("", &(", " <> &1))
+      |> String.trim_leading(", ")
+      |> List.wrap()
+    end
+
+    defp fixed(number), do: :erlang.float_to_binary(number * 1.0, decimals: 2)
+  end
+end

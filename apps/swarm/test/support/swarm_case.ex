@@ -1,0 +1,80 @@
+defmodule Swarm.Case do
+  @moduledoc """
+  Robots with fake drives and links. Names and directory are shared by all tests of a VM, so
+  robots get names of their own; the test tells the drive's readings.
+  """
+  use ExUnit.CaseTemplate
+  alias Hal.{Odometry, Pose, Twist}
+  alias Robot.Names
+
+  using do
+    quote do
+      import Swarm.Case
+      import Robot.Case, only: [listen: 2, kill: 2]
+      alias Hal.{Pose, Twist}
+      alias Robot.{Board, Gate, Names, Pilot}
+      alias Swarm.{Directory, Heartbeat, Link, Message}
+    end
+  end
+
+  setup do
+    unless Process.whereis(Robot.Names), do: start_supervised!(Swarm.Supervisor)
+    :ok
+  end
+
+  @doc "A robot with a link; link options under `:link`, the others as in `Robot.Config`."
+  def robot(id, options \\ []) do
+    {link, options} = Keyword.pop(options, :link, [])
+    config = id |> Robot.Case.config(options) |> Swarm.Link.join(link)
+    start_supervised!({Robot.Supervisor, config}, id: id, restart: :temporary)
+    stand(id, Pose.new(0, 0))
+    eventually(fn -> Swarm.Directory.whereis(id) end)
+    id
+  end
+
+  @doc "The wheels say that the robot stands there."
+  def stand(id, pose) do
+    free = List.duplicate(5.0, 16)
+    odometry = {:odometry, %Odometry{pose: pose, twist: Twist.zero()}}
+    send(Names.whereis(id, :drive), {:readings, [odometry, {:sonar, free}]})
+    id
+  end
+
+  @doc "Lets the wheels say so all the time, ten times a second, as real ones do."
+  def standing(ids) do
+    start_supervised!(
+      {Task,
+       fn ->
+         Stream.interval(100)
+         |> Enum.each(fn n ->
+           for id <- ids, Names.whereis(id, :drive), do: stand(id, Pose.new(0.001 * rem(n, 2), 0))
+         end)
+       end},
+      id: {:wheels, ids}
+    )
+
+    ids
+  end
+
+  @doc "Waits until a function gives something, and returns it."
+  def eventually(function, ms \\ 2_000) do
+    deadline = System.monotonic_time(:millisecond) + ms
+    wait(function, deadline)
+  end
+
+  defp wait(function, deadline) do
+    cond do
+      value = function.() -> value
+      System.monotonic_time(:millisecond) > deadline -> ExUnit.Assertions.flunk("waited in vain")
+      true -> pause(function, deadline)
+    end
+  end
+
+  defp pause(function, deadline) do
+    receive do
+      :never -> :ok
+    after
+      5 -> wait(function, deadline)
+    end
+  end
+end

@@ -1,0 +1,130 @@
+defmodule Swarm.DoorTest do
+  use Swarm.Case, async: false
+  @moduletag :capture_log
+
+  defp line({:error, line}) do
+    assert is_binary(line)
+    refute line =~ "\n"
+    line
+  end
+
+  defp state(id),
+    do: Board.fetch(Board.find!(id), :mission, :infinity) |> elem(1) |> Map.fetch!(:state)
+
+  test "single commands work from idle and replace each other" do
+    id = robot(:door1)
+    standing([id])
+    assert Swarm.goto(id, {2.0, 1}) == :ok
+    assert state(id) == {Swarm.Missions.Manual, :goto}
+
+    eventually(fn -> match?({:ok, %{by: :goto}, _}, Board.fetch(Board.find!(id), :doing, 300)) end)
+
+    assert Swarm.tell("door1", "MOVE:0.1:0") == :ok
+
+    eventually(fn -> match?({:ok, %{by: :move}, _}, Board.fetch(Board.find!(id), :doing, 300)) end)
+
+    assert %Swarm.Status{state: :move, robot: :door1} = Swarm.status(id)
+    assert Swarm.stop(id) == :ok
+
+    eventually(fn -> match?({:ok, %{by: :stop}, _}, Board.fetch(Board.find!(id), :doing, 300)) end)
+
+    assert Swarm.tell([id], "findblob:Yellow") == :ok
+    assert Swarm.tell(id, "lead") == :ok
+    assert Swarm.tell(id, "ping") == :ok
+    assert Swarm.goto(id, {1, 2, 1.5}) == :ok
+    assert Swarm.goto(id, Pose.new(1, 2)) == :ok
+  end
+
+  test "robots follow each other, but in no circle" do
+    [a, b, c] = for k <- 1..3, do: robot(:"door_follow#{k}")
+    standing([a, b, c])
+    assert line(Swarm.follow(a, a)) =~ "itself"
+    assert Swarm.follow(a, b) == :ok
+    assert Swarm.follow(b, c) == :ok
+
+    leader = fn id, of ->
+      match?({:ok, %{beat: %{leader: ^of}}, _}, Board.fetch(Board.find!(c), {:peer, id}, 1_000))
+    end
+
+    eventually(fn -> leader.(a, b) and leader.(b, c) end)
+    assert line(Swarm.follow(c, a)) =~ "door_follow1 -> door_follow2 -> door_follow3"
+    assert line(Swarm.tell(c, "followtheleader:nobody")) =~ "nobody"
+    assert Swarm.stop([a, b]) == :ok
+    eventually(fn -> leader.(a, nil) end)
+    assert Swarm.follow(c, a) == :ok
+  end
+
+  test "the mission starts, takes a formation, and keeps single commands out until it is stopped" do
+    id = robot(:door_group)
+    assert line(Swarm.formation(:wedge)) =~ "start it first"
+    assert Swarm.start(robots: [id], formation: :line) == :ok
+    assert {Swarm.Missions.Landmark, _} = state(id)
+    standing([id])
+    eventually(fn -> state(id) != {Swarm.Missions.Landmark, :idle} end)
+    assert line(Swarm.goto(id, {1, 1})) =~ "stop it first"
+    assert Swarm.formation(:wedge, spacing: 1.2) == :ok
+    assert Swarm.formation("column") == :ok
+    assert Swarm.stop(id) == :ok
+    eventually(fn -> state(id) == {Swarm.Missions.Landmark, :idle} end)
+    assert Swarm.goto(id, {1, 1}) == :ok
+  end
+
+  test "wrong input is one line that says what is allowed, and never raises" do
+    id = robot(:door_wrong)
+    assert line(Swarm.goto(:door_wrnog, {1, 1})) =~ "did you mean door_wrong?"
+    assert line(Swarm.goto(id, {:nan, 1})) =~ "number"
+    assert line(Swarm.formation(:wegde)) =~ "did you mean wedge?"
+    assert line(Swarm.formation(:line, length: "4")) =~ "metres"
+    assert line(Swarm.start(assign: :luck)) =~ ":chain or :cost"
+    assert line(Swarm.start(leader_chnage: true)) =~ "did you mean leader_change?"
+
+    wrong = [
+      nil,
+      :nobody,
+      "nobody",
+      1,
+      1.5,
+      {},
+      {1},
+      %{},
+      [],
+      [nil],
+      [id | id],
+      [[id]],
+      self(),
+      "",
+      -1,
+      {1, :inf},
+      {nil, nil}
+    ]
+
+    for term <- wrong do
+      line(Swarm.goto(term, {1, 1}))
+      line(Swarm.goto(id, term))
+      line(Swarm.follow(term, id))
+      line(Swarm.follow(id, term))
+      line(Swarm.tell(term, "ping"))
+      line(Swarm.tell(id, term))
+      line(Swarm.status(term))
+      line(Swarm.stop(term))
+      line(Swarm.formation(term))
+      if term != [], do: line(Swarm.formation(:wedge, term))
+      if term != [], do: line(Swarm.start(term))
+      line(Swarm.formation(:wedge, spacing: term))
+      line(Swarm.start(formation: term))
+      line(Swarm.start(robots: term))
+    end
+  end
+
+  test "a robot that does not answer is named within half a second" do
+    id = robot(:door_deaf)
+    :ok = :sys.suspend(Names.whereis(id, :link))
+    {took, answer} = :timer.tc(fn -> Swarm.stop(id) end)
+    assert line(answer) == "door_deaf does not answer"
+    assert took in 450_000..700_000
+    assert Enum.any?(Swarm.status(), &match?(%{robot: :door_deaf, state: :no_answer}, &1))
+    :ok = :sys.resume(Names.whereis(id, :link))
+    assert %Swarm.Status{} = Swarm.status(id)
+    refute_received {_alias, :door_deaf, _answer}
+  end
+end
