@@ -21,7 +21,8 @@ defmodule Swarm do
   that names what was wrong and what is allowed. Nothing raises, whatever it is given. A command
   to several robots is `:ok` when all have accepted it.
 
-  Robots are atoms (`:mag1`), or their names as text.
+  Robots are atoms (`:mag1`), or their names as text. A robot does what it was told last: one that is
+  sent somewhere leaves the group's mission, which goes on without it until the next start.
   """
   alias Robot.Command
   alias Swarm.{Directory, Door, Formation, Status}

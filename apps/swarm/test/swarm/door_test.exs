@@ -54,19 +54,23 @@ defmodule Swarm.DoorTest do
     assert Swarm.follow(c, a) == :ok
   end
 
-  test "the mission starts, takes a formation, and keeps single commands out until it is stopped" do
+  test "the mission starts, takes a formation, stops, and is left by whoever is sent elsewhere" do
     id = robot(:door_group)
     assert line(Swarm.formation(:wedge)) =~ "start it first"
     assert Swarm.start(robots: [id], formation: :line) == :ok
     assert {Swarm.Missions.Landmark, _} = state(id)
     standing([id])
     eventually(fn -> state(id) != {Swarm.Missions.Landmark, :idle} end)
-    assert line(Swarm.goto(id, {1, 1})) =~ "stop it first"
     assert Swarm.formation(:wedge, spacing: 1.2) == :ok
     assert Swarm.formation("column") == :ok
     assert Swarm.stop(id) == :ok
     eventually(fn -> state(id) == {Swarm.Missions.Landmark, :idle} end)
+    assert Swarm.start() == :ok
+    eventually(fn -> state(id) != {Swarm.Missions.Landmark, :idle} end)
     assert Swarm.goto(id, {1, 1}) == :ok
+    assert state(id) == {Swarm.Missions.Manual, :goto}
+    assert Swarm.start() == :ok
+    assert {Swarm.Missions.Landmark, _} = state(id)
   end
 
   test "wrong input is one line that says what is allowed, and never raises" do

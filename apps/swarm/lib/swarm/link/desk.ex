@@ -10,7 +10,7 @@ defmodule Swarm.Link.Desk do
   | `:start`, `{:start, options}` | the group mission begins; anew where there are options |
   | `:stop` | the robot stands, whatever it was at |
   | `{:formation, kind, spacing}` | for the running mission |
-  | a `Robot.Command` | for this robot alone, while no group mission is on |
+  | a `Robot.Command` | for this robot alone, which leaves the group's mission for it |
   """
   alias Robot.{Board, Config, Gate, Pilot}
   alias Swarm.{Missions.Landmark, Missions.Manual, Status, Stop}
@@ -59,9 +59,6 @@ defmodule Swarm.Link.Desk do
   defp obey({:formation, _kind, _spacing}, _doing, config, _ear),
     do: {:error, "#{config.id} is on no mission that has a formation; start it first"}
 
-  defp obey(_command, {:group, phase}, config, _ear) when phase != :idle,
-    do: {:error, "#{config.id} is on the group's mission; stop it first"}
-
   defp obey({:follow_the_leader, leader} = command, doing, %{id: id} = config, ear) do
     with :ok <- Manual.follow(id, leader, Ear.leaders(ear, Config.now(config))),
          do: alone(command, doing, config)
@@ -71,7 +68,7 @@ defmodule Swarm.Link.Desk do
 
   defp alone(command, {:alone, _phase}, config), do: Pilot.command(config.id, command)
 
-  defp alone(command, _idle, config) do
+  defp alone(command, _idle_or_group, config) do
     :ok = Pilot.start(config.id, Manual, [])
     Pilot.command(config.id, command)
   end

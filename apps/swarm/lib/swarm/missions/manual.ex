@@ -1,7 +1,7 @@
 defmodule Swarm.Missions.Manual do
   @moduledoc """
   One robot does what a person tells it (`Robot.Command`), one command at a time (R16, R31 to R36):
-  the pilot runs it while no group mission is on. Pure.
+  a robot leaves the group's mission for it, and comes back with the next start. Pure.
 
   In its heartbeats the robot stays `:idle`, so that no group waits for it, and names whom it
   follows, so that nobody can close a circle of followers.
