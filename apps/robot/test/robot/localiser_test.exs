@@ -79,18 +79,21 @@ defmodule Robot.LocaliserTest do
     assert abs(percept.pose.heading) < 0.01
   end
 
-  test "a wrong estimate comes near the truth by two references, for many errors" do
+  test "a wrong estimate is turned until both references are where they are seen" do
     for _ <- 1..50 do
       truth = Pose.new(0.1 * (:rand.uniform() - 0.5), 0.1 * (:rand.uniform() - 0.5), 0.0)
       believed = Pose.new(0, 0, 0.08 * (:rand.uniform() - 0.5))
       localiser = Localiser.new(believed)
       # Odometry that has driven a little admits an error of its own.
       {_, localiser} = Localiser.update(localiser, percept(Pose.new(-2, 0, 1), 0))
-      {percept, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0), 1))
-      before = Pose.distance(percept.pose, truth) + abs(percept.pose.heading)
+      {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0), 1))
       {percept, _} = settle(localiser, truth, [@landmark, @leader], 80)
-      later = Pose.distance(percept.pose, truth) + abs(percept.pose.heading)
-      assert later < max(0.7 * before, 0.06)
+
+      # Both are seen where they are expected: that much two bearings tell.
+      for %{at: place} <- [@landmark, @leader] do
+        error = Pose.bearing(percept.pose, place) - Pose.bearing(truth, place)
+        assert abs(error) < 0.015
+      end
     end
   end
 
