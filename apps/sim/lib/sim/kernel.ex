@@ -84,7 +84,8 @@ defmodule Sim.Kernel do
 
   @doc "The arguments of the kernels as they take them."
   @spec pack(Sim.Map.t() | Sight.t() | [Sight.pole()]) :: tuple() | binary()
-  def pack(%Sim.Map{} = map), do: {map.field, map.width, map.height, map.cell}
+  def pack(%{field: field, width: width, height: height, cell: cell}),
+    do: {field, width, height, cell}
 
   def pack(%Sight{} = s),
     do: {s.x, s.y, s.cosine, s.sine, s.eye, s.focal, s.horizon, s.width, s.height}

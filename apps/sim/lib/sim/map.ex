@@ -7,7 +7,7 @@ defmodule Sim.Map do
   counted as a king moves in chess and at most 255; 0 is wall. Rays and bodies jump by it.
   `room` is the rectangle round the origin where a fleet starts.
   """
-  alias Sim.Map.{Drawing, Image, Starts}
+  alias Sim.Map.{Clearance, Drawing, Image, Starts}
 
   @enforce_keys [:name, :width, :height, :cell, :field, :room]
   defstruct @enforce_keys
@@ -35,9 +35,10 @@ defmodule Sim.Map do
   """
   @spec open(String.t(), pos_integer()) :: {:ok, t()} | {:error, String.t()}
   def open(name, fleet) when name in ["hall", "hospital", "arena"] and fleet > 0,
-    do: {:ok, Drawing.draw(name, fleet)}
+    do: {:ok, struct!(__MODULE__, Drawing.draw(name, fleet))}
 
-  def open(name, _fleet), do: Image.open(name)
+  def open(name, _fleet),
+    do: with({:ok, fields} <- Image.open(name), do: {:ok, struct!(__MODULE__, fields)})
 
   @doc "Width and height in metres."
   @spec size(t()) :: {float(), float()}
@@ -52,7 +53,7 @@ defmodule Sim.Map do
       {false, true}
   """
   @spec wall?(t(), point()) :: boolean()
-  def wall?(%__MODULE__{} = map, point), do: steps(map, point) == 0
+  def wall?(%__MODULE__{} = map, point), do: Clearance.steps(map, point) == 0
 
   @doc """
   Whether a disc of this radius fits here.
@@ -73,53 +74,11 @@ defmodule Sim.Map do
       0.5
   """
   @spec clearance(t(), point(), number()) :: float()
-  def clearance(%__MODULE__{} = map, point, limit) do
-    case steps(map, point) do
-      0 ->
-        0.0
-
-      steps when (steps - 1) * map.cell >= limit ->
-        (steps - 1) * map.cell
-
-      _near ->
-        map |> near(point, limit) |> Enum.reduce(limit * 1.0, fn {d, _}, m -> min(d, m) end)
-    end
-  end
+  defdelegate clearance(map, point, limit), to: Clearance, as: :of
 
   @doc "The nearest points of all wall cells closer than `limit`, each with its distance."
   @spec near(t(), point(), number()) :: [{distance :: float(), point()}]
-  def near(%__MODULE__{} = map, {x, y} = point, limit) do
-    if (steps(map, point) - 1) * map.cell >= limit do
-      []
-    else
-      {px, py} = local(map, point)
-      {right, high} = size(map)
-      reach = trunc(limit / map.cell) + 1
-      {i, j} = {floor(px / map.cell), floor(py / map.cell)}
-
-      borders =
-        for {d, bx, by} <- [
-              {px, -px, 0.0},
-              {right - px, right - px, 0.0},
-              {py, 0.0, -py},
-              {high - py, 0.0, high - py}
-            ],
-            d < limit,
-            do: {max(d, 0.0), {x + bx, y + by}}
-
-      cells =
-        for jj <- max(j - reach, 0)..min(j + reach, map.height - 1)//1,
-            ii <- max(i - reach, 0)..min(i + reach, map.width - 1)//1,
-            :binary.at(map.field, jj * map.width + ii) == 0,
-            dx = nearest(px, ii, map.cell) - px,
-            dy = nearest(py, jj, map.cell) - py,
-            distance = :math.sqrt(dx * dx + dy * dy),
-            distance < limit,
-            do: {distance, {x + dx, y + dy}}
-
-      borders ++ cells
-    end
-  end
+  defdelegate near(map, point, limit), to: Clearance
 
   @doc """
   Poses to start from: in the room, at least 1.0 m between centres, 0.7 m from walls, 1.2 m from
@@ -156,26 +115,6 @@ defmodule Sim.Map do
 
       true ->
         {:error, "the landmark cannot stand at #{x},#{y} of map #{map.name}: there is a wall"}
-    end
-  end
-
-  # The byte of the field; outside is wall.
-  defp steps(map, point) do
-    {px, py} = local(map, point)
-    {i, j} = {floor(px / map.cell), floor(py / map.cell)}
-
-    if i < 0 or j < 0 or i >= map.width or j >= map.height,
-      do: 0,
-      else: :binary.at(map.field, j * map.width + i)
-  end
-
-  defp local(map, {x, y}), do: {x + map.width * map.cell / 2, y + map.height * map.cell / 2}
-
-  defp nearest(p, i, cell) do
-    cond do
-      p < i * cell -> i * cell
-      p > (i + 1) * cell -> (i + 1) * cell
-      true -> p
     end
   end
 end

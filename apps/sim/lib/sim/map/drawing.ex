@@ -17,8 +17,8 @@ defmodule Sim.Map.Drawing do
           {:wall | :free, left :: float(), low :: float(), right :: float(), high :: float()}
           | {:pillar, x :: float(), y :: float(), radius :: float()}
 
-  @doc "The map of this name."
-  @spec draw(String.t(), pos_integer()) :: Sim.Map.t()
+  @doc "The fields of the map of this name."
+  @spec draw(String.t(), pos_integer()) :: map()
   def draw("hall", fleet) do
     {x, y} = half(fleet)
     {w, h} = {round(2 * x / @cell), round(2 * y / @cell)}
@@ -26,7 +26,7 @@ defmodule Sim.Map.Drawing do
     rows = Map.new(1..255, fn most -> {most, open_row(w, most)} end)
     field = for j <- 0..(h - 1), into: <<>>, do: rows[Enum.min([j + 1, h - j, 255])]
 
-    %Sim.Map{name: "hall", width: w, height: h, cell: @cell, field: field, room: {-x, -y, x, y}}
+    %{name: "hall", width: w, height: h, cell: @cell, field: field, room: {-x, -y, x, y}}
   end
 
   def draw("hospital", fleet) do
@@ -132,7 +132,7 @@ defmodule Sim.Map.Drawing do
       end)
 
     field = rows |> IO.iodata_to_binary() |> Kernel.field(w, h)
-    %Sim.Map{name: name, width: w, height: h, cell: @cell, field: field, room: room}
+    %{name: name, width: w, height: h, cell: @cell, field: field, room: room}
   end
 
   defp span({:pillar, x, middle, radius}, y) do

@@ -10,11 +10,8 @@ defmodule Sim.Map.Image do
   @cell 0.05
   @most_cells 64_000_000
 
-  @typedoc "Rows from the top, one byte a pixel, 1 is wall."
-  @type picture :: {width :: pos_integer(), height :: pos_integer(), rows :: [binary()]}
-
-  @doc "Opens `FILE:WIDTHxHEIGHT`; the error is one line."
-  @spec open(String.t()) :: {:ok, Sim.Map.t()} | {:error, String.t()}
+  @doc "The fields of the map `FILE:WIDTHxHEIGHT`; the error is one line."
+  @spec open(String.t()) :: {:ok, map()} | {:error, String.t()}
   def open(name) do
     case Regex.run(~r/\A(.+):([^:]*)\z/s, name) do
       [_, file, size] ->
@@ -27,10 +24,6 @@ defmodule Sim.Map.Image do
         {:error, "unknown map #{name}: hall, hospital, arena or FILE.png:WIDTHxHEIGHT in metres"}
     end
   end
-
-  @doc "The most pixels or cells that are read."
-  @spec most_cells() :: pos_integer()
-  def most_cells, do: @most_cells
 
   defp size(name, text) do
     with [_, width, height] <- Regex.run(~r/\A(\d{1,9}\.?\d{0,9})x(\d{1,9}\.?\d{0,9})\z/, text),
@@ -63,8 +56,8 @@ defmodule Sim.Map.Image do
   defp decode(file, bytes) do
     result =
       case bytes do
-        <<0x89, "PNG\r\n", 0x1A, "\n", chunks::binary>> -> Png.decode(chunks)
-        <<"P", kind, rest::binary>> when kind in [?2, ?5] -> Pgm.decode(kind, rest)
+        <<0x89, "PNG\r\n", 0x1A, "\n", chunks::binary>> -> Png.decode(chunks, @most_cells)
+        <<"P", kind, rest::binary>> when kind in [?2, ?5] -> Pgm.decode(kind, rest, @most_cells)
         _ -> {:error, "neither a PNG nor a PGM (P2, P5) picture"}
       end
 
@@ -86,7 +79,7 @@ defmodule Sim.Map.Image do
 
     field = cells |> IO.iodata_to_binary() |> Kernel.field(w, h)
     {x, y} = {w * @cell / 2, h * @cell / 2}
-    %Sim.Map{name: name, width: w, height: h, cell: @cell, field: field, room: {-x, -y, x, y}}
+    %{name: name, width: w, height: h, cell: @cell, field: field, room: {-x, -y, x, y}}
   end
 
   # The pixels under cell `i` of `cells`: the first, and how many.

@@ -1,19 +1,20 @@
 defmodule Sim.Map.Pgm do
   @moduledoc "Reads PGM pictures as walls, plain (P2) and raw (P5), of up to 255 greys. Pure."
-  alias Sim.Map.Image
+  @typedoc "Rows from the top, one byte a pixel, 1 is wall."
+  @type picture :: {width :: pos_integer(), height :: pos_integer(), rows :: [binary()]}
 
   @damaged {:error, "the picture is damaged"}
 
   @doc """
-  The picture after the two letters of its kind.
+  The picture after the two letters of its kind, of at most so many pixels.
 
-      iex> Sim.Map.Pgm.decode(?2, "\\n# a comment\\n3 2\\n255\\n0 255 255\\n255 255 100\\n")
+      iex> Sim.Map.Pgm.decode(?2, "\\n# a comment\\n3 2\\n255\\n0 255 255\\n255 255 100\\n", 99)
       {:ok, {3, 2, [<<1, 0, 0>>, <<0, 0, 1>>]}}
-      iex> Sim.Map.Pgm.decode(?5, "\\n3 2\\n255\\nabc")
+      iex> Sim.Map.Pgm.decode(?5, "\\n3 2\\n255\\nabc", 99)
       {:error, "the picture is damaged"}
   """
-  @spec decode(?2 | ?5, binary()) :: {:ok, Image.picture()} | {:error, String.t()}
-  def decode(kind, bytes) do
+  @spec decode(?2 | ?5, binary(), pos_integer()) :: {:ok, picture()} | {:error, String.t()}
+  def decode(kind, bytes, most_pixels) do
     with {:ok, width, bytes} <- number(bytes),
          {:ok, height, bytes} <- number(bytes),
          {:ok, most, <<blank, bytes::binary>>} when blank in ~c" \t\r\n" <- number(bytes) do
@@ -21,7 +22,7 @@ defmodule Sim.Map.Pgm do
         width < 1 or height < 1 or most < 1 ->
           @damaged
 
-        width * height > Image.most_cells() ->
+        width * height > most_pixels ->
           {:error, "#{width} x #{height} pixels are too many"}
 
         most > 255 ->

@@ -3,15 +3,16 @@ defmodule Sim.Map.Png do
   Reads PNG pictures as walls: grey of 1, 2, 4 or 8 bits, grey with alpha, RGB, RGBA of 8 bits a channel, and
   palettes; not interlaced. What is transparent is white. Pure.
   """
-  alias Sim.Map.Image
+  @typedoc "Rows from the top, one byte a pixel, 1 is wall."
+  @type picture :: {width :: pos_integer(), height :: pos_integer(), rows :: [binary()]}
 
   @damaged {:error, "the picture is damaged"}
 
-  @doc "The picture in the chunks that follow the signature."
-  @spec decode(binary()) :: {:ok, Image.picture()} | {:error, String.t()}
-  def decode(chunks) do
+  @doc "The picture in the chunks that follow the signature, of at most `most` pixels."
+  @spec decode(binary(), pos_integer()) :: {:ok, picture()} | {:error, String.t()}
+  def decode(chunks, most) do
     with {:ok, [{"IHDR", header} | chunks]} <- chunks(chunks, []),
-         {:ok, {width, height, _, _} = header} <- header(header),
+         {:ok, {width, height, _, _} = header} <- header(header, most),
          {:ok, bytes} <- inflate(for({"IDAT", data} <- chunks, do: data), size(header)) do
       palette = palette(chunks)
       rows = bytes |> rows(header) |> Enum.map(&walls(&1, header, palette))
@@ -41,18 +42,18 @@ defmodule Sim.Map.Png do
   # Channels of each colour type.
   @channels %{0 => 1, 2 => 3, 3 => 1, 4 => 2, 6 => 4}
 
-  defp header(<<width::32, height::32, depth, type, 0, 0, interlace>>)
+  defp header(<<width::32, height::32, depth, type, 0, 0, interlace>>, most)
        when is_map_key(@channels, type) and width > 0 and height > 0 do
     cond do
       interlace != 0 -> {:error, "interlaced PNGs are not read, save it without interlacing"}
       depth == 16 -> {:error, "16 bits a channel are not read, save it with 8"}
       depth not in [1, 2, 4, 8] or (depth < 8 and type not in [0, 3]) -> @damaged
-      width * height > Image.most_cells() -> {:error, "#{width} x #{height} pixels are too many"}
+      width * height > most -> {:error, "#{width} x #{height} pixels are too many"}
       true -> {:ok, {width, height, depth, type}}
     end
   end
 
-  defp header(_other), do: @damaged
+  defp header(_other, _most), do: @damaged
 
   defp stride({width, _height, depth, type}), do: div(width * depth * @channels[type] + 7, 8)
   defp size({_, height, _, _} = header), do: height * (stride(header) + 1)

@@ -6,6 +6,7 @@ defmodule Sim.Map.Starts do
   in another room of a strange map. The middle of the room is tried first, then all of it.
   """
   alias Hal.Pose
+  alias Sim.Map.Clearance
   alias Sim.Noise
 
   @between 1.0
@@ -61,7 +62,7 @@ defmodule Sim.Map.Starts do
 
     if Enum.all?(poses, &(Pose.distance(&1, place) >= @between)) and
          (landmark == nil or Pose.distance(landmark, place) >= @from_landmark) and
-         Sim.Map.free?(map, place, @from_wall) and
+         Clearance.of(map, place, @from_wall) >= @from_wall and
          reachable?(map, place, Enum.map(poses, &Pose.point/1) ++ List.wrap(landmark)) do
       {x, y} = place
       Pose.new(x, y, (draw.(2) - 0.5) * 2 * :math.pi())
@@ -76,10 +77,11 @@ defmodule Sim.Map.Starts do
 
     Enum.all?(1..steps//1, fn k ->
       share = k / steps
-      Sim.Map.free?(map, {ax + share * (bx - ax), ay + share * (by - ay)}, wide(map, b))
+      wide = wide(map, b)
+      Clearance.of(map, {ax + share * (bx - ax), ay + share * (by - ay)}, wide) >= wide
     end)
   end
 
   # A landmark may stand closer to a wall than a robot.
-  defp wide(map, b), do: min(@way, Sim.Map.clearance(map, b, @way))
+  defp wide(map, b), do: min(@way, Clearance.of(map, b, @way))
 end
