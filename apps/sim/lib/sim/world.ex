@@ -12,12 +12,10 @@ defmodule Sim.World do
   edge, `nil` with fewer than two.
   """
   alias Hal.{Pose, Twist}
-  alias Sim.{Blobs, Body, Contact, Kernel, Map, Sight}
+  alias Sim.{Blobs, Body, Kernel, Map, Sight}
+  alias Sim.World.{Bodies, Motion, Touch}
 
-  @landmark_radius 0.15
   @landmark_height 1.0
-  @glide 0.3
-  @polite 0.5
 
   @enforce_keys [:map, :seed, :noise, :at_ms, :order, :robots]
   defstruct @enforce_keys ++
@@ -43,7 +41,7 @@ defmodule Sim.World do
           goal: Pose.point() | nil,
           collisions: non_neg_integer(),
           min_separation: float() | nil,
-          together: MapSet.t(Contact.pair())
+          together: MapSet.t(Sim.Contact.pair())
         }
 
   @doc """
@@ -147,11 +145,11 @@ defmodule Sim.World do
   @spec step(t(), 1..100) :: t()
   def step(%__MODULE__{} = world, dt_ms \\ 50) when dt_ms in 1..100 do
     world
-    |> glide(dt_ms)
-    |> move(dt_ms)
+    |> Motion.glide(dt_ms)
+    |> Motion.move(dt_ms)
     |> Elixir.Map.update!(:at_ms, &(&1 + dt_ms))
     |> Elixir.Map.update!(:step, &(&1 + 1))
-    |> touch()
+    |> Touch.touch()
     |> sense()
   end
 
@@ -213,131 +211,16 @@ defmodule Sim.World do
 
     case world.landmark do
       nil -> robots
-      {x, y} -> [{x, y, @landmark_radius, @landmark_height, :landmark} | robots]
+      {x, y} -> [{x, y, Bodies.landmark_radius(), @landmark_height, :landmark} | robots]
     end
   end
 
   defp update(world, id, change),
     do: %{world | robots: Elixir.Map.update!(world.robots, id, change)}
 
-  defp bodies(world), do: Enum.map(world.order, &Elixir.Map.fetch!(world.robots, &1))
-
-  defp disc(%Body{pose: pose, profile: profile}), do: {pose.x, pose.y, profile.radius}
-
-  defp pole(%__MODULE__{landmark: nil}), do: []
-  defp pole(%__MODULE__{landmark: {x, y}}), do: [{x, y, @landmark_radius}]
-
-  defp glide(%__MODULE__{goal: nil} = world, _dt_ms), do: world
-
-  defp glide(%__MODULE__{landmark: {x, y} = here, goal: {gx, gy} = goal} = world, dt_ms) do
-    way = @glide * dt_ms / 1000
-    left = Pose.distance(here, goal)
-    next = if left <= way, do: goal, else: {x + (gx - x) * way / left, y + (gy - y) * way / left}
-    discs = Enum.map(bodies(world), &disc/1)
-
-    blocked? =
-      Enum.any?(discs, fn robot ->
-        gap = Contact.gap(landmark(next), robot)
-        gap < @polite and gap < Contact.gap(landmark(here), robot)
-      end) or not Map.free?(world.map, next, @landmark_radius)
-
-    cond do
-      blocked? -> world
-      next == goal -> %{world | landmark: goal, goal: nil}
-      true -> %{world | landmark: next}
-    end
-  end
-
-  defp landmark({x, y}), do: {x, y, @landmark_radius}
-
-  # One after the other: each goes as far as those before it, already moved, and those after it, not yet, let it.
-  defp move(world, dt_ms) do
-    bodies = bodies(world)
-    discs = Elixir.Map.new(bodies, &{&1.index, disc(&1)})
-    neighbours = neighbours(bodies, discs, dt_ms)
-
-    {bodies, _discs} =
-      Enum.map_reduce(bodies, discs, fn body, discs ->
-        body = body |> Body.accelerate(dt_ms) |> Body.slew(dt_ms)
-        {body, way, along, turn} = Body.intend(body, dt_ms, world.seed, world.noise)
-        others = pole(world) ++ for j <- Elixir.Map.get(neighbours, body.index, []), do: discs[j]
-        {place, share} = Contact.move(world.map, discs[body.index], way, others)
-
-        body =
-          Body.arrive(
-            body,
-            place,
-            share,
-            {along, turn},
-            dt_ms,
-            {world.seed, world.step},
-            world.noise
-          )
-
-        {body, Elixir.Map.put(discs, body.index, disc(body))}
-      end)
-
-    %{world | robots: Elixir.Map.new(bodies, &{&1.id, &1})}
-  end
-
-  # Whom each can meet in this step, should both drive as fast as they can.
-  defp neighbours(bodies, discs, dt_ms) do
-    fastest = bodies |> Enum.map(& &1.profile.max_linear) |> Enum.max(fn -> 0.0 end)
-
-    for {i, j, _gap} <-
-          Contact.close(Elixir.Map.to_list(discs), 0.01 + 2 * fastest * dt_ms / 1000),
-        {a, b} <- [{i, j}, {j, i}],
-        reduce: %{} do
-      near -> Elixir.Map.update(near, a, [b], &[b | &1])
-    end
-  end
-
-  # Contacts, the count of new ones, bumpers.
-  defp touch(world) do
-    bodies = bodies(world)
-    count = length(bodies)
-    discs = Enum.map(bodies, &{&1.index, disc(&1)}) ++ Enum.map(pole(world), &{count, &1})
-    {touching, together, least} = Contact.pairs(discs, count, world.min_separation)
-
-    walls = for {index, disc} <- discs, index < count, do: {index, Contact.walls(world.map, disc)}
-    at_wall = for {index, {[_ | _], _}} <- walls, do: {index, :wall}
-    near_wall = for {index, {_, true}} <- walls, do: {index, :wall}
-
-    # The landmark is the last disc: touching it presses bumpers but is no collision.
-    now = MapSet.new(at_wall ++ for({_, j} = pair <- touching, j < count, do: pair))
-    near = MapSet.new(near_wall ++ together)
-    new = now |> MapSet.difference(world.together) |> MapSet.size()
-    places = Elixir.Map.new(discs)
-
-    bodies =
-      for {body, {_, {points, _}}} <- Enum.zip(bodies, walls) do
-        others =
-          for {i, j} <- touching,
-              i == body.index or j == body.index,
-              do: if(i == body.index, do: j, else: i)
-
-        points =
-          points ++
-            Enum.map(others, fn j ->
-              {x, y, _} = places[j]
-              {x, y}
-            end)
-
-        Body.press(body, points, world.at_ms)
-      end
-
-    %{
-      world
-      | robots: Elixir.Map.new(bodies, &{&1.id, &1}),
-        collisions: world.collisions + new,
-        together: world.together |> MapSet.union(now) |> MapSet.intersection(near),
-        min_separation: least
-    }
-  end
-
   defp sense(world) do
-    bodies = bodies(world)
-    discs = Enum.map(bodies, &disc/1) ++ pole(world)
+    bodies = Bodies.all(world)
+    discs = Enum.map(bodies, &Bodies.disc/1) ++ Bodies.pole(world)
     living = Enum.filter(bodies, & &1.alive)
 
     rings =

@@ -1,0 +1,27 @@
+defmodule Sim.World.Bodies do
+  @moduledoc "The solid things of a world as discs. Pure."
+  alias Sim.{Body, Contact}
+
+  @landmark_radius 0.15
+
+  @doc "The landmark's radius in metres."
+  @spec landmark_radius() :: float()
+  def landmark_radius, do: @landmark_radius
+
+  @doc "All robots' bodies, in the order of the fleet."
+  @spec all(Sim.World.t()) :: [Body.t()]
+  def all(world), do: Enum.map(world.order, &Map.fetch!(world.robots, &1))
+
+  @doc "The world with these bodies in place of its robots."
+  @spec put(Sim.World.t(), [Body.t()]) :: Sim.World.t()
+  def put(world, bodies), do: %{world | robots: Map.new(bodies, &{&1.id, &1})}
+
+  @doc "A robot as a disc."
+  @spec disc(Body.t()) :: Contact.disc()
+  def disc(%Body{pose: pose, profile: profile}), do: {pose.x, pose.y, profile.radius}
+
+  @doc "The landmark as a disc, if there is one."
+  @spec pole(Sim.World.t()) :: [Contact.disc()]
+  def pole(%{landmark: nil}), do: []
+  def pole(%{landmark: {x, y}}), do: [{x, y, @landmark_radius}]
+end

@@ -1,0 +1,82 @@
+defmodule Sim.World.Motion do
+  @moduledoc "One step of everything that moves: robots and the landmark. Pure."
+  alias Hal.Pose
+  alias Sim.{Body, Contact}
+  alias Sim.World.Bodies
+
+  @glide 0.3
+  @polite 0.5
+
+  @doc """
+  The landmark on its way for `dt_ms`, at 0.3 m/s; it waits 0.5 m before a robot, and stops before a wall.
+  """
+  @spec glide(Sim.World.t(), pos_integer()) :: Sim.World.t()
+  def glide(%{goal: nil} = world, _dt_ms), do: world
+
+  def glide(%{landmark: {x, y} = here, goal: {gx, gy} = goal} = world, dt_ms) do
+    way = @glide * dt_ms / 1000
+    left = Pose.distance(here, goal)
+    next = if left <= way, do: goal, else: {x + (gx - x) * way / left, y + (gy - y) * way / left}
+    discs = Enum.map(Bodies.all(world), &Bodies.disc/1)
+
+    blocked? =
+      Enum.any?(discs, fn robot ->
+        gap = Contact.gap(landmark(next), robot)
+        gap < @polite and gap < Contact.gap(landmark(here), robot)
+      end) or not Sim.Map.free?(world.map, next, Bodies.landmark_radius())
+
+    cond do
+      blocked? -> world
+      next == goal -> %{world | landmark: goal, goal: nil}
+      true -> %{world | landmark: next}
+    end
+  end
+
+  defp landmark({x, y}), do: {x, y, Bodies.landmark_radius()}
+
+  @doc """
+  All robots on their way for `dt_ms`, one after the other: each goes as far as those before it,
+  already moved, and those after it, not yet, let it.
+  """
+  @spec move(Sim.World.t(), pos_integer()) :: Sim.World.t()
+  def move(world, dt_ms) do
+    bodies = Bodies.all(world)
+    discs = Map.new(bodies, &{&1.index, Bodies.disc(&1)})
+    neighbours = neighbours(bodies, discs, dt_ms)
+
+    {bodies, _discs} =
+      Enum.map_reduce(bodies, discs, fn body, discs ->
+        body = body |> Body.accelerate(dt_ms) |> Body.slew(dt_ms)
+        {body, way, along, turn} = Body.intend(body, dt_ms, world.seed, world.noise)
+        others = Bodies.pole(world) ++ for j <- Map.get(neighbours, body.index, []), do: discs[j]
+        {place, share} = Contact.move(world.map, discs[body.index], way, others)
+
+        body =
+          Body.arrive(
+            body,
+            place,
+            share,
+            {along, turn},
+            dt_ms,
+            {world.seed, world.step},
+            world.noise
+          )
+
+        {body, Map.put(discs, body.index, Bodies.disc(body))}
+      end)
+
+    Bodies.put(world, bodies)
+  end
+
+  # Whom each can meet in this step, should both drive as fast as they can.
+  defp neighbours(bodies, discs, dt_ms) do
+    fastest = bodies |> Enum.map(& &1.profile.max_linear) |> Enum.max(fn -> 0.0 end)
+
+    for {i, j, _gap} <-
+          Contact.close(Map.to_list(discs), 0.01 + 2 * fastest * dt_ms / 1000),
+        {a, b} <- [{i, j}, {j, i}],
+        reduce: %{} do
+      near -> Map.update(near, a, [b], &[b | &1])
+    end
+  end
+end

@@ -1,0 +1,46 @@
+defmodule Sim.World.Touch do
+  @moduledoc "Who touches whom after a step, and what comes of it. Pure."
+  alias Sim.{Body, Contact}
+  alias Sim.World.Bodies
+
+  @doc "The world with its contacts, the count of new ones, the least gap, and the bumpers pressed."
+  @spec touch(Sim.World.t()) :: Sim.World.t()
+  def touch(world) do
+    bodies = Bodies.all(world)
+    count = length(bodies)
+
+    discs =
+      Enum.map(bodies, &{&1.index, Bodies.disc(&1)}) ++ Enum.map(Bodies.pole(world), &{count, &1})
+
+    {touching, together, least} = Contact.pairs(discs, count, world.min_separation)
+
+    walls = for {index, disc} <- discs, index < count, do: {index, Contact.walls(world.map, disc)}
+    at_wall = for {index, {[_ | _], _}} <- walls, do: {index, :wall}
+    near_wall = for {index, {_, true}} <- walls, do: {index, :wall}
+
+    # The landmark is the last disc: touching it presses bumpers but is no collision.
+    now = MapSet.new(at_wall ++ for({_, j} = pair <- touching, j < count, do: pair))
+    near = MapSet.new(near_wall ++ together)
+    new = now |> MapSet.difference(world.together) |> MapSet.size()
+    places = Map.new(discs)
+
+    bodies =
+      for {body, {_, {points, _}}} <- Enum.zip(bodies, walls),
+          do: Body.press(body, points ++ touched(body.index, touching, places), world.at_ms)
+
+    %{
+      Bodies.put(world, bodies)
+      | collisions: world.collisions + new,
+        together: world.together |> MapSet.union(now) |> MapSet.intersection(near),
+        min_separation: least
+    }
+  end
+
+  # Where the others are that a body touches: discs touch on the line between their centres.
+  defp touched(index, touching, places) do
+    for {i, j} <- touching, index in [i, j] do
+      {x, y, _radius} = places[if(i == index, do: j, else: i)]
+      {x, y}
+    end
+  end
+end
