@@ -159,6 +159,16 @@ static void blur(uint8_t *restrict plane, int64_t width, int64_t height, const s
     }
 }
 
+/* One pixel in a thousand is white or black. */
+static void salt(uint8_t *plane, int64_t size, const sim_noise *noise)
+{
+    for (int64_t n = 0; n < size / 1000; n++) {
+        uint32_t hash =
+            sim_hash(noise->seed, noise->step, noise->robot, 0x70000u + (uint32_t)n);
+        plane[hash % (uint32_t)size] = hash >> 31 ? 235 : 16;
+    }
+}
+
 static void room(const sim_sight *sight, const sim_scratch *scratch, uint8_t *restrict picture)
 {
     const int16_t *restrict tops = scratch->tops, *restrict bottoms = scratch->bottoms;
@@ -233,6 +243,7 @@ void sim_paint(const sim_map *map, const sim_sight *sight, const sim_pole *poles
         const int8_t *chroma = tables + SIM_TABLE + SIM_WIDEST;
         uint8_t *u = picture + width * height, *v = u + width * height / 4;
         blur(picture, width, height, noise, 0x40000u, tables);
+        salt(picture, width * height, noise);
         blur(u, width / 2, height / 2, noise, 0x50000u, chroma);
         blur(v, width / 2, height / 2, noise, 0x60000u, chroma);
     }

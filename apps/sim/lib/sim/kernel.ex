@@ -68,7 +68,10 @@ defmodule Sim.Kernel do
       do: {column, Palette.kind(kind), top, bottom, luma}
   end
 
-  @doc "The bytes of an I420 picture."
+  @doc """
+  The bytes of an I420 picture. Noise is N(0, 3) for luma, N(0, 2) for chroma, and salt: one luma in
+  a thousand is white or black.
+  """
   @spec paint(Sim.Map.t(), Sight.t(), [Sight.pole()], noise()) :: binary()
   def paint(map, %Sight{} = sight, poles, noise),
     do: module().paint(pack(map), pack(sight), pack(poles), narrow(noise), tables())

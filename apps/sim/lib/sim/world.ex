@@ -75,6 +75,8 @@ defmodule Sim.World do
     unless ids == Enum.uniq(ids),
       do: raise(ArgumentError, "world option :robots names a robot twice")
 
+    Enum.each(options[:robots], &free!(map, &1.id, &1.pose, &1.profile.radius))
+
     bodies =
       for {robot, index} <- Enum.with_index(options[:robots]),
           do: Body.new(robot, index, options[:seed], noise)
@@ -120,10 +122,13 @@ defmodule Sim.World do
   def displace(%__MODULE__{} = world, id, %Pose{} = pose) do
     body = Elixir.Map.fetch!(world.robots, id)
 
-    unless Map.free?(world.map, Pose.point(pose), body.profile.radius),
-      do: raise(ArgumentError, "#{id} cannot stand at #{pose.x},#{pose.y}: there is a wall")
-
+    free!(world.map, id, pose, body.profile.radius)
     world |> update(id, &%{&1 | pose: pose, speed: {0.0, 0.0}, ramp: {0.0, 0.0}}) |> sense()
+  end
+
+  defp free!(map, id, pose, radius) do
+    unless Map.free?(map, Pose.point(pose), radius),
+      do: raise(ArgumentError, "#{id} cannot stand at #{pose.x},#{pose.y}: there is a wall")
   end
 
   @doc """

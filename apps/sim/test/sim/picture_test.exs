@@ -76,11 +76,18 @@ defmodule Sim.PictureTest do
       pairs =
         Enum.zip(:binary.bin_to_list(noisy, from, count), :binary.bin_to_list(clean, from, count))
 
-      :math.sqrt(Enum.sum(for {a, b} <- pairs, do: (a - b) * (a - b)) / count)
+      :math.sqrt(Enum.sum(for {a, b} <- pairs, abs(a - b) < 15, do: (a - b) * (a - b)) / count)
     end
 
     assert_in_delta spread.(0, 76_800), 3.0, 0.2
     assert_in_delta spread.(76_800, 38_400), 2.0, 0.2
+
+    salt =
+      for {a, b} <- Enum.zip(:binary.bin_to_list(noisy), :binary.bin_to_list(clean)),
+          abs(a - b) >= 15,
+          do: a
+
+    assert length(salt) in 60..77 and Enum.uniq(Enum.sort(salt)) == [16, 235]
   end
 
   test "blobs by geometry are those of the blob finder" do

@@ -222,7 +222,7 @@ defmodule Sim.WorldTest do
 
     world = World.new!(map: map, robots: robots, seed: 2)
     draw = fn -> Twist.new(:rand.uniform() * 3.0 - 1.0, :rand.uniform() * 1.6 - 0.8) end
-    world = wander(outside!(world), 1_500, draw)
+    world = wander(outside!(world), 1_000, draw)
     assert world.collisions > 5
   end
 

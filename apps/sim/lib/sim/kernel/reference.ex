@@ -87,7 +87,8 @@ defmodule Sim.Kernel.Reference do
     <<luma::binary-size(size), chroma::binary>> = tables
 
     [
-      for(v <- 0..(height - 1), do: row(columns, v, height, noise, 0x40000 + v, luma)),
+      for(v <- 0..(height - 1), do: row(columns, v, height, noise, 0x40000 + v, luma))
+      |> salt(width * height, noise),
       for(v <- 0..(div(height, 2) - 1), do: tint(half, v, 1, noise, 0x50000 + v, chroma)),
       for(v <- 0..(div(height, 2) - 1), do: tint(half, v, 2, noise, 0x60000 + v, chroma))
     ]
@@ -109,6 +110,19 @@ defmodule Sim.Kernel.Reference do
         end
 
       <<base + draws.(u)>>
+    end
+  end
+
+  # One pixel in a thousand is white or black; the last word on a pixel counts.
+  defp salt(rows, _size, nil), do: rows
+
+  defp salt(rows, size, {seed, step, robot}) do
+    for n <- 0..(div(size, 1000) - 1)//1, reduce: IO.iodata_to_binary(rows) do
+      plane ->
+        hash = Noise.hash(seed, step, robot, 0x70000 + n)
+        at = rem(hash, size)
+        <<before::binary-size(at), _, rest::binary>> = plane
+        <<before::binary, if(hash >= 0x80000000, do: 235, else: 16), rest::binary>>
     end
   end
 
