@@ -14,47 +14,14 @@ defmodule Swarm.Missions.Landmark do
 
   Time is `percept.at_ms`, compared with whole numbers; there are no timers.
   """
-  alias Hal.Twist
   alias Robot.Behaviour
   alias Swarm.{Anchor, Formation, Message, Round, Trail}
-  alias Swarm.Missions.Landmark.{Attend, Council, Lead, Phases, Sight}
+  alias Swarm.Missions.Landmark.{Attend, Council, Lead, Phases, Sight, State}
 
   @behaviour Robot.Mission
 
-  @colour "YellowLandmark"
-  @sight_ms 700
   @roam_ms 6_000
   @tries 3
-
-  @enforce_keys [:me, :formation, :assign, :leader_change?]
-  defstruct @enforce_keys ++
-              [
-                colour: @colour,
-                percept: nil,
-                now_ms: 0,
-                phase: :idle,
-                since_ms: 0,
-                started?: false,
-                scan: nil,
-                sight: nil,
-                tries: 0,
-                round: nil,
-                verdict: nil,
-                rescan?: false,
-                order: [],
-                epoch: 0,
-                leader: nil,
-                founded: nil,
-                size_ppm: nil,
-                anchor: nil,
-                anchor_ms: nil,
-                trail: [],
-                lead: nil,
-                attend: nil,
-                challenge: nil
-              ]
-
-  @type t :: %__MODULE__{}
 
   @doc """
   A robot's mission. Options: `formation:` (`{kind, spacing}`), `assign:` (`:chain` or `:cost`),
@@ -62,12 +29,12 @@ defmodule Swarm.Missions.Landmark do
   """
   @impl Robot.Mission
   def init(robot, options \\ []) do
-    mission = %__MODULE__{
+    mission = %State{
       me: robot,
       formation: Keyword.get(options, :formation, {:column, 1.0}),
       assign: Keyword.get(options, :assign, :chain),
       leader_change?: Keyword.get(options, :leader_change, true),
-      colour: Keyword.get(options, :colour, @colour),
+      colour: Keyword.get(options, :colour, State.colour()),
       round: Round.new(robot),
       lead: Lead.new(),
       attend: Attend.new()
@@ -117,10 +84,6 @@ defmodule Swarm.Missions.Landmark do
     {mission.phase, mission, letters ++ stages ++ effects ++ [{:claim, claim(mission)}]}
   end
 
-  @doc "Whether the landmark is in this robot's picture."
-  @spec sees?(t()) :: boolean()
-  def sees?(mission), do: Sight.fresh?(mission.sight, mission.now_ms, @sight_ms)
-
   defp still(mission), do: {mission.phase, mission, []}
 
   # The leader's heartbeats carry the anchor too.
@@ -164,7 +127,7 @@ defmodule Swarm.Missions.Landmark do
   defp holds?(:nobody_again, m), do: m.verdict == :nobody and m.tries + 1 >= @tries
   defp holds?(:scanned, m), do: m.scan != nil
   defp holds?(:scan_wanted, m), do: m.scan == nil and Council.search?(m)
-  defp holds?(:sighted, m), do: sees?(m) or Council.search?(m)
+  defp holds?(:sighted, m), do: State.sees?(m) or Council.search?(m)
   defp holds?(:roamed, m), do: m.now_ms - m.since_ms >= @roam_ms
   defp holds?(:deposed, m), do: Lead.deposed?(m)
   defp holds?(:round_open, m), do: Round.open?(m.round)
@@ -254,7 +217,7 @@ defmodule Swarm.Missions.Landmark do
       epoch: mission.epoch,
       leader: mission.leader,
       sight:
-        if(sees?(mission),
+        if(State.sees?(mission),
           do: %{
             size_ppm: mission.sight.size_ppm,
             distance: mission.sight.distance && round(mission.sight.distance * 1000)
@@ -268,12 +231,7 @@ defmodule Swarm.Missions.Landmark do
     }
   end
 
-  defp standing?(%{phase: :lead, percept: percept}), do: slow?(percept, 0.05)
+  defp standing?(%{phase: :lead, percept: percept}), do: State.slow?(percept, 0.05)
   defp standing?(%{phase: :follow} = mission), do: mission.attend.holding?
   defp standing?(%{phase: phase}), do: phase in [:idle, :search, :agree, :rest]
-
-  @doc "Whether a robot moves slower than `limit` m/s, as far as its wheels say."
-  @spec slow?(Robot.Percept.t(), float()) :: boolean()
-  def slow?(%{odometry: %{twist: %Twist{linear: linear}}}, limit), do: abs(linear) < limit
-  def slow?(_percept, _limit), do: true
 end

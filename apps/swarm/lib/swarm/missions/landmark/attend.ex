@@ -9,8 +9,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   alias Robot.Behaviour
   alias Robot.Behaviour.Avoid.Neighbours
   alias Swarm.{Chain, Message}
-  alias Swarm.Missions.Landmark
-  alias Swarm.Missions.Landmark.Places
+  alias Swarm.Missions.Landmark.{Places, State}
 
   @lease_ms 1_000
   @in_place 0.25
@@ -50,11 +49,11 @@ defmodule Swarm.Missions.Landmark.Attend do
   def new, do: %__MODULE__{}
 
   @doc "Begins to follow."
-  @spec begin(Landmark.t()) :: Landmark.t()
+  @spec begin(State.t()) :: State.t()
   def begin(mission), do: %{mission | attend: new(), scan: nil}
 
   @doc "One tick of following."
-  @spec act(Landmark.t()) :: {Landmark.t(), [tuple()]}
+  @spec act(State.t()) :: {State.t(), [tuple()]}
   def act(mission) do
     age_ms = mission.now_ms - (mission.anchor_ms || mission.now_ms)
     place = mission.anchor && Places.slot(mission.anchor, mission.me, age_ms)
@@ -69,7 +68,7 @@ defmodule Swarm.Missions.Landmark.Attend do
 
   defp attend(mission, {slot, velocity}, age_ms) do
     error = Pose.distance(mission.percept.pose, slot)
-    slow? = Landmark.slow?(mission.percept, @slow)
+    slow? = State.slow?(mission.percept, @slow)
     {vx, vy} = velocity
     resting? = slow? and vx * vx + vy * vy < @slow * @slow
 

@@ -6,8 +6,8 @@ defmodule Swarm.Missions.Landmark.Challenge do
   as long as the landmark has not moved, a robot that passes it on the way to its slot is no
   challenger. Pure.
   """
-  alias Swarm.Missions.Landmark
   alias Swarm.Peers
+  alias Swarm.Missions.Landmark.State
 
   @dwell_ms 2_000
   @blind_ms 3_000
@@ -17,7 +17,7 @@ defmodule Swarm.Missions.Landmark.Challenge do
   @moved 1.0
 
   @doc "`challenge` becomes `:open` when it is time to open a round."
-  @spec update(Landmark.t()) :: Landmark.t()
+  @spec update(State.t()) :: State.t()
   def update(%{phase: :follow, leader_change?: true} = mission) do
     case reason(mission) do
       nil ->
@@ -39,7 +39,7 @@ defmodule Swarm.Missions.Landmark.Challenge do
   defp reason(mission) do
     peers = Peers.taking_part(mission.percept.peers, mission.now_ms)
 
-    with true <- Landmark.sees?(mission),
+    with true <- State.sees?(mission),
          %{distance: mine} when mine != nil <- mission.sight,
          %{phase: :lead} = leader <- peers[mission.leader],
          mine = round(mine * 1000),

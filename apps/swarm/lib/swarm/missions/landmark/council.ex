@@ -8,8 +8,7 @@ defmodule Swarm.Missions.Landmark.Council do
   come clearly nearer to the landmark (R76). While a round is open all stand still.
   """
   alias Swarm.{Assignment, Chain, Election, Formation, Message, Peers, Round}
-  alias Swarm.Missions.Landmark
-  alias Swarm.Missions.Landmark.{Challenge, Sight}
+  alias Swarm.Missions.Landmark.{Challenge, Sight, State}
 
   # Heartbeats come at 5 Hz: after this time the view has settled.
   @settle_ms 600
@@ -20,20 +19,20 @@ defmodule Swarm.Missions.Landmark.Council do
   @lost_ms 2_000
 
   @doc "Hears a letter. A robot that is not started takes no part."
-  @spec hear(Landmark.t(), atom(), Round.Letter.t()) :: Landmark.t()
+  @spec hear(State.t(), atom(), Round.Letter.t()) :: State.t()
   def hear(%{started?: false} = mission, _from, _letter), do: mission
 
   def hear(mission, from, letter),
     do: %{mission | round: Round.hear(mission.round, from, letter, mission.now_ms)}
 
   @doc "Whether a round waits for this robot's scan."
-  @spec search?(Landmark.t()) :: boolean()
+  @spec search?(State.t()) :: boolean()
   def search?(%{round: round, rescan?: rescan?}),
     do:
       rescan? or (round.phase == :collect and round.purpose == :search and round.report == :busy)
 
   @doc "One tick: the letters to send, as effects, and the verdict of a round that has committed."
-  @spec tick(Landmark.t()) :: {Landmark.t(), [tuple()]}
+  @spec tick(State.t()) :: {State.t(), [tuple()]}
   def tick(%{phase: :idle} = mission), do: {mission, []}
 
   def tick(mission) do
@@ -49,7 +48,7 @@ defmodule Swarm.Missions.Landmark.Council do
   end
 
   @doc "All that take part in the mission and are not gone, this robot too, sorted."
-  @spec view(Landmark.t()) :: [atom()]
+  @spec view(State.t()) :: [atom()]
   def view(mission) do
     others =
       for {id, beat} <- Peers.taking_part(mission.percept.peers, mission.now_ms),
@@ -60,7 +59,7 @@ defmodule Swarm.Missions.Landmark.Council do
   end
 
   @doc "Whether another robot leads, as far as this one hears."
-  @spec led?(Landmark.t()) :: boolean()
+  @spec led?(State.t()) :: boolean()
   def led?(mission) do
     mission.percept.peers
     |> Peers.taking_part(mission.now_ms)
@@ -143,7 +142,7 @@ defmodule Swarm.Missions.Landmark.Council do
     case round.purpose do
       :change -> put_report(mission, Sight.fresh?(mission.sight, mission.now_ms, @fresh_ms))
       :search when mission.scan == nil -> mission
-      :search -> put_report(mission, mission.scan == :found or Landmark.sees?(mission))
+      :search -> put_report(mission, mission.scan == :found or State.sees?(mission))
     end
   end
 
@@ -154,7 +153,7 @@ defmodule Swarm.Missions.Landmark.Council do
   defp put_report(mission, found?) do
     found? = found? and mission.sight != nil
     size = if found?, do: mission.sight.size_ppm, else: 0
-    report = %{found: found?, size_ppm: size, pose: millimetres(mission.percept.pose)}
+    report = %{found: found?, size_ppm: size, pose: State.millimetres(mission.percept.pose)}
     %{mission | round: Round.report(mission.round, report)}
   end
 
@@ -209,13 +208,8 @@ defmodule Swarm.Missions.Landmark.Council do
   @spec slots(Formation.t(), Hal.Pose.t(), pos_integer(), float()) :: [{integer(), integer()}]
   def slots(formation, pose, robots, landmark_distance \\ 1.6) do
     for slot <- Formation.slots(formation, robots, landmark_distance) do
-      {x, y, _heading} = pose |> Hal.Pose.compose(slot) |> millimetres()
+      {x, y, _heading} = pose |> Hal.Pose.compose(slot) |> State.millimetres()
       {x, y}
     end
   end
-
-  @doc "A pose in whole millimetres and milliradians, as robots tell it."
-  @spec millimetres(Hal.Pose.t()) :: {integer(), integer(), integer()}
-  def millimetres(pose),
-    do: {round(pose.x * 1000), round(pose.y * 1000), round(pose.heading * 1000)}
 end

@@ -6,8 +6,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   """
   alias Robot.Behaviour
   alias Swarm.{Anchor, Assignment, Chain, Formation, Message, Peers}
-  alias Swarm.Missions.Landmark
-  alias Swarm.Missions.Landmark.{Council, Shape, Sight}
+  alias Swarm.Missions.Landmark.{Council, Shape, Sight, State}
 
   # The landmark's foot leaves the picture below 1.4 m, and its size with it.
   @near 1.5
@@ -35,7 +34,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   def new, do: %__MODULE__{}
 
   @doc "Takes the lead with the order that the round's record gave."
-  @spec begin(Landmark.t()) :: Landmark.t()
+  @spec begin(State.t()) :: State.t()
   def begin(mission) do
     %{
       mission
@@ -46,7 +45,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   end
 
   @doc "Takes up a new shape, which everyone learns from the anchor; `:cost` deals the slots anew."
-  @spec reshape(Landmark.t()) :: Landmark.t()
+  @spec reshape(State.t()) :: State.t()
   def reshape(mission) do
     lead = %{mission.lead | formed?: false, good_ms: nil, bad_ms: nil, shape: Shape.new()}
     %{mission | lead: lead}
@@ -56,7 +55,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   Whether a leader is one no more: others follow a higher epoch, or nobody has heard it for 1.5 s
   though it is not alone.
   """
-  @spec deposed?(Landmark.t()) :: boolean()
+  @spec deposed?(State.t()) :: boolean()
   def deposed?(mission) do
     peers = Peers.taking_part(mission.percept.peers, mission.now_ms)
     higher? = Enum.any?(peers, fn {_id, beat} -> beat.epoch > mission.epoch end)
@@ -66,7 +65,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   end
 
   @doc "One tick of leading."
-  @spec act(Landmark.t()) :: {Landmark.t(), [tuple()]}
+  @spec act(State.t()) :: {State.t(), [tuple()]}
   def act(mission) do
     mission = mission |> hear() |> muster() |> shape() |> tell()
     {mission, formed} = judge(mission)
@@ -116,7 +115,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   defp deal(mission) do
     beats = Peers.taking_part(mission.percept.peers, mission.now_ms)
     followers = for id <- mission.order, {x, y, _heading} = beats[id].pose, do: {id, {x, y}}
-    {x, y, _heading} = Council.millimetres(mission.percept.pose)
+    {x, y, _heading} = State.millimetres(mission.percept.pose)
     {size, places} = mission.lead.shape.room
 
     slots =
@@ -139,7 +138,7 @@ defmodule Swarm.Missions.Landmark.Lead do
       leader: mission.me,
       epoch: mission.epoch,
       sequence: sequence,
-      pose: Council.millimetres(percept.pose),
+      pose: State.millimetres(percept.pose),
       twist: twist(percept),
       formation: lead.shape.formation,
       asked: mission.formation,
@@ -148,7 +147,7 @@ defmodule Swarm.Missions.Landmark.Lead do
       places: elem(lead.shape.room, 1),
       trail: Shape.trail(lead.shape, mission),
       landmark: place && point(place),
-      still: Landmark.sees?(mission) and not mission.sight.moving?
+      still: State.sees?(mission) and not mission.sight.moving?
     }
 
     %{mission | anchor: anchor, lead: %{lead | sequence: sequence}}
@@ -166,7 +165,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   # All followers in place, and the leader still in front of the landmark, for a second.
   defp judge(mission) do
     good? =
-      Landmark.sees?(mission) and Landmark.slow?(mission.percept, 0.05) and
+      State.sees?(mission) and State.slow?(mission.percept, 0.05) and
         Enum.all?(mission.order, &in_place?(mission, &1))
 
     now = mission.now_ms

@@ -9,8 +9,7 @@ defmodule Swarm.Missions.Landmark.Shape do
   """
   alias Hal.Pose
   alias Swarm.{Formation, Peers, Room, Trail}
-  alias Swarm.Missions.Landmark
-  alias Swarm.Missions.Landmark.Council
+  alias Swarm.Missions.Landmark.State
 
   @step_ms 3_000
   @step 0.1
@@ -31,7 +30,7 @@ defmodule Swarm.Missions.Landmark.Shape do
   def new, do: %__MODULE__{}
 
   @doc "The shape for this tick. A standing leader looks for room; a moving one keeps its choice."
-  @spec update(t(), Landmark.t(), distance :: float()) :: t()
+  @spec update(t(), State.t(), distance :: float()) :: t()
   def update(shape, mission, distance) do
     shape = shape |> relax(mission) |> squeeze(mission)
     {formation, trail?} = formation(mission.formation, shape.squeeze)
@@ -43,7 +42,7 @@ defmodule Swarm.Missions.Landmark.Shape do
 
     shape = %{shape | formation: formation, trail?: trail?}
 
-    if changed? or Landmark.slow?(mission.percept, 0.02),
+    if changed? or State.slow?(mission.percept, 0.02),
       do: %{shape | room: room(shape, mission, followers, distance, changed?)},
       else: shape
   end
@@ -66,7 +65,7 @@ defmodule Swarm.Missions.Landmark.Shape do
   end
 
   @doc "The poses along the leader's trail, where the shape is that; else `nil`."
-  @spec trail(t(), Landmark.t()) :: [{integer(), integer(), integer()}] | nil
+  @spec trail(t(), State.t()) :: [{integer(), integer(), integer()}] | nil
   def trail(%{trail?: false}, _mission), do: nil
 
   def trail(%{formation: {_kind, spacing}}, mission) do
@@ -89,7 +88,7 @@ defmodule Swarm.Missions.Landmark.Shape do
     end)
     |> elem(0)
     |> Enum.reverse()
-    |> Enum.map(&Council.millimetres/1)
+    |> Enum.map(&State.millimetres/1)
   end
 
   defp relax(%{squeeze: 0} = shape, _mission), do: shape
