@@ -45,7 +45,7 @@ defmodule Console.Report do
       safety(result),
       leadership(result),
       "#{Words.decimals(result.simulated_s, 1)} s simulated in #{Words.decimals(wall_s, 1)} s" <>
-        " (#{Words.decimals(result.simulated_s / max(wall_s, 0.001), 0)} times real time)"
+        " (#{speed(result.simulated_s / max(wall_s, 0.001))} times real time)"
     ]
   end
 
@@ -108,6 +108,8 @@ defmodule Console.Report do
     ", off their places by #{Words.decimals(formation.error_mean_m, 2)} m in the mean" <>
       " and #{Words.decimals(formation.error_max_m, 2)} m at most"
   end
+
+  defp speed(times), do: Words.decimals(times, if(times < 10, do: 1, else: 0))
 
   defp distance(nil), do: ""
   defp distance(metres), do: ", #{Words.decimals(metres, 2)} m from the landmark"

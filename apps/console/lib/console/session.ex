@@ -12,7 +12,8 @@ defmodule Console.Session do
   @status_s 5
 
   @enforce_keys [:module, :live, :robots, :until_s, :mode, :output]
-  defstruct @enforce_keys ++ [view: nil, told: 0, status_s: 0, track: nil, started_ms: 0]
+  defstruct @enforce_keys ++
+              [view: nil, scene: nil, told: 0, status_s: 0, track: nil, started_ms: 0]
 
   @doc "Runs until the time is up or somebody quits; answers with the exit status."
   @spec run(Options.t(), module(), (map() -> {:ok, pid()} | {:error, String.t()})) :: 0 | 1 | 2
@@ -49,6 +50,7 @@ defmodule Console.Session do
       module: module,
       live: live,
       robots: options.robots,
+      scene: scene,
       until_s: until_s,
       mode: mode,
       output: Output.to(if(options.json == "-", do: :stderr, else: :stdio)),
@@ -106,7 +108,7 @@ defmodule Console.Session do
     receive do
       :draw ->
         scene = session.module.scene(live)
-        session = session |> draw(scene) |> tell(scene) |> track(scene)
+        session = %{session | scene: scene} |> draw(scene) |> tell(scene) |> track(scene)
 
         if session.until_s && scene.at_ms >= session.until_s * 1000 do
           session
@@ -147,7 +149,8 @@ defmodule Console.Session do
   end
 
   defp redraw({:quit, session}), do: {:quit, session}
-  defp redraw(session), do: draw(session, session.module.scene(session.live))
+  # With the scene at hand: typing must not wait for the fleet.
+  defp redraw(session), do: draw(session, session.scene)
 
   defp draw(%{mode: :lines} = session, _scene), do: session
 

@@ -2,7 +2,8 @@ defmodule Console.Live.Trial do
   @moduledoc """
   A trial in real time: the lockstep run, one step of 100 ms each 100 ms.
 
-  It never hurries to make up for lost time: on a machine too slow for its fleet the run is slow.
+  It never hurries to make up for lost time: on a machine too slow for its fleet the run is slow,
+  and so an answer may take as long as a step.
   """
   use GenServer
   @behaviour Console.Live
@@ -18,13 +19,13 @@ defmodule Console.Live.Trial do
   end
 
   @impl Console.Live
-  def scene(live), do: GenServer.call(live, :scene)
+  def scene(live), do: GenServer.call(live, :scene, :infinity)
 
   @impl Console.Live
-  def command(live, command), do: GenServer.call(live, {:command, command})
+  def command(live, command), do: GenServer.call(live, {:command, command}, :infinity)
 
   @impl Console.Live
-  def result(live), do: GenServer.call(live, :result)
+  def result(live), do: GenServer.call(live, :result, :infinity)
 
   @impl GenServer
   def init({module, trial}) do
