@@ -6,9 +6,9 @@ defmodule Robot.HallTest do
   for {n, shape, assign, seeds, limit_s} <- [
         {2, :column, :cost, 1..3, 40},
         {3, :wedge, :chain, 1..3, 40},
-        {6, :column, :chain, 1..4, 60},
-        {6, :circle, :chain, 1..3, 60},
-        {6, :line, :cost, 1..3, 40},
+        {6, :column, :chain, 1..2, 60},
+        {6, :circle, :chain, 1..2, 60},
+        {6, :line, :cost, 1..2, 40},
         {12, :wedge, :cost, 1..1, 60},
         {20, :column, :chain, 1..1, 120}
       ] do

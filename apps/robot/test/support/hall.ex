@@ -337,7 +337,9 @@ defmodule Robot.Hall do
             reduce: 5.1,
             do: (m -> min(m, ray(p.x, p.y, p.heading + a, near, hall.half)))
 
-      if range < 5.0, do: max(0.0, range + 0.01 * (2 * :rand.uniform() - 1)), else: 5.1
+      if range < 5.0,
+        do: max(r.profile.sonar_min, range + 0.01 * (2 * :rand.uniform() - 1)),
+        else: 5.1
     end
   end
 

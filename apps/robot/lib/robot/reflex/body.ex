@@ -14,6 +14,8 @@ defmodule Robot.Reflex.Body do
   @reaction_s 0.15
   # Things that would only be grazed keep this much to the side.
   @side 0.03
+  # Metres: where a thing is taken to be that is too near to be measured.
+  @touching 0.05
 
   @doc """
   The places that a sonar ring sees: no echo, and what is no range at all, gives none.
@@ -27,17 +29,19 @@ defmodule Robot.Reflex.Body do
       {1.2, 0.0}
   """
   @spec points(Profile.t(), [number()]) :: [point()]
-  def points(%Profile{sonars: sonars, sonar_max: most}, ranges), do: points(sonars, ranges, most)
+  def points(%Profile{sonars: sonars} = profile, ranges), do: points(sonars, ranges, profile)
 
-  defp points([pose | poses], [range | ranges], most)
-       when is_number(range) and range >= 0 and range < most do
+  defp points([pose | poses], [range | ranges], profile)
+       when is_number(range) and range >= 0 and range < profile.sonar_max do
+    # The least a sonar can say means "somewhere between there and me".
+    range = if range <= profile.sonar_min + 0.005, do: min(range, @touching), else: range
     x = pose.x + range * :math.cos(pose.heading)
     y = pose.y + range * :math.sin(pose.heading)
-    [{x, y} | points(poses, ranges, most)]
+    [{x, y} | points(poses, ranges, profile)]
   end
 
-  defp points([_ | poses], [_ | ranges], most), do: points(poses, ranges, most)
-  defp points(_, _, _most), do: []
+  defp points([_ | poses], [_ | ranges], profile), do: points(poses, ranges, profile)
+  defp points(_, _, _profile), do: []
 
   @doc """
   The greatest speed (m/s) in the direction of `linear` from which the body can stop before

@@ -30,7 +30,7 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   @sonar_range 1.5
   @sonar_radius 0.05
   # How far beside a known body an echo may lie and still be its echo.
-  @explained 0.25
+  @explained 0.15
 
   @doc "The other robots, nearest first, carried on to now; all of them, however far."
   @spec robots(Percept.t()) :: [t()]
