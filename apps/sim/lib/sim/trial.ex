@@ -7,9 +7,9 @@ defmodule Sim.Trial do
   `step/1` is 100 ms. What happens on purpose (landmark moved, robots killed) is `Sim.Trial.Script`;
   what is written down of a run is `Sim.Trial.Ledger`.
   """
-  alias Hal.{Pose, Profile}
+  alias Hal.Pose
   alias Sim.{Radio, Scene, World}
-  alias Sim.Trial.{Ledger, Score, Script}
+  alias Sim.Trial.{Ledger, Score, Script, Setup}
   alias Swarm.Member
 
   @half_ms 50
@@ -20,44 +20,12 @@ defmodule Sim.Trial do
 
   @type t :: %__MODULE__{at_ms: non_neg_integer()}
 
-  @defaults %{
-    robots: [:mag1, :mag2, :mag3, :min1, :min2, :min3],
-    seed: 1,
-    map: "hall",
-    start: :spread,
-    landmark: :default,
-    moves: [],
-    kills: [],
-    loss: 0.0,
-    noise: :default,
-    formation: {:column, 1.0},
-    assign: :cost,
-    leader_change: true,
-    duration_s: 120,
-    blobs: :painted
-  }
-
   @doc """
-  A trial. Options (a map; all have defaults): `robots` (ids that begin with `mag` or `min`), `seed`,
-  `map`, `start` (`:spread` or `:same`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
-  (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `loss` (0 to 1), `noise` (`:off`,
-  `:default`, `:slip`), `formation` (`{kind, spacing}`), `assign` (`:chain` or `:cost`),
-  `leader_change`, `duration_s`, `blobs` (`:painted` or `:direct`). Errors are one line.
+  A trial; its options are those of `Sim.Trial.Setup`. Errors are one line.
   """
   @spec new(map()) :: {:ok, t()} | {:error, String.t()}
   def new(options) do
-    options = Map.merge(@defaults, options)
-    profiles = Map.new(options.robots, &{&1, profile(&1)})
-    bodies = for id <- options.robots, do: {id, profiles[id].radius}
-    landmark = landmark(options.landmark)
-    places = [landmark | Enum.map(options.moves, &elem(&1, 0))]
-
-    with {:ok, map} <- Sim.Map.open(options.map, length(options.robots)),
-         :ok <- check_landmarks(map, places),
-         {:ok, starts} <- Sim.Map.starts(map, bodies, options.seed, landmark) do
-      robots = Enum.zip(options.robots, starts)
-      {:ok, build(options, map, robots, profiles, landmark)}
-    end
+    with {:ok, setup} <- Setup.new(options), do: {:ok, build(setup)}
   end
 
   @doc "100 ms further."
@@ -97,16 +65,16 @@ defmodule Sim.Trial do
 
   @doc "What a viewer sees now."
   @spec scene(t()) :: Scene.t()
-  def scene(trial), do: Score.scene(trial)
+  def scene(trial), do: trial |> run() |> Score.scene()
 
   @doc "All that the report says of the run, but for its wall time."
   @spec result(t()) :: map()
-  def result(trial), do: Score.result(trial)
+  def result(trial), do: trial |> run() |> Score.result()
 
   @doc "Moves the landmark there, as a person would push it, from now on."
   @spec move(t(), Pose.point()) :: {:ok, t()} | {:error, String.t()}
   def move(trial, place) do
-    with :ok <- check_landmarks(trial.map, [place]),
+    with :ok <- Setup.check_landmarks(trial.map, [place]),
          do: {:ok, %{trial | script: Script.add_move(trial.script, place, trial.at_ms)}}
   end
 
@@ -130,35 +98,28 @@ defmodule Sim.Trial do
   @spec claims(t()) :: [{atom(), map()}]
   def claims(trial), do: for(id <- living(trial), do: {id, Member.claim(trial.members[id])})
 
-  defp build(options, map, robots, profiles, landmark) do
-    common = common_start(options, robots)
+  defp run(trial) do
+    %{
+      at_ms: trial.at_ms,
+      options: trial.options,
+      world: trial.world,
+      ledger: trial.ledger,
+      claims: Map.new(claims(trial)),
+      messages: %{sent: trial.radio.sent, lost: trial.radio.lost}
+    }
+  end
 
-    world =
-      World.new!(
-        map: map,
-        seed: options.seed,
-        noise: options.noise,
-        landmark: landmark,
-        robots:
-          for {id, pose} <- robots do
-            odometry = if common, do: displaced(options, id, common, pose), else: Pose.new(0, 0)
-            %{id: id, profile: profiles[id], pose: pose, odometry: odometry}
-          end
-      )
-
-    mission =
-      {Swarm.Missions.Landmark,
-       formation: options.formation, assign: options.assign, leader_change: options.leader_change}
-
+  defp build(%Setup{options: options} = setup) do
     members =
-      Map.new(robots, fn {id, pose} ->
-        {id, Member.new(id: id, profile: profiles[id], start: common || pose, mission: mission)}
+      Map.new(setup.robots, fn robot ->
+        member = Map.to_list(robot) ++ [mission: setup.mission]
+        {robot.id, Member.new(member)}
       end)
 
     trial = %__MODULE__{
       options: options,
-      map: map,
-      world: world,
+      map: setup.map,
+      world: setup.world,
       radio: Radio.new(seed: options.seed, loss: options.loss),
       members: members,
       script: Script.new(options.moves, options.kills),
@@ -167,19 +128,6 @@ defmodule Sim.Trial do
     }
 
     command(trial, :all, :start)
-  end
-
-  # R66: all are switched on at the first one's place, and then driven to theirs by hand; their
-  # wheels count that way too, with their errors.
-  defp common_start(%{start: :same}, [{_id, pose} | _rest]), do: pose
-  defp common_start(_options, _robots), do: nil
-
-  defp displaced(options, id, common, pose) do
-    %Pose{x: x, y: y, heading: heading} = Pose.relative(common, pose)
-    share = if options.noise == :off, do: 0.0, else: 0.003
-    sign = fn key -> 1 - 2 * rem(:erlang.phash2({options.seed, id, key}), 2) end
-    scale = 1 + share * sign.(:scale)
-    Pose.new(x * scale, y * scale, heading * (1 + share * sign.(:turn)))
   end
 
   defp play(trial) do
@@ -286,26 +234,4 @@ defmodule Sim.Trial do
 
   defp effect({:stage, name, facts}, id, trial),
     do: %{trial | ledger: Ledger.stage(trial.ledger, trial.at_ms, name, id, facts)}
-
-  defp landmark(:default), do: {0.0, 0.0}
-  defp landmark(:none), do: nil
-  defp landmark({x, y}), do: {x * 1.0, y * 1.0}
-
-  defp check_landmarks(map, places) do
-    Enum.find_value(places, :ok, fn place ->
-      case place && Sim.Map.check_landmark(map, place) do
-        {:error, line} -> {:error, line}
-        _fine -> nil
-      end
-    end)
-  end
-
-  @doc "The profile of a robot by its name, as in the thesis: `mag1` is a Magellan Pro, `min1` an ATRV mini."
-  @spec profile(atom()) :: Profile.t()
-  def profile(id) do
-    case Atom.to_string(id) do
-      "min" <> _number -> Profile.atrv_mini()
-      _mag -> Profile.magellan()
-    end
-  end
 end

@@ -72,6 +72,10 @@ defmodule Sim.Trial.Ledger do
     end
   end
 
+  @doc "Whether the fleet is in formation now, by its own judgement."
+  @spec formed?(t()) :: boolean()
+  def formed?(ledger), do: ledger.formed_ms != nil
+
   @doc "Since when the fleet has been in formation, or at rest without a landmark; `nil` if it is not."
   @spec calm_since_ms(t()) :: integer() | nil
   def calm_since_ms(ledger), do: ledger.formed_ms || ledger.rest_ms

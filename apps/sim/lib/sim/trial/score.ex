@@ -5,25 +5,34 @@ defmodule Sim.Trial.Score do
   """
   alias Hal.Pose
   alias Sim.{Scene, World}
-  alias Sim.Trial
-  alias Sim.Trial.Ledger
-  alias Swarm.{Anchor, Formation, Member}
+  alias Sim.Trial.{Ledger, Setup}
+  alias Swarm.{Anchor, Formation}
+
+  @typedoc "A run at one instant; `claims` are those of the living."
+  @type run :: %{
+          at_ms: non_neg_integer(),
+          options: map(),
+          world: World.t(),
+          ledger: Ledger.t(),
+          claims: %{atom() => map()},
+          messages: %{sent: non_neg_integer(), lost: non_neg_integer()}
+        }
 
   @doc "What a viewer sees."
-  @spec scene(Trial.t()) :: Scene.t()
-  def scene(trial) do
-    leader = Ledger.leader(trial.ledger)
-    slots = slots(trial, leader)
+  @spec scene(run()) :: Scene.t()
+  def scene(run) do
+    leader = Ledger.leader(run.ledger)
+    slots = slots(run, leader)
 
     robots =
-      for id <- trial.options.robots do
-        claim = claim(trial, id)
+      for id <- run.options.robots do
+        claim = run.claims[id]
         {_index, slot} = Map.get(slots, id, {nil, nil})
 
         %{
           id: id,
-          pose: World.truth(trial.world, id),
-          radius: Trial.profile(id).radius,
+          pose: World.truth(run.world, id),
+          radius: Setup.profile(id).radius,
           alive: claim != nil,
           state: state(claim),
           slot: slot && Pose.point(slot),
@@ -33,50 +42,50 @@ defmodule Sim.Trial.Score do
       end
 
     %Scene{
-      at_ms: trial.at_ms,
-      map: trial.map,
-      landmark: trial.world.landmark,
+      at_ms: run.at_ms,
+      map: run.world.map,
+      landmark: run.world.landmark,
       robots: robots,
       leader: leader,
-      epoch: trial.ledger.epoch,
-      formation: formation(trial, leader),
+      epoch: run.ledger.epoch,
+      formation: formation(run, leader),
       error: error(robots),
-      formed?: Trial.formed?(trial),
-      stages: Ledger.stages(trial.ledger)
+      formed?: Ledger.formed?(run.ledger),
+      stages: Ledger.stages(run.ledger)
     }
   end
 
   @doc "The report of a run, but for its wall time; keys as in the report."
-  @spec result(Trial.t()) :: map()
-  def result(trial) do
-    scene = scene(trial)
+  @spec result(run()) :: map()
+  def result(run) do
+    scene = scene(run)
     leader = scene.leader
-    slots = slots(trial, leader)
+    slots = slots(run, leader)
     {mean, max} = scene.error || {nil, nil}
     {kind, spacing} = scene.formation
 
     %{
-      seed: trial.options.seed,
-      map: trial.options.map,
-      robots: length(trial.options.robots),
-      simulated_s: trial.at_ms / 1000,
+      seed: run.options.seed,
+      map: run.options.map,
+      robots: length(run.options.robots),
+      simulated_s: run.at_ms / 1000,
       stages: scene.stages,
       leader: leader,
-      leaders_at_once_max: trial.ledger.leaders_at_once_max,
-      leader_changes: max(trial.ledger.elections - 1, 0),
+      leaders_at_once_max: run.ledger.leaders_at_once_max,
+      leader_changes: max(run.ledger.elections - 1, 0),
       formation: %{
         kind: kind,
         spacing_m: spacing,
         error_mean_m: mean,
         error_max_m: max,
-        share_of_time_formed: Ledger.share_formed(trial.ledger)
+        share_of_time_formed: Ledger.share_formed(run.ledger)
       },
       landmark_distance_m:
         leader && scene.landmark &&
-          Pose.distance(World.truth(trial.world, leader), scene.landmark),
-      collisions: trial.world.collisions,
-      min_separation_m: trial.world.min_separation,
-      messages: %{sent: trial.radio.sent, lost: trial.radio.lost},
+          Pose.distance(World.truth(run.world, leader), scene.landmark),
+      collisions: run.world.collisions,
+      min_separation_m: run.world.min_separation,
+      messages: run.messages,
       fleet: for(robot <- scene.robots, do: row(robot, Map.get(slots, robot.id)))
     }
   end
@@ -96,13 +105,13 @@ defmodule Sim.Trial.Score do
   end
 
   # Slot number and true pose of each follower that the leader has in its order.
-  defp slots(_trial, nil), do: %{}
+  defp slots(_run, nil), do: %{}
 
-  defp slots(trial, leader) do
-    case Member.claim(trial.members[leader]) do
+  defp slots(run, leader) do
+    case run.claims[leader] do
       %{anchor: %Anchor{} = anchor} ->
-        pose = World.truth(trial.world, leader)
-        landmark = trial.world.landmark
+        pose = World.truth(run.world, leader)
+        landmark = run.world.landmark
         distance = if landmark, do: Pose.distance(pose, landmark), else: 1.6
 
         anchor
@@ -130,10 +139,10 @@ defmodule Sim.Trial.Score do
     end
   end
 
-  defp formation(trial, leader) do
-    case leader && Member.claim(trial.members[leader]) do
+  defp formation(run, leader) do
+    case leader && run.claims[leader] do
       %{anchor: %{formation: formation}} -> formation
-      _none -> trial.options.formation
+      _none -> run.options.formation
     end
   end
 
@@ -141,13 +150,6 @@ defmodule Sim.Trial.Score do
     case for robot <- robots, robot.alive, e = Scene.slot_error(robot), do: e do
       [] -> nil
       errors -> {Enum.sum(errors) / length(errors), Enum.max(errors)}
-    end
-  end
-
-  defp claim(trial, id) do
-    case trial.members do
-      %{^id => member} -> Member.claim(member)
-      _dead -> nil
     end
   end
 

@@ -1,0 +1,121 @@
+defmodule Sim.Trial.Setup do
+  @moduledoc """
+  What a fleet starts from: options checked, the world with everybody at a start pose, what each
+  robot is switched on with. Pure; the trial and the live fleet both start from it.
+  """
+  alias Hal.{Pose, Profile}
+  alias Sim.World
+
+  @enforce_keys [:options, :map, :world, :robots, :mission]
+  defstruct @enforce_keys
+
+  @typedoc "`start` is the pose at which a robot's wheels begin to count."
+  @type robot :: %{id: atom(), profile: Profile.t(), start: Pose.t()}
+  @type t :: %__MODULE__{
+          options: map(),
+          map: Sim.Map.t(),
+          world: World.t(),
+          robots: [robot()],
+          mission: {module(), keyword()}
+        }
+
+  @defaults %{
+    robots: [:mag1, :mag2, :mag3, :min1, :min2, :min3],
+    seed: 1,
+    map: "hall",
+    start: :spread,
+    landmark: :default,
+    moves: [],
+    kills: [],
+    loss: 0.0,
+    noise: :default,
+    formation: {:column, 1.0},
+    assign: :cost,
+    leader_change: true,
+    duration_s: 120,
+    blobs: :painted
+  }
+
+  @doc """
+  A setup. Options (a map; all have defaults): `robots` (ids that begin with `mag` or `min`), `seed`,
+  `map`, `start` (`:spread` or `:same`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
+  (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `loss` (0 to 1), `noise` (`:off`,
+  `:default`, `:slip`), `formation` (`{kind, spacing}`), `assign` (`:chain` or `:cost`),
+  `leader_change`, `duration_s`, `blobs` (`:painted` or `:direct`). Errors are one line.
+  """
+  @spec new(map()) :: {:ok, t()} | {:error, String.t()}
+  def new(options) do
+    options = Map.merge(@defaults, options)
+    bodies = for id <- options.robots, do: {id, profile(id).radius}
+    landmark = landmark(options.landmark)
+    places = [landmark | Enum.map(options.moves, &elem(&1, 0))]
+
+    with {:ok, map} <- Sim.Map.open(options.map, length(options.robots)),
+         :ok <- check_landmarks(map, places),
+         {:ok, starts} <- Sim.Map.starts(map, bodies, options.seed, landmark) do
+      {:ok, build(options, map, Enum.zip(options.robots, starts), landmark)}
+    end
+  end
+
+  @doc "Whether the landmark can stand at all these places (`nil`: nowhere)."
+  @spec check_landmarks(Sim.Map.t(), [Pose.point() | nil]) :: :ok | {:error, String.t()}
+  def check_landmarks(map, places) do
+    Enum.find_value(places, :ok, fn place ->
+      case place && Sim.Map.check_landmark(map, place) do
+        {:error, line} -> {:error, line}
+        _fine -> nil
+      end
+    end)
+  end
+
+  @doc "The profile of a robot by its name, as in the thesis: `mag1` is a Magellan Pro, `min1` an ATRV mini."
+  @spec profile(atom()) :: Profile.t()
+  def profile(id) do
+    case Atom.to_string(id) do
+      "min" <> _number -> Profile.atrv_mini()
+      _mag -> Profile.magellan()
+    end
+  end
+
+  defp build(options, map, robots, landmark) do
+    common = common_start(options, robots)
+
+    world =
+      World.new!(
+        map: map,
+        seed: options.seed,
+        noise: options.noise,
+        landmark: landmark,
+        robots:
+          for {id, pose} <- robots do
+            odometry = if common, do: displaced(options, id, common, pose), else: Pose.new(0, 0)
+            %{id: id, profile: profile(id), pose: pose, odometry: odometry}
+          end
+      )
+
+    mission =
+      {Swarm.Missions.Landmark,
+       formation: options.formation, assign: options.assign, leader_change: options.leader_change}
+
+    robots = for {id, pose} <- robots, do: %{id: id, profile: profile(id), start: common || pose}
+
+    %__MODULE__{options: options, map: map, world: world, robots: robots, mission: mission}
+  end
+
+  # R66: all are switched on at the first one's place, and then driven to theirs by hand; their
+  # wheels count that way too, with their errors.
+  defp common_start(%{start: :same}, [{_id, pose} | _rest]), do: pose
+  defp common_start(_options, _robots), do: nil
+
+  defp displaced(options, id, common, pose) do
+    %Pose{x: x, y: y, heading: heading} = Pose.relative(common, pose)
+    share = if options.noise == :off, do: 0.0, else: 0.003
+    sign = fn key -> 1 - 2 * rem(:erlang.phash2({options.seed, id, key}), 2) end
+    scale = 1 + share * sign.(:scale)
+    Pose.new(x * scale, y * scale, heading * (1 + share * sign.(:turn)))
+  end
+
+  defp landmark(:default), do: {0.0, 0.0}
+  defp landmark(:none), do: nil
+  defp landmark({x, y}), do: {x * 1.0, y * 1.0}
+end
