@@ -5,7 +5,10 @@ defmodule Hal.Camera do
   the last one on.
   """
 
-  @type reading :: {:frame, Hal.Frame.t()}
+  @typedoc "A picture; or, of a camera that finds them by itself, its blobs, as `Vision.Eye` gives them."
+  @type reading ::
+          {:frame, Hal.Frame.t()}
+          | {:blobs, [struct()], %{at_ms: integer(), pan: float(), tilt: float()}}
 
   @doc "Opens the source."
   @callback init(keyword()) :: {:ok, state :: term()} | {:error, reason :: term()}

@@ -37,9 +37,13 @@ defmodule Robot.Devices do
     Supervisor.init(children, strategy: :one_for_one, max_restarts: 200, max_seconds: 5)
   end
 
-  @doc "A sink for the camera: its frames are for the eye, its health for the board."
+  @doc """
+  A sink for the camera: its frames are for the eye, its health for the board, and so are the blobs of
+  a camera that finds them by itself.
+  """
   @spec health(Board.t(), tuple()) :: :ok
   def health(board, {:health, device, _status} = reading), do: Board.sense(board, device, reading)
+  def health(board, {:blobs, _blobs, _when} = reading), do: Board.sense(board, :eye, reading)
   def health(_board, _frame), do: :ok
 
   defp eye(%Config{camera: nil}, _sink), do: []

@@ -92,12 +92,9 @@ defmodule Swarm.Status do
 
   defimpl Inspect do
     def inspect(status, _options) do
-      "#" <>
-        Enum.join(
-          ["#{status.robot} #{status.state}", place(status.pose), speed(status)] ++
-            remarks(status),
-          " "
-        )
+      [first | rest] = [speed(status) | remarks(status)]
+      words = ["#{status.robot} #{status.state} #{place(status.pose)} #{first}" | rest]
+      "#" <> Enum.join(words, ", ")
     end
 
     defp place(nil), do: "(pose unknown)"
@@ -122,9 +119,6 @@ defmodule Swarm.Status do
       ]
       |> Enum.filter(& &1)
       |> Kernel.++(offline)
-      |> Enum.map_join("", &(", " <> &1))
-      |> String.trim_leading(", ")
-      |> List.wrap()
     end
 
     defp fixed(number), do: :erlang.float_to_binary(number * 1.0, decimals: 2)

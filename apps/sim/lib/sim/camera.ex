@@ -1,0 +1,59 @@
+defmodule Sim.Camera do
+  @moduledoc """
+  The camera of a robot in a simulated world: it paints its pictures in its own process, from the
+  world that the server sends. Options: `world`, `robot` as for `Sim.Drive`; `clock`, the robot's, by
+  which pictures are dated; `blobs: :direct` for a camera that finds blobs by itself, by geometry,
+  and never paints: for many robots on few processors.
+  """
+  @behaviour Hal.Camera
+  alias Sim.{Server, World}
+
+  @impl Hal.Camera
+  def init(options) do
+    options =
+      Keyword.validate!(options, [
+        :world,
+        :robot,
+        blobs: :painted,
+        clock: {System, :monotonic_time, [:millisecond]}
+      ])
+
+    with {:ok, line} <- Server.attach(options[:world], options[:robot], :camera) do
+      {:ok, %{line: line, robot: options[:robot], blobs: options[:blobs], clock: options[:clock]}}
+    end
+  end
+
+  @impl Hal.Camera
+  def next(%{line: {server, _}} = camera) do
+    Server.next(server, camera.robot)
+    {:ok, camera}
+  end
+
+  @impl Hal.Camera
+  def handle_message({:world, server, {:view, world}}, %{line: {server, _}} = camera),
+    do: {:ok, [see(world, camera)], camera}
+
+  def handle_message({:world, server, {:error, reason}}, %{line: {server, _}} = camera),
+    do: {:error, reason, camera}
+
+  def handle_message({:DOWN, monitor, _, _, _}, %{line: {_, monitor}} = camera),
+    do: {:error, :no_world, camera}
+
+  def handle_message(_other, camera), do: {:ok, [], camera}
+
+  @impl Hal.Camera
+  def terminate(camera), do: Server.detach(camera.line, camera.robot, :camera)
+
+  defp see(world, %{clock: {m, f, a}, robot: robot} = camera) do
+    at_ms = apply(m, f, a)
+
+    case camera.blobs do
+      :painted ->
+        {:frame, %{World.frame(world, robot) | at_ms: at_ms}}
+
+      :direct ->
+        %{pan: pan, tilt: tilt} = Map.fetch!(world.robots, robot)
+        {:blobs, World.blobs(world, robot), %{at_ms: at_ms, pan: pan, tilt: tilt}}
+    end
+  end
+end

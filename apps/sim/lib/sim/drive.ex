@@ -1,0 +1,40 @@
+defmodule Sim.Drive do
+  @moduledoc """
+  The wheels, sonars and bumpers of a robot in a simulated world. Options: `world` (its name),
+  `robot`. Until the world is up there is `{:error, :no_world}`, and again when it ends.
+  """
+  @behaviour Hal.Drive
+  alias Hal.Twist
+  alias Sim.Server
+
+  @impl Hal.Drive
+  def init(options) do
+    options = Keyword.validate!(options, [:world, :robot])
+
+    with {:ok, {server, _} = line} <- Server.attach(options[:world], options[:robot], :drive) do
+      Server.drive(server, options[:robot], Twist.zero())
+      {:ok, %{line: line, robot: options[:robot]}}
+    end
+  end
+
+  @impl Hal.Drive
+  def drive(twist, %{line: {server, _}} = drive) do
+    Server.drive(server, drive.robot, twist)
+    {:ok, drive}
+  end
+
+  @impl Hal.Drive
+  def handle_message({:world, server, {:readings, readings}}, %{line: {server, _}} = drive),
+    do: {:ok, readings, drive}
+
+  def handle_message({:world, server, {:error, reason}}, %{line: {server, _}} = drive),
+    do: {:error, reason, drive}
+
+  def handle_message({:DOWN, monitor, _, _, _}, %{line: {_, monitor}} = drive),
+    do: {:error, :no_world, drive}
+
+  def handle_message(_other, drive), do: {:ok, [], drive}
+
+  @impl Hal.Drive
+  def terminate(drive), do: Server.detach(drive.line, drive.robot, :drive)
+end

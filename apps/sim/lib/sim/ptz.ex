@@ -1,0 +1,34 @@
+defmodule Sim.Ptz do
+  @moduledoc "The pan-tilt unit of a robot in a simulated world. Options as for `Sim.Drive`."
+  @behaviour Hal.Ptz
+  alias Sim.Server
+
+  @impl Hal.Ptz
+  def init(options) do
+    options = Keyword.validate!(options, [:world, :robot])
+
+    with {:ok, line} <- Server.attach(options[:world], options[:robot], :ptz),
+         do: {:ok, %{line: line, robot: options[:robot]}}
+  end
+
+  @impl Hal.Ptz
+  def look(pan, tilt, %{line: {server, _}} = ptz) do
+    Server.look(server, ptz.robot, pan, tilt)
+    {:ok, ptz}
+  end
+
+  @impl Hal.Ptz
+  def handle_message({:world, server, {:readings, readings}}, %{line: {server, _}} = ptz),
+    do: {:ok, readings, ptz}
+
+  def handle_message({:world, server, {:error, reason}}, %{line: {server, _}} = ptz),
+    do: {:error, reason, ptz}
+
+  def handle_message({:DOWN, monitor, _, _, _}, %{line: {_, monitor}} = ptz),
+    do: {:error, :no_world, ptz}
+
+  def handle_message(_other, ptz), do: {:ok, [], ptz}
+
+  @impl Hal.Ptz
+  def terminate(ptz), do: Server.detach(ptz.line, ptz.robot, :ptz)
+end

@@ -1,0 +1,236 @@
+defmodule Sim.Server do
+  @moduledoc """
+  A world in real time: 50 ms every 50 ms. Simulated devices attach to it; it tells them what they
+  sense, and does what they ask for. It knows no robots' processes, only devices.
+
+  After each step a drive gets its readings and a pan-tilt unit its own; after each second one a
+  camera that has asked gets the world as it is, thinned, and paints its picture itself. A message to
+  a device is `{:world, server, what}` with `{:readings, list}`, `{:view, world}` or
+  `{:error, :unknown_robot}`.
+
+  A drive whose process ends leaves its wheels standing: that is the body's own watchdog.
+
+  Steps are set by absolute times, so the pace does not drift. A step that came late is not made up
+  for: then the world is slow, and says so by the event `[:sim, :server, :late]` with `late_ms`.
+  """
+  use GenServer
+  alias Hal.{Event, Pose, Twist}
+  alias Sim.{World, Worlds}
+
+  @step_ms 50
+  @late_ms 50
+
+  @enforce_keys [:name, :world, :next]
+  defstruct @enforce_keys ++ [devices: %{}, owners: %{}, asked: MapSet.new(), stats: nil]
+
+  @type kind :: :drive | :ptz | :camera
+  @type stats :: %{
+          steps: non_neg_integer(),
+          late_ms_max: non_neg_integer(),
+          late_ms_sum: non_neg_integer(),
+          busy_us: non_neg_integer(),
+          busy_us_max: non_neg_integer()
+        }
+
+  @doc "Starts a world's server. Options: `name` (any term), `world` (`Sim.World`)."
+  @spec start_link(keyword()) :: GenServer.on_start()
+  def start_link(options) do
+    options = Keyword.validate!(options, [:name, :world])
+    GenServer.start_link(__MODULE__, {options[:name], options[:world]})
+  end
+
+  @doc """
+  Attaches the calling process to a robot's body in a world, as its drive, pan-tilt unit or camera, in
+  place of the one before. Whoever attaches watches the server; the reference is of that monitor.
+  """
+  @spec attach(name :: term(), robot :: atom(), kind()) ::
+          {:ok, {pid(), reference()}} | {:error, :no_world}
+  def attach(name, robot, kind) do
+    case Worlds.find(name) do
+      nil ->
+        {:error, :no_world}
+
+      server ->
+        GenServer.cast(server, {:attach, robot, kind, self()})
+        {:ok, {server, Process.monitor(server)}}
+    end
+  end
+
+  @doc "Detaches the calling process."
+  @spec detach({pid(), reference()}, robot :: atom(), kind()) :: :ok
+  def detach({server, monitor}, robot, kind) do
+    Process.demonitor(monitor, [:flush])
+    GenServer.cast(server, {:detach, robot, kind, self()})
+  end
+
+  @doc "The speed that a robot's wheels shall have."
+  @spec drive(pid(), robot :: atom(), Twist.t()) :: :ok
+  def drive(server, robot, twist), do: GenServer.cast(server, {:drive, robot, twist})
+
+  @doc "Where a robot's camera shall look."
+  @spec look(pid(), robot :: atom(), float(), float()) :: :ok
+  def look(server, robot, pan, tilt), do: GenServer.cast(server, {:look, robot, pan, tilt})
+
+  @doc "Asks for the next view, for the camera attached."
+  @spec next(pid(), robot :: atom()) :: :ok
+  def next(server, robot), do: GenServer.cast(server, {:next, robot})
+
+  @doc "The world as it is."
+  @spec world(GenServer.server()) :: World.t()
+  def world(server), do: GenServer.call(server, :world)
+
+  @doc "How punctual it was, and how busy, since the last time that somebody asked."
+  @spec stats(GenServer.server()) :: stats()
+  def stats(server), do: GenServer.call(server, :stats)
+
+  @doc "Stops a robot's body for ever."
+  @spec kill(GenServer.server(), robot :: atom()) :: :ok
+  def kill(server, robot), do: GenServer.call(server, {:change, &World.kill(&1, robot)})
+
+  @doc "Lifts a robot to another pose."
+  @spec displace(GenServer.server(), robot :: atom(), Pose.t()) :: :ok
+  def displace(server, robot, pose),
+    do: GenServer.call(server, {:change, &World.displace(&1, robot, pose)})
+
+  @doc "Lets the landmark glide there; `nil` takes it away."
+  @spec move_landmark(GenServer.server(), Pose.point() | nil) :: :ok
+  def move_landmark(server, nil),
+    do: GenServer.call(server, {:change, &World.place_landmark(&1, nil)})
+
+  def move_landmark(server, place),
+    do: GenServer.call(server, {:change, &World.move_landmark(&1, place)})
+
+  @impl GenServer
+  def init({name, %World{} = world}) do
+    :ok = Worlds.enter(name, self())
+    next = System.monotonic_time(:millisecond)
+    {:ok, schedule(%__MODULE__{name: name, world: world, next: next, stats: new_stats()})}
+  end
+
+  @impl GenServer
+  def handle_call(:world, _from, s), do: {:reply, s.world, s}
+  def handle_call(:stats, _from, s), do: {:reply, s.stats, %{s | stats: new_stats()}}
+  def handle_call({:change, change}, _from, s), do: {:reply, :ok, %{s | world: change.(s.world)}}
+
+  @impl GenServer
+  def handle_cast({:attach, robot, kind, pid}, s) do
+    if is_map_key(s.world.robots, robot) do
+      owners = Map.put(s.owners, Process.monitor(pid), {robot, kind, pid})
+      {:noreply, %{s | devices: Map.put(s.devices, {robot, kind}, pid), owners: owners}}
+    else
+      send(pid, {:world, self(), {:error, :unknown_robot}})
+      {:noreply, s}
+    end
+  end
+
+  def handle_cast({:detach, robot, kind, pid}, s), do: {:noreply, release(s, robot, kind, pid)}
+
+  def handle_cast({:drive, robot, twist}, s),
+    do: {:noreply, %{s | world: World.drive(s.world, robot, twist)}}
+
+  def handle_cast({:look, robot, pan, tilt}, s),
+    do: {:noreply, %{s | world: World.look(s.world, robot, pan, tilt)}}
+
+  def handle_cast({:next, robot}, s), do: {:noreply, %{s | asked: MapSet.put(s.asked, robot)}}
+
+  @impl GenServer
+  def handle_info(:step, s) do
+    begun = System.monotonic_time(:microsecond)
+    s = %{s | world: World.step(s.world, @step_ms)}
+    tell(s)
+    s = show(s)
+    {:noreply, s |> note(begun) |> schedule()}
+  end
+
+  def handle_info({:DOWN, monitor, :process, _pid, _reason}, s) do
+    case Map.pop(s.owners, monitor) do
+      {{robot, kind, pid}, owners} ->
+        {:noreply, release(%{s | owners: owners}, robot, kind, pid)}
+
+      {nil, _owners} ->
+        {:noreply, s}
+    end
+  end
+
+  # Another process may have attached meanwhile.
+  defp release(s, robot, kind, pid) do
+    case s.devices do
+      %{{^robot, ^kind} => ^pid} ->
+        world = if kind == :drive, do: World.drive(s.world, robot, Twist.zero()), else: s.world
+        %{s | world: world, devices: Map.delete(s.devices, {robot, kind})}
+
+      _another ->
+        s
+    end
+  end
+
+  defp tell(%{devices: devices, world: world}) do
+    for id <- world.order do
+      {ptz, readings} = world |> World.readings(id) |> Enum.split_with(&match?({:ptz, _}, &1))
+      tell(devices, {id, :drive}, readings)
+      tell(devices, {id, :ptz}, ptz)
+    end
+  end
+
+  defp tell(_devices, _device, []), do: :ok
+
+  defp tell(devices, device, readings) do
+    case devices do
+      %{^device => pid} -> send(pid, {:world, self(), {:readings, readings}})
+      _none -> :ok
+    end
+  end
+
+  # Ten pictures a second.
+  defp show(%{world: %{at_ms: at_ms}} = s) when rem(at_ms, 2 * @step_ms) != 0, do: s
+
+  defp show(s) do
+    view = {:world, self(), {:view, thin(s.world)}}
+
+    for id <- s.asked,
+        World.alive?(s.world, id),
+        pid = s.devices[{id, :camera}],
+        do: send(pid, view)
+
+    %{s | asked: MapSet.filter(s.asked, &(not is_map_key(s.devices, {&1, :camera})))}
+  end
+
+  # What a camera does not see is not copied to it: a hundred of them look ten times a second.
+  defp thin(world) do
+    robots =
+      Map.new(world.robots, fn {id, body} ->
+        profile = %{body.profile | sonars: [], irs: []}
+        {id, %{body | profile: profile, sonar: [], geometry: <<>>}}
+      end)
+
+    %{world | robots: robots, together: MapSet.new()}
+  end
+
+  defp note(s, begun) do
+    late_ms = max(div(begun, 1_000) - s.next, 0)
+    busy_us = System.monotonic_time(:microsecond) - begun
+    about = %{world: s.name}
+    if late_ms > @late_ms, do: Event.execute([:sim, :server, :late], %{late_ms: late_ms}, about)
+
+    stats = s.stats
+
+    %{
+      s
+      | stats: %{
+          steps: stats.steps + 1,
+          late_ms_max: max(stats.late_ms_max, late_ms),
+          late_ms_sum: stats.late_ms_sum + late_ms,
+          busy_us: stats.busy_us + busy_us,
+          busy_us_max: max(stats.busy_us_max, busy_us)
+        }
+    }
+  end
+
+  defp new_stats, do: %{steps: 0, late_ms_max: 0, late_ms_sum: 0, busy_us: 0, busy_us_max: 0}
+
+  defp schedule(s) do
+    next = max(s.next + @step_ms, System.monotonic_time(:millisecond))
+    Process.send_after(self(), :step, next, abs: true)
+    %{s | next: next}
+  end
+end

@@ -1,0 +1,159 @@
+defmodule Sim.FleetTest do
+  @moduledoc "Fleets of whole robots in real time."
+  use ExUnit.Case, async: false
+  import Swarm.Case, only: [eventually: 2]
+  alias Hal.Pose
+  alias Robot.{Board, Names}
+  alias Sim.{Fleet, Server, World}
+  @moduletag :capture_log
+
+  defp fleet(options) do
+    {:ok, fleet} = Fleet.start_link(Map.merge(%{map: "hall", seed: 3}, options))
+
+    on_exit(fn ->
+      monitor = Process.monitor(fleet)
+      assert_receive {:DOWN, ^monitor, _, _, _}, 5_000
+    end)
+
+    fleet
+  end
+
+  defp truth(fleet, id), do: fleet |> Fleet.server() |> Server.world() |> World.truth(id)
+  defp stages(fleet), do: Enum.map(Fleet.scene(fleet).stages, & &1.stage)
+  defp stop(fleet), do: Fleet.stop(fleet)
+
+  test "a robot that is sent somewhere gets there, and its fleet is gone afterwards" do
+    fleet = fleet(%{robots: [:mag71], landmark: :none, mission: false})
+    eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(:mag71)) end, 2_000)
+    start = truth(fleet, :mag71)
+    place = Pose.place(start, {0.7, 0.2})
+    assert Swarm.goto(:mag71, place) == :ok
+    eventually(fn -> Swarm.status(:mag71).state == :done end, 10_000)
+    assert Pose.distance(truth(fleet, :mag71), place) < 0.15
+    assert [%{state: :idle, alive: true}] = Fleet.scene(fleet).robots
+    assert Fleet.result(fleet).collisions == 0
+    stop(fleet)
+    assert Names.whereis(:mag71, :robot) == nil
+    assert Swarm.status(:mag71) |> elem(1) =~ "no robot"
+  end
+
+  test "three robots search, agree on a leader, and heal when it dies; stops reach all" do
+    ids = [:mag81, :mag82, :min81]
+    fleet = fleet(%{robots: ids})
+    eventually(fn -> Fleet.scene(fleet).leader end, 15_000)
+    scene = Fleet.scene(fleet)
+    assert [:search, :elected] = stages(fleet)
+    leader = scene.leader
+    assert Enum.find(scene.robots, & &1.leader?).id == leader
+    eventually(fn -> Enum.any?(Fleet.scene(fleet).robots, & &1.slot) end, 2_000)
+
+    # All stop, and stay so, until a person clears it.
+    assert Swarm.estop() == :ok
+    for id <- ids, do: assert(Board.latched?(Board.find!(id)))
+    still = fn -> for id <- ids, do: truth(fleet, id) end
+
+    eventually(
+      fn ->
+        Enum.all?(Server.world(Fleet.server(fleet)).robots, fn {_, body} ->
+          body.speed == {0.0, 0.0}
+        end)
+      end,
+      2_000
+    )
+
+    before = still.()
+    assert Swarm.stop(hd(ids)) == :ok
+    assert Swarm.start(robots: [hd(ids)]) == :ok
+    assert still.() == before
+    assert Swarm.reset() == :ok
+
+    # The leader dies: its body stays, the others know, and one of them takes over.
+    assert Fleet.kill(fleet, :leader) == :ok
+    assert Fleet.living(fleet) == ids -- [leader]
+    assert Names.whereis(leader, :robot) == nil
+    body = truth(fleet, leader)
+    assert Fleet.kill(fleet, leader) |> elem(1) =~ "no robot"
+    assert :killed in stages(fleet)
+    [other | _] = ids -- [leader]
+    eventually(fn -> Board.peers(Board.find!(other))[leader].mode == :dead end, 4_000)
+    eventually(fn -> Fleet.scene(fleet).leader not in [nil, leader] end, 20_000)
+    assert truth(fleet, leader) == body
+
+    assert %{alive: false, state: :dead} =
+             Enum.find(Fleet.scene(fleet).robots, &(&1.id == leader))
+
+    assert Fleet.result(fleet).leaders_at_once_max == 1
+    stop(fleet)
+  end
+
+  test "a robot whose parts fall too often is a wreck, and the others live on" do
+    fleet = fleet(%{robots: [:mag91, :mag92], mission: false})
+
+    eventually(
+      fn ->
+        length(Swarm.Directory.robots() -- Swarm.Directory.robots() -- [:mag91, :mag92]) == 2
+      end,
+      2_000
+    )
+
+    # One failure is none.
+    kill(:mag91, :executive)
+    eventually(fn -> Names.whereis(:mag91, :link) && Swarm.tell(:mag91, "ping") == :ok end, 2_000)
+    assert Fleet.living(fleet) == [:mag91, :mag92]
+
+    Enum.find(1..8, fn _ ->
+      kill(:mag91, :gate)
+
+      eventually(
+        fn -> Names.whereis(:mag91, :gate) || Names.whereis(:mag91, :robot) == nil end,
+        2_000
+      )
+
+      Names.whereis(:mag91, :robot) == nil
+    end)
+
+    eventually(fn -> Fleet.living(fleet) == [:mag92] end, 2_000)
+    assert :killed in stages(fleet)
+    assert Swarm.tell(:mag92, "ping") == :ok
+    stop(fleet)
+  end
+
+  defp kill(id, role) do
+    pid = Names.whereis(id, role)
+    monitor = Process.monitor(pid)
+    Process.exit(pid, :kill)
+    assert_receive {:DOWN, ^monitor, _, _, _}
+  end
+
+  test "the radio loses what it is told to, and the script is played" do
+    fleet =
+      fleet(%{
+        robots: [:mag95, :mag96, :min95],
+        loss: 0.3,
+        blobs: :direct,
+        mission: false,
+        moves: [{{1.0, 0.0}, 0.5}],
+        kills: [{:mag96, 0.3}]
+      })
+
+    eventually(fn -> stages(fleet) == [:killed, :landmark_moved] end, 3_000)
+    eventually(fn -> elem(Fleet.scene(fleet).landmark, 0) > 0.05 end, 2_000)
+    %{messages: %{sent: sent, lost: lost}} = Fleet.result(fleet)
+    assert lost > 0 and lost < sent
+    assert Fleet.move_landmark(fleet, {99.0, 0.0}) |> elem(1) =~ "99"
+    assert Fleet.move_landmark(fleet, nil) == :ok
+    assert Fleet.scene(fleet).landmark == nil
+    stop(fleet)
+  end
+
+  test "what is wrong with a fleet is said before anything starts" do
+    assert {:error, line} = Fleet.start_link(%{map: "mars"})
+    assert line =~ "mars"
+    assert {:error, line} = Fleet.start_link(%{landmark: {50, 50}})
+    refute line =~ "\n"
+    fleet = fleet(%{robots: [:mag99], mission: false})
+    assert {:error, line} = Fleet.start_link(%{robots: [:mag98, :mag99]})
+    assert line =~ "mag99 lives on this node already"
+    stop(fleet)
+  end
+end
