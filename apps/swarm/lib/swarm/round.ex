@@ -16,10 +16,13 @@ defmodule Swarm.Round do
   alias Swarm.Round.Letter
 
   @version 1
+  # Letters are repeated every 100 ms, more rarely in a large group: all to all grows with its square.
   @repeat_ms 100
+  @repeat_ms_per_robot 8
   @echo_ms 200
-  @ask_ms 400
-  @give_up_ms 2_500
+  # Counted in repeats: when a missing digest is asked for, and when a round is given up.
+  @ask_after 4
+  @give_up_after 25
   # After its commit a member goes on answering, for those that missed the last digest.
   @linger_ms 2_000
 
@@ -111,7 +114,7 @@ defmodule Swarm.Round do
       round.phase == :digest and differing?(round) ->
         {%{fenced(round) | phase: :none}, letters, {:failed, :mismatch}}
 
-      round.phase == :digest and now_ms - round.since_ms > @give_up_ms ->
+      round.phase == :digest and now_ms - round.since_ms > @give_up_after * repeat_ms(round) ->
         {%{fenced(round) | phase: :none}, letters, {:failed, :timeout}}
 
       true ->
@@ -154,14 +157,21 @@ defmodule Swarm.Round do
     round = if letter.digest, do: put_digest(round, from, letter.digest), else: round
     round = if letter.ask, do: %{round | said_ms: nil, echo?: true}, else: round
 
-    if round.phase in [:collect, :echo] do
-      heard = if is_map(letter.report), do: %{from => letter.report}, else: %{}
-      known = (letter.known || %{}) |> Map.merge(heard) |> Map.take(round.view)
-      known = for {id, report} <- known, report != nil, into: %{}, do: {id, report}
-      %{round | reports: Map.merge(known, round.reports)}
-    else
-      round
-    end
+    if round.phase in [:collect, :echo],
+      do: round |> keep(%{from => letter.report}) |> keep(letter.known || %{}),
+      else: round
+  end
+
+  defp keep(round, reports) do
+    news =
+      for {id, report} <- reports,
+          is_map(report),
+          not is_map_key(round.reports, id),
+          id in round.view,
+          into: %{},
+          do: {id, report}
+
+    if news == %{}, do: round, else: %{round | reports: Map.merge(round.reports, news)}
   end
 
   defp put_digest(round, from, digest),
@@ -197,7 +207,7 @@ defmodule Swarm.Round do
   defp speak(round, now_ms), do: say(round, now_ms)
 
   defp say(round, now_ms) do
-    if round.said_ms == nil or now_ms - round.said_ms >= @repeat_ms do
+    if round.said_ms == nil or now_ms - round.said_ms >= repeat_ms(round) do
       letter = %Letter{
         id: round.id,
         view: round.view,
@@ -206,7 +216,7 @@ defmodule Swarm.Round do
         report: round.report,
         known: if(round.echo?, do: round.reports),
         digest: round.digest,
-        ask: round.phase == :digest and now_ms - round.since_ms >= @ask_ms
+        ask: round.phase == :digest and now_ms - round.since_ms >= @ask_after * repeat_ms(round)
       }
 
       {%{round | said_ms: now_ms, echo?: false}, [letter]}
@@ -214,6 +224,8 @@ defmodule Swarm.Round do
       {round, []}
     end
   end
+
+  defp repeat_ms(round), do: max(@repeat_ms, @repeat_ms_per_robot * length(round.view))
 
   defp agreed?(round),
     do: Enum.all?(round.view, &(Map.get(round.digests, &1) == round.digest))
