@@ -100,7 +100,8 @@ defmodule Sim.ProcessesTest do
   defp script(run, 300), do: input(run, @me, {:command, :estop, run.at_ms})
 
   defp script(run, 320) do
-    Enum.reduce(@ids, run, &input(&2, &1, {:command, :reset, run.at_ms}))
+    run = Enum.reduce(@ids, run, &input(&2, &1, {:command, :reset, run.at_ms}))
+    Enum.reduce(@ids, run, &input(&2, &1, {:command, :start, run.at_ms}))
   end
 
   defp script(run, 350), do: %{run | world: World.move_landmark(run.world, {2.0, 1.0})}

@@ -137,7 +137,7 @@ defmodule Sim.TrialTest do
     assert_formed(run(%{seed: 1, start: :same}))
   end
 
-  test "an e-stop of one reaches all by their heartbeats, and only a reset of each frees it" do
+  test "an e-stop of one reaches all by their heartbeats, and nothing moves before a reset and a new start" do
     {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct})
     trial = Enum.reduce(1..120, trial, fn _, trial -> Trial.step(trial) end)
     trial = Trial.command(trial, :mag1, :estop)
@@ -146,6 +146,9 @@ defmodule Sim.TrialTest do
     trial = Enum.reduce(1..30, trial, fn _, trial -> Trial.step(trial) end)
     assert poses(trial) == before
     trial = Trial.command(trial, :all, :reset)
+    trial = Enum.reduce(1..30, trial, fn _, trial -> Trial.step(trial) end)
+    assert poses(trial) == before, "a reset alone moved a robot"
+    trial = Trial.command(trial, :all, :start)
     trial = Enum.reduce(1..30, trial, fn _, trial -> Trial.step(trial) end)
     refute poses(trial) == before
   end

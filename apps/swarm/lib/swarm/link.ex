@@ -237,7 +237,13 @@ defmodule Swarm.Link do
 
   defp stop(s, ear) do
     Board.put(s.board, :link, :estop, ear.stop, Config.now(s.config))
-    if ear.stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id)
+
+    # The mission ends with it: after the reset nothing moves until somebody says so.
+    if ear.stop.latched? and not Board.latched?(s.board) do
+      :ok = Gate.estop(s.id)
+      :ok = Pilot.hear(s.id, {:command, :stop})
+    end
+
     %{s | ear: ear}
   end
 

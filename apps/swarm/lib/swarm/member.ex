@@ -92,7 +92,7 @@ defmodule Swarm.Member do
   end
 
   def step(member, {:command, :estop, _at_ms}),
-    do: {latch(member, Stop.press(member.stop)), []}
+    do: latch(member, Stop.press(member.stop))
 
   def step(member, {:command, :reset, _at_ms}),
     do: {%{member | reflex: Reflex.reset(member.reflex), stop: Stop.reset(member.stop)}, []}
@@ -150,13 +150,16 @@ defmodule Swarm.Member do
   # An e-stop spreads with every heartbeat.
   defp hear(member, %Message{from: from, body: beat}, at_ms) do
     member = %{member | peers: Peers.hear(member.peers, from, beat, at_ms)}
-    {latch(member, Stop.hear(member.stop, beat.estop, beat.latched)), []}
+    latch(member, Stop.hear(member.stop, beat.estop, beat.latched))
   end
 
-  defp latch(%{stop: %{latched?: false}} = member, %{latched?: true} = stop),
-    do: %{member | reflex: Reflex.estop(member.reflex), stop: stop}
+  # The mission ends with it: after the reset nothing moves until somebody says so.
+  defp latch(%{stop: %{latched?: false}} = member, %{latched?: true} = stop) do
+    member = %{member | reflex: Reflex.estop(member.reflex), stop: stop}
+    handle(member, {:command, :stop})
+  end
 
-  defp latch(member, stop), do: %{member | stop: stop}
+  defp latch(member, stop), do: {%{member | stop: stop}, []}
 
   defp outcome({tag, result}), do: {:outcome, tag, result}
 
