@@ -12,16 +12,21 @@ defmodule Mix.Tasks.Demo do
   def run(arguments) do
     Build.update()
 
-    # No application is started: a run needs neither nodes nor servers of ours.
     status =
       case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
         {:ok, %Options{help: true}} -> IO.write(Options.help())
         {:ok, %Options{headless: true} = options} -> Demo.run(options, Sim.Trial)
-        {:ok, options} -> Session.run(options, Live.Trial, &Live.Trial.start_link(Sim.Trial, &1))
+        {:ok, options} -> live(options)
         {:error, lines} -> refuse(lines)
       end
 
     if is_integer(status) and status > 0, do: exit({:shutdown, status})
+  end
+
+  # Robots are killed here on purpose: what their supervisors say of it would spoil the picture.
+  defp live(options) do
+    Logger.configure(level: :none)
+    Session.run(options, Live.Fleet, &Live.Fleet.start_link/1)
   end
 
   defp refuse(lines) do

@@ -1,0 +1,46 @@
+defmodule Console.LiveFleetTest do
+  use ExUnit.Case, async: false
+  alias Console.{Live, Options}
+  @moduletag :capture_log
+
+  test "people command whole robots, and are told what is wrong" do
+    options = Options.trial(%Options{robots: [:mag61, :min61], blobs: :direct})
+    {:ok, live} = Live.Fleet.start_link(options)
+    assert [%{id: :mag61}, %{id: :min61}] = Live.Fleet.scene(live).robots
+    Swarm.Case.eventually(fn -> Swarm.Directory.robots() == [:mag61, :min61] end)
+
+    devices = for id <- [:drive, :ptz, :camera], do: Robot.Names.whereis(:mag61, id)
+    monitors = Enum.map(devices, &Process.monitor/1)
+
+    for command <- [
+          {:tell, :all, "ping"},
+          {:tell, [:mag61], "goto:1:1"},
+          {:tell, :all, "start"},
+          {:formation, {:wedge, nil}},
+          {:formation, {:line, 1.5}},
+          {:landmark, {1.0, 0.5}},
+          {:landmark, :none},
+          :estop,
+          :reset,
+          {:kill, :mag61}
+        ],
+        do: assert({command, {:ok, "done"}} == {command, Live.Fleet.command(live, command)})
+
+    for command <- [
+          {:kill, :leader},
+          {:kill, :mag61},
+          {:tell, [:mag61], "ping"},
+          {:tell, :all, "goto:abc:1"},
+          {:landmark, {500.0, 0.0}}
+        ] do
+      assert {:error, line} = Live.Fleet.command(live, command)
+      refute line =~ "\n"
+    end
+
+    # What a robot's devices say when they are cut off belongs to this test's log.
+    for monitor <- monitors, do: assert_receive({:DOWN, ^monitor, _, _, _}, 2_000)
+    assert %{robots: 2, messages: %{sent: _}} = Live.Fleet.result(live)
+    Sim.Fleet.stop(live)
+    assert {:error, _line} = Live.Fleet.start_link(%{options | map: "nowhere"})
+  end
+end
