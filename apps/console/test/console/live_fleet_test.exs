@@ -9,8 +9,8 @@ defmodule Console.LiveFleetTest do
     assert [%{id: :mag61}, %{id: :min61}] = Live.Fleet.scene(live).robots
     Swarm.Case.eventually(fn -> Swarm.Directory.robots() == [:mag61, :min61] end)
 
-    devices = for id <- [:drive, :ptz, :camera], do: Robot.Names.whereis(:mag61, id)
-    monitors = Enum.map(devices, &Process.monitor/1)
+    parts = :mag61 |> Robot.Names.whereis(:robot) |> Supervisor.which_children()
+    monitors = for {_id, pid, _type, _modules} <- parts, do: Process.monitor(pid)
 
     for command <- [
           {:tell, :all, "ping"},
@@ -37,7 +37,7 @@ defmodule Console.LiveFleetTest do
       refute line =~ "\n"
     end
 
-    # What a robot's devices say when they are cut off belongs to this test's log.
+    # What a robot's parts log when they are cut off belongs to this test.
     for monitor <- monitors, do: assert_receive({:DOWN, ^monitor, _, _, _}, 2_000)
     assert %{robots: 2, messages: %{sent: _}} = Live.Fleet.result(live)
     Sim.Fleet.stop(live)
