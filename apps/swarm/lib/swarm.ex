@@ -153,7 +153,10 @@ defmodule Swarm do
   @spec estop() :: answer()
   def estop, do: command(:all, :estop)
 
-  @doc "Releases the emergency stop. Look first where the robots would go."
+  @doc """
+  Releases the emergency stop. What the robots were at ended with the stop: they stand until they
+  are told something new, for instance `start/0`.
+  """
   @spec reset() :: answer()
   def reset, do: command(:all, :reset)
 
