@@ -63,9 +63,16 @@ defmodule Sim.FleetTest do
 
     before = still.()
     assert Swarm.stop(hd(ids)) == :ok
-    assert Swarm.start(robots: [hd(ids)]) == :ok
+    assert {:error, line} = Swarm.start(robots: [hd(ids)])
+    assert line =~ "emergency stop"
     assert still.() == before
     assert Swarm.reset() == :ok
+
+    # What they were at ended with the stop; they begin anew.
+    eventually(fn -> Fleet.scene(fleet).leader == nil end, 2_000)
+    assert Swarm.start() == :ok
+    eventually(fn -> Fleet.scene(fleet).leader end, 15_000)
+    leader = Fleet.scene(fleet).leader
 
     # The leader dies: its body stays, the others know, and one of them takes over.
     assert Fleet.kill(fleet, :leader) == :ok

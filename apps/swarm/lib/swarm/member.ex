@@ -97,6 +97,11 @@ defmodule Swarm.Member do
   def step(member, {:command, :reset, _at_ms}),
     do: {%{member | reflex: Reflex.reset(member.reflex), stop: Stop.reset(member.stop)}, []}
 
+  # What is asked for while all stand would otherwise begin with the reset.
+  def step(%{stop: %{latched?: true}} = member, {:command, command, _at_ms})
+      when command != :stop,
+      do: {member, []}
+
   def step(member, {:command, command, _at_ms}), do: handle(member, {:command, command})
 
   def step(member, {:tick, at_ms}) do

@@ -11,6 +11,8 @@ defmodule Swarm.Link.Desk do
   | `:stop` | the robot stands, whatever it was at |
   | `{:formation, kind, spacing}` | for the running mission |
   | a `Robot.Command` | for this robot alone, which leaves the group's mission for it |
+
+  While the emergency stop holds a robot, it refuses all that would move it.
   """
   alias Robot.{Board, Config, Gate, Pilot}
   alias Swarm.{Missions.Landmark, Missions.Manual, Status, Stop}
@@ -27,6 +29,11 @@ defmodule Swarm.Link.Desk do
     :ok = Gate.reset(config.id)
     {:ok, %{ear | stop: Stop.reset(ear.stop)}}
   end
+
+  # What is asked for while all stand would otherwise begin with the reset.
+  def answer(request, config, _board, %{stop: %{latched?: true}} = ear)
+      when request not in [:stop, :ping],
+      do: {{:error, "#{config.id} is held by the emergency stop; Swarm.reset() first"}, ear}
 
   def answer(request, config, board, ear),
     do: {obey(request, doing(board), config, ear), ear}
