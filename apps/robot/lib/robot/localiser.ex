@@ -14,9 +14,10 @@ defmodule Robot.Localiser do
   alias Hal.{Odometry, Pose}
   alias Robot.{Percept, Sighting}
 
-  # Standard deviations of odometry: of the way driven, of the angle turned, of angle per metre.
+  # Standard deviations of odometry: of the way driven, of the angle turned (skid steering slips by
+  # 5 % and more, R74), of angle per metre.
   @way_share 0.01
-  @turn_share 0.02
+  @turn_share 0.06
   @turn_per_metre 0.01
   @start_sd {0.03, 0.03, 0.02}
   # A single sighting: bearing in radians, range as a share and in metres.
