@@ -42,8 +42,18 @@ defmodule Console.Bench do
       at("three", "3 robots", %{robots: 3}, nil, 180),
       at("twelve", "12 robots", %{robots: 12}, nil, 180),
       at("twenty", "20 robots", %{robots: 20}, nil, 180),
-      at("none", "no landmark", %{landmark: :none}, nil, 120)
+      at("none", "no landmark", %{landmark: :none}, nil, 120),
+      at("same", "6 robots, all switched on at one place", %{start: :same}, nil, 120),
+      at("chain", "6 robots, slots by the thesis's chain", %{assign: :chain}, nil, 120),
+      at("twelve-chain", "12 robots, chain", %{robots: 12, assign: :chain}, nil, 180),
+      at("twenty-chain", "20 robots, chain", %{robots: 20, assign: :chain}, nil, 180)
+      | shapes()
     ]
+  end
+
+  defp shapes do
+    for kind <- [:line, :wedge, :triangle, :diamond, :circle],
+        do: at("#{kind}", "6 robots, #{kind}", %{formation: {kind, 1.0}}, nil, 120)
   end
 
   @doc """
