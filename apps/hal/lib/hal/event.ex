@@ -84,12 +84,13 @@ defmodule Hal.Event do
   """
   @spec detach(id :: term()) :: :ok | {:error, :not_found}
   def detach(id) do
-    case :ets.take(@table, {:id, id}) do
+    # At the end of a node the table may be gone before those who listened.
+    case :ets.whereis(@table) != :undefined and :ets.take(@table, {:id, id}) do
       [{_key, event}] ->
         :ets.match_delete(@table, {{:event, event}, id, :_, :_})
         :ok
 
-      [] ->
+      _none ->
         {:error, :not_found}
     end
   end

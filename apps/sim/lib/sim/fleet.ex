@@ -24,17 +24,19 @@ defmodule Sim.Fleet do
   @period_ms 100
 
   @doc """
-  Starts a fleet. Options as of `Sim.Trial.new/1` (there is no time limit here), and `mission: false` for
-  robots that wait for commands instead of starting their mission at once.
+  Starts a fleet. Options as of `Sim.Trial.Setup.new/1` (there is no time limit here), and `mission: false`
+  for robots that wait for commands instead of starting their mission at once; `trace` as of
+  `Robot.Config`, called with the robot's id first.
   """
   @spec start_link(map()) :: {:ok, pid()} | {:error, line :: String.t()}
   def start_link(options \\ %{}) do
     {mission?, options} = Map.pop(options, :mission, true)
+    {trace, options} = Map.pop(options, :trace)
 
     with {:ok, setup} <- Setup.new(options),
          :ok <- free(setup.options.robots) do
       {:ok, _apps} = Application.ensure_all_started(:swarm)
-      GenServer.start_link(__MODULE__, {setup, mission?})
+      GenServer.start_link(__MODULE__, {setup, mission?, trace})
     end
   end
 
@@ -72,7 +74,7 @@ defmodule Sim.Fleet do
   def now(epoch_ms), do: System.monotonic_time(:millisecond) - epoch_ms
 
   @impl GenServer
-  def init({%Setup{options: options} = setup, mission?}) do
+  def init({%Setup{options: options} = setup, mission?, trace}) do
     # So that `terminate/2` runs, and a fall of the parts is seen.
     Process.flag(:trap_exit, true)
     epoch_ms = System.monotonic_time(:millisecond)
@@ -94,7 +96,8 @@ defmodule Sim.Fleet do
     }
 
     :ok = Event.attach({__MODULE__, self()}, [:robot, :stage], &__MODULE__.stage/4, self())
-    body = %{world: name, clock: {__MODULE__, :now, [epoch_ms]}, transport: transport}
+    clock = {__MODULE__, :now, [epoch_ms]}
+    body = %{world: name, clock: clock, transport: transport, trace: trace}
     robots = for robot <- setup.robots, do: start_robot(part.(Robot.Fleet), robot, body, setup)
     if mission?, do: for({_pid, id} <- robots, do: begin(id))
     {:ok, schedule(%{s | robots: Map.new(robots)})}
@@ -202,7 +205,8 @@ defmodule Sim.Fleet do
         ptz: {Sim.Ptz, device},
         camera: {Sim.Camera, camera},
         colours: World.colours(),
-        mission: setup.mission
+        mission: setup.mission,
+        trace: trace(body.trace, id)
       )
 
     {:ok, pid} =
@@ -211,6 +215,9 @@ defmodule Sim.Fleet do
     Process.monitor(pid)
     {pid, id}
   end
+
+  defp trace(nil, _id), do: nil
+  defp trace({m, f, a}, id), do: {m, f, a ++ [id]}
 
   defp begin(id) do
     :ok = Pilot.start(id)

@@ -102,6 +102,8 @@ defmodule Sim.Server do
 
   @impl GenServer
   def init({name, %World{} = world}) do
+    # Time does not wait for those who live in it.
+    Process.flag(:priority, :high)
     :ok = Worlds.enter(name, self())
     next = System.monotonic_time(:millisecond)
     {:ok, schedule(%__MODULE__{name: name, world: world, next: next, stats: new_stats()})}
@@ -184,27 +186,22 @@ defmodule Sim.Server do
   # Ten pictures a second.
   defp show(%{world: %{at_ms: at_ms}} = s) when rem(at_ms, 2 * @step_ms) != 0, do: s
 
-  defp show(s) do
-    view = {:world, self(), {:view, thin(s.world)}}
+  defp show(%{world: world} = s) do
+    slim = Map.new(world.robots, fn {id, body} -> {id, slim(body)} end)
+    view = %{world | together: MapSet.new()}
 
-    for id <- s.asked,
-        World.alive?(s.world, id),
-        pid = s.devices[{id, :camera}],
-        do: send(pid, view)
+    for id <- s.asked, World.alive?(world, id), pid = s.devices[{id, :camera}] do
+      own = %{world.robots[id] | sonar: [], geometry: <<>>}
+      send(pid, {:world, self(), {:view, %{view | robots: %{slim | id => own}}}})
+    end
 
     %{s | asked: MapSet.filter(s.asked, &(not is_map_key(s.devices, {&1, :camera})))}
   end
 
-  # What a camera does not see is not copied to it: a hundred of them look ten times a second.
-  defp thin(world) do
-    robots =
-      Map.new(world.robots, fn {id, body} ->
-        profile = %{body.profile | sonars: [], irs: []}
-        {id, %{body | profile: profile, sonar: [], geometry: <<>>}}
-      end)
-
-    %{world | robots: robots, together: MapSet.new()}
-  end
+  # Of the others a camera sees the outline only, and what it does not see is not copied to it: a
+  # hundred cameras look ten times a second.
+  defp slim(%{profile: %{radius: radius, height: height}} = body),
+    do: %{body | profile: %{radius: radius, height: height}, sonar: [], geometry: <<>>}
 
   defp note(s, begun) do
     late_ms = max(div(begun, 1_000) - s.next, 0)
