@@ -24,11 +24,11 @@ defmodule Sim.FleetTest do
 
   test "a robot that is sent somewhere gets there, and its fleet is gone afterwards" do
     fleet = fleet(%{robots: [:mag71], landmark: :none, mission: false})
-    eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(:mag71)) end, 2_000)
+    eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(:mag71)) end, 6_000)
     start = truth(fleet, :mag71)
     place = Pose.place(start, {0.7, 0.2})
     assert Swarm.goto(:mag71, place) == :ok
-    eventually(fn -> Swarm.status(:mag71).state == :done end, 10_000)
+    eventually(fn -> Swarm.status(:mag71).state == :done end, 20_000)
     assert Pose.distance(truth(fleet, :mag71), place) < 0.15
     assert [%{state: :idle, alive: true}] = Fleet.scene(fleet).robots
     assert Fleet.result(fleet).collisions == 0
@@ -45,7 +45,7 @@ defmodule Sim.FleetTest do
     assert [:search, :elected] = stages(fleet)
     leader = scene.leader
     assert Enum.find(scene.robots, & &1.leader?).id == leader
-    eventually(fn -> Enum.any?(Fleet.scene(fleet).robots, & &1.slot) end, 2_000)
+    eventually(fn -> Enum.any?(Fleet.scene(fleet).robots, & &1.slot) end, 6_000)
 
     # All stop, and stay so, until a person clears it.
     assert Swarm.estop() == :ok
@@ -69,7 +69,7 @@ defmodule Sim.FleetTest do
     assert Swarm.reset() == :ok
 
     # What they were at ended with the stop; they begin anew.
-    eventually(fn -> Fleet.scene(fleet).leader == nil end, 2_000)
+    eventually(fn -> Fleet.scene(fleet).leader == nil end, 6_000)
     assert Swarm.start() == :ok
     eventually(fn -> Fleet.scene(fleet).leader end, 15_000)
     leader = Fleet.scene(fleet).leader
@@ -82,7 +82,7 @@ defmodule Sim.FleetTest do
     assert Fleet.kill(fleet, leader) |> elem(1) =~ "no robot"
     assert :killed in stages(fleet)
     [other | _] = ids -- [leader]
-    eventually(fn -> Board.peers(Board.find!(other))[leader].mode == :dead end, 4_000)
+    eventually(fn -> Board.peers(Board.find!(other))[leader].mode == :dead end, 8_000)
     eventually(fn -> Fleet.scene(fleet).leader not in [nil, leader] end, 20_000)
     assert truth(fleet, leader) == body
 
@@ -105,7 +105,7 @@ defmodule Sim.FleetTest do
 
     # One failure is none.
     kill(:mag91, :executive)
-    eventually(fn -> Names.whereis(:mag91, :link) && Swarm.tell(:mag91, "ping") == :ok end, 2_000)
+    eventually(fn -> Names.whereis(:mag91, :link) && Swarm.tell(:mag91, "ping") == :ok end, 6_000)
     assert Fleet.living(fleet) == [:mag91, :mag92]
 
     Enum.find(1..8, fn _ ->
@@ -119,7 +119,7 @@ defmodule Sim.FleetTest do
       Names.whereis(:mag91, :robot) == nil
     end)
 
-    eventually(fn -> Fleet.living(fleet) == [:mag92] end, 2_000)
+    eventually(fn -> Fleet.living(fleet) == [:mag92] end, 6_000)
     assert :killed in stages(fleet)
     assert Swarm.tell(:mag92, "ping") == :ok
     stop(fleet)
@@ -143,8 +143,8 @@ defmodule Sim.FleetTest do
         kills: [{:mag96, 0.3}]
       })
 
-    eventually(fn -> stages(fleet) == [:killed, :landmark_moved] end, 3_000)
-    eventually(fn -> elem(Fleet.scene(fleet).landmark, 0) > 0.05 end, 2_000)
+    eventually(fn -> stages(fleet) == [:killed, :landmark_moved] end, 6_000)
+    eventually(fn -> elem(Fleet.scene(fleet).landmark, 0) > 0.05 end, 6_000)
     %{messages: %{sent: sent, lost: lost}} = Fleet.result(fleet)
     assert lost > 0 and lost < sent
     assert Fleet.move_landmark(fleet, {99.0, 0.0}) |> elem(1) =~ "99"
