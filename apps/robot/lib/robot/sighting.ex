@@ -1,10 +1,55 @@
 defmodule Robot.Sighting do
   @moduledoc """
   From a blob in a picture to a direction and a place: pinhole camera, landmarks upright. Pure.
+
+  A picture is old when it is looked at: the robot has turned meanwhile. So `of/3` first takes the
+  direction to the map by the pose at exposure, and then looks at it from the present pose.
   """
   alias Hal.Pose
   alias Robot.Percept
   alias Vision.Blob
+
+  @typedoc """
+  What the camera says about one coloured thing. `bearing` is relative to the body now, left
+  positive; `direction` is in the map frame, `nil` without a pose.
+  """
+  @type t :: %{
+          bearing: float(),
+          direction: float() | nil,
+          distance: float() | nil,
+          share: float(),
+          at_ms: integer() | nil
+        }
+
+  # Boxes this many pixels apart still touch: a border between two colours belongs to neither.
+  @touch 3
+  # How far a blob's width may be off the expected one.
+  @fits 0.25
+  # A clipped blob that covers more of the picture than this is too near to be measured.
+  @too_near_share 0.2
+
+  @doc "The sighting of the largest blob of a colour (`nil`: of any), or `nil`; see `largest/3`."
+  @spec of(Percept.t(), String.t() | nil, float()) :: t() | nil
+  def of(percept, colour, min_share \\ 0.0) do
+    with %Blob{} = blob <- largest(percept, colour, min_share) do
+      seen = bearing(blob, percept.blobs_pan, field_of_view(percept))
+      exposed = percept.blobs_pose || percept.pose
+      direction = exposed && Pose.wrap(exposed.heading + seen)
+
+      %{
+        bearing:
+          if(direction && percept.pose,
+            do: Pose.wrap(direction - percept.pose.heading),
+            else: seen
+          ),
+        direction: direction,
+        distance:
+          if(blob.clipped? and blob.share > @too_near_share, do: nil, else: blob.distance),
+        share: blob.share,
+        at_ms: percept.blobs_at_ms
+      }
+    end
+  end
 
   @doc """
   Direction of a blob's centre seen from the robot's body, in radians, left positive: where the
@@ -50,7 +95,6 @@ defmodule Robot.Sighting do
       else: blob.distance
   end
 
-  @touch 3
   defp touch?(a, b) do
     a.left <= b.right + @touch and b.left <= a.right + @touch and a.top <= b.bottom + @touch and
       b.top <= a.bottom + @touch
@@ -65,7 +109,7 @@ defmodule Robot.Sighting do
   def fits?(%Blob{} = blob, radius, distance, field_of_view) when distance > radius do
     focal = blob.width / 2 / :math.tan(field_of_view / 2)
     expected = 2 * focal * :math.tan(:math.asin(radius / distance))
-    abs((blob.right - blob.left + 1) / expected - 1) < 0.25
+    abs((blob.right - blob.left + 1) / expected - 1) < @fits
   end
 
   def fits?(_blob, _radius, _distance, _field_of_view), do: false
@@ -75,13 +119,17 @@ defmodule Robot.Sighting do
   def field_of_view(%Percept{ptz: %{field_of_view: angle}}), do: angle
   def field_of_view(%Percept{profile: profile}), do: profile.camera.field_of_view
 
-  @doc "The largest blob of a colour in a percept, or `nil`."
-  @spec largest(Percept.t(), String.t()) :: Blob.t() | nil
-  def largest(%Percept{blobs: nil}, _colour), do: nil
+  @doc """
+  The largest blob of a colour (`nil`: of any) with at least this share of the picture; `nil`
+  without one, or without a fresh picture. Of equally large ones the topmost, then the leftmost.
+  """
+  @spec largest(Percept.t(), String.t() | nil, float()) :: Blob.t() | nil
+  def largest(percept, colour, min_share \\ 0.0)
+  def largest(%Percept{blobs: nil}, _colour, _min_share), do: nil
 
-  def largest(%Percept{blobs: blobs}, colour) do
+  def largest(%Percept{blobs: blobs}, colour, min_share) do
     blobs
-    |> Enum.filter(&(&1.colour == colour))
+    |> Enum.filter(&(&1.share >= min_share and colour in [nil, &1.colour]))
     |> Enum.max_by(&{&1.area, -&1.top, -&1.left}, fn -> nil end)
   end
 end

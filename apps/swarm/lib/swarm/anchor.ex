@@ -34,7 +34,6 @@ defmodule Swarm.Anchor do
           trail: [{integer(), integer(), integer()}] | nil
         }
 
-  @far 1_000_000_000
   @most 1_000
 
   @doc """
@@ -56,15 +55,17 @@ defmodule Swarm.Anchor do
   @doc "Whether a term from outside is an anchor with sane numbers."
   @spec valid?(term()) :: boolean()
   def valid?(%__MODULE__{twist: {v, w}, order: order, places: places} = anchor) do
-    Shape.whole?(anchor, __MODULE__) and pose?(anchor.pose) and whole?(v) and whole?(w) and
-      is_atom(anchor.leader) and is_integer(anchor.epoch) and anchor.epoch > 0 and
-      is_integer(anchor.sequence) and formation?(anchor.formation) and
+    Shape.whole?(anchor, __MODULE__) and Shape.pose?(anchor.pose) and Shape.number?(v) and
+      Shape.number?(w) and Shape.name?(anchor.leader) and Shape.count?(anchor.epoch) and
+      anchor.epoch > 0 and Shape.count?(anchor.sequence) and formation?(anchor.formation) and
       (anchor.asked == nil or formation?(anchor.asked)) and
-      list?(order, &is_atom/1) and anchor.size in 1..@most and
-      list?(places, &(&1 in 1..@most and &1 < anchor.size)) and length(places) == length(order) and
+      Shape.names?(order) and Shape.distinct?(order) and anchor.leader not in order and
+      anchor.size in 1..@most and
+      Shape.list?(places, &(&1 in 1..@most and &1 < anchor.size)) and
+      length(places) == length(order) and Shape.distinct?(places) and
       landmark?(anchor.landmark) and is_boolean(anchor.still) and
       (anchor.trail == nil or
-         (list?(anchor.trail, &pose?/1) and length(anchor.trail) == length(order)))
+         (Shape.list?(anchor.trail, &Shape.pose?/1) and length(anchor.trail) == length(order)))
   end
 
   def valid?(_term), do: false
@@ -76,17 +77,7 @@ defmodule Swarm.Anchor do
 
   defp formation?(_other), do: false
 
-  defp list?(list, check) when is_list(list),
-    do: not List.improper?(list) and Enum.all?(list, check)
-
-  defp list?(_other, _check), do: false
-
-  defp pose?({x, y, heading}), do: whole?(x) and whole?(y) and whole?(heading)
-  defp pose?(_other), do: false
-
   defp landmark?(nil), do: true
-  defp landmark?({x, y}), do: whole?(x) and whole?(y)
+  defp landmark?({x, y}), do: Shape.number?(x) and Shape.number?(y)
   defp landmark?(_other), do: false
-
-  defp whole?(n), do: is_integer(n) and abs(n) < @far
 end

@@ -4,8 +4,9 @@ defmodule Swarm.Heartbeat do
   whom it follows. Whole numbers only: mm, mrad, mm/s, mrad/s, millionths of a picture.
 
   `estop` is the number of the last emergency stop that it knows, 0 for none, and `latched` says
-  whether its own latch is set (`Swarm.Stop`). `sight` is its newest view of the landmark: relative size and estimated distance, `nil` where it
-  does not see it. `anchor` is there in the leader's heartbeats only.
+  whether its own latch is set (`Swarm.Stop`). `sight` is its newest view of the landmark: relative
+  size and estimated distance, `nil` where it does not see it. `anchor` is there in the leader's
+  heartbeats only. `boot` is its life's number, which grows with every start.
   """
   alias Swarm.Shape
 
@@ -47,7 +48,8 @@ defmodule Swarm.Heartbeat do
           anchor: Swarm.Anchor.t() | nil
         }
 
-  @far 1_000_000_000
+  # Boot numbers may be times in ms, or, on clocks that count finer, in ns.
+  @latest 0xFFFFFFFFFFFFFFFF
 
   @doc """
   The heartbeat of a robot: what it perceives, what its mission claims, whom it hears. A percept
@@ -81,12 +83,12 @@ defmodule Swarm.Heartbeat do
       false
   """
   @spec valid?(term()) :: boolean()
-  def valid?(%__MODULE__{pose: {x, y, heading}, twist: {linear, turn}} = beat) do
-    Shape.whole?(beat, __MODULE__) and
-      Enum.all?([x, y, heading, linear, turn], &(is_integer(&1) and abs(&1) < @far)) and
-      is_integer(beat.boot) and is_integer(beat.sequence) and beat.sequence >= 0 and
-      beat.radius in 50..2000 and is_atom(beat.phase) and is_integer(beat.epoch) and
-      beat.epoch >= 0 and is_atom(beat.leader) and Shape.names?(beat.heard) and sight?(beat.sight) and
+  def valid?(%__MODULE__{twist: {linear, turn}} = beat) do
+    Shape.whole?(beat, __MODULE__) and Shape.pose?(beat.pose) and Shape.number?(linear) and
+      Shape.number?(turn) and is_integer(beat.boot) and beat.boot in 0..@latest and
+      Shape.count?(beat.sequence) and beat.radius in 50..2000 and Shape.name?(beat.phase) and
+      Shape.count?(beat.epoch) and (beat.leader == nil or Shape.name?(beat.leader)) and
+      Shape.names?(beat.heard) and sight?(beat.sight) and
       Enum.all?(
         [beat.standing, beat.in_place, beat.blocked, beat.formed, beat.latched],
         &is_boolean/1
@@ -98,8 +100,10 @@ defmodule Swarm.Heartbeat do
 
   defp sight?(nil), do: true
 
-  defp sight?(%{size_ppm: size, distance: distance}),
-    do: size in 0..1_000_000 and (distance == nil or distance in 0..1_000_000)
+  defp sight?(%{size_ppm: size, distance: distance} = sight),
+    do:
+      map_size(sight) == 2 and size in 0..1_000_000 and
+        (distance == nil or distance in 0..1_000_000)
 
   defp sight?(_other), do: false
 end

@@ -18,23 +18,41 @@ defmodule Swarm.Member do
   alias Hal.{Pose, Profile, Twist}
   alias Robot.{Mind, Percept, Reflex}
   alias Swarm.{Heartbeat, Message, Peers, Stop}
+  alias Swarm.Link.Ear
 
   @beat_ms 200
 
-  @enforce_keys [:id, :profile, :boot, :module, :mission, :mind, :reflex, :peers]
+  @enforce_keys [:id, :profile, :boot, :module, :mission, :mind, :reflex, :ear]
   defstruct @enforce_keys ++
               [
                 phase: :idle,
                 entries: %{},
                 claim: %{},
                 look: nil,
-                stop: %Stop{},
                 sequence: 0,
-                beat_ms: nil,
-                rejected: %{}
+                beat_ms: nil
               ]
 
-  @type t :: %__MODULE__{id: atom(), profile: Profile.t(), rejected: %{atom() => pos_integer()}}
+  @typedoc """
+  `entries` is what was sensed last, by name, and when; `phase`, `claim` and `look` are what the
+  mission said last; `ear` is what was heard: peers, emergency stop, rejected messages.
+  """
+  @type t :: %__MODULE__{
+          id: atom(),
+          profile: Profile.t(),
+          boot: non_neg_integer(),
+          module: module(),
+          mission: term(),
+          mind: Mind.t(),
+          reflex: Reflex.t(),
+          ear: Ear.t(),
+          phase: term(),
+          entries: %{atom() => {term(), integer()}},
+          claim: map(),
+          look: float() | nil,
+          sequence: non_neg_integer(),
+          beat_ms: integer() | nil
+        }
 
   @type input ::
           {:reading, Hal.Drive.reading() | Hal.Ptz.reading(), integer()}
@@ -69,7 +87,7 @@ defmodule Swarm.Member do
       phase: phase,
       mind: Mind.new(profile: options[:profile], start: options[:start]),
       reflex: Reflex.new(options[:profile]),
-      peers: Peers.new(options[:id])
+      ear: Ear.new(options[:id])
     }
   end
 
@@ -84,21 +102,24 @@ defmodule Swarm.Member do
     do: {put(member, :blobs, %{blobs: blobs, pan: pan}, at_ms), []}
 
   def step(member, {:message, term, at_ms}) do
-    case Message.check(term) do
-      {:ok, %Message{kind: :heartbeat} = message} -> hear(member, message, at_ms)
-      {:ok, message} -> handle(member, {:message, message})
-      {:error, reason} -> {%{member | rejected: count(member.rejected, reason)}, []}
+    {heard, ear} = Ear.hear(member.ear, term, at_ms)
+
+    case heard do
+      {:message, message} -> handle(%{member | ear: ear}, {:message, message})
+      _peer_or_nothing -> latch(member, ear)
     end
   end
 
-  def step(member, {:command, :estop, _at_ms}),
-    do: latch(member, Stop.press(member.stop))
+  def step(%{ear: ear} = member, {:command, :estop, _at_ms}),
+    do: latch(member, %{ear | stop: Stop.press(ear.stop)})
 
-  def step(member, {:command, :reset, _at_ms}),
-    do: {%{member | reflex: Reflex.reset(member.reflex), stop: Stop.reset(member.stop)}, []}
+  def step(%{ear: ear} = member, {:command, :reset, _at_ms}) do
+    reflex = Reflex.reset(member.reflex)
+    {%{member | reflex: reflex, ear: %{ear | stop: Stop.reset(ear.stop)}}, []}
+  end
 
   # What is asked for while all stand would otherwise begin with the reset.
-  def step(%{stop: %{latched?: true}} = member, {:command, command, _at_ms})
+  def step(%{ear: %{stop: %{latched?: true}}} = member, {:command, command, _at_ms})
       when command != :stop,
       do: {member, []}
 
@@ -141,7 +162,7 @@ defmodule Swarm.Member do
         robot: member.id,
         at_ms: at_ms,
         profile: member.profile,
-        peers: Peers.percepts(member.peers, at_ms)
+        peers: Peers.percepts(member.ear.peers, at_ms)
       },
       fn key, limit_ms ->
         case member.entries do
@@ -153,18 +174,13 @@ defmodule Swarm.Member do
   end
 
   # An e-stop spreads with every heartbeat.
-  defp hear(member, %Message{from: from, body: beat}, at_ms) do
-    member = %{member | peers: Peers.hear(member.peers, from, beat, at_ms)}
-    latch(member, Stop.hear(member.stop, beat.estop, beat.latched))
-  end
-
   # The mission ends with it: after the reset nothing moves until somebody says so.
-  defp latch(%{stop: %{latched?: false}} = member, %{latched?: true} = stop) do
-    member = %{member | reflex: Reflex.estop(member.reflex), stop: stop}
+  defp latch(%{ear: %{stop: %{latched?: false}}} = member, %{stop: %{latched?: true}} = ear) do
+    member = %{member | reflex: Reflex.estop(member.reflex), ear: ear}
     handle(member, {:command, :stop})
   end
 
-  defp latch(member, stop), do: {%{member | stop: stop}, []}
+  defp latch(member, ear), do: {%{member | ear: ear}, []}
 
   defp outcome({tag, result}), do: {:outcome, tag, result}
 
@@ -189,9 +205,9 @@ defmodule Swarm.Member do
   defp beat(member, at_ms) do
     case Mind.percept(member.mind) do
       %Percept{pose: %Pose{}} = percept ->
-        heard = Peers.heard(member.peers, at_ms)
+        heard = Peers.heard(member.ear.peers, at_ms)
         sender = {member.boot, member.sequence + 1}
-        beat = Heartbeat.new(sender, percept, member.claim, heard, member.stop)
+        beat = Heartbeat.new(sender, percept, member.claim, heard, member.ear.stop)
 
         {%{member | sequence: member.sequence + 1, beat_ms: at_ms},
          [{:send, :all, Message.new(member.id, :heartbeat, beat)}]}
@@ -200,6 +216,4 @@ defmodule Swarm.Member do
         {member, []}
     end
   end
-
-  defp count(rejected, reason), do: Map.update(rejected, reason, 1, &(&1 + 1))
 end

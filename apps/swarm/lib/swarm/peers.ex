@@ -4,9 +4,10 @@ defmodule Swarm.Peers do
   the listener's own, in milliseconds.
 
   A peer is suspect after 1 s of silence and gone after 2 s. A gone robot's last pose stays known,
-  as an obstacle, until it is heard from elsewhere. A robot that comes back with a new boot number
-  starts anew; within one boot only newer sequence numbers count, so that late and doubled
-  heartbeats do no harm.
+  as an obstacle, until it is heard from elsewhere. A robot that comes back with a higher boot
+  number starts anew; within one boot only newer sequence numbers count, so that late and doubled
+  heartbeats do no harm, those of a robot's former life included. Boot numbers may be times of day,
+  and clocks are set back: from a robot that is gone any boot number is believed.
   """
   alias Hal.{Pose, Twist}
   alias Swarm.Heartbeat
@@ -30,15 +31,18 @@ defmodule Swarm.Peers do
   def hear(%{me: me} = peers, me, _beat, _now_ms), do: peers
 
   def hear(peers, from, beat, now_ms) do
-    case peers.rows do
-      %{^from => %{beat: %{boot: boot, sequence: old}}}
-      when boot == beat.boot and old >= beat.sequence ->
-        peers
-
-      _unknown_or_older ->
-        %{peers | rows: Map.put(peers.rows, from, %{beat: beat, at_ms: now_ms})}
-    end
+    if news?(peers.rows[from], beat, now_ms),
+      do: %{peers | rows: Map.put(peers.rows, from, %{beat: beat, at_ms: now_ms})},
+      else: peers
   end
+
+  defp news?(nil, _beat, _now_ms), do: true
+
+  defp news?(%{beat: %{boot: boot, sequence: sequence}}, %{boot: boot} = beat, _now_ms),
+    do: beat.sequence > sequence
+
+  defp news?(%{beat: %{boot: boot}, at_ms: at_ms}, beat, now_ms),
+    do: beat.boot > boot or now_ms - at_ms >= @gone_ms
 
   @doc "How a robot is, judged by its silence; an unknown one is gone."
   @spec status(t(), atom(), integer()) :: status()

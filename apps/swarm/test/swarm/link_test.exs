@@ -156,7 +156,7 @@ defmodule Swarm.LinkTest do
 
   test "a transport of one's own" do
     id = talking(:link11, link: [transport: {__MODULE__, :carry, [self()]}])
-    Link.say(id, [:mag7, :link11], Message.new(id, :command, :start))
+    Link.say(id, [:mag7, :link11], Message.new(id, :place, :start))
     assert_receive {:carried, ^id, [:mag7], %Message{body: :start}}
     assert_receive {:carried, ^id, _all, %Message{kind: :heartbeat}}, 500
   end
@@ -166,7 +166,7 @@ defmodule Swarm.LinkTest do
 
   test "says who is addressed" do
     ids = for id <- [:link12, :link13, :link14], do: talking(id)
-    message = Message.new(:link12, :command, :start)
+    message = Message.new(:link12, :place, :start)
     all = Link.say(:link12, :all, message)
     assert all -- ids == all -- [:link13, :link14]
     assert Link.say(:link12, :link13, message) == [:link13]

@@ -9,8 +9,8 @@ defmodule Robot.Behaviour.FindBlob do
   """
   @behaviour Robot.Behaviour
   alias Hal.{Pose, Twist}
-  alias Robot.Behaviour.{Options, Sighting}
-  alias Robot.{Steering, Wish}
+  alias Robot.Behaviour.Options
+  alias Robot.{Sighting, Steering, Wish}
 
   # How long a sighting is believed after the last picture that showed it.
   @memory_ms 600
@@ -56,7 +56,7 @@ defmodule Robot.Behaviour.FindBlob do
   end
 
   defp look(state, percept) do
-    case Sighting.largest(percept, state.colour, state.min_share) do
+    case Sighting.of(percept, state.colour, state.min_share) do
       nil ->
         forget? = state.seen && percept.at_ms - state.seen.at_ms > @memory_ms
         if forget?, do: %{state | seen: nil, steady: 0}, else: state

@@ -13,8 +13,8 @@ defmodule Robot.Behaviour.TrackBlob do
   """
   @behaviour Robot.Behaviour
   alias Hal.{Pose, Twist}
-  alias Robot.Behaviour.{Options, Sighting}
-  alias Robot.{Steering, Wish}
+  alias Robot.Behaviour.Options
+  alias Robot.{Sighting, Steering, Wish}
 
   # Radians: where turning begins, and where it is good enough.
   @off_centre 0.04
@@ -108,7 +108,7 @@ defmodule Robot.Behaviour.TrackBlob do
   defp look(state, percept) do
     state = %{state | picture_ms: percept.blobs_at_ms}
 
-    case Sighting.largest(percept, state.colour, state.min_share) do
+    case Sighting.of(percept, state.colour, state.min_share) do
       nil ->
         state
 

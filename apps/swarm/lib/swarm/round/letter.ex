@@ -22,31 +22,35 @@ defmodule Swarm.Round.Letter do
           ask: boolean()
         }
 
+  # More than any round lasts.
+  @longest_ms 120_000
+
   @doc "Whether a term from outside is a letter."
   @spec valid?(term()) :: boolean()
   def valid?(%__MODULE__{id: {epoch, counter, initiator}} = letter) do
-    Shape.whole?(letter, __MODULE__) and is_integer(epoch) and epoch > 0 and epoch < 1_000_000_000 and
-      is_integer(counter) and
-      counter > 0 and counter < 1_000_000_000 and is_atom(initiator) and
-      is_integer(letter.remaining_ms) and letter.remaining_ms <= 120_000 and
+    Shape.whole?(letter, __MODULE__) and Shape.count?(epoch) and epoch > 0 and
+      Shape.count?(counter) and counter > 0 and Shape.name?(initiator) and
+      Shape.number?(letter.remaining_ms) and letter.remaining_ms <= @longest_ms and
       letter.purpose in [:search, :change] and Shape.names?(letter.view) and
+      Shape.distinct?(letter.view) and
       (letter.report == :busy or report?(letter.report)) and
       (letter.known == nil or known?(letter.known)) and
-      (letter.digest == nil or is_binary(letter.digest)) and is_boolean(letter.ask)
+      (letter.digest == nil or (is_binary(letter.digest) and byte_size(letter.digest) == 32)) and
+      is_boolean(letter.ask)
   end
 
   def valid?(_term), do: false
 
   defp known?(known) when is_map(known) and not is_struct(known),
-    do: Enum.all?(known, fn {id, report} -> is_atom(id) and report?(report) end)
+    do: Enum.all?(known, fn {id, report} -> Shape.name?(id) and report?(report) end)
 
   defp known?(_other), do: false
 
   defp report?(nil), do: true
 
-  defp report?(%{found: found, size_ppm: size, pose: {x, y, heading}}) do
-    is_boolean(found) and is_integer(size) and size in 0..1_000_000 and
-      Enum.all?([x, y, heading], &(is_integer(&1) and abs(&1) < 1_000_000_000))
+  defp report?(%{found: found, size_ppm: size, pose: pose} = report) do
+    map_size(report) == 3 and is_boolean(found) and is_integer(size) and size in 0..1_000_000 and
+      Shape.pose?(pose)
   end
 
   defp report?(_other), do: false
