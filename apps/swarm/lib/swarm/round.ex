@@ -45,7 +45,26 @@ defmodule Swarm.Round do
               ]
 
   @type phase :: :none | :collect | :echo | :digest | :committed
-  @type t :: %__MODULE__{me: atom(), phase: phase()}
+  @typedoc """
+  `report` is the own one, `reports` and `digests` are what was heard of all, `said_ms` is when this
+  robot spoke last, `since_ms` when the phase began, `highest` the highest epoch and counter known.
+  """
+  @type t :: %__MODULE__{
+          me: atom(),
+          id: Letter.id() | nil,
+          view: [atom()],
+          phase: phase(),
+          purpose: :search | :change,
+          deadline_ms: integer(),
+          since_ms: integer(),
+          said_ms: integer() | nil,
+          report: :busy | Swarm.Election.report(),
+          reports: %{atom() => Swarm.Election.report()},
+          digests: %{atom() => binary()},
+          digest: binary() | nil,
+          echo?: boolean(),
+          highest: {epoch :: non_neg_integer(), counter :: non_neg_integer()}
+        }
   @type record :: %{
           id: Letter.id(),
           view: [atom()],
@@ -87,7 +106,7 @@ defmodule Swarm.Round do
 
     cond do
       letter.id == round.id -> take(round, from, letter)
-      above?(letter.id, round) and me in letter.view -> join(round, from, letter, now_ms)
+      supersedes?(letter.id, round) and me in letter.view -> join(round, from, letter, now_ms)
       true -> round
     end
   end
@@ -112,19 +131,21 @@ defmodule Swarm.Round do
         {%{round | phase: :committed, since_ms: now_ms}, letters, {:commit, record(round)}}
 
       round.phase == :digest and differing?(round) ->
-        {%{fenced(round) | phase: :none}, letters, {:failed, :mismatch}}
+        {leave(round), letters, {:failed, :mismatch}}
 
       round.phase == :digest and now_ms - round.since_ms > @give_up_after * repeat_ms(round) ->
-        {%{fenced(round) | phase: :none}, letters, {:failed, :timeout}}
+        {leave(round), letters, {:failed, :timeout}}
 
       true ->
         {round, letters, nil}
     end
   end
 
-  @doc "The frozen record of a round that has its reports."
-  @spec record(t()) :: record()
-  def record(round),
+  @doc "Leaves a round; what this robot said in it stands."
+  @spec leave(t()) :: t()
+  def leave(round), do: %{fenced(round) | phase: :none}
+
+  defp record(round),
     do: %{id: round.id, view: round.view, reports: frozen(round), digest: round.digest}
 
   defp enter(round, id, view, purpose, length_ms, now_ms) do
@@ -174,8 +195,11 @@ defmodule Swarm.Round do
     if news == %{}, do: round, else: %{round | reports: Map.merge(round.reports, news)}
   end
 
-  defp put_digest(round, from, digest),
-    do: %{round | digests: Map.put_new(round.digests, from, digest)}
+  defp put_digest(round, from, digest) do
+    if from in round.view,
+      do: %{round | digests: Map.put_new(round.digests, from, digest)},
+      else: round
+  end
 
   defp advance(%{phase: :collect} = round, now_ms) do
     all? = Enum.all?(round.view, &is_map_key(round.reports, &1))
@@ -269,6 +293,17 @@ defmodule Swarm.Round do
   defp note(round, {epoch, counter, _initiator}),
     do: %{round | highest: max(round.highest, {epoch, counter})}
 
-  defp above?(id, %{id: nil}), do: id != nil
-  defp above?(id, round), do: id > round.id
+  # Whoever has sent its digest goes on to another round of the same epoch only with one who has
+  # not sent any: else two rounds could found the same epoch.
+  defp supersedes?(_id, %{id: nil}), do: true
+
+  defp supersedes?({epoch, _counter, initiator} = id, %{id: {own, _, _}} = round) do
+    case round.phase do
+      :committed -> epoch > own
+      :digest -> epoch > own or (id > round.id and unsigned?(round, initiator))
+      _open_or_left -> id > round.id
+    end
+  end
+
+  defp unsigned?(round, id), do: id in round.view and not is_map_key(round.digests, id)
 end

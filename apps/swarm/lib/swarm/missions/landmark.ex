@@ -94,12 +94,12 @@ defmodule Swarm.Missions.Landmark do
     end)
   end
 
-  # Only an anchor of this or a later epoch counts, and only one that is news.
+  # Only an anchor of the own leader or of a later epoch counts, and only one that is news.
   defp hear_anchor(%{me: me} = mission, %Anchor{leader: leader} = anchor) when leader != me do
-    known = mission.anchor
+    ours? = anchor.epoch == mission.epoch and mission.leader in [nil, leader]
 
-    if anchor.epoch >= mission.epoch and
-         (known == nil or {anchor.epoch, anchor.sequence} > {known.epoch, known.sequence}),
+    if (ours? or anchor.epoch > mission.epoch) and
+         Anchor.newest(mission.anchor, anchor) != mission.anchor,
        do: %{
          mission
          | anchor: anchor,
@@ -130,6 +130,7 @@ defmodule Swarm.Missions.Landmark do
   defp holds?(:sighted, m), do: State.sees?(m) or Council.search?(m)
   defp holds?(:roamed, m), do: m.now_ms - m.since_ms >= @roam_ms
   defp holds?(:deposed, m), do: Lead.deposed?(m)
+  defp holds?(:superseded, m), do: joined?(m)
   defp holds?(:round_open, m), do: Round.open?(m.round)
 
   # A robot that comes late, or missed the end of a round, joins the leader who names it.

@@ -50,27 +50,23 @@ defmodule Swarm.Missions.Landmark.Council do
   @doc "All that take part in the mission and are not gone, this robot too, sorted."
   @spec view(State.t()) :: [atom()]
   def view(mission) do
-    others =
-      for {id, beat} <- Peers.taking_part(mission.percept.peers, mission.now_ms),
-          beat.phase != :idle,
-          do: id
+    others = for {id, beat} <- beats(mission), beat.phase != :idle, do: id
 
     Enum.sort([mission.me | others])
   end
 
   @doc "Whether another robot leads, as far as this one hears."
   @spec led?(State.t()) :: boolean()
-  def led?(mission) do
-    mission.percept.peers
-    |> Peers.taking_part(mission.now_ms)
-    |> Enum.any?(fn {_id, beat} -> beat.phase == :lead end)
-  end
+  def led?(mission), do: leading_epoch(mission) >= 0
 
   defp open(mission) do
     view = view(mission)
     since = mission.now_ms - mission.since_ms
 
     cond do
+      Round.open?(mission.round) and overtaken?(mission) ->
+        %{mission | round: Round.leave(mission.round)}
+
       Round.open?(mission.round) ->
         reopen(mission, view)
 
@@ -104,6 +100,21 @@ defmodule Swarm.Missions.Landmark.Council do
   defp purpose(%{scan: nil}), do: :change
   defp purpose(_scanned), do: :search
 
+  # While this robot waited, others have elected a leader: it comes along with their anchor. Once
+  # its digest is out the round has to end by itself, for the others may wait for it.
+  defp overtaken?(%{round: %{phase: :digest}}), do: false
+
+  defp overtaken?(%{round: %{id: {epoch, _counter, _initiator}}} = mission),
+    do: epoch <= leading_epoch(mission)
+
+  defp leading_epoch(mission) do
+    for {_id, %{phase: :lead, epoch: epoch}} <- beats(mission), reduce: -1 do
+      highest -> max(highest, epoch)
+    end
+  end
+
+  defp beats(mission), do: Peers.taking_part(mission.percept.peers, mission.now_ms)
+
   # A member that is gone would be waited for in vain, and one that came would be left out.
   defp reopen(%{round: round} = mission, view) do
     gone? = Enum.any?(round.view, &(&1 not in view))
@@ -117,7 +128,8 @@ defmodule Swarm.Missions.Landmark.Council do
   defp start(mission, view, purpose) do
     length = if purpose == :search, do: @search_ms, else: @change_ms
     same? = Round.open?(mission.round)
-    epoch = if same?, do: elem(mission.round.id, 0), else: mission.epoch + 1
+    known = for {_id, beat} <- beats(mission), do: beat.epoch
+    epoch = if same?, do: elem(mission.round.id, 0), else: Enum.max([mission.epoch | known]) + 1
     round = Round.open(mission.round, epoch, view, purpose, length, mission.now_ms)
     %{mission | round: round, challenge: nil}
   end
@@ -130,7 +142,7 @@ defmodule Swarm.Missions.Landmark.Council do
   end
 
   defp heard_by_others?(mission) do
-    peers = Peers.taking_part(mission.percept.peers, mission.now_ms)
+    peers = beats(mission)
 
     case peers[mission.leader] do
       nil -> Enum.any?(peers, fn {_id, beat} -> mission.leader in beat.heard end)
@@ -182,8 +194,11 @@ defmodule Swarm.Missions.Landmark.Council do
     end
   end
 
-  defp conclude({:failed, _reason}, mission),
-    do: start(mission, view(mission), mission.round.purpose)
+  defp conclude({:failed, _reason}, %{round: %{id: {epoch, _counter, _initiator}}} = mission) do
+    if epoch <= leading_epoch(mission),
+      do: mission,
+      else: start(mission, view(mission), mission.round.purpose)
+  end
 
   defp conclude(nil, mission), do: mission
 

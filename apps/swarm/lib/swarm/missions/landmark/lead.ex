@@ -67,7 +67,16 @@ defmodule Swarm.Missions.Landmark.Lead do
   @doc "One tick of leading."
   @spec act(State.t()) :: {State.t(), [tuple()]}
   def act(mission) do
-    mission = mission |> hear() |> muster() |> shape() |> tell()
+    mission = hear(mission)
+    if mission.percept.pose, do: lead(mission), else: blind(mission)
+  end
+
+  # Who does not know where it is cannot tell others where to stand; they soon stand still.
+  defp blind(mission),
+    do: {%{mission | anchor: nil}, [{:goal, :stand, {Behaviour.Stop, []}}, {:look, 0.0}]}
+
+  defp lead(mission) do
+    mission = mission |> muster() |> shape() |> tell()
     {mission, formed} = judge(mission)
     {mission, lost} = miss(mission)
     child = List.first(mission.order)
@@ -79,13 +88,16 @@ defmodule Swarm.Missions.Landmark.Lead do
     {mission, formed ++ lost ++ place ++ [goal(mission), {:look, 0.0}, {:anchors, []}]}
   end
 
+  # Who is alone has nobody to be heard by, and who comes needs time to hear it.
   defp hear(mission) do
     heard? =
       mission.percept.peers
       |> Peers.taking_part(mission.now_ms)
       |> Enum.any?(fn {_id, beat} -> mission.me in beat.heard end)
 
-    if heard?, do: put_in(mission.lead.heard_ms, mission.now_ms), else: mission
+    if heard? or mission.order == [],
+      do: put_in(mission.lead.heard_ms, mission.now_ms),
+      else: mission
   end
 
   # The gone leave their slots and those behind move up (R53 with healing); who comes joins the tail.

@@ -13,6 +13,19 @@ defmodule Swarm.Missions.Landmark.Phases do
   | `:rest` | stands | the landmark is nowhere; starts again when it sees one |
   | `:lead` | tracks the landmark, tells the others where it is | |
   | `:follow` | drives to its slot, tells its child | |
+
+  | condition | holds when |
+  |---|---|
+  | `:started`, `:stopped` | a person has said so |
+  | `:elected`, `:led` | a round has made this robot the leader, or another, or one names it in its order |
+  | `:nobody`, `:nobody_again` | a round in which nobody had found the landmark; the third in a row |
+  | `:scanned` | the turn is over, whatever it showed |
+  | `:scan_wanted` | a round waits for a scan that this robot has not made |
+  | `:sighted` | the landmark is in the picture, or a round waits for a scan |
+  | `:roamed` | it has roamed for long enough |
+  | `:deposed` | others follow a later leader, or nobody hears this one |
+  | `:superseded` | a leader of a later epoch names this robot in its order |
+  | `:round_open` | a round is under way |
   """
 
   @table [
@@ -34,9 +47,9 @@ defmodule Swarm.Missions.Landmark.Phases do
        nobody: :wander,
        scan_wanted: :search},
     wander: {:roam, stopped: :idle, led: :follow, sighted: :search, roamed: :search},
-    rest: {:stand, stopped: :idle, led: :follow, sighted: :search, scan_wanted: :search},
+    rest: {:stand, stopped: :idle, led: :follow, sighted: :search},
     lead: {:lead, stopped: :idle, deposed: :agree, round_open: :agree},
-    follow: {:follow, stopped: :idle, round_open: :agree, elected: :lead}
+    follow: {:follow, stopped: :idle, round_open: :agree, superseded: :agree}
   ]
 
   @type phase :: :idle | :search | :agree | :wander | :rest | :lead | :follow
@@ -53,6 +66,7 @@ defmodule Swarm.Missions.Landmark.Phases do
           | :sighted
           | :roamed
           | :deposed
+          | :superseded
           | :round_open
 
   @doc "The phases in the order of the table."
