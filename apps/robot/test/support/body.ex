@@ -83,8 +83,8 @@ defmodule Robot.Body do
         right: at,
         top: 110,
         bottom: 130,
-        width: 1,
-        height: 21,
+        width: 320,
+        height: 240,
         distance: distance
       }
     end

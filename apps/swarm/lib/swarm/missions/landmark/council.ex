@@ -68,7 +68,7 @@ defmodule Swarm.Missions.Landmark.Council do
         %{mission | round: Round.leave(mission.round)}
 
       Round.open?(mission.round) ->
-        reopen(mission, view)
+        reopen(mission, view, since)
 
       mission.challenge == :open ->
         start(mission, view, :change)
@@ -115,9 +115,10 @@ defmodule Swarm.Missions.Landmark.Council do
 
   defp beats(mission), do: Peers.taking_part(mission.percept.peers, mission.now_ms)
 
-  # A member that is gone would be waited for in vain, and one that came would be left out.
-  defp reopen(%{round: round} = mission, view) do
-    gone? = Enum.any?(round.view, &(&1 not in view))
+  # A member that is gone would be waited for in vain, and one that came would be left out. Who has
+  # only just been switched on has heard nobody yet, but nobody is gone.
+  defp reopen(%{round: round} = mission, view, since) do
+    gone? = since >= @settle_ms and Enum.any?(round.view, &(&1 not in view))
     came? = round.phase == :collect and hd(view) == mission.me and view -- round.view != []
 
     if gone? or came?,

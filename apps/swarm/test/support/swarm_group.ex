@@ -1,0 +1,270 @@
+defmodule Swarm.Group do
+  @moduledoc """
+  A handful of landmark missions on one floor, without a world: bodies go straight to their slots,
+  a scan takes half a second, and messages go over a small radio that delays, loses, doubles,
+  reorders and is cut in two. Pure but for `:rand`, which ExUnit seeds.
+  """
+  alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Robot.{Behaviour, Percept}
+  alias Swarm.{Heartbeat, Message, Peers, Stop}
+  alias Swarm.Missions.Landmark
+
+  @tick_ms 100
+  @beat_ms 200
+  @scan_ms 500
+  @step 0.05
+
+  defstruct robots: %{},
+            air: [],
+            now: 0,
+            loss: 0.0,
+            doubled: 0.0,
+            delay_ms: {5, 50},
+            cut: [],
+            elected: [],
+            stages: [],
+            both_ms: 0,
+            worst_both_ms: 0
+
+  @type t :: %__MODULE__{}
+
+  @doc "A group; options are the radio's: `loss`, `doubled`, `delay_ms`, `cut`."
+  @spec new(keyword()) :: t()
+  def new(options \\ []), do: struct!(__MODULE__, options)
+
+  @doc "Puts a robot there and starts it. `share` of the picture that the landmark fills, `nil` for unseen."
+  @spec join(t(), atom(), {number(), number()}, float() | nil, keyword()) :: t()
+  def join(group, id, {x, y}, share, options \\ []) do
+    {boot, options} = Keyword.pop(options, :boot, 1)
+    {_phase, mission, []} = Landmark.init(id, options)
+
+    robot = %{
+      id: id,
+      mission: mission,
+      peers: Peers.new(id),
+      pose: Pose.new(x, y),
+      share: share,
+      boot: boot,
+      sequence: 0,
+      claim: %{},
+      goal: nil,
+      goal_ms: 0,
+      phases: [:idle]
+    }
+
+    group = put_in(group.robots[id], robot)
+    event(group, id, {:command, :start})
+  end
+
+  @doc "A robot that is switched off, with all that it knew."
+  @spec kill(t(), atom()) :: t()
+  def kill(group, id), do: %{group | robots: Map.delete(group.robots, id)}
+
+  @doc "How much of a robot's picture the landmark fills from now on."
+  @spec show(t(), atom(), float() | nil) :: t()
+  def show(group, id, share), do: put_in(group.robots[id].share, share)
+
+  @doc "Cuts the radio between the members of different sets; `[]` mends it."
+  @spec cut(t(), [[atom()]]) :: t()
+  def cut(group, sets), do: %{group | cut: sets}
+
+  @doc "So many seconds on."
+  @spec run(t(), number()) :: t()
+  def run(group, seconds), do: Enum.reduce(1..round(seconds * 10), group, fn _, g -> tick(g) end)
+
+  @doc "On until it holds, at most so many seconds; says whether it did."
+  @spec until(t(), number(), (t() -> boolean())) :: {boolean(), t()}
+  def until(group, seconds, holds?) do
+    Enum.reduce_while(1..round(seconds * 10), {false, group}, fn _, {_, group} ->
+      group = tick(group)
+      if holds?.(group), do: {:halt, {true, group}}, else: {:cont, {false, group}}
+    end)
+  end
+
+  @doc "One event for one robot, as if it happened now."
+  @spec event(t(), atom(), term()) :: t()
+  def event(group, id, event) do
+    robot = group.robots[id]
+    {phase, mission, effects} = Landmark.handle(event, robot.mission)
+    phases = if hd(robot.phases) == phase, do: robot.phases, else: [phase | robot.phases]
+    group = put_in(group.robots[id], %{robot | mission: mission, phases: phases})
+    Enum.reduce(effects, group, &carry_out(&1, id, &2))
+  end
+
+  @doc "The percept that a robot has now."
+  @spec percept(t(), atom()) :: Percept.t()
+  def percept(group, id) do
+    robot = group.robots[id]
+
+    %Percept{
+      robot: id,
+      at_ms: group.now,
+      profile: Profile.magellan(),
+      pose: robot.pose,
+      odometry: %Odometry{pose: robot.pose, twist: Twist.zero()},
+      peers: Peers.percepts(robot.peers, group.now),
+      blobs: blobs(robot.share),
+      blobs_at_ms: group.now,
+      blobs_pose: robot.pose
+    }
+  end
+
+  defp blobs(nil), do: []
+
+  defp blobs(share) do
+    [
+      %Vision.Blob{
+        colour: "YellowLandmark",
+        area: round(share * 76_800),
+        share: share,
+        x: 159.5,
+        y: 119.5,
+        left: 150,
+        right: 169,
+        top: 60,
+        bottom: 180,
+        width: 320,
+        height: 240,
+        distance: 1.7
+      }
+    ]
+  end
+
+  @doc "What all robots are at, by name."
+  @spec phases(t()) :: %{atom() => atom()}
+  def phases(group), do: Map.new(group.robots, fn {id, robot} -> {id, robot.mission.phase} end)
+
+  @doc "Whom each robot takes for its leader."
+  @spec leaders(t()) :: %{atom() => atom() | nil}
+  def leaders(group), do: Map.new(group.robots, fn {id, robot} -> {id, robot.mission.leader} end)
+
+  @doc "Whether one of these leads and all others follow it, in one epoch."
+  @spec one?(t(), [atom()]) :: boolean()
+  def one?(group, ids) do
+    missions = for id <- ids, do: group.robots[id].mission
+
+    match?([_], Enum.uniq(for m <- missions, do: {m.leader, m.epoch})) and
+      hd(missions).leader in ids and
+      Enum.all?(missions, &(&1.phase == if(&1.me == &1.leader, do: :lead, else: :follow)))
+  end
+
+  defp tick(group) do
+    group = deliver(%{group | now: group.now + @tick_ms})
+    ids = Enum.shuffle(Map.keys(group.robots))
+    ids |> Enum.reduce(group, &think/2) |> watch()
+  end
+
+  defp think(id, group) do
+    group = group |> finish(id) |> event(id, {:tick, percept(group, id)})
+    if rem(group.now, @beat_ms) == 0, do: beat(group, id), else: group
+  end
+
+  # Bodies and scans: what behaviours would do.
+  defp finish(group, id) do
+    case group.robots[id] do
+      %{goal: {{:search, _} = tag, _}, goal_ms: since} = robot
+      when group.now - since >= @scan_ms ->
+        group = put_in(group.robots[id].goal, {:over, tag})
+        event(group, id, {:outcome, tag, if(robot.share, do: 1, else: 0)})
+
+      %{goal: {_tag, {Behaviour.Follow, options}}, pose: pose} = robot ->
+        put_in(group.robots[id], %{robot | pose: toward(pose, options[:target])})
+
+      _standing ->
+        group
+    end
+  end
+
+  defp toward(pose, target) do
+    way = Pose.distance(pose, target)
+    part = if way > @step, do: @step / way, else: 1.0
+    x = pose.x + part * (target.x - pose.x)
+    Pose.new(x, pose.y + part * (target.y - pose.y), pose.heading)
+  end
+
+  defp beat(group, id) do
+    robot = group.robots[id]
+    sender = {robot.boot, robot.sequence + 1}
+    heard = Peers.heard(robot.peers, group.now)
+    beat = Heartbeat.new(sender, percept(group, id), robot.claim, heard, Stop.new())
+    group = put_in(group.robots[id].sequence, robot.sequence + 1)
+    carry_out({:send, :all, Message.new(id, :heartbeat, beat)}, id, group)
+  end
+
+  defp carry_out({:send, to, message}, id, group) do
+    to = if to == :all, do: Map.keys(group.robots) -- [id], else: List.wrap(to)
+    Enum.reduce(to, group, &send_one(&1, id, message, &2))
+  end
+
+  defp carry_out({:claim, claim}, id, group), do: put_in(group.robots[id].claim, claim)
+
+  defp carry_out({:goal, tag, goal}, id, group) do
+    case group.robots[id] do
+      %{goal: {:over, ^tag}} ->
+        group
+
+      %{goal: {^tag, _}} ->
+        put_in(group.robots[id].goal, {tag, goal})
+
+      robot ->
+        put_in(group.robots[id], %{robot | goal: {tag, goal}, goal_ms: group.now})
+    end
+  end
+
+  defp carry_out({:stage, :elected, facts}, id, group),
+    do: %{group | elected: [{facts.epoch, id} | group.elected]}
+
+  defp carry_out({:stage, stage, _facts}, id, group),
+    do: %{group | stages: [{stage, id, group.now} | group.stages]}
+
+  defp carry_out(_look_or_anchors, _id, group), do: group
+
+  defp send_one(to, from, message, group) do
+    copies = if :rand.uniform() < group.doubled, do: 2, else: 1
+    {least, most} = group.delay_ms
+
+    sent =
+      for _copy <- 1..copies,
+          connected?(group, from, to),
+          :rand.uniform() >= group.loss,
+          do: {group.now + least + :rand.uniform(most - least + 1) - 1, to, from, message}
+
+    %{group | air: sent ++ group.air}
+  end
+
+  defp connected?(group, a, b),
+    do: group.cut == [] or Enum.any?(group.cut, &(a in &1 and b in &1))
+
+  defp deliver(group) do
+    {due, air} = Enum.split_with(group.air, fn {at, _, _, _} -> at <= group.now end)
+
+    due
+    |> Enum.sort_by(fn {at, _, _, _} -> at end)
+    |> Enum.reduce(%{group | air: air}, fn {_at, to, from, message}, group ->
+      if is_map_key(group.robots, to) and is_map_key(group.robots, from),
+        do: hear(group, to, from, message),
+        else: group
+    end)
+  end
+
+  @doc "Lets a robot hear a message now."
+  @spec hear(t(), atom(), atom(), Message.t()) :: t()
+  def hear(group, to, from, message) do
+    {:ok, ^message} = Message.check(message)
+
+    if message.kind == :heartbeat,
+      do: update_in(group.robots[to].peers, &Peers.hear(&1, from, message.body, group.now)),
+      else: event(group, to, {:message, message})
+  end
+
+  # For how long two robots lead that hear each other.
+  defp watch(group) do
+    leading = for {id, %{mission: %{phase: :lead}}} <- group.robots, do: id
+
+    both? =
+      Enum.any?(leading, fn a -> Enum.any?(leading, &(&1 < a and connected?(group, a, &1))) end)
+
+    both = if both?, do: group.both_ms + @tick_ms, else: 0
+    %{group | both_ms: both, worst_both_ms: max(group.worst_both_ms, both)}
+  end
+end
