@@ -1,7 +1,7 @@
 defmodule Robot.Localiser do
   @moduledoc """
   Where a robot is in the map frame: odometry from its start pose, corrected by what it sees of
-  things whose places it was told. Pure; an extended Kalman filter over (x, y, heading).
+  things whose places it was told. Pure; the filter itself is `Robot.Localiser.Belief`.
 
   References are told by the mission (`anchors`): the landmark where the leader sees it, and the
   robots ahead in the formation where they say they are. Corrections run one way, from the leader
@@ -9,40 +9,21 @@ defmodule Robot.Localiser do
   landmark a range too. Sightings of the same thing repeat the same errors, so each counts for
   much less than its noise would allow.
 
-  Formulas: Siegwart and Nourbakhsh 2004 (odometry), the standard EKF with scalar updates in turn.
   """
   alias Hal.{Odometry, Pose}
+  alias Robot.Localiser.Belief
   alias Robot.{Percept, Sighting}
 
-  # Standard deviations of odometry: of the way driven, of the angle turned (skid steering slips by
-  # 5 % and more, R74), of angle per metre.
-  @way_share 0.01
-  @turn_share 0.06
-  @turn_per_metre 0.01
-  @start_sd {0.03, 0.03, 0.02}
   # A single sighting: bearing in radians, range as a share and in metres.
   @bearing_sd 0.04
   @range_share 0.10
   @range_sd 0.15
-  @gate 9.0
   # A robot that is seen must be the one that is expected: no other expected one within this angle.
   @match 0.12
-  # After so many pictures in a row that contradict the estimate, it is the estimate that is doubted.
-  @doubt 8
-  @doubt_sd {0.3, 0.3, 0.3}
   @history 12
 
   @enforce_keys [:start]
-  defstruct @enforce_keys ++
-              [
-                odometry: nil,
-                pose: nil,
-                covariance: nil,
-                history: [],
-                seen_ms: nil,
-                anchors: [],
-                refused: 0
-              ]
+  defstruct @enforce_keys ++ [odometry: nil, belief: nil, history: [], seen_ms: nil, anchors: []]
 
   @typedoc """
   Something of a colour at a place (map frame); `sd` is how well the place is known, in metres.
@@ -55,7 +36,14 @@ defmodule Robot.Localiser do
           range?: boolean(),
           radius: float() | nil
         }
-  @type t :: %__MODULE__{start: Pose.t(), pose: Pose.t() | nil, anchors: [anchor()]}
+  @type t :: %__MODULE__{
+          start: Pose.t(),
+          odometry: Pose.t() | nil,
+          belief: Belief.t() | nil,
+          history: [{at_ms :: integer(), odometry :: Pose.t()}],
+          seen_ms: integer() | nil,
+          anchors: [anchor()]
+        }
 
   @doc "A robot that was switched on at `start`, where its odometry said zero."
   @spec new(Pose.t()) :: t()
@@ -76,42 +64,17 @@ defmodule Robot.Localiser do
   def update(localiser, %Percept{odometry: %Odometry{pose: odometry}} = percept) do
     localiser = localiser |> move(odometry) |> see(percept) |> remember(percept.at_ms)
     blobs_pose = percept.blobs_at_ms && pose_at(localiser, percept.blobs_at_ms)
-    {%{percept | pose: localiser.pose, blobs_pose: blobs_pose}, localiser}
+    {%{percept | pose: localiser.belief.pose, blobs_pose: blobs_pose}, localiser}
   end
 
   defp move(%{odometry: nil} = localiser, odometry) do
-    {x, y, heading} = @start_sd
-
-    %{
-      localiser
-      | odometry: odometry,
-        pose: Pose.compose(localiser.start, odometry),
-        covariance: {x * x, 0.0, 0.0, y * y, 0.0, heading * heading}
-    }
+    belief = Belief.new(Pose.compose(localiser.start, odometry))
+    %{localiser | odometry: odometry, belief: belief}
   end
 
-  # With d the way driven and h the heading half-way, F = [1 0 -d sin h; 0 1 d cos h; 0 0 1].
   defp move(localiser, odometry) do
     step = Pose.relative(localiser.odometry, odometry)
-    way = :math.sqrt(step.x * step.x + step.y * step.y)
-    pose = Pose.compose(localiser.pose, step)
-    a = -(pose.y - localiser.pose.y)
-    b = pose.x - localiser.pose.x
-    {xx, xy, xh, yy, yh, hh} = localiser.covariance
-    along = :math.pow(@way_share * way, 2)
-
-    turned = :math.pow(@turn_share * abs(step.heading), 2) + :math.pow(@turn_per_metre * way, 2)
-
-    covariance = {
-      xx + 2 * a * xh + a * a * hh + along,
-      xy + a * yh + b * xh + a * b * hh,
-      xh + a * hh,
-      yy + 2 * b * yh + b * b * hh + along,
-      yh + b * hh,
-      hh + turned
-    }
-
-    %{localiser | odometry: odometry, pose: pose, covariance: covariance}
+    %{localiser | odometry: odometry, belief: Belief.move(localiser.belief, step)}
   end
 
   # Every picture counts once.
@@ -180,14 +143,14 @@ defmodule Robot.Localiser do
       bearing_noise = :math.pow(@bearing_sd, 2) + :math.pow(anchor.sd / distance, 2)
 
       localiser =
-        scalar(localiser, bearing_error, {dy / square, -dx / square, -1.0}, bearing_noise)
+        measure(localiser, bearing_error, {dy / square, -dx / square, -1.0}, bearing_noise)
 
       range = anchor.range? && Sighting.distance(blob, percept.blobs)
 
       if range do
         range_noise = :math.pow(@range_share * distance + @range_sd, 2) + :math.pow(anchor.sd, 2)
 
-        scalar(
+        measure(
           localiser,
           range - distance,
           {-dx / distance, -dy / distance, 0.0},
@@ -199,75 +162,39 @@ defmodule Robot.Localiser do
     end
   end
 
-  # One scalar measurement: K = P H' / S, x + K e, (1 - K H) P; beyond three sigma it is not believed.
-  defp scalar(localiser, error, {a, b, c}, noise) do
-    {xx, xy, xh, yy, yh, hh} = localiser.covariance
-    px = xx * a + xy * b + xh * c
-    py = xy * a + yy * b + yh * c
-    ph = xh * a + yh * b + hh * c
-    s = a * px + b * py + c * ph + noise
-
-    if error * error > @gate * s do
-      refuse(localiser)
-    else
-      {kx, ky, kh} = {px / s, py / s, ph / s}
-      pose = localiser.pose
-
-      %{
-        localiser
-        | pose: Pose.new(pose.x + kx * error, pose.y + ky * error, pose.heading + kh * error),
-          covariance: {
-            xx - kx * px,
-            xy - kx * py,
-            xh - kx * ph,
-            yy - ky * py,
-            yh - ky * ph,
-            hh - kh * ph
-          }
-      }
-    end
-  end
-
-  # Wheels that slip take the estimate farther than odometry admits; then it has to be found again.
-  defp refuse(%{refused: refused} = localiser) when refused < @doubt,
-    do: %{localiser | refused: refused + 1}
-
-  defp refuse(localiser) do
-    {xx, xy, xh, yy, yh, hh} = localiser.covariance
-    {x, y, heading} = @doubt_sd
-    covariance = {xx + x * x, xy, xh, yy + y * y, yh, hh + heading * heading}
-    %{localiser | refused: 0, covariance: covariance}
-  end
+  defp measure(localiser, error, slope, noise),
+    do: %{localiser | belief: Belief.correct(localiser.belief, error, slope, noise)}
 
   defp remember(localiser, at_ms) do
-    history =
-      Enum.take([{at_ms, localiser.pose, localiser.odometry} | localiser.history], @history)
+    history = Enum.take([{at_ms, localiser.odometry} | localiser.history], @history)
 
     %{localiser | history: history}
   end
 
-  # The estimate at an earlier time: back along the odometry from the present estimate.
+  # The estimate at an earlier time: back along the odometry from the present estimate. Between two
+  # ticks it is taken in proportion; before all that is remembered there is only the present one.
   defp pose_at(localiser, at_ms) do
-    case Enum.find(localiser.history, fn {time, _pose, _odometry} -> time <= at_ms end) do
-      {time, _pose, then} when time == at_ms or localiser.history == [] ->
-        Pose.compose(localiser.pose, Pose.relative(localiser.odometry, then))
+    case Enum.split_while(localiser.history, fn {time_ms, _odometry} -> time_ms > at_ms end) do
+      {_later, []} ->
+        localiser.belief.pose
 
-      {time, _pose, then} ->
-        later = localiser.history |> Enum.take_while(fn {t, _, _} -> t > at_ms end) |> List.last()
-
-        {next_ms, after_} =
-          case later do
-            nil -> {nil, localiser.odometry}
-            {next_ms, _pose, after_} -> {next_ms, after_}
-          end
-
-        part = if next_ms, do: (at_ms - time) / (next_ms - time), else: 1.0
-        step = Pose.relative(then, after_)
-        between = Pose.compose(then, Pose.new(step.x * part, step.y * part, step.heading * part))
-        Pose.compose(localiser.pose, Pose.relative(localiser.odometry, between))
-
-      nil ->
-        localiser.pose
+      {later, [{time_ms, then} | _]} ->
+        step = Pose.relative(then, after_(later, localiser))
+        part = part(later, time_ms, at_ms)
+        between = Pose.new(step.x * part, step.y * part, step.heading * part)
+        back = Pose.relative(localiser.odometry, Pose.compose(then, between))
+        Pose.compose(localiser.belief.pose, back)
     end
+  end
+
+  defp after_([], localiser), do: localiser.odometry
+  defp after_(later, _localiser), do: later |> List.last() |> elem(1)
+
+  defp part(_later, at_ms, at_ms), do: 0.0
+  defp part([], _time_ms, _at_ms), do: 1.0
+
+  defp part(later, time_ms, at_ms) do
+    {next_ms, _odometry} = List.last(later)
+    (at_ms - time_ms) / (next_ms - time_ms)
   end
 end

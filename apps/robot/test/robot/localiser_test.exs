@@ -1,6 +1,7 @@
 defmodule Robot.LocaliserTest do
   use ExUnit.Case, async: true
   doctest Robot.Sighting
+  doctest Robot.Localiser.Belief
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.{Localiser, Percept, Sighting}
   alias Vision.Blob
@@ -119,9 +120,9 @@ defmodule Robot.LocaliserTest do
     {percept, localiser} = Localiser.update(localiser, old)
     assert_in_delta percept.pose.heading, 0.4, 1.0e-6
     assert_in_delta percept.blobs_pose.heading, 0.0, 1.0e-6
-    covariance = localiser.covariance
+    belief = localiser.belief
     {_, localiser} = Localiser.update(localiser, %{old | at_ms: 201})
-    assert localiser.covariance == covariance
+    assert localiser.belief == belief
   end
 
   test "nothing is said of the distance of what is hidden in part" do
