@@ -18,7 +18,8 @@ defmodule Robot.Pilot do
   alias Hal.Event
   alias Robot.{Board, Config, Executive, Names, Trace}
 
-  @call_ms 1_000
+  # On a busy machine a pilot is slow, not gone.
+  @call_ms 5_000
 
   @doc "A child of the robot's supervisor."
   @spec child_spec(Config.t()) :: Supervisor.child_spec()

@@ -42,11 +42,11 @@ defmodule Sim.Fleet do
 
   @doc "What a viewer sees now."
   @spec scene(GenServer.server()) :: Scene.t()
-  def scene(fleet), do: GenServer.call(fleet, :scene)
+  def scene(fleet), do: GenServer.call(fleet, :scene, :infinity)
 
   @doc "What the report says of the run so far, but for its wall time."
   @spec result(GenServer.server()) :: map()
-  def result(fleet), do: GenServer.call(fleet, :result)
+  def result(fleet), do: GenServer.call(fleet, :result, :infinity)
 
   @doc "Kills a robot, or whoever leads: all its processes at once, as a broken wire would."
   @spec kill(GenServer.server(), atom() | :leader) :: :ok | {:error, line :: String.t()}
@@ -99,8 +99,15 @@ defmodule Sim.Fleet do
     clock = {__MODULE__, :now, [epoch_ms]}
     body = %{world: name, clock: clock, transport: transport, trace: trace}
     robots = for robot <- setup.robots, do: start_robot(part.(Robot.Fleet), robot, body, setup)
-    if mission?, do: for({_pid, id} <- robots, do: begin(id))
-    {:ok, schedule(%{s | robots: Map.new(robots)})}
+    {:ok, schedule(%{s | robots: Map.new(robots)}), {:continue, {:begin, mission?}}}
+  end
+
+  @impl GenServer
+  def handle_continue({:begin, mission?}, s) do
+    # All at once: on a busy machine a hundred pilots one after the other take long to answer.
+    options = [max_concurrency: 100, ordered: false, timeout: :infinity]
+    if mission?, do: alive(s) |> Task.async_stream(&begin/1, options) |> Stream.run()
+    {:noreply, s}
   end
 
   @doc false
