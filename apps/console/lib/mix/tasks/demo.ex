@@ -3,10 +3,16 @@ defmodule Mix.Tasks.Demo do
   @moduledoc """
   Runs the demo; `mix demo --help` lists its options.
 
+  Live, every robot is a tree of processes of its own, in real time; a fleet too large for the
+  machine's processors is run in lockstep instead, as slowly as it takes.
+
   Exit status: 0 the fleet ended in formation, 2 it did not, 1 something was wrong with the input.
   """
   use Mix.Task
   alias Console.{Build, Demo, Live, Options, Session}
+
+  # Twenty robots take a third of a processor, fifty a whole one: all hear all.
+  @robots_a_processor 20
 
   @impl Mix.Task
   def run(arguments) do
@@ -26,7 +32,10 @@ defmodule Mix.Tasks.Demo do
   # Robots are killed here on purpose: what their supervisors say of it would spoil the picture.
   defp live(options) do
     Logger.configure(level: :none)
-    Session.run(options, Live.Fleet, &Live.Fleet.start_link/1)
+
+    if length(options.robots) <= @robots_a_processor * System.schedulers_online(),
+      do: Session.run(options, Live.Fleet, &Live.Fleet.start_link/1),
+      else: Session.run(options, Live.Trial, &Live.Trial.start_link(Sim.Trial, &1))
   end
 
   defp refuse(lines) do
