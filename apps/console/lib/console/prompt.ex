@@ -30,24 +30,46 @@ defmodule Console.Prompt do
     end
   end
 
-  @doc "The words that begin a command, for completion."
-  @spec words() :: [String.t()]
-  def words, do: @words
+  @doc """
+  The words that may come after those before.
+
+      iex> Console.Prompt.completions(["kill"], [:mag1])
+      ["leader", "mag1"]
+      iex> Console.Prompt.completions(["goto", "mag1"], [:mag1])
+      []
+  """
+  @spec completions([String.t()], [atom()]) :: [String.t()]
+  def completions(before, robots) do
+    names = Enum.map(robots, &to_string/1)
+
+    case before do
+      [] -> @words ++ ["all" | names]
+      ["kill"] -> ["leader" | names]
+      ["formation"] -> Values.formations()
+      ["landmark"] -> ["none"]
+      ["follow", _follower] -> names
+      ["tell"] -> ["all" | names]
+      [word] when word in ["goto", "follow", "stop", "start", "status"] -> names
+      _other -> []
+    end
+  end
 
   @doc "The help, one command a line."
   @spec help() :: [String.t()]
   def help do
     [
-      "kill leader | kill mag2      that robot dies",
-      "formation wedge 1.2          column, line, wedge, triangle, diamond, circle; spacing in m",
-      "landmark 3,2 | landmark none the landmark glides there, or is taken away",
-      "goto mag2 1,2                one robot drives to a place",
-      "follow min1 mag2             one robot follows another",
-      "stop | stop mag2             the fleet or one robot stops; start: again from the search",
-      "estop | reset                emergency stop of all, held until reset",
-      "mag2 move:0.2:0.1            any text command to one robot, or: all ...",
-      "status | status mag2         what everybody does",
-      "quit                         end (so does Ctrl-C)"
+      "kill leader, kill mag2        that robot dies",
+      "formation wedge 1.2           column, line, wedge, triangle, diamond or",
+      "                              circle, and a spacing of 0.8 to 5 m",
+      "landmark 3,2, landmark none   the landmark glides there, or is taken away",
+      "goto mag2 1,2                 one robot drives to a place",
+      "follow min1 mag2              one robot follows another",
+      "stop, stop mag2               the fleet or one robot stops and stands",
+      "start, start mag2             the mission again, from the search",
+      "estop, reset                  emergency stop of all; held until the reset",
+      "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all",
+      "status, status mag2           what everybody does",
+      "quit                          the end (so is Ctrl-C); Tab completes"
     ]
   end
 

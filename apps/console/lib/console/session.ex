@@ -56,7 +56,7 @@ defmodule Console.Session do
       output: Output.to(if(options.json == "-", do: :stderr, else: :stdio)),
       track: options.picture && Track.new(scene),
       view: %Terminal{
-        editor: Editor.new(Prompt.words() ++ Enum.map(options.robots, &to_string/1))
+        editor: Editor.new(&Prompt.completions(&1, options.robots))
       },
       started_ms: System.monotonic_time(:millisecond)
     }
@@ -144,6 +144,7 @@ defmodule Console.Session do
     case event do
       nil -> redraw(session)
       :quit -> {:quit, session}
+      {:choices, words} -> session |> answer(Enum.join(words, "  "), :dim) |> redraw()
       {:line, line} -> %{session | view: %{session.view | overlay: nil}} |> obey(line) |> redraw()
     end
   end

@@ -96,8 +96,8 @@ defmodule Console.Terminal do
   end
 
   defp body(_scene, %{overlay: lines} = view, rows) when is_list(lines) do
-    {Enum.take(Enum.map(["" | lines], &[{"  " <> &1, :plain}]) ++ List.duplicate([], rows), rows),
-     view}
+    lines = ["" | Enum.flat_map(lines, &Words.rows(&1, max(view.columns - 3, 20)))]
+    {Enum.take(Enum.map(lines, &[{"  " <> &1, :plain}]) ++ List.duplicate([], rows), rows), view}
   end
 
   defp body(scene, view, rows) do
@@ -125,11 +125,17 @@ defmodule Console.Terminal do
   defp answers(view, count) do
     lines =
       view.messages
+      |> Enum.flat_map(&answer(&1, view.columns, count))
       |> Enum.take(count)
       |> Enum.reverse()
-      |> Enum.map(fn {text, style} -> [{" " <> text, style}] end)
 
     List.duplicate([], count - length(lines)) ++ lines
+  end
+
+  # Its rows with the last first; of one too long for all rows the beginning says most.
+  defp answer({text, style}, columns, count) do
+    for row <- text |> Words.rows(max(columns - 2, 20)) |> Enum.take(count) |> Enum.reverse(),
+        do: [{" " <> row, style}]
   end
 
   # A line longer than the screen scrolls, so that the cursor stays in sight.

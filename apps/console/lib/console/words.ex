@@ -5,7 +5,7 @@ defmodule Console.Words do
   One stage as a line.
 
       iex> Console.Words.stage(%{stage: :elected, at_s: 12.34, robot: :mag2, epoch: 3, size_ppm: 41_000})
-      "   12.3 s  elected         mag2 leads (epoch 3, the landmark fills 4.1 % of its picture)"
+      "   12.3 s  elected         mag2 leads (epoch 3, landmark 4.1 % of its picture)"
       iex> Console.Words.stage(%{stage: :search, at_s: 0.0})
       "    0.0 s  search          every robot looks round for the landmark"
   """
@@ -91,6 +91,32 @@ defmodule Console.Words do
     "#{robot.id}: #{robot.state}#{if robot.leader?, do: " (leader)"} at #{pose(robot.pose)}#{slot}#{sight}"
   end
 
+  @doc """
+  A line in rows of at most `width` characters, broken between words; the further rows are indented.
+
+      iex> Console.Words.rows("mag1: lead at 1,2, sees it", 14)
+      ["mag1: lead at", "    1,2, sees", "    it"]
+  """
+  @spec rows(String.t(), pos_integer()) :: [String.t()]
+  def rows(line, width) do
+    if String.length(line) <= width, do: [line], else: broken(line, width)
+  end
+
+  defp broken(line, width) do
+    [start] = Regex.run(~r/^ */, line)
+
+    line
+    |> String.split(" ", trim: true)
+    |> Enum.reduce([start], fn word, [row | rows] ->
+      longer = if String.trim(row) == "", do: row <> word, else: row <> " " <> word
+
+      if String.length(longer) <= width or String.trim(row) == "",
+        do: [longer | rows],
+        else: ["    " <> word, row | rows]
+    end)
+    |> Enum.reverse()
+  end
+
   defp pose(pose) do
     degrees = decimals(pose.heading * 180 / :math.pi(), 0)
     "#{decimals(pose.x, 2)},#{decimals(pose.y, 2)} heading #{degrees} degrees"
@@ -109,7 +135,7 @@ defmodule Console.Words do
       [Map.get(stage, :epoch) && "epoch #{stage.epoch}"] ++
         [
           Map.get(stage, :size_ppm) &&
-            "the landmark fills #{decimals(stage.size_ppm / 10_000, 1)} % of its picture"
+            "landmark #{decimals(stage.size_ppm / 10_000, 1)} % of its picture"
         ]
 
     case Enum.filter(parts, & &1) do

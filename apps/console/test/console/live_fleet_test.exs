@@ -21,24 +21,28 @@ defmodule Console.LiveFleetTest do
           {:landmark, {1.0, 0.5}},
           {:landmark, :none},
           :estop,
-          :reset,
-          {:kill, :mag61}
+          :reset
         ],
-        do: assert({command, {:ok, "done"}} == {command, Live.Fleet.command(live, command)})
+        do: assert({command, {:ok, "accepted"}} == {command, Live.Fleet.command(live, command)})
+
+    assert {:ok, "done"} = Live.Fleet.command(live, {:kill, :mag61})
+
+    # What a robot's parts log when they are cut off belongs to this test.
+    for monitor <- monitors, do: assert_receive({:DOWN, ^monitor, _, _, _}, 2_000)
+    Swarm.Case.eventually(fn -> Swarm.Directory.robots() == [:min61] end)
 
     for command <- [
           {:kill, :leader},
           {:kill, :mag61},
           {:tell, [:mag61], "ping"},
           {:tell, :all, "goto:abc:1"},
+          {:tell, [:min61], "goto:99.0:0.0"},
           {:landmark, {500.0, 0.0}}
         ] do
       assert {:error, line} = Live.Fleet.command(live, command)
       refute line =~ "\n"
     end
 
-    # What a robot's parts log when they are cut off belongs to this test.
-    for monitor <- monitors, do: assert_receive({:DOWN, ^monitor, _, _, _}, 2_000)
     assert %{robots: 2, messages: %{sent: _}} = Live.Fleet.result(live)
     Sim.Fleet.stop(live)
     assert {:error, _line} = Live.Fleet.start_link(%{options | map: "nowhere"})

@@ -74,6 +74,26 @@ defmodule Console.TerminalTest do
     assert String.length(List.last(screen(Runs.scene("", 1), 40, 24, editor: long))) < 40
   end
 
+  test "the walls are shown all round, whatever the screen" do
+    scene = Runs.scene("", 1)
+    room = Ground.room("hall", 18.0, 18.0)
+
+    for {columns, rows} <- [{41, 16}, {38, 16}, {80, 30}, {84, 27}] do
+      row = Canvas.floor(nil, room, scene, columns, rows).walls |> Map.keys()
+      middle = for {column, row} <- row, row == div(rows, 2), do: column
+      assert Enum.min(middle) < div(columns, 2) and Enum.max(middle) > div(columns, 2)
+    end
+  end
+
+  test "long answers and lists are broken between words" do
+    text = "mag1: a line " <> String.duplicate("with many words ", 8) <> "at last"
+    scene = Runs.scene("", 1)
+    shown = scene |> screen(80, 24, overlay: [text]) |> Enum.join("\n")
+    assert shown =~ "at last"
+    answer = "no robot at all, but " <> String.duplicate("word ", 12) <> "did you mean mag1?"
+    assert scene |> screen(80, 24, messages: [{answer, :bad}]) |> Enum.join(" ") =~ "mean mag1?"
+  end
+
   test "the floor is made once as long as nothing changes" do
     scene = Runs.scene("", 1)
     room = Ground.room("hall", 16.0, 12.0)
@@ -98,6 +118,12 @@ defmodule Console.TerminalTest do
     assert type.(["a", " ", "b", <<23>>]) == "a "
     assert type.(["a", "b", <<21>>]) == ""
     assert type.(["f", "o", "\t"]) == "formation "
+    robots = Editor.new(["mag1", "mag2", "min1"])
+    {nil, typed} = Editor.key(robots, "m")
+    assert {{:choices, ["mag1", "mag2", "min1"]}, ^typed} = Editor.key(typed, "\t")
+    {nil, typed} = Editor.key(typed, "a")
+    {nil, typed} = Editor.key(typed, "\t")
+    assert Editor.text(typed) == "mag"
     assert type.(["a", "\r", "\e", "[", "A"]) == "a"
     assert type.(["a", "\e", "[", "H", "\e", "[", "3", "~", "ü"]) == "ü"
     assert {:quit, _editor} = Editor.key(Editor.new([]), <<3>>)

@@ -4,6 +4,8 @@ defmodule Console.Live.Fleet do
   door that real ones have (`Swarm`).
   """
   @behaviour Console.Live
+  alias Console.Words
+  alias Robot.Command
   alias Sim.Fleet
 
   @doc "Starts a fleet, or says in one line what is wrong with its options."
@@ -19,15 +21,23 @@ defmodule Console.Live.Fleet do
   @impl Console.Live
   def command(live, command) do
     case carry_out(command, live) do
-      :ok -> {:ok, "done"}
+      :ok -> {:ok, told(command)}
       {:error, line} -> {:error, line}
     end
   end
 
+  # Robots have accepted it then; whether they reach what they were sent to is another thing.
+  defp told({:kill, _who}), do: "done"
+  defp told(_order), do: "accepted"
+
   defp carry_out({:kill, who}, live), do: Fleet.kill(live, who)
   defp carry_out({:landmark, :none}, live), do: Fleet.move_landmark(live, nil)
   defp carry_out({:landmark, place}, live), do: Fleet.move_landmark(live, place)
-  defp carry_out({:tell, target, text}, _live), do: Swarm.tell(target, text)
+
+  defp carry_out({:tell, target, text}, live) do
+    with :ok <- on_floor(text, Fleet.scene(live).map), do: Swarm.tell(target, text)
+  end
+
   defp carry_out(:estop, _live), do: Swarm.estop()
   defp carry_out(:reset, _live), do: Swarm.reset()
 
@@ -35,5 +45,17 @@ defmodule Console.Live.Fleet do
   defp carry_out({:formation, {kind, spacing}}, live) do
     {_kind, present} = Fleet.scene(live).formation
     Swarm.formation(kind, spacing: spacing || present)
+  end
+
+  # Robots have no map: what lies in a wall can only be seen here.
+  defp on_floor(text, map) do
+    with {:ok, {:goto, x, y, _heading}} <- Command.parse(text, []),
+         true <- Sim.Map.wall?(map, {x, y}) do
+      {width, height} = Sim.Map.size(map)
+      size = "#{Words.decimals(width, 1)} x #{Words.decimals(height, 1)} m"
+      {:error, "no robot can stand at #{x},#{y}: map #{map.name} is #{size}, and that is a wall"}
+    else
+      _floor_or_no_place -> :ok
+    end
   end
 end

@@ -113,11 +113,13 @@ defmodule Console.Terminal.Canvas do
     %{key: key, origin: origin, scale: scale, columns: columns, rows: rows, walls: walls}
   end
 
-  # A thin wall must not fall between two samples.
+  # A thin wall must not fall between two samples, nor the map's edge between two characters.
   defp wall?(ground, x, y, scale) do
+    edge = max(@edge, 2 / 3 * scale)
+
     inside? =
-      abs(x + scale / 2) <= ground.width / 2 + @edge and
-        abs(y - scale / 2) <= ground.height / 2 + @edge
+      abs(x + scale / 2) <= ground.width / 2 + edge and
+        abs(y - scale / 2) <= ground.height / 2 + edge
 
     inside? and
       Enum.any?(1..3, fn i ->

@@ -5,12 +5,13 @@ defmodule Console.Terminal.Editor do
   The view draws it, so the terminal itself must not echo.
   """
 
-  defstruct before: "", behind: "", history: [], older: [], newer: [], escape: nil, words: []
+  defstruct before: "", behind: "", history: [], older: [], newer: [], escape: nil, words: nil
 
   @type t :: %__MODULE__{}
 
   @doc """
-  One character; a finished line or the wish to leave comes back beside the editor.
+  One character. A finished line, the wish to leave, or what the word at the cursor may become comes
+  back beside the editor.
 
       iex> editor = Console.Terminal.Editor.new(["kill"])
       iex> {nil, editor} = Console.Terminal.Editor.key(editor, "k")
@@ -21,7 +22,8 @@ defmodule Console.Terminal.Editor do
       iex> line
       {:line, "kill "}
   """
-  @spec key(t(), String.t()) :: {nil | {:line, String.t()} | :quit, t()}
+  @spec key(t(), String.t()) ::
+          {nil | {:line, String.t()} | {:choices, [String.t()]} | :quit, t()}
   def key(%__MODULE__{escape: nil} = editor, "\e"), do: {nil, %{editor | escape: ""}}
 
   def key(%__MODULE__{escape: escape} = editor, char) when is_binary(escape) do
@@ -57,7 +59,7 @@ defmodule Console.Terminal.Editor do
   def key(editor, <<23>>),
     do: {nil, %{editor | before: String.replace(editor.before, ~r/\S*\s*$/, "")}}
 
-  def key(editor, "\t"), do: {nil, complete(editor)}
+  def key(editor, "\t"), do: complete(editor)
 
   def key(editor, char) do
     if String.printable?(char),
@@ -65,8 +67,9 @@ defmodule Console.Terminal.Editor do
       else: {nil, editor}
   end
 
-  @doc "An editor that completes these words."
-  @spec new([String.t()]) :: t()
+  @doc "An editor that completes these words, or those that a function gives for the words before."
+  @spec new([String.t()] | ([String.t()] -> [String.t()])) :: t()
+  def new(words) when is_list(words), do: new(fn _before -> words end)
   def new(words), do: %__MODULE__{words: words}
 
   @doc "The whole line."
@@ -107,14 +110,26 @@ defmodule Console.Terminal.Editor do
   defp move(editor, _other), do: editor
 
   defp complete(editor) do
-    [stem | _] = editor.before |> String.split(" ") |> Enum.reverse()
+    [stem | earlier] = editor.before |> String.split(" ") |> Enum.reverse()
+    earlier = earlier |> Enum.reverse() |> Enum.reject(&(&1 == ""))
 
-    case Enum.filter(editor.words, &String.starts_with?(&1, stem)) do
-      [only] when stem != "" ->
-        %{editor | before: String.replace_suffix(editor.before, stem, only) <> " "}
-
-      _none_or_many ->
-        editor
+    case Enum.filter(editor.words.(earlier), &String.starts_with?(&1, stem)) do
+      [] -> {nil, editor}
+      [only] -> {nil, put(editor, stem, only <> " ")}
+      several -> several(editor, stem, several)
     end
+  end
+
+  # As far as they agree; only then which there are.
+  defp several(editor, stem, words) do
+    case String.slice(hd(words), 0, :binary.longest_common_prefix(words)) do
+      ^stem -> {{:choices, words}, editor}
+      longer -> {nil, put(editor, stem, longer)}
+    end
+  end
+
+  defp put(editor, stem, word) do
+    kept = String.slice(editor.before, 0, String.length(editor.before) - String.length(stem))
+    %{editor | before: kept <> word}
   end
 end

@@ -33,7 +33,7 @@ defmodule Swarm.Link.Desk do
   # What is asked for while all stand would otherwise begin with the reset.
   def answer(request, config, _board, %{stop: %{latched?: true}} = ear)
       when request not in [:stop, :ping],
-      do: {{:error, "#{config.id} is held by the emergency stop; Swarm.reset() first"}, ear}
+      do: {{:error, "#{config.id} is held by the emergency stop; reset it first"}, ear}
 
   def answer(request, config, board, ear),
     do: {obey(request, doing(board), config, ear), ear}
