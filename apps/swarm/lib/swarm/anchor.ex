@@ -13,7 +13,7 @@ defmodule Swarm.Anchor do
   slots of it are used (`Swarm.Room`), `trail` gives them pose by pose where the shape is a column
   along the leader's trail.
   """
-  alias Swarm.Shape
+  alias Swarm.{Formation, Shape}
 
   @enforce_keys [:leader, :epoch, :sequence, :pose, :twist, :formation, :order, :size, :places]
   defstruct @enforce_keys ++ [asked: nil, landmark: nil, still: false, trail: nil]
@@ -24,13 +24,13 @@ defmodule Swarm.Anchor do
           sequence: non_neg_integer(),
           pose: {integer(), integer(), integer()},
           twist: {integer(), integer()},
-          formation: Swarm.Formation.t(),
+          formation: Formation.t(),
           order: [atom()],
           landmark: {integer(), integer()} | nil,
           still: boolean(),
           size: pos_integer(),
           places: [pos_integer()],
-          asked: Swarm.Formation.t() | nil,
+          asked: Formation.t() | nil,
           trail: [{integer(), integer(), integer()}] | nil
         }
 
@@ -57,8 +57,8 @@ defmodule Swarm.Anchor do
   def valid?(%__MODULE__{twist: {v, w}, order: order, places: places} = anchor) do
     Shape.whole?(anchor, __MODULE__) and Shape.pose?(anchor.pose) and Shape.number?(v) and
       Shape.number?(w) and Shape.name?(anchor.leader) and Shape.count?(anchor.epoch) and
-      anchor.epoch > 0 and Shape.count?(anchor.sequence) and formation?(anchor.formation) and
-      (anchor.asked == nil or formation?(anchor.asked)) and
+      anchor.epoch > 0 and Shape.count?(anchor.sequence) and Formation.valid?(anchor.formation) and
+      (anchor.asked == nil or Formation.valid?(anchor.asked)) and
       Shape.names?(order) and Shape.distinct?(order) and anchor.leader not in order and
       anchor.size in 1..@most and
       Shape.list?(places, &(&1 in 1..@most and &1 < anchor.size)) and
@@ -69,13 +69,6 @@ defmodule Swarm.Anchor do
   end
 
   def valid?(_term), do: false
-
-  defp formation?({kind, spacing}),
-    do:
-      kind in Swarm.Formation.kinds() and is_float(spacing) and
-        spacing >= Swarm.Formation.least_spacing() and spacing < 100
-
-  defp formation?(_other), do: false
 
   defp landmark?(nil), do: true
   defp landmark?({x, y}), do: Shape.number?(x) and Shape.number?(y)

@@ -30,6 +30,18 @@ defmodule Swarm.Formation do
   def kinds, do: @kinds
 
   @doc """
+  Whether a term from outside is a formation.
+
+      iex> {Swarm.Formation.valid?({:wedge, 1.2}), Swarm.Formation.valid?({:wedge, :wide})}
+      {true, false}
+  """
+  @spec valid?(term()) :: boolean()
+  def valid?({kind, spacing}),
+    do: kind in @kinds and is_float(spacing) and spacing >= @least_spacing and spacing < 100
+
+  def valid?(_other), do: false
+
+  @doc """
   A checked formation. `length:` is the whole length of a line, `side:` the side of the triangle;
   both need the number of robots.
 

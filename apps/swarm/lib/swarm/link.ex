@@ -23,7 +23,7 @@ defmodule Swarm.Link do
   use GenServer
   alias Hal.Event
   alias Robot.{Board, Config, Gate, Names, Percept, Pilot}
-  alias Swarm.{Directory, Heartbeat, Message, Peers, Stop}
+  alias Swarm.{Directory, Heartbeat, Message, Peers, Shape, Stop}
   alias Swarm.Link.{Desk, Ear}
 
   @behaviour Robot.Companion
@@ -117,8 +117,15 @@ defmodule Swarm.Link do
     {:noreply, enter(s)}
   end
 
+  # Links are found in the directory, so anything may come here from anywhere: what would make this
+  # process fall is counted instead.
   @impl GenServer
-  def handle_cast({:say, ids, message}, s), do: {:noreply, speak(s, ids, message)}
+  def handle_call(_unknown, _from, s), do: {:noreply, reject(s)}
+
+  @impl GenServer
+  def handle_cast({:say, ids, %Message{} = message}, s) do
+    if Shape.names?(ids), do: {:noreply, speak(s, ids, message)}, else: {:noreply, reject(s)}
+  end
 
   def handle_cast({:hear, term}, s) do
     at_ms = Config.now(s.config)
@@ -126,14 +133,17 @@ defmodule Swarm.Link do
     {:noreply, s |> stop(ear) |> heard(heard, at_ms)}
   end
 
-  def handle_cast({:command, command, reply_to}, s) do
+  def handle_cast({:command, command, reply_to}, s) when is_reference(reply_to) do
     {answer, ear} = Desk.answer(command, s.config, s.board, s.ear)
     s = stop(s, ear)
     :erlang.send(reply_to, {reply_to, answer}, [:nosuspend, :noconnect])
     {:noreply, s}
   end
 
-  def handle_cast({:rival, other, link}, s), do: {:noreply, rival(s, other, link)}
+  def handle_cast({:rival, {boot, node} = other, link}, s)
+      when is_integer(boot) and is_atom(node) and is_pid(link),
+      do: {:noreply, rival(s, other, link)}
+
   def handle_cast(_unknown, s), do: {:noreply, reject(s)}
 
   @impl GenServer

@@ -7,7 +7,7 @@ defmodule Swarm.Peers do
   as an obstacle, until it is heard from elsewhere. A robot that comes back with a higher boot
   number starts anew; within one boot only newer sequence numbers count, so that late and doubled
   heartbeats do no harm, those of a robot's former life included. Boot numbers may be times of day,
-  and clocks are set back: from a robot that is gone any boot number is believed.
+  and clocks are set back: from a robot that is gone any number is believed.
   """
   alias Hal.{Pose, Twist}
   alias Swarm.Heartbeat
@@ -38,11 +38,13 @@ defmodule Swarm.Peers do
 
   defp news?(nil, _beat, _now_ms), do: true
 
+  # So that a number that was wrong does no lasting harm.
+  defp news?(%{at_ms: at_ms}, _beat, now_ms) when now_ms - at_ms >= @gone_ms, do: true
+
   defp news?(%{beat: %{boot: boot, sequence: sequence}}, %{boot: boot} = beat, _now_ms),
     do: beat.sequence > sequence
 
-  defp news?(%{beat: %{boot: boot}, at_ms: at_ms}, beat, now_ms),
-    do: beat.boot > boot or now_ms - at_ms >= @gone_ms
+  defp news?(%{beat: %{boot: boot}}, beat, _now_ms), do: beat.boot > boot
 
   @doc "How a robot is, judged by its silence; an unknown one is gone."
   @spec status(t(), atom(), integer()) :: status()

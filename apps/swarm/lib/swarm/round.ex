@@ -16,6 +16,7 @@ defmodule Swarm.Round do
   alias Swarm.Round.Letter
 
   @version 1
+  @leap 1_000_000
   # Letters are repeated every 100 ms, more rarely in a large group: all to all grows with its square.
   @repeat_ms 100
   @repeat_ms_per_robot 8
@@ -102,16 +103,31 @@ defmodule Swarm.Round do
   @doc "Hears a letter. A higher id takes this robot along if it is in the view; a lower one is dropped."
   @spec hear(t(), atom(), Letter.t(), integer()) :: t()
   def hear(%{me: me} = round, from, %Letter{} = letter, now_ms) when from != me do
-    round = note(round, letter.id)
-
-    cond do
-      letter.id == round.id -> take(round, from, letter)
-      supersedes?(letter.id, round) and me in letter.view -> join(round, from, letter, now_ms)
-      true -> round
-    end
+    if leap?(letter.id, round.highest),
+      do: round,
+      else: round |> note(letter.id) |> heed(from, letter, now_ms)
   end
 
   def hear(round, _from, _letter, _now_ms), do: round
+
+  # No fleet gets that far at once; taken over, such an id would leave no room for the next ones.
+  defp leap?({epoch, counter, _initiator}, {epoch, highest}), do: counter > highest + @leap
+
+  defp leap?({epoch, counter, _initiator}, {highest, _counter}),
+    do: epoch > highest + @leap or counter > @leap
+
+  defp heed(round, from, letter, now_ms) do
+    cond do
+      letter.id == round.id ->
+        take(round, from, letter)
+
+      supersedes?(letter.id, round) and round.me in letter.view ->
+        join(round, from, letter, now_ms)
+
+      true ->
+        round
+    end
+  end
 
   @doc """
   One tick: the letters to send to all of the view, and whether something came of it.

@@ -8,6 +8,8 @@ defmodule Swarm.Stop do
   has reset yet, and one that joins a fleet whose stop is long cleared is not stopped by it.
   """
 
+  @leap 100_000
+
   defstruct known: 0, cleared: 0, latched?: false
 
   @type t :: %__MODULE__{
@@ -43,6 +45,10 @@ defmodule Swarm.Stop do
   @spec hear(t(), non_neg_integer(), boolean()) :: t()
   def hear(%__MODULE__{} = stop, number, latched?) do
     cond do
+      # No fleet counts that far at once; taken over, it would leave no room for numbers to come.
+      number > stop.known + @leap ->
+        stop
+
       latched? and number > stop.cleared ->
         %{stop | known: max(stop.known, number), latched?: true}
 

@@ -82,6 +82,60 @@ defmodule Swarm.LinkTest do
     assert Names.whereis(id, :link) == link
   end
 
+  test "whatever is sent to a link in whatever envelope: nothing of the robot falls" do
+    id = talking(:linkattacked)
+    parts = parts(id, [:link, :pilot, :executive, :gate])
+    [link, pilot | _] = parts
+    ref = :erlang.alias([:reply])
+    deep = Enum.reduce(1..10_000, [], fn _, deep -> {deep} end)
+
+    junk = [
+      :x,
+      nil,
+      -1.5,
+      "text",
+      [1 | 2],
+      %{},
+      {:a, :b, :c},
+      deep,
+      self(),
+      :binary.copy("x", 100_000)
+    ]
+
+    for junk <- junk do
+      send(link, junk)
+
+      for {tag, junk} <- [{:"$gen_cast", junk}, {:"$gen_call", junk}, {:rival, junk}],
+          do: send(link, {tag, junk})
+
+      send(link, {:"$gen_call", {self(), make_ref()}, junk})
+      for word <- [:say, :command, :rival, :hear], do: GenServer.cast(link, {word, junk})
+      for word <- [:say, :command, :rival], do: GenServer.cast(link, {word, junk, junk})
+      GenServer.cast(link, {:say, [:mag1], junk})
+      GenServer.cast(link, {:rival, {junk, node()}, self()})
+      GenServer.cast(link, {:command, junk, self()})
+      GenServer.cast(link, {:command, junk, ref})
+
+      for word <- [:start, :goto, :move, :follow_the_leader, :find_blob, :position, :subscribe],
+          do: GenServer.cast(link, {:command, {word, junk}, ref})
+
+      GenServer.cast(link, {:command, {:start, [formation: junk]}, ref})
+      GenServer.cast(link, {:command, {:start, [{:assign, junk}]}, ref})
+      GenServer.cast(link, {:command, {:goto, junk, 1.0, nil}, ref})
+      GenServer.cast(link, {:command, {:formation, junk, junk}, ref})
+      GenServer.cast(pilot, junk)
+      Link.hear(id, Message.new(:linkother, :command, junk))
+    end
+
+    assert Swarm.ask(id, :stop) == :ok
+    assert %{rejected: %{not_a_message: dropped}} = Swarm.status(id)
+    assert dropped > 50
+    assert Swarm.ask(id, {:goto, :far, 0.0, nil}) |> elem(1) =~ "goto cannot take :far"
+    assert Swarm.ask(id, {:dance, 1}) |> elem(1) =~ "{:dance, 1} is no command"
+    assert Swarm.ask(id, {:start, [assign: :luck]}) |> elem(1) =~ "assign"
+    assert parts(id, [:link, :pilot, :executive, :gate]) == parts
+  end
+
   test "an e-stop spreads, survives the link, and is not caught again after a reset" do
     ids = for id <- [:link5, :link6, :link7], do: talking(id)
     for id <- ids, do: assert(Swarm.ask(id, {:move, 0.1, 0.0}) == :ok)

@@ -101,4 +101,64 @@ defmodule Swarm.MessageTest do
       end
     end
   end
+
+  test "sizes are bounded, and names are names" do
+    many = List.duplicate(1, 1_000_000)
+    names = List.duplicate(:mag1, 1_001)
+    large = :binary.copy("x", 1_000_000)
+    report = %{found: true, size_ppm: 1, pose: {0, 0, 0}}
+
+    for {kind, body} <- [
+          place: %{@anchor | places: many},
+          place: %{@anchor | order: names, places: Enum.to_list(1..1_001), size: 1_000},
+          place: %{@anchor | epoch: Integer.pow(10, 1_000)},
+          place: %{@anchor | leader: nil},
+          heartbeat: %{@beat | heard: names},
+          heartbeat: %{@beat | heard: [nil]},
+          heartbeat: %{@beat | sequence: Integer.pow(10, 1_000)},
+          heartbeat: %{@beat | boot: Integer.pow(10, 1_000)},
+          heartbeat: %{@beat | sight: %{size_ppm: 1, distance: 1, more: large}},
+          round: %{@letter | view: names},
+          round: %{@letter | digest: large},
+          round: %{@letter | report: Map.put(report, :more, large)},
+          round: %{
+            @letter
+            | known:
+                Map.new(many |> Enum.take(1_001) |> Enum.with_index(), fn {_, k} -> {k, nil} end)
+          }
+        ] do
+      assert Message.check(Message.new(:mag1, kind, body)) == {:error, kind}
+    end
+
+    assert Message.check(Message.new(nil, :heartbeat, @beat)) == {:error, :not_a_message}
+    assert {:ok, _} = Message.check(Message.new(:mag1, :round, %{@letter | report: report}))
+  end
+
+  test "a number that is far too high leaves room for the ones to come" do
+    round = Round.open(Round.new(:mag1), 1, [:mag1, :mag2], :search, 100, 0)
+
+    for id <- [{999_999_999, 1, :mag2}, {1, 999_999_999, :mag2}] do
+      letter = %{@letter | id: id, view: [:mag1, :mag2]}
+      assert Round.hear(round, :mag2, letter, 0) == round
+    end
+
+    near = %{@letter | id: {7, 1, :mag2}, view: [:mag1, :mag2]}
+    assert Round.hear(round, :mag2, near, 0).id == near.id
+    assert Swarm.Stop.hear(Swarm.Stop.new(), 1_000_000, true) == Swarm.Stop.new()
+
+    # A false sequence number of a robot is forgotten with it.
+    peers = Swarm.Peers.hear(Swarm.Peers.new(:mag2), :mag1, %{@beat | sequence: 1_000_000_000}, 0)
+    assert Swarm.Peers.hear(peers, :mag1, @beat, 1_900) == peers
+    assert Swarm.Peers.hear(peers, :mag1, @beat, 2_000).rows.mag1.beat == @beat
+  end
+
+  test "an anchor of an epoch that cannot be is no leader's" do
+    alias Swarm.Missions.Landmark
+    {_phase, mission, []} = Landmark.init(:mag2, [])
+    far = Message.new(:mag3, :place, %{@anchor | epoch: 999_999_999})
+    {_phase, same, _effects} = Landmark.handle({:message, far}, mission)
+    assert same.anchor == nil
+    {_phase, led, _effects} = Landmark.handle({:message, %{far | body: @anchor}}, mission)
+    assert led.anchor == @anchor
+  end
 end

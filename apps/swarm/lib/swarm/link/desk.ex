@@ -15,7 +15,7 @@ defmodule Swarm.Link.Desk do
   While the emergency stop holds a robot, it refuses all that would move it.
   """
   alias Robot.{Board, Config, Gate, Pilot}
-  alias Swarm.{Missions.Landmark, Missions.Manual, Status, Stop}
+  alias Swarm.{Formation, Missions.Landmark, Missions.Manual, Status, Stop}
   alias Swarm.Link.Ear
 
   @type answer :: :ok | {:error, String.t()} | Status.t()
@@ -36,7 +36,27 @@ defmodule Swarm.Link.Desk do
       do: {{:error, "#{config.id} is held by the emergency stop; reset it first"}, ear}
 
   def answer(request, config, board, ear),
-    do: {obey(request, doing(board), config, ear), ear}
+    do: {checked(request, doing(board), config, ear), ear}
+
+  # People come by `Swarm`, which has checked it all; but anybody may send something here.
+  defp checked({:start, options} = request, doing, config, ear) do
+    with :ok <- options(options), do: obey(request, doing, config, ear)
+  end
+
+  defp checked(request, doing, config, ear) do
+    with {:ok, request} <- Manual.check(request), do: obey(request, doing, config, ear)
+  end
+
+  defp options(options) do
+    if Keyword.keyword?(options) and Enum.all?(options, &option?/1),
+      do: :ok,
+      else: {:error, "a mission starts with formation, assign and leader_change only"}
+  end
+
+  defp option?({:formation, formation}), do: Formation.valid?(formation)
+  defp option?({:assign, how}), do: how in [:chain, :cost]
+  defp option?({:leader_change, on?}), do: is_boolean(on?)
+  defp option?(_other), do: false
 
   defp doing(board) do
     case Board.fetch(board, :mission, :infinity) do

@@ -22,6 +22,8 @@ defmodule Swarm.Missions.Landmark do
 
   @roam_ms 6_000
   @tries 3
+  # No fleet elects that often unheard; taken over, it would leave no room for epochs to come.
+  @leap 1_000_000
 
   @doc """
   A robot's mission. Options: `formation:` (`{kind, spacing}`), `assign:` (`:chain` or `:cost`),
@@ -98,7 +100,9 @@ defmodule Swarm.Missions.Landmark do
   defp hear_anchor(%{me: me} = mission, %Anchor{leader: leader} = anchor) when leader != me do
     ours? = anchor.epoch == mission.epoch and mission.leader in [nil, leader]
 
-    if (ours? or anchor.epoch > mission.epoch) and
+    later? = anchor.epoch > mission.epoch and anchor.epoch <= mission.epoch + @leap
+
+    if (ours? or later?) and
          Anchor.newest(mission.anchor, anchor) != mission.anchor,
        do: %{
          mission

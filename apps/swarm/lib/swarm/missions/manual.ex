@@ -12,6 +12,7 @@ defmodule Swarm.Missions.Manual do
   """
   alias Hal.{Pose, Twist}
   alias Robot.{Behaviour, Command, Percept}
+  alias Swarm.{Formation, Shape}
 
   @behaviour Robot.Mission
 
@@ -52,7 +53,23 @@ defmodule Swarm.Missions.Manual do
   def check({:follow, %Pose{x: x, y: y, heading: h}}),
     do: numbers(:follow, [x, y, h], @farthest, &{:follow, Pose.new(&1, &2, &3)})
 
-  def check(command), do: {:ok, command}
+  def check(command) do
+    if known?(command),
+      do: {:ok, command},
+      else: {:error, "#{brief(command)} is no command; those of Robot.Command are allowed"}
+  end
+
+  defp known?(word) when word in [:stop, :lead, :start, :ping], do: true
+  defp known?({:follow_the_leader, robot}), do: Shape.name?(robot)
+  defp known?({:find_blob, colour}), do: colour == nil or is_binary(colour)
+  defp known?({word, robot}) when word in [:subscribe, :unsubscribe], do: Shape.name?(robot)
+  defp known?({:position, %Pose{}}), do: true
+  defp known?({:blob, %Pose{}, _size, _found?}), do: true
+  defp known?({:formation, kind, spacing}), do: Formation.valid?({kind, spacing})
+  defp known?({:start, options}), do: Keyword.keyword?(options)
+  defp known?(_other), do: false
+
+  defp brief(term), do: inspect(term, limit: 5, printable_limit: 40)
 
   defp turn(heading), do: Pose.wrap(heading)
 
