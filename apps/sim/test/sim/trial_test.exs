@@ -112,6 +112,12 @@ defmodule Sim.TrialTest do
     assert result.landmark_distance_m < 2.5
   end
 
+  test "a landmark that passes the leader too near to be measured leads nobody's pose astray" do
+    options = %{seed: 1, formation: {:line, 1.0}, moves: [{{-5.0, 3.0}, 40}]}
+    result = run(options) |> assert_formed() |> Trial.result()
+    assert result.formation.error_max_m < 0.35
+  end
+
   test "a fifth of all messages lost changes nothing but the time" do
     for seed <- 1..3, do: assert_formed(run(%{seed: seed, loss: 0.2}))
   end

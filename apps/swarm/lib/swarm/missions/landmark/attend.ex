@@ -19,9 +19,8 @@ defmodule Swarm.Missions.Landmark.Attend do
   @gaze_ms 1_500
   @landmark_radius 0.15
   @robot_colour "RedRobot"
-  # How well the leader knows the landmark's place when it stands, and while it moves, in metres.
-  @still_sd 0.08
-  @moving_sd 0.5
+  # How well the places that were told are known, in metres.
+  @landmark_sd 0.08
   @robot_sd 0.1
 
   # A slot is blocked when something unknown stands in it for so long, or no way leads nearer.
@@ -171,13 +170,19 @@ defmodule Swarm.Missions.Landmark.Attend do
         }
       end
 
-    case Places.landmark(anchor) do
-      nil ->
-        robots
+    # A landmark that moves is somewhere else by now.
+    if anchor.still and anchor.landmark != nil do
+      landmark = %{
+        colour: mission.colour,
+        at: Places.landmark(anchor),
+        sd: @landmark_sd,
+        range?: true,
+        radius: nil
+      }
 
-      place ->
-        sd = if anchor.still, do: @still_sd, else: @moving_sd
-        [%{colour: mission.colour, at: place, sd: sd, range?: true, radius: nil} | robots]
+      [landmark | robots]
+    else
+      robots
     end
   end
 

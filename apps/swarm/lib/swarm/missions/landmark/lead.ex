@@ -12,6 +12,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   @near 1.5
   @far 1.9
   @ring_slack 0.15
+  @still_ms 400
   @formed_ms 1_000
   @unformed_ms 500
   @lost_ms 3_000
@@ -159,7 +160,7 @@ defmodule Swarm.Missions.Landmark.Lead do
       places: elem(lead.shape.room, 1),
       trail: Shape.trail(lead.shape, mission),
       landmark: place && point(place),
-      still: State.sees?(mission) and not mission.sight.moving?
+      still: Sight.still?(mission.sight, mission.now_ms, @still_ms)
     }
 
     %{mission | anchor: anchor, lead: %{lead | sequence: sequence}}

@@ -7,7 +7,7 @@ defmodule Swarm.Missions.Landmark.Sight do
   alias Robot.{Percept, Sighting}
 
   @enforce_keys [:at_ms, :size_ppm, :bearing]
-  defstruct @enforce_keys ++ [distance: nil, place: nil, moving?: false]
+  defstruct @enforce_keys ++ [distance: nil, place: nil, place_ms: nil, moving?: false]
 
   @type t :: %__MODULE__{
           at_ms: integer(),
@@ -15,6 +15,7 @@ defmodule Swarm.Missions.Landmark.Sight do
           bearing: float(),
           distance: float() | nil,
           place: Pose.point() | nil,
+          place_ms: integer() | nil,
           moving?: boolean()
         }
 
@@ -49,10 +50,21 @@ defmodule Swarm.Missions.Landmark.Sight do
           bearing: Pose.bearing(percept.pose, Sighting.place(percept.blobs_pose, bearing, 5.0)),
           distance: distance,
           place: place,
+          place_ms: if(seen, do: percept.blobs_at_ms, else: old && old.place_ms),
           moving?: seen != nil and place != nil and Pose.distance(seen, place) > @moving
         }
     end
   end
+
+  @doc """
+  Whether the place is known for sure: seen within the last `ms`, all of it, and standing. A landmark
+  that comes too near is clipped, and where it goes then nobody sees.
+  """
+  @spec still?(t() | nil, integer(), pos_integer()) :: boolean()
+  def still?(%{place_ms: place_ms, moving?: false}, now_ms, ms) when place_ms != nil,
+    do: now_ms - place_ms <= ms
+
+  def still?(_sight, _now_ms, _ms), do: false
 
   @doc "Whether the landmark was seen within the last `ms`."
   @spec fresh?(t() | nil, integer(), pos_integer()) :: boolean()
