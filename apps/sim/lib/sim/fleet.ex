@@ -24,12 +24,19 @@ defmodule Sim.Fleet do
   @period_ms 100
 
   @doc """
-  Starts a fleet. Options as of `Sim.Trial.Setup.new/1` (there is no time limit here), and `mission: false`
-  for robots that wait for commands instead of starting their mission at once; `trace` as of
+  Starts a fleet. All options have defaults: `robots`, `seed`, `map`, `landmark`, `formation`, `noise`,
+  `loss` and the others of `Sim.Trial.Setup.new/1` (there is no time limit here); `mission: false` for
+  robots that wait for commands instead of starting their mission at once; `trace` as of
   `Robot.Config`, called with the robot's id first.
+
+      {:ok, fleet} = Sim.Fleet.start_link()
+      {:ok, fleet} = Sim.Fleet.start_link(robots: [:mag1, :mag2, :min1], map: "hospital", mission: false)
+      Sim.Fleet.kill(fleet, :leader)
+      Sim.Fleet.move_landmark(fleet, {3.0, 2.0})
   """
-  @spec start_link(map()) :: {:ok, pid()} | {:error, line :: String.t()}
-  def start_link(options \\ %{}) do
+  @spec start_link(keyword() | map()) :: {:ok, pid()} | {:error, line :: String.t()}
+  def start_link(options \\ []) do
+    options = Map.new(options)
     {mission?, options} = Map.pop(options, :mission, true)
     {trace, options} = Map.pop(options, :trace)
 

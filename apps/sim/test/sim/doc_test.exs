@@ -7,5 +7,6 @@ defmodule Sim.DocTest do
   doctest Sim.Palette
   doctest Sim.Scene
   doctest Sim.Radio
+  doctest Sim.Trial.Options
   doctest Sim.Trig
 end

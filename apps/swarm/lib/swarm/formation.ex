@@ -61,8 +61,12 @@ defmodule Swarm.Formation do
 
   def new(kind, options) when kind in @kinds do
     case Keyword.keys(options) -- allowed(kind) do
-      [] -> kind |> spacing(options) |> check(kind)
-      [key | _] -> {:error, "#{kind} takes no #{inspect(key)}: #{Enum.join(allowed(kind), ", ")}"}
+      [] ->
+        kind |> spacing(options) |> check(kind)
+
+      [key | _] ->
+        {:error,
+         "#{kind} takes no #{inspect(key)}: #{Enum.join(allowed(kind) -- [:robots], ", ")}"}
     end
   end
 

@@ -4,6 +4,7 @@ defmodule Sim.Trial.Setup do
   robot is switched on with. Pure; the trial and the live fleet both start from it.
   """
   alias Hal.{Pose, Profile}
+  alias Sim.Trial.Options
   alias Sim.World
 
   @enforce_keys [:options, :map, :world, :robots, :mission]
@@ -19,33 +20,19 @@ defmodule Sim.Trial.Setup do
           mission: {module(), keyword()}
         }
 
-  @defaults %{
-    robots: [:mag1, :mag2, :mag3, :min1, :min2, :min3],
-    seed: 1,
-    map: "hall",
-    start: :spread,
-    landmark: :default,
-    moves: [],
-    kills: [],
-    loss: 0.0,
-    noise: :default,
-    formation: {:column, 1.0},
-    assign: :cost,
-    leader_change: true,
-    duration_s: 120,
-    blobs: :painted
-  }
-
   @doc """
-  A setup. Options (a map; all have defaults): `robots` (ids that begin with `mag` or `min`), `seed`,
+  A setup. Options (a keyword list or a map; all have defaults): `robots` (ids that begin with `mag` or `min`), `seed`,
   `map`, `start` (`:spread` or `:same`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
   (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `loss` (0 to 1), `noise` (`:off`,
-  `:default`, `:slip`), `formation` (`{kind, spacing}`), `assign` (`:chain` or `:cost`),
+  `:default`, `:slip`), `formation` (`kind` or `{kind, spacing}`), `assign` (`:chain` or `:cost`),
   `leader_change`, `duration_s`, `blobs` (`:painted` or `:direct`). Errors are one line.
   """
-  @spec new(map()) :: {:ok, t()} | {:error, String.t()}
+  @spec new(keyword() | map()) :: {:ok, t()} | {:error, String.t()}
   def new(options) do
-    options = Map.merge(@defaults, options)
+    with {:ok, options} <- Options.check(options), do: set_up(options)
+  end
+
+  defp set_up(options) do
     bodies = for id <- options.robots, do: {id, profile(id).radius}
     landmark = landmark(options.landmark)
     places = [landmark | Enum.map(options.moves, &elem(&1, 0))]
