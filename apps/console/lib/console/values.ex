@@ -23,7 +23,7 @@ defmodule Console.Values do
       {:error, "a whole number from 1 to 100"}
   """
   @spec whole(String.t(), Range.t()) :: {:ok, integer()} | {:error, String.t()}
-  def whole(text, first..last) do
+  def whole(text, first..last//_) do
     with true <- byte_size(text) <= @longest,
          {number, ""} when number >= first and number <= last <- Integer.parse(text) do
       {:ok, number}
