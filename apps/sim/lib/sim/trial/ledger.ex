@@ -13,10 +13,32 @@ defmodule Sim.Trial.Ledger do
             ticks: 0,
             formed_ticks: 0,
             formed_ms: nil,
-            rest_ms: nil,
-            formation: nil
+            rest_ms: nil
 
-  @type t :: %__MODULE__{}
+  @type stage :: %{
+          required(:stage) => atom(),
+          required(:at_s) => float(),
+          required(:robot) => atom() | nil,
+          optional(:epoch) => pos_integer(),
+          optional(:size_ppm) => pos_integer()
+        }
+
+  @typedoc """
+  `stages` has the newest first; `formed_ms` and `rest_ms` say since when the fleet is in formation, or
+  at rest without a landmark, `ticks` and `formed_ticks` count those since the first election.
+  """
+  @type t :: %__MODULE__{
+          stages: [stage()],
+          leader: atom() | nil,
+          epoch: non_neg_integer(),
+          leaders_at_once_max: non_neg_integer(),
+          elections: non_neg_integer(),
+          searching?: boolean(),
+          ticks: non_neg_integer(),
+          formed_ticks: non_neg_integer(),
+          formed_ms: integer() | nil,
+          rest_ms: integer() | nil
+        }
 
   @doc "An empty ledger."
   @spec new() :: t()
@@ -48,7 +70,7 @@ defmodule Sim.Trial.Ledger do
 
     %{
       ledger
-      | leader: leader(leaders),
+      | leader: highest(leaders),
         epoch:
           Enum.reduce(claims, ledger.epoch, fn {_id, claim}, e -> max(e, claim[:epoch] || 0) end),
         leaders_at_once_max: max(ledger.leaders_at_once_max, length(leaders)),
@@ -63,14 +85,7 @@ defmodule Sim.Trial.Ledger do
 
   @doc "Who leads now: of several the one of the highest epoch."
   @spec leader(t()) :: atom() | nil
-  def leader(%__MODULE__{leader: leader}), do: leader
-
-  def leader(leaders) when is_list(leaders) do
-    case Enum.max_by(leaders, fn {id, claim} -> {claim.epoch, id} end, fn -> nil end) do
-      nil -> nil
-      {id, _claim} -> id
-    end
-  end
+  def leader(ledger), do: ledger.leader
 
   @doc "Whether the fleet is in formation now, by its own judgement."
   @spec formed?(t()) :: boolean()
@@ -81,11 +96,18 @@ defmodule Sim.Trial.Ledger do
   def calm_since_ms(ledger), do: ledger.formed_ms || ledger.rest_ms
 
   @doc "The stages, oldest first."
-  @spec stages(t()) :: [map()]
+  @spec stages(t()) :: [stage()]
   def stages(ledger), do: Enum.reverse(ledger.stages)
 
   @doc "The share of the time since the first election that the fleet was in formation."
   @spec share_formed(t()) :: float()
   def share_formed(%{ticks: 0}), do: 0.0
   def share_formed(ledger), do: ledger.formed_ticks / ledger.ticks
+
+  defp highest([]), do: nil
+
+  defp highest(leaders) do
+    {id, _claim} = Enum.max_by(leaders, fn {id, claim} -> {claim.epoch, id} end)
+    id
+  end
 end

@@ -36,25 +36,32 @@ defmodule Mix.Tasks.Blobs do
 
   @impl Mix.Task
   def run(words) do
-    with {:ok, options} <- Options.parse(words),
-         {:ok, colours} <-
+    case Options.parse(words) do
+      {:ok, options} -> options |> find() |> finish()
+      {:error, line} -> refuse(line)
+      :help -> Mix.shell().info(@moduledoc)
+    end
+  end
+
+  defp find(options) do
+    with {:ok, colours} <-
            Colours.read(options.colours, distance: options.distance, min_area: options.min_area),
          {:ok, output} <- open(options.json),
          {:ok, summary} <- look(options, colours, output),
          :ok <- draw(options.picture, summary.last, colours) do
       close(output)
       conclude(options, summary)
-    else
-      :help ->
-        Mix.shell().info(@moduledoc)
-
-      :halted ->
-        exit({:shutdown, 1})
-
-      {:error, line} ->
-        Mix.shell().error(line)
-        exit({:shutdown, 1})
     end
+  end
+
+  defp finish(:ok), do: :ok
+  defp finish(:halted), do: exit({:shutdown, 1})
+
+  defp finish({:error, line}), do: refuse(line)
+
+  defp refuse(line) do
+    Mix.shell().error(line)
+    exit({:shutdown, 1})
   end
 
   defp look(options, colours, output) do
