@@ -34,14 +34,28 @@ defmodule Swarm.Missions.Landmark.Attend do
             holding?: false,
             blocked?: false,
             told: {0, 0},
-            error: nil,
             landmark: nil,
             slot: nil,
             best: nil,
             best_ms: 0,
             obstacle_ms: nil
 
-  @type t :: %__MODULE__{}
+  @typedoc """
+  `told` is the epoch and sequence number of the anchor that was last passed on, `landmark` where the
+  landmark stood when this robot was last in place. `best` is the least distance to `slot` so far, and
+  `best_ms` when it was reached; since `obstacle_ms` something unknown stands in the slot.
+  """
+  @type t :: %__MODULE__{
+          in_place?: boolean(),
+          holding?: boolean(),
+          blocked?: boolean(),
+          told: {non_neg_integer(), non_neg_integer()},
+          landmark: {integer(), integer()} | nil,
+          slot: Pose.t() | nil,
+          best: float() | nil,
+          best_ms: integer(),
+          obstacle_ms: integer() | nil
+        }
 
   @doc "Not attending anybody yet."
   @spec new() :: t()
@@ -79,7 +93,6 @@ defmodule Swarm.Missions.Landmark.Attend do
           mission.attend
           | in_place?: slow? and error <= @in_place,
             holding?: resting? and error <= @near,
-            error: error,
             told: told,
             # Where the landmark stood when this robot was last in place, or began to follow.
             landmark: landmark(mission, slow? and error <= @in_place)

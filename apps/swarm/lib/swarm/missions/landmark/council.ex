@@ -5,7 +5,8 @@ defmodule Swarm.Missions.Landmark.Council do
 
   A round is opened for two purposes. `:search`: everybody reports after its scan. `:change`:
   everybody reports at once what it sees now, because the leader is gone, or another robot has
-  come clearly nearer to the landmark (R76). While a round is open all stand still.
+  come clearly nearer to the landmark (R76). Leader and
+  followers stand still while a round is open, searchers once they have scanned.
   """
   alias Swarm.{Assignment, Chain, Election, Formation, Message, Peers, Round}
   alias Swarm.Missions.Landmark.{Challenge, Sight, State}
@@ -13,9 +14,12 @@ defmodule Swarm.Missions.Landmark.Council do
   # Heartbeats come at 5 Hz: after this time the view has settled.
   @settle_ms 600
   @late_ms 1_500
+  # How long reports are waited for: more than a scan takes, and than a letter under way.
   @search_ms 30_000
   @change_ms 2_000
+  # A sighting this old still counts in a report.
   @fresh_ms 1_000
+  # Without a sign of life for so long a leader is lost.
   @lost_ms 2_000
 
   @doc "Hears a letter. A robot that is not started takes no part."
@@ -179,7 +183,6 @@ defmodule Swarm.Missions.Landmark.Council do
           mission
           | verdict: {:leader, leader},
             epoch: epoch,
-            founded: mission.now_ms,
             size_ppm: record.reports[leader].size_ppm,
             order: plan(mission, record.reports, leader),
             rescan?: false,

@@ -11,13 +11,18 @@ defmodule Swarm.Missions.Landmark.Lead do
   # The landmark's foot leaves the picture below 1.4 m, and its size with it.
   @near 1.5
   @far 1.9
+  # How far off its ring round the landmark a leader may stand.
   @ring_slack 0.15
+  # A landmark measured this long ago is where it was told to be.
   @still_ms 400
+  # A shape is formed when it has been right for so long, and no more when it was wrong for so long.
   @formed_ms 1_000
   @unformed_ms 500
+  # The landmark is lost when it was not seen for so long; a little later the leader looks round.
   @lost_ms 3_000
   @scan_ms 5_000
   @unheard_ms 1_500
+  # By then all that took part in the round have told that they follow; who comes now is new.
   @settled_ms 1_000
 
   defstruct sequence: 0,
@@ -28,7 +33,19 @@ defmodule Swarm.Missions.Landmark.Lead do
             heard_ms: nil,
             shape: %Shape{}
 
-  @type t :: %__MODULE__{}
+  @typedoc """
+  `sequence` numbers the anchors; since `good_ms` the shape has been as it should be, since `bad_ms` it
+  has not; `heard_ms` is when somebody was last known to hear this leader.
+  """
+  @type t :: %__MODULE__{
+          sequence: non_neg_integer(),
+          good_ms: integer() | nil,
+          bad_ms: integer() | nil,
+          formed?: boolean(),
+          lost?: boolean(),
+          heard_ms: integer() | nil,
+          shape: Shape.t()
+        }
 
   @doc "Nothing led yet."
   @spec new() :: t()

@@ -27,7 +27,6 @@ defmodule Swarm.Missions.Landmark.State do
                 order: [],
                 epoch: 0,
                 leader: nil,
-                founded: nil,
                 size_ppm: nil,
                 anchor: nil,
                 anchor_ms: nil,
@@ -37,7 +36,40 @@ defmodule Swarm.Missions.Landmark.State do
                 challenge: nil
               ]
 
-  @type t :: %__MODULE__{}
+  @typedoc """
+  `since_ms` is when the phase began, `scan` how the last turn ended, `rescan?` that the next round
+  needs a new one, `tries` how many searches found nothing, `verdict` what the last round said until a
+  phase has acted on it, `order` the followers by slot. `epoch` and `leader` are those that the robot
+  belongs to, `size_ppm` is the size that elected the leader, `anchor_ms` when the anchor came.
+  """
+  @type t :: %__MODULE__{
+          me: atom(),
+          formation: Swarm.Formation.t(),
+          assign: Swarm.Assignment.method(),
+          leader_change?: boolean(),
+          colour: String.t(),
+          percept: Robot.Percept.t() | nil,
+          now_ms: integer(),
+          phase: Swarm.Missions.Landmark.Phases.phase(),
+          since_ms: integer(),
+          started?: boolean(),
+          scan: :found | :nothing | nil,
+          sight: Sight.t() | nil,
+          tries: non_neg_integer(),
+          round: Swarm.Round.t() | nil,
+          verdict: {:leader, atom()} | :nobody | nil,
+          rescan?: boolean(),
+          order: [atom()],
+          epoch: non_neg_integer(),
+          leader: atom() | nil,
+          size_ppm: non_neg_integer() | nil,
+          anchor: Swarm.Anchor.t() | nil,
+          anchor_ms: integer() | nil,
+          trail: Swarm.Trail.t(),
+          lead: Swarm.Missions.Landmark.Lead.t() | nil,
+          attend: Swarm.Missions.Landmark.Attend.t() | nil,
+          challenge: :open | {:nearer | :blind, since_ms :: integer()} | nil
+        }
 
   @doc "The colour of the landmark unless told otherwise."
   @spec colour() :: String.t()

@@ -1,0 +1,186 @@
+defmodule Swarm.MemberTest do
+  @moduledoc "Nothing that is said to a member crashes it; an emergency stop finds everybody."
+  use ExUnit.Case, async: true
+  alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Swarm.{Anchor, Heartbeat, Member, Message, Round}
+
+  @beat %Heartbeat{boot: 1, sequence: 1, pose: {900, 0, 0}, twist: {0, 0}, phase: :search}
+  @anchor %Anchor{
+    leader: :mag2,
+    epoch: 1,
+    sequence: 1,
+    pose: {0, 0, 0},
+    twist: {0, 0},
+    formation: {:wedge, 1.0},
+    order: [:mag1, :mag3],
+    size: 3,
+    places: [1, 2]
+  }
+  @report %{found: true, size_ppm: 5, pose: {1, 2, 3}}
+  @letter %Round.Letter{
+    id: {1, 1, :mag2},
+    view: [:mag1, :mag2],
+    remaining_ms: 10,
+    purpose: :search,
+    report: @report,
+    known: %{mag2: @report}
+  }
+
+  defp member(id \\ :mag1) do
+    mission = {Swarm.Missions.Landmark, []}
+
+    member =
+      Member.new(id: id, profile: Profile.magellan(), start: Pose.new(0, 0), mission: mission)
+
+    {member, _} = Member.step(member, {:command, :start, 0})
+    sense(member, 0)
+  end
+
+  defp sense(member, at_ms) do
+    odometry = {:odometry, %Odometry{pose: Pose.new(0, 0), twist: Twist.zero()}}
+    {member, []} = Member.step(member, {:reading, odometry, at_ms})
+    {member, _} = Member.step(member, {:tick, at_ms})
+    member
+  end
+
+  defp hear(member, term, at_ms \\ 100), do: elem(Member.step(member, {:message, term, at_ms}), 0)
+  defp rejected(member), do: member.ear.rejected |> Map.values() |> Enum.sum()
+  defp deep(n), do: Enum.reduce(1..n, nil, fn _, term -> [term] end)
+
+  defp junk do
+    Enum.random([
+      nil,
+      -1,
+      1.0e300,
+      Bitwise.bsl(1, 5_000),
+      -Bitwise.bsl(1, 5_000),
+      "text",
+      <<1::3>>,
+      [],
+      [:a | :b],
+      [1 | 2],
+      List.duplicate(:mag1, 5_000),
+      deep(10_000),
+      {},
+      {1, 2, 3, 4},
+      {Bitwise.bsl(1, 99), 0, 0},
+      {0.5, 0, 0},
+      {:column, 0.0},
+      {:diamond, Bitwise.bsl(1, 70)},
+      %{},
+      %{found: true, size_ppm: 1, pose: {1, 2, 3}, more: deep(100)},
+      %{size_ppm: 1},
+      %{deep(5) => deep(5)},
+      self(),
+      make_ref(),
+      &Enum.map/2,
+      %{__struct__: Heartbeat},
+      %{__struct__: NoSuchThing},
+      @beat,
+      @anchor,
+      @letter,
+      Pose.new(0, 0)
+    ])
+  end
+
+  defp spoil(%{__struct__: _} = struct) do
+    key = struct |> Map.keys() |> Enum.random()
+
+    case :rand.uniform(4) do
+      1 -> Map.delete(struct, key)
+      2 -> Map.put(struct, :extra, junk())
+      3 -> Map.put(struct, key, junk())
+      4 -> Map.update!(struct, key, &nest/1)
+    end
+  end
+
+  # Spoils something inside of a field.
+  defp nest(tuple) when is_tuple(tuple) and tuple != {},
+    do: put_elem(tuple, :rand.uniform(tuple_size(tuple)) - 1, junk())
+
+  defp nest([_ | rest]), do: Enum.random([[junk() | rest], rest ++ [junk()], rest ++ :tail])
+
+  defp nest(map) when is_map(map) and map_size(map) > 0 and not is_struct(map),
+    do: Map.put(map, map |> Map.keys() |> Enum.random(), junk())
+
+  defp nest(_plain), do: junk()
+
+  test "2,000 spoilt messages are counted or make sense, and nobody crashes" do
+    {member, heard} =
+      Enum.reduce(1..2_000, {member(), 0}, fn n, {member, heard} ->
+        {kind, body} =
+          Enum.random(
+            heartbeat: %{@beat | sequence: n},
+            heartbeat: %{@beat | sequence: n, phase: :lead, epoch: 1, anchor: @anchor},
+            place: %{@anchor | sequence: n},
+            round: @letter
+          )
+
+        message = Message.new(:mag2, kind, spoil(body))
+        message = if rem(n, 10) == 0, do: spoil(message), else: message
+        before = rejected(member)
+        member = hear(member, message, n * 20)
+        member = if rem(n, 5) == 0, do: sense(member, n * 20), else: member
+        {member, heard + 1 - (rejected(member) - before)}
+      end)
+
+    assert rejected(member) + heard == 2_000
+    assert rejected(member) > 1_000
+    # It still thinks.
+    assert {%Member{}, [_ | _]} = Member.step(member, {:tick, 50_000})
+  end
+
+  test "what is no message is counted by what it claims to be" do
+    for {term, reason} <- [
+          {:junk, :not_a_message},
+          {deep(100), :not_a_message},
+          {%{__struct__: Message}, :not_a_message},
+          {Message.new(:mag2, :command, :start), :not_a_message},
+          {Message.new(nil, :heartbeat, @beat), :not_a_message},
+          {Message.new("mag2", :heartbeat, @beat), :not_a_message},
+          {Message.new(:mag2, :place, @beat), :place},
+          {Message.new(:mag2, :round, @anchor), :round},
+          {Message.new(:mag2, :heartbeat, @letter), :heartbeat},
+          {Message.new(:mag2, :heartbeat, %{@beat | epoch: Bitwise.bsl(1, 64)}), :heartbeat},
+          {Message.new(:mag2, :place, %{@anchor | order: [:mag1, :mag1]}), :place},
+          {Message.new(:mag2, :place, %{@anchor | places: [1, 1]}), :place},
+          {Message.new(:mag2, :round, %{@letter | view: [:mag1 | :mag2]}), :round},
+          {Message.new(:mag2, :round, %{@letter | digest: "short"}), :round}
+        ] do
+      before = member()
+      later = hear(before, term)
+      assert later.ear.rejected == %{reason => 1}, inspect(term, limit: 5)
+      assert later.mission == before.mission
+    end
+  end
+
+  test "whole messages are heard" do
+    for {kind, body} <- [heartbeat: @beat, place: @anchor, round: @letter],
+        do: assert(hear(member(), Message.new(:mag2, kind, body)).ear.rejected == %{})
+  end
+
+  test "an emergency stop spreads by heartbeats, and its own echo does not bring it back" do
+    {one, _} = Member.step(member(), {:command, :estop, 0})
+    assert one.ear.stop.latched?
+    pressed = Message.new(:mag2, :heartbeat, %{@beat | estop: one.ear.stop.known, latched: true})
+    two = hear(member(:mag3), pressed)
+    assert two.ear.stop == one.ear.stop
+    assert sense(two, 100).phase == :idle
+    {_, [{:drive, twist}]} = Member.step(two, {:reflex, 100})
+    assert Twist.zero?(twist)
+
+    # Reset by a person; the neighbour, not reset yet, repeats the old number.
+    {two, _} = Member.step(two, {:command, :reset, 200})
+    two = hear(two, put_in(pressed.body.sequence, 2), 300)
+    refute two.ear.stop.latched?
+
+    # The next stop has the next number, and counts.
+    {two, _} = Member.step(two, {:command, :estop, 400})
+    assert two.ear.stop.known == one.ear.stop.known + 1
+  end
+
+  test "while it is stopped no command but stop is taken" do
+    {member, _} = Member.step(member(), {:command, :estop, 0})
+    assert {^member, []} = Member.step(member, {:command, :start, 100})
+  end
+end
