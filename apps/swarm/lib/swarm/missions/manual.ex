@@ -32,6 +32,10 @@ defmodule Swarm.Missions.Manual do
           result: integer() | nil
         }
 
+  @typedoc "What a person may ask of a robot: a command for it alone, or one for its group."
+  @type order ::
+          Command.t() | {:start, keyword()} | {:formation, Formation.kind(), spacing :: float()}
+
   @doc """
   A command that a person gave, with numbers that make sense, or one line that says which does not.
 
@@ -42,7 +46,7 @@ defmodule Swarm.Missions.Manual do
       iex> Swarm.Missions.Manual.check({:move, 99, 0})
       {:error, "move cannot take 99: a number from -10 to 10 is allowed"}
   """
-  @spec check(Command.t() | term()) :: {:ok, Command.t()} | {:error, line :: String.t()}
+  @spec check(term()) :: {:ok, order()} | {:error, line :: String.t()}
   def check({:goto, x, y, nil}), do: numbers(:goto, [x, y], @farthest, &{:goto, &1, &2, nil})
 
   def check({:goto, x, y, h}),
