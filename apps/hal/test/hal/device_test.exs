@@ -42,19 +42,19 @@ defmodule Hal.DeviceTest do
     zero = Twist.zero()
     Device.drive(pid, twist)
     assert_receive {:drive, {:drive, ^twist}, ^pid}
-    refute_receive {:drive, {:drive, ^zero}, ^pid}, 400
-    assert_receive {:drive, {:drive, ^zero}, ^pid}, 200
+    refute_receive {:drive, {:drive, ^zero}, ^pid}, 300
+    assert_receive {:drive, {:drive, ^zero}, ^pid}
     refute_receive {:drive, {:drive, _}, ^pid}, 600
   end
 
   test "a missing device is tried again, ever more slowly" do
     device(:drive, open: answers([{:error, :enoent}, {:error, :enoent}, {:error, :ebusy}, :ok]))
     assert_receive {:health, :drive, {{:offline, :enoent}, since}}
-    assert_receive {:drive, :init, _}
-    assert_receive {:drive, :init, _}, 200
-    refute_receive {:drive, :init, _}, 150
-    assert_receive {:health, :drive, {{:offline, :ebusy}, ^since}}, 200
-    assert_receive {:health, :drive, {:online, later}} when later > since, 600
+    for _ <- 1..4, do: assert_receive({:drive, :init, _})
+    assert_receive {:health, :drive, {{:offline, :ebusy}, ^since}}
+    assert_receive {:health, :drive, {:online, later}}
+    # 100, 200 and 400 ms, by the device's own clock.
+    assert later - since >= 700
   end
 
   test "a driver that reports an error is closed and opened again" do
@@ -65,7 +65,7 @@ defmodule Hal.DeviceTest do
     assert_receive {:health, :drive, {{:offline, :eio}, _}}
     # Nobody is there to drive meanwhile, and that is no error.
     Device.drive(pid, Twist.new(0.1, 0.0))
-    assert_receive {:health, :drive, {:online, _}}, 300
+    assert_receive {:health, :drive, {:online, _}}
     refute_received {:drive, {:drive, _}, _}
   end
 
@@ -78,7 +78,7 @@ defmodule Hal.DeviceTest do
         send(pid, :raise)
         assert_receive {:drive, :terminate, ^pid}
         refute_receive {:DOWN, ^monitor, _, _, _}, 300
-        assert_receive {:DOWN, ^monitor, _, _, _}, 500
+        assert_receive {:DOWN, ^monitor, _, _, _}
         assert_receive {:drive, :init, other} when other != pid
       end)
 

@@ -23,15 +23,15 @@ defmodule Robot.PilotTest do
 
   test "hands ticks, outcomes, messages and commands to the mission" do
     id = flown(:pilot2)
-    assert_receive {:mission, {:tick, %Robot.Percept{robot: ^id}}}, 200
+    assert_receive {:mission, {:tick, %Robot.Percept{robot: ^id}}}
     Pilot.hear(id, {:message, %{hello: 1}})
     assert_receive {:mission, {:message, %{hello: 1}}}
     assert Pilot.command(id, :go) == :ok
     assert_receive {:mission, {:command, :go}}
     goal = {:goal, :soon, {Acts.Roll, outcome: 7, twist: Twist.zero()}}
     assert Pilot.command(id, {:do, :ready, [goal]}) == :ok
-    assert_receive {:mission, {:outcome, :soon, 7}}, 200
-    assert_receive {:mission, {:tick, _}}, 200
+    assert_receive {:mission, {:outcome, :soon, 7}}
+    assert_receive {:mission, {:tick, _}}
   end
 
   test "carries out every kind of effect" do
@@ -59,10 +59,10 @@ defmodule Robot.PilotTest do
     assert_received {[:robot, :pilot, :phase], %{state: {Acts.Mission, :lead}}}
     {:ok, %{claim: %{slot: 2}}, _} = Board.fetch(Board.find!(id), :mission, 1_000)
     rolls()
-    assert_receive {:ptz, {:look, 0.25, _}, _}, 200
+    assert_receive {:ptz, {:look, 0.25, _}, _}
 
     assert Pilot.command(id, {:do, :lead, [{:goal, :none, nil}, {:look, -0.5}]}) == :ok
-    assert_receive {:ptz, {:look, -0.5, _}, _}, 300
+    assert_receive {:ptz, {:look, -0.5, _}, _}
   end
 
   @doc false

@@ -38,7 +38,7 @@ defmodule Robot.TraceTest do
     :ok = Gate.reset(id)
     goal = {:goal, :end, {Acts.Roll, outcome: 5, twist: Twist.zero()}}
     :ok = Pilot.command(id, {:do, :ready, [goal, {:look, nil}]})
-    assert_receive {:mission, {:outcome, :end, 5}}, 500
+    assert_receive {:mission, {:outcome, :end, 5}}
     two_ticks()
     stop_supervised!(id)
 
@@ -53,7 +53,7 @@ defmodule Robot.TraceTest do
   def record(table, entry), do: :ets.insert(table, {System.unique_integer([:monotonic]), entry})
 
   defp two_ticks do
-    for _ <- 1..2, do: assert_receive({:mission, {:tick, _}}, 500)
+    for _ <- 1..2, do: assert_receive({:mission, {:tick, _}})
   end
 
   # Plays the role's recorded inputs to the function, and compares. The robot was switched off in
