@@ -6,6 +6,7 @@ defmodule SwarmPureTest do
   doctest Swarm.Election
   doctest Swarm.Trail
   doctest Swarm.Room
+  doctest Swarm.Round.Record
   doctest Swarm.Message
   doctest Swarm.Heartbeat
   doctest Swarm.Anchor

@@ -13,9 +13,8 @@ defmodule Swarm.Round do
   Ids are `{epoch, counter, initiator}`: the epoch is that of the leadership which the round will
   found, the counter grows with each new try.
   """
-  alias Swarm.Round.Letter
+  alias Swarm.Round.{Letter, Record}
 
-  @version 1
   @leap 1_000_000
   # Letters are repeated every 100 ms, more rarely in a large group: all to all grows with its square.
   @repeat_ms 100
@@ -65,12 +64,6 @@ defmodule Swarm.Round do
           digest: binary() | nil,
           echo?: boolean(),
           highest: {epoch :: non_neg_integer(), counter :: non_neg_integer()}
-        }
-  @type record :: %{
-          id: Letter.id(),
-          view: [atom()],
-          reports: %{atom() => Swarm.Election.report()},
-          digest: binary()
         }
 
   @doc "No round yet."
@@ -135,7 +128,7 @@ defmodule Swarm.Round do
   `{:commit, record}` comes once. `{:failed, :mismatch | :timeout}` asks for a new round.
   """
   @spec tick(t(), integer()) ::
-          {t(), [Letter.t()], nil | {:commit, record()} | {:failed, :mismatch | :timeout}}
+          {t(), [Letter.t()], nil | {:commit, Record.t()} | {:failed, :mismatch | :timeout}}
   def tick(%{phase: :none} = round, _now_ms), do: {round, [], nil}
 
   def tick(round, now_ms) do
@@ -162,7 +155,12 @@ defmodule Swarm.Round do
   def leave(round), do: %{fenced(round) | phase: :none}
 
   defp record(round),
-    do: %{id: round.id, view: round.view, reports: frozen(round), digest: round.digest}
+    do: %Record{
+      id: round.id,
+      view: round.view,
+      reports: Record.freeze(round.view, round.reports),
+      digest: round.digest
+    }
 
   defp enter(round, id, view, purpose, length_ms, now_ms) do
     round
@@ -227,7 +225,7 @@ defmodule Swarm.Round do
 
   defp advance(%{phase: :echo} = round, now_ms) do
     if now_ms - round.since_ms >= @echo_ms do
-      digest = digest(round)
+      digest = Record.digest(round.id, Record.freeze(round.view, round.reports))
 
       %{round | phase: :digest, since_ms: now_ms, said_ms: nil, digest: digest, echo?: false}
       |> put_digest(round.me, digest)
@@ -271,33 +269,6 @@ defmodule Swarm.Round do
     do: Enum.all?(round.view, &(Map.get(round.digests, &1) == round.digest))
 
   defp differing?(round), do: Enum.any?(round.digests, fn {_id, d} -> d != round.digest end)
-
-  # Who was silent until the deadline is in the record as nil.
-  defp frozen(round), do: Map.new(round.view, &{&1, Map.get(round.reports, &1)})
-
-  # Over a fixed layout of whole numbers and names, sorted by name: never over a term's own bytes.
-  defp digest(round) do
-    {epoch, counter, initiator} = round.id
-
-    lines =
-      for {id, report} <- round |> frozen() |> Enum.sort() do
-        case report do
-          nil ->
-            [Atom.to_string(id), ":-;"]
-
-          %{found: found, size_ppm: size, pose: {x, y, heading}} ->
-            [Atom.to_string(id), ":", if(found, do: "1", else: "0")] ++
-              for(n <- [size, x, y, heading], do: [",", Integer.to_string(n)]) ++ [";"]
-        end
-      end
-
-    :crypto.hash(:sha256, [
-      "#{@version}/#{epoch}/#{counter}/",
-      Atom.to_string(initiator),
-      "/",
-      lines
-    ])
-  end
 
   # A round whose digest is out may have been committed by others: what follows it is a new epoch.
   defp fenced(%{phase: phase, id: {epoch, _counter, initiator}} = round)
