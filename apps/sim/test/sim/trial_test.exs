@@ -92,6 +92,14 @@ defmodule Sim.TrialTest do
     assert second > first
   end
 
+  test "a shape asked for just before the leader dies is the next leader's shape" do
+    {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct})
+    trial = until(trial, &Trial.formed?/1)
+    trial = trial |> Trial.command(:all, {:formation, :wedge, 1.2}) |> Trial.kill(:leader)
+    result = trial |> to_the_end() |> assert_formed() |> Trial.result()
+    assert {result.formation.kind, result.formation.spacing_m} == {:wedge, 1.2}
+  end
+
   test "a gap in the middle closes, without a new election" do
     {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct, kills: []})
     trial = until(trial, &Trial.formed?/1)

@@ -9,14 +9,14 @@ defmodule Swarm.Anchor do
   Poses are `{x_mm, y_mm, mrad}` in the leader's map frame; `landmark` is `{x_mm, y_mm}` or `nil`,
   `still` says that it does not move. `order` names the followers by slot, which is also
   the order in which each passes the anchor on to its child. `formation` is
-  the shape as there is room for it, `asked` the one that was asked for; `size` and `places` say which
+  the shape as there is room for it, `asked` the one that was asked for, the `asked_no`-th that was; `size` and `places` say which
   slots of it are used (`Swarm.Room`), `trail` gives them pose by pose where the shape is a column
   along the leader's trail.
   """
   alias Swarm.{Formation, Shape}
 
   @enforce_keys [:leader, :epoch, :sequence, :pose, :twist, :formation, :order, :size, :places]
-  defstruct @enforce_keys ++ [asked: nil, landmark: nil, still: false, trail: nil]
+  defstruct @enforce_keys ++ [asked: nil, asked_no: 0, landmark: nil, still: false, trail: nil]
 
   @type t :: %__MODULE__{
           leader: atom(),
@@ -31,6 +31,7 @@ defmodule Swarm.Anchor do
           size: pos_integer(),
           places: [pos_integer()],
           asked: Formation.t() | nil,
+          asked_no: non_neg_integer(),
           trail: [{integer(), integer(), integer()}] | nil
         }
 
@@ -59,6 +60,7 @@ defmodule Swarm.Anchor do
       Shape.number?(w) and Shape.name?(anchor.leader) and Shape.count?(anchor.epoch) and
       anchor.epoch > 0 and Shape.count?(anchor.sequence) and Formation.valid?(anchor.formation) and
       (anchor.asked == nil or Formation.valid?(anchor.asked)) and
+      Shape.count?(anchor.asked_no) and
       Shape.names?(order) and Shape.distinct?(order) and anchor.leader not in order and
       anchor.size in 1..@most and
       Shape.list?(places, &(&1 in 1..@most and &1 < anchor.size)) and

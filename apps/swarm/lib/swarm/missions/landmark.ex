@@ -51,8 +51,11 @@ defmodule Swarm.Missions.Landmark do
 
   def handle({:command, {:formation, kind, spacing}}, mission) do
     case Formation.new(kind, spacing: spacing) do
-      {:ok, formation} -> still(Lead.reshape(%{mission | formation: formation}))
-      {:error, _line} -> still(mission)
+      {:ok, formation} ->
+        still(Lead.reshape(%{mission | formation: formation, asked_no: mission.asked_no + 1}))
+
+      {:error, _line} ->
+        still(mission)
     end
   end
 
@@ -104,16 +107,18 @@ defmodule Swarm.Missions.Landmark do
 
     if (ours? or later?) and
          Anchor.newest(mission.anchor, anchor) != mission.anchor,
-       do: %{
-         mission
-         | anchor: anchor,
-           anchor_ms: mission.now_ms,
-           formation: anchor.asked || anchor.formation
-       },
+       do: take_up(%{mission | anchor: anchor, anchor_ms: mission.now_ms}, anchor),
        else: mission
   end
 
   defp hear_anchor(mission, _own), do: mission
+
+  # A person may have asked for another shape while this anchor was under way.
+  defp take_up(%{asked_no: known} = mission, %Anchor{asked_no: number} = anchor)
+       when number >= known,
+       do: %{mission | formation: anchor.asked || anchor.formation, asked_no: number}
+
+  defp take_up(mission, _older), do: mission
 
   # From phase to phase along the table; a row that leads on at once is followed at once.
   defp step(mission, stages \\ []) do

@@ -172,6 +172,7 @@ defmodule Swarm.Missions.Landmark.Lead do
       twist: twist(percept),
       formation: lead.shape.formation,
       asked: mission.formation,
+      asked_no: mission.asked_no,
       order: mission.order,
       size: elem(lead.shape.room, 0),
       places: elem(lead.shape.room, 1),

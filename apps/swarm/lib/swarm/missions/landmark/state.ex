@@ -12,6 +12,7 @@ defmodule Swarm.Missions.Landmark.State do
   @enforce_keys [:me, :formation, :assign, :leader_change?]
   defstruct @enforce_keys ++
               [
+                asked_no: 0,
                 colour: @colour,
                 percept: nil,
                 now_ms: 0,
@@ -37,7 +38,8 @@ defmodule Swarm.Missions.Landmark.State do
               ]
 
   @typedoc """
-  `since_ms` is when the phase began, `scan` how the last turn ended, `rescan?` that the next round
+  `asked_no` counts the shapes that people asked for, so that an older anchor does not undo the
+  newest. `since_ms` is when the phase began, `scan` how the last turn ended, `rescan?` that the next round
   needs a new one, `tries` how many searches found nothing, `verdict` what the last round said until a
   phase has acted on it, `order` the followers by slot. `epoch` and `leader` are those that the robot
   belongs to, `size_ppm` is the size that elected the leader, `anchor_ms` when the anchor came.
@@ -45,6 +47,7 @@ defmodule Swarm.Missions.Landmark.State do
   @type t :: %__MODULE__{
           me: atom(),
           formation: Swarm.Formation.t(),
+          asked_no: non_neg_integer(),
           assign: Swarm.Assignment.method(),
           leader_change?: boolean(),
           colour: String.t(),
