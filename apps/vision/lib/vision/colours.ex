@@ -51,6 +51,7 @@ defmodule Vision.Colours do
         }
 
   @most 32
+  @largest_file 1_048_576
   @largest_area 0xFFFFFFFF
 
   @doc """
@@ -61,9 +62,23 @@ defmodule Vision.Colours do
   """
   @spec read(Path.t(), keyword()) :: {:ok, t()} | {:error, String.t()}
   def read(path, options \\ []) do
-    case File.read(path) do
-      {:ok, text} -> parse(text, [{:file, path} | options])
-      {:error, reason} -> {:error, "#{path}: #{:file.format_error(reason)}"}
+    # A pipe or a device may never end.
+    with {:ok, %File.Stat{type: :regular, size: size}} when size <= @largest_file <-
+           File.stat(path),
+         {:ok, text} <- File.read(path) do
+      parse(text, [{:file, path} | options])
+    else
+      {:ok, %File.Stat{type: :regular}} ->
+        {:error, "#{path}: no colour file is larger than #{div(@largest_file, 1024)} kB"}
+
+      {:ok, %File.Stat{type: :directory}} ->
+        {:error, "#{path}: #{:file.format_error(:eisdir)}"}
+
+      {:ok, %File.Stat{}} ->
+        {:error, "#{path}: a pipe or device, where a file is needed"}
+
+      {:error, reason} ->
+        {:error, "#{path}: #{:file.format_error(reason)}"}
     end
   end
 

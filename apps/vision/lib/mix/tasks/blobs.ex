@@ -47,9 +47,8 @@ defmodule Mix.Tasks.Blobs do
     with {:ok, colours} <-
            Colours.read(options.colours, distance: options.distance, min_area: options.min_area),
          {:ok, output} <- open(options.json),
-         {:ok, summary} <- look(options, colours, output),
+         {:ok, summary} <- output |> looked(options, colours) |> close(output, options.json),
          :ok <- draw(options.picture, summary.last, colours) do
-      close(output)
       conclude(options, summary)
     end
   end
@@ -64,7 +63,7 @@ defmodule Mix.Tasks.Blobs do
     exit({:shutdown, 1})
   end
 
-  defp look(options, colours, output) do
+  defp looked(output, options, colours) do
     terminal? = output != :table and match?({:ok, _columns}, :io.columns(:standard_error))
 
     report = fn seen ->
@@ -89,14 +88,23 @@ defmodule Mix.Tasks.Blobs do
 
   defp open(path) do
     case File.open(path, [:write, :delayed_write]) do
-      {:ok, file} -> {:ok, {:file, file}}
-      {:error, reason} -> {:error, "#{path}: #{:file.format_error(reason)}"}
+      {:ok, file} ->
+        {:ok, {:file, file}}
+
+      {:error, reason} ->
+        {:error, "--json #{path} cannot be written: #{:file.format_error(reason)}"}
     end
   end
 
   defp write(:table, seen), do: print(Report.table(seen))
   defp write(:stdio, seen), do: print([Report.json(seen), ?\n])
-  defp write({:file, file}, seen), do: IO.binwrite(file, [Report.json(seen), ?\n])
+
+  defp write({:file, file}, seen) do
+    with {:error, reason} <- :file.write(file, [Report.json(seen), ?\n]) do
+      Mix.shell().error("--json: the report cannot be written: #{:file.format_error(reason)}")
+      :halt
+    end
+  end
 
   # Who reads us may have seen enough, as `head` does; then we end without a word.
   defp print(text) do
@@ -106,8 +114,23 @@ defmodule Mix.Tasks.Blobs do
       if error.original == :terminated, do: :halt, else: reraise(error, __STACKTRACE__)
   end
 
-  defp close({:file, file}), do: File.close(file)
-  defp close(_output), do: :ok
+  # What was held back is written at the latest here, so here a full disk is known. Of a source
+  # that cannot be read no empty report stays.
+  defp close(result, {:file, file}, path) do
+    case {result, File.close(file)} do
+      {{:ok, _summary}, {:error, reason}} ->
+        {:error, "--json #{path} cannot be written: #{:file.format_error(reason)}"}
+
+      {{:error, _line}, _closed} ->
+        if match?({:ok, %File.Stat{size: 0, type: :regular}}, File.stat(path)), do: File.rm(path)
+        result
+
+      _both_well ->
+        result
+    end
+  end
+
+  defp close(result, _output, _path), do: result
 
   defp progress(seen) do
     if rem(seen.number, 10) == 0,

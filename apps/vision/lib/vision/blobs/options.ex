@@ -99,6 +99,7 @@ defmodule Vision.Blobs.Options do
   defp one_source(many),
     do: {:error, "#{length(many)} sources (#{Enum.join(many, ", ")}): one is allowed"}
 
+  defp needed(""), do: needed(nil)
   defp needed(nil), do: {:error, "--colours FILE is missing: a CMVision colour file"}
   defp needed(_path), do: :ok
 
@@ -121,6 +122,9 @@ defmodule Vision.Blobs.Options do
 
   defp writable(option, path) do
     cond do
+      path == "" ->
+        {:error, "#{option} cannot be \"\": the name of a file is allowed"}
+
       File.dir?(path) ->
         {:error, "#{option} cannot be #{inspect(path)}: it is a folder"}
 

@@ -25,6 +25,9 @@ defmodule Vision.Colours.Text do
       not String.valid?(text) or String.contains?(text, <<0>>) ->
         {:error, "not a text file"}
 
+      String.starts_with?(text, <<0xFEFF::utf8>>) ->
+        {:error, "begins with a byte order mark, which hides its first line: save it without"}
+
       String.trim(text) == "" ->
         {:error, "is empty: it needs a [Colors] and a [Thresholds] section"}
 
@@ -59,7 +62,7 @@ defmodule Vision.Colours.Text do
 
   defp read_line(line, number, %{section: :colours} = scan) do
     case Regex.run(
-           ~r/^\(\s*([+-]?\d+),\s*([+-]?\d+),\s*([+-]?\d+)\)\s*([\d.]+(?:[eE][+-]?\d+)?)\s+([+-]?\d+)\s*(\S+)/,
+           ~r/^\(\s*([+-]?\d+),\s*([+-]?\d+),\s*([+-]?\d+)\)\s*([\d.]+(?:[eE][+-]?\d+)?)\s+([+-]?\d+)\s*([^\s[:cntrl:]]+)/,
            line
          ) do
       [_, r, g, b, merge, expected, name] -> colour(scan, {r, g, b}, merge, expected, name)

@@ -45,8 +45,21 @@ defmodule Mix.Tasks.BlobsTest do
     assert File.exists?(picture)
   end
 
-  test "bad input is one line and status 1", %{colours: colours} do
+  test "bad input is one line and status 1, and leaves no file behind", %{
+    colours: colours,
+    tmp_dir: folder
+  } do
+    text = Path.join(folder, "text.jpg")
+    File.write!(text, "no picture")
+    json = Path.join(folder, "left.json")
+
     for words <- [
+          ["no/such.png", "--colours", colours, "--json", json],
+          [text, "--colours", colours, "--json", json],
+          [@source, "--colours", colours, "--json", ""],
+          [@source, "--colours", "/dev/zero"],
+          [@source, "--colours", folder],
+          [@source, "--colours", ""],
           ["no/such.png", "--colours", colours],
           [@source, "--colours", "no/such.txt"],
           [@source, "--colours", colours, "--distance", "Red=1"],
@@ -54,6 +67,16 @@ defmodule Mix.Tasks.BlobsTest do
         ] do
       line = capture_io(:stderr, fn -> assert catch_exit(Blobs.run(words)) == {:shutdown, 1} end)
       assert [_one] = String.split(line, "\n", trim: true)
+    end
+
+    refute File.exists?(json)
+  end
+
+  if File.exists?("/dev/full") do
+    test "a report that cannot be written is no success", %{colours: colours} do
+      words = [@source, "--colours", colours, "--json", "/dev/full"]
+      line = capture_io(:stderr, fn -> assert catch_exit(Blobs.run(words)) == {:shutdown, 1} end)
+      assert line =~ "--json /dev/full cannot be written: no space left on device"
     end
   end
 
