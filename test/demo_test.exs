@@ -115,6 +115,48 @@ defmodule System.DemoTest do
     refute output =~ "\e["
   end
 
+  test "who reads no further is told nothing more" do
+    for line <- ["--headless --robots 2 --duration 20", "--robots 2 --duration 20"] do
+      command = "mix demo #{line} 2>&1 | head -n 1"
+      {output, 0} = System.cmd("sh", ["-c", command], cd: @root)
+      assert output =~ "2 robots (mag1, min1) in hall"
+
+      {told, 0} =
+        System.cmd("sh", ["-c", "{ mix demo #{line} 2>&3 | head -n 1; } 3>&1 >/dev/null"],
+          cd: @root
+        )
+
+      assert told == ""
+    end
+  end
+
+  test "bin/demo says what it cannot read, needs no home, and keeps standard input" do
+    demo = Path.join(@root, "bin/demo")
+    assert {"", told, 1} = run(demo, ["--map", <<0xFF>>], [])
+    assert told == "demo: the options must be text in UTF-8\n"
+    {output, _told, 2} = run("env", ["-u", "HOME", demo, "--robots", "2"], input: "help\nquit\n")
+    assert output =~ "formation"
+  end
+
+  @tag :tmp_dir
+  test "bin/demo takes the demo along when it is ended", %{tmp_dir: folder} do
+    demo = Path.join(@root, "bin/demo")
+    file = Path.join(folder, "out")
+
+    script = """
+    #{demo} --robots 2 --duration 60 >#{file} 2>&1 </dev/null &
+    p=$!; n=0
+    until grep -q 'looks round' #{file}; do sleep 0.1; n=$((n + 1)); [ $n -lt 200 ] || exit 1; done
+    demo=$(cat /proc/$p/task/$p/children)
+    kill -TERM $p; wait $p; echo $?
+    for d in $demo; do kill -0 $d 2>/dev/null && echo "$d is left"; done
+    exit 0
+    """
+
+    assert {"143\n", 0} = System.cmd("sh", ["-c", script])
+    refute File.read!(file) =~ "SIGTERM"
+  end
+
   # `script` gives the command a terminal, where the system has some to give.
   terminal? =
     System.find_executable("script") != nil and

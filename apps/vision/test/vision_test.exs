@@ -78,6 +78,24 @@ defmodule VisionTest do
     assert {:ok, [%{clipped?: true, distance: nil, share: 1.0}]} = Vision.blobs(frame, colours)
   end
 
+  test "one side at the border is enough to be clipped", %{colours: colours} do
+    for {columns, rows, clipped?} <- [
+          {0..5, 4..9, true},
+          {10..15, 4..9, true},
+          {4..9, 0..5, true},
+          {4..9, 6..11, true},
+          {4..9, 4..9, false}
+        ] do
+      bytes =
+        for y <- 0..11, x <- 0..15, into: <<>> do
+          if x in columns and y in rows, do: <<220, 205, 90>>, else: <<0, 0, 0>>
+        end
+
+      {:ok, frame} = Frame.new(:rgb24, 16, 12, bytes, 0)
+      assert {:ok, [%{clipped?: ^clipped?}]} = Vision.blobs(frame, colours)
+    end
+  end
+
   test "a frame whose bytes do not fit is an error in each backend", %{colours: colours} do
     frame = %Frame{format: :yuyv, width: 4, height: 2, bytes: <<1, 2, 3>>, at_ms: 0}
 

@@ -14,25 +14,34 @@ defmodule Mix.Tasks.Demo do
   # Twenty robots take a third of a processor, fifty a whole one: all hear all.
   @robots_a_processor 20
 
+  # As the shell says it of programs that nobody reads any more.
+  @unread 141
+
   @impl Mix.Task
   def run(arguments) do
     Build.update()
+    # Robots are killed here on purpose: what their supervisors say of it would spoil the picture.
+    Logger.configure(level: :none)
 
     status =
       case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
         {:ok, %Options{help: true}} -> IO.write(Options.help())
-        {:ok, %Options{headless: true} = options} -> Demo.run(options, Sim.Trial)
-        {:ok, options} -> live(options)
+        {:ok, options} -> play(options)
         {:error, lines} -> refuse(lines)
       end
 
     if is_integer(status) and status > 0, do: exit({:shutdown, status})
   end
 
-  # Robots are killed here on purpose: what their supervisors say of it would spoil the picture.
-  defp live(options) do
-    Logger.configure(level: :none)
+  # Who reads us may have seen enough, as `head` does; then we end without a word.
+  defp play(options) do
+    if options.headless, do: Demo.run(options, Sim.Trial), else: live(options)
+  rescue
+    error in ErlangError ->
+      if error.original == :terminated, do: @unread, else: reraise(error, __STACKTRACE__)
+  end
 
+  defp live(options) do
     if length(options.robots) <= @robots_a_processor * System.schedulers_online(),
       do: Session.run(options, Live.Fleet, &Live.Fleet.start_link/1),
       else: Session.run(options, Live.Trial, &Live.Trial.start_link(Sim.Trial, &1))
