@@ -58,6 +58,14 @@ defmodule Swarm.Peers do
     end
   end
 
+  @doc "The names of all that are not gone, this robot too, sorted."
+  @spec view(t(), integer()) :: [atom()]
+  def view(peers, now_ms) do
+    others = for {id, %{at_ms: at_ms}} <- peers.rows, now_ms - at_ms < @gone_ms, do: id
+
+    Enum.sort([peers.me | others])
+  end
+
   @doc "The names of those that are gone."
   @spec gone(t(), integer()) :: [atom()]
   def gone(peers, now_ms),
