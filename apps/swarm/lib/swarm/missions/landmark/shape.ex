@@ -3,7 +3,8 @@ defmodule Swarm.Missions.Landmark.Shape do
   The leader's choice of a shape that there is room for. Pure.
 
   The shape is the one asked for as long as that goes. Slots that a dead robot's body takes away
-  are left out. When followers say that their slots are blocked, the shape closes up step by step:
+  are left out. When followers say that their slots are blocked, and all others stand in theirs, the
+  shape closes up step by step:
   spacing down to 0.8 m, then a column along the leader's trail. Once the leader has moved on, or a
   person asks for a shape, the one asked for is tried again.
   """
@@ -112,10 +113,12 @@ defmodule Swarm.Missions.Landmark.Shape do
       else: shape
   end
 
+  # Somebody says that it is blocked, and all others have come to rest in their places: as long as
+  # some are under way, what stands in the way may be one of them.
   defp blocked?(mission) do
-    mission.percept.peers
-    |> Peers.taking_part(mission.now_ms)
-    |> Enum.any?(fn {id, beat} -> beat.blocked and id in mission.order end)
+    beats = Peers.taking_part(mission.percept.peers, mission.now_ms)
+    followers = for id <- mission.order, beat = beats[id], do: beat
+    Enum.any?(followers, & &1.blocked) and Enum.all?(followers, &(&1.blocked or &1.in_place))
   end
 
   defp formation(asked, 0), do: {asked, false}
