@@ -1,0 +1,46 @@
+defmodule Swarm.Mesh.Secret.TextTest do
+  use ExUnit.Case, async: true
+  alias Swarm.Mesh.Secret.Text
+  doctest Text
+
+  test "random bytes are taken, in every spelling" do
+    for _ <- 1..500, size <- [32, 48, 64] do
+      bytes = :rand.bytes(size)
+      assert {:ok, ^bytes} = Text.decode(Base.encode64(bytes))
+      assert {:ok, ^bytes} = Text.decode(Base.encode16(bytes, case: :lower) <> "\n")
+      assert {:ok, ^bytes} = Text.decode(Base.url_encode64(bytes, padding: false))
+    end
+  end
+
+  test "lines that base64 has broken are put together" do
+    bytes = :rand.bytes(64)
+    <<first::binary-76, rest::binary>> = Base.encode64(bytes)
+    assert {:ok, ^bytes} = Text.decode(first <> "\n" <> rest <> "\r\n")
+  end
+
+  test "what is plainly not random is weak" do
+    for text <- [
+          String.duplicate("A", 44),
+          String.duplicate("cookie", 10),
+          String.duplicate("xK9+", 11),
+          Base.encode64(:binary.copy(:rand.bytes(8), 4)),
+          Base.encode64(String.duplicate(<<0>>, 32)),
+          Base.encode64(:rand.bytes(10) <> String.duplicate(<<0>>, 30)),
+          Base.encode64(:binary.list_to_bin(Enum.to_list(0..31))),
+          "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz",
+          "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef",
+          "thequickbrownfoxjumpsoverthelazydogandthensomemore12",
+          "4815162342108481516234210848151623421084815162342108481516234210",
+          "31415926535897932384626433832795028841971693993751058209749445923",
+          "Convoy/" <> Base.encode64(:crypto.hash(:sha256, "z"), padding: false)
+        ] do
+      assert {:error, problem} = Text.decode(text), text
+      assert problem =~ ~r"weak|is not base64|too short", text
+    end
+  end
+
+  test "no text fells it" do
+    for size <- 0..200, do: assert({_, _} = Text.decode(:rand.bytes(size)))
+    assert {:error, "is too long" <> _rest} = Text.decode(Base.encode64(:rand.bytes(2_000)))
+  end
+end
