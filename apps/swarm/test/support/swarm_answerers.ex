@@ -1,0 +1,35 @@
+defmodule Swarm.Answerers do
+  @moduledoc "Services for tests; compiled, so that they run on other nodes too."
+
+  defmodule Echo do
+    @moduledoc "Answers what it is asked; `:silent` is not answered, `:raise` raises, `:die` ends it."
+    @behaviour Swarm.Responder
+
+    @impl Swarm.Responder
+    def init(robot, argument), do: %{robot: robot, argument: argument, heard: 0}
+
+    @impl Swarm.Responder
+    def handle(%{content: :silent}, s), do: {:noreply, s}
+    def handle(%{content: :raise}, _s), do: raise("told to")
+    def handle(%{content: :die}, _s), do: Process.exit(self(), :kill)
+    def handle(%{content: :nonsense}, s), do: {{:shout, 1}, s}
+    def handle(%{content: :heard}, s), do: {{:inform, s.heard}, s}
+
+    def handle(%{content: {:tell, pid}} = envelope, s) do
+      send(pid, {:told, s.robot, envelope})
+      {:noreply, s}
+    end
+
+    def handle(%{content: content}, s), do: {{:inform, content}, %{s | heard: s.heard + 1}}
+  end
+
+  @doc "Some echoes that live on after the process that started them: for other nodes."
+  @spec start([atom()], atom()) :: [pid()]
+  def start(names, service) do
+    for name <- names do
+      {:ok, pid} = Swarm.Responder.start_link(name, service: service, module: Echo)
+      Process.unlink(pid)
+      pid
+    end
+  end
+end
