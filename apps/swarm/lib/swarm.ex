@@ -25,7 +25,8 @@ defmodule Swarm do
   sent somewhere leaves the group's mission, which goes on without it until the next start.
   """
   alias Robot.Command
-  alias Swarm.{Directory, Door, Formation, Status}
+  alias Swarm.{Alarm, Directory, Door, Formation, Status}
+  alias Swarm.Door.Ask
   alias Swarm.Missions.Manual
 
   @type robot :: atom() | String.t()
@@ -107,7 +108,7 @@ defmodule Swarm do
   @spec status() :: [Status.t()]
   def status do
     robots = Directory.robots()
-    answers = Door.ask(robots, :status)
+    answers = Ask.ask(robots, :status)
 
     for id <- robots do
       case answers do
@@ -126,7 +127,7 @@ defmodule Swarm do
   @spec status(robot()) :: Status.t() | {:error, String.t()}
   def status(robot) do
     with {:ok, [id]} <- Door.robots(robot) do
-      case Door.ask([id], :status) do
+      case Ask.ask([id], :status) do
         %{^id => %Status{} = status} -> status
         _silent -> {:error, "#{id} does not answer"}
       end
@@ -146,26 +147,33 @@ defmodule Swarm do
   def stop(robots \\ :all), do: command(robots, :stop)
 
   @doc """
-  Emergency stop: all robots stop and are held until `reset/0`. Each that hears of it tells the
-  others, again and again, so that it also reaches those that this node does not. The hardware's
-  own emergency stop stays the last resort: this one is software.
+  Emergency stop: all robots stop and are held until `reset/0`. It goes out at once by every way
+  there is, and again for a second; each robot that hears of it tells the others, so that it also
+  reaches those that this node does not. `:ok` when all robots that are known here have answered
+  that they are held. The hardware's own emergency stop stays the last resort: this one is software.
   """
   @spec estop() :: answer()
-  def estop, do: command(:all, :estop)
+  def estop do
+    call = Alarm.sound()
+    with {:ok, robots} <- Door.robots(:all), do: Door.tell(robots, {:estop, call})
+  end
 
   @doc """
   Releases the emergency stop. What the robots were at ended with the stop: they stand until they
   are told something new, for instance `start/0`.
   """
   @spec reset() :: answer()
-  def reset, do: command(:all, :reset)
+  def reset do
+    Alarm.quiet(:all)
+    command(:all, :reset)
+  end
 
   @doc false
   @spec ask(atom(), term()) :: term()
-  def ask(robot, request), do: Door.ask([robot], request)[robot]
+  def ask(robot, request), do: Ask.ask([robot], request)[robot]
 
-  defp command(to, request) when request in [:estop, :reset] do
-    with {:ok, robots} <- Door.robots(to), do: Door.tell(robots, request)
+  defp command(to, :reset) do
+    with {:ok, robots} <- Door.robots(to), do: Door.tell(robots, :reset)
   end
 
   defp command(to, request) do

@@ -12,7 +12,7 @@ defmodule Robot.Board do
   | `:blobs` | `:eye` | `%{blobs: [blob], pan: radians}`, at the time of the picture |
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, since when |
   | `{:peer, id}` | `:link` | as in `Robot.Percept` |
-  | `:estop` | `:link` | the number of the last e-stop, and of the last one cleared here |
+  | `:estop` | `:brake` | the number of the last e-stop, and of the last one cleared here |
   | `:radio` | `:link` | what was sent, heard, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
   | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil}` |
@@ -41,7 +41,7 @@ defmodule Robot.Board do
           file: Path.t() | nil
         }
 
-  @type writer :: :drive | :ptz | :camera | :eye | :link | :gate | :executive | :pilot
+  @type writer :: :drive | :ptz | :camera | :eye | :link | :brake | :gate | :executive | :pilot
 
   @writers %{
     odometry: :drive,
@@ -55,7 +55,7 @@ defmodule Robot.Board do
     doing: :executive,
     pose: :executive,
     mission: :pilot,
-    estop: :link,
+    estop: :brake,
     radio: :link
   }
 

@@ -6,14 +6,21 @@ defmodule Swarm.Directory do
   | group | holds |
   |---|---|
   | `{:robot, :mag1}` | the link of that robot |
-  | `:robots` | the links of all robots |
+  | `{:brake, :mag1}` | its brake |
+  | `:robots`, `:brakes` | the links of all robots, their brakes |
   | `{:team, :blue}`, `{:service, :camera}` | whoever entered |
 
   A directory that restarts is empty, and one that is down cannot be entered: who entered watches
   it (`monitor/0`), and enters again.
   """
 
-  @type group :: :robots | {:robot, atom()} | {:team, atom()} | {:service, atom()}
+  @type group ::
+          :robots
+          | :brakes
+          | {:robot, atom()}
+          | {:brake, atom()}
+          | {:team, atom()}
+          | {:service, atom()}
 
   @doc "The scope as a child."
   @spec child_spec(term()) :: Supervisor.child_spec()

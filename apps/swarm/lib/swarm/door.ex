@@ -2,14 +2,13 @@ defmodule Swarm.Door do
   @moduledoc false
   # What `Swarm` needs: who is meant, is it allowed, and what do they answer.
   alias Robot.Command.Words
-  alias Swarm.{Directory, Formation}
-
-  @answer_ms 500
+  alias Swarm.{Directory, Formation, Post}
+  alias Swarm.Door.Ask
 
   @doc "The ids of the robots meant, which all exist, or one line."
   @spec robots(term()) :: {:ok, [atom(), ...]} | {:error, String.t()}
   def robots(:all) do
-    case Directory.robots() do
+    case known() do
       [] -> {:error, "there are no robots here"}
       robots -> {:ok, robots}
     end
@@ -18,7 +17,7 @@ defmodule Swarm.Door do
   def robots([]), do: {:error, "[] names no robot; write a name, a list of names or :all"}
 
   def robots(names) when is_list(names) do
-    known = Directory.robots()
+    known = known()
 
     with false <- List.improper?(names),
          {:ok, ids} <- named(names, known) do
@@ -30,6 +29,14 @@ defmodule Swarm.Door do
   end
 
   def robots(name), do: robots([name])
+
+  # Also those that are heard by radio, but not connected.
+  defp known do
+    case map_size(heard = Post.heard()) do
+      0 -> Directory.robots()
+      _some -> Enum.uniq(Enum.sort(Directory.robots() ++ Map.keys(heard)))
+    end
+  end
 
   defp named(names, known) do
     Enum.reduce_while(names, {:ok, []}, fn name, {:ok, ids} ->
@@ -72,13 +79,13 @@ defmodule Swarm.Door do
     with :ok <- keyword(options, "spacing, length or side"),
          {:ok, kind} <- kind(kind),
          :ok <- numbers(options),
-         do: Formation.new(kind, fleet(kind, options, robots || length(Directory.robots())))
+         do: Formation.new(kind, fleet(kind, options, robots || length(known())))
   end
 
   @doc "Tells the robots; `:ok` when all accept, else one line about those that do not."
   @spec tell([atom()], term()) :: Swarm.answer()
   def tell(robots, request) do
-    answers = ask(robots, request)
+    answers = Ask.ask(robots, request)
 
     case for(id <- robots, answers[id] != :ok, do: refusal(id, answers[id])) do
       [] -> :ok
@@ -89,42 +96,8 @@ defmodule Swarm.Door do
   @doc "The same, but one that accepts is enough."
   @spec any([atom()], term()) :: Swarm.answer()
   def any(robots, request) do
-    answers = ask(robots, request)
+    answers = Ask.ask(robots, request)
     if Enum.any?(robots, &(answers[&1] == :ok)), do: :ok, else: {:error, no_mission(answers)}
-  end
-
-  @doc """
-  What the robots answer within half a second; who does not is not in the map. All are asked at once,
-  so that a silent robot holds up nobody else's answer.
-  """
-  @spec ask([atom()], term()) :: %{atom() => term()}
-  def ask(robots, request) do
-    deadline = System.monotonic_time(:millisecond) + @answer_ms
-    asked = for id <- robots, link = Directory.whereis(id), do: {id, post(link, request)}
-    for {id, ref} <- asked, {:ok, answer} <- [answer(ref, deadline)], into: %{}, do: {id, answer}
-  end
-
-  # An alias: an answer that comes too late finds no mailbox.
-  defp post(link, request) do
-    ref = :erlang.alias([:reply])
-    :erlang.send(link, {:"$gen_cast", {:command, request, ref}}, [:nosuspend, :noconnect])
-    ref
-  end
-
-  defp answer(ref, deadline) do
-    receive do
-      {^ref, answer} -> {:ok, answer}
-    after
-      max(deadline - System.monotonic_time(:millisecond), 0) ->
-        :erlang.unalias(ref)
-
-        # It may have come just before the alias was gone.
-        receive do
-          {^ref, answer} -> {:ok, answer}
-        after
-          0 -> :error
-        end
-    end
   end
 
   defp refusal(id, nil), do: "#{id} does not answer"

@@ -6,40 +6,40 @@ defmodule Swarm.Link do
   Heartbeats become peers on the robot's board, everything else goes to the pilot. Mouth: what the
   mission says goes out, and five times a second a heartbeat, with what the board says of the robot.
 
-  An e-stop spreads with the heartbeats (`Swarm.Stop`), also one that was pressed on the robot's
-  gate. Of two robots of one name the later one leaves the directory, stops and falls silent, with
-  the event `[:swarm, :link, :duplicate_id]`.
+  An e-stop spreads with the heartbeats, also one that was pressed on the robot's gate; how it
+  stands is `Swarm.Brake`'s to say, which is started beside the link. When it changes, heartbeats go
+  out at once and ten times a second for a second. Of two robots of one name the later one leaves the
+  directory, stops and falls silent, with the event `[:swarm, :link, :duplicate_id]`.
 
-  What people ask is answered by `Swarm.Link.Desk`; what is heard is judged by `Swarm.Link.Ear`.
+  What people ask is answered by `Swarm.Link.Desk`, if it is not too old (`Swarm.Stamp`); what is
+  heard is judged by `Swarm.Link.Ear`; `Swarm.Link.Flood` keeps the mailbox short.
 
   `join/2` makes a config with a link. Its options:
 
     * `:transport` - `{m, f, a}`; a message goes to `apply(m, f, a ++ [from, ids, message])`, and
       arrives by `hear/2`. Default: straight to the links of these robots, wherever they are
     * `:boot` - a number that grows with every start; default the time of day
-
-  Messages between nodes are sent so that nothing ever waits for a robot that has gone silent.
   """
   use GenServer
   alias Hal.Event
-  alias Robot.{Board, Config, Gate, Names, Percept, Pilot}
-  alias Swarm.{Directory, Heartbeat, Message, Peers, Shape, Stop}
-  alias Swarm.Link.{Desk, Ear}
+  alias Robot.{Board, Config, Names, Pilot}
+  alias Swarm.{Brake, Directory, Message, Peers, Post, Shape, Stamp, Stop}
+  alias Swarm.Link.{Beat, Desk, Ear, Flood, Presence}
 
   @behaviour Robot.Companion
 
   @tick_ms 100
   @beat_every 2
   @rivals_every 10
-  @odometry_ms 300
-  @retry_ms 100
-  @longest_retry_ms 5_000
+  @urgent_ticks 10
+  @look_every 64
 
-  @doc "The config of a robot that talks: with a link, which its mission speaks through."
+  @doc "The config of a robot that talks: with a link, which its mission speaks through, and a brake."
   @spec join(Config.t(), keyword()) :: Config.t()
   def join(%Config{} = config, options \\ []) do
     options = Keyword.validate!(options, [:boot, transport: {__MODULE__, :transmit, []}])
-    companions = config.companions ++ [{__MODULE__, options}]
+    # The brake first: whoever is listed later falls with those before, never takes them along.
+    companions = config.companions ++ [{Brake, []}, {__MODULE__, options}]
     %{config | send: {__MODULE__, :say, [config.id]}, companions: companions}
   end
 
@@ -49,8 +49,12 @@ defmodule Swarm.Link do
 
   @doc "Starts the link of a robot, as its supervisor does."
   @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
-  def start_link(%Config{} = config, options),
-    do: GenServer.start_link(__MODULE__, {config, options}, name: Names.via(config.id, :link))
+  def start_link(%Config{} = config, options) do
+    GenServer.start_link(__MODULE__, {config, options},
+      name: Names.via(config.id, :link),
+      spawn_opt: [message_queue_data: :off_heap]
+    )
+  end
 
   @doc """
   Says something to one robot, to several, or to all others, and returns who is addressed: of `:all`
@@ -67,55 +71,45 @@ defmodule Swarm.Link do
   @spec hear(robot :: atom(), term()) :: :ok
   def hear(robot, term), do: GenServer.cast(Names.via(robot, :link), {:hear, term})
 
+  @doc "A heartbeat of a robot of this one's name came from another node, from that life of it."
+  @spec rival(robot :: atom(), Presence.identity()) :: :ok
+  def rival(robot, {_boot, _node} = other),
+    do: GenServer.cast(Names.via(robot, :link), {:rival, other, nil})
+
   @doc "The transport between links: lost where a robot is not to be reached now."
   @spec transmit(from :: atom(), [atom()], Message.t()) :: :ok
   def transmit(_from, ids, message) do
-    for id <- ids, link <- Directory.members({:robot, id}), do: post(link, {:hear, message})
-    :ok
-  end
-
-  # Without these options a send waits for a full buffer, or dials a robot that is gone.
-  defp post(link, message) do
-    :erlang.send(link, {:"$gen_cast", message}, [:nosuspend, :noconnect])
+    for id <- ids, link <- Directory.members({:robot, id}), do: Post.cast(link, {:hear, message})
     :ok
   end
 
   @impl GenServer
   def init({%Config{id: id} = config, options}) do
     board = Board.find!(id)
-
-    stop =
-      case Board.fetch(board, :estop, :infinity) do
-        {:ok, stop, _at_ms} -> stop
-        :error -> Stop.new(Board.latched?(board))
-      end
+    boot = options[:boot] || System.system_time(:millisecond)
 
     s = %{
       config: config,
       id: id,
       board: board,
       transport: options[:transport] || {__MODULE__, :transmit, []},
-      boot: options[:boot] || System.system_time(:millisecond),
-      ear: Ear.new(id, stop),
+      ear: Ear.new(id, written(board)),
+      stamps: Stamp.new(boot),
+      presence: Presence.new([:robots, {:robot, id}]),
       gone: MapSet.new(),
       ticks: 0,
-      sequence: 0,
+      urgent: 0,
       sent: 0,
-      scope: nil,
-      gave_way?: false,
-      retry_ms: @retry_ms,
+      unseen: 0,
       next: System.monotonic_time(:millisecond)
     }
 
+    Brake.present(id, true)
     {:ok, schedule(s), {:continue, :enter}}
   end
 
   @impl GenServer
-  def handle_continue(:enter, s) do
-    # A stop that was written down by the link before this one may not have reached the gate.
-    if s.ear.stop.latched?, do: :ok = Gate.estop(s.id)
-    {:noreply, enter(s)}
-  end
+  def handle_continue(:enter, s), do: {:noreply, enter(s)}
 
   # Links are found in the directory, so anything may come here from anywhere: what would make this
   # process fall is counted instead.
@@ -130,18 +124,28 @@ defmodule Swarm.Link do
   def handle_cast({:hear, term}, s) do
     at_ms = Config.now(s.config)
     {heard, ear} = Ear.hear(s.ear, term, at_ms)
-    {:noreply, s |> stop(ear) |> heard(heard, at_ms)}
+    {:noreply, s |> stop(ear, term) |> heard(heard, at_ms) |> relieve()}
   end
 
-  def handle_cast({:command, command, reply_to}, s) when is_reference(reply_to) do
-    {answer, ear} = Desk.answer(command, s.config, s.board, s.ear)
-    s = stop(s, ear)
-    :erlang.send(reply_to, {reply_to, answer}, [:nosuspend, :noconnect])
-    {:noreply, s}
+  def handle_cast({:command, request, ref}, s) when is_reference(ref),
+    do: {:noreply, command(s, request, ref, nil)}
+
+  def handle_cast({:command, request, ref, stamp}, s) when is_reference(ref),
+    do: {:noreply, command(s, request, ref, stamp)}
+
+  def handle_cast({:stamp, ref}, s) when is_reference(ref) do
+    {stamp, stamps} = Stamp.issue(s.stamps, Config.now(s.config))
+    Post.answer(ref, stamp)
+    {:noreply, %{s | stamps: stamps}}
   end
+
+  def handle_cast(:stop, s), do: {:noreply, latch(s, written(s.board))}
+
+  def handle_cast({:rejected, why}, s) when is_atom(why),
+    do: {:noreply, %{s | ear: Ear.reject(s.ear, why)}}
 
   def handle_cast({:rival, {boot, node} = other, link}, s)
-      when is_integer(boot) and is_atom(node) and is_pid(link),
+      when is_integer(boot) and is_atom(node) and (is_pid(link) or link == nil),
       do: {:noreply, rival(s, other, link)}
 
   def handle_cast(_unknown, s), do: {:noreply, reject(s)}
@@ -150,8 +154,12 @@ defmodule Swarm.Link do
   def handle_info(:tick, s), do: {:noreply, s |> tick(Config.now(s.config)) |> schedule()}
   def handle_info(:enter, s), do: {:noreply, enter(s)}
 
-  def handle_info({:DOWN, scope, :process, _scope, _reason}, %{scope: scope} = s),
-    do: {:noreply, retry(%{s | scope: nil})}
+  def handle_info({:DOWN, ref, :process, _scope, _reason}, s) do
+    case Presence.down(s.presence, ref) do
+      {:ok, presence} -> {:noreply, %{s | presence: presence}}
+      :error -> {:noreply, reject(s)}
+    end
+  end
 
   def handle_info(_unknown, s), do: {:noreply, reject(s)}
 
@@ -166,19 +174,18 @@ defmodule Swarm.Link do
     s
   end
 
-  defp heard(s, :nothing, at_ms), do: count(s, at_ms)
+  defp heard(s, :nothing, _at_ms), do: s
 
   defp tick(s, at_ms) do
-    s =
-      %{s | ticks: s.ticks + 1} |> stop(Ear.follow(s.ear, Board.latched?(s.board))) |> age(at_ms)
-
+    s = grow_old(follow(%{s | ticks: s.ticks + 1}), at_ms)
     count(s, at_ms)
     if rem(s.ticks, @rivals_every) == 0, do: challenge(s)
-    if rem(s.ticks, @beat_every) == 1, do: beat(s, at_ms), else: s
+    s = if s.urgent > 0 or rem(s.ticks, @beat_every) == 1, do: beat(s, at_ms), else: s
+    %{s | urgent: max(s.urgent - 1, 0)}
   end
 
   # Of a robot that is gone nothing arrives, so somebody has to write down that it is.
-  defp age(s, at_ms) do
+  defp grow_old(s, at_ms) do
     for id <- Peers.gone(s.ear.peers, at_ms), id not in s.gone, reduce: s do
       s ->
         show(s, id, at_ms)
@@ -191,45 +198,20 @@ defmodule Swarm.Link do
     Board.put(s.board, :link, {:peer, id}, peer, peer.at_ms)
   end
 
-  # A robot that has no pose yet has nothing to say; one whose executive fell stands where it was.
   defp beat(s, at_ms) do
-    case Board.fetch(s.board, :pose, :infinity, at_ms) do
-      {:ok, pose, _then} ->
-        percept = %Percept{
-          robot: s.id,
-          at_ms: at_ms,
-          profile: s.config.profile,
-          pose: pose,
-          odometry: odometry(s.board, at_ms)
-        }
+    sequence = Stamp.last(s.stamps) + 1
 
-        sender = {s.boot, s.sequence + 1}
-        heard = Peers.heard(s.ear.peers, at_ms)
-        beat = Heartbeat.new(sender, percept, claim(s.board), heard, s.ear.stop)
-        message = Message.new(s.id, :heartbeat, beat)
-        speak(%{s | sequence: s.sequence + 1}, List.delete(Directory.robots(), s.id), message)
+    case Beat.message(s.config, s.board, s.ear, {s.stamps.boot, sequence}, at_ms) do
+      {:ok, message} ->
+        s = %{s | stamps: Stamp.sent(s.stamps, sequence, at_ms)}
+        speak(s, List.delete(Directory.robots(), s.id), message)
 
       :error ->
         s
     end
   end
 
-  defp odometry(board, at_ms) do
-    case Board.fetch(board, :odometry, @odometry_ms, at_ms) do
-      {:ok, odometry, _then} -> odometry
-      :error -> nil
-    end
-  end
-
-  defp claim(board) do
-    case Board.fetch(board, :mission, :infinity) do
-      {:ok, %{state: :idle}, _at_ms} -> %{standing: true}
-      {:ok, %{claim: claim}, _at_ms} -> claim
-      :error -> %{}
-    end
-  end
-
-  defp speak(%{gave_way?: true} = s, _ids, _message), do: s
+  defp speak(%{presence: %{left?: true}} = s, _ids, _message), do: s
 
   defp speak(s, ids, message) do
     {m, f, a} = s.transport
@@ -241,68 +223,93 @@ defmodule Swarm.Link do
   defp addressed(ids) when is_list(ids), do: ids
   defp addressed(id), do: [id]
 
-  # Written down before the gate is told: a link that restarts in between knows that there is a
-  # stop to spread.
-  defp stop(%{ear: %{stop: stop}} = s, %{stop: stop} = ear), do: %{s | ear: ear}
+  defp command(s, request, ref, stamp) do
+    case age(s, request, ref, stamp) do
+      :ok ->
+        # Who knows no better way than the link finds the brake through it.
+        if Brake.takes?(request),
+          do: Brake.take(s.id, request, ref),
+          else: Post.answer(ref, Desk.answer(request, s.config, s.board, s.ear))
 
-  defp stop(s, ear) do
-    Board.put(s.board, :link, :estop, ear.stop, Config.now(s.config))
+        s
 
-    # The mission ends with it: after the reset nothing moves until somebody says so.
-    if ear.stop.latched? and not Board.latched?(s.board) do
-      :ok = Gate.estop(s.id)
-      :ok = Pilot.hear(s.id, {:command, :stop})
+      {:error, age} ->
+        Post.answer(ref, Stamp.refusal(s.id, age))
+        %{s | ear: Ear.reject(s.ear, :too_old)}
     end
-
-    %{s | ear: ear}
   end
 
-  defp groups(s), do: [:robots, {:robot, s.id}]
+  # What was said on this node was not queued on the way.
+  defp age(s, request, ref, stamp) do
+    if Stamp.needed?(request) and node(ref) != node(),
+      do: Stamp.check(s.stamps, stamp, Config.now(s.config)),
+      else: :ok
+  end
 
-  defp enter(%{gave_way?: true} = s), do: s
+  # The brake knows best; it is only asked where a heartbeat seems to change something.
+  defp stop(%{ear: %{stop: stop}} = s, %{stop: stop} = ear, _term), do: %{s | ear: ear}
+
+  defp stop(s, ear, %Message{body: beat}),
+    do: latch(%{s | ear: %{ear | stop: s.ear.stop}}, Brake.beat(s.id, beat.estop, beat.latched))
+
+  defp follow(s) do
+    if Board.latched?(s.board) == s.ear.stop.latched?,
+      do: s,
+      else: latch(s, Brake.follow(s.id))
+  end
+
+  defp latch(%{ear: ear} = s, stop) do
+    changed? = stop.latched? != ear.stop.latched?
+    s = %{s | ear: %{ear | stop: stop}}
+    if changed? and s.config.pace != :manual, do: urgent(s), else: s
+  end
+
+  defp urgent(s), do: beat(%{s | urgent: @urgent_ticks}, Config.now(s.config))
+
+  defp written(board) do
+    case Board.fetch(board, :estop, :infinity) do
+      {:ok, stop, _at_ms} -> stop
+      :error -> Stop.new(Board.latched?(board))
+    end
+  end
 
   defp enter(s) do
-    scope = Directory.monitor()
-
-    case Directory.enter(self(), groups(s)) do
-      :ok ->
-        challenge(s)
-        %{s | scope: scope, retry_ms: @retry_ms}
-
-      {:error, :down} ->
-        Process.demonitor(scope, [:flush])
-        retry(s)
-    end
-  end
-
-  defp retry(s) do
-    Process.send_after(self(), :enter, s.retry_ms)
-    %{s | retry_ms: min(2 * s.retry_ms, @longest_retry_ms)}
+    {in?, presence} = Presence.enter(s.presence)
+    if in?, do: challenge(s)
+    %{s | presence: presence}
   end
 
   # Two robots of one name: both tell each other who they are, and the later one gives way.
+  defp challenge(%{presence: %{left?: true}}), do: :ok
+
   defp challenge(s) do
     for link <- Directory.members({:robot, s.id}),
         link != self(),
-        not s.gave_way?,
-        do: post(link, {:rival, {s.boot, node()}, self()})
+        do: Post.cast(link, {:rival, {s.stamps.boot, node()}, self()})
   end
 
+  defp rival(%{presence: %{left?: true}} = s, _other, _link), do: s
+
+  # By radio a robot may hear itself; a link that is another one on this node is in the directory.
+  defp rival(s, {_boot, node}, nil) when node == node(), do: s
+
   defp rival(s, other, link) do
-    mine = {s.boot, node()}
+    mine = {s.stamps.boot, node()}
 
-    cond do
-      mine > other ->
-        Directory.leave(self(), groups(s))
+    case Presence.judge(mine, other) do
+      :give_way ->
+        presence = Presence.leave(s.presence)
+        Brake.present(s.id, false)
         Pilot.stop(s.id)
-        Event.execute([:swarm, :link, :duplicate_id], %{}, %{robot: s.id, other: node(link)})
-        %{s | gave_way?: true}
+        about = %{robot: s.id, other: elem(other, 1)}
+        Event.execute([:swarm, :link, :duplicate_id], %{}, about)
+        %{s | presence: presence}
 
-      mine < other ->
-        post(link, {:rival, mine, self()})
+      :stay ->
+        if link, do: Post.cast(link, {:rival, mine, self()})
         s
 
-      true ->
+      :same ->
         s
     end
   end
@@ -310,10 +317,18 @@ defmodule Swarm.Link do
   defp count(s, at_ms) do
     counts = %{sent: s.sent, heard: s.ear.heard, rejected: s.ear.rejected}
     Board.put(s.board, :link, :radio, counts, at_ms)
-    s
   end
 
-  defp reject(s), do: count(%{s | ear: Ear.reject(s.ear, :not_a_message)}, Config.now(s.config))
+  defp reject(s), do: relieve(%{s | ear: Ear.reject(s.ear, :not_a_message)})
+
+  defp relieve(%{unseen: unseen} = s) when unseen < @look_every, do: %{s | unseen: unseen + 1}
+
+  defp relieve(s) do
+    case Flood.relieve() do
+      0 -> %{s | unseen: 0}
+      dropped -> %{s | unseen: 0, ear: Ear.reject(s.ear, :flooded, dropped)}
+    end
+  end
 
   defp schedule(%{config: %{pace: :manual}} = s), do: s
 

@@ -6,16 +6,27 @@ defmodule Swarm.Stop do
   its own latch is set; a robot latches when it hears of a set latch with a number that no person
   has cleared here. So one that a person has reset is not caught again by a neighbour that nobody
   has reset yet, and one that joins a fleet whose stop is long cleared is not stopped by it.
+
+  A call to stop (`Swarm.Alarm`) is sent many times, and comes by several ways. `calls` remembers the
+  last one of each node, so that a late repeat does not latch again what a person has reset.
   """
+  alias Swarm.Shape
 
   @leap 100_000
+  @callers 64
+  # Boots are times in ms, or, on clocks that count finer, in ns.
+  @latest 0xFFFFFFFFFFFFFFFF
 
-  defstruct known: 0, cleared: 0, latched?: false
+  defstruct known: 0, cleared: 0, latched?: false, calls: []
+
+  @typedoc "Which call to stop it is: who calls, that node's life, and the how manieth of its calls."
+  @type call :: {node(), boot :: integer(), counter :: integer()}
 
   @type t :: %__MODULE__{
           known: non_neg_integer(),
           cleared: non_neg_integer(),
-          latched?: boolean()
+          latched?: boolean(),
+          calls: [{node(), {boot :: integer(), counter :: integer()}}]
         }
 
   @doc "No stop known; `latched?` when the robot's own latch has survived a restart."
@@ -30,6 +41,58 @@ defmodule Swarm.Stop do
   """
   @spec press(t()) :: t()
   def press(%__MODULE__{known: known} = stop), do: %{stop | known: known + 1, latched?: true}
+
+  @doc """
+  Hears a call to stop; one that was heard before changes nothing. A robot that stands by a stop
+  already gives it no new number: its own and its neighbours' numbers could otherwise run past each
+  other while a person resets them.
+
+      iex> call = {:base@hall, 1_700_000_000_000, 1}
+      iex> stop = Swarm.Stop.call(Swarm.Stop.new(), call)
+      iex> {stop.known, stop.latched?}
+      {1, true}
+      iex> stop |> Swarm.Stop.reset() |> Swarm.Stop.call(call) |> Map.fetch!(:latched?)
+      false
+  """
+  @spec call(t(), call()) :: t()
+  def call(%__MODULE__{} = stop, {node, boot, counter}) do
+    case List.keyfind(stop.calls, node, 0) do
+      # Of another life of that node nothing is known, so that it counts as new.
+      {_node, {^boot, last}} when counter <= last ->
+        stop
+
+      _new ->
+        calls = [{node, {boot, counter}} | List.keydelete(stop.calls, node, 0)]
+        stop = %{stop | calls: Enum.take(calls, @callers)}
+        if stop.latched?, do: stop, else: press(stop)
+    end
+  end
+
+  @doc """
+  Whether a term from outside is a call to stop.
+
+      iex> for term <- [{:base@hall, 1, 1}, {nil, 1, 1}, {:base@hall, 1}], do: Swarm.Stop.call?(term)
+      [true, false, false]
+  """
+  @spec call?(term()) :: boolean()
+  def call?({node, boot, counter}),
+    do: Shape.name?(node) and number?(boot) and number?(counter)
+
+  def call?(_other), do: false
+
+  defp number?(number), do: is_integer(number) and number in 0..@latest
+
+  @doc """
+  Follows the latch of the robot, which its gate's own buttons set and clear too: a stop pressed
+  on the robot itself spreads like any other.
+
+      iex> Swarm.Stop.follow(Swarm.Stop.new(), true).known
+      1
+  """
+  @spec follow(t(), latched? :: boolean()) :: t()
+  def follow(%__MODULE__{latched?: latched?} = stop, latched?), do: stop
+  def follow(stop, true), do: press(stop)
+  def follow(stop, false), do: reset(stop)
 
   @doc """
   Hears what a neighbour's heartbeat says: its number, and whether its latch is set.
@@ -64,5 +127,6 @@ defmodule Swarm.Stop do
 
   @doc "A person clears this robot's latch."
   @spec reset(t()) :: t()
-  def reset(%__MODULE__{known: known}), do: %__MODULE__{known: known, cleared: known}
+  def reset(%__MODULE__{known: known} = stop),
+    do: %{stop | cleared: known, latched?: false}
 end

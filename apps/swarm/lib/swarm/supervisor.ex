@@ -5,7 +5,8 @@ defmodule Swarm.Supervisor do
       Swarm.Supervisor (no restarts to give)
       |-- Robot.Names            who is who on this node
       |-- Swarm.Parts (one_for_one)
-      |   `-- Swarm.Directory    who is where in the fleet
+      |   |-- Swarm.Directory    who is where in the fleet
+      |   `-- Swarm.Alarm        calls all robots to stop
       `-- Robot.Fleet            the robots
 
   Robots do without the directory: they drive on, and enter a new one by themselves. A fleet that
@@ -23,7 +24,11 @@ defmodule Swarm.Supervisor do
 
     @impl Supervisor
     def init([]) do
-      Supervisor.init([Swarm.Directory], strategy: :one_for_one, max_restarts: 5, max_seconds: 5)
+      Supervisor.init([Swarm.Directory, Swarm.Alarm],
+        strategy: :one_for_one,
+        max_restarts: 5,
+        max_seconds: 5
+      )
     end
   end
 

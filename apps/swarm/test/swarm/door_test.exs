@@ -123,10 +123,12 @@ defmodule Swarm.DoorTest do
   test "a robot that does not answer is named within half a second" do
     id = robot(:door_deaf)
     :ok = :sys.suspend(Names.whereis(id, :link))
-    {took, answer} = :timer.tc(fn -> Swarm.stop(id) end)
+    {took, answer} = :timer.tc(fn -> Swarm.goto(id, {1, 1}) end)
     assert line(answer) == "door_deaf does not answer"
     assert took in 450_000..700_000
     assert Enum.any?(Swarm.status(), &match?(%{robot: :door_deaf, state: :no_answer}, &1))
+    # What stops it does not pass its link.
+    assert Swarm.stop(id) == :ok
     :ok = :sys.resume(Names.whereis(id, :link))
     assert %Swarm.Status{} = Swarm.status(id)
     refute_received {_alias, :door_deaf, _answer}

@@ -4,6 +4,8 @@ defmodule Swarm.MessageTest do
   alias Swarm.{Anchor, Heartbeat, Message, Round}
   alias Swarm.Link.Ear
   doctest Swarm.Stop
+  doctest Swarm.Stamp
+  doctest Swarm.Link.Presence
   doctest Swarm.Shape
   doctest Ear
   doctest Swarm.Missions.Manual

@@ -1,42 +1,35 @@
 defmodule Swarm.Link.Desk do
   @moduledoc """
   What a robot answers to people (`Swarm`): it accepts or refuses, in one line. It runs in the
-  robot's link, so that people on any node reach it by the directory.
+  robot's link, so that people on any node reach it by the directory. What stops a robot, and the
+  reset, are not for the desk but for `Swarm.Brake`.
 
   | request | answer |
   |---|---|
   | `:status` | `Swarm.Status` |
-  | `:estop`, `:reset` | `:ok`, when it is done |
+  | `:ping` | `:ok` |
   | `:start`, `{:start, options}` | the group mission begins; anew where there are options |
-  | `:stop` | the robot stands, whatever it was at |
   | `{:formation, kind, spacing}` | for the running mission |
   | a `Robot.Command` | for this robot alone, which leaves the group's mission for it |
 
   While the emergency stop holds a robot, it refuses all that would move it.
   """
-  alias Robot.{Board, Config, Gate, Pilot}
-  alias Swarm.{Formation, Missions.Landmark, Missions.Manual, Status, Stop}
+  alias Robot.{Board, Config, Pilot}
+  alias Swarm.{Formation, Missions.Landmark, Missions.Manual, Status}
   alias Swarm.Link.Ear
 
   @type answer :: :ok | {:error, String.t()} | Status.t()
 
-  @doc "Answers, and what has become of the ear by that."
-  @spec answer(term(), Config.t(), Board.t(), Ear.t()) :: {answer(), Ear.t()}
-  def answer(:status, config, board, ear), do: {Status.of(config, board, ear), ear}
-  def answer(:estop, _config, _board, ear), do: {:ok, %{ear | stop: Stop.press(ear.stop)}}
-
-  def answer(:reset, config, _board, ear) do
-    :ok = Gate.reset(config.id)
-    {:ok, %{ear | stop: Stop.reset(ear.stop)}}
-  end
+  @doc "Answers a request."
+  @spec answer(term(), Config.t(), Board.t(), Ear.t()) :: answer()
+  def answer(:status, config, board, ear), do: Status.of(config, board, ear)
+  def answer(:ping, _config, _board, _ear), do: :ok
 
   # What is asked for while all stand would otherwise begin with the reset.
-  def answer(request, config, _board, %{stop: %{latched?: true}} = ear)
-      when request not in [:stop, :ping],
-      do: {{:error, "#{config.id} is held by the emergency stop; reset it first"}, ear}
+  def answer(_request, config, _board, %{stop: %{latched?: true}}),
+    do: {:error, "#{config.id} is held by the emergency stop; reset it first"}
 
-  def answer(request, config, board, ear),
-    do: {checked(request, doing(board), config, ear), ear}
+  def answer(request, config, board, ear), do: checked(request, doing(board), config, ear)
 
   # People come by `Swarm`, which has checked it all; but anybody may send something here.
   defp checked({:start, options} = request, doing, config, ear) do
@@ -74,11 +67,6 @@ defmodule Swarm.Link.Desk do
     :ok = Pilot.start(config.id, module, Keyword.merge(defaults, options))
     Pilot.command(config.id, :start)
   end
-
-  # A robot that is at nothing stands already.
-  defp obey(:stop, :idle, _config, _ear), do: :ok
-  defp obey(:stop, _doing, config, _ear), do: Pilot.command(config.id, :stop)
-  defp obey(:ping, _doing, _config, _ear), do: :ok
 
   defp obey({:formation, _kind, _spacing} = command, {:group, _phase}, config, _ear),
     do: Pilot.command(config.id, command)

@@ -54,19 +54,10 @@ defmodule Swarm.Link.Ear do
     end
   end
 
-  @doc "Counts what is no message at all."
-  @spec reject(t(), atom()) :: t()
-  def reject(ear, reason),
-    do: %{ear | rejected: Map.update(ear.rejected, reason, 1, &(&1 + 1))}
-
-  @doc """
-  Follows the latch on the board, which others set and clear too: a stop pressed on the robot
-  itself spreads like any other.
-  """
-  @spec follow(t(), latched? :: boolean()) :: t()
-  def follow(%__MODULE__{stop: %{latched?: latched?}} = ear, latched?), do: ear
-  def follow(ear, true), do: %{ear | stop: Stop.press(ear.stop)}
-  def follow(ear, false), do: %{ear | stop: Stop.reset(ear.stop)}
+  @doc "Counts what was dropped, and why; several of a kind at once."
+  @spec reject(t(), atom(), pos_integer()) :: t()
+  def reject(ear, reason, number \\ 1),
+    do: %{ear | rejected: Map.update(ear.rejected, reason, number, &(&1 + number))}
 
   @doc "Whom each robot that is not gone follows, or says that it leads it."
   @spec leaders(t(), integer()) :: %{atom() => atom() | nil}

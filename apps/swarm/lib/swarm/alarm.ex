@@ -1,0 +1,109 @@
+defmodule Swarm.Alarm do
+  @moduledoc """
+  The voice of the emergency stop, one for a node, so that a node without a robot has it too.
+
+  `sound/0` sends a call to stop to every brake in the directory and, by signed datagrams, to every
+  node. That happens at once, in the caller; this process then repeats it, ten times in all, one
+  each 100 ms, whatever has become of the caller. Every call has an identity (`t:Swarm.Stop.call/0`),
+  so that a robot obeys it once. Whoever hears a call for the first time passes it on, so that it also
+  reaches those that hear him but not its sender. A reset ends the repeats, so that a robot that is
+  switched on afterwards is not stopped by one.
+  """
+  use GenServer
+  alias Swarm.{Directory, Post, Stop}
+
+  @times 10
+  @passed_on 3
+  @every_ms 100
+  # More calls at a time are not different any more.
+  @most 16
+
+  @doc "Starts it, as a node's supervisor does."
+  @spec start_link(term()) :: GenServer.on_start()
+  def start_link(_options), do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
+
+  @doc "Calls all robots to stop, and returns the call's identity."
+  @spec sound() :: Stop.call()
+  def sound do
+    call = {node(), boot(), System.unique_integer([:positive, :monotonic])}
+    send_out(call)
+    GenServer.cast(__MODULE__, {:repeat, call, @times - 1})
+    call
+  end
+
+  @doc "Passes on a call that was heard; one of this node's own is being repeated anyway."
+  @spec pass_on(Stop.call()) :: :ok
+  def pass_on({node, _boot, _counter}) when node == node(), do: :ok
+  def pass_on(call), do: GenServer.cast(__MODULE__, {:pass_on, call})
+
+  @doc "A person has reset what these calls stopped: they are repeated no more."
+  @spec quiet(:all | [{node(), {integer(), integer()}}]) :: :ok
+  def quiet(calls), do: GenServer.cast(__MODULE__, {:quiet, calls})
+
+  @impl GenServer
+  def init([]) do
+    Process.flag(:priority, :high)
+    {:ok, %{left: %{}, heard: %Stop{}}}
+  end
+
+  @impl GenServer
+  def handle_cast({:repeat, call, times}, s), do: {:noreply, repeat(s, call, times)}
+
+  def handle_cast({:pass_on, call}, s) do
+    # Many robots of this node may have heard it.
+    case Stop.call(s.heard, call) do
+      heard when heard == s.heard ->
+        {:noreply, s}
+
+      heard ->
+        send_out(call)
+        {:noreply, repeat(%{s | heard: heard}, call, @passed_on - 1)}
+    end
+  end
+
+  def handle_cast({:quiet, :all}, s), do: {:noreply, %{s | left: %{}}}
+
+  def handle_cast({:quiet, calls}, s) when is_list(calls) do
+    heard = %Stop{calls: calls}
+    over = for {call, _left} <- s.left, Stop.call(heard, call) == heard, do: call
+    {:noreply, %{s | left: Map.drop(s.left, over)}}
+  end
+
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info({:again, call}, s) do
+    case s.left do
+      %{^call => left} ->
+        send_out(call)
+        {:noreply, repeat(%{s | left: Map.delete(s.left, call)}, call, left - 1)}
+
+      _none ->
+        {:noreply, s}
+    end
+  end
+
+  def handle_info(_unknown, s), do: {:noreply, s}
+
+  defp repeat(s, _call, 0), do: s
+  defp repeat(%{left: left} = s, _call, _times) when map_size(left) >= @most, do: s
+
+  defp repeat(s, call, times) do
+    Process.send_after(self(), {:again, call}, @every_ms)
+    %{s | left: Map.put(s.left, call, times)}
+  end
+
+  defp send_out(call) do
+    for brake <- Directory.members(:brakes), do: Post.cast(brake, {:estop, call})
+    Post.radio(:stop, {:estop, call})
+  end
+
+  # When this VM was started, by the time of day.
+  defp boot do
+    started = :erlang.system_info(:start_time) + :erlang.time_offset()
+    System.convert_time_unit(started, :native, :millisecond)
+  end
+end

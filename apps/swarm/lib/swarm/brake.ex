@@ -1,0 +1,239 @@
+defmodule Swarm.Brake do
+  @moduledoc """
+  A robot's emergency brake: a companion beside its link, of high priority, with a mailbox of its
+  own. What stops the robot comes here (`:estop`, `:reset`, `:stop` of people, calls of `Swarm.Alarm`)
+  and goes to the gate at once, also where the link is flooded, hangs or is dead.
+
+  It alone decides how the emergency stop stands (`Swarm.Stop`), and writes it on the board under
+  `:estop`. The link asks it about what heartbeats say, and is told of each change, so that the next
+  heartbeats, which follow at once, spread it.
+
+  A stop is obeyed however old it is; a reset that a person gave on another node bears a stamp
+  (`Swarm.Stamp`), which is asked for here.
+  """
+  use GenServer
+  alias Robot.{Board, Config, Gate, Names, Pilot}
+  alias Swarm.{Alarm, Post, Stamp, Stop}
+  alias Swarm.Link.Presence
+
+  @behaviour Robot.Companion
+
+  @impl Robot.Companion
+  def child_spec({config, options}),
+    do: %{id: __MODULE__, start: {__MODULE__, :start_link, [config, options]}}
+
+  @doc "Starts the brake of a robot, as its supervisor does."
+  @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
+  def start_link(%Config{} = config, _options) do
+    GenServer.start_link(__MODULE__, config,
+      name: Names.via(config.id, :brake),
+      spawn_opt: [priority: :high, message_queue_data: :off_heap]
+    )
+  end
+
+  @doc "A call to stop came from a node, by datagram: for all robots of this one."
+  @spec hear(node(), term()) :: :ok
+  def hear(_node, {:estop, call} = term) do
+    if Stop.call?(call), do: Enum.each(local(), &GenServer.cast(&1, term))
+    :ok
+  end
+
+  def hear(_node, _malformed), do: :ok
+
+  @doc """
+  What a heartbeat that the link of this robot heard says of the emergency stop; returns how the stop
+  stands with it.
+  """
+  @spec beat(robot :: atom(), number :: non_neg_integer(), latched? :: boolean()) :: Stop.t()
+  def beat(robot, number, latched?),
+    do: GenServer.call(Names.via(robot, :brake), {:beat, number, latched?})
+
+  @doc "The gate's latch may be another than this brake knows: buttons set it too."
+  @spec follow(robot :: atom()) :: Stop.t()
+  def follow(robot), do: GenServer.call(Names.via(robot, :brake), :follow)
+
+  @doc "Whether a request is for the brake; all others are for the link."
+  @spec takes?(request :: term()) :: boolean()
+  def takes?({:estop, _call}), do: true
+  def takes?(request), do: request in [:stop, :estop, :reset]
+
+  @doc "Takes a request for the brake from the robot's link, which has looked how old it is."
+  @spec take(robot :: atom(), request :: term(), reference()) :: :ok
+  def take(robot, request, ref),
+    do: GenServer.cast(Names.via(robot, :brake), {:in_time, request, ref})
+
+  @doc "The robot is there for commands by its name, or no longer: another of that name was first."
+  @spec present(robot :: atom(), boolean()) :: :ok
+  def present(robot, present?),
+    do: GenServer.cast(Names.via(robot, :brake), {:present, present?})
+
+  @impl GenServer
+  def init(%Config{id: id} = config) do
+    board = Board.find!(id)
+
+    stop =
+      case Board.fetch(board, :estop, :infinity) do
+        {:ok, stop, _at_ms} -> stop
+        :error -> Stop.new(Board.latched?(board))
+      end
+
+    s = %{
+      config: config,
+      id: id,
+      board: board,
+      stop: stop,
+      stamps: Stamp.new(System.system_time(:nanosecond)),
+      brakes: Presence.new([:brakes]),
+      name: Presence.new([{:brake, id}])
+    }
+
+    {:ok, write(s), {:continue, :enter}}
+  end
+
+  @impl GenServer
+  def handle_continue(:enter, s) do
+    # A stop that was written down by the brake before this one may not have reached the gate.
+    if s.stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id)
+    {:noreply, enter(s)}
+  end
+
+  @impl GenServer
+  def handle_call({:beat, number, latched?}, _from, s) do
+    s = become(s, Stop.hear(s.stop, number, latched?))
+    {:reply, s.stop, s}
+  end
+
+  def handle_call(:follow, _from, s) do
+    s = become(s, Stop.follow(s.stop, Board.latched?(s.board)))
+    {:reply, s.stop, s}
+  end
+
+  # Brakes are found in the directory, so anything may come here from anywhere, and counts as
+  # nothing.
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_cast({:estop, call}, s), do: {:noreply, called(s, call)}
+
+  def handle_cast({:command, request, ref}, s) when is_reference(ref),
+    do: {:noreply, command(s, request, ref, nil)}
+
+  def handle_cast({:command, request, ref, stamp}, s) when is_reference(ref),
+    do: {:noreply, command(s, request, ref, stamp)}
+
+  def handle_cast({:in_time, request, ref}, s) when is_reference(ref),
+    do: {:noreply, obey(s, request, ref)}
+
+  def handle_cast({:stamp, ref}, s) when is_reference(ref) do
+    {stamp, stamps} = Stamp.issue(s.stamps, Config.now(s.config))
+    Post.answer(ref, stamp)
+    {:noreply, %{s | stamps: stamps}}
+  end
+
+  def handle_cast({:present, true}, s), do: {:noreply, enter(%{s | name: named(s)})}
+  def handle_cast({:present, false}, s), do: {:noreply, %{s | name: Presence.leave(s.name)}}
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info(:enter, s), do: {:noreply, enter(s)}
+
+  def handle_info({:DOWN, ref, :process, _scope, _reason}, s) do
+    case {Presence.down(s.brakes, ref), Presence.down(s.name, ref)} do
+      {{:ok, brakes}, _} -> {:noreply, %{s | brakes: brakes}}
+      {_, {:ok, name}} -> {:noreply, %{s | name: name}}
+      _anothers -> {:noreply, s}
+    end
+  end
+
+  def handle_info(_unknown, s), do: {:noreply, s}
+
+  defp command(s, request, ref, stamp) do
+    case age(s, request, ref, stamp) do
+      :ok ->
+        obey(s, request, ref)
+
+      {:error, age} ->
+        GenServer.cast(Names.via(s.id, :link), {:rejected, :too_old})
+        Post.answer(ref, Stamp.refusal(s.id, age))
+        s
+    end
+  end
+
+  defp age(s, request, ref, stamp) do
+    if Stamp.needed?(request) and node(ref) != node(),
+      do: Stamp.check(s.stamps, stamp, Config.now(s.config)),
+      else: :ok
+  end
+
+  defp obey(s, request, ref) do
+    {answer, s} = answer(request, s)
+    Post.answer(ref, answer)
+    s
+  end
+
+  defp answer(:estop, s), do: {:ok, become(s, Stop.press(s.stop))}
+
+  defp answer({:estop, call}, s) do
+    s = called(s, call)
+    if s.stop.latched?, do: {:ok, s}, else: {{:error, "#{s.id} was reset meanwhile"}, s}
+  end
+
+  # Nobody is waited for here: a mission that is slow to end delays no emergency stop. A robot that
+  # is at nothing stands already.
+  defp answer(:stop, s) do
+    :ok = Pilot.hear(s.id, {:command, :stop})
+    {:ok, s}
+  end
+
+  defp answer(:reset, s) do
+    :ok = Gate.reset(s.id)
+    Alarm.quiet(s.stop.calls)
+    {:ok, become(s, Stop.reset(s.stop))}
+  end
+
+  defp answer(other, s),
+    do: {{:error, "#{inspect(other, limit: 5)} does not stop #{s.id}; stop and estop do"}, s}
+
+  defp called(s, call) do
+    with true <- Stop.call?(call),
+         stop when stop != s.stop <- Stop.call(s.stop, call) do
+      s = become(s, stop)
+      Alarm.pass_on(call)
+      s
+    else
+      _malformed_or_heard_before -> s
+    end
+  end
+
+  defp become(%{stop: stop} = s, stop), do: s
+
+  # Written down before the gate is told: a brake that restarts in between knows that there is a
+  # stop to carry out and to spread.
+  defp become(%{stop: before} = s, stop) do
+    s = write(%{s | stop: stop})
+    if stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id)
+
+    # The mission ends with it: after the reset nothing moves until somebody says so.
+    if stop.latched? and not before.latched?,
+      do: :ok = Pilot.hear(s.id, {:command, :stop})
+
+    GenServer.cast(Names.via(s.id, :link), :stop)
+    s
+  end
+
+  defp write(s) do
+    Board.put(s.board, :brake, :estop, s.stop, Config.now(s.config))
+    s
+  end
+
+  defp enter(s) do
+    {_in?, brakes} = Presence.enter(s.brakes)
+    {_in?, name} = Presence.enter(s.name)
+    %{s | brakes: brakes, name: name}
+  end
+
+  defp named(%{name: %{left?: true}} = s), do: Presence.new([{:brake, s.id}])
+  defp named(s), do: s.name
+
+  defp local, do: Registry.select(Names, [{{{:_, :brake}, :"$1", :_}, [], [:"$1"]}])
+end

@@ -1,0 +1,117 @@
+defmodule Swarm.Door.Ask do
+  @moduledoc false
+  # Asks robots, wherever they are, and gathers what they answer. What stops a robot goes to its
+  # brake, all else to its link. A command for another node bears a stamp (`Swarm.Stamp`); who has
+  # none at hand asks the robot for one first.
+  alias Robot.{Board, Names}
+  alias Swarm.{Brake, Directory, Post, Stamp}
+
+  @answer_ms 500
+  # Half of what is too old for the robot: the other half is for the way there.
+  @fresh_ms 1_000
+
+  @doc """
+  What the robots answer within half a second; who does not is not in the map. All are asked at once,
+  so that a silent robot holds up nobody else's answer.
+  """
+  @spec ask([atom()], term()) :: %{atom() => term()}
+  def ask(robots, request) do
+    deadline = System.monotonic_time(:millisecond) + @answer_ms
+
+    waiting =
+      for id <- robots, to = whereabouts(id, request), into: %{}, do: first(id, to, request)
+
+    gather(waiting, request, %{}, deadline)
+  end
+
+  defp gather(waiting, _request, answers, _deadline) when map_size(waiting) == 0, do: answers
+
+  defp gather(waiting, request, answers, deadline) do
+    receive do
+      {ref, answer} when is_map_key(waiting, ref) ->
+        case Map.pop!(waiting, ref) do
+          {{:stamp, id, to}, waiting} ->
+            {ref, about} = post(id, to, request, answer)
+            gather(Map.put(waiting, ref, about), request, answers, deadline)
+
+          {{:command, id}, waiting} ->
+            gather(waiting, request, Map.put(answers, id, answer), deadline)
+        end
+    after
+      max(deadline - System.monotonic_time(:millisecond), 0) -> give_up(waiting, answers)
+    end
+  end
+
+  # An answer may have come just before its alias was gone.
+  defp give_up(waiting, answers) do
+    for {ref, about} <- waiting, reduce: answers do
+      answers ->
+        :erlang.unalias(ref)
+
+        receive do
+          {^ref, answer} -> late(about, answer, answers)
+        after
+          0 -> answers
+        end
+    end
+  end
+
+  defp late({:command, id}, answer, answers), do: Map.put(answers, id, answer)
+  defp late({:stamp, _id, _to}, _stamp, answers), do: answers
+
+  # The nearest process that takes the request, or the way by others, or `nil`.
+  defp whereabouts(id, request) do
+    if(Brake.takes?(request), do: nearest({:brake, id})) || Directory.whereis(id) ||
+      if(is_map_key(Post.heard(), id), do: :relay)
+  end
+
+  defp nearest(group) do
+    case Directory.members(group) do
+      [] -> nil
+      [first | _] = pids -> Enum.find(pids, first, &(node(&1) == node()))
+    end
+  end
+
+  defp first(id, to, request) do
+    cond do
+      not Stamp.needed?(request) or (is_pid(to) and node(to) == node()) ->
+        post(id, to, request, nil)
+
+      # A brake knows its own stamps only.
+      stamp = request != :reset && stamp(id) ->
+        post(id, to, request, stamp)
+
+      true ->
+        post(id, to, :stamp)
+    end
+  end
+
+  # An alias: an answer that comes too late finds no mailbox.
+  defp post(id, to, :stamp) do
+    ref = :erlang.alias([:reply])
+    cast(id, to, {:stamp, ref}, ref)
+    {ref, {:stamp, id, to}}
+  end
+
+  defp post(id, to, request, stamp) do
+    ref = :erlang.alias([:reply])
+    order = if stamp, do: {:command, request, ref, stamp}, else: {:command, request, ref}
+    cast(id, to, order, ref)
+    {ref, {:command, id}}
+  end
+
+  defp cast(id, :relay, order, ref), do: Post.relay(id, order, ref)
+  defp cast(_id, pid, order, _ref), do: Post.cast(pid, order)
+
+  # The newest heartbeat of a robot that one of this node's has heard.
+  defp stamp(id) do
+    Enum.find_value(Names.robots(), fn here ->
+      with {:ok, board} <- Board.find(here),
+           {:ok, %{beat: beat}, _at_ms} <- Board.fetch(board, {:peer, id}, @fresh_ms) do
+        {beat.boot, beat.sequence}
+      else
+        :error -> nil
+      end
+    end)
+  end
+end

@@ -1,0 +1,172 @@
+defmodule Swarm.BrakeTest do
+  use Swarm.Case, async: false
+  @moduletag :capture_log
+  alias Swarm.{Alarm, Brake, Stop}
+
+  defp latched?(id), do: Board.latched?(Board.find!(id))
+
+  defp stop_of(id) do
+    {:ok, stop, _at_ms} = Board.fetch(Board.find!(id), :estop, :infinity)
+    stop
+  end
+
+  # Another one in each test: a node remembers what it heard.
+  defp call(counter),
+    do: {:base@hall, 1_700_000_000_000, 10 * Process.get(:ten) + counter}
+
+  setup do
+    Process.put(:ten, System.unique_integer([:positive, :monotonic]))
+    :ok
+  end
+
+  test "an e-stop does not wait for a link that hangs, nor does a stop or the reset" do
+    id = robot(:brake_hangs)
+    link = Names.whereis(id, :link)
+    assert Swarm.goto(id, {1, 1}) == :ok
+    :ok = :sys.suspend(link)
+    assert Swarm.stop(id) == :ok
+    assert Swarm.estop() == :ok
+    assert latched?(id)
+    assert Swarm.reset() == :ok
+    refute latched?(id)
+    :ok = :sys.resume(link)
+
+    # The mission ended with the stop, before the reset.
+    eventually(fn ->
+      match?(
+        {:ok, %{state: {_, :ready}}, _},
+        Board.fetch(Board.find!(id), :mission, :infinity)
+      )
+    end)
+  end
+
+  test "an e-stop reaches a robot whose link is dead, and is spread by the link that follows" do
+    [a, b] = standing(for id <- [:brake_dead, :brake_beside], do: robot(id))
+    eventually(fn -> is_map_key(Board.peers(Board.find!(b)), a) end)
+    link = Names.whereis(a, :link)
+    :ok = :sys.suspend(link)
+    # Only this one is called.
+    assert Swarm.ask(a, {:estop, call(1)}) == :ok
+    assert latched?(a)
+    kill(a, :link)
+    eventually(fn -> latched?(b) end)
+    assert Swarm.reset() == :ok
+  end
+
+  test "all robots of a node hear a call that comes by datagram; junk does nothing" do
+    [a, b] = for id <- [:brake_air1, :brake_air2], do: robot(id)
+
+    for junk <- [:x, {:estop, :x}, {:estop, {1, 2, 3}}, {:estop, {nil, 1, 1}}, {:reset, call(1)}] do
+      assert Brake.hear(:base@hall, junk) == :ok
+      GenServer.cast(Names.whereis(a, :brake), junk)
+      send(Names.whereis(a, :brake), junk)
+    end
+
+    refute latched?(a)
+    assert Brake.hear(:base@hall, {:estop, call(7)}) == :ok
+    for id <- [a, b], do: eventually(fn -> latched?(id) end)
+
+    # Repeats, late ones too, do not undo what a person has done.
+    assert Swarm.reset() == :ok
+    for counter <- [7, 6, 7], do: Brake.hear(:base@hall, {:estop, call(counter)})
+    for id <- [a, b], do: refute(Swarm.ask(id, :ping) != :ok or latched?(id))
+    for id <- [a, b], do: assert(%Stop{latched?: false, known: n, cleared: n} = stop_of(id))
+    # The next call does.
+    assert Brake.hear(:base@hall, {:estop, call(8)}) == :ok
+    for id <- [a, b], do: eventually(fn -> latched?(id) end)
+    assert Swarm.reset() == :ok
+  end
+
+  test "what was heard survives the brake, and the latch is carried out by the next one" do
+    id = robot(:brake_falls)
+    assert Swarm.ask(id, {:estop, call(1)}) == :ok
+    assert Swarm.reset() == :ok
+    [gate, pilot] = [Names.whereis(id, :gate), Names.whereis(id, :pilot)]
+    brake = kill(id, :brake)
+    eventually(fn -> (now = Names.whereis(id, :brake)) && now != brake end)
+    eventually(fn -> Directory.members({:brake, id}) == [Names.whereis(id, :brake)] end)
+    Brake.hear(:base@hall, {:estop, call(1)})
+    assert Swarm.ask(id, :stop) == :ok
+    refute latched?(id)
+    assert [gate, pilot] == [Names.whereis(id, :gate), Names.whereis(id, :pilot)]
+  end
+
+  test "the call is repeated, whatever becomes of the caller, and passed on once" do
+    id = robot(:brake_repeat)
+    :ok = Directory.enter(self(), [:brakes])
+    {caller, monitor} = spawn_monitor(fn -> exit({:called, Alarm.sound()}) end)
+    assert_receive {:DOWN, ^monitor, :process, ^caller, {:called, call}}
+    for _ <- 1..10, do: assert_receive({:"$gen_cast", {:estop, ^call}})
+    assert latched?(id)
+
+    # A person ends it.
+    call = Alarm.sound()
+    assert_receive {:"$gen_cast", {:estop, ^call}}
+    assert Swarm.reset() == :ok
+    :sys.get_state(Alarm)
+    refute_receive {:"$gen_cast", {:estop, ^call}}, 150
+
+    # Of another node's call each hears from each that heard it, three times.
+    Brake.hear(:base@hall, {:estop, call(1)})
+    far = call(1)
+    for _ <- 1..3, do: assert_receive({:"$gen_cast", {:estop, ^far}})
+    refute_received {:"$gen_cast", {:estop, _more}}
+    :ok = Directory.leave(self(), [:brakes])
+    assert Swarm.reset() == :ok
+  end
+
+  test "a stop spreads by heartbeats that are sent at once and ten times more" do
+    [a, b] =
+      for id <- [:brake_beats1, :brake_beats2],
+          do: robot(id, link: [transport: {__MODULE__, :carry, [self()]}])
+
+    standing([a, b])
+    assert_receive {:carried, ^a, %Message{body: %Heartbeat{latched: false, sequence: before}}}
+    :ok = Gate.estop(a)
+    assert_receive {:carried, ^a, %Message{body: %Heartbeat{latched: true}} = message}
+    assert message.body.estop == 1
+    assert message.body.sequence - before < 10
+    Link.hear(b, message)
+    assert_receive {:carried, ^b, %Message{body: %Heartbeat{latched: true, estop: 1}}}
+    eventually(fn -> latched?(b) end)
+    for _ <- 1..10, do: assert_receive({:carried, ^b, %Message{kind: :heartbeat}})
+    assert Swarm.reset() == :ok
+  end
+
+  @doc false
+  def carry(test, from, _ids, message), do: send(test, {:carried, from, message})
+
+  test "how long an e-stop takes in a flooded robot" do
+    id = robot(:brake_flooded)
+    link = Names.whereis(id, :link)
+    flood = start_supervised!({Task, fn -> pour(link, id) end})
+    eventually(fn -> flooded(id) > 0 end)
+    {took, answer} = :timer.tc(fn -> Swarm.estop() end)
+    assert answer == :ok
+    assert latched?(id)
+    {asked, _status} = :timer.tc(fn -> assert Swarm.ask(id, :ping) == :ok end)
+    assert Swarm.reset() == :ok
+    stop_supervised!(Task)
+    refute Process.alive?(flood)
+    {:message_queue_len, queued} = Process.info(link, :message_queue_len)
+    assert queued < 100_000
+    IO.puts("\n  e-stop of a flooded robot #{took} us, ping #{asked} us, queued #{queued}")
+  end
+
+  defp pour(link, id) do
+    beat = %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
+    message = Message.new(:brake_pouring, :heartbeat, beat)
+
+    for _ <- 1..1_000, do: GenServer.cast(link, {:hear, message})
+    for _ <- 1..100, do: GenServer.cast(link, :junk)
+    for _ <- 1..100, do: send(link, {:junk, id})
+    pour(link, id)
+  end
+
+  defp flooded(id) do
+    case Board.fetch(Board.find!(id), :radio, :infinity) do
+      {:ok, %{rejected: %{flooded: n}}, _at_ms} -> n
+      _none -> 0
+    end
+  end
+end
