@@ -1,12 +1,12 @@
 defmodule Sim.Camera do
   @moduledoc """
-  The camera of a robot in a simulated world: it paints its pictures in its own process, from the
-  world that the server sends. Options: `world`, `robot` as for `Sim.Drive`; `clock`, the robot's, by
+  The camera of a robot in a simulated world: it paints its pictures in its own process, from what
+  the server sends: the ground once, and then what moves (`Sim.View`). Options: `world`, `robot` as for `Sim.Drive`; `clock`, the robot's, by
   which pictures are dated; `blobs: :direct` for a camera that finds blobs by itself, by geometry,
   and never paints: for many robots on few processors.
   """
   @behaviour Hal.Camera
-  alias Sim.{Server, World}
+  alias Sim.{Server, View, World}
 
   @impl Hal.Camera
   def init(options) do
@@ -19,7 +19,8 @@ defmodule Sim.Camera do
       ])
 
     with {:ok, line} <- Server.attach(options[:world], options[:robot], :camera) do
-      {:ok, %{line: line, robot: options[:robot], blobs: options[:blobs], clock: options[:clock]}}
+      camera = Map.new(Keyword.take(options, [:robot, :blobs, :clock]))
+      {:ok, Map.merge(camera, %{line: line, ground: nil})}
     end
   end
 
@@ -30,8 +31,18 @@ defmodule Sim.Camera do
   end
 
   @impl Hal.Camera
-  def handle_message({:world, server, {:view, world}}, %{line: {server, _}} = camera),
-    do: {:ok, [see(world, camera)], camera}
+  def handle_message({:world, server, {:ground, ground}}, %{line: {server, _}} = camera),
+    do: {:ok, [], %{camera | ground: ground}}
+
+  # It was lost on its way: the next attachment brings it.
+  def handle_message(
+        {:world, server, {:view, _moving}},
+        %{line: {server, _}, ground: nil} = camera
+      ),
+      do: {:error, :no_ground, camera}
+
+  def handle_message({:world, server, {:view, moving}}, %{line: {server, _}} = camera),
+    do: {:ok, [see(View.world(camera.ground, moving, camera.robot), camera)], camera}
 
   def handle_message({:world, server, {:error, reason}}, %{line: {server, _}} = camera),
     do: {:error, reason, camera}

@@ -5,7 +5,7 @@ defmodule Sim.Drive do
   """
   @behaviour Hal.Drive
   alias Hal.Twist
-  alias Sim.Server
+  alias Sim.{Lateness, Server}
 
   @impl Hal.Drive
   def init(options) do
@@ -13,7 +13,7 @@ defmodule Sim.Drive do
 
     with {:ok, {server, _} = line} <- Server.attach(options[:world], options[:robot], :drive) do
       Server.drive(server, options[:robot], Twist.zero())
-      {:ok, %{line: line, robot: options[:robot]}}
+      {:ok, %{line: line, robot: options[:robot], least: nil}}
     end
   end
 
@@ -24,8 +24,10 @@ defmodule Sim.Drive do
   end
 
   @impl Hal.Drive
-  def handle_message({:world, server, {:readings, readings}}, %{line: {server, _}} = drive),
-    do: {:ok, readings, drive}
+  def handle_message({:world, server, {:readings, sent_ms, all}}, %{line: {server, _}} = drive) do
+    {late?, least} = Lateness.late?(drive.least, sent_ms, System.monotonic_time(:millisecond))
+    {:ok, if(late?, do: [], else: all), %{drive | least: least}}
+  end
 
   def handle_message({:world, server, {:error, reason}}, %{line: {server, _}} = drive),
     do: {:error, reason, drive}

@@ -1,14 +1,14 @@
 defmodule Sim.Ptz do
   @moduledoc "The pan-tilt unit of a robot in a simulated world. Options as for `Sim.Drive`."
   @behaviour Hal.Ptz
-  alias Sim.Server
+  alias Sim.{Lateness, Server}
 
   @impl Hal.Ptz
   def init(options) do
     options = Keyword.validate!(options, [:world, :robot])
 
     with {:ok, line} <- Server.attach(options[:world], options[:robot], :ptz),
-         do: {:ok, %{line: line, robot: options[:robot]}}
+         do: {:ok, %{line: line, robot: options[:robot], least: nil}}
   end
 
   @impl Hal.Ptz
@@ -18,8 +18,10 @@ defmodule Sim.Ptz do
   end
 
   @impl Hal.Ptz
-  def handle_message({:world, server, {:readings, readings}}, %{line: {server, _}} = ptz),
-    do: {:ok, readings, ptz}
+  def handle_message({:world, server, {:readings, sent_ms, all}}, %{line: {server, _}} = ptz) do
+    {late?, least} = Lateness.late?(ptz.least, sent_ms, System.monotonic_time(:millisecond))
+    {:ok, if(late?, do: [], else: all), %{ptz | least: least}}
+  end
 
   def handle_message({:world, server, {:error, reason}}, %{line: {server, _}} = ptz),
     do: {:error, reason, ptz}

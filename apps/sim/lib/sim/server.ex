@@ -4,26 +4,33 @@ defmodule Sim.Server do
   sense, and does what they ask for. It knows no robots' processes, only devices.
 
   After each step a drive gets its readings and a pan-tilt unit its own; after each second one a
-  camera that has asked gets the world as it is, thinned, and paints its picture itself. A message to
-  a device is `{:world, server, what}` with `{:readings, list}`, `{:view, world}` or
-  `{:error, :unknown_robot}`.
+  camera that has asked gets what moves, and paints its picture itself on the ground that it was
+  given when it attached (`Sim.View`). A message to a device is `{:world, server, what}` with
+  `{:readings, sent_ms, list}`, `{:ground, ground}`, `{:view, moving}` or `{:error, :unknown_robot}`.
 
-  A drive whose process ends leaves its wheels standing: that is the body's own watchdog.
+  Devices may be on other nodes. Nothing here ever waits for one of them: what cannot be sent at
+  once is lost, and what comes late is old (`Sim.Lateness`).
+
+  Wheels stand when the process of their drive ends, and also when no speed has come for 500 ms: that is
+  the body's own watchdog, for a robot that is frozen and can tell nothing any more.
 
   Steps are set by absolute times, so the pace does not drift. A step that came late is not made up
   for: then the world is slow, and says so by the event `[:sim, :server, :late]` with `late_ms`.
   """
   use GenServer
   alias Hal.{Event, Pose, Twist}
-  alias Sim.{World, Worlds}
+  alias Sim.{View, World, Worlds}
 
   @step_ms 50
   @late_ms 50
+  @watchdog_steps 10
 
   @enforce_keys [:name, :world, :next]
-  defstruct @enforce_keys ++ [devices: %{}, owners: %{}, asked: MapSet.new(), stats: nil]
+  defstruct @enforce_keys ++
+              [devices: %{}, owners: %{}, driven: %{}, asked: MapSet.new(), stats: nil]
 
   @type kind :: :drive | :ptz | :camera
+  @type change :: {:kill, robot :: atom()} | {:move, Pose.point() | nil}
   @type stats :: %{
           steps: non_neg_integer(),
           late_ms_max: non_neg_integer(),
@@ -51,7 +58,7 @@ defmodule Sim.Server do
         {:error, :no_world}
 
       server ->
-        GenServer.cast(server, {:attach, robot, kind, self()})
+        post(server, {:attach, robot, kind, self()})
         {:ok, {server, Process.monitor(server)}}
     end
   end
@@ -60,20 +67,20 @@ defmodule Sim.Server do
   @spec detach({pid(), reference()}, robot :: atom(), kind()) :: :ok
   def detach({server, monitor}, robot, kind) do
     Process.demonitor(monitor, [:flush])
-    GenServer.cast(server, {:detach, robot, kind, self()})
+    post(server, {:detach, robot, kind, self()})
   end
 
   @doc "The speed that a robot's wheels shall have."
   @spec drive(pid(), robot :: atom(), Twist.t()) :: :ok
-  def drive(server, robot, twist), do: GenServer.cast(server, {:drive, robot, twist})
+  def drive(server, robot, twist), do: post(server, {:drive, robot, twist})
 
   @doc "Where a robot's camera shall look."
   @spec look(pid(), robot :: atom(), float(), float()) :: :ok
-  def look(server, robot, pan, tilt), do: GenServer.cast(server, {:look, robot, pan, tilt})
+  def look(server, robot, pan, tilt), do: post(server, {:look, robot, pan, tilt})
 
   @doc "Asks for the next view, for the camera attached."
   @spec next(pid(), robot :: atom()) :: :ok
-  def next(server, robot), do: GenServer.cast(server, {:next, robot})
+  def next(server, robot), do: post(server, {:next, robot})
 
   @doc "The world as it is."
   @spec world(GenServer.server()) :: World.t()
@@ -83,9 +90,22 @@ defmodule Sim.Server do
   @spec stats(GenServer.server()) :: stats()
   def stats(server), do: GenServer.call(server, :stats)
 
+  @doc "Does one of these to a world, without waiting for a server that may be on another node."
+  @spec change(pid(), change()) :: :ok
+  def change(server, change), do: post(server, {:change, change})
+
+  @doc """
+  The same to a world as a value: a robot's body stops for ever; the landmark glides there, or is taken
+  away by `nil`.
+  """
+  @spec changed(World.t(), change()) :: World.t()
+  def changed(world, {:kill, robot}), do: World.kill(world, robot)
+  def changed(world, {:move, nil}), do: World.place_landmark(world, nil)
+  def changed(world, {:move, place}), do: World.move_landmark(world, place)
+
   @doc "Stops a robot's body for ever."
   @spec kill(GenServer.server(), robot :: atom()) :: :ok
-  def kill(server, robot), do: GenServer.call(server, {:change, &World.kill(&1, robot)})
+  def kill(server, robot), do: GenServer.call(server, {:change, &changed(&1, {:kill, robot})})
 
   @doc "Lifts a robot to another pose."
   @spec displace(GenServer.server(), robot :: atom(), Pose.t()) :: :ok
@@ -94,11 +114,8 @@ defmodule Sim.Server do
 
   @doc "Lets the landmark glide there; `nil` takes it away."
   @spec move_landmark(GenServer.server(), Pose.point() | nil) :: :ok
-  def move_landmark(server, nil),
-    do: GenServer.call(server, {:change, &World.place_landmark(&1, nil)})
-
   def move_landmark(server, place),
-    do: GenServer.call(server, {:change, &World.move_landmark(&1, place)})
+    do: GenServer.call(server, {:change, &changed(&1, {:move, place})})
 
   @impl GenServer
   def init({name, %World{} = world}) do
@@ -118,17 +135,22 @@ defmodule Sim.Server do
   def handle_cast({:attach, robot, kind, pid}, s) do
     if is_map_key(s.world.robots, robot) do
       owners = Map.put(s.owners, Process.monitor(pid), {robot, kind, pid})
+      if kind == :camera, do: hand(pid, {:ground, View.ground(s.world, robot)})
       {:noreply, %{s | devices: Map.put(s.devices, {robot, kind}, pid), owners: owners}}
     else
-      send(pid, {:world, self(), {:error, :unknown_robot}})
+      hand(pid, {:error, :unknown_robot})
       {:noreply, s}
     end
   end
 
   def handle_cast({:detach, robot, kind, pid}, s), do: {:noreply, release(s, robot, kind, pid)}
 
-  def handle_cast({:drive, robot, twist}, s),
-    do: {:noreply, %{s | world: World.drive(s.world, robot, twist)}}
+  def handle_cast({:drive, robot, twist}, s) do
+    world = World.drive(s.world, robot, twist)
+    {:noreply, %{s | world: world, driven: Map.put(s.driven, robot, world.step)}}
+  end
+
+  def handle_cast({:change, change}, s), do: {:noreply, %{s | world: changed(s.world, change)}}
 
   def handle_cast({:look, robot, pan, tilt}, s),
     do: {:noreply, %{s | world: World.look(s.world, robot, pan, tilt)}}
@@ -138,6 +160,7 @@ defmodule Sim.Server do
   @impl GenServer
   def handle_info(:step, s) do
     begun = System.monotonic_time(:microsecond)
+    s = watch(s)
     s = %{s | world: World.step(s.world, @step_ms)}
     tell(s)
     s = show(s)
@@ -154,11 +177,20 @@ defmodule Sim.Server do
     end
   end
 
+  # By steps of the world: on a busy machine all are slow together.
+  defp watch(%{world: %{step: step}} = s) do
+    silent = for {id, at} <- s.driven, step - at >= @watchdog_steps, do: id
+    world = Enum.reduce(silent, s.world, &stand(&2, &1))
+    %{s | world: world, driven: Map.drop(s.driven, silent)}
+  end
+
+  defp stand(world, id), do: World.drive(world, id, Twist.zero())
+
   # Another process may have attached meanwhile.
   defp release(s, robot, kind, pid) do
     case s.devices do
       %{{^robot, ^kind} => ^pid} ->
-        world = if kind == :drive, do: World.drive(s.world, robot, Twist.zero()), else: s.world
+        world = if kind == :drive, do: stand(s.world, robot), else: s.world
         %{s | world: world, devices: Map.delete(s.devices, {robot, kind})}
 
       _another ->
@@ -178,7 +210,7 @@ defmodule Sim.Server do
 
   defp tell(devices, device, readings) do
     case devices do
-      %{^device => pid} -> send(pid, {:world, self(), {:readings, readings}})
+      %{^device => pid} -> hand(pid, {:readings, System.monotonic_time(:millisecond), readings})
       _none -> :ok
     end
   end
@@ -187,21 +219,26 @@ defmodule Sim.Server do
   defp show(%{world: %{at_ms: at_ms}} = s) when rem(at_ms, 2 * @step_ms) != 0, do: s
 
   defp show(%{world: world} = s) do
-    slim = Map.new(world.robots, fn {id, body} -> {id, slim(body)} end)
-    view = %{world | together: MapSet.new()}
+    poses = View.poses(world)
 
-    for id <- s.asked, World.alive?(world, id), pid = s.devices[{id, :camera}] do
-      own = %{world.robots[id] | sonar: [], geometry: <<>>}
-      send(pid, {:world, self(), {:view, %{view | robots: %{slim | id => own}}}})
-    end
+    told =
+      for id <- s.asked, pid = s.devices[{id, :camera}] do
+        alive? = World.alive?(world, id)
+        if not alive? or hand(pid, {:view, View.moving(world, poses, id)}) == :ok, do: id
+      end
 
-    %{s | asked: MapSet.filter(s.asked, &(not is_map_key(s.devices, {&1, :camera})))}
+    %{s | asked: MapSet.difference(s.asked, MapSet.new(told))}
   end
 
-  # Of the others a camera sees the outline only, and what it does not see is not copied to it: a
-  # hundred cameras look ten times a second.
-  defp slim(%{profile: %{radius: radius, height: height}} = body),
-    do: %{body | profile: %{radius: radius, height: height}, sonar: [], geometry: <<>>}
+  # Without these options a send waits for a full buffer, or dials a node that is gone.
+  defp hand(pid, what) do
+    :erlang.send(pid, {:world, self(), what}, [:nosuspend, :noconnect])
+  end
+
+  defp post(server, request) do
+    :erlang.send(server, {:"$gen_cast", request}, [:nosuspend, :noconnect])
+    :ok
+  end
 
   defp note(s, begun) do
     late_ms = max(div(begun, 1_000) - s.next, 0)

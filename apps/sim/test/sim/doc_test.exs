@@ -1,6 +1,7 @@
 defmodule Sim.DocTest do
   use ExUnit.Case, async: true
   doctest Sim.Contact
+  doctest Sim.Lateness
   doctest Sim.Map
   doctest Sim.Map.Pgm
   doctest Sim.Noise

@@ -1,0 +1,33 @@
+defmodule Sim.Lateness do
+  @moduledoc """
+  How late a message is, between two clocks that are not set by each other: later than the quickest
+  one so far. Pure; times in milliseconds.
+
+  What was held up on its way, as for a process that was frozen, comes all at once, and is old by
+  then. The quickest way is forgotten slowly, 1 ms in 20 messages, so that clocks may drift.
+  """
+
+  @late_ms 300
+  @leak_ms 0.05
+
+  @typedoc "The least difference of the two clocks so far, or `nil` before any message."
+  @type t :: float() | nil
+
+  @doc """
+  Whether a message that was sent at `sent_ms` by the sender's clock and is read at `now_ms` by ours is
+  too old.
+
+      iex> {false, least} = Sim.Lateness.late?(nil, 1_000, 5_000)
+      iex> {false, least} = Sim.Lateness.late?(least, 1_050, 5_060)
+      iex> {late?, _least} = Sim.Lateness.late?(least, 1_100, 5_700)
+      iex> late?
+      true
+  """
+  @spec late?(t(), sent_ms :: integer(), now_ms :: integer()) :: {boolean(), t()}
+  def late?(nil, sent_ms, now_ms), do: {false, (now_ms - sent_ms) * 1.0}
+
+  def late?(least, sent_ms, now_ms) do
+    least = min(least + @leak_ms, (now_ms - sent_ms) * 1.0)
+    {now_ms - sent_ms - least > @late_ms, least}
+  end
+end
