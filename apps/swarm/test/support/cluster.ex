@@ -1,0 +1,124 @@
+defmodule Swarm.Cluster do
+  @moduledoc """
+  Further nodes for tests, by `:peer`, with the application `:swarm` running on each.
+
+      @tag :cluster
+      test "…" do
+        [north, south] = Swarm.Cluster.start_nodes(2)
+        :erpc.call(north, Swarm, :status, [])
+
+  Nodes connect only when told to (`connect/1`), as robots do: `-connect_all false`, and no overlapping
+  partitions are prevented. A node ends with the test that started it, or when it is killed.
+  """
+  import ExUnit.Callbacks, only: [on_exit: 1]
+
+  # Cheap starts on a machine with few processors.
+  @flags ~w(-kernel prevent_overlapping_partitions false -kernel connect_all false +S 1 +sbwt none)
+
+  @doc """
+  Starts nodes, connected to this one and to each other. Options: `:connect` (`false`: to this one
+  only), `:apps` (default `[:swarm]`), `:env` (`[swarm: [mesh: false]]`, set before the start),
+  `:flags` (more arguments of the VM, as text).
+  """
+  @spec start_nodes(pos_integer(), keyword()) :: [node()]
+  def start_nodes(count, options \\ []) do
+    options = Keyword.validate!(options, connect: true, apps: [:swarm], env: [], flags: [])
+    be_a_node()
+
+    # Started at once: nine of ten parts of a start are waiting.
+    nodes =
+      for(_ <- 1..count, do: Task.async(fn -> start_one(options) end))
+      |> Task.await_many(30_000)
+      |> Enum.map(fn {peer, node} ->
+        on_exit(fn -> stop(peer) end)
+        node
+      end)
+
+    if options[:connect], do: connect(nodes)
+    nodes
+  end
+
+  @doc "Connects all of these nodes to each other."
+  @spec connect([node()]) :: :ok
+  def connect(nodes) do
+    for a <- nodes, b <- nodes, a < b, do: true = :erpc.call(a, Node, :connect, [b])
+    :ok
+  end
+
+  @doc "Ends a node as `kill -9` does, and waits until this node knows."
+  @spec kill(node()) :: :ok
+  def kill(node), do: signal(node, "KILL", fn -> await_down(node) end)
+
+  @doc "Freezes a node: it is there, and silent. `thaw/1` lets it go on."
+  @spec freeze(node()) :: :ok
+  def freeze(node), do: signal(node, "STOP", fn -> on_exit(fn -> thaw(node) end) end)
+
+  @doc "Lets a frozen node go on."
+  @spec thaw(node()) :: :ok
+  def thaw(node), do: signal(node, "CONT", fn -> :ok end)
+
+  defp start_one(options) do
+    paths = Enum.flat_map(:code.get_path(), &[~c"-pa", &1])
+
+    flags =
+      Enum.map(@flags ++ options[:flags], &to_charlist/1) ++
+        [~c"-setcookie", Atom.to_charlist(Node.get_cookie())]
+
+    # Not linked: the task that starts it ends.
+    {:ok, peer, node} =
+      :peer.start(%{
+        name: :peer.random_name(),
+        host: ~c"127.0.0.1",
+        longnames: true,
+        args: flags ++ paths,
+        wait_boot: 20_000
+      })
+
+    for {app, values} <- [logger: [level: :critical]] ++ options[:env], {key, value} <- values do
+      :ok = :erpc.call(node, Application, :put_env, [app, key, value, [persistent: true]])
+    end
+
+    for app <- options[:apps],
+        do: {:ok, _} = :erpc.call(node, Application, :ensure_all_started, [app])
+
+    remember(node)
+    {peer, node}
+  end
+
+  # A frozen node cannot be asked for its process of the operating system.
+  defp remember(node),
+    do: :persistent_term.put({__MODULE__, node}, :erpc.call(node, System, :pid, []))
+
+  defp signal(node, name, afterwards) do
+    {_text, 0} = System.cmd("kill", ["-#{name}", :persistent_term.get({__MODULE__, node})])
+    afterwards.()
+    :ok
+  end
+
+  defp await_down(node) do
+    Node.monitor(node, true)
+
+    receive do
+      {:nodedown, ^node} -> :ok
+    after
+      10_000 -> raise "#{node} is still there"
+    end
+  end
+
+  defp stop(peer) do
+    :peer.stop(peer)
+  catch
+    # Killed by the test.
+    :exit, _gone -> :ok
+  end
+
+  # The node of the tests has a name only when a test needs it.
+  defp be_a_node do
+    unless Node.alive?() do
+      {_text, 0} = System.cmd("epmd", ["-daemon"])
+      name = :"tests_#{System.pid()}@127.0.0.1"
+      {:ok, _} = Node.start(name, :longnames)
+      Node.set_cookie(:"#{Base.encode16(:crypto.strong_rand_bytes(16))}")
+    end
+  end
+end
