@@ -24,6 +24,10 @@ defmodule Robot.Names do
   @spec whereis(robot :: atom(), role :: term()) :: pid() | nil
   def whereis(robot, role), do: GenServer.whereis(via(robot, role))
 
+  @doc "The processes in that role, of all robots of this node."
+  @spec all(role :: term()) :: [pid()]
+  def all(role), do: Registry.select(__MODULE__, [{{{:_, role}, :"$1", :_}, [], [:"$1"]}])
+
   @doc "The robots that run on this node, sorted."
   @spec robots() :: [atom()]
   def robots do

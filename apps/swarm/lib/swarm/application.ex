@@ -3,5 +3,14 @@ defmodule Swarm.Application do
   use Application
 
   @impl Application
-  def start(_type, _arguments), do: Swarm.Supervisor.start_link([])
+  def start(_type, _arguments) do
+    case Application.get_env(:swarm, :mesh, false) do
+      false ->
+        Swarm.Supervisor.start_link([])
+
+      options ->
+        with {:ok, mesh} <- Swarm.Mesh.prepare(options),
+             do: Swarm.Supervisor.start_link(mesh: mesh)
+    end
+  end
 end

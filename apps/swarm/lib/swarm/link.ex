@@ -17,7 +17,7 @@ defmodule Swarm.Link do
   `join/2` makes a config with a link. Its options:
 
     * `:transport` - `{m, f, a}`; a message goes to `apply(m, f, a ++ [from, ids, message])`, and
-      arrives by `hear/2`. Default: straight to the links of these robots, wherever they are
+      arrives by `hear/2`. Default: `Swarm.Mesh.transmit/3`
     * `:boot` - a number that grows with every start; default the time of day
   """
   use GenServer
@@ -37,7 +37,7 @@ defmodule Swarm.Link do
   @doc "The config of a robot that talks: with a link, which its mission speaks through, and a brake."
   @spec join(Config.t(), keyword()) :: Config.t()
   def join(%Config{} = config, options \\ []) do
-    options = Keyword.validate!(options, [:boot, transport: {__MODULE__, :transmit, []}])
+    options = Keyword.validate!(options, [:boot, transport: {Swarm.Mesh, :transmit, []}])
     # The brake first: whoever is listed later falls with those before, never takes them along.
     companions = config.companions ++ [{Brake, []}, {__MODULE__, options}]
     %{config | send: {__MODULE__, :say, [config.id]}, companions: companions}
@@ -92,7 +92,7 @@ defmodule Swarm.Link do
       config: config,
       id: id,
       board: board,
-      transport: options[:transport] || {__MODULE__, :transmit, []},
+      transport: options[:transport] || {Swarm.Mesh, :transmit, []},
       ear: Ear.new(id, written(board)),
       stamps: Stamp.new(boot),
       presence: Presence.new([:robots, {:robot, id}]),

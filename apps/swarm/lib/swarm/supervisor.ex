@@ -6,7 +6,8 @@ defmodule Swarm.Supervisor do
       |-- Robot.Names            who is who on this node
       |-- Swarm.Parts (one_for_one)
       |   |-- Swarm.Directory    who is where in the fleet
-      |   `-- Swarm.Alarm        calls all robots to stop
+      |   |-- Swarm.Alarm        calls all robots to stop
+      |   `-- Swarm.Mesh         the other nodes, where there is a mesh
       `-- Robot.Fleet            the robots
 
   Robots do without the directory: they drive on, and enter a new one by themselves. A fleet that
@@ -20,25 +21,23 @@ defmodule Swarm.Supervisor do
     use Supervisor
 
     @doc false
-    def start_link(_options), do: Supervisor.start_link(__MODULE__, [])
+    def start_link(options), do: Supervisor.start_link(__MODULE__, options)
 
     @impl Supervisor
-    def init([]) do
-      Supervisor.init([Swarm.Directory, Swarm.Alarm],
-        strategy: :one_for_one,
-        max_restarts: 5,
-        max_seconds: 5
-      )
+    def init(options) do
+      mesh = for mesh <- List.wrap(options[:mesh]), do: {Swarm.Mesh, mesh}
+      children = [Swarm.Directory, Swarm.Alarm | mesh]
+      Supervisor.init(children, strategy: :one_for_one, max_restarts: 5, max_seconds: 5)
     end
   end
 
-  @doc "Starts the node's parts, without a robot."
+  @doc "Starts the node's parts, without a robot; `mesh` as prepared by `Swarm.Mesh.prepare/1`."
   @spec start_link(keyword()) :: Supervisor.on_start()
-  def start_link(_options), do: Supervisor.start_link(__MODULE__, [])
+  def start_link(options), do: Supervisor.start_link(__MODULE__, options)
 
   @impl Supervisor
-  def init([]) do
-    children = [Robot.Names, Parts, {Robot.Fleet, name: Robot.Fleet}]
+  def init(options) do
+    children = [Robot.Names, {Parts, options}, {Robot.Fleet, name: Robot.Fleet}]
     Supervisor.init(children, strategy: :rest_for_one, max_restarts: 0)
   end
 end

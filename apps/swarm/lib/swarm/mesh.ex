@@ -1,0 +1,207 @@
+defmodule Swarm.Mesh do
+  @moduledoc """
+  A node among others: how they find each other, stay in touch, and who is there.
+
+      Swarm.Mesh (rest_for_one)
+      |-- Swarm.Mesh.Radio    signed datagrams: beacons, heartbeats, rounds, rows, stops
+      |-- Swarm.Mesh.Dialer   connects the distribution, again and again
+      `-- Swarm.Mesh.Relay    commands to nodes that this one is not connected to
+
+  Two planes. Datagrams carry what must be new or is worth nothing, and they alone decide who is
+  alive: after a cut the next one arrives at once. Erlang's distribution carries what needs an
+  answer. A connection that has gone silent holds up nobody, and one that is lost changes no view.
+
+  Without a mesh (`config :swarm, mesh: false`) a node's robots have only each other, and whom
+  somebody has connected by hand. `docs/networking.md` tells how to set it up.
+  """
+  use Supervisor
+  alias Swarm.{Link, Message}
+  alias Swarm.Mesh.{Book, Dialer, Options, Radio, Relay, Roster, Secret}
+
+  @typedoc """
+  How a node sees the others: `number` grows with each change of who is there; for each node its
+  `status`, whether the distribution is `connected`, whom it `hears`, which `robots` it holds, and how
+  long ago it was heard.
+  """
+  @type view :: %{
+          number: non_neg_integer(),
+          nodes: %{
+            node() => %{
+              status: Book.status(),
+              connected: boolean(),
+              hears: [node()],
+              robots: [atom()],
+              age_ms: non_neg_integer()
+            }
+          }
+        }
+
+  # A robot whose heartbeat is older is gone.
+  @gone_ms 2_000
+
+  @doc "Starts the mesh of this node. An error is one line."
+  @spec start_link(Options.t()) :: Supervisor.on_start()
+  def start_link(%Options{} = options),
+    do: Supervisor.start_link(__MODULE__, options, name: __MODULE__)
+
+  @doc """
+  Checks what the configuration says, and gives the node the fleet's cookie. A node without a name
+  or a secret has no mesh, and says which is missing.
+  """
+  @spec prepare(keyword()) :: {:ok, Options.t()} | {:error, String.t()}
+  def prepare(options) do
+    with {:ok, options} <- Options.new(options),
+         :ok <- Secret.apply_cookie(options.secret),
+         do: {:ok, options}
+  end
+
+  @impl Supervisor
+  def init(options) do
+    children = [{Radio, options}, {Dialer, options}, {Relay, options}]
+    Supervisor.init(children, strategy: :rest_for_one, max_restarts: 5, max_seconds: 5)
+  end
+
+  @doc "Whether this node has a mesh."
+  @spec running?() :: boolean()
+  def running?, do: :ets.whereis(__MODULE__) != :undefined
+
+  @doc """
+  The transport of links (`Swarm.Link`). Heartbeats go to everybody known, other messages to the robots
+  named; those of this node get them directly, those of other nodes by datagram, which may be lost.
+  """
+  @spec transmit(from :: atom(), [atom()], Message.t()) :: :ok
+  def transmit(from, ids, %Message{kind: kind} = message) do
+    if running?() do
+      here = Enum.filter(ids, &(Robot.Names.whereis(&1, :link) != nil))
+      for id <- here, do: Link.hear(id, message)
+      to = if kind == :heartbeat, do: :all, else: ids -- here
+      if to != [], do: GenServer.cast(Radio, {:speak, to, message})
+      :ok
+    else
+      Link.transmit(from, ids, message)
+    end
+  end
+
+  @doc """
+  Sends a service's term to all other nodes, by datagram: it may be lost, doubled or come out of
+  order. One of more than 60,000 bytes is refused. Without a mesh nothing is sent.
+  """
+  @spec cast(:rows | :hints | :stop, term()) :: :ok | {:error, :too_big}
+  def cast(service, term), do: serve(service, :all, term)
+
+  @doc "The same, to one node."
+  @spec cast(:rows | :hints | :stop, node(), term()) :: :ok | {:error, :too_big}
+  def cast(service, node, term), do: serve(service, node, term)
+
+  defp serve(service, to, term) when service in [:rows, :hints, :stop] do
+    cond do
+      not running?() -> :ok
+      :erlang.external_size(term) > Swarm.Mesh.Packet.largest() -> {:error, :too_big}
+      true -> GenServer.cast(Radio, {:serve, service, to, term})
+    end
+  end
+
+  @doc "The robots of other nodes that were heard within the last 2 s, and their nodes."
+  @spec robots() :: %{atom() => node()}
+  def robots do
+    if running?() do
+      since = now() - @gone_ms
+      guard = [{:>, :"$3", since}]
+
+      Map.new(
+        :ets.select(__MODULE__, [
+          {{{:robot, :"$1"}, :"$2", :_, :_, :"$3"}, guard, [{{:"$1", :"$2"}}]}
+        ])
+      )
+    else
+      %{}
+    end
+  end
+
+  @doc "The newest heartbeat heard of a robot of another node: `{boot, sequence, age_ms}`."
+  @spec beat(atom()) :: {integer(), non_neg_integer(), age_ms :: non_neg_integer()} | nil
+  def beat(robot) do
+    with true <- running?(),
+         [{_key, _node, boot, sequence, at_ms}] <- :ets.lookup(__MODULE__, {:robot, robot}) do
+      {boot, sequence, now() - at_ms}
+    else
+      _unheard -> nil
+    end
+  end
+
+  @doc "Who is there, as seen from here."
+  @spec view() :: view()
+  def view do
+    case book() do
+      nil -> %{number: 0, nodes: %{}}
+      {book, roster} -> view(book, roster, now(), Node.list())
+    end
+  end
+
+  @doc "What was dropped, by reason, since the start."
+  @spec rejected() :: %{atom() => pos_integer()}
+  def rejected do
+    case running?() && :ets.lookup(__MODULE__, :book) do
+      [{:book, _book, _roster, rejected}] -> rejected
+      _none -> %{}
+    end
+  end
+
+  @doc "What the radio has sent, heard and rejected, and its UDP port."
+  @spec counts() :: map()
+  def counts, do: GenServer.call(Radio, :counts)
+
+  @doc """
+  Sends a link's request to a robot that this node has no connection to, over others that have
+  (`Swarm.Mesh.Relay`). `ref` is the alias in it that is to be answered.
+  """
+  @spec relay(atom(), tuple(), reference()) :: :ok | {:error, :unknown | :no_way}
+  def relay(robot, request, ref) do
+    case {book(), robots()} do
+      {{book, roster}, %{^robot => node}} ->
+        Relay.send(node, links(book, roster), robot, request, ref)
+
+      _unknown ->
+        {:error, :unknown}
+    end
+  end
+
+  defp links(book, roster) do
+    for {name, %{links: links, status: :alive}} <- book.nodes, into: %{node() => Node.list()} do
+      {Map.fetch!(roster.nodes, name), nodes(links, roster)}
+    end
+  end
+
+  defp book do
+    with true <- running?(),
+         [{:book, book, roster, _rejected}] <- :ets.lookup(__MODULE__, :book) do
+      {book, roster}
+    else
+      _none -> nil
+    end
+  end
+
+  defp view(book, roster, now_ms, connected) do
+    nodes =
+      for {name, entry} <- book.nodes, into: %{} do
+        node = Map.fetch!(roster.nodes, name)
+        robots = for {id, {at_ms, _, _}} <- entry.robots, now_ms - at_ms < @gone_ms, do: id
+
+        {node,
+         %{
+           status: Book.status(book, name, now_ms),
+           connected: node in connected,
+           hears: nodes(entry.hears, roster),
+           robots: Enum.sort(robots),
+           age_ms: now_ms - entry.heard_ms
+         }}
+      end
+
+    %{number: book.number, nodes: nodes}
+  end
+
+  defp nodes(names, roster),
+    do: for(name <- names, {:ok, node} <- [Roster.node(roster, name)], do: node)
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

@@ -1,0 +1,48 @@
+defmodule Swarm.Mesh.Beacon do
+  @moduledoc """
+  What a node says of itself: the sessions that it knows (so that those who listen can tell that it
+  speaks now), whom it hears, to whom its distribution is connected, and on which port that listens
+  (0: ask epmd). Names are text. Pure.
+  """
+
+  @enforce_keys [:sessions, :hears, :links, :port]
+  defstruct @enforce_keys
+
+  @type t :: %__MODULE__{
+          sessions: [{String.t(), non_neg_integer()}],
+          hears: [String.t()],
+          links: [String.t()],
+          port: 0..65_535
+        }
+
+  @most 1_100
+
+  @doc "As a plain term for the wire."
+  @spec term(t()) :: tuple()
+  def term(%__MODULE__{} = beacon),
+    do: {beacon.sessions, beacon.hears, beacon.links, beacon.port}
+
+  @doc """
+  A beacon from the wire.
+
+      iex> {:ok, beacon} = Swarm.Mesh.Beacon.check({[{"mag1@lab", 7}], ["mag1@lab"], [], 0})
+      iex> beacon.hears
+      ["mag1@lab"]
+      iex> Swarm.Mesh.Beacon.check({[], [:mag1], [], 0})
+      :error
+  """
+  @spec check(term()) :: {:ok, t()} | :error
+  def check({sessions, hears, links, port})
+      when is_list(sessions) and is_list(hears) and is_list(links) and port in 0..65_535 do
+    if list?(sessions, &session?/1) and list?(hears, &name?/1) and list?(links, &name?/1),
+      do: {:ok, %__MODULE__{sessions: sessions, hears: hears, links: links, port: port}},
+      else: :error
+  end
+
+  def check(_other), do: :error
+
+  defp list?(list, fun), do: Swarm.Shape.list?(list, fun) and length(list) <= @most
+  defp session?({name, session}), do: name?(name) and is_integer(session) and session >= 0
+  defp session?(_other), do: false
+  defp name?(text), do: is_binary(text) and byte_size(text) in 1..255
+end

@@ -1,0 +1,120 @@
+defmodule Swarm.Mesh.Dialer do
+  @moduledoc """
+  Connects this node's distribution to those that the plan names, again and again, for ever, with
+  back-off. A connection attempt blocks for seconds where packets vanish, so each has a process of
+  its own, and no more than four run at once.
+
+  Whether a node is alive is not decided here: that is told by datagrams (`Swarm.Mesh.Book`).
+  """
+  use GenServer
+  alias Hal.Event
+  alias Swarm.Mesh.{Backoff, Options, Plan}
+
+  @tick_ms 200
+  # So long the one whose part it is has to connect before the other tries.
+  @grace_ms 3_000
+  @at_once 4
+
+  @doc "Starts the dialer of this node."
+  @spec start_link(Options.t()) :: GenServer.on_start()
+  def start_link(%Options{} = options),
+    do: GenServer.start_link(__MODULE__, options, name: __MODULE__)
+
+  @doc "Tells it of a node."
+  @spec note(:up | :suspect | :gone, node()) :: :ok
+  def note(change, node), do: GenServer.cast(__MODULE__, {:note, change, node})
+
+  @doc "The nodes that this one is connected to, sorted."
+  @spec links() :: [node()]
+  def links, do: Enum.sort(Node.list())
+
+  @impl GenServer
+  def init(options) do
+    :ok = :net_kernel.monitor_nodes(true)
+    now = now()
+    chance = :rand.seed_s(:exsss, :erlang.phash2(node()))
+
+    # A dialer before this one may have been told of nodes already.
+    known = for node <- Map.keys(Swarm.Mesh.view().nodes), into: %{}, do: {node, row(now)}
+    {:ok, schedule(%{options: options, known: known, dialling: %{}, chance: chance})}
+  end
+
+  @impl GenServer
+  def handle_cast({:note, :up, node}, s) do
+    {:noreply, dial(%{s | known: Map.put(s.known, node, row(now()))})}
+  end
+
+  def handle_cast({:note, _silent, _node}, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info(:tick, s), do: {:noreply, s |> dial() |> schedule()}
+
+  def handle_info({:nodeup, node}, s) do
+    Event.execute([:swarm, :mesh, :connected], %{at_ms: now()}, %{node: node})
+    {:noreply, s}
+  end
+
+  def handle_info({:nodedown, node}, s) do
+    Event.execute([:swarm, :mesh, :disconnected], %{at_ms: now()}, %{node: node})
+    now = now()
+
+    known =
+      case s.known do
+        %{^node => row} -> %{s.known | node => %{row | since_ms: now, backoff: Backoff.new(now)}}
+        known -> known
+      end
+
+    {:noreply, dial(%{s | known: known})}
+  end
+
+  def handle_info({:DOWN, monitor, :process, _pid, _reason}, s),
+    do: {:noreply, %{s | dialling: Map.delete(s.dialling, monitor)}}
+
+  def handle_info(_other, s), do: {:noreply, s}
+
+  defp row(now), do: %{since_ms: now, backoff: Backoff.new(now)}
+
+  defp dial(s) do
+    now = now()
+    busy = Map.values(s.dialling)
+
+    wanted(s)
+    |> Enum.reject(&(&1 in busy))
+    |> Enum.filter(&due?(s.known[&1], &1, now))
+    |> Enum.take(@at_once - length(busy))
+    |> Enum.reduce(s, &attempt(&1, &2, now))
+  end
+
+  defp wanted(s) do
+    names = Map.new(s.known, fn {node, _row} -> {Atom.to_string(node), node} end)
+    %{full_mesh: full_mesh, degree: degree} = s.options
+    peers = Plan.peers(Atom.to_string(node()), Map.keys(names), full_mesh, degree)
+    Enum.map(peers, &Map.fetch!(names, &1)) -- links()
+  end
+
+  defp due?(row, node, now) do
+    mine? = Plan.dials?(Atom.to_string(node()), Atom.to_string(node))
+    (mine? or now - row.since_ms >= @grace_ms) and Backoff.due?(row.backoff, now)
+  end
+
+  defp attempt(node, s, now) do
+    {_pid, monitor} = spawn_monitor(fn -> :net_kernel.connect_node(node) end)
+    {chance, state} = :rand.uniform_s(s.chance)
+    row = s.known[node]
+    row = %{row | backoff: Backoff.tried(row.backoff, now, chance)}
+
+    %{
+      s
+      | known: Map.put(s.known, node, row),
+        chance: state,
+        dialling: Map.put(s.dialling, monitor, node)
+    }
+  end
+
+  defp schedule(s) do
+    Process.send_after(self(), :tick, @tick_ms)
+    s
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

@@ -1,0 +1,187 @@
+defmodule Swarm.Mesh.Radio do
+  @moduledoc """
+  The process round `Swarm.Mesh.Station`: it owns the sockets, keeps the time and carries effects
+  out. What others ask often is in a table that anybody reads (`Swarm.Mesh`).
+
+  Sockets that cannot be opened are tried again with back-off; a robot without a network drives on.
+  """
+  use GenServer
+  alias Hal.Event
+  alias Robot.Names
+  alias Swarm.Link
+  alias Swarm.Mesh.{Backoff, Dialer, Options, Roster, Sockets, Station}
+
+  @tick_ms 200
+  @rejoin_every 50
+  @receivers %{rows: Swarm.Blackboard, hints: Swarm.Hints, stop: Swarm.Brake}
+
+  @doc "Starts the radio of this node."
+  @spec start_link(Options.t()) :: GenServer.on_start()
+  def start_link(%Options{} = options),
+    do: GenServer.start_link(__MODULE__, options, name: __MODULE__)
+
+  @impl GenServer
+  def init(%Options{} = options) do
+    # Heartbeats must not wait behind a busy robot.
+    Process.flag(:priority, :high)
+    table = :ets.new(Swarm.Mesh, [:named_table, :protected, read_concurrency: true])
+    <<session::64>> = :crypto.strong_rand_bytes(8)
+    load()
+
+    station =
+      Station.new(
+        secret: options.secret,
+        roster: Roster.new(node(), options.fleet),
+        session: session,
+        strategies: options.started,
+        port: options.dist_port,
+        group: options.multicast || nil
+      )
+
+    s = %{
+      options: options,
+      station: station,
+      sockets: nil,
+      backoff: Backoff.new(now()),
+      table: table,
+      chance: :rand.seed_s(:exsss, session),
+      ticks: 0,
+      sent: 0,
+      heard: 0,
+      next: now()
+    }
+
+    {:ok, s |> open() |> publish() |> schedule()}
+  end
+
+  # Words that come as atoms are known once the modules that say them are loaded.
+  defp load do
+    for module <- [Swarm.Missions.Landmark.Phases, Swarm.Missions.Manual, Swarm.Formation],
+        do: {:module, _} = Code.ensure_loaded(module)
+  end
+
+  @impl GenServer
+  def handle_cast({:speak, to, message}, s),
+    do: {:noreply, run(s, Station.speak(s.station, to, message, now()))}
+
+  def handle_cast({:serve, service, to, term}, s),
+    do: {:noreply, run(s, Station.serve(s.station, service, to, term))}
+
+  @impl GenServer
+  def handle_call(:counts, _from, s) do
+    counts = %{sent: s.sent, heard: s.heard, rejected: s.station.rejected}
+    {:reply, Map.put(counts, :port, s.sockets && s.sockets.port), s}
+  end
+
+  @impl GenServer
+  def handle_info({:udp, _socket, ip, port, datagram}, s) do
+    s = %{s | heard: s.heard + 1}
+    {:noreply, run(s, Station.hear(s.station, datagram, {ip, port}, now()))}
+  end
+
+  def handle_info({:udp_passive, socket}, s) do
+    Sockets.again(socket)
+    {:noreply, s}
+  end
+
+  def handle_info(:tick, s) do
+    {chance, state} = :rand.uniform_s(s.chance)
+    s = open(%{s | chance: state, ticks: s.ticks + 1})
+    if s.sockets && rem(s.ticks, @rejoin_every) == 0, do: Sockets.rejoin(s.sockets)
+    s = run(s, Station.tick(s.station, Dialer.links(), now(), chance))
+    {:noreply, s |> publish() |> schedule()}
+  end
+
+  # A reset of the network shows as an error on the socket.
+  def handle_info({:udp_error, _socket, _reason}, s), do: {:noreply, s}
+  def handle_info(_other, s), do: {:noreply, s}
+
+  @impl GenServer
+  def terminate(_reason, s), do: if(s.sockets, do: Sockets.close(s.sockets))
+
+  defp open(%{sockets: nil} = s) do
+    if Backoff.due?(s.backoff, now()), do: try_open(s), else: s
+  end
+
+  defp open(s), do: s
+
+  defp try_open(s) do
+    case Sockets.open(s.options) do
+      {:ok, sockets} ->
+        %{s | sockets: sockets}
+
+      {:error, reason} ->
+        about = %{reason: reason, interface: s.options.interface, port: s.options.port}
+        Event.execute([:swarm, :mesh, :no_network], %{}, about)
+        {chance, state} = :rand.uniform_s(s.chance)
+        %{s | chance: state, backoff: Backoff.tried(s.backoff, now(), chance)}
+    end
+  end
+
+  defp run(s, {station, effects}) do
+    changed? = Enum.any?(effects, &match?({:node, _, _}, &1))
+    s = Enum.reduce(effects, %{s | station: station}, &carry_out/2)
+    if changed?, do: publish(s), else: s
+  end
+
+  defp carry_out({:send, _address, _datagram}, %{sockets: nil} = s), do: s
+
+  defp carry_out({:send, address, datagram}, s) do
+    # What the network does not take now is lost, as any datagram may be.
+    _ = Sockets.send(s.sockets, address, datagram)
+    %{s | sent: s.sent + 1}
+  end
+
+  defp carry_out({:beat, robot, node, {boot, sequence}}, s) do
+    :ets.insert(s.table, {{:robot, robot}, node, boot, sequence, now()})
+    if Names.whereis(robot, :link), do: Link.rival(robot, {boot, node})
+    s
+  end
+
+  defp carry_out({:deliver, :all, message}, s) do
+    for link <- Names.all(:link), do: GenServer.cast(link, {:hear, message})
+    s
+  end
+
+  defp carry_out({:deliver, ids, message}, s) do
+    for id <- ids, link = Names.whereis(id, :link), do: GenServer.cast(link, {:hear, message})
+    s
+  end
+
+  defp carry_out({:serve, service, node, term}, s) do
+    Map.fetch!(@receivers, service).hear(node, term)
+    s
+  end
+
+  defp carry_out({:node, change, node}, s) do
+    Event.execute([:swarm, :mesh, change], %{at_ms: now()}, %{node: node})
+    Dialer.note(change, node)
+    s
+  end
+
+  defp carry_out({:learn, name, ip, port}, s) do
+    if Code.ensure_loaded?(Swarm.Mesh.Epmd),
+      do: apply(Swarm.Mesh.Epmd, :learn, [name, ip, port])
+
+    s
+  end
+
+  defp carry_out({:event, name, about}, s) do
+    Event.execute([:swarm, :mesh, name], %{at_ms: now()}, about)
+    s
+  end
+
+  # The book, for those who read it without asking.
+  defp publish(s) do
+    :ets.insert(s.table, {:book, s.station.book, s.station.roster, s.station.rejected})
+    s
+  end
+
+  defp schedule(s) do
+    next = max(s.next + @tick_ms, now())
+    Process.send_after(self(), :tick, next, abs: true)
+    %{s | next: next}
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

@@ -1,0 +1,41 @@
+defmodule Swarm.MeshNodes.Wheels do
+  @moduledoc """
+  A robot on a test's node: the whole tree with a fake drive, whose wheels say ten times a second
+  that they stand.
+  """
+  use GenServer
+  alias Hal.Pose
+
+  @period_ms 100
+
+  @doc "Starts a robot on this node, under its fleet."
+  @spec robot(atom(), keyword()) :: :ok
+  def robot(id, link \\ []) do
+    {:ok, _wheels} = GenServer.start(__MODULE__, {id, link})
+    :ok
+  end
+
+  @impl GenServer
+  def init({id, link}) do
+    config =
+      Robot.Config.new!(
+        id: id,
+        profile: Hal.Profile.magellan(),
+        drive: {Hal.FakeDrive, test: self(), device: :drive}
+      )
+
+    {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, Swarm.Link.join(config, link))
+    {:ok, _timer} = :timer.send_interval(@period_ms, :stand)
+    {:ok, %{id: id, n: 0}}
+  end
+
+  @impl GenServer
+  def handle_info(:stand, s) do
+    if Robot.Names.whereis(s.id, :drive),
+      do: Swarm.Case.stand(s.id, Pose.new(0.001 * rem(s.n, 2), 0))
+
+    {:noreply, %{s | n: s.n + 1}}
+  end
+
+  def handle_info(_asked_of_the_drive, s), do: {:noreply, s}
+end

@@ -1,0 +1,82 @@
+defmodule Swarm.MeshTest do
+  # Real nodes on loopback.
+  use ExUnit.Case, async: false
+  import Swarm.Case, only: [eventually: 1, eventually: 2]
+  alias Swarm.MeshNodes, as: Cluster
+
+  defp alive(node) do
+    for {other, %{status: :alive}} <- Cluster.call(node, Swarm.Mesh, :view, []).nodes, do: other
+  end
+
+  defp linked(node), do: Cluster.call(node, Node, :list, [])
+  defp full?(nodes), do: Enum.all?(nodes, &(met?(&1, nodes) and joined?(&1, nodes)))
+  defp met?(node, nodes), do: Enum.sort(alive(node)) == others(node, nodes)
+  defp joined?(node, nodes), do: Enum.sort(linked(node)) == others(node, nodes)
+  defp others(node, nodes), do: Enum.sort(for n <- nodes, n.node != node.node, do: n.node)
+
+  defp status(node, robot), do: Cluster.call(node, Swarm, :status, [robot])
+
+  test "nodes find each other, a command crosses, and each hears all" do
+    nodes = [one, two, _three] = Cluster.start(3, robots: true)
+    assert eventually(fn -> full?(nodes) end)
+    assert eventually(fn -> Cluster.call(one, Swarm, :stop, [two.name]) == :ok end)
+
+    assert eventually(fn ->
+             match?(%{peers: peers} when map_size(peers) == 2, status(one, two.name))
+           end)
+
+    assert %{status: :alive, connected: true, robots: [robot]} =
+             Cluster.call(one, Swarm.Mesh, :view, []).nodes[two.node]
+
+    assert robot == two.name
+  end
+
+  test "a killed node is gone, and comes back as if it had never been away" do
+    nodes = [one, two, three] = Cluster.start(3, robots: true)
+    assert eventually(fn -> full?(nodes) end)
+    Cluster.signal(three, "KILL")
+    assert eventually(fn -> alive(one) == [two.node] end)
+    back = Cluster.join(nodes, three.name, robots: true)
+    assert eventually(fn -> full?([one, two, back]) end, 10_000)
+    assert eventually(fn -> Cluster.call(one, Swarm, :stop, [three.name]) == :ok end)
+  end
+
+  test "a frozen node is gone for the others though its connections stand, and comes back" do
+    nodes = [one, two, three] = Cluster.start(3, robots: true)
+    assert eventually(fn -> full?(nodes) end)
+    Cluster.signal(two, "STOP")
+    assert eventually(fn -> alive(one) == [three.node] and alive(three) == [one.node] end)
+    assert two.node in linked(one)
+    Cluster.signal(two, "CONT")
+    assert eventually(fn -> full?(nodes) end)
+  end
+
+  test "one connection cut for good changes no other, and no view" do
+    nodes = [one, two, three] = Cluster.start(3, robots: true)
+    assert eventually(fn -> full?(nodes) end)
+    # A cookie that only these two have for each other: neither can connect again.
+    Cluster.call(one, :erlang, :set_cookie, [two.node, :wrong])
+    true = Cluster.call(one, Node, :disconnect, [two.node])
+    number = Cluster.call(three, Swarm.Mesh, :view, []).number
+    assert eventually(fn -> two.node not in linked(one) end)
+    assert Enum.sort(linked(three)) == others(three, nodes)
+    assert met?(one, nodes) and met?(two, nodes)
+    assert Cluster.call(three, Swarm.Mesh, :view, []).number == number
+  end
+
+  test "where multicast is blocked a list of addresses does" do
+    [one] = Cluster.start(1, mesh: [multicast: false])
+    %{port: port} = Cluster.call(one, Swarm.Mesh, :counts, [])
+    mesh = Cluster.call(one, Application, :get_env, [:swarm, :mesh])
+    peers = Keyword.put(mesh, :peers, ["127.0.0.1:#{port}"])
+    Cluster.call(one, Application, :put_env, [:swarm, :mesh, peers])
+    [name | _] = Enum.reverse(mesh[:fleet])
+    two = Cluster.join([one], name)
+    assert eventually(fn -> full?([one, two]) end)
+  end
+
+  test "ten nodes form" do
+    nodes = Cluster.start(10, robots: true)
+    assert eventually(fn -> full?(nodes) end, 15_000)
+  end
+end
