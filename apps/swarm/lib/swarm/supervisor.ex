@@ -7,6 +7,7 @@ defmodule Swarm.Supervisor do
       |-- Swarm.Parts (one_for_one)
       |   |-- Swarm.Directory    who is where in the fleet
       |   |-- Swarm.Alarm        calls all robots to stop
+      |   |-- Swarm.Blackboard   what the robots of the fleet tell of themselves
       |   `-- Swarm.Mesh         the other nodes, where there is a mesh
       `-- Robot.Fleet            the robots
 
@@ -26,7 +27,7 @@ defmodule Swarm.Supervisor do
     @impl Supervisor
     def init(options) do
       mesh = for mesh <- List.wrap(options[:mesh]), do: {Swarm.Mesh, mesh}
-      children = [Swarm.Directory, Swarm.Alarm | mesh]
+      children = [Swarm.Directory, Swarm.Alarm, Swarm.Blackboard | mesh]
       Supervisor.init(children, strategy: :one_for_one, max_restarts: 5, max_seconds: 5)
     end
   end
