@@ -98,7 +98,7 @@ defmodule Swarm.Alarm do
 
   defp send_out(call) do
     for brake <- Directory.members(:brakes), do: Post.cast(brake, {:estop, call})
-    Post.radio(:stop, {:estop, call})
+    Swarm.Mesh.cast(:stop, {:estop, call})
   end
 
   # When this VM was started, by the time of day.

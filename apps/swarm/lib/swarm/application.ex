@@ -9,7 +9,7 @@ defmodule Swarm.Application do
         Swarm.Supervisor.start_link([])
 
       options ->
-        with {:ok, mesh} <- Swarm.Mesh.prepare(options),
+        with {:ok, mesh} <- Swarm.Mesh.Options.prepare(options),
              do: Swarm.Supervisor.start_link(mesh: mesh)
     end
   end

@@ -2,7 +2,7 @@ defmodule Swarm.Door do
   @moduledoc false
   # What `Swarm` needs: who is meant, is it allowed, and what do they answer.
   alias Robot.Command.Words
-  alias Swarm.{Directory, Formation, Post}
+  alias Swarm.{Directory, Formation}
   alias Swarm.Door.Ask
 
   @doc "The ids of the robots meant, which all exist, or one line."
@@ -32,7 +32,7 @@ defmodule Swarm.Door do
 
   # Also those that are heard by radio, but not connected.
   defp known do
-    case map_size(heard = Post.heard()) do
+    case map_size(heard = Swarm.Mesh.robots()) do
       0 -> Directory.robots()
       _some -> Enum.uniq(Enum.sort(Directory.robots() ++ Map.keys(heard)))
     end

@@ -17,7 +17,7 @@ defmodule Swarm.Link do
   `join/2` makes a config with a link. Its options:
 
     * `:transport` - `{m, f, a}`; a message goes to `apply(m, f, a ++ [from, ids, message])`, and
-      arrives by `hear/2`. Default: `Swarm.Mesh.transmit/3`
+      arrives by `hear/2`. Default: `Swarm.Transport.transmit/3`
     * `:boot` - a number that grows with every start; default the time of day
   """
   use GenServer
@@ -37,7 +37,7 @@ defmodule Swarm.Link do
   @doc "The config of a robot that talks: with a link, which its mission speaks through, and a brake."
   @spec join(Config.t(), keyword()) :: Config.t()
   def join(%Config{} = config, options \\ []) do
-    options = Keyword.validate!(options, [:boot, transport: {Swarm.Mesh, :transmit, []}])
+    options = Keyword.validate!(options, [:boot, transport: {Swarm.Transport, :transmit, []}])
     # The brake first: whoever is listed later falls with those before, never takes them along.
     companions = config.companions ++ [{Brake, []}, {__MODULE__, options}]
     %{config | send: {__MODULE__, :say, [config.id]}, companions: companions}
@@ -76,13 +76,6 @@ defmodule Swarm.Link do
   def rival(robot, {_boot, _node} = other),
     do: GenServer.cast(Names.via(robot, :link), {:rival, other, nil})
 
-  @doc "The transport between links: lost where a robot is not to be reached now."
-  @spec transmit(from :: atom(), [atom()], Message.t()) :: :ok
-  def transmit(_from, ids, message) do
-    for id <- ids, link <- Directory.members({:robot, id}), do: Post.cast(link, {:hear, message})
-    :ok
-  end
-
   @impl GenServer
   def init({%Config{id: id} = config, options}) do
     board = Board.find!(id)
@@ -92,7 +85,7 @@ defmodule Swarm.Link do
       config: config,
       id: id,
       board: board,
-      transport: options[:transport] || {Swarm.Mesh, :transmit, []},
+      transport: options[:transport] || {Swarm.Transport, :transmit, []},
       ear: Ear.new(id, written(board)),
       stamps: Stamp.new(boot),
       presence: Presence.new([:robots, {:robot, id}]),

@@ -1,11 +1,6 @@
 defmodule Swarm.Mesh do
   @moduledoc """
-  A node among others: how they find each other, stay in touch, and who is there.
-
-      Swarm.Mesh (rest_for_one)
-      |-- Swarm.Mesh.Radio    signed datagrams: beacons, heartbeats, rounds, rows, stops
-      |-- Swarm.Mesh.Dialer   connects the distribution, again and again
-      `-- Swarm.Mesh.Relay    commands to nodes that this one is not connected to
+  A node among others: who is there, and how to reach them.
 
   Two planes. Datagrams carry what must be new or is worth nothing, and they alone decide who is
   alive: after a cut the next one arrives at once. Erlang's distribution carries what needs an
@@ -14,9 +9,7 @@ defmodule Swarm.Mesh do
   Without a mesh (`config :swarm, mesh: false`) a node's robots have only each other, and whom
   somebody has connected by hand. `docs/networking.md` tells how to set it up.
   """
-  use Supervisor
-  alias Swarm.{Link, Message}
-  alias Swarm.Mesh.{Book, Dialer, Options, Radio, Relay, Roster, Secret}
+  alias Swarm.Mesh.{Book, Packet, Relay, Roster}
 
   @typedoc """
   How a node sees the others: `number` grows with each change of who is there; for each node its
@@ -39,48 +32,16 @@ defmodule Swarm.Mesh do
   # A robot whose heartbeat is older is gone.
   @gone_ms 2_000
 
-  @doc "Starts the mesh of this node. An error is one line."
-  @spec start_link(Options.t()) :: Supervisor.on_start()
-  def start_link(%Options{} = options),
-    do: Supervisor.start_link(__MODULE__, options, name: __MODULE__)
-
-  @doc """
-  Checks what the configuration says, and gives the node the fleet's cookie. A node without a name
-  or a secret has no mesh, and says which is missing.
-  """
-  @spec prepare(keyword()) :: {:ok, Options.t()} | {:error, String.t()}
-  def prepare(options) do
-    with {:ok, options} <- Options.new(options),
-         :ok <- Secret.apply_cookie(options.secret),
-         do: {:ok, options}
-  end
-
-  @impl Supervisor
-  def init(options) do
-    children = [{Radio, options}, {Dialer, options}, {Relay, options}]
-    Supervisor.init(children, strategy: :rest_for_one, max_restarts: 5, max_seconds: 5)
-  end
-
   @doc "Whether this node has a mesh."
   @spec running?() :: boolean()
   def running?, do: :ets.whereis(__MODULE__) != :undefined
 
   @doc """
-  The transport of links (`Swarm.Link`). Heartbeats go to everybody known, other messages to the robots
-  named; those of this node get them directly, those of other nodes by datagram, which may be lost.
+  Sends a robot's message by datagram, which may be lost: to all other nodes, or to those that hold
+  these robots. Without a mesh nothing is sent.
   """
-  @spec transmit(from :: atom(), [atom()], Message.t()) :: :ok
-  def transmit(from, ids, %Message{kind: kind} = message) do
-    if running?() do
-      here = Enum.filter(ids, &(Robot.Names.whereis(&1, :link) != nil))
-      for id <- here, do: Link.hear(id, message)
-      to = if kind == :heartbeat, do: :all, else: ids -- here
-      if to != [], do: GenServer.cast(Radio, {:speak, to, message})
-      :ok
-    else
-      Link.transmit(from, ids, message)
-    end
-  end
+  @spec speak(:all | [atom()], Swarm.Message.t()) :: :ok
+  def speak(to, message), do: radio({:speak, to, message})
 
   @doc """
   Sends a service's term to all other nodes, by datagram: it may be lost, doubled or come out of
@@ -95,9 +56,8 @@ defmodule Swarm.Mesh do
 
   defp serve(service, to, term) when service in [:rows, :hints, :stop] do
     cond do
-      not running?() -> :ok
-      :erlang.external_size(term) > Swarm.Mesh.Packet.largest() -> {:error, :too_big}
-      true -> GenServer.cast(Radio, {:serve, service, to, term})
+      :erlang.external_size(term) > Packet.largest() -> {:error, :too_big}
+      true -> radio({:serve, service, to, term})
     end
   end
 
@@ -149,7 +109,7 @@ defmodule Swarm.Mesh do
 
   @doc "What the radio has sent, heard and rejected, and its UDP port."
   @spec counts() :: map()
-  def counts, do: GenServer.call(Radio, :counts)
+  def counts, do: GenServer.call(:ets.lookup_element(__MODULE__, :radio, 2), :counts)
 
   @doc """
   Sends a link's request to a robot that this node has no connection to, over others that have
@@ -169,6 +129,14 @@ defmodule Swarm.Mesh do
   defp links(book, roster) do
     for {name, %{links: links, status: :alive}} <- book.nodes, into: %{node() => Node.list()} do
       {Map.fetch!(roster.nodes, name), nodes(links, roster)}
+    end
+  end
+
+  # The table goes with the radio that made it; in between there is none.
+  defp radio(request) do
+    case running?() && :ets.lookup(__MODULE__, :radio) do
+      [{:radio, pid}] -> GenServer.cast(pid, request)
+      _none -> :ok
     end
   end
 

@@ -8,7 +8,7 @@ defmodule Swarm.Supervisor do
       |   |-- Swarm.Directory    who is where in the fleet
       |   |-- Swarm.Alarm        calls all robots to stop
       |   |-- Swarm.Blackboard   what the robots of the fleet tell of themselves
-      |   `-- Swarm.Mesh         the other nodes, where there is a mesh
+      |   `-- Swarm.Mesh.Supervisor  the other nodes, where there is a mesh
       `-- Robot.Fleet            the robots
 
   Robots do without the directory: they drive on, and enter a new one by themselves. A fleet that
@@ -26,13 +26,13 @@ defmodule Swarm.Supervisor do
 
     @impl Supervisor
     def init(options) do
-      mesh = for mesh <- List.wrap(options[:mesh]), do: {Swarm.Mesh, mesh}
+      mesh = for mesh <- List.wrap(options[:mesh]), do: {Swarm.Mesh.Supervisor, mesh}
       children = [Swarm.Directory, Swarm.Alarm, Swarm.Blackboard | mesh]
       Supervisor.init(children, strategy: :one_for_one, max_restarts: 5, max_seconds: 5)
     end
   end
 
-  @doc "Starts the node's parts, without a robot; `mesh` as prepared by `Swarm.Mesh.prepare/1`."
+  @doc "Starts the node's parts, without a robot; `mesh` as prepared by `Swarm.Mesh.Options.prepare/1`."
   @spec start_link(keyword()) :: Supervisor.on_start()
   def start_link(options), do: Supervisor.start_link(__MODULE__, options)
 

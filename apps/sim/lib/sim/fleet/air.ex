@@ -23,7 +23,7 @@ defmodule Sim.Fleet.Air do
   @spec hand_on(counter(), atom(), [atom()], Swarm.Message.t()) :: :ok
   def hand_on(counter, from, to, message) do
     :counters.add(counter, 1, length(to))
-    Link.transmit(from, to, message)
+    Swarm.Transport.transmit(from, to, message)
   end
 
   @doc "Starts a radio that loses and delays; options as of `Sim.Radio.new/1`."

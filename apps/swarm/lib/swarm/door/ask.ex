@@ -62,7 +62,7 @@ defmodule Swarm.Door.Ask do
   # The nearest process that takes the request, or the way by others, or `nil`.
   defp whereabouts(id, request) do
     if(Brake.takes?(request), do: nearest({:brake, id})) || Directory.whereis(id) ||
-      if(is_map_key(Post.heard(), id), do: :relay)
+      if(is_map_key(Swarm.Mesh.robots(), id), do: :relay)
   end
 
   defp nearest(group) do
@@ -100,7 +100,7 @@ defmodule Swarm.Door.Ask do
     {ref, {:command, id}}
   end
 
-  defp cast(id, :relay, order, ref), do: Post.relay(id, order, ref)
+  defp cast(id, :relay, order, ref), do: Swarm.Mesh.relay(id, order, ref)
   defp cast(_id, pid, order, _ref), do: Post.cast(pid, order)
 
   # The newest heartbeat of a robot that one of this node's has heard.

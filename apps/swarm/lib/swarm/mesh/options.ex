@@ -53,6 +53,17 @@ defmodule Swarm.Mesh.Options do
     end
   end
 
+  @doc """
+  Checks what the configuration says, and gives this node the fleet's cookie. A node without a name
+  or a secret has no mesh, and the line says which is missing.
+  """
+  @spec prepare(keyword()) :: {:ok, t()} | {:error, String.t()}
+  def prepare(options) do
+    with {:ok, options} <- new(options),
+         :ok <- Secret.apply_cookie(options.secret),
+         do: {:ok, options}
+  end
+
   defp known(options) do
     case Keyword.keyword?(options) && Keyword.keys(options) -- Keyword.keys(@defaults) do
       false ->

@@ -25,6 +25,7 @@ defmodule Swarm.Mesh.Radio do
     # Heartbeats must not wait behind a busy robot.
     Process.flag(:priority, :high)
     table = :ets.new(Swarm.Mesh, [:named_table, :protected, read_concurrency: true])
+    :ets.insert(table, {:radio, self()})
     <<session::64>> = :crypto.strong_rand_bytes(8)
     load()
 

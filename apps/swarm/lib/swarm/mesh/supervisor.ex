@@ -1,0 +1,24 @@
+defmodule Swarm.Mesh.Supervisor do
+  @moduledoc """
+  The processes of a node's mesh.
+
+      Swarm.Mesh.Supervisor (rest_for_one)
+      |-- Swarm.Mesh.Radio    signed datagrams: beacons, heartbeats, rounds, rows, stops
+      |-- Swarm.Mesh.Dialer   connects the distribution, again and again
+      `-- Swarm.Mesh.Relay    commands to nodes that this one is not connected to
+
+  A radio that starts anew has a new session: for the others it is a node that was away for a moment.
+  """
+  use Supervisor
+  alias Swarm.Mesh.{Dialer, Options, Radio, Relay}
+
+  @doc "Starts the mesh of this node, with options from `Swarm.Mesh.Options.prepare/1`."
+  @spec start_link(Options.t()) :: Supervisor.on_start()
+  def start_link(%Options{} = options), do: Supervisor.start_link(__MODULE__, options)
+
+  @impl Supervisor
+  def init(options) do
+    children = [{Radio, options}, {Dialer, options}, {Relay, options}]
+    Supervisor.init(children, strategy: :rest_for_one, max_restarts: 5, max_seconds: 5)
+  end
+end

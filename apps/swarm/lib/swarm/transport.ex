@@ -1,0 +1,30 @@
+defmodule Swarm.Transport do
+  @moduledoc """
+  How what a robot says reaches others: those of this node get it straight into their links, those
+  of other nodes by the mesh's datagrams. A node without a mesh speaks to those that somebody has
+  connected by hand, over Erlang's distribution.
+  """
+  alias Robot.Names
+  alias Swarm.{Directory, Mesh, Message, Post}
+
+  @doc """
+  The transport of links (`Swarm.Link`). With a mesh heartbeats go to everybody known, whoever is named.
+  Nobody is waited for.
+  """
+  @spec transmit(from :: atom(), [atom()], Message.t()) :: :ok
+  def transmit(_from, ids, %Message{kind: kind} = message) do
+    if Mesh.running?() do
+      {here, there} = Enum.split_with(ids, &(Names.whereis(&1, :link) != nil))
+      for id <- here, do: GenServer.cast(Names.via(id, :link), {:hear, message})
+      to = if kind == :heartbeat, do: :all, else: there
+      if to != [], do: Mesh.speak(to, message)
+      :ok
+    else
+      for id <- ids,
+          link <- Directory.members({:robot, id}),
+          do: Post.cast(link, {:hear, message})
+
+      :ok
+    end
+  end
+end
