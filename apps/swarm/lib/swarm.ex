@@ -63,7 +63,10 @@ defmodule Swarm do
   @doc """
   Starts the group's mission: find the landmark, elect who leads, follow in formation. Options:
   `formation` (`:wedge` or `{:wedge, 1.2}`), `assign` (`:chain` or `:cost`), `leader_change` (whether
-  another robot may take over), `robots` (who takes part, default `:all`).
+  another robot may take over), `robots` (who takes part, default `:all`), `policy` (`:available`, the
+  default: each part of a divided fleet leads itself, or `:majority`: only more than half of the
+  fleet, whose size is the number of `robots` unless `of` says another), `lost_link` (`:stop`, `:hold` or `:continue`: what a robot does
+  that hears nobody any more; `Swarm.Missions.Landmark.Policy`).
 
       Swarm.start()
       Swarm.start(formation: {:diamond, 1.0}, robots: [:mag1, :mag2, :min1])

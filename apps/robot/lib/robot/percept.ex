@@ -29,7 +29,8 @@ defmodule Robot.Percept do
   @typedoc """
   What another robot told: its pose and speed in the `map` frame, when it was heard, and its
   body's radius (metres). `mode`: `:moving` avoids others too, `:holding` stands and gives no way,
-  `:dead` is a body that stayed where it was last heard of. `beat` is all that it told last.
+  `:dead` is a body that stayed where it was last heard of. `beat` is all that it told last, and
+  `direct_ms` when it was heard itself, not by way of another robot.
   """
   @type peer :: %{
           required(:pose) => Pose.t(),
@@ -37,6 +38,7 @@ defmodule Robot.Percept do
           required(:radius) => float(),
           required(:at_ms) => integer(),
           required(:mode) => :moving | :holding | :dead,
+          optional(:direct_ms) => integer() | nil,
           optional(:beat) => struct()
         }
 

@@ -11,12 +11,14 @@ defmodule Swarm.Anchor do
   the order in which each passes the anchor on to its child. `formation` is
   the shape as there is room for it, `asked` the one that was asked for, the `asked_no`-th that was; `size` and `places` say which
   slots of it are used (`Swarm.Room`), `trail` gives them pose by pose where the shape is a column
-  along the leader's trail.
+  along the leader's trail. `of` is the size of the fleet of which a majority must be together for anybody
+  to lead, 0 for no such rule (`Swarm.Missions.Landmark.Policy`).
   """
   alias Swarm.{Formation, Shape}
 
   @enforce_keys [:leader, :epoch, :sequence, :pose, :twist, :formation, :order, :size, :places]
-  defstruct @enforce_keys ++ [asked: nil, asked_no: 0, landmark: nil, still: false, trail: nil]
+  defstruct @enforce_keys ++
+              [asked: nil, asked_no: 0, landmark: nil, still: false, trail: nil, of: 0]
 
   @type t :: %__MODULE__{
           leader: atom(),
@@ -32,7 +34,8 @@ defmodule Swarm.Anchor do
           places: [pos_integer()],
           asked: Formation.t() | nil,
           asked_no: non_neg_integer(),
-          trail: [{integer(), integer(), integer()}] | nil
+          trail: [{integer(), integer(), integer()}] | nil,
+          of: non_neg_integer()
         }
 
   @most 1_000
@@ -66,6 +69,7 @@ defmodule Swarm.Anchor do
       Shape.list?(places, &(&1 in 1..@most and &1 < anchor.size)) and
       length(places) == length(order) and Shape.distinct?(places) and
       landmark?(anchor.landmark) and is_boolean(anchor.still) and
+      is_integer(anchor.of) and anchor.of in 0..@most and
       (anchor.trail == nil or
          (Shape.list?(anchor.trail, &Shape.pose?/1) and length(anchor.trail) == length(order)))
   end

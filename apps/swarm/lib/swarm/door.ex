@@ -4,6 +4,7 @@ defmodule Swarm.Door do
   alias Robot.Command.Words
   alias Swarm.{Directory, Formation}
   alias Swarm.Door.Ask
+  alias Swarm.Missions.Landmark.Policy
 
   @doc "The ids of the robots meant, which all exist, or one line."
   @spec robots(term()) :: {:ok, [atom(), ...]} | {:error, String.t()}
@@ -65,9 +66,11 @@ defmodule Swarm.Door do
   @doc "Checks the options of a start: who takes part, and the mission's own."
   @spec start(term()) :: {:ok, [atom()], keyword()} | {:error, String.t()}
   def start(options) do
-    with :ok <- keyword(options, "formation, assign, leader_change, robots"),
+    with :ok <-
+           keyword(options, "formation, assign, leader_change, policy, of, lost_link, robots"),
          {:ok, robots} <- robots(Keyword.get(options, :robots, :all)),
          {:ok, options} <- mission(Keyword.delete(options, :robots), length(robots)),
+         {:ok, options} <- fleet_size(options, length(robots)),
          do: {:ok, robots, options}
   end
 
@@ -136,10 +139,23 @@ defmodule Swarm.Door do
   defp option({:leader_change, other}, _robots),
     do: {:error, "leader_change cannot be #{inspect(other)}: true or false"}
 
+  defp option({key, _value} = option, _robots) when key in [:policy, :of, :lost_link],
+    do: {:ok, option}
+
   defp option({key, _value}, _robots) do
+    names = ~w(formation assign leader_change policy of lost_link robots)
+
     {:error,
-     "unknown option #{inspect(key)}: formation, assign, leader_change or robots" <>
-       hint(Atom.to_string(key), ~w(formation assign leader_change robots))}
+     "unknown option #{inspect(key)}: #{Enum.join(names, ", ")}" <>
+       hint(Atom.to_string(key), names)}
+  end
+
+  # A majority is one of those that are started, unless told otherwise.
+  defp fleet_size(options, robots) do
+    options =
+      if options[:policy] == :majority, do: Keyword.put_new(options, :of, robots), else: options
+
+    with {:ok, _policy} <- Policy.options(options), do: {:ok, options}
   end
 
   defp kind(kind) do

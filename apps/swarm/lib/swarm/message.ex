@@ -12,17 +12,23 @@ defmodule Swarm.Message do
   | `:heartbeat` | `Swarm.Heartbeat` |
   | `:round` | one `Swarm.Round` letter |
   | `:place` | `Swarm.Anchor`: a parent tells its child where the leader is supposed to be |
+  | `:relay` | a whole heartbeat or letter of another robot, for one that does not hear it (`Swarm.Relay`) |
+
+  `hops` counts the robots that have passed a message on, three at most.
   """
   alias Swarm.{Anchor, Heartbeat, Round, Shape}
 
-  @enforce_keys [:from, :kind, :body]
-  defstruct @enforce_keys
+  @most_hops 3
 
-  @type kind :: :heartbeat | :round | :place
+  @enforce_keys [:from, :kind, :body]
+  defstruct @enforce_keys ++ [hops: 0]
+
+  @type kind :: :heartbeat | :round | :place | :relay
   @type t :: %__MODULE__{
           from: atom(),
           kind: kind(),
-          body: Heartbeat.t() | Round.Letter.t() | Anchor.t()
+          body: Heartbeat.t() | Round.Letter.t() | Anchor.t() | t(),
+          hops: 0..3
         }
 
   @doc """
@@ -32,8 +38,22 @@ defmodule Swarm.Message do
       iex> Swarm.Message.new(:mag1, :heartbeat, beat).kind
       :heartbeat
   """
-  @spec new(atom(), kind(), Heartbeat.t() | Round.Letter.t() | Anchor.t()) :: t()
+  @spec new(atom(), kind(), Heartbeat.t() | Round.Letter.t() | Anchor.t() | t()) :: t()
   def new(from, kind, body), do: %__MODULE__{from: from, kind: kind, body: body}
+
+  @doc """
+  Another robot's message as this robot passes it on; `:error` when it has come far enough.
+
+      iex> letter = %Swarm.Round.Letter{id: {1, 1, :mag1}, view: [:mag1], remaining_ms: 9, purpose: :search}
+      iex> {:ok, relay} = Swarm.Message.pass_on(Swarm.Message.new(:mag1, :round, letter), :mag2)
+      iex> {relay.from, relay.kind, relay.body.from, relay.body.hops}
+      {:mag2, :relay, :mag1, 1}
+  """
+  @spec pass_on(t(), atom()) :: {:ok, t()} | :error
+  def pass_on(%__MODULE__{hops: hops} = message, me) when hops < @most_hops,
+    do: {:ok, new(me, :relay, %{message | hops: hops + 1})}
+
+  def pass_on(_from_afar, _me), do: :error
 
   @doc """
   Whether a term is a message that a robot may act on.
@@ -45,9 +65,10 @@ defmodule Swarm.Message do
   """
   @spec check(term()) :: {:ok, t()} | {:error, :not_a_message | kind()}
   def check(%__MODULE__{from: from, kind: kind, body: body} = message)
-      when kind in [:heartbeat, :round, :place] do
+      when kind in [:heartbeat, :round, :place, :relay] do
     cond do
       not (Shape.whole?(message, __MODULE__) and Shape.name?(from)) -> {:error, :not_a_message}
+      message.hops not in 0..@most_hops -> {:error, :not_a_message}
       valid?(kind, body) -> {:ok, message}
       true -> {:error, kind}
     end
@@ -58,4 +79,10 @@ defmodule Swarm.Message do
   defp valid?(:heartbeat, body), do: Heartbeat.valid?(body)
   defp valid?(:round, body), do: Round.Letter.valid?(body)
   defp valid?(:place, body), do: Anchor.valid?(body)
+
+  # Nothing else is passed on, and nothing twice wrapped.
+  defp valid?(:relay, %__MODULE__{kind: kind} = inner) when kind in [:heartbeat, :round],
+    do: inner.hops != 0 and match?({:ok, _}, check(inner))
+
+  defp valid?(:relay, _other), do: false
 end

@@ -8,6 +8,10 @@ defmodule Swarm.Peers do
   number starts anew; within one boot only newer sequence numbers count, so that late and doubled
   heartbeats do no harm, those of a robot's former life included. Boot numbers may be times of day,
   and clocks are set back: from a robot that is gone any number is believed.
+
+  A heartbeat may come by way of a third robot (`Swarm.Relay`): it counts as a sign of life, but not
+  as heard. Who is there has a number (`members/2`) that grows whenever a robot comes, goes, or comes
+  back as another life.
   """
   alias Hal.{Pose, Twist}
   alias Swarm.Heartbeat
@@ -16,25 +20,57 @@ defmodule Swarm.Peers do
   @gone_ms 2_000
 
   @enforce_keys [:me]
-  defstruct @enforce_keys ++ [rows: %{}]
+  defstruct @enforce_keys ++ [rows: %{}, changes: 0]
 
-  @type row :: %{beat: Heartbeat.t(), at_ms: integer()}
-  @type t :: %__MODULE__{me: atom(), rows: %{atom() => row()}}
+  @typedoc "`at_ms` is when the robot was last heard of, `direct_ms` when it was heard itself, `nil` for never."
+  @type row :: %{beat: Heartbeat.t(), at_ms: integer(), direct_ms: integer() | nil}
+  @typedoc "`changes` counts those who came, came back or restarted, up to the last heartbeat."
+  @type t :: %__MODULE__{
+          me: atom(),
+          rows: %{atom() => row()},
+          changes: non_neg_integer()
+        }
   @type status :: :alive | :suspect | :gone
 
   @doc "Nobody heard yet."
   @spec new(atom()) :: t()
   def new(me), do: %__MODULE__{me: me}
 
-  @doc "Hears a heartbeat; an old one, or one of the robot's own name, changes nothing."
-  @spec hear(t(), atom(), Heartbeat.t(), integer()) :: t()
-  def hear(%{me: me} = peers, me, _beat, _now_ms), do: peers
+  @doc """
+  Hears a heartbeat, itself or (`direct?` false) by way of another robot; an old one, or one of the
+  robot's own name, changes nothing.
+  """
+  @spec hear(t(), atom(), Heartbeat.t(), integer(), direct? :: boolean()) :: t()
+  def hear(peers, from, beat, now_ms, direct? \\ true)
+  def hear(%{me: me} = peers, me, _beat, _now_ms, _direct?), do: peers
 
-  def hear(peers, from, beat, now_ms) do
-    if news?(peers.rows[from], beat, now_ms),
-      do: %{peers | rows: Map.put(peers.rows, from, %{beat: beat, at_ms: now_ms})},
-      else: peers
+  def hear(peers, from, beat, now_ms, direct?) do
+    old = peers.rows[from]
+
+    cond do
+      news?(old, beat, now_ms) ->
+        direct_ms = if direct?, do: now_ms, else: old && old.direct_ms
+        row = %{beat: beat, at_ms: now_ms, direct_ms: direct_ms}
+        changes = peers.changes + change(old, beat, now_ms)
+        %{peers | rows: Map.put(peers.rows, from, row), changes: changes}
+
+      # The same by the straight way, which was overtaken.
+      direct? and same?(old.beat, beat) and old.direct_ms != old.at_ms ->
+        %{peers | rows: Map.put(peers.rows, from, %{old | direct_ms: old.at_ms})}
+
+      true ->
+        peers
+    end
   end
+
+  # Who comes counts one; who was away, one for its going and one for its return.
+  defp change(nil, _beat, _now_ms), do: 1
+  defp change(%{at_ms: at_ms}, _beat, now_ms) when now_ms - at_ms >= @gone_ms, do: 2
+  defp change(%{beat: %{boot: boot}}, %{boot: boot}, _now_ms), do: 0
+  defp change(_former_life, _beat, _now_ms), do: 1
+
+  defp same?(%{boot: boot, sequence: sequence}, beat),
+    do: beat.boot == boot and beat.sequence == sequence
 
   defp news?(nil, _beat, _now_ms), do: true
 
@@ -71,11 +107,41 @@ defmodule Swarm.Peers do
   def gone(peers, now_ms),
     do: for({id, %{at_ms: at_ms}} <- peers.rows, now_ms - at_ms >= @gone_ms, do: id)
 
-  @doc "The names of those heard within the last second, sorted; this is what a heartbeat lists as heard."
+  @doc """
+  The names of those heard within the last second, not by way of another, sorted; this is what a
+  heartbeat lists as heard.
+  """
   @spec heard(t(), integer()) :: [atom()]
   def heard(peers, now_ms) do
-    Enum.sort(for {id, %{at_ms: at_ms}} <- peers.rows, now_ms - at_ms < @suspect_ms, do: id)
+    Enum.sort(
+      for {id, %{direct_ms: at_ms}} <- peers.rows,
+          at_ms != nil and now_ms - at_ms < @suspect_ms,
+          do: id
+    )
   end
+
+  @doc """
+  All other robots that are not gone, each with the number of its life, sorted, and the number of this
+  view: it grows with every robot that comes, goes, or comes back as another life.
+
+      iex> beat = %Swarm.Heartbeat{boot: 7, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
+      iex> peers = Swarm.Peers.hear(Swarm.Peers.new(:mag1), :mag2, beat, 0)
+      iex> {Swarm.Peers.members(peers, 100), Swarm.Peers.members(peers, 2_000)}
+      {{1, [mag2: 7]}, {2, []}}
+  """
+  @spec members(t(), integer()) :: {number :: non_neg_integer(), [{atom(), boot :: integer()}]}
+  def members(peers, now_ms) do
+    there =
+      for {id, %{at_ms: at_ms, beat: beat}} <- peers.rows,
+          now_ms - at_ms < @gone_ms,
+          do: {id, beat.boot}
+
+    {view_number(peers, now_ms), Enum.sort(there)}
+  end
+
+  @doc "The number of the view of `members/2`."
+  @spec view_number(t(), integer()) :: non_neg_integer()
+  def view_number(peers, now_ms), do: peers.changes + length(gone(peers, now_ms))
 
   @doc "The newest heartbeat of a robot that is not gone, or `nil`."
   @spec beat(t(), atom(), integer()) :: Heartbeat.t() | nil
@@ -103,7 +169,7 @@ defmodule Swarm.Peers do
   @spec percept(t(), atom(), integer()) :: Robot.Percept.peer()
   def percept(peers, id, now_ms), do: percept(Map.fetch!(peers.rows, id), now_ms)
 
-  defp percept(%{beat: beat, at_ms: at_ms}, now_ms) do
+  defp percept(%{beat: beat, at_ms: at_ms, direct_ms: direct_ms}, now_ms) do
     {x, y, heading} = beat.pose
     {linear, turn} = beat.twist
 
@@ -112,6 +178,7 @@ defmodule Swarm.Peers do
       twist: Twist.new(linear / 1000, turn / 1000),
       radius: beat.radius / 1000,
       at_ms: at_ms,
+      direct_ms: direct_ms,
       mode: mode(beat, now_ms - at_ms),
       beat: beat
     }

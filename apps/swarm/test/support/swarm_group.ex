@@ -251,11 +251,20 @@ defmodule Swarm.Group do
   @spec hear(t(), atom(), atom(), Message.t()) :: t()
   def hear(group, to, from, message) do
     {:ok, ^message} = Message.check(message)
-
-    if message.kind == :heartbeat,
-      do: update_in(group.robots[to].peers, &Peers.hear(&1, from, message.body, group.now)),
-      else: event(group, to, {:message, message})
+    ^from = message.from
+    take(group, to, message)
   end
+
+  defp take(group, to, %{kind: :relay, body: message}), do: take(group, to, message)
+  defp take(group, to, %{from: to}), do: group
+
+  defp take(group, to, %{kind: :heartbeat} = message) do
+    direct? = message.hops == 0
+    %{from: from, body: beat} = message
+    update_in(group.robots[to].peers, &Peers.hear(&1, from, beat, group.now, direct?))
+  end
+
+  defp take(group, to, message), do: event(group, to, {:message, message})
 
   # For how long two robots lead that hear each other.
   defp watch(group) do

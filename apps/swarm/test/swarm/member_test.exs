@@ -16,7 +16,7 @@ defmodule Swarm.MemberTest do
     size: 3,
     places: [1, 2]
   }
-  @report %{found: true, size_ppm: 5, pose: {1, 2, 3}}
+  @report %{found: true, size_ppm: 5, pose: {1, 2, 3}, led: 0, of: 0}
   @letter %Round.Letter{
     id: {1, 1, :mag2},
     view: [:mag1, :mag2],

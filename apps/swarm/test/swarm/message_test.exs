@@ -108,7 +108,7 @@ defmodule Swarm.MessageTest do
     many = List.duplicate(1, 1_000_000)
     names = List.duplicate(:mag1, 1_001)
     large = :binary.copy("x", 1_000_000)
-    report = %{found: true, size_ppm: 1, pose: {0, 0, 0}}
+    report = %{found: true, size_ppm: 1, pose: {0, 0, 0}, led: 0, of: 0}
 
     for {kind, body} <- [
           place: %{@anchor | places: many},

@@ -62,7 +62,7 @@ defmodule Swarm.RoundTest do
 
     round =
       if now >= report_at,
-        do: Round.report(round, %{found: true, size_ppm: :erlang.phash2(id), pose: {1, 2, 3}}),
+        do: Round.report(round, report(id)),
         else: round
 
     {round, letters, event} = Round.tick(round, now)
@@ -89,6 +89,9 @@ defmodule Swarm.RoundTest do
 
     %{update(state, id, fn _ -> round end) | commits: commits, air: air ++ state.air}
   end
+
+  defp report(id),
+    do: %{found: true, size_ppm: :erlang.phash2(id), pose: {1, 2, 3}, led: 0, of: 0}
 
   defp update(state, id, function),
     do: %{state | members: Map.update!(state.members, id, function)}
@@ -164,7 +167,7 @@ defmodule Swarm.RoundTest do
     other = Round.open(Round.new(:mag2), 1, [:mag1, :mag2], :search, @length, 0)
     {other, [letter], nil} = Round.tick(other, 0)
     round = Round.hear(round, :mag2, letter, 0)
-    first = %{found: true, size_ppm: 1, pose: {0, 0, 0}}
+    first = %{found: true, size_ppm: 1, pose: {0, 0, 0}, led: 0, of: 0}
     round = Round.hear(round, :mag2, %{letter | report: first}, 10)
     round = Round.hear(round, :mag2, %{letter | report: %{first | size_ppm: 2}}, 20)
     assert round.reports.mag2.size_ppm == 1

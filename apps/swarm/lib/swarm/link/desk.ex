@@ -42,14 +42,18 @@ defmodule Swarm.Link.Desk do
 
   defp options(options) do
     if Keyword.keyword?(options) and Enum.all?(options, &option?/1),
-      do: :ok,
-      else: {:error, "a mission starts with formation, assign and leader_change only"}
+      do: policy(options),
+      else:
+        {:error,
+         "a mission starts with formation, assign, leader_change, policy, of and lost_link only"}
   end
+
+  defp policy(options), do: with({:ok, _policy} <- Landmark.Policy.options(options), do: :ok)
 
   defp option?({:formation, formation}), do: Formation.valid?(formation)
   defp option?({:assign, how}), do: how in [:chain, :cost]
   defp option?({:leader_change, on?}), do: is_boolean(on?)
-  defp option?(_other), do: false
+  defp option?({key, _value}), do: key in [:policy, :of, :lost_link]
 
   defp doing(board) do
     case Board.fetch(board, :mission, :infinity) do

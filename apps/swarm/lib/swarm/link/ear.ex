@@ -35,14 +35,19 @@ defmodule Swarm.Link.Ear do
       {:nothing, %{not_a_message: 1}}
   """
   @spec hear(t(), term(), integer()) :: {heard(), t()}
-  def hear(%__MODULE__{me: me} = ear, term, now_ms) do
-    case Message.check(term) do
+  def hear(%__MODULE__{} = ear, term, now_ms), do: take(ear, Message.check(term), now_ms)
+
+  defp take(%{me: me} = ear, checked, now_ms) do
+    case checked do
       # From another robot of this name: which of the two gives way is settled elsewhere.
       {:ok, %Message{from: ^me}} ->
         {:nothing, ear}
 
-      {:ok, %Message{kind: :heartbeat, from: from, body: beat}} ->
-        peers = Peers.hear(ear.peers, from, beat, now_ms)
+      {:ok, %Message{kind: :relay, body: inner}} ->
+        take(ear, {:ok, inner}, now_ms)
+
+      {:ok, %Message{kind: :heartbeat, from: from, body: beat, hops: hops}} ->
+        peers = Peers.hear(ear.peers, from, beat, now_ms, hops == 0)
         stop = Stop.hear(ear.stop, beat.estop, beat.latched)
         {{:peer, from}, %{ear | peers: peers, stop: stop, heard: ear.heard + 1}}
 

@@ -11,12 +11,14 @@ defmodule Swarm.Missions.Landmark do
   | `Lead` | what the leader tells: the anchor, the order, whether the shape is formed |
   | `Shape` | a shape that there is room for |
   | `Attend` | what a follower does: its slot, its gaze, its child |
+  | `Merge` | what becomes of two leaders that meet |
+  | `Policy` | who may lead, and what a robot does that has lost everybody |
 
   Time is `percept.at_ms`, compared with whole numbers; there are no timers.
   """
   alias Robot.Behaviour
-  alias Swarm.{Anchor, Formation, Message, Round, Trail}
-  alias Swarm.Missions.Landmark.{Attend, Council, Lead, Phases, Sight, State}
+  alias Swarm.{Anchor, Formation, Message, Relay, Round, Trail}
+  alias Swarm.Missions.Landmark.{Attend, Council, Lead, Phases, Policy, Sight, State}
 
   @behaviour Robot.Mission
 
@@ -24,13 +26,18 @@ defmodule Swarm.Missions.Landmark do
   @tries 3
   # No fleet elects that often unheard; taken over, it would leave no room for epochs to come.
   @leap 1_000_000
+  # Without a sign of life for so long a leader is lost.
+  @led_ms 2_000
 
   @doc """
   A robot's mission. Options: `formation:` (`{kind, spacing}`), `assign:` (`:chain` or `:cost`),
-  `leader_change:` (whether a robot that is nearer takes over), `colour:` of the landmark.
+  `leader_change:` (whether a robot that is nearer takes over), `colour:` of the landmark, and those of
+  `Policy`: `policy:` (`:available` or `:majority`, with `of:`, the fleet's size), `lost_link:`.
   """
   @impl Robot.Mission
   def init(robot, options \\ []) do
+    {:ok, {of, lost_link}} = Policy.options(options)
+
     mission = %State{
       me: robot,
       formation: Keyword.get(options, :formation, {:column, 1.0}),
@@ -39,7 +46,9 @@ defmodule Swarm.Missions.Landmark do
       colour: Keyword.get(options, :colour, State.colour()),
       round: Round.new(robot),
       lead: Lead.new(),
-      attend: Attend.new()
+      attend: Attend.new(),
+      of: of,
+      lost_link: lost_link
     }
 
     {mission.phase, mission, []}
@@ -66,8 +75,10 @@ defmodule Swarm.Missions.Landmark do
 
   def handle({:outcome, _tag, _result}, mission), do: still(mission)
 
-  def handle({:message, %Message{kind: :round, from: from, body: letter}}, mission),
-    do: still(Council.hear(mission, from, letter))
+  def handle({:message, %Message{kind: :round, from: from, body: letter} = message}, mission) do
+    {mission, relays} = relay_letter(mission, message)
+    {mission.phase, Council.hear(mission, from, letter), relays}
+  end
 
   def handle({:message, %Message{kind: :place, body: anchor}}, mission),
     do: still(hear_anchor(mission, anchor))
@@ -83,10 +94,29 @@ defmodule Swarm.Missions.Landmark do
         trail: if(percept.pose, do: Trail.note(mission.trail, percept.pose), else: mission.trail)
     }
 
-    {mission, letters} = mission |> hear_beats() |> Council.tick()
+    {mission, letters} = mission |> Policy.update() |> hear_beats() |> Council.tick()
     {mission, stages} = step(mission)
     {mission, effects} = act(Phases.activity(mission.phase), mission)
-    {mission.phase, mission, letters ++ stages ++ effects ++ [{:claim, claim(mission)}]}
+    {mission, beats} = relay_beats(mission)
+    effects = letters ++ beats ++ stages ++ effects
+    {mission.phase, mission, effects ++ [{:claim, claim(mission)}]}
+  end
+
+  # A robot that is not on the mission leaves that to those that are.
+  defp relay_beats(%{phase: :idle} = mission), do: {mission, []}
+
+  defp relay_beats(%{percept: percept} = mission) do
+    {relay, beats} = Relay.beats(mission.relay, mission.me, percept.peers, mission.now_ms)
+    {%{mission | relay: relay}, beats}
+  end
+
+  defp relay_letter(%{percept: nil} = mission, _message), do: {mission, []}
+
+  defp relay_letter(%{percept: percept} = mission, message) do
+    {relay, letters} =
+      Relay.letter(mission.relay, mission.me, percept.peers, message, mission.now_ms)
+
+    {%{mission | relay: relay}, letters}
   end
 
   defp still(mission), do: {mission.phase, mission, []}
@@ -99,16 +129,22 @@ defmodule Swarm.Missions.Landmark do
     end)
   end
 
-  # Only an anchor of the own leader or of a later epoch counts, and only one that is news.
+  # Only an anchor of the own leader, or one of a later epoch that names this robot, counts, and only
+  # one that is news. Of other leaders one learns what people have asked for meanwhile.
   defp hear_anchor(%{me: me} = mission, %Anchor{leader: leader} = anchor) when leader != me do
     ours? = anchor.epoch == mission.epoch and mission.leader in [nil, leader]
-
     later? = anchor.epoch > mission.epoch and anchor.epoch <= mission.epoch + @leap
 
-    if (ours? or later?) and
-         Anchor.newest(mission.anchor, anchor) != mission.anchor,
-       do: take_up(%{mission | anchor: anchor, anchor_ms: mission.now_ms}, anchor),
-       else: mission
+    cond do
+      not (ours? or (later? and me in anchor.order)) ->
+        if anchor.asked_no > mission.asked_no, do: take_up(mission, anchor), else: mission
+
+      Anchor.newest(mission.anchor, anchor) != mission.anchor ->
+        take_up(%{mission | anchor: anchor, anchor_ms: mission.now_ms}, anchor)
+
+      true ->
+        mission
+    end
   end
 
   defp hear_anchor(mission, _own), do: mission
@@ -116,7 +152,12 @@ defmodule Swarm.Missions.Landmark do
   # A person may have asked for another shape while this anchor was under way.
   defp take_up(%{asked_no: known} = mission, %Anchor{asked_no: number} = anchor)
        when number >= known,
-       do: %{mission | formation: anchor.asked || anchor.formation, asked_no: number}
+       do: %{
+         mission
+         | formation: anchor.asked || anchor.formation,
+           asked_no: number,
+           of: max(mission.of, anchor.of)
+       }
 
   defp take_up(mission, _older), do: mission
 
@@ -139,19 +180,39 @@ defmodule Swarm.Missions.Landmark do
   defp holds?(:sighted, m), do: State.sees?(m) or Council.search?(m)
   defp holds?(:roamed, m), do: m.now_ms - m.since_ms >= @roam_ms
   defp holds?(:deposed, m), do: Lead.deposed?(m)
-  defp holds?(:superseded, m), do: joined?(m)
+  defp holds?(:superseded, m), do: m.anchor != nil and m.anchor.epoch > m.epoch and joined?(m)
   defp holds?(:round_open, m), do: Round.open?(m.round)
+  defp holds?(:lost_stop, m), do: Policy.lost?(m) and Policy.lost_link(m) == :stop
+  defp holds?(:lost_hold, m), do: Policy.lost?(m) and Policy.lost_link(m) == :hold
+  defp holds?(:company, m), do: Policy.company?(m)
 
-  # A robot that comes late, or missed the end of a round, joins the leader who names it.
+  # Who has a leader leaves it to that one to judge.
+  defp holds?(:short, %{phase: :follow} = m) when m.now_ms - m.since_ms < @led_ms, do: false
+
+  defp holds?(:short, %{phase: :follow, anchor_ms: at_ms, now_ms: now})
+       when now - at_ms < @led_ms,
+       do: false
+
+  defp holds?(:short, m), do: not Round.open?(m.round) and Policy.short?(m, together(m))
+  defp holds?(:enough, m), do: Policy.enough?(m, together(m))
+
+  defp together(m), do: length(Council.view(m))
+
+  # A robot that comes late or back, or missed the end of a round, joins the leader who names it.
   defp joined?(%{anchor: nil}), do: false
 
   defp joined?(m),
     do:
-      m.anchor.epoch > m.epoch and m.me in m.anchor.order and m.now_ms - m.anchor_ms < 500 and
+      m.anchor.epoch >= m.epoch and m.me in m.anchor.order and m.now_ms - m.anchor_ms < 500 and
         not Round.open?(m.round)
 
   defp enter(mission, phase) do
-    mission = %{mission | since_ms: mission.now_ms}
+    mission = %{
+      mission
+      | since_ms: mission.now_ms,
+        role: role(phase) || mission.role,
+        led: if(phase == :agree, do: mission.led, else: 0)
+    }
 
     case phase do
       :idle ->
@@ -163,6 +224,7 @@ defmodule Swarm.Missions.Landmark do
             verdict: nil,
             leader: nil,
             anchor: nil,
+            place: nil,
             round: Round.new(mission.me) |> Map.put(:highest, mission.round.highest)
         }
 
@@ -176,7 +238,18 @@ defmodule Swarm.Missions.Landmark do
         %{mission | phase: :rest, verdict: nil, scan: :nothing, tries: 0}
 
       :agree ->
-        %{mission | phase: :agree, leader: nil}
+        forget(%{mission | phase: :agree, leader: nil})
+
+      phase when phase in [:wait, :halt, :hold] ->
+        %{
+          mission
+          | phase: phase,
+            leader: nil,
+            anchor: nil,
+            verdict: nil,
+            scan: nil,
+            round: Round.leave(mission.round)
+        }
 
       :lead ->
         Lead.begin(%{mission | phase: :lead, verdict: nil, tries: 0, leader: mission.me})
@@ -185,6 +258,15 @@ defmodule Swarm.Missions.Landmark do
         follow(%{mission | phase: :follow, tries: 0})
     end
   end
+
+  defp role(:lead), do: :leader
+  defp role(:follow), do: :follower
+  defp role(phase) when phase in [:idle, :search, :wander, :rest], do: :searcher
+  defp role(_between), do: nil
+
+  # The anchor that it gave as a leader is nothing to join.
+  defp forget(%{anchor: %{leader: me}, me: me} = mission), do: %{mission | anchor: nil}
+  defp forget(mission), do: mission
 
   defp follow(%{verdict: {:leader, leader}} = mission),
     do: Attend.begin(%{mission | verdict: nil, leader: leader})
@@ -215,6 +297,13 @@ defmodule Swarm.Missions.Landmark do
   defp act(:roam, mission),
     do: {mission, [{:goal, :roam, {Behaviour.Wander, []}}, {:look, 0.0}]}
 
+  defp act(:hold, %{place: nil} = mission), do: act(:stand, mission)
+
+  defp act(:hold, mission) do
+    goal = {Behaviour.Follow, target: mission.place, velocity: {0.0, 0.0}}
+    {mission, [{:goal, {:hold, mission.since_ms}, goal}, {:look, 0.0}]}
+  end
+
   defp act(:lead, mission), do: Lead.act(mission)
   defp act(:follow, mission), do: Attend.act(mission)
 
@@ -243,5 +332,6 @@ defmodule Swarm.Missions.Landmark do
 
   defp standing?(%{phase: :lead, percept: percept}), do: State.slow?(percept, 0.05)
   defp standing?(%{phase: :follow} = mission), do: mission.attend.holding?
-  defp standing?(%{phase: phase}), do: phase in [:idle, :search, :agree, :rest]
+  defp standing?(%{phase: :hold, percept: percept}), do: State.slow?(percept, 0.05)
+  defp standing?(%{phase: phase}), do: phase in [:idle, :search, :agree, :rest, :wait, :halt]
 end

@@ -22,8 +22,9 @@ defmodule Swarm.Round.Letter do
           ask: boolean()
         }
 
-  # More than any round lasts.
+  # More than any round lasts, and more robots than any fleet has.
   @longest_ms 120_000
+  @most 1_000
 
   @doc "Whether a term from outside is a letter."
   @spec valid?(term()) :: boolean()
@@ -48,9 +49,10 @@ defmodule Swarm.Round.Letter do
 
   defp report?(nil), do: true
 
-  defp report?(%{found: found, size_ppm: size, pose: pose} = report) do
-    map_size(report) == 3 and is_boolean(found) and is_integer(size) and size in 0..1_000_000 and
-      Shape.pose?(pose)
+  defp report?(%{found: found, size_ppm: size, pose: pose, led: led, of: of} = report) do
+    map_size(report) == 5 and is_boolean(found) and is_integer(size) and size in 0..1_000_000 and
+      Shape.pose?(pose) and is_integer(led) and led in 0..@most and is_integer(of) and
+      of in 0..@most
   end
 
   defp report?(_other), do: false

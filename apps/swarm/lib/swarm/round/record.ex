@@ -7,7 +7,7 @@ defmodule Swarm.Round.Record do
 
   # The version of this layout and of what is computed from a record: robots of different versions
   # must not believe that they agree.
-  @version 1
+  @version 2
 
   @enforce_keys [:id, :view, :reports, :digest]
   defstruct @enforce_keys
@@ -23,8 +23,9 @@ defmodule Swarm.Round.Record do
   @doc """
   The reports of a whole view: who was silent until the deadline is there as `nil`.
 
-      iex> Swarm.Round.Record.freeze([:mag1, :mag2], %{mag2: %{found: false, size_ppm: 0, pose: {0, 0, 0}}})
-      %{mag1: nil, mag2: %{found: false, size_ppm: 0, pose: {0, 0, 0}}}
+      iex> report = %{found: false, size_ppm: 0, pose: {0, 0, 0}, led: 0, of: 0}
+      iex> Swarm.Round.Record.freeze([:mag1, :mag2], %{mag2: report}) == %{mag1: nil, mag2: report}
+      true
   """
   @spec freeze([atom()], reports()) :: reports()
   def freeze(view, reports), do: Map.new(view, &{&1, Map.get(reports, &1)})
@@ -33,7 +34,7 @@ defmodule Swarm.Round.Record do
   The digest of frozen reports: over a fixed layout of whole numbers and names, sorted by name, never
   over a term's own bytes.
 
-      iex> report = %{found: true, size_ppm: 900, pose: {1, 2, 3}}
+      iex> report = %{found: true, size_ppm: 900, pose: {1, 2, 3}, led: 0, of: 0}
       iex> a = Swarm.Round.Record.digest({1, 1, :mag1}, %{mag1: report, mag2: nil})
       iex> a == Swarm.Round.Record.digest({1, 1, :mag1}, %{mag2: nil, mag1: report})
       true
@@ -49,8 +50,10 @@ defmodule Swarm.Round.Record do
 
   defp line(name, nil), do: [name, ":-;"]
 
-  defp line(name, %{found: found, size_ppm: size, pose: {x, y, heading}}) do
-    numbers = for n <- [size, x, y, heading], do: [",", Integer.to_string(n)]
+  defp line(name, %{found: found, size_ppm: size, pose: {x, y, heading}} = report) do
+    numbers =
+      for n <- [size, x, y, heading, report.led, report.of], do: [",", Integer.to_string(n)]
+
     [name, ":", if(found, do: "1", else: "0"), numbers, ";"]
   end
 end

@@ -5,11 +5,11 @@ defmodule Swarm.Missions.LandmarkTest do
 
   @three [:mag1, :mag2, :mag3]
 
-  defp three(options \\ []) do
+  defp three(options \\ [], mission \\ []) do
     Group.new(options)
-    |> Group.join(:mag1, {0, 0}, 0.02)
-    |> Group.join(:mag2, {1, 0}, 0.05)
-    |> Group.join(:mag3, {2, 1}, 0.03)
+    |> Group.join(:mag1, {0, 0}, 0.02, mission)
+    |> Group.join(:mag2, {1, 0}, 0.05, mission)
+    |> Group.join(:mag3, {2, 1}, 0.03, mission)
   end
 
   defp led(group, ids, seconds \\ 20) do
@@ -104,7 +104,7 @@ defmodule Swarm.Missions.LandmarkTest do
   end
 
   test "a robot that was away for a change of leaders follows the new one" do
-    group = three() |> led(@three) |> Group.run(1)
+    group = three([], lost_link: :continue) |> led(@three) |> Group.run(1)
     away = Enum.random([:mag1, :mag3])
     [stays] = @three -- [:mag2, away]
     # It sees nothing, so it elects nobody by itself meanwhile.

@@ -89,7 +89,8 @@ defmodule Swarm.Missions.Landmark.Attend do
 
     mission = %{
       mission
-      | attend: %{
+      | place: slot,
+        attend: %{
           mission.attend
           | in_place?: slow? and error <= @in_place,
             holding?: resting? and error <= @near,

@@ -9,7 +9,7 @@ defmodule Swarm.Missions.Landmark.Council do
   followers stand still while a round is open, searchers once they have scanned.
   """
   alias Swarm.{Assignment, Chain, Election, Formation, Message, Peers, Round}
-  alias Swarm.Missions.Landmark.{Challenge, Sight, State}
+  alias Swarm.Missions.Landmark.{Challenge, Merge, Policy, Sight, State}
 
   # Heartbeats come at 5 Hz: after this time the view has settled.
   @settle_ms 600
@@ -40,7 +40,7 @@ defmodule Swarm.Missions.Landmark.Council do
   def tick(%{phase: :idle} = mission), do: {mission, []}
 
   def tick(mission) do
-    mission = mission |> Challenge.update() |> open() |> report()
+    mission = mission |> Challenge.update() |> Merge.update() |> open() |> report()
     {round, letters, event} = Round.tick(mission.round, mission.now_ms)
     mission = conclude(event, %{mission | round: round})
     to = List.delete(round.view, mission.me)
@@ -77,7 +77,7 @@ defmodule Swarm.Missions.Landmark.Council do
       mission.challenge == :open ->
         start(mission, view, :change)
 
-      mission.phase == :lead and led?(mission) ->
+      Merge.due?(mission) ->
         start(mission, view, :change)
 
       mission.phase == :follow and leader_lost?(mission) ->
@@ -131,6 +131,18 @@ defmodule Swarm.Missions.Landmark.Council do
   end
 
   defp start(mission, view, purpose) do
+    if Policy.may_open?(mission, length(view)),
+      do: begin(mission, view, purpose),
+      else: give_up(mission)
+  end
+
+  # Once its digest is out, a round ends by itself.
+  defp give_up(%{round: %{phase: phase}} = mission) when phase in [:collect, :echo],
+    do: %{mission | round: Round.leave(mission.round), challenge: nil}
+
+  defp give_up(mission), do: %{mission | challenge: nil}
+
+  defp begin(mission, view, purpose) do
     length = if purpose == :search, do: @search_ms, else: @change_ms
     same? = Round.open?(mission.round)
     known = for {_id, beat} <- beats(mission), do: beat.epoch
@@ -170,11 +182,21 @@ defmodule Swarm.Missions.Landmark.Council do
   defp put_report(mission, found?) do
     found? = found? and mission.sight != nil
     size = if found?, do: mission.sight.size_ppm, else: 0
-    report = %{found: found?, size_ppm: size, pose: State.millimetres(mission.percept.pose)}
+
+    report = %{
+      found: found?,
+      size_ppm: size,
+      pose: State.millimetres(mission.percept.pose),
+      led: if(mission.phase in [:lead, :agree], do: mission.led, else: 0),
+      of: mission.of
+    }
+
     %{mission | round: Round.report(mission.round, report)}
   end
 
   defp conclude({:commit, record}, mission) do
+    mission = %{mission | of: Election.fleet(record.reports)}
+
     case Election.leader(record.reports) do
       {:ok, leader} ->
         {epoch, _counter, _initiator} = record.id
@@ -189,6 +211,9 @@ defmodule Swarm.Missions.Landmark.Council do
             anchor: nil,
             anchor_ms: nil
         }
+
+      :minority ->
+        mission
 
       :nobody when mission.round.purpose == :search ->
         %{mission | verdict: :nobody, rescan?: false}

@@ -6,7 +6,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   """
   alias Robot.Behaviour
   alias Swarm.{Anchor, Assignment, Chain, Formation, Message, Peers}
-  alias Swarm.Missions.Landmark.{Council, Shape, Sight, State}
+  alias Swarm.Missions.Landmark.{Council, Merge, Shape, Sight, State}
 
   # The landmark's foot leaves the picture below 1.4 m, and its size with it.
   @near 1.5
@@ -24,6 +24,8 @@ defmodule Swarm.Missions.Landmark.Lead do
   @unheard_ms 1_500
   # By then all that took part in the round have told that they follow; who comes now is new.
   @settled_ms 1_000
+  # For so long a new leader tells its place to all, not to its child alone.
+  @fresh_ms 500
 
   defstruct sequence: 0,
             good_ms: nil,
@@ -70,16 +72,14 @@ defmodule Swarm.Missions.Landmark.Lead do
   end
 
   @doc """
-  Whether a leader is one no more: others follow a higher epoch, or nobody has heard it for 1.5 s
-  though it is not alone.
+  Whether a leader is one no more: it gives way to a later one, or nobody has heard it for 1.5 s
+  though it is not alone. Under the policy `:majority` more than half of the fleet must hear it.
   """
   @spec deposed?(State.t()) :: boolean()
   def deposed?(mission) do
-    peers = Peers.taking_part(mission.percept.peers, mission.now_ms)
-    higher? = Enum.any?(peers, fn {_id, beat} -> beat.epoch > mission.epoch end)
-
-    higher? or
-      (mission.order != [] and mission.now_ms - mission.lead.heard_ms >= @unheard_ms)
+    Merge.yields?(mission) or
+      ((mission.order != [] or mission.of > 0) and
+         mission.now_ms - mission.lead.heard_ms >= @unheard_ms)
   end
 
   @doc "One tick of leading."
@@ -97,13 +97,30 @@ defmodule Swarm.Missions.Landmark.Lead do
     mission = mission |> muster() |> shape() |> tell()
     {mission, formed} = judge(mission)
     {mission, lost} = miss(mission)
-    child = List.first(mission.order)
+    told = told(mission)
 
     place =
-      for id <- List.wrap(child),
-          do: {:send, [id], Message.new(mission.me, :place, mission.anchor)}
+      if told == [],
+        do: [],
+        else: [{:send, told, Message.new(mission.me, :place, mission.anchor)}]
 
     {mission, formed ++ lost ++ place ++ [goal(mission), {:look, 0.0}, {:anchors, []}]}
+  end
+
+  # By when so many followers as a majority needs have told that they hear this leader.
+  defp hear(%{of: of} = mission) when of > 0 do
+    told =
+      for {_id, %{at_ms: at_ms, beat: %{leader: leader, heard: heard}}} <- mission.percept.peers,
+          leader == mission.me and mission.me in heard,
+          do: at_ms
+
+    heard_ms =
+      case div(of, 2) do
+        0 -> mission.now_ms
+        others -> told |> Enum.sort(:desc) |> Enum.at(others - 1, mission.lead.heard_ms)
+      end
+
+    put_in(mission.lead.heard_ms, max(heard_ms, mission.lead.heard_ms))
   end
 
   # Who is alone has nobody to be heard by, and who comes needs time to hear it.
@@ -118,11 +135,22 @@ defmodule Swarm.Missions.Landmark.Lead do
       else: mission
   end
 
+  # The child passes it on; but at first all stand and wait for it.
+  defp told(mission) do
+    if mission.now_ms - mission.since_ms < @fresh_ms,
+      do: mission.order,
+      else: Enum.take(mission.order, 1)
+  end
+
   # The gone leave their slots and those behind move up (R53 with healing); who comes joins the tail.
   defp muster(mission) do
     view = List.delete(Council.view(mission), mission.me)
     kept = Chain.heal(mission.order, view)
-    came = if mission.now_ms - mission.since_ms >= @settled_ms, do: view -- kept, else: []
+
+    came =
+      if mission.now_ms - mission.since_ms >= @settled_ms,
+        do: (view -- kept) -- Merge.theirs(view, mission),
+        else: []
 
     %{mission | order: kept ++ came}
   end
@@ -177,6 +205,7 @@ defmodule Swarm.Missions.Landmark.Lead do
       size: elem(lead.shape.room, 0),
       places: elem(lead.shape.room, 1),
       trail: Shape.trail(lead.shape, mission),
+      of: mission.of,
       landmark: place && point(place),
       still: Sight.still?(mission.sight, mission.now_ms, @still_ms)
     }

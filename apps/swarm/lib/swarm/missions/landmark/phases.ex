@@ -13,6 +13,9 @@ defmodule Swarm.Missions.Landmark.Phases do
   | `:rest` | stands | the landmark is nowhere; starts again when it sees one |
   | `:lead` | tracks the landmark, tells the others where it is | |
   | `:follow` | drives to its slot, tells its child | |
+  | `:wait` | stands | too few robots to have a leader |
+  | `:halt` | stands | has lost everybody, `lost_link: :stop` |
+  | `:hold` | goes to the place it was given last | has lost everybody, `lost_link: :hold` |
 
   | condition | holds when |
   |---|---|
@@ -26,6 +29,9 @@ defmodule Swarm.Missions.Landmark.Phases do
   | `:deposed` | others follow a later leader, or nobody hears this one |
   | `:superseded` | a leader of a later epoch names this robot in its order |
   | `:round_open` | a round is under way |
+  | `:lost_stop`, `:lost_hold` | it has lost everybody, and is to do that then (`Policy`) |
+  | `:company` | somebody is heard |
+  | `:short`, `:enough` | there are too few robots to have a leader; not too few |
   """
 
   @table [
@@ -37,6 +43,9 @@ defmodule Swarm.Missions.Landmark.Phases do
        led: :follow,
        nobody_again: :rest,
        nobody: :wander,
+       lost_stop: :halt,
+       lost_hold: :hold,
+       short: :wait,
        scanned: :agree},
     agree:
       {:stand,
@@ -45,15 +54,55 @@ defmodule Swarm.Missions.Landmark.Phases do
        led: :follow,
        nobody_again: :rest,
        nobody: :wander,
+       lost_stop: :halt,
+       lost_hold: :hold,
+       short: :wait,
        scan_wanted: :search},
-    wander: {:roam, stopped: :idle, led: :follow, sighted: :search, roamed: :search},
-    rest: {:stand, stopped: :idle, led: :follow, sighted: :search},
-    lead: {:lead, stopped: :idle, deposed: :agree, round_open: :agree},
-    follow: {:follow, stopped: :idle, round_open: :agree, superseded: :agree}
+    wander:
+      {:roam,
+       stopped: :idle,
+       led: :follow,
+       lost_stop: :halt,
+       lost_hold: :hold,
+       short: :wait,
+       sighted: :search,
+       roamed: :search},
+    rest:
+      {:stand,
+       stopped: :idle,
+       led: :follow,
+       lost_stop: :halt,
+       lost_hold: :hold,
+       short: :wait,
+       sighted: :search},
+    lead:
+      {:lead,
+       stopped: :idle, lost_stop: :halt, lost_hold: :hold, deposed: :agree, round_open: :agree},
+    follow:
+      {:follow,
+       stopped: :idle,
+       lost_stop: :halt,
+       lost_hold: :hold,
+       round_open: :agree,
+       superseded: :agree,
+       short: :wait},
+    wait: {:stand, stopped: :idle, led: :follow, round_open: :agree, enough: :agree},
+    halt: {:stand, stopped: :idle, led: :follow, company: :agree},
+    hold: {:hold, stopped: :idle, led: :follow, company: :agree}
   ]
 
-  @type phase :: :idle | :search | :agree | :wander | :rest | :lead | :follow
-  @type activity :: :stand | :scan | :roam | :lead | :follow
+  @type phase ::
+          :idle
+          | :search
+          | :agree
+          | :wander
+          | :rest
+          | :lead
+          | :follow
+          | :wait
+          | :halt
+          | :hold
+  @type activity :: :stand | :scan | :roam | :lead | :follow | :hold
   @type condition ::
           :started
           | :stopped
@@ -68,6 +117,11 @@ defmodule Swarm.Missions.Landmark.Phases do
           | :deposed
           | :superseded
           | :round_open
+          | :lost_stop
+          | :lost_hold
+          | :company
+          | :short
+          | :enough
 
   @doc "The phases in the order of the table."
   @spec phases() :: [phase()]

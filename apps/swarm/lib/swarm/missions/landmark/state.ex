@@ -34,7 +34,17 @@ defmodule Swarm.Missions.Landmark.State do
                 trail: [],
                 lead: nil,
                 attend: nil,
-                challenge: nil
+                challenge: nil,
+                of: 0,
+                lost_link: nil,
+                role: :searcher,
+                met?: false,
+                gather_ms: 0,
+                place: nil,
+                led: 0,
+                rival_ms: nil,
+                higher_ms: nil,
+                relay: %Swarm.Relay{}
               ]
 
   @typedoc """
@@ -43,6 +53,10 @@ defmodule Swarm.Missions.Landmark.State do
   needs a new one, `tries` how many searches found nothing, `verdict` what the last round said until a
   phase has acted on it, `order` the followers by slot. `epoch` and `leader` are those that the robot
   belongs to, `size_ppm` is the size that elected the leader, `anchor_ms` when the anchor came.
+
+  `of` is the size of the fleet of which a majority is needed, 0 for none; `role` what it was last,
+  `met?` whether it has had company, `place` where it was told to stand last. `led` is how many robots
+  it leads, or led when the round began; since `rival_ms` it hears another leader, since `higher_ms` a later epoch.
   """
   @type t :: %__MODULE__{
           me: atom(),
@@ -71,7 +85,17 @@ defmodule Swarm.Missions.Landmark.State do
           trail: Swarm.Trail.t(),
           lead: Swarm.Missions.Landmark.Lead.t() | nil,
           attend: Swarm.Missions.Landmark.Attend.t() | nil,
-          challenge: :open | {:nearer | :blind, since_ms :: integer()} | nil
+          challenge: :open | {:nearer | :blind, since_ms :: integer()} | nil,
+          of: non_neg_integer(),
+          lost_link: :stop | :hold | :continue | nil,
+          role: :searcher | :leader | :follower,
+          met?: boolean(),
+          gather_ms: integer(),
+          place: Pose.t() | nil,
+          led: non_neg_integer(),
+          rival_ms: integer() | nil,
+          higher_ms: integer() | nil,
+          relay: Swarm.Relay.t()
         }
 
   @doc "The colour of the landmark unless told otherwise."

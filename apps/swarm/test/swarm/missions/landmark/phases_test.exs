@@ -173,7 +173,10 @@ defmodule Swarm.Missions.Landmark.PhasesTest do
     leading = to(:lead, 0.02)
     asked = leading |> beat(:mag1, []) |> letter({9, 1, :mag1}, :change) |> Group.run(0.1)
     assert [:agree] = entered(asked, leading)
-    rival = leading |> beat(:mag1, phase: :lead, epoch: 1) |> Group.run(0.1)
+    rival = leading |> beside(:mag1, [phase: :lead, epoch: 1, heard: [:mag2]], 0.3)
+    # It waits a little, to hear of all of the other's robots too.
+    assert [] = entered(rival, leading)
+    rival = rival |> beside(:mag1, [phase: :lead, epoch: 1, heard: [:mag2]], 0.1)
     assert [:agree] = entered(rival, leading)
     assert Round.open?(mission(rival).round)
     assert elem(mission(rival).round.id, 0) == 2
@@ -261,7 +264,7 @@ defmodule Swarm.Missions.Landmark.PhasesTest do
 
   test "every phase of the table has an activity, and every exit leads into the table" do
     for phase <- Phases.phases() do
-      assert Phases.activity(phase) in [:stand, :scan, :roam, :lead, :follow]
+      assert Phases.activity(phase) in [:stand, :scan, :roam, :lead, :follow, :hold]
       assert Phases.next(phase, fn _ -> true end) in Phases.phases()
       assert Phases.next(phase, fn _ -> false end) == phase
     end
