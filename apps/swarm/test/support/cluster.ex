@@ -68,8 +68,6 @@ defmodule Swarm.Cluster do
     {:ok, peer, node} =
       :peer.start(%{
         name: :peer.random_name(),
-        host: ~c"127.0.0.1",
-        longnames: true,
         args: flags ++ paths,
         wait_boot: 20_000
       })
@@ -116,8 +114,7 @@ defmodule Swarm.Cluster do
   defp be_a_node do
     unless Node.alive?() do
       {_text, 0} = System.cmd("epmd", ["-daemon"])
-      name = :"tests_#{System.pid()}@127.0.0.1"
-      {:ok, _} = Node.start(name, :longnames)
+      {:ok, _} = Node.start(:"tests_#{System.pid()}", :shortnames)
       Node.set_cookie(:"#{Base.encode16(:crypto.strong_rand_bytes(16))}")
     end
   end

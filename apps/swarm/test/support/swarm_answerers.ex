@@ -32,4 +32,13 @@ defmodule Swarm.Answerers do
       pid
     end
   end
+
+  @doc "One that hears a topic."
+  @spec start_topic(Swarm.Envelope.topic()) :: pid()
+  def start_topic(topic) do
+    options = [service: :topic_far, module: Echo, topics: [topic]]
+    {:ok, pid} = Swarm.Responder.start_link(:topic_far, options)
+    Process.unlink(pid)
+    pid
+  end
 end

@@ -4,7 +4,9 @@ defmodule Swarm.ConversationTest do
 
   defp service(name, service \\ :echo) do
     options = [service: service, module: Answerers.Echo]
-    start_supervised!({Responder, {name, options}}, id: {name, service})
+    pid = start_supervised!({Responder, {name, options}}, id: {name, service})
+    # The test before may have ended the directory.
+    eventually(fn -> pid in Directory.members({:service, service, name}) end)
     {name, service}
   end
 
