@@ -148,7 +148,7 @@ defmodule Swarm.Brake do
   def handle_info(_unknown, s), do: {:noreply, s}
 
   defp command(s, request, ref, stamp) do
-    case age(s, request, ref, stamp) do
+    case Stamp.judge(s.stamps, request, ref, stamp, Config.now(s.config)) do
       :ok ->
         obey(s, request, ref)
 
@@ -157,12 +157,6 @@ defmodule Swarm.Brake do
         Post.answer(ref, Stamp.refusal(s.id, age))
         s
     end
-  end
-
-  defp age(s, request, ref, stamp) do
-    if Stamp.needed?(request) and node(ref) != node(),
-      do: Stamp.check(s.stamps, stamp, Config.now(s.config)),
-      else: :ok
   end
 
   defp obey(s, request, ref) do

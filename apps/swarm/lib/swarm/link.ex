@@ -7,12 +7,16 @@ defmodule Swarm.Link do
   mission says goes out, and five times a second a heartbeat, with what the board says of the robot.
 
   An e-stop spreads with the heartbeats, also one that was pressed on the robot's gate; how it
-  stands is `Swarm.Brake`'s to say, which is started beside the link. When it changes, heartbeats go
-  out at once and ten times a second for a second. Of two robots of one name the later one leaves the
-  directory, stops and falls silent, with the event `[:swarm, :link, :duplicate_id]`.
+  stands is `Swarm.Brake`'s to say, which is started beside the link. Of two robots of one name the
+  later one (`Swarm.Link.Name`) stops and falls silent, with the event `[:swarm, :link, :duplicate_id]`.
 
-  What people ask is answered by `Swarm.Link.Desk`, if it is not too old (`Swarm.Stamp`); what is
-  heard is judged by `Swarm.Link.Ear`; `Swarm.Link.Flood` keeps the mailbox short.
+  | part | what it does |
+  |---|---|
+  | `Swarm.Link.Ear` | judges what is heard |
+  | `Swarm.Link.Chart` | writes the peers on the board |
+  | `Swarm.Link.Mouth` | speaks, sends the heartbeats |
+  | `Swarm.Link.Desk` | answers people, if what they ask is not too old (`Swarm.Stamp`) |
+  | `Swarm.Link.Flood` | keeps the mailbox short |
 
   `join/2` makes a config with a link. Its options:
 
@@ -23,15 +27,14 @@ defmodule Swarm.Link do
   use GenServer
   alias Hal.Event
   alias Robot.{Board, Config, Names, Pilot}
-  alias Swarm.{Brake, Directory, Message, Peers, Post, Shape, Stamp, Stop}
-  alias Swarm.Link.{Beat, Desk, Ear, Flood, Presence}
+  alias Swarm.{Brake, Directory, Message, Post, Shape, Stamp, Stop}
+  alias Swarm.Link.{Chart, Desk, Ear, Flood, Mouth, Name}
 
   @behaviour Robot.Companion
 
   @tick_ms 100
-  @beat_every 2
   @rivals_every 10
-  @urgent_ticks 10
+  # So many messages are handled between two looks at how many wait.
   @look_every 64
 
   @doc "The config of a robot that talks: with a link, which its mission speaks through, and a brake."
@@ -72,7 +75,7 @@ defmodule Swarm.Link do
   def hear(robot, term), do: GenServer.cast(Names.via(robot, :link), {:hear, term})
 
   @doc "A heartbeat of a robot of this one's name came from another node, from that life of it."
-  @spec rival(robot :: atom(), Presence.identity()) :: :ok
+  @spec rival(robot :: atom(), Name.identity()) :: :ok
   def rival(robot, {_boot, _node} = other),
     do: GenServer.cast(Names.via(robot, :link), {:rival, other, nil})
 
@@ -80,19 +83,16 @@ defmodule Swarm.Link do
   def init({%Config{id: id} = config, options}) do
     board = Board.find!(id)
     boot = options[:boot] || System.system_time(:millisecond)
+    transport = options[:transport] || {Swarm.Transport, :transmit, []}
 
     s = %{
       config: config,
       id: id,
       board: board,
-      transport: options[:transport] || {Swarm.Transport, :transmit, []},
       ear: Ear.new(id, written(board)),
-      stamps: Stamp.new(boot),
-      presence: Presence.new([:robots, {:robot, id}]),
-      gone: MapSet.new(),
-      ticks: 0,
-      urgent: 0,
-      sent: 0,
+      chart: Chart.new(board),
+      mouth: Mouth.new(config, board, transport, boot),
+      name: Name.new(id, {boot, node()}),
       unseen: 0,
       next: System.monotonic_time(:millisecond)
     }
@@ -102,7 +102,7 @@ defmodule Swarm.Link do
   end
 
   @impl GenServer
-  def handle_continue(:enter, s), do: {:noreply, enter(s)}
+  def handle_continue(:enter, s), do: {:noreply, %{s | name: Name.enter(s.name)}}
 
   # Links are found in the directory, so anything may come here from anywhere: what would make this
   # process fall is counted instead.
@@ -111,7 +111,9 @@ defmodule Swarm.Link do
 
   @impl GenServer
   def handle_cast({:say, ids, %Message{} = message}, s) do
-    if Shape.names?(ids), do: {:noreply, speak(s, ids, message)}, else: {:noreply, reject(s)}
+    if Shape.names?(ids),
+      do: {:noreply, %{s | mouth: Mouth.speak(s.mouth, ids, message)}},
+      else: {:noreply, reject(s)}
   end
 
   def handle_cast({:hear, term}, s) do
@@ -127,9 +129,9 @@ defmodule Swarm.Link do
     do: {:noreply, command(s, request, ref, stamp)}
 
   def handle_cast({:stamp, ref}, s) when is_reference(ref) do
-    {stamp, stamps} = Stamp.issue(s.stamps, Config.now(s.config))
+    {stamp, mouth} = Mouth.stamp(s.mouth)
     Post.answer(ref, stamp)
-    {:noreply, %{s | stamps: stamps}}
+    {:noreply, %{s | mouth: mouth}}
   end
 
   def handle_cast(:stop, s), do: {:noreply, latch(s, written(s.board))}
@@ -138,29 +140,30 @@ defmodule Swarm.Link do
     do: {:noreply, %{s | ear: Ear.reject(s.ear, why)}}
 
   def handle_cast({:rival, {boot, node} = other, link}, s)
-      when is_integer(boot) and is_atom(node) and (is_pid(link) or link == nil),
-      do: {:noreply, rival(s, other, link)}
+      when is_integer(boot) and is_atom(node) and (is_pid(link) or link == nil) do
+    case Name.rival(s.name, other, link) do
+      {false, name} -> {:noreply, %{s | name: name}}
+      {true, name} -> {:noreply, give_way(%{s | name: name}, node)}
+    end
+  end
 
   def handle_cast(_unknown, s), do: {:noreply, reject(s)}
 
   @impl GenServer
   def handle_info(:tick, s), do: {:noreply, s |> tick(Config.now(s.config)) |> schedule()}
-  def handle_info(:enter, s), do: {:noreply, enter(s)}
+  def handle_info(:enter, s), do: {:noreply, %{s | name: Name.enter(s.name)}}
 
   def handle_info({:DOWN, ref, :process, _scope, _reason}, s) do
-    case Presence.down(s.presence, ref) do
-      {:ok, presence} -> {:noreply, %{s | presence: presence}}
+    case Name.down(s.name, ref) do
+      {:ok, name} -> {:noreply, %{s | name: name}}
       :error -> {:noreply, reject(s)}
     end
   end
 
   def handle_info(_unknown, s), do: {:noreply, reject(s)}
 
-  # One row for each heartbeat: a hundred robots tell each other fifty thousand times a second.
-  defp heard(s, {:peer, id}, at_ms) do
-    show(s, id, at_ms)
-    %{s | gone: MapSet.delete(s.gone, id)}
-  end
+  defp heard(s, {:peer, id}, at_ms),
+    do: %{s | chart: Chart.heard(s.chart, s.ear.peers, id, at_ms)}
 
   defp heard(s, {:message, message}, _at_ms) do
     Pilot.hear(s.id, {:message, message})
@@ -170,56 +173,19 @@ defmodule Swarm.Link do
   defp heard(s, :nothing, _at_ms), do: s
 
   defp tick(s, at_ms) do
-    s = grow_old(follow(%{s | ticks: s.ticks + 1}), at_ms)
-    count(s, at_ms)
-    if rem(s.ticks, @rivals_every) == 0, do: challenge(s)
-    s = if s.urgent > 0 or rem(s.ticks, @beat_every) == 1, do: beat(s, at_ms), else: s
-    %{s | urgent: max(s.urgent - 1, 0)}
+    s = follow(s)
+    s = %{s | chart: Chart.grow_old(s.chart, s.ear.peers, at_ms)}
+    counts = %{sent: s.mouth.sent, heard: s.ear.heard, rejected: s.ear.rejected}
+    Board.put(s.board, :link, :radio, counts, at_ms)
+    s = %{s | mouth: Mouth.tick(s.mouth, s.ear, at_ms)}
+    if rem(s.mouth.ticks, @rivals_every) == 0, do: Name.challenge(s.name)
+    s
   end
 
-  # Of a robot that is gone nothing arrives, so somebody has to write down that it is.
-  defp grow_old(s, at_ms) do
-    for id <- Peers.gone(s.ear.peers, at_ms), id not in s.gone, reduce: s do
-      s ->
-        show(s, id, at_ms)
-        %{s | gone: MapSet.put(s.gone, id)}
-    end
-  end
-
-  defp show(s, id, at_ms) do
-    peer = Peers.percept(s.ear.peers, id, at_ms)
-    Board.put(s.board, :link, {:peer, id}, peer, peer.at_ms)
-  end
-
-  defp beat(s, at_ms) do
-    sequence = Stamp.last(s.stamps) + 1
-
-    case Beat.message(s.config, s.board, s.ear, {s.stamps.boot, sequence}, at_ms) do
-      {:ok, message} ->
-        s = %{s | stamps: Stamp.sent(s.stamps, sequence, at_ms)}
-        speak(s, List.delete(Directory.robots(), s.id), message)
-
-      :error ->
-        s
-    end
-  end
-
-  defp speak(%{presence: %{left?: true}} = s, _ids, _message), do: s
-
-  defp speak(s, ids, message) do
-    {m, f, a} = s.transport
-    apply(m, f, a ++ [s.id, ids, message])
-    %{s | sent: s.sent + length(ids)}
-  end
-
-  defp addressed(:all), do: Directory.robots()
-  defp addressed(ids) when is_list(ids), do: ids
-  defp addressed(id), do: [id]
-
+  # Who knows no better way than the link finds the brake through it.
   defp command(s, request, ref, stamp) do
-    case age(s, request, ref, stamp) do
+    case Stamp.judge(s.mouth.stamps, request, ref, stamp, Config.now(s.config)) do
       :ok ->
-        # Who knows no better way than the link finds the brake through it.
         if Brake.takes?(request),
           do: Brake.take(s.id, request, ref),
           else: Post.answer(ref, Desk.answer(request, s.config, s.board, s.ear))
@@ -232,32 +198,25 @@ defmodule Swarm.Link do
     end
   end
 
-  # What was said on this node was not queued on the way.
-  defp age(s, request, ref, stamp) do
-    if Stamp.needed?(request) and node(ref) != node(),
-      do: Stamp.check(s.stamps, stamp, Config.now(s.config)),
-      else: :ok
-  end
-
   # The brake knows best; it is only asked where a heartbeat seems to change something.
   defp stop(%{ear: %{stop: stop}} = s, %{stop: stop} = ear, _term), do: %{s | ear: ear}
+
+  defp stop(s, ear, %Message{kind: :relay, body: inner}), do: stop(s, ear, inner)
 
   defp stop(s, ear, %Message{body: beat}),
     do: latch(%{s | ear: %{ear | stop: s.ear.stop}}, Brake.beat(s.id, beat.estop, beat.latched))
 
+  # A stop may have been pressed on the robot itself.
   defp follow(s) do
     if Board.latched?(s.board) == s.ear.stop.latched?,
       do: s,
       else: latch(s, Brake.follow(s.id))
   end
 
-  defp latch(%{ear: ear} = s, stop) do
-    changed? = stop.latched? != ear.stop.latched?
+  defp latch(%{ear: %{stop: before} = ear} = s, stop) do
     s = %{s | ear: %{ear | stop: stop}}
-    if changed? and s.config.pace != :manual, do: urgent(s), else: s
+    if stop.latched? == before.latched?, do: s, else: %{s | mouth: Mouth.urge(s.mouth, s.ear)}
   end
-
-  defp urgent(s), do: beat(%{s | urgent: @urgent_ticks}, Config.now(s.config))
 
   defp written(board) do
     case Board.fetch(board, :estop, :infinity) do
@@ -266,51 +225,16 @@ defmodule Swarm.Link do
     end
   end
 
-  defp enter(s) do
-    {in?, presence} = Presence.enter(s.presence)
-    if in?, do: challenge(s)
-    %{s | presence: presence}
+  defp give_way(s, other) do
+    Brake.present(s.id, false)
+    Pilot.stop(s.id)
+    Event.execute([:swarm, :link, :duplicate_id], %{}, %{robot: s.id, other: other})
+    %{s | mouth: %{s.mouth | silent?: true}}
   end
 
-  # Two robots of one name: both tell each other who they are, and the later one gives way.
-  defp challenge(%{presence: %{left?: true}}), do: :ok
-
-  defp challenge(s) do
-    for link <- Directory.members({:robot, s.id}),
-        link != self(),
-        do: Post.cast(link, {:rival, {s.stamps.boot, node()}, self()})
-  end
-
-  defp rival(%{presence: %{left?: true}} = s, _other, _link), do: s
-
-  # By radio a robot may hear itself; a link that is another one on this node is in the directory.
-  defp rival(s, {_boot, node}, nil) when node == node(), do: s
-
-  defp rival(s, other, link) do
-    mine = {s.stamps.boot, node()}
-
-    case Presence.judge(mine, other) do
-      :give_way ->
-        presence = Presence.leave(s.presence)
-        Brake.present(s.id, false)
-        Pilot.stop(s.id)
-        about = %{robot: s.id, other: elem(other, 1)}
-        Event.execute([:swarm, :link, :duplicate_id], %{}, about)
-        %{s | presence: presence}
-
-      :stay ->
-        if link, do: Post.cast(link, {:rival, mine, self()})
-        s
-
-      :same ->
-        s
-    end
-  end
-
-  defp count(s, at_ms) do
-    counts = %{sent: s.sent, heard: s.ear.heard, rejected: s.ear.rejected}
-    Board.put(s.board, :link, :radio, counts, at_ms)
-  end
+  defp addressed(:all), do: Directory.robots()
+  defp addressed(ids) when is_list(ids), do: ids
+  defp addressed(id), do: [id]
 
   defp reject(s), do: relieve(%{s | ear: Ear.reject(s.ear, :not_a_message)})
 

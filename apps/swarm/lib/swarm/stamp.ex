@@ -85,6 +85,18 @@ defmodule Swarm.Stamp do
   def needed?({:estop, _call}), do: false
   def needed?(request), do: request not in [:stop, :estop, :status, :ping]
 
+  @doc """
+  Whether a robot is to obey a request now. One without a stamp is obeyed where whoever asked, by the
+  reference that is to be answered, is on this node: it was not queued on the way.
+  """
+  @spec judge(t(), request :: term(), reference(), stamp :: term(), integer()) ::
+          :ok | {:error, age_ms :: integer() | :unknown}
+  def judge(sent, request, ref, stamp, now_ms) do
+    if needed?(request) and (stamp != nil or node(ref) != node()),
+      do: check(sent, stamp, now_ms),
+      else: :ok
+  end
+
   @doc "What a robot answers to a command that it does not obey for its age."
   @spec refusal(robot :: atom(), age_ms :: integer() | :unknown) :: {:error, String.t()}
   def refusal(robot, :unknown),

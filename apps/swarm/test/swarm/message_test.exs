@@ -5,7 +5,7 @@ defmodule Swarm.MessageTest do
   alias Swarm.Link.Ear
   doctest Swarm.Stop
   doctest Swarm.Stamp
-  doctest Swarm.Link.Presence
+  doctest Swarm.Link.Name
   doctest Swarm.Shape
   doctest Ear
   doctest Swarm.Missions.Manual

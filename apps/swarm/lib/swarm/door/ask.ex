@@ -4,7 +4,7 @@ defmodule Swarm.Door.Ask do
   # brake, all else to its link. A command for another node bears a stamp (`Swarm.Stamp`); who has
   # none at hand asks the robot for one first.
   alias Robot.{Board, Names}
-  alias Swarm.{Brake, Directory, Post, Stamp}
+  alias Swarm.{Brake, Directory, Mesh, Post, Stamp}
 
   @answer_ms 500
   # Half of what is too old for the robot: the other half is for the way there.
@@ -62,7 +62,7 @@ defmodule Swarm.Door.Ask do
   # The nearest process that takes the request, or the way by others, or `nil`.
   defp whereabouts(id, request) do
     if(Brake.takes?(request), do: nearest({:brake, id})) || Directory.whereis(id) ||
-      if(is_map_key(Swarm.Mesh.robots(), id), do: :relay)
+      if(is_map_key(Mesh.robots(), id), do: :relay)
   end
 
   defp nearest(group) do
@@ -100,18 +100,23 @@ defmodule Swarm.Door.Ask do
     {ref, {:command, id}}
   end
 
-  defp cast(id, :relay, order, ref), do: Swarm.Mesh.relay(id, order, ref)
+  defp cast(id, :relay, order, ref), do: Mesh.relay(id, order, ref)
   defp cast(_id, pid, order, _ref), do: Post.cast(pid, order)
 
-  # The newest heartbeat of a robot that one of this node's has heard.
+  # The newest heartbeat of a robot that this node has heard, by its radio or by one of its robots.
   defp stamp(id) do
-    Enum.find_value(Names.robots(), fn here ->
-      with {:ok, board} <- Board.find(here),
-           {:ok, %{beat: beat}, _at_ms} <- Board.fetch(board, {:peer, id}, @fresh_ms) do
-        {beat.boot, beat.sequence}
-      else
-        :error -> nil
-      end
-    end)
+    case Mesh.beat(id) do
+      {boot, sequence, age_ms} when age_ms < @fresh_ms -> {boot, sequence}
+      _old_or_none -> Enum.find_value(Names.robots(), &heard(&1, id))
+    end
+  end
+
+  defp heard(here, id) do
+    with {:ok, board} <- Board.find(here),
+         {:ok, %{beat: beat}, _at_ms} <- Board.fetch(board, {:peer, id}, @fresh_ms) do
+      {beat.boot, beat.sequence}
+    else
+      :error -> nil
+    end
   end
 end

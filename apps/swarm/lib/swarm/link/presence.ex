@@ -2,9 +2,7 @@ defmodule Swarm.Link.Presence do
   @moduledoc """
   A process's place in the directory. It enters its groups, watches the directory, and enters a new
   one by itself, with back-off while there is none: the process gets `:enter` then. A process that
-  left stays out until it enters again.
-
-  Of two robots of one name the one of the lower `{boot, node}` stays (`judge/2`).
+  left stays out.
   """
   alias Swarm.Directory
 
@@ -20,9 +18,6 @@ defmodule Swarm.Link.Presence do
           retry_ms: pos_integer(),
           left?: boolean()
         }
-
-  @typedoc "Who a robot is besides its name: the number of its life, and its node."
-  @type identity :: {boot :: integer(), node()}
 
   @doc "In none of these groups yet."
   @spec new([Directory.group()]) :: t()
@@ -62,20 +57,6 @@ defmodule Swarm.Link.Presence do
     Directory.leave(self(), presence.groups)
     %{presence | scope: nil, left?: true}
   end
-
-  @doc """
-  Which of two robots of one name is to go on.
-
-      iex> Swarm.Link.Presence.judge({5, :mag1@a}, {7, :mag1@b})
-      :stay
-      iex> Swarm.Link.Presence.judge({7, :mag1@b}, {7, :mag1@a})
-      :give_way
-      iex> Swarm.Link.Presence.judge({7, :mag1@b}, {7, :mag1@b})
-      :same
-  """
-  @spec judge(mine :: identity(), other :: identity()) :: :stay | :give_way | :same
-  def judge(same, same), do: :same
-  def judge(mine, other), do: if(mine < other, do: :stay, else: :give_way)
 
   defp retry(presence) do
     Process.send_after(self(), :enter, presence.retry_ms)
