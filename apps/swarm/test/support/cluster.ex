@@ -51,7 +51,12 @@ defmodule Swarm.Cluster do
 
   @doc "Freezes a node: it is there, and silent. `thaw/1` lets it go on."
   @spec freeze(node()) :: :ok
-  def freeze(node), do: signal(node, "STOP", fn -> on_exit(fn -> thaw(node) end) end)
+  def freeze(node) do
+    signal(node, "STOP", fn ->
+      on_exit(fn -> thaw(node) end)
+      await_stopped(process(node))
+    end)
+  end
 
   @doc "Lets a frozen node go on."
   @spec thaw(node()) :: :ok
@@ -88,10 +93,27 @@ defmodule Swarm.Cluster do
     do: :persistent_term.put({__MODULE__, node}, :erpc.call(node, System, :pid, []))
 
   defp signal(node, name, afterwards) do
-    {_text, 0} = System.cmd("kill", ["-#{name}", :persistent_term.get({__MODULE__, node})])
+    {_text, 0} = System.cmd("kill", ["-#{name}", process(node)])
     afterwards.()
     :ok
   end
+
+  defp process(node), do: :persistent_term.get({__MODULE__, node})
+
+  # The signal is on its way when `kill` returns. Every thread stops by itself.
+  defp await_stopped(pid, tries \\ 100_000) do
+    states = for file <- Path.wildcard("/proc/#{pid}/task/*/stat"), do: state(File.read(file))
+
+    cond do
+      Enum.all?(states, &(&1 in ["T", :ended])) -> :ok
+      tries == 0 -> raise "process #{pid} does not stop"
+      true -> await_stopped(pid, tries - 1)
+    end
+  end
+
+  # After the name, which is in brackets and may hold anything.
+  defp state({:ok, stat}), do: stat |> String.split(") ") |> List.last() |> String.first()
+  defp state({:error, _gone}), do: :ended
 
   defp await_down(node) do
     Node.monitor(node, true)

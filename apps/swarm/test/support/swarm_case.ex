@@ -32,6 +32,27 @@ defmodule Swarm.Case do
     id
   end
 
+  @doc "The same on another node (`Swarm.Cluster`), which the robot ends with; no drive tells the test."
+  def robot_on(node, id, options \\ []) do
+    {link, options} = Keyword.pop(options, :link, [])
+    options = Keyword.put_new(options, :drive, {Hal.FakeDrive, test: self(), device: id})
+    config = id |> Robot.Case.config(options) |> Swarm.Link.join(link)
+    {:ok, _robot} = :erpc.call(node, Robot.Fleet, :start_robot, [Robot.Fleet, config])
+    :erpc.call(node, __MODULE__, :stand, [id, Pose.new(0, 0)])
+    eventually(fn -> node(Swarm.Directory.whereis(id) || self()) == node end)
+    id
+  end
+
+  @doc "What the latest of a robot's board entries is, on whatever node; `nil` without it."
+  def entry(node, id, key) do
+    {:ok, board} = :erpc.call(node, Robot.Board, :find, [id])
+
+    case :erpc.call(node, Robot.Board, :fetch, [board, key, :infinity]) do
+      {:ok, value, _at_ms} -> value
+      :error -> nil
+    end
+  end
+
   @doc "The wheels say that the robot stands there."
   def stand(id, pose) do
     free = List.duplicate(5.0, 16)

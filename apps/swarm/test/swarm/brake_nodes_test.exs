@@ -1,0 +1,77 @@
+defmodule Swarm.BrakeNodesTest do
+  use Swarm.Case, async: false
+  alias Swarm.{Cluster, Post}
+  alias Swarm.Missions.Manual
+  @moduletag :cluster
+  @moduletag :capture_log
+
+  defp latched?(node, id), do: match?(%{latched?: true}, entry(node, id, :estop))
+
+  test "a stop from a node without a robot reaches all, outlives its sender, and awaits the newcomer" do
+    [base, one, two] = Cluster.start_nodes(3)
+    robot_on(one, :brake_n1)
+    robot_on(two, :brake_n2)
+    eventually(fn -> length(:erpc.call(base, Directory, :members, [:brakes])) == 2 end)
+    # It has heard no heartbeat, so it asks how old its command may be.
+    assert :erpc.call(base, Swarm, :goto, [:brake_n1, {1, 1}]) == :ok
+    assert entry(one, :brake_n1, :mission).state == {Manual, :goto}
+
+    {took, answer} = :timer.tc(fn -> :erpc.call(base, Swarm, :estop, []) end)
+    assert answer == :ok
+    IO.puts("\n  e-stop of two robots on two other nodes, answered: #{took} us")
+    assert latched?(one, :brake_n1) and latched?(two, :brake_n2)
+    refused = :erpc.call(base, Swarm, :goto, [:brake_n1, {1, 1}])
+    assert {:error, "brake_n1 is held by the emergency stop; reset it first"} = refused
+
+    Cluster.kill(base)
+    Cluster.kill(one)
+    # The one that is left tells the one that comes.
+    stands = spawn_link(fn -> stand_for_ever(two, :brake_n2) end)
+    here = robot(:brake_new)
+    eventually(fn -> Board.latched?(Board.find!(here)) end)
+    assert Swarm.reset() == :ok
+    refute latched?(two, :brake_n2) or Board.latched?(Board.find!(here))
+    Process.unlink(stands)
+    Process.exit(stands, :kill)
+  end
+
+  test "what was queued for a frozen robot is not obeyed when it goes on, but for the stop" do
+    [far] = Cluster.start_nodes(1)
+    id = robot_on(far, :brake_frozen)
+    here = robot(:brake_awake)
+    stands = spawn_link(fn -> stand_for_ever(far, id) end)
+    mode = fn -> Map.get(Board.peers(Board.find!(here)), id) end
+    eventually(fn -> match?(%{mode: mode} when mode != :dead, mode.()) end)
+    assert Swarm.follow(id, here) == :ok
+    assert entry(far, id, :mission).state == {Manual, :follow_the_leader}
+    Process.unlink(stands)
+    Process.exit(stands, :kill)
+
+    link = Directory.whereis(id)
+    Post.cast(link, {:stamp, ref = :erlang.alias([:reply])})
+    assert_receive {^ref, stamp}
+    Cluster.freeze(far)
+    Post.cast(link, {:command, {:goto, 5.0, 5.0, nil}, :erlang.alias([:reply]), stamp})
+    assert Swarm.goto(id, {5, 5}) == {:error, "brake_frozen does not answer"}
+    # Silent for longer than a command may be old.
+    eventually(fn -> match?(%{mode: :dead}, mode.()) end)
+    assert Swarm.stop(id) == {:error, "brake_frozen does not answer"}
+    Cluster.thaw(far)
+
+    # The stop was obeyed, and nothing else.
+    eventually(fn -> match?(%{rejected: %{too_old: _}}, Swarm.status(id)) end)
+    eventually(fn -> entry(far, id, :mission).state == {Manual, :ready} end)
+    assert Swarm.goto(id, {5, 5}) == :ok
+  end
+
+  # A robot without odometry is silent.
+  defp stand_for_ever(node, id) do
+    :erpc.cast(node, Swarm.Case, :stand, [id, Pose.new(0, 0)])
+
+    receive do
+      :never -> :ok
+    after
+      100 -> stand_for_ever(node, id)
+    end
+  end
+end
