@@ -25,7 +25,7 @@ defmodule Swarm do
   sent somewhere leaves the group's mission, which goes on without it until the next start.
   """
   alias Robot.Command
-  alias Swarm.{Alarm, Directory, Door, Formation, Status}
+  alias Swarm.{Alarm, Door, Formation, Status, Transport}
   alias Swarm.Door.Ask
   alias Swarm.Missions.Manual
 
@@ -101,7 +101,7 @@ defmodule Swarm do
   """
   @spec tell(robot() | [robot()] | :all, String.t()) :: answer()
   def tell(to, text) when is_binary(text) do
-    with {:ok, command} <- Command.parse(text, Directory.robots()), do: command(to, command)
+    with {:ok, command} <- Command.parse(text, Transport.robots()), do: command(to, command)
   end
 
   def tell(_to, other),
@@ -110,7 +110,7 @@ defmodule Swarm do
   @doc "How all robots are, one line each in `iex`."
   @spec status() :: [Status.t()]
   def status do
-    robots = Directory.robots()
+    robots = Transport.robots()
     answers = Ask.ask(robots, :status)
 
     for id <- robots do

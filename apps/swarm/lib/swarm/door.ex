@@ -2,14 +2,14 @@ defmodule Swarm.Door do
   @moduledoc false
   # What `Swarm` needs: who is meant, is it allowed, and what do they answer.
   alias Robot.Command.Words
-  alias Swarm.{Directory, Formation}
+  alias Swarm.{Formation, Transport}
   alias Swarm.Door.Ask
   alias Swarm.Missions.Landmark.Policy
 
   @doc "The ids of the robots meant, which all exist, or one line."
   @spec robots(term()) :: {:ok, [atom(), ...]} | {:error, String.t()}
   def robots(:all) do
-    case known() do
+    case Transport.robots() do
       [] -> {:error, "there are no robots here"}
       robots -> {:ok, robots}
     end
@@ -18,7 +18,7 @@ defmodule Swarm.Door do
   def robots([]), do: {:error, "[] names no robot; write a name, a list of names or :all"}
 
   def robots(names) when is_list(names) do
-    known = known()
+    known = Transport.robots()
 
     with false <- List.improper?(names),
          {:ok, ids} <- named(names, known) do
@@ -30,14 +30,6 @@ defmodule Swarm.Door do
   end
 
   def robots(name), do: robots([name])
-
-  # Also those that are heard by radio, but not connected.
-  defp known do
-    case map_size(heard = Swarm.Mesh.robots()) do
-      0 -> Directory.robots()
-      _some -> Enum.uniq(Enum.sort(Directory.robots() ++ Map.keys(heard)))
-    end
-  end
 
   defp named(names, known) do
     Enum.reduce_while(names, {:ok, []}, fn name, {:ok, ids} ->
@@ -82,7 +74,7 @@ defmodule Swarm.Door do
     with :ok <- keyword(options, "spacing, length or side"),
          {:ok, kind} <- kind(kind),
          :ok <- numbers(options),
-         do: Formation.new(kind, fleet(kind, options, robots || length(known())))
+         do: Formation.new(kind, fleet(kind, options, robots || length(Transport.robots())))
   end
 
   @doc "Tells the robots; `:ok` when all accept, else one line about those that do not."

@@ -27,7 +27,7 @@ defmodule Swarm.Link do
   use GenServer
   alias Hal.Event
   alias Robot.{Board, Config, Names, Pilot}
-  alias Swarm.{Brake, Directory, Message, Post, Shape, Stamp, Stop}
+  alias Swarm.{Brake, Message, Post, Shape, Stamp, Stop, Transport}
   alias Swarm.Link.{Chart, Desk, Ear, Flood, Mouth, Name}
 
   @behaviour Robot.Companion
@@ -40,7 +40,7 @@ defmodule Swarm.Link do
   @doc "The config of a robot that talks: with a link, which its mission speaks through, and a brake."
   @spec join(Config.t(), keyword()) :: Config.t()
   def join(%Config{} = config, options \\ []) do
-    options = Keyword.validate!(options, [:boot, transport: {Swarm.Transport, :transmit, []}])
+    options = Keyword.validate!(options, [:boot, transport: {Transport, :transmit, []}])
     # The brake first: whoever is listed later falls with those before, never takes them along.
     companions = config.companions ++ [{Brake, []}, {__MODULE__, options}]
     %{config | send: {__MODULE__, :say, [config.id]}, companions: companions}
@@ -61,7 +61,7 @@ defmodule Swarm.Link do
 
   @doc """
   Says something to one robot, to several, or to all others, and returns who is addressed: of `:all`
-  those that the directory knows. Nobody is waited for, and nobody says whether it was heard.
+  those that are known here (`Swarm.Transport.robots/0`). Nobody is waited for, and nobody says whether it was heard.
   """
   @spec say(robot :: atom(), to :: atom() | [atom()] | :all, Message.t()) :: [atom()]
   def say(robot, to, message) do
@@ -83,7 +83,7 @@ defmodule Swarm.Link do
   def init({%Config{id: id} = config, options}) do
     board = Board.find!(id)
     boot = options[:boot] || System.system_time(:millisecond)
-    transport = options[:transport] || {Swarm.Transport, :transmit, []}
+    transport = options[:transport] || {Transport, :transmit, []}
 
     s = %{
       config: config,
@@ -232,7 +232,7 @@ defmodule Swarm.Link do
     %{s | mouth: %{s.mouth | silent?: true}}
   end
 
-  defp addressed(:all), do: Directory.robots()
+  defp addressed(:all), do: Transport.robots()
   defp addressed(ids) when is_list(ids), do: ids
   defp addressed(id), do: [id]
 

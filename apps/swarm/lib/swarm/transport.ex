@@ -8,6 +8,18 @@ defmodule Swarm.Transport do
   alias Swarm.{Directory, Mesh, Message, Post}
 
   @doc """
+  All robots that can be spoken to, sorted: in the directory, or heard by radio from nodes that this one
+  is not connected to.
+  """
+  @spec robots() :: [atom()]
+  def robots do
+    case Map.keys(Mesh.robots()) do
+      [] -> Directory.robots()
+      heard -> Enum.uniq(Enum.sort(Directory.robots() ++ heard))
+    end
+  end
+
+  @doc """
   The transport of links (`Swarm.Link`). With a mesh heartbeats go to everybody known, whoever is named.
   Nobody is waited for.
   """

@@ -19,7 +19,11 @@ defmodule Swarm.Door.Ask do
     deadline = System.monotonic_time(:millisecond) + @answer_ms
 
     waiting =
-      for id <- robots, to = whereabouts(id, request), into: %{}, do: first(id, to, request)
+      for id <- robots,
+          to = whereabouts(id, request),
+          asked = first(id, to, request),
+          into: %{},
+          do: asked
 
     gather(waiting, request, %{}, deadline)
   end
@@ -31,8 +35,13 @@ defmodule Swarm.Door.Ask do
       {ref, answer} when is_map_key(waiting, ref) ->
         case Map.pop!(waiting, ref) do
           {{:stamp, id, to}, waiting} ->
-            {ref, about} = post(id, to, request, answer)
-            gather(Map.put(waiting, ref, about), request, answers, deadline)
+            waiting =
+              case post(id, to, request, answer) do
+                {ref, about} -> Map.put(waiting, ref, about)
+                nil -> waiting
+              end
+
+            gather(waiting, request, answers, deadline)
 
           {{:command, id}, waiting} ->
             gather(waiting, request, Map.put(answers, id, answer), deadline)
@@ -86,22 +95,30 @@ defmodule Swarm.Door.Ask do
     end
   end
 
-  # An alias: an answer that comes too late finds no mailbox.
-  defp post(id, to, :stamp) do
+  defp post(id, to, :stamp), do: cast(id, to, {:stamp}, {:stamp, id, to})
+  defp post(id, to, request, nil), do: cast(id, to, {:command, request}, {:command, id})
+
+  defp post(id, to, request, stamp),
+    do: cast(id, to, {:command, request, stamp}, {:command, id})
+
+  # By an alias: an answer that comes too late finds no mailbox. `nil` where no way leads there.
+  defp cast(id, to, order, about) do
     ref = :erlang.alias([:reply])
-    cast(id, to, {:stamp, ref}, ref)
-    {ref, {:stamp, id, to}}
+    order = with_ref(order, ref)
+
+    case if(to == :relay, do: Mesh.relay(id, order, ref), else: Post.cast(to, order)) do
+      :ok ->
+        {ref, about}
+
+      {:error, _no_way} ->
+        :erlang.unalias(ref)
+        nil
+    end
   end
 
-  defp post(id, to, request, stamp) do
-    ref = :erlang.alias([:reply])
-    order = if stamp, do: {:command, request, ref, stamp}, else: {:command, request, ref}
-    cast(id, to, order, ref)
-    {ref, {:command, id}}
-  end
-
-  defp cast(id, :relay, order, ref), do: Mesh.relay(id, order, ref)
-  defp cast(_id, pid, order, _ref), do: Post.cast(pid, order)
+  defp with_ref({:stamp}, ref), do: {:stamp, ref}
+  defp with_ref({:command, request}, ref), do: {:command, request, ref}
+  defp with_ref({:command, request, stamp}, ref), do: {:command, request, ref, stamp}
 
   # The newest heartbeat of a robot that this node has heard, by its radio or by one of its robots.
   defp stamp(id) do

@@ -5,7 +5,7 @@ defmodule Swarm.Link.Mouth do
   a second for a second, so that it spreads within 200 ms.
   """
   alias Robot.{Board, Config}
-  alias Swarm.{Directory, Message, Stamp}
+  alias Swarm.{Message, Stamp, Transport}
   alias Swarm.Link.{Beat, Ear}
 
   @beat_every 2
@@ -72,7 +72,7 @@ defmodule Swarm.Link.Mouth do
     case Beat.message(mouth.config, mouth.board, ear, sender, at_ms) do
       {:ok, message} ->
         mouth = %{mouth | stamps: Stamp.sent(mouth.stamps, sequence, at_ms)}
-        speak(mouth, List.delete(Directory.robots(), mouth.config.id), message)
+        speak(mouth, List.delete(Transport.robots(), mouth.config.id), message)
 
       :error ->
         mouth
