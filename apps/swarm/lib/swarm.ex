@@ -25,9 +25,11 @@ defmodule Swarm do
   sent somewhere leaves the group's mission, which goes on without it until the next start.
   """
   alias Robot.Command
-  alias Swarm.{Alarm, Door, Formation, Status, Transport}
+  alias Swarm.{Alarm, Door, Formation, Matrix, Status, Transport}
+  alias Swarm.Directory.{Search, Watch}
   alias Swarm.Door.Ask
   alias Swarm.Missions.Manual
+  alias Swarm.Status.Report
 
   @type robot :: atom() | String.t()
   @type answer :: :ok | {:error, line :: String.t()}
@@ -107,38 +109,49 @@ defmodule Swarm do
   def tell(_to, other),
     do: {:error, "#{inspect(other)} is no command; write one as text, such as \"goto:2.0:1.0\""}
 
-  @doc "How all robots are, one line each in `iex`."
+  @doc "How all robots are, one line each in `iex`; those that do not answer by their rows."
   @spec status() :: [Status.t()]
-  def status do
-    robots = Transport.robots()
-    answers = Ask.ask(robots, :status)
-
-    for id <- robots do
-      case answers do
-        %{^id => %Status{} = status} -> status
-        _silent -> %Status{robot: id, state: :no_answer}
-      end
-    end
-  end
+  def status, do: Report.all()
 
   @doc """
-  How one robot is.
+  How one robot is; one that does not answer as its row on the blackboard says, however old.
 
       Swarm.status(:mag1)
       Swarm.status(:mag1).rejected
   """
   @spec status(robot()) :: Status.t() | {:error, String.t()}
-  def status(robot) do
-    with {:ok, [id]} <- Door.robots(robot) do
-      case Ask.ask([id], :status) do
-        %{^id => %Status{} = status} -> status
-        _silent -> {:error, "#{id} does not answer"}
-      end
-    else
-      {:ok, _several} -> {:error, "status/1 takes one robot; status/0 shows all"}
-      error -> error
-    end
-  end
+  def status(robot), do: Report.one(robot)
+
+  @doc "Who hears whom, as a table in `iex`."
+  @spec matrix() :: Matrix.t()
+  def matrix, do: Matrix.new(status())
+
+  @doc """
+  The robots that are as wanted, sorted; all, without options. Options: `service`, `profile`, `state`,
+  `mission`, `robot`, `node` (a name, or a list of names), `battery` (volts, `{11.5, 14.0}` or
+  `11..14`), `calibrated` (`true`), each also a function of one argument; `max_age_ms` of what is
+  known of them (10,000).
+
+      Swarm.find(service: :camera)
+      Swarm.find(profile: :atrv_mini, battery: {11.5, 14.0})
+      Swarm.find(state: [:follow, :lead], battery: &(&1 > 12))
+  """
+  @spec find(keyword()) :: [atom()] | {:error, line :: String.t()}
+  def find(template \\ []), do: Search.robots(template)
+
+  @doc """
+  Lets this process, or that one, know of robots that join and leave, by messages `{:swarm, {:join,
+  robot, about}}` (`Swarm.About`) and `{:swarm, {:leave, robot, reason}}` (`:left`, `:nodedown`, or
+  `:silent` for 2 s). Returns the robots that are there now.
+
+      {:ok, robots} = Swarm.subscribe()
+  """
+  @spec subscribe(pid()) :: {:ok, [atom()]} | {:error, line :: String.t()}
+  def subscribe(pid \\ self()), do: Watch.subscribe(pid)
+
+  @doc "Ends that."
+  @spec unsubscribe(pid()) :: :ok | {:error, line :: String.t()}
+  def unsubscribe(pid \\ self()), do: Watch.unsubscribe(pid)
 
   @doc """
   Stops all robots, one, or a list of them. They stand until they are told something else.

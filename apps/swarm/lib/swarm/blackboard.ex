@@ -20,7 +20,7 @@ defmodule Swarm.Blackboard do
 
     * `:name` - of the process and its table (`#{inspect(__MODULE__)}`)
     * `:transport` - `{m, f, a}`, called with `a ++ [:rows, term]` for all other nodes and `a ++
-      [:rows, node, term]` for one (the mesh)
+      [:rows, node, term]` for one (`{Swarm.Mesh, :cast, []}`)
     * `:nodes` - `{m, f, a}` that gives the nodes that are alive (of the mesh's view)
     * `:repair_ms` - between two digests (1,000; `:never` for tests that call `repair/1`)
     * `:limits` - as of `Swarm.Rows.new/1`
@@ -44,7 +44,7 @@ defmodule Swarm.Blackboard do
       Keyword.validate!(options, [
         :seed,
         name: __MODULE__,
-        transport: Carrier.mesh(),
+        transport: {Swarm.Mesh, :cast, []},
         nodes: {Carrier, :alive, []},
         repair_ms: @repair_ms,
         limits: []
@@ -60,6 +60,10 @@ defmodule Swarm.Blackboard do
   @spec enter(GenServer.server(), atom(), non_neg_integer()) :: :ok | {:error, line :: String.t()}
   def enter(board \\ __MODULE__, robot, boot) when is_atom(robot) and is_integer(boot),
     do: call(board, {:enter, robot, boot, self()})
+
+  @doc "A robot of this node writes no more; its rows stay, and grow old."
+  @spec leave(GenServer.server(), atom()) :: :ok
+  def leave(board \\ __MODULE__, robot), do: GenServer.cast(board, {:leave, robot})
 
   @doc """
   Writes a row of a robot of this node, and tells all nodes. The key is an atom or a pair such as
@@ -187,6 +191,8 @@ defmodule Swarm.Blackboard do
      end)}
   end
 
+  def handle_cast({:leave, robot}, s), do: {:noreply, end_of(s, robot)}
+
   def handle_cast({:hear, node, term}, s) do
     case Wire.read(term) do
       {heard, dropped} -> {:noreply, heard(drop(s, dropped), node, heard)}
@@ -211,16 +217,19 @@ defmodule Swarm.Blackboard do
   end
 
   def handle_info({:DOWN, ref, :process, _owner, _reason}, s) do
-    case Enum.find(s.owners, fn {_robot, {_pid, r}} -> r == ref end) do
-      {robot, _} ->
-        {:noreply, %{s | rows: Rows.leave(s.rows, robot), owners: Map.delete(s.owners, robot)}}
-
-      nil ->
-        {:noreply, s}
+    case Enum.find(s.owners, fn {_robot, {_pid, owner}} -> owner == ref end) do
+      {robot, _owner} -> {:noreply, end_of(s, robot)}
+      nil -> {:noreply, s}
     end
   end
 
   def handle_info(_unknown, s), do: {:noreply, drop(s, 1)}
+
+  defp end_of(s, robot) do
+    {owner, owners} = Map.pop(s.owners, robot)
+    with {_pid, ref} <- owner, do: Process.demonitor(ref, [:flush])
+    %{s | rows: Rows.leave(s.rows, robot), owners: owners}
+  end
 
   defp enter(s, owner, robot, boot) do
     {rows, notes} = Rows.enter(s.rows, robot, boot, now())

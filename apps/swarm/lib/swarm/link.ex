@@ -27,7 +27,7 @@ defmodule Swarm.Link do
   use GenServer
   alias Hal.Event
   alias Robot.{Board, Config, Names, Pilot}
-  alias Swarm.{Brake, Message, Post, Shape, Stamp, Stop, Transport}
+  alias Swarm.{About, Brake, Message, Post, Shape, Stamp, Stop, Transport}
   alias Swarm.Link.{Chart, Desk, Ear, Flood, Mouth, Name}
 
   @behaviour Robot.Companion
@@ -94,6 +94,7 @@ defmodule Swarm.Link do
       mouth: Mouth.new(config, board, transport, boot),
       name: Name.new(id, {boot, node()}),
       unseen: 0,
+      noted: nil,
       next: System.monotonic_time(:millisecond)
     }
 
@@ -173,7 +174,7 @@ defmodule Swarm.Link do
   defp heard(s, :nothing, _at_ms), do: s
 
   defp tick(s, at_ms) do
-    s = follow(s)
+    s = note(follow(s))
     s = %{s | chart: Chart.grow_old(s.chart, s.ear.peers, at_ms)}
     counts = %{sent: s.mouth.sent, heard: s.ear.heard, rejected: s.ear.rejected}
     Board.put(s.board, :link, :radio, counts, at_ms)
@@ -181,6 +182,12 @@ defmodule Swarm.Link do
     if rem(s.mouth.ticks, @rivals_every) == 0, do: Name.challenge(s.name)
     s
   end
+
+  defp note(%{name: %{presence: %{left?: true}}} = s),
+    do: %{s | noted: About.leave(s.noted, s.id)}
+
+  defp note(s),
+    do: %{s | noted: About.note(s.noted, s.config, s.board, s.mouth.stamps.boot, s.ear)}
 
   # Who knows no better way than the link finds the brake through it.
   defp command(s, request, ref, stamp) do

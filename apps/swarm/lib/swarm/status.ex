@@ -4,7 +4,11 @@ defmodule Swarm.Status do
 
       #mag1 follow (1.20, -0.35, 90 deg) 0.31 m/s by follow, hears 5, age 40 ms
 
-  `age_ms` is how old its newest reading is; `rejected` counts malformed messages by kind.
+  `age_ms` is how old its newest reading is; `rejected` counts malformed messages by kind. `hears` are
+  the robots it hears itself, `view` those that it takes for there, with the view's number.
+
+  A robot that does not answer is shown as its row on the blackboard says (`from: :row`), with that
+  age: `…, age 1240 ms by its row`.
   """
   alias Hal.Pose
   alias Robot.{Board, Config}
@@ -14,6 +18,7 @@ defmodule Swarm.Status do
   @enforce_keys [:robot]
   defstruct @enforce_keys ++
               [
+                from: :robot,
                 node: nil,
                 state: :idle,
                 by: nil,
@@ -25,23 +30,29 @@ defmodule Swarm.Status do
                 power: nil,
                 health: %{},
                 peers: %{},
+                hears: [],
+                view: nil,
                 rejected: %{},
                 age_ms: nil
               ]
 
+  @type view :: {number :: non_neg_integer(), members :: [atom()]}
   @type t :: %__MODULE__{
           robot: atom(),
-          node: node() | nil,
-          state: atom(),
-          by: atom(),
+          from: :robot | :row,
+          node: node() | String.t() | nil,
+          state: atom() | String.t(),
+          by: atom() | String.t(),
           pose: Pose.t() | nil,
           speed: float(),
-          limits: [atom()],
+          limits: [atom() | String.t()],
           estop: boolean(),
-          leader: atom() | nil,
+          leader: atom() | String.t() | nil,
           power: float() | nil,
-          health: %{atom() => :online | {:offline, term()}},
+          health: %{(atom() | String.t()) => :online | {:offline, term()}},
           peers: %{atom() => Peers.status()},
+          hears: [atom()],
+          view: view() | nil,
           rejected: %{atom() => pos_integer()},
           age_ms: non_neg_integer() | nil
         }
@@ -68,6 +79,8 @@ defmodule Swarm.Status do
       health:
         for({{:health, device}, {condition, _age}} <- entries, into: %{}, do: {device, condition}),
       peers: Map.new(ear.peers.rows, fn {id, _} -> {id, Peers.status(ear.peers, id, now_ms)} end),
+      hears: Peers.heard(ear.peers, now_ms),
+      view: {Peers.view_number(ear.peers, now_ms), Peers.view(ear.peers, now_ms)},
       rejected: ear.rejected,
       age_ms: age(entries)
     }
@@ -106,16 +119,15 @@ defmodule Swarm.Status do
       do: "#{fixed(status.speed)} m/s" <> if(status.by, do: " by #{status.by}", else: "")
 
     defp remarks(status) do
-      hears = Enum.count(status.peers, fn {_id, how} -> how == :alive end)
       offline = for {device, {:offline, _reason}} <- status.health, do: "#{device} offline"
       dropped = status.rejected |> Map.values() |> Enum.sum()
 
       [
         status.estop && "E-STOP",
         status.leader && "leader #{status.leader}",
-        "hears #{hears}",
+        "hears #{length(status.hears)}",
         dropped > 0 && "dropped #{dropped} messages",
-        "age #{status.age_ms || "?"} ms"
+        "age #{status.age_ms || "?"} ms" <> if(status.from == :row, do: " by its row", else: "")
       ]
       |> Enum.filter(& &1)
       |> Kernel.++(offline)

@@ -142,6 +142,10 @@ defmodule Swarm.BlackboardTest do
     Blackboard.info(a)
     refute_received {:rival, %{incarnation: 2, robot: :bbtwin}}
     assert {:ok, :first, _} = Blackboard.get(a, :bbtwin, :x, :infinity)
+    # The one that gives way hears the other.
+    :ok = Blackboard.leave(a, :bbtwin)
+    :ok = Blackboard.put(b, :bbtwin, :x, :second)
+    eventually(fn -> match?({:ok, :second, _}, Blackboard.get(a, :bbtwin, :x, :infinity)) end)
   end
 
   test "a board that fell has all again from the others, its own robots' words too" do

@@ -1,8 +1,7 @@
 defmodule Swarm.Rows.Carrier do
   @moduledoc false
-  # How blackboard and hints reach other nodes: by a transport, `{m, f, a}`, that may be a test's. The
-  # mesh hands on to them, and so it is not called by name from here (as in `Swarm.Post`).
-  @mesh :"Elixir.Swarm.Mesh"
+  # How blackboard and hints reach other nodes: by a transport, `{m, f, a}`, that may be a test's.
+  alias Swarm.Mesh
 
   @type call :: {module(), atom(), list()}
 
@@ -15,23 +14,13 @@ defmodule Swarm.Rows.Carrier do
   def cast({m, f, a}, service, node, term), do: go(m, f, a ++ [service, node, term])
 
   defp go(m, f, arguments) do
-    if there?(m, f, length(arguments)), do: apply(m, f, arguments)
+    _ok_or_too_big = apply(m, f, arguments)
     :ok
   end
 
-  @doc "The transport of the mesh."
-  @spec mesh() :: call()
-  def mesh, do: {@mesh, :cast, []}
-
   @doc "The nodes that the mesh hears now."
   @spec alive() :: [node()]
-  def alive do
-    if there?(@mesh, :view, 0) and apply(@mesh, :running?, []),
-      do: for({node, %{status: :alive}} <- apply(@mesh, :view, []).nodes, do: node),
-      else: []
-  end
-
-  defp there?(m, f, arity), do: Code.ensure_loaded?(m) and function_exported?(m, f, arity)
+  def alive, do: for({node, %{status: :alive}} <- Mesh.view().nodes, do: node)
 
   @doc "Some of the nodes, chosen at random."
   @spec some(call(), pos_integer(), :rand.state()) :: {[node()], :rand.state()}

@@ -230,4 +230,16 @@ defmodule Swarm.Rows.Wire do
   end
 
   def robot(_other), do: :error
+
+  @typedoc "A name that travelled as text, where there is no such atom."
+  @type word :: atom() | String.t()
+
+  @doc "A name that travelled as text: its atom, or the text where this node has none."
+  @spec word(String.t()) :: word()
+  def word(text) do
+    case robot(text) do
+      {:ok, atom} -> atom
+      :error -> text
+    end
+  end
 end

@@ -1,0 +1,82 @@
+defmodule Swarm.Status.Row do
+  @moduledoc """
+  A robot's status as a row of the blackboard, for those that it cannot answer: small, in whole
+  numbers (mm, mrad, mm/s) and text. Pure.
+  """
+  alias Hal.Pose
+  alias Swarm.{Shape, Status}
+  alias Swarm.Rows.Wire
+
+  @doc "A status as it travels."
+  @spec encode(Status.t()) :: map()
+  def encode(%Status{} = status) do
+    {number, members} = status.view || {0, []}
+
+    %{
+      node: Atom.to_string(status.node),
+      state: Atom.to_string(status.state),
+      by: status.by && Atom.to_string(status.by),
+      pose: pose(status.pose),
+      speed: round(status.speed * 1000),
+      limits: texts(status.limits),
+      estop: status.estop,
+      leader: status.leader && Atom.to_string(status.leader),
+      power: status.power,
+      offline: texts(for {device, {:offline, _reason}} <- status.health, do: device),
+      view: {number, texts(members)},
+      # Nearly always nobody, while whom it hears may be many.
+      deaf_to: texts(members -- [status.robot | status.hears]),
+      rejected: status.rejected |> Map.values() |> Enum.sum(),
+      age_ms: status.age_ms
+    }
+  end
+
+  defp pose(nil), do: nil
+  defp pose(pose), do: {mm(pose.x), mm(pose.y), mm(pose.heading)}
+  defp mm(number), do: round(number * 1000)
+  defp texts(names), do: Enum.map(names, &Atom.to_string/1)
+
+  @doc "The status in a row that is so old; `:error` for anything else."
+  @spec decode(atom(), term(), age_ms :: non_neg_integer()) :: {:ok, Status.t()} | :error
+  def decode(robot, row, age_ms) do
+    with %{state: state, by: by, pose: pose, speed: speed, limits: limits, estop: estop} <- row,
+         %{node: node, leader: leader, power: power, offline: offline, view: view} <- row,
+         %{deaf_to: deaf_to, rejected: rejected, age_ms: was_ms} <- row,
+         {number, members} <- view,
+         true <- Enum.all?([limits, offline, members, deaf_to], &texts?/1),
+         true <- Enum.all?([node, state], &is_binary/1),
+         true <- Enum.all?([by, leader], &(&1 == nil or is_binary(&1))),
+         true <- Enum.all?([speed, rejected, number], &Shape.number?/1) and is_boolean(estop),
+         true <- pose == nil or Shape.pose?(pose),
+         true <- power == nil or is_number(power),
+         true <- was_ms == nil or Shape.number?(was_ms) do
+      members = names(members)
+
+      {:ok,
+       %Status{
+         robot: robot,
+         from: :row,
+         node: Wire.word(node),
+         state: Wire.word(state),
+         by: by && Wire.word(by),
+         pose: pose && place(pose),
+         speed: speed / 1000,
+         limits: Enum.map(limits, &Wire.word/1),
+         estop: estop,
+         leader: leader && Wire.word(leader),
+         power: power,
+         health: Map.new(offline, &{Wire.word(&1), {:offline, :unknown}}),
+         hears: members -- [robot | names(deaf_to)],
+         view: {number, members},
+         rejected: if(rejected > 0, do: %{all: rejected}, else: %{}),
+         age_ms: (was_ms || 0) + age_ms
+       }}
+    else
+      _other -> :error
+    end
+  end
+
+  defp texts?(list), do: Shape.list?(list, &is_binary/1)
+  defp names(texts), do: for(text <- texts, {:ok, name} <- [Wire.robot(text)], do: name)
+  defp place({x, y, heading}), do: Pose.new(x / 1000, y / 1000, heading / 1000)
+end
