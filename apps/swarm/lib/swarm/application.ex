@@ -9,8 +9,10 @@ defmodule Swarm.Application do
         Swarm.Supervisor.start_link([])
 
       options ->
-        with {:ok, mesh} <- Swarm.Mesh.Options.prepare(options),
-             do: Swarm.Supervisor.start_link(mesh: mesh)
+        with {:ok, mesh} <- Swarm.Mesh.Options.prepare(options) do
+          :ok = Swarm.Mesh.Log.attach()
+          Swarm.Supervisor.start_link(mesh: mesh)
+        end
     end
   end
 end

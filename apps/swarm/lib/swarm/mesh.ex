@@ -61,6 +61,10 @@ defmodule Swarm.Mesh do
     end
   end
 
+  @doc "Tells a connected node where this one is to be heard, and so gets to hear it."
+  @spec introduce(node()) :: :ok
+  def introduce(node), do: radio({:introduce, node})
+
   @doc "The robots of other nodes that were heard within the last 2 s, and their nodes."
   @spec robots() :: %{atom() => node()}
   def robots do

@@ -6,7 +6,7 @@ defmodule Swarm.Post do
   """
 
   @doc "Casts to a `GenServer`, wherever it is."
-  @spec cast(pid(), term()) :: :ok
+  @spec cast(pid() | {atom(), node()}, term()) :: :ok
   def cast(pid, term) do
     :erlang.send(pid, {:"$gen_cast", term}, [:nosuspend, :noconnect])
     :ok

@@ -20,15 +20,15 @@ defmodule Swarm.Transport do
   end
 
   @doc """
-  The transport of links (`Swarm.Link`). With a mesh heartbeats go to everybody known, whoever is named.
+  The transport of links (`Swarm.Link`). With a mesh the robot's own heartbeats go to everybody known, whoever is named.
   Nobody is waited for.
   """
   @spec transmit(from :: atom(), [atom()], Message.t()) :: :ok
-  def transmit(_from, ids, %Message{kind: kind} = message) do
+  def transmit(from, ids, %Message{} = message) do
     if Mesh.running?() do
       {here, there} = Enum.split_with(ids, &(Names.whereis(&1, :link) != nil))
       for id <- here, do: GenServer.cast(Names.via(id, :link), {:hear, message})
-      to = if kind == :heartbeat, do: :all, else: there
+      to = if own_beat?(from, message), do: :all, else: there
       if to != [], do: Mesh.speak(to, message)
       :ok
     else
@@ -39,4 +39,8 @@ defmodule Swarm.Transport do
       :ok
     end
   end
+
+  # One that is passed on for another robot is meant for those named.
+  defp own_beat?(from, %Message{kind: kind, from: author}),
+    do: kind == :heartbeat and author == from
 end

@@ -14,6 +14,8 @@ defmodule Swarm.Mesh.Dialer do
   # So long the one whose part it is has to connect before the other tries.
   @grace_ms 3_000
   @at_once 4
+  # In ticks: how often a node that is connected, but not heard, is told this one's address.
+  @introduce_every 25
 
   @doc "Starts the dialer of this node."
   @spec start_link(Options.t()) :: GenServer.on_start()
@@ -36,7 +38,7 @@ defmodule Swarm.Mesh.Dialer do
 
     # A dialer before this one may have been told of nodes already.
     known = for node <- Map.keys(Swarm.Mesh.view().nodes), into: %{}, do: {node, row(now)}
-    {:ok, schedule(%{options: options, known: known, dialling: %{}, chance: chance})}
+    {:ok, schedule(%{options: options, known: known, dialling: %{}, chance: chance, ticks: 1})}
   end
 
   @impl GenServer
@@ -47,10 +49,14 @@ defmodule Swarm.Mesh.Dialer do
   def handle_cast({:note, _silent, _node}, s), do: {:noreply, s}
 
   @impl GenServer
-  def handle_info(:tick, s), do: {:noreply, s |> dial() |> schedule()}
+  def handle_info(:tick, s) do
+    if rem(s.ticks, @introduce_every) == 0, do: introduce()
+    {:noreply, schedule(dial(%{s | ticks: s.ticks + 1}))}
+  end
 
   def handle_info({:nodeup, node}, s) do
     Event.execute([:swarm, :mesh, :connected], %{at_ms: now()}, %{node: node})
+    Swarm.Mesh.introduce(node)
     {:noreply, s}
   end
 
@@ -73,6 +79,12 @@ defmodule Swarm.Mesh.Dialer do
   def handle_info(_other, s), do: {:noreply, s}
 
   defp row(now), do: %{since_ms: now, backoff: Backoff.new(now)}
+
+  # Whoever is connected, by whatever means, shall be heard too.
+  defp introduce do
+    alive = for {node, %{status: :alive}} <- Swarm.Mesh.view().nodes, do: node
+    for node <- links() -- alive, do: Swarm.Mesh.introduce(node)
+  end
 
   defp dial(s) do
     now = now()

@@ -11,7 +11,8 @@ defmodule Swarm.Mesh.Options do
   | `multicast` | group and port of the gossip, default `{{239, 255, 67, 86}, 4371}`; `false` for none |
   | `peers` | addresses to try, `["10.0.0.7:4370"]`, where multicast is blocked |
   | `strategies` | further ways to meet, `[{Module, options}]` (`Swarm.Mesh.Strategy`) |
-  | `dist_port` | the port that this node's distribution listens on; 0, the default, leaves it to epmd |
+  | `topologies` | those of `libcluster`, where it is (`MIX_TARGET`): any of its strategies then connects nodes |
+  | `dist_port` | the port that this node's distribution listens on; default: that of `Swarm.Mesh.Epmd`, or 0 where there is an epmd to ask |
   | `full_mesh` | up to so many nodes each is connected to each; default 30 |
   | `degree` | above that, to so many others; 6 to 8, default 8 |
   """
@@ -26,7 +27,8 @@ defmodule Swarm.Mesh.Options do
     multicast: {{239, 255, 67, 86}, 4371},
     peers: [],
     strategies: [],
-    dist_port: 0,
+    topologies: [],
+    dist_port: nil,
     full_mesh: 30,
     degree: 8
   ]
@@ -45,11 +47,13 @@ defmodule Swarm.Mesh.Options do
          :ok <- Roster.check(fleet),
          :ok <- ip(options.interface),
          :ok <- number(:port, options.port, 0..65_535),
-         :ok <- number(:dist_port, options.dist_port, 0..65_535),
+         dist_port = options.dist_port || own_port(),
+         :ok <- number(:dist_port, dist_port, 0..65_535),
+         :ok <- topologies(options.topologies),
          :ok <- number(:full_mesh, options.full_mesh, 2..1_000),
          :ok <- number(:degree, options.degree, 2..30),
          {:ok, started} <- start(options) do
-      {:ok, %{options | secret: secret, fleet: fleet, started: started}}
+      {:ok, %{options | dist_port: dist_port, secret: secret, fleet: fleet, started: started}}
     end
   end
 
@@ -95,6 +99,35 @@ defmodule Swarm.Mesh.Options do
       else:
         {:error,
          "mesh #{key} is a whole number from #{range.first} to #{range.last}, not #{inspect(value)}"}
+  end
+
+  # Without an epmd others are told in beacons.
+  defp own_port do
+    case :init.get_argument(:epmd_module) do
+      {:ok, _without_epmd} ->
+        [name | _host] = String.split(Atom.to_string(node()), "@")
+        {:ok, port} = Swarm.Mesh.Epmd.listen_port_please(String.to_charlist(name), ~c"")
+        port
+
+      :error ->
+        0
+    end
+  end
+
+  defp topologies([]), do: :ok
+
+  defp topologies(topologies) do
+    cond do
+      not Keyword.keyword?(topologies) ->
+        {:error, "mesh topologies are libcluster's: [name: [strategy: Module, config: [...]]]"}
+
+      not Code.ensure_loaded?(Cluster.Supervisor) ->
+        {:error,
+         "mesh topologies need libcluster; build with MIX_TARGET=robot where Hex is, or use peers"}
+
+      true ->
+        :ok
+    end
   end
 
   defp start(options) do

@@ -8,8 +8,8 @@ defmodule Swarm.Mesh.Radio do
   use GenServer
   alias Hal.Event
   alias Robot.Names
-  alias Swarm.Link
-  alias Swarm.Mesh.{Backoff, Dialer, Options, Roster, Sockets, Station}
+  alias Swarm.{Link, Post}
+  alias Swarm.Mesh.{Backoff, Dialer, Epmd, Options, Roster, Sockets, Station}
 
   @tick_ms 200
   @rejoin_every 50
@@ -67,6 +67,22 @@ defmodule Swarm.Mesh.Radio do
 
   def handle_cast({:serve, service, to, term}, s),
     do: {:noreply, run(s, Station.serve(s.station, service, to, term))}
+
+  # To a node that the distribution is connected to, however that came about.
+  def handle_cast({:introduce, node}, s) do
+    if s.sockets, do: Post.cast({__MODULE__, node}, {:knock, node(), s.sockets.port})
+    {:noreply, s}
+  end
+
+  def handle_cast({:knock, node, port}, s) when is_atom(node) and port in 1..65_535 do
+    case ip(node) do
+      nil -> {:noreply, s}
+      ip -> {:noreply, run(s, Station.knock(s.station, {ip, port}, now()))}
+    end
+  end
+
+  # Connected nodes may send anything.
+  def handle_cast(_unknown, s), do: {:noreply, s}
 
   @impl GenServer
   def handle_call(:counts, _from, s) do
@@ -161,9 +177,7 @@ defmodule Swarm.Mesh.Radio do
   end
 
   defp carry_out({:learn, name, ip, port}, s) do
-    if Code.ensure_loaded?(Swarm.Mesh.Epmd),
-      do: apply(Swarm.Mesh.Epmd, :learn, [name, ip, port])
-
+    _ = Epmd.learn(name, ip, port)
     s
   end
 
@@ -176,6 +190,16 @@ defmodule Swarm.Mesh.Radio do
   defp publish(s) do
     :ets.insert(s.table, {:book, s.station.book, s.station.roster, s.station.rejected})
     s
+  end
+
+  # The address that the connection to a node goes to.
+  defp ip(node) do
+    with {:ok, info} <- :net_kernel.node_info(node),
+         {:net_address, {{_, _, _, _} = ip, _port}, _host, _protocol, _family} <- info[:address] do
+      ip
+    else
+      _not_connected -> nil
+    end
   end
 
   defp schedule(s) do

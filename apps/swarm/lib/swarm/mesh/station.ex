@@ -123,6 +123,11 @@ defmodule Swarm.Mesh.Station do
     send_all(station, :message, {ids, message}, to)
   end
 
+  @doc "Somebody who may not know this node is there: a beacon introduces it."
+  @spec knock(t(), address(), integer()) :: {t(), [effect()]}
+  def knock(station, address, now_ms),
+    do: send_all(station, :beacon, beacon(station, now_ms), [address])
+
   @doc "A service's term, to all nodes or to one."
   @spec serve(t(), atom(), :all | node(), term()) :: {t(), [effect()]}
   def serve(station, :stop, :all, term) do
@@ -221,8 +226,9 @@ defmodule Swarm.Mesh.Station do
   end
 
   defp take(station, packet, node, {to, %Message{from: from} = message}, _address, now_ms) do
-    case message do
-      %{kind: :heartbeat, body: beat} ->
+    case {to, message} do
+      # One that is meant for some only is passed on: its robot is elsewhere.
+      {:all, %{kind: :heartbeat, body: beat}} ->
         boot = {beat.boot, beat.sequence}
         book = Book.robot(station.book, packet.sender, from, boot, now_ms)
         {%{station | book: book}, [{:beat, from, node, boot}, {:deliver, to, message}]}

@@ -5,7 +5,8 @@ defmodule Swarm.Mesh.Supervisor do
       Swarm.Mesh.Supervisor (rest_for_one)
       |-- Swarm.Mesh.Radio    signed datagrams: beacons, heartbeats, rounds, rows, stops
       |-- Swarm.Mesh.Dialer   connects the distribution, again and again
-      `-- Swarm.Mesh.Relay    commands to nodes that this one is not connected to
+      |-- Swarm.Mesh.Relay    commands to nodes that this one is not connected to
+      `-- libcluster          where its topologies are configured
 
   A radio that starts anew has a new session: for the others it is a node that was away for a moment.
   """
@@ -18,7 +19,13 @@ defmodule Swarm.Mesh.Supervisor do
 
   @impl Supervisor
   def init(options) do
-    children = [{Radio, options}, {Dialer, options}, {Relay, options}]
+    children = [{Radio, options}, {Dialer, options}, {Relay, options}] ++ libcluster(options)
     Supervisor.init(children, strategy: :rest_for_one, max_restarts: 5, max_seconds: 5)
   end
+
+  # Not a dependency. Its strategies connect nodes; connected nodes introduce themselves.
+  defp libcluster(%{topologies: []}), do: []
+
+  defp libcluster(%{topologies: topologies}),
+    do: [{Cluster.Supervisor, [topologies, [name: Swarm.Mesh.Libcluster]]}]
 end

@@ -5,6 +5,7 @@ defmodule Swarm.Mesh.PureTest do
   doctest Swarm.Mesh.Backoff
   doctest Swarm.Mesh.Beacon
   doctest Swarm.Mesh.Guard
+  doctest Swarm.Mesh.Log
   doctest Swarm.Mesh.Packet
   doctest Swarm.Mesh.Plan
   doctest Swarm.Mesh.Roster
@@ -47,7 +48,9 @@ defmodule Swarm.Mesh.PureTest do
           {[strategies: [String]], "strategies are {Module, options}"},
           {[strategies: [{String, 1}]], "strategy String is no Swarm.Mesh.Strategy"},
           {[secret: "cookie"], "mesh secret_file"},
-          {[full_mesh: 1], "mesh full_mesh"}
+          {[full_mesh: 1], "mesh full_mesh"},
+          {[topologies: [lab: [strategy: Nowhere]]], "mesh topologies need libcluster"},
+          {[topologies: :lab], "mesh topologies are libcluster's"}
         ] do
       assert {:error, line} = Options.new(Keyword.merge([secret: secret], options))
       assert line =~ word

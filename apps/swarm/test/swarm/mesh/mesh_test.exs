@@ -62,6 +62,9 @@ defmodule Swarm.MeshTest do
     assert Enum.sort(linked(three)) == others(three, nodes)
     assert met?(one, nodes) and met?(two, nodes)
     assert Cluster.call(three, Swarm.Mesh, :view, []).number == number
+
+    # The command goes by way of the third.
+    assert eventually(fn -> Cluster.call(one, Swarm, :stop, [two.name]) == :ok end)
   end
 
   test "where multicast is blocked a list of addresses does" do
@@ -72,6 +75,13 @@ defmodule Swarm.MeshTest do
     Cluster.call(one, Application, :put_env, [:swarm, :mesh, peers])
     [name | _] = Enum.reverse(mesh[:fleet])
     two = Cluster.join([one], name)
+    assert eventually(fn -> full?([one, two]) end)
+  end
+
+  test "nodes that somebody has connected by hand, or libcluster, introduce themselves" do
+    [one, two] = Cluster.start(2, mesh: [multicast: false])
+    assert alive(one) == []
+    true = Cluster.call(one, :net_kernel, :connect_node, [two.node])
     assert eventually(fn -> full?([one, two]) end)
   end
 
