@@ -1,16 +1,18 @@
 defmodule Swarm.Mesh.Beacon do
   @moduledoc """
   What a node says of itself: the sessions that it knows (so that those who listen can tell that it
-  speaks now), whom it hears, to whom its distribution is connected, and on which port that listens
-  (0: ask epmd). Names are text. Pure.
+  speaks now), whom it hears and from where, to whom its distribution is connected, and on which port that
+  listens (0: ask epmd). Names are text. Pure.
   """
+
+  alias Swarm.Mesh.Strategy.Static
 
   @enforce_keys [:sessions, :hears, :links, :port]
   defstruct @enforce_keys
 
   @type t :: %__MODULE__{
           sessions: [{String.t(), non_neg_integer()}],
-          hears: [String.t()],
+          hears: [{String.t(), Swarm.Mesh.Strategy.address()}],
           links: [String.t()],
           port: 0..65_535
         }
@@ -25,16 +27,16 @@ defmodule Swarm.Mesh.Beacon do
   @doc """
   A beacon from the wire.
 
-      iex> {:ok, beacon} = Swarm.Mesh.Beacon.check({[{"mag1@lab", 7}], ["mag1@lab"], [], 0})
+      iex> {:ok, beacon} = Swarm.Mesh.Beacon.check({[{"mag1@lab", 7}], [{"mag1@lab", {{10, 0, 0, 7}, 4370}}], [], 0})
       iex> beacon.hears
-      ["mag1@lab"]
+      [{"mag1@lab", {{10, 0, 0, 7}, 4370}}]
       iex> Swarm.Mesh.Beacon.check({[], [:mag1], [], 0})
       :error
   """
   @spec check(term()) :: {:ok, t()} | :error
   def check({sessions, hears, links, port})
       when is_list(sessions) and is_list(hears) and is_list(links) and port in 0..65_535 do
-    if list?(sessions, &session?/1) and list?(hears, &name?/1) and list?(links, &name?/1),
+    if list?(sessions, &session?/1) and list?(hears, &heard?/1) and list?(links, &name?/1),
       do: {:ok, %__MODULE__{sessions: sessions, hears: hears, links: links, port: port}},
       else: :error
   end
@@ -44,5 +46,11 @@ defmodule Swarm.Mesh.Beacon do
   defp list?(list, fun), do: Swarm.Shape.list?(list, fun) and length(list) <= @most
   defp session?({name, session}), do: name?(name) and is_integer(session) and session >= 0
   defp session?(_other), do: false
+
+  defp heard?({name, address}) do
+    name?(name) and match?({{_, _, _, _}, _}, address) and Static.address(address) != :error
+  end
+
+  defp heard?(_other), do: false
   defp name?(text), do: is_binary(text) and byte_size(text) in 1..255
 end

@@ -3,6 +3,8 @@ defmodule Swarm.Mesh.Book do
   What a node knows of the others: where they are, when they were heard, whom they hear, whose
   distribution they are connected to, and which robots they hold. Pure; times are this node's own, in ms.
 
+  Of nodes that others hear, and this one does not, the address is a lead: they get beacons too.
+
   A node is suspect after 1 s of silence and gone after 2 s; what decides is datagrams, never a
   connection. One that is gone stays in the book and is sent beacons for ever. The view's number
   grows with each change of who is there.
@@ -11,11 +13,13 @@ defmodule Swarm.Mesh.Book do
 
   @suspect_ms 1_000
   @gone_ms 2_000
+  # More names than any fleet has: what is told beyond that is not kept.
+  @most 1_100
   # A beacon to those that are there, though there may be heartbeats too.
   @beacon_ms 1_000
 
   @enforce_keys [:me]
-  defstruct @enforce_keys ++ [nodes: %{}, claims: %{}, told: %{}, number: 0]
+  defstruct @enforce_keys ++ [nodes: %{}, leads: %{}, claims: %{}, told: %{}, number: 0]
 
   @type name :: String.t()
   @type status :: :alive | :suspect | :gone
@@ -32,6 +36,7 @@ defmodule Swarm.Mesh.Book do
   @type t :: %__MODULE__{
           me: name(),
           nodes: %{name() => entry()},
+          leads: %{name() => {Swarm.Mesh.Strategy.address(), Backoff.t()}},
           claims: %{name() => non_neg_integer()},
           told: %{name() => non_neg_integer()},
           number: non_neg_integer()
@@ -72,17 +77,42 @@ defmodule Swarm.Mesh.Book do
   def claim(book, name, session), do: %{book | claims: Map.put(book.claims, name, session)}
 
   @doc "A beacon of a node that is let in: whom it hears, what it is connected to."
-  @spec beacon(t(), name(), map()) :: t()
-  def beacon(book, name, beacon) do
+  @spec beacon(t(), name(), Swarm.Mesh.Beacon.t(), integer()) :: t()
+  def beacon(book, name, beacon, now_ms) do
     told = Map.delete(Map.new(beacon.sessions), book.me)
 
     case book.nodes do
       %{^name => entry} ->
-        entry = %{entry | hears: beacon.hears, links: beacon.links, port: beacon.port}
-        %{put(book, name, entry) | told: Map.merge(book.told, told)}
+        hears = for {name, _address} <- beacon.hears, do: name
+        entry = %{entry | hears: hears, links: beacon.links, port: beacon.port}
+        told = Map.merge(book.told, told)
+        book = put(book, name, entry)
+        book = if map_size(told) <= @most, do: %{book | told: told}, else: book
+        Enum.reduce(beacon.hears, book, &lead(&2, &1, now_ms))
 
       _rival_of_this_name ->
         book
+    end
+  end
+
+  # One that was heard here has an entry with an address of its own, which is the newer lead when it
+  # has moved.
+  defp lead(%{me: me} = book, {me, _address}, _now_ms), do: book
+
+  defp lead(book, {name, address}, now_ms) do
+    case book do
+      %{nodes: %{^name => %{status: status, address: known}}}
+      when status != :gone or known == address ->
+        %{book | leads: Map.delete(book.leads, name)}
+
+      %{leads: %{^name => {^address, _backoff}}} ->
+        book
+
+      %{leads: leads} when map_size(leads) >= @most ->
+        book
+
+      _news ->
+        %{book | leads: Map.put(book.leads, name, {address, Backoff.new(now_ms)})}
     end
   end
 
@@ -120,10 +150,15 @@ defmodule Swarm.Mesh.Book do
     end
   end
 
-  @doc "Whom this node hears, sorted."
-  @spec hears(t(), integer()) :: [name()]
-  def hears(book, now_ms),
-    do: Enum.sort(for {name, _} <- book.nodes, status(book, name, now_ms) == :alive, do: name)
+  @doc "Whom this node hears, and from where, sorted."
+  @spec hears(t(), integer()) :: [{name(), Swarm.Mesh.Strategy.address()}]
+  def hears(book, now_ms) do
+    Enum.sort(
+      for {name, entry} <- book.nodes,
+          status(book, name, now_ms) == :alive,
+          do: {name, entry.address}
+    )
+  end
 
   @doc "What time has changed: who has become suspect, who is gone."
   @spec age(t(), integer()) :: {t(), [{:suspect | :gone, name()}]}
@@ -142,11 +177,13 @@ defmodule Swarm.Mesh.Book do
 
   @doc """
   The addresses that get a beacon now: those that are there once a second, or each time when `often?`;
-  those that are not, at growing intervals.
+  those that are not, and leads, at growing intervals.
   """
   @spec due(t(), boolean(), integer(), float()) :: {[Swarm.Mesh.Strategy.address()], t()}
   def due(book, often?, now_ms, chance) do
-    for {name, entry} <- Enum.sort(book.nodes), reduce: {[], book} do
+    {due, book} = follow(book, now_ms, chance)
+
+    for {name, entry} <- Enum.sort(book.nodes), reduce: {due, book} do
       {due, book} ->
         cond do
           entry.status != :gone and (often? or Backoff.due?(entry.probe, now_ms)) ->
@@ -160,6 +197,16 @@ defmodule Swarm.Mesh.Book do
           true ->
             {due, book}
         end
+    end
+  end
+
+  defp follow(book, now_ms, chance) do
+    for {name, {address, backoff}} <- Enum.sort(book.leads),
+        Backoff.due?(backoff, now_ms),
+        reduce: {[], book} do
+      {due, book} ->
+        lead = {address, Backoff.tried(backoff, now_ms, chance)}
+        {[address | due], %{book | leads: Map.put(book.leads, name, lead)}}
     end
   end
 
@@ -179,7 +226,10 @@ defmodule Swarm.Mesh.Book do
       )
 
   defp up(book, name, entry),
-    do: {put(%{book | number: book.number + 1}, name, entry), [{:up, name}]}
+    do: {
+      put(%{book | number: book.number + 1, leads: Map.delete(book.leads, name)}, name, entry),
+      [{:up, name}]
+    }
 
   defp put(book, name, entry), do: %{book | nodes: Map.put(book.nodes, name, entry)}
 end

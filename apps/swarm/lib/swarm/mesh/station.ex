@@ -219,10 +219,10 @@ defmodule Swarm.Mesh.Station do
     end
   end
 
-  defp take(station, packet, node, %Beacon{} = beacon, {ip, _port}, _now_ms) do
+  defp take(station, packet, node, %Beacon{} = beacon, {ip, _port}, now_ms) do
     learn = if beacon.port > 0, do: [{:learn, packet.sender, ip, beacon.port}], else: []
     rival = if node == station.roster.me, do: [{:event, :duplicate_node, %{node: node}}], else: []
-    {%{station | book: Book.beacon(station.book, packet.sender, beacon)}, learn ++ rival}
+    {%{station | book: Book.beacon(station.book, packet.sender, beacon, now_ms)}, learn ++ rival}
   end
 
   defp take(station, packet, node, {to, %Message{from: from} = message}, _address, now_ms) do
