@@ -13,7 +13,10 @@ defmodule Sim.MixProject do
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
       compilers: [:native | Mix.compilers()],
-      native: [nifs: [kernel: ["rays.c", "paint.c", "kernel_nif.c"]]],
+      native: [
+        nifs: [kernel: ["rays.c", "paint.c", "kernel_nif.c"]],
+        programs: [leash: ["leash.c"]]
+      ],
       elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
       deps: [{:swarm, in_umbrella: true}]

@@ -8,16 +8,17 @@ defmodule Console.Demo do
 
   @doc """
   Runs `options` with a trial module (`Sim.Trial`) and returns the exit status: 0 when the fleet
-  ended in formation, 2 when it did not, 1 when the run cannot be made.
+  ended in formation, 2 when it did not, 1 when the run cannot be made. `lines` makes what is to be
+  said of the trial before it runs.
   """
-  @spec run(Options.t(), module()) :: 0 | 1 | 2
-  def run(%Options{} = options, trial_module) do
+  @spec run(Options.t(), module(), (term() -> [String.t()])) :: 0 | 1 | 2
+  def run(%Options{} = options, trial_module, lines \\ fn _trial -> [] end) do
     # With `--json -` the standard output belongs to the report alone.
     output = Output.to(if(options.json == "-", do: :stderr, else: :stdio))
 
     case trial_module.new(Options.trial(options)) do
       {:ok, trial} ->
-        Output.line(output, heading(options))
+        Enum.each([heading(options) | lines.(trial)], &Output.line(output, &1))
         started = System.monotonic_time(:millisecond)
         scene = trial_module.scene(trial)
 

@@ -22,6 +22,9 @@ defmodule Console.Live do
   @doc "Carries a command out, or says in one line why not."
   @callback command(live :: term(), command()) :: {:ok, String.t()} | {:error, String.t()}
 
+  @doc "Where its processes of the operating system are, and how to reach them, a line each."
+  @callback lines(live :: term()) :: [String.t()]
+
   @doc "The result for the report, as `Sim.Trial.result/1` gives it."
   @callback result(live :: term()) :: map()
 end

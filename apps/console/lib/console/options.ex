@@ -20,6 +20,7 @@ defmodule Console.Options do
             duration_s: nil,
             blobs: :painted,
             headless: false,
+            nodes: false,
             json: nil,
             picture: nil,
             help: false
@@ -66,6 +67,8 @@ defmodule Console.Options do
       bin/demo --headless --kill leader@40 --seed 7         what happens when the leader dies?
       bin/demo --headless --move 3,2@40 --picture run.svg   the landmark moves away; see the paths
       bin/demo --headless --map hospital --json -           a report for another program
+      bin/demo --nodes --robots 4                           five processes: kill -9 one of them
+      bin/demo --nodes --headless --kill leader@40 --json - the same with a report
 
     Exit status: 0 the fleet ended in formation, 2 it did not, 1 something was wrong with the input.
     """
@@ -119,7 +122,9 @@ defmodule Console.Options do
        "may another robot take over when it sees better? (on)"},
       {"duration", "S", &Values.number(&1, 1, 3600),
        "simulated seconds at most (120, hospital 180;\nlive on a terminal: until you quit)"},
-      {"headless", nil, nil, "no view, as fast as it goes"},
+      {"headless", nil, nil, "no view, as fast as it goes (with --nodes in real time)"},
+      {"nodes", nil, nil,
+       "each robot and the world in a process of its own, a node\nto attach to, to kill -9 and to kill -STOP"},
       {"json", "FILE|-", &file(&1, "", folder), "write the report (- is standard output)"},
       {"picture", "FILE.svg", &file(&1, ".svg", folder),
        "draw the paths and the formation error"},

@@ -7,10 +7,10 @@ defmodule Console.Prompt do
   alias Console.{Fleet, Suggest, Values}
   alias Robot.Command
 
-  @words ~w(kill formation landmark move goto follow stop estop reset start status tell help quit)
+  @words ~w(kill formation landmark move goto follow stop estop reset start status nodes tell help quit)
 
   @type parsed ::
-          Console.Live.command() | :help | :status | {:status, atom()} | :quit | :nothing
+          Console.Live.command() | :help | :nodes | :status | {:status, atom()} | :quit | :nothing
 
   @doc """
   A command, or one line that says what is allowed.
@@ -69,6 +69,7 @@ defmodule Console.Prompt do
       "estop, reset                  emergency stop of all; held until the reset",
       "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all",
       "status, status mag2           what everybody does",
+      "nodes                         their processes, and how to attach to one",
       "quit                          the end (so is Ctrl-C); Tab completes"
     ]
   end
@@ -132,6 +133,7 @@ defmodule Console.Prompt do
   defp command("estop", [], _robots), do: {:ok, :estop}
   defp command("reset", [], _robots), do: {:ok, :reset}
   defp command("status", [], _robots), do: {:ok, :status}
+  defp command("nodes", [], _robots), do: {:ok, :nodes}
   defp command("status", [name], robots), do: with_robot(name, robots, &{:status, &1})
   defp command(word, _rest, _robots) when word in ["help", "?"], do: {:ok, :help}
   defp command(word, _rest, _robots) when word in ["quit", "exit", "q"], do: {:ok, :quit}

@@ -61,7 +61,7 @@ defmodule Console.Session do
       started_ms: System.monotonic_time(:millisecond)
     }
 
-    begin(session, options)
+    begin(session, options, if(options.nodes, do: module.lines(live), else: []))
     send(self(), :draw)
     session = loop(session)
     Process.unlink(reader)
@@ -69,10 +69,14 @@ defmodule Console.Session do
     session
   end
 
-  defp begin(%{mode: :screen}, _options), do: IO.write(Terminal.enter())
+  # Before the full screen, so that they can still be read after it.
+  defp begin(%{mode: :screen} = session, _options, lines) do
+    Enum.each(lines, &Output.line(session.output, &1))
+    IO.write(Terminal.enter())
+  end
 
-  defp begin(session, options) do
-    Output.line(session.output, Demo.heading(options))
+  defp begin(session, options, lines) do
+    Enum.each([Demo.heading(options) | lines], &Output.line(session.output, &1))
     Output.line(session.output, Terminal.hint())
   end
 
@@ -125,6 +129,9 @@ defmodule Console.Session do
 
       :quit ->
         session
+
+      {:EXIT, ^live, {:shutdown, line}} when is_binary(line) ->
+        refuse(line)
 
       {:EXIT, ^live, reason} ->
         exit({:fleet_died, reason})
@@ -185,6 +192,7 @@ defmodule Console.Session do
       {:ok, :nothing} -> session
       {:ok, :quit} -> {:quit, session}
       {:ok, :help} -> show(session, Prompt.help())
+      {:ok, :nodes} -> show(session, session.module.lines(session.live))
       {:ok, :status} -> show(session, Words.everybody(session.module.scene(session.live)))
       {:ok, {:status, name}} -> show(session, Words.one(session.module.scene(session.live), name))
       {:ok, command} -> act(session, String.trim(line), command)

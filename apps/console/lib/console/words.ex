@@ -27,6 +27,8 @@ defmodule Console.Words do
   def meaning(%{stage: :formed}), do: "every robot stands in its place"
   def meaning(%{stage: :landmark_moved}), do: "the landmark sets off"
   def meaning(%{stage: :killed, robot: robot}), do: "#{robot} is dead"
+  def meaning(%{stage: :world_lost}), do: "the world has ended; robots stand, it is started again"
+  def meaning(%{stage: :world_back}), do: "the world goes on where it was"
   def meaning(%{stage: :lost} = stage), do: "#{subject(stage)} has lost the landmark"
   def meaning(%{stage: name}), do: name |> to_string() |> String.replace("_", " ")
 

@@ -1,33 +1,26 @@
 defmodule Sim.Fleet do
   @moduledoc """
-  A world and n robots on this node, in real time: each robot is the whole tree of
-  `Robot.Supervisor` with simulated drivers, so that `Swarm` commands it like any other, and any of
-  its processes may be killed.
+  A world and n robots in real time, so that `Swarm` commands them like any other, and any part of
+  them may be killed: on this node (`Sim.Fleet.Local`), or each in a process of the operating system of
+  its own (`Sim.Fleet.Nodes`).
 
-      Sim.Fleet
-      `-- supervisor (one_for_all, no restarts: without its world a fleet is none)
-          |-- Sim.Worlds     unless another fleet of this node has it already
-          |-- Sim.Server     the world
-          |-- Sim.Fleet.Air  a radio that loses, if any is lost
-          `-- Robot.Fleet    the robots, each :temporary: one that ends for good is a wreck
-
-  This process plays the script, keeps the ledger, and answers what viewers ask.
+  This process plays the script, keeps the ledger, and answers what viewers ask; where world and
+  robots run is its crew's business (`Sim.Fleet.Crew`).
   """
   use GenServer
-  alias Hal.{Event, Pose}
-  alias Robot.{Board, Config, Pilot}
-  alias Sim.Fleet.Air
-  alias Sim.{Scene, Server, World, Worlds}
-  alias Sim.Trial.{Ledger, Score, Script, Setup}
-  alias Swarm.Missions.Manual
+  alias Hal.Pose
+  alias Sim.Fleet.{Local, Nodes}
+  alias Sim.Scene
+  alias Sim.Trial.{Finish, Ledger, Score, Script, Setup}
 
   @period_ms 100
 
   @doc """
   Starts a fleet. All options have defaults: `robots`, `seed`, `map`, `landmark`, `formation`, `noise`,
   `loss` and the others of `Sim.Trial.Setup.new/1` (there is no time limit here); `mission: false` for
-  robots that wait for commands instead of starting their mission at once; `trace` as of
-  `Robot.Config`, called with the robot's id first.
+  robots that wait for commands instead of starting their mission at once; `nodes: true` for robots and
+  world in processes of the operating system of their own; `trace` as of `Robot.Config`, called
+  with the robot's id first (on one node).
 
       {:ok, fleet} = Sim.Fleet.start_link()
       {:ok, fleet} = Sim.Fleet.start_link(robots: [:mag1, :mag2, :min1], map: "hospital", mission: false)
@@ -37,13 +30,21 @@ defmodule Sim.Fleet do
   @spec start_link(keyword() | map()) :: {:ok, pid()} | {:error, line :: String.t()}
   def start_link(options \\ []) do
     options = Map.new(options)
-    {mission?, options} = Map.pop(options, :mission, true)
-    {trace, options} = Map.pop(options, :trace)
+    {own, options} = Map.split(options, [:mission, :trace, :nodes])
+    crew = if own[:nodes], do: Nodes, else: Local
 
     with {:ok, setup} <- Setup.new(options),
          :ok <- free(setup.options.robots) do
       {:ok, _apps} = Application.ensure_all_started(:swarm)
-      GenServer.start_link(__MODULE__, {setup, mission?, trace})
+      answer = make_ref()
+      start = {setup, crew, own, {self(), answer}}
+
+      # What could not start has ended well, and said why.
+      with :ignore <- GenServer.start_link(__MODULE__, start) do
+        receive do
+          {^answer, line} -> {:error, line}
+        end
+      end
     end
   end
 
@@ -72,60 +73,62 @@ defmodule Sim.Fleet do
   @spec server(GenServer.server()) :: pid()
   def server(fleet), do: GenServer.call(fleet, :server)
 
+  @doc "Whether the run is over, as `Sim.Trial.Finish` has it."
+  @spec done?(GenServer.server()) :: boolean()
+  def done?(fleet), do: GenServer.call(fleet, :done?, :infinity)
+
+  @doc "How to reach the fleet's processes of the operating system, a line each."
+  @spec lines(GenServer.server()) :: [String.t()]
+  def lines(fleet), do: GenServer.call(fleet, :lines, :infinity)
+
   @doc "Ends all of it."
   @spec stop(GenServer.server()) :: :ok
   def stop(fleet), do: GenServer.stop(fleet)
 
-  @doc "The clock of a fleet's robots: milliseconds since its start."
-  @spec now(integer()) :: non_neg_integer()
-  def now(epoch_ms), do: System.monotonic_time(:millisecond) - epoch_ms
-
   @impl GenServer
-  def init({%Setup{options: options} = setup, mission?, trace}) do
+  def init({setup, module, own, {caller, answer}}) do
     # So that `terminate/2` runs, and a fall of the parts is seen.
     Process.flag(:trap_exit, true)
-    epoch_ms = System.monotonic_time(:millisecond)
-    name = make_ref()
-    {:ok, supervisor} = Supervisor.start_link(parts(setup, name), parts_options())
-    part = fn id -> supervisor |> Supervisor.which_children() |> List.keyfind(id, 0) |> pid() end
-    {transport, air} = radio(part.(Air))
 
-    s = %{
+    case module.start(setup, Keyword.take(Map.to_list(own), [:trace])) do
+      {:ok, crew} ->
+        epoch_ms = System.monotonic_time(:millisecond)
+
+        {:ok, begun(setup, {module, crew}, epoch_ms),
+         {:continue, {:begin, own[:mission] != false}}}
+
+      {:error, line} ->
+        send(caller, {answer, line})
+        :ignore
+    end
+  end
+
+  defp begun(%Setup{options: options} = setup, crew, epoch_ms) do
+    schedule(%{
       setup: setup,
+      crew: crew,
       epoch_ms: epoch_ms,
-      supervisor: supervisor,
-      server: part.(Server),
-      air: air,
-      robots: %{},
       script: Script.new(options.moves, options.kills),
       ledger: Ledger.new(),
       next: epoch_ms
-    }
-
-    :ok = Event.attach({__MODULE__, self()}, [:robot, :stage], &__MODULE__.stage/4, self())
-    clock = {__MODULE__, :now, [epoch_ms]}
-    body = %{world: name, clock: clock, transport: transport, trace: trace}
-    robots = for robot <- setup.robots, do: start_robot(part.(Robot.Fleet), robot, body, setup)
-    {:ok, schedule(%{s | robots: Map.new(robots)}), {:continue, {:begin, mission?}}}
+    })
   end
 
   @impl GenServer
   def handle_continue({:begin, mission?}, s) do
-    # All at once: on a busy machine a hundred pilots one after the other take long to answer.
-    options = [max_concurrency: 100, ordered: false, timeout: :infinity]
-    if mission?, do: alive(s) |> Task.async_stream(&begin/1, options) |> Stream.run()
+    if mission?, do: ask(s, :begin)
     {:noreply, s}
   end
-
-  @doc false
-  @spec stage(Event.name(), map(), map(), pid()) :: term()
-  def stage(_event, _measurements, about, fleet), do: send(fleet, {:stage, about})
 
   @impl GenServer
   def handle_call(:scene, _from, s), do: {:reply, s |> run() |> Score.scene(), s}
   def handle_call(:result, _from, s), do: {:reply, s |> run() |> Score.result(), s}
-  def handle_call(:living, _from, s), do: {:reply, alive(s), s}
-  def handle_call(:server, _from, s), do: {:reply, s.server, s}
+  def handle_call(:living, _from, s), do: {:reply, ask(s, :living), s}
+  def handle_call(:server, _from, s), do: {:reply, ask(s, :server), s}
+  def handle_call(:lines, _from, s), do: {:reply, ask(s, :lines), s}
+
+  def handle_call(:done?, _from, s),
+    do: {:reply, s |> run() |> Map.put(:script, s.script) |> Finish.reached?(), s}
 
   def handle_call({:kill, :leader}, from, s) do
     case Ledger.leader(s.ledger) do
@@ -135,14 +138,16 @@ defmodule Sim.Fleet do
   end
 
   def handle_call({:kill, id}, _from, s) do
-    if id in alive(s),
-      do: {:reply, :ok, end_robot(s, id)},
-      else: {:reply, {:error, "no robot #{inspect(id)} lives here; #{list(alive(s))}"}, s}
+    living = ask(s, :living)
+
+    if id in living,
+      do: {:reply, :ok, play({:kill, id}, s)},
+      else: {:reply, {:error, "no robot #{inspect(id)} lives here; #{list(living)}"}, s}
   end
 
   def handle_call({:move, place}, _from, s) do
     with :ok <- Setup.check_landmarks(s.setup.map, [place]) do
-      {:reply, :ok, move(s, place)}
+      {:reply, :ok, play({:move, place}, s)}
     else
       error -> {:reply, error, s}
     end
@@ -150,31 +155,21 @@ defmodule Sim.Fleet do
 
   @impl GenServer
   def handle_info(:tick, s) do
-    ledger = Ledger.note(s.ledger, now(s.epoch_ms), claims(s))
+    ledger = Ledger.note(s.ledger, now(s.epoch_ms), ask(s, :claims))
     {events, script} = Script.due(s.script, now(s.epoch_ms), Ledger.leader(ledger))
     s = Enum.reduce(events, %{s | ledger: ledger, script: script}, &play/2)
     {:noreply, schedule(s)}
   end
 
-  def handle_info({:stage, %{robot: id, stage: stage} = about}, s) do
-    facts = Map.drop(about, [:robot, :stage])
-    {:noreply, if(id in alive(s), do: written(s, stage, id, facts), else: s)}
+  def handle_info(message, %{crew: {module, crew}} = s) do
+    case module.hear(crew, message) do
+      {:ok, events, crew} -> {:noreply, Enum.reduce(events, %{s | crew: {module, crew}}, &note/2)}
+      {:stop, reason} -> {:stop, reason, s}
+    end
   end
-
-  # However it ended: killed, or with its restarts used up.
-  def handle_info({:DOWN, _monitor, :process, pid, _reason}, s) when is_map_key(s.robots, pid),
-    do: {:noreply, wreck(s, pid)}
-
-  def handle_info({:EXIT, supervisor, reason}, %{supervisor: supervisor} = s),
-    do: {:stop, reason, s}
-
-  def handle_info(_other, s), do: {:noreply, s}
 
   @impl GenServer
-  def terminate(_reason, s) do
-    Event.detach({__MODULE__, self()})
-    if Process.alive?(s.supervisor), do: Supervisor.stop(s.supervisor, :shutdown)
-  end
+  def terminate(_reason, s), do: ask(s, :stop)
 
   defp free(robots) do
     case Enum.filter(robots, &(Process.whereis(Robot.Names) && Robot.Names.whereis(&1, :robot))) do
@@ -187,111 +182,35 @@ defmodule Sim.Fleet do
   defp list([one]), do: "#{one} lives"
   defp list(robots), do: "#{Enum.join(robots, ", ")} live"
 
-  defp parts(%{options: options, world: world}, name) do
-    worlds = if Worlds.running?(), do: [], else: [Worlds]
-    server = [%{id: Server, start: {Server, :start_link, [[name: name, world: world]]}}]
-    radio = [seed: options.seed, loss: options.loss]
-
-    air = if options.loss > 0, do: [%{id: Air, start: {Air, :start_link, [radio]}}], else: []
-
-    worlds ++ server ++ air ++ [Robot.Fleet]
+  defp play({:kill, id}, s) do
+    if id in ask(s, :living), do: note({:killed, id}, become(s, :kill, [id])), else: s
   end
 
-  defp parts_options, do: [strategy: :one_for_all, max_restarts: 0]
+  defp play({:move, place}, s),
+    do: note({:stage, :landmark_moved, nil, %{}}, become(s, :change, [{:move, place}]))
 
-  defp pid(nil), do: nil
-  defp pid({_id, pid, _type, _modules}), do: pid
+  defp note({:killed, id}, s), do: note({:stage, :killed, id, %{}}, s)
 
-  defp radio(nil), do: Air.clear()
-  defp radio(air), do: {Air.transport(air), air}
-
-  defp start_robot(fleet, %{id: id} = robot, body, setup) do
-    device = [world: body.world, robot: id]
-    camera = device ++ [blobs: setup.options.blobs, clock: body.clock]
-
-    config =
-      Config.new!(
-        id: id,
-        profile: robot.profile,
-        start: robot.start,
-        clock: body.clock,
-        drive: {Sim.Drive, device},
-        ptz: {Sim.Ptz, device},
-        camera: {Sim.Camera, camera},
-        colours: World.colours(),
-        mission: setup.mission,
-        trace: trace(body.trace, id)
-      )
-
-    {:ok, pid} =
-      Robot.Fleet.start_robot(fleet, Swarm.Link.join(config, transport: body.transport))
-
-    Process.monitor(pid)
-    {pid, id}
-  end
-
-  defp trace(nil, _id), do: nil
-  defp trace({m, f, a}, id), do: {m, f, a ++ [id]}
-
-  defp begin(id) do
-    :ok = Pilot.start(id)
-    :ok = Pilot.command(id, :start)
-  end
-
-  defp play({:kill, id}, s), do: if(id in alive(s), do: end_robot(s, id), else: s)
-  defp play({:move, place}, s), do: move(s, place)
-
-  defp move(s, place) do
-    Server.move_landmark(s.server, place)
-    written(s, :landmark_moved, nil, %{})
-  end
-
-  defp end_robot(s, id) do
-    {pid, ^id} = Enum.find(s.robots, fn {_pid, robot} -> robot == id end)
-    Process.exit(pid, :kill)
-    wreck(s, pid)
-  end
-
-  defp wreck(s, pid) do
-    {id, robots} = Map.pop!(s.robots, pid)
-    Server.kill(s.server, id)
-    written(%{s | robots: robots}, :killed, id, %{})
-  end
-
-  defp written(s, stage, id, facts),
+  defp note({:stage, stage, id, facts}, s),
     do: %{s | ledger: Ledger.stage(s.ledger, now(s.epoch_ms), stage, id, facts)}
-
-  defp alive(s) do
-    living = Map.values(s.robots)
-    Enum.filter(s.setup.options.robots, &(&1 in living))
-  end
 
   defp run(s) do
     %{
       at_ms: now(s.epoch_ms),
       options: s.setup.options,
-      world: Server.world(s.server),
+      world: ask(s, :world),
       ledger: s.ledger,
-      claims: Map.new(claims(s)),
-      messages: Air.counts(s.air)
+      claims: Map.new(ask(s, :claims)),
+      messages: ask(s, :messages)
     }
   end
 
-  # As in lockstep, but read off the boards.
-  defp claims(s), do: for(id <- alive(s), do: {id, claim(id)})
+  defp now(epoch_ms), do: System.monotonic_time(:millisecond) - epoch_ms
 
-  defp claim(id) do
-    with {:ok, board} <- Board.find(id),
-         {:ok, %{state: state, claim: claim}, _at_ms} <- Board.fetch(board, :mission, :infinity) do
-      case state do
-        {Manual, phase} when phase not in [:ready, :done] -> Map.put(claim, :phase, :manual)
-        _group_or_idle -> claim
-      end
-    else
-      # Between the fall of a board and the next one.
-      :error -> %{}
-    end
-  end
+  defp ask(%{crew: {module, crew}}, what), do: apply(module, what, [crew])
+
+  defp become(%{crew: {module, crew}} = s, what, arguments),
+    do: %{s | crew: {module, apply(module, what, [crew | arguments])}}
 
   defp schedule(s) do
     next = max(s.next + @period_ms, System.monotonic_time(:millisecond))

@@ -9,11 +9,10 @@ defmodule Sim.Trial do
   """
   alias Hal.Pose
   alias Sim.{Radio, Scene, World}
-  alias Sim.Trial.{Ledger, Score, Script, Setup}
+  alias Sim.Trial.{Finish, Ledger, Score, Script, Setup}
   alias Swarm.Member
 
   @half_ms 50
-  @calm_ms 5_000
 
   @enforce_keys [:options, :map, :world, :radio, :members, :script, :ledger, :colours]
   defstruct @enforce_keys ++ [at_ms: 0]
@@ -51,13 +50,7 @@ defmodule Sim.Trial do
   formation, or at rest without a landmark, for 5 s.
   """
   @spec done?(t()) :: boolean()
-  def done?(%__MODULE__{} = trial) do
-    calm_ms = Ledger.calm_since_ms(trial.ledger)
-
-    trial.at_ms >= trial.options.duration_s * 1000 or
-      (Script.over?(trial.script, trial.world) and calm_ms != nil and
-         trial.at_ms - max(calm_ms, Script.last_ms(trial.script)) >= @calm_ms)
-  end
+  def done?(%__MODULE__{} = trial), do: Finish.reached?(trial)
 
   @doc "Whether the fleet is in formation now, by its own judgement."
   @spec formed?(t()) :: boolean()

@@ -19,6 +19,9 @@ defmodule Console.Live.Fleet do
   def result(live), do: Fleet.result(live)
 
   @impl Console.Live
+  def lines(live), do: Fleet.lines(live)
+
+  @impl Console.Live
   def command(live, command) do
     case carry_out(command, live) do
       :ok -> {:ok, told(command)}

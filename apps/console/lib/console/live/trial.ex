@@ -27,6 +27,9 @@ defmodule Console.Live.Trial do
   @impl Console.Live
   def result(live), do: GenServer.call(live, :result, :infinity)
 
+  @impl Console.Live
+  def lines(_live), do: ["all robots live in process #{System.pid()}, in lockstep; see --nodes"]
+
   @impl GenServer
   def init({module, trial}) do
     send(self(), :step)

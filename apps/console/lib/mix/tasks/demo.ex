@@ -14,6 +14,9 @@ defmodule Mix.Tasks.Demo do
   # Twenty robots take a third of a processor, fifty a whole one: all hear all.
   @robots_a_processor 20
 
+  # What a node needs is a thirtieth of a processor, and more with every other node.
+  @nodes_a_processor 15
+
   # As the shell says it of programs that nobody reads any more.
   @unread 141
 
@@ -35,11 +38,30 @@ defmodule Mix.Tasks.Demo do
 
   # Who reads us may have seen enough, as `head` does; then we end without a word.
   defp play(options) do
-    if options.headless, do: Demo.run(options, Sim.Trial), else: live(options)
+    if options.nodes, do: warn(length(options.robots))
+
+    cond do
+      options.headless and options.nodes -> Demo.run(options, Live.Paced, &Live.Paced.lines/1)
+      options.headless -> Demo.run(options, Sim.Trial)
+      true -> live(options)
+    end
   rescue
     error in ErlangError ->
       if error.original == :terminated, do: @unread, else: reraise(error, __STACKTRACE__)
   end
+
+  defp warn(robots) do
+    if robots > @nodes_a_processor * System.schedulers_online() do
+      IO.puts(
+        :stderr,
+        "demo: #{robots} processes are much for this machine; up to " <>
+          "#{@nodes_a_processor * System.schedulers_online()} keep real time"
+      )
+    end
+  end
+
+  defp live(%{nodes: true} = options),
+    do: Session.run(options, Live.Fleet, &Live.Fleet.start_link(Map.put(&1, :nodes, true)))
 
   defp live(options) do
     if length(options.robots) <= @robots_a_processor * System.schedulers_online(),

@@ -1,6 +1,6 @@
 defmodule Sim.Fleet.Air do
   @moduledoc """
-  Two radios for robots of one node, as transports of `Swarm.Link`: one that counts and hands on at
+  Two radios for simulated robots, as transports of `Swarm.Link`: one that counts and hands on at
   once, and one that loses and delays by `Sim.Radio`.
   """
   use GenServer
@@ -11,6 +11,18 @@ defmodule Sim.Fleet.Air do
 
   @typedoc "What was sent, for the radio that never loses."
   @type counter :: :counters.counters_ref()
+
+  @doc "The part of a fleet's tree that loses `loss` of all messages; none where none is lost."
+  @spec parts(number(), integer()) :: [Supervisor.child_spec()]
+  def parts(loss, seed) when loss > 0,
+    do: [%{id: __MODULE__, start: {__MODULE__, :start_link, [[seed: seed, loss: loss]]}}]
+
+  def parts(_no_loss, _seed), do: []
+
+  @doc "The transport of that part, or of none, and what counts its messages."
+  @spec radio(pid() | nil) :: {{module(), atom(), list()}, pid() | counter()}
+  def radio(nil), do: clear()
+  def radio(air), do: {transport(air), air}
 
   @doc "The transport that never loses, and its counter."
   @spec clear() :: {{module(), atom(), list()}, counter()}
@@ -56,7 +68,7 @@ defmodule Sim.Fleet.Air do
   @impl GenServer
   def handle_info(:poll, s) do
     {letters, radio} = Radio.receive(s.radio, now())
-    for {to, _from, message} <- letters, do: Link.hear(to, message)
+    for {to, from, message} <- letters, do: Link.transmit(from, [to], message)
     {:noreply, poll(%{s | radio: radio, polling?: false})}
   end
 

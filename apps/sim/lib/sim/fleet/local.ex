@@ -1,0 +1,133 @@
+defmodule Sim.Fleet.Local do
+  @moduledoc """
+  World and robots on this node: each robot the whole tree of `Robot.Supervisor`.
+
+      supervisor (one_for_all, no restarts: without its world a fleet is none)
+      |-- Sim.Worlds     unless another fleet of this node has it already
+      |-- Sim.Server     the world
+      |-- Sim.Fleet.Air  a radio that loses, if any is lost
+      `-- Robot.Fleet    the robots, each :temporary: one that ends for good is a wreck
+  """
+  @behaviour Sim.Fleet.Crew
+  alias Hal.Event
+  alias Sim.Fleet.{Air, Robot}
+  alias Sim.{Server, Worlds}
+
+  @enforce_keys [:supervisor, :server, :air, :order, :pids]
+  defstruct @enforce_keys
+
+  @impl Sim.Fleet.Crew
+  def start(setup, options) do
+    name = make_ref()
+    {:ok, supervisor} = Supervisor.start_link(parts(setup, name), parts_options())
+    part = fn id -> supervisor |> Supervisor.which_children() |> List.keyfind(id, 0) |> pid() end
+    {transport, air} = Air.radio(part.(Air))
+    :ok = Event.attach({__MODULE__, self()}, [:robot, :stage], &__MODULE__.stage/4, self())
+
+    common = %{
+      world: name,
+      clock: Robot.clock(),
+      transport: transport,
+      blobs: setup.options.blobs,
+      mission: setup.mission,
+      trace: options[:trace]
+    }
+
+    pids =
+      for robot <- setup.robots, into: %{} do
+        {:ok, pid} = Robot.start(part.(Elixir.Robot.Fleet), robot, common)
+        Process.monitor(pid)
+        {pid, robot.id}
+      end
+
+    {:ok,
+     %__MODULE__{
+       supervisor: supervisor,
+       server: part.(Server),
+       air: air,
+       order: setup.options.robots,
+       pids: pids
+     }}
+  end
+
+  @doc false
+  @spec stage(Event.name(), map(), map(), pid()) :: term()
+  def stage(_event, _measurements, about, fleet), do: send(fleet, {:stage, about})
+
+  @impl Sim.Fleet.Crew
+  def begin(crew) do
+    # All at once: on a busy machine a hundred pilots one after the other take long to answer.
+    options = [max_concurrency: 100, ordered: false, timeout: :infinity]
+    crew |> living() |> Task.async_stream(&Robot.begin/1, options) |> Stream.run()
+  end
+
+  @impl Sim.Fleet.Crew
+  def living(crew) do
+    living = Map.values(crew.pids)
+    Enum.filter(crew.order, &(&1 in living))
+  end
+
+  @impl Sim.Fleet.Crew
+  def claims(crew), do: for(id <- living(crew), do: {id, Robot.claim(id)})
+
+  @impl Sim.Fleet.Crew
+  def kill(crew, id) do
+    {pid, ^id} = Enum.find(crew.pids, fn {_pid, robot} -> robot == id end)
+    Process.exit(pid, :kill)
+    wreck(crew, pid)
+  end
+
+  @impl Sim.Fleet.Crew
+  def change(crew, change) do
+    :ok = Server.change(crew.server, change)
+    crew
+  end
+
+  @impl Sim.Fleet.Crew
+  def world(crew), do: Server.world(crew.server)
+
+  @impl Sim.Fleet.Crew
+  def server(crew), do: crew.server
+
+  @impl Sim.Fleet.Crew
+  def messages(crew), do: Air.counts(crew.air)
+
+  @impl Sim.Fleet.Crew
+  def lines(_crew), do: ["all robots live in process #{System.pid()}; see --nodes"]
+
+  @impl Sim.Fleet.Crew
+  def hear(crew, {:stage, %{robot: id, stage: stage} = about}) do
+    facts = Map.drop(about, [:robot, :stage])
+    {:ok, if(id in living(crew), do: [{:stage, stage, id, facts}], else: []), crew}
+  end
+
+  # However it ended: killed, or with its restarts used up.
+  def hear(%{pids: pids} = crew, {:DOWN, _monitor, :process, pid, _reason})
+      when is_map_key(pids, pid),
+      do: {:ok, [{:killed, pids[pid]}], wreck(crew, pid)}
+
+  def hear(%{supervisor: supervisor}, {:EXIT, supervisor, reason}), do: {:stop, reason}
+  def hear(crew, _other), do: {:ok, [], crew}
+
+  @impl Sim.Fleet.Crew
+  def stop(crew) do
+    Event.detach({__MODULE__, self()})
+    if Process.alive?(crew.supervisor), do: Supervisor.stop(crew.supervisor, :shutdown)
+  end
+
+  defp wreck(crew, pid) do
+    {id, pids} = Map.pop!(crew.pids, pid)
+    change(%{crew | pids: pids}, {:kill, id})
+  end
+
+  defp parts(%{options: options, world: world}, name) do
+    worlds = if Worlds.running?(), do: [], else: [Worlds]
+    server = [%{id: Server, start: {Server, :start_link, [[name: name, world: world]]}}]
+    worlds ++ server ++ Air.parts(options.loss, options.seed) ++ [Elixir.Robot.Fleet]
+  end
+
+  defp parts_options, do: [strategy: :one_for_all, max_restarts: 0]
+
+  defp pid(nil), do: nil
+  defp pid({_id, pid, _type, _modules}), do: pid
+end

@@ -1,0 +1,88 @@
+defmodule Sim.Fleet.Nodes.Child do
+  @moduledoc """
+  A node that we started: its process of the operating system behind a port. It lives no longer than
+  we do: its standard input closes with us, and the leash (`c_src/leash.c`) ends it even when it is
+  frozen.
+  """
+  alias Sim.Fleet.Nodes.Command
+  alias Sim.Node.Config
+
+  @apps [:logger, :hal, :vision, :robot, :swarm, :sim]
+  @own_flags ~w(ERL_FLAGS ERL_AFLAGS ERL_ZFLAGS ELIXIR_ERL_OPTIONS)
+  @kept_bytes 4_000
+
+  @enforce_keys [:node, :port, :pid]
+  defstruct @enforce_keys ++ [up: nil, said: ""]
+
+  @typedoc "`up` holds what it told when it was there; `said` the last of what it printed."
+  @type t :: %__MODULE__{
+          node: node(),
+          port: port(),
+          pid: pos_integer(),
+          up: map() | nil,
+          said: String.t()
+        }
+
+  @doc "Starts a node, in the calling process; `home` holds its cookie."
+  @spec start(Config.t(), Path.t()) :: {:ok, t()} | {:error, line :: String.t()}
+  def start(%Config{} = config, home) do
+    leash = Application.app_dir(:sim, "priv/leash")
+    erl = System.find_executable("erl") || Path.join([:code.root_dir(), "bin", "erl"])
+
+    environment =
+      [{~c"HOME", to_charlist(home)}, {~c"ERL_CRASH_DUMP_BYTES", ~c"0"}] ++
+        for(v <- @own_flags, do: {to_charlist(v), false})
+
+    arguments = [erl | Command.arguments(folders())]
+    options = [:binary, :exit_status, :stderr_to_stdout, args: arguments, env: environment]
+    port = Port.open({:spawn_executable, leash}, options)
+
+    case Port.info(port, :os_pid) do
+      {:os_pid, pid} ->
+        true = Port.command(port, Config.line(config))
+        {:ok, %__MODULE__{node: config.node, port: port, pid: pid}}
+
+      nil ->
+        {:error, "#{config.node} cannot be started: #{leash} #{erl} does not run"}
+    end
+  end
+
+  @doc "It printed something."
+  @spec said(t(), binary()) :: t()
+  def said(child, text) do
+    all = child.said <> text
+    size = byte_size(all)
+    kept = min(size, @kept_bytes)
+    %{child | said: binary_part(all, size - kept, kept)}
+  end
+
+  @doc "The last line that it printed, for a message to people."
+  @spec last_line(t()) :: String.t()
+  def last_line(child) do
+    case child.said |> String.split("\n", trim: true) |> List.last() do
+      nil ->
+        "it printed nothing"
+
+      line ->
+        if String.valid?(line), do: String.slice(line, 0, 200), else: inspect(line, limit: 200)
+    end
+  end
+
+  @doc "Kills it, frozen or not, and without asking it."
+  @spec kill(t()) :: :ok
+  def kill(child) do
+    _ = System.cmd("kill", ["-KILL", Integer.to_string(child.pid)], stderr_to_stdout: true)
+    :ok
+  end
+
+  # Those of this build: what runs here runs there.
+  defp folders do
+    consolidated =
+      for path <- :code.get_path(), List.to_string(path) =~ ~r"consolidated$", do: path
+
+    apps = for app <- @apps, do: Application.app_dir(app, "ebin")
+    Enum.map(consolidated, &List.to_string/1) ++ apps ++ [elixir()]
+  end
+
+  defp elixir, do: Path.join(to_string(:code.lib_dir(:elixir)), "ebin")
+end

@@ -1,0 +1,66 @@
+defmodule Sim.Fleet.Nodes.Command do
+  @moduledoc "How a node is started, and how a person reaches it: commands and lines as text. Pure."
+
+  # A robot has little to do: one scheduler, no busy waiting (there are more nodes than processors),
+  # and few threads.
+  @emulator ~w(+S 1:1 +SDcpu 1:1 +SDio 1 +A 1 +sbwt none +sbwtdcpu none +sbwtdio none)
+
+  # A cut link must not make healthy nodes leave each other, and nobody dials by the way.
+  @kernel ~w(-kernel prevent_overlapping_partitions false -kernel connect_all false
+             -kernel dist_auto_connect never -kernel inet_dist_use_interface {127,0,0,1})
+
+  @doc """
+  The arguments of `erl` for a node, with the code of these folders.
+
+      iex> Sim.Fleet.Nodes.Command.arguments(["a/ebin"]) |> Enum.take(-5)
+      ["-pa", "a/ebin", "-s", "Elixir.Sim.Node", "main"]
+  """
+  @spec arguments([Path.t()]) :: [String.t()]
+  def arguments(folders) do
+    ["-noshell"] ++ @emulator ++ @kernel ++ ["-pa" | folders] ++ ["-s", "Elixir.Sim.Node", "main"]
+  end
+
+  @doc """
+  A node's name.
+
+      iex> Sim.Fleet.Nodes.Command.node_name(:mag1, "127.0.0.1")
+      :"mag1@127.0.0.1"
+  """
+  @spec node_name(atom(), String.t()) :: node()
+  def node_name(id, host), do: :"#{id}@#{host}"
+
+  @doc """
+  The lines that tell people of a fleet's processes.
+
+      iex> [first, _world, attach | _] =
+      ...>   Sim.Fleet.Nodes.Command.lines([{:mag1, :"mag1@127.0.0.1", 71}, {:world, :"world@127.0.0.1", 70}], "/tmp/x")
+      iex> first
+      "mag1 pid 71 node mag1@127.0.0.1"
+      iex> attach
+      "attach:   HOME=/tmp/x iex --hidden --name me$$@127.0.0.1 --remsh mag1@127.0.0.1"
+  """
+  @spec lines([{atom(), node(), pid :: pos_integer() | nil}], Path.t()) :: [String.t()]
+  def lines(nodes, home) do
+    width =
+      nodes |> Enum.map(fn {id, _, _} -> String.length("#{id}") end) |> Enum.max(fn -> 0 end)
+
+    width = if length(nodes) > 2, do: width, else: 0
+    living = Enum.filter(nodes, fn {_id, _node, pid} -> pid end)
+    for({id, node, pid} <- nodes, do: line(id, node, pid, width)) ++ ways(living, home)
+  end
+
+  defp ways([], _home), do: ["no process is left to attach to"]
+
+  defp ways([{_id, node, pid} | _], home) do
+    [_name, host] = node |> Atom.to_string() |> String.split("@")
+
+    [
+      "attach:   HOME=#{home} iex --hidden --name me$$@#{host} --remsh #{node}",
+      "kill:     kill -9 #{pid}     freeze: kill -STOP #{pid}     continue: kill -CONT #{pid}"
+    ]
+  end
+
+  defp line(id, node, nil, width), do: "#{pad(id, width)} is gone, was node #{node}"
+  defp line(id, node, pid, width), do: "#{pad(id, width)} pid #{pid} node #{node}"
+  defp pad(id, width), do: String.pad_trailing("#{id}", width)
+end

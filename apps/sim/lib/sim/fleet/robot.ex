@@ -1,0 +1,76 @@
+defmodule Sim.Fleet.Robot do
+  @moduledoc "One robot of a simulated fleet on this node: its config, its start, what it claims."
+  alias Robot.{Board, Config, Pilot}
+  alias Sim.World
+  alias Swarm.Missions.Manual
+
+  @typedoc """
+  What all robots of a fleet have in common: the name of their world, their clock and radio, how they
+  see, what they are at, and who is told what goes in and out (`{m, f, a}`, called with the id first).
+  """
+  @type common :: %{
+          world: term(),
+          clock: Config.call(),
+          transport: Config.call(),
+          blobs: :painted | :direct,
+          mission: Config.module_options(),
+          trace: Config.call() | nil
+        }
+
+  @doc "Starts a robot of `Sim.Trial.Setup` in a `Robot.Fleet`."
+  @spec start(Supervisor.supervisor(), Sim.Trial.Setup.robot(), common()) :: {:ok, pid()}
+  def start(fleet, robot, common) do
+    config = Swarm.Link.join(config(robot, common), transport: common.transport)
+    {:ok, _pid} = Robot.Fleet.start_robot(fleet, config)
+  end
+
+  @doc "A clock of robots: milliseconds since now."
+  @spec clock() :: Config.call()
+  def clock, do: {__MODULE__, :now, [System.monotonic_time(:millisecond)]}
+
+  @doc "The time by such a clock."
+  @spec now(integer()) :: non_neg_integer()
+  def now(epoch_ms), do: System.monotonic_time(:millisecond) - epoch_ms
+
+  @doc "Begins its mission."
+  @spec begin(atom()) :: :ok
+  def begin(id) do
+    :ok = Pilot.start(id)
+    :ok = Pilot.command(id, :start)
+  end
+
+  @doc "What it claims of itself, as in lockstep, but read off its board."
+  @spec claim(atom()) :: map()
+  def claim(id) do
+    with {:ok, board} <- Board.find(id),
+         {:ok, %{state: state, claim: claim}, _at_ms} <- Board.fetch(board, :mission, :infinity) do
+      case state do
+        {Manual, phase} when phase not in [:ready, :done] -> Map.put(claim, :phase, :manual)
+        _group_or_idle -> claim
+      end
+    else
+      # Between the fall of a board and the next one.
+      :error -> %{}
+    end
+  end
+
+  defp config(%{id: id} = robot, common) do
+    device = [world: common.world, robot: id]
+
+    Config.new!(
+      id: id,
+      profile: robot.profile,
+      start: robot.start,
+      clock: common.clock,
+      drive: {Sim.Drive, device},
+      ptz: {Sim.Ptz, device},
+      camera: {Sim.Camera, device ++ [blobs: common.blobs, clock: common.clock]},
+      colours: World.colours(),
+      mission: common.mission,
+      trace: trace(common.trace, id)
+    )
+  end
+
+  defp trace(nil, _id), do: nil
+  defp trace({m, f, a}, id), do: {m, f, a ++ [id]}
+end

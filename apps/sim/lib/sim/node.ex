@@ -1,0 +1,90 @@
+defmodule Sim.Node do
+  @moduledoc """
+  The main program of a process of the operating system that holds one robot, or the world, of a
+  `Sim.Fleet.Nodes`.
+
+  Its first line of standard input is its whole configuration (`Sim.Node.Config`), so that nothing of it is
+  on a command line. It becomes a node by that, starts its part, and tells the launcher, a process on
+  another node. It ends when standard input closes: nobody needs it any more then.
+
+  What it tells the launcher goes by `Sim.Node.Courier`.
+  """
+  alias Sim.Node.{Config, Courier, Dialer}
+
+  @doc "What a part of a fleet is, in a node of its own."
+  @callback start(options :: map()) ::
+              {:ok, supervisor :: pid(), facts :: map(), report :: {module(), atom(), list()}}
+
+  @doc "Called when the launcher says that all are there."
+  @callback begin(options :: map()) :: :ok
+
+  @doc "Starts what standard input says; for `erl -s`."
+  @spec main() :: pid()
+  def main, do: spawn(&run/0)
+
+  defp run do
+    :ok = :io.setopts(:standard_io, [:binary])
+
+    case Config.read(IO.gets("")) do
+      {:ok, config} ->
+        spawn_link(&watch/0)
+        become(config)
+
+      {:error, line} ->
+        fail(line)
+    end
+  end
+
+  # Nothing more comes, until the end.
+  defp watch do
+    case IO.gets("") do
+      line when is_binary(line) -> watch()
+      _closed -> :erlang.halt(0, flush: false)
+    end
+  end
+
+  defp become(config) do
+    Application.put_env(:logger, :level, :error)
+    {:ok, _apps} = Application.ensure_all_started(:sim)
+
+    case Node.start(config.node, :longnames) do
+      {:ok, _kernel} ->
+        start(config)
+
+      {:error, _reason} ->
+        fail("#{config.node} cannot start: is there a node of this name already?")
+    end
+  end
+
+  defp start(%{part: {module, options}} = config) do
+    Process.flag(:trap_exit, true)
+    Dialer.start(config.nodes)
+    {:ok, supervisor, facts, report} = module.start(options)
+    {:ok, courier} = Courier.start_link(config.launcher, report)
+    Courier.tell(courier, {:up, Map.put(facts, :main, self())})
+    wait(supervisor, courier, config.part)
+  end
+
+  defp wait(supervisor, courier, {module, options} = part) do
+    receive do
+      :begin ->
+        module.begin(options)
+        wait(supervisor, courier, part)
+
+      {:EXIT, ^supervisor, reason} ->
+        fail("its parts have ended: #{inspect(reason, limit: 20)}")
+
+      {:EXIT, ^courier, reason} ->
+        fail("its courier has ended: #{inspect(reason, limit: 20)}")
+
+      _other ->
+        wait(supervisor, courier, part)
+    end
+  end
+
+  @spec fail(String.t()) :: no_return()
+  defp fail(line) do
+    IO.puts(line)
+    System.halt(1)
+  end
+end

@@ -1,0 +1,44 @@
+defmodule Sim.Node.Config do
+  @moduledoc "What a node of a fleet is told at its start, as one line of text and back. Pure."
+
+  @enforce_keys [:node, :launcher, :nodes, :part]
+  defstruct @enforce_keys
+
+  @typedoc """
+  `launcher` is the process that hears of everything, `nodes` are those to be connected with, `part` is a
+  `Sim.Node` with its options.
+  """
+  @type t :: %__MODULE__{
+          node: node(),
+          launcher: pid(),
+          nodes: [node()],
+          part: {module(), map()}
+        }
+
+  @doc """
+  A config as one line.
+
+      iex> config = %Sim.Node.Config{node: :a@b, launcher: self(), nodes: [], part: {Some.Part, %{}}}
+      iex> config |> Sim.Node.Config.line() |> Sim.Node.Config.read()
+      {:ok, config}
+      iex> Sim.Node.Config.read("junk")
+      {:error, "this is started by a fleet of nodes, which tells it what to be"}
+  """
+  @spec line(t()) :: String.t()
+  def line(%__MODULE__{} = config),
+    do: (config |> :erlang.term_to_binary([:compressed]) |> Base.encode64()) <> "\n"
+
+  @doc "Back; what comes here is from the process that started this one, and trusted."
+  @spec read(String.t() | term()) :: {:ok, t()} | {:error, line :: String.t()}
+  def read(line) do
+    with true <- is_binary(line),
+         {:ok, bytes} <- Base.decode64(String.trim(line)),
+         # A version, and not another byte: so is every term.
+         <<131, _rest::binary>> <- bytes,
+         %__MODULE__{} = config <- :erlang.binary_to_term(bytes) do
+      {:ok, config}
+    else
+      _no_config -> {:error, "this is started by a fleet of nodes, which tells it what to be"}
+    end
+  end
+end

@@ -1,0 +1,44 @@
+defmodule Sim.Node.Robot do
+  @moduledoc """
+  One robot as the part of a node: the same tree as on a node with others.
+
+      supervisor (one_for_all, no restarts: a robot that ends for good takes its node along)
+      |-- Sim.Worlds     where the world is
+      |-- Sim.Fleet.Air  a radio that loses, if any is lost
+      `-- Robot.Fleet    the robot
+
+  Options: `robot` as of `Sim.Trial.Setup`, `world`, `blobs`, `mission` as of `Sim.Fleet.Robot`, `loss`
+  and `seed` of the radio.
+  """
+  @behaviour Sim.Node
+  alias Sim.Fleet.{Air, Robot}
+  alias Sim.Worlds
+
+  @impl Sim.Node
+  def start(options) do
+    children = [Worlds] ++ Air.parts(options.loss, options.seed) ++ [Elixir.Robot.Fleet]
+    {:ok, supervisor} = Supervisor.start_link(children, strategy: :one_for_all, max_restarts: 0)
+    part = fn id -> for {^id, pid, _, _} <- Supervisor.which_children(supervisor), do: pid end
+    {transport, air} = Air.radio(List.first(part.(Air)))
+
+    common = %{
+      world: options.world,
+      clock: Robot.clock(),
+      transport: transport,
+      blobs: options.blobs,
+      mission: options.mission,
+      trace: nil
+    }
+
+    {:ok, pid} = Robot.start(hd(part.(Elixir.Robot.Fleet)), options.robot, common)
+    Process.link(pid)
+    {:ok, pid, %{}, {__MODULE__, :report, [options.robot.id, air]}}
+  end
+
+  @impl Sim.Node
+  def begin(options), do: Robot.begin(options.robot.id)
+
+  @doc "What the robot claims of itself, and how many messages it sent."
+  @spec report(atom(), pid() | Air.counter()) :: {map(), map()}
+  def report(id, air), do: {Robot.claim(id), Air.counts(air)}
+end

@@ -1,0 +1,27 @@
+defmodule Sim.Node.World do
+  @moduledoc """
+  The world as the part of a node: `Sim.Server`, found by its name on all nodes (`Sim.Worlds`). What it
+  reports is a snapshot, from which it can be started again. Options: `name`, `world`.
+  """
+  @behaviour Sim.Node
+  alias Sim.{Server, Snapshot, Worlds}
+
+  @impl Sim.Node
+  def start(options) do
+    server = [name: options.name, world: options.world]
+    children = [Worlds, %{id: Server, start: {Server, :start_link, [server]}}]
+    {:ok, supervisor} = Supervisor.start_link(children, strategy: :one_for_all, max_restarts: 0)
+
+    {Server, pid, _type, _modules} =
+      supervisor |> Supervisor.which_children() |> List.keyfind(Server, 0)
+
+    {:ok, supervisor, %{server: pid}, {__MODULE__, :report, [pid]}}
+  end
+
+  @impl Sim.Node
+  def begin(_options), do: :ok
+
+  @doc "The world as it is, without what never changes."
+  @spec report(pid()) :: Snapshot.t()
+  def report(server), do: server |> Server.world() |> Snapshot.of()
+end

@@ -1,0 +1,26 @@
+defmodule Sim.Trial.Finish do
+  @moduledoc "When a run is over, in lockstep or live. Pure."
+  alias Sim.Trial.{Ledger, Script}
+
+  @calm_ms 5_000
+
+  @doc """
+  Whether its time is up, or nothing is to come and the fleet has been in formation, or at rest without
+  a landmark, for 5 s.
+  """
+  @spec reached?(%{
+          :at_ms => non_neg_integer(),
+          :options => map(),
+          :script => Script.t(),
+          :ledger => Ledger.t(),
+          :world => Sim.World.t(),
+          optional(atom()) => term()
+        }) :: boolean()
+  def reached?(run) do
+    calm_ms = Ledger.calm_since_ms(run.ledger)
+
+    run.at_ms >= run.options.duration_s * 1000 or
+      (Script.over?(run.script, run.world) and calm_ms != nil and
+         run.at_ms - max(calm_ms, Script.last_ms(run.script)) >= @calm_ms)
+  end
+end

@@ -1,0 +1,57 @@
+defmodule Sim.NodesTest do
+  @moduledoc "The pure parts of fleets whose robots are processes of their own."
+  use ExUnit.Case, async: true
+  alias Sim.Fleet.Nodes.{Child, Command}
+  alias Sim.Node.Config
+  doctest Sim.Fleet.Nodes.Command
+  doctest Sim.Node.Config
+
+  test "a node listens on loopback only, dials nobody by itself, and is told no secret" do
+    arguments = Command.arguments(["x/ebin"])
+    line = Enum.join(arguments, " ")
+    assert line =~ "inet_dist_use_interface {127,0,0,1}"
+    assert line =~ "prevent_overlapping_partitions false"
+    assert line =~ "dist_auto_connect never"
+    refute line =~ "cookie"
+  end
+
+  test "people are told of each process, and of those that are gone" do
+    nodes = [{:mag1, :"mag1@127.0.0.1", nil}, {:min1, :"min1@127.0.0.1", 12}]
+    [gone, there, attach, kill] = Command.lines(nodes, "/tmp/x")
+    assert gone =~ "mag1"
+    assert gone =~ "gone"
+    assert there == "min1 pid 12 node min1@127.0.0.1"
+    assert attach =~ "--remsh min1@127.0.0.1"
+    assert kill =~ "kill -9 12"
+    assert kill =~ "kill -STOP 12"
+    assert kill =~ "kill -CONT 12"
+    assert [gone, _no_command] = Command.lines([hd(nodes)], "/tmp/x")
+    assert gone =~ "gone"
+  end
+
+  test "a config is one line, whatever is in it, and nothing else is taken for one" do
+    {:ok, setup} = Sim.Trial.Setup.new(robots: [:mag1], map: "hall")
+    part = {Sim.Node.World, %{name: :w, world: setup.world}}
+    config = %Config{node: :"world@127.0.0.1", launcher: self(), nodes: [], part: part}
+    line = Config.line(config)
+    assert [_one, ""] = String.split(line, "\n")
+    assert Config.read(line) == {:ok, config}
+
+    for junk <- ["", "\n", "AAAA\n", Base.encode64("x"), :eof, ~c"list"] do
+      assert {:error, told} = Config.read(junk)
+      assert told =~ "fleet of nodes"
+    end
+  end
+
+  test "of what a node prints the end is kept, and its last line told" do
+    child = %Child{node: :n, port: nil, pid: 1}
+    assert Child.last_line(child) == "it printed nothing"
+
+    child =
+      child |> Child.said(String.duplicate("x", 9_000) <> "\n") |> Child.said("the reason\n")
+
+    assert byte_size(child.said) <= 4_000
+    assert Child.last_line(child) == "the reason"
+    assert Child.last_line(Child.said(child, <<255>>)) =~ "255"
+  end
+end
