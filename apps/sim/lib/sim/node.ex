@@ -9,7 +9,7 @@ defmodule Sim.Node do
 
   What it tells the launcher goes by `Sim.Node.Courier`.
   """
-  alias Sim.Node.{Config, Courier, Dialer}
+  alias Sim.Node.{Config, Courier}
 
   @doc "What a part of a fleet is, in a node of its own."
   @callback start(options :: map()) ::
@@ -45,10 +45,11 @@ defmodule Sim.Node do
 
   defp become(config) do
     Application.put_env(:logger, :level, :error)
-    {:ok, _apps} = Application.ensure_all_started(:sim)
+    Application.put_env(:swarm, :mesh, config.mesh)
 
     case Node.start(config.node, :longnames) do
       {:ok, _kernel} ->
+        {:ok, _apps} = Application.ensure_all_started(:sim)
         start(config)
 
       {:error, _reason} ->
@@ -58,7 +59,6 @@ defmodule Sim.Node do
 
   defp start(%{part: {module, options}} = config) do
     Process.flag(:trap_exit, true)
-    Dialer.start(config.nodes)
     {:ok, supervisor, facts, report} = module.start(options)
     {:ok, courier} = Courier.start_link(config.launcher, report)
     Courier.tell(courier, {:up, Map.put(facts, :main, self())})

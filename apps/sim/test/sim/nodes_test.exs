@@ -32,7 +32,7 @@ defmodule Sim.NodesTest do
   test "a config is one line, whatever is in it, and nothing else is taken for one" do
     {:ok, setup} = Sim.Trial.Setup.new(robots: [:mag1], map: "hall")
     part = {Sim.Node.World, %{name: :w, world: setup.world}}
-    config = %Config{node: :"world@127.0.0.1", launcher: self(), nodes: [], part: part}
+    config = %Config{node: :"world@127.0.0.1", launcher: self(), mesh: [], part: part}
     line = Config.line(config)
     assert [_one, ""] = String.split(line, "\n")
     assert Config.read(line) == {:ok, config}

@@ -4,8 +4,9 @@ defmodule Sim.Fleet.Air do
   once, and one that loses and delays by `Sim.Radio`.
   """
   use GenServer
+  alias Robot.Names
   alias Sim.Radio
-  alias Swarm.Link
+  alias Swarm.{Link, Mesh}
 
   @poll_ms 5
 
@@ -68,7 +69,7 @@ defmodule Sim.Fleet.Air do
   @impl GenServer
   def handle_info(:poll, s) do
     {letters, radio} = Radio.receive(s.radio, now())
-    for {to, from, message} <- letters, do: Link.transmit(from, [to], message)
+    for {to, _from, message} <- letters, do: deliver(to, message)
     {:noreply, poll(%{s | radio: radio, polling?: false})}
   end
 
@@ -81,6 +82,11 @@ defmodule Sim.Fleet.Air do
       Process.send_after(self(), :poll, @poll_ms)
       %{s | polling?: true}
     end
+  end
+
+  # One by one: what one robot misses, another may hear.
+  defp deliver(to, message) do
+    if Names.whereis(to, :link), do: Link.hear(to, message), else: Mesh.speak([to], message)
   end
 
   defp now, do: System.monotonic_time(:millisecond)

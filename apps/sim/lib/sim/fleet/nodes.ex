@@ -10,26 +10,25 @@ defmodule Sim.Fleet.Nodes do
   @behaviour Sim.Fleet.Crew
   alias Sim.Fleet.Nodes.{Child, Command, Host}
   alias Sim.{Server, Snapshot}
-  alias Sim.Node.{Config, Courier, Dialer}
+  alias Sim.Node.{Config, Courier}
 
   @up_ms 10_000
   @silent_ms 1_000
   @world_starts 5
 
-  @enforce_keys [:setup, :host, :name, :nodes, :world]
-  defstruct @enforce_keys ++ [children: %{}, reports: %{}, dialers: [], world_starts: 0]
+  @enforce_keys [:setup, :host, :name, :world]
+  defstruct @enforce_keys ++ [children: %{}, reports: %{}, world_starts: 0]
 
   @typedoc "`children` by robot id and `:world`; `reports` hold claim, counts, and when they came."
   @type t :: %__MODULE__{}
 
   @impl Sim.Fleet.Crew
   def start(setup, _options) do
-    with {:ok, host} <- Host.start() do
+    ids = [:world | setup.options.robots]
+
+    with {:ok, host} <- Host.start(setup.options.robots, Enum.map(ids, &node_name/1)) do
       name = {:world, System.pid(), System.unique_integer()}
-      ids = [:world | setup.options.robots]
-      nodes = [node() | Enum.map(ids, &Command.node_name(&1, Host.host()))]
-      crew = %__MODULE__{setup: setup, host: host, name: name, nodes: nodes, world: setup.world}
-      crew = %{crew | dialers: Dialer.start(nodes)}
+      crew = %__MODULE__{setup: setup, host: host, name: name, world: setup.world}
 
       with {:ok, crew} <- launch(crew, ids), {:ok, crew} <- await_all(crew, ids) do
         {:ok, crew}
@@ -140,7 +139,7 @@ defmodule Sim.Fleet.Nodes do
   def lines(crew) do
     for id <- crew.setup.options.robots ++ [:world] do
       child = crew.children[id]
-      {id, Command.node_name(id, Host.host()), child && child.pid}
+      {id, node_name(id), child && child.pid}
     end
     |> Command.lines(crew.host.home)
   end
@@ -179,7 +178,6 @@ defmodule Sim.Fleet.Nodes do
 
   @impl Sim.Fleet.Crew
   def stop(crew) do
-    for dialer <- crew.dialers, do: Process.exit(dialer, :kill)
     for {_id, child} <- crew.children, do: Child.kill(child)
     Host.stop(crew.host)
   end
@@ -198,10 +196,19 @@ defmodule Sim.Fleet.Nodes do
   defp heard(crew, id, {:report, {claim, counts}}),
     do: {:ok, [], put_in(crew.reports[id], {claim, counts, now()})}
 
-  defp heard(crew, id, {:stage, %{robot: id, stage: stage} = about}),
-    do: {:ok, [{:stage, stage, id, Map.drop(about, [:robot, :stage])}], crew}
+  defp heard(crew, id, {:stage, %{robot: id, stage: stage} = about}) do
+    {:ok, [{:stage, stage, id, Map.drop(about, [:robot, :stage])}], begun(crew, id, stage)}
+  end
 
   defp heard(crew, _id, _unknown), do: {:ok, [], crew}
+
+  # Its next report will say so; until then the ledger must not take the search for over.
+  defp begun(crew, id, :search) do
+    {claim, counts, _at_ms} = Map.get(crew.reports, id, {%{}, %{}, 0})
+    put_in(crew.reports[id], {Map.put(claim, :phase, :search), counts, now()})
+  end
+
+  defp begun(crew, _id, _stage), do: crew
 
   defp wreck(crew, id), do: change(%{crew | children: Map.delete(crew.children, id)}, {:kill, id})
 
@@ -229,15 +236,15 @@ defmodule Sim.Fleet.Nodes do
   end
 
   defp config(crew, id) do
-    node = Command.node_name(id, Host.host())
-
     %Config{
-      node: node,
+      node: node_name(id),
       launcher: self(),
-      nodes: List.delete(crew.nodes, node),
+      mesh: Host.mesh(crew.host, node_name(id)),
       part: part(crew, id)
     }
   end
+
+  defp node_name(id), do: Command.node_name(id, Host.host())
 
   defp part(crew, :world), do: {Sim.Node.World, %{name: crew.name, world: crew.world}}
 

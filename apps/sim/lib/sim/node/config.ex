@@ -1,24 +1,25 @@
 defmodule Sim.Node.Config do
   @moduledoc "What a node of a fleet is told at its start, as one line of text and back. Pure."
 
-  @enforce_keys [:node, :launcher, :nodes, :part]
+  @enforce_keys [:node, :launcher, :mesh, :part]
   defstruct @enforce_keys
 
   @typedoc """
-  `launcher` is the process that hears of everything, `nodes` are those to be connected with, `part` is a
+  `launcher` is the process that hears of everything, `mesh` are the options of
+  `Swarm.Mesh.Options`, `part` is a
   `Sim.Node` with its options.
   """
   @type t :: %__MODULE__{
           node: node(),
           launcher: pid(),
-          nodes: [node()],
+          mesh: keyword(),
           part: {module(), map()}
         }
 
   @doc """
   A config as one line.
 
-      iex> config = %Sim.Node.Config{node: :a@b, launcher: self(), nodes: [], part: {Some.Part, %{}}}
+      iex> config = %Sim.Node.Config{node: :a@b, launcher: self(), mesh: [], part: {Some.Part, %{}}}
       iex> config |> Sim.Node.Config.line() |> Sim.Node.Config.read()
       {:ok, config}
       iex> Sim.Node.Config.read("junk")

@@ -1,47 +1,94 @@
 defmodule Sim.Fleet.Nodes.Host do
   @moduledoc """
-  Makes this process of the operating system the node that starts others, on the loopback interface.
+  Makes this process of the operating system the node that starts others, on the loopback interface,
+  with a mesh of its own to hear them by.
 
-  The cookie of a run is drawn at random and kept in a folder of its own, which only this user can
-  read; the nodes are given that folder as their home, where Erlang looks for it. So it is in no
+  The secret of a run is drawn at random. Nodes are told it on their standard input, and for the
+  people who want to attach its cookie lies in a folder that only this user can read; so it is in no
   command line and no environment.
   """
+  alias Swarm.Mesh.{Options, Secret}
 
   @host "127.0.0.1"
+  @address {127, 0, 0, 1}
   @name :"demo@127.0.0.1"
 
-  @enforce_keys [:home]
+  @enforce_keys [:home, :secret, :ports, :fleet, :mesh]
   defstruct @enforce_keys
 
-  @type t :: %__MODULE__{home: Path.t()}
+  @type t :: %__MODULE__{
+          home: Path.t(),
+          secret: Secret.t(),
+          ports: %{node() => :inet.port_number()},
+          fleet: [atom()],
+          mesh: pid() | nil
+        }
 
   @doc "The host part of all nodes' names."
   @spec host() :: String.t()
   def host, do: @host
 
-  @doc "Becomes a node, with a cookie for this run."
-  @spec start() :: {:ok, t()} | {:error, line :: String.t()}
-  def start do
-    if Node.alive?(), do: home(Node.get_cookie()), else: become_node()
+  @doc "Becomes a node with a mesh, for a fleet of these robots in those nodes."
+  @spec start([atom()], [node()]) :: {:ok, t()} | {:error, line :: String.t()}
+  def start(fleet, nodes) do
+    with :ok <- alone(),
+         {:ok, home} <- home(),
+         {:ok, secret} <- secret(home),
+         :ok <- become_node(),
+         {:ok, ports} <- ports([node() | nodes]) do
+      host = %__MODULE__{home: home, secret: secret, ports: ports, fleet: fleet, mesh: nil}
+
+      with {:ok, options} <- Options.prepare(mesh(host, node())),
+           {:ok, mesh} <- Swarm.Mesh.Supervisor.start_link(options),
+           do: {:ok, %{host | mesh: mesh}}
+    end
   end
 
-  @doc "Takes the run's folder away."
+  @doc """
+  The options of a node's mesh. The ports are known, so nobody needs multicast, which not every
+  machine has on loopback; and all are connected to all, since the world is one of them.
+  """
+  @spec mesh(t(), node()) :: keyword()
+  def mesh(host, node) do
+    {port, others} = Map.pop!(host.ports, node)
+
+    [
+      secret: host.secret,
+      fleet: host.fleet,
+      interface: @address,
+      port: port,
+      multicast: false,
+      peers: for({_node, port} <- Enum.sort(others), do: {@address, port}),
+      full_mesh: 1_000
+    ]
+  end
+
+  @doc "Takes the mesh and the run's folder away."
   @spec stop(t()) :: :ok
-  def stop(%__MODULE__{home: home}) do
+  def stop(%__MODULE__{home: home, mesh: mesh}) do
+    if Process.alive?(mesh), do: Supervisor.stop(mesh)
     _ = File.rm_rf(home)
     :ok
   end
 
+  defp alone do
+    if Swarm.Mesh.running?(),
+      do:
+        {:error, "this node belongs to a mesh already; robots in nodes of their own need another"},
+      else: :ok
+  end
+
   defp become_node do
-    Application.put_env(:kernel, :inet_dist_use_interface, {127, 0, 0, 1})
+    if Node.alive?(), do: :ok, else: name_node()
+  end
+
+  defp name_node do
+    Application.put_env(:kernel, :inet_dist_use_interface, @address)
     epmd()
 
     case quietly(fn -> Node.start(@name, :longnames) end) do
       {:ok, _kernel} ->
-        # Our own random number, not a text from outside.
-        cookie = :"#{Base.encode32(:crypto.strong_rand_bytes(20), padding: false)}"
-        Node.set_cookie(cookie)
-        home(cookie)
+        :ok
 
       {:error, _reason} ->
         {:error,
@@ -68,20 +115,40 @@ defmodule Sim.Fleet.Nodes.Host do
     result
   end
 
-  defp home(cookie) do
+  # All open at once, so that no two are the same.
+  defp ports(nodes) do
+    opened = for node <- nodes, do: {node, :gen_udp.open(0, ip: @address)}
+
+    ports =
+      for {node, {:ok, socket}} <- opened, {:ok, port} <- [:inet.port(socket)], do: {node, port}
+
+    for {_node, {:ok, socket}} <- opened, do: :gen_udp.close(socket)
+
+    if length(ports) == length(nodes),
+      do: {:ok, Map.new(ports)},
+      else: {:error, "no UDP port is free on #{@host} for each of #{length(nodes)} nodes"}
+  end
+
+  defp home do
     sweep(System.tmp_dir!())
     number = Base.encode16(:crypto.strong_rand_bytes(4), case: :lower)
     home = Path.join(System.tmp_dir!(), "convoy-#{System.pid()}-#{number}")
-    file = Path.join(home, ".erlang.cookie")
 
-    with :ok <- File.mkdir(home),
-         :ok <- File.chmod(home, 0o700),
-         :ok <- File.write(file, Atom.to_string(cookie)),
-         :ok <- File.chmod(file, 0o400) do
+    with :ok <- File.mkdir(home), :ok <- File.chmod(home, 0o700) do
       System.at_exit(fn _status -> File.rm_rf(home) end)
-      {:ok, %__MODULE__{home: home}}
+      {:ok, home}
     else
       {:error, reason} -> {:error, "#{home} cannot be made: #{:file.format_error(reason)}"}
+    end
+  end
+
+  defp secret(home) do
+    cookie = Path.join(home, ".erlang.cookie")
+
+    with {:ok, secret} <- Secret.create(Path.join(home, "secret")) do
+      File.write!(cookie, Atom.to_string(secret.cookie))
+      File.chmod!(cookie, 0o400)
+      {:ok, secret}
     end
   end
 
