@@ -34,7 +34,7 @@ defmodule Sim.FleetTest do
     assert Fleet.result(fleet).collisions == 0
     stop(fleet)
     assert Names.whereis(:mag71, :robot) == nil
-    assert Swarm.status(:mag71) |> elem(1) =~ "no robot"
+    assert Swarm.tell(:mag71, "ping") |> elem(1) =~ "no robot"
   end
 
   test "three robots search, agree on a leader, and heal when it dies; stops reach all" do
