@@ -85,6 +85,17 @@ defmodule Swarm.MeshTest do
     assert eventually(fn -> full?([one, two]) end)
   end
 
+  test "where not all are connected, commands and their answers travel over those between" do
+    nodes = Cluster.start(7, robots: true, mesh: [full_mesh: 3, degree: 2])
+    # The second and the fifth are no neighbours, however many are there.
+    [_, one, _, _, far | _] = nodes
+    assert eventually(fn -> Enum.all?(nodes, &met?(&1, nodes)) end)
+    assert eventually(fn -> Enum.all?(nodes, &(length(linked(&1)) >= 2)) end)
+    assert eventually(fn -> match?(%{state: :idle}, status(one, far.name)) end)
+    assert Cluster.call(one, Swarm, :stop, [far.name]) == :ok
+    assert far.node not in linked(one)
+  end
+
   test "ten nodes form" do
     nodes = Cluster.start(10, robots: true)
     assert eventually(fn -> full?(nodes) end, 15_000)

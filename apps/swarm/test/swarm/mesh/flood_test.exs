@@ -1,0 +1,73 @@
+defmodule Swarm.Mesh.FloodTest do
+  # A real socket, a real robot in a VM of its own, and a flood.
+  use ExUnit.Case, async: false
+  import Swarm.Case, only: [eventually: 1]
+  alias Swarm.MeshNodes
+  alias Swarm.Mesh.Packet
+
+  @datagrams 100_000
+
+  setup do
+    [one, two] = MeshNodes.start(2, robots: true)
+    %{port: port} = MeshNodes.call(one, Swarm.Mesh, :counts, [])
+    {:ok, socket} = :gen_udp.open(0, [:binary, active: false, ip: {127, 0, 0, 1}])
+    assert eventually(fn -> hears?(one, two) end)
+    %{one: one, two: two, send: &:gen_udp.send(socket, {127, 0, 0, 1}, port, &1)}
+  end
+
+  defp hears?(one, two) do
+    match?(%{status: :alive}, MeshNodes.call(one, Swarm.Mesh, :view, []).nodes[two.node])
+  end
+
+  defp state(node) do
+    board = MeshNodes.call(node, Robot.Board, :find!, [node.name])
+    {:ok, _doing, at_ms} = MeshNodes.call(node, Robot.Board, :fetch, [board, :doing, :infinity])
+
+    %{
+      radio: MeshNodes.call(node, Process, :whereis, [Swarm.Mesh.Radio]),
+      atoms: MeshNodes.call(node, :erlang, :system_info, [:atom_count]),
+      memory: MeshNodes.call(node, :erlang, :memory, [:total]),
+      tick_ms: at_ms
+    }
+  end
+
+  test "garbage, packets of another fleet and replayed ones: nothing falls, nothing grows, the robot ticks on",
+       %{one: one, two: two, send: send} do
+    foreign =
+      Packet.seal(
+        %Packet{
+          sender: "#{two.node}",
+          session: 7,
+          sequence: 7,
+          kind: :beacon,
+          payload: Packet.pack({[], [], [], 0})
+        },
+        "not this fleet's key"
+      )
+
+    flood = fn datagrams ->
+      for n <- 1..datagrams do
+        case rem(n, 4) do
+          0 -> send.(foreign)
+          1 -> send.(<<"CVY", 1, 1, 5, "abcde", n::64, n::64, 0::128, n::128>>)
+          _ -> send.(:rand.bytes(1 + rem(n, 700)))
+        end
+      end
+
+      # Within the flood the robot's mind goes on, and people are answered.
+      tick_ms = state(one).tick_ms
+      assert eventually(fn -> state(one).tick_ms > tick_ms + 500 end)
+      assert :ok = MeshNodes.call(one, Swarm, :stop, [one.name])
+      assert %{not_ours: _, throttled: _} = MeshNodes.call(one, Swarm.Mesh, :rejected, [])
+      state(one)
+    end
+
+    # A first one loads all modules that a flood needs.
+    before = flood.(10_000)
+    then = flood.(@datagrams)
+    assert then.radio == before.radio
+    assert then.memory - before.memory < 20_000_000
+    assert then.atoms - before.atoms < 10
+    assert hears?(one, two)
+  end
+end
