@@ -14,7 +14,7 @@ defmodule Swarm.Conversation do
   that peer is missing. Each peer answers to an alias of its own that takes one message: a second
   answer, and one that comes after the deadline, find no mailbox.
   """
-  alias Swarm.{Directory, Envelope}
+  alias Swarm.{Directory, Envelope, Watch}
 
   # Most answers are here long before: only then is it worth asking the runtime whether the others
   # are alive. Between nodes that costs more than the question.
@@ -93,9 +93,10 @@ defmodule Swarm.Conversation do
     if pending == %{} or map_size(answers) >= enough or patience == deadline do
       close(answers, pending, missing)
     else
-      watcher = watch(pending)
+      # Of an answer and this news only the first gets through an alias.
+      watch = Watch.start(Map.new(pending, fn {ref, {_peer, pid}} -> {ref, pid} end))
       {answers, pending, missing} = collect(answers, pending, missing, enough, deadline)
-      Process.exit(watcher, :kill)
+      Watch.stop(watch)
       close(answers, pending, missing)
     end
   end
@@ -134,7 +135,7 @@ defmodule Swarm.Conversation do
             collect(answers, pending, [{peer, :no_answer} | missing], enough, deadline)
         end
 
-      {__MODULE__, ref, :gone} when is_map_key(pending, ref) ->
+      {Watch, ref, :gone} when is_map_key(pending, ref) ->
         {{peer, _pid}, pending} = Map.pop!(pending, ref)
         collect(answers, pending, [{peer, :gone} | missing], enough, deadline)
     after
@@ -155,7 +156,7 @@ defmodule Swarm.Conversation do
               {:error, _reason} -> {answers, [{peer, :no_answer} | missing]}
             end
 
-          {__MODULE__, ^ref, :gone} ->
+          {Watch, ^ref, :gone} ->
             {answers, [{peer, :gone} | missing]}
         after
           0 -> {answers, [{peer, :no_answer} | missing]}
@@ -163,37 +164,16 @@ defmodule Swarm.Conversation do
     end
   end
 
-  # To monitor a process of another node may wait for a full connection, so somebody else does it. It
-  # tells by the alias: of an answer and this news only the first arrives.
-  defp watch(pending) do
-    asker = self()
+  @doc "The process that a peer is now, one of this node first; `nil` if there is none."
+  @spec find(peer()) :: pid() | nil
+  def find(pid) when is_pid(pid), do: pid
 
-    spawn(fn ->
-      own = Process.monitor(asker)
-      watched = for {ref, {_peer, pid}} <- pending, into: %{}, do: {Process.monitor(pid), ref}
-      watch(own, watched)
-    end)
-  end
-
-  defp watch(own, watched) do
-    receive do
-      {:DOWN, ^own, :process, _asker, _reason} ->
-        :ok
-
-      {:DOWN, monitor, :process, _pid, _reason} when is_map_key(watched, monitor) ->
-        send(watched[monitor], {__MODULE__, watched[monitor], :gone})
-        watch(own, watched)
-    end
-  end
-
-  defp find(pid) when is_pid(pid), do: pid
-
-  defp find({robot, service}) do
+  def find({robot, service}) do
     case Directory.members({:service, service, robot}) do
       [] -> nil
       [first | _] = pids -> Enum.find(pids, first, &(node(&1) == node()))
     end
   end
 
-  defp find(_other), do: nil
+  def find(_other), do: nil
 end

@@ -40,6 +40,11 @@ defmodule Swarm.Responder do
   @doc "An envelope, checked but for its content: what to answer, and the next state."
   @callback handle(Envelope.t(), state :: term()) :: {answer() | :noreply, state :: term()}
 
+  @doc "A message that is no envelope, from anywhere; without this callback it is counted as rejected."
+  @callback info(message :: term(), state :: term()) :: state :: term()
+
+  @optional_callbacks info: 2
+
   @impl Robot.Companion
   def child_spec({%Config{id: id}, options}), do: child_spec({id, options})
 
@@ -69,14 +74,17 @@ defmodule Swarm.Responder do
   @impl GenServer
   def init({name, options}) do
     service = options[:service]
+    # Only of a module that is loaded it is known what it exports.
+    {:module, module} = Code.ensure_loaded(options[:module])
     groups = for topic <- options[:topics], do: {:topic, topic}
 
     {:ok,
      %{
        name: name,
        service: service,
-       module: options[:module],
-       state: options[:module].init(name, options[:argument]),
+       module: module,
+       info?: function_exported?(module, :info, 2),
+       state: module.init(name, options[:argument]),
        inbox: Inbox.new(Keyword.take(options, [:limit, :template])),
        entry: Entry.enter([{:service, service}, {:service, service, name} | groups])
      }}
@@ -97,15 +105,22 @@ defmodule Swarm.Responder do
     end
   end
 
-  # Envelopes are many, news of the directory are rare: the inbox looks first, and what it would
-  # count as rejected may be such.
-  defp enter(%Envelope{}, s, inbox), do: %{s | inbox: inbox}
+  # Envelopes are many, news of the directory and others are rare: so the inbox looks first, and
+  # what it has counted as rejected may be such.
+  defp enter(%{__struct__: Envelope}, s, inbox), do: %{s | inbox: inbox}
+  defp enter({Inbox, _turn}, s, inbox), do: %{s | inbox: inbox}
 
   defp enter(message, s, inbox) do
     case Entry.arrived(s.entry, message) do
       {:ok, entry} -> %{s | entry: entry}
-      :other -> %{s | inbox: inbox}
+      :other -> if s.info?, do: info(message, s), else: %{s | inbox: inbox}
     end
+  end
+
+  defp info(message, s) do
+    %{s | state: s.module.info(message, s.state)}
+  catch
+    kind, reason -> failed(kind, reason, s)
   end
 
   # Somebody else's code with content from outside: whatever it does must not end the robot.
@@ -116,9 +131,13 @@ defmodule Swarm.Responder do
     end
   catch
     kind, reason ->
-      failure = %{robot: s.name, service: s.service, kind: kind, reason: reason}
-      Event.execute([:swarm, :responder, :failure], %{}, failure)
-      answer({:failure, :error}, envelope, s)
+      answer({:failure, :error}, envelope, failed(kind, reason, s))
+  end
+
+  defp failed(kind, reason, s) do
+    failure = %{robot: s.name, service: s.service, kind: kind, reason: reason}
+    Event.execute([:swarm, :responder, :failure], %{}, failure)
+    s
   end
 
   defp answer({performative, content}, envelope, s),

@@ -42,3 +42,23 @@ defmodule Swarm.Answerers do
     pid
   end
 end
+
+defmodule Swarm.Answerers.Carry do
+  @moduledoc "Bids its argument for `{:carry, _}`, and does what the task says."
+  @behaviour Swarm.ContractNet
+
+  @impl Swarm.ContractNet
+  def cost({:carry, _how}, _robot, cost), do: cost
+  def cost(:raise, _robot, _cost), do: raise("told to")
+  def cost(_other, _robot, _cost), do: :infinite
+
+  @impl Swarm.ContractNet
+  def work({:carry, {:tell, pid}}, robot, _cost, report) do
+    report.(:on_my_way)
+    send(pid, {:working, robot, self()})
+    receive do: (:go_on -> {:carried_by, robot})
+  end
+
+  def work({:carry, :fail}, _robot, _cost, _report), do: exit(:told_to)
+  def work({:carry, _how}, robot, _cost, _report), do: {:carried_by, robot}
+end
