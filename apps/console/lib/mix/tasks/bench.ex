@@ -1,9 +1,12 @@
 defmodule Mix.Tasks.Bench do
-  @shortdoc "Measures the demo over many seeds"
+  @shortdoc "Measures the demo over many seeds, and the swarm beside bare OTP"
   @moduledoc """
   `mix bench demo` runs the cases of the main job over many seeds and prints a table in Markdown.
 
   Two runs go at a time; the figures but for the speed are the same on every machine.
+
+  `mix bench swarm` measures robots that are nodes of their own on this machine, beside bare OTP:
+  how long it takes to ask all, to find each other, to notice a death. Both have `--help`.
   """
   use Mix.Task
   alias Console.{Arguments, Bench, Build, Output, Progress, Values}
@@ -18,8 +21,16 @@ defmodule Mix.Tasks.Bench do
     end
   end
 
+  def run(["swarm" | arguments]) do
+    Build.update()
+
+    with {:error, lines} <- Bench.Mesh.Main.run(arguments), do: refuse(lines)
+  end
+
   def run(arguments) when arguments in [["--help"], ["-h"]], do: help()
-  def run(_other), do: refuse(["bench what? There is: mix bench demo [options]"])
+
+  def run(_other),
+    do: refuse(["bench what? There are: mix bench demo [options], mix bench swarm [options]"])
 
   defp measure(%{"help" => true}), do: help()
 

@@ -1,0 +1,25 @@
+defmodule Console.Bench.Mesh.Stand do
+  @moduledoc "Wheels that stand still and say so ten times a second: a robot's drive without a world."
+  @behaviour Hal.Drive
+  alias Hal.{Odometry, Pose, Twist}
+
+  @period_ms 100
+
+  @impl Hal.Drive
+  def init(_options) do
+    {:ok, _timer} = :timer.send_interval(@period_ms, :stand)
+    {:ok, nil}
+  end
+
+  @impl Hal.Drive
+  def drive(_twist, s), do: {:ok, s}
+
+  @impl Hal.Drive
+  def handle_message(:stand, s),
+    do: {:ok, [{:odometry, %Odometry{pose: Pose.new(0, 0), twist: Twist.zero()}}], s}
+
+  def handle_message(_other, s), do: {:ok, [], s}
+
+  @impl Hal.Drive
+  def terminate(_s), do: :ok
+end
