@@ -6,7 +6,22 @@ defmodule Convoy.MixProject do
       apps_path: "apps",
       version: "0.1.0",
       start_permanent: Mix.env() == :prod,
+      releases: releases(),
       deps: []
+    ]
+  end
+
+  # `robot` is for real hardware; `fleet` holds everything: robots, worlds, the view of people.
+  # Both have ssl, for distribution by TLS (rel/env.sh.eex).
+  defp releases do
+    tls = [ssl: :permanent, runtime_tools: :permanent]
+    robot = Keyword.new([:hal, :vision, :robot, :swarm], &{&1, :permanent})
+    fleet = robot ++ [sim: :permanent, console: :permanent]
+
+    # No cookie is made at build time: a robot's comes from its fleet's secret.
+    [
+      robot: [applications: robot ++ tls, cookie: "none"],
+      fleet: [applications: fleet ++ tls, cookie: "none"]
     ]
   end
 

@@ -20,6 +20,7 @@ defmodule Hal.Event do
   | `[:robot, :executive, :slow]` | `at_ms`, `duration_ms` | `robot`: a tick took over 50 ms |
   | `[:robot, :pilot, :phase]` | `at_ms` | `robot`, `state`: `:idle` or `{mission, phase}` |
   | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and what the mission adds |
+  | `[:swarm, :mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): a node was not let in, or would not have us |
   | `[:swarm, :link, :duplicate_id]` | | `robot`, `other`: a robot of this name was there before; this one is silent |
   | `[:sim, :server, :late]` | `late_ms` | `world`: a step of the simulated world came late |
   """

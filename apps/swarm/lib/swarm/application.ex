@@ -11,6 +11,7 @@ defmodule Swarm.Application do
       options ->
         with {:ok, mesh} <- Swarm.Mesh.Options.prepare(options) do
           :ok = Swarm.Mesh.Log.attach()
+          :ok = Swarm.Mesh.Refusals.install()
           Swarm.Supervisor.start_link(mesh: mesh)
         end
     end

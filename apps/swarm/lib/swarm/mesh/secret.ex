@@ -100,8 +100,8 @@ defmodule Swarm.Mesh.Secret do
   The command that makes a good secret there. Where there is no Mix, as in a release, it is made of
   what every system has.
 
-      iex> Swarm.Mesh.Secret.command("/etc/convoy/secret", false, false)
-      "(umask 077; head -c 32 /dev/urandom | base64 > /etc/convoy/secret)"
+      iex> Swarm.Mesh.Secret.command("/etc/secret", false, false)
+      "(umask 077; head -c 32 /dev/urandom | base64 > /etc/secret)"
   """
   @spec command(Path.t(), mix? :: boolean(), there? :: boolean()) :: String.t()
   def command(path, mix?, there?)
@@ -109,8 +109,11 @@ defmodule Swarm.Mesh.Secret do
   def command(path, true, true), do: "mix fleet.secret #{shell(path)} --force"
   def command(path, false, true), do: "rm #{shell(path)}; #{command(path, false, false)}"
 
-  def command(path, false, false),
-    do: "(umask 077; head -c 32 /dev/urandom | base64 > #{shell(path)})"
+  def command(path, false, false) do
+    folder = Path.dirname(path)
+    mkdir = if File.dir?(folder), do: "", else: "mkdir -p #{shell(folder)}; "
+    "(umask 077; #{mkdir}head -c 32 /dev/urandom | base64 > #{shell(path)})"
+  end
 
   defp line(path, "may be read by others" <> _rest = problem),
     do: "the fleet's secret #{shown(path)} #{problem}; close it: chmod 600 #{shell(path)}"

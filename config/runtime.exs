@@ -1,0 +1,32 @@
+import Config
+
+# The settings of a robot, from its environment; `rel/env.sh.eex` lists and checks them. Outside of
+# a release nothing of this applies.
+if System.get_env("RELEASE_NAME") && System.get_env("ROBOT") do
+  number = fn name, default ->
+    case Integer.parse(System.get_env(name, "")) do
+      {number, ""} -> number
+      _other -> default
+    end
+  end
+
+  words = fn name -> name |> System.get_env("") |> String.split([",", " "], trim: true) end
+
+  interface =
+    case :inet.parse_ipv4strict_address(to_charlist(System.get_env("CONVOY_INTERFACE", ""))) do
+      {:ok, ip} -> [interface: ip]
+      {:error, :einval} -> []
+    end
+
+  dist_port =
+    number.("CONVOY_DIST_PORT", Swarm.Mesh.Epmd.default_port(System.fetch_env!("ROBOT")))
+
+  config :swarm,
+    mesh:
+      [
+        secret_file: System.get_env("CONVOY_SECRET_FILE", "/etc/convoy/secret"),
+        dist_port: dist_port,
+        port: number.("CONVOY_UDP_PORT", 4370),
+        peers: words.("CONVOY_UDP_PEERS")
+      ] ++ interface
+end
