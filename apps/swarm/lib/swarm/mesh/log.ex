@@ -6,7 +6,16 @@ defmodule Swarm.Mesh.Log do
   require Logger
   alias Hal.Event
 
-  @events [:up, :gone, :connected, :disconnected, :no_network, :unknown_node, :duplicate_node]
+  @events [
+    :up,
+    :gone,
+    :connected,
+    :disconnected,
+    :no_network,
+    :unknown_node,
+    :duplicate_node,
+    :libcluster
+  ]
 
   @doc "Attaches the log to the mesh's events; once a node."
   @spec attach() :: :ok
@@ -47,6 +56,9 @@ defmodule Swarm.Mesh.Log do
      "mesh: #{inspect(name)} at #{:inet.ntoa(ip)} has the fleet's secret, but is not in this node's " <>
        "fleet or has another host part; see the option fleet"}
   end
+
+  def line(:libcluster, %{reason: reason}),
+    do: {:warning, "mesh: libcluster ended, and starts again: #{inspect(reason, limit: 10)}"}
 
   def line(:duplicate_node, %{node: node}),
     do: {:error, "mesh: another node calls itself #{node}; rename one of the two"}

@@ -6,12 +6,12 @@ defmodule Swarm.Mesh.Supervisor do
       |-- Swarm.Mesh.Radio    signed datagrams: beacons, heartbeats, rounds, rows, stops
       |-- Swarm.Mesh.Dialer   connects the distribution, again and again
       |-- Swarm.Mesh.Relay    commands to nodes that this one is not connected to
-      `-- libcluster          where its topologies are configured
+      `-- Swarm.Mesh.Libcluster  where its topologies are configured
 
   A radio that starts anew has a new session: for the others it is a node that was away for a moment.
   """
   use Supervisor
-  alias Swarm.Mesh.{Dialer, Options, Radio, Relay}
+  alias Swarm.Mesh.{Dialer, Libcluster, Options, Radio, Relay}
 
   @doc "Starts the mesh of this node, with options from `Swarm.Mesh.Options.prepare/1`."
   @spec start_link(Options.t()) :: Supervisor.on_start()
@@ -23,9 +23,7 @@ defmodule Swarm.Mesh.Supervisor do
     Supervisor.init(children, strategy: :rest_for_one, max_restarts: 5, max_seconds: 5)
   end
 
-  # Not a dependency. Its strategies connect nodes; connected nodes introduce themselves.
   defp libcluster(%{topologies: []}), do: []
 
-  defp libcluster(%{topologies: topologies}),
-    do: [{Cluster.Supervisor, [topologies, [name: Swarm.Mesh.Libcluster]]}]
+  defp libcluster(%{topologies: topologies}), do: [{Libcluster, topologies}]
 end
