@@ -6,9 +6,10 @@ defmodule Swarm.Supervisor do
       |-- Robot.Names            who is who on this node
       |-- Swarm.Parts (one_for_one)
       |   |-- Swarm.Directory    who is where in the fleet
-      |   |-- Swarm.Directory.Watch  tells who joins and leaves
+      |   |-- Swarm.Directory.Watch    tells who joins and leaves
       |   |-- Swarm.Alarm        calls all robots to stop
       |   |-- Swarm.Blackboard   what the robots of the fleet tell of themselves
+      |   |-- Swarm.Hints        what robots leave for each other
       |   `-- Swarm.Mesh.Supervisor  the other nodes, where there is a mesh
       `-- Robot.Fleet            the robots
 
@@ -28,7 +29,15 @@ defmodule Swarm.Supervisor do
     @impl Supervisor
     def init(options) do
       mesh = for mesh <- List.wrap(options[:mesh]), do: {Swarm.Mesh.Supervisor, mesh}
-      children = [Swarm.Directory, Swarm.Blackboard, Swarm.Directory.Watch, Swarm.Alarm | mesh]
+
+      children = [
+        Swarm.Directory,
+        Swarm.Blackboard,
+        Swarm.Hints,
+        Swarm.Directory.Watch,
+        Swarm.Alarm | mesh
+      ]
+
       Supervisor.init(children, strategy: :one_for_one, max_restarts: 5, max_seconds: 5)
     end
   end
