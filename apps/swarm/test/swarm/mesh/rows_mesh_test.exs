@@ -1,0 +1,120 @@
+defmodule Swarm.RowsMeshTest do
+  # Real nodes on loopback.
+  use ExUnit.Case, async: false
+  import Swarm.Case, only: [eventually: 1, eventually: 2]
+  alias Swarm.{About, Blackboard, Hints, Status}
+  alias Swarm.MeshNodes, as: Cluster
+  alias Swarm.MeshNodes.Listener
+
+  defp get(node, robot, key),
+    do: Cluster.call(node, Blackboard, :get, [robot, key, :infinity])
+
+  defp news(node, what, robot) do
+    Enum.find(Cluster.call(node, Listener, :news, []), fn {news, _at_us} ->
+      elem(news, 0) == what and elem(news, 1) == robot
+    end)
+  end
+
+  test "rows and hints cross, robots are found by what they are, and the matrix is full" do
+    nodes = [one, two, three] = Cluster.start(3, robots: true)
+    names = Enum.sort(Enum.map(nodes, & &1.name))
+    assert eventually(fn -> Cluster.call(one, Swarm, :find, [[service: :drive]]) == names end)
+
+    assert eventually(fn ->
+             Cluster.call(three, Swarm, :find, [
+               [profile: :magellan, calibrated: true, state: :idle]
+             ]) == names
+           end)
+
+    :ok = Cluster.call(one, Blackboard, :put, [one.name, :door, %{open: true}])
+    assert eventually(fn -> match?({:ok, %{open: true}, _}, get(two, one.name, :door)) end)
+    assert {:error, _} = Cluster.call(two, Blackboard, :put, [one.name, :door, 1])
+
+    big = :crypto.strong_rand_bytes(50_000)
+    :ok = Cluster.call(one, Blackboard, :put, [one.name, :map, big])
+    assert eventually(fn -> match?({:ok, ^big, _}, get(three, one.name, :map)) end)
+
+    :ok = Cluster.call(two, Hints, :put, [two.name, {:searched, 7}, 1.5])
+
+    assert eventually(fn ->
+             Cluster.call(three, Hints, :get, [{:searched, 7}]) == {:ok, 1.5, two.name}
+           end)
+
+    # One that comes later has all of it.
+    late =
+      Cluster.join(
+        nodes,
+        :"#{hd(names)}" |> to_string() |> String.replace(~r/_.*/, "_90") |> String.to_atom()
+      )
+
+    assert eventually(fn -> match?({:ok, ^big, _}, get(late, one.name, :map)) end, 10_000)
+
+    assert eventually(fn ->
+             Cluster.call(late, Hints, :get, [{:searched, 7}]) == {:ok, 1.5, two.name}
+           end)
+
+    assert eventually(fn ->
+             matrix = Cluster.call(one, Swarm, :matrix, [])
+
+             Enum.all?(names, fn a ->
+               Enum.all?(names -- [a], &(Swarm.Matrix.hears?(matrix, a, &1) == true))
+             end)
+           end)
+
+    %{view: {number, members}} = Cluster.call(one, Swarm, :status, [two.name])
+    assert number >= 2 and members == names
+  end
+
+  test "a robot that nothing connects is shown as its row says" do
+    [one, two] = Cluster.start(2, robots: true)
+
+    assert eventually(fn ->
+             match?(%Status{from: :robot}, Cluster.call(one, Swarm, :status, [two.name]))
+           end)
+
+    Cluster.call(one, :erlang, :set_cookie, [two.node, :wrong])
+    Cluster.call(two, :erlang, :set_cookie, [one.node, :wrong])
+    true = Cluster.call(one, Node, :disconnect, [two.node])
+
+    assert eventually(fn ->
+             match?(
+               %Status{from: :row, state: :idle, age_ms: age} when age < 2_000,
+               Cluster.call(one, Swarm, :status, [two.name])
+             )
+           end)
+
+    assert Enum.any?(
+             Cluster.call(one, Swarm, :status, []),
+             &(&1.robot == two.name and &1.from == :row)
+           )
+
+    assert Cluster.call(one, Swarm, :find, [[robot: two.name, service: :drive]]) == [two.name]
+  end
+
+  test "who subscribes hears of a join, of a kill at once, and of a robot that froze" do
+    nodes = [one, two, three] = Cluster.start(3, robots: true)
+    :ok = Cluster.call(one, Listener, :start, [])
+    # Both planes know of both before anything happens.
+    for other <- [two, three] do
+      assert eventually(fn ->
+               Map.has_key?(Cluster.call(one, Swarm.Mesh, :robots, []), other.name)
+             end)
+
+      assert eventually(fn ->
+               Cluster.call(one, Swarm.Directory, :whereis, [other.name]) != nil
+             end)
+    end
+
+    killed_us = System.os_time(:microsecond)
+    Cluster.signal(two, "KILL")
+    {{:leave, _, :nodedown}, at_us} = eventually(fn -> news(one, :leave, two.name) end)
+    # Half a second on a busy machine; a silence would take four times as long.
+    assert at_us - killed_us < 500_000
+    Cluster.signal(three, "STOP")
+    assert {{:leave, _, :silent}, _} = eventually(fn -> news(one, :leave, three.name) end)
+    Cluster.signal(three, "CONT")
+    assert {{:join, _, %About{}}, _} = eventually(fn -> news(one, :join, three.name) end)
+    back = Cluster.join(nodes, two.name, robots: true)
+    assert {{:join, _, %About{}}, _} = eventually(fn -> news(one, :join, back.name) end)
+  end
+end
