@@ -42,6 +42,8 @@ defmodule Robot.Gate do
 
   @impl GenServer
   def init(%Config{id: id} = config) do
+    # A stop must not wait for those who talk; the gate itself never has much to do.
+    Process.flag(:priority, :high)
     drive = Names.via(id, :drive)
     Device.drive(drive, Twist.zero())
     board = Board.find!(id)
