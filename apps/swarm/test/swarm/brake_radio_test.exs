@@ -1,0 +1,24 @@
+defmodule Swarm.BrakeRadioTest do
+  use Swarm.Case, async: false
+  alias Swarm.MeshNodes
+  @moduletag :cluster
+
+  defp latched?(node) do
+    {:ok, board} = MeshNodes.call(node, Board, :find, [node.name])
+    MeshNodes.call(node, Board, :latched?, [board])
+  end
+
+  test "a stop that comes by datagram alone holds the robots of all other nodes" do
+    [base | robots] = nodes = MeshNodes.start(3, robots: true)
+    others = for node <- robots, do: node.name
+    hears? = fn node -> map_size(MeshNodes.call(node, Swarm.Mesh, :robots, [])) == 2 end
+    for node <- nodes, do: eventually(fn -> hears?.(node) end)
+    assert others -- Map.keys(MeshNodes.call(base, Swarm.Mesh, :robots, [])) == []
+
+    call = {:estop, {base.node, 1, 1}}
+    assert MeshNodes.call(base, Swarm.Mesh, :cast, [:stop, call]) == :ok
+    for node <- robots, do: eventually(fn -> latched?(node) end)
+    # Their heartbeats tell the sender's own robot, which no datagram of its own reaches.
+    eventually(fn -> latched?(base) end)
+  end
+end
