@@ -54,8 +54,34 @@ defmodule Sim.Radio do
 
   @doc "From now on these pairs cannot hear each other, and all others can."
   @spec cut(t(), [{id(), id()}]) :: t()
-  def cut(%__MODULE__{} = radio, pairs) do
-    %{radio | cut: for({a, b} <- pairs, pair <- [{a, b}, {b, a}], into: MapSet.new(), do: pair)}
+  def cut(%__MODULE__{} = radio, pairs),
+    do: cut_ways(radio, for({a, b} <- pairs, pair <- [{a, b}, {b, a}], do: pair))
+
+  @doc "The same one way: of each `{from, to}` the second cannot hear the first."
+  @spec cut_ways(t(), [{from :: id(), to :: id()}]) :: t()
+  def cut_ways(%__MODULE__{} = radio, ways), do: %{radio | cut: MapSet.new(ways)}
+
+  @doc """
+  The parts into which the cuts divide these robots, loss left out: in a part everybody can reach
+  everybody, if need be by way of others.
+
+      iex> radio = Sim.Radio.new(seed: 1, cut: [{:mag1, :mag2}, {:mag1, :mag3}])
+      iex> Sim.Radio.parts(radio, [:mag1, :mag2, :mag3])
+      [[:mag1], [:mag2, :mag3]]
+  """
+  @spec parts(t(), [id()]) :: [[id()]]
+  def parts(%__MODULE__{}, []), do: []
+
+  def parts(%__MODULE__{} = radio, [first | _] = ids) do
+    there = reach(radio, ids, [first], &{&1, &2})
+    back = reach(radio, ids, [first], &{&2, &1})
+    part = Enum.filter(ids, &(&1 in there and &1 in back))
+    [part | parts(radio, ids -- part)]
+  end
+
+  defp reach(radio, ids, found, way) do
+    more = for b <- ids -- found, Enum.any?(found, &(way.(&1, b) not in radio.cut)), do: b
+    if more == [], do: found, else: reach(radio, ids, found ++ more, way)
   end
 
   @doc """

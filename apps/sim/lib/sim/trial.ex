@@ -9,7 +9,7 @@ defmodule Sim.Trial do
   """
   alias Hal.Pose
   alias Sim.{Radio, Scene, World}
-  alias Sim.Trial.{Finish, Ledger, Score, Script, Setup}
+  alias Sim.Trial.{Cuts, Finish, Ledger, Score, Script, Setup}
   alias Swarm.Member
 
   @half_ms 50
@@ -32,6 +32,7 @@ defmodule Sim.Trial do
   def step(%__MODULE__{} = trial) do
     trial
     |> play()
+    |> cut()
     |> hear()
     |> sense()
     |> look()
@@ -113,7 +114,13 @@ defmodule Sim.Trial do
       options: options,
       map: setup.map,
       world: setup.world,
-      radio: Radio.new(seed: options.seed, loss: options.loss),
+      radio:
+        Radio.new(
+          seed: options.seed,
+          loss: options.loss,
+          duplicates: options.duplicates,
+          delay_ms: options.delay_ms
+        ),
       members: members,
       script: Script.new(options.moves, options.kills),
       ledger: Ledger.new(),
@@ -147,6 +154,13 @@ defmodule Sim.Trial do
       | world: World.move_landmark(trial.world, place),
         ledger: Ledger.stage(trial.ledger, trial.at_ms, :landmark_moved, nil, %{})
     }
+  end
+
+  defp cut(%{options: %{cuts: []}} = trial), do: trial
+
+  defp cut(%{options: options, at_ms: at_ms} = trial) do
+    ways = Cuts.ways(options.cuts, options.robots, at_ms)
+    %{trial | radio: Radio.cut_ways(trial.radio, ways)}
   end
 
   defp hear(trial) do
@@ -192,7 +206,10 @@ defmodule Sim.Trial do
 
   defp write(trial) do
     claims = claims(trial)
-    %{trial | ledger: Ledger.note(trial.ledger, trial.at_ms, claims)}
+    parts = Radio.parts(trial.radio, Enum.map(claims, &elem(&1, 0)))
+    standing = for {id, member} <- trial.members, Member.stands?(member), do: id
+
+    %{trial | ledger: Ledger.note(trial.ledger, trial.at_ms, claims, parts, standing)}
   end
 
   defp act(trial) do

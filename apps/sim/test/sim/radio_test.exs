@@ -39,6 +39,16 @@ defmodule Sim.RadioTest do
     assert {[{:mag2, :mag1, :b}], %{sent: 2, lost: 1}} = Radio.receive(radio, 50)
   end
 
+  test "one way of a link, and the parts that cuts make" do
+    radio = Radio.cut_ways(Radio.new(seed: 1), mag1: :mag2)
+    radio = radio |> Radio.send(0, :mag1, [:mag2], :a) |> Radio.send(0, :mag2, [:mag1], :b)
+    assert {[{:mag1, :mag2, :b}], _} = Radio.receive(radio, 50)
+    # By way of the third they can still reach each other, both ways.
+    assert Radio.parts(radio, [:mag1, :mag2, :mag3]) == [[:mag1, :mag2, :mag3]]
+    assert Radio.parts(radio, [:mag1, :mag2]) == [[:mag1], [:mag2]]
+    assert Radio.parts(radio, []) == []
+  end
+
   test "one seed, one course" do
     assert run([seed: 9, loss: 0.3], 100) == run([seed: 9, loss: 0.3], 100)
     refute run([seed: 9, loss: 0.3], 100) == run([seed: 8, loss: 0.3], 100)

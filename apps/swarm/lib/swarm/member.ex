@@ -153,6 +153,10 @@ defmodule Swarm.Member do
   @spec claim(t()) :: map()
   def claim(member), do: member.claim
 
+  @doc "Whether the mission lets the robot stand and wait, for a round, a leader or a person."
+  @spec stands?(t()) :: boolean()
+  def stands?(member), do: member.mind.tag == :stand
+
   defp put(member, key, value, at_ms),
     do: %{member | entries: Map.put(member.entries, key, {value, at_ms})}
 

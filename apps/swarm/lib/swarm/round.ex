@@ -3,7 +3,8 @@ defmodule Swarm.Round do
   Agreement on shared inputs: in the end every member of a view holds the same record, and knows
   that the others do. Pure; time is passed in, in milliseconds.
 
-      collect --all reports, or the deadline--> echo --200 ms--> digest --all digests equal--> committed
+      collect --all reports-------------------------> digest --all digests equal--> committed
+              --the deadline--> echo --200 ms---------^
 
   No process can know what the last message did, so time-outs give progress and digests give
   safety: each member freezes what it holds, signs it with a digest that is final for the round's
@@ -19,6 +20,7 @@ defmodule Swarm.Round do
   # Letters are repeated every 100 ms, more rarely in a large group: all to all grows with its square.
   @repeat_ms 100
   @repeat_ms_per_robot 8
+  # For so long reports are told on: before the digest when some are missing, else along with it.
   @echo_ms 200
   # Counted in repeats: when a missing digest is asked for, and when a round is given up.
   @ask_after 4
@@ -216,25 +218,40 @@ defmodule Swarm.Round do
   end
 
   defp advance(%{phase: :collect} = round, now_ms) do
-    all? = Enum.all?(round.view, &is_map_key(round.reports, &1))
-
-    if all? or now_ms >= round.deadline_ms,
-      do: %{round | phase: :echo, since_ms: now_ms, said_ms: nil, echo?: true},
-      else: round
-  end
-
-  defp advance(%{phase: :echo} = round, now_ms) do
-    if now_ms - round.since_ms >= @echo_ms do
-      digest = Record.digest(round.id, Record.freeze(round.view, round.reports))
-
-      %{round | phase: :digest, since_ms: now_ms, said_ms: nil, digest: digest, echo?: false}
-      |> put_digest(round.me, digest)
-    else
-      %{round | echo?: true}
+    cond do
+      # Not at the tick of its opening: whoever opened it has to stand first.
+      whole?(round) and now_ms > round.since_ms -> freeze(round, now_ms)
+      now_ms < round.deadline_ms -> round
+      true -> %{round | phase: :echo, since_ms: now_ms, said_ms: nil, echo?: true}
     end
   end
 
+  defp advance(%{phase: :echo} = round, now_ms) do
+    if now_ms - round.since_ms >= @echo_ms,
+      do: freeze(round, now_ms),
+      else: %{round | echo?: true}
+  end
+
+  defp advance(%{phase: :digest} = round, now_ms) when now_ms - round.since_ms < @echo_ms,
+    do: %{round | echo?: round.echo? or whole?(round)}
+
   defp advance(round, _now_ms), do: round
+
+  defp whole?(round), do: Enum.all?(round.view, &is_map_key(round.reports, &1))
+
+  defp freeze(round, now_ms) do
+    digest = Record.digest(round.id, Record.freeze(round.view, round.reports))
+
+    %{
+      round
+      | phase: :digest,
+        since_ms: now_ms,
+        said_ms: nil,
+        digest: digest,
+        echo?: whole?(round)
+    }
+    |> put_digest(round.me, digest)
+  end
 
   defp speak(%{phase: :committed} = round, now_ms) do
     if now_ms - round.since_ms <= @linger_ms,

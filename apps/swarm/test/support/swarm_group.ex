@@ -23,6 +23,7 @@ defmodule Swarm.Group do
             cut: [],
             elected: [],
             stages: [],
+            digests: %{},
             both_ms: 0,
             worst_both_ms: 0
 
@@ -64,9 +65,30 @@ defmodule Swarm.Group do
   @spec show(t(), atom(), float() | nil) :: t()
   def show(group, id, share), do: put_in(group.robots[id].share, share)
 
-  @doc "Cuts the radio between the members of different sets; `[]` mends it."
-  @spec cut(t(), [[atom()]]) :: t()
+  @doc """
+  Cuts the radio between the members of different sets, or single links `{:link, a, b}` and ways
+  `{:way, from, to}`; `[]` mends it.
+  """
+  @spec cut(t(), [[atom()] | {:link | :way, atom(), atom()}]) :: t()
   def cut(group, sets), do: %{group | cut: sets}
+
+  @doc "The robots that can reach each other, if need be by way of others: the parts of the radio."
+  @spec parts(t()) :: [[atom()]]
+  def parts(group), do: parts(group, Map.keys(group.robots))
+
+  defp parts(_group, []), do: []
+
+  defp parts(group, [first | _] = ids) do
+    there = reach(ids, [first], &connected?(group, &1, &2))
+    back = reach(ids, [first], &connected?(group, &2, &1))
+    part = Enum.filter(ids, &(&1 in there and &1 in back))
+    [part | parts(group, ids -- part)]
+  end
+
+  defp reach(ids, found, way?) do
+    more = for b <- ids -- found, Enum.any?(found, &way?.(&1, b)), do: b
+    if more == [], do: found, else: reach(ids, found ++ more, way?)
+  end
 
   @doc "So many seconds on."
   @spec run(t(), number()) :: t()
@@ -86,10 +108,19 @@ defmodule Swarm.Group do
   def event(group, id, event) do
     robot = group.robots[id]
     {phase, mission, effects} = Landmark.handle(event, robot.mission)
+    group = note_digest(group, mission.round)
     phases = if hd(robot.phases) == phase, do: robot.phases, else: [phase | robot.phases]
     group = put_in(group.robots[id], %{robot | mission: mission, phases: phases})
     Enum.reduce(effects, group, &carry_out(&1, id, &2))
   end
+
+  # What was committed under each round's id.
+  defp note_digest(group, %{phase: :committed, id: id, digest: digest}) do
+    all = Map.update(group.digests, id, MapSet.new([digest]), &MapSet.put(&1, digest))
+    %{group | digests: all}
+  end
+
+  defp note_digest(group, _round), do: group
 
   @doc "The percept that a robot has now."
   @spec percept(t(), atom()) :: Percept.t()
@@ -232,8 +263,14 @@ defmodule Swarm.Group do
     %{group | air: sent ++ group.air}
   end
 
-  defp connected?(group, a, b),
-    do: group.cut == [] or Enum.any?(group.cut, &(a in &1 and b in &1))
+  defp connected?(%{cut: []}, _a, _b), do: true
+
+  defp connected?(%{cut: cut}, a, b) do
+    {links, sets} = Enum.split_with(cut, &is_tuple/1)
+
+    (sets == [] or Enum.any?(sets, &(a in &1 and b in &1))) and
+      Enum.all?(links, &(&1 not in [{:link, a, b}, {:link, b, a}, {:way, a, b}]))
+  end
 
   defp deliver(group) do
     {due, air} = Enum.split_with(group.air, fn {at, _, _, _} -> at <= group.now end)
@@ -266,12 +303,13 @@ defmodule Swarm.Group do
 
   defp take(group, to, message), do: event(group, to, {:message, message})
 
-  # For how long two robots lead that hear each other.
+  # For how long two robots lead in one part of the radio.
   defp watch(group) do
     leading = for {id, %{mission: %{phase: :lead}}} <- group.robots, do: id
 
     both? =
-      Enum.any?(leading, fn a -> Enum.any?(leading, &(&1 < a and connected?(group, a, &1))) end)
+      length(leading) > 1 and
+        Enum.any?(parts(group), fn part -> Enum.count(leading, &(&1 in part)) > 1 end)
 
     both = if both?, do: group.both_ms + @tick_ms, else: 0
     %{group | both_ms: both, worst_both_ms: max(group.worst_both_ms, both)}

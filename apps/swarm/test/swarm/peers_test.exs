@@ -62,6 +62,34 @@ defmodule Swarm.PeersTest do
     end
   end
 
+  test "who is there has a number that grows with everyone that comes, goes, returns or restarts" do
+    peers = Peers.new(:mag1)
+    assert Peers.members(peers, 0) == {0, []}
+    peers = hear(peers, 1, 1, 0)
+    assert Peers.members(peers, 0) == {1, [mag2: 1]}
+    peers = hear(peers, 1, 2, 500)
+    assert Peers.members(peers, 2_499) == {1, [mag2: 1]}
+    assert Peers.members(peers, 2_500) == {2, []}
+    peers = hear(peers, 1, 3, 3_000)
+    assert Peers.members(peers, 3_000) == {3, [mag2: 1]}
+    peers = hear(peers, 2, 1, 3_100)
+    assert Peers.members(peers, 3_100) == {4, [mag2: 2]}
+    # Gone, and back as another life: two changes.
+    assert peers |> hear(3, 1, 9_000) |> Peers.members(9_000) == {6, [mag2: 3]}
+  end
+
+  test "what comes by way of another is a sign of life, but not heard" do
+    peers = Peers.hear(Peers.new(:mag1), :mag2, beat(1, 1), 0, false)
+    assert Peers.view(peers, 0) == [:mag1, :mag2]
+    assert Peers.heard(peers, 0) == []
+    # The straight one was overtaken.
+    peers = Peers.hear(peers, :mag2, beat(1, 1), 40, true)
+    assert Peers.heard(peers, 900) == [:mag2]
+    peers = Peers.hear(peers, :mag2, beat(1, 2), 990, false)
+    assert Peers.heard(peers, 1_000) == []
+    assert Peers.status(peers, :mag2, 1_900) == :alive
+  end
+
   test "nobody hears itself" do
     assert Peers.hear(Peers.new(:mag1), :mag1, beat(1, 1), 0) == Peers.new(:mag1)
   end

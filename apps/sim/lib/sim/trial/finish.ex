@@ -1,6 +1,6 @@
 defmodule Sim.Trial.Finish do
   @moduledoc "When a run is over, in lockstep or live. Pure."
-  alias Sim.Trial.{Ledger, Script}
+  alias Sim.Trial.{Cuts, Ledger, Script}
 
   @calm_ms 5_000
 
@@ -21,6 +21,11 @@ defmodule Sim.Trial.Finish do
 
     run.at_ms >= run.options.duration_s * 1000 or
       (Script.over?(run.script, run.world) and calm_ms != nil and
-         run.at_ms - max(calm_ms, Script.last_ms(run.script)) >= @calm_ms)
+         run.at_ms - Enum.max([calm_ms, Script.last_ms(run.script), healed_ms(run)]) >= @calm_ms)
   end
+
+  defp healed_ms(%{options: %{cuts: cuts}}),
+    do: cuts |> Cuts.healed_ms() |> Enum.max(fn -> 0 end)
+
+  defp healed_ms(_whole), do: 0
 end

@@ -4,6 +4,8 @@ defmodule Sim.Trial.Ledger do
   Pure; fed every 100 ms with what the living robots claim.
   """
 
+  alias Sim.Trial.Accord
+
   defstruct stages: [],
             leader: nil,
             epoch: 0,
@@ -13,7 +15,8 @@ defmodule Sim.Trial.Ledger do
             ticks: 0,
             formed_ticks: 0,
             formed_ms: nil,
-            rest_ms: nil
+            rest_ms: nil,
+            accord: %Sim.Trial.Accord{}
 
   @type stage :: %{
           required(:stage) => atom(),
@@ -24,7 +27,7 @@ defmodule Sim.Trial.Ledger do
         }
 
   @typedoc """
-  `stages` has the newest first; `formed_ms` and `rest_ms` say since when the fleet is in formation, or
+  `stages` has the newest first; `leaders_at_once_max` counts those of one part of the radio; `formed_ms` and `rest_ms` say since when the fleet is in formation, or
   at rest without a landmark, `ticks` and `formed_ticks` count those since the first election.
   """
   @type t :: %__MODULE__{
@@ -37,7 +40,8 @@ defmodule Sim.Trial.Ledger do
           ticks: non_neg_integer(),
           formed_ticks: non_neg_integer(),
           formed_ms: integer() | nil,
-          rest_ms: integer() | nil
+          rest_ms: integer() | nil,
+          accord: Sim.Trial.Accord.t()
         }
 
   @doc "An empty ledger."
@@ -60,9 +64,13 @@ defmodule Sim.Trial.Ledger do
     end
   end
 
-  @doc "One tick of claims."
-  @spec note(t(), integer(), [{atom(), map()}]) :: t()
-  def note(ledger, at_ms, claims) do
+  @doc """
+  One tick of claims, in a radio that is divided into these parts (`nil` for one that is whole), and who
+  stands still.
+  """
+  @spec note(t(), integer(), [{atom(), map()}], [[atom()]] | nil, [atom()]) :: t()
+  def note(ledger, at_ms, claims, parts \\ nil, standing \\ []) do
+    parts = parts || [for({id, _claim} <- claims, do: id)]
     leaders = for {id, %{phase: :lead} = claim} <- claims, do: {id, claim}
     phases = for {_id, claim} <- claims, do: claim[:phase]
     formed? = Enum.any?(leaders, fn {_id, claim} -> claim.formed end)
@@ -73,7 +81,8 @@ defmodule Sim.Trial.Ledger do
       | leader: highest(leaders),
         epoch:
           Enum.reduce(claims, ledger.epoch, fn {_id, claim}, e -> max(e, claim[:epoch] || 0) end),
-        leaders_at_once_max: max(ledger.leaders_at_once_max, length(leaders)),
+        leaders_at_once_max: max(ledger.leaders_at_once_max, at_once(leaders, parts)),
+        accord: Accord.note(ledger.accord, at_ms, claims, parts, standing),
         searching?: :search in phases,
         ticks: ledger.ticks + if(elected?, do: 1, else: 0),
         formed_ticks: ledger.formed_ticks + if(elected? and formed?, do: 1, else: 0),
@@ -103,6 +112,13 @@ defmodule Sim.Trial.Ledger do
   @spec share_formed(t()) :: float()
   def share_formed(%{ticks: 0}), do: 0.0
   def share_formed(ledger), do: ledger.formed_ticks / ledger.ticks
+
+  # In one part: parts that cannot reach each other each have their own.
+  defp at_once(leaders, parts) do
+    parts
+    |> Enum.map(fn part -> Enum.count(leaders, fn {id, _claim} -> id in part end) end)
+    |> Enum.max(fn -> 0 end)
+  end
 
   defp highest([]), do: nil
 

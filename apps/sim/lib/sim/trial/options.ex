@@ -10,10 +10,16 @@ defmodule Sim.Trial.Options do
     moves: [],
     kills: [],
     loss: 0.0,
+    duplicates: 0.0,
+    delay_ms: {5, 50},
+    cuts: [],
     noise: :default,
     formation: {:column, 1.0},
     assign: :cost,
     leader_change: true,
+    policy: :available,
+    of: nil,
+    lost_link: nil,
     duration_s: 120,
     blobs: :painted
   }
@@ -24,6 +30,8 @@ defmodule Sim.Trial.Options do
     noise: [:off, :default, :slip],
     assign: [:chain, :cost],
     leader_change: [true, false],
+    policy: [:available, :majority],
+    lost_link: [nil, :stop, :hold, :continue],
     blobs: [:painted, :direct]
   }
 
@@ -43,9 +51,20 @@ defmodule Sim.Trial.Options do
 
   def check(asked) do
     if Keyword.keyword?(asked),
-      do: Enum.reduce_while(asked, {:ok, @defaults}, &take/2),
+      do: asked |> Enum.reduce_while({:ok, @defaults}, &take/2) |> cuts(),
       else: {:error, "options cannot be #{inspect(asked)}: [robots: [:mag1, :min1], seed: 3]"}
   end
+
+  defp cuts({:ok, %{cuts: cuts, robots: robots}} = checked) do
+    if Sim.Trial.Cuts.valid?(cuts, robots),
+      do: checked,
+      else:
+        {:error,
+         "cuts cannot be #{inspect(cuts)}: [{from_s, to_s, [[:mag1], [:mag2]]}] or " <>
+           "[{from_s, :end, {:link, :mag1, :mag2}}], with robots of this run"}
+  end
+
+  defp cuts(error), do: error
 
   defp take({name, _value}, _options) when name not in @names,
     do: {:halt, {:error, "unknown option #{inspect(name)}#{hint(name)}"}}
@@ -74,8 +93,20 @@ defmodule Sim.Trial.Options do
   defp value(:landmark, _other), do: "{x, y} in metres, :none or :default"
   defp value(:map, name) when is_binary(name), do: {:ok, name}
   defp value(:map, _other), do: ~s("hall", "hospital", "arena" or "FILE.png:WIDTHxHEIGHT")
-  defp value(:loss, loss) when is_number(loss) and loss >= 0 and loss <= 1, do: {:ok, loss}
-  defp value(:loss, _other), do: "a share from 0 to 1"
+
+  defp value(name, share)
+       when name in [:loss, :duplicates] and is_number(share) and share >= 0 and share <= 1,
+       do: {:ok, share}
+
+  defp value(name, _other) when name in [:loss, :duplicates], do: "a share from 0 to 1"
+
+  defp value(:delay_ms, {least, most})
+       when is_integer(least) and is_integer(most) and least >= 0 and most >= least,
+       do: {:ok, {least, most}}
+
+  defp value(:delay_ms, _other), do: "{least, greatest} in whole milliseconds"
+  defp value(:of, of) when of == nil or (is_integer(of) and of in 1..1_000), do: {:ok, of}
+  defp value(:of, _other), do: "the number of robots of the fleet, 1 to 1000"
   defp value(:seed, seed) when is_integer(seed), do: {:ok, seed}
   defp value(:seed, _other), do: "a whole number"
 

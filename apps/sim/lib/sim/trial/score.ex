@@ -5,7 +5,7 @@ defmodule Sim.Trial.Score do
   """
   alias Hal.Pose
   alias Sim.{Scene, World}
-  alias Sim.Trial.{Ledger, Setup}
+  alias Sim.Trial.{Accord, Ledger, Setup}
   alias Swarm.{Anchor, Formation}
 
   @typedoc "A run at one instant; `claims` are those of the living."
@@ -86,6 +86,7 @@ defmodule Sim.Trial.Score do
       collisions: run.world.collisions,
       min_separation_m: run.world.min_separation,
       messages: run.messages,
+      agreement: Accord.report(run.ledger.accord),
       fleet: for(robot <- scene.robots, do: row(robot, Map.get(slots, robot.id)))
     }
   end

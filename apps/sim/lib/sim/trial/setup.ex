@@ -25,7 +25,9 @@ defmodule Sim.Trial.Setup do
   `map`, `start` (`:spread` or `:same`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
   (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `loss` (0 to 1), `noise` (`:off`,
   `:default`, `:slip`), `formation` (`kind` or `{kind, spacing}`), `assign` (`:chain` or `:cost`),
-  `leader_change`, `duration_s`, `blobs` (`:painted` or `:direct`). Errors are one line.
+  `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
+  (`:stop`, `:hold` or `:continue`), `duration_s`, `blobs` (`:painted` or `:direct`); of the radio in
+  lockstep also `cuts` (`Sim.Trial.Cuts`), `duplicates` (0 to 1) and `delay_ms` (`{5, 50}`). Errors are one line.
   """
   @spec new(keyword() | map()) :: {:ok, t()} | {:error, String.t()}
   def new(options) do
@@ -82,7 +84,13 @@ defmodule Sim.Trial.Setup do
 
     mission =
       {Swarm.Missions.Landmark,
-       formation: options.formation, assign: options.assign, leader_change: options.leader_change}
+       [
+         formation: options.formation,
+         assign: options.assign,
+         leader_change: options.leader_change,
+         policy: options.policy,
+         of: options.of || length(options.robots)
+       ] ++ if(options.lost_link, do: [lost_link: options.lost_link], else: [])}
 
     robots = for {id, pose} <- robots, do: %{id: id, profile: profile(id), start: common || pose}
 

@@ -28,6 +28,8 @@ defmodule Swarm.Missions.Landmark do
   @leap 1_000_000
   # Without a sign of life for so long a leader is lost.
   @led_ms 2_000
+  # An anchor this old is not joined any more.
+  @news_ms 500
 
   @doc """
   A robot's mission. Options: `formation:` (`{kind, spacing}`), `assign:` (`:chain` or `:cost`),
@@ -121,11 +123,15 @@ defmodule Swarm.Missions.Landmark do
 
   defp still(mission), do: {mission.phase, mission, []}
 
-  # The leader's heartbeats carry the anchor too.
-  defp hear_beats(mission) do
+  # The leader's heartbeats carry the anchor too; the last one of a leader that fell silent is no news.
+  defp hear_beats(%{now_ms: now} = mission) do
     Enum.reduce(mission.percept.peers, mission, fn
-      {_id, %{beat: %{anchor: %Anchor{} = anchor}}}, mission -> hear_anchor(mission, anchor)
-      _silent, mission -> mission
+      {_id, %{at_ms: at_ms, beat: %{anchor: %Anchor{} = anchor}}}, mission
+      when now - at_ms < @news_ms ->
+        hear_anchor(mission, anchor)
+
+      _silent, mission ->
+        mission
     end)
   end
 
@@ -203,8 +209,8 @@ defmodule Swarm.Missions.Landmark do
 
   defp joined?(m),
     do:
-      m.anchor.epoch >= m.epoch and m.me in m.anchor.order and m.now_ms - m.anchor_ms < 500 and
-        not Round.open?(m.round)
+      m.anchor.epoch >= m.epoch and m.me in m.anchor.order and
+        m.now_ms - m.anchor_ms < @news_ms and not Round.open?(m.round)
 
   defp enter(mission, phase) do
     mission = %{
