@@ -69,6 +69,18 @@ defmodule Swarm.Mesh.Guard do
     end
   end
 
+  @doc """
+  Whether a datagram is a copy of one that was let in, as far as can be told without reading it. Most
+  are: what comes by multicast comes by name too.
+  """
+  @spec copy?(t(), String.t(), non_neg_integer(), non_neg_integer()) :: boolean()
+  def copy?(guard, name, session, sequence) do
+    case guard.senders do
+      %{^name => %{session: ^session} = sender} -> window(sender, sequence) == :doubled
+      _other -> false
+    end
+  end
+
   @doc "The sessions believed now, by name."
   @spec sessions(t()) :: %{String.t() => non_neg_integer()}
   def sessions(guard), do: for({name, %{session: s}} <- guard.senders, into: %{}, do: {name, s})

@@ -33,6 +33,7 @@ defmodule Swarm.Mesh.Packet do
   # More than any payload unpacks to; a small datagram could else unpack to gigabytes.
   @most 262_144
   @largest 60_000
+  @frame 1_200
 
   @doc "The largest payload in bytes: what one datagram takes."
   @spec largest() :: pos_integer()
@@ -99,7 +100,13 @@ defmodule Swarm.Mesh.Packet do
       {:error, :payload}
   """
   @spec pack(term()) :: binary()
-  def pack(term), do: :erlang.term_to_binary(term, compressed: 1, minor_version: 2)
+  def pack(term) do
+    # What fits a frame of the network is not worth the time that it takes to press it.
+    case :erlang.term_to_binary(term, minor_version: 2) do
+      payload when byte_size(payload) <= @frame -> payload
+      _large -> :erlang.term_to_binary(term, compressed: 1, minor_version: 2)
+    end
+  end
 
   @doc "The other way round."
   @spec unpack(binary()) :: {:ok, term()} | {:error, :payload}

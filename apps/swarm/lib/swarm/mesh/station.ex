@@ -81,6 +81,7 @@ defmodule Swarm.Mesh.Station do
          {:ok, packet} <- Packet.open(datagram, station.secret.key),
          :ok <- foreign(packet, station),
          {:ok, node} <- known(packet.sender, station.roster),
+         :ok <- original(packet, station.guard),
          {:ok, term} <- Packet.unpack(packet.payload),
          {:ok, body} <- body(packet.kind, term, station) do
       admit(station, packet, node, body, address, now_ms)
@@ -166,6 +167,12 @@ defmodule Swarm.Mesh.Station do
       {:ok, node} -> {:ok, node}
       :error -> {:error, {:unknown_node, name}}
     end
+  end
+
+  defp original(packet, guard) do
+    if Guard.copy?(guard, packet.sender, packet.session, packet.sequence),
+      do: {:error, :doubled},
+      else: :ok
   end
 
   defp body(:beacon, term, _station) do
