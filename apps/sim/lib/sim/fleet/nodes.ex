@@ -12,7 +12,8 @@ defmodule Sim.Fleet.Nodes do
   alias Sim.{Server, Snapshot}
   alias Sim.Node.{Config, Courier}
 
-  @up_ms 10_000
+  # On a machine that is busy with much else a start takes several seconds.
+  @up_ms 20_000
   @silent_ms 1_000
   @world_starts 5
 
@@ -50,23 +51,26 @@ defmodule Sim.Fleet.Nodes do
   end
 
   # As long as one after the other comes, the machine is only slow.
-  defp await_all(crew, ids) do
+  defp await_all(crew, ids, deadline \\ now() + @up_ms) do
     case Enum.filter(ids, &(crew.children[&1].up == nil)) do
       [] ->
         {:ok, crew}
 
       missing ->
         receive do
-          {Courier, _pid, _what} = message ->
+          {Courier, _pid, {:up, _facts}} = message ->
             crew |> told(message) |> await_all(missing)
 
-          {port, {:data, _}} = message when is_port(port) ->
-            crew |> told(message) |> await_all(ids)
+          {Courier, _pid, _what} = message ->
+            crew |> told(message) |> await_all(missing, deadline)
 
-          {port, {:exit_status, _}} when is_port(port) ->
+          {port, {:data, _text}} = message when is_port(port) ->
+            crew |> told(message) |> await_all(missing, deadline)
+
+          {port, {:exit_status, _status}} when is_port(port) ->
             {:error, fallen(crew, port), crew}
         after
-          @up_ms -> {:error, late(crew, hd(missing)), crew}
+          max(deadline - now(), 0) -> {:error, late(crew, hd(missing)), crew}
         end
     end
   end

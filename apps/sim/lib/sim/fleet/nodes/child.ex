@@ -7,7 +7,8 @@ defmodule Sim.Fleet.Nodes.Child do
   alias Sim.Fleet.Nodes.Command
   alias Sim.Node.Config
 
-  @apps [:logger, :hal, :vision, :robot, :swarm, :sim]
+  # With the shell, for those who attach.
+  @apps [:elixir, :iex, :logger, :hal, :vision, :robot, :swarm, :sim]
   @own_flags ~w(ERL_FLAGS ERL_AFLAGS ERL_ZFLAGS ELIXIR_ERL_OPTIONS)
   @kept_bytes 4_000
 
@@ -80,9 +81,7 @@ defmodule Sim.Fleet.Nodes.Child do
     consolidated =
       for path <- :code.get_path(), List.to_string(path) =~ ~r"consolidated$", do: path
 
-    apps = for app <- @apps, do: Application.app_dir(app, "ebin")
-    Enum.map(consolidated, &List.to_string/1) ++ apps ++ [elixir()]
+    apps = for app <- @apps, do: Path.join(to_string(:code.lib_dir(app)), "ebin")
+    Enum.map(consolidated, &List.to_string/1) ++ apps
   end
-
-  defp elixir, do: Path.join(to_string(:code.lib_dir(:elixir)), "ebin")
 end
