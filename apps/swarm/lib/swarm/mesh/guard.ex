@@ -81,6 +81,15 @@ defmodule Swarm.Mesh.Guard do
     end
   end
 
+  @doc "The session believed of this name now, or `nil`."
+  @spec session(t(), String.t()) :: non_neg_integer() | nil
+  def session(guard, name) do
+    case guard.senders do
+      %{^name => %{session: session}} -> session
+      _unknown -> nil
+    end
+  end
+
   @doc "The sessions believed now, by name."
   @spec sessions(t()) :: %{String.t() => non_neg_integer()}
   def sessions(guard), do: for({name, %{session: s}} <- guard.senders, into: %{}, do: {name, s})

@@ -92,6 +92,23 @@ defmodule Swarm.Mesh.Packet do
   def open(_datagram, _key), do: {:error, :not_ours}
 
   @doc """
+  Who sent a datagram and as which, by its own unproven word: only to drop it unread.
+
+      iex> Swarm.Mesh.Packet.peek("garbage")
+      :error
+  """
+  @spec peek(binary()) ::
+          {:ok, {String.t(), session :: non_neg_integer(), sequence :: non_neg_integer()}}
+          | :error
+  def peek(
+        <<"CVY", @version, _kind, size, sender::binary-size(size), session::64, sequence::64,
+          _rest::binary>>
+      ),
+      do: {:ok, {sender, session, sequence}}
+
+  def peek(_datagram), do: :error
+
+  @doc """
   A term as a payload, and back. What would make an atom, or unpack to more than 256 KiB, is refused.
 
       iex> {:mag1, [1, 2.5]} |> Swarm.Mesh.Packet.pack() |> Swarm.Mesh.Packet.unpack()

@@ -77,11 +77,11 @@ defmodule Swarm.Mesh.Station do
   def hear(station, datagram, address, now_ms) do
     station = count_anew(station, div(now_ms, 1_000))
 
-    with :ok <- patience(station, address),
+    with :ok <- original(Packet.peek(datagram), station.guard),
+         :ok <- patience(station, address),
          {:ok, packet} <- Packet.open(datagram, station.secret.key),
          :ok <- foreign(packet, station),
          {:ok, node} <- known(packet.sender, station.roster),
-         :ok <- original(packet, station.guard),
          {:ok, term} <- Packet.unpack(packet.payload),
          {:ok, body} <- body(packet.kind, term, station) do
       admit(station, packet, node, body, address, now_ms)
@@ -169,11 +169,12 @@ defmodule Swarm.Mesh.Station do
     end
   end
 
-  defp original(packet, guard) do
-    if Guard.copy?(guard, packet.sender, packet.session, packet.sequence),
-      do: {:error, :doubled},
-      else: :ok
+  # Half of all datagrams are copies, one by multicast and one by name: those cost no signature.
+  defp original({:ok, {name, session, sequence}}, guard) do
+    if Guard.copy?(guard, name, session, sequence), do: {:error, :doubled}, else: :ok
   end
+
+  defp original(:error, _guard), do: :ok
 
   defp body(:beacon, term, _station) do
     with :error <- Beacon.check(term), do: {:error, :beacon}
@@ -207,7 +208,7 @@ defmodule Swarm.Mesh.Station do
 
     case admitted do
       {:ok, guard} ->
-        new? = Guard.sessions(station.guard)[packet.sender] != packet.session
+        new? = Guard.session(station.guard, packet.sender) != packet.session
         {book, changes} = Book.hear(station.book, packet.sender, address, now_ms)
         station = %{station | guard: guard, book: book}
         {station, taken} = take(station, packet, node, body, address, now_ms)

@@ -176,8 +176,20 @@ defmodule Swarm.Mesh.StationTest do
     after_all = Enum.reduce(garbage, air, &Air.inject(&2, "a", &1))
     assert after_all.out == []
 
-    assert Map.drop(after_all.stations["a"].rejected, [:unsigned, :not_ours, :version, :throttled]) ==
-             Map.drop(air.stations["a"].rejected, [:unsigned, :not_ours, :version, :throttled])
+    assert Map.drop(after_all.stations["a"].rejected, [
+             :doubled,
+             :unsigned,
+             :not_ours,
+             :version,
+             :throttled
+           ]) ==
+             Map.drop(air.stations["a"].rejected, [
+               :doubled,
+               :unsigned,
+               :not_ours,
+               :version,
+               :throttled
+             ])
   end
 
   defp flip(datagram) do

@@ -55,6 +55,8 @@ defmodule Console.Bench.Mesh.Nodes do
       fleet: for(n <- 0..(count + 1), do: :"#{prefix}_#{n}"),
       interface: {127, 0, 0, 1},
       port: 0,
+      # The base is one more.
+      full_mesh: max(count + 1, 2),
       multicast: {{239, 255, 67, 86}, 20_000 + :rand.uniform(20_000)}
     ]
   end
