@@ -12,24 +12,21 @@ defmodule Swarm.Missions.Landmark do
   | `Shape` | a shape that there is room for |
   | `Attend` | what a follower does: its slot, its gaze, its child |
   | `Merge` | what becomes of two leaders that meet |
+  | `Hearing` | whose anchor it believes, and when it joins a leader who names it |
   | `Policy` | who may lead, and what a robot does that has lost everybody |
 
   Time is `percept.at_ms`, compared with whole numbers; there are no timers.
   """
   alias Robot.Behaviour
-  alias Swarm.{Anchor, Formation, Message, Relay, Round, Trail}
-  alias Swarm.Missions.Landmark.{Attend, Council, Lead, Phases, Policy, Sight, State}
+  alias Swarm.{Formation, Message, Relay, Round, Trail}
+  alias Swarm.Missions.Landmark.{Attend, Council, Hearing, Lead, Phases, Policy, Sight, State}
 
   @behaviour Robot.Mission
 
   @roam_ms 6_000
   @tries 3
-  # No fleet elects that often unheard; taken over, it would leave no room for epochs to come.
-  @leap 1_000_000
   # Without a sign of life for so long a leader is lost.
   @led_ms 2_000
-  # An anchor this old is not joined any more.
-  @news_ms 500
 
   @doc """
   A robot's mission. Options: `formation:` (`{kind, spacing}`), `assign:` (`:chain` or `:cost`),
@@ -83,7 +80,7 @@ defmodule Swarm.Missions.Landmark do
   end
 
   def handle({:message, %Message{kind: :place, body: anchor}}, mission),
-    do: still(hear_anchor(mission, anchor))
+    do: still(Hearing.anchor(mission, anchor))
 
   def handle({:message, _other}, mission), do: still(mission)
 
@@ -96,7 +93,7 @@ defmodule Swarm.Missions.Landmark do
         trail: if(percept.pose, do: Trail.note(mission.trail, percept.pose), else: mission.trail)
     }
 
-    {mission, letters} = mission |> Policy.update() |> hear_beats() |> Council.tick()
+    {mission, letters} = mission |> Policy.update() |> Hearing.beats() |> Council.tick()
     {mission, stages} = step(mission)
     {mission, effects} = act(Phases.activity(mission.phase), mission)
     {mission, beats} = relay_beats(mission)
@@ -112,7 +109,9 @@ defmodule Swarm.Missions.Landmark do
     {%{mission | relay: relay}, beats}
   end
 
-  defp relay_letter(%{percept: nil} = mission, _message), do: {mission, []}
+  defp relay_letter(%{percept: percept, phase: phase} = mission, _message)
+       when percept == nil or phase == :idle,
+       do: {mission, []}
 
   defp relay_letter(%{percept: percept} = mission, message) do
     {relay, letters} =
@@ -122,50 +121,6 @@ defmodule Swarm.Missions.Landmark do
   end
 
   defp still(mission), do: {mission.phase, mission, []}
-
-  # The leader's heartbeats carry the anchor too; the last one of a leader that fell silent is no news.
-  defp hear_beats(%{now_ms: now} = mission) do
-    Enum.reduce(mission.percept.peers, mission, fn
-      {_id, %{at_ms: at_ms, beat: %{anchor: %Anchor{} = anchor}}}, mission
-      when now - at_ms < @news_ms ->
-        hear_anchor(mission, anchor)
-
-      _silent, mission ->
-        mission
-    end)
-  end
-
-  # Only an anchor of the own leader, or one of a later epoch that names this robot, counts, and only
-  # one that is news. Of other leaders one learns what people have asked for meanwhile.
-  defp hear_anchor(%{me: me} = mission, %Anchor{leader: leader} = anchor) when leader != me do
-    ours? = anchor.epoch == mission.epoch and mission.leader in [nil, leader]
-    later? = anchor.epoch > mission.epoch and anchor.epoch <= mission.epoch + @leap
-
-    cond do
-      not (ours? or (later? and me in anchor.order)) ->
-        if anchor.asked_no > mission.asked_no, do: take_up(mission, anchor), else: mission
-
-      Anchor.newest(mission.anchor, anchor) != mission.anchor ->
-        take_up(%{mission | anchor: anchor, anchor_ms: mission.now_ms}, anchor)
-
-      true ->
-        mission
-    end
-  end
-
-  defp hear_anchor(mission, _own), do: mission
-
-  # A person may have asked for another shape while this anchor was under way.
-  defp take_up(%{asked_no: known} = mission, %Anchor{asked_no: number} = anchor)
-       when number >= known,
-       do: %{
-         mission
-         | formation: anchor.asked || anchor.formation,
-           asked_no: number,
-           of: max(mission.of, anchor.of)
-       }
-
-  defp take_up(mission, _older), do: mission
 
   # From phase to phase along the table; a row that leads on at once is followed at once.
   defp step(mission, stages \\ []) do
@@ -178,7 +133,10 @@ defmodule Swarm.Missions.Landmark do
   defp holds?(:started, m), do: m.started?
   defp holds?(:stopped, m), do: not m.started?
   defp holds?(:elected, m), do: m.verdict == {:leader, m.me}
-  defp holds?(:led, m), do: match?({:leader, other} when other != m.me, m.verdict) or joined?(m)
+
+  defp holds?(:led, m),
+    do: match?({:leader, other} when other != m.me, m.verdict) or Hearing.joined?(m)
+
   defp holds?(:nobody, m), do: m.verdict == :nobody
   defp holds?(:nobody_again, m), do: m.verdict == :nobody and m.tries + 1 >= @tries
   defp holds?(:scanned, m), do: m.scan != nil
@@ -186,7 +144,10 @@ defmodule Swarm.Missions.Landmark do
   defp holds?(:sighted, m), do: State.sees?(m) or Council.search?(m)
   defp holds?(:roamed, m), do: m.now_ms - m.since_ms >= @roam_ms
   defp holds?(:deposed, m), do: Lead.deposed?(m)
-  defp holds?(:superseded, m), do: m.anchor != nil and m.anchor.epoch > m.epoch and joined?(m)
+
+  defp holds?(:superseded, m),
+    do: m.anchor != nil and m.anchor.epoch > m.epoch and Hearing.joined?(m)
+
   defp holds?(:round_open, m), do: Round.open?(m.round)
   defp holds?(:lost_stop, m), do: Policy.lost?(m) and Policy.lost_link(m) == :stop
   defp holds?(:lost_hold, m), do: Policy.lost?(m) and Policy.lost_link(m) == :hold
@@ -203,14 +164,6 @@ defmodule Swarm.Missions.Landmark do
   defp holds?(:enough, m), do: Policy.enough?(m, together(m))
 
   defp together(m), do: length(Council.view(m))
-
-  # A robot that comes late or back, or missed the end of a round, joins the leader who names it.
-  defp joined?(%{anchor: nil}), do: false
-
-  defp joined?(m),
-    do:
-      m.anchor.epoch >= m.epoch and m.me in m.anchor.order and
-        m.now_ms - m.anchor_ms < @news_ms and not Round.open?(m.round)
 
   defp enter(mission, phase) do
     mission = %{
