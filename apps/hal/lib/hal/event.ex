@@ -22,6 +22,13 @@ defmodule Hal.Event do
   | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and what the mission adds |
   | `[:swarm, :mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): a node was not let in, or would not have us |
   | `[:swarm, :link, :duplicate_id]` | | `robot`, `other`: a robot of this name was there before; this one is silent |
+  | `[:swarm, :mesh, :up]`, `[:swarm, :mesh, :suspect]`, `[:swarm, :mesh, :gone]` | `at_ms` | `node`: by datagrams |
+  | `[:swarm, :mesh, :connected]`, `[:swarm, :mesh, :disconnected]` | `at_ms` | `node`: by Erlang's distribution |
+  | `[:swarm, :mesh, :unknown_node]` | `at_ms` | `name`, `address`: has the secret, but is not in the roster |
+  | `[:swarm, :mesh, :duplicate_node]` | `at_ms` | `node`: another one calls itself like this one |
+  | `[:swarm, :mesh, :no_network]` | | `reason`, `interface`, `port`: no socket; tried again |
+  | `[:swarm, :mesh, :libcluster]` | `at_ms` | `reason`: it ended, and starts again |
+  | `[:swarm, :responder, :failure]` | | `robot`, `service`, `kind`, `reason`: a service's code raised |
   | `[:sim, :server, :late]` | `late_ms` | `world`: a step of the simulated world came late |
   """
   require Logger
