@@ -1,8 +1,9 @@
 defmodule Swarm.RowsTest do
   use ExUnit.Case, async: true
   alias Swarm.Rows
-  alias Swarm.Rows.Wire
+  alias Swarm.Rows.{Diff, Wire}
   doctest Swarm.Rows
+  doctest Swarm.Rows.Diff
   doctest Swarm.Rows.Wire
 
   @robots [:mag1, :mag2, :min1]
@@ -76,10 +77,10 @@ defmodule Swarm.RowsTest do
     for _ <- 1..100 do
       a = merge(Rows.new(), Enum.take_random(history(), 25), 0)
       b = merge(Rows.new(), Enum.take_random(history(), 25), 0)
-      have = Rows.stamps(b, Rows.differing(b, Rows.digest(a)))
-      {lacked, wanted} = Rows.diff(a, have, 0)
+      have = Diff.stamps(b, Diff.differing(b, Diff.digest(a)))
+      {lacked, wanted} = Diff.diff(a, have, 0)
       told = for {robot, key} <- wanted, row <- Rows.rows(b, robot, key, 0), do: row
-      assert Rows.digest(merge(a, told, 0)) == Rows.digest(merge(b, lacked, 0))
+      assert Diff.digest(merge(a, told, 0)) == Diff.digest(merge(b, lacked, 0))
     end
   end
 
@@ -106,7 +107,7 @@ defmodule Swarm.RowsTest do
       stores =
         Enum.reduce(31..70, stores, fn now_ms, stores -> repair(stores, hears?, now_ms) end)
 
-      assert [_same] = stores |> Map.values() |> Enum.map(&Rows.digest/1) |> Enum.uniq()
+      assert [_same] = stores |> Map.values() |> Enum.map(&Diff.digest/1) |> Enum.uniq()
       assert map_size(stores.r1.robots) == map_size(stores.r5.robots)
     end
   end
@@ -119,8 +120,8 @@ defmodule Swarm.RowsTest do
         hears?.(a, b),
         reduce: stores do
       stores ->
-        have = Rows.stamps(stores[b], Rows.differing(stores[b], Rows.digest(stores[a])))
-        {lacked, wanted} = Rows.diff(stores[a], have, now_ms)
+        have = Diff.stamps(stores[b], Diff.differing(stores[b], Diff.digest(stores[a])))
+        {lacked, wanted} = Diff.diff(stores[a], have, now_ms)
 
         told =
           for {robot, key} <- wanted, row <- Rows.rows(stores[b], robot, key, now_ms), do: row
@@ -137,16 +138,16 @@ defmodule Swarm.RowsTest do
       merge(Rows.new(), for(n <- 1..count, do: {:"mag#{n}", :a, {1, n}, 0, n}), 0)
     end
 
-    assert [{:digest, "", nil, _} = part] = Wire.digest(Rows.digest(rows.(30)))
+    assert [{:digest, "", nil, _} = part] = Wire.digest(Diff.digest(rows.(30)))
     assert byte_size(:erlang.term_to_binary(part)) <= 800
-    parts = Wire.digest(Rows.digest(rows.(100)))
+    parts = Wire.digest(Diff.digest(rows.(100)))
     assert length(parts) > 1
     assert Enum.all?(parts, &(byte_size(:erlang.term_to_binary(&1)) <= 1_200))
 
     differing = fn rows ->
       for part <- parts,
           {{:digest, first, until, digest}, 0} = Wire.read(part),
-          robot <- Rows.differing(rows, digest, first, until),
+          robot <- Diff.differing(rows, digest, first, until),
           do: robot
     end
 
@@ -208,7 +209,7 @@ defmodule Swarm.RowsTest do
     assert {:ok, :kept, 300} = Rows.get(rows, :mag1, :b, 10)
     assert {:ok, {{1, 41}, :newest, 0}} = Rows.held(rows, :mag1, :a)
     other = merge(merge(Rows.new(), theirs, 10), Rows.rows(rows, :mag1, 10), 10)
-    assert Rows.digest(other) == Rows.digest(rows)
+    assert Diff.digest(other) == Diff.digest(rows)
   end
 
   test "robots long gone are forgotten, and old words of a former life" do

@@ -14,6 +14,7 @@ defmodule Swarm.Rows.Wire do
   a node relays what it has no words for; nothing that arrives becomes an atom.
   """
   alias Swarm.{Rows, Shape}
+  alias Swarm.Rows.Diff
 
   # Of the payload of a datagram; larger terms go alone.
   @datagram 1_200
@@ -75,7 +76,7 @@ defmodule Swarm.Rows.Wire do
   end
 
   @doc "A digest as terms for datagrams, each of which says of which names it is."
-  @spec digest(Rows.digest()) :: [term()]
+  @spec digest(Diff.digest()) :: [term()]
   def digest(digest) do
     parts = pack(for {robot, hash} <- digest, do: {Atom.to_string(robot), hash})
     firsts = parts |> Enum.drop(1) |> Enum.map(fn [{name, _hash} | _] -> name end)
@@ -133,7 +134,7 @@ defmodule Swarm.Rows.Wire do
 
   @type heard ::
           {:rows, [Rows.row()]}
-          | {:digest, String.t(), String.t() | nil, Rows.digest()}
+          | {:digest, String.t(), String.t() | nil, Diff.digest()}
           | {:have, [{atom(), [{id(), Rows.stamp()}]}]}
           | {:want, [{atom(), id()}]}
 
