@@ -8,11 +8,15 @@ defmodule Console.Demo do
 
   @doc """
   Runs `options` with a trial module (`Sim.Trial`) and returns the exit status: 0 when the fleet
-  ended in formation, 2 when it did not, 1 when the run cannot be made. `lines` makes what is to be
-  said of the trial before it runs.
+  ended in formation, 2 when it did not, 1 when the run cannot be made. Of the `hooks`, `lines`
+  makes what is to be said of the trial before it runs, and `stop` ends what it leaves behind.
   """
-  @spec run(Options.t(), module(), (term() -> [String.t()])) :: 0 | 1 | 2
-  def run(%Options{} = options, trial_module, lines \\ fn _trial -> [] end) do
+  @spec run(Options.t(), module(), lines: (term() -> [String.t()]), stop: (term() -> :ok)) ::
+          0 | 1 | 2
+  def run(%Options{} = options, trial_module, hooks \\ []) do
+    lines = Keyword.get(hooks, :lines, fn _trial -> [] end)
+    stop = Keyword.get(hooks, :stop, fn _trial -> :ok end)
+
     # With `--json -` the standard output belongs to the report alone.
     output = Output.to(if(options.json == "-", do: :stderr, else: :stdio))
 
@@ -37,7 +41,9 @@ defmodule Console.Demo do
           )
 
         Output.finish(output)
-        finish(run, options, (System.monotonic_time(:millisecond) - started) / 1000)
+        status = finish(run, options, (System.monotonic_time(:millisecond) - started) / 1000)
+        stop.(run.trial)
+        status
 
       {:error, line} ->
         IO.puts(:stderr, "demo: #{line}")

@@ -27,4 +27,7 @@ defmodule Console.Live do
 
   @doc "The result for the report, as `Sim.Trial.result/1` gives it."
   @callback result(live :: term()) :: map()
+
+  @doc "Ends it, and returns when nothing of it is left."
+  @callback stop(live :: term()) :: :ok
 end

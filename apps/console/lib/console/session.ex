@@ -236,6 +236,7 @@ defmodule Console.Session do
     Enum.each(Report.summary(result, formed?, wall_s), &Output.line(session.output, &1))
     title = Picture.title(length(options.robots), options.map, options.seed)
     drawing = session.track && fn -> Picture.draw(session.track, title) end
+    session.module.stop(session.live)
 
     case Report.write(options, Report.json(result, wall_s), drawing, session.output) do
       :ok -> if formed? or session.until_s == nil, do: 0, else: 2

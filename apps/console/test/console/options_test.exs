@@ -20,9 +20,10 @@ defmodule Console.OptionsTest do
       parse(
         "--fleet mag:4,min:2 --seed 7 --map hospital --start same --landmark=-2,1 --move -3,2@40 " <>
           "--move 0,0@60 --kill leader@30 --kill min2@50.5 --loss 0.2 --noise slip --formation wedge:1.2 " <>
-          "--assign chain --leader-change off --duration 200 --headless --json - --picture a.svg --blobs direct"
+          "--assign chain --leader-change off --duration 200 --headless --nodes --json - --picture a.svg --blobs direct"
       )
 
+    assert options.headless and options.nodes
     assert options.robots == [:mag1, :mag2, :mag3, :mag4, :min1, :min2]
     assert options.moves == [{{-3.0, 2.0}, 40.0}, {{0.0, 0.0}, 60.0}]
     assert options.kills == [{:leader, 30.0}, {:min2, 50.5}]

@@ -22,6 +22,9 @@ defmodule Console.Live.Fleet do
   def lines(live), do: Fleet.lines(live)
 
   @impl Console.Live
+  def stop(live), do: Fleet.stop(live)
+
+  @impl Console.Live
   def command(live, command) do
     case carry_out(command, live) do
       :ok -> {:ok, told(command)}

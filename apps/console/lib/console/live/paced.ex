@@ -35,4 +35,8 @@ defmodule Console.Live.Paced do
   @doc "How to reach its processes."
   @spec lines(pid()) :: [String.t()]
   defdelegate lines(fleet), to: Fleet
+
+  @doc "Ends them, and returns when they are gone."
+  @spec stop(pid()) :: :ok
+  defdelegate stop(fleet), to: Fleet
 end

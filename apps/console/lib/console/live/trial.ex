@@ -30,6 +30,9 @@ defmodule Console.Live.Trial do
   @impl Console.Live
   def lines(_live), do: ["all robots live in process #{System.pid()}, in lockstep; see --nodes"]
 
+  @impl Console.Live
+  def stop(live), do: GenServer.stop(live)
+
   @impl GenServer
   def init({module, trial}) do
     send(self(), :step)

@@ -41,7 +41,7 @@ defmodule Mix.Tasks.Demo do
     if options.nodes, do: warn(length(options.robots))
 
     cond do
-      options.headless and options.nodes -> Demo.run(options, Live.Paced, &Live.Paced.lines/1)
+      options.headless and options.nodes -> Demo.run(options, Live.Paced, paced())
       options.headless -> Demo.run(options, Sim.Trial)
       true -> live(options)
     end
@@ -49,6 +49,8 @@ defmodule Mix.Tasks.Demo do
     error in ErlangError ->
       if error.original == :terminated, do: @unread, else: reraise(error, __STACKTRACE__)
   end
+
+  defp paced, do: [lines: &Live.Paced.lines/1, stop: &Live.Paced.stop/1]
 
   defp warn(robots) do
     if robots > @nodes_a_processor * System.schedulers_online() do

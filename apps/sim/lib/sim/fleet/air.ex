@@ -84,9 +84,15 @@ defmodule Sim.Fleet.Air do
     end
   end
 
-  # One by one: what one robot misses, another may hear.
-  defp deliver(to, message) do
-    if Names.whereis(to, :link), do: Link.hear(to, message), else: Mesh.speak([to], message)
+  # One by one: what one robot misses, another may hear. Where a robot is, its first heartbeats tell,
+  # and until then those of others go to everybody.
+  defp deliver(to, %{kind: kind} = message) do
+    cond do
+      Names.whereis(to, :link) -> Link.hear(to, message)
+      is_map_key(Mesh.robots(), to) -> Mesh.speak([to], message)
+      kind == :heartbeat -> Mesh.speak(:all, message)
+      true -> :ok
+    end
   end
 
   defp now, do: System.monotonic_time(:millisecond)

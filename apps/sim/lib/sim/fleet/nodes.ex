@@ -182,7 +182,9 @@ defmodule Sim.Fleet.Nodes do
 
   @impl Sim.Fleet.Crew
   def stop(crew) do
-    for {_id, child} <- crew.children, do: Child.kill(child)
+    children = Map.values(crew.children)
+    Enum.each(children, &Child.kill/1)
+    Child.await_ends(children)
     Host.stop(crew.host)
   end
 

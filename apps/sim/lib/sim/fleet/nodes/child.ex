@@ -11,6 +11,7 @@ defmodule Sim.Fleet.Nodes.Child do
   @apps [:elixir, :iex, :logger, :hal, :vision, :robot, :swarm, :sim]
   @own_flags ~w(ERL_FLAGS ERL_AFLAGS ERL_ZFLAGS ELIXIR_ERL_OPTIONS)
   @kept_bytes 4_000
+  @end_ms 2_000
 
   @enforce_keys [:node, :port, :pid]
   defstruct @enforce_keys ++ [up: nil, said: ""]
@@ -74,6 +75,25 @@ defmodule Sim.Fleet.Nodes.Child do
   def kill(child) do
     _ = System.cmd("kill", ["-KILL", Integer.to_string(child.pid)], stderr_to_stdout: true)
     :ok
+  end
+
+  @doc """
+  Waits until these, which were killed, are gone, 2 s at most: whoever looks for them after we have
+  ended finds none. In the process that started them.
+  """
+  @spec await_ends([t()]) :: :ok
+  def await_ends(children) do
+    await(for(child <- children, do: child.port), System.monotonic_time(:millisecond) + @end_ms)
+  end
+
+  defp await([], _deadline), do: :ok
+
+  defp await([port | ports], deadline) do
+    receive do
+      {^port, {:exit_status, _status}} -> await(ports, deadline)
+    after
+      max(deadline - System.monotonic_time(:millisecond), 0) -> await(ports, deadline)
+    end
   end
 
   # Those of this build: what runs here runs there.
