@@ -10,7 +10,7 @@ defmodule Swarm.Alarm do
   switched on afterwards is not stopped by one.
   """
   use GenServer
-  alias Swarm.{Directory, Post, Stop}
+  alias Swarm.{Directory, Post, Shape, Stop}
 
   @times 10
   @passed_on 3
@@ -46,25 +46,18 @@ defmodule Swarm.Alarm do
     {:ok, %{left: %{}, heard: %Stop{}}}
   end
 
+  # It has a name that connected nodes can send to, so anything may come here.
   @impl GenServer
-  def handle_cast({:repeat, call, times}, s), do: {:noreply, repeat(s, call, times)}
+  def handle_cast({:repeat, call, times}, s) when times in 1..@times,
+    do: {:noreply, if(Stop.call?(call), do: repeat(s, call, times), else: s)}
 
-  def handle_cast({:pass_on, call}, s) do
-    # Many robots of this node may have heard it.
-    case Stop.call(s.heard, call) do
-      heard when heard == s.heard ->
-        {:noreply, s}
-
-      heard ->
-        send_out(call)
-        {:noreply, repeat(%{s | heard: heard}, call, @passed_on - 1)}
-    end
-  end
+  def handle_cast({:pass_on, call}, s),
+    do: {:noreply, if(Stop.call?(call), do: pass_on(s, call), else: s)}
 
   def handle_cast({:quiet, :all}, s), do: {:noreply, %{s | left: %{}}}
 
-  def handle_cast({:quiet, calls}, s) when is_list(calls) do
-    heard = %Stop{calls: calls}
+  def handle_cast({:quiet, calls}, s) do
+    heard = %Stop{calls: if(Shape.list?(calls, &match?({_, {_, _}}, &1)), do: calls, else: [])}
     over = for {call, _left} <- s.left, Stop.call(heard, call) == heard, do: call
     {:noreply, %{s | left: Map.drop(s.left, over)}}
   end
@@ -87,6 +80,18 @@ defmodule Swarm.Alarm do
   end
 
   def handle_info(_unknown, s), do: {:noreply, s}
+
+  # Many robots of this node may have heard it.
+  defp pass_on(s, call) do
+    case Stop.call(s.heard, call) do
+      heard when heard == s.heard ->
+        s
+
+      heard ->
+        send_out(call)
+        repeat(%{s | heard: heard}, call, @passed_on - 1)
+    end
+  end
 
   defp repeat(s, _call, 0), do: s
   defp repeat(%{left: left} = s, _call, _times) when map_size(left) >= @most, do: s

@@ -98,7 +98,8 @@ defmodule Swarm.Brake do
   end
 
   @impl GenServer
-  def handle_call({:beat, number, latched?}, _from, s) do
+  def handle_call({:beat, number, latched?}, _from, s)
+      when is_integer(number) and number >= 0 and is_boolean(latched?) do
     s = become(s, Stop.hear(s.stop, number, latched?))
     {:reply, s.stop, s}
   end

@@ -132,15 +132,22 @@ defmodule Swarm.Hints do
     {:ok, schedule(s)}
   end
 
+  # It has a name that connected nodes can send to, so anything may come here.
   @impl GenServer
   def handle_call({:put, robot, id, payload}, _from, s) do
-    s = show(%{s | hints: Stigmergy.put(s.hints, robot, id, payload, now())})
-    Carrier.cast(s.transport, :hints, {:hints, Stigmergy.entries(s.hints, [id])})
-    {:reply, :ok, s}
+    if Stigmergy.entry?({id, 1, robot, payload}, @bytes) do
+      s = show(%{s | hints: Stigmergy.put(s.hints, robot, id, payload, now())})
+      Carrier.cast(s.transport, :hints, {:hints, Stigmergy.entries(s.hints, [id])})
+      {:reply, :ok, s}
+    else
+      {:noreply, drop(s)}
+    end
   end
 
   def handle_call(:info, _from, s),
     do: {:reply, %{entries: map_size(s.hints.entries), dropped: s.dropped}, s}
+
+  def handle_call(_unknown, _from, s), do: {:noreply, drop(s)}
 
   @impl GenServer
   def handle_cast({:hear, node, term}, s), do: {:noreply, heard(s, node, term)}

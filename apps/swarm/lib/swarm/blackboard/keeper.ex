@@ -5,7 +5,7 @@ defmodule Swarm.Blackboard.Keeper do
   """
   use GenServer
   alias Hal.Event
-  alias Swarm.Rows
+  alias Swarm.{Rows, Shape}
   alias Swarm.Rows.{Carrier, Diff, Wire}
 
   # Nodes that get each digest.
@@ -35,11 +35,17 @@ defmodule Swarm.Blackboard.Keeper do
     {:ok, schedule(s)}
   end
 
+  # It has a name that connected nodes can send to, so anything may come here.
+  defguardp is_owner(pid, robot, boot)
+            when is_pid(pid) and node(pid) == node() and is_atom(robot) and is_integer(boot) and
+                   boot >= 0
+
   @impl GenServer
-  def handle_call({:enter, robot, boot, owner}, _from, s),
+  def handle_call({:enter, robot, boot, owner}, _from, s) when is_owner(owner, robot, boot),
     do: {:reply, :ok, enter(s, owner, robot, boot)}
 
-  def handle_call({:put, robot, key, payload}, _from, s) do
+  def handle_call({:put, robot, key, payload}, _from, s)
+      when is_atom(robot) and is_binary(payload) do
     case put_one(s, robot, key, payload) do
       {:ok, s} -> {:reply, :ok, s}
       {:error, reason} -> {:reply, {:error, line(reason, robot, key, payload, s)}, s}
@@ -51,17 +57,13 @@ defmodule Swarm.Blackboard.Keeper do
     {:reply, %{robots: map_size(s.rows.robots), rows: rows, dropped: s.dropped}, s}
   end
 
-  @impl GenServer
-  def handle_cast({:note, owner, robot, boot, pairs}, s) do
-    s = enter(s, owner, robot, boot)
+  def handle_call(_unknown, _from, s), do: {:noreply, drop(s, 1)}
 
-    {:noreply,
-     Enum.reduce(pairs, s, fn {key, payload}, s ->
-       case put_one(s, robot, key, payload) do
-         {:ok, s} -> s
-         {:error, _over_a_limit} -> drop(s, 1)
-       end
-     end)}
+  @impl GenServer
+  def handle_cast({:note, owner, robot, boot, pairs}, s) when is_owner(owner, robot, boot) do
+    if Shape.list?(pairs, &match?({_key, payload} when is_binary(payload), &1)),
+      do: {:noreply, s |> enter(owner, robot, boot) |> put_all(robot, pairs)},
+      else: {:noreply, drop(s, 1)}
   end
 
   def handle_cast({:leave, robot}, s), do: {:noreply, end_of(s, robot)}
@@ -118,6 +120,15 @@ defmodule Swarm.Blackboard.Keeper do
         with %{^robot => {_former, ref}} <- owners, do: Process.demonitor(ref, [:flush])
         Map.put(owners, robot, {owner, Process.monitor(owner)})
     end
+  end
+
+  defp put_all(s, robot, pairs) do
+    Enum.reduce(pairs, s, fn {key, payload}, s ->
+      case put_one(s, robot, key, payload) do
+        {:ok, s} -> s
+        {:error, _over_a_limit} -> drop(s, 1)
+      end
+    end)
   end
 
   defp put_one(s, robot, key, payload) do

@@ -48,7 +48,7 @@ defmodule Swarm.Directory.Watch do
   end
 
   @impl GenServer
-  def handle_call({:subscribe, pid}, _from, s) when node(pid) == node() do
+  def handle_call({:subscribe, pid}, _from, s) when is_pid(pid) and node(pid) == node() do
     subscribers = Map.put_new_lazy(s.subscribers, pid, fn -> Process.monitor(pid) end)
     {:reply, {:ok, s.told |> Map.keys() |> Enum.sort()}, %{s | subscribers: subscribers}}
   end
@@ -57,6 +57,12 @@ defmodule Swarm.Directory.Watch do
     do: {:reply, {:error, "#{inspect(pid)} is not of this node: subscribe there"}, s}
 
   def handle_call({:unsubscribe, pid}, _from, s), do: {:reply, :ok, forget(s, pid)}
+
+  # It has a name that connected nodes can send to, so anything may come here.
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_cast(_unknown, s), do: {:noreply, s}
 
   @impl GenServer
   def handle_info({ref, :join, {:robot, robot}, pids}, %{ref: ref} = s) do

@@ -4,55 +4,65 @@ defmodule Swarm.Link.Flood do
   but it can throw them away faster than others send them: a look at one costs far less than its
   handling.
 
-  What goes first is telemetry (what is heard by radio) and junk, the oldest of it; then, of what is
-  left, commands and the mission's own letters, if anybody sends so many. Timers and what holds
-  processes together stay.
+  What goes first is telemetry (what is heard by radio) and junk, the oldest of it; then, if what is left
+  is still too much, commands, the mission's own letters and forged messages of the system, if
+  anybody sends so many. Timers stay. The order of what stays is kept.
   """
 
   @most 2_000
   @keep 500
 
   @orders [:command, :say, :rival, :stamp]
-  @system [:"$gen_cast", :"$gen_call", :system, :DOWN, :EXIT]
-
-  defguardp is_order(cast)
-            when is_tuple(cast) and tuple_size(cast) > 1 and elem(cast, 0) in @orders
-
-  # A pair of a reference and something answers a call.
-  defguardp is_needed(message)
-            when message in [:tick, :enter] or
-                   (is_tuple(message) and tuple_size(message) > 0 and
-                      (elem(message, 0) in @system or is_reference(elem(message, 0))))
 
   @doc "Throws away the oldest of the calling process's mailbox if it is too long; returns how many."
   @spec relieve() :: non_neg_integer()
   def relieve do
     case queued() do
-      queued when queued > @most -> telemetry(queued - @keep, 0)
+      queued when queued > @most -> sweep(queued)
       _few -> 0
     end
   end
 
-  defp telemetry(0, dropped), do: dropped
+  # Each message is taken out once, and what stays is sent again: to leave it where it is, and look for the
+  # others behind it again and again, would take longer than they need to come.
+  defp sweep(queued) do
+    {kept, left} = take(queued, queued - @keep, [])
+    kept = Enum.reverse(kept)
+    kept = if length(kept) > @most, do: drop_oldest(kept, left), else: kept
+    for message <- kept, do: send(self(), message)
+    queued - length(kept)
+  end
 
-  defp telemetry(left, dropped) do
+  # `left` is how many are still to go.
+  defp take(0, left, kept), do: {kept, left}
+
+  defp take(number, left, kept) do
     receive do
-      {:"$gen_cast", cast} when not is_order(cast) -> telemetry(left - 1, dropped + 1)
-      message when not is_needed(message) -> telemetry(left - 1, dropped + 1)
-    after
-      0 -> if queued() > @most, do: orders(left, dropped), else: dropped
+      message ->
+        if left > 0 and telemetry?(message),
+          do: take(number - 1, left - 1, kept),
+          else: take(number - 1, left, [message | kept])
     end
   end
 
-  defp orders(0, dropped), do: dropped
+  defp drop_oldest(kept, 0), do: kept
+  defp drop_oldest([], _left), do: []
 
-  defp orders(left, dropped) do
-    receive do
-      {:"$gen_cast", _order} -> orders(left - 1, dropped + 1)
-    after
-      0 -> dropped
-    end
-  end
+  defp drop_oldest([timer | kept], left) when timer in [:tick, :enter],
+    do: [timer | drop_oldest(kept, left)]
+
+  defp drop_oldest([_oldest | kept], left), do: drop_oldest(kept, left - 1)
+
+  # Nobody calls a link, and no answer to a call of its own comes when nobody waits for it.
+  defp telemetry?({:"$gen_cast", cast}),
+    do: not (is_tuple(cast) and tuple_size(cast) > 1 and elem(cast, 0) in @orders)
+
+  defp telemetry?(timer) when timer in [:tick, :enter], do: false
+
+  defp telemetry?(message) when is_tuple(message) and tuple_size(message) > 0,
+    do: elem(message, 0) not in [:system, :DOWN]
+
+  defp telemetry?(_junk), do: true
 
   defp queued do
     {:message_queue_len, queued} = Process.info(self(), :message_queue_len)

@@ -8,7 +8,7 @@ defmodule Swarm.Mesh.Dialer do
   """
   use GenServer
   alias Hal.Event
-  alias Swarm.Mesh.{Backoff, Options, Plan}
+  alias Swarm.Mesh.{Backoff, Options, Plan, Roster}
 
   @tick_ms 200
   # So long the one whose part it is has to connect before the other tries.
@@ -38,15 +38,31 @@ defmodule Swarm.Mesh.Dialer do
 
     # A dialer before this one may have been told of nodes already.
     known = for node <- Map.keys(Swarm.Mesh.view().nodes), into: %{}, do: {node, row(now)}
-    {:ok, schedule(%{options: options, known: known, dialling: %{}, chance: chance, ticks: 1})}
+    fleet = MapSet.new(Map.values(Roster.new(node(), options.fleet).nodes))
+
+    {:ok,
+     schedule(%{
+       options: options,
+       fleet: fleet,
+       known: known,
+       dialling: %{},
+       chance: chance,
+       ticks: 1
+     })}
   end
+
+  # It has a name that connected nodes can send to, so anything may come here.
+  @impl GenServer
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
 
   @impl GenServer
   def handle_cast({:note, :up, node}, s) do
-    {:noreply, dial(%{s | known: Map.put(s.known, node, row(now()))})}
+    if node in s.fleet,
+      do: {:noreply, dial(%{s | known: Map.put(s.known, node, row(now()))})},
+      else: {:noreply, s}
   end
 
-  def handle_cast({:note, _silent, _node}, s), do: {:noreply, s}
+  def handle_cast(_silent_or_unknown, s), do: {:noreply, s}
 
   @impl GenServer
   def handle_info(:tick, s) do
@@ -54,13 +70,13 @@ defmodule Swarm.Mesh.Dialer do
     {:noreply, schedule(dial(%{s | ticks: s.ticks + 1}))}
   end
 
-  def handle_info({:nodeup, node}, s) do
+  def handle_info({:nodeup, node}, s) when is_atom(node) do
     Event.execute([:swarm, :mesh, :connected], %{at_ms: now()}, %{node: node})
     Swarm.Mesh.introduce(node)
     {:noreply, s}
   end
 
-  def handle_info({:nodedown, node}, s) do
+  def handle_info({:nodedown, node}, s) when is_atom(node) do
     Event.execute([:swarm, :mesh, :disconnected], %{at_ms: now()}, %{node: node})
     now = now()
 

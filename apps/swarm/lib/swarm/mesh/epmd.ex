@@ -57,6 +57,16 @@ defmodule Swarm.Mesh.Epmd do
   @spec default_port(text()) :: 9_101..9_999
   def default_port(name), do: Peers.default_port(to_string(name))
 
+  # A distribution whose port mapper falls ends the node, so nothing that comes here may fell it.
+  @impl GenServer
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info(_unknown, s), do: {:noreply, s}
+
   # What Erlang asks of an epmd module.
 
   @doc false

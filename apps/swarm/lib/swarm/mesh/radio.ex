@@ -8,7 +8,7 @@ defmodule Swarm.Mesh.Radio do
   use GenServer
   alias Hal.Event
   alias Robot.Names
-  alias Swarm.{Link, Post}
+  alias Swarm.{Link, Post, Shape}
   alias Swarm.Mesh.{Backoff, Dialer, Epmd, Options, Roster, Sockets, Station}
 
   @tick_ms 200
@@ -69,14 +69,18 @@ defmodule Swarm.Mesh.Radio do
   end
 
   @impl GenServer
-  def handle_cast({:speak, to, message}, s),
-    do: {:noreply, run(s, Station.speak(s.station, to, message, now()))}
+  def handle_cast({:speak, to, message}, s) do
+    if to == :all or Shape.names?(to),
+      do: {:noreply, run(s, Station.speak(s.station, to, message, now()))},
+      else: {:noreply, s}
+  end
 
-  def handle_cast({:serve, service, to, term}, s),
-    do: {:noreply, run(s, Station.serve(s.station, service, to, term))}
+  def handle_cast({:serve, service, to, term}, s)
+      when is_map_key(@receivers, service) and is_atom(to),
+      do: {:noreply, run(s, Station.serve(s.station, service, to, term))}
 
   # To a node that the distribution is connected to, however that came about.
-  def handle_cast({:introduce, node}, s) do
+  def handle_cast({:introduce, node}, s) when is_atom(node) do
     if s.sockets, do: Post.cast({__MODULE__, node}, {:knock, node(), s.sockets.port})
     {:noreply, s}
   end
@@ -97,13 +101,17 @@ defmodule Swarm.Mesh.Radio do
     {:reply, Map.put(counts, :port, s.sockets && s.sockets.port), s}
   end
 
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
   @impl GenServer
-  def handle_info({:udp, _socket, ip, port, datagram}, s) do
+  def handle_info({:udp, socket, ip, port, datagram}, %{sockets: %Sockets{} = sockets} = s)
+      when socket == sockets.own or socket == sockets.group do
     s = %{s | heard: s.heard + 1}
     {:noreply, run(s, Station.hear(s.station, datagram, {ip, port}, now()))}
   end
 
-  def handle_info({:udp_passive, socket}, s) do
+  def handle_info({:udp_passive, socket}, %{sockets: %Sockets{} = sockets} = s)
+      when socket == sockets.own or socket == sockets.group do
     Sockets.again(socket)
     {:noreply, s}
   end

@@ -9,7 +9,7 @@ defmodule Swarm.Mesh.Relay do
   use GenServer
   alias Robot.Names
   alias Swarm.Mesh.Plan
-  alias Swarm.Shape
+  alias Swarm.{Post, Shape}
 
   # Answers later than this are asked for by nobody.
   @forget_ms 2_000
@@ -46,8 +46,12 @@ defmodule Swarm.Mesh.Relay do
   @impl GenServer
   def init([]), do: {:ok, %{asked: %{}}}
 
+  # It has a name that connected nodes can send to, so anything may come here.
   @impl GenServer
-  def handle_cast({:there, [], back, robot, request, ref}, s) when is_tuple(request) do
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_cast({:there, [], [_ | _] = back, robot, request, ref}, s) when is_tuple(request) do
     with true <- Shape.name?(robot) and is_reference(ref) and nodes?(back),
          true <- map_size(s.asked) < @most,
          link when link != nil <- Names.whereis(robot, :link) do
@@ -69,7 +73,7 @@ defmodule Swarm.Mesh.Relay do
   end
 
   def handle_cast({:back, [], ref, answer}, s) when is_reference(ref) do
-    Kernel.send(ref, {ref, answer})
+    Post.answer(ref, answer)
     {:noreply, s}
   end
 
@@ -81,7 +85,7 @@ defmodule Swarm.Mesh.Relay do
   def handle_cast(_unknown, s), do: {:noreply, s}
 
   @impl GenServer
-  def handle_info({:forget, own}, s) do
+  def handle_info({:forget, own}, s) when is_map_key(s.asked, own) do
     :erlang.unalias(own)
     {:noreply, %{s | asked: Map.delete(s.asked, own)}}
   end

@@ -1,0 +1,32 @@
+defmodule Swarm.Mesh.JunkTest do
+  # Whoever is connected can send anything to whatever has a name or is in the directory.
+  use ExUnit.Case, async: false
+  import Swarm.Case, only: [eventually: 1]
+  alias Swarm.MeshNodes
+  alias Swarm.MeshNodes.Junk
+
+  test "nothing that a node can be sent fells or fattens anything" do
+    [one, two] = MeshNodes.start(2, robots: true)
+    assert eventually(fn -> hears?(one, two) end)
+
+    # A first time loads all modules that are needed for it.
+    assert MeshNodes.call(one, Junk, :pour, [one.name], 40_000) == []
+    before = grown(one)
+    assert MeshNodes.call(one, Junk, :pour, [one.name], 40_000) == []
+    assert grown(one) - before < 20_000_000
+
+    assert eventually(fn -> hears?(one, two) and hears?(two, one) end)
+    assert eventually(fn -> MeshNodes.call(two, Swarm, :stop, [one.name]) == :ok end)
+    assert MeshNodes.call(one, Node, :list, []) == [two.node]
+  end
+
+  defp hears?(one, two),
+    do: match?(%{status: :alive}, MeshNodes.call(one, Swarm.Mesh, :view, []).nodes[two.node])
+
+  defp grown(node) do
+    for pid <- MeshNodes.call(node, Process, :list, []),
+        do: MeshNodes.call(node, :erlang, :garbage_collect, [pid])
+
+    MeshNodes.call(node, :erlang, :memory, [:total])
+  end
+end
