@@ -98,8 +98,6 @@ defmodule Robot.CommandTest do
       Command.keywords() ++
         ["1", "-", ".", "e", "1e9999999", "nan", "mag1", "ä", " ", "\n", <<200>>]
 
-    before = :erlang.system_info(:atom_count)
-
     for k <- 1..3000 do
       text =
         for _ <- 1..:rand.uniform(6),
@@ -107,12 +105,20 @@ defmodule Robot.CommandTest do
             do: Enum.random(pieces) <> Enum.random([":", "", "::"])
 
       text = if rem(k, 3) == 0, do: :crypto.strong_rand_bytes(:rand.uniform(40)), else: text
+      new = "new#{k}_#{:rand.uniform(1_000_000_000)}"
+      strange = Enum.reject([text, new | String.split(text, ":")], &atom?/1)
       assert {kind, _} = Command.parse(text, @known)
       assert kind in [:ok, :error]
-      Command.parse("new#{k}:newer#{k}", @known)
+      assert {:error, _line} = Command.parse("#{new}:#{new}", @known)
+      assert {:error, _line} = Command.parse("goto:#{new}:1", @known)
+      refute Enum.any?(strange, &atom?/1)
     end
+  end
 
-    # Other tests run beside this one and may load modules; thousands would be ours.
-    assert :erlang.system_info(:atom_count) - before < 1000
+  # Of these words, and not how many atoms there are: other tests make some meanwhile.
+  defp atom?(word) do
+    is_atom(String.to_existing_atom(word))
+  rescue
+    ArgumentError -> false
   end
 end

@@ -256,9 +256,12 @@ defmodule Swarm.RowsTest do
              )
 
     assert {{:have, []}, 2} = Wire.read({:have, [{"mag1", [{1, 1, -1}]}, {"mag1", [1 | 2]}]})
-    atoms = :erlang.system_info(:atom_count)
-    for n <- 1..100, do: Wire.read({:rows, [{"unheard of #{n}", 1, 1, 1, 1, ""}]})
-    assert :erlang.system_info(:atom_count) == atoms
+
+    for n <- 1..100 do
+      name = "unheard of #{n}, #{:rand.uniform(1_000_000_000)}"
+      assert {{:rows, []}, 1} = Wire.read({:rows, [{name, 1, 1, 1, 1, ""}]})
+      assert_raise ArgumentError, fn -> String.to_existing_atom(name) end
+    end
 
     assert Wire.decode(:erlang.term_to_binary(List.duplicate(0, 100_000), compressed: 9)) ==
              :error
