@@ -13,8 +13,7 @@ defmodule Swarm.Brake do
   """
   use GenServer
   alias Robot.{Board, Config, Gate, Names, Pilot}
-  alias Swarm.{Alarm, Post, Stamp, Stop}
-  alias Swarm.Link.Presence
+  alias Swarm.{Alarm, Entry, Post, Stamp, Stop}
 
   @behaviour Robot.Companion
 
@@ -34,7 +33,7 @@ defmodule Swarm.Brake do
   @doc "A call to stop came from a node, by datagram: for all robots of this one."
   @spec hear(node(), term()) :: :ok
   def hear(_node, {:estop, call} = term) do
-    if Stop.call?(call), do: Enum.each(local(), &GenServer.cast(&1, term))
+    if Stop.call?(call), do: Enum.each(Names.all(:brake), &GenServer.cast(&1, term))
     :ok
   end
 
@@ -51,6 +50,15 @@ defmodule Swarm.Brake do
   @doc "The gate's latch may be another than this brake knows: buttons set it too."
   @spec follow(robot :: atom()) :: Stop.t()
   def follow(robot), do: GenServer.call(Names.via(robot, :brake), :follow)
+
+  @doc "How the stop stands as the last brake wrote it down; before the first, by the gate's latch."
+  @spec written(Board.t()) :: Stop.t()
+  def written(board) do
+    case Board.fetch(board, :estop, :infinity) do
+      {:ok, stop, _at_ms} -> stop
+      :error -> Stop.new(Board.latched?(board))
+    end
+  end
 
   @doc "Whether a request is for the brake; all others are for the link."
   @spec takes?(request :: term()) :: boolean()
@@ -71,20 +79,14 @@ defmodule Swarm.Brake do
   def init(%Config{id: id} = config) do
     board = Board.find!(id)
 
-    stop =
-      case Board.fetch(board, :estop, :infinity) do
-        {:ok, stop, _at_ms} -> stop
-        :error -> Stop.new(Board.latched?(board))
-      end
-
     s = %{
       config: config,
       id: id,
       board: board,
-      stop: stop,
+      stop: written(board),
       stamps: Stamp.new(System.system_time(:nanosecond)),
-      brakes: Presence.new([:brakes]),
-      name: Presence.new([{:brake, id}])
+      brakes: nil,
+      name: nil
     }
 
     {:ok, write(s), {:continue, :enter}}
@@ -94,7 +96,7 @@ defmodule Swarm.Brake do
   def handle_continue(:enter, s) do
     # A stop that was written down by the brake before this one may not have reached the gate.
     if s.stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id)
-    {:noreply, enter(s)}
+    {:noreply, %{s | brakes: Entry.enter([:brakes]), name: Entry.enter([{:brake, s.id}])}}
   end
 
   @impl GenServer
@@ -131,22 +133,20 @@ defmodule Swarm.Brake do
     {:noreply, %{s | stamps: stamps}}
   end
 
-  def handle_cast({:present, true}, s), do: {:noreply, enter(%{s | name: named(s)})}
-  def handle_cast({:present, false}, s), do: {:noreply, %{s | name: Presence.leave(s.name)}}
+  def handle_cast({:present, true}, %{name: %{left?: true}} = s),
+    do: {:noreply, %{s | name: Entry.enter([{:brake, s.id}])}}
+
+  def handle_cast({:present, false}, s), do: {:noreply, %{s | name: Entry.leave(s.name)}}
   def handle_cast(_unknown, s), do: {:noreply, s}
 
   @impl GenServer
-  def handle_info(:enter, s), do: {:noreply, enter(s)}
-
-  def handle_info({:DOWN, ref, :process, _scope, _reason}, s) do
-    case {Presence.down(s.brakes, ref), Presence.down(s.name, ref)} do
-      {{:ok, brakes}, _} -> {:noreply, %{s | brakes: brakes}}
-      {_, {:ok, name}} -> {:noreply, %{s | name: name}}
-      _anothers -> {:noreply, s}
+  def handle_info(message, s) do
+    case {Entry.arrived(s.brakes, message), Entry.arrived(s.name, message)} do
+      {{:ok, brakes}, :other} -> {:noreply, %{s | brakes: brakes}}
+      {:other, {:ok, name}} -> {:noreply, %{s | name: name}}
+      {:other, :other} -> {:noreply, s}
     end
   end
-
-  def handle_info(_unknown, s), do: {:noreply, s}
 
   defp command(s, request, ref, stamp) do
     case Stamp.judge(s.stamps, request, ref, stamp, Config.now(s.config)) do
@@ -220,15 +220,4 @@ defmodule Swarm.Brake do
     Board.put(s.board, :brake, :estop, s.stop, Config.now(s.config))
     s
   end
-
-  defp enter(s) do
-    {_in?, brakes} = Presence.enter(s.brakes)
-    {_in?, name} = Presence.enter(s.name)
-    %{s | brakes: brakes, name: name}
-  end
-
-  defp named(%{name: %{left?: true}} = s), do: Presence.new([{:brake, s.id}])
-  defp named(s), do: s.name
-
-  defp local, do: Registry.select(Names, [{{{:_, :brake}, :"$1", :_}, [], [:"$1"]}])
 end

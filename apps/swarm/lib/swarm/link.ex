@@ -27,7 +27,7 @@ defmodule Swarm.Link do
   use GenServer
   alias Hal.Event
   alias Robot.{Board, Config, Names, Pilot}
-  alias Swarm.{About, Brake, Message, Post, Shape, Stamp, Stop, Transport}
+  alias Swarm.{About, Brake, Message, Post, Shape, Stamp, Transport}
   alias Swarm.Link.{Chart, Desk, Ear, Flood, Mouth, Name}
 
   @behaviour Robot.Companion
@@ -89,7 +89,7 @@ defmodule Swarm.Link do
       config: config,
       id: id,
       board: board,
-      ear: Ear.new(id, written(board)),
+      ear: Ear.new(id, Brake.written(board)),
       chart: Chart.new(board),
       mouth: Mouth.new(config, board, transport, boot),
       name: Name.new(id, {boot, node()}),
@@ -135,7 +135,7 @@ defmodule Swarm.Link do
     {:noreply, %{s | mouth: mouth}}
   end
 
-  def handle_cast(:stop, s), do: {:noreply, latch(s, written(s.board))}
+  def handle_cast(:stop, s), do: {:noreply, latch(s, Brake.written(s.board))}
 
   def handle_cast({:rejected, why}, s) when is_atom(why),
     do: {:noreply, %{s | ear: Ear.reject(s.ear, why)}}
@@ -152,16 +152,13 @@ defmodule Swarm.Link do
 
   @impl GenServer
   def handle_info(:tick, s), do: {:noreply, s |> tick(Config.now(s.config)) |> schedule()}
-  def handle_info(:enter, s), do: {:noreply, %{s | name: Name.enter(s.name)}}
 
-  def handle_info({:DOWN, ref, :process, _scope, _reason}, s) do
-    case Name.down(s.name, ref) do
+  def handle_info(message, s) do
+    case Name.arrived(s.name, message) do
       {:ok, name} -> {:noreply, %{s | name: name}}
-      :error -> {:noreply, reject(s)}
+      :other -> {:noreply, reject(s)}
     end
   end
-
-  def handle_info(_unknown, s), do: {:noreply, reject(s)}
 
   defp heard(s, {:peer, id}, at_ms),
     do: %{s | chart: Chart.heard(s.chart, s.ear.peers, id, at_ms)}
@@ -183,11 +180,14 @@ defmodule Swarm.Link do
     s
   end
 
-  defp note(%{name: %{presence: %{left?: true}}} = s),
-    do: %{s | noted: About.leave(s.noted, s.id)}
+  defp note(s) do
+    noted =
+      if Name.left?(s.name),
+        do: About.leave(s.noted, s.id),
+        else: About.note(s.noted, s.config, s.board, s.mouth.stamps.boot, s.ear)
 
-  defp note(s),
-    do: %{s | noted: About.note(s.noted, s.config, s.board, s.mouth.stamps.boot, s.ear)}
+    %{s | noted: noted}
+  end
 
   # Who knows no better way than the link finds the brake through it.
   defp command(s, request, ref, stamp) do
@@ -225,13 +225,6 @@ defmodule Swarm.Link do
     if stop.latched? == before.latched?, do: s, else: %{s | mouth: Mouth.urge(s.mouth, s.ear)}
   end
 
-  defp written(board) do
-    case Board.fetch(board, :estop, :infinity) do
-      {:ok, stop, _at_ms} -> stop
-      :error -> Stop.new(Board.latched?(board))
-    end
-  end
-
   defp give_way(s, other) do
     Brake.present(s.id, false)
     Pilot.stop(s.id)
@@ -248,7 +241,7 @@ defmodule Swarm.Link do
   defp relieve(%{unseen: unseen} = s) when unseen < @look_every, do: %{s | unseen: unseen + 1}
 
   defp relieve(s) do
-    case Flood.relieve() do
+    case Flood.relieve([:tick | Name.timers(s.name)]) do
       0 -> %{s | unseen: 0}
       dropped -> %{s | unseen: 0, ear: Ear.reject(s.ear, :flooded, dropped)}
     end

@@ -14,50 +14,52 @@ defmodule Swarm.Link.Flood do
 
   @orders [:command, :say, :rival, :stamp]
 
-  @doc "Throws away the oldest of the calling process's mailbox if it is too long; returns how many."
-  @spec relieve() :: non_neg_integer()
-  def relieve do
+  @doc """
+  Throws away the oldest of the calling process's mailbox if it is too long; returns how many. `timers`
+  are the messages that stay in any case.
+  """
+  @spec relieve(timers :: [term()]) :: non_neg_integer()
+  def relieve(timers) do
     case queued() do
-      queued when queued > @most -> sweep(queued)
+      queued when queued > @most -> sweep(queued, timers)
       _few -> 0
     end
   end
 
   # Each message is taken out once, and what stays is sent again: to leave it where it is, and look for the
   # others behind it again and again, would take longer than they need to come.
-  defp sweep(queued) do
-    {kept, left} = take(queued, queued - @keep, [])
+  defp sweep(queued, timers) do
+    {kept, left} = take(queued, queued - @keep, [], timers)
     kept = Enum.reverse(kept)
-    kept = if length(kept) > @most, do: drop_oldest(kept, left), else: kept
+    kept = if length(kept) > @most, do: drop_oldest(kept, left, timers), else: kept
     for message <- kept, do: send(self(), message)
     queued - length(kept)
   end
 
   # `left` is how many are still to go.
-  defp take(0, left, kept), do: {kept, left}
+  defp take(0, left, kept, _timers), do: {kept, left}
 
-  defp take(number, left, kept) do
+  defp take(number, left, kept, timers) do
     receive do
       message ->
-        if left > 0 and telemetry?(message),
-          do: take(number - 1, left - 1, kept),
-          else: take(number - 1, left, [message | kept])
+        if left > 0 and telemetry?(message) and message not in timers,
+          do: take(number - 1, left - 1, kept, timers),
+          else: take(number - 1, left, [message | kept], timers)
     end
   end
 
-  defp drop_oldest(kept, 0), do: kept
-  defp drop_oldest([], _left), do: []
+  defp drop_oldest(kept, 0, _timers), do: kept
+  defp drop_oldest([], _left, _timers), do: []
 
-  defp drop_oldest([timer | kept], left) when timer in [:tick, :enter],
-    do: [timer | drop_oldest(kept, left)]
-
-  defp drop_oldest([_oldest | kept], left), do: drop_oldest(kept, left - 1)
+  defp drop_oldest([oldest | kept], left, timers) do
+    if oldest in timers,
+      do: [oldest | drop_oldest(kept, left, timers)],
+      else: drop_oldest(kept, left - 1, timers)
+  end
 
   # Nobody calls a link, and no answer to a call of its own comes when nobody waits for it.
   defp telemetry?({:"$gen_cast", cast}),
     do: not (is_tuple(cast) and tuple_size(cast) > 1 and elem(cast, 0) in @orders)
-
-  defp telemetry?(timer) when timer in [:tick, :enter], do: false
 
   defp telemetry?(message) when is_tuple(message) and tuple_size(message) > 0,
     do: elem(message, 0) not in [:system, :DOWN]

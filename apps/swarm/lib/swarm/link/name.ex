@@ -6,39 +6,47 @@ defmodule Swarm.Link.Name do
   They find each other in the directory, where both links are in one group and tell each other who
   they are, once a second; or by radio, where each hears heartbeats that are not its own.
   """
-  alias Swarm.{Directory, Post}
-  alias Swarm.Link.Presence
+  alias Swarm.{Directory, Entry, Post}
 
-  @enforce_keys [:robot, :me, :presence]
-  defstruct @enforce_keys
+  @enforce_keys [:robot, :me]
+  defstruct @enforce_keys ++ [entry: nil]
 
   @typedoc "Who a robot is besides its name: the number of its life, and its node."
   @type identity :: {boot :: integer(), node()}
-  @type t :: %__MODULE__{robot: atom(), me: identity(), presence: Presence.t()}
+  @type t :: %__MODULE__{robot: atom(), me: identity(), entry: Entry.t() | nil}
 
   @doc "The name of a robot, not entered yet."
   @spec new(atom(), identity()) :: t()
-  def new(robot, me),
-    do: %__MODULE__{robot: robot, me: me, presence: Presence.new([:robots, {:robot, robot}])}
+  def new(robot, me), do: %__MODULE__{robot: robot, me: me}
 
   @doc "Enters the calling process, the robot's link, into the directory, now or when there is one."
   @spec enter(t()) :: t()
-  def enter(%__MODULE__{} = name) do
-    {in?, presence} = Presence.enter(name.presence)
-    if in?, do: challenge(name)
-    %{name | presence: presence}
+  def enter(%__MODULE__{robot: robot} = name),
+    do: entered(name, Entry.enter([:robots, {:robot, robot}]))
+
+  @doc "Whether a message was about the entry: it enters again when the directory has ended."
+  @spec arrived(t(), message :: term()) :: {:ok, t()} | :other
+  def arrived(%__MODULE__{} = name, message) do
+    with {:ok, entry} <- Entry.arrived(name.entry, message), do: {:ok, entered(name, entry)}
   end
 
-  @doc "A monitored process ended: it enters again if that was the directory."
-  @spec down(t(), reference()) :: {:ok, t()} | :error
-  def down(%__MODULE__{} = name, ref) do
-    with {:ok, presence} <- Presence.down(name.presence, ref),
-         do: {:ok, %{name | presence: presence}}
+  @doc "The messages that it waits for and that must not get lost."
+  @spec timers(t()) :: [term()]
+  def timers(%__MODULE__{entry: entry}), do: for(one <- List.wrap(entry), do: Entry.timer(one))
+
+  defp entered(%{entry: before} = name, entry) do
+    name = %{name | entry: entry}
+    if Entry.in?(entry) and not (before != nil and Entry.in?(before)), do: challenge(name)
+    name
   end
+
+  @doc "Whether it has given way to another of its name."
+  @spec left?(t()) :: boolean()
+  def left?(%__MODULE__{entry: entry}), do: entry != nil and entry.left?
 
   @doc "Tells all others of this name who this one is."
   @spec challenge(t()) :: :ok
-  def challenge(%__MODULE__{presence: %{left?: true}}), do: :ok
+  def challenge(%__MODULE__{entry: %{left?: true}}), do: :ok
 
   def challenge(name) do
     for link <- Directory.members({:robot, name.robot}),
@@ -53,7 +61,7 @@ defmodule Swarm.Link.Name do
   gives way by that; it has left the directory then.
   """
   @spec rival(t(), identity(), pid() | nil) :: {gives_way? :: boolean(), t()}
-  def rival(%__MODULE__{presence: %{left?: true}} = name, _other, _link), do: {false, name}
+  def rival(%__MODULE__{entry: %{left?: true}} = name, _other, _link), do: {false, name}
 
   # By radio a robot may hear itself, and its former life; two on one node cannot be.
   def rival(name, {_boot, node}, nil) when node == node(), do: {false, name}
@@ -61,7 +69,7 @@ defmodule Swarm.Link.Name do
   def rival(name, other, link) do
     case judge(name.me, other) do
       :give_way ->
-        {true, %{name | presence: Presence.leave(name.presence)}}
+        {true, %{name | entry: Entry.leave(name.entry)}}
 
       :stay ->
         if link, do: tell(name, link)
