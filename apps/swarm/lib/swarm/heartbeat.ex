@@ -48,7 +48,8 @@ defmodule Swarm.Heartbeat do
           anchor: Swarm.Anchor.t() | nil
         }
 
-  # Boot numbers may be times in ms, or, on clocks that count finer, in ns.
+  # Boot numbers may be times in ms, or, on clocks that count finer, in ns. Numbers of stops cannot be made
+  # to run so far, for nobody follows a leap (`Swarm.Stop`).
   @latest 0xFFFFFFFFFFFFFFFF
 
   @doc """
@@ -92,7 +93,7 @@ defmodule Swarm.Heartbeat do
       Enum.all?(
         [beat.standing, beat.in_place, beat.blocked, beat.formed, beat.latched],
         &is_boolean/1
-      ) and beat.estop in 0..1_000_000 and
+      ) and beat.estop in 0..@latest and
       (beat.anchor == nil or Swarm.Anchor.valid?(beat.anchor))
   end
 

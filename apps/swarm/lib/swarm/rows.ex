@@ -22,6 +22,7 @@ defmodule Swarm.Rows do
 
   @limits %{robots: 256, keys: 32, bytes: 59_000}
   @rival_ms 5_000
+  @leap 1_000_000_000_000
   @forget_ms 600_000
 
   @enforce_keys [:limits]
@@ -243,7 +244,9 @@ defmodule Swarm.Rows do
       # This robot's own words, which the board has lost since: never newer than what it says now.
       stamp > {life, count} ->
         known? = is_map_key(of(rows, robot), key)
-        {rows, notes} = again(rows, robot, boot, {life, sequence})
+        # Nothing counts as far by itself: then another life, with numbers that will last.
+        on = if sequence > count + @leap, do: {life + 1, 0}, else: {life, sequence}
+        {rows, notes} = again(rows, robot, boot, on)
         {rows, more} = if known?, do: {rows, []}, else: take(rows, robot, key, new)
         {rows, notes ++ more}
 

@@ -11,13 +11,14 @@ defmodule Swarm.Stigmergy do
   The other half of stigmergy is to look at who is near: `near/3`, `map/2` and `reduce/3`.
   """
   alias Hal.Pose
-  alias Swarm.Shape
 
   @most 256
   @buckets 16
   @hashes 4_294_967_296
   @forget_ms 600_000
-  @last 500_000_000
+  @last 0xFFFFFFFFFFFFFFFF
+  # No fleet writes that much unheard; taken over, it would leave no room for what is written later.
+  @leap 1_000_000_000_000
 
   defstruct most: @most, clock: 0, entries: %{}
 
@@ -39,8 +40,7 @@ defmodule Swarm.Stigmergy do
   @doc "A robot writes; an empty payload deletes."
   @spec put(t(), String.t(), id(), payload(), integer()) :: t()
   def put(hints, robot, id, payload, now_ms) do
-    lamport = min(hints.clock + 1, @last)
-    take(hints, {id, lamport, robot, payload}, now_ms)
+    take(hints, {id, hints.clock + 1, robot, payload}, now_ms)
   end
 
   @doc """
@@ -62,7 +62,10 @@ defmodule Swarm.Stigmergy do
     end
   end
 
-  @doc "Takes what is newer of entries from outside; says which are."
+  @doc """
+  Takes what is newer of entries from outside; says which are. One whose count is far above all that was
+  seen is not taken, for nobody could write after it.
+  """
   @spec merge(t(), [entry()], integer()) :: {t(), changed :: [id()]}
   def merge(hints, entries, now_ms) do
     merged = Enum.reduce(entries, hints, &take(&2, &1, now_ms))
@@ -72,6 +75,10 @@ defmodule Swarm.Stigmergy do
 
     {merged, changed}
   end
+
+  defp take(%{clock: clock} = hints, {_id, lamport, _robot, _payload}, _now_ms)
+       when lamport > clock + @leap,
+       do: hints
 
   defp take(hints, {id, lamport, robot, payload}, now_ms) do
     stamp = {lamport, robot, check(payload)}
@@ -167,7 +174,7 @@ defmodule Swarm.Stigmergy do
   @spec id?(term()) :: boolean()
   def id?(id), do: is_integer(id) and id >= 0 and id < @hashes
 
-  defp lamport?(lamport), do: Shape.count?(lamport) and lamport > 0 and lamport <= @last
+  defp lamport?(lamport), do: is_integer(lamport) and lamport in 1..@last
   defp name?(robot), do: is_binary(robot) and byte_size(robot) in 1..255
 
   @typedoc "A robot in range: where it is, how far (m), and in what direction from here (radians)."

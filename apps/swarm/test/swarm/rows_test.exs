@@ -50,6 +50,45 @@ defmodule Swarm.RowsTest do
     end
   end
 
+  # What a board takes of rows that another sends it.
+  defp heard(rows, sent, now_ms) do
+    Enum.reduce(Wire.tell(sent), rows, fn term, rows ->
+      {{:rows, incoming}, _dropped} = Wire.read(term)
+      merge(rows, incoming, now_ms)
+    end)
+  end
+
+  test "no number that somebody invents keeps a robot from being read for longer than some seconds" do
+    numbers =
+      for n <- [10, 31, 32, 41, 52, 53, 61, 62, 63, 64, 40_000],
+          d <- [-1, 0, 1],
+          do: Bitwise.bsl(1, n) + d
+
+    for incarnation <- [1 | numbers], sequence <- [1 | numbers] do
+      absurd = [{:mag1, 7, {incarnation, sequence}, 0, "absurd"}]
+      owner = [:mag1] |> entered() |> put!(:mag1, 7, "mine", 0)
+      other = Rows.new() |> heard(all(owner, 0), 0) |> heard(absurd, 0)
+      # It comes back to its robot by the other, which repairs once a second.
+      {owner, other} =
+        Enum.reduce(1..8, {owner, other}, fn second, {owner, other} ->
+          now_ms = 1_000 * second
+          owner = owner |> heard(all(other, now_ms), now_ms) |> put!(:mag1, 8, second, now_ms)
+          {owner, heard(other, all(owner, now_ms), now_ms)}
+        end)
+
+      assert {:ok, "mine", _} = Rows.get(owner, :mag1, 7, 9_000)
+      assert {:ok, "mine", _} = Rows.get(other, :mag1, 7, 9_000)
+      owner = put!(owner, :mag1, 7, "later", 9_000)
+
+      assert {:ok, "later", _} =
+               other |> heard(all(owner, 9_000), 9_000) |> Rows.get(:mag1, 7, 9_000)
+
+      # So it does to one that comes later.
+      assert {:ok, "later", _} =
+               Rows.new() |> heard(all(owner, 9_000), 9_000) |> Rows.get(:mag1, 7, 9_000)
+    end
+  end
+
   test "with more keys than a robot may have, all keep the same ones: the newest" do
     for _ <- 1..100 do
       history = for n <- Enum.shuffle(1..60), do: {:mag1, Enum.random(1..20), {1, n}, 0, n}

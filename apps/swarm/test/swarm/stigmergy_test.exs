@@ -54,6 +54,24 @@ defmodule Swarm.StigmergyTest do
     assert none == %{}
   end
 
+  test "no count that somebody invents keeps others from writing" do
+    powers = for n <- [20, 31, 32, 41, 53, 62, 63, 64, 40_000], do: Bitwise.bsl(1, n)
+
+    for n <- [500_000_000 | powers], d <- [-1, 0, 1], id <- [1, 2] do
+      absurd = {id, n + d, "zz", "absurd"}
+      start = Stigmergy.new() |> Stigmergy.put("mag1", 1, "first", 0)
+
+      [a, b] =
+        for _ <- 1..2,
+            do: if(Stigmergy.entry?(absurd, 1_000), do: merge(start, [absurd]), else: start)
+
+      a = Stigmergy.put(a, "mag1", 1, "second", 0)
+      assert {:ok, "second", "mag1"} = Stigmergy.get(a, 1)
+      assert {:ok, "second", "mag1"} = b |> merge(all(a)) |> Stigmergy.get(1)
+      assert {:ok, "second", "mag1"} = Stigmergy.new() |> merge(all(a)) |> Stigmergy.get(1)
+    end
+  end
+
   test "neighbours are those in range, in the order of their names" do
     poses = %{mag2: Pose.new(0, 2), mag1: Pose.new(1, 0), min1: Pose.new(4, 0)}
     near = Stigmergy.near(poses, Pose.new(0, 0), 3)

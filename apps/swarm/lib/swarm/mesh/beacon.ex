@@ -18,6 +18,7 @@ defmodule Swarm.Mesh.Beacon do
         }
 
   @most 1_100
+  @latest 0xFFFFFFFFFFFFFFFF
 
   @doc "As a plain term for the wire."
   @spec term(t()) :: tuple()
@@ -43,8 +44,29 @@ defmodule Swarm.Mesh.Beacon do
 
   def check(_other), do: :error
 
+  @doc """
+  Without names that this node does not know: what it tells others again must stay true and short.
+
+      iex> beacon = %Swarm.Mesh.Beacon{sessions: [{"mag1@lab", 7}, {"x@y", 8}], hears: [], links: ["x@y"], port: 0}
+      iex> known = Swarm.Mesh.Beacon.known(beacon, %{"mag1@lab" => :mag1@lab})
+      iex> {known.sessions, known.links}
+      {[{"mag1@lab", 7}], []}
+  """
+  @spec known(t(), %{String.t() => node()}) :: t()
+  def known(%__MODULE__{} = beacon, nodes) do
+    %{
+      beacon
+      | sessions: Enum.filter(beacon.sessions, &is_map_key(nodes, elem(&1, 0))),
+        hears: Enum.filter(beacon.hears, &is_map_key(nodes, elem(&1, 0))),
+        links: Enum.filter(beacon.links, &is_map_key(nodes, &1))
+    }
+  end
+
   defp list?(list, fun), do: Swarm.Shape.list?(list, fun) and length(list) <= @most
-  defp session?({name, session}), do: name?(name) and is_integer(session) and session >= 0
+
+  defp session?({name, session}),
+    do: name?(name) and is_integer(session) and session in 0..@latest
+
   defp session?(_other), do: false
 
   defp heard?({name, address}) do

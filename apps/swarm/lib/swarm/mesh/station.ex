@@ -176,14 +176,17 @@ defmodule Swarm.Mesh.Station do
 
   defp original(:error, _guard), do: :ok
 
-  defp body(:beacon, term, _station) do
-    with :error <- Beacon.check(term), do: {:error, :beacon}
+  defp body(:beacon, term, station) do
+    case Beacon.check(term) do
+      {:ok, beacon} -> {:ok, Beacon.known(beacon, station.roster.nodes)}
+      :error -> {:error, :beacon}
+    end
   end
 
   defp body(:message, {to, message}, station) do
     with true <- to == :all or Swarm.Shape.names?(to),
-         {:ok, %Message{from: from} = message} <- Message.check(message),
-         true <- Roster.robot?(station.roster, from) || :unknown_robot do
+         {:ok, %Message{} = message} <- Message.check(message),
+         true <- ours?(message, station.roster) || :unknown_robot do
       {:ok, {to, message}}
     else
       :unknown_robot -> {:error, :unknown_robot}
@@ -195,6 +198,12 @@ defmodule Swarm.Mesh.Station do
     do: {:ok, {service, term}}
 
   defp body(kind, _other, _station), do: {:error, kind}
+
+  # Of one that is passed on its first sender, too.
+  defp ours?(%Message{kind: :relay, from: from, body: inner}, roster),
+    do: Roster.robot?(roster, from) and ours?(inner, roster)
+
+  defp ours?(%Message{from: from}, roster), do: Roster.robot?(roster, from)
 
   defp admit(station, packet, node, body, address, now_ms) do
     told =

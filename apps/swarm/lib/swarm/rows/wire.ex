@@ -21,7 +21,11 @@ defmodule Swarm.Rows.Wire do
   # Terms that are compressed may be far larger than their bytes.
   @compressed 80
   @ids 4_294_967_296
-  @latest 0xFFFFFFFFFFFFFFFF
+  # Times of day in ms, or, on clocks that count finer, in ns: until the year 2160. Who is outbid by such a
+  # number, however wrong, has one left that is higher.
+  @latest 6_000_000_000_000_000_000
+  # No robot writes as often in one life.
+  @most 1_000_000_000_000_000
   @oldest_ms 1_000_000_000
 
   @type key :: atom() | {atom(), atom() | integer()}
@@ -177,11 +181,14 @@ defmodule Swarm.Rows.Wire do
     end
   end
 
-  defguardp number?(n) when is_integer(n) and n >= 0 and n <= @latest
+  defguardp stamp?(incarnation, n)
+            when is_integer(incarnation) and incarnation >= 0 and incarnation <= @latest and
+                   is_integer(n) and n >= 0 and n <= @most
+
   defguardp id?(id) when is_integer(id) and id >= 0 and id < @ids
 
   defp row({name, id, incarnation, n, age_ms, payload})
-       when id?(id) and number?(incarnation) and number?(n) and age_ms in 0..@oldest_ms and
+       when id?(id) and stamp?(incarnation, n) and age_ms in 0..@oldest_ms and
               is_binary(payload) do
     with {:ok, robot} <- robot(name), do: {:ok, {robot, id, {incarnation, n}, age_ms, payload}}
   end
@@ -209,7 +216,7 @@ defmodule Swarm.Rows.Wire do
 
   defp stamps(_other), do: :error
 
-  defp stamp({id, incarnation, n}) when id?(id) and number?(incarnation) and number?(n),
+  defp stamp({id, incarnation, n}) when id?(id) and stamp?(incarnation, n),
     do: {:ok, {id, {incarnation, n}}}
 
   defp stamp(_other), do: :error

@@ -57,6 +57,42 @@ defmodule Swarm.Mesh.StationTest do
     assert hears(air, "a") == ["b"] and hears(air, "b") == ["a"]
   end
 
+  test "a beacon that tells of numbers and nodes of no sense spoils nobody else's" do
+    air = Air.new() |> Air.join("a") |> Air.join("b") |> Air.join("c") |> Air.run(1_000)
+    huge = Bitwise.bsl(1, 400_000)
+    many = for n <- 1..1_000, into: %{}, do: {"#{n}#{String.duplicate("x", 200)}@lab", n}
+
+    for told <- [%{"c@lab" => huge}, many] do
+      spoilt = put_in(air.stations["a"].book.told, told)
+      spoilt = %{spoilt | tap: []} |> Air.run(5_000)
+      assert "c" in hears(spoilt, "b") and "b" in hears(spoilt, "c")
+      # What a tells is refused, or, of nodes that nobody knows, not told any further.
+      assert map_size(spoilt.stations["b"].book.told) <= 3
+
+      said =
+        for datagram <- spoilt.tap,
+            {:ok, {"b@lab", _, _}} <- [Packet.peek(datagram)],
+            do: datagram
+
+      assert said != [] and Enum.all?(said, &(byte_size(&1) < 1_000))
+    end
+  end
+
+  test "a robot that is of no fleet is not heard by way of another either" do
+    air = Air.new() |> Air.join("a") |> Air.join("b") |> Air.run(1_000)
+    air = air |> Air.speak("b", :all, beat(:b, 1)) |> Air.run(5) |> Map.put(:out, [])
+
+    [none, one] =
+      for id <- [:undefined, :c] do
+        {:ok, relayed} = Message.pass_on(beat(id, 1), :a)
+        air |> Air.speak("a", [:b], relayed) |> Air.run(5)
+      end
+
+    assert delivered(none) == []
+    assert none.stations["b"].rejected[:unknown_robot] == 1
+    assert [{_at, "b", {:deliver, [:b], _}}] = delivered(one)
+  end
+
   test "a heartbeat arrives once though it comes by multicast and by name" do
     air = Air.new() |> Air.join("a") |> Air.join("b") |> Air.run(1_000)
     air = air |> Air.speak("a", :all, beat(:a, 1)) |> Air.run(5)
