@@ -11,7 +11,7 @@ defmodule Swarm do
       iex> Swarm.formation(:line, length: 4.0)
       :ok
       iex> Swarm.status()
-      [#mag1 lead (0.02, -1.63, 90 deg) 0.00 m/s by track_blob, leader mag1, hears 5, age 12 ms, …]
+      [#mag1 lead (0.02, -1.63, 90 deg) 0.00 m/s by track_blob, leader mag1, view 6, hears 5, age 12 ms, …]
       iex> Swarm.stop(:mag1)
       :ok
       iex> Swarm.estop()
@@ -109,7 +109,10 @@ defmodule Swarm do
   def tell(_to, other),
     do: {:error, "#{inspect(other)} is no command; write one as text, such as \"goto:2.0:1.0\""}
 
-  @doc "How all robots are, one line each in `iex`; those that do not answer by their rows."
+  @doc """
+  How all robots are, one line each in `iex`; those that do not answer by their rows. Each has its numbered
+  view, who is there, and whom it hears (`Swarm.Status`).
+  """
   @spec status() :: [Status.t()]
   def status, do: Report.all()
 

@@ -2,10 +2,12 @@ defmodule Swarm.Status do
   @moduledoc """
   How a robot is, for people. In `iex` it is one line:
 
-      #mag1 follow (1.20, -0.35, 90 deg) 0.31 m/s by follow, hears 5, age 40 ms
+      #mag1 follow (1.20, -0.35, 90 deg) 0.31 m/s by follow, view 7, hears 4 but not min2, age 40 ms
 
   `age_ms` is how old its newest reading is; `rejected` counts malformed messages by kind. `hears` are
-  the robots it hears itself, `view` those that it takes for there, with the view's number.
+  the robots it hears itself, `view` those that it takes for there (itself too), with the view's number,
+  which grows with each that comes or goes (`Swarm.Peers`). Of whom it knows by way of others only, the line
+  says that it does not hear them. `Swarm.matrix/0` shows the same of all robots as a table.
 
   A robot that does not answer is shown as its row on the blackboard says (`from: :row`), with that
   age: `…, age 1240 ms by its row`.
@@ -104,6 +106,9 @@ defmodule Swarm.Status do
   defp age(_no_wheels), do: nil
 
   defimpl Inspect do
+    # So many that it does not hear are named.
+    @named 3
+
     def inspect(status, _options) do
       [first | rest] = [speed(status) | remarks(status)]
       words = ["#{status.robot} #{status.state} #{place(status.pose)} #{first}" | rest]
@@ -125,13 +130,25 @@ defmodule Swarm.Status do
       [
         status.estop && "E-STOP",
         status.leader && "leader #{status.leader}",
-        "hears #{length(status.hears)}",
+        status.view && "view #{elem(status.view, 0)}",
+        "hears #{length(status.hears)}" <> deaf(status),
         dropped > 0 && "dropped #{dropped} messages",
         "age #{status.age_ms || "?"} ms" <> if(status.from == :row, do: " by its row", else: "")
       ]
       |> Enum.filter(& &1)
       |> Kernel.++(offline)
     end
+
+    # Those of the view that are known by way of others only; nearly always none.
+    defp deaf(%{view: {_number, members}} = status) do
+      case Enum.split(members -- [status.robot | status.hears], @named) do
+        {[], []} -> ""
+        {names, []} -> " but not #{Enum.join(names, " ")}"
+        {names, more} -> " but not #{Enum.join(names, " ")} and #{length(more)} more"
+      end
+    end
+
+    defp deaf(_unknown), do: ""
 
     defp fixed(number), do: :erlang.float_to_binary(number * 1.0, decimals: 2)
   end

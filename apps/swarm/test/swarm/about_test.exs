@@ -129,7 +129,7 @@ defmodule Swarm.AboutTest do
     assert status.age_ms in 1_040..1_900
 
     assert inspect(status) =~
-             ~r/^#ab9 follow \(1.00, 2.00, 0 deg\) 0.31 m\/s, hears 1, age \d+ ms by its row$/
+             ~r/^#ab9 follow \(1.00, 2.00, 0 deg\) 0.31 m\/s, view 3, hears 1 but not ab3, age \d+ ms by its row$/
 
     assert Enum.any?(Swarm.status(), &match?(%Status{robot: :ab9, from: :row}, &1))
     assert inspect(Swarm.matrix()) =~ ~r/ab9.*x.* 3: ab9 ab2 ab3, 1\d\d\d ms ago/

@@ -1,0 +1,27 @@
+defmodule Swarm.StatusTest do
+  use Swarm.Case, async: false
+  alias Swarm.Status
+
+  test "the line shows the view's number, and names whom the robot does not hear" do
+    line = fn fields -> inspect(struct!(%Status{robot: :mag1, age_ms: 5}, fields)) end
+    members = [:mag1, :mag2, :min1, :min2, :min3, :min4, :min5]
+
+    assert line.([]) == "#mag1 idle (pose unknown) 0.00 m/s, hears 0, age 5 ms"
+    assert line.(view: {3, [:mag1, :mag2]}, hears: [:mag2]) =~ ", view 3, hears 1, age"
+    assert line.(view: {3, [:mag1, :mag2]}) =~ ", view 3, hears 0 but not mag2, age"
+
+    assert line.(view: {9, members}, hears: [:mag2]) =~
+             ", view 9, hears 1 but not min1 min2 min3 and 2 more, age"
+  end
+
+  test "robots of one node are in each other's view and hear each other, and it says so" do
+    for id <- [:st1, :st2], do: robot(id)
+    assert eventually(fn -> :st2 in Swarm.status(:st1).hears end)
+
+    status = Enum.find(Swarm.status(), &(&1.robot == :st1))
+    assert %Status{view: {number, members}} = status
+    assert number >= 1 and :st1 in members and :st2 in members
+    assert inspect(status) =~ "view #{number}, hears #{length(status.hears)}"
+    assert Swarm.Matrix.hears?(Swarm.matrix(), :st1, :st2)
+  end
+end
