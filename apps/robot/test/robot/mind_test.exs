@@ -130,6 +130,21 @@ defmodule Robot.MindTest do
     assert abs(Pose.bearing(body.pose, place)) < 0.05
   end
 
+  test "turns to where a thing is known to stand, which it has not seen itself, and no further" do
+    for place <- [{1.0, 1.6}, {-1.5, -0.4}] do
+      goal = {TrackBlob, near: 1.5, far: 2.5, place: place}
+      body = Pose.new(0, 0) |> Body.new() |> with_goal(:lead, goal)
+      assert Body.see(Body.percept(body), place).blobs == []
+      {nil, body} = Body.run(body, 90, &Body.see(&1, place))
+      assert abs(Pose.bearing(body.pose, place)) < 0.05
+    end
+
+    # One that is told nothing stands.
+    body = Pose.new(0, 0) |> Body.new() |> with_goal(:lead, {TrackBlob, []})
+    {nil, body} = Body.run(body, 90, &Body.see(&1, {1.0, 1.6}))
+    assert body.pose == Pose.new(0, 0)
+  end
+
   test "stop outweighs, and another tag starts afresh" do
     body = Pose.new(0, 0) |> Body.new() |> with_goal(1, {Move, linear: 0.3, turn: 0.0})
     {nil, body} = Body.run(body, 20)
@@ -152,6 +167,7 @@ defmodule Robot.MindTest do
     assert_raise ArgumentError, ~r/option x cannot be :a/, fn -> Goto.new(x: :a, y: 1) end
     assert_raise ArgumentError, ~r/option target/, fn -> Follow.new(target: 1) end
     assert_raise ArgumentError, ~r/unknown keys/, fn -> FindBlob.new(color: "Red") end
+    assert_raise ArgumentError, ~r/place cannot be 1/, fn -> TrackBlob.new(place: 1) end
     assert_raise ArgumentError, ~r/near/, fn -> TrackBlob.new(near: 2.0, far: 1.0) end
     assert_raise ArgumentError, ~r/profile/, fn -> Mind.new([]) end
   end

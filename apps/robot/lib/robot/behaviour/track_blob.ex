@@ -9,7 +9,9 @@ defmodule Robot.Behaviour.TrackBlob do
   last seen, then on to that side for one full turn, and then waits.
 
   Options: `colour` (default any), `min_share` (default 0.0003), `near` and `far` (metres, default
-  1.0 and 1.5), `max_turn` (rad/s, default 0.4, so that followers keep up), `speed` (m/s, default 0.3).
+  1.0 and 1.5), `max_turn` (rad/s, default 0.4, so that followers keep up), `speed` (m/s, default 0.3),
+  `place` (`{x, y}` in the map frame, or `nil`, the default): where the thing stands as far as is known, which
+  is where it turns to as long as it has not seen it itself.
   """
   @behaviour Robot.Behaviour
   alias Hal.{Pose, Twist}
@@ -37,7 +39,8 @@ defmodule Robot.Behaviour.TrackBlob do
         near: 1.0,
         far: 1.5,
         max_turn: 0.4,
-        speed: 0.3
+        speed: 0.3,
+        place: nil
       )
 
     state = %{
@@ -47,6 +50,7 @@ defmodule Robot.Behaviour.TrackBlob do
       far: Options.number!(options, :far, 0.1, 20.0),
       max_turn: Options.number!(options, :max_turn, 0.01, 10.0),
       speed: Options.number!(options, :speed, 0.01, 10.0),
+      place: Options.check!(options, :place, &place?/1, "{x, y} in metres"),
       error: nil,
       side: 1,
       distance: nil,
@@ -65,7 +69,11 @@ defmodule Robot.Behaviour.TrackBlob do
     {__MODULE__, state}
   end
 
-  @options [:colour, :min_share, :near, :far, :max_turn, :speed]
+  defp place?(nil), do: true
+  defp place?({x, y}), do: is_number(x) and is_number(y)
+  defp place?(_other), do: false
+
+  @options [:colour, :min_share, :near, :far, :max_turn, :speed, :place]
 
   @impl Robot.Behaviour
   def update(options, state) do
@@ -75,7 +83,7 @@ defmodule Robot.Behaviour.TrackBlob do
 
   @impl Robot.Behaviour
   def tick(percept, state) do
-    state = state |> carry(percept) |> look(percept)
+    state = state |> carry(percept) |> look(percept) |> recall(percept)
 
     cond do
       state.error == nil -> stand(state)
@@ -129,6 +137,14 @@ defmodule Robot.Behaviour.TrackBlob do
         }
     end
   end
+
+  # Never seen by this robot's camera as it points now, but it is known where to look.
+  defp recall(%{error: nil, place: {_x, _y} = place} = state, %{pose: %Pose{} = pose} = percept) do
+    error = Pose.bearing(pose, place)
+    %{state | error: error, side: if(error < 0, do: -1, else: 1), seen_ms: percept.at_ms}
+  end
+
+  defp recall(state, _percept), do: state
 
   defp distance(%{share: share}, state) when share > @too_near_share, do: state.near * 0.5
   defp distance(%{distance: distance}, _state), do: distance

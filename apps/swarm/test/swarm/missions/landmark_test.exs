@@ -1,7 +1,9 @@
 defmodule Swarm.Missions.LandmarkTest do
   @moduledoc "Groups of missions over a bad radio: who leads, for how long, and who follows."
   use ExUnit.Case, async: true
+  alias Hal.Pose
   alias Swarm.{Group, Message}
+  alias Swarm.Missions.Landmark
 
   @three [:mag1, :mag2, :mag3]
 
@@ -87,6 +89,18 @@ defmodule Swarm.Missions.LandmarkTest do
       group = group |> Group.kill(leader) |> led(@three -- [leader], 30)
       assert_lawful(group)
     end
+  end
+
+  test "a follower that hears no leader looks at the landmark, which a round may ask it for" do
+    group = three() |> led(@three, 5) |> Group.run(3) |> Group.kill(:mag2)
+    group = Enum.reduce([:mag1, :mag3], group, &Group.show(&2, &1, nil))
+    group = Group.run(group, 1.2)
+    # By what the leader told; it stood at {1, 0}, and saw it 1.7 m ahead.
+    percept = Group.percept(group, :mag3)
+    {:follow, _mission, effects} = Landmark.handle({:tick, percept}, group.robots.mag3.mission)
+    assert [bearing] = for({:look, bearing} <- effects, do: bearing)
+    assert_in_delta bearing, Pose.bearing(percept.pose, {2.7, 0.0}), 0.02
+    assert bearing != 0.0
   end
 
   test "a robot that comes late joins the tail, without an election" do

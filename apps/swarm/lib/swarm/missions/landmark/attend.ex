@@ -3,7 +3,8 @@ defmodule Swarm.Missions.Landmark.Attend do
   What a follower does: drive to its slot, keep an eye on what it can correct its pose by, and
   pass the anchor on to its child. Pure.
 
-  Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard).
+  Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard). Meanwhile
+  it looks at the landmark, since the next it may be asked for is how large it sees it.
   """
   alias Hal.Pose
   alias Robot.Behaviour
@@ -73,7 +74,7 @@ defmodule Swarm.Missions.Landmark.Attend do
 
     if place == nil or age_ms > @lease_ms or mission.percept.pose == nil do
       {%{mission | attend: %{mission.attend | in_place?: false, holding?: true}},
-       [{:goal, :stand, {Behaviour.Stop, []}}, {:look, 0.0}]}
+       [{:goal, :stand, {Behaviour.Stop, []}}, {:look, look_out(mission)}]}
     else
       attend(mission, place, age_ms)
     end
@@ -218,6 +219,15 @@ defmodule Swarm.Missions.Landmark.Attend do
       bearing = Pose.bearing(percept.pose, place)
       if abs(bearing) <= limit, do: bearing
     end)
+  end
+
+  # Where the landmark was when somebody last knew.
+  defp look_out(%{percept: %{pose: nil}}), do: 0.0
+
+  defp look_out(%{anchor: anchor, sight: sight, percept: percept}) do
+    place = (anchor && Places.landmark(anchor)) || (sight && sight.place)
+    bearing = if place, do: Pose.bearing(percept.pose, place), else: 0.0
+    if abs(bearing) <= percept.profile.camera.max_pan, do: bearing, else: 0.0
   end
 
   defp ahead(%{anchor: anchor, percept: percept} = mission, leader) do

@@ -271,12 +271,14 @@ defmodule Swarm.Missions.Landmark.Lead do
     {put_in(mission.lead.lost?, lost?), stage}
   end
 
-  # A leader that has not seen the landmark for long looks all round for it.
+  # A leader that has not seen the landmark for long looks all round for it. A new one may have seen it
+  # with its camera turned aside, and looks ahead now: it turns to where that was.
   defp goal(mission) do
     if Sight.fresh?(mission.sight, mission.now_ms, @scan_ms) or
          mission.now_ms - mission.since_ms < @scan_ms do
       {near, far} = range(mission)
-      options = [colour: mission.colour, near: near, far: far]
+      place = mission.sight && mission.sight.place
+      options = [colour: mission.colour, near: near, far: far, place: place]
       {:goal, {:track, mission.epoch}, {Behaviour.TrackBlob, options}}
     else
       turn = div(mission.now_ms, 20_000)

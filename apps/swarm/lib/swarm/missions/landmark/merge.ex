@@ -68,17 +68,20 @@ defmodule Swarm.Missions.Landmark.Merge do
   defp joinable?({id, epoch}, mission, peers),
     do: epoch > mission.epoch and following(peers, id) > 0
 
-  @doc "Of these robots, those that another leader leads now."
+  @doc """
+  Of these robots, those that another leader leads now. When parts meet, a follower may be heard before
+  its leader is: who follows somebody that is not heard is not free either.
+  """
   @spec theirs([atom()], State.t()) :: [atom()]
   def theirs(ids, mission) do
     peers = peers(mission)
-    leaders = for {id, _epoch} <- rivals(peers), do: id
-
-    for id <- ids,
-        beat = peers[id],
-        id in leaders or (beat.phase == :follow and beat.leader in leaders),
-        do: id
+    for id <- ids, beat = peers[id], beat.phase == :lead or led?(beat, mission.me, peers), do: id
   end
+
+  defp led?(%{phase: :follow, leader: leader}, me, peers) when leader not in [nil, me],
+    do: match?(%{phase: :lead}, Map.get(peers, leader, %{phase: :lead}))
+
+  defp led?(_beat, _me, _peers), do: false
 
   defp led(mission, peers) do
     told =
