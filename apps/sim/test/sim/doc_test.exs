@@ -6,6 +6,7 @@ defmodule Sim.DocTest do
   doctest Sim.Map.Pgm
   doctest Sim.Noise
   doctest Sim.Palette
+  doctest Sim.Trial.Cuts
   doctest Sim.Scene
   doctest Sim.Radio
   doctest Sim.Trial.Options

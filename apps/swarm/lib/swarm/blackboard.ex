@@ -27,9 +27,8 @@ defmodule Swarm.Blackboard do
     * `:seed` - of the choice of nodes (a new one each time)
   """
   alias Swarm.Blackboard.Keeper
+  alias Swarm.{Post, Table}
   alias Swarm.Rows.{Carrier, Wire}
-
-  @repair_ms 1_000
 
   @type age :: non_neg_integer()
 
@@ -40,16 +39,7 @@ defmodule Swarm.Blackboard do
   @doc "Starts a node's board."
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options \\ []) do
-    options =
-      Keyword.validate!(options, [
-        :seed,
-        name: __MODULE__,
-        transport: {Swarm.Mesh, :cast, []},
-        nodes: {Carrier, :alive, []},
-        repair_ms: @repair_ms,
-        limits: []
-      ])
-
+    options = Keyword.validate!(options, Carrier.options(__MODULE__) ++ [limits: []])
     GenServer.start_link(Keeper, options, name: options[:name])
   end
 
@@ -88,7 +78,7 @@ defmodule Swarm.Blackboard do
   @doc "What a robot wrote last under this key, with its age in ms, unless that is over `max_age_ms`."
   @spec get(atom(), atom(), Wire.key(), age() | :infinity) :: {:ok, term(), age()} | :error
   def get(board \\ __MODULE__, robot, key, max_age_ms) do
-    with [{_, payload, at_ms}] <- lookup(board, {robot, Wire.id(key)}),
+    with [{_, payload, at_ms}] <- Table.lookup(board, {robot, Wire.id(key)}),
          age when age <= max_age_ms <- age(at_ms),
          # Two keys may have one number.
          {:ok, ^key, value} <- Wire.decode(payload) do
@@ -101,7 +91,7 @@ defmodule Swarm.Blackboard do
   @doc "All rows of a robot, by key, with their ages in ms."
   @spec rows(atom(), atom()) :: %{Wire.key() => {term(), age()}}
   def rows(board \\ __MODULE__, robot) do
-    for {_, payload, at_ms} <- select(board, [{{{robot, :_}, :_, :_}, [], [:"$_"]}]),
+    for {_, payload, at_ms} <- Table.select(board, [{{{robot, :_}, :_, :_}, [], [:"$_"]}]),
         {:ok, key, value} <- [Wire.decode(payload)],
         into: %{},
         do: {key, {value, age(at_ms)}}
@@ -110,7 +100,8 @@ defmodule Swarm.Blackboard do
   @doc "The names of all robots of which there is a row, sorted."
   @spec robots(atom()) :: [atom()]
   def robots(board \\ __MODULE__),
-    do: board |> select([{{{:"$1", :_}, :_, :_}, [], [:"$1"]}]) |> Enum.uniq() |> Enum.sort()
+    do:
+      board |> Table.select([{{{:"$1", :_}, :_, :_}, [], [:"$1"]}]) |> Enum.uniq() |> Enum.sort()
 
   @doc "Something arrived from another node."
   @spec hear(GenServer.server(), node(), term()) :: :ok
@@ -124,17 +115,7 @@ defmodule Swarm.Blackboard do
   @spec info(GenServer.server()) :: map() | {:error, line :: String.t()}
   def info(board \\ __MODULE__), do: call(board, :info)
 
-  defp call(board, request) do
-    GenServer.call(board, request)
-  catch
-    :exit, {reason, _call} when reason in [:noproc, :normal, :shutdown, :timeout] ->
-      {:error, "the blackboard of this node does not answer"}
-  end
-
-  # The table is gone with its process.
-  defp lookup(board, key), do: if(table?(board), do: :ets.lookup(board, key), else: [])
-  defp select(board, match), do: if(table?(board), do: :ets.select(board, match), else: [])
-  defp table?(board), do: :ets.whereis(board) != :undefined
+  defp call(board, request), do: Post.call(board, request, "the blackboard of this node")
 
   defp age(at_ms), do: max(now() - at_ms, 0)
   defp now, do: System.monotonic_time(:millisecond)

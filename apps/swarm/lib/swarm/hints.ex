@@ -15,26 +15,16 @@ defmodule Swarm.Hints do
   `Swarm.Blackboard`, and `:most` entries.
   """
   use GenServer
-  alias Swarm.{Shape, Stigmergy}
+  alias Swarm.{Post, Shape, Stigmergy, Table}
   alias Swarm.Rows.{Carrier, Wire}
 
-  @repair_ms 1_000
   @peers 2
   @bytes 1_000
 
   @doc "Starts a node's hints."
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options \\ []) do
-    options =
-      Keyword.validate!(options, [
-        :seed,
-        name: __MODULE__,
-        transport: {Swarm.Mesh, :cast, []},
-        nodes: {Carrier, :alive, []},
-        repair_ms: @repair_ms,
-        most: 256
-      ])
-
+    options = Keyword.validate!(options, Carrier.options(__MODULE__) ++ [most: 256])
     GenServer.start_link(__MODULE__, options, name: options[:name])
   end
 
@@ -75,8 +65,7 @@ defmodule Swarm.Hints do
   @doc "A hint, and who wrote it."
   @spec get(atom(), Wire.key()) :: {:ok, term(), Wire.word()} | :error
   def get(hints \\ __MODULE__, key) do
-    with true <- table?(hints),
-         [{_id, payload, robot}] <- :ets.lookup(hints, Wire.id(key)),
+    with [{_id, payload, robot}] <- Table.lookup(hints, Wire.id(key)),
          {:ok, ^key, value} <- Wire.decode(payload) do
       {:ok, value, Wire.word(robot)}
     else
@@ -87,7 +76,7 @@ defmodule Swarm.Hints do
   @doc "All hints, by key, with who wrote each."
   @spec all(atom()) :: %{Wire.key() => {term(), Wire.word()}}
   def all(hints \\ __MODULE__) do
-    for {_id, payload, robot} <- if(table?(hints), do: :ets.tab2list(hints), else: []),
+    for {_id, payload, robot} <- Table.select(hints, [{:_, [], [:"$_"]}]),
         {:ok, key, value} <- [Wire.decode(payload)],
         into: %{},
         do: {key, {value, Wire.word(robot)}}
@@ -105,15 +94,7 @@ defmodule Swarm.Hints do
   @spec info(GenServer.server()) :: map() | {:error, line :: String.t()}
   def info(hints \\ __MODULE__), do: call(hints, :info)
 
-  defp call(hints, request) do
-    GenServer.call(hints, request)
-  catch
-    :exit, {reason, _call} when reason in [:noproc, :normal, :shutdown, :timeout] ->
-      {:error, "the hints of this node do not answer"}
-  end
-
-  # The table is gone with its process.
-  defp table?(hints), do: :ets.whereis(hints) != :undefined
+  defp call(hints, request), do: Post.call(hints, request, "the store of hints of this node")
 
   @impl GenServer
   def init(options) do
@@ -235,12 +216,5 @@ defmodule Swarm.Hints do
   defp drop(s), do: %{s | dropped: s.dropped + 1}
   defp now, do: System.monotonic_time(:millisecond)
 
-  defp schedule(%{repair_ms: :never} = s), do: s
-
-  # Not all nodes at one moment.
-  defp schedule(s) do
-    {part, rand} = :rand.uniform_s(s.rand)
-    Process.send_after(self(), :repair, round(s.repair_ms * (0.75 + 0.5 * part)))
-    %{s | rand: rand}
-  end
+  defp schedule(s), do: %{s | rand: Carrier.repair_later(s.repair_ms, s.rand)}
 end

@@ -10,6 +10,7 @@ defmodule Swarm.Mesh do
   somebody has connected by hand. `docs/networking.md` tells how to set it up.
   """
   alias Swarm.Mesh.{Book, Packet, Relay, Roster}
+  alias Swarm.{Post, Table}
 
   @typedoc """
   How a node sees the others: `number` grows with each change of who is there; for each node its
@@ -55,10 +56,9 @@ defmodule Swarm.Mesh do
   def cast(service, node, term), do: serve(service, node, term)
 
   defp serve(service, to, term) when service in [:rows, :hints, :stop] do
-    cond do
-      :erlang.external_size(term) > Packet.largest() -> {:error, :too_big}
-      true -> radio({:serve, service, to, term})
-    end
+    if :erlang.external_size(term) > Packet.largest(),
+      do: {:error, :too_big},
+      else: radio({:serve, service, to, term})
   end
 
   @doc "Tells a connected node where this one is to be heard, and so gets to hear it."
@@ -68,28 +68,17 @@ defmodule Swarm.Mesh do
   @doc "The robots of other nodes that were heard within the last 2 s, and their nodes."
   @spec robots() :: %{atom() => node()}
   def robots do
-    if running?() do
-      since = now() - @gone_ms
-      guard = [{:>, :"$3", since}]
-
-      Map.new(
-        :ets.select(__MODULE__, [
-          {{{:robot, :"$1"}, :"$2", :_, :_, :"$3"}, guard, [{{:"$1", :"$2"}}]}
-        ])
-      )
-    else
-      %{}
-    end
+    heard = {{:robot, :"$1"}, :"$2", :_, :_, :"$3"}
+    lately = {:>, :"$3", now() - @gone_ms}
+    Map.new(Table.select(__MODULE__, [{heard, [lately], [{{:"$1", :"$2"}}]}]))
   end
 
   @doc "The newest heartbeat heard of a robot of another node: `{boot, sequence, age_ms}`."
   @spec beat(atom()) :: {integer(), non_neg_integer(), age_ms :: non_neg_integer()} | nil
   def beat(robot) do
-    with true <- running?(),
-         [{_key, _node, boot, sequence, at_ms}] <- :ets.lookup(__MODULE__, {:robot, robot}) do
-      {boot, sequence, now() - at_ms}
-    else
-      _unheard -> nil
+    case Table.lookup(__MODULE__, {:robot, robot}) do
+      [{_key, _node, boot, sequence, at_ms}] -> {boot, sequence, now() - at_ms}
+      [] -> nil
     end
   end
 
@@ -105,15 +94,27 @@ defmodule Swarm.Mesh do
   @doc "What was dropped, by reason, since the start."
   @spec rejected() :: %{atom() => pos_integer()}
   def rejected do
-    case running?() && :ets.lookup(__MODULE__, :book) do
+    case Table.lookup(__MODULE__, :book) do
       [{:book, _book, _roster, rejected}] -> rejected
-      _none -> %{}
+      [] -> %{}
     end
   end
 
-  @doc "What the radio has sent, heard and rejected, and its UDP port."
-  @spec counts() :: map()
-  def counts, do: GenServer.call(:ets.lookup_element(__MODULE__, :radio, 2), :counts)
+  @doc "How many datagrams the radio has sent, heard and rejected, and its UDP port; `nil` without a network."
+  @spec counts() ::
+          %{
+            sent: non_neg_integer(),
+            heard: non_neg_integer(),
+            rejected: %{atom() => pos_integer()},
+            port: :inet.port_number() | nil
+          }
+          | {:error, line :: String.t()}
+  def counts do
+    case Table.lookup(__MODULE__, :radio) do
+      [{:radio, pid}] -> Post.call(pid, :counts, "the radio of this node")
+      [] -> {:error, "this node has no mesh"}
+    end
+  end
 
   @doc """
   Sends a link's request to a robot that this node has no connection to, over others that have
@@ -138,18 +139,16 @@ defmodule Swarm.Mesh do
 
   # The table goes with the radio that made it; in between there is none.
   defp radio(request) do
-    case running?() && :ets.lookup(__MODULE__, :radio) do
+    case Table.lookup(__MODULE__, :radio) do
       [{:radio, pid}] -> GenServer.cast(pid, request)
-      _none -> :ok
+      [] -> :ok
     end
   end
 
   defp book do
-    with true <- running?(),
-         [{:book, book, roster, _rejected}] <- :ets.lookup(__MODULE__, :book) do
-      {book, roster}
-    else
-      _none -> nil
+    case Table.lookup(__MODULE__, :book) do
+      [{:book, book, roster, _rejected}] -> {book, roster}
+      [] -> nil
     end
   end
 

@@ -12,6 +12,18 @@ defmodule Swarm.Post do
     :ok
   end
 
+  @doc """
+  Calls a process of this node for a person: where it has ended, or does not answer within 5 s, one line
+  says whose it was.
+  """
+  @spec call(GenServer.server(), term(), whose :: String.t()) ::
+          term() | {:error, line :: String.t()}
+  def call(server, request, whose) do
+    GenServer.call(server, request)
+  catch
+    :exit, {_reason, {GenServer, :call, _arguments}} -> {:error, "#{whose} does not answer"}
+  end
+
   @doc "Answers to who asked with this reference, an alias (`Swarm.Door.Ask`)."
   @spec answer(reference(), term()) :: :ok
   def answer(ref, answer) do

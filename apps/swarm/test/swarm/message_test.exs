@@ -8,6 +8,7 @@ defmodule Swarm.MessageTest do
   doctest Swarm.Link.Name
   doctest Swarm.Shape
   doctest Ear
+  doctest Swarm.Missions.Landmark.Policy
   doctest Swarm.Missions.Manual
 
   @beat %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}

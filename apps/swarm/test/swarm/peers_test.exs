@@ -1,6 +1,7 @@
 defmodule Swarm.PeersTest do
   use ExUnit.Case, async: true
   alias Swarm.{Heartbeat, Peers}
+  doctest Peers
 
   defp beat(boot, sequence, x \\ 0),
     do: %Heartbeat{boot: boot, sequence: sequence, pose: {x, 0, 0}, twist: {0, 0}}

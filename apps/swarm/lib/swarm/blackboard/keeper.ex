@@ -255,12 +255,5 @@ defmodule Swarm.Blackboard.Keeper do
   defp drop(s, count), do: %{s | dropped: s.dropped + count}
   defp now, do: System.monotonic_time(:millisecond)
 
-  defp schedule(%{repair_ms: :never} = s), do: s
-
-  # Not all nodes at one moment.
-  defp schedule(s) do
-    {part, rand} = :rand.uniform_s(s.rand)
-    Process.send_after(self(), :repair, round(s.repair_ms * (0.75 + 0.5 * part)))
-    %{s | rand: rand}
-  end
+  defp schedule(s), do: %{s | rand: Carrier.repair_later(s.repair_ms, s.rand)}
 end

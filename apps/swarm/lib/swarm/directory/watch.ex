@@ -8,7 +8,7 @@ defmodule Swarm.Directory.Watch do
   connection ended, and that is heard on, joins again as soon as that is certain.
   """
   use GenServer
-  alias Swarm.{About, Directory, Mesh}
+  alias Swarm.{About, Directory, Mesh, Post}
 
   @look_ms 100
   # A killed robot's last heartbeat counts for 2 s.
@@ -33,11 +33,7 @@ defmodule Swarm.Directory.Watch do
   @spec unsubscribe(pid()) :: :ok | {:error, line :: String.t()}
   def unsubscribe(pid), do: call({:unsubscribe, pid})
 
-  defp call(request) do
-    GenServer.call(__MODULE__, request)
-  catch
-    :exit, _not_there -> {:error, "the directory of this node does not answer"}
-  end
+  defp call(request), do: Post.call(__MODULE__, request, "the directory of this node")
 
   @impl GenServer
   def init([]) do

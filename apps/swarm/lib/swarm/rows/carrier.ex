@@ -3,7 +3,32 @@ defmodule Swarm.Rows.Carrier do
   # How blackboard and hints reach other nodes: by a transport, `{m, f, a}`, that may be a test's.
   alias Swarm.Mesh
 
+  @repair_ms 1_000
+
   @type call :: {module(), atom(), list()}
+
+  @doc "The options that both have, with their defaults."
+  @spec options(name :: atom()) :: [atom() | {atom(), term()}]
+  def options(name) do
+    [
+      :seed,
+      name: name,
+      transport: {Mesh, :cast, []},
+      nodes: {__MODULE__, :alive, []},
+      repair_ms: @repair_ms
+    ]
+  end
+
+  @doc "Sends `:repair` to the calling process in about so many ms; never for `:never`."
+  @spec repair_later(pos_integer() | :never, :rand.state()) :: :rand.state()
+  def repair_later(:never, rand), do: rand
+
+  # Not all nodes at one moment.
+  def repair_later(ms, rand) do
+    {part, rand} = :rand.uniform_s(rand)
+    Process.send_after(self(), :repair, round(ms * (0.75 + 0.5 * part)))
+    rand
+  end
 
   @doc "To all other nodes. What does not go out, or gets lost, is repaired later."
   @spec cast(call(), atom(), term()) :: :ok

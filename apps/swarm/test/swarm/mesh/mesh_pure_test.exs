@@ -4,6 +4,7 @@ defmodule Swarm.Mesh.PureTest do
 
   doctest Swarm.Mesh.Backoff
   doctest Swarm.Mesh.Beacon
+  doctest Swarm.Mesh.Certs
   doctest Swarm.Mesh.Guard
   doctest Swarm.Mesh.Log
   doctest Swarm.Mesh.Packet

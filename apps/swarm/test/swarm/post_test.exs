@@ -1,0 +1,25 @@
+defmodule Swarm.PostTest do
+  use ExUnit.Case, async: true
+  alias Swarm.{Post, Table}
+  doctest Table
+
+  @tag :capture_log
+  test "a call to a process that is not there, or that ends over it, is one line" do
+    assert Post.call(:nobody_has_this_name, :x, "the box") == {:error, "the box does not answer"}
+    {:ok, agent} = Agent.start(fn -> 1 end)
+    # An agent that is asked what agents are not asked falls.
+    assert Post.call(agent, :x, "the box") == {:error, "the box does not answer"}
+    refute Process.alive?(agent)
+  end
+
+  test "a table is read as long as it is there" do
+    table = :ets.new(:"post_test_#{System.unique_integer([:positive])}", [:named_table])
+    :ets.insert(table, {:a, 1})
+    assert Table.lookup(table, :a) == [{:a, 1}]
+    assert Table.lookup(table, :b) == []
+    assert Table.select(table, [{{:"$1", 1}, [], [:"$1"]}]) == [:a]
+    :ets.delete(table)
+    assert Table.lookup(table, :a) == []
+    assert Table.select(table, [{{:"$1", 1}, [], [:"$1"]}]) == []
+  end
+end
