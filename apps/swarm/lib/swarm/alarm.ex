@@ -15,7 +15,7 @@ defmodule Swarm.Alarm do
   @times 10
   @passed_on 3
   @every_ms 100
-  # More calls at a time are not different any more.
+  # More calls at a time are not different any more, and not passed on.
   @most 16
 
   @doc "Starts it, as a node's supervisor does."
@@ -80,6 +80,8 @@ defmodule Swarm.Alarm do
   end
 
   def handle_info(_unknown, s), do: {:noreply, s}
+
+  defp pass_on(%{left: left} = s, _call) when map_size(left) >= @most, do: s
 
   # Many robots of this node may have heard it.
   defp pass_on(s, call) do

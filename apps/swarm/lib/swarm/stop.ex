@@ -8,7 +8,7 @@ defmodule Swarm.Stop do
   has reset yet, and one that joins a fleet whose stop is long cleared is not stopped by it.
 
   A call to stop (`Swarm.Alarm`) is sent many times, and comes by several ways. `calls` remembers the
-  last one of each node, so that a late repeat does not latch again what a person has reset.
+  last one of each node's life, so that a late repeat does not latch again what a person has reset.
   """
   alias Swarm.Shape
 
@@ -56,14 +56,14 @@ defmodule Swarm.Stop do
   """
   @spec call(t(), call()) :: t()
   def call(%__MODULE__{} = stop, {node, boot, counter}) do
-    case List.keyfind(stop.calls, node, 0) do
-      # Of another life of that node nothing is known, so that it counts as new.
-      {_node, {^boot, last}} when counter <= last ->
+    # Of each life of a node on its own: repeats of its calls in two lives would else take each
+    # other for new, and robots would pass them on to each other for ever.
+    case Enum.split_with(stop.calls, &match?({^node, {^boot, _last}}, &1)) do
+      {[{_node, {_boot, last}} | _], _others} when counter <= last ->
         stop
 
-      _new ->
-        calls = [{node, {boot, counter}} | List.keydelete(stop.calls, node, 0)]
-        stop = %{stop | calls: Enum.take(calls, @callers)}
+      {_before, others} ->
+        stop = %{stop | calls: Enum.take([{node, {boot, counter}} | others], @callers)}
         if stop.latched?, do: stop, else: press(stop)
     end
   end

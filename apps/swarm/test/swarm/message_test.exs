@@ -164,4 +164,13 @@ defmodule Swarm.MessageTest do
     {_phase, led, _effects} = Landmark.handle({:message, %{far | body: @anchor}}, mission)
     assert led.anchor == @anchor
   end
+
+  test "repeats of calls from two lives of a node do not take each other for new" do
+    alias Swarm.Stop
+    calls = for boot <- [7, 5], counter <- [1, 2], do: {:base@hall, boot, counter}
+    stop = calls |> Enum.reduce(Stop.new(), &Stop.call(&2, &1)) |> Stop.reset()
+    assert Enum.reduce(calls ++ calls, stop, &Stop.call(&2, &1)) == stop
+    assert Stop.call(stop, {:base@hall, 5, 3}).latched?
+    assert Stop.call(stop, {:base@hall, 8, 1}).latched?
+  end
 end

@@ -1,0 +1,119 @@
+defmodule Swarm.MeshNodes.Absurd do
+  @moduledoc """
+  What a robot with a bug would sign and send: each of the mesh's messages with each of its fields
+  replaced by each term of no sense. Run on a test's node.
+  """
+  alias Swarm.{Anchor, Heartbeat, Mesh, Message, Round}
+
+  @doc """
+  Sends each `every`-th of them to the others, slowly enough for their sockets, and says how many it was.
+  """
+  @spec send_all(robot :: atom(), pos_integer()) :: non_neg_integer()
+  def send_all(me, every) do
+    messages = messages(me) ++ for m <- messages(me), do: %{m | kind: :relay}
+    relayed = for m <- messages, do: %Message{from: me, kind: :relay, body: Map.put(m, :hops, 1)}
+    services = for service <- [:rows, :hints, :stop], term <- services(me), do: {service, term}
+
+    messages = Enum.take_every(messages ++ relayed, every)
+    services = Enum.take_every(services, every)
+
+    for {message, n} <- Enum.with_index(messages) do
+      Mesh.speak(:all, message)
+      pause(n)
+    end
+
+    for {{service, term}, n} <- Enum.with_index(services) do
+      Mesh.cast(service, term)
+      pause(n)
+    end
+
+    length(messages) + length(services)
+  end
+
+  # Nobody is listened to who sends more than 2,000 a second.
+  defp pause(n) when rem(n, 100) != 0, do: :ok
+
+  defp pause(_n) do
+    receive do
+      :never -> :ok
+    after
+      60 -> :ok
+    end
+  end
+
+  defp messages(me) do
+    for {kind, body} <- bodies(me), spoilt <- [:junk | spoilt(body)] do
+      %Message{from: me, kind: kind, body: spoilt}
+    end
+  end
+
+  defp bodies(me) do
+    anchor = %Anchor{
+      leader: me,
+      epoch: 1,
+      sequence: 1,
+      pose: {0, 0, 0},
+      twist: {0, 0},
+      formation: {:column, 1.0},
+      order: [],
+      size: 1,
+      places: []
+    }
+
+    letter = %Round.Letter{id: {1, 1, me}, view: [me], remaining_ms: 900, purpose: :search}
+    beat = %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}, anchor: anchor}
+    [heartbeat: beat, round: letter, place: anchor]
+  end
+
+  defp spoilt(%module{} = body) do
+    for {field, value} <- Map.from_struct(body), junk <- [{value, 1} | wild()] do
+      Map.put(body, field, junk)
+    end ++ [%{__struct__: module}, Map.put(body, :more, 1)]
+  end
+
+  defp services(me) do
+    text = Atom.to_string(me)
+
+    for(tag <- [:rows, :have, :want, :hints, :digest, :estop], a <- wild(), do: {tag, a}) ++
+      for(tag <- [:rows, :have, :want, :hints], a <- wild(), do: {tag, [a]}) ++
+      for(a <- wild(), b <- wild(), do: {:digest, a, b, [{text, 1}]}) ++
+      for(a <- wild(), b <- wild(), do: {:have, a, b}) ++
+      for(at <- 0..5, a <- wild(), do: {:rows, [put_elem({text, 1, 1, 1, 1, "x"}, at, a)]}) ++
+      for(at <- 0..3, a <- wild(), do: {:hints, [put_elem({1, 1, text, "x"}, at, a)]}) ++
+      for(a <- wild(), do: {:rows, [{text, 1, 1, 1, 1, :erlang.term_to_binary({:about, a})}]}) ++
+      for(a <- wild(), do: {:have, [{text, [{1, a, 1}, {1, 1, a}]}]}) ++
+      for(at <- 0..2, a <- wild(), do: {:estop, put_elem({node(), 1, 1}, at, a)}) ++ wild()
+  end
+
+  defp wild do
+    [
+      nil,
+      true,
+      :junk,
+      -1,
+      0,
+      1.0e308,
+      -0.0,
+      Bitwise.bsl(1, 63),
+      Bitwise.bsl(1, 64) - 1,
+      Bitwise.bsl(1, 80_000),
+      "",
+      <<255>>,
+      <<1::3>>,
+      :binary.copy("x", 40_000),
+      [],
+      [1 | 2],
+      [nil],
+      Enum.to_list(1..10_000),
+      {},
+      {1.0e308, 1.0e308, 1.0e308},
+      %{},
+      %{junk: 1},
+      %{__struct__: :junk},
+      self(),
+      make_ref(),
+      &is_atom/1,
+      Enum.reduce(1..5_000, [], fn _n, term -> [term] end)
+    ]
+  end
+end

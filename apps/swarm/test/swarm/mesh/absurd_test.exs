@@ -1,0 +1,78 @@
+defmodule Swarm.Mesh.AbsurdTest do
+  # A robot of the fleet with a bug: what it says is signed, and makes no sense.
+  use ExUnit.Case, async: false
+  import Swarm.Case, only: [eventually: 1]
+  alias Swarm.MeshNodes
+
+  @parts [
+    Swarm.Mesh.Radio,
+    Swarm.Mesh.Dialer,
+    Swarm.Alarm,
+    Swarm.Blackboard,
+    Swarm.Hints,
+    Swarm.Directory.Watch
+  ]
+
+  defp parts(%{name: name} = node) do
+    roles = [:link, :brake, :pilot, :executive, :gate]
+    named = for role <- roles, do: MeshNodes.call(node, Robot.Names, :whereis, [name, role])
+    named ++ for part <- @parts, do: MeshNodes.call(node, Process, :whereis, [part])
+  end
+
+  defp hears?(one, two),
+    do: match?(%{status: :alive}, MeshNodes.call(one, Swarm.Mesh, :view, []).nodes[two.node])
+
+  test "it fells nothing and moves nobody, and is understood when it makes sense again" do
+    [one, two] = MeshNodes.start(2, robots: true)
+    assert eventually(fn -> hears?(one, two) and hears?(two, one) end)
+    assert eventually(fn -> MeshNodes.call(two, Swarm, :stop, [one.name]) == :ok end)
+    # A first time loads all modules that are needed for it.
+    MeshNodes.call(two, Swarm.MeshNodes.Absurd, :send_all, [two.name, 7], 60_000)
+    before = parts(one)
+    atoms = MeshNodes.call(one, :erlang, :system_info, [:atom_count])
+    heard = MeshNodes.call(one, Swarm.Mesh, :counts, []).heard
+
+    sent = MeshNodes.call(two, Swarm.MeshNodes.Absurd, :send_all, [two.name, 2], 60_000)
+    # What is larger than a datagram does not even go out.
+    assert eventually(fn ->
+             MeshNodes.call(one, Swarm.Mesh, :counts, []).heard - heard > sent / 2
+           end)
+
+    assert MeshNodes.call(one, Swarm.Mesh, :rejected, [])[:message] > 100
+
+    assert parts(one) == before
+    assert MeshNodes.call(one, :erlang, :system_info, [:atom_count]) - atoms < 10
+
+    assert %{state: :idle, speed: speed} = MeshNodes.call(one, Swarm, :status, [one.name])
+    assert speed == 0
+
+    for f <- [:status, :matrix, :find],
+        do: assert(is_binary(inspect(MeshNodes.call(one, Swarm, f, []))))
+
+    assert is_map(MeshNodes.call(one, Swarm.Hints, :all, []))
+    assert is_map(MeshNodes.call(one, Swarm.Blackboard, :rows, [two.name]))
+
+    assert eventually(fn -> hears?(one, two) and hears?(two, one) end)
+
+    # Some of it was a stop, of which nothing comes back.
+    assert MeshNodes.call(one, Swarm, :status, [one.name]).estop
+    assert eventually(fn -> MeshNodes.call(two, Swarm, :reset, []) == :ok end)
+    assert :ok = MeshNodes.call(two, Swarm.Blackboard, :put, [two.name, :door, 1])
+    assert :ok = MeshNodes.call(two, Swarm.Hints, :put, [two.name, :hint, 1])
+
+    assert eventually(fn ->
+             match?(
+               {:ok, 1, _},
+               MeshNodes.call(one, Swarm.Blackboard, :get, [two.name, :door, 2_000])
+             )
+           end)
+
+    assert eventually(fn ->
+             match?({:ok, 1, _}, MeshNodes.call(one, Swarm.Hints, :get, [:hint]))
+           end)
+
+    refute MeshNodes.call(one, Swarm, :status, [one.name]).estop
+    assert eventually(fn -> MeshNodes.call(two, Swarm, :estop, []) == :ok end)
+    assert eventually(fn -> MeshNodes.call(one, Swarm, :status, [one.name]).estop end)
+  end
+end
