@@ -103,20 +103,6 @@ defmodule Sim.Server do
   def changed(world, {:move, nil}), do: World.place_landmark(world, nil)
   def changed(world, {:move, place}), do: World.move_landmark(world, place)
 
-  @doc "Stops a robot's body for ever."
-  @spec kill(GenServer.server(), robot :: atom()) :: :ok
-  def kill(server, robot), do: GenServer.call(server, {:change, &changed(&1, {:kill, robot})})
-
-  @doc "Lifts a robot to another pose."
-  @spec displace(GenServer.server(), robot :: atom(), Pose.t()) :: :ok
-  def displace(server, robot, pose),
-    do: GenServer.call(server, {:change, &World.displace(&1, robot, pose)})
-
-  @doc "Lets the landmark glide there; `nil` takes it away."
-  @spec move_landmark(GenServer.server(), Pose.point() | nil) :: :ok
-  def move_landmark(server, place),
-    do: GenServer.call(server, {:change, &changed(&1, {:move, place})})
-
   @impl GenServer
   def init({name, %World{} = world}) do
     # Time does not wait for those who live in it.
@@ -129,11 +115,11 @@ defmodule Sim.Server do
   @impl GenServer
   def handle_call(:world, _from, s), do: {:reply, s.world, s}
   def handle_call(:stats, _from, s), do: {:reply, s.stats, %{s | stats: new_stats()}}
-  def handle_call({:change, change}, _from, s), do: {:reply, :ok, %{s | world: change.(s.world)}}
 
   @impl GenServer
   def handle_cast({:attach, robot, kind, pid}, s) do
     if is_map_key(s.world.robots, robot) do
+      s = disown(s, {robot, kind, pid})
       owners = Map.put(s.owners, Process.monitor(pid), {robot, kind, pid})
       if kind == :camera, do: hand(pid, {:ground, View.ground(s.world, robot)})
       {:noreply, %{s | devices: Map.put(s.devices, {robot, kind}, pid), owners: owners}}
@@ -143,7 +129,8 @@ defmodule Sim.Server do
     end
   end
 
-  def handle_cast({:detach, robot, kind, pid}, s), do: {:noreply, release(s, robot, kind, pid)}
+  def handle_cast({:detach, robot, kind, pid}, s),
+    do: {:noreply, s |> disown({robot, kind, pid}) |> release(robot, kind, pid)}
 
   def handle_cast({:drive, robot, twist}, s) do
     world = World.drive(s.world, robot, twist)
@@ -185,6 +172,13 @@ defmodule Sim.Server do
   end
 
   defp stand(world, id), do: World.drive(world, id, Twist.zero())
+
+  # A device that fails attaches again and again in one process.
+  defp disown(s, owner) do
+    monitors = for {monitor, ^owner} <- s.owners, do: monitor
+    Enum.each(monitors, &Process.demonitor(&1, [:flush]))
+    %{s | owners: Map.drop(s.owners, monitors)}
+  end
 
   # Another process may have attached meanwhile.
   defp release(s, robot, kind, pid) do

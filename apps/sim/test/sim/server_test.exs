@@ -48,6 +48,33 @@ defmodule Sim.ServerTest do
     assert Process.alive?(drive)
   end
 
+  test "a device that attaches again and again is watched once, and not after it has left", %{
+    world: world,
+    name: name
+  } do
+    server = serve(name, world)
+
+    watched = fn ->
+      server |> Process.info(:monitors) |> elem(1) |> Enum.count(&(&1 == {:process, self()}))
+    end
+
+    for _ <- 1..3 do
+      {:ok, line} = Server.attach(name, :mag1, :drive)
+      # The call comes after the cast, so it has been carried out.
+      %World{} = Server.world(server)
+      assert watched.() == 1
+      Server.detach(line, :mag1, :drive)
+    end
+
+    {:ok, line} = Server.attach(name, :mag1, :drive)
+    {:ok, _again} = Server.attach(name, :mag1, :drive)
+    %World{} = Server.world(server)
+    assert watched.() == 1
+    Server.detach(line, :mag1, :drive)
+    %World{} = Server.world(server)
+    assert watched.() == 0
+  end
+
   test "wheels do as asked, and stand when whoever drives them is gone", %{
     world: world,
     name: name
