@@ -69,8 +69,8 @@ defmodule Sim.Fleet do
   @spec living(GenServer.server()) :: [atom()]
   def living(fleet), do: GenServer.call(fleet, :living)
 
-  @doc "The server of its world."
-  @spec server(GenServer.server()) :: pid()
+  @doc "The server of its world; `nil` while that is being started again."
+  @spec server(GenServer.server()) :: pid() | nil
   def server(fleet), do: GenServer.call(fleet, :server)
 
   @doc "Whether the run is over, as `Sim.Trial.Finish` has it."

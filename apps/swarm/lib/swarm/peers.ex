@@ -143,15 +143,6 @@ defmodule Swarm.Peers do
   @spec view_number(t(), integer()) :: non_neg_integer()
   def view_number(peers, now_ms), do: peers.changes + length(gone(peers, now_ms))
 
-  @doc "The newest heartbeat of a robot that is not gone, or `nil`."
-  @spec beat(t(), atom(), integer()) :: Heartbeat.t() | nil
-  def beat(peers, id, now_ms) do
-    case peers.rows do
-      %{^id => %{at_ms: at_ms, beat: beat}} when now_ms - at_ms < @gone_ms -> beat
-      _silent -> nil
-    end
-  end
-
   @doc "The newest heartbeats of all that are not gone, by name, without this robot's."
   @spec beats(t(), integer()) :: %{atom() => Heartbeat.t()}
   def beats(peers, now_ms) do

@@ -4,12 +4,12 @@ defmodule Swarm.Supervisor do
 
       Swarm.Supervisor (no restarts to give)
       |-- Robot.Names            who is who on this node
-      |-- Swarm.Parts (one_for_one)
+      |-- Swarm.Supervisor.Parts (one_for_one)
       |   |-- Swarm.Directory    who is where in the fleet
-      |   |-- Swarm.Directory.Watch    tells who joins and leaves
-      |   |-- Swarm.Alarm        calls all robots to stop
       |   |-- Swarm.Blackboard   what the robots of the fleet tell of themselves
       |   |-- Swarm.Hints        what robots leave for each other
+      |   |-- Swarm.Directory.Watch    tells who joins and leaves
+      |   |-- Swarm.Alarm        calls all robots to stop
       |   `-- Swarm.Mesh.Supervisor  the other nodes, where there is a mesh
       `-- Robot.Fleet            the robots
 

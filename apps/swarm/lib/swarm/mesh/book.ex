@@ -7,7 +7,7 @@ defmodule Swarm.Mesh.Book do
 
   A node is suspect after 1 s of silence and gone after 2 s; what decides is datagrams, never a
   connection. One that is gone stays in the book and is sent beacons for ever. The view's number
-  grows with each change of who is there.
+  grows with each node that comes or goes.
   """
   alias Swarm.Mesh.Backoff
 
@@ -55,11 +55,12 @@ defmodule Swarm.Mesh.Book do
       %{^name => %{status: :alive} = entry} ->
         {put(book, name, %{entry | address: address, heard_ms: now_ms}), []}
 
-      %{^name => entry} ->
-        up(book, name, %{entry | address: address, heard_ms: now_ms, status: :alive})
+      %{^name => %{status: status} = entry} ->
+        entry = %{entry | address: address, heard_ms: now_ms, status: :alive}
+        up(book, name, entry, if(status == :gone, do: 1, else: 0))
 
       _unknown ->
-        up(book, name, %{
+        entry = %{
           address: address,
           heard_ms: now_ms,
           status: :alive,
@@ -68,7 +69,9 @@ defmodule Swarm.Mesh.Book do
           port: 0,
           robots: %{},
           probe: Backoff.new(now_ms)
-        })
+        }
+
+        up(book, name, entry, 1)
     end
   end
 
@@ -225,11 +228,11 @@ defmodule Swarm.Mesh.Book do
         do: name
       )
 
-  defp up(book, name, entry),
-    do: {
-      put(%{book | number: book.number + 1, leads: Map.delete(book.leads, name)}, name, entry),
-      [{:up, name}]
-    }
+  # One that was only suspect was in the view all the time.
+  defp up(book, name, entry, news) do
+    book = %{book | number: book.number + news, leads: Map.delete(book.leads, name)}
+    {put(book, name, entry), [{:up, name}]}
+  end
 
   defp put(book, name, entry), do: %{book | nodes: Map.put(book.nodes, name, entry)}
 end

@@ -14,7 +14,7 @@ defmodule Swarm.Mesh.Options do
   | `topologies` | those of `libcluster`, where it is (`MIX_TARGET`): any of its strategies then connects nodes |
   | `dist_port` | the port that this node's distribution listens on; default: that of `Swarm.Mesh.Epmd`, or 0 where there is an epmd to ask |
   | `full_mesh` | up to so many nodes each is connected to each; default 30 |
-  | `degree` | above that, to so many others; 6 to 8, default 8 |
+  | `degree` | above that, to about so many others, 2 to 30; default 8 |
   """
   alias Swarm.Mesh.{Roster, Secret, Strategy}
 

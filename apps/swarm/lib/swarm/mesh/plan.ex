@@ -43,7 +43,7 @@ defmodule Swarm.Mesh.Plan do
     place = Enum.find_index(all, &(&1 == me))
     steps = div(degree, 2)
 
-    for k <- 0..(steps - 1), sign <- [1, -1] do
+    for k <- 0..(steps - 1)//1, sign <- [1, -1] do
       far = round(:math.pow(count, k / steps))
       Enum.at(all, Integer.mod(place + sign * far, count))
     end

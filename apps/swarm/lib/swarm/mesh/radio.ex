@@ -128,9 +128,6 @@ defmodule Swarm.Mesh.Radio do
   def handle_info({:udp_error, _socket, _reason}, s), do: {:noreply, s}
   def handle_info(_other, s), do: {:noreply, s}
 
-  @impl GenServer
-  def terminate(_reason, s), do: if(s.sockets, do: Sockets.close(s.sockets))
-
   defp open(%{sockets: nil} = s) do
     if Backoff.due?(s.backoff, now()), do: try_open(s), else: s
   end

@@ -25,13 +25,6 @@ defmodule Swarm.Mesh.Refusals do
     :ok
   end
 
-  @doc "Takes the filter away."
-  @spec uninstall() :: :ok
-  def uninstall do
-    _ = :logger.remove_primary_filter(__MODULE__)
-    :ok
-  end
-
   @doc false
   @spec filter(:logger.log_event(), :atomics.atomics_ref()) :: :logger.filter_return()
   def filter(%{msg: message} = event, state) do

@@ -3,7 +3,7 @@ defmodule Swarm.Mesh.Sockets do
   A node's two UDP sockets: one to send from and to be reached at, one that listens to the
   multicast group, which all nodes of a machine share.
 
-  Both hand over a limited number of datagrams before they ask again, so that a flood waits, and is
+  They belong to the process that opens them, and close with it. Both hand over a limited number of datagrams before they ask again, so that a flood waits, and is
   lost, in the kernel and not in a process's mailbox.
   """
   alias Swarm.Mesh.Options
@@ -46,13 +46,6 @@ defmodule Swarm.Mesh.Sockets do
     _ = :inet.setopts(socket, drop_membership: membership)
     _ = :inet.setopts(socket, add_membership: membership)
     sockets
-  end
-
-  @doc "Closes them."
-  @spec close(t()) :: :ok
-  def close(sockets) do
-    if sockets.group, do: :gen_udp.close(sockets.group)
-    :gen_udp.close(sockets.own)
   end
 
   defp sending(options) do

@@ -1,6 +1,6 @@
 defmodule Swarm.Mesh.PureTest do
   use ExUnit.Case, async: true
-  alias Swarm.Mesh.{Options, Plan}
+  alias Swarm.Mesh.{Book, Options, Plan}
 
   doctest Swarm.Mesh.Backoff
   doctest Swarm.Mesh.Beacon
@@ -31,6 +31,17 @@ defmodule Swarm.Mesh.PureTest do
     end
   end
 
+  test "the number of the view grows with a node that goes and comes, not with one that is late" do
+    place = {{10, 0, 0, 7}, 4370}
+    {book, [up: "b"]} = Book.hear(Book.new("a"), "b", place, 0)
+    {late, [suspect: "b"]} = Book.age(book, 1_500)
+    {back, [up: "b"]} = Book.hear(late, "b", place, 1_600)
+    assert {book.number, late.number, back.number} == {1, 1, 1}
+    {gone, [gone: "b"]} = Book.age(back, 3_600)
+    {again, [up: "b"]} = Book.hear(gone, "b", place, 9_000)
+    assert {gone.number, again.number} == {2, 3}
+  end
+
   test "there is no way to where no connection leads" do
     assert Plan.route("a", "z", %{"a" => ["b"], "b" => ["a"], "z" => []}) == nil
   end
@@ -42,6 +53,8 @@ defmodule Swarm.Mesh.PureTest do
           {[prot: 1], "no option :prot"},
           {[port: -1], "mesh port is a whole number from 0 to 65535, not -1"},
           {[multicast: {{10, 0, 0, 1}, 1}], "mesh multicast"},
+          {[multicast: {{239, 999, 0, 1}, 1}], "mesh multicast"},
+          {[multicast: "239.0.0.1:1"], "mesh multicast"},
           {[peers: ["10.0.0.1"]], ~s(not "10.0.0.1")},
           {[peers: :all], "peers are addresses"},
           {[interface: "eth0"], "mesh interface"},

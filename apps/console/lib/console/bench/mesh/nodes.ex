@@ -119,7 +119,7 @@ defmodule Console.Bench.Mesh.Nodes do
   end
 
   @doc "Its memory: what is resident, and its share of what is resident, in bytes."
-  @spec memory(t()) :: %{rss: pos_integer(), pss: pos_integer() | nil}
+  @spec memory(t()) :: %{rss: pos_integer() | nil, pss: pos_integer() | nil}
   def memory(node) do
     %{
       rss: kilobytes("/proc/#{node.pid}/status", "VmRSS:"),

@@ -39,7 +39,7 @@ defmodule Console.Bench.Mesh.Play do
 
     try do
       s = state(fleet, plan, :one, [node], node, names)
-      {:ok, _} = {:ok, Nodes.call(node, s.code, :full, [1, names])}
+      _at_ns = Nodes.call(node, s.code, :full, [1, names])
       [:ping, :gather, :round, :rate] |> Enum.reduce(%{}, &one(&1, &2, s))
     after
       Nodes.stop([node])

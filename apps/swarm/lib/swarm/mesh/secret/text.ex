@@ -35,7 +35,7 @@ defmodule Swarm.Mesh.Secret.Text do
 
   # base64 breaks its lines after 76 letters, and editors end files with a line of their own.
   defp plain(text) do
-    case for <<byte <- text>>, byte not in ' \t\r\n', into: <<>>, do: <<byte>> do
+    case for <<byte <- text>>, byte not in ~c" \t\r\n", into: <<>>, do: <<byte>> do
       "" -> {:error, "is empty"}
       plain -> {:ok, plain}
     end

@@ -5,17 +5,21 @@ defmodule Swarm.Mesh.Strategy.Gossip do
   group's address and port.
   """
   @behaviour Swarm.Mesh.Strategy
+  alias Swarm.Mesh.Strategy.Static
 
   @every_ms 1_000
 
   @impl Swarm.Mesh.Strategy
-  def init({{a, _, _, _}, port} = group) when a in 224..239 and port in 1..65_535,
-    do: {:ok, %{group: group, due_ms: nil}}
+  def init(group) do
+    case Static.address(group) do
+      {:ok, {{a, _, _, _}, _port}} when a in 224..239 and is_tuple(group) ->
+        {:ok, %{group: group, due_ms: nil}}
 
-  def init(other),
-    do:
-      {:error,
-       "multicast is a group and a port such as {{239, 255, 67, 86}, 4371}, or false, not #{inspect(other)}"}
+      _none ->
+        {:error,
+         "multicast is a group and a port such as {{239, 255, 67, 86}, 4371}, or false, not #{inspect(group, limit: 5, printable_limit: 60)}"}
+    end
+  end
 
   @impl Swarm.Mesh.Strategy
   def targets(%{due_ms: due_ms} = state, _known, now_ms, _chance)

@@ -23,20 +23,14 @@ defmodule Swarm.Mesh.Strategy.Static do
 
   @impl Swarm.Mesh.Strategy
   def targets(state, known, now_ms, chance) do
-    Enum.map_reduce(state, 0, fn {address, backoff}, turn ->
-      {probe(
-         address,
-         backoff || Backoff.new(now_ms),
-         address in known,
-         now_ms,
-         spread(chance, turn)
-       ), turn + 1}
-    end)
-    |> elem(0)
-    |> Enum.reduce({[], []}, fn {target, row}, {targets, rows} ->
-      {target ++ targets, [row | rows]}
-    end)
-    |> then(fn {targets, rows} -> {Enum.reverse(targets), Enum.reverse(rows)} end)
+    {targets, rows} =
+      for {{address, backoff}, turn} <- Enum.with_index(state) do
+        backoff = backoff || Backoff.new(now_ms)
+        probe(address, backoff, address in known, now_ms, spread(chance, turn))
+      end
+      |> Enum.unzip()
+
+    {Enum.concat(targets), rows}
   end
 
   @doc """
