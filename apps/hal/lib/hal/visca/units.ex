@@ -1,0 +1,147 @@
+defmodule Hal.Visca.Units do
+  @moduledoc """
+  Between radians and the numbers of a Sony EVI-D30 (fact sheet, section 5). Pure.
+
+  | what | here | in the camera |
+  |---|---|---|
+  | pan | radians, left positive, 100 degrees to each side | -880 to 880, **right** positive, 8.8 a degree |
+  | tilt | radians, up positive, 25 degrees each way | -300 to 300, up positive, 12 a degree |
+  | pan speed | rad/s, up to 80 degrees/s | 1 to 24, 10/3 degrees/s each |
+  | tilt speed | rad/s, up to 50 degrees/s | 1 to 20, 2.5 degrees/s each |
+  | zoom | horizontal field of view, radians | 0 (wide) to 1023 (tele) |
+
+  What is asked for beyond a range becomes the end of the range: a head that is told to look
+  behind itself looks as far as it can. The field of view is taken as linear in the zoom, as
+  Player does; the truth is not (the sheet says so, and has no better source).
+  """
+
+  @degree :math.pi() / 180
+  @pan_max 880
+  @tilt_max 300
+  @zoom_max 1023
+
+  @typedoc "Fields of view, tele and wide, in radians."
+  @type lens :: {tele :: float(), wide :: float()}
+
+  @doc """
+  The camera's pan for radians.
+
+      iex> Hal.Visca.Units.pan(:math.pi() / 6)
+      -264
+      iex> Hal.Visca.Units.pan(-9.0)
+      880
+  """
+  @spec pan(float()) :: -880..880
+  def pan(radians) when is_number(radians), do: steps(-radians, 8.8, @pan_max)
+
+  @doc """
+  The camera's tilt for radians.
+
+      iex> Hal.Visca.Units.tilt(-:math.pi() / 18)
+      -120
+  """
+  @spec tilt(float()) :: -300..300
+  def tilt(radians) when is_number(radians), do: steps(radians, 12, @tilt_max)
+
+  @doc """
+  Radians of a pan and tilt of the camera.
+
+      iex> {pan, tilt} = Hal.Visca.Units.angles(-264, 120)
+      iex> {Float.round(pan, 4), Float.round(tilt, 4)}
+      {0.5236, 0.1745}
+  """
+  @spec angles(pan :: integer(), tilt :: integer()) :: {float(), float()}
+  # Zero less, not minus: there is no use for a zero with a sign.
+  def angles(pan, tilt) when is_integer(pan) and is_integer(tilt),
+    do: {(0 - pan) / 8.8 * @degree, tilt / 12 * @degree}
+
+  @doc """
+  Whether a position is one that the camera can have, with a degree to spare.
+
+      iex> Hal.Visca.Units.position?(-880, 300)
+      true
+      iex> Hal.Visca.Units.position?(0, 4000)
+      false
+  """
+  @spec position?(integer(), integer()) :: boolean()
+  def position?(pan, tilt), do: abs(pan) <= @pan_max + 9 and abs(tilt) <= @tilt_max + 12
+
+  @doc """
+  The camera's pan speed that is nearest to so many rad/s, at least 1 (there is no slower one).
+
+      iex> Hal.Visca.Units.pan_speed(20 * :math.pi() / 180)
+      6
+  """
+  @spec pan_speed(float()) :: 1..24
+  def pan_speed(rate) when is_number(rate), do: speed(rate, 10 / 3, 24)
+
+  @doc """
+  The camera's tilt speed that is nearest to so many rad/s, at least 1.
+
+      iex> Hal.Visca.Units.tilt_speed(9.0)
+      20
+  """
+  @spec tilt_speed(float()) :: 1..20
+  def tilt_speed(rate) when is_number(rate), do: speed(rate, 2.5, 20)
+
+  @doc """
+  Rates of turn as a drive command: `{direction, speed}` for each axis, pan positive to the left,
+  tilt positive upwards, in rad/s. Less than half the slowest speed is a stop.
+
+      iex> Hal.Visca.Units.drive(20 * :math.pi() / 180, 0.0)
+      {:drive, {:left, 6}, {:stop, 0}}
+  """
+  @spec drive(float(), float()) :: Hal.Visca.Command.t()
+  def drive(pan_rate, tilt_rate) when is_number(pan_rate) and is_number(tilt_rate) do
+    {:drive, axis(pan_rate, :left, :right, 10 / 3, &pan_speed/1),
+     axis(tilt_rate, :up, :down, 2.5, &tilt_speed/1)}
+  end
+
+  @doc """
+  The zoom for a field of view.
+
+      iex> degree = :math.pi() / 180
+      iex> Hal.Visca.Units.zoom(15 * degree, {3 * degree, 30 * degree})
+      569
+      iex> Hal.Visca.Units.zoom(9.0, {3 * degree, 30 * degree})
+      0
+  """
+  @spec zoom(float(), lens()) :: 0..1023
+  def zoom(angle, {tele, wide}) when is_number(angle) and 0 < tele and tele < wide do
+    angle = angle |> max(tele) |> min(wide)
+    min(round(1024 * (wide - angle) / (wide - tele)), @zoom_max)
+  end
+
+  @doc """
+  The horizontal field of view at a zoom, in radians.
+
+      iex> degree = :math.pi() / 180
+      iex> angle = Hal.Visca.Units.field_of_view(568, {3 * degree, 30 * degree})
+      iex> Float.round(angle / degree, 2)
+      15.02
+  """
+  @spec field_of_view(integer(), lens()) :: float()
+  def field_of_view(zoom, {tele, wide}) when is_integer(zoom) and 0 < tele and tele < wide do
+    zoom = zoom |> max(0) |> min(@zoom_max)
+    wide - zoom / 1024 * (wide - tele)
+  end
+
+  # Cut before the number is made an integer: a huge float would make a huge integer.
+  defp steps(radians, per_degree, most) do
+    limit = most / per_degree * @degree
+    round((radians |> max(-limit) |> min(limit)) / @degree * per_degree)
+  end
+
+  defp speed(rate, step, most) do
+    rate = min(abs(rate), most * step * @degree)
+    max(round(rate / (step * @degree)), 1)
+  end
+
+  defp axis(rate, positive, negative, step, speed) do
+    cond do
+      abs(rate) < step * @degree / 2 -> {:stop, 0}
+      rate > 0 -> {positive, speed.(rate)}
+      true -> {negative, speed.(rate)}
+    end
+  end
+end
