@@ -1,7 +1,6 @@
 defmodule Swarm.MeshNodes.Listener do
   @moduledoc """
-  Hears on a test's node who joins and leaves, and when: in microseconds of the machine's clock, which
-  all nodes of one machine share.
+  Hears on a test's node who joins and leaves.
   """
   use GenServer
 
@@ -12,8 +11,8 @@ defmodule Swarm.MeshNodes.Listener do
     :ok
   end
 
-  @doc "What it heard so far, newest first: `{news, at_us}`."
-  @spec news() :: [{tuple(), integer()}]
+  @doc "What it heard so far, newest first."
+  @spec news() :: [tuple()]
   def news, do: GenServer.call(__MODULE__, :news)
 
   @impl GenServer
@@ -26,6 +25,5 @@ defmodule Swarm.MeshNodes.Listener do
   def handle_call(:news, _from, news), do: {:reply, news, news}
 
   @impl GenServer
-  def handle_info({:swarm, news}, heard),
-    do: {:noreply, [{news, System.os_time(:microsecond)} | heard]}
+  def handle_info({:swarm, news}, heard), do: {:noreply, [news | heard]}
 end

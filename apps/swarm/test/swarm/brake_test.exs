@@ -136,21 +136,20 @@ defmodule Swarm.BrakeTest do
   @doc false
   def carry(test, from, _ids, message), do: send(test, {:carried, from, message})
 
-  test "how long an e-stop takes in a flooded robot" do
+  test "an e-stop, and its reset, get through to a flooded robot, whose mailbox stays short" do
     id = robot(:brake_flooded)
     link = Names.whereis(id, :link)
     flood = start_supervised!({Task, fn -> pour(link, id) end})
     eventually(fn -> flooded(id) > 0 end)
-    {took, answer} = :timer.tc(fn -> Swarm.estop() end)
-    assert answer == :ok
+    assert Swarm.estop() == :ok
     assert latched?(id)
-    {asked, _status} = :timer.tc(fn -> assert Swarm.ask(id, :ping) == :ok end)
+    assert Swarm.ask(id, :ping) == :ok
     assert Swarm.reset() == :ok
+    refute latched?(id)
     stop_supervised!(Task)
     refute Process.alive?(flood)
     {:message_queue_len, queued} = Process.info(link, :message_queue_len)
     assert queued < 100_000
-    IO.puts("\n  e-stop of a flooded robot #{took} us, ping #{asked} us, queued #{queued}")
   end
 
   defp pour(link, id) do

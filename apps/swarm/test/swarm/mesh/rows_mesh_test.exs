@@ -10,7 +10,7 @@ defmodule Swarm.RowsMeshTest do
     do: Cluster.call(node, Blackboard, :get, [robot, key, :infinity])
 
   defp news(node, what, robot) do
-    Enum.find(Cluster.call(node, Listener, :news, []), fn {news, _at_us} ->
+    Enum.find(Cluster.call(node, Listener, :news, []), fn news ->
       elem(news, 0) == what and elem(news, 1) == robot
     end)
   end
@@ -106,16 +106,14 @@ defmodule Swarm.RowsMeshTest do
              end)
     end
 
-    killed_us = System.os_time(:microsecond)
     Cluster.signal(two, "KILL")
-    {{:leave, _, :nodedown}, at_us} = eventually(fn -> news(one, :leave, two.name) end)
-    # Half a second on a busy machine; a silence would take four times as long.
-    assert at_us - killed_us < 500_000
+    # By its connection, that is, and not only by its silence.
+    assert {:leave, _, :nodedown} = eventually(fn -> news(one, :leave, two.name) end)
     Cluster.signal(three, "STOP")
-    assert {{:leave, _, :silent}, _} = eventually(fn -> news(one, :leave, three.name) end)
+    assert {:leave, _, :silent} = eventually(fn -> news(one, :leave, three.name) end)
     Cluster.signal(three, "CONT")
-    assert {{:join, _, %About{}}, _} = eventually(fn -> news(one, :join, three.name) end)
+    assert {:join, _, %About{}} = eventually(fn -> news(one, :join, three.name) end)
     back = Cluster.join(nodes, two.name, robots: true)
-    assert {{:join, _, %About{}}, _} = eventually(fn -> news(one, :join, back.name) end)
+    assert {:join, _, %About{}} = eventually(fn -> news(one, :join, back.name) end)
   end
 end
