@@ -13,7 +13,12 @@ defmodule Hal.MixProject do
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
       compilers: [:native | Mix.compilers()],
-      native: [programs: [newest_frame: ["newest_frame.c", "y4m.c"]]],
+      native: [
+        programs: [
+          newest_frame: ["newest_frame.c", "y4m.c"],
+          serial: ["serial.c", "serial_main.c"]
+        ]
+      ],
       elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
       deps: []

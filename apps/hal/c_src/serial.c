@@ -1,0 +1,693 @@
+/* One serial line of the Erlang VM, and what is said on it when the VM no longer can. Started as
+
+       serial --port DEVICE --speed BAUD | --pty LINK   [--last-words HEX] [--keep-alive MS]
+
+   it opens DEVICE raw, 8 data bits, no parity, one stop bit, no flow control, for itself alone; or
+   makes a new pseudo-terminal, and the symbolic link LINK to its other end. Packets on both sides have
+   a length of two bytes, most significant first, and begin with a letter. In come
+
+       'W' bytes       to write
+       'K'             a sign of life; 'W' and 'L' are signs of life too
+       'L' bytes       the last words from now on
+       'T' count:32    so many bytes of 'D' were taken
+       'C'             close: what waits is written, then the last words, then 'C' is answered
+
+   and out go
+
+       'O'             open; always the first, unless it is 'E'
+       'D' bytes       read
+       'T' count:32    so many bytes of 'W' are off to the line, or dropped
+       'E' reason      the line cannot be had, or is lost; nothing follows
+       'C'             closed; nothing follows
+
+   The last words are written when our input ends, on SIGTERM and SIGHUP, on 'C', and when no sign of
+   life came for MS milliseconds: then once, until there is a sign of life again. They do not wait
+   behind what would take longer than PATIENCE_MS to leave; that is thrown away, half a packet maybe,
+   so they should be such that whoever listens finds their beginning.
+
+   After 'E' and 'C' we wait for our input to end: were we gone, a write of the VM's could fail, and it
+   would take this for the news and not our packet.
+
+   Nothing here blocks but that waiting, and nothing grows: what the line does not take is kept up to
+   SERIAL_OUT_MOST bytes, and while the VM does not read, we do not either. */
+#define _GNU_SOURCE
+#include "serial.h"
+
+#include <asm/termbits.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
+#include <time.h>
+#include <unistd.h>
+
+#define PATIENCE_MS 20      /* what leaves in this time may go before the last words */
+#define WORDS_MS 200        /* the longest try to have the last words taken */
+#define CLOSE_MS 500        /* the longest that 'C' waits for what was written before, and for the end */
+#define FAREWELL_MS 1000    /* the longest that we stay after SIGTERM for the VM to hear of it */
+#define ABSENT_MS 10        /* how often a pty is asked whether somebody has opened its other end */
+#define SLAVE_MAJOR_FIRST 136
+#define SLAVE_MAJOR_LAST 143
+
+static struct {
+    const char *device, *link;
+    char slave[64];                     /* what the link leads to; empty when we have made none */
+    unsigned speed;
+    int64_t keep_alive_ms;
+    int fd;                             /* of the line; -1 when it is closed or lost */
+    int absent;                         /* nobody has the other end of our pty open */
+    int done;                           /* 'E' or 'C' was said */
+    uint8_t words[SERIAL_WORDS_MOST];
+    size_t words_length;
+    int64_t life_ms;
+    int spoken;                         /* since the last sign of life */
+    uint8_t in[2 + 65535];              /* packets of the VM */
+    size_t in_have;
+    uint8_t out[SERIAL_OUT_MOST];       /* for the line */
+    size_t out_have;
+    uint8_t up[8192];                   /* packets to the VM */
+    size_t up_have;
+    uint32_t unread, taken;
+} s;
+
+static volatile sig_atomic_t told_to_end;
+
+static void on_signal(int number)
+{
+    told_to_end = number;
+}
+
+static int64_t now_ms(void)
+{
+    struct timespec t;
+
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (int64_t)t.tv_sec * 1000 + t.tv_nsec / 1000000;
+}
+
+static void quit(int status)
+{
+    char to[sizeof s.slave];
+    ssize_t n = s.slave[0] ? readlink(s.link, to, sizeof to) : -1;
+
+    /* Somebody else may have put another one there. */
+    if (n == (ssize_t)strlen(s.slave) && memcmp(to, s.slave, (size_t)n) == 0)
+        unlink(s.link);
+    _exit(status);
+}
+
+/* ---- to the VM ---- */
+
+static void flush_up(void)
+{
+    while (s.up_have > 0) {
+        ssize_t n = write(STDOUT_FILENO, s.up, s.up_have);
+
+        if (n > 0) {
+            s.up_have -= (size_t)n;
+            memmove(s.up, s.up + n, s.up_have);
+        } else if (errno == EAGAIN) {
+            return;
+        } else if (errno != EINTR) {
+            s.up_have = 0;      /* the VM is gone, which our input will tell */
+        }
+    }
+}
+
+/* The caller sees to the room. */
+static void send_up(char letter, const void *body, size_t size)
+{
+    uint8_t *at = s.up + s.up_have;
+
+    at[0] = (uint8_t)((size + 1) >> 8);
+    at[1] = (uint8_t)(size + 1);
+    at[2] = (uint8_t)letter;
+    memcpy(at + 3, body, size);
+    s.up_have += 3 + size;
+    flush_up();
+}
+
+static int room_up(size_t size)
+{
+    return s.up_have + 3 + size <= sizeof s.up;
+}
+
+/* Says once what has become of the line, and lets go of it. */
+static void fail(const char *reason)
+{
+    if (s.done)
+        return;
+    s.done = 1;
+    if (s.fd >= 0)
+        close(s.fd);
+    s.fd = -1;
+    if (room_up(strlen(reason)))
+        send_up('E', reason, strlen(reason));
+}
+
+static const char *reason_of(int error)
+{
+    switch (error) {
+    case ENOENT: return "enoent";
+    case ENOTDIR: return "enoent";
+    case EACCES: return "eacces";
+    case EPERM: return "eacces";
+    case EBUSY: return "ebusy";
+    case EWOULDBLOCK: return "ebusy";
+    case EIO: return "eio";
+    case ENXIO: return "enxio";
+    case ENODEV: return "enodev";
+    case ENOTTY: return "enotty";
+    case EINVAL: return "einval";
+    case EISDIR: return "enotty";
+    case EEXIST: return "eexist";
+    default: return strerror(error);
+    }
+}
+
+/* ---- the line ---- */
+
+static void lost(void)
+{
+    fail("unplugged");
+}
+
+static void note_taken(size_t size)
+{
+    uint8_t count[4];
+
+    s.taken += (uint32_t)size;
+    /* With room left for a last packet. */
+    if (s.taken >= SERIAL_TAKEN_STEP && !s.done && room_up(sizeof count + 128)) {
+        for (int k = 0; k < 4; k++)
+            count[k] = (uint8_t)(s.taken >> (24 - 8 * k));
+        s.taken = 0;
+        send_up('T', count, sizeof count);
+    }
+}
+
+static int other_end_is_open(void)
+{
+    struct pollfd line = { .fd = s.fd };
+
+    return poll(&line, 1, 0) == 0 || !(line.revents & POLLHUP);
+}
+
+static void drop_out(void)
+{
+    size_t size = s.out_have;
+
+    s.out_have = 0;
+    note_taken(size);
+}
+
+static void flush_line(void)
+{
+    ioctl(s.fd, TCFLSH, TCOFLUSH);
+}
+
+/* A pty whose user went away keeps what that one did not read; the next one shall not get it. */
+static void look_for_user(void)
+{
+    int absent = !other_end_is_open();
+
+    if (absent && !s.absent) {
+        flush_line();
+        drop_out();
+    }
+    s.absent = absent;
+}
+
+/* Writes what the line takes now. With nobody at the other end, a pty is a cable that hangs in the air. */
+static void write_line(void)
+{
+    if (s.link && s.fd >= 0 && s.out_have > 0)
+        look_for_user();
+    if (s.absent)
+        drop_out();
+    while (s.fd >= 0 && s.out_have > 0) {
+        ssize_t n = write(s.fd, s.out, s.out_have);
+
+        if (n > 0) {
+            s.out_have -= (size_t)n;
+            memmove(s.out, s.out + n, s.out_have);
+            note_taken((size_t)n);
+        } else if (n < 0 && errno == EAGAIN) {
+            return;
+        } else if (n == 0 || errno != EINTR) {
+            lost();
+        }
+    }
+}
+
+/* How long the line needs for what the kernel holds. A pty says that it holds nothing. */
+static int64_t held_ms(void)
+{
+    int bytes = 0;
+
+    if (ioctl(s.fd, TIOCOUTQ, &bytes) != 0 || bytes <= 0)
+        return 0;
+    return (int64_t)bytes * 10 * 1000 / s.speed + 1;
+}
+
+static void speak(void)
+{
+    size_t said = 0;
+    int64_t until = now_ms() + WORDS_MS;
+    int flushed = 0;
+
+    if (s.fd < 0 || s.words_length == 0)
+        return;
+    if (s.link)
+        look_for_user();
+    if (s.absent)
+        return;
+    if (s.out_have > 0 || held_ms() > PATIENCE_MS) {
+        drop_out();
+        flush_line();
+        flushed = 1;
+    }
+    while (said < s.words_length) {
+        ssize_t n = write(s.fd, s.words + said, s.words_length - said);
+
+        if (n > 0) {
+            said += (size_t)n;
+        } else if (n < 0 && errno == EINTR) {
+            continue;
+        } else if (n < 0 && errno == EAGAIN && !flushed) {
+            flush_line();
+            flushed = 1;
+            said = 0;           /* their beginning may have been thrown away too */
+        } else if (n < 0 && errno == EAGAIN) {
+            struct pollfd line = { .fd = s.fd, .events = POLLOUT };
+            int64_t left = until - now_ms();
+
+            if (left <= 0)
+                return;
+            poll(&line, 1, (int)left);
+        } else {
+            lost();
+            return;
+        }
+    }
+}
+
+static void read_line(void)
+{
+    uint8_t bytes[4096];
+    ssize_t n = read(s.fd, bytes, sizeof bytes);
+
+    if (n > 0) {
+        s.unread += (uint32_t)n;
+        send_up('D', bytes, (size_t)n);
+    } else if (n < 0 && (errno == EAGAIN || errno == EINTR)) {
+        return;
+    } else if (s.link) {
+        look_for_user();
+    } else {
+        lost();
+    }
+}
+
+/* ---- opening ---- */
+
+static int make_raw(int fd)
+{
+    struct termios2 t;
+
+    if (ioctl(fd, TCGETS2, &t) != 0)
+        return -1;
+    t.c_iflag = IGNBRK | IGNPAR;
+    t.c_oflag = 0;
+    t.c_lflag = 0;
+    t.c_cflag = CS8 | CREAD | CLOCAL | BOTHER;
+    t.c_ispeed = t.c_ospeed = s.speed;
+    memset(t.c_cc, 0, sizeof t.c_cc);
+    t.c_cc[VMIN] = 1;
+    if (ioctl(fd, TCSETS2, &t) != 0 || ioctl(fd, TCGETS2, &t) != 0)
+        return -1;
+    /* Bytes are misread above some 4 %, of which the other side has its part. */
+    if ((t.c_cflag & CSIZE) != CS8 ||
+        llabs((long long)t.c_ospeed - (long long)s.speed) * 100 > 3LL * s.speed) {
+        errno = EINVAL;
+        return -1;
+    }
+    return 0;
+}
+
+static const char *open_device(void)
+{
+    struct stat about;
+
+    s.fd = open(s.device, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (s.fd < 0)
+        return reason_of(errno);
+    if (fstat(s.fd, &about) != 0)
+        return reason_of(errno);
+    if (!S_ISCHR(about.st_mode) || !isatty(s.fd))
+        return errno == EIO ? "eio" : "enotty";
+    if (flock(s.fd, LOCK_EX | LOCK_NB) != 0)
+        return reason_of(errno);
+
+    /* A pty would stay so after us, for as long as its master lives, and refuse us too the next time. */
+    unsigned number = major(about.st_rdev);
+
+    if ((number < SLAVE_MAJOR_FIRST || number > SLAVE_MAJOR_LAST) && ioctl(s.fd, TIOCEXCL) != 0)
+        return reason_of(errno);
+    if (make_raw(s.fd) != 0)
+        return errno == EINVAL ? "speed" : reason_of(errno);
+    /* Not what is on its way out: it may be the last words of who was here before. */
+    ioctl(s.fd, TCFLSH, TCIFLUSH);
+    return NULL;
+}
+
+/* Only a link that leads nowhere, left by one of us who was killed, is replaced. */
+static const char *make_link(const char *to)
+{
+    struct stat about;
+
+    if (symlink(to, s.link) != 0) {
+        if (errno != EEXIST)
+            return reason_of(errno);
+        if (lstat(s.link, &about) != 0 || !S_ISLNK(about.st_mode) || stat(s.link, &about) == 0)
+            return "eexist";
+        if (unlink(s.link) != 0 || symlink(to, s.link) != 0)
+            return reason_of(errno);
+    }
+    strcpy(s.slave, to);
+    return NULL;
+}
+
+static const char *open_pty(void)
+{
+    char slave[sizeof s.slave];
+
+    s.fd = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (s.fd < 0 || grantpt(s.fd) != 0 || unlockpt(s.fd) != 0 ||
+        ptsname_r(s.fd, slave, sizeof slave) != 0)
+        return reason_of(errno);
+
+    /* Opened once, so that the other end counts as closed until somebody comes. */
+    int other = open(slave, O_RDWR | O_NOCTTY | O_CLOEXEC);
+
+    if (other < 0 || make_raw(other) != 0)
+        return reason_of(errno);
+    close(other);
+    s.absent = 1;
+    return make_link(slave);
+}
+
+/* ---- from the VM ---- */
+
+static void alive(void)
+{
+    s.life_ms = now_ms();
+    s.spoken = 0;
+}
+
+static void wait_until_sent(int64_t until)
+{
+    int64_t held;
+
+    while (s.fd >= 0 && (held = held_ms()) > 0 && now_ms() < until)
+        poll(NULL, 0, held < 10 ? (int)held : 10);
+}
+
+static void close_line(void)
+{
+    int64_t until = now_ms() + CLOSE_MS;
+
+    write_line();
+    while (s.fd >= 0 && s.out_have > 0 && now_ms() < until) {
+        struct pollfd line = { .fd = s.fd, .events = POLLOUT };
+
+        poll(&line, 1, 10);
+        write_line();
+    }
+    speak();
+    wait_until_sent(until);
+    if (s.done)
+        return;
+    s.done = 1;
+    close(s.fd);
+    s.fd = -1;
+    if (room_up(0))
+        send_up('C', "", 0);
+}
+
+static void take_packet(const uint8_t *packet, size_t size)
+{
+    if (size == 0 || s.fd < 0)
+        return;
+    const uint8_t *body = packet + 1;
+
+    size--;
+    switch (packet[0]) {
+    case 'W':
+        alive();
+        if (size > sizeof s.out - s.out_have) {
+            note_taken(size);   /* the VM would have to know better */
+        } else {
+            memcpy(s.out + s.out_have, body, size);
+            s.out_have += size;
+            write_line();
+        }
+        break;
+    case 'K':
+        alive();
+        break;
+    case 'L':
+        alive();
+        if (size <= sizeof s.words) {
+            memcpy(s.words, body, size);
+            s.words_length = size;
+        }
+        break;
+    case 'T':
+        if (size == 4) {
+            uint32_t count = (uint32_t)body[0] << 24 | (uint32_t)body[1] << 16 |
+                             (uint32_t)body[2] << 8 | body[3];
+
+            s.unread -= count < s.unread ? count : s.unread;
+        }
+        break;
+    case 'C':
+        close_line();
+        break;
+    }
+}
+
+/* 0 when the input has ended. */
+static int read_vm(void)
+{
+    ssize_t n = read(STDIN_FILENO, s.in + s.in_have, sizeof s.in - s.in_have);
+    size_t at = 0;
+
+    if (n < 0 && (errno == EINTR || errno == EAGAIN))
+        return 1;
+    if (n <= 0)
+        return 0;
+    s.in_have += (size_t)n;
+    while (s.in_have - at >= 2) {
+        size_t size = (size_t)s.in[at] << 8 | s.in[at + 1];
+
+        if (s.in_have - at - 2 < size)
+            break;
+        take_packet(s.in + at + 2, size);
+        at += 2 + size;
+    }
+    s.in_have -= at;
+    memmove(s.in, s.in + at, s.in_have);
+    return 1;
+}
+
+/* ---- the program ---- */
+
+static int hex_digit(char c)
+{
+    const char *digits = "0123456789ABCDEF", *at = c ? strchr(digits, c) : NULL;
+
+    return at ? (int)(at - digits) : -1;
+}
+
+static int parse_words(const char *hex)
+{
+    size_t length = strlen(hex);
+
+    if (length % 2 != 0 || length / 2 > sizeof s.words)
+        return -1;
+    for (size_t k = 0; k < length / 2; k++) {
+        int high = hex_digit(hex[2 * k]), low = hex_digit(hex[2 * k + 1]);
+
+        if (high < 0 || low < 0)
+            return -1;
+        s.words[k] = (uint8_t)(high << 4 | low);
+    }
+    s.words_length = length / 2;
+    return 0;
+}
+
+static int parse_number(const char *text, long most, long *number)
+{
+    char *end;
+
+    errno = 0;
+    *number = strtol(text, &end, 10);
+    return *text != 0 && *end == 0 && errno == 0 && *number >= 1 && *number <= most ? 0 : -1;
+}
+
+static int parse(int argc, char **argv)
+{
+    long number;
+
+    s.speed = 115200;
+    s.keep_alive_ms = 200;
+    if (argc % 2 != 1)
+        return -1;
+    for (int k = 1; k < argc; k += 2) {
+        const char *value = argv[k + 1];
+
+        if (strcmp(argv[k], "--port") == 0) {
+            s.device = value;
+        } else if (strcmp(argv[k], "--pty") == 0) {
+            s.link = value;
+        } else if (strcmp(argv[k], "--speed") == 0) {
+            if (parse_number(value, INT_MAX, &number) != 0)
+                return -1;
+            s.speed = (unsigned)number;
+        } else if (strcmp(argv[k], "--keep-alive") == 0) {
+            if (parse_number(value, INT_MAX, &number) != 0)
+                return -1;
+            s.keep_alive_ms = number;
+        } else if (strcmp(argv[k], "--last-words") == 0) {
+            if (parse_words(value) != 0)
+                return -1;
+        } else {
+            return -1;
+        }
+    }
+    return !s.device != !s.link ? 0 : -1;
+}
+
+static void listen_to_signals(sigset_t *while_waiting)
+{
+    struct sigaction end = { .sa_handler = on_signal };
+    sigset_t ours;
+
+    sigemptyset(&ours);
+    sigaddset(&ours, SIGTERM);
+    sigaddset(&ours, SIGHUP);
+    sigprocmask(SIG_BLOCK, &ours, while_waiting);
+    sigdelset(while_waiting, SIGTERM);
+    sigdelset(while_waiting, SIGHUP);
+    sigaction(SIGTERM, &end, NULL);
+    sigaction(SIGHUP, &end, NULL);
+    signal(SIGPIPE, SIG_IGN);
+    signal(SIGINT, SIG_IGN);    /* a key pressed in the VM's terminal is meant for the VM */
+}
+
+/* Until when we may wait; none: INT64_MAX. */
+static int64_t next_ms(void)
+{
+    int64_t at = INT64_MAX;
+
+    if (s.fd >= 0 && s.words_length > 0 && !s.spoken)
+        at = s.life_ms + s.keep_alive_ms;
+    if (s.fd >= 0 && s.absent && at > now_ms() + ABSENT_MS)
+        at = now_ms() + ABSENT_MS;
+    return at;
+}
+
+/* Waits for what comes next, and carries it out. 0 when the VM is gone. */
+static int turn(const sigset_t *while_waiting)
+{
+    int64_t at = next_ms(), left = at - now_ms();
+    struct timespec timeout = { 0 };
+
+    if (at != INT64_MAX && left > 0) {
+        timeout.tv_sec = left / 1000;
+        timeout.tv_nsec = left % 1000 * 1000000;
+    }
+    /* Data is read only into an empty buffer, so that there is always room for a last packet. */
+    int reading = s.up_have == 0 && s.unread < SERIAL_UNREAD_MOST;
+    short wishes = (short)((reading ? POLLIN : 0) | (s.out_have > 0 ? POLLOUT : 0));
+    struct pollfd fds[3] = {
+        { .fd = STDIN_FILENO, .events = POLLIN },
+        { .fd = s.absent ? -1 : s.fd, .events = wishes },
+        { .fd = s.up_have > 0 ? STDOUT_FILENO : -1, .events = POLLOUT },
+    };
+
+    if (ppoll(fds, 3, at == INT64_MAX ? NULL : &timeout, while_waiting) < 0)
+        return errno == EINTR;
+    if (fds[0].revents && !read_vm())
+        return 0;
+    if (fds[2].revents)
+        flush_up();
+    note_taken(0);
+    if (s.fd >= 0 && s.absent) {
+        look_for_user();
+        if (reading && s.up_have == 0)
+            read_line();        /* what the last one said before it went */
+    }
+    if (s.fd >= 0 && (fds[1].revents & POLLOUT))
+        write_line();
+    if (s.fd >= 0 && (fds[1].revents & (POLLIN | POLLHUP | POLLERR))) {
+        if (reading && s.up_have == 0)
+            read_line();
+        else if (fds[1].revents & (POLLHUP | POLLERR))
+            s.link ? look_for_user() : lost();
+    }
+    /* Last, so that a sign of life that was waiting for us counts. */
+    if (s.words_length > 0 && !s.spoken && now_ms() >= s.life_ms + s.keep_alive_ms) {
+        s.spoken = 1;
+        speak();
+    }
+    return 1;
+}
+
+int serial_run(int argc, char **argv)
+{
+    sigset_t while_waiting;
+    const char *reason;
+
+    s.fd = -1;
+    if (parse(argc, argv) != 0) {
+        fprintf(stderr, "usage: serial --port DEVICE | --pty LINK  [--speed BAUD] [--last-words HEX]"
+                        " [--keep-alive MS]\n");
+        return 2;
+    }
+    listen_to_signals(&while_waiting);
+    fcntl(STDOUT_FILENO, F_SETFL, fcntl(STDOUT_FILENO, F_GETFL) | O_NONBLOCK);
+    reason = s.link ? open_pty() : open_device();
+    if (reason) {
+        fail(reason);
+    } else {
+        send_up('O', "", 0);
+        alive();
+    }
+    while (!told_to_end)
+        if (!turn(&while_waiting)) {
+            speak();
+            quit(0);
+        }
+    speak();
+    fail("terminated");
+    for (int64_t until = now_ms() + FAREWELL_MS; now_ms() < until;) {
+        struct pollfd input = { .fd = STDIN_FILENO, .events = POLLIN };
+
+        if (poll(&input, 1, 10) > 0 && !read_vm())
+            break;
+        flush_up();
+    }
+    quit(128 + told_to_end);
+    return 0;
+}

@@ -1,0 +1,6 @@
+#include "serial.h"
+
+int main(int argc, char **argv)
+{
+    return serial_run(argc, argv);
+}

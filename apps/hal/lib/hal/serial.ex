@@ -1,0 +1,210 @@
+defmodule Hal.Serial do
+  @moduledoc """
+  A serial line: raw bytes, 8 data bits, no parity, one stop bit, no flow control. Where a packet begins
+  and ends is for whoever knows the protocol.
+
+      {:ok, line} = Hal.Serial.open(port: "/dev/ttyS0", speed: 115_200, last_words: stop)
+      :ok = Hal.Serial.write(line, bytes)
+
+      receive do
+        message ->
+          case Hal.Serial.handle(line, message) do
+            {:data, bytes} -> ...
+            {:error, reason} -> ...   # the line is of no more use: close it
+            :unknown -> ...           # not for us
+          end
+      end
+
+      :ok = Hal.Serial.close(line)
+
+  A line belongs to the process that opened it, which gets its messages, and ends with it. That process
+  traps exits, as `Hal.Device` does, to see a line that is killed as an error.
+
+  ## Options
+
+  | option | allowed | default |
+  |---|---|---|
+  | `:port` | path of a device | this or `:pty` must be given |
+  | `:pty` | path of a link that is made, to the other end of a new pseudo-terminal | |
+  | `:speed` | baud, 1 to 20,000,000 | `115_200` |
+  | `:last_words` | binary of at most 1024 bytes | `<<>>`: none |
+  | `:keep_alive_ms` | 10 to 60,000 | `200` |
+  | `:module` | `Hal.Serial.Port` or `Hal.Serial.Circuits` (only `:port`) | `Hal.Serial.Port` |
+
+  ## Last words
+
+  What the line is to hear when nobody is there to say it: a stop. They are written when the line is
+  closed, when its process or the whole VM ends, in whatever way, and when there was no sign of life for
+  `:keep_alive_ms`: then once, until there is one. Signs of life are `write/2`, `last_words/2` and
+  `keep_alive/1`. Bytes that were written before and would hold them up for more than 20 ms are thrown
+  away, so before the last words half a packet may stand. What this is worth without our port program,
+  see `Hal.Serial.Circuits`.
+
+  ## Much at once
+
+  At most 4096 bytes that the line has not taken are kept. A write that does not fit is not done at all,
+  and gives `{:error, :overrun}`: a command that comes late is worth nothing, and nobody waits. The line
+  is still good then. Who does not take the bytes that come holds up the line, and it loses bytes as
+  a serial line does; nothing grows. Taking a message means giving it to `handle/2`.
+
+  ## A pseudo-terminal
+
+  With `:pty`, whoever opens the link is at the other end, comes and goes as he likes; what is written
+  meanwhile is lost. The link is removed at the end. It replaces one that leads nowhere, and nothing else.
+  """
+  alias Hal.Serial.{Line, Port}
+
+  @most_words 1024
+  @defaults [speed: 115_200, last_words: <<>>, keep_alive_ms: 200, module: Port]
+  @keys [:port, :pty | Keyword.keys(@defaults)]
+
+  @enforce_keys [:module, :line, :name]
+  defstruct @enforce_keys
+
+  @type t :: %__MODULE__{module: module(), line: Line.t(), name: String.t()}
+  @type reason :: Line.reason()
+
+  @doc """
+  Opens a line; its messages come to the calling process. Wrong options raise `ArgumentError`;
+  `options/1` tells beforehand. For the errors see `explain/2`.
+  """
+  @spec open(keyword()) :: {:ok, t()} | {:error, reason()}
+  def open(options) do
+    case options(options) do
+      {:ok, options} ->
+        with {:ok, line} <- options[:module].open(options) do
+          name = options[:port] || options[:pty]
+          {:ok, %__MODULE__{module: options[:module], line: line, name: name}}
+        end
+
+      {:error, line} ->
+        raise ArgumentError, line
+    end
+  end
+
+  @doc "Writes bytes, without waiting. `{:error, :overrun}`: nothing was written, the line is behind."
+  @spec write(t(), iodata()) :: :ok | {:error, reason()}
+  def write(%__MODULE__{} = t, bytes), do: t.module.write(t.line, bytes)
+
+  @doc "Changes the last words; `<<>>` for none. `{:error, :einval}`: they are longer than 1024 bytes."
+  @spec last_words(t(), binary()) :: :ok | {:error, reason()}
+  def last_words(%__MODULE__{} = t, words) when byte_size(words) <= @most_words,
+    do: t.module.last_words(t.line, words)
+
+  def last_words(%__MODULE__{}, words) when is_binary(words), do: {:error, :einval}
+
+  @doc "Says that whoever drives is well, though it has nothing to write."
+  @spec keep_alive(t()) :: :ok | {:error, reason()}
+  def keep_alive(%__MODULE__{} = t), do: t.module.keep_alive(t.line)
+
+  @doc """
+  Writes what still waits and the last words, sees that they get out, at most a second or so, and closes.
+  Messages of the line that were not taken are gone. A line that is closed or lost may be closed again.
+  """
+  @spec close(t()) :: :ok
+  def close(%__MODULE__{} = t), do: t.module.close(t.line)
+
+  @doc "What a message of the mailbox says. After an error the line is of no more use, and is to be closed."
+  @spec handle(t(), message :: term()) :: {:data, binary()} | {:error, reason()} | :unknown
+  def handle(%__MODULE__{} = t, message), do: t.module.handle(t.line, message)
+
+  @doc """
+  Checks options and fills in what is missing; or says in a line what is wrong.
+
+      iex> Hal.Serial.options(port: "/dev/ttyS0", speed: 0)
+      {:error, "serial option :speed cannot be 0: it must be a whole number of baud from 1 to 20000000"}
+  """
+  @spec options(keyword()) :: {:ok, keyword()} | {:error, String.t()}
+  def options(options) do
+    with :ok <- check_keys(options),
+         options = Keyword.merge(@defaults, options),
+         :ok <- check_all(options),
+         do: check_ends(options)
+  end
+
+  @doc """
+  An error in one line for people.
+
+      iex> Hal.Serial.explain(:enoent, "/dev/ttyR0")
+      "/dev/ttyR0: no such device"
+  """
+  @spec explain(reason(), port :: String.t()) :: String.t()
+  def explain(reason, port), do: "#{port}: #{words(reason)}"
+
+  defp words(:enoent), do: "no such device"
+
+  defp words(:eacces),
+    do:
+      "permission denied (serial devices are for the group dialout: adduser USER dialout, and log in again)"
+
+  defp words(:ebusy), do: "another program uses it"
+  defp words(:eio), do: "there is no hardware behind it"
+  defp words(reason) when reason in [:enodev, :enxio], do: "there is no device behind it"
+  defp words(:enotty), do: "not a serial device"
+  defp words(:einval), do: "the device refuses the settings"
+  defp words(:eexist), do: "there is something of this name, which is not replaced"
+  defp words(:speed), do: "the device cannot do this speed"
+  defp words(:unplugged), do: "unplugged"
+  defp words(:terminated), do: "the port program was told to end"
+  defp words(:overrun), do: "the line cannot take so much at once"
+  defp words(:closed), do: "closed"
+  defp words(:timeout), do: "no answer"
+  defp words({:os, words}), do: words
+  defp words({:exit, status}), do: "the port program ended (#{inspect(status)})"
+  defp words(other), do: inspect(other)
+
+  defp check_keys(options) do
+    cond do
+      not Keyword.keyword?(options) ->
+        {:error, "serial options cannot be #{show(options)}: they must be a keyword list"}
+
+      unknown = Enum.find(Keyword.keys(options), &(&1 not in @keys)) ->
+        {:error, "there is no serial option #{show(unknown)}: allowed are #{allowed()}"}
+
+      true ->
+        :ok
+    end
+  end
+
+  defp allowed, do: Enum.map_join(@keys, ", ", &inspect/1)
+
+  defp check_all(options) do
+    Enum.find_value(options, :ok, fn {key, value} ->
+      if not valid?(key, value), do: wrong(key, value, rule(key))
+    end)
+  end
+
+  defp check_ends(options) do
+    case {options[:port], options[:pty], options[:module]} do
+      {nil, nil, _} -> {:error, "serial option :port is missing: it must be the path of a device"}
+      {_, nil, _} -> {:ok, options}
+      {nil, _, Port} -> {:ok, options}
+      {nil, _, module} -> wrong(:module, module, "Hal.Serial.Port where there is a :pty")
+      {_, pty, _} -> wrong(:pty, pty, "left out where there is a :port")
+    end
+  end
+
+  defp valid?(key, path) when key in [:port, :pty],
+    do: is_binary(path) and byte_size(path) in 1..4095 and not String.contains?(path, <<0>>)
+
+  defp valid?(:speed, speed), do: is_integer(speed) and speed in 1..20_000_000
+  defp valid?(:keep_alive_ms, ms), do: is_integer(ms) and ms in 10..60_000
+  defp valid?(:last_words, words), do: is_binary(words) and byte_size(words) <= @most_words
+
+  defp valid?(:module, module),
+    do: is_atom(module) and Code.ensure_loaded?(module) and function_exported?(module, :open, 1)
+
+  defp rule(key) when key in [:port, :pty], do: "a path"
+  defp rule(:speed), do: "a whole number of baud from 1 to 20000000"
+  defp rule(:keep_alive_ms), do: "a whole number of milliseconds from 10 to 60000"
+  defp rule(:last_words), do: "a binary of at most #{@most_words} bytes"
+
+  defp rule(:module),
+    do: "Hal.Serial.Port, or Hal.Serial.Circuits where circuits_uart is (MIX_TARGET)"
+
+  defp wrong(key, value, rule),
+    do: {:error, "serial option #{inspect(key)} cannot be #{show(value)}: it must be #{rule}"}
+
+  # One line, however much there is.
+  defp show(value), do: inspect(value, limit: 20, printable_limit: 60, width: :infinity)
+end
