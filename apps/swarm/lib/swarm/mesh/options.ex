@@ -35,7 +35,22 @@ defmodule Swarm.Mesh.Options do
 
   defstruct Keyword.keys(@defaults) ++ [started: []]
 
-  @type t :: %__MODULE__{}
+  @typedoc "Checked: `started` are the strategies with their states, and nothing that is needed is `nil` any more."
+  @type t :: %__MODULE__{
+          secret: Secret.t(),
+          secret_file: Path.t() | nil,
+          fleet: [atom(), ...],
+          interface: :inet.ip4_address(),
+          port: :inet.port_number(),
+          multicast: Strategy.address() | false,
+          peers: [Strategy.address() | String.t()],
+          strategies: [{module(), term()}],
+          topologies: keyword(),
+          dist_port: :inet.port_number(),
+          full_mesh: pos_integer(),
+          degree: pos_integer(),
+          started: [{module(), state :: term()}]
+        }
 
   @doc "Checks options; an error is one line that names the option and what is allowed."
   @spec new(keyword()) :: {:ok, t()} | {:error, String.t()}

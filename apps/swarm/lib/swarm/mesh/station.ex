@@ -13,16 +13,13 @@ defmodule Swarm.Mesh.Station do
   | `{:learn, name, ip, port}` | where a node's distribution listens |
   | `{:event, name, metadata}` | for whoever logs |
   """
-  alias Swarm.Mesh.{Beacon, Book, Guard, Packet, Roster}
+  alias Swarm.Mesh.{Beacon, Book, Guard, Intake, Packet, Roster}
   alias Swarm.Message
 
-  @services [:rows, :hints, :stop]
   # Without a heartbeat of a robot of its own a node shows as often by beacons that it is there.
   @beat_ms 200
   # An answer to a stranger, no more often than this for each.
   @answer_ms 20
-  # So many datagrams of unknown origin are looked into a second.
-  @strange_per_second 2_000
 
   @enforce_keys [:secret, :roster, :name, :session, :guard, :book, :strategies, :port]
   defstruct @enforce_keys ++
@@ -46,7 +43,29 @@ defmodule Swarm.Mesh.Station do
           | {:node, :up | :suspect | :gone, node()}
           | {:learn, String.t(), :inet.ip4_address(), :inet.port_number()}
           | {:event, atom(), map()}
-  @type t :: %__MODULE__{}
+  @typedoc """
+  `group` is the multicast address that heartbeats go to besides, `links` to whom the distribution is connected,
+  `spoke_ms` when a robot of this node was last heard by all, `answered` when a stranger last got an answer;
+  `second` is the one in which `strange` counts what nobody of the fleet has signed.
+  """
+  @type t :: %__MODULE__{
+          secret: Swarm.Mesh.Secret.t(),
+          roster: Roster.t(),
+          name: String.t(),
+          session: non_neg_integer(),
+          guard: Guard.t(),
+          book: Book.t(),
+          strategies: [{module(), state :: term()}],
+          port: :inet.port_number(),
+          group: address() | nil,
+          sequence: non_neg_integer(),
+          links: [String.t()],
+          spoke_ms: integer() | nil,
+          answered: %{String.t() => integer()},
+          second: integer(),
+          strange: non_neg_integer(),
+          rejected: %{atom() => pos_integer()}
+        }
 
   @doc """
   A station; `session` is random and new with each start, `strategies` are `{module, state}`, `group`
@@ -77,15 +96,8 @@ defmodule Swarm.Mesh.Station do
   def hear(station, datagram, address, now_ms) do
     station = count_anew(station, div(now_ms, 1_000))
 
-    with :ok <- original(Packet.peek(datagram), station.guard),
-         :ok <- patience(station, address),
-         {:ok, packet} <- Packet.open(datagram, station.secret.key),
-         :ok <- foreign(packet, station),
-         {:ok, node} <- known(packet.sender, station.roster),
-         {:ok, term} <- Packet.unpack(packet.payload),
-         {:ok, body} <- body(packet.kind, term, station) do
-      admit(station, packet, node, body, address, now_ms)
-    else
+    case Intake.read(station, datagram, address) do
+      {:ok, packet, node, body} -> admit(station, packet, node, body, address, now_ms)
       {:error, :own} -> {station, []}
       {:error, reason} -> reject(station, reason, address, now_ms)
     end
@@ -149,61 +161,6 @@ defmodule Swarm.Mesh.Station do
 
   defp count_anew(%{second: second} = station, second), do: station
   defp count_anew(station, second), do: %{station | second: second, strange: 0}
-
-  # Garbage costs a signature each; beyond a measure only those who are known are listened to.
-  defp patience(station, address) do
-    if station.strange < @strange_per_second or address in Book.addresses(station.book),
-      do: :ok,
-      else: {:error, :throttled}
-  end
-
-  defp foreign(%{sender: name, session: session}, %{name: name, session: session}),
-    do: {:error, :own}
-
-  defp foreign(_packet, _station), do: :ok
-
-  defp known(name, roster) do
-    case Roster.node(roster, name) do
-      {:ok, node} -> {:ok, node}
-      :error -> {:error, {:unknown_node, name}}
-    end
-  end
-
-  # Half of all datagrams are copies, one by multicast and one by name: those cost no signature.
-  defp original({:ok, {name, session, sequence}}, guard) do
-    if Guard.copy?(guard, name, session, sequence), do: {:error, :doubled}, else: :ok
-  end
-
-  defp original(:error, _guard), do: :ok
-
-  defp body(:beacon, term, station) do
-    case Beacon.check(term) do
-      {:ok, beacon} -> {:ok, Beacon.known(beacon, station.roster.nodes)}
-      :error -> {:error, :beacon}
-    end
-  end
-
-  defp body(:message, {to, message}, station) do
-    with true <- to == :all or Swarm.Shape.names?(to),
-         {:ok, %Message{} = message} <- Message.check(message),
-         true <- ours?(message, station.roster) || :unknown_robot do
-      {:ok, {to, message}}
-    else
-      :unknown_robot -> {:error, :unknown_robot}
-      _malformed -> {:error, :message}
-    end
-  end
-
-  defp body(:service, {service, term}, _station) when service in @services,
-    do: {:ok, {service, term}}
-
-  defp body(kind, _other, _station), do: {:error, kind}
-
-  # Of one that is passed on its first sender, too.
-  defp ours?(%Message{kind: :relay, from: from, body: inner}, roster),
-    do: Roster.robot?(roster, from) and ours?(inner, roster)
-
-  defp ours?(%Message{from: from}, roster), do: Roster.robot?(roster, from)
 
   defp admit(station, packet, node, body, address, now_ms) do
     told =
