@@ -21,6 +21,7 @@ defmodule Hal.Event do
   | `[:robot, :pilot, :phase]` | `at_ms` | `robot`, `state`: `:idle` or `{mission, phase}` |
   | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and what the mission adds |
   | `[:swarm, :mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): a node was not let in, or would not have us |
+  | `[:swarm, :part, :fell]` | `at_ms` | `id`, `reason`: a part of the node; it starts again |
   | `[:swarm, :link, :duplicate_id]` | | `robot`, `other`: a robot of this name was there before; this one is silent |
   | `[:swarm, :mesh, :up]`, `[:swarm, :mesh, :suspect]`, `[:swarm, :mesh, :gone]` | `at_ms` | `node`: by datagrams |
   | `[:swarm, :mesh, :connected]`, `[:swarm, :mesh, :disconnected]` | `at_ms` | `node`: by Erlang's distribution |

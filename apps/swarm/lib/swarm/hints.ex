@@ -110,7 +110,9 @@ defmodule Swarm.Hints do
       dropped: 0
     }
 
-    {:ok, schedule(s)}
+    # One that starts anew among others asks at once for what it has lost.
+    unless s.repair_ms == :never, do: send(self(), :repair)
+    {:ok, s}
   end
 
   # It has a name that connected nodes can send to, so anything may come here.

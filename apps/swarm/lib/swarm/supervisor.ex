@@ -4,7 +4,7 @@ defmodule Swarm.Supervisor do
 
       Swarm.Supervisor (no restarts to give)
       |-- Robot.Names            who is who on this node
-      |-- Swarm.Supervisor.Parts (one_for_one)
+      |-- Swarm.Supervisor.Parts (one_for_one), each in the care of a Swarm.Supervisor.Tireless
       |   |-- Swarm.Directory    who is where in the fleet
       |   |-- Swarm.Blackboard   what the robots of the fleet tell of themselves
       |   |-- Swarm.Hints        what robots leave for each other
@@ -13,7 +13,8 @@ defmodule Swarm.Supervisor do
       |   `-- Swarm.Mesh.Supervisor  the other nodes, where there is a mesh
       `-- Robot.Fleet            the robots
 
-  Robots do without the directory: they drive on, and enter a new one by themselves. A fleet that
+  Robots do without these parts: they drive on, and enter a new directory by themselves. However
+  often a part falls, it is started again, and no robot ends for it. A fleet that
   ended, and names that are gone, cannot be replaced by empty ones, under which the node would look
   well without its robots: then the application ends, and the machine's supervisor starts it afresh.
   """
@@ -22,6 +23,7 @@ defmodule Swarm.Supervisor do
   defmodule Parts do
     @moduledoc false
     use Supervisor
+    alias Swarm.Supervisor.Tireless
 
     @doc false
     def start_link(options), do: Supervisor.start_link(__MODULE__, options)
@@ -38,7 +40,8 @@ defmodule Swarm.Supervisor do
         Swarm.Alarm | mesh
       ]
 
-      Supervisor.init(children, strategy: :one_for_one, max_restarts: 5, max_seconds: 5)
+      tireless = for child <- children, do: {Tireless, child}
+      Supervisor.init(tireless, strategy: :one_for_one, max_restarts: 5, max_seconds: 5)
     end
   end
 
