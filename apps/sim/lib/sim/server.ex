@@ -8,8 +8,8 @@ defmodule Sim.Server do
   given when it attached (`Sim.View`). A message to a device is `{:world, server, what}` with
   `{:readings, sent_ms, list}`, `{:ground, ground}`, `{:view, moving}` or `{:error, :unknown_robot}`.
 
-  Devices may be on other nodes. Nothing here ever waits for one of them: what cannot be sent at
-  once is lost, and what comes late is old (`Sim.Lateness`).
+  Devices may be on other nodes. Nothing here waits for one of them once it is attached: what cannot be
+  sent at once is lost, and what comes late is old (`Sim.Lateness`).
 
   Wheels stand when the process of their drive ends, and also when no speed has come for 500 ms: that is
   the body's own watchdog, for a robot that is frozen and can tell nothing any more.

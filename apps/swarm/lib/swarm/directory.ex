@@ -8,7 +8,9 @@ defmodule Swarm.Directory do
   | `{:robot, :mag1}` | the link of that robot |
   | `{:brake, :mag1}` | its brake |
   | `:robots`, `:brakes` | the links of all robots, their brakes |
-  | `{:team, :blue}`, `{:service, :camera}` | whoever entered |
+  | `{:team, :blue}` | whoever entered |
+  | `{:service, :camera}`, `{:service, :camera, :mag1}` | who offers it (`Swarm.Responder`); that of one robot |
+  | `{:topic, :poses}` | who wants to be told (`Swarm.Topic`) |
 
   A directory that restarts is empty, and one that is down cannot be entered: who entered watches
   it (`monitor/0`), and enters again.
@@ -21,6 +23,8 @@ defmodule Swarm.Directory do
           | {:brake, atom()}
           | {:team, atom()}
           | {:service, atom()}
+          | {:service, atom(), robot :: atom()}
+          | {:topic, atom() | String.t()}
 
   @doc "The scope as a child."
   @spec child_spec(term()) :: Supervisor.child_spec()

@@ -23,7 +23,7 @@ defmodule Swarm.Entry do
   defstruct @enforce_keys ++ [scope: nil, retry_ms: @retry_ms, left?: false]
 
   @type t :: %__MODULE__{
-          groups: [Directory.group() | tuple()],
+          groups: [Directory.group()],
           token: reference(),
           scope: reference() | nil,
           retry_ms: pos_integer(),
@@ -31,7 +31,7 @@ defmodule Swarm.Entry do
         }
 
   @doc "Enters the calling process into these groups, now or as soon as there is a directory."
-  @spec enter([Directory.group() | tuple()]) :: t()
+  @spec enter([Directory.group()]) :: t()
   def enter(groups), do: try_to(%__MODULE__{groups: groups, token: make_ref()})
 
   @doc "Whether the process is in its groups now."

@@ -1,6 +1,7 @@
 defmodule Swarm.Envelope do
   @moduledoc """
-  What programs on robots write to each other: what is meant, by whom, in which conversation. Pure.
+  What programs on robots write to each other: what is meant, by whom, in which conversation. Pure, but for
+  the reference that a new conversation is given.
 
   Robots' own talk (heartbeats, rounds) is `Swarm.Message`. An envelope is for everything else: a
   service asks another, a mission hands out tasks, a topic tells its news. `check/1` is the one door

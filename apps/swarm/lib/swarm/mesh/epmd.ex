@@ -70,6 +70,7 @@ defmodule Swarm.Mesh.Epmd do
   # What Erlang asks of an epmd module.
 
   @doc false
+  @spec start_link() :: GenServer.on_start()
   def start_link, do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
 
   @impl GenServer
@@ -82,12 +83,16 @@ defmodule Swarm.Mesh.Epmd do
   end
 
   @doc false
+  @spec listen_port_please(text(), text()) :: {:ok, :inet.port_number()}
   def listen_port_please(name, _host), do: {:ok, Peers.own_port(to_string(name), environment())}
 
   @doc false
+  @spec register_node(text(), :inet.port_number()) :: {:ok, creation :: pos_integer()}
   def register_node(name, port), do: register_node(name, port, :inet)
 
   @doc false
+  @spec register_node(text(), :inet.port_number(), family :: atom()) ::
+          {:ok, creation :: pos_integer()}
   def register_node(name, port, _family) do
     if :ets.whereis(@table) != :undefined, do: insert({{:own, to_string(name)}, nil, port})
     # Tells one life of a node from the next, as epmd would; 0 to 3 have a meaning of their own.
@@ -95,6 +100,8 @@ defmodule Swarm.Mesh.Epmd do
   end
 
   @doc false
+  @spec address_please(text(), text(), family :: atom()) ::
+          {:ok, :inet.ip_address(), :inet.port_number(), version :: 5} | {:error, :address}
   def address_please(name, host, family) do
     {name, host} = {to_string(name), to_string(host)}
 
@@ -111,9 +118,13 @@ defmodule Swarm.Mesh.Epmd do
   end
 
   @doc false
+  @spec port_please(text(), text() | :inet.ip_address()) ::
+          {:port, :inet.port_number(), version :: 5}
   def port_please(name, host), do: port_please(name, host, :infinity)
 
   @doc false
+  @spec port_please(text(), text() | :inet.ip_address(), timeout()) ::
+          {:port, :inet.port_number(), version :: 5}
   def port_please(name, host, _timeout) do
     text = to_string(name) <> "@" <> if(is_tuple(host), do: "", else: to_string(host))
 
@@ -124,9 +135,11 @@ defmodule Swarm.Mesh.Epmd do
   end
 
   @doc false
+  @spec names() :: {:ok, [{charlist(), :inet.port_number()}]}
   def names, do: names(own_host())
 
   @doc false
+  @spec names(text() | :inet.ip_address()) :: {:ok, [{charlist(), :inet.port_number()}]}
   def names(host) do
     host = if is_tuple(host), do: to_string(:inet.ntoa(host)), else: to_string(host)
     rows = if :ets.whereis(@table) == :undefined, do: [], else: :ets.tab2list(@table)
