@@ -4,4 +4,5 @@ defmodule HalTest do
   doctest Hal.Twist
   doctest Hal.Frame
   doctest Hal.Profile
+  doctest Hal.Suggest
 end

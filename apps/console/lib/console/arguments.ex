@@ -6,7 +6,7 @@ defmodule Console.Arguments do
   repeated, and for errors that say what is allowed. An option is `{name, hint, check, help}`: `hint`
   is how its value is shown in the help, or `nil` for a switch; `check` turns the text into the value.
   """
-  alias Console.Suggest
+  alias Hal.Suggest
 
   @type check :: (String.t() -> {:ok, term()} | {:error, allowed :: String.t()})
   @type option ::

@@ -3,7 +3,8 @@ defmodule Console.Options do
   What `mix demo` is told, checked once at the door. Pure; the options are one table, from which
   the help is made too.
   """
-  alias Console.{Arguments, Fleet, Suggest, Values}
+  alias Console.{Arguments, Fleet, Values}
+  alias Hal.Suggest
 
   defstruct robots: nil,
             seed: 1,

@@ -4,7 +4,8 @@ defmodule Console.Prompt do
 
   Names become robots by comparison; a text never becomes an atom.
   """
-  alias Console.{Fleet, Suggest, Values}
+  alias Console.{Fleet, Values}
+  alias Hal.Suggest
   alias Robot.Command
 
   @words ~w(kill formation landmark move goto follow stop estop reset start status nodes tell help quit)

@@ -162,7 +162,7 @@ defmodule Console.Values do
   end
 
   defp suggestion(text, names) do
-    case Console.Suggest.nearest(text, names) do
+    case Hal.Suggest.nearest(text, names) do
       nil -> ""
       near -> " (did you mean #{inspect(near)}?)"
     end

@@ -2,7 +2,6 @@ defmodule Console.OptionsTest do
   use ExUnit.Case, async: true
   alias Console.Options
 
-  doctest Console.Suggest
   doctest Console.Arguments
   doctest Console.Values
   doctest Console.Fleet

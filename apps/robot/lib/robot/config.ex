@@ -17,6 +17,7 @@ defmodule Robot.Config do
     * `:clock` - `{m, f, a}` giving integer milliseconds, default the monotonic time
     * `:pace` - `:clock`, or `:manual`: gate and executive act when they are sent `:step` and `:tick`
       and not by themselves, so that a test decides the order of everything
+    * `:arm` - `:auto` (the default), or `:manual`: the wheels stand until a person arms them
     * `:estop_file` - where the e-stop latch outlives the machine, or `nil`
     * `:trace` - `{m, f, a}` that is told all that goes in and out, see `Robot.Trace`, or `nil`
   """
@@ -37,6 +38,7 @@ defmodule Robot.Config do
                 send: nil,
                 clock: {System, :monotonic_time, [:millisecond]},
                 pace: :clock,
+                arm: :auto,
                 estop_file: nil,
                 trace: nil
               ]
@@ -58,6 +60,7 @@ defmodule Robot.Config do
           send: call() | nil,
           clock: call(),
           pace: :clock | :manual,
+          arm: :auto | :manual,
           estop_file: Path.t() | nil,
           trace: call() | nil
         }
@@ -154,6 +157,7 @@ defmodule Robot.Config do
 
   defp valid?(:clock, clock), do: call?(clock)
   defp valid?(:pace, pace), do: pace in [:clock, :manual]
+  defp valid?(:arm, arm), do: arm in [:auto, :manual]
   defp valid?(option, value) when option in [:send, :trace], do: value == nil or call?(value)
   defp valid?(:estop_file, path), do: path == nil or is_binary(path)
 
@@ -167,6 +171,7 @@ defmodule Robot.Config do
   defp allowed(:limits), do: "a keyword list of positive floats for #{Enum.join(@limits, ", ")}"
   defp allowed(:companions), do: "a list of {module, options}"
   defp allowed(:pace), do: ":clock or :manual"
+  defp allowed(:arm), do: ":auto or :manual"
   defp allowed(:clock), do: "{module, function, arguments}"
   defp allowed(option) when option in [:send, :trace], do: "{module, function, arguments} or nil"
   defp allowed(:estop_file), do: "the path of a file or nil"

@@ -25,12 +25,54 @@ defmodule Hal.Camera.FFmpeg do
   """
   @behaviour Hal.Camera
   alias Hal.Camera.Source
-  alias Hal.Frame
+  alias Hal.{Frame, Suggest}
 
   @enforce_keys [:port, :format, :every]
   defstruct @enforce_keys
 
   @opaque t :: %__MODULE__{port: port(), format: Frame.format(), every: boolean()}
+
+  @defaults [
+    source: nil,
+    size: nil,
+    rate: nil,
+    ffmpeg: nil,
+    format: :yuyv,
+    every: false,
+    loop: false
+  ]
+  @widest 32_768
+
+  @doc """
+  The options with their defaults, or all that is wrong with them, a line each.
+
+      iex> Hal.Camera.FFmpeg.options(source: "testsrc", siz: {320, 240})
+      {:error, ["camera has no option :siz; did you mean :size?"]}
+  """
+  @spec options(keyword()) :: {:ok, keyword()} | {:error, [line :: String.t(), ...]}
+  def options(options) do
+    names = Enum.map(Keyword.keys(@defaults), &inspect/1)
+    {known, unknown} = Keyword.split(options, Keyword.keys(@defaults))
+    merged = Keyword.merge(@defaults, known)
+
+    strange =
+      for {name, _value} <- unknown do
+        hint = with nil <- Suggest.nearest(inspect(name), names), do: Enum.join(names, ", ")
+
+        if hint in names,
+          do: "camera has no option #{inspect(name)}; did you mean #{hint}?",
+          else: "camera has no option #{inspect(name)}; it has #{hint}"
+      end
+
+    missing = if options[:source] == nil, do: ["camera option :source is missing"], else: []
+
+    wrong = for option <- known, option != {:source, nil}, not valid?(option), do: refused(option)
+
+    case strange ++ missing ++ wrong do
+      [] -> {:ok, merged}
+      lines -> {:error, lines}
+    end
+  end
 
   @impl Hal.Camera
   def init(options) do
@@ -136,36 +178,31 @@ defmodule Hal.Camera.FFmpeg do
   end
 
   defp check!(options) do
-    options =
-      Keyword.validate!(options, [
-        :source,
-        :size,
-        :rate,
-        :ffmpeg,
-        format: :yuyv,
-        every: false,
-        loop: false
-      ])
-
-    Enum.each(options, &check_option!/1)
-    if options[:source] == nil, do: raise(ArgumentError, "camera option :source is missing")
-    options
+    case options(options) do
+      {:ok, options} -> options
+      {:error, lines} -> raise ArgumentError, Enum.join(lines, "; ")
+    end
   end
 
-  defp check_option!({:source, source}) when is_binary(source) and source != "", do: :ok
-  defp check_option!({:format, format}) when format in [:yuyv, :i420], do: :ok
+  defp refused({option, value}),
+    do: "camera option #{inspect(option)} cannot be #{inspect(value)}: #{allowed(option)}"
 
-  defp check_option!({option, value}) when option in [:every, :loop] and is_boolean(value),
-    do: :ok
+  defp valid?({:source, source}), do: is_binary(source) and source != ""
+  defp valid?({:format, format}), do: format in [:yuyv, :i420]
+  defp valid?({option, value}) when option in [:every, :loop], do: is_boolean(value)
+  defp valid?({option, nil}) when option in [:size, :rate, :ffmpeg], do: true
+  defp valid?({:rate, rate}), do: is_number(rate) and rate > 0
+  defp valid?({:ffmpeg, path}), do: is_binary(path)
 
-  defp check_option!({option, nil}) when option in [:size, :rate, :ffmpeg], do: :ok
-  defp check_option!({:rate, rate}) when is_number(rate) and rate > 0, do: :ok
-  defp check_option!({:ffmpeg, path}) when is_binary(path), do: :ok
+  defp valid?({:size, {width, height}}),
+    do: width in 2..@widest//2 and height in 2..@widest//2
 
-  defp check_option!({:size, {width, height}})
-       when width in 2..32_768//2 and height in 2..32_768//2,
-       do: :ok
+  defp valid?({:size, _other}), do: false
 
-  defp check_option!({option, value}),
-    do: raise(ArgumentError, "camera option #{inspect(option)} cannot be #{inspect(value)}")
+  defp allowed(:source), do: "a file, stream or device"
+  defp allowed(:format), do: ":yuyv or :i420"
+  defp allowed(option) when option in [:every, :loop], do: "true or false"
+  defp allowed(:rate), do: "frames a second, above 0"
+  defp allowed(:size), do: "{width, height}, even numbers up to #{@widest}"
+  defp allowed(:ffmpeg), do: "the path of ffmpeg"
 end

@@ -1,4 +1,4 @@
-defmodule Console.Suggest do
+defmodule Hal.Suggest do
   @moduledoc "What somebody may have meant by a word that nobody knows. Pure."
 
   @near_enough 0.77
@@ -6,9 +6,9 @@ defmodule Console.Suggest do
   @doc """
   The known word most like `word`, or `nil` when none is like it.
 
-      iex> Console.Suggest.nearest("fromation", ["formation", "landmark"])
+      iex> Hal.Suggest.nearest("fromation", ["formation", "landmark"])
       "formation"
-      iex> Console.Suggest.nearest("xyz", ["formation", "landmark"])
+      iex> Hal.Suggest.nearest("xyz", ["formation", "landmark"])
       nil
   """
   @spec nearest(String.t(), [String.t()]) :: String.t() | nil
@@ -25,9 +25,9 @@ defmodule Console.Suggest do
   @doc """
   The half-sentence to put behind an error, empty when there is nothing to suggest.
 
-      iex> Console.Suggest.hint("hal", ["hall", "arena"])
+      iex> Hal.Suggest.hint("hal", ["hall", "arena"])
       ~s(; did you mean "hall"?)
-      iex> Console.Suggest.hint("moon", ["hall", "arena"])
+      iex> Hal.Suggest.hint("moon", ["hall", "arena"])
       ""
   """
   @spec hint(String.t(), [String.t()]) :: String.t()

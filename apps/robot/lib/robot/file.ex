@@ -1,0 +1,185 @@
+defmodule Robot.File do
+  @moduledoc """
+  One file says what one robot is: `config/robots/mag1.exs`. It is Elixir data, one list of keys,
+  and is read, never run (`Robot.File.Reader`); `config/robots/template.exs` shows all keys, the
+  table of them is `Robot.File.Schema`.
+
+      {:ok, file} = Robot.File.load("config/robots/mag1.exs")
+      {:ok, config} = Robot.File.config(file)
+
+  All that is wrong with a file is said at once, each problem on a line that names file, line, key
+  and what is allowed:
+
+      config/robots/mag1.exs:7: limits.max_liner: is no key; did you mean max_linear?
+
+  A real robot arms by hand: `arm: :manual` is the default here, not in `Robot.Config`.
+  """
+  alias Hal.{Pose, Profile}
+  alias Robot.Config
+  alias Robot.File.{Check, Consistent, Reader, Schema}
+
+  @enforce_keys [:id, :profile, :drive]
+  defstruct @enforce_keys ++
+              [
+                ptz: nil,
+                camera: nil,
+                colours: nil,
+                limits: [],
+                start: nil,
+                arm: :manual,
+                estop_file: nil,
+                network: [],
+                policies: []
+              ]
+
+  @type t :: %__MODULE__{
+          id: atom(),
+          profile: Profile.t(),
+          drive: Config.module_options(),
+          ptz: Config.module_options() | nil,
+          camera: Config.module_options() | nil,
+          colours: struct() | nil,
+          limits: keyword(float()),
+          start: Pose.t(),
+          arm: :manual | :auto,
+          estop_file: Path.t() | nil,
+          network: keyword(),
+          policies: keyword()
+        }
+
+  @largest 65_536
+  @most_lines 40
+
+  @doc """
+  The robot of the file at `path`, or all that is wrong with it. A colour file is looked for beside
+  it. `fleet:` are the names that there may be (default `Robot.File.Schema.fleet/0`).
+
+      iex> Robot.File.load("no/such.exs")
+      {:error, ["no/such.exs: no such file or directory"]}
+  """
+  @spec load(Path.t(), keyword()) :: {:ok, t()} | {:error, [String.t(), ...]}
+  def load(path, options \\ []) do
+    # A pipe or a device may never end.
+    with {:ok, %File.Stat{type: :regular, size: size}} when size <= @largest <- File.stat(path),
+         {:ok, text} <- File.read(path) do
+      folder = Path.dirname(path)
+
+      read = fn file, options ->
+        Vision.Colours.read(Path.expand(file, folder), options)
+      end
+
+      parse(text, Keyword.merge([file: path, colours: read], options))
+    else
+      {:ok, %File.Stat{type: :regular}} ->
+        {:error, ["#{path}: no robot file is larger than #{div(@largest, 1024)} kB"]}
+
+      {:ok, %File.Stat{type: type}} ->
+        {:error, ["#{path}: is a #{type}, where a file is needed"]}
+
+      {:error, reason} ->
+        {:error, ["#{path}: #{:file.format_error(reason)}"]}
+    end
+  end
+
+  @doc """
+  The robot that a text describes. Options: `file:`, its name for errors; `fleet:` as in `load/2`;
+  `colours:`, a function of path and options that reads a colour file (`t:Robot.File.Colours.reader/0`).
+
+      iex> Robot.File.parse("[id: :mag1, profil: :magellan, arm: :manaul]", file: "mag1.exs")
+      {:error, [
+        "mag1.exs:1: profil: is no key; did you mean profile?",
+        "mag1.exs:1: arm: cannot be :manaul: allowed: :manual, :auto; did you mean :manual?",
+        "mag1.exs:1: profile: is missing",
+        "mag1.exs:1: drive: is missing"]}
+  """
+  @spec parse(String.t(), keyword()) :: {:ok, t()} | {:error, [String.t(), ...]}
+  def parse(text, options \\ []) do
+    file = Keyword.get(options, :file, "robot file")
+
+    context = %{
+      fleet: Keyword.get_lazy(options, :fleet, &Schema.fleet/0),
+      colours: Keyword.get(options, :colours, fn _path, _options -> {:error, "no files here"} end)
+    }
+
+    with {:ok, {_line, value} = tree} <- Reader.read(text),
+         :ok <- whole(value),
+         {:ok, values} <- complete(tree, Check.run(Schema.table(context), tree, [])),
+         robot = robot(values),
+         [] <- problems(Consistent.problems(robot, file), tree) do
+      {:ok, robot}
+    else
+      {:error, {line, text}} -> {:error, ["#{file}:#{line}: #{text}"]}
+      {:error, problems} -> {:error, lines(file, problems)}
+      problems -> {:error, lines(file, problems)}
+    end
+  end
+
+  @doc """
+  What the robot is started with, as far as it is its own: `Swarm.Start` adds mission and link.
+
+  An error is a line of `Robot.Config.new/1`.
+  """
+  @spec config(t()) :: {:ok, Config.t()} | {:error, String.t()}
+  def config(%__MODULE__{} = robot) do
+    robot
+    |> Map.take([
+      :id,
+      :profile,
+      :drive,
+      :ptz,
+      :camera,
+      :colours,
+      :limits,
+      :start,
+      :arm,
+      :estop_file
+    ])
+    |> Map.to_list()
+    |> Config.new()
+  end
+
+  defp whole({:keys, _keys}), do: :ok
+  defp whole({:list, []}), do: :ok
+  defp whole(_other), do: {:error, {1, "a robot file is one list, [key: value, …]"}}
+
+  # What is missing is told together with what is wrong.
+  defp complete({line, value}, result) do
+    given = for {name, _line, _node} <- keys(value), do: name
+    missing = for key <- Schema.needed(), name = Atom.to_string(key), name not in given, do: name
+
+    case {missing, result} do
+      {[], result} -> result
+      {_, {:ok, _values}} -> {:error, missing(missing, line)}
+      {_, {:error, problems}} -> {:error, problems ++ missing(missing, line)}
+    end
+  end
+
+  defp missing(names, line), do: for(name <- names, do: {line, [name], "is missing"})
+
+  defp keys({:keys, keys}), do: keys
+  defp keys({:list, []}), do: []
+
+  defp robot(values) do
+    {body, values} = Keyword.pop(values, :body, [])
+    profile = Schema.profile(values[:profile], body)
+
+    struct!(
+      __MODULE__,
+      values |> Keyword.put(:profile, profile) |> Keyword.put_new(:start, Pose.new(0, 0))
+    )
+  end
+
+  defp problems(found, {_line, {:keys, keys}}) do
+    lines = Map.new(keys, fn {name, line, _node} -> {name, line} end)
+    for {[key | _] = path, text} <- found, do: {lines[key] || 1, path, text}
+  end
+
+  # Whoever has so many problems solves the first ones first.
+  defp lines(file, problems) do
+    more = length(problems) - @most_lines
+    lines = problems |> Enum.take(@most_lines) |> Enum.map(&line(file, &1))
+    if more > 0, do: lines ++ ["#{file}: and #{more} problems more"], else: lines
+  end
+
+  defp line(file, {line, path, text}), do: "#{file}:#{line}: #{Enum.join(path, ".")}: #{text}"
+end

@@ -1,0 +1,70 @@
+defmodule Robot.File.Consistent do
+  @moduledoc "What the keys of a robot file must be to each other, and no single key can know. Pure."
+  alias Robot.File.{Check, Schema}
+
+  @doc "All that does not fit: the keys it is about, and what is wrong; `file` is the file's path."
+  @spec problems(Robot.File.t(), Path.t()) :: [{[String.t(), ...], String.t()}]
+  def problems(robot, file) do
+    Enum.reject(
+      [
+        named(robot, file),
+        seen(robot),
+        majority(robot.policies),
+        colour(robot),
+        rings(robot)
+        | limits(robot)
+      ],
+      &(&1 == nil)
+    )
+  end
+
+  # A file that was copied for another robot and not changed would make two of one name.
+  defp named(robot, file) do
+    name = Path.basename(file, ".exs")
+
+    if Enum.any?(Schema.fleet(), &(Atom.to_string(&1) == name and &1 != robot.id)),
+      do: {["id"], "is #{inspect(robot.id)}, but the file is named #{name}.exs"}
+  end
+
+  defp seen(%{camera: camera, colours: nil}) when camera != nil,
+    do: {["colours"], "is missing: a robot with a camera must have colours"}
+
+  defp seen(_robot), do: nil
+
+  defp majority(policies) do
+    if policies[:policy] == :majority and policies[:of] == nil,
+      do: {["policies"], "policy: :majority needs of:, the number of robots of the fleet"}
+  end
+
+  defp colour(%{colours: nil}), do: nil
+
+  defp colour(%{colours: colours, policies: policies}) do
+    names = Enum.map(colours.classes, & &1.name)
+    colour = policies[:colour]
+
+    if colour != nil and colour not in names,
+      do:
+        {["policies", "colour"],
+         "cannot be #{inspect(colour)}: the colours are #{Enum.join(names, ", ")}" <>
+           Check.meant(colour, names, "")}
+  end
+
+  # Readings come in the order of the profile's poses, so there must be as many of them.
+  defp rings(%{drive: {_module, options}, profile: profile}) do
+    with banks when is_list(banks) <- options[:sonar_banks],
+         true <- Enum.all?(banks, &is_integer/1),
+         sum when sum != length(profile.sonars) <- Enum.sum(banks) do
+      {["drive", "sonar_banks"],
+       "have #{sum} sonars together, but the body has poses for #{length(profile.sonars)}"}
+    else
+      _as_it_should_be -> nil
+    end
+  end
+
+  defp limits(%{limits: limits, profile: profile}) do
+    for {name, value} <- limits, most = Map.fetch!(profile, name), value > most do
+      {["limits", Atom.to_string(name)],
+       "cannot be #{value}: a #{profile.name} can do #{most} at most"}
+    end
+  end
+end

@@ -1,0 +1,340 @@
+defmodule Robot.FileTest do
+  use ExUnit.Case, async: true
+
+  doctest Robot.File
+  doctest Robot.File.Reader
+  doctest Robot.File.Check
+  doctest Robot.File.Tokens
+  doctest Robot.File.Words
+
+  alias Hal.Pose
+  alias Robot.File.{Reader, Schema, Words}
+
+  @robots Path.expand("../../../../config/robots", __DIR__)
+  @least ~s(id: :mag1, profile: :magellan, drive: {Robot.FileDrive, port: "/dev/ttyS1"})
+
+  defp parse(more, options \\ []) do
+    more = if more == "", do: "", else: ",\n" <> more
+    Robot.File.parse("[#{@least}#{more}]", [file: "mag1.exs"] ++ options)
+  end
+
+  defp lines(more, options \\ []) do
+    assert {:error, lines} = parse(more, options)
+    lines
+  end
+
+  defp colours do
+    {:ok, colours} = Vision.Colours.read(Path.join(@robots, "landmark.txt"))
+    fn "landmark.txt", _options -> {:ok, colours} end
+  end
+
+  test "three keys make a robot, whose wheels stand until a person arms them" do
+    assert {:ok, robot} = parse("")
+    assert robot.profile == Hal.Profile.magellan()
+    assert robot.start == Pose.new(0, 0)
+    assert robot.arm == :manual
+    assert robot.drive == {Robot.FileDrive, [port: "/dev/ttyS1"]}
+
+    assert {:ok, config} = Robot.File.config(robot)
+    assert %{id: :mag1, arm: :manual, camera: nil, mission: nil} = config
+  end
+
+  test "all keys arrive where they belong" do
+    text = """
+    body: [radius: 0.25, sonars: [{0.2, 0, 0}, {0, 0.2, deg(90)}], camera: [field_of_view: deg(48.8)]],
+    ptz: {Robot.FilePtz, port: "/dev/ttyS2", speed: 9600},
+    camera: {Hal.Camera.FFmpeg, source: "testsrc", size: {320, 240}},
+    colours: "landmark.txt",
+    limits: [max_linear: 0.3],
+    start: {1, -2.5, deg(-90)},
+    arm: :auto,
+    estop_file: "/tmp/estop",
+    network: [secret_file: "/etc/convoy/secret", interface: "10.0.0.7", peers: ["10.0.0.8:4370"],
+      multicast: {"239.255.67.86", 4371}],
+    policies: [mission: :landmark, formation: {:wedge, 1}, policy: :majority, of: 6, lost_link: :hold,
+      colour: "YellowLandmark"]
+    """
+
+    assert {:ok, robot} = parse(text, colours: colours())
+    assert robot.profile.radius == 0.25
+    assert robot.profile.sonars == [Pose.new(0.2, 0), Pose.new(0, 0.2, :math.pi() / 2)]
+    assert_in_delta robot.profile.camera.field_of_view, 0.8517, 1.0e-4
+    assert robot.profile.camera.width == 320
+    assert robot.ptz == {Robot.FilePtz, port: "/dev/ttyS2", speed: 9600}
+    assert robot.camera == {Hal.Camera.FFmpeg, source: "testsrc", size: {320, 240}}
+    assert robot.start == Pose.new(1, -2.5, -:math.pi() / 2)
+    assert robot.network[:interface] == {10, 0, 0, 7}
+    assert robot.network[:multicast] == {{239, 255, 67, 86}, 4371}
+    assert robot.policies[:formation] == {:wedge, 1.0}
+
+    assert {:ok, config} = Robot.File.config(robot)
+    assert config.profile.max_linear == 0.3
+    assert config.arm == :auto
+    assert config.estop_file == "/tmp/estop"
+  end
+
+  test "all that is wrong is said at once, with line, key, what is allowed and a suggestion" do
+    text = """
+    limits: [max_liner: 0.3, max_turn: "fast"],
+    strat: {0, 0, 0},
+    arm: :maual,
+    start: {0, 0},
+    body: [radius: 90],
+    policies: [formation: {:colum, 1.0}, of: 0]
+    """
+
+    assert lines(text) == [
+             "mag1.exs:2: limits.max_liner: is no key; did you mean max_linear?",
+             "mag1.exs:2: limits.max_turn: cannot be \"fast\": a number from 0.01 to 10.0 rad/s is allowed",
+             "mag1.exs:3: strat: is no key; did you mean start?",
+             "mag1.exs:4: arm: cannot be :maual: allowed: :manual, :auto; did you mean :manual?",
+             "mag1.exs:5: start: cannot be {0, 0}: {x, y, heading} is allowed, metres up to 10000 and radians, such as {1.0, 0.5, deg(90)}",
+             "mag1.exs:6: body.radius: cannot be 90: a number from 0.05 to 1.0 m is allowed",
+             "mag1.exs:7: policies.formation: cannot be :colum: allowed: :column, :line, :wedge, :triangle, :diamond, :circle; did you mean :column?",
+             "mag1.exs:7: policies.of: cannot be 0: a whole number from 1 to 1000 is allowed"
+           ]
+  end
+
+  test "a key that is like none gets the list of those that there are" do
+    assert [line] = lines("network: [zzz: 1]")
+    assert line =~ "network.zzz: is no key: there are secret_file, interface"
+  end
+
+  test "a key twice is refused" do
+    assert lines("arm: :auto,\narm: :manual") == [
+             "mag1.exs:3: arm: is given twice, first in line 2"
+           ]
+
+    assert [line] = lines("ptz: {Robot.FilePtz, port: \"a\", port: \"b\"}")
+    assert line == "mag1.exs:2: ptz.port: is given twice"
+  end
+
+  test "drivers are modules of this build, of the right kind, with options that they take" do
+    assert ["mag1.exs:2: ptz: Robot.FileDrive is no Hal.Ptz"] = lines("ptz: Robot.FileDrive")
+    assert [line] = lines("camera: {Hal.Camera.FFmpg, source: \"x\"}")
+    assert line =~ "cannot be Hal.Camera.FFmpg"
+    assert line =~ "did you mean Hal.Camera.FFmpeg?"
+    assert [line] = lines("ptz: :none")
+    assert line =~ "ptz: cannot be :none: {driver, options} is allowed"
+
+    assert ["mag1.exs:2: camera: camera option :source is missing", size] =
+             lines("colours: \"landmark.txt\", camera: {Hal.Camera.FFmpeg, size: {1, 1}}",
+               colours: colours()
+             )
+
+    assert size =~ "camera option :size cannot be {1, 1}"
+    assert [line] = lines("ptz: {Robot.FilePtz, no_such_option_of_anybody: 1}")
+    assert line =~ "ptz.no_such_option_of_anybody: is an option of no driver"
+    assert [line] = lines("ptz: {Robot.FilePtz, serial: :no_such_name_of_anybody}")
+    assert line =~ "ptz.serial: cannot be :no_such_name_of_anybody"
+
+    assert {:error, ["mag1.exs:1: drive: drive option :port is missing"]} =
+             Robot.File.parse("[id: :mag1, profile: :magellan, drive: Robot.FileDrive]",
+               file: "mag1.exs"
+             )
+  end
+
+  test "what does not fit together is said" do
+    assert lines("camera: {Hal.Camera.FFmpeg, source: \"testsrc\"}") == [
+             "mag1.exs:1: colours: is missing: a robot with a camera must have colours"
+           ]
+
+    assert lines("limits: [max_linear: 0.9]") == [
+             "mag1.exs:2: limits.max_linear: cannot be 0.9: a magellan can do 0.5 at most"
+           ]
+
+    assert [line] = lines("policies: [policy: :majority]")
+    assert line =~ "policies: policy: :majority needs of:"
+
+    assert [line] =
+             lines("colours: \"landmark.txt\", policies: [colour: \"YelowLandmark\"]",
+               colours: colours()
+             )
+
+    assert line =~ "the colours are YellowLandmark; did you mean YellowLandmark?"
+
+    assert {:error, [line]} =
+             Robot.File.parse(
+               "[id: :mag1, profile: :magellan, drive: {Robot.FileDrive, port: \"x\", sonar_banks: [8, 4]}]"
+             )
+
+    assert line =~ "drive.sonar_banks: have 12 sonars together, but the body has poses for 16"
+    assert {:error, [line]} = Robot.File.parse("[#{@least}]", file: "robots/mag2.exs")
+    assert line == "robots/mag2.exs:1: id: is :mag1, but the file is named mag2.exs"
+  end
+
+  test "nothing in a file is run, and no file makes an atom" do
+    for text <- [
+          "System.halt(1)",
+          "fn -> 1 end",
+          "\"\#{1}\"",
+          "~w(a b)",
+          ":\"a\#{1}\"",
+          "%Foo{}",
+          "1 + 1",
+          "'text'",
+          "<<1>>",
+          "x",
+          "[1 | 2]",
+          "deg(1, 2)",
+          "deg(deg)",
+          "deg(1.0e30)",
+          "-:a",
+          "&1",
+          "(1; 2)"
+        ] do
+      assert [line] = lines("estop_file: #{text}"), text
+      assert line =~ ~r/^mag1.exs:2: .*(cannot|takes|nothing is put)/, line
+    end
+
+    strange = "strange#{System.unique_integer([:positive])}"
+
+    for text <- [
+          "#{strange}: 1",
+          "arm: :#{strange}",
+          "arm: #{strange}(1)",
+          "arm: #{strange}",
+          "ptz: {S#{strange}, port: 1}",
+          "ptz: {Robot.FilePtz, #{strange}: 1}",
+          "ptz: {Robot.FilePtz, port: :#{strange}}",
+          "colours: [file: \"#{strange}\"]",
+          "arm: :\"#{strange} a\"",
+          "id: :#{strange}"
+        ] do
+      assert [_ | _] = lines(text)
+      assert_raise ArgumentError, fn -> String.to_existing_atom(strange) end
+      assert_raise ArgumentError, fn -> String.to_existing_atom("Elixir.S" <> strange) end
+    end
+  end
+
+  test "text that is no robot file ends in one line" do
+    for {text, words} <- [
+          {"", "is empty"},
+          {"# only this", "is empty"},
+          {"[id: :mag1", "the [ of line 1 is never closed"},
+          {"[id: {:mag1", "the { of line 1 is never closed"},
+          {"[id: {:mag1]", "] cannot close the { of line 1"},
+          {"[a: 1]\n[b: 2]", "[ stands behind the end of the list"},
+          {"%{id: :mag1}", "one list, [key: value, …]"},
+          {"[1, 2]", "one list, [key: value, …]"},
+          {"[1, a: 2]", "a list has keys for all its values or for none"},
+          {"[id: :mag1 profile: 1]", "a comma is missing before profile:"},
+          {"[id: ]", "a value is missing before ]"},
+          {"[id: , a: 1]", "a value is missing before ,"},
+          {"[id: \n profile: 1]", "a value is missing before profile:"},
+          {"[id::mag1]", "a space is missing after id:"},
+          {"[start: {1.5m, 0}]", "1.5m is no number"},
+          {"[start: 1.0e400]", "1.0e400 is no number"},
+          {"[start: 1e5]", "1e5 is no number"},
+          {"[start: \"abc]", "no closing"},
+          {"[start: \"a\\x\"]", "only"},
+          {"[start: {a: 1, 2}]", "in a tuple, keys come last"},
+          {"[start: %{a: 1}]", "a value is missing before a:"},
+          {"[start: %{1}]", "a map is written %{key => value}"},
+          {<<"[id: ", 0xFF, "]">>, "is not text in UTF-8"},
+          {String.duplicate("#", 70_000), "larger than 64 kB"}
+        ] do
+      assert {:error, [line]} = Robot.File.parse(text, file: "mag1.exs")
+      assert line =~ ~r/^mag1.exs:\d+: /
+      assert line =~ words
+    end
+  end
+
+  test "hostile sizes and depths end soon, in lines of bounded length" do
+    for text <- [
+          String.duplicate("[", 30_000),
+          String.duplicate("[", 15_000) <> String.duplicate("]", 15_000),
+          "[arm: " <> String.duplicate("9", 60_000) <> "]",
+          "[start: {#{String.duplicate("9", 60_000)}, 0, 0}]",
+          "[arm: \"#{String.duplicate("a", 60_000)}\"]",
+          "[#{String.duplicate("a", 60_000)}: 1]",
+          "[arm: :#{String.duplicate("a", 60_000)}]",
+          "[" <> Enum.map_join(1..5_000, ", ", &"a#{&1}: 1") <> "]",
+          "[arm: " <> String.duplicate("-", 30_000) <> "1]"
+        ] do
+      {us, {:error, lines}} = :timer.tc(fn -> Robot.File.parse(text) end)
+      assert us < 5_000_000
+      assert Enum.all?(lines, &(String.length(&1) < 700)), inspect(lines, printable_limit: 900)
+    end
+  end
+
+  test "random damage to a good file never raises" do
+    text = File.read!(Path.join(@robots, "template.exs"))
+    bytes = ~c"[]{}(),:;\"'#%&|^~@!?<>=+-*/\\ \n\tazAZ09_." ++ [0, 127, 200, 255]
+
+    for _ <- 1..1_000 do
+      at = :rand.uniform(byte_size(text)) - 1
+      cut = :rand.uniform(8) - 1
+      <<head::binary-size(at), rest::binary>> = text
+
+      rest =
+        binary_part(rest, min(cut, byte_size(rest)), byte_size(rest) - min(cut, byte_size(rest)))
+
+      new = for _ <- 1..:rand.uniform(4), into: "", do: <<Enum.random(bytes)>>
+      damaged = head <> new <> rest
+
+      case Robot.File.parse(damaged, colours: fn _path, _options -> {:error, "none"} end) do
+        {:ok, _robot} -> :ok
+        {:error, [_ | _] = lines} -> assert Enum.all?(lines, &is_binary/1)
+      end
+    end
+  end
+
+  test "the robots that come along are well, and so is the template" do
+    for {name, file} <- [mag1: "mag1.exs", min1: "min1.exs", mag1: "template.exs"] do
+      case Robot.File.load(Path.join(@robots, file)) do
+        {:ok, robot} ->
+          assert robot.id == name
+          assert robot.arm == :manual
+          assert {:ok, _config} = Robot.File.config(robot)
+
+        {:error, lines} ->
+          # A build without these drivers says so, and nothing else.
+          assert Enum.all?(
+                   lines,
+                   &(&1 =~ ~r/no (Hal.RFlex.Driver|Hal.Visca.Driver) in this build/)
+                 ),
+                 Enum.join(lines, "\n")
+
+          refute Code.ensure_loaded?(Hal.RFlex.Driver) and Code.ensure_loaded?(Hal.Visca.Driver)
+      end
+    end
+  end
+
+  test "the template tells of every key" do
+    template = File.read!(Path.join(@robots, "template.exs"))
+
+    for key <- all_keys(Schema.table(%{fleet: Schema.fleet(), colours: nil})) do
+      assert template =~ ~r/\b#{key}:\s/, "template.exs does not tell of #{key}:"
+    end
+  end
+
+  test "a file that cannot be read says why" do
+    folder = Path.join(System.tmp_dir!(), "robot_file_#{System.unique_integer([:positive])}")
+    File.mkdir_p!(folder)
+    on_exit(fn -> File.rm_rf!(folder) end)
+    assert {:error, [line]} = Robot.File.load(folder)
+    assert line =~ "is a directory, where a file is needed"
+
+    path = Path.join(folder, "mag1.exs")
+    File.write!(path, "[#{@least}, colours: \"none.txt\"]")
+    assert {:error, [line]} = Robot.File.load(path)
+
+    assert line ==
+             "#{path}:1: colours: #{Path.join(folder, "none.txt")}: no such file or directory"
+  end
+
+  test "a node is shown as it was written" do
+    for text <- ["[1, -2.5, nil]", "[{:a, \"b\"}]", "[a: true, b: Some.Module]"] do
+      assert {:ok, node} = Reader.read(text)
+      assert Words.show(node) == text
+    end
+  end
+
+  defp all_keys({:keys, table}),
+    do: Enum.flat_map(table, fn {key, check} -> [key | all_keys(check)] end)
+
+  defp all_keys({:or, _value, check}), do: all_keys(check)
+  defp all_keys({:list, check, _most}), do: all_keys(check)
+  defp all_keys(_check), do: []
+end

@@ -1,0 +1,104 @@
+# One robot. Copy this file to config/robots/NAME.exs, change it, and look at what comes of it:
+#
+#     mix robot.check config/robots/NAME.exs
+#
+# The file is read, never run. It holds numbers, "text", :names, [lists], {tuples}, and deg(…), which
+# is degrees in radians. Metres, radians, seconds; x is forward, y is left, angles grow to the left.
+# What is commented out is the default, or an example where there is none.
+[
+  # Its name in the fleet. mag1 to mag100 and min1 to min100 are known.
+  id: :mag1,
+
+  # Its kind: :magellan or :atrv_mini. Geometry, sensor poses and limits come with it.
+  profile: :magellan,
+
+  # What is different on this one. All lengths in metres.
+  body: [
+    # radius: 0.2,                       # of the circle round the whole body
+    # length: 0.4,
+    # width: 0.4,
+    # height: 0.5,
+    # wheel_base: 0.36,                  # between the wheels, left to right
+    # bumpers: 16,                       # 0 for none
+    # sonars: [{0.2, 0.0, deg(0)}, …],   # {x, y, angle} of each, in the order of the driver's readings
+    # sonar_min: 0.15,
+    # sonar_max: 5.1,
+    # sonar_cone: deg(30),               # full width
+    # irs: [{0.2, 0.0, deg(0)}, …],
+    # ir_max: 0.8,
+    # camera: [
+    #   width: 320, height: 240, field_of_view: deg(60), mount_height: 0.6,
+    #   max_pan: deg(100), max_tilt: deg(25), pan_rate: deg(80), tilt_rate: deg(50)
+    # ]
+  ],
+
+  # Its wheels, with sonar, infrared, bumpers and battery: a driver and its options, which
+  # the driver's own documentation lists.
+  drive:
+    {Hal.RFlex.Driver,
+     [
+       port: "/dev/ttyUSB0",
+       conversions: [
+         # Without these two it does not arm. They differ from robot to robot, by 7 % and more:
+         # mix calibrate odometry finds them. Published ones, to begin with: Magellan Pro 31387
+         # and 4654.2, ATRV mini 190000 and 60000.
+         # distance: 31_387.0,             # units per metre
+         # angle: 4654.2,                  # units per radian
+         # units per metre of a sonar's range
+         range: 1474.0
+       ]
+     ]},
+
+  # The camera's head: {Hal.Visca.Driver, port: "/dev/ttyS2"}, or nil for a camera that looks ahead.
+  ptz: nil,
+
+  # The camera: {Hal.Camera.FFmpeg, source: "/dev/video0", size: {320, 240}}, or nil for none.
+  camera: nil,
+
+  # What the camera looks for: a CMVision colour file, searched beside this one. With more to say:
+  # [file: "landmark.txt", distance: %{"YellowLandmark" => 0.0651}, min_area: 20, max_area: 0];
+  # distance is the share of the picture that a thing fills which is 1 m away.
+  colours: "landmark.txt",
+
+  # Lower than what its kind can do, never higher.
+  limits: [
+    # m/s; a Magellan and an ATRV mini can do 0.5
+    max_linear: 0.3
+    # max_turn: 1.0,                       # rad/s; an ATRV mini 0.8
+    # max_acceleration: 0.5,               # m/s2, also of braking
+    # max_turn_acceleration: 1.0           # rad/s2
+  ],
+
+  # Where it is switched on, in the map that all robots share.
+  start: {0.0, 0.0, deg(0)},
+
+  # :manual: its wheels stand until a person arms them. :auto: they turn as soon as they are told.
+  # arm: :manual,
+
+  # Here an e-stop outlives a restart of the machine; the folder must be there.
+  # estop_file: "/var/lib/convoy/estop",
+
+  # How it meets the others.
+  network: [
+    # secret_file: "/etc/convoy/secret",
+    # interface: "10.0.0.11",              # the address to listen on; all, unless given
+    # port: 4370,                          # UDP
+    # multicast: {"239.255.67.86", 4371},  # false where it is blocked; then name some:
+    # peers: ["10.0.0.12:4370"],
+    # dist_port: 9101,                     # TCP
+    # full_mesh: 30,                       # up to so many robots each is connected to each,
+    # degree: 8                            # above that to so many
+  ],
+
+  # What it does with the others.
+  policies: [
+    # mission: :landmark,                  # nil: none until it is told one
+    # formation: {:column, 1.0},           # :column :line :wedge :triangle :diamond :circle; 0.8 to 5 m
+    # assign: :chain,                      # or :cost
+    # leader_change: true,
+    # colour: "YellowLandmark",
+    # policy: :available,                  # :majority: only more than half of the fleet has a leader
+    # of: 6,                               # the number of robots of the fleet, for :majority
+    # lost_link: :stop                     # without the others: :stop, :hold or :continue
+  ]
+]
