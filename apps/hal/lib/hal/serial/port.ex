@@ -59,7 +59,7 @@ defmodule Hal.Serial.Port do
 
     cond do
       size == 0 -> keep_alive(line)
-      fits?(line, size) or (hear_taken(line) and fits?(line, size)) -> put(line, size, bytes)
+      fits?(line, size) or fits?(hear_taken(line), size) -> put(line, size, bytes)
       true -> {:error, :overrun}
     end
   end
@@ -122,7 +122,7 @@ defmodule Hal.Serial.Port do
         :counters.sub(line.counters, @under_way, size)
         hear_taken(line)
     after
-      0 -> true
+      0 -> line
     end
   end
 
