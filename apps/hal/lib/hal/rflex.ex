@@ -1,0 +1,37 @@
+defmodule Hal.RFlex do
+  @moduledoc """
+  The byte protocol of the rFLEX motion controller (Magellan Pro, ATRV mini, B21r): frames,
+  commands, reports, and what they mean in metres and radians. All of it is pure; the process and
+  the line belong to `Hal.RFlex.Driver`.
+
+  | module | subject |
+  |---|---|
+  | `Hal.RFlex.Packet` | a frame: port, id, opcode, data, checksum |
+  | `Hal.RFlex.Decoder` | frames out of a stream of bytes, however cut or damaged |
+  | `Hal.RFlex.Command` | what we may say |
+  | `Hal.RFlex.Report` | what the controller says |
+  | `Hal.RFlex.Conversions` | units per metre and radian; which are missing |
+  | `Hal.RFlex.Odometry` | pose and speed from two counters |
+  | `Hal.RFlex.Sonar`, `.Infrared`, `.Bumpers`, `.Home` | the other senses |
+  | `Hal.RFlex.Queue` | which command goes next, and when |
+  | `Hal.RFlex.Options` | a robot's configuration, checked |
+  | `Hal.RFlex.Console` | the phrase after which the controller cuts the power |
+
+  There is no vendor document: the facts are what public drivers do. Where those are unsure the
+  modules say so.
+  """
+
+  @doc """
+  The difference of two 32-bit counters: `later - earlier`, where both may have wrapped.
+
+      iex> Hal.RFlex.difference(-0x8000_0000, 0x7FFF_FFFF)
+      1
+      iex> Hal.RFlex.difference(5, 7)
+      -2
+  """
+  @spec difference(later :: integer(), earlier :: integer()) :: integer()
+  def difference(later, earlier) do
+    <<difference::signed-32>> = <<later - earlier::32>>
+    difference
+  end
+end
