@@ -8,7 +8,7 @@ defmodule Swarm.Heartbeat do
   size and estimated distance, `nil` where it does not see it. `anchor` is there in the leader's
   heartbeats only. `boot` is its life's number, which grows with every start.
   """
-  alias Swarm.Shape
+  alias Swarm.{Roll, Shape}
 
   @enforce_keys [:boot, :sequence, :pose, :twist]
   defstruct @enforce_keys ++
@@ -17,7 +17,7 @@ defmodule Swarm.Heartbeat do
                 phase: :idle,
                 epoch: 0,
                 leader: nil,
-                heard: [],
+                heard: <<>>,
                 sight: nil,
                 standing: false,
                 in_place: false,
@@ -37,7 +37,7 @@ defmodule Swarm.Heartbeat do
           phase: atom(),
           epoch: non_neg_integer(),
           leader: atom() | nil,
-          heard: [atom()],
+          heard: Roll.t(),
           sight: %{size_ppm: pos_integer(), distance: pos_integer() | nil} | nil,
           standing: boolean(),
           in_place: boolean(),
@@ -67,7 +67,7 @@ defmodule Swarm.Heartbeat do
       pose: {round(pose.x * 1000), round(pose.y * 1000), round(pose.heading * 1000)},
       twist: {round(twist.linear * 1000), round(twist.turn * 1000)},
       radius: round(percept.profile.radius * 1000),
-      heard: heard,
+      heard: Roll.new(heard),
       estop: stop.known,
       latched: stop.latched?
     }
@@ -89,7 +89,7 @@ defmodule Swarm.Heartbeat do
       Shape.number?(turn) and is_integer(beat.boot) and beat.boot in 0..@latest and
       Shape.count?(beat.sequence) and beat.radius in 50..2000 and Shape.name?(beat.phase) and
       Shape.count?(beat.epoch) and (beat.leader == nil or Shape.name?(beat.leader)) and
-      Shape.names?(beat.heard) and sight?(beat.sight) and
+      Roll.valid?(beat.heard) and sight?(beat.sight) and
       Enum.all?(
         [beat.standing, beat.in_place, beat.blocked, beat.formed, beat.latched],
         &is_boolean/1

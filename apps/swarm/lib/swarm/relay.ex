@@ -9,7 +9,7 @@ defmodule Swarm.Relay do
   at most, heartbeats stop where they are known. What came by a relay counts as a sign of life, but not as heard, so that the relay goes on
   for as long as it is needed.
   """
-  alias Swarm.{Heartbeat, Message}
+  alias Swarm.{Heartbeat, Message, Roll}
 
   # A robot that has just come is not in anybody's list yet.
   @patience_ms 300
@@ -43,11 +43,13 @@ defmodule Swarm.Relay do
     alive = for {id, %{beat: %Heartbeat{}} = peer} <- peers, alive?(peer, now_ms), do: {id, peer}
     alive = Enum.sort(alive)
     names = Enum.map(alive, &elem(&1, 0))
+    all = Roll.new([me | names])
 
     pairs =
       for {to, %{beat: %{heard: heard}}} <- alive,
-          me in heard,
-          from <- :ordsets.subtract(names, heard),
+          not Roll.all_but?(heard, all, to),
+          Roll.member?(heard, me),
+          from <- names -- Roll.names(heard),
           from != to,
           do: {from, to}
 
@@ -115,7 +117,7 @@ defmodule Swarm.Relay do
       for {id, peer} <- peers,
           id not in [from, to],
           alive?(peer, now_ms),
-          from in peer.beat.heard and id in peers[to].beat.heard,
+          Roll.member?(peer.beat.heard, from) and Roll.member?(peers[to].beat.heard, id),
           do: id
 
     if heard?(peers[from], now_ms),

@@ -251,11 +251,11 @@ defmodule Swarm.LinkTest do
     beat = fn ->
       case Board.peers(Board.find!(first)) do
         %{^second => %{beat: beat}} -> beat
-        _not_yet -> %{sequence: 0, heard: []}
+        _not_yet -> %{sequence: 0, heard: <<>>}
       end
     end
 
-    until(first, fn _ -> ids -- [second | beat.().heard] == [] end)
+    until(first, fn _ -> ids -- [second | Swarm.Roll.names(beat.().heard)] == [] end)
     {begun, from} = {System.monotonic_time(:millisecond), beat.().sequence}
     until(first, fn _ -> beat.().sequence >= from + 6 end)
     assert (System.monotonic_time(:millisecond) - begun) in 900..6_000

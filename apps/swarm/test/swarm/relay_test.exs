@@ -6,7 +6,14 @@ defmodule Swarm.RelayTest do
   defp peers(heard, now_ms) do
     beats =
       for {id, list} <- heard do
-        beat = %Heartbeat{boot: 1, sequence: now_ms, pose: {0, 0, 0}, twist: {0, 0}, heard: list}
+        beat = %Heartbeat{
+          boot: 1,
+          sequence: now_ms,
+          pose: {0, 0, 0},
+          twist: {0, 0},
+          heard: Swarm.Roll.new(list)
+        }
+
         {id, beat}
       end
 

@@ -8,7 +8,7 @@ defmodule Swarm.Missions.Landmark.Council do
   come clearly nearer to the landmark (R76). Leader and
   followers stand still while a round is open, searchers once they have scanned.
   """
-  alias Swarm.{Assignment, Chain, Election, Formation, Message, Peers, Round}
+  alias Swarm.{Assignment, Chain, Election, Formation, Message, Peers, Roll, Round}
   alias Swarm.Missions.Landmark.{Challenge, Merge, Policy, Sight, State}
 
   # Heartbeats come at 5 Hz: after this time the view has settled.
@@ -42,7 +42,7 @@ defmodule Swarm.Missions.Landmark.Council do
   def tick(mission) do
     mission = mission |> Challenge.update() |> Merge.update() |> open() |> report()
     {round, letters, event} = Round.tick(mission.round, mission.now_ms)
-    mission = conclude(event, %{mission | round: round})
+    mission = conclude(event, promise(event, %{mission | round: round}, mission.round.phase))
     to = List.delete(round.view, mission.me)
 
     effects =
@@ -162,20 +162,36 @@ defmodule Swarm.Missions.Landmark.Council do
     peers = beats(mission)
 
     case peers[mission.leader] do
-      nil -> Enum.any?(peers, fn {_id, beat} -> mission.leader in beat.heard end)
+      nil -> Enum.any?(peers, fn {_id, beat} -> Roll.member?(beat.heard, mission.leader) end)
       beat -> beat.phase == :lead
     end
   end
 
+  # Whoever has all digests leads, with those who sent them.
+  defp promise({:commit, record}, mission, _phase) do
+    case Election.leader(record.reports) do
+      {:ok, leader} -> Policy.vow(mission, leader)
+      _none -> mission
+    end
+  end
+
+  # Somebody may have them all, and this robot not.
+  defp promise({:failed, _reason}, mission, :digest), do: Policy.vow(mission, nil)
+  defp promise(_event, mission, _phase), do: mission
+
   defp report(%{round: %{phase: :collect, report: :busy} = round} = mission) do
-    case round.purpose do
+    if Policy.bound?(mission, round.view), do: mission, else: report(mission, round.purpose)
+  end
+
+  defp report(mission), do: mission
+
+  defp report(mission, purpose) do
+    case purpose do
       :change -> put_report(mission, Sight.fresh?(mission.sight, mission.now_ms, @fresh_ms))
       :search when mission.scan == nil -> mission
       :search -> put_report(mission, mission.scan == :found or State.sees?(mission))
     end
   end
-
-  defp report(mission), do: mission
 
   defp put_report(%{percept: %{pose: nil}} = mission, _found?), do: mission
 

@@ -5,7 +5,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   shape is formed. Pure.
   """
   alias Robot.Behaviour
-  alias Swarm.{Anchor, Assignment, Chain, Formation, Message, Peers}
+  alias Swarm.{Anchor, Assignment, Chain, Formation, Message, Peers, Roll}
   alias Swarm.Missions.Landmark.{Council, Merge, Shape, Sight, State}
 
   # The landmark's foot leaves the picture below 1.4 m, and its size with it.
@@ -111,7 +111,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   defp hear(%{of: of} = mission) when of > 0 do
     told =
       for {_id, %{at_ms: at_ms, beat: %{leader: leader, heard: heard}}} <- mission.percept.peers,
-          leader == mission.me and mission.me in heard,
+          leader == mission.me and Roll.member?(heard, mission.me),
           do: at_ms
 
     heard_ms =
@@ -128,7 +128,7 @@ defmodule Swarm.Missions.Landmark.Lead do
     heard? =
       mission.percept.peers
       |> Peers.taking_part(mission.now_ms)
-      |> Enum.any?(fn {_id, beat} -> mission.me in beat.heard end)
+      |> Enum.any?(fn {_id, beat} -> Roll.member?(beat.heard, mission.me) end)
 
     if heard? or mission.order == [],
       do: put_in(mission.lead.heard_ms, mission.now_ms),

@@ -5,7 +5,8 @@ defmodule Swarm.Missions.Landmark.Policy do
   **Who may lead.** `policy: :available` (the default): every part of a fleet leads itself.
   `policy: :majority, of: n`: only a part with more than half of `n` robots may lead; the others stand
   still until they are enough again, and their leader abdicates within its lease. Of 4 robots, 2 are
-  not enough. The number travels in every report and in the anchor, and the greatest that is heard
+  not enough. A robot that a leader may still count on reports in no round without this leader until that
+  lease is over, so that no other one leads before. The number travels in every report and in the anchor, and the greatest that is heard
   counts, so that all of a part judge alike.
 
   **Lost link.** A robot that was with others in this mission, and has heard nobody for 2 s, does
@@ -25,6 +26,10 @@ defmodule Swarm.Missions.Landmark.Policy do
 
   @links [:stop, :hold, :continue]
   @most 1_000
+  # A heartbeat lists who was heard in the last second.
+  @heard_ms 1_000
+  # A leader's lease, and the time that a heartbeat may be under way.
+  @vow_ms 1_800
   # Who has only just been started has heard nobody yet.
   @gather_ms 2_000
 
@@ -71,9 +76,36 @@ defmodule Swarm.Missions.Landmark.Policy do
   @doc "Notes once a tick whether this robot has company."
   @spec update(State.t()) :: State.t()
   def update(%{phase: :idle} = mission),
-    do: %{mission | met?: false, gather_ms: mission.now_ms + @gather_ms}
+    do: %{mission | met?: false, vow: nil, gather_ms: mission.now_ms + @gather_ms}
 
-  def update(mission), do: %{mission | met?: mission.met? or company?(mission)}
+  def update(mission) do
+    mission = %{mission | met?: mission.met? or company?(mission)}
+    if tells?(mission), do: vow(mission, mission.leader), else: mission
+  end
+
+  # Whether its heartbeats say that it follows this leader and hears it.
+  defp tells?(%{leader: leader, me: me}) when leader in [nil, me], do: false
+
+  defp tells?(%{leader: leader} = mission) do
+    case mission.percept.peers do
+      %{^leader => %{direct_ms: at_ms}} when at_ms != nil ->
+        mission.now_ms - at_ms < @heard_ms
+
+      _unheard ->
+        false
+    end
+  end
+
+  @doc "Notes that this leader, or `nil` for one that is not known, may count on this robot from now on."
+  @spec vow(State.t(), atom()) :: State.t()
+  def vow(mission, leader), do: %{mission | vow: {leader, mission.now_ms}}
+
+  @doc "Whether a leader who is not among these may still count on this robot."
+  @spec bound?(State.t(), [atom()]) :: boolean()
+  def bound?(%{of: of, vow: vow}, _view) when of == 0 or vow == nil, do: false
+
+  def bound?(%{vow: {leader, at_ms}} = mission, view),
+    do: leader not in view and mission.now_ms - at_ms < @vow_ms
 
   @doc "Whether it was with others, and hears nobody any more."
   @spec lost?(State.t()) :: boolean()

@@ -40,6 +40,7 @@ defmodule Swarm.Missions.Landmark.State do
                 role: :searcher,
                 met?: false,
                 gather_ms: 0,
+                vow: nil,
                 place: nil,
                 led: 0,
                 rival_ms: nil,
@@ -55,7 +56,7 @@ defmodule Swarm.Missions.Landmark.State do
   belongs to, `size_ppm` is the size that elected the leader, `anchor_ms` when the anchor came.
 
   `of` is the size of the fleet of which a majority is needed, 0 for none; `role` what it was last,
-  `met?` whether it has had company, `place` where it was told to stand last. `led` is how many robots
+  `met?` whether it has had company, `vow` which leader may count on it, and when it last could, `place` where it was told to stand last. `led` is how many robots
   it leads, or led when the round began; since `rival_ms` it hears another leader, since `higher_ms` a later epoch.
   """
   @type t :: %__MODULE__{
@@ -91,6 +92,7 @@ defmodule Swarm.Missions.Landmark.State do
           role: :searcher | :leader | :follower,
           met?: boolean(),
           gather_ms: integer(),
+          vow: {leader :: atom(), at_ms :: integer()} | nil,
           place: Pose.t() | nil,
           led: non_neg_integer(),
           rival_ms: integer() | nil,

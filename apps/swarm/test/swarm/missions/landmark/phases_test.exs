@@ -156,7 +156,7 @@ defmodule Swarm.Missions.Landmark.PhasesTest do
     later = leading |> beat(:mag1, phase: :follow, epoch: 9) |> Group.run(0.1)
     assert [:agree] = entered(later, leading)
 
-    same = leading |> beside(:mag1, [phase: :follow, epoch: 1, heard: [:mag2]], 5)
+    same = leading |> beside(:mag1, [phase: :follow, epoch: 1, heard: Swarm.Roll.new([:mag2])], 5)
     assert [] = entered(same, leading)
     assert mission(same).order == [:mag1]
     # It hears the follower, which hears it no more.
@@ -173,10 +173,13 @@ defmodule Swarm.Missions.Landmark.PhasesTest do
     leading = to(:lead, 0.02)
     asked = leading |> beat(:mag1, []) |> letter({9, 1, :mag1}, :change) |> Group.run(0.1)
     assert [:agree] = entered(asked, leading)
-    rival = leading |> beside(:mag1, [phase: :lead, epoch: 1, heard: [:mag2]], 0.3)
+
+    rival =
+      leading |> beside(:mag1, [phase: :lead, epoch: 1, heard: Swarm.Roll.new([:mag2])], 0.3)
+
     # It waits a little, to hear of all of the other's robots too.
     assert [] = entered(rival, leading)
-    rival = rival |> beside(:mag1, [phase: :lead, epoch: 1, heard: [:mag2]], 0.1)
+    rival = rival |> beside(:mag1, [phase: :lead, epoch: 1, heard: Swarm.Roll.new([:mag2])], 0.1)
     assert [:agree] = entered(rival, leading)
     assert Round.open?(mission(rival).round)
     assert elem(mission(rival).round.id, 0) == 2
@@ -208,7 +211,12 @@ defmodule Swarm.Missions.Landmark.PhasesTest do
 
   test "a leader that is silent for it but heard by others is not replaced" do
     group =
-      following() |> beside(:mag3, [phase: :follow, epoch: 1, leader: :mag1, heard: [:mag1]], 10)
+      following()
+      |> beside(
+        :mag3,
+        [phase: :follow, epoch: 1, leader: :mag1, heard: Swarm.Roll.new([:mag1])],
+        10
+      )
 
     assert phase(group) == :follow
     assert mission(group).round.phase == :none
@@ -230,7 +238,9 @@ defmodule Swarm.Missions.Landmark.PhasesTest do
   end
 
   test "a leader that does not know where it is stands, and tells no place" do
-    leading = to(:lead, 0.02) |> beside(:mag1, [phase: :follow, epoch: 1, heard: [:mag2]], 3)
+    leading =
+      to(:lead, 0.02)
+      |> beside(:mag1, [phase: :follow, epoch: 1, heard: Swarm.Roll.new([:mag2])], 3)
 
     lost = %{
       Group.percept(leading, :mag2)
