@@ -29,7 +29,7 @@ defmodule Swarm.ContractNet do
   The rules are in `Swarm.ContractNet.Manager` and `Swarm.ContractNet.Bidder`.
   """
   alias Swarm.ContractNet.{Cost, Manager}
-  alias Swarm.{Conversation, Envelope, Watch}
+  alias Swarm.{Conversation, Envelope, Shape, Watch}
 
   @doc """
   What a task would cost this robot; `:infinite` if it cannot do it, or does not know it. Short: the
@@ -58,15 +58,14 @@ defmodule Swarm.ContractNet do
   """
   @spec auction(task :: term(), [Conversation.peer()], keyword()) :: Manager.outcome()
   def auction(task, peers, options) do
-    {from, options} = Keyword.pop!(options, :from)
-    pids = for peer <- Enum.uniq(peers), pid = Conversation.find(peer), do: {peer, pid}
+    # All is looked at before anything is begun that would have to be ended.
+    {letter, options} = begin(options)
+    pids = for peer <- Conversation.peers!(peers), pid = Conversation.find(peer), do: {peer, pid}
 
     # An alias for each peer: what comes by it is that peer's, whatever name it gives.
     found = for {peer, pid} <- pids, into: %{}, do: {peer, {pid, :erlang.alias()}}
     refs = for {peer, {_pid, ref}} <- found, into: %{}, do: {ref, peer}
     watch = Watch.start(for {_peer, {pid, ref}} <- found, into: %{}, do: {ref, pid})
-    # The same conversation in all rounds.
-    letter = Envelope.new(:cfp, from, nil)
 
     outcome =
       task
@@ -77,6 +76,16 @@ defmodule Swarm.ContractNet do
     Watch.stop(watch)
     Enum.each(refs, fn {ref, _peer} -> close(ref) end)
     outcome
+  end
+
+  defp begin(options) do
+    unless Keyword.keyword?(options) and Shape.name?(options[:from]) do
+      raise ArgumentError, "an auction needs from: the name of who asks, an atom such as :mag1"
+    end
+
+    {from, options} = Keyword.pop!(options, :from)
+    # The same conversation in all rounds.
+    {Envelope.new(:cfp, from, nil), Manager.options!(options)}
   end
 
   defp run(%{outcome: nil} = manager, found, refs, letter) do

@@ -14,7 +14,7 @@ defmodule Swarm.Conversation do
   that peer is missing. Each peer answers to an alias of its own that takes one message: a second
   answer, and one that comes after the deadline, find no mailbox.
   """
-  alias Swarm.{Directory, Envelope, Watch}
+  alias Swarm.{Directory, Envelope, Shape, Watch}
 
   # Most answers are here long before: only then is it worth asking the runtime whether the others
   # are alive. Between nodes that costs more than the question.
@@ -56,6 +56,9 @@ defmodule Swarm.Conversation do
   @spec request(peer(), Envelope.t(), timeout_ms :: non_neg_integer()) ::
           {:ok, Envelope.t()} | {:error, reason()}
   def request(peer, %Envelope{} = envelope, timeout_ms \\ 500) do
+    patience!(timeout_ms)
+    [peer] = peers!([peer])
+
     case ask([peer], envelope, timeout_ms, 1) do
       {%{^peer => answer}, _missing} -> {:ok, answer}
       {_none, [{^peer, reason}]} -> {:error, reason}
@@ -72,7 +75,8 @@ defmodule Swarm.Conversation do
   @spec gather([peer()], Envelope.t(), deadline_ms :: non_neg_integer(), quorum()) ::
           {:complete | :partial, answers :: %{peer() => Envelope.t()}, missing :: [peer()]}
   def gather(peers, %Envelope{} = envelope, deadline_ms, quorum \\ :all) do
-    peers = Enum.uniq(peers)
+    patience!(deadline_ms)
+    peers = peers!(peers)
     enough = enough(quorum, length(peers))
     {answers, missing} = ask(peers, envelope, deadline_ms, enough)
     state = if map_size(answers) >= enough, do: :complete, else: :partial
@@ -83,7 +87,37 @@ defmodule Swarm.Conversation do
   defp enough(:majority, count), do: div(count, 2) + 1
   defp enough(number, _count) when is_integer(number) and number >= 0, do: number
 
-  defp ask(peers, envelope, ms, enough) when is_integer(ms) and ms >= 0 do
+  defp enough(other, _count) do
+    raise ArgumentError,
+          "quorum cannot be #{brief(other)}: :all, :majority, or a whole number from 0"
+  end
+
+  @doc false
+  # What is wrong here is the program's own, and raises; what is wrong with others is answered.
+  @spec patience!(term()) :: :ok
+  def patience!(ms) do
+    if Shape.ms?(ms),
+      do: :ok,
+      else: raise(ArgumentError, "nobody can wait #{brief(ms)}: whole ms, up to a day")
+  end
+
+  @doc false
+  @spec peers!(term()) :: [peer()]
+  def peers!(peers) do
+    if is_list(peers) and not List.improper?(peers) and Enum.all?(peers, &peer?/1),
+      do: Enum.uniq(peers),
+      else:
+        raise(
+          ArgumentError,
+          "#{brief(peers)} are no peers: processes, or {:mag1, :service}, in a list"
+        )
+  end
+
+  defp peer?({robot, service}), do: is_atom(robot) and is_atom(service)
+  defp peer?(pid), do: is_pid(pid)
+  defp brief(term), do: inspect(term, limit: 5, printable_limit: 40)
+
+  defp ask(peers, envelope, ms, enough) do
     now = System.monotonic_time(:millisecond)
     {pending, missing} = post_all(peers, envelope, %{}, [])
     deadline = now + ms

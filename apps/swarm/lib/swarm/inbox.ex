@@ -34,21 +34,16 @@ defmodule Swarm.Inbox do
           unwanted: non_neg_integer()
         }
 
-  @doc "An empty inbox. Options: `:limit` (default #{@limit}), `:template` (default `[]`, everything)."
+  @doc "An empty inbox. Options: `:limit` (default #{@limit}), `:template` (default `[]`, everything); wrong ones raise."
   @spec new(keyword()) :: t()
   def new(options \\ []) do
     options = Keyword.validate!(options, limit: @limit, template: [])
 
-    case Template.check(options[:template]) do
-      {:ok, template} ->
-        %__MODULE__{
-          mailbox: Mailbox.new(options[:limit]),
-          template: template,
-          turn: make_ref()
-        }
-
-      {:error, line} ->
-        raise ArgumentError, line
+    with {:ok, limit} <- Mailbox.limit(options[:limit]),
+         {:ok, template} <- Template.check(options[:template]) do
+      %__MODULE__{mailbox: Mailbox.new(limit), template: template, turn: make_ref()}
+    else
+      {:error, line} -> raise ArgumentError, line
     end
   end
 

@@ -42,6 +42,18 @@ defmodule Swarm.Mailbox do
   @spec new(pos_integer()) :: t()
   def new(limit) when is_integer(limit) and limit > 0, do: %__MODULE__{limit: limit}
 
+  @doc """
+  Whether it can be a mailbox's limit, or one line.
+
+      iex> Swarm.Mailbox.limit(0)
+      {:error, "limit cannot be 0: a whole number above 0"}
+  """
+  @spec limit(term()) :: {:ok, pos_integer()} | {:error, line :: String.t()}
+  def limit(limit) when is_integer(limit) and limit > 0, do: {:ok, limit}
+
+  def limit(other),
+    do: {:error, "limit cannot be #{inspect(other, limit: 5)}: a whole number above 0"}
+
   @doc "How many wait."
   @spec size(t()) :: non_neg_integer()
   def size(mailbox), do: mailbox.size + mailbox.urgent_size

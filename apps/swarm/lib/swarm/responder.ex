@@ -55,16 +55,31 @@ defmodule Swarm.Responder do
   @spec start_link(name :: atom(), keyword()) :: GenServer.on_start()
   def start_link(name, options) do
     allowed = [:service, :module, argument: nil, topics: [], limit: 1_000, template: []]
+
+    unless Keyword.keyword?(options),
+      do: raise(ArgumentError, "a responder has options such as service: :power, module: Battery")
+
     options = Keyword.validate!(options, allowed)
+    _would_be = Inbox.new(Keyword.take(options, [:limit, :template]))
 
     unless Shape.name?(name) and Shape.name?(options[:service]),
       do: raise(ArgumentError, "a responder needs a name and a :service, both atoms")
 
-    unless is_list(options[:topics]) and Enum.all?(options[:topics], &Envelope.topic?/1),
-      do: raise(ArgumentError, "#{inspect(options[:topics])} are no topics: atoms or text")
+    unless is_list(options[:topics]) and not List.improper?(options[:topics]) and
+             Enum.all?(options[:topics], &Envelope.topic?/1),
+           do: raise(ArgumentError, "#{inspect(options[:topics])} are no topics: atoms or text")
+
+    unless responder?(options[:module]),
+      do: raise(ArgumentError, "module cannot be #{inspect(options[:module])}: a Swarm.Responder")
 
     via = Names.via(name, {:service, options[:service]})
     GenServer.start_link(__MODULE__, {name, options}, name: via)
+  end
+
+  # Only of a module that is loaded it is known what it exports.
+  defp responder?(module) do
+    is_atom(module) and Code.ensure_loaded?(module) and function_exported?(module, :init, 2) and
+      function_exported?(module, :handle, 2)
   end
 
   @doc "What it has dropped, by reason, and how many envelopes wait."
@@ -73,9 +88,7 @@ defmodule Swarm.Responder do
 
   @impl GenServer
   def init({name, options}) do
-    service = options[:service]
-    # Only of a module that is loaded it is known what it exports.
-    {:module, module} = Code.ensure_loaded(options[:module])
+    [service, module] = [options[:service], options[:module]]
     groups = for topic <- options[:topics], do: {:topic, topic}
 
     {:ok,

@@ -7,6 +7,7 @@ defmodule Swarm.Shape do
   @far 1_000_000_000
   @count 500_000_000
   @most 1_000
+  @day_ms 86_400_000
 
   @doc """
   Whether a struct has all the fields of its kind and no others: over the wire anything can come.
@@ -79,6 +80,15 @@ defmodule Swarm.Shape do
   """
   @spec count?(term()) :: boolean()
   def count?(term), do: is_integer(term) and term in 0..@count
+
+  @doc """
+  Whether it is a time in ms that somebody may wait: up to a day.
+
+      iex> for term <- [0, 500, -1, 1.5, :infinity], do: Swarm.Shape.ms?(term)
+      [true, true, false, false, false]
+  """
+  @spec ms?(term()) :: boolean()
+  def ms?(term), do: is_integer(term) and term in 0..@day_ms
 
   @doc """
   Whether it is a pose as robots tell it, `{x_mm, y_mm, mrad}`.

@@ -14,7 +14,7 @@ defmodule Swarm.Topic do
   ends with its owner. A process with other things to do asks with `more/1`, and gets one message
   `{:topic, subscription, envelope}` for it. A `Swarm.Responder` has its own way, `:topics`.
   """
-  alias Swarm.{Conversation, Directory, Envelope, Template}
+  alias Swarm.{Conversation, Directory, Envelope, Mailbox, Template}
   alias Swarm.Topic.Subscription
 
   @limit 100
@@ -27,7 +27,7 @@ defmodule Swarm.Topic do
   def subscribe(topic, options \\ []) do
     with :ok <- named(topic),
          :ok <- known(options),
-         {:ok, limit} <- limit(Keyword.get(options, :limit, @limit)),
+         {:ok, limit} <- Mailbox.limit(Keyword.get(options, :limit, @limit)),
          {:ok, template} <- Template.check(Keyword.get(options, :template, [])),
          do: Subscription.start_link(self(), topic, limit, template)
   end
@@ -44,6 +44,7 @@ defmodule Swarm.Topic do
   @spec next(subscription :: pid(), timeout_ms :: non_neg_integer()) ::
           {:ok, Envelope.t()} | :none
   def next(subscription, timeout_ms) do
+    Conversation.patience!(timeout_ms)
     more(subscription)
 
     receive do
@@ -100,7 +101,4 @@ defmodule Swarm.Topic do
         :ok
     end
   end
-
-  defp limit(limit) when is_integer(limit) and limit > 0, do: {:ok, limit}
-  defp limit(other), do: {:error, "limit cannot be #{inspect(other)}: a whole number above 0"}
 end

@@ -33,6 +33,20 @@ defmodule Swarm.Answerers do
     end
   end
 
+  @doc "One that bids so much for tasks, for another node."
+  @spec start_bidder(atom(), Swarm.ContractNet.Cost.t()) :: pid()
+  def start_bidder(name, cost) do
+    options = [
+      service: :tasks,
+      module: Swarm.ContractNet.Bidding,
+      argument: {__MODULE__.Carry, cost}
+    ]
+
+    {:ok, pid} = Swarm.Responder.start_link(name, options)
+    Process.unlink(pid)
+    pid
+  end
+
   @doc "One that hears a topic."
   @spec start_topic(Swarm.Envelope.topic()) :: pid()
   def start_topic(topic) do

@@ -163,9 +163,33 @@ defmodule Swarm.ConversationTest do
           [module: Answerers.Echo],
           [service: "x", module: Answerers.Echo],
           [service: :x, module: Answerers.Echo, topics: [1]],
-          [service: :x, module: Answerers.Echo, speed: 1]
+          [service: :x, module: Answerers.Echo, speed: 1],
+          [service: :x, module: Answerers.Echo, limit: 0],
+          [service: :x, module: Answerers.Echo, topics: [:a | :b]],
+          [service: :x, module: Answerers],
+          [service: :x, module: "Echo"],
+          :junk
         ],
         do: assert_raise(ArgumentError, fn -> Responder.start_link(:talk_bad, options) end)
+  end
+
+  test "who asks in a wrong way is told so in one line" do
+    alias Swarm.Topic
+
+    for ask <- [
+          fn -> Conversation.request({:a, :b}, question(1), -1) end,
+          fn -> Conversation.request({:a, :b}, question(1), :infinity) end,
+          fn -> Conversation.request(:a, question(1), 1) end,
+          fn -> Conversation.gather([], question(1), 1.0e308) end,
+          fn -> Conversation.gather(:a, question(1), 1) end,
+          fn -> Conversation.gather([:a | :b], question(1), 1) end,
+          fn -> Conversation.gather([], question(1), 1, :half) end,
+          fn -> Conversation.gather([], question(1), 1, -1) end,
+          fn -> Topic.next(self(), 5_000_000_000) end
+        ] do
+      assert %ArgumentError{message: line} = catch_error(ask.())
+      refute line =~ "\n"
+    end
   end
 
   # start_supervised starts it again under the same name: then it is another process.

@@ -118,7 +118,10 @@ defmodule Swarm.MailboxTest do
     test "bad options raise at the start" do
       assert_raise ArgumentError, ~r/:speed/, fn -> Inbox.new(template: [speed: 1]) end
       assert_raise ArgumentError, fn -> Inbox.new(size: 1) end
-      assert_raise FunctionClauseError, fn -> Inbox.new(limit: 0) end
+
+      assert_raise ArgumentError, "limit cannot be 0: a whole number above 0", fn ->
+        Inbox.new(limit: 0)
+      end
     end
   end
 end

@@ -16,6 +16,8 @@ defmodule Swarm.ContractNet.Manager do
   `start/4` takes `:bid_ms` (500), `:silence_ms` (5000) and `:rounds` (3), how often it is announced.
   Functions return the letters to send, `{peer, performative, content}`.
   """
+  alias Swarm.Shape
+
   @enforce_keys [:task, :peers, :bid_ms, :silence_ms, :rounds]
   defstruct @enforce_keys ++
               [
@@ -51,14 +53,21 @@ defmodule Swarm.ContractNet.Manager do
   @doc "Announces a task."
   @spec start(term(), [peer()], keyword(), integer()) :: {t(), [letter()]}
   def start(task, peers, options, now_ms) do
+    fields = [task: task, peers: Enum.sort(Enum.uniq(peers))]
+    announce(struct!(__MODULE__, fields ++ options!(options)), :nobody, now_ms)
+  end
+
+  @doc "The options of a manager, whole; wrong ones raise with one line."
+  @spec options!(keyword()) :: keyword()
+  def options!(options) do
     options = Keyword.validate!(options, bid_ms: 500, silence_ms: 5_000, rounds: 3)
 
-    for {option, value} <- options, not (is_integer(value) and value > 0) do
-      raise ArgumentError, "#{option} cannot be #{inspect(value)}: a whole number above 0"
+    for {option, value} <- options, not (Shape.ms?(value) and value > 0) do
+      raise ArgumentError,
+            "#{option} cannot be #{inspect(value, limit: 5)}: a whole number above 0, ms up to a day"
     end
 
-    fields = [task: task, peers: Enum.sort(Enum.uniq(peers))]
-    announce(struct!(__MODULE__, fields ++ options), :nobody, now_ms)
+    options
   end
 
   @doc "A letter came from one of the peers. What makes no sense changes nothing."

@@ -30,8 +30,28 @@ defmodule Swarm.ContractNet.AuctionTest do
              {:error, :no_bids}
            ]
 
-    assert Process.info(self(), :messages) == {:messages, []}
-    assert_raise KeyError, fn -> ContractNet.auction(1, [], []) end
+    idle = [messages: [], monitored_by: elem(Process.info(self(), :monitored_by), 1)]
+
+    for {options, peers} <- [
+          {[], peers},
+          {:junk, peers},
+          {[from: "base"], peers},
+          {[from: :base, bid_ms: 0], peers},
+          {[from: :base, rounds: 5_000_000_000], peers},
+          {[from: :base, silence_ms: 1.0e308], peers},
+          {[from: :base, speed: 1], peers},
+          {[from: :base], :bid_a},
+          {[from: :base], [:bid_a | :bid_b]},
+          {[from: :base], ["bid_a"]}
+        ] do
+      assert %ArgumentError{message: line} =
+               catch_error(ContractNet.auction({:carry, 1}, peers, options))
+
+      refute line =~ "\n"
+    end
+
+    # Nothing was begun that is still there.
+    assert Process.info(self(), [:messages, :monitored_by]) == idle
   end
 
   test "a robot does one task at a time" do
