@@ -57,7 +57,6 @@ defmodule Swarm.Conversation do
           {:ok, Envelope.t()} | {:error, reason()}
   def request(peer, %Envelope{} = envelope, timeout_ms \\ 500) do
     patience!(timeout_ms)
-    [peer] = peers!([peer])
 
     case ask([peer], envelope, timeout_ms, 1) do
       {%{^peer => answer}, _missing} -> {:ok, answer}
@@ -104,17 +103,11 @@ defmodule Swarm.Conversation do
   @doc false
   @spec peers!(term()) :: [peer()]
   def peers!(peers) do
-    if is_list(peers) and not List.improper?(peers) and Enum.all?(peers, &peer?/1),
+    if is_list(peers) and not List.improper?(peers),
       do: Enum.uniq(peers),
-      else:
-        raise(
-          ArgumentError,
-          "#{brief(peers)} are no peers: processes, or {:mag1, :service}, in a list"
-        )
+      else: raise(ArgumentError, "#{brief(peers)} is no list of peers")
   end
 
-  defp peer?({robot, service}), do: is_atom(robot) and is_atom(service)
-  defp peer?(pid), do: is_pid(pid)
   defp brief(term), do: inspect(term, limit: 5, printable_limit: 40)
 
   defp ask(peers, envelope, ms, enough) do

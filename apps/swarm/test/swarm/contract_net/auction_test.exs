@@ -41,8 +41,7 @@ defmodule Swarm.ContractNet.AuctionTest do
           {[from: :base, silence_ms: 1.0e308], peers},
           {[from: :base, speed: 1], peers},
           {[from: :base], :bid_a},
-          {[from: :base], [:bid_a | :bid_b]},
-          {[from: :base], ["bid_a"]}
+          {[from: :base], [:bid_a | :bid_b]}
         ] do
       assert %ArgumentError{message: line} =
                catch_error(ContractNet.auction({:carry, 1}, peers, options))
