@@ -68,7 +68,7 @@ defmodule Swarm.Conversation do
   Asks many at once, and gives what they answer, and who is missing. It ends when the quorum has
   answered, when all that are still there have, or at the deadline (ms from now).
 
-  The quorum is `:all` (the default), `:majority` of the peers asked, or a number. `:complete` says that
+  Who is missing is told in the order of the peers. The quorum is `:all` (the default), `:majority` of the peers asked, or a number. `:complete` says that
   it was reached. A peer that cannot be reached, or that leaves meanwhile, is not waited for.
   """
   @spec gather([peer()], Envelope.t(), deadline_ms :: non_neg_integer(), quorum()) ::
@@ -79,7 +79,15 @@ defmodule Swarm.Conversation do
     enough = enough(quorum, length(peers))
     {answers, missing} = ask(peers, envelope, deadline_ms, enough)
     state = if map_size(answers) >= enough, do: :complete, else: :partial
-    {state, answers, for({peer, _reason} <- missing, do: peer)}
+    {state, answers, in_order(peers, missing)}
+  end
+
+  # As they were asked, and not as they fell out.
+  defp in_order(_peers, []), do: []
+
+  defp in_order(peers, missing) do
+    missing = Map.new(missing)
+    for peer <- peers, is_map_key(missing, peer), do: peer
   end
 
   defp enough(:all, count), do: count

@@ -1,14 +1,8 @@
 defmodule Mix.Tasks.Fleet.CertsTest do
-  use ExUnit.Case, async: false
+  use Swarm.TaskCase, async: false
   alias Mix.Tasks.Fleet.Certs, as: Task
 
-  @moduletag :tmp_dir
   unless System.find_executable("openssl"), do: @moduletag(skip: "openssl is missing")
-
-  setup do
-    Mix.shell(Mix.Shell.Process)
-    on_exit(fn -> Mix.shell(Mix.Shell.IO) end)
-  end
 
   test "makes a CA and robots, keeps what is there, adds a robot by the same CA", %{tmp_dir: tmp} do
     out = Path.join(tmp, "certs")
@@ -36,28 +30,14 @@ defmodule Mix.Tasks.Fleet.CertsTest do
 
   test "wrong words are one line, and nothing is made", %{tmp_dir: tmp} do
     out = Path.join(tmp, "certs")
-    assert refused(["--out", out]) == "which robots? Give their names, or --fleet FILE"
-    assert refused(["--colour"]) == "--colour is no option; --help lists them"
-    assert refused(["../mag1", "--out", out]) =~ ~s("../mag1" is no robot's name)
-    assert refused(["--fleet", "/nowhere"]) =~ "cannot be read: no such file"
-    assert refused(["--fleet", tmp]) =~ "is no file of names"
+    assert refused(Task, ["--out", out]) == "which robots? Give their names, or --fleet FILE"
+    assert refused(Task, ["--colour"]) == "--colour is no option; --help lists them"
+    assert refused(Task, ["../mag1", "--out", out]) =~ ~s("../mag1" is no robot's name)
+    assert refused(Task, ["--fleet", "/nowhere"]) =~ "cannot be read: no such file"
+    assert refused(Task, ["--fleet", tmp]) =~ "is no file of names"
     refute File.exists?(out)
     File.mkdir_p!(out)
     File.write!(Path.join(out, "ca.pem"), "")
-    assert refused(["mag1", "--out", out]) =~ "has a ca.pem, but not its key"
-  end
-
-  defp said do
-    receive do
-      {:mix_shell, :info, [line]} -> [line | said()]
-    after
-      0 -> []
-    end
-  end
-
-  defp refused(words) do
-    assert catch_exit(Task.run(words)) == {:shutdown, 1}
-    assert_received {:mix_shell, :error, [line]}
-    line
+    assert refused(Task, ["mag1", "--out", out]) =~ "has a ca.pem, but not its key"
   end
 end
