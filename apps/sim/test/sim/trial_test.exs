@@ -1,18 +1,8 @@
 defmodule Sim.TrialTest do
   @moduledoc "Whole missions in lockstep: every layer but the processes."
   use ExUnit.Case, async: true
+  import Sim.TrialRuns
   alias Sim.Trial
-
-  defp run(options) do
-    {:ok, trial} = Trial.new(Map.merge(%{blobs: :direct}, options))
-    to_the_end(trial)
-  end
-
-  defp to_the_end(trial),
-    do: if(Trial.done?(trial), do: trial, else: to_the_end(Trial.step(trial)))
-
-  defp until(trial, condition),
-    do: if(condition.(trial), do: trial, else: until(Trial.step(trial), condition))
 
   defp stages(trial), do: Enum.map(Trial.result(trial).stages, & &1.stage)
 

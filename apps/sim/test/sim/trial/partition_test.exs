@@ -1,22 +1,12 @@
 defmodule Sim.Trial.PartitionTest do
   @moduledoc "Whole missions in lockstep while the radio is cut and mended."
   use ExUnit.Case, async: true
+  import Sim.TrialRuns
   alias Sim.Trial
   alias Sim.Trial.{Accord, Cuts}
 
   @left [:mag1, :min2, :mag3]
   @right [:mag2, :min1, :min3]
-
-  defp run(options) do
-    {:ok, trial} = Trial.new(Map.merge(%{blobs: :direct}, options))
-    to_the_end(trial)
-  end
-
-  defp to_the_end(trial),
-    do: if(Trial.done?(trial), do: trial, else: to_the_end(Trial.step(trial)))
-
-  defp until(trial, condition),
-    do: if(condition.(trial), do: trial, else: until(Trial.step(trial), condition))
 
   defp elections(result), do: Enum.count(result.stages, &(&1.stage == :elected))
 
