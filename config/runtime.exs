@@ -1,8 +1,10 @@
 import Config
 
 # The settings of a robot, from its environment; `rel/env.sh.eex` lists and checks them. Outside of
-# a release nothing of this applies.
-if System.get_env("RELEASE_NAME") && System.get_env("ROBOT") do
+# a release `bin/node` sets them, and else nothing of this applies.
+robot = System.get_env("RELEASE_NAME") && System.get_env("ROBOT")
+
+if name = robot || System.get_env("CONVOY_NODE") do
   number = fn name, default ->
     case Integer.parse(System.get_env(name, "")) do
       {number, ""} -> number
@@ -18,15 +20,14 @@ if System.get_env("RELEASE_NAME") && System.get_env("ROBOT") do
       {:error, :einval} -> []
     end
 
-  dist_port =
-    number.("CONVOY_DIST_PORT", Swarm.Mesh.Epmd.default_port(System.fetch_env!("ROBOT")))
+  dist_port = number.("CONVOY_DIST_PORT", Swarm.Mesh.Epmd.default_port(name))
 
   config :swarm,
     mesh:
       [
         secret_file: System.get_env("CONVOY_SECRET_FILE", "/etc/convoy/secret"),
         dist_port: dist_port,
-        port: number.("CONVOY_UDP_PORT", 4370),
+        port: number.("CONVOY_UDP_PORT", if(robot, do: 4370, else: 0)),
         peers: words.("CONVOY_UDP_PEERS")
       ] ++ interface
 end
