@@ -115,7 +115,7 @@ defmodule Swarm.Envelope do
       conversation: nil
     }
 
-    envelope = Enum.reduce(options, envelope, &put/2)
+    envelope = Enum.reduce(options!(options), envelope, &put/2)
 
     %{envelope | conversation: envelope.conversation || make_ref()}
     |> check()
@@ -227,6 +227,16 @@ defmodule Swarm.Envelope do
   defp valid?(:topic, topic), do: topic == nil or topic?(topic)
   defp valid?(:class, class), do: class in @classes
   defp valid?(field, _anything) when field in [:__struct__, :content], do: true
+
+  defp options!(options) do
+    if is_list(options) and not List.improper?(options),
+      do: options,
+      else:
+        raise(
+          ArgumentError,
+          "the options of an envelope are a list, not #{inspect(options, limit: 5)}"
+        )
+  end
 
   defp put({option, value}, envelope) when option in @options,
     do: Map.replace!(envelope, option, value)

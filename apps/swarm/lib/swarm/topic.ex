@@ -79,8 +79,15 @@ defmodule Swarm.Topic do
   @spec publish(Envelope.topic(), from :: atom(), content :: term(), keyword()) ::
           non_neg_integer()
   def publish(topic, from, content, options \\ []) do
-    envelope = Envelope.new(:inform, from, content, Keyword.put(options, :topic, topic))
+    envelope = Envelope.new(:inform, from, content, under(topic, options))
     Enum.count(Directory.members({:topic, topic}), &(Conversation.post(&1, envelope) == :ok))
+  end
+
+  # What is no list of options is refused by the envelope.
+  defp under(topic, options) do
+    if is_list(options) and not List.improper?(options),
+      do: options ++ [topic: topic],
+      else: options
   end
 
   defp named(topic) do

@@ -45,6 +45,14 @@ defmodule Swarm.BlackboardTest do
     assert Ether.get(air).largest <= 1_200
   end
 
+  test "who is no robot at all cannot write either, and is told so at once" do
+    {[a], _air} = boards(1)
+    assert {:error, line} = Blackboard.put(a, "mag1", :door, 1)
+
+    assert line ==
+             ~s("mag1" is no robot of this node; each robot writes its own rows, on its node)
+  end
+
   test "what was lost is repaired, by way of third parties too" do
     {[a, b, c], air} = boards(3)
     Ether.change(air, cut: [{a, c}], loss: 0.4, doubled: 0.3)

@@ -46,8 +46,7 @@ defmodule Swarm.Blackboard.Keeper do
   def handle_call({:enter, robot, boot, owner}, _from, s) when is_owner(owner, robot, boot),
     do: {:reply, :ok, enter(s, owner, robot, boot)}
 
-  def handle_call({:put, robot, key, payload}, _from, s)
-      when is_atom(robot) and is_binary(payload) do
+  def handle_call({:put, robot, key, payload}, _from, s) when is_binary(payload) do
     case put_one(s, robot, key, payload) do
       {:ok, s} -> {:reply, :ok, s}
       {:error, reason} -> {:reply, {:error, line(reason, robot, key, payload, s)}, s}

@@ -146,7 +146,8 @@ defmodule Swarm.Mesh.Options do
   end
 
   defp start(options) do
-    gossip = if options.multicast, do: [{Strategy.Gossip, options.multicast}], else: []
+    gossip = if options.multicast == false, do: [], else: [{Strategy.Gossip, options.multicast}]
+
     static = if options.peers != [], do: [{Strategy.Static, options.peers}], else: []
 
     with true <-

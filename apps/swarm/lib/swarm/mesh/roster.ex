@@ -50,7 +50,10 @@ defmodule Swarm.Mesh.Roster do
   """
   @spec check(term()) :: :ok | {:error, String.t()}
   def check(fleet) when is_list(fleet) and length(fleet) in 1..@most do
-    case Enum.reject(fleet, &(is_atom(&1) and Regex.match?(~r/^[a-z][a-z0-9_]{0,30}$/, "#{&1}"))) do
+    case Enum.reject(
+           fleet,
+           &(is_atom(&1) and Regex.match?(~r/\A[a-z][a-z0-9_]{0,30}\z/, "#{&1}"))
+         ) do
       [] -> :ok
       [wrong | _] -> {:error, "fleet names robots by atoms such as :mag1, not #{inspect(wrong)}"}
     end

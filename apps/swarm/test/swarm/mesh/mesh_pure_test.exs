@@ -58,6 +58,8 @@ defmodule Swarm.Mesh.PureTest do
           {[peers: ["10.0.0.1"]], ~s(not "10.0.0.1")},
           {[peers: :all], "peers are addresses"},
           {[interface: "eth0"], "mesh interface"},
+          {[multicast: nil], "mesh multicast"},
+          {[fleet: [:"mag1\n"]], "fleet names robots by atoms"},
           {[fleet: ["mag1"]], "fleet names robots by atoms"},
           {[strategies: [String]], "strategies are {Module, options}"},
           {[strategies: [{String, 1}]], "strategy String is no Swarm.Mesh.Strategy"},
