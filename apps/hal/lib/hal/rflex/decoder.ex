@@ -172,11 +172,11 @@ defmodule Hal.RFlex.Decoder do
 
   defp ghosts([{head?, data?, sum?} | ways], body, ghost, idle?) do
     found =
-      with {:ok, <<port, id, opcode>>, rest} <- take(body, 3, head? && ghost, <<>>),
-           {:ok, <<n>>, rest} <- take(rest, 1, data? && ghost, <<>>),
+      with {:ok, <<port, id, opcode>>, rest} <- take(body, 3, where(head?, ghost), <<>>),
+           {:ok, <<n>>, rest} <- take(rest, 1, where(data?, ghost), <<>>),
            true <- possible?(port, opcode, n) || :no,
-           {:ok, data, rest} <- take(rest, n, data? && ghost, <<>>),
-           {:ok, <<sum>>, rest} <- take(rest, 1, sum? && ghost, <<>>),
+           {:ok, data, rest} <- take(rest, n, where(data?, ghost), <<>>),
+           {:ok, <<sum>>, rest} <- take(rest, 1, where(sum?, ghost), <<>>),
            do: finish(:ghost, {port, id, opcode}, n, <<data::binary, sum, rest::binary>>)
 
     case unless_idle(found, idle?) do
@@ -184,6 +184,9 @@ defmodule Hal.RFlex.Decoder do
       found -> found
     end
   end
+
+  defp where(true, ghost), do: ghost
+  defp where(false, _ghost), do: nil
 
   # `count` bytes without the ghosts after each 1B. What has no ghost where one belongs is no such frame.
   defp take(rest, 0, _ghost, taken), do: {:ok, taken, rest}
