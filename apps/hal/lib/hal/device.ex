@@ -23,6 +23,11 @@ defmodule Hal.Device do
   driver and rests for 500 ms before it goes, so that a driver which falls over every message
   cannot use up the supervisor's restarts, and with them the robot's other devices.
 
+  ## Wishes
+
+  Wheels that are offline do not hear what is asked of them: a speed is for now. A pan-tilt unit
+  is asked where to look; once it is (again) online, its device tells it the last of that.
+
   ## Wheels
 
   A drive that hears no speed for 500 ms stops its wheels. This is the second line behind the
@@ -38,7 +43,14 @@ defmodule Hal.Device do
 
   @enforce_keys [:kind, :device, :driver, :options, :sinks, :clock]
   defstruct @enforce_keys ++
-              [inner: :closed, health: nil, retry_ms: @retry_ms, retry: nil, watchdog: nil]
+              [
+                inner: :closed,
+                health: nil,
+                retry_ms: @retry_ms,
+                retry: nil,
+                watchdog: nil,
+                wishes: %{}
+              ]
 
   @type kind :: :drive | :ptz | :camera
   @type status :: {:online | {:offline, reason :: term()}, since_ms :: integer()}
@@ -61,10 +73,15 @@ defmodule Hal.Device do
   @spec drive(GenServer.server(), Twist.t()) :: :ok
   def drive(device, %Twist{} = twist), do: GenServer.cast(device, {:drive, twist})
 
-  @doc "Asks a pan-tilt unit to look there (radians, left and up positive). While it is offline, this is lost."
+  @doc "Asks a pan-tilt unit to look there (radians, left and up positive)."
   @spec look(GenServer.server(), pan :: float(), tilt :: float()) :: :ok
   def look(device, pan, tilt) when is_float(pan) and is_float(tilt),
     do: GenServer.cast(device, {:look, pan, tilt})
+
+  @doc "Asks a pan-tilt unit to zoom to a horizontal field of view (radians). One that cannot does nothing."
+  @spec zoom(GenServer.server(), field_of_view :: float()) :: :ok
+  def zoom(device, field_of_view) when is_float(field_of_view),
+    do: GenServer.cast(device, {:zoom, field_of_view})
 
   @impl GenServer
   def init(device) do
@@ -82,8 +99,10 @@ defmodule Hal.Device do
     {:noreply, done(s, s.driver.drive(twist, inner))}
   end
 
-  def handle_cast({:look, pan, tilt}, %{kind: :ptz, inner: {:open, inner}} = s),
-    do: {:noreply, done(s, s.driver.look(pan, tilt, inner))}
+  def handle_cast({:look, pan, tilt}, %{kind: :ptz} = s),
+    do: {:noreply, wish(s, :look, [pan, tilt])}
+
+  def handle_cast({:zoom, angle}, %{kind: :ptz} = s), do: {:noreply, wish(s, :zoom, [angle])}
 
   def handle_cast(_command, s), do: {:noreply, s}
 
@@ -138,7 +157,7 @@ defmodule Hal.Device do
 
   defp open(s) do
     case s.driver.init(s.options) do
-      {:ok, inner} -> ask(report(%{s | inner: {:open, inner}}, :online))
+      {:ok, inner} -> %{s | inner: {:open, inner}} |> report(:online) |> ask() |> remind()
       {:error, reason} -> retry(report(s, {:offline, reason}))
     end
   end
@@ -160,6 +179,22 @@ defmodule Hal.Device do
   # A camera gives its next picture only once the last one was handed on.
   defp ask(%{kind: :camera, inner: {:open, inner}} = s), do: done(s, s.driver.next(inner))
   defp ask(s), do: s
+
+  defp wish(s, callback, arguments),
+    do: carry_out(%{s | wishes: Map.put(s.wishes, callback, arguments)}, callback)
+
+  # Where a pan-tilt unit was to look before it failed, or while nobody was there.
+  defp remind(s), do: s.wishes |> Map.keys() |> Enum.reduce(s, &carry_out(&2, &1))
+
+  defp carry_out(%{inner: {:open, inner}} = s, callback) do
+    arguments = s.wishes[callback] ++ [inner]
+
+    if function_exported?(s.driver, callback, length(arguments)),
+      do: done(s, apply(s.driver, callback, arguments)),
+      else: s
+  end
+
+  defp carry_out(s, _callback), do: s
 
   defp arm(s, twist) do
     s = disarm(s)

@@ -6,7 +6,18 @@ defmodule Hal.Ptz do
   Run by `Hal.Device`, like `Hal.Drive`.
   """
 
-  @type reading :: {:ptz, %{pan: float(), tilt: float(), field_of_view: float()}}
+  @typedoc """
+  Where it looks. `age_ms`: how long ago that was when the reading was handed on, where the driver
+  knows.
+  """
+  @type reading ::
+          {:ptz,
+           %{
+             required(:pan) => float(),
+             required(:tilt) => float(),
+             required(:field_of_view) => float(),
+             optional(:age_ms) => non_neg_integer()
+           }}
 
   @doc "Opens the line."
   @callback init(keyword()) :: {:ok, state :: term()} | {:error, reason :: term()}
@@ -15,10 +26,16 @@ defmodule Hal.Ptz do
   @callback look(pan :: float(), tilt :: float(), state :: term()) ::
               {:ok, term()} | {:error, term(), term()}
 
+  @doc "Zooms to a horizontal field of view (radians), or as near as the unit can."
+  @callback zoom(field_of_view :: float(), state :: term()) ::
+              {:ok, term()} | {:error, term(), term()}
+
   @doc "Turns one raw message from the line into readings; unknown messages give `[]`."
   @callback handle_message(term(), state :: term()) ::
               {:ok, [reading()], term()} | {:error, term(), term()}
 
   @doc "Closes the line."
   @callback terminate(state :: term()) :: :ok
+
+  @optional_callbacks zoom: 2
 end

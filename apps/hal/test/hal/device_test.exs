@@ -101,6 +101,21 @@ defmodule Hal.DeviceTest do
     assert_receive {:ptz, %{pan: 0.5}}
   end
 
+  test "a pan-tilt unit that was away is told the last of where to look, and nothing it cannot do" do
+    pid = device(:ptz)
+    Device.look(pid, 0.1, 0.0)
+    Device.zoom(pid, 0.5)
+    assert_receive {:ptz, {:look, 0.1, _}, ^pid}
+    send(pid, {:fail, :eio})
+    assert_receive {:ptz, :terminate, ^pid}
+    Device.look(pid, 0.2, 0.0)
+    Device.look(pid, 0.3, 0.0)
+    assert_receive {:health, :ptz, {{:offline, :eio}, _}}
+    assert_receive {:ptz, :init, ^pid}
+    assert_receive {:ptz, {:look, 0.3, _}, ^pid}
+    refute_received {:ptz, {:look, _, _}, ^pid}
+  end
+
   test "a camera is asked for the next frame when the last was handed on" do
     pid = device(:camera)
     assert_receive {:camera, :next, ^pid}

@@ -1,0 +1,145 @@
+defmodule Hal.Visca.Driver do
+  @moduledoc """
+  The pan-tilt-zoom unit of a Sony EVI-D30 or D31 on a serial line, run by `Hal.Device`.
+
+      {Hal.Device, kind: :ptz, driver: {Hal.Visca.Driver, port: "/dev/ttyS2"}, sinks: [...]}
+
+  Options: `Hal.Visca.Options`. What it does and when is `Hal.Visca.Head`, a function; this
+  only owns the line and the clock.
+
+  ## What the line allows
+
+  9600 baud is 960 bytes a second, 1.04 ms each; the camera answers after about 16 ms.
+
+  | | bytes to and from | on the line | with the answer's delay |
+  |---|---|---|---|
+  | absolute target and its ACK | 15 + 3 | 18.8 ms | 35 ms |
+  | position | 5 + 11 | 16.7 ms | 33 ms |
+  | zoom | 5 + 7 | 12.5 ms | 29 ms |
+  | completion | 3 | 3.1 ms | |
+
+  So ten times a second a target (35 ms), a position (33 ms) and the completion (3 ms) take 71 of
+  100 ms; the zoom each half second adds 6 of 100 on the average, and 29 once. 10 Hz is what
+  the line allows while the camera tracks; a slower camera makes less of both, and nothing queues.
+
+  ## Readings
+
+  `{:ptz, %{pan:, tilt:, field_of_view:, age_ms:}}` as in `Hal.Ptz`, one for each position.
+
+  ## Errors
+
+  Those of `Hal.Serial` at the opening and later, and those of `Hal.Visca.Head`: `:no_answer`,
+  `{:cameras, n}`, `{:model, code}`. After each the device closes the line and opens it again.
+  """
+  @behaviour Hal.Ptz
+  alias Hal.Serial
+  alias Hal.Visca.{Head, Options}
+
+  @enforce_keys [:line, :head]
+  defstruct @enforce_keys ++ [timer: nil, wake: nil]
+
+  @opaque t :: %__MODULE__{
+            line: Serial.t(),
+            head: Head.t(),
+            timer: reference() | nil,
+            wake: reference() | nil
+          }
+
+  @doc "Checks options; see `Hal.Visca.Options.check/1`."
+  @spec options(keyword()) :: {:ok, keyword()} | {:error, String.t()}
+  defdelegate options(options), to: Options, as: :check
+
+  @impl Hal.Ptz
+  def init(options) do
+    case Options.check(options) do
+      {:ok, options} ->
+        with {:ok, line} <- Serial.open(Options.serial(options)), do: open(line, options)
+
+      {:error, line} ->
+        raise ArgumentError, line
+    end
+  end
+
+  @impl Hal.Ptz
+  def look(pan, tilt, state), do: outward(Head.look(state.head, pan, tilt, now()), state)
+
+  @impl Hal.Ptz
+  def zoom(field_of_view, state), do: outward(Head.zoom(state.head, field_of_view, now()), state)
+
+  @impl Hal.Ptz
+  def handle_message({:visca_wake, wake}, %__MODULE__{wake: wake} = state),
+    do: carry_out(Head.tick(state.head, now()), state)
+
+  def handle_message({:visca_wake, _old}, state), do: {:ok, [], state}
+
+  def handle_message(message, %__MODULE__{} = state) do
+    case Serial.handle(state.line, message) do
+      {:data, bytes} -> carry_out(Head.bytes(state.head, bytes, now()), state)
+      {:error, reason} -> {:error, reason, state}
+      :unknown -> {:ok, [], state}
+    end
+  end
+
+  @impl Hal.Ptz
+  def terminate(%__MODULE__{} = state) do
+    cancel(state)
+    Serial.close(state.line)
+  end
+
+  defp open(line, options) do
+    {effects, head} =
+      Head.open(Keyword.take(options, [:camera, :lens, :poll_ms, :field_of_view]), now())
+
+    case carry_out({effects, head}, %__MODULE__{line: line, head: head}) do
+      {:ok, [], state} ->
+        {:ok, state}
+
+      {:error, reason, state} ->
+        terminate(state)
+        {:error, reason}
+    end
+  end
+
+  # A wish brings no readings.
+  defp outward(result, state) do
+    with {:ok, [], state} <- carry_out(result, state), do: {:ok, state}
+  end
+
+  defp carry_out({effects, head}, state) do
+    {readings, error} = Enum.reduce(effects, {[], nil}, &effect(&1, &2, state.line))
+    state = wake(%{state | head: head})
+    if error, do: {:error, error, state}, else: {:ok, Enum.reverse(readings), state}
+  end
+
+  defp effect(_effect, {readings, error}, _line) when error != nil, do: {readings, error}
+  defp effect({:reading, reading}, {readings, nil}, _line), do: {[reading | readings], nil}
+  defp effect({:error, reason}, {readings, nil}, _line), do: {readings, reason}
+
+  defp effect({:write, bytes}, {readings, nil}, line) do
+    case Serial.write(line, bytes) do
+      :ok -> {readings, nil}
+      # It was not said, and will be said again when no answer comes.
+      {:error, :overrun} -> {readings, nil}
+      {:error, reason} -> {readings, reason}
+    end
+  end
+
+  defp wake(state) do
+    cancel(state)
+
+    case Head.wake_ms(state.head) do
+      nil ->
+        %{state | timer: nil, wake: nil}
+
+      at_ms ->
+        wake = make_ref()
+        timer = Process.send_after(self(), {:visca_wake, wake}, max(at_ms, now()), abs: true)
+        %{state | timer: timer, wake: wake}
+    end
+  end
+
+  defp cancel(%{timer: nil}), do: :ok
+  defp cancel(%{timer: timer}), do: Process.cancel_timer(timer)
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

@@ -1,0 +1,123 @@
+defmodule Hal.Visca.DriverTest do
+  use ExUnit.Case, async: true
+  alias Hal.{Device, Serial, ViscaToy}
+  alias Hal.Visca.{Driver, Options}
+  doctest Hal.Visca.Options
+
+  setup do
+    Process.flag(:trap_exit, true)
+    name = "visca_#{System.unique_integer([:positive])}_#{System.pid()}"
+    folder = Path.join(System.tmp_dir!(), name)
+    File.mkdir_p!(folder)
+    on_exit(fn -> File.rm_rf!(folder) end)
+    {:ok, link: Path.join(folder, "camera")}
+  end
+
+  defp device(link) do
+    options = [kind: :ptz, driver: {Driver, port: link}, sinks: [{Kernel, :send, [self()]}]]
+    start_supervised!({Device, options})
+  end
+
+  # The other end of a real pseudo-terminal, answered by the toy at the speed of the real clock.
+  defp camera(link, toy \\ %ViscaToy{}) do
+    {:ok, far} = Serial.open(pty: link)
+    %{far: far, toy: toy, begun_ms: System.monotonic_time(:millisecond) - toy.now_ms}
+  end
+
+  # Plays the camera until a message for the test comes that the function wants.
+  defp play(camera, wanted, left_ms \\ 5_000) do
+    receive do
+      message ->
+        cond do
+          match?({:data, _}, Serial.handle(camera.far, message)) ->
+            {:data, bytes} = Serial.handle(camera.far, message)
+            camera = catch_up(camera)
+            play(%{camera | toy: ViscaToy.hear(camera.toy, bytes)}, wanted, left_ms)
+
+          wanted.(message) ->
+            {message, camera}
+
+          true ->
+            play(camera, wanted, left_ms)
+        end
+    after
+      1 ->
+        if left_ms == 0, do: flunk("the camera waited in vain")
+        play(catch_up(camera), wanted, left_ms - 1)
+    end
+  end
+
+  defp catch_up(%{toy: toy} = camera) do
+    if camera.begun_ms + toy.now_ms < System.monotonic_time(:millisecond) do
+      {said, toy} = ViscaToy.step(toy)
+      if said != "", do: :ok = Serial.write(camera.far, said)
+      catch_up(%{camera | toy: toy})
+    else
+      camera
+    end
+  end
+
+  defp pan?(pan), do: &(match?({:ptz, _}, &1) and abs(elem(&1, 1).pan - pan) < 0.002)
+
+  test "looks and tells, over a real line", %{link: link} do
+    camera = camera(link)
+    pid = device(link)
+    Device.look(pid, 0.5, 0.1)
+    {{:ptz, reading}, camera} = play(camera, pan?(0.5))
+    assert_in_delta reading.tilt, 0.1, 0.01
+    assert_in_delta reading.field_of_view, 0.8517, 1.0e-4
+    assert reading.age_ms in 3..60
+    assert camera.toy.at == {-252, 69}
+    Serial.close(camera.far)
+  end
+
+  test "a camera that falls silent is offline; replugged, it is told its last target", %{
+    link: link
+  } do
+    camera = camera(link)
+    pid = device(link)
+    Device.look(pid, -0.4, 0.0)
+    {_, camera} = play(camera, pan?(-0.4))
+
+    silent = %{camera | toy: %{camera.toy | lose: fn _ -> true end}}
+    {_, camera} = play(silent, &match?({:health, :ptz, {{:offline, :no_answer}, _}}, &1))
+
+    again = %ViscaToy{now_ms: camera.toy.now_ms}
+    {_, camera} = play(%{camera | toy: again}, pan?(-0.4))
+    assert {_, <<0x88, 0x30, 0x01>>} = List.last(camera.toy.heard)
+    Serial.close(camera.far)
+  end
+
+  test "the line unplugged, and plugged in again", %{link: link} do
+    camera = camera(link)
+    pid = device(link)
+    Device.look(pid, 0.2, 0.0)
+    {_, camera} = play(camera, pan?(0.2))
+    Serial.close(camera.far)
+    assert_receive {:health, :ptz, {{:offline, _reason}, _}}, 5_000
+    {_, camera} = play(camera(link), pan?(0.2))
+    Serial.close(camera.far)
+  end
+
+  test "a missing line is an error, and wrong options are named", %{link: link} do
+    assert Driver.init(port: link) == {:error, :enoent}
+
+    for {wrong, words} <- [
+          {[], "camera option :port is missing"},
+          {[port: 3], ":port cannot be 3"},
+          {[port: "a", lens: {1.0, 0.5}], ":lens cannot be {1.0, 0.5}"},
+          {[port: "a", poll_ms: 5],
+           ":poll_ms cannot be 5: it must be milliseconds from 50 to 400"},
+          {[port: "a", speed: -1], ":speed cannot be -1"},
+          {[port: "a", serial: [speed: 3]], ":serial cannot be"},
+          {[port: "a", zoom: 3], "there is no camera option :zoom"},
+          {:what, "camera options cannot be :what"}
+        ] do
+      assert {:error, line} = Options.check(wrong)
+      assert line =~ words
+      refute line =~ "\n"
+    end
+
+    assert_raise ArgumentError, ~r/:camera/, fn -> Driver.init(port: link, camera: 9) end
+  end
+end
