@@ -31,6 +31,7 @@ defmodule Hal.Event do
   | `[:swarm, :mesh, :libcluster]` | `at_ms` | `reason`: it ended, and starts again |
   | `[:swarm, :responder, :failure]` | | `robot`, `service`, `kind`, `reason`: a service's code raised |
   | `[:swarm, :blackboard, :rival]` | | `robot`, `incarnation`, `node`: rows of another robot of this name came from there |
+  | `[:sim, :emulator, :line]` | `at_ms` | `link`, `reason`: an emulated device has no line; tried again |
   | `[:sim, :server, :late]` | `late_ms` | `world`: a step of the simulated world came late |
   """
   require Logger

@@ -17,6 +17,8 @@ defmodule Sim.Body do
   @lag_s 0.1
   @still 1.0e-4
   @latch_ms 200
+  # An infrared's beam is a few degrees wide.
+  @ir_cone :math.pi() / 45
   # Cosine of half a bumper segment, 11.25 degrees.
   @half_segment 0.9807852804032304
 
@@ -33,6 +35,8 @@ defmodule Sim.Body do
                 pan: 0.0,
                 tilt: 0.0,
                 sonar: [],
+                infrared: <<>>,
+                ir: [],
                 pressed: %{}
               ]
 
@@ -55,10 +59,12 @@ defmodule Sim.Body do
           pan: float(),
           tilt: float(),
           sonar: [float()],
+          infrared: binary(),
+          ir: [float()],
           pressed: %{(0..15) => integer()}
         }
 
-  @doc "A body at rest."
+  @doc "A body at rest; with `infrared: true` it feels what is near by infrared too."
   @spec new(map(), non_neg_integer(), integer(), noise()) :: t()
   def new(
         %{id: id, profile: %Profile{} = profile, pose: %Pose{} = pose} = robot,
@@ -73,7 +79,8 @@ defmodule Sim.Body do
       pose: pose,
       odometry: Map.get(robot, :odometry, Pose.new(0, 0)),
       gains: gains(seed, index, noise),
-      geometry: geometry(profile)
+      geometry: geometry(profile.sonars, profile.sonar_cone),
+      infrared: if(robot[:infrared], do: geometry(profile.irs, @ir_cone), else: <<>>)
     }
   end
 
@@ -86,12 +93,12 @@ defmodule Sim.Body do
     {scale, turn}
   end
 
-  # Each sonar as its place and five directions across its cone.
-  defp geometry(profile) do
-    for %Pose{x: x, y: y, heading: heading} <- profile.sonars, into: <<>> do
+  # Each sensor as its place and five directions across its cone.
+  defp geometry(poses, cone) do
+    for %Pose{x: x, y: y, heading: heading} <- poses, into: <<>> do
       rays =
         for k <- -2..2, into: <<>> do
-          {c, s} = Trig.cos_sin(heading + k * profile.sonar_cone / 4)
+          {c, s} = Trig.cos_sin(heading + k * cone / 4)
           <<c::float-native, s::float-native>>
         end
 
@@ -239,6 +246,7 @@ defmodule Sim.Body do
       {:power, max(22.0, 25.6 - at_ms * 3.0e-7)},
       {:ptz,
        %{pan: body.pan, tilt: body.tilt, field_of_view: body.profile.camera.field_of_view * 1.0}}
+      | if(body.ir == [], do: [], else: [{:ir, body.ir}])
     ]
   end
 

@@ -52,8 +52,15 @@ defmodule Sim.View do
   end
 
   # Of the others a camera sees the outline only.
-  defp slim(body, true), do: %{body | sonar: [], geometry: <<>>}
+  defp slim(body, true), do: %{body | sonar: [], geometry: <<>>, ir: [], infrared: <<>>}
 
   defp slim(%{profile: %{radius: radius, height: height}} = body, false),
-    do: %{body | profile: %{radius: radius, height: height}, sonar: [], geometry: <<>>}
+    do: %{
+      body
+      | profile: %{radius: radius, height: height},
+        sonar: [],
+        geometry: <<>>,
+        ir: [],
+        infrared: <<>>
+    }
 end

@@ -46,7 +46,8 @@ defmodule Sim.World do
 
   @doc """
   A world. `:robots` are `%{id:, profile:, pose:}` with the true pose, and `odometry:`, the first
-  reading of the wheels (0, 0, 0 unless given). Wrong options raise `ArgumentError`.
+  reading of the wheels (0, 0, 0 unless given), `infrared: true` for one that has such sensors. Wrong options
+  raise `ArgumentError`.
   """
   @spec new!(keyword()) :: t()
   def new!(options) do
@@ -228,20 +229,35 @@ defmodule Sim.World do
     discs = Enum.map(bodies, &Bodies.disc/1) ++ Bodies.pole(world)
     living = Enum.filter(bodies, & &1.alive)
 
-    rings =
-      for %Body{pose: pose, profile: profile} = body <- living do
-        {c, s} = Sim.Trig.cos_sin(pose.heading)
+    world
+    |> put_ranges(:sonar, living, discs, world.step, &{&1.sonar_min, &1.sonar_max})
+    |> put_ranges(
+      :ir,
+      Enum.filter(living, &(&1.infrared != <<>>)),
+      discs,
+      -world.step - 1,
+      &{0.0, &1.ir_max}
+    )
+  end
 
-        {body.index, pose.x, pose.y, c, s, profile.sonar_min * 1.0, profile.sonar_max * 1.0,
-         body.geometry}
+  # Draws of one kind of sensor are not those of the other.
+  defp put_ranges(world, _sense, [], _discs, _draw, _limits), do: world
+
+  defp put_ranges(world, sense, bodies, discs, draw, limits) do
+    rings =
+      for %Body{pose: pose} = body <- bodies do
+        {c, s} = Sim.Trig.cos_sin(pose.heading)
+        {least, most} = limits.(body.profile)
+        geometry = if sense == :ir, do: body.infrared, else: body.geometry
+        {body.index, pose.x, pose.y, c, s, least * 1.0, most * 1.0, geometry}
       end
 
-    noise = if world.noise != :off, do: {world.seed, world.step, 0}
+    noise = if world.noise != :off, do: {world.seed, draw, 0}
 
-    living
+    bodies
     |> Enum.zip(Kernel.sonar(world.map, discs, rings, noise))
-    |> Enum.reduce(world, fn {body, sonar}, world ->
-      update(world, body.id, &%{&1 | sonar: sonar})
+    |> Enum.reduce(world, fn {body, ranges}, world ->
+      update(world, body.id, &Elixir.Map.put(&1, sense, ranges))
     end)
   end
 end

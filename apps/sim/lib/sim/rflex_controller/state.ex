@@ -23,7 +23,7 @@ defmodule Sim.RFlexController.State do
                 near: [],
                 inputs: %{},
                 home?: false,
-                centivolts: 0,
+                centivolts: 2_500,
                 stick: {0, 0, 0},
                 out: [],
                 wished: nil,

@@ -1,0 +1,258 @@
+defmodule Sim.Emulator do
+  @moduledoc """
+  An emulated device (`Sim.Emulator.Core`) on a pseudo-terminal, with a body: what the device at one end of the
+  line wants, the body does, and what the body feels, the device knows. At the other end, the link, a driver
+  finds it as it would find the real one.
+
+  | option | meaning |
+  |---|---|
+  | `:core` | `{module, options}`, `Sim.RFlexController` or `Sim.ViscaCamera` |
+  | `:link` | path of the link that is made to the pseudo-terminal |
+  | `:body` | `{driver, options}`, a `Hal.Drive` or `Hal.Ptz` as `Sim.Drive`, or `nil` for none |
+  | `:wire` | faults of the line, both ways, as of `Sim.Wire` |
+  | `:name` | as in `GenServer` |
+
+  A body that is not there yet, or a line that cannot be opened, is tried again and again. A line that fails is told
+  by the event `[:sim, :emulator, :line]`.
+
+  What may happen to hardware: `unplug/1` takes the line away, so that the driver's end has nothing behind it, and
+  `plug/1` brings it back; `freeze/1` leaves it deaf and dumb, with wheels that the body itself stops, until
+  `thaw/1`; `restart/1` is its power switch.
+  """
+  use GenServer
+  alias Hal.{Event, Serial}
+  alias Sim.Wire
+
+  @retry_ms 100
+
+  @enforce_keys [:module, :core, :link, :driver, :to_core, :from_core]
+  defstruct @enforce_keys ++
+              [line: nil, body: nil, plugged?: true, frozen?: false, timer: nil, reason: nil]
+
+  @doc "Starts it; or says in one line what is wrong with its options."
+  @spec start_link(keyword()) :: GenServer.on_start() | {:error, line :: String.t()}
+  def start_link(options) do
+    {name, options} = Keyword.split(options, [:name])
+    options = Keyword.validate!(options, [:core, :link, body: nil, wire: []])
+    {module, core_options} = options[:core]
+
+    with {:ok, core} <- module.new(core_options, now()),
+         {:ok, to_core} <- Wire.new([way: 0] ++ options[:wire]),
+         {:ok, from_core} <- Wire.new([way: 1] ++ options[:wire]) do
+      GenServer.start_link(
+        __MODULE__,
+        %__MODULE__{
+          module: module,
+          core: core,
+          link: options[:link],
+          driver: options[:body],
+          to_core: to_core,
+          from_core: from_core
+        },
+        name
+      )
+    end
+  end
+
+  @doc "Takes the line away."
+  @spec unplug(GenServer.server()) :: :ok
+  def unplug(emulator), do: GenServer.call(emulator, :unplug)
+
+  @doc "Brings it back, under the same link."
+  @spec plug(GenServer.server()) :: :ok
+  def plug(emulator), do: GenServer.call(emulator, :plug)
+
+  @doc "The device stands still: it hears nothing, says nothing, and tells its body nothing."
+  @spec freeze(GenServer.server()) :: :ok
+  def freeze(emulator), do: GenServer.call(emulator, {:freeze, true})
+
+  @doc "It goes on where it was."
+  @spec thaw(GenServer.server()) :: :ok
+  def thaw(emulator), do: GenServer.call(emulator, {:freeze, false})
+
+  @doc "Switches it off and on."
+  @spec restart(GenServer.server()) :: :ok
+  def restart(emulator), do: GenServer.call(emulator, {:change, :restart, []})
+
+  @doc "Does `function` of the core's module with the core and these arguments, as `:stick` of a controller."
+  @spec change(GenServer.server(), atom(), list()) :: :ok
+  def change(emulator, function, arguments),
+    do: GenServer.call(emulator, {:apply, function, arguments})
+
+  @doc "Faults of the line from now on, as of `Sim.Wire`."
+  @spec spoil(GenServer.server(), keyword()) :: :ok | {:error, line :: String.t()}
+  def spoil(emulator, options), do: GenServer.call(emulator, {:spoil, options})
+
+  @doc "The device as it is."
+  @spec core(GenServer.server()) :: term()
+  def core(emulator), do: GenServer.call(emulator, :core)
+
+  @impl GenServer
+  def init(s) do
+    # So that `terminate/2` runs, and a port program that falls is seen.
+    Process.flag(:trap_exit, true)
+    {:ok, s |> open() |> attach() |> pump()}
+  end
+
+  @impl GenServer
+  def handle_call(:core, _from, s), do: {:reply, s.core, s}
+
+  def handle_call(:unplug, _from, s) do
+    s = close(%{s | plugged?: false})
+    {:reply, :ok, %{s | to_core: Wire.pull(s.to_core), from_core: Wire.pull(s.from_core)}}
+  end
+
+  def handle_call(:plug, _from, s) do
+    s = %{s | plugged?: true, to_core: Wire.plug(s.to_core), from_core: Wire.plug(s.from_core)}
+    {:reply, :ok, if(s.line, do: s, else: open(s))}
+  end
+
+  def handle_call({:freeze, frozen?}, _from, s), do: {:reply, :ok, pump(%{s | frozen?: frozen?})}
+
+  def handle_call({:change, :restart, []}, _from, s),
+    do: {:reply, :ok, pump(%{s | core: s.module.restart(s.core, now())})}
+
+  def handle_call({:apply, function, arguments}, _from, s),
+    do: {:reply, :ok, pump(%{s | core: apply(s.module, function, [s.core | arguments])})}
+
+  def handle_call({:spoil, options}, _from, s) do
+    with {:ok, to_core} <- Wire.new([way: 0] ++ options),
+         {:ok, from_core} <- Wire.new([way: 1] ++ options) do
+      {:reply, :ok, %{s | to_core: to_core, from_core: from_core}}
+    else
+      error -> {:reply, error, s}
+    end
+  end
+
+  @impl GenServer
+  def handle_info({:pump, at_ms}, %{timer: {_timer, at_ms}} = s),
+    do: {:noreply, pump(%{s | timer: nil})}
+
+  def handle_info({:pump, _old}, s), do: {:noreply, s}
+  def handle_info(:open, %{line: nil, plugged?: true} = s), do: {:noreply, open(s)}
+  def handle_info(:open, s), do: {:noreply, s}
+  def handle_info(:attach, %{body: nil} = s), do: {:noreply, attach(s)}
+  def handle_info(:attach, s), do: {:noreply, s}
+
+  def handle_info(message, %{line: line} = s) do
+    case line && Serial.handle(line, message) do
+      {:data, bytes} -> {:noreply, pump(%{s | to_core: Wire.put(s.to_core, bytes, now())})}
+      {:error, reason} -> {:noreply, s |> close() |> failed(reason)}
+      _not_the_line -> {:noreply, felt(s, message)}
+    end
+  end
+
+  @impl GenServer
+  def terminate(_reason, s) do
+    close(s)
+    with {driver, _options} <- s.driver, {:body, body} <- s.body, do: driver.terminate(body)
+  end
+
+  defp open(s) do
+    case Serial.open(pty: s.link) do
+      {:ok, line} -> %{s | line: line, reason: nil}
+      {:error, reason} -> failed(s, reason)
+    end
+  end
+
+  defp close(%{line: nil} = s), do: s
+
+  defp close(%{line: line} = s) do
+    :ok = Serial.close(line)
+    %{s | line: nil}
+  end
+
+  defp failed(s, reason) do
+    about = %{link: s.link, reason: reason}
+    if reason != s.reason, do: Event.execute([:sim, :emulator, :line], %{at_ms: now()}, about)
+    Process.send_after(self(), :open, @retry_ms)
+    %{s | reason: reason}
+  end
+
+  defp attach(%{driver: nil} = s), do: s
+
+  defp attach(%{driver: {driver, options}} = s) do
+    case driver.init(options) do
+      {:ok, body} -> %{s | body: {:body, body}}
+      {:error, _no_world_yet} -> again(s)
+    end
+  end
+
+  defp again(s) do
+    Process.send_after(self(), :attach, @retry_ms)
+    %{s | body: nil}
+  end
+
+  defp felt(%{body: nil} = s, _message), do: s
+
+  defp felt(%{driver: {driver, _options}, body: {:body, body}} = s, message) do
+    case driver.handle_message(message, body) do
+      {:ok, [], body} ->
+        %{s | body: {:body, body}}
+
+      {:ok, readings, body} ->
+        s = %{s | body: {:body, body}}
+        at_ms = now()
+        feel = fn reading, core -> s.module.feel(core, reading, at_ms) end
+        if s.frozen?, do: s, else: pump(%{s | core: Enum.reduce(readings, s.core, feel)})
+
+      {:error, _reason, body} ->
+        driver.terminate(body)
+        again(s)
+    end
+  end
+
+  # Everything that is due: bytes in, bytes out, the body, and the next time.
+  defp pump(%{frozen?: true} = s) do
+    {_unheard, to_core} = Wire.take(s.to_core, now())
+    schedule(%{s | to_core: to_core}, [Wire.next_ms(to_core)])
+  end
+
+  defp pump(s) do
+    at_ms = now()
+    {heard, to_core} = Wire.take(s.to_core, at_ms)
+    {said, wishes, core} = s.core |> s.module.hear(heard, at_ms) |> s.module.run(at_ms)
+    {sent, from_core} = s.from_core |> Wire.put(said, at_ms) |> Wire.take(at_ms)
+    # Of a line that cannot take it, it is lost.
+    if s.line && sent != <<>>, do: Serial.write(s.line, sent)
+    s = Enum.reduce(wishes, %{s | core: core, to_core: to_core, from_core: from_core}, &wish/2)
+
+    schedule(s, [s.module.next_ms(core), Wire.next_ms(to_core), Wire.next_ms(from_core)])
+  end
+
+  defp wish(_wish, %{body: nil} = s), do: s
+
+  defp wish(wish, %{driver: {driver, _options}, body: {:body, body}} = s) do
+    result =
+      case wish do
+        {:drive, twist} -> driver.drive(twist, body)
+        {:look, pan, tilt} -> driver.look(pan, tilt, body)
+      end
+
+    case result do
+      {:ok, body} ->
+        %{s | body: {:body, body}}
+
+      {:error, _reason, body} ->
+        driver.terminate(body)
+        again(s)
+    end
+  end
+
+  defp schedule(s, times) do
+    case {Enum.min(Enum.reject(times, &is_nil/1), fn -> nil end), s.timer} do
+      {at_ms, {_timer, at_ms}} ->
+        s
+
+      {at_ms, timer} ->
+        with {timer, _at_ms} <- timer, do: Process.cancel_timer(timer)
+
+        %{
+          s
+          | timer: at_ms && {Process.send_after(self(), {:pump, at_ms}, at_ms, abs: true), at_ms}
+        }
+    end
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end
