@@ -8,7 +8,13 @@ defmodule Hal.Camera do
   @typedoc "A picture; or, of a camera that finds them by itself, its blobs, as `Vision.Eye` gives them."
   @type reading ::
           {:frame, Hal.Frame.t()}
-          | {:blobs, [struct()], %{at_ms: integer(), pan: float(), tilt: float()}}
+          | {:blobs, [struct()],
+             %{
+               required(:at_ms) => integer(),
+               required(:pan) => float(),
+               required(:tilt) => float(),
+               optional(:field_of_view) => float() | nil
+             }}
 
   @doc "Opens the source."
   @callback init(keyword()) :: {:ok, state :: term()} | {:error, reason :: term()}

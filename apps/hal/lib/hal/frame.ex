@@ -11,11 +11,13 @@ defmodule Hal.Frame do
   | `:rgb24` | R G B for each pixel |
 
   `at_ms` is the time of exposure by the clock of the robot (monotonic, or the simulator's).
-  `pan` and `tilt` (radians, left and up positive) are where the camera looked at that moment.
+  `pan` and `tilt` (radians, left and up positive) are where the camera looked at that moment, and
+  `field_of_view` how wide; `nil` where the camera does not know: who knows is its pan-tilt unit
+  (`Hal.Aim`).
   """
 
   @enforce_keys [:format, :width, :height, :bytes, :at_ms]
-  defstruct @enforce_keys ++ [pan: 0.0, tilt: 0.0]
+  defstruct @enforce_keys ++ [pan: nil, tilt: nil, field_of_view: nil]
 
   @type format :: :yuyv | :i420 | :nv12 | :yuv444 | :rgb24
   @type t :: %__MODULE__{
@@ -24,8 +26,9 @@ defmodule Hal.Frame do
           height: pos_integer(),
           bytes: binary(),
           at_ms: integer(),
-          pan: float(),
-          tilt: float()
+          pan: float() | nil,
+          tilt: float() | nil,
+          field_of_view: float() | nil
         }
 
   @formats [:yuyv, :i420, :nv12, :yuv444, :rgb24]

@@ -9,7 +9,7 @@ defmodule Robot.Board do
   |---|---|---|
   | `:odometry` `:sonar` `:ir` `:bumpers` `:power` | `:drive` | as in `Hal.Drive` |
   | `:ptz` | `:ptz` | as in `Hal.Ptz` |
-  | `:blobs` | `:eye` | `%{blobs: [blob], pan: radians}`, at the time of the picture |
+  | `:blobs` | `:eye` | `%{blobs: [blob], pan: radians, field_of_view: radians or nil}`, at the time of the picture |
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, since when |
   | `{:peer, id}` | `:link` | as in `Robot.Percept` |
   | `:estop` | `:brake` | the number of the last e-stop, and of the last one cleared here |
@@ -98,8 +98,10 @@ defmodule Robot.Board do
   def sense(board, device, {:health, device, {condition, since_ms}}),
     do: put(board, device, {:health, device}, condition, since_ms)
 
-  def sense(board, :eye, {:blobs, blobs, %{at_ms: at_ms, pan: pan}}),
-    do: put(board, :eye, :blobs, %{blobs: blobs, pan: pan}, at_ms)
+  def sense(board, :eye, {:blobs, blobs, %{at_ms: at_ms, pan: pan} = meta}) do
+    view = Map.get(meta, :field_of_view)
+    put(board, :eye, :blobs, %{blobs: blobs, pan: pan, field_of_view: view}, at_ms)
+  end
 
   def sense(board, device, {key, value}), do: put(board, device, key, value, now(board))
 

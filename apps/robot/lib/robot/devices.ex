@@ -5,7 +5,7 @@ defmodule Robot.Devices do
       Robot.Devices (one_for_one)
       |-- Vision.Eye           the newest frame to blobs (only with a camera)
       |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and at once to the gate
-      |-- Hal.Device :ptz      --> board
+      |-- Hal.Device :ptz      --> board, and where the camera looked --> eye
       `-- Hal.Device :camera   --> eye --> board
 
   The eye is here, and not above the gate, because a picture that it falls over must not take the
@@ -27,11 +27,12 @@ defmodule Robot.Devices do
     board = Board.find!(id)
     write = fn writer -> {Board, :sense, [board, writer]} end
     to_eye = {Vision.Eye, :frame, [Names.via(id, :eye)]}
+    to_aim = {Vision.Eye, :aim, [Names.via(id, :eye)]}
 
     children =
       eye(config, write.(:eye)) ++
         device(config, :drive, [write.(:drive), {Gate, :sense, [id]}]) ++
-        device(config, :ptz, [write.(:ptz)]) ++
+        device(config, :ptz, [write.(:ptz) | if(config.camera, do: [to_aim], else: [])]) ++
         device(config, :camera, [{__MODULE__, :health, [board]}, to_eye])
 
     Supervisor.init(children, strategy: :one_for_one, max_restarts: 200, max_seconds: 5)
@@ -48,8 +49,16 @@ defmodule Robot.Devices do
 
   defp eye(%Config{camera: nil}, _sink), do: []
 
-  defp eye(config, sink),
-    do: [{Vision.Eye, colours: config.colours, sink: sink, name: Names.via(config.id, :eye)}]
+  defp eye(config, sink) do
+    [
+      {Vision.Eye,
+       colours: config.colours,
+       sink: sink,
+       ptz: config.ptz != nil,
+       clock: config.clock,
+       name: Names.via(config.id, :eye)}
+    ]
+  end
 
   defp device(config, kind, sinks) do
     case Map.fetch!(config, kind) do

@@ -21,6 +21,7 @@ defmodule Robot.Percept do
                 blobs: nil,
                 blobs_at_ms: nil,
                 blobs_pan: 0.0,
+                blobs_view: nil,
                 blobs_pose: nil,
                 peers: %{},
                 driving: nil
@@ -43,8 +44,8 @@ defmodule Robot.Percept do
         }
 
   @typedoc """
-  `blobs_pan` and `blobs_pose` are where the camera looked and where the robot stood (map frame)
-  when the picture was taken. `driving` is what the gate last let through, and why it limited it.
+  `blobs_pan`, `blobs_view` and `blobs_pose` are where the camera looked, how wide (radians, `nil`:
+  as the unit says now) and where the robot stood (map frame) when the picture was taken. `driving` is what the gate last let through, and why it limited it.
   """
   @type t :: %__MODULE__{
           robot: atom(),
@@ -60,6 +61,7 @@ defmodule Robot.Percept do
           blobs: [Vision.Blob.t()] | nil,
           blobs_at_ms: integer() | nil,
           blobs_pan: float(),
+          blobs_view: float() | nil,
           blobs_pose: Pose.t() | nil,
           peers: %{atom() => peer()},
           driving: %{twist: Twist.t(), limits: [atom()]} | nil

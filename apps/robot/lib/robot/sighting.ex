@@ -114,8 +114,12 @@ defmodule Robot.Sighting do
 
   def fits?(_blob, _radius, _distance, _field_of_view), do: false
 
-  @doc "The horizontal field of view of the robot's camera: what the unit says, or the profile's."
+  @doc """
+  The horizontal field of view of the percept's picture: as it was taken, or what the unit says, or
+  the profile's.
+  """
   @spec field_of_view(Percept.t()) :: float()
+  def field_of_view(%Percept{blobs_view: angle}) when angle != nil, do: angle
   def field_of_view(%Percept{ptz: %{field_of_view: angle}}), do: angle
   def field_of_view(%Percept{profile: profile}), do: profile.camera.field_of_view
 

@@ -3,7 +3,7 @@ defmodule Robot.SightTest do
   use Robot.Case, async: false
   @moduletag :capture_log
 
-  defp seeing(id) do
+  defp seeing(id, more \\ []) do
     {:ok, colours} =
       Vision.Colours.new([%{name: "Yellow", y: {170, 240}, u: {60, 90}, v: {130, 145}}],
         min_area: 2
@@ -11,10 +11,13 @@ defmodule Robot.SightTest do
 
     goal = {:goal, :roll, {Acts.Roll, twist: Twist.new(0.1, 0.0)}}
 
-    rolling(id,
-      camera: {Hal.FakeCamera, test: self(), device: :camera},
-      colours: colours,
-      mission: {Acts.Mission, test: self(), effects: [goal]}
+    rolling(
+      id,
+      [
+        camera: {Hal.FakeCamera, test: self(), device: :camera},
+        colours: colours,
+        mission: {Acts.Mission, test: self(), effects: [goal]}
+      ] ++ more
     )
   end
 
@@ -58,6 +61,21 @@ defmodule Robot.SightTest do
     assert_receive {:camera, :next, camera}
     sees(id)
     assert_receive {:camera, :next, ^camera}
+  end
+
+  test "a camera that does not know where it looks gets it from its pan-tilt unit" do
+    id = seeing(:sight_ptz, ptz: {Hal.FakePtz, test: self(), device: :ptz})
+    looks = {:ptz, %{pan: 0.3, tilt: 0.1, field_of_view: 0.7}}
+    send(Names.whereis(id, :ptz), {:readings, [looks]})
+    # It is with the eye when it is on the board and the eye has answered: the board comes first.
+    _ = :sys.get_state(Names.whereis(id, :ptz))
+    _ = Vision.Eye.status(Names.via(id, :eye))
+    at_ms = System.monotonic_time(:millisecond)
+    {:ok, frame} = Hal.Frame.new(:yuyv, 2, 1, <<200, 70, 200, 140>>, at_ms)
+    send(Names.whereis(id, :camera), {:readings, [{:frame, frame}]})
+    assert_receive {:mission, {:tick, %{blobs_at_ms: ^at_ms} = percept}}, 300
+    assert {percept.blobs_pan, percept.blobs_view} == {0.3, 0.7}
+    assert Robot.Sighting.field_of_view(percept) == 0.7
   end
 
   for fallen <- [:eye, :camera] do

@@ -51,8 +51,10 @@ defmodule Robot.Percept.Snapshot do
     |> see(fetch.(:blobs, @blobs_ms))
   end
 
-  defp see(percept, {:ok, %{blobs: blobs, pan: pan}, at_ms}),
-    do: %{percept | blobs: blobs, blobs_at_ms: at_ms, blobs_pan: pan}
+  defp see(percept, {:ok, %{blobs: blobs, pan: pan} = seen, at_ms}) do
+    view = Map.get(seen, :field_of_view)
+    %{percept | blobs: blobs, blobs_at_ms: at_ms, blobs_pan: pan, blobs_view: view}
+  end
 
   defp see(percept, :error), do: percept
 end
