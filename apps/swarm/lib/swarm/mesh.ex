@@ -9,7 +9,7 @@ defmodule Swarm.Mesh do
   Without a mesh (`config :swarm, mesh: false`) a node's robots have only each other, and whom
   somebody has connected by hand. `docs/networking.md` tells how to set it up.
   """
-  alias Swarm.Mesh.{Book, Packet, Relay, Roster}
+  alias Swarm.Mesh.{Book, Packet, Relay, Roster, Ways}
   alias Swarm.{Post, Table}
 
   @typedoc """
@@ -73,6 +73,15 @@ defmodule Swarm.Mesh do
     Map.new(Table.select(__MODULE__, [{heard, [lately], [{{:"$1", :"$2"}}]}]))
   end
 
+  @doc "The robots of nodes that are not heard here, but by others that are: commands reach them by those."
+  @spec beyond() :: [atom()]
+  def beyond do
+    case book() do
+      nil -> []
+      {book, _roster} -> Ways.beyond(book, now())
+    end
+  end
+
   @doc "The newest heartbeat heard of a robot of another node: `{boot, sequence, age_ms}`."
   @spec beat(atom()) :: {integer(), non_neg_integer(), age_ms :: non_neg_integer()} | nil
   def beat(robot) do
@@ -116,24 +125,37 @@ defmodule Swarm.Mesh do
     end
   end
 
-  @doc """
-  Sends a link's request to a robot that this node has no connection to, over others that have
-  (`Swarm.Mesh.Relay`). `ref` is the alias in it that is to be answered.
-  """
-  @spec relay(atom(), tuple(), reference()) :: :ok | {:error, :unknown | :no_way}
-  def relay(robot, request, ref) do
-    case {book(), robots()} do
-      {{book, roster}, %{^robot => node}} ->
-        Relay.send(node, links(book, roster), robot, request, ref)
-
-      _unknown ->
-        {:error, :unknown}
+  @doc "Whether a node is known and has not been heard for a second, whatever its connection says."
+  @spec silent?(node()) :: boolean()
+  def silent?(node) do
+    with {book, _roster} <- book(),
+         name = Atom.to_string(node),
+         true <- is_map_key(book.nodes, name) do
+      Book.status(book, name, now()) != :alive
+    else
+      _unknown -> false
     end
   end
 
-  defp links(book, roster) do
-    for {name, %{links: links, status: :alive}} <- book.nodes, into: %{node() => Node.list()} do
-      {Map.fetch!(roster.nodes, name), nodes(links, roster)}
+  @doc """
+  Sends a link's request to a robot that this node has no connection to, or a silent one, over others that
+  have (`Swarm.Mesh.Relay`). `ref` is the alias in it that is to be answered.
+  """
+  @spec relay(atom(), tuple(), reference()) :: :ok | {:error, :unknown | :no_way}
+  def relay(robot, request, ref) do
+    with {book, roster} <- book(),
+         name when name != nil <- Ways.holder(book, robot) do
+      links = for node <- Node.list(), do: Atom.to_string(node)
+
+      ways =
+        for {from, to} <- Ways.ways(book, links, now()),
+            {:ok, node} <- [Roster.node(roster, from)],
+            into: %{},
+            do: {node, nodes(to, roster)}
+
+      Relay.send(Map.fetch!(roster.nodes, name), ways, robot, request, ref)
+    else
+      nil -> {:error, :unknown}
     end
   end
 

@@ -8,14 +8,14 @@ defmodule Swarm.Transport do
   alias Swarm.{Directory, Mesh, Message, Post}
 
   @doc """
-  All robots that can be spoken to, sorted: in the directory, or heard by radio from nodes that this one
-  is not connected to.
+  All robots that can be spoken to, sorted: in the directory, heard by radio from nodes that this one
+  is not connected to, or heard by others that are.
   """
   @spec robots() :: [atom()]
   def robots do
     case Map.keys(Mesh.robots()) do
       [] -> Directory.robots()
-      heard -> Enum.uniq(Enum.sort(Directory.robots() ++ heard))
+      heard -> Enum.uniq(Enum.sort(Directory.robots() ++ heard ++ Mesh.beyond()))
     end
   end
 

@@ -68,10 +68,16 @@ defmodule Swarm.Door.Ask do
   defp late({:command, id}, answer, answers), do: Map.put(answers, id, answer)
   defp late({:stamp, _id, _to}, _stamp, answers), do: answers
 
-  # The nearest process that takes the request, or the way by others, or `nil`.
+  # The nearest process that takes the request. Where its node is not connected, or not heard, the way by
+  # others comes first, `{:relay, process or nil}`; `nil` where nobody knows the robot.
   defp whereabouts(id, request) do
-    if(Brake.takes?(request), do: nearest({:brake, id})) || Directory.whereis(id) ||
-      if(is_map_key(Mesh.robots(), id), do: :relay)
+    pid = if(Brake.takes?(request), do: nearest({:brake, id})) || Directory.whereis(id)
+
+    cond do
+      pid && not Mesh.silent?(node(pid)) -> pid
+      pid || is_map_key(Mesh.robots(), id) || id in Mesh.beyond() -> {:relay, pid}
+      true -> nil
+    end
   end
 
   defp nearest(group) do
@@ -106,7 +112,7 @@ defmodule Swarm.Door.Ask do
     ref = :erlang.alias([:reply])
     order = with_ref(order, ref)
 
-    case if(to == :relay, do: Mesh.relay(id, order, ref), else: Post.cast(to, order)) do
+    case hand(to, id, order, ref) do
       :ok ->
         {ref, about}
 
@@ -115,6 +121,14 @@ defmodule Swarm.Door.Ask do
         nil
     end
   end
+
+  # Where there is no way round, the silent connection may yet be one.
+  defp hand({:relay, pid}, id, order, ref) do
+    with {:error, _no_way} = error <- Mesh.relay(id, order, ref),
+         do: if(pid, do: Post.cast(pid, order), else: error)
+  end
+
+  defp hand(pid, _id, order, _ref), do: Post.cast(pid, order)
 
   defp with_ref({:stamp}, ref), do: {:stamp, ref}
   defp with_ref({:command, request}, ref), do: {:command, request, ref}

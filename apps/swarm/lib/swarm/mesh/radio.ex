@@ -62,9 +62,12 @@ defmodule Swarm.Mesh.Radio do
   defp group(%{interface: {127, _, _, _}}), do: nil
   defp group(%{multicast: group}), do: group
 
-  # Words that come as atoms are known once the modules that say them are loaded.
+  # Words that come as atoms are known once the modules that say them are loaded, which without a
+  # release is when they are first called: a robot that has just been switched on would not understand
+  # what a leader says.
   defp load do
-    for module <- [Swarm.Missions.Landmark.Phases, Swarm.Missions.Manual, Swarm.Formation],
+    for app <- [:hal, :swarm],
+        module <- Application.spec(app, :modules) || [],
         do: {:module, _} = Code.ensure_loaded(module)
   end
 

@@ -1,6 +1,6 @@
 defmodule Swarm.Mesh.PureTest do
   use ExUnit.Case, async: true
-  alias Swarm.Mesh.{Book, Options, Plan}
+  alias Swarm.Mesh.{Beacon, Book, Options, Plan, Ways}
 
   doctest Swarm.Mesh.Backoff
   doctest Swarm.Mesh.Beacon
@@ -44,6 +44,32 @@ defmodule Swarm.Mesh.PureTest do
 
   test "there is no way to where no connection leads" do
     assert Plan.route("a", "z", %{"a" => ["b"], "b" => ["a"], "z" => []}) == nil
+  end
+
+  # What "a" knows at 5 s: all of "b", of "c" that it has been silent for 3 s, though TCP has not noticed.
+  defp torn(hears) do
+    address = {{10, 0, 0, 1}, 1}
+    {book, _up} = Book.hear(Book.new("a"), "c", address, 2_000)
+    book = Book.robot(book, "c", :mag3, {1, 1}, 2_000)
+    {book, _up} = Book.hear(book, "b", address, 5_000)
+    hears = for name <- hears, do: {name, address}
+    Book.beacon(book, "b", %Beacon{sessions: [], hears: hears, links: ["a", "c"], port: 0}, 5_000)
+  end
+
+  test "where a link is silent the way leads over one that hears both" do
+    book = torn(["a", "c"])
+    ways = Ways.ways(book, ["b", "c"], 5_000)
+    assert ways == %{"a" => ["b"], "b" => ["a", "c"]}
+    assert Plan.route("a", "c", ways) == ["b", "c"]
+    assert Ways.holder(book, :mag3) == "c"
+    assert Ways.beyond(book, 5_000) == [:mag3]
+  end
+
+  test "there is no way to a node that nobody hears" do
+    book = torn(["a"])
+    assert Plan.route("a", "c", Ways.ways(book, ["b", "c"], 5_000)) == nil
+    assert Ways.beyond(book, 5_000) == []
+    assert Ways.holder(book, :mag9) == nil
   end
 
   test "options are checked by name" do

@@ -103,6 +103,30 @@ defmodule Swarm.Missions.LandmarkTest do
     assert bearing != 0.0
   end
 
+  test "a new leader deals the slots that a dead robot has left free" do
+    abreast = [
+      mag1: {0, 0.05},
+      mag2: {1, 0.04},
+      mag3: {-1, 0.02},
+      mag4: {2, 0.01},
+      mag5: {-2, 0.01}
+    ]
+
+    mission = [formation: {:line, 1.0}, assign: :cost]
+
+    group =
+      for {id, {y, share}} <- abreast, reduce: Group.new() do
+        group -> Group.join(group, id, {0, y}, share, mission)
+      end
+
+    group = group |> led(Keyword.keys(abreast), 5) |> Group.run(3) |> Group.kill(:mag1)
+    group = led(group, [:mag2, :mag3, :mag4, :mag5], 5)
+
+    # At 2, 3 and -1 m to the left; at 0 lies mag1. The least squares of their ways are 9, 1 and 1.
+    assert group.robots.mag2.mission.anchor.places == [1, 3, 4]
+    assert group.robots.mag2.mission.order == [:mag3, :mag4, :mag5]
+  end
+
   test "a robot that comes late joins the tail, without an election" do
     group = three() |> led(@three) |> Group.run(2)
     order = group.robots.mag2.mission.order

@@ -160,8 +160,14 @@ defmodule Swarm.Missions.Landmark.Lead do
     shape = Shape.update(lead.shape, mission, landmark_distance(mission))
     new? = {shape.formation, shape.room} != {lead.shape.formation, lead.shape.room}
     mission = %{mission | lead: %{lead | shape: shape}}
-    first? = lead.shape.room == nil and mission.now_ms == mission.since_ms
-    if new? and not first? and mission.assign == :cost, do: deal(mission), else: mission
+    dealt? = lead.shape.room == nil and mission.now_ms == mission.since_ms and all_free?(mission)
+    if new? and not dealt? and mission.assign == :cost, do: deal(mission), else: mission
+  end
+
+  # Then the round's record has dealt them; it does not know where there is no room.
+  defp all_free?(%{order: order, lead: %{shape: %{room: {size, places}}}}) do
+    count = length(order)
+    size == count + 1 and Enum.sort(places) == Enum.to_list(1..count//1)
   end
 
   defp landmark_distance(%{sight: %{place: place}, percept: percept}) when place != nil,
