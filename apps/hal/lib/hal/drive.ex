@@ -10,7 +10,8 @@ defmodule Hal.Drive do
   @typedoc """
   A reading. Ranges are metres, in the order of the profile's sensor poses; no echo is the
   profile's greatest range. Bumpers are the pressed segments, counted counter-clockwise from
-  the front. Power is in volts.
+  the front. Power is in volts. Not every base has a brake, a joystick, or a switch at one absolute
+  heading (given as odometry's heading there); who does not know a reading leaves it alone.
   """
   @type reading ::
           {:odometry, Hal.Odometry.t()}
@@ -18,6 +19,9 @@ defmodule Hal.Drive do
           | {:ir, [float()]}
           | {:bumpers, [0..15]}
           | {:power, float()}
+          | {:brake, boolean()}
+          | {:joystick, %{x: integer(), y: integer(), buttons: byte()}}
+          | {:home, heading :: float()}
 
   @doc "Opens the line and stops the motors."
   @callback init(keyword()) :: {:ok, state :: term()} | {:error, reason :: term()}
@@ -29,6 +33,11 @@ defmodule Hal.Drive do
   @callback handle_message(term(), state :: term()) ::
               {:ok, [reading()], term()} | {:error, term(), term()}
 
+  @doc "Whether it may be armed: the line says what is missing, such as a conversion."
+  @callback ready(state :: term()) :: :ok | {:error, line :: String.t()}
+
   @doc "Stops the motors and closes the line."
   @callback terminate(state :: term()) :: :ok
+
+  @optional_callbacks ready: 1
 end

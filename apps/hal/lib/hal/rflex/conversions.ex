@@ -1,0 +1,54 @@
+defmodule Hal.RFlex.Conversions do
+  @moduledoc """
+  A robot's own numbers between the controller's units and ours. They differ from robot to robot, by 7 %
+  and more for one model, so none has a default, and a robot without them does not arm. Pure.
+
+  | name | units |
+  |---|---|
+  | `distance` | per metre driven |
+  | `angle` | per radian turned |
+  | `range` | per metre of a sonar's range |
+  | `ir_a`, `ir_b` | of each infrared's law, a number for all or a list (see `Hal.RFlex.Infrared`) |
+
+  Other drivers' files of old give distances per millimetre: times 1000.
+  """
+
+  defstruct distance: nil, angle: nil, range: nil, ir_a: nil, ir_b: nil
+
+  @type t :: %__MODULE__{
+          distance: float() | nil,
+          angle: float() | nil,
+          range: float() | nil,
+          ir_a: float() | [float()] | nil,
+          ir_b: float() | [float()] | nil
+        }
+
+  @words [
+    distance: "distance (units per metre)",
+    angle: "angle (units per radian)",
+    range: "range (units per metre of sonar)",
+    ir_a: "ir_a (infrared)",
+    ir_b: "ir_b (infrared)"
+  ]
+
+  @doc """
+  Whether all that a robot with these senses needs is there; or which conversions are missing.
+
+      iex> Hal.RFlex.Conversions.ready(%Hal.RFlex.Conversions{range: 1474.0}, [:sonar])
+      {:error, "conversions are missing: distance (units per metre), angle (units per radian)"}
+      iex> Hal.RFlex.Conversions.ready(%Hal.RFlex.Conversions{distance: 31387.0, angle: 4654.2}, [])
+      :ok
+  """
+  @spec ready(t(), [:sonar | :infrared]) :: :ok | {:error, String.t()}
+  def ready(%__MODULE__{} = conversions, senses) do
+    needed =
+      [:distance, :angle] ++
+        if(:sonar in senses, do: [:range], else: []) ++
+        if(:infrared in senses, do: [:ir_a, :ir_b], else: [])
+
+    case for key <- needed, Map.fetch!(conversions, key) == nil, do: @words[key] do
+      [] -> :ok
+      missing -> {:error, "conversions are missing: #{Enum.join(missing, ", ")}"}
+    end
+  end
+end

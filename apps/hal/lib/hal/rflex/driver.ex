@@ -1,0 +1,347 @@
+defmodule Hal.RFlex.Driver do
+  @moduledoc """
+  A base with an rFLEX controller on a serial line. `Hal.Device` runs it.
+
+  | option | allowed | default |
+  |---|---|---|
+  | `:port` | the line's device | must be given, or `serial: [pty: LINK]` |
+  | `:speed` | baud | `115_200` |
+  | `:serial` | `pty:`, `module:`, `keep_alive_ms:` of `Hal.Serial` | `[]` |
+  | `:profile` | `:magellan`, `:atrv_mini` or a `Hal.Profile` | `:magellan` |
+  | `:conversions` | `distance:` units per metre, `angle:` per radian, `range:` per metre of sonar, `ir_a:`, `ir_b:` (`Hal.RFlex.Conversions`) | none: does not arm |
+  | `:limits` | `max_linear:` m/s, `max_turn:` rad/s, `max_acceleration:` m/s2, `max_turn_acceleration:` rad/s2, none above the profile's; `max_braking:`, `max_turn_braking:` up to 10 | the profile's; braking twice the acceleration |
+  | `:bumpers` | `style:` `:bit` or `:address`, `base:` 0 to 255, `count:` 0 to 64, `segments:` list of 0 to 15 | `:bit`, `0x40`, the profile's, see `Hal.RFlex.Bumpers` |
+  | `:sonar_banks` | how many are fitted on each board, 0 to 16 | boards of 8 |
+  | `:sonar_stride` | ids of a board, 1 to 16 | `16` |
+  | `:sonar_age` | a range is the least of so many readings, 1 to 20 | `1` |
+  | `:sonar_times` | `{echo, ping, set}`, microseconds | `{30_000, 1250, 0}`; an ATRV mini's ping 0 |
+  | `:ir_banks`, `:ir_base_bank` | infrareds of each board, 0 to 8; the first board | boards of 8; `0` |
+  | `:ir_order` | for each pose of the profile its place in the reports | a Magellan's; else as they come |
+  | `:ir_law`, `:ir_min` | `:metres` or `:millimetres`; metres | `:metres`; `0.1` |
+  | `:power_offset` | volts that the controller reads too low | `0.0` |
+  | `:joystick` | whether to ask for it | `false` |
+  | `:home` | address of the heading switch | `nil`: there is none |
+  | `:report_period` | of wheels and bumpers, microseconds | `100_000` |
+  | `:pace_ms` | between two commands, 1 to 50 | `12` |
+  | `:clock` | `{m, f, a}` giving integer milliseconds | monotonic time |
+
+  ## Driving
+
+  A speed goes through `Hal.Ramp`, last before the wire, every 50 ms, and is repeated every 100 ms, zero
+  too: a frame may be lost, and the controller stops by itself when it hears nothing for some time (how long
+  is not known). A stop is not ramped: it is the next thing on the wire, and the controller brakes with
+  `max_braking`. What is no speed (`Hal.Ramp.check/1`) is a stop, and counted. A speed that was not
+  renewed for 500 ms is zero. The brake is released before the first speed, and again when the controller
+  says that it is set; `init` sets it.
+
+  Without `distance` or `angle` there is no odometry, and every speed is a stop.
+
+  The line's last words are a stop of both axes and the brake, twice (`Hal.RFlex.Speech`).
+
+  ## Readings
+
+  Those of `Hal.Drive`. Ranges and bumpers are repeated every 100 ms as long as they hold, for the
+  sonars take half a second for a round. The joystick is only read: driving by it is for whoever may drive.
+  Odometry goes on where it was when a line was lost and is open again in the same process.
+
+  A controller that sends no wheels for 0.5 s is told again what to send, every second, as it may have been
+  switched off and on; one that sends nothing at all for 2 s is the error `:silent`.
+  """
+  @behaviour Hal.Drive
+  alias Hal.{Event, Ramp, Serial, Twist}
+  alias Hal.RFlex.{Command, Conversions, Decoder, Options, Queue, Senses, Speech}
+
+  @tick_ms 50
+  @repeat_ms 100
+  @watchdog_ms 500
+  @status_ms 500
+  @idle_ms 30
+  @no_wheels_ms 500
+  @again_ms 1_000
+  @silent_ms 2_000
+  @tell_ms 10_000
+
+  @enforce_keys [:options, :line, :ref, :queue, :ramp, :senses, :heard_ms, :bytes_ms, :stepped_ms]
+  defstruct @enforce_keys ++
+              [
+                decoder: Decoder.new(),
+                wanted: Twist.zero(),
+                wanted_ms: nil,
+                said: nil,
+                due: %{},
+                pump: nil,
+                released?: false,
+                refused: 0,
+                overruns: 0,
+                told: %{}
+              ]
+
+  @type t :: %__MODULE__{}
+
+  @doc "Checks options; or says in one line what is wrong."
+  @spec options(keyword()) :: {:ok, Options.t()} | {:error, String.t()}
+  def options(options), do: Options.new(options)
+
+  @doc "Opens the line, stops the wheels and sets the brake. Wrong options raise `ArgumentError`."
+  @impl Hal.Drive
+  def init(options) do
+    options =
+      case Options.new(options) do
+        {:ok, options} -> options
+        {:error, line} -> raise ArgumentError, line
+      end
+
+    serial = Options.line(options) ++ [last_words: Speech.last_words(options)]
+    with {:ok, line} <- Serial.open(serial), do: {:ok, start(options, line)}
+  end
+
+  @doc "Whether it may be armed; the line names the conversions that are missing."
+  @impl Hal.Drive
+  def ready(%__MODULE__{options: options}),
+    do: Conversions.ready(options.conversions, Speech.senses(options))
+
+  @impl Hal.Drive
+  def drive(twist, s) do
+    at_ms = now(s)
+
+    s =
+      case Ramp.check(twist) do
+        :ok -> %{s | wanted: twist, wanted_ms: at_ms}
+        {:error, _line} -> refuse(s, at_ms)
+      end
+
+    s |> step(at_ms) |> say(at_ms) |> pump(at_ms)
+  end
+
+  @impl Hal.Drive
+  def handle_message({__MODULE__, ref, :tick}, %{ref: ref} = s), do: tick(s, now(s))
+
+  def handle_message({__MODULE__, ref, :pump}, %{ref: ref} = s) do
+    with {:ok, s} <- pump(%{s | pump: nil}, now(s)), do: {:ok, [], s}
+  end
+
+  def handle_message(message, s) do
+    case Serial.handle(s.line, message) do
+      {:data, bytes} -> hear(s, bytes, now(s))
+      {:error, reason} -> {:error, reason, s}
+      :unknown -> {:ok, [], s}
+    end
+  end
+
+  @impl Hal.Drive
+  def terminate(s) do
+    # Kept where the device's next opening finds it: odometry that begins again would be a leap.
+    Process.put({__MODULE__, name(s.options)}, s.senses.odometry)
+    Serial.last_words(s.line, Speech.farewell(s.options))
+    Serial.close(s.line)
+  end
+
+  @doc """
+  What went wrong on the line since it was opened: bytes `skipped`, beginnings `given_up`, frames with
+  `ghosts`, packets `unknown` or `malformed`, wheel reports `dropped`, counter `jumps`, speeds `refused`, …
+  """
+  @spec counts(t()) :: %{atom() => non_neg_integer()}
+  def counts(%__MODULE__{} = s) do
+    s.decoder
+    |> Map.take([:packets, :skipped, :given_up, :ghosts])
+    |> Map.merge(Senses.counts(s.senses))
+    |> Map.merge(%{refused: s.refused, overruns: s.overruns})
+  end
+
+  defp start(options, line) do
+    {m, f, a} = options.clock
+    at_ms = apply(m, f, a)
+    ref = make_ref()
+    Process.send_after(self(), {__MODULE__, ref, :tick}, 0)
+    before = Process.delete({__MODULE__, name(options)})
+    queue = Enum.reduce(Speech.first_words(options), Queue.new(options.pace_ms), &put/2)
+    queue = Queue.stop(put({:brake, Command.brake()}, queue), Speech.stop(options))
+
+    %__MODULE__{
+      options: options,
+      line: line,
+      ref: ref,
+      queue: queue,
+      ramp: Speech.ramp(options),
+      senses: Senses.new(options, before),
+      heard_ms: at_ms,
+      bytes_ms: at_ms,
+      stepped_ms: at_ms,
+      due: %{speed: at_ms + @repeat_ms, setup: at_ms + @again_ms, tell: at_ms + @tell_ms}
+    }
+  end
+
+  defp name(options), do: options.port || options.serial[:pty]
+
+  defp put({key, bytes}, queue), do: Queue.put(queue, key, bytes)
+
+  defp refuse(s, at_ms),
+    do: %{s | wanted: Twist.zero(), wanted_ms: at_ms, refused: s.refused + 1}
+
+  # What the wheels are to do now.
+  defp step(s, at_ms) do
+    wanted = if known?(s), do: s.wanted, else: Twist.zero()
+    {_twist, ramp} = Ramp.step(s.ramp, wanted, (at_ms - s.stepped_ms) / 1000)
+    %{s | ramp: ramp, stepped_ms: at_ms}
+  end
+
+  defp known?(%{options: %{conversions: conversions}}),
+    do: conversions.distance != nil and conversions.angle != nil
+
+  defp say(%{ramp: %{twist: twist}, said: twist} = s, at_ms) do
+    if due?(s, :speed, at_ms), do: say_speed(s, at_ms), else: s
+  end
+
+  defp say(s, at_ms), do: say_speed(s, at_ms)
+
+  defp say_speed(%{ramp: %{twist: twist}} = s, at_ms) do
+    queue =
+      if Twist.zero?(twist) do
+        Queue.stop(s.queue, Speech.stop(s.options))
+      else
+        before = s.said || Twist.zero()
+        Enum.reduce(Speech.speed(s.options, twist, before), release(s), &put/2)
+      end
+
+    again(
+      %{s | queue: queue, said: twist, released?: not Twist.zero?(twist) or s.released?},
+      :speed,
+      at_ms,
+      @repeat_ms
+    )
+  end
+
+  defp release(%{released?: true, senses: %{brake: brake}} = s) when brake != true, do: s.queue
+  defp release(s), do: Queue.put(s.queue, :brake, Command.release())
+
+  defp tick(s, at_ms) do
+    Process.send_after(self(), {__MODULE__, s.ref, :tick}, @tick_ms)
+    {readings, s} = s |> watch(at_ms) |> idle(at_ms)
+    s = s |> step(at_ms) |> say(at_ms) |> ask(at_ms) |> set_up(at_ms) |> tell(at_ms)
+    {standing, s} = standing(s, at_ms)
+
+    with :ok <- alive(s, at_ms),
+         :ok <- keep_alive(s),
+         {:ok, s} <- pump(s, at_ms),
+         do: {:ok, readings ++ standing, s}
+  end
+
+  defp watch(%{wanted_ms: wanted_ms} = s, at_ms)
+       when wanted_ms != nil and at_ms - wanted_ms >= @watchdog_ms,
+       do: %{s | wanted: Twist.zero(), wanted_ms: nil}
+
+  defp watch(s, _at_ms), do: s
+
+  defp idle(s, at_ms) do
+    if Decoder.waiting?(s.decoder) and at_ms - s.bytes_ms >= @idle_ms do
+      {packets, decoder} = Decoder.idle(s.decoder)
+      take(packets, %{s | decoder: decoder}, at_ms)
+    else
+      {[], s}
+    end
+  end
+
+  defp ask(s, at_ms) do
+    s =
+      if due?(s, :status, at_ms),
+        do: put_again(s, :status, Command.status(), at_ms, @status_ms),
+        else: s
+
+    if s.options.joystick and due?(s, :joystick, at_ms),
+      do: put_again(s, :joystick, Command.joystick(), at_ms, @repeat_ms),
+      else: s
+  end
+
+  defp set_up(s, at_ms) do
+    wheels? = s.senses.motor_ms != nil and at_ms - s.senses.motor_ms < @no_wheels_ms
+
+    if not wheels? and due?(s, :setup, at_ms) do
+      queue = Enum.reduce(Speech.first_words(s.options), s.queue, &put/2)
+      again(%{s | queue: queue}, :setup, at_ms, @again_ms)
+    else
+      s
+    end
+  end
+
+  defp standing(s, at_ms) do
+    if at_ms - s.heard_ms < @no_wheels_ms and due?(s, :standing, at_ms),
+      do: {Senses.standing(s.senses, at_ms), again(s, :standing, at_ms, @repeat_ms)},
+      else: {[], s}
+  end
+
+  defp tell(s, at_ms) do
+    if due?(s, :tell, at_ms) do
+      counts = counts(s)
+      lost = Map.drop(counts, [:packets])
+
+      if lost != s.told,
+        do:
+          Event.execute([:hal, :rflex, :lost], Map.put(counts, :at_ms, at_ms), %{
+            port: name(s.options)
+          })
+
+      again(%{s | told: lost}, :tell, at_ms, @tell_ms)
+    else
+      s
+    end
+  end
+
+  defp alive(s, at_ms),
+    do: if(at_ms - s.heard_ms >= @silent_ms, do: {:error, :silent, s}, else: :ok)
+
+  defp keep_alive(s) do
+    case Serial.keep_alive(s.line) do
+      :ok -> :ok
+      {:error, reason} -> lost(s, reason)
+    end
+  end
+
+  # The line is behind, and has not lost anything.
+  defp lost(_s, :overrun), do: :ok
+  defp lost(s, reason), do: {:error, reason, s}
+
+  defp hear(s, bytes, at_ms) do
+    {packets, decoder} = Decoder.feed(s.decoder, bytes)
+    {readings, s} = take(packets, %{s | decoder: decoder, bytes_ms: at_ms}, at_ms)
+    {:ok, readings, s}
+  end
+
+  # Noise is no sign of a controller.
+  defp take([], s, _at_ms), do: {[], s}
+
+  defp take(packets, s, at_ms) do
+    {readings, senses} = Enum.flat_map_reduce(packets, s.senses, &Senses.packet(&2, &1, at_ms))
+
+    {readings, %{s | senses: senses, heard_ms: at_ms}}
+  end
+
+  defp pump(s, at_ms) do
+    case Queue.take(s.queue, at_ms) do
+      :empty -> {:ok, s}
+      {:wait, ms} -> {:ok, wait(s, ms)}
+      {:send, bytes, queue} -> write(%{s | queue: queue}, bytes, at_ms)
+    end
+  end
+
+  defp write(s, bytes, at_ms) do
+    case Serial.write(s.line, bytes) do
+      :ok -> pump(s, at_ms)
+      {:error, :overrun} -> pump(%{s | overruns: s.overruns + 1}, at_ms)
+      {:error, reason} -> {:error, reason, s}
+    end
+  end
+
+  defp wait(%{pump: nil} = s, ms),
+    do: %{s | pump: Process.send_after(self(), {__MODULE__, s.ref, :pump}, ms)}
+
+  defp wait(s, _ms), do: s
+
+  defp due?(s, what, at_ms), do: at_ms >= Map.get(s.due, what, at_ms)
+
+  defp again(s, what, at_ms, ms), do: %{s | due: Map.put(s.due, what, at_ms + ms)}
+
+  defp put_again(s, key, bytes, at_ms, ms),
+    do: again(%{s | queue: Queue.put(s.queue, key, bytes)}, key, at_ms, ms)
+
+  defp now(%{options: %{clock: {m, f, a}}}), do: apply(m, f, a)
+end
