@@ -627,6 +627,13 @@ static int64_t next_ms(void)
     return at;
 }
 
+static int input_waits(void)
+{
+    struct pollfd input = { .fd = STDIN_FILENO, .events = POLLIN };
+
+    return poll(&input, 1, 0) > 0;
+}
+
 /* Waits for what comes next, and carries it out. 0 when the VM is gone. */
 static int turn(const sigset_t *while_waiting)
 {
@@ -666,8 +673,9 @@ static int turn(const sigset_t *while_waiting)
         else if (fds[1].revents & (POLLHUP | POLLERR))
             s.link ? look_for_user() : lost();
     }
-    /* Last, so that a sign of life that was waiting for us counts. */
-    if (s.words_length > 0 && !s.spoken && now_ms() >= s.life_ms + s.keep_alive_ms) {
+    /* Last, and after another look, so that a sign of life that waits for us counts: on a busy machine
+       it is we who are late. */
+    if (s.words_length > 0 && !s.spoken && now_ms() >= s.life_ms + s.keep_alive_ms && !input_waits()) {
         s.spoken = 1;
         speak();
     }

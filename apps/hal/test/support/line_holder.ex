@@ -13,7 +13,7 @@ defmodule Hal.LineHolder do
     {peer, List.to_integer(:peer.call(peer, :os, :getpid, []))}
   end
 
-  @doc "In that VM: opens the line in a process that says that it is well every 20 ms, for ever."
+  @doc "In that VM: opens the line in a process that says that it is well every 20 ms, and answers `?` by `!`."
   @spec hold(keyword()) :: :ok
   def hold(options) do
     me = self()
@@ -34,7 +34,7 @@ defmodule Hal.LineHolder do
 
     receive do
       message ->
-        {:data, _} = Serial.handle(line, message)
+        with {:data, "?"} <- Serial.handle(line, message), do: :ok = Serial.write(line, "!")
         well(line)
     after
       20 -> well(line)
