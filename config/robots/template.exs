@@ -38,12 +38,15 @@
     {Hal.RFlex.Driver,
      [
        port: "/dev/ttyUSB0",
+       # sonar_banks: [8, 8],              # how many sonars each board has; for infrareds ir_banks:
+       # bumpers: [style: :bit, base: 0x40, count: 16],
        conversions: [
-         # Without these two it does not arm. They differ from robot to robot, by 7 % and more:
+         # Without distance and angle it does not arm. They differ from robot to robot, by 7 % and more:
          # mix calibrate odometry finds them. Published ones, to begin with: Magellan Pro 31387
          # and 4654.2, ATRV mini 190000 and 60000.
          # distance: 31_387.0,             # units per metre
          # angle: 4654.2,                  # units per radian
+         # ir_a: 4000.0, ir_b: -2.0,       # infrared: metres are a * V^b; one, or a list of each
          # units per metre of a sonar's range
          range: 1474.0
        ]

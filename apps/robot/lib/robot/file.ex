@@ -16,7 +16,7 @@ defmodule Robot.File do
   """
   alias Hal.{Pose, Profile}
   alias Robot.Config
-  alias Robot.File.{Check, Consistent, Reader, Schema}
+  alias Robot.File.{Check, Consistent, Device, Reader, Schema}
 
   @enforce_keys [:id, :profile, :drive]
   defstruct @enforce_keys ++
@@ -49,6 +49,7 @@ defmodule Robot.File do
 
   @largest 65_536
   @most_lines 40
+  @config [:id, :profile, :drive, :ptz, :camera, :colours, :limits, :start, :arm, :estop_file]
 
   @doc """
   The robot of the file at `path`, or all that is wrong with it. A colour file is looked for beside
@@ -115,27 +116,20 @@ defmodule Robot.File do
   end
 
   @doc """
-  What the robot is started with, as far as it is its own: `Swarm.Start` adds mission and link.
+  What the robot is started with, as far as it is its own: `Swarm.Start` adds mission and
+  link. The drive is given the body, with the limits of this robot, if it asks for one (`profile:`).
 
   An error is a line of `Robot.Config.new/1`.
   """
   @spec config(t()) :: {:ok, Config.t()} | {:error, String.t()}
   def config(%__MODULE__{} = robot) do
-    robot
-    |> Map.take([
-      :id,
-      :profile,
-      :drive,
-      :ptz,
-      :camera,
-      :colours,
-      :limits,
-      :start,
-      :arm,
-      :estop_file
-    ])
-    |> Map.to_list()
-    |> Config.new()
+    with {:ok, config} <- robot |> Map.take(@config) |> Map.to_list() |> Config.new(),
+         {:ok, drive} <- Device.fit(robot.drive, config.profile) do
+      {:ok, %{config | drive: drive}}
+    else
+      {:error, line} when is_binary(line) -> {:error, line}
+      {:error, lines} -> {:error, Enum.join(lines, "; ")}
+    end
   end
 
   defp whole({:keys, _keys}), do: :ok

@@ -69,6 +69,8 @@ defmodule Robot.FileTest do
 
     assert {:ok, config} = Robot.File.config(robot)
     assert config.profile.max_linear == 0.3
+    assert {Robot.FileDrive, options} = config.drive
+    assert options[:profile] == config.profile
     assert config.arm == :auto
     assert config.estop_file == "/tmp/estop"
   end
@@ -89,7 +91,7 @@ defmodule Robot.FileTest do
              "mag1.exs:3: strat: is no key; did you mean start?",
              "mag1.exs:4: arm: cannot be :maual: allowed: :manual, :auto; did you mean :manual?",
              "mag1.exs:5: start: cannot be {0, 0}: {x, y, heading} is allowed, metres up to 10000 and radians, such as {1.0, 0.5, deg(90)}",
-             "mag1.exs:6: body.radius: cannot be 90: a number from 0.05 to 1.0 m is allowed",
+             "mag1.exs:6: body.radius: cannot be 90: a number from 0.05 to 1.5 m is allowed",
              "mag1.exs:7: policies.formation: cannot be :colum: allowed: :column, :line, :wedge, :triangle, :diamond, :circle; did you mean :column?",
              "mag1.exs:7: policies.of: cannot be 0: a whole number from 1 to 1000 is allowed"
            ]
@@ -124,9 +126,21 @@ defmodule Robot.FileTest do
 
     assert size =~ "camera option :size cannot be {1, 1}"
     assert [line] = lines("ptz: {Robot.FilePtz, no_such_option_of_anybody: 1}")
-    assert line =~ "ptz.no_such_option_of_anybody: is an option of no driver"
+    assert line =~ "ptz.no_such_option_of_anybody: is no option of any driver"
     assert [line] = lines("ptz: {Robot.FilePtz, serial: :no_such_name_of_anybody}")
     assert line =~ "ptz.serial: cannot be :no_such_name_of_anybody"
+
+    assert {:error, lines} =
+             Robot.File.parse(
+               "[id: :mag1, profile: :magellan,\ndrive: {Robot.FileDrive, port: \"x\",\nconvesions: [],\nconversions: [distanse: 1, x: 2]}]",
+               file: "mag1.exs"
+             )
+
+    assert lines == [
+             "mag1.exs:3: drive.convesions: is no option; did you mean conversions?",
+             "mag1.exs:4: drive.conversions.distanse: is no option; did you mean distance?",
+             "mag1.exs:4: drive.conversions.x: is no option: there are angle, distance"
+           ]
 
     assert {:error, ["mag1.exs:1: drive: drive option :port is missing"]} =
              Robot.File.parse("[id: :mag1, profile: :magellan, drive: Robot.FileDrive]",
@@ -158,7 +172,7 @@ defmodule Robot.FileTest do
                "[id: :mag1, profile: :magellan, drive: {Robot.FileDrive, port: \"x\", sonar_banks: [8, 4]}]"
              )
 
-    assert line =~ "drive.sonar_banks: have 12 sonars together, but the body has poses for 16"
+    assert line =~ "drive: drive option :sonar_banks has 12 for 16"
     assert {:error, [line]} = Robot.File.parse("[#{@least}]", file: "robots/mag2.exs")
     assert line == "robots/mag2.exs:1: id: is :mag1, but the file is named mag2.exs"
   end
@@ -282,22 +296,13 @@ defmodule Robot.FileTest do
 
   test "the robots that come along are well, and so is the template" do
     for {name, file} <- [mag1: "mag1.exs", min1: "min1.exs", mag1: "template.exs"] do
-      case Robot.File.load(Path.join(@robots, file)) do
-        {:ok, robot} ->
-          assert robot.id == name
-          assert robot.arm == :manual
-          assert {:ok, _config} = Robot.File.config(robot)
-
-        {:error, lines} ->
-          # A build without these drivers says so, and nothing else.
-          assert Enum.all?(
-                   lines,
-                   &(&1 =~ ~r/no (Hal.RFlex.Driver|Hal.Visca.Driver) in this build/)
-                 ),
-                 Enum.join(lines, "\n")
-
-          refute Code.ensure_loaded?(Hal.RFlex.Driver) and Code.ensure_loaded?(Hal.Visca.Driver)
-      end
+      assert {:ok, robot} = Robot.File.load(Path.join(@robots, file))
+      assert robot.id == name
+      assert robot.arm == :manual
+      assert {:ok, config} = Robot.File.config(robot)
+      assert {Hal.RFlex.Driver, options} = config.drive
+      assert options[:profile] == config.profile
+      assert config.profile.max_linear == 0.3
     end
   end
 

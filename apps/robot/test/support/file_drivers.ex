@@ -3,12 +3,25 @@ defmodule Robot.FileDrive do
   # A drive that says what options it takes, and takes any port.
   @behaviour Hal.Drive
 
-  @keys [:port, :sonar_banks, :conversions]
+  @keys [:port, :sonar_banks, :conversions, :bumpers, :profile]
 
   def options(options) do
-    case Keyword.keys(options) -- @keys do
-      [] -> if options[:port], do: {:ok, options}, else: {:error, "drive option :port is missing"}
-      more -> {:error, Enum.map(more, &"drive has no option #{inspect(&1)}")}
+    sonars = options[:profile] && length(options[:profile].sonars)
+    banks = options[:sonar_banks] && Enum.sum(options[:sonar_banks])
+
+    cond do
+      more = Enum.find(Keyword.keys(options), &(&1 not in @keys)) ->
+        {:error, "drive has no option #{inspect(more)}"}
+
+      options[:port] == nil ->
+        {:error, "drive option :port is missing"}
+
+      sonars && banks && sonars != banks ->
+        {:error, "drive option :sonar_banks has #{banks} for #{sonars}"}
+
+      true ->
+        {:ok,
+         Keyword.merge(Enum.map(@keys, &{&1, nil}), conversions: [distance: nil, angle: nil])}
     end
   end
 

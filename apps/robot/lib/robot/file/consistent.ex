@@ -1,6 +1,6 @@
 defmodule Robot.File.Consistent do
   @moduledoc "What the keys of a robot file must be to each other, and no single key can know. Pure."
-  alias Robot.File.{Check, Schema}
+  alias Robot.File.{Check, Device, Schema}
 
   @doc "All that does not fit: the keys it is about, and what is wrong; `file` is the file's path."
   @spec problems(Robot.File.t(), Path.t()) :: [{[String.t(), ...], String.t()}]
@@ -10,9 +10,7 @@ defmodule Robot.File.Consistent do
         named(robot, file),
         seen(robot),
         majority(robot.policies),
-        colour(robot),
-        rings(robot)
-        | limits(robot)
+        colour(robot) | limits(robot) ++ driven(robot)
       ],
       &(&1 == nil)
     )
@@ -49,15 +47,11 @@ defmodule Robot.File.Consistent do
            Check.meant(colour, names, "")}
   end
 
-  # Readings come in the order of the profile's poses, so there must be as many of them.
-  defp rings(%{drive: {_module, options}, profile: profile}) do
-    with banks when is_list(banks) <- options[:sonar_banks],
-         true <- Enum.all?(banks, &is_integer/1),
-         sum when sum != length(profile.sonars) <- Enum.sum(banks) do
-      {["drive", "sonar_banks"],
-       "have #{sum} sonars together, but the body has poses for #{length(profile.sonars)}"}
-    else
-      _as_it_should_be -> nil
+  # A drive knows what it can do with a body: how many sensors it reads, how fast it may go.
+  defp driven(%{drive: drive, profile: profile}) do
+    case Device.fit(drive, profile) do
+      {:ok, _drive} -> []
+      {:error, lines} -> for line <- lines, do: {["drive"], line}
     end
   end
 

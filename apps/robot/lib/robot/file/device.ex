@@ -3,8 +3,9 @@ defmodule Robot.File.Device do
   The drivers that a robot file names, as `{Hal.RFlex.Driver, port: "/dev/ttyR0"}`.
 
   A driver is a module of this build with the callbacks of its kind. What options it takes it says
-  itself, if it exports `options/1`: `{:ok, keyword} | {:error, line | [line]}`. Names in options are
-  compared with the atoms that there are; a file makes none.
+  itself, if it exports `options/1`: `{:ok, all options} | {:error, line | [line]}`. Names in options
+  are compared with the atoms that there are; a file makes none. A drive that has an option `profile:`
+  is given the body of the file, with its limits.
   """
   alias Hal.Suggest
   alias Robot.File.{Check, Reader}
@@ -43,17 +44,69 @@ defmodule Robot.File.Device do
 
   defp driver(kind, {line, _} = node, name, keys, path) do
     with {:ok, module} <- module(kind, name, node, path),
-         {:ok, options} <- options(keys, path) do
-      judge(module, options, line, path)
+         {:ok, options} <- options(keys, path, known(module)) do
+      case refused(module, options) do
+        [] -> {:ok, {module, options}}
+        lines -> {:error, for(text <- lines, do: {line, path, text})}
+      end
     end
   end
+
+  @doc """
+  The options of a drive with the body that they are for, if it has a place for it; or what does not fit
+  the body, a line each.
+  """
+  @spec fit({module(), keyword()}, Hal.Profile.t()) ::
+          {:ok, {module(), keyword()}} | {:error, [String.t(), ...]}
+  def fit({module, options}, profile) do
+    if Map.has_key?(known(module), :profile) do
+      options = Keyword.put_new(options, :profile, profile)
+
+      with [] <- refused(module, options),
+           do: {:ok, {module, options}},
+           else: (lines -> {:error, lines})
+    else
+      {:ok, {module, options}}
+    end
+  end
+
+  # A module that nobody has used yet is known by its file only, which knows its own name.
+  defp built(name) do
+    with :error <- existing("Elixir." <> name) do
+      case :code.where_is_file(to_charlist("Elixir.#{name}.beam")) do
+        :non_existing -> :error
+        path -> Keyword.fetch(:beam_lib.info(path), :module)
+      end
+    end
+  end
+
+  # What a driver makes of the least that it can be told holds all its options, with the keys of
+  # those that are lists of keys; of a driver that does not tell, nothing is known.
+  defp known(module) do
+    if function_exported?(module, :options, 1) do
+      Enum.find_value([[port: "/dev/null"], [source: "testsrc"], []], %{}, fn least ->
+        with {:ok, all} <- module.options(least), do: Map.new(pairs(all)), else: (_no -> nil)
+      end)
+    else
+      %{}
+    end
+  end
+
+  defp pairs(%_{} = all), do: all |> Map.from_struct() |> pairs()
+
+  defp pairs(all) when is_map(all) or is_list(all),
+    do: Enum.map(all, fn {key, value} -> {key, below(value)} end)
+
+  defp below(%_{} = value), do: Map.new(pairs(value))
+  defp below([{key, _value} | _] = list) when is_atom(key), do: Map.new(pairs(list))
+  defp below(_value), do: %{}
 
   defp module(kind, name, {line, _} = node, path) do
     {function, arity, behaviour} = @kinds[kind]
     ours = Enum.map(@ours[kind], &inspect/1)
     hint = with nil <- Suggest.nearest(name, ours), do: hd(ours)
 
-    case existing("Elixir." <> name) do
+    case built(name) do
       {:ok, module} ->
         cond do
           not Code.ensure_loaded?(module) ->
@@ -73,11 +126,14 @@ defmodule Robot.File.Device do
   end
 
   # Names that nobody has made cannot be an option of any driver.
-  defp options(keys, path) do
-    {known, unknown} = Enum.split_with(keys, &match?({:ok, _}, existing(elem(&1, 0))))
+  defp options(keys, path, allowed) do
+    names = Map.keys(allowed)
 
     strange =
-      for {name, line, _node} <- unknown, do: {line, path ++ [name], "is an option of no driver"}
+      for {name, line, _node} <- keys, not option?(name, names) do
+        {line, path ++ [name],
+         "is no option#{Check.meant(name, names, "")}#{choice(name, names)}"}
+      end
 
     twice =
       for {{name, line, _node}, n} <- Enum.with_index(keys),
@@ -85,9 +141,9 @@ defmodule Robot.File.Device do
           do: {line, path ++ [name], "is given twice"}
 
     values =
-      for {name, _line, node} <- known do
-        {:ok, key} = existing(name)
-        with {:ok, value} <- plain(node, path ++ [name]), do: {:ok, {key, value}}
+      for {name, _line, node} <- keys, {:ok, key} <- [existing(name)] do
+        below = Map.get(allowed, key, %{})
+        with {:ok, value} <- plain(node, path ++ [name], below), do: {:ok, {key, value}}
       end
 
     case {strange ++ twice, Check.all(values)} do
@@ -97,23 +153,36 @@ defmodule Robot.File.Device do
     end
   end
 
-  defp judge(module, options, line, path) do
+  defp option?(name, []), do: existing(name) != :error
+  defp option?(name, names), do: Enum.any?(names, &(Atom.to_string(&1) == name))
+
+  defp choice(_name, []), do: " of any driver"
+
+  defp choice(name, names) do
+    if Check.meant(name, names, "") == "",
+      do: ": there are #{names |> Enum.sort() |> Enum.join(", ")}",
+      else: ""
+  end
+
+  @doc "What a driver has against these options, a line each; nothing if it does not tell."
+  @spec refused(module(), keyword()) :: [String.t()]
+  def refused(module, options) do
     # Looked for at run time: a driver may have no such function.
-    case function_exported?(module, :options, 1) && apply(module, :options, [options]) do
-      {:error, lines} -> {:error, for(text <- List.wrap(lines), do: {line, path, text})}
-      _well -> {:ok, {module, options}}
+    case function_exported?(module, :options, 1) && module.options(options) do
+      {:error, lines} -> List.wrap(lines)
+      _well -> []
     end
   end
 
-  defp plain({_line, {:list, nodes}}, path), do: all(nodes, path)
+  defp plain({_line, {:list, nodes}}, path, _below), do: all(nodes, path)
 
-  defp plain({_line, {:tuple, nodes}}, path) do
+  defp plain({_line, {:tuple, nodes}}, path, _below) do
     with {:ok, values} <- all(nodes, path), do: {:ok, List.to_tuple(values)}
   end
 
-  defp plain({_line, {:keys, keys}}, path), do: options(keys, path)
+  defp plain({_line, {:keys, keys}}, path, below), do: options(keys, path, below)
 
-  defp plain({_line, {:map, pairs}}, path) do
+  defp plain({_line, {:map, pairs}}, path, _below) do
     results =
       for {key, value} <- pairs do
         with {:ok, [key, value]} <- all([key, value], path), do: {:ok, {key, value}}
@@ -122,11 +191,14 @@ defmodule Robot.File.Device do
     with {:ok, pairs} <- Check.all(results), do: {:ok, Map.new(pairs)}
   end
 
-  defp plain({_line, {:name, name}} = node, path), do: atom(name, node, path)
-  defp plain({_line, {:module, name}} = node, path), do: atom("Elixir." <> name, node, path)
-  defp plain({_line, value}, _path), do: {:ok, value}
+  defp plain({_line, {:name, name}} = node, path, _below), do: atom(name, node, path)
 
-  defp all(nodes, path), do: nodes |> Enum.map(&plain(&1, path)) |> Check.all()
+  defp plain({_line, {:module, name}} = node, path, _below),
+    do: atom("Elixir." <> name, node, path)
+
+  defp plain({_line, value}, _path, _below), do: {:ok, value}
+
+  defp all(nodes, path), do: nodes |> Enum.map(&plain(&1, path, %{})) |> Check.all()
 
   defp atom(name, node, path) do
     case existing(name) do

@@ -46,7 +46,7 @@ defmodule Robot.File.Schema do
   @spec body() :: Check.check()
   def body do
     {:keys,
-     radius: {:number, 0.05, 1.0, "m"},
+     radius: {:number, 0.05, 1.5, "m"},
      length: {:number, 0.1, 2.0, "m"},
      width: {:number, 0.1, 2.0, "m"},
      height: {:number, 0.05, 2.5, "m"},

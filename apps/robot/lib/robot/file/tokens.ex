@@ -17,7 +17,7 @@ defmodule Robot.File.Tokens do
   """
 
   @marks ["[", "]", "{", "}", "(", ")", ",", "-", "+"]
-  @escapes %{?" => ?", ?\\ => ?\\, ?n => ?\n, ?t => ?\t}
+  @escapes %{?" => ?", ?\\ => ?\\, ?# => ?#, ?n => ?\n, ?t => ?\t}
   @longest 255
 
   @type token :: {kind :: atom(), line :: pos_integer(), value :: term()}
@@ -109,7 +109,7 @@ defmodule Robot.File.Tokens do
 
   # All that can belong to a number is taken first, so that 1.5m is no number and not two things.
   defp number(text, line, tokens) do
-    word = head(~r/^[0-9A-Za-z_]+(\.[0-9][0-9A-Za-z_]*)?([eE][-+][0-9]+)?/, text)
+    word = head(~r/^[0-9A-Za-z_]+(\.[0-9][0-9A-Za-z_]*([-+][0-9]+)?)?/, text)
 
     with false <- byte_size(word) > 40 or word =~ ~r/__|_$|_\./,
          {:ok, number} <- value(String.replace(word, "_", "")) do
@@ -154,7 +154,7 @@ defmodule Robot.File.Tokens do
     do: text(rest, first, line, [@escapes[c] | done], tokens)
 
   defp text(<<?\\, _::binary>>, _first, line, _done, _tokens),
-    do: {:error, {line, ~S(in text, only \" \\ \n \t may follow a \\)}}
+    do: {:error, {line, ~S(in text, only \" \\ \# \n \t may follow a \\)}}
 
   defp text(<<?#, ?{, _::binary>>, _first, line, _done, _tokens),
     do: {:error, {line, "nothing is put into text: \#{…} cannot be here"}}

@@ -1,0 +1,62 @@
+defmodule Mix.Tasks.Robot.Check do
+  @shortdoc "Checks robot files, and says what each robot is"
+  @moduledoc """
+  Checks robot files, and says what each robot is: how fast it may go, how far it needs to stop, what it
+  feels, when its wheels turn.
+
+      mix robot.check [FILE…]
+
+  Without a FILE, all of `config/robots`. All that is wrong is said at once, each problem on a line
+  `file:line: key: what is allowed`; the exit status is then 1. `docs/robots.md` tells of the keys.
+
+  Options:
+
+    * `--help` - this text
+  """
+  use Mix.Task
+  alias Robot.File.Summary
+
+  @impl Mix.Task
+  def run(words) do
+    case OptionParser.parse(words, strict: [help: :boolean]) do
+      {_options, _files, [{word, _value} | _]} ->
+        refuse(["#{word} is no option; --help lists them"])
+
+      {[help: true], _files, []} ->
+        Mix.shell().info(@moduledoc)
+
+      {_options, [], []} ->
+        files(Path.wildcard("config/robots/*.exs"))
+
+      {_options, files, []} ->
+        files(files)
+    end
+  end
+
+  defp files([]), do: refuse(["no robot file is in config/robots; name one"])
+
+  defp files(files) do
+    problems = Enum.flat_map(files, &check/1)
+    if problems != [], do: refuse(problems)
+  end
+
+  defp check(file) do
+    with {:ok, robot} <- Robot.File.load(file),
+         {:ok, _config} <- Robot.File.config(robot) do
+      Enum.each(
+        ["#{file}: well" | Enum.map(Summary.lines(robot), &"  #{&1}")],
+        &Mix.shell().info/1
+      )
+
+      []
+    else
+      {:error, line} when is_binary(line) -> ["#{file}: #{line}"]
+      {:error, lines} -> lines
+    end
+  end
+
+  defp refuse(lines) do
+    Enum.each(lines, &Mix.shell().error/1)
+    exit({:shutdown, 1})
+  end
+end

@@ -1,0 +1,171 @@
+defmodule Mix.Tasks.Robot.Import do
+  @shortdoc "Makes a robot file of a Player configuration"
+  @moduledoc """
+  Makes a robot file of a configuration of the Player device server, 1.x or later.
+
+      mix robot.import FILE [-o OUT] [options]
+
+  What Player calls `rflex`, `sonyevid30`, `camerav4l` and `cmvision` is carried over, in metres and
+  radians. What was assumed, and what could not be carried over, is listed with its line and why.
+  Without OUT the robot file goes to standard output, and all else to standard error.
+
+  Options:
+
+    * `-o OUT`, `--out OUT` - where to write it, as `config/robots/mag2.exs`; never over a file
+    * `--force` - also over a file
+    * `--name NAME` - the robot's name; by default that of OUT, else `mag1` or `min1`
+    * `--profile KIND` - `magellan` or `atrv_mini`; by default guessed
+    * `--player N` - 1 for Player 1.x (millimetres, degrees), 2 for later ones (metres); by default
+      told by the names of the options
+    * `--help` - this text
+  """
+  use Mix.Task
+  alias Robot.File.{Check, Schema}
+
+  @switches [
+    out: :string,
+    force: :boolean,
+    name: :string,
+    profile: :string,
+    player: :integer,
+    help: :boolean
+  ]
+  @largest 1_048_576
+
+  @impl Mix.Task
+  def run(words) do
+    case OptionParser.parse(words, strict: @switches, aliases: [o: :out]) do
+      {_options, _files, [{word, nil} | _]} ->
+        refuse("#{word} is no option; --help lists them")
+
+      {_options, _files, [{word, value} | _]} ->
+        refuse("#{word} cannot be #{value}; --help tells")
+
+      {options, files, []} ->
+        run(options, files)
+    end
+  end
+
+  defp run(options, files) do
+    with false <- options[:help] || false,
+         {:ok, file} <- one(files),
+         {:ok, id} <- name(options),
+         {:ok, profile} <- profile(options[:profile]),
+         {:ok, version} <- version(options[:player]),
+         :ok <- free(options[:out], options[:force]),
+         {:ok, text} <- read(file),
+         wanted = [file: file, id: id, profile: profile, version: version],
+         {:ok, result} <-
+           Robot.Player.import(text, [{:colours, colours(file, options[:out])} | wanted]),
+         :ok <- write(result.text, options[:out]) do
+      tell(result, file, options[:out])
+    else
+      true -> Mix.shell().info(@moduledoc)
+      {:error, line} -> refuse(line)
+    end
+  end
+
+  defp one([file]), do: {:ok, file}
+  defp one([]), do: {:error, "which file? mix robot.import FILE"}
+  defp one(files), do: {:error, "one file at a time, not #{length(files)}"}
+
+  # OUT names the robot unless somebody does, and if it is a robot's name at all.
+  defp name(options) do
+    named = if out = options[:out], do: find(Path.basename(out, ".exs"))
+    asked = if name = options[:name], do: find(name)
+
+    cond do
+      options[:name] == nil ->
+        {:ok, named}
+
+      asked == nil ->
+        hint = Check.meant(options[:name], Enum.take(Schema.fleet(), 9), "")
+        {:error, "--name #{options[:name]} is no robot: mag1 to mag100, min1 to min100#{hint}"}
+
+      named not in [nil, asked] ->
+        {:error, "--name #{asked} does not go with a file named #{named}.exs"}
+
+      true ->
+        {:ok, asked}
+    end
+  end
+
+  defp find(name), do: Enum.find(Schema.fleet(), &(Atom.to_string(&1) == name))
+
+  defp profile(nil), do: {:ok, nil}
+  defp profile("magellan"), do: {:ok, :magellan}
+  defp profile("atrv_mini"), do: {:ok, :atrv_mini}
+
+  defp profile(other) do
+    hint = Check.meant(other, ["magellan", "atrv_mini"], "")
+    {:error, "--profile cannot be #{other}: magellan or atrv_mini#{hint}"}
+  end
+
+  defp version(version) when version in [nil, 1, 2], do: {:ok, version}
+  defp version(other), do: {:error, "--player cannot be #{other}: 1 for 1.x, 2 for later ones"}
+
+  defp free(nil, _force), do: :ok
+  defp free(_out, true), do: :ok
+
+  defp free(out, _force),
+    do:
+      if(File.exists?(out),
+        do: {:error, "#{out} is there already; --force writes over it"},
+        else: :ok
+      )
+
+  defp read(file) do
+    with {:ok, %File.Stat{type: :regular, size: size}} when size <= @largest <- File.stat(file),
+         {:ok, text} <- File.read(file) do
+      {:ok, text}
+    else
+      {:ok, %File.Stat{type: :regular}} -> {:error, "#{file}: larger than 1 MB"}
+      {:ok, %File.Stat{type: type}} -> {:error, "#{file}: is a #{type}, where a file is needed"}
+      {:error, reason} -> {:error, "#{file}: #{:file.format_error(reason)}"}
+    end
+  end
+
+  # A robot file names its colour file from where it is itself.
+  defp colours(file, out) do
+    folder = file |> Path.expand() |> Path.dirname()
+    target = if out, do: out |> Path.expand() |> Path.dirname(), else: folder
+
+    fn name ->
+      path = Path.expand(name, folder)
+      {if(folder == target, do: name, else: path), Vision.Colours.read(path)}
+    end
+  end
+
+  defp write(text, nil), do: IO.write(text)
+
+  defp write(text, out) do
+    with {:error, reason} <- File.write(out, text),
+         do: {:error, "#{out} cannot be written: #{:file.format_error(reason)}"}
+  end
+
+  defp tell(result, file, out) do
+    list("Assumed; look whether it is so:", result.assumed, file)
+    list("Not carried over:", result.left, file)
+    where = if out, do: "#{out} written", else: "#{result.id}"
+    next = if out, do: "; mix robot.check #{out} shows what it says", else: ""
+
+    say(
+      "#{where}: #{length(result.assumed)} assumed, #{length(result.left)} not carried over#{next}"
+    )
+  end
+
+  defp list(_title, [], _file), do: :ok
+
+  defp list(title, remarks, file) do
+    say(title)
+    for {line, what, why} <- remarks, do: say("  #{file}:#{line}: #{what}: #{why}")
+  end
+
+  # Standard output may be the robot file.
+  defp say(line), do: IO.puts(:stderr, line)
+
+  defp refuse(line) do
+    Mix.shell().error(line)
+    exit({:shutdown, 1})
+  end
+end

@@ -1,0 +1,153 @@
+defmodule Robot.File.Summary do
+  @moduledoc """
+  What a person wants to see of a robot file before 40 kg move. Pure.
+  """
+  alias Hal.{Pose, Profile}
+
+  @kinds %{magellan: "a Magellan Pro", atrv_mini: "an ATRV mini"}
+  @weights %{magellan: 20, atrv_mini: 40}
+  @delay_s 0.3
+
+  @doc """
+  The robot in lines of at most 100 characters; the first names it.
+
+      iex> robot = %Robot.File{id: :mag1, profile: Hal.Profile.magellan(), start: Hal.Pose.new(0, 0),
+      ...>   drive: {Some.Drive, [port: "/dev/ttyS1"]}}
+      iex> [first | _] = Robot.File.Summary.lines(robot)
+      iex> first
+      "mag1, a Magellan Pro of 20 kg: 0.40 m long, 0.40 m wide, 0.20 m to its farthest corner"
+  """
+  @spec lines(Robot.File.t()) :: [String.t(), ...]
+  def lines(%Robot.File{} = robot) do
+    profile = struct!(robot.profile, robot.limits)
+    body = robot.profile
+
+    [
+      "#{robot.id}, #{@kinds[body.name]} of #{@weights[body.name]} kg: #{metres(body.length)} long, " <>
+        "#{metres(body.width)} wide, #{metres(body.radius)} to its farthest corner"
+    ] ++
+      rows(
+        drive: device(robot.drive),
+        measured: conversions(robot.drive, body),
+        moves: moves(profile),
+        stops: stops(profile),
+        feels: senses(body),
+        head: robot.ptz && device(robot.ptz),
+        camera: robot.camera && device(robot.camera),
+        "looks for": colours(robot.colours),
+        starts: start(robot.start),
+        arms: arms(robot.arm),
+        "e-stop": estop(robot.estop_file),
+        network: network(robot.network),
+        mission: mission(robot.policies)
+      )
+  end
+
+  defp rows(rows) do
+    for {name, words} <- rows, words not in [nil, ""] do
+      "  #{String.pad_trailing(to_string(name), 10)}#{short(words)}"
+    end
+  end
+
+  defp short(words),
+    do: if(String.length(words) > 88, do: String.slice(words, 0, 87) <> "…", else: words)
+
+  defp device({module, options}) do
+    place = options[:port] || options[:source]
+    if place, do: "#{inspect(module)} on #{place}", else: inspect(module)
+  end
+
+  # Without these no rFLEX arms, and with those of another robot it misjudges its way.
+  defp conversions({_module, options}, body) do
+    with given when is_list(given) <- options[:conversions] do
+      needed =
+        [:distance, :angle] ++
+          if(body.sonars == [], do: [], else: [:range]) ++
+          if(body.irs == [], do: [], else: [:ir_a, :ir_b])
+
+      case for key <- needed, given[key] == nil, do: key do
+        [] -> "#{number(given[:distance])} units a metre, #{number(given[:angle])} units a radian"
+        missing -> "#{Enum.join(missing, ", ")} MISSING: it will not arm (mix calibrate odometry)"
+      end
+    end
+  end
+
+  defp moves(profile) do
+    "at most #{rate(profile.max_linear, "m/s")} and #{degrees(profile.max_turn)} a second; " <>
+      "gathers speed with #{rate(profile.max_acceleration, "m/s2")}"
+  end
+
+  # v t + v^2 / 2a, with the time that a stop may take to the wheels.
+  defp stops(%Profile{max_linear: v, max_acceleration: a}) do
+    way = v * @delay_s + v * v / (2 * a)
+
+    far = if way > 1.0, do: "FAR: ", else: ""
+
+    "#{far}from full speed within #{metres(way)} (#{@delay_s} s until it brakes, then #{rate(a, "m/s2")})"
+  end
+
+  defp senses(profile) do
+    "#{length(profile.sonars)} sonars (#{metres(profile.sonar_min)} to #{metres(profile.sonar_max)}), " <>
+      "#{length(profile.irs)} infrareds, #{profile.bumpers} bumpers#{blind(profile)}"
+  end
+
+  # The widest angle that no sonar looks into.
+  defp blind(%Profile{sonars: []}), do: ""
+
+  defp blind(%Profile{sonars: sonars, sonar_cone: cone}) do
+    angles = sonars |> Enum.map(& &1.heading) |> Enum.sort()
+    next = tl(angles) ++ [hd(angles) + 2 * :math.pi()]
+    gap = angles |> Enum.zip(next) |> Enum.map(fn {a, b} -> b - a end) |> Enum.max()
+    if gap > cone + 0.02, do: "; #{degrees(gap - cone)} without sonar at a stretch", else: ""
+  end
+
+  defp colours(nil), do: nil
+
+  defp colours(%{classes: classes}) do
+    Enum.map_join(classes, ", ", fn class ->
+      if class.distance, do: "#{class.name} (with distance)", else: class.name
+    end)
+  end
+
+  defp start(%Pose{x: x, y: y, heading: heading}),
+    do: "at x #{metres(x)}, y #{metres(y)}, heading #{degrees(heading)}"
+
+  defp arms(:manual), do: "by hand: its wheels stand until a person arms them"
+  defp arms(:auto), do: "BY ITSELF, as soon as it runs"
+
+  defp estop(nil), do: "forgotten when the machine restarts (no estop_file)"
+  defp estop(file), do: "kept in #{file}"
+
+  defp network([]), do: nil
+
+  defp network(options) do
+    Enum.map_join(options, ", ", fn
+      {:interface, ip} -> "on #{:inet.ntoa(ip)}"
+      {:multicast, false} -> "no multicast"
+      {:multicast, {ip, port}} -> "multicast #{:inet.ntoa(ip)}:#{port}"
+      {:peers, peers} -> "#{length(peers)} peers"
+      {key, value} -> "#{key} #{value}"
+    end)
+  end
+
+  defp mission(policies) do
+    case policies[:mission] do
+      nil -> "none until it is told one"
+      mission -> "#{mission}#{formation(policies[:formation])}#{lost(policies[:lost_link])}"
+    end
+  end
+
+  defp formation(nil), do: ""
+  defp formation({kind, spacing}), do: ", in #{kind} of #{metres(spacing)}"
+
+  defp lost(nil), do: ""
+  defp lost(policy), do: ", without link: #{policy}"
+
+  defp metres(length), do: "#{:erlang.float_to_binary(length * 1.0, decimals: 2)} m"
+  defp rate(value, unit), do: "#{:erlang.float_to_binary(value * 1.0, decimals: 2)} #{unit}"
+  defp degrees(angle), do: "#{round(angle * 180 / :math.pi())}°"
+
+  defp number(value) when is_integer(value), do: Integer.to_string(value)
+  defp number(value) when trunc(value) == value, do: Integer.to_string(trunc(value))
+  defp number(value), do: to_string(Float.round(value * 1.0, 3))
+end

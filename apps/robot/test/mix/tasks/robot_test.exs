@@ -1,0 +1,159 @@
+defmodule Mix.Tasks.RobotTest do
+  use ExUnit.Case, async: false
+  import ExUnit.CaptureIO
+  alias Mix.Tasks.Robot.{Check, Import}
+
+  @moduletag :tmp_dir
+  @robots Path.expand("../../../../../config/robots", __DIR__)
+  @player """
+  driver ( name "rflex" rflex_serial_port "/dev/ttyS1" mm_length 500 mm_width 300
+    odo_distance_conversion 190 odo_angle_conversion 60000 sonar_2nd_bank_start 8 )
+  driver ( name "cmvision" colorfile "color.cfg" )
+  """
+
+  setup %{tmp_dir: folder} do
+    Mix.shell(Mix.Shell.Process)
+    on_exit(fn -> Mix.shell(Mix.Shell.IO) end)
+    File.cp!(Path.join(@robots, "landmark.txt"), Path.join(folder, "color.cfg"))
+    file = Path.join(folder, "old.cfg")
+    File.write!(file, @player)
+    {:ok, player: file}
+  end
+
+  defp said do
+    receive do
+      {:mix_shell, :info, [line]} -> [line | said()]
+    after
+      0 -> []
+    end
+  end
+
+  defp refused(task, words) do
+    assert catch_exit(task.run(words)) == {:shutdown, 1}
+    errors()
+  end
+
+  defp errors do
+    receive do
+      {:mix_shell, :error, [line]} -> [line | errors()]
+    after
+      0 -> []
+    end
+  end
+
+  test "a file that is well is told in words: limits, way to stop, what is missing, how it arms" do
+    path = Path.join(@robots, "mag1.exs")
+    Check.run([path])
+    lines = said()
+    assert hd(lines) == "#{path}: well"
+    text = Enum.join(lines, "\n")
+    assert text =~ "mag1, a Magellan Pro of 20 kg: 0.40 m long"
+    assert text =~ "distance, angle, ir_a, ir_b MISSING: it will not arm"
+    assert text =~ "moves     at most 0.30 m/s and 57° a second"
+    # 0.3 m/s for 0.3 s, and 0.3^2 / (2 * 0.5) m.
+    assert text =~ "stops     from full speed within 0.18 m"
+    assert text =~ "arms      by hand"
+    assert Enum.all?(lines, &(String.length(&1) <= 104))
+
+    Check.run([Path.join(@robots, "min1.exs")])
+    assert Enum.join(said(), "\n") =~ "min1, an ATRV mini of 40 kg"
+  end
+
+  test "of several files, what is wrong in each is said, and the status is 1", %{tmp_dir: folder} do
+    bad = Path.join(folder, "bad.exs")
+    File.write!(bad, "[id: :mag1, profile: :magelan,\n dirve: 1]")
+    lines = refused(Check, [Path.join(@robots, "mag1.exs"), bad, "none.exs"])
+
+    assert lines == [
+             "#{bad}:1: profile: cannot be :magelan: allowed: :magellan, :atrv_mini; did you mean :magellan?",
+             "#{bad}:2: dirve: is no key; did you mean drive?",
+             "#{bad}:1: drive: is missing",
+             "none.exs: no such file or directory"
+           ]
+
+    assert refused(Check, ["--colour"]) == ["--colour is no option; --help lists them"]
+    Check.run(["--help"])
+    assert [_well | _lines] = said()
+  end
+
+  test "a Player file becomes a robot file that is well", %{tmp_dir: folder, player: file} do
+    out = Path.join(folder, "min7.exs")
+    told = capture_io(:stderr, fn -> Import.run([file, "-o", out]) end)
+    assert told =~ "#{file}:2: sonar_2nd_bank_start: all sonars are one list here"
+    assert told =~ "Assumed; look whether it is so:"
+    assert told =~ "#{out} written: 1 assumed, 1 not carried over"
+
+    assert {:ok, %{id: :min7} = robot} = Robot.File.load(out)
+    assert {:ok, _config} = Robot.File.config(robot)
+    assert [%{name: "YellowLandmark"}] = robot.colours.classes
+
+    assert refused(Import, [file, "-o", out]) == [
+             "#{out} is there already; --force writes over it"
+           ]
+
+    capture_io(:stderr, fn ->
+      Import.run([file, "-o", out, "--force", "--profile", "magellan"])
+    end)
+
+    assert {:ok, %{id: :min7, profile: %{name: :magellan}}} = Robot.File.load(out)
+  end
+
+  test "elsewhere, the colour file is named by its whole path", %{tmp_dir: folder, player: file} do
+    out = Path.join([folder, "robots", "min1.exs"])
+    File.mkdir_p!(Path.dirname(out))
+    capture_io(:stderr, fn -> Import.run([file, "-o", out]) end)
+    assert {:ok, robot} = Robot.File.load(out)
+    assert robot.colours != nil
+    assert File.read!(out) =~ Path.join(folder, "color.cfg")
+  end
+
+  test "without OUT only the robot file is on standard output", %{player: file} do
+    {text, _told} =
+      with_io(:stderr, fn -> capture_io(fn -> Import.run([file, "--name", "min2"]) end) end)
+
+    assert {:ok, %{id: :min2}} =
+             Robot.File.parse(text,
+               colours: fn "color.cfg", _ ->
+                 Vision.Colours.read(Path.join(@robots, "landmark.txt"))
+               end
+             )
+  end
+
+  test "a colour file that is not there is told, and the rest is written", %{
+    player: file,
+    tmp_dir: folder
+  } do
+    File.rm!(Path.join(folder, "color.cfg"))
+    out = Path.join(folder, "min1.exs")
+    told = capture_io(:stderr, fn -> Import.run([file, "-o", out]) end)
+    assert told =~ "colorfile: the colour file is to be put right: "
+    assert {:error, [line]} = Robot.File.load(out)
+    assert line =~ "color.cfg: no such file or directory"
+  end
+
+  test "wrong words are one line", %{tmp_dir: folder, player: file} do
+    for {words, line} <- [
+          {[], "which file? mix robot.import FILE"},
+          {[file, file], "one file at a time, not 2"},
+          {[file, "--outt", "x"], "--outt is no option; --help lists them"},
+          {[file, "--player", "3"], "--player cannot be 3: 1 for 1.x, 2 for later ones"},
+          {[file, "--player", "x"], "--player cannot be x; --help tells"},
+          {[file, "--profile", "magelan"],
+           "--profile cannot be magelan: magellan or atrv_mini; did you mean magellan?"},
+          {[file, "--name", "rover"], "--name rover is no robot: mag1 to mag100, min1 to min100"},
+          {[file, "--name", "mag1", "-o", "mag2.exs"],
+           "--name mag1 does not go with a file named mag2.exs"},
+          {[folder], "#{folder}: is a directory, where a file is needed"},
+          {["none.cfg"], "none.cfg: no such file or directory"},
+          {[file, "-o", Path.join(folder, "no/x.exs")],
+           "#{Path.join(folder, "no/x.exs")} cannot be written: no such file or directory"}
+        ] do
+      assert refused(Import, words) == [line]
+    end
+
+    File.write!(file, "driver\n( name")
+    assert refused(Import, [file]) == ["#{file}:2: name has no value"]
+    Import.run(["--help"])
+    assert ["Makes a robot file" <> _rest] = said()
+  end
+end
