@@ -187,12 +187,42 @@ defmodule Swarm do
     command(:all, :reset)
   end
 
+  @doc """
+  Lets the wheels of a robot turn (of a list, of `:all`). Real robots come up disarmed: whoever arms one stands
+  beside it and looks where it would go. Refused, with what is missing, by a base whose conversions are
+  not set, by one whose line was lost while its wheels turned (`acknowledge/1`), and while the emergency
+  stop holds it.
+
+      Swarm.arm(:mag1)
+  """
+  @spec arm(robot() | [robot()] | :all) :: answer()
+  def arm(robots), do: command(robots, :arm)
+
+  @doc """
+  Stops all robots, one, or a list of them, and their wheels turn for nobody until `arm/1`. What they
+  were at has ended. As every stop it is obeyed however late it comes.
+
+      Swarm.disarm(:mag1)
+  """
+  @spec disarm(robot() | [robot()] | :all) :: answer()
+  def disarm(robots \\ :all), do: command(robots, :disarm)
+
+  @doc """
+  A robot's line was lost while its wheels turned, and a person has looked why: it is disarmed then,
+  and may be armed. Does nothing to others.
+
+      Swarm.acknowledge(:mag1)
+  """
+  @spec acknowledge(robot() | [robot()] | :all) :: answer()
+  def acknowledge(robots), do: command(robots, :acknowledge)
+
   @doc false
   @spec ask(atom(), term()) :: term()
   def ask(robot, request), do: Ask.ask([robot], request)[robot]
 
-  defp command(to, :reset) do
-    with {:ok, robots} <- Door.robots(to), do: Door.tell(robots, :reset)
+  # For the robot itself, not for its mission.
+  defp command(to, request) when request in [:reset, :arm, :disarm, :acknowledge] do
+    with {:ok, robots} <- Door.robots(to), do: Door.tell(robots, request)
   end
 
   defp command(to, request) do

@@ -10,6 +10,7 @@ defmodule Hal.Device do
     * `:sinks` - `[{m, f, a}]`; each reading goes to `apply(m, f, a ++ [reading])`. A change of
       health is the reading `{:health, device, {:online | {:offline, reason}, since_ms}}`
     * `:device` - what it is called in its health, by default its kind
+    * `:arm` - of a drive: `:auto` (the default) or `:manual`, see below
     * `:name` - as in `GenServer`
     * `:clock` - `{m, f, a}` giving integer milliseconds
 
@@ -32,14 +33,22 @@ defmodule Hal.Device do
 
   A drive that hears no speed for 500 ms stops its wheels. This is the second line behind the
   dead man's switch of whoever drives, for the case that this one is gone or stuck.
+
+  They turn only while the drive is armed (`Hal.Arming`): what is asked for before is a stop, and
+  counted. With `arm: :auto` the drive arms whenever its driver is open and ready; with `:manual` a
+  person does, after every start, by `arm/1`. If the line is lost while they turn, `acknowledge/1`
+  comes first. How it stands is the reading `{:arming, %{state: state, why: line or nil}}`.
   """
   use GenServer
-  alias Hal.{Event, Twist}
+  alias Hal.{Arming, Event, Twist}
+  alias Hal.Device.Options
 
   @retry_ms 100
   @longest_retry_ms 5_000
   @watchdog_ms 500
   @rest_ms 500
+  # On a busy machine a device is slow, not gone; and whoever asks has half a second.
+  @call_ms 400
 
   @enforce_keys [:kind, :device, :driver, :options, :sinks, :clock]
   defstruct @enforce_keys ++
@@ -49,6 +58,8 @@ defmodule Hal.Device do
                 retry_ms: @retry_ms,
                 retry: nil,
                 watchdog: nil,
+                arming: nil,
+                armed_as: nil,
                 wishes: %{}
               ]
 
@@ -73,6 +84,32 @@ defmodule Hal.Device do
   @spec drive(GenServer.server(), Twist.t()) :: :ok
   def drive(device, %Twist{} = twist), do: GenServer.cast(device, {:drive, twist})
 
+  @doc "Lets the wheels turn. The line says why it does not: what is missing, or that nobody has acknowledged."
+  @spec arm(GenServer.server()) :: :ok | {:error, line :: String.t()}
+  def arm(device), do: order(device, :arm)
+
+  @doc "Stops the wheels, until `arm/1`."
+  @spec disarm(GenServer.server()) :: :ok | {:error, line :: String.t()}
+  def disarm(device), do: order(device, :disarm)
+
+  @doc "The same for those who must not wait: nobody says whether it was done."
+  @spec disarm_later(GenServer.server()) :: :ok
+  def disarm_later(device), do: GenServer.cast(device, :disarm)
+
+  @doc "A person has looked why the line was lost while the wheels turned; then it may be armed."
+  @spec acknowledge(GenServer.server()) :: :ok | {:error, line :: String.t()}
+  def acknowledge(device), do: order(device, :acknowledge)
+
+  @doc "How the drive is armed, with all that `Hal.Arming` counts; `nil` for what is no drive."
+  @spec arming(GenServer.server()) :: Arming.t() | nil
+  def arming(device), do: GenServer.call(device, :arming)
+
+  defp order(device, order) do
+    GenServer.call(device, order, @call_ms)
+  catch
+    :exit, {_timeout_or_gone, {GenServer, :call, _call}} -> {:error, "the drive does not answer"}
+  end
+
   @doc "Asks a pan-tilt unit to look there (radians, left and up positive)."
   @spec look(GenServer.server(), pan :: float(), tilt :: float()) :: :ok
   def look(device, pan, tilt) when is_float(pan) and is_float(tilt),
@@ -94,9 +131,27 @@ defmodule Hal.Device do
   def handle_continue(:open, s), do: {:noreply, open(s)}
 
   @impl GenServer
-  def handle_cast({:drive, twist}, %{kind: :drive, inner: {:open, inner}} = s) do
-    s = arm(s, twist)
-    {:noreply, done(s, s.driver.drive(twist, inner))}
+  def handle_call(:arming, _from, s), do: {:reply, s.arming, s}
+
+  def handle_call(order, _from, %{kind: :drive} = s)
+      when order in [:arm, :disarm, :acknowledge] do
+    {answer, arming} = Arming.order(s.arming, order, readiness(s))
+    {:reply, answer, become(s, arming)}
+  end
+
+  def handle_call(order, _from, s) when order in [:arm, :disarm, :acknowledge],
+    do: {:reply, {:error, "a #{s.kind} has no wheels that could be armed"}, s}
+
+  @impl GenServer
+  def handle_cast({:drive, twist}, %{kind: :drive, inner: {:open, _}} = s) do
+    {allowed, arming} = Arming.drive(s.arming, twist)
+    if arming.refused > s.arming.refused, do: tell_refused(s, arming)
+    {:noreply, drive_on(%{s | arming: arming}, allowed)}
+  end
+
+  def handle_cast(:disarm, %{kind: :drive} = s) do
+    {:ok, arming} = Arming.order(s.arming, :disarm, readiness(s))
+    {:noreply, become(s, arming)}
   end
 
   def handle_cast({:look, pan, tilt}, %{kind: :ptz} = s),
@@ -110,9 +165,9 @@ defmodule Hal.Device do
   def handle_info({:open, ref}, %{retry: ref} = s), do: {:noreply, open(%{s | retry: nil})}
   def handle_info({:open, _old}, s), do: {:noreply, s}
 
-  def handle_info({:watchdog, ref}, %{watchdog: {_timer, ref}, inner: {:open, inner}} = s) do
+  def handle_info({:watchdog, ref}, %{watchdog: {_timer, ref}, inner: {:open, _}} = s) do
     Event.execute([:hal, :device, :watchdog], %{at_ms: now(s)}, about(s))
-    {:noreply, done(%{s | watchdog: nil}, s.driver.drive(Twist.zero(), inner))}
+    {:noreply, drive_on(s, Twist.zero())}
   end
 
   def handle_info({:watchdog, _old}, s), do: {:noreply, s}
@@ -120,11 +175,12 @@ defmodule Hal.Device do
   def handle_info(message, %{inner: {:open, inner}} = s) do
     case s.driver.handle_message(message, inner) do
       {:ok, [], inner} ->
-        {:noreply, %{s | inner: {:open, inner}}}
+        {:noreply, ready(%{s | inner: {:open, inner}})}
 
       {:ok, readings, inner} ->
         for reading <- readings, do: hand_on(s, reading)
-        {:noreply, ask(%{s | inner: {:open, inner}, retry_ms: @retry_ms})}
+        s = %{s | inner: {:open, inner}, retry_ms: @retry_ms}
+        {:noreply, s |> measured(readings) |> ready() |> ask()}
 
       {:error, reason, inner} ->
         {:noreply, fail(s, reason, inner)}
@@ -157,9 +213,63 @@ defmodule Hal.Device do
 
   defp open(s) do
     case s.driver.init(s.options) do
-      {:ok, inner} -> %{s | inner: {:open, inner}} |> report(:online) |> ask() |> remind()
-      {:error, reason} -> retry(report(s, {:offline, reason}))
+      {:ok, inner} ->
+        %{s | inner: {:open, inner}} |> report(:online) |> ready() |> ask() |> remind()
+
+      {:error, reason} ->
+        s |> report({:offline, reason}) |> tell_arming() |> retry()
     end
+  end
+
+  defp drive_on(%{inner: {:open, inner}} = s, twist) do
+    s = guard(s, twist)
+
+    case s.driver.drive(twist, inner) do
+      {:ok, inner} -> %{s | inner: {:open, inner}, arming: Arming.told(s.arming, twist)}
+      {:error, reason, inner} -> fail(s, reason, inner)
+    end
+  end
+
+  # A driver may become ready while it is open, or tell another thing that is missing.
+  defp ready(%{kind: :drive, arming: %{state: :disarmed}} = s),
+    do: become(s, Arming.ready(s.arming, readiness(s)))
+
+  defp ready(s), do: s
+
+  defp readiness(%{inner: {:open, inner}} = s) do
+    if function_exported?(s.driver, :ready, 1), do: s.driver.ready(inner), else: :ok
+  end
+
+  defp readiness(%{health: {{:offline, reason}, _since}}),
+    do: {:error, "the drive is offline (#{inspect(reason, limit: 5, printable_limit: 40)})"}
+
+  defp readiness(_not_opened_yet), do: {:error, "the drive is not open yet"}
+
+  defp measured(%{kind: :drive} = s, readings),
+    do: %{s | arming: Enum.reduce(readings, s.arming, &Arming.measured(&2, &1))}
+
+  defp measured(s, _readings), do: s
+
+  # Wheels that may no longer turn stop before anybody is told.
+  defp become(%{arming: before} = s, arming) do
+    s = %{s | arming: arming}
+    stop? = before.state == :armed and arming.state != :armed and s.inner != :closed
+    tell_arming(if stop?, do: drive_on(s, Twist.zero()), else: s)
+  end
+
+  defp tell_arming(%{arming: %{state: state, why: why}, armed_as: {state, why}} = s), do: s
+  defp tell_arming(%{kind: kind} = s) when kind != :drive, do: s
+
+  defp tell_arming(%{arming: %{state: state, why: why}} = s) do
+    reading = %{state: state, why: why}
+    Event.execute([:hal, :device, :arming], %{at_ms: now(s)}, Map.merge(about(s), reading))
+    hand_on(s, {:arming, reading})
+    %{s | armed_as: {state, why}}
+  end
+
+  defp tell_refused(s, %{refused: refused}) do
+    measured = %{at_ms: now(s), refused: refused}
+    Event.execute([:hal, :device, :refused], measured, about(s))
   end
 
   defp done(s, {:ok, inner}), do: %{s | inner: {:open, inner}}
@@ -167,7 +277,8 @@ defmodule Hal.Device do
 
   defp fail(s, reason, inner) do
     s.driver.terminate(inner)
-    retry(report(%{disarm(s) | inner: :closed}, {:offline, reason}))
+    s = report(%{unguard(s) | inner: :closed}, {:offline, reason})
+    retry(if s.arming, do: become(s, Arming.lost(s.arming, reason)), else: s)
   end
 
   defp retry(s) do
@@ -196,8 +307,8 @@ defmodule Hal.Device do
 
   defp carry_out(s, _callback), do: s
 
-  defp arm(s, twist) do
-    s = disarm(s)
+  defp guard(s, twist) do
+    s = unguard(s)
 
     if Twist.zero?(twist) do
       s
@@ -207,9 +318,9 @@ defmodule Hal.Device do
     end
   end
 
-  defp disarm(%{watchdog: nil} = s), do: s
+  defp unguard(%{watchdog: nil} = s), do: s
 
-  defp disarm(%{watchdog: {timer, _ref}} = s) do
+  defp unguard(%{watchdog: {timer, _ref}} = s) do
     Process.cancel_timer(timer)
     %{s | watchdog: nil}
   end
@@ -243,38 +354,5 @@ defmodule Hal.Device do
 
   defp now(%{clock: {m, f, a}}), do: apply(m, f, a)
 
-  defp new!(options) do
-    options =
-      Keyword.validate!(options, [
-        :kind,
-        :driver,
-        :device,
-        sinks: [],
-        clock: {System, :monotonic_time, [:millisecond]}
-      ])
-
-    unless options[:kind] in [:drive, :ptz, :camera],
-      do: refuse!(:kind, options[:kind], ":drive, :ptz or :camera")
-
-    {driver, driver_options} =
-      case options[:driver] do
-        {module, list} when is_atom(module) and is_list(list) -> {module, list}
-        other -> refuse!(:driver, other, "{module, options}")
-      end
-
-    struct!(__MODULE__,
-      kind: options[:kind],
-      device: options[:device] || options[:kind],
-      driver: driver,
-      options: driver_options,
-      sinks: options[:sinks],
-      clock: options[:clock]
-    )
-  end
-
-  @spec refuse!(atom(), term(), String.t()) :: no_return()
-  defp refuse!(option, value, allowed) do
-    raise ArgumentError,
-          "device option #{inspect(option)} cannot be #{inspect(value)}: it must be #{allowed}"
-  end
+  defp new!(options), do: struct!(__MODULE__, Options.check!(options))
 end

@@ -12,6 +12,8 @@ defmodule Hal.Event do
   | `[:hal, :device, :offline]` | `at_ms` | `device`, `driver`, `reason` |
   | `[:hal, :device, :watchdog]` | `at_ms` | `device`, `driver`: no speed came in time, the wheels were stopped |
   | `[:hal, :rflex, :lost]` | `at_ms`, and counters (`Hal.RFlex.Driver.counts/1`) | `port`: on this line more was lost or refused, told every 10 s |
+  | `[:hal, :device, :arming]` | `at_ms` | `device`, `driver`, `state`, `why`: whether wheels may turn has changed (`Hal.Arming`) |
+  | `[:hal, :device, :refused]` | `at_ms`, `refused` | `device`, `driver`: a speed came for wheels that are not armed, so many by now |
   | `[:hal, :event, :failure]` | | `handler`, `event`, `kind`, `reason`: a handler failed and is detached |
   | `[:robot, :gate, :start]` | `at_ms` | `robot`, `latched?` |
   | `[:robot, :gate, :limits]` | `at_ms` | `robot`, `limits`: why the speed is limited has changed |

@@ -4,7 +4,8 @@ defmodule Hal.Fake do
   `{device, what, pid of the device's process}`.
 
   Options: `:test` (pid), `:device` (what it calls itself), `:open` (a function of no arguments
-  that gives `:ok`, `{:error, reason}` or raises; asked at each opening).
+  that gives `:ok`, `{:error, reason}` or raises; asked at each opening), `:ready` (such a function,
+  asked whether it may be armed), `:told` (such a function, what a drive answers to a speed).
 
   A device process that runs one does as it is told by messages: `{:readings, list}`,
   `{:fail, reason}`, `:raise`.
@@ -46,8 +47,15 @@ defmodule Hal.FakeDrive do
   @impl Hal.Drive
   def drive(twist, options) do
     Hal.Fake.tell(options, {:drive, twist})
-    {:ok, options}
+
+    case Keyword.get(options, :told, fn -> :ok end).() do
+      :ok -> {:ok, options}
+      {:error, reason} -> {:error, reason, options}
+    end
   end
+
+  @impl Hal.Drive
+  def ready(options), do: Keyword.get(options, :ready, fn -> :ok end).()
 
   @impl Hal.Drive
   defdelegate handle_message(message, options), to: Hal.Fake

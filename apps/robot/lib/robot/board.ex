@@ -8,6 +8,7 @@ defmodule Robot.Board do
   | key | writer | value |
   |---|---|---|
   | `:odometry` `:sonar` `:ir` `:bumpers` `:power` | `:drive` | as in `Hal.Drive` |
+  | `:arming` | `:drive` | `%{state: state, why: line or nil}` (`Hal.Arming`) |
   | `:ptz` | `:ptz` | as in `Hal.Ptz` |
   | `:blobs` | `:eye` | `%{blobs: [blob], pan: radians, field_of_view: radians or nil}`, at the time of the picture |
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, since when |
@@ -49,6 +50,7 @@ defmodule Robot.Board do
     ir: :drive,
     bumpers: :drive,
     power: :drive,
+    arming: :drive,
     ptz: :ptz,
     blobs: :eye,
     driving: :gate,

@@ -14,6 +14,7 @@ defmodule Robot.Command do
   | `position:X:Y:THETA`, `follow:X:Y:THETA` | `{:position, pose}`, `{:follow, pose}` |
   | `blob:X:Y:THETA:SIZE:FOUND` | `{:blob, pose, size, found?}`; FOUND is 0 or 1 |
   | `lead`, `start`, `ping` | `:lead`, `:start`, `:ping` |
+  | `arm`, `disarm`, `acknowledge` | `:arm`, `:disarm`, `:acknowledge`: whether the wheels may turn (`Hal.Arming`) |
   """
   alias Hal.Pose
   alias Robot.Command.Words
@@ -23,6 +24,9 @@ defmodule Robot.Command do
           | :lead
           | :start
           | :ping
+          | :arm
+          | :disarm
+          | :acknowledge
           | {:move, float(), float()}
           | {:goto, float(), float(), float() | nil}
           | {:follow_the_leader, atom()}
@@ -47,9 +51,13 @@ defmodule Robot.Command do
     {"follow", [:x, :y, :theta], []},
     {"lead", [], []},
     {"start", [], []},
-    {"ping", [], []}
+    {"ping", [], []},
+    {"arm", [], []},
+    {"disarm", [], []},
+    {"acknowledge", [], []}
   ]
 
+  @bare [:stop, :lead, :start, :ping, :arm, :disarm, :acknowledge]
   @keywords Enum.map(@grammar, &elem(&1, 0))
   # No text that means something is longer.
   @longest 500
@@ -147,6 +155,9 @@ defmodule Robot.Command do
   defp build("lead", []), do: :lead
   defp build("start", []), do: :start
   defp build("ping", []), do: :ping
+  defp build("arm", []), do: :arm
+  defp build("disarm", []), do: :disarm
+  defp build("acknowledge", []), do: :acknowledge
   defp build("move", [v, w]), do: {:move, v, w}
   defp build("goto", [x, y]), do: {:goto, x, y, nil}
   defp build("goto", [x, y, theta]), do: {:goto, x, y, theta}
@@ -170,7 +181,7 @@ defmodule Robot.Command do
       "blob:1.0:2.0:0.0:0.01:1"
   """
   @spec to_text(t()) :: String.t()
-  def to_text(word) when word in [:stop, :lead, :start, :ping], do: Atom.to_string(word)
+  def to_text(word) when word in @bare, do: Atom.to_string(word)
   def to_text({:move, v, w}), do: join("move", [v, w])
   def to_text({:goto, x, y, nil}), do: join("goto", [x, y])
   def to_text({:goto, x, y, theta}), do: join("goto", [x, y, theta])

@@ -70,6 +70,7 @@ defmodule Robot.Devices do
           {Hal.Device,
            kind: kind,
            driver: driver,
+           arm: config.arm,
            sinks: sinks,
            clock: config.clock,
            name: Names.via(config.id, kind)}

@@ -9,6 +9,9 @@ defmodule Robot.Gate do
 
   The e-stop latch is read at the start, so that a gate that restarts is as latched as it was.
   Only `reset/1`, a person's doing, clears it.
+
+  While the drive is not armed (`Hal.Arming`) the gate asks it for nothing but to stand, so that a
+  robot that a person arms begins from standing, and says why it stands.
   """
   use GenServer
   alias Hal.{Device, Event, Twist}
@@ -27,7 +30,7 @@ defmodule Robot.Gate do
 
   @doc "A sink for the drive: what reflexes need goes to the gate at once."
   @spec sense(robot :: atom(), tuple()) :: :ok
-  def sense(robot, {kind, _value} = reading) when kind in [:odometry, :sonar, :bumpers],
+  def sense(robot, {kind, _value} = reading) when kind in [:odometry, :sonar, :bumpers, :arming],
     do: GenServer.cast(Names.via(robot, :gate), {:sense, reading})
 
   def sense(_robot, _reading), do: :ok
@@ -55,7 +58,7 @@ defmodule Robot.Gate do
       config: config,
       board: board,
       drive: drive,
-      reflex: Reflex.new(config.profile, latched?: latched?),
+      reflex: Reflex.new(config.profile, latched?: latched?, armed?: armed?(board, config)),
       limits: nil,
       next: System.monotonic_time(:millisecond)
     }
@@ -95,6 +98,15 @@ defmodule Robot.Gate do
   def handle_info(:step, s), do: {:noreply, s |> step(Config.now(s.config)) |> schedule()}
   def handle_info(_other, s), do: {:noreply, s}
 
+  # Before the drive has said anything: as it comes up.
+  defp armed?(board, config) do
+    case Board.fetch(board, :arming, :infinity) do
+      {:ok, %{state: state}, _at_ms} -> state == :armed
+      :error -> config.arm == :auto
+    end
+  end
+
+  defp urgent?({:arming, _state}), do: true
   defp urgent?({:bumpers, [_ | _]}), do: true
   defp urgent?({:sonar, _ranges}), do: true
   defp urgent?(_reading), do: false

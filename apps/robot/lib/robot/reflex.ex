@@ -9,6 +9,7 @@ defmodule Robot.Reflex do
   | limit | what it does |
   |---|---|
   | `:estop` | latched: stands until `reset/1`; wishes from before are forgotten |
+  | `:disarmed` | the drive is not armed: stands (`Hal.Arming`) |
   | `:dead_man` | no wish for 200 ms: stands |
   | `:refused` | the wish was no number, or absurdly large: stands |
   | `:speed` | the profile's greatest speeds |
@@ -18,7 +19,7 @@ defmodule Robot.Reflex do
   | `:blind` | no sonar reading for 500 ms, though it has sonars: at most 0.1 m/s |
   | `:acceleration` | the profile's accelerations; braking before a near thing may be twice as hard |
 
-  `:estop`, `:dead_man`, `:refused` and `:bumper` set the speed to zero at once: how hard the wheels
+  `:estop`, `:disarmed`, `:dead_man`, `:refused` and `:bumper` set the speed to zero at once: how hard the wheels
   then brake is the base's own affair. Everything else is continuous.
   """
   alias Hal.{Profile, Twist}
@@ -41,6 +42,7 @@ defmodule Robot.Reflex do
                 sonar_at_ms: nil,
                 bumpers: [],
                 latched?: false,
+                armed?: true,
                 twist: %Twist{linear: 0.0, turn: 0.0},
                 at_ms: nil
               ]
@@ -53,12 +55,14 @@ defmodule Robot.Reflex do
           sonar_at_ms: integer() | nil,
           bumpers: [0..15],
           latched?: boolean(),
+          armed?: boolean(),
           twist: Twist.t(),
           at_ms: integer() | nil
         }
 
   @type limit ::
           :estop
+          | :disarmed
           | :dead_man
           | :refused
           | :speed
@@ -68,11 +72,19 @@ defmodule Robot.Reflex do
           | :blind
           | :acceleration
 
-  @doc "A gate that stands. Options: `latched?` (default false), for a latch that survived a restart."
+  @doc """
+  A gate that stands. Options: `latched?` (default false), for a latch that survived a restart;
+  `armed?` (default true), until a reading `{:arming, …}` says otherwise.
+  """
   @spec new(Profile.t(), keyword()) :: t()
   def new(%Profile{} = profile, options \\ []) do
-    options = Keyword.validate!(options, latched?: false)
-    %__MODULE__{profile: profile, latched?: options[:latched?] == true}
+    options = Keyword.validate!(options, latched?: false, armed?: true)
+
+    %__MODULE__{
+      profile: profile,
+      latched?: options[:latched?] == true,
+      armed?: options[:armed?] == true
+    }
   end
 
   @doc "Takes a wish. Anything at all may come: what is no sensible number counts as a wish to stop."
@@ -96,6 +108,9 @@ defmodule Robot.Reflex do
 
   def sense(%__MODULE__{} = reflex, {:bumpers, pressed}, _at_ms) when is_list(pressed),
     do: %{reflex | bumpers: pressed}
+
+  def sense(%__MODULE__{} = reflex, {:arming, %{state: state}}, _at_ms),
+    do: %{reflex | armed?: state == :armed}
 
   def sense(%__MODULE__{} = reflex, _reading, _at_ms), do: reflex
 
@@ -121,6 +136,7 @@ defmodule Robot.Reflex do
   end
 
   defp wanted(%{latched?: true}, _at_ms), do: {:stop, :estop}
+  defp wanted(%{armed?: false}, _at_ms), do: {:stop, :disarmed}
   defp wanted(%{wish: nil}, _at_ms), do: {:stop, :dead_man}
 
   defp wanted(%{wish_at_ms: wish_at_ms}, at_ms) when at_ms - wish_at_ms > @dead_man_ms,

@@ -26,6 +26,9 @@ defmodule Robot.CommandTest do
           {"lead", :lead},
           {"start", :start},
           {"ping", :ping},
+          {"arm", :arm},
+          {"DisArm", :disarm},
+          {"acknowledge", :acknowledge},
           {"move:.5:+1.", {:move, 0.5, 1.0}},
           {"move:1e-400:0e400", nil},
           {"move:1e-99:0e99", {:move, 0.0, 0.0}}

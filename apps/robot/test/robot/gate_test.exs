@@ -62,6 +62,33 @@ defmodule Robot.GateTest do
     rolls()
   end
 
+  test "a gate that starts again knows that its drive is not armed" do
+    id = rolling(:gate5, arm: :manual)
+    eventually_limits(id, [:disarmed])
+    stands(250)
+    :ok = Hal.Device.arm(Names.whereis(id, :drive))
+    rolls()
+    :ok = Hal.Device.disarm(Names.whereis(id, :drive))
+    listen(id, [:robot, :gate, :start])
+    listen(id, [:robot, :gate, :limits])
+    kill(id, :gate)
+    assert_receive {[:robot, :gate, :start], %{latched?: false}}
+    # Its first word is why it stands.
+    assert_receive {[:robot, :gate, :limits], %{limits: limits}}
+    assert limits == [:disarmed]
+  end
+
+  defp eventually_limits(id, limits) do
+    listen(id, [:robot, :gate, :limits])
+
+    case Board.fetch(Board.find!(id), :driving, :infinity) do
+      {:ok, %{limits: ^limits}, _at_ms} -> :ok
+      _others -> assert_receive {[:robot, :gate, :limits], %{limits: ^limits}}
+    end
+
+    Hal.Event.detach({Robot.Case, id, [:robot, :gate, :limits]})
+  end
+
   test "whatever is wished, only sane speeds come out" do
     id = robot(:gate4)
     assert_receive {:drive, {:drive, @zero}, _}

@@ -49,6 +49,24 @@ defmodule Robot.ReflexTest do
     assert Reflex.new(Profile.magellan(), latched?: true).latched?
   end
 
+  test "a drive that is not armed stands at once, and begins again from standing" do
+    {_, _, reflex} = run(gate(), Twist.new(0.5, 1.0), 0, 30)
+
+    for state <- [:disarmed, {:error, :unplugged}] do
+      stopped = Reflex.sense(reflex, {:arming, %{state: state, why: nil}}, 1_500)
+      assert {twist, [:disarmed], stopped} = run(stopped, Twist.new(0.5, 1.0), 1_500, 10)
+      assert Twist.zero?(twist)
+      armed = Reflex.sense(stopped, {:arming, %{state: :armed, why: nil}}, 2_000)
+      assert {first, [:acceleration | _], _} = run(armed, Twist.new(0.5, 1.0), 2_000, 1)
+      assert first == Twist.new(0.025, 0.05)
+      # The latch is stronger, and told first.
+      assert {_, [:estop], _} = Reflex.step(Reflex.estop(stopped), 2_000)
+    end
+
+    fresh = Reflex.new(Profile.magellan(), armed?: false)
+    assert {_, [:disarmed], _} = run(fresh, Twist.new(0.5, 0.0), 0, 3)
+  end
+
   test "a touched side stops driving toward it, not away and not turning" do
     for {segment, stops} <- [
           {0, :ahead},

@@ -59,7 +59,7 @@ defmodule Swarm.About do
   """
   @spec note(noted(), Config.t(), Board.t(), boot :: non_neg_integer(), Ear.t()) :: noted()
   def note(noted, config, board, boot, ear) do
-    doing = {doing(board), Board.latched?(board)}
+    doing = {doing(board), Board.latched?(board), Board.fetch(board, :arming, :infinity)}
 
     case noted do
       {left, ^doing} when left > 0 ->

@@ -1,7 +1,7 @@
 defmodule Swarm.Brake do
   @moduledoc """
   A robot's emergency brake: a companion beside its link, of high priority, with a mailbox of its
-  own. What stops the robot comes here (`:estop`, `:reset`, `:stop` of people, calls of `Swarm.Alarm`)
+  own. What stops the robot comes here (`:estop`, `:reset`, `:stop` and `:disarm` of people, calls of `Swarm.Alarm`)
   and goes to the gate at once, also where the link is flooded, hangs or is dead.
 
   It alone decides how the emergency stop stands (`Swarm.Stop`), and writes it on the board under
@@ -12,6 +12,7 @@ defmodule Swarm.Brake do
   (`Swarm.Stamp`), which is asked for here.
   """
   use GenServer
+  alias Hal.Device
   alias Robot.{Board, Config, Gate, Names, Pilot}
   alias Swarm.{Alarm, Entry, Post, Stamp, Stop}
 
@@ -63,7 +64,7 @@ defmodule Swarm.Brake do
   @doc "Whether a request is for the brake; all others are for the link."
   @spec takes?(request :: term()) :: boolean()
   def takes?({:estop, _call}), do: true
-  def takes?(request), do: request in [:stop, :estop, :reset]
+  def takes?(request), do: request in [:stop, :disarm, :estop, :reset]
 
   @doc "Takes a request for the brake from the robot's link, which has looked how old it is."
   @spec take(robot :: atom(), request :: term(), reference()) :: :ok
@@ -180,6 +181,11 @@ defmodule Swarm.Brake do
     {:ok, s}
   end
 
+  defp answer(:disarm, s) do
+    :ok = Device.disarm_later(Names.via(s.id, :drive))
+    answer(:stop, s)
+  end
+
   defp answer(:reset, s) do
     :ok = Gate.reset(s.id)
     Alarm.quiet(s.stop.calls)
@@ -187,7 +193,9 @@ defmodule Swarm.Brake do
   end
 
   defp answer(other, s),
-    do: {{:error, "#{inspect(other, limit: 5)} does not stop #{s.id}; stop and estop do"}, s}
+    do:
+      {{:error, "#{inspect(other, limit: 5)} does not stop #{s.id}; stop, disarm and estop do"},
+       s}
 
   defp called(s, call) do
     with true <- Stop.call?(call),

@@ -78,12 +78,12 @@ defmodule Swarm.Stamp do
   @doc """
   Whether a request needs a stamp. A stop is obeyed at any age, and questions do no harm.
 
-      iex> for request <- [:reset, :stop, :status], do: Swarm.Stamp.needed?(request)
-      [true, false, false]
+      iex> for request <- [:reset, :arm, :stop, :disarm], do: Swarm.Stamp.needed?(request)
+      [true, true, false, false]
   """
   @spec needed?(request :: term()) :: boolean()
   def needed?({:estop, _call}), do: false
-  def needed?(request), do: request not in [:stop, :estop, :status, :ping]
+  def needed?(request), do: request not in [:stop, :disarm, :estop, :status, :ping]
 
   @doc """
   Whether a robot is to obey a request now. One without a stamp is obeyed where whoever asked, by the

@@ -4,6 +4,9 @@ defmodule Swarm.Status do
 
       #mag1 follow (1.20, -0.35, 90 deg) 0.31 m/s by follow, view 7, hears 4 but not min2, age 40 ms
 
+  Of wheels that may not turn it says `DISARMED`, with what is missing, or `LINE LOST` until a person
+  acknowledges (`Hal.Arming`; `arming` and `why`).
+
   `age_ms` is how old its newest reading is; `rejected` counts malformed messages by kind. `hears` are
   the robots it hears itself, `view` those that it takes for there (itself too), with the view's number,
   which grows with each that comes or goes (`Swarm.Peers`). Of whom it knows by way of others only, the line
@@ -28,6 +31,8 @@ defmodule Swarm.Status do
                 speed: 0.0,
                 limits: [],
                 estop: false,
+                arming: nil,
+                why: nil,
                 leader: nil,
                 power: nil,
                 health: %{},
@@ -49,6 +54,8 @@ defmodule Swarm.Status do
           speed: float(),
           limits: [atom() | String.t()],
           estop: boolean(),
+          arming: Hal.Arming.state() | nil,
+          why: String.t() | nil,
           leader: atom() | String.t() | nil,
           power: float() | nil,
           health: %{(atom() | String.t()) => :online | {:offline, term()}},
@@ -76,6 +83,8 @@ defmodule Swarm.Status do
       speed: if(driving, do: driving.twist.linear, else: 0.0),
       limits: field(driving, :limits) || [],
       estop: Board.latched?(board),
+      arming: entries |> value(:arming) |> field(:state),
+      why: entries |> value(:arming) |> field(:why),
       leader: mission |> field(:claim) |> field(:leader),
       power: value(entries, :power),
       health:
@@ -129,6 +138,7 @@ defmodule Swarm.Status do
 
       [
         status.estop && "E-STOP",
+        arming(status),
         status.leader && "leader #{status.leader}",
         status.view && "view #{elem(status.view, 0)}",
         "hears #{length(status.hears)}" <> deaf(status),
@@ -138,6 +148,11 @@ defmodule Swarm.Status do
       |> Enum.filter(& &1)
       |> Kernel.++(offline)
     end
+
+    defp arming(%{arming: :disarmed, why: nil}), do: "DISARMED"
+    defp arming(%{arming: :disarmed, why: why}), do: "DISARMED (#{why})"
+    defp arming(%{arming: {:error, _reason}}), do: "LINE LOST (acknowledge it)"
+    defp arming(_armed_or_unknown), do: nil
 
     # Those of the view that are known by way of others only; nearly always none.
     defp deaf(%{view: {_number, members}} = status) do

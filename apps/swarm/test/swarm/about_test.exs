@@ -156,7 +156,9 @@ defmodule Swarm.AboutTest do
           limits: nil,
           power: "x",
           age_ms: "x",
-          rejected: nil
+          rejected: nil,
+          arming: "armed?",
+          arming: :disarmed
         ],
         row = Map.put(good, key, bad),
         row != good and key != :hears,
@@ -164,6 +166,12 @@ defmodule Swarm.AboutTest do
 
     for junk <- [nil, %{}, [], "x", {1, 2}],
         do: assert(Status.Row.decode(:ab11, junk, 0) == :error)
+
+    for {arming, shown} <-
+          [disarmed: :disarmed, armed: nil] ++ [{{:error, :eio}, {:error, :unknown}}] do
+      row = status_row(:ab11, arming: arming)
+      assert {:ok, %{arming: ^shown}} = Status.Row.decode(:ab11, row, 0)
+    end
 
     told(:ab11, :status, %{state: "follow"})
     assert {:error, _} = Swarm.status(:ab11)

@@ -11,10 +11,12 @@ defmodule Swarm.Link.Desk do
   | `:start`, `{:start, options}` | the group mission begins; anew where there are options |
   | `{:formation, kind, spacing}` | for the running mission |
   | a `Robot.Command` | for this robot alone, which leaves the group's mission for it |
+  | `:arm`, `:acknowledge` | of the wheels (`Hal.Device`): done, or why not |
 
-  While the emergency stop holds a robot, it refuses all that would move it.
+  While the emergency stop holds a robot, it refuses all that would move it, and to be armed.
   """
-  alias Robot.{Board, Config, Pilot}
+  alias Hal.Device
+  alias Robot.{Board, Config, Names, Pilot}
   alias Swarm.{Formation, Missions.Landmark, Missions.Manual, Status}
   alias Swarm.Link.Ear
 
@@ -25,11 +27,19 @@ defmodule Swarm.Link.Desk do
   def answer(:status, config, board, ear), do: Status.of(config, board, ear)
   def answer(:ping, _config, _board, _ear), do: :ok
 
+  def answer(:acknowledge, %{id: id}, _board, _ear),
+    do: named(Device.acknowledge(Names.via(id, :drive)), id)
+
   # What is asked for while all stand would otherwise begin with the reset.
   def answer(_request, config, _board, %{stop: %{latched?: true}}),
     do: {:error, "#{config.id} is held by the emergency stop; reset it first"}
 
+  def answer(:arm, %{id: id}, _board, _ear), do: named(Device.arm(Names.via(id, :drive)), id)
+
   def answer(request, config, board, ear), do: checked(request, doing(board), config, ear)
+
+  defp named(:ok, _id), do: :ok
+  defp named({:error, line}, id), do: {:error, "#{id}: #{line}"}
 
   # People come by `Swarm`, which has checked it all; but anybody may send something here.
   defp checked({:start, options} = request, doing, config, ear) do

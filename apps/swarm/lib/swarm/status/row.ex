@@ -1,7 +1,7 @@
 defmodule Swarm.Status.Row do
   @moduledoc """
   A robot's status as a row of the blackboard, for those that it cannot answer: small, in whole
-  numbers (mm, mrad, mm/s) and text. Pure.
+  numbers (mm, mrad, mm/s) and text. Pure. Of wheels that may turn, as nearly always, it says nothing.
   """
   alias Hal.Pose
   alias Swarm.{Shape, Status}
@@ -29,7 +29,12 @@ defmodule Swarm.Status.Row do
       rejected: status.rejected |> Map.values() |> Enum.sum(),
       age_ms: status.age_ms
     }
+    |> arming(status.arming)
   end
+
+  defp arming(row, :disarmed), do: Map.put(row, :arming, "disarmed")
+  defp arming(row, {:error, _reason}), do: Map.put(row, :arming, "error")
+  defp arming(row, _armed_or_unknown), do: row
 
   defp pose(nil), do: nil
   defp pose(pose), do: {mm(pose.x), mm(pose.y), mm(pose.heading)}
@@ -43,6 +48,7 @@ defmodule Swarm.Status.Row do
          %{node: node, leader: leader, power: power, offline: offline, view: view} <- row,
          %{deaf_to: deaf_to, rejected: rejected, age_ms: was_ms} <- row,
          {number, members} <- view,
+         {:ok, arming} <- armed(Map.get(row, :arming)),
          true <- Enum.all?([limits, offline, members, deaf_to], &texts?/1),
          true <- Enum.all?([node, state], &is_binary/1),
          true <- Enum.all?([by, leader], &(&1 == nil or is_binary(&1))),
@@ -63,6 +69,7 @@ defmodule Swarm.Status.Row do
          speed: speed / 1000,
          limits: Enum.map(limits, &Wire.word/1),
          estop: estop,
+         arming: arming,
          leader: leader && Wire.word(leader),
          power: power,
          health: Map.new(offline, &{Wire.word(&1), {:offline, :unknown}}),
@@ -75,6 +82,11 @@ defmodule Swarm.Status.Row do
       _other -> :error
     end
   end
+
+  defp armed(nil), do: {:ok, nil}
+  defp armed("disarmed"), do: {:ok, :disarmed}
+  defp armed("error"), do: {:ok, {:error, :unknown}}
+  defp armed(_other), do: :error
 
   defp texts?(list), do: Shape.list?(list, &is_binary/1)
   defp names(texts), do: for(text <- texts, {:ok, name} <- [Wire.robot(text)], do: name)

@@ -1,0 +1,46 @@
+defmodule Hal.Device.Options do
+  @moduledoc "The options of `Hal.Device`, checked once. Pure."
+  alias Hal.Arming
+
+  @doc "The fields of a device; `ArgumentError` names an option, its value and what it must be."
+  @spec check!(keyword()) :: keyword()
+  def check!(options) do
+    options =
+      Keyword.validate!(options, [
+        :kind,
+        :driver,
+        :device,
+        arm: :auto,
+        sinks: [],
+        clock: {System, :monotonic_time, [:millisecond]}
+      ])
+
+    unless options[:kind] in [:drive, :ptz, :camera],
+      do: refuse!(:kind, options[:kind], ":drive, :ptz or :camera")
+
+    unless options[:arm] in [:auto, :manual],
+      do: refuse!(:arm, options[:arm], ":auto or :manual")
+
+    {driver, driver_options} =
+      case options[:driver] do
+        {module, list} when is_atom(module) and is_list(list) -> {module, list}
+        other -> refuse!(:driver, other, "{module, options}")
+      end
+
+    [
+      kind: options[:kind],
+      device: options[:device] || options[:kind],
+      driver: driver,
+      options: driver_options,
+      arming: if(options[:kind] == :drive, do: Arming.new(options[:arm])),
+      sinks: options[:sinks],
+      clock: options[:clock]
+    ]
+  end
+
+  @spec refuse!(atom(), term(), String.t()) :: no_return()
+  defp refuse!(option, value, allowed) do
+    raise ArgumentError,
+          "device option #{inspect(option)} cannot be #{inspect(value)}: it must be #{allowed}"
+  end
+end

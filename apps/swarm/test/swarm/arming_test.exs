@@ -1,0 +1,154 @@
+defmodule Swarm.ArmingTest do
+  use Swarm.Case, async: false
+  @moduletag :capture_log
+  alias Swarm.Status
+
+  defp line(id), do: inspect(Swarm.status(id))
+  defp shows(id, text), do: eventually(fn -> line(id) =~ text end)
+
+  # What the robot's own wheels are told, until it is this.
+  defp told(id, wanted?) do
+    pid = Names.whereis(id, :drive)
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, ^pid} when is_float(v), 1_000
+    wanted?.(v) || told(id, wanted?)
+  end
+
+  # It may be told to stand at any time, but not to roll, while this goes by.
+  defp stands_while(id, function) do
+    pid = Names.whereis(id, :drive)
+    forget(pid)
+    result = function.()
+
+    receive do
+      {:drive, {:drive, %Twist{linear: v}}, ^pid} when v != 0 -> flunk("rolls at #{v} m/s")
+    after
+      0 -> result
+    end
+  end
+
+  defp forget(pid) do
+    receive do
+      {:drive, {:drive, _}, ^pid} -> forget(pid)
+    after
+      0 -> :ok
+    end
+  end
+
+  test "a robot that comes up disarmed stands and says why, until a person arms it" do
+    id = robot(:arm_hand, arm: :manual)
+    standing([id])
+    shows(id, "DISARMED")
+
+    stands_while(id, fn ->
+      # The order is accepted; its mission runs.
+      assert Swarm.tell(id, "move:0.2:0") == :ok
+      eventually(fn -> match?(%Status{by: :move, limits: [:disarmed]}, Swarm.status(id)) end)
+    end)
+
+    assert Swarm.arm(id) == :ok
+    told(id, &(&1 > 0))
+    refute line(id) =~ "DISARMED"
+
+    assert Swarm.disarm(id) == :ok
+    shows(id, "DISARMED")
+
+    # What it was at has ended: armed again it stands.
+    assert Swarm.tell("arm_hand", "Arm") == :ok
+    eventually(fn -> match?(%Status{arming: :armed, state: :idle}, Swarm.status(id)) end)
+    assert Swarm.tell(id, "disarm") == :ok
+    eventually(fn -> match?(%Status{arming: :disarmed}, Swarm.status(id)) end)
+  end
+
+  test "disarming takes wheels in motion to a stop" do
+    id = robot(:arm_stop)
+    standing([id])
+    assert Swarm.tell(id, "move:0.2:0") == :ok
+    told(id, &(&1 > 0.1))
+    assert Swarm.disarm() == :ok
+    told(id, &(&1 == 0))
+    shows(id, "DISARMED")
+    stands_while(id, fn -> eventually(fn -> Swarm.status(id).limits == [:disarmed] end) end)
+  end
+
+  test "a base that lacks something says what when it is to be armed, and in its status" do
+    missing = fn -> {:error, "conversion distance is missing"} end
+    drive = {Hal.FakeDrive, test: self(), device: :drive, ready: missing}
+    id = robot(:arm_lacks, drive: drive)
+    assert Swarm.arm(id) == {:error, "arm_lacks: conversion distance is missing"}
+    shows(id, "DISARMED (conversion distance is missing)")
+  end
+
+  test "a line lost in motion stays an error, over a new line, until a person acknowledges" do
+    id = robot(:arm_lost, arm: :manual)
+    standing([id])
+    assert Swarm.arm(id) == :ok
+    assert Swarm.tell(id, "move:0.2:0") == :ok
+    told(id, &(&1 > 0))
+    send(Names.whereis(id, :drive), {:fail, :unplugged})
+    shows(id, "LINE LOST (acknowledge it)")
+    eventually(fn -> Swarm.status(id).health[:drive] == :online end)
+    assert {:error, line} = Swarm.arm(id)
+    assert line =~ "arm_lost: the line was lost (:unplugged) while the wheels turned"
+
+    stands_while(id, fn ->
+      eventually(fn -> Swarm.status(id).limits == [:disarmed] end)
+      assert Swarm.acknowledge(id) == :ok
+      shows(id, "DISARMED")
+    end)
+
+    assert Swarm.arm(id) == :ok
+    told(id, &(&1 > 0))
+  end
+
+  test "the emergency stop is stronger: it refuses to be armed, and arming does not release it" do
+    id = robot(:arm_estop, arm: :manual)
+    assert Swarm.arm(id) == :ok
+    assert Swarm.estop() == :ok
+    assert {:error, line} = Swarm.arm(id)
+    assert line == "arm_estop is held by the emergency stop; reset it first"
+    assert Swarm.acknowledge(id) == :ok
+    assert Swarm.disarm(id) == :ok
+    assert Swarm.reset() == :ok
+    # The reset arms nothing.
+    shows(id, "DISARMED")
+    assert Swarm.arm(id) == :ok
+  end
+
+  test "a robot is disarmed though its link hangs, and by an order of any age; armed only in time" do
+    id = robot(:arm_age)
+    old = {1, 1}
+
+    for {request, answer} <- [disarm: :ok, arm: :too_late, acknowledge: :too_late] do
+      ref = :erlang.alias([:reply])
+      role = if request == :disarm, do: :brake, else: :link
+      GenServer.cast(Names.whereis(id, role), {:command, request, ref, old})
+      assert_receive {^ref, got}
+      if answer == :ok, do: assert(got == :ok), else: assert(elem(got, 1) =~ "too late")
+    end
+
+    shows(id, "DISARMED")
+    assert Swarm.arm(id) == :ok
+    link = Names.whereis(id, :link)
+    :ok = :sys.suspend(link)
+    assert Swarm.disarm(id) == :ok
+    eventually(fn -> Hal.Device.arming(Names.whereis(id, :drive)).state == :disarmed end)
+    :ok = :sys.resume(link)
+  end
+
+  test "who arms a robot whose drive hangs is told so in time" do
+    id = robot(:arm_hangs, arm: :manual)
+    drive = Names.whereis(id, :drive)
+    :ok = :sys.suspend(drive)
+    assert {:error, line} = Swarm.arm(id)
+    assert line =~ "arm_hangs" and line =~ "does not answer"
+    :ok = :sys.resume(drive)
+  end
+
+  test "robots and orders of no sense are told in a line" do
+    assert {:error, "no robot :nobody" <> _} = Swarm.arm(:nobody)
+    assert {:error, _} = Swarm.disarm([:nobody])
+    assert {:error, _} = Swarm.acknowledge({1, 2})
+    id = robot(:arm_sense)
+    assert {:error, "arm: \"now\" is too much" <> _} = Swarm.tell(id, "arm:now")
+  end
+end
