@@ -65,11 +65,11 @@
 
   # Lower than what its kind can do, never higher.
   limits: [
-    # m/s; a Magellan and an ATRV mini can do 0.5
-    max_linear: 0.3
     # max_turn: 1.0,                       # rad/s; an ATRV mini 0.8
     # max_acceleration: 0.5,               # m/s2, also of braking
-    # max_turn_acceleration: 1.0           # rad/s2
+    # max_turn_acceleration: 1.0,          # rad/s2
+    # m/s; a Magellan and an ATRV mini can do 0.5
+    max_linear: 0.3
   ],
 
   # Where it is switched on, in the map that all robots share.

@@ -306,11 +306,33 @@ defmodule Robot.FileTest do
     end
   end
 
-  test "the template tells of every key" do
+  test "template and guide tell of every key" do
     template = File.read!(Path.join(@robots, "template.exs"))
+    guide = File.read!(Path.expand("../../../../docs/robots.md", __DIR__))
 
     for key <- all_keys(Schema.table(%{fleet: Schema.fleet(), colours: nil})) do
       assert template =~ ~r/\b#{key}:\s/, "template.exs does not tell of #{key}:"
+      assert guide =~ ~r/`#{key}:[` ]/, "robots.md does not tell of #{key}:"
+    end
+  end
+
+  # What stands behind # with a key is an example: one that is taken, when it is no longer a remark.
+  test "the examples in the template are well" do
+    text = File.read!(Path.join(@robots, "template.exs"))
+
+    examples =
+      for [line, indent, example] <- Regex.scan(~r/^( +)# (\w+: .*)$/m, text),
+          not String.contains?(line, ["…", "camera: ["]),
+          do:
+            {line,
+             indent <>
+               (example |> String.replace(~r/ +#.*$/, "") |> String.trim_trailing(",")) <> ","}
+
+    assert length(examples) > 25
+
+    for {line, example} <- examples do
+      changed = String.replace(text, line, example)
+      assert {:ok, _robot} = Robot.File.parse(changed, colours: colours()), example
     end
   end
 
