@@ -22,6 +22,7 @@ defmodule Console.Options do
             blobs: :painted,
             headless: false,
             nodes: false,
+            hardware: [],
             json: nil,
             picture: nil,
             help: false
@@ -49,6 +50,7 @@ defmodule Console.Options do
       pairs
       |> Enum.reduce(options, &put/2)
       |> check_kills()
+      |> check_hardware()
     end
   end
 
@@ -70,20 +72,26 @@ defmodule Console.Options do
       bin/demo --headless --map hospital --json -           a report for another program
       bin/demo --nodes --robots 4                           five processes: kill -9 one of them
       bin/demo --nodes --headless --kill leader@40 --json - the same with a report
+      bin/demo --hardware 1                                 the first robot has the real drivers
 
     Exit status: 0 the fleet ended in formation, 2 it did not, 1 something was wrong with the input.
     """
   end
 
-  @doc "What `Sim.Trial.new/1` takes."
+  @doc "What `Sim.Trial.new/1` and `Sim.Fleet.start_link/1` take."
   @spec trial(t()) :: map()
   def trial(%__MODULE__{} = options) do
     options
     |> Map.take(
-      ~w(robots seed map start landmark moves kills loss noise formation assign leader_change blobs)a
+      ~w(robots seed map start landmark moves kills loss noise formation assign leader_change blobs hardware)a
     )
     |> Map.put(:duration_s, duration_s(options))
+    |> Map.merge(if options.nodes, do: %{nodes: true}, else: %{})
   end
+
+  @doc "Whether the run takes the time that it shows: lockstep has no serial lines and no other processes."
+  @spec real_time?(t()) :: boolean()
+  def real_time?(%__MODULE__{nodes: nodes?, hardware: hardware}), do: nodes? or hardware != []
 
   @doc """
   How long the run may take, in simulated seconds.
@@ -123,9 +131,12 @@ defmodule Console.Options do
        "may another robot take over when it sees better? (on)"},
       {"duration", "S", &Values.number(&1, 1, 3600),
        "simulated seconds at most (120, hospital 180;\nlive on a terminal: until you quit)"},
-      {"headless", nil, nil, "no view, as fast as it goes (with --nodes in real time)"},
+      {"headless", nil, nil,
+       "no view, as fast as it goes (with --nodes or --hardware in real time)"},
       {"nodes", nil, nil,
        "each robot and the world in a process of its own, a node\nto attach to, to kill -9 and to kill -STOP"},
+      {"hardware", "N|mag:N,min:N", &hardware/1,
+       "so many robots, or so many of each kind, have the drivers of real ones,\nand devices emulated on serial lines (0)"},
       {"json", "FILE|-", &file(&1, "", folder), "write the report (- is standard output)"},
       {"picture", "FILE.svg", &file(&1, ".svg", folder),
        "draw the paths and the formation error"},
@@ -176,6 +187,41 @@ defmodule Console.Options do
 
       robot ->
         {:ok, {robot, at_s}}
+    end
+  end
+
+  defp check_hardware({:ok, %{hardware: count} = options}) when is_integer(count) do
+    if count <= length(options.robots),
+      do: {:ok, %{options | hardware: Enum.take(options.robots, count)}},
+      else: too_much_hardware("#{count}", options.robots)
+  end
+
+  defp check_hardware({:ok, %{hardware: robots} = options}) do
+    case robots -- options.robots do
+      [] -> {:ok, options}
+      [missing | _] -> too_much_hardware("#{missing}", options.robots)
+    end
+  end
+
+  defp check_hardware(error), do: error
+
+  defp too_much_hardware(asked, robots) do
+    {:error,
+     ["--hardware #{asked} is more than there is: the fleet is #{Fleet.describe(robots)}"]}
+  end
+
+  defp hardware(text) do
+    with {:error, _allowed} <- Values.whole(text, 0..100),
+         {:error, _allowed} <- Fleet.parse(text) do
+      {:error, "a whole number, or like mag:1,min:1 (kinds mag and min)#{kind_hint(text)}"}
+    end
+  end
+
+  # As people type it: a kind without a number, a robot's name.
+  defp kind_hint(text) do
+    case Regex.run(~r/^(mag|min)(\d*)$/, text) do
+      [_all, kind, _number] -> " (did you mean \"#{kind}:1\"?)"
+      nil -> ""
     end
   end
 

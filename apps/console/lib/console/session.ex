@@ -61,7 +61,7 @@ defmodule Console.Session do
       started_ms: System.monotonic_time(:millisecond)
     }
 
-    begin(session, options, if(options.nodes, do: module.lines(live), else: []))
+    begin(session, options, if(Options.real_time?(options), do: module.lines(live), else: []))
     send(self(), :draw)
     session = loop(session)
     Process.unlink(reader)

@@ -19,7 +19,7 @@ defmodule Console.OptionsTest do
       parse(
         "--fleet mag:4,min:2 --seed 7 --map hospital --start same --landmark=-2,1 --move -3,2@40 " <>
           "--move 0,0@60 --kill leader@30 --kill min2@50.5 --loss 0.2 --noise slip --formation wedge:1.2 " <>
-          "--assign chain --leader-change off --duration 200 --headless --nodes --json - --picture a.svg --blobs direct"
+          "--assign chain --leader-change off --duration 200 --headless --nodes --hardware mag:1 --json - --picture a.svg --blobs direct"
       )
 
     assert options.headless and options.nodes
@@ -41,8 +41,39 @@ defmodule Console.OptionsTest do
              assign: :chain,
              leader_change: false,
              duration_s: 200.0,
-             blobs: :direct
+             blobs: :direct,
+             hardware: [:mag1],
+             nodes: true
            }
+  end
+
+  test "hardware are the first robots, or the first of a kind, and take real time" do
+    {:ok, options} = parse("--robots 4 --hardware 3")
+    assert options.hardware == [:mag1, :mag2, :min1]
+    {:ok, options} = parse("--hardware mag:1,min:1")
+    assert options.hardware == [:mag1, :min1]
+    assert Options.real_time?(options)
+    {:ok, options} = parse("--hardware 0")
+    refute Options.real_time?(options)
+    refute is_map_key(Options.trial(options), :nodes)
+
+    assert error("--hardware mag") =~ ~s(did you mean "mag:1"?)
+    assert error("--hardware min2") =~ ~s(did you mean "min:1"?)
+    assert error("--hardwear 1") =~ ~s(did you mean "--hardware"?)
+
+    for wrong <- ~w(-1 1.5 dog:1 mag:x 101 nan) do
+      assert error("--hardware #{wrong}") ==
+               "--hardware must be a whole number, or like mag:1,min:1 (kinds mag and min), not #{inspect(wrong)}"
+    end
+
+    for {line, asked} <- [
+          {"--robots 3 --hardware 4", "4"},
+          {"--hardware 100 --robots 3", "100"},
+          {"--fleet mag:3 --hardware min:1", "min1"},
+          {"--robots 3 --hardware mag:3", "mag3"}
+        ] do
+      assert error(line) =~ "--hardware #{asked} is more than there is: the fleet is mag1"
+    end
   end
 
   test "without options six robots in the hall" do
@@ -98,7 +129,7 @@ defmodule Console.OptionsTest do
 
   test "the help names every option" do
     for name <- ~w(robots fleet seed map start landmark move kill loss noise formation assign
-                   leader-change duration headless json picture blobs) do
+                   leader-change duration headless json picture blobs hardware) do
       assert Options.help() =~ "--#{name}"
     end
   end

@@ -34,6 +34,7 @@ defmodule Sim.Body do
                 look: {0.0, 0.0},
                 pan: 0.0,
                 tilt: 0.0,
+                field_of_view: nil,
                 sonar: [],
                 infrared: <<>>,
                 ir: [],
@@ -58,6 +59,7 @@ defmodule Sim.Body do
           look: {float(), float()},
           pan: float(),
           tilt: float(),
+          field_of_view: float(),
           sonar: [float()],
           infrared: binary(),
           ir: [float()],
@@ -79,6 +81,7 @@ defmodule Sim.Body do
       pose: pose,
       odometry: Map.get(robot, :odometry, Pose.new(0, 0)),
       gains: gains(seed, index, noise),
+      field_of_view: profile.camera.field_of_view * 1.0,
       geometry: geometry(profile.sonars, profile.sonar_cone),
       infrared: if(robot[:infrared], do: geometry(profile.irs, @ir_cone), else: <<>>)
     }
@@ -244,8 +247,7 @@ defmodule Sim.Body do
       {:bumpers, body.pressed |> Map.keys() |> Enum.sort()},
       # Two lead batteries that last for three hours.
       {:power, max(22.0, 25.6 - at_ms * 3.0e-7)},
-      {:ptz,
-       %{pan: body.pan, tilt: body.tilt, field_of_view: body.profile.camera.field_of_view * 1.0}}
+      {:ptz, %{pan: body.pan, tilt: body.tilt, field_of_view: body.field_of_view}}
       | if(body.ir == [], do: [], else: [{:ir, body.ir}])
     ]
   end

@@ -227,6 +227,7 @@ defmodule Sim.Emulator do
       case wish do
         {:drive, twist} -> driver.drive(twist, body)
         {:look, pan, tilt} -> driver.look(pan, tilt, body)
+        {:zoom, angle} -> driver.zoom(angle, body)
       end
 
     case result do

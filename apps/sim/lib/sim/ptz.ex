@@ -17,6 +17,13 @@ defmodule Sim.Ptz do
     {:ok, ptz}
   end
 
+  @doc "Takes any angle from 0.05 to 3 radians, at once."
+  @impl Hal.Ptz
+  def zoom(field_of_view, %{line: {server, _}} = ptz) do
+    Server.zoom(server, ptz.robot, field_of_view)
+    {:ok, ptz}
+  end
+
   @impl Hal.Ptz
   def handle_message({:world, server, {:readings, sent_ms, all}}, %{line: {server, _}} = ptz) do
     {late?, least} = Lateness.late?(ptz.least, sent_ms, System.monotonic_time(:millisecond))

@@ -78,6 +78,10 @@ defmodule Sim.Server do
   @spec look(pid(), robot :: atom(), float(), float()) :: :ok
   def look(server, robot, pan, tilt), do: post(server, {:look, robot, pan, tilt})
 
+  @doc "What field of view a robot's camera shall have, in radians."
+  @spec zoom(pid(), robot :: atom(), float()) :: :ok
+  def zoom(server, robot, angle), do: post(server, {:zoom, robot, angle})
+
   @doc "Asks for the next view, for the camera attached."
   @spec next(pid(), robot :: atom()) :: :ok
   def next(server, robot), do: post(server, {:next, robot})
@@ -141,6 +145,9 @@ defmodule Sim.Server do
 
   def handle_cast({:look, robot, pan, tilt}, s),
     do: {:noreply, %{s | world: World.look(s.world, robot, pan, tilt)}}
+
+  def handle_cast({:zoom, robot, angle}, s),
+    do: {:noreply, %{s | world: World.zoom(s.world, robot, angle)}}
 
   def handle_cast({:next, robot}, s), do: {:noreply, %{s | asked: MapSet.put(s.asked, robot)}}
 

@@ -29,7 +29,7 @@ defmodule Sim.Sight do
   @spec of(Sim.Body.t()) :: t()
   def of(%Sim.Body{pose: pose, profile: %{camera: camera}} = body) do
     {c, s} = Trig.cos_sin(pose.heading + body.pan)
-    focal = camera.width / 2 / Trig.tan(camera.field_of_view / 2)
+    focal = camera.width / 2 / Trig.tan(body.field_of_view / 2)
 
     %__MODULE__{
       x: pose.x,

@@ -9,7 +9,7 @@ defmodule Sim.Snapshot do
   alias Sim.{Body, World}
 
   @moving ~w(step at_ms landmark goal collisions min_separation together)a
-  @body ~w(pose odometry alive wanted ramp speed measured turn look pan tilt pressed)a
+  @body ~w(pose odometry alive wanted ramp speed measured turn look pan tilt field_of_view pressed)a
 
   @type t :: {[term()], [[term()]]}
 

@@ -24,7 +24,14 @@ defmodule Sim.Trial do
   """
   @spec new(map()) :: {:ok, t()} | {:error, String.t()}
   def new(options) do
-    with {:ok, setup} <- Setup.new(options), do: {:ok, build(setup)}
+    with {:ok, setup} <- Setup.new(options), :ok <- timeless(setup), do: {:ok, build(setup)}
+  end
+
+  defp timeless(%Setup{options: %{hardware: []}}), do: :ok
+
+  defp timeless(%Setup{options: %{hardware: ids}}) do
+    {:error,
+     "no run in lockstep can have #{Enum.join(ids, ", ")} as hardware: serial lines have a time of their own"}
   end
 
   @doc "100 ms further."
@@ -106,7 +113,7 @@ defmodule Sim.Trial do
   defp build(%Setup{options: options} = setup) do
     members =
       Map.new(setup.robots, fn robot ->
-        member = Map.to_list(robot) ++ [mission: setup.mission]
+        member = [{:mission, setup.mission} | robot |> Map.delete(:hardware?) |> Map.to_list()]
         {robot.id, Member.new(member)}
       end)
 

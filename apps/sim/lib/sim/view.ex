@@ -12,10 +12,11 @@ defmodule Sim.View do
   @typedoc "A world without what only others need; `World.frame/2` and `World.blobs/2` of its robot work."
   @type ground :: World.t()
 
-  @typedoc "Step, time, landmark, poses in the order of the fleet, pan and tilt of the camera's robot."
+  @typedoc "Step, time, landmark, poses in the order of the fleet; pan, tilt and field of view of the robot's camera."
   @type moving ::
           {step :: non_neg_integer(), at_ms :: integer(), Pose.point() | nil,
-           [{float(), float(), float()}], {pan :: float(), tilt :: float()}}
+           [{float(), float(), float()}],
+           {pan :: float(), tilt :: float(), field_of_view :: float()}}
 
   @doc "The ground that the camera of robot `id` stands on."
   @spec ground(World.t(), World.id()) :: ground()
@@ -35,19 +36,19 @@ defmodule Sim.View do
   @doc "What moves, for the camera of robot `id`, with the `poses/1` of all."
   @spec moving(World.t(), [{float(), float(), float()}], World.id()) :: moving()
   def moving(%World{} = world, poses, id) do
-    %Body{pan: pan, tilt: tilt} = Map.fetch!(world.robots, id)
-    {world.step, world.at_ms, world.landmark, poses, {pan, tilt}}
+    %Body{pan: pan, tilt: tilt, field_of_view: angle} = Map.fetch!(world.robots, id)
+    {world.step, world.at_ms, world.landmark, poses, {pan, tilt, angle}}
   end
 
   @doc "The world as the camera of robot `id` sees it."
   @spec world(ground(), moving(), World.id()) :: World.t()
-  def world(%World{} = ground, {step, at_ms, landmark, poses, {pan, tilt}}, id) do
+  def world(%World{} = ground, {step, at_ms, landmark, poses, {pan, tilt, angle}}, id) do
     robots =
       for {other, {x, y, heading}} <- Enum.zip(ground.order, poses), into: %{} do
         {other, %{ground.robots[other] | pose: %Pose{x: x, y: y, heading: heading}}}
       end
 
-    robots = Map.update!(robots, id, &%{&1 | pan: pan, tilt: tilt})
+    robots = Map.update!(robots, id, &%{&1 | pan: pan, tilt: tilt, field_of_view: angle})
     %{ground | step: step, at_ms: at_ms, landmark: landmark, robots: robots}
   end
 

@@ -74,20 +74,18 @@ defmodule Sim.ViscaCamera do
   @impl Sim.Emulator.Core
   def run(%State{} = camera, at_ms) do
     {bytes, camera} = camera |> settle(at_ms) |> State.due(at_ms)
-    {pan, tilt} = looks = Head.angles(camera.head)
+    {pan, tilt} = Head.angles(camera.head)
+    wishes = [{:look, pan, tilt}, {:zoom, Head.field_of_view(camera.head, camera.options.lens)}]
 
     case camera.wished do
-      {^looks, since_ms} when at_ms - since_ms < @repeat_ms ->
-        {bytes, [], camera}
-
-      _other_or_long_ago ->
-        {bytes, [{:look, pan, tilt}], %{camera | wished: {looks, at_ms}}}
+      {^wishes, since_ms} when at_ms - since_ms < @repeat_ms -> {bytes, [], camera}
+      _other_or_long_ago -> {bytes, wishes, %{camera | wished: {wishes, at_ms}}}
     end
   end
 
   @impl Sim.Emulator.Core
   def next_ms(%State{head: head} = camera) do
-    turning = if head.motion != :still, do: camera.at_ms + @step_ms
+    turning = if head.motion != :still or head.zooming != :still, do: camera.at_ms + @step_ms
 
     [State.next_ms(camera), Head.there_ms(head), Head.zoomed_ms(head), turning]
     |> Enum.reject(&is_nil/1)

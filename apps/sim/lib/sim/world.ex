@@ -104,6 +104,11 @@ defmodule Sim.World do
   def look(%__MODULE__{} = world, id, pan, tilt),
     do: update(world, id, &if(&1.alive, do: %{&1 | look: {pan * 1.0, tilt * 1.0}}, else: &1))
 
+  @doc "The horizontal field of view of a robot's camera, 0.05 to 3 radians, from now on."
+  @spec zoom(t(), id(), number()) :: t()
+  def zoom(%__MODULE__{} = world, id, angle),
+    do: update(world, id, &%{&1 | field_of_view: angle |> max(0.05) |> min(3.0)})
+
   @doc "Stops a robot for ever; its body stays where it is."
   @spec kill(t(), id()) :: t()
   def kill(%__MODULE__{} = world, id) do

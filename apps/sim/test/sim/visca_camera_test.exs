@@ -108,11 +108,11 @@ defmodule Sim.ViscaCameraTest do
 
   test "the body is told where it looks, left and up positive, at the speed it turns" do
     camera = hear(camera(), "81 01 06 02 18 14 0f 0e 0f 08 0f 0f 08 08 ff", 0)
-    {_, [{:look, pan, tilt}], camera} = Camera.run(camera, 100)
+    {_, [{:look, pan, tilt}, {:zoom, _}], camera} = Camera.run(camera, 100)
     assert_in_delta pan, 0.1 * 24 * 3.33 * :math.pi() / 180, 1.0e-6
     assert_in_delta tilt, -0.1 * 50 * :math.pi() / 180, 1.0e-6
     {_, _, camera} = Camera.run(camera, 1000)
-    {_, [{:look, pan, tilt}], _} = Camera.run(camera, 1200)
+    {_, [{:look, pan, tilt}, {:zoom, _}], _} = Camera.run(camera, 1200)
     assert_in_delta pan, 30 * :math.pi() / 180, 1.0e-6
     assert_in_delta tilt, -10 * :math.pi() / 180, 1.0e-6
   end

@@ -1,15 +1,15 @@
 defmodule Console.Live.Paced do
   @moduledoc """
-  A live fleet of many processes with the functions of `Sim.Trial`, so that a run without a view goes
+  A live fleet with the functions of `Sim.Trial`, so that a run without a view goes
   over the same lines: a step is a tenth of a second that passes.
   """
   alias Sim.Fleet
 
   @step_ms 100
 
-  @doc "Starts the fleet, each robot in a process of the operating system of its own."
+  @doc "Starts the fleet; with `nodes: true` each robot in a process of the operating system of its own."
   @spec new(map()) :: {:ok, pid()} | {:error, String.t()}
-  def new(options), do: Fleet.start_link(Map.put(options, :nodes, true))
+  defdelegate new(options), to: Fleet, as: :start_link
 
   @doc "A tenth of a second later; when the fleet has fallen, this process ends with it."
   @spec step(pid()) :: pid()

@@ -4,7 +4,7 @@ defmodule Mix.Tasks.Demo do
   Runs the demo; `mix demo --help` lists its options.
 
   Live, every robot is a tree of processes of its own, in real time; a fleet too large for the
-  machine's processors is run in lockstep instead, as slowly as it takes.
+  machine's processors is run in lockstep instead, as slowly as it takes, unless there are nodes or hardware.
 
   Exit status: 0 the fleet ended in formation, 2 it did not, 1 something was wrong with the input.
   """
@@ -38,10 +38,10 @@ defmodule Mix.Tasks.Demo do
 
   # Who reads us may have seen enough, as `head` does; then we end without a word.
   defp play(options) do
-    if options.nodes, do: warn(length(options.robots))
+    warn(options)
 
     cond do
-      options.headless and options.nodes -> Demo.run(options, Live.Paced, paced())
+      options.headless and Options.real_time?(options) -> Demo.run(options, Live.Paced, paced())
       options.headless -> Demo.run(options, Sim.Trial)
       true -> live(options)
     end
@@ -52,23 +52,30 @@ defmodule Mix.Tasks.Demo do
 
   defp paced, do: [lines: &Live.Paced.lines/1, stop: &Live.Paced.stop/1]
 
-  defp warn(robots) do
-    if robots > @nodes_a_processor * System.schedulers_online() do
+  defp warn(%{nodes: true, robots: robots}),
+    do: warn("processes", length(robots), @nodes_a_processor)
+
+  defp warn(%{hardware: [_ | _], robots: robots}),
+    do: warn("robots", length(robots), @robots_a_processor)
+
+  defp warn(_lockstep_at_need), do: :ok
+
+  defp warn(what, count, a_processor) do
+    most = a_processor * System.schedulers_online()
+
+    if count > most do
       IO.puts(
         :stderr,
-        "demo: #{robots} processes are much for this machine; up to " <>
-          "#{@nodes_a_processor * System.schedulers_online()} keep real time"
+        "demo: #{count} #{what} are much for this machine; up to #{most} keep real time"
       )
     end
   end
 
-  defp live(%{nodes: true} = options),
-    do: Session.run(options, Live.Fleet, &Live.Fleet.start_link(Map.put(&1, :nodes, true)))
-
   defp live(options) do
-    if length(options.robots) <= @robots_a_processor * System.schedulers_online(),
-      do: Session.run(options, Live.Fleet, &Live.Fleet.start_link/1),
-      else: Session.run(options, Live.Trial, &Live.Trial.start_link(Sim.Trial, &1))
+    if Options.real_time?(options) or
+         length(options.robots) <= @robots_a_processor * System.schedulers_online(),
+       do: Session.run(options, Live.Fleet, &Live.Fleet.start_link/1),
+       else: Session.run(options, Live.Trial, &Live.Trial.start_link(Sim.Trial, &1))
   end
 
   defp refuse(lines) do

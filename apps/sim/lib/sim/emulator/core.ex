@@ -7,7 +7,10 @@ defmodule Sim.Emulator.Core do
   @type core :: term()
 
   @typedoc "What the device wants of its body."
-  @type wish :: {:drive, Hal.Twist.t()} | {:look, pan :: float(), tilt :: float()}
+  @type wish ::
+          {:drive, Hal.Twist.t()}
+          | {:look, pan :: float(), tilt :: float()}
+          | {:zoom, field_of_view :: float()}
 
   @doc "The device, just switched on; or one line that names what is wrong with its options."
   @callback new(options :: keyword(), at_ms :: integer()) ::

@@ -6,20 +6,29 @@ defmodule Sim.Fleet.Local do
       |-- Sim.Worlds     unless another fleet of this node has it already
       |-- Sim.Server     the world
       |-- Sim.Fleet.Air  a radio that loses, if any is lost
+      |-- Sim.Fleet.Hardware  emulated devices of those that have the real drivers, if any has
       `-- Robot.Fleet    the robots, each :temporary: one that ends for good is a wreck
   """
   @behaviour Sim.Fleet.Crew
   alias Hal.Event
-  alias Sim.Fleet.{Air, Robot}
+  alias Sim.Fleet.{Air, Folder, Hardware, Robot}
   alias Sim.{Server, Worlds}
 
-  @enforce_keys [:supervisor, :server, :air, :order, :pids]
+  @enforce_keys [:supervisor, :server, :air, :order, :pids, :robots, :folder]
   defstruct @enforce_keys
 
   @impl Sim.Fleet.Crew
   def start(setup, options) do
+    with {:ok, folder} <- folder(setup.options), do: {:ok, start(setup, options, folder)}
+  end
+
+  # Only serial lines need one.
+  defp folder(%{hardware: []}), do: {:ok, nil}
+  defp folder(_hardware), do: Folder.make()
+
+  defp start(setup, options, folder) do
     name = make_ref()
-    {:ok, supervisor} = Supervisor.start_link(parts(setup, name), parts_options())
+    {:ok, supervisor} = Supervisor.start_link(parts(setup, name, folder), parts_options())
     part = fn id -> supervisor |> Supervisor.which_children() |> List.keyfind(id, 0) |> pid() end
     {transport, air} = Air.radio(part.(Air))
     :ok = Event.attach({__MODULE__, self()}, [:robot, :stage], &__MODULE__.stage/4, self())
@@ -30,7 +39,8 @@ defmodule Sim.Fleet.Local do
       transport: transport,
       blobs: setup.options.blobs,
       mission: setup.mission,
-      trace: options[:trace]
+      trace: options[:trace],
+      folder: folder
     }
 
     pids =
@@ -40,14 +50,15 @@ defmodule Sim.Fleet.Local do
         {pid, robot.id}
       end
 
-    {:ok,
-     %__MODULE__{
-       supervisor: supervisor,
-       server: part.(Server),
-       air: air,
-       order: setup.options.robots,
-       pids: pids
-     }}
+    %__MODULE__{
+      supervisor: supervisor,
+      server: part.(Server),
+      air: air,
+      order: setup.options.robots,
+      pids: pids,
+      robots: setup.robots,
+      folder: folder
+    }
   end
 
   @doc false
@@ -93,7 +104,10 @@ defmodule Sim.Fleet.Local do
   def messages(crew), do: Air.counts(crew.air)
 
   @impl Sim.Fleet.Crew
-  def lines(_crew), do: ["all robots live in process #{System.pid()}; see --nodes"]
+  def lines(crew) do
+    ["all robots live in process #{System.pid()}; see --nodes"] ++
+      Hardware.lines(crew.robots, crew.folder)
+  end
 
   @impl Sim.Fleet.Crew
   def hear(crew, {:stage, %{robot: id, stage: stage} = about}) do
@@ -113,6 +127,7 @@ defmodule Sim.Fleet.Local do
   def stop(crew) do
     Event.detach({__MODULE__, self()})
     if Process.alive?(crew.supervisor), do: Supervisor.stop(crew.supervisor, :shutdown)
+    if crew.folder, do: Folder.remove(crew.folder)
   end
 
   defp wreck(crew, pid) do
@@ -120,10 +135,14 @@ defmodule Sim.Fleet.Local do
     change(%{crew | pids: pids}, {:kill, id})
   end
 
-  defp parts(%{options: options, world: world}, name) do
+  defp parts(%{options: options, world: world, robots: robots}, name, folder) do
     worlds = if Worlds.running?(), do: [], else: [Worlds]
     server = [%{id: Server, start: {Server, :start_link, [[name: name, world: world]]}}]
-    worlds ++ server ++ Air.parts(options.loss, options.seed) ++ [Elixir.Robot.Fleet]
+
+    worlds ++
+      server ++
+      Air.parts(options.loss, options.seed) ++
+      Hardware.parts(robots, name, folder) ++ [Elixir.Robot.Fleet]
   end
 
   defp parts_options, do: [strategy: :one_for_all, max_restarts: 0]

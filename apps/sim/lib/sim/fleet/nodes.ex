@@ -8,6 +8,7 @@ defmodule Sim.Fleet.Nodes do
   snapshot that came from it, and the robots, which stood meanwhile, go on.
   """
   @behaviour Sim.Fleet.Crew
+  alias Sim.Fleet.Hardware
   alias Sim.Fleet.Nodes.{Child, Command, Host}
   alias Sim.{Server, Snapshot}
   alias Sim.Node.{Config, Courier}
@@ -146,6 +147,7 @@ defmodule Sim.Fleet.Nodes do
       {id, node_name(id), child && child.pid}
     end
     |> Command.lines(crew.host.home)
+    |> Kernel.++(Hardware.lines(crew.setup.robots, crew.host.home))
   end
 
   @impl Sim.Fleet.Crew
@@ -263,6 +265,7 @@ defmodule Sim.Fleet.Nodes do
        world: crew.name,
        blobs: options.blobs,
        mission: setup.mission,
+       folder: crew.host.home,
        loss: options.loss,
        seed: options.seed + index
      }}

@@ -1,12 +1,14 @@
 defmodule Sim.Fleet.Robot do
   @moduledoc "One robot of a simulated fleet on this node: its config, its start, what it claims."
   alias Robot.{Board, Config, Pilot}
+  alias Sim.Fleet.Hardware
   alias Sim.World
   alias Swarm.Missions.Manual
 
   @typedoc """
   What all robots of a fleet have in common: the name of their world, their clock and radio, how they
-  see, what they are at, and who is told what goes in and out (`{m, f, a}`, called with the id first).
+  see, what they are at, who is told what goes in and out (`{m, f, a}`, called with the id first), and the run's
+  folder, where the serial lines of those that are hardware are.
   """
   @type common :: %{
           world: term(),
@@ -14,7 +16,8 @@ defmodule Sim.Fleet.Robot do
           transport: Config.call(),
           blobs: :painted | :direct,
           mission: Config.module_options(),
-          trace: Config.call() | nil
+          trace: Config.call() | nil,
+          folder: Path.t() | nil
         }
 
   @doc "Starts a robot of `Sim.Trial.Setup` in a `Robot.Fleet`."
@@ -58,18 +61,23 @@ defmodule Sim.Fleet.Robot do
     device = [world: common.world, robot: id]
 
     Config.new!(
-      id: id,
-      profile: robot.profile,
-      start: robot.start,
-      clock: common.clock,
-      drive: {Sim.Drive, device},
-      ptz: {Sim.Ptz, device},
-      camera: {Sim.Camera, device ++ [blobs: common.blobs, clock: common.clock]},
-      colours: World.colours(),
-      mission: common.mission,
-      trace: trace(common.trace, id)
+      [
+        id: id,
+        profile: robot.profile,
+        start: robot.start,
+        clock: common.clock,
+        camera: {Sim.Camera, device ++ [blobs: common.blobs, clock: common.clock]},
+        colours: World.colours(),
+        mission: common.mission,
+        trace: trace(common.trace, id)
+      ] ++ drivers(robot, device, common.folder)
     )
   end
+
+  defp drivers(%{hardware?: true} = robot, _device, folder), do: Hardware.drivers(robot, folder)
+
+  defp drivers(_simulated, device, _folder),
+    do: [drive: {Sim.Drive, device}, ptz: {Sim.Ptz, device}]
 
   defp trace(nil, _id), do: nil
   defp trace({m, f, a}, id), do: {m, f, a ++ [id]}

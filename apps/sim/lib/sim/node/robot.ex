@@ -5,18 +5,23 @@ defmodule Sim.Node.Robot do
       supervisor (one_for_all, no restarts: a robot that ends for good takes its node along)
       |-- Sim.Worlds     where the world is
       |-- Sim.Fleet.Air  a radio that loses, if any is lost
+      |-- Sim.Fleet.Hardware  emulated devices, if it has the real drivers
       `-- Robot.Fleet    the robot
 
-  Options: `robot` as of `Sim.Trial.Setup`, `world`, `blobs`, `mission` as of `Sim.Fleet.Robot`, `loss`
+  Options: `robot` as of `Sim.Trial.Setup`, `world`, `blobs`, `mission`, `folder` as of `Sim.Fleet.Robot`, `loss`
   and `seed` of the radio.
   """
   @behaviour Sim.Node
-  alias Sim.Fleet.{Air, Robot}
+  alias Sim.Fleet.{Air, Hardware, Robot}
   alias Sim.Worlds
 
   @impl Sim.Node
   def start(options) do
-    children = [Worlds] ++ Air.parts(options.loss, options.seed) ++ [Elixir.Robot.Fleet]
+    children =
+      [Worlds] ++
+        Air.parts(options.loss, options.seed) ++
+        Hardware.parts([options.robot], options.world, options.folder) ++ [Elixir.Robot.Fleet]
+
     {:ok, supervisor} = Supervisor.start_link(children, strategy: :one_for_all, max_restarts: 0)
     part = fn id -> for {^id, pid, _, _} <- Supervisor.which_children(supervisor), do: pid end
     {transport, air} = Air.radio(List.first(part.(Air)))
@@ -27,7 +32,8 @@ defmodule Sim.Node.Robot do
       transport: transport,
       blobs: options.blobs,
       mission: options.mission,
-      trace: nil
+      trace: nil,
+      folder: options.folder
     }
 
     {:ok, pid} = Robot.start(hd(part.(Elixir.Robot.Fleet)), options.robot, common)

@@ -21,7 +21,8 @@ defmodule Sim.Trial.Options do
     of: nil,
     lost_link: nil,
     duration_s: 120,
-    blobs: :painted
+    blobs: :painted,
+    hardware: []
   }
 
   @names Enum.sort(Map.keys(@defaults))
@@ -51,7 +52,7 @@ defmodule Sim.Trial.Options do
 
   def check(asked) do
     if Keyword.keyword?(asked),
-      do: asked |> Enum.reduce_while({:ok, @defaults}, &take/2) |> cuts(),
+      do: asked |> Enum.reduce_while({:ok, @defaults}, &take/2) |> cuts() |> hardware(),
       else: {:error, "options cannot be #{inspect(asked)}: [robots: [:mag1, :min1], seed: 3]"}
   end
 
@@ -65,6 +66,14 @@ defmodule Sim.Trial.Options do
   end
 
   defp cuts(error), do: error
+
+  defp hardware({:ok, %{hardware: ids, robots: robots}} = checked) do
+    if is_list(ids) and ids == Enum.uniq(ids) and ids -- robots == [],
+      do: checked,
+      else: {:error, "hardware cannot be #{inspect(ids)}: a list of robots of this run, [:mag1]"}
+  end
+
+  defp hardware(error), do: error
 
   defp take({name, _value}, _options) when name not in @names,
     do: {:halt, {:error, "unknown option #{inspect(name)}#{hint(name)}"}}

@@ -10,8 +10,8 @@ defmodule Sim.Trial.Setup do
   @enforce_keys [:options, :map, :world, :robots, :mission]
   defstruct @enforce_keys
 
-  @typedoc "`start` is the pose at which a robot's wheels begin to count."
-  @type robot :: %{id: atom(), profile: Profile.t(), start: Pose.t()}
+  @typedoc "`start` is where a robot's wheels begin to count; `hardware?`, whether it is to have the real drivers."
+  @type robot :: %{id: atom(), profile: Profile.t(), start: Pose.t(), hardware?: boolean()}
   @type t :: %__MODULE__{
           options: map(),
           map: Sim.Map.t(),
@@ -26,7 +26,7 @@ defmodule Sim.Trial.Setup do
   (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `loss` (0 to 1), `noise` (`:off`,
   `:default`, `:slip`), `formation` (`kind` or `{kind, spacing}`), `assign` (`:chain` or `:cost`),
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
-  (`:stop`, `:hold` or `:continue`), `duration_s`, `blobs` (`:painted` or `:direct`); of the radio in
+  (`:stop`, `:hold` or `:continue`), `duration_s`, `blobs` (`:painted` or `:direct`), `hardware` (robots with the real drivers, in real time only); of the radio in
   lockstep also `cuts` (`Sim.Trial.Cuts`), `duplicates` (0 to 1) and `delay_ms` (`{5, 50}`). Errors are one line.
   """
   @spec new(keyword() | map()) :: {:ok, t()} | {:error, String.t()}
@@ -78,7 +78,8 @@ defmodule Sim.Trial.Setup do
         robots:
           for {id, pose} <- robots do
             odometry = if common, do: displaced(options, id, common, pose), else: Pose.new(0, 0)
-            %{id: id, profile: profile(id), pose: pose, odometry: odometry}
+            hardware? = id in options.hardware
+            %{id: id, profile: profile(id), pose: pose, odometry: odometry, infrared: hardware?}
           end
       )
 
@@ -92,7 +93,11 @@ defmodule Sim.Trial.Setup do
          of: options.of || length(options.robots)
        ] ++ if(options.lost_link, do: [lost_link: options.lost_link], else: [])}
 
-    robots = for {id, pose} <- robots, do: %{id: id, profile: profile(id), start: common || pose}
+    robots =
+      for {id, pose} <- robots do
+        hardware? = id in options.hardware
+        %{id: id, profile: profile(id), start: common || pose, hardware?: hardware?}
+      end
 
     %__MODULE__{options: options, map: map, world: world, robots: robots, mission: mission}
   end

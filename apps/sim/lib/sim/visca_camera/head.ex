@@ -149,6 +149,10 @@ defmodule Sim.ViscaCamera.Head do
   defp towards(from, to, most) when to < from - most, do: from - most
   defp towards(_from, to, _most), do: to * 1.0
 
+  @doc "The field of view through a lens, in radians; linear, as the sheet's, though no lens is."
+  @spec field_of_view(t(), {tele :: number(), wide :: number()}) :: float()
+  def field_of_view(%__MODULE__{zoom: zoom}, {tele, wide}), do: wide + zoom * (tele - wide) / 1024
+
   @doc "Where it looks, in radians: left and up positive."
   @spec angles(t()) :: {pan :: float(), tilt :: float()}
   def angles(%__MODULE__{pan: pan, tilt: tilt}),

@@ -9,6 +9,7 @@ defmodule Sim.ViscaCamera.Options do
   | `:power_on_ms` | 0 to 60000: from the power command to its completion | 2000 |
   | `:drive_done` | `:at_once`, `:at_stop`: when a drive is said to be completed | `:at_once` |
   | `:zoom_ms` | 1 to 60000: from wide to tele | 2000 |
+  | `:lens` | `{tele, wide}`, fields of view in radians; between them they go by the zoom's number | 4.4 and 48.8 degrees |
   | `:drop` | share of answers never given, 0 to 1 | 0 |
   | `:seed` | whole number, of what is dropped | 0 |
   | `:announce` | whether it tells the chain when it gets current again | true |
@@ -20,6 +21,7 @@ defmodule Sim.ViscaCamera.Options do
     power_on_ms: 2_000,
     drive_done: :at_once,
     zoom_ms: 2_000,
+    lens: {4.4 * :math.pi() / 180, 48.8 * :math.pi() / 180},
     drop: 0,
     seed: 0,
     announce: true
@@ -56,6 +58,12 @@ defmodule Sim.ViscaCamera.Options do
   defp allowed(:power, power), do: power in [:on, :off] or ":on or :off"
   defp allowed(:power_on_ms, ms), do: (is_integer(ms) and ms in 0..60_000) or "0 to 60000"
   defp allowed(:zoom_ms, ms), do: (is_integer(ms) and ms in 1..60_000) or "1 to 60000"
+
+  defp allowed(:lens, {tele, wide})
+       when is_number(tele) and is_number(wide) and tele > 0 and wide > tele and wide < 3,
+       do: true
+
+  defp allowed(:lens, _other), do: "{tele, wide} in radians, less than 3"
   defp allowed(:drive_done, when?), do: when? in [:at_once, :at_stop] or ":at_once or :at_stop"
 
   defp allowed(:drop, share),

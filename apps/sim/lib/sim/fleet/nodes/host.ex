@@ -7,6 +7,7 @@ defmodule Sim.Fleet.Nodes.Host do
   people who want to attach its cookie lies in a folder that only this user can read; so it is in no
   command line and no environment.
   """
+  alias Sim.Fleet.Folder
   alias Swarm.Mesh.{Options, Secret}
 
   @host "127.0.0.1"
@@ -32,7 +33,7 @@ defmodule Sim.Fleet.Nodes.Host do
   @spec start([atom()], [node()]) :: {:ok, t()} | {:error, line :: String.t()}
   def start(fleet, nodes) do
     with :ok <- alone(),
-         {:ok, home} <- home(),
+         {:ok, home} <- Folder.make(),
          {:ok, secret} <- secret(home),
          :ok <- become_node(),
          {:ok, ports} <- ports([node() | nodes]) do
@@ -67,8 +68,7 @@ defmodule Sim.Fleet.Nodes.Host do
   @spec stop(t()) :: :ok
   def stop(%__MODULE__{home: home, mesh: mesh}) do
     if Process.alive?(mesh), do: Supervisor.stop(mesh)
-    _ = File.rm_rf(home)
-    :ok
+    Folder.remove(home)
   end
 
   defp alone do
@@ -129,19 +129,6 @@ defmodule Sim.Fleet.Nodes.Host do
       else: {:error, "no UDP port is free on #{@host} for each of #{length(nodes)} nodes"}
   end
 
-  defp home do
-    sweep(System.tmp_dir!())
-    number = Base.encode16(:crypto.strong_rand_bytes(4), case: :lower)
-    home = Path.join(System.tmp_dir!(), "convoy-#{System.pid()}-#{number}")
-
-    with :ok <- File.mkdir(home), :ok <- File.chmod(home, 0o700) do
-      System.at_exit(fn _status -> File.rm_rf(home) end)
-      {:ok, home}
-    else
-      {:error, reason} -> {:error, "#{home} cannot be made: #{:file.format_error(reason)}"}
-    end
-  end
-
   defp secret(home) do
     cookie = Path.join(home, ".erlang.cookie")
 
@@ -149,16 +136,6 @@ defmodule Sim.Fleet.Nodes.Host do
       File.write!(cookie, Atom.to_string(secret.cookie))
       File.chmod!(cookie, 0o400)
       {:ok, secret}
-    end
-  end
-
-  # What runs left that were killed: their number is in the name, and their cookie is worth nothing.
-  defp sweep(folder) do
-    with true <- File.dir?("/proc/self"), {:ok, names} <- File.ls(folder) do
-      for name <- names,
-          [_all, pid] <- [Regex.run(~r/^convoy-(\d+)-[0-9a-f]{8}$/, name)],
-          not File.dir?("/proc/#{pid}"),
-          do: File.rm_rf(Path.join(folder, name))
     end
   end
 end

@@ -1,0 +1,38 @@
+defmodule Sim.Fleet.Folder do
+  @moduledoc """
+  A run's own folder among the temporary ones, which only this user can read. It goes with the run, and what runs left
+  behind that were killed goes with the next one.
+  """
+
+  @doc "Makes one."
+  @spec make() :: {:ok, Path.t()} | {:error, line :: String.t()}
+  def make do
+    sweep(System.tmp_dir!())
+    number = Base.encode16(:crypto.strong_rand_bytes(4), case: :lower)
+    folder = Path.join(System.tmp_dir!(), "convoy-#{System.pid()}-#{number}")
+
+    with :ok <- File.mkdir(folder), :ok <- File.chmod(folder, 0o700) do
+      System.at_exit(fn _status -> File.rm_rf(folder) end)
+      {:ok, folder}
+    else
+      {:error, reason} -> {:error, "#{folder} cannot be made: #{:file.format_error(reason)}"}
+    end
+  end
+
+  @doc "Takes it away, with all that is in it."
+  @spec remove(Path.t()) :: :ok
+  def remove(folder) do
+    _ = File.rm_rf(folder)
+    :ok
+  end
+
+  # The number of their process is in the name.
+  defp sweep(folder) do
+    with true <- File.dir?("/proc/self"), {:ok, names} <- File.ls(folder) do
+      for name <- names,
+          [_all, pid] <- [Regex.run(~r/^convoy-(\d+)-[0-9a-f]{8}$/, name)],
+          not File.dir?("/proc/#{pid}"),
+          do: File.rm_rf(Path.join(folder, name))
+    end
+  end
+end

@@ -1,0 +1,84 @@
+defmodule Sim.Fleet.Hardware do
+  @moduledoc """
+  Robots of a simulated fleet with the drivers of real ones: a base and a camera for each, emulated on
+  pseudo-terminals whose links lie in the run's folder (`mag1.base`, `mag1.camera`), with the robot's body in
+  the world behind them.
+
+      supervisor (one_for_one: a device that falls is one that was switched off and on)
+      `-- Sim.Emulator   two for each such robot
+  """
+  alias Sim.{Drive, Emulator, Ptz, RFlexController, ViscaCamera}
+  alias Sim.Trial.Setup
+
+  # A device falls by a fault of ours alone; the others go on.
+  @restarts 100
+
+  @doc "The part of a fleet's tree, for those of the robots that are hardware; none where none is."
+  @spec parts([Setup.robot()], world :: term(), Path.t()) :: [Supervisor.child_spec()]
+  def parts(robots, world, folder) do
+    case for(
+           %{hardware?: true} = robot <- robots,
+           device <- devices(robot, world, folder),
+           do: device
+         ) do
+      [] ->
+        []
+
+      devices ->
+        options = [strategy: :one_for_one, max_restarts: @restarts]
+        start = {Supervisor, :start_link, [devices, options]}
+        [%{id: __MODULE__, type: :supervisor, start: start}]
+    end
+  end
+
+  defp devices(%{id: id, profile: profile} = robot, world, folder) do
+    body = [world: world, robot: id]
+    base = [kind: profile.name, sonar_max: profile.sonar_max, ir_max: profile.ir_max]
+
+    [
+      emulator({id, :base}, {RFlexController, base}, base_link(folder, robot), {Drive, body}),
+      emulator(
+        {id, :camera},
+        {ViscaCamera, lens: lens(profile)},
+        camera_link(folder, robot),
+        {Ptz, body}
+      )
+    ]
+  end
+
+  defp emulator(id, core, link, body) do
+    %{id: id, start: {Emulator, :start_link, [[core: core, link: link, body: body]]}}
+  end
+
+  @doc "What such a robot is configured with in place of simulated devices: drive and camera's head."
+  @spec drivers(Setup.robot(), Path.t()) :: keyword()
+  def drivers(%{profile: profile} = robot, folder) do
+    [
+      drive: {Hal.RFlex.Driver, [port: base_link(folder, robot)] ++ base(profile.name)},
+      ptz: {Hal.Visca.Driver, port: camera_link(folder, robot), lens: lens(profile)}
+    ]
+  end
+
+  @doc "Where their lines are, for people, one a robot."
+  @spec lines([Setup.robot()], Path.t()) :: [String.t()]
+  def lines(robots, folder) do
+    for %{hardware?: true} = robot <- robots do
+      "#{robot.id} has real drivers: its base on #{base_link(folder, robot)}, its camera's head on " <>
+        camera_link(folder, robot)
+    end
+  end
+
+  # By the fact sheet, as a file of such a robot has them.
+  defp base(:magellan),
+    do: [
+      conversions: [distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0]
+    ]
+
+  defp base(:atrv_mini), do: [conversions: [distance: 190_000.0, angle: 60_000.0, range: 1476.0]]
+
+  # The pictures' field of view is the profile's as long as nobody zooms.
+  defp lens(%{camera: %{field_of_view: wide}}), do: {wide / 11, wide}
+
+  defp base_link(folder, %{id: id}), do: Path.join(folder, "#{id}.base")
+  defp camera_link(folder, %{id: id}), do: Path.join(folder, "#{id}.camera")
+end
