@@ -7,7 +7,7 @@ defmodule Robot.Board do
 
   | key | writer | value |
   |---|---|---|
-  | `:odometry` `:sonar` `:ir` `:bumpers` `:power` | `:drive` | as in `Hal.Drive` |
+  | `:odometry` `:sonar` `:ir` `:bumpers` `:power` `:brake` `:joystick` `:home` | `:drive` | as in `Hal.Drive` |
   | `:arming` | `:drive` | `%{state: state, why: line or nil}` (`Hal.Arming`) |
   | `:ptz` | `:ptz` | as in `Hal.Ptz` |
   | `:blobs` | `:eye` | `%{blobs: [blob], pan: radians, field_of_view: radians or nil}`, at the time of the picture |
@@ -50,6 +50,9 @@ defmodule Robot.Board do
     ir: :drive,
     bumpers: :drive,
     power: :drive,
+    brake: :drive,
+    joystick: :drive,
+    home: :drive,
     arming: :drive,
     ptz: :ptz,
     blobs: :eye,

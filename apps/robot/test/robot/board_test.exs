@@ -32,6 +32,11 @@ defmodule Robot.BoardTest do
   test "is a device's sink" do
     board = board(:board3)
     Board.sense(board, :drive, {:power, 24.0})
+    # What real bases say besides.
+    for reading <- [brake: true, joystick: %{x: 0, y: -3, buttons: 1}, home: 1.5],
+        do: Board.sense(board, :drive, reading)
+
+    assert {:ok, 1.5, _now} = Board.fetch(board, :home, 1_000)
     Board.sense(board, :drive, {:health, :drive, {{:offline, :enoent}, 5}})
     assert {:ok, 24.0, _now} = Board.fetch(board, :power, 1_000)
     assert {:ok, {:offline, :enoent}, 5} = Board.fetch(board, {:health, :drive}, :infinity)

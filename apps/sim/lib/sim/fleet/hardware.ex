@@ -54,7 +54,9 @@ defmodule Sim.Fleet.Hardware do
   @spec drivers(Setup.robot(), Path.t()) :: keyword()
   def drivers(%{profile: profile} = robot, folder) do
     [
-      drive: {Hal.RFlex.Driver, [port: base_link(folder, robot)] ++ base(profile.name)},
+      drive:
+        {Hal.RFlex.Driver,
+         [port: base_link(folder, robot), profile: profile] ++ base(profile.name)},
       ptz: {Hal.Visca.Driver, port: camera_link(folder, robot), lens: lens(profile)}
     ]
   end
@@ -74,7 +76,13 @@ defmodule Sim.Fleet.Hardware do
       conversions: [distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0]
     ]
 
-  defp base(:atrv_mini), do: [conversions: [distance: 190_000.0, angle: 60_000.0, range: 1476.0]]
+  defp base(:atrv_mini) do
+    [
+      conversions: [distance: 190_000.0, angle: 60_000.0, range: 1476.0],
+      bumpers: [count: 0],
+      power_offset: 1.2
+    ]
+  end
 
   # The pictures' field of view is the profile's as long as nobody zooms.
   defp lens(%{camera: %{field_of_view: wide}}), do: {wide / 11, wide}
