@@ -32,6 +32,18 @@ defmodule Hal.RampTest do
     end)
   end
 
+  test "the limits are reached and not passed" do
+    for {linear, turn} <- [{99.0, -99.0}, {-0.51, 1.01}] do
+      speeds =
+        Enum.scan(1..50, Ramp.new(@limits), fn _, ramp ->
+          elem(Ramp.step(ramp, Twist.new(linear, turn), 0.1), 1)
+        end)
+
+      assert List.last(speeds).twist == Twist.new(0.5 * linear / abs(linear), turn / abs(turn))
+      for %{twist: twist} <- speeds, do: assert(abs(twist.linear) <= 0.5 and abs(twist.turn) <= 1)
+    end
+  end
+
   test "it gets there" do
     {_twist, ramp} = Ramp.step(Ramp.new(@limits), Twist.new(0.3, -0.7), 0.1)
 
