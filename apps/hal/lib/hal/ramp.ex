@@ -102,6 +102,10 @@ defmodule Hal.Ramp do
     {twist, %{ramp | twist: twist}}
   end
 
+  @doc "The same limits, standing."
+  @spec standing(t()) :: t()
+  def standing(%__MODULE__{} = ramp), do: %{ramp | twist: Twist.zero()}
+
   defp axis(_now, wanted, _faster, _slower) when wanted == 0.0, do: 0.0
 
   defp axis(now, wanted, faster, slower) do

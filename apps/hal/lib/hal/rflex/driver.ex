@@ -32,7 +32,8 @@ defmodule Hal.RFlex.Driver do
   is not known). A stop is not ramped: it is the next thing on the wire, and the controller brakes with
   `max_braking`. What is no speed (`Hal.Ramp.check/1`) is a stop, and counted. A speed that was not
   renewed for 500 ms is zero. The brake is released before the first speed, and again when the controller
-  says that it is set; `init` sets it.
+  says that it is set; `init` sets it. A driver that was held up until the line said its last words begins
+  again like that: from standing, with the brake.
 
   Without `distance` or `angle` there is no odometry, and every speed is a stop.
 
@@ -162,7 +163,7 @@ defmodule Hal.RFlex.Driver do
       line: line,
       ref: ref,
       queue: queue,
-      ramp: Speech.ramp(options),
+      ramp: options.limits,
       senses: Senses.new(options, before),
       heard_ms: at_ms,
       bytes_ms: at_ms,
@@ -180,10 +181,16 @@ defmodule Hal.RFlex.Driver do
 
   # What the wheels are to do now.
   defp step(s, at_ms) do
+    s = if at_ms - s.stepped_ms >= pause_ms(s), do: stood(s), else: s
     wanted = if known?(s), do: s.wanted, else: Twist.zero()
     {_twist, ramp} = Ramp.step(s.ramp, wanted, (at_ms - s.stepped_ms) / 1000)
     %{s | ramp: ramp, stepped_ms: at_ms}
   end
+
+  # Whoever was away for so long comes back to a line that has said its last words.
+  defp pause_ms(s), do: s.options.serial[:keep_alive_ms] || 200
+
+  defp stood(s), do: %{s | ramp: Ramp.standing(s.ramp), said: nil, released?: false}
 
   defp known?(%{options: %{conversions: conversions}}),
     do: conversions.distance != nil and conversions.angle != nil

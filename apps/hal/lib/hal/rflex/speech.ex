@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Speech do
   @moduledoc "The commands that a driver says as one: speeds, stops, the first words and the last. Pure."
-  alias Hal.{Ramp, Twist}
+  alias Hal.Twist
   alias Hal.RFlex.{Command, Options, Queue}
 
   # Of a base whose conversion is not known. It stands, and is to brake whatever the units are.
@@ -70,10 +70,6 @@ defmodule Hal.RFlex.Speech do
   def senses(%Options{} = options) do
     for {sense, true} <- [sonar: sonar?(options), infrared: infrared?(options)], do: sense
   end
-
-  @doc "The limits of a standing robot."
-  @spec ramp(Options.t()) :: Ramp.t()
-  def ramp(%Options{limits: limits}), do: limits
 
   defp sonar?(options), do: Enum.sum(options.sonar_banks) > 0
 
