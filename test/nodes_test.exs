@@ -84,4 +84,28 @@ defmodule System.NodesTest do
     assert said =~ ~r/"name":"mag1","alive":true/
     assert said =~ ~r/"name":"min1","alive":true/
   end
+
+  test "kill -9 of what was started: all that it started ends with it", %{environment: env} do
+    if match?({_, 0}, System.cmd("sh", ["-c", "setpriv --pdeathsig TERM true 2>&1"])) do
+      port = start("--robots 2 --duration 45", env)
+      said = await(port, ~r/elected +\w+ leads/)
+      processes = for name <- ["mag1", "min1", "world"], do: pid(said, name)
+      {:os_pid, script} = Port.info(port, :os_pid)
+      kill("#{script}")
+      ended(processes, System.monotonic_time(:millisecond) + 15_000)
+    end
+  end
+
+  defp ended(processes, deadline) do
+    case Enum.filter(processes, &there?/1) do
+      [] ->
+        :ok
+
+      left ->
+        if(System.monotonic_time(:millisecond) > deadline,
+          do: flunk("#{inspect(left)} go on"),
+          else: ended(left, deadline)
+        )
+    end
+  end
 end

@@ -159,7 +159,7 @@ defmodule Netns.Bodies do
 
   def handle_info({:udp, _socket, _path, _port, term}, s) do
     {robot, pose} = :erlang.binary_to_term(term)
-    :ok = Server.displace(s.server, robot, pose)
+    :ok = Server.change(s.server, {:displace, robot, pose})
     {:noreply, s}
   end
 end

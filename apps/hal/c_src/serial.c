@@ -17,8 +17,8 @@
        'O'             open; always the first, unless it is 'E'
        'D' bytes       read
        'T' count:32    so many bytes of 'W' are off to the line, or dropped
-       'E' reason      the line cannot be had, or is lost; nothing follows
-       'C'             closed; nothing follows
+       'E' reason      the line cannot be had, or is lost; only 'C' follows
+       'C'             closed, or as good as closed; nothing follows
 
    The last words are written when our input ends, on SIGTERM and SIGHUP, on 'C', and when no sign of
    life came for MS milliseconds: then once, until there is a sign of life again. They do not wait
@@ -94,13 +94,18 @@ static int64_t now_ms(void)
     return (int64_t)t.tv_sec * 1000 + t.tv_nsec / 1000000;
 }
 
+static int leads_to(const char *link, const char *to)
+{
+    char found[sizeof s.slave];
+    ssize_t n = readlink(link, found, sizeof found);
+
+    return n == (ssize_t)strlen(to) && memcmp(found, to, (size_t)n) == 0;
+}
+
 static void quit(int status)
 {
-    char to[sizeof s.slave];
-    ssize_t n = s.slave[0] ? readlink(s.link, to, sizeof to) : -1;
-
     /* Somebody else may have put another one there. */
-    if (n == (ssize_t)strlen(s.slave) && memcmp(to, s.slave, (size_t)n) == 0)
+    if (s.slave[0] && leads_to(s.link, s.slave))
         unlink(s.link);
     _exit(status);
 }
@@ -210,6 +215,7 @@ static void drop_out(void)
     note_taken(size);
 }
 
+/* Of a pty, what has arrived in the other end's buffer of 4 kB stays, as with any line. */
 static void flush_line(void)
 {
     ioctl(s.fd, TCFLSH, TCOFLUSH);
@@ -221,8 +227,14 @@ static void look_for_user(void)
     int absent = !other_end_is_open();
 
     if (absent && !s.absent) {
+        int other = open(s.slave, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+
         flush_line();
         drop_out();
+        if (other >= 0) {
+            ioctl(other, TCFLSH, TCIFLUSH);
+            close(other);
+        }
     }
     s.absent = absent;
 }
@@ -370,15 +382,23 @@ static const char *open_device(void)
     return NULL;
 }
 
-/* Only a link that leads nowhere, left by one of us who was killed, is replaced. */
-static const char *make_link(const char *to)
+static int leads_nowhere(const char *link)
 {
     struct stat about;
 
-    if (symlink(to, s.link) != 0) {
-        if (errno != EEXIST)
-            return reason_of(errno);
-        if (lstat(s.link, &about) != 0 || !S_ISLNK(about.st_mode) || stat(s.link, &about) == 0)
+    return lstat(link, &about) == 0 && S_ISLNK(about.st_mode) && stat(link, &about) != 0 && errno == ENOENT;
+}
+
+/* Only a link that leads nowhere, left by one of us who was killed, is replaced. When its number was
+   free, we have it now, and the link leads to us. */
+static const char *make_link(const char *to)
+{
+    int made = symlink(to, s.link) == 0;
+
+    if (!made && errno != EEXIST)
+        return reason_of(errno);
+    if (!made && !leads_to(s.link, to)) {
+        if (!leads_nowhere(s.link))
             return "eexist";
         if (unlink(s.link) != 0 || symlink(to, s.link) != 0)
             return reason_of(errno);
@@ -435,10 +455,9 @@ static void close_line(void)
     }
     speak();
     wait_until_sent(until);
-    if (s.done)
-        return;
     s.done = 1;
-    close(s.fd);
+    if (s.fd >= 0)
+        close(s.fd);
     s.fd = -1;
     if (room_up(0))
         send_up('C', "", 0);
@@ -446,7 +465,8 @@ static void close_line(void)
 
 static void take_packet(const uint8_t *packet, size_t size)
 {
-    if (size == 0 || s.fd < 0)
+    /* A lost line is closed too. */
+    if (size == 0 || (s.fd < 0 && packet[0] != 'C'))
         return;
     const uint8_t *body = packet + 1;
 
@@ -607,6 +627,13 @@ static int64_t next_ms(void)
     return at;
 }
 
+static int input_waits(void)
+{
+    struct pollfd input = { .fd = STDIN_FILENO, .events = POLLIN };
+
+    return poll(&input, 1, 0) > 0;
+}
+
 /* Waits for what comes next, and carries it out. 0 when the VM is gone. */
 static int turn(const sigset_t *while_waiting)
 {
@@ -646,8 +673,9 @@ static int turn(const sigset_t *while_waiting)
         else if (fds[1].revents & (POLLHUP | POLLERR))
             s.link ? look_for_user() : lost();
     }
-    /* Last, so that a sign of life that was waiting for us counts. */
-    if (s.words_length > 0 && !s.spoken && now_ms() >= s.life_ms + s.keep_alive_ms) {
+    /* Last, and after another look, so that a sign of life that waits for us counts: on a busy machine
+       it is we who are late. */
+    if (s.words_length > 0 && !s.spoken && now_ms() >= s.life_ms + s.keep_alive_ms && !input_waits()) {
         s.spoken = 1;
         speak();
     }

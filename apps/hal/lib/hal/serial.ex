@@ -206,5 +206,8 @@ defmodule Hal.Serial do
     do: {:error, "serial option #{inspect(key)} cannot be #{show(value)}: it must be #{rule}"}
 
   # One line, however much there is.
-  defp show(value), do: inspect(value, limit: 20, printable_limit: 60, width: :infinity)
+  defp show(value) do
+    text = inspect(value, limit: 20, printable_limit: 60, width: :infinity)
+    if String.length(text) > 80, do: String.slice(text, 0, 80) <> "...", else: text
+  end
 end

@@ -30,7 +30,10 @@ defmodule Sim.Server do
               [devices: %{}, owners: %{}, driven: %{}, asked: MapSet.new(), stats: nil]
 
   @type kind :: :drive | :ptz | :camera
-  @type change :: {:kill, robot :: atom()} | {:move, Pose.point() | nil}
+  @type change ::
+          {:kill, robot :: atom()}
+          | {:displace, robot :: atom(), Pose.t()}
+          | {:move, Pose.point() | nil}
   @type stats :: %{
           steps: non_neg_integer(),
           late_ms_max: non_neg_integer(),
@@ -99,11 +102,12 @@ defmodule Sim.Server do
   def change(server, change), do: post(server, {:change, change})
 
   @doc """
-  The same to a world as a value: a robot's body stops for ever; the landmark glides there, or is taken
-  away by `nil`.
+  The same to a world as a value: a robot's body stops for ever, or is lifted to another pose; the landmark
+  glides there, or is taken away by `nil`.
   """
   @spec changed(World.t(), change()) :: World.t()
   def changed(world, {:kill, robot}), do: World.kill(world, robot)
+  def changed(world, {:displace, robot, pose}), do: World.displace(world, robot, pose)
   def changed(world, {:move, nil}), do: World.place_landmark(world, nil)
   def changed(world, {:move, place}), do: World.move_landmark(world, place)
 

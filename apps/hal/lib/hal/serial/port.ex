@@ -16,7 +16,7 @@ defmodule Hal.Serial.Port do
   alias Hal.Serial.Line
 
   # c_src/serial.h has the same limits on its side, or greater.
-  @most_under_way 4096
+  @out_most 4096
   @take_step 16_384
 
   @open_ms 5_000
@@ -27,7 +27,7 @@ defmodule Hal.Serial.Port do
              &{Atom.to_string(&1), &1}
            )
 
-  # Of the counters: bytes out that the line has not taken, bytes in of which the program was not told.
+  # The counters: bytes written that the line has not taken, bytes taken of which the program was not told.
   @under_way 1
   @untold 2
 
@@ -113,7 +113,7 @@ defmodule Hal.Serial.Port do
     with :ok <- command(line, [?W, bytes]), do: :counters.add(line.counters, @under_way, size)
   end
 
-  defp fits?(line, size), do: :counters.get(line.counters, @under_way) + size <= @most_under_way
+  defp fits?(line, size), do: :counters.get(line.counters, @under_way) + size <= @out_most
 
   # The owner may write much without a look at its mailbox.
   defp hear_taken(%{port: port} = line) do
@@ -162,6 +162,7 @@ defmodule Hal.Serial.Port do
   # Then no message of it is left.
   defp shut(port) do
     monitor = Port.monitor(port)
+    Process.unlink(port)
     send(port, {self(), :close})
 
     receive do
