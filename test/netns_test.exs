@@ -255,7 +255,11 @@ defmodule System.NetnsTest do
     assert told(fleet, :reset, pressed) == []
     assert Fleet.call(fleet, :mag5, Swarm, :reset, []) == :ok
     again = start(fleet)
-    formed(fleet, again)
+
+    Fleet.await(fleet, "they drive", @patience_ms, fn _lines ->
+      told(fleet, :body, again) != []
+    end)
+
     lawful(fleet, "e-stop", again, reached: reached, healed_reached: late)
   end
 
