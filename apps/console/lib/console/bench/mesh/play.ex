@@ -224,6 +224,8 @@ defmodule Console.Bench.Mesh.Play do
     seen(s, :gone)
     wake.(victim)
     seen(s, :up)
+    # What happens to a robot before it is known again is told to nobody.
+    seen(s, :join)
     (noticed_ns - began_ns) / 1_000
   end
 
