@@ -62,7 +62,12 @@ defmodule Swarm.Mesh.FloodTest do
       state(one)
     end
 
-    # A first one loads all modules that a flood needs.
+    # A module that is loaded brings its own atoms, and memory.
+    for app <- [:kernel, :stdlib, :elixir, :hal, :vision, :robot, :swarm] do
+      modules = MeshNodes.call(one, Application, :spec, [app, :modules])
+      MeshNodes.call(one, :code, :ensure_modules_loaded, [modules])
+    end
+
     before = flood.(10_000)
     then = flood.(@datagrams)
     assert then.radio == before.radio
