@@ -21,11 +21,15 @@ defmodule Hal.MixProject do
       ],
       elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
-      deps: []
+      deps: packages(Mix.target())
     ]
   end
 
   def application, do: [mod: {Hal.Application, []}, extra_applications: [:logger, :crypto]]
+
+  # Adapters for what Hex has; with MIX_TARGET=hex, say. Nothing here needs them.
+  defp packages(:host), do: []
+  defp packages(_target), do: [{:circuits_uart, "~> 1.5.5"}]
 
   defp elixirc_paths(:test), do: ["lib", "test/support"]
   defp elixirc_paths(_env), do: ["lib"]

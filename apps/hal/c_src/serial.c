@@ -102,11 +102,20 @@ static int leads_to(const char *link, const char *to)
     return n == (ssize_t)strlen(to) && memcmp(found, to, (size_t)n) == 0;
 }
 
-static void quit(int status)
+/* The link goes first: once the pty is closed, its number may be another one's, and so the link. */
+static void let_go(void)
 {
-    /* Somebody else may have put another one there. */
     if (s.slave[0] && leads_to(s.link, s.slave))
         unlink(s.link);
+    s.slave[0] = 0;
+    if (s.fd >= 0)
+        close(s.fd);
+    s.fd = -1;
+}
+
+static void quit(int status)
+{
+    let_go();
     _exit(status);
 }
 
@@ -152,9 +161,7 @@ static void fail(const char *reason)
     if (s.done)
         return;
     s.done = 1;
-    if (s.fd >= 0)
-        close(s.fd);
-    s.fd = -1;
+    let_go();
     if (room_up(strlen(reason)))
         send_up('E', reason, strlen(reason));
 }
@@ -456,9 +463,7 @@ static void close_line(void)
     speak();
     wait_until_sent(until);
     s.done = 1;
-    if (s.fd >= 0)
-        close(s.fd);
-    s.fd = -1;
+    let_go();
     if (room_up(0))
         send_up('C', "", 0);
 }

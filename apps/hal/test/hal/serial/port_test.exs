@@ -198,7 +198,22 @@ defmodule Hal.Serial.PortTest do
       :ok = Serial.close(other)
       assert {:ok, "/dev/pts/" <> _} = File.read_link(link <> "_2")
       :ok = Serial.close(far)
-      gone!(link <> "_2")
+      assert File.lstat(link <> "_2") == {:error, :enoent}
+    end
+
+    test "leaves alone the link of who has got its number since", %{link: link} do
+      for _ <- 1..5 do
+        {:ok, old} = Serial.open(pty: link)
+        program = os_pid(old)
+        kill(:TERM, program)
+        assert next(old) == {:error, :terminated}
+        # The old program is still there; its pty is not.
+        {:ok, new} = Serial.open(pty: link)
+        :ok = Serial.close(old)
+        ended!(program)
+        assert {:ok, "/dev/pts/" <> _} = File.read_link(link)
+        :ok = Serial.close(new)
+      end
     end
 
     test "leaves a link alone that is no longer its own", %{link: link} do
@@ -234,7 +249,6 @@ defmodule Hal.Serial.PortTest do
   end
 
   # Programs end a moment after their line is closed.
-  defp gone!(path), do: eventually(fn -> File.lstat(path) == {:error, :enoent} end)
   defp ended!(pid), do: eventually(fn -> not File.exists?("/proc/#{pid}") end)
 
   describe "in motion" do
