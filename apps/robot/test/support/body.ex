@@ -13,9 +13,13 @@ defmodule Robot.Body do
       at_ms: 0,
       reflex: reflex,
       mind: Mind.new(profile: profile),
-      profile: profile
+      profile: profile,
+      pan: nil
     }
   end
+
+  @doc "The same with a camera on a pan-tilt unit, that looks ahead."
+  def with_head(body), do: %{body | pan: 0.0}
 
   @doc "Runs the mind for some ticks; `change` may change each percept; gives outcome and body."
   def run(body, ticks, change \\ & &1)
@@ -35,7 +39,9 @@ defmodule Robot.Body do
       pose: body.pose,
       odometry: %Odometry{pose: body.pose, twist: body.twist},
       sonar: silence(body.profile),
-      driving: %{twist: body.twist, limits: []}
+      driving: %{twist: body.twist, limits: []},
+      ptz: body.pan && %{pan: body.pan, tilt: 0.0, field_of_view: :math.pi() / 3},
+      blobs_pan: body.pan || 0.0
     }
   end
 
@@ -50,9 +56,13 @@ defmodule Robot.Body do
     Enum.reduce(1..2, %{body | reflex: reflex}, fn _, body ->
       {twist, _limits, reflex} = Reflex.step(body.reflex, body.at_ms)
       pose = move(body.pose, twist, 0.05)
-      %{body | reflex: reflex, twist: twist, pose: pose, at_ms: body.at_ms + 50}
+      pan = slew(body.pan, wish.look, body.profile.camera.pan_rate * 0.05)
+      %{body | reflex: reflex, twist: twist, pose: pose, pan: pan, at_ms: body.at_ms + 50}
     end)
   end
+
+  defp slew(pan, look, _most) when pan == nil or look == nil, do: pan
+  defp slew(pan, look, most), do: pan + max(-most, min(most, look - pan))
 
   @doc "The pose after driving so for some seconds."
   def move(pose, twist, seconds) do
@@ -92,7 +102,8 @@ defmodule Robot.Body do
 
   @doc "A percept changer that shows a thing at this place."
   def see(percept, place, wobble \\ 0.0) do
-    blob = blob(%{pose: percept.pose}, place)
+    eye = %{percept.pose | heading: percept.pose.heading + percept.blobs_pan}
+    blob = blob(%{pose: eye}, place)
     blobs = if blob, do: [%{blob | x: blob.x + wobble}], else: []
     %{percept | blobs: blobs, blobs_at_ms: percept.at_ms, blobs_pose: percept.pose}
   end

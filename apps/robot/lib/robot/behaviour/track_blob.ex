@@ -1,11 +1,13 @@
 defmodule Robot.Behaviour.TrackBlob do
   @moduledoc """
-  Keeps a coloured thing in front of the body and at its distance (R36, R37): the leader's errand.
-  Never ends.
+  Keeps a coloured thing in view and at its distance (R36, R37, R82): the leader's errand. Never ends.
+
+  The camera follows the thing. The body turns only when the camera is more than 30 degrees off
+  its middle, and then until the thing is ahead; or when it has to drive, which it does facing the
+  thing. A robot without a pan-tilt unit keeps the thing in front of its body.
 
   Pictures wobble (R44), so direction and distance are filtered, and both have two thresholds: the
-  robot starts to turn when clearly off and stops when well centred, and likewise for the
-  distance; in between it stands really still. When the thing is lost it turns to where it was
+  robot starts to turn when clearly off and stops when well centred, and likewise for the distance; in between it stands really still. When the thing is lost it turns to where it was
   last seen, then on to that side for one full turn, and then waits.
 
   Options: `colour` (default any), `min_share` (default 0.0003), `near` and `far` (metres, default
@@ -16,9 +18,10 @@ defmodule Robot.Behaviour.TrackBlob do
   @behaviour Robot.Behaviour
   alias Hal.{Pose, Twist}
   alias Robot.Behaviour.Options
-  alias Robot.{Sighting, Steering, Wish}
+  alias Robot.{Gaze, Sighting, Steering, Wish}
 
-  # Radians: where turning begins, and where it is good enough.
+  # Radians: where turning begins with a camera that turns by itself, and without; where it is good enough.
+  @aside :math.pi() / 6
   @off_centre 0.04
   @centred 0.012
   # Only drive while the thing is about ahead.
@@ -156,13 +159,19 @@ defmodule Robot.Behaviour.TrackBlob do
   defp filter(old, new, part), do: old + part * (new - old)
 
   defp hold(percept, state) do
-    limit = if state.turning?, do: @centred, else: @off_centre
-    turning? = abs(state.error) > limit
-    turn = if turning?, do: turn(state.error, percept, state), else: 0.0
     driving = driving(state.driving, state.distance, state)
+    turning? = abs(state.error) > limit(state.turning?, driving, percept)
+    turn = if turning?, do: turn(state.error, percept, state), else: 0.0
     state = %{state | turning?: turning?, driving: driving}
-    running(Twist.new(linear(percept, state), turn), state)
+    running(Twist.new(linear(percept, state), turn), gaze(state.error, percept), state)
   end
+
+  defp limit(true, _driving, _percept), do: @centred
+  defp limit(false, 0, %{ptz: ptz}) when ptz != nil, do: @aside
+  defp limit(false, _driving, _percept), do: @off_centre
+
+  defp gaze(_error, %{ptz: nil}), do: 0.0
+  defp gaze(error, percept), do: Gaze.pan(error, percept)
 
   # Which way it drives: it starts outside the range and stops a little inside it.
   defp driving(_driving, nil, _state), do: 0
@@ -192,8 +201,10 @@ defmodule Robot.Behaviour.TrackBlob do
     # First to where it was; from there on to the side where it went, and never back.
     there? = state.there? or abs(state.error) < 0.1
     error = if there?, do: state.side * 3.0, else: state.error
+    # The eyes are there before the body; for the turn they look ahead.
+    gaze = if there?, do: 0.0, else: gaze(state.error, percept)
     state = %{state | driving: 0, turning?: true, there?: there?}
-    running(Twist.new(0, turn(error, percept, state)), state)
+    running(Twist.new(0, turn(error, percept, state)), gaze, state)
   end
 
   defp search(_percept, state), do: stand(%{state | driving: 0, turning?: false})
@@ -202,8 +213,8 @@ defmodule Robot.Behaviour.TrackBlob do
     do:
       error |> Steering.turn_rate(percept.profile) |> min(state.max_turn) |> max(-state.max_turn)
 
-  defp stand(state), do: running(Twist.zero(), state)
+  defp stand(state), do: running(Twist.zero(), 0.0, state)
 
-  defp running(twist, state),
-    do: {:running, Wish.new(:track_blob, twist, 0.5, look: 0.0), {__MODULE__, state}}
+  defp running(twist, look, state),
+    do: {:running, Wish.new(:track_blob, twist, 0.5, look: look), {__MODULE__, state}}
 end

@@ -7,7 +7,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   it looks at the landmark, since the next it may be asked for is how large it sees it.
   """
   alias Hal.Pose
-  alias Robot.Behaviour
+  alias Robot.{Behaviour, Gaze}
   alias Robot.Behaviour.Avoid.Neighbours
   alias Swarm.{Chain, Message}
   alias Swarm.Missions.Landmark.{Places, State}
@@ -210,14 +210,13 @@ defmodule Swarm.Missions.Landmark.Attend do
   # Pan towards the landmark or towards the robot ahead, whichever's turn it is and can be seen.
   defp look(%{anchor: anchor, percept: percept} = mission, age_ms) do
     {leader, _twist} = Places.leader(anchor, age_ms)
-    limit = percept.profile.camera.max_pan
     targets = [Places.landmark(anchor) || Pose.point(leader), ahead(mission, leader)]
     turn = rem(div(mission.now_ms, @gaze_ms), 2)
     {first, [second]} = List.pop_at(targets, turn)
 
     Enum.find_value([first, second], 0.0, fn place ->
       bearing = Pose.bearing(percept.pose, place)
-      if abs(bearing) <= limit, do: bearing
+      if Gaze.within?(bearing, percept), do: Gaze.pan(bearing, percept)
     end)
   end
 
@@ -227,7 +226,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   defp look_out(%{anchor: anchor, sight: sight, percept: percept}) do
     place = (anchor && Places.landmark(anchor)) || (sight && sight.place)
     bearing = if place, do: Pose.bearing(percept.pose, place), else: 0.0
-    if abs(bearing) <= percept.profile.camera.max_pan, do: bearing, else: 0.0
+    if Gaze.within?(bearing, percept), do: Gaze.pan(bearing, percept), else: 0.0
   end
 
   defp ahead(%{anchor: anchor, percept: percept} = mission, leader) do
