@@ -67,7 +67,7 @@ defmodule Robot.SightTest do
     id = seeing(:sight_ptz, ptz: {Hal.FakePtz, test: self(), device: :ptz})
     looks = {:ptz, %{pan: 0.3, tilt: 0.1, field_of_view: 0.7}}
     send(Names.whereis(id, :ptz), {:readings, [looks]})
-    # It is with the eye when it is on the board and the eye has answered: the board comes first.
+    # The unit's process has handed the reading on when it answers, and then the eye has it, too.
     _ = :sys.get_state(Names.whereis(id, :ptz))
     _ = Vision.Eye.status(Names.via(id, :eye))
     at_ms = System.monotonic_time(:millisecond)

@@ -3,12 +3,14 @@ defmodule Robot.Behaviour.TrackBlob do
   Keeps a coloured thing in view and at its distance (R36, R37, R82): the leader's errand. Never ends.
 
   The camera follows the thing. The body turns only when the camera is more than 30 degrees off
-  its middle, and then until the thing is ahead; or when it has to drive, which it does facing the
-  thing. A robot without a pan-tilt unit keeps the thing in front of its body.
+  its middle, and then until the thing is ahead, gently as soon as the camera is within these; or
+  when it has to drive, which it does facing the thing. A robot without a pan-tilt unit keeps the
+  thing in front of its body.
 
   Pictures wobble (R44), so direction and distance are filtered, and both have two thresholds: the
-  robot starts to turn when clearly off and stops when well centred, and likewise for the distance; in between it stands really still. When the thing is lost it turns to where it was
-  last seen, then on to that side for one full turn, and then waits.
+  robot starts to turn when clearly off and stops when well centred, and likewise for the distance;
+  in between it stands really still. When the thing is lost it turns to where it was last seen, then
+  on to that side for one full turn, and then waits.
 
   Options: `colour` (default any), `min_share` (default 0.0003), `near` and `far` (metres, default
   1.0 and 1.5), `max_turn` (rad/s, default 0.4, so that followers keep up), `speed` (m/s, default 0.3),
@@ -24,6 +26,8 @@ defmodule Robot.Behaviour.TrackBlob do
   @aside :math.pi() / 6
   @off_centre 0.04
   @centred 0.012
+  # rad/s.
+  @gently 0.2
   # Only drive while the thing is about ahead.
   @ahead 0.3
   # Share of a new picture in the filtered value, while standing and while moving.
@@ -161,7 +165,7 @@ defmodule Robot.Behaviour.TrackBlob do
   defp hold(percept, state) do
     driving = driving(state.driving, state.distance, state)
     turning? = abs(state.error) > limit(state.turning?, driving, percept)
-    turn = if turning?, do: turn(state.error, percept, state), else: 0.0
+    turn = if turning?, do: turn(state.error, percept, gently(state, percept)), else: 0.0
     state = %{state | turning?: turning?, driving: driving}
     running(Twist.new(linear(percept, state), turn), gaze(state.error, percept), state)
   end
@@ -169,6 +173,12 @@ defmodule Robot.Behaviour.TrackBlob do
   defp limit(true, _driving, _percept), do: @centred
   defp limit(false, 0, %{ptz: ptz}) when ptz != nil, do: @aside
   defp limit(false, _driving, _percept), do: @off_centre
+
+  # The camera has it in view: the body takes its time, so that those who stand behind it keep up.
+  defp gently(%{error: error} = state, %{ptz: ptz}) when ptz != nil and abs(error) < @aside,
+    do: %{state | max_turn: min(state.max_turn, @gently)}
+
+  defp gently(state, _percept), do: state
 
   defp gaze(_error, %{ptz: nil}), do: 0.0
   defp gaze(error, percept), do: Gaze.pan(error, percept)

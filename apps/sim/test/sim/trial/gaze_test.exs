@@ -1,0 +1,45 @@
+defmodule Sim.Trial.GazeTest do
+  @moduledoc "What becomes of a formation when the landmark moves a little: nothing but the cameras' directions."
+  use ExUnit.Case, async: true
+  alias Hal.Pose
+  alias Sim.Trial
+
+  @degree :math.pi() / 180
+
+  defp formed(trial, calm \\ 0)
+  defp formed(trial, 20), do: trial
+
+  defp formed(trial, calm) do
+    assert trial.at_ms < 100_000
+    trial = Trial.step(trial)
+    formed(trial, if(Trial.formed?(trial), do: calm + 1, else: 0))
+  end
+
+  test "the cameras follow a landmark that moves by 0.5 m; the leader's body does not, and the fleet stays in formation" do
+    {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct, duration_s: 200})
+    trial = formed(trial)
+    leader = Sim.Trial.Ledger.leader(trial.ledger)
+    before = trial.world.robots
+    {x, y} = trial.world.landmark
+    aside = before[leader].pose.heading + before[leader].pan + :math.pi() / 2
+    place = {x + 0.5 * :math.cos(aside), y + 0.5 * :math.sin(aside)}
+    {:ok, trial} = Trial.move(trial, place)
+
+    trial =
+      Enum.reduce(1..80, trial, fn _, trial ->
+        trial = Trial.step(trial)
+        assert Trial.formed?(trial)
+        %{pose: pose, pan: pan} = trial.world.robots[leader]
+        off = Pose.wrap(Pose.bearing(pose, trial.world.landmark) - pan)
+        assert abs(off) < 8 * @degree
+        trial
+      end)
+
+    assert trial.world.landmark == place
+    now = trial.world.robots
+    assert now[leader].pose == before[leader].pose
+    assert now[leader].pan - before[leader].pan > 8 * @degree
+    # A follower's body belongs to its slot, which has not moved.
+    for {id, body} <- now, do: assert(Pose.distance(body.pose, before[id].pose) < 0.15)
+  end
+end
