@@ -16,8 +16,7 @@ defmodule Robot.Player do
   `Robot.Player.Units`; where a file says something else than it seems to mean, what was assumed is
   told as well.
   """
-  alias Robot.File.Write
-  alias Robot.Player.{Base, Eyes, Fit, Others, Sections, Units, Whole}
+  alias Robot.Player.{Base, Eyes, Fit, Others, Sections, Text, Units, Whole}
 
   @drivers %{
     "rflex" => :drive,
@@ -30,7 +29,6 @@ defmodule Robot.Player do
     "cmvision" => :colours
   }
   @modules %{drive: Hal.RFlex.Driver, ptz: Hal.Visca.Driver, camera: Hal.Camera.FFmpeg}
-  @order [:id, :profile, :body, :drive, :ptz, :camera, :colours, :limits, :start, :policies]
   @said ~w(name driver provides requires alwayson plugin key)
 
   @typedoc "A line of the file, what stands there, and what is to be said of it."
@@ -173,7 +171,7 @@ defmodule Robot.Player do
     state = state |> Whole.complete(profile) |> coloured(options[:colours])
 
     %{
-      text: Write.text(head(file, state), keys(state, id, profile)),
+      text: Text.write(state, file, id, profile, @modules),
       id: id,
       profile: profile,
       assumed: Enum.sort(state.assumed),
@@ -221,46 +219,5 @@ defmodule Robot.Player do
           | left: [{line, option, "the colour file is to be put right: #{why}"} | state.left]
         }
     end
-  end
-
-  defp head(file, state) do
-    assumed =
-      for {line, what, why} <- Enum.sort(state.assumed), do: "  line #{line}, #{what}: #{why}"
-
-    lines =
-      [
-        "From #{Path.basename(file)}, a configuration of the Player device server.",
-        "mix robot.check shows what it says; template.exs explains all keys."
-      ] ++ if(assumed == [], do: [], else: ["", "Assumed:" | assumed])
-
-    # Into a remark, nothing may go that ends it.
-    Enum.map(lines, &String.replace(&1, ~r/[^\x20-\x7E]/, "?"))
-  end
-
-  defp keys(state, id, profile) do
-    nested =
-      Enum.reduce(state.values, [], fn {path, value, _, _}, all -> nest(all, path, value) end)
-
-    for key <- @order, value = key(key, nested, id, profile), do: {key, value}
-  end
-
-  defp key(:id, _nested, id, _profile), do: id
-  defp key(:profile, _nested, _id, profile), do: profile
-  defp key(:start, _nested, _id, _profile), do: {0.0, 0.0, {:deg, 0.0}}
-
-  defp key(kind, nested, _id, _profile) when is_map_key(@modules, kind),
-    do: nested[kind] && {@modules[kind], nested[kind]}
-
-  defp key(key, nested, _id, _profile), do: nested[key]
-
-  # In the order of Player's file.
-  defp nest(all, [key], value), do: all ++ [{key, value}]
-
-  defp nest(all, [key | path], value) do
-    inner = nest(Keyword.get(all, key, []), path, value)
-
-    if Keyword.has_key?(all, key),
-      do: Keyword.replace!(all, key, inner),
-      else: all ++ [{key, inner}]
   end
 end

@@ -4,6 +4,7 @@ defmodule Robot.FileTest do
   doctest Robot.File
   doctest Robot.File.Reader
   doctest Robot.File.Check
+  doctest Robot.File.Options
   doctest Robot.File.Tokens
   doctest Robot.File.Words
 

@@ -47,21 +47,23 @@ defmodule Mix.Tasks.Robot.Import do
   end
 
   defp run(options, files) do
-    with false <- options[:help] || false,
-         {:ok, file} <- one(files),
+    if options[:help],
+      do: Mix.shell().info(@moduledoc),
+      else: with({:error, line} <- carry_over(options, files), do: refuse(line))
+  end
+
+  defp carry_over(options, files) do
+    with {:ok, file} <- one(files),
          {:ok, id} <- name(options),
          {:ok, profile} <- profile(options[:profile]),
          {:ok, version} <- version(options[:player]),
          :ok <- free(options[:out], options[:force]),
          {:ok, text} <- read(file),
-         wanted = [file: file, id: id, profile: profile, version: version],
-         {:ok, result} <-
-           Robot.Player.import(text, [{:colours, colours(file, options[:out])} | wanted]),
+         colours = colours(file, options[:out]),
+         wanted = [file: file, id: id, profile: profile, version: version, colours: colours],
+         {:ok, result} <- Robot.Player.import(text, wanted),
          :ok <- write(result.text, options[:out]) do
       tell(result, file, options[:out])
-    else
-      true -> Mix.shell().info(@moduledoc)
-      {:error, line} -> refuse(line)
     end
   end
 

@@ -8,7 +8,7 @@ defmodule Robot.File.Device do
   is given the body of the file, with its limits.
   """
   alias Hal.Suggest
-  alias Robot.File.{Check, Reader}
+  alias Robot.File.{Check, Options, Reader}
 
   @kinds %{
     drive: {:drive, 2, "Hal.Drive"},
@@ -44,7 +44,7 @@ defmodule Robot.File.Device do
 
   defp driver(kind, {line, _} = node, name, keys, path) do
     with {:ok, module} <- module(kind, name, node, path),
-         {:ok, options} <- options(keys, path, known(module)) do
+         {:ok, options} <- Options.read(keys, path, known(module)) do
       case refused(module, options) do
         [] -> {:ok, {module, options}}
         lines -> {:error, for(text <- lines, do: {line, path, text})}
@@ -72,7 +72,7 @@ defmodule Robot.File.Device do
 
   # A module that nobody has used yet is known by its file only, which knows its own name.
   defp built(name) do
-    with :error <- existing("Elixir." <> name) do
+    with :error <- Options.existing("Elixir." <> name) do
       case :code.where_is_file(to_charlist("Elixir.#{name}.beam")) do
         :non_existing -> :error
         path -> Keyword.fetch(:beam_lib.info(path), :module)
@@ -125,45 +125,6 @@ defmodule Robot.File.Device do
     end
   end
 
-  # Names that nobody has made cannot be an option of any driver.
-  defp options(keys, path, allowed) do
-    names = Map.keys(allowed)
-
-    strange =
-      for {name, line, _node} <- keys, not option?(name, names) do
-        {line, path ++ [name],
-         "is no option#{Check.meant(name, names, "")}#{choice(name, names)}"}
-      end
-
-    twice =
-      for {{name, line, _node}, n} <- Enum.with_index(keys),
-          Enum.any?(Enum.take(keys, n), &(elem(&1, 0) == name)),
-          do: {line, path ++ [name], "is given twice"}
-
-    values =
-      for {name, _line, node} <- keys, {:ok, key} <- [existing(name)] do
-        below = Map.get(allowed, key, %{})
-        with {:ok, value} <- plain(node, path ++ [name], below), do: {:ok, {key, value}}
-      end
-
-    case {strange ++ twice, Check.all(values)} do
-      {[], result} -> result
-      {problems, {:ok, _values}} -> {:error, problems}
-      {problems, {:error, more}} -> {:error, problems ++ more}
-    end
-  end
-
-  defp option?(name, []), do: existing(name) != :error
-  defp option?(name, names), do: Enum.any?(names, &(Atom.to_string(&1) == name))
-
-  defp choice(_name, []), do: " of any driver"
-
-  defp choice(name, names) do
-    if Check.meant(name, names, "") == "",
-      do: ": there are #{names |> Enum.sort() |> Enum.join(", ")}",
-      else: ""
-  end
-
   @doc "What a driver has against these options, a line each; nothing if it does not tell."
   @spec refused(module(), keyword()) :: [String.t()]
   def refused(module, options) do
@@ -172,44 +133,5 @@ defmodule Robot.File.Device do
       {:error, lines} -> List.wrap(lines)
       _well -> []
     end
-  end
-
-  defp plain({_line, {:list, nodes}}, path, _below), do: all(nodes, path)
-
-  defp plain({_line, {:tuple, nodes}}, path, _below) do
-    with {:ok, values} <- all(nodes, path), do: {:ok, List.to_tuple(values)}
-  end
-
-  defp plain({_line, {:keys, keys}}, path, below), do: options(keys, path, below)
-
-  defp plain({_line, {:map, pairs}}, path, _below) do
-    results =
-      for {key, value} <- pairs do
-        with {:ok, [key, value]} <- all([key, value], path), do: {:ok, {key, value}}
-      end
-
-    with {:ok, pairs} <- Check.all(results), do: {:ok, Map.new(pairs)}
-  end
-
-  defp plain({_line, {:name, name}} = node, path, _below), do: atom(name, node, path)
-
-  defp plain({_line, {:module, name}} = node, path, _below),
-    do: atom("Elixir." <> name, node, path)
-
-  defp plain({_line, value}, _path, _below), do: {:ok, value}
-
-  defp all(nodes, path), do: nodes |> Enum.map(&plain(&1, path, %{})) |> Check.all()
-
-  defp atom(name, node, path) do
-    case existing(name) do
-      {:ok, atom} -> {:ok, atom}
-      :error -> Check.refuse("no driver knows such a name", node, path)
-    end
-  end
-
-  defp existing(name) do
-    {:ok, String.to_existing_atom(name)}
-  rescue
-    ArgumentError -> :error
   end
 end

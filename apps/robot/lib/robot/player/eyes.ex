@@ -3,10 +3,10 @@ defmodule Robot.Player.Eyes do
   The options of Player's camera drivers in ours: the head (`sonyevid30`), the picture (`camerav4l`
   and its kin) and the colours (`cmvision`). Pure.
   """
-  alias Robot.Player.{Base, Units}
+  alias Robot.Player.Units
 
   @doc "What becomes of one option of a head, a camera or a blob finder."
-  @spec option(:ptz | :camera | :colours, String.t(), term(), Units.context()) :: Base.carried()
+  @spec option(:ptz | :camera | :colours, String.t(), term(), Units.context()) :: Units.carried()
   def option(:ptz, "port", port, _context) when is_binary(port),
     do: {:ok, [{[:ptz, :port], port}]}
 

@@ -18,6 +18,16 @@ defmodule Robot.Player.Units do
         }
   @type angle :: float() | {:deg, float()}
 
+  @typedoc """
+  What becomes of an option: values for keys of the robot file, perhaps with what was assumed;
+  nothing, as it says nothing of its own; or why it is left out.
+  """
+  @type carried ::
+          {:ok, [{path :: [atom()], term()}]}
+          | {:assumed, [{path :: [atom()], term()}], String.t()}
+          | :used
+          | {:left, String.t()}
+
   # No robot is as long, no sensor as far from its middle.
   @longest_m 10
   # Angles are written from -180 to 180 or from 0 to 360 degrees.
@@ -97,6 +107,12 @@ defmodule Robot.Player.Units do
         {Enum.map(angles, &radians/1), nil}
     end
   end
+
+  @doc "A value that may have been assumed, carried to the keys that the function makes of it."
+  @spec told({value, String.t() | nil}, (value -> [{[atom()], term()}])) :: carried()
+        when value: term()
+  def told({value, nil}, pairs), do: {:ok, pairs.(value)}
+  def told({value, assumed}, pairs), do: {:assumed, pairs.(value), assumed}
 
   @doc "Whether a number can be an angle in radians."
   @spec radians?(number()) :: boolean()
