@@ -45,6 +45,7 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 #include <time.h>
@@ -699,6 +700,8 @@ int serial_run(int argc, char **argv)
         return 2;
     }
     listen_to_signals(&while_waiting);
+    /* Little to do, but at once, however busy the machine. Only root may, and who is let (LimitNICE). */
+    (void)setpriority(PRIO_PROCESS, 0, -10);
     fcntl(STDOUT_FILENO, F_SETFL, fcntl(STDOUT_FILENO, F_GETFL) | O_NONBLOCK);
     reason = s.link ? open_pty() : open_device();
     if (reason) {
