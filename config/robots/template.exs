@@ -78,6 +78,13 @@
   # :manual: its wheels stand until a person arms them. :auto: they turn as soon as they are told.
   # arm: :manual,
 
+  # A line that it does not cross, by what its wheels say: two opposite corners of a rectangle, or a list of
+  # corners of a polygon, in metres of the map. Give it where some of the fleet are simulated. nil for none.
+  # fence: {{-2.0, -1.5}, {4.0, 1.5}},     # or [{0.0, 0.0}, {4.0, 0.0}, {2.0, 3.0}]
+
+  # true: nothing moves, and what would be done is printed. For the first run of a robot.
+  # dry_run: false,
+
   # Here an e-stop outlives a restart of the machine; the folder must be there.
   # estop_file: "/var/lib/convoy/estop",
 

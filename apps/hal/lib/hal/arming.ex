@@ -10,7 +10,7 @@ defmodule Hal.Arming do
 
   With the policy `:manual` (real robots) nothing arms but a person, after each start and each loss
   of the line. With `:auto` (simulated ones) it arms by itself, and a loss is no error; but where a
-  person has disarmed, only a person arms.
+  person has disarmed, only a person arms. With `:never` nobody arms: a dry run.
 
   `why` is what is missing: a line of the driver's own (`c:Hal.Drive.ready/1`), or `nil`.
   """
@@ -28,7 +28,7 @@ defmodule Hal.Arming do
             measured: %Twist{linear: 0.0, turn: 0.0},
             refused: 0
 
-  @type policy :: :auto | :manual
+  @type policy :: :auto | :manual | :never
   @type state :: :disarmed | :armed | {:error, reason :: term()}
   @typedoc "What the driver says of itself; one that is closed is not ready."
   @type readiness :: :ok | {:error, line :: String.t()}
@@ -48,8 +48,11 @@ defmodule Hal.Arming do
           refused: non_neg_integer()
         }
 
+  @dry_run "this is a dry run: the wheels stand"
+
   @doc "Disarmed, as every start begins."
   @spec new(policy()) :: t()
+  def new(:never), do: %__MODULE__{policy: :never, why: @dry_run}
   def new(policy) when policy in [:auto, :manual], do: %__MODULE__{policy: policy}
 
   @doc """
@@ -63,6 +66,8 @@ defmodule Hal.Arming do
       %{state: :disarmed, why: "distance is missing"}
   """
   @spec ready(t(), readiness()) :: t()
+  def ready(%__MODULE__{policy: :never} = arming, _readiness), do: arming
+
   def ready(%__MODULE__{state: :disarmed, policy: :auto, held?: false} = arming, :ok),
     do: %{arming | state: :armed, why: nil}
 
@@ -90,6 +95,9 @@ defmodule Hal.Arming do
       :disarmed
   """
   @spec order(t(), order(), readiness()) :: {:ok | {:error, line :: String.t()}, t()}
+  def order(%__MODULE__{policy: :never} = arming, :arm, _readiness),
+    do: {{:error, @dry_run}, arming}
+
   def order(%__MODULE__{state: {:error, reason}} = arming, :arm, _readiness),
     do:
       {{:error,
@@ -150,7 +158,8 @@ defmodule Hal.Arming do
       turns?(arming.told, 0.0, 0.0) or turns?(arming.measured, @standing_linear, @standing_turn)
 
     state = if arming.policy == :manual and turned?, do: {:error, reason}, else: :disarmed
-    %{arming | state: state, why: nil, told: Twist.zero(), measured: Twist.zero()}
+    why = if arming.policy == :never, do: @dry_run
+    %{arming | state: state, why: why, told: Twist.zero(), measured: Twist.zero()}
   end
 
   defp turns?(%Twist{linear: linear, turn: turn}, most_linear, most_turn),

@@ -10,7 +10,7 @@ defmodule Hal.Device do
     * `:sinks` - `[{m, f, a}]`; each reading goes to `apply(m, f, a ++ [reading])`. A change of
       health is the reading `{:health, device, {:online | {:offline, reason}, since_ms}}`
     * `:device` - what it is called in its health, by default its kind
-    * `:arm` - of a drive: `:auto` (the default) or `:manual`, see below
+    * `:arm` - of a drive: `:auto` (the default), `:manual` or `:never`, see below
     * `:name` - as in `GenServer`
     * `:clock` - `{m, f, a}` giving integer milliseconds
 
@@ -36,7 +36,7 @@ defmodule Hal.Device do
 
   They turn only while the drive is armed (`Hal.Arming`): what is asked for before is a stop, and
   counted. With `arm: :auto` the drive arms whenever its driver is open and ready; with `:manual` a
-  person does, after every start, by `arm/1`. If the line is lost while they turn, `acknowledge/1`
+  person does, after every start, by `arm/1`; with `:never` it stands, as in a dry run. If the line is lost while they turn, `acknowledge/1`
   comes first. How it stands is the reading `{:arming, %{state: state, why: line or nil}}`.
   """
   use GenServer

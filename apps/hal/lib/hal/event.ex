@@ -15,6 +15,7 @@ defmodule Hal.Event do
   | `[:hal, :device, :arming]` | `at_ms` | `device`, `driver`, `state`, `why`: whether wheels may turn has changed (`Hal.Arming`) |
   | `[:hal, :device, :refused]` | `at_ms`, `refused` | `device`, `driver`: a speed came for wheels that are not armed, so many by now |
   | `[:hal, :event, :failure]` | | `handler`, `event`, `kind`, `reason`: a handler failed and is detached |
+  | `[:robot, :dry_run]` | `at_ms` | `robot`, `command`, `line`: what would be done, if this were no dry run |
   | `[:robot, :gate, :start]` | `at_ms` | `robot`, `latched?` |
   | `[:robot, :gate, :limits]` | `at_ms` | `robot`, `limits`: why the speed is limited has changed |
   | `[:robot, :gate, :estop]`, `[:robot, :gate, :reset]` | `at_ms` | `robot` |

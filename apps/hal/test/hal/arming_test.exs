@@ -46,6 +46,16 @@ defmodule Hal.ArmingTest do
     end
   end
 
+  test "with :never, nothing that happens arms" do
+    for first <- @events, second <- @events, third <- @events do
+      Enum.reduce([first, second, third], Arming.new(:never), fn event, before ->
+        now = apply_event(before, event)
+        assert {now.state, now.why} == {:disarmed, "this is a dry run: the wheels stand"}
+        now
+      end)
+    end
+  end
+
   test "with :auto, what a person disarmed is armed by a person only, also after the line was lost" do
     auto = Arming.new(:auto) |> Arming.ready(:ok)
     {:ok, held} = Arming.order(auto, :disarm, :ok)
@@ -174,9 +184,11 @@ defmodule Hal.ArmingTest do
   end
 
   test "a wrong policy is named" do
-    assert_raise ArgumentError, ~r/:arm cannot be :hand: it must be :auto or :manual/, fn ->
-      Device.start_link(kind: :drive, driver: {Hal.FakeDrive, []}, arm: :hand)
-    end
+    assert_raise ArgumentError,
+                 ~r/:arm cannot be :hand: it must be :auto, :manual or :never/,
+                 fn ->
+                   Device.start_link(kind: :drive, driver: {Hal.FakeDrive, []}, arm: :hand)
+                 end
   end
 
   defp forget do

@@ -18,10 +18,14 @@ defmodule Robot.Config do
     * `:pace` - `:clock`, or `:manual`: gate and executive act when they are sent `:step` and `:tick`
       and not by themselves, so that a test decides the order of everything
     * `:arm` - `:auto` (the default), or `:manual`: the wheels stand until a person arms them
+    * `:fence` - a line that the robot does not cross, `{{x, y}, {x, y}}` or `[{x, y}, …]`, see
+      `Robot.Reflex.Fence`; or `nil`
+    * `:dry_run` - whether nothing moves, and what would is printed (`Robot.DryRun`), default `false`
     * `:estop_file` - where the e-stop latch outlives the machine, or `nil`
     * `:trace` - `{m, f, a}` that is told all that goes in and out, see `Robot.Trace`, or `nil`
   """
   alias Hal.{Pose, Profile}
+  alias Robot.Reflex.Fence
 
   @limits [:max_linear, :max_turn, :max_acceleration, :max_turn_acceleration]
 
@@ -39,6 +43,8 @@ defmodule Robot.Config do
                 clock: {System, :monotonic_time, [:millisecond]},
                 pace: :clock,
                 arm: :auto,
+                fence: nil,
+                dry_run: false,
                 estop_file: nil,
                 trace: nil
               ]
@@ -61,6 +67,8 @@ defmodule Robot.Config do
           clock: call(),
           pace: :clock | :manual,
           arm: :auto | :manual,
+          fence: Fence.t() | nil,
+          dry_run: boolean(),
           estop_file: Path.t() | nil,
           trace: call() | nil
         }
@@ -116,12 +124,26 @@ defmodule Robot.Config do
         {:error, "robot option :colours cannot be nil: a robot with a camera must have colours"}
 
       nil ->
-        limit(config)
+        limit(fenced(config))
+
+      {:fence, value} ->
+        {:error, allowed} = Fence.new(value)
+
+        {:error,
+         "robot option :fence cannot be #{inspect(value, limit: 10)}: it must be #{allowed}"}
 
       {option, value} ->
         {:error,
          "robot option #{inspect(option)} cannot be #{inspect(value)}: it must be #{allowed(option)}"}
     end
+  end
+
+  defp fenced(%{fence: nil} = config), do: config
+  defp fenced(%{fence: %Fence{}} = config), do: config
+
+  defp fenced(config) do
+    {:ok, fence} = Fence.new(config.fence)
+    %{config | fence: fence}
   end
 
   # A limit may be lower than what the body can do, never higher.
@@ -158,6 +180,11 @@ defmodule Robot.Config do
   defp valid?(:clock, clock), do: call?(clock)
   defp valid?(:pace, pace), do: pace in [:clock, :manual]
   defp valid?(:arm, arm), do: arm in [:auto, :manual]
+  defp valid?(:dry_run, dry?), do: is_boolean(dry?)
+
+  defp valid?(:fence, fence),
+    do: fence == nil or is_struct(fence, Fence) or match?({:ok, _}, Fence.new(fence))
+
   defp valid?(option, value) when option in [:send, :trace], do: value == nil or call?(value)
   defp valid?(:estop_file, path), do: path == nil or is_binary(path)
 
@@ -172,6 +199,7 @@ defmodule Robot.Config do
   defp allowed(:companions), do: "a list of {module, options}"
   defp allowed(:pace), do: ":clock or :manual"
   defp allowed(:arm), do: ":auto or :manual"
+  defp allowed(:dry_run), do: "true or false"
   defp allowed(:clock), do: "{module, function, arguments}"
   defp allowed(option) when option in [:send, :trace], do: "{module, function, arguments} or nil"
   defp allowed(:estop_file), do: "the path of a file or nil"

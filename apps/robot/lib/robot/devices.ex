@@ -70,7 +70,7 @@ defmodule Robot.Devices do
           {Hal.Device,
            kind: kind,
            driver: driver,
-           arm: config.arm,
+           arm: if(config.dry_run, do: :never, else: config.arm),
            sinks: sinks,
            clock: config.clock,
            name: Names.via(config.id, kind)}

@@ -8,7 +8,7 @@ defmodule Robot.Executive do
   """
   use GenServer
   alias Hal.{Device, Event}
-  alias Robot.{Board, Config, Gate, Mind, Names, Percept, Trace}
+  alias Robot.{Board, Config, DryRun, Gate, Mind, Names, Percept, Trace}
 
   @period_ms 100
   @slow_us 50_000
@@ -49,6 +49,7 @@ defmodule Robot.Executive do
       mind: Mind.new(profile: config.profile, start: config.start),
       look: nil,
       behaviour_looks?: false,
+      told: nil,
       next: System.monotonic_time(:millisecond)
     }
 
@@ -70,7 +71,7 @@ defmodule Robot.Executive do
     at_ms = Config.now(s.config)
     Trace.input(s.config, :executive, input, at_ms)
     # The mission looks by the percept of this tick: its word is not for the next one.
-    unless s.behaviour_looks? or pan == s.look, do: look(pan, s.config, at_ms)
+    s = if s.behaviour_looks? or pan == s.look, do: s, else: look(s, pan, at_ms)
     {:noreply, %{s | look: pan}}
   end
 
@@ -98,7 +99,7 @@ defmodule Robot.Executive do
 
     Gate.wish(config.id, wish.twist)
     Trace.effect(config, :executive, {:wish, wish}, at_ms)
-    look(wish.look || s.look, config, at_ms)
+    s = look(s, wish.look || s.look, at_ms)
 
     doing = %{by: wish.by, weight: wish.weight, outcome: outcome}
     Board.put(board, :executive, :doing, doing, at_ms)
@@ -110,12 +111,16 @@ defmodule Robot.Executive do
     %{s | mind: mind, behaviour_looks?: wish.look != nil}
   end
 
-  defp look(pan, %{ptz: ptz} = config, at_ms) when pan != nil and ptz != nil do
+  defp look(%{config: %{ptz: ptz}} = s, pan, _at_ms) when pan == nil or ptz == nil, do: s
+
+  defp look(%{config: %{dry_run: true}} = s, pan, at_ms),
+    do: %{s | told: DryRun.tell(s.config.id, {:look, pan}, s.told, at_ms)}
+
+  defp look(%{config: config} = s, pan, at_ms) do
     Device.look(Names.via(config.id, :ptz), pan, 0.0)
     Trace.effect(config, :executive, {:look, pan}, at_ms)
+    s
   end
-
-  defp look(_pan, _config, _at_ms), do: :ok
 
   defp tell(%{sink: {m, f, a}} = s, event, at_ms) do
     apply(m, f, a ++ [event])

@@ -27,6 +27,8 @@ defmodule Robot.File do
                 limits: [],
                 start: nil,
                 arm: :manual,
+                fence: nil,
+                dry_run: false,
                 estop_file: nil,
                 network: [],
                 policies: []
@@ -42,6 +44,8 @@ defmodule Robot.File do
           limits: keyword(float()),
           start: Pose.t(),
           arm: :manual | :auto,
+          fence: Robot.Reflex.Fence.t() | nil,
+          dry_run: boolean(),
           estop_file: Path.t() | nil,
           network: keyword(),
           policies: keyword()
@@ -49,7 +53,20 @@ defmodule Robot.File do
 
   @largest 65_536
   @most_lines 40
-  @config [:id, :profile, :drive, :ptz, :camera, :colours, :limits, :start, :arm, :estop_file]
+  @config [
+    :id,
+    :profile,
+    :drive,
+    :ptz,
+    :camera,
+    :colours,
+    :limits,
+    :start,
+    :arm,
+    :fence,
+    :dry_run,
+    :estop_file
+  ]
 
   @doc """
   The robot of the file at `path`, or all that is wrong with it. A colour file is looked for beside

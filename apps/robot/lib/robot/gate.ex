@@ -11,11 +11,12 @@ defmodule Robot.Gate do
   Only `reset/1`, a person's doing, clears it.
 
   While the drive is not armed (`Hal.Arming`) the gate asks it for nothing but to stand, so that a
-  robot that a person arms begins from standing, and says why it stands.
+  robot that a person arms begins from standing, and says why it stands. In a dry run
+  (`Robot.DryRun`) it asks for nothing else either, and tells what it would have asked for.
   """
   use GenServer
   alias Hal.{Device, Event, Twist}
-  alias Robot.{Board, Config, Names, Reflex, Trace}
+  alias Robot.{Board, Config, DryRun, Names, Reflex, Trace}
 
   @period_ms 50
 
@@ -52,13 +53,21 @@ defmodule Robot.Gate do
     board = Board.find!(id)
     latched? = Board.latched?(board)
     at_ms = Config.now(config)
+    if config.dry_run, do: DryRun.attach()
     Event.execute([:robot, :gate, :start], %{at_ms: at_ms}, %{robot: id, latched?: latched?})
 
     s = %{
       config: config,
       board: board,
       drive: drive,
-      reflex: Reflex.new(config.profile, latched?: latched?, armed?: armed?(board, config)),
+      reflex:
+        Reflex.new(config.profile,
+          latched?: latched?,
+          armed?: armed?(board, config),
+          fence: config.fence,
+          start: config.start
+        ),
+      told: nil,
       limits: nil,
       next: System.monotonic_time(:millisecond)
     }
@@ -71,6 +80,9 @@ defmodule Robot.Gate do
     at_ms = heard(s, {:wish, twist})
     {:noreply, %{s | reflex: Reflex.wish(s.reflex, twist, at_ms)}}
   end
+
+  def handle_cast({:sense, {:arming, _state}}, %{config: %{dry_run: true}} = s),
+    do: {:noreply, s}
 
   def handle_cast({:sense, reading}, s) do
     at_ms = heard(s, {:sense, reading})
@@ -98,6 +110,9 @@ defmodule Robot.Gate do
   def handle_info(:step, s), do: {:noreply, s |> step(Config.now(s.config)) |> schedule()}
   def handle_info(_other, s), do: {:noreply, s}
 
+  # In a dry run no drive is armed, and what would be driven if it were is the question.
+  defp armed?(_board, %{dry_run: true}), do: true
+
   # Before the drive has said anything: as it comes up.
   defp armed?(board, config) do
     case Board.fetch(board, :arming, :infinity) do
@@ -113,7 +128,8 @@ defmodule Robot.Gate do
 
   defp step(s, at_ms) do
     Trace.input(s.config, :gate, :step, at_ms)
-    {twist, limits, reflex} = Reflex.step(s.reflex, at_ms)
+    {wanted, limits, reflex} = Reflex.step(s.reflex, at_ms)
+    {twist, limits, s} = rehearse(wanted, limits, s, at_ms)
     Device.drive(s.drive, twist)
     Board.put(s.board, :gate, :driving, %{twist: twist, limits: limits}, at_ms)
     Trace.effect(s.config, :gate, {:drive, twist, limits}, at_ms)
@@ -124,6 +140,13 @@ defmodule Robot.Gate do
     end
 
     %{s | reflex: reflex, limits: limits}
+  end
+
+  defp rehearse(twist, limits, %{config: %{dry_run: false}} = s, _at_ms), do: {twist, limits, s}
+
+  defp rehearse(twist, limits, s, at_ms) do
+    told = DryRun.tell(s.config.id, {:drive, twist, limits}, s.told, at_ms)
+    {Twist.zero(), [:dry_run | limits], %{s | told: told}}
   end
 
   # At absolute times, so that the pace does not drift; steps that were missed are not made up for.

@@ -16,18 +16,20 @@ defmodule Robot.Reflex do
   | `:bumper` | no driving toward a touched side; away and turning are free |
   | `:near` | slow enough to stop 0.15 m before what the sonars see in the direction of motion |
   | `:corner` | a robot longer than wide turns its corners into nothing |
+  | `:fence` | stops before the line of its fence (`Robot.Reflex.Fence`); not knowing where it is, it stands |
   | `:blind` | no sonar reading for 500 ms, though it has sonars: at most 0.1 m/s |
   | `:acceleration` | the profile's accelerations; braking before a near thing may be twice as hard |
 
   `:estop`, `:disarmed`, `:dead_man`, `:refused` and `:bumper` set the speed to zero at once: how hard the wheels
   then brake is the base's own affair. Everything else is continuous.
   """
-  alias Hal.{Profile, Twist}
-  alias Robot.Reflex.Body
+  alias Hal.{Pose, Profile, Twist}
+  alias Robot.Reflex.{Body, Fence}
 
   @dead_man_ms 200
   @blind_ms 500
   @blind_speed 0.1
+  @lost_ms 500
   # No base drives or turns this fast: such a number is a fault of the one who wished.
   @absurd 100.0
   # The step that accelerations are counted with is never longer than this, whatever the clock did.
@@ -43,6 +45,9 @@ defmodule Robot.Reflex do
                 bumpers: [],
                 latched?: false,
                 armed?: true,
+                fence: nil,
+                start: nil,
+                place: nil,
                 twist: %Twist{linear: 0.0, turn: 0.0},
                 at_ms: nil
               ]
@@ -56,6 +61,9 @@ defmodule Robot.Reflex do
           bumpers: [0..15],
           latched?: boolean(),
           armed?: boolean(),
+          fence: Fence.t() | nil,
+          start: Pose.t() | nil,
+          place: {Pose.t(), integer()} | nil,
           twist: Twist.t(),
           at_ms: integer() | nil
         }
@@ -69,21 +77,26 @@ defmodule Robot.Reflex do
           | :bumper
           | :near
           | :corner
+          | :fence
           | :blind
           | :acceleration
 
   @doc """
   A gate that stands. Options: `latched?` (default false), for a latch that survived a restart;
-  `armed?` (default true), until a reading `{:arming, …}` says otherwise.
+  `armed?` (default true), until a reading `{:arming, …}` says otherwise; `fence` (`Robot.Reflex.Fence`,
+  default none), with `start`, the pose at which the odometry says zero (default the origin).
   """
   @spec new(Profile.t(), keyword()) :: t()
   def new(%Profile{} = profile, options \\ []) do
-    options = Keyword.validate!(options, latched?: false, armed?: true)
+    options =
+      Keyword.validate!(options, latched?: false, armed?: true, fence: nil, start: Pose.new(0, 0))
 
     %__MODULE__{
       profile: profile,
       latched?: options[:latched?] == true,
-      armed?: options[:armed?] == true
+      armed?: options[:armed?] == true,
+      fence: options[:fence],
+      start: options[:start]
     }
   end
 
@@ -108,6 +121,9 @@ defmodule Robot.Reflex do
 
   def sense(%__MODULE__{} = reflex, {:bumpers, pressed}, _at_ms) when is_list(pressed),
     do: %{reflex | bumpers: pressed}
+
+  def sense(%__MODULE__{fence: %Fence{}} = reflex, {:odometry, %{pose: %Pose{} = pose}}, at_ms),
+    do: %{reflex | place: {Pose.compose(reflex.start, pose), at_ms}}
 
   def sense(%__MODULE__{} = reflex, {:arming, %{state: state}}, _at_ms),
     do: %{reflex | armed?: state == :armed}
@@ -150,6 +166,7 @@ defmodule Robot.Reflex do
     {linear, turn, limits} = speed(linear, turn, profile, [])
     {safe_linear, limits} = linear |> near(reflex, at_ms, limits)
     {safe_turn, limits} = corner(turn, reflex, limits)
+    {safe_linear, limits} = fence(safe_linear, safe_turn, reflex, at_ms, limits)
     seconds = step_s(reflex.at_ms, at_ms)
 
     {ramped, limits} = ramp(last.linear, safe_linear, profile.max_acceleration * seconds, limits)
@@ -180,6 +197,19 @@ defmodule Robot.Reflex do
 
   defp corner(turn, reflex, limits),
     do: lower(turn, Body.free_turn(reflex.profile, reflex.sonar, turn), :corner, limits)
+
+  defp fence(linear, _turn, %{fence: nil}, _at_ms, limits), do: {linear, limits}
+
+  defp fence(linear, turn, %{place: {pose, then_ms}} = reflex, at_ms, limits)
+       when at_ms - then_ms <= @lost_ms do
+    # It turns as it did, and will as it may: on its way from the one to the other.
+    turns = Enum.uniq([reflex.twist.turn, turn])
+    age_s = max(at_ms - then_ms, 0) / 1000
+    free = Fence.free_speed(reflex.fence, reflex.profile, pose, linear, turns, age_s)
+    lower(linear, free, :fence, limits)
+  end
+
+  defp fence(linear, _turn, _lost, _at_ms, limits), do: lower(linear, 0.0, :fence, limits)
 
   defp bumper(linear, %{bumpers: []}, limits), do: {linear, limits}
 

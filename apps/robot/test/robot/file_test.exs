@@ -49,6 +49,8 @@ defmodule Robot.FileTest do
     limits: [max_linear: 0.3],
     start: {1, -2.5, deg(-90)},
     arm: :auto,
+    fence: [{-2, -2}, {2, -2}, {0, 2.5}],
+    dry_run: true,
     estop_file: "/tmp/estop",
     network: [secret_file: "/etc/convoy/secret", interface: "10.0.0.7", peers: ["10.0.0.8:4370"],
       multicast: {"239.255.67.86", 4371}],
@@ -74,6 +76,19 @@ defmodule Robot.FileTest do
     assert options[:profile] == config.profile
     assert config.arm == :auto
     assert config.estop_file == "/tmp/estop"
+    assert config.fence.corners == [{-2.0, -2.0}, {2.0, -2.0}, {0.0, 2.5}]
+    assert config.dry_run
+
+    assert {:ok, %{fence: fence}} = parse("fence: {{-1, -1}, {2, 3}}")
+    assert length(fence.corners) == 4
+    assert {:ok, %{fence: nil, dry_run: false}} = parse("fence: nil")
+  end
+
+  test "fences of no sense are refused" do
+    for bad <- [":big", "{1, 2}", "[{0, 0}, {1, 1}]", "[{0, 0}, {1, 0}, :x]", "{{0, 0}, {0, 1}}"] do
+      assert [line] = lines("fence: #{bad}")
+      assert line =~ "mag1.exs:2: fence: cannot be" and line =~ "is allowed"
+    end
   end
 
   test "all that is wrong is said at once, with line, key, what is allowed and a suggestion" do

@@ -18,8 +18,8 @@ defmodule Hal.Device.Options do
     unless options[:kind] in [:drive, :ptz, :camera],
       do: refuse!(:kind, options[:kind], ":drive, :ptz or :camera")
 
-    unless options[:arm] in [:auto, :manual],
-      do: refuse!(:arm, options[:arm], ":auto or :manual")
+    unless options[:arm] in [:auto, :manual, :never],
+      do: refuse!(:arm, options[:arm], ":auto, :manual or :never")
 
     {driver, driver_options} =
       case options[:driver] do

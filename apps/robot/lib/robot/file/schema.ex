@@ -5,6 +5,7 @@ defmodule Robot.File.Schema do
   """
   alias Hal.Profile
   alias Robot.File.{Check, Colours, Device}
+  alias Robot.Reflex.Fence
 
   @formations [:column, :line, :wedge, :triangle, :diamond, :circle]
   @fleet for kind <- ~w(mag min), n <- 1..100, do: :"#{kind}#{n}"
@@ -37,6 +38,8 @@ defmodule Robot.File.Schema do
      limits: limits(),
      start: :pose,
      arm: {:one_of, [:manual, :auto]},
+     fence: {:or, nil, {:with, &fence/2}},
+     dry_run: :boolean,
      estop_file: {:or, nil, {:text, "the path of a file"}},
      network: network(),
      policies: policies()}
@@ -117,6 +120,21 @@ defmodule Robot.File.Schema do
 
   defp some(fleet) when fleet == @fleet, do: ":mag1 to :mag100 and :min1 to :min100"
   defp some(fleet), do: fleet |> Enum.take(10) |> Enum.map_join(", ", &inspect/1)
+
+  defp fence({_line, shape} = node, path) do
+    with {:ok, corners} <- corners(shape), {:ok, fence} <- Fence.new(corners) do
+      {:ok, fence}
+    else
+      {:error, allowed} -> Check.refuse("#{allowed} is allowed", node, path)
+    end
+  end
+
+  defp corners({:tuple, [{_, one}, {_, other}]}), do: {:ok, {corner(one), corner(other)}}
+  defp corners({:list, nodes}), do: {:ok, Enum.map(nodes, fn {_, node} -> corner(node) end)}
+  defp corners(other), do: {:ok, other}
+
+  defp corner({:tuple, [{_, x}, {_, y}]}), do: {x, y}
+  defp corner(other), do: other
 
   # A sensor farther from the middle than any body is long is a slip of units.
   defp mount(node, path) do

@@ -36,7 +36,8 @@ defmodule Robot.File.Summary do
         camera: robot.camera && device(robot.camera),
         "looks for": colours(robot.colours),
         starts: start(robot.start),
-        arms: arms(robot.arm),
+        arms: arms(robot),
+        stays: fence(robot.fence),
         "e-stop": estop(robot.estop_file),
         network: network(robot.network),
         mission: mission(robot.policies)
@@ -112,8 +113,18 @@ defmodule Robot.File.Summary do
   defp start(%Pose{x: x, y: y, heading: heading}),
     do: "at x #{metres(x)}, y #{metres(y)}, heading #{degrees(heading)}"
 
-  defp arms(:manual), do: "by hand: its wheels stand until a person arms them"
-  defp arms(:auto), do: "BY ITSELF, as soon as it runs"
+  defp arms(%{dry_run: true}), do: "never: a dry run, which prints what it would do"
+  defp arms(%{arm: :manual}), do: "by hand: its wheels stand until a person arms them"
+  defp arms(%{arm: :auto}), do: "BY ITSELF, as soon as it runs"
+
+  defp fence(nil), do: nil
+
+  defp fence(%{corners: corners}) do
+    {xs, ys} = Enum.unzip(corners)
+    [left, right] = for x <- [Enum.min(xs), Enum.max(xs)], do: metres(x)
+    [low, high] = for y <- [Enum.min(ys), Enum.max(ys)], do: metres(y)
+    "within #{length(corners)} corners, x from #{left} to #{right}, y from #{low} to #{high}"
+  end
 
   defp estop(nil), do: "forgotten when the machine restarts (no estop_file)"
   defp estop(file), do: "kept in #{file}"
