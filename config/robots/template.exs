@@ -82,7 +82,7 @@
   # corners of a polygon, in metres of the map. Give it where some of the fleet are simulated. nil for none.
   # fence: {{-2.0, -1.5}, {4.0, 1.5}},     # or [{0.0, 0.0}, {4.0, 0.0}, {2.0, 3.0}]
 
-  # true: nothing moves, and what would be done is printed. For the first run of a robot.
+  # With true nothing moves, and what would be done is printed. For the first run of a robot.
   # dry_run: false,
 
   # Here an e-stop outlives a restart of the machine; the folder must be there.
