@@ -43,6 +43,8 @@ defmodule System.DemoTest do
         {"--loss nan", "--loss must be a number from 0 to 1"},
         {"--kill mag9@3", ~s("mag9")},
         {"--headles", ~s(did you mean "--headless"?)},
+        {"--hardwear 1", ~s(did you mean "--hardware"?)},
+        {"--robots 2 --hardware min:2", "--hardware min2 is more than there is"},
         {"--picture /no/such/place/a.svg", "a folder that exists"}
       ] do
     test "refuses #{line} in clear words" do
@@ -74,6 +76,21 @@ defmodule System.DemoTest do
 
     keys = Regex.scan(~r/"(\w+)":/, first) |> Enum.map(&List.last/1)
     assert Enum.take(keys, 6) == ~w(version seed map robots simulated_s wall_s)
+  end
+
+  test "robots with real drivers find their place among the others, in real time" do
+    line = "--headless --robots 2 --hardware mag:1,min:1 --blobs direct --seed 1"
+    {output, told, status} = demo(line)
+    assert {told, status} == {"", 0}
+
+    assert [_all, folder] =
+             Regex.run(~r"mag1 has real drivers: its base on (/\S+)/mag1\.base", output)
+
+    assert output =~ "min1 has real drivers"
+    assert output =~ "In formation"
+    assert output =~ "No collisions"
+    assert output =~ "(1.0 times real time)"
+    refute File.exists?(folder)
   end
 
   test "another seed is another run" do
