@@ -18,11 +18,27 @@ defmodule Convoy.MixProject do
     robot = Keyword.new([:hal, :vision, :robot, :swarm], &{&1, :permanent})
     fleet = robot ++ [sim: :permanent, console: :permanent]
 
-    # No cookie is made at build time: a robot's comes from its fleet's secret.
-    [
-      robot: [applications: robot ++ tls, cookie: "none"],
-      fleet: [applications: fleet ++ tls, cookie: "none"]
+    # No cookie is made at build time: a robot's comes from its fleet's secret. `h` in a robot's shell
+    # needs the documentation that is in the code.
+    common = [
+      cookie: "none",
+      include_executables_for: [:unix],
+      strip_beams: [keep: ["Docs"]],
+      steps: [:assemble, &add_robots/1]
     ]
+
+    [
+      robot: [applications: robot ++ tls] ++ common,
+      fleet: [applications: fleet ++ tls] ++ common
+    ]
+  end
+
+  # The robot files of this folder go along; rel/deploy replaces the robot's own by the newest.
+  defp add_robots(release) do
+    robots = Path.join(release.path, "robots")
+    File.rm_rf!(robots)
+    File.cp_r!("config/robots", robots)
+    release
   end
 
   # The commands read files and print reports; they run in the everyday build.

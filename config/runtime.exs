@@ -22,7 +22,9 @@ if name = robot || System.get_env("CONVOY_NODE") do
 
   dist_port = number.("CONVOY_DIST_PORT", Swarm.Mesh.Epmd.default_port(name))
 
+  # In a release the node is the robot of its file (`Swarm.Boot`).
   config :swarm,
+    boot: robot != nil,
     mesh:
       [
         secret_file: System.get_env("CONVOY_SECRET_FILE", "/etc/convoy/secret"),

@@ -1,19 +1,59 @@
 defmodule Swarm.Application do
   @moduledoc false
   use Application
+  require Logger
+  alias Swarm.{Boot, Machine, Start}
+  alias Swarm.Mesh.{Log, Options, Refusals}
 
+  # With `config :swarm, boot: true`, as in a release, the node is the robot that its environment says.
   @impl Application
   def start(_type, _arguments) do
-    case Application.get_env(:swarm, :mesh, false) do
-      false ->
-        Swarm.Supervisor.start_link([])
+    environment = System.get_env()
 
-      options ->
-        with {:ok, mesh} <- Swarm.Mesh.Options.prepare(options) do
-          :ok = Swarm.Mesh.Log.attach()
-          :ok = Swarm.Mesh.Refusals.install()
-          Swarm.Supervisor.start_link(mesh: mesh)
-        end
+    with {:ok, robot} <- robot(Application.get_env(:swarm, :boot, false), environment),
+         {:ok, mesh} <- mesh(Application.get_env(:swarm, :mesh, false), robot),
+         machine = machine(robot, environment),
+         {:ok, supervisor} <- Swarm.Supervisor.start_link(mesh ++ machine),
+         :ok <- begin(robot) do
+      {:ok, supervisor}
     end
   end
+
+  defp robot(false, _environment), do: {:ok, :none}
+
+  defp robot(true, environment) do
+    with {:error, lines} <- Boot.robot(environment) do
+      Enum.each(lines, &Logger.error/1)
+      {:error, hd(lines)}
+    end
+  end
+
+  defp mesh(false, _robot), do: {:ok, []}
+
+  defp mesh(options, robot) do
+    network = with {file, _config} <- robot, do: Start.mesh(file), else: (_none -> [])
+
+    with {:ok, mesh} <- Options.prepare(Keyword.merge(options, network)) do
+      :ok = Log.attach()
+      :ok = Refusals.install()
+      {:ok, [mesh: mesh]}
+    end
+  end
+
+  defp machine(:none, _environment), do: []
+
+  defp machine(robot, environment) do
+    id = with {file, _config} <- robot, do: file.id
+
+    case Machine.from_env(environment, id, System.pid()) do
+      nil -> []
+      options -> [machine: options]
+    end
+  end
+
+  defp begin({_file, config}) do
+    with {:ok, _robot} <- Robot.Fleet.start_robot(Robot.Fleet, config, :permanent), do: :ok
+  end
+
+  defp begin(_none), do: :ok
 end

@@ -10,7 +10,8 @@ defmodule Swarm.Supervisor do
       |   |-- Swarm.Hints        what robots leave for each other
       |   |-- Swarm.Directory.Watch    tells who joins and leaves
       |   |-- Swarm.Alarm        calls all robots to stop
-      |   `-- Swarm.Mesh.Supervisor  the other nodes, where there is a mesh
+      |   |-- Swarm.Mesh.Supervisor  the other nodes, where there is a mesh
+      |   `-- Swarm.Machine    tells systemd, where there is one
       `-- Robot.Fleet            the robots
 
   Robots do without these parts: they drive on, and enter a new directory by themselves. However
@@ -31,13 +32,14 @@ defmodule Swarm.Supervisor do
     @impl Supervisor
     def init(options) do
       mesh = for mesh <- List.wrap(options[:mesh]), do: {Swarm.Mesh.Supervisor, mesh}
+      machine = for {:machine, machine} <- options, do: {Swarm.Machine, machine}
 
       children = [
         Swarm.Directory,
         Swarm.Blackboard,
         Swarm.Hints,
         Swarm.Directory.Watch,
-        Swarm.Alarm | mesh
+        Swarm.Alarm | mesh ++ machine
       ]
 
       tireless = for child <- children, do: {Tireless, child}
@@ -45,7 +47,10 @@ defmodule Swarm.Supervisor do
     end
   end
 
-  @doc "Starts the node's parts, without a robot; `mesh` as prepared by `Swarm.Mesh.Options.prepare/1`."
+  @doc """
+  Starts the node's parts, without a robot; `mesh` as prepared by `Swarm.Mesh.Options.prepare/1`, `machine` the
+  options of `Swarm.Machine`.
+  """
   @spec start_link(keyword()) :: Supervisor.on_start()
   def start_link(options), do: Supervisor.start_link(__MODULE__, options)
 

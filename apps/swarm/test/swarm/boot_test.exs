@@ -1,0 +1,130 @@
+defmodule Swarm.BootTest do
+  use ExUnit.Case, async: true
+  alias Swarm.Boot
+  alias Swarm.Mesh.Secret
+
+  doctest Boot
+
+  @moduletag :tmp_dir
+
+  defp machine(folder, file, more \\ %{}) do
+    path = Path.join(folder, "mag1.exs")
+    File.write!(path, file)
+    secret = Path.join(folder, "secret")
+    {:ok, _secret} = Secret.create(secret, false)
+
+    Map.merge(
+      %{"ROBOT" => "mag1", "CONVOY_ROBOT_FILE" => path, "CONVOY_SECRET_FILE" => secret},
+      more
+    )
+  end
+
+  defp file(more \\ "") do
+    drive = ~s(drive: {Hal.RFlex.Driver, port: "/dev/ttyS1"})
+    "[id: :mag1, profile: :magellan, #{drive}#{more}]"
+  end
+
+  test "the release of real robots needs a file, and says where it looked; a base station needs none" do
+    real = %{"RELEASE_NAME" => "robot", "ROBOT" => "mag9", "RELEASE_ROOT" => "/nowhere"}
+
+    assert Boot.robot(real) ==
+             {:error,
+              [
+                "mag9 has no robot file; looked for /etc/convoy/robots/mag9.exs and /nowhere/robots/mag9.exs"
+              ]}
+
+    assert Boot.robot(%{real | "RELEASE_NAME" => "fleet", "ROBOT" => "base"}) == {:ok, nil}
+  end
+
+  test "the machine's own file stands above that of the release" do
+    environment = %{"ROBOT" => "mag1", "RELEASE_ROOT" => "/opt/convoy/current"}
+    assert Boot.place(environment, fn _ -> true end) == {:ok, "/etc/convoy/robots/mag1.exs"}
+  end
+
+  test "a robot comes with its mission and its link, disarmed", %{tmp_dir: folder} do
+    environment = machine(folder, file(", policies: [mission: :landmark]"))
+    assert {:ok, {%Robot.File{id: :mag1}, config}} = Boot.robot(environment)
+    assert config.arm == :manual
+    assert {Swarm.Missions.Landmark, _options} = config.mission
+    assert {Swarm.Link, _options} = List.last(config.companions)
+  end
+
+  test "a file of another robot, and a wrong one, are refused in lines", %{tmp_dir: folder} do
+    environment = machine(folder, file(), %{"ROBOT" => "mag2"})
+    assert {:error, [line]} = Boot.robot(environment)
+    assert line =~ "mag1.exs is that of mag1, and this machine is ROBOT=mag2"
+
+    environment = %{environment | "ROBOT" => "mag1"}
+    File.write!(environment["CONVOY_ROBOT_FILE"], file(", arm: :maual, limit: []"))
+    assert {:error, lines} = Boot.robot(environment)
+    assert Enum.any?(lines, &(&1 =~ "mag1.exs:1: arm: cannot be :maual"))
+    assert Enum.any?(lines, &(&1 =~ "limit: is no key; did you mean limits?"))
+    assert {1, [], ^lines} = Boot.answer("start", environment)
+    assert {1, [], ^lines} = Boot.answer("check", environment)
+  end
+
+  test "who wants to reach a running robot gets there though its file is wrong by now", context do
+    environment = machine(context.tmp_dir, "[", %{"CONVOY_DIST_PORT" => "9400"})
+    secret = environment["CONVOY_SECRET_FILE"]
+
+    for command <- ~w(remote rpc stop restart pid) do
+      assert {0, [cookie, ^secret, "9400", ""], [_line]} = Boot.answer(command, environment)
+      assert cookie =~ ~r/\A[a-z2-7]{52}\z/
+    end
+  end
+
+  test "what the file says of the network stands above the environment", %{tmp_dir: folder} do
+    more = %{"CONVOY_DIST_PORT" => "9400", "CONVOY_INTERFACE" => "10.0.0.1"}
+    environment = machine(folder, file(), more)
+    {:ok, secret} = Secret.load(environment["CONVOY_SECRET_FILE"])
+    other = Path.join(folder, "other")
+    {:ok, %{cookie: cookie}} = Secret.create(other, false)
+
+    assert {:ok, {plain, _config}} = Boot.robot(environment)
+
+    assert Boot.settings(environment, plain) ==
+             {:ok,
+              %{
+                secret_file: secret.path,
+                cookie: Atom.to_string(secret.cookie),
+                dist_port: 9400,
+                interface: "10.0.0.1"
+              }}
+
+    assert {:ok, %{dist_port: 9101}} =
+             Boot.settings(Map.delete(environment, "CONVOY_DIST_PORT"), plain)
+
+    network = ~s(, network: [secret_file: "#{other}", dist_port: 9500, interface: "10.0.0.2"])
+
+    File.write!(environment["CONVOY_ROBOT_FILE"], file(network))
+    assert {:ok, {told, _config}} = Boot.robot(environment)
+
+    assert Boot.settings(environment, told) ==
+             {:ok,
+              %{
+                secret_file: other,
+                cookie: Atom.to_string(cookie),
+                dist_port: 9500,
+                interface: "10.0.0.2"
+              }}
+  end
+
+  test "without a secret nothing is told but how to make one", %{tmp_dir: folder} do
+    environment = machine(folder, file())
+    File.rm!(environment["CONVOY_SECRET_FILE"])
+
+    for command <- ~w(start rpc check) do
+      assert {1, [], [line]} = Boot.answer(command, environment)
+      assert line =~ "does not exist; make one"
+    end
+  end
+
+  test "check says what the robot is", %{tmp_dir: folder} do
+    environment = machine(folder, file())
+
+    assert {0, ["" <> first, "mag1, a Magellan Pro" <> _ | _], []} =
+             Boot.answer("check", environment)
+
+    assert first == environment["CONVOY_ROBOT_FILE"] <> ": well"
+  end
+end
