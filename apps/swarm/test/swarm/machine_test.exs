@@ -4,13 +4,9 @@ defmodule Swarm.MachineTest do
 
   doctest Machine
 
-  @moduletag :tmp_dir
-
-  # What systemd has: a socket of datagrams.
-  setup %{tmp_dir: folder} do
-    # Paths of sockets are short.
-    path = Path.relative_to_cwd(Path.join(folder, "n"))
-    path = if byte_size(path) < 100, do: path, else: "/tmp/n#{System.unique_integer([:positive])}"
+  # What systemd has: a socket of datagrams. Its path must be short.
+  setup do
+    path = Path.join(System.tmp_dir!(), "n#{System.pid()}-#{System.unique_integer([:positive])}")
     {:ok, socket} = :gen_udp.open(0, [:local, :binary, ifaddr: {:local, path}])
     on_exit(fn -> File.rm(path) end)
     %{path: path, socket: socket}

@@ -1,0 +1,326 @@
+Code.require_file("release/machine.exs", __DIR__)
+
+# What a release takes from the machine that builds it.
+erts = Path.join(:code.root_dir(), "erts-#{:erlang.system_info(:version)}/bin")
+
+why_not =
+  Enum.find_value(~w(erlexec beam.smp run_erl), fn name ->
+    unless File.exists?(Path.join(erts, name)), do: "#{erts} has no #{name}"
+  end)
+
+no_machine = why_not || Release.Machine.why_not()
+if why_not, do: IO.puts("the release is not tested: #{why_not}")
+if no_machine, do: IO.puts("rel/deploy is not tested: #{no_machine}")
+
+defmodule System.ReleaseTest do
+  @moduledoc """
+  The release of real robots, from outside: it is built, started, commanded, killed and started again, with the
+  real driver on an emulated base; and deployed to a bare machine.
+  """
+  use ExUnit.Case, async: false
+  alias Hal.{Pose, Profile}
+  alias Release.Machine
+  alias Sim.{Emulator, Server, World, Worlds}
+
+  @moduletag timeout: 300_000
+  @moduletag skip: why_not
+  @root Path.expand("..", __DIR__)
+  @release Path.join(@root, "_build/prod/rel/robot")
+
+  setup_all do
+    environment = [{"MIX_ENV", "prod"}, {"MIX_TARGET", nil}]
+    arguments = ["release", "robot", "--overwrite", "--quiet"]
+    options = [cd: @root, env: environment, stderr_to_stdout: true]
+    {said, status} = System.cmd("mix", arguments, options)
+    assert status == 0, said
+    {:ok, _started} = Application.ensure_all_started(:hal)
+    :ok
+  end
+
+  setup do
+    folder =
+      Path.join(System.tmp_dir!(), "convoy-release-#{System.pid()}-#{:rand.uniform(10_000)}")
+
+    File.mkdir_p!(folder)
+    on_exit(fn -> File.rm_rf!(folder) end)
+    {:ok, _secret} = Swarm.Mesh.Secret.create(Path.join(folder, "secret"), false)
+    %{folder: folder}
+  end
+
+  # Ports of its own, so that it meets no other fleet of this machine.
+  defp robot_file(path, port, more \\ "") do
+    {:ok, socket} = :gen_tcp.listen(0, ip: {127, 0, 0, 1})
+    {:ok, free} = :inet.port(socket)
+    :gen_tcp.close(socket)
+
+    File.write!(path, """
+    [
+      id: :mag1,
+      profile: :magellan,
+      drive: {Hal.RFlex.Driver, [port: "#{port}", conversions: [distance: 31_387.0, angle: 4654.2,
+        range: 1474.0, ir_a: 4000.0, ir_b: -2.0]]},
+      network: [interface: "127.0.0.1", port: 0, multicast: false, dist_port: #{free}]#{more}
+    ]
+    """)
+  end
+
+  defp base(link) do
+    start_supervised!(Worlds)
+    {:ok, map} = Sim.Map.open("hall", 1)
+    robot = %{id: :mag1, profile: Profile.magellan(), pose: Pose.new(-4, 0, 0), infrared: true}
+    name = make_ref()
+    world = World.new!(map: map, robots: [robot], noise: :off)
+    server = start_supervised!({Server, name: name, world: world})
+    body = {Sim.Drive, world: name, robot: :mag1}
+    start_supervised!({Emulator, core: {Sim.RFlexController, []}, link: link, body: body})
+    server
+  end
+
+  defp speed(server), do: elem(Server.world(server).robots.mag1.speed, 0)
+
+  defp robot(arguments, environment) do
+    options = [env: environment, stderr_to_stdout: true]
+    System.cmd(Path.join(@root, "bin/robot"), arguments, options)
+  end
+
+  # Asks until the answer is such.
+  defp until(pattern, ask, left_ms \\ 20_000) do
+    began = System.monotonic_time(:millisecond)
+    {said, _status} = ask.()
+
+    cond do
+      said =~ pattern -> said
+      left_ms < 0 -> flunk("it never said #{inspect(pattern)}, but: #{said}")
+      true -> until(pattern, ask, left_ms - (System.monotonic_time(:millisecond) - began) - 1)
+    end
+  end
+
+  defp wait(true?, ms \\ 15_000) do
+    cond do
+      true?.() -> :ok
+      ms < 0 -> flunk("it never came")
+      true -> receive(do: (:never -> :ok), after: (5 -> wait(true?, ms - 5)))
+    end
+  end
+
+  defp there?(pid), do: match?({_, 0}, System.cmd("kill", ["-0", pid], stderr_to_stdout: true))
+
+  # The number of the robot's process, which ends with the test.
+  defp pid(ask) do
+    pid = ask |> then(&until(~r/^\d+$/m, &1)) |> String.trim()
+    on_exit(fn -> System.cmd("kill", ["-KILL", pid], stderr_to_stdout: true) end)
+    pid
+  end
+
+  test "it is lean, and its programs may be run" do
+    apps = for path <- File.ls!(Path.join(@release, "lib")), do: hd(String.split(path, "-"))
+    for app <- ~w(hal vision robot swarm), do: assert(app in apps)
+    for app <- ~w(sim console mix ex_unit), do: refute(app in apps)
+
+    for {name, mode} <- [
+          {"hal*/priv/serial", 0o111},
+          {"hal*/priv/newest_frame", 0o111},
+          {"vision*/priv/blobs.so", 0}
+        ] do
+      assert [file] = Path.wildcard(Path.join([@release, "lib", name]))
+      assert Bitwise.band(File.stat!(file).mode, mode) == mode
+    end
+  end
+
+  test "started, armed, driven, killed by -9: the wheels stop; started again, disarmed", %{
+    folder: folder
+  } do
+    link = Path.join(folder, "base")
+    file = Path.join(folder, "mag1.exs")
+    robot_file(file, link)
+    server = base(link)
+
+    environment = [
+      {"ROBOT", "mag1"},
+      {"CONVOY_ROBOT_FILE", file},
+      {"CONVOY_SECRET_FILE", Path.join(folder, "secret")},
+      {"RELEASE_TMP", folder}
+    ]
+
+    ask = fn arguments -> fn -> robot(arguments, environment) end end
+
+    assert {said, 0} = robot(["check"], environment)
+    assert said =~ "mag1, a Magellan Pro"
+    assert {"", 0} = robot(["daemon"], environment)
+    pid = pid(ask.(["pid"]))
+    # Where it is, its wheels have said.
+    here = ~r/^#mag1 idle \(0\.00, 0\.00, 0 deg\) .* DISARMED/
+    until(here, ask.(["status"]))
+
+    assert {said, 0} = robot(["rpc", ~s|Swarm.tell(:mag1, "armm")|], environment)
+    assert said =~ ~s({:error, ")
+
+    # It moves only once a person has armed it.
+    move = ["rpc", ~s|Swarm.tell(:mag1, "move:0.2:0")|]
+    assert {":ok\n", 0} = robot(move, environment)
+    assert speed(server) == 0.0
+    assert until(~r/^:ok$/m, ask.(["rpc", "Swarm.arm(:mag1)"]))
+    assert {":ok\n", 0} = robot(move, environment)
+    wait(fn -> speed(server) > 0.1 end)
+
+    {_, 0} = System.cmd("kill", ["-KILL", pid])
+    wait(fn -> speed(server) == 0.0 end, 1_000)
+    refute there?(pid)
+    assert {_said, status} = robot(["status"], environment)
+    assert status != 0
+
+    assert {"", 0} = robot(["daemon"], environment)
+    assert pid(ask.(["pid"])) != pid
+    until(here, ask.(["status"]))
+    assert {":ok\n", 0} = robot(move, environment)
+    again = pid(ask.(["pid"]))
+    assert {"", 0} = robot(["stop"], environment)
+    wait(fn -> not there?(again) end)
+    assert speed(server) == 0.0
+  end
+
+  test "what is wrong is said in a line, and nothing starts", %{folder: folder} do
+    file = Path.join(folder, "mag1.exs")
+    robot_file(file, "/dev/ttyS1", ", arm: :maual")
+    secret = Path.join(folder, "secret")
+    environment = [{"ROBOT", "mag1"}, {"CONVOY_ROBOT_FILE", file}, {"CONVOY_SECRET_FILE", secret}]
+    assert {said, 1} = robot(["start"], environment)
+    assert said =~ ~r/mag1.exs:\d+: arm: cannot be :maual.*did you mean :manual/
+
+    assert {said, 1} =
+             robot(["start"], List.keyreplace(environment, "ROBOT", 0, {"ROBOT", "mag2"}))
+
+    assert said =~ "arm: cannot be :maual"
+    robot_file(file, "/dev/ttyS1")
+    File.rm!(secret)
+    assert {said, 1} = robot(["start"], environment)
+    assert said =~ "make one: (umask 077;"
+
+    for {word, meant} <- [{"stpo", "stop"}, {"reomte", "remote"}, {"daemn", "daemon"}] do
+      assert {said, 1} = robot([word], environment)
+      assert said =~ "did you mean #{meant}?"
+    end
+  end
+
+  describe "rel/deploy" do
+    @describetag skip: no_machine
+
+    setup %{folder: folder} do
+      {machine, environment} = Machine.new(folder)
+      file = Path.join(folder, "mag1.exs")
+      robot_file(file, "/tmp/base")
+      %{machine: machine, robot: file, environment: environment}
+    end
+
+    defp deploy(arguments, context) do
+      options = [env: context.environment, stderr_to_stdout: true]
+      System.cmd(Path.join(@root, "rel/deploy"), arguments, options)
+    end
+
+    defp to_machine(context, more \\ []) do
+      secret = Path.join(context.folder, "secret")
+
+      deploy(
+        ["root@machine", "mag1", "--file", context.robot, "--secret", secret] ++ more,
+        context
+      )
+    end
+
+    defp on_machine(command, context) do
+      [{"PATH", path}] = context.environment
+      ssh = Path.join(hd(String.split(path, ":")), "ssh")
+      System.cmd(ssh, ["root@machine", command], stderr_to_stdout: true)
+    end
+
+    defp current(context), do: File.read_link(Path.join(context.machine, "opt/convoy/current"))
+
+    test "--dry-run prints the commands, and does none", context do
+      assert {said, 0} = to_machine(context, ["--dry-run"])
+      assert said =~ ~r/^tar -C .* \| ssh root@machine /m
+      assert said =~ ~r/^root@machine: ROBOT=mag1 .*bin\/robot check$/m
+      assert said =~ ~r/^root@machine: systemctl restart convoy/m
+      assert File.ls!(Path.join(context.machine, "opt")) == []
+    end
+
+    test "what is wrong with the arguments is one line", context do
+      for {arguments, line} <- [
+            {[], "where is the robot?"},
+            {["root@machine"], "which robot is root@machine?"},
+            {["-oProxyCommand=x", "mag1"], "is no option"},
+            {["a;b", "mag1"], "a;b is no host"},
+            {["root@machine", "../mag1"], "../mag1 is no name"},
+            {["root@machine", "mag1", "mag2"], "what is mag2?"},
+            {["root@machine", "mag1", "--fil", "x"], "did you mean --file?"},
+            {["root@machine", "mag1", "--file"], "--file needs a value"},
+            {["root@machine", "mag1", "--file", "/no"], "there is no robot file /no"},
+            {["root@machine", "mag1", "--release", "/no"], "MIX_ENV=prod mix release robot"},
+            {["root@machine", "mag1", "--secret", "/no"], "mix fleet.secret /no"},
+            {["--back", "root@machine", "--file", "x"], "nothing is copied"}
+          ] do
+        assert {said, 1} = deploy(arguments, context)
+        assert said =~ line
+        assert [_one_line] = String.split(said, "\n", trim: true)
+      end
+    end
+
+    test "from a bare machine to a robot that runs; a wrong file changes nothing; and back",
+         context do
+      assert {said, 0} = to_machine(context)
+      assert said =~ "mag1, a Magellan Pro"
+      assert {:ok, first} = current(context)
+
+      assert {"600 convoy /etc/convoy/secret\n", 0} =
+               on_machine("stat -c '%a %U %n' /etc/convoy/secret", context)
+
+      assert {groups, 0} = on_machine("id -nG convoy", context)
+      assert "dialout" in String.split(groups) and "video" in String.split(groups)
+      assert {"ROBOT=mag1\n", 0} = on_machine("cat /etc/convoy/robot.env", context)
+
+      assert File.ls!(Path.join(context.machine, "opt/convoy")) |> Enum.sort() == [
+               "current",
+               "releases"
+             ]
+
+      # It runs as its own user, and root may command it.
+      as_robot =
+        "setpriv --reuid convoy --regid convoy --init-groups env RELEASE_TMP=/tmp robot daemon"
+
+      assert {"", 0} = on_machine(as_robot, context)
+      pid = pid(fn -> on_machine("robot pid", context) end)
+      assert {"convoy\n", 0} = on_machine("stat -c %U /proc/#{pid}", context)
+      assert {"#mag1 idle" <> _, 0} = on_machine("robot status", context)
+
+      right = File.read!(context.robot)
+      File.write!(context.robot, "[]")
+      assert {said, 1} = to_machine(context)
+      assert said =~ "drive: is missing"
+      assert current(context) == {:ok, first}
+      refute File.exists?(Path.join(context.machine, "opt/convoy/incoming"))
+      File.write!(context.robot, right)
+
+      assert {_said, 0} = to_machine(context)
+      assert {:ok, second} = current(context)
+      assert second != first
+      assert {_said, 0} = deploy(["--back", "root@machine"], context)
+      assert current(context) == {:ok, first}
+      assert {_said, 0} = deploy(["--back", "root@machine"], context)
+      assert current(context) == {:ok, second}
+
+      # The one before the last goes.
+      assert {_said, 0} = to_machine(context)
+      assert {releases, 0} = on_machine("ls /opt/convoy/releases", context)
+      assert length(String.split(releases)) == 2
+      refute releases =~ Path.basename(first)
+    end
+  end
+
+  test "the unit for systemd is one", %{folder: folder} do
+    if System.find_executable("systemd-analyze") do
+      # Its program is on robots only.
+      unit = File.read!(Path.join(@root, "rel/convoy.service"))
+      path = Path.join(folder, "convoy.service")
+      File.write!(path, String.replace(unit, ~r/^ExecStart=.*/m, "ExecStart=/bin/true"))
+      assert {"", 0} = System.cmd("systemd-analyze", ["verify", path], stderr_to_stdout: true)
+    end
+  end
+end
