@@ -55,7 +55,9 @@
   # The camera's head: {Hal.Visca.Driver, port: "/dev/ttyS2"}, or nil for a camera that looks ahead.
   ptz: nil,
 
-  # The camera: {Hal.Camera.FFmpeg, source: "/dev/video0", size: {320, 240}}, or nil for none.
+  # The camera: {Hal.Camera.FFmpeg, source: "/dev/video0", size: {320, 240}}, or nil for none. A frame
+  # grabber is told norm: :pal (:ntsc, :secam) and input: 1, the number of the socket; any V4L2 device
+  # rate: 10 and pixel_format: :mjpeg (:yuyv, :uyvy, …).
   camera: nil,
 
   # What the camera looks for: a CMVision colour file, searched beside this one. With more to say:

@@ -111,7 +111,10 @@ defmodule Robot.PlayerTest do
     assert {tele, wide} = ptz[:lens]
     assert_in_delta tele, 0.0524, 1.0e-4
     assert_in_delta wide, 0.5236, 1.0e-4
-    assert robot.camera == {Hal.Camera.FFmpeg, size: {320, 240}, source: "/dev/video0"}
+
+    assert robot.camera ==
+             {Hal.Camera.FFmpeg, size: {320, 240}, norm: :ntsc, source: "/dev/video0"}
+
     assert robot.colours.min_area == 20
     assert robot.policies == [colour: "Ball"]
 
@@ -120,7 +123,6 @@ defmodule Robot.PlayerTest do
              {20, "rflex_joy_pos_ratio", "the joystick is read, but drives nothing by itself"},
              {21, "odo_distence_conversion",
               "is no option of rflex; was odo_distance_conversion meant?"},
-             {24, "norm", "set the camera's input by v4l2-ctl"},
              {26, "driver festival", "no speech"},
              {27, "include \"more.inc\"",
               "other files are not read: import that one, or copy it in"}
@@ -229,6 +231,28 @@ defmodule Robot.PlayerTest do
              {10, "port"},
              {11, "laser:0"}
            ]
+  end
+
+  test "norm and input of a frame grabber" do
+    text = fn more ->
+      """
+      driver ( name "rflex" rflex_serial_port "/dev/ttyS1" )
+      driver ( name "camerav4l" port "/dev/video1" #{more} )
+      driver ( name "cmvision" colorfile "color.cfg" )
+      """
+    end
+
+    file = [colours: &colours/1]
+    assert {:ok, result} = Player.import(text.(~s(source 2 norm "PAL")), file)
+
+    assert result.text =~
+             ~s(camera: {Hal.Camera.FFmpeg, [source: "/dev/video1", input: 2, norm: :pal]})
+
+    assert {:ok, %{left: []} = result} = Player.import(text.(~s(norm "UNKNOWN")), file)
+    refute result.text =~ "norm"
+
+    assert {:ok, result} = Player.import(text.(~s(source 99 norm "film")), file)
+    assert for({_, what, _why} <- result.left, do: what) |> Enum.sort() == ["norm", "source"]
   end
 
   test "definitions carry over, and what a section says itself wins" do

@@ -1,4 +1,7 @@
 defmodule Hal.Camera.FFmpeg do
+  alias Hal.Camera.{Options, Source}
+  alias Hal.Frame
+
   @moduledoc """
   A camera that is whatever ffmpeg reads: a V4L2 device, a stream, a video file, a picture, a
   test picture (`Hal.Camera.Source`).
@@ -12,7 +15,17 @@ defmodule Hal.Camera.FFmpeg do
     * `:every` - `false`: the newest frame wins, files run in real time. `true`: each frame in
       turn, as fast as it is asked for, and timed by its place in the file
     * `:loop` - `true`: start a file again at its end
-    * `:rate` - frames a second to ask of a V4L2 device
+
+  and of a V4L2 device only:
+
+    * `:rate` - frames a second to ask of it, 0.1 to 1000
+    * `:norm` - of an analog camera: `:pal`, `:ntsc` or `:secam`
+    * `:input` - the number of the socket of a frame grabber that the camera is plugged into, from 0
+    * `:pixel_format` - what the device is to send, where it can send several:
+      #{Enum.map_join(Source.pixel_formats(), ", ", &"`#{inspect(&1)}`")}. The compressed ones take
+      less of a USB line, and time to unpack
+
+  What of these is left out is as the device was left by whoever used it last.
 
   ffmpeg runs behind the port program `newest_frame`, which keeps one frame and gives it out when
   `next/1` asks; nothing queues, and ffmpeg ends with this process or its VM, however they end.
@@ -20,28 +33,15 @@ defmodule Hal.Camera.FFmpeg do
   The process that calls `init/1` gets the messages and is linked to the port program. To see the
   end of a killed one as an error, it traps exits, as `Hal.Device` does.
 
-  Errors: `:no_ffmpeg`, `:enoent` (no such file or device), `:eisdir`, `:eof` (the source ended
+  Errors: `:no_ffmpeg`, `:enoent` (no such file or device), `:eacces`, `:eisdir`, `:eof` (the source ended
   after at least one frame), `{:unreadable, what ffmpeg says}`, `{:exit, status}`.
   """
   @behaviour Hal.Camera
-  alias Hal.Camera.Source
-  alias Hal.{Frame, Suggest}
 
   @enforce_keys [:port, :format, :every]
   defstruct @enforce_keys
 
   @opaque t :: %__MODULE__{port: port(), format: Frame.format(), every: boolean()}
-
-  @defaults [
-    source: nil,
-    size: nil,
-    rate: nil,
-    ffmpeg: nil,
-    format: :yuyv,
-    every: false,
-    loop: false
-  ]
-  @widest 32_768
 
   @doc """
   The options with their defaults, or all that is wrong with them, a line each.
@@ -50,29 +50,7 @@ defmodule Hal.Camera.FFmpeg do
       {:error, ["camera has no option :siz; did you mean :size?"]}
   """
   @spec options(keyword()) :: {:ok, keyword()} | {:error, [line :: String.t(), ...]}
-  def options(options) do
-    names = Enum.map(Keyword.keys(@defaults), &inspect/1)
-    {known, unknown} = Keyword.split(options, Keyword.keys(@defaults))
-    merged = Keyword.merge(@defaults, known)
-
-    strange =
-      for {name, _value} <- unknown do
-        hint = with nil <- Suggest.nearest(inspect(name), names), do: Enum.join(names, ", ")
-
-        if hint in names,
-          do: "camera has no option #{inspect(name)}; did you mean #{hint}?",
-          else: "camera has no option #{inspect(name)}; it has #{hint}"
-      end
-
-    missing = if options[:source] == nil, do: ["camera option :source is missing"], else: []
-
-    wrong = for option <- known, option != {:source, nil}, not valid?(option), do: refused(option)
-
-    case strange ++ missing ++ wrong do
-      [] -> {:ok, merged}
-      lines -> {:error, lines}
-    end
-  end
+  defdelegate options(options), to: Options, as: :check
 
   @impl Hal.Camera
   def init(options) do
@@ -131,6 +109,7 @@ defmodule Hal.Camera.FFmpeg do
   """
   @spec explain(reason :: term()) :: String.t()
   def explain(:enoent), do: "no such file or device"
+  def explain(:eacces), do: "permission denied (a camera wants its user in the group video)"
   def explain(:eisdir), do: "is a folder"
   def explain(:no_ffmpeg), do: "the program ffmpeg is missing (on Debian: apt install ffmpeg)"
   def explain(:eof), do: "ended"
@@ -183,26 +162,4 @@ defmodule Hal.Camera.FFmpeg do
       {:error, lines} -> raise ArgumentError, Enum.join(lines, "; ")
     end
   end
-
-  defp refused({option, value}),
-    do: "camera option #{inspect(option)} cannot be #{inspect(value)}: #{allowed(option)}"
-
-  defp valid?({:source, source}), do: is_binary(source) and source != ""
-  defp valid?({:format, format}), do: format in [:yuyv, :i420]
-  defp valid?({option, value}) when option in [:every, :loop], do: is_boolean(value)
-  defp valid?({option, nil}) when option in [:size, :rate, :ffmpeg], do: true
-  defp valid?({:rate, rate}), do: is_number(rate) and rate > 0
-  defp valid?({:ffmpeg, path}), do: is_binary(path)
-
-  defp valid?({:size, {width, height}}),
-    do: width in 2..@widest//2 and height in 2..@widest//2
-
-  defp valid?({:size, _other}), do: false
-
-  defp allowed(:source), do: "a file, stream or device"
-  defp allowed(:format), do: ":yuyv or :i420"
-  defp allowed(option) when option in [:every, :loop], do: "true or false"
-  defp allowed(:rate), do: "frames a second, above 0"
-  defp allowed(:size), do: "{width, height}, even numbers up to #{@widest}"
-  defp allowed(:ffmpeg), do: "the path of ffmpeg"
 end

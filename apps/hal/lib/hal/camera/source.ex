@@ -16,6 +16,28 @@ defmodule Hal.Camera.Source do
 
   @pictures ~w(.png .jpg .jpeg .bmp .ppm .pgm .tif .tiff .webp)
 
+  # Our names, after `Hal.Frame`, and ffmpeg's, of what cameras send.
+  @pixel_formats [
+    yuyv: "yuyv422",
+    uyvy: "uyvy422",
+    i420: "yuv420p",
+    nv12: "nv12",
+    rgb24: "rgb24",
+    bgr24: "bgr24",
+    grey: "gray",
+    mjpeg: "mjpeg",
+    h264: "h264"
+  ]
+  @norms [pal: "PAL", ntsc: "NTSC", secam: "SECAM"]
+
+  @doc "What a V4L2 device can be asked to send."
+  @spec pixel_formats() :: [atom(), ...]
+  def pixel_formats, do: Keyword.keys(@pixel_formats)
+
+  @doc "The norms of analog cameras."
+  @spec norms() :: [atom(), ...]
+  def norms, do: Keyword.keys(@norms)
+
   @doc """
   The kind of a source.
 
@@ -37,17 +59,25 @@ defmodule Hal.Camera.Source do
       iex> Hal.Camera.Source.check("testsrc")
       :ok
   """
-  @spec check(String.t()) :: :ok | {:error, :enoent | :eisdir}
-  def check(source) do
-    cond do
-      kind(source) in [:stream, :generator] -> :ok
-      File.dir?(source) -> {:error, :eisdir}
-      File.exists?(source) -> :ok
-      true -> {:error, :enoent}
-    end
-  end
+  @spec check(String.t()) :: :ok | {:error, :enoent | :eacces | :eisdir}
+  def check(source),
+    do: if(kind(source) in [:stream, :generator], do: :ok, else: readable(File.stat(source)))
 
-  @doc "The arguments of ffmpeg for a yuv4mpeg stream of that source on its output; options as in `Hal.Camera.FFmpeg`."
+  defp readable({:ok, %File.Stat{type: :directory}}), do: {:error, :eisdir}
+  defp readable({:ok, %File.Stat{access: access}}) when access in [:read, :read_write], do: :ok
+  defp readable({:ok, _closed}), do: {:error, :eacces}
+  defp readable({:error, :eacces}), do: {:error, :eacces}
+  defp readable({:error, _reason}), do: {:error, :enoent}
+
+  @doc """
+  The arguments of ffmpeg for a yuv4mpeg stream of that source on its output; options as in
+  `Hal.Camera.FFmpeg`.
+
+      iex> "/dev/video0"
+      ...> |> Hal.Camera.Source.arguments(format: :yuyv, norm: :pal, input: 1)
+      ...> |> Enum.slice(4, 8)
+      ["-f", "v4l2", "-channel", "1", "-standard", "PAL", "-i", "/dev/video0"]
+  """
   @spec arguments(String.t(), keyword()) :: [String.t()]
   def arguments(source, options) do
     ~w(-nostdin -hide_banner -loglevel error) ++
@@ -70,10 +100,19 @@ defmodule Hal.Camera.Source do
   defp loop(:generator), do: []
 
   defp input(:device, source, options) do
-    {width, height} = options[:size] || {nil, nil}
-    size = if width, do: ["-video_size", "#{width}x#{height}"], else: []
-    rate = if options[:rate], do: ["-framerate", "#{options[:rate]}"], else: []
-    ~w(-f v4l2) ++ size ++ rate ++ ["-i", source]
+    asked =
+      for {option, word} <- [
+            input: "-channel",
+            norm: "-standard",
+            pixel_format: "-input_format",
+            size: "-video_size",
+            rate: "-framerate"
+          ],
+          value = options[option],
+          text <- [word, asked(option, value)],
+          do: text
+
+    ~w(-f v4l2) ++ asked ++ ["-i", source]
   end
 
   defp input(:generator, "testsrc", _options),
@@ -83,6 +122,11 @@ defmodule Hal.Camera.Source do
   defp input(:stream, source, _options), do: ["-i", source]
   # Otherwise a colon in a file's name would make it a protocol.
   defp input(:file, source, _options), do: literal(source) ++ ["-i", "file:" <> source]
+
+  defp asked(:size, {width, height}), do: "#{width}x#{height}"
+  defp asked(:norm, norm), do: @norms[norm]
+  defp asked(:pixel_format, format), do: @pixel_formats[format]
+  defp asked(option, number) when option in [:rate, :input], do: to_string(number)
 
   # A per cent sign in a picture's name would make it a pattern for numbered pictures.
   defp literal(source) do

@@ -1,8 +1,9 @@
 defmodule Hal.Camera.FFmpegTest do
   use ExUnit.Case, async: true
   doctest Hal.Camera.Source
+  doctest Hal.Camera.Options
   doctest Hal.Camera.FFmpeg
-  alias Hal.Camera.FFmpeg
+  alias Hal.Camera.{FFmpeg, Source}
 
   @moduletag if(System.find_executable("ffmpeg"), do: [], else: [skip: "ffmpeg is missing"])
 
@@ -124,6 +125,8 @@ defmodule Hal.Camera.FFmpegTest do
   test "every wrong source is an error with its reason" do
     assert FFmpeg.init(source: "no/such/file.png") == {:error, :enoent}
     assert FFmpeg.init(source: "/dev/video77") == {:error, :enoent}
+    assert {:unreadable, words} = take(open(source: "/dev/null", norm: :pal, input: 1))
+    assert words =~ "/dev/null"
     assert FFmpeg.init(source: "lib") == {:error, :eisdir}
     assert {:unreadable, words} = take(open(source: "mix.exs"))
     assert words =~ "Invalid data"
@@ -133,7 +136,7 @@ defmodule Hal.Camera.FFmpegTest do
   end
 
   test "every reason has words" do
-    for reason <- [:enoent, :eisdir, :no_ffmpeg, :eof, {:unreadable, "x"}, {:exit, 1}] do
+    for reason <- [:enoent, :eacces, :eisdir, :no_ffmpeg, :eof, {:unreadable, "x"}, {:exit, 1}] do
       assert FFmpeg.explain(reason) =~ ~r/^[^\n]+$/
     end
   end
@@ -146,6 +149,81 @@ defmodule Hal.Camera.FFmpegTest do
     end
 
     assert_raise ArgumentError, ~r/:source is missing/, fn -> FFmpeg.init([]) end
+  end
+
+  test "a V4L2 device is asked for size, rate, norm, input and pixel format, each if it is given" do
+    device = fn options ->
+      {:ok, options} = FFmpeg.options([source: "/dev/video0"] ++ options)
+      line = Enum.join(Source.arguments("/dev/video0", options), " ")
+      [_, asked] = Regex.run(~r/^-nostdin -hide_banner -loglevel error (.*) -map 0:v:0 /, line)
+      asked
+    end
+
+    assert device.([]) == "-f v4l2 -i /dev/video0"
+
+    assert device.(size: {320, 240}, rate: 12.5, norm: :secam, input: 2, pixel_format: :mjpeg) ==
+             "-f v4l2 -channel 2 -standard SECAM -input_format mjpeg -video_size 320x240 " <>
+               "-framerate 12.5 -i /dev/video0"
+
+    assert device.(norm: :ntsc, input: 0) == "-f v4l2 -channel 0 -standard NTSC -i /dev/video0"
+    for format <- Source.pixel_formats(), do: assert(device.(pixel_format: format) =~ "_format ")
+  end
+
+  test "ffmpeg itself knows all that a device is asked for" do
+    {help, 0} = System.cmd("ffmpeg", ~w(-hide_banner -h demuxer=v4l2))
+    {formats, 0} = System.cmd("ffmpeg", ~w(-hide_banner -pix_fmts))
+    {decoders, 0} = System.cmd("ffmpeg", ~w(-hide_banner -decoders))
+    asked = Keyword.merge(all_of_a_device(), every: false, loop: false, format: :yuyv)
+
+    for "-" <> _ = word <- Source.arguments("/dev/video0", asked) |> Enum.slice(4, 12),
+        word not in ["-f", "-i"],
+        do: assert(help =~ ~r/ #{word} /)
+
+    for format <- Source.pixel_formats() do
+      words = Source.arguments("/dev/video0", Keyword.put(asked, :pixel_format, format))
+      name = Enum.at(words, Enum.find_index(words, &(&1 == "-input_format")) + 1)
+      assert formats =~ ~r/^I.* #{name} /m or decoders =~ ~r/^ V.* #{name} /m
+    end
+  end
+
+  defp all_of_a_device,
+    do: [size: {320, 240}, rate: 10, norm: :pal, input: 1, pixel_format: :yuyv]
+
+  test "what only a device understands is refused for another source, in a line each" do
+    for source <- ["testsrc", "film.mp4", "rtsp://cam/1"],
+        {name, _} = option <- Keyword.delete(all_of_a_device(), :size) do
+      assert {:error, [line]} = FFmpeg.options([option, source: source])
+      assert line =~ "#{inspect(name)} is for a V4L2 device" and line =~ inspect(source)
+    end
+
+    assert {:ok, _} = FFmpeg.options([source: "/dev/video0"] ++ all_of_a_device())
+  end
+
+  test "what no device can be asked for is refused, with what is allowed" do
+    for {name, values} <- [
+          norm: ["PAL", :palm, 1],
+          input: [-1, 32, 1.0, "1", 1.0e300],
+          pixel_format: [:yuv, "yuyv", 7],
+          rate: [0, -1, 0.01, 1.0e300, "10", :fast],
+          size: [{3, 2}, {0, 0}, {1.0e300, 2}, {320}, "320x240", {32_770, 2}]
+        ],
+        value <- values do
+      assert {:error, [line]} = FFmpeg.options([{name, value}, source: "/dev/video0"])
+      assert line =~ ~r/^camera option #{inspect(name)} cannot be [^\n]+: [^\n]+$/
+    end
+
+    assert {:error, [line]} = FFmpeg.options(source: "/dev/video0", pixel_formt: :yuyv)
+    assert line =~ "did you mean :pixel_format?"
+  end
+
+  @tag :tmp_dir
+  test "a device that its user may not open says so", %{tmp_dir: folder} do
+    closed = Path.join(folder, "closed")
+    File.write!(closed, "")
+    File.chmod!(closed, 0o000)
+    # Root opens whatever there is.
+    expected = if File.stat!(closed).access == :none, do: {:error, :eacces}, else: :ok
+    assert Source.check(closed) == expected
   end
 
   defp put(options, {key, value}), do: Keyword.put(options, key, value)

@@ -34,8 +34,16 @@ defmodule Robot.Player.Eyes do
   def option(:camera, "save", 0, _context), do: :used
   def option(:camera, "mode", _value, _context), do: {:left, "frames are always YUV here"}
 
-  def option(:camera, name, _value, _context) when name in ~w(source norm),
-    do: {:left, "set the camera's input by v4l2-ctl"}
+  def option(:camera, "source", input, _context) when input in 0..31,
+    do: {:ok, [{[:camera, :input], input}]}
+
+  def option(:camera, "norm", norm, _context) when is_binary(norm) do
+    case String.downcase(norm) do
+      norm when norm in ~w(pal ntsc secam) -> {:ok, [{[:camera, :norm], norm(norm)}]}
+      "unknown" -> :used
+      _other -> {:left, "norms are pal, ntsc and secam"}
+    end
+  end
 
   def option(:camera, _name, _value, _context), do: {:left, "our driver decides that by itself"}
 
@@ -50,6 +58,10 @@ defmodule Robot.Player.Eyes do
 
   def option(:colours, "debuglevel", 0, _context), do: :used
   def option(:colours, _name, _value, _context), do: {:left, "our blob finder has no such option"}
+
+  defp norm("pal"), do: :pal
+  defp norm("ntsc"), do: :ntsc
+  defp norm("secam"), do: :secam
 
   defp even?(number), do: is_integer(number) and number in 2..32_768 and rem(number, 2) == 0
 end

@@ -6,7 +6,7 @@ defmodule Robot.Player.Fit do
   alias Robot.File.{Check, Device, Schema}
   alias Robot.Player.Whole
 
-  @least %{drive: [port: "/dev/null"], ptz: [port: "/dev/null"], camera: [source: "testsrc"]}
+  @least %{drive: [port: "/dev/null"], ptz: [port: "/dev/null"], camera: [source: "/dev/video0"]}
 
   @doc "The state with only such values as are allowed one by one; `modules` are the drivers by kind."
   @spec allowed(Whole.t(), %{atom() => module()}) :: Whole.t()
