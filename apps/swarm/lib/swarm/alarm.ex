@@ -5,7 +5,8 @@ defmodule Swarm.Alarm do
   `sound/0` sends a call to stop to every brake in the directory and, by signed datagrams, to every
   node. That happens at once, in the caller; this process then repeats it, ten times in all, one
   each 100 ms, whatever has become of the caller. Every call has an identity (`t:Swarm.Stop.call/0`),
-  so that a robot obeys it once. Whoever hears a call for the first time passes it on, so that it also
+  so that a robot obeys it once, and an age, counted by
+  those who have it: what is older than a person's reset does not stop the robot again. Whoever hears a call for the first time passes it on, so that it also
   reaches those that hear him but not its sender. A reset ends the repeats, so that a robot that is
   switched on afterwards is not stopped by one.
   """
@@ -26,15 +27,15 @@ defmodule Swarm.Alarm do
   @spec sound() :: Stop.call()
   def sound do
     call = {node(), boot(), System.unique_integer([:positive, :monotonic])}
-    send_out(call)
+    send_out(call, 0)
     GenServer.cast(__MODULE__, {:repeat, call, @times - 1})
     call
   end
 
   @doc "Passes on a call that was heard; one of this node's own is being repeated anyway."
-  @spec pass_on(Stop.call()) :: :ok
-  def pass_on({node, _boot, _counter}) when node == node(), do: :ok
-  def pass_on(call), do: GenServer.cast(__MODULE__, {:pass_on, call})
+  @spec pass_on(Stop.call(), age_ms :: non_neg_integer()) :: :ok
+  def pass_on({node, _boot, _counter}, _age_ms) when node == node(), do: :ok
+  def pass_on(call, age_ms), do: GenServer.cast(__MODULE__, {:pass_on, call, age_ms})
 
   @doc "A person has reset what these calls stopped: they are repeated no more."
   @spec quiet(:all | [{node(), {integer(), integer()}}]) :: :ok
@@ -49,16 +50,18 @@ defmodule Swarm.Alarm do
   # It has a name that connected nodes can send to, so anything may come here.
   @impl GenServer
   def handle_cast({:repeat, call, times}, s) when times in 1..@times,
-    do: {:noreply, if(Stop.call?(call), do: repeat(s, call, times), else: s)}
+    do: {:noreply, if(Stop.call?(call), do: repeat(s, call, times, now()), else: s)}
 
-  def handle_cast({:pass_on, call}, s),
-    do: {:noreply, if(Stop.call?(call), do: pass_on(s, call), else: s)}
+  def handle_cast({:pass_on, call, age_ms}, s) do
+    whole? = Stop.call?(call) and Stop.age?(age_ms)
+    {:noreply, if(whole?, do: pass_on(s, call, age_ms), else: s)}
+  end
 
   def handle_cast({:quiet, :all}, s), do: {:noreply, %{s | left: %{}}}
 
   def handle_cast({:quiet, calls}, s) do
     heard = %Stop{calls: if(Shape.list?(calls, &match?({_, {_, _}}, &1)), do: calls, else: [])}
-    over = for {call, _left} <- s.left, Stop.call(heard, call) == heard, do: call
+    over = for {call, _times} <- s.left, Stop.call(heard, call) == heard, do: call
     {:noreply, %{s | left: Map.drop(s.left, over)}}
   end
 
@@ -70,9 +73,9 @@ defmodule Swarm.Alarm do
   @impl GenServer
   def handle_info({:again, call}, s) do
     case s.left do
-      %{^call => left} ->
-        send_out(call)
-        {:noreply, repeat(%{s | left: Map.delete(s.left, call)}, call, left - 1)}
+      %{^call => {left, since_ms}} ->
+        send_out(call, now() - since_ms)
+        {:noreply, repeat(%{s | left: Map.delete(s.left, call)}, call, left - 1, since_ms)}
 
       _none ->
         {:noreply, s}
@@ -81,32 +84,34 @@ defmodule Swarm.Alarm do
 
   def handle_info(_unknown, s), do: {:noreply, s}
 
-  defp pass_on(%{left: left} = s, _call) when map_size(left) >= @most, do: s
+  defp pass_on(%{left: left} = s, _call, _age_ms) when map_size(left) >= @most, do: s
 
   # Many robots of this node may have heard it.
-  defp pass_on(s, call) do
+  defp pass_on(s, call, age_ms) do
     case Stop.call(s.heard, call) do
       heard when heard == s.heard ->
         s
 
       heard ->
-        send_out(call)
-        repeat(%{s | heard: heard}, call, @passed_on - 1)
+        send_out(call, age_ms)
+        repeat(%{s | heard: heard}, call, @passed_on - 1, now() - age_ms)
     end
   end
 
-  defp repeat(s, _call, 0), do: s
-  defp repeat(%{left: left} = s, _call, _times) when map_size(left) >= @most, do: s
+  defp repeat(s, _call, 0, _since_ms), do: s
+  defp repeat(%{left: left} = s, _call, _times, _since_ms) when map_size(left) >= @most, do: s
 
-  defp repeat(s, call, times) do
+  defp repeat(s, call, times, since_ms) do
     Process.send_after(self(), {:again, call}, @every_ms)
-    %{s | left: Map.put(s.left, call, times)}
+    %{s | left: Map.put(s.left, call, {times, since_ms})}
   end
 
-  defp send_out(call) do
-    for brake <- Directory.members(:brakes), do: Post.cast(brake, {:estop, call})
-    Swarm.Mesh.cast(:stop, {:estop, call})
+  defp send_out(call, age_ms) do
+    for brake <- Directory.members(:brakes), do: Post.cast(brake, {:estop, call, age_ms})
+    Swarm.Mesh.cast(:stop, {:estop, call, age_ms})
   end
+
+  defp now, do: System.monotonic_time(:millisecond)
 
   # When this VM was started, by the time of day.
   defp boot do

@@ -33,8 +33,10 @@ defmodule Swarm.Brake do
 
   @doc "A call to stop came from a node, by datagram: for all robots of this one."
   @spec hear(node(), term()) :: :ok
-  def hear(_node, {:estop, call} = term) do
-    if Stop.call?(call), do: Enum.each(Names.all(:brake), &GenServer.cast(&1, term))
+  def hear(_node, {:estop, call, age_ms} = term) do
+    if Stop.call?(call) and Stop.age?(age_ms),
+      do: Enum.each(Names.all(:brake), &GenServer.cast(&1, term))
+
     :ok
   end
 
@@ -87,7 +89,8 @@ defmodule Swarm.Brake do
       stop: written(board),
       stamps: Stamp.new(System.system_time(:nanosecond)),
       brakes: nil,
-      name: nil
+      name: nil,
+      reset_ms: nil
     }
 
     {:ok, write(s), {:continue, :enter}}
@@ -117,7 +120,7 @@ defmodule Swarm.Brake do
   def handle_call(_unknown, _from, s), do: {:noreply, s}
 
   @impl GenServer
-  def handle_cast({:estop, call}, s), do: {:noreply, called(s, call)}
+  def handle_cast({:estop, call, age_ms}, s), do: {:noreply, called(s, call, age_ms)}
 
   def handle_cast({:command, request, ref}, s) when is_reference(ref),
     do: {:noreply, command(s, request, ref, nil)}
@@ -170,7 +173,7 @@ defmodule Swarm.Brake do
   defp answer(:estop, s), do: {:ok, become(s, Stop.press(s.stop))}
 
   defp answer({:estop, call}, s) do
-    s = called(s, call)
+    s = called(s, call, 0)
     if s.stop.latched?, do: {:ok, s}, else: {{:error, "#{s.id} was reset meanwhile"}, s}
   end
 
@@ -189,7 +192,7 @@ defmodule Swarm.Brake do
   defp answer(:reset, s) do
     :ok = Gate.reset(s.id)
     Alarm.quiet(s.stop.calls)
-    {:ok, become(s, Stop.reset(s.stop))}
+    {:ok, become(%{s | reset_ms: now()}, Stop.reset(s.stop))}
   end
 
   defp answer(other, s),
@@ -197,16 +200,26 @@ defmodule Swarm.Brake do
       {{:error, "#{inspect(other, limit: 5)} does not stop #{s.id}; stop, disarm and estop do"},
        s}
 
-  defp called(s, call) do
-    with true <- Stop.call?(call),
+  defp called(s, call, age_ms) do
+    with true <- Stop.call?(call) and Stop.age?(age_ms),
          stop when stop != s.stop <- Stop.call(s.stop, call) do
-      s = become(s, stop)
-      Alarm.pass_on(call)
-      s
+      if over?(s, age_ms) do
+        write(%{s | stop: Stop.late(s.stop, call)})
+      else
+        s = become(s, stop)
+        Alarm.pass_on(call, age_ms)
+        s
+      end
     else
       _malformed_or_heard_before -> s
     end
   end
+
+  # Made before a person reset this robot: somebody far away has only now been heard.
+  defp over?(%{reset_ms: nil}, _age_ms), do: false
+  defp over?(%{reset_ms: reset_ms}, age_ms), do: age_ms > now() - reset_ms
+
+  defp now, do: System.monotonic_time(:millisecond)
 
   defp become(%{stop: stop} = s, stop), do: s
 

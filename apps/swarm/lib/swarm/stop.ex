@@ -69,6 +69,22 @@ defmodule Swarm.Stop do
   end
 
   @doc """
+  Remembers a call that was made before a person reset this robot, and is heard for the first time only
+  now: it stops nothing any more.
+
+      iex> call = {:base@hall, 1_700_000_000_000, 1}
+      iex> stop = Swarm.Stop.late(Swarm.Stop.new(), call)
+      iex> Swarm.Stop.call(stop, call).latched?
+      false
+  """
+  @spec late(t(), call()) :: t()
+  def late(%__MODULE__{} = stop, call), do: %{stop | calls: call(stop, call).calls}
+
+  @doc "Whether a term from outside can be the age of a call, in ms: a day at most."
+  @spec age?(term()) :: boolean()
+  def age?(term), do: is_integer(term) and term in 0..86_400_000
+
+  @doc """
   Whether a term from outside is a call to stop.
 
       iex> for term <- [{:base@hall, 1, 1}, {nil, 1, 1}, {:base@hall, 1}], do: Swarm.Stop.call?(term)

@@ -82,7 +82,8 @@ defmodule Swarm.MeshNodes.Absurd do
       for(at <- 0..3, a <- wild(), do: {:hints, [put_elem({1, 1, text, "x"}, at, a)]}) ++
       for(a <- wild(), do: {:rows, [{text, 1, 1, 1, 1, :erlang.term_to_binary({:about, a})}]}) ++
       for(a <- wild(), do: {:have, [{text, [{1, a, 1}, {1, 1, a}]}]}) ++
-      for(at <- 0..2, a <- wild(), do: {:estop, put_elem({node(), 1, 1}, at, a)}) ++ wild()
+      for(at <- 0..2, a <- wild(), do: {:estop, put_elem({node(), 1, 1}, at, a), 0}) ++
+      for(a <- wild(), do: {:estop, {node(), 1, 1}, a}) ++ wild()
   end
 
   defp wild do

@@ -56,23 +56,37 @@ defmodule Swarm.BrakeTest do
   test "all robots of a node hear a call that comes by datagram; junk does nothing" do
     [a, b] = for id <- [:brake_air1, :brake_air2], do: robot(id)
 
-    for junk <- [:x, {:estop, :x}, {:estop, {1, 2, 3}}, {:estop, {nil, 1, 1}}, {:reset, call(1)}] do
+    for junk <- [
+          :x,
+          {:estop, call(1)},
+          {:estop, :x, 0},
+          {:estop, {1, 2, 3}, 0},
+          {:estop, {nil, 1, 1}, 0},
+          {:estop, call(1), -1},
+          {:estop, call(1), nil},
+          {:reset, call(1)}
+        ] do
       assert Brake.hear(:base@hall, junk) == :ok
       GenServer.cast(Names.whereis(a, :brake), junk)
       send(Names.whereis(a, :brake), junk)
     end
 
     refute latched?(a)
-    assert Brake.hear(:base@hall, {:estop, call(7)}) == :ok
+    assert Brake.hear(:base@hall, {:estop, call(7), 0}) == :ok
     for id <- [a, b], do: eventually(fn -> latched?(id) end)
 
     # Repeats, late ones too, do not undo what a person has done.
     assert Swarm.reset() == :ok
-    for counter <- [7, 6, 7], do: Brake.hear(:base@hall, {:estop, call(counter)})
+    for counter <- [7, 6, 7], do: Brake.hear(:base@hall, {:estop, call(counter), 0})
     for id <- [a, b], do: refute(Swarm.ask(id, :ping) != :ok or latched?(id))
     for id <- [a, b], do: assert(%Stop{latched?: false, known: n, cleared: n} = stop_of(id))
+
+    # Nor does one that is heard for the first time now, and was made before; on a node that was cut off, say.
+    far = {:far@hall, 1, 1}
+    assert Brake.hear(:base@hall, {:estop, far, 60_000}) == :ok
+    for id <- [a, b], do: refute(Swarm.ask(id, :ping) != :ok or latched?(id))
     # The next call does.
-    assert Brake.hear(:base@hall, {:estop, call(8)}) == :ok
+    assert Brake.hear(:base@hall, {:estop, call(8), 0}) == :ok
     for id <- [a, b], do: eventually(fn -> latched?(id) end)
     assert Swarm.reset() == :ok
   end
@@ -85,7 +99,7 @@ defmodule Swarm.BrakeTest do
     brake = kill(id, :brake)
     eventually(fn -> (now = Names.whereis(id, :brake)) && now != brake end)
     eventually(fn -> Directory.members({:brake, id}) == [Names.whereis(id, :brake)] end)
-    Brake.hear(:base@hall, {:estop, call(1)})
+    Brake.hear(:base@hall, {:estop, call(1), 0})
     assert Swarm.ask(id, :stop) == :ok
     refute latched?(id)
     assert [gate, pilot] == [Names.whereis(id, :gate), Names.whereis(id, :pilot)]
@@ -96,21 +110,21 @@ defmodule Swarm.BrakeTest do
     :ok = Directory.enter(self(), [:brakes])
     {caller, monitor} = spawn_monitor(fn -> exit({:called, Alarm.sound()}) end)
     assert_receive {:DOWN, ^monitor, :process, ^caller, {:called, call}}
-    for _ <- 1..10, do: assert_receive({:"$gen_cast", {:estop, ^call}})
+    for _ <- 1..10, do: assert_receive({:"$gen_cast", {:estop, ^call, _age}})
     assert latched?(id)
 
     # A person ends it.
     call = Alarm.sound()
-    assert_receive {:"$gen_cast", {:estop, ^call}}
+    assert_receive {:"$gen_cast", {:estop, ^call, _age}}
     assert Swarm.reset() == :ok
     :sys.get_state(Alarm)
-    refute_receive {:"$gen_cast", {:estop, ^call}}, 150
+    refute_receive {:"$gen_cast", {:estop, ^call, _age}}, 150
 
     # Of another node's call each hears from each that heard it, three times.
-    Brake.hear(:base@hall, {:estop, call(1)})
+    Brake.hear(:base@hall, {:estop, call(1), 0})
     far = call(1)
-    for _ <- 1..3, do: assert_receive({:"$gen_cast", {:estop, ^far}})
-    refute_received {:"$gen_cast", {:estop, _more}}
+    for _ <- 1..3, do: assert_receive({:"$gen_cast", {:estop, ^far, _age}})
+    refute_received {:"$gen_cast", {:estop, _more, _age}}
     :ok = Directory.leave(self(), [:brakes])
     assert Swarm.reset() == :ok
   end
