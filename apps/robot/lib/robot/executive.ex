@@ -4,7 +4,8 @@ defmodule Robot.Executive do
   and the percept to the pilot. It never calls anyone, so nobody can hold it up; whatever takes
   long (vision, planning) is a process of its own that writes to the board.
 
-  It starts idle: goals live here, and are gone when it falls.
+  It starts idle: goals live here, and are gone when it falls. The first that it does is to have the gate
+  forget what the one before it wished.
   """
   use GenServer
   alias Hal.{Device, Event}
@@ -37,6 +38,7 @@ defmodule Robot.Executive do
 
   @impl GenServer
   def init({%Config{id: id} = config, sink}) do
+    Gate.forget(id)
     board = Board.find!(id)
     at_ms = Config.now(config)
     Board.put(board, :executive, :doing, %{by: :idle, weight: 0.0, outcome: nil}, at_ms)

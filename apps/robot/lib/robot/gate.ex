@@ -29,6 +29,13 @@ defmodule Robot.Gate do
   @spec wish(robot :: atom(), Twist.t()) :: :ok
   def wish(robot, twist), do: GenServer.cast(Names.via(robot, :gate), {:wish, twist})
 
+  @doc """
+  Whoever wished has fallen, says the one who takes its place: what it wished counts no more. The robot
+  stops, before it is slowly brought to rest by the first wishes of one who knows nothing.
+  """
+  @spec forget(robot :: atom()) :: :ok
+  def forget(robot), do: GenServer.cast(Names.via(robot, :gate), :forget)
+
   @doc "A sink for the drive: what reflexes need goes to the gate at once."
   @spec sense(robot :: atom(), tuple()) :: :ok
   def sense(robot, {kind, _value} = reading) when kind in [:odometry, :sonar, :bumpers, :arming],
@@ -79,6 +86,13 @@ defmodule Robot.Gate do
   def handle_cast({:wish, twist}, s) do
     at_ms = heard(s, {:wish, twist})
     {:noreply, %{s | reflex: Reflex.wish(s.reflex, twist, at_ms)}}
+  end
+
+  def handle_cast(:forget, s) do
+    at_ms = heard(s, :forget)
+    moving? = not Twist.zero?(s.reflex.twist)
+    s = %{s | reflex: Reflex.forget(s.reflex)}
+    {:noreply, if(moving?, do: step(s, at_ms), else: s)}
   end
 
   def handle_cast({:sense, {:arming, _state}}, %{config: %{dry_run: true}} = s),

@@ -114,6 +114,10 @@ defmodule Robot.Reflex do
 
   defp sane?(number), do: is_number(number) and number > -@absurd and number < @absurd
 
+  @doc "Whoever wished is no more: stands until somebody else wishes, and at once, for nobody brakes gently now."
+  @spec forget(t()) :: t()
+  def forget(%__MODULE__{} = reflex), do: %{reflex | wish: nil, wish_at_ms: nil}
+
   @doc "Takes a reading; those that no limit needs are ignored."
   @spec sense(t(), Hal.Drive.reading() | term(), integer()) :: t()
   def sense(%__MODULE__{} = reflex, {:sonar, ranges}, at_ms) when is_list(ranges),

@@ -49,6 +49,14 @@ defmodule Robot.ReflexTest do
     assert Reflex.new(Profile.magellan(), latched?: true).latched?
   end
 
+  test "when whoever wished is no more, it stands at once, not by a ramp" do
+    {_, _, reflex} = run(gate(), Twist.new(0.5, 1.0), 0, 30)
+    assert {twist, [:dead_man], reflex} = reflex |> Reflex.forget() |> Reflex.step(1_500)
+    assert Twist.zero?(twist)
+    assert {%Twist{linear: v}, _, _} = run(reflex, Twist.new(0.5, 0.0), 1_550, 1)
+    assert v > 0
+  end
+
   test "a drive that is not armed stands at once, and begins again from standing" do
     {_, _, reflex} = run(gate(), Twist.new(0.5, 1.0), 0, 30)
 

@@ -42,6 +42,28 @@ defmodule Robot.SupervisorTest do
     assert {:ok, :online, _} = Board.fetch(board, {:health, :drive}, :infinity)
   end
 
+  test "what the executive that fell had wished is forgotten at once, not braked for slowly" do
+    goal = {:goal, :roll, {Acts.Roll, twist: Twist.new(0.5, 0.0)}}
+    id = rolling(:fall9, mission: {Acts.Mission, effects: [goal]})
+    full_speed(id)
+    kill(id, :executive)
+    # Up to the stop nothing but full speed; and from then on nothing but stops.
+    assert until_slower() == 0.0
+    stands(200)
+  end
+
+  # With sonars that see nothing: a robot without them does not go so fast.
+  defp full_speed(id) do
+    send(Names.whereis(id, :drive), {:readings, [{:sonar, List.duplicate(5.1, 16)}]})
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, _}, 400
+    if v < 0.5, do: full_speed(id), else: forget_drives()
+  end
+
+  defp until_slower do
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, _}, 400
+    if v == 0.5, do: until_slower(), else: v
+  end
+
   test "a behaviour raises: executive, pilot and companions restart idle, the gate stops" do
     test = self()
     id = rolling(:fall1, companions: [{Acts.Companion, test: test}])

@@ -72,6 +72,7 @@ defmodule Robot.TraceTest do
 
   defp gate({:wish, twist}, at_ms, reflex), do: {[], Reflex.wish(reflex, twist, at_ms)}
   defp gate({:sense, reading}, at_ms, reflex), do: {[], Reflex.sense(reflex, reading, at_ms)}
+  defp gate(:forget, _at_ms, reflex), do: {[], Reflex.forget(reflex)}
   defp gate(:estop, _at_ms, reflex), do: {[], Reflex.estop(reflex)}
   defp gate(:reset, _at_ms, reflex), do: {[], Reflex.reset(reflex)}
 

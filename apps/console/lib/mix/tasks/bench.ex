@@ -1,12 +1,15 @@
 defmodule Mix.Tasks.Bench do
-  @shortdoc "Measures the demo over many seeds, and the swarm beside bare OTP"
+  @shortdoc "Measures the demo over many seeds, the swarm beside bare OTP, and how fast robots stop"
   @moduledoc """
   `mix bench demo` runs the cases of the main job over many seeds and prints a table in Markdown.
 
   Two runs go at a time; the figures but for the speed are the same on every machine.
 
   `mix bench swarm` measures robots that are nodes of their own on this machine, beside bare OTP:
-  how long it takes to ask all, to find each other, to notice a death. Both have `--help`.
+  how long it takes to ask all, to find each other, to notice a death.
+
+  `mix bench stop` measures how long it takes from a crash, a freeze, a bumper or an emergency stop to the
+  stop on the serial line of a base. All have `--help`.
   """
   use Mix.Task
   alias Console.{Arguments, Bench, Build, Output, Progress, Values}
@@ -27,10 +30,19 @@ defmodule Mix.Tasks.Bench do
     with {:error, lines} <- Bench.Mesh.Main.run(arguments), do: refuse(lines)
   end
 
+  def run(["stop" | arguments]) do
+    Build.update()
+
+    with {:error, lines} <- Bench.Stop.Main.run(arguments), do: refuse(lines)
+  end
+
   def run(arguments) when arguments in [["--help"], ["-h"]], do: help()
 
   def run(_other),
-    do: refuse(["bench what? There are: mix bench demo [options], mix bench swarm [options]"])
+    do:
+      refuse([
+        "bench what? There are: mix bench demo [options], mix bench swarm [options], mix bench stop [options]"
+      ])
 
   defp measure(%{"help" => true}), do: help()
 

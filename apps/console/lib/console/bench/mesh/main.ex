@@ -3,6 +3,7 @@ defmodule Console.Bench.Mesh.Main do
   alias Console.{Arguments, Output, Values}
   alias Console.Bench.Mesh
   alias Console.Bench.Mesh.{Play, Sheet}
+  alias Console.Bench.Vm
 
   @doc "Runs it; errors are lines."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
@@ -20,10 +21,10 @@ defmodule Console.Bench.Mesh.Main do
     note = &Output.progress(output, "bench: " <> &1)
     cases = Map.get(given, "only", Mesh.cases())
     plan = %{cases: cases, share: Map.get(given, "share", 100) / 100, note: note}
-    before = load()
+    before = Vm.load()
     rows = Enum.flat_map(sizes, &Play.rows(&1, if(&1 == :one, do: many, else: &1), plan))
     Output.finish(output)
-    about = %{load_before: before, load_after: load(), schedulers: System.schedulers_online()}
+    about = %{load_before: before, load_after: Vm.load(), schedulers: System.schedulers_online()}
     IO.write(Sheet.draw(rows))
     IO.puts("\n" <> words(about))
     write(given["json"], Sheet.term(rows, about))
@@ -33,14 +34,6 @@ defmodule Console.Bench.Mesh.Main do
     "Bare OTP: the same nodes with :pg and send alone, right before ours. Of fewer than 100 times the second " <>
       "figure is the largest.\nLoad of the machine (1 min): #{about.load_before || "?"} before, " <>
       "#{about.load_after || "?"} after; #{about.schedulers} processors."
-  end
-
-  # Where there is no such file nobody knows.
-  defp load do
-    with {:ok, text} <- File.read("/proc/loadavg"),
-         {load, _rest} <- Float.parse(text),
-         do: load,
-         else: (_unknown -> nil)
   end
 
   defp write(nil, _term), do: :ok

@@ -4,6 +4,7 @@ defmodule Console.Bench.Mesh.Nodes do
   is no part of what is measured. They end when it does.
   """
   alias Console.Bench.Mesh.{Bare, Ours, Watch}
+  alias Console.Bench.Vm
   alias Swarm.Mesh.Secret
 
   @enforce_keys [:name, :node, :peer, :pid, :began_ns]
@@ -67,35 +68,16 @@ defmodule Console.Bench.Mesh.Nodes do
     name = name(fleet, n)
     began_ns = Watch.now_ns()
 
-    {:ok, peer, node} =
-      at_terminal(fn ->
-        :peer.start(%{
-          name: name,
-          host: to_charlist(@host),
-          longnames: true,
-          connection: :standard_io,
-          args: arguments(fleet, schedulers),
-          exec: command(),
-          wait_boot: @boot_ms
-        })
-      end)
+    {peer, node} =
+      Vm.boot(
+        %{name: name, host: to_charlist(@host), longnames: true},
+        ["+S", "#{schedulers}:#{schedulers}"] ++ @emulator ++ @kernel ++ fleet.flags
+      )
 
     code = if fleet.kind == :ours, do: Ours, else: Bare
     :ok = :peer.call(peer, code, :main, [fleet.mesh, robots], @boot_ms)
     pid = to_string(:peer.call(peer, :os, :getpid, []))
     %__MODULE__{name: name, node: node, peer: peer, pid: pid, began_ns: began_ns}
-  end
-
-  # What a node prints comes to whoever started it, which must be a real device: Elixir asks that.
-  defp at_terminal(start) do
-    leader = Process.group_leader()
-    Process.group_leader(self(), Process.whereis(:user))
-
-    try do
-      start.()
-    after
-      Process.group_leader(self(), leader)
-    end
   end
 
   @doc "Starts several at once."
@@ -114,7 +96,7 @@ defmodule Console.Bench.Mesh.Nodes do
   @spec signal(t(), String.t()) :: at_ns :: integer()
   def signal(node, signal) do
     at_ns = Watch.now_ns()
-    _ = System.cmd("kill", ["-#{signal}", node.pid], stderr_to_stdout: true)
+    :ok = Vm.signal(node.pid, signal)
     at_ns
   end
 
@@ -146,24 +128,5 @@ defmodule Console.Bench.Mesh.Nodes do
     _ = System.cmd("kill", ["-KILL" | Enum.map(nodes, & &1.pid)], stderr_to_stdout: true)
     for %{peer: peer} <- nodes, Process.alive?(peer), do: Process.exit(peer, :kill)
     :ok
-  end
-
-  defp arguments(fleet, schedulers) do
-    (["+S", "#{schedulers}:#{schedulers}"] ++
-       @emulator ++ @kernel ++ fleet.flags ++ paths())
-    |> Enum.map(&to_charlist/1)
-  end
-
-  # The code of this build: what runs here runs there.
-  defp paths, do: ["-pa" | Enum.map(:code.get_path(), &to_string/1) |> Enum.filter(&ours?/1)]
-
-  defp ours?(path),
-    do: path =~ ~r"/_build/[^/]+/(consolidated|lib/)" or path =~ ~r"/(elixir|logger)/ebin$"
-
-  # Bound to this process where the build has the program for it: they end also when they are frozen.
-  defp command do
-    erl = System.find_executable("erl")
-    leash = Application.app_dir(:sim, "priv/leash")
-    if File.exists?(leash), do: {to_charlist(leash), [to_charlist(erl)]}, else: to_charlist(erl)
   end
 end
