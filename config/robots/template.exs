@@ -46,6 +46,7 @@
          # and 4654.2, ATRV mini 190000 and 60000.
          # distance: 31_387.0,             # units per metre
          # angle: 4654.2,                  # units per radian
+         # wheel_ratio: 1.0,               # way of the right wheel for the left one's
          # ir_a: 4000.0, ir_b: -2.0,       # infrared: metres are a * V^b; one, or a list of each
          # units per metre of a sonar's range
          range: 1474.0

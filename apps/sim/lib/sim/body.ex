@@ -10,6 +10,11 @@ defmodule Sim.Body do
   error of 0.3 %, of either sign, and adds 1e-6 m2 of variance a metre to each wheel; `:slip` adds
   what skid-steered bases do (R74): a turn to the left goes 5.5 % further than the wheels say, a
   turn to the right 5.5 % less far, and each turn by a further 1.7 % of its own (1.5 degrees in 90).
+
+  Besides, a body may have wheels that its odometry is wrong about, whatever the noise: `wheels` with
+  `distance` (true metres for each one counted), `base` (how much wider the wheels stand than the profile
+  says) and `ratio` (true way of the right wheel for one of the left one, where odometry counts the same);
+  each 1.0 unless given. That is what calibration finds.
   """
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Sim.{Noise, Trig}
@@ -22,10 +27,13 @@ defmodule Sim.Body do
   # Cosine of half a bumper segment, 11.25 degrees.
   @half_segment 0.9807852804032304
 
+  @wheels %{distance: 1.0, base: 1.0, ratio: 1.0}
+
   @enforce_keys [:id, :index, :profile, :pose, :odometry, :gains, :geometry]
   defstruct @enforce_keys ++
               [
                 alive: true,
+                wheels: @wheels,
                 wanted: %Twist{linear: 0.0, turn: 0.0},
                 ramp: {0.0, 0.0},
                 speed: {0.0, 0.0},
@@ -51,6 +59,7 @@ defmodule Sim.Body do
           gains: {float(), float()},
           geometry: binary(),
           alive: boolean(),
+          wheels: %{distance: float(), base: float(), ratio: float()},
           wanted: Twist.t(),
           ramp: {float(), float()},
           speed: {float(), float()},
@@ -81,6 +90,7 @@ defmodule Sim.Body do
       pose: pose,
       odometry: Map.get(robot, :odometry, Pose.new(0, 0)),
       gains: gains(seed, index, noise),
+      wheels: Map.merge(@wheels, Map.new(Map.get(robot, :wheels, []))),
       field_of_view: profile.camera.field_of_view * 1.0,
       geometry: geometry(profile.sonars, profile.sonar_cone),
       infrared: if(robot[:infrared], do: geometry(profile.irs, @ir_cone), else: <<>>)
@@ -187,19 +197,29 @@ defmodule Sim.Body do
     }
   end
 
-  defp measure(_body, way, turn, _key, :off), do: {way, turn}
+  defp measure(%{wheels: @wheels}, way, turn, _key, :off), do: {way, turn}
 
-  defp measure(body, way, turn, {seed, step}, _noise) do
-    base = body.profile.wheel_base
+  # Each wheel goes its true way; what odometry counts is that by the wheel's own factor, and it
+  # reckons with the wheel base that it knows. The factors of unequal wheels have the mean 1.
+  defp measure(body, way, turn, key, noise) do
+    %{distance: distance, base: wider, ratio: ratio} = body.wheels
+    base = body.profile.wheel_base * wider
     {scale, turn_gain} = body.gains
 
     [left, right] =
-      for {wheel, use} <- [{way - turn * base / 2, 0}, {way + turn * base / 2, 1}] do
-        draw = Noise.gauss(Noise.hash(seed, step, body.index, 0x0D0 + use))
-        wheel + :math.sqrt(1.0e-6 * abs(wheel)) * draw
-      end
+      for {wheel, use} <- [{way - turn * base / 2, 0}, {way + turn * base / 2, 1}],
+          do: wheel + shake(body, wheel, key, use, noise)
 
-    {(left + right) / 2 * scale, (right - left) / base * turn_gain}
+    left = left / (distance * 2 / (ratio + 1))
+    right = right / (distance * 2 * ratio / (ratio + 1))
+    {(left + right) / 2 * scale, (right - left) / body.profile.wheel_base * turn_gain}
+  end
+
+  defp shake(_body, _wheel, _key, _use, :off), do: 0.0
+
+  defp shake(body, wheel, {seed, step}, use, _noise) do
+    draw = Noise.gauss(Noise.hash(seed, step, body.index, 0x0D0 + use))
+    :math.sqrt(1.0e-6 * abs(wheel)) * draw
   end
 
   @doc "Turns the camera for `dt_ms`, as fast as the unit can."

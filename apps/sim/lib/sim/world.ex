@@ -46,7 +46,8 @@ defmodule Sim.World do
 
   @doc """
   A world. `:robots` are `%{id:, profile:, pose:}` with the true pose, and `odometry:`, the first
-  reading of the wheels (0, 0, 0 unless given), `infrared: true` for one that has such sensors. Wrong options
+  reading of the wheels (0, 0, 0 unless given), `infrared: true` for one that has such sensors, `wheels:` for
+  one whose odometry is wrong about them (`Sim.Body`). Wrong options
   raise `ArgumentError`.
   """
   @spec new!(keyword()) :: t()

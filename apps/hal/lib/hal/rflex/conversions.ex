@@ -1,23 +1,25 @@
 defmodule Hal.RFlex.Conversions do
   @moduledoc """
   A robot's own numbers between the controller's units and ours. They differ from robot to robot, by 7 %
-  and more for one model, so none has a default, and a robot without them does not arm. Pure.
+  and more for one model, so none of them has a default but the wheels' ratio, and a robot without them does not arm. Pure.
 
   | name | units |
   |---|---|
   | `distance` | per metre driven |
   | `angle` | per radian turned |
   | `range` | per metre of a sonar's range |
+  | `wheel_ratio` | way of the right wheel for the left one's, where the controller counts the same (`Hal.Wheels`); 1.0 unless given |
   | `ir_a`, `ir_b` | of each infrared's law, a number for all or a list (see `Hal.RFlex.Infrared`) |
 
   Other drivers' files of old give distances per millimetre: times 1000.
   """
 
-  defstruct distance: nil, angle: nil, range: nil, ir_a: nil, ir_b: nil
+  defstruct distance: nil, angle: nil, wheel_ratio: 1.0, range: nil, ir_a: nil, ir_b: nil
 
   @type t :: %__MODULE__{
           distance: float() | nil,
           angle: float() | nil,
+          wheel_ratio: float(),
           range: float() | nil,
           ir_a: float() | [float()] | nil,
           ir_b: float() | [float()] | nil

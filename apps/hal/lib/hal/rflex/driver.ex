@@ -8,7 +8,7 @@ defmodule Hal.RFlex.Driver do
   | `:speed` | baud | `115_200` |
   | `:serial` | `pty:`, `module:`, `keep_alive_ms:` of `Hal.Serial` | `[]` |
   | `:profile` | `:magellan`, `:atrv_mini` or a `Hal.Profile` | `:magellan` |
-  | `:conversions` | `distance:` units per metre, `angle:` per radian, `range:` per metre of sonar, `ir_a:`, `ir_b:` (`Hal.RFlex.Conversions`) | none: does not arm |
+  | `:conversions` | `distance:` units per metre, `angle:` per radian, `wheel_ratio:` 0.8 to 1.25, `range:` per metre of sonar, `ir_a:`, `ir_b:` (`Hal.RFlex.Conversions`) | none: does not arm |
   | `:limits` | `max_linear:` m/s, `max_turn:` rad/s, `max_acceleration:` m/s2, `max_turn_acceleration:` rad/s2, none above the profile's; `max_braking:`, `max_turn_braking:` up to 10 | the profile's; braking twice the acceleration |
   | `:bumpers` | `style:` `:bit` or `:address`, `base:` 0 to 255, `count:` 0 to 64, `segments:` list of 0 to 15 | `:bit`, `0x40`, the profile's, see `Hal.RFlex.Bumpers` |
   | `:sonar_banks` | how many are fitted on each board, 0 to 16 | boards of 8 |

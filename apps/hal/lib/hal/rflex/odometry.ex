@@ -24,7 +24,7 @@ defmodule Hal.RFlex.Odometry do
   the one wrong piece.
   """
   import Hal.RFlex, only: [difference: 2]
-  alias Hal.{Pose, Twist}
+  alias Hal.{Pose, Twist, Wheels}
 
   @margin 1.5
   @held_up_s 0.3
@@ -36,23 +36,27 @@ defmodule Hal.RFlex.Odometry do
   @still_s 0.05
 
   @enforce_keys [:distance, :angle, :axes]
-  defstruct @enforce_keys ++ [pose: Pose.new(0, 0), dropped: 0, jumps: 0]
+  defstruct @enforce_keys ++ [wheels: {1.0, 1.0}, pose: Pose.new(0, 0), dropped: 0, jumps: 0]
 
   @typedoc "`dropped` reports, and `jumps` of a counter that were followed without moving."
   @type t :: %__MODULE__{
           distance: float(),
           angle: float(),
           axes: map(),
+          wheels: {base :: float(), ratio :: float()},
           pose: Pose.t(),
           dropped: non_neg_integer(),
           jumps: non_neg_integer()
         }
 
-  @doc "At the origin. Conversions in units per metre and radian, limits in m/s and rad/s."
-  @spec new(float(), float(), float(), float()) :: t()
-  def new(distance, angle, max_linear, max_turn) do
+  @doc """
+  At the origin. Conversions in units per metre and radian, limits in m/s and rad/s, wheels as their
+  base (metres) and ratio (`Hal.Wheels`).
+  """
+  @spec new(float(), float(), float(), float(), {float(), float()}) :: t()
+  def new(distance, angle, max_linear, max_turn, wheels \\ {1.0, 1.0}) do
     axes = %{0 => axis(max_linear * distance), 1 => axis(max_turn * angle)}
-    %__MODULE__{distance: distance, angle: angle, axes: axes}
+    %__MODULE__{distance: distance, angle: angle, axes: axes, wheels: wheels}
   end
 
   @doc "Takes a report; a pair gives the odometry."
@@ -131,8 +135,7 @@ defmodule Hal.RFlex.Odometry do
 
   # Siegwart and Nourbakhsh 2004, section 5.2.4: the chord at the middle heading.
   defp integrate(t, move, turn) do
-    distance = move.driven / t.distance
-    angle = turn.driven / t.angle
+    {distance, angle} = true_step(t, move.driven, turn.driven)
     middle = t.pose.heading + angle / 2
 
     pose =
@@ -143,7 +146,11 @@ defmodule Hal.RFlex.Odometry do
       )
 
     axes = %{0 => %{move | driven: 0, fresh?: false}, 1 => %{turn | driven: 0, fresh?: false}}
-    twist = Twist.new(move.velocity / t.distance, turn.velocity / t.angle)
+    {linear, rate} = true_step(t, move.velocity, turn.velocity)
+    twist = Twist.new(linear, rate)
     {%Hal.Odometry{pose: pose, twist: twist}, %{t | pose: pose, axes: axes}}
   end
+
+  defp true_step(%{wheels: {base, ratio}} = t, move, turn),
+    do: Wheels.correct({move / t.distance, turn / t.angle}, base, ratio)
 end

@@ -31,7 +31,7 @@ defmodule Hal.RFlex.Options do
     clock: {System, :monotonic_time, [:millisecond]}
   ]
   @keys Keyword.keys(@defaults)
-  @conversions [:distance, :angle, :range, :ir_a, :ir_b]
+  @conversions [:distance, :angle, :wheel_ratio, :range, :ir_a, :ir_b]
   @limits [
     :max_linear,
     :max_turn,
@@ -176,6 +176,11 @@ defmodule Hal.RFlex.Options do
 
   defp floats({key, values}) when is_list(values), do: {key, Enum.map(values, &(&1 * 1.0))}
   defp floats({key, value}), do: {key, value && value * 1.0}
+
+  # The two wheels of a base differ by some thousandths; what differs by more is no pair.
+  defp conversion(:wheel_ratio, value) do
+    if number?(value, 0.8, 1.25), do: :ok, else: "a number from 0.8 to 1.25"
+  end
 
   defp conversion(_key, nil), do: :ok
 

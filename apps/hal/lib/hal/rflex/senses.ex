@@ -123,7 +123,14 @@ defmodule Hal.RFlex.Senses do
 
   defp odometry(%{conversions: %{distance: distance, angle: angle}} = options)
        when distance != nil and angle != nil,
-       do: Odometry.new(distance, angle, options.limits.max_linear, options.limits.max_turn)
+       do:
+         Odometry.new(
+           distance,
+           angle,
+           options.limits.max_linear,
+           options.limits.max_turn,
+           {options.profile.wheel_base, options.conversions.wheel_ratio}
+         )
 
   defp odometry(_options), do: nil
 

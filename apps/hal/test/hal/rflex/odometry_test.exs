@@ -187,4 +187,17 @@ defmodule Hal.RFlex.OdometryTest do
     assert {nil, t} = axis(new(), 2, 7, 0)
     assert t == new()
   end
+
+  test "unequal wheels go an arc where the counters say straight on" do
+    t = Odometry.new(@distance, @angle, 0.5, 1.0, {0.36, 1.01})
+    {t, _at, at_ms} = drive(t, {0, 0}, {0, 0}, 1, 0)
+    {t, _at, _at_ms} = drive(t, {0, 0}, {round(0.03 * @distance), 0}, 100, at_ms)
+
+    # (c_right - c_left) / b for each metre.
+    way = 100 * round(0.03 * @distance) / @distance
+    turn = way * (2 * 1.01 / 2.01 - 2 / 2.01) / 0.36
+    assert_in_delta t.pose.heading, turn, 1.0e-4
+    assert_in_delta t.pose.x, way * :math.sin(turn) / turn, 1.0e-4
+    assert_in_delta t.pose.y, way * (1 - :math.cos(turn)) / turn, 1.0e-4
+  end
 end

@@ -1,0 +1,47 @@
+defmodule Robot.Calibration.Drive do
+  @moduledoc """
+  The mission of a robot that is calibrated: it drives one course (`Robot.Behaviour.Course`) and
+  stands. Options: those of the course. Its phase is `:driving`, then `:done` or `:blocked`. Pure.
+
+  Legs for what is measured: `legs/1`.
+  """
+  @behaviour Robot.Mission
+  alias Robot.Behaviour.Course
+
+  @doc """
+  The legs of a distance (metres), of an angle (radians), and of a square, which ends as it began.
+
+      iex> Robot.Calibration.Drive.legs({:distance, 3.0})
+      [go: 3.0]
+      iex> Robot.Calibration.Drive.legs({:square, :cw, 4.0}) |> length()
+      8
+  """
+  @spec legs({:distance, float()} | {:angle, float()} | {:square, :cw | :ccw, float()}) ::
+          [{:go, float()} | {:turn, float()}]
+  def legs({:distance, way}), do: [go: way]
+  def legs({:angle, turn}), do: [turn: turn]
+
+  def legs({:square, direction, side}) do
+    quarter = if direction == :cw, do: -:math.pi() / 2, else: :math.pi() / 2
+    [go: side, turn: quarter] |> List.duplicate(4) |> List.flatten()
+  end
+
+  @impl Robot.Mission
+  def init(_robot, options) do
+    effects = [
+      {:goal, :course, {Course, options}},
+      {:look, 0.0},
+      {:claim, %{phase: :idle, standing: false}}
+    ]
+
+    {:driving, :driving, effects}
+  end
+
+  @impl Robot.Mission
+  def handle({:outcome, :course, outcome}, _phase) do
+    phase = if outcome == 1, do: :done, else: :blocked
+    {phase, phase, [{:goal, :idle, nil}, {:claim, %{phase: :idle, standing: true}}]}
+  end
+
+  def handle(_event, phase), do: {phase, phase, []}
+end
