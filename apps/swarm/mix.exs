@@ -18,7 +18,7 @@ defmodule Swarm.MixProject do
 
   def application, do: [mod: {Swarm.Application, []}, extra_applications: [:logger, :crypto]]
 
-  # Adapters for what Hex has; with MIX_TARGET=hex, say. Nothing here needs them.
+  # Adapters for what Hex has; with MIX_TARGET=robot. Nothing here needs them.
   defp packages(:host), do: []
   defp packages(_target), do: [{:libcluster, "~> 3.5"}, {:phoenix_pubsub, "~> 2.1"}]
 

@@ -52,8 +52,13 @@ defmodule Swarm.Application do
   end
 
   defp begin({_file, config}) do
-    with {:ok, _robot} <- Robot.Fleet.start_robot(Robot.Fleet, config, :permanent), do: :ok
+    with {:ok, _robot} <- Robot.Fleet.start_robot(Robot.Fleet, config, :permanent) do
+      Logger.info("#{config.id} is up; its wheels #{wheels(config.arm)}")
+    end
   end
 
   defp begin(_none), do: :ok
+
+  defp wheels(:manual), do: "stand until a person arms them"
+  defp wheels(:auto), do: "arm by themselves"
 end
