@@ -152,31 +152,28 @@ defmodule System.ReleaseTest do
     here = ~r/^#mag1 idle \(0\.00, 0\.00, 0 deg\) .* DISARMED/
     until(here, ask.(["status"]))
 
-    assert {said, 0} = robot(["rpc", ~s|Swarm.tell(:mag1, "armm")|], environment)
-    assert said =~ ~s({:error, ")
-
     # It moves only once a person has armed it.
-    move = ["rpc", ~s|Swarm.tell(:mag1, "move:0.2:0")|]
-    assert {":ok\n", 0} = robot(move, environment)
+    move = ~s|Swarm.tell(:mag1, "move:0.2:0")|
+    assert {said, 0} = robot(["rpc", ~s|{Swarm.tell(:mag1, "armm"), #{move}}|], environment)
+    assert said =~ ~r/^{{:error, ".*"}, :ok}$/m
     assert speed(server) == 0.0
-    assert until(~r/^:ok$/m, ask.(["rpc", "Swarm.arm(:mag1)"]))
-    assert {":ok\n", 0} = robot(move, environment)
+    until(~r/^{:ok, :ok}$/m, ask.(["rpc", "{Swarm.arm(:mag1), #{move}}"]))
     wait(fn -> speed(server) > 0.1 end)
 
     {_, 0} = System.cmd("kill", ["-KILL", pid])
     wait(fn -> speed(server) == 0.0 end, 1_000)
     refute there?(pid)
-    assert {_said, status} = robot(["status"], environment)
-    assert status != 0
 
     assert {"", 0} = robot(["daemon"], environment)
-    assert pid(ask.(["pid"])) != pid
-    until(here, ask.(["status"]))
-    assert {":ok\n", 0} = robot(move, environment)
     again = pid(ask.(["pid"]))
+    assert again != pid
+    until(here, ask.(["status"]))
+    assert {":ok\n", 0} = robot(["rpc", move], environment)
     assert {"", 0} = robot(["stop"], environment)
     wait(fn -> not there?(again) end)
     assert speed(server) == 0.0
+    assert {said, 1} = robot(["status"], environment)
+    assert said =~ "nodedown"
   end
 
   test "what is wrong is said in a line, and nothing starts", %{folder: folder} do
@@ -289,6 +286,10 @@ defmodule System.ReleaseTest do
       pid = pid(fn -> on_machine("robot pid", context) end)
       assert {"convoy\n", 0} = on_machine("stat -c %U /proc/#{pid}", context)
       assert {"#mag1 idle" <> _, 0} = on_machine("robot status", context)
+
+      other = "setpriv --reuid nobody --regid nogroup --clear-groups robot status"
+      assert {said, 1} = on_machine(other, context)
+      assert said =~ "permission denied); do this as root, or as its owner"
 
       right = File.read!(context.robot)
       File.write!(context.robot, "[]")

@@ -118,6 +118,10 @@ defmodule Swarm.Mesh.Secret do
   defp line(path, "may be read by others" <> _rest = problem),
     do: "the fleet's secret #{shown(path)} #{problem}; close it: chmod 600 #{shell(path)}"
 
+  # Who may not read it shall not replace it.
+  defp line(path, "cannot be read (permission denied)" = problem),
+    do: "the fleet's secret #{shown(path)} #{problem}; do this as root, or as its owner"
+
   defp line(path, problem) do
     command = command(path, Code.ensure_loaded?(Mix), problem != "does not exist")
     "the fleet's secret #{shown(path)} #{problem}; make one: #{command}"
