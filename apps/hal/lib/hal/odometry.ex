@@ -1,8 +1,14 @@
 defmodule Hal.Odometry do
-  @moduledoc "What the wheels say: the pose in the robot's own `odom` frame, and the present speed."
+  @moduledoc """
+  What the wheels say: the pose in the robot's own `odom` frame, and the present speed.
+
+  Poses belong together as long as `frame` is the same. A driver that had to begin again at zero, because
+  its process fell, says another one: between the two nobody knows how far the robot went.
+  """
 
   @enforce_keys [:pose, :twist]
-  defstruct @enforce_keys
+  defstruct @enforce_keys ++ [frame: nil]
 
-  @type t :: %__MODULE__{pose: Hal.Pose.t(), twist: Hal.Twist.t()}
+  @typedoc "`frame`: `nil` of a driver that never begins again."
+  @type t :: %__MODULE__{pose: Hal.Pose.t(), twist: Hal.Twist.t(), frame: reference() | nil}
 end

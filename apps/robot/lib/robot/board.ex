@@ -16,6 +16,7 @@ defmodule Robot.Board do
   | `:estop` | `:brake` | the number of the last e-stop, and of the last one cleared here |
   | `:radio` | `:link` | what was sent, heard, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
+  | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Reflex.frame/1` |
   | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil}` |
   | `:pose` | `:executive` | the estimate in the `map` frame |
   | `:mission` | `:pilot` | `%{state: :idle or {mission, phase}, claim: map}` |
@@ -57,6 +58,7 @@ defmodule Robot.Board do
     ptz: :ptz,
     blobs: :eye,
     driving: :gate,
+    frame: :gate,
     doing: :executive,
     pose: :executive,
     mission: :pilot,

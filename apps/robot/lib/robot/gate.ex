@@ -72,7 +72,8 @@ defmodule Robot.Gate do
           latched?: latched?,
           armed?: armed?(board, config),
           fence: config.fence,
-          start: config.start
+          start: config.start,
+          frame: frame(board)
         ),
       told: nil,
       limits: nil,
@@ -101,7 +102,7 @@ defmodule Robot.Gate do
   def handle_cast({:sense, reading}, s) do
     at_ms = heard(s, {:sense, reading})
     moving? = not Twist.zero?(s.reflex.twist)
-    s = %{s | reflex: Reflex.sense(s.reflex, reading, at_ms)}
+    s = frame(s, Reflex.sense(s.reflex, reading, at_ms), at_ms)
     {:noreply, if(moving? and urgent?(reading), do: step(s, at_ms), else: s)}
   end
 
@@ -132,6 +133,20 @@ defmodule Robot.Gate do
     case Board.fetch(board, :arming, :infinity) do
       {:ok, %{state: state}, _at_ms} -> state == :armed
       :error -> config.arm == :auto
+    end
+  end
+
+  # A gate that falls must not take another frame for the one that its fence is laid in.
+  defp frame(s, reflex, at_ms) do
+    frame = Reflex.frame(reflex)
+    if frame != Reflex.frame(s.reflex), do: Board.put(s.board, :gate, :frame, frame, at_ms)
+    %{s | reflex: reflex}
+  end
+
+  defp frame(board) do
+    case Board.fetch(board, :frame, :infinity) do
+      {:ok, frame, _at_ms} -> frame
+      :error -> nil
     end
   end
 

@@ -9,6 +9,8 @@ defmodule Robot.Localiser do
   landmark a range too. Sightings of the same thing repeat the same errors, so each counts for
   much less than its noise would allow.
 
+  Odometry that begins again in another frame (`Hal.Odometry`) moves the robot nowhere: it goes on from
+  where it was believed to be. The few decimetres of its stop that nobody counted are doubted.
   """
   alias Hal.{Odometry, Pose}
   alias Robot.Localiser.Belief
@@ -23,7 +25,8 @@ defmodule Robot.Localiser do
   @history 12
 
   @enforce_keys [:start]
-  defstruct @enforce_keys ++ [odometry: nil, belief: nil, history: [], seen_ms: nil, anchors: []]
+  defstruct @enforce_keys ++
+              [odometry: nil, frame: nil, belief: nil, history: [], seen_ms: nil, anchors: []]
 
   @typedoc """
   Something of a colour at a place (map frame); `sd` is how well the place is known, in metres.
@@ -39,6 +42,7 @@ defmodule Robot.Localiser do
   @type t :: %__MODULE__{
           start: Pose.t(),
           odometry: Pose.t() | nil,
+          frame: reference() | nil,
           belief: Belief.t() | nil,
           history: [{at_ms :: integer(), odometry :: Pose.t()}],
           seen_ms: integer() | nil,
@@ -61,16 +65,37 @@ defmodule Robot.Localiser do
   def update(localiser, %Percept{odometry: nil} = percept),
     do: {%{percept | pose: nil, blobs_pose: nil}, localiser}
 
-  def update(localiser, %Percept{odometry: %Odometry{pose: odometry}} = percept) do
-    localiser = localiser |> move(odometry) |> see(percept) |> remember(percept.at_ms)
+  def update(localiser, %Percept{odometry: %Odometry{} = odometry} = percept) do
+    localiser =
+      localiser
+      |> framed(odometry.frame)
+      |> move(odometry.pose)
+      |> see(percept)
+      |> remember(percept.at_ms)
+
     blobs_pose = percept.blobs_at_ms && pose_at(localiser, percept.blobs_at_ms)
     {%{percept | pose: localiser.belief.pose, blobs_pose: blobs_pose}, localiser}
   end
 
-  defp move(%{odometry: nil} = localiser, odometry) do
+  defp framed(%{frame: frame} = localiser, frame), do: localiser
+  defp framed(%{belief: nil} = localiser, frame), do: %{localiser | frame: frame}
+
+  # Poses of the frame before mean nothing any more.
+  defp framed(localiser, frame),
+    do: %{
+      localiser
+      | frame: frame,
+        odometry: nil,
+        history: [],
+        belief: Belief.doubt(localiser.belief)
+    }
+
+  defp move(%{odometry: nil, belief: nil} = localiser, odometry) do
     belief = Belief.new(Pose.compose(localiser.start, odometry))
     %{localiser | odometry: odometry, belief: belief}
   end
+
+  defp move(%{odometry: nil} = localiser, odometry), do: %{localiser | odometry: odometry}
 
   defp move(localiser, odometry) do
     step = Pose.relative(localiser.odometry, odometry)

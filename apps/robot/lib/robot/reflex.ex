@@ -23,7 +23,7 @@ defmodule Robot.Reflex do
   `:estop`, `:disarmed`, `:dead_man`, `:refused` and `:bumper` set the speed to zero at once: how hard the wheels
   then brake is the base's own affair. Everything else is continuous.
   """
-  alias Hal.{Pose, Profile, Twist}
+  alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.Reflex.{Body, Fence}
 
   @dead_man_ms 200
@@ -47,6 +47,7 @@ defmodule Robot.Reflex do
                 armed?: true,
                 fence: nil,
                 start: nil,
+                frame: nil,
                 place: nil,
                 twist: %Twist{linear: 0.0, turn: 0.0},
                 at_ms: nil
@@ -63,6 +64,7 @@ defmodule Robot.Reflex do
           armed?: boolean(),
           fence: Fence.t() | nil,
           start: Pose.t() | nil,
+          frame: {:is, reference() | nil} | nil,
           place: {Pose.t(), integer()} | nil,
           twist: Twist.t(),
           at_ms: integer() | nil
@@ -84,21 +86,37 @@ defmodule Robot.Reflex do
   @doc """
   A gate that stands. Options: `latched?` (default false), for a latch that survived a restart;
   `armed?` (default true), until a reading `{:arming, …}` says otherwise; `fence` (`Robot.Reflex.Fence`,
-  default none), with `start`, the pose at which the odometry says zero (default the origin).
+  default none), with `start`, the pose at which the odometry says zero (default the origin), and `frame`, what
+  `frame/1` said of the gate before it.
+
+  A fence believes odometry of one frame only, the first (`Hal.Odometry`). In another one zero is not the
+  start any more but wherever the robot was: that place is not known, and the robot stands until it is started
+  again at its start.
   """
   @spec new(Profile.t(), keyword()) :: t()
   def new(%Profile{} = profile, options \\ []) do
     options =
-      Keyword.validate!(options, latched?: false, armed?: true, fence: nil, start: Pose.new(0, 0))
+      Keyword.validate!(options,
+        latched?: false,
+        armed?: true,
+        fence: nil,
+        start: Pose.new(0, 0),
+        frame: nil
+      )
 
     %__MODULE__{
       profile: profile,
       latched?: options[:latched?] == true,
       armed?: options[:armed?] == true,
       fence: options[:fence],
-      start: options[:start]
+      start: options[:start],
+      frame: options[:frame]
     }
   end
+
+  @doc "The frame of odometry that the fence is laid in; `nil` before the first reading, and without a fence."
+  @spec frame(t()) :: {:is, reference() | nil} | nil
+  def frame(%__MODULE__{frame: frame}), do: frame
 
   @doc "Takes a wish. Anything at all may come: what is no sensible number counts as a wish to stop."
   @spec wish(t(), Twist.t() | term(), integer()) :: t()
@@ -126,8 +144,16 @@ defmodule Robot.Reflex do
   def sense(%__MODULE__{} = reflex, {:bumpers, pressed}, _at_ms) when is_list(pressed),
     do: %{reflex | bumpers: pressed}
 
-  def sense(%__MODULE__{fence: %Fence{}} = reflex, {:odometry, %{pose: %Pose{} = pose}}, at_ms),
-    do: %{reflex | place: {Pose.compose(reflex.start, pose), at_ms}}
+  def sense(%__MODULE__{fence: %Fence{}} = reflex, {:odometry, %Odometry{} = odometry}, at_ms) do
+    case reflex.frame || {:is, odometry.frame} do
+      {:is, frame} when frame == odometry.frame ->
+        place = {Pose.compose(reflex.start, odometry.pose), at_ms}
+        %{reflex | frame: {:is, frame}, place: place}
+
+      _another ->
+        %{reflex | place: nil}
+    end
+  end
 
   def sense(%__MODULE__{} = reflex, {:arming, %{state: state}}, _at_ms),
     do: %{reflex | armed?: state == :armed}

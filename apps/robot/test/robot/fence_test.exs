@@ -185,6 +185,35 @@ defmodule Robot.FenceTest do
     assert :fence in limits
   end
 
+  test "odometry that begins again in another frame is no place: it stands" do
+    profile = Profile.magellan()
+    room = fence({{-3, -2}, {3, 2}})
+    [one, other] = [make_ref(), make_ref()]
+
+    drive = fn gate, frame, x, at_ms ->
+      odometry = %Odometry{pose: Pose.new(x, 0), twist: Twist.zero(), frame: frame}
+
+      gate
+      |> Reflex.sense({:sonar, Body.silence(profile)}, at_ms)
+      |> Reflex.sense({:odometry, odometry}, at_ms)
+      |> Reflex.wish(Twist.new(0.3, 0.0), at_ms)
+      |> Reflex.step(at_ms)
+    end
+
+    assert {%{linear: v}, _, gate} = drive.(gate(room, profile), one, 2.0, 0)
+    assert v > 0
+    # It stands at the line, and its new odometry says that it is in the middle.
+    {_, limits, gate} = drive.(gate, other, 0.0, 100)
+    assert :fence in limits
+    assert {%{linear: 0.0}, [:fence], gate} = drive.(gate, other, 0.0, 200)
+
+    # Nor does the gate that takes its place believe it.
+    next = Reflex.new(profile, fence: room, frame: Reflex.frame(gate))
+    assert {%{linear: 0.0}, [:fence], _} = drive.(next, other, 0.0, 300)
+    assert {%{linear: v}, _, _} = drive.(next, one, 0.0, 300)
+    assert v > 0
+  end
+
   test "the line is where the map has it, wherever the robot was switched on" do
     profile = Profile.magellan()
     room = fence({{10, 10}, {14, 14}})

@@ -62,6 +62,29 @@ defmodule Robot.GateTest do
     rolls()
   end
 
+  test "a gate that starts again does not lay its fence in another frame of odometry" do
+    {:ok, fence} = Robot.Reflex.Fence.new({{-50, -50}, {50, 50}})
+    id = rolling(:gate6, fence: fence)
+    board = Board.find!(id)
+
+    tell = fn frame ->
+      odometry = %Hal.Odometry{pose: Hal.Pose.new(0, 0), twist: @zero, frame: frame}
+      Gate.sense(id, {:odometry, odometry})
+      # The gate has heard it when it answers.
+      Gate.reset(id)
+    end
+
+    tell.(frame = make_ref())
+    assert {:ok, {:is, ^frame}, _} = Board.fetch(board, :frame, :infinity)
+    assert %{reflex: %{place: {_pose, _at_ms}}} = :sys.get_state(Names.via(id, :gate))
+    listen(id, [:robot, :gate, :start])
+    kill(id, :gate)
+    assert_receive {[:robot, :gate, :start], _}
+    tell.(make_ref())
+    assert {:ok, {:is, ^frame}, _} = Board.fetch(board, :frame, :infinity)
+    assert %{reflex: %{place: nil}} = :sys.get_state(Names.via(id, :gate))
+  end
+
   test "a gate that starts again knows that its drive is not armed" do
     id = rolling(:gate5, arm: :manual)
     eventually_limits(id, [:disarmed])

@@ -64,6 +64,25 @@ defmodule Robot.LocaliserTest do
     assert_in_delta percept.pose.heading, :math.pi() / 2 + 0.1, 1.0e-9
   end
 
+  test "odometry that begins again at zero in another frame takes the robot nowhere" do
+    framed = fn pose, frame, at_ms -> put_in(percept(pose, at_ms).odometry.frame, frame) end
+    [one, other] = [make_ref(), make_ref()]
+    localiser = Localiser.new(Pose.new(1, 2))
+    {_, localiser} = Localiser.update(localiser, framed.(Pose.new(0, 0), one, 0))
+    {before, localiser} = Localiser.update(localiser, framed.(Pose.new(3, 0), one, 100))
+    assert before.pose == Pose.new(4, 2)
+
+    # Its blobs are of a time that only poses of the old frame could tell of.
+    again = %{framed.(Pose.new(0, 0), other, 900) | blobs: [], blobs_at_ms: 100}
+    {percept, sure} = Localiser.update(localiser, again)
+    assert percept.pose == before.pose
+    assert percept.blobs_pose == before.pose
+    assert elem(sure.belief.covariance, 0) > elem(localiser.belief.covariance, 0)
+
+    {percept, _} = Localiser.update(sure, framed.(Pose.new(0.5, 0), other, 1_000))
+    assert percept.pose == Pose.new(4.5, 2)
+  end
+
   test "without odometry there is no pose" do
     {percept, _} =
       Localiser.update(Localiser.new(Pose.new(0, 0)), %{

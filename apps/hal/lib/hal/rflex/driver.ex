@@ -43,7 +43,8 @@ defmodule Hal.RFlex.Driver do
 
   Those of `Hal.Drive`. Ranges and bumpers are repeated every 100 ms as long as they hold, for the
   sonars take half a second for a round. The joystick is only read: driving by it is for whoever may drive.
-  Odometry goes on where it was when a line was lost and is open again in the same process.
+  Odometry goes on where it was when a line was lost and is open again in the same process; in another one
+  it begins at zero, in another frame (`Hal.Odometry`).
 
   A controller that sends no wheels for 0.5 s is told again what to send, every second, as it may have been
   switched off and on; one that sends nothing at all for 2 s is the error `:silent`.
@@ -132,7 +133,7 @@ defmodule Hal.RFlex.Driver do
   @impl Hal.Drive
   def terminate(s) do
     # Kept where the device's next opening finds it: odometry that begins again would be a leap.
-    Process.put({__MODULE__, name(s.options)}, s.senses.odometry)
+    Process.put({__MODULE__, name(s.options)}, {s.senses.odometry, s.senses.frame})
     Serial.last_words(s.line, Speech.farewell(s.options))
     Serial.close(s.line)
   end
@@ -154,7 +155,9 @@ defmodule Hal.RFlex.Driver do
     at_ms = apply(m, f, a)
     ref = make_ref()
     Process.send_after(self(), {__MODULE__, ref, :tick}, 0)
-    before = Process.delete({__MODULE__, name(options)})
+
+    # A process that begins knows of no way before: what it counts from now on is a frame of its own.
+    {before, frame} = Process.delete({__MODULE__, name(options)}) || {nil, make_ref()}
     queue = Enum.reduce(Speech.first_words(options), Queue.new(options.pace_ms), &put/2)
     queue = Queue.stop(put({:brake, Command.brake()}, queue), Speech.stop(options))
 
@@ -164,7 +167,7 @@ defmodule Hal.RFlex.Driver do
       ref: ref,
       queue: queue,
       ramp: options.limits,
-      senses: Senses.new(options, before),
+      senses: Senses.new(options, before, frame),
       heard_ms: at_ms,
       bytes_ms: at_ms,
       stepped_ms: at_ms,

@@ -8,15 +8,16 @@ defmodule Hal.RFlex.Senses do
   @most_volts 60.0
 
   @enforce_keys [:odometry, :sonar, :infrared, :bumpers, :home_address, :power_offset]
-  defstruct @enforce_keys ++ [home: %Home{}, brake: nil, motor_ms: nil, counts: %{}]
+  defstruct @enforce_keys ++ [frame: nil, home: %Home{}, brake: nil, motor_ms: nil, counts: %{}]
 
-  @typedoc "`counts`: packets that were `unknown`, `malformed`, or `implausible`."
+  @typedoc "`frame` of the odometry; `counts`: packets that were `unknown`, `malformed`, or `implausible`."
   @type t :: %__MODULE__{}
 
-  @doc "Senses of these options; `before` is the odometry of the same base, if it goes on."
-  @spec new(Options.t(), Odometry.t() | nil) :: t()
-  def new(%Options{} = options, before \\ nil) do
+  @doc "Senses of these options; `before` is the odometry of the same base in the same `frame`, if it goes on."
+  @spec new(Options.t(), Odometry.t() | nil, frame :: reference() | nil) :: t()
+  def new(%Options{} = options, before \\ nil, frame \\ nil) do
     %__MODULE__{
+      frame: frame,
       odometry: before || odometry(options),
       sonar: sonar(options),
       infrared: infrared(options),
@@ -57,8 +58,11 @@ defmodule Hal.RFlex.Senses do
 
   defp axis(senses, report, at_ms) do
     case Odometry.report(senses.odometry, report, at_ms) do
-      {nil, odometry} -> {[], %{senses | odometry: odometry}}
-      {reading, odometry} -> {[{:odometry, reading}], %{senses | odometry: odometry}}
+      {nil, odometry} ->
+        {[], %{senses | odometry: odometry}}
+
+      {reading, odometry} ->
+        {[{:odometry, %{reading | frame: senses.frame}}], %{senses | odometry: odometry}}
     end
   end
 

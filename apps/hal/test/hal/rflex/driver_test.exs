@@ -382,6 +382,24 @@ defmodule Hal.RFlex.DriverTest do
     Serial.close(t.far)
   end
 
+  test "odometry of another process is in another frame", %{link: link} do
+    [one, other] =
+      for _process <- 1..2 do
+        Task.await(
+          Task.async(fn ->
+            t = open(link) |> until(said?(:status)) |> answer(RFlexBase.wheels(1000, 0, 0))
+            t = until(t, told?(:odometry))
+            close(t)
+            {:odometry, odometry} = List.keyfind(t.readings, :odometry, 0)
+            odometry
+          end)
+        )
+      end
+
+    assert one.pose == other.pose
+    assert is_reference(one.frame) and one.frame != other.frame
+  end
+
   test "a line that is lost is an error; opened again, the way goes on", %{link: link} do
     t = open(link) |> until(said?(:status))
     t = t |> answer(RFlexBase.wheels(1000, 0, 0)) |> answer(RFlexBase.wheels(1100, 6277, 100))
@@ -395,6 +413,7 @@ defmodule Hal.RFlex.DriverTest do
     t = open(link) |> answer(RFlexBase.wheels(1600, 6277, 100)) |> until(told?(:odometry))
     assert {:odometry, now} = List.keyfind(t.readings, :odometry, 0)
     assert now.pose == before.pose
+    assert is_reference(now.frame) and now.frame == before.frame
     close(t)
   end
 

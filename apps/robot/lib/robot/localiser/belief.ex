@@ -104,7 +104,11 @@ defmodule Robot.Localiser.Belief do
   defp refuse(%{refused: refused} = belief) when refused < @doubt,
     do: %{belief | refused: refused + 2}
 
-  defp refuse(belief) do
+  defp refuse(belief), do: doubt(belief)
+
+  @doc "The same pose, of which one is less sure by decimetres: something happened that nobody measured."
+  @spec doubt(t()) :: t()
+  def doubt(%__MODULE__{} = belief) do
     {xx, xy, xh, yy, yh, hh} = belief.covariance
     {x, y, heading} = @doubt_sd
 
