@@ -15,6 +15,10 @@ defmodule Hal.Event do
   | `[:hal, :device, :arming]` | `at_ms` | `device`, `driver`, `state`, `why`: whether wheels may turn has changed (`Hal.Arming`) |
   | `[:hal, :device, :refused]` | `at_ms`, `refused` | `device`, `driver`: a speed came for wheels that are not armed, so many by now |
   | `[:hal, :event, :failure]` | | `handler`, `event`, `kind`, `reason`: a handler failed and is detached |
+  | `[:vision, :view, :failed]` | `at_ms` | `view`, `reason`, `line`: what makes pictures for viewers failed, and is started again |
+  | `[:vision, :view, :healed]` | `at_ms` | `view`: it makes pictures again |
+  | `[:vision, :saver, :failed]` | `at_ms` | `folder`, `reason`, `line`: no picture can be saved; tried again |
+  | `[:vision, :saver, :healed]` | `at_ms` | `folder`: pictures are saved again |
   | `[:robot, :dry_run]` | `at_ms` | `robot`, `command`, `line`: what would be done, if this were no dry run |
   | `[:robot, :gate, :start]` | `at_ms` | `robot`, `latched?` |
   | `[:robot, :gate, :limits]` | `at_ms` | `robot`, `limits`: why the speed is limited has changed |

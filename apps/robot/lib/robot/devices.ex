@@ -4,9 +4,10 @@ defmodule Robot.Devices do
 
       Robot.Devices (one_for_one)
       |-- Vision.Eye           the newest frame to blobs (only with a camera)
+      |-- Vision.View          frames to pictures for people, while somebody looks (only with a camera)
       |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and at once to the gate
       |-- Hal.Device :ptz      --> board, and where the camera looked --> eye
-      `-- Hal.Device :camera   --> eye --> board
+      `-- Hal.Device :camera   --> eye --> board, and --> view
 
   The eye is here, and not above the gate, because a picture that it falls over must not take the
   executive along: the blobs on the board grow old, and the robot drives on.
@@ -28,12 +29,15 @@ defmodule Robot.Devices do
     write = fn writer -> {Board, :sense, [board, writer]} end
     to_eye = {Vision.Eye, :frame, [Names.via(id, :eye)]}
     to_aim = {Vision.Eye, :aim, [Names.via(id, :eye)]}
+    demand = Vision.View.demand()
+    to_view = {Vision.View, :frame, [Names.via(id, :view), demand]}
 
     children =
       eye(config, write.(:eye)) ++
+        view(config, demand) ++
         device(config, :drive, [write.(:drive), {Gate, :sense, [id]}]) ++
         device(config, :ptz, [write.(:ptz) | if(config.camera, do: [to_aim], else: [])]) ++
-        device(config, :camera, [{__MODULE__, :health, [board]}, to_eye])
+        device(config, :camera, [{__MODULE__, :health, [board]}, to_eye, to_view])
 
     Supervisor.init(children, strategy: :one_for_one, max_restarts: 200, max_seconds: 5)
   end
@@ -59,6 +63,11 @@ defmodule Robot.Devices do
        name: Names.via(config.id, :eye)}
     ]
   end
+
+  defp view(%Config{camera: nil}, _demand), do: []
+
+  defp view(config, demand),
+    do: [{Vision.View, demand: demand, name: Names.via(config.id, :view)}]
 
   defp device(config, kind, sinks) do
     case Map.fetch!(config, kind) do

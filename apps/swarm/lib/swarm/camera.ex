@@ -1,0 +1,81 @@
+defmodule Swarm.Camera do
+  @moduledoc """
+  What a robot's camera sees, for people, as JPEG (R103).
+
+      {:ok, jpeg} = Swarm.Camera.snapshot(:mag1)
+      File.write!("mag1.jpg", jpeg)
+
+  and as a stream of pictures to this process, which asks for each one after the first, so that it never
+  gets more than it can take:
+
+      {:ok, ref} = Swarm.Camera.subscribe(:mag1, rate: 5)
+      receive do {:picture, ^ref, %Vision.View.Picture{jpeg: jpeg}} -> File.write!("mag1.jpg", jpeg) end
+      Swarm.Camera.next(:mag1, ref)
+      Swarm.Camera.unsubscribe(:mag1, ref)
+
+  Pictures are made only while somebody looks, and do not leave the robot's node: they would crowd out
+  what the robots have to say to each other. On another node each of these is refused in a line; a shell
+  on the robot's own node (`bin/robot remote`) has them. Nothing raises, whatever it is given.
+  """
+  alias Robot.Names
+  alias Swarm.{Directory, Door}
+  alias Vision.View
+
+  @doc "One picture of now as JPEG, or a line that says why there is none. Waits 5 s at most."
+  @spec snapshot(Swarm.robot()) :: {:ok, jpeg :: binary()} | {:error, line :: String.t()}
+  def snapshot(robot) do
+    with {:ok, view} <- view(robot),
+         {:ok, picture} <- View.snapshot(view),
+         do: {:ok, picture.jpeg}
+  end
+
+  @doc """
+  Lets this process look, at most `rate:` pictures a second (0.001 to 30, default 5). `ref` is also a
+  monitor: `{:DOWN, ref, …}` says that the view has ended.
+  """
+  @spec subscribe(Swarm.robot(), keyword()) :: {:ok, reference()} | {:error, line :: String.t()}
+  def subscribe(robot, options \\ []) do
+    with {:ok, view} <- view(robot), do: View.subscribe(view, options)
+  end
+
+  @doc "Asks for the next picture."
+  @spec next(Swarm.robot(), reference()) :: :ok | {:error, line :: String.t()}
+  def next(robot, ref), do: tell(robot, ref, &View.next/2)
+
+  @doc "Ends looking."
+  @spec unsubscribe(Swarm.robot(), reference()) :: :ok | {:error, line :: String.t()}
+  def unsubscribe(robot, ref), do: tell(robot, ref, &View.unsubscribe/2)
+
+  @doc "How many look, how many pictures were made, how often their making failed, and why it last did."
+  @spec status(Swarm.robot()) :: View.status() | {:error, line :: String.t()}
+  def status(robot) do
+    with {:ok, view} <- view(robot), do: View.status(view)
+  end
+
+  defp tell(robot, ref, order) when is_reference(ref) do
+    with {:ok, view} <- view(robot), do: order.(view, ref)
+  end
+
+  defp tell(_robot, other, _order),
+    do: {:error, "#{inspect(other, limit: 5)} is not what subscribe gave"}
+
+  defp view(robot) do
+    with {:ok, [id]} <- one(robot) do
+      case {Names.whereis(id, :view), Names.whereis(id, :robot)} do
+        {view, _robot} when view != nil -> {:ok, view}
+        {nil, nil} -> {:error, elsewhere(id, Directory.whereis(id))}
+        {nil, _robot} -> {:error, "#{id} has no camera"}
+      end
+    end
+  end
+
+  defp one(robots) when is_list(robots) or robots == :all,
+    do: {:error, "one robot is looked through, not #{inspect(robots, limit: 5)}"}
+
+  defp one(robot), do: Door.robots(robot)
+
+  defp elsewhere(id, link) do
+    where = if is_pid(link), do: "on #{node(link)}", else: "on another node"
+    "#{id} is #{where}, and pictures do not leave their node: look from there"
+  end
+end

@@ -1,0 +1,72 @@
+defmodule Swarm.CameraTest do
+  use Swarm.Case, async: false
+  alias Swarm.{Camera, Cluster}
+  alias Vision.View.Picture
+
+  @moduletag if(System.find_executable("ffmpeg"), do: [], else: [skip: "ffmpeg is missing"])
+  @camera {Hal.Camera.FFmpeg, source: "lavfi:testsrc=size=64x48:rate=50"}
+
+  defp colours do
+    {:ok, colours} =
+      Vision.Colours.new([%{name: "Yellow", y: {170, 240}, u: {60, 90}, v: {130, 145}}])
+
+    colours
+  end
+
+  test "what the camera of a robot of this node sees, once and as a stream" do
+    id = robot(:seeing1, camera: @camera, colours: colours())
+    assert {:ok, <<0xFF, 0xD8, _::binary>>} = Camera.snapshot(id)
+    assert {:ok, <<0xFF, 0xD8, _::binary>>} = Camera.snapshot("seeing1")
+
+    assert {:ok, ref} = Camera.subscribe(id, rate: 20)
+
+    for _ <- 1..3 do
+      assert_receive {:picture, ^ref, %Picture{width: 64, jpeg: <<0xFF, 0xD8, _::binary>>}}, 5_000
+      assert Camera.next(id, ref) == :ok
+    end
+
+    assert %{viewers: 1, failed: 0} = Camera.status(id)
+
+    # The view falls alone, and the viewer hears of it.
+    kill(id, :view)
+    assert_receive {:DOWN, ^ref, :process, _, :killed}
+    eventually(fn -> match?({:ok, _}, Camera.snapshot(id)) end)
+    assert %{viewers: 0} = Camera.status(id)
+  end
+
+  test "what cannot be looked at is refused in a line" do
+    id = robot(:seeing2)
+    assert Camera.snapshot(id) == {:error, "seeing2 has no camera"}
+
+    for bad <- [:nobody, "nobody", :all, [], [id], 7, nil, {id}] do
+      assert {:error, line} = Camera.snapshot(bad)
+      assert {:error, ^line} = Camera.subscribe(bad)
+      assert {:error, ^line} = Camera.next(bad, make_ref())
+      refute line =~ "\n"
+    end
+
+    assert {:error, ":x is not what subscribe gave"} = Camera.next(id, :x)
+    robot(:seeing3, camera: {Hal.Camera.FFmpeg, source: "/dev/video77"}, colours: colours())
+    assert {:error, "rate cannot be 0: " <> _} = Camera.subscribe(:seeing3, rate: 0)
+    assert {:error, "the camera is offline (:enoent)"} = Camera.snapshot(:seeing3)
+  end
+
+  @tag :cluster
+  test "pictures do not leave their node: a viewer on another one is refused, whichever way it asks" do
+    [node] = Cluster.start_nodes(1)
+    robot_on(node, :seeing4, camera: @camera, colours: colours())
+    assert {:ok, <<0xFF, 0xD8, _::binary>>} = :erpc.call(node, Camera, :snapshot, [:seeing4])
+    assert {:error, line} = Camera.snapshot(:seeing4)
+    assert line == "seeing4 is on #{node}, and pictures do not leave their node: look from there"
+    assert Camera.subscribe(:seeing4) == {:error, line}
+
+    # And who has the view itself.
+    view = :erpc.call(node, Names, :whereis, [:seeing4, :view])
+    assert {:error, line} = Vision.View.snapshot(view)
+    assert line =~ "the camera is on #{node}, the viewer on #{node()}"
+    assert {:error, ^line} = Vision.View.subscribe(view)
+    assert {:error, ^line} = GenServer.call(view, :snapshot)
+    assert {:error, ^line} = GenServer.call(view, {:subscribe, make_ref(), 100})
+    refute_receive {:picture, _, _}, 100
+  end
+end

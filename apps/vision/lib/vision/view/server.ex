@@ -1,0 +1,192 @@
+defmodule Vision.View.Server do
+  @moduledoc """
+  The process of `Vision.View`: who looks is the matter of `Vision.View.Audience`, what makes the pictures
+  that of `Vision.View.Maker`; here they meet. It never waits for a viewer, the camera or ffmpeg.
+  """
+  use GenServer
+  alias Vision.View.{Audience, Maker}
+
+  @doc "The line for a viewer on another node than the camera's."
+  @spec elsewhere(camera :: node(), viewer :: node()) :: String.t()
+  def elsewhere(camera, viewer),
+    do: "pictures do not leave their node: the camera is on #{camera}, the viewer on #{viewer}"
+
+  @impl GenServer
+  def init(options) do
+    # The end of an ffmpeg is a message.
+    Process.flag(:trap_exit, true)
+    :atomics.put(options.demand, 1, 0)
+
+    {:ok,
+     %{
+       demand: options.demand,
+       audience: Audience.new(options.viewers),
+       people: %{},
+       maker: Maker.new(options.ffmpeg),
+       snapshot_ms: options.snapshot_ms,
+       timer: nil,
+       camera: :online
+     }}
+  end
+
+  @impl GenServer
+  def handle_call(:status, _from, %{maker: maker} = s) do
+    encoder = if maker.encoder, do: :open, else: :closed
+    looking = %{viewers: Audience.size(s.audience), encoder: encoder}
+    {:reply, maker |> Map.take([:made, :failed, :why]) |> Map.merge(looking), s}
+  end
+
+  def handle_call(_request, {pid, _tag}, s) when node(pid) != node(),
+    do: {:reply, {:error, elsewhere(node(), node(pid))}, s}
+
+  def handle_call({:subscribe, ref, every_ms}, {pid, _tag}, s) do
+    case join(s, ref, every_ms) do
+      {:ok, s} ->
+        people = Map.put(s.people, ref, {pid, Process.monitor(pid)})
+        {:reply, :ok, look(%{s | people: people})}
+
+      error ->
+        {:reply, error, s}
+    end
+  end
+
+  def handle_call(:snapshot, from, s) do
+    case join(s, {:once, from}, :once) do
+      {:ok, s} ->
+        Process.send_after(self(), {:too_late, from}, s.snapshot_ms)
+        {:noreply, look(s)}
+
+      error ->
+        {:reply, error, s}
+    end
+  end
+
+  @impl GenServer
+  def handle_cast({:frame, frame}, s), do: {:noreply, s |> begin(frame) |> look()}
+  def handle_cast({:camera, condition}, s), do: {:noreply, %{s | camera: condition}}
+  def handle_cast({:unsubscribe, ref}, s), do: {:noreply, s |> leave(ref) |> look()}
+
+  def handle_cast({:next, ref}, s),
+    do: {:noreply, look(%{s | audience: Audience.ask(s.audience, ref)})}
+
+  # Looked for again when somebody asks again.
+  def handle_cast(:no_frames, s),
+    do: {:noreply, refuse(s, "this camera gives coloured blobs, and no pictures")}
+
+  @impl GenServer
+  def handle_info(:look, s), do: {:noreply, look(%{s | timer: nil})}
+
+  def handle_info({:too_late, from}, s) do
+    if Audience.member?(s.audience, {:once, from}),
+      do: GenServer.reply(from, {:error, why_none(s)})
+
+    {:noreply, look(%{s | audience: Audience.leave(s.audience, {:once, from})})}
+  end
+
+  def handle_info({:DOWN, monitor, :process, _pid, _reason}, s) do
+    gone = for {ref, {_pid, ^monitor}} <- s.people, do: ref
+    {:noreply, gone |> Enum.reduce(s, &leave(&2, &1)) |> look()}
+  end
+
+  def handle_info(message, s) do
+    case Maker.handle(s.maker, message, now()) do
+      {:picture, picture, maker} -> {:noreply, %{s | maker: maker} |> show(picture) |> look()}
+      {:ok, maker} -> {:noreply, %{s | maker: maker}}
+      {:error, line, maker} -> {:noreply, %{s | maker: maker} |> refuse(line) |> look()}
+      # What an encoder that is closed by now had to say.
+      :unknown -> {:noreply, s}
+    end
+  end
+
+  @impl GenServer
+  def terminate(_reason, s), do: Maker.close(s.maker)
+
+  defp join(s, id, every) do
+    with :ok <- Maker.able(s.maker),
+         {:ok, audience} <- Audience.join(s.audience, id, every, now()) do
+      {:ok, %{s | audience: audience}}
+    else
+      {:error, :full} -> {:error, "#{Audience.size(s.audience)} look already, no more can"}
+      error -> error
+    end
+  end
+
+  defp leave(s, ref) do
+    case Map.pop(s.people, ref) do
+      {nil, _people} ->
+        s
+
+      {{_pid, monitor}, people} ->
+        Process.demonitor(monitor, [:flush])
+        %{s | people: people, audience: Audience.leave(s.audience, ref)}
+    end
+  end
+
+  # Asks the camera for a frame if a picture is due, and else sets the clock.
+  defp look(s) do
+    if s.timer, do: Process.cancel_timer(s.timer)
+
+    case wait(s, now()) do
+      0 ->
+        :atomics.put(s.demand, 1, 1)
+        %{s | timer: nil}
+
+      wait ->
+        :atomics.put(s.demand, 1, 0)
+        %{s | timer: if(is_integer(wait), do: Process.send_after(self(), :look, wait))}
+    end
+  end
+
+  defp wait(s, now) do
+    case {Maker.rests(s.maker, now), Audience.due(s.audience, now)} do
+      {:busy, _due} -> :busy
+      {_rests, :never} -> :never
+      {rests, due} -> max(rests, due)
+    end
+  end
+
+  # A frame that was still under way when its last viewer went, or the encoder failed, is dropped.
+  defp begin(s, frame) do
+    now = now()
+
+    with 0 <- wait(s, now), {:error, line, maker} <- Maker.begin(s.maker, frame, now) do
+      refuse(%{s | maker: maker}, line)
+    else
+      {:ok, maker} -> %{s | maker: maker}
+      _not_now -> s
+    end
+  end
+
+  defp show(s, picture) do
+    {ids, audience} = Audience.serve(s.audience, now())
+    for id <- ids, do: hand_over(id, s.people, picture)
+    %{s | audience: audience}
+  end
+
+  defp hand_over({:once, from}, _people, picture), do: GenServer.reply(from, {:ok, picture})
+
+  defp hand_over(ref, people, picture) do
+    {pid, _monitor} = Map.fetch!(people, ref)
+    send(pid, {:picture, ref, picture})
+  end
+
+  # Whoever wants one picture now hears why there is none; those who look go on waiting.
+  defp refuse(s, line) do
+    Enum.reduce(Audience.ids(s.audience), s, fn
+      {:once, from} = id, s ->
+        GenServer.reply(from, {:error, line})
+        %{s | audience: Audience.leave(s.audience, id)}
+
+      _looking, s ->
+        s
+    end)
+  end
+
+  defp why_none(%{camera: {:offline, reason}}),
+    do: "the camera is offline (#{inspect(reason, limit: 5, printable_limit: 80)})"
+
+  defp why_none(s), do: "the camera gave no frame within #{s.snapshot_ms} ms"
+
+  # Not the robot's clock, which may be a simulator's: pictures are made for people.
+  defp now, do: System.monotonic_time(:millisecond)
+end
