@@ -84,9 +84,12 @@ defmodule Hal.Device do
   @spec drive(GenServer.server(), Twist.t()) :: :ok
   def drive(device, %Twist{} = twist), do: GenServer.cast(device, {:drive, twist})
 
-  @doc "Lets the wheels turn. The line says why it does not: what is missing, or that nobody has acknowledged."
+  @doc """
+  Lets the wheels turn. The line says why it does not: what is missing, or that nobody has acknowledged. A
+  device of this node only. Where it says that the drive does not answer, it is not armed later either.
+  """
   @spec arm(GenServer.server()) :: :ok | {:error, line :: String.t()}
-  def arm(device), do: order(device, :arm)
+  def arm(device), do: order(device, {:arm, System.monotonic_time(:millisecond) + @call_ms})
 
   @doc "Stops the wheels, until `arm/1`."
   @spec disarm(GenServer.server()) :: :ok | {:error, line :: String.t()}
@@ -132,6 +135,13 @@ defmodule Hal.Device do
 
   @impl GenServer
   def handle_call(:arming, _from, s), do: {:reply, s.arming, s}
+
+  # Whoever asked has been told by now that nothing came of it, and may stand before the robot.
+  def handle_call({:arm, until_ms}, from, s) do
+    if System.monotonic_time(:millisecond) < until_ms,
+      do: handle_call(:arm, from, s),
+      else: {:reply, {:error, "the drive answers too late"}, s}
+  end
 
   def handle_call(order, _from, %{kind: :drive} = s)
       when order in [:arm, :disarm, :acknowledge] do

@@ -86,6 +86,15 @@ defmodule Hal.ArmingTest do
              :disarmed
   end
 
+  test "a drive that did not answer in time is not armed when it comes to it" do
+    pid = drive([], arm: :manual)
+    :ok = :sys.suspend(pid)
+    assert {:error, "the drive does not answer"} = Device.arm(pid)
+    :ok = :sys.resume(pid)
+    assert %{state: :disarmed} = Device.arming(pid)
+    assert Device.arm(pid) == :ok
+  end
+
   defp drive(options, device \\ []) do
     driver = {Hal.FakeDrive, [test: self(), device: :drive] ++ options}
     options = [kind: :drive, driver: driver, sinks: [{Kernel, :send, [self()]}]] ++ device
