@@ -10,8 +10,7 @@ defmodule Sim.Calibration do
   alias Hal.{Pose, Profile}
   alias Robot.{Mind, Percept, Reflex}
   alias Robot.Behaviour.Course
-  alias Robot.Calibration
-  alias Robot.Calibration.Drive
+  alias Robot.Calibration.{Drive, Model}
   alias Sim.{Noise, World}
 
   @id :mag1
@@ -53,11 +52,11 @@ defmodule Sim.Calibration do
   What the robot's odometry is truly wrong about, the draws of the noise with it: what calibration
   is to find.
   """
-  @spec truth(t()) :: Calibration.t()
+  @spec truth(t()) :: Model.t()
   def truth(%__MODULE__{world: world}) do
     %{wheels: wheels, gains: {scale, turn}} = world.robots[@id]
 
-    %Calibration{
+    %Model{
       distance: wheels.distance / scale,
       base: wheels.base * turn / scale,
       ratio: wheels.ratio
