@@ -1,0 +1,183 @@
+defmodule Console.Calibrate.Live do
+  @moduledoc """
+  Drives a robot of this node along one course, with all that stands between a wish and its wheels: mission,
+  executive, gate, device. A person lets it begin each time; its wheels are armed for this course
+  alone. Whatever is typed meanwhile is an emergency stop, which is held until he says `reset`.
+  """
+  alias Console.Calibrate.Talk
+  alias Console.{Output, Words}
+  alias Hal.Pose
+  alias Robot.{Board, Gate, Pilot}
+  alias Robot.Calibration.Drive
+
+  @look_ms 100
+  @ready_ms 5_000
+  # From a wheel that is told to stand to odometry that says so.
+  @fresh_ms 500
+
+  @type driven :: %{told: Pose.t(), told_turn: float()}
+
+  @doc """
+  Waits until the robot's drive is there; or what it says that is missing.
+  """
+  @spec ready(atom(), non_neg_integer()) :: :ok | {:error, String.t()}
+  def ready(robot, patience_ms \\ @ready_ms) do
+    cond do
+      odometry(robot) != nil -> :ok
+      patience_ms <= 0 -> {:error, "#{robot} tells no odometry: #{why(robot)}"}
+      true -> wait(fn -> ready(robot, patience_ms - @look_ms) end)
+    end
+  end
+
+  defp why(robot) do
+    case entry(robot, {:health, :drive}) do
+      {:offline, reason} ->
+        "its drive is offline (#{inspect(reason, limit: 5, printable_limit: 60)})"
+
+      _online_or_unknown ->
+        with(
+          %{why: line} when line != nil <- entry(robot, :arming),
+          do: line,
+          else: (_ -> "its drive is silent")
+        )
+    end
+  end
+
+  @doc """
+  One course. `{:error, line}` where it was not driven to its end; then the wheels are disarmed.
+  """
+  @spec drive(atom(), keyword(), Talk.t(), Output.t()) :: {:ok, driven()} | {:error, String.t()}
+  def drive(robot, course, talk, output) do
+    Talk.forget(talk)
+
+    with :ok <- Swarm.arm(robot),
+         %{pose: start} <- odometry(robot) || {:error, "#{robot} tells no odometry"},
+         :ok <- Pilot.start(robot, Drive, course) do
+      s = %{
+        robot: robot,
+        talk: talk,
+        output: output,
+        start: start,
+        last: start.heading,
+        turned: 0.0
+      }
+
+      result = watch(s)
+      Pilot.stop(robot)
+      Output.finish(output)
+      disarm(robot, result)
+    else
+      {:error, line} when is_binary(line) -> {:error, line}
+      {:error, reason} -> {:error, "#{robot} does not drive: #{inspect(reason)}"}
+    end
+  end
+
+  defp disarm(robot, result) do
+    case Swarm.disarm(robot) do
+      :ok -> result
+      {:error, line} -> {:error, line}
+    end
+  end
+
+  defp watch(s) do
+    ref = s.talk.ref
+
+    receive do
+      {^ref, word} when word != :eof -> stopped(s)
+    after
+      @look_ms -> s |> look() |> judge()
+    end
+  end
+
+  defp stopped(s) do
+    :ok = Gate.estop(s.robot)
+    Output.finish(s.output)
+    IO.puts("EMERGENCY STOP: #{s.robot} is held")
+
+    with {:ok, "reset"} <- Talk.choose(s.talk, "type reset when it may drive again: ", ["reset"]),
+         do: Gate.reset(s.robot)
+
+    {:error, "stopped by hand"}
+  end
+
+  defp look(s) do
+    case odometry(s.robot) do
+      nil ->
+        s
+
+      %{pose: pose} ->
+        turned = s.turned + Pose.wrap(pose.heading - s.last)
+        %{s | last: pose.heading, turned: turned} |> tell(pose)
+    end
+  end
+
+  defp tell(s, pose) do
+    at = Pose.relative(s.start, pose)
+
+    limits =
+      with %{limits: [_ | _] = limits} <- entry(s.robot, :driving),
+           do: ", limited: #{Enum.join(limits, " ")}",
+           else: (_none -> "")
+
+    Output.progress(
+      s.output,
+      "by odometry #{Words.decimals(at.x, 2)},#{Words.decimals(at.y, 2)} m, turned " <>
+        "#{Words.decimals(s.turned * 180 / :math.pi(), 0)} degrees#{limits}; Enter stops it"
+    )
+
+    s
+  end
+
+  defp judge(s) do
+    case entry(s.robot, :mission) do
+      %{state: {Drive, :driving}} ->
+        watch(s)
+
+      %{state: {Drive, :done}} ->
+        arrived(s)
+
+      %{state: {Drive, :blocked}} ->
+        {:error, "it touched something or came no further#{limits(s)}"}
+
+      _idle_or_gone ->
+        {:error, "the drive was ended by a stop, an emergency stop or a fault"}
+    end
+  end
+
+  defp limits(s) do
+    case {entry(s.robot, :driving), entry(s.robot, :arming)} do
+      {_driving, %{state: state}} when state != :armed -> "; its wheels are #{inspect(state)}"
+      {%{limits: [_ | _] = limits}, _arming} -> "; limited: #{Enum.join(limits, " ")}"
+      _nothing -> ""
+    end
+  end
+
+  # The course ends with wheels that stand.
+  defp arrived(s) do
+    case odometry(s.robot) do
+      nil -> {:error, "it told no odometry at its end"}
+      %{pose: pose} -> {:ok, %{told: Pose.relative(s.start, pose), told_turn: look(s).turned}}
+    end
+  end
+
+  defp odometry(robot) do
+    with {:ok, board} <- Board.find(robot),
+         {:ok, odometry, _at_ms} <- Board.fetch(board, :odometry, @fresh_ms),
+         do: odometry,
+         else: (:error -> nil)
+  end
+
+  defp entry(robot, key) do
+    with {:ok, board} <- Board.find(robot),
+         {:ok, value, _at_ms} <- Board.fetch(board, key, :infinity),
+         do: value,
+         else: (:error -> nil)
+  end
+
+  defp wait(continue) do
+    receive do
+    after
+      @look_ms -> continue.()
+    end
+  end
+end

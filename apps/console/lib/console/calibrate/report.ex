@@ -1,0 +1,116 @@
+defmodule Console.Calibrate.Report do
+  @moduledoc "What a calibration of odometry found, in lines for people. Pure."
+  alias Console.Words
+  alias Robot.Calibration
+  alias Robot.Calibration.{Model, Squares}
+
+  # Of what is found; half of the errors that are wanted, 0.5 % and 0.2 %.
+  @sure %{base: 0.0025, ratio: 0.001}
+  @slip 0.015
+  # What squares leave that wheels explain.
+  @left_m 0.15
+
+  @doc "What was found, and of what."
+  @spec lines(Model.t(), Squares.t() | nil, Calibration.measured()) :: [String.t()]
+  def lines(%Model{} = wheels, squares, measured) do
+    found = found(measured)
+
+    Enum.concat([
+      if(:distance in found,
+        do: ["distance     #{factor(wheels.distance)} of what it tells"],
+        else: []
+      ),
+      if(:base in found,
+        do: ["wheel base   #{factor(wheels.base)} of what it reckons with"],
+        else: []
+      ),
+      if(:ratio in found, do: ["wheel ratio  #{factor(wheels.ratio)} right to left"], else: []),
+      squares(squares),
+      remarks(squares, measured)
+    ])
+  end
+
+  @doc """
+  What these measurements tell of.
+
+      iex> Console.Calibrate.Report.found(%{distances: [{3.0, 3.1}], angles: [], runs: [], side: 4.0})
+      [:distance]
+  """
+  @spec found(Calibration.measured()) :: [:distance | :base | :ratio]
+  def found(measured) do
+    squares = measured.runs != []
+
+    [
+      distance: measured.distances != [],
+      base: squares or measured.angles != [],
+      ratio: ratio?(squares, measured)
+    ]
+    |> Enum.filter(&elem(&1, 1))
+    |> Keyword.keys()
+  end
+
+  # What a base slips in turns looks to squares like unequal wheels.
+  defp ratio?(squares, measured), do: squares and not slips?(measured)
+
+  defp slips?(measured) do
+    slip = Calibration.slip(measured.angles)
+    slip != nil and abs(slip) > @slip
+  end
+
+  @doc "What is left to be said: slip, too few squares, an error that no wheels explain."
+  @spec remarks(Squares.t() | nil, Calibration.measured()) :: [String.t()]
+  def remarks(squares, measured) do
+    slip = Calibration.slip(measured.angles)
+
+    [
+      slips?(measured) &&
+        "turns to the left go #{percent(slip)} further than turns to the right: its wheels slip. Squares " <>
+          "cannot tell that from unequal wheels, so the wheel ratio stays as it is",
+      unsure(squares, length(measured.runs)),
+      squares != nil and squares.after_m > @left_m &&
+        "#{Words.decimals(squares.after_m, 2)} m of the error are not explained by base and ratio: was one " <>
+          "square measured wrongly, or do the wheels slip?"
+    ]
+    |> Enum.filter(& &1)
+  end
+
+  defp unsure(%{sd: %{} = sd}, runs) do
+    worst = Enum.max(for {key, most} <- @sure, do: sd[key] / most)
+
+    if worst > 1,
+      do:
+        "the squares scatter: the wheel base is sure to #{percent(2 * sd.base)}, the ratio to " <>
+          "#{percent(2 * sd.ratio)} only; #{ceil(runs / 2 * worst * worst)} squares each way would do"
+  end
+
+  defp unsure(_squares, _runs), do: false
+
+  defp squares(nil), do: []
+
+  defp squares(%{formulas: formulas} = squares) do
+    sure =
+      if squares.sd,
+        do: " (sure to #{percent(2 * squares.sd.base)} and #{percent(2 * squares.sd.ratio)})",
+        else: ""
+
+    [
+      "squares      end #{Words.decimals(squares.before_m, 3)} m off; " <>
+        "#{Words.decimals(squares.after_m, 3)} m with these wheels#{sure}",
+      "             UMBmark's formulas alone: base #{factor(formulas.base)}, ratio #{factor(formulas.ratio)}"
+    ]
+  end
+
+  @doc """
+  A factor and its distance from one.
+
+      iex> Console.Calibrate.Report.factor(1.0123)
+      "1.0123 (+1.23 %)"
+  """
+  @spec factor(float()) :: String.t()
+  def factor(value) do
+    sign = if value >= 1, do: "+", else: ""
+    "#{Words.decimals(value, 4)} (#{sign}#{percent(value - 1)})"
+  end
+
+  defp percent(share), do: "#{Words.decimals(100 * share, 2)} %"
+end

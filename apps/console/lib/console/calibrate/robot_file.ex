@@ -1,0 +1,97 @@
+defmodule Console.Calibrate.RobotFile do
+  @moduledoc """
+  Puts what was found into a robot file. What changes is told before it is written, and nothing is
+  written that says anything else than before but for these numbers.
+  """
+  alias Console.Calibrate.Talk
+  alias Console.Diff
+
+  @doc "The file, and the conversions of its drive, `nil` for a drive that has none."
+  @spec load(Path.t()) :: {:ok, Robot.File.t(), keyword() | nil} | {:error, [String.t()]}
+  def load(path) do
+    with {:ok, file} <- Robot.File.load(path) do
+      {_driver, options} = file.drive
+      conversions = if known?(file.drive), do: options[:conversions] || []
+      {:ok, file, conversions}
+    end
+  end
+
+  defp known?({driver, options}),
+    do: driver == Hal.RFlex.Driver or is_list(options[:conversions])
+
+  @doc """
+  Shows the change, and writes it when it is wanted: `:always`, or asked for by `talk`, or `:never`. The new
+  file takes the place of the old one at once.
+  """
+  @spec write(Path.t(), keyword(float()), :always | :never | Talk.t()) ::
+          :ok | {:error, String.t()}
+  def write(path, keys, wanted) do
+    with {:ok, old} <- read(path),
+         {:ok, new} <- Robot.File.Edit.conversions(old, keys),
+         :ok <- same?(path, old, new, keys) do
+      IO.puts("#{path}:")
+      Enum.each(Diff.lines(old, new), &IO.puts("  " <> &1))
+      decide(path, new, old == new, wanted)
+    else
+      {:error, line} -> {:error, "#{path}: #{line}; write by hand: conversions: [#{text(keys)}]"}
+    end
+  end
+
+  @doc """
+  The keys as they stand in a robot file.
+
+      iex> Console.Calibrate.RobotFile.text(distance: 31000.5, angle: 4700.25)
+      "distance: 31000.5, angle: 4700.25"
+  """
+  @spec text(keyword(float())) :: String.t()
+  def text(keys), do: Enum.map_join(keys, ", ", fn {key, value} -> "#{key}: #{value}" end)
+
+  defp read(path) do
+    with {:error, reason} <- File.read(path), do: {:error, "#{:file.format_error(reason)}"}
+  end
+
+  # Both are read as a robot would read them.
+  defp same?(path, old, new, keys) do
+    with {:ok, before} <- parse(path, old), {:ok, now} <- parse(path, new) do
+      {driver, options} = now.drive
+      {_driver, was} = before.drive
+
+      expected = Keyword.merge(was[:conversions] || [], keys)
+
+      if Enum.sort(options[:conversions]) == Enum.sort(expected) and
+           %{now | drive: {driver, Keyword.delete(options, :conversions)}} ==
+             %{before | drive: {driver, Keyword.delete(was, :conversions)}},
+         do: :ok,
+         else: {:error, "the numbers cannot be put into it"}
+    else
+      {:error, [line | _]} -> {:error, line}
+    end
+  end
+
+  defp parse(path, text) do
+    folder = Path.dirname(path)
+    colours = fn file, options -> Vision.Colours.read(Path.expand(file, folder), options) end
+    Robot.File.parse(text, file: path, colours: colours)
+  end
+
+  defp decide(path, _new, true, _wanted), do: IO.puts("#{path} says so already")
+  defp decide(path, _new, _same?, :never), do: IO.puts("#{path} not written; --write writes it")
+  defp decide(path, new, _same?, :always), do: replace(path, new)
+
+  defp decide(path, new, _same?, %Talk{} = talk) do
+    case Talk.choose(talk, "write it? (yes, no) ", ["yes", "no"]) do
+      {:ok, "yes"} -> replace(path, new)
+      _no_or_end -> IO.puts("#{path} not written")
+    end
+  end
+
+  defp replace(path, new) do
+    part = path <> ".part"
+
+    with :ok <- File.write(part, new, [:sync]), :ok <- File.rename(part, path) do
+      IO.puts("#{path} written; mix robot.check #{path} shows what it says")
+    else
+      {:error, reason} -> {:error, "#{path} cannot be written: #{:file.format_error(reason)}"}
+    end
+  end
+end
