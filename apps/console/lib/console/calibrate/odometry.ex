@@ -50,7 +50,8 @@ defmodule Console.Calibrate.Odometry do
       | tasks |> Enum.map(&"  #{name(&1)}: #{legs(&1)}") |> Enum.dedup() |> times(tasks)
     ] ++
       [
-        "It needs #{Words.decimals(room + 1, 1)} by #{Words.decimals(room + 1, 1)} m of flat floor, and someone beside it.",
+        "It needs #{Words.decimals(room + 1, 1)} by #{Words.decimals(room + 1, 1)} m of flat floor, and someone " <>
+          "beside it. Clockwise squares lie to the right of its mark, others to the left.",
         "Its wheels turn only when you say go, each time; Enter stops it at once."
       ]
   end
