@@ -146,6 +146,8 @@ defmodule System.ReleaseTest do
 
     assert {said, 0} = robot(["check"], environment)
     assert said =~ "mag1, a Magellan Pro"
+    assert {said, 1} = robot(["halt"], environment)
+    assert said =~ "mag1: has no console: in its file; the power stays on"
     assert {"", 0} = robot(["daemon"], environment)
     pid = pid(ask.(["pid"]))
     # Where it is, its wheels have said.

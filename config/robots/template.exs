@@ -91,6 +91,10 @@
   # Here an e-stop outlives a restart of the machine; the folder must be there.
   # estop_file: "/var/lib/convoy/estop",
 
+  # For `robot halt`, the last thing that this machine does: the controller reads the phrase on the machine's
+  # serial console and cuts the power. Without it, or nil, there is no such command.
+  # console: [port: "/dev/ttyS0", speed: 9600, phrase: "The system is halted"],
+
   # How it meets the others.
   network: [
     # secret_file: "/etc/convoy/secret",

@@ -30,6 +30,7 @@ defmodule Robot.File do
                 fence: nil,
                 dry_run: false,
                 estop_file: nil,
+                console: nil,
                 network: [],
                 policies: []
               ]
@@ -47,6 +48,7 @@ defmodule Robot.File do
           fence: Robot.Reflex.Fence.t() | nil,
           dry_run: boolean(),
           estop_file: Path.t() | nil,
+          console: keyword() | nil,
           network: keyword(),
           policies: keyword()
         }

@@ -13,6 +13,7 @@ defmodule Swarm.Boot do
   without a file is a base station, a node without a robot.
   """
   alias Robot.File.Summary
+  alias Swarm.Machine.Halt
   alias Swarm.Mesh.{Epmd, Secret}
   alias Swarm.Start
 
@@ -91,13 +92,14 @@ defmodule Swarm.Boot do
 
   @doc """
   The answer to `rel/env.sh.eex`: status and lines of standard output and standard error. For `check` they say
-  what the robot is, else they are the settings. Who only wants to reach a running robot, to stop it
+  what the robot is, for `halt` that its controller was told to cut the power (`Swarm.Machine.Halt`), else they are the settings. Who only wants to reach a running robot, to stop it
   say, gets there also when its file has become wrong since.
   """
   @spec answer(command :: String.t(), environment()) ::
           {status :: 0 | 1, output :: [String.t()], errors :: [String.t()]}
   def answer(command, environment) do
     case {robot(environment), command} do
+      {{:ok, robot}, "halt"} -> halt(environment, file(robot))
       {{:ok, robot}, "check"} -> told(environment, file(robot), &about(environment, &1, &2))
       {{:ok, robot}, _command} -> told(environment, file(robot), &shell/2)
       {{:error, lines}, command} -> wrong(command, environment, lines)
@@ -112,6 +114,13 @@ defmodule Swarm.Boot do
     Enum.each(errors, &IO.puts(:stderr, &1))
     Enum.each(output, &IO.puts/1)
     if status != 0, do: System.halt(status), else: :ok
+  end
+
+  defp halt(environment, file) do
+    case Halt.say(file) do
+      {:ok, line} -> {0, [line], []}
+      {:error, line} -> {1, [], ["#{environment["ROBOT"]}: #{line}"]}
+    end
   end
 
   defp wrong(command, environment, lines) when command in ~w(remote rpc stop restart pid) do

@@ -11,7 +11,7 @@ defmodule Swarm.BootTest do
     path = Path.join(folder, "mag1.exs")
     File.write!(path, file)
     secret = Path.join(folder, "secret")
-    {:ok, _secret} = Secret.create(secret, false)
+    {:ok, _secret} = Secret.create(secret, true)
 
     Map.merge(
       %{"ROBOT" => "mag1", "CONVOY_ROBOT_FILE" => path, "CONVOY_SECRET_FILE" => secret},
@@ -116,6 +116,69 @@ defmodule Swarm.BootTest do
     for command <- ~w(start rpc check) do
       assert {1, [], [line]} = Boot.answer(command, environment)
       assert line =~ "does not exist; make one"
+    end
+  end
+
+  describe "halt" do
+    defp wired(folder) do
+      [base, console] = for name <- ~w(base console), do: Path.join(folder, name)
+      {:ok, base_end} = Hal.Serial.open(pty: base)
+      {:ok, console_end} = Hal.Serial.open(pty: console)
+      drive = ~s(drive: {Hal.RFlex.Driver, port: "#{base}"})
+      {base, base_end, console, console_end, "[id: :mag1, profile: :magellan, #{drive}"}
+    end
+
+    defp heard(line, text, until) do
+      if String.ends_with?(text, until) do
+        text
+      else
+        assert_receive message, 2_000
+
+        case Hal.Serial.handle(line, message) do
+          {:data, bytes} -> heard(line, text <> bytes, until)
+          _other -> heard(line, text, until)
+        end
+      end
+    end
+
+    test "says the phrase of the file on its console, and only that", %{tmp_dir: folder} do
+      {_base, base_end, console, console_end, file} = wired(folder)
+      options = ~s(port: "#{console}", phrase: "System halted")
+      environment = machine(folder, file <> ", console: [#{options}]]")
+      assert {0, [line], []} = Boot.answer("halt", environment)
+      assert line == "#{console} was told; the power goes off now"
+      assert heard(console_end, "", "halted\r\n") == "\r\nSystem halted\r\n"
+      for line <- [base_end, console_end], do: Hal.Serial.close(line)
+    end
+
+    test "says nothing while a robot has its base, nor where no console is configured", %{
+      tmp_dir: folder
+    } do
+      {base, base_end, console, console_end, file} = wired(folder)
+      assert {1, [], [line]} = Boot.answer("halt", machine(folder, file <> "]"))
+      assert line == "mag1: has no console: in its file; the power stays on"
+      {:ok, robot} = Hal.Serial.open(port: base)
+      environment = machine(folder, file <> ~s(, console: [port: "#{console}"]]))
+      assert {1, [], [line]} = Boot.answer("halt", environment)
+
+      assert line ==
+               "mag1: a robot runs here: #{base}: another program uses it; the power stays on"
+
+      Hal.Serial.close(robot)
+      assert {0, [_], []} = Boot.answer("halt", environment)
+      # The first that the console hears is of the last call.
+      halted = "\r\nThe system is halted\r\n"
+      assert heard(console_end, "", halted) == halted
+      for line <- [base_end, console_end], do: Hal.Serial.close(line)
+    end
+
+    test "does not say it for a file that is wrong", %{tmp_dir: folder} do
+      environment = machine(folder, file(~s(, console: [port: "/dev/ttyS0", phrase: "häh"])))
+      assert {1, [], [line]} = Boot.answer("halt", environment)
+      assert line =~ "console: console option :phrase cannot be"
+      environment = machine(folder, file(~s(, console: [phrase: "x"])))
+      assert {1, [], [line]} = Boot.answer("halt", environment)
+      assert line =~ "console: serial option :port"
     end
   end
 

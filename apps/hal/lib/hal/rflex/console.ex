@@ -11,6 +11,7 @@ defmodule Hal.RFlex.Console do
   | `:phrase` | 1 to 80 printable ASCII characters | `"The system is halted"` |
   | `:serial` | further options for `Hal.Serial` | `[]` |
 
+  The command is `robot halt` (`Swarm.Machine.Halt`), off unless the robot's file has a `console:`.
   Whoever calls this is about to lose power: file systems are to be unmounted or read-only.
   """
   alias Hal.Serial

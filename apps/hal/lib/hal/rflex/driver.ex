@@ -6,7 +6,7 @@ defmodule Hal.RFlex.Driver do
   |---|---|---|
   | `:port` | the line's device | must be given, or `serial: [pty: LINK]` |
   | `:speed` | baud | `115_200` |
-  | `:serial` | `pty:`, `module:`, `keep_alive_ms:` of `Hal.Serial` | `[]` |
+  | `:serial` | `pty:`, `module:` of `Hal.Serial`; `keep_alive_ms:`, 100 to 300 | `[]` |
   | `:profile` | `:magellan`, `:atrv_mini` or a `Hal.Profile` | `:magellan` |
   | `:conversions` | `distance:` units per metre, `angle:` per radian, `wheel_ratio:` 0.8 to 1.25, `range:` per metre of sonar, `ir_a:`, `ir_b:` (`Hal.RFlex.Conversions`) | none: does not arm |
   | `:limits` | `max_linear:` m/s, `max_turn:` rad/s, `max_acceleration:` m/s2, `max_turn_acceleration:` rad/s2, none above the profile's; `max_braking:`, `max_turn_braking:` up to 10 | the profile's; braking twice the acceleration |

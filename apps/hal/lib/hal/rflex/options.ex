@@ -96,9 +96,17 @@ defmodule Hal.RFlex.Options do
 
   defp serial(given) do
     with :ok <- known([:serial], given[:serial], [:pty, :module, :keep_alive_ms]),
+         :ok <- keep_alive(given[:serial][:keep_alive_ms]),
          {:ok, _options} <- Serial.options(line(given)),
          do: :ok
   end
+
+  # Wheels of a VM that is frozen turn on for that long; and the driver gives a sign of life each 50 ms.
+  defp keep_alive(nil), do: :ok
+  defp keep_alive(ms) when is_integer(ms) and ms in 100..300, do: :ok
+
+  defp keep_alive(other),
+    do: wrong([:serial, :keep_alive_ms], other, "whole milliseconds from 100 to 300")
 
   @doc "The options for `Hal.Serial.open/1`, without last words."
   @spec line(keyword() | t()) :: keyword()

@@ -41,6 +41,7 @@ defmodule Robot.File.Schema do
      fence: {:or, nil, {:with, &fence/2}},
      dry_run: :boolean,
      estop_file: {:or, nil, {:text, "the path of a file"}},
+     console: {:or, nil, {:with, &console/2}},
      network: network(),
      policies: policies()}
   end
@@ -94,6 +95,22 @@ defmodule Robot.File.Schema do
      dist_port: {:whole, 0, 65_535},
      full_mesh: {:whole, 2, 1_000},
      degree: {:whole, 2, 30}}
+  end
+
+  # The driver's own check has the last word.
+  defp console({line, _value} = node, path) do
+    keys =
+      {:keys,
+       port: {:text, "the path of the machine's serial console"},
+       speed: {:whole, 1, 20_000_000},
+       phrase: {:text, "the words at which the controller cuts the power"}}
+
+    with {:ok, options} <- Check.run(keys, node, path) do
+      case Hal.RFlex.Console.options(options) do
+        {:ok, _all} -> {:ok, options}
+        {:error, text} -> {:error, [{line, path, text}]}
+      end
+    end
   end
 
   defp policies do

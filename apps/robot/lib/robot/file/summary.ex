@@ -39,6 +39,7 @@ defmodule Robot.File.Summary do
         arms: arms(robot),
         stays: fence(robot.fence),
         "e-stop": estop(robot.estop_file),
+        power: power(robot.console),
         network: network(robot.network),
         mission: mission(robot.policies)
       )
@@ -128,6 +129,9 @@ defmodule Robot.File.Summary do
 
   defp estop(nil), do: "forgotten when the machine restarts (no estop_file)"
   defp estop(file), do: "kept in #{file}"
+
+  defp power(nil), do: nil
+  defp power(console), do: "cut by the controller when `robot halt` says so on #{console[:port]}"
 
   defp network([]), do: nil
 

@@ -1,0 +1,40 @@
+defmodule Swarm.Machine.Halt do
+  @moduledoc """
+  Has the controller of this machine's robot cut the power of both (`Hal.RFlex.Console`), by the `console:` of
+  the robot's file. Without one, nothing is said to anybody.
+
+  While a robot runs here, it has the line of its base, and the power stays on: a machine that still drives
+  has not halted. A base on another line than its own file says is not found out.
+  """
+  alias Hal.RFlex.Console
+  alias Hal.Serial
+
+  @doc "Says the phrase; or why not, in a line. `nil` is a node without a robot."
+  @spec say(Robot.File.t() | nil) :: {:ok, line :: String.t()} | {:error, line :: String.t()}
+  def say(nil), do: {:error, "has no robot that could be switched off"}
+
+  def say(%Robot.File{console: nil}),
+    do: {:error, "has no console: in its file; the power stays on"}
+
+  def say(%Robot.File{console: console, drive: {_driver, options}}) do
+    with :ok <- idle(options[:port]), :ok <- Console.halt(console) do
+      {:ok, "#{console[:port]} was told; the power goes off now"}
+    end
+  end
+
+  # A base that is not there drives nobody either.
+  defp idle(nil), do: :ok
+
+  defp idle(port) do
+    case Serial.open(port: port) do
+      {:ok, line} ->
+        Serial.close(line)
+
+      {:error, :ebusy} ->
+        {:error, "a robot runs here: #{Serial.explain(:ebusy, port)}; the power stays on"}
+
+      {:error, _not_there} ->
+        :ok
+    end
+  end
+end
