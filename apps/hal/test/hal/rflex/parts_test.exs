@@ -30,6 +30,10 @@ defmodule Hal.RFlex.PartsTest do
       assert Sonar.ranges(sonar, 0) == nil
       sonar = sonar |> Sonar.report([{1, 2000}], 100) |> Sonar.report([{16, 3000}], 200)
       assert Sonar.ranges(sonar, 200) == [1.0, 2.0, 3.0]
+      assert Sonar.ranges(sonar, 1200) == [1.0, 2.0, 3.0]
+      assert Sonar.ranges(sonar, 1201) == nil
+      # The others go on, and the first has said nothing since 0.
+      sonar = Sonar.report(sonar, [{1, 2000}, {16, 3000}], 1500)
       assert Sonar.ranges(sonar, 2000) == [1.0, 2.0, 3.0]
       assert Sonar.ranges(sonar, 2001) == nil
     end
