@@ -66,6 +66,10 @@
   # distance is the share of the picture that a thing fills which is 1 m away.
   colours: "landmark.txt",
 
+  # Keeps pictures of the camera as JPEG, so many a second, the newest of them, in a folder that is there:
+  # [folder: "/var/lib/convoy/pictures", rate: 1.0, files: 1000, megabytes: 100], or nil for none.
+  save_pictures: nil,
+
   # Lower than what its kind can do, never higher.
   limits: [
     # max_turn: 1.0,                       # rad/s; an ATRV mini 0.8

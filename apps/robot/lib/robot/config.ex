@@ -8,6 +8,8 @@ defmodule Robot.Config do
     * `:ptz`, `:camera` - the same of `Hal.Ptz` and `Hal.Camera`, or `nil` for none (the default)
     * `:start` - where it is switched on, in the `map` frame; `%Hal.Pose{}`, default the origin
     * `:colours` - what the camera looks for, `%Vision.Colours{}`; needed with a camera
+    * `:save_pictures` - where and how the camera's pictures are kept, options of `Vision.Saver`; or `nil`,
+      the default
     * `:limits` - what to lower in the profile, as `[max_linear: 0.3]`: `:max_linear` (m/s), `:max_turn`
       (rad/s), `:max_acceleration` (m/s2), `:max_turn_acceleration` (rad/s2)
     * `:mission` - `{module, options}` that `Robot.Pilot.start/1` starts, or `nil`
@@ -36,6 +38,7 @@ defmodule Robot.Config do
                 camera: nil,
                 start: nil,
                 colours: nil,
+                save_pictures: nil,
                 limits: [],
                 mission: nil,
                 companions: [],
@@ -60,6 +63,7 @@ defmodule Robot.Config do
           camera: module_options() | nil,
           start: Pose.t(),
           colours: struct() | nil,
+          save_pictures: keyword() | nil,
           limits: keyword(),
           mission: module_options() | nil,
           companions: [module_options()],
@@ -123,8 +127,15 @@ defmodule Robot.Config do
       nil when config.camera != nil and config.colours == nil ->
         {:error, "robot option :colours cannot be nil: a robot with a camera must have colours"}
 
+      nil when config.camera == nil and config.save_pictures != nil ->
+        {:error, "robot option :save_pictures is for a robot with a camera"}
+
       nil ->
         limit(fenced(config))
+
+      {:save_pictures, value} ->
+        {:error, line} = Vision.Saver.options(value)
+        {:error, "robot option :save_pictures: #{line}"}
 
       {:fence, value} ->
         {:error, allowed} = Fence.new(value)
@@ -168,6 +179,9 @@ defmodule Robot.Config do
 
   defp valid?(:start, pose), do: is_struct(pose, Pose)
   defp valid?(:colours, colours), do: colours == nil or is_struct(colours, Vision.Colours)
+
+  defp valid?(:save_pictures, options),
+    do: options == nil or match?({:ok, _}, Vision.Saver.options(options))
 
   defp valid?(:limits, list) do
     Keyword.keyword?(list) and

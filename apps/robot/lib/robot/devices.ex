@@ -5,6 +5,7 @@ defmodule Robot.Devices do
       Robot.Devices (one_for_one)
       |-- Vision.Eye           the newest frame to blobs (only with a camera)
       |-- Vision.View          frames to pictures for people, while somebody looks (only with a camera)
+      |-- Vision.Saver         keeps such pictures in a folder (only if told to)
       |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and at once to the gate
       |-- Hal.Device :ptz      --> board, and where the camera looked --> eye
       `-- Hal.Device :camera   --> eye --> board, and --> view
@@ -35,6 +36,7 @@ defmodule Robot.Devices do
     children =
       eye(config, write.(:eye)) ++
         view(config, demand) ++
+        saver(config) ++
         device(config, :drive, [write.(:drive), {Gate, :sense, [id]}]) ++
         device(config, :ptz, [write.(:ptz) | if(config.camera, do: [to_aim], else: [])]) ++
         device(config, :camera, [{__MODULE__, :health, [board]}, to_eye, to_view])
@@ -68,6 +70,13 @@ defmodule Robot.Devices do
 
   defp view(config, demand),
     do: [{Vision.View, demand: demand, name: Names.via(config.id, :view)}]
+
+  defp saver(%Config{save_pictures: nil}), do: []
+
+  defp saver(%Config{id: id, save_pictures: options}) do
+    ours = [prefix: Atom.to_string(id), view: Names.via(id, :view), name: Names.via(id, :saver)]
+    [{Vision.Saver, options ++ ours}]
+  end
 
   defp device(config, kind, sinks) do
     case Map.fetch!(config, kind) do

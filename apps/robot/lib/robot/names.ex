@@ -3,7 +3,7 @@ defmodule Robot.Names do
   Names the parts of all robots of this node: a `Registry` keyed `{robot, role}`, so that any
   number of robots live beside each other, and no name is made up at run time.
 
-  Roles: `:robot` (the supervisor), `:board`, `:drive`, `:ptz`, `:camera`, `:eye`, `:view`, `:gate`,
+  Roles: `:robot` (the supervisor), `:board`, `:drive`, `:ptz`, `:camera`, `:eye`, `:view`, `:saver`, `:gate`,
   `:executive`, `:pilot`, and what companions call themselves.
   """
 

@@ -84,6 +84,29 @@ defmodule Robot.FileTest do
     assert {:ok, %{fence: nil, dry_run: false}} = parse("fence: nil")
   end
 
+  test "pictures to keep" do
+    camera = ~s(camera: {Hal.Camera.FFmpeg, source: "testsrc"}, colours: "landmark.txt")
+    keep = ~s(save_pictures: [folder: "/tmp/pictures", rate: 2, files: 10])
+    assert {:ok, robot} = parse("#{camera}, #{keep}", colours: colours())
+    assert robot.save_pictures == [folder: "/tmp/pictures", rate: 2.0, files: 10]
+    assert {:ok, %{save_pictures: [{:folder, "/tmp/pictures"} | _]}} = Robot.File.config(robot)
+    assert {:ok, %{save_pictures: nil}} = parse("#{camera}", colours: colours())
+
+    assert lines("save_pictures: [folder: 7, rate: 0, file: 3]") == [
+             "mag1.exs:2: save_pictures.file: is no key; did you mean files?",
+             "mag1.exs:2: save_pictures.folder: cannot be 7: the path of a folder is allowed",
+             "mag1.exs:2: save_pictures.rate: cannot be 0: a number from 0.001 to 30.0 pictures a second is allowed"
+           ]
+
+    assert lines(keep) == [
+             "mag1.exs:2: save_pictures: is for a robot with a camera, and it has none"
+           ]
+
+    assert lines("#{camera}, save_pictures: [rate: 2]", colours: colours()) == [
+             "mag1.exs:2: save_pictures: folder is missing"
+           ]
+  end
+
   test "fences of no sense are refused" do
     for bad <- [":big", "{1, 2}", "[{0, 0}, {1, 1}]", "[{0, 0}, {1, 0}, :x]", "{{0, 0}, {0, 1}}"] do
       assert [line] = lines("fence: #{bad}")

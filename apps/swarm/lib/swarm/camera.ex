@@ -46,10 +46,18 @@ defmodule Swarm.Camera do
   @spec unsubscribe(Swarm.robot(), reference()) :: :ok | {:error, line :: String.t()}
   def unsubscribe(robot, ref), do: tell(robot, ref, &View.unsubscribe/2)
 
-  @doc "How many look, how many pictures were made, how often their making failed, and why it last did."
-  @spec status(Swarm.robot()) :: View.status() | {:error, line :: String.t()}
+  @doc """
+  How many look, how many pictures were made, how often their making failed, and why it last did. Of a
+  robot that keeps pictures, `saver` says how many there are, and why none are saved at present.
+  """
+  @spec status(Swarm.robot()) :: map() | {:error, line :: String.t()}
   def status(robot) do
-    with {:ok, view} <- view(robot), do: View.status(view)
+    with {:ok, view} <- view(robot), {:ok, [id]} <- one(robot) do
+      case Names.whereis(id, :saver) do
+        nil -> View.status(view)
+        saver -> Map.put(View.status(view), :saver, Vision.Saver.status(saver))
+      end
+    end
   end
 
   defp tell(robot, ref, order) when is_reference(ref) do

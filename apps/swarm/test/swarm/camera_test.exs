@@ -34,6 +34,16 @@ defmodule Swarm.CameraTest do
     assert %{viewers: 0} = Camera.status(id)
   end
 
+  @tag :tmp_dir
+  test "a robot that is told to keeps pictures", %{tmp_dir: folder} do
+    keep = [folder: folder, rate: 20, files: 3]
+    id = robot(:seeing5, camera: @camera, colours: colours(), save_pictures: keep)
+    eventually(fn -> match?(%{saver: %{saved: n, files: 3}} when n > 3, Camera.status(id)) end)
+    assert Enum.any?(File.ls!(folder), &(&1 =~ ~r/^seeing5-\d{8}T\d{6}\.\d{3}Z\.jpg$/))
+    kill(id, :saver)
+    eventually(fn -> match?(%{saver: %{saved: n, files: 3}} when n > 0, Camera.status(id)) end)
+  end
+
   test "what cannot be looked at is refused in a line" do
     id = robot(:seeing2)
     assert Camera.snapshot(id) == {:error, "seeing2 has no camera"}

@@ -9,6 +9,7 @@ defmodule Robot.File.Consistent do
       [
         named(robot, file),
         seen(robot),
+        kept(robot),
         majority(robot.policies),
         colour(robot) | limits(robot) ++ driven(robot)
       ],
@@ -28,6 +29,17 @@ defmodule Robot.File.Consistent do
     do: {["colours"], "is missing: a robot with a camera must have colours"}
 
   defp seen(_robot), do: nil
+
+  defp kept(%{save_pictures: nil}), do: nil
+
+  defp kept(%{camera: nil}),
+    do: {["save_pictures"], "is for a robot with a camera, and it has none"}
+
+  defp kept(%{save_pictures: options}) do
+    with {:error, line} <- Vision.Saver.options(options),
+         do: {["save_pictures"], line},
+         else: (_well -> nil)
+  end
 
   defp majority(policies) do
     if policies[:policy] == :majority and policies[:of] == nil,

@@ -35,6 +35,7 @@ defmodule Robot.File.Schema do
      ptz: {:or, nil, {:with, &Device.check(:ptz, &1, &2)}},
      camera: {:or, nil, {:with, &Device.check(:camera, &1, &2)}},
      colours: {:or, nil, {:with, &Colours.check(&1, &2, context.colours)}},
+     save_pictures: {:or, nil, save_pictures()},
      limits: limits(),
      start: :pose,
      arm: {:one_of, [:manual, :auto]},
@@ -72,6 +73,14 @@ defmodule Robot.File.Schema do
         max_tilt: {:number, 0.0, 1.58, "rad"},
         pan_rate: {:number, 0.01, 10.0, "rad/s"},
         tilt_rate: {:number, 0.01, 10.0, "rad/s"}}}
+  end
+
+  defp save_pictures do
+    {:keys,
+     folder: {:text, "the path of a folder"},
+     rate: {:number, 0.001, 30.0, "pictures a second"},
+     files: {:whole, 1, 100_000},
+     megabytes: {:whole, 1, 1_000_000}}
   end
 
   # That they are not above what the body can do is checked with the profile.

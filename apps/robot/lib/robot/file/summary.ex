@@ -35,6 +35,7 @@ defmodule Robot.File.Summary do
         head: robot.ptz && device(robot.ptz),
         camera: robot.camera && device(robot.camera),
         "looks for": colours(robot.colours),
+        keeps: pictures(robot.save_pictures),
         starts: start(robot.start),
         arms: arms(robot),
         stays: fence(robot.fence),
@@ -53,6 +54,15 @@ defmodule Robot.File.Summary do
 
   defp short(words),
     do: if(String.length(words) > 88, do: String.slice(words, 0, 87) <> "…", else: words)
+
+  defp pictures(nil), do: nil
+
+  defp pictures(options) do
+    {:ok, all} = Vision.Saver.options(options)
+
+    "the newest #{all[:files]} pictures or #{all[:megabytes]} MB in #{all[:folder]}, " <>
+      "#{all[:rate]} a second"
+  end
 
   defp device({module, options}) do
     place = options[:port] || options[:source]
