@@ -18,7 +18,7 @@ defmodule Hal.RFlex.Speech do
         do: limits.max_acceleration,
         else: limits.max_braking
 
-    move = Command.move(trunc(twist.linear * distance), trunc(rate * distance))
+    move = Command.move(trunc(twist.linear * distance), acceleration(distance, rate))
     turn = Command.turn(trunc(twist.turn * angle), trunc(limits.max_turn * angle))
     [{{:speed, 0}, move}, {{:speed, 1}, turn}]
   end
@@ -81,5 +81,6 @@ defmodule Hal.RFlex.Speech do
   defp sonar_on(%{sonar_times: {echo, ping, set}}), do: Command.sonar_on(echo, ping, set)
 
   defp acceleration(nil, _rate), do: @some_acceleration
-  defp acceleration(units, rate), do: trunc(units * rate)
+  # Never 0: a base that is to stand with no braking at all would roll on.
+  defp acceleration(units, rate), do: max(trunc(units * rate), 2)
 end

@@ -156,6 +156,18 @@ defmodule Hal.RFlex.PartsTest do
     end
   end
 
+  test "a stop brakes, however few units a metre has" do
+    for distance <- [1.0e-3, 31.387, 31_387.0] do
+      {:ok, options} =
+        Hal.RFlex.Options.new(port: "/dev/ttyR0", conversions: [distance: distance, angle: 1.0])
+
+      assert [{{:speed, 0}, <<_::binary-6, 0, 0::32, acceleration::32, _::binary>>} | _] =
+               Hal.RFlex.Speech.stop(options)
+
+      assert acceleration >= max(distance * options.limits.max_braking - 2, 1)
+    end
+  end
+
   describe "queue" do
     test "paced, bounded, the newest of each kind, a stop first" do
       queue = Queue.new(12)
