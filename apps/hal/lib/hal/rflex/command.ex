@@ -40,9 +40,18 @@ defmodule Hal.RFlex.Command do
   @spec release() :: binary()
   def release, do: frame(2, 12, <<>>)
 
-  @doc "The first frame of an axis after opening: standing, with this acceleration."
+  @doc """
+  The first frame of an axis after opening: standing, with this acceleration. Neither its bytes nor the
+  checksum are `1B`: see `turn/2`.
+  """
   @spec prepare(axis(), non_neg_integer()) :: binary()
-  def prepare(axis, acceleration), do: frame(2, 7, <<axis, 0::32, acceleration::32, 0::32, 0>>)
+  def prepare(axis, acceleration) do
+    bytes = frame(2, 7, <<axis, 0::32, plain(acceleration)::32, 0::32, 0>>)
+
+    if summed?(bytes) and acceleration > 0,
+      do: prepare(axis, plain(acceleration) - 1),
+      else: bytes
+  end
 
   @doc """
   The speed of axis 0, signed, and the acceleration with which the controller gets there.
@@ -121,11 +130,13 @@ defmodule Hal.RFlex.Command do
     data = <<axis, abs(speed)::32, plain(acceleration)::32, torque::32, direction>>
     bytes = frame(2, 7, data)
 
-    # The last but two is the checksum. Another acceleration has another one.
-    if :binary.at(bytes, byte_size(bytes) - 3) == 0x1B and acceleration > 0,
+    if summed?(bytes) and acceleration > 0,
       do: axis(axis, speed, plain(acceleration) - 1),
       else: bytes
   end
+
+  # The last but two is the checksum. Another acceleration has another one.
+  defp summed?(bytes), do: :binary.at(bytes, byte_size(bytes) - 3) == 0x1B
 
   defp frame(port, opcode, data, id \\ 0),
     do: Packet.encode(%Packet{port: port, id: id, opcode: opcode, data: data})

@@ -90,6 +90,15 @@ defmodule Hal.RFlex.CommandTest do
     end
   end
 
+  test "nor does the first frame of an axis" do
+    for axis <- [0, 1], acceleration <- Enum.concat(1..20_000, 0x1AFFF0..0x1C0010//7) do
+      <<0x1B, 2, body::binary-19, 0x1B, 3>> = Command.prepare(axis, acceleration)
+      assert :binary.match(body, <<0x1B>>) == :nomatch
+      <<_head::binary-5, 0::32, given::32, _::binary>> = body
+      assert (acceleration - given) in 0..0x10002
+    end
+  end
+
   defp speed(bytes) do
     {[%Packet{data: <<_axis, speed::32, _::64, direction>>}], _} =
       Decoder.feed(Decoder.new(), bytes)
