@@ -100,7 +100,7 @@ defmodule Robot.Board do
     :ok
   end
 
-  @doc "A sink for `Hal.Device` and `Vision.Eye`: writes a reading, now, or blobs at the time of their picture."
+  @doc "A sink for `Hal.Device` and `Vision.Eye`: writes a reading, now, or blobs at the time of their picture; leaves alone what it does not know."
   @spec sense(t(), writer(), reading :: tuple()) :: :ok
   def sense(board, device, {:health, device, {condition, since_ms}}),
     do: put(board, device, {:health, device}, condition, since_ms)
@@ -110,7 +110,10 @@ defmodule Robot.Board do
     put(board, :eye, :blobs, %{blobs: blobs, pan: pan, field_of_view: view}, at_ms)
   end
 
-  def sense(board, device, {key, value}), do: put(board, device, key, value, now(board))
+  # What only a driver of its own knows is nobody's here, and no reason for it to fall.
+  def sense(board, device, {key, value}) do
+    if writer(key), do: put(board, device, key, value, now(board)), else: :ok
+  end
 
   @doc "Takes an entry off, for instance of a peer whose place was seen to be empty."
   @spec delete(t(), writer(), key :: term()) :: :ok

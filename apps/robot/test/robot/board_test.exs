@@ -37,6 +37,10 @@ defmodule Robot.BoardTest do
         do: Board.sense(board, :drive, reading)
 
     assert {:ok, 1.5, _now} = Board.fetch(board, :home, 1_000)
+    # What a driver of somebody else's says is left alone, what is another's still is.
+    assert Board.sense(board, :drive, {:temperature, 41.0}) == :ok
+    refute Map.has_key?(Board.entries(board), :temperature)
+    assert_raise ArgumentError, fn -> Board.sense(board, :drive, {:pose, nil}) end
     Board.sense(board, :drive, {:health, :drive, {{:offline, :enoent}, 5}})
     assert {:ok, 24.0, _now} = Board.fetch(board, :power, 1_000)
     assert {:ok, {:offline, :enoent}, 5} = Board.fetch(board, {:health, :drive}, :infinity)
