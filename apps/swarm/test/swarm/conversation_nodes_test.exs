@@ -9,7 +9,9 @@ defmodule Swarm.ConversationNodesTest do
     for {node, n} <- Enum.with_index(nodes) do
       name = Enum.at([:talk_n0, :talk_n1, :talk_n2, :talk_n3], n)
       [pid] = :erpc.call(node, Answerers, :start, [[name], :far])
+      # By the second it is found; they come one after the other.
       eventually(fn -> pid in Directory.members({:service, :far}) end)
+      eventually(fn -> pid in Directory.members({:service, :far, name}) end)
       {{name, :far}, pid}
     end
   end
