@@ -123,7 +123,12 @@ defmodule Console.Bench.Stop.Play do
 
   # What is touched moves away: that it rolls backwards then is as it should be.
   defp trial(:bumper, s) do
-    stop = stop(fn -> touch(s, [0]) && reported() end)
+    stop =
+      stop(fn ->
+        :ok = touch(s, [0])
+        reported()
+      end)
+
     touch(s, [])
     {%{stop | rolled?: false}, s}
   end
