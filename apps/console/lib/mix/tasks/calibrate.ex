@@ -50,6 +50,7 @@ defmodule Mix.Tasks.Calibrate do
   defp finish(:ok), do: :ok
   defp finish({:error, lines}), do: refuse(lines)
 
+  @spec refuse(String.t() | [String.t()]) :: no_return()
   @spec refuse(String.t() | [String.t()], String.t() | nil) :: no_return()
   defp refuse(lines, more \\ nil) do
     for line <- List.wrap(lines) ++ List.wrap(more), do: IO.puts(:stderr, "calibrate: #{line}")
