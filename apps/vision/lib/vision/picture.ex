@@ -10,24 +10,57 @@ defmodule Vision.Picture do
   @black {0, 0, 0}
   @white {255, 255, 255}
 
-  @doc "The frame as RGB bytes with the blobs drawn in."
-  @spec draw(Frame.t(), [Blob.t()], Colours.t()) :: binary()
-  def draw(%Frame{width: width} = frame, blobs, %Colours{classes: classes}) do
+  @doc """
+  The frame as RGB bytes with the blobs drawn in. Options: `classified: true` leaves colour to the pixels
+  that are taken for one of the colours, which shine in it, and makes all others dark and grey; `boxes`, white
+  boxes `{left, top, right, bottom}`.
+  """
+  @spec draw(Frame.t(), [Blob.t()], Colours.t(), keyword()) :: binary()
+  def draw(
+        %Frame{width: width} = frame,
+        blobs,
+        %Colours{classes: classes} = colours,
+        options \\ []
+      ) do
+    options = Keyword.validate!(options, classified: false, boxes: [])
+
+    boxes =
+      for {left, top, right, bottom} <- options[:boxes], do: box(left, top, right, bottom, @white)
+
+    paint = if options[:classified], do: &classified(&1, colours), else: &Rgb.from_yuv/1
     shown = Map.new(classes, &{&1.name, &1.rgb})
     # Largest last, so that its label stays readable.
     ink =
-      blobs |> Enum.reverse() |> Enum.flat_map(&strokes(&1, shown[&1.colour], width)) |> Map.new()
+      (List.flatten(boxes) ++
+         (blobs |> Enum.reverse() |> Enum.flat_map(&strokes(&1, shown[&1.colour], width))))
+      |> Map.new()
 
     for {yuv, index} <- Enum.with_index(Pixels.yuv(frame)), into: <<>> do
       place = {rem(index, width), div(index, width)}
-      {r, g, b} = Map.get_lazy(ink, place, fn -> Rgb.from_yuv(yuv) end)
+      {r, g, b} = Map.get_lazy(ink, place, fn -> paint.(yuv) end)
       <<r, g, b>>
     end
   end
 
-  @doc "Writes the picture as PNG or JPEG by the ending of `path`; the error is one line."
-  @spec write(Path.t(), Frame.t(), [Blob.t()], Colours.t()) :: :ok | {:error, String.t()}
-  def write(path, %Frame{} = frame, blobs, %Colours{} = colours) do
+  # The least bit of a mask is the first class; its colour is made for showing.
+  defp classified({y, _u, _v} = yuv, %Colours{classes: classes} = colours) do
+    mask = Colours.mask(colours, yuv)
+
+    class =
+      Enum.find(Enum.with_index(classes), fn {_class, k} -> Bitwise.band(mask, 2 ** k) != 0 end)
+
+    case class do
+      nil -> Rgb.from_yuv({div(y, 3), 128, 128})
+      {%{rgb: rgb}, _k} -> rgb
+    end
+  end
+
+  @doc """
+  Writes the picture as PNG or JPEG by the ending of `path`; options as of `draw/4`. The error is one line.
+  """
+  @spec write(Path.t(), Frame.t(), [Blob.t()], Colours.t(), keyword()) ::
+          :ok | {:error, String.t()}
+  def write(path, %Frame{} = frame, blobs, %Colours{} = colours, options \\ []) do
     raw =
       Path.join(
         System.tmp_dir!(),
@@ -35,7 +68,7 @@ defmodule Vision.Picture do
       )
 
     try do
-      File.write!(raw, draw(frame, blobs, colours))
+      File.write!(raw, draw(frame, blobs, colours, options))
       encode(raw, path, frame)
     after
       File.rm(raw)

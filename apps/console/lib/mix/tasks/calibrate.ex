@@ -81,5 +81,32 @@ defmodule Mix.Tasks.Calibrate do
     """
   end
 
-  defp colour(_words), do: refuse("not yet")
+  defp colour(words) do
+    case Console.Calibrate.ColourOptions.parse(words) do
+      {:ok, options} -> finish(Console.Calibrate.Colour.run(options))
+      {:error, lines} -> refuse(lines, "mix calibrate colour --help lists all options")
+      :help -> IO.puts(colour_help())
+    end
+  end
+
+  defp colour_help do
+    """
+    Finds the limits of a colour from places in a picture that show it, and tells what they do there.
+
+        mix calibrate colour SOURCE --box X,Y,WIDTH,HEIGHT --name NAME [options]
+
+    SOURCE is a picture or video file, a stream (rtsp://…), a camera (/dev/video0), or sim, a simulated camera.
+    Outliers in a box are left out (edges, glare, background in its corners); what is left is widened
+    by what a change of light does, as far as nothing else in the picture is taken for the colour.
+
+    #{Console.Arguments.help(Console.Calibrate.ColourOptions.table())}
+
+    Examples:
+
+        mix calibrate colour /dev/video0 --box 140,90,40,60 --name YellowLandmark --picture look.png
+        mix calibrate colour photo.jpg --point 160,120 --point 170,140 --name Red --colours config/robots/landmark.txt
+        mix calibrate colour tour.avi --frames 5 --point 160,120 --box 120,80,80,80 --name Ball --light 20
+        mix calibrate colour sim --box 128,80,20,60 --name YellowLandmark --metres 2 --picture look.png
+    """
+  end
 end

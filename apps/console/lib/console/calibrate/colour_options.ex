@@ -1,0 +1,137 @@
+defmodule Console.Calibrate.ColourOptions do
+  @moduledoc "The command line of `mix calibrate colour`: words in, a checked map or lines out. Pure."
+  alias Console.{Arguments, Values}
+
+  @type t :: %{
+          source: String.t(),
+          places: [Vision.Calibration.Sample.place(), ...],
+          name: String.t(),
+          colours: Path.t() | nil,
+          write: boolean(),
+          picture: Path.t() | nil,
+          frames: pos_integer() | nil,
+          tolerance: :auto | float(),
+          min_area: pos_integer(),
+          metres: float() | nil
+        }
+
+  @doc "The options, as `Console.Arguments` has them."
+  @spec table() :: [Arguments.option()]
+  def table do
+    [
+      {"box", "X,Y,W,H", &numbers(&1, 4, "X,Y,WIDTH,HEIGHT in pixels from the top left"),
+       "a box that shows the thing and little else; may be repeated"},
+      {"point", "X,Y", &numbers(&1, 2, "X,Y in pixels from the top left"),
+       "a point that shows it (5 by 5 pixels); may be repeated. With points and\nboxes the points say what colour, the boxes how it varies"},
+      {"name", "NAME", &name/1, "of the colour, one word"},
+      {"colours", "FILE", &file/1,
+       "the colour file that it is put into; one that is not there is made"},
+      {"write", nil, nil, "writes it without asking; what changes is told"},
+      {"picture", "FILE", &picture/1,
+       "a preview, .png or .jpg: what is taken for the colour shines, all else is\ndark and grey; its blobs and your boxes are outlined"},
+      {"frames", "N", &Values.whole(&1, 1..100),
+       "looks at so many frames together (1 of files, 10 of cameras)"},
+      {"light", "PERCENT", &light/1,
+       "so much more or less light is put up with (auto: the most, up to 40,\nwith which nothing else in the picture is found)"},
+      {"min-area", "PIXELS", &Values.whole(&1, 1..1_000_000), "smaller blobs do not count (20)"},
+      {"metres", "METRES", &Values.number(&1, 0.1, 20),
+       "the thing is so far away: tells the robot file's distance constant"},
+      {"help", nil, nil, "this text"}
+    ]
+  end
+
+  @doc """
+  Reads the words after `colour`.
+
+      iex> {:ok, options} = Console.Calibrate.ColourOptions.parse(~w(a.png --box 10,20,60,80 --name Red))
+      iex> {options.source, options.places, options.tolerance}
+      {"a.png", [box: {10, 20, 60, 80}], :auto}
+      iex> Console.Calibrate.ColourOptions.parse(~w(a.png --box 10,20 --name Red))
+      {:error, [~s(--box must be X,Y,WIDTH,HEIGHT in pixels from the top left, not "10,20")]}
+      iex> Console.Calibrate.ColourOptions.parse(~w(a.png --nmae Red))
+      {:error, [~s(unknown option --nmae; did you mean "--name"?)]}
+  """
+  @spec parse([String.t()]) :: {:ok, t()} | :help | {:error, [String.t()]}
+  def parse(words) do
+    {sources, words} = Enum.split_while(words, &(not String.starts_with?(&1, "--")))
+
+    with {:ok, given} <- Arguments.parse(words, table()) do
+      map = Map.new(given)
+      if map["help"], do: :help, else: check(sources, given, map)
+    end
+  end
+
+  defp check(sources, given, map) do
+    places = for {name, value} <- given, name in ["box", "point"], do: {kind(name), value}
+
+    problems =
+      [
+        sources == [] && "which picture? a picture, video, stream, /dev/video0 or sim",
+        length(sources) > 1 &&
+          "#{length(sources)} sources (#{Enum.join(sources, ", ")}): one is allowed",
+        places == [] && "where is it? --box X,Y,WIDTH,HEIGHT or --point X,Y",
+        map["name"] == nil && "what is it called? --name NAME",
+        map["write"] == true and map["colours"] == nil && "--write needs --colours FILE"
+      ]
+      |> Enum.filter(& &1)
+
+    if problems == [],
+      do: {:ok, options(hd(sources), places, map)},
+      else: {:error, problems}
+  end
+
+  defp kind("box"), do: :box
+  defp kind("point"), do: :point
+
+  defp options(source, places, map) do
+    %{
+      source: source,
+      places: places,
+      name: map["name"],
+      colours: map["colours"],
+      write: map["write"] || false,
+      picture: map["picture"],
+      frames: map["frames"],
+      tolerance: map["light"] || :auto,
+      min_area: map["min-area"] || 20,
+      metres: map["metres"]
+    }
+  end
+
+  defp numbers(text, count, form) do
+    parts = text |> String.split(",") |> Enum.map(&Values.whole(&1, 0..65_535))
+
+    if length(parts) == count and Enum.all?(parts, &match?({:ok, _}, &1)),
+      do: {:ok, parts |> Enum.map(&elem(&1, 1)) |> List.to_tuple()},
+      else: {:error, form}
+  end
+
+  defp name(text) do
+    if text =~ ~r/^[^\s[:cntrl:]]{1,60}$/u,
+      do: {:ok, text},
+      else: {:error, "one word of up to 60 letters"}
+  end
+
+  defp file(text) do
+    cond do
+      text == "" or File.dir?(text) -> {:error, "the path of a file"}
+      not File.dir?(Path.dirname(text)) -> {:error, "in a folder that is there"}
+      true -> {:ok, text}
+    end
+  end
+
+  defp picture(text) do
+    if String.downcase(Path.extname(text)) in [".png", ".jpg", ".jpeg"],
+      do: file(text),
+      else: {:error, "a name that ends in .png or .jpg"}
+  end
+
+  defp light("auto"), do: {:ok, :auto}
+
+  defp light(text) do
+    case Values.number(text, 0, 90) do
+      {:ok, percent} -> {:ok, percent / 100}
+      {:error, allowed} -> {:error, "auto or #{allowed}"}
+    end
+  end
+end
