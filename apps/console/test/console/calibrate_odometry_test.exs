@@ -133,7 +133,13 @@ defmodule Console.CalibrateOdometryTest do
             if Process.put(:once, true), do: "quit", else: "go"
 
           text =~ "type reset" ->
-            send(me, {:stopped, World.truth(Server.world(server), :mag1)})
+            {:ok, board} = Robot.Board.find(:mag1)
+
+            send(
+              me,
+              {:stopped, World.truth(Server.world(server), :mag1), Robot.Board.latched?(board)}
+            )
+
             "reset"
 
           true ->
@@ -157,7 +163,7 @@ defmodule Console.CalibrateOdometryTest do
 
     stop.()
     assert {:error, "ended by hand; nothing is written"} = Task.await(task, 60_000)
-    assert_received {:stopped, pose}
+    assert_received {:stopped, pose, true}
     assert pose.x < 1.0
     assert World.truth(Server.world(server), :mag1).x - pose.x < 0.15
     assert Person.heard(person) =~ "EMERGENCY STOP: mag1 is held"

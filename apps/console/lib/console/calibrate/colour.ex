@@ -42,10 +42,14 @@ defmodule Console.Calibrate.Colour do
       "limits   Y #{range(class.y)}  U #{range(class.u)}  V #{range(class.v)}  #{Colours.Edit.limits(class)}",
       "light    #{percent(found.tolerance)} more or less is put up with",
       "inside   #{match.hit} of #{match.inside} pixels are taken for #{class.name} (#{share(match.hit, match.inside)})",
-      "outside  #{match.outside} pixels, #{match.background} of them in #{Words.count(length(match.others), "blob")} that " <>
-        "#{if length(match.others) == 1, do: "touches", else: "touch"} no place of yours"
+      "outside  #{match.outside} pixels#{elsewhere(match)}"
     ] ++ distance(options.metres, match.blobs, class.name)
   end
+
+  defp elsewhere(%{others: []}), do: ", all of them next to your places or too few for a blob"
+
+  defp elsewhere(match),
+    do: ", #{match.background} of them in #{Words.count(length(match.others), "blob")} elsewhere"
 
   defp distance(nil, _blobs, _name), do: []
   defp distance(_metres, [], _name), do: []
@@ -116,7 +120,8 @@ defmodule Console.Calibrate.Colour do
       if old == "", do: IO.write(new), else: Enum.each(Diff.lines(old, new), &IO.puts("  " <> &1))
       decide(path, new, old == new, options.write)
     else
-      {:error, line} -> {:error, "#{path}: #{String.replace_prefix(line, "colour file", "line")}"}
+      {:error, line} ->
+        {:error, "#{path}:" <> String.replace_prefix(" " <> line, " colour file:", "")}
     end
   end
 

@@ -3,9 +3,8 @@ defmodule Console.Calibrate.Odometry do
   `mix calibrate odometry`: lets a robot drive what is wanted, asks what a tape says, tells what is wrong, and
   puts it into the robot's file.
   """
-  alias Console.Calibrate.{Live, Options, Report, RobotFile, Simulated, Talk}
-  alias Console.{Output, Words}
-  alias Hal.Pose
+  alias Console.Calibrate.{Live, Options, Plan, Question, Report, RobotFile, Simulated, Talk}
+  alias Console.Output
   alias Robot.Calibration
   alias Robot.Calibration.{Drive, Keys}
 
@@ -19,7 +18,7 @@ defmodule Console.Calibrate.Odometry do
   def run(%{file: path} = options) do
     with {:ok, file, conversions} <- RobotFile.load(path) do
       {file, conversions} = begin(file, conversions)
-      Enum.each(plan(options, file), &IO.puts/1)
+      Enum.each(Plan.lines(options, file), &IO.puts/1)
       if options.mode == :dry_run, do: :ok, else: live(options, file, conversions)
     end
   end
@@ -38,50 +37,6 @@ defmodule Console.Calibrate.Odometry do
   end
 
   defp begin(file, nil), do: {%{file | arm: :manual}, nil}
-
-  @doc "What will be driven, in lines."
-  @spec plan(Options.t(), Robot.File.t()) :: [String.t()]
-  def plan(options, file) do
-    tasks = Simulated.tasks(options)
-    room = Enum.max([1.0, options.distance, if(options.squares > 0, do: options.side, else: 0.0)])
-
-    [
-      "#{file.id} will drive, at #{Words.decimals(speed(options, file), 2)} m/s at most:"
-      | tasks |> Enum.map(&"  #{name(&1)}: #{legs(&1)}") |> Enum.dedup() |> times(tasks)
-    ] ++
-      [
-        "It needs #{Words.decimals(room + 1, 1)} by #{Words.decimals(room + 1, 1)} m of flat floor, and someone " <>
-          "beside it. Clockwise squares lie to the right of its mark, others to the left.",
-        "Its wheels turn only when you say go, each time; Enter stops it at once."
-      ]
-  end
-
-  defp times(lines, tasks) do
-    squares = div(Enum.count(tasks, &match?({:square, _, _}, &1)), 2)
-
-    lines
-    |> Enum.uniq()
-    |> Enum.map(&if(&1 =~ "square", do: &1 <> " (#{squares} times)", else: &1))
-  end
-
-  defp speed(options, file),
-    do: min(options.speed, file.limits[:max_linear] || file.profile.max_linear)
-
-  defp name({:distance, way}), do: "#{Words.decimals(way, 2)} m straight on"
-  defp name({:angle, turn}) when turn > 0, do: "#{degrees(turn)} degrees to the left"
-  defp name({:angle, turn}), do: "#{degrees(-turn)} degrees to the right"
-
-  defp name({:square, direction, side}),
-    do: "a square of #{Words.decimals(side, 1)} m, #{Calibration.Model.words(direction)}"
-
-  defp legs(task) do
-    Enum.map_join(Drive.legs(task), ", ", fn
-      {:go, way} -> "go #{Words.decimals(way, 2)}"
-      {:turn, turn} -> "turn #{degrees(turn)}"
-    end)
-  end
-
-  defp degrees(turn), do: Words.decimals(turn / @degree, 0)
 
   defp live(options, file, conversions) do
     with {:ok, _apps} <- start_apps(),
@@ -115,13 +70,13 @@ defmodule Console.Calibrate.Odometry do
 
   # Drives until it went well or is left out.
   defp course(task, file, options, talk) do
-    IO.puts("\nNow #{name(task)}. Put #{file.id} on its mark, and mark where it points.")
+    IO.puts("\nNow #{Plan.name(task)}. Put #{file.id} on its mark, and mark where it points.")
 
     case Talk.choose(talk, "go, skip or quit? ", ["go", "skip", "quit"]) do
       {:ok, "go"} ->
         case Live.drive(
                file.id,
-               [legs: Drive.legs(task), speed: speed(options, file)],
+               [legs: Drive.legs(task), speed: Plan.speed(options, file)],
                talk,
                Output.to(:stdio)
              ) do
@@ -142,11 +97,11 @@ defmodule Console.Calibrate.Odometry do
   end
 
   defp measure(task, driven, file, options, talk) do
-    {question, check} = question(task)
+    {question, check} = Question.of(task)
 
     case Talk.ask(talk, question, &answer(&1, check)) do
       {:ok, :again} -> course(task, file, options, talk)
-      {:ok, value} -> [{task, Map.merge(driven, measured(task, value))}]
+      {:ok, value} -> [{task, Map.merge(driven, Question.measured(task, value))}]
       :eof -> throw({:quit, "nobody answers; nothing is written"})
     end
   end
@@ -156,30 +111,6 @@ defmodule Console.Calibrate.Odometry do
   defp answer(text, check) do
     with {:error, allowed} <- check.(text), do: {:error, "#{allowed}, or again"}
   end
-
-  defp question({:distance, way}),
-    do:
-      {"How far is it from its mark, in a straight line, in metres? ",
-       &Console.Values.number(&1, way / 2, way * 2)}
-
-  defp question({:angle, turn}) do
-    far = abs(turn) / @degree
-
-    {"By how many degrees did it turn in all, such as #{degrees(abs(turn))}? ",
-     &Console.Values.number(&1, far / 2, far * 2)}
-  end
-
-  defp question({:square, _direction, _side}),
-    do:
-      {"Where does it stand, seen from its mark: X,Y in metres, ahead and to the left? ",
-       &Console.Values.point/1}
-
-  defp measured({:distance, _way}, far), do: %{measured: Pose.new(far, 0), turn: 0.0}
-
-  defp measured({:angle, turn}, degrees),
-    do: %{measured: Pose.new(0, 0), turn: if(turn < 0, do: -degrees, else: degrees) * @degree}
-
-  defp measured({:square, _direction, _side}, {x, y}), do: %{measured: Pose.new(x, y), turn: 0.0}
 
   defp typed(options) do
     with {:ok, file, conversions} <- typed_file(options.file) do

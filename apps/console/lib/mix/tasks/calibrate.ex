@@ -15,10 +15,21 @@ defmodule Mix.Tasks.Calibrate do
 
   @words ["odometry", "colour"]
 
+  # As the shell says it of programs that nobody reads any more.
+  @unread 141
+
   @impl Mix.Task
   def run(arguments) do
     Build.update()
+    calibrate(arguments)
+  rescue
+    error in ErlangError ->
+      if error.original == :terminated,
+        do: exit({:shutdown, @unread}),
+        else: reraise(error, __STACKTRACE__)
+  end
 
+  defp calibrate(arguments) do
     case arguments do
       ["odometry" | rest] ->
         odometry(rest)

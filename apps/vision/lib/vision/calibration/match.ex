@@ -53,16 +53,16 @@ defmodule Vision.Calibration.Match do
   end
 
   @doc """
-  Whether wider limits find the same things as strict ones: no blob besides, and together not more than
-  twice as large, for a thing that runs into its background is none.
+  Whether wider limits find the same things as strict ones: no blob besides, and none more than twice as
+  large, for a thing that runs into its background is none.
   """
   @spec same?({[Blob.t()], [Blob.t()]}, {[Blob.t()], [Blob.t()]}) :: boolean()
   def same?({own, others}, {strict_own, strict_others}) do
-    known = for blob <- strict_others, do: {blob.left, blob.top, blob.right, blob.bottom}
-    new? = Enum.any?(others, fn blob -> not Enum.any?(known, &touches?(blob, &1)) end)
-
-    not new? and area(own) <= @growth * area(strict_own) and
-      area(others) <= @growth * area(strict_others)
+    area(own) <= @growth * area(strict_own) and
+      Enum.all?(others, fn blob ->
+        bounds = {blob.left, blob.top, blob.right, blob.bottom}
+        blob.area <= @growth * area(Enum.filter(strict_others, &touches?(&1, bounds)))
+      end)
   end
 
   defp area(blobs), do: blobs |> Enum.map(& &1.area) |> Enum.sum()

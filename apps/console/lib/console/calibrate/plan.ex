@@ -1,0 +1,62 @@
+defmodule Console.Calibrate.Plan do
+  @moduledoc "What a calibration of odometry will drive, in words. Pure."
+  alias Console.Calibrate.{Options, Simulated}
+  alias Console.Words
+  alias Robot.Calibration
+  alias Robot.Calibration.Drive
+
+  @degree :math.pi() / 180
+
+  @doc "What will be driven, in lines."
+  @spec lines(Options.t(), Robot.File.t()) :: [String.t()]
+  def lines(options, file) do
+    tasks = Simulated.tasks(options)
+    room = Enum.max([1.0, options.distance, if(options.squares > 0, do: options.side, else: 0.0)])
+
+    [
+      "#{file.id} will drive, at #{Words.decimals(speed(options, file), 2)} m/s at most:"
+      | tasks |> Enum.map(&"  #{name(&1)}: #{legs(&1)}") |> Enum.dedup() |> times(tasks)
+    ] ++
+      [
+        "It needs #{Words.decimals(room + 1, 1)} by #{Words.decimals(room + 1, 1)} m of flat floor, and someone " <>
+          "beside it. Clockwise squares lie to the right of its mark, others to the left.",
+        "Its wheels turn only when you say go, each time; Enter stops it at once."
+      ]
+  end
+
+  defp times(lines, tasks) do
+    squares = div(Enum.count(tasks, &match?({:square, _, _}, &1)), 2)
+
+    lines
+    |> Enum.uniq()
+    |> Enum.map(&if(&1 =~ "square", do: &1 <> " (#{squares} times)", else: &1))
+  end
+
+  @doc "The speed of it, m/s: never above what the robot's file allows."
+  @spec speed(Options.t(), Robot.File.t()) :: float()
+  def speed(options, file),
+    do: min(options.speed, file.limits[:max_linear] || file.profile.max_linear)
+
+  @doc """
+  One course.
+
+      iex> Console.Calibrate.Plan.name({:angle, -2 * :math.pi()})
+      "360 degrees to the right"
+  """
+  @spec name(Sim.Calibration.task()) :: String.t()
+  def name({:distance, way}), do: "#{Words.decimals(way, 2)} m straight on"
+  def name({:angle, turn}) when turn > 0, do: "#{degrees(turn)} degrees to the left"
+  def name({:angle, turn}), do: "#{degrees(-turn)} degrees to the right"
+
+  def name({:square, direction, side}),
+    do: "a square of #{Words.decimals(side, 1)} m, #{Calibration.Model.words(direction)}"
+
+  defp legs(task) do
+    Enum.map_join(Drive.legs(task), ", ", fn
+      {:go, way} -> "go #{Words.decimals(way, 2)}"
+      {:turn, turn} -> "turn #{degrees(turn)}"
+    end)
+  end
+
+  defp degrees(turn), do: Words.decimals(turn / @degree, 0)
+end
