@@ -226,7 +226,7 @@ defmodule Console.CalibrateOdometryTest do
     assert File.read!(file) =~ "# from the old file: distance: 5"
   end
 
-  test "wrong words are told" do
+  test "wrong words are told", %{tmp_dir: folder} do
     for {words, line} <- [
           {~w(mag1.exs --side 0.1), ~s(--side must be a number from 1 to 20, not "0.1")},
           {~w(mag1.exs --distance 0.1),
@@ -244,6 +244,19 @@ defmodule Console.CalibrateOdometryTest do
 
     {:ok, options} = Options.parse(~w(no/such.exs))
     assert Odometry.run(options) == {:error, ["no/such.exs: no such file or directory"]}
+    dry = Path.join(folder, "mag3.exs")
+
+    File.write!(
+      dry,
+      ~s([id: :mag3, profile: :magellan, dry_run: true, drive: {Hal.RFlex.Driver, port: "/dev/none"}])
+    )
+
+    {:ok, options} = Options.parse([dry])
+
+    capture_io(fn ->
+      assert Odometry.run(options) == {:error, "#{dry}: dry_run: is true: nothing would move"}
+    end)
+
     {:ok, options} = Options.parse(~w(--cw 0.1,0.1))
     assert {:error, "no square was driven counter-clockwise" <> _} = Odometry.run(options)
   end

@@ -19,7 +19,12 @@ defmodule Console.Calibrate.Odometry do
     with {:ok, file, conversions} <- RobotFile.load(path) do
       {file, conversions} = begin(file, conversions)
       Enum.each(Plan.lines(options, file), &IO.puts/1)
-      if options.mode == :dry_run, do: :ok, else: live(options, file, conversions)
+
+      cond do
+        options.mode == :dry_run -> :ok
+        file.dry_run -> {:error, "#{path}: dry_run: is true: nothing would move"}
+        true -> live(options, file, conversions)
+      end
     end
   end
 
@@ -40,7 +45,8 @@ defmodule Console.Calibrate.Odometry do
 
   defp live(options, file, conversions) do
     with {:ok, _apps} <- start_apps(),
-         {:ok, config} <- Swarm.Start.config(%{file | camera: nil, ptz: nil}),
+         # It is carried to its mark by hand: where a fence is, it does not know.
+         {:ok, config} <- Swarm.Start.config(%{file | camera: nil, ptz: nil, fence: nil}),
          {:ok, _pid} <- start(config) do
       talk = Talk.start()
 
