@@ -178,6 +178,29 @@ defmodule Console.CalibrateOdometryTest do
     end
   end
 
+  test "an emergency stop of before holds it until a person resets it", %{tmp_dir: folder} do
+    {server, file} = base(folder, [])
+    latch = Path.join(folder, "estop")
+    File.write!(latch, "")
+    text = File.read!(file)
+    File.write!(file, String.replace(text, "limits:", ~s(estop_file: "#{latch}",\n  limits:)))
+
+    person =
+      Person.start(fn text ->
+        if text =~ "go, skip or quit" do
+          n = Process.get(:asked, 0)
+          Process.put(:asked, n + 1)
+          Enum.at(["go", "reset", "quit"], n)
+        end
+      end)
+
+    words = [file, "--distance", "1", "--angle", "0", "--squares", "0"]
+    assert {:error, "ended by hand; nothing is written"} = run(words, person)
+    assert Person.heard(person) =~ "reset releases an emergency stop"
+    refute File.exists?(latch)
+    assert World.truth(Server.world(server), :mag1) == Pose.new(0, 0)
+  end
+
   test "nobody there: no wheel turns", %{tmp_dir: folder} do
     {server, file} = base(folder, [])
 

@@ -78,27 +78,39 @@ defmodule Console.Calibrate.Odometry do
   defp course(task, file, options, talk) do
     IO.puts("\nNow #{Plan.name(task)}. Put #{file.id} on its mark, and mark where it points.")
 
-    case Talk.choose(talk, "go, skip or quit? ", ["go", "skip", "quit"]) do
-      {:ok, "go"} ->
-        case Live.drive(
-               file.id,
-               [legs: Drive.legs(task), speed: Plan.speed(options, file)],
-               talk,
-               Output.to(:stdio)
-             ) do
-          {:ok, driven} ->
-            measure(task, driven, file, options, talk)
+    words = ["go", "skip", "quit", "reset", "acknowledge"]
 
-          {:error, line} ->
-            IO.puts("  " <> line)
-            course(task, file, options, talk)
-        end
+    case Talk.choose(talk, "go, skip or quit? ", words) do
+      {:ok, "go"} ->
+        begin_course(task, file, options, talk)
 
       {:ok, "skip"} ->
         []
 
+      {:ok, "reset"} ->
+        :ok = Robot.Gate.reset(file.id)
+        course(task, file, options, talk)
+
+      {:ok, "acknowledge"} ->
+        with {:error, line} <- Swarm.acknowledge(file.id), do: IO.puts("  " <> line)
+        course(task, file, options, talk)
+
       _quit_or_end ->
         throw({:quit, "ended by hand; nothing is written"})
+    end
+  end
+
+  defp begin_course(task, file, options, talk) do
+    drive = [legs: Drive.legs(task), speed: Plan.speed(options, file)]
+
+    case Live.drive(file.id, drive, talk, Output.to(:stdio)) do
+      {:ok, driven} ->
+        measure(task, driven, file, options, talk)
+
+      {:error, line} ->
+        IO.puts("  " <> line)
+        IO.puts("  (reset releases an emergency stop, acknowledge a line that was lost)")
+        course(task, file, options, talk)
     end
   end
 
