@@ -189,7 +189,8 @@ defmodule Vision.ViewTest do
       pictures(view, ref, 2)
       [pid] = children_of_view(view)
       {_, 0} = System.cmd("kill", [signal, pid])
-      assert_receive {:failed, %{reason: reason, line: line}}, 10_000
+      on_exit(fn -> System.cmd("kill", ["-KILL", pid], stderr_to_stdout: true) end)
+      assert_receive {:failed, %{reason: reason, line: line}}, 15_000
       reason = with {:exit, reason} <- reason, do: reason
       assert reason in reasons and line =~ "ffmpeg"
       assert gone?(pid)
@@ -205,6 +206,20 @@ defmodule Vision.ViewTest do
     do: send(test, {event, about})
 
   def tell(_event, _measured, _another, _config), do: :ok
+
+  test "an ffmpeg that hangs does not outlive a view that is ended" do
+    {view, demand} = view()
+    {:ok, ref} = View.subscribe(view, rate: 30)
+    feed(view, demand, frame(320, 240))
+    pictures(view, ref, 1)
+    [pid] = children_of_view(view)
+    {_, 0} = System.cmd("kill", ["-STOP", pid])
+    on_exit(fn -> System.cmd("kill", ["-KILL", pid], stderr_to_stdout: true) end)
+    # More than its pipe holds, and so more than a port that is only closed gets rid of.
+    feed(view, demand, frame(320, 240))
+    stop_supervised!(View)
+    assert gone?(pid)
+  end
 
   test "what is no ffmpeg is said, and tried again later and later" do
     view = look(ffmpeg: "/bin/echo")
@@ -296,10 +311,10 @@ defmodule Vision.ViewTest do
 
   # The processes that a view's port runs: ffmpeg, which has taken the place of `nice`.
   defp children_of_view(view) do
-    for port <- Port.list(), Port.info(port, :connected) == {:connected, view} do
-      {:os_pid, pid} = Port.info(port, :os_pid)
-      "#{pid}"
-    end
+    for port <- Port.list(),
+        Port.info(port, :connected) == {:connected, view},
+        {:os_pid, pid} <- [Port.info(port, :os_pid)],
+        do: "#{pid}"
   end
 
   defp gone?(pid, left_ms \\ 5_000)

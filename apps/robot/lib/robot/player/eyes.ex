@@ -32,6 +32,7 @@ defmodule Robot.Player.Eyes do
   end
 
   def option(:camera, "save", 0, _context), do: :used
+  def option(:camera, "save", _on, _context), do: {:left, "say save_pictures: with a folder"}
   def option(:camera, "mode", _value, _context), do: {:left, "frames are always YUV here"}
 
   def option(:camera, "source", input, _context) when input in 0..31,

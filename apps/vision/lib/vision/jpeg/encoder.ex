@@ -5,7 +5,7 @@ defmodule Vision.Jpeg.Encoder do
   the process that opened it, or with the VM, because its input ends.
 
   The process that opens it gets its messages, must trap exits, and gives them to `handle/2`. Nothing here
-  waits, not even for an ffmpeg that hangs: whoever has waited long enough calls `kill/1`.
+  waits, not even for an ffmpeg that hangs: whoever has waited long enough calls `close/1`.
   """
   alias Hal.Frame
   alias Vision.Jpeg
@@ -84,22 +84,16 @@ defmodule Vision.Jpeg.Encoder do
   def handle({:EXIT, port, reason}, %__MODULE__{port: port}), do: {:error, {:exit, reason}}
   def handle(_other, _encoder), do: :unknown
 
-  @doc "Ends ffmpeg: its input ends, and so does it."
+  @doc "Ends ffmpeg, also one that hangs and would not notice that its input ends."
   @spec close(t()) :: :ok
   def close(%__MODULE__{port: port}) do
-    send(port, {self(), :close})
-    :ok
-  end
-
-  @doc "Ends an ffmpeg that may not even notice that its input has ended."
-  @spec kill(t()) :: :ok
-  def kill(%__MODULE__{port: port} = encoder) do
     # As long as the port is open nobody else can have this number.
     with {:os_pid, pid} <- Port.info(port, :os_pid),
          path when path != nil <- System.find_executable("kill"),
          do: System.cmd(path, ["-9", "#{pid}"], stderr_to_stdout: true)
 
-    close(encoder)
+    send(port, {self(), :close})
+    :ok
   end
 
   @doc """

@@ -3,7 +3,7 @@ defmodule Vision.View.Maker do
   Makes pictures of frames, one at a time, with an encoder that is there only as long as it is needed: started
   for the first frame, for each of another shape, and after it failed; closed after 5 s without a picture.
 
-  An encoder that ends, or needs more than 2 s for a picture, is followed by a rest of 100 ms, 200 ms, … up
+  An encoder that ends, or needs more than 5 s for a picture, is followed by a rest of 100 ms, 200 ms, … up
   to 5 s. The owner traps exits and hands all messages to `handle/3`. Times are integer milliseconds.
   """
   alias Hal.{Event, Frame}
@@ -12,7 +12,8 @@ defmodule Vision.View.Maker do
 
   @rest_ms 100
   @longest_rest_ms 5_000
-  @late_ms 2_000
+  # On a machine with more to do than it can, the encoder, which comes last, is slow and not stuck.
+  @late_ms 5_000
   @idle_ms 5_000
 
   @enforce_keys [:ffmpeg]
@@ -78,10 +79,8 @@ defmodule Vision.View.Maker do
   @doc "What a message means for it; `:unknown` if it is for somebody else."
   @spec handle(t(), term(), now_ms :: integer()) ::
           {:picture, Picture.t(), t()} | {:ok, t()} | {:error, String.t(), t()} | :unknown
-  def handle(%__MODULE__{job: {ref, _frame}} = maker, {__MODULE__, :late, ref}, now_ms) do
-    Encoder.kill(maker.encoder)
-    fail(maker, :late, now_ms)
-  end
+  def handle(%__MODULE__{job: {ref, _frame}} = maker, {__MODULE__, :late, ref}, now_ms),
+    do: fail(maker, :late, now_ms)
 
   def handle(%__MODULE__{job: nil, made: made} = maker, {__MODULE__, :idle, made}, _now_ms),
     do: {:ok, close(maker)}
