@@ -4,7 +4,7 @@ defmodule System.NodesTest do
 
   A port mapper of its own keeps it apart from other fleets on the machine.
   """
-  use ExUnit.Case, async: false
+  use ExUnit.Case, async: true
 
   @moduletag timeout: 120_000
   @root Path.expand("..", __DIR__)

@@ -1,9 +1,9 @@
 defmodule Sim.EmulatorTest do
   @moduledoc "Emulated devices on real pseudo-terminals, in a world in real time; the test is their driver."
-  use ExUnit.Case, async: false
+  use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1]
   alias Hal.{Pose, Profile, Serial}
-  alias Sim.{Emulator, Server, World, Worlds}
+  alias Sim.{Emulator, Server, World}
   @moduletag :tmp_dir
 
   @on "1b0202002208000186a0000000030c1b03"
@@ -16,7 +16,6 @@ defmodule Sim.EmulatorTest do
   @status "1b0201000100001b03"
 
   setup %{tmp_dir: folder} = context do
-    unless Worlds.running?(), do: start_supervised!(Worlds)
     {:ok, map} = Sim.Map.open("hall", 1)
 
     {x, y} = Map.get(context, :place, {-2, 0})

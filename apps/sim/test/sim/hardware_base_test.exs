@@ -1,9 +1,9 @@
 defmodule Sim.HardwareBaseTest do
   @moduledoc "The driver of real bases against the emulated controller, which was written from the fact sheet alone."
-  use ExUnit.Case, async: false
+  use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 2]
   alias Hal.{Device, Pose, Profile, Twist}
-  alias Sim.{Emulator, Server, World, Worlds}
+  alias Sim.{Emulator, Server, World}
   @moduletag :tmp_dir
 
   @conversions %{
@@ -12,7 +12,6 @@ defmodule Sim.HardwareBaseTest do
   }
 
   setup %{tmp_dir: folder} = context do
-    unless Worlds.running?(), do: start_supervised!(Worlds)
     {:ok, map} = Sim.Map.open("hall", 1)
     profile = Map.get(context, :profile, Profile.magellan())
     {x, y, heading} = Map.get(context, :place, {-4, 0, 0})

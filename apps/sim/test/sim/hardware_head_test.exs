@@ -1,13 +1,12 @@
 defmodule Sim.HardwareHeadTest do
   @moduledoc "The driver of real cameras' heads against the emulated one, which was written from the fact sheet alone."
-  use ExUnit.Case, async: false
+  use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 2]
   alias Hal.{Device, Pose, Profile}
-  alias Sim.{Emulator, Server, World, Worlds}
+  alias Sim.{Emulator, Server, World}
   @moduletag :tmp_dir
 
   setup %{tmp_dir: folder} = context do
-    unless Worlds.running?(), do: start_supervised!(Worlds)
     {:ok, map} = Sim.Map.open("hall", 1)
     robot = %{id: :mag1, profile: Profile.magellan(), pose: Pose.new(-2, 0)}
     world = World.new!(map: map, robots: [robot], landmark: {0.0, 0.0}, noise: :off)

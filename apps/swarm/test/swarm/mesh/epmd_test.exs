@@ -14,6 +14,7 @@ defmodule Swarm.Mesh.EpmdTest do
       ~w(-start_epmd false -epmd_module Elixir.Swarm.Mesh.Epmd -kernel dist_auto_connect never)c ++
         ~w(-setcookie epmdless -sname #{name}@#{@host})c
 
+    # It ends with the test.
     {:ok, peer, _node} =
       :peer.start_link(%{
         connection: :standard_io,
@@ -21,7 +22,6 @@ defmodule Swarm.Mesh.EpmdTest do
         env: variables
       })
 
-    on_exit(fn -> if Process.alive?(peer), do: :peer.stop(peer) end)
     peer
   end
 

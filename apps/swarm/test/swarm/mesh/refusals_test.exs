@@ -93,10 +93,10 @@ defmodule Swarm.Mesh.RefusalsTest do
           do: {String.to_charlist(key), String.to_charlist(value)}
 
     arguments = paths ++ Enum.map(words, &String.to_charlist/1)
-    {:ok, peer, _node} = :peer.start(%{connection: :standard_io, args: arguments, env: env})
+    # It ends with the test, if not before.
+    {:ok, peer, _node} = :peer.start_link(%{connection: :standard_io, args: arguments, env: env})
     # What it says is read from a file.
     :ok = :peer.call(peer, :logger, :remove_handler, [:default])
-    on_exit(fn -> if Process.alive?(peer), do: :peer.stop(peer) end)
     peer
   end
 
