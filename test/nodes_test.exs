@@ -10,12 +10,24 @@ defmodule System.NodesTest do
   @root Path.expand("..", __DIR__)
 
   setup do
-    {:ok, socket} = :gen_tcp.listen(0, ip: {127, 0, 0, 1})
-    {:ok, port} = :inet.port(socket)
-    :gen_tcp.close(socket)
+    port = free_port()
     environment = [{"ERL_EPMD_PORT", "#{port}"}, {"ERL_EPMD_ADDRESS", "127.0.0.1"}]
     on_exit(fn -> System.cmd("epmd", ["-kill"], env: environment, stderr_to_stdout: true) end)
     %{environment: environment}
+  end
+
+  # None of those that the system hands out by itself, to another test perhaps.
+  defp free_port do
+    port = 20_000 + :rand.uniform(10_000)
+
+    case :gen_tcp.listen(port, ip: {127, 0, 0, 1}) do
+      {:ok, socket} ->
+        :gen_tcp.close(socket)
+        port
+
+      {:error, :eaddrinuse} ->
+        free_port()
+    end
   end
 
   defp start(line, environment) do

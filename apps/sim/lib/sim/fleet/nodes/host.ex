@@ -13,6 +13,7 @@ defmodule Sim.Fleet.Nodes.Host do
   @host "127.0.0.1"
   @address {127, 0, 0, 1}
   @name :"demo@127.0.0.1"
+  @epmd_ms 2_000
 
   @enforce_keys [:home, :secret, :ports, :fleet, :mesh]
   defstruct @enforce_keys
@@ -101,7 +102,32 @@ defmodule Sim.Fleet.Nodes.Host do
   defp epmd do
     program = System.find_executable("epmd") || Path.join(erts(), "epmd")
     environment = [{"ERL_EPMD_ADDRESS", @host}]
-    if File.exists?(program), do: System.cmd(program, ["-daemon"], env: environment)
+
+    if File.exists?(program) do
+      System.cmd(program, ["-daemon"], env: environment)
+      await_epmd(System.monotonic_time(:millisecond) + @epmd_ms)
+    end
+  end
+
+  # It returns before it listens.
+  defp await_epmd(deadline) do
+    case :gen_tcp.connect(@address, epmd_port(), [], 100) do
+      {:ok, socket} ->
+        :gen_tcp.close(socket)
+
+      {:error, _not_yet} ->
+        receive do
+        after
+          20 -> if System.monotonic_time(:millisecond) < deadline, do: await_epmd(deadline)
+        end
+    end
+  end
+
+  defp epmd_port do
+    case Integer.parse(System.get_env("ERL_EPMD_PORT", "")) do
+      {port, ""} when port in 1..65_535 -> port
+      _default -> 4369
+    end
   end
 
   defp erts, do: Path.join([:code.root_dir(), "erts-#{:erlang.system_info(:version)}", "bin"])
