@@ -325,11 +325,37 @@ static void random_bytes(uint8_t *to, size_t size)
         to[k] = (uint8_t)rand();
 }
 
+/* Takes what it says, and remembers the last three bytes of all that: what its last packet was. */
+static void drain(uint8_t last[3])
+{
+    uint8_t bytes[4096];
+    ssize_t size;
+
+    while ((size = read(t.out, bytes, sizeof bytes)) > 0)
+        for (ssize_t k = size > 3 ? size - 3 : 0; k < size; k++) {
+            last[0] = last[1];
+            last[1] = last[2];
+            last[2] = bytes[k];
+        }
+}
+
+/* Whether it says, within 2 s, that it was told to close. */
+static int closed(uint8_t last[3])
+{
+    for (int64_t until = now_ms() + 2000; now_ms() < until; usleep(1000)) {
+        drain(last);
+        if (last[0] == 0 && last[1] == 1 && last[2] == 'C')
+            return 1;
+    }
+    return 0;
+}
+
 /* Anything from the VM's side and the line's, in pieces of any size, read by nobody or by somebody. */
 static void junk(int seed)
 {
     static uint8_t bytes[70000];
     char *pty[] = { "serial", "--pty", "serial_test_link", "--last-words", STOP_HEX, "--keep-alive", "1", NULL };
+    uint8_t last[3] = { 0 };
     int line, reading = seed / 2 % 2;
 
     srand((unsigned)seed);
@@ -365,15 +391,16 @@ static void junk(int seed)
         if (reading) {
             while (read(line, bytes, sizeof bytes) > 0)
                 ;
-            while (read(t.out, bytes, sizeof bytes) > 0)
-                ;
+            drain(last);
         }
         if (seed % 2 && rand() % 10 == 0) {     /* the user of the pty comes and goes */
             close(line);
             line = open(pty[2], O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-            /* Among the junk may have been a 'C': then it ends, as well as ever. */
-            if (line < 0)
+            /* Only a 'C', which may be among the junk, takes it away. */
+            if (line < 0) {
+                check(closed(last), "the link is gone");
                 break;
+            }
         }
     }
     check(finish() == 0, "junk");
