@@ -7,6 +7,8 @@ defmodule Console.Bench do
   a case counts from that moment, else from the start.
   """
 
+  alias Console.Values
+
   @type deed :: nil | :move | :kill_leader | :kill_middle
   @type case :: %{
           name: String.t(),
@@ -67,14 +69,7 @@ defmodule Console.Bench do
       true
   """
   @spec choose(String.t()) :: {:ok, [case()]} | {:error, String.t()}
-  def choose(text) do
-    wanted = String.split(text, ",")
-    names = Enum.map(cases(), & &1.name)
-
-    if wanted -- names == [],
-      do: {:ok, Enum.filter(cases(), &(&1.name in wanted))},
-      else: {:error, "names of #{Enum.join(names, ", ")}, with commas between"}
-  end
+  def choose(text), do: Values.named(text, cases())
 
   @doc """
   The time within which a case should be formed (again): the hospital gives a fresh fleet longer.

@@ -36,4 +36,18 @@ defmodule Console.Output do
   @doc "Takes the progress line away."
   @spec finish(t()) :: :ok
   def finish(output), do: progress(output, "")
+
+  @doc "Writes a term to the file that `--json` names, if it names one; the error is for people."
+  @spec json(Path.t() | nil, term()) :: :ok | {:error, [String.t()]}
+  def json(nil, _term), do: :ok
+
+  def json(path, term) do
+    case File.write(path, [Hal.Json.encode!(term), "\n"]) do
+      :ok ->
+        :ok
+
+      {:error, reason} ->
+        {:error, ["--json #{path} cannot be written: #{:file.format_error(reason)}"]}
+    end
+  end
 end

@@ -148,6 +148,25 @@ defmodule Console.Values do
   end
 
   @doc """
+  What people name of a table, in its order; each entry has a `:name`.
+
+      iex> Console.Values.named("b,a", [%{name: :a}, %{name: :b}, %{name: :c}])
+      {:ok, [%{name: :a}, %{name: :b}]}
+      iex> Console.Values.named("d", [%{name: :a}, %{name: :b}])
+      {:error, "names of a, b, with commas between"}
+  """
+  @spec named(String.t(), [entry]) :: {:ok, [entry]} | {:error, String.t()}
+        when entry: %{:name => atom() | String.t(), optional(atom()) => term()}
+  def named(text, entries) do
+    wanted = String.split(text, ",")
+    names = Enum.map(entries, &to_string(&1.name))
+
+    if wanted -- names == [],
+      do: {:ok, Enum.filter(entries, &(to_string(&1.name) in wanted))},
+      else: {:error, "names of #{Enum.join(names, ", ")}, with commas between"}
+  end
+
+  @doc """
   Words as people write a choice.
 
       iex> Console.Values.either(~w(hall hospital arena))

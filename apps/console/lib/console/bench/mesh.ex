@@ -3,6 +3,7 @@ defmodule Console.Bench.Mesh do
   What `mix bench swarm` measures, and what it is to beat: the cases with their goals, and JADE's figures,
   which were taken on another day. Pure. Times are microseconds, memory is bytes.
   """
+  alias Console.Values
 
   @type size :: pos_integer() | :one
   @typedoc "`:one` is many robots in one node."
@@ -50,14 +51,7 @@ defmodule Console.Bench.Mesh do
       :error
   """
   @spec choose(String.t()) :: {:ok, [case()]} | {:error, String.t()}
-  def choose(text) do
-    wanted = String.split(text, ",")
-    names = Enum.map(cases(), &Atom.to_string(&1.name))
-
-    if wanted -- names == [],
-      do: {:ok, Enum.filter(cases(), &("#{&1.name}" in wanted))},
-      else: {:error, "names of #{Enum.join(names, ", ")}, with commas between"}
-  end
+  def choose(text), do: Values.named(text, cases())
 
   @doc """
   The goal as `{p50, p99}`, `nil` where there is none.

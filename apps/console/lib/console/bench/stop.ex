@@ -6,6 +6,7 @@ defmodule Console.Bench.Stop do
   The stop is there when both axes of the base were told a speed of zero. What the base does then is its own
   affair: it brakes.
   """
+  alias Console.Values
 
   @type name :: :crash | :frozen | :kill | :freeze | :pull | :estop | :bumper
   @type case :: %{name: name(), says: String.t(), goal_ms: pos_integer() | nil}
@@ -37,12 +38,5 @@ defmodule Console.Bench.Stop do
       :error
   """
   @spec choose(String.t()) :: {:ok, [case()]} | {:error, String.t()}
-  def choose(text) do
-    wanted = String.split(text, ",")
-    names = Enum.map(cases(), &Atom.to_string(&1.name))
-
-    if wanted -- names == [],
-      do: {:ok, Enum.filter(cases(), &("#{&1.name}" in wanted))},
-      else: {:error, "names of #{Enum.join(names, ", ")}, with commas between"}
-  end
+  def choose(text), do: Values.named(text, cases())
 end

@@ -27,25 +27,13 @@ defmodule Console.Bench.Mesh.Main do
     about = %{load_before: before, load_after: Vm.load(), schedulers: System.schedulers_online()}
     IO.write(Sheet.draw(rows))
     IO.puts("\n" <> words(about))
-    write(given["json"], Sheet.term(rows, about))
+    Output.json(given["json"], Sheet.term(rows, about))
   end
 
   defp words(about) do
     "Bare OTP: the same nodes with :pg and send alone, right before ours. Of fewer than 100 times the second " <>
       "figure is the largest.\nLoad of the machine (1 min): #{about.load_before || "?"} before, " <>
       "#{about.load_after || "?"} after; #{about.schedulers} processors."
-  end
-
-  defp write(nil, _term), do: :ok
-
-  defp write(path, term) do
-    case File.write(path, [Hal.Json.encode!(term), "\n"]) do
-      :ok ->
-        :ok
-
-      {:error, reason} ->
-        {:error, ["--json #{path} cannot be written: #{:file.format_error(reason)}"]}
-    end
   end
 
   defp table do

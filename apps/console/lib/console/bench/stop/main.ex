@@ -33,7 +33,7 @@ defmodule Console.Bench.Stop.Main do
 
       IO.write(Sheet.draw(results))
       IO.puts("\n" <> words(about))
-      write(given["json"], results, about)
+      Output.json(given["json"], Sheet.term(results, about))
     after
       File.rm_rf!(folder)
     end
@@ -42,18 +42,6 @@ defmodule Console.Bench.Stop.Main do
   defp words(about) do
     "Times run from before the cause to when both axes were told to stand, at the line's other end. Load of the " <>
       "machine (1 min): #{about.load_before || "?"} before, #{about.load_after || "?"} after; #{about.schedulers} processors."
-  end
-
-  defp write(nil, _results, _about), do: :ok
-
-  defp write(path, results, about) do
-    case File.write(path, [Hal.Json.encode!(Sheet.term(results, about)), "\n"]) do
-      :ok ->
-        :ok
-
-      {:error, reason} ->
-        {:error, ["--json #{path} cannot be written: #{:file.format_error(reason)}"]}
-    end
   end
 
   defp table do
