@@ -47,7 +47,9 @@ defmodule Netns.Story do
   @doc "When something first held from then on, or `nil`."
   @spec first([line()], from :: integer(), (now() -> boolean())) :: integer() | nil
   def first(lines, from, holds?) do
-    Enum.find_value(scan(lines), fn {{us, _, _, _}, now} -> us >= from and holds?.(now) && us end)
+    Enum.find_value(scan(lines), fn {{us, _, _, _}, now} ->
+      if us >= from and holds?.(now), do: us
+    end)
   end
 
   @doc "The lines of a kind, from then on, of these robots."

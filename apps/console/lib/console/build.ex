@@ -5,7 +5,7 @@ defmodule Console.Build do
   @spec update() :: :ok
   def update do
     shell = Mix.shell()
-    Mix.shell(Mix.Shell.Quiet)
+    Mix.shell(Console.Build.Shell)
     Mix.Task.run("compile", [])
     Mix.shell(shell)
     :ok

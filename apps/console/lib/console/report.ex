@@ -50,9 +50,10 @@ defmodule Console.Report do
   end
 
   @doc """
-  Writes the report and the picture where the options say; the drawing is made only if it is wanted.
+  Writes the report and the picture where the options say. `drawing` takes no argument and is called
+  only if a picture is wanted.
   """
-  @spec write(Console.Options.t(), iodata(), (() -> iodata()) | nil, Output.t()) ::
+  @spec write(Console.Options.t(), iodata(), (... -> iodata()) | nil, Output.t()) ::
           :ok | {:error, String.t()}
   def write(options, json, drawing, output) do
     with :ok <- put("--json", options.json, fn -> json end, output),

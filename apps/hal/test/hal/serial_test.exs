@@ -19,7 +19,7 @@ defmodule Hal.SerialTest do
       {[port: "a", speed: 1.0e308], "1 to 20000000"},
       {[port: "a", speed: Integer.pow(10, 400)], "1 to 20000000"},
       {[port: "a", last_words: long], "at most 1024 bytes"},
-      {[port: "a", last_words: 'ab'], "at most 1024 bytes"},
+      {[port: "a", last_words: ~c"ab"], "at most 1024 bytes"},
       {[port: "a", keep_alive_ms: 9], "10 to 60000"},
       {[port: "a", keep_alive_ms: :infinity], "10 to 60000"},
       {[port: "a", module: Enum], "Hal.Serial.Port"},

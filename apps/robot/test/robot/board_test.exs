@@ -51,8 +51,7 @@ defmodule Robot.BoardTest do
   test "two robots of one name cannot be" do
     board(:board4)
 
-    assert {:error, {{:already_started, _pid}, _}} =
-             start_supervised({Board, config(:board4)}, id: :other)
+    assert {:error, {:already_started, _pid}} = Board.start_link(config(:board4))
 
     assert Board.find(:nobody) == :error
   end

@@ -23,7 +23,7 @@ defmodule Robot.GateTest do
     id = rolling(:gate1)
     rolls()
     send(Names.whereis(id, :drive), {:readings, [{:bumpers, [0]}]})
-    assert_receive {:drive, {:drive, %Twist{linear: 0.0}}, _}, 50
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v == 0.0, 50
     {:ok, %{limits: limits}, _} = Board.fetch(Board.find!(id), :driving, 100)
     assert :bumper in limits
   end
@@ -54,8 +54,10 @@ defmodule Robot.GateTest do
     assert Pilot.start(id) == :ok
     stands(250)
 
-    assert {:ok, %{twist: @zero, limits: [:estop]}, _} =
+    assert {:ok, %{twist: twist, limits: [:estop]}, _} =
              Board.fetch(Board.find!(id), :driving, 100)
+
+    assert Twist.zero?(twist)
 
     assert Gate.reset(id) == :ok
     refute Board.latched?(Board.find!(id))
@@ -114,13 +116,13 @@ defmodule Robot.GateTest do
 
   test "whatever is wished, only sane speeds come out" do
     id = robot(:gate4)
-    assert_receive {:drive, {:drive, @zero}, _}
+    assert_receive {:drive, {:drive, twist}, _} when twist == @zero
     :ok = :sys.suspend(Names.whereis(id, :executive))
 
     for wish <- [%{linear: :nan, turn: 0.0}, %{linear: 1.0e308, turn: 0.0}, :nonsense] do
       Gate.wish(id, wish)
       forget_drives()
-      assert_receive {:drive, {:drive, %Twist{linear: 0.0}}, _}, 200
+      assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v == 0.0, 200
     end
 
     Gate.wish(id, Twist.new(50.0, 0.0))

@@ -16,7 +16,7 @@ defmodule Sim.Blobs do
   def see(map, %Sight{} = sight, poles, noise) do
     map
     |> Kernel.look(sight, poles)
-    |> Enum.filter(fn {_column, kind, _top, _bottom, luma} -> luma >= Palette.least_luma(kind) end)
+    |> Enum.filter(fn {_, kind, _, _, luma} -> luma >= Palette.least_luma(kind) end)
     |> Enum.chunk_by(&elem(&1, 0))
     |> regions()
     |> Enum.with_index()

@@ -190,7 +190,9 @@ defmodule Sim.KernelTest do
       Native.sonar_few(map, <<>>, [{0, 1.0e9, 0.0, 1.0, 0.0, 0.1, 5.0, <<>>}], nil)
     end)
 
-    badarg.(fn -> Native.sonar_few(map, <<>>, [{0, 0.0, 0.0, 1.0, 0.0, 0.1, 5.0, <<1>>}], nil) end)
+    badarg.(fn ->
+      Native.sonar_few(map, <<>>, [{0, 0.0, 0.0, 1.0, 0.0, 0.1, 5.0, <<1>>}], nil)
+    end)
 
     badarg.(fn -> Native.sonar_few(map, <<-1::64>>, [], nil) end)
     badarg.(fn -> Native.sonar_few(map, <<>>, [], {-1, 0, 0}) end)

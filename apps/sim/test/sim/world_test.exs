@@ -62,7 +62,7 @@ defmodule Sim.WorldTest do
   test "turns on the spot to the left" do
     world = world([robot(:mag1, 0, 0)]) |> World.drive(:mag1, Twist.new(0.0, 1.0)) |> steps(20)
     assert World.truth(world, :mag1).heading > 0.3
-    assert {0.0, 0.0} = Pose.point(World.truth(world, :mag1))
+    assert Pose.point(World.truth(world, :mag1)) == {0.0, 0.0}
   end
 
   test "stops at a wall, presses the bumper in front, counts one collision" do

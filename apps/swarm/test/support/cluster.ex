@@ -53,7 +53,8 @@ defmodule Swarm.Cluster do
   @spec freeze(node()) :: :ok
   def freeze(node) do
     signal(node, "STOP", fn ->
-      on_exit(fn -> thaw(node) end)
+      # It may have been killed by then.
+      on_exit(fn -> send_signal(node, "CONT") end)
       await_stopped(process(node))
     end)
   end
@@ -93,10 +94,13 @@ defmodule Swarm.Cluster do
     do: :persistent_term.put({__MODULE__, node}, :erpc.call(node, System, :pid, []))
 
   defp signal(node, name, afterwards) do
-    {_text, 0} = System.cmd("kill", ["-#{name}", process(node)])
+    {_text, 0} = send_signal(node, name)
     afterwards.()
     :ok
   end
+
+  defp send_signal(node, name),
+    do: System.cmd("kill", ["-#{name}", process(node)], stderr_to_stdout: true)
 
   defp process(node), do: :persistent_term.get({__MODULE__, node})
 

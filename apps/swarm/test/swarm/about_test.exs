@@ -62,7 +62,7 @@ defmodule Swarm.AboutTest do
           [1],
           [srevice: :camera],
           [battery: :full],
-          [battery: 14..11],
+          [battery: 14..11//-1],
           [calibrated: 1],
           [profile: 3],
           [max_age_ms: -1],

@@ -11,22 +11,24 @@ defmodule Swarm.DoorTest do
   defp state(id),
     do: Board.fetch(Board.find!(id), :mission, :infinity) |> elem(1) |> Map.fetch!(:state)
 
+  # The behaviour that drives it now.
+  defp doing(id) do
+    with {:ok, %{by: behaviour}, _age} <- Board.fetch(Board.find!(id), :doing, 300), do: behaviour
+  end
+
   test "single commands work from idle and replace each other" do
     id = robot(:door1)
     standing([id])
     assert Swarm.goto(id, {2.0, 1}) == :ok
     assert state(id) == {Swarm.Missions.Manual, :goto}
-
-    eventually(fn -> match?({:ok, %{by: :goto}, _}, Board.fetch(Board.find!(id), :doing, 300)) end)
+    eventually(fn -> doing(id) == :goto end)
 
     assert Swarm.tell("door1", "MOVE:0.1:0") == :ok
-
-    eventually(fn -> match?({:ok, %{by: :move}, _}, Board.fetch(Board.find!(id), :doing, 300)) end)
+    eventually(fn -> doing(id) == :move end)
 
     assert %Swarm.Status{state: :move, robot: :door1} = Swarm.status(id)
     assert Swarm.stop(id) == :ok
-
-    eventually(fn -> match?({:ok, %{by: :stop}, _}, Board.fetch(Board.find!(id), :doing, 300)) end)
+    eventually(fn -> doing(id) == :stop end)
 
     assert Swarm.tell([id], "findblob:Yellow") == :ok
     assert Swarm.tell(id, "lead") == :ok

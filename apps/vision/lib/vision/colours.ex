@@ -166,7 +166,7 @@ defmodule Vision.Colours do
   defp check_count(n) when n <= @most, do: :ok
   defp check_count(n), do: {:error, "#{n} colours: 1 to #{@most} are allowed"}
 
-  defp check_area(_option, area, least) when area in least..@largest_area, do: :ok
+  defp check_area(_option, area, least) when area in least..@largest_area//1, do: :ok
 
   defp check_area(option, area, least),
     do: {:error, "#{option} cannot be #{inspect(area)}: whole numbers from #{least} are allowed"}

@@ -75,7 +75,7 @@ defmodule Console.Calibrate.Colour do
       found.share < @alike &&
         "WARNING: #{percent(1 - found.share)} of the sample are of another colour and were left out: " <>
           "give a smaller box, or points",
-      match.hit < @few * match.inside and found.share >= @alike &&
+      match.hit < @few * match.inside && found.share >= @alike &&
         "WARNING: only #{share(match.hit, match.inside)} of your places are taken for #{options.name}",
       match.blobs == [] &&
         "WARNING: no blob of at least #{options.min_area} pixels is left where you pointed",

@@ -71,7 +71,7 @@ defmodule Console.Calibrate.ColourOptions do
           "#{length(sources)} sources (#{Enum.join(sources, ", ")}): one is allowed",
         places == [] && "where is it? --box X,Y,WIDTH,HEIGHT or --point X,Y",
         map["name"] == nil && "what is it called? --name NAME",
-        map["write"] == true and map["colours"] == nil && "--write needs --colours FILE"
+        map["write"] == true && map["colours"] == nil && "--write needs --colours FILE"
       ]
       |> Enum.filter(& &1)
 

@@ -144,8 +144,8 @@ defmodule Console.Calibrate.Options do
           "--#{hd(strange)} is for a simulated robot: with --simulate",
         options.mode == :simulate && files != [] &&
           "a simulated robot has no file: #{hd(files)} or --simulate",
-        options.distance == 0 and options.measured != [] && "--measured needs a --distance",
-        options.angle == 0 and options.turned != [] && "--turned needs an --angle",
+        options.distance == 0 && options.measured != [] && "--measured needs a --distance",
+        options.angle == 0 && options.turned != [] && "--turned needs an --angle",
         nothing?(options) && "nothing is left to drive: --distance, --angle and --squares are 0"
       ]
       |> Enum.filter(& &1)

@@ -67,7 +67,7 @@ defmodule Console.Calibrate.Report do
         "turns to the left go #{percent(slip)} further than turns to the right: its wheels slip. Squares " <>
           "cannot tell that from unequal wheels, so the wheel ratio stays as it is",
       unsure(squares, length(measured.runs)),
-      squares != nil and squares.after_m > @left_m &&
+      squares != nil && squares.after_m > @left_m &&
         "#{Words.decimals(squares.after_m, 2)} m of the error are not explained by base and ratio: was one " <>
           "square measured wrongly, or do the wheels slip?"
     ]

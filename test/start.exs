@@ -1,0 +1,5 @@
+# How every suite of the project starts, of the apps and of the whole system.
+Code.require_file("skipped.exs", __DIR__)
+
+# On a busy machine a message may take its time; nothing waits longer than it must.
+ExUnit.start(assert_receive_timeout: 3_000, formatters: [ExUnit.CLIFormatter, Convoy.Skipped])
