@@ -24,7 +24,7 @@ defmodule Convoy.MixProject do
       cookie: "none",
       include_executables_for: [:unix],
       strip_beams: [keep: ["Docs"]],
-      steps: [:assemble, &add_robots/1]
+      steps: [:assemble, &add_robots/1, &write_system/1]
     ]
 
     [
@@ -38,6 +38,20 @@ defmodule Convoy.MixProject do
     robots = Path.join(release.path, "robots")
     File.rm_rf!(robots)
     File.cp_r!("config/robots", robots)
+    release
+  end
+
+  # Where it was built, for rel/install: a release runs on that system only. The first line is what
+  # os-release and uname say there, the second what people call it.
+  defp write_system(release) do
+    script = """
+    [ ! -r /etc/os-release ] || . /etc/os-release
+    echo "${ID:-$(uname -s)} ${VERSION_ID:-${VERSION_CODENAME:-}} $(uname -m)"
+    echo "${PRETTY_NAME:-$(uname -sr)}"
+    """
+
+    {system, 0} = System.cmd("sh", ["-c", script])
+    File.write!(Path.join(release.path, "system"), system)
     release
   end
 

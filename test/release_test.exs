@@ -266,6 +266,29 @@ defmodule System.ReleaseTest do
       end
     end
 
+    test "a robot with another Debian than the builder's refuses the release, and says why",
+         context do
+      system = Path.join(context.machine, "etc/os-release")
+      File.rm!(system)
+
+      for {version, name} <- [{11, "bullseye"}, {14, "forky"}] do
+        File.write!(system, """
+        PRETTY_NAME="Debian GNU/Linux #{version} (#{name})"
+        ID=debian
+        VERSION_ID="#{version}"
+        """)
+
+        assert {said, 1} = to_machine(context)
+        assert [line] = String.split(said, "\n", trim: true)
+
+        assert line =~
+                 ~r/this release was built on .+ \(\w+ \S* ?\w+\), and this machine is debian #{version} /
+
+        refute File.exists?(Path.join(context.machine, "opt/convoy/releases"))
+        refute File.exists?(Path.join(context.machine, "opt/convoy/incoming"))
+      end
+    end
+
     test "from a bare machine to a robot that runs; a wrong file changes nothing; and back",
          context do
       assert {said, 0} = to_machine(context)

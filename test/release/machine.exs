@@ -5,7 +5,7 @@ defmodule Release.Machine do
   """
 
   @folders ~w(etc opt var/lib run tmp root home dev proc usr local)
-  @etc ~w(passwd group shadow gshadow login.defs nsswitch.conf ld.so.cache alternatives)
+  @etc ~w(passwd group shadow gshadow login.defs nsswitch.conf ld.so.cache alternatives os-release)
 
   @enter """
   #!/bin/sh
