@@ -129,7 +129,9 @@ defmodule Swarm.MeshTest do
     assert eventually(fn -> Enum.all?(nodes, &met?(&1, nodes)) end)
     assert eventually(fn -> Enum.all?(nodes, &(length(linked(&1)) >= 2)) end)
     assert eventually(fn -> match?(%{state: :idle}, status(one, far.name)) end)
-    assert Cluster.call(one, Swarm, :stop, [far.name]) == :ok
+
+    # Seven nodes on a busy machine may take longer for an answer than the 500 ms that are waited for.
+    assert eventually(fn -> Cluster.call(one, Swarm, :stop, [far.name]) == :ok end)
     assert far.node not in linked(one)
   end
 
