@@ -139,11 +139,25 @@ defmodule Hal.Camera.FFmpeg do
   defp end_reason(status, _count, words) do
     case words |> printable() |> String.split("\n", trim: true) |> Enum.reject(&hint?/1) do
       [] -> {:unreadable, "status #{status}, no frame"}
-      lines -> {:unreadable, lines |> List.last() |> String.trim()}
+      lines -> {:unreadable, lines |> reason() |> String.trim()}
     end
   end
 
   defp hint?(line), do: String.starts_with?(line, "To ignore this")
+
+  # The last line is the reason, but ffmpeg 7 goes on to say of which file and option it was.
+  @echoes [
+    "Error opening input file",
+    "Error opening output file",
+    "Error parsing options for",
+    "Failed to set value"
+  ]
+
+  defp reason(lines) do
+    reason = lines |> Enum.reverse() |> Enum.find(&(not String.starts_with?(&1, @echoes)))
+    # Which part of ffmpeg says it, at which address, as in "[in#0 @ 0x5575da885000] ".
+    Regex.replace(~r/^\[[^\]]* @ 0x[^\]]*\] /, reason || List.last(lines), "")
+  end
 
   # Names of files come in any encoding.
   defp printable(words),

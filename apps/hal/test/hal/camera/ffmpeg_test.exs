@@ -126,10 +126,10 @@ defmodule Hal.Camera.FFmpegTest do
     assert FFmpeg.init(source: "no/such/file.png") == {:error, :enoent}
     assert FFmpeg.init(source: "/dev/video77") == {:error, :enoent}
     assert {:unreadable, words} = take(open(source: "/dev/null", norm: :pal, input: 1))
-    assert words =~ "Inappropriate ioctl"
+    assert words =~ ~r/^[^\[].*: Inappropriate ioctl/
     assert FFmpeg.init(source: "lib") == {:error, :eisdir}
     assert {:unreadable, words} = take(open(source: "mix.exs"))
-    assert words =~ "Invalid data"
+    assert words =~ ~r/^[^\[].*: Invalid data/
     assert {:unreadable, "Stream map" <> _} = take(open(source: "lavfi:anullsrc"))
     assert take(open(source: "testsrc", ffmpeg: "/no/such/ffmpeg")) == :no_ffmpeg
     assert take(open(source: "testsrc", ffmpeg: "/bin/echo")) |> elem(0) == :unreadable
