@@ -48,9 +48,11 @@ defmodule Robot.BoardTest do
     assert age_ms in 0..1_000
   end
 
+  @tag :capture_log
   test "two robots of one name cannot be" do
     board(:board4)
-
+    # It is linked before it finds that it is the second.
+    Process.flag(:trap_exit, true)
     assert {:error, {:already_started, _pid}} = Board.start_link(config(:board4))
 
     assert Board.find(:nobody) == :error
