@@ -35,19 +35,20 @@ defmodule Hal.RFlexBase do
   @doc "The commands in these bytes as `{name, values}`, and the rest. What is none is passed over."
   def commands(bytes, found \\ [])
 
+  def commands(
+        <<0x1B, 2, port, id, opcode, n, data::binary-size(n), sum, 0x1B, 3, rest::binary>> =
+          bytes,
+        found
+      ) do
+    ^bytes = report(port, opcode, data, id) <> rest
+    ^sum = :binary.at(bytes, 6 + n)
+    commands(rest, [command(port, opcode, data) | found])
+  end
+
   def commands(<<0x1B, 2, port, id, opcode, n, rest::binary>> = bytes, found) do
-    case rest do
-      <<data::binary-size(n), sum, 0x1B, 3, rest::binary>> ->
-        ^bytes = report(port, opcode, data, id) <> rest
-        ^sum = :binary.at(bytes, 6 + n)
-        commands(rest, [command(port, opcode, data) | found])
-
-      _unfinished when byte_size(rest) < n + 3 ->
-        {Enum.reverse(found), bytes}
-
-      _other ->
-        commands(<<2, port, id, opcode, n, rest::binary>>, found)
-    end
+    if byte_size(rest) < n + 3,
+      do: {Enum.reverse(found), bytes},
+      else: commands(<<2, port, id, opcode, n, rest::binary>>, found)
   end
 
   def commands(bytes, found) when byte_size(bytes) < 6, do: {Enum.reverse(found), bytes}

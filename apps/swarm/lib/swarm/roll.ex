@@ -52,18 +52,12 @@ defmodule Swarm.Roll do
   def all_but?(roll, all, id) do
     case :binary.match(all, entry(id)) do
       {at, length} ->
-        rest = byte_size(all) - at - length
+        front = binary_part(all, 0, at)
+        back = binary_part(all, at + length, byte_size(all) - at - length)
 
-        case roll do
-          <<>> ->
-            at + rest == 0
-
-          <<front::binary-size(at), 0, back::binary-size(rest)>> ->
-            front == binary_part(all, 0, at) and back == binary_part(all, at + length, rest)
-
-          _other ->
-            false
-        end
+        if roll == <<>>,
+          do: front == <<>> and back == <<>>,
+          else: roll == <<front::binary, 0, back::binary>>
 
       :nomatch ->
         roll == all

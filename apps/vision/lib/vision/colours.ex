@@ -142,7 +142,7 @@ defmodule Vision.Colours do
   end
 
   defp entry(tables, index) do
-    <<_::binary-size(4 * index), mask::32-native, _::binary>> = tables
+    <<mask::32-native>> = binary_part(tables, 4 * index, 4)
     mask
   end
 

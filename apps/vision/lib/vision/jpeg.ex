@@ -60,7 +60,7 @@ defmodule Vision.Jpeg do
   def take(buffer, longest) do
     case :binary.match(buffer, "\r\n\r\n", scope: {0, min(byte_size(buffer), @longest_head)}) do
       {at, 4} ->
-        <<head::binary-size(at), _blank::32, body::binary>> = buffer
+        {head, <<_blank::32, body::binary>>} = :erlang.split_binary(buffer, at)
         body(length_of(head), body, longest)
 
       :nomatch ->
@@ -80,7 +80,7 @@ defmodule Vision.Jpeg do
   defp body(length, body, longest) when length in 4..longest//1 do
     case body do
       <<0xFF, 0xD8, _::binary>> when byte_size(body) >= length ->
-        <<jpeg::binary-size(length), rest::binary>> = body
+        {jpeg, rest} = :erlang.split_binary(body, length)
         # So that a small picture does not hold the whole buffer.
         {:ok, :binary.copy(jpeg), :binary.copy(rest)}
 

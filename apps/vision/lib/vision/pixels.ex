@@ -37,7 +37,7 @@ defmodule Vision.Pixels do
 
   def yuv(%Frame{format: :yuv444, width: w, height: h, bytes: bytes}) do
     size = w * h
-    <<y::binary-size(size), u::binary-size(size), v::binary-size(size)>> = bytes
+    [y, u, v] = for plane <- 0..2, do: binary_part(bytes, plane * size, size)
     Enum.zip([:binary.bin_to_list(y), :binary.bin_to_list(u), :binary.bin_to_list(v)])
   end
 

@@ -77,7 +77,7 @@ defmodule Hal.RFlex.Decoder do
   end
 
   defp start(decoder, bytes, at, idle?, packets) do
-    <<_before::binary-size(at), 0x1B, 0x02, body::binary>> = bytes
+    {_before, <<0x1B, 0x02, body::binary>>} = :erlang.split_binary(bytes, at)
 
     case frame(body, decoder, idle?) do
       {:ok, packet, rest, decoder} ->
@@ -89,7 +89,7 @@ defmodule Hal.RFlex.Decoder do
         done(%{decoder | rest: rest}, packets)
 
       :no ->
-        <<_::binary-size(at), _, rest::binary>> = bytes
+        {_, <<_, rest::binary>>} = :erlang.split_binary(bytes, at)
         decoder = %{decoder | given_up: decoder.given_up + 1, skipped: decoder.skipped + 1}
         run(decoder, rest, idle?, packets)
     end
@@ -137,15 +137,14 @@ defmodule Hal.RFlex.Decoder do
 
   defp plain(_short), do: :more
 
+  defp finish(_tag, _head, n, rest) when byte_size(rest) < n + 3, do: :more
+
   defp finish(tag, {port, id, opcode} = head, n, rest) do
-    case rest do
-      <<data::binary-size(n), sum, 0x1B, 0x03, rest::binary>> ->
+    case :erlang.split_binary(rest, n) do
+      {data, <<sum, 0x1B, 0x03, rest::binary>>} ->
         if sum(head, n, data) == sum,
           do: {tag, packet(port, id, opcode, data), rest},
           else: :no
-
-      _ when byte_size(rest) < n + 3 ->
-        :more
 
       _other ->
         :no
@@ -223,25 +222,24 @@ defmodule Hal.RFlex.Decoder do
   defp after_length(_other), do: :no
 
   # One ghost after any 1B of N, data or checksum: its place does not change the checksum.
-  defp single(<<port, id, opcode, n, rest::binary>>, ghost) do
-    case rest do
-      <<data::binary-size(n), extra, sum, 0x1B, 0x03, rest::binary>> ->
-        body = <<n, data::binary, extra, sum>>
+  defp single(
+         <<port, id, opcode, n, data::binary-size(n), extra, sum, 0x1B, 0x03, rest::binary>>,
+         ghost
+       ) do
+    body = <<n, data::binary, extra, sum>>
 
-        with true <- Packet.checksum(<<port, id, opcode, body::binary>>) == ghost || :no,
-             {at, 2} <- :binary.match(body, <<0x1B, ghost>>) do
-          <<before::binary-size(at), 0x1B, _ghost, behind::binary>> = body
-          <<_n, clean::binary>> = <<before::binary, 0x1B, behind::binary>>
-          {:ghost, packet(port, id, opcode, binary_part(clean, 0, n)), rest}
-        else
-          _none -> :no
-        end
-
-      _ when byte_size(rest) < n + 4 ->
-        if possible?(port, opcode, n), do: :more, else: :no
-
-      _other ->
-        :no
+    with true <- Packet.checksum(<<port, id, opcode, body::binary>>) == ghost || :no,
+         {at, 2} <- :binary.match(body, <<0x1B, ghost>>) do
+      {before, <<0x1B, _ghost, behind::binary>>} = :erlang.split_binary(body, at)
+      <<_n, clean::binary>> = <<before::binary, 0x1B, behind::binary>>
+      {:ghost, packet(port, id, opcode, binary_part(clean, 0, n)), rest}
+    else
+      _none -> :no
     end
   end
+
+  defp single(<<port, _id, opcode, n, rest::binary>>, _ghost) when byte_size(rest) < n + 4,
+    do: if(possible?(port, opcode, n), do: :more, else: :no)
+
+  defp single(_body, _ghost), do: :no
 end

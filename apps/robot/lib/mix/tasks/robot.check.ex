@@ -45,7 +45,7 @@ defmodule Mix.Tasks.Robot.Check do
          {:ok, _config} <- Robot.File.config(robot) do
       Enum.each(
         ["#{file}: well" | Enum.map(Summary.lines(robot), &"  #{&1}")],
-        &Mix.shell().info/1
+        fn line -> Mix.shell().info(line) end
       )
 
       []
@@ -56,7 +56,7 @@ defmodule Mix.Tasks.Robot.Check do
   end
 
   defp refuse(lines) do
-    Enum.each(lines, &Mix.shell().error/1)
+    Enum.each(lines, fn line -> Mix.shell().error(line) end)
     exit({:shutdown, 1})
   end
 end

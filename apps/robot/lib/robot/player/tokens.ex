@@ -45,7 +45,7 @@ defmodule Robot.Player.Tokens do
 
   defp cut(<<c, _::binary>> = text, line, done) when c in 0x21..0x7E do
     length = word_length(text, 0)
-    <<word::binary-size(length), rest::binary>> = text
+    {word, rest} = :erlang.split_binary(text, length)
 
     cond do
       length > @longest -> {:error, {line, "no word is as long as #{binary_part(word, 0, 40)}…"}}

@@ -11,7 +11,8 @@ defmodule Sim.Kernel.Native do
   end
 
   @spec loaded?() :: boolean()
-  def loaded?, do: false
+  # The library replaces this. A plain `false` would tell compilers that infer types that it never is.
+  def loaded?, do: not function_exported?(__MODULE__, :loaded?, 0)
 
   @spec field(binary(), pos_integer(), pos_integer()) :: binary()
   def field(_walls, _width, _height), do: :erlang.nif_error(:nif_not_loaded)

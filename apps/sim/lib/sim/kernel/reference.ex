@@ -10,8 +10,10 @@ defmodule Sim.Kernel.Reference do
   @spec field(binary(), pos_integer(), pos_integer()) :: binary()
   def field(walls, width, _height) do
     rows =
-      for <<row::binary-size(width) <- walls>>,
-        do: for(<<cell <- row>>, do: if(cell == 0, do: 255, else: 0))
+      for <<cell <- walls>> do
+        if cell == 0, do: 255, else: 0
+      end
+      |> Enum.chunk_every(width)
 
     edge = List.duplicate(0, width)
     down = rows |> sweep(edge) |> Enum.map(&Enum.reverse/1)
@@ -84,7 +86,7 @@ defmodule Sim.Kernel.Reference do
     columns = for u <- 0..(width - 1), do: Columns.column(map, sight, poles, u, :walls)
     half = Enum.take_every(columns, 2)
     size = div(byte_size(tables), 2)
-    <<luma::binary-size(size), chroma::binary>> = tables
+    {luma, chroma} = :erlang.split_binary(tables, size)
 
     [
       for(v <- 0..(height - 1), do: row(columns, v, height, noise, 0x40000 + v, luma))
@@ -121,7 +123,7 @@ defmodule Sim.Kernel.Reference do
       plane ->
         hash = Noise.hash(seed, step, robot, 0x70000 + n)
         at = rem(hash, size)
-        <<before::binary-size(at), _, rest::binary>> = plane
+        {before, <<_, rest::binary>>} = :erlang.split_binary(plane, at)
         <<before::binary, if(hash >= 0x80000000, do: 235, else: 16), rest::binary>>
     end
   end
@@ -154,7 +156,7 @@ defmodule Sim.Kernel.Reference do
     start = rem(Noise.hash(seed, step, robot, use), 4096)
 
     fn u ->
-      <<_::binary-size(start + u), draw::8-signed, _::binary>> = table
+      <<draw::8-signed>> = binary_part(table, start + u, 1)
       draw
     end
   end

@@ -61,7 +61,10 @@ defmodule Sim.Map.Pgm do
     end
   end
 
-  defp cut(pixels, width), do: for(<<row::binary-size(width) <- pixels>>, do: row)
+  defp cut(pixels, width) do
+    for row <- 0..(div(byte_size(pixels), width) - 1)//1,
+        do: binary_part(pixels, row * width, width)
+  end
 
   defp wall(grey, most) when grey * 255 < 128 * most, do: <<1>>
   defp wall(_grey, _most), do: <<0>>

@@ -103,7 +103,7 @@ defmodule Sim.Map.Png do
 
     {rows, _} =
       Enum.map_reduce(0..(height - 1), zero, fn j, above ->
-        <<filter, row::binary-size(stride)>> = binary_part(bytes, j * (stride + 1), stride + 1)
+        <<filter, row::binary>> = binary_part(bytes, j * (stride + 1), stride + 1)
         row = unfilter(filter, :binary.bin_to_list(row), above, pixel)
         {row, row}
       end)
@@ -152,18 +152,24 @@ defmodule Sim.Map.Png do
   # An unknown filter is left as it is; the picture will look wrong, not crash.
   defp guess(_unknown, _a, _b, _c), do: 0
 
+  for depth <- [1, 2, 4, 8, 16] do
+    defp samples(bytes, unquote(depth)), do: for(<<s::size(unquote(depth)) <- bytes>>, do: s)
+  end
+
   defp walls(row, {width, _, depth, type}, palette) do
     bytes = :binary.list_to_bin(row)
 
     case type do
       0 ->
-        for <<grey::size(depth) <- bytes>>, into: <<>>, do: wall(2 * grey < Bitwise.bsl(1, depth))
+        for grey <- samples(bytes, depth),
+            into: <<>>,
+            do: wall(2 * grey < Bitwise.bsl(1, depth))
 
       2 ->
         for <<rgb::binary-size(3) <- bytes>>, into: <<>>, do: wall(dark(rgb, 255))
 
       3 ->
-        for <<k::size(depth) <- bytes>>, into: <<>>, do: wall(Map.get(palette, k, true))
+        for k <- samples(bytes, depth), into: <<>>, do: wall(Map.get(palette, k, true))
 
       4 ->
         for <<grey, alpha <- bytes>>, into: <<>>, do: wall(dark(<<grey, grey, grey>>, alpha))

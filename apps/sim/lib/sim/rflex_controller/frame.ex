@@ -67,10 +67,10 @@ defmodule Sim.RFlexController.Frame do
 
   defp read(<<_start::16, _ids::24, size, rest::binary>> = bytes, frames, bad)
        when size > @longest or byte_size(rest) >= size + 3 do
-    case rest do
-      <<data::binary-size(size), sum, 0x1B, 0x03, rest::binary>> when size <= @longest ->
-        <<_start::16, inside::binary-size(size + 4), _::binary>> = bytes
-        <<port, id, opcode, _size, _data::binary>> = inside
+    case bytes do
+      <<_start::16, port, id, opcode, n, data::binary-size(n), sum, 0x1B, 0x03, rest::binary>>
+      when n <= @longest ->
+        inside = <<port, id, opcode, n, data::binary>>
 
         if sum(inside) == sum,
           do: cut(rest, [{port, id, opcode, data} | frames], bad),

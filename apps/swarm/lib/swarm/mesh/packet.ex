@@ -139,8 +139,7 @@ defmodule Swarm.Mesh.Packet do
   defp kind(_other), do: {:error, :version}
 
   defp signed(datagram, key) do
-    length = byte_size(datagram) - @mac
-    <<body::binary-size(length), mac::binary>> = datagram
+    {body, mac} = :erlang.split_binary(datagram, byte_size(datagram) - @mac)
     if :crypto.hash_equals(mac, mac(key, body)), do: :ok, else: {:error, :unsigned}
   end
 

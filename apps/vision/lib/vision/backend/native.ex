@@ -23,7 +23,8 @@ defmodule Vision.Backend.Native do
 
   @doc "Whether the C library was built and loaded."
   @spec loaded?() :: boolean()
-  def loaded?, do: false
+  # The library replaces this. A plain `false` would tell compilers that infer types that it never is.
+  def loaded?, do: not function_exported?(__MODULE__, :loaded?, 0)
 
   @impl Vision.Backend
   def reads?(format), do: is_map_key(@formats, format) and loaded?()

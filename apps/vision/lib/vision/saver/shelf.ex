@@ -88,9 +88,9 @@ defmodule Vision.Saver.Shelf do
   """
   @spec time_ms(prefix :: String.t(), name :: String.t()) :: integer() | nil
   def time_ms(prefix, name) do
-    size = byte_size(prefix)
-
-    with <<^prefix::binary-size(size), ?-, time::binary-size(20), ".jpg">> <- name,
+    with true <- String.starts_with?(name, prefix),
+         {_prefix, <<?-, time::binary-size(20), ".jpg">>} <-
+           :erlang.split_binary(name, byte_size(prefix)),
          <<y::binary-4, mo::binary-2, d::binary-2, ?T, h::binary-2, mi::binary-2, s::binary-2, ?.,
            ms::binary-3, ?Z>> <- time,
          {:ok, time, 0} <- DateTime.from_iso8601("#{y}-#{mo}-#{d}T#{h}:#{mi}:#{s}.#{ms}Z") do

@@ -26,19 +26,20 @@ defmodule Console.Bench.Stop.Reader do
   @spec feed(t(), binary()) :: {[event()], t()}
   def feed(rest, bytes), do: read(rest <> bytes, [])
 
-  defp read(<<0x1B, 2, port, id, opcode, n, more::binary>> = bytes, events) do
-    case more do
-      <<data::binary-size(n), sum, 0x1B, 3, rest::binary>> ->
-        if sum == checksum(<<port, id, opcode, n, data::binary>>),
-          do: read(rest, event(port, opcode, data) ++ events),
-          else: skip(bytes, events)
+  defp read(
+         <<0x1B, 2, port, id, opcode, n, data::binary-size(n), sum, 0x1B, 3, rest::binary>> =
+           bytes,
+         events
+       ) do
+    if sum == checksum(<<port, id, opcode, n, data::binary>>),
+      do: read(rest, event(port, opcode, data) ++ events),
+      else: skip(bytes, events)
+  end
 
-      _other when byte_size(more) >= n + 3 ->
-        skip(bytes, events)
-
-      _unfinished ->
-        {Enum.reverse(events), bytes}
-    end
+  defp read(<<0x1B, 2, _port, _id, _opcode, n, more::binary>> = bytes, events) do
+    if byte_size(more) >= n + 3,
+      do: skip(bytes, events),
+      else: {Enum.reverse(events), bytes}
   end
 
   # The beginning of a frame, perhaps.
