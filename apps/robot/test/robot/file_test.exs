@@ -318,7 +318,7 @@ defmodule Robot.FileTest do
     for _ <- 1..1_000 do
       at = :rand.uniform(byte_size(text)) - 1
       cut = :rand.uniform(8) - 1
-      <<head::binary-size(at), rest::binary>> = text
+      {head, rest} = :erlang.split_binary(text, at)
 
       rest =
         binary_part(rest, min(cut, byte_size(rest)), byte_size(rest) - min(cut, byte_size(rest)))

@@ -179,8 +179,9 @@ defmodule Robot.ReflexTest do
         since = reflex.at_ms
         {twist, limits, reflex} = Reflex.step(reflex, at_ms)
 
-        assert is_float(twist.linear) and abs(twist.linear) <= profile.max_linear
-        assert is_float(twist.turn) and abs(twist.turn) <= profile.max_turn
+        assert Enum.all?([twist.linear, twist.turn], &is_float/1)
+        assert abs(twist.linear) <= profile.max_linear
+        assert abs(twist.turn) <= profile.max_turn
         seconds = if since, do: min(at_ms - since, 200) / 1000, else: 0.05
         dv = profile.max_acceleration * seconds + 1.0e-9
         dw = profile.max_turn_acceleration * seconds + 1.0e-9

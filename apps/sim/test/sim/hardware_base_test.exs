@@ -76,9 +76,30 @@ defmodule Sim.HardwareBaseTest do
     end
   end
 
-  defp stop(%{device: device, server: server}) do
+  # What it was told and what the wheels do, for one that does not stop in time.
+  defp stop(%{device: device, server: server, emulator: emulator}) do
     Device.drive(device, Twist.zero())
-    eventually(fn -> still?(server) end, 5_000)
+    deadline = System.monotonic_time(:millisecond) + 5_000
+
+    eventually(
+      fn ->
+        still?(server) ||
+          (System.monotonic_time(:millisecond) > deadline and
+             flunk(
+               "it does not stand: #{inspect(body(server).speed)}, health #{inspect(newest_health())}, " <>
+                 inspect(Emulator.core(emulator), limit: :infinity)
+             ))
+      end,
+      6_000
+    )
+  end
+
+  defp newest_health(last \\ nil) do
+    receive do
+      {:health, :drive, health} -> newest_health(health)
+    after
+      0 -> last
+    end
   end
 
   # The newest of these readings.

@@ -161,9 +161,11 @@ defmodule Sim.MapTest do
           for <<rgb::binary-size(3) <- row>>, into: <<>>, do: grey.(luma.(rgb) < 128 - 1.0e-9)
 
         {_, 3} ->
-          for <<k::size(depth) <- row>>,
-            into: <<>>,
-            do: grey.(luma.(binary_part(palette, 3 * k, 3)) < 128 - 1.0e-9)
+          bits = for <<bit::1 <- row>>, do: bit
+
+          for k <- bits |> Enum.chunk_every(depth) |> Enum.map(&Integer.undigits(&1, 2)),
+              into: <<>>,
+              do: grey.(luma.(binary_part(palette, 3 * k, 3)) < 128 - 1.0e-9)
 
         {8, 4} ->
           for <<y, a <- row>>, into: <<>>, do: grey.(255 - a / 255 * (255 - y) < 128 - 1.0e-9)
@@ -246,7 +248,7 @@ defmodule Sim.MapTest do
 
     for _ <- 1..500 do
       at = :rand.uniform(byte_size(bytes)) - 1
-      <<before::binary-size(at), _, rest::binary>> = bytes
+      {before, <<_, rest::binary>>} = :erlang.split_binary(bytes, at)
 
       assert {what, _} =
                Png.decode(<<before::binary, :rand.uniform(256) - 1, rest::binary>>, 1_000)

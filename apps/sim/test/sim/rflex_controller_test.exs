@@ -396,7 +396,7 @@ defmodule Sim.RFlexControllerTest do
       good = hex(@release) <> hex(@forward)
 
       for split <- 0..byte_size(good) do
-        <<first::binary-size(split), second::binary>> = good
+        {first, second} = :erlang.split_binary(good, split)
         core = controller() |> Controller.hear(first, 0) |> Controller.hear(second, 10)
         assert core.counts.frames == 2
       end

@@ -269,7 +269,7 @@ defmodule Sim.ViscaCameraTest do
     packet = hex("81 01 06 02 18 14 0f 0e 0f 08 0f 0f 08 08 ff")
 
     for split <- 0..byte_size(packet) do
-      <<a::binary-size(split), b::binary>> = packet
+      {a, b} = :erlang.split_binary(packet, split)
       {text, _} = camera() |> Camera.hear(a, 0) |> Camera.hear(b, 5) |> told(30)
       assert text == "90 41 ff"
     end

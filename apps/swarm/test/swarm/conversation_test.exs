@@ -178,7 +178,7 @@ defmodule Swarm.ConversationTest do
 
     for ask <- [
           fn -> Conversation.request({:a, :b}, question(1), -1) end,
-          fn -> Conversation.request({:a, :b}, question(1), :infinity) end,
+          fn -> apply(Conversation, :request, [{:a, :b}, question(1), :infinity]) end,
           fn -> Conversation.gather([], question(1), 1.0e308) end,
           fn -> Conversation.gather(:a, question(1), 1) end,
           fn -> Conversation.gather([:a | :b], question(1), 1) end,

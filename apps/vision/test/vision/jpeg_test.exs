@@ -21,7 +21,7 @@ defmodule Vision.JpegTest do
 
   defp pieces(stream) do
     size = min(:rand.uniform(90), byte_size(stream))
-    <<piece::binary-size(size), rest::binary>> = stream
+    {piece, rest} = :erlang.split_binary(stream, size)
     [piece | pieces(rest)]
   end
 

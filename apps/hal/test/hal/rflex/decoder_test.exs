@@ -30,7 +30,7 @@ defmodule Hal.RFlex.DecoderTest do
 
   defp cut(bytes) do
     n = min(:rand.uniform(40), byte_size(bytes))
-    <<piece::binary-size(n), rest::binary>> = bytes
+    {piece, rest} = :erlang.split_binary(bytes, n)
     [piece | cut(rest)]
   end
 
@@ -48,7 +48,7 @@ defmodule Hal.RFlex.DecoderTest do
   defp ghostly(packet, parts, ghost \\ 0x1B) do
     <<0x1B, 2, head::binary-3, n, rest::binary>> = Packet.encode(packet)
     size = byte_size(rest) - 3
-    <<data::binary-size(size), sum, 0x1B, 3>> = rest
+    {data, <<sum, 0x1B, 3>>} = :erlang.split_binary(rest, size)
     double = fn bytes -> :binary.replace(bytes, <<0x1B>>, <<0x1B, ghost>>, [:global]) end
     part = fn bytes, name -> if name in parts, do: double.(bytes), else: bytes end
 
@@ -130,7 +130,7 @@ defmodule Hal.RFlex.DecoderTest do
         places ->
           {at, 1} = Enum.random(places)
           packet = %Packet{port: 2, opcode: 33, data: data}
-          <<before::binary-size(at), 0x1B, behind::binary>> = data
+          {before, <<0x1B, behind::binary>>} = :erlang.split_binary(data, at)
           <<head::binary-6, _::binary-25, tail::binary>> = Packet.encode(packet)
           bytes = head <> before <> <<0x1B, 0x1B>> <> behind <> tail
           assert {[^packet], %{ghosts: 1}} = all(bytes)
@@ -192,7 +192,7 @@ defmodule Hal.RFlex.DecoderTest do
       packet = %{packet(false) | port: 2, opcode: 33}
       frame = Packet.encode(packet)
       at = :rand.uniform(byte_size(frame)) - 1
-      <<before::binary-size(at), byte, behind::binary>> = frame
+      {before, <<byte, behind::binary>>} = :erlang.split_binary(frame, at)
 
       bytes =
         case rem(n, 3) do

@@ -94,7 +94,7 @@ defmodule Hal.Serial.PortTest do
 
   defp write_some(line, bytes) do
     size = min(:rand.uniform(2000), byte_size(bytes))
-    <<chunk::binary-size(size), rest::binary>> = bytes
+    {chunk, rest} = :erlang.split_binary(bytes, size)
 
     case Serial.write(line, chunk) do
       :ok -> write_some(line, rest)

@@ -154,7 +154,7 @@ defmodule Hal.Visca.DecoderTest do
 
   defp pieces(stream, size, {replies, decoder}) do
     n = min(size.(), byte_size(stream))
-    <<piece::binary-size(n), rest::binary>> = stream
+    {piece, rest} = :erlang.split_binary(stream, n)
     {more, decoder} = Decoder.feed(decoder, piece)
     pieces(rest, size, {replies ++ more, decoder})
   end

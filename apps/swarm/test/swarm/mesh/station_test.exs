@@ -233,7 +233,7 @@ defmodule Swarm.Mesh.StationTest do
 
   defp flip(datagram) do
     at = :rand.uniform(byte_size(datagram)) - 1
-    <<head::binary-size(at), byte, tail::binary>> = datagram
+    {head, <<byte, tail::binary>>} = :erlang.split_binary(datagram, at)
     <<head::binary, Bitwise.bxor(byte, :rand.uniform(255)), tail::binary>>
   end
 
