@@ -176,17 +176,17 @@ defmodule Swarm.ConversationTest do
   test "who asks in a wrong way is told so in one line" do
     alias Swarm.Topic
 
-    for ask <- [
-          fn -> Conversation.request({:a, :b}, question(1), -1) end,
-          fn -> apply(Conversation, :request, [{:a, :b}, question(1), :infinity]) end,
-          fn -> Conversation.gather([], question(1), 1.0e308) end,
-          fn -> Conversation.gather(:a, question(1), 1) end,
-          fn -> Conversation.gather([:a | :b], question(1), 1) end,
-          fn -> Conversation.gather([], question(1), 1, :half) end,
-          fn -> Conversation.gather([], question(1), 1, -1) end,
-          fn -> Topic.next(self(), 5_000_000_000) end
+    for {module, function, arguments} <- [
+          {Conversation, :request, [{:a, :b}, question(1), -1]},
+          {Conversation, :request, [{:a, :b}, question(1), :infinity]},
+          {Conversation, :gather, [[], question(1), 1.0e308]},
+          {Conversation, :gather, [:a, question(1), 1]},
+          {Conversation, :gather, [[:a | :b], question(1), 1]},
+          {Conversation, :gather, [[], question(1), 1, :half]},
+          {Conversation, :gather, [[], question(1), 1, -1]},
+          {Topic, :next, [self(), 5_000_000_000]}
         ] do
-      assert %ArgumentError{message: line} = catch_error(ask.())
+      assert %ArgumentError{message: line} = catch_error(apply(module, function, arguments))
       refute line =~ "\n"
     end
   end
