@@ -4,15 +4,16 @@ defmodule Hal.Arming do
 
   | state | the wheels | until |
   |---|---|---|
-  | `:disarmed` | stand | a person arms, or, with `:auto`, the driver is open and ready |
-  | `:armed` | may turn | a person disarms, or the line is lost |
+  | `:disarmed` | stand | a person arms, or, with `:auto`, the drive is ready |
+  | `:armed` | may turn | a person disarms, the drive is not ready any more, or the line is lost |
   | `{:error, reason}` | stand | a person acknowledges that the line was lost while they turned |
 
   With the policy `:manual` (real robots) nothing arms but a person, after each start and each loss
   of the line. With `:auto` (simulated ones) it arms by itself, and a loss is no error; but where a
   person has disarmed, only a person arms. With `:never` nobody arms: a dry run.
 
-  `why` is what is missing: a line of the driver's own (`c:Hal.Drive.ready/1`), or `nil`.
+  A drive is ready while its line is open, its driver lacks nothing (`c:Hal.Drive.ready/1`) and its base's
+  reports are fresh (`Hal.Reports`). `why` is the line that says what is missing, or `nil`.
   """
   alias Hal.{Odometry, Twist}
 
@@ -30,7 +31,7 @@ defmodule Hal.Arming do
 
   @type policy :: :auto | :manual | :never
   @type state :: :disarmed | :armed | {:error, reason :: term()}
-  @typedoc "What the driver says of itself; one that is closed is not ready."
+  @typedoc "Whether the drive is ready: its line open, its driver without a lack, its base's reports fresh."
   @type readiness :: :ok | {:error, line :: String.t()}
   @type order :: :arm | :disarm | :acknowledge
 
@@ -56,7 +57,7 @@ defmodule Hal.Arming do
   def new(policy) when policy in [:auto, :manual], do: %__MODULE__{policy: policy}
 
   @doc """
-  The driver is open, and says whether it may be armed.
+  Whether the drive is ready now. One that is not any more is disarmed.
 
       iex> Hal.Arming.new(:auto) |> Hal.Arming.ready(:ok) |> Map.fetch!(:state)
       :armed
@@ -64,6 +65,10 @@ defmodule Hal.Arming do
       :disarmed
       iex> Hal.Arming.new(:auto) |> Hal.Arming.ready({:error, "distance is missing"}) |> Map.take([:state, :why])
       %{state: :disarmed, why: "distance is missing"}
+      iex> {:ok, armed} = Hal.Arming.order(Hal.Arming.new(:manual), :arm, :ok)
+      iex> silent = Hal.Arming.ready(armed, {:error, "its base reports nothing"})
+      iex> {silent.state, Hal.Arming.ready(silent, :ok).state}
+      {:disarmed, :disarmed}
   """
   @spec ready(t(), readiness()) :: t()
   def ready(%__MODULE__{policy: :never} = arming, _readiness), do: arming
@@ -72,7 +77,10 @@ defmodule Hal.Arming do
     do: %{arming | state: :armed, why: nil}
 
   def ready(%__MODULE__{state: :disarmed} = arming, :ok), do: %{arming | why: nil}
-  def ready(%__MODULE__{state: :disarmed} = arming, {:error, line}), do: %{arming | why: line}
+
+  def ready(%__MODULE__{state: state} = arming, {:error, line}) when state in [:disarmed, :armed],
+    do: %{arming | state: :disarmed, why: line}
+
   def ready(%__MODULE__{} = arming, _readiness), do: arming
 
   @doc """

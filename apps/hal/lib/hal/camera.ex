@@ -26,6 +26,11 @@ defmodule Hal.Camera do
   @callback handle_message(term(), state :: term()) ::
               {:ok, [reading()], term()} | {:error, term(), term()}
 
+  @doc "An error that it gave with these options, in one line for people."
+  @callback explain(reason :: term(), options :: keyword()) :: String.t()
+
   @doc "Closes the source."
   @callback terminate(state :: term()) :: :ok
+
+  @optional_callbacks explain: 2
 end

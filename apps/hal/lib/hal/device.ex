@@ -11,8 +11,17 @@ defmodule Hal.Device do
       health is the reading `{:health, device, {:online | {:offline, reason}, since_ms}}`
     * `:device` - what it is called in its health, by default its kind
     * `:arm` - of a drive: `:auto` (the default), `:manual` or `:never`, see below
+    * `:sonar` - of a drive: whether its base has sonars (default false), without which it is not armed
+    * `:about` - a map that its events have beside their own, such as `%{robot: :mag1}`
     * `:name` - as in `GenServer`
     * `:clock` - `{m, f, a}` giving integer milliseconds
+
+  ## Online
+
+  A camera or a pan-tilt unit is online when its driver has opened it. A drive is online once its base has
+  reported its wheels since then, and as long as it does (`Hal.Reports`): of a line that is silent, full of noise,
+  or leads to a base that hears and never answers, nobody knows where its wheels are. It is offline then
+  with the reason `:silent`, though its driver is open and goes on asking.
 
   ## When a driver fails
 
@@ -35,13 +44,14 @@ defmodule Hal.Device do
   dead man's switch of whoever drives, for the case that this one is gone or stuck.
 
   They turn only while the drive is armed (`Hal.Arming`): what is asked for before is a stop, and
-  counted. With `arm: :auto` the drive arms whenever its driver is open and ready; with `:manual` a
-  person does, after every start, by `arm/1`; with `:never` it stands, as in a dry run. If the line is lost while they turn, `acknowledge/1`
+  counted. With `arm: :auto` the drive arms whenever its driver is open and ready and its base's reports are
+  fresh; with `:manual` a person does, after every start, by `arm/1`; with `:never` it stands, as in a dry run.
+  Reports that grow old stop and disarm it. If the line is lost while they turn, `acknowledge/1`
   comes first. How it stands is the reading `{:arming, %{state: state, why: line or nil}}`.
   """
   use GenServer
-  alias Hal.{Arming, Event, Twist}
-  alias Hal.Device.Options
+  alias Hal.{Arming, Event, Reports, Twist}
+  alias Hal.Device.{Options, Words}
 
   @retry_ms 100
   @longest_retry_ms 5_000
@@ -60,7 +70,11 @@ defmodule Hal.Device do
                 watchdog: nil,
                 arming: nil,
                 armed_as: nil,
-                wishes: %{}
+                wishes: %{},
+                about: %{},
+                sonar?: false,
+                reports: nil,
+                listening: nil
               ]
 
   @type kind :: :drive | :ptz | :camera
@@ -182,15 +196,20 @@ defmodule Hal.Device do
 
   def handle_info({:watchdog, _old}, s), do: {:noreply, s}
 
+  def handle_info({:listen, ref}, %{listening: ref, inner: {:open, _}} = s),
+    do: {:noreply, s |> judge() |> listen()}
+
+  def handle_info({:listen, _old}, s), do: {:noreply, s}
+
   def handle_info(message, %{inner: {:open, inner}} = s) do
     case s.driver.handle_message(message, inner) do
       {:ok, [], inner} ->
-        {:noreply, ready(%{s | inner: {:open, inner}})}
+        {:noreply, judge(%{s | inner: {:open, inner}})}
 
       {:ok, readings, inner} ->
         for reading <- readings, do: hand_on(s, reading)
         s = %{s | inner: {:open, inner}, retry_ms: @retry_ms}
-        {:noreply, s |> measured(readings) |> ready() |> ask()}
+        {:noreply, s |> measured(readings) |> judge() |> ask()}
 
       {:error, reason, inner} ->
         {:noreply, fail(s, reason, inner)}
@@ -224,7 +243,7 @@ defmodule Hal.Device do
   defp open(s) do
     case s.driver.init(s.options) do
       {:ok, inner} ->
-        %{s | inner: {:open, inner}} |> report(:online) |> ready() |> ask() |> remind()
+        %{s | inner: {:open, inner}} |> opened() |> judge() |> listen() |> ask() |> remind()
 
       {:error, reason} ->
         s |> report({:offline, reason}) |> tell_arming() |> retry()
@@ -240,23 +259,54 @@ defmodule Hal.Device do
     end
   end
 
-  # A driver may become ready while it is open, or tell another thing that is missing.
-  defp ready(%{kind: :drive, arming: %{state: :disarmed}} = s),
-    do: become(s, Arming.ready(s.arming, readiness(s)))
+  # An open line says nothing of a base.
+  defp opened(%{kind: :drive} = s), do: %{s | reports: Reports.new(s.sonar?, now(s))}
+  defp opened(s), do: report(s, :online)
 
-  defp ready(s), do: s
-
-  defp readiness(%{inner: {:open, inner}} = s) do
-    if function_exported?(s.driver, :ready, 1), do: s.driver.ready(inner), else: :ok
+  # Whether the base is there, and its wheels may turn. Those that may no longer are stopped before
+  # anybody is told.
+  defp judge(%{kind: :drive, inner: {:open, _}} = s) do
+    case Reports.wheels(s.reports, now(s)) do
+      :fresh -> s |> report(:online) |> ready()
+      :waiting -> ready(s)
+      :silent -> s |> ready() |> silent()
+    end
   end
 
-  defp readiness(%{health: {{:offline, reason}, _since}}),
-    do: {:error, "the drive is offline (#{inspect(reason, limit: 5, printable_limit: 40)})"}
+  defp judge(s), do: s
+
+  # Its last stop may have failed.
+  defp silent(%{inner: {:open, _}} = s), do: report(s, {:offline, :silent})
+  defp silent(s), do: s
+
+  # Silence sends no message.
+  defp listen(%{kind: :drive, inner: {:open, _}} = s) do
+    ref = make_ref()
+    at_ms = now(s)
+    Process.send_after(self(), {:listen, ref}, Reports.next_ms(s.reports, at_ms) - at_ms)
+    %{s | listening: ref}
+  end
+
+  defp listen(s), do: s
+
+  # A driver may become ready while it is open, or tell another thing that is missing.
+  defp ready(s), do: become(s, Arming.ready(s.arming, readiness(s)))
+
+  # What a person can mend comes before what may come by itself.
+  defp readiness(%{inner: {:open, inner}} = s) do
+    driver = if function_exported?(s.driver, :ready, 1), do: s.driver.ready(inner), else: :ok
+    with :ok <- driver, do: Reports.ready(s.reports, now(s))
+  end
+
+  defp readiness(%{health: {{:offline, reason}, _since}} = s),
+    do: {:error, "the drive is offline (#{words(s, reason)})"}
 
   defp readiness(_not_opened_yet), do: {:error, "the drive is not open yet"}
 
-  defp measured(%{kind: :drive} = s, readings),
-    do: %{s | arming: Enum.reduce(readings, s.arming, &Arming.measured(&2, &1))}
+  defp measured(%{kind: :drive} = s, readings) do
+    arming = Enum.reduce(readings, s.arming, &Arming.measured(&2, &1))
+    %{s | arming: arming, reports: Reports.heard(s.reports, readings, now(s))}
+  end
 
   defp measured(s, _readings), do: s
 
@@ -272,10 +322,15 @@ defmodule Hal.Device do
 
   defp tell_arming(%{arming: %{state: state, why: why}} = s) do
     reading = %{state: state, why: why}
-    Event.execute([:hal, :device, :arming], %{at_ms: now(s)}, Map.merge(about(s), reading))
+    {was, _why} = s.armed_as || {:disarmed, nil}
+    about = s |> about() |> Map.merge(reading) |> Map.merge(%{was: was, line: lost(s, state)})
+    Event.execute([:hal, :device, :arming], %{at_ms: now(s)}, about)
     hand_on(s, {:arming, reading})
     %{s | armed_as: {state, why}}
   end
+
+  defp lost(s, {:error, reason}), do: words(s, reason)
+  defp lost(_s, _not_lost), do: nil
 
   defp tell_refused(s, %{refused: refused}) do
     measured = %{at_ms: now(s), refused: refused}
@@ -342,10 +397,11 @@ defmodule Hal.Device do
 
     case condition do
       :online ->
-        Event.execute([:hal, :device, :online], %{at_ms: at_ms}, about(s))
+        about = Map.put(about(s), :again?, s.health != nil)
+        Event.execute([:hal, :device, :online], %{at_ms: at_ms}, about)
 
       {:offline, reason} ->
-        about = Map.put(about(s), :reason, reason)
+        about = s |> about() |> Map.merge(%{reason: reason, line: words(s, reason)})
         Event.execute([:hal, :device, :offline], %{at_ms: at_ms}, about)
     end
 
@@ -360,7 +416,9 @@ defmodule Hal.Device do
 
   defp hand_on(s, reading), do: for({m, f, a} <- s.sinks, do: apply(m, f, a ++ [reading]))
 
-  defp about(s), do: %{device: s.device, driver: s.driver}
+  defp about(s), do: Map.merge(s.about, %{device: s.device, driver: s.driver})
+
+  defp words(s, reason), do: Words.offline({s.driver, s.options}, reason)
 
   defp now(%{clock: {m, f, a}}), do: apply(m, f, a)
 

@@ -12,6 +12,10 @@ defmodule Hal.Drive do
   profile's greatest range. Bumpers are the pressed segments, counted counter-clockwise from
   the front. Power is in volts. Not every base has a brake, a joystick, or a switch at one absolute
   heading (given as odometry's heading there); who does not know a reading leaves it alone.
+
+  Odometry and sonar come with a report of the base and are not repeated without one: a base that tells
+  neither is taken for silent (`Hal.Reports`). A driver that hears a report and cannot make such a reading of it,
+  for want of a conversion, says `{:report, :wheels}` or `{:report, :sonar}`.
   """
   @type reading ::
           {:odometry, Hal.Odometry.t()}
@@ -22,6 +26,7 @@ defmodule Hal.Drive do
           | {:brake, boolean()}
           | {:joystick, %{x: integer(), y: integer(), buttons: byte()}}
           | {:home, heading :: float()}
+          | {:report, :wheels | :sonar}
 
   @doc "Opens the line and stops the motors."
   @callback init(keyword()) :: {:ok, state :: term()} | {:error, reason :: term()}
@@ -36,8 +41,11 @@ defmodule Hal.Drive do
   @doc "Whether it may be armed: the line says what is missing, such as a conversion."
   @callback ready(state :: term()) :: :ok | {:error, line :: String.t()}
 
+  @doc "An error that it gave with these options, in one line for people."
+  @callback explain(reason :: term(), options :: keyword()) :: String.t()
+
   @doc "Stops the motors and closes the line."
   @callback terminate(state :: term()) :: :ok
 
-  @optional_callbacks ready: 1
+  @optional_callbacks explain: 2, ready: 1
 end

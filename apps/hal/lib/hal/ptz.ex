@@ -34,8 +34,11 @@ defmodule Hal.Ptz do
   @callback handle_message(term(), state :: term()) ::
               {:ok, [reading()], term()} | {:error, term(), term()}
 
+  @doc "An error that it gave with these options, in one line for people."
+  @callback explain(reason :: term(), options :: keyword()) :: String.t()
+
   @doc "Closes the line."
   @callback terminate(state :: term()) :: :ok
 
-  @optional_callbacks zoom: 2
+  @optional_callbacks explain: 2, zoom: 2
 end

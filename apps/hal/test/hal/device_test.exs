@@ -3,6 +3,8 @@ defmodule Hal.DeviceTest do
   import ExUnit.CaptureLog
   alias Hal.{Device, Frame, Twist}
 
+  doctest Hal.Device.Words
+
   @zero Twist.zero()
   @modules [drive: Hal.FakeDrive, ptz: Hal.FakePtz, camera: Hal.FakeCamera]
 
@@ -10,6 +12,12 @@ defmodule Hal.DeviceTest do
     driver = {@modules[kind], [test: self(), device: kind] ++ options}
     options = [kind: kind, driver: driver, sinks: [{Kernel, :send, [self()]}]]
     start_supervised!({Device, options})
+  end
+
+  # The base has reported, and the wheels may turn.
+  defp armed(pid) do
+    assert_receive {:arming, %{state: :armed}}
+    pid
   end
 
   defp answers(list) do
@@ -32,13 +40,14 @@ defmodule Hal.DeviceTest do
     assert_receive {:bumpers, [3]}
     assert_receive {:power, 24.0}
 
+    armed(pid)
     twist = Twist.new(0.3, 0.1)
     assert Device.drive(pid, twist) == :ok
     assert_receive {:drive, {:drive, ^twist}, ^pid}
   end
 
   test "a drive that hears no more speeds stops its wheels, once" do
-    pid = device(:drive)
+    pid = armed(device(:drive))
     twist = Twist.new(0.3, 0.0)
     Device.drive(pid, twist)
     assert_receive {:drive, {:drive, ^twist}, ^pid}
@@ -127,9 +136,53 @@ defmodule Hal.DeviceTest do
     assert_receive {:camera, :next, ^pid}
   end
 
+  def forward(event, _measured, %{robot: robot} = about, {robot, test}),
+    do: send(test, {List.last(event), about})
+
+  def forward(_event, _measured, _others, _config), do: :ok
+
+  test "each change is one event, with its reason in words; a try that changes nothing is none" do
+    robot = make_ref()
+
+    for event <- [:online, :offline, :arming] do
+      handler = {robot, event}
+
+      :ok =
+        Hal.Event.attach(handler, [:hal, :device, event], &__MODULE__.forward/4, {robot, self()})
+
+      on_exit(fn -> Hal.Event.detach(handler) end)
+    end
+
+    busy = {:error, :ebusy}
+    open = answers([{:error, :enoent}, {:error, :enoent}, busy, busy, :ok])
+    words = fn reason -> "the line: #{reason}" end
+    driver = {Hal.FakeDrive, test: self(), device: :drive, open: open, words: words}
+    device = [kind: :drive, driver: driver, arm: :manual, about: %{robot: robot}]
+    pid = start_supervised!({Device, device})
+    assert_receive {:online, %{device: :drive, again?: true}}, 5_000
+    assert_received {:offline, %{reason: :enoent, line: "the line: enoent"}}
+    assert_received {:offline, %{reason: :ebusy, line: "the line: ebusy"}}
+    refute_received {:offline, _about}
+    assert Device.arm(pid) == :ok
+    assert_receive {:arming, %{state: :armed, was: :disarmed}}
+    Device.drive(pid, Twist.new(0.1, 0.0))
+    send(pid, {:fail, :unplugged})
+    assert_receive {:offline, %{line: "the line: unplugged"}}
+
+    assert_receive {:arming,
+                    %{state: {:error, :unplugged}, was: :armed, line: "the line: unplugged"}}
+
+    assert_receive {:online, %{again?: true}}
+    refute_received {:offline, _about}
+  end
+
   test "wrong options are named" do
     assert_raise ArgumentError, ~r/:kind cannot be :wheels: .*:drive, :ptz or :camera/, fn ->
       Device.start_link(kind: :wheels, driver: {Hal.FakeDrive, []})
+    end
+
+    assert_raise ArgumentError, ~r/:sonar cannot be 16: it must be true or false/, fn ->
+      Device.start_link(kind: :drive, driver: {Hal.FakeDrive, []}, sonar: 16)
     end
 
     assert_raise ArgumentError, ~r/:driver cannot be Hal.FakeDrive/, fn ->

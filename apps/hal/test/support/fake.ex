@@ -5,7 +5,9 @@ defmodule Hal.Fake do
 
   Options: `:test` (pid), `:device` (what it calls itself), `:open` (a function of no arguments
   that gives `:ok`, `{:error, reason}` or raises; asked at each opening), `:ready` (such a function,
-  asked whether it may be armed), `:told` (such a function, what a drive answers to a speed).
+  asked whether it may be armed), `:told` (such a function, what a drive answers to a speed), `:reports`
+  (such a function, asked ten times a second what a drive reports; by default `[:wheels, :sonar]`), `:words`
+  (a function of a reason that explains it).
 
   A device process that runs one does as it is told by messages: `{:readings, list}`,
   `{:fail, reason}`, `:raise`.
@@ -41,8 +43,16 @@ defmodule Hal.FakeDrive do
   @moduledoc "See `Hal.Fake`. Tells `{:drive, twist}`."
   @behaviour Hal.Drive
 
+  @period_ms 100
+
   @impl Hal.Drive
-  defdelegate init(options), to: Hal.Fake
+  def init(options) do
+    with {:ok, options} <- Hal.Fake.init(options) do
+      opening = make_ref()
+      send(self(), {:report, opening})
+      {:ok, Keyword.put(options, :opening, opening)}
+    end
+  end
 
   @impl Hal.Drive
   def drive(twist, options) do
@@ -55,10 +65,23 @@ defmodule Hal.FakeDrive do
   end
 
   @impl Hal.Drive
+  def explain(reason, options), do: Keyword.get(options, :words, &inspect/1).(reason)
+
+  @impl Hal.Drive
   def ready(options), do: Keyword.get(options, :ready, fn -> :ok end).()
 
   @impl Hal.Drive
-  defdelegate handle_message(message, options), to: Hal.Fake
+  def handle_message({:report, opening}, options) do
+    if options[:opening] == opening do
+      Process.send_after(self(), {:report, opening}, @period_ms)
+      reports = Keyword.get(options, :reports, fn -> [:wheels, :sonar] end).()
+      {:ok, for(what <- reports, do: {:report, what}), options}
+    else
+      {:ok, [], options}
+    end
+  end
+
+  def handle_message(message, options), do: Hal.Fake.handle_message(message, options)
 
   @impl Hal.Drive
   defdelegate terminate(options), to: Hal.Fake

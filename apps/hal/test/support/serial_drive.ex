@@ -1,5 +1,8 @@
 defmodule Hal.SerialDrive do
-  @moduledoc "A drive behind a serial line: each byte that comes is the battery's voltage. Options as `Hal.Serial`."
+  @moduledoc """
+  A drive behind a serial line: each byte that comes is the battery's voltage, and says that the wheels are
+  there. Options as `Hal.Serial`.
+  """
   @behaviour Hal.Drive
   alias Hal.Serial
 
@@ -12,9 +15,14 @@ defmodule Hal.SerialDrive do
   @impl Hal.Drive
   def handle_message(message, line) do
     case Serial.handle(line, message) do
-      {:data, bytes} -> {:ok, for(<<volts <- bytes>>, do: {:power, volts * 1.0}), line}
-      {:error, reason} -> {:error, reason, line}
-      :unknown -> {:ok, [], line}
+      {:data, bytes} ->
+        {:ok, [{:report, :wheels} | for(<<volts <- bytes>>, do: {:power, volts * 1.0})], line}
+
+      {:error, reason} ->
+        {:error, reason, line}
+
+      :unknown ->
+        {:ok, [], line}
     end
   end
 

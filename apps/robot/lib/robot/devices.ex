@@ -89,6 +89,8 @@ defmodule Robot.Devices do
            kind: kind,
            driver: driver,
            arm: if(config.dry_run, do: :never, else: config.arm),
+           sonar: kind == :drive and config.profile.sonars != [],
+           about: %{robot: config.id},
            sinks: sinks,
            clock: config.clock,
            name: Names.via(config.id, kind)}

@@ -32,10 +32,20 @@ defmodule Robot.Case do
     |> Robot.Config.new!()
   end
 
-  @doc "A running robot; it ends with the test."
+  @doc "A running robot, whose base has reported if it is the usual fake; it ends with the test."
   def robot(id, options \\ []) do
     start_supervised!({Robot.Supervisor, config(id, options)}, id: id, restart: :temporary)
+    if options[:drive] == nil, do: online(id)
     id
+  end
+
+  @doc "Waits until the base of a robot has reported: nobody arms it before."
+  def online(id, left \\ 500) do
+    case Robot.Board.fetch(Robot.Board.find!(id), {:health, :drive}, :infinity) do
+      {:ok, :online, _at_ms} -> id
+      _not_yet when left == 0 -> flunk("the drive of #{id} is not online")
+      _not_yet -> receive(do: (:never -> :ok), after: (5 -> online(id, left - 1)))
+    end
   end
 
   @doc "A robot whose mission lets it roll."

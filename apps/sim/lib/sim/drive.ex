@@ -18,6 +18,11 @@ defmodule Sim.Drive do
   end
 
   @impl Hal.Drive
+  def explain(:no_world, _options), do: "its simulated world is not there"
+  def explain(:silent, _options), do: "its body in the world says nothing"
+  def explain(reason, _options), do: inspect(reason)
+
+  @impl Hal.Drive
   def drive(twist, %{line: {server, _}} = drive) do
     Server.drive(server, drive.robot, twist)
     {:ok, drive}

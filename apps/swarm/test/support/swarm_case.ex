@@ -28,6 +28,7 @@ defmodule Swarm.Case do
     config = id |> Robot.Case.config(options) |> Swarm.Link.join(link)
     start_supervised!({Robot.Supervisor, config}, id: id, restart: :temporary)
     stand(id, Pose.new(0, 0))
+    if options[:drive] == nil, do: Robot.Case.online(id)
     eventually(fn -> Swarm.Directory.whereis(id) end)
     id
   end

@@ -115,6 +115,11 @@ defmodule Hal.Camera.FFmpeg do
   def explain(:eof), do: "ended"
   def explain({:unreadable, words}), do: "not a readable picture, video or stream (#{words})"
   def explain({:exit, reason}), do: "the reader ended (#{inspect(reason)})"
+  def explain(other), do: inspect(other, limit: 5, printable_limit: 40)
+
+  @doc "The same with the name of its source."
+  @impl Hal.Camera
+  def explain(reason, options), do: "#{options[:source]}: #{explain(reason)}"
 
   defp frame(picture, state) do
     <<_chroma, width::32, height::32, rate::32, per::32, number::64, age_us::64, bytes::binary>> =

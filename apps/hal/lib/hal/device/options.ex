@@ -11,6 +11,8 @@ defmodule Hal.Device.Options do
         :driver,
         :device,
         arm: :auto,
+        sonar: false,
+        about: %{},
         sinks: [],
         clock: {System, :monotonic_time, [:millisecond]}
       ])
@@ -20,6 +22,12 @@ defmodule Hal.Device.Options do
 
     unless options[:arm] in [:auto, :manual, :never],
       do: refuse!(:arm, options[:arm], ":auto, :manual or :never")
+
+    unless is_boolean(options[:sonar]),
+      do: refuse!(:sonar, options[:sonar], "true or false")
+
+    unless is_map(options[:about]),
+      do: refuse!(:about, options[:about], "a map")
 
     {driver, driver_options} =
       case options[:driver] do
@@ -33,6 +41,8 @@ defmodule Hal.Device.Options do
       driver: driver,
       options: driver_options,
       arming: if(options[:kind] == :drive, do: Arming.new(options[:arm])),
+      sonar?: options[:sonar],
+      about: options[:about],
       sinks: options[:sinks],
       clock: options[:clock]
     ]

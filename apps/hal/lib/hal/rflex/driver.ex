@@ -41,8 +41,8 @@ defmodule Hal.RFlex.Driver do
 
   ## Readings
 
-  Those of `Hal.Drive`. Ranges and bumpers are repeated every 100 ms as long as they hold, for the
-  sonars take half a second for a round. The joystick is only read: driving by it is for whoever may drive.
+  Those of `Hal.Drive`. Ranges come with each report of some sonars. Bumpers, of which the base tells changes only,
+  are repeated every 100 ms as long as they hold. The joystick is only read: driving by it is for whoever may drive.
   Odometry goes on where it was when a line was lost and is open again in the same process; in another one
   it begins at zero, in another frame (`Hal.Odometry`).
 
@@ -101,6 +101,20 @@ defmodule Hal.RFlex.Driver do
   @impl Hal.Drive
   def ready(%__MODULE__{options: options}),
     do: Conversions.ready(options.conversions, Speech.senses(options))
+
+  @doc """
+  An error in words.
+
+      iex> Hal.RFlex.Driver.explain(:silent, port: "/dev/ttyR0", speed: 9600)
+      "/dev/ttyR0: the base does not report its wheels (is it on, its cable right, its speed 9600 baud?)"
+  """
+  @impl Hal.Drive
+  def explain(:silent, options) do
+    "#{name(options)}: the base does not report its wheels (is it on, its cable right, its speed " <>
+      "#{options[:speed] || 115_200} baud?)"
+  end
+
+  def explain(reason, options), do: Serial.explain(reason, name(options))
 
   @impl Hal.Drive
   def drive(twist, s) do
@@ -175,7 +189,8 @@ defmodule Hal.RFlex.Driver do
     }
   end
 
-  defp name(options), do: options.port || options.serial[:pty]
+  defp name(%Options{} = options), do: options.port || options.serial[:pty]
+  defp name(options), do: options[:port] || options[:serial][:pty]
 
   defp put({key, bytes}, queue), do: Queue.put(queue, key, bytes)
 
@@ -275,7 +290,7 @@ defmodule Hal.RFlex.Driver do
 
   defp standing(s, at_ms) do
     if at_ms - s.heard_ms < @no_wheels_ms and due?(s, :standing, at_ms),
-      do: {Senses.standing(s.senses, at_ms), again(s, :standing, at_ms, @repeat_ms)},
+      do: {Senses.standing(s.senses), again(s, :standing, at_ms, @repeat_ms)},
       else: {[], s}
   end
 

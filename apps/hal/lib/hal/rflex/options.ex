@@ -149,7 +149,7 @@ defmodule Hal.RFlex.Options do
   defp valid?(:joystick, joystick, _), do: is_boolean(joystick)
   defp valid?(:home, home, _), do: home == nil or (is_integer(home) and home in 0..255)
 
-  defp valid?(:report_period, period, _), do: is_integer(period) and period in 20_000..1_000_000
+  defp valid?(:report_period, period, _), do: is_integer(period) and period in 20_000..200_000
   defp valid?(:pace_ms, ms, _), do: is_integer(ms) and ms in 1..50
 
   defp valid?(:clock, clock, _),
@@ -172,7 +172,7 @@ defmodule Hal.RFlex.Options do
   defp rule(:power_offset), do: "a number from -10.0 to 10.0, in volts"
   defp rule(:joystick), do: "true or false"
   defp rule(:home), do: "nil or an address from 0 to 255"
-  defp rule(:report_period), do: "whole microseconds from 20000 to 1000000"
+  defp rule(:report_period), do: "whole microseconds from 20000 to 200000"
   defp rule(:pace_ms), do: "whole milliseconds from 1 to 50"
   defp rule(:clock), do: "{module, function, arguments}"
 

@@ -42,9 +42,9 @@ defmodule Hal.RFlex.Senses do
     end
   end
 
-  @doc "What still holds and should not grow old on the board: ranges and bumpers."
-  @spec standing(t(), integer()) :: [Hal.Drive.reading()]
-  def standing(%__MODULE__{} = senses, at_ms), do: ranges(senses, at_ms) ++ pressed(senses)
+  @doc "What still holds and should not grow old on the board: bumpers, which tell of changes only."
+  @spec standing(t()) :: [Hal.Drive.reading()]
+  def standing(%__MODULE__{} = senses), do: pressed(senses)
 
   @doc "What was counted since the start, by what it is."
   @spec counts(t()) :: map()
@@ -54,7 +54,7 @@ defmodule Hal.RFlex.Senses do
     senses.counts |> Map.merge(odometry) |> Map.merge(unknown)
   end
 
-  defp axis(%{odometry: nil} = senses, _report, _at_ms), do: {[], senses}
+  defp axis(%{odometry: nil} = senses, _report, _at_ms), do: {[{:report, :wheels}], senses}
 
   defp axis(senses, report, at_ms) do
     case Odometry.report(senses.odometry, report, at_ms) do
@@ -66,7 +66,7 @@ defmodule Hal.RFlex.Senses do
     end
   end
 
-  defp sonar(%{sonar: nil} = senses, _records, _at_ms), do: {[], senses}
+  defp sonar(%{sonar: nil} = senses, _records, _at_ms), do: {[{:report, :sonar}], senses}
 
   defp sonar(senses, records, at_ms) do
     senses = %{senses | sonar: Sonar.report(senses.sonar, records, at_ms)}

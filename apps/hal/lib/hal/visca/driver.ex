@@ -60,6 +60,18 @@ defmodule Hal.Visca.Driver do
     end
   end
 
+  @doc "An error in words."
+  @impl Hal.Ptz
+  def explain(:no_answer, options), do: "#{options[:port]}: no camera answers"
+
+  def explain({:cameras, n}, options),
+    do: "#{options[:port]}: camera #{options[:camera] || 1} is not there; its cable has #{n}"
+
+  def explain({:model, model}, options),
+    do: "#{options[:port]}: a camera of an unknown model (#{inspect(model)}) answers"
+
+  def explain(reason, options), do: Serial.explain(reason, "#{options[:port]}")
+
   @impl Hal.Ptz
   def look(pan, tilt, state), do: outward(Head.look(state.head, pan, tilt, now()), state)
 

@@ -1,5 +1,8 @@
 defmodule Console.Bench.Mesh.Stand do
-  @moduledoc "Wheels that stand still and say so ten times a second: a robot's drive without a world."
+  @moduledoc """
+  Wheels that stand still and say so ten times a second: a robot's drive without a world. Its sonars report, but
+  see nothing.
+  """
   @behaviour Hal.Drive
   alias Hal.{Odometry, Pose, Twist}
 
@@ -15,8 +18,10 @@ defmodule Console.Bench.Mesh.Stand do
   def drive(_twist, s), do: {:ok, s}
 
   @impl Hal.Drive
-  def handle_message(:stand, s),
-    do: {:ok, [{:odometry, %Odometry{pose: Pose.new(0, 0), twist: Twist.zero()}}], s}
+  def handle_message(:stand, s) do
+    odometry = %Odometry{pose: Pose.new(0, 0), twist: Twist.zero()}
+    {:ok, [{:odometry, odometry}, {:report, :sonar}], s}
+  end
 
   def handle_message(_other, s), do: {:ok, [], s}
 

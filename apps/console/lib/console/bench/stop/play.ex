@@ -112,6 +112,7 @@ defmodule Console.Bench.Stop.Play do
     fire = signaller(s.vm.pid, "STOP")
     stop = stop(fn -> timed(fire) end)
     Vm.signal(s.vm.pid, "CONT")
+    :ok = call(s, Robot, :thawed, [])
     {stop, s}
   end
 

@@ -7,7 +7,7 @@ defmodule Console.Bench.Stop.Robot do
   @behaviour Robot.Behaviour
   alias Console.Bench.Stop.Tap
   alias Hal.{Device, Event, Twist}
-  alias Robot.{Names, Pilot, Wish}
+  alias Robot.{Board, Names, Pilot, Wish}
 
   @id :mag1
   @deadline_ms 10_000
@@ -46,6 +46,19 @@ defmodule Console.Bench.Stop.Robot do
   @doc "Arms it, once there is something to arm."
   @spec arm() :: :ok
   def arm, do: until(fn -> Device.arm(Names.via(@id, :drive)) == :ok end)
+
+  @doc "Arms it again after its VM was frozen: with reports that are old by then it may have been disarmed."
+  @spec thawed() :: :ok
+  def thawed do
+    board = Board.find!(@id)
+    thawed_ms = Board.now(board)
+
+    until(fn ->
+      match?({:ok, _, at_ms} when at_ms > thawed_ms, Board.fetch(board, :odometry, 500))
+    end)
+
+    arm()
+  end
 
   @doc "Lets it roll, this fast."
   @spec roll(float()) :: :ok

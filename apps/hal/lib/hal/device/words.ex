@@ -1,0 +1,23 @@
+defmodule Hal.Device.Words do
+  @moduledoc "What is wrong with a device, in one line for people. Pure."
+
+  @longest 240
+
+  @doc """
+  Why it is offline: what its driver makes of the reason (`c:Hal.Drive.explain/2`), or the reason itself.
+
+      iex> Hal.Device.Words.offline({Hal.RFlex.Driver, port: "/dev/ttyR0"}, :enoent)
+      "/dev/ttyR0: no such device"
+      iex> Hal.Device.Words.offline({Some.Driver, []}, :odd)
+      ":odd"
+  """
+  @spec offline({driver :: module(), options :: keyword()}, reason :: term()) :: String.t()
+  def offline({driver, options}, reason) do
+    if Code.ensure_loaded?(driver) and function_exported?(driver, :explain, 2),
+      do: reason |> driver.explain(options) |> String.slice(0, @longest),
+      else: plain(reason)
+  end
+
+  defp plain(:silent), do: "its base does not report its wheels"
+  defp plain(reason), do: inspect(reason, limit: 5, printable_limit: 40)
+end

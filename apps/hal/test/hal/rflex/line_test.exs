@@ -1,0 +1,156 @@
+defmodule Hal.RFlex.LineTest do
+  @moduledoc "A device with the driver of real bases on lines with nobody, or nobody of sense, at the other end."
+  use ExUnit.Case, async: true
+  import Hal.Lines
+  alias Hal.{Device, RFlexBase, Serial, Twist}
+
+  @conversions [distance: 31_387.0, angle: 4654.2, range: 1474.0]
+  @on {:reports, 100_000, 3}
+
+  setup do
+    Process.flag(:trap_exit, true)
+    link = Path.join(folder(), "line")
+    {:ok, far} = Serial.open(pty: link)
+    {:ok, link: link, far: far}
+  end
+
+  defp device(link, options) do
+    defaults = [port: link, conversions: @conversions, ir_banks: [0]]
+    driver = {Hal.RFlex.Driver, Keyword.merge(defaults, options)}
+    sinks = [{__MODULE__, :tell, [self()]}]
+    device = [kind: :drive, driver: driver, sinks: sinks, arm: :manual, sonar: true]
+    start_supervised!({Device, device})
+  end
+
+  @doc false
+  def tell(test, reading), do: send(test, {:reading, reading})
+
+  # For so long: asks for a speed as a gate does, answers what `says` makes of each command, and gives all commands.
+  defp play(t, ms, says) do
+    play_until(t, System.monotonic_time(:millisecond) + ms, says)
+  end
+
+  defp play_until(t, until_ms, says) do
+    receive do
+      message ->
+        case Serial.handle(t.far, message) do
+          {:data, bytes} ->
+            {commands, rest} = RFlexBase.commands(t.rest <> bytes)
+            for command <- commands, bytes = says.(command), do: Serial.write(t.far, bytes)
+            play_until(%{t | rest: rest, heard: t.heard ++ commands}, until_ms, says)
+
+          _other ->
+            play_until(note(t, message), until_ms, says)
+        end
+    after
+      20 ->
+        Device.drive(t.device, Twist.new(0.3, 0.2))
+        with bytes when is_binary(bytes) <- says.(:now), do: Serial.write(t.far, bytes)
+
+        if System.monotonic_time(:millisecond) < until_ms,
+          do: play_until(t, until_ms, says),
+          else: t
+    end
+  end
+
+  defp note(t, {:reading, {:health, :drive, {health, _since}}}),
+    do: %{t | health: t.health ++ [health]}
+
+  defp note(t, {:reading, {:arming, %{state: state}}}), do: %{t | arming: t.arming ++ [state]}
+  defp note(t, _other), do: t
+
+  defp begin(link, far, options \\ []) do
+    device = device(link, options)
+    %{device: device, far: far, rest: <<>>, heard: [], health: [], arming: []}
+  end
+
+  defp moves(t),
+    do: for({what, speed, _} <- t.heard, what in [:move, :turn], speed != 0, do: speed)
+
+  # 2.7 s: longer than the driver itself waits.
+  defp nobody(link, far, says) do
+    t = begin(link, far) |> play(700, says)
+    assert {:error, line} = Device.arm(t.device)
+    assert line =~ "wheels"
+    t = play(t, 2_000, says)
+    assert {:error, _line} = Device.arm(t.device)
+    assert :online not in t.health
+    assert {:offline, :silent} in t.health
+    assert :armed not in t.arming
+    assert moves(t) == []
+    t
+  end
+
+  test "a silent line is not online and not armed", %{link: link, far: far} do
+    nobody(link, far, fn _ -> nil end)
+  end
+
+  test "noise neither, as of a line of another speed", %{link: link, far: far} do
+    :rand.seed(:exsss, {4, 5, 6})
+    nobody(link, far, fn what -> if what == :now, do: :rand.bytes(200) end)
+  end
+
+  test "a base that says all but where its wheels are neither", %{link: link, far: far} do
+    all = for id <- Enum.to_list(0..7) ++ Enum.to_list(16..23), do: {id, 1474}
+
+    t =
+      nobody(link, far, fn
+        :status -> RFlexBase.status(2450, 0)
+        :now -> RFlexBase.sonar(all) <> RFlexBase.input(0x40, 0)
+        _other -> nil
+      end)
+
+    # It is asked for them all the while.
+    assert Enum.count(t.heard, &(&1 == @on)) >= 2
+  end
+
+  test "a base that reports is online, is armed, and stopped and disarmed when its reports end",
+       %{
+         link: link,
+         far: far
+       } do
+    all = for id <- Enum.to_list(0..7) ++ Enum.to_list(16..23), do: {id, 1474}
+    counter = :counters.new(1, [])
+
+    reports = fn
+      :now ->
+        :counters.add(counter, 1, 20)
+        RFlexBase.wheels(:counters.get(counter, 1), 100, 100) <> RFlexBase.sonar(all)
+
+      _other ->
+        nil
+    end
+
+    t = begin(link, far) |> play(600, reports)
+    assert t.health == [:online]
+    assert moves(t) == []
+    assert Device.arm(t.device) == :ok
+    t = play(t, 600, reports)
+    assert moves(t) != []
+    # It goes on with its battery only.
+    t =
+      play(%{t | heard: []}, 800, fn what -> if what == :status, do: RFlexBase.status(2450, 0) end)
+
+    assert List.last(t.arming) == :disarmed
+    assert List.last(t.health) == {:offline, :silent}
+    assert {:error, line} = Device.arm(t.device)
+    assert line =~ "wheels"
+    # Long after the watchdog of a gate that drives on, nothing but stops.
+    assert moves(play(%{t | heard: []}, 300, fn _ -> nil end)) == []
+    t = play(%{t | heard: []}, 600, reports)
+    assert List.last(t.health) == :online
+    assert moves(t) == []
+    assert Device.arm(t.device) == :ok
+  end
+
+  test "without its conversions a base that answers is online, and says what it lacks", %{
+    link: link,
+    far: far
+  } do
+    t = begin(link, far, conversions: [range: 1474.0])
+    t = play(t, 400, fn what -> if what == :now, do: RFlexBase.wheels(1, 1, 1) end)
+    assert t.health == [:online]
+    assert {:error, line} = Device.arm(t.device)
+    assert line =~ "distance"
+  end
+end

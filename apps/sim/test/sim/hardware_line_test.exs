@@ -1,0 +1,106 @@
+defmodule Sim.HardwareLineTest do
+  @moduledoc "A whole robot at the end of a line whose other end is silent, mute, or falls silent."
+  use Swarm.Case, async: false
+  alias Hal.Profile
+  alias Sim.{Emulator, Server, World}
+  @moduletag :tmp_dir
+  @moduletag :capture_log
+
+  @conversions [distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0]
+
+  setup %{tmp_dir: folder} do
+    {:ok, map} = Sim.Map.open("hall", 1)
+    body = %{id: :body, profile: Profile.magellan(), pose: Pose.new(-4, 0), infrared: true}
+    world = World.new!(map: map, robots: [body], noise: :off)
+    name = make_ref()
+    server = start_supervised!({Server, name: name, world: world})
+    %{server: server, world: name, link: Path.join(folder, "base")}
+  end
+
+  defp base(context, silent) do
+    body = {Sim.Drive, world: context.world, robot: :body}
+    core = {Sim.MuteController, silent: silent}
+    start_supervised!({Emulator, core: core, link: context.link, body: body})
+  end
+
+  # The robot as its file would make it; armed by hand.
+  defp real(context, id) do
+    driver = {Hal.RFlex.Driver, port: context.link, conversions: @conversions}
+    robot(id, drive: driver, arm: :manual, profile: Profile.magellan())
+  end
+
+  defp health(id) do
+    with {:ok, health, _at_ms} <- Board.fetch(Board.find!(id), {:health, :drive}, :infinity),
+         do: health
+  end
+
+  defp limits(id), do: Swarm.status(id).limits
+  defp place(context), do: Server.world(context.server).robots.body.pose
+  defp still?(context), do: Server.world(context.server).robots.body.speed == {0.0, 0.0}
+
+  # Looks for so long whether it ever is so.
+  defp never(ms, condition) do
+    until_ms = System.monotonic_time(:millisecond) + ms
+    refute Enum.find(looks(until_ms), fn _ -> condition.() end)
+  end
+
+  defp looks(until_ms) do
+    Stream.repeatedly(fn -> receive(do: (:never -> :ok), after: (20 -> :ok)) end)
+    |> Stream.take_while(fn _ -> System.monotonic_time(:millisecond) < until_ms end)
+  end
+
+  defp rolls(context, id) do
+    eventually(fn -> Swarm.arm(id) == :ok end)
+    assert Swarm.tell(id, "move:0.2:0") == :ok
+    x = place(context).x
+    eventually(fn -> place(context).x > x + 0.1 end)
+  end
+
+  test "a base that hears and never answers is not online, not armed, and does not move",
+       context do
+    base(context, :all)
+    start = place(context)
+    id = real(context, :line_mute)
+    _refused_or_not = Swarm.tell(id, "move:0.2:0")
+
+    # Longer than the driver waits before it opens the line again.
+    never(4_000, fn -> health(id) == :online or Swarm.arm(id) == :ok or not still?(context) end)
+    assert health(id) == {:offline, :silent}
+    assert place(context) == start
+    {:error, line} = Swarm.arm(id)
+    assert line =~ "line_mute: " and line =~ "wheels"
+  end
+
+  test "wheels that are no longer reported stop within a second, and are disarmed", context do
+    emulator = base(context, [])
+    id = real(context, :line_wheels)
+    rolls(context, id)
+    :ok = Emulator.change(emulator, :silence, [[2]])
+    eventually(fn -> still?(context) end, 2_000)
+    eventually(fn -> health(id) == {:offline, :silent} end)
+    assert Hal.Device.arming(Names.whereis(id, :drive)).state == :disarmed
+    :ok = Emulator.change(emulator, :silence, [[]])
+    eventually(fn -> health(id) == :online end)
+    # Nobody has armed it.
+    never(500, fn -> not still?(context) end)
+    rolls(context, id)
+  end
+
+  test "sonars that are no longer reported: slow after 0.5 s, stopped and disarmed after 2 s",
+       context do
+    emulator = base(context, [])
+    id = real(context, :line_sonar)
+    rolls(context, id)
+    :ok = Emulator.change(emulator, :silence, [[4]])
+    since_ms = System.monotonic_time(:millisecond)
+    eventually(fn -> :blind in limits(id) end, 1_500)
+    assert Hal.Device.arming(Names.whereis(id, :drive)).state == :armed
+    eventually(fn -> :disarmed in limits(id) and still?(context) end, 4_000)
+    assert System.monotonic_time(:millisecond) - since_ms >= 1_900
+    assert health(id) == :online
+    {:error, line} = Swarm.arm(id)
+    assert line =~ "sonars"
+    :ok = Emulator.change(emulator, :silence, [[]])
+    rolls(context, id)
+  end
+end
