@@ -1,6 +1,7 @@
 defmodule Sim.HardwareLineTest do
   @moduledoc "A whole robot at the end of a line whose other end is silent, mute, or falls silent."
   use Swarm.Case, async: false
+  import ExUnit.CaptureLog
   alias Hal.Profile
   alias Sim.{Emulator, Server, World}
   @moduletag :tmp_dir
@@ -102,5 +103,60 @@ defmodule Sim.HardwareLineTest do
     assert line =~ "sonars"
     :ok = Emulator.change(emulator, :silence, [[]])
     rolls(context, id)
+  end
+
+  defp line(id), do: inspect(Swarm.status(id))
+
+  test "log and status say in words what is the matter with the line, once a change", context do
+    Logger.put_module_level(Robot.Devices.Log, :info)
+    on_exit(fn -> Logger.delete_module_level(Robot.Devices.Log) end)
+    link = context.link
+
+    log =
+      capture_log(fn ->
+        id = real(context, :line_words)
+        eventually(fn -> line(id) =~ "drive offline (#{link}: no such device)" end)
+        emulator = base(context, :all)
+
+        eventually(
+          fn -> line(id) =~ "drive offline (#{link}: the base does not report" end,
+          10_000
+        )
+
+        assert line(id) =~ "DISARMED (its base has not reported its wheels yet)"
+        # Over several of the driver's attempts.
+        never(4_000, fn -> health(id) != {:offline, :silent} end)
+        :ok = Emulator.change(emulator, :silence, [[]])
+        eventually(fn -> not (line(id) =~ "offline") end, 10_000)
+        rolls(context, id)
+        :ok = Emulator.change(emulator, :silence, [[4]])
+        eventually(fn -> line(id) =~ "BLIND (no sonar; slow)" end, 1_500)
+        :ok = Emulator.change(emulator, :silence, [[]])
+        rolls(context, id)
+        :ok = Emulator.unplug(emulator)
+        eventually(fn -> line(id) =~ "LINE LOST (acknowledge it)" end)
+        eventually(fn -> line(id) =~ "drive offline (#{link}: no such device)" end)
+        :ok = Emulator.plug(emulator)
+        eventually(fn -> not (line(id) =~ "offline") end, 10_000)
+        assert line(id) =~ "LINE LOST (acknowledge it)"
+      end)
+
+    said =
+      for line <- String.split(log, "\n"),
+          [_, words] <- [String.split(line, "line_words: ")],
+          do: words
+
+    wanted = [
+      "drive offline: #{link}: no such device",
+      "drive offline: #{link}: the base does not report",
+      "drive online again",
+      "drive offline: #{link}: unplugged",
+      "drive: LINE LOST while the wheels turned (#{link}: unplugged)",
+      "drive offline: #{link}: no such device",
+      "drive online again"
+    ]
+
+    assert length(said) == length(wanted)
+    for {words, begin} <- Enum.zip(said, wanted), do: assert(String.starts_with?(words, begin))
   end
 end

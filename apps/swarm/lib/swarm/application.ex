@@ -9,6 +9,7 @@ defmodule Swarm.Application do
   @impl Application
   def start(_type, _arguments) do
     environment = System.get_env()
+    :ok = Robot.Devices.Log.attach()
 
     with {:ok, robot} <- robot(Application.get_env(:swarm, :boot, false), environment),
          {:ok, mesh} <- mesh(Application.get_env(:swarm, :mesh, false), robot),

@@ -5,7 +5,9 @@ defmodule Swarm.Status do
       #mag1 follow (1.20, -0.35, 90 deg) 0.31 m/s by follow, view 7, hears 4 but not min2, age 40 ms
 
   Of wheels that may not turn it says `DISARMED`, with what is missing, or `LINE LOST` until a person
-  acknowledges (`Hal.Arming`; `arming` and `why`).
+  acknowledges (`Hal.Arming`; `arming` and `why`). Of a device that is not there it says why: `drive offline
+  (/dev/ttyR0: no such device)` (`offline`: words by device). A robot that is slow for want of sonar is
+  `BLIND`.
 
   `age_ms` is how old its newest reading is; `rejected` counts malformed messages by kind. `hears` are
   the robots it hears itself, `view` those that it takes for there (itself too), with the view's number,
@@ -15,6 +17,7 @@ defmodule Swarm.Status do
   A robot that does not answer is shown as its row on the blackboard says (`from: :row`), with that
   age: `…, age 1240 ms by its row`.
   """
+  alias Hal.Device.Words
   alias Hal.Pose
   alias Robot.{Board, Config}
   alias Swarm.Link.Ear
@@ -36,6 +39,7 @@ defmodule Swarm.Status do
                 leader: nil,
                 power: nil,
                 health: %{},
+                offline: %{},
                 peers: %{},
                 hears: [],
                 view: nil,
@@ -59,6 +63,7 @@ defmodule Swarm.Status do
           leader: atom() | String.t() | nil,
           power: float() | nil,
           health: %{(atom() | String.t()) => :online | {:offline, term()}},
+          offline: %{(atom() | String.t()) => String.t()},
           peers: %{atom() => Peers.status()},
           hears: [atom()],
           view: view() | nil,
@@ -73,6 +78,7 @@ defmodule Swarm.Status do
     driving = value(entries, :driving)
     mission = value(entries, :mission)
     now_ms = Config.now(config)
+    health = for {{:health, device}, {condition, _age}} <- entries, do: {device, condition}
 
     %__MODULE__{
       robot: config.id,
@@ -87,8 +93,13 @@ defmodule Swarm.Status do
       why: entries |> value(:arming) |> field(:why),
       leader: mission |> field(:claim) |> field(:leader),
       power: value(entries, :power),
-      health:
-        for({{:health, device}, {condition, _age}} <- entries, into: %{}, do: {device, condition}),
+      health: Map.new(health),
+      offline:
+        for(
+          {device, {:offline, reason}} <- health,
+          into: %{},
+          do: {device, words(config, device, reason)}
+        ),
       peers: Map.new(ear.peers.rows, fn {id, _} -> {id, Peers.status(ear.peers, id, now_ms)} end),
       hears: Peers.heard(ear.peers, now_ms),
       view: {Peers.view_number(ear.peers, now_ms), Peers.view(ear.peers, now_ms)},
@@ -96,6 +107,9 @@ defmodule Swarm.Status do
       age_ms: age(entries)
     }
   end
+
+  defp words(config, device, reason),
+    do: config |> Map.fetch!(device) |> Words.offline(reason)
 
   defp value(entries, key) do
     case entries do
@@ -133,12 +147,13 @@ defmodule Swarm.Status do
       do: "#{fixed(status.speed)} m/s" <> if(status.by, do: " by #{status.by}", else: "")
 
     defp remarks(status) do
-      offline = for {device, {:offline, _reason}} <- status.health, do: "#{device} offline"
+      offline = for {device, {:offline, _}} <- status.health, do: offline(status, device)
       dropped = status.rejected |> Map.values() |> Enum.sum()
 
       [
         status.estop && "E-STOP",
         arming(status),
+        Enum.any?(status.limits, &("#{&1}" == "blind")) && "BLIND (no sonar; slow)",
         status.leader && "leader #{status.leader}",
         status.view && "view #{elem(status.view, 0)}",
         "hears #{length(status.hears)}" <> deaf(status),
@@ -147,6 +162,13 @@ defmodule Swarm.Status do
       ]
       |> Enum.filter(& &1)
       |> Kernel.++(offline)
+    end
+
+    defp offline(%{offline: lines}, device) do
+      case lines do
+        %{^device => line} -> "#{device} offline (#{line})"
+        _not_told -> "#{device} offline"
+      end
     end
 
     defp arming(%{arming: :disarmed, why: nil}), do: "DISARMED"

@@ -24,4 +24,35 @@ defmodule Swarm.StatusTest do
     assert inspect(status) =~ "view #{number}, hears #{length(status.hears)}"
     assert Swarm.Matrix.hears?(Swarm.matrix(), :st1, :st2)
   end
+
+  test "the line says why a device is offline, and that a robot is slow for want of sonar" do
+    status = %Status{
+      robot: :mag1,
+      node: :mag1@lab,
+      health: %{drive: {:offline, :eacces}, ptz: :online},
+      offline: %{drive: "/dev/ttyR0: permission denied"},
+      limits: [:blind]
+    }
+
+    assert inspect(status) =~ ", BLIND (no sonar; slow), "
+    assert inspect(status) =~ ", drive offline (/dev/ttyR0: permission denied)"
+    # So does its row, to those that it cannot answer.
+    {:ok, told} = Status.Row.decode(:mag1, Status.Row.encode(status), 7)
+    assert inspect(told) =~ ", BLIND (no sonar; slow), "
+    assert inspect(told) =~ ", drive offline (/dev/ttyR0: permission denied)"
+    # A row of before knows no words.
+    row = status |> Status.Row.encode() |> Map.delete(:words)
+    assert {:ok, %Status{offline: none} = told} = Status.Row.decode(:mag1, row, 7)
+    assert none == %{} and inspect(told) =~ ", drive offline"
+  end
+
+  @tag :capture_log
+  test "why a drive is offline is in its driver's words" do
+    port = "/dev/convoy_no_such_line"
+    id = robot(:st_line, drive: {Hal.RFlex.Driver, port: port}, arm: :manual)
+    words = "drive offline (#{port}: no such device)"
+    assert eventually(fn -> inspect(Swarm.status(id)) =~ words end)
+    assert {:error, line} = Swarm.arm(id)
+    assert line == "st_line: the drive is offline (#{port}: no such device)"
+  end
 end

@@ -30,9 +30,9 @@ defmodule Console.Calibrate.Live do
   end
 
   defp why(robot) do
-    case entry(robot, {:health, :drive}) do
-      {:offline, reason} ->
-        "its drive is offline (#{inspect(reason, limit: 5, printable_limit: 60)})"
+    case Swarm.status(robot) do
+      %{offline: %{drive: line}} ->
+        "its drive is offline (#{line})"
 
       _online_or_unknown ->
         with(

@@ -1,7 +1,8 @@
 defmodule Swarm.Status.Row do
   @moduledoc """
   A robot's status as a row of the blackboard, for those that it cannot answer: small, in whole
-  numbers (mm, mrad, mm/s) and text. Pure. Of wheels that may turn, as nearly always, it says nothing.
+  numbers (mm, mrad, mm/s) and text. Pure. Of wheels that may turn, as nearly always, it says nothing,
+  and nothing of devices that are there.
   """
   alias Hal.Pose
   alias Swarm.{Shape, Status}
@@ -30,6 +31,15 @@ defmodule Swarm.Status.Row do
       age_ms: status.age_ms
     }
     |> arming(status.arming)
+    |> offline(status)
+  end
+
+  defp offline(row, %{offline: lines}) when lines == %{}, do: row
+
+  # In the order of the names.
+  defp offline(row, %{health: health, offline: lines}) do
+    words = for {device, {:offline, _reason}} <- health, do: Map.get(lines, device, "")
+    Map.put(row, :words, words)
   end
 
   defp arming(row, :disarmed), do: Map.put(row, :arming, "disarmed")
@@ -49,7 +59,8 @@ defmodule Swarm.Status.Row do
          %{deaf_to: deaf_to, rejected: rejected, age_ms: was_ms} <- row,
          {number, members} <- view,
          {:ok, arming} <- armed(Map.get(row, :arming)),
-         true <- Enum.all?([limits, offline, members, deaf_to], &texts?/1),
+         words = Map.get(row, :words, []),
+         true <- Enum.all?([limits, offline, members, deaf_to, words], &texts?/1),
          true <- Enum.all?([node, state], &is_binary/1),
          true <- Enum.all?([by, leader], &(&1 == nil or is_binary(&1))),
          true <- Enum.all?([speed, rejected, number], &Shape.number?/1) and is_boolean(estop),
@@ -73,6 +84,8 @@ defmodule Swarm.Status.Row do
          leader: leader && Wire.word(leader),
          power: power,
          health: Map.new(offline, &{Wire.word(&1), {:offline, :unknown}}),
+         offline:
+           for({name, line} <- Enum.zip(offline, words), into: %{}, do: {Wire.word(name), line}),
          hears: members -- [robot | names(deaf_to)],
          view: {number, members},
          rejected: if(rejected > 0, do: %{all: rejected}, else: %{}),

@@ -1,0 +1,57 @@
+defmodule Robot.Devices.Log do
+  @moduledoc """
+  What the log says of a robot's devices: a line when one is offline, with the reason in words, when it is back,
+  and when wheels are disarmed without a person's doing. Once a change: a device that is tried again and again
+  says nothing new.
+  """
+  require Logger
+  alias Hal.Event
+
+  @events [:online, :offline, :arming]
+
+  @doc "Attaches the log to the devices' events; once a node."
+  @spec attach() :: :ok
+  def attach do
+    for event <- @events do
+      _ = Event.attach({__MODULE__, event}, [:hal, :device, event], &__MODULE__.write/4, nil)
+    end
+
+    :ok
+  end
+
+  @doc false
+  @spec write(Event.name(), map(), map(), term()) :: :ok
+  def write([:hal, :device, event], _measurements, about, _config) do
+    with {level, line} <- line(event, about), do: Logger.log(level, line)
+    :ok
+  end
+
+  @doc """
+  The line; `nil` where there is nothing to say.
+
+      iex> about = %{robot: :mag1, device: :drive, line: "/dev/ttyR0: no such device"}
+      iex> Robot.Devices.Log.line(:offline, about)
+      {:warning, "mag1: drive offline: /dev/ttyR0: no such device"}
+      iex> Robot.Devices.Log.line(:online, %{robot: :mag1, device: :drive, again?: true})
+      {:info, "mag1: drive online again"}
+  """
+  @spec line(atom(), map()) :: {Logger.level(), String.t()} | nil
+  def line(:offline, %{line: line} = about), do: {:warning, "#{name(about)} offline: #{line}"}
+
+  def line(:online, %{again?: true} = about), do: {:info, "#{name(about)} online again"}
+  def line(:online, about), do: {:debug, "#{name(about)} online"}
+
+  def line(:arming, %{state: {:error, _reason}, line: line} = about) do
+    {:error,
+     "#{name(about)}: LINE LOST while the wheels turned (#{line}); it stands until a person has looked " <>
+       "and acknowledges"}
+  end
+
+  def line(:arming, %{state: :disarmed, was: :armed, why: why} = about) when why != nil,
+    do: {:warning, "#{name(about)} disarmed: #{why}"}
+
+  def line(:arming, _changed_by_a_person), do: nil
+
+  defp name(%{robot: robot, device: device}), do: "#{robot}: #{device}"
+  defp name(%{device: device}), do: "#{device}"
+end

@@ -1,0 +1,35 @@
+defmodule Robot.Devices.LogTest do
+  use ExUnit.Case, async: true
+  alias Robot.Devices.Log
+  doctest Robot.Devices.Log
+
+  @drive %{robot: :mag1, device: :drive}
+
+  test "a lost line is an error, wheels that were disarmed by nobody a warning" do
+    lost =
+      Map.merge(@drive, %{
+        state: {:error, :unplugged},
+        was: :armed,
+        why: nil,
+        line: "x: unplugged"
+      })
+
+    assert {:error, "mag1: drive: LINE LOST while the wheels turned (x: unplugged)" <> _} =
+             Log.line(:arming, lost)
+
+    stale = Map.merge(@drive, %{state: :disarmed, was: :armed, why: "no sonar", line: nil})
+    assert Log.line(:arming, stale) == {:warning, "mag1: drive disarmed: no sonar"}
+  end
+
+  test "what a person did, and what was never there, is no news" do
+    for change <- [
+          %{state: :armed, was: :disarmed, why: nil, line: nil},
+          %{state: :disarmed, was: :armed, why: nil, line: nil},
+          %{state: :disarmed, was: :disarmed, why: "angle is missing", line: nil},
+          %{state: :disarmed, was: {:error, :eio}, why: nil, line: nil}
+        ],
+        do: assert(Log.line(:arming, Map.merge(@drive, change)) == nil)
+
+    assert Log.line(:online, Map.put(@drive, :again?, false)) == {:debug, "mag1: drive online"}
+  end
+end
