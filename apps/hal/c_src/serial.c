@@ -6,15 +6,16 @@
    makes a new pseudo-terminal, and the symbolic link LINK to its other end. Packets on both sides have
    a length of two bytes, most significant first, and begin with a letter. In come
 
-       'W' bytes       to write
-       'K'             a sign of life; 'W' and 'L' are signs of life too
-       'L' bytes       the last words from now on
+       'W' at:64 bytes to write
+       'K' at:64       a sign of life; 'W' and 'L' are signs of life too
+       'L' at:64 bytes the last words from now on
        'T' count:32    so many bytes of 'D' were taken
        'C'             close: what waits is written, then the last words, then 'C' is answered
 
    and out go
 
-       'O'             open; always the first, unless it is 'E'
+       'O' now:64      open; always the first, unless it is 'E'
+       'K'             'K' was read; not more often than every ANSWER_MS
        'D' bytes       read
        'T' count:32    so many bytes of 'W' are off to the line, or dropped
        'E' reason      the line cannot be had, or is lost; only 'C' follows
@@ -24,6 +25,11 @@
    life came for MS milliseconds: then once, until there is a sign of life again. They do not wait
    behind what would take longer than PATIENCE_MS to leave; that is thrown away, half a packet maybe,
    so they should be such that whoever listens finds their beginning.
+
+   Every sign of life says when it was given, `at` in milliseconds of CLOCK_MONOTONIC, which the VM reads too. We may
+   be frozen (SIGSTOP) while the VM is not; what it says meanwhile waits in the pipe, and on the line nothing can be
+   said. When we go on, what is older than STALE_MS is not written, and a sign of life counts for when it was given:
+   so no old speed comes, and the last words do. The VM notices that 'K' is not answered.
 
    After 'E' and 'C' we wait for our input to end: were we gone, a write of the VM's could fail, and it
    would take this for the news and not our packet.
@@ -55,6 +61,8 @@
 #define WORDS_MS 200        /* the longest try to have the last words taken */
 #define CLOSE_MS 500        /* the longest that 'C' waits for what was written before, and for the end */
 #define FAREWELL_MS 1000    /* the longest that we stay after SIGTERM for the VM to hear of it */
+#define STALE_MS 200        /* what is older is not worth to be said */
+#define ANSWER_MS 100       /* between two answers to 'K' */
 #define ABSENT_MS 10        /* how often a pty is asked whether somebody has opened its other end */
 #define SLAVE_MAJOR_FIRST 136
 #define SLAVE_MAJOR_LAST 143
@@ -70,6 +78,8 @@ static struct {
     uint8_t words[SERIAL_WORDS_MOST];
     size_t words_length;
     int64_t life_ms;
+    int64_t answer_ms;                  /* when 'K' was answered last */
+    int64_t out_ms;                     /* when the newest of `out` was said */
     int spoken;                         /* since the last sign of life */
     uint8_t in[2 + 65535];              /* packets of the VM */
     size_t in_have;
@@ -80,11 +90,14 @@ static struct {
     uint32_t unread, taken;
 } s;
 
-static volatile sig_atomic_t told_to_end;
+static volatile sig_atomic_t told_to_end, continued;
 
 static void on_signal(int number)
 {
-    told_to_end = number;
+    if (number == SIGCONT)
+        continued = 1;
+    else
+        told_to_end = number;
 }
 
 static int64_t now_ms(void)
@@ -223,6 +236,17 @@ static void drop_out(void)
     note_taken(size);
 }
 
+/* What waited for the line while we were stopped is old too. */
+static void drop_stale(void)
+{
+    sigset_t pending;
+
+    if (!continued && (sigpending(&pending) != 0 || !sigismember(&pending, SIGCONT)))
+        return;
+    if (s.out_have > 0 && now_ms() - s.out_ms > STALE_MS)
+        drop_out();
+}
+
 /* Of a pty, what has arrived in the other end's buffer of 4 kB stays, as with any line. */
 static void flush_line(void)
 {
@@ -250,6 +274,7 @@ static void look_for_user(void)
 /* Writes what the line takes now. With nobody at the other end, a pty is a cable that hangs in the air. */
 static void write_line(void)
 {
+    drop_stale();
     if (s.link && s.fd >= 0 && s.out_have > 0)
         look_for_user();
     if (s.absent)
@@ -436,10 +461,27 @@ static const char *open_pty(void)
 
 /* ---- from the VM ---- */
 
-static void alive(void)
+static int64_t number_64(const uint8_t *bytes)
 {
-    s.life_ms = now_ms();
-    s.spoken = 0;
+    uint64_t number = 0;
+
+    for (int k = 0; k < 8; k++)
+        number = number << 8 | bytes[k];
+    return number > INT64_MAX ? INT64_MAX : (int64_t)number;
+}
+
+/* Who is alive at `at`; how old that is now. A time to come is as good as now. */
+static int64_t alive(int64_t at)
+{
+    int64_t now = now_ms();
+
+    if (at > now)
+        at = now;
+    if (at > s.life_ms)
+        s.life_ms = at;
+    if (now - at <= STALE_MS)
+        s.spoken = 0;
+    return now - at;
 }
 
 static void wait_until_sent(int64_t until)
@@ -475,24 +517,34 @@ static void take_packet(const uint8_t *packet, size_t size)
     if (size == 0 || (s.fd < 0 && packet[0] != 'C'))
         return;
     const uint8_t *body = packet + 1;
+    int64_t age = 0;
 
     size--;
+    if (packet[0] == 'W' || packet[0] == 'K' || packet[0] == 'L') {
+        if (size < 8)
+            return;
+        age = alive(number_64(body));
+        body += 8;
+        size -= 8;
+    }
     switch (packet[0]) {
     case 'W':
-        alive();
-        if (size > sizeof s.out - s.out_have) {
-            note_taken(size);   /* the VM would have to know better */
+        if (age > STALE_MS || size > sizeof s.out - s.out_have) {
+            note_taken(size);   /* too late, or more than the VM knows there is room for */
         } else {
             memcpy(s.out + s.out_have, body, size);
             s.out_have += size;
+            s.out_ms = now_ms() - age;
             write_line();
         }
         break;
     case 'K':
-        alive();
+        if (now_ms() - s.answer_ms >= ANSWER_MS && room_up(128)) {
+            s.answer_ms = now_ms();
+            send_up('K', "", 0);
+        }
         break;
     case 'L':
-        alive();
         if (size <= sizeof s.words) {
             memcpy(s.words, body, size);
             s.words_length = size;
@@ -612,9 +664,12 @@ static void listen_to_signals(sigset_t *while_waiting)
     sigemptyset(&ours);
     sigaddset(&ours, SIGTERM);
     sigaddset(&ours, SIGHUP);
+    sigaddset(&ours, SIGCONT);
     sigprocmask(SIG_BLOCK, &ours, while_waiting);
     sigdelset(while_waiting, SIGTERM);
     sigdelset(while_waiting, SIGHUP);
+    sigdelset(while_waiting, SIGCONT);
+    sigaction(SIGCONT, &end, NULL);
     sigaction(SIGTERM, &end, NULL);
     sigaction(SIGHUP, &end, NULL);
     signal(SIGPIPE, SIG_IGN);
@@ -659,8 +714,12 @@ static int turn(const sigset_t *while_waiting)
         { .fd = s.up_have > 0 ? STDOUT_FILENO : -1, .events = POLLOUT },
     };
 
-    if (ppoll(fds, 3, at == INT64_MAX ? NULL : &timeout, while_waiting) < 0)
-        return errno == EINTR;
+    int found = ppoll(fds, 3, at == INT64_MAX ? NULL : &timeout, while_waiting), interrupted = errno == EINTR;
+
+    drop_stale();
+    continued = 0;
+    if (found < 0)
+        return interrupted;
     if (fds[0].revents && !read_vm())
         return 0;
     if (fds[2].revents)
@@ -707,8 +766,14 @@ int serial_run(int argc, char **argv)
     if (reason) {
         fail(reason);
     } else {
-        send_up('O', "", 0);
-        alive();
+        uint8_t now[8];
+        int64_t at = now_ms();
+
+        for (int k = 0; k < 8; k++)
+            now[k] = (uint8_t)(at >> (56 - 8 * k));
+        send_up('O', now, sizeof now);
+        s.life_ms = at;
+        s.answer_ms = at - ANSWER_MS;
     }
     while (!told_to_end)
         if (!turn(&while_waiting)) {

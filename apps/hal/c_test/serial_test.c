@@ -101,9 +101,13 @@ static int finish(void)
 
 static void send_packet(char letter, const void *body, size_t size)
 {
-    uint8_t head[3] = { (uint8_t)((size + 1) >> 8), (uint8_t)(size + 1), (uint8_t)letter };
+    size_t stamp = letter == 'W' || letter == 'K' || letter == 'L' ? 8 : 0;
+    uint8_t head[11] = { (uint8_t)((size + stamp + 1) >> 8), (uint8_t)(size + stamp + 1), (uint8_t)letter };
+    int64_t at = now_ms();
 
-    check(write(t.in, head, 3) == 3, "a packet's head was not taken");
+    for (int k = 0; k < 8; k++)
+        head[3 + k] = (uint8_t)(at >> (56 - 8 * k));
+    check(write(t.in, head, 3 + stamp) == (ssize_t)(3 + stamp), "a packet's head was not taken");
     check(size == 0 || write(t.in, body, size) == (ssize_t)size, "a packet was not taken");
 }
 
@@ -279,6 +283,90 @@ static void ways_to_end(void)
     }
 }
 
+static void pause_ms(int64_t ms)
+{
+    for (int64_t until = now_ms() + ms; now_ms() < until;)
+        usleep(1000);
+}
+
+static void freeze(void)
+{
+    int found;
+
+    kill(t.pid, SIGSTOP);
+    check(waitpid(t.pid, &found, WUNTRACED) == t.pid && WIFSTOPPED(found), "it does not stop");
+}
+
+/* Only the program is frozen, while the VM goes on. */
+static void frozen(void)
+{
+    static char much[1000];
+    char found[1024], last[3] = { 0 }, letter;
+    size_t size = 0, sent = 0, taken = 0;
+
+    /* What is said meanwhile is old when it goes on; then come the last words, and what is new. */
+    start_on_pty("500");
+    freeze();
+    for (int k = 0; k < 5; k++) {
+        send_packet('W', "old", 3);
+        send_packet('K', "", 0);
+    }
+    pause_ms(800);
+    kill(t.pid, SIGCONT);
+    expect_stop();
+    /* Of the signs of life one at least is answered. */
+    while ((letter = packet(found, sizeof found)) == 'T')
+        ;
+    check(letter == 'K', "a sign of life is not answered");
+    send_packet('W', "new", 3);
+    read_exactly(t.master, found, 3);
+    check(memcmp(found, "new", 3) == 0, "something else than what is new");
+    expect_stop();
+    check(finish() == 0, "frozen");
+    close(t.master);
+
+    /* New last words are never too old, nor is the end of the VM. */
+    start_on_pty("100000");
+    freeze();
+    send_packet('W', "old", 3);
+    send_packet('L', "HALT", 4);
+    end_input();
+    pause_ms(300);
+    kill(t.pid, SIGCONT);
+    read_exactly(t.master, found, 4);
+    check(memcmp(found, "HALT", 4) == 0, "not the newest last words");
+    check(finish() == 0, "frozen at its end");
+    close(t.master);
+
+    /* What the line had not taken is old too: of it there is so much that some waits in the program. */
+    start_on_pty("100000");
+    memset(much, 'x', sizeof much);
+    while (sent < taken + 5000) {
+        struct pollfd from = { .fd = t.out, .events = POLLIN };
+
+        send_packet('W', much, sizeof much);
+        sent += sizeof much;
+        while (poll(&from, 1, 5) > 0) {
+            check(packet(found, sizeof found) == 'T', "something else than what was taken");
+            taken += (size_t)(uint8_t)found[2] << 8 | (uint8_t)found[3];
+        }
+    }
+    freeze();
+    pause_ms(300);
+    kill(t.pid, SIGCONT);
+    pause_ms(50);
+    send_packet('W', "new", 3);
+    while (size < 3 || memcmp(last, "new", 3) != 0) {
+        memmove(last, last + 1, 2);
+        read_exactly(t.master, last + 2, 1);
+        size++;
+    }
+    /* It tells of 1024 at a time. */
+    check(size < taken + 1024 + 3, "what waited for the line was written after the freeze");
+    check(finish() == 0, "frozen with a full line");
+    close(t.master);
+}
+
 static void unplugged(void)
 {
     start_on_pty("100000");
@@ -416,6 +504,7 @@ int main(void)
     check(mkdtemp(folder) && chdir(folder) == 0, "no folder");
     command_line();
     ways_to_end();
+    frozen();
     unplugged();
     busy();
     settings();

@@ -40,6 +40,10 @@ defmodule Hal.Serial do
   away, so before the last words half a packet may stand. What this is worth without our port program,
   see `Hal.Serial.Circuits`.
 
+  The port program itself may be frozen, and only it: then nobody can say anything on the line. `keep_alive/1`, said
+  often, gives `{:error, :frozen}` after half a second. When it goes on, it writes nothing that it was told more than
+  200 ms before, and then the last words.
+
   ## Much at once
 
   At most 4096 bytes that the line has not taken are kept. A write that does not fit is not done at all,
@@ -93,7 +97,10 @@ defmodule Hal.Serial do
 
   def last_words(%__MODULE__{}, words) when is_binary(words), do: {:error, :einval}
 
-  @doc "Says that whoever drives is well, though it has nothing to write."
+  @doc """
+  Says that whoever drives is well, though it has nothing to write. `{:error, :frozen}`: for 500 ms nobody has
+  taken notice; the line is to be closed.
+  """
   @spec keep_alive(t()) :: :ok | {:error, reason()}
   def keep_alive(%__MODULE__{} = t), do: t.module.keep_alive(t.line)
 
@@ -147,6 +154,8 @@ defmodule Hal.Serial do
   defp words(:unplugged), do: "unplugged"
   defp words(:terminated), do: "the port program was told to end"
   defp words(:overrun), do: "the line cannot take so much at once"
+  defp words(:frozen), do: "its port program is frozen, so nothing can be said on the line"
+  defp words(:clock), do: "this VM does not read the machine's monotonic clock"
   defp words(:closed), do: "closed"
   defp words(:timeout), do: "no answer"
   defp words({:os, words}), do: words

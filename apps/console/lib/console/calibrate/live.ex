@@ -18,28 +18,23 @@ defmodule Console.Calibrate.Live do
   @type driven :: %{told: Pose.t(), told_turn: float()}
 
   @doc """
-  Waits until the robot's drive is there; or what it says that is missing.
+  Waits until the robot's drive is there and lacks nothing; or what it says that is missing.
   """
   @spec ready(atom(), non_neg_integer()) :: :ok | {:error, String.t()}
   def ready(robot, patience_ms \\ @ready_ms) do
     cond do
-      odometry(robot) != nil -> :ok
-      patience_ms <= 0 -> {:error, "#{robot} tells no odometry: #{why(robot)}"}
+      odometry(robot) != nil and lacks(robot) == nil -> :ok
+      patience_ms <= 0 -> {:error, "#{robot} cannot drive: #{why(robot)}"}
       true -> wait(fn -> ready(robot, patience_ms - @look_ms) end)
     end
   end
 
+  defp lacks(robot), do: with(%{why: line} <- entry(robot, :arming), do: line)
+
   defp why(robot) do
     case Swarm.status(robot) do
-      %{offline: %{drive: line}} ->
-        "its drive is offline (#{line})"
-
-      _online_or_unknown ->
-        with(
-          %{why: line} when line != nil <- entry(robot, :arming),
-          do: line,
-          else: (_ -> "its drive is silent")
-        )
+      %{offline: %{drive: line}} -> "its drive is offline (#{line})"
+      _online_or_unknown -> lacks(robot) || "its base tells no odometry"
     end
   end
 

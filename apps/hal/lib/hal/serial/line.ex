@@ -22,6 +22,8 @@ defmodule Hal.Serial.Line do
           | :overrun
           | :closed
           | :timeout
+          | :clock
+          | :frozen
           | {:exit, status :: term()}
           | {:os, String.t()}
 

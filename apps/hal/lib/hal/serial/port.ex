@@ -6,11 +6,16 @@ defmodule Hal.Serial.Port do
   The program keeps the clock of the signs of life. It may be killed itself, by the kernel's
   hand or an administrator's `kill -9`: then there are no last words, and this side sees `{:exit, 137}`.
 
+  It may also be frozen alone (`kill -STOP`): then nothing can be said on the line, the last words neither. It does
+  not answer the signs of life any more, and `keep_alive/1` says `:frozen` when 500 ms and five of them went by. All
+  that is said to it bears the time of the machine's monotonic clock, so that, when it goes on, it writes
+  nothing that is older than 200 ms: after a freeze the line hears the last words, or what is said now.
+
   Errors of `open/1`: `:enoent`, `:eacces`, `:ebusy` (another program has locked it), `:eio`, `:enodev`,
   `:enxio` (nothing behind it), `:enotty` (not a serial device), `:speed` (the hardware cannot), `:einval`,
-  `:eexist` (`:pty` would replace something), `:timeout`, `{:os, text}`, `{:exit, status}`.
+  `:eexist` (`:pty` would replace something), `:timeout`, `:clock` (the VM reads another clock than the program), `{:os, text}`, `{:exit, status}`.
   Later ones: `:unplugged`, `:terminated` (by SIGTERM or SIGHUP, after the last words), `{:exit, reason}`,
-  and of `write/2` and its like `:overrun`, `:closed`.
+  and of `write/2` and its like `:overrun`, `:closed`, of `keep_alive/1` also `:frozen`.
   """
   @behaviour Hal.Serial.Line
   alias Hal.Serial.Line
@@ -21,15 +26,22 @@ defmodule Hal.Serial.Port do
 
   @open_ms 5_000
   @close_ms 2_000
+  @frozen_ms 500
+  @frozen_signs 5
+  # From the program's look at the clock to ours, on a busy machine.
+  @clocks_ms 5_000
 
   @reasons Map.new(
              ~w(enoent eacces ebusy eio enodev enxio enotty einval eexist speed unplugged terminated)a,
              &{Atom.to_string(&1), &1}
            )
 
-  # The counters: bytes written that the line has not taken, bytes taken of which the program was not told.
+  # The counters: bytes written that the line has not taken, bytes taken of which the program was not told; signs of
+  # life since the program's last answer, and when the first of these was given.
   @under_way 1
   @untold 2
+  @unanswered 3
+  @unanswered_ms 4
 
   @enforce_keys [:port, :counters]
   defstruct @enforce_keys
@@ -41,10 +53,10 @@ defmodule Hal.Serial.Port do
     program = Application.app_dir(:hal, "priv/serial")
     settings = [:binary, :exit_status, packet: 2, args: arguments(options)]
     port = Port.open({:spawn_executable, program}, settings)
-    line = %__MODULE__{port: port, counters: :counters.new(2, [])}
+    line = %__MODULE__{port: port, counters: :counters.new(4, [])}
 
     receive do
-      {^port, {:data, "O"}} -> {:ok, line}
+      {^port, {:data, <<?O, at_ms::64>>}} -> same_clock(line, at_ms)
       {^port, {:data, <<?E, reason::binary>>}} -> give_up(line, reason(reason))
       {^port, {:exit_status, status}} -> give_up(line, {:exit, status})
       {:EXIT, ^port, reason} -> give_up(line, {:exit, reason})
@@ -65,14 +77,34 @@ defmodule Hal.Serial.Port do
   end
 
   @impl Line
-  def last_words(%__MODULE__{} = line, words), do: command(line, [?L, words])
+  def last_words(%__MODULE__{} = line, words),
+    do: command(line, [?L, <<now_ms()::64>>, words])
 
   @impl Line
-  def keep_alive(%__MODULE__{} = line), do: command(line, "K")
+  def keep_alive(%__MODULE__{} = line) do
+    at_ms = now_ms()
+
+    if frozen?(line, at_ms) and frozen?(hear_answers(line), at_ms) do
+      {:error, :frozen}
+    else
+      if :counters.get(line.counters, @unanswered) == 0,
+        do: :counters.put(line.counters, @unanswered_ms, at_ms)
+
+      :counters.add(line.counters, @unanswered, 1)
+      command(line, [?K, <<at_ms::64>>])
+    end
+  end
+
+  # Who was frozen himself has given few signs meanwhile.
+  defp frozen?(%{counters: counters}, at_ms) do
+    :counters.get(counters, @unanswered) >= @frozen_signs and
+      at_ms - :counters.get(counters, @unanswered_ms) >= @frozen_ms
+  end
 
   @impl Line
   def close(%__MODULE__{port: port} = line) do
-    if command(line, "C") == :ok, do: wait_closed(port)
+    # Who is frozen does not answer this either.
+    if command(line, "C") == :ok and not frozen?(line, now_ms()), do: wait_closed(port)
     shut(port)
   end
 
@@ -85,6 +117,10 @@ defmodule Hal.Serial.Port do
 
       {^port, {:data, <<?T, size::32>>}} ->
         :counters.sub(line.counters, @under_way, size)
+        :unknown
+
+      {^port, {:data, "K"}} ->
+        :counters.put(line.counters, @unanswered, 0)
         :unknown
 
       {^port, {:data, <<?E, reason::binary>>}} ->
@@ -110,7 +146,8 @@ defmodule Hal.Serial.Port do
   end
 
   defp put(line, size, bytes) do
-    with :ok <- command(line, [?W, bytes]), do: :counters.add(line.counters, @under_way, size)
+    with :ok <- command(line, [?W, <<now_ms()::64>>, bytes]),
+         do: :counters.add(line.counters, @under_way, size)
   end
 
   defp fits?(line, size), do: :counters.get(line.counters, @under_way) + size <= @out_most
@@ -124,6 +161,26 @@ defmodule Hal.Serial.Port do
     after
       0 -> line
     end
+  end
+
+  defp hear_answers(%{port: port} = line) do
+    receive do
+      {^port, {:data, "K"}} ->
+        :counters.put(line.counters, @unanswered, 0)
+        hear_answers(line)
+    after
+      0 -> line
+    end
+  end
+
+  defp same_clock(line, at_ms) do
+    if abs(now_ms() - at_ms) <= @clocks_ms, do: {:ok, line}, else: give_up(line, :clock)
+  end
+
+  # CLOCK_MONOTONIC of the machine, as the program reads it; Erlang's own clocks are corrected.
+  defp now_ms do
+    source = :erlang.system_info(:os_monotonic_time_source)
+    :erlang.convert_time_unit(source[:time], :native, :millisecond)
   end
 
   # A program that falls silent for want of this goes on once the owner has taken what it has.
