@@ -15,7 +15,7 @@ defmodule Hal.Drive do
 
   Odometry and sonar come with a report of the base and are not repeated without one: a base that tells
   neither is taken for silent (`Hal.Reports`). A driver that hears a report and cannot make such a reading of it,
-  for want of a conversion, says `{:report, :wheels}` or `{:report, :sonar}`.
+  for want of a conversion or of its other half, says `{:report, :wheels}` or `{:report, :sonar}`.
   """
   @type reading ::
           {:odometry, Hal.Odometry.t()}

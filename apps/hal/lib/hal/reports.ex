@@ -13,7 +13,7 @@ defmodule Hal.Reports do
   Between 500 ms and 2 s without sonar the robot is slow (`:blind` of `Robot.Reflex`).
 
   Odometry is a report of the wheels, ranges are one of the sonars. `{:report, :wheels}` and `{:report, :sonar}`
-  count too: of a driver that hears its base but lacks the conversions to say what it heard.
+  count too: of a driver that hears its base but cannot say yet what it heard.
   """
 
   @wheels_ms 500

@@ -17,7 +17,7 @@ defmodule Robot.Board do
   | `:radio` | `:link` | what was sent, heard, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
   | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Reflex.frame/1` |
-  | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil}` |
+  | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil}` |
   | `:pose` | `:executive` | the estimate in the `map` frame |
   | `:mission` | `:pilot` | `%{state: :idle or {mission, phase}, claim: map}` |
 

@@ -41,7 +41,15 @@ defmodule Robot.Executive do
     Gate.forget(id)
     board = Board.find!(id)
     at_ms = Config.now(config)
-    Board.put(board, :executive, :doing, %{by: :idle, weight: 0.0, outcome: nil}, at_ms)
+
+    Board.put(
+      board,
+      :executive,
+      :doing,
+      %{by: :idle, weight: 0.0, outcome: nil, fault: nil},
+      at_ms
+    )
+
     Event.execute([:robot, :executive, :start], %{at_ms: at_ms}, %{robot: id})
 
     s = %{
@@ -103,7 +111,8 @@ defmodule Robot.Executive do
     Trace.effect(config, :executive, {:wish, wish}, at_ms)
     s = look(s, wish.look || s.look, at_ms)
 
-    doing = %{by: wish.by, weight: wish.weight, outcome: outcome}
+    fault = fault(s, Mind.fault(mind), at_ms)
+    doing = %{by: wish.by, weight: wish.weight, outcome: outcome, fault: fault}
     Board.put(board, :executive, :doing, doing, at_ms)
     if percept.pose, do: Board.put(board, :executive, :pose, percept.pose, at_ms)
 
@@ -111,6 +120,14 @@ defmodule Robot.Executive do
     with {tag, outcome} <- outcome, do: tell(s, {:outcome, tag, outcome}, at_ms)
     tell(s, {:tick, percept}, at_ms)
     %{s | mind: mind, behaviour_looks?: wish.look != nil}
+  end
+
+  # Told when it changes.
+  defp fault(s, line, at_ms) do
+    if line != Mind.fault(s.mind),
+      do: Event.execute([:robot, :fault], %{at_ms: at_ms}, %{robot: s.config.id, line: line})
+
+    line
   end
 
   defp look(%{config: %{ptz: ptz}} = s, pan, _at_ms) when pan == nil or ptz == nil, do: s

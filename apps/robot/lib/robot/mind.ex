@@ -81,6 +81,10 @@ defmodule Robot.Mind do
   @spec percept(t()) :: Percept.t() | nil
   def percept(%__MODULE__{percept: percept}), do: percept
 
+  @doc "Why the robot stands though nobody told it to, in one line for people; `nil` where it does not."
+  @spec fault(t()) :: String.t() | nil
+  def fault(%__MODULE__{escape: {Escape, state}}), do: Escape.fault(state)
+
   @doc """
   One tick: the chosen wish (its `by` says whose), and the goal's outcome at the tick it ends.
   """

@@ -5,6 +5,7 @@ defmodule Sim.HardwareBaseTest do
   alias Hal.{Device, Pose, Profile, Twist}
   alias Sim.{Emulator, Server, World}
   @moduletag :tmp_dir
+  @moduletag :capture_log
 
   @conversions %{
     magellan: [distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0],

@@ -159,4 +159,31 @@ defmodule Sim.HardwareLineTest do
     assert length(said) == length(wanted)
     for {words, begin} <- Enum.zip(said, wanted), do: assert(String.starts_with?(words, begin))
   end
+
+  test "a bumper that is held down on an armed, idle robot: it backs off once, stands, and says so",
+       context do
+    emulator = base(context, [])
+    id = real(context, :line_held)
+    listen(id, [:robot, :fault])
+    eventually(fn -> Swarm.arm(id) == :ok end)
+    start = place(context)
+    :ok = Emulator.change(emulator, :hold, [[0]])
+    assert_receive {[:robot, :fault], %{line: "bumper 0 stays pressed"}}, 5_000
+    eventually(fn -> line(id) =~ "FAULT (bumper 0 stays pressed)" and still?(context) end)
+    stood = place(context)
+    assert Pose.distance(start, stood) < 0.25
+    assert_in_delta stood.heading, start.heading, 0.1
+    # Neither by itself nor by an order, until somebody has looked.
+    _refused_or_not = Swarm.tell(id, "move:-0.1:0")
+    never(3_000, fn -> Pose.distance(stood, place(context)) > 0.01 end)
+
+    assert Swarm.disarm(id) == :ok
+    assert_receive {[:robot, :fault], %{line: nil}}, 2_000
+    assert Swarm.arm(id) == :ok
+    # To be armed is no reason to move.
+    never(1_000, fn -> Pose.distance(stood, place(context)) > 0.01 end)
+    refute line(id) =~ "FAULT"
+    assert Swarm.tell(id, "move:-0.1:0") == :ok
+    eventually(fn -> Pose.distance(stood, place(context)) > 0.1 end)
+  end
 end

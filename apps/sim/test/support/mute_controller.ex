@@ -8,10 +8,13 @@ defmodule Sim.MuteController do
   alias Sim.RFlexController.Frame
 
   @enforce_keys [:base, :silent]
-  defstruct @enforce_keys
+  defstruct @enforce_keys ++ [pressed: []]
 
   @doc "From now on silent of these ports."
   def silence(core, silent), do: %{core | silent: silent}
+
+  @doc "From now on these bumpers are pressed, whatever the body feels."
+  def hold(core, pressed), do: %{core | pressed: pressed}
 
   @impl Sim.Emulator.Core
   def new(options, at_ms) do
@@ -25,6 +28,11 @@ defmodule Sim.MuteController do
   def hear(core, bytes, at_ms), do: %{core | base: RFlexController.hear(core.base, bytes, at_ms)}
 
   @impl Sim.Emulator.Core
+  def feel(core, {:bumpers, felt}, at_ms) do
+    pressed = Enum.uniq(core.pressed ++ felt)
+    %{core | base: RFlexController.feel(core.base, {:bumpers, pressed}, at_ms)}
+  end
+
   def feel(core, reading, at_ms),
     do: %{core | base: RFlexController.feel(core.base, reading, at_ms)}
 

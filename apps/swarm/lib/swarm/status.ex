@@ -7,7 +7,7 @@ defmodule Swarm.Status do
   Of wheels that may not turn it says `DISARMED`, with what is missing, or `LINE LOST` until a person
   acknowledges (`Hal.Arming`; `arming` and `why`). Of a device that is not there it says why: `drive offline
   (/dev/ttyR0: no such device)` (`offline`: words by device). A robot that is slow for want of sonar is
-  `BLIND`.
+  `BLIND`. One that stands though nobody told it to says `FAULT`, and why (`fault`).
 
   `age_ms` is how old its newest reading is; `rejected` counts malformed messages by kind. `hears` are
   the robots it hears itself, `view` those that it takes for there (itself too), with the view's number,
@@ -40,6 +40,7 @@ defmodule Swarm.Status do
                 power: nil,
                 health: %{},
                 offline: %{},
+                fault: nil,
                 peers: %{},
                 hears: [],
                 view: nil,
@@ -64,6 +65,7 @@ defmodule Swarm.Status do
           power: float() | nil,
           health: %{(atom() | String.t()) => :online | {:offline, term()}},
           offline: %{(atom() | String.t()) => String.t()},
+          fault: String.t() | nil,
           peers: %{atom() => Peers.status()},
           hears: [atom()],
           view: view() | nil,
@@ -85,6 +87,7 @@ defmodule Swarm.Status do
       node: node(),
       state: state(mission),
       by: entries |> value(:doing) |> field(:by),
+      fault: entries |> value(:doing) |> field(:fault),
       pose: value(entries, :pose),
       speed: if(driving, do: driving.twist.linear, else: 0.0),
       limits: field(driving, :limits) || [],
@@ -153,6 +156,7 @@ defmodule Swarm.Status do
       [
         status.estop && "E-STOP",
         arming(status),
+        status.fault && "FAULT (#{status.fault})",
         Enum.any?(status.limits, &("#{&1}" == "blind")) && "BLIND (no sonar; slow)",
         status.leader && "leader #{status.leader}",
         status.view && "view #{elem(status.view, 0)}",

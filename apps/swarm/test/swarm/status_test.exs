@@ -31,14 +31,15 @@ defmodule Swarm.StatusTest do
       node: :mag1@lab,
       health: %{drive: {:offline, :eacces}, ptz: :online},
       offline: %{drive: "/dev/ttyR0: permission denied"},
-      limits: [:blind]
+      limits: [:blind],
+      fault: "bumper 0 stays pressed"
     }
 
     assert inspect(status) =~ ", BLIND (no sonar; slow), "
     assert inspect(status) =~ ", drive offline (/dev/ttyR0: permission denied)"
     # So does its row, to those that it cannot answer.
     {:ok, told} = Status.Row.decode(:mag1, Status.Row.encode(status), 7)
-    assert inspect(told) =~ ", BLIND (no sonar; slow), "
+    assert inspect(told) =~ ", FAULT (bumper 0 stays pressed), BLIND (no sonar; slow), "
     assert inspect(told) =~ ", drive offline (/dev/ttyR0: permission denied)"
     # A row of before knows no words.
     row = status |> Status.Row.encode() |> Map.delete(:words)

@@ -8,9 +8,10 @@ defmodule Hal.RFlex.Senses do
   @most_volts 60.0
 
   @enforce_keys [:odometry, :sonar, :infrared, :bumpers, :home_address, :power_offset]
-  defstruct @enforce_keys ++ [frame: nil, home: %Home{}, brake: nil, motor_ms: nil, counts: %{}]
+  defstruct @enforce_keys ++
+              [frame: nil, home: %Home{}, brake: nil, motor_ms: nil, paired?: false, counts: %{}]
 
-  @typedoc "`frame` of the odometry; `counts`: packets that were `unknown`, `malformed`, or `implausible`."
+  @typedoc "`frame` of the odometry; `paired?`: both wheels' counters were heard; `counts`: packets that were `unknown`, `malformed`, or `implausible`."
   @type t :: %__MODULE__{}
 
   @doc "Senses of these options; `before` is the odometry of the same base in the same `frame`, if it goes on."
@@ -59,12 +60,18 @@ defmodule Hal.RFlex.Senses do
   defp axis(senses, report, at_ms) do
     case Odometry.report(senses.odometry, report, at_ms) do
       {nil, odometry} ->
-        {[], %{senses | odometry: odometry}}
+        believed? = odometry.dropped == senses.odometry.dropped
+        {half(senses.paired? and believed?), %{senses | odometry: odometry}}
 
       {reading, odometry} ->
-        {[{:odometry, %{reading | frame: senses.frame}}], %{senses | odometry: odometry}}
+        senses = %{senses | odometry: odometry, paired?: true}
+        {[{:odometry, %{reading | frame: senses.frame}}], senses}
     end
   end
+
+  # Of a pair of which the other half may come or be lost: once a pair was heard, the base is there.
+  defp half(true), do: [{:report, :wheels}]
+  defp half(false), do: []
 
   defp sonar(%{sonar: nil} = senses, _records, _at_ms), do: {[{:report, :sonar}], senses}
 

@@ -3,6 +3,17 @@ defmodule Robot.Behaviour.Escape do
   What to do after touching something (R50): back off 0.15 m, away from the touched side, then
   turn away from it. Wishes nothing while nothing is touched; it never ends.
 
+  What makes it move is a touch, not a bumper that is pressed: one that stays pressed is escaped from once. If it
+  is still pressed after the backing off, and the sonars see nothing there either, or after the turn, that is a
+  **fault** (`fault/1`): a switch that hangs, or a thing that comes along. The robot stands until
+
+    * the bumper is released, or
+    * another bumper is touched, from which it escapes, or
+    * a person has looked: whoever disarms the wheels or stops them by the emergency stop knows what is pressed
+      then. It is no reason to move when they are armed again, until it was released once.
+
+  All the while the gate lets the robot not drive toward a side that is pressed (`Robot.Reflex`).
+
   Options: `distance` (metres, default 0.15), `turn` (radians, default 0.8).
   """
   @behaviour Robot.Behaviour
@@ -12,6 +23,11 @@ defmodule Robot.Behaviour.Escape do
 
   # A robot that is held in front and behind gives up, rather than push for ever.
   @give_up_ms 4000
+  # What the sonars see so near on the touched side, and so far aside, may be what touches it.
+  @near 0.4
+  @aside 0.6
+  # The wheels stand by a person's word.
+  @by_hand [:disarmed, :estop]
 
   @impl Robot.Behaviour
   def new(options \\ []) do
@@ -20,41 +36,80 @@ defmodule Robot.Behaviour.Escape do
     state = %{
       distance: Options.number!(options, :distance, 0.01, 2.0),
       turn: Options.number!(options, :turn, 0.0, 3.0),
-      phase: :idle
+      phase: :idle,
+      held: [],
+      known: []
     }
 
     {__MODULE__, state}
   end
 
-  @impl Robot.Behaviour
-  def tick(%{odometry: nil}, state), do: {:running, nil, {__MODULE__, state}}
+  @doc """
+  Why it stands, in one line; `nil` where it does not.
 
-  def tick(%{bumpers: [_ | _] = bumpers} = percept, %{phase: :idle} = state) do
-    angle = contact_angle(bumpers, percept.profile.bumpers)
-    back(percept, %{state | phase: {:back, angle, percept.odometry.pose, percept.at_ms}})
+      iex> {Robot.Behaviour.Escape, state} = Robot.Behaviour.Escape.new()
+      iex> Robot.Behaviour.Escape.fault(%{state | phase: :fault, held: [0, 3]})
+      "bumpers 0 and 3 stay pressed"
+  """
+  @spec fault(state :: map()) :: String.t() | nil
+  def fault(%{phase: :fault, held: [bumper]}), do: "bumper #{bumper} stays pressed"
+  def fault(%{phase: :fault, held: held}), do: "bumpers #{Enum.join(held, " and ")} stay pressed"
+  def fault(_state), do: nil
+
+  @impl Robot.Behaviour
+  def tick(percept, state) do
+    pressed = percept.bumpers
+
+    if by_hand?(percept) do
+      idle(%{state | held: [], known: pressed})
+    else
+      # Pressed ever since it was touched; pressed ever since a person knew of it.
+      state = %{state | held: common(state.held, pressed), known: common(state.known, pressed)}
+      act(percept, pressed -- (state.held ++ state.known), state)
+    end
   end
 
-  def tick(_percept, %{phase: :idle} = state), do: {:running, nil, {__MODULE__, state}}
+  defp by_hand?(%{driving: %{limits: limits}}), do: Enum.any?(@by_hand, &(&1 in limits))
+  defp by_hand?(_nothing_told), do: false
 
-  def tick(percept, state) do
+  defp common(some, pressed), do: Enum.filter(some, &(&1 in pressed))
+
+  defp act(%{odometry: nil}, _touched, state), do: {:running, nil, {__MODULE__, state}}
+  defp act(_percept, [], %{phase: :idle} = state), do: idle(state)
+  defp act(_percept, [], %{phase: :fault, held: []} = state), do: idle(state)
+  defp act(_percept, [], %{phase: :fault} = state), do: stand(state)
+
+  defp act(percept, touched, %{phase: phase} = state) when phase in [:idle, :fault] do
+    angle = contact_angle(touched, percept.profile.bumpers)
+    known = state.known ++ state.held
+    phase = {:back, angle, percept.odometry.pose, percept.at_ms}
+    back(percept, %{state | phase: phase, held: touched, known: known})
+  end
+
+  defp act(percept, _more, state) do
     {_, _, _, since_ms} = state.phase
 
     cond do
-      percept.at_ms - since_ms > @give_up_ms -> idle(state)
+      percept.at_ms - since_ms > @give_up_ms -> over(state)
       elem(state.phase, 0) == :back -> back(percept, state)
       true -> turn(percept, state)
     end
   end
 
   defp back(percept, %{phase: {:back, angle, from, since_ms}} = state) do
-    if Pose.distance(percept.odometry.pose, from) >= state.distance do
-      # Away from a contact on the left is to the right; straight ahead counts as left.
-      side = if angle >= 0, do: -1, else: 1
-      goal = Pose.wrap(percept.odometry.pose.heading + side * state.turn)
-      turn(percept, %{state | phase: {:turn, angle, goal, since_ms}})
-    else
-      speed = if :math.cos(angle) >= 0, do: -0.15, else: 0.15
-      running(Twist.new(speed, 0), state)
+    cond do
+      Pose.distance(percept.odometry.pose, from) < state.distance ->
+        speed = if :math.cos(angle) >= 0, do: -0.15, else: 0.15
+        running(Twist.new(speed, 0), state)
+
+      state.held == [] or near?(percept, angle) ->
+        # Away from a contact on the left is to the right; straight ahead counts as left.
+        side = if angle >= 0, do: -1, else: 1
+        goal = Pose.wrap(percept.odometry.pose.heading + side * state.turn)
+        turn(percept, %{state | phase: {:turn, angle, goal, since_ms}})
+
+      true ->
+        over(state)
     end
   end
 
@@ -62,11 +117,31 @@ defmodule Robot.Behaviour.Escape do
     error = Pose.wrap(goal - percept.odometry.pose.heading)
 
     if abs(error) < 0.1,
-      do: idle(state),
+      do: over(state),
       else: running(Twist.new(0, Steering.turn_rate(error, percept.profile)), state)
   end
 
+  defp over(%{held: []} = state), do: idle(state)
+  defp over(state), do: stand(state)
+
+  defp near?(%{sonar: nil}, _angle), do: false
+
+  defp near?(%{profile: profile, sonar: ranges}, angle) do
+    profile.sonars
+    |> Enum.zip(ranges)
+    |> Enum.any?(fn {sonar, range} ->
+      range < @near and abs(Pose.wrap(sonar.heading - angle)) < @aside
+    end)
+  end
+
   defp idle(state), do: {:running, nil, {__MODULE__, %{state | phase: :idle}}}
+
+  # Nothing that a mission wants is more than that.
+  defp stand(state) do
+    wish = Wish.new(:escape, Twist.zero(), 1.0)
+    {:running, wish, {__MODULE__, %{state | phase: :fault}}}
+  end
+
   defp running(twist, state), do: {:running, Wish.new(:escape, twist, 0.9), {__MODULE__, state}}
 
   # The middle of all touched segments, counter-clockwise from the front.

@@ -1,19 +1,24 @@
 defmodule Robot.Devices.Log do
   @moduledoc """
   What the log says of a robot's devices: a line when one is offline, with the reason in words, when it is back,
-  and when wheels are disarmed without a person's doing. Once a change: a device that is tried again and again
+  when wheels are disarmed without a person's doing, and when a bumper stays pressed. Once a change: a device that is tried again and again
   says nothing new.
   """
   require Logger
   alias Hal.Event
 
-  @events [:online, :offline, :arming]
+  @events [
+    [:hal, :device, :online],
+    [:hal, :device, :offline],
+    [:hal, :device, :arming],
+    [:robot, :fault]
+  ]
 
   @doc "Attaches the log to the devices' events; once a node."
   @spec attach() :: :ok
   def attach do
     for event <- @events do
-      _ = Event.attach({__MODULE__, event}, [:hal, :device, event], &__MODULE__.write/4, nil)
+      _ = Event.attach({__MODULE__, event}, event, &__MODULE__.write/4, nil)
     end
 
     :ok
@@ -21,8 +26,8 @@ defmodule Robot.Devices.Log do
 
   @doc false
   @spec write(Event.name(), map(), map(), term()) :: :ok
-  def write([:hal, :device, event], _measurements, about, _config) do
-    with {level, line} <- line(event, about), do: Logger.log(level, line)
+  def write(event, _measurements, about, _config) do
+    with {level, line} <- event |> List.last() |> line(about), do: Logger.log(level, line)
     :ok
   end
 
@@ -51,6 +56,8 @@ defmodule Robot.Devices.Log do
     do: {:warning, "#{name(about)} disarmed: #{why}"}
 
   def line(:arming, _changed_by_a_person), do: nil
+  def line(:fault, %{robot: robot, line: nil}), do: {:info, "#{robot}: the fault is over"}
+  def line(:fault, %{robot: robot, line: line}), do: {:warning, "#{robot} stands: #{line}"}
 
   defp name(%{robot: robot, device: device}), do: "#{robot}: #{device}"
   defp name(%{device: device}), do: "#{device}"

@@ -32,7 +32,11 @@ defmodule Swarm.Status.Row do
     }
     |> arming(status.arming)
     |> offline(status)
+    |> fault(status.fault)
   end
+
+  defp fault(row, nil), do: row
+  defp fault(row, line), do: Map.put(row, :fault, line)
 
   defp offline(row, %{offline: lines}) when lines == %{}, do: row
 
@@ -60,9 +64,10 @@ defmodule Swarm.Status.Row do
          {number, members} <- view,
          {:ok, arming} <- armed(Map.get(row, :arming)),
          words = Map.get(row, :words, []),
+         fault = Map.get(row, :fault),
          true <- Enum.all?([limits, offline, members, deaf_to, words], &texts?/1),
          true <- Enum.all?([node, state], &is_binary/1),
-         true <- Enum.all?([by, leader], &(&1 == nil or is_binary(&1))),
+         true <- Enum.all?([by, leader, fault], &(&1 == nil or is_binary(&1))),
          true <- Enum.all?([speed, rejected, number], &Shape.number?/1) and is_boolean(estop),
          true <- pose == nil or Shape.pose?(pose),
          true <- power == nil or is_number(power),
@@ -86,6 +91,7 @@ defmodule Swarm.Status.Row do
          health: Map.new(offline, &{Wire.word(&1), {:offline, :unknown}}),
          offline:
            for({name, line} <- Enum.zip(offline, words), into: %{}, do: {Wire.word(name), line}),
+         fault: fault,
          hears: members -- [robot | names(deaf_to)],
          view: {number, members},
          rejected: if(rejected > 0, do: %{all: rejected}, else: %{}),
