@@ -394,6 +394,8 @@ defmodule Hal.Device do
 
   defp report(s, condition) do
     at_ms = now(s)
+    health = {condition, since(s.health, condition, at_ms)}
+    hand_on(s, {:health, s.device, health})
 
     case condition do
       :online ->
@@ -405,8 +407,6 @@ defmodule Hal.Device do
         Event.execute([:hal, :device, :offline], %{at_ms: at_ms}, about)
     end
 
-    health = {condition, since(s.health, condition, at_ms)}
-    hand_on(s, {:health, s.device, health})
     %{s | health: health}
   end
 

@@ -154,9 +154,7 @@ defmodule Robot.SupervisorTest do
     id = rolling(:fall7, drive: {Hal.FakeDrive, test: self(), device: :drive, open: open})
     parts = parts(id, [:gate | @above])
 
-    assert {:ok, {:offline, :enoent}, _} =
-             Board.fetch(Board.find!(id), {:health, :drive}, :infinity)
-
+    health(id, {:offline, :enoent})
     rolls(800)
     assert {:ok, :online, _} = Board.fetch(Board.find!(id), {:health, :drive}, :infinity)
     assert parts(id, [:gate | @above]) == parts

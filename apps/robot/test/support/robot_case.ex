@@ -40,11 +40,14 @@ defmodule Robot.Case do
   end
 
   @doc "Waits until the base of a robot has reported: nobody arms it before."
-  def online(id, left \\ 500) do
+  def online(id), do: health(id, :online)
+
+  @doc "Waits until the drive of a robot is in this health."
+  def health(id, wanted, left \\ 500) do
     case Robot.Board.fetch(Robot.Board.find!(id), {:health, :drive}, :infinity) do
-      {:ok, :online, _at_ms} -> id
-      _not_yet when left == 0 -> flunk("the drive of #{id} is not online")
-      _not_yet -> receive(do: (:never -> :ok), after: (5 -> online(id, left - 1)))
+      {:ok, ^wanted, _at_ms} -> id
+      other when left == 0 -> flunk("the drive of #{id}: #{inspect(other)}")
+      _not_yet -> receive(do: (:never -> :ok), after: (5 -> health(id, wanted, left - 1)))
     end
   end
 

@@ -267,6 +267,18 @@ defmodule Hal.RFlex.DriverTest do
     close(t)
   end
 
+  test "half of a pair says that the base is there, once a whole pair was heard", %{link: link} do
+    t = open(link) |> until(said?(:brake)) |> answer(RFlexBase.axis(0, 100, 5000)) |> go_on(60)
+    refute told?(:report).(t) or told?(:odometry).(t)
+    t = t |> answer(RFlexBase.wheels(200, 5000, 70)) |> until(told?(:odometry)) |> forget()
+    t = t |> answer(RFlexBase.axis(1, 300, 70)) |> until(told?(:report))
+    refute told?(:odometry).(t)
+    # Of what is not believed, nothing.
+    t = t |> forget() |> answer(RFlexBase.axis(1, 400, 2_000_000)) |> go_on(60)
+    refute told?(:report).(t)
+    close(t)
+  end
+
   test "with them it is ready", %{link: link} do
     t = open(link) |> until(said?(:brake))
     assert Driver.ready(t.driver) == :ok
