@@ -157,7 +157,9 @@ defmodule Swarm do
   def unsubscribe(pid \\ self()), do: Watch.unsubscribe(pid)
 
   @doc """
-  Stops all robots, one, or a list of them. They stand until they are told something else.
+  Stops all robots, one, or a list of them, whatever they are at: no mission is asked. `:ok` when each one's
+  wheels have been told to stand and what it was at has ended; it stands until it is told something new. The next
+  `start/1` takes up the formation that was asked for last.
 
       Swarm.stop()
       Swarm.stop(:mag1)
@@ -200,7 +202,7 @@ defmodule Swarm do
 
   @doc """
   Stops all robots, one, or a list of them, and their wheels turn for nobody until `arm/1`. What they
-  were at has ended. As every stop it is obeyed however late it comes.
+  were at has ended; `:ok` when both are so. As every stop it is obeyed however late it comes.
 
       Swarm.disarm(:mag1)
   """

@@ -109,9 +109,11 @@ defmodule Hal.Device do
   @spec disarm(GenServer.server()) :: :ok | {:error, line :: String.t()}
   def disarm(device), do: order(device, :disarm)
 
-  @doc "The same for those who must not wait: nobody says whether it was done."
-  @spec disarm_later(GenServer.server()) :: :ok
-  def disarm_later(device), do: GenServer.cast(device, :disarm)
+  @doc """
+  The same for those who must not wait: once it is done, the device applies `then`, an `{m, f, a}`, if there is one.
+  """
+  @spec disarm_later(GenServer.server(), then :: {module(), atom(), list()} | nil) :: :ok
+  def disarm_later(device, then \\ nil), do: GenServer.cast(device, {:disarm, then})
 
   @doc "A person has looked why the line was lost while the wheels turned; then it may be armed."
   @spec acknowledge(GenServer.server()) :: :ok | {:error, line :: String.t()}
@@ -173,9 +175,11 @@ defmodule Hal.Device do
     {:noreply, drive_on(%{s | arming: arming}, allowed)}
   end
 
-  def handle_cast(:disarm, %{kind: :drive} = s) do
+  def handle_cast({:disarm, then}, %{kind: :drive} = s) do
     {:ok, arming} = Arming.order(s.arming, :disarm, readiness(s))
-    {:noreply, become(s, arming)}
+    s = become(s, arming)
+    with {m, f, a} <- then, do: apply(m, f, a)
+    {:noreply, s}
   end
 
   def handle_cast({:look, pan, tilt}, %{kind: :ptz} = s),

@@ -26,6 +26,13 @@ defmodule Robot.Executive do
   @spec goal(robot :: atom(), tag :: term(), {module(), keyword()} | nil) :: :ok
   def goal(robot, tag, goal), do: cast(robot, {:goal, tag, goal})
 
+  @doc """
+  Drops the goal and all else that the mission said, and has the gate forget the wish behind them, after
+  every wish from before; then the gate applies `then`.
+  """
+  @spec stand(robot :: atom(), then :: Config.call() | nil) :: :ok
+  def stand(robot, then \\ nil), do: cast(robot, {:stand, then})
+
   @doc "Sets the references that the estimate of the pose is corrected by."
   @spec anchors(robot :: atom(), list()) :: :ok
   def anchors(robot, anchors), do: cast(robot, {:anchors, anchors})
@@ -70,6 +77,13 @@ defmodule Robot.Executive do
   def handle_cast({:goal, tag, goal} = input, s) do
     Trace.input(s.config, :executive, input, Config.now(s.config))
     {:noreply, %{s | mind: Mind.goal(s.mind, tag, goal)}}
+  end
+
+  def handle_cast({:stand, then}, s) do
+    Trace.input(s.config, :executive, :stand, Config.now(s.config))
+    Gate.forget(s.config.id, then)
+    mind = s.mind |> Mind.goal(:idle, nil) |> Mind.anchors([])
+    {:noreply, %{s | mind: mind, look: nil}}
   end
 
   def handle_cast({:anchors, anchors} = input, s) do

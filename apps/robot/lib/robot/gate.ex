@@ -30,11 +30,13 @@ defmodule Robot.Gate do
   def wish(robot, twist), do: GenServer.cast(Names.via(robot, :gate), {:wish, twist})
 
   @doc """
-  Whoever wished has fallen, says the one who takes its place: what it wished counts no more. The robot
-  stops, before it is slowly brought to rest by the first wishes of one who knows nothing.
+  What was wished so far counts no more, and the robot stops at once: a stop was ordered, or the one who
+  wished has fallen, and the one who takes its place says so. Then `then` is applied, if there is one: whoever
+  waits for the stop hears of it from the gate.
   """
-  @spec forget(robot :: atom()) :: :ok
-  def forget(robot), do: GenServer.cast(Names.via(robot, :gate), :forget)
+  @spec forget(robot :: atom(), then :: Config.call() | nil) :: :ok
+  def forget(robot, then \\ nil),
+    do: GenServer.cast(Names.via(robot, :gate), {:forget, then})
 
   @doc "A sink for the drive: what reflexes need goes to the gate at once."
   @spec sense(robot :: atom(), tuple()) :: :ok
@@ -89,11 +91,13 @@ defmodule Robot.Gate do
     {:noreply, %{s | reflex: Reflex.wish(s.reflex, twist, at_ms)}}
   end
 
-  def handle_cast(:forget, s) do
+  def handle_cast({:forget, then}, s) do
     at_ms = heard(s, :forget)
     moving? = not Twist.zero?(s.reflex.twist)
     s = %{s | reflex: Reflex.forget(s.reflex)}
-    {:noreply, if(moving?, do: step(s, at_ms), else: s)}
+    s = if moving?, do: step(s, at_ms), else: s
+    with {m, f, a} <- then, do: apply(m, f, a)
+    {:noreply, s}
   end
 
   def handle_cast({:sense, {:arming, _state}}, %{config: %{dry_run: true}} = s),

@@ -3,6 +3,9 @@ defmodule Robot.Mission do
   What a robot is up to over minutes: a pure state machine, run by `Robot.Pilot` in real time and
   by simulations in lockstep. It sends nothing, keeps no timers and reads no clock: deadlines are
   integers, compared with `percept.at_ms` at each tick.
+
+  A stop is not for the mission: the pilot ends it, and hands it nothing more. What is left of it for the
+  next start, if anything, is what `c:halted/1` says.
   """
 
   @type event ::
@@ -35,4 +38,12 @@ defmodule Robot.Mission do
 
   @doc "What happens next."
   @callback handle(event(), mission :: term()) :: result()
+
+  @doc """
+  What outlives a stop: the mission as it waits for its next `{:command, :start}`, with what people have
+  asked of it so far. Asked once it is out of command; with `nil`, and without this callback, the next start begins from nothing.
+  """
+  @callback halted(mission :: term()) :: (mission :: term()) | nil
+
+  @optional_callbacks halted: 1
 end

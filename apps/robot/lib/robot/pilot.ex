@@ -7,6 +7,10 @@ defmodule Robot.Pilot do
   It starts idle, and tells the executive so: after a failure in the mission the robot stands
   until a person starts it again.
 
+  A stop is not the mission's to interpret. The pilot takes the mission out of command, whatever it is
+  at, and the stop goes on to the executive, which drops its goal, and from there to the gate, after
+  every older wish. Only the gate says that it is done.
+
   | effect | goes to |
   |---|---|
   | `{:goal, tag, goal}`, `{:anchors, list}`, `{:look, pan}` | the executive |
@@ -38,9 +42,24 @@ defmodule Robot.Pilot do
   @spec start(robot :: atom(), module(), keyword()) :: :ok | {:error, :no_mission}
   def start(robot, module, options), do: call(robot, {:start, module, options})
 
-  @doc "Ends the mission; the robot stands."
+  @doc "Ends the mission. When this returns, the gate has been told to stand, and no older wish follows."
   @spec stop(robot :: atom()) :: :ok
   def stop(robot), do: call(robot, :stop)
+
+  @doc """
+  The same for those who must not wait. Once it is done, `then` is applied; never, where the pilot, the
+  executive or the gate hangs or falls meanwhile.
+  """
+  @spec halt(robot :: atom(), then :: Config.call() | nil) :: :ok
+  def halt(robot, then \\ nil),
+    do: :gen_statem.cast(Names.via(robot, :pilot), {:halt, then})
+
+  @doc """
+  Takes up the mission that the last stop has ended, from its beginning, with what people had asked of it
+  (`c:Robot.Mission.halted/1`). `{:error, :idle}` where there is nothing to take up.
+  """
+  @spec resume(robot :: atom()) :: :ok | {:error, :idle}
+  def resume(robot), do: call(robot, :resume)
 
   @doc "Hands a command to the mission. `:ok` means that it has it, not that it is done."
   @spec command(robot :: atom(), command :: term()) :: :ok | {:error, :idle}
@@ -60,7 +79,7 @@ defmodule Robot.Pilot do
 
   @impl :gen_statem
   def init(%Config{} = config) do
-    data = %{config: config, board: Board.find!(config.id), mission: nil, claim: %{}}
+    data = %{config: config, board: Board.find!(config.id), mission: nil, claim: %{}, halted: nil}
     # The executive may still follow a goal of the mission that failed.
     rest(data)
     told(:idle, data)
@@ -79,19 +98,26 @@ defmodule Robot.Pilot do
       heard(input, data)
       rest(data)
       result = module.init(data.config.id, options)
-      follow(result, module, state, %{data | claim: %{}}, [{:reply, from, :ok}])
+      data = %{data | claim: %{}, halted: nil}
+      follow(result, module, state, data, [{:reply, from, :ok}])
     else
       {:keep_state_and_data, [{:reply, from, {:error, :no_mission}}]}
     end
   end
 
-  def handle_event({:call, from}, :stop, state, data) do
-    heard(:stop, data)
-    rest(data)
-    data = %{data | mission: nil, claim: %{}}
-    changed(state, :idle, data)
-    {:next_state, :idle, data, [{:reply, from, :ok}]}
+  def handle_event({:call, from}, :stop, state, data),
+    do: halt(state, {:gen_statem, :reply, [from, :ok]}, data)
+
+  def handle_event(:cast, {:halt, then}, state, data), do: halt(state, then, data)
+
+  def handle_event({:call, from}, :resume, :idle, %{halted: {module, mission}} = data) do
+    data = %{data | mission: mission, halted: nil}
+    result = handle({:command, :start}, module, data)
+    follow(result, module, :idle, data, [{:reply, from, :ok}])
   end
+
+  def handle_event({:call, from}, :resume, _state, _data),
+    do: {:keep_state_and_data, [{:reply, from, {:error, :idle}}]}
 
   def handle_event({:call, from}, {:command, _command}, :idle, _data),
     do: {:keep_state_and_data, [{:reply, from, {:error, :idle}}]}
@@ -105,6 +131,21 @@ defmodule Robot.Pilot do
     do: event |> newest() |> handle(module, data) |> follow(module, state, data, [])
 
   def handle_event(:info, _unknown, _state, _data), do: :keep_state_and_data
+
+  # Whoever is answered finds the robot idle. The mission is asked last: it has no say in this.
+  defp halt(state, then, data) do
+    heard(:stop, data)
+    changed(state, :idle, %{data | claim: %{}})
+    Executive.stand(data.config.id, then)
+    {:next_state, :idle, %{data | halted: halted(state, data), mission: nil, claim: %{}}}
+  end
+
+  defp halted(:idle, data), do: data.halted
+
+  defp halted({module, _phase}, data) do
+    left = if function_exported?(module, :halted, 1), do: module.halted(data.mission)
+    if left != nil, do: {module, left}
+  end
 
   # Percepts that came in meanwhile are further down in our own mailbox.
   defp newest({:tick, _percept} = tick) do

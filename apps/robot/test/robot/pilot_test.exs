@@ -80,6 +80,45 @@ defmodule Robot.PilotTest do
     for n <- 1..8, do: refute_received({:mission, {:tick, %{at_ms: ^n}}})
   end
 
+  test "a stop ends a mission that does not care, and a goal of nobody's, before it returns" do
+    roll = {Acts.Roll, twist: Twist.new(0.1, 0.0)}
+    id = flown(:pilot6)
+    :ok = Pilot.command(id, {:do, :ready, [{:goal, :roll, roll}]})
+    rolls()
+    assert Pilot.stop(id) == :ok
+    # What the drive is told from now on was asked for after the answer.
+    :sys.get_state(Names.whereis(id, :drive))
+    stands(250)
+    assert {:ok, %{state: :idle, claim: claim}, _} = Board.fetch(Board.find!(id), :mission, 1_000)
+    assert claim == %{}
+    refute_received {:mission, {:command, :stop}}
+
+    # Without a mission.
+    Executive.goal(id, :roll, roll)
+    rolls()
+    Pilot.halt(id, {Kernel, :send, [self(), :stopped]})
+    assert_receive :stopped
+    :sys.get_state(Names.whereis(id, :drive))
+    stands(250)
+    assert Pilot.resume(id) == {:error, :idle}
+  end
+
+  test "what a mission leaves of itself when it is stopped is taken up by the next start" do
+    id = flown(:pilot7, [])
+    :ok = Pilot.stop(id)
+    assert Pilot.resume(id) == {:error, :idle}
+    assert Pilot.start(id, Acts.Mission, test: self(), halted: :left) == :ok
+    assert Pilot.stop(id) == :ok
+    assert {:idle, %{mission: nil}} = :sys.get_state(Names.whereis(id, :pilot))
+    # A second stop takes nothing away.
+    assert Pilot.stop(id) == :ok
+    assert Pilot.command(id, :go) == {:error, :idle}
+    assert Pilot.resume(id) == :ok
+    assert_receive {:mission, {:command, :start}}
+    assert {{Acts.Mission, :left}, _} = :sys.get_state(Names.whereis(id, :pilot))
+    assert Pilot.resume(id) == {:error, :idle}
+  end
+
   test "another mission takes the place of a running one" do
     id = flown(:pilot5)
     goal = {:goal, :roll, {Acts.Roll, twist: Twist.new(0.1, 0.0)}}

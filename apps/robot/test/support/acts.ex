@@ -42,6 +42,11 @@ defmodule Robot.Acts do
       {options[:phase] || :ready, options, []}
     end
 
+    # What is left of it stands in the phase `:halted`; without one nothing is.
+    @impl Robot.Mission
+    def halted(options),
+      do: if(options[:halted], do: Keyword.put(options, :phase, options[:halted]))
+
     defp tell(options, what), do: if(options[:test], do: send(options[:test], {:mission, what}))
   end
 

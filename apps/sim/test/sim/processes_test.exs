@@ -97,6 +97,8 @@ defmodule Sim.ProcessesTest do
 
   # What a person does meanwhile.
   defp script(run, 200), do: input(run, @me, {:command, {:formation, :wedge, 1.2}, run.at_ms})
+  defp script(run, 260), do: input(run, @me, {:command, :stop, run.at_ms})
+  defp script(run, 275), do: input(run, @me, {:command, :start, run.at_ms})
   defp script(run, 300), do: input(run, @me, {:command, :estop, run.at_ms})
 
   defp script(run, 320) do

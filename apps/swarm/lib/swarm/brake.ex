@@ -8,12 +8,16 @@ defmodule Swarm.Brake do
   `:estop`. The link asks it about what heartbeats say, and is told of each change, so that the next
   heartbeats, which follow at once, spread it.
 
+  A stop goes to gate, executive and pilot at once, so that none that hangs holds up the others. It is
+  answered by the last of them, the gate, when the mission is out of command and no older wish can follow
+  (`Robot.Pilot.halt/2`); where that does not come, by nobody.
+
   A stop is obeyed however old it is; a reset that a person gave on another node bears a stamp
   (`Swarm.Stamp`), which is asked for here.
   """
   use GenServer
   alias Hal.Device
-  alias Robot.{Board, Config, Gate, Names, Pilot}
+  alias Robot.{Board, Config, Executive, Gate, Names, Pilot}
   alias Swarm.{Alarm, Entry, Post, Stamp, Stop}
 
   @behaviour Robot.Companion
@@ -164,6 +168,20 @@ defmodule Swarm.Brake do
     end
   end
 
+  # Nobody is waited for here: a mission that is slow to end delays no emergency stop.
+  defp obey(s, :stop, ref) do
+    halt(s, {Post, :answer, [ref, :ok]})
+    s
+  end
+
+  # The drive first says that its wheels are disarmed.
+  defp obey(s, :disarm, ref) do
+    halt(s, nil)
+    stopped = {Pilot, :halt, [s.id, {Post, :answer, [ref, :ok]}]}
+    :ok = Device.disarm_later(Names.via(s.id, :drive), stopped)
+    s
+  end
+
   defp obey(s, request, ref) do
     {answer, s} = answer(request, s)
     Post.answer(ref, answer)
@@ -175,18 +193,6 @@ defmodule Swarm.Brake do
   defp answer({:estop, call}, s) do
     s = called(s, call, 0)
     if s.stop.latched?, do: {:ok, s}, else: {{:error, "#{s.id} was reset meanwhile"}, s}
-  end
-
-  # Nobody is waited for here: a mission that is slow to end delays no emergency stop. A robot that
-  # is at nothing stands already.
-  defp answer(:stop, s) do
-    :ok = Pilot.hear(s.id, {:command, :stop})
-    {:ok, s}
-  end
-
-  defp answer(:disarm, s) do
-    :ok = Device.disarm_later(Names.via(s.id, :drive))
-    answer(:stop, s)
   end
 
   defp answer(:reset, s) do
@@ -215,6 +221,14 @@ defmodule Swarm.Brake do
     end
   end
 
+  # The gate stands at once. The goal goes also where the pilot is stuck in its mission, and again
+  # when the mission is out of command: it may have set another meanwhile.
+  defp halt(%{id: id}, then) do
+    :ok = Gate.forget(id)
+    :ok = Executive.stand(id)
+    :ok = Pilot.halt(id, then)
+  end
+
   # Made before a person reset this robot: somebody far away has only now been heard.
   defp over?(%{reset_ms: nil}, _age_ms), do: false
   defp over?(%{reset_ms: reset_ms}, age_ms), do: age_ms > now() - reset_ms
@@ -230,8 +244,7 @@ defmodule Swarm.Brake do
     if stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id)
 
     # The mission ends with it: after the reset nothing moves until somebody says so.
-    if stop.latched? and not before.latched?,
-      do: :ok = Pilot.hear(s.id, {:command, :stop})
+    if stop.latched? and not before.latched?, do: halt(s, nil)
 
     GenServer.cast(Names.via(s.id, :link), :stop)
     s

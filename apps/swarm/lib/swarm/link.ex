@@ -227,7 +227,7 @@ defmodule Swarm.Link do
 
   defp give_way(s, other) do
     Brake.present(s.id, false)
-    Pilot.stop(s.id)
+    Pilot.halt(s.id)
     Event.execute([:swarm, :link, :duplicate_id], %{}, %{robot: s.id, other: other})
     %{s | mouth: %{s.mouth | silent?: true}}
   end

@@ -22,10 +22,11 @@ defmodule Swarm.Member do
 
   @beat_ms 200
 
-  @enforce_keys [:id, :profile, :boot, :module, :mission, :mind, :reflex, :ear]
+  @enforce_keys [:id, :profile, :boot, :module, :options, :mission, :mind, :reflex, :ear]
   defstruct @enforce_keys ++
               [
                 phase: :idle,
+                halted: nil,
                 entries: %{},
                 claim: %{},
                 look: nil,
@@ -34,7 +35,8 @@ defmodule Swarm.Member do
               ]
 
   @typedoc """
-  `entries` is what was sensed last, by name, and when; `phase`, `claim` and `look` are what the
+  `mission` is `nil` between a stop and the next start, and `halted` what is left of it for that
+  (`c:Robot.Mission.halted/1`). `entries` is what was sensed last, by name, and when; `phase`, `claim` and `look` are what the
   mission said last; `ear` is what was heard: peers, emergency stop, rejected messages.
   """
   @type t :: %__MODULE__{
@@ -42,7 +44,9 @@ defmodule Swarm.Member do
           profile: Profile.t(),
           boot: non_neg_integer(),
           module: module(),
-          mission: term(),
+          options: keyword(),
+          mission: term() | nil,
+          halted: term() | nil,
           mind: Mind.t(),
           reflex: Reflex.t(),
           ear: Ear.t(),
@@ -83,6 +87,7 @@ defmodule Swarm.Member do
       profile: options[:profile],
       boot: options[:boot],
       module: module,
+      options: mission_options,
       mission: mission,
       phase: phase,
       mind: Mind.new(profile: options[:profile], start: options[:start]),
@@ -123,6 +128,15 @@ defmodule Swarm.Member do
       when command != :stop,
       do: {member, []}
 
+  # Nothing that the mission could interpret, as in `Robot.Pilot`.
+  def step(member, {:command, :stop, _at_ms}), do: {halt(member), []}
+
+  def step(%{mission: nil} = member, {:command, :start, _at_ms}) do
+    {member, begun} = resume(member)
+    {member, effects} = handle(member, {:command, :start})
+    {member, begun ++ effects}
+  end
+
   def step(member, {:command, command, _at_ms}), do: handle(member, {:command, command})
 
   def step(member, {:tick, at_ms}) do
@@ -155,7 +169,7 @@ defmodule Swarm.Member do
 
   @doc "Whether the mission lets the robot stand and wait, for a round, a leader or a person."
   @spec stands?(t()) :: boolean()
-  def stands?(member), do: member.mind.tag == :stand
+  def stands?(member), do: member.mission == nil or member.mind.tag == :stand
 
   defp put(member, key, value, at_ms),
     do: %{member | entries: Map.put(member.entries, key, {value, at_ms})}
@@ -180,16 +194,42 @@ defmodule Swarm.Member do
   # An e-stop spreads with every heartbeat.
   # The mission ends with it: after the reset nothing moves until somebody says so.
   defp latch(%{ear: %{stop: %{latched?: false}}} = member, %{stop: %{latched?: true}} = ear) do
-    member = %{member | reflex: Reflex.estop(member.reflex), ear: ear}
-    handle(member, {:command, :stop})
+    {halt(%{member | reflex: Reflex.estop(member.reflex), ear: ear}), []}
   end
 
   defp latch(member, ear), do: {%{member | ear: ear}, []}
 
+  defp halt(member) do
+    %{
+      member
+      | mind: member.mind |> Mind.goal(:idle, nil) |> Mind.anchors([]),
+        reflex: Reflex.forget(member.reflex),
+        halted: halted(member),
+        mission: nil,
+        phase: :idle,
+        claim: %{},
+        look: nil
+    }
+  end
+
+  defp halted(%{mission: nil, halted: halted}), do: halted
+
+  defp halted(%{module: module, mission: mission}) do
+    if function_exported?(module, :halted, 1), do: module.halted(mission)
+  end
+
+  defp resume(%{halted: nil} = member),
+    do: become(member, member.module.init(member.id, member.options))
+
+  defp resume(%{halted: mission} = member), do: {%{member | mission: mission, halted: nil}, []}
+
   defp outcome({tag, result}), do: {:outcome, tag, result}
 
-  defp handle(member, event) do
-    {phase, mission, effects} = member.module.handle(event, member.mission)
+  # Out of command it hears nothing.
+  defp handle(%{mission: nil} = member, _event), do: {member, []}
+  defp handle(member, event), do: become(member, member.module.handle(event, member.mission))
+
+  defp become(member, {phase, mission, effects}) do
     Enum.reduce(effects, {%{member | phase: phase, mission: mission}, []}, &carry_out/2)
   end
 
@@ -211,7 +251,8 @@ defmodule Swarm.Member do
       %Percept{pose: %Pose{}} = percept ->
         heard = Peers.heard(member.ear.peers, at_ms)
         sender = {member.boot, member.sequence + 1}
-        beat = Heartbeat.new(sender, percept, member.claim, heard, member.ear.stop)
+        claim = if member.mission == nil, do: %{standing: true}, else: member.claim
+        beat = Heartbeat.new(sender, percept, claim, heard, member.ear.stop)
 
         {%{member | sequence: member.sequence + 1, beat_ms: at_ms},
          [{:send, :all, Message.new(member.id, :heartbeat, beat)}]}

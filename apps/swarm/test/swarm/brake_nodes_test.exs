@@ -58,7 +58,7 @@ defmodule Swarm.BrakeNodesTest do
 
     # The stop was obeyed, and nothing else.
     eventually(fn -> match?(%{rejected: %{too_old: _}}, Swarm.status(id)) end)
-    eventually(fn -> entry(far, id, :mission).state == {Manual, :ready} end)
+    eventually(fn -> entry(far, id, :mission).state == :idle end)
     assert Swarm.goto(id, {5, 5}) == :ok
   end
 

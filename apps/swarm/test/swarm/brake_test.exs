@@ -32,12 +32,7 @@ defmodule Swarm.BrakeTest do
     :ok = :sys.resume(link)
 
     # The mission ended with the stop, before the reset.
-    eventually(fn ->
-      match?(
-        {:ok, %{state: {_, :ready}}, _},
-        Board.fetch(Board.find!(id), :mission, :infinity)
-      )
-    end)
+    assert {:ok, %{state: :idle}, _} = Board.fetch(Board.find!(id), :mission, :infinity)
   end
 
   test "an e-stop reaches a robot whose link is dead, and is spread by the link that follows" do

@@ -11,6 +11,11 @@ defmodule Swarm.DoorTest do
   defp state(id),
     do: Board.fetch(Board.find!(id), :mission, :infinity) |> elem(1) |> Map.fetch!(:state)
 
+  defp mission(id) do
+    {_state, %{mission: mission}} = :sys.get_state(Names.whereis(id, :pilot))
+    mission
+  end
+
   # The behaviour that drives it now.
   defp doing(id) do
     with {:ok, %{by: behaviour}, _age} <- Board.fetch(Board.find!(id), :doing, 300), do: behaviour
@@ -28,7 +33,8 @@ defmodule Swarm.DoorTest do
 
     assert %Swarm.Status{state: :move, robot: :door1} = Swarm.status(id)
     assert Swarm.stop(id) == :ok
-    eventually(fn -> doing(id) == :stop end)
+    assert state(id) == :idle
+    eventually(fn -> doing(id) == :rest end)
 
     assert Swarm.tell([id], "findblob:Yellow") == :ok
     assert Swarm.tell(id, "lead") == :ok
@@ -66,9 +72,12 @@ defmodule Swarm.DoorTest do
     assert Swarm.formation(:wedge, spacing: 1.2) == :ok
     assert Swarm.formation("column") == :ok
     assert Swarm.stop(id) == :ok
-    eventually(fn -> state(id) == {Swarm.Missions.Landmark, :idle} end)
+    assert state(id) == :idle
     assert Swarm.start() == :ok
+    assert {Swarm.Missions.Landmark, _} = state(id)
     eventually(fn -> state(id) != {Swarm.Missions.Landmark, :idle} end)
+    # The shape that was asked for last.
+    assert {:column, 1.0} = mission(id).formation
     assert Swarm.goto(id, {1, 1}) == :ok
     assert state(id) == {Swarm.Missions.Manual, :goto}
     assert Swarm.start() == :ok

@@ -179,6 +179,49 @@ defmodule Swarm.MemberTest do
     assert two.ear.stop.known == one.ear.stop.known + 1
   end
 
+  defmodule Deaf do
+    @moduledoc "A mission that goes on whatever it is told."
+    @behaviour Robot.Mission
+
+    @impl Robot.Mission
+    def init(_robot, _options), do: {:rolling, :deaf, []}
+
+    @impl Robot.Mission
+    def handle(_event, mission),
+      do: {:rolling, mission, [{:goal, :roll, {Robot.Behaviour.Move, linear: 0.2, turn: 0.0}}]}
+  end
+
+  test "a stop ends any mission, at once, and nothing of before moves it again until the next start" do
+    options = [id: :mag1, profile: Profile.magellan(), start: Pose.new(0, 0), mission: {Deaf, []}]
+    {member, []} = Member.step(Member.new(options), {:command, :start, 0})
+    rolling = member |> sense(100) |> sense(200)
+    assert {_, [{:drive, %Twist{linear: v}}]} = Member.step(rolling, {:reflex, 200})
+    assert v > 0
+
+    {stopped, []} = Member.step(rolling, {:command, :stop, 200})
+    assert %{phase: :idle, mission: nil, claim: %{}} = stopped
+    assert Member.stands?(stopped)
+    assert stands?(stopped, 200)
+    {stopped, []} = Member.step(stopped, {:command, {:formation, :wedge, 1.0}, 300})
+    assert stopped |> sense(300) |> sense(400) |> stands?(400)
+
+    {started, []} = Member.step(stopped, {:command, :start, 500})
+    refute started |> sense(500) |> sense(600) |> stands?(600)
+  end
+
+  defp stands?(member, at_ms) do
+    {_member, [{:drive, twist}]} = Member.step(member, {:reflex, at_ms})
+    Twist.zero?(twist)
+  end
+
+  test "what people asked of the group's mission outlives a stop" do
+    {member, []} = Member.step(member(), {:command, {:formation, :wedge, 1.2}, 0})
+    {stopped, []} = Member.step(member, {:command, :stop, 100})
+    {started, []} = Member.step(stopped, {:command, :start, 200})
+    assert %{formation: {:wedge, 1.2}, started?: true} = started.mission
+    assert sense(started, 300).phase == :search
+  end
+
   test "while it is stopped no command but stop is taken" do
     {member, _} = Member.step(member(), {:command, :estop, 0})
     assert {^member, []} = Member.step(member, {:command, :start, 100})

@@ -76,11 +76,12 @@ defmodule Swarm.Link.Desk do
   defp obey(:start, doing, config, ear), do: obey({:start, []}, doing, config, ear)
   defp obey({:start, []}, {:group, _phase}, config, _ear), do: Pilot.command(config.id, :start)
 
-  defp obey({:start, options}, _doing, config, _ear) do
-    {module, defaults} = config.mission || {Landmark, []}
-    :ok = Pilot.start(config.id, module, Keyword.merge(defaults, options))
-    Pilot.command(config.id, :start)
+  # What people had asked of the mission outlives a stop.
+  defp obey({:start, []}, _doing, config, _ear) do
+    with {:error, :idle} <- Pilot.resume(config.id), do: begin([], config)
   end
+
+  defp obey({:start, options}, _doing, config, _ear), do: begin(options, config)
 
   defp obey({:formation, _kind, _spacing} = command, {:group, _phase}, config, _ear),
     do: Pilot.command(config.id, command)
@@ -94,6 +95,12 @@ defmodule Swarm.Link.Desk do
   end
 
   defp obey(command, doing, config, _ear), do: alone(command, doing, config)
+
+  defp begin(options, config) do
+    {module, defaults} = config.mission || {Landmark, []}
+    :ok = Pilot.start(config.id, module, Keyword.merge(defaults, options))
+    Pilot.command(config.id, :start)
+  end
 
   defp alone(command, {:alone, _phase}, config), do: Pilot.command(config.id, command)
 

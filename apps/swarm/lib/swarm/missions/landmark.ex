@@ -55,7 +55,6 @@ defmodule Swarm.Missions.Landmark do
 
   @impl Robot.Mission
   def handle({:command, :start}, mission), do: still(%{mission | started?: true})
-  def handle({:command, :stop}, mission), do: still(%{mission | started?: false})
 
   def handle({:command, {:formation, kind, spacing}}, mission) do
     case Formation.new(kind, spacing: spacing) do
@@ -101,6 +100,10 @@ defmodule Swarm.Missions.Landmark do
     {mission.phase, mission, effects ++ [{:claim, claim(mission)}]}
   end
 
+  @impl Robot.Mission
+  # The formation, and how far the group had counted its rounds and epochs.
+  def halted(mission), do: %{enter(mission, :idle) | started?: false}
+
   # A robot that is not on the mission leaves that to those that are.
   defp relay_beats(%{phase: :idle} = mission), do: {mission, []}
 
@@ -131,7 +134,6 @@ defmodule Swarm.Missions.Landmark do
   end
 
   defp holds?(:started, m), do: m.started?
-  defp holds?(:stopped, m), do: not m.started?
   defp holds?(:elected, m), do: m.verdict == {:leader, m.me}
 
   defp holds?(:led, m),

@@ -1,7 +1,8 @@
 defmodule Swarm.Missions.Manual do
   @moduledoc """
   One robot does what a person tells it (`Robot.Command`), one command at a time (R16, R31 to R36):
-  a robot leaves the group's mission for it, and comes back with the next start. Pure.
+  a robot leaves the group's mission for it, and comes back with the next start. Pure. `stop` is no
+  command of a mission's: the pilot ends this one like any other.
 
   In its heartbeats the robot stays `:idle`, so that no group waits for it, and names whom it
   follows, so that nobody can close a circle of followers.
@@ -23,12 +24,12 @@ defmodule Swarm.Missions.Manual do
   @fastest 10
 
   @enforce_keys [:me]
-  defstruct @enforce_keys ++ [count: 0, command: :stop, result: nil]
+  defstruct @enforce_keys ++ [count: 0, command: nil, result: nil]
 
   @type t :: %__MODULE__{
           me: atom(),
           count: non_neg_integer(),
-          command: Command.t(),
+          command: Command.t() | nil,
           result: integer() | nil
         }
 
@@ -145,7 +146,7 @@ defmodule Swarm.Missions.Manual do
 
   def handle(_event, mission), do: result(mission, [])
 
-  defp result(%{command: :stop} = mission, effects), do: {:ready, mission, effects}
+  defp result(%{command: nil} = mission, effects), do: {:ready, mission, effects}
 
   defp result(%{result: nil} = mission, effects),
     do: {phase(mission.command), mission, effects}
@@ -156,13 +157,16 @@ defmodule Swarm.Missions.Manual do
   defp phase(command), do: elem(command, 0)
 
   defp claim(%{command: {:follow_the_leader, leader}}), do: %{phase: :idle, leader: leader}
-  defp claim(%{command: command}), do: %{phase: :idle, standing: command == :stop}
+  defp claim(_command), do: %{phase: :idle, standing: false}
 
   defp goal({:move, linear, turn}, _percept), do: {Behaviour.Move, linear: linear, turn: turn}
   defp goal({:goto, x, y, nil}, _percept), do: {Behaviour.Goto, x: x, y: y}
   defp goal({:goto, x, y, heading}, _percept), do: {Behaviour.Goto, x: x, y: y, heading: heading}
   defp goal({:follow, %Pose{} = place}, _percept), do: {Behaviour.Follow, target: place}
   defp goal({:find_blob, colour}, _percept), do: {Behaviour.FindBlob, colour: colour}
+
+  # Until the next percept shows where that one is.
+  defp goal({:follow_the_leader, _leader}, nil), do: {Behaviour.Stop, []}
 
   defp goal({:follow_the_leader, leader}, %Percept{peers: peers, at_ms: now_ms}) do
     case peers do
@@ -173,7 +177,6 @@ defmodule Swarm.Missions.Manual do
 
   # Whatever is carried before its camera leads it, and others follow (R35).
   defp goal(:lead, _percept), do: {Behaviour.TrackBlob, []}
-  defp goal(_command, _percept), do: {Behaviour.Stop, []}
 
   defp behind(%{pose: pose, twist: %Twist{linear: linear}}) do
     velocity = {linear * :math.cos(pose.heading), linear * :math.sin(pose.heading)}

@@ -142,7 +142,6 @@ defmodule Console.Bench.Stop.Robot do
     def init(_robot, options), do: {:rolling, options, [{:goal, :roll, {Roller, options}}]}
 
     @impl Robot.Mission
-    def handle({:command, :stop}, options), do: {:stopped, options, [{:goal, :stop, nil}]}
     def handle(_event, options), do: {:rolling, options, []}
   end
 end

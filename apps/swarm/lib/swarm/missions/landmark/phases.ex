@@ -2,7 +2,7 @@ defmodule Swarm.Missions.Landmark.Phases do
   @moduledoc """
   The mission as one table (R59): what a robot does in each phase, and what leads out of it.
   Conditions are asked in the order of the row; the first that holds wins. To insert a phase,
-  insert a row.
+  insert a row. A stop is in no row: it ends the mission from outside, in every phase, and leaves it `:idle`.
 
   | phase | does | |
   |---|---|---|
@@ -19,7 +19,7 @@ defmodule Swarm.Missions.Landmark.Phases do
 
   | condition | holds when |
   |---|---|
-  | `:started`, `:stopped` | a person has said so |
+  | `:started` | a person has said so |
   | `:elected`, `:led` | a round has made this robot the leader, or another, or one names it in its order |
   | `:nobody`, `:nobody_again` | a round in which nobody had found the landmark; the third in a row |
   | `:scanned` | the turn is over, whatever it showed |
@@ -38,7 +38,6 @@ defmodule Swarm.Missions.Landmark.Phases do
     idle: {:stand, started: :search},
     search:
       {:scan,
-       stopped: :idle,
        elected: :lead,
        led: :follow,
        nobody_again: :rest,
@@ -49,7 +48,6 @@ defmodule Swarm.Missions.Landmark.Phases do
        scanned: :agree},
     agree:
       {:stand,
-       stopped: :idle,
        elected: :lead,
        led: :follow,
        nobody_again: :rest,
@@ -60,7 +58,6 @@ defmodule Swarm.Missions.Landmark.Phases do
        scan_wanted: :search},
     wander:
       {:roam,
-       stopped: :idle,
        led: :follow,
        lost_stop: :halt,
        lost_hold: :hold,
@@ -68,27 +65,14 @@ defmodule Swarm.Missions.Landmark.Phases do
        sighted: :search,
        roamed: :search},
     rest:
-      {:stand,
-       stopped: :idle,
-       led: :follow,
-       lost_stop: :halt,
-       lost_hold: :hold,
-       short: :wait,
-       sighted: :search},
-    lead:
-      {:lead,
-       stopped: :idle, lost_stop: :halt, lost_hold: :hold, deposed: :agree, round_open: :agree},
+      {:stand, led: :follow, lost_stop: :halt, lost_hold: :hold, short: :wait, sighted: :search},
+    lead: {:lead, lost_stop: :halt, lost_hold: :hold, deposed: :agree, round_open: :agree},
     follow:
       {:follow,
-       stopped: :idle,
-       lost_stop: :halt,
-       lost_hold: :hold,
-       round_open: :agree,
-       superseded: :agree,
-       short: :wait},
-    wait: {:stand, stopped: :idle, led: :follow, round_open: :agree, enough: :agree},
-    halt: {:stand, stopped: :idle, led: :follow, company: :agree},
-    hold: {:hold, stopped: :idle, led: :follow, company: :agree}
+       lost_stop: :halt, lost_hold: :hold, round_open: :agree, superseded: :agree, short: :wait},
+    wait: {:stand, led: :follow, round_open: :agree, enough: :agree},
+    halt: {:stand, led: :follow, company: :agree},
+    hold: {:hold, led: :follow, company: :agree}
   ]
 
   @type phase ::
@@ -105,7 +89,6 @@ defmodule Swarm.Missions.Landmark.Phases do
   @type activity :: :stand | :scan | :roam | :lead | :follow | :hold
   @type condition ::
           :started
-          | :stopped
           | :elected
           | :led
           | :nobody

@@ -73,16 +73,22 @@ defmodule Swarm.Missions.Landmark.PhasesTest do
     group
   end
 
-  defp stopped(group), do: group |> Group.event(:mag2, {:command, :stop}) |> Group.run(0.1)
+  defp stopped(group), do: update_in(group.robots.mag2.mission, &Landmark.halted/1)
 
-  test "started, and from everywhere stopped" do
+  test "started, and from everywhere stopped: what is left is idle, and starts anew" do
     assert {:idle, mission, []} = Landmark.init(:mag2, [])
     assert mission.phase == :idle
     assert phase(alone(nil)) == :search
 
     for group <- [alone(nil), to(:agree), to(:wander), to(:rest), to(:lead, 0.02), following()] do
-      assert phase(stopped(group)) == :idle
-      assert %{goal: {:stand, {Behaviour.Stop, []}}} = stopped(group).robots.mag2
+      stopped = stopped(group)
+      assert %{phase: :idle, started?: false, formation: formation} = mission(stopped)
+      assert formation == mission(group).formation
+      stood = Group.run(stopped, 0.1)
+      assert phase(stood) == :idle
+      assert %{goal: {:stand, {Behaviour.Stop, []}}} = stood.robots.mag2
+      again = stopped |> Group.event(:mag2, {:command, :start}) |> Group.run(0.1)
+      assert :search in entered(again, stopped)
     end
   end
 

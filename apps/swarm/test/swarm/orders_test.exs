@@ -1,0 +1,116 @@
+defmodule Swarm.OrdersTest do
+  @moduledoc "What is answered to an order is what became of it."
+  use Swarm.Case, async: false
+  @moduletag :capture_log
+  alias Robot.{Acts, Executive}
+
+  @roll {Acts.Roll, twist: Twist.new(0.2, 0.0)}
+
+  defp state(id) do
+    {:ok, %{state: state}, _at_ms} = Board.fetch(Board.find!(id), :mission, :infinity)
+    state
+  end
+
+  defp rolls(id) do
+    drive = Names.whereis(id, :drive)
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, ^drive} when v > 0, 2_000
+  end
+
+  # From now on, for so long, its wheels are told nothing but to stand.
+  defp stands(id, ms \\ 300) do
+    drive = Names.whereis(id, :drive)
+    :sys.get_state(drive)
+    forget(drive)
+
+    receive do
+      {:drive, {:drive, %Twist{linear: v}}, ^drive} when v != 0 -> flunk("rolls at #{v} m/s")
+    after
+      ms -> :ok
+    end
+  end
+
+  defp forget(drive) do
+    receive do
+      {:drive, {:drive, _twist}, ^drive} -> forget(drive)
+    after
+      0 -> :ok
+    end
+  end
+
+  # A mission that ignores whatever it is told, and sets its goal again at every tick.
+  defmodule Deaf do
+    @behaviour Robot.Mission
+
+    @impl Robot.Mission
+    def init(_robot, goal), do: {:rolling, goal, []}
+
+    @impl Robot.Mission
+    def handle({:command, :hang}, goal) do
+      receive do
+        :never -> {:rolling, goal, []}
+      end
+    end
+
+    def handle(_event, goal), do: {:rolling, goal, [{:goal, :roll, goal[:goal]}]}
+  end
+
+  describe "stop" do
+    test "ends a mission that ignores it, by every way of saying it" do
+      id = robot(:orders_deaf)
+      standing([id])
+
+      for stop <- [
+            fn -> Swarm.stop() end,
+            fn -> Swarm.stop(id) end,
+            fn -> Swarm.tell(:all, "stop") end,
+            fn -> Swarm.tell([id], " STOP ") end,
+            fn -> Swarm.disarm(id) end
+          ] do
+        assert Swarm.arm(id) == :ok
+        :ok = Pilot.start(id, Deaf, goal: @roll)
+        rolls(id)
+        assert stop.() == :ok
+        assert state(id) == :idle
+        stands(id)
+      end
+    end
+
+    test "ends a goal that no mission has set" do
+      id = robot(:orders_goal)
+      standing([id])
+      Executive.goal(id, :roll, @roll)
+      rolls(id)
+      assert Swarm.stop(id) == :ok
+      stands(id)
+    end
+
+    test "is not :ok where the mission hangs; the robot stands all the same" do
+      id = robot(:orders_hangs)
+      standing([id])
+      :ok = Pilot.start(id, Deaf, goal: @roll)
+      rolls(id)
+      :gen_statem.cast(Names.via(id, :pilot), {:command, :hang})
+      assert Swarm.stop(id) == {:error, "orders_hangs does not answer"}
+      stands(id)
+    end
+
+    test "is not :ok where the drive does not hear that it is disarmed" do
+      id = robot(:orders_drive)
+      drive = Names.whereis(id, :drive)
+      :ok = :sys.suspend(drive)
+      assert Swarm.disarm(id) == {:error, "orders_drive does not answer"}
+      :ok = :sys.resume(drive)
+    end
+
+    test "leaves of the group's mission what people had asked of it" do
+      id = robot(:orders_shape)
+      standing([id])
+      assert Swarm.start(robots: [id], formation: :line) == :ok
+      assert Swarm.formation(:wedge, spacing: 1.2) == :ok
+      assert Swarm.stop(id) == :ok
+      assert Swarm.start(robots: [id]) == :ok
+      {_state, %{mission: mission}} = :sys.get_state(Names.whereis(id, :pilot))
+      assert mission.formation == {:wedge, 1.2}
+    end
+  end
+end
