@@ -100,8 +100,16 @@ defmodule Swarm do
       Swarm.tell(:mag1, "goto:2.0:1.0")
       Swarm.tell([:mag1, :mag2], "move:0.2:0.1")
       Swarm.tell(:all, "stop")
+
+  `"ping"` is a question: who answers says who it is, since when it is up, and in what state it is since when.
+
+      Swarm.tell(:mag1, "ping")
+      {:ok, "mag1 on mag1@convoy, up for 12 min 3 s, follow for 34 s"}
+
+  `subscribe`, `unsubscribe`, `position` and `blob` are words of robots among themselves, and refused: what
+  they would bring comes with every heartbeat.
   """
-  @spec tell(robot() | [robot()] | :all, String.t()) :: answer()
+  @spec tell(robot() | [robot()] | :all, String.t()) :: answer() | {:ok, line :: String.t()}
   def tell(to, text) when is_binary(text) do
     with {:ok, command} <- Command.parse(text, Transport.robots()), do: command(to, command)
   end

@@ -12,8 +12,11 @@ defmodule Console.LiveFleetTest do
     parts = :mag61 |> Robot.Names.whereis(:robot) |> Supervisor.which_children()
     monitors = for {_id, pid, _type, _modules} <- parts, do: Process.monitor(pid)
 
+    # A question has an answer.
+    assert {:ok, said} = Live.Fleet.command(live, {:tell, :all, "ping"})
+    assert said =~ ~r/^mag61 on .*, up for .*; min61 on /
+
     for command <- [
-          {:tell, :all, "ping"},
           {:tell, [:mag61], "goto:1:1"},
           {:tell, :all, "start"},
           {:formation, {:wedge, nil}},

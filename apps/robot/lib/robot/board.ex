@@ -19,7 +19,7 @@ defmodule Robot.Board do
   | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Reflex.frame/1` |
   | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil}` |
   | `:pose` | `:executive` | the estimate in the `map` frame |
-  | `:mission` | `:pilot` | `%{state: :idle or {mission, phase}, claim: map}` |
+  | `:mission` | `:pilot` | `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state}` |
 
   This process owns the tables and does nothing else, so that they outlive whoever writes them.
   Nothing outlives the board, on purpose, with one exception.
@@ -31,16 +31,17 @@ defmodule Robot.Board do
   use GenServer
   alias Robot.{Config, Names}
 
-  @enforce_keys [:robot, :table, :latch, :clock, :file]
+  @enforce_keys [:robot, :table, :latch, :clock, :file, :since_ms]
   defstruct @enforce_keys
 
-  @typedoc "What readers and writers hold: the tables and the clock."
+  @typedoc "What readers and writers hold: the tables and the clock; `since_ms`, when the robot was started."
   @type t :: %__MODULE__{
           robot: atom(),
           table: :ets.tid(),
           latch: :ets.tid(),
           clock: {module(), atom(), list()},
-          file: Path.t() | nil
+          file: Path.t() | nil,
+          since_ms: integer()
         }
 
   @type writer :: :drive | :ptz | :camera | :eye | :link | :brake | :gate | :executive | :pilot
@@ -183,7 +184,8 @@ defmodule Robot.Board do
       table: :ets.new(__MODULE__, [:public, read_concurrency: true]),
       latch: :ets.new(__MODULE__, [:public]),
       clock: config.clock,
-      file: config.estop_file
+      file: config.estop_file,
+      since_ms: Config.now(config)
     }
 
     if board.file && File.exists?(board.file), do: :ets.insert(board.latch, {:estop, true})

@@ -10,7 +10,7 @@ defmodule Robot.Command do
   | `goto:X:Y` or `goto:X:Y:THETA` | `{:goto, x, y, theta or nil}`, metres, radians |
   | `followtheleader:NAME` | `{:follow_the_leader, id}` |
   | `findblob` or `findblob:COLOUR` | `{:find_blob, colour or nil}` |
-  | `subscribe:NAME`, `unsubscribe:NAME` | `{:subscribe, id}`, `{:unsubscribe, id}` |
+  | `subscribe:NAME`, `unsubscribe:NAME` | `{:subscribe, id}`, `{:unsubscribe, id}`; robots refuse it, for all tell their poses to all |
   | `position:X:Y:THETA`, `follow:X:Y:THETA` | `{:position, pose}`, `{:follow, pose}` |
   | `blob:X:Y:THETA:SIZE:FOUND` | `{:blob, pose, size, found?}`; FOUND is 0 or 1 |
   | `lead`, `start`, `ping` | `:lead`, `:start`, `:ping` |

@@ -79,11 +79,18 @@ defmodule Robot.Pilot do
 
   @impl :gen_statem
   def init(%Config{} = config) do
-    data = %{config: config, board: Board.find!(config.id), mission: nil, claim: %{}, halted: nil}
+    data = %{
+      config: config,
+      board: Board.find!(config.id),
+      mission: nil,
+      claim: %{},
+      halted: nil,
+      since_ms: Config.now(config)
+    }
+
     # The executive may still follow a goal of the mission that failed.
     rest(data)
-    told(:idle, data)
-    {:ok, :idle, data}
+    {:ok, :idle, told(:idle, data)}
   end
 
   @impl :gen_statem
@@ -135,9 +142,9 @@ defmodule Robot.Pilot do
   # Whoever is answered finds the robot idle. The mission is asked last: it has no say in this.
   defp halt(state, then, data) do
     heard(:stop, data)
-    changed(state, :idle, %{data | claim: %{}})
+    data = changed(state, :idle, %{data | claim: %{}})
     Executive.stand(data.config.id, then)
-    {:next_state, :idle, %{data | halted: halted(state, data), mission: nil, claim: %{}}}
+    {:next_state, :idle, %{data | halted: halted(state, data), mission: nil}}
   end
 
   defp halted(:idle, data), do: data.halted
@@ -165,8 +172,7 @@ defmodule Robot.Pilot do
 
   defp follow({phase, mission, effects}, module, state, data, replies) do
     data = Enum.reduce(effects, %{data | mission: mission}, &carry_out/2)
-    changed(state, {module, phase}, data)
-    {:next_state, {module, phase}, data, replies}
+    {:next_state, {module, phase}, changed(state, {module, phase}, data), replies}
   end
 
   defp carry_out(effect, data) do
@@ -213,18 +219,20 @@ defmodule Robot.Pilot do
   defp heard(input, data), do: Trace.input(data.config, :pilot, input, Config.now(data.config))
 
   defp changed(state, state, data), do: written(state, data)
-  defp changed(_before, state, data), do: told(state, data)
+  defp changed(_before, state, data), do: told(state, %{data | since_ms: Config.now(data.config)})
 
   defp told(state, data) do
-    at_ms = written(state, data)
+    data = written(state, data)
+    at_ms = data.since_ms
     Trace.effect(data.config, :pilot, {:phase, state}, at_ms)
     about = %{robot: data.config.id, state: state}
     Event.execute([:robot, :pilot, :phase], %{at_ms: at_ms}, about)
+    data
   end
 
   defp written(state, data) do
-    at_ms = Config.now(data.config)
-    Board.put(data.board, :pilot, :mission, %{state: state, claim: data.claim}, at_ms)
-    at_ms
+    entry = %{state: state, claim: data.claim, since_ms: data.since_ms}
+    Board.put(data.board, :pilot, :mission, entry, Config.now(data.config))
+    data
   end
 end

@@ -77,14 +77,21 @@ defmodule Swarm.Door do
          do: Formation.new(kind, fleet(kind, options, robots || length(Transport.robots())))
   end
 
-  @doc "Tells the robots; `:ok` when all accept, else one line about those that do not."
-  @spec tell([atom()], term()) :: Swarm.answer()
+  @doc """
+  Tells the robots; `:ok` when all accept, or `{:ok, line}` with what they say to it, else one line about
+  those that do not, and what the others say.
+  """
+  @spec tell([atom()], term()) :: Swarm.answer() | {:ok, line :: String.t()}
   def tell(robots, request) do
     answers = Ask.ask(robots, request)
+    said = for id <- robots, {:ok, line} <- [answers[id]], do: line
+    accepted? = &(&1 == :ok or match?({:ok, _line}, &1))
+    refusals = for id <- robots, not accepted?.(answers[id]), do: refusal(id, answers[id])
 
-    case for(id <- robots, answers[id] != :ok, do: refusal(id, answers[id])) do
-      [] -> :ok
-      lines -> {:error, lines |> Enum.uniq() |> Enum.join("; ")}
+    case {refusals, said} do
+      {[], []} -> :ok
+      {[], said} -> {:ok, Enum.join(said, "; ")}
+      {refusals, said} -> {:error, (refusals ++ said) |> Enum.uniq() |> Enum.join("; ")}
     end
   end
 

@@ -114,6 +114,13 @@ defmodule Swarm.Status do
   defp words(config, device, reason),
     do: config |> Map.fetch!(device) |> Words.offline(reason)
 
+  @doc "Why its wheels may not turn, as people read it; `nil` where they may, or nobody knows."
+  @spec arming(t()) :: String.t() | nil
+  def arming(%__MODULE__{arming: :disarmed, why: nil}), do: "DISARMED"
+  def arming(%__MODULE__{arming: :disarmed, why: why}), do: "DISARMED (#{why})"
+  def arming(%__MODULE__{arming: {:error, _reason}}), do: "LINE LOST (acknowledge it)"
+  def arming(%__MODULE__{}), do: nil
+
   defp value(entries, key) do
     case entries do
       %{^key => {value, _age_ms}} -> value
@@ -155,7 +162,7 @@ defmodule Swarm.Status do
 
       [
         status.estop && "E-STOP",
-        arming(status),
+        Swarm.Status.arming(status),
         status.fault && "FAULT (#{status.fault})",
         Enum.any?(status.limits, &("#{&1}" == "blind")) && "BLIND (no sonar; slow)",
         status.leader && "leader #{status.leader}",
@@ -174,11 +181,6 @@ defmodule Swarm.Status do
         _not_told -> "#{device} offline"
       end
     end
-
-    defp arming(%{arming: :disarmed, why: nil}), do: "DISARMED"
-    defp arming(%{arming: :disarmed, why: why}), do: "DISARMED (#{why})"
-    defp arming(%{arming: {:error, _reason}}), do: "LINE LOST (acknowledge it)"
-    defp arming(_armed_or_unknown), do: nil
 
     # Those of the view that are known by way of others only; nearly always none.
     defp deaf(%{view: {_number, members}} = status) do

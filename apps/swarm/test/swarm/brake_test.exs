@@ -73,13 +73,13 @@ defmodule Swarm.BrakeTest do
     # Repeats, late ones too, do not undo what a person has done.
     assert Swarm.reset() == :ok
     for counter <- [7, 6, 7], do: Brake.hear(:base@hall, {:estop, call(counter), 0})
-    for id <- [a, b], do: refute(Swarm.ask(id, :ping) != :ok or latched?(id))
+    for id <- [a, b], do: assert({{:ok, _}, false} = {Swarm.ask(id, :ping), latched?(id)})
     for id <- [a, b], do: assert(%Stop{latched?: false, known: n, cleared: n} = stop_of(id))
 
     # Nor does one that is heard for the first time now, and was made before; on a node that was cut off, say.
     far = {:far@hall, 1, 1}
     assert Brake.hear(:base@hall, {:estop, far, 60_000}) == :ok
-    for id <- [a, b], do: refute(Swarm.ask(id, :ping) != :ok or latched?(id))
+    for id <- [a, b], do: assert({{:ok, _}, false} = {Swarm.ask(id, :ping), latched?(id)})
     # The next call does.
     assert Brake.hear(:base@hall, {:estop, call(8), 0}) == :ok
     for id <- [a, b], do: eventually(fn -> latched?(id) end)
@@ -152,7 +152,7 @@ defmodule Swarm.BrakeTest do
     eventually(fn -> flooded(id) > 0 end)
     assert Swarm.estop() == :ok
     assert latched?(id)
-    assert Swarm.ask(id, :ping) == :ok
+    assert {:ok, _} = Swarm.ask(id, :ping)
     assert Swarm.reset() == :ok
     refute latched?(id)
     stop_supervised!(Task)

@@ -10,6 +10,7 @@ defmodule Swarm.MessageTest do
   doctest Ear
   doctest Swarm.Missions.Landmark.Policy
   doctest Swarm.Missions.Manual
+  doctest Swarm.Link.Presence
 
   @beat %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
   @anchor %Anchor{

@@ -39,7 +39,9 @@ defmodule Swarm.Missions.ManualTest do
     end
 
     for text <- ~w(subscribe:mag2 unsubscribe:mag2 position:1:2:3 blob:1:2:3:0.1:1) do
-      assert {:ready, _, []} = tell(new(), text)
+      {:ok, command} = Command.parse(text, [:mag2])
+      assert {:error, line} = Manual.check(command)
+      assert line =~ hd(String.split(text, ":"))
     end
   end
 

@@ -54,6 +54,49 @@ defmodule Swarm.OrdersTest do
     def handle(_event, goal), do: {:rolling, goal, [{:goal, :roll, goal[:goal]}]}
   end
 
+  describe "what is for robots only" do
+    test "is refused in a line, and nobody leaves a mission for it" do
+      [id, other] = for id <- [:orders_talk, :orders_other], do: robot(id)
+      standing([id, other])
+      assert Swarm.start(robots: [id, other]) == :ok
+      before = state(id)
+
+      for text <- ~w(subscribe:orders_other unsubscribe:orders_other position:1:2:3
+                     blob:1:2:3:0.1:1) do
+        assert {:error, line} = Swarm.tell(id, text)
+        assert line =~ "#{hd(String.split(text, ":"))} is for"
+        # Whatever is sent to it past the door.
+        {:ok, command} = Robot.Command.parse(text, [:orders_other])
+        assert {:error, ^line} = Swarm.ask(id, command)
+        assert {Swarm.Missions.Landmark, _phase} = state(id)
+      end
+
+      assert elem(before, 0) == elem(state(id), 0)
+    end
+
+    test "but ping is a question, and answered: who, since when, in what state" do
+      [id, other] = for id <- [:orders_ping, :orders_pong], do: robot(id)
+      standing([id, other])
+      assert {:ok, line} = Swarm.tell(id, "ping")
+      assert line =~ ~r/^orders_ping on #{node()}, up for \d+ s, idle for \d+ s$/
+      assert Swarm.goto(id, {1, 1}) == :ok
+      assert {:ok, line} = Swarm.tell(id, "Ping")
+      assert line =~ ~r/, up for \d+ s, goto for \d+ s$/
+      assert state(id) == {Swarm.Missions.Manual, :goto}
+
+      assert {:ok, both} = Swarm.tell([id, other], "ping")
+      assert both =~ ~r/^orders_ping on [^;]+; orders_pong on [^;]+$/
+      :ok = :sys.suspend(Names.whereis(other, :link))
+      assert {:error, line} = Swarm.tell([id, other], "ping")
+      assert line =~ ~r/^orders_pong does not answer; orders_ping on /
+      :ok = :sys.resume(Names.whereis(other, :link))
+      assert Swarm.estop() == :ok
+      assert {:ok, line} = Swarm.tell(id, "ping")
+      assert line =~ ~r/, idle for \d+ s, E-STOP$/
+      assert Swarm.reset() == :ok
+    end
+  end
+
   describe "stop" do
     test "ends a mission that ignores it, by every way of saying it" do
       id = robot(:orders_deaf)

@@ -28,6 +28,7 @@ defmodule Console.Live.Fleet do
   def command(live, command) do
     case carry_out(command, live) do
       :ok -> {:ok, told(command)}
+      {:ok, said} -> {:ok, said}
       {:error, line} -> {:error, line}
     end
   end

@@ -7,7 +7,7 @@ defmodule Swarm.Link.Desk do
   | request | answer |
   |---|---|
   | `:status` | `Swarm.Status` |
-  | `:ping` | `:ok` |
+  | `:ping` | `{:ok, line}`: who it is, since when, in what state (`Swarm.Link.Presence`) |
   | `:start`, `{:start, options}` | the group mission begins; anew where there are options |
   | `{:formation, kind, spacing}` | for the running mission |
   | a `Robot.Command` | for this robot alone, which leaves the group's mission for it |
@@ -18,14 +18,16 @@ defmodule Swarm.Link.Desk do
   alias Hal.Device
   alias Robot.{Board, Config, Names, Pilot}
   alias Swarm.{Formation, Missions.Landmark, Missions.Manual, Status}
-  alias Swarm.Link.Ear
+  alias Swarm.Link.{Ear, Presence}
 
-  @type answer :: :ok | {:error, String.t()} | Status.t()
+  @type answer :: :ok | {:ok, String.t()} | {:error, String.t()} | Status.t()
 
   @doc "Answers a request."
   @spec answer(term(), Config.t(), Board.t(), Ear.t()) :: answer()
   def answer(:status, config, board, ear), do: Status.of(config, board, ear)
-  def answer(:ping, _config, _board, _ear), do: :ok
+
+  def answer(:ping, config, board, ear),
+    do: {:ok, Presence.line(config, board, Status.of(config, board, ear))}
 
   def answer(:acknowledge, %{id: id}, _board, _ear),
     do: named(Device.acknowledge(Names.via(id, :drive)), id)

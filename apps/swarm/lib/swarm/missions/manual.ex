@@ -8,7 +8,7 @@ defmodule Swarm.Missions.Manual do
   follows, so that nobody can close a circle of followers.
 
   Whoever is followed need not do anything: its heartbeats are the position updates that a
-  subscription asked for (R27, R35). A follower keeps 1 m behind its leader, stands when it has
+  subscription asked for (R27, R35), so a person who asks for one is told so, and nothing changes. A follower keeps 1 m behind its leader, stands when it has
   not heard it for a second, and goes on when it hears it again (R34).
   """
   alias Hal.{Pose, Twist}
@@ -58,6 +58,22 @@ defmodule Swarm.Missions.Manual do
   def check({:follow, %Pose{x: x, y: y, heading: h}}),
     do: numbers(:follow, [x, y, h], @farthest, &{:follow, Pose.new(&1, &2, &3)})
 
+  # What robots tell each other travels in their heartbeats and rounds. A person who says it would be believed by
+  # nobody, and the robot shall not leave its mission for nothing.
+  def check({word, _robot}) when word in [:subscribe, :unsubscribe],
+    do:
+      {:error,
+       "#{word} is for no robot: each tells its pose to all, five times a second; " <>
+         "followtheleader:NAME follows one"}
+
+  def check({:position, _pose}),
+    do:
+      {:error,
+       "position is for robots only, which tell their own; goto:X:Y:THETA sends one there"}
+
+  def check({:blob, _pose, _size, _found?}),
+    do: {:error, "blob is for robots only, which report what they see; findblob lets one look"}
+
   def check(command) do
     if known?(command),
       do: {:ok, command},
@@ -67,9 +83,6 @@ defmodule Swarm.Missions.Manual do
   defp known?(word) when word in [:stop, :lead, :start, :ping], do: true
   defp known?({:follow_the_leader, robot}), do: Shape.name?(robot)
   defp known?({:find_blob, colour}), do: colour == nil or is_binary(colour)
-  defp known?({word, robot}) when word in [:subscribe, :unsubscribe], do: Shape.name?(robot)
-  defp known?({:position, %Pose{}}), do: true
-  defp known?({:blob, %Pose{}, _size, _found?}), do: true
   defp known?({:formation, kind, spacing}), do: Formation.valid?({kind, spacing})
   defp known?({:start, options}), do: Keyword.keyword?(options)
   defp known?(_other), do: false
@@ -125,11 +138,6 @@ defmodule Swarm.Missions.Manual do
     do: {:ready, %__MODULE__{me: robot}, [{:claim, %{phase: :idle, standing: true}}]}
 
   @impl Robot.Mission
-  # What robots tell each other travels in their heartbeats already.
-  def handle({:command, command}, mission)
-      when is_tuple(command) and elem(command, 0) in [:subscribe, :unsubscribe, :position, :blob],
-      do: result(mission, [])
-
   def handle({:command, command}, mission) do
     mission = %{mission | command: command, count: mission.count + 1, result: nil}
     goal = {:goal, {:command, mission.count}, goal(command, nil)}
