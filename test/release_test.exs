@@ -157,7 +157,8 @@ defmodule System.ReleaseTest do
     # It moves only once a person has armed it.
     move = ~s|Swarm.tell(:mag1, "move:0.2:0")|
     assert {said, 0} = robot(["rpc", ~s|{Swarm.tell(:mag1, "armm"), #{move}}|], environment)
-    assert said =~ ~r/^{{:error, ".*"}, :ok}$/m
+    refused = ~S|{:error, "mag1: its wheels are disarmed; arm it first"}|
+    assert said =~ ~r/^{{:error, ".*"}, #{Regex.escape(refused)}}$/m
     assert speed(server) == 0.0
     until(~r/^{:ok, :ok}$/m, ask.(["rpc", "{Swarm.arm(:mag1), #{move}}"]))
     wait(fn -> speed(server) > 0.1 end)
@@ -170,7 +171,9 @@ defmodule System.ReleaseTest do
     again = pid(ask.(["pid"]))
     assert again != pid
     until(here, ask.(["status"]))
-    assert {":ok\n", 0} = robot(["rpc", move], environment)
+    # An order from before does not wait for it, nor does one that comes now.
+    assert {said, 0} = robot(["rpc", move], environment)
+    assert said == refused <> "\n"
     assert {"", 0} = robot(["stop"], environment)
     wait(fn -> not there?(again) end)
     assert speed(server) == 0.0

@@ -6,7 +6,8 @@ defmodule Robot.Devices do
       |-- Vision.Eye           the newest frame to blobs (only with a camera)
       |-- Vision.View          frames to pictures for people, while somebody looks (only with a camera)
       |-- Vision.Saver         keeps such pictures in a folder (only if told to)
-      |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and at once to the gate
+      |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and at once to the gate;
+      |                        whether they may turn --> the pilot, too
       |-- Hal.Device :ptz      --> board, and where the camera looked --> eye
       `-- Hal.Device :camera   --> eye --> board, and --> view
 
@@ -18,7 +19,7 @@ defmodule Robot.Devices do
   falls. Whoever falls more often has something that no restart cures, and the robot goes down with it.
   """
   use Supervisor
-  alias Robot.{Board, Config, Gate, Names}
+  alias Robot.{Board, Config, Gate, Names, Pilot}
 
   @doc "Starts the devices of a robot whose board is running."
   @spec start_link(Config.t()) :: Supervisor.on_start()
@@ -37,7 +38,7 @@ defmodule Robot.Devices do
       eye(config, write.(:eye)) ++
         view(config, demand) ++
         saver(config) ++
-        device(config, :drive, [write.(:drive), {Gate, :sense, [id]}]) ++
+        device(config, :drive, [write.(:drive), {Gate, :sense, [id]}, {Pilot, :sense, [id]}]) ++
         device(config, :ptz, [write.(:ptz) | if(config.camera, do: [to_aim], else: [])]) ++
         device(config, :camera, [{__MODULE__, :health, [board]}, to_eye, to_view])
 

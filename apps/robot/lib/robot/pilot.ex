@@ -11,6 +11,9 @@ defmodule Robot.Pilot do
   at, and the stop goes on to the executive, which drops its goal, and from there to the gate, after
   every older wish. Only the gate says that it is done.
 
+  Where a person arms the wheels (`arm: :manual`), every change of that ends what the robot is at: when they
+  are disarmed or lost, and when they are armed again, which is never the start of a motion.
+
   | effect | goes to |
   |---|---|
   | `{:goal, tag, goal}`, `{:anchors, list}`, `{:look, pan}` | the executive |
@@ -72,6 +75,13 @@ defmodule Robot.Pilot do
   @spec hear(robot :: atom(), Robot.Mission.event()) :: :ok
   def hear(robot, event), do: :gen_statem.cast(Names.via(robot, :pilot), event)
 
+  @doc "A sink for the drive: that the wheels may turn, or may no longer, is the pilot's affair, too."
+  @spec sense(robot :: atom(), reading :: tuple()) :: :ok
+  def sense(robot, {:arming, %{state: state}}),
+    do: :gen_statem.cast(Names.via(robot, :pilot), {:arming, state})
+
+  def sense(_robot, _reading), do: :ok
+
   defp call(robot, request), do: :gen_statem.call(Names.via(robot, :pilot), request, @call_ms)
 
   @impl :gen_statem
@@ -116,6 +126,12 @@ defmodule Robot.Pilot do
     do: halt(state, {:gen_statem, :reply, [from, :ok]}, data)
 
   def handle_event(:cast, {:halt, then}, state, data), do: halt(state, then, data)
+
+  def handle_event(:cast, {:arming, _state}, state, %{config: config} = data) do
+    if config.arm == :manual and not config.dry_run,
+      do: halt(state, nil, data),
+      else: :keep_state_and_data
+  end
 
   def handle_event({:call, from}, :resume, :idle, %{halted: {module, mission}} = data) do
     data = %{data | mission: mission, halted: nil}

@@ -155,8 +155,13 @@ defmodule Robot.Reflex do
     end
   end
 
-  def sense(%__MODULE__{} = reflex, {:arming, %{state: state}}, _at_ms),
-    do: %{reflex | armed?: state == :armed}
+  # What was wished before it was armed, or disarmed, counts no more.
+  def sense(%__MODULE__{armed?: before?} = reflex, {:arming, %{state: state}}, _at_ms) do
+    case state == :armed do
+      ^before? -> reflex
+      armed? -> %{reflex | armed?: armed?, wish: nil, wish_at_ms: nil}
+    end
+  end
 
   def sense(%__MODULE__{} = reflex, _reading, _at_ms), do: reflex
 

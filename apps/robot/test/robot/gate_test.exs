@@ -92,6 +92,9 @@ defmodule Robot.GateTest do
     eventually_limits(id, [:disarmed])
     stands(250)
     :ok = Hal.Device.arm(Names.whereis(id, :drive))
+    # What it was told before is forgotten.
+    stands(250)
+    :ok = Pilot.start(id)
     rolls()
     :ok = Hal.Device.disarm(Names.whereis(id, :drive))
     listen(id, [:robot, :gate, :start])

@@ -1,6 +1,7 @@
 defmodule Robot.PureTest do
   use ExUnit.Case, async: true
   doctest Robot.Wish
+  doctest Robot.Readiness
   doctest Robot.Arbiter
   doctest Robot.Steering
   doctest Robot.Reflex.Body

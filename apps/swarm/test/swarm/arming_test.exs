@@ -39,13 +39,20 @@ defmodule Swarm.ArmingTest do
     standing([id])
     shows(id, "DISARMED")
 
+    refusal = {:error, "arm_hand: its wheels are disarmed; arm it first"}
+
+    # An order is for now: none waits until somebody arms the robot.
     stands_while(id, fn ->
-      # The order is accepted; its mission runs.
-      assert Swarm.tell(id, "move:0.2:0") == :ok
-      eventually(fn -> match?(%Status{by: :move, limits: [:disarmed]}, Swarm.status(id)) end)
+      for text <- ~w(move:0.2:0 goto:1:1 follow:1:1:0 lead start),
+          do: assert({text, Swarm.tell(id, text)} == {text, refusal})
+
+      assert Swarm.start(robots: [id]) == refusal
+      assert Swarm.arm(id) == :ok
+      assert %Status{state: :idle} = Swarm.status(id)
+      eventually(fn -> Swarm.status(id).limits == [] end)
     end)
 
-    assert Swarm.arm(id) == :ok
+    assert Swarm.tell(id, "move:0.2:0") == :ok
     told(id, &(&1 > 0))
     refute line(id) =~ "DISARMED"
 
@@ -96,8 +103,82 @@ defmodule Swarm.ArmingTest do
       shows(id, "DISARMED")
     end)
 
-    assert Swarm.arm(id) == :ok
+    # What it was at had ended with the line.
+    stands_while(id, fn ->
+      assert Swarm.arm(id) == :ok
+      assert %Status{state: :idle} = Swarm.status(id)
+      eventually(fn -> match?(%Status{limits: [], by: :rest}, Swarm.status(id)) end)
+    end)
+
+    assert Swarm.tell(id, "move:0.2:0") == :ok
     told(id, &(&1 > 0))
+  end
+
+  test "while the line is lost, and while it is away, the reason is the answer" do
+    {:ok, line} = Agent.start_link(fn -> :ok end)
+    drive = [test: self(), device: :drive, open: fn -> Agent.get(line, & &1) end]
+    id = robot(:arm_away, arm: :manual, drive: {Hal.FakeDrive, drive})
+    standing([id])
+    assert Swarm.arm(id) == :ok
+    # It stands: nobody needs to acknowledge.
+    Agent.update(line, fn _ -> {:error, :enoent} end)
+    send(Names.whereis(id, :drive), {:fail, :unplugged})
+    eventually(fn -> match?({:offline, _}, Swarm.status(id).health[:drive]) end)
+    assert {:error, "arm_away: its drive is offline (:" <> _} = Swarm.goto(id, {1, 1})
+    assert {:error, "arm_away: its drive is offline (:" <> _} = Swarm.start(robots: [id])
+    # What stops it, and questions, are always taken.
+    assert Swarm.stop(id) == :ok
+    assert Swarm.disarm(id) == :ok
+    assert {:ok, _said} = Swarm.tell(id, "ping")
+    Agent.update(line, fn _ -> :ok end)
+    eventually(fn -> Swarm.status(id).health[:drive] == :online end)
+    assert {:error, "arm_away: its wheels are disarmed" <> _} = Swarm.goto(id, {1, 1})
+
+    assert Swarm.arm(id) == :ok
+    assert Swarm.tell(id, "move:0.2:0") == :ok
+    told(id, &(&1 > 0))
+    send(Names.whereis(id, :drive), {:fail, :unplugged})
+    shows(id, "LINE LOST")
+    assert {:error, "arm_away: its line was lost (:unplugged)" <> _} = Swarm.goto(id, {1, 1})
+  end
+
+  test "of a group those who are ready start, and the others are named" do
+    ready = robot(:arm_ready)
+    held = robot(:arm_held, arm: :manual)
+    standing([ready, held])
+    refusal = {:error, "arm_held: its wheels are disarmed; arm it first"}
+    assert Swarm.start(robots: [held, ready]) == refusal
+    eventually(fn -> Swarm.status(ready).state not in [:idle, nil] end)
+    assert %Status{state: :idle} = Swarm.status(held)
+  end
+
+  test "wheels that are disarmed past the brake take the mission along, and a goal of nobody's" do
+    id = robot(:arm_past, arm: :manual)
+    standing([id])
+    drive = Names.whereis(id, :drive)
+    assert Swarm.arm(id) == :ok
+    assert Swarm.tell(id, "move:0.2:0") == :ok
+    told(id, &(&1 > 0))
+    assert Hal.Device.disarm(drive) == :ok
+    eventually(fn -> match?(%Status{state: :idle, by: :rest}, Swarm.status(id)) end)
+    stands_while(id, fn -> assert Swarm.arm(id) == :ok end)
+    roll = {Robot.Acts.Roll, twist: Twist.new(0.2, 0.0)}
+    Robot.Executive.goal(id, :roll, roll)
+    told(id, &(&1 > 0))
+    assert Hal.Device.disarm(drive) == :ok
+    eventually(fn -> match?(%Status{by: :rest}, Swarm.status(id)) end)
+
+    stands_while(id, fn ->
+      assert Swarm.arm(id) == :ok
+      eventually(fn -> Swarm.status(id).limits == [] end)
+    end)
+  end
+
+  test "in a dry run every order is taken: nothing moves" do
+    id = robot(:arm_dry, arm: :manual, dry_run: true)
+    standing([id])
+    assert Swarm.tell(id, "move:0.2:0") == :ok
+    eventually(fn -> Swarm.status(id).by == :move end)
   end
 
   test "the emergency stop is stronger: it refuses to be armed, and arming does not release it" do

@@ -13,10 +13,12 @@ defmodule Swarm.Link.Desk do
   | a `Robot.Command` | for this robot alone, which leaves the group's mission for it |
   | `:arm`, `:acknowledge` | of the wheels (`Hal.Device`): done, or why not |
 
-  While the emergency stop holds a robot, it refuses all that would move it, and to be armed.
+  While the emergency stop holds a robot, it refuses all that would move it, and to be armed. What would
+  move it is also refused, with the reason, while its drive is offline or not armed (`Robot.Readiness`): else
+  the motion would begin later, when somebody arms it.
   """
   alias Hal.Device
-  alias Robot.{Board, Config, Names, Pilot}
+  alias Robot.{Board, Config, Names, Pilot, Readiness}
   alias Swarm.{Formation, Missions.Landmark, Missions.Manual, Status}
   alias Swarm.Link.{Ear, Presence}
 
@@ -38,18 +40,26 @@ defmodule Swarm.Link.Desk do
 
   def answer(:arm, %{id: id}, _board, _ear), do: named(Device.arm(Names.via(id, :drive)), id)
 
-  def answer(request, config, board, ear), do: checked(request, doing(board), config, ear)
+  def answer(request, config, board, ear) do
+    with {:ok, request} <- checked(request),
+         :ok <- ready(request, config, board),
+         do: obey(request, doing(board), config, ear)
+  end
 
   defp named(:ok, _id), do: :ok
   defp named({:error, line}, id), do: {:error, "#{id}: #{line}"}
 
   # People come by `Swarm`, which has checked it all; but anybody may send something here.
-  defp checked({:start, options} = request, doing, config, ear) do
-    with :ok <- options(options), do: obey(request, doing, config, ear)
-  end
+  defp checked({:start, options} = request),
+    do: with(:ok <- options(options), do: {:ok, request})
 
-  defp checked(request, doing, config, ear) do
-    with {:ok, request} <- Manual.check(request), do: obey(request, doing, config, ear)
+  defp checked(request), do: Manual.check(request)
+
+  # A shape moves nobody who is on no mission, and whoever is on one is ready.
+  defp ready({:formation, _kind, _spacing}, _config, _board), do: :ok
+
+  defp ready(_request, config, board) do
+    with {:error, line} <- Readiness.of(config, board), do: {:error, "#{config.id}: #{line}"}
   end
 
   defp options(options) do

@@ -1,0 +1,66 @@
+defmodule Robot.Readiness do
+  @moduledoc """
+  Whether an order that can move a robot would be carried out now, by what its board says of the drive:
+  an order is for now, and shall not begin to move the robot later, when somebody arms it.
+
+  A drive that arms by itself (`arm: :auto`) and has not said anything yet is just coming up, and counts as
+  ready. In a dry run nothing moves, and what would is the question: every order is taken.
+  """
+  alias Robot.{Board, Config}
+
+  @typedoc "What the board says under `:arming` and under `{:health, :drive}`; `nil` for nothing yet."
+  @type arming :: %{state: Hal.Arming.state(), why: String.t() | nil} | nil
+  @type health :: :online | {:offline, reason :: term()} | nil
+
+  @doc "The same of a robot of this node."
+  @spec of(Config.t(), Board.t()) :: :ok | {:error, line :: String.t()}
+  def of(%Config{dry_run: true}, _board), do: :ok
+
+  def of(%Config{arm: policy}, board),
+    do: judge(policy, entry(board, :arming), entry(board, {:health, :drive}))
+
+  @doc """
+  `:ok`, or the reason, which names no robot.
+
+      iex> Robot.Readiness.judge(:manual, %{state: :armed, why: nil}, :online)
+      :ok
+      iex> Robot.Readiness.judge(:manual, %{state: :disarmed, why: nil}, :online)
+      {:error, "its wheels are disarmed; arm it first"}
+      iex> Robot.Readiness.judge(:auto, %{state: :disarmed, why: "conversion distance is missing"}, :online)
+      {:error, "its wheels are disarmed (conversion distance is missing)"}
+      iex> Robot.Readiness.judge(:auto, %{state: :disarmed, why: nil}, {:offline, :enoent})
+      {:error, "its drive is offline (:enoent)"}
+      iex> Robot.Readiness.judge(:manual, %{state: {:error, :eio}, why: nil}, :online)
+      {:error, "its line was lost (:eio) while the wheels turned; look, acknowledge, and arm it"}
+      iex> for policy <- [:auto, :manual], do: Robot.Readiness.judge(policy, nil, nil)
+      [:ok, {:error, "its drive is not open yet"}]
+  """
+  @spec judge(:auto | :manual, arming(), health()) :: :ok | {:error, line :: String.t()}
+  def judge(_policy, %{state: {:error, reason}}, _health),
+    do:
+      {:error,
+       "its line was lost (#{brief(reason)}) while the wheels turned; look, acknowledge, and arm it"}
+
+  def judge(_policy, _arming, {:offline, reason}),
+    do: {:error, "its drive is offline (#{brief(reason)})"}
+
+  def judge(_policy, %{state: :armed}, _health), do: :ok
+
+  def judge(_policy, %{state: :disarmed, why: nil}, _health),
+    do: {:error, "its wheels are disarmed; arm it first"}
+
+  def judge(_policy, %{state: :disarmed, why: why}, _health),
+    do: {:error, "its wheels are disarmed (#{why})"}
+
+  def judge(:auto, nil, _health), do: :ok
+  def judge(:manual, nil, _health), do: {:error, "its drive is not open yet"}
+
+  defp brief(reason), do: inspect(reason, limit: 5, printable_limit: 40)
+
+  defp entry(board, key) do
+    case Board.fetch(board, key, :infinity) do
+      {:ok, value, _at_ms} -> value
+      :error -> nil
+    end
+  end
+end
