@@ -24,6 +24,46 @@ defmodule Robot.Behaviour do
 
   @optional_callbacks update: 2
 
+  @doc """
+  Whether a goal, `{module, options}` or `nil` for none, is one that a robot can have.
+
+      iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: 1.0, y: 2.0})
+      :ok
+      iex> Robot.Behaviour.check({NoSuchModule, []})
+      {:error, "NoSuchModule is no behaviour: a module with new/1 and tick/2 is allowed"}
+      iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: :far, y: 2.0})
+      {:error, "Robot.Behaviour.Goto: option x cannot be :far: a number from -1.0e6 to 1.0e6 is allowed"}
+  """
+  @spec check(term()) :: :ok | {:error, line :: String.t()}
+  def check(nil), do: :ok
+
+  def check({module, options}) when is_atom(module) and is_list(options) do
+    cond do
+      not Keyword.keyword?(options) ->
+        {:error, "#{inspect(module)}: #{brief(options)} are no options: [key: value] is allowed"}
+
+      Code.ensure_loaded?(module) and function_exported?(module, :new, 1) and
+          function_exported?(module, :tick, 2) ->
+        made(module, Keyword.delete(options, :discs))
+
+      true ->
+        {:error, "#{inspect(module)} is no behaviour: a module with new/1 and tick/2 is allowed"}
+    end
+  end
+
+  def check(other),
+    do: {:error, "#{brief(other)} is no goal: {module, options} or nil is allowed"}
+
+  # Wrong options raise, by contract.
+  defp made(module, options) do
+    {_module, _state} = module.new(options)
+    :ok
+  rescue
+    error in ArgumentError -> {:error, "#{inspect(module)}: #{Exception.message(error)}"}
+  end
+
+  defp brief(term), do: inspect(term, limit: 5, printable_limit: 40)
+
   @doc "One tick of a running behaviour."
   @spec tick(t(), Percept.t()) :: result()
   def tick({module, state}, %Percept{} = percept), do: module.tick(percept, state)

@@ -17,7 +17,9 @@ defmodule Robot.Board do
   | `:radio` | `:link` | what was sent, heard, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
   | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Reflex.frame/1` |
-  | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil}` |
+  | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil, tick: count}` |
+  | `:goal` | `:executive` | the module of its goal's behaviour, or `nil` |
+  | `:hung` | `:watch` | the module of the behaviour in which the executive hung last, or `nil` |
   | `:pose` | `:executive` | the estimate in the `map` frame |
   | `:mission` | `:pilot` | `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state}` |
 
@@ -44,7 +46,8 @@ defmodule Robot.Board do
           since_ms: integer()
         }
 
-  @type writer :: :drive | :ptz | :camera | :eye | :link | :brake | :gate | :executive | :pilot
+  @type writer ::
+          :drive | :ptz | :camera | :eye | :link | :brake | :gate | :watch | :executive | :pilot
 
   @writers %{
     odometry: :drive,
@@ -61,6 +64,8 @@ defmodule Robot.Board do
     driving: :gate,
     frame: :gate,
     doing: :executive,
+    goal: :executive,
+    hung: :watch,
     pose: :executive,
     mission: :pilot,
     estop: :brake,

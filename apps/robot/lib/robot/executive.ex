@@ -4,12 +4,14 @@ defmodule Robot.Executive do
   and the percept to the pilot. It never calls anyone, so nobody can hold it up; whatever takes
   long (vision, planning) is a process of its own that writes to the board.
 
+  A behaviour that hangs holds up all of it. `Robot.Watch` sees that, and ends it.
+
   It starts idle: goals live here, and are gone when it falls. The first that it does is to have the gate
   forget what the one before it wished.
   """
   use GenServer
   alias Hal.{Device, Event}
-  alias Robot.{Board, Config, DryRun, Gate, Mind, Names, Percept, Trace}
+  alias Robot.{Behaviour, Board, Config, DryRun, Gate, Mind, Names, Percept, Trace}
 
   @period_ms 100
   @slow_us 50_000
@@ -22,9 +24,30 @@ defmodule Robot.Executive do
   def start_link({%Config{} = config, {_m, _f, _a} = sink}),
     do: GenServer.start_link(__MODULE__, {config, sink}, name: Names.via(config.id, :executive))
 
-  @doc "Sets, changes or (`nil`) drops the goal, as in `Robot.Mind.goal/3`."
-  @spec goal(robot :: atom(), tag :: term(), {module(), keyword()} | nil) :: :ok
-  def goal(robot, tag, goal), do: cast(robot, {:goal, tag, goal})
+  @doc """
+  Sets, changes or (`nil`) drops the goal, as in `Robot.Mind.goal/3`. Refused, in a line, where no such robot
+  runs on this node, and a goal that is no behaviour, or none with these options.
+  """
+  @spec goal(robot :: atom(), tag :: term(), {module(), keyword()} | nil) ::
+          :ok | {:error, line :: String.t()}
+  def goal(robot, tag, goal) do
+    with :ok <- Behaviour.check(goal) do
+      if Names.whereis(robot, :executive),
+        do: set(robot, tag, goal),
+        else: {:error, "no robot #{inspect(robot)} runs on this node"}
+    end
+  end
+
+  @doc "The same for the pilot, which has checked the goal, and lives no longer than the executive."
+  @spec set(robot :: atom(), tag :: term(), {module(), keyword()} | nil) :: :ok
+  def set(robot, tag, goal), do: cast(robot, {:goal, tag, goal})
+
+  @doc """
+  Applies `then` as soon as all that was said to the executive before is taken in: whoever waits for that
+  hears nothing from one that hangs.
+  """
+  @spec confirm(robot :: atom(), then :: Config.call()) :: :ok
+  def confirm(robot, {_m, _f, _a} = then), do: cast(robot, {:confirm, then})
 
   @doc """
   Drops the goal and all else that the mission said, and has the gate forget the wish behind them, after
@@ -48,15 +71,9 @@ defmodule Robot.Executive do
     Gate.forget(id)
     board = Board.find!(id)
     at_ms = Config.now(config)
-
-    Board.put(
-      board,
-      :executive,
-      :doing,
-      %{by: :idle, weight: 0.0, outcome: nil, fault: nil},
-      at_ms
-    )
-
+    doing = %{by: :idle, weight: 0.0, outcome: nil, fault: nil, tick: 0}
+    Board.put(board, :executive, :doing, doing, at_ms)
+    Board.put(board, :executive, :goal, nil, at_ms)
     Event.execute([:robot, :executive, :start], %{at_ms: at_ms}, %{robot: id})
 
     s = %{
@@ -67,6 +84,7 @@ defmodule Robot.Executive do
       look: nil,
       behaviour_looks?: false,
       told: nil,
+      tick: 0,
       next: System.monotonic_time(:millisecond)
     }
 
@@ -76,14 +94,19 @@ defmodule Robot.Executive do
   @impl GenServer
   def handle_cast({:goal, tag, goal} = input, s) do
     Trace.input(s.config, :executive, input, Config.now(s.config))
-    {:noreply, %{s | mind: Mind.goal(s.mind, tag, goal)}}
+    {:noreply, pursue(s, Mind.goal(s.mind, tag, goal))}
+  end
+
+  def handle_cast({:confirm, {m, f, a}}, s) do
+    apply(m, f, a)
+    {:noreply, s}
   end
 
   def handle_cast({:stand, then}, s) do
     Trace.input(s.config, :executive, :stand, Config.now(s.config))
     Gate.forget(s.config.id, then)
     mind = s.mind |> Mind.goal(:idle, nil) |> Mind.anchors([])
-    {:noreply, %{s | mind: mind, look: nil}}
+    {:noreply, pursue(%{s | look: nil}, mind)}
   end
 
   def handle_cast({:anchors, anchors} = input, s) do
@@ -115,6 +138,14 @@ defmodule Robot.Executive do
 
   def handle_info(_other, s), do: {:noreply, s}
 
+  # Written down before its first tick, which may be its last.
+  defp pursue(%{mind: %{module: module}} = s, %{module: module} = mind), do: %{s | mind: mind}
+
+  defp pursue(s, mind) do
+    Board.put(s.board, :executive, :goal, mind.module, Config.now(s.config))
+    %{s | mind: mind}
+  end
+
   defp tick(%{config: config, board: board} = s, at_ms) do
     raw = Percept.Snapshot.take(board, config.profile, at_ms)
     Trace.input(config, :executive, {:tick, raw}, at_ms)
@@ -126,14 +157,14 @@ defmodule Robot.Executive do
     s = look(s, wish.look || s.look, at_ms)
 
     fault = fault(s, Mind.fault(mind), at_ms)
-    doing = %{by: wish.by, weight: wish.weight, outcome: outcome, fault: fault}
+    doing = %{by: wish.by, weight: wish.weight, outcome: outcome, fault: fault, tick: s.tick + 1}
     Board.put(board, :executive, :doing, doing, at_ms)
     if percept.pose, do: Board.put(board, :executive, :pose, percept.pose, at_ms)
 
     # The outcome first: the mission knows what came of its goal when it sees the next percept.
     with {tag, outcome} <- outcome, do: tell(s, {:outcome, tag, outcome}, at_ms)
     tell(s, {:tick, percept}, at_ms)
-    %{s | mind: mind, behaviour_looks?: wish.look != nil}
+    %{s | mind: mind, tick: doing.tick, behaviour_looks?: wish.look != nil}
   end
 
   # Told when it changes.

@@ -23,7 +23,7 @@ defmodule Robot.Pilot do
   """
   @behaviour :gen_statem
   alias Hal.Event
-  alias Robot.{Board, Config, Executive, Names, Trace}
+  alias Robot.{Behaviour, Board, Config, Executive, Names, Trace}
 
   # On a busy machine a pilot is slow, not gone.
   @call_ms 5_000
@@ -197,7 +197,9 @@ defmodule Robot.Pilot do
   end
 
   defp carry_out({:goal, tag, goal}, config, data) do
-    Executive.goal(config.id, tag, goal)
+    # A wrong one is the mission's fault, which falls with it, and not the executive's.
+    with {:error, line} <- Behaviour.check(goal), do: raise(ArgumentError, line)
+    Executive.set(config.id, tag, goal)
     data
   end
 
@@ -227,7 +229,7 @@ defmodule Robot.Pilot do
   end
 
   defp rest(%{config: %{id: id}}) do
-    Executive.goal(id, :idle, nil)
+    Executive.set(id, :idle, nil)
     Executive.anchors(id, [])
     Executive.look(id, nil)
   end

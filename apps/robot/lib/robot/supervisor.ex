@@ -6,6 +6,7 @@ defmodule Robot.Supervisor do
       |-- Robot.Board        the newest readings, the e-stop latch
       |-- Robot.Devices      one_for_one: eye, drive, ptz, camera; each falls alone
       |-- Robot.Gate         the only one who drives the wheels
+      |-- Robot.Watch        sees that the executive ticks, and ends one that hangs
       |-- Robot.Executive    percept to wish, ten times a second
       |-- Robot.Pilot        runs the mission
       `-- companions         the radio, and what else the config names
@@ -18,7 +19,7 @@ defmodule Robot.Supervisor do
   cure. What then happens is the fleet's to say (`Robot.Fleet`).
   """
   use Supervisor
-  alias Robot.{Board, Config, Devices, Executive, Gate, Names, Pilot}
+  alias Robot.{Board, Config, Devices, Executive, Gate, Names, Pilot, Watch}
 
   @doc "Starts a robot. `Robot.Names` must be running."
   @spec start_link(Config.t()) :: Supervisor.on_start()
@@ -41,6 +42,7 @@ defmodule Robot.Supervisor do
       {Board, config},
       {Devices, config},
       {Gate, config},
+      {Watch, config},
       {Executive, {config, {Pilot, :hear, [config.id]}}},
       {Pilot, config}
     ]

@@ -120,7 +120,7 @@ defmodule Robot.GateTest do
   test "whatever is wished, only sane speeds come out" do
     id = robot(:gate4)
     assert_receive {:drive, {:drive, twist}, _} when twist == @zero
-    :ok = :sys.suspend(Names.whereis(id, :executive))
+    for part <- [:watch, :executive], do: :ok = :sys.suspend(Names.whereis(id, part))
 
     for wish <- [%{linear: :nan, turn: 0.0}, %{linear: 1.0e308, turn: 0.0}, :nonsense] do
       Gate.wish(id, wish)

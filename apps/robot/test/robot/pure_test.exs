@@ -1,6 +1,8 @@
 defmodule Robot.PureTest do
   use ExUnit.Case, async: true
   doctest Robot.Wish
+  doctest Robot.Behaviour
+  doctest Robot.Watch
   doctest Robot.Readiness
   doctest Robot.Arbiter
   doctest Robot.Steering

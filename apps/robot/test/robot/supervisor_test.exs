@@ -3,6 +3,7 @@ defmodule Robot.SupervisorTest do
   use Robot.Case, async: false
   @moduletag :capture_log
   import ExUnit.CaptureLog
+  alias Robot.Behaviour
 
   @zero Twist.zero()
   @above [:executive, :pilot]
@@ -89,6 +90,65 @@ defmodule Robot.SupervisorTest do
     assert Enum.zip_with(before, parts(id, @above), &(&1 != &2)) == [true, true]
   end
 
+  test "a behaviour hangs: it is named within 0.5 s, and the robot is there again, idle" do
+    id = rolling(:fall13)
+    rolls()
+    listen(id)
+    listen(id, [:robot, :executive, :hung])
+    [gate, watch | before] = parts(id, [:gate, :watch | @above])
+    assert Executive.goal(id, :hang, {Acts.Hang, test: self()}) == :ok
+    assert_receive {:hangs, executive}
+    begun_ms = System.monotonic_time(:millisecond)
+
+    assert_receive {[:robot, :executive, :hung], %{behaviour: Acts.Hang}}, 2_000
+    idle?(id)
+    # Not before four ticks were missed: a slow one is no hanging.
+    assert System.monotonic_time(:millisecond) - begun_ms >= 300
+    assert executive == hd(before)
+    refute Process.alive?(executive)
+    assert {:ok, Acts.Hang, _at_ms} = Board.fetch(Board.find!(id), :hung, :infinity)
+    assert parts(id, [:gate, :watch]) == [gate, watch]
+    refute Enum.any?(parts(id, @above), &(&1 in before))
+    stands(150)
+    # It works again.
+    roll = {Acts.Roll, twist: Twist.new(0.1, 0.0)}
+    assert Executive.goal(id, :roll, roll) == :ok
+    rolls()
+  end
+
+  test "ticks that are late are no hanging: looks are counted, and not time" do
+    looks = fn ticks -> Enum.map_reduce(ticks, {nil, 0}, &swapped/2) |> elem(0) end
+    assert :hangs not in looks.(Enum.flat_map(1..20, &List.duplicate(&1, 8)))
+    assert looks.(List.duplicate(1, 9)) == List.duplicate(:well, 8) ++ [:hangs]
+  end
+
+  defp swapped(tick, watch), do: Robot.Watch.look(watch, tick)
+
+  test "a goal that is no behaviour is refused, and one of a mission ends the mission only" do
+    id = rolling(:fall14)
+    rolls()
+    [executive, pilot] = parts(id, @above)
+    goal = fn goal -> Executive.goal(id, :t, goal) end
+    assert {:error, "NoSuchModule is no behaviour" <> _} = goal.({NoSuchModule, []})
+    assert {:error, "Robot.Gate is no behaviour" <> _} = goal.({Gate, []})
+    assert {:error, "Robot.Behaviour.Goto: option x is missing"} = goal.({Behaviour.Goto, y: 1})
+
+    assert {:error, "Robot.Behaviour.Goto: [1] are no options" <> _} =
+             goal.({Behaviour.Goto, [1]})
+
+    assert {:error, ":roll is no goal" <> _} = goal.(:roll)
+    roll = {Acts.Roll, twist: Twist.zero()}
+    assert Executive.goal(:fall_nobody, :t, roll) |> elem(1) =~ "no robot :fall_nobody runs"
+    rolls()
+    assert parts(id, @above) == [executive, pilot]
+
+    listen(id)
+    bad = {:do, :ready, [{:goal, :t, {NoSuchModule, []}}]}
+    assert inspect(catch_exit(Pilot.command(id, bad))) =~ "NoSuchModule is no behaviour"
+    assert_receive {[:robot, :pilot, :phase], %{state: :idle}}
+    assert Names.whereis(id, :executive) == executive
+  end
+
   test "a mission raises: the pilot restarts, the executive drops its goal" do
     id = rolling(:fall2)
     rolls()
@@ -108,7 +168,8 @@ defmodule Robot.SupervisorTest do
   test "the executive is stuck: zero is at the driver within 0.3 s" do
     id = rolling(:fall3)
     rolls()
-    :ok = :sys.suspend(Names.whereis(id, :executive))
+    # The gate alone; what the watch does about it is another test.
+    for part <- [:watch, :executive], do: :ok = :sys.suspend(Names.whereis(id, part))
     forget_drives()
     assert_receive {:drive, {:drive, twist}, _} when twist == @zero, 300
     {:ok, %{limits: [:dead_man]}, _} = Board.fetch(Board.find!(id), :driving, 100)

@@ -20,6 +20,23 @@ defmodule Robot.Acts do
     defp wish(twist), do: %{Wish.new(:roll, twist, 0.9) | look: 0.25}
   end
 
+  defmodule Hang do
+    @moduledoc "Its first tick never ends; `:test` is told who hangs in it."
+    @behaviour Robot.Behaviour
+
+    @impl Robot.Behaviour
+    def new(options), do: {__MODULE__, Map.new(options)}
+
+    @impl Robot.Behaviour
+    def tick(percept, %{test: test} = state) do
+      send(test, {:hangs, self()})
+      spin(percept, state)
+    end
+
+    # Busy, and not waiting: nothing that is sent to it is looked at.
+    defp spin(percept, state), do: spin(percept, state)
+  end
+
   defmodule Mission do
     @moduledoc """
     Starts with the effects `:effects`; the command `{:do, phase, effects}` brings others, and

@@ -26,7 +26,7 @@ defmodule Swarm.Link do
   """
   use GenServer
   alias Hal.Event
-  alias Robot.{Board, Config, Names, Pilot}
+  alias Robot.{Board, Config, Executive, Names, Pilot}
   alias Swarm.{About, Brake, Message, Post, Shape, Stamp, Transport}
   alias Swarm.Link.{Chart, Desk, Ear, Flood, Mouth, Name}
 
@@ -195,7 +195,7 @@ defmodule Swarm.Link do
       :ok ->
         if Brake.takes?(request),
           do: Brake.take(s.id, request, ref),
-          else: Post.answer(ref, Desk.answer(request, s.config, s.board, s.ear))
+          else: answer(s, Desk.answer(request, s.config, s.board, s.ear), ref)
 
         s
 
@@ -204,6 +204,10 @@ defmodule Swarm.Link do
         %{s | ear: Ear.reject(s.ear, :too_old)}
     end
   end
+
+  # The pilot has taken an order; that the executive has it, too, only that one can say.
+  defp answer(s, :accepted, ref), do: Executive.confirm(s.id, {Post, :answer, [ref, :ok]})
+  defp answer(_s, answer, ref), do: Post.answer(ref, answer)
 
   # The brake knows best; it is only asked where a heartbeat seems to change something.
   defp stop(%{ear: %{stop: stop}} = s, %{stop: stop} = ear, _term), do: %{s | ear: ear}

@@ -9,6 +9,9 @@ defmodule Swarm.Status do
   (/dev/ttyR0: no such device)` (`offline`: words by device). A robot that is slow for want of sonar is
   `BLIND`. One that stands though nobody told it to says `FAULT`, and why (`fault`).
 
+  Of a robot whose behaviour hung, and which was started again for it (`Robot.Watch`), it says so for a minute (`hung`:
+  what hung, and how long ago, ms).
+
   `age_ms` is how old its newest reading is; `rejected` counts malformed messages by kind. `hears` are
   the robots it hears itself, `view` those that it takes for there (itself too), with the view's number,
   which grows with each that comes or goes (`Swarm.Peers`). Of whom it knows by way of others only, the line
@@ -23,6 +26,8 @@ defmodule Swarm.Status do
   alias Swarm.Link.Ear
   alias Swarm.{Missions, Peers}
 
+  @recently_ms 60_000
+
   @enforce_keys [:robot]
   defstruct @enforce_keys ++
               [
@@ -36,6 +41,7 @@ defmodule Swarm.Status do
                 estop: false,
                 arming: nil,
                 why: nil,
+                hung: nil,
                 leader: nil,
                 power: nil,
                 health: %{},
@@ -61,6 +67,7 @@ defmodule Swarm.Status do
           estop: boolean(),
           arming: Hal.Arming.state() | nil,
           why: String.t() | nil,
+          hung: {behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
           leader: atom() | String.t() | nil,
           power: float() | nil,
           health: %{(atom() | String.t()) => :online | {:offline, term()}},
@@ -94,6 +101,7 @@ defmodule Swarm.Status do
       estop: Board.latched?(board),
       arming: entries |> value(:arming) |> field(:state),
       why: entries |> value(:arming) |> field(:why),
+      hung: hung(entries),
       leader: mission |> field(:claim) |> field(:leader),
       power: value(entries, :power),
       health: Map.new(health),
@@ -127,6 +135,11 @@ defmodule Swarm.Status do
       _none -> nil
     end
   end
+
+  defp hung(%{hung: {module, ago_ms}}) when ago_ms < @recently_ms,
+    do: {if(module, do: inspect(module), else: "its thinking"), ago_ms}
+
+  defp hung(_never_or_long_ago), do: nil
 
   defp field(nil, _key), do: nil
   defp field(map, key), do: Map.get(map, key)
@@ -165,6 +178,7 @@ defmodule Swarm.Status do
         Swarm.Status.arming(status),
         status.fault && "FAULT (#{status.fault})",
         Enum.any?(status.limits, &("#{&1}" == "blind")) && "BLIND (no sonar; slow)",
+        hung(status.hung),
         status.leader && "leader #{status.leader}",
         status.view && "view #{elem(status.view, 0)}",
         "hears #{length(status.hears)}" <> deaf(status),
@@ -181,6 +195,9 @@ defmodule Swarm.Status do
         _not_told -> "#{device} offline"
       end
     end
+
+    defp hung(nil), do: nil
+    defp hung({what, ago_ms}), do: "HUNG in #{what} #{div(ago_ms, 1_000)} s ago, started again"
 
     # Those of the view that are known by way of others only; nearly always none.
     defp deaf(%{view: {_number, members}} = status) do

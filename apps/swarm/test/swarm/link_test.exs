@@ -153,7 +153,7 @@ defmodule Swarm.LinkTest do
     for id <- ids, do: refute(Board.latched?(Board.find!(id)))
 
     # What was wished before the stop is forgotten: only a new command moves a robot.
-    for id <- ids, do: until(id, &match?({:ok, %{by: :stop}, _}, Board.fetch(&1, :doing, 500)))
+    for id <- ids, do: until(id, &match?({:ok, %{by: :rest}, _}, Board.fetch(&1, :doing, 500)))
     for id <- ids, do: forget(id)
     for id <- ids, do: assert(Swarm.ask(id, {:move, 0.1, 0.0}) == :ok)
     for id <- ids, do: rolls_of(id)

@@ -91,10 +91,36 @@ defmodule Swarm.OrdersTest do
       assert line =~ ~r/^orders_pong does not answer; orders_ping on /
       :ok = :sys.resume(Names.whereis(other, :link))
       assert Swarm.estop() == :ok
-      assert {:ok, line} = Swarm.tell(id, "ping")
-      assert line =~ ~r/, idle for \d+ s, E-STOP$/
+      held = ~r/^orders_ping .*, idle for \d+ s, E-STOP$/
+      eventually(fn -> elem(Swarm.tell(id, "ping"), 1) =~ held end)
       assert Swarm.reset() == :ok
     end
+  end
+
+  test "an order is :ok when the robot's executive has it; one that hangs is told, and recovers" do
+    id = robot(:orders_mind)
+    standing([id])
+    :ok = listen(id, [:robot, :executive, :hung])
+    before = Names.whereis(id, :pilot)
+    assert Executive.goal(id, :hang, {Acts.Hang, test: self()}) == :ok
+    assert_receive {:hangs, _executive}
+    assert {:error, "orders_mind does not answer"} = Swarm.goto(id, {1, 1})
+    assert_receive {[:robot, :executive, :hung], %{behaviour: Acts.Hang}}
+
+    eventually(fn ->
+      pid = Names.whereis(id, :link)
+
+      pid != nil and Names.whereis(id, :pilot) not in [nil, before] and
+        Directory.whereis(id) == pid
+    end)
+
+    status = Swarm.status(id)
+    assert %{state: :idle, hung: {"Robot.Acts.Hang", ago_ms}} = status
+    assert ago_ms < 60_000
+    assert inspect(status) =~ ~r/, HUNG in Robot\.Acts\.Hang \d+ s ago, started again,/
+    # Nothing of the order that was not answered is left.
+    stands(id)
+    assert Swarm.goto(id, {1, 1}) == :ok
   end
 
   describe "stop" do

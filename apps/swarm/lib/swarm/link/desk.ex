@@ -22,7 +22,8 @@ defmodule Swarm.Link.Desk do
   alias Swarm.{Formation, Missions.Landmark, Missions.Manual, Status}
   alias Swarm.Link.{Ear, Presence}
 
-  @type answer :: :ok | {:ok, String.t()} | {:error, String.t()} | Status.t()
+  @typedoc "`:accepted`: the pilot has the order; it is `:ok` once the executive has it, too."
+  @type answer :: :ok | :accepted | {:ok, String.t()} | {:error, String.t()} | Status.t()
 
   @doc "Answers a request."
   @spec answer(term(), Config.t(), Board.t(), Ear.t()) :: answer()
@@ -43,7 +44,8 @@ defmodule Swarm.Link.Desk do
   def answer(request, config, board, ear) do
     with {:ok, request} <- checked(request),
          :ok <- ready(request, config, board),
-         do: obey(request, doing(board), config, ear)
+         :ok <- obey(request, doing(board), config, ear),
+         do: :accepted
   end
 
   defp named(:ok, _id), do: :ok

@@ -24,6 +24,8 @@ defmodule Swarm.Machine.PulseTest do
     for {id, part} <- [pulse_gate: :gate, pulse_mind: :executive] do
       id = robot(id)
       assert words(id, true)
+      # Which would start the executive again before a second is over.
+      :ok = :sys.suspend(Names.whereis(id, :watch))
       :ok = :sys.suspend(Names.whereis(id, part))
       assert words(id, false) =~ "its #{part} has done nothing for 1."
       :ok = :sys.resume(Names.whereis(id, part))
