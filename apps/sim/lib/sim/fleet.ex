@@ -9,7 +9,7 @@ defmodule Sim.Fleet do
   """
   use GenServer
   alias Hal.Pose
-  alias Sim.Fleet.{Local, Nodes}
+  alias Sim.Fleet.{Local, Mission, Nodes}
   alias Sim.Scene
   alias Sim.Trial.{Finish, Ledger, Score, Script, Setup}
 
@@ -18,7 +18,8 @@ defmodule Sim.Fleet do
   @doc """
   Starts a fleet. All options have defaults: `robots`, `seed`, `map`, `landmark`, `formation`, `noise`,
   `loss` and the others of `Sim.Trial.Setup.new/1` (there is no time limit here); `mission: false` for
-  robots that wait for commands instead of starting their mission at once; `nodes: true` for robots and
+  robots that wait for commands instead of starting their mission at once, or `mission: {module, options}` for
+  another `Robot.Mission` than the search for the landmark; `nodes: true` for robots and
   world in processes of the operating system of their own; `trace` as of `Robot.Config`, called
   with the robot's id first (on one node).
 
@@ -34,10 +35,12 @@ defmodule Sim.Fleet do
     crew = if own[:nodes], do: Nodes, else: Local
 
     with {:ok, setup} <- Setup.new(options),
+         {:ok, setup, begin?} <-
+           Mission.choose(setup, Map.get(own, :mission, true), crew == Nodes),
          :ok <- free(setup.options.robots) do
       {:ok, _apps} = Application.ensure_all_started(:swarm)
       answer = make_ref()
-      start = {setup, crew, own, {self(), answer}}
+      start = {setup, crew, Map.put(own, :mission, begin?), {self(), answer}}
 
       # What could not start has ended well, and said why.
       with :ignore <- GenServer.start_link(__MODULE__, start) do
@@ -94,8 +97,7 @@ defmodule Sim.Fleet do
       {:ok, crew} ->
         epoch_ms = System.monotonic_time(:millisecond)
 
-        {:ok, begun(setup, {module, crew}, epoch_ms),
-         {:continue, {:begin, own[:mission] != false}}}
+        {:ok, begun(setup, {module, crew}, epoch_ms), {:continue, {:begin, own.mission}}}
 
       {:error, line} ->
         send(caller, {answer, line})

@@ -1,5 +1,6 @@
 defmodule Sim.DocTest do
   use ExUnit.Case, async: true
+  doctest Sim.Fleet.Mission
   doctest Sim.Contact
   doctest Sim.Lateness
   doctest Sim.Map

@@ -153,6 +153,43 @@ defmodule Sim.FleetTest do
     stop(fleet)
   end
 
+  defmodule Turn do
+    @moduledoc "Another mission: turns on the spot from its start on."
+    @behaviour Robot.Mission
+
+    @impl Robot.Mission
+    def init(_robot, options), do: {:waiting, options[:rate], []}
+
+    @impl Robot.Mission
+    def handle({:command, :start}, rate) do
+      goal = {Robot.Behaviour.Move, linear: 0.0, turn: rate}
+      {:turning, rate, [{:goal, :turn, goal}, {:claim, %{phase: :lead}}]}
+    end
+
+    def handle(_event, rate), do: {:turning, rate, []}
+  end
+
+  test "a fleet is at the mission that it is given, or says why not" do
+    fleet = fleet(%{robots: [:mag75], landmark: :none, mission: {Turn, rate: 0.3}})
+    heading = truth(fleet, :mag75).heading
+    eventually(fn -> Swarm.status(:mag75).state == :turning end, 6_000)
+    eventually(fn -> abs(Pose.wrap(truth(fleet, :mag75).heading - heading)) > 0.3 end, 6_000)
+    assert [%{state: :lead}] = Fleet.scene(fleet).robots
+    assert Swarm.stop(:mag75) == :ok
+    stop(fleet)
+
+    for {mission, nodes?, word} <- [
+          {{NoSuchModule, []}, false, "NoSuchModule is no Robot.Mission"},
+          {{Turn, [1]}, false, "options"},
+          {:patrol, false, "true, false or"},
+          {{Turn, rate: 0.3}, true, "with nodes"}
+        ] do
+      options = %{robots: [:mag76], map: "hall", mission: mission, nodes: nodes?}
+      assert {:error, line} = Fleet.start_link(options)
+      assert line =~ "mission cannot be" and line =~ word
+    end
+  end
+
   test "what is wrong with a fleet is said before anything starts" do
     assert {:error, line} = Fleet.start_link(%{map: "mars"})
     assert line =~ "mars"

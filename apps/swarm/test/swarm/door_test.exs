@@ -16,13 +16,21 @@ defmodule Swarm.DoorTest do
     mission
   end
 
+  # A camera that shows nothing, and what it looks for.
+  defp eyes do
+    box = %{y: {80, 240}, u: {60, 90}, v: {130, 145}}
+    classes = for name <- ["Yellow", "Red"], do: Map.put(box, :name, name)
+    {:ok, colours} = Vision.Colours.new(classes)
+    [camera: {Hal.FakeCamera, test: self(), device: :camera}, colours: colours]
+  end
+
   # The behaviour that drives it now.
   defp doing(id) do
     with {:ok, %{by: behaviour}, _age} <- Board.fetch(Board.find!(id), :doing, 300), do: behaviour
   end
 
   test "single commands work from idle and replace each other" do
-    id = robot(:door1)
+    id = robot(:door1, eyes())
     standing([id])
     assert Swarm.goto(id, {2.0, 1}) == :ok
     assert state(id) == {Swarm.Missions.Manual, :goto}
@@ -41,6 +49,23 @@ defmodule Swarm.DoorTest do
     assert {:ok, "door1 on " <> _} = Swarm.tell(id, "ping")
     assert Swarm.goto(id, {1, 2, 1.5}) == :ok
     assert Swarm.goto(id, Pose.new(1, 2)) == :ok
+  end
+
+  test "a colour that a robot does not know is refused, with those that it looks for" do
+    id = robot(:door_sees, eyes())
+    blind = robot(:door_blind)
+    standing([id, blind])
+
+    assert Swarm.tell(id, "findblob:Blue") ==
+             {:error, ~s(door_sees knows no colour "Blue"; it looks for Yellow, Red)}
+
+    assert state(id) == :idle
+    assert Swarm.tell(id, "findblob") == :ok
+    # A full turn shows nothing, by the clock that stands behind the wheels.
+    assert Swarm.tell(blind, "findblob") == {:error, "door_blind has no camera to look with"}
+    assert Swarm.tell(id, "findblob:Red") == :ok
+    assert state(id) == {Swarm.Missions.Manual, :find_blob}
+    eventually(fn -> Swarm.status(id).state == :not_found end, 20_000)
   end
 
   test "robots follow each other, but in no circle" do

@@ -29,6 +29,17 @@ defmodule Swarm.Missions.ManualTest do
              Manual.handle({:outcome, next, 1}, mission)
   end
 
+  test "whether a colour was found is its phase, and not only that it is done" do
+    for {outcome, phase} <- [{1, :found}, {0, :not_found}] do
+      {:find_blob, mission, [{:goal, tag, _} | _]} = tell(new(), "findblob:Red")
+
+      assert {^phase, mission, [{:claim, %{standing: true}}]} =
+               Manual.handle({:outcome, tag, outcome}, mission)
+
+      assert {^phase, _mission, []} = Manual.handle({:tick, percept(100, %{})}, mission)
+    end
+  end
+
   test "every command that moves a robot has the options of its behaviour" do
     for text <- ~w(goto:1:2 goto:1:2:3 move:0.1:0 findblob findblob:Red lead follow:1:2:0) do
       assert {_phase, _, [{:goal, {:command, 1}, {module, options}}, {:look, _}, {:claim, claim}]} =

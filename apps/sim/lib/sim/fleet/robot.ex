@@ -5,6 +5,9 @@ defmodule Sim.Fleet.Robot do
   alias Sim.World
   alias Swarm.Missions.Manual
 
+  # Of a command for one robot alone.
+  @over [:ready, :done, :found, :not_found]
+
   @typedoc """
   What all robots of a fleet have in common: the name of their world, their clock and radio, how they
   see, what they are at, who is told what goes in and out (`{m, f, a}`, called with the id first), and the run's
@@ -48,7 +51,7 @@ defmodule Sim.Fleet.Robot do
     with {:ok, board} <- Board.find(id),
          {:ok, %{state: state, claim: claim}, _at_ms} <- Board.fetch(board, :mission, :infinity) do
       case state do
-        {Manual, phase} when phase not in [:ready, :done] -> Map.put(claim, :phase, :manual)
+        {Manual, phase} when phase not in @over -> Map.put(claim, :phase, :manual)
         _group_or_idle -> claim
       end
     else

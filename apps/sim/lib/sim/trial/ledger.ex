@@ -73,7 +73,7 @@ defmodule Sim.Trial.Ledger do
     parts = parts || [for({id, _claim} <- claims, do: id)]
     leaders = for {id, %{phase: :lead} = claim} <- claims, do: {id, claim}
     phases = for {_id, claim} <- claims, do: claim[:phase]
-    formed? = Enum.any?(leaders, fn {_id, claim} -> claim.formed end)
+    formed? = Enum.any?(leaders, fn {_id, claim} -> claim[:formed] == true end)
     elected? = ledger.elections > 0
 
     %{
@@ -123,7 +123,7 @@ defmodule Sim.Trial.Ledger do
   defp highest([]), do: nil
 
   defp highest(leaders) do
-    {id, _claim} = Enum.max_by(leaders, fn {id, claim} -> {claim.epoch, id} end)
+    {id, _claim} = Enum.max_by(leaders, fn {id, claim} -> {claim[:epoch] || 0, id} end)
     id
   end
 end

@@ -108,7 +108,25 @@ defmodule Swarm.Link.Desk do
          do: alone(command, doing, config)
   end
 
+  defp obey({:find_blob, colour} = command, doing, config, _ear) do
+    with :ok <- known(colour, config), do: alone(command, doing, config)
+  end
+
   defp obey(command, doing, config, _ear), do: alone(command, doing, config)
+
+  defp known(_colour, %{camera: nil, id: id}), do: {:error, "#{id} has no camera to look with"}
+  defp known(nil, _config), do: :ok
+
+  defp known(colour, %{id: id, colours: %{classes: classes}}) do
+    names = Enum.map(classes, & &1.name)
+
+    if colour in names,
+      do: :ok,
+      else: {:error, "#{id} knows no colour #{inspect(colour)}; it looks for #{list(names)}"}
+  end
+
+  defp list([name]), do: name
+  defp list(names), do: Enum.join(names, ", ")
 
   defp begin(options, config) do
     {module, defaults} = config.mission || {Landmark, []}

@@ -7,6 +7,8 @@ defmodule Swarm.Missions.Manual do
   In its heartbeats the robot stays `:idle`, so that no group waits for it, and names whom it
   follows, so that nobody can close a circle of followers.
 
+  Its phase is the command's name, then `:done`; of `find_blob`, `:found` or `:not_found`.
+
   Whoever is followed need not do anything: its heartbeats are the position updates that a
   subscription asked for (R27, R35), so a person who asks for one is told so, and nothing changes. A follower keeps 1 m behind its leader, stands when it has
   not heard it for a second, and goes on when it hears it again (R34).
@@ -144,7 +146,7 @@ defmodule Swarm.Missions.Manual do
     result(mission, [goal, {:look, 0.0}, {:claim, claim(mission)}])
   end
 
-  # How a command ended, as a number (R12), is known to whoever asks for the robot's status.
+  # How a command ended, by its outcome (R12), is known to whoever asks for the robot's status.
   def handle({:outcome, {:command, count}, outcome}, %{count: count} = mission),
     do: result(%{mission | result: outcome}, [{:claim, %{phase: :idle, standing: true}}])
 
@@ -158,6 +160,9 @@ defmodule Swarm.Missions.Manual do
 
   defp result(%{result: nil} = mission, effects),
     do: {phase(mission.command), mission, effects}
+
+  defp result(%{command: {:find_blob, _colour}} = mission, effects),
+    do: {if(mission.result == 1, do: :found, else: :not_found), mission, effects}
 
   defp result(mission, effects), do: {:done, mission, effects}
 

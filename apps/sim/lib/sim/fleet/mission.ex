@@ -1,0 +1,52 @@
+defmodule Sim.Fleet.Mission do
+  @moduledoc """
+  What the option `mission:` of a fleet means: `true` for the mission of its setup, `false` for the same, but
+  not begun, `{module, options}` for another `Robot.Mission`, begun. Pure, but that it loads the module.
+  """
+  alias Sim.Trial.Setup
+
+  # What a process of its own has on board.
+  @apps [:hal, :vision, :robot, :swarm, :sim]
+
+  @doc """
+  The setup with that mission, and whether it is to begin; or one line.
+
+      iex> Sim.Fleet.Mission.choose(%{mission: nil}, {NoSuchModule, []}, false)
+      {:error, "mission cannot be {NoSuchModule, []}: NoSuchModule is no Robot.Mission (init/2 and handle/2)"}
+      iex> Sim.Fleet.Mission.choose(%{mission: nil}, :patrol, false)
+      {:error, "mission cannot be :patrol: true, false or {module, options} is allowed"}
+  """
+  @spec choose(Setup.t(), term(), nodes? :: boolean()) ::
+          {:ok, Setup.t(), begin? :: boolean()} | {:error, line :: String.t()}
+  def choose(setup, begin?, _nodes?) when is_boolean(begin?), do: {:ok, setup, begin?}
+
+  def choose(setup, {module, options} = mission, nodes?) when is_atom(module) do
+    cond do
+      not Keyword.keyword?(options) ->
+        {:error, "mission cannot be #{brief(mission)}: its options must be [key: value]"}
+
+      not mission?(module) ->
+        {:error,
+         "mission cannot be #{brief(mission)}: #{inspect(module)} is no Robot.Mission " <>
+           "(init/2 and handle/2)"}
+
+      nodes? and Application.get_application(module) not in @apps ->
+        {:error,
+         "mission cannot be #{brief(mission)} with nodes: processes of their own have the " <>
+           "modules of #{Enum.join(@apps, ", ")} only"}
+
+      true ->
+        {:ok, %{setup | mission: mission}, true}
+    end
+  end
+
+  def choose(_setup, other, _nodes?),
+    do: {:error, "mission cannot be #{brief(other)}: true, false or {module, options} is allowed"}
+
+  defp mission?(module) do
+    Code.ensure_loaded?(module) and function_exported?(module, :init, 2) and
+      function_exported?(module, :handle, 2)
+  end
+
+  defp brief(term), do: inspect(term, limit: 5, printable_limit: 40)
+end
