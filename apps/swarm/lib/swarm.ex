@@ -189,7 +189,8 @@ defmodule Swarm do
 
   @doc """
   Releases the emergency stop. What the robots were at ended with the stop: they stand until they
-  are told something new, for instance `start/0`.
+  are told something new, for instance `start/0`. `:ok` when that has ended, and none is held any more; a robot
+  whose mission or executive hangs does not answer, and stays held. Does nothing to robots that are not.
   """
   @spec reset() :: answer()
   def reset do

@@ -12,6 +12,9 @@ defmodule Swarm.Brake do
   answered by the last of them, the gate, when the mission is out of command and no older wish can follow
   (`Robot.Pilot.halt/2`); where that does not come, by nobody.
 
+  A reset goes the same way first: the gate is released once what the robot was at has ended, and unless
+  somebody stops it again meanwhile.
+
   A stop is obeyed however old it is; a reset that a person gave on another node bears a stamp
   (`Swarm.Stamp`), which is asked for here.
   """
@@ -21,6 +24,9 @@ defmodule Swarm.Brake do
   alias Swarm.{Alarm, Entry, Post, Stamp, Stop}
 
   @behaviour Robot.Companion
+
+  # Whoever asks has half a second (`Swarm.Door.Ask`): a robot that nobody was told of stays held.
+  @release_ms 400
 
   @impl Robot.Companion
   def child_spec({config, options}),
@@ -77,6 +83,15 @@ defmodule Swarm.Brake do
   def take(robot, request, ref),
     do: GenServer.cast(Names.via(robot, :brake), {:in_time, request, ref})
 
+  @doc """
+  What the robot was at has ended, says its gate: it may be released, before that time (monotonic, ms; who asked for
+  it hears nothing later), and if nobody has stopped it since it was
+  in the state that `pressed` stands for.
+  """
+  @spec release(atom(), pressed :: reference(), until_ms :: integer(), reference()) :: :ok
+  def release(robot, pressed, until_ms, ref),
+    do: GenServer.cast(Names.via(robot, :brake), {:release, pressed, until_ms, ref})
+
   @doc "The robot is there for commands by its name, or no longer: another of that name was first."
   @spec present(robot :: atom(), boolean()) :: :ok
   def present(robot, present?),
@@ -94,6 +109,7 @@ defmodule Swarm.Brake do
       stamps: Stamp.new(System.system_time(:nanosecond)),
       brakes: nil,
       name: nil,
+      pressed: make_ref(),
       reset_ms: nil
     }
 
@@ -134,6 +150,24 @@ defmodule Swarm.Brake do
 
   def handle_cast({:in_time, request, ref}, s) when is_reference(ref),
     do: {:noreply, obey(s, request, ref)}
+
+  # Nobody else knows this reference.
+  def handle_cast({:release, pressed, until_ms, ref}, %{pressed: pressed} = s)
+      when is_integer(until_ms) and is_reference(ref) do
+    if now() < until_ms do
+      s = released(s)
+      Post.answer(ref, :ok)
+      {:noreply, s}
+    else
+      {:noreply, s}
+    end
+  end
+
+  def handle_cast({:release, pressed, _until_ms, ref}, s)
+      when is_reference(pressed) and is_reference(ref) do
+    Post.answer(ref, {:error, "#{s.id} was stopped again meanwhile; reset it again"})
+    {:noreply, s}
+  end
 
   def handle_cast({:stamp, ref}, s) when is_reference(ref) do
     {stamp, stamps} = Stamp.issue(s.stamps, Config.now(s.config))
@@ -182,23 +216,29 @@ defmodule Swarm.Brake do
     s
   end
 
+  defp obey(%{stop: %{latched?: true}} = s, :reset, ref) do
+    halt(s, {__MODULE__, :release, [s.id, s.pressed, now() + @release_ms, ref]})
+    s
+  end
+
+  # Whoever is not held drives on.
+  defp obey(s, :reset, ref) do
+    s = released(s)
+    Post.answer(ref, :ok)
+    s
+  end
+
   defp obey(s, request, ref) do
     {answer, s} = answer(request, s)
     Post.answer(ref, answer)
     s
   end
 
-  defp answer(:estop, s), do: {:ok, become(s, Stop.press(s.stop))}
+  defp answer(:estop, s), do: {:ok, become(%{s | pressed: make_ref()}, Stop.press(s.stop))}
 
   defp answer({:estop, call}, s) do
     s = called(s, call, 0)
     if s.stop.latched?, do: {:ok, s}, else: {{:error, "#{s.id} was reset meanwhile"}, s}
-  end
-
-  defp answer(:reset, s) do
-    :ok = Gate.reset(s.id)
-    Alarm.quiet(s.stop.calls)
-    {:ok, become(%{s | reset_ms: now()}, Stop.reset(s.stop))}
   end
 
   defp answer(other, s),
@@ -212,13 +252,19 @@ defmodule Swarm.Brake do
       if over?(s, age_ms) do
         write(%{s | stop: Stop.late(s.stop, call)})
       else
-        s = become(s, stop)
+        s = become(%{s | pressed: make_ref()}, stop)
         Alarm.pass_on(call, age_ms)
         s
       end
     else
       _malformed_or_heard_before -> s
     end
+  end
+
+  defp released(s) do
+    :ok = Gate.reset(s.id)
+    Alarm.quiet(s.stop.calls)
+    become(%{s | reset_ms: now()}, Stop.reset(s.stop))
   end
 
   # The gate stands at once. The goal goes also where the pilot is stuck in its mission, and again

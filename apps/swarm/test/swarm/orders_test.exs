@@ -37,6 +37,11 @@ defmodule Swarm.OrdersTest do
     end
   end
 
+  defp queued(pid) do
+    {:messages, messages} = Process.info(pid, :messages)
+    messages
+  end
+
   # A mission that ignores whatever it is told, and sets its goal again at every tick.
   defmodule Deaf do
     @behaviour Robot.Mission
@@ -95,6 +100,65 @@ defmodule Swarm.OrdersTest do
       eventually(fn -> elem(Swarm.tell(id, "ping"), 1) =~ held end)
       assert Swarm.reset() == :ok
     end
+  end
+
+  test "a reset releases a robot once what it was at has ended, and not against a new stop" do
+    id = robot(:orders_reset)
+    standing([id])
+    :ok = Pilot.start(id, Deaf, goal: @roll)
+    rolls(id)
+    pilot = Names.whereis(id, :pilot)
+    :ok = :sys.suspend(pilot)
+    assert Swarm.ask(id, :estop) == :ok
+    # Its mission has not ended yet.
+    assert Swarm.ask(id, :reset) == nil
+    :ok = :sys.resume(pilot)
+    eventually(fn -> state(id) == :idle end)
+    # Who reset it was told nothing, so it is held still.
+    :sys.get_state(Names.whereis(id, :gate))
+    :sys.get_state(Names.whereis(id, :brake))
+    assert Board.latched?(Board.find!(id))
+
+    # A person presses again while the reset is under way.
+    :ok = :sys.suspend(pilot)
+    ref = :erlang.alias([:reply])
+    GenServer.cast(Names.whereis(id, :brake), {:command, :reset, ref})
+    assert Swarm.ask(id, :estop) == :ok
+    :ok = :sys.resume(pilot)
+    assert_receive {^ref, {:error, "orders_reset was stopped again meanwhile" <> _}}
+    assert Board.latched?(Board.find!(id))
+    assert Swarm.ask(id, :reset) == :ok
+    refute Board.latched?(Board.find!(id))
+    assert state(id) == :idle
+    stands(id)
+  end
+
+  test "a reset of those who are not held stops nobody" do
+    id = robot(:orders_free)
+    standing([id])
+    assert Swarm.tell(id, "move:0.2:0") == :ok
+    rolls(id)
+    assert Swarm.ask(id, :reset) == :ok
+    assert state(id) == {Swarm.Missions.Manual, :move}
+  end
+
+  test "a start right after a stop that is still on its way begins the mission anew" do
+    id = robot(:orders_late)
+    standing([id])
+    assert Swarm.start(robots: [id], formation: :wedge) == :ok
+    pilot = Names.whereis(id, :pilot)
+    :ok = :sys.suspend(pilot)
+    Pilot.halt(id)
+    # The board shows the mission still.
+    answer = Task.async(fn -> Swarm.ask(id, :start) end)
+
+    eventually(fn -> Enum.any?(queued(pilot), &match?({_call, _from, {:command, :start}}, &1)) end)
+
+    :ok = :sys.resume(pilot)
+    assert Task.await(answer) == :ok
+    assert {Swarm.Missions.Landmark, _phase} = state(id)
+    {_state, %{mission: mission}} = :sys.get_state(pilot)
+    assert {:wedge, _spacing} = mission.formation
   end
 
   test "an order is :ok when the robot's executive has it; one that hangs is told, and recovers" do

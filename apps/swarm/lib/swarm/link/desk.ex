@@ -88,20 +88,22 @@ defmodule Swarm.Link.Desk do
   end
 
   defp obey(:start, doing, config, ear), do: obey({:start, []}, doing, config, ear)
-  defp obey({:start, []}, {:group, _phase}, config, _ear), do: Pilot.command(config.id, :start)
 
-  # What people had asked of the mission outlives a stop.
-  defp obey({:start, []}, _doing, config, _ear) do
-    with {:error, :idle} <- Pilot.resume(config.id), do: begin([], config)
+  # A mission that the board still shows may have been stopped just now. What people had asked of it
+  # outlives that.
+  defp obey({:start, []}, doing, config, _ear) do
+    with {:error, :idle} <- again(doing, config),
+         {:error, :idle} <- Pilot.resume(config.id),
+         do: begin([], config)
   end
 
   defp obey({:start, options}, _doing, config, _ear), do: begin(options, config)
 
-  defp obey({:formation, _kind, _spacing} = command, {:group, _phase}, config, _ear),
-    do: Pilot.command(config.id, command)
+  defp obey({:formation, _kind, _spacing} = command, {:group, _phase}, config, _ear) do
+    with {:error, :idle} <- Pilot.command(config.id, command), do: shapeless(config)
+  end
 
-  defp obey({:formation, _kind, _spacing}, _doing, config, _ear),
-    do: {:error, "#{config.id} is on no mission that has a formation; start it first"}
+  defp obey({:formation, _kind, _spacing}, _doing, config, _ear), do: shapeless(config)
 
   defp obey({:follow_the_leader, leader} = command, doing, %{id: id} = config, ear) do
     with :ok <- Manual.follow(id, leader, Ear.leaders(ear, Config.now(config))),
@@ -134,7 +136,15 @@ defmodule Swarm.Link.Desk do
     Pilot.command(config.id, :start)
   end
 
-  defp alone(command, {:alone, _phase}, config), do: Pilot.command(config.id, command)
+  defp again({:group, _phase}, config), do: Pilot.command(config.id, :start)
+  defp again(_idle_or_alone, _config), do: {:error, :idle}
+
+  defp shapeless(%{id: id}),
+    do: {:error, "#{id} is on no mission that has a formation; start it first"}
+
+  defp alone(command, {:alone, _phase}, config) do
+    with {:error, :idle} <- Pilot.command(config.id, command), do: alone(command, :idle, config)
+  end
 
   defp alone(command, _idle_or_group, config) do
     :ok = Pilot.start(config.id, Manual, [])
