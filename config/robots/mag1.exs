@@ -19,6 +19,5 @@
   limits: [max_linear: 0.3],
   start: {0.0, 0.0, deg(0)},
   estop_file: "/var/lib/convoy/estop",
-  network: [secret_file: "/etc/convoy/secret"],
   policies: [mission: :landmark, formation: {:column, 1.0}]
 ]

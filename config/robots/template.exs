@@ -101,7 +101,7 @@
 
   # How it meets the others.
   network: [
-    # secret_file: "/etc/convoy/secret",
+    # secret_file: "/etc/convoy/secret",   # stands above CONVOY_SECRET_FILE; best left out
     # interface: "10.0.0.11",              # the address to listen on; all, unless given
     # port: 4370,                          # UDP
     # multicast: {"239.255.67.86", 4371},  # false where it is blocked; then name some:

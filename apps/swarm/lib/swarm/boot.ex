@@ -79,7 +79,7 @@ defmodule Swarm.Boot do
     network = if file, do: Start.mesh(file), else: []
     secret_file = network[:secret_file] || value(environment, "CONVOY_SECRET_FILE")
 
-    with {:ok, secret} <- Secret.from_env(%{"CONVOY_SECRET_FILE" => secret_file || ""}) do
+    with {:ok, secret} <- secret(secret_file, network, value(environment, "CONVOY_SECRET_FILE")) do
       {:ok,
        %{
          secret_file: secret.path,
@@ -87,6 +87,15 @@ defmodule Swarm.Boot do
          dist_port: network[:dist_port] || dist_port(environment),
          interface: interface(network[:interface]) || value(environment, "CONVOY_INTERFACE")
        }}
+    end
+  end
+
+  # That the environment's was not even looked at must be said.
+  defp secret(path, network, told) do
+    with {:error, line} <- Secret.from_env(%{"CONVOY_SECRET_FILE" => path || ""}) do
+      if network[:secret_file] && told not in [nil, path],
+        do: {:error, "#{line} (network.secret_file of the robot file stands above #{told})"},
+        else: {:error, line}
     end
   end
 

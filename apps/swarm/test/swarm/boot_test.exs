@@ -109,6 +109,25 @@ defmodule Swarm.BootTest do
               }}
   end
 
+  test "the robots that come along take the secret of the environment", %{tmp_dir: folder} do
+    environment = machine(folder, file())
+
+    for id <- ~w(mag1 min1) do
+      path = Path.expand("../../../../config/robots/#{id}.exs", __DIR__)
+      environment = Map.merge(environment, %{"ROBOT" => id, "CONVOY_ROBOT_FILE" => path})
+      assert {0, [first | _], []} = Boot.answer("check", environment)
+      assert first == path <> ": well"
+    end
+  end
+
+  test "a file that names another secret than the environment says so", %{tmp_dir: folder} do
+    environment = machine(folder, file(~s(, network: [secret_file: "/nowhere/secret"])))
+    assert {1, [], [line]} = Boot.answer("check", environment)
+    assert line =~ "/nowhere/secret does not exist"
+    secret = environment["CONVOY_SECRET_FILE"]
+    assert line =~ "(network.secret_file of the robot file stands above #{secret})"
+  end
+
   test "without a secret nothing is told but how to make one", %{tmp_dir: folder} do
     environment = machine(folder, file())
     File.rm!(environment["CONVOY_SECRET_FILE"])

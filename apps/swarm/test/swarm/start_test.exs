@@ -21,7 +21,7 @@ defmodule Swarm.StartTest do
       assert config.mission == {Landmark, formation: {:column, 1.0}}
       assert {Link, _options} = List.last(config.companions)
       assert config.send == {Link, :say, [id]}
-      assert Start.mesh(file) == [secret_file: "/etc/convoy/secret"]
+      assert Start.mesh(file) == []
     end
   end
 
