@@ -86,11 +86,14 @@ defmodule Robot.Player do
     name = text_of(section, "name") || text_of(section, "driver")
 
     case {section.type, Map.get(@drivers, name)} do
-      {"driver", nil} -> leave(state, section, "driver #{name}", Others.driver(name))
+      {"driver", nil} -> leave(state, section, "driver #{name}", Others.driver(name, names()))
       {type, nil} -> leave(state, section, type, Others.section(type))
       {_type, kind} -> first(kind, name, section, state, units)
     end
   end
+
+  # The plain ones first: of two that are as near, these are meant.
+  defp names, do: @drivers |> Map.keys() |> Enum.sort()
 
   defp text_of(section, name) do
     case List.keyfind(section.options, name, 0) do

@@ -7,7 +7,8 @@ defmodule Mix.Tasks.Robot.Import do
 
   What Player calls `rflex`, `sonyevid30`, `camerav4l` and `cmvision` is carried over, in metres and
   radians. What was assumed, and what could not be carried over, is listed with its line and why.
-  Without OUT the robot file goes to standard output, and all else to standard error.
+  Without OUT the robot file goes to standard output, and all else to standard error. A file with which
+  no robot starts is written too, for you to put right; then what is wrong is told, and the status is 1.
 
   Options:
 
@@ -64,7 +65,29 @@ defmodule Mix.Tasks.Robot.Import do
          {:ok, result} <- Robot.Player.import(text, wanted),
          :ok <- write(result.text, options[:out]) do
       tell(result, file, options[:out])
+      judge(result.text, file, options[:out])
     end
+  end
+
+  # It is there for a person to put right, but nobody shall take it for well.
+  defp judge(text, file, out) do
+    with {:ok, robot} <- made(text, file, out),
+         {:ok, _config} <- Robot.File.config(robot) do
+      :ok
+    else
+      {:error, lines} ->
+        say("To be put right; no robot starts with this:")
+        for line <- List.wrap(lines), do: say("  #{line}")
+        exit({:shutdown, 1})
+    end
+  end
+
+  defp made(_text, _file, out) when out != nil, do: Robot.File.load(out)
+
+  defp made(text, file, nil) do
+    folder = Path.dirname(file)
+    read = fn name, options -> Vision.Colours.read(Path.expand(name, folder), options) end
+    Robot.File.parse(text, colours: read)
   end
 
   defp one([file]), do: {:ok, file}

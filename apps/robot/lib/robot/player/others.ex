@@ -1,5 +1,6 @@
 defmodule Robot.Player.Others do
   @moduledoc "Why drivers and sections of Player's that have no place in a robot file are left out. Pure."
+  alias Hal.Suggest
 
   @reasons [
     {~w(cameracompress camerauncompress), "pictures for viewers are made here on demand"},
@@ -25,14 +26,23 @@ defmodule Robot.Player.Others do
   @why for {names, why} <- @reasons, name <- names, into: %{}, do: {name, why}
 
   @doc """
-  Why a driver is left out.
+  Why a driver is left out; `taken` are the names of those that are carried over.
 
-      iex> Robot.Player.Others.driver("festival")
+      iex> Robot.Player.Others.driver("festival", ["rflex", "camerav4l"])
       "no speech"
+      iex> Robot.Player.Others.driver("camerav41", ["rflex", "camerav4l"])
+      "none of our drivers does what it does; was camerav4l meant?"
   """
-  @spec driver(String.t() | nil) :: String.t()
-  def driver(nil), do: "has no name"
-  def driver(name), do: Map.get(@why, name, "none of our drivers does what it does")
+  @spec driver(String.t() | nil, [String.t()]) :: String.t()
+  def driver(nil, _taken), do: "has no name"
+
+  def driver(name, taken) do
+    Map.get_lazy(@why, name, fn ->
+      near = Suggest.nearest(name, taken ++ Map.keys(@why))
+      hint = if near, do: "; was #{near} meant?", else: ""
+      "none of our drivers does what it does#{hint}"
+    end)
+  end
 
   @doc "Why a section is left out that is no driver."
   @spec section(String.t()) :: String.t()

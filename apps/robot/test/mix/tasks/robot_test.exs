@@ -125,10 +125,24 @@ defmodule Mix.Tasks.RobotTest do
   } do
     File.rm!(Path.join(folder, "color.cfg"))
     out = Path.join(folder, "min1.exs")
-    told = capture_io(:stderr, fn -> Import.run([file, "-o", out]) end)
+    told = capture_io(:stderr, fn -> assert refused(Import, [file, "-o", out]) == [] end)
     assert told =~ "colorfile: the colour file is to be put right: "
     assert {:error, [line]} = Robot.File.load(out)
     assert line =~ "color.cfg: no such file or directory"
+    assert told =~ "To be put right; no robot starts with this:\n  #{line}\n"
+
+    told = capture_io(:stderr, fn -> capture_io(fn -> refused(Import, [file]) end) end)
+    assert told =~ ~r/^  robot file:\d+: colours: .*color.cfg: no such file or directory$/m
+  end
+
+  test "a driver that is not known is told with the one that may be meant", context do
+    camera = ~s|driver ( name "camerav41" port "/dev/video1" )\n|
+    File.write!(context.player, @player <> camera)
+    out = Path.join(context.tmp_dir, "min1.exs")
+    told = capture_io(:stderr, fn -> Import.run([context.player, "-o", out]) end)
+
+    assert told =~
+             ":4: driver camerav41: none of our drivers does what it does; was camerav4l meant?"
   end
 
   test "wrong words are one line", %{tmp_dir: folder, player: file} do
