@@ -83,6 +83,7 @@ defmodule System.NodesTest do
     assert [_line, next] = Regex.run(~r/"leader":"(\w+)"/, said)
     assert next != leader
     refute Enum.any?(processes, &there?/1)
+    refute mapped?(env)
   end
 
   test "kill -9 of the world's process: it comes back, and robots go on", %{environment: env} do
@@ -104,7 +105,20 @@ defmodule System.NodesTest do
       processes = for name <- ["mag1", "min1", "world"], do: pid(said, name)
       {:os_pid, script} = Port.info(port, :os_pid)
       kill("#{script}")
-      ended(processes, System.monotonic_time(:millisecond) + 15_000)
+      deadline = System.monotonic_time(:millisecond) + 15_000
+      ended(processes, deadline)
+      unmapped(env, deadline)
+    end
+  end
+
+  # Whether the port mapper that the run started is still there.
+  defp mapped?(env),
+    do: match?({_, 0}, System.cmd("epmd", ["-names"], env: env, stderr_to_stdout: true))
+
+  defp unmapped(env, deadline) do
+    if mapped?(env) do
+      assert System.monotonic_time(:millisecond) < deadline, "its epmd goes on"
+      unmapped(env, deadline)
     end
   end
 

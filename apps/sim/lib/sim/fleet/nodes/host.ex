@@ -8,14 +8,14 @@ defmodule Sim.Fleet.Nodes.Host do
   command line and no environment.
   """
   alias Sim.Fleet.Folder
+  alias Sim.Fleet.Nodes.Mapper
   alias Swarm.Mesh.{Options, Secret}
 
   @host "127.0.0.1"
   @address {127, 0, 0, 1}
   @name :"demo@127.0.0.1"
-  @epmd_ms 2_000
 
-  @enforce_keys [:home, :secret, :ports, :fleet, :mesh]
+  @enforce_keys [:home, :secret, :ports, :fleet, :mesh, :named]
   defstruct @enforce_keys
 
   @type t :: %__MODULE__{
@@ -23,7 +23,8 @@ defmodule Sim.Fleet.Nodes.Host do
           secret: Secret.t(),
           ports: %{node() => :inet.port_number()},
           fleet: [atom()],
-          mesh: pid() | nil
+          mesh: pid() | nil,
+          named: {:by_us, Mapper.t()} | :before
         }
 
   @doc "The host part of all nodes' names."
@@ -36,9 +37,16 @@ defmodule Sim.Fleet.Nodes.Host do
     with :ok <- alone(),
          {:ok, home} <- Folder.make(),
          {:ok, secret} <- secret(home),
-         :ok <- become_node(),
+         {:ok, named} <- become_node(),
          {:ok, ports} <- ports([node() | nodes]) do
-      host = %__MODULE__{home: home, secret: secret, ports: ports, fleet: fleet, mesh: nil}
+      host = %__MODULE__{
+        home: home,
+        secret: secret,
+        ports: ports,
+        fleet: fleet,
+        mesh: nil,
+        named: named
+      }
 
       with {:ok, options} <- Options.prepare(mesh(host, node())),
            {:ok, mesh} <- Swarm.Mesh.Supervisor.start_link(options),
@@ -65,10 +73,11 @@ defmodule Sim.Fleet.Nodes.Host do
     ]
   end
 
-  @doc "Takes the mesh and the run's folder away."
+  @doc "Takes the mesh and the run's folder away, and the node's name, if it got that here."
   @spec stop(t()) :: :ok
-  def stop(%__MODULE__{home: home, mesh: mesh}) do
+  def stop(%__MODULE__{home: home, mesh: mesh, named: named}) do
     if Process.alive?(mesh), do: Supervisor.stop(mesh)
+    unname(named)
     Folder.remove(home)
   end
 
@@ -80,57 +89,32 @@ defmodule Sim.Fleet.Nodes.Host do
   end
 
   defp become_node do
-    if Node.alive?(), do: :ok, else: name_node()
+    if Node.alive?(), do: {:ok, :before}, else: name_node()
   end
 
   defp name_node do
     Application.put_env(:kernel, :inet_dist_use_interface, @address)
-    epmd()
+    mapper = Mapper.start()
 
     case quietly(fn -> Node.start(@name, :longnames) end) do
       {:ok, _kernel} ->
-        :ok
+        {:ok, {:by_us, mapper}}
 
       {:error, _reason} ->
+        Mapper.stop(mapper)
+
         {:error,
          "no nodes can be started here: #{@name} is taken by another run, or epmd does not " <>
            "answer (see: epmd -names)"}
     end
   end
 
-  # A daemon, which does not hold our terminal; where one is running this does nothing.
-  defp epmd do
-    program = System.find_executable("epmd") || Path.join(erts(), "epmd")
-    environment = [{"ERL_EPMD_ADDRESS", @host}]
+  defp unname(:before), do: :ok
 
-    if File.exists?(program) do
-      System.cmd(program, ["-daemon"], env: environment)
-      await_epmd(System.monotonic_time(:millisecond) + @epmd_ms)
-    end
+  defp unname({:by_us, mapper}) do
+    quietly(fn -> Node.stop() end)
+    Mapper.stop(mapper)
   end
-
-  # It returns before it listens.
-  defp await_epmd(deadline) do
-    case :gen_tcp.connect(@address, epmd_port(), [], 100) do
-      {:ok, socket} ->
-        :gen_tcp.close(socket)
-
-      {:error, _not_yet} ->
-        receive do
-        after
-          20 -> if System.monotonic_time(:millisecond) < deadline, do: await_epmd(deadline)
-        end
-    end
-  end
-
-  defp epmd_port do
-    case Integer.parse(System.get_env("ERL_EPMD_PORT", "")) do
-      {port, ""} when port in 1..65_535 -> port
-      _default -> 4369
-    end
-  end
-
-  defp erts, do: Path.join([:code.root_dir(), "erts-#{:erlang.system_info(:version)}", "bin"])
 
   # The kernel tells all about a failure; one line is enough.
   defp quietly(function) do
