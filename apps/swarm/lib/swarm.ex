@@ -139,13 +139,13 @@ defmodule Swarm do
 
   @doc """
   The robots that are as wanted, sorted; all, without options. Options: `service`, `profile`, `state`,
-  `mission`, `robot`, `node` (a name, or a list of names), `battery` (volts, `{11.5, 14.0}` or
-  `11..14`), `calibrated` (`true`), each also a function of one argument; `max_age_ms` of what is
+  `mission`, `robot`, `node` (a name, or a list of names), `battery` (volts, `{24.0, 28.0}` or
+  `24..28`), `calibrated` (`true`), each also a function of one argument; `max_age_ms` of what is
   known of them (10,000).
 
       Swarm.find(service: :camera)
-      Swarm.find(profile: :atrv_mini, battery: {11.5, 14.0})
-      Swarm.find(state: [:follow, :lead], battery: &(&1 > 12))
+      Swarm.find(profile: :atrv_mini, battery: {24.0, 28.0})
+      Swarm.find(state: [:follow, :lead], battery: &(&1 > 24))
   """
   @spec find(keyword()) :: [atom()] | {:error, line :: String.t()}
   def find(template \\ []), do: Search.robots(template)

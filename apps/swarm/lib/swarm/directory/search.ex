@@ -80,6 +80,6 @@ defmodule Swarm.Directory.Search do
 
   defp allowed(:max_age_ms), do: "milliseconds or :infinity"
   defp allowed(:calibrated), do: "true, false or a function"
-  defp allowed(:battery), do: "volts, {11.5, 14.0}, 11..14 or a function"
+  defp allowed(:battery), do: "volts, {24.0, 28.0}, 24..28 or a function"
   defp allowed(_name), do: "a name, a list of names or a function"
 end
