@@ -1,0 +1,248 @@
+defmodule Docs.Sandbox do
+  @moduledoc """
+  A copy of the project for the commands of one document, and the shells in which its `iex>` lines are typed.
+  What was built is that of the project.
+  """
+  alias Docs.Reader
+
+  @left_out ~w(_build deps tmp .git convoy.secret certs)
+  # Nothing here meets another fleet of this machine, nor finds a camera.
+  @environment [{"CONVOY_INTERFACE", "127.0.0.1"}]
+
+  @doc "The folder, with what the document takes for granted."
+  @spec create(Path.t(), String.t()) :: Path.t()
+  def create(root, document) do
+    folder =
+      Path.join(
+        System.tmp_dir!(),
+        "convoy-docs-#{System.pid()}-#{System.unique_integer([:positive])}"
+      )
+
+    File.mkdir_p!(folder)
+
+    # With their times, so that nothing is built again.
+    for name <- File.ls!(root), name not in @left_out do
+      {_, 0} = System.cmd("cp", ["-a", Path.join(root, name), folder])
+    end
+
+    File.ln_s!(Path.join(root, "_build"), Path.join(folder, "_build"))
+    given(document, folder)
+    folder
+  end
+
+  # A picture with two colours, and the colour file that the page shows.
+  defp given("docs/user-guide.md", folder) do
+    {_, 0} =
+      System.cmd("ffmpeg", ~w(-v error -f lavfi -i color=c=blue:s=640x480 -frames:v 1 photo.jpg),
+        cd: folder
+      )
+
+    items = Reader.items(File.read!(Path.join(folder, "docs/user-guide.md")))
+    {:shown, _n, first, rest} = Enum.find(items, &match?({:shown, _, "[Colors]", _}, &1))
+    File.write!(Path.join(folder, "sweets.txt"), first <> "\n" <> rest <> "\n")
+  end
+
+  defp given("docs/robots.md", folder) do
+    File.mkdir_p!(Path.join(folder, "old"))
+
+    File.write!(Path.join(folder, "old/mag3.cfg"), """
+    driver ( name "rflex" provides ["odometry:::position2d:0" "sonar:0"] rflex_serial_port "/dev/ttyR0"
+      m_length 0.4 m_width 0.4 odo_distance_conversion 31387 odo_angle_conversion 4654.2
+      range_distance_conversion 1.474 )
+    driver ( name "sicklms200" provides ["laser:0"] )
+    """)
+  end
+
+  # The pages that go on from a secret tell how it is made.
+  defp given(_document, _folder), do: :ok
+
+  @doc "Runs a line in the folder's shell; `nil`, or what is wrong with what came."
+  @spec run(String.t(), String.t(), Path.t()) :: String.t() | nil
+  def run(line, answer, folder) do
+    {printed, status} = command(line, folder)
+
+    # A remark such as `# 2: no landmark` behind `echo $?` tells the status.
+    told = with [_all, told] <- Regex.run(~r/echo \$\?\s+# (\d+):/, line), do: told
+
+    cond do
+      status != 0 -> "status #{status}: #{printed}"
+      told && List.last(String.split(printed)) != told -> "printed #{printed}"
+      answer != "" and not Reader.like?(answer, printed) -> "printed instead: #{printed}"
+      true -> nil
+    end
+  end
+
+  @doc "The files of the project that are not as they came."
+  @spec changed(Path.t(), Path.t()) :: [Path.t()]
+  def changed(root, folder) do
+    for path <- Path.wildcard(Path.join(root, "{bin,config,docs,rel}/**")),
+        File.regular?(path),
+        name = Path.relative_to(path, root),
+        File.read(path) != File.read(Path.join(folder, name)),
+        do: name
+  end
+
+  @doc "What a command prints, on both ways, and its status."
+  @spec command(String.t(), Path.t()) :: {String.t(), non_neg_integer()}
+  def command(line, folder) do
+    options = [cd: folder, stderr_to_stdout: true, env: @environment]
+    # Without an input to wait for.
+    System.cmd("timeout", ["60", "sh", "-c", "exec </dev/null\n" <> line], options)
+  end
+
+  @doc "Types the document's lines of Elixir; what is wrong with them, a line each."
+  @spec session(String.t(), [Reader.item()], Path.t(), non_neg_integer()) :: [String.t()]
+  def session(document, items, folder, patience_ms \\ 10_000) do
+    case lines(items) do
+      [] -> []
+      lines -> type(document, lines, folder, patience_ms)
+    end
+  end
+
+  defp lines(items) do
+    Enum.flat_map(items, fn
+      {:iex, n, code, shown} -> [{n, code, shown}]
+      {:elixir, n, code, _none} -> expressions(code, n)
+      _other -> []
+    end)
+  end
+
+  # An expression, and the remarks below it, which say its value.
+  defp expressions(code, first) do
+    {:ok, tree} = Code.string_to_quoted(code)
+
+    starts =
+      for {_, meta, _} = expression <- block(tree), line = start(expression, meta), do: line
+
+    lines = String.split(code, "\n")
+
+    for {from, to} <- Enum.zip(starts, tl(starts) ++ [length(lines) + 1]) do
+      part = Enum.slice(lines, (from - 1)..(to - 2)//1)
+
+      {value, code} =
+        part
+        |> Enum.reverse()
+        |> Enum.drop_while(&(&1 == ""))
+        |> Enum.split_while(&(&1 =~ ~r/^# /))
+
+      value = value |> Enum.reverse() |> Enum.map_join("\n", &String.replace_prefix(&1, "# ", ""))
+      {first + from - 1, code |> Enum.reverse() |> Enum.join("\n"), value}
+    end
+  end
+
+  defp block({:__block__, _meta, expressions}), do: expressions
+  defp block(expression), do: [expression]
+
+  # That of a call with a dot is where the dot is.
+  defp start(expression, meta) do
+    {_tree, first} =
+      Macro.prewalk(expression, meta[:line], fn
+        {_, [_ | _] = meta, _} = node, first -> {node, min(first, meta[:line] || first)}
+        node, first -> {node, first}
+      end)
+
+    first
+  end
+
+  defp type(document, lines, folder, patience_ms) do
+    [asked, told] = for name <- ["asked", "told"], do: Path.join(folder, "docs-" <> name)
+    File.write!(asked, :erlang.term_to_binary({before(document), lines, patience_ms}))
+    environment = [{"DOCS_LINES", asked}, {"DOCS_TOLD", told} | @environment]
+    {printed, status} = shell(document, folder, environment)
+
+    case File.read(told) do
+      {:ok, answers} ->
+        for {n, answer} <- :erlang.binary_to_term(answers),
+            answer != :ok,
+            do: "line #{n}: #{said(answer)}"
+
+      {:error, _none} ->
+        ["its shell ended with status #{status}: #{printed}"]
+    end
+  end
+
+  defp said({:printed, printed}), do: "printed instead: #{printed}"
+  defp said({:raised, line}), do: "raised: #{line}"
+  defp said({:refused, answer}), do: "answered #{answer}"
+
+  # Two nodes, as the page has them, in a fleet of their own.
+  defp shell("docs/networking.md", folder, environment) do
+    {_, 0} = command("test -e convoy.secret || mix fleet.secret", folder)
+    ports = [first, second | _] = free_ports()
+    peers = Enum.map_join(Enum.take(ports, 2), ",", &"127.0.0.1:#{&1}")
+    common = [{"CONVOY_UDP_PEERS", peers} | environment]
+    [_, _, third, fourth] = ports
+
+    other = [{"CONVOY_UDP_PORT", "#{second}"}, {"CONVOY_DIST_PORT", "#{fourth}"} | common]
+    port = node("bin/node mag2", folder, other)
+    mine = [{"CONVOY_UDP_PORT", "#{first}"}, {"CONVOY_DIST_PORT", "#{third}"} | common]
+    options = [cd: folder, env: mine, stderr_to_stdout: true]
+
+    answer =
+      System.cmd(
+        "sh",
+        ["-c", "exec </dev/null; exec timeout 60 bin/node mag1 test/docs/session.exs"],
+        options
+      )
+
+    Port.close(port)
+    answer
+  end
+
+  defp shell(_document, folder, environment) do
+    options = [cd: folder, env: environment, stderr_to_stdout: true]
+    System.cmd("timeout", ~w(60 mix run test/docs/session.exs), options)
+  end
+
+  # A shell that waits for what is typed, and ends when its input does.
+  defp node(line, folder, environment) do
+    environment = for {name, value} <- environment, do: {to_charlist(name), to_charlist(value)}
+    sh = System.find_executable("sh")
+
+    Port.open({:spawn_executable, sh}, [
+      :binary,
+      :hide,
+      :stderr_to_stdout,
+      cd: folder,
+      env: environment,
+      args: ["-c", "exec " <> line]
+    ])
+  end
+
+  defp free_ports do
+    opened =
+      for kind <- [:udp, :udp, :tcp, :tcp] do
+        {:ok, socket} = if kind == :udp, do: :gen_udp.open(0), else: :gen_tcp.listen(0, [])
+        {kind, socket}
+      end
+
+    for {kind, socket} <- opened do
+      {:ok, port} = :inet.port(socket)
+      if kind == :udp, do: :gen_udp.close(socket), else: :gen_tcp.close(socket)
+      port
+    end
+  end
+
+  # What the page takes for granted: here a robot of its file, on an emulated base.
+  defp before("docs/robots.md") do
+    """
+    alias Hal.{Pose, Profile}
+    link = Path.join(File.cwd!(), "base")
+    {:ok, map} = Sim.Map.open("hall", 1)
+    body = %{id: :mag2, profile: Profile.magellan(), pose: Pose.new(-4, 0, 0), infrared: true}
+    world = Sim.World.new!(map: map, robots: [body], noise: :off)
+    drive = {Sim.Drive, world: :docs, robot: :mag2}
+    base = [core: {Sim.RFlexController, []}, link: link, body: drive]
+    parts = [Sim.Worlds, {Sim.Server, name: :docs, world: world}, {Sim.Emulator, base}]
+    {:ok, _} = Supervisor.start_link(parts, strategy: :one_for_one)
+    path = "config/robots/mag2.exs"
+    text = String.replace(File.read!(path), ~r/# (distance: |angle: |ir_a: )/, "\\\\1")
+    File.write!(path, String.replace(text, "/dev/ttyUSB0", link))
+    {:ok, file} = Robot.File.load(path)
+    {:ok, config} = Swarm.Start.config(file)
+    {:ok, _} = Robot.Fleet.start_robot(Robot.Fleet, config, :permanent)
+    """
+  end
+
+  defp before(_document), do: ""
+end
