@@ -10,7 +10,7 @@
        sonar_banks: [8, 8],
        bumpers: [style: :bit, base: 0x40, count: 16],
        # distance and angle are missing until mix calibrate odometry has found them for this very
-       # robot, ir_a and ir_b until its infrared was measured; it does not arm without.
+       # robot; it does not arm without. Without ir_a and ir_b its infrareds are not read.
        conversions: [range: 1474.0]
      ]},
   ptz: {Hal.Visca.Driver, port: "/dev/ttyS2"},

@@ -44,8 +44,21 @@ defmodule Hal.Drive do
   @doc "An error that it gave with these options, in one line for people."
   @callback explain(reason :: term(), options :: keyword()) :: String.t()
 
+  @typedoc """
+  What options alone say of a drive: whether it may be armed once it is there, which senses it reads, and
+  what is allowed and odd all the same, a line each with what would be usual.
+  """
+  @type judgement :: %{
+          ready: :ok | {:error, line :: String.t()},
+          senses: [:sonar | :infrared],
+          odd: [line :: String.t()]
+        }
+
+  @doc "Judges options before anything is opened, by what `ready/1` goes by later."
+  @callback judge(keyword()) :: {:ok, judgement()} | {:error, line :: String.t()}
+
   @doc "Stops the motors and closes the line."
   @callback terminate(state :: term()) :: :ok
 
-  @optional_callbacks explain: 2, ready: 1
+  @optional_callbacks explain: 2, ready: 1, judge: 1
 end

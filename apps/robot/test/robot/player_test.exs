@@ -6,6 +6,7 @@ defmodule Robot.PlayerTest do
   doctest Robot.Player.Sections
   doctest Robot.Player.Tokens
   doctest Robot.Player.Units
+  doctest Robot.File.Odd
   doctest Robot.File.Summary
   doctest Robot.File.Write
 

@@ -152,7 +152,7 @@ defmodule Swarm.Boot do
 
   defp about(environment, _settings, file) do
     {:ok, path} = place(environment)
-    ["#{path}: well" | Summary.lines(file)]
+    Summary.report(path, file)
   end
 
   defp file({file, _config}), do: file

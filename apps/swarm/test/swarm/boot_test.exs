@@ -20,7 +20,7 @@ defmodule Swarm.BootTest do
   end
 
   defp file(more \\ "") do
-    drive = ~s(drive: {Hal.RFlex.Driver, port: "/dev/ttyS1"})
+    drive = ~s(drive: {Hal.RFlex.Driver, port: "/dev/null"})
     "[id: :mag1, profile: :magellan, #{drive}#{more}]"
   end
 
@@ -116,7 +116,7 @@ defmodule Swarm.BootTest do
       path = Path.expand("../../../../config/robots/#{id}.exs", __DIR__)
       environment = Map.merge(environment, %{"ROBOT" => id, "CONVOY_ROBOT_FILE" => path})
       assert {0, [first | _], []} = Boot.answer("check", environment)
-      assert first == path <> ": well"
+      assert first =~ path <> ": well"
     end
   end
 

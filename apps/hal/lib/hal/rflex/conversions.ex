@@ -33,6 +33,26 @@ defmodule Hal.RFlex.Conversions do
     ir_b: "ir_b (infrared)"
   ]
 
+  # What public configurations have; a robot's own differ by 7 % and more.
+  @published %{
+    magellan: [distance: 31_387.0, angle: 4654.2],
+    atrv_mini: [distance: 190_000.0, angle: 60_000.0]
+  }
+  @range 1474.0
+
+  @doc """
+  The published conversions of a kind's wheels, to begin with.
+
+      iex> Hal.RFlex.Conversions.published(:magellan)
+      [distance: 31387.0, angle: 4654.2]
+  """
+  @spec published(:magellan | :atrv_mini) :: [distance: float(), angle: float()]
+  def published(kind), do: Map.fetch!(@published, kind)
+
+  @doc "The published conversion of the sonars, units a metre."
+  @spec range() :: float()
+  def range, do: @range
+
   @doc """
   Whether all that a robot with these senses needs is there; or which conversions are missing.
 

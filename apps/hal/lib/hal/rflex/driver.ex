@@ -51,7 +51,7 @@ defmodule Hal.RFlex.Driver do
   """
   @behaviour Hal.Drive
   alias Hal.{Event, Ramp, Serial, Twist}
-  alias Hal.RFlex.{Command, Conversions, Decoder, Options, Queue, Senses, Speech}
+  alias Hal.RFlex.{Command, Decoder, Options, Outlook, Queue, Senses, Speech}
 
   @tick_ms 50
   @repeat_ms 100
@@ -100,7 +100,17 @@ defmodule Hal.RFlex.Driver do
   @doc "Whether it may be armed; the line names the conversions that are missing."
   @impl Hal.Drive
   def ready(%__MODULE__{options: options}),
-    do: Conversions.ready(options.conversions, Speech.senses(options))
+    do: Outlook.ready(options)
+
+  @doc "What its options alone say; `Hal.RFlex.Outlook` judges both this and `ready/1`."
+  @impl Hal.Drive
+  def judge(given) do
+    with {:ok, options} <- Options.new(given) do
+      senses = Speech.senses(options)
+      odd = Outlook.odd(options, given)
+      {:ok, %{ready: Outlook.ready(options), senses: senses, odd: odd}}
+    end
+  end
 
   @doc """
   An error in words.

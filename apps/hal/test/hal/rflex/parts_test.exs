@@ -5,6 +5,7 @@ defmodule Hal.RFlex.PartsTest do
   doctest Hal.RFlex.Conversions
   doctest Hal.RFlex.Console
   doctest Hal.RFlex.Home
+  doctest Hal.RFlex.Outlook
   doctest Hal.RFlex.Infrared
   doctest Hal.RFlex.Queue
   doctest Hal.RFlex.Sonar

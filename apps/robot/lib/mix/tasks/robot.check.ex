@@ -7,7 +7,8 @@ defmodule Mix.Tasks.Robot.Check do
       mix robot.check [FILE…]
 
   Without a FILE, all of `config/robots`. All that is wrong is said at once, each problem on a line
-  `file:line: key: what is allowed`; the exit status is then 1. `docs/robots.md` tells of the keys.
+  `file:line: key: what is allowed`; the exit status is then 1. What is allowed and odd is a WARNING, with
+  what would be usual. `docs/robots.md` tells of the keys.
 
   Options:
 
@@ -43,10 +44,8 @@ defmodule Mix.Tasks.Robot.Check do
   defp check(file) do
     with {:ok, robot} <- Robot.File.load(file),
          {:ok, _config} <- Robot.File.config(robot) do
-      Enum.each(
-        ["#{file}: well" | Enum.map(Summary.lines(robot), &"  #{&1}")],
-        fn line -> Mix.shell().info(line) end
-      )
+      [title | lines] = Summary.report(file, robot)
+      Enum.each([title | Enum.map(lines, &"  #{&1}")], fn line -> Mix.shell().info(line) end)
 
       []
     else

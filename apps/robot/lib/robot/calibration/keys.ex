@@ -7,13 +7,8 @@ defmodule Robot.Calibration.Keys do
   `distance / d`, `angle * base / d`. The ratio is put behind both (`Hal.Wheels`), and so for the wheel
   base that odometry reckons with.
   """
+  alias Hal.RFlex.Conversions
   alias Robot.Calibration.Model
-
-  # What public configurations have; a robot's own differ by 7 % and more.
-  @published %{
-    magellan: [distance: 31_387.0, angle: 4654.2],
-    atrv_mini: [distance: 190_000.0, angle: 60_000.0]
-  }
 
   @doc """
   The published conversions of a kind, to begin with.
@@ -22,7 +17,7 @@ defmodule Robot.Calibration.Keys do
       [distance: 31387.0, angle: 4654.2]
   """
   @spec published(:magellan | :atrv_mini) :: [distance: float(), angle: float()]
-  def published(kind), do: Map.fetch!(@published, kind)
+  def published(kind), do: Conversions.published(kind)
 
   @doc """
   The conversions that a base is to have which was calibrated with these. What was not measured (`found`)

@@ -70,6 +70,21 @@ defmodule Robot.File.Device do
     end
   end
 
+  @doc """
+  What a drive says of its options, with the body that they are for (`c:Hal.Drive.judge/1`); `nil` of one that
+  does not tell.
+  """
+  @spec judge({module(), keyword()}, Hal.Profile.t()) :: Hal.Drive.judgement() | nil
+  def judge({module, _options} = drive, profile) do
+    with true <- Code.ensure_loaded?(module) and function_exported?(module, :judge, 1),
+         {:ok, {module, options}} <- fit(drive, profile),
+         {:ok, judgement} <- module.judge(options) do
+      judgement
+    else
+      _silent -> nil
+    end
+  end
+
   # A module that nobody has used yet is known by its file only, which knows its own name.
   defp built(name) do
     with :error <- Options.existing("Elixir." <> name) do

@@ -3,10 +3,30 @@ defmodule Robot.File.Summary do
   What a person wants to see of a robot file before 40 kg move. Pure.
   """
   alias Hal.{Pose, Profile}
+  alias Robot.File.{Device, Odd}
 
   @kinds %{magellan: "a Magellan Pro", atrv_mini: "an ATRV mini"}
   @weights %{magellan: 20, atrv_mini: 40}
   @delay_s 0.3
+  @wide 88
+
+  @doc """
+  What is said of a file that no robot is refused: that it is well, or how much in it is odd
+  (`Robot.File.Odd`), then the lines of `lines/1`, then what is odd. `there?` says whether a device is on this machine.
+  """
+  @spec report(Path.t(), Robot.File.t(), (Path.t() -> boolean())) :: [String.t(), ...]
+  def report(path, %Robot.File{} = robot, there? \\ &File.exists?/1) do
+    odd = Odd.lines(robot, there?)
+
+    title =
+      case length(odd) do
+        0 -> "#{path}: well"
+        1 -> "#{path}: well, but for 1 warning below"
+        n -> "#{path}: well, but for #{n} warnings below"
+      end
+
+    [title | lines(robot)] ++ Enum.flat_map(odd, &row({:WARNING, &1}))
+  end
 
   @doc """
   The robot in lines of at most 100 characters; the first names it.
@@ -21,6 +41,7 @@ defmodule Robot.File.Summary do
   def lines(%Robot.File{} = robot) do
     profile = struct!(robot.profile, robot.limits)
     body = robot.profile
+    judgement = Device.judge(robot.drive, body)
 
     [
       "#{robot.id}, #{@kinds[body.name]} of #{@weights[body.name]} kg: #{metres(body.length)} long, " <>
@@ -28,10 +49,10 @@ defmodule Robot.File.Summary do
     ] ++
       rows(
         drive: device(robot.drive),
-        measured: conversions(robot.drive, body),
+        measured: conversions(robot.drive, judgement),
         moves: moves(profile),
         stops: stops(profile),
-        feels: senses(body),
+        feels: senses(body, judgement),
         head: robot.ptz && device(robot.ptz),
         camera: robot.camera && device(robot.camera),
         "looks for": colours(robot.colours),
@@ -47,13 +68,33 @@ defmodule Robot.File.Summary do
   end
 
   defp rows(rows) do
-    for {name, words} <- rows, words not in [nil, ""] do
-      "  #{String.pad_trailing(to_string(name), 10)}#{short(words)}"
-    end
+    for {_name, words} = row <- rows, words not in [nil, ""], line <- row(row), do: line
   end
 
-  defp short(words),
-    do: if(String.length(words) > 88, do: String.slice(words, 0, 87) <> "…", else: words)
+  defp row({name, words}) do
+    [first | more] = wrap(words)
+
+    ["  #{String.pad_trailing(to_string(name), 10)}#{first}"] ++
+      for(line <- more, do: String.duplicate(" ", 12) <> line)
+  end
+
+  # A word that is longer than a line, such as a path, is cut.
+  defp wrap(words) do
+    words
+    |> String.split(" ")
+    |> Enum.map(&short/1)
+    |> Enum.reduce([""], fn word, [line | lines] ->
+      cond do
+        line == "" -> [word | lines]
+        String.length(line) + 1 + String.length(word) > @wide -> [word, line | lines]
+        true -> [line <> " " <> word | lines]
+      end
+    end)
+    |> Enum.reverse()
+  end
+
+  defp short(word),
+    do: if(String.length(word) > @wide, do: String.slice(word, 0, @wide - 1) <> "…", else: word)
 
   defp pictures(nil), do: nil
 
@@ -69,19 +110,15 @@ defmodule Robot.File.Summary do
     if place, do: "#{inspect(module)} on #{place}", else: inspect(module)
   end
 
-  # Without these no rFLEX arms, and with those of another robot it misjudges its way.
-  defp conversions({_module, options}, body) do
-    with given when is_list(given) <- options[:conversions] do
-      needed =
-        [:distance, :angle] ++
-          if(body.sonars == [], do: [], else: [:range]) ++
-          if(body.irs == [], do: [], else: [:ir_a, :ir_b])
+  # What keeps it from arming the driver says, by what it will go by itself.
+  defp conversions(_drive, %{ready: {:error, line}}),
+    do: "#{line}: it will not arm (mix calibrate odometry)"
 
-      case for key <- needed, given[key] == nil, do: key do
-        [] -> "#{number(given[:distance])} units a metre, #{number(given[:angle])} units a radian"
-        missing -> "#{Enum.join(missing, ", ")} MISSING: it will not arm (mix calibrate odometry)"
-      end
-    end
+  defp conversions({_module, options}, _judgement) do
+    with given when is_list(given) <- options[:conversions],
+         true <- given[:distance] != nil and given[:angle] != nil,
+         do: "#{number(given[:distance])} units a metre, #{number(given[:angle])} units a radian",
+         else: (_nothing -> nil)
   end
 
   defp moves(profile) do
@@ -98,10 +135,15 @@ defmodule Robot.File.Summary do
     "#{far}from full speed within #{metres(way)} (#{@delay_s} s until it brakes, then #{rate(a, "m/s2")})"
   end
 
-  defp senses(profile) do
+  defp senses(profile, judgement) do
     "#{length(profile.sonars)} sonars (#{metres(profile.sonar_min)} to #{metres(profile.sonar_max)}), " <>
-      "#{length(profile.irs)} infrareds, #{profile.bumpers} bumpers#{blind(profile)}"
+      "#{length(profile.irs)} infrareds#{unread(profile, judgement)}, #{profile.bumpers} bumpers#{blind(profile)}"
   end
+
+  defp unread(%{irs: [_ | _]}, %{senses: senses}),
+    do: if(:infrared in senses, do: "", else: " (not read: no ir_a, no ir_b)")
+
+  defp unread(_profile, _judgement), do: ""
 
   # The widest angle that no sonar looks into.
   defp blind(%Profile{sonars: []}), do: ""

@@ -45,10 +45,11 @@ defmodule Mix.Tasks.RobotTest do
     path = Path.join(@robots, "mag1.exs")
     Check.run([path])
     lines = said()
-    assert hd(lines) == "#{path}: well"
+    assert hd(lines) =~ "#{path}: well"
     text = Enum.join(lines, "\n")
     assert text =~ "mag1, a Magellan Pro of 20 kg: 0.40 m long"
-    assert text =~ "distance, angle, ir_a, ir_b MISSING: it will not arm"
+    missing = "distance (units per metre), angle (units per radian): it will not arm"
+    assert String.replace(text, ~r/\s+/, " ") =~ missing
     assert text =~ "moves     at most 0.30 m/s and 57° a second"
     # 0.3 m/s for 0.3 s, and 0.3^2 / (2 * 0.5) m.
     assert text =~ "stops     from full speed within 0.18 m"
@@ -57,6 +58,81 @@ defmodule Mix.Tasks.RobotTest do
 
     Check.run([Path.join(@robots, "min1.exs")])
     assert Enum.join(said(), "\n") =~ "min1, an ATRV mini of 40 kg"
+  end
+
+  defp checked(folder, file) do
+    path = Path.join(folder, "mag1.exs")
+    File.write!(path, file)
+    Check.run([path])
+    [title | lines] = said()
+    {String.replace_prefix(title, path, ""), String.replace(Enum.join(lines, " "), ~r/\s+/, " ")}
+  end
+
+  test "what check says of arming is what the driver says", %{tmp_dir: folder} do
+    laws = [[], [ir_a: 4000.0], [ir_a: 4000.0, ir_b: -2.0]]
+    ranges = [[], [range: 1474.0]]
+    wheels = [[], [distance: 31_387.0], [distance: 31_387.0, angle: 4654.2]]
+
+    for law <- laws, range <- ranges, wheel <- wheels do
+      conversions = wheel ++ range ++ law
+      drive = "{Hal.RFlex.Driver, port: \"/dev/null\", conversions: #{inspect(conversions)}}"
+      {_title, text} = checked(folder, "[id: :mag1, profile: :magellan, drive: #{drive}]")
+
+      {:ok, robot} = Robot.File.load(Path.join(folder, "mag1.exs"))
+      {:ok, %{drive: {Hal.RFlex.Driver, options}}} = Robot.File.config(robot)
+      line = Path.join(folder, "line")
+      {:ok, far} = Hal.Serial.open(pty: line)
+      {:ok, driver} = Hal.RFlex.Driver.init(Keyword.put(options, :port, line))
+
+      case Hal.RFlex.Driver.ready(driver) do
+        :ok -> refute text =~ "it will not arm"
+        {:error, why} -> assert text =~ why <> ": it will not arm"
+      end
+
+      assert text =~ "not read: no ir_a, no ir_b" == (law == [])
+      Hal.RFlex.Driver.terminate(driver)
+      Hal.Serial.close(far)
+    end
+  end
+
+  test "what is odd is a warning, with what would be usual", %{tmp_dir: folder} do
+    well = "distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0"
+
+    file = fn conversions, more ->
+      options = ~s([port: "/dev/null", conversions: [#{conversions}]#{more[:drive]}])
+      keys = more[:keys] || ""
+      "[id: :mag1, profile: :magellan, drive: {Hal.RFlex.Driver, #{options}}#{keys}]"
+    end
+
+    assert {": well", text} = checked(folder, file.(well, []))
+    refute text =~ "WARNING"
+
+    pose = fn n -> "{0.2, #{n / 100}, 0.0}" end
+    fifty = "body: [sonars: [#{Enum.map_join(1..50, ", ", pose)}]]"
+    far = String.replace(well, "31_387.0", "31.387")
+
+    for {file, line} <- [
+          {String.replace(file.(well, []), "/dev/null", "/dev/ttyNONE"),
+           "/dev/ttyNONE is not on this machine; it must be on the robot's"},
+          {file.(well, keys: ", limits: [max_turn_acceleration: 0.017]"),
+           "limits.max_turn_acceleration: with 0.017 rad/s2 it takes 59 s to turn at full speed; 1.0 is usual"},
+          {file.(well, keys: ", limits: [max_acceleration: 0.05]"),
+           "limits.max_acceleration: with 0.05 m/s2 it takes 10 s to drive at full speed; 0.5 is usual"},
+          {file.(well, keys: ", #{fifty}"),
+           "drive: sonar_banks: is not given, and 50 poses are no full boards of 8 (48 or 56 would be)"},
+          {file.(far, []),
+           "drive: conversions.distance: 31.387 units a metre is odd; 31387.0 is usual"},
+          {file.(well, drive: ", speed: 9600"),
+           "drive: speed: 9600 baud is odd; 115200 is usual"},
+          {file.(well, keys: ", body: [sonars: [{0.2, 0.0, 3.1}, {0.1, 0.1, 0.8}]]"),
+           "body.sonars: number 1 looks into the body"},
+          {file.(well, keys: ", body: [irs: [{0.2, 0.0, 0.0}, {0.2, 0.0, 0.0}]]"),
+           "body.irs: 1 of the 2 poses are given twice"}
+        ] do
+      assert {title, text} = checked(folder, file)
+      assert title =~ ": well, but for "
+      assert text =~ "WARNING " <> line
+    end
   end
 
   test "of several files, what is wrong in each is said, and the status is 1", %{tmp_dir: folder} do

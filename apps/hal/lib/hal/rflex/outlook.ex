@@ -1,0 +1,64 @@
+defmodule Hal.RFlex.Outlook do
+  @moduledoc """
+  What can be said of a base by its options alone, before its line is open: whether it may be armed, what
+  it reads, and what is allowed and odd all the same. Driver and `mix robot.check` ask here. Pure.
+  """
+  alias Hal.RFlex.{Conversions, Options, Speech}
+
+  @baud 115_200
+  # Robots of one kind differ by some percent; by so much no two that were public.
+  @factor 1.5
+
+  @doc """
+  Whether it may be armed; or which conversions are missing. Infrareds without their law are not read,
+  and hinder nothing.
+
+      iex> {:ok, options} = Hal.RFlex.Options.new(port: "/dev/ttyR0", conversions: [range: 1474.0])
+      iex> Hal.RFlex.Outlook.ready(options)
+      {:error, "conversions are missing: distance (units per metre), angle (units per radian)"}
+  """
+  @spec ready(Options.t()) :: :ok | {:error, line :: String.t()}
+  def ready(%Options{} = options),
+    do: Conversions.ready(options.conversions, Speech.senses(options))
+
+  @doc """
+  What is allowed and odd, a line each, with the number that would be usual; `given` are the options as they
+  were written.
+
+      iex> given = [port: "/dev/ttyR0", conversions: [distance: 31.387]]
+      iex> {:ok, options} = Hal.RFlex.Options.new(given)
+      iex> Hal.RFlex.Outlook.odd(options, given)
+      ["conversions.distance: 31.387 units a metre is odd; 31387.0 is usual"]
+  """
+  @spec odd(Options.t(), keyword()) :: [String.t()]
+  def odd(%Options{} = options, given) do
+    Enum.filter([baud(options.speed) | boards(options, given) ++ conversions(options)], & &1)
+  end
+
+  defp baud(@baud), do: nil
+  defp baud(speed), do: "speed: #{speed} baud is odd; #{@baud} is usual"
+
+  # Without a word of it, boards are taken for full.
+  defp boards(options, given) do
+    for key <- [:sonar_banks, :ir_banks], given[key] == nil do
+      banks = Map.fetch!(options, key)
+      count = Enum.sum(banks)
+
+      if rem(count, 8) != 0,
+        do:
+          "#{key}: is not given, and #{count} poses are no full boards of 8 " <>
+            "(#{count - rem(count, 8)} or #{count - rem(count, 8) + 8} would be); " <>
+            "taken for #{inspect(banks, charlists: :as_lists)}"
+    end
+  end
+
+  defp conversions(%{conversions: conversions, profile: profile}) do
+    usual = Conversions.published(profile.name) ++ [range: Conversions.range()]
+    words = [distance: "units a metre", angle: "units a radian", range: "units a metre of sonar"]
+
+    for {key, usual} <- usual, value = Map.fetch!(conversions, key) do
+      if value > usual * @factor or value * @factor < usual,
+        do: "conversions.#{key}: #{value} #{words[key]} is odd; #{usual} is usual"
+    end
+  end
+end

@@ -1,0 +1,110 @@
+defmodule Robot.File.Odd do
+  @moduledoc """
+  What is allowed in a robot file, and seldom meant: each a line that names the key, and what would be usual.
+  A person should look before 40 kg move. Pure.
+  """
+  alias Hal.{Pose, Profile}
+  alias Robot.File.Device
+
+  # The robots of the thesis get to full speed within 1 s.
+  @slow_s 5.0
+  @inwards :math.pi() / 2 + 0.1
+  # Nearer to the middle than this a sensor has no direction of its own.
+  @middle_m 0.02
+
+  @doc """
+  All of it; `there?` says whether a device is on this machine.
+
+      iex> robot = %Robot.File{id: :mag1, profile: Hal.Profile.magellan(), start: Hal.Pose.new(0, 0),
+      ...>   drive: {Some.Drive, [port: "/dev/ttyS9"]}, limits: [max_turn_acceleration: 0.017]}
+      iex> Robot.File.Odd.lines(robot, fn _device -> false end)
+      ["limits.max_turn_acceleration: with 0.017 rad/s2 it takes 59 s to turn at full speed; 1.0 is usual",
+       "/dev/ttyS9 is not on this machine; it must be on the robot's"]
+  """
+  @spec lines(Robot.File.t(), (Path.t() -> boolean())) :: [String.t()]
+  def lines(%Robot.File{} = robot, there?) do
+    limits(robot) ++ drive(robot) ++ poses(robot.profile) ++ devices(robot, there?)
+  end
+
+  defp limits(%{profile: kind} = robot) do
+    own = struct!(kind, robot.limits)
+
+    Enum.filter(
+      [
+        gathers(own, kind, :max_acceleration, :max_linear, "m/s2", "drive"),
+        gathers(own, kind, :max_turn_acceleration, :max_turn, "rad/s2", "turn")
+      ],
+      & &1
+    )
+  end
+
+  defp gathers(own, kind, acceleration, speed, unit, doing) do
+    value = Map.fetch!(own, acceleration)
+    seconds = Map.fetch!(own, speed) / value
+
+    if seconds > @slow_s,
+      do:
+        "limits.#{acceleration}: with #{value} #{unit} it takes #{round(seconds)} s to #{doing} " <>
+          "at full speed; #{Map.fetch!(kind, acceleration)} is usual"
+  end
+
+  defp drive(robot) do
+    case Device.judge(robot.drive, robot.profile) do
+      nil -> []
+      %{odd: odd} -> for line <- odd, do: "drive: " <> line
+    end
+  end
+
+  defp poses(%Profile{} = body) do
+    for {name, poses} <- [sonars: body.sonars, irs: body.irs],
+        line <- [inwards(name, poses), alike(name, poses)],
+        line != nil,
+        do: "body.#{name}: " <> line
+  end
+
+  defp inwards(_name, poses) do
+    case for {pose, n} <- Enum.with_index(poses, 1), inwards?(pose), do: n do
+      [] -> nil
+      numbers -> "#{numbers(numbers)} into the body; sensors usually look away from its middle"
+    end
+  end
+
+  defp inwards?(%Pose{x: x, y: y, heading: heading}) do
+    :math.sqrt(x * x + y * y) > @middle_m and
+      abs(Pose.wrap(heading - :math.atan2(y, x))) > @inwards
+  end
+
+  defp numbers([one]), do: "number #{one} looks"
+
+  defp numbers(several) do
+    more = length(several) - 8
+    shown = several |> Enum.take(8) |> Enum.join(", ")
+    "numbers #{shown}#{if more > 0, do: " and #{more} more"} look"
+  end
+
+  defp alike(_name, poses) do
+    twice = length(poses) - length(Enum.uniq(poses))
+    if twice > 0, do: "#{twice} of the #{length(poses)} poses are given twice; each has its own"
+  end
+
+  defp devices(robot, there?) do
+    named =
+      for {_module, options} <- [robot.drive, robot.ptz, robot.camera],
+          "/dev/" <> _ = path <- [options[:port] || options[:source]],
+          not there?.(path),
+          do: path
+
+    case Enum.uniq(named) do
+      [] ->
+        []
+
+      [one] ->
+        ["#{one} is not on this machine; it must be on the robot's"]
+
+      several ->
+        {last, first} = List.pop_at(several, -1)
+        all = "#{Enum.join(first, ", ")} and #{last}"
+        ["#{all} are not on this machine; they must be on the robot's"]
+    end
+  end
+end
