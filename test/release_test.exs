@@ -185,6 +185,58 @@ defmodule System.ReleaseTest do
     end
   end
 
+  test "a question may take long; a second start, and one right after a stop, are said in words",
+       %{
+         folder: folder
+       } do
+    file = Path.join(folder, "mag1.exs")
+    robot_file(file, Path.join(folder, "none"))
+
+    environment = [
+      {"ROBOT", "mag1"},
+      {"CONVOY_ROBOT_FILE", file},
+      {"CONVOY_SECRET_FILE", Path.join(folder, "secret")},
+      {"RELEASE_TMP", folder}
+    ]
+
+    ask = fn arguments -> fn -> robot(arguments, environment) end end
+    assert {"", 0} = robot(["daemon"], environment)
+    first = pid(ask.(["pid"]))
+
+    # Longer than net_ticktime, in which neither says anything else.
+    assert {":done\n", 0} = robot(["rpc", ":timer.sleep(12_000); :done"], environment)
+
+    for command <- ["start", "daemon"] do
+      assert {said, 1} = robot([command], environment)
+      assert [line] = String.split(said, "\n", trim: true)
+      assert line =~ ~r/^mag1 does not start: its TCP port \d+ is taken/
+      assert line =~ "it runs here already (robot status tells how it is, robot stop ends it)"
+    end
+
+    # It has ended when this returns.
+    assert {"", 0} = robot(["stop"], environment)
+    refute there?(first)
+    assert {"", 0} = robot(["daemon"], environment)
+    second = pid(ask.(["pid"]))
+    assert second != first
+
+    # Also without our own command, which waits for the end.
+    release = Path.join(@release, "bin/robot")
+    options = [env: environment, stderr_to_stdout: true]
+    assert {_said, 0} = System.cmd(release, ["stop"], options)
+    assert {"", 0} = System.cmd(release, ["daemon"], options)
+    assert pid(ask.(["pid"])) not in [first, second]
+    assert {"", 0} = robot(["stop"], environment)
+  end
+
+  test "in a clone, a robot that comes along is checked with the secret of the environment", %{
+    folder: folder
+  } do
+    environment = [{"ROBOT", "mag1"}, {"CONVOY_SECRET_FILE", Path.join(folder, "secret")}]
+    assert {said, 0} = robot(["check"], environment)
+    assert said =~ ~r/robots\/mag1.exs: well/
+  end
+
   test "what is wrong is said in a line, and nothing starts", %{folder: folder} do
     file = Path.join(folder, "mag1.exs")
     robot_file(file, "/dev/ttyS1", ", arm: :maual")

@@ -18,6 +18,8 @@ defmodule Swarm.Boot do
   alias Swarm.Start
 
   @machine "/etc/convoy/robots"
+  @starts ~w(start start_iex daemon daemon_iex)
+  @patience_ms 3_000
 
   @type environment :: %{optional(String.t()) => String.t()}
 
@@ -102,16 +104,27 @@ defmodule Swarm.Boot do
   @doc """
   The answer to `rel/env.sh.eex`: status and lines of standard output and standard error. For `check` they say
   what the robot is, for `halt` that its controller was told to cut the power (`Swarm.Machine.Halt`), else they are the settings. Who only wants to reach a running robot, to stop it
-  say, gets there also when its file has become wrong since.
+  say, gets there also when its file has become wrong since. Nothing starts where the port of its distribution is taken for
+  longer than `patience_ms`; one that was told to stop may need a second.
   """
-  @spec answer(command :: String.t(), environment()) ::
+  @spec answer(command :: String.t(), environment(), patience_ms :: non_neg_integer()) ::
           {status :: 0 | 1, output :: [String.t()], errors :: [String.t()]}
-  def answer(command, environment) do
+  def answer(command, environment, patience_ms \\ @patience_ms) do
     case {robot(environment), command} do
-      {{:ok, robot}, "halt"} -> halt(environment, file(robot))
-      {{:ok, robot}, "check"} -> told(environment, file(robot), &about(environment, &1, &2))
-      {{:ok, robot}, _command} -> told(environment, file(robot), &shell/2)
-      {{:error, lines}, command} -> wrong(command, environment, lines)
+      {{:ok, robot}, "halt"} ->
+        halt(environment, file(robot))
+
+      {{:ok, robot}, "check"} ->
+        told(environment, file(robot), &about(environment, &1, &2))
+
+      {{:ok, robot}, command} when command in @starts ->
+        told(environment, file(robot), &begins(environment, &1, &2, patience_ms))
+
+      {{:ok, robot}, _command} ->
+        told(environment, file(robot), &shell/2)
+
+      {{:error, lines}, command} ->
+        wrong(command, environment, lines)
     end
   end
 
@@ -141,8 +154,46 @@ defmodule Swarm.Boot do
 
   defp told(environment, file, tell) do
     case settings(environment, file) do
-      {:ok, settings} -> {0, tell.(settings, file), []}
+      {:ok, settings} -> answered(tell.(settings, file))
       {:error, line} -> {1, [], [line]}
+    end
+  end
+
+  defp answered({:error, line}), do: {1, [], [line]}
+  defp answered(lines), do: {0, lines, []}
+
+  defp begins(environment, settings, file, patience_ms) do
+    port = settings.dist_port
+
+    if free?(port, settings.interface, patience_ms),
+      do: shell(settings, file),
+      else:
+        {:error,
+         "#{environment["ROBOT"]} does not start: its TCP port #{port} is taken. Either it runs here already " <>
+           "(robot status tells how it is, robot stop ends it), or another program has the port (ss -ltnp), " <>
+           "and dist_port: of its file, or CONVOY_DIST_PORT, names another"}
+  end
+
+  # As Erlang's distribution will listen.
+  defp free?(port, interface, left_ms) do
+    ip =
+      with {:ok, ip} <- :inet.parse_address(to_charlist(interface || "")),
+           do: [ip: ip],
+           else: (_ -> [])
+
+    case :gen_tcp.listen(port, [reuseaddr: true] ++ ip) do
+      {:error, :eaddrinuse} when left_ms > 0 ->
+        receive(do: (:never -> :ok), after: (100 -> free?(port, interface, left_ms - 100)))
+
+      {:error, :eaddrinuse} ->
+        false
+
+      # What else may be wrong with it Erlang says better.
+      {:error, _other} ->
+        true
+
+      {:ok, socket} ->
+        :gen_tcp.close(socket) == :ok
     end
   end
 

@@ -128,6 +128,34 @@ defmodule Swarm.BootTest do
     assert line =~ "(network.secret_file of the robot file stands above #{secret})"
   end
 
+  test "nothing starts where its port is taken, but for one that is ending", %{tmp_dir: folder} do
+    {:ok, socket} = :gen_tcp.listen(0, ip: {127, 0, 0, 1})
+    {:ok, port} = :inet.port(socket)
+    more = %{"CONVOY_DIST_PORT" => "#{port}", "CONVOY_INTERFACE" => "127.0.0.1"}
+    environment = machine(folder, file(), more)
+
+    for command <- ~w(start start_iex daemon daemon_iex) do
+      assert {1, [], [line]} = Boot.answer(command, environment, 0)
+      assert line =~ "mag1 does not start: its TCP port #{port} is taken"
+    end
+
+    # Others reach the one that has it.
+    assert {0, [_cookie | _], []} = Boot.answer("rpc", environment, 0)
+
+    test = self()
+
+    ending =
+      spawn_link(fn ->
+        receive do: (:end -> :gen_tcp.close(socket))
+      end)
+
+    :ok = :gen_tcp.controlling_process(socket, ending)
+    spawn_link(fn -> send(test, {:answer, Boot.answer("start", environment, 60_000)}) end)
+    refute_receive {:answer, _}, 150
+    send(ending, :end)
+    assert_receive {:answer, {0, [_cookie | _], []}}, 5_000
+  end
+
   test "without a secret nothing is told but how to make one", %{tmp_dir: folder} do
     environment = machine(folder, file())
     File.rm!(environment["CONVOY_SECRET_FILE"])
