@@ -52,7 +52,8 @@ defmodule Robot.Player do
     * `:colours` - `function.(name)` gives `{path, {:ok, colours} | {:error, line}}`: how the colour
       file is named in the robot file, and what is in it
 
-  The error is one line: it names what keeps the file from being read, or says that no rFLEX is in it.
+  The error is one line: it names what keeps the file from being read, or says that no rFLEX is in it, or
+  which line of it leaves open what the robot's sensors are (`Robot.Player.Whole.sure/1`).
   """
   @spec import(String.t(), keyword()) :: {:ok, result()} | {:error, String.t()}
   def import(text, options \\ []) do
@@ -61,8 +62,12 @@ defmodule Robot.Player do
     with {:ok, parsed} <- Sections.parse(text),
          units = Units.context(parsed.options, parsed.sections, options[:version]),
          state = Enum.reduce(parsed.sections, start(parsed), &section(&1, &2, units)),
-         :ok <- based(state) do
-      {:ok, finish(state, file, options)}
+         :ok <- based(state),
+         # What a line itself lacks comes before what lacks because of it.
+         :ok <- Whole.sure(state),
+         {profile, state} = finish(state, options),
+         :ok <- Whole.sure(state) do
+      {:ok, result(state, profile, file, options)}
     else
       {:error, {line, why}} -> {:error, "#{file}:#{line}: #{why}"}
       {:error, why} -> {:error, "#{file}: #{why}"}
@@ -167,11 +172,14 @@ defmodule Robot.Player do
     end
   end
 
-  defp finish(state, file, options) do
+  defp finish(state, options) do
     state = Fit.allowed(state, @modules)
     {profile, state} = Whole.profile(state, options[:profile])
+    {profile, state |> Whole.complete(profile) |> coloured(options[:colours])}
+  end
+
+  defp result(state, profile, file, options) do
     id = options[:id] || if(profile == :magellan, do: :mag1, else: :min1)
-    state = state |> Whole.complete(profile) |> coloured(options[:colours])
 
     %{
       text: Text.write(state, file, id, profile, @modules),

@@ -3,6 +3,7 @@ defmodule Robot.PlayerTest do
 
   doctest Robot.Player.Base
   doctest Robot.Player.Others
+  doctest Robot.Player.Poses
   doctest Robot.Player.Sections
   doctest Robot.Player.Tokens
   doctest Robot.Player.Units
@@ -192,6 +193,160 @@ defmodule Robot.PlayerTest do
 
     assert {2, "mmrad_sonar_poses", "read as x, y, theta" <> _} =
              List.keyfind(result.assumed, 2, 0)
+  end
+
+  # A base larger than ours: two rings of 24 sonars on fourteen boards, 24 infrareds and 14 bumpers round it. Its
+  # angles go on counting beyond a turn, and poses are left over.
+  defp ring(count, radius, from, form) do
+    for k <- 0..(count - 1) do
+      angle = from - 2 * :math.pi() * k / count
+      form.(Float.round(angle, 6), radius * :math.cos(angle), radius * :math.sin(angle))
+    end
+  end
+
+  defp words(tuples), do: tuples |> List.flatten() |> Enum.map_join(" ", &Float.round(&1, 6))
+
+  defp large(more \\ %{}) do
+    theta_first = fn angle, x, y -> [angle, x, y] end
+    upper = ring(24, 0.24, 7.5, theta_first)
+    lower = ring(24, 0.26, 4.0, theta_first)
+    spare = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+
+    given =
+      Map.merge(
+        %{
+          sonars: words(upper ++ lower ++ spare),
+          count: 48,
+          banks: "4 4 4 4 4 4 3 3 3 3 3 3 3 3",
+          irs: words(ring(24, 0.25, 7.33, fn angle, x, y -> [x, y, angle] end)),
+          boards: "4 4 4 4 4 4",
+          bumpers: words(ring(14, 0.26, 2.6, fn angle, x, y -> [x, y, angle, 0.2, 0.26] end)),
+          more: ""
+        },
+        more
+      )
+
+    """
+    driver (
+      name "rflex" provides ["position2d:0" "sonar:0" "ir:0" "bumper:0"]
+      rflex_serial_port "/dev/ttyR0"
+      m_length 0.5 m_width 0.5
+      odo_distance_conversion 103000 odo_angle_conversion 35000
+      default_trans_acceleration 0.5 default_rot_acceleration 0.017
+      range_distance_conversion 1476
+      num_sonars #{given.count}
+      num_sonars_in_bank [#{given.banks}]
+      mrad_sonar_poses [#{given.sonars}]
+      rflex_banks [#{given.boards}]
+      poses [#{given.irs}]
+      bumper_count 14 rflex_bumper_style "addr"
+      bumper_def [#{given.bumpers}]
+      #{given.more}
+    )
+    """
+  end
+
+  test "where sensors are decides what their angles mean: radians that go on beyond a turn" do
+    assert {:ok, result} = Player.import(large(), file: "large.cfg")
+    robot = again(result.text)
+    assert length(robot.profile.sonars) == 48
+    assert length(robot.profile.irs) == 24
+
+    for %{x: x, y: y, heading: heading} <- robot.profile.sonars ++ robot.profile.irs do
+      assert abs(Hal.Pose.wrap(heading - :math.atan2(y, x))) < 1.0e-4
+      assert abs(heading) <= 2 * :math.pi() + 0.01
+    end
+
+    assert %{x: x} = hd(robot.profile.sonars)
+    assert_in_delta x, 0.24 * :math.cos(7.5), 1.0e-5
+    assert options(robot)[:sonar_banks] == List.duplicate(4, 6) ++ List.duplicate(3, 8)
+    assert options(robot)[:ir_banks] == List.duplicate(4, 6)
+    assert options(robot)[:ir_order] == Enum.to_list(0..23)
+
+    # The first is to the left behind, and the others follow clockwise.
+    assert [7, 5, 4 | _] = options(robot)[:bumpers][:segments]
+    assert length(options(robot)[:bumpers][:segments]) == 14
+
+    # With it a turn at full speed would be a minute off.
+    assert robot.limits == [max_acceleration: 0.5]
+
+    assert [{6, "default_rot_acceleration", why}] = result.left
+    assert why =~ "with 0.017 rad/s2 it would take 59 s"
+
+    assert [
+             {1, "profile: :magellan", _},
+             {10, "mrad_sonar_poses", sonars},
+             {12, "poses", "angles taken for radians, some of them beyond a turn" <> _}
+           ] = result.assumed
+
+    assert sonars ==
+             "the first 48 of 50 poses are taken, as many sonars as num_sonars_in_bank says"
+  end
+
+  test "degrees are found out by positions, too, whatever a file says" do
+    degrees = words(ring(8, 0.2, 6.0, fn angle, x, y -> [x, y, angle * 180 / :math.pi()] end))
+    small = words(ring(8, 0.2, 6.0, fn angle, x, y -> [x, y, angle] end))
+    text = &~s|#{&2} driver ( name "rflex" m_length 0.4 rflex_banks [8] poses [#{&1}] )|
+
+    for {poses, unit, assumed} <- [
+          {degrees, "", "angles taken for degrees: so they look away from the middle"},
+          {degrees, ~s(unit_angle "degrees"), nil},
+          {degrees, ~s(unit_angle "radians"),
+           "angles taken for degrees, not for radians: so they look away from the middle"},
+          {small, "", nil},
+          {small, ~s(unit_angle "degrees"),
+           "angles taken for radians, not for degrees: so they look away from the middle"}
+        ] do
+      assert {:ok, result} = Player.import(text.(poses, unit))
+
+      for %{x: x, y: y, heading: heading} <- again(result.text).profile.irs,
+          do: assert(abs(Hal.Pose.wrap(heading - :math.atan2(y, x))) < 1.0e-4)
+
+      assert assumed ==
+               Enum.find_value(result.assumed, fn
+                 {_, "poses", w} -> w
+                 _ -> nil
+               end)
+    end
+  end
+
+  test "what a file leaves open of its sensors is refused with the line, not guessed" do
+    inwards = words(ring(24, 0.25, 7.33, fn angle, x, y -> [-x, -y, angle] end))
+    few = words(ring(40, 0.25, 1.0, fn angle, x, y -> [angle, x, y] end))
+    askew = words(ring(48, 0.25, 1.0, fn angle, x, y -> [angle + 1.6, x, y] end))
+
+    for {more, line} <- [
+          {%{irs: inwards},
+           "12: poses: neither in radians nor in degrees do they look away from the middle"},
+          {%{sonars: few},
+           "10: mrad_sonar_poses: there are poses for 40 sonars, and num_sonars_in_bank says 48"},
+          {%{sonars: askew}, "10: mrad_sonar_poses: neither as theta, x, y nor as x, y, theta"},
+          {%{sonars: "1 2"}, "10: mrad_sonar_poses: is no list of three numbers for each sensor"},
+          {%{count: 46}, "9: num_sonars_in_bank: adds up to 48 sonars, and num_sonars is 46"},
+          {%{boards: "4 4 4 4 4 5"},
+           "12: poses: there are poses for 24 infrareds, and rflex_banks says 25"},
+          {%{boards: "24"},
+           "11: rflex_banks: a board has 0 to 8 infrareds, and there are 8 boards"},
+          {%{banks: "48"}, "9: num_sonars_in_bank: a bank has 0 to 16 sonars"},
+          {%{more: "mrad_sonar_poses [0 1 1]"}, "15: mrad_sonar_poses: is given twice"}
+        ] do
+      assert {:error, told} = Player.import(large(more), file: "large.cfg")
+      assert String.starts_with?(told, "large.cfg:" <> line), told
+    end
+
+    # Without poses, a kind's own are taken, if it has as many.
+    text =
+      &~s|driver ( name "rflex" m_length 0.4 num_sonars_in_bank [#{&1}] rflex_banks [#{&2}] )|
+
+    assert {:error, told} = Player.import(text.("8 8 8", "8 8"), file: "x.cfg")
+    assert told =~ "x.cfg:1: num_sonars_in_bank: adds up to 24 sonars, and there are no poses"
+    assert {:error, told} = Player.import(text.("8 8", "8"), file: "x.cfg")
+    assert told =~ "x.cfg:1: rflex_banks: adds up to 8 infrareds, and there are no poses"
+    assert {:ok, result} = Player.import(text.("8 8", "8 8"), profile: :magellan)
+    assert length(again(result.text).profile.irs) == 16
+    why = "no poses are given: those of a magellan are taken"
+    assert {1, "num_sonars_in_bank", why} in result.assumed
+    assert {1, "rflex_banks", why} in result.assumed
   end
 
   test "what is asked for wins over what is guessed" do

@@ -58,7 +58,10 @@ defmodule Hal.RFlex.Outlook do
 
     for {key, usual} <- usual, value = Map.fetch!(conversions, key) do
       if value > usual * @factor or value * @factor < usual,
-        do: "conversions.#{key}: #{value} #{words[key]} is odd; #{usual} is usual"
+        do: "conversions.#{key}: #{number(value)} #{words[key]} is odd; #{number(usual)} is usual"
     end
   end
+
+  # 190000.0, not 1.9e5.
+  defp number(value), do: :erlang.float_to_binary(value, [:compact, decimals: 6])
 end

@@ -6,7 +6,8 @@ defmodule Mix.Tasks.Robot.Import do
       mix robot.import FILE [-o OUT] [options]
 
   What Player calls `rflex`, `sonyevid30`, `camerav4l` and `cmvision` is carried over, in metres and
-  radians. What was assumed, and what could not be carried over, is listed with its line and why.
+  radians. What was assumed, and what could not be carried over, is listed with its line and why; a file that
+  leaves open where sensors are, or on which board, is refused with the line.
   Without OUT the robot file goes to standard output, and all else to standard error. A file with which
   no robot starts is written too, for you to put right; then what is wrong is told, and the status is 1.
 
@@ -21,7 +22,7 @@ defmodule Mix.Tasks.Robot.Import do
     * `--help` - this text
   """
   use Mix.Task
-  alias Robot.File.{Check, Schema}
+  alias Robot.File.{Check, Odd, Schema}
 
   @switches [
     out: :string,
@@ -73,7 +74,10 @@ defmodule Mix.Tasks.Robot.Import do
   defp judge(text, file, out) do
     with {:ok, robot} <- made(text, file, out),
          {:ok, _config} <- Robot.File.config(robot) do
-      :ok
+      # Whether its devices are here is of no interest yet.
+      odd = Odd.lines(robot, fn _device -> true end)
+      if odd != [], do: say("Odd; look whether it is meant:")
+      Enum.each(odd, &say("  #{&1}"))
     else
       {:error, lines} ->
         say("To be put right; no robot starts with this:")

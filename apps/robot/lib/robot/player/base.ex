@@ -78,7 +78,6 @@ defmodule Robot.Player.Base do
 
   @reasons %{
     "sonar_2nd_bank_start" => "all sonars are one list here",
-    "bumper_def" => "bumpers are parts of the body here, counted from its front",
     "sonar_max_range" => "a sonar sees as far as the body's sonar_max says",
     "rflex_joy_pos_ratio" => "the joystick is read, but drives nothing by itself",
     "rflex_joy_ang_ratio" => "the joystick is read, but drives nothing by itself",
@@ -87,7 +86,7 @@ defmodule Robot.Player.Base do
   @known ~w(rflex_serial_port mm_length m_length mm_width m_width odo_distance_conversion
             odo_angle_conversion range_distance_conversion default_trans_acceleration
             default_rot_acceleration mmrad_sonar_poses mrad_sonar_poses poses ir_max_range
-            ir_min_range rflex_ir_calib num_sonars_in_bank bumper_count rflex_bumper_style
+            ir_min_range rflex_ir_calib num_sonars_in_bank bumper_count bumper_def rflex_bumper_style
             rflex_bumper_address num_sonars pose_count num_sonars_possible_per_bank sonar_age
             sonar_echo_delay sonar_ping_delay sonar_set_delay rflex_banks rflex_base_bank
             rflex_power_offset rflex_joystick rflex_heading_home_address)

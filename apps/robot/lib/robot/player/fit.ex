@@ -41,8 +41,9 @@ defmodule Robot.Player.Fit do
 
   defp refused(_path, _value, _modules), do: nil
 
-  # The ends of a time that is put together later are no options.
+  # The ends of a time that is put together later are no options; segments go with their count.
   defp nest([:sonar_times, _name], _us), do: []
+  defp nest([:bumpers, :segments], _segments), do: []
   defp nest([key], value), do: [{key, value}]
   defp nest([key | path], value), do: [{key, nest(path, value)}]
 

@@ -17,6 +17,8 @@ defmodule Robot.Player.Whole do
         }
 
   @echo_us 30_000
+  # As Robot.File.Odd has it.
+  @slow_s 5.0
 
   @doc "The value at a path, or nil."
   @spec value(t(), [atom()]) :: term()
@@ -56,11 +58,28 @@ defmodule Robot.Player.Whole do
     |> ported()
     |> timed()
     |> bumped(kind)
+    |> placed()
     |> banked(body)
-    |> ringed()
+    |> ringed(body)
     |> touchless(kind)
     |> circled(body)
     |> limited(body)
+  end
+
+  # What cannot be guessed: which sensor is where. A robot drives by them.
+  @sensors ~w(mmrad_sonar_poses mrad_sonar_poses num_sonars num_sonars_in_bank
+              num_sonars_possible_per_bank poses rflex_banks rflex_base_bank)
+
+  @doc """
+  Whether all that the file says of sonars and infrareds came over. If not, which line did not, and why: a robot
+  whose sensors are elsewhere than it thinks is worse than none.
+  """
+  @spec sure(t()) :: :ok | {:error, {line :: pos_integer(), why :: String.t()}}
+  def sure(state) do
+    case Enum.sort(for {_, name, _} = remark <- state.left, name in @sensors, do: remark) do
+      [] -> :ok
+      [{line, name, why} | _more] -> {:error, {line, "#{name}: #{why}"}}
+    end
   end
 
   @doc "A remark on what was taken for granted."
@@ -131,34 +150,73 @@ defmodule Robot.Player.Whole do
     end
   end
 
+  # Which bumper is where, when nothing says it, is the driver's guess.
+  defp placed(state) do
+    count = value(state, [:drive, :bumpers, :count])
+    address? = value(state, [:drive, :bumpers, :style]) == :address
+
+    if count != nil and address? and value(state, [:drive, :bumpers, :segments]) == nil,
+      do:
+        assume(
+          state,
+          1,
+          "bumpers",
+          "no bumper_def is given: the first is taken for the front's, then to the left"
+        ),
+      else: state
+  end
+
   # Our profile's sonars are there when the file has no poses.
   defp banked(state, body) do
     banks = value(state, [:drive, :sonar_banks])
-    sonars = value(state, [:body, :sonars]) || body.sonars
+    sonars = value(state, [:body, :sonars])
+    count = length(sonars || body.sonars)
 
-    if banks == nil or Enum.sum(banks) == length(sonars) do
-      state
-    else
-      why = "has #{Enum.sum(banks)} sonars, and the body #{length(sonars)}"
-      leave(state, &match?({[:drive, :sonar_banks], _, _, _}, &1), why)
+    cond do
+      banks == nil and sonars != nil and rem(count, 8) != 0 ->
+        {_, _, line, _option} = List.keyfind(state.values, [:body, :sonars], 0)
+
+        why = "is not given: taken for boards of 8, #{count} sonars in all"
+        assume(state, line, "num_sonars_in_bank", why)
+
+      banks == nil or (sonars != nil and Enum.sum(banks) == count) ->
+        state
+
+      Enum.sum(banks) == count ->
+        {_, _, line, option} = List.keyfind(state.values, [:drive, :sonar_banks], 0)
+        assume(state, line, option, "no poses are given: those of a #{body.name} are taken")
+
+      true ->
+        why =
+          "adds up to #{Enum.sum(banks)} sonars, and there are no poses; a #{body.name} has #{count}"
+
+        leave(state, &match?({[:drive, :sonar_banks], _, _, _}, &1), why)
     end
   end
 
   # Player's poses are in the order of the reports, unlike those of our profile.
-  defp ringed(state) do
+  defp ringed(state, body) do
     case value(state, [:body, :irs]) do
       nil ->
-        leave(
-          state,
-          &match?({[:drive, :ir_banks], _, _, _}, &1),
-          "there are no poses of infrareds"
-        )
+        unplaced(state, value(state, [:drive, :ir_banks]), body)
 
       irs ->
         state =
           keep(state, 1, "poses", [{[:drive, :ir_order], Enum.to_list(0..(length(irs) - 1))}])
 
         state |> boarded(length(irs)) |> calibrated(length(irs))
+    end
+  end
+
+  defp unplaced(state, nil, _body), do: state
+
+  defp unplaced(state, banks, body) do
+    if Enum.sum(banks) == length(body.irs) do
+      {_, _, line, option} = List.keyfind(state.values, [:drive, :ir_banks], 0)
+      assume(state, line, option, "no poses are given: those of a #{body.name} are taken")
+    else
+      why = "adds up to #{Enum.sum(banks)} infrareds, and there are no poses of them"
+      leave(state, &match?({[:drive, :ir_banks], _, _, _}, &1), why)
     end
   end
 
@@ -229,9 +287,26 @@ defmodule Robot.Player.Whole do
       {_, _, line, option} = List.keyfind(state.values, [:limits, :max_acceleration], 0)
       way = Float.round(body.max_linear * body.max_linear / (2 * a), 1)
       why = "taken as it is, but at full speed it then needs #{way} m to stand"
-      state |> assume(line, option, why) |> lowered(body)
+      state |> assume(line, option, why) |> turned(body) |> lowered(body)
     else
-      _well -> lowered(state, body)
+      _well -> state |> turned(body) |> lowered(body)
+    end
+  end
+
+  # Player's driver turns with an acceleration of its own, whatever the file says.
+  defp turned(state, body) do
+    case value(state, [:limits, :max_turn_acceleration]) do
+      a when is_number(a) and a > 0 and body.max_turn / a > @slow_s ->
+        seconds = round(body.max_turn / a)
+
+        why =
+          "with #{a} rad/s2 it would take #{seconds} s to turn at full speed; " <>
+            "Player does not drive by it, and #{body.max_turn_acceleration} is usual"
+
+        leave(state, &match?({[:limits, :max_turn_acceleration], _, _, _}, &1), why)
+
+      _usual ->
+        state
     end
   end
 

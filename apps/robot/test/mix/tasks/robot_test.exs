@@ -174,6 +174,27 @@ defmodule Mix.Tasks.RobotTest do
     assert {:ok, %{id: :min7, profile: %{name: :magellan}}} = Robot.File.load(out)
   end
 
+  test "what came over and is odd is told at once", %{tmp_dir: folder, player: file} do
+    File.write!(file, String.replace(@player, "conversion 190", "conversion 19"))
+    out = Path.join(folder, "min7.exs")
+    told = capture_io(:stderr, fn -> Import.run([file, "-o", out]) end)
+
+    assert told =~
+             "Odd; look whether it is meant:\n  drive: conversions.distance: 19000.0 units a metre"
+
+    File.write!(
+      file,
+      String.replace(
+        @player,
+        "conversion 190",
+        "conversion 190 num_sonars 3 mmrad_sonar_poses [0 1 0]"
+      )
+    )
+
+    assert [line] = refused(Import, [file, "-o", out, "--force"])
+    assert line =~ "mmrad_sonar_poses: there are poses for 1 sonars, and num_sonars says 3"
+  end
+
   test "elsewhere, the colour file is named by its whole path", %{tmp_dir: folder, player: file} do
     out = Path.join([folder, "robots", "min1.exs"])
     File.mkdir_p!(Path.dirname(out))
