@@ -11,7 +11,7 @@ defmodule System.DocsTest do
   only words and options are compared with what its program knows. A new line is thus run unless somebody says why not.
   Nothing that a reader types may change a file that came along.
   """
-  use ExUnit.Case, async: true
+  use ExUnit.Case, async: false
   alias Docs.{LookedAt, Reader, Sandbox}
 
   @moduletag timeout: 180_000
@@ -85,6 +85,9 @@ defmodule System.DocsTest do
     ~S(iex --sname rem-1@lab --hidden --cookie "$COOKIE" --remsh mag1@lab --erl "-start_epmd false -kernel net_ticktime 8 -epmd_module Elixir.Swarm.Mesh.Epmd -pa _build/dev/lib/swarm/ebin") =>
       @robot
   }
+
+  # And what others need.
+  @programs [{"mix fleet.certs", "openssl"}]
 
   # How blocks begin that nobody types.
   @shown [
@@ -222,9 +225,20 @@ defmodule System.DocsTest do
   defp wrong(:prompt, text, _answer, _folder), do: LookedAt.prompt(text)
 
   defp wrong(:shell, text, answer, folder) do
-    if is_map_key(@not_run, command(text)),
+    if is_map_key(@not_run, command(text)) or lacking(text) != nil,
       do: LookedAt.command(Reader.words(text), folder),
       else: Sandbox.run(text, answer, folder)
+  end
+
+  # Programs that a machine may do without (bin/setup).
+  defp lacking(text) do
+    with {_command, program} <- Enum.find(@programs, &String.starts_with?(text, elem(&1, 0))),
+         nil <- System.find_executable(program) do
+      IO.puts("not run, as #{program} is not here: #{text}")
+      program
+    else
+      _there_or_not_needed -> nil
+    end
   end
 
   # A sentence may say anything; but a command or a function that it names must be there.

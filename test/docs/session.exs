@@ -28,7 +28,7 @@ defmodule Docs.Session do
         {result, binding, env}
 
       shown == "" and match?({:ok, {:error, _line}}, result) ->
-        {{:refused, inspect(elem(result, 1))}, binding, env}
+        again({:refused, inspect(elem(result, 1))}, code, shown, {binding, env}, deadline)
 
       shown == "" ->
         {:ok, after_binding, after_env}
@@ -37,17 +37,18 @@ defmodule Docs.Session do
         {:ok, value} = result
         printed = String.trim(printed <> "\n" <> inspect(value, pretty: true, limit: 50))
 
-        cond do
-          Docs.Reader.like?(shown, printed) ->
-            {:ok, after_binding, after_env}
+        if Docs.Reader.like?(shown, printed),
+          do: {:ok, after_binding, after_env},
+          else: again({:printed, printed}, code, shown, {after_binding, after_env}, deadline)
+    end
+  end
 
-          System.monotonic_time(:millisecond) > deadline ->
-            {{:printed, printed}, after_binding, after_env}
-
-          true ->
-            receive(do: (:never -> :ok), after: (50 -> :ok))
-            type(code, shown, binding, env, deadline)
-        end
+  defp again(answer, code, shown, {binding, env}, deadline) do
+    if System.monotonic_time(:millisecond) > deadline do
+      {answer, binding, env}
+    else
+      receive(do: (:never -> :ok), after: (50 -> :ok))
+      type(code, shown, binding, env, deadline)
     end
   end
 
