@@ -10,13 +10,14 @@ defmodule Robot.Player do
   | `camerav4l` and its kin | `camera` | |
   | `cmvision` | `colours` | |
 
-  What follows from several options, and from Player's own defaults, is `Robot.Player.Whole`'s.
+  What follows from several options, and from Player's own defaults, is `Robot.Player.Whole`'s and
+  `Robot.Player.Boards`'s.
 
   All else is left out, and told: each option and section with its line and why. Units are those of
   `Robot.Player.Units`; where a file says something else than it seems to mean, what was assumed is
   told as well.
   """
-  alias Robot.Player.{Base, Eyes, Fit, Others, Sections, Text, Units, Whole}
+  alias Robot.Player.{Base, Boards, Eyes, Fit, Others, Sections, Text, Units, Whole}
 
   @drivers %{
     "rflex" => :drive,
@@ -53,7 +54,7 @@ defmodule Robot.Player do
       file is named in the robot file, and what is in it
 
   The error is one line: it names what keeps the file from being read, or says that no rFLEX is in it, or
-  which line of it leaves open what the robot's sensors are (`Robot.Player.Whole.sure/1`).
+  which line of it leaves open what the robot's sensors are (`Robot.Player.Boards.sure/1`).
   """
   @spec import(String.t(), keyword()) :: {:ok, result()} | {:error, String.t()}
   def import(text, options \\ []) do
@@ -64,9 +65,9 @@ defmodule Robot.Player do
          state = Enum.reduce(parsed.sections, start(parsed), &section(&1, &2, units)),
          :ok <- based(state),
          # What a line itself lacks comes before what lacks because of it.
-         :ok <- Whole.sure(state),
+         :ok <- Boards.sure(state),
          {profile, state} = finish(state, options),
-         :ok <- Whole.sure(state) do
+         :ok <- Boards.sure(state) do
       {:ok, result(state, profile, file, options)}
     else
       {:error, {line, why}} -> {:error, "#{file}:#{line}: #{why}"}
@@ -175,7 +176,8 @@ defmodule Robot.Player do
   defp finish(state, options) do
     state = Fit.allowed(state, @modules)
     {profile, state} = Whole.profile(state, options[:profile])
-    {profile, state |> Whole.complete(profile) |> coloured(options[:colours])}
+    state = state |> Whole.complete(profile) |> Boards.complete(profile)
+    {profile, coloured(state, options[:colours])}
   end
 
   defp result(state, profile, file, options) do
