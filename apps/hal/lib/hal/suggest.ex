@@ -10,11 +10,16 @@ defmodule Hal.Suggest do
       "formation"
       iex> Hal.Suggest.nearest("xyz", ["formation", "landmark"])
       nil
+      iex> Hal.Suggest.nearest(<<"format", 0xFF>>, ["formation", "landmark"])
+      nil
   """
   @spec nearest(String.t(), [String.t()]) :: String.t() | nil
   def nearest(word, known) do
-    word = String.downcase(word)
+    # Newer Elixirs do not compare what is not text, such as the words of a damaged file.
+    if String.valid?(word), do: likest(String.downcase(word), known)
+  end
 
+  defp likest(word, known) do
     known
     |> Enum.map(&{String.jaro_distance(word, &1), &1})
     |> Enum.filter(fn {likeness, _known} -> likeness > @near_enough end)
