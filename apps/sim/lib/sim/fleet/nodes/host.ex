@@ -37,21 +37,27 @@ defmodule Sim.Fleet.Nodes.Host do
     with :ok <- alone(),
          {:ok, home} <- Folder.make(),
          {:ok, secret} <- secret(home),
-         {:ok, named} <- become_node(),
-         {:ok, ports} <- ports([node() | nodes]) do
-      host = %__MODULE__{
-        home: home,
-        secret: secret,
-        ports: ports,
-        fleet: fleet,
-        mesh: nil,
-        named: named
-      }
-
-      with {:ok, options} <- Options.prepare(mesh(host, node())),
-           {:ok, mesh} <- Swarm.Mesh.Supervisor.start_link(options),
-           do: {:ok, %{host | mesh: mesh}}
+         {:ok, named} <- become_node() do
+      with {:error, line} <- meshed(home, secret, fleet, nodes, named) do
+        unname(named)
+        {:error, line}
+      end
     end
+  end
+
+  defp meshed(home, secret, fleet, nodes, named) do
+    with {:ok, ports} <- ports([node() | nodes]),
+         host = %__MODULE__{
+           home: home,
+           secret: secret,
+           ports: ports,
+           fleet: fleet,
+           mesh: nil,
+           named: named
+         },
+         {:ok, options} <- Options.prepare(mesh(host, node())),
+         {:ok, mesh} <- Swarm.Mesh.Supervisor.start_link(options),
+         do: {:ok, %{host | mesh: mesh}}
   end
 
   @doc """
