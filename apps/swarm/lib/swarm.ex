@@ -17,9 +17,10 @@ defmodule Swarm do
       iex> Swarm.estop()
       :ok
 
-  Every command answers within half a second: `:ok`, which means accepted, not done, or `{:error, line}`
-  that names what was wrong and what is allowed. Nothing raises, whatever it is given. A command
-  to several robots is `:ok` when all have accepted it.
+  Every command answers within half a second: `:ok`, which means accepted by the part of the robot that
+  carries it out, not done, or `{:error, line}` that names what was wrong and what is allowed, or who did not
+  answer. Of what stops, arms or resets a robot, `:ok` means that it is so. Nothing raises, whatever it is given. A
+  command to several robots is `:ok` when all have accepted it; where some refuse, they are named, and the others obey.
 
   Robots are atoms (`:mag1`), or their names as text. A robot does what it was told last: one that is
   sent somewhere leaves the group's mission, which goes on without it until the next start.
