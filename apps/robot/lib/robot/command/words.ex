@@ -89,9 +89,14 @@ defmodule Robot.Command.Words do
       "findblob"
       iex> Robot.Command.Words.nearest("xyz", ["findblob", "goto"])
       nil
+      iex> Robot.Command.Words.nearest(<<"got", 0xFF>>, ["findblob", "goto"])
+      nil
   """
   @spec nearest(String.t(), [String.t()]) :: String.t() | nil
   def nearest(word, words) do
+    # Newer Elixirs do not compare what is not text.
+    words = if String.valid?(word), do: words, else: []
+
     case words |> Enum.map(&{String.jaro_distance(word, &1), &1}) |> Enum.max(fn -> nil end) do
       {likeness, near} when likeness > 0.7 -> near
       _ -> nil
