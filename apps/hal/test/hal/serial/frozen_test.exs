@@ -24,10 +24,11 @@ defmodule Hal.Serial.FrozenTest do
     end
   end
 
-  defp freeze(near) do
-    kill(:STOP, os_pid(near))
-    stat = "/proc/#{os_pid(near)}/stat"
-    eventually(fn -> File.read!(stat) =~ ") T " end)
+  defp freeze(program) do
+    # Whatever becomes of the test, nobody is left behind frozen.
+    on_exit(fn -> System.cmd("kill", ["-CONT", "#{program}"], stderr_to_stdout: true) end)
+    kill(:STOP, program)
+    eventually(fn -> File.read!("/proc/#{program}/stat") =~ ") T " end)
   end
 
   test "its owner notices within a second; thawed it says the last words and nothing old", %{
@@ -36,7 +37,7 @@ defmodule Hal.Serial.FrozenTest do
   } do
     {:ok, near} = Serial.open(port: link, last_words: @stop)
     program = os_pid(near)
-    freeze(near)
+    freeze(program)
     since_ms = System.monotonic_time(:millisecond)
     for _ <- 1..10, do: :ok = Serial.write(near, "old speed\r")
     :ok = until_frozen(near)
@@ -56,7 +57,7 @@ defmodule Hal.Serial.FrozenTest do
     far: far
   } do
     {:ok, near} = Serial.open(port: link, last_words: @stop)
-    freeze(near)
+    freeze(os_pid(near))
     for _ <- 1..10, do: :ok = Serial.write(near, "old speed\r")
     :ok = until_frozen(near)
     kill(:CONT, os_pid(near))
@@ -85,9 +86,8 @@ defmodule Hal.Serial.FrozenTest do
     reporting(device, far, fn heard -> moves(heard) != [] end)
 
     program = program(device)
-    kill(:STOP, program)
     since_ms = System.monotonic_time(:millisecond)
-    eventually(fn -> File.read!("/proc/#{program}/stat") =~ ") T " end)
+    freeze(program)
     # What it had said before is read here and now.
     reporting(device, far, fn _ -> Device.arming(device).state == {:error, :frozen} end)
     assert System.monotonic_time(:millisecond) - since_ms < 2_500
