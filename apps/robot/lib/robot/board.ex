@@ -19,7 +19,7 @@ defmodule Robot.Board do
   | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Reflex.frame/1` |
   | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil, tick: count}` |
   | `:goal` | `:executive` | the module of its goal's behaviour, or `nil` |
-  | `:hung` | `:watch` | the module of the behaviour in which the executive hung last, or `nil` |
+  | `:hung` | `:watch` | `{:silent, module}` of the behaviour in which the executive hangs, `{:hung, module}` once it was ended for it |
   | `:pose` | `:executive` | the estimate in the `map` frame |
   | `:mission` | `:pilot` | `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state}` |
 

@@ -4,8 +4,10 @@ defmodule Robot.Watch do
   dead man stops the wheels, and the robot would stand for ever, well by its status.
 
   The watch asks nobody. It looks at the board, where the executive counts its ticks. When the count is the
-  same for eight looks of its own, 0.4 s, the executive hangs: the watch says so, on the board under `:hung` and by the event
-  `[:robot, :executive, :hung]`, names the behaviour, and ends it. The executive that follows is idle.
+  same for 8 looks of its own, 0.4 s, it says so, on the board under `:hung` and by the event
+  `[:robot, :executive, :silent]`, with the behaviour's name. On a busy machine a tick may take that long, for
+  instance where code is loaded; after 40 looks, 2 s, it is taken for one that never ends: the watch ends the executive
+  (`[:robot, :executive, :hung]`), and the one that follows is idle.
 
   It counts looks and not time, so that a machine that was asleep, or is slow, is not taken for a robot that hangs.
   """
@@ -14,7 +16,8 @@ defmodule Robot.Watch do
   alias Robot.{Board, Config, Names}
 
   @look_ms 50
-  @looks 8
+  @silent 8
+  @hung 40
 
   @typedoc "The count of ticks at the last look, and how many looks it has been the same."
   @type t :: {tick :: term(), same :: non_neg_integer()}
@@ -27,11 +30,17 @@ defmodule Robot.Watch do
       {8, 0}
       iex> {:well, watch} = Robot.Watch.look({8, 6}, 8)
       iex> Robot.Watch.look(watch, 8)
+      {:silent, {8, 8}}
+      iex> Robot.Watch.look({8, 8}, 9)
+      {:again, {9, 0}}
+      iex> Robot.Watch.look({8, 39}, 8)
       {:hangs, {8, 0}}
   """
-  @spec look(t(), tick :: term()) :: {:well | :hangs, t()}
-  def look({tick, same}, tick) when same + 1 >= @looks, do: {:hangs, {tick, 0}}
+  @spec look(t(), tick :: term()) :: {:well | :silent | :again | :hangs, t()}
+  def look({tick, same}, tick) when same + 1 >= @hung, do: {:hangs, {tick, 0}}
+  def look({tick, same}, tick) when same + 1 == @silent, do: {:silent, {tick, @silent}}
   def look({tick, same}, tick), do: {:well, {tick, same + 1}}
+  def look({_before, same}, tick) when same >= @silent, do: {:again, {tick, 0}}
   def look({_before, _same}, tick), do: {:well, {tick, 0}}
 
   @doc "Starts the watch of a robot whose board is running."
@@ -48,7 +57,7 @@ defmodule Robot.Watch do
   @impl GenServer
   def handle_info(:look, s) do
     {judged, watch} = look(s.watch, tick(s.board, s.config.id))
-    if judged == :hangs, do: restart(s)
+    act(judged, s)
     {:noreply, schedule(%{s | watch: watch})}
   end
 
@@ -62,15 +71,23 @@ defmodule Robot.Watch do
          else: (_none -> make_ref())
   end
 
-  defp restart(%{config: %{id: id} = config, board: board}) do
-    at_ms = Config.now(config)
-    behaviour = behaviour(board)
-    Board.put(board, :watch, :hung, behaviour, at_ms)
-    about = %{robot: id, behaviour: behaviour}
-    Event.execute([:robot, :executive, :hung], %{at_ms: at_ms}, about)
+  defp act(:well, _s), do: :ok
+  defp act(:again, s), do: Board.delete(s.board, :watch, :hung)
+  defp act(:silent, s), do: tell(s, :silent, behaviour(s.board))
+
+  defp act(:hangs, %{config: %{id: id}} = s) do
+    behaviour = behaviour(s.board)
+    tell(s, :hung, behaviour)
 
     with pid when is_pid(pid) <- Names.whereis(id, :executive),
          do: Process.exit(pid, {:hung, behaviour})
+  end
+
+  defp tell(%{config: config} = s, what, behaviour) do
+    at_ms = Config.now(config)
+    Board.put(s.board, :watch, :hung, {what, behaviour}, at_ms)
+    about = %{robot: config.id, behaviour: behaviour}
+    Event.execute([:robot, :executive, what], %{at_ms: at_ms}, about)
   end
 
   defp behaviour(board) do

@@ -9,8 +9,8 @@ defmodule Swarm.Status do
   (/dev/ttyR0: no such device)` (`offline`: words by device). A robot that is slow for want of sonar is
   `BLIND`. One that stands though nobody told it to says `FAULT`, and why (`fault`).
 
-  Of a robot whose behaviour hung, and which was started again for it (`Robot.Watch`), it says so for a minute (`hung`:
-  what hung, and how long ago, ms).
+  Of a robot whose behaviour hangs it says so, and for a minute after it was started again for that (`Robot.Watch`;
+  `hung`: `:silent` or `:hung`, in what, and how long ago, ms).
 
   `age_ms` is how old its newest reading is; `rejected` counts malformed messages by kind. `hears` are
   the robots it hears itself, `view` those that it takes for there (itself too), with the view's number,
@@ -67,7 +67,7 @@ defmodule Swarm.Status do
           estop: boolean(),
           arming: Hal.Arming.state() | nil,
           why: String.t() | nil,
-          hung: {behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
+          hung: {:silent | :hung, behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
           leader: atom() | String.t() | nil,
           power: float() | nil,
           health: %{(atom() | String.t()) => :online | {:offline, term()}},
@@ -136,8 +136,8 @@ defmodule Swarm.Status do
     end
   end
 
-  defp hung(%{hung: {module, ago_ms}}) when ago_ms < @recently_ms,
-    do: {if(module, do: inspect(module), else: "its thinking"), ago_ms}
+  defp hung(%{hung: {{what, module}, ago_ms}}) when ago_ms < @recently_ms,
+    do: {what, if(module, do: inspect(module), else: "its thinking"), ago_ms}
 
   defp hung(_never_or_long_ago), do: nil
 
@@ -197,7 +197,10 @@ defmodule Swarm.Status do
     end
 
     defp hung(nil), do: nil
-    defp hung({what, ago_ms}), do: "HUNG in #{what} #{div(ago_ms, 1_000)} s ago, started again"
+    defp hung({:silent, where, _ago_ms}), do: "HANGS in #{where}"
+
+    defp hung({:hung, where, ago_ms}),
+      do: "HUNG in #{where} #{div(ago_ms, 1_000)} s ago, started again"
 
     # Those of the view that are known by way of others only; nearly always none.
     defp deaf(%{view: {_number, members}} = status) do

@@ -169,7 +169,8 @@ defmodule Swarm.OrdersTest do
     assert Executive.goal(id, :hang, {Acts.Hang, test: self()}) == :ok
     assert_receive {:hangs, _executive}
     assert {:error, "orders_mind does not answer"} = Swarm.goto(id, {1, 1})
-    assert_receive {[:robot, :executive, :hung], %{behaviour: Acts.Hang}}
+    eventually(fn -> inspect(Swarm.status(id)) =~ ", HANGS in Robot.Acts.Hang," end)
+    assert_receive {[:robot, :executive, :hung], %{behaviour: Acts.Hang}}, 10_000
 
     eventually(fn ->
       pid = Names.whereis(id, :link)
@@ -179,7 +180,7 @@ defmodule Swarm.OrdersTest do
     end)
 
     status = Swarm.status(id)
-    assert %{state: :idle, hung: {"Robot.Acts.Hang", ago_ms}} = status
+    assert %{state: :idle, hung: {:hung, "Robot.Acts.Hang", ago_ms}} = status
     assert ago_ms < 60_000
     assert inspect(status) =~ ~r/, HUNG in Robot\.Acts\.Hang \d+ s ago, started again,/
     # Nothing of the order that was not answered is left.
