@@ -334,6 +334,28 @@ defmodule Sim.RFlexControllerTest do
       assert twist == Twist.zero()
     end
 
+    test "get no faster than a base can, however a command is damaged, and stop from there in time" do
+      motors = fn core ->
+        Sim.RFlexController.Motors.command(
+          core.motors,
+          0,
+          2_000_000_000,
+          2_000_000_000,
+          30_000,
+          0
+        )
+      end
+
+      core = controller(brake: :released)
+      {twist, core} = wanted(%{core | motors: motors.(core)}, 100)
+      assert_in_delta twist.linear, 2.5, 1.0e-6
+
+      # The next command, 0.1 s later, is right again: 1 m/s2.
+      stop = Sim.RFlexController.Motors.command(core.motors, 0, 0, 31_387, 30_000, 100)
+      {twist, _core} = wanted(%{core | motors: stop}, 2_650)
+      assert twist == Twist.zero()
+    end
+
     test "stop by themselves when no command comes" do
       core = controller(timeout_ms: 700, brake: :released) |> hear(@forward, 0)
       {twist, core} = wanted(core, 699)

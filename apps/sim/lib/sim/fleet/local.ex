@@ -14,6 +14,9 @@ defmodule Sim.Fleet.Local do
   alias Sim.Fleet.{Air, Folder, Hardware, Robot}
   alias Sim.{Server, Worlds}
 
+  @armed_ms 5_000
+  @look_ms 10
+
   @enforce_keys [:supervisor, :server, :air, :order, :pids, :robots, :folder]
   defstruct @enforce_keys
 
@@ -50,6 +53,8 @@ defmodule Sim.Fleet.Local do
         {pid, robot.id}
       end
 
+    await_armed(Map.values(pids), System.monotonic_time(:millisecond) + @armed_ms)
+
     %__MODULE__{
       supervisor: supervisor,
       server: part.(Server),
@@ -59,6 +64,17 @@ defmodule Sim.Fleet.Local do
       robots: setup.robots,
       folder: folder
     }
+  end
+
+  # Drives arm by themselves once they have reported. Until then a robot refuses what would move it, also
+  # the first order of a person who has just started the fleet. One that cannot arm holds nobody up for long.
+  defp await_armed(ids, until_ms) do
+    late = Enum.reject(ids, &Robot.armed?/1)
+
+    if late != [] and System.monotonic_time(:millisecond) < until_ms do
+      Process.sleep(@look_ms)
+      await_armed(late, until_ms)
+    end
   end
 
   @doc false

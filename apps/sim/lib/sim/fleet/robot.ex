@@ -45,6 +45,15 @@ defmodule Sim.Fleet.Robot do
     :ok = Pilot.command(id, :start)
   end
 
+  @doc "Whether its wheels may turn: its drive is there, has reported, and is armed."
+  @spec armed?(atom()) :: boolean()
+  def armed?(id) do
+    with {:ok, board} <- Board.find(id),
+         {:ok, %{state: :armed}, _at_ms} <- Board.fetch(board, :arming, :infinity),
+         do: true,
+         else: (_not_yet -> false)
+  end
+
   @doc "What it claims of itself, as in lockstep, but read off its board."
   @spec claim(atom()) :: map()
   def claim(id) do

@@ -4,10 +4,16 @@ defmodule Sim.RFlexController.Motors do
   commands fail to come, and the counters. Pure; counts are the controller's, times milliseconds.
 
   What the sheet leaves open: an acceleration of 0 leaves the axis with the one before; a set brake stops the
-  wheels at once, and takes no speed while it is set.
+  wheels at once, and takes no speed while it is set; an axis gets no faster than a base of that size can, 2.5 m/s and
+  5 rad/s, whatever it is told. (A command damaged on its way, whose checksum fits all the same, may ask for 20 m/s
+  at 100 m/s2; an axis that took that as it stands would brake from it for 20 s.)
   """
   import Bitwise
   alias Hal.{Odometry, Pose, Twist}
+
+  # The fastest that an axis goes, m/s and rad/s.
+  @top_linear 2.5
+  @top_turn 5.0
 
   @enforce_keys [:conversions, :start, :timeout_ms, :brake?, :at_ms]
   defstruct @enforce_keys ++
@@ -91,10 +97,19 @@ defmodule Sim.RFlexController.Motors do
   defp ramp(motors, at_ms) do
     s = (at_ms - motors.at_ms) / 1000
 
-    each(%{motors | at_ms: at_ms}, fn axis ->
-      %{axis | ramp: towards(axis.ramp, axis.target, axis.acceleration * s)}
-    end)
+    {way, turn} = motors.axes
+    {distance, angle} = motors.conversions
+
+    axes = {
+      %{way | ramp: ramp(way, s, @top_linear * abs(distance))},
+      %{turn | ramp: ramp(turn, s, @top_turn * abs(angle))}
+    }
+
+    %{motors | at_ms: at_ms, axes: axes}
   end
+
+  defp ramp(axis, s, top),
+    do: axis.ramp |> towards(axis.target, axis.acceleration * s) |> max(-top) |> min(top)
 
   defp towards(from, to, most), do: from + ((to - from) |> max(-most) |> min(most))
 
