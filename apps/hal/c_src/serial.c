@@ -28,7 +28,7 @@
 
    Every sign of life says when it was given, `at` in milliseconds of CLOCK_MONOTONIC, which the VM reads too. We may
    be frozen (SIGSTOP) while the VM is not; what it says meanwhile waits in the pipe, and on the line nothing can be
-   said. When we go on, what is older than STALE_MS is not written, and a sign of life counts for when it was given:
+   said. When we go on, what is older than the keep-alive time is not written, and a sign of life counts for when it was given:
    so no old speed comes, and the last words do. The VM notices that 'K' is not answered.
 
    After 'E' and 'C' we wait for our input to end: were we gone, a write of the VM's could fail, and it
@@ -61,7 +61,7 @@
 #define WORDS_MS 200        /* the longest try to have the last words taken */
 #define CLOSE_MS 500        /* the longest that 'C' waits for what was written before, and for the end */
 #define FAREWELL_MS 1000    /* the longest that we stay after SIGTERM for the VM to hear of it */
-#define STALE_MS 200        /* what is older is not worth to be said */
+
 #define ANSWER_MS 100       /* between two answers to 'K' */
 #define ABSENT_MS 10        /* how often a pty is asked whether somebody has opened its other end */
 #define SLAVE_MAJOR_FIRST 136
@@ -243,7 +243,7 @@ static void drop_stale(void)
 
     if (!continued && (sigpending(&pending) != 0 || !sigismember(&pending, SIGCONT)))
         return;
-    if (s.out_have > 0 && now_ms() - s.out_ms > STALE_MS)
+    if (s.out_have > 0 && now_ms() - s.out_ms > s.keep_alive_ms)
         drop_out();
 }
 
@@ -479,7 +479,7 @@ static int64_t alive(int64_t at)
         at = now;
     if (at > s.life_ms)
         s.life_ms = at;
-    if (now - at <= STALE_MS)
+    if (now - at <= s.keep_alive_ms)
         s.spoken = 0;
     return now - at;
 }
@@ -529,7 +529,7 @@ static void take_packet(const uint8_t *packet, size_t size)
     }
     switch (packet[0]) {
     case 'W':
-        if (age > STALE_MS || size > sizeof s.out - s.out_have) {
+        if (age > s.keep_alive_ms || size > sizeof s.out - s.out_have) {
             note_taken(size);   /* too late, or more than the VM knows there is room for */
         } else {
             memcpy(s.out + s.out_have, body, size);

@@ -326,7 +326,7 @@ static void frozen(void)
     close(t.master);
 
     /* New last words are never too old, nor is the end of the VM. */
-    start_on_pty("100000");
+    start_on_pty("200");
     freeze();
     send_packet('W', "old", 3);
     send_packet('L', "HALT", 4);
@@ -339,7 +339,7 @@ static void frozen(void)
     close(t.master);
 
     /* What the line had not taken is old too: of it there is so much that some waits in the program. */
-    start_on_pty("100000");
+    start_on_pty("200");
     memset(much, 'x', sizeof much);
     while (sent < taken + 5000) {
         struct pollfd from = { .fd = t.out, .events = POLLIN };

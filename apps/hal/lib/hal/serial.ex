@@ -41,8 +41,8 @@ defmodule Hal.Serial do
   see `Hal.Serial.Circuits`.
 
   The port program itself may be frozen, and only it: then nobody can say anything on the line. `keep_alive/1`, said
-  often, gives `{:error, :frozen}` after half a second. When it goes on, it writes nothing that it was told more than
-  200 ms before, and then the last words.
+  often, gives `{:error, :frozen}` after half a second. When it goes on, it writes nothing that it was told longer
+  ago than `keep_alive_ms`, and then the last words.
 
   ## Much at once
 

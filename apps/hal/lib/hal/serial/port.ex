@@ -9,7 +9,7 @@ defmodule Hal.Serial.Port do
   It may also be frozen alone (`kill -STOP`): then nothing can be said on the line, the last words neither. It does
   not answer the signs of life any more, and `keep_alive/1` says `:frozen` when 500 ms and five of them went by. All
   that is said to it bears the time of the machine's monotonic clock, so that, when it goes on, it writes
-  nothing that is older than 200 ms: after a freeze the line hears the last words, or what is said now.
+  nothing that is older than `keep_alive_ms` (200 ms): after a freeze the line hears the last words, or what is said now.
 
   Errors of `open/1`: `:enoent`, `:eacces`, `:ebusy` (another program has locked it), `:eio`, `:enodev`,
   `:enxio` (nothing behind it), `:enotty` (not a serial device), `:speed` (the hardware cannot), `:einval`,
