@@ -181,7 +181,7 @@ defmodule Swarm.Group do
 
   defp tick(group) do
     group = deliver(%{group | now: group.now + @tick_ms})
-    ids = Enum.shuffle(Map.keys(group.robots))
+    ids = group.robots |> Map.keys() |> Enum.sort() |> Enum.shuffle()
     ids |> Enum.reduce(group, &think/2) |> watch()
   end
 
