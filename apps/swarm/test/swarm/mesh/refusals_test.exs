@@ -46,11 +46,11 @@ defmodule Swarm.Mesh.RefusalsTest do
     knock = ["s_client", "-tls1_2", "-connect", "127.0.0.1:9761", "-cert"]
     papers = [Path.join(other, "spy/cert.pem"), "-key", Path.join(other, "spy/key.pem")]
 
-    System.cmd("sh", ["-c", ~s(exec openssl "$@" </dev/null), "sh" | knock ++ papers],
-      stderr_to_stdout: true
-    )
-
+    # Its input stays open, so that it ends only when it has heard the refusal.
+    openssl = {:spawn_executable, System.find_executable("openssl")}
+    client = Port.open(openssl, [:binary, :stderr_to_stdout, args: knock ++ papers])
     logged(log, "refused spy at 127.0.0.1:N: its certificate is of another fleet (unknown CA)")
+    if Port.info(client), do: Port.close(client)
     assert :peer.call(door, Node, :list, []) == []
     refute File.read!(log) =~ "ALERT"
   end
