@@ -33,6 +33,8 @@ defmodule System.DocsTest do
   @not_run %{
     "bin/demo" => @live,
     "bin/test" => @tests,
+    "bin/test-on bookworm --fresh" => @tests,
+    "bin/test-on trixie --fresh" => @tests,
     "bin/setup" => @system,
     "bin/demo --nodes" => @live,
     "bin/demo --nodes --robots 4" => @live,
