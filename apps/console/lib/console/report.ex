@@ -6,13 +6,15 @@ defmodule Console.Report do
   bytes, except for `wall_s`, the only key that tells of the machine.
   """
   alias Console.{Output, Words}
+  alias Sim.Trial.Claims
 
   @version Mix.Project.config()[:version]
 
   @keys ~w(version seed map robots simulated_s wall_s stages leader leaders_at_once_max
-           leader_changes formation landmark_distance_m collisions min_separation_m messages fleet)a
+           leader_changes formation claims landmark_distance_m collisions min_separation_m messages fleet)a
   @stage ~w(stage at_s robot epoch size_ppm)a
   @formation ~w(kind spacing_m error_mean_m error_max_m share_of_time_formed)a
+  @claim ~w(at_s robot worst_m worst_5s_m)a
   @messages ~w(sent lost)a
   @robot ~w(name alive state x y theta slot error_m size_ppm)a
 
@@ -27,6 +29,7 @@ defmodule Console.Report do
       wall_s: wall_s,
       stages: Enum.map(result.stages, &stage/1),
       formation: object(result.formation, @formation),
+      claims: Enum.map(result.claims, &object(&1, @claim)),
       messages: object(result.messages, @messages),
       fleet: Enum.map(result.fleet, &object(&1, @robot))
     })
@@ -41,7 +44,7 @@ defmodule Console.Report do
   @spec summary(map(), boolean(), float()) :: [String.t()]
   def summary(result, formed?, wall_s) do
     [
-      outcome(result, formed?),
+      outcome(result, formed?) <> wrong(result.claims),
       safety(result),
       leadership(result),
       "#{Words.decimals(result.simulated_s, 1)} s simulated in #{Words.decimals(wall_s, 1)} s" <>
@@ -108,6 +111,20 @@ defmodule Console.Report do
   defp error(formation) do
     ", off their places by #{Words.decimals(formation.error_mean_m, 2)} m in the mean" <>
       " and #{Words.decimals(formation.error_max_m, 2)} m at most"
+  end
+
+  defp wrong(claims) do
+    case Enum.count(claims, &(Claims.right?(&1) == false)) do
+      0 -> ""
+      count -> " Formed was wrongly claimed " <> times(count, claims) <> "."
+    end
+  end
+
+  defp times(count, claims) do
+    worst =
+      claims |> Enum.flat_map(&[&1.worst_m, &1.worst_5s_m]) |> Enum.filter(& &1) |> Enum.max()
+
+    "#{Words.count(count, "time")}: a robot was #{Words.decimals(worst, 2)} m off"
   end
 
   defp speed(times), do: Words.decimals(times, if(times < 10, do: 1, else: 0))

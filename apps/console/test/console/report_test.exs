@@ -21,12 +21,15 @@ defmodule Console.ReportTest do
 
     assert keys(report) ==
              ~w(version seed map robots simulated_s wall_s stages leader leaders_at_once_max
-                leader_changes formation landmark_distance_m collisions min_separation_m messages fleet)a
+                leader_changes formation claims landmark_distance_m collisions min_separation_m messages fleet)a
 
     assert keys(fetch(report, :formation)) ==
              ~w(kind spacing_m error_mean_m error_max_m share_of_time_formed)a
 
     assert keys(fetch(report, :messages)) == ~w(sent lost)a
+
+    for claim <- fetch(report, :claims),
+        do: assert(keys(claim) == ~w(at_s robot worst_m worst_5s_m)a)
 
     for robot <- fetch(report, :fleet),
         do: assert(keys(robot) == ~w(name alive state x y theta slot error_m size_ppm)a)
@@ -60,10 +63,19 @@ defmodule Console.ReportTest do
     assert first =~ "No formation: 6 robots"
   end
 
+  test "report and summary say what each claim of formed was worth" do
+    result = result("")
+    [claim] = fetch(Report.term(result, 1.0), :claims)
+    assert {fetch(claim, :worst_m), fetch(claim, :worst_5s_m)} == {0.211, 0.622}
+    line = hd(Report.summary(result, true, 2.0))
+    assert line =~ "Formed was wrongly claimed 1 time: a robot was 0.62 m off."
+  end
+
   test "the summary tells a formation from none" do
     result = result("")
     assert hd(Report.summary(result, true, 2.0)) =~ "In formation: column of 6 led by"
     assert hd(Report.summary(result, false, 2.0)) =~ "Not in formation"
+    refute hd(Report.summary(%{result | claims: []}, true, 2.0)) =~ "wrongly"
 
     assert List.last(Report.summary(%{result | simulated_s: 60.0}, true, 2.0)) =~
              "30 times real time"

@@ -124,6 +124,7 @@ defmodule Console.FakeTrial do
       landmark_distance_m: 1.23456,
       collisions: 0,
       min_separation_m: 0.61,
+      claims: claims(trial),
       messages: %{sent: 1234, lost: 0},
       fleet:
         for r <- trial.robots do
@@ -141,6 +142,11 @@ defmodule Console.FakeTrial do
         end
     }
   end
+
+  defp claims(%{formed_ms: nil}), do: []
+
+  defp claims(%{formed_ms: at_ms, leader: leader}),
+    do: [%{at_s: at_ms / 1000, robot: leader, worst_m: 0.21111, worst_5s_m: 0.62222}]
 
   defp slot(_trial, %{slot: nil}), do: nil
 

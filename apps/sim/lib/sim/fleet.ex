@@ -157,7 +157,10 @@ defmodule Sim.Fleet do
 
   @impl GenServer
   def handle_info(:tick, s) do
-    ledger = Ledger.note(s.ledger, now(s.epoch_ms), ask(s, :claims))
+    now = now(s.epoch_ms)
+    claims = ask(s, :claims)
+    worst = fn leader -> s |> run() |> Score.worst(leader) end
+    ledger = s.ledger |> Ledger.note(now, claims) |> Ledger.judge(now, claims, worst)
     {events, script} = Script.due(s.script, now(s.epoch_ms), Ledger.leader(ledger))
     s = Enum.reduce(events, %{s | ledger: ledger, script: script}, &play/2)
     {:noreply, schedule(s)}

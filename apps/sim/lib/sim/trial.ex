@@ -216,7 +216,9 @@ defmodule Sim.Trial do
     parts = Radio.parts(trial.radio, Enum.map(claims, &elem(&1, 0)))
     standing = for {id, member} <- trial.members, Member.stands?(member), do: id
 
-    %{trial | ledger: Ledger.note(trial.ledger, trial.at_ms, claims, parts, standing)}
+    ledger = Ledger.note(trial.ledger, trial.at_ms, claims, parts, standing)
+    worst = fn leader -> trial |> run() |> Score.worst(leader) end
+    %{trial | ledger: Ledger.judge(ledger, trial.at_ms, claims, worst)}
   end
 
   defp act(trial) do

@@ -8,7 +8,8 @@ defmodule Console.Bench.Run do
   @push_m 3.0
 
   @typedoc """
-  `formed_s` is `nil` when the fleet did not form (again) before its time was up.
+  `formed_s` is `nil` when the fleet did not form (again) before its time was up. `claims` are all of the
+  run, those before the deed too.
   """
   @type measured :: %{
           formed_s: float() | nil,
@@ -17,6 +18,7 @@ defmodule Console.Bench.Run do
           collisions: non_neg_integer(),
           leaders: non_neg_integer(),
           changes: non_neg_integer(),
+          claims: [Sim.Trial.Claims.claim()],
           speed: float()
         }
 
@@ -132,6 +134,7 @@ defmodule Console.Bench.Run do
       collisions: result.collisions,
       leaders: result.leaders_at_once_max,
       changes: result.leader_changes - state.changes,
+      claims: result.claims,
       speed: result.simulated_s / wall_s
     }
   end

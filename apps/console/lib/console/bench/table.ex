@@ -1,6 +1,7 @@
 defmodule Console.Bench.Table do
   @moduledoc "Measured runs as a table in Markdown. Pure."
   alias Console.Words
+  alias Sim.Trial.Claims
 
   @heads [
     "case",
@@ -10,6 +11,7 @@ defmodule Console.Bench.Table do
     "time to formed: median / 95 % / max (s)",
     "error mean: median / 90 % / max (m)",
     "error max: median / 90 % / max (m)",
+    "true claims of formed",
     "collisions",
     "leaders at once",
     "leader changes: mean / max",
@@ -54,12 +56,51 @@ defmodule Console.Bench.Table do
       figures(times, [0.5, 0.95, 1.0], 1),
       figures(means, [0.5, 0.9, 1.0], 3),
       figures(maxima, [0.5, 0.9, 1.0], 3),
+      runs |> true_claims() |> share(),
       "#{runs |> Enum.map(& &1.collisions) |> Enum.sum()}",
       "#{runs |> Enum.map(& &1.leaders) |> Enum.max(fn -> 0 end)}",
       "#{Words.decimals(Enum.sum(changes) / max(length(runs), 1), 1)} / #{Enum.max(changes, fn -> 0 end)}",
       figures(Enum.map(runs, & &1.speed), [0.5], 0)
     ]
   end
+
+  @doc """
+  What all claims of `formed` were worth, in two lines: how many were true, all cases and maps pooled, and
+  the case that did worst. A claim is true when the worst robot was at most half a metre off at the claim
+  and 5 s later (`Sim.Trial.Claims`).
+  """
+  @spec pooled([{String.t(), String.t(), number(), [Console.Bench.Run.measured()]}]) :: String.t()
+  def pooled(rows) do
+    judged =
+      for {says, map, _limit_s, runs} <- rows,
+          {_right, all} = counts = true_claims(runs),
+          all > 0,
+          do: {"#{says}, in #{map}", counts}
+
+    right = judged |> Enum.map(fn {_says, {right, _all}} -> right end) |> Enum.sum()
+    all = judged |> Enum.map(fn {_says, {_right, all}} -> all end) |> Enum.sum()
+    metres = Words.decimals(Claims.right_m(), 1)
+
+    "Claims of formed with the worst robot at most #{metres} m off, at the claim and 5 s later: " <>
+      "#{share({right, all})} (goal 99 %).\n" <> least(judged)
+  end
+
+  defp least([]), do: ""
+
+  defp least(judged) do
+    {says, counts} = Enum.min_by(judged, fn {_says, {right, all}} -> right / all end)
+    "Least in one case: #{says}, #{share(counts)} (goal 95 %).\n"
+  end
+
+  defp true_claims(runs) do
+    verdicts = for run <- runs, claim <- run.claims, do: Claims.right?(claim)
+    {Enum.count(verdicts, &(&1 == true)), Enum.count(verdicts, &(&1 != nil))}
+  end
+
+  defp share({_right, 0}), do: "–"
+
+  defp share({right, all}),
+    do: "#{right} of #{all} (#{Words.decimals(100 * right / all, 1)} %)"
 
   defp figures([], _shares, _decimals), do: "–"
 

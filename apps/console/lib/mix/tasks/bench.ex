@@ -70,7 +70,8 @@ defmodule Mix.Tasks.Bench do
     for {{case, map, seed}, {:error, line}} <- results,
         do: Output.line(output, "bench: #{case.name} in #{map}, seed #{seed}: #{line}")
 
-    text = results |> rows(cases, maps) |> Bench.Table.draw()
+    rows = rows(results, cases, maps)
+    text = Bench.Table.draw(rows) <> "\n" <> Bench.Table.pooled(rows)
     IO.write(text)
     write(given["markdown"], text)
   end

@@ -4,7 +4,7 @@ defmodule Sim.Trial.Ledger do
   Pure; fed every 100 ms with what the living robots claim.
   """
 
-  alias Sim.Trial.Accord
+  alias Sim.Trial.{Accord, Claims}
 
   defstruct stages: [],
             leader: nil,
@@ -16,7 +16,8 @@ defmodule Sim.Trial.Ledger do
             formed_ticks: 0,
             formed_ms: nil,
             rest_ms: nil,
-            accord: %Sim.Trial.Accord{}
+            accord: %Sim.Trial.Accord{},
+            claims: %Sim.Trial.Claims{}
 
   @type stage :: %{
           required(:stage) => atom(),
@@ -41,7 +42,8 @@ defmodule Sim.Trial.Ledger do
           formed_ticks: non_neg_integer(),
           formed_ms: integer() | nil,
           rest_ms: integer() | nil,
-          accord: Sim.Trial.Accord.t()
+          accord: Sim.Trial.Accord.t(),
+          claims: Sim.Trial.Claims.t()
         }
 
   @doc "An empty ledger."
@@ -90,6 +92,16 @@ defmodule Sim.Trial.Ledger do
         rest_ms:
           if(phases != [] and Enum.all?(phases, &(&1 == :rest)), do: ledger.rest_ms || at_ms)
     }
+  end
+
+  @doc """
+  The same tick judged by true poses (`Sim.Trial.Claims`): `worst` says of a leader how far the worst robot
+  of its shape is from its slot, in metres.
+  """
+  @spec judge(t(), integer(), [{atom(), map()}], (atom() -> float() | nil)) :: t()
+  def judge(ledger, at_ms, claims, worst) do
+    leaders = for {id, %{phase: :lead, formed: true}} <- claims, do: id
+    %{ledger | claims: Claims.note(ledger.claims, at_ms, leaders, worst)}
   end
 
   @doc "Who leads now: of several the one of the highest epoch."

@@ -5,7 +5,7 @@ defmodule Sim.Trial.Score do
   """
   alias Hal.Pose
   alias Sim.{Scene, World}
-  alias Sim.Trial.{Accord, Ledger, Setup}
+  alias Sim.Trial.{Accord, Claims, Ledger, Setup}
   alias Swarm.{Anchor, Formation}
 
   @typedoc "A run at one instant; `claims` are those of the living."
@@ -85,10 +85,22 @@ defmodule Sim.Trial.Score do
           Pose.distance(World.truth(run.world, leader), scene.landmark),
       collisions: run.world.collisions,
       min_separation_m: run.world.min_separation,
+      claims: Claims.report(run.ledger.claims, run.at_ms, &worst(run, &1)),
       messages: run.messages,
       agreement: Accord.report(run.ledger.accord),
       fleet: for(robot <- scene.robots, do: row(robot, Map.get(slots, robot.id)))
     }
+  end
+
+  @doc "How far the worst living robot of a leader's shape is from its slot, in metres; `nil` where it leads nobody."
+  @spec worst(run(), leader :: atom()) :: float() | nil
+  def worst(run, leader) do
+    errors =
+      for {id, {_place, slot}} <- slots(run, leader),
+          is_map_key(run.claims, id),
+          do: Pose.distance(World.truth(run.world, id), slot)
+
+    Enum.max(errors, fn -> nil end)
   end
 
   defp row(robot, slot) do
