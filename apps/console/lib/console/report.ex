@@ -11,12 +11,13 @@ defmodule Console.Report do
   @version Mix.Project.config()[:version]
 
   @keys ~w(version seed map robots simulated_s wall_s stages leader leaders_at_once_max
-           leader_changes formation claims landmark_distance_m collisions min_separation_m messages fleet)a
+           leader_changes formation claims stuck landmark_distance_m collisions min_separation_m messages fleet)a
   @stage ~w(stage at_s robot epoch size_ppm)a
   @formation ~w(kind spacing_m error_mean_m error_max_m share_of_time_formed)a
   @claim ~w(at_s robot worst_m worst_5s_m)a
   @messages ~w(sent lost)a
-  @robot ~w(name alive state x y theta slot error_m size_ppm)a
+  @stuck ~w(at_s robot error_m)a
+  @robot ~w(name alive state blocked_by x y theta slot error_m size_ppm)a
 
   @doc """
   The report as a term for `Hal.Json.encode!/1`, from a trial's result.
@@ -30,6 +31,7 @@ defmodule Console.Report do
       stages: Enum.map(result.stages, &stage/1),
       formation: object(result.formation, @formation),
       claims: Enum.map(result.claims, &object(&1, @claim)),
+      stuck: Enum.map(result.stuck, &object(&1, @stuck)),
       messages: object(result.messages, @messages),
       fleet: Enum.map(result.fleet, &object(&1, @robot))
     })
@@ -44,7 +46,7 @@ defmodule Console.Report do
   @spec summary(map(), boolean(), float()) :: [String.t()]
   def summary(result, formed?, wall_s) do
     [
-      outcome(result, formed?) <> wrong(result.claims),
+      outcome(result, formed?) <> wrong(result.claims) <> blocked(result.fleet),
       safety(result),
       leadership(result),
       "#{Words.decimals(result.simulated_s, 1)} s simulated in #{Words.decimals(wall_s, 1)} s" <>
@@ -126,6 +128,15 @@ defmodule Console.Report do
 
     "#{Words.count(count, "time")}: a robot was #{Words.decimals(worst, 2)} m off"
   end
+
+  defp blocked(fleet) do
+    case for %{blocked_by: words} = robot when words != nil <- fleet, do: {robot.name, words} do
+      [] -> ""
+      blocked -> " Blocked: " <> Enum.map_join(blocked, ", ", &by/1) <> "."
+    end
+  end
+
+  defp by({name, words}), do: "#{name} by #{words}"
 
   defp speed(times), do: Words.decimals(times, if(times < 10, do: 1, else: 0))
 

@@ -45,6 +45,7 @@ defmodule Console.BenchTest do
     pooled = Bench.Table.pooled(rows)
     assert pooled =~ "at most 0.5 m off, at the claim and 5 s later: 3 of 4 (75.0 %)"
     assert pooled =~ "Least in one case: slip, in hall, 1 of 2 (50.0 %)"
+    assert pooled =~ "without a word: 0 (goal 0)"
     assert "slip" in Enum.map(Bench.cases(), & &1.name)
   end
 

@@ -21,7 +21,7 @@ defmodule Console.ReportTest do
 
     assert keys(report) ==
              ~w(version seed map robots simulated_s wall_s stages leader leaders_at_once_max
-                leader_changes formation claims landmark_distance_m collisions min_separation_m messages fleet)a
+                leader_changes formation claims stuck landmark_distance_m collisions min_separation_m messages fleet)a
 
     assert keys(fetch(report, :formation)) ==
              ~w(kind spacing_m error_mean_m error_max_m share_of_time_formed)a
@@ -32,7 +32,8 @@ defmodule Console.ReportTest do
         do: assert(keys(claim) == ~w(at_s robot worst_m worst_5s_m)a)
 
     for robot <- fetch(report, :fleet),
-        do: assert(keys(robot) == ~w(name alive state x y theta slot error_m size_ppm)a)
+        do:
+          assert(keys(robot) == ~w(name alive state blocked_by x y theta slot error_m size_ppm)a)
 
     assert Enum.map(fetch(report, :stages), &keys/1) == [
              [:stage, :at_s],
@@ -69,6 +70,14 @@ defmodule Console.ReportTest do
     assert {fetch(claim, :worst_m), fetch(claim, :worst_5s_m)} == {0.211, 0.622}
     line = hd(Report.summary(result, true, 2.0))
     assert line =~ "Formed was wrongly claimed 1 time: a robot was 0.62 m off."
+  end
+
+  test "the summary names who is blocked, and by what" do
+    result = result("")
+    [first | rest] = result.fleet
+    blocked = %{result | fleet: [%{first | blocked_by: "the landmark"} | rest]}
+    assert hd(Report.summary(blocked, false, 2.0)) =~ "Blocked: #{first.name} by the landmark."
+    refute hd(Report.summary(result, false, 2.0)) =~ "Blocked"
   end
 
   test "the summary tells a formation from none" do

@@ -125,6 +125,7 @@ defmodule Console.FakeTrial do
       collisions: 0,
       min_separation_m: 0.61,
       claims: claims(trial),
+      stuck: [],
       messages: %{sent: 1234, lost: 0},
       fleet:
         for r <- trial.robots do
@@ -132,6 +133,7 @@ defmodule Console.FakeTrial do
             name: r.id,
             alive: r.alive,
             state: r.state,
+            blocked_by: nil,
             x: r.pose.x,
             y: r.pose.y,
             theta: r.pose.heading,

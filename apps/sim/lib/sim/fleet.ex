@@ -160,7 +160,9 @@ defmodule Sim.Fleet do
     now = now(s.epoch_ms)
     claims = ask(s, :claims)
     worst = fn leader -> s |> run() |> Score.worst(leader) end
+    followers = fn -> s |> run() |> Score.followers() end
     ledger = s.ledger |> Ledger.note(now, claims) |> Ledger.judge(now, claims, worst)
+    ledger = Ledger.watch(ledger, now, followers)
     {events, script} = Script.due(s.script, now(s.epoch_ms), Ledger.leader(ledger))
     s = Enum.reduce(events, %{s | ledger: ledger, script: script}, &play/2)
     {:noreply, schedule(s)}

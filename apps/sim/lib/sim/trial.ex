@@ -218,7 +218,9 @@ defmodule Sim.Trial do
 
     ledger = Ledger.note(trial.ledger, trial.at_ms, claims, parts, standing)
     worst = fn leader -> trial |> run() |> Score.worst(leader) end
-    %{trial | ledger: Ledger.judge(ledger, trial.at_ms, claims, worst)}
+    ledger = Ledger.judge(ledger, trial.at_ms, claims, worst)
+    followers = fn -> Score.followers(%{run(trial) | ledger: ledger}) end
+    %{trial | ledger: Ledger.watch(ledger, trial.at_ms, followers)}
   end
 
   defp act(trial) do

@@ -1,5 +1,8 @@
 defmodule Sim.TrialRuns do
-  @moduledoc "Plays whole missions in lockstep for tests."
+  @moduledoc """
+  Plays whole missions in lockstep for tests. In all of them a robot that does not get on says so.
+  """
+  import ExUnit.Assertions
   alias Sim.Trial
 
   @doc "A run to its end; blobs are seen directly unless told otherwise."
@@ -13,5 +16,10 @@ defmodule Sim.TrialRuns do
 
   @doc "Plays on until a condition holds."
   def until(trial, condition),
-    do: if(condition.(trial), do: trial, else: until(Trial.step(trial), condition))
+    do: if(condition.(trial), do: spoken(trial), else: until(Trial.step(trial), condition))
+
+  defp spoken(trial) do
+    assert Trial.result(trial).stuck == [], "robots stood short of their places without a word"
+    trial
+  end
 end

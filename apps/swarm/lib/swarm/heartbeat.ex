@@ -72,7 +72,8 @@ defmodule Swarm.Heartbeat do
       latched: stop.latched?
     }
 
-    struct!(beat, claim)
+    # What a robot is blocked by is for people, who ask the robot itself.
+    struct!(beat, Map.delete(claim, :blocked_by))
   end
 
   @doc """

@@ -12,6 +12,9 @@ defmodule Swarm.Status do
   Of a robot whose behaviour hangs it says so, and for a minute after it was started again for that (`Robot.Watch`;
   `hung`: `:silent` or `:hung`, in what, and how long ago, ms).
 
+  A follower that does not get to its place is `BLOCKED by the landmark`, by another robot, by something
+  unknown or by `no way` (`Swarm.Missions.Landmark.Blocker`).
+
   `age_ms` is how old its newest reading is; `rejected` counts malformed messages by kind. `hears` are
   the robots it hears itself, `view` those that it takes for there (itself too), with the view's number,
   which grows with each that comes or goes (`Swarm.Peers`). Of whom it knows by way of others only, the line
@@ -24,6 +27,7 @@ defmodule Swarm.Status do
   alias Hal.Pose
   alias Robot.{Board, Config}
   alias Swarm.Link.Ear
+  alias Swarm.Missions.Landmark.Blocker
   alias Swarm.{Missions, Peers}
 
   @recently_ms 60_000
@@ -43,6 +47,7 @@ defmodule Swarm.Status do
                 why: nil,
                 hung: nil,
                 leader: nil,
+                blocked_by: nil,
                 power: nil,
                 health: %{},
                 offline: %{},
@@ -69,6 +74,7 @@ defmodule Swarm.Status do
           why: String.t() | nil,
           hung: {:silent | :hung, behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
           leader: atom() | String.t() | nil,
+          blocked_by: String.t() | nil,
           power: float() | nil,
           health: %{(atom() | String.t()) => :online | {:offline, term()}},
           offline: %{(atom() | String.t()) => String.t()},
@@ -103,6 +109,7 @@ defmodule Swarm.Status do
       why: entries |> value(:arming) |> field(:why),
       hung: hung(entries),
       leader: mission |> field(:claim) |> field(:leader),
+      blocked_by: mission |> field(:claim) |> field(:blocked_by) |> Blocker.words(),
       power: value(entries, :power),
       health: Map.new(health),
       offline:
@@ -179,6 +186,7 @@ defmodule Swarm.Status do
         status.fault && "FAULT (#{status.fault})",
         Enum.any?(status.limits, &("#{&1}" == "blind")) && "BLIND (no sonar; slow)",
         hung(status.hung),
+        status.blocked_by && "BLOCKED by #{status.blocked_by}",
         status.leader && "leader #{status.leader}",
         status.view && "view #{elem(status.view, 0)}",
         "hears #{length(status.hears)}" <> deaf(status),

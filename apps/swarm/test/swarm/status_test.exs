@@ -12,6 +12,19 @@ defmodule Swarm.StatusTest do
 
     assert line.(view: {9, members}, hears: [:mag2]) =~
              ", view 9, hears 1 but not min1 min2 min3 and 2 more, age"
+
+    assert line.(blocked_by: "the landmark", leader: :min1) =~
+             ", BLOCKED by the landmark, leader min1,"
+  end
+
+  test "what a robot is blocked by travels in its row, as text of a sane length" do
+    status = %Status{robot: :mag1, node: node(), by: :follow, blocked_by: "mag2", age_ms: 5}
+    row = Status.Row.encode(status)
+    assert {:ok, %{blocked_by: "mag2"}} = Status.Row.decode(:mag1, row, 10)
+    assert {:ok, %{blocked_by: nil}} = Status.Row.decode(:mag1, Map.delete(row, :blocked_by), 10)
+
+    for junk <- [:landmark, String.duplicate("x", 81)],
+        do: assert(Status.Row.decode(:mag1, %{row | blocked_by: junk}, 10) == :error)
   end
 
   test "robots of one node are in each other's view and hear each other, and it says so" do

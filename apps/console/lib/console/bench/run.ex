@@ -9,7 +9,8 @@ defmodule Console.Bench.Run do
 
   @typedoc """
   `formed_s` is `nil` when the fleet did not form (again) before its time was up. `claims` are all of the
-  run, those before the deed too.
+  run, those before the deed too; `stuck` counts
+  robots that stood short of their places without a word (`Sim.Trial.Stuck`).
   """
   @type measured :: %{
           formed_s: float() | nil,
@@ -19,6 +20,7 @@ defmodule Console.Bench.Run do
           leaders: non_neg_integer(),
           changes: non_neg_integer(),
           claims: [Sim.Trial.Claims.claim()],
+          stuck: non_neg_integer(),
           speed: float()
         }
 
@@ -135,6 +137,7 @@ defmodule Console.Bench.Run do
       leaders: result.leaders_at_once_max,
       changes: result.leader_changes - state.changes,
       claims: result.claims,
+      stuck: length(result.stuck),
       speed: result.simulated_s / wall_s
     }
   end

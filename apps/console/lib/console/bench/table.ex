@@ -65,8 +65,8 @@ defmodule Console.Bench.Table do
   end
 
   @doc """
-  What all claims of `formed` were worth, in two lines: how many were true, all cases and maps pooled, and
-  the case that did worst. A claim is true when the worst robot was at most half a metre off at the claim
+  What the words of all runs were worth, in lines: how many claims of `formed` were true, all cases and maps
+  pooled, and the case that did worst; how many robots were stuck and did not say so (`Sim.Trial.Stuck`). A claim is true when the worst robot was at most half a metre off at the claim
   and 5 s later (`Sim.Trial.Claims`).
   """
   @spec pooled([{String.t(), String.t(), number(), [Console.Bench.Run.measured()]}]) :: String.t()
@@ -82,7 +82,7 @@ defmodule Console.Bench.Table do
     metres = Words.decimals(Claims.right_m(), 1)
 
     "Claims of formed with the worst robot at most #{metres} m off, at the claim and 5 s later: " <>
-      "#{share({right, all})} (goal 99 %).\n" <> least(judged)
+      "#{share({right, all})} (goal 99 %).\n" <> least(judged) <> stuck(rows)
   end
 
   defp least([]), do: ""
@@ -90,6 +90,11 @@ defmodule Console.Bench.Table do
   defp least(judged) do
     {says, counts} = Enum.min_by(judged, fn {_says, {right, all}} -> right / all end)
     "Least in one case: #{says}, #{share(counts)} (goal 95 %).\n"
+  end
+
+  defp stuck(rows) do
+    count = for({_, _, _, runs} <- rows, run <- runs, do: run.stuck) |> Enum.sum()
+    "Robots short of their places for 20 s without a word: #{count} (goal 0).\n"
   end
 
   defp true_claims(runs) do

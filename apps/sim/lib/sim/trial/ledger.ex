@@ -4,7 +4,7 @@ defmodule Sim.Trial.Ledger do
   Pure; fed every 100 ms with what the living robots claim.
   """
 
-  alias Sim.Trial.{Accord, Claims}
+  alias Sim.Trial.{Accord, Claims, Stuck}
 
   defstruct stages: [],
             leader: nil,
@@ -17,7 +17,8 @@ defmodule Sim.Trial.Ledger do
             formed_ms: nil,
             rest_ms: nil,
             accord: %Sim.Trial.Accord{},
-            claims: %Sim.Trial.Claims{}
+            claims: %Sim.Trial.Claims{},
+            stuck: %Sim.Trial.Stuck{}
 
   @type stage :: %{
           required(:stage) => atom(),
@@ -43,7 +44,8 @@ defmodule Sim.Trial.Ledger do
           formed_ms: integer() | nil,
           rest_ms: integer() | nil,
           accord: Sim.Trial.Accord.t(),
-          claims: Sim.Trial.Claims.t()
+          claims: Sim.Trial.Claims.t(),
+          stuck: Sim.Trial.Stuck.t()
         }
 
   @doc "An empty ledger."
@@ -103,6 +105,10 @@ defmodule Sim.Trial.Ledger do
     leaders = for {id, %{phase: :lead, formed: true}} <- claims, do: id
     %{ledger | claims: Claims.note(ledger.claims, at_ms, leaders, worst)}
   end
+
+  @doc "The same tick of the invariant of `Sim.Trial.Stuck`; `rows` is asked once a second."
+  @spec watch(t(), integer(), (... -> [Stuck.row()])) :: t()
+  def watch(ledger, at_ms, rows), do: %{ledger | stuck: Stuck.note(ledger.stuck, at_ms, rows)}
 
   @doc "Who leads now: of several the one of the highest epoch."
   @spec leader(t()) :: atom() | nil

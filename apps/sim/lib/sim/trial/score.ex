@@ -5,8 +5,9 @@ defmodule Sim.Trial.Score do
   """
   alias Hal.Pose
   alias Sim.{Scene, World}
-  alias Sim.Trial.{Accord, Claims, Ledger, Setup}
+  alias Sim.Trial.{Accord, Claims, Ledger, Setup, Stuck}
   alias Swarm.{Anchor, Formation}
+  alias Swarm.Missions.Landmark.Blocker
 
   @typedoc "A run at one instant; `claims` are those of the living."
   @type run :: %{
@@ -86,9 +87,10 @@ defmodule Sim.Trial.Score do
       collisions: run.world.collisions,
       min_separation_m: run.world.min_separation,
       claims: Claims.report(run.ledger.claims, run.at_ms, &worst(run, &1)),
+      stuck: Stuck.report(run.ledger.stuck),
       messages: run.messages,
       agreement: Accord.report(run.ledger.accord),
-      fleet: for(robot <- scene.robots, do: row(robot, Map.get(slots, robot.id)))
+      fleet: for(r <- scene.robots, do: row(r, Map.get(slots, r.id), run.claims[r.id]))
     }
   end
 
@@ -103,11 +105,24 @@ defmodule Sim.Trial.Score do
     Enum.max(errors, fn -> nil end)
   end
 
-  defp row(robot, slot) do
+  @doc "The living followers of whom `Sim.Trial.Stuck` judges whether they get on."
+  @spec followers(run()) :: [Stuck.row()]
+  def followers(run) do
+    leader = Ledger.leader(run.ledger)
+    shape = {leader, formation(run, leader)}
+
+    for {id, {_place, slot}} <- slots(run, leader), claim = run.claims[id], claim != nil do
+      error_m = Pose.distance(World.truth(run.world, id), slot)
+      %{id: id, claim: claim, error_m: error_m, slot: slot, shape: shape}
+    end
+  end
+
+  defp row(robot, slot, claim) do
     %{
       name: robot.id,
       alive: robot.alive,
       state: robot.state,
+      blocked_by: Blocker.words(claim[:blocked_by]),
       x: robot.pose.x,
       y: robot.pose.y,
       theta: robot.pose.heading,

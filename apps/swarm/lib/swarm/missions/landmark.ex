@@ -11,6 +11,7 @@ defmodule Swarm.Missions.Landmark do
   | `Lead` | what the leader tells: the anchor, the order, whether the shape is formed |
   | `Shape` | a shape that there is room for |
   | `Attend` | what a follower does: its slot, its gaze, its child |
+  | `Blocker` | what keeps it from its slot |
   | `Merge` | what becomes of two leaders that meet |
   | `Hearing` | whose anchor it believes, and when it joins a leader who names it |
   | `Policy` | who may lead, and what a robot does that has lost everybody |
@@ -286,6 +287,7 @@ defmodule Swarm.Missions.Landmark do
       standing: standing?(mission),
       in_place: mission.phase == :follow and mission.attend.in_place?,
       blocked: mission.phase == :follow and mission.attend.blocked?,
+      blocked_by: if(mission.phase == :follow, do: mission.attend.blocker),
       formed: leading? and mission.lead.formed?,
       anchor: if(leading?, do: mission.anchor)
     }

@@ -8,6 +8,9 @@ defmodule Swarm.Status.Row do
   alias Swarm.{Shape, Status}
   alias Swarm.Rows.Wire
 
+  # Longer than any name; what comes from outside is not printed at any length.
+  @words 80
+
   @doc "A status as it travels."
   @spec encode(Status.t()) :: map()
   def encode(%Status{} = status) do
@@ -33,6 +36,7 @@ defmodule Swarm.Status.Row do
     |> arming(status.arming)
     |> offline(status)
     |> fault(status.fault)
+    |> blocked(status.blocked_by)
   end
 
   defp fault(row, nil), do: row
@@ -50,6 +54,9 @@ defmodule Swarm.Status.Row do
   defp arming(row, {:error, _reason}), do: Map.put(row, :arming, "error")
   defp arming(row, _armed_or_unknown), do: row
 
+  defp blocked(row, nil), do: row
+  defp blocked(row, words), do: Map.put(row, :blocked_by, words)
+
   defp pose(nil), do: nil
   defp pose(pose), do: {mm(pose.x), mm(pose.y), mm(pose.heading)}
   defp mm(number), do: round(number * 1000)
@@ -65,6 +72,7 @@ defmodule Swarm.Status.Row do
          {:ok, arming} <- armed(Map.get(row, :arming)),
          words = Map.get(row, :words, []),
          fault = Map.get(row, :fault),
+         {:ok, blocked_by} <- text(Map.get(row, :blocked_by)),
          true <- Enum.all?([limits, offline, members, deaf_to, words], &texts?/1),
          true <- Enum.all?([node, state], &is_binary/1),
          true <- Enum.all?([by, leader, fault], &(&1 == nil or is_binary(&1))),
@@ -87,6 +95,7 @@ defmodule Swarm.Status.Row do
          estop: estop,
          arming: arming,
          leader: leader && Wire.word(leader),
+         blocked_by: blocked_by,
          power: power,
          health: Map.new(offline, &{Wire.word(&1), {:offline, :unknown}}),
          offline:
@@ -106,6 +115,10 @@ defmodule Swarm.Status.Row do
   defp armed("disarmed"), do: {:ok, :disarmed}
   defp armed("error"), do: {:ok, {:error, :unknown}}
   defp armed(_other), do: :error
+
+  defp text(nil), do: {:ok, nil}
+  defp text(text) when is_binary(text) and byte_size(text) <= @words, do: {:ok, text}
+  defp text(_other), do: :error
 
   defp texts?(list), do: Shape.list?(list, &is_binary/1)
   defp names(texts), do: for(text <- texts, {:ok, name} <- [Wire.robot(text)], do: name)

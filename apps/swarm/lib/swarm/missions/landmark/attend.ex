@@ -10,7 +10,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   alias Robot.{Behaviour, Gaze}
   alias Robot.Behaviour.Avoid.Neighbours
   alias Swarm.{Chain, Message}
-  alias Swarm.Missions.Landmark.{Places, State}
+  alias Swarm.Missions.Landmark.{Blocker, Places, State}
 
   @lease_ms 1_000
   @in_place 0.25
@@ -30,10 +30,15 @@ defmodule Swarm.Missions.Landmark.Attend do
   @progress 0.1
   @reach 2.0
   @clear 0.1
+  # Wherever it is: who has come no nearer for so long, to one place of one shape, does not get on.
+  @late_ms 15_000
+  @elsewhere 1.0
 
   defstruct in_place?: false,
             holding?: false,
             blocked?: false,
+            blocker: nil,
+            late: nil,
             told: {0, 0},
             landmark: nil,
             slot: nil,
@@ -44,12 +49,16 @@ defmodule Swarm.Missions.Landmark.Attend do
   @typedoc """
   `told` is the epoch and sequence number of the anchor that was last passed on, `landmark` where the
   landmark stood when this robot was last in place. `best` is the least distance to `slot` so far, and
-  `best_ms` when it was reached; since `obstacle_ms` something unknown stands in the slot.
+  `best_ms` when it was reached; since `obstacle_ms` something unknown stands in the slot. `late` is the same over
+  all small moves of the slot: shape, slot, least distance, and when that was reached. `blocker` is what a blocked
+  robot is blocked by.
   """
   @type t :: %__MODULE__{
           in_place?: boolean(),
           holding?: boolean(),
           blocked?: boolean(),
+          blocker: Blocker.t() | nil,
+          late: {shape :: term(), Pose.t(), float(), integer()} | nil,
           told: {non_neg_integer(), non_neg_integer()},
           landmark: {integer(), integer()} | nil,
           slot: Pose.t() | nil,
@@ -73,11 +82,18 @@ defmodule Swarm.Missions.Landmark.Attend do
     place = mission.anchor && Places.slot(mission.anchor, mission.me, age_ms)
 
     if place == nil or age_ms > @lease_ms or mission.percept.pose == nil do
-      {%{mission | attend: %{mission.attend | in_place?: false, holding?: true}},
+      {%{mission | attend: wait(mission.attend, age_ms)},
        [{:goal, :stand, {Behaviour.Stop, []}}, {:look, look_out(mission)}]}
     else
       attend(mission, place, age_ms)
     end
+  end
+
+  # A leader that is silent for longer than a lease leaves its followers where they are.
+  defp wait(attend, age_ms) do
+    silent? = age_ms >= @late_ms
+    blocker = if silent?, do: :no_anchor
+    %{attend | in_place?: false, holding?: true, blocked?: silent?, blocker: blocker}
   end
 
   defp attend(mission, {slot, velocity}, age_ms) do
@@ -101,7 +117,7 @@ defmodule Swarm.Missions.Landmark.Attend do
         }
     }
 
-    mission = %{mission | attend: block(mission, slot, error)}
+    mission = %{mission | attend: mission |> block(slot, error) |> late(mission, slot, error)}
     options = [target: slot, velocity: velocity, discs: discs(mission.anchor)]
     goal = {:goal, {:slot, mission.epoch}, {Behaviour.Follow, options}}
 
@@ -126,6 +142,36 @@ defmodule Swarm.Missions.Landmark.Attend do
         %{attend | blocked?: obstacle? or stuck?}
     end
   end
+
+  # Farther off, or where the slot trembles, time alone tells that a robot does not get on.
+  defp late(%{in_place?: true} = attend, _mission, _slot, _error),
+    do: %{attend | late: nil, blocker: nil}
+
+  defp late(attend, %{anchor: anchor, now_ms: now} = mission, slot, error) do
+    shape = {anchor.leader, anchor.formation}
+    late = patience(attend.late, shape, slot, error, now)
+    {_shape, _slot, _best, since_ms} = late
+    blocked? = attend.blocked? or now - since_ms >= @late_ms
+    %{attend | late: late, blocked?: blocked?, blocker: blocker(attend, mission, slot, blocked?)}
+  end
+
+  defp patience({shape, place, best, since_ms}, shape, slot, error, now) do
+    cond do
+      Pose.distance(place, slot) > @elsewhere -> {shape, slot, error, now}
+      error < best - @progress -> {shape, place, error, now}
+      true -> {shape, place, best, since_ms}
+    end
+  end
+
+  defp patience(_none_or_other, shape, slot, error, now), do: {shape, slot, error, now}
+
+  # Named once, when the robot gives up: while it stands and waits, what passes by is not to blame.
+  defp blocker(_attend, _mission, _slot, false), do: nil
+
+  defp blocker(%{blocker: nil}, mission, slot, true),
+    do: Blocker.find(mission.percept, slot, Places.landmark(mission.anchor))
+
+  defp blocker(attend, _mission, _slot, true), do: attend.blocker
 
   defp fresh(attend, slot, error, now) do
     %{attend | slot: slot, best: error, best_ms: now, obstacle_ms: nil, blocked?: false}

@@ -1,0 +1,45 @@
+defmodule Sim.Trial.StuckTest do
+  use ExUnit.Case, async: true
+  alias Hal.Pose
+  alias Sim.Trial.Stuck
+
+  @claim %{phase: :follow, in_place: false, blocked: false}
+
+  # One follower for `seconds`; `row` gives its error, and what differs, for a second.
+  defp play(seconds, row) do
+    Enum.reduce(0..seconds, %Stuck{}, fn s, stuck ->
+      Stuck.note(stuck, s * 1000, fn ->
+        plain = %{id: :a, claim: @claim, error_m: 3.0, slot: Pose.new(0, 0), shape: :column}
+        [Map.merge(plain, row.(s))]
+      end)
+    end)
+    |> Stuck.report()
+  end
+
+  test "a robot that stands short of its place for 20 s without a word is told of, once" do
+    assert play(19, fn _ -> %{} end) == []
+    assert play(60, fn _ -> %{} end) == [%{at_s: 0.0, robot: :a, error_m: 3.0}]
+  end
+
+  test "one that comes nearer, stands in place, is blocked or leads is not" do
+    assert play(60, &%{error_m: 9.0 - &1 * 0.1}) == []
+
+    for claim <- [%{in_place: true}, %{blocked: true}, %{phase: :lead}],
+        do: assert(play(60, fn _ -> %{claim: Map.merge(@claim, claim)} end) == [])
+  end
+
+  test "another slot or another shape begins the time again, a trembling slot does not" do
+    assert play(30, &%{slot: Pose.new(&1, 0)}) == []
+    assert play(30, &%{shape: div(&1, 15)}) == []
+    assert [_] = play(30, &%{slot: Pose.new(rem(&1, 2) * 0.5, 0)})
+  end
+
+  test "it asks once a second" do
+    asked = fn stuck, at_ms -> Stuck.note(stuck, at_ms, fn -> send(self(), at_ms) && [] end) end
+    Enum.reduce(0..20, %Stuck{}, &asked.(&2, &1 * 100))
+    assert_received 0
+    assert_received 1000
+    assert_received 2000
+    refute_received _more
+  end
+end
