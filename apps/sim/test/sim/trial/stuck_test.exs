@@ -1,6 +1,8 @@
 defmodule Sim.Trial.StuckTest do
   use ExUnit.Case, async: true
+  import Sim.TrialRuns
   alias Hal.Pose
+  alias Sim.Trial
   alias Sim.Trial.Stuck
 
   @claim %{phase: :follow, in_place: false, blocked: false}
@@ -41,5 +43,13 @@ defmodule Sim.Trial.StuckTest do
     assert_received 1000
     assert_received 2000
     refute_received _more
+  end
+
+  # A wall stands where the line should; one robot used to stand 2.4 m off for two minutes, `follow`.
+  test "where one finds no way from afar it says so, and the shape closes up for it" do
+    options = %{seed: 2, formation: {:line, 1.2}, landmark: {6.8, 0.0}, duration_s: 180}
+    trial = run(options)
+    assert Trial.result(trial).stuck == []
+    assert Trial.formed?(trial)
   end
 end
