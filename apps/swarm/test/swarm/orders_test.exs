@@ -152,7 +152,8 @@ defmodule Swarm.OrdersTest do
     # The board shows the mission still.
     answer = Task.async(fn -> Swarm.ask(id, :start) end)
 
-    eventually(fn -> Enum.any?(queued(pilot), &match?({_call, _from, {:command, :start}}, &1)) end)
+    asked? = &match?({_call, _from, {:command, :start}}, &1)
+    eventually(fn -> Enum.any?(queued(pilot), asked?) end)
 
     :ok = :sys.resume(pilot)
     assert Task.await(answer) == :ok
