@@ -112,7 +112,7 @@ defmodule Sim.Trial.Accord do
     case Enum.uniq(for {_id, claim} <- claims, do: {claim[:leader], claim[:epoch]}) do
       [{leader, _epoch}] when leader != nil ->
         Enum.all?(claims, fn {id, claim} ->
-          claim.phase == if(id == leader, do: :lead, else: :follow)
+          claim[:phase] == if(id == leader, do: :lead, else: :follow)
         end)
 
       _several ->

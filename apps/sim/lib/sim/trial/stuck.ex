@@ -46,8 +46,11 @@ defmodule Sim.Trial.Stuck do
   @spec report(t()) :: [silence()]
   def report(stuck), do: Enum.reverse(stuck.told)
 
-  defp silent?(claim),
-    do: claim.phase == :follow and not (claim.in_place or claim.blocked)
+  # A robot that was stopped claims nothing.
+  defp silent?(%{phase: :follow, in_place: in_place?, blocked: blocked?}),
+    do: not (in_place? or blocked?)
+
+  defp silent?(_claim), do: false
 
   defp go_on(nil, row, at_ms), do: begin(row, at_ms)
 
