@@ -5,9 +5,19 @@ defmodule Console.Build do
   @spec update() :: :ok
   def update do
     shell = Mix.shell()
-    Mix.shell(Console.Build.Shell)
-    Mix.Task.run("compile", [])
-    Mix.shell(shell)
+    # `Mix.Shell.Quiet` writes the name of the app on standard output before an error.
+    Mix.shell(Mix.Shell.Process)
+
+    try do
+      Mix.Task.run("compile", [])
+    after
+      Mix.shell(shell)
+      Mix.Shell.Process.flush(&tell/1)
+    end
+
     :ok
   end
+
+  defp tell({:mix_shell, :error, [message]}), do: IO.puts(:stderr, message)
+  defp tell(_progress), do: :ok
 end
