@@ -16,17 +16,23 @@ defmodule Robot.Localiser do
   alias Robot.Localiser.Belief
   alias Robot.{Percept, Sighting}
 
-  # A single sighting: bearing in radians, range as a share and in metres.
-  @bearing_sd 0.04
-  @range_share 0.10
-  @range_sd 0.15
-  # A robot that is seen must be the one that is expected: no other expected one within this angle.
+  # A single sighting: bearing in radians, range as a share and in metres. Errors that the next picture has again
+  # count as shared.
+  @bearing_sd 0.02
+  @mark_bias 0.02
+  @mark_bias_share 0.01
+  @edge_bias 0.02
+  @edge_bias_share 0.015
+  @range_share 0.05
+  @range_sd 0.05
+  # A robot that is seen must be the one that is expected, within this angle.
   @match 0.12
+  @widest 0.5
   @history 12
 
   @enforce_keys [:start]
   defstruct @enforce_keys ++
-              [odometry: nil, frame: nil, belief: nil, history: [], seen_ms: nil, anchors: []]
+              [odometry: nil, frame: nil, belief: nil, history: [], seen_ms: nil, anchors: [], told: nil]
 
   @typedoc """
   Something of a colour at a place (map frame); `sd` is how well the place is known, in metres.
@@ -55,7 +61,20 @@ defmodule Robot.Localiser do
 
   @doc "The references to use from now on."
   @spec anchors(t(), [anchor()]) :: t()
-  def anchors(localiser, anchors), do: %{localiser | anchors: anchors}
+  def anchors(localiser, []), do: %{localiser | anchors: [], belief: localiser.belief && Belief.forget(localiser.belief)}
+  def anchors(localiser, {frame, anchors}), do: %{tell(localiser, frame) | anchors: anchors}
+
+  defp tell(%{belief: nil} = localiser, _frame), do: localiser
+  defp tell(%{told: %{key: key} = told} = localiser, %{key: key} = frame) do
+    p = max(frame.position_var - told.position_var, 0.0)
+    h = max(frame.heading_var - told.heading_var, 0.0)
+    reframe(localiser, frame, p, h)
+  end
+  defp tell(localiser, frame), do: reframe(localiser, frame, frame.position_var, frame.heading_var)
+
+  defp reframe(localiser, frame, p, h) do
+    %{localiser | told: frame, belief: Belief.reframe(localiser.belief, frame.at, p, h)}
+  end
 
   @doc """
   Moves the estimate by the percept's odometry, corrects it by the percept's blobs, and fills in
@@ -74,7 +93,7 @@ defmodule Robot.Localiser do
       |> remember(percept.at_ms)
 
     blobs_pose = percept.blobs_at_ms && pose_at(localiser, percept.blobs_at_ms)
-    {%{percept | pose: localiser.belief.pose, blobs_pose: blobs_pose}, localiser}
+    {%{percept | pose: localiser.belief.pose, blobs_pose: blobs_pose, pose_sd: Belief.sd(localiser.belief)}, localiser}
   end
 
   defp framed(%{frame: frame} = localiser, frame), do: localiser
@@ -112,83 +131,103 @@ defmodule Robot.Localiser do
     # The picture was taken a moment ago, and the body may have turned since.
     exposed = pose_at(localiser, percept.blobs_at_ms)
 
-    Enum.reduce(localiser.anchors, localiser, fn anchor, localiser ->
-      case match(anchor, localiser.anchors, percept, exposed, view) do
-        nil -> localiser
-        blob -> correct(localiser, anchor, blob, exposed, percept, view)
-      end
+    {marks, robots} = Enum.split_with(localiser.anchors, & &1.range?)
+
+    localiser =
+      Enum.reduce(marks, localiser, fn anchor, localiser ->
+        case mark(anchor, percept) do
+          nil -> localiser
+          blob -> correct(localiser, anchor, blob, exposed, percept, view)
+        end
+      end)
+
+    # Turned right by the landmark, one knows better which robot is which.
+    exposed = pose_at(localiser, percept.blobs_at_ms)
+
+    Enum.reduce(pairs(robots, localiser, percept, exposed, view), localiser, fn {anchor, blob}, localiser ->
+      correct(localiser, anchor, blob, pose_at(localiser, percept.blobs_at_ms), percept, view)
     end)
   end
 
-  defp match(anchor, anchors, percept, exposed, view) do
-    expected = Pose.bearing(exposed, anchor.at)
-
-    alone? =
-      Enum.all?(anchors, fn other ->
-        other == anchor or other.colour != anchor.colour or
-          abs(Pose.wrap(Pose.bearing(exposed, other.at) - expected)) > 2 * @match
-      end)
-
-    near =
-      Enum.filter(percept.blobs, fn blob ->
-        bearing = Sighting.bearing(blob, percept.blobs_pan, view)
-
-        blob.colour == anchor.colour and not blob.clipped? and
-          abs(Pose.wrap(bearing - expected)) < gate(anchor) and
-          fits?(blob, anchor, Pose.distance(exposed, anchor.at), view)
-      end)
-
-    if alone?, do: Enum.max_by(near, & &1.area, fn -> nil end)
+  # There is one landmark: whatever has its colour is it.
+  defp mark(anchor, percept) do
+    percept.blobs
+    |> Enum.filter(&(&1.colour == anchor.colour and not &1.clipped?))
+    |> Enum.max_by(& &1.area, fn -> nil end)
   end
 
-  defp fits?(_blob, %{radius: nil}, _distance, _view), do: true
+  # A blob counts where it can be one robot only, and that robot one blob only. What is half hidden looks narrower than it is.
+  defp pairs(robots, localiser, percept, exposed, view) do
+    candidates =
+      for anchor <- robots,
+          gate = gate(anchor, localiser, exposed),
+          expected = Pose.bearing(exposed, anchor.at),
+          distance = Pose.distance(exposed, anchor.at),
+          blob <- percept.blobs,
+          blob.colour == anchor.colour,
+          bearing = Sighting.bearing(blob, percept.blobs_pan, view),
+          ratio = Sighting.width_ratio(blob, anchor.radius, distance, view),
+          ratio > 0.3 and ratio < 1.35,
+          off = abs(Pose.wrap(bearing - expected)),
+          off < gate + (1 - min(ratio, 1.0)) * :math.asin(min(anchor.radius / max(distance, 0.01), 1.0)),
+          do: {anchor, blob, off < gate and abs(ratio - 1) < 0.2 and blob.left > 0 and blob.right < blob.width - 1}
 
-  defp fits?(blob, anchor, distance, view),
-    do: Sighting.fits?(blob, anchor.radius, distance, view)
+    for {anchor, blob, true} <- candidates,
+        anchor.sd != nil,
+        Enum.count(candidates, &(elem(&1, 0) == anchor)) == 1,
+        Enum.count(candidates, &(elem(&1, 1) == blob)) == 1,
+        do: {anchor, blob}
+  end
 
-  # There is one landmark: whatever has its colour is it.
-  defp gate(%{range?: true}), do: 2 * :math.pi()
-  defp gate(_robot), do: @match
-
-  defp correct(localiser, anchor, blob, exposed, percept, view) do
+  defp gate(anchor, localiser, exposed) do
     {ax, ay} = anchor.at
     dx = ax - exposed.x
     dy = ay - exposed.y
-    square = dx * dx + dy * dy
-    distance = :math.sqrt(square)
+    square = max(dx * dx + dy * dy, 0.09)
+    sd = anchor.sd || 0.3
+    variance = Belief.variance(localiser.belief, {dy / square, -dx / square, -1.0}) + sd * sd / square + @bearing_sd * @bearing_sd
+    (3 * :math.sqrt(variance)) |> max(@match) |> min(@widest)
+  end
+
+  defp correct(localiser, anchor, blob, exposed, percept, view) do
+    dbg_(localiser, anchor, blob, percept, view, exposed)
+    distance = Pose.distance(exposed, anchor.at)
 
     if distance < 0.3 do
       localiser
     else
-      bearing_error =
-        Pose.wrap(
-          Sighting.bearing(blob, percept.blobs_pan, view) - Pose.bearing(exposed, anchor.at)
-        )
-
-      bearing_noise = :math.pow(@bearing_sd, 2) + :math.pow(anchor.sd / distance, 2)
-
-      localiser =
-        measure(localiser, bearing_error, {dy / square, -dx / square, -1.0}, bearing_noise)
-
+      bias = if anchor.range?, do: @mark_bias + @mark_bias_share * distance, else: @edge_bias + @edge_bias_share * distance
+      sd = :math.sqrt(anchor.sd * anchor.sd + bias * bias)
+      localiser = bearing(localiser, anchor, sd, exposed, Sighting.bearing(blob, percept.blobs_pan, view))
       range = anchor.range? && Sighting.distance(blob, percept.blobs)
-
-      if range do
-        range_noise = :math.pow(@range_share * distance + @range_sd, 2) + :math.pow(anchor.sd, 2)
-
-        measure(
-          localiser,
-          range - distance,
-          {-dx / distance, -dy / distance, 0.0},
-          range_noise
-        )
-      else
-        localiser
-      end
+      if range, do: range(localiser, anchor, sd, pose_at(localiser, percept.blobs_at_ms), range), else: localiser
     end
   end
 
-  defp measure(localiser, error, slope, noise),
-    do: %{localiser | belief: Belief.correct(localiser.belief, error, slope, noise)}
+  defp bearing(localiser, anchor, sd, exposed, seen) do
+    {belief, at} = Belief.meet(localiser.belief, anchor.key, anchor.at, sd)
+    {dx, dy, square} = way(exposed, at)
+    error = Pose.wrap(seen - Pose.bearing(exposed, at))
+    %{localiser | belief: Belief.correct(belief, anchor.key, error, {dy / square, -dx / square, -1.0}, @bearing_sd * @bearing_sd)}
+  end
+
+  defp range(localiser, anchor, sd, exposed, seen) do
+    {belief, at} = Belief.meet(localiser.belief, anchor.key, anchor.at, sd)
+    {dx, dy, square} = way(exposed, at)
+    distance = :math.sqrt(square)
+    noise = :math.pow(@range_share * distance + @range_sd, 2)
+    %{localiser | belief: Belief.correct(belief, anchor.key, seen - distance, {-dx / distance, -dy / distance, 0.0}, noise)}
+  end
+
+  defp way(exposed, {ax, ay}) do
+    dx = ax - exposed.x
+    dy = ay - exposed.y
+    {dx, dy, max(dx * dx + dy * dy, 0.01)}
+  end
+
+  defp dbg_(localiser, anchor, blob, percept, view, exposed) do
+    with f when is_function(f) <- Process.get(:dbg), do: f.(percept.robot, localiser, anchor, blob, Sighting.bearing(blob, percept.blobs_pan, view), percept, exposed)
+  end
 
   defp remember(localiser, at_ms) do
     history = Enum.take([{at_ms, localiser.odometry} | localiser.history], @history)

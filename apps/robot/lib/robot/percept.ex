@@ -12,6 +12,7 @@ defmodule Robot.Percept do
   defstruct @enforce_keys ++
               [
                 pose: nil,
+                pose_sd: nil,
                 odometry: nil,
                 sonar: nil,
                 ir: nil,
@@ -52,6 +53,7 @@ defmodule Robot.Percept do
           at_ms: integer(),
           profile: Profile.t(),
           pose: Pose.t() | nil,
+          pose_sd: {position :: float(), heading :: float()} | nil,
           odometry: Odometry.t() | nil,
           sonar: [float()] | nil,
           ir: [float()] | nil,

@@ -114,6 +114,15 @@ defmodule Robot.Sighting do
 
   def fits?(_blob, _radius, _distance, _field_of_view), do: false
 
+  @doc "width ratio"
+  def width_ratio(%Blob{} = blob, radius, distance, field_of_view) when distance > radius do
+    focal = blob.width / 2 / :math.tan(field_of_view / 2)
+    expected = 2 * focal * :math.tan(:math.asin(radius / distance))
+    (blob.right - blob.left + 1) / expected
+  end
+
+  def width_ratio(_blob, _radius, _distance, _view), do: 0.0
+
   @doc """
   The horizontal field of view of the percept's picture: as it was taken, or what the unit says, or
   the profile's.

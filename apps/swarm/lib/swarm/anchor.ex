@@ -18,7 +18,7 @@ defmodule Swarm.Anchor do
 
   @enforce_keys [:leader, :epoch, :sequence, :pose, :twist, :formation, :order, :size, :places]
   defstruct @enforce_keys ++
-              [asked: nil, asked_no: 0, landmark: nil, still: false, trail: nil, of: 0]
+              [sd: {0, 0}, asked: nil, asked_no: 0, landmark: nil, still: false, trail: nil, of: 0]
 
   @type t :: %__MODULE__{
           leader: atom(),

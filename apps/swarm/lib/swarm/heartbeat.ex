@@ -14,6 +14,7 @@ defmodule Swarm.Heartbeat do
   defstruct @enforce_keys ++
               [
                 radius: 200,
+                sd: nil,
                 phase: :idle,
                 epoch: 0,
                 leader: nil,
@@ -67,6 +68,7 @@ defmodule Swarm.Heartbeat do
       pose: {round(pose.x * 1000), round(pose.y * 1000), round(pose.heading * 1000)},
       twist: {round(twist.linear * 1000), round(twist.turn * 1000)},
       radius: round(percept.profile.radius * 1000),
+      sd: sd(percept.pose_sd),
       heard: Roll.new(heard),
       estop: stop.known,
       latched: stop.latched?
@@ -75,6 +77,9 @@ defmodule Swarm.Heartbeat do
     # What a robot is blocked by is for people, who ask the robot itself.
     struct!(beat, Map.delete(claim, :blocked_by))
   end
+
+  defp sd(nil), do: nil
+  defp sd({position, heading}), do: {min(round(position * 1000), 100_000), min(round(heading * 1000), 100_000)}
 
   @doc """
   Whether a term from outside is a heartbeat with sane numbers.

@@ -1,121 +1,187 @@
 defmodule Robot.Localiser.Belief do
-  @moduledoc """
-  A pose and how sure one is of it: an extended Kalman filter over (x, y, heading), moved by
-  odometry and corrected by one scalar measurement after another. Pure.
-
-  The covariance is `{xx, xy, xh, yy, yh, hh}`. Formulas: Siegwart and Nourbakhsh 2004 for odometry,
-  the standard filter else.
-  """
+  @moduledoc false
   alias Hal.Pose
 
-  @start_sd {0.03, 0.03, 0.02}
-  # Standard deviations of odometry: of the way driven, of the angle turned (skid steering slips by
-  # 5 % and more, R74), of angle per metre.
+  @start_sd {0.03, 0.03, 0.02, 0.055}
   @way_share 0.01
-  @turn_share 0.06
+  @turn_share 0.05
   @turn_per_metre 0.01
-  # What is farther off than three standard deviations is not believed.
+  @slip_change 0.005
   @gate 9.0
-  # Where measurements go on contradicting the estimate, it is the estimate that is doubted: a
-  # refusal counts two, one that is believed takes one back.
   @doubt 16
   @doubt_sd {0.3, 0.3, 0.3}
+  @most 4
+  @moved 0.05
 
-  @enforce_keys [:pose, :covariance]
-  defstruct @enforce_keys ++ [refused: 0]
+  @enforce_keys [:pose, :p]
+  defstruct @enforce_keys ++ [slip: 0.0, refused: 0, marks: []]
 
-  @type t :: %__MODULE__{
-          pose: Pose.t(),
-          covariance: {float(), float(), float(), float(), float(), float()},
-          refused: non_neg_integer()
-        }
+  @type t :: %__MODULE__{}
 
-  @doc "A robot that was put down at a pose by hand."
   @spec new(Pose.t()) :: t()
   def new(%Pose{} = pose) do
-    {x, y, heading} = @start_sd
-    %__MODULE__{pose: pose, covariance: {x * x, 0.0, 0.0, y * y, 0.0, heading * heading}}
+    sds = Tuple.to_list(@start_sd)
+    p = for {sd, i} <- Enum.with_index(sds), do: for(j <- 0..3, do: if(i == j, do: sd * sd, else: 0.0))
+    %__MODULE__{pose: pose, p: p}
   end
 
-  @doc """
-  Moved by a step of odometry, given in the robot's own frame.
+  @spec sd(t()) :: {position :: float(), heading :: float()}
+  def sd(%__MODULE__{} = belief) do
+    {xx, xy, _, yy, _, hh} = covariance(belief)
+    half = (xx + yy) / 2
+    root = :math.sqrt(max((xx - yy) * (xx - yy) / 4 + xy * xy, 0.0))
+    {:math.sqrt(max(half + root, 0.0)), :math.sqrt(max(hh, 0.0))}
+  end
 
-      iex> belief = Robot.Localiser.Belief.new(Hal.Pose.new(1, 0))
-      iex> Robot.Localiser.Belief.move(belief, Hal.Pose.new(0.5, 0)).pose
-      Hal.Pose.new(1.5, 0)
-  """
+  def covariance(%__MODULE__{p: [[xx, xy, xh | _], [_, yy, yh | _], [_, _, hh | _] | _]}),
+    do: {xx, xy, xh, yy, yh, hh}
+
   @spec move(t(), step :: Pose.t()) :: t()
+  def move(belief, %Pose{x: x, y: y, heading: h}) when x == 0.0 and y == 0.0 and h == 0.0, do: belief
+
   def move(belief, step) do
-    pose = Pose.compose(belief.pose, step)
+    u = abs(step.heading)
+    extra = belief.slip * u
+    c = :math.cos(extra / 2)
+    s = :math.sin(extra / 2)
+    step_ = Pose.new(c * step.x - s * step.y, s * step.x + c * step.y, step.heading + extra)
+    pose = Pose.compose(belief.pose, step_)
     way = :math.sqrt(step.x * step.x + step.y * step.y)
-    # With d the way and h the heading half-way, F = [1 0 -d sin h; 0 1 d cos h; 0 0 1].
     a = -(pose.y - belief.pose.y)
     b = pose.x - belief.pose.x
-    {xx, xy, xh, yy, yh, hh} = belief.covariance
     along = :math.pow(@way_share * way, 2)
-    turned = :math.pow(@turn_share * abs(step.heading), 2) + :math.pow(@turn_per_metre * way, 2)
+    turned = :math.pow(@turn_share * u, 2) + :math.pow(@turn_per_metre * way, 2)
 
-    covariance = {
-      xx + 2 * a * xh + a * a * hh + along,
-      xy + a * yh + b * xh + a * b * hh,
-      xh + a * hh,
-      yy + 2 * b * yh + b * b * hh + along,
-      yh + b * hh,
-      hh + turned
-    }
+    p =
+      belief.p
+      |> carry(a, b, u)
+      |> transpose()
+      |> carry(a, b, u)
+      |> noise([along, along, turned, @slip_change * @slip_change * u])
 
-    %{belief | pose: pose, covariance: covariance}
+    %{belief | pose: pose, p: p}
   end
 
-  @doc """
-  Corrected by one measurement: its `error` (measured minus expected), how the expected value
-  changes with x, y and heading, and the variance of its noise. K = P H' / S, x + K e, (1 - K H) P.
-  """
-  @spec correct(t(), float(), {float(), float(), float()}, float()) :: t()
-  def correct(belief, error, {a, b, c}, noise) do
-    {xx, xy, xh, yy, yh, hh} = belief.covariance
-    px = xx * a + xy * b + xh * c
-    py = xy * a + yy * b + yh * c
-    ph = xh * a + yh * b + hh * c
-    s = a * px + b * py + c * ph + noise
+  # F P with F = [1 0 a au/2; 0 1 b bu/2; 0 0 1 u; 0 0 0 1].
+  defp carry([x, y, h, s | rest], a, b, u) do
+    [mix(x, a, h, a * u / 2, s), mix(y, b, h, b * u / 2, s), mix(h, u, s, 0.0, s), s | rest]
+  end
+
+  defp mix([], _, [], _, []), do: []
+  defp mix([a | as], p, [b | bs], q, [c | cs]), do: [a + p * b + q * c | mix(as, p, bs, q, cs)]
+
+  defp transpose([[] | _]), do: []
+  defp transpose(rows), do: Enum.zip_with(rows, & &1)
+
+  defp noise(rows, []), do: rows
+  defp noise(rows, vars), do: noise(rows, vars, 0)
+  defp noise(rows, [], _i), do: rows
+  defp noise([row | rows], [v | vs], i), do: [List.update_at(row, i, &(&1 + v)) | noise(rows, vs, i + 1)]
+
+  @spec reframe(t(), Pose.point(), float(), float()) :: t()
+  def reframe(belief, {x, y}, position_var, h) do
+    gx = -(belief.pose.y - y)
+    gy = belief.pose.x - x
+    [[xx, xy, xh | rx], [yx, yy, yh | ry], [hx, hy, hh | rh] | rest] = belief.p
+
+    %{
+      belief
+      | p: [
+          [xx + position_var + h * gx * gx, xy + h * gx * gy, xh + h * gx | rx],
+          [yx + h * gx * gy, yy + position_var + h * gy * gy, yh + h * gy | ry],
+          [hx + h * gx, hy + h * gy, hh + h | rh] | rest
+        ]
+    }
+  end
+
+  @spec variance(t(), {float(), float(), float()}) :: float()
+  def variance(belief, {a, b, c}) do
+    {xx, xy, xh, yy, yh, hh} = covariance(belief)
+    a * a * xx + 2 * a * b * xy + 2 * a * c * xh + b * b * yy + 2 * b * c * yh + c * c * hh
+  end
+
+  @doc "Where a mark is by now, of which was told where it is and how well that is known."
+  def meet(belief, key, {x, y} = at, sd) do
+    case Enum.find_index(belief.marks, &(elem(&1, 0) == key)) do
+      nil ->
+        belief = if length(belief.marks) >= @most, do: drop(belief, @most - 1), else: belief
+        {add(belief, key, at, sd), at}
+
+      index ->
+        {_key, told, told_sd, {bx, by}} = Enum.at(belief.marks, index)
+
+        if Pose.distance(told, at) > @moved or sd > 1.5 * told_sd or sd < 0.6 * told_sd do
+          {belief |> drop(index) |> add(key, at, sd), at}
+        else
+          {front(belief, index), {x + bx, y + by}}
+        end
+    end
+  end
+
+  # New ones come first in the list of marks and last in p? order: marks are kept in the order of p.
+  defp front(belief, _index), do: belief
+
+  defp add(belief, key, at, sd) do
+    zeros = List.duplicate(0.0, length(belief.p))
+    rows = Enum.map(belief.p, &(&1 ++ [0.0, 0.0]))
+    p = rows ++ [zeros ++ [sd * sd, 0.0], zeros ++ [0.0, sd * sd]]
+    %{belief | p: p, marks: belief.marks ++ [{key, at, sd, {0.0, 0.0}}]}
+  end
+
+  defp drop(belief, index) do
+    i = 4 + 2 * index
+    cut = fn list -> list |> List.delete_at(i) |> List.delete_at(i) end
+    %{belief | p: belief.p |> cut.() |> Enum.map(cut), marks: List.delete_at(belief.marks, index)}
+  end
+
+  @doc "Without marks."
+  def forget(%{marks: []} = belief), do: belief
+  def forget(belief), do: %{belief | marks: [], p: belief.p |> Enum.take(4) |> Enum.map(&Enum.take(&1, 4))}
+
+  @spec correct(t(), term(), float(), {float(), float(), float()}, float()) :: t()
+  def correct(belief, key, error, {a, b, c}, noise) do
+    index = 2 * Enum.find_index(belief.marks, &(elem(&1, 0) == key))
+    v = Enum.map(belief.p, fn [x, y, h, _s | rest] -> a * x + b * y + c * h - mark(rest, index, a, b) end)
+    [vx, vy, vh, vs | rest] = v
+    s = a * vx + b * vy + c * vh - mark(rest, index, a, b) + noise
 
     if error * error > @gate * s do
       refuse(belief)
     else
-      {kx, ky, kh} = {px / s, py / s, ph / s}
+      g = error / s
+      p = for {row, k} <- Enum.zip(belief.p, v), do: less(row, v, k / s)
       pose = belief.pose
 
-      %__MODULE__{
-        pose: Pose.new(pose.x + kx * error, pose.y + ky * error, pose.heading + kh * error),
-        covariance: {
-          xx - kx * px,
-          xy - kx * py,
-          xh - kx * ph,
-          yy - ky * py,
-          yh - ky * ph,
-          hh - kh * ph
-        },
-        refused: max(belief.refused - 1, 0)
+      %{
+        belief
+        | pose: Pose.new(pose.x + vx * g, pose.y + vy * g, pose.heading + vh * g),
+          slip: belief.slip + vs * g,
+          p: p,
+          marks: shift(belief.marks, rest, g),
+          refused: max(belief.refused - 1, 0)
       }
     end
   end
 
-  # Wheels that slip take the estimate farther than odometry admits; then it has to be found again.
+  defp mark([x, y | _], 0, a, b), do: a * x + b * y
+  defp mark([_, _ | rest], i, a, b), do: mark(rest, i - 2, a, b)
+
+  defp less([], [], _k), do: []
+  defp less([x | xs], [v | vs], k), do: [x - k * v | less(xs, vs, k)]
+
+  defp shift([], [], _g), do: []
+
+  defp shift([{key, at, sd, {bx, by}} | marks], [x, y | rest], g),
+    do: [{key, at, sd, {bx + x * g, by + y * g}} | shift(marks, rest, g)]
+
   defp refuse(%{refused: refused} = belief) when refused < @doubt,
     do: %{belief | refused: refused + 2}
 
   defp refuse(belief), do: doubt(belief)
 
-  @doc "The same pose, of which one is less sure by decimetres: something happened that nobody measured."
   @spec doubt(t()) :: t()
   def doubt(%__MODULE__{} = belief) do
-    {xx, xy, xh, yy, yh, hh} = belief.covariance
-    {x, y, heading} = @doubt_sd
-
-    %{
-      belief
-      | refused: 0,
-        covariance: {xx + x * x, xy, xh, yy + y * y, yh, hh + heading * heading}
-    }
+    {x, y, h} = @doubt_sd
+    %{belief | refused: 0, p: noise(belief.p, [x * x, y * y, h * h])}
   end
 end

@@ -21,7 +21,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   @landmark_radius 0.15
   @robot_colour "RedRobot"
   # How well the places that were told are known, in metres.
-  @landmark_sd 0.08
+  @landmark_sd 0.03
   @robot_sd 0.1
 
   # A slot is blocked when something unknown stands in it for so long, or no way leads nearer.
@@ -109,7 +109,7 @@ defmodule Swarm.Missions.Landmark.Attend do
       | place: slot,
         attend: %{
           mission.attend
-          | in_place?: slow? and error <= @in_place,
+          | in_place?: slow? and error <= @in_place and sure?(mission.percept, error),
             holding?: resting? and error <= @near,
             told: told,
             # Where the landmark stood when this robot was last in place, or began to follow.
@@ -123,6 +123,9 @@ defmodule Swarm.Missions.Landmark.Attend do
 
     {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, references(mission)}]}
   end
+
+  defp sure?(%{pose_sd: {sd, _}}, error), do: error + 2 * sd <= 0.5
+  defp sure?(_percept, _error), do: true
 
   defp block(%{attend: %{in_place?: true} = attend} = mission, slot, error),
     do: fresh(attend, slot, error, mission.now_ms)
@@ -219,13 +222,15 @@ defmodule Swarm.Missions.Landmark.Attend do
     ahead = Enum.take_while(anchor.order, &(&1 != mission.me))
 
     robots =
-      for id <- [anchor.leader | ahead], peer = percept.peers[id], standing?(peer) do
+      for {id, peer} <- percept.peers do
         at = if id == anchor.leader, do: leader, else: peer.pose
+        use? = id in [anchor.leader | ahead] and standing?(peer)
 
         %{
+          key: id,
           colour: @robot_colour,
           at: Pose.point(at),
-          sd: @robot_sd,
+          sd: if(use?, do: robot_sd(id, peer, anchor)),
           range?: false,
           radius: peer.radius
         }
@@ -234,6 +239,7 @@ defmodule Swarm.Missions.Landmark.Attend do
     # A landmark that moves is somewhere else by now.
     if anchor.still and anchor.landmark != nil do
       landmark = %{
+        key: :landmark,
         colour: mission.colour,
         at: Places.landmark(anchor),
         sd: @landmark_sd,
@@ -241,10 +247,23 @@ defmodule Swarm.Missions.Landmark.Attend do
         radius: nil
       }
 
-      [landmark | robots]
+      {frame(anchor, leader), [landmark | robots]}
     else
-      robots
+      {frame(anchor, leader), robots}
     end
+  end
+
+  defp robot_sd(leader, _peer, %{leader: leader}), do: 0.02
+  defp robot_sd(_id, %{beat: %{sd: {mm, _}, epoch: epoch}}, %{epoch: epoch}), do: mm / 1000
+  defp robot_sd(_id, _peer, _anchor), do: nil
+
+  defp frame(%{sd: {p, h}} = anchor, leader) do
+    %{
+      key: {anchor.leader, anchor.epoch},
+      at: Pose.point(leader),
+      position_var: p * p / 1.0e6,
+      heading_var: h * h / 1.0e6
+    }
   end
 
   # What a moving robot told is where it was.

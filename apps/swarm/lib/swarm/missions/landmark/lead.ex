@@ -204,6 +204,7 @@ defmodule Swarm.Missions.Landmark.Lead do
       sequence: sequence,
       pose: State.millimetres(percept.pose),
       twist: twist(percept),
+      sd: sd(percept.pose_sd),
       formation: lead.shape.formation,
       asked: mission.formation,
       asked_no: mission.asked_no,
@@ -218,6 +219,9 @@ defmodule Swarm.Missions.Landmark.Lead do
 
     %{mission | anchor: anchor, lead: %{lead | sequence: sequence}}
   end
+
+  defp sd(nil), do: {0, 0}
+  defp sd({p, h}), do: {round(p * 1000), round(h * 1000)}
 
   # A crawl is told as standing still, so that no slot trembles.
   defp twist(%{odometry: %{twist: %{linear: linear, turn: turn}}}) do
