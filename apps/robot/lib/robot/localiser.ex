@@ -18,11 +18,12 @@ defmodule Robot.Localiser do
 
   # A single sighting: bearing in radians, range as a share and in metres. Errors that the next picture has again
   # count as shared.
-  @bearing_sd 0.02
-  @mark_bias 0.02
-  @mark_bias_share 0.01
-  @edge_bias 0.02
-  @edge_bias_share 0.015
+  @bearing_sd 0.015
+  @range_bias 0.06
+  @bearing_bias 0.005
+  @width_bias 0.1
+  @edge_bias 0.01
+  @edge_bias_share 0.01
   @range_share 0.05
   @range_sd 0.05
   # A robot that is seen must be the one that is expected, within this angle.
@@ -196,12 +197,21 @@ defmodule Robot.Localiser do
     if distance < 0.3 do
       localiser
     else
-      bias = if anchor.range?, do: @mark_bias + @mark_bias_share * distance, else: @edge_bias + @edge_bias_share * distance
-      sd = :math.sqrt(anchor.sd * anchor.sd + bias * bias)
+      sd = sds(anchor, distance)
       localiser = bearing(localiser, anchor, sd, exposed, Sighting.bearing(blob, percept.blobs_pan, view))
-      range = anchor.range? && Sighting.distance(blob, percept.blobs)
+      range = if anchor.range?, do: Sighting.distance(blob, percept.blobs), else: Sighting.width_distance(blob, anchor.radius, view)
       if range, do: range(localiser, anchor, sd, pose_at(localiser, percept.blobs_at_ms), range), else: localiser
     end
+  end
+
+  # What is wrong with the place of a thing, as told and as seen, time after time: along the line of sight and across it.
+  defp sds(%{range?: true, sd: sd}, distance),
+    do: {sd + @range_bias * distance, sd + @bearing_bias * distance}
+
+  defp sds(%{sd: sd}, distance) do
+    across = @edge_bias + @edge_bias_share * distance
+    along = @width_bias * distance
+    {:math.sqrt(sd * sd + along * along), :math.sqrt(sd * sd + across * across)}
   end
 
   defp bearing(localiser, anchor, sd, exposed, seen) do

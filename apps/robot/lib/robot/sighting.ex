@@ -114,6 +114,12 @@ defmodule Robot.Sighting do
 
   def fits?(_blob, _radius, _distance, _field_of_view), do: false
 
+  @doc "distance by width"
+  def width_distance(%Blob{} = blob, radius, field_of_view) do
+    focal = blob.width / 2 / :math.tan(field_of_view / 2)
+    radius / :math.sin(:math.atan((blob.right - blob.left + 1) / 2 / focal))
+  end
+
   @doc "width ratio"
   def width_ratio(%Blob{} = blob, radius, distance, field_of_view) when distance > radius do
     focal = blob.width / 2 / :math.tan(field_of_view / 2)

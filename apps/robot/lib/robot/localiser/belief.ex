@@ -101,17 +101,17 @@ defmodule Robot.Localiser.Belief do
   end
 
   @doc "Where a mark is by now, of which was told where it is and how well that is known."
-  def meet(belief, key, {x, y} = at, sd) do
+  def meet(belief, key, {x, y} = at, {sd, _across} = sds) do
     case Enum.find_index(belief.marks, &(elem(&1, 0) == key)) do
       nil ->
         belief = if length(belief.marks) >= @most, do: drop(belief, @most - 1), else: belief
-        {add(belief, key, at, sd), at}
+        {add(belief, key, at, sds), at}
 
       index ->
         {_key, told, told_sd, {bx, by}} = Enum.at(belief.marks, index)
 
         if Pose.distance(told, at) > @moved or sd > 1.5 * told_sd or sd < 0.6 * told_sd do
-          {belief |> drop(index) |> add(key, at, sd), at}
+          {belief |> drop(index) |> add(key, at, sds), at}
         else
           {front(belief, index), {x + bx, y + by}}
         end
@@ -121,11 +121,18 @@ defmodule Robot.Localiser.Belief do
   # New ones come first in the list of marks and last in p? order: marks are kept in the order of p.
   defp front(belief, _index), do: belief
 
-  defp add(belief, key, at, sd) do
+  # Along the line of sight and across it.
+  defp add(belief, key, {x, y} = at, {along, across}) do
+    direction = :math.atan2(y - belief.pose.y, x - belief.pose.x)
+    c = :math.cos(direction)
+    s = :math.sin(direction)
+    xx = along * along * c * c + across * across * s * s
+    yy = along * along * s * s + across * across * c * c
+    xy = (along * along - across * across) * c * s
     zeros = List.duplicate(0.0, length(belief.p))
     rows = Enum.map(belief.p, &(&1 ++ [0.0, 0.0]))
-    p = rows ++ [zeros ++ [sd * sd, 0.0], zeros ++ [0.0, sd * sd]]
-    %{belief | p: p, marks: belief.marks ++ [{key, at, sd, {0.0, 0.0}}]}
+    p = rows ++ [zeros ++ [xx, xy], zeros ++ [xy, yy]]
+    %{belief | p: p, marks: belief.marks ++ [{key, at, along, {0.0, 0.0}}]}
   end
 
   defp drop(belief, index) do

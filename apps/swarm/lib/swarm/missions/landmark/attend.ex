@@ -21,7 +21,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   @landmark_radius 0.15
   @robot_colour "RedRobot"
   # How well the places that were told are known, in metres.
-  @landmark_sd 0.03
+  @landmark_sd 0.02
   @robot_sd 0.1
 
   # A slot is blocked when something unknown stands in it for so long, or no way leads nearer.
