@@ -94,7 +94,7 @@ defmodule Robot.Localiser do
       |> remember(percept.at_ms)
 
     blobs_pose = percept.blobs_at_ms && pose_at(localiser, percept.blobs_at_ms)
-    {%{percept | pose: localiser.belief.pose, blobs_pose: blobs_pose, pose_sd: Belief.sd(localiser.belief)}, localiser}
+    {%{percept | pose: localiser.belief.pose, blobs_pose: blobs_pose, pose_sd: Belief.sd(localiser.belief), pose_frame: localiser.told && localiser.told.key}, localiser}
   end
 
   defp framed(%{frame: frame} = localiser, frame), do: localiser

@@ -13,6 +13,7 @@ defmodule Robot.Percept do
               [
                 pose: nil,
                 pose_sd: nil,
+                pose_frame: nil,
                 odometry: nil,
                 sonar: nil,
                 ir: nil,
@@ -53,6 +54,7 @@ defmodule Robot.Percept do
           at_ms: integer(),
           profile: Profile.t(),
           pose: Pose.t() | nil,
+          pose_frame: term(),
           pose_sd: {position :: float(), heading :: float()} | nil,
           odometry: Odometry.t() | nil,
           sonar: [float()] | nil,

@@ -68,7 +68,7 @@ defmodule Swarm.Heartbeat do
       pose: {round(pose.x * 1000), round(pose.y * 1000), round(pose.heading * 1000)},
       twist: {round(twist.linear * 1000), round(twist.turn * 1000)},
       radius: round(percept.profile.radius * 1000),
-      sd: sd(percept.pose_sd),
+      sd: if(claim[:leader] == nil or percept.pose_frame == {claim[:leader], claim[:epoch]}, do: sd(percept.pose_sd)),
       heard: Roll.new(heard),
       estop: stop.known,
       latched: stop.latched?

@@ -124,7 +124,7 @@ defmodule Swarm.Missions.Landmark.Attend do
     {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, references(mission)}]}
   end
 
-  defp sure?(%{pose_sd: {sd, _}}, error), do: error + 2 * sd <= 0.5
+  defp sure?(%{pose_sd: {sd, _}, pose_frame: frame}, error), do: frame != nil and error + 2 * sd <= 0.5
   defp sure?(_percept, _error), do: true
 
   defp block(%{attend: %{in_place?: true} = attend} = mission, slot, error),
@@ -254,7 +254,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   end
 
   defp robot_sd(leader, _peer, %{leader: leader}), do: 0.02
-  defp robot_sd(_id, %{beat: %{sd: {mm, _}, epoch: epoch}}, %{epoch: epoch}), do: mm / 1000
+  defp robot_sd(_id, %{beat: %{sd: {mm, _}, epoch: epoch, leader: leader}}, %{epoch: epoch, leader: leader}), do: mm / 1000
   defp robot_sd(_id, _peer, _anchor), do: nil
 
   defp frame(%{sd: {p, h}} = anchor, leader) do
