@@ -28,6 +28,8 @@ defmodule Robot.Localiser do
   @range_sd 0.05
   # A robot that is seen must be the one that is expected, within this angle.
   @match 0.12
+  @fits 0.45
+  @clear 0.22
   @widest 0.5
   @history 12
 
@@ -145,8 +147,8 @@ defmodule Robot.Localiser do
     # Turned right by the landmark, one knows better which robot is which.
     exposed = pose_at(localiser, percept.blobs_at_ms)
 
-    Enum.reduce(pairs(robots, localiser, percept, exposed, view), localiser, fn {anchor, blob}, localiser ->
-      correct(localiser, anchor, blob, pose_at(localiser, percept.blobs_at_ms), percept, view)
+    Enum.reduce(pairs(robots, localiser, percept, exposed, view), localiser, fn {anchor, blob, slack, off}, localiser ->
+      correct(localiser, Map.merge(anchor, %{slack: slack, width?: off < 0.15}), blob, pose_at(localiser, percept.blobs_at_ms), percept, view)
     end)
   end
 
@@ -168,16 +170,19 @@ defmodule Robot.Localiser do
           blob.colour == anchor.colour,
           bearing = Sighting.bearing(blob, percept.blobs_pan, view),
           ratio = Sighting.width_ratio(blob, anchor.radius, distance, view),
-          ratio > 0.3 and ratio < 1.35,
-          off = abs(Pose.wrap(bearing - expected)),
-          off < gate + (1 - min(ratio, 1.0)) * :math.asin(min(anchor.radius / max(distance, 0.01), 1.0)),
-          do: {anchor, blob, off < gate and abs(ratio - 1) < 0.2 and blob.left > 0 and blob.right < blob.width - 1}
+          ratio > 0.3 and ratio < 2.5,
+          half = :math.asin(min(anchor.radius / max(distance, 0.01), 1.0)),
+          slack = abs(ratio - 1) * half,
+          abs(Pose.wrap(bearing - expected)) < gate + slack,
+          do: {anchor, blob, abs(:math.log(ratio)), slack}
 
-    for {anchor, blob, true} <- candidates,
+    for {anchor, blob, off, slack} <- candidates,
         anchor.sd != nil,
-        Enum.count(candidates, &(elem(&1, 0) == anchor)) == 1,
-        Enum.count(candidates, &(elem(&1, 1) == blob)) == 1,
-        do: {anchor, blob}
+        blob.left > 0 and blob.right < blob.width - 1,
+        off < @fits,
+        rivals = Enum.filter(candidates, fn {a, b, _, _} -> (a == anchor) != (b == blob) end),
+        Enum.all?(rivals, fn {_, _, other, _} -> other > off + @clear end),
+        do: {anchor, blob, slack, off}
   end
 
   defp gate(anchor, localiser, exposed) do
@@ -199,7 +204,7 @@ defmodule Robot.Localiser do
     else
       sd = sds(anchor, distance)
       localiser = bearing(localiser, anchor, sd, exposed, Sighting.bearing(blob, percept.blobs_pan, view))
-      range = if anchor.range?, do: Sighting.distance(blob, percept.blobs), else: Sighting.width_distance(blob, anchor.radius, view)
+      range = if anchor.range?, do: Sighting.distance(blob, percept.blobs), else: anchor.width? && Sighting.width_distance(blob, anchor.radius, view)
       if range, do: range(localiser, anchor, sd, pose_at(localiser, percept.blobs_at_ms), range), else: localiser
     end
   end
@@ -208,8 +213,8 @@ defmodule Robot.Localiser do
   defp sds(%{range?: true, sd: sd}, distance),
     do: {sd + @range_bias * distance, sd + @bearing_bias * distance}
 
-  defp sds(%{sd: sd}, distance) do
-    across = @edge_bias + @edge_bias_share * distance
+  defp sds(%{sd: sd, slack: slack}, distance) do
+    across = @edge_bias + (@edge_bias_share + slack) * distance
     along = @width_bias * distance
     {:math.sqrt(sd * sd + along * along), :math.sqrt(sd * sd + across * across)}
   end

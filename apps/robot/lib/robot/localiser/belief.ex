@@ -10,11 +10,11 @@ defmodule Robot.Localiser.Belief do
   @gate 9.0
   @doubt 16
   @doubt_sd {0.3, 0.3, 0.3}
-  @most 4
-  @moved 0.05
+  @most 6
+  @moved 1.0
 
   @enforce_keys [:pose, :p]
-  defstruct @enforce_keys ++ [slip: 0.0, refused: 0, marks: []]
+  defstruct @enforce_keys ++ [slip: 0.0, refused: 0, marks: [], count: 0]
 
   @type t :: %__MODULE__{}
 
@@ -101,25 +101,44 @@ defmodule Robot.Localiser.Belief do
   end
 
   @doc "Where a mark is by now, of which was told where it is and how well that is known."
-  def meet(belief, key, {x, y} = at, {sd, _across} = sds) do
+  def meet(belief, key, at, {along, _across} = sds) do
     case Enum.find_index(belief.marks, &(elem(&1, 0) == key)) do
       nil ->
-        belief = if length(belief.marks) >= @most, do: drop(belief, @most - 1), else: belief
+        belief = if length(belief.marks) >= @most, do: drop(belief, oldest(belief)), else: belief
         {add(belief, key, at, sds), at}
 
       index ->
-        {_key, told, told_sd, {bx, by}} = Enum.at(belief.marks, index)
+        {_key, told, told_sd, _bias, _used} = Enum.at(belief.marks, index)
+        moved = Pose.distance(told, at)
 
-        if Pose.distance(told, at) > @moved or sd > 1.5 * told_sd or sd < 0.6 * told_sd do
+        if moved > @moved do
           {belief |> drop(index) |> add(key, at, sds), at}
         else
-          {front(belief, index), {x + bx, y + by}}
+          variance = moved * moved + max(along * along - 2 * told_sd * told_sd, 0.0)
+          belief = belief |> shake(index, variance) |> renew(index, at, if(variance > moved * moved, do: along, else: told_sd))
+          {_key, {x, y}, _sd, {bx, by}, _used} = Enum.at(belief.marks, index)
+          {belief, {x + bx, y + by}}
         end
     end
   end
 
-  # New ones come first in the list of marks and last in p? order: marks are kept in the order of p.
-  defp front(belief, _index), do: belief
+  defp oldest(belief) do
+    {_, index} = belief.marks |> Enum.with_index() |> Enum.min_by(fn {mark, _} -> elem(mark, 4) end)
+    index
+  end
+
+  defp shake(belief, _index, v) when v == 0.0, do: belief
+
+  defp shake(belief, index, v) do
+    i = 4 + 2 * index
+    p = belief.p |> List.update_at(i, fn row -> List.update_at(row, i, &(&1 + v)) end) |> List.update_at(i + 1, fn row -> List.update_at(row, i + 1, &(&1 + v)) end)
+    %{belief | p: p}
+  end
+
+  defp renew(belief, index, at, sd) do
+    marks = List.update_at(belief.marks, index, fn {key, _at, _sd, bias, _used} -> {key, at, sd, bias, belief.count} end)
+    %{belief | marks: marks, count: belief.count + 1}
+  end
 
   # Along the line of sight and across it.
   defp add(belief, key, {x, y} = at, {along, across}) do
@@ -132,7 +151,7 @@ defmodule Robot.Localiser.Belief do
     zeros = List.duplicate(0.0, length(belief.p))
     rows = Enum.map(belief.p, &(&1 ++ [0.0, 0.0]))
     p = rows ++ [zeros ++ [xx, xy], zeros ++ [xy, yy]]
-    %{belief | p: p, marks: belief.marks ++ [{key, at, along, {0.0, 0.0}}]}
+    %{belief | p: p, marks: belief.marks ++ [{key, at, along, {0.0, 0.0}, belief.count}], count: belief.count + 1}
   end
 
   defp drop(belief, index) do
@@ -178,8 +197,8 @@ defmodule Robot.Localiser.Belief do
 
   defp shift([], [], _g), do: []
 
-  defp shift([{key, at, sd, {bx, by}} | marks], [x, y | rest], g),
-    do: [{key, at, sd, {bx + x * g, by + y * g}} | shift(marks, rest, g)]
+  defp shift([{key, at, sd, {bx, by}, used} | marks], [x, y | rest], g),
+    do: [{key, at, sd, {bx + x * g, by + y * g}, used} | shift(marks, rest, g)]
 
   defp refuse(%{refused: refused} = belief) when refused < @doubt,
     do: %{belief | refused: refused + 2}
