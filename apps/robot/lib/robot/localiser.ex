@@ -19,9 +19,7 @@ defmodule Robot.Localiser do
   # A single sighting: bearing in radians, range as a share and in metres. Errors that the next picture has again
   # count as shared.
   @bearing_sd 0.015
-  @range_bias 0.06
   @bearing_bias 0.005
-  @width_bias 0.1
   @edge_bias 0.01
   @edge_bias_share 0.01
   @range_share 0.05
@@ -209,21 +207,22 @@ defmodule Robot.Localiser do
     end
   end
 
-  # What is wrong with the place of a thing, as told and as seen, time after time: along the line of sight and across it.
-  defp sds(%{range?: true, sd: sd}, distance),
-    do: {sd + @range_bias * distance, sd + @bearing_bias * distance}
+  defp sds(%{range?: true, sd: sd}, distance) do
+    sd = sd + @bearing_bias * distance
+    {sd, sd}
+  end
 
   defp sds(%{sd: sd, slack: slack}, distance) do
     across = @edge_bias + (@edge_bias_share + slack) * distance
-    along = @width_bias * distance
-    {:math.sqrt(sd * sd + along * along), :math.sqrt(sd * sd + across * across)}
+    sd = :math.sqrt(sd * sd + across * across)
+    {sd, sd}
   end
 
   defp bearing(localiser, anchor, sd, exposed, seen) do
     {belief, at} = Belief.meet(localiser.belief, anchor.key, anchor.at, sd)
     {dx, dy, square} = way(exposed, at)
     error = Pose.wrap(seen - Pose.bearing(exposed, at))
-    %{localiser | belief: Belief.correct(belief, anchor.key, error, {dy / square, -dx / square, -1.0}, @bearing_sd * @bearing_sd)}
+    %{localiser | belief: Belief.correct(belief, anchor.key, error, {dy / square, -dx / square, -1.0}, {0.0, 0.0}, @bearing_sd * @bearing_sd)}
   end
 
   defp range(localiser, anchor, sd, exposed, seen) do
@@ -231,7 +230,9 @@ defmodule Robot.Localiser do
     {dx, dy, square} = way(exposed, at)
     distance = :math.sqrt(square)
     noise = :math.pow(@range_share * distance + @range_sd, 2)
-    %{localiser | belief: Belief.correct(belief, anchor.key, seen - distance, {-dx / distance, -dy / distance, 0.0}, noise)}
+    {m, n} = belief.scales
+    {scale, use} = if anchor.range?, do: {m, {distance, 0.0}}, else: {n, {0.0, distance}}
+    %{localiser | belief: Belief.correct(belief, anchor.key, seen - distance * (1 + scale), {-dx / distance, -dy / distance, 0.0}, use, noise)}
   end
 
   defp way(exposed, {ax, ay}) do

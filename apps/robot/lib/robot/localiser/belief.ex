@@ -2,7 +2,8 @@ defmodule Robot.Localiser.Belief do
   @moduledoc false
   alias Hal.Pose
 
-  @start_sd {0.03, 0.03, 0.02, 0.055}
+  @start_sd {0.03, 0.03, 0.02, 0.055, 0.06, 0.08}
+  @base 6
   @way_share 0.01
   @turn_share 0.05
   @turn_per_metre 0.01
@@ -14,14 +15,14 @@ defmodule Robot.Localiser.Belief do
   @moved 1.0
 
   @enforce_keys [:pose, :p]
-  defstruct @enforce_keys ++ [slip: 0.0, refused: 0, marks: [], count: 0]
+  defstruct @enforce_keys ++ [slip: 0.0, scales: {0.0, 0.0}, refused: 0, marks: [], count: 0]
 
   @type t :: %__MODULE__{}
 
   @spec new(Pose.t()) :: t()
   def new(%Pose{} = pose) do
     sds = Tuple.to_list(@start_sd)
-    p = for {sd, i} <- Enum.with_index(sds), do: for(j <- 0..3, do: if(i == j, do: sd * sd, else: 0.0))
+    p = for {sd, i} <- Enum.with_index(sds), do: for(j <- 0..5, do: if(i == j, do: sd * sd, else: 0.0))
     %__MODULE__{pose: pose, p: p}
   end
 
@@ -130,7 +131,7 @@ defmodule Robot.Localiser.Belief do
   defp shake(belief, _index, v) when v == 0.0, do: belief
 
   defp shake(belief, index, v) do
-    i = 4 + 2 * index
+    i = @base + 2 * index
     p = belief.p |> List.update_at(i, fn row -> List.update_at(row, i, &(&1 + v)) end) |> List.update_at(i + 1, fn row -> List.update_at(row, i + 1, &(&1 + v)) end)
     %{belief | p: p}
   end
@@ -155,21 +156,20 @@ defmodule Robot.Localiser.Belief do
   end
 
   defp drop(belief, index) do
-    i = 4 + 2 * index
+    i = @base + 2 * index
     cut = fn list -> list |> List.delete_at(i) |> List.delete_at(i) end
     %{belief | p: belief.p |> cut.() |> Enum.map(cut), marks: List.delete_at(belief.marks, index)}
   end
 
   @doc "Without marks."
   def forget(%{marks: []} = belief), do: belief
-  def forget(belief), do: %{belief | marks: [], p: belief.p |> Enum.take(4) |> Enum.map(&Enum.take(&1, 4))}
+  def forget(belief), do: %{belief | marks: [], p: belief.p |> Enum.take(@base) |> Enum.map(&Enum.take(&1, @base))}
 
-  @spec correct(t(), term(), float(), {float(), float(), float()}, float()) :: t()
-  def correct(belief, key, error, {a, b, c}, noise) do
+  def correct(belief, key, error, {a, b, c}, {k, l}, noise) do
     index = 2 * Enum.find_index(belief.marks, &(elem(&1, 0) == key))
-    v = Enum.map(belief.p, fn [x, y, h, _s | rest] -> a * x + b * y + c * h - mark(rest, index, a, b) end)
-    [vx, vy, vh, vs | rest] = v
-    s = a * vx + b * vy + c * vh - mark(rest, index, a, b) + noise
+    v = Enum.map(belief.p, fn [x, y, h, _s, m, n | rest] -> a * x + b * y + c * h + k * m + l * n - mark(rest, index, a, b) end)
+    [vx, vy, vh, vs, vm, vn | rest] = v
+    s = a * vx + b * vy + c * vh + k * vm + l * vn - mark(rest, index, a, b) + noise
 
     if error * error > @gate * s do
       refuse(belief)
@@ -177,11 +177,13 @@ defmodule Robot.Localiser.Belief do
       g = error / s
       p = for {row, k} <- Enum.zip(belief.p, v), do: less(row, v, k / s)
       pose = belief.pose
+      {m, n} = belief.scales
 
       %{
         belief
         | pose: Pose.new(pose.x + vx * g, pose.y + vy * g, pose.heading + vh * g),
           slip: belief.slip + vs * g,
+          scales: {m + vm * g, n + vn * g},
           p: p,
           marks: shift(belief.marks, rest, g),
           refused: max(belief.refused - 1, 0)
