@@ -138,7 +138,7 @@ defmodule Robot.Localiser do
       Enum.reduce(marks, localiser, fn anchor, localiser ->
         case mark(anchor, percept) do
           nil -> localiser
-          blob -> correct(localiser, anchor, blob, exposed, percept, view)
+          blob -> correct(localiser, Map.put(anchor, :slack, 0.0), blob, exposed, percept, view)
         end
       end)
 
@@ -212,8 +212,8 @@ defmodule Robot.Localiser do
     {sd, sd}
   end
 
-  defp sds(%{sd: sd, slack: slack}, distance) do
-    across = @edge_bias + (@edge_bias_share + slack) * distance
+  defp sds(%{sd: sd}, distance) do
+    across = @edge_bias + @edge_bias_share * distance
     sd = :math.sqrt(sd * sd + across * across)
     {sd, sd}
   end
@@ -222,7 +222,7 @@ defmodule Robot.Localiser do
     {belief, at} = Belief.meet(localiser.belief, anchor.key, anchor.at, sd)
     {dx, dy, square} = way(exposed, at)
     error = Pose.wrap(seen - Pose.bearing(exposed, at))
-    %{localiser | belief: Belief.correct(belief, anchor.key, error, {dy / square, -dx / square, -1.0}, {0.0, 0.0}, @bearing_sd * @bearing_sd)}
+    %{localiser | belief: Belief.correct(belief, anchor.key, error, {dy / square, -dx / square, -1.0}, {0.0, 0.0}, @bearing_sd * @bearing_sd + 20 * anchor.slack * anchor.slack)}
   end
 
   defp range(localiser, anchor, sd, exposed, seen) do
