@@ -124,14 +124,17 @@ defmodule System.DocsTest do
     "[Colors]"
   ]
 
+  setup_all do
+    Sandbox.remove()
+    on_exit(&Sandbox.remove/0)
+  end
+
   for document <- @documents do
     @document document
     test "#{document} tells no lie" do
       items = Reader.items(File.read!(Path.join(@root, @document)))
       assert unknown(items) == []
       folder = Sandbox.create(@root, @document)
-      on_exit(fn -> File.rm_rf!(folder) end)
-
       wrong = commands(items, folder) ++ mentions(items, folder)
       assert wrong ++ Sandbox.session(@document, items, folder) == []
       assert Sandbox.changed(@root, folder) == []
@@ -173,7 +176,6 @@ defmodule System.DocsTest do
 
     items = Reader.items(lies)
     folder = Sandbox.create(@root, "none")
-    on_exit(fn -> File.rm_rf!(folder) end)
     commands = commands(items, folder)
     assert [nowhere, ill, prompt] = commands
     assert nowhere =~ "line 3: mix robot.check config/robots/mag9.exs: status 1"
