@@ -94,7 +94,7 @@ defmodule Sim.BaseCase do
   end
 
   @doc "Stops it, and waits until it stands; what it was told and what its wheels do, if it does not in time."
-  def stop(%{device: device, server: server, emulator: emulator}) do
+  def stop(%{device: device, server: server} = context) do
     Device.drive(device, Twist.zero())
     deadline = System.monotonic_time(:millisecond) + 5_000
 
@@ -102,10 +102,7 @@ defmodule Sim.BaseCase do
       fn ->
         still?(server) ||
           (System.monotonic_time(:millisecond) > deadline and
-             flunk(
-               "it does not stand: #{inspect(body(server).speed)}, health #{inspect(newest_health())}, " <>
-                 inspect(Emulator.core(emulator), limit: :infinity)
-             ))
+             flunk("it does not stand: #{inspect(body(server).speed)}, " <> said(context)))
       end,
       6_000
     )
@@ -128,18 +125,33 @@ defmodule Sim.BaseCase do
     end
   end
 
-  # Where the driver believes to be against where the body is, both from the start.
-  defp off(%{server: server}, {x, y, heading}) do
-    case newest(:odometry) do
-      nil ->
-        nil
+  @doc """
+  Waits until the driver believes the body to be where it is, both from the start; in metres. What both say, if they
+  do not agree in time.
+  """
+  def agree(context, start \\ {-4, 0, 0}, tolerance \\ 0.005),
+    do: agree(context, start, tolerance, System.monotonic_time(:millisecond) + 10_000, nil)
 
-      odometry ->
-        Pose.distance(Pose.relative(Pose.new(x, y, heading), body(server).pose), odometry.pose)
+  defp agree(%{server: server} = context, {x, y, heading} = start, tolerance, until_ms, last) do
+    odometry = newest(:odometry)
+    pose = Pose.relative(Pose.new(x, y, heading), body(server).pose)
+    last = if odometry, do: {odometry.pose, pose}, else: last
+
+    cond do
+      odometry && Pose.distance(pose, odometry.pose) < tolerance ->
+        :ok
+
+      System.monotonic_time(:millisecond) > until_ms ->
+        flunk("the driver and the body do not agree: #{inspect(last)}, " <> said(context))
+
+      true ->
+        receive(do: (:never -> :ok), after: (20 -> :ok))
+        agree(context, start, tolerance, until_ms, last)
     end
   end
 
-  @doc "Waits until the driver believes the body to be where it is, both from the start; in metres."
-  def agree(context, start \\ {-4, 0, 0}, tolerance \\ 0.005),
-    do: eventually(fn -> (off(context, start) || 1.0) < tolerance end, 10_000)
+  defp said(%{emulator: emulator}) do
+    core = Emulator.core(emulator)
+    "health #{inspect(newest_health())}, #{inspect(core, limit: :infinity)}"
+  end
 end
