@@ -11,7 +11,7 @@ defmodule System.DocsTest do
   only words and options are compared with what its program knows. A new line is thus run unless somebody says why not.
   Nothing that a reader types may change a file that came along.
   """
-  use ExUnit.Case, async: false
+  use ExUnit.Case, async: true
 
   alias Docs.{LookedAt, Reader, Sandbox, Shown}
 
