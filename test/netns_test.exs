@@ -252,6 +252,8 @@ defmodule System.NetnsTest do
     last(still, 2_000)
     moved = for {who, ms, pose} <- told(fleet, :body, still), ms > 1_000, do: {who, ms, pose}
     assert moved == []
+    # The stop needs the radio only; who answers for a reset, is connected.
+    met(fleet)
     assert told(fleet, :reset, pressed) == []
     assert Fleet.call(fleet, :mag5, Swarm, :reset, []) == :ok
     again = start(fleet)

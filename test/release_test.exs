@@ -17,7 +17,7 @@ defmodule System.ReleaseTest do
   The release of real robots, from outside: it is built, started, commanded, killed and started again, with the
   real driver on an emulated base; and deployed to a bare machine.
   """
-  use ExUnit.Case, async: false
+  use ExUnit.Case, async: true
   alias Hal.{Pose, Profile}
   alias Release.Machine
   alias Sim.{Emulator, Server, World, Worlds}

@@ -12,7 +12,7 @@ defmodule Docs.Reader do
     * all else in a block is shown only, and so is what is fenced with another word than `elixir`
     * in a block fenced with `elixir`, a remark alone on the lines below an expression is its value
     * `` `in a sentence` `` a command or the name of a function is a mention
-    * `…` stands for anything; where a robot's status is printed (`#mag1 …`), so do numbers for numbers
+    * `…` stands for anything (in an answer of `iex>`, see `Docs.Shown`); where a robot's status is printed (`#mag1 …`), so do numbers for numbers
   """
 
   @type item ::
@@ -124,22 +124,25 @@ defmodule Docs.Reader do
     |> Enum.drop_while(&(&1 =~ ~r/^[A-Z_]+=/))
   end
 
-  @doc "Whether what was printed is what the document shows."
+  @doc "Whether what was printed is what the document shows, compared as text."
   @spec like?(String.t(), String.t()) :: boolean()
   def like?(shown, printed) do
-    robots? = shown =~ ~r/(^|\s|\[)#(\w+\d |Swarm\.Matrix)/
-
-    pattern =
-      shown
-      |> plain(robots?)
-      |> String.split("…")
-      |> Enum.map_join(".*", &Regex.escape/1)
-
-    plain(printed, robots?) =~ Regex.compile!("\\A#{pattern}\\z", "su")
+    {shown, printed} = plain(shown, printed)
+    pattern = shown |> String.split("…") |> Enum.map_join(".*", &Regex.escape/1)
+    printed =~ Regex.compile!("\\A#{pattern}\\z", "su")
   end
 
-  # How wide a terminal is, and where lines end for it, is nobody's promise.
-  defp plain(text, numbers?) do
+  @doc """
+  Both texts without what a document does not promise: how wide a terminal is, where lines end for it, and the
+  numbers of a robot's status.
+  """
+  @spec plain(String.t(), String.t()) :: {String.t(), String.t()}
+  def plain(shown, printed) do
+    numbers? = shown =~ ~r/(^|\s|\[)#(\w+\d |Swarm\.Matrix)/
+    {plain_text(shown, numbers?), plain_text(printed, numbers?)}
+  end
+
+  defp plain_text(text, numbers?) do
     text = text |> String.replace(~r/\s+/, " ") |> String.replace(~r/ ?([\[\]{}(),|]) ?/, "\\1")
     text = String.trim(text)
     if numbers?, do: String.replace(text, ~r/(?<![\w.])-?\d+(\.\d+)?(?!\w)/, "0"), else: text

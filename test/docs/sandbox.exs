@@ -1,7 +1,9 @@
 defmodule Docs.Sandbox do
   @moduledoc """
   A copy of the project for the commands of one document, and the shells in which its `iex>` lines are typed.
-  What was built is that of the project.
+
+  All copies are made in one place, one after the other, with what was built, which is copied once: newer Mix builds all
+  again in another folder, and what the project itself goes on with stays as it is.
   """
   alias Docs.Reader
 
@@ -12,22 +14,42 @@ defmodule Docs.Sandbox do
   @doc "The folder, with what the document takes for granted."
   @spec create(Path.t(), String.t()) :: Path.t()
   def create(root, document) do
-    folder =
-      Path.join(
-        System.tmp_dir!(),
-        "convoy-docs-#{System.pid()}-#{System.unique_integer([:positive])}"
-      )
-
+    folder = folder()
     File.mkdir_p!(folder)
+    for name <- File.ls!(folder), name != "_build", do: File.rm_rf!(Path.join(folder, name))
 
     # With their times, so that nothing is built again.
     for name <- File.ls!(root), name not in @left_out do
       {_, 0} = System.cmd("cp", ["-a", Path.join(root, name), folder])
     end
 
-    File.ln_s!(Path.join(root, "_build"), Path.join(folder, "_build"))
+    built(root, folder)
     given(document, folder)
     folder
+  end
+
+  @doc "Takes the folder away, and what was built."
+  @spec remove() :: :ok
+  def remove do
+    File.rm_rf!(folder())
+    :ok
+  end
+
+  defp folder, do: Path.join(System.tmp_dir!(), "convoy-docs-#{System.pid()}")
+
+  # That of these tests; what else was built is not changed by a document.
+  defp built(root, folder) do
+    [from, to] = for top <- [root, folder], do: Path.join(top, "_build")
+    mine = to_string(Mix.env())
+
+    unless File.exists?(to) do
+      File.mkdir_p!(to)
+      {_, 0} = System.cmd("cp", ["-a", Path.join(from, mine), to])
+
+      for name <- File.ls!(from),
+          name != mine,
+          do: File.ln_s!(Path.join(from, name), Path.join(to, name))
+    end
   end
 
   # A picture with two colours, and the colour file that the page shows.

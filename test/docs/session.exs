@@ -1,7 +1,7 @@
 # A person at iex, for test/docs_test.exs: types lines one after the other, and writes down what came of them.
 #
 # DOCS_LINES holds the lines as a term, DOCS_TOLD takes the answers.
-Code.require_file("reader.exs", __DIR__)
+for file <- ~w(reader.exs shown.exs), do: Code.require_file(file, __DIR__)
 
 defmodule Docs.Session do
   @moduledoc false
@@ -37,7 +37,7 @@ defmodule Docs.Session do
         {:ok, value} = result
         printed = String.trim(printed <> "\n" <> inspect(value, pretty: true, limit: 50))
 
-        if Docs.Reader.like?(shown, printed),
+        if Docs.Shown.like?(shown, printed),
           do: {:ok, after_binding, after_env},
           else: again({:printed, printed}, code, shown, {after_binding, after_env}, deadline)
     end

@@ -1,0 +1,157 @@
+defmodule Sim.BaseCase do
+  @moduledoc """
+  A robot's body in a world of its own, the emulated controller of its base, which was written from the fact sheet
+  alone, and the driver of real bases on the line between them, whose readings the test hears.
+
+  Tags: `profile`, `place` (of the body), `base` (options of the controller), `wire` (faults of the line).
+  """
+  use ExUnit.CaseTemplate
+  import Swarm.Case, only: [eventually: 2]
+  alias Hal.{Device, Pose, Profile, Twist}
+  alias Sim.{Emulator, Server, World}
+
+  @conversions %{
+    magellan: [distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0],
+    atrv_mini: [distance: 190_000.0, angle: 60_000.0, range: 1476.0]
+  }
+
+  using do
+    quote do
+      import Sim.BaseCase
+      import Swarm.Case, only: [eventually: 2]
+      alias Hal.{Profile, Twist}
+      alias Sim.Emulator
+      @moduletag :tmp_dir
+      @moduletag :capture_log
+    end
+  end
+
+  setup %{tmp_dir: folder} = context do
+    {:ok, map} = Sim.Map.open("hall", 1)
+    profile = Map.get(context, :profile, Profile.magellan())
+    {x, y, heading} = Map.get(context, :place, {-4, 0, 0})
+    robot = %{id: :mag1, profile: profile, pose: Pose.new(x, y, heading), infrared: true}
+    world = World.new!(map: map, robots: [robot], noise: :off)
+    name = make_ref()
+    server = start_supervised!({Server, name: name, world: world})
+    link = Path.join(folder, "base")
+
+    emulator =
+      start_supervised!(
+        {Emulator,
+         core: {Sim.RFlexController, [kind: profile.name] ++ Map.get(context, :base, [])},
+         link: link,
+         body: {Sim.Drive, world: name, robot: :mag1},
+         wire: Map.get(context, :wire, [])}
+      )
+
+    options = [
+      port: link,
+      profile: profile,
+      conversions: @conversions[profile.name],
+      bumpers: [count: if(profile.name == :magellan, do: 16, else: 0)]
+    ]
+
+    sinks = [{__MODULE__, :tell, [self()]}]
+
+    device =
+      start_supervised!({Device, kind: :drive, driver: {Hal.RFlex.Driver, options}, sinks: sinks})
+
+    assert_receive {:health, :drive, {:online, _}}, 10_000
+    assert_receive {:odometry, _}, 10_000
+    %{server: server, emulator: emulator, device: device, link: link}
+  end
+
+  @doc "Sends a reading to the test."
+  def tell(test, reading), do: send(test, reading)
+
+  @doc "The robot's body, in the world as it is now."
+  def body(server), do: Server.world(server).robots.mag1
+  @doc "Whether the body stands."
+  def still?(server), do: body(server).speed == {0.0, 0.0}
+
+  @doc "Tells it the speed as a gate does, until the body is so far; the fastest that it went meanwhile."
+  def drive(%{device: device, server: server}, twist, done?, ms \\ 20_000),
+    do: drive(device, server, twist, done?, System.monotonic_time(:millisecond) + ms, {0.0, 0.0})
+
+  defp drive(device, server, twist, done?, until_ms, {v, w}) do
+    Device.drive(device, twist)
+    body = body(server)
+    {speed, turn} = body.speed
+    fastest = {max(v, abs(speed)), max(w, abs(turn))}
+
+    cond do
+      done?.(body) ->
+        fastest
+
+      System.monotonic_time(:millisecond) > until_ms ->
+        flunk("it never got there: #{inspect(body.pose)}")
+
+      true ->
+        receive(do: (:never -> :ok), after: (50 -> :ok))
+        drive(device, server, twist, done?, until_ms, fastest)
+    end
+  end
+
+  @doc "Stops it, and waits until it stands; what it was told and what its wheels do, if it does not in time."
+  def stop(%{device: device, server: server} = context) do
+    Device.drive(device, Twist.zero())
+    deadline = System.monotonic_time(:millisecond) + 5_000
+
+    eventually(
+      fn ->
+        still?(server) ||
+          (System.monotonic_time(:millisecond) > deadline and
+             flunk("it does not stand: #{inspect(body(server).speed)}, " <> said(context)))
+      end,
+      6_000
+    )
+  end
+
+  defp newest_health(last \\ nil) do
+    receive do
+      {:health, :drive, health} -> newest_health(health)
+    after
+      0 -> last
+    end
+  end
+
+  @doc "The newest of these readings; `last` without one."
+  def newest(kind, last \\ nil) do
+    receive do
+      {^kind, reading} -> newest(kind, reading)
+    after
+      0 -> last
+    end
+  end
+
+  @doc """
+  Waits until the driver believes the body to be where it is, both from the start; in metres. What both say, if they
+  do not agree in time.
+  """
+  def agree(context, start \\ {-4, 0, 0}, tolerance \\ 0.005),
+    do: agree(context, start, tolerance, System.monotonic_time(:millisecond) + 10_000, nil)
+
+  defp agree(%{server: server} = context, {x, y, heading} = start, tolerance, until_ms, last) do
+    odometry = newest(:odometry)
+    pose = Pose.relative(Pose.new(x, y, heading), body(server).pose)
+    last = if odometry, do: {odometry.pose, pose}, else: last
+
+    cond do
+      odometry && Pose.distance(pose, odometry.pose) < tolerance ->
+        :ok
+
+      System.monotonic_time(:millisecond) > until_ms ->
+        flunk("the driver and the body do not agree: #{inspect(last)}, " <> said(context))
+
+      true ->
+        receive(do: (:never -> :ok), after: (20 -> :ok))
+        agree(context, start, tolerance, until_ms, last)
+    end
+  end
+
+  defp said(%{emulator: emulator}) do
+    core = Emulator.core(emulator)
+    "health #{inspect(newest_health())}, #{inspect(core, limit: :infinity)}"
+  end
+end
