@@ -1,89 +1,98 @@
 defmodule Robot.Localiser do
   @moduledoc """
-  Where a robot is in the map frame: odometry from its start pose, corrected by what it sees of
-  things whose places it was told. Pure; the filter itself is `Robot.Localiser.Belief`.
+  Where a robot is, and how sure that is: odometry from its start pose, corrected by what it sees of things whose
+  places it was told (`Robot.Localiser.Anchors`). Pure; the filter is `Robot.Localiser.Belief`, which
+  blob is which thing decides `Robot.Localiser.Matching`.
 
-  References are told by the mission (`anchors`): the landmark where the leader sees it, and the
-  robots ahead in the formation where they say they are. Corrections run one way, from the leader
-  down, so that no robot ever corrects itself by its own echo. A reference gives a bearing, the
-  landmark a range too. Sightings of the same thing repeat the same errors, so each counts for
-  much less than its noise would allow.
+  Corrections run one way, from the leader down, so that no robot ever corrects itself by its own echo. Things are
+  seen in a direction and, where nothing hides a part of them, at a distance: the landmark by its size, a robot by its
+  width.
 
   Odometry that begins again in another frame (`Hal.Odometry`) moves the robot nowhere: it goes on from
   where it was believed to be. The few decimetres of its stop that nobody counted are doubted.
   """
   alias Hal.{Odometry, Pose}
-  alias Robot.Localiser.Belief
+  alias Robot.Localiser.{Anchors, Belief, Matching}
   alias Robot.{Percept, Sighting}
 
-  # A single sighting: bearing in radians, range as a share and in metres. Errors that the next picture has again
-  # count as shared.
+  # A single sighting: bearing in radians, range as a share and in metres.
   @bearing_sd 0.015
-  @bearing_bias 0.005
-  @edge_bias 0.01
-  @edge_bias_share 0.01
   @range_share 0.05
   @range_sd 0.05
-  # A robot that is seen must be the one that is expected, within this angle.
-  @match 0.12
-  @fits 0.45
-  @clear 0.22
-  @widest 0.5
+  # What is wrong with every sighting of a thing alike: so much of its place, in metres, and per metre of distance.
+  @landmark_bias 0.005
+  @robot_bias 0.01
+  # Pictures of a second or two show the same slack; so many count as one.
+  @repeated 20
+  # Too near for a camera that looks over it, in metres.
+  @near 0.3
   @history 12
 
   @enforce_keys [:start]
   defstruct @enforce_keys ++
-              [odometry: nil, frame: nil, belief: nil, history: [], seen_ms: nil, anchors: [], told: nil]
+              [
+                odometry: nil,
+                odometry_frame: nil,
+                belief: nil,
+                history: [],
+                seen_ms: nil,
+                anchors: %Anchors{},
+                frame: nil
+              ]
 
-  @typedoc """
-  Something of a colour at a place (map frame); `sd` is how well the place is known, in metres.
-  With a `radius` only a blob as wide as that is taken for it; `range?`: its distance counts too.
-  """
-  @type anchor :: %{
-          colour: String.t(),
-          at: Pose.point(),
-          sd: float(),
-          range?: boolean(),
-          radius: float() | nil
-        }
+  @typedoc "`frame` is the one that the belief is in: `nil` for its own, from the start pose."
   @type t :: %__MODULE__{
           start: Pose.t(),
           odometry: Pose.t() | nil,
-          frame: reference() | nil,
+          odometry_frame: reference() | nil,
           belief: Belief.t() | nil,
           history: [{at_ms :: integer(), odometry :: Pose.t()}],
           seen_ms: integer() | nil,
-          anchors: [anchor()]
+          anchors: Anchors.t(),
+          frame: Anchors.frame() | nil
         }
 
   @doc "A robot that was switched on at `start`, where its odometry said zero."
   @spec new(Pose.t()) :: t()
   def new(%Pose{} = start), do: %__MODULE__{start: start}
 
-  @doc "The references to use from now on."
-  @spec anchors(t(), [anchor()]) :: t()
-  def anchors(localiser, []), do: %{localiser | anchors: [], belief: localiser.belief && Belief.forget(localiser.belief)}
-  def anchors(localiser, {frame, anchors}), do: %{tell(localiser, frame) | anchors: anchors}
+  @doc """
+  What to find the pose by from now on. In a frame that is new to it the robot is as unsure as that frame's
+  robot is of its own pose, and then by what that robot becomes less sure.
+  """
+  @spec anchors(t(), Anchors.t()) :: t()
+  def anchors(localiser, %Anchors{frame: frame, marks: marks} = anchors) do
+    localiser = localiser |> join(frame) |> Map.put(:anchors, anchors)
 
-  defp tell(%{belief: nil} = localiser, _frame), do: localiser
-  defp tell(%{told: %{key: key} = told} = localiser, %{key: key} = frame) do
-    p = max(frame.position_var - told.position_var, 0.0)
-    h = max(frame.heading_var - told.heading_var, 0.0)
-    reframe(localiser, frame, p, h)
+    if marks == [] and localiser.belief != nil,
+      do: %{localiser | belief: Belief.forget(localiser.belief)},
+      else: localiser
   end
-  defp tell(localiser, frame), do: reframe(localiser, frame, frame.position_var, frame.heading_var)
 
-  defp reframe(localiser, frame, p, h) do
-    %{localiser | told: frame, belief: Belief.reframe(localiser.belief, frame.at, p, h)}
+  # Where a leader is believed to be stays true when nobody leads any more.
+  defp join(localiser, nil), do: localiser
+  defp join(%{belief: nil} = localiser, _frame), do: localiser
+
+  defp join(%{frame: %{key: key} = known} = localiser, %{key: key} = frame) do
+    position = max(frame.position - known.position, 0.0)
+    heading = max(frame.heading - known.heading, 0.0)
+    reframe(localiser, frame, position, heading)
+  end
+
+  defp join(localiser, frame), do: reframe(localiser, frame, frame.position, frame.heading)
+
+  defp reframe(localiser, frame, position, heading) do
+    belief = Belief.reframe(localiser.belief, frame.at, position, heading)
+    %{localiser | frame: frame, belief: belief}
   end
 
   @doc """
-  Moves the estimate by the percept's odometry, corrects it by the percept's blobs, and fills in
-  the percept's `pose` and `blobs_pose`. Without odometry there is no pose.
+  Moves the estimate by the percept's odometry, corrects it by the percept's blobs, and fills in the percept's
+  `pose`, `uncertainty` and `blobs_pose`. Without odometry there is no pose.
   """
   @spec update(t(), Percept.t()) :: {Percept.t(), t()}
   def update(localiser, %Percept{odometry: nil} = percept),
-    do: {%{percept | pose: nil, blobs_pose: nil}, localiser}
+    do: {%{percept | pose: nil, uncertainty: nil, blobs_pose: nil}, localiser}
 
   def update(localiser, %Percept{odometry: %Odometry{} = odometry} = percept) do
     localiser =
@@ -93,18 +102,35 @@ defmodule Robot.Localiser do
       |> see(percept)
       |> remember(percept.at_ms)
 
-    blobs_pose = percept.blobs_at_ms && pose_at(localiser, percept.blobs_at_ms)
-    {%{percept | pose: localiser.belief.pose, blobs_pose: blobs_pose, pose_sd: Belief.sd(localiser.belief), pose_frame: localiser.told && localiser.told.key}, localiser}
+    percept = %{
+      percept
+      | pose: localiser.belief.pose,
+        uncertainty: uncertainty(localiser),
+        blobs_pose: percept.blobs_at_ms && pose_at(localiser, percept.blobs_at_ms)
+    }
+
+    {percept, localiser}
   end
 
-  defp framed(%{frame: frame} = localiser, frame), do: localiser
-  defp framed(%{belief: nil} = localiser, frame), do: %{localiser | frame: frame}
+  defp uncertainty(%{belief: belief, frame: frame}) do
+    {position, _across, heading} = Belief.sd(belief)
+
+    %{
+      radius: Belief.radius(belief),
+      position: position,
+      heading: heading,
+      frame: frame && frame.key
+    }
+  end
+
+  defp framed(%{odometry_frame: frame} = localiser, frame), do: localiser
+  defp framed(%{belief: nil} = localiser, frame), do: %{localiser | odometry_frame: frame}
 
   # Poses of the frame before mean nothing any more.
   defp framed(localiser, frame),
     do: %{
       localiser
-      | frame: frame,
+      | odometry_frame: frame,
         odometry: nil,
         history: [],
         belief: Belief.doubt(localiser.belief)
@@ -126,123 +152,99 @@ defmodule Robot.Localiser do
   defp see(localiser, %Percept{blobs: nil}), do: localiser
   defp see(%{seen_ms: at_ms} = localiser, %Percept{blobs_at_ms: at_ms}), do: localiser
 
+  # Turned right by the landmark, it knows better which robot is which.
   defp see(localiser, percept) do
-    localiser = %{localiser | seen_ms: percept.blobs_at_ms}
-    view = Sighting.field_of_view(percept)
-    # The picture was taken a moment ago, and the body may have turned since.
-    exposed = pose_at(localiser, percept.blobs_at_ms)
+    {landmarks, robots} = Enum.split_with(localiser.anchors.marks, &(&1.kind == :landmark))
 
-    {marks, robots} = Enum.split_with(localiser.anchors, & &1.range?)
-
-    localiser =
-      Enum.reduce(marks, localiser, fn anchor, localiser ->
-        case mark(anchor, percept) do
-          nil -> localiser
-          blob -> correct(localiser, Map.put(anchor, :slack, 0.0), blob, exposed, percept, view)
-        end
-      end)
-
-    # Turned right by the landmark, one knows better which robot is which.
-    exposed = pose_at(localiser, percept.blobs_at_ms)
-
-    Enum.reduce(pairs(robots, localiser, percept, exposed, view), localiser, fn {anchor, blob, slack, off}, localiser ->
-      correct(localiser, Map.merge(anchor, %{slack: slack, width?: off < 0.15}), blob, pose_at(localiser, percept.blobs_at_ms), percept, view)
-    end)
+    %{localiser | seen_ms: percept.blobs_at_ms}
+    |> see_landmarks(landmarks, percept)
+    |> see_robots(robots, percept)
   end
 
   # There is one landmark: whatever has its colour is it.
-  defp mark(anchor, percept) do
-    percept.blobs
-    |> Enum.filter(&(&1.colour == anchor.colour and not &1.clipped?))
-    |> Enum.max_by(& &1.area, fn -> nil end)
+  defp see_landmarks(localiser, landmarks, percept) do
+    Enum.reduce(landmarks, localiser, fn mark, localiser ->
+      whole = Enum.filter(percept.blobs, &(&1.colour == mark.colour and not &1.clipped?))
+
+      case Enum.max_by(whole, & &1.area, fn -> nil end) do
+        nil ->
+          localiser
+
+        blob ->
+          correct(localiser, percept, mark, blob, 0.0, Sighting.distance(blob, percept.blobs))
+      end
+    end)
   end
 
-  # A blob counts where it can be one robot only, and that robot one blob only. What is half hidden looks narrower than it is.
-  defp pairs(robots, localiser, percept, exposed, view) do
-    candidates =
-      for anchor <- robots,
-          gate = gate(anchor, localiser, exposed),
-          expected = Pose.bearing(exposed, anchor.at),
-          distance = Pose.distance(exposed, anchor.at),
-          blob <- percept.blobs,
-          blob.colour == anchor.colour,
-          bearing = Sighting.bearing(blob, percept.blobs_pan, view),
-          ratio = Sighting.width_ratio(blob, anchor.radius, distance, view),
-          ratio > 0.3 and ratio < 2.5,
-          half = :math.asin(min(anchor.radius / max(distance, 0.01), 1.0)),
-          slack = abs(ratio - 1) * half,
-          abs(Pose.wrap(bearing - expected)) < gate + slack,
-          do: {anchor, blob, abs(:math.log(ratio)), slack}
+  defp see_robots(localiser, robots, percept) do
+    view = Sighting.field_of_view(percept)
+    exposed = pose_at(localiser, percept.blobs_at_ms)
 
-    for {anchor, blob, off, slack} <- candidates,
-        anchor.sd != nil,
-        blob.left > 0 and blob.right < blob.width - 1,
-        off < @fits,
-        rivals = Enum.filter(candidates, fn {a, b, _, _} -> (a == anchor) != (b == blob) end),
-        Enum.all?(rivals, fn {_, _, other, _} -> other > off + @clear end),
-        do: {anchor, blob, slack, off}
+    robots
+    |> Matching.pairs(percept.blobs, localiser.belief, exposed, percept.blobs_pan, view)
+    |> Enum.reduce(localiser, fn %{mark: mark, blob: blob, slack: slack} = pair, localiser ->
+      distance = if pair.whole?, do: Sighting.distance_by_width(blob, mark.radius, view)
+      correct(localiser, percept, mark, blob, slack, distance)
+    end)
   end
 
-  defp gate(anchor, localiser, exposed) do
-    {ax, ay} = anchor.at
-    dx = ax - exposed.x
-    dy = ay - exposed.y
-    square = max(dx * dx + dy * dy, 0.09)
-    sd = anchor.sd || 0.3
-    variance = Belief.variance(localiser.belief, {dy / square, -dx / square, -1.0}) + sd * sd / square + @bearing_sd * @bearing_sd
-    (3 * :math.sqrt(variance)) |> max(@match) |> min(@widest)
-  end
+  defp correct(localiser, percept, mark, blob, slack, distance) do
+    far = Pose.distance(pose_at(localiser, percept.blobs_at_ms), mark.at)
+    bearing = Sighting.bearing(blob, percept.blobs_pan, Sighting.field_of_view(percept))
 
-  defp correct(localiser, anchor, blob, exposed, percept, view) do
-    dbg_(localiser, anchor, blob, percept, view, exposed)
-    distance = Pose.distance(exposed, anchor.at)
+    cond do
+      far < @near ->
+        localiser
 
-    if distance < 0.3 do
-      localiser
-    else
-      sd = sds(anchor, distance)
-      localiser = bearing(localiser, anchor, sd, exposed, Sighting.bearing(blob, percept.blobs_pan, view))
-      range = if anchor.range?, do: Sighting.distance(blob, percept.blobs), else: anchor.width? && Sighting.width_distance(blob, anchor.radius, view)
-      if range, do: range(localiser, anchor, sd, pose_at(localiser, percept.blobs_at_ms), range), else: localiser
+      distance == nil ->
+        turn(localiser, percept, mark, far, bearing, slack)
+
+      true ->
+        localiser
+        |> turn(percept, mark, far, bearing, slack)
+        |> stretch(percept, mark, far, distance)
     end
   end
 
-  defp sds(%{range?: true, sd: sd}, distance) do
-    sd = sd + @bearing_bias * distance
-    {sd, sd}
+  # The picture was taken a moment ago, and the body may have turned since.
+  defp turn(localiser, percept, mark, far, seen, slack) do
+    {belief, exposed, {dx, dy, distance}} = meet(localiser, percept, mark, far)
+    expected = Pose.wrap(:math.atan2(dy, dx) - exposed.heading)
+    square = distance * distance
+    slope = {{dy / square, -dx / square, -1.0}, {0.0, 0.0}}
+    noise = @bearing_sd * @bearing_sd + @repeated * slack * slack
+    error = Pose.wrap(seen - expected)
+    %{localiser | belief: Belief.correct(belief, mark.key, error, slope, noise)}
   end
 
-  defp sds(%{sd: sd}, distance) do
-    across = @edge_bias + @edge_bias_share * distance
-    sd = :math.sqrt(sd * sd + across * across)
-    {sd, sd}
-  end
+  defp stretch(localiser, percept, mark, far, seen) do
+    {belief, _exposed, {dx, dy, distance}} = meet(localiser, percept, mark, far)
 
-  defp bearing(localiser, anchor, sd, exposed, seen) do
-    {belief, at} = Belief.meet(localiser.belief, anchor.key, anchor.at, sd)
-    {dx, dy, square} = way(exposed, at)
-    error = Pose.wrap(seen - Pose.bearing(exposed, at))
-    %{localiser | belief: Belief.correct(belief, anchor.key, error, {dy / square, -dx / square, -1.0}, {0.0, 0.0}, @bearing_sd * @bearing_sd + 20 * anchor.slack * anchor.slack)}
-  end
+    {scale, scales} =
+      case mark.kind do
+        :landmark -> {elem(belief.scales, 0), {distance, 0.0}}
+        :robot -> {elem(belief.scales, 1), {0.0, distance}}
+      end
 
-  defp range(localiser, anchor, sd, exposed, seen) do
-    {belief, at} = Belief.meet(localiser.belief, anchor.key, anchor.at, sd)
-    {dx, dy, square} = way(exposed, at)
-    distance = :math.sqrt(square)
+    slope = {{-dx / distance, -dy / distance, 0.0}, scales}
     noise = :math.pow(@range_share * distance + @range_sd, 2)
-    {m, n} = belief.scales
-    {scale, use} = if anchor.range?, do: {m, {distance, 0.0}}, else: {n, {0.0, distance}}
-    %{localiser | belief: Belief.correct(belief, anchor.key, seen - distance * (1 + scale), {-dx / distance, -dy / distance, 0.0}, use, noise)}
+    error = seen - distance * (1 + scale)
+    %{localiser | belief: Belief.correct(belief, mark.key, error, slope, noise)}
   end
 
-  defp way(exposed, {ax, ay}) do
-    dx = ax - exposed.x
-    dy = ay - exposed.y
-    {dx, dy, max(dx * dx + dy * dy, 0.01)}
+  # The way from where the picture was taken to where the thing is by now believed to be.
+  defp meet(localiser, percept, mark, far) do
+    exposed = pose_at(localiser, percept.blobs_at_ms)
+    {belief, {x, y}} = Belief.meet(localiser.belief, mark.key, mark.at, place_sd(mark, far))
+    {dx, dy} = {x - exposed.x, y - exposed.y}
+    {belief, exposed, {dx, dy, max(:math.sqrt(dx * dx + dy * dy), 0.1)}}
   end
 
-  defp dbg_(localiser, anchor, blob, percept, view, exposed) do
-    with f when is_function(f) <- Process.get(:dbg), do: f.(percept.robot, localiser, anchor, blob, Sighting.bearing(blob, percept.blobs_pan, view), percept, exposed)
+  defp place_sd(%{kind: :landmark, sd: sd}, far), do: sd + @landmark_bias * far
+
+  defp place_sd(%{kind: :robot, sd: sd}, far) do
+    bias = @robot_bias * (1 + far)
+    :math.sqrt(sd * sd + bias * bias)
   end
 
   defp remember(localiser, at_ms) do

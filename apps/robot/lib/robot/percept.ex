@@ -12,8 +12,7 @@ defmodule Robot.Percept do
   defstruct @enforce_keys ++
               [
                 pose: nil,
-                pose_sd: nil,
-                pose_frame: nil,
+                uncertainty: nil,
                 odometry: nil,
                 sonar: nil,
                 ir: nil,
@@ -46,6 +45,17 @@ defmodule Robot.Percept do
         }
 
   @typedoc """
+  How sure the pose is: within `radius` metres in 95 of 100 cases; `position` (along the worst direction, metres) and `heading`
+  (radians) are standard deviations. `frame` tells whose frame it is that the pose is in: `nil` for the robot's own.
+  """
+  @type uncertainty :: %{
+          radius: float(),
+          position: float(),
+          heading: float(),
+          frame: term()
+        }
+
+  @typedoc """
   `blobs_pan`, `blobs_view` and `blobs_pose` are where the camera looked, how wide (radians, `nil`:
   as the unit says now) and where the robot stood (map frame) when the picture was taken. `driving` is what the gate last let through, and why it limited it.
   """
@@ -54,8 +64,7 @@ defmodule Robot.Percept do
           at_ms: integer(),
           profile: Profile.t(),
           pose: Pose.t() | nil,
-          pose_frame: term(),
-          pose_sd: {position :: float(), heading :: float()} | nil,
+          uncertainty: uncertainty() | nil,
           odometry: Odometry.t() | nil,
           sonar: [float()] | nil,
           ir: [float()] | nil,

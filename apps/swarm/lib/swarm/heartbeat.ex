@@ -6,7 +6,8 @@ defmodule Swarm.Heartbeat do
   `estop` is the number of the last emergency stop that it knows, 0 for none, and `latched` says
   whether its own latch is set (`Swarm.Stop`). `sight` is its newest view of the landmark: relative
   size and estimated distance, `nil` where it does not see it. `anchor` is there in the leader's
-  heartbeats only. `boot` is its life's number, which grows with every start.
+  heartbeats only. `sd` is how well it knows its pose in its leader's frame, `nil` outside of
+  it. `boot` is its life's number, which grows with every start.
   """
   alias Swarm.{Roll, Shape}
 
@@ -35,6 +36,7 @@ defmodule Swarm.Heartbeat do
           pose: {x :: integer(), y :: integer(), heading :: integer()},
           twist: {linear :: integer(), turn :: integer()},
           radius: pos_integer(),
+          sd: non_neg_integer() | nil,
           phase: atom(),
           epoch: non_neg_integer(),
           leader: atom() | nil,
@@ -68,18 +70,14 @@ defmodule Swarm.Heartbeat do
       pose: {round(pose.x * 1000), round(pose.y * 1000), round(pose.heading * 1000)},
       twist: {round(twist.linear * 1000), round(twist.turn * 1000)},
       radius: round(percept.profile.radius * 1000),
-      sd: if(claim[:leader] == nil or percept.pose_frame == {claim[:leader], claim[:epoch]}, do: sd(percept.pose_sd)),
       heard: Roll.new(heard),
       estop: stop.known,
       latched: stop.latched?
     }
 
-    # What a robot is blocked by is for people, who ask the robot itself.
-    struct!(beat, Map.delete(claim, :blocked_by))
+    # These are for people, who ask the robot itself.
+    struct!(beat, Map.drop(claim, [:blocked_by, :uncertainty]))
   end
-
-  defp sd(nil), do: nil
-  defp sd({position, heading}), do: {min(round(position * 1000), 100_000), min(round(heading * 1000), 100_000)}
 
   @doc """
   Whether a term from outside is a heartbeat with sane numbers.
@@ -93,7 +91,8 @@ defmodule Swarm.Heartbeat do
   def valid?(%__MODULE__{twist: {linear, turn}} = beat) do
     Shape.whole?(beat, __MODULE__) and Shape.pose?(beat.pose) and Shape.number?(linear) and
       Shape.number?(turn) and is_integer(beat.boot) and beat.boot in 0..@latest and
-      Shape.count?(beat.sequence) and beat.radius in 50..2000 and Shape.name?(beat.phase) and
+      Shape.count?(beat.sequence) and beat.radius in 50..2000 and
+      (beat.sd == nil or beat.sd in 0..100_000) and Shape.name?(beat.phase) and
       Shape.count?(beat.epoch) and (beat.leader == nil or Shape.name?(beat.leader)) and
       Roll.valid?(beat.heard) and sight?(beat.sight) and
       Enum.all?(

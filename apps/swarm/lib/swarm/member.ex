@@ -17,6 +17,7 @@ defmodule Swarm.Member do
   """
   alias Hal.{Pose, Profile, Twist}
   alias Robot.{Mind, Percept, Reflex}
+  alias Robot.Localiser.Anchors
   alias Swarm.{Heartbeat, Message, Peers, Stop}
   alias Swarm.Link.Ear
 
@@ -202,7 +203,7 @@ defmodule Swarm.Member do
   defp halt(member) do
     %{
       member
-      | mind: member.mind |> Mind.goal(:idle, nil) |> Mind.anchors([]),
+      | mind: member.mind |> Mind.goal(:idle, nil) |> Mind.anchors(%Anchors{}),
         reflex: Reflex.forget(member.reflex),
         halted: halted(member),
         mission: nil,

@@ -1,215 +1,293 @@
 defmodule Robot.Localiser.Belief do
-  @moduledoc false
-  alias Hal.Pose
+  @moduledoc """
+  A pose and how sure one is of it: an extended Kalman filter, moved by odometry and corrected by one
+  scalar measurement after another. Pure.
 
-  @start_sd {0.03, 0.03, 0.02, 0.055, 0.06, 0.08}
-  @base 6
+  Its states are x, y and heading, and what makes them wrong again and again:
+
+  | state | is |
+  |---|---|
+  | slip | by which share the robot turns farther to the left than its wheels say, and less far to the right (R74) |
+  | two scales | by which share distances come out too long: by the size of the landmark, by the width of a robot |
+  | x, y of each mark | how far a thing that was told is from where it was told to be |
+
+  With the last, a mark that is seen a thousand times makes nobody surer than its own place is: Smith, Self
+  and Cheeseman 1990. Odometry: Siegwart and Nourbakhsh 2004. What is farther off than three standard
+  deviations is not believed (Bar-Shalom, Li and Kirubarajan 2001).
+  """
+  alias Hal.Pose
+  alias Robot.Localiser.Covariance
+
+  # x, y, heading, slip, the scales of the landmark and of robots.
+  @start_sd [0.03, 0.03, 0.02, 0.055, 0.06, 0.08]
+  @own length(@start_sd)
+  # Standard deviations of odometry: of the way driven, of the angle turned, of angle per metre.
   @way_share 0.01
   @turn_share 0.05
   @turn_per_metre 0.01
+  # How much slip changes, in a radian turned.
   @slip_change 0.005
   @gate 9.0
+  # Where measurements go on contradicting the estimate, it is the estimate that is doubted: a
+  # refusal counts two, one that is believed takes one back.
   @doubt 16
-  @doubt_sd {0.3, 0.3, 0.3}
-  @most 6
-  @moved 1.0
+  @doubt_sd 0.3
+  # Marks beyond these take the place of the one that was seen least lately.
+  @marks 6
+  # A thing that was told to be so far from before is another one, in metres.
+  @elsewhere 1.0
+  # Beyond these nobody knows anything, and linear algebra less: metres, radians.
+  @lost_position 5.0
+  @lost_heading 1.0
 
-  @enforce_keys [:pose, :p]
-  defstruct @enforce_keys ++ [slip: 0.0, scales: {0.0, 0.0}, refused: 0, marks: [], count: 0]
+  @enforce_keys [:pose, :covariance]
+  defstruct @enforce_keys ++ [slip: 0.0, scales: {0.0, 0.0}, marks: [], uses: 0, refused: 0]
 
-  @type t :: %__MODULE__{}
+  @typedoc "`told` is where it was told to be and how well that was known, `off` how far it is from there."
+  @type mark :: %{
+          key: term(),
+          told: Pose.point(),
+          sd: float(),
+          off: {float(), float()},
+          used: non_neg_integer()
+        }
+  @type t :: %__MODULE__{
+          pose: Pose.t(),
+          covariance: Covariance.t(),
+          slip: float(),
+          scales: {landmark :: float(), robot :: float()},
+          marks: [mark()],
+          uses: non_neg_integer(),
+          refused: non_neg_integer()
+        }
+  @typedoc "How a measurement changes with x, y and heading, and with the scales."
+  @type slope :: {{float(), float(), float()}, {float(), float()}}
 
+  @doc "A robot that was put down at a pose by hand."
   @spec new(Pose.t()) :: t()
-  def new(%Pose{} = pose) do
-    sds = Tuple.to_list(@start_sd)
-    p = for {sd, i} <- Enum.with_index(sds), do: for(j <- 0..5, do: if(i == j, do: sd * sd, else: 0.0))
-    %__MODULE__{pose: pose, p: p}
-  end
+  def new(%Pose{} = pose),
+    do: %__MODULE__{pose: pose, covariance: Covariance.diagonal(@start_sd)}
 
-  @spec sd(t()) :: {position :: float(), heading :: float()}
-  def sd(%__MODULE__{} = belief) do
-    {xx, xy, _, yy, _, hh} = covariance(belief)
+  @doc """
+  Standard deviations: of the position along its worst direction and across it, in metres; of the heading, in
+  radians.
+
+      iex> Robot.Localiser.Belief.sd(Robot.Localiser.Belief.new(Hal.Pose.new(1, 0)))
+      {0.03, 0.03, 0.02}
+  """
+  @spec sd(t()) :: {worst :: float(), least :: float(), heading :: float()}
+  def sd(%__MODULE__{covariance: [[xx, xy | _], [_, yy | _], [_, _, hh | _] | _]}) do
     half = (xx + yy) / 2
-    root = :math.sqrt(max((xx - yy) * (xx - yy) / 4 + xy * xy, 0.0))
-    {:math.sqrt(max(half + root, 0.0)), :math.sqrt(max(hh, 0.0))}
+    root = :math.sqrt((xx - yy) * (xx - yy) / 4 + xy * xy)
+    {root(half + root), root(half - root), root(hh)}
   end
 
-  def covariance(%__MODULE__{p: [[xx, xy, xh | _], [_, yy, yh | _], [_, _, hh | _] | _]}),
-    do: {xx, xy, xh, yy, yh, hh}
+  defp root(square), do: :math.sqrt(max(square, 0.0))
 
+  @doc """
+  In what distance from the estimate the robot is in 95 of 100 cases, in metres: 1.96 standard deviations of
+  an error along a line, 2.45 of one in all directions, and between them by a fit to the table of circular errors.
+
+      iex> Float.round(Robot.Localiser.Belief.radius(Robot.Localiser.Belief.new(Hal.Pose.new(1, 0))), 3)
+      0.073
+  """
+  @spec radius(t()) :: float()
+  def radius(belief) do
+    {worst, least, _heading} = sd(belief)
+    worst * (1.96 + 0.488 * :math.pow(least / worst, 2.5))
+  end
+
+  @doc """
+  Moved by a step of odometry, given in the robot's own frame.
+
+      iex> belief = Robot.Localiser.Belief.new(Hal.Pose.new(1, 0))
+      iex> Robot.Localiser.Belief.move(belief, Hal.Pose.new(0.5, 0)).pose
+      Hal.Pose.new(1.5, 0)
+  """
   @spec move(t(), step :: Pose.t()) :: t()
-  def move(belief, %Pose{x: x, y: y, heading: h}) when x == 0.0 and y == 0.0 and h == 0.0, do: belief
+  def move(belief, %Pose{x: x, y: y, heading: turn})
+      when x == 0.0 and y == 0.0 and turn == 0.0,
+      do: belief
 
   def move(belief, step) do
-    u = abs(step.heading)
-    extra = belief.slip * u
-    c = :math.cos(extra / 2)
-    s = :math.sin(extra / 2)
-    step_ = Pose.new(c * step.x - s * step.y, s * step.x + c * step.y, step.heading + extra)
-    pose = Pose.compose(belief.pose, step_)
+    angle = abs(step.heading)
+    more = belief.slip * angle
+    {c, s} = {:math.cos(more / 2), :math.sin(more / 2)}
+
+    slipped = Pose.new(c * step.x - s * step.y, s * step.x + c * step.y, step.heading + more)
+
+    pose = Pose.compose(belief.pose, slipped)
     way = :math.sqrt(step.x * step.x + step.y * step.y)
-    a = -(pose.y - belief.pose.y)
-    b = pose.x - belief.pose.x
     along = :math.pow(@way_share * way, 2)
-    turned = :math.pow(@turn_share * u, 2) + :math.pow(@turn_per_metre * way, 2)
+    turned = :math.pow(@turn_share * angle, 2) + :math.pow(@turn_per_metre * way, 2)
+    slips = @slip_change * @slip_change * angle
 
-    p =
-      belief.p
-      |> carry(a, b, u)
-      |> transpose()
-      |> carry(a, b, u)
-      |> noise([along, along, turned, @slip_change * @slip_change * u])
+    covariance =
+      belief.covariance
+      |> Covariance.carry(&motion(&1, belief.pose.y - pose.y, pose.x - belief.pose.x, angle))
+      |> Covariance.add([along, along, turned, slips])
 
-    %{belief | pose: pose, p: p}
+    %{belief | pose: pose, covariance: covariance}
   end
 
-  # F P with F = [1 0 a au/2; 0 1 b bu/2; 0 0 1 u; 0 0 0 1].
-  defp carry([x, y, h, s | rest], a, b, u) do
-    [mix(x, a, h, a * u / 2, s), mix(y, b, h, b * u / 2, s), mix(h, u, s, 0.0, s), s | rest]
+  # F = [1 0 a au/2; 0 1 b bu/2; 0 0 1 u; 0 0 0 1]: the way turns with the heading, half of the slip with it.
+  defp motion([x, y, heading, slip | rest], a, b, u) do
+    [
+      mix(x, a, heading, a * u / 2, slip),
+      mix(y, b, heading, b * u / 2, slip),
+      mix(heading, u, slip, 0.0, slip),
+      slip | rest
+    ]
   end
 
-  defp mix([], _, [], _, []), do: []
+  defp mix([], _p, [], _q, []), do: []
   defp mix([a | as], p, [b | bs], q, [c | cs]), do: [a + p * b + q * c | mix(as, p, bs, q, cs)]
 
-  defp transpose([[] | _]), do: []
-  defp transpose(rows), do: Enum.zip_with(rows, & &1)
+  @doc """
+  The same pose in the frame of somebody at `at` who is sure of its own pose by these variances only (m2, rad2):
+  its frame may have moved, and turned about it.
+  """
+  @spec reframe(t(), at :: Pose.point(), position :: float(), heading :: float()) :: t()
+  def reframe(belief, {x, y}, position, heading) do
+    position = min(position, @lost_position * @lost_position)
+    heading = min(heading, @lost_heading * @lost_heading)
+    turn = [y - belief.pose.y, belief.pose.x - x, 1.0]
+    [a, b, c | rest] = belief.covariance
 
-  defp noise(rows, []), do: rows
-  defp noise(rows, vars), do: noise(rows, vars, 0)
-  defp noise(rows, [], _i), do: rows
-  defp noise([row | rows], [v | vs], i), do: [List.update_at(row, i, &(&1 + v)) | noise(rows, vs, i + 1)]
+    rows =
+      for {row, g} <- Enum.zip([a, b, c], turn) do
+        {own, others} = Enum.split(row, 3)
+        for({p, k} <- Enum.zip(own, turn), do: p + heading * g * k) ++ others
+      end
 
-  @spec reframe(t(), Pose.point(), float(), float()) :: t()
-  def reframe(belief, {x, y}, position_var, h) do
-    gx = -(belief.pose.y - y)
-    gy = belief.pose.x - x
-    [[xx, xy, xh | rx], [yx, yy, yh | ry], [hx, hy, hh | rh] | rest] = belief.p
-
-    %{
-      belief
-      | p: [
-          [xx + position_var + h * gx * gx, xy + h * gx * gy, xh + h * gx | rx],
-          [yx + h * gx * gy, yy + position_var + h * gy * gy, yh + h * gy | ry],
-          [hx + h * gx, hy + h * gy, hh + h | rh] | rest
-        ]
-    }
+    %{belief | covariance: Covariance.add(rows ++ rest, [position, position])}
   end
 
+  @doc "The variance of what is measured of the pose alone, whose value changes so with x, y and heading."
   @spec variance(t(), {float(), float(), float()}) :: float()
   def variance(belief, {a, b, c}) do
-    {xx, xy, xh, yy, yh, hh} = covariance(belief)
-    a * a * xx + 2 * a * b * xy + 2 * a * c * xh + b * b * yy + 2 * b * c * yh + c * c * hh
+    {_v, variance} = Covariance.project(belief.covariance, [a, b, c])
+    variance
   end
 
-  @doc "Where a mark is by now, of which was told where it is and how well that is known."
-  def meet(belief, key, at, {along, _across} = sds) do
-    case Enum.find_index(belief.marks, &(elem(&1, 0) == key)) do
+  @doc """
+  Where a thing is that was told to be at `at`, known by `sd` metres: there, as long as nobody has seen it, and then
+  where it was seen to be.
+  """
+  @spec meet(t(), key :: term(), Pose.point(), sd :: float()) :: {t(), Pose.point()}
+  def meet(belief, key, {x, y} = at, sd) do
+    case Enum.find_index(belief.marks, &(&1.key == key)) do
       nil ->
-        belief = if length(belief.marks) >= @most, do: drop(belief, oldest(belief)), else: belief
-        {add(belief, key, at, sds), at}
+        {add(belief, key, at, sd), at}
 
       index ->
-        {_key, told, told_sd, _bias, _used} = Enum.at(belief.marks, index)
-        moved = Pose.distance(told, at)
+        mark = Enum.at(belief.marks, index)
+        moved = Pose.distance(mark.told, at)
 
-        if moved > @moved do
-          {belief |> drop(index) |> add(key, at, sds), at}
+        if moved > @elsewhere do
+          {belief |> drop(index) |> add(key, at, sd), at}
         else
-          variance = moved * moved + max(along * along - 2 * told_sd * told_sd, 0.0)
-          belief = belief |> shake(index, variance) |> renew(index, at, if(variance > moved * moved, do: along, else: told_sd))
-          {_key, {x, y}, _sd, {bx, by}, _used} = Enum.at(belief.marks, index)
-          {belief, {x + bx, y + by}}
+          {tell(belief, index, mark, at, sd, moved * moved), shift({x, y}, mark.off)}
         end
     end
   end
 
-  defp oldest(belief) do
-    {_, index} = belief.marks |> Enum.with_index() |> Enum.min_by(fn {mark, _} -> elem(mark, 4) end)
-    index
+  # Told to be elsewhere, or with less certainty, it may be off by that much more.
+  defp tell(belief, index, mark, at, sd, moved) do
+    less_sure = sd * sd > 2 * mark.sd * mark.sd
+    more = if less_sure, do: sd * sd - mark.sd * mark.sd, else: 0.0
+    mark = %{mark | told: at, sd: if(less_sure, do: sd, else: mark.sd), used: belief.uses}
+
+    %{
+      belief
+      | covariance:
+          Covariance.add(belief.covariance, [moved + more, moved + more], @own + 2 * index),
+        marks: List.replace_at(belief.marks, index, mark),
+        uses: belief.uses + 1
+    }
   end
 
-  defp shake(belief, _index, v) when v == 0.0, do: belief
-
-  defp shake(belief, index, v) do
-    i = @base + 2 * index
-    p = belief.p |> List.update_at(i, fn row -> List.update_at(row, i, &(&1 + v)) end) |> List.update_at(i + 1, fn row -> List.update_at(row, i + 1, &(&1 + v)) end)
-    %{belief | p: p}
+  defp add(%{marks: marks} = belief, key, at, sd) when length(marks) >= @marks do
+    {_mark, index} = marks |> Enum.with_index() |> Enum.min_by(fn {mark, _} -> mark.used end)
+    belief |> drop(index) |> add(key, at, sd)
   end
 
-  defp renew(belief, index, at, sd) do
-    marks = List.update_at(belief.marks, index, fn {key, _at, _sd, bias, _used} -> {key, at, sd, bias, belief.count} end)
-    %{belief | marks: marks, count: belief.count + 1}
-  end
+  defp add(belief, key, at, sd) do
+    mark = %{key: key, told: at, sd: sd, off: {0.0, 0.0}, used: belief.uses}
 
-  # Along the line of sight and across it.
-  defp add(belief, key, {x, y} = at, {along, across}) do
-    direction = :math.atan2(y - belief.pose.y, x - belief.pose.x)
-    c = :math.cos(direction)
-    s = :math.sin(direction)
-    xx = along * along * c * c + across * across * s * s
-    yy = along * along * s * s + across * across * c * c
-    xy = (along * along - across * across) * c * s
-    zeros = List.duplicate(0.0, length(belief.p))
-    rows = Enum.map(belief.p, &(&1 ++ [0.0, 0.0]))
-    p = rows ++ [zeros ++ [xx, xy], zeros ++ [xy, yy]]
-    %{belief | p: p, marks: belief.marks ++ [{key, at, along, {0.0, 0.0}, belief.count}], count: belief.count + 1}
+    %{
+      belief
+      | covariance: Covariance.append(belief.covariance, sd, 2),
+        marks: belief.marks ++ [mark],
+        uses: belief.uses + 1
+    }
   end
 
   defp drop(belief, index) do
-    i = @base + 2 * index
-    cut = fn list -> list |> List.delete_at(i) |> List.delete_at(i) end
-    %{belief | p: belief.p |> cut.() |> Enum.map(cut), marks: List.delete_at(belief.marks, index)}
+    %{
+      belief
+      | covariance: Covariance.drop(belief.covariance, @own + 2 * index, 2),
+        marks: List.delete_at(belief.marks, index)
+    }
   end
 
-  @doc "Without marks."
-  def forget(%{marks: []} = belief), do: belief
-  def forget(belief), do: %{belief | marks: [], p: belief.p |> Enum.take(@base) |> Enum.map(&Enum.take(&1, @base))}
+  @doc "Without marks: what they were in is over."
+  @spec forget(t()) :: t()
+  def forget(%__MODULE__{marks: []} = belief), do: belief
+  def forget(belief), do: belief |> drop(length(belief.marks) - 1) |> forget()
 
-  def correct(belief, key, error, {a, b, c}, {k, l}, noise) do
-    index = 2 * Enum.find_index(belief.marks, &(elem(&1, 0) == key))
-    v = Enum.map(belief.p, fn [x, y, h, _s, m, n | rest] -> a * x + b * y + c * h + k * m + l * n - mark(rest, index, a, b) end)
-    [vx, vy, vh, vs, vm, vn | rest] = v
-    s = a * vx + b * vy + c * vh + k * vm + l * vn - mark(rest, index, a, b) + noise
+  @doc """
+  Corrected by one measurement of a mark (`meet/4`): its `error` (measured minus expected), how the expected value
+  changes, and the variance of its noise. K = P H' / S, x + K e, P - K S K'.
+  """
+  @spec correct(t(), key :: term(), float(), slope(), noise :: float()) :: t()
+  def correct(belief, key, error, {{a, b, c}, {k, l}}, noise) do
+    index = Enum.find_index(belief.marks, &(&1.key == key))
+    slope = [a, b, c, 0.0, k, l] ++ List.duplicate(0.0, 2 * index) ++ [-a, -b]
+    {v, variance} = Covariance.project(belief.covariance, slope)
+    s = variance + noise
 
-    if error * error > @gate * s do
-      refuse(belief)
-    else
-      g = error / s
-      p = for {row, k} <- Enum.zip(belief.p, v), do: less(row, v, k / s)
-      pose = belief.pose
-      {m, n} = belief.scales
-
-      %{
-        belief
-        | pose: Pose.new(pose.x + vx * g, pose.y + vy * g, pose.heading + vh * g),
-          slip: belief.slip + vs * g,
-          scales: {m + vm * g, n + vn * g},
-          p: p,
-          marks: shift(belief.marks, rest, g),
-          refused: max(belief.refused - 1, 0)
-      }
-    end
+    if error * error > @gate * s,
+      do: refuse(belief),
+      else: believe(belief, v, error / s, Covariance.reduce(belief.covariance, v, s))
   end
 
-  defp mark([x, y | _], 0, a, b), do: a * x + b * y
-  defp mark([_, _ | rest], i, a, b), do: mark(rest, i - 2, a, b)
+  defp believe(belief, [x, y, heading, slip, k, l | marks], share, covariance) do
+    %{pose: pose, scales: {landmark, robot}} = belief
 
-  defp less([], [], _k), do: []
-  defp less([x | xs], [v | vs], k), do: [x - k * v | less(xs, vs, k)]
+    %{
+      belief
+      | pose: Pose.new(pose.x + x * share, pose.y + y * share, pose.heading + heading * share),
+        slip: belief.slip + slip * share,
+        scales: {landmark + k * share, robot + l * share},
+        marks: shift_marks(belief.marks, marks, share),
+        covariance: covariance,
+        refused: max(belief.refused - 1, 0)
+    }
+  end
 
-  defp shift([], [], _g), do: []
+  defp shift_marks([], [], _share), do: []
 
-  defp shift([{key, at, sd, {bx, by}, used} | marks], [x, y | rest], g),
-    do: [{key, at, sd, {bx + x * g, by + y * g}, used} | shift(marks, rest, g)]
+  defp shift_marks([mark | marks], [x, y | rest], share),
+    do: [%{mark | off: shift(mark.off, {x * share, y * share})} | shift_marks(marks, rest, share)]
 
+  defp shift({x, y}, {dx, dy}), do: {x + dx, y + dy}
+
+  # Wheels that slip take the estimate farther than odometry admits; then it has to be found again.
   defp refuse(%{refused: refused} = belief) when refused < @doubt,
     do: %{belief | refused: refused + 2}
 
   defp refuse(belief), do: doubt(belief)
 
+  @doc "The same pose, of which one is less sure by decimetres: something happened that nobody measured."
   @spec doubt(t()) :: t()
   def doubt(%__MODULE__{} = belief) do
-    {x, y, h} = @doubt_sd
-    %{belief | refused: 0, p: noise(belief.p, [x * x, y * y, h * h])}
+    variance = @doubt_sd * @doubt_sd
+
+    %{
+      belief
+      | refused: 0,
+        covariance: Covariance.add(belief.covariance, [variance, variance, variance])
+    }
   end
 end

@@ -10,7 +10,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   alias Robot.{Behaviour, Gaze}
   alias Robot.Behaviour.Avoid.Neighbours
   alias Swarm.{Chain, Message}
-  alias Swarm.Missions.Landmark.{Blocker, Places, State}
+  alias Swarm.Missions.Landmark.{Blocker, Marks, Places, State}
 
   @lease_ms 1_000
   @in_place 0.25
@@ -19,10 +19,6 @@ defmodule Swarm.Missions.Landmark.Attend do
   # The camera looks at the landmark and at the robot ahead in turn.
   @gaze_ms 1_500
   @landmark_radius 0.15
-  @robot_colour "RedRobot"
-  # How well the places that were told are known, in metres.
-  @landmark_sd 0.02
-  @robot_sd 0.1
 
   # A slot is blocked when something unknown stands in it for so long, or no way leads nearer.
   @obstacle_ms 2_000
@@ -109,7 +105,7 @@ defmodule Swarm.Missions.Landmark.Attend do
       | place: slot,
         attend: %{
           mission.attend
-          | in_place?: slow? and error <= @in_place and sure?(mission.percept, error),
+          | in_place?: slow? and error <= @in_place and Marks.sure?(mission, error),
             holding?: resting? and error <= @near,
             told: told,
             # Where the landmark stood when this robot was last in place, or began to follow.
@@ -121,11 +117,8 @@ defmodule Swarm.Missions.Landmark.Attend do
     options = [target: slot, velocity: velocity, discs: discs(mission.anchor)]
     goal = {:goal, {:slot, mission.epoch}, {Behaviour.Follow, options}}
 
-    {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, references(mission)}]}
+    {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, Marks.anchors(mission)}]}
   end
-
-  defp sure?(%{pose_sd: {sd, _}, pose_frame: frame}, error), do: frame != nil and error + 2 * sd <= 0.5
-  defp sure?(_percept, _error), do: true
 
   defp block(%{attend: %{in_place?: true} = attend} = mission, slot, error),
     do: fresh(attend, slot, error, mission.now_ms)
@@ -215,62 +208,6 @@ defmodule Swarm.Missions.Landmark.Attend do
       {x, y} -> [{x, y, @landmark_radius}]
     end
   end
-
-  # Only those ahead in the order: corrections run one way, from the leader down.
-  defp references(%{anchor: anchor, percept: percept} = mission) do
-    {leader, _twist} = Places.leader(anchor, mission.now_ms - mission.anchor_ms)
-    ahead = Enum.take_while(anchor.order, &(&1 != mission.me))
-
-    robots =
-      for {id, peer} <- percept.peers do
-        at = if id == anchor.leader, do: leader, else: peer.pose
-        use? = id in [anchor.leader | ahead] and standing?(peer)
-
-        %{
-          key: id,
-          colour: @robot_colour,
-          at: Pose.point(at),
-          sd: if(use?, do: robot_sd(id, peer, anchor)),
-          range?: false,
-          radius: peer.radius
-        }
-      end
-
-    # A landmark that moves is somewhere else by now.
-    if anchor.still and anchor.landmark != nil do
-      landmark = %{
-        key: :landmark,
-        colour: mission.colour,
-        at: Places.landmark(anchor),
-        sd: @landmark_sd,
-        range?: true,
-        radius: nil
-      }
-
-      {frame(anchor, leader), [landmark | robots]}
-    else
-      {frame(anchor, leader), robots}
-    end
-  end
-
-  defp robot_sd(leader, _peer, %{leader: leader}), do: 0.02
-  defp robot_sd(_id, %{beat: %{sd: {mm, _}, epoch: epoch, leader: leader}}, %{epoch: epoch, leader: leader}), do: mm / 1000
-  defp robot_sd(_id, _peer, _anchor), do: nil
-
-  defp frame(%{sd: {p, h}} = anchor, leader) do
-    %{
-      key: {anchor.leader, anchor.epoch},
-      at: Pose.point(leader),
-      position_var: p * p / 1.0e6,
-      heading_var: h * h / 1.0e6
-    }
-  end
-
-  # What a moving robot told is where it was.
-  defp standing?(%{mode: :moving, twist: twist}),
-    do: abs(twist.linear) < @slow and abs(twist.turn) < @slow
-
-  defp standing?(_holding), do: true
 
   # Pan towards the landmark or towards the robot ahead, whichever's turn it is and can be seen.
   defp look(%{anchor: anchor, percept: percept} = mission, age_ms) do
