@@ -36,6 +36,8 @@ defmodule Robot.Localiser.Belief do
   @marks 6
   # A thing that was told to be so far from before is another one, in metres.
   @elsewhere 1.0
+  # A thing whose place is known better than by this share of what was known, says something new.
+  @surer 0.6
   # Beyond these nobody knows anything, and linear algebra less: metres, radians.
   @lost_position 5.0
   @lost_heading 1.0
@@ -184,7 +186,7 @@ defmodule Robot.Localiser.Belief do
         mark = Enum.at(belief.marks, index)
         moved = Pose.distance(mark.told, at)
 
-        if moved > @elsewhere do
+        if moved > @elsewhere or sd < @surer * mark.sd do
           {belief |> drop(index) |> add(key, at, sd), at}
         else
           {tell(belief, index, mark, at, sd, moved * moved), shift({x, y}, mark.off)}
