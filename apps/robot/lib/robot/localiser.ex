@@ -22,7 +22,7 @@ defmodule Robot.Localiser do
   # What is wrong with every sighting of a thing alike: so much of its place, in metres, and per metre of distance.
   @landmark_bias 0.005
   @robot_bias 0.01
-  # Pictures of a second or two show the same slack; so many count as one.
+  # Pictures of a second or two show the same slack, and the same size; so many count as one.
   @repeated 20
   # Too near for a camera that looks over it, in metres.
   @near 0.3
@@ -227,7 +227,7 @@ defmodule Robot.Localiser do
       end
 
     slope = {{-dx / distance, -dy / distance, 0.0}, scales}
-    noise = :math.pow(@range_share * distance + @range_sd, 2)
+    noise = @repeated * :math.pow(@range_share * distance + @range_sd, 2)
     error = seen - distance * (1 + scale)
     %{localiser | belief: Belief.correct(belief, mark.key, error, slope, noise)}
   end
