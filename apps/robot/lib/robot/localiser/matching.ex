@@ -13,15 +13,17 @@ defmodule Robot.Localiser.Matching do
 
   # Within this angle a robot is always looked for, and never beyond that one, in radians.
   @narrow 0.12
-  @wide 0.5
+  @wide 1.2
   # A place of which nobody says how well it is known, in metres.
   @unknown 0.3
-  # A blob from so much narrower to so much wider than expected may be the robot, as shares.
-  @narrowest 0.3
-  @widest 2.5
+  # So many times wider or narrower than expected a blob may be the robot, as a logarithm.
+  @widest 0.92
   # How far off, as logarithms of such shares, a blob may be that is measured by, and how much farther off all
   # that it might be else.
   @fits 0.45
+  # A robot whose distance is less sure than this, as a share, may be seen but not measured by.
+  @doubt 0.4
+  @lost 0.3
   @clear 0.22
   # So little off, it is whole, and its width tells the distance.
   @whole 0.15
@@ -45,12 +47,12 @@ defmodule Robot.Localiser.Matching do
           do: c
 
     for %{mark: mark, blob: blob} = candidate <- candidates,
-        mark.sd != nil and not cut?(blob) and candidate.off < @fits and
+        mark.sd != nil and candidate.sure? and not cut?(blob) and candidate.off < @fits and
           clear?(candidate, candidates),
         do:
           candidate
           |> Map.take([:mark, :blob, :slack])
-          |> Map.put(:whole?, candidate.off < @whole)
+          |> Map.put(:whole?, candidate.share < @whole)
   end
 
   defp clear?(%{mark: mark, blob: blob, off: off}, candidates) do
@@ -74,24 +76,37 @@ defmodule Robot.Localiser.Matching do
     expected = Sighting.width(mark.radius, distance, blob.width, view)
     share = expected && (blob.right - blob.left + 1) / expected
 
-    if share != nil and share > @narrowest and share < @widest do
+    if share != nil do
+      {bearing_sd, distance_sd} = sds(mark, distance, belief, exposed)
       slack = abs(share - 1) * :math.asin(mark.radius / distance)
-      off = Pose.wrap(Sighting.bearing(blob, pan, view) - Pose.bearing(exposed, mark.at))
+      bearing = Pose.wrap(Sighting.bearing(blob, pan, view) - Pose.bearing(exposed, mark.at))
+      # As a share of the distance, what nobody knows of it makes the blob wider or narrower.
+      doubt = 2 * max(distance_sd - @lost, 0.0) / distance
+      off = max(abs(:math.log(share)) - doubt, 0.0)
 
-      if abs(off) < gate(mark, belief, exposed) + slack,
-        do: %{mark: mark, blob: blob, slack: slack, off: abs(:math.log(share))}
+      if off < @widest and abs(bearing) < max(3 * bearing_sd, @narrow) + slack do
+        %{
+          mark: mark,
+          blob: blob,
+          slack: slack,
+          off: off,
+          share: abs(:math.log(share)),
+          sure?: 3 * bearing_sd < @wide and doubt < @doubt
+        }
+      end
     end
   end
 
   defp candidate(_mark, _blob_of_another_colour, _belief, _exposed, _pan, _view), do: nil
 
-  # Three standard deviations of where it is expected.
-  defp gate(%{at: {x, y}, sd: sd}, belief, exposed) do
+  # How far off, in direction and distance, it may be seen.
+  defp sds(%{at: {x, y}, sd: sd}, distance, belief, exposed) do
     {dx, dy} = {x - exposed.x, y - exposed.y}
-    square = max(dx * dx + dy * dy, 0.09)
-    own = Belief.variance(belief, {dy / square, -dx / square, -1.0})
-    place = (sd || @unknown) * (sd || @unknown) / square
-    deviation = :math.sqrt(own + place + @sighting_sd * @sighting_sd)
-    (3 * deviation) |> max(@narrow) |> min(@wide)
+    square = max(distance * distance, 0.09)
+    place = (sd || @unknown) * (sd || @unknown)
+    across = Belief.variance(belief, {dy / square, -dx / square, -1.0})
+    along = Belief.variance(belief, {-dx / distance, -dy / distance, 0.0})
+
+    {:math.sqrt(across + place / square + @sighting_sd * @sighting_sd), :math.sqrt(along + place)}
   end
 end
