@@ -12,6 +12,7 @@ defmodule Hal.Device do
     * `:device` - what it is called in its health, by default its kind
     * `:arm` - of a drive: `:auto` (the default), `:manual` or `:never`, see below
     * `:sonar` - of a drive: whether its base has sonars (default false), without which it is not armed
+    * `:was` - `{m, f, a}` that gives the status which its sinks know of the process before it, or `nil`
     * `:about` - a map that its events have beside their own, such as `%{robot: :mag1}`
     * `:name` - as in `GenServer`
     * `:clock` - `{m, f, a}` giving integer milliseconds
@@ -30,8 +31,9 @@ defmodule Hal.Device do
   to 100 ms, so that a driver that opens well and then fails is not reopened ten times a second.
 
   A driver that *raises* takes the device down, which its supervisor restarts. It closes the
-  driver and rests for 500 ms before it goes, so that a driver which falls over every message
-  cannot use up the supervisor's restarts, and with them the robot's other devices.
+  driver, says that it is offline (`:fell`) and disarmed, and rests for 500 ms before it goes, so that a driver
+  which falls over every message cannot use up the supervisor's restarts, and with them the robot's other devices.
+  A device that is killed can say nothing; the one that follows says it first (`:was`).
 
   ## Wishes
 
@@ -70,6 +72,7 @@ defmodule Hal.Device do
                 watchdog: nil,
                 arming: nil,
                 armed_as: nil,
+                was: nil,
                 wishes: %{},
                 about: %{},
                 sonar?: false,
@@ -143,7 +146,7 @@ defmodule Hal.Device do
   def init(device) do
     # So that `terminate/2` runs, and stops the wheels, when the supervisor ends us.
     Process.flag(:trap_exit, true)
-    {:ok, device, {:continue, :open}}
+    {:ok, succeed(device), {:continue, :open}}
   end
 
   @impl GenServer
@@ -228,11 +231,36 @@ defmodule Hal.Device do
     with {:open, inner} <- s.inner, do: s.driver.terminate(inner)
 
     case reason do
-      :normal -> :ok
-      :shutdown -> :ok
-      {:shutdown, _} -> :ok
-      _crash -> rest()
+      :normal ->
+        :ok
+
+      :shutdown ->
+        :ok
+
+      {:shutdown, _} ->
+        :ok
+
+      _crash ->
+        fallen(%{s | inner: :closed})
+        rest()
     end
+  end
+
+  # What the sinks know of the process before us, which may have been killed.
+  defp succeed(%{was: nil} = s), do: s
+
+  defp succeed(%{was: {m, f, a}} = s) do
+    case apply(m, f, a) do
+      {:online, _since_ms} = health -> fallen(%{s | health: health})
+      health -> %{s | health: health}
+    end
+  end
+
+  # The wheels were stopped, by the driver's last act or by the end of its line.
+  defp fallen(s) do
+    s = report(s, {:offline, :fell})
+    line = words(s, :fell)
+    if s.arming, do: tell_arming(%{s | arming: Arming.ready(s.arming, {:error, line})}), else: s
   end
 
   # A shutdown asked for meanwhile is not kept waiting.

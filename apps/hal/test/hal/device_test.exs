@@ -94,6 +94,32 @@ defmodule Hal.DeviceTest do
     assert log =~ "was told to"
   end
 
+  test "a driver that raises: stopped first, then told as offline and disarmed, before its device rests" do
+    capture_log(fn ->
+      pid = armed(device(:drive))
+      send(pid, :raise)
+      assert_receive {:drive, :terminate, ^pid}
+      # Before the next one is started, 500 ms later.
+      assert_receive {:health, :drive, {{:offline, :fell}, _since}}, 400
+      assert_receive {:arming, %{state: :disarmed, why: "its process fell" <> _}}, 400
+      assert Process.alive?(pid)
+    end)
+  end
+
+  test "the one after a device that was killed says first that it is offline and disarmed" do
+    robot = listen([:online, :offline])
+    driver = {Hal.FakeDrive, [test: self(), device: :drive]}
+    was = {Function, :identity, [{:online, 7}]}
+    options = [was: was, sinks: [{Kernel, :send, [self()]}], about: %{robot: robot}]
+    pid = start_supervised!({Device, [kind: :drive, driver: driver] ++ options})
+    # Already when its start returns.
+    assert_received {:health, :drive, {{:offline, :fell}, since}} when since != 7
+    assert_received {:arming, %{state: :disarmed, why: "its process fell" <> _}}
+    assert_received {:offline, %{reason: :fell, line: "its process fell, and is started again"}}
+    assert_receive {:online, %{again?: true}}
+    armed(pid)
+  end
+
   test "ends with its supervisor, and stops the motors first" do
     pid = device(:drive)
     assert_receive {:drive, :init, ^pid}
@@ -136,15 +162,10 @@ defmodule Hal.DeviceTest do
     assert_receive {:camera, :next, ^pid}
   end
 
-  def forward(event, _measured, %{robot: robot} = about, {robot, test}),
-    do: send(test, {List.last(event), about})
-
-  def forward(_event, _measured, _others, _config), do: :ok
-
-  test "each change is one event, with its reason in words; a try that changes nothing is none" do
+  defp listen(events) do
     robot = make_ref()
 
-    for event <- [:online, :offline, :arming] do
+    for event <- events do
       handler = {robot, event}
 
       :ok =
@@ -153,6 +174,16 @@ defmodule Hal.DeviceTest do
       on_exit(fn -> Hal.Event.detach(handler) end)
     end
 
+    robot
+  end
+
+  def forward(event, _measured, %{robot: robot} = about, {robot, test}),
+    do: send(test, {List.last(event), about})
+
+  def forward(_event, _measured, _others, _config), do: :ok
+
+  test "each change is one event, with its reason in words; a try that changes nothing is none" do
+    robot = listen([:online, :offline, :arming])
     busy = {:error, :ebusy}
     open = answers([{:error, :enoent}, {:error, :enoent}, busy, busy, :ok])
     words = fn reason -> "the line: #{reason}" end

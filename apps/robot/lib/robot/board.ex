@@ -150,6 +150,15 @@ defmodule Robot.Board do
           {:ok, term(), at_ms :: integer()} | :error
   def fetch(board, key, max_age_ms), do: fetch(board, key, max_age_ms, now(board))
 
+  @doc "How a device is, and since when, as its process said last; `nil` if none has said anything yet."
+  @spec health(t(), device :: atom()) :: Hal.Device.status() | nil
+  def health(board, device) do
+    case fetch(board, {:health, device}, :infinity) do
+      {:ok, condition, since_ms} -> {condition, since_ms}
+      :error -> nil
+    end
+  end
+
   @doc "What other robots told, by their ids."
   @spec peers(t()) :: %{atom() => Robot.Percept.peer()}
   def peers(%__MODULE__{table: table}),

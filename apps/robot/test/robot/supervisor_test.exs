@@ -256,6 +256,31 @@ defmodule Robot.SupervisorTest do
     assert parts(id, [:gate | @above]) == parts
   end
 
+  test "a drive that is killed is nowhere armed or online any more before another is there" do
+    test = self()
+
+    # The first opens at once, the others when the test lets them.
+    open = fn ->
+      send(test, {:opens, self()})
+      receive(do: (:open -> :ok))
+    end
+
+    id = robot(:fall15, drive: {Hal.FakeDrive, test: test, device: :drive, open: open})
+    assert_receive {:opens, first}
+    send(first, :open)
+    online(id)
+    board = Board.find!(id)
+    for name <- [:offline, :online], do: listen(id, [:hal, :device, name])
+    kill(id, :drive)
+    assert_receive {:opens, second} when second != first
+    assert {:ok, {:offline, :fell}, _} = Board.fetch(board, {:health, :drive}, :infinity)
+    assert {:ok, arming, _at_ms} = Board.fetch(board, :arming, :infinity)
+    assert arming == %{state: :disarmed, why: "its process fell, and is started again"}
+    assert_received {[:hal, :device, :offline], %{reason: :fell}}
+    send(second, :open)
+    assert_receive {[:hal, :device, :online], %{again?: true}}
+  end
+
   test "a drive that crashes over every message does not take the robot down" do
     id = rolling(:fall10)
     parts = parts(id, [:gate | @above])

@@ -10,8 +10,12 @@ defmodule Hal.Device.Words do
       "/dev/ttyR0: no such device"
       iex> Hal.Device.Words.offline({Some.Driver, []}, :odd)
       ":odd"
+      iex> Hal.Device.Words.offline({Hal.RFlex.Driver, port: "/dev/ttyR0"}, :fell)
+      "its process fell, and is started again"
   """
   @spec offline({driver :: module(), options :: keyword()}, reason :: term()) :: String.t()
+  def offline(_driver, :fell), do: "its process fell, and is started again"
+
   def offline({driver, options}, reason) do
     if Code.ensure_loaded?(driver) and function_exported?(driver, :explain, 2),
       do: reason |> driver.explain(options) |> String.slice(0, @longest),
