@@ -19,8 +19,9 @@ defmodule Robot.Board do
   | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Reflex.frame/1` |
   | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil, tick: count}` |
   | `:goal` | `:executive` | the module of its goal's behaviour, or `nil` |
-  | `:hung` | `:watch` | `{:silent, module}` of the behaviour in which the executive hangs, `{:hung, module}` once it was ended for it |
+  | `{:hung, part}` | `:watch` | of `:executive` or `:pilot`: `{:silent, module}` of the behaviour or the mission in which it hangs, `{:hung, module}` once it was ended for it |
   | `:pose` | `:executive` | the estimate in the `map` frame |
+  | `:asking` | `:pilot` | `{module, integer}` while a callback of the mission runs, each with another number |
   | `:mission` | `:pilot` | `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state}` |
 
   This process owns the tables and does nothing else, so that they outlive whoever writes them.
@@ -65,9 +66,9 @@ defmodule Robot.Board do
     frame: :gate,
     doing: :executive,
     goal: :executive,
-    hung: :watch,
     pose: :executive,
     mission: :pilot,
+    asking: :pilot,
     estop: :brake,
     radio: :link
   }
@@ -212,6 +213,7 @@ defmodule Robot.Board do
 
   defp writer({:peer, _id}), do: :link
   defp writer({:health, device}), do: device
+  defp writer({:hung, _part}), do: :watch
   defp writer(key), do: Map.get(@writers, key)
 
   defp checked(_board, :ok), do: :ok

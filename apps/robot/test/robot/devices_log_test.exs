@@ -32,4 +32,13 @@ defmodule Robot.Devices.LogTest do
 
     assert Log.line(:online, Map.put(@drive, :again?, false)) == {:debug, "mag1: drive online"}
   end
+
+  test "what hangs is one line when it is noticed, and one when it is over" do
+    about = %{robot: :mag1, behaviour: Acts.Hang, line: "Acts.Hang"}
+    assert Log.line(:silent, about) == {:warning, "mag1 hangs in Acts.Hang"}
+    assert Log.line(:again, about) == {:info, "mag1 hangs no more in Acts.Hang"}
+
+    assert Log.line(:hung, about) ==
+             {:error, "mag1 hung in Acts.Hang for 2 s: started again, idle"}
+  end
 end

@@ -1,11 +1,12 @@
 defmodule Robot.Devices.Log do
   @moduledoc """
   What the log says of a robot's devices: a line when one is offline, with the reason in words, when it is back,
-  when wheels are disarmed without a person's doing, and when a bumper stays pressed. Once a change: a device that is tried again and again
-  says nothing new.
+  when wheels are disarmed without a person's doing, and when a bumper stays pressed; and of a behaviour or a mission
+  that hangs. Once a change: a device that is tried again and again says nothing new.
   """
   require Logger
   alias Hal.Event
+  alias Robot.Watch
 
   @events [
     [:hal, :device, :online],
@@ -17,7 +18,9 @@ defmodule Robot.Devices.Log do
   @doc "Attaches the log to the devices' events; once a node."
   @spec attach() :: :ok
   def attach do
-    for event <- @events do
+    hangs = for part <- Watch.parts(), what <- [:silent, :hung, :again], do: [:robot, part, what]
+
+    for event <- @events ++ hangs do
       _ = Event.attach({__MODULE__, event}, event, &__MODULE__.write/4, nil)
     end
 
@@ -39,6 +42,8 @@ defmodule Robot.Devices.Log do
       {:warning, "mag1: drive offline: /dev/ttyR0: no such device"}
       iex> Robot.Devices.Log.line(:online, %{robot: :mag1, device: :drive, again?: true})
       {:info, "mag1: drive online again"}
+      iex> Robot.Devices.Log.line(:silent, %{robot: :mag1, line: "its mission Patrol"})
+      {:warning, "mag1 hangs in its mission Patrol"}
   """
   @spec line(atom(), map()) :: {Logger.level(), String.t()} | nil
   def line(:offline, %{line: line} = about), do: {:warning, "#{name(about)} offline: #{line}"}
@@ -58,6 +63,12 @@ defmodule Robot.Devices.Log do
   def line(:arming, _changed_by_a_person), do: nil
   def line(:fault, %{robot: robot, line: nil}), do: {:info, "#{robot}: the fault is over"}
   def line(:fault, %{robot: robot, line: line}), do: {:warning, "#{robot} stands: #{line}"}
+
+  def line(:silent, about), do: {:warning, "#{about.robot} hangs in #{about.line}"}
+  def line(:again, about), do: {:info, "#{about.robot} hangs no more in #{about.line}"}
+
+  def line(:hung, about),
+    do: {:error, "#{about.robot} hung in #{about.line} for 2 s: started again, idle"}
 
   defp name(%{robot: robot, device: device}), do: "#{robot}: #{device}"
   defp name(%{device: device}), do: "#{device}"

@@ -18,7 +18,7 @@ defmodule Swarm.Link.Desk do
   the motion would begin later, when somebody arms it.
   """
   alias Hal.Device
-  alias Robot.{Board, Config, Names, Pilot, Readiness}
+  alias Robot.{Board, Config, Names, Pilot, Readiness, Watch}
   alias Swarm.{Formation, Missions.Landmark, Missions.Manual, Status}
   alias Swarm.Link.{Ear, Presence}
 
@@ -43,6 +43,7 @@ defmodule Swarm.Link.Desk do
 
   def answer(request, config, board, ear) do
     with {:ok, request} <- checked(request),
+         :ok <- well(config, board),
          :ok <- ready(request, config, board),
          :ok <- obey(request, doing(board), config, ear),
          do: :accepted
@@ -56,6 +57,17 @@ defmodule Swarm.Link.Desk do
     do: with(:ok <- options(options), do: {:ok, request})
 
   defp checked(request), do: Manual.check(request)
+
+  # Its pilot would not answer, and the link would wait for it and be silent to others.
+  defp well(%{id: id}, board) do
+    case Board.fetch(board, {:hung, :pilot}, :infinity) do
+      {:ok, {:silent, mission}, _at_ms} ->
+        {:error, "#{id} hangs in #{Watch.words(:pilot, mission)}; it is started again by itself"}
+
+      _well ->
+        :ok
+    end
+  end
 
   # A shape moves nobody who is on no mission, and whoever is on one is ready.
   defp ready({:formation, _kind, _spacing}, _config, _board), do: :ok
