@@ -108,7 +108,7 @@ defmodule Hal.Device do
   @spec arm(GenServer.server()) :: :ok | {:error, line :: String.t()}
   def arm(device), do: order(device, {:arm, System.monotonic_time(:millisecond) + @call_ms})
 
-  @doc "Stops the wheels, until `arm/1`."
+  @doc "Stops the wheels, until `arm/1`. The line says that its own line is lost, so that nobody can."
   @spec disarm(GenServer.server()) :: :ok | {:error, line :: String.t()}
   def disarm(device), do: order(device, :disarm)
 
@@ -165,7 +165,8 @@ defmodule Hal.Device do
   def handle_call(order, _from, %{kind: :drive} = s)
       when order in [:arm, :disarm, :acknowledge] do
     {answer, arming} = Arming.order(s.arming, order, readiness(s))
-    {:reply, answer, become(s, arming)}
+    s = become(s, arming)
+    {:reply, carried_out(order, answer, s), s}
   end
 
   def handle_call(order, _from, s) when order in [:arm, :disarm, :acknowledge],
@@ -341,6 +342,12 @@ defmodule Hal.Device do
   end
 
   defp measured(s, _readings), do: s
+
+  # The stop that a disarming begins with may itself be what finds the line lost.
+  defp carried_out(:disarm, :ok, %{inner: :closed, arming: %{state: {:error, reason}}} = s),
+    do: {:error, "the line was lost (#{words(s, reason)}) while the wheels turned"}
+
+  defp carried_out(_order, answer, _s), do: answer
 
   # Wheels that may no longer turn stop before anybody is told.
   defp become(%{arming: before} = s, arming) do

@@ -10,7 +10,8 @@ defmodule Swarm.Brake do
 
   A stop goes to gate, executive and pilot at once, so that none that hangs holds up the others. It is
   answered by the last of them, the gate, when the mission is out of command and no older wish can follow
-  (`Robot.Pilot.halt/2`); where that does not come, by nobody.
+  (`Robot.Pilot.halt/2`); where that does not come, by nobody. Where nothing reaches the wheels, the answer says so
+  (`Robot.Readiness.stopped/1`), to stop, disarm and e-stop alike.
 
   A reset goes the same way first: the gate is released once what the robot was at has ended, and unless
   somebody stops it again meanwhile.
@@ -20,7 +21,7 @@ defmodule Swarm.Brake do
   """
   use GenServer
   alias Hal.Device
-  alias Robot.{Board, Config, Executive, Gate, Names, Pilot}
+  alias Robot.{Board, Config, Executive, Gate, Names, Pilot, Readiness}
   alias Swarm.{Alarm, Entry, Post, Stamp, Stop}
 
   @behaviour Robot.Companion
@@ -91,6 +92,13 @@ defmodule Swarm.Brake do
   @spec release(atom(), pressed :: reference(), until_ms :: integer(), reference()) :: :ok
   def release(robot, pressed, until_ms, ref),
     do: GenServer.cast(Names.via(robot, :brake), {:release, pressed, until_ms, ref})
+
+  @doc "What the robot was at has ended, says its gate, which stands: answers whether its wheels do."
+  @spec stood(atom(), reference()) :: :ok
+  def stood(robot, ref), do: Post.answer(ref, stopped(robot, Board.find!(robot)))
+
+  defp stopped(robot, board),
+    do: with({:error, line} <- Readiness.stopped(board), do: {:error, "#{robot}: #{line}"})
 
   @doc "The robot is there for commands by its name, or no longer: another of that name was first."
   @spec present(robot :: atom(), boolean()) :: :ok
@@ -204,14 +212,14 @@ defmodule Swarm.Brake do
 
   # Nobody is waited for here: a mission that is slow to end delays no emergency stop.
   defp obey(s, :stop, ref) do
-    halt(s, {Post, :answer, [ref, :ok]})
+    halt(s, {__MODULE__, :stood, [s.id, ref]})
     s
   end
 
   # The drive first says that its wheels are disarmed.
   defp obey(s, :disarm, ref) do
     halt(s, nil)
-    stopped = {Pilot, :halt, [s.id, {Post, :answer, [ref, :ok]}]}
+    stopped = {Pilot, :halt, [s.id, {__MODULE__, :stood, [s.id, ref]}]}
     :ok = Device.disarm_later(Names.via(s.id, :drive), stopped)
     s
   end
@@ -234,11 +242,17 @@ defmodule Swarm.Brake do
     s
   end
 
-  defp answer(:estop, s), do: {:ok, become(%{s | pressed: make_ref()}, Stop.press(s.stop))}
+  defp answer(:estop, s) do
+    s = become(%{s | pressed: make_ref()}, Stop.press(s.stop))
+    {stopped(s.id, s.board), s}
+  end
 
   defp answer({:estop, call}, s) do
     s = called(s, call, 0)
-    if s.stop.latched?, do: {:ok, s}, else: {{:error, "#{s.id} was reset meanwhile"}, s}
+
+    if s.stop.latched?,
+      do: {stopped(s.id, s.board), s},
+      else: {{:error, "#{s.id} was reset meanwhile"}, s}
   end
 
   defp answer(other, s),
