@@ -49,6 +49,10 @@ defmodule Swarm.Link.Desk do
          do: :accepted
   end
 
+  @doc "What a robot says to a formation that it has no mission for."
+  @spec shapeless(atom()) :: {:error, line :: String.t()}
+  def shapeless(id), do: {:error, "#{id} is on no mission that has a formation; start it first"}
+
   defp named(:ok, _id), do: :ok
   defp named({:error, line}, id), do: {:error, "#{id}: #{line}"}
 
@@ -112,10 +116,10 @@ defmodule Swarm.Link.Desk do
   defp obey({:start, options}, _doing, config, _ear), do: begin(options, config)
 
   defp obey({:formation, _kind, _spacing} = command, {:group, _phase}, config, _ear) do
-    with {:error, :idle} <- Pilot.command(config.id, command), do: shapeless(config)
+    with {:error, :idle} <- Pilot.command(config.id, command), do: shapeless(config.id)
   end
 
-  defp obey({:formation, _kind, _spacing}, _doing, config, _ear), do: shapeless(config)
+  defp obey({:formation, _kind, _spacing}, _doing, config, _ear), do: shapeless(config.id)
 
   defp obey({:follow_the_leader, leader} = command, doing, %{id: id} = config, ear) do
     with :ok <- Manual.follow(id, leader, Ear.leaders(ear, Config.now(config))),
@@ -150,9 +154,6 @@ defmodule Swarm.Link.Desk do
 
   defp again({:group, _phase}, config), do: Pilot.command(config.id, :start)
   defp again(_idle_or_alone, _config), do: {:error, :idle}
-
-  defp shapeless(%{id: id}),
-    do: {:error, "#{id} is on no mission that has a formation; start it first"}
 
   defp alone(command, {:alone, _phase}, config) do
     with {:error, :idle} <- Pilot.command(config.id, command), do: alone(command, :idle, config)
