@@ -19,10 +19,12 @@ defmodule Hal.Device do
 
   ## Online
 
-  A camera or a pan-tilt unit is online when its driver has opened it. A drive is online once its base has
-  reported its wheels since then, and as long as it does (`Hal.Reports`): of a line that is silent, full of noise,
-  or leads to a base that hears and never answers, nobody knows where its wheels are. It is offline then
-  with the reason `:silent`, though its driver is open and goes on asking.
+  That its driver has opened it makes no device online: of a line that is silent, full of noise, or leads to a base
+  that hears and never answers, nobody knows where the wheels are. A drive is online once its base has
+  reported its wheels since then, and as long as it does (`Hal.Reports`); it is offline then
+  with the reason `:silent`, though its driver is open and goes on asking. A camera is online once it has given a
+  picture, a pan-tilt unit once it has said where it looks; one that gives nothing for 10 s is offline (`:mute`) and
+  opened again (`Hal.Device.Signs`).
 
   ## When a driver fails
 
@@ -52,8 +54,8 @@ defmodule Hal.Device do
   comes first. How it stands is the reading `{:arming, %{state: state, why: line or nil}}`.
   """
   use GenServer
-  alias Hal.{Arming, Event, Reports, Twist}
-  alias Hal.Device.{Options, Words}
+  alias Hal.{Arming, Event, Twist}
+  alias Hal.Device.{Options, Signs, Words}
 
   @retry_ms 100
   @longest_retry_ms 5_000
@@ -76,7 +78,7 @@ defmodule Hal.Device do
                 wishes: %{},
                 about: %{},
                 sonar?: false,
-                reports: nil,
+                signs: nil,
                 listening: nil
               ]
 
@@ -276,7 +278,8 @@ defmodule Hal.Device do
   defp open(s) do
     case s.driver.init(s.options) do
       {:ok, inner} ->
-        %{s | inner: {:open, inner}} |> opened() |> judge() |> listen() |> ask() |> remind()
+        signs = Signs.new(s.kind, s.sonar?, now(s))
+        %{s | inner: {:open, inner}, signs: signs} |> judge() |> listen() |> ask() |> remind()
 
       {:error, reason} ->
         s |> report({:offline, reason}) |> tell_arming() |> retry()
@@ -292,43 +295,43 @@ defmodule Hal.Device do
     end
   end
 
-  # An open line says nothing of a base.
-  defp opened(%{kind: :drive} = s), do: %{s | reports: Reports.new(s.sonar?, now(s))}
-  defp opened(s), do: report(s, :online)
-
-  # Whether the base is there, and its wheels may turn. Those that may no longer are stopped before
+  # Whether anything is there, and a drive's wheels may turn. Those that may no longer are stopped before
   # anybody is told.
-  defp judge(%{kind: :drive, inner: {:open, _}} = s) do
-    case Reports.wheels(s.reports, now(s)) do
-      :fresh -> s |> report(:online) |> ready()
-      :waiting -> ready(s)
-      :silent -> s |> ready() |> silent()
+  defp judge(%{inner: {:open, _}} = s) do
+    case {Signs.judge(s.signs, now(s)), s.kind} do
+      {:online, _kind} -> s |> report(:online) |> ready()
+      {:waiting, _kind} -> ready(s)
+      {{:offline, :silent}, :drive} -> s |> ready() |> silent()
+      {{:offline, reason}, _kind} -> mute(s, reason)
     end
   end
 
   defp judge(s), do: s
+
+  defp mute(%{inner: {:open, inner}} = s, reason), do: fail(s, reason, inner)
 
   # Its last stop may have failed.
   defp silent(%{inner: {:open, _}} = s), do: report(s, {:offline, :silent})
   defp silent(s), do: s
 
   # Silence sends no message.
-  defp listen(%{kind: :drive, inner: {:open, _}} = s) do
+  defp listen(%{inner: {:open, _}} = s) do
     ref = make_ref()
     at_ms = now(s)
-    Process.send_after(self(), {:listen, ref}, Reports.next_ms(s.reports, at_ms) - at_ms)
+    Process.send_after(self(), {:listen, ref}, Signs.next_ms(s.signs, at_ms) - at_ms)
     %{s | listening: ref}
   end
 
   defp listen(s), do: s
 
   # A driver may become ready while it is open, or tell another thing that is missing.
-  defp ready(s), do: become(s, Arming.ready(s.arming, readiness(s)))
+  defp ready(%{kind: :drive} = s), do: become(s, Arming.ready(s.arming, readiness(s)))
+  defp ready(s), do: s
 
   # What a person can mend comes before what may come by itself.
   defp readiness(%{inner: {:open, inner}} = s) do
     driver = if function_exported?(s.driver, :ready, 1), do: s.driver.ready(inner), else: :ok
-    with :ok <- driver, do: Reports.ready(s.reports, now(s))
+    with :ok <- driver, do: Signs.ready(s.signs, now(s))
   end
 
   defp readiness(%{health: {{:offline, reason}, _since}} = s),
@@ -336,12 +339,10 @@ defmodule Hal.Device do
 
   defp readiness(_not_opened_yet), do: {:error, "the drive is not open yet"}
 
-  defp measured(%{kind: :drive} = s, readings) do
-    arming = Enum.reduce(readings, s.arming, &Arming.measured(&2, &1))
-    %{s | arming: arming, reports: Reports.heard(s.reports, readings, now(s))}
+  defp measured(s, readings) do
+    arming = s.arming && Enum.reduce(readings, s.arming, &Arming.measured(&2, &1))
+    %{s | arming: arming, signs: Signs.heard(s.signs, readings, now(s))}
   end
-
-  defp measured(s, _readings), do: s
 
   # The stop that a disarming begins with may itself be what finds the line lost.
   defp carried_out(:disarm, :ok, %{inner: :closed, arming: %{state: {:error, reason}}} = s),

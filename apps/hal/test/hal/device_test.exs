@@ -3,6 +3,7 @@ defmodule Hal.DeviceTest do
   import ExUnit.CaptureLog
   alias Hal.{Device, Frame, Twist}
 
+  doctest Hal.Device.Signs
   doctest Hal.Device.Words
 
   @zero Twist.zero()
@@ -160,6 +161,55 @@ defmodule Hal.DeviceTest do
     send(pid, {:readings, [{:frame, frame}]})
     assert_receive {:frame, ^frame}
     assert_receive {:camera, :next, ^pid}
+  end
+
+  test "a camera is online once it has given a picture; one that gives none for 10 s is opened again" do
+    clock = :counters.new(1, [])
+    driver = {Hal.FakeCamera, test: self(), device: :camera}
+    options = [clock: {:counters, :get, [clock, 1]}, sinks: [{Kernel, :send, [self()]}]]
+    pid = start_supervised!({Device, [kind: :camera, driver: driver] ++ options})
+    assert_receive {:camera, :init, ^pid}
+    assert_receive {:camera, :next, ^pid}
+    refute_receive {:health, :camera, _status}, 50
+
+    later = fn ms ->
+      :counters.add(clock, 1, ms)
+      send(pid, :something_unknown)
+    end
+
+    later.(9_999)
+    send(pid, {:readings, [:a_frame]})
+    assert_receive {:health, :camera, {:online, 9_999}}
+    later.(9_999)
+    refute_receive {:camera, :terminate, ^pid}, 50
+    later.(1)
+    assert_receive {:health, :camera, {{:offline, :mute}, 19_999}}
+    assert_receive {:camera, :terminate, ^pid}
+    # Open again it has proven nothing yet.
+    assert_receive {:camera, :init, ^pid}
+    refute_receive {:health, :camera, {:online, _}}, 50
+    send(pid, {:readings, [:a_frame]})
+    assert_receive {:health, :camera, {:online, _}}
+  end
+
+  test "a pan-tilt unit whose line opens, and then proves dead, is told once, and not as there again" do
+    robot = listen([:online, :offline])
+    driver = {Hal.FakePtz, test: self(), device: :ptz}
+    sinks = [{Kernel, :send, [self()]}]
+    device = [kind: :ptz, driver: driver, sinks: sinks, about: %{robot: robot}]
+    pid = start_supervised!({Device, device})
+
+    for _ <- 1..3 do
+      assert_receive {:ptz, :init, ^pid}, 1_000
+      send(pid, {:fail, :no_answer})
+    end
+
+    assert_receive {:ptz, :init, ^pid}, 1_000
+    assert_received {:offline, %{reason: :no_answer}}
+    refute_received {:offline, _about}
+    refute_received {:online, _about}
+    send(pid, {:readings, [{:ptz, %{pan: 0.5, tilt: 0.0, field_of_view: 1.0}}]})
+    assert_receive {:online, %{again?: true}}
   end
 
   defp listen(events) do

@@ -22,6 +22,7 @@ defmodule Hal.Device.Words do
       else: plain(reason)
   end
 
+  defp plain(:mute), do: "it is open, and nothing comes from it"
   defp plain(:silent), do: "its base does not report its wheels"
   defp plain(reason), do: inspect(reason, limit: 5, printable_limit: 40)
 end
