@@ -25,7 +25,7 @@ defmodule Hal.Event do
   | `[:robot, :gate, :start]` | `at_ms` | `robot`, `latched?` |
   | `[:robot, :gate, :limits]` | `at_ms` | `robot`, `limits`: why the speed is limited has changed |
   | `[:robot, :gate, :estop]`, `[:robot, :gate, :reset]` | `at_ms` | `robot` |
-  | `[:robot, :estop_file, :error]` | | `robot`, `reason`: the latch holds, but would not outlive a restart of the board |
+  | `[:robot, :estop_file, :error]` | | `robot`, `file`, `reason`: the latch is as it was told, but would not outlive a restart of the board so |
   | `[:robot, :executive, :start]` | `at_ms` | `robot`: the robot is idle |
   | `[:robot, :executive, :slow]` | `at_ms`, `duration_ms` | `robot`: a tick took over 50 ms |
   | `[:robot, :fault]` | `at_ms` | `robot`, `line`: why it stands though nobody told it to, such as a bumper that stays pressed; `nil` when that is over |

@@ -219,7 +219,7 @@ defmodule Robot.Board do
   defp checked(_board, :ok), do: :ok
 
   defp checked(board, {:error, reason}) do
-    about = %{robot: board.robot, reason: reason}
+    about = %{robot: board.robot, file: board.file, reason: reason}
     Hal.Event.execute([:robot, :estop_file, :error], %{}, about)
   end
 end

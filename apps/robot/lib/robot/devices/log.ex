@@ -1,8 +1,9 @@
 defmodule Robot.Devices.Log do
   @moduledoc """
-  What the log says of a robot's devices: a line when one is offline, with the reason in words, when it is back,
-  when wheels are disarmed without a person's doing, and when a bumper stays pressed; and of a behaviour or a mission
-  that hangs. Once a change: a device that is tried again and again says nothing new.
+  What the log says of a robot: a line when a device is offline, with the reason in words, when it is back,
+  when wheels are disarmed without a person's doing, when a bumper stays pressed, when a behaviour or a mission hangs, when
+  pictures cannot be saved, when the emergency stop would not outlive the machine, and when another robot has the name.
+  Once a change: a device that is tried again and again says nothing new.
   """
   require Logger
   alias Hal.Event
@@ -12,19 +13,28 @@ defmodule Robot.Devices.Log do
     [:hal, :device, :online],
     [:hal, :device, :offline],
     [:hal, :device, :arming],
-    [:robot, :fault]
+    [:robot, :fault],
+    [:robot, :estop_file, :error],
+    [:vision, :saver, :failed],
+    [:vision, :saver, :healed],
+    [:swarm, :link, :duplicate_id]
   ]
 
   @doc "Attaches the log to the devices' events; once a node."
   @spec attach() :: :ok
   def attach do
-    hangs = for part <- Watch.parts(), what <- [:silent, :hung, :again], do: [:robot, part, what]
-
-    for event <- @events ++ hangs do
+    for event <- events() do
       _ = Event.attach({__MODULE__, event}, event, &__MODULE__.write/4, nil)
     end
 
     :ok
+  end
+
+  @doc "The events that may be worth a line."
+  @spec events() :: [Event.name()]
+  def events do
+    @events ++
+      for part <- Watch.parts(), what <- [:silent, :hung, :again], do: [:robot, part, what]
   end
 
   @doc false
@@ -69,6 +79,20 @@ defmodule Robot.Devices.Log do
 
   def line(:hung, about),
     do: {:error, "#{about.robot} hung in #{about.line} for 2 s: started again, idle"}
+
+  def line(:error, %{robot: robot, file: file, reason: reason}) do
+    {:error,
+     "#{robot}: the e-stop file #{file} is not as the stop is (#{:file.format_error(reason)}): the stop holds as " <>
+       "it was told, but would not outlive a restart of the machine so"}
+  end
+
+  def line(:failed, %{line: line}), do: {:warning, line}
+  def line(:healed, %{folder: folder}), do: {:info, "pictures are saved in #{folder} again"}
+
+  def line(:duplicate_id, %{robot: robot, other: other}) do
+    {:error,
+     "#{robot}: a robot of this name was on #{other} before; this one stands, is silent and takes no orders"}
+  end
 
   defp name(%{robot: robot, device: device}), do: "#{robot}: #{device}"
   defp name(%{device: device}), do: "#{device}"
