@@ -7,6 +7,7 @@ defmodule Robot.Readiness do
   A drive that arms by itself (`arm: :auto`) and has not said anything yet is just coming up, and counts as
   ready. In a dry run nothing moves, and what would is the question: every order is taken.
   """
+  alias Hal.Device.Words
   alias Robot.{Board, Config}
 
   @typedoc "What the board says under `:arming` and under `{:health, :drive}`; `nil` for nothing yet."
@@ -17,11 +18,18 @@ defmodule Robot.Readiness do
   @spec of(Config.t(), Board.t()) :: :ok | {:error, line :: String.t()}
   def of(%Config{dry_run: true}, _board), do: :ok
 
-  def of(%Config{arm: policy}, board),
-    do: judge(policy, entry(board, :arming), entry(board, {:health, :drive}))
+  def of(%Config{arm: policy, drive: drive}, board) do
+    case entry(board, {:health, :drive}) do
+      {:offline, reason} ->
+        judge(policy, entry(board, :arming), {:offline, Words.offline(drive, reason)})
+
+      health ->
+        judge(policy, entry(board, :arming), health)
+    end
+  end
 
   @doc """
-  `:ok`, or the reason, which names no robot.
+  `:ok`, or the reason, which names no robot. A text for why the drive is offline is taken as it is.
 
       iex> Robot.Readiness.judge(:manual, %{state: :armed, why: nil}, :online)
       :ok
@@ -85,6 +93,7 @@ defmodule Robot.Readiness do
 
   def reached(_arming, _health), do: :ok
 
+  defp brief(words) when is_binary(words), do: words
   defp brief(reason), do: inspect(reason, limit: 5, printable_limit: 40)
 
   defp entry(board, key) do
