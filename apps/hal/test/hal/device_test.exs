@@ -116,7 +116,8 @@ defmodule Hal.DeviceTest do
     # Already when its start returns.
     assert_received {:health, :drive, {{:offline, :fell}, since}} when since != 7
     assert_received {:arming, %{state: :disarmed, why: "its process fell" <> _}}
-    assert_received {:offline, %{reason: :fell, line: "its process fell, and is started again"}}
+    line = "its process fell, and is started again"
+    assert_received {:offline, %{reason: :fell, line: ^line}}
     assert_receive {:online, %{again?: true}}
     armed(pid)
   end

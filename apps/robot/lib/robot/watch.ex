@@ -143,7 +143,7 @@ defmodule Robot.Watch do
   end
 
   defp module(:executive, board), do: named(noted(board, :goal, & &1))
-  defp module(:pilot, board), do: named(noted(board, :asking, fn {module, _call} -> module end))
+  defp module(:pilot, board), do: named(noted(board, :asking, &elem(&1, 0)))
 
   defp named({:ok, module}), do: module
   defp named(:error), do: nil

@@ -8,7 +8,9 @@ defmodule Hal.Device.News do
 
   @doc "Hands a reading to all sinks."
   @spec hand_on(State.t(), tuple()) :: :ok
-  def hand_on(s, reading), do: Enum.each(s.sinks, fn {m, f, a} -> apply(m, f, a ++ [reading]) end)
+  def hand_on(s, reading) do
+    Enum.each(s.sinks, fn {m, f, a} -> apply(m, f, a ++ [reading]) end)
+  end
 
   @doc "Tells how the device is, if that has changed."
   @spec health(State.t(), :online | {:offline, reason :: term()}) :: State.t()
@@ -19,13 +21,15 @@ defmodule Hal.Device.News do
     health = {condition, since(s.health, condition, at_ms)}
     hand_on(s, {:health, s.device, health})
 
-    case condition do
-      :online -> event(s, :online, at_ms, %{again?: s.health != nil})
-      {:offline, reason} -> event(s, :offline, at_ms, %{reason: reason, line: words(s, reason)})
-    end
-
+    {name, about} = change(s, condition)
+    event(s, name, at_ms, about)
     %{s | health: health}
   end
+
+  defp change(s, :online), do: {:online, %{again?: s.health != nil}}
+
+  defp change(s, {:offline, reason}),
+    do: {:offline, %{reason: reason, line: words(s, reason)}}
 
   # Another reason to be offline is no new beginning.
   defp since({{:offline, _}, since_ms}, {:offline, _}, _at_ms), do: since_ms

@@ -34,7 +34,8 @@ defmodule Sim.Fleet.Said do
   @spec look(t(), [{robot :: atom(), claim :: map()}]) :: {[stage()], t()}
   def look(said, claims) do
     {told, left} = Enum.split_with(said, &(shown?(&1, claims) or late?(&1)))
-    {Enum.map(told, &elem(&1, 1)), Enum.map(left, fn {looks, stage} -> {looks + 1, stage} end)}
+    left = for {looks, stage} <- left, do: {looks + 1, stage}
+    {Enum.map(told, &elem(&1, 1)), left}
   end
 
   defp shown?({_looks, {:elected, robot, _facts}}, claims),
