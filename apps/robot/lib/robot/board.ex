@@ -19,7 +19,7 @@ defmodule Robot.Board do
   | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Reflex.frame/1` |
   | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil, tick: count}` |
   | `:goal` | `:executive` | the module of its goal's behaviour, or `nil` |
-  | `{:hung, part}` | `:watch` | of `:executive` or `:pilot`: `{:silent, module}` of the behaviour or the mission in which it hangs, `{:hung, module}` once it was ended for it |
+  | `{:hung, part}` | `:watch` | of `:gate`, `:executive` or `:pilot`: `{:silent, module}` of the behaviour or the mission in which it hangs (`nil` of the gate), `{:hung, module}` once it was ended for it |
   | `:pose` | `:executive` | the estimate in the `map` frame |
   | `:asking` | `:pilot` | `{module, integer}` while a callback of the mission runs, each with another number |
   | `:mission` | `:pilot` | `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state}` |
@@ -176,10 +176,17 @@ defmodule Robot.Board do
   @spec latched?(t()) :: boolean()
   def latched?(%__MODULE__{latch: latch}), do: :ets.member(latch, :estop)
 
+  @doc "Latches the e-stop in the table alone, which waits for no disk; `latch/1` is to follow."
+  @spec hold(t()) :: :ok
+  def hold(%__MODULE__{latch: latch}) do
+    :ets.insert(latch, {:estop, true})
+    :ok
+  end
+
   @doc "Latches the e-stop. The table holds it even where the file cannot be written."
   @spec latch(t()) :: :ok
-  def latch(%__MODULE__{latch: latch} = board) do
-    :ets.insert(latch, {:estop, true})
+  def latch(%__MODULE__{} = board) do
+    :ok = hold(board)
     if board.file, do: checked(board, File.write(board.file, "e-stop\n", [:sync]))
     :ok
   end
