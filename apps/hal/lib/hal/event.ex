@@ -33,6 +33,7 @@ defmodule Hal.Event do
   | `[:robot, :executive, :hung]` | `at_ms` | the same: it has missed them for 2 s, and is started again |
   | `[:robot, :executive, :again]` | `at_ms` | the same: it ticks again by itself |
   | `[:robot, :pilot, :silent]`, `[:robot, :pilot, :hung]`, `[:robot, :pilot, :again]` | `at_ms` | `robot`, `mission`, `line`: the same of a mission that does not return |
+  | `[:robot, :gate, :silent]`, `[:robot, :gate, :hung]`, `[:robot, :gate, :again]` | `at_ms` | `robot`, `line`: the same of a gate that does not step |
   | `[:robot, :pilot, :phase]` | `at_ms` | `robot`, `state`: `:idle` or `{mission, phase}` |
   | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and what the mission adds |
   | `[:swarm, :mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): a node was not let in, or would not have us |

@@ -1,11 +1,11 @@
 defmodule Robot.Watch do
   @moduledoc """
-  Sees that the executive ticks and that the pilot comes back from its mission. A behaviour or a mission that
-  hangs cannot say so, nor can a supervisor see it, and the robot would be well by its status for ever: with an
-  executive that hangs it stands, as the gate's dead man stops the wheels; with a mission that hangs it goes on
+  Sees that gate and executive tick and that the pilot comes back from its mission. What hangs cannot say so, nor can a
+  supervisor see it, and the robot would be well by its status for ever: with a gate that hangs it stands, by the
+  watchdog of the drive's device; with an executive that hangs, by the gate's dead man; with a mission that hangs it goes on
   with its last goal and hears no order.
 
-  The watch asks nobody. It looks at the board, where the executive counts its ticks and the pilot notes each call of
+  The watch asks nobody. It looks at the board, where gate and executive write at each tick and the pilot notes each call of
   its mission. When that is the same for 8 looks of its own, 0.4 s, it says so, on the board under `{:hung, part}`
   and by the event `[:robot, part, :silent]`, with the name of the behaviour or the mission. On a busy machine a tick may
   take that long, for instance where code is loaded (then `[:robot, part, :again]` follows); after 40 looks, 2 s, it is
@@ -20,13 +20,15 @@ defmodule Robot.Watch do
   @look_ms 50
   @silent 8
   @hung 40
-  @parts [:executive, :pilot]
+  @parts [:gate, :executive, :pilot]
 
   @typedoc "What a part was at by the last look, and how many looks it has been the same."
   @type t :: {mark :: term(), same :: non_neg_integer()}
 
+  @type part :: :gate | :executive | :pilot
+
   @doc "The parts of a robot that are watched."
-  @spec parts() :: [:executive | :pilot]
+  @spec parts() :: [part()]
   def parts, do: @parts
 
   @doc """
@@ -60,7 +62,8 @@ defmodule Robot.Watch do
       iex> Robot.Watch.words(:pilot, Swarm.Missions.Landmark)
       "its mission Swarm.Missions.Landmark"
   """
-  @spec words(:executive | :pilot, module() | nil) :: String.t()
+  @spec words(part(), module() | nil) :: String.t()
+  def words(:gate, nil), do: "its gate"
   def words(:executive, nil), do: "its thinking"
   def words(:executive, behaviour), do: inspect(behaviour)
   def words(:pilot, mission), do: "its mission #{inspect(mission)}"
@@ -105,6 +108,10 @@ defmodule Robot.Watch do
          else: (_none -> make_ref())
   end
 
+  defp at(:gate, board) do
+    with {:ok, _driving, at_ms} <- Board.fetch(board, :driving, :infinity), do: {:ok, at_ms}
+  end
+
   defp at(:executive, board), do: noted(board, :doing, & &1.tick)
   defp at(:pilot, board), do: noted(board, :asking, & &1)
 
@@ -137,11 +144,15 @@ defmodule Robot.Watch do
 
   defp tell(%{config: config} = s, part, what) do
     {:ok, {_what, module}, _at_ms} = Board.fetch(s.board, {:hung, part}, :infinity)
-    where = if part == :pilot, do: :mission, else: :behaviour
-    about = %{:robot => config.id, where => module, :line => words(part, module)}
+    about = Map.merge(where(part, module), %{robot: config.id, line: words(part, module)})
     Event.execute([:robot, part, what], %{at_ms: Config.now(config)}, about)
   end
 
+  defp where(:gate, nil), do: %{}
+  defp where(:executive, behaviour), do: %{behaviour: behaviour}
+  defp where(:pilot, mission), do: %{mission: mission}
+
+  defp module(:gate, _board), do: nil
   defp module(:executive, board), do: named(noted(board, :goal, & &1))
   defp module(:pilot, board), do: named(noted(board, :asking, &elem(&1, 0)))
 

@@ -254,6 +254,26 @@ defmodule Robot.SupervisorTest do
     assert_receive {:drive, {:drive, twist}, _} when twist == @zero, 600
   end
 
+  test "a gate that hangs is named within 0.5 s, and ended after 2 s: all above it restarts idle" do
+    id = rolling(:fall17)
+    rolls()
+    listen(id)
+    for what <- [:silent, :hung], do: listen(id, [:robot, :gate, what])
+    [gate, drive] = parts(id, [:gate, :drive])
+    board = Board.find!(id)
+    :ok = :sys.suspend(gate)
+    assert_receive {[:robot, :gate, :silent], %{line: "its gate"}}, 1_000
+    assert {:ok, {:silent, nil}, _at_ms} = Board.fetch(board, {:hung, :gate}, :infinity)
+    assert_receive {[:robot, :gate, :hung], _about}, 10_000
+    idle?(id)
+    assert {:ok, {:hung, nil}, _at_ms} = Board.fetch(board, {:hung, :gate}, :infinity)
+    assert [other, ^drive] = parts(id, [:gate, :drive])
+    assert other != gate
+    stands(150)
+    assert Pilot.start(id) == :ok
+    rolls()
+  end
+
   test "a missing drive is retried; nobody else falls" do
     open = open_of([{:error, :enoent}, {:error, :enoent}, :ok])
     id = rolling(:fall7, drive: {Hal.FakeDrive, test: self(), device: :drive, open: open})

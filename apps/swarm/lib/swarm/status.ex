@@ -9,7 +9,7 @@ defmodule Swarm.Status do
   (/dev/ttyR0: no such device)` (`offline`: words by device). A robot that is slow for want of sonar is
   `BLIND`. One that stands though nobody told it to says `FAULT`, and why (`fault`).
 
-  Of a robot whose behaviour or mission hangs it says so, and for a minute after it was started again for that
+  Of a robot whose gate, behaviour or mission hangs it says so, and for a minute after it was started again for that
   (`Robot.Watch`; `hung`: `:silent` or `:hung`, in what, and how long ago, ms).
 
   A follower that does not get to its place is `BLOCKED by the landmark`, by another robot, by something

@@ -62,14 +62,17 @@ defmodule Swarm.Link.Desk do
 
   defp checked(request), do: Manual.check(request)
 
-  # Its pilot would not answer, and the link would wait for it and be silent to others.
+  # A pilot that hangs would not answer, and the link would wait for it and be silent to others. A gate that hangs
+  # is ended, and with it what was begun.
   defp well(%{id: id}, board) do
-    case Board.fetch(board, {:hung, :pilot}, :infinity) do
-      {:ok, {:silent, mission}, _at_ms} ->
-        {:error, "#{id} hangs in #{Watch.words(:pilot, mission)}; it is started again by itself"}
+    hangs =
+      for part <- [:gate, :pilot],
+          {:ok, {:silent, module}, _at_ms} <- [Board.fetch(board, {:hung, part}, :infinity)],
+          do: Watch.words(part, module)
 
-      _well ->
-        :ok
+    case hangs do
+      [] -> :ok
+      [where | _] -> {:error, "#{id} hangs in #{where}; it is started again by itself"}
     end
   end
 
