@@ -339,6 +339,13 @@ defmodule System.DocsTest do
           do: assert(LookedAt.prompt(code) == nil)
     end
 
+    test "what an answer of the door is worth stands there, of every function" do
+      told = for cell <- rows("### What an answer is worth"), code <- codes(cell), do: code
+      functions = for {name, _arity} <- Swarm.__info__(:functions), name != :ask, do: name
+      missing = Enum.reject(Enum.uniq(functions), &("Swarm.#{&1}" in told))
+      assert missing == []
+    end
+
     test "the options of the demo are all there, and no others" do
       told =
         for cell <- rows("## 3. Options"), [option] <- Regex.scan(~r/--[a-z-]+/, cell), do: option

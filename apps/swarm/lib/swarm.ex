@@ -80,7 +80,8 @@ defmodule Swarm do
   end
 
   @doc """
-  Changes the formation of the running mission. Options: `spacing` (0.8 to 5 m, default 1), `length`
+  Changes the formation of the running mission: `:ok` when all that are on one have it. One that does not answer, or
+  refuses, is named, as it may be the one that leads; the others keep the new shape. Options: `spacing` (0.8 to 5 m, default 1), `length`
   of a line, `side` of a triangle.
 
       Swarm.formation(:wedge)

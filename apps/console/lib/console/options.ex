@@ -74,7 +74,8 @@ defmodule Console.Options do
       bin/demo --nodes --headless --kill leader@40 --json - the same with a report
       bin/demo --hardware 1                                 the first robot has the real drivers
 
-    Exit status: 0 the fleet ended in formation, 2 it did not, 1 something was wrong with the input.
+    Exit status: 0 the fleet ended in formation, or a person at a terminal has quit; 2 it did
+    not; 1 something was wrong with the input.
     """
   end
 

@@ -24,7 +24,7 @@ defmodule Console.Words do
   @spec meaning(Sim.Scene.stage()) :: String.t()
   def meaning(%{stage: :search}), do: "every robot looks round for the landmark"
   def meaning(%{stage: :elected} = stage), do: "#{stage.robot} leads" <> why(stage)
-  def meaning(%{stage: :formed}), do: "every robot stands in its place"
+  def meaning(%{stage: :formed}), do: "every robot says that it stands in its place"
   def meaning(%{stage: :landmark_moved}), do: "the landmark sets off"
   def meaning(%{stage: :killed, robot: robot}), do: "#{robot} is dead"
   def meaning(%{stage: :world_lost}), do: "the world has ended; robots stand, it is started again"

@@ -25,12 +25,15 @@ defmodule Hal.Event do
   | `[:robot, :gate, :start]` | `at_ms` | `robot`, `latched?` |
   | `[:robot, :gate, :limits]` | `at_ms` | `robot`, `limits`: why the speed is limited has changed |
   | `[:robot, :gate, :estop]`, `[:robot, :gate, :reset]` | `at_ms` | `robot` |
-  | `[:robot, :estop_file, :error]` | | `robot`, `reason`: the latch holds, but would not outlive a restart of the board |
+  | `[:robot, :estop_file, :error]` | | `robot`, `file`, `reason`: the latch is as it was told, but would not outlive a restart of the board so |
   | `[:robot, :executive, :start]` | `at_ms` | `robot`: the robot is idle |
   | `[:robot, :executive, :slow]` | `at_ms`, `duration_ms` | `robot`: a tick took over 50 ms |
   | `[:robot, :fault]` | `at_ms` | `robot`, `line`: why it stands though nobody told it to, such as a bumper that stays pressed; `nil` when that is over |
-  | `[:robot, :executive, :silent]` | `at_ms` | `robot`, `behaviour` (a module, or `nil`): it misses its ticks |
+  | `[:robot, :executive, :silent]` | `at_ms` | `robot`, `behaviour` (a module, or `nil`), `line` (where, in words): it misses its ticks |
   | `[:robot, :executive, :hung]` | `at_ms` | the same: it has missed them for 2 s, and is started again |
+  | `[:robot, :executive, :again]` | `at_ms` | the same: it ticks again by itself |
+  | `[:robot, :pilot, :silent]`, `[:robot, :pilot, :hung]`, `[:robot, :pilot, :again]` | `at_ms` | `robot`, `mission`, `line`: the same of a mission that does not return |
+  | `[:robot, :gate, :silent]`, `[:robot, :gate, :hung]`, `[:robot, :gate, :again]` | `at_ms` | `robot`, `line`: the same of a gate that does not step |
   | `[:robot, :pilot, :phase]` | `at_ms` | `robot`, `state`: `:idle` or `{mission, phase}` |
   | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and what the mission adds |
   | `[:swarm, :mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): a node was not let in, or would not have us |

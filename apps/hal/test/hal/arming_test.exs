@@ -175,7 +175,8 @@ defmodule Hal.ArmingTest do
     Device.drive(pid, @ahead)
     assert_receive {:drive, {:drive, twist}, ^pid} when twist == @ahead
     Agent.update(agent, fn _ -> {:error, :eio} end)
-    assert Device.disarm(pid) == :ok
+    lost = "the line was lost (:eio) while the wheels turned"
+    assert Device.disarm(pid) == {:error, lost}
     assert_received {:arming, %{state: {:error, :eio}}}
   end
 

@@ -3,6 +3,7 @@ defmodule Hal.DeviceTest do
   import ExUnit.CaptureLog
   alias Hal.{Device, Frame, Twist}
 
+  doctest Hal.Device.Signs
   doctest Hal.Device.Words
 
   @zero Twist.zero()
@@ -94,6 +95,33 @@ defmodule Hal.DeviceTest do
     assert log =~ "was told to"
   end
 
+  test "a driver that raises: stopped first, then told as offline and disarmed, before its device rests" do
+    capture_log(fn ->
+      pid = armed(device(:drive))
+      send(pid, :raise)
+      assert_receive {:drive, :terminate, ^pid}
+      # Before the next one is started, 500 ms later.
+      assert_receive {:health, :drive, {{:offline, :fell}, _since}}, 400
+      assert_receive {:arming, %{state: :disarmed, why: "its process fell" <> _}}, 400
+      assert Process.alive?(pid)
+    end)
+  end
+
+  test "the one after a device that was killed says first that it is offline and disarmed" do
+    robot = listen([:online, :offline])
+    driver = {Hal.FakeDrive, [test: self(), device: :drive]}
+    was = {Function, :identity, [{:online, 7}]}
+    options = [was: was, sinks: [{Kernel, :send, [self()]}], about: %{robot: robot}]
+    pid = start_supervised!({Device, [kind: :drive, driver: driver] ++ options})
+    # Already when its start returns.
+    assert_received {:health, :drive, {{:offline, :fell}, since}} when since != 7
+    assert_received {:arming, %{state: :disarmed, why: "its process fell" <> _}}
+    line = "its process fell, and is started again"
+    assert_received {:offline, %{reason: :fell, line: ^line}}
+    assert_receive {:online, %{again?: true}}
+    armed(pid)
+  end
+
   test "ends with its supervisor, and stops the motors first" do
     pid = device(:drive)
     assert_receive {:drive, :init, ^pid}
@@ -136,15 +164,59 @@ defmodule Hal.DeviceTest do
     assert_receive {:camera, :next, ^pid}
   end
 
-  def forward(event, _measured, %{robot: robot} = about, {robot, test}),
-    do: send(test, {List.last(event), about})
+  test "a camera is online once it has given a picture; one that gives none for 10 s is opened again" do
+    clock = :counters.new(1, [])
+    driver = {Hal.FakeCamera, test: self(), device: :camera}
+    options = [clock: {:counters, :get, [clock, 1]}, sinks: [{Kernel, :send, [self()]}]]
+    pid = start_supervised!({Device, [kind: :camera, driver: driver] ++ options})
+    assert_receive {:camera, :init, ^pid}
+    assert_receive {:camera, :next, ^pid}
+    refute_receive {:health, :camera, _status}, 50
 
-  def forward(_event, _measured, _others, _config), do: :ok
+    later = fn ms ->
+      :counters.add(clock, 1, ms)
+      send(pid, :something_unknown)
+    end
 
-  test "each change is one event, with its reason in words; a try that changes nothing is none" do
+    later.(9_999)
+    send(pid, {:readings, [:a_frame]})
+    assert_receive {:health, :camera, {:online, 9_999}}
+    later.(9_999)
+    refute_receive {:camera, :terminate, ^pid}, 50
+    later.(1)
+    assert_receive {:health, :camera, {{:offline, :mute}, 19_999}}
+    assert_receive {:camera, :terminate, ^pid}
+    # Open again it has proven nothing yet.
+    assert_receive {:camera, :init, ^pid}
+    refute_receive {:health, :camera, {:online, _}}, 50
+    send(pid, {:readings, [:a_frame]})
+    assert_receive {:health, :camera, {:online, _}}
+  end
+
+  test "a pan-tilt unit whose line opens, and then proves dead, is told once, and not as there again" do
+    robot = listen([:online, :offline])
+    driver = {Hal.FakePtz, test: self(), device: :ptz}
+    sinks = [{Kernel, :send, [self()]}]
+    device = [kind: :ptz, driver: driver, sinks: sinks, about: %{robot: robot}]
+    pid = start_supervised!({Device, device})
+
+    for _ <- 1..3 do
+      assert_receive {:ptz, :init, ^pid}, 1_000
+      send(pid, {:fail, :no_answer})
+    end
+
+    assert_receive {:ptz, :init, ^pid}, 1_000
+    assert_received {:offline, %{reason: :no_answer}}
+    refute_received {:offline, _about}
+    refute_received {:online, _about}
+    send(pid, {:readings, [{:ptz, %{pan: 0.5, tilt: 0.0, field_of_view: 1.0}}]})
+    assert_receive {:online, %{again?: true}}
+  end
+
+  defp listen(events) do
     robot = make_ref()
 
-    for event <- [:online, :offline, :arming] do
+    for event <- events do
       handler = {robot, event}
 
       :ok =
@@ -153,6 +225,16 @@ defmodule Hal.DeviceTest do
       on_exit(fn -> Hal.Event.detach(handler) end)
     end
 
+    robot
+  end
+
+  def forward(event, _measured, %{robot: robot} = about, {robot, test}),
+    do: send(test, {List.last(event), about})
+
+  def forward(_event, _measured, _others, _config), do: :ok
+
+  test "each change is one event, with its reason in words; a try that changes nothing is none" do
+    robot = listen([:online, :offline, :arming])
     busy = {:error, :ebusy}
     open = answers([{:error, :enoent}, {:error, :enoent}, busy, busy, :ok])
     words = fn reason -> "the line: #{reason}" end

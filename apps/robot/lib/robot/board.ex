@@ -19,8 +19,9 @@ defmodule Robot.Board do
   | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Reflex.frame/1` |
   | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil, tick: count}` |
   | `:goal` | `:executive` | the module of its goal's behaviour, or `nil` |
-  | `:hung` | `:watch` | `{:silent, module}` of the behaviour in which the executive hangs, `{:hung, module}` once it was ended for it |
+  | `{:hung, part}` | `:watch` | of `:gate`, `:executive` or `:pilot`: `{:silent, module}` of the behaviour or the mission in which it hangs (`nil` of the gate), `{:hung, module}` once it was ended for it |
   | `:pose` | `:executive` | the estimate in the `map` frame |
+  | `:asking` | `:pilot` | `{module, integer}` while a callback of the mission runs, each with another number |
   | `:mission` | `:pilot` | `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state}` |
 
   This process owns the tables and does nothing else, so that they outlive whoever writes them.
@@ -65,9 +66,9 @@ defmodule Robot.Board do
     frame: :gate,
     doing: :executive,
     goal: :executive,
-    hung: :watch,
     pose: :executive,
     mission: :pilot,
+    asking: :pilot,
     estop: :brake,
     radio: :link
   }
@@ -150,6 +151,15 @@ defmodule Robot.Board do
           {:ok, term(), at_ms :: integer()} | :error
   def fetch(board, key, max_age_ms), do: fetch(board, key, max_age_ms, now(board))
 
+  @doc "How a device is, and since when, as its process said last; `nil` if none has said anything yet."
+  @spec health(t(), device :: atom()) :: Hal.Device.status() | nil
+  def health(board, device) do
+    case fetch(board, {:health, device}, :infinity) do
+      {:ok, condition, since_ms} -> {condition, since_ms}
+      :error -> nil
+    end
+  end
+
   @doc "What other robots told, by their ids."
   @spec peers(t()) :: %{atom() => Robot.Percept.peer()}
   def peers(%__MODULE__{table: table}),
@@ -166,10 +176,17 @@ defmodule Robot.Board do
   @spec latched?(t()) :: boolean()
   def latched?(%__MODULE__{latch: latch}), do: :ets.member(latch, :estop)
 
+  @doc "Latches the e-stop in the table alone, which waits for no disk; `latch/1` is to follow."
+  @spec hold(t()) :: :ok
+  def hold(%__MODULE__{latch: latch}) do
+    :ets.insert(latch, {:estop, true})
+    :ok
+  end
+
   @doc "Latches the e-stop. The table holds it even where the file cannot be written."
   @spec latch(t()) :: :ok
-  def latch(%__MODULE__{latch: latch} = board) do
-    :ets.insert(latch, {:estop, true})
+  def latch(%__MODULE__{} = board) do
+    :ok = hold(board)
     if board.file, do: checked(board, File.write(board.file, "e-stop\n", [:sync]))
     :ok
   end
@@ -203,12 +220,13 @@ defmodule Robot.Board do
 
   defp writer({:peer, _id}), do: :link
   defp writer({:health, device}), do: device
+  defp writer({:hung, _part}), do: :watch
   defp writer(key), do: Map.get(@writers, key)
 
   defp checked(_board, :ok), do: :ok
 
   defp checked(board, {:error, reason}) do
-    about = %{robot: board.robot, reason: reason}
+    about = %{robot: board.robot, file: board.file, reason: reason}
     Hal.Event.execute([:robot, :estop_file, :error], %{}, about)
   end
 end

@@ -38,9 +38,13 @@ defmodule Robot.Devices do
       eye(config, write.(:eye)) ++
         view(config, demand) ++
         saver(config) ++
-        device(config, :drive, [write.(:drive), {Gate, :sense, [id]}, {Pilot, :sense, [id]}]) ++
-        device(config, :ptz, [write.(:ptz) | if(config.camera, do: [to_aim], else: [])]) ++
-        device(config, :camera, [{__MODULE__, :health, [board]}, to_eye, to_view])
+        device(config, board, :drive, [
+          write.(:drive),
+          {Gate, :sense, [id]},
+          {Pilot, :sense, [id]}
+        ]) ++
+        device(config, board, :ptz, [write.(:ptz) | if(config.camera, do: [to_aim], else: [])]) ++
+        device(config, board, :camera, [{__MODULE__, :health, [board]}, to_eye, to_view])
 
     Supervisor.init(children, strategy: :one_for_one, max_restarts: 200, max_seconds: 5)
   end
@@ -79,7 +83,7 @@ defmodule Robot.Devices do
     [{Vision.Saver, options ++ ours}]
   end
 
-  defp device(config, kind, sinks) do
+  defp device(config, board, kind, sinks) do
     case Map.fetch!(config, kind) do
       nil ->
         []
@@ -91,6 +95,7 @@ defmodule Robot.Devices do
            driver: driver,
            arm: if(config.dry_run, do: :never, else: config.arm),
            sonar: kind == :drive and config.profile.sonars != [],
+           was: {Board, :health, [board, kind]},
            about: %{robot: config.id},
            sinks: sinks,
            clock: config.clock,

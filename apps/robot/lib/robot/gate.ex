@@ -113,9 +113,12 @@ defmodule Robot.Gate do
   @impl GenServer
   def handle_call(:estop, _from, s) do
     at_ms = heard(s, :estop)
+    # The wheels first: the latch has a file, too, and a disk may take its time.
+    Board.hold(s.board)
+    s = step(%{s | reflex: Reflex.estop(s.reflex)}, at_ms)
     Board.latch(s.board)
     Event.execute([:robot, :gate, :estop], %{at_ms: at_ms}, %{robot: s.config.id})
-    {:reply, :ok, step(%{s | reflex: Reflex.estop(s.reflex)}, at_ms)}
+    {:reply, :ok, s}
   end
 
   def handle_call(:reset, _from, s) do

@@ -11,6 +11,9 @@ defmodule Robot.Pilot do
   at, and the stop goes on to the executive, which drops its goal, and from there to the gate, after
   every older wish. Only the gate says that it is done.
 
+  The mission's callbacks are somebody else's code. While one is called, the board says so under `:asking`, so that
+  `Robot.Watch` sees one that never returns, and ends the pilot.
+
   Where a person arms the wheels (`arm: :manual`), every change of that ends what the robot is at: when they
   are disarmed or lost, and when they are armed again, which is never the start of a motion.
 
@@ -99,7 +102,8 @@ defmodule Robot.Pilot do
       since_ms: Config.now(config)
     }
 
-    # The executive may still follow a goal of the mission that failed.
+    # The pilot before this one may have ended within its mission, and the executive may still follow a goal of it.
+    Board.delete(data.board, :pilot, :asking)
     rest(data)
     {:ok, :idle, told(:idle, data)}
   end
@@ -115,7 +119,7 @@ defmodule Robot.Pilot do
     if Code.ensure_loaded?(module) and function_exported?(module, :init, 2) do
       heard(input, data)
       rest(data)
-      result = module.init(data.config.id, options)
+      result = asking(module, :init, [data.config.id, options], data)
       data = %{data | claim: %{}, halted: nil}
       follow(result, module, state, data, [{:reply, from, :ok}])
     else
@@ -167,7 +171,10 @@ defmodule Robot.Pilot do
   defp halted(:idle, data), do: data.halted
 
   defp halted({module, _phase}, data) do
-    left = if function_exported?(module, :halted, 1), do: module.halted(data.mission)
+    left =
+      if function_exported?(module, :halted, 1),
+        do: asking(module, :halted, [data.mission], data)
+
     if left != nil, do: {module, left}
   end
 
@@ -184,7 +191,16 @@ defmodule Robot.Pilot do
 
   defp handle(event, module, data) do
     heard(event, data)
-    module.handle(event, data.mission)
+    asking(module, :handle, [event, data.mission], data)
+  end
+
+  # No two calls are noted alike.
+  defp asking(module, callback, arguments, %{board: board, config: config}) do
+    call = {module, System.unique_integer()}
+    Board.put(board, :pilot, :asking, call, Config.now(config))
+    result = apply(module, callback, arguments)
+    Board.delete(board, :pilot, :asking)
+    result
   end
 
   defp follow({phase, mission, effects}, module, state, data, replies) do

@@ -5,7 +5,7 @@ defmodule Robot.Player do
 
   | Player's driver | becomes | by |
   |---|---|---|
-  | `rflex` | `drive`, `body`, acceleration in `limits` | `Robot.Player.Base` |
+  | `rflex`, or `rflex_position`, `rflex_sonar` and its kin | `drive`, `body`, acceleration in `limits` | `Robot.Player.Base` |
   | `sonyevid30` | `ptz` | `Robot.Player.Eyes` |
   | `camerav4l` and its kin | `camera` | |
   | `cmvision` | `colours` | |
@@ -17,11 +17,10 @@ defmodule Robot.Player do
   `Robot.Player.Units`; where a file says something else than it seems to mean, what was assumed is
   told as well.
   """
-  alias Robot.Player.{Base, Boards, Eyes, Fit, Others, Sections, Text, Units, Whole}
+  alias Robot.Player.{Base, Boards, Eyes, Fit, Others, Parts, Sections, Text, Units, Whole}
 
   @drivers %{
     "rflex" => :drive,
-    "rflex_position" => :drive,
     "sonyevid30" => :ptz,
     "camerav4l" => :camera,
     "camerav4l2" => :camera,
@@ -61,8 +60,9 @@ defmodule Robot.Player do
     file = Keyword.get(options, :file, "configuration file")
 
     with {:ok, parsed} <- Sections.parse(text),
-         units = Units.context(parsed.options, parsed.sections, options[:version]),
-         state = Enum.reduce(parsed.sections, start(parsed), &section(&1, &2, units)),
+         sections = Parts.join(parsed.sections),
+         units = Units.context(parsed.options, sections, options[:version]),
+         state = Enum.reduce(sections, start(parsed), &section(&1, &2, units)),
          :ok <- based(state),
          # What a line itself lacks comes before what lacks because of it.
          :ok <- Boards.sure(state),
@@ -91,7 +91,9 @@ defmodule Robot.Player do
   defp section(section, state, units) do
     name = text_of(section, "name") || text_of(section, "driver")
 
-    case {section.type, Map.get(@drivers, name)} do
+    kind = if name in Parts.names(), do: :drive, else: Map.get(@drivers, name)
+
+    case {section.type, kind} do
       {"driver", nil} -> leave(state, section, "driver #{name}", Others.driver(name, names()))
       {type, nil} -> leave(state, section, type, Others.section(type))
       {_type, kind} -> first(kind, name, section, state, units)

@@ -6,7 +6,7 @@ defmodule Robot.Supervisor do
       |-- Robot.Board        the newest readings, the e-stop latch
       |-- Robot.Devices      one_for_one: eye, drive, ptz, camera; each falls alone
       |-- Robot.Gate         the only one who drives the wheels
-      |-- Robot.Watch        sees that the executive ticks, and ends one that hangs
+      |-- Robot.Watch        sees that gate, executive and mission go on, and ends one that hangs
       |-- Robot.Executive    percept to wish, ten times a second
       |-- Robot.Pilot        runs the mission
       `-- companions         the radio, and what else the config names

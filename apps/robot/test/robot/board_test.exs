@@ -80,7 +80,8 @@ defmodule Robot.BoardTest do
     on_exit(fn -> Hal.Event.detach(:board6) end)
     board = board(:board6, estop_file: Path.join(dir, "missing/estop"))
     Board.latch(board)
-    assert_received %{robot: :board6, reason: :enoent}
+    file = Path.join(dir, "missing/estop")
+    assert_received %{robot: :board6, file: ^file, reason: :enoent}
     assert Board.latched?(board)
   end
 

@@ -32,4 +32,32 @@ defmodule Robot.Devices.LogTest do
 
     assert Log.line(:online, Map.put(@drive, :again?, false)) == {:debug, "mag1: drive online"}
   end
+
+  test "what hangs is one line when it is noticed, and one when it is over" do
+    about = %{robot: :mag1, behaviour: Acts.Hang, line: "Acts.Hang"}
+    assert Log.line(:silent, about) == {:warning, "mag1 hangs in Acts.Hang"}
+    assert Log.line(:again, about) == {:info, "mag1 hangs no more in Acts.Hang"}
+
+    assert Log.line(:hung, about) ==
+             {:error, "mag1 hung in Acts.Hang for 2 s: started again, idle"}
+  end
+
+  test "what would be found out only when it is needed is told: the stop's file, pictures, a second robot" do
+    for event <- [
+          [:robot, :estop_file, :error],
+          [:vision, :saver, :failed],
+          [:swarm, :link, :duplicate_id]
+        ],
+        do: assert(event in Log.events())
+
+    file = %{robot: :mag1, file: "/var/estop", reason: :eacces}
+    assert {:error, "mag1: the e-stop file /var/estop is not as" <> line} = Log.line(:error, file)
+    assert line =~ "permission denied"
+    why = "no pictures are saved in /p: no space left on device"
+    assert Log.line(:failed, %{folder: "/p", line: why}) == {:warning, why}
+    twice = %{robot: :mag1, other: :mag1@lab}
+
+    assert {:error, "mag1: a robot of this name was on mag1@lab" <> _} =
+             Log.line(:duplicate_id, twice)
+  end
 end

@@ -64,6 +64,30 @@ defmodule Robot.GateTest do
     rolls()
   end
 
+  def wait(_event, _measured, %{robot: :gate8}, test) do
+    send(test, {:writing, self()})
+    receive(do: (:written -> :ok), after: (1_000 -> :ok))
+  end
+
+  def wait(_event, _measured, _others, _test), do: :ok
+
+  @tag :tmp_dir
+  test "an e-stop stops the wheels before its file is written", %{tmp_dir: folder} do
+    # A disk that takes its time: who hears that it failed makes the gate wait.
+    event = [:robot, :estop_file, :error]
+    :ok = Hal.Event.attach(:gate8, event, &__MODULE__.wait/4, self())
+    on_exit(fn -> Hal.Event.detach(:gate8) end)
+    id = rolling(:gate8, estop_file: Path.join(folder, "missing/estop"))
+    rolls()
+    answer = Task.async(fn -> Gate.estop(id) end)
+    assert_receive {:writing, gate}
+    assert_receive {:drive, {:drive, twist}, _} when twist == @zero, 300
+    assert Board.latched?(Board.find!(id))
+    assert Task.yield(answer, 0) == nil
+    send(gate, :written)
+    assert Task.await(answer) == :ok
+  end
+
   test "a gate that starts again does not lay its fence in another frame of odometry" do
     {:ok, fence} = Robot.Reflex.Fence.new({{-50, -50}, {50, 50}})
     id = rolling(:gate6, fence: fence)

@@ -3,6 +3,7 @@ defmodule Robot.PlayerTest do
 
   doctest Robot.Player.Base
   doctest Robot.Player.Others
+  doctest Robot.Player.Parts
   doctest Robot.Player.Poses
   doctest Robot.Player.Sections
   doctest Robot.Player.Tokens
@@ -276,7 +277,8 @@ defmodule Robot.PlayerTest do
     assert [
              {1, "profile: :magellan", _},
              {10, "mrad_sonar_poses", sonars},
-             {12, "poses", "angles taken for radians, some of them beyond a turn" <> _}
+             {12, "poses", "angles taken for radians, some of them beyond a turn" <> _},
+             {12, "rflex_ir_calib", "is not given" <> _}
            ] = result.assumed
 
     assert sonars ==
@@ -387,6 +389,61 @@ defmodule Robot.PlayerTest do
              {10, "port"},
              {11, "laser:0"}
            ]
+  end
+
+  # A section for each interface, as Player had it first; a line on sonars, and one on what else is there.
+  defp pieces(sonars, more \\ "") do
+    """
+    position:0 ( driver "rflex_position"
+      rflex_serial_port "/dev/ttyS1"
+      mm_length "500.0"
+      mm_width "500.0"
+      odo_distance_conversion "31.387"
+      odo_angle_conversion 4654.2 )
+    sonar:0 ( driver "rflex_sonar" range_distance_conversion "1.4" #{sonars} )
+    power:0 ( driver "rflex_power" rflex_power_offset 12 )
+    laser:0 ( port "/dev/ttyS2" )
+    #{more}
+    """
+  end
+
+  test "a base in pieces, a driver for each of its interfaces, is one base" do
+    poses = words(ring(6, 200.0, 3.0, fn angle, x, y -> [angle, x, y] end))
+    text = pieces(~s|num_sonars "6" num_sonars_in_bank "3 3" mmrad_sonar_poses "#{poses}"|)
+    assert {:ok, result} = Player.import(text, profile: :magellan)
+    robot = again(result.text)
+    assert %{port: "/dev/ttyS1", sonar_banks: [3, 3], power_offset: 1.2} = Map.new(options(robot))
+    assert options(robot)[:conversions] == [distance: 31_387.0, angle: 4654.2, range: 1400.0]
+    assert %{length: 0.5, width: 0.5, radius: 0.25} = robot.profile
+    assert length(robot.profile.sonars) == 6
+    assert [{9, "laser:0", _why}] = result.left
+
+    # What is not clear of the sensors in any piece is refused, as in one.
+    assert {:error, line} = Player.import(pieces(~s|num_sonars_in_bank "3 many"|), file: "x.cfg")
+    assert line =~ "x.cfg:7: num_sonars_in_bank: "
+    more = ~s|sonar:1 ( driver "rflex_sonar" num_sonars_in_bank [8] )|
+    text = pieces("num_sonars_in_bank [8 8]", more)
+    assert {:error, line} = Player.import(text, file: "x.cfg", profile: :magellan)
+    assert line =~ "x.cfg:10: num_sonars_in_bank: is given twice"
+  end
+
+  test "infrareds without their law are told not to be read, sensors beyond the body to be odd" do
+    ring = words(ring(8, 0.23, 1.0, fn angle, x, y -> [x, y, angle] end))
+    text = ~s|driver ( name "rflex" m_length 0.4 m_width 0.4 rflex_banks [8] poses [#{ring}] )|
+    assert {:ok, result} = Player.import(text, profile: :magellan)
+    why = "is not given, so that no infrared is read"
+    assert {1, "rflex_ir_calib", why} in result.assumed
+    odd = Robot.File.Odd.lines(again(result.text), fn _device -> true end)
+
+    assert Enum.any?(odd, fn line ->
+             line =~
+               "body.irs: the farthest is 0.230 m from the middle, and the body's radius is 0.200"
+           end)
+
+    law = ~s|m_width 0.4 rflex_ir_calib [#{words(List.duplicate([4000.0, -2.0], 8))}]|
+    text = String.replace(text, "m_width 0.4", law)
+    assert {:ok, result} = Player.import(text, profile: :magellan)
+    refute {1, "rflex_ir_calib", why} in result.assumed
   end
 
   test "norm and input of a frame grabber" do

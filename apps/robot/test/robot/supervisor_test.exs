@@ -102,20 +102,58 @@ defmodule Robot.SupervisorTest do
 
     # Within 0.5 s, and what a machine takes that does much else.
     assert_receive {[:robot, :executive, :silent], %{behaviour: Acts.Hang}}, 1_000
-    assert {:ok, {:silent, Acts.Hang}, _at_ms} = Board.fetch(Board.find!(id), :hung, :infinity)
+
+    assert {:ok, {:silent, Acts.Hang}, _at_ms} =
+             Board.fetch(Board.find!(id), {:hung, :executive}, :infinity)
+
     assert_receive {[:robot, :executive, :hung], %{behaviour: Acts.Hang}}, 10_000
     idle?(id)
     # A slow tick is no hanging.
     assert System.monotonic_time(:millisecond) - begun_ms >= 1_500
     assert executive == hd(before)
     refute Process.alive?(executive)
-    assert {:ok, {:hung, Acts.Hang}, _at_ms} = Board.fetch(Board.find!(id), :hung, :infinity)
+
+    assert {:ok, {:hung, Acts.Hang}, _at_ms} =
+             Board.fetch(Board.find!(id), {:hung, :executive}, :infinity)
+
     assert parts(id, [:gate, :watch]) == [gate, watch]
     refute Enum.any?(parts(id, @above), &(&1 in before))
     stands(150)
     # It works again.
     roll = {Acts.Roll, twist: Twist.new(0.1, 0.0)}
     assert Executive.goal(id, :roll, roll) == :ok
+    rolls()
+  end
+
+  test "a mission hangs: it is named within 0.5 s, and the robot is there again, idle" do
+    roll = {:goal, :roll, {Acts.Roll, twist: Twist.new(0.1, 0.0)}}
+    id = rolling(:fall16, mission: {Acts.Mission, test: self(), effects: [roll]})
+    rolls()
+    listen(id)
+    for what <- [:silent, :hung], do: listen(id, [:robot, :pilot, what])
+    [gate, watch, executive, before] = parts(id, [:gate, :watch | @above])
+    board = Board.find!(id)
+    hung = fn -> Board.fetch(board, {:hung, :pilot}, :infinity) end
+    assert hung.() == :error
+    Pilot.hear(id, {:command, :hang})
+    assert_receive {:mission, {:hangs, ^before}}
+    begun_ms = System.monotonic_time(:millisecond)
+
+    # Within 0.5 s, and what a machine takes that does much else.
+    line = "its mission Robot.Acts.Mission"
+    assert_receive {[:robot, :pilot, :silent], %{mission: Acts.Mission, line: ^line}}, 1_000
+    assert {:ok, {:silent, Acts.Mission}, _at_ms} = hung.()
+    assert_receive {[:robot, :pilot, :hung], %{mission: Acts.Mission}}, 10_000
+    assert_receive {[:robot, :pilot, :phase], %{state: :idle}}, 3_000
+    # A mission that is slow does not hang.
+    assert System.monotonic_time(:millisecond) - begun_ms >= 1_500
+    refute Process.alive?(before)
+    assert {:ok, {:hung, Acts.Mission}, _at_ms} = hung.()
+    assert parts(id, [:gate, :watch, :executive]) == [gate, watch, executive]
+    assert_receive {:drive, {:drive, twist}, _} when twist == @zero, 400
+    stands(150)
+    # It works again.
+    assert Pilot.start(id) == :ok
     rolls()
   end
 
@@ -216,6 +254,26 @@ defmodule Robot.SupervisorTest do
     assert_receive {:drive, {:drive, twist}, _} when twist == @zero, 600
   end
 
+  test "a gate that hangs is named within 0.5 s, and ended after 2 s: all above it restarts idle" do
+    id = rolling(:fall17)
+    rolls()
+    listen(id)
+    for what <- [:silent, :hung], do: listen(id, [:robot, :gate, what])
+    [gate, drive] = parts(id, [:gate, :drive])
+    board = Board.find!(id)
+    :ok = :sys.suspend(gate)
+    assert_receive {[:robot, :gate, :silent], %{line: "its gate"}}, 1_000
+    assert {:ok, {:silent, nil}, _at_ms} = Board.fetch(board, {:hung, :gate}, :infinity)
+    assert_receive {[:robot, :gate, :hung], _about}, 10_000
+    idle?(id)
+    assert {:ok, {:hung, nil}, _at_ms} = Board.fetch(board, {:hung, :gate}, :infinity)
+    assert [other, ^drive] = parts(id, [:gate, :drive])
+    assert other != gate
+    stands(150)
+    assert Pilot.start(id) == :ok
+    rolls()
+  end
+
   test "a missing drive is retried; nobody else falls" do
     open = open_of([{:error, :enoent}, {:error, :enoent}, :ok])
     id = rolling(:fall7, drive: {Hal.FakeDrive, test: self(), device: :drive, open: open})
@@ -254,6 +312,31 @@ defmodule Robot.SupervisorTest do
     end)
 
     assert parts(id, [:gate | @above]) == parts
+  end
+
+  test "a drive that is killed is nowhere armed or online any more before another is there" do
+    test = self()
+
+    # The first opens at once, the others when the test lets them.
+    open = fn ->
+      send(test, {:opens, self()})
+      receive(do: (:open -> :ok))
+    end
+
+    id = robot(:fall15, drive: {Hal.FakeDrive, test: test, device: :drive, open: open})
+    assert_receive {:opens, first}
+    send(first, :open)
+    online(id)
+    board = Board.find!(id)
+    for name <- [:offline, :online], do: listen(id, [:hal, :device, name])
+    kill(id, :drive)
+    assert_receive {:opens, second} when second != first
+    assert {:ok, {:offline, :fell}, _} = Board.fetch(board, {:health, :drive}, :infinity)
+    assert {:ok, arming, _at_ms} = Board.fetch(board, :arming, :infinity)
+    assert arming == %{state: :disarmed, why: "its process fell, and is started again"}
+    assert_received {[:hal, :device, :offline], %{reason: :fell}}
+    send(second, :open)
+    assert_receive {[:hal, :device, :online], %{again?: true}}
   end
 
   test "a drive that crashes over every message does not take the robot down" do

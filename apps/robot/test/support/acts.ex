@@ -40,7 +40,7 @@ defmodule Robot.Acts do
   defmodule Mission do
     @moduledoc """
     Starts with the effects `:effects`; the command `{:do, phase, effects}` brings others, and
-    `:raise` raises. Tells `:test` all that it hears.
+    `:raise` raises, and `:hang` never returns, which `:test` is told, too. Tells `:test` all that it hears.
     """
     @behaviour Robot.Mission
 
@@ -54,6 +54,11 @@ defmodule Robot.Acts do
     def handle({:command, {:do, phase, effects}}, options), do: {phase, options, effects}
     def handle({:command, :raise}, _options), do: raise("the mission was told to")
 
+    def handle({:command, :hang} = event, options) do
+      tell(options, {:hangs, self()})
+      spin(event)
+    end
+
     def handle(event, options) do
       tell(options, event)
       {options[:phase] || :ready, options, []}
@@ -63,6 +68,8 @@ defmodule Robot.Acts do
     @impl Robot.Mission
     def halted(options),
       do: if(options[:halted], do: Keyword.put(options, :phase, options[:halted]))
+
+    defp spin(event), do: spin(event)
 
     defp tell(options, what), do: if(options[:test], do: send(options[:test], {:mission, what}))
   end

@@ -9,7 +9,7 @@ defmodule Sim.Fleet do
   """
   use GenServer
   alias Hal.Pose
-  alias Sim.Fleet.{Local, Mission, Nodes}
+  alias Sim.Fleet.{Local, Mission, Nodes, Said}
   alias Sim.Scene
   alias Sim.Trial.{Finish, Ledger, Score, Script, Setup}
 
@@ -112,6 +112,7 @@ defmodule Sim.Fleet do
       epoch_ms: epoch_ms,
       script: Script.new(options.moves, options.kills),
       ledger: Ledger.new(),
+      said: [],
       next: epoch_ms
     })
   end
@@ -161,10 +162,11 @@ defmodule Sim.Fleet do
     claims = ask(s, :claims)
     worst = fn leader -> s |> run() |> Score.worst(leader) end
     followers = fn -> s |> run() |> Score.followers() end
+    {told, said} = Said.look(s.said, claims)
     ledger = s.ledger |> Ledger.note(now, claims) |> Ledger.judge(now, claims, worst)
-    ledger = Ledger.watch(ledger, now, followers)
+    ledger = ledger |> Ledger.watch(now, followers) |> tell(now, told)
     {events, script} = Script.due(s.script, now(s.epoch_ms), Ledger.leader(ledger))
-    s = Enum.reduce(events, %{s | ledger: ledger, script: script}, &play/2)
+    s = Enum.reduce(events, %{s | ledger: ledger, said: said, script: script}, &play/2)
     {:noreply, schedule(s)}
   end
 
@@ -198,8 +200,18 @@ defmodule Sim.Fleet do
 
   defp note({:killed, id}, s), do: note({:stage, :killed, id, %{}}, s)
 
-  defp note({:stage, stage, id, facts}, s),
-    do: %{s | ledger: Ledger.stage(s.ledger, now(s.epoch_ms), stage, id, facts)}
+  defp note({:stage, stage, id, facts}, s) do
+    if Said.waits?(stage),
+      do: %{s | said: Said.hear(s.said, {stage, id, facts})},
+      else: %{s | ledger: Ledger.stage(s.ledger, now(s.epoch_ms), stage, id, facts)}
+  end
+
+  # At the same instant as the claims that show them.
+  defp tell(ledger, at_ms, stages) do
+    Enum.reduce(stages, ledger, fn {stage, id, facts}, ledger ->
+      Ledger.stage(ledger, at_ms, stage, id, facts)
+    end)
+  end
 
   defp run(s) do
     %{

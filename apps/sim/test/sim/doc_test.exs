@@ -1,6 +1,7 @@
 defmodule Sim.DocTest do
   use ExUnit.Case, async: true
   doctest Sim.Fleet.Mission
+  doctest Sim.Fleet.Said
   doctest Sim.Contact
   doctest Sim.Lateness
   doctest Sim.Map

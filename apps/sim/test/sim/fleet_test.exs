@@ -191,6 +191,43 @@ defmodule Sim.FleetTest do
     end
   end
 
+  defmodule Formed do
+    @moduledoc "Another mission: leads, formed, from its start on."
+    @behaviour Robot.Mission
+
+    @impl Robot.Mission
+    def init(_robot, options), do: {:waiting, options, []}
+
+    @impl Robot.Mission
+    def handle({:command, :start}, options) do
+      stages = for name <- [:elected, :formed], do: {:stage, name, %{epoch: 1}}
+      {:lead, options, stages ++ [{:claim, %{phase: :lead, formed: true, epoch: 1}}]}
+    end
+
+    def handle(_event, options), do: {:lead, options, []}
+  end
+
+  test "whoever sees that the fleet has elected a leader, or is formed, finds it so" do
+    fleet = fleet(%{robots: [:mag77], landmark: :none, mission: false})
+    :ok = Robot.Pilot.start(:mag77, Formed, [])
+    :ok = Robot.Pilot.command(:mag77, :start)
+
+    # At once, and from then on.
+    eventually(
+      fn ->
+        scene = Fleet.scene(fleet)
+        told = Enum.map(scene.stages, & &1.stage)
+        assert :elected not in told or scene.leader == :mag77
+        assert :formed not in told or scene.formed?
+        told == [:elected, :formed]
+      end,
+      2_000
+    )
+
+    assert %{leader: :mag77} = Fleet.result(fleet)
+    stop(fleet)
+  end
+
   test "what is wrong with a fleet is said before anything starts" do
     assert {:error, line} = Fleet.start_link(%{map: "mars"})
     assert line =~ "mars"

@@ -16,7 +16,7 @@ defmodule Swarm.About do
 
   Names travel as text, and are text here too where this node has no such atom.
   """
-  alias Robot.{Board, Config}
+  alias Robot.{Board, Config, Watch}
   alias Swarm.{Blackboard, Shape, Status}
   alias Swarm.Link.Ear
   alias Swarm.Rows.Wire
@@ -59,7 +59,10 @@ defmodule Swarm.About do
   """
   @spec note(noted(), Config.t(), Board.t(), boot :: non_neg_integer(), Ear.t()) :: noted()
   def note(noted, config, board, boot, ear) do
-    doing = {doing(board), Board.latched?(board), Board.fetch(board, :arming, :infinity)}
+    health = Board.health(board, :drive)
+    hung = for part <- Watch.parts(), do: Board.fetch(board, {:hung, part}, :infinity)
+    arming = Board.fetch(board, :arming, :infinity)
+    doing = {doing(board), Board.latched?(board), arming, health, hung}
 
     case noted do
       {left, ^doing} when left > 0 ->

@@ -61,7 +61,11 @@ defmodule Swarm.Camera do
   end
 
   defp tell(robot, ref, order) when is_reference(ref) do
-    with {:ok, view} <- view(robot), do: order.(view, ref)
+    with {:ok, view} <- view(robot) do
+      if View.looks?(view, ref),
+        do: order.(view, ref),
+        else: {:error, "this process does not look by #{inspect(ref)}; subscribe first"}
+    end
   end
 
   defp tell(_robot, other, _order),

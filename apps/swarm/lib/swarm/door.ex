@@ -4,6 +4,7 @@ defmodule Swarm.Door do
   alias Robot.Command.Words
   alias Swarm.{Formation, Transport}
   alias Swarm.Door.Ask
+  alias Swarm.Link.Desk
   alias Swarm.Missions.Landmark.Policy
 
   @doc "The ids of the robots meant, which all exist, or one line."
@@ -95,20 +96,28 @@ defmodule Swarm.Door do
     end
   end
 
-  @doc "The same, but one that accepts is enough."
+  @doc """
+  The same of what only robots on a mission can take: that others have none is no refusal, if one has. A robot
+  that does not answer may be the one that leads, so it is named.
+  """
   @spec any([atom()], term()) :: Swarm.answer()
   def any(robots, request) do
     answers = Ask.ask(robots, request)
-    if Enum.any?(robots, &(answers[&1] == :ok)), do: :ok, else: {:error, no_mission(answers)}
+    {taken, others} = Enum.split_with(robots, &(answers[&1] == :ok))
+    others = Enum.reject(others, &(answers[&1] == Desk.shapeless(&1)))
+    lines = others |> Enum.map(&refusal(&1, answers[&1])) |> Enum.uniq()
+
+    case {taken, lines} do
+      {[_ | _], []} -> :ok
+      {[], []} -> {:error, "no robot is on a mission that has a formation; start it first"}
+      {[], lines} -> {:error, Enum.join(lines, "; ")}
+      {_taken, lines} -> {:error, Enum.join(lines ++ ["the others took it"], "; ")}
+    end
   end
 
   defp refusal(id, nil), do: "#{id} does not answer"
   defp refusal(_id, {:error, line}) when is_binary(line), do: line
   defp refusal(id, {:error, reason}), do: "#{id} refuses: #{inspect(reason)}"
-
-  defp no_mission(answers) when answers == %{}, do: "no robot answers"
-
-  defp no_mission(_refusals), do: "no robot is on a mission that has a formation; start it first"
 
   defp mission(options, robots) do
     Enum.reduce_while(options, {:ok, []}, fn option, {:ok, checked} ->

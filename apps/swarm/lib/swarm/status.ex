@@ -9,8 +9,8 @@ defmodule Swarm.Status do
   (/dev/ttyR0: no such device)` (`offline`: words by device). A robot that is slow for want of sonar is
   `BLIND`. One that stands though nobody told it to says `FAULT`, and why (`fault`).
 
-  Of a robot whose behaviour hangs it says so, and for a minute after it was started again for that (`Robot.Watch`;
-  `hung`: `:silent` or `:hung`, in what, and how long ago, ms).
+  Of a robot whose gate, behaviour or mission hangs it says so, and for a minute after it was started again for that
+  (`Robot.Watch`; `hung`: `:silent` or `:hung`, in what, and how long ago, ms).
 
   A follower that does not get to its place is `BLOCKED by the landmark`, by another robot, by something
   unknown or by `no way` (`Swarm.Missions.Landmark.Blocker`).
@@ -25,7 +25,7 @@ defmodule Swarm.Status do
   """
   alias Hal.Device.Words
   alias Hal.Pose
-  alias Robot.{Board, Config}
+  alias Robot.{Board, Config, Watch}
   alias Swarm.Link.Ear
   alias Swarm.Missions.Landmark.Blocker
   alias Swarm.{Missions, Peers}
@@ -143,10 +143,16 @@ defmodule Swarm.Status do
     end
   end
 
-  defp hung(%{hung: {{what, module}, ago_ms}}) when ago_ms < @recently_ms,
-    do: {what, if(module, do: inspect(module), else: "its thinking"), ago_ms}
+  # What hangs now, else what hung last.
+  defp hung(entries) do
+    hung =
+      for part <- Watch.parts(),
+          {{what, module}, ago_ms} <- List.wrap(entries[{:hung, part}]),
+          ago_ms < @recently_ms,
+          do: {what, Watch.words(part, module), ago_ms}
 
-  defp hung(_never_or_long_ago), do: nil
+    Enum.min_by(hung, fn {what, _where, ago_ms} -> {what == :hung, ago_ms} end, fn -> nil end)
+  end
 
   defp field(nil, _key), do: nil
   defp field(map, key), do: Map.get(map, key)

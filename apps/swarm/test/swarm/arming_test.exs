@@ -114,6 +114,37 @@ defmodule Swarm.ArmingTest do
     told(id, &(&1 > 0))
   end
 
+  test "a stop that does not reach the wheels says so, whichever it is" do
+    {:ok, line} = Agent.start_link(fn -> :ok end)
+    drive = [test: self(), device: :drive, open: fn -> Agent.get(line, & &1) end]
+    id = robot(:arm_unheard, arm: :manual, drive: {Hal.FakeDrive, drive})
+    standing([id])
+    assert Swarm.arm(id) == :ok
+    assert Swarm.tell(id, "move:0.2:0") == :ok
+    told(id, &(&1 > 0))
+    Agent.update(line, fn _ -> {:error, :enoent} end)
+    send(Names.whereis(id, :drive), {:fail, :unplugged})
+    shows(id, "LINE LOST (acknowledge it)")
+
+    for stop <- [&Swarm.stop/1, &Swarm.disarm/1, fn _all -> Swarm.estop() end] do
+      assert {:error, told} = stop.(id)
+
+      assert told =~
+               "arm_unheard: its line was lost (:unplugged) while the wheels turned, and is not"
+
+      assert told =~ "use the robot's own emergency stop"
+    end
+
+    assert Board.latched?(Board.find!(id))
+    assert Swarm.reset() == :ok
+    # A line that is opened again begins with a stop.
+    Agent.update(line, fn _ -> :ok end)
+    eventually(fn -> Swarm.status(id).health[:drive] == :online end)
+    shows(id, "LINE LOST (acknowledge it)")
+    assert Swarm.stop(id) == :ok
+    assert Swarm.disarm(id) == :ok
+  end
+
   test "while the line is lost, and while it is away, the reason is the answer" do
     {:ok, line} = Agent.start_link(fn -> :ok end)
     drive = [test: self(), device: :drive, open: fn -> Agent.get(line, & &1) end]

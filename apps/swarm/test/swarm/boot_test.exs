@@ -193,7 +193,7 @@ defmodule Swarm.BootTest do
       options = ~s(port: "#{console}", phrase: "System halted")
       environment = machine(folder, file <> ", console: [#{options}]]")
       assert {0, [line], []} = Boot.answer("halt", environment)
-      assert line == "#{console} was told; the power goes off now"
+      assert line == "#{console} was told; a controller that listens there cuts the power now"
       assert heard(console_end, "", "halted\r\n") == "\r\nSystem halted\r\n"
       for line <- [base_end, console_end], do: Hal.Serial.close(line)
     end
@@ -214,6 +214,22 @@ defmodule Swarm.BootTest do
       Hal.Serial.close(robot)
       assert {0, [_], []} = Boot.answer("halt", environment)
       # The first that the console hears is of the last call.
+      halted = "\r\nThe system is halted\r\n"
+      assert heard(console_end, "", halted) == halted
+      for line <- [base_end, console_end], do: Hal.Serial.close(line)
+    end
+
+    test "says nothing where nobody can tell whether a robot runs", %{tmp_dir: folder} do
+      {_base, base_end, console, console_end, _file} = wired(folder)
+      odd = Path.join(folder, "odd")
+      File.write!(odd, "")
+      drive = ~s(drive: {Hal.RFlex.Driver, port: "#{odd}"})
+      file = ~s([id: :mag1, profile: :magellan, #{drive}, console: [port: "#{console}"]])
+      assert {1, [], [line]} = Boot.answer("halt", machine(folder, file))
+      assert line == "mag1: a robot may run here: #{odd}: not a serial device; the power stays on"
+      # A base that is not there at all drives nobody.
+      File.rm!(odd)
+      assert {0, [_told], []} = Boot.answer("halt", machine(folder, file))
       halted = "\r\nThe system is halted\r\n"
       assert heard(console_end, "", halted) == halted
       for line <- [base_end, console_end], do: Hal.Serial.close(line)

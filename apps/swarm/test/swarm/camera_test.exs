@@ -27,6 +27,13 @@ defmodule Swarm.CameraTest do
 
     assert %{viewers: 1, failed: 0} = Camera.status(id)
 
+    # Of what nobody looks by, nothing comes.
+    unknown = make_ref()
+    assert {:error, "this process does not look by #Ref" <> _} = Camera.next(id, unknown)
+    assert {:error, "this process does not look by" <> _} = Camera.unsubscribe(id, unknown)
+    theirs = Task.await(Task.async(fn -> Camera.next(id, ref) end))
+    assert {:error, "this process does not look by" <> _} = theirs
+
     # The view falls alone, and the viewer hears of it.
     kill(id, :view)
     assert_receive {:DOWN, ^ref, :process, _, :killed}

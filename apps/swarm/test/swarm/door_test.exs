@@ -109,6 +109,23 @@ defmodule Swarm.DoorTest do
     assert {Swarm.Missions.Landmark, _} = state(id)
   end
 
+  test "a formation is :ok only when all on the mission have it; who does not answer is named" do
+    for id <- [:shape1, :shape2, :shape3], do: robot(id)
+    standing([:shape1, :shape2, :shape3])
+    assert Swarm.start(robots: [:shape1, :shape2]) == :ok
+    # The third is on none.
+    assert Swarm.formation(:wedge) == :ok
+    link = Names.whereis(:shape2, :link)
+    :ok = :sys.suspend(link)
+    told = "shape2 does not answer; the others took it"
+    assert Swarm.formation(:column) == {:error, told}
+    :ok = :sys.resume(link)
+    assert Swarm.estop() == :ok
+    assert {:error, line} = Swarm.formation(:wedge)
+    assert line =~ "shape1 is held by the emergency stop; reset it first; shape2 is held by"
+    assert Swarm.reset() == :ok
+  end
+
   test "wrong input is one line that says what is allowed, and never raises" do
     id = robot(:door_wrong)
     assert line(Swarm.goto(:door_wrnog, {1, 1})) =~ "did you mean door_wrong?"

@@ -2,6 +2,7 @@ defmodule Swarm.OrdersTest do
   @moduledoc "What is answered to an order is what became of it."
   use Swarm.Case, async: false
   @moduletag :capture_log
+  import ExUnit.CaptureLog
   alias Robot.{Acts, Executive}
 
   @roll {Acts.Roll, twist: Twist.new(0.2, 0.0)}
@@ -185,6 +186,46 @@ defmodule Swarm.OrdersTest do
     assert ago_ms < 60_000
     assert inspect(status) =~ ~r/, HUNG in Robot\.Acts\.Hang \d+ s ago, started again,/
     # Nothing of the order that was not answered is left.
+    stands(id)
+    assert Swarm.goto(id, {1, 1}) == :ok
+  end
+
+  test "a mission that hangs is told in status, row and log; orders are refused with it, and it recovers" do
+    id = robot(:orders_hung, mission: {Acts.Mission, test: self()})
+    standing([id])
+    :ok = listen(id, [:robot, :pilot, :hung])
+    :ok = Pilot.start(id)
+    before = Names.whereis(id, :pilot)
+    where = "its mission Robot.Acts.Mission"
+
+    log =
+      capture_log(fn ->
+        Pilot.hear(id, {:command, :hang})
+        assert_receive {:mission, {:hangs, ^before}}
+        eventually(fn -> inspect(Swarm.status(id)) =~ ", HANGS in #{where}," end)
+        line = "orders_hung hangs in #{where}; it is started again by itself"
+        assert Swarm.goto(id, {1, 1}) == {:error, line}
+        # Its gate stands, but that nothing of before follows nobody can say.
+        assert Swarm.stop(id) == {:error, "orders_hung does not answer"}
+
+        told = fn ->
+          with {:ok, row, age_ms} <- Swarm.Blackboard.get(id, :status, :infinity),
+               {:ok, %{hung: {:silent, ^where, _ago_ms}}} <-
+                 Swarm.Status.Row.decode(id, row, age_ms),
+               do: true,
+               else: (_other -> false)
+        end
+
+        eventually(told)
+        assert_receive {[:robot, :pilot, :hung], %{mission: Acts.Mission}}, 10_000
+        eventually(fn -> Names.whereis(id, :pilot) not in [nil, before] end)
+        eventually(fn -> Directory.whereis(id) == Names.whereis(id, :link) end)
+      end)
+
+    assert log =~ "orders_hung hangs in #{where}\n"
+    assert log =~ "orders_hung hung in #{where} for 2 s: started again, idle"
+    status = Swarm.status(id)
+    assert %{state: :idle, hung: {:hung, ^where, _ago_ms}} = status
     stands(id)
     assert Swarm.goto(id, {1, 1}) == :ok
   end

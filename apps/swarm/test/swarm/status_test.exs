@@ -27,6 +27,22 @@ defmodule Swarm.StatusTest do
         do: assert(Status.Row.decode(:mag1, %{row | blocked_by: junk}, 10) == :error)
   end
 
+  test "what a robot hangs in travels in its row" do
+    hung = {:silent, "its mission Patrol", 150}
+    status = %Status{robot: :mag1, node: node(), by: :follow, hung: hung, age_ms: 5}
+    row = Status.Row.encode(status)
+    assert {:ok, told} = Status.Row.decode(:mag1, row, 10)
+    assert told.hung == {:silent, "its mission Patrol", 160}
+    assert inspect(told) =~ ", HANGS in its mission Patrol,"
+    started = Status.Row.encode(%{status | hung: {:hung, "Acts.Hang", 3_000}})
+    assert {:ok, told} = Status.Row.decode(:mag1, started, 10)
+    assert inspect(told) =~ ", HUNG in Acts.Hang 3 s ago, started again,"
+    assert {:ok, %{hung: nil}} = Status.Row.decode(:mag1, Map.delete(row, :hung), 10)
+
+    for junk <- [:hung, {"asleep", "x", 1}, {"hung", :x, 1}, {"hung", "x", -1}],
+        do: assert(Status.Row.decode(:mag1, %{row | hung: junk}, 10) == :error)
+  end
+
   test "robots of one node are in each other's view and hear each other, and it says so" do
     for id <- [:st1, :st2], do: robot(id)
     assert eventually(fn -> :st2 in Swarm.status(:st1).hears end)

@@ -98,6 +98,12 @@ defmodule Vision.View do
     end
   end
 
+  @doc "Whether the calling process looks by this `ref`."
+  @spec looks?(GenServer.server(), reference()) :: boolean()
+  def looks?(view, ref) when is_reference(ref) do
+    with {:ok, pid} <- here(view), do: ask(pid, {:looks, ref}) == true, else: (_error -> false)
+  end
+
   @doc "Asks for the next picture."
   @spec next(GenServer.server(), reference()) :: :ok
   def next(view, ref) when is_reference(ref), do: GenServer.cast(view, {:next, ref})

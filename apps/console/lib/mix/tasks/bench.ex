@@ -9,7 +9,8 @@ defmodule Mix.Tasks.Bench do
   how long it takes to ask all, to find each other, to notice a death.
 
   `mix bench stop` measures how long it takes from a crash, a freeze, a bumper or an emergency stop to the
-  stop on the serial line of a base. All have `--help`.
+  stop on the serial line of a base. All have `--help`. Exit status: 0 all was measured, 1 something was wrong with the
+  input, or a run could not be made.
   """
   use Mix.Task
   alias Console.{Arguments, Bench, Build, Output, Progress, Values}
@@ -67,13 +68,16 @@ defmodule Mix.Tasks.Bench do
 
     Output.finish(output)
 
-    for {{case, map, seed}, {:error, line}} <- results,
-        do: Output.line(output, "bench: #{case.name} in #{map}, seed #{seed}: #{line}")
+    failed =
+      for {{case, map, seed}, {:error, line}} <- results,
+          do: "#{case.name} in #{map}, seed #{seed}: #{line}"
 
     rows = rows(results, cases, maps)
     text = Bench.Table.draw(rows) <> "\n" <> Bench.Table.pooled(rows)
     IO.write(text)
     write(given["markdown"], text)
+    # What is in the table is not all that was asked for.
+    if failed != [], do: refuse(failed)
   end
 
   defp job({case, map, seed}, blobs), do: Bench.Run.run(case, map, seed, blobs, Sim.Trial)

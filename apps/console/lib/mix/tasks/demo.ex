@@ -6,7 +6,8 @@ defmodule Mix.Tasks.Demo do
   Live, every robot is a tree of processes of its own, in real time; a fleet too large for the
   machine's processors is run in lockstep instead, as slowly as it takes, unless there are nodes or hardware.
 
-  Exit status: 0 the fleet ended in formation, 2 it did not, 1 something was wrong with the input.
+  Exit status: 0 the fleet ended in formation, or a person at a terminal has quit; 2 it did not; 1 something was
+  wrong with the input.
   """
   use Mix.Task
   alias Console.{Build, Demo, Live, Options, Session}

@@ -113,6 +113,7 @@ defmodule Hal.Camera.FFmpeg do
   def explain(:eisdir), do: "is a folder"
   def explain(:no_ffmpeg), do: "the program ffmpeg is missing (on Debian: apt install ffmpeg)"
   def explain(:eof), do: "ended"
+  def explain(:mute), do: "is open, and gives no picture"
   def explain({:unreadable, words}), do: "not a readable picture, video or stream (#{words})"
   def explain({:exit, reason}), do: "the reader ended (#{inspect(reason)})"
   def explain(other), do: inspect(other, limit: 5, printable_limit: 40)

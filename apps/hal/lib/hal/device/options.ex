@@ -12,6 +12,7 @@ defmodule Hal.Device.Options do
         :device,
         arm: :auto,
         sonar: false,
+        was: nil,
         about: %{},
         sinks: [],
         clock: {System, :monotonic_time, [:millisecond]}
@@ -25,6 +26,9 @@ defmodule Hal.Device.Options do
 
     unless is_boolean(options[:sonar]),
       do: refuse!(:sonar, options[:sonar], "true or false")
+
+    unless options[:was] == nil or match?({_m, _f, _a}, options[:was]),
+      do: refuse!(:was, options[:was], "{module, function, arguments} or nil")
 
     unless is_map(options[:about]),
       do: refuse!(:about, options[:about], "a map")
@@ -42,6 +46,7 @@ defmodule Hal.Device.Options do
       options: driver_options,
       arming: if(options[:kind] == :drive, do: Arming.new(options[:arm])),
       sonar?: options[:sonar],
+      was: options[:was],
       about: options[:about],
       sinks: options[:sinks],
       clock: options[:clock]

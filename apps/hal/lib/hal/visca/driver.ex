@@ -62,7 +62,8 @@ defmodule Hal.Visca.Driver do
 
   @doc "An error in words."
   @impl Hal.Ptz
-  def explain(:no_answer, options), do: "#{options[:port]}: no camera answers"
+  def explain(reason, options) when reason in [:no_answer, :mute],
+    do: "#{options[:port]}: no camera answers"
 
   def explain({:cameras, n}, options),
     do: "#{options[:port]}: camera #{options[:camera] || 1} is not there; its cable has #{n}"

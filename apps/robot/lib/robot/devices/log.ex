@@ -1,27 +1,40 @@
 defmodule Robot.Devices.Log do
   @moduledoc """
-  What the log says of a robot's devices: a line when one is offline, with the reason in words, when it is back,
-  when wheels are disarmed without a person's doing, and when a bumper stays pressed. Once a change: a device that is tried again and again
-  says nothing new.
+  What the log says of a robot: a line when a device is offline, with the reason in words, when it is back,
+  when wheels are disarmed without a person's doing, when a bumper stays pressed, when a behaviour or a mission hangs, when
+  pictures cannot be saved, when the emergency stop would not outlive the machine, and when another robot has the name.
+  Once a change: a device that is tried again and again says nothing new.
   """
   require Logger
   alias Hal.Event
+  alias Robot.Watch
 
   @events [
     [:hal, :device, :online],
     [:hal, :device, :offline],
     [:hal, :device, :arming],
-    [:robot, :fault]
+    [:robot, :fault],
+    [:robot, :estop_file, :error],
+    [:vision, :saver, :failed],
+    [:vision, :saver, :healed],
+    [:swarm, :link, :duplicate_id]
   ]
 
   @doc "Attaches the log to the devices' events; once a node."
   @spec attach() :: :ok
   def attach do
-    for event <- @events do
+    for event <- events() do
       _ = Event.attach({__MODULE__, event}, event, &__MODULE__.write/4, nil)
     end
 
     :ok
+  end
+
+  @doc "The events that may be worth a line."
+  @spec events() :: [Event.name()]
+  def events do
+    @events ++
+      for part <- Watch.parts(), what <- [:silent, :hung, :again], do: [:robot, part, what]
   end
 
   @doc false
@@ -39,6 +52,8 @@ defmodule Robot.Devices.Log do
       {:warning, "mag1: drive offline: /dev/ttyR0: no such device"}
       iex> Robot.Devices.Log.line(:online, %{robot: :mag1, device: :drive, again?: true})
       {:info, "mag1: drive online again"}
+      iex> Robot.Devices.Log.line(:silent, %{robot: :mag1, line: "its mission Patrol"})
+      {:warning, "mag1 hangs in its mission Patrol"}
   """
   @spec line(atom(), map()) :: {Logger.level(), String.t()} | nil
   def line(:offline, %{line: line} = about), do: {:warning, "#{name(about)} offline: #{line}"}
@@ -58,6 +73,26 @@ defmodule Robot.Devices.Log do
   def line(:arming, _changed_by_a_person), do: nil
   def line(:fault, %{robot: robot, line: nil}), do: {:info, "#{robot}: the fault is over"}
   def line(:fault, %{robot: robot, line: line}), do: {:warning, "#{robot} stands: #{line}"}
+
+  def line(:silent, about), do: {:warning, "#{about.robot} hangs in #{about.line}"}
+  def line(:again, about), do: {:info, "#{about.robot} hangs no more in #{about.line}"}
+
+  def line(:hung, about),
+    do: {:error, "#{about.robot} hung in #{about.line} for 2 s: started again, idle"}
+
+  def line(:error, %{robot: robot, file: file, reason: reason}) do
+    {:error,
+     "#{robot}: the e-stop file #{file} is not as the stop is (#{:file.format_error(reason)}): the stop holds as " <>
+       "it was told, but would not outlive a restart of the machine so"}
+  end
+
+  def line(:failed, %{line: line}), do: {:warning, line}
+  def line(:healed, %{folder: folder}), do: {:info, "pictures are saved in #{folder} again"}
+
+  def line(:duplicate_id, %{robot: robot, other: other}) do
+    {:error,
+     "#{robot}: a robot of this name was on #{other} before; this one stands, is silent and takes no orders"}
+  end
 
   defp name(%{robot: robot, device: device}), do: "#{robot}: #{device}"
   defp name(%{device: device}), do: "#{device}"

@@ -11,6 +11,8 @@ defmodule Robot.File.Odd do
   @inwards :math.pi() / 2 + 0.1
   # Nearer to the middle than this a sensor has no direction of its own.
   @middle_m 0.02
+  # What a sensor may stand out of the body without a word.
+  @beyond_m 0.005
 
   @doc """
   All of it; `there?` says whether a device is on this machine.
@@ -57,7 +59,7 @@ defmodule Robot.File.Odd do
 
   defp poses(%Profile{} = body) do
     for {name, poses} <- [sonars: body.sonars, irs: body.irs],
-        line <- [inwards(name, poses), alike(name, poses)],
+        line <- [inwards(name, poses), alike(name, poses), beyond(poses, body.radius)],
         line != nil,
         do: "body.#{name}: " <> line
   end
@@ -68,6 +70,18 @@ defmodule Robot.File.Odd do
       numbers -> "#{numbers(numbers)} into the body; sensors usually look away from its middle"
     end
   end
+
+  # What a robot keeps clear of others by is its radius.
+  defp beyond(poses, radius) do
+    far_m = poses |> Enum.map(&Pose.distance({0.0, 0.0}, &1)) |> Enum.max(fn -> 0.0 end)
+
+    if far_m > radius + @beyond_m,
+      do:
+        "the farthest is #{metres(far_m)} m from the middle, and the body's radius is #{metres(radius)} m; " <>
+          "a body that holds its sensors is usual"
+  end
+
+  defp metres(value), do: :erlang.float_to_binary(value * 1.0, decimals: 3)
 
   defp inwards?(%Pose{x: x, y: y, heading: heading}) do
     :math.sqrt(x * x + y * y) > @middle_m and

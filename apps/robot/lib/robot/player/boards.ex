@@ -113,7 +113,12 @@ defmodule Robot.Player.Boards do
 
         Whole.leave(state, calibration?, "is for #{length(as)} infrareds, not for #{irs}")
 
-      _one_or_none ->
+      nil ->
+        {_, _, line, _option} = List.keyfind(state.values, [:body, :irs], 0)
+        why = "is not given, so that no infrared is read"
+        Whole.assume(state, line, "rflex_ir_calib", why)
+
+      _one_or_as_many ->
         state
     end
   end

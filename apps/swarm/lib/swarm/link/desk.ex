@@ -18,7 +18,7 @@ defmodule Swarm.Link.Desk do
   the motion would begin later, when somebody arms it.
   """
   alias Hal.Device
-  alias Robot.{Board, Config, Names, Pilot, Readiness}
+  alias Robot.{Board, Config, Names, Pilot, Readiness, Watch}
   alias Swarm.{Formation, Missions.Landmark, Missions.Manual, Status}
   alias Swarm.Link.{Ear, Presence}
 
@@ -43,10 +43,15 @@ defmodule Swarm.Link.Desk do
 
   def answer(request, config, board, ear) do
     with {:ok, request} <- checked(request),
+         :ok <- well(config, board),
          :ok <- ready(request, config, board),
          :ok <- obey(request, doing(board), config, ear),
          do: :accepted
   end
+
+  @doc "What a robot says to a formation that it has no mission for."
+  @spec shapeless(atom()) :: {:error, line :: String.t()}
+  def shapeless(id), do: {:error, "#{id} is on no mission that has a formation; start it first"}
 
   defp named(:ok, _id), do: :ok
   defp named({:error, line}, id), do: {:error, "#{id}: #{line}"}
@@ -56,6 +61,20 @@ defmodule Swarm.Link.Desk do
     do: with(:ok <- options(options), do: {:ok, request})
 
   defp checked(request), do: Manual.check(request)
+
+  # A pilot that hangs would not answer, and the link would wait for it and be silent to others. A gate that hangs
+  # is ended, and with it what was begun.
+  defp well(%{id: id}, board) do
+    hangs =
+      for part <- [:gate, :pilot],
+          {:ok, {:silent, module}, _at_ms} <- [Board.fetch(board, {:hung, part}, :infinity)],
+          do: Watch.words(part, module)
+
+    case hangs do
+      [] -> :ok
+      [where | _] -> {:error, "#{id} hangs in #{where}; it is started again by itself"}
+    end
+  end
 
   # A shape moves nobody who is on no mission, and whoever is on one is ready.
   defp ready({:formation, _kind, _spacing}, _config, _board), do: :ok
@@ -100,10 +119,10 @@ defmodule Swarm.Link.Desk do
   defp obey({:start, options}, _doing, config, _ear), do: begin(options, config)
 
   defp obey({:formation, _kind, _spacing} = command, {:group, _phase}, config, _ear) do
-    with {:error, :idle} <- Pilot.command(config.id, command), do: shapeless(config)
+    with {:error, :idle} <- Pilot.command(config.id, command), do: shapeless(config.id)
   end
 
-  defp obey({:formation, _kind, _spacing}, _doing, config, _ear), do: shapeless(config)
+  defp obey({:formation, _kind, _spacing}, _doing, config, _ear), do: shapeless(config.id)
 
   defp obey({:follow_the_leader, leader} = command, doing, %{id: id} = config, ear) do
     with :ok <- Manual.follow(id, leader, Ear.leaders(ear, Config.now(config))),
@@ -138,9 +157,6 @@ defmodule Swarm.Link.Desk do
 
   defp again({:group, _phase}, config), do: Pilot.command(config.id, :start)
   defp again(_idle_or_alone, _config), do: {:error, :idle}
-
-  defp shapeless(%{id: id}),
-    do: {:error, "#{id} is on no mission that has a formation; start it first"}
 
   defp alone(command, {:alone, _phase}, config) do
     with {:error, :idle} <- Pilot.command(config.id, command), do: alone(command, :idle, config)

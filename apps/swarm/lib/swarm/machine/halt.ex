@@ -4,7 +4,9 @@ defmodule Swarm.Machine.Halt do
   the robot's file. Without one, nothing is said to anybody.
 
   While a robot runs here, it has the line of its base, and the power stays on: a machine that still drives
-  has not halted. A base on another line than its own file says is not found out.
+  has not halted. So it does where the line cannot be looked at, for instance without permission. A base on another line
+  than its own file says is not found out. Whether a controller listens to the console nobody can know: what is answered
+  is that it was told.
   """
   alias Hal.RFlex.Console
   alias Hal.Serial
@@ -18,11 +20,10 @@ defmodule Swarm.Machine.Halt do
 
   def say(%Robot.File{console: console, drive: {_driver, options}}) do
     with :ok <- idle(options[:port]), :ok <- Console.halt(console) do
-      {:ok, "#{console[:port]} was told; the power goes off now"}
+      {:ok, "#{console[:port]} was told; a controller that listens there cuts the power now"}
     end
   end
 
-  # A base that is not there drives nobody either.
   defp idle(nil), do: :ok
 
   defp idle(port) do
@@ -33,8 +34,12 @@ defmodule Swarm.Machine.Halt do
       {:error, :ebusy} ->
         {:error, "a robot runs here: #{Serial.explain(:ebusy, port)}; the power stays on"}
 
-      {:error, _not_there} ->
+      # A base that is not there drives nobody.
+      {:error, not_there} when not_there in [:enoent, :enodev, :enxio, :eio] ->
         :ok
+
+      {:error, reason} ->
+        {:error, "a robot may run here: #{Serial.explain(reason, port)}; the power stays on"}
     end
   end
 end

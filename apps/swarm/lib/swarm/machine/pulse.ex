@@ -18,21 +18,24 @@ defmodule Swarm.Machine.Pulse do
   @spec of(robot :: atom()) :: t()
   def of(robot) do
     case Board.find(robot) do
-      {:ok, board} -> judge(robot, ages(board), backlog(robot), arming(board))
+      {:ok, board} -> judge(robot, ages(board), backlog(robot), offline(board) || arming(board))
       :error -> {false, "#{robot} is not there"}
     end
   end
 
   @doc """
   The same, judged from how old (ms) the last work of gate and executive is, `nil` for none, how many
-  messages wait for the drive, and how the drive is armed.
+  messages wait for the drive, and how the drive is armed, or that it is offline.
 
       iex> Swarm.Machine.Pulse.judge(:mag1, [gate: 12, executive: 80], 0, %{state: :disarmed, why: nil})
       {true, "mag1 is disarmed"}
+      iex> Swarm.Machine.Pulse.judge(:mag1, [gate: 12, executive: 80], 0, :offline)
+      {true, "mag1 is there, and its drive is offline"}
       iex> Swarm.Machine.Pulse.judge(:mag1, [gate: 2_500, executive: 80], 0, nil)
       {false, "mag1: its gate has done nothing for 2.5 s"}
   """
-  @spec judge(atom(), keyword(integer() | nil), non_neg_integer() | nil, map() | nil) :: t()
+  @spec judge(atom(), keyword(integer() | nil), non_neg_integer() | nil, map() | :offline | nil) ::
+          t()
   def judge(robot, ages, backlog, arming) do
     case Enum.find(ages, fn {_part, age_ms} -> age_ms == nil or age_ms > @silent_ms end) do
       {part, nil} ->
@@ -76,6 +79,17 @@ defmodule Swarm.Machine.Pulse do
       :error -> nil
     end
   end
+
+  # What was lost in motion is told first.
+  defp offline(board) do
+    case {Board.health(board, :drive), arming(board)} do
+      {_health, %{state: {:error, _reason}}} -> nil
+      {{{:offline, _reason}, _since_ms}, _arming} -> :offline
+      _online -> nil
+    end
+  end
+
+  defp words(:offline), do: "is there, and its drive is offline"
 
   defp words(%{state: state, why: why}) when is_atom(state) and is_binary(why),
     do: "is #{state}: #{why}"

@@ -2,7 +2,7 @@ defmodule Swarm.Status.Row do
   @moduledoc """
   A robot's status as a row of the blackboard, for those that it cannot answer: small, in whole
   numbers (mm, mrad, mm/s) and text. Pure. Of wheels that may turn, as nearly always, it says nothing,
-  and nothing of devices that are there.
+  and nothing of devices that are there, nor of hanging where nothing hangs.
   """
   alias Hal.Pose
   alias Swarm.{Shape, Status}
@@ -37,7 +37,13 @@ defmodule Swarm.Status.Row do
     |> offline(status)
     |> fault(status.fault)
     |> blocked(status.blocked_by)
+    |> hung(status.hung)
   end
+
+  defp hung(row, nil), do: row
+
+  defp hung(row, {what, where, ago_ms}),
+    do: Map.put(row, :hung, {Atom.to_string(what), where, ago_ms})
 
   defp fault(row, nil), do: row
   defp fault(row, line), do: Map.put(row, :fault, line)
@@ -73,6 +79,7 @@ defmodule Swarm.Status.Row do
          words = Map.get(row, :words, []),
          fault = Map.get(row, :fault),
          {:ok, blocked_by} <- text(Map.get(row, :blocked_by)),
+         {:ok, hung} <- hangs(Map.get(row, :hung), age_ms),
          true <- Enum.all?([limits, offline, members, deaf_to, words], &texts?/1),
          true <- Enum.all?([node, state], &is_binary/1),
          true <- Enum.all?([by, leader, fault], &(&1 == nil or is_binary(&1))),
@@ -96,6 +103,7 @@ defmodule Swarm.Status.Row do
          arming: arming,
          leader: leader && Wire.word(leader),
          blocked_by: blocked_by,
+         hung: hung,
          power: power,
          health: Map.new(offline, &{Wire.word(&1), {:offline, :unknown}}),
          offline:
@@ -119,6 +127,16 @@ defmodule Swarm.Status.Row do
   defp text(nil), do: {:ok, nil}
   defp text(text) when is_binary(text) and byte_size(text) <= @words, do: {:ok, text}
   defp text(_other), do: :error
+
+  defp hangs(nil, _age_ms), do: {:ok, nil}
+
+  defp hangs({what, where, ago_ms}, age_ms)
+       when what in ["silent", "hung"] and is_binary(where) and is_integer(ago_ms) and ago_ms >= 0 do
+    what = if what == "silent", do: :silent, else: :hung
+    {:ok, {what, String.slice(where, 0, @words), ago_ms + age_ms}}
+  end
+
+  defp hangs(_other, _age_ms), do: :error
 
   defp texts?(list), do: Shape.list?(list, &is_binary/1)
   defp names(texts), do: for(text <- texts, {:ok, name} <- [Wire.robot(text)], do: name)

@@ -20,6 +20,12 @@ defmodule Swarm.Machine.PulseTest do
     assert Pulse.of(:pulse_none) == {false, "pulse_none is not there"}
   end
 
+  test "a drive that is not there is said, and no ill of the robot" do
+    drive = {Hal.FakeDrive, test: self(), device: :drive, open: fn -> {:error, :enoent} end}
+    id = robot(:pulse_away, drive: drive)
+    assert words(id, true) == "pulse_away is there, and its drive is offline"
+  end
+
   test "a gate or an executive that hangs is named" do
     for {id, part} <- [pulse_gate: :gate, pulse_mind: :executive] do
       id = robot(id)

@@ -4,6 +4,7 @@ defmodule Vision.View.Server do
   that of `Vision.View.Maker`; here they meet. It never waits for a viewer, the camera or ffmpeg.
   """
   use GenServer
+  alias Hal.Device.Words
   alias Vision.View.{Audience, Maker}
 
   @doc "The line for a viewer on another node than the camera's."
@@ -38,6 +39,9 @@ defmodule Vision.View.Server do
 
   def handle_call(_request, {pid, _tag}, s) when node(pid) != node(),
     do: {:reply, {:error, elsewhere(node(), node(pid))}, s}
+
+  def handle_call({:looks, ref}, {pid, _tag}, s),
+    do: {:reply, match?(%{^ref => {^pid, _monitor}}, s.people), s}
 
   def handle_call({:subscribe, ref, every_ms}, {pid, _tag}, s) do
     case join(s, ref, every_ms) do
@@ -183,7 +187,7 @@ defmodule Vision.View.Server do
   end
 
   defp why_none(%{camera: {:offline, reason}}),
-    do: "the camera is offline (#{inspect(reason, limit: 5, printable_limit: 80)})"
+    do: "the camera is offline (#{Words.offline({nil, []}, reason)})"
 
   defp why_none(s), do: "the camera gave no frame within #{s.snapshot_ms} ms"
 

@@ -1,0 +1,127 @@
+defmodule Hal.Device.Server do
+  @moduledoc """
+  The process of a device (`Hal.Device`): what comes in, and in which order it is done. What is done is
+  `Hal.Device.Work`'s and `Hal.Device.Wishes`'s.
+  """
+  use GenServer
+  alias Hal.Device.{News, State, Wishes, Work}
+  alias Hal.Twist
+
+  @rest_ms 500
+
+  @impl GenServer
+  def init(%State{} = s) do
+    # So that `terminate/2` runs, and stops the wheels, when the supervisor ends us.
+    Process.flag(:trap_exit, true)
+    {:ok, succeed(s), {:continue, :open}}
+  end
+
+  # What the sinks know of the process before us, which may have been killed.
+  defp succeed(%{was: nil} = s), do: s
+
+  defp succeed(%{was: {m, f, a}} = s) do
+    case apply(m, f, a) do
+      {:online, _since_ms} = health -> News.fallen(%{s | health: health})
+      health -> %{s | health: health}
+    end
+  end
+
+  @impl GenServer
+  def handle_continue(:open, s), do: {:noreply, open(s)}
+
+  defp open(s), do: s |> Work.open() |> Wishes.ask() |> Wishes.remind()
+
+  @impl GenServer
+  def handle_call(:arming, _from, s), do: {:reply, s.arming, s}
+
+  # Whoever asked has been told by now that nothing came of it, and may stand before the robot.
+  def handle_call({:arm, until_ms}, from, s) do
+    if System.monotonic_time(:millisecond) < until_ms,
+      do: handle_call(:arm, from, s),
+      else: {:reply, {:error, "the drive answers too late"}, s}
+  end
+
+  def handle_call(order, _from, %{kind: :drive} = s)
+      when order in [:arm, :disarm, :acknowledge] do
+    {answer, s} = Work.order(s, order)
+    {:reply, answer, s}
+  end
+
+  def handle_call(order, _from, s) when order in [:arm, :disarm, :acknowledge],
+    do: {:reply, {:error, "a #{s.kind} has no wheels that could be armed"}, s}
+
+  @impl GenServer
+  def handle_cast({:drive, twist}, %{kind: :drive, inner: {:open, _}} = s),
+    do: {:noreply, Work.drive(s, twist)}
+
+  def handle_cast({:disarm, then}, %{kind: :drive} = s) do
+    {_answer, s} = Work.order(s, :disarm)
+    with {m, f, a} <- then, do: apply(m, f, a)
+    {:noreply, s}
+  end
+
+  def handle_cast({:look, pan, tilt}, %{kind: :ptz} = s),
+    do: {:noreply, Wishes.wish(s, :look, [pan, tilt])}
+
+  def handle_cast({:zoom, angle}, %{kind: :ptz} = s),
+    do: {:noreply, Wishes.wish(s, :zoom, [angle])}
+
+  def handle_cast(_command, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info({:open, ref}, %{retry: ref} = s), do: {:noreply, open(%{s | retry: nil})}
+  def handle_info({:open, _old}, s), do: {:noreply, s}
+
+  def handle_info({:watchdog, ref}, %{watchdog: {_timer, ref}, inner: {:open, _}} = s) do
+    News.watchdog(s)
+    {:noreply, Work.drive_on(s, Twist.zero())}
+  end
+
+  def handle_info({:watchdog, _old}, s), do: {:noreply, s}
+
+  def handle_info({:listen, ref}, %{listening: ref, inner: {:open, _}} = s),
+    do: {:noreply, s |> Work.judge() |> Work.listen()}
+
+  def handle_info({:listen, _old}, s), do: {:noreply, s}
+
+  def handle_info(message, %{inner: {:open, inner}} = s) do
+    case s.driver.handle_message(message, inner) do
+      {:ok, [], inner} ->
+        {:noreply, Work.judge(%{s | inner: {:open, inner}})}
+
+      {:ok, readings, inner} ->
+        for reading <- readings, do: News.hand_on(s, reading)
+        s = Work.measured(%{s | inner: {:open, inner}}, readings)
+        {:noreply, s |> Work.judge() |> Wishes.ask()}
+
+      {:error, reason, inner} ->
+        {:noreply, Work.fail(s, reason, inner)}
+    end
+  end
+
+  # What a driver that is closed by now had asked for.
+  def handle_info(_late, s), do: {:noreply, s}
+
+  @impl GenServer
+  def terminate(reason, s) do
+    with {:open, inner} <- s.inner, do: s.driver.terminate(inner)
+
+    unless asked?(reason) do
+      News.fallen(%{s | inner: :closed})
+      rest()
+    end
+  end
+
+  defp asked?(reason) when reason in [:normal, :shutdown], do: true
+  defp asked?({:shutdown, _why}), do: true
+  defp asked?(_crash), do: false
+
+  # A shutdown asked for meanwhile is not kept waiting.
+  defp rest do
+    receive do
+      {:EXIT, _parent, :shutdown} -> :ok
+    after
+      @rest_ms -> :ok
+    end
+  end
+end

@@ -1,0 +1,32 @@
+defmodule Hal.Device.Watchdog do
+  @moduledoc """
+  The second line behind whoever drives: wheels of which nothing is asked for 500 ms are to be stopped. Its
+  message is `{:watchdog, ref}`, and counts while `ref` is the one in the state.
+  """
+  alias Hal.Device.State
+  alias Hal.Twist
+
+  @watchdog_ms 500
+
+  @doc "A speed was asked for now: waits for the next one, unless it is a stop."
+  @spec guard(State.t(), Twist.t()) :: State.t()
+  def guard(s, twist) do
+    s = unguard(s)
+
+    if Twist.zero?(twist) do
+      s
+    else
+      ref = make_ref()
+      %{s | watchdog: {Process.send_after(self(), {:watchdog, ref}, @watchdog_ms), ref}}
+    end
+  end
+
+  @doc "Waits no more."
+  @spec unguard(State.t()) :: State.t()
+  def unguard(%{watchdog: nil} = s), do: s
+
+  def unguard(%{watchdog: {timer, _ref}} = s) do
+    Process.cancel_timer(timer)
+    %{s | watchdog: nil}
+  end
+end
