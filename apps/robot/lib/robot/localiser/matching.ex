@@ -11,23 +11,27 @@ defmodule Robot.Localiser.Matching do
   alias Robot.Sighting
   alias Vision.Blob
 
-  # Within this angle a robot is always looked for, and never beyond that one, in radians.
+  # Within this angle a robot is always looked for; one whose direction is less sure than that is not measured
+  # by, nor one whose distance is less sure than this share of it. Radians, and shares.
   @narrow 0.12
-  @wide 1.2
-  # A place of which nobody says how well it is known, in metres.
+  @wide 2.0
+  @doubt 0.8
+  # A place of which nobody says how well it is known, and a doubt of a distance that changes nothing, in metres.
   @unknown 0.3
-  # So many times wider or narrower than expected a blob may be the robot, as a logarithm.
-  @widest 0.92
-  # How far off, as logarithms of such shares, a blob may be that is measured by, and how much farther off all
-  # that it might be else.
+  @surely 0.3
+  # Standard deviations of a direction (radians), and of a width, as a logarithm: others beside it make a blob wider,
+  # others before it narrower.
+  @bearing_sd 0.04
+  @wider_sd 0.2
+  @narrower_sd 0.5
+  # So many standard deviations, squared, off it is not the robot, or so much worse than another.
+  @unlike 9.0
+  @worse 4.0
+  # A blob that is measured by is not farther off in width than this, as a logarithm; and if within that one, it is whole.
   @fits 0.45
-  # A robot whose distance is less sure than this, as a share, may be seen but not measured by.
-  @doubt 0.4
-  @lost 0.3
-  @clear 0.22
-  # So little off, it is whole, and its width tells the distance.
   @whole 0.15
-  @sighting_sd 0.015
+  # What stands so far behind another, in metres, is hidden by it.
+  @behind 0.5
 
   @type pair :: %{
           mark: Anchors.mark(),
@@ -46,51 +50,52 @@ defmodule Robot.Localiser.Matching do
           c = candidate(mark, blob, belief, exposed, pan, view),
           do: c
 
-    for %{mark: mark, blob: blob} = candidate <- candidates,
-        mark.sd != nil and candidate.sure? and not cut?(blob) and candidate.off < @fits and
-          clear?(candidate, candidates),
-        do:
-          candidate
-          |> Map.take([:mark, :blob, :slack])
-          |> Map.put(:whole?, candidate.share < @whole)
+    for %{mark: mark, blob: blob} = one <- candidates,
+        mark.sd != nil and one.sure? and not cut?(blob) and one.width < @fits,
+        Enum.all?(candidates, &(&1.cost > one.cost + @worse or not rivals?(one, &1))) do
+      %{mark: mark, blob: blob, slack: one.slack, whole?: one.width < @whole}
+    end
   end
 
-  defp clear?(%{mark: mark, blob: blob, off: off}, candidates) do
-    Enum.all?(candidates, fn other ->
-      other.mark == mark == (other.blob == blob) or other.off > off + @clear
-    end)
+  # The same robot another blob, or the same blob another robot, which this one does not hide.
+  defp rivals?(%{mark: mark, blob: blob}, %{mark: mark, blob: other}), do: blob != other
+  defp rivals?(%{blob: blob} = one, %{blob: blob} = other), do: not hides?(one, other)
+  defp rivals?(_one, _other), do: false
+
+  defp hides?(near, far) do
+    far.distance > near.distance + @behind and
+      abs(Pose.wrap(far.expected - near.expected)) < near.half
   end
 
   # At the left or right border; above and below a robot may be cut off.
   defp cut?(blob), do: blob.left == 0 or blob.right == blob.width - 1
 
-  defp candidate(
-         %{colour: colour} = mark,
-         %Blob{colour: colour} = blob,
-         belief,
-         exposed,
-         pan,
-         view
-       ) do
+  defp candidate(%{colour: colour} = mark, %{colour: colour} = blob, belief, exposed, pan, view) do
     distance = Pose.distance(exposed, mark.at)
-    expected = Sighting.width(mark.radius, distance, blob.width, view)
-    share = expected && (blob.right - blob.left + 1) / expected
+    width = Sighting.width(mark.radius, distance, blob.width, view)
 
-    if share != nil do
+    if width != nil do
+      share = (blob.right - blob.left + 1) / width
+      half = :math.asin(mark.radius / distance)
+      expected = Pose.bearing(exposed, mark.at)
+      seen = Sighting.bearing(blob, pan, view)
       {bearing_sd, distance_sd} = sds(mark, distance, belief, exposed)
-      slack = abs(share - 1) * :math.asin(mark.radius / distance)
-      bearing = Pose.wrap(Sighting.bearing(blob, pan, view) - Pose.bearing(exposed, mark.at))
-      # As a share of the distance, what nobody knows of it makes the blob wider or narrower.
-      doubt = 2 * max(distance_sd - @lost, 0.0) / distance
-      off = max(abs(:math.log(share)) - doubt, 0.0)
+      # What nobody knows of the distance makes the blob wider or narrower.
+      doubt = 2 * max(distance_sd - @surely, 0.0) / distance
+      slack = abs(share - 1) * half
+      off = max(abs(Pose.wrap(seen - expected)) - slack, 0.0)
+      cost = cost(off, bearing_sd, :math.log(share), doubt)
 
-      if off < @widest and abs(bearing) < max(3 * bearing_sd, @narrow) + slack do
+      if off < max(3 * bearing_sd, @narrow) and cost < @unlike do
         %{
           mark: mark,
           blob: blob,
+          distance: distance,
+          expected: expected,
+          half: half,
           slack: slack,
-          off: off,
-          share: abs(:math.log(share)),
+          width: abs(:math.log(share)),
+          cost: cost,
           sure?: 3 * bearing_sd < @wide and doubt < @doubt
         }
       end
@@ -98,6 +103,14 @@ defmodule Robot.Localiser.Matching do
   end
 
   defp candidate(_mark, _blob_of_another_colour, _belief, _exposed, _pan, _view), do: nil
+
+  # Squares of standard deviations in direction and width.
+  defp cost(off, bearing_sd, width, doubt) do
+    sd = if width > 0, do: @wider_sd, else: @narrower_sd
+    width = max(abs(width) - doubt, 0.0) / sd
+    bearing = off / max(bearing_sd, @bearing_sd)
+    bearing * bearing + width * width
+  end
 
   # How far off, in direction and distance, it may be seen.
   defp sds(%{at: {x, y}, sd: sd}, distance, belief, exposed) do
@@ -107,6 +120,7 @@ defmodule Robot.Localiser.Matching do
     across = Belief.variance(belief, {dy / square, -dx / square, -1.0})
     along = Belief.variance(belief, {-dx / distance, -dy / distance, 0.0})
 
-    {:math.sqrt(across + place / square + @sighting_sd * @sighting_sd), :math.sqrt(along + place)}
+    {:math.sqrt(across + place / square + @bearing_sd * @bearing_sd / 4),
+     :math.sqrt(along + place)}
   end
 end
