@@ -21,6 +21,7 @@ defmodule Robot.Board do
   | `:goal` | `:executive` | the module of its goal's behaviour, or `nil` |
   | `:hung` | `:watch` | `{:silent, module}` of the behaviour in which the executive hangs, `{:hung, module}` once it was ended for it |
   | `:pose` | `:executive` | the estimate in the `map` frame |
+  | `:uncertainty` | `:executive` | how sure that pose is: `t:Robot.Percept.uncertainty/0` |
   | `:mission` | `:pilot` | `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state}` |
 
   This process owns the tables and does nothing else, so that they outlive whoever writes them.
@@ -67,6 +68,7 @@ defmodule Robot.Board do
     goal: :executive,
     hung: :watch,
     pose: :executive,
+    uncertainty: :executive,
     mission: :pilot,
     estop: :brake,
     radio: :link
