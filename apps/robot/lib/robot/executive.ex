@@ -160,12 +160,17 @@ defmodule Robot.Executive do
     fault = fault(s, Mind.fault(mind), at_ms)
     doing = %{by: wish.by, weight: wish.weight, outcome: outcome, fault: fault, tick: s.tick + 1}
     Board.put(board, :executive, :doing, doing, at_ms)
-    if percept.pose, do: Board.put(board, :executive, :pose, percept.pose, at_ms)
+    if percept.pose, do: place(board, percept, at_ms)
 
     # The outcome first: the mission knows what came of its goal when it sees the next percept.
     with {tag, outcome} <- outcome, do: tell(s, {:outcome, tag, outcome}, at_ms)
     tell(s, {:tick, percept}, at_ms)
     %{s | mind: mind, tick: doing.tick, behaviour_looks?: wish.look != nil}
+  end
+
+  defp place(board, %{pose: pose, uncertainty: uncertainty}, at_ms) do
+    Board.put(board, :executive, :pose, pose, at_ms)
+    Board.put(board, :executive, :uncertainty, uncertainty, at_ms)
   end
 
   # Told when it changes.

@@ -6,7 +6,8 @@ defmodule Swarm.Heartbeat do
   `estop` is the number of the last emergency stop that it knows, 0 for none, and `latched` says
   whether its own latch is set (`Swarm.Stop`). `sight` is its newest view of the landmark: relative
   size and estimated distance, `nil` where it does not see it. `anchor` is there in the leader's
-  heartbeats only. `sd` is how well it knows its pose in its leader's frame, `nil` outside of
+  heartbeats only. `in_place` says that a follower is in its slot, `unsure` that it believes so and is not sure
+  enough. `sd` is how well it knows its pose in its leader's frame, `nil` outside of
   it. `boot` is its life's number, which grows with every start.
   """
   alias Swarm.{Roll, Shape}
@@ -23,6 +24,7 @@ defmodule Swarm.Heartbeat do
                 sight: nil,
                 standing: false,
                 in_place: false,
+                unsure: false,
                 blocked: false,
                 formed: false,
                 estop: 0,
@@ -44,6 +46,7 @@ defmodule Swarm.Heartbeat do
           sight: %{size_ppm: pos_integer(), distance: pos_integer() | nil} | nil,
           standing: boolean(),
           in_place: boolean(),
+          unsure: boolean(),
           blocked: boolean(),
           formed: boolean(),
           estop: non_neg_integer(),
@@ -96,7 +99,7 @@ defmodule Swarm.Heartbeat do
       Shape.count?(beat.epoch) and (beat.leader == nil or Shape.name?(beat.leader)) and
       Roll.valid?(beat.heard) and sight?(beat.sight) and
       Enum.all?(
-        [beat.standing, beat.in_place, beat.blocked, beat.formed, beat.latched],
+        [beat.standing, beat.in_place, beat.unsure, beat.blocked, beat.formed, beat.latched],
         &is_boolean/1
       ) and beat.estop in 0..@latest and
       (beat.anchor == nil or Swarm.Anchor.valid?(beat.anchor))

@@ -164,6 +164,14 @@ defmodule Swarm.Member do
     percept && percept.pose
   end
 
+  @doc "Within how many metres of that pose the robot is in 95 of 100 cases (`Robot.Percept`), or `nil`."
+  @spec uncertainty(t()) :: float() | nil
+  def uncertainty(member) do
+    with %Percept{uncertainty: %{radius: radius}} <- Mind.percept(member.mind),
+         do: radius,
+         else: (_no_pose -> nil)
+  end
+
   @doc "What the robot's mission says of it: its phase and the fields of `Swarm.Heartbeat`."
   @spec claim(t()) :: map()
   def claim(member), do: member.claim

@@ -290,6 +290,7 @@ defmodule Swarm.Missions.Landmark do
       sd: Marks.told(mission),
       uncertainty: uncertainty(mission.percept),
       in_place: mission.phase == :follow and mission.attend.in_place?,
+      unsure: mission.phase == :follow and mission.attend.unsure?,
       blocked: mission.phase == :follow and mission.attend.blocked?,
       blocked_by: if(mission.phase == :follow, do: mission.attend.blocker),
       formed: leading? and mission.lead.formed?,

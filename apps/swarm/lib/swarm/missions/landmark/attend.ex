@@ -5,6 +5,9 @@ defmodule Swarm.Missions.Landmark.Attend do
 
   Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard). Meanwhile
   it looks at the landmark, since the next it may be asked for is how large it sees it.
+
+  One that stands in its slot by its own estimate, and does not know its place well enough to say so
+  (`Swarm.Missions.Landmark.Marks.sure?/2`), is `unsure?`: neither in place nor blocked.
   """
   alias Hal.Pose
   alias Robot.{Behaviour, Gaze}
@@ -31,6 +34,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   @elsewhere 1.0
 
   defstruct in_place?: false,
+            unsure?: false,
             holding?: false,
             blocked?: false,
             blocker: nil,
@@ -51,6 +55,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   """
   @type t :: %__MODULE__{
           in_place?: boolean(),
+          unsure?: boolean(),
           holding?: boolean(),
           blocked?: boolean(),
           blocker: Blocker.t() | nil,
@@ -89,7 +94,15 @@ defmodule Swarm.Missions.Landmark.Attend do
   defp wait(attend, age_ms) do
     silent? = age_ms >= @late_ms
     blocker = if silent?, do: :no_anchor
-    %{attend | in_place?: false, holding?: true, blocked?: silent?, blocker: blocker}
+
+    %{
+      attend
+      | in_place?: false,
+        unsure?: false,
+        holding?: true,
+        blocked?: silent?,
+        blocker: blocker
+    }
   end
 
   defp attend(mission, {slot, velocity}, age_ms) do
@@ -97,6 +110,8 @@ defmodule Swarm.Missions.Landmark.Attend do
     slow? = State.slow?(mission.percept, @slow)
     {vx, vy} = velocity
     resting? = slow? and vx * vx + vy * vy < @slow * @slow
+    there? = slow? and error <= @in_place
+    sure? = Marks.sure?(mission, error)
 
     {told, place} = pass_on(mission)
 
@@ -105,11 +120,12 @@ defmodule Swarm.Missions.Landmark.Attend do
       | place: slot,
         attend: %{
           mission.attend
-          | in_place?: slow? and error <= @in_place and Marks.sure?(mission, error),
+          | in_place?: there? and sure?,
+            unsure?: there? and not sure?,
             holding?: resting? and error <= @near,
             told: told,
             # Where the landmark stood when this robot was last in place, or began to follow.
-            landmark: landmark(mission, slow? and error <= @in_place)
+            landmark: landmark(mission, there?)
         }
     }
 
@@ -120,8 +136,10 @@ defmodule Swarm.Missions.Landmark.Attend do
     {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, Marks.anchors(mission)}]}
   end
 
-  defp block(%{attend: %{in_place?: true} = attend} = mission, slot, error),
-    do: fresh(attend, slot, error, mission.now_ms)
+  # Nothing blocks a robot that stands where it wants to be, as far as it knows.
+  defp block(%{attend: %{in_place?: in_place?, unsure?: unsure?} = attend} = mission, slot, error)
+       when in_place? or unsure?,
+       do: fresh(attend, slot, error, mission.now_ms)
 
   defp block(%{attend: attend, now_ms: now} = mission, slot, error) do
     cond do
@@ -140,8 +158,9 @@ defmodule Swarm.Missions.Landmark.Attend do
   end
 
   # Farther off, or where the slot trembles, time alone tells that a robot does not get on.
-  defp late(%{in_place?: true} = attend, _mission, _slot, _error),
-    do: %{attend | late: nil, blocker: nil}
+  defp late(%{in_place?: in_place?, unsure?: unsure?} = attend, _mission, _slot, _error)
+       when in_place? or unsure?,
+       do: %{attend | late: nil, blocker: nil}
 
   defp late(attend, %{anchor: anchor, now_ms: now} = mission, slot, error) do
     shape = {anchor.leader, anchor.formation}
