@@ -37,10 +37,14 @@ defmodule Robot.Localiser do
                 history: [],
                 seen_ms: nil,
                 anchors: %Anchors{},
-                frame: nil
+                frame: nil,
+                joins: 0
               ]
 
-  @typedoc "`frame` is the one that the belief is in: `nil` for its own, from the start pose."
+  @typedoc """
+  `frame` is the one that the belief is in: `nil` for that of the start poses. `joins` counts how often it came into
+  another.
+  """
   @type t :: %__MODULE__{
           start: Pose.t(),
           odometry: Pose.t() | nil,
@@ -49,7 +53,8 @@ defmodule Robot.Localiser do
           history: [{at_ms :: integer(), odometry :: Pose.t()}],
           seen_ms: integer() | nil,
           anchors: Anchors.t(),
-          frame: Anchors.frame() | nil
+          frame: Anchors.frame() | nil,
+          joins: non_neg_integer()
         }
 
   @doc "A robot that was switched on at `start`, where its odometry said zero."
@@ -57,8 +62,8 @@ defmodule Robot.Localiser do
   def new(%Pose{} = start), do: %__MODULE__{start: start}
 
   @doc """
-  What to find the pose by from now on. In a frame that is new to it the robot is as unsure as that frame's
-  robot is of its own pose, and then by what that robot becomes less sure.
+  What to find the pose by from now on. In a frame that is new to it the robot is as much less sure as that
+  frame's robot is unsure of its own pose, and then by what that robot becomes less sure.
   """
   @spec anchors(t(), Anchors.t()) :: t()
   def anchors(localiser, %Anchors{frame: frame, marks: marks} = anchors) do
@@ -73,13 +78,27 @@ defmodule Robot.Localiser do
   defp join(localiser, nil), do: localiser
   defp join(%{belief: nil} = localiser, _frame), do: localiser
 
-  defp join(%{frame: %{key: key} = known} = localiser, %{key: key} = frame) do
-    position = max(frame.position - known.position, 0.0)
-    heading = max(frame.heading - known.heading, 0.0)
+  # Surer than before can only be one that was started anew.
+  defp join(%{frame: %{key: key} = known} = localiser, %{key: key} = frame)
+       when frame.position >= known.position and frame.heading >= known.heading do
+    position = frame.position - known.position
+    heading = frame.heading - known.heading
     reframe(localiser, frame, position, heading)
   end
 
-  defp join(localiser, frame), do: reframe(localiser, frame, frame.position, frame.heading)
+  defp join(localiser, frame) do
+    {position, heading} = between(localiser.frame, frame)
+    localiser = reframe(localiser, frame, position, heading)
+    %{localiser | joins: localiser.joins + 1}
+  end
+
+  # What nobody knows of one frame in another: one may have begun in the other, or both elsewhere.
+  defp between(nil, frame), do: {frame.position, frame.heading}
+  defp between(%{key: key}, %{base: key} = frame), do: {frame.position, frame.heading}
+  defp between(%{base: key} = known, %{key: key}), do: {known.position, known.heading}
+
+  defp between(known, frame),
+    do: {known.position + frame.position, known.heading + frame.heading}
 
   defp reframe(localiser, frame, position, heading) do
     belief = Belief.reframe(localiser.belief, frame.at, position, heading)
@@ -112,14 +131,15 @@ defmodule Robot.Localiser do
     {percept, localiser}
   end
 
-  defp uncertainty(%{belief: belief, frame: frame}) do
+  defp uncertainty(%{belief: belief, frame: frame, joins: joins}) do
     {position, _across, heading} = Belief.sd(belief)
 
     %{
       radius: Belief.radius(belief),
       position: position,
       heading: heading,
-      frame: frame && frame.key
+      frame: frame && frame.key,
+      joins: joins
     }
   end
 

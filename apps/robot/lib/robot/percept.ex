@@ -46,13 +46,15 @@ defmodule Robot.Percept do
 
   @typedoc """
   How sure the pose is: within `radius` metres in 95 of 100 cases; `position` (along the worst direction, metres) and `heading`
-  (radians) are standard deviations. `frame` tells whose frame it is that the pose is in: `nil` for the robot's own.
+  (radians) are standard deviations. `frame` is the key of the frame that the pose is in (`Robot.Localiser.Anchors`): `nil`
+  for that of the start poses; `joins` counts how often it came into another.
   """
   @type uncertainty :: %{
           radius: float(),
           position: float(),
           heading: float(),
-          frame: term()
+          frame: term(),
+          joins: non_neg_integer()
         }
 
   @typedoc """

@@ -181,8 +181,8 @@ defmodule Robot.LocaliserTest do
     told(localiser, [], frame(:elsewhere, {2.5, 0.8}, sd * sd, 0.0))
   end
 
-  defp frame(key, at, position, heading),
-    do: %{key: key, at: at, position: position, heading: heading}
+  defp frame(key, at, position, heading, base \\ nil),
+    do: %{key: key, base: base, at: at, position: position, heading: heading}
 
   test "in another's frame a robot is as unsure as that one is, and as that one becomes" do
     {before, localiser} =
@@ -211,10 +211,30 @@ defmodule Robot.LocaliserTest do
 
     assert_in_delta more.uncertainty.position, :math.sqrt(2.0 + 0.04), 0.01
 
-    # Another leader, or the same one anew, is another frame.
-    {other, _} = localiser |> told([], frame({:mag2, 2}, {10.0, 0.0}, 0.0, 0.02)) |> tick.(400)
-    assert_in_delta other.uncertainty.position, :math.sqrt(4.0 + 0.04), 0.01
-    assert other.uncertainty.frame == {:mag2, 2}
+    # It cannot become surer; if it says so, it was started anew.
+    {anew, _} = localiser |> told([], frame({:mag2, 1}, {10.0, 0.0}, 0.01, 0.0)) |> tick.(400)
+    assert anew.uncertainty.joins == 2
+    assert anew.uncertainty.position > more.uncertainty.position + 0.5
+
+    # One who was in the frame of mag2 leads: that it is unsure of there. Then mag2 again: that is what was unsure.
+    {other, localiser} =
+      localiser
+      |> told([], frame({:mag3, 2}, {10.0, 0.0}, 0.0, 0.01, {:mag2, 1}))
+      |> tick.(400)
+
+    assert_in_delta other.uncertainty.position, :math.sqrt(3.0 + 0.04), 0.01
+    assert %{frame: {:mag3, 2}, joins: 2} = other.uncertainty
+
+    {back, localiser} =
+      localiser |> told([], frame({:mag2, 1}, {10.0, 0.0}, 0.04, 0.02)) |> tick.(500)
+
+    assert_in_delta back.uncertainty.position, :math.sqrt(4.0 + 0.04), 0.01
+
+    # Of a frame that nothing is known of, all is unsure that is unsure of both.
+    {strange, _} =
+      localiser |> told([], frame({:min1, 7}, {10.0, 0.0}, 0.0, 0.01, {:min2, 3})) |> tick.(600)
+
+    assert_in_delta strange.uncertainty.position, :math.sqrt(4.0 + 0.04 + 0.04 + 3.0), 0.01
   end
 
   test "wheels that slip are found out by what stands still, and then turn it no more" do

@@ -206,6 +206,8 @@ defmodule Swarm.Missions.Landmark.Lead do
       pose: State.millimetres(percept.pose),
       twist: twist(percept),
       sd: sd(percept.uncertainty),
+      frame: percept.uncertainty.joins,
+      base: percept.uncertainty.frame,
       formation: lead.shape.formation,
       asked: mission.formation,
       asked_no: mission.asked_no,

@@ -76,23 +76,23 @@ defmodule Swarm.Missions.Landmark.Marks do
 
   defp frame(%{sd: {mm, mrad}} = anchor, leader) do
     %{
-      key: key(anchor.leader, anchor.epoch),
+      key: key(anchor),
+      base: anchor.base,
       at: Pose.point(leader),
       position: mm * mm / 1.0e6,
       heading: mrad * mrad / 1.0e6
     }
   end
 
-  defp key(leader, epoch), do: {leader, epoch}
+  defp key(%{leader: leader, frame: number}), do: {leader, number}
 
   @doc """
   How well a robot knows its pose in its leader's frame, as heartbeats tell it: the standard deviation of its
   position along the worst direction, in mm; `nil` where it has not come into that frame yet, or has none.
   """
   @spec told(State.t()) :: non_neg_integer() | nil
-  def told(%{percept: %{uncertainty: %{frame: frame, position: sd}}} = mission)
-      when frame != nil do
-    if frame == key(mission.leader, mission.epoch), do: min(round(sd * 1000), 100_000)
+  def told(%{anchor: %{} = anchor, percept: %{uncertainty: %{frame: frame, position: sd}}}) do
+    if frame == key(anchor), do: min(round(sd * 1000), 100_000)
   end
 
   def told(_mission), do: nil
@@ -100,13 +100,14 @@ defmodule Swarm.Missions.Landmark.Marks do
   @doc """
   Whether a follower that believes to be so far from its slot (metres) is within half a metre of it in 95 of 100 cases.
 
-      iex> mission = %{leader: :mag2, epoch: 3, percept: %{uncertainty: %{radius: 0.3, frame: {:mag2, 3}}}}
+      iex> anchor = %{leader: :mag2, frame: 3}
+      iex> mission = %{anchor: anchor, percept: %{uncertainty: %{radius: 0.3, frame: {:mag2, 3}}}}
       iex> Enum.map([0.1, 0.25], &Swarm.Missions.Landmark.Marks.sure?(mission, &1))
       [true, false]
   """
   @spec sure?(State.t() | map(), error :: float()) :: boolean()
-  def sure?(%{percept: %{uncertainty: %{frame: frame, radius: radius}}} = mission, error),
-    do: frame == key(mission.leader, mission.epoch) and error + radius <= @tolerance
+  def sure?(%{anchor: anchor, percept: %{uncertainty: %{frame: frame, radius: radius}}}, error),
+    do: frame == key(anchor) and error + radius <= @tolerance
 
   def sure?(_mission, _error), do: false
 end

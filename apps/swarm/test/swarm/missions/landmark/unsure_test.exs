@@ -22,7 +22,14 @@ defmodule Swarm.Missions.Landmark.UnsureTest do
   # A follower that is never moved, `off` metres from its slot, for `seconds`; it is in its leader's frame.
   defp stand(off, radius, seconds) do
     mission = mission(phase: :follow, leader: :mag1, epoch: 1, attend: Attend.new())
-    uncertainty = %{radius: radius, position: radius / 2, heading: 0.1, frame: {:mag1, 1}}
+
+    uncertainty = %{
+      radius: radius,
+      position: radius / 2,
+      heading: 0.1,
+      frame: {:mag1, 0},
+      joins: 1
+    }
 
     Enum.reduce(0..(seconds * 10), mission, fn tick, mission ->
       now = tick * 100
