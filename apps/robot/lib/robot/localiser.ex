@@ -78,12 +78,13 @@ defmodule Robot.Localiser do
   defp join(localiser, nil), do: localiser
   defp join(%{belief: nil} = localiser, _frame), do: localiser
 
-  # Surer than before can only be one that was started anew.
+  # Way back makes a position surer again, but nothing a heading by half: that is a robot that was started anew.
   defp join(%{frame: %{key: key} = known} = localiser, %{key: key} = frame)
-       when frame.position >= known.position and frame.heading >= known.heading do
-    position = frame.position - known.position
-    heading = frame.heading - known.heading
-    reframe(localiser, frame, position, heading)
+       when 4 * frame.heading >= known.heading do
+    position = max(frame.position - known.position, 0.0)
+    heading = max(frame.heading - known.heading, 0.0)
+    most = %{frame | position: known.position + position, heading: known.heading + heading}
+    reframe(localiser, most, position, heading)
   end
 
   defp join(localiser, frame) do
