@@ -11,7 +11,7 @@ defmodule Swarm do
       iex> Swarm.formation(:line, length: 4.0)
       :ok
       iex> Swarm.status()
-      [#mag1 lead (0.02, -1.63, 90 deg) 0.00 m/s by track_blob, leader mag1, view 6, hears 5, age 12 ms, …]
+      [#mag1 lead (0.02, -1.63, 90 deg) ±0.31 m, 0.00 m/s by track_blob, leader mag1, view 6, hears 5, age 12 ms, …]
       iex> Swarm.stop(:mag1)
       :ok
       iex> Swarm.estop()

@@ -17,7 +17,7 @@ defmodule Console.Report do
   @claim ~w(at_s robot worst_m worst_5s_m)a
   @messages ~w(sent lost)a
   @stuck ~w(at_s robot error_m)a
-  @robot ~w(name alive state blocked_by x y theta slot error_m size_ppm)a
+  @robot ~w(name alive state blocked_by x y theta slot error_m uncertainty_m size_ppm)a
 
   @doc """
   The report as a term for `Hal.Json.encode!/1`, from a trial's result.
@@ -46,7 +46,8 @@ defmodule Console.Report do
   @spec summary(map(), boolean(), float()) :: [String.t()]
   def summary(result, formed?, wall_s) do
     [
-      outcome(result, formed?) <> wrong(result.claims) <> blocked(result.fleet),
+      outcome(result, formed?) <>
+        wrong(result.claims) <> blocked(result.fleet) <> unsure(result.fleet),
       safety(result),
       leadership(result),
       "#{Words.decimals(result.simulated_s, 1)} s simulated in #{Words.decimals(wall_s, 1)} s" <>
@@ -137,6 +138,15 @@ defmodule Console.Report do
   end
 
   defp by({name, words}), do: "#{name} by #{words}"
+
+  defp unsure(fleet) do
+    case for %{state: :unsure} = robot <- fleet,
+             do: "#{robot.name} (#{Words.within(robot.uncertainty_m)})" do
+      [] -> ""
+      [one] -> " Not sure of its place: #{one}."
+      several -> " Not sure of their places: #{Enum.join(several, ", ")}."
+    end
+  end
 
   defp speed(times), do: Words.decimals(times, if(times < 10, do: 1, else: 0))
 

@@ -90,8 +90,22 @@ defmodule Console.Words do
         ppm -> ", the landmark fills #{decimals(ppm / 10_000, 1)} % of its picture"
       end
 
-    "#{robot.id}: #{robot.state}#{if robot.leader?, do: " (leader)"} at #{pose(robot.pose)}#{slot}#{sight}"
+    doubt = if robot.uncertainty, do: ", #{within(robot.uncertainty)} by its own word", else: ""
+    role = if robot.leader?, do: " (leader)", else: ""
+    "#{robot.id}: #{state(robot)}#{role} at #{pose(robot.pose)}#{doubt}#{slot}#{sight}"
   end
+
+  defp state(%{state: :unsure}), do: "in its slot, but not sure of its place,"
+  defp state(%{state: state}), do: state
+
+  @doc """
+  How sure a robot is of its pose, in metres.
+
+      iex> Console.Words.within(0.618)
+      "±0.62 m"
+  """
+  @spec within(number()) :: String.t()
+  def within(metres), do: "±#{decimals(metres, 2)} m"
 
   @doc """
   A line in rows of at most `width` characters, broken between words; the further rows are indented.

@@ -33,7 +33,10 @@ defmodule Console.ReportTest do
 
     for robot <- fetch(report, :fleet),
         do:
-          assert(keys(robot) == ~w(name alive state blocked_by x y theta slot error_m size_ppm)a)
+          assert(
+            keys(robot) ==
+              ~w(name alive state blocked_by x y theta slot error_m uncertainty_m size_ppm)a
+          )
 
     assert Enum.map(fetch(report, :stages), &keys/1) == [
              [:stage, :at_s],
@@ -78,6 +81,36 @@ defmodule Console.ReportTest do
     blocked = %{result | fleet: [%{first | blocked_by: "the landmark"} | rest]}
     assert hd(Report.summary(blocked, false, 2.0)) =~ "Blocked: #{first.name} by the landmark."
     refute hd(Report.summary(result, false, 2.0)) =~ "Blocked"
+  end
+
+  test "the report says how sure each robot is, the summary who is not sure enough to be in place" do
+    result = result("")
+    [first, second | rest] = result.fleet
+    doubt = fn robot -> %{robot | state: :unsure, uncertainty_m: 0.6184} end
+    one = %{result | fleet: [doubt.(first), second | rest]}
+    assert hd(Report.summary(one, false, 2.0)) =~ " Not sure of its place: mag1 (±0.62 m)."
+
+    two = %{result | fleet: [doubt.(first), doubt.(second) | rest]}
+
+    assert hd(Report.summary(two, false, 2.0)) =~
+             " Not sure of their places: mag1 (±0.62 m), mag2 (±0.62 m)."
+
+    refute hd(Report.summary(result, false, 2.0)) =~ "sure"
+    assert [robot | _] = fetch(Report.term(two, 1.0), :fleet)
+    assert {fetch(robot, :state), fetch(robot, :uncertainty_m)} == {:unsure, 0.618}
+    unknown = %{result | fleet: [%{first | uncertainty_m: nil} | rest]}
+    assert IO.iodata_to_binary(Report.json(unknown, 1.0)) =~ ~s("uncertainty_m":null)
+  end
+
+  test "a robot in a line says how sure it is of its pose" do
+    scene = Runs.scene("", 12)
+    [first | rest] = scene.robots
+    line = fn robot -> hd(Console.Words.one(%{scene | robots: [robot | rest]}, robot.id)) end
+
+    assert line.(%{first | leader?: false, state: :unsure, uncertainty: 0.618}) =~
+             ~r/^mag1: in its slot, but not sure of its place, at .* degrees, ±0\.62 m by its own word/
+
+    refute line.(%{first | uncertainty: nil}) =~ "±"
   end
 
   test "the summary tells a formation from none" do

@@ -57,6 +57,42 @@ defmodule Console.TerminalTest do
     assert text =~ ~r/mag2\s+dead/
   end
 
+  test "each robot shows how sure it is, and one that is not sure of its place says so" do
+    scene = Runs.scene("", 12)
+
+    for columns <- [80, 120] do
+      text = scene |> screen(columns, 24) |> Enum.join("\n")
+      assert text =~ ~r/robot  does +off +± sees %/
+      assert text =~ ~r/mag2 +follow +\d+\.\d\d ±0\.04 ◆ 0\.9/
+
+      rows = scene |> doubt(:mag3, 0.6184) |> screen(columns, 24)
+      # Below the leader, since it needs attention.
+      at = fn name -> Enum.find_index(rows, &(&1 =~ ~r/ #{name} +(lead|not sure|follow) /)) end
+      assert at.("mag1") < at.("mag3") and at.("mag3") < at.("mag2")
+      assert Enum.at(rows, at.("mag3")) =~ ~r/mag3 +not sure +\d+\.\d\d ±0\.62 ◆/
+    end
+  end
+
+  test "however unsure robots are, the table keeps its width" do
+    scene = Runs.scene("", 12)
+
+    for {metres, word} <- [{0.0, "±0.00"}, {9.996, "±10.0"}, {99.96, "±100"}, {1.0e6, "±9999"}] do
+      rows = scene |> doubt(:mag3, metres) |> screen(80, 24)
+      assert [row] = Enum.filter(rows, &(&1 =~ "not sure"))
+      assert row =~ " #{word} ◆" and String.length(String.trim_trailing(row)) <= 80
+    end
+
+    refute scene |> doubt(:mag3, nil) |> screen(80, 24) |> Enum.any?(&(&1 =~ ~r/not sure.*±/))
+  end
+
+  defp doubt(scene, id, metres) do
+    robots =
+      for robot <- scene.robots,
+          do: if(robot.id == id, do: %{robot | state: :unsure, uncertainty: metres}, else: robot)
+
+    %{scene | robots: robots}
+  end
+
   test "of a hundred robots those without a row are counted" do
     text = "--robots 100" |> Runs.scene(12) |> screen(80, 24) |> Enum.join("\n")
     assert text =~ ~r/… and \d+: \d+ follow/

@@ -40,6 +40,7 @@ defmodule Console.FakeTrial do
           state: :search,
           slot: nil,
           leader?: false,
+          uncertainty: 0.04,
           size_ppm: nil
         }
       end
@@ -139,6 +140,7 @@ defmodule Console.FakeTrial do
             theta: r.pose.heading,
             slot: slot(trial, r),
             error_m: Scene.slot_error(r),
+            uncertainty_m: r.uncertainty,
             size_ppm: r.size_ppm
           }
         end

@@ -22,6 +22,7 @@ defmodule Robot.Board do
   | `{:hung, part}` | `:watch` | of `:gate`, `:executive` or `:pilot`: `{:silent, module}` of the behaviour or the mission in which it hangs (`nil` of the gate), `{:hung, module}` once it was ended for it |
   | `:pose` | `:executive` | the estimate in the `map` frame |
   | `:asking` | `:pilot` | `{module, integer}` while a callback of the mission runs, each with another number |
+  | `:uncertainty` | `:executive` | how sure that pose is: `t:Robot.Percept.uncertainty/0` |
   | `:mission` | `:pilot` | `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state}` |
 
   This process owns the tables and does nothing else, so that they outlive whoever writes them.
@@ -67,6 +68,7 @@ defmodule Robot.Board do
     doing: :executive,
     goal: :executive,
     pose: :executive,
+    uncertainty: :executive,
     mission: :pilot,
     asking: :pilot,
     estop: :brake,

@@ -12,6 +12,7 @@ defmodule Robot.Executive do
   use GenServer
   alias Hal.{Device, Event}
   alias Robot.{Behaviour, Board, Config, DryRun, Gate, Mind, Names, Percept, Trace}
+  alias Robot.Localiser.Anchors
 
   @period_ms 100
   @slow_us 50_000
@@ -57,7 +58,7 @@ defmodule Robot.Executive do
   def stand(robot, then \\ nil), do: cast(robot, {:stand, then})
 
   @doc "Sets the references that the estimate of the pose is corrected by."
-  @spec anchors(robot :: atom(), list()) :: :ok
+  @spec anchors(robot :: atom(), Anchors.t()) :: :ok
   def anchors(robot, anchors), do: cast(robot, {:anchors, anchors})
 
   @doc "Where the camera looks while no behaviour cares; `nil` leaves it where it is."
@@ -105,7 +106,7 @@ defmodule Robot.Executive do
   def handle_cast({:stand, then}, s) do
     Trace.input(s.config, :executive, :stand, Config.now(s.config))
     Gate.forget(s.config.id, then)
-    mind = s.mind |> Mind.goal(:idle, nil) |> Mind.anchors([])
+    mind = s.mind |> Mind.goal(:idle, nil) |> Mind.anchors(%Anchors{})
     {:noreply, pursue(%{s | look: nil}, mind)}
   end
 
@@ -159,12 +160,17 @@ defmodule Robot.Executive do
     fault = fault(s, Mind.fault(mind), at_ms)
     doing = %{by: wish.by, weight: wish.weight, outcome: outcome, fault: fault, tick: s.tick + 1}
     Board.put(board, :executive, :doing, doing, at_ms)
-    if percept.pose, do: Board.put(board, :executive, :pose, percept.pose, at_ms)
+    if percept.pose, do: place(board, percept, at_ms)
 
     # The outcome first: the mission knows what came of its goal when it sees the next percept.
     with {tag, outcome} <- outcome, do: tell(s, {:outcome, tag, outcome}, at_ms)
     tell(s, {:tick, percept}, at_ms)
     %{s | mind: mind, tick: doing.tick, behaviour_looks?: wish.look != nil}
+  end
+
+  defp place(board, %{pose: pose, uncertainty: uncertainty}, at_ms) do
+    Board.put(board, :executive, :pose, pose, at_ms)
+    Board.put(board, :executive, :uncertainty, uncertainty, at_ms)
   end
 
   # Told when it changes.

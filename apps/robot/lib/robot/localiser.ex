@@ -1,69 +1,118 @@
 defmodule Robot.Localiser do
   @moduledoc """
-  Where a robot is in the map frame: odometry from its start pose, corrected by what it sees of
-  things whose places it was told. Pure; the filter itself is `Robot.Localiser.Belief`.
+  Where a robot is, and how sure that is: odometry from its start pose, corrected by what it sees of things whose
+  places it was told (`Robot.Localiser.Anchors`). Pure; the filter is `Robot.Localiser.Belief`, which
+  blob is which thing decides `Robot.Localiser.Matching`.
 
-  References are told by the mission (`anchors`): the landmark where the leader sees it, and the
-  robots ahead in the formation where they say they are. Corrections run one way, from the leader
-  down, so that no robot ever corrects itself by its own echo. A reference gives a bearing, the
-  landmark a range too. Sightings of the same thing repeat the same errors, so each counts for
-  much less than its noise would allow.
+  Corrections run one way, from the leader down, so that no robot ever corrects itself by its own echo. Things are
+  seen in a direction and, where nothing hides a part of them, at a distance: the landmark by its size, a robot by its
+  width.
 
   Odometry that begins again in another frame (`Hal.Odometry`) moves the robot nowhere: it goes on from
   where it was believed to be. The few decimetres of its stop that nobody counted are doubted.
   """
   alias Hal.{Odometry, Pose}
-  alias Robot.Localiser.Belief
+  alias Robot.Localiser.{Anchors, Belief, Matching}
   alias Robot.{Percept, Sighting}
 
   # A single sighting: bearing in radians, range as a share and in metres.
-  @bearing_sd 0.04
-  @range_share 0.10
-  @range_sd 0.15
-  # A robot that is seen must be the one that is expected: no other expected one within this angle.
-  @match 0.12
+  @bearing_sd 0.015
+  @range_share 0.05
+  @range_sd 0.05
+  # What is wrong with every sighting of a thing alike: so much of its place, in metres, and per metre of distance.
+  @landmark_bias 0.005
+  @robot_bias 0.01
+  # Pictures of a second or two show the same slack, and the same size; so many count as one.
+  @repeated 20
+  # Too near for a camera that looks over it, in metres.
+  @near 0.3
   @history 12
 
   @enforce_keys [:start]
   defstruct @enforce_keys ++
-              [odometry: nil, frame: nil, belief: nil, history: [], seen_ms: nil, anchors: []]
+              [
+                odometry: nil,
+                odometry_frame: nil,
+                belief: nil,
+                history: [],
+                seen_ms: nil,
+                anchors: %Anchors{},
+                frame: nil,
+                joins: 0
+              ]
 
   @typedoc """
-  Something of a colour at a place (map frame); `sd` is how well the place is known, in metres.
-  With a `radius` only a blob as wide as that is taken for it; `range?`: its distance counts too.
+  `frame` is the one that the belief is in: `nil` for that of the start poses. `joins` counts how often it came into
+  another.
   """
-  @type anchor :: %{
-          colour: String.t(),
-          at: Pose.point(),
-          sd: float(),
-          range?: boolean(),
-          radius: float() | nil
-        }
   @type t :: %__MODULE__{
           start: Pose.t(),
           odometry: Pose.t() | nil,
-          frame: reference() | nil,
+          odometry_frame: reference() | nil,
           belief: Belief.t() | nil,
           history: [{at_ms :: integer(), odometry :: Pose.t()}],
           seen_ms: integer() | nil,
-          anchors: [anchor()]
+          anchors: Anchors.t(),
+          frame: Anchors.frame() | nil,
+          joins: non_neg_integer()
         }
 
   @doc "A robot that was switched on at `start`, where its odometry said zero."
   @spec new(Pose.t()) :: t()
   def new(%Pose{} = start), do: %__MODULE__{start: start}
 
-  @doc "The references to use from now on."
-  @spec anchors(t(), [anchor()]) :: t()
-  def anchors(localiser, anchors), do: %{localiser | anchors: anchors}
+  @doc """
+  What to find the pose by from now on. In a frame that is new to it the robot is as much less sure as that
+  frame's robot is unsure of its own pose, and then by what that robot becomes less sure.
+  """
+  @spec anchors(t(), Anchors.t()) :: t()
+  def anchors(localiser, %Anchors{frame: frame, marks: marks} = anchors) do
+    localiser = localiser |> join(frame) |> Map.put(:anchors, anchors)
+
+    if marks == [] and localiser.belief != nil,
+      do: %{localiser | belief: Belief.forget(localiser.belief)},
+      else: localiser
+  end
+
+  # Where a leader is believed to be stays true when nobody leads any more.
+  defp join(localiser, nil), do: localiser
+  defp join(%{belief: nil} = localiser, _frame), do: localiser
+
+  # Way back makes a position surer again, but nothing a heading by half: that is a robot that was started anew.
+  defp join(%{frame: %{key: key} = known} = localiser, %{key: key} = frame)
+       when 4 * frame.heading >= known.heading do
+    position = max(frame.position - known.position, 0.0)
+    heading = max(frame.heading - known.heading, 0.0)
+    most = %{frame | position: known.position + position, heading: known.heading + heading}
+    reframe(localiser, most, position, heading)
+  end
+
+  defp join(localiser, frame) do
+    {position, heading} = between(localiser.frame, frame)
+    localiser = reframe(localiser, frame, position, heading)
+    %{localiser | joins: localiser.joins + 1}
+  end
+
+  # What nobody knows of one frame in another: one may have begun in the other, or both elsewhere.
+  defp between(nil, frame), do: {frame.position, frame.heading}
+  defp between(%{key: key}, %{base: key} = frame), do: {frame.position, frame.heading}
+  defp between(%{base: key} = known, %{key: key}), do: {known.position, known.heading}
+
+  defp between(known, frame),
+    do: {known.position + frame.position, known.heading + frame.heading}
+
+  defp reframe(localiser, frame, position, heading) do
+    belief = Belief.reframe(localiser.belief, frame.at, position, heading)
+    %{localiser | frame: frame, belief: belief}
+  end
 
   @doc """
-  Moves the estimate by the percept's odometry, corrects it by the percept's blobs, and fills in
-  the percept's `pose` and `blobs_pose`. Without odometry there is no pose.
+  Moves the estimate by the percept's odometry, corrects it by the percept's blobs, and fills in the percept's
+  `pose`, `uncertainty` and `blobs_pose`. Without odometry there is no pose.
   """
   @spec update(t(), Percept.t()) :: {Percept.t(), t()}
   def update(localiser, %Percept{odometry: nil} = percept),
-    do: {%{percept | pose: nil, blobs_pose: nil}, localiser}
+    do: {%{percept | pose: nil, uncertainty: nil, blobs_pose: nil}, localiser}
 
   def update(localiser, %Percept{odometry: %Odometry{} = odometry} = percept) do
     localiser =
@@ -73,18 +122,36 @@ defmodule Robot.Localiser do
       |> see(percept)
       |> remember(percept.at_ms)
 
-    blobs_pose = percept.blobs_at_ms && pose_at(localiser, percept.blobs_at_ms)
-    {%{percept | pose: localiser.belief.pose, blobs_pose: blobs_pose}, localiser}
+    percept = %{
+      percept
+      | pose: localiser.belief.pose,
+        uncertainty: uncertainty(localiser),
+        blobs_pose: percept.blobs_at_ms && pose_at(localiser, percept.blobs_at_ms)
+    }
+
+    {percept, localiser}
   end
 
-  defp framed(%{frame: frame} = localiser, frame), do: localiser
-  defp framed(%{belief: nil} = localiser, frame), do: %{localiser | frame: frame}
+  defp uncertainty(%{belief: belief, frame: frame, joins: joins}) do
+    {position, _across, heading} = Belief.sd(belief)
+
+    %{
+      radius: Belief.radius(belief),
+      position: position,
+      heading: heading,
+      frame: frame && frame.key,
+      joins: joins
+    }
+  end
+
+  defp framed(%{odometry_frame: frame} = localiser, frame), do: localiser
+  defp framed(%{belief: nil} = localiser, frame), do: %{localiser | odometry_frame: frame}
 
   # Poses of the frame before mean nothing any more.
   defp framed(localiser, frame),
     do: %{
       localiser
-      | frame: frame,
+      | odometry_frame: frame,
         odometry: nil,
         history: [],
         belief: Belief.doubt(localiser.belief)
@@ -106,89 +173,100 @@ defmodule Robot.Localiser do
   defp see(localiser, %Percept{blobs: nil}), do: localiser
   defp see(%{seen_ms: at_ms} = localiser, %Percept{blobs_at_ms: at_ms}), do: localiser
 
+  # Turned right by the landmark, it knows better which robot is which.
   defp see(localiser, percept) do
-    localiser = %{localiser | seen_ms: percept.blobs_at_ms}
-    view = Sighting.field_of_view(percept)
-    # The picture was taken a moment ago, and the body may have turned since.
-    exposed = pose_at(localiser, percept.blobs_at_ms)
+    {landmarks, robots} = Enum.split_with(localiser.anchors.marks, &(&1.kind == :landmark))
 
-    Enum.reduce(localiser.anchors, localiser, fn anchor, localiser ->
-      case match(anchor, localiser.anchors, percept, exposed, view) do
-        nil -> localiser
-        blob -> correct(localiser, anchor, blob, exposed, percept, view)
+    %{localiser | seen_ms: percept.blobs_at_ms}
+    |> see_landmarks(landmarks, percept)
+    |> see_robots(robots, percept)
+  end
+
+  # There is one landmark: whatever has its colour is it.
+  defp see_landmarks(localiser, landmarks, percept) do
+    Enum.reduce(landmarks, localiser, fn mark, localiser ->
+      whole = Enum.filter(percept.blobs, &(&1.colour == mark.colour and not &1.clipped?))
+
+      case Enum.max_by(whole, & &1.area, fn -> nil end) do
+        nil ->
+          localiser
+
+        blob ->
+          correct(localiser, percept, mark, blob, 0.0, Sighting.distance(blob, percept.blobs))
       end
     end)
   end
 
-  defp match(anchor, anchors, percept, exposed, view) do
-    expected = Pose.bearing(exposed, anchor.at)
+  defp see_robots(localiser, robots, percept) do
+    view = Sighting.field_of_view(percept)
+    exposed = pose_at(localiser, percept.blobs_at_ms)
 
-    alone? =
-      Enum.all?(anchors, fn other ->
-        other == anchor or other.colour != anchor.colour or
-          abs(Pose.wrap(Pose.bearing(exposed, other.at) - expected)) > 2 * @match
-      end)
-
-    near =
-      Enum.filter(percept.blobs, fn blob ->
-        bearing = Sighting.bearing(blob, percept.blobs_pan, view)
-
-        blob.colour == anchor.colour and not blob.clipped? and
-          abs(Pose.wrap(bearing - expected)) < gate(anchor) and
-          fits?(blob, anchor, Pose.distance(exposed, anchor.at), view)
-      end)
-
-    if alone?, do: Enum.max_by(near, & &1.area, fn -> nil end)
+    robots
+    |> Matching.pairs(percept.blobs, localiser.belief, exposed, percept.blobs_pan, view)
+    |> Enum.reduce(localiser, fn %{mark: mark, blob: blob, slack: slack} = pair, localiser ->
+      distance = if pair.whole?, do: Sighting.distance_by_width(blob, mark.radius, view)
+      correct(localiser, percept, mark, blob, slack, distance)
+    end)
   end
 
-  defp fits?(_blob, %{radius: nil}, _distance, _view), do: true
+  defp correct(localiser, percept, mark, blob, slack, distance) do
+    far = Pose.distance(pose_at(localiser, percept.blobs_at_ms), mark.at)
+    bearing = Sighting.bearing(blob, percept.blobs_pan, Sighting.field_of_view(percept))
 
-  defp fits?(blob, anchor, distance, view),
-    do: Sighting.fits?(blob, anchor.radius, distance, view)
-
-  # There is one landmark: whatever has its colour is it.
-  defp gate(%{range?: true}), do: 2 * :math.pi()
-  defp gate(_robot), do: @match
-
-  defp correct(localiser, anchor, blob, exposed, percept, view) do
-    {ax, ay} = anchor.at
-    dx = ax - exposed.x
-    dy = ay - exposed.y
-    square = dx * dx + dy * dy
-    distance = :math.sqrt(square)
-
-    if distance < 0.3 do
-      localiser
-    else
-      bearing_error =
-        Pose.wrap(
-          Sighting.bearing(blob, percept.blobs_pan, view) - Pose.bearing(exposed, anchor.at)
-        )
-
-      bearing_noise = :math.pow(@bearing_sd, 2) + :math.pow(anchor.sd / distance, 2)
-
-      localiser =
-        measure(localiser, bearing_error, {dy / square, -dx / square, -1.0}, bearing_noise)
-
-      range = anchor.range? && Sighting.distance(blob, percept.blobs)
-
-      if range do
-        range_noise = :math.pow(@range_share * distance + @range_sd, 2) + :math.pow(anchor.sd, 2)
-
-        measure(
-          localiser,
-          range - distance,
-          {-dx / distance, -dy / distance, 0.0},
-          range_noise
-        )
-      else
+    cond do
+      far < @near ->
         localiser
-      end
+
+      distance == nil ->
+        turn(localiser, percept, mark, far, bearing, slack)
+
+      true ->
+        localiser
+        |> turn(percept, mark, far, bearing, slack)
+        |> stretch(percept, mark, far, distance)
     end
   end
 
-  defp measure(localiser, error, slope, noise),
-    do: %{localiser | belief: Belief.correct(localiser.belief, error, slope, noise)}
+  # The picture was taken a moment ago, and the body may have turned since.
+  defp turn(localiser, percept, mark, far, seen, slack) do
+    {belief, exposed, {dx, dy, distance}} = meet(localiser, percept, mark, far)
+    expected = Pose.wrap(:math.atan2(dy, dx) - exposed.heading)
+    square = distance * distance
+    slope = {{dy / square, -dx / square, -1.0}, {0.0, 0.0}}
+    noise = @bearing_sd * @bearing_sd + @repeated * slack * slack
+    error = Pose.wrap(seen - expected)
+    %{localiser | belief: Belief.correct(belief, mark.key, error, slope, noise)}
+  end
+
+  defp stretch(localiser, percept, mark, far, seen) do
+    {belief, _exposed, {dx, dy, distance}} = meet(localiser, percept, mark, far)
+
+    {scale, scales} =
+      case mark.kind do
+        :landmark -> {elem(belief.scales, 0), {distance, 0.0}}
+        :robot -> {elem(belief.scales, 1), {0.0, distance}}
+      end
+
+    slope = {{-dx / distance, -dy / distance, 0.0}, scales}
+    noise = @repeated * :math.pow(@range_share * distance + @range_sd, 2)
+    error = seen - distance * (1 + scale)
+    %{localiser | belief: Belief.correct(belief, mark.key, error, slope, noise)}
+  end
+
+  # The way from where the picture was taken to where the thing is by now believed to be.
+  defp meet(localiser, percept, mark, far) do
+    exposed = pose_at(localiser, percept.blobs_at_ms)
+    {belief, {x, y}} = Belief.meet(localiser.belief, mark.key, mark.at, place_sd(mark, far))
+    {dx, dy} = {x - exposed.x, y - exposed.y}
+    {belief, exposed, {dx, dy, max(:math.sqrt(dx * dx + dy * dy), 0.1)}}
+  end
+
+  defp place_sd(%{kind: :landmark, sd: sd}, far), do: sd + @landmark_bias * far
+
+  defp place_sd(%{kind: :robot, sd: sd}, far) do
+    bias = @robot_bias * (1 + far)
+    :math.sqrt(sd * sd + bias * bias)
+  end
 
   defp remember(localiser, at_ms) do
     history = Enum.take([{at_ms, localiser.odometry} | localiser.history], @history)

@@ -71,7 +71,7 @@ defmodule Robot.Mind do
   end
 
   @doc "References for the estimate of the pose, from now on."
-  @spec anchors(t(), [Localiser.anchor()]) :: t()
+  @spec anchors(t(), Localiser.Anchors.t()) :: t()
   def anchors(%__MODULE__{localiser: nil} = mind, _anchors), do: mind
 
   def anchors(%__MODULE__{} = mind, anchors),

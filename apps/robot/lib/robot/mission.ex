@@ -17,7 +17,7 @@ defmodule Robot.Mission do
   @typedoc """
     * `{:goal, tag, {module, options} | nil}` - what to do from now on. The same tag again changes
       the options of the running behaviour, another one starts afresh; `nil` is idling
-    * `{:anchors, list}` - references for the estimate of the pose
+    * `{:anchors, anchors}` - what to find the pose by (`Robot.Localiser.Anchors`)
     * `{:look, pan}` - where the camera looks, radians, left positive, unless the behaviour cares
     * `{:send, to, message}` - say something to one robot, to several, or to `:all`
     * `{:claim, map}` - what the robot says of itself until further notice
@@ -25,7 +25,7 @@ defmodule Robot.Mission do
   """
   @type effect ::
           {:goal, tag :: term(), Robot.Behaviour.t() | {module(), keyword()} | nil}
-          | {:anchors, list()}
+          | {:anchors, Robot.Localiser.Anchors.t()}
           | {:look, pan :: float()}
           | {:send, to :: atom() | [atom()] | :all, struct()}
           | {:claim, map()}

@@ -12,6 +12,7 @@ defmodule Robot.Percept do
   defstruct @enforce_keys ++
               [
                 pose: nil,
+                uncertainty: nil,
                 odometry: nil,
                 sonar: nil,
                 ir: nil,
@@ -44,6 +45,19 @@ defmodule Robot.Percept do
         }
 
   @typedoc """
+  How sure the pose is: within `radius` metres in 95 of 100 cases; `position` (along the worst direction, metres) and `heading`
+  (radians) are standard deviations. `frame` is the key of the frame that the pose is in (`Robot.Localiser.Anchors`): `nil`
+  for that of the start poses; `joins` counts how often it came into another.
+  """
+  @type uncertainty :: %{
+          radius: float(),
+          position: float(),
+          heading: float(),
+          frame: term(),
+          joins: non_neg_integer()
+        }
+
+  @typedoc """
   `blobs_pan`, `blobs_view` and `blobs_pose` are where the camera looked, how wide (radians, `nil`:
   as the unit says now) and where the robot stood (map frame) when the picture was taken. `driving` is what the gate last let through, and why it limited it.
   """
@@ -52,6 +66,7 @@ defmodule Robot.Percept do
           at_ms: integer(),
           profile: Profile.t(),
           pose: Pose.t() | nil,
+          uncertainty: uncertainty() | nil,
           odometry: Odometry.t() | nil,
           sonar: [float()] | nil,
           ir: [float()] | nil,

@@ -19,7 +19,7 @@ defmodule Robot.Pilot do
 
   | effect | goes to |
   |---|---|
-  | `{:goal, tag, goal}`, `{:anchors, list}`, `{:look, pan}` | the executive |
+  | `{:goal, tag, goal}`, `{:anchors, anchors}`, `{:look, pan}` | the executive |
   | `{:send, to, message}` | the config's `:send`; lost without one |
   | `{:claim, map}` | the board, under `:mission`, for the heartbeat to carry |
   | `{:stage, name, map}` | the event `[:robot, :stage]` |
@@ -27,6 +27,7 @@ defmodule Robot.Pilot do
   @behaviour :gen_statem
   alias Hal.Event
   alias Robot.{Behaviour, Board, Config, Executive, Names, Trace}
+  alias Robot.Localiser.Anchors
 
   # On a busy machine a pilot is slow, not gone.
   @call_ms 5_000
@@ -246,7 +247,7 @@ defmodule Robot.Pilot do
 
   defp rest(%{config: %{id: id}}) do
     Executive.set(id, :idle, nil)
-    Executive.anchors(id, [])
+    Executive.anchors(id, %Anchors{})
     Executive.look(id, nil)
   end
 

@@ -23,8 +23,6 @@ defmodule Robot.Sighting do
 
   # Boxes this many pixels apart still touch: a border between two colours belongs to neither.
   @touch 3
-  # How far a blob's width may be off the expected one.
-  @fits 0.25
   # A clipped blob that covers more of the picture than this is too near to be measured.
   @too_near_share 0.2
 
@@ -101,18 +99,26 @@ defmodule Robot.Sighting do
   end
 
   @doc """
-  Whether a blob is as wide as an upright cylinder of this radius at this distance would be, within
-  a quarter: what is half hidden, or several things in one, is not.
+  How wide (in pixels) an upright cylinder of this radius at this distance (metres, of its axis) is in a picture of this width
+  and field of view (radians); `nil` from within.
+
+      iex> round(Robot.Sighting.width(0.2, 1.0, 320, :math.pi() / 3))
+      113
   """
-  @spec fits?(Blob.t(), radius :: float(), distance :: float(), field_of_view :: float()) ::
-          boolean()
-  def fits?(%Blob{} = blob, radius, distance, field_of_view) when distance > radius do
-    focal = blob.width / 2 / :math.tan(field_of_view / 2)
-    expected = 2 * focal * :math.tan(:math.asin(radius / distance))
-    abs((blob.right - blob.left + 1) / expected - 1) < @fits
+  @spec width(radius :: float(), distance :: float(), pos_integer(), float()) :: float() | nil
+  def width(radius, distance, picture, field_of_view) when distance > radius do
+    focal = picture / 2 / :math.tan(field_of_view / 2)
+    2 * focal * :math.tan(:math.asin(radius / distance))
   end
 
-  def fits?(_blob, _radius, _distance, _field_of_view), do: false
+  def width(_radius, _distance, _picture, _field_of_view), do: nil
+
+  @doc "The distance of an upright cylinder of this radius (metres) that a blob shows in all its width."
+  @spec distance_by_width(Blob.t(), radius :: float(), field_of_view :: float()) :: float()
+  def distance_by_width(%Blob{} = blob, radius, field_of_view) do
+    focal = blob.width / 2 / :math.tan(field_of_view / 2)
+    radius / :math.sin(:math.atan((blob.right - blob.left + 1) / 2 / focal))
+  end
 
   @doc """
   The horizontal field of view of the percept's picture: as it was taken, or what the unit says, or

@@ -9,7 +9,7 @@ defmodule Robot.Trace do
   | role | inputs | effects |
   |---|---|---|
   | `:gate` | `{:wish, twist}` `{:sense, reading}` `:forget` `:estop` `:reset` `:step` | `{:drive, twist, limits}` |
-  | `:executive` | `{:goal, tag, goal}` `:stand` `{:anchors, list}` `{:look, pan}` `{:tick, raw percept}` | `{:wish, wish}` `{:look, pan}` `{:tick, percept}` `{:outcome, tag, integer}` |
+  | `:executive` | `{:goal, tag, goal}` `:stand` `{:anchors, anchors}` `{:look, pan}` `{:tick, raw percept}` | `{:wish, wish}` `{:look, pan}` `{:tick, percept}` `{:outcome, tag, integer}` |
   | `:pilot` | `{:start, module, options}` `:stop`, and the events of `Robot.Mission` | `{:phase, state}` and the effects of `Robot.Mission` |
   """
   alias Robot.Config

@@ -1,9 +1,9 @@
 defmodule Robot.LocaliserTest do
   use ExUnit.Case, async: true
   doctest Robot.Sighting
-  doctest Robot.Localiser.Belief
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.{Localiser, Percept, Sighting}
+  alias Robot.Localiser.{Anchors, Belief}
   alias Vision.Blob
 
   @view :math.pi() / 3
@@ -44,11 +44,21 @@ defmodule Robot.LocaliserTest do
     }
   end
 
-  @landmark %{colour: "Y", at: {4.0, 0.0}, sd: 0.05, range?: true, radius: nil}
-  @leader %{colour: "R", at: {2.5, 0.8}, sd: 0.05, range?: false, radius: 0.2}
+  @landmark %{
+    key: :landmark,
+    kind: :landmark,
+    colour: "Y",
+    at: {4.0, 0.0},
+    sd: 0.05,
+    radius: 0.15
+  }
+  @leader %{key: :mag2, kind: :robot, colour: "R", at: {2.5, 0.8}, sd: 0.05, radius: 0.2}
+
+  defp told(localiser, marks, frame \\ nil),
+    do: Localiser.anchors(localiser, %Anchors{frame: frame, marks: marks})
 
   defp settle(localiser, truth, anchors, ticks) do
-    Enum.reduce(1..ticks, {nil, Localiser.anchors(localiser, anchors)}, fn k, {_, localiser} ->
+    Enum.reduce(1..ticks, {nil, told(localiser, anchors)}, fn k, {_, localiser} ->
       blobs = [blob("Y", truth, {4.0, 0.0}, 0.15), blob("R", truth, {2.5, 0.8}, 0.2)]
       Localiser.update(localiser, percept(Pose.new(0, 0), 100 * k, blobs))
     end)
@@ -77,7 +87,7 @@ defmodule Robot.LocaliserTest do
     {percept, sure} = Localiser.update(localiser, again)
     assert percept.pose == before.pose
     assert percept.blobs_pose == before.pose
-    assert elem(sure.belief.covariance, 0) > elem(localiser.belief.covariance, 0)
+    assert Belief.radius(sure.belief) > Belief.radius(localiser.belief) + 0.3
 
     {percept, _} = Localiser.update(sure, framed.(Pose.new(0.5, 0), other, 1_000))
     assert percept.pose == Pose.new(4.5, 2)
@@ -91,6 +101,7 @@ defmodule Robot.LocaliserTest do
       })
 
     assert percept.pose == nil
+    assert percept.uncertainty == nil
   end
 
   test "what agrees with the references stays" do
@@ -131,7 +142,7 @@ defmodule Robot.LocaliserTest do
   end
 
   test "a picture is counted once, and by where the robot stood when it was taken" do
-    localiser = Localiser.anchors(Localiser.new(Pose.new(0, 0)), [@landmark])
+    localiser = told(Localiser.new(Pose.new(0, 0)), [@landmark])
     {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0, 0.0), 0))
     {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0, 0.2), 100))
     blobs = [blob("Y", Pose.new(0, 0), {4.0, 0.0}, 0.15)]
@@ -150,5 +161,103 @@ defmodule Robot.LocaliserTest do
     red = %{yellow | colour: "R", top: 170, bottom: 230}
     assert Sighting.distance(yellow, [yellow, red]) == nil
     assert Sighting.distance(%{yellow | clipped?: true}, [yellow]) == nil
+  end
+
+  test "however often they are seen, they make nobody surer than their places are known" do
+    {percept, _} =
+      settle(Localiser.new(Pose.new(0, 0)), Pose.new(0, 0), [@landmark, @leader], 1_000)
+
+    sure = percept.uncertainty.radius
+    unknown = for mark <- [@landmark, @leader], do: %{mark | sd: 0.3}
+    {percept, _} = settle(lost(0.5), Pose.new(0, 0), unknown, 1_000)
+    assert percept.uncertainty.radius > 0.3
+    assert sure < 0.1
+    assert percept.uncertainty.frame == :elsewhere
+  end
+
+  # Put into the frame of somebody who does not know where it is itself.
+  defp lost(sd) do
+    {_, localiser} = Localiser.update(Localiser.new(Pose.new(0, 0)), percept(Pose.new(0, 0), 0))
+    told(localiser, [], frame(:elsewhere, {2.5, 0.8}, sd * sd, 0.0))
+  end
+
+  defp frame(key, at, position, heading, base \\ nil),
+    do: %{key: key, base: base, at: at, position: position, heading: heading}
+
+  test "in another's frame a robot is as unsure as that one is, and as that one becomes" do
+    {before, localiser} =
+      Localiser.update(Localiser.new(Pose.new(0, 0)), percept(Pose.new(0, 0), 0))
+
+    assert before.uncertainty.frame == nil
+    tick = fn localiser, at_ms -> Localiser.update(localiser, percept(Pose.new(0, 0), at_ms)) end
+
+    # 10 m from somebody who may be turned by 0.1 rad: 1 m across.
+    {joined, localiser} =
+      localiser |> told([], frame({:mag2, 1}, {10.0, 0.0}, 0.04, 0.01)) |> tick.(100)
+
+    assert_in_delta joined.uncertainty.position, :math.sqrt(1.0 + 0.04), 0.01
+    assert_in_delta joined.uncertainty.heading, 0.1, 0.01
+    assert joined.uncertainty.frame == {:mag2, 1}
+    assert joined.pose == before.pose
+
+    # Told again it is no news; told more, it is by so much more.
+    {same, localiser} =
+      localiser |> told([], frame({:mag2, 1}, {10.0, 0.0}, 0.04, 0.01)) |> tick.(200)
+
+    assert same.uncertainty == joined.uncertainty
+
+    {more, localiser} =
+      localiser |> told([], frame({:mag2, 1}, {10.0, 0.0}, 0.04, 0.02)) |> tick.(300)
+
+    assert_in_delta more.uncertainty.position, :math.sqrt(2.0 + 0.04), 0.01
+
+    # It cannot become surer; if it says so, it was started anew.
+    {anew, _} = localiser |> told([], frame({:mag2, 1}, {10.0, 0.0}, 0.01, 0.0)) |> tick.(400)
+    assert anew.uncertainty.joins == 2
+    assert anew.uncertainty.position > more.uncertainty.position + 0.5
+
+    # One who was in the frame of mag2 leads: that it is unsure of there. Then mag2 again: that is what was unsure.
+    {other, localiser} =
+      localiser
+      |> told([], frame({:mag3, 2}, {10.0, 0.0}, 0.0, 0.01, {:mag2, 1}))
+      |> tick.(400)
+
+    assert_in_delta other.uncertainty.position, :math.sqrt(3.0 + 0.04), 0.01
+    assert %{frame: {:mag3, 2}, joins: 2} = other.uncertainty
+
+    {back, localiser} =
+      localiser |> told([], frame({:mag2, 1}, {10.0, 0.0}, 0.04, 0.02)) |> tick.(500)
+
+    assert_in_delta back.uncertainty.position, :math.sqrt(4.0 + 0.04), 0.01
+
+    # Of a frame that nothing is known of, all is unsure that is unsure of both.
+    {strange, _} =
+      localiser |> told([], frame({:min1, 7}, {10.0, 0.0}, 0.0, 0.01, {:min2, 3})) |> tick.(600)
+
+    assert_in_delta strange.uncertainty.position, :math.sqrt(4.0 + 0.04 + 0.04 + 3.0), 0.01
+  end
+
+  test "wheels that slip are found out by what stands still, and then turn it no more" do
+    # It turns to and fro by 0.5 rad; each turn to the left goes 5 % farther, each to the right less far.
+    turns = List.duplicate(0.1, 5) ++ List.duplicate(-0.1, 5)
+    localiser = told(Localiser.new(Pose.new(0, 0)), [@landmark])
+    {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0), 0))
+    state = {Pose.new(0, 0), Pose.new(0, 0), localiser}
+
+    {truth, _wheels, localiser} =
+      turns
+      |> List.duplicate(20)
+      |> List.flatten()
+      |> Enum.with_index(1)
+      |> Enum.reduce(state, fn {turn, k}, {truth, wheels, localiser} ->
+        truth = Pose.compose(truth, Pose.new(0, 0, turn + 0.05 * abs(turn)))
+        wheels = Pose.compose(wheels, Pose.new(0, 0, turn))
+        blobs = [blob("Y", truth, {4.0, 0.0}, 0.15)]
+        {_, localiser} = Localiser.update(localiser, percept(wheels, 100 * k, blobs))
+        {truth, wheels, localiser}
+      end)
+
+    assert_in_delta localiser.belief.slip, 0.05, 0.01
+    assert abs(Pose.wrap(localiser.belief.pose.heading - truth.heading)) < 0.02
   end
 end

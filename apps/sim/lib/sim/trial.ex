@@ -95,9 +95,12 @@ defmodule Sim.Trial do
   @spec living(t()) :: [atom()]
   def living(trial), do: Enum.filter(trial.options.robots, &is_map_key(trial.members, &1))
 
-  @doc "What each living robot claims of itself."
+  @doc "What each living robot claims of itself, and, whatever its mission is, how sure its pose is."
   @spec claims(t()) :: [{atom(), map()}]
-  def claims(trial), do: for(id <- living(trial), do: {id, Member.claim(trial.members[id])})
+  def claims(trial), do: for(id <- living(trial), do: {id, claim(trial.members[id])})
+
+  defp claim(member),
+    do: Map.put_new(Member.claim(member), :uncertainty, Member.uncertainty(member))
 
   defp run(trial) do
     %{

@@ -30,7 +30,11 @@ defmodule Sim.FleetTest do
     assert Swarm.goto(:mag71, place) == :ok
     eventually(fn -> Swarm.status(:mag71).state == :done end, 20_000)
     assert Pose.distance(truth(fleet, :mag71), place) < 0.15
-    assert [%{state: :idle, alive: true}] = Fleet.scene(fleet).robots
+    assert [%{state: :idle, alive: true, uncertainty: metres}] = Fleet.scene(fleet).robots
+    # Without a mission of its own it knows how sure it is, too; by now it has driven.
+    assert is_float(metres) and metres > 0.0
+    assert [%{uncertainty_m: told}] = Fleet.result(fleet).fleet
+    assert is_float(told)
     assert Fleet.result(fleet).collisions == 0
     stop(fleet)
     assert Names.whereis(:mag71, :robot) == nil

@@ -6,7 +6,8 @@ defmodule Swarm.Anchor do
   does not hear the leader still knows its place. The newest sequence number wins; the epoch
   fences off leaders of the past.
 
-  Poses are `{x_mm, y_mm, mrad}` in the leader's map frame; `landmark` is `{x_mm, y_mm}` or `nil`,
+  Poses are `{x_mm, y_mm, mrad}` in the leader's map frame, of which it is itself so unsure as `sd` says (standard
+  deviations in mm and mrad), in the frame `base` that it was in before; `frame` is the number of its own. `landmark` is `{x_mm, y_mm}` or `nil`,
   `still` says that it does not move. `order` names the followers by slot, which is also
   the order in which each passes the anchor on to its child. `formation` is
   the shape as there is room for it, `asked` the one that was asked for, the `asked_no`-th that was; `size` and `places` say which
@@ -18,14 +19,29 @@ defmodule Swarm.Anchor do
 
   @enforce_keys [:leader, :epoch, :sequence, :pose, :twist, :formation, :order, :size, :places]
   defstruct @enforce_keys ++
-              [asked: nil, asked_no: 0, landmark: nil, still: false, trail: nil, of: 0]
+              [
+                sd: {0, 0},
+                frame: 0,
+                base: nil,
+                asked: nil,
+                asked_no: 0,
+                landmark: nil,
+                still: false,
+                trail: nil,
+                of: 0
+              ]
 
+  @typedoc "A robot's frame, and the number that it has among those that this robot was in."
+  @type frame :: {atom(), non_neg_integer()}
   @type t :: %__MODULE__{
           leader: atom(),
           epoch: pos_integer(),
           sequence: non_neg_integer(),
           pose: {integer(), integer(), integer()},
           twist: {integer(), integer()},
+          sd: {position :: non_neg_integer(), heading :: non_neg_integer()},
+          frame: non_neg_integer(),
+          base: frame() | nil,
           formation: Formation.t(),
           order: [atom()],
           landmark: {integer(), integer()} | nil,
@@ -68,6 +84,7 @@ defmodule Swarm.Anchor do
       anchor.size in 1..@most and
       Shape.list?(places, &(&1 in 1..@most and &1 < anchor.size)) and
       length(places) == length(order) and Shape.distinct?(places) and
+      sd?(anchor.sd) and Shape.count?(anchor.frame) and base?(anchor.base) and
       landmark?(anchor.landmark) and is_boolean(anchor.still) and
       is_integer(anchor.of) and anchor.of in 0..@most and
       (anchor.trail == nil or
@@ -75,6 +92,13 @@ defmodule Swarm.Anchor do
   end
 
   def valid?(_term), do: false
+
+  defp sd?({mm, mrad}), do: Enum.all?([mm, mrad], &(Shape.number?(&1) and &1 >= 0))
+  defp sd?(_other), do: false
+
+  defp base?(nil), do: true
+  defp base?({name, number}), do: Shape.name?(name) and Shape.count?(number)
+  defp base?(_other), do: false
 
   defp landmark?(nil), do: true
   defp landmark?({x, y}), do: Shape.number?(x) and Shape.number?(y)

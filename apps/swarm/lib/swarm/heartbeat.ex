@@ -6,7 +6,9 @@ defmodule Swarm.Heartbeat do
   `estop` is the number of the last emergency stop that it knows, 0 for none, and `latched` says
   whether its own latch is set (`Swarm.Stop`). `sight` is its newest view of the landmark: relative
   size and estimated distance, `nil` where it does not see it. `anchor` is there in the leader's
-  heartbeats only. `boot` is its life's number, which grows with every start.
+  heartbeats only. `in_place` says that a follower is in its slot, `unsure` that it believes so and is not sure
+  enough. `sd` is how well it knows its pose in its leader's frame, `nil` outside of
+  it. `boot` is its life's number, which grows with every start.
   """
   alias Swarm.{Roll, Shape}
 
@@ -14,6 +16,7 @@ defmodule Swarm.Heartbeat do
   defstruct @enforce_keys ++
               [
                 radius: 200,
+                sd: nil,
                 phase: :idle,
                 epoch: 0,
                 leader: nil,
@@ -21,6 +24,7 @@ defmodule Swarm.Heartbeat do
                 sight: nil,
                 standing: false,
                 in_place: false,
+                unsure: false,
                 blocked: false,
                 formed: false,
                 estop: 0,
@@ -34,6 +38,7 @@ defmodule Swarm.Heartbeat do
           pose: {x :: integer(), y :: integer(), heading :: integer()},
           twist: {linear :: integer(), turn :: integer()},
           radius: pos_integer(),
+          sd: non_neg_integer() | nil,
           phase: atom(),
           epoch: non_neg_integer(),
           leader: atom() | nil,
@@ -41,6 +46,7 @@ defmodule Swarm.Heartbeat do
           sight: %{size_ppm: pos_integer(), distance: pos_integer() | nil} | nil,
           standing: boolean(),
           in_place: boolean(),
+          unsure: boolean(),
           blocked: boolean(),
           formed: boolean(),
           estop: non_neg_integer(),
@@ -72,8 +78,8 @@ defmodule Swarm.Heartbeat do
       latched: stop.latched?
     }
 
-    # What a robot is blocked by is for people, who ask the robot itself.
-    struct!(beat, Map.delete(claim, :blocked_by))
+    # These are for people, who ask the robot itself.
+    struct!(beat, Map.drop(claim, [:blocked_by, :uncertainty]))
   end
 
   @doc """
@@ -88,11 +94,12 @@ defmodule Swarm.Heartbeat do
   def valid?(%__MODULE__{twist: {linear, turn}} = beat) do
     Shape.whole?(beat, __MODULE__) and Shape.pose?(beat.pose) and Shape.number?(linear) and
       Shape.number?(turn) and is_integer(beat.boot) and beat.boot in 0..@latest and
-      Shape.count?(beat.sequence) and beat.radius in 50..2000 and Shape.name?(beat.phase) and
+      Shape.count?(beat.sequence) and beat.radius in 50..2000 and
+      (beat.sd == nil or beat.sd in 0..100_000) and Shape.name?(beat.phase) and
       Shape.count?(beat.epoch) and (beat.leader == nil or Shape.name?(beat.leader)) and
       Roll.valid?(beat.heard) and sight?(beat.sight) and
       Enum.all?(
-        [beat.standing, beat.in_place, beat.blocked, beat.formed, beat.latched],
+        [beat.standing, beat.in_place, beat.unsure, beat.blocked, beat.formed, beat.latched],
         &is_boolean/1
       ) and beat.estop in 0..@latest and
       (beat.anchor == nil or Swarm.Anchor.valid?(beat.anchor))

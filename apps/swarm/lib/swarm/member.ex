@@ -17,6 +17,7 @@ defmodule Swarm.Member do
   """
   alias Hal.{Pose, Profile, Twist}
   alias Robot.{Mind, Percept, Reflex}
+  alias Robot.Localiser.Anchors
   alias Swarm.{Heartbeat, Message, Peers, Stop}
   alias Swarm.Link.Ear
 
@@ -163,6 +164,14 @@ defmodule Swarm.Member do
     percept && percept.pose
   end
 
+  @doc "Within how many metres of that pose the robot is in 95 of 100 cases (`Robot.Percept`), or `nil`."
+  @spec uncertainty(t()) :: float() | nil
+  def uncertainty(member) do
+    with %Percept{uncertainty: %{radius: radius}} <- Mind.percept(member.mind),
+         do: radius,
+         else: (_no_pose -> nil)
+  end
+
   @doc "What the robot's mission says of it: its phase and the fields of `Swarm.Heartbeat`."
   @spec claim(t()) :: map()
   def claim(member), do: member.claim
@@ -202,7 +211,7 @@ defmodule Swarm.Member do
   defp halt(member) do
     %{
       member
-      | mind: member.mind |> Mind.goal(:idle, nil) |> Mind.anchors([]),
+      | mind: member.mind |> Mind.goal(:idle, nil) |> Mind.anchors(%Anchors{}),
         reflex: Reflex.forget(member.reflex),
         halted: halted(member),
         mission: nil,

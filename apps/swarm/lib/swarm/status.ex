@@ -2,7 +2,12 @@ defmodule Swarm.Status do
   @moduledoc """
   How a robot is, for people. In `iex` it is one line:
 
-      #mag1 follow (1.20, -0.35, 90 deg) 0.31 m/s by follow, view 7, hears 4 but not min2, age 40 ms
+      #mag1 follow (1.20, -0.35, 90 deg) ±0.12 m, 0.31 m/s by follow, view 7, hears 4 but not min2, age 40 ms
+
+  Behind its pose stands how sure that is: in 95 of 100 cases the robot is no farther from it (`uncertainty`,
+  metres; `Robot.Percept`). A follower's is in its leader's frame, any other robot's in its own. One that stands in its
+  slot as far as it knows, and does not know that well enough to say so, is `in its slot, but NOT SURE of its place
+  (±0.62 m)` (`unsure`).
 
   Of wheels that may not turn it says `DISARMED`, with what is missing, or `LINE LOST` until a person
   acknowledges (`Hal.Arming`; `arming` and `why`). Of a device that is not there it says why: `drive offline
@@ -40,6 +45,7 @@ defmodule Swarm.Status do
                 state: :idle,
                 by: nil,
                 pose: nil,
+                uncertainty: nil,
                 speed: 0.0,
                 limits: [],
                 estop: false,
@@ -47,6 +53,7 @@ defmodule Swarm.Status do
                 why: nil,
                 hung: nil,
                 leader: nil,
+                unsure: false,
                 blocked_by: nil,
                 power: nil,
                 health: %{},
@@ -67,6 +74,7 @@ defmodule Swarm.Status do
           state: atom() | String.t(),
           by: atom() | String.t(),
           pose: Pose.t() | nil,
+          uncertainty: float() | nil,
           speed: float(),
           limits: [atom() | String.t()],
           estop: boolean(),
@@ -74,6 +82,7 @@ defmodule Swarm.Status do
           why: String.t() | nil,
           hung: {:silent | :hung, behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
           leader: atom() | String.t() | nil,
+          unsure: boolean(),
           blocked_by: String.t() | nil,
           power: float() | nil,
           health: %{(atom() | String.t()) => :online | {:offline, term()}},
@@ -102,6 +111,7 @@ defmodule Swarm.Status do
       by: entries |> value(:doing) |> field(:by),
       fault: entries |> value(:doing) |> field(:fault),
       pose: value(entries, :pose),
+      uncertainty: entries |> value(:uncertainty) |> field(:radius),
       speed: if(driving, do: driving.twist.linear, else: 0.0),
       limits: field(driving, :limits) || [],
       estop: Board.latched?(board),
@@ -109,6 +119,7 @@ defmodule Swarm.Status do
       why: entries |> value(:arming) |> field(:why),
       hung: hung(entries),
       leader: mission |> field(:claim) |> field(:leader),
+      unsure: mission |> field(:claim) |> field(:unsure) == true,
       blocked_by: mission |> field(:claim) |> field(:blocked_by) |> Blocker.words(),
       power: value(entries, :power),
       health: Map.new(health),
@@ -170,14 +181,26 @@ defmodule Swarm.Status do
 
     def inspect(status, _options) do
       [first | rest] = [speed(status) | remarks(status)]
-      words = ["#{status.robot} #{status.state} #{place(status.pose)} #{first}" | rest]
+      words = ["#{status.robot} #{status.state} #{place(status)} #{first}" | rest]
       "#" <> Enum.join(words, ", ")
     end
 
-    defp place(nil), do: "(pose unknown)"
+    defp place(%{pose: nil}), do: "(pose unknown)"
 
-    defp place(%{x: x, y: y, heading: heading}),
-      do: "(#{fixed(x)}, #{fixed(y)}, #{round(heading * 180 / :math.pi())} deg)"
+    defp place(%{pose: %{x: x, y: y, heading: heading}, uncertainty: metres}) do
+      degrees = round(heading * 180 / :math.pi())
+
+      "(#{fixed(x)}, #{fixed(y)}, #{degrees} deg)" <>
+        if(metres, do: " #{within(metres)},", else: "")
+    end
+
+    defp within(metres), do: "±#{fixed(metres)} m"
+
+    defp unsure(%{unsure: false}), do: nil
+    defp unsure(%{uncertainty: nil}), do: "in its slot, but NOT SURE of its place"
+
+    defp unsure(%{uncertainty: metres}),
+      do: "in its slot, but NOT SURE of its place (#{within(metres)})"
 
     defp speed(status),
       do: "#{fixed(status.speed)} m/s" <> if(status.by, do: " by #{status.by}", else: "")
@@ -192,6 +215,7 @@ defmodule Swarm.Status do
         status.fault && "FAULT (#{status.fault})",
         Enum.any?(status.limits, &("#{&1}" == "blind")) && "BLIND (no sonar; slow)",
         hung(status.hung),
+        unsure(status),
         status.blocked_by && "BLOCKED by #{status.blocked_by}",
         status.leader && "leader #{status.leader}",
         status.view && "view #{elem(status.view, 0)}",

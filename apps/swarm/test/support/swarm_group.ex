@@ -6,6 +6,7 @@ defmodule Swarm.Group do
   """
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.{Behaviour, Percept}
+  alias Robot.Localiser.Anchors
   alias Swarm.{Heartbeat, Message, Peers, Stop}
   alias Swarm.Missions.Landmark
 
@@ -50,6 +51,7 @@ defmodule Swarm.Group do
       claim: %{},
       goal: nil,
       goal_ms: 0,
+      frame: nil,
       phases: [:idle]
     }
 
@@ -132,6 +134,7 @@ defmodule Swarm.Group do
       at_ms: group.now,
       profile: Profile.magellan(),
       pose: robot.pose,
+      uncertainty: %{radius: 0.05, position: 0.02, heading: 0.01, frame: robot.frame, joins: 0},
       odometry: %Odometry{pose: robot.pose, twist: Twist.zero()},
       peers: Peers.percepts(robot.peers, group.now),
       blobs: blobs(robot.share),
@@ -247,6 +250,9 @@ defmodule Swarm.Group do
 
   defp carry_out({:stage, stage, _facts}, id, group),
     do: %{group | stages: [{stage, id, group.now} | group.stages]}
+
+  defp carry_out({:anchors, %Anchors{frame: frame}}, id, group) when frame != nil,
+    do: put_in(group.robots[id].frame, frame.key)
 
   defp carry_out(_look_or_anchors, _id, group), do: group
 

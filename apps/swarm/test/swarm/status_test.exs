@@ -43,6 +43,57 @@ defmodule Swarm.StatusTest do
         do: assert(Status.Row.decode(:mag1, %{row | hung: junk}, 10) == :error)
   end
 
+  test "the line says how sure the pose is, where anybody knows" do
+    line = fn fields -> inspect(struct!(%Status{robot: :mag1, age_ms: 5}, fields)) end
+    pose = Hal.Pose.new(1.2, 3.4, 1.5708)
+
+    assert line.(pose: pose) =~ "#mag1 idle (1.20, 3.40, 90 deg) 0.00 m/s, hears"
+
+    assert line.(pose: pose, uncertainty: 0.1234) =~
+             "#mag1 idle (1.20, 3.40, 90 deg) ±0.12 m, 0.00 m/s, hears"
+
+    assert line.(uncertainty: 0.1234) =~ "#mag1 idle (pose unknown) 0.00 m/s, hears"
+
+    assert line.(pose: pose, uncertainty: 0.62, unsure: true, leader: :min1) =~
+             " m/s, in its slot, but NOT SURE of its place (±0.62 m), leader min1,"
+
+    assert line.(unsure: true) =~ " m/s, in its slot, but NOT SURE of its place, hears"
+  end
+
+  test "how sure a pose is travels in its row, in whole mm" do
+    status = %Status{robot: :mag1, node: node(), by: :follow, age_ms: 5}
+    sure = %{status | uncertainty: 0.12345, unsure: true}
+    row = Status.Row.encode(sure)
+    assert row.uncertainty == 123
+    assert {:ok, %{uncertainty: 0.123, unsure: true}} = Status.Row.decode(:mag1, row, 10)
+
+    # Who does not know says nothing, as robots of before.
+    none = Status.Row.encode(status)
+    refute is_map_key(none, :uncertainty) or is_map_key(none, :unsure)
+    assert {:ok, %{uncertainty: nil, unsure: false}} = Status.Row.decode(:mag1, none, 10)
+
+    for zero <- [0, 0.0],
+        do: assert(%{uncertainty: 0} = Status.Row.encode(%{sure | uncertainty: zero}))
+
+    # However lost, it can say so.
+    lost = Status.Row.encode(%{sure | uncertainty: 1.0e12})
+    assert {:ok, %{uncertainty: 1.0e5}} = Status.Row.decode(:mag1, lost, 10)
+
+    for junk <- [-1, 0.5, 100_000_001, 10 ** 40, "123", :far, {1}, [1]],
+        do: assert(Status.Row.decode(:mag1, %{row | uncertainty: junk}, 10) == :error)
+
+    for junk <- [nil, 1, "true", :maybe],
+        do: assert(Status.Row.decode(:mag1, %{row | unsure: junk}, 10) == :error)
+  end
+
+  test "a robot without a mission says how sure it is of its pose" do
+    id = robot(:st_sure)
+    assert eventually(fn -> is_float(Swarm.status(id).uncertainty) end)
+    status = Swarm.status(id)
+    assert status.uncertainty >= 0.0 and not status.unsure
+    assert inspect(status) =~ ~r/ deg\) ±\d+\.\d\d m, 0\.00 m\/s/
+  end
+
   test "robots of one node are in each other's view and hear each other, and it says so" do
     for id <- [:st1, :st2], do: robot(id)
     assert eventually(fn -> :st2 in Swarm.status(:st1).hears end)

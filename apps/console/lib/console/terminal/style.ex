@@ -17,6 +17,7 @@ defmodule Console.Terminal.Style do
     dim: "38;5;245",
     good: "38;5;42",
     bad: "1;38;5;203",
+    unsure: "38;5;220",
     prompt: "1;38;5;208"
   }
 

@@ -3,7 +3,7 @@ defmodule Console.Terminal.Table do
   alias Console.Words
   alias Sim.Scene
 
-  @width 32
+  @width 36
 
   @doc "The table's width in characters."
   @spec width() :: pos_integer()
@@ -29,18 +29,20 @@ defmodule Console.Terminal.Table do
   # The leader, then those who need attention, then by name as given.
   defp rank(%{leader?: true}), do: 0
   defp rank(%{state: :blocked}), do: 1
-  defp rank(%{alive: false}), do: 3
-  defp rank(_robot), do: 2
+  defp rank(%{state: :unsure}), do: 2
+  defp rank(%{alive: false}), do: 4
+  defp rank(_robot), do: 3
 
-  defp heading, do: [{"  robot  does        off  sees %", :dim}]
+  defp heading, do: [{"  robot  does       off     ± sees %", :dim}]
 
   defp row(robot) do
     [
       {if(robot.leader?, do: "★ ", else: "  "), :leader},
       {String.pad_trailing("#{robot.id}", 7), name(robot)},
       {String.pad_trailing(does(robot), 9), state(robot)},
-      {String.pad_leading(off(robot), 6), off_style(robot)},
-      {"  ", :plain},
+      {String.pad_leading(off(robot), 5), off_style(robot)},
+      {String.pad_leading(within(robot), 6), within_style(robot)},
+      {" ", :plain},
       sees(robot)
     ]
   end
@@ -52,6 +54,7 @@ defmodule Console.Terminal.Table do
   end
 
   defp does(%{alive: false}), do: "dead"
+  defp does(%{state: :unsure}), do: "not sure"
   defp does(robot), do: robot.state |> Atom.to_string() |> String.slice(0, 8)
 
   defp off(robot) do
@@ -68,6 +71,19 @@ defmodule Console.Terminal.Table do
     end
   end
 
+  # By its own word, where it has any.
+  defp within(%{alive: false}), do: ""
+  defp within(%{uncertainty: nil}), do: ""
+  defp within(%{uncertainty: metres}), do: "±" <> figure(metres)
+
+  # Never wider than four characters.
+  defp figure(metres) when metres < 9.995, do: Words.decimals(metres, 2)
+  defp figure(metres) when metres < 99.95, do: Words.decimals(metres, 1)
+  defp figure(metres), do: Words.decimals(min(metres, 9_999), 0)
+
+  defp within_style(%{state: :unsure}), do: :unsure
+  defp within_style(_robot), do: :dim
+
   defp sees(%{alive: false}), do: {"", :dim}
   defp sees(%{size_ppm: nil}), do: {"–", :dim}
   defp sees(%{size_ppm: ppm}), do: {"◆ #{Words.decimals(ppm / 10_000, 1)}", :landmark}
@@ -78,5 +94,6 @@ defmodule Console.Terminal.Table do
 
   defp state(%{alive: false}), do: :dead
   defp state(%{state: :blocked}), do: :bad
+  defp state(%{state: :unsure}), do: :unsure
   defp state(_robot), do: :plain
 end

@@ -1,40 +1,102 @@
 defmodule Robot.Localiser.Belief do
   @moduledoc """
-  A pose and how sure one is of it: an extended Kalman filter over (x, y, heading), moved by
-  odometry and corrected by one scalar measurement after another. Pure.
+  A pose and how sure one is of it: an extended Kalman filter, moved by odometry and corrected by one
+  scalar measurement after another. Pure.
 
-  The covariance is `{xx, xy, xh, yy, yh, hh}`. Formulas: Siegwart and Nourbakhsh 2004 for odometry,
-  the standard filter else.
+  Its states are x, y and heading, and what makes them wrong again and again:
+
+  | state | is |
+  |---|---|
+  | slip | by which share the robot turns farther to the left than its wheels say, and less far to the right (R74) |
+  | two scales | by which share distances come out too long: by the size of the landmark, by the width of a robot |
+  | x, y of each mark | how far a thing that was told is from where it was told to be |
+
+  With the last, a mark that is seen a thousand times makes nobody surer than its own place is: Smith, Self
+  and Cheeseman 1990. Odometry: Siegwart and Nourbakhsh 2004. What is farther off than three standard
+  deviations is not believed (Bar-Shalom, Li and Kirubarajan 2001).
   """
   alias Hal.Pose
+  alias Robot.Localiser.Covariance
 
-  @start_sd {0.03, 0.03, 0.02}
-  # Standard deviations of odometry: of the way driven, of the angle turned (skid steering slips by
-  # 5 % and more, R74), of angle per metre.
+  # x, y, heading, slip, the scales of the landmark and of robots.
+  @start_sd [0.03, 0.03, 0.02, 0.055, 0.06, 0.08]
+  @own length(@start_sd)
+  # Standard deviations of odometry: of the way driven, of the angle turned, of angle per metre.
   @way_share 0.01
-  @turn_share 0.06
+  @turn_share 0.05
   @turn_per_metre 0.01
-  # What is farther off than three standard deviations is not believed.
+  # How much slip changes, in a radian turned.
+  @slip_change 0.005
   @gate 9.0
   # Where measurements go on contradicting the estimate, it is the estimate that is doubted: a
   # refusal counts two, one that is believed takes one back.
   @doubt 16
-  @doubt_sd {0.3, 0.3, 0.3}
+  @doubt_sd 0.3
+  # Marks beyond these take the place of the one that was seen least lately.
+  @marks 6
+  # A thing that was told to be so far from before is another one, in metres.
+  @elsewhere 1.0
+  # A thing whose place is known better than by this share of what was known, says something new.
+  @surer 0.6
+  # Beyond these nobody knows anything, and linear algebra less: metres, radians.
+  @lost_position 5.0
+  @lost_heading 1.0
 
   @enforce_keys [:pose, :covariance]
-  defstruct @enforce_keys ++ [refused: 0]
+  defstruct @enforce_keys ++ [slip: 0.0, scales: {0.0, 0.0}, marks: [], uses: 0, refused: 0]
 
+  @typedoc "`told` is where it was told to be and how well that was known, `off` how far it is from there."
+  @type mark :: %{
+          key: term(),
+          told: Pose.point(),
+          sd: float(),
+          off: {float(), float()},
+          used: non_neg_integer()
+        }
   @type t :: %__MODULE__{
           pose: Pose.t(),
-          covariance: {float(), float(), float(), float(), float(), float()},
+          covariance: Covariance.t(),
+          slip: float(),
+          scales: {landmark :: float(), robot :: float()},
+          marks: [mark()],
+          uses: non_neg_integer(),
           refused: non_neg_integer()
         }
+  @typedoc "How a measurement changes with x, y and heading, and with the scales."
+  @type slope :: {{float(), float(), float()}, {float(), float()}}
 
   @doc "A robot that was put down at a pose by hand."
   @spec new(Pose.t()) :: t()
-  def new(%Pose{} = pose) do
-    {x, y, heading} = @start_sd
-    %__MODULE__{pose: pose, covariance: {x * x, 0.0, 0.0, y * y, 0.0, heading * heading}}
+  def new(%Pose{} = pose),
+    do: %__MODULE__{pose: pose, covariance: Covariance.diagonal(@start_sd)}
+
+  @doc """
+  Standard deviations: of the position along its worst direction and across it, in metres; of the heading, in
+  radians.
+
+      iex> Robot.Localiser.Belief.sd(Robot.Localiser.Belief.new(Hal.Pose.new(1, 0)))
+      {0.03, 0.03, 0.02}
+  """
+  @spec sd(t()) :: {worst :: float(), least :: float(), heading :: float()}
+  def sd(%__MODULE__{covariance: [[xx, xy | _], [_, yy | _], [_, _, hh | _] | _]}) do
+    half = (xx + yy) / 2
+    root = :math.sqrt((xx - yy) * (xx - yy) / 4 + xy * xy)
+    {root(half + root), root(half - root), root(hh)}
+  end
+
+  defp root(square), do: :math.sqrt(max(square, 0.0))
+
+  @doc """
+  In what distance from the estimate the robot is in 95 of 100 cases, in metres: 1.96 standard deviations of
+  an error along a line, 2.45 of one in all directions, and between them by a fit to the table of circular errors.
+
+      iex> Float.round(Robot.Localiser.Belief.radius(Robot.Localiser.Belief.new(Hal.Pose.new(1, 0))), 3)
+      0.073
+  """
+  @spec radius(t()) :: float()
+  def radius(belief) do
+    {worst, least, _heading} = sd(belief)
+    worst * (1.96 + 0.488 * :math.pow(least / worst, 2.5))
   end
 
   @doc """
@@ -45,60 +107,173 @@ defmodule Robot.Localiser.Belief do
       Hal.Pose.new(1.5, 0)
   """
   @spec move(t(), step :: Pose.t()) :: t()
-  def move(belief, step) do
-    pose = Pose.compose(belief.pose, step)
-    way = :math.sqrt(step.x * step.x + step.y * step.y)
-    # With d the way and h the heading half-way, F = [1 0 -d sin h; 0 1 d cos h; 0 0 1].
-    a = -(pose.y - belief.pose.y)
-    b = pose.x - belief.pose.x
-    {xx, xy, xh, yy, yh, hh} = belief.covariance
-    along = :math.pow(@way_share * way, 2)
-    turned = :math.pow(@turn_share * abs(step.heading), 2) + :math.pow(@turn_per_metre * way, 2)
+  def move(belief, %Pose{x: x, y: y, heading: turn})
+      when x == 0.0 and y == 0.0 and turn == 0.0,
+      do: belief
 
-    covariance = {
-      xx + 2 * a * xh + a * a * hh + along,
-      xy + a * yh + b * xh + a * b * hh,
-      xh + a * hh,
-      yy + 2 * b * yh + b * b * hh + along,
-      yh + b * hh,
-      hh + turned
-    }
+  def move(belief, step) do
+    angle = abs(step.heading)
+    more = belief.slip * angle
+    {c, s} = {:math.cos(more / 2), :math.sin(more / 2)}
+
+    slipped = Pose.new(c * step.x - s * step.y, s * step.x + c * step.y, step.heading + more)
+
+    pose = Pose.compose(belief.pose, slipped)
+    way = :math.sqrt(step.x * step.x + step.y * step.y)
+    along = :math.pow(@way_share * way, 2)
+    turned = :math.pow(@turn_share * angle, 2) + :math.pow(@turn_per_metre * way, 2)
+    slips = @slip_change * @slip_change * angle
+
+    covariance =
+      belief.covariance
+      |> Covariance.carry(&motion(&1, belief.pose.y - pose.y, pose.x - belief.pose.x, angle))
+      |> Covariance.add([along, along, turned, slips])
 
     %{belief | pose: pose, covariance: covariance}
   end
 
+  # F = [1 0 a au/2; 0 1 b bu/2; 0 0 1 u; 0 0 0 1]: the way turns with the heading, half of the slip with it.
+  defp motion([x, y, heading, slip | rest], a, b, u) do
+    [
+      mix(x, a, heading, a * u / 2, slip),
+      mix(y, b, heading, b * u / 2, slip),
+      mix(heading, u, slip, 0.0, slip),
+      slip | rest
+    ]
+  end
+
+  defp mix([], _p, [], _q, []), do: []
+  defp mix([a | as], p, [b | bs], q, [c | cs]), do: [a + p * b + q * c | mix(as, p, bs, q, cs)]
+
   @doc """
-  Corrected by one measurement: its `error` (measured minus expected), how the expected value
-  changes with x, y and heading, and the variance of its noise. K = P H' / S, x + K e, (1 - K H) P.
+  The same pose in the frame of somebody at `at` who is sure of its own pose by these variances only (m2, rad2):
+  its frame may have moved, and turned about it.
   """
-  @spec correct(t(), float(), {float(), float(), float()}, float()) :: t()
-  def correct(belief, error, {a, b, c}, noise) do
-    {xx, xy, xh, yy, yh, hh} = belief.covariance
-    px = xx * a + xy * b + xh * c
-    py = xy * a + yy * b + yh * c
-    ph = xh * a + yh * b + hh * c
-    s = a * px + b * py + c * ph + noise
+  @spec reframe(t(), at :: Pose.point(), position :: float(), heading :: float()) :: t()
+  def reframe(belief, {x, y}, position, heading) do
+    position = min(position, @lost_position * @lost_position)
+    heading = min(heading, @lost_heading * @lost_heading)
+    turn = [y - belief.pose.y, belief.pose.x - x, 1.0]
+    [a, b, c | rest] = belief.covariance
 
-    if error * error > @gate * s do
-      refuse(belief)
-    else
-      {kx, ky, kh} = {px / s, py / s, ph / s}
-      pose = belief.pose
+    rows =
+      for {row, g} <- Enum.zip([a, b, c], turn) do
+        {own, others} = Enum.split(row, 3)
+        for({p, k} <- Enum.zip(own, turn), do: p + heading * g * k) ++ others
+      end
 
-      %__MODULE__{
-        pose: Pose.new(pose.x + kx * error, pose.y + ky * error, pose.heading + kh * error),
-        covariance: {
-          xx - kx * px,
-          xy - kx * py,
-          xh - kx * ph,
-          yy - ky * py,
-          yh - ky * ph,
-          hh - kh * ph
-        },
-        refused: max(belief.refused - 1, 0)
-      }
+    %{belief | covariance: Covariance.add(rows ++ rest, [position, position])}
+  end
+
+  @doc "The variance of what is measured of the pose alone, whose value changes so with x, y and heading."
+  @spec variance(t(), {float(), float(), float()}) :: float()
+  def variance(belief, {a, b, c}) do
+    {_v, variance} = Covariance.project(belief.covariance, [a, b, c])
+    variance
+  end
+
+  @doc """
+  Where a thing is that was told to be at `at`, known by `sd` metres: there, as long as nobody has seen it, and then
+  where it was seen to be.
+  """
+  @spec meet(t(), key :: term(), Pose.point(), sd :: float()) :: {t(), Pose.point()}
+  def meet(belief, key, {x, y} = at, sd) do
+    case Enum.find_index(belief.marks, &(&1.key == key)) do
+      nil ->
+        {add(belief, key, at, sd), at}
+
+      index ->
+        mark = Enum.at(belief.marks, index)
+        moved = Pose.distance(mark.told, at)
+
+        if moved > @elsewhere or sd < @surer * mark.sd do
+          {belief |> drop(index) |> add(key, at, sd), at}
+        else
+          {tell(belief, index, mark, at, sd, moved * moved), shift({x, y}, mark.off)}
+        end
     end
   end
+
+  # Told to be elsewhere, or with less certainty, it may be off by that much more.
+  defp tell(belief, index, mark, at, sd, moved) do
+    less_sure = sd * sd > 2 * mark.sd * mark.sd
+    more = if less_sure, do: sd * sd - mark.sd * mark.sd, else: 0.0
+    mark = %{mark | told: at, sd: if(less_sure, do: sd, else: mark.sd), used: belief.uses}
+
+    %{
+      belief
+      | covariance:
+          Covariance.add(belief.covariance, [moved + more, moved + more], @own + 2 * index),
+        marks: List.replace_at(belief.marks, index, mark),
+        uses: belief.uses + 1
+    }
+  end
+
+  defp add(%{marks: marks} = belief, key, at, sd) when length(marks) >= @marks do
+    {_mark, index} = marks |> Enum.with_index() |> Enum.min_by(fn {mark, _} -> mark.used end)
+    belief |> drop(index) |> add(key, at, sd)
+  end
+
+  defp add(belief, key, at, sd) do
+    mark = %{key: key, told: at, sd: sd, off: {0.0, 0.0}, used: belief.uses}
+
+    %{
+      belief
+      | covariance: Covariance.append(belief.covariance, sd, 2),
+        marks: belief.marks ++ [mark],
+        uses: belief.uses + 1
+    }
+  end
+
+  defp drop(belief, index) do
+    %{
+      belief
+      | covariance: Covariance.drop(belief.covariance, @own + 2 * index, 2),
+        marks: List.delete_at(belief.marks, index)
+    }
+  end
+
+  @doc "Without marks: what they were in is over."
+  @spec forget(t()) :: t()
+  def forget(%__MODULE__{marks: []} = belief), do: belief
+  def forget(belief), do: belief |> drop(length(belief.marks) - 1) |> forget()
+
+  @doc """
+  Corrected by one measurement of a mark (`meet/4`): its `error` (measured minus expected), how the expected value
+  changes, and the variance of its noise. K = P H' / S, x + K e, P - K S K'.
+  """
+  @spec correct(t(), key :: term(), float(), slope(), noise :: float()) :: t()
+  def correct(belief, key, error, {{a, b, c}, {k, l}}, noise) do
+    index = Enum.find_index(belief.marks, &(&1.key == key))
+    slope = [a, b, c, 0.0, k, l] ++ List.duplicate(0.0, 2 * index) ++ [-a, -b]
+    {v, variance} = Covariance.project(belief.covariance, slope)
+    s = variance + noise
+
+    if error * error > @gate * s,
+      do: refuse(belief),
+      else: believe(belief, v, error / s, Covariance.reduce(belief.covariance, v, s))
+  end
+
+  defp believe(belief, [x, y, heading, slip, k, l | marks], share, covariance) do
+    %{pose: pose, scales: {landmark, robot}} = belief
+
+    %{
+      belief
+      | pose: Pose.new(pose.x + x * share, pose.y + y * share, pose.heading + heading * share),
+        slip: belief.slip + slip * share,
+        scales: {landmark + k * share, robot + l * share},
+        marks: shift_marks(belief.marks, marks, share),
+        covariance: covariance,
+        refused: max(belief.refused - 1, 0)
+    }
+  end
+
+  defp shift_marks([], [], _share), do: []
+
+  defp shift_marks([mark | marks], [x, y | rest], share),
+    do: [%{mark | off: shift(mark.off, {x * share, y * share})} | shift_marks(marks, rest, share)]
+
+  defp shift({x, y}, {dx, dy}), do: {x + dx, y + dy}
 
   # Wheels that slip take the estimate farther than odometry admits; then it has to be found again.
   defp refuse(%{refused: refused} = belief) when refused < @doubt,
@@ -109,13 +284,12 @@ defmodule Robot.Localiser.Belief do
   @doc "The same pose, of which one is less sure by decimetres: something happened that nobody measured."
   @spec doubt(t()) :: t()
   def doubt(%__MODULE__{} = belief) do
-    {xx, xy, xh, yy, yh, hh} = belief.covariance
-    {x, y, heading} = @doubt_sd
+    variance = @doubt_sd * @doubt_sd
 
     %{
       belief
       | refused: 0,
-        covariance: {xx + x * x, xy, xh, yy + y * y, yh, hh + heading * heading}
+        covariance: Covariance.add(belief.covariance, [variance, variance, variance])
     }
   end
 end

@@ -59,6 +59,8 @@ defmodule Sim.Fleet.Robot do
   def claim(id) do
     with {:ok, board} <- Board.find(id),
          {:ok, %{state: state, claim: claim}, _at_ms} <- Board.fetch(board, :mission, :infinity) do
+      claim = Map.put_new_lazy(claim, :uncertainty, fn -> uncertainty(board) end)
+
       case state do
         {Manual, phase} when phase not in @over -> Map.put(claim, :phase, :manual)
         _group_or_idle -> claim
@@ -67,6 +69,12 @@ defmodule Sim.Fleet.Robot do
       # Between the fall of a board and the next one.
       :error -> %{}
     end
+  end
+
+  defp uncertainty(board) do
+    with {:ok, %{radius: radius}, _at_ms} <- Board.fetch(board, :uncertainty, :infinity),
+         do: radius,
+         else: (_unknown -> nil)
   end
 
   defp config(%{id: id} = robot, common) do

@@ -38,6 +38,7 @@ defmodule Sim.Trial.Score do
           state: state(claim),
           slot: slot && Pose.point(slot),
           leader?: id == leader,
+          uncertainty: claim[:uncertainty],
           size_ppm: size(claim)
         }
       end
@@ -128,6 +129,7 @@ defmodule Sim.Trial.Score do
       theta: robot.pose.heading,
       slot: if(robot.leader?, do: 0, else: slot && elem(slot, 0)),
       error_m: Scene.slot_error(robot),
+      uncertainty_m: robot.uncertainty,
       size_ppm: robot.size_ppm
     }
   end
@@ -184,6 +186,7 @@ defmodule Sim.Trial.Score do
   defp state(nil), do: :dead
   defp state(%{blocked: true}), do: :blocked
   defp state(%{phase: :follow, in_place: true}), do: :in_place
+  defp state(%{phase: :follow, unsure: true}), do: :unsure
   defp state(%{phase: phase}), do: phase
   defp state(_new), do: :idle
 

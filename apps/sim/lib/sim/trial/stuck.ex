@@ -3,8 +3,8 @@ defmodule Sim.Trial.Stuck do
   The invariant of every run: a follower that cannot get on says so. Judged from outside, by true poses.
   Pure; fed once a second.
 
-  A follower that neither claims to be in place nor says that it is blocked must have come nearer to its
-  slot within 20 s. The time begins again when its slot is another one, or the shape is.
+  A follower that neither claims to be in place, nor says that it is blocked, nor that it stands in its slot as far as
+  it knows and is not sure of it, must have come nearer to its slot within 20 s. The time begins again when its slot is another one, or the shape is.
   """
 
   @silent_ms 20_000
@@ -47,8 +47,8 @@ defmodule Sim.Trial.Stuck do
   def report(stuck), do: Enum.reverse(stuck.told)
 
   # A robot that was stopped claims nothing.
-  defp silent?(%{phase: :follow, in_place: in_place?, blocked: blocked?}),
-    do: not (in_place? or blocked?)
+  defp silent?(%{phase: :follow, in_place: in_place?, unsure: unsure?, blocked: blocked?}),
+    do: not (in_place? or unsure? or blocked?)
 
   defp silent?(_claim), do: false
 

@@ -5,7 +5,7 @@ defmodule Sim.Trial.StuckTest do
   alias Sim.Trial
   alias Sim.Trial.Stuck
 
-  @claim %{phase: :follow, in_place: false, blocked: false}
+  @claim %{phase: :follow, in_place: false, unsure: false, blocked: false}
 
   # One follower for `seconds`; `row` gives its error, and what differs, for a second.
   defp play(seconds, row) do
@@ -23,10 +23,10 @@ defmodule Sim.Trial.StuckTest do
     assert play(60, fn _ -> %{} end) == [%{at_s: 0.0, robot: :a, error_m: 3.0}]
   end
 
-  test "one that comes nearer, stands in place, is blocked or leads is not" do
+  test "one that comes nearer, stands in place, is not sure of it, is blocked or leads is not" do
     assert play(60, &%{error_m: 9.0 - &1 * 0.1}) == []
 
-    for claim <- [%{in_place: true}, %{blocked: true}, %{phase: :lead}],
+    for claim <- [%{in_place: true}, %{unsure: true}, %{blocked: true}, %{phase: :lead}],
         do: assert(play(60, fn _ -> %{claim: Map.merge(@claim, claim)} end) == [])
   end
 

@@ -11,6 +11,7 @@ defmodule Swarm.Missions.Landmark do
   | `Lead` | what the leader tells: the anchor, the order, whether the shape is formed |
   | `Shape` | a shape that there is room for |
   | `Attend` | what a follower does: its slot, its gaze, its child |
+  | `Marks` | what it finds its pose by, and whether it is sure of its place |
   | `Blocker` | what keeps it from its slot |
   | `Merge` | what becomes of two leaders that meet |
   | `Hearing` | whose anchor it believes, and when it joins a leader who names it |
@@ -20,7 +21,8 @@ defmodule Swarm.Missions.Landmark do
   """
   alias Robot.Behaviour
   alias Swarm.{Formation, Message, Relay, Round, Trail}
-  alias Swarm.Missions.Landmark.{Attend, Council, Hearing, Lead, Phases, Policy, Sight, State}
+  alias Swarm.Missions.Landmark.{Attend, Council, Hearing, Lead, Marks}
+  alias Swarm.Missions.Landmark.{Phases, Policy, Sight, State}
 
   @behaviour Robot.Mission
 
@@ -285,13 +287,19 @@ defmodule Swarm.Missions.Landmark do
           }
         ),
       standing: standing?(mission),
+      sd: Marks.told(mission),
+      uncertainty: uncertainty(mission.percept),
       in_place: mission.phase == :follow and mission.attend.in_place?,
+      unsure: mission.phase == :follow and mission.attend.unsure?,
       blocked: mission.phase == :follow and mission.attend.blocked?,
       blocked_by: if(mission.phase == :follow, do: mission.attend.blocker),
       formed: leading? and mission.lead.formed?,
       anchor: if(leading?, do: mission.anchor)
     }
   end
+
+  defp uncertainty(%{uncertainty: %{radius: radius}}), do: radius
+  defp uncertainty(_no_pose), do: nil
 
   defp standing?(%{phase: :lead, percept: percept}), do: State.slow?(percept, 0.05)
   defp standing?(%{phase: :follow} = mission), do: mission.attend.holding?

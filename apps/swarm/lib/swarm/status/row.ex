@@ -2,7 +2,8 @@ defmodule Swarm.Status.Row do
   @moduledoc """
   A robot's status as a row of the blackboard, for those that it cannot answer: small, in whole
   numbers (mm, mrad, mm/s) and text. Pure. Of wheels that may turn, as nearly always, it says nothing,
-  and nothing of devices that are there, nor of hanging where nothing hangs.
+  and nothing of devices that are there, nor of hanging where nothing hangs. How sure the pose is stands in mm under
+  `uncertainty`, where it is known.
   """
   alias Hal.Pose
   alias Swarm.{Shape, Status}
@@ -10,6 +11,8 @@ defmodule Swarm.Status.Row do
 
   # Longer than any name; what comes from outside is not printed at any length.
   @words 80
+  # In mm: whoever is less sure than 100 km tells that.
+  @unsure_mm 100_000_000
 
   @doc "A status as it travels."
   @spec encode(Status.t()) :: map()
@@ -38,12 +41,22 @@ defmodule Swarm.Status.Row do
     |> fault(status.fault)
     |> blocked(status.blocked_by)
     |> hung(status.hung)
+    |> uncertain(status.uncertainty)
+    |> unsure(status.unsure)
   end
 
   defp hung(row, nil), do: row
 
   defp hung(row, {what, where, ago_ms}),
     do: Map.put(row, :hung, {Atom.to_string(what), where, ago_ms})
+
+  defp uncertain(row, nil), do: row
+
+  defp uncertain(row, metres),
+    do: Map.put(row, :uncertainty, min(mm(metres), @unsure_mm))
+
+  defp unsure(row, true), do: Map.put(row, :unsure, true)
+  defp unsure(row, false), do: row
 
   defp fault(row, nil), do: row
   defp fault(row, line), do: Map.put(row, :fault, line)
@@ -80,6 +93,9 @@ defmodule Swarm.Status.Row do
          fault = Map.get(row, :fault),
          {:ok, blocked_by} <- text(Map.get(row, :blocked_by)),
          {:ok, hung} <- hangs(Map.get(row, :hung), age_ms),
+         {:ok, uncertainty} <- metres(Map.get(row, :uncertainty)),
+         unsure = Map.get(row, :unsure, false),
+         true <- is_boolean(unsure),
          true <- Enum.all?([limits, offline, members, deaf_to, words], &texts?/1),
          true <- Enum.all?([node, state], &is_binary/1),
          true <- Enum.all?([by, leader, fault], &(&1 == nil or is_binary(&1))),
@@ -97,11 +113,13 @@ defmodule Swarm.Status.Row do
          state: Wire.word(state),
          by: by && Wire.word(by),
          pose: pose && place(pose),
+         uncertainty: uncertainty,
          speed: speed / 1000,
          limits: Enum.map(limits, &Wire.word/1),
          estop: estop,
          arming: arming,
          leader: leader && Wire.word(leader),
+         unsure: unsure,
          blocked_by: blocked_by,
          hung: hung,
          power: power,
@@ -137,6 +155,10 @@ defmodule Swarm.Status.Row do
   end
 
   defp hangs(_other, _age_ms), do: :error
+
+  defp metres(nil), do: {:ok, nil}
+  defp metres(mm) when is_integer(mm) and mm in 0..@unsure_mm, do: {:ok, mm / 1000}
+  defp metres(_other), do: :error
 
   defp texts?(list), do: Shape.list?(list, &is_binary/1)
   defp names(texts), do: for(text <- texts, {:ok, name} <- [Wire.robot(text)], do: name)

@@ -5,12 +5,15 @@ defmodule Swarm.Missions.Landmark.Attend do
 
   Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard). Meanwhile
   it looks at the landmark, since the next it may be asked for is how large it sees it.
+
+  One that stands in its slot by its own estimate, and does not know its place well enough to say so
+  (`Swarm.Missions.Landmark.Marks.sure?/2`), is `unsure?`: neither in place nor blocked.
   """
   alias Hal.Pose
   alias Robot.{Behaviour, Gaze}
   alias Robot.Behaviour.Avoid.Neighbours
   alias Swarm.{Chain, Message}
-  alias Swarm.Missions.Landmark.{Blocker, Places, State}
+  alias Swarm.Missions.Landmark.{Blocker, Marks, Places, State}
 
   @lease_ms 1_000
   @in_place 0.25
@@ -19,10 +22,6 @@ defmodule Swarm.Missions.Landmark.Attend do
   # The camera looks at the landmark and at the robot ahead in turn.
   @gaze_ms 1_500
   @landmark_radius 0.15
-  @robot_colour "RedRobot"
-  # How well the places that were told are known, in metres.
-  @landmark_sd 0.08
-  @robot_sd 0.1
 
   # A slot is blocked when something unknown stands in it for so long, or no way leads nearer.
   @obstacle_ms 2_000
@@ -35,6 +34,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   @elsewhere 1.0
 
   defstruct in_place?: false,
+            unsure?: false,
             holding?: false,
             blocked?: false,
             blocker: nil,
@@ -55,6 +55,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   """
   @type t :: %__MODULE__{
           in_place?: boolean(),
+          unsure?: boolean(),
           holding?: boolean(),
           blocked?: boolean(),
           blocker: Blocker.t() | nil,
@@ -93,7 +94,15 @@ defmodule Swarm.Missions.Landmark.Attend do
   defp wait(attend, age_ms) do
     silent? = age_ms >= @late_ms
     blocker = if silent?, do: :no_anchor
-    %{attend | in_place?: false, holding?: true, blocked?: silent?, blocker: blocker}
+
+    %{
+      attend
+      | in_place?: false,
+        unsure?: false,
+        holding?: true,
+        blocked?: silent?,
+        blocker: blocker
+    }
   end
 
   defp attend(mission, {slot, velocity}, age_ms) do
@@ -101,6 +110,8 @@ defmodule Swarm.Missions.Landmark.Attend do
     slow? = State.slow?(mission.percept, @slow)
     {vx, vy} = velocity
     resting? = slow? and vx * vx + vy * vy < @slow * @slow
+    there? = slow? and error <= @in_place
+    sure? = Marks.sure?(mission, error)
 
     {told, place} = pass_on(mission)
 
@@ -109,11 +120,12 @@ defmodule Swarm.Missions.Landmark.Attend do
       | place: slot,
         attend: %{
           mission.attend
-          | in_place?: slow? and error <= @in_place,
+          | in_place?: there? and sure?,
+            unsure?: there? and not sure?,
             holding?: resting? and error <= @near,
             told: told,
             # Where the landmark stood when this robot was last in place, or began to follow.
-            landmark: landmark(mission, slow? and error <= @in_place)
+            landmark: landmark(mission, there?)
         }
     }
 
@@ -121,11 +133,13 @@ defmodule Swarm.Missions.Landmark.Attend do
     options = [target: slot, velocity: velocity, discs: discs(mission.anchor)]
     goal = {:goal, {:slot, mission.epoch}, {Behaviour.Follow, options}}
 
-    {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, references(mission)}]}
+    {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, Marks.anchors(mission)}]}
   end
 
-  defp block(%{attend: %{in_place?: true} = attend} = mission, slot, error),
-    do: fresh(attend, slot, error, mission.now_ms)
+  # Nothing blocks a robot that stands where it wants to be, as far as it knows.
+  defp block(%{attend: %{in_place?: in_place?, unsure?: unsure?} = attend} = mission, slot, error)
+       when in_place? or unsure?,
+       do: fresh(attend, slot, error, mission.now_ms)
 
   defp block(%{attend: attend, now_ms: now} = mission, slot, error) do
     cond do
@@ -144,8 +158,9 @@ defmodule Swarm.Missions.Landmark.Attend do
   end
 
   # Farther off, or where the slot trembles, time alone tells that a robot does not get on.
-  defp late(%{in_place?: true} = attend, _mission, _slot, _error),
-    do: %{attend | late: nil, blocker: nil}
+  defp late(%{in_place?: in_place?, unsure?: unsure?} = attend, _mission, _slot, _error)
+       when in_place? or unsure?,
+       do: %{attend | late: nil, blocker: nil}
 
   defp late(attend, %{anchor: anchor, now_ms: now} = mission, slot, error) do
     shape = {anchor.leader, anchor.formation}
@@ -212,46 +227,6 @@ defmodule Swarm.Missions.Landmark.Attend do
       {x, y} -> [{x, y, @landmark_radius}]
     end
   end
-
-  # Only those ahead in the order: corrections run one way, from the leader down.
-  defp references(%{anchor: anchor, percept: percept} = mission) do
-    {leader, _twist} = Places.leader(anchor, mission.now_ms - mission.anchor_ms)
-    ahead = Enum.take_while(anchor.order, &(&1 != mission.me))
-
-    robots =
-      for id <- [anchor.leader | ahead], peer = percept.peers[id], standing?(peer) do
-        at = if id == anchor.leader, do: leader, else: peer.pose
-
-        %{
-          colour: @robot_colour,
-          at: Pose.point(at),
-          sd: @robot_sd,
-          range?: false,
-          radius: peer.radius
-        }
-      end
-
-    # A landmark that moves is somewhere else by now.
-    if anchor.still and anchor.landmark != nil do
-      landmark = %{
-        colour: mission.colour,
-        at: Places.landmark(anchor),
-        sd: @landmark_sd,
-        range?: true,
-        radius: nil
-      }
-
-      [landmark | robots]
-    else
-      robots
-    end
-  end
-
-  # What a moving robot told is where it was.
-  defp standing?(%{mode: :moving, twist: twist}),
-    do: abs(twist.linear) < @slow and abs(twist.turn) < @slow
-
-  defp standing?(_holding), do: true
 
   # Pan towards the landmark or towards the robot ahead, whichever's turn it is and can be seen.
   defp look(%{anchor: anchor, percept: percept} = mission, age_ms) do

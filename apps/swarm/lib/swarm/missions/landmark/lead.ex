@@ -5,6 +5,7 @@ defmodule Swarm.Missions.Landmark.Lead do
   shape is formed. Pure.
   """
   alias Robot.Behaviour
+  alias Robot.Localiser.Anchors
   alias Swarm.{Anchor, Assignment, Chain, Formation, Message, Peers, Roll}
   alias Swarm.Missions.Landmark.{Council, Merge, Shape, Sight, State}
 
@@ -104,7 +105,7 @@ defmodule Swarm.Missions.Landmark.Lead do
         do: [],
         else: [{:send, told, Message.new(mission.me, :place, mission.anchor)}]
 
-    {mission, formed ++ lost ++ place ++ [goal(mission), {:look, 0.0}, {:anchors, []}]}
+    {mission, formed ++ lost ++ place ++ [goal(mission), {:look, 0.0}, {:anchors, %Anchors{}}]}
   end
 
   # By when so many followers as a majority needs have told that they hear this leader.
@@ -204,6 +205,9 @@ defmodule Swarm.Missions.Landmark.Lead do
       sequence: sequence,
       pose: State.millimetres(percept.pose),
       twist: twist(percept),
+      sd: sd(percept.uncertainty),
+      frame: percept.uncertainty.joins,
+      base: percept.uncertainty.frame,
       formation: lead.shape.formation,
       asked: mission.formation,
       asked_no: mission.asked_no,
@@ -218,6 +222,9 @@ defmodule Swarm.Missions.Landmark.Lead do
 
     %{mission | anchor: anchor, lead: %{lead | sequence: sequence}}
   end
+
+  defp sd(%{position: position, heading: heading}),
+    do: {round(position * 1000), round(heading * 1000)}
 
   # A crawl is told as standing still, so that no slot trembles.
   defp twist(%{odometry: %{twist: %{linear: linear, turn: turn}}}) do

@@ -114,11 +114,13 @@ defmodule Swarm.Missions.Landmark.Shape do
   end
 
   # Somebody says that it is blocked, and all others have come to rest in their places: as long as
-  # some are under way, what stands in the way may be one of them.
+  # some are under way, what stands in the way may be one of them. One that is not sure of its place stands, too.
   defp blocked?(mission) do
     beats = Peers.taking_part(mission.percept.peers, mission.now_ms)
     followers = for id <- mission.order, beat = beats[id], do: beat
-    Enum.any?(followers, & &1.blocked) and Enum.all?(followers, &(&1.blocked or &1.in_place))
+
+    Enum.any?(followers, & &1.blocked) and
+      Enum.all?(followers, &(&1.blocked or &1.in_place or &1.unsure))
   end
 
   defp formation(asked, 0), do: {asked, false}

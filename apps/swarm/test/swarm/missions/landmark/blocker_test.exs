@@ -50,8 +50,12 @@ defmodule Swarm.Missions.Landmark.BlockerTest do
       assign: :cost,
       leader_change?: true,
       phase: :follow,
+      leader: :mag1,
+      epoch: 1,
       attend: Attend.new()
     }
+
+    sure = %{radius: 0.1, position: 0.05, heading: 0.02, frame: {:mag1, 0}, joins: 1}
 
     Enum.reduce(0..(seconds * 10), mission, fn tick, mission ->
       now = tick * 100
@@ -71,7 +75,7 @@ defmodule Swarm.Missions.Landmark.BlockerTest do
         still: true
       }
 
-      percept = percept(at_ms: now)
+      percept = percept(at_ms: now, uncertainty: sure)
       mission = %{mission | anchor: anchor, anchor_ms: now, percept: percept, now_ms: now}
       {mission, _effects} = Attend.act(mission)
       mission

@@ -1,0 +1,40 @@
+defmodule Robot.Localiser.Anchors do
+  @moduledoc """
+  What a mission tells the localiser to find its pose by: in whose frame, and which things are where. Pure data.
+
+  The frame is that of a robot that nobody corrects, the leader: what it believes of its own pose is so by definition,
+  and what it is unsure of, all others are unsure of. The variances are of its belief in the frame that it was in
+  before it led (`base`), and only grow while it leads.
+  """
+  alias Hal.Pose
+
+  defstruct frame: nil, marks: []
+
+  @typedoc """
+  `key` tells one frame from another, `base` is the key of the one that its variances (m2, rad2) are in, `nil` for that of the
+  start poses; `at` is where its robot believes to be.
+  """
+  @type frame :: %{
+          key: term(),
+          base: term(),
+          at: Pose.point(),
+          position: float(),
+          heading: float()
+        }
+
+  @typedoc """
+  Something of a colour at a place (metres, in the frame). `sd` is how well the place is known, in metres; with
+  `nil` it may be seen and taken for another, but nothing is measured by it. A `:landmark` is the only thing of
+  its colour; of robots there are many, and only a blob as wide as a cylinder of the `radius` (metres) is one.
+  """
+  @type mark :: %{
+          key: term(),
+          kind: :landmark | :robot,
+          colour: String.t(),
+          at: Pose.point(),
+          sd: float() | nil,
+          radius: float()
+        }
+
+  @type t :: %__MODULE__{frame: frame() | nil, marks: [mark()]}
+end

@@ -1,0 +1,100 @@
+defmodule Robot.Localiser.Covariance do
+  @moduledoc """
+  A covariance matrix as a list of its rows, and what an extended Kalman filter does with it. Pure.
+
+  Sizes stay below 20, so that lists are as fast as anything.
+  """
+
+  @type t :: [[float()]]
+
+  @doc """
+  A matrix with these standard deviations and no correlation.
+
+      iex> Robot.Localiser.Covariance.diagonal([0.5, 2.0])
+      [[0.25, 0.0], [0.0, 4.0]]
+  """
+  @spec diagonal([float()]) :: t()
+  def diagonal(sds) do
+    for {sd, i} <- Enum.with_index(sds),
+        do: for({_sd, j} <- Enum.with_index(sds), do: if(i == j, do: sd * sd, else: 0.0))
+  end
+
+  @doc """
+  F P F', where `rows` computes F A of the rows of any matrix A.
+
+      iex> Robot.Localiser.Covariance.carry([[1.0, 0.0], [0.0, 4.0]], fn [a, b] -> [b, a] end)
+      [[4.0, 0.0], [0.0, 1.0]]
+  """
+  @spec carry(t(), (t() -> t())) :: t()
+  def carry(p, rows), do: p |> rows.() |> transpose() |> rows.()
+
+  defp transpose(rows), do: Enum.zip_with(rows, & &1)
+
+  @doc """
+  With more variance in the first states, one for each of the list.
+
+      iex> Robot.Localiser.Covariance.add([[1.0, 0.5], [0.5, 1.0]], [2.0])
+      [[3.0, 0.5], [0.5, 1.0]]
+  """
+  @spec add(t(), [float()]) :: t()
+  def add(p, variances), do: add(p, variances, 0)
+
+  @doc "The same from the state `index` on."
+  @spec add(t(), [float()], index :: non_neg_integer()) :: t()
+  def add(p, variances, index) do
+    variances
+    |> Enum.with_index(index)
+    |> Enum.reduce(p, fn {variance, i}, p ->
+      List.update_at(p, i, fn row -> List.update_at(row, i, &(&1 + variance)) end)
+    end)
+  end
+
+  @doc """
+  With new states of this standard deviation behind the others, correlated with nothing.
+
+      iex> Robot.Localiser.Covariance.append([[1.0]], 0.5, 1)
+      [[1.0, 0.0], [0.0, 0.25]]
+  """
+  @spec append(t(), sd :: float(), count :: pos_integer()) :: t()
+  def append(p, sd, count) do
+    beside = List.duplicate(0.0, count)
+    above = List.duplicate(0.0, length(p))
+    new = diagonal(List.duplicate(sd, count))
+    Enum.map(p, &(&1 ++ beside)) ++ Enum.map(new, &(above ++ &1))
+  end
+
+  @doc """
+  Without these states.
+
+      iex> Robot.Localiser.Covariance.drop([[1.0, 2.0, 3.0], [2.0, 5.0, 6.0], [3.0, 6.0, 9.0]], 1, 2)
+      [[1.0]]
+  """
+  @spec drop(t(), index :: non_neg_integer(), count :: pos_integer()) :: t()
+  def drop(p, index, count) do
+    cut = fn list -> Enum.take(list, index) ++ Enum.drop(list, index + count) end
+    p |> cut.() |> Enum.map(cut)
+  end
+
+  @doc """
+  P H' and H P H' of a measurement whose expected value changes by `slope` (H) with the states; states that
+  are not in it do not change it.
+
+      iex> Robot.Localiser.Covariance.project([[2.0, 1.0], [1.0, 3.0]], [1.0])
+      {[2.0, 1.0], 2.0}
+  """
+  @spec project(t(), slope :: [float()]) :: {[float()], float()}
+  def project(p, slope) do
+    v = Enum.map(p, &dot(&1, slope))
+    {v, dot(v, slope)}
+  end
+
+  @doc "P - v v' / s: what is left of it after a measurement (`project/2`) of the variance `s`."
+  @spec reduce(t(), [float()], float()) :: t()
+  def reduce(p, v, s), do: for({row, x} <- Enum.zip(p, v), do: less(row, v, x / s))
+
+  defp dot([x | xs], [y | ys]), do: x * y + dot(xs, ys)
+  defp dot(_xs, _ys), do: 0.0
+
+  defp less([], [], _k), do: []
+  defp less([x | xs], [v | vs], k), do: [x - k * v | less(xs, vs, k)]
+end

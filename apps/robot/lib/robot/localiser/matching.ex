@@ -1,0 +1,126 @@
+defmodule Robot.Localiser.Matching do
+  @moduledoc """
+  Which blob is which robot: data association for things that all look the same. Pure.
+
+  A blob can be a robot where it is seen about there and about as wide as that robot would be. Where a
+  blob could well be several robots, or a robot several blobs, nothing is said. A blob that is wider is that of
+  several in line, one that is narrower is half hidden: then the robot's direction is less sure (`slack`).
+  """
+  alias Hal.Pose
+  alias Robot.Localiser.{Anchors, Belief}
+  alias Robot.Sighting
+  alias Vision.Blob
+
+  # Within this angle a robot is always looked for; one whose direction is less sure than that is not measured
+  # by, nor one whose distance is less sure than this share of it. Radians, and shares.
+  @narrow 0.12
+  @wide 2.0
+  @doubt 0.8
+  # A place of which nobody says how well it is known, and a doubt of a distance that changes nothing, in metres.
+  @unknown 0.3
+  @surely 0.3
+  # Standard deviations of a direction (radians), and of a width, as a logarithm: others beside it make a blob wider,
+  # others before it narrower.
+  @bearing_sd 0.04
+  @wider_sd 0.2
+  @narrower_sd 0.5
+  # So many standard deviations, squared, off it is not the robot, or so much worse than another.
+  @unlike 9.0
+  @worse 4.0
+  # A blob that is measured by is not farther off in width than this, as a logarithm; and if within that one, it is whole.
+  @fits 0.45
+  @whole 0.15
+  # What stands so far behind another, in metres, is hidden by it.
+  @behind 0.5
+
+  @type pair :: %{
+          mark: Anchors.mark(),
+          blob: Blob.t(),
+          slack: float(),
+          whole?: boolean()
+        }
+
+  @doc "The robots among the marks that are seen for sure, each with its blob, in the order of the marks."
+  @spec pairs([Anchors.mark()], [Blob.t()], Belief.t(), Pose.t(), pan :: float(), view :: float()) ::
+          [pair()]
+  def pairs(robots, blobs, belief, exposed, pan, view) do
+    candidates =
+      for mark <- robots,
+          blob <- blobs,
+          c = candidate(mark, blob, belief, exposed, pan, view),
+          do: c
+
+    for %{mark: mark, blob: blob} = one <- candidates,
+        mark.sd != nil and one.sure? and not cut?(blob) and one.width < @fits,
+        Enum.all?(candidates, &(&1.cost > one.cost + @worse or not rivals?(one, &1))) do
+      %{mark: mark, blob: blob, slack: one.slack, whole?: one.width < @whole}
+    end
+  end
+
+  # The same robot another blob, or the same blob another robot, which this one does not hide.
+  defp rivals?(%{mark: mark, blob: blob}, %{mark: mark, blob: other}), do: blob != other
+  defp rivals?(%{blob: blob} = one, %{blob: blob} = other), do: not hides?(one, other)
+  defp rivals?(_one, _other), do: false
+
+  defp hides?(near, far) do
+    far.distance > near.distance + @behind and
+      abs(Pose.wrap(far.expected - near.expected)) < near.half
+  end
+
+  # At the left or right border; above and below a robot may be cut off.
+  defp cut?(blob), do: blob.left == 0 or blob.right == blob.width - 1
+
+  defp candidate(%{colour: colour} = mark, %{colour: colour} = blob, belief, exposed, pan, view) do
+    distance = Pose.distance(exposed, mark.at)
+    width = Sighting.width(mark.radius, distance, blob.width, view)
+
+    if width != nil do
+      share = (blob.right - blob.left + 1) / width
+      half = :math.asin(mark.radius / distance)
+      expected = Pose.bearing(exposed, mark.at)
+      seen = Sighting.bearing(blob, pan, view)
+      {bearing_sd, distance_sd} = sds(mark, distance, belief, exposed)
+      # What nobody knows of the distance makes the blob wider or narrower.
+      doubt = 2 * max(distance_sd - @surely, 0.0) / distance
+      slack = abs(share - 1) * half
+      off = max(abs(Pose.wrap(seen - expected)) - slack, 0.0)
+      cost = cost(off, bearing_sd, :math.log(share), doubt)
+
+      if off < max(3 * bearing_sd, @narrow) and cost < @unlike do
+        %{
+          mark: mark,
+          blob: blob,
+          distance: distance,
+          expected: expected,
+          half: half,
+          slack: slack,
+          width: abs(:math.log(share)),
+          cost: cost,
+          sure?: 3 * bearing_sd < @wide and doubt < @doubt
+        }
+      end
+    end
+  end
+
+  defp candidate(_mark, _blob_of_another_colour, _belief, _exposed, _pan, _view), do: nil
+
+  # Squares of standard deviations in direction and width.
+  defp cost(off, bearing_sd, width, doubt) do
+    sd = if width > 0, do: @wider_sd, else: @narrower_sd
+    width = max(abs(width) - doubt, 0.0) / sd
+    bearing = off / max(bearing_sd, @bearing_sd)
+    bearing * bearing + width * width
+  end
+
+  # How far off, in direction and distance, it may be seen.
+  defp sds(%{at: {x, y}, sd: sd}, distance, belief, exposed) do
+    {dx, dy} = {x - exposed.x, y - exposed.y}
+    square = max(distance * distance, 0.09)
+    place = (sd || @unknown) * (sd || @unknown)
+    across = Belief.variance(belief, {dy / square, -dx / square, -1.0})
+    along = Belief.variance(belief, {-dx / distance, -dy / distance, 0.0})
+
+    {:math.sqrt(across + place / square + @bearing_sd * @bearing_sd / 4),
+     :math.sqrt(along + place)}
+  end
+end

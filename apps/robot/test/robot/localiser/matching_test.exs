@@ -1,0 +1,102 @@
+defmodule Robot.Localiser.MatchingTest do
+  use ExUnit.Case, async: true
+  alias Hal.Pose
+  alias Robot.Localiser.{Belief, Matching}
+  alias Robot.Sighting
+  alias Vision.Blob
+
+  @view :math.pi() / 3
+  @here Pose.new(0, 0)
+
+  defp robot(key, at, options \\ []),
+    do:
+      Map.merge(
+        %{key: key, kind: :robot, colour: "R", at: at, sd: 0.05, radius: 0.2},
+        Map.new(options)
+      )
+
+  # A cylinder in the picture, `share` times as wide as it is.
+  defp blob({x, y}, radius \\ 0.2, share \\ 1.0) do
+    focal = 160 / :math.tan(@view / 2)
+    column = 159.5 - focal * y / x
+    half = share * Sighting.width(radius, :math.sqrt(x * x + y * y), 320, @view) / 2
+
+    %Blob{
+      colour: "R",
+      area: 500,
+      share: 0.0065,
+      x: column,
+      y: 120.0,
+      left: max(round(column - half), 0),
+      right: min(round(column + half) - 1, 319),
+      top: 60,
+      bottom: 180,
+      width: 320,
+      height: 240
+    }
+  end
+
+  defp pairs(robots, blobs, belief \\ Belief.new(@here)) do
+    for %{mark: mark, blob: blob, whole?: whole?} <-
+          Matching.pairs(robots, blobs, belief, @here, 0.0, @view),
+        do: {mark.key, Enum.find_index(blobs, &(&1 == blob)), whole?}
+  end
+
+  test "each robot is the blob where it is expected and as wide as it is" do
+    robots = [robot(:mag2, {2.0, 0.6}), robot(:mag3, {3.0, -0.9})]
+    blobs = [blob({3.0, -0.9}), blob({2.0, 0.6})]
+    assert pairs(robots, blobs) == [{:mag2, 1, true}, {:mag3, 0, true}]
+  end
+
+  test "of two that stand in line the near one is seen" do
+    robots = [robot(:mag2, {1.0, 0.0}), robot(:mag3, {2.0, 0.0})]
+    assert pairs(robots, [blob({1.0, 0.0})]) == [{:mag2, 0, true}]
+  end
+
+  test "what may be either of two is neither, and so is what may be one that nothing is measured by" do
+    assert pairs([robot(:mag2, {2.0, 0.1}), robot(:mag3, {2.2, -0.1})], [blob({2.0, 0.0})]) == []
+    moving = robot(:mag3, {2.2, -0.1}, sd: nil)
+    assert pairs([robot(:mag2, {2.0, 0.1}), moving], [blob({2.0, 0.0})]) == []
+    assert pairs([robot(:mag2, {2.0, 0.1})], [blob({2.0, 0.0})]) == [{:mag2, 0, true}]
+  end
+
+  test "a robot that may be either of two blobs is neither" do
+    robots = [robot(:mag2, {2.0, 0.0})]
+    assert pairs(robots, [blob({2.0, 0.1}), blob({2.0, -0.15})]) == []
+  end
+
+  test "what is half hidden, or several in one, tells a direction less surely, and no distance" do
+    robots = [robot(:mag2, {1.0, 0.0})]
+    whole = blob({1.0, 0.0})
+    [%{slack: slack}] = Matching.pairs(robots, [whole], Belief.new(@here), @here, 0.0, @view)
+    assert slack < 0.01
+
+    for share <- [0.75, 1.3] do
+      part = blob({1.0, 0.0}, 0.2, share)
+      assert pairs(robots, [part]) == [{:mag2, 0, false}]
+      [%{slack: slack}] = Matching.pairs(robots, [part], Belief.new(@here), @here, 0.0, @view)
+      assert_in_delta slack, abs(share - 1) * :math.asin(0.2), 0.01
+    end
+
+    assert pairs(robots, [blob({1.0, 0.0}, 0.2, 0.5)]) == []
+    assert pairs(robots, [blob({1.0, 0.0}, 0.2, 1.8)]) == []
+  end
+
+  test "a blob at the border, of another colour, or elsewhere is none" do
+    robots = [robot(:mag2, {2.0, 0.0})]
+    assert pairs(robots, [%{blob({2.0, 0.0}) | left: 0}]) == []
+    assert pairs(robots, [%{blob({2.0, 0.0}) | right: 319}]) == []
+    assert pairs(robots, [%{blob({2.0, 0.0}) | colour: "Y"}]) == []
+    assert pairs(robots, [blob({2.0, 0.8})]) == []
+    # Above and below it may be cut.
+    assert pairs(robots, [%{blob({2.0, 0.0}) | bottom: 239, clipped?: true}]) != []
+  end
+
+  test "one that is unsure of itself looks farther" do
+    robots = [robot(:mag2, {2.0, 0.0})]
+    blobs = [blob({2.0, 0.8})]
+    unsure = Belief.reframe(Belief.new(@here), {2.0, 5.0}, 0.2, 0.0)
+    assert pairs(robots, blobs) == []
+    assert pairs(robots, blobs, unsure) == [{:mag2, 0, true}]
+  end
+end
