@@ -1,6 +1,7 @@
 defmodule Swarm.Mesh.RefusalsTest do
   @moduledoc "Real nodes with certificates: one listens, others knock."
-  use ExUnit.Case, async: false
+  # Nobody else has these ports.
+  use ExUnit.Case, async: true
   alias Swarm.Mesh.{Certs, Refusals}
 
   @moduletag :tmp_dir
