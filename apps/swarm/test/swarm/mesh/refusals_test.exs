@@ -1,7 +1,6 @@
 defmodule Swarm.Mesh.RefusalsTest do
   @moduledoc "Real nodes with certificates: one listens, others knock."
-  # Nobody else has these ports.
-  use ExUnit.Case, async: true
+  use ExUnit.Case, async: false
   alias Swarm.Mesh.{Certs, Refusals}
 
   @moduletag :tmp_dir
