@@ -3,7 +3,8 @@ defmodule Hal.Odometry do
   What the wheels say: the pose in the robot's own `odom` frame, and the present speed.
 
   Poses belong together as long as `frame` is the same. A driver that had to begin again at zero, because
-  its process fell, says another one: between the two nobody knows how far the robot went.
+  its process fell, says another one, and so does one whose base's counters jumped, because its controller was
+  switched off and on: between the two nobody knows how far the robot went.
   """
 
   @enforce_keys [:pose, :twist]

@@ -9,7 +9,8 @@ defmodule Swarm.MeshNodes do
       Swarm.MeshNodes.signal(hd(nodes), "KILL")
 
   `start/2` takes `mesh: false` for nodes without a mesh, mesh options under `mesh: [...]`, further
-  arguments of the VM under `args:`, `robots: true` for a robot with fake wheels on each node, of the node's name.
+  arguments of the VM under `args:`, `robots: true` for a robot with fake wheels on each node, of the node's name,
+  `one_by_one: true` for nodes that join the fleet in their order, not all at once.
   """
   import ExUnit.Callbacks, only: [on_exit: 1]
   alias Swarm.Mesh.Secret
@@ -33,15 +34,25 @@ defmodule Swarm.MeshNodes do
 
     names
     |> Enum.map(&Task.async(fn -> boot(&1, options) end))
-    |> Enum.map(&Task.await(&1, 20_000))
-    |> Enum.map(&prepare(&1, mesh, options))
+    |> Enum.map(&(&1 |> Task.await(20_000) |> end_with_test()))
+    |> join_all(mesh, options)
+  end
+
+  defp join_all(nodes, mesh, options) do
+    if options[:one_by_one],
+      do: Enum.map(nodes, &prepare(&1, mesh, options)),
+      else:
+        Task.await_many(
+          for(n <- nodes, do: Task.async(fn -> prepare(n, mesh, options) end)),
+          30_000
+        )
   end
 
   @doc "One more node of the same fleet, or one that was killed, again."
   @spec join([t()], atom(), keyword()) :: t()
   def join([one | _], name, options \\ []) do
     mesh = call(one, Application, :get_env, [:swarm, :mesh])
-    name |> boot(options) |> prepare(mesh, options)
+    name |> boot(options) |> end_with_test() |> prepare(mesh, options)
   end
 
   @doc "Calls a function there, over standard input and output."
@@ -85,9 +96,13 @@ defmodule Swarm.MeshNodes do
     %__MODULE__{peer: peer, node: node, name: name, pid: ""}
   end
 
-  defp prepare(node, mesh, options) do
+  defp end_with_test(node) do
     node = %{node | pid: "#{call(node, :os, :getpid, [])}"}
     on_exit(fn -> stop(node) end)
+    node
+  end
+
+  defp prepare(node, mesh, options) do
     call(node, :code, :add_paths, [:code.get_path()])
     {:ok, _} = call(node, Application, :ensure_all_started, [:logger])
     call(node, Logger, :configure, [[level: :none]])

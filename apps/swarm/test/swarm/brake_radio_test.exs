@@ -1,5 +1,8 @@
 defmodule Swarm.BrakeRadioTest do
-  use Swarm.Case, async: false
+  # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
+  use ExUnit.Case, async: true
+  import Swarm.Case, only: [eventually: 1]
+  alias Robot.Board
   alias Swarm.MeshNodes
   @moduletag :cluster
 

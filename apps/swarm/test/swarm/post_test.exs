@@ -7,8 +7,11 @@ defmodule Swarm.PostTest do
   test "a call to a process that is not there, or that ends over it, is one line" do
     assert Post.call(:nobody_has_this_name, :x, "the box") == {:error, "the box does not answer"}
     {:ok, agent} = Agent.start(fn -> 1 end)
+    monitor = Process.monitor(agent)
     # An agent that is asked what agents are not asked falls.
     assert Post.call(agent, :x, "the box") == {:error, "the box does not answer"}
+    # On a busy machine it falls when the call has been given up.
+    assert_receive {:DOWN, ^monitor, :process, ^agent, _reason}
     refute Process.alive?(agent)
   end
 

@@ -44,7 +44,8 @@ defmodule Hal.RFlex.Driver do
   Those of `Hal.Drive`. Ranges come with each report of some sonars. Bumpers, of which the base tells changes only,
   are repeated every 100 ms as long as they hold. The joystick is only read: driving by it is for whoever may drive.
   Odometry goes on where it was when a line was lost and is open again in the same process; in another one
-  it begins at zero, in another frame (`Hal.Odometry`).
+  it begins at zero, in another frame (`Hal.Odometry`). Where a counter jumped (`Hal.RFlex.Odometry`) it stays
+  where it is and goes on in another frame, for nobody knows how far the robot went meanwhile.
 
   A controller that sends no wheels for 0.5 s is told again what to send, every second, as it may have been
   switched off and on; one that sends nothing at all for 2 s is the error `:silent`.
@@ -345,9 +346,17 @@ defmodule Hal.RFlex.Driver do
   defp take([], s, _at_ms), do: {[], s}
 
   defp take(packets, s, at_ms) do
-    {readings, senses} = Enum.flat_map_reduce(packets, s.senses, &Senses.packet(&2, &1, at_ms))
+    {readings, senses} = Enum.flat_map_reduce(packets, s.senses, &packet(&2, &1, at_ms))
 
     {readings, %{s | senses: senses, heard_ms: at_ms}}
+  end
+
+  defp packet(senses, packet, at_ms) do
+    {readings, heard} = Senses.packet(senses, packet, at_ms)
+
+    if Senses.jumps(heard) > Senses.jumps(senses),
+      do: Senses.reframe(readings, heard, make_ref()),
+      else: {readings, heard}
   end
 
   defp pump(s, at_ms) do

@@ -19,9 +19,12 @@ defmodule Hal.RFlex.Odometry do
       a silence of 0.25 s: a controller that was switched off and on
 
   When the next report continues a dropped one, the counter has truly jumped: it is followed from there on,
-  and the pose stays where it is. A checksum lets through 1 in 256 of heavily damaged frames, and such
-  a number that is within the limits; the next sound report puts that right, but for the direction of at most
-  the one wrong piece.
+  the pose stays where it is, and the `jumps` are counted: how far the robot went meanwhile, nobody knows.
+
+  A checksum lets through 1 in 256 of heavily damaged frames, and each one that lost a zero and has another one
+  twice; such a number may be within the limits. The next sound report puts that right, but for the direction of
+  at most the wrong pieces: where it does not continue the last report, and does continue the one before, the
+  last was the wrong one, and no way is lost.
   """
   import Hal.RFlex, only: [difference: 2]
   alias Hal.{Pose, Twist, Wheels}
@@ -75,7 +78,15 @@ defmodule Hal.RFlex.Odometry do
   def report(%__MODULE__{} = t, _other_axis, _at_ms), do: {nil, t}
 
   defp axis(limit),
-    do: %{limit: limit, last: nil, suspect: nil, driven: 0, velocity: 0, fresh?: false}
+    do: %{
+      limit: limit,
+      last: nil,
+      before: nil,
+      suspect: nil,
+      driven: 0,
+      velocity: 0,
+      fresh?: false
+    }
 
   defp judge(axis, report, {position, _timestamp, _at_ms} = seen) do
     cond do
@@ -83,23 +94,28 @@ defmodule Hal.RFlex.Odometry do
         :drop
 
       axis.last == nil ->
-        {:ok, follow(axis, report, seen, 0)}
+        {:ok, follow(axis, report, seen, {nil, 0})}
 
-      near?(axis, axis.last, seen) and not restarted?(axis, seen) ->
-        {:ok, follow(axis, report, seen, difference(position, elem(axis.last, 0)))}
+      continues?(axis, axis.last, seen) ->
+        {:ok, follow(axis, report, seen, {axis.last, since(axis.last, position)})}
+
+      # The last was damaged. What it added is taken back with it.
+      axis.before != nil and continues?(axis, axis.before, seen) ->
+        {:ok, follow(axis, report, seen, {axis.before, since(axis.last, position)})}
 
       axis.suspect != nil and near?(axis, axis.suspect, seen) and not back?(axis.suspect, seen) ->
-        {:jump, follow(axis, report, seen, difference(position, elem(axis.suspect, 0)))}
+        {:jump, follow(axis, report, seen, {axis.suspect, since(axis.suspect, position)})}
 
       true ->
         {:suspect, %{axis | suspect: seen}}
     end
   end
 
-  defp follow(axis, report, seen, driven) do
+  defp follow(axis, report, seen, {before, driven}) do
     %{
       axis
       | last: seen,
+        before: before,
         suspect: nil,
         driven: axis.driven + driven,
         velocity: report.velocity,
@@ -107,16 +123,21 @@ defmodule Hal.RFlex.Odometry do
     }
   end
 
+  defp since({before, _timestamp, _at_ms}, position), do: difference(position, before)
+
+  defp continues?(axis, from, seen),
+    do: near?(axis, from, seen) and not restarted?(axis, from, seen)
+
   defp near?(axis, {before, _, before_ms}, {position, _, at_ms}) do
     seconds = min(max(at_ms - before_ms, 0) / 1000, @longest_s) + @held_up_s
     abs(difference(position, before)) <= @margin * axis.limit * seconds + 1
   end
 
-  defp restarted?(%{last: {before, timestamp, before_ms}} = axis, {position, now, at_ms} = seen) do
+  defp restarted?(axis, {before, timestamp, before_ms} = from, {position, now, at_ms} = seen) do
     young? = abs(position) <= axis.limit * @young_s
     moved? = abs(difference(position, before)) > axis.limit * @still_s
     silent? = now == timestamp and at_ms - before_ms >= @gap_ms
-    young? and moved? and (silent? or back?(axis.last, seen))
+    young? and moved? and (silent? or back?(from, seen))
   end
 
   defp back?({_, before, _}, {_, now, _}), do: difference(now, before) < 0

@@ -43,6 +43,23 @@ defmodule Hal.RFlex.Senses do
     end
   end
 
+  @doc "How often a counter of the wheels has jumped, so that nobody knows how far the robot went."
+  @spec jumps(t()) :: non_neg_integer()
+  def jumps(%__MODULE__{odometry: nil}), do: 0
+  def jumps(%__MODULE__{odometry: %Odometry{jumps: jumps}}), do: jumps
+
+  @doc "Readings and senses whose odometry is in another frame."
+  @spec reframe([Hal.Drive.reading()], t(), reference()) :: {[Hal.Drive.reading()], t()}
+  def reframe(readings, %__MODULE__{} = senses, frame) do
+    readings =
+      Enum.map(readings, fn
+        {:odometry, odometry} -> {:odometry, %{odometry | frame: frame}}
+        other -> other
+      end)
+
+    {readings, %{senses | frame: frame}}
+  end
+
   @doc "What still holds and should not grow old on the board: bumpers, which tell of changes only."
   @spec standing(t()) :: [Hal.Drive.reading()]
   def standing(%__MODULE__{} = senses), do: pressed(senses)

@@ -379,6 +379,8 @@ defmodule Hal.RFlex.DriverTest do
     assert Pose.distance(before.pose, now.pose) < 0.01
     assert abs(Pose.wrap(before.pose.heading - now.pose.heading)) < 0.01
     assert Driver.counts(t.driver).jumps == 2
+    # How far it went meanwhile, nobody has counted.
+    assert is_reference(now.frame) and now.frame != before.frame
     close(t)
   end
 

@@ -14,8 +14,8 @@ defmodule Robot.Localiser.Matching do
   # Within this angle a robot is always looked for; one whose direction is less sure than that is not measured
   # by, nor one whose distance is less sure than this share of it. Radians, and shares.
   @narrow 0.12
-  @wide 2.0
-  @doubt 0.8
+  @wide 3.0
+  @doubt 1.6
   # A place of which nobody says how well it is known, and a doubt of a distance that changes nothing, in metres.
   @unknown 0.3
   @surely 0.3

@@ -1,6 +1,7 @@
 defmodule Swarm.Mesh.JunkTest do
   # Whoever is connected can send anything to whatever has a name or is in the directory.
-  use ExUnit.Case, async: false
+  # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
+  use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes
   alias Swarm.MeshNodes.Junk

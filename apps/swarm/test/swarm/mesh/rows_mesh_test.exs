@@ -1,6 +1,7 @@
 defmodule Swarm.RowsMeshTest do
   # Real nodes on loopback.
-  use ExUnit.Case, async: false
+  # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
+  use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1, eventually: 2]
   alias Swarm.{About, Blackboard, Hints, Status}
   alias Swarm.MeshNodes, as: Cluster
