@@ -48,7 +48,7 @@ defmodule Robot.Localiser do
 
   @doc """
   What to find the pose by from now on. In a frame that is new to it the robot is as much less sure as that
-  frame's robot is unsure of its own pose, and then by what that robot becomes less sure.
+  frame's robot is unsure of its own pose, and then by what that robot's odometry drifts.
   """
   @spec anchors(t(), Anchors.t()) :: t()
   def anchors(localiser, %Anchors{frame: frame, marks: marks} = anchors) do
@@ -63,14 +63,10 @@ defmodule Robot.Localiser do
   defp join(localiser, nil), do: localiser
   defp join(%{belief: nil} = localiser, _frame), do: localiser
 
-  # Way back makes a position surer again, but nothing a heading by half: that is a robot that was started anew.
+  # Less drift than before has only a robot that was started anew.
   defp join(%{frame: %{key: key} = known} = localiser, %{key: key} = frame)
-       when 4 * frame.heading >= known.heading do
-    position = max(frame.position - known.position, 0.0)
-    heading = max(frame.heading - known.heading, 0.0)
-    most = %{frame | position: known.position + position, heading: known.heading + heading}
-    reframe(localiser, most, position, heading)
-  end
+       when frame.way >= known.way and frame.turn >= known.turn,
+       do: reframe(localiser, frame, frame.way - known.way, frame.turn - known.turn)
 
   defp join(localiser, frame) do
     {position, heading} = between(localiser.frame, frame)
@@ -125,7 +121,8 @@ defmodule Robot.Localiser do
       position: position,
       heading: heading,
       frame: frame && frame.key,
-      joins: joins
+      joins: joins,
+      drift: belief.drift
     }
   end
 
