@@ -47,14 +47,16 @@ defmodule Robot.Percept do
   @typedoc """
   How sure the pose is: within `radius` metres in 95 of 100 cases; `position` (along the worst direction, metres) and `heading`
   (radians) are standard deviations. `frame` is the key of the frame that the pose is in (`Robot.Localiser.Anchors`): `nil`
-  for that of the start poses; `joins` counts how often it came into another.
+  for that of the start poses; `joins` counts how often it came into another. `drift` is what odometry has added since the
+  start: variances in m2 and rad2.
   """
   @type uncertainty :: %{
           radius: float(),
           position: float(),
           heading: float(),
           frame: term(),
-          joins: non_neg_integer()
+          joins: non_neg_integer(),
+          drift: {way :: float(), turn :: float()}
         }
 
   @typedoc """

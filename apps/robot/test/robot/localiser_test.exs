@@ -181,60 +181,62 @@ defmodule Robot.LocaliserTest do
     told(localiser, [], frame(:elsewhere, {2.5, 0.8}, sd * sd, 0.0))
   end
 
-  defp frame(key, at, position, heading, base \\ nil),
-    do: %{key: key, base: base, at: at, position: position, heading: heading}
+  defp frame(key, at, position, heading, options \\ []) do
+    Map.merge(
+      %{
+        key: key,
+        base: nil,
+        at: at,
+        position: position,
+        heading: heading,
+        way: 0.0,
+        turn: 0.0
+      },
+      Map.new(options)
+    )
+  end
 
-  test "in another's frame a robot is as unsure as that one is, and as that one becomes" do
+  @there {10.0, 0.0}
+
+  test "in another's frame a robot is as unsure as that one is, and then by what that one drifts" do
     {before, localiser} =
       Localiser.update(Localiser.new(Pose.new(0, 0)), percept(Pose.new(0, 0), 0))
 
     assert before.uncertainty.frame == nil
     tick = fn localiser, at_ms -> Localiser.update(localiser, percept(Pose.new(0, 0), at_ms)) end
+    come = fn localiser, frame -> localiser |> told([], frame) |> tick.(100) end
+    sd = fn percept -> percept.uncertainty.position end
 
     # 10 m from somebody who may be turned by 0.1 rad: 1 m across.
-    {joined, localiser} =
-      localiser |> told([], frame({:mag2, 1}, {10.0, 0.0}, 0.04, 0.01)) |> tick.(100)
-
-    assert_in_delta joined.uncertainty.position, :math.sqrt(1.0 + 0.04), 0.01
+    {joined, localiser} = come.(localiser, frame({:mag2, 1}, @there, 0.04, 0.01))
+    assert_in_delta sd.(joined), :math.sqrt(1.0 + 0.04), 0.01
     assert_in_delta joined.uncertainty.heading, 0.1, 0.01
     assert joined.uncertainty.frame == {:mag2, 1}
     assert joined.pose == before.pose
 
-    # Told again it is no news; told more, it is by so much more.
-    {same, localiser} =
-      localiser |> told([], frame({:mag2, 1}, {10.0, 0.0}, 0.04, 0.01)) |> tick.(200)
-
+    # Told again it is no news, however unsure of its own pose that one has become on its way; drift is.
+    {same, localiser} = come.(localiser, frame({:mag2, 1}, @there, 0.5, 0.02))
     assert same.uncertainty == joined.uncertainty
+    drifted = frame({:mag2, 1}, @there, 0.5, 0.02, way: 0.02, turn: 0.01)
+    {more, localiser} = come.(localiser, drifted)
+    assert_in_delta sd.(more), :math.sqrt(2.0 + 0.06), 0.01
 
-    {more, localiser} =
-      localiser |> told([], frame({:mag2, 1}, {10.0, 0.0}, 0.04, 0.02)) |> tick.(300)
-
-    assert_in_delta more.uncertainty.position, :math.sqrt(2.0 + 0.04), 0.01
-
-    # It cannot become surer; if it says so, it was started anew.
-    {anew, _} = localiser |> told([], frame({:mag2, 1}, {10.0, 0.0}, 0.01, 0.0)) |> tick.(400)
+    # It cannot drift back; if it says so, it was started anew.
+    {anew, _} = come.(localiser, frame({:mag2, 1}, @there, 0.01, 0.0))
     assert anew.uncertainty.joins == 2
-    assert anew.uncertainty.position > more.uncertainty.position + 0.5
+    assert sd.(anew) > sd.(more) + 0.5
 
     # One who was in the frame of mag2 leads: that it is unsure of there. Then mag2 again: that is what was unsure.
-    {other, localiser} =
-      localiser
-      |> told([], frame({:mag3, 2}, {10.0, 0.0}, 0.0, 0.01, {:mag2, 1}))
-      |> tick.(400)
+    {other, localiser} = come.(localiser, frame({:mag3, 2}, @there, 0.0, 0.01, base: {:mag2, 1}))
 
-    assert_in_delta other.uncertainty.position, :math.sqrt(3.0 + 0.04), 0.01
+    assert_in_delta sd.(other), :math.sqrt(3.0 + 0.06), 0.01
     assert %{frame: {:mag3, 2}, joins: 2} = other.uncertainty
-
-    {back, localiser} =
-      localiser |> told([], frame({:mag2, 1}, {10.0, 0.0}, 0.04, 0.02)) |> tick.(500)
-
-    assert_in_delta back.uncertainty.position, :math.sqrt(4.0 + 0.04), 0.01
+    {back, localiser} = come.(localiser, drifted)
+    assert_in_delta sd.(back), :math.sqrt(4.0 + 0.06), 0.01
 
     # Of a frame that nothing is known of, all is unsure that is unsure of both.
-    {strange, _} =
-      localiser |> told([], frame({:min1, 7}, {10.0, 0.0}, 0.0, 0.01, {:min2, 3})) |> tick.(600)
-
-    assert_in_delta strange.uncertainty.position, :math.sqrt(4.0 + 0.04 + 0.04 + 3.0), 0.01
+    {strange, _} = come.(localiser, frame({:min1, 7}, @there, 0.0, 0.01, base: {:min2, 3}))
+    assert_in_delta sd.(strange), :math.sqrt(4.0 + 0.06 + 0.5 + 3.0), 0.01
   end
 
   test "wheels that slip are found out by what stands still, and then turn it no more" do

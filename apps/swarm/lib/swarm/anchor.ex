@@ -7,7 +7,8 @@ defmodule Swarm.Anchor do
   fences off leaders of the past.
 
   Poses are `{x_mm, y_mm, mrad}` in the leader's map frame, of which it is itself so unsure as `sd` says (standard
-  deviations in mm and mrad), in the frame `base` that it was in before; `frame` is the number of its own. `landmark` is `{x_mm, y_mm}` or `nil`,
+  deviations in mm and mrad), in the frame `base` that it was in before; `frame` is the number of its own. `drift` is by how much its odometry
+  has drifted since it was started (variances, in mm2 and millionths of rad2). `landmark` is `{x_mm, y_mm}` or `nil`,
   `still` says that it does not move. `order` names the followers by slot, which is also
   the order in which each passes the anchor on to its child. `formation` is
   the shape as there is room for it, `asked` the one that was asked for, the `asked_no`-th that was; `size` and `places` say which
@@ -21,6 +22,7 @@ defmodule Swarm.Anchor do
   defstruct @enforce_keys ++
               [
                 sd: {0, 0},
+                drift: {0, 0},
                 frame: 0,
                 base: nil,
                 asked: nil,
@@ -40,6 +42,7 @@ defmodule Swarm.Anchor do
           pose: {integer(), integer(), integer()},
           twist: {integer(), integer()},
           sd: {position :: non_neg_integer(), heading :: non_neg_integer()},
+          drift: {way :: non_neg_integer(), turn :: non_neg_integer()},
           frame: non_neg_integer(),
           base: frame() | nil,
           formation: Formation.t(),
@@ -84,7 +87,7 @@ defmodule Swarm.Anchor do
       anchor.size in 1..@most and
       Shape.list?(places, &(&1 in 1..@most and &1 < anchor.size)) and
       length(places) == length(order) and Shape.distinct?(places) and
-      sd?(anchor.sd) and Shape.count?(anchor.frame) and base?(anchor.base) and
+      sd?(anchor.sd) and sd?(anchor.drift) and Shape.count?(anchor.frame) and base?(anchor.base) and
       landmark?(anchor.landmark) and is_boolean(anchor.still) and
       is_integer(anchor.of) and anchor.of in 0..@most and
       (anchor.trail == nil or

@@ -134,7 +134,14 @@ defmodule Swarm.Group do
       at_ms: group.now,
       profile: Profile.magellan(),
       pose: robot.pose,
-      uncertainty: %{radius: 0.05, position: 0.02, heading: 0.01, frame: robot.frame, joins: 0},
+      uncertainty: %{
+        radius: 0.05,
+        position: 0.02,
+        heading: 0.01,
+        frame: robot.frame,
+        joins: 0,
+        drift: {0.0, 0.0}
+      },
       odometry: %Odometry{pose: robot.pose, twist: Twist.zero()},
       peers: Peers.percepts(robot.peers, group.now),
       blobs: blobs(robot.share),

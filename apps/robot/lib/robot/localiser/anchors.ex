@@ -3,23 +3,26 @@ defmodule Robot.Localiser.Anchors do
   What a mission tells the localiser to find its pose by: in whose frame, and which things are where. Pure data.
 
   The frame is that of a robot that nobody corrects, the leader: what it believes of its own pose is so by definition,
-  and what it is unsure of, all others are unsure of. The variances are of its belief in the frame that it was in
-  before it led (`base`), and only grow while it leads.
+  and what it is unsure of, all others are unsure of: when they come into its frame, of its pose in the one that it was in
+  before it led (`base`), and from then on, of what its odometry adds.
   """
   alias Hal.Pose
 
   defstruct frame: nil, marks: []
 
   @typedoc """
-  `key` tells one frame from another, `base` is the key of the one that its variances (m2, rad2) are in, `nil` for that of the
-  start poses; `at` is where its robot believes to be.
+  `key` tells one frame from another, `base` is the key of the one that its variances (`position`, `heading`: m2, rad2) are in,
+  `nil` for that of the start poses; `at` is where its robot believes to be. `way` and `turn` are variances, too: by what its
+  odometry has drifted since it was started.
   """
   @type frame :: %{
           key: term(),
           base: term(),
           at: Pose.point(),
           position: float(),
-          heading: float()
+          heading: float(),
+          way: float(),
+          turn: float()
         }
 
   @typedoc """

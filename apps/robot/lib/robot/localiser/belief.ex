@@ -11,7 +11,10 @@ defmodule Robot.Localiser.Belief do
   | two scales | by which share distances come out too long: by the size of the landmark, by the width of a robot |
   | x, y of each mark | how far a thing that was told is from where it was told to be |
 
-  With the last, a mark that is seen a thousand times makes nobody surer than its own place is: Smith, Self
+  `drift` is by what variance (m2, rad2) it has come away from its own former self by odometry alone: what matters to
+  those whose poses hang from its own.
+
+  With the last state, a mark that is seen a thousand times makes nobody surer than its own place is: Smith, Self
   and Cheeseman 1990. Odometry: Siegwart and Nourbakhsh 2004. What is farther off than three standard
   deviations is not believed (Bar-Shalom, Li and Kirubarajan 2001).
   """
@@ -19,7 +22,8 @@ defmodule Robot.Localiser.Belief do
   alias Robot.Localiser.Covariance
 
   # x, y, heading, slip, the scales of the landmark and of robots.
-  @start_sd [0.03, 0.03, 0.02, 0.055, 0.06, 0.08]
+  @slip_sd 0.055
+  @start_sd [0.03, 0.03, 0.02, @slip_sd, 0.06, 0.08]
   @own length(@start_sd)
   # Standard deviations of odometry: of the way driven, of the angle turned, of angle per metre.
   @way_share 0.01
@@ -43,7 +47,11 @@ defmodule Robot.Localiser.Belief do
   @lost_heading 1.0
 
   @enforce_keys [:pose, :covariance]
-  defstruct @enforce_keys ++ [slip: 0.0, scales: {0.0, 0.0}, marks: [], uses: 0, refused: 0]
+  defstruct @enforce_keys ++
+              [slip: 0.0, scales: {0.0, 0.0}, marks: [], uses: 0, refused: 0, drift: {0.0, 0.0}]
+
+  # Over so many radians the slip of a turn goes one way, for those who do not know which.
+  @slip_rad 1.0
 
   @typedoc "`told` is where it was told to be and how well that was known, `off` how far it is from there."
   @type mark :: %{
@@ -60,7 +68,8 @@ defmodule Robot.Localiser.Belief do
           scales: {landmark :: float(), robot :: float()},
           marks: [mark()],
           uses: non_neg_integer(),
-          refused: non_neg_integer()
+          refused: non_neg_integer(),
+          drift: {way :: float(), turn :: float()}
         }
   @typedoc "How a measurement changes with x, y and heading, and with the scales."
   @type slope :: {{float(), float(), float()}, {float(), float()}}
@@ -129,7 +138,9 @@ defmodule Robot.Localiser.Belief do
       |> Covariance.carry(&motion(&1, belief.pose.y - pose.y, pose.x - belief.pose.x, angle))
       |> Covariance.add([along, along, turned, slips])
 
-    %{belief | pose: pose, covariance: covariance}
+    {way, turn} = belief.drift
+    slipped = @slip_sd * @slip_sd * @slip_rad * angle
+    %{belief | pose: pose, covariance: covariance, drift: {way + along, turn + turned + slipped}}
   end
 
   # F = [1 0 a au/2; 0 1 b bu/2; 0 0 1 u; 0 0 0 1]: the way turns with the heading, half of the slip with it.
@@ -285,10 +296,12 @@ defmodule Robot.Localiser.Belief do
   @spec doubt(t()) :: t()
   def doubt(%__MODULE__{} = belief) do
     variance = @doubt_sd * @doubt_sd
+    {way, turn} = belief.drift
 
     %{
       belief
       | refused: 0,
+        drift: {way + variance, turn + variance},
         covariance: Covariance.add(belief.covariance, [variance, variance, variance])
     }
   end

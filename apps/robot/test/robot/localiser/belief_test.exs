@@ -2,6 +2,7 @@ defmodule Robot.Localiser.BeliefTest do
   use ExUnit.Case, async: true
   doctest Robot.Localiser.Belief
   doctest Robot.Localiser.Covariance
+  doctest Robot.Localiser.History
   alias Hal.Pose
   alias Robot.Localiser.{Belief, Covariance}
 

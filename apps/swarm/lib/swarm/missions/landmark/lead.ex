@@ -206,6 +206,7 @@ defmodule Swarm.Missions.Landmark.Lead do
       pose: State.millimetres(percept.pose),
       twist: twist(percept),
       sd: sd(percept.uncertainty),
+      drift: drift(percept.uncertainty),
       frame: percept.uncertainty.joins,
       base: percept.uncertainty.frame,
       formation: lead.shape.formation,
@@ -225,6 +226,9 @@ defmodule Swarm.Missions.Landmark.Lead do
 
   defp sd(%{position: position, heading: heading}),
     do: {round(position * 1000), round(heading * 1000)}
+
+  defp drift(%{drift: {way, turn}}), do: {millionths(way), millionths(turn)}
+  defp millionths(variance), do: min(round(variance * 1.0e6), 999_999_999)
 
   # A crawl is told as standing still, so that no slot trembles.
   defp twist(%{odometry: %{twist: %{linear: linear, turn: turn}}}) do

@@ -74,13 +74,15 @@ defmodule Swarm.Missions.Landmark.Marks do
 
   defp sd(_id, _peer, _anchor), do: nil
 
-  defp frame(%{sd: {mm, mrad}} = anchor, leader) do
+  defp frame(%{sd: {mm, mrad}, drift: {way, turn}} = anchor, leader) do
     %{
       key: key(anchor),
       base: anchor.base,
       at: Pose.point(leader),
       position: mm * mm / 1.0e6,
-      heading: mrad * mrad / 1.0e6
+      heading: mrad * mrad / 1.0e6,
+      way: way / 1.0e6,
+      turn: turn / 1.0e6
     }
   end
 
