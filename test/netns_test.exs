@@ -35,6 +35,8 @@ defmodule System.NetnsTest do
 
   @lease_ms 1_500
   @healed_ms 10_000
+  # From 0.5 m/s by 0.5 m/s2, and what the wheels lag behind: then a body that was told to stand does.
+  @brakes_ms 1_500
   @estop_ms 200
   # From a link that works again to what it was kept from: a heartbeat comes each 200 ms.
   @heard_ms 1_000
@@ -249,8 +251,8 @@ defmodule System.NetnsTest do
 
     # Nobody moves till a person says so, and then they can.
     still = Log.now()
-    last(still, 2_000)
-    moved = for {who, ms, pose} <- told(fleet, :body, still), ms > 1_000, do: {who, ms, pose}
+    last(still, 3_000)
+    moved = for {who, ms, pose} <- told(fleet, :body, still), ms > @brakes_ms, do: {who, ms, pose}
     assert moved == []
     # The stop needs the radio only; who answers for a reset, is connected.
     met(fleet)

@@ -105,7 +105,8 @@ defmodule Robot.Localiser.Belief do
   @spec radius(t()) :: float()
   def radius(belief) do
     {worst, least, _heading} = sd(belief)
-    worst * (1.96 + 0.488 * :math.pow(least / worst, 2.5))
+    roundness = if worst > 0.0, do: least / worst, else: 1.0
+    worst * (1.96 + 0.488 * :math.pow(roundness, 2.5))
   end
 
   @doc """

@@ -34,6 +34,11 @@ defmodule Robot.Localiser.BeliefTest do
     end
   end
 
+  test "one that knows all is within no radius at all" do
+    sure = %{Belief.new(Pose.new(0, 0)) | covariance: Covariance.diagonal(List.duplicate(0.0, 6))}
+    assert Belief.radius(sure) == 0.0
+  end
+
   test "what it is unsure of grows with the way and the turns, and is carried along by them" do
     start = Belief.new(Pose.new(0, 0))
     {standing, _, _} = Belief.sd(start)
