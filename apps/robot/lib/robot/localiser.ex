@@ -70,6 +70,8 @@ defmodule Robot.Localiser do
 
   defp join(localiser, frame) do
     {position, heading} = between(localiser.frame, frame)
+    # Where things are in the other frame has still to be seen.
+    localiser = %{localiser | belief: Belief.forget(localiser.belief)}
     localiser = reframe(localiser, frame, position, heading)
     %{localiser | joins: localiser.joins + 1}
   end

@@ -239,6 +239,14 @@ defmodule Robot.LocaliserTest do
     assert_in_delta sd.(strange), :math.sqrt(4.0 + 0.06 + 0.5 + 3.0), 0.01
   end
 
+  test "what was learnt of a thing in one frame is forgotten in another" do
+    told_wrong = %{@landmark | at: {4.0, 0.3}, sd: 0.3}
+    {_, localiser} = settle(Localiser.new(Pose.new(0, 0)), Pose.new(0, 0), [told_wrong], 50)
+    assert [%{key: :landmark}] = localiser.belief.marks
+    joined = told(localiser, [told_wrong], frame({:mag3, 1}, {0.0, 0.0}, 0.04, 0.01))
+    assert joined.belief.marks == []
+  end
+
   test "wheels that slip are found out by what stands still, and then turn it no more" do
     # It turns to and fro by 0.5 rad; each turn to the left goes 5 % farther, each to the right less far.
     turns = List.duplicate(0.1, 5) ++ List.duplicate(-0.1, 5)

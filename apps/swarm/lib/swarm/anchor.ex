@@ -6,7 +6,7 @@ defmodule Swarm.Anchor do
   does not hear the leader still knows its place. The newest sequence number wins; the epoch
   fences off leaders of the past.
 
-  Poses are `{x_mm, y_mm, mrad}` in the leader's map frame, of which it is itself so unsure as `sd` says (standard
+  Poses are `{x_mm, y_mm, mrad}` in the leader's map frame, its own uncertainty there is `sd` (standard
   deviations in mm and mrad), in the frame `base` that it was in before; `frame` is the number of its own. `drift` is by how much its odometry
   has drifted since it was started (variances, in mm2 and millionths of rad2). `landmark` is `{x_mm, y_mm}` or `nil`,
   `still` says that it does not move. `order` names the followers by slot, which is also

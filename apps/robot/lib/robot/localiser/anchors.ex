@@ -12,7 +12,7 @@ defmodule Robot.Localiser.Anchors do
 
   @typedoc """
   `key` tells one frame from another, `base` is the key of the one that its variances (`position`, `heading`: m2, rad2) are in,
-  `nil` for that of the start poses; `at` is where its robot believes to be. `way` and `turn` are variances, too: by what its
+  `nil` for that of the start poses; `at` is where its robot believes itself to be. `way` and `turn` are variances, too: by what its
   odometry has drifted since it was started.
   """
   @type frame :: %{

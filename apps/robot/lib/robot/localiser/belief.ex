@@ -45,6 +45,7 @@ defmodule Robot.Localiser.Belief do
   # Beyond these nobody knows anything, and linear algebra less: metres, radians.
   @lost_position 5.0
   @lost_heading 1.0
+  @far 100.0
 
   @enforce_keys [:pose, :covariance]
   defstruct @enforce_keys ++
@@ -96,7 +97,7 @@ defmodule Robot.Localiser.Belief do
   defp root(square), do: :math.sqrt(max(square, 0.0))
 
   @doc """
-  In what distance from the estimate the robot is in 95 of 100 cases, in metres: 1.96 standard deviations of
+  The radius round the estimate that holds the robot in 95 of 100 cases, in metres: 1.96 standard deviations of
   an error along a line, 2.45 of one in all directions, and between them by a fit to the table of circular errors.
 
       iex> Float.round(Robot.Localiser.Belief.radius(Robot.Localiser.Belief.new(Hal.Pose.new(1, 0))), 3)
@@ -164,6 +165,7 @@ defmodule Robot.Localiser.Belief do
   @spec reframe(t(), at :: Pose.point(), position :: float(), heading :: float()) :: t()
   def reframe(belief, {x, y}, position, heading) do
     position = min(position, @lost_position * @lost_position)
+    {x, y} = near(belief.pose, {x, y})
     heading = min(heading, @lost_heading * @lost_heading)
     turn = [y - belief.pose.y, belief.pose.x - x, 1.0]
     [a, b, c | rest] = belief.covariance
@@ -175,6 +177,13 @@ defmodule Robot.Localiser.Belief do
       end
 
     %{belief | covariance: Covariance.add(rows ++ rest, [position, position])}
+  end
+
+  # What turns about somebody so far away is lost anyway.
+  defp near(pose, {x, y} = at) do
+    distance = Pose.distance(pose, at)
+    share = if distance > @far, do: @far / distance, else: 1.0
+    {pose.x + share * (x - pose.x), pose.y + share * (y - pose.y)}
   end
 
   @doc "The variance of what is measured of the pose alone, whose value changes so with x, y and heading."
@@ -261,7 +270,7 @@ defmodule Robot.Localiser.Belief do
     {v, variance} = Covariance.project(belief.covariance, slope)
     s = variance + noise
 
-    if error * error > @gate * s,
+    if s <= 0.0 or error * error > @gate * s,
       do: refuse(belief),
       else: believe(belief, v, error / s, Covariance.reduce(belief.covariance, v, s))
   end

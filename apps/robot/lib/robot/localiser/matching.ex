@@ -120,7 +120,9 @@ defmodule Robot.Localiser.Matching do
     across = Belief.variance(belief, {dy / square, -dx / square, -1.0})
     along = Belief.variance(belief, {-dx / distance, -dy / distance, 0.0})
 
-    {:math.sqrt(across + place / square + @bearing_sd * @bearing_sd / 4),
-     :math.sqrt(along + place)}
+    {root(across + place / square + @bearing_sd * @bearing_sd / 4), root(along + place)}
   end
+
+  # Rounding takes a variance of nothing below it.
+  defp root(square), do: :math.sqrt(max(square, 0.0))
 end

@@ -25,6 +25,8 @@ defmodule Swarm.Missions.Landmark.Lead do
   @unheard_ms 1_500
   # By then all that took part in the round have told that they follow; who comes now is new.
   @settled_ms 1_000
+  # Farther than this nobody is lost, in whatever unit.
+  @lost 999_999_999
   # For so long a new leader tells its place to all, not to its child alone.
   @fresh_ms 500
 
@@ -225,10 +227,10 @@ defmodule Swarm.Missions.Landmark.Lead do
   end
 
   defp sd(%{position: position, heading: heading}),
-    do: {round(position * 1000), round(heading * 1000)}
+    do: {min(round(position * 1000), @lost), min(round(heading * 1000), @lost)}
 
   defp drift(%{drift: {way, turn}}), do: {millionths(way), millionths(turn)}
-  defp millionths(variance), do: min(round(variance * 1.0e6), 999_999_999)
+  defp millionths(variance), do: min(round(variance * 1.0e6), @lost)
 
   # A crawl is told as standing still, so that no slot trembles.
   defp twist(%{odometry: %{twist: %{linear: linear, turn: turn}}}) do

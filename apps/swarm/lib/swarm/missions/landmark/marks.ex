@@ -27,10 +27,11 @@ defmodule Swarm.Missions.Landmark.Marks do
     {leader, _twist} = Places.leader(anchor, mission.now_ms - mission.anchor_ms)
     ahead = [anchor.leader | Enum.take_while(anchor.order, &(&1 != mission.me))]
 
+    # In an order that no virtual machine chooses: each correction changes the next.
     robots =
-      for {id, peer} <- percept.peers do
+      for {id, peer} <- Enum.sort(percept.peers) do
         %{
-          key: id,
+          key: {:robot, id},
           kind: :robot,
           colour: @robot_colour,
           at: Pose.point(if id == anchor.leader, do: leader, else: peer.pose),
@@ -59,7 +60,9 @@ defmodule Swarm.Missions.Landmark.Marks do
 
   defp landmark(_mission), do: []
 
-  # What a moving robot told is where it was.
+  # What a moving robot told is where it was, and where a dead one came to rest nobody knows.
+  defp standing?(%{mode: :dead}), do: false
+
   defp standing?(%{mode: :moving, twist: twist}),
     do: abs(twist.linear) < @slow and abs(twist.turn) < @slow
 
@@ -100,7 +103,7 @@ defmodule Swarm.Missions.Landmark.Marks do
   def told(_mission), do: nil
 
   @doc """
-  Whether a follower that believes to be so far from its slot (metres) is within half a metre of it in 95 of 100 cases.
+  Whether a follower that believes it is this far from its slot (metres) is within half a metre of it in 95 of 100 cases.
 
       iex> anchor = %{leader: :mag2, frame: 3}
       iex> mission = %{anchor: anchor, percept: %{uncertainty: %{radius: 0.3, frame: {:mag2, 3}}}}
