@@ -47,7 +47,7 @@ defmodule System.DocsTest do
     "mix demo --headless --hardware mag:1,min:1 --seed 1" => @long,
     "mix bench demo --seeds 1-10 --maps hall --cases six,move,kill-leader" => @long,
     "mix bench demo --seeds 1-40 --maps hall,hospital --markdown table.md" => @long,
-    "mix bench demo --seeds 1-10 --maps hall --cases six,exact,move,kill-leader,kill-middle,loss,slip,one,two,three,twelve" =>
+    "mix bench demo --seeds 1-40 --maps hall --cases six,exact,move,kill-leader,kill-middle,loss,slip,one,two,three,twelve" =>
       @long,
     "mix bench demo --seeds 1-20 --maps hall --cases slip,same,chain,twelve-chain,line,wedge,triangle,diamond,circle" =>
       @long,
