@@ -13,6 +13,9 @@ defmodule Robot.Localiser do
   alias Robot.Localiser.{Anchors, Belief, History, Sightings}
   alias Robot.Percept
 
+  # Odometry that begins farther from zero than this (metres, radians) has counted before.
+  @put_down 0.1
+
   @enforce_keys [:start]
   defstruct @enforce_keys ++
               [
@@ -143,6 +146,7 @@ defmodule Robot.Localiser do
 
   defp move(%{odometry: nil, belief: nil} = localiser, odometry) do
     belief = Belief.new(Pose.compose(localiser.start, odometry))
+    belief = if driven?(odometry), do: Belief.lost(belief), else: belief
     %{localiser | odometry: odometry, belief: belief}
   end
 
@@ -168,4 +172,8 @@ defmodule Robot.Localiser do
 
   defp pose_at(%{belief: belief} = localiser, at_ms),
     do: Pose.compose(belief.pose, History.back(localiser.history, localiser.odometry, at_ms))
+
+  # It was started anew in the middle of its way: how it came there, and what corrected it, nobody knows any more.
+  defp driven?(%Pose{x: x, y: y, heading: heading}),
+    do: x * x + y * y > @put_down * @put_down or abs(heading) > @put_down
 end

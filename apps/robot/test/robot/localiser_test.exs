@@ -93,6 +93,13 @@ defmodule Robot.LocaliserTest do
     assert percept.pose == Pose.new(4.5, 2)
   end
 
+  test "one that was started anew on its way does not know how sure it was" do
+    {put_down, _} = Localiser.update(Localiser.new(Pose.new(0, 0)), percept(Pose.new(0, 0), 0))
+    assert put_down.uncertainty.radius < 0.1
+    {anew, _} = Localiser.update(Localiser.new(Pose.new(0, 0)), percept(Pose.new(30, 0, 2), 0))
+    assert anew.uncertainty.radius > 5.0
+  end
+
   test "without odometry there is no pose" do
     {percept, _} =
       Localiser.update(Localiser.new(Pose.new(0, 0)), %{

@@ -302,6 +302,14 @@ defmodule Robot.Localiser.Belief do
 
   defp refuse(belief), do: doubt(belief)
 
+  @doc "The same pose, of which nobody knows how it came about: less sure by metres."
+  @spec lost(t()) :: t()
+  def lost(%__MODULE__{} = belief) do
+    position = @lost_position * @lost_position
+    variances = [position, position, @lost_heading * @lost_heading]
+    %{belief | covariance: Covariance.add(belief.covariance, variances)}
+  end
+
   @doc "The same pose, of which one is less sure by decimetres: something happened that nobody measured."
   @spec doubt(t()) :: t()
   def doubt(%__MODULE__{} = belief) do
