@@ -76,7 +76,7 @@ defmodule Swarm.Group do
 
   @doc "The robots that can reach each other, if need be by way of others: the parts of the radio."
   @spec parts(t()) :: [[atom()]]
-  def parts(group), do: parts(group, Map.keys(group.robots))
+  def parts(group), do: parts(group, ids(group))
 
   defp parts(_group, []), do: []
 
@@ -191,9 +191,11 @@ defmodule Swarm.Group do
 
   defp tick(group) do
     group = deliver(%{group | now: group.now + @tick_ms})
-    ids = group.robots |> Map.keys() |> Enum.sort() |> Enum.shuffle()
-    ids |> Enum.reduce(group, &think/2) |> watch()
+    group |> ids() |> Enum.shuffle() |> Enum.reduce(group, &think/2) |> watch()
   end
+
+  # Sorted: a map's own order changes from one start of the VM to the next, and draws with it.
+  defp ids(group), do: group.robots |> Map.keys() |> Enum.sort()
 
   defp think(id, group) do
     group = group |> finish(id) |> event(id, {:tick, percept(group, id)})
@@ -233,7 +235,7 @@ defmodule Swarm.Group do
   end
 
   defp carry_out({:send, to, message}, id, group) do
-    to = if to == :all, do: Map.keys(group.robots) -- [id], else: List.wrap(to)
+    to = if to == :all, do: ids(group) -- [id], else: List.wrap(to)
     Enum.reduce(to, group, &send_one(&1, id, message, &2))
   end
 
