@@ -26,12 +26,16 @@ defmodule Robot.Localiser do
                 seen_ms: nil,
                 anchors: %Anchors{},
                 frame: nil,
-                joins: 0
+                frame_no: nil
               ]
 
+  # Numbers of frames are told to others, who take none above half a billion.
+  @numbers 400_000_000
+
   @typedoc """
-  `frame` is the one that the belief is in: `nil` for that of the start poses. `joins` counts how often it came into
-  another.
+  `frame` is the one that the belief is in: `nil` for that of the start poses. `frame_no` numbers the frames that this robot's
+  own poses make for others: another one each time that it was started, that it came into another's frame, or began to be
+  corrected anew.
   """
   @type t :: %__MODULE__{
           start: Pose.t(),
@@ -42,7 +46,7 @@ defmodule Robot.Localiser do
           seen_ms: integer() | nil,
           anchors: Anchors.t(),
           frame: Anchors.frame() | nil,
-          joins: non_neg_integer()
+          frame_no: non_neg_integer() | nil
         }
 
   @doc "A robot that was switched on at `start`, where its odometry said zero."
@@ -54,43 +58,58 @@ defmodule Robot.Localiser do
   frame's robot is unsure of its own pose, and then by what that robot's odometry drifts.
   """
   @spec anchors(t(), Anchors.t()) :: t()
-  def anchors(localiser, %Anchors{frame: frame, marks: marks} = anchors) do
+  def anchors(%{anchors: %{marks: before}} = localiser, %Anchors{frame: frame} = anchors) do
     localiser = localiser |> join(frame) |> Map.put(:anchors, anchors)
-
-    if marks == [] and localiser.belief != nil,
-      do: %{localiser | belief: Belief.forget(localiser.belief)},
-      else: localiser
+    if before == [] and anchors.marks != [], do: renumber(localiser), else: localiser
   end
+
+  # The first tick's time tells one start of a robot from another.
+  defp renumber(%{frame_no: nil} = localiser), do: localiser
+  defp renumber(%{frame_no: number} = localiser), do: %{localiser | frame_no: number + 1}
 
   # Where a leader is believed to be stays true when nobody leads any more.
   defp join(localiser, nil), do: localiser
   defp join(%{belief: nil} = localiser, _frame), do: localiser
 
-  # Less drift than before has only a robot that was started anew.
-  defp join(%{frame: %{key: key} = known} = localiser, %{key: key} = frame)
-       when frame.way >= known.way and frame.turn >= known.turn,
-       do: reframe(localiser, frame, frame.way - known.way, frame.turn - known.turn)
+  defp join(%{frame: %{key: key} = known} = localiser, %{key: key} = frame) do
+    {way, turn, turned} = known.drift
+    {now_way, now_turn, now_turned} = frame.drift
 
-  defp join(localiser, frame) do
-    {position, heading} = between(localiser.frame, frame)
-    # Where things are in the other frame has still to be seen.
-    localiser = %{localiser | belief: Belief.forget(localiser.belief)}
-    localiser = reframe(localiser, frame, position, heading)
-    %{localiser | joins: localiser.joins + 1}
+    # Less drift than before has only a robot that was started anew.
+    if now_way >= way and now_turn >= turn and now_turned >= turned do
+      belief =
+        localiser.belief
+        |> Belief.slipped(frame.at, now_turned - turned)
+        |> Belief.reframe(frame.at, now_way - way, now_turn - turn)
+
+      %{localiser | frame: frame, belief: belief}
+    else
+      change(localiser, frame)
+    end
   end
 
-  # What nobody knows of one frame in another: one may have begun in the other, or both elsewhere.
-  defp between(nil, frame), do: {frame.position, frame.heading}
+  defp join(localiser, frame), do: change(localiser, frame)
+
+  # Where things are in the other frame has still to be seen.
+  defp change(localiser, frame) do
+    {position, heading} = between(localiser.frame, frame)
+
+    belief =
+      localiser.belief
+      |> Belief.forget()
+      |> Belief.reframe(frame.at, position, heading)
+      |> Belief.led(frame.slip)
+
+    renumber(%{localiser | frame: frame, belief: belief})
+  end
+
+  # What nobody knows of one frame in another: one may have begun in the other, or both in the start poses.
+  defp between(nil, frame), do: frame.start
   defp between(%{key: key}, %{base: key} = frame), do: {frame.position, frame.heading}
   defp between(%{base: key} = known, %{key: key}), do: {known.position, known.heading}
 
-  defp between(known, frame),
-    do: {known.position + frame.position, known.heading + frame.heading}
-
-  defp reframe(localiser, frame, position, heading) do
-    belief = Belief.reframe(localiser.belief, frame.at, position, heading)
-    %{localiser | frame: frame, belief: belief}
-  end
+  defp between(%{start: {a, b}}, %{start: {position, heading}}),
+    do: {a + position, b + heading}
 
   @doc """
   Moves the estimate by the percept's odometry, corrects it by the percept's blobs, and fills in the percept's
@@ -103,10 +122,11 @@ defmodule Robot.Localiser do
   def update(localiser, %Percept{odometry: %Odometry{} = odometry} = percept) do
     localiser =
       localiser
+      |> numbered(percept.at_ms)
       |> framed(odometry.frame)
       |> move(odometry.pose)
-      |> see(percept)
       |> remember(percept.at_ms)
+      |> see(percept)
 
     percept = %{
       percept
@@ -118,18 +138,26 @@ defmodule Robot.Localiser do
     {percept, localiser}
   end
 
-  defp uncertainty(%{belief: belief, frame: frame, joins: joins}) do
+  defp uncertainty(%{belief: belief, frame: frame, frame_no: number}) do
     {position, _across, heading} = Belief.sd(belief)
+    {square, turn} = if frame, do: frame.start, else: {0.0, 0.0}
 
     %{
       radius: Belief.radius(belief),
       position: position,
       heading: heading,
       frame: frame && frame.key,
-      joins: joins,
-      drift: belief.drift
+      frame_no: number,
+      start: {square + position * position, turn + heading * heading},
+      drift: belief.drift,
+      slip: Belief.slip_sd(belief)
     }
   end
+
+  defp numbered(%{frame_no: nil} = localiser, at_ms),
+    do: %{localiser | frame_no: Integer.mod(at_ms, @numbers)}
+
+  defp numbered(localiser, _at_ms), do: localiser
 
   defp framed(%{odometry_frame: frame} = localiser, frame), do: localiser
   defp framed(%{belief: nil} = localiser, frame), do: %{localiser | odometry_frame: frame}
@@ -162,16 +190,23 @@ defmodule Robot.Localiser do
   defp see(%{seen_ms: at_ms} = localiser, %Percept{blobs_at_ms: at_ms}), do: localiser
 
   defp see(localiser, %Percept{blobs_at_ms: at_ms} = percept) do
-    back = History.back(localiser.history, localiser.odometry, at_ms)
-    belief = Sightings.correct(localiser.belief, localiser.anchors.marks, percept, back)
-    %{localiser | seen_ms: at_ms, belief: belief}
+    case History.back(localiser.history, localiser.odometry, at_ms) do
+      nil ->
+        localiser
+
+      back ->
+        belief = Sightings.correct(localiser.belief, localiser.anchors.marks, percept, back)
+        %{localiser | seen_ms: at_ms, belief: belief}
+    end
   end
 
   defp remember(localiser, at_ms),
     do: %{localiser | history: History.note(localiser.history, at_ms, localiser.odometry)}
 
-  defp pose_at(%{belief: belief} = localiser, at_ms),
-    do: Pose.compose(belief.pose, History.back(localiser.history, localiser.odometry, at_ms))
+  defp pose_at(%{belief: belief} = localiser, at_ms) do
+    back = History.back(localiser.history, localiser.odometry, at_ms)
+    back && Pose.compose(belief.pose, back)
+  end
 
   # It was started anew in the middle of its way: how it came there, and what corrected it, nobody knows any more.
   defp driven?(%Pose{x: x, y: y, heading: heading}),

@@ -86,7 +86,7 @@ defmodule Robot.LocaliserTest do
     again = %{framed.(Pose.new(0, 0), other, 900) | blobs: [], blobs_at_ms: 100}
     {percept, sure} = Localiser.update(localiser, again)
     assert percept.pose == before.pose
-    assert percept.blobs_pose == before.pose
+    assert percept.blobs_pose == nil
     assert Belief.radius(sure.belief) > Belief.radius(localiser.belief) + 0.3
 
     {percept, _} = Localiser.update(sure, framed.(Pose.new(0.5, 0), other, 1_000))
@@ -162,6 +162,42 @@ defmodule Robot.LocaliserTest do
     assert localiser.belief == belief
   end
 
+  test "a picture that is younger than the tick before this one is of the way between" do
+    localiser = told(Localiser.new(Pose.new(0, 0)), [@landmark])
+    {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0), 0))
+    blobs = [blob("Y", Pose.new(0, 0, 0.1), {4.0, 0.0}, 0.15)]
+    now = %{percept(Pose.new(0, 0, 0.2), 100, blobs) | blobs_at_ms: 50}
+    {percept, _} = Localiser.update(localiser, now)
+    assert_in_delta percept.blobs_pose.heading, 0.1, 1.0e-3
+    assert_in_delta percept.pose.heading, 0.2, 1.0e-3
+  end
+
+  test "a picture of a time before all that is remembered corrects nothing" do
+    localiser = told(Localiser.new(Pose.new(0, 0)), [@landmark])
+    {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0), 1_000))
+    blobs = [blob("Y", Pose.new(0, 0, 0.05), {4.0, 0.0}, 0.15)]
+
+    {percept, corrected} =
+      Localiser.update(localiser, %{percept(Pose.new(0, 0), 1_100, blobs) | blobs_at_ms: 900})
+
+    assert percept.blobs_pose == nil
+    assert corrected.belief == localiser.belief
+  end
+
+  test "its own frame is another one when it begins to be corrected anew, or is started anew" do
+    number = fn {percept, _localiser} -> percept.uncertainty.frame_no end
+    tick = &Localiser.update(&1, percept(Pose.new(0, 0), &2))
+    {_, localiser} = started = tick.(Localiser.new(Pose.new(0, 0)), 7_000)
+    assert number.(started) == 7_000
+    {_, localiser} = one = localiser |> told([@landmark]) |> tick.(7_100)
+    assert number.(one) == 7_001
+    {_, localiser} = same = localiser |> told([@landmark, @leader]) |> tick.(7_200)
+    assert number.(same) == 7_001
+    {_, localiser} = leading = localiser |> told([]) |> tick.(7_300)
+    assert number.(leading) == 7_001
+    assert number.(localiser |> told([@landmark]) |> tick.(7_400)) == 7_002
+  end
+
   test "nothing is said of the distance of what is hidden in part" do
     yellow = blob("Y", Pose.new(0, 0), {4.0, 0.0}, 0.15)
     assert Sighting.distance(yellow, [yellow]) == 4.0
@@ -196,8 +232,9 @@ defmodule Robot.LocaliserTest do
         at: at,
         position: position,
         heading: heading,
-        way: 0.0,
-        turn: 0.0
+        start: {position, heading},
+        drift: {0.0, 0.0, 0.0},
+        slip: 0.0
       },
       Map.new(options)
     )
@@ -223,27 +260,63 @@ defmodule Robot.LocaliserTest do
 
     # Told again it is no news, however unsure of its own pose that one has become on its way; drift is.
     {same, localiser} = come.(localiser, frame({:mag2, 1}, @there, 0.5, 0.02))
-    assert same.uncertainty == joined.uncertainty
-    drifted = frame({:mag2, 1}, @there, 0.5, 0.02, way: 0.02, turn: 0.01)
+    as_sure = &Map.take(&1.uncertainty, [:radius, :position, :heading, :frame, :frame_no])
+    assert as_sure.(same) == as_sure.(joined)
+    drifted = frame({:mag2, 1}, @there, 0.5, 0.02, drift: {0.02, 0.01, 0.0})
     {more, localiser} = come.(localiser, drifted)
     assert_in_delta sd.(more), :math.sqrt(2.0 + 0.06), 0.01
 
     # It cannot drift back; if it says so, it was started anew.
     {anew, _} = come.(localiser, frame({:mag2, 1}, @there, 0.01, 0.0))
-    assert anew.uncertainty.joins == 2
+    assert anew.uncertainty.frame_no == 2
     assert sd.(anew) > sd.(more) + 0.5
 
     # One who was in the frame of mag2 leads: that it is unsure of there. Then mag2 again: that is what was unsure.
     {other, localiser} = come.(localiser, frame({:mag3, 2}, @there, 0.0, 0.01, base: {:mag2, 1}))
 
     assert_in_delta sd.(other), :math.sqrt(3.0 + 0.06), 0.01
-    assert %{frame: {:mag3, 2}, joins: 2} = other.uncertainty
+    assert %{frame: {:mag3, 2}, frame_no: 2} = other.uncertainty
     {back, localiser} = come.(localiser, drifted)
     assert_in_delta sd.(back), :math.sqrt(4.0 + 0.06), 0.01
 
     # Of a frame that nothing is known of, all is unsure that is unsure of both.
     {strange, _} = come.(localiser, frame({:min1, 7}, @there, 0.0, 0.01, base: {:min2, 3}))
     assert_in_delta sd.(strange), :math.sqrt(4.0 + 0.06 + 0.5 + 3.0), 0.01
+  end
+
+  test "a leader that slips turns its followers by as much in each radian, and they find out by what they see" do
+    truth = fn turned -> Pose.new(0, 0, -0.05 * turned) end
+    {_, localiser} = Localiser.update(Localiser.new(Pose.new(0, 0)), percept(Pose.new(0, 0), 0))
+    frame = &frame({:mag2, 1}, {0.0, 0.0}, 0.0, 0.0, slip: 0.055, drift: {0.0, 0.0, &1})
+    heading = fn percept -> percept.uncertainty.heading end
+
+    # By twice the angle it is twice as unsure: a bias, and no walk.
+    after_turn = fn turned ->
+      {percept, _} =
+        localiser
+        |> told([], frame.(0.0))
+        |> told([], frame.(turned))
+        |> Localiser.update(percept(Pose.new(0, 0), 100))
+
+      assert percept.pose == Pose.new(0, 0)
+      percept
+    end
+
+    assert_in_delta heading.(after_turn.(4.0)), :math.sqrt(0.22 * 0.22 + 0.0004), 0.01
+    assert_in_delta heading.(after_turn.(8.0)), :math.sqrt(0.44 * 0.44 + 0.0004), 0.01
+
+    # It slips by 5 in 100: what stands still is seen to turn in its frame.
+    localiser =
+      Enum.reduce(1..100, told(localiser, [], frame.(0.0)), fn k, localiser ->
+        turned = k * 0.1
+        blobs = [blob("Y", truth.(turned), {4.0, 0.0}, 0.15)]
+        localiser = told(localiser, [@landmark], frame.(turned))
+        {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0), 100 * k, blobs))
+        localiser
+      end)
+
+    assert_in_delta localiser.belief.leader_slip, 0.05, 0.005
+    assert_in_delta localiser.belief.pose.heading, truth.(10.0).heading, 0.02
   end
 
   test "what was learnt of a thing in one frame is forgotten in another" do

@@ -6,9 +6,10 @@ defmodule Swarm.Anchor do
   does not hear the leader still knows its place. The newest sequence number wins; the epoch
   fences off leaders of the past.
 
-  Poses are `{x_mm, y_mm, mrad}` in the leader's map frame, its own uncertainty there is `sd` (standard
-  deviations in mm and mrad), in the frame `base` that it was in before; `frame` is the number of its own. `drift` is by how much its odometry
-  has drifted since it was started (variances, in mm2 and millionths of rad2). `landmark` is `{x_mm, y_mm}` or `nil`,
+  Poses are `{x_mm, y_mm, mrad}` in the leader's map frame. Its own uncertainty (standard deviations in mm and mrad)
+  is `sd` in the frame `base` that it was in before, and `start_sd` in that of the start poses; `frame` is the number of its own.
+  `drift` is by how much its odometry has drifted since it was started (variances in mm2 and millionths of rad2, all angles
+  turned in mrad), `slip` how well it knows by what share of an angle it slips (a standard deviation, in thousandths). `landmark` is `{x_mm, y_mm}` or `nil`,
   `still` says that it does not move. `order` names the followers by slot, which is also
   the order in which each passes the anchor on to its child. `formation` is
   the shape as there is room for it, `asked` the one that was asked for, the `asked_no`-th that was; `size` and `places` say which
@@ -22,7 +23,9 @@ defmodule Swarm.Anchor do
   defstruct @enforce_keys ++
               [
                 sd: {0, 0},
-                drift: {0, 0},
+                start_sd: {0, 0},
+                drift: {0, 0, 0},
+                slip: 0,
                 frame: 0,
                 base: nil,
                 asked: nil,
@@ -33,8 +36,8 @@ defmodule Swarm.Anchor do
                 of: 0
               ]
 
-  @typedoc "A robot's frame, and the number that it has among those that this robot was in."
-  @type frame :: {atom(), non_neg_integer()}
+  @typedoc "Whose frame it is, the number of that robot's life, and of the frame among those of this life."
+  @type frame :: {atom(), boot :: non_neg_integer() | nil, non_neg_integer()}
   @type t :: %__MODULE__{
           leader: atom(),
           epoch: pos_integer(),
@@ -42,7 +45,10 @@ defmodule Swarm.Anchor do
           pose: {integer(), integer(), integer()},
           twist: {integer(), integer()},
           sd: {position :: non_neg_integer(), heading :: non_neg_integer()},
-          drift: {way :: non_neg_integer(), turn :: non_neg_integer()},
+          start_sd: {position :: non_neg_integer(), heading :: non_neg_integer()},
+          drift:
+            {way :: non_neg_integer(), turn :: non_neg_integer(), turned :: non_neg_integer()},
+          slip: non_neg_integer(),
           frame: non_neg_integer(),
           base: frame() | nil,
           formation: Formation.t(),
@@ -87,7 +93,8 @@ defmodule Swarm.Anchor do
       anchor.size in 1..@most and
       Shape.list?(places, &(&1 in 1..@most and &1 < anchor.size)) and
       length(places) == length(order) and Shape.distinct?(places) and
-      sd?(anchor.sd) and sd?(anchor.drift) and Shape.count?(anchor.frame) and base?(anchor.base) and
+      sizes?(anchor.sd, 2) and sizes?(anchor.start_sd, 2) and sizes?(anchor.drift, 3) and
+      size?(anchor.slip) and Shape.count?(anchor.frame) and base?(anchor.base) and
       landmark?(anchor.landmark) and is_boolean(anchor.still) and
       is_integer(anchor.of) and anchor.of in 0..@most and
       (anchor.trail == nil or
@@ -96,11 +103,18 @@ defmodule Swarm.Anchor do
 
   def valid?(_term), do: false
 
-  defp sd?({mm, mrad}), do: Enum.all?([mm, mrad], &(Shape.number?(&1) and &1 >= 0))
-  defp sd?(_other), do: false
+  defp sizes?(term, count) when is_tuple(term) and tuple_size(term) == count,
+    do: term |> Tuple.to_list() |> Enum.all?(&size?/1)
+
+  defp sizes?(_other, _count), do: false
+
+  defp size?(term), do: Shape.number?(term) and term >= 0
 
   defp base?(nil), do: true
-  defp base?({name, number}), do: Shape.name?(name) and Shape.count?(number)
+
+  defp base?({name, boot, number}),
+    do: Shape.name?(name) and (boot == nil or Shape.boot?(boot)) and Shape.count?(number)
+
   defp base?(_other), do: false
 
   defp landmark?(nil), do: true

@@ -93,7 +93,7 @@ defmodule Swarm.Heartbeat do
   @spec valid?(term()) :: boolean()
   def valid?(%__MODULE__{twist: {linear, turn}} = beat) do
     Shape.whole?(beat, __MODULE__) and Shape.pose?(beat.pose) and Shape.number?(linear) and
-      Shape.number?(turn) and is_integer(beat.boot) and beat.boot in 0..@latest and
+      Shape.number?(turn) and Shape.boot?(beat.boot) and
       Shape.count?(beat.sequence) and beat.radius in 50..2000 and
       (beat.sd == nil or beat.sd in 0..100_000) and Shape.name?(beat.phase) and
       Shape.count?(beat.epoch) and (beat.leader == nil or Shape.name?(beat.leader)) and

@@ -8,6 +8,7 @@ defmodule Swarm.Shape do
   @count 500_000_000
   @most 1_000
   @day_ms 86_400_000
+  @latest 0xFFFFFFFFFFFFFFFF
 
   @doc """
   Whether a struct has all the fields of its kind and no others: over the wire anything can come.
@@ -80,6 +81,15 @@ defmodule Swarm.Shape do
   """
   @spec count?(term()) :: boolean()
   def count?(term), do: is_integer(term) and term in 0..@count
+
+  @doc """
+  Whether it is the number of a robot's life: the time of day at which it began, in ms.
+
+      iex> for term <- [1, 1_700_000_000_000, -1, 1.0e12], do: Swarm.Shape.boot?(term)
+      [true, true, false, false]
+  """
+  @spec boot?(term()) :: boolean()
+  def boot?(term), do: is_integer(term) and term in 0..@latest
 
   @doc """
   Whether it is a time in ms that somebody may wait: up to a day.

@@ -139,8 +139,10 @@ defmodule Swarm.Group do
         position: 0.02,
         heading: 0.01,
         frame: robot.frame,
-        joins: 0,
-        drift: {0.0, 0.0}
+        frame_no: 0,
+        start: {0.0, 0.0},
+        drift: {0.0, 0.0, 0.0},
+        slip: 0.0
       },
       odometry: %Odometry{pose: robot.pose, twist: Twist.zero()},
       peers: Peers.percepts(robot.peers, group.now),

@@ -12,8 +12,9 @@ defmodule Robot.Localiser.Anchors do
 
   @typedoc """
   `key` tells one frame from another, `base` is the key of the one that its variances (`position`, `heading`: m2, rad2) are in,
-  `nil` for that of the start poses; `at` is where its robot believes itself to be. `way` and `turn` are variances, too: by what its
-  odometry has drifted since it was started.
+  `nil` for that of the start poses; `start` are the variances in the latter. `at` is where its robot believes itself to be. `drift` is
+  by what its odometry has drifted since it was started: variances of way and turn, and all angles turned (radians); `slip`
+  (a standard deviation) how well it knows what slips in each of them alike.
   """
   @type frame :: %{
           key: term(),
@@ -21,8 +22,9 @@ defmodule Robot.Localiser.Anchors do
           at: Pose.point(),
           position: float(),
           heading: float(),
-          way: float(),
-          turn: float()
+          start: {position :: float(), heading :: float()},
+          drift: {way :: float(), turn :: float(), turned :: float()},
+          slip: float()
         }
 
   @typedoc """

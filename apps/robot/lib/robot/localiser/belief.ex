@@ -9,10 +9,12 @@ defmodule Robot.Localiser.Belief do
   |---|---|
   | slip | by which share the robot turns farther to the left than its wheels say, and less far to the right (R74) |
   | two scales | by which share distances come out too long: by the size of the landmark, by the width of a robot |
+  | slip of the leader | the same of the robot in whose frame the pose is, as far as nobody knows it there |
   | x, y of each mark | how far a thing that was told is from where it was told to be |
 
-  `drift` is by what variance (m2, rad2) it has come away from its own former self by odometry alone: what matters to
-  those whose poses hang from its own.
+  `drift` is by what it has come away from its own former self by odometry alone, which is what matters to those whose
+  poses hang from its own: variances of its way and of its turns (m2, rad2), and all angles turned so far (radians), for
+  what slips in each of them alike.
 
   With the last state, a mark that is seen a thousand times makes nobody surer than its own place is: Smith, Self
   and Cheeseman 1990. Odometry: Siegwart and Nourbakhsh 2004. What is farther off than three standard
@@ -21,14 +23,16 @@ defmodule Robot.Localiser.Belief do
   alias Hal.Pose
   alias Robot.Localiser.Covariance
 
-  # x, y, heading, slip, the scales of the landmark and of robots.
+  # x, y, heading, slip, the scales of the landmark and of robots, the leader's slip.
   @slip_sd 0.055
-  @start_sd [0.03, 0.03, 0.02, @slip_sd, 0.06, 0.08]
+  @start_sd [0.03, 0.03, 0.02, @slip_sd, 0.06, 0.08, 0.0]
   @own length(@start_sd)
-  # Standard deviations of odometry: of the way driven, of the angle turned, of angle per metre.
-  @way_share 0.01
-  @turn_share 0.05
-  @turn_per_metre 0.01
+  @leader_slip 6
+  # Variances of odometry: of a metre driven, along it (m2) and in angle (rad2), and of a radian turned. They
+  # grow with the way, however many steps it is told in.
+  @way_variance 1.0e-5
+  @bend_variance 1.0e-5
+  @turn_variance 2.5e-4
   # How much slip changes, in a radian turned.
   @slip_change 0.005
   @gate 9.0
@@ -46,13 +50,20 @@ defmodule Robot.Localiser.Belief do
   @lost_position 5.0
   @lost_heading 1.0
   @far 100.0
+  # A leader that is said to have turned by more since it was last heard, in radians.
+  @turned_at_once 100.0
 
   @enforce_keys [:pose, :covariance]
   defstruct @enforce_keys ++
-              [slip: 0.0, scales: {0.0, 0.0}, marks: [], uses: 0, refused: 0, drift: {0.0, 0.0}]
-
-  # Over so many radians the slip of a turn goes one way, for those who do not know which.
-  @slip_rad 1.0
+              [
+                slip: 0.0,
+                scales: {0.0, 0.0},
+                leader_slip: 0.0,
+                marks: [],
+                uses: 0,
+                refused: 0,
+                drift: {0.0, 0.0, 0.0}
+              ]
 
   @typedoc "`told` is where it was told to be and how well that was known, `off` how far it is from there."
   @type mark :: %{
@@ -67,10 +78,11 @@ defmodule Robot.Localiser.Belief do
           covariance: Covariance.t(),
           slip: float(),
           scales: {landmark :: float(), robot :: float()},
+          leader_slip: float(),
           marks: [mark()],
           uses: non_neg_integer(),
           refused: non_neg_integer(),
-          drift: {way :: float(), turn :: float()}
+          drift: {way :: float(), turn :: float(), turned :: float()}
         }
   @typedoc "How a measurement changes with x, y and heading, and with the scales."
   @type slope :: {{float(), float(), float()}, {float(), float()}}
@@ -95,6 +107,16 @@ defmodule Robot.Localiser.Belief do
   end
 
   defp root(square), do: :math.sqrt(max(square, 0.0))
+
+  @doc """
+  The standard deviation of its slip.
+
+      iex> Robot.Localiser.Belief.slip_sd(Robot.Localiser.Belief.new(Hal.Pose.new(1, 0)))
+      0.055
+  """
+  @spec slip_sd(t()) :: float()
+  def slip_sd(%__MODULE__{covariance: [_x, _y, _heading, [_, _, _, variance | _] | _]}),
+    do: root(variance)
 
   @doc """
   The radius round the estimate that holds the robot in 95 of 100 cases, in metres: 1.96 standard deviations of
@@ -131,8 +153,8 @@ defmodule Robot.Localiser.Belief do
 
     pose = Pose.compose(belief.pose, slipped)
     way = :math.sqrt(step.x * step.x + step.y * step.y)
-    along = :math.pow(@way_share * way, 2)
-    turned = :math.pow(@turn_share * angle, 2) + :math.pow(@turn_per_metre * way, 2)
+    along = @way_variance * way
+    turned = @turn_variance * angle + @bend_variance * way
     slips = @slip_change * @slip_change * angle
 
     covariance =
@@ -140,9 +162,9 @@ defmodule Robot.Localiser.Belief do
       |> Covariance.carry(&motion(&1, belief.pose.y - pose.y, pose.x - belief.pose.x, angle))
       |> Covariance.add([along, along, turned, slips])
 
-    {way, turn} = belief.drift
-    slipped = @slip_sd * @slip_sd * @slip_rad * angle
-    %{belief | pose: pose, covariance: covariance, drift: {way + along, turn + turned + slipped}}
+    {drift, turn, all} = belief.drift
+    drift = {drift + along, turn + turned, all + angle}
+    %{belief | pose: pose, covariance: covariance, drift: drift}
   end
 
   # F = [1 0 a au/2; 0 1 b bu/2; 0 0 1 u; 0 0 0 1]: the way turns with the heading, half of the slip with it.
@@ -163,11 +185,10 @@ defmodule Robot.Localiser.Belief do
   its frame may have moved, and turned about it.
   """
   @spec reframe(t(), at :: Pose.point(), position :: float(), heading :: float()) :: t()
-  def reframe(belief, {x, y}, position, heading) do
+  def reframe(belief, at, position, heading) do
     position = min(position, @lost_position * @lost_position)
-    {x, y} = near(belief.pose, {x, y})
     heading = min(heading, @lost_heading * @lost_heading)
-    turn = [y - belief.pose.y, belief.pose.x - x, 1.0]
+    turn = swing(belief.pose, at)
     [a, b, c | rest] = belief.covariance
 
     rows =
@@ -177,6 +198,52 @@ defmodule Robot.Localiser.Belief do
       end
 
     %{belief | covariance: Covariance.add(rows ++ rest, [position, position])}
+  end
+
+  @doc "In the frame of another leader, whose slip is known by this standard deviation."
+  @spec led(t(), slip_sd :: float()) :: t()
+  def led(belief, sd),
+    do: %{
+      belief
+      | leader_slip: 0.0,
+        covariance: Covariance.replace(belief.covariance, @leader_slip, min(sd, @lost_heading))
+    }
+
+  @doc """
+  After the leader, at `at`, has turned by so many radians, to whichever side: where it slips in each of them alike, all
+  that it tells is turned about it by as much the other way.
+  """
+  @spec slipped(t(), at :: Pose.point(), turned :: float()) :: t()
+  def slipped(belief, _at, turned) when turned <= 0.0, do: belief
+
+  def slipped(belief, at, turned) do
+    turned = min(turned, @turned_at_once)
+    [gx, gy, 1.0] = swing(belief.pose, at)
+    angle = -turned * belief.leader_slip
+    pose = belief.pose
+    pose = Pose.new(pose.x + gx * angle, pose.y + gy * angle, pose.heading + angle)
+    slips = List.duplicate(0.0, @leader_slip) ++ [@slip_change * @slip_change * turned]
+
+    covariance =
+      belief.covariance
+      |> Covariance.carry(&swung(&1, -turned * gx, -turned * gy, -turned))
+      |> Covariance.add(slips)
+
+    %{belief | pose: pose, covariance: covariance}
+  end
+
+  defp swung([x, y, heading | rest], a, b, c) do
+    slip = Enum.at(rest, @leader_slip - 3)
+    [plus(x, a, slip), plus(y, b, slip), plus(heading, c, slip) | rest]
+  end
+
+  defp plus([], _k, []), do: []
+  defp plus([a | as], k, [b | bs]), do: [a + k * b | plus(as, k, bs)]
+
+  # How x, y and heading change with an angle about somebody there.
+  defp swing(pose, at) do
+    {x, y} = near(pose, at)
+    [y - pose.y, pose.x - x, 1.0]
   end
 
   # What turns about somebody so far away is lost anyway.
@@ -266,7 +333,7 @@ defmodule Robot.Localiser.Belief do
   @spec correct(t(), key :: term(), float(), slope(), noise :: float()) :: t()
   def correct(belief, key, error, {{a, b, c}, {k, l}}, noise) do
     index = Enum.find_index(belief.marks, &(&1.key == key))
-    slope = [a, b, c, 0.0, k, l] ++ List.duplicate(0.0, 2 * index) ++ [-a, -b]
+    slope = [a, b, c, 0.0, k, l, 0.0] ++ List.duplicate(0.0, 2 * index) ++ [-a, -b]
     {v, variance} = Covariance.project(belief.covariance, slope)
     s = variance + noise
 
@@ -275,7 +342,7 @@ defmodule Robot.Localiser.Belief do
       else: believe(belief, v, error / s, Covariance.reduce(belief.covariance, v, s))
   end
 
-  defp believe(belief, [x, y, heading, slip, k, l | marks], share, covariance) do
+  defp believe(belief, [x, y, heading, slip, k, l, leader | marks], share, covariance) do
     %{pose: pose, scales: {landmark, robot}} = belief
 
     %{
@@ -283,6 +350,7 @@ defmodule Robot.Localiser.Belief do
       | pose: Pose.new(pose.x + x * share, pose.y + y * share, pose.heading + heading * share),
         slip: belief.slip + slip * share,
         scales: {landmark + k * share, robot + l * share},
+        leader_slip: belief.leader_slip + leader * share,
         marks: shift_marks(belief.marks, marks, share),
         covariance: covariance,
         refused: max(belief.refused - 1, 0)
@@ -314,12 +382,12 @@ defmodule Robot.Localiser.Belief do
   @spec doubt(t()) :: t()
   def doubt(%__MODULE__{} = belief) do
     variance = @doubt_sd * @doubt_sd
-    {way, turn} = belief.drift
+    {way, turn, all} = belief.drift
 
     %{
       belief
       | refused: 0,
-        drift: {way + variance, turn + variance},
+        drift: {way + variance, turn + variance, all},
         covariance: Covariance.add(belief.covariance, [variance, variance, variance])
     }
   end

@@ -64,6 +64,25 @@ defmodule Robot.Localiser.Covariance do
   end
 
   @doc """
+  With this standard deviation of one state, correlated with nothing, in place of what was known of it.
+
+      iex> Robot.Localiser.Covariance.replace([[1.0, 0.5], [0.5, 1.0]], 1, 2.0)
+      [[1.0, 0.0], [0.0, 4.0]]
+  """
+  @spec replace(t(), index :: non_neg_integer(), sd :: float()) :: t()
+  def replace(p, index, sd) do
+    for {row, i} <- Enum.with_index(p) do
+      for {x, j} <- Enum.with_index(row) do
+        cond do
+          i == index and j == index -> sd * sd
+          i == index or j == index -> 0.0
+          true -> x
+        end
+      end
+    end
+  end
+
+  @doc """
   Without these states.
 
       iex> Robot.Localiser.Covariance.drop([[1.0, 2.0, 3.0], [2.0, 5.0, 6.0], [3.0, 6.0, 9.0]], 1, 2)

@@ -19,17 +19,17 @@ defmodule Robot.Localiser.History do
 
   @doc """
   Where the robot was at a time, seen from where odometry has it now. Between two ticks the way is taken in
-  proportion; of what is before all that is remembered nobody knows, and it is taken for now.
+  proportion; of what is before all that is remembered nobody knows: `nil`.
 
       iex> history = [{100, Hal.Pose.new(1, 0)}, {0, Hal.Pose.new(0, 0)}]
       iex> Robot.Localiser.History.back(history, Hal.Pose.new(1.5, 0), 50)
       Hal.Pose.new(-1.0, 0)
   """
-  @spec back(t(), now :: Pose.t(), integer()) :: Pose.t()
+  @spec back(t(), now :: Pose.t(), integer()) :: Pose.t() | nil
   def back(history, now, at_ms) do
     case Enum.split_while(history, fn {time_ms, _odometry} -> time_ms > at_ms end) do
       {_later, []} ->
-        Pose.new(0, 0)
+        nil
 
       {later, [{time_ms, then} | _]} ->
         {next_ms, next} = List.last(later) || {nil, now}

@@ -18,7 +18,7 @@ defmodule Robot.Localiser.BeliefTest do
     for least <- [0.0, 0.3, 0.6, 1.0] do
       belief = %{
         Belief.new(Pose.new(0, 0))
-        | covariance: Covariance.diagonal([1.0, least, 0.1, 0.0, 0.0, 0.0])
+        | covariance: Covariance.diagonal([1.0, least, 0.1, 0.0, 0.0, 0.0, 0.0])
       }
 
       radius = Belief.radius(belief)
@@ -35,7 +35,7 @@ defmodule Robot.Localiser.BeliefTest do
   end
 
   test "one that knows all is within no radius at all" do
-    sure = %{Belief.new(Pose.new(0, 0)) | covariance: Covariance.diagonal(List.duplicate(0.0, 6))}
+    sure = %{Belief.new(Pose.new(0, 0)) | covariance: Covariance.diagonal(List.duplicate(0.0, 7))}
     assert Belief.radius(sure) == 0.0
   end
 
@@ -46,6 +46,12 @@ defmodule Robot.Localiser.BeliefTest do
 
     straight =
       Enum.reduce(1..100, start, fn _, belief -> Belief.move(belief, Pose.new(0.1, 0)) end)
+
+    # However many steps it is told in.
+    long = Enum.reduce(1..10, start, fn _, belief -> Belief.move(belief, Pose.new(1.0, 0)) end)
+
+    for {a, b} <- Enum.zip(Tuple.to_list(Belief.sd(straight)), Tuple.to_list(Belief.sd(long))),
+        do: assert_in_delta(a, b, 0.005)
 
     # 10 m by 0.02 rad of heading, and what the way adds.
     {worst, least, _} = Belief.sd(straight)
@@ -86,10 +92,10 @@ defmodule Robot.Localiser.BeliefTest do
       end)
 
     assert Enum.map(belief.marks, & &1.key) |> Enum.sort() == [16, 17, 18, 19, 20, :first]
-    assert length(belief.covariance) == 6 + 2 * 6
-    assert Enum.all?(belief.covariance, &(length(&1) == 18))
+    assert length(belief.covariance) == 7 + 2 * 6
+    assert Enum.all?(belief.covariance, &(length(&1) == 19))
     assert Belief.forget(belief).marks == []
-    assert length(Belief.forget(belief).covariance) == 6
+    assert length(Belief.forget(belief).covariance) == 7
   end
 
   test "nothing makes it lose itself in numbers, however unsure another is" do

@@ -20,6 +20,7 @@ defmodule Swarm.Missions.Landmark do
   Time is `percept.at_ms`, compared with whole numbers; there are no timers.
   """
   alias Robot.Behaviour
+  alias Robot.Localiser.Anchors
   alias Swarm.{Formation, Message, Relay, Round, Trail}
   alias Swarm.Missions.Landmark.{Attend, Council, Hearing, Lead, Marks}
   alias Swarm.Missions.Landmark.{Phases, Policy, Sight, State}
@@ -28,6 +29,8 @@ defmodule Swarm.Missions.Landmark do
 
   @roam_ms 6_000
   @tries 3
+  # Where nobody says where things are, nobody corrects itself by where they were.
+  @unled [anchors: %Anchors{}]
   # Without a sign of life for so long a leader is lost.
   @led_ms 2_000
 
@@ -98,6 +101,7 @@ defmodule Swarm.Missions.Landmark do
     {mission, letters} = mission |> Policy.update() |> Hearing.beats() |> Council.tick()
     {mission, stages} = step(mission)
     {mission, effects} = act(Phases.activity(mission.phase), mission)
+    effects = if :lists.keymember(:anchors, 1, effects), do: effects, else: effects ++ @unled
     {mission, beats} = relay_beats(mission)
     effects = letters ++ beats ++ stages ++ effects
     {mission.phase, mission, effects ++ [{:claim, claim(mission)}]}

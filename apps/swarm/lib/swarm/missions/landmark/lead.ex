@@ -208,8 +208,10 @@ defmodule Swarm.Missions.Landmark.Lead do
       pose: State.millimetres(percept.pose),
       twist: twist(percept),
       sd: sd(percept.uncertainty),
+      start_sd: start_sd(percept.uncertainty),
       drift: drift(percept.uncertainty),
-      frame: percept.uncertainty.joins,
+      slip: min(ceil(percept.uncertainty.slip * 1000), @lost),
+      frame: percept.uncertainty.frame_no,
       base: percept.uncertainty.frame,
       formation: lead.shape.formation,
       asked: mission.formation,
@@ -229,7 +231,12 @@ defmodule Swarm.Missions.Landmark.Lead do
   defp sd(%{position: position, heading: heading}),
     do: {min(round(position * 1000), @lost), min(round(heading * 1000), @lost)}
 
-  defp drift(%{drift: {way, turn}}), do: {millionths(way), millionths(turn)}
+  defp start_sd(%{start: {position, heading}}),
+    do: sd(%{position: :math.sqrt(position), heading: :math.sqrt(heading)})
+
+  defp drift(%{drift: {way, turn, turned}}),
+    do: {millionths(way), millionths(turn), min(round(turned * 1000), @lost)}
+
   defp millionths(variance), do: min(round(variance * 1.0e6), @lost)
 
   # A crawl is told as standing still, so that no slot trembles.

@@ -40,7 +40,7 @@ defmodule Swarm.Missions.Landmark.Marks do
         }
       end
 
-    %Anchors{frame: frame(anchor, leader), marks: landmark(mission) ++ robots}
+    %Anchors{frame: frame(mission, leader), marks: landmark(mission) ++ robots}
   end
 
   # A landmark that moves is somewhere else by now.
@@ -77,27 +77,38 @@ defmodule Swarm.Missions.Landmark.Marks do
 
   defp sd(_id, _peer, _anchor), do: nil
 
-  defp frame(%{sd: {mm, mrad}, drift: {way, turn}} = anchor, leader) do
+  defp frame(%{anchor: %{drift: {way, turn, turned}} = anchor} = mission, leader) do
+    {position, heading} = variances(anchor.sd)
+
     %{
-      key: key(anchor),
+      key: key(mission),
       base: anchor.base,
       at: Pose.point(leader),
-      position: mm * mm / 1.0e6,
-      heading: mrad * mrad / 1.0e6,
-      way: way / 1.0e6,
-      turn: turn / 1.0e6
+      position: position,
+      heading: heading,
+      start: variances(anchor.start_sd),
+      drift: {way / 1.0e6, turn / 1.0e6, turned / 1000},
+      slip: anchor.slip / 1000
     }
   end
 
-  defp key(%{leader: leader, frame: number}), do: {leader, number}
+  defp variances({mm, mrad}), do: {mm * mm / 1.0e6, mrad * mrad / 1.0e6}
+
+  # A leader that was started anew numbers its frames anew.
+  defp key(%{anchor: %{leader: leader, frame: number}, percept: percept}) do
+    case percept.peers do
+      %{^leader => %{beat: %{boot: boot}}} -> {leader, boot, number}
+      _nothing_heard -> {leader, nil, number}
+    end
+  end
 
   @doc """
   How well a robot knows its pose in its leader's frame, as heartbeats tell it: the standard deviation of its
   position along the worst direction, in mm; `nil` where it has not come into that frame yet, or has none.
   """
   @spec told(State.t()) :: non_neg_integer() | nil
-  def told(%{anchor: %{} = anchor, percept: %{uncertainty: %{frame: frame, position: sd}}}) do
-    if frame == key(anchor), do: min(round(sd * 1000), 100_000)
+  def told(%{anchor: %{}, percept: %{uncertainty: %{frame: frame, position: sd}}} = mission) do
+    if frame == key(mission), do: min(round(sd * 1000), 100_000)
   end
 
   def told(_mission), do: nil
@@ -105,14 +116,15 @@ defmodule Swarm.Missions.Landmark.Marks do
   @doc """
   Whether a follower that believes it is this far from its slot (metres) is within half a metre of it in 95 of 100 cases.
 
-      iex> anchor = %{leader: :mag2, frame: 3}
-      iex> mission = %{anchor: anchor, percept: %{uncertainty: %{radius: 0.3, frame: {:mag2, 3}}}}
+      iex> peers = %{mag2: %{beat: %{boot: 7}}}
+      iex> percept = %{uncertainty: %{radius: 0.3, frame: {:mag2, 7, 3}}, peers: peers}
+      iex> mission = %{anchor: %{leader: :mag2, frame: 3}, percept: percept}
       iex> Enum.map([0.1, 0.25], &Swarm.Missions.Landmark.Marks.sure?(mission, &1))
       [true, false]
   """
   @spec sure?(State.t() | map(), error :: float()) :: boolean()
-  def sure?(%{anchor: anchor, percept: %{uncertainty: %{frame: frame, radius: radius}}}, error),
-    do: frame == key(anchor) and error + radius <= @tolerance
+  def sure?(%{percept: %{uncertainty: %{frame: frame, radius: radius}}} = mission, error),
+    do: frame == key(mission) and error + radius <= @tolerance
 
   def sure?(_mission, _error), do: false
 end

@@ -55,7 +55,7 @@ defmodule Swarm.Missions.Landmark.BlockerTest do
       attend: Attend.new()
     }
 
-    sure = %{radius: 0.1, position: 0.05, heading: 0.02, frame: {:mag1, 0}, joins: 1}
+    sure = %{radius: 0.1, position: 0.05, heading: 0.02, frame: {:mag1, nil, 0}}
 
     Enum.reduce(0..(seconds * 10), mission, fn tick, mission ->
       now = tick * 100

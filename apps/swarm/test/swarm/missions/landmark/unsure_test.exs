@@ -27,8 +27,7 @@ defmodule Swarm.Missions.Landmark.UnsureTest do
       radius: radius,
       position: radius / 2,
       heading: 0.1,
-      frame: {:mag1, 0},
-      joins: 1
+      frame: {:mag1, nil, 0}
     }
 
     Enum.reduce(0..(seconds * 10), mission, fn tick, mission ->
