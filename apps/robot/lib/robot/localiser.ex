@@ -145,6 +145,7 @@ defmodule Robot.Localiser do
     %{
       radius: Belief.radius(belief),
       position: position,
+      spread: Belief.spread(belief),
       heading: heading,
       frame: frame && frame.key,
       frame_no: number,

@@ -45,8 +45,8 @@ defmodule Robot.Percept do
         }
 
   @typedoc """
-  How sure the pose is: within `radius` metres in 95 of 100 cases; `position` (along the worst direction, metres) and `heading`
-  (radians) are standard deviations. `frame` is the key of the frame that the pose is in (`Robot.Localiser.Anchors`): `nil`
+  How sure the pose is: within `radius` metres in 95 of 100 cases; `position` (along the worst direction, metres; `spread` says more) and
+  `heading` (radians) are standard deviations. `frame` is the key of the frame that the pose is in (`Robot.Localiser.Anchors`): `nil`
   for that of the start poses, in which `start` are its variances (m2, rad2); `frame_no` is the number of the frame that it makes for
   others. `drift` is what odometry has added since the start: variances in m2 and rad2, and all angles turned; `slip` (a standard
   deviation) how well is known what slips in each of them.
@@ -54,6 +54,7 @@ defmodule Robot.Percept do
   @type uncertainty :: %{
           radius: float(),
           position: float(),
+          spread: Robot.Localiser.Anchors.spread(),
           heading: float(),
           frame: term(),
           frame_no: non_neg_integer(),

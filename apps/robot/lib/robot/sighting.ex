@@ -87,11 +87,12 @@ defmodule Robot.Sighting do
   @spec distance(Blob.t(), [Blob.t()]) :: float() | nil
   def distance(%Blob{clipped?: true}, _blobs), do: nil
 
-  def distance(%Blob{} = blob, blobs) do
-    if Enum.any?(blobs, &(&1.colour != blob.colour and touch?(&1, blob))),
-      do: nil,
-      else: blob.distance
-  end
+  def distance(%Blob{} = blob, blobs), do: if(hidden?(blob, blobs), do: nil, else: blob.distance)
+
+  @doc "Whether something of another colour may hide a part of it: boxes that touch."
+  @spec hidden?(Blob.t(), [Blob.t()]) :: boolean()
+  def hidden?(%Blob{} = blob, blobs),
+    do: Enum.any?(blobs, &(&1.colour != blob.colour and touch?(&1, blob)))
 
   defp touch?(a, b) do
     a.left <= b.right + @touch and b.left <= a.right + @touch and a.top <= b.bottom + @touch and

@@ -49,10 +49,19 @@ defmodule Robot.LocaliserTest do
     kind: :landmark,
     colour: "Y",
     at: {4.0, 0.0},
-    sd: 0.05,
+    sd: {0.05, 0.05, 0.0},
+    reference?: true,
     radius: 0.15
   }
-  @leader %{key: :mag2, kind: :robot, colour: "R", at: {2.5, 0.8}, sd: 0.05, radius: 0.2}
+  @leader %{
+    key: :mag2,
+    kind: :robot,
+    colour: "R",
+    at: {2.5, 0.8},
+    sd: {0.05, 0.05, 0.0},
+    reference?: true,
+    radius: 0.2
+  }
 
   defp told(localiser, marks, frame \\ nil),
     do: Localiser.anchors(localiser, %Anchors{frame: frame, marks: marks})
@@ -211,7 +220,7 @@ defmodule Robot.LocaliserTest do
       settle(Localiser.new(Pose.new(0, 0)), Pose.new(0, 0), [@landmark, @leader], 1_000)
 
     sure = percept.uncertainty.radius
-    unknown = for mark <- [@landmark, @leader], do: %{mark | sd: 0.3}
+    unknown = for mark <- [@landmark, @leader], do: %{mark | sd: {0.3, 0.3, 0.0}}
     {percept, _} = settle(lost(0.5), Pose.new(0, 0), unknown, 1_000)
     assert percept.uncertainty.radius > 0.3
     assert sure < 0.1
@@ -281,7 +290,9 @@ defmodule Robot.LocaliserTest do
 
     # Of a frame that nothing is known of, all is unsure that is unsure of both.
     {strange, _} = come.(localiser, frame({:min1, 7}, @there, 0.0, 0.01, base: {:min2, 3}))
-    assert_in_delta sd.(strange), :math.sqrt(4.0 + 0.06 + 0.5 + 3.0), 0.01
+    # And by how much each of the arcs so far bends.
+    bend = 0.75 * 100 * (3 * 0.01 * 0.01 + 0.01 * 0.01 + 0.03 * 0.03)
+    assert_in_delta sd.(strange), :math.sqrt(4.0 + 0.06 + 0.5 + 3.0 + bend), 0.01
   end
 
   test "a leader that slips turns its followers by as much in each radian, and they find out by what they see" do
@@ -320,7 +331,7 @@ defmodule Robot.LocaliserTest do
   end
 
   test "what was learnt of a thing in one frame is forgotten in another" do
-    told_wrong = %{@landmark | at: {4.0, 0.3}, sd: 0.3}
+    told_wrong = %{@landmark | at: {4.0, 0.3}, sd: {0.3, 0.3, 0.0}}
     {_, localiser} = settle(Localiser.new(Pose.new(0, 0)), Pose.new(0, 0), [told_wrong], 50)
     assert [%{key: :landmark}] = localiser.belief.marks
     joined = told(localiser, [told_wrong], frame({:mag3, 1}, {0.0, 0.0}, 0.04, 0.01))

@@ -7,7 +7,7 @@ defmodule Swarm.Heartbeat do
   whether its own latch is set (`Swarm.Stop`). `sight` is its newest view of the landmark: relative
   size and estimated distance, `nil` where it does not see it. `anchor` is there in the leader's
   heartbeats only. `in_place` says that a follower is in its slot, `unsure` that it believes so and is not sure
-  enough. `sd` is how well it knows its pose in its leader's frame, `nil` outside of
+  enough. `sd` is how well it knows its place in its leader's frame, `nil` outside of
   it. `boot` is its life's number, which grows with every start.
   """
   alias Swarm.{Roll, Shape}
@@ -32,13 +32,16 @@ defmodule Swarm.Heartbeat do
                 anchor: nil
               ]
 
+  @typedoc "Standard deviations of a place in mm, along the worst direction and across it, and that direction in mrad."
+  @type spread :: {worst :: non_neg_integer(), least :: non_neg_integer(), direction :: integer()}
+
   @type t :: %__MODULE__{
           boot: integer(),
           sequence: non_neg_integer(),
           pose: {x :: integer(), y :: integer(), heading :: integer()},
           twist: {linear :: integer(), turn :: integer()},
           radius: pos_integer(),
-          sd: non_neg_integer() | nil,
+          sd: spread() | nil,
           phase: atom(),
           epoch: non_neg_integer(),
           leader: atom() | nil,
@@ -95,7 +98,7 @@ defmodule Swarm.Heartbeat do
     Shape.whole?(beat, __MODULE__) and Shape.pose?(beat.pose) and Shape.number?(linear) and
       Shape.number?(turn) and Shape.boot?(beat.boot) and
       Shape.count?(beat.sequence) and beat.radius in 50..2000 and
-      (beat.sd == nil or beat.sd in 0..100_000) and Shape.name?(beat.phase) and
+      sd?(beat.sd) and Shape.name?(beat.phase) and
       Shape.count?(beat.epoch) and (beat.leader == nil or Shape.name?(beat.leader)) and
       Roll.valid?(beat.heard) and sight?(beat.sight) and
       Enum.all?(
@@ -106,6 +109,13 @@ defmodule Swarm.Heartbeat do
   end
 
   def valid?(_term), do: false
+
+  defp sd?(nil), do: true
+
+  defp sd?({worst, least, direction}),
+    do: worst in 0..100_000 and least in 0..100_000 and direction in -4_000..4_000
+
+  defp sd?(_other), do: false
 
   defp sight?(nil), do: true
 

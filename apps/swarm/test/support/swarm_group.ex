@@ -137,6 +137,7 @@ defmodule Swarm.Group do
       uncertainty: %{
         radius: 0.05,
         position: 0.02,
+        spread: {0.02, 0.02, 0.0},
         heading: 0.01,
         frame: robot.frame,
         frame_no: 0,

@@ -28,8 +28,14 @@ defmodule Robot.Localiser.Anchors do
         }
 
   @typedoc """
-  Something of a colour at a place (metres, in the frame). `sd` is how well the place is known, in metres; with
-  `nil` it may be seen and taken for another, but nothing is measured by it. A `:landmark` is the only thing of
+  Standard deviations of a place, in metres: in the direction (radians, in the frame) in which it is known worst, and
+  across.
+  """
+  @type spread :: {worst :: float(), least :: float(), direction :: float()}
+
+  @typedoc """
+  Something of a colour at a place (metres, in the frame), and how well that is known. One that is no `reference?` may be
+  seen and taken for another, but nothing is measured by it. A `:landmark` is the only thing of
   its colour; of robots there are many, and only a blob as wide as a cylinder of the `radius` (metres) is one.
   """
   @type mark :: %{
@@ -37,9 +43,36 @@ defmodule Robot.Localiser.Anchors do
           kind: :landmark | :robot,
           colour: String.t(),
           at: Pose.point(),
-          sd: float() | nil,
+          sd: spread(),
+          reference?: boolean(),
           radius: float()
         }
+
+  @doc """
+  The variance of a place in the direction of a unit vector, in m2.
+
+      iex> Robot.Localiser.Anchors.variance({0.2, 0.1, 0.0}, {0.0, 1.0})
+      0.010000000000000002
+  """
+  @spec variance(spread(), {float(), float()}) :: float()
+  def variance({worst, least, direction}, {x, y}) do
+    along = x * :math.cos(direction) + y * :math.sin(direction)
+    across = y * :math.cos(direction) - x * :math.sin(direction)
+    worst * worst * along * along + least * least * across * across
+  end
+
+  @doc """
+  Its covariance: variances of x and y, and between them that of both.
+
+      iex> Robot.Localiser.Anchors.covariance({0.5, 0.25, 0.0})
+      {0.25, 0.0, 0.0625}
+  """
+  @spec covariance(spread()) :: {xx :: float(), xy :: float(), yy :: float()}
+  def covariance({worst, least, direction}) do
+    {c, s} = {:math.cos(direction), :math.sin(direction)}
+    {w, l} = {worst * worst, least * least}
+    {w * c * c + l * s * s, (w - l) * c * s, w * s * s + l * c * c}
+  end
 
   @type t :: %__MODULE__{frame: frame() | nil, marks: [mark()]}
 end

@@ -21,7 +21,7 @@ defmodule Robot.Localiser.Belief do
   deviations is not believed (Bar-Shalom, Li and Kirubarajan 2001).
   """
   alias Hal.Pose
-  alias Robot.Localiser.Covariance
+  alias Robot.Localiser.{Anchors, Covariance}
 
   # x, y, heading, slip, the scales of the landmark and of robots, the leader's slip.
   @slip_sd 0.055
@@ -45,7 +45,7 @@ defmodule Robot.Localiser.Belief do
   # A thing that was told to be so far from before is another one, in metres.
   @elsewhere 1.0
   # A thing whose place is known better than by this share of what was known, says something new.
-  @surer 0.6
+  @surer 0.75
   # Beyond these nobody knows anything, and linear algebra less: metres, radians.
   @lost_position 5.0
   @lost_heading 1.0
@@ -65,7 +65,7 @@ defmodule Robot.Localiser.Belief do
                 drift: {0.0, 0.0, 0.0}
               ]
 
-  @typedoc "`told` is where it was told to be and how well that was known, `off` how far it is from there."
+  @typedoc "`told` is where it was told to be, `sd` how well that was known on average, `off` how far it is from there."
   @type mark :: %{
           key: term(),
           told: Pose.point(),
@@ -100,10 +100,17 @@ defmodule Robot.Localiser.Belief do
       {0.03, 0.03, 0.02}
   """
   @spec sd(t()) :: {worst :: float(), least :: float(), heading :: float()}
-  def sd(%__MODULE__{covariance: [[xx, xy | _], [_, yy | _], [_, _, hh | _] | _]}) do
+  def sd(%__MODULE__{covariance: [_x, _y, [_, _, hh | _] | _]} = belief) do
+    {worst, least, _direction} = spread(belief)
+    {worst, least, root(hh)}
+  end
+
+  @doc "Standard deviations of the position: along its worst direction and across it, and that direction (radians, in the frame)."
+  @spec spread(t()) :: Anchors.spread()
+  def spread(%__MODULE__{covariance: [[xx, xy | _], [_, yy | _] | _]}) do
     half = (xx + yy) / 2
     root = :math.sqrt((xx - yy) * (xx - yy) / 4 + xy * xy)
-    {root(half + root), root(half - root), root(hh)}
+    {root(half + root), root(half - root), :math.atan2(2 * xy, xx - yy) / 2}
   end
 
   defp root(square), do: :math.sqrt(max(square, 0.0))
@@ -197,7 +204,12 @@ defmodule Robot.Localiser.Belief do
         for({p, k} <- Enum.zip(own, turn), do: p + heading * g * k) ++ others
       end
 
-    %{belief | covariance: Covariance.add(rows ++ rest, [position, position])}
+    # An arc is no line: by how much it bends is unsure, too (second order of the turn; a mean that is left
+    # where it was counts as variance).
+    {dx, dy, 1.0} = List.to_tuple(turn)
+    bend = 0.75 * heading * heading * (dx * dx + dy * dy)
+    more = position + bend
+    %{belief | covariance: Covariance.add(rows ++ rest, [more, more])}
   end
 
   @doc "In the frame of another leader, whose slip is known by this standard deviation."
@@ -261,21 +273,24 @@ defmodule Robot.Localiser.Belief do
   end
 
   @doc """
-  Where a thing is that was told to be at `at`, known by `sd` metres: there, as long as nobody has seen it, and then
+  Where a thing is that was told to be at `at`, known by `spread`: there, as long as nobody has seen it, and then
   where it was seen to be.
   """
-  @spec meet(t(), key :: term(), Pose.point(), sd :: float()) :: {t(), Pose.point()}
-  def meet(belief, key, {x, y} = at, sd) do
+  @spec meet(t(), key :: term(), Pose.point(), Anchors.spread()) :: {t(), Pose.point()}
+  def meet(belief, key, {x, y} = at, spread) do
+    {worst, least, _direction} = spread
+    sd = :math.sqrt((worst * worst + least * least) / 2)
+
     case Enum.find_index(belief.marks, &(&1.key == key)) do
       nil ->
-        {add(belief, key, at, sd), at}
+        {add(belief, key, at, spread, sd), at}
 
       index ->
         mark = Enum.at(belief.marks, index)
         moved = Pose.distance(mark.told, at)
 
         if moved > @elsewhere or sd < @surer * mark.sd do
-          {belief |> drop(index) |> add(key, at, sd), at}
+          {belief |> drop(index) |> add(key, at, spread, sd), at}
         else
           {tell(belief, index, mark, at, sd, moved * moved), shift({x, y}, mark.off)}
         end
@@ -297,17 +312,18 @@ defmodule Robot.Localiser.Belief do
     }
   end
 
-  defp add(%{marks: marks} = belief, key, at, sd) when length(marks) >= @marks do
+  defp add(%{marks: marks} = belief, key, at, spread, sd) when length(marks) >= @marks do
     {_mark, index} = marks |> Enum.with_index() |> Enum.min_by(fn {mark, _} -> mark.used end)
-    belief |> drop(index) |> add(key, at, sd)
+    belief |> drop(index) |> add(key, at, spread, sd)
   end
 
-  defp add(belief, key, at, sd) do
+  defp add(belief, key, at, spread, sd) do
+    {xx, xy, yy} = Anchors.covariance(spread)
     mark = %{key: key, told: at, sd: sd, off: {0.0, 0.0}, used: belief.uses}
 
     %{
       belief
-      | covariance: Covariance.append(belief.covariance, sd, 2),
+      | covariance: Covariance.append(belief.covariance, [[xx, xy], [xy, yy]]),
         marks: belief.marks ++ [mark],
         uses: belief.uses + 1
     }

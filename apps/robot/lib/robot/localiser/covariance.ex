@@ -50,16 +50,15 @@ defmodule Robot.Localiser.Covariance do
   end
 
   @doc """
-  With new states of this standard deviation behind the others, correlated with nothing.
+  With new states of this covariance behind the others, correlated with none of them.
 
-      iex> Robot.Localiser.Covariance.append([[1.0]], 0.5, 1)
+      iex> Robot.Localiser.Covariance.append([[1.0]], [[0.25]])
       [[1.0, 0.0], [0.0, 0.25]]
   """
-  @spec append(t(), sd :: float(), count :: pos_integer()) :: t()
-  def append(p, sd, count) do
-    beside = List.duplicate(0.0, count)
+  @spec append(t(), new :: t()) :: t()
+  def append(p, new) do
+    beside = List.duplicate(0.0, length(new))
     above = List.duplicate(0.0, length(p))
-    new = diagonal(List.duplicate(sd, count))
     Enum.map(p, &(&1 ++ beside)) ++ Enum.map(new, &(above ++ &1))
   end
 

@@ -11,13 +11,11 @@ defmodule Robot.Localiser.Matching do
   alias Robot.Sighting
   alias Vision.Blob
 
-  # Within this angle a robot is always looked for; one whose direction is less sure than that is not measured
-  # by, nor one whose distance is less sure than this share of it. Radians, and shares.
+  # Within this angle (radians) a robot is always looked for; one whose distance is less sure than by this share
+  # is not measured by.
   @narrow 0.12
-  @wide 3.0
   @doubt 1.6
-  # A place of which nobody says how well it is known, and a doubt of a distance that changes nothing, in metres.
-  @unknown 0.3
+  # A doubt of a distance that changes nothing, in metres.
   @surely 0.3
   # Standard deviations of a direction (radians), and of a width, as a logarithm: others beside it make a blob wider,
   # others before it narrower.
@@ -51,7 +49,7 @@ defmodule Robot.Localiser.Matching do
           do: c
 
     for %{mark: mark, blob: blob} = one <- candidates,
-        mark.sd != nil and one.sure? and not cut?(blob) and one.width < @fits,
+        mark.reference? and one.sure? and not cut?(blob) and one.width < @fits,
         Enum.all?(candidates, &(&1.cost > one.cost + @worse or not rivals?(one, &1))) do
       %{mark: mark, blob: blob, slack: one.slack, whole?: one.width < @whole}
     end
@@ -96,7 +94,7 @@ defmodule Robot.Localiser.Matching do
           slack: slack,
           width: abs(:math.log(share)),
           cost: cost,
-          sure?: 3 * bearing_sd < @wide and doubt < @doubt
+          sure?: doubt < @doubt
         }
       end
     end
@@ -116,11 +114,14 @@ defmodule Robot.Localiser.Matching do
   defp sds(%{at: {x, y}, sd: sd}, distance, belief, exposed) do
     {dx, dy} = {x - exposed.x, y - exposed.y}
     square = max(distance * distance, 0.09)
-    place = (sd || @unknown) * (sd || @unknown)
+    length = max(distance, 0.01)
+    {x, y} = {dx / length, dy / length}
     across = Belief.variance(belief, {dy / square, -dx / square, -1.0})
-    along = Belief.variance(belief, {-dx / distance, -dy / distance, 0.0})
+    along = Belief.variance(belief, {-x, -y, 0.0})
+    bearing = across + Anchors.variance(sd, {-y, x}) / square + @bearing_sd * @bearing_sd / 4
 
-    {root(across + place / square + @bearing_sd * @bearing_sd / 4), root(along + place)}
+    # However unsure it is of its place, a thing in front of it is not seen behind it.
+    {:math.atan(root(bearing)), root(along + Anchors.variance(sd, {x, y}))}
   end
 
   # Rounding takes a variance of nothing below it.

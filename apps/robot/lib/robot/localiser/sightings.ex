@@ -16,10 +16,10 @@ defmodule Robot.Localiser.Sightings do
   @range_share 0.05
   @range_sd 0.05
   # What is wrong with every sighting of a thing alike: so much of its place, in metres, and per metre of distance.
-  @landmark_bias 0.005
-  @robot_bias 0.01
+  @landmark_bias 0.003
+  @robot_bias 0.006
   # Pictures of a second or two show the same slack, and the same size; so many count as one.
-  @repeated 20
+  @repeated 6
   # Too near for a camera that looks over it, in metres.
   @near 0.3
 
@@ -80,7 +80,9 @@ defmodule Robot.Localiser.Sightings do
     expected = Pose.wrap(:math.atan2(dy, dx) - exposed.heading)
     square = distance * distance
     slope = {{dy / square, -dx / square, -1.0}, {0.0, 0.0}}
-    noise = @bearing_sd * @bearing_sd + @repeated * slack * slack
+    {along, across} = spread(belief, mark, {dx, dy, distance})
+    bend = 2 * along * across / (square * square)
+    noise = @bearing_sd * @bearing_sd + @repeated * slack * slack + bend
     Belief.correct(belief, mark.key, Pose.wrap(seen - expected), slope, noise)
   end
 
@@ -94,8 +96,19 @@ defmodule Robot.Localiser.Sightings do
       end
 
     slope = {{-dx / distance, -dy / distance, 0.0}, scales}
-    noise = @repeated * :math.pow(@range_share * distance + @range_sd, 2)
+    {_along, across} = spread(belief, mark, {dx, dy, distance})
+    bend = 0.75 * across * across / (distance * distance)
+    noise = @repeated * :math.pow(@range_share * distance + @range_sd, 2) + bend
     Belief.correct(belief, mark.key, seen - distance * (1 + scale), slope, noise)
+  end
+
+  # The variances of where it is, towards the thing and across. What is measured of a thing is no straight line over
+  # where the robot may be: what it bends by there counts as noise (second-order filter, Bar-Shalom, Li and Kirubarajan 2001).
+  defp spread(belief, %{sd: sd}, {dx, dy, distance}) do
+    {x, y} = {dx / distance, dy / distance}
+
+    {Belief.variance(belief, {x, y, 0.0}) + Anchors.variance(sd, {x, y}),
+     Belief.variance(belief, {-y, x, 0.0}) + Anchors.variance(sd, {-y, x})}
   end
 
   # The way from where the picture was taken to where the thing is by now believed to be.
@@ -108,10 +121,11 @@ defmodule Robot.Localiser.Sightings do
 
   defp exposed(belief, back), do: Pose.compose(belief.pose, back)
 
-  defp place_sd(%{kind: :landmark, sd: sd}, far), do: sd + @landmark_bias * far
+  defp place_sd(%{kind: :landmark, sd: sd}, far), do: wider(sd, @landmark_bias * far)
+  defp place_sd(%{kind: :robot, sd: sd}, far), do: wider(sd, @robot_bias * (1 + far))
 
-  defp place_sd(%{kind: :robot, sd: sd}, far) do
-    bias = @robot_bias * (1 + far)
-    :math.sqrt(sd * sd + bias * bias)
-  end
+  defp wider({worst, least, direction}, bias),
+    do: {root(worst * worst + bias * bias), root(least * least + bias * bias), direction}
+
+  defp root(square), do: :math.sqrt(square)
 end

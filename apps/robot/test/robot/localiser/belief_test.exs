@@ -1,5 +1,6 @@
 defmodule Robot.Localiser.BeliefTest do
   use ExUnit.Case, async: true
+  doctest Robot.Localiser.Anchors
   doctest Robot.Localiser.Belief
   doctest Robot.Localiser.Covariance
   doctest Robot.Localiser.History
@@ -13,6 +14,8 @@ defmodule Robot.Localiser.BeliefTest do
     {x, state} = :rand.normal_s(state)
     {sd * x, state}
   end
+
+  defp all_round(sd), do: {sd, sd, 0.0}
 
   test "the radius holds 95 of 100 errors, whether they lie along a line or all round" do
     for least <- [0.0, 0.3, 0.6, 1.0] do
@@ -67,17 +70,17 @@ defmodule Robot.Localiser.BeliefTest do
   end
 
   test "a mark that was told to be elsewhere is less sure, one far off is another one" do
-    {belief, at} = Belief.meet(Belief.new(Pose.new(0, 0)), :mag2, {2.0, 0.0}, 0.1)
+    {belief, at} = Belief.meet(Belief.new(Pose.new(0, 0)), :mag2, {2.0, 0.0}, all_round(0.1))
     assert at == {2.0, 0.0}
     variance = fn belief -> belief.covariance |> List.last() |> List.last() end
     assert_in_delta variance.(belief), 0.01, 1.0e-9
-    {belief, _} = Belief.meet(belief, :mag2, {2.0, 0.1}, 0.1)
+    {belief, _} = Belief.meet(belief, :mag2, {2.0, 0.1}, all_round(0.1))
     assert_in_delta variance.(belief), 0.02, 1.0e-9
-    {less, _} = Belief.meet(belief, :mag2, {2.0, 0.1}, 0.3)
+    {less, _} = Belief.meet(belief, :mag2, {2.0, 0.1}, all_round(0.3))
     assert_in_delta variance.(less), 0.02 + 0.08, 1.0e-9
-    {surer, _} = Belief.meet(belief, :mag2, {2.0, 0.1}, 0.05)
+    {surer, _} = Belief.meet(belief, :mag2, {2.0, 0.1}, all_round(0.05))
     assert_in_delta variance.(surer), 0.0025, 1.0e-9
-    {other, at} = Belief.meet(belief, :mag2, {5.0, 0.0}, 0.1)
+    {other, at} = Belief.meet(belief, :mag2, {5.0, 0.0}, all_round(0.1))
     assert at == {5.0, 0.0}
     assert [%{told: ^at}] = other.marks
     assert_in_delta variance.(other), 0.01, 1.0e-9
@@ -86,8 +89,8 @@ defmodule Robot.Localiser.BeliefTest do
   test "there are never more marks than a filter can carry; the one seen least lately goes" do
     belief =
       Enum.reduce(1..20, Belief.new(Pose.new(0, 0)), fn k, belief ->
-        {belief, _} = Belief.meet(belief, :first, {1.0, 0.0}, 0.1)
-        {belief, _} = Belief.meet(belief, k, {1.0 * k, 1.0}, 0.1)
+        {belief, _} = Belief.meet(belief, :first, {1.0, 0.0}, all_round(0.1))
+        {belief, _} = Belief.meet(belief, k, {1.0 * k, 1.0}, all_round(0.1))
         belief
       end)
 
@@ -98,11 +101,20 @@ defmodule Robot.Localiser.BeliefTest do
     assert length(Belief.forget(belief).covariance) == 7
   end
 
+  test "what turns about somebody moves on an arc: that is unsure towards it, too" do
+    turned = Belief.reframe(Belief.new(Pose.new(0, 0)), {6.0, 0.0}, 0.0, 0.09)
+    {across, along, direction} = Belief.spread(turned)
+    assert_in_delta across, :math.sqrt(1.8 * 1.8 + 0.0009 + 0.75 * 0.09 * 0.09 * 36), 0.001
+    assert_in_delta along, :math.sqrt(0.0009 + 0.75 * 0.09 * 0.09 * 36), 0.001
+    assert_in_delta abs(direction), :math.pi() / 2, 0.001
+  end
+
   test "nothing makes it lose itself in numbers, however unsure another is" do
     belief = Belief.reframe(Belief.new(Pose.new(0, 0)), {1.0e3, 0.0}, 1.0e12, 1.0e12)
     {worst, _, heading} = Belief.sd(belief)
     assert heading <= 1.01
-    assert worst <= 1.01e2
+    # 100 m by 1 rad, and by how much that arc bends.
+    assert worst <= 1.01 * :math.sqrt(1.75) * 100
   end
 
   # Robots that drive about and see things at places which were told wrongly by as much as was said: the squares of
@@ -152,7 +164,7 @@ defmodule Robot.Localiser.BeliefTest do
   defp see(truth, belief, told, key, state) do
     {noise, state} = normal(state, 0.015)
     seen = Pose.bearing(truth, @places[key]) + noise
-    {belief, {x, y}} = Belief.meet(belief, key, told[key], 0.1)
+    {belief, {x, y}} = Belief.meet(belief, key, told[key], all_round(0.1))
     {dx, dy} = {x - belief.pose.x, y - belief.pose.y}
     square = dx * dx + dy * dy
     error = Pose.wrap(seen - Pose.bearing(belief.pose, {x, y}))

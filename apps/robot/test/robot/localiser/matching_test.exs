@@ -11,7 +11,15 @@ defmodule Robot.Localiser.MatchingTest do
   defp robot(key, at, options \\ []),
     do:
       Map.merge(
-        %{key: key, kind: :robot, colour: "R", at: at, sd: 0.05, radius: 0.2},
+        %{
+          key: key,
+          kind: :robot,
+          colour: "R",
+          at: at,
+          sd: {0.05, 0.05, 0.0},
+          reference?: true,
+          radius: 0.2
+        },
         Map.new(options)
       )
 
@@ -55,9 +63,22 @@ defmodule Robot.Localiser.MatchingTest do
 
   test "what may be either of two is neither, and so is what may be one that nothing is measured by" do
     assert pairs([robot(:mag2, {2.0, 0.1}), robot(:mag3, {2.2, -0.1})], [blob({2.0, 0.0})]) == []
-    moving = robot(:mag3, {2.2, -0.1}, sd: nil)
+    moving = robot(:mag3, {2.2, -0.1}, reference?: false)
     assert pairs([robot(:mag2, {2.0, 0.1}), moving], [blob({2.0, 0.0})]) == []
     assert pairs([robot(:mag2, {2.0, 0.1})], [blob({2.0, 0.0})]) == [{:mag2, 0, true}]
+  end
+
+  test "one of which nobody knows where it is may be anybody" do
+    blobs = [blob({2.0, 0.0})]
+    known = robot(:mag3, {3.0, 0.8}, reference?: false)
+    assert pairs([robot(:mag2, {2.0, 0.1}), known], blobs) == [{:mag2, 0, true}]
+    assert pairs([robot(:mag2, {2.0, 0.1}), %{known | sd: {1.0, 1.0, 0.0}}], blobs) == []
+  end
+
+  test "who is unsure of its place still sees nothing before it that stands behind it" do
+    unsure = Belief.reframe(Belief.new(@here), {7.0, 0.0}, 0.0, 0.05)
+    robots = [robot(:mag2, {1.0, 0.0}), robot(:mag3, {-1.0, 0.0})]
+    assert pairs(robots, [blob({1.0, 0.1})], unsure) == [{:mag2, 0, true}]
   end
 
   test "a robot that may be either of two blobs is neither" do

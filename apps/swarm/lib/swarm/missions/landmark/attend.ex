@@ -13,7 +13,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   alias Robot.{Behaviour, Gaze}
   alias Robot.Behaviour.Avoid.Neighbours
   alias Swarm.{Chain, Message}
-  alias Swarm.Missions.Landmark.{Blocker, Marks, Places, State}
+  alias Swarm.Missions.Landmark.{Blocker, Marks, Places, Sight, State}
 
   @lease_ms 1_000
   @in_place 0.25
@@ -21,7 +21,6 @@ defmodule Swarm.Missions.Landmark.Attend do
   @slow 0.05
   # The camera looks at the landmark and at the robot ahead in turn.
   @gaze_ms 1_500
-  @landmark_radius 0.15
 
   # A slot is blocked when something unknown stands in it for so long, or no way leads nearer.
   @obstacle_ms 2_000
@@ -224,7 +223,7 @@ defmodule Swarm.Missions.Landmark.Attend do
   defp discs(anchor) do
     case Places.landmark(anchor) do
       nil -> []
-      {x, y} -> [{x, y, @landmark_radius}]
+      {x, y} -> [{x, y, Sight.radius()}]
     end
   end
 

@@ -13,11 +13,11 @@ defmodule Swarm.Missions.Landmark.Blocker do
   alias Hal.Pose
   alias Robot.Behaviour.Avoid.Neighbours
   alias Robot.Percept
+  alias Swarm.Missions.Landmark.Sight
 
   # Room that a robot wants beside its body, and how much of its way it looks at, in metres.
   @clear 0.1
   @ahead 1.5
-  @landmark_radius 0.15
 
   @type t :: :landmark | {:robot, atom()} | :unknown | :no_way | :no_anchor
 
@@ -53,7 +53,7 @@ defmodule Swarm.Missions.Landmark.Blocker do
   defp things(percept, landmark) do
     robots = for {id, peer} <- Enum.sort(percept.peers), do: {{:robot, id}, peer}
     bodies = for {what, peer} <- robots, do: {what, Pose.point(peer.pose), peer.radius}
-    marks = if landmark, do: [{:landmark, landmark, @landmark_radius}], else: []
+    marks = if landmark, do: [{:landmark, landmark, Sight.radius()}], else: []
     known = for {_what, {x, y}, radius} <- marks ++ bodies, do: {x, y, radius}
     seen = for thing <- Neighbours.unknown(percept, known), do: {:unknown, thing.at, thing.radius}
     marks ++ bodies ++ seen

@@ -9,13 +9,17 @@ defmodule Swarm.Missions.Landmark.Marks do
   """
   alias Hal.Pose
   alias Robot.Localiser.Anchors
-  alias Swarm.Missions.Landmark.{Places, State}
+  alias Swarm.Missions.Landmark.{Places, Sight, State}
 
   @robot_colour "RedRobot"
-  # How well the leader knows the landmark's place in its own frame, and where it is itself, in metres.
-  @landmark_sd 0.02
-  @leader_sd 0.02
-  @landmark_radius 0.15
+  # How well the leader knows where it is itself, in its own frame, and how well the landmark's place there: of its
+  # distance so much (in metres, and per metre), and across.
+  @leader_sd 0.01
+  # How far a robot may have gone since it was heard, and how well is known where one is that is in another frame, or dead.
+  @moved_sd 0.15
+  @strange_sd 1.0
+  @landmark_along {0.02, 0.1}
+  @landmark_across {0.005, 0.005}
   # Slower than this a robot stands, in m/s and rad/s.
   @slow 0.05
   # A robot in its place is no farther from it than this, in 95 of 100 cases, in metres.
@@ -35,7 +39,8 @@ defmodule Swarm.Missions.Landmark.Marks do
           kind: :robot,
           colour: @robot_colour,
           at: Pose.point(if id == anchor.leader, do: leader, else: peer.pose),
-          sd: if(id in ahead and standing?(peer), do: sd(id, peer, anchor)),
+          sd: spread(id, peer, anchor),
+          reference?: id in ahead and standing?(peer) and told?(id, peer, anchor),
           radius: peer.radius
         }
       end
@@ -52,13 +57,21 @@ defmodule Swarm.Missions.Landmark.Marks do
         kind: :landmark,
         colour: mission.colour,
         at: Places.landmark(anchor),
-        sd: @landmark_sd,
-        radius: @landmark_radius
+        sd: landmark_spread(anchor),
+        reference?: true,
+        radius: Sight.radius()
       }
     ]
   end
 
   defp landmark(_mission), do: []
+
+  defp landmark_spread(%{pose: {x, y, _heading}, landmark: {lx, ly}}) do
+    {dx, dy} = {(lx - x) / 1000, (ly - y) / 1000}
+    distance = :math.sqrt(dx * dx + dy * dy)
+    grown = fn {sd, per_metre} -> sd + per_metre * distance end
+    {grown.(@landmark_along), grown.(@landmark_across), :math.atan2(dy, dx)}
+  end
 
   # What a moving robot told is where it was, and where a dead one came to rest nobody knows.
   defp standing?(%{mode: :dead}), do: false
@@ -69,13 +82,24 @@ defmodule Swarm.Missions.Landmark.Marks do
   defp standing?(_holding), do: true
 
   # Who is not in the leader's frame yet cannot tell where it is there.
-  defp sd(leader, _peer, %{leader: leader}), do: @leader_sd
+  defp told?(leader, _peer, %{leader: leader}), do: true
 
-  defp sd(_id, %{beat: %{sd: mm, leader: leader, epoch: epoch}}, anchor)
-       when mm != nil and leader == anchor.leader and epoch == anchor.epoch,
-       do: mm / 1000
+  defp told?(_id, %{beat: %{sd: sd, leader: leader, epoch: epoch}}, anchor),
+    do: sd != nil and leader == anchor.leader and epoch == anchor.epoch
 
-  defp sd(_id, _peer, _anchor), do: nil
+  defp told?(_id, _peer, _anchor), do: false
+
+  defp spread(leader, _peer, %{leader: leader}), do: {@leader_sd, @leader_sd, 0.0}
+
+  defp spread(id, peer, anchor) do
+    if told?(id, peer, anchor) do
+      {worst, least, mrad} = peer.beat.sd
+      since = if standing?(peer), do: 0.0, else: @moved_sd
+      {worst / 1000 + since, least / 1000 + since, mrad / 1000}
+    else
+      {@strange_sd, @strange_sd, 0.0}
+    end
+  end
 
   defp frame(%{anchor: %{drift: {way, turn, turned}} = anchor} = mission, leader) do
     {position, heading} = variances(anchor.sd)
@@ -103,15 +127,21 @@ defmodule Swarm.Missions.Landmark.Marks do
   end
 
   @doc """
-  How well a robot knows its pose in its leader's frame, as heartbeats tell it: the standard deviation of its
-  position along the worst direction, in mm; `nil` where it has not come into that frame yet, or has none.
+  How well a robot knows its place in its leader's frame, as heartbeats tell it: the standard deviation of its
+  position along the worst direction and across it (mm), and that direction (mrad); `nil` where it has not come into
+  that frame yet, or has none.
   """
-  @spec told(State.t()) :: non_neg_integer() | nil
-  def told(%{anchor: %{}, percept: %{uncertainty: %{frame: frame, position: sd}}} = mission) do
-    if frame == key(mission), do: min(round(sd * 1000), 100_000)
+  @spec told(State.t()) :: Swarm.Heartbeat.spread() | nil
+  def told(%{anchor: %{}, percept: %{uncertainty: %{frame: frame, spread: spread}}} = mission) do
+    {worst, least, direction} = spread
+
+    if frame == key(mission),
+      do: {millimetres(worst), millimetres(least), round(direction * 1000)}
   end
 
   def told(_mission), do: nil
+
+  defp millimetres(metres), do: min(round(metres * 1000), 100_000)
 
   @doc """
   Whether a follower that believes it is this far from its slot (metres) is within half a metre of it in 95 of 100 cases.

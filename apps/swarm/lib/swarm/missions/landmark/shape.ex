@@ -10,12 +10,11 @@ defmodule Swarm.Missions.Landmark.Shape do
   """
   alias Hal.Pose
   alias Swarm.{Formation, Peers, Room, Trail}
-  alias Swarm.Missions.Landmark.State
+  alias Swarm.Missions.Landmark.{Sight, State}
 
   @step_ms 3_000
   @step 0.1
   @elsewhere 1.0
-  @landmark_radius 0.15
 
   defstruct formation: nil, trail?: false, room: nil, squeeze: 0, squeezed_ms: nil, at: nil
 
@@ -140,7 +139,7 @@ defmodule Swarm.Missions.Landmark.Shape do
           do: {pose.x, pose.y, radius}
 
     case mission.sight do
-      %{place: {x, y}} -> [{x, y, @landmark_radius} | dead]
+      %{place: {x, y}} -> [{x, y, Sight.radius()} | dead]
       _unknown -> dead
     end
   end

@@ -25,6 +25,13 @@ defmodule Swarm.Missions.Landmark.Sight do
   @jump 0.6
   @moving 0.1
 
+  # An upright pole, in metres.
+  @radius 0.15
+
+  @doc "The radius of the landmark, in metres."
+  @spec radius() :: float()
+  def radius, do: @radius
+
   @doc "The sight after one more percept; an old one stays when the landmark is not in the picture."
   @spec update(t() | nil, Percept.t(), String.t()) :: t() | nil
   def update(old, %Percept{blobs_pose: nil}, _colour), do: old
@@ -39,7 +46,7 @@ defmodule Swarm.Missions.Landmark.Sight do
         view = Sighting.field_of_view(percept)
         bearing = Sighting.bearing(blob, percept.blobs_pan, view)
 
-        distance = Sighting.distance(blob, percept.blobs)
+        distance = distance(blob, percept.blobs, view)
         seen = distance && Sighting.place(percept.blobs_pose, bearing, distance)
 
         place = smooth(old && old.place, seen)
@@ -56,9 +63,18 @@ defmodule Swarm.Missions.Landmark.Sight do
     end
   end
 
+  # A pole whose foot or top is out of the picture is as wide as before.
+  defp distance(%{clipped?: true, left: left, right: right, width: width} = blob, blobs, view)
+       when left > 0 and right < width - 1 do
+    unless Sighting.hidden?(blob, blobs),
+      do: Sighting.distance_by_width(blob, @radius, view)
+  end
+
+  defp distance(blob, blobs, _view), do: Sighting.distance(blob, blobs)
+
   @doc """
-  Whether the place is known for sure: seen within the last `ms`, all of it, and standing. A landmark
-  that comes too near is clipped, and where it goes then nobody sees.
+  Whether the place is known for sure: seen within the last `ms`, in all its width, and standing. Where a landmark
+  goes that is clipped at the side nobody sees.
   """
   @spec still?(t() | nil, integer(), pos_integer()) :: boolean()
   def still?(%{place_ms: place_ms, moving?: false}, now_ms, ms) when place_ms != nil,

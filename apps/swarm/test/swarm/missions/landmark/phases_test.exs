@@ -2,6 +2,7 @@ defmodule Swarm.Missions.Landmark.PhasesTest do
   @moduledoc "Each exit of the table, reached by events."
   use ExUnit.Case, async: true
   alias Robot.Behaviour
+  alias Robot.Localiser.Anchors
   alias Swarm.{Anchor, Group, Heartbeat, Message, Round}
   alias Swarm.Missions.Landmark
   alias Swarm.Missions.Landmark.{Phases, Sight}
@@ -286,6 +287,15 @@ defmodule Swarm.Missions.Landmark.PhasesTest do
     end
   end
 
+  test "who neither leads nor follows corrects itself by nothing that it was told before" do
+    group = alone(0.02)
+
+    {:search, _mission, effects} =
+      Landmark.handle({:tick, Group.percept(group, :mag2)}, mission(group))
+
+    assert {:anchors, %Anchors{}} in effects
+  end
+
   test "a sight smooths the place, follows a jump, and says when it moves" do
     group = alone(0.02)
     percept = Group.percept(group, :mag2)
@@ -305,5 +315,17 @@ defmodule Swarm.Missions.Landmark.PhasesTest do
     moved = Sight.update(sight, jump, "YellowLandmark")
     assert_in_delta elem(moved.place, 0), 4.0, 0.01
     assert Sight.update(sight, %{far | blobs: []}, "YellowLandmark") == sight
+  end
+
+  test "a landmark whose foot is out of the picture is as far off as it is wide" do
+    group = alone(0.02)
+    %{blobs: [blob]} = percept = Group.percept(group, :mag2)
+    # 48 of 320 pixels over 60 degrees: 0.15 m of radius, 1.74 m off.
+    near = %{blob | clipped?: true, left: 136, right: 183, top: 40, bottom: 239, distance: 9.0}
+    place = fn blobs -> Sight.update(nil, %{percept | blobs: blobs}, "YellowLandmark").place end
+    assert_in_delta elem(place.([near]), 0), 1.74, 0.05
+    assert place.([%{near | left: 0}]) == nil
+    # Somebody stands before it.
+    assert place.([near, %{near | colour: "RedRobot", right: 150}]) == nil
   end
 end

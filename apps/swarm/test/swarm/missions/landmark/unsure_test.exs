@@ -6,6 +6,8 @@ defmodule Swarm.Missions.Landmark.UnsureTest do
   alias Swarm.{Anchor, Heartbeat, Stop}
   alias Swarm.Missions.Landmark.{Attend, Shape, State}
 
+  doctest Swarm.Missions.Landmark.Marks
+
   @column {:column, 1.0}
 
   defp percept(fields) do
