@@ -10,7 +10,7 @@ defmodule Robot.Localiser do
   where it was believed to be. The few decimetres of its stop that nobody counted are doubted.
   """
   alias Hal.{Odometry, Pose}
-  alias Robot.Localiser.{Anchors, Belief, History, Sightings}
+  alias Robot.Localiser.{Anchors, Belief, Frame, History, Sightings}
   alias Robot.Percept
 
   # Odometry that begins farther from zero than this (metres, radians) has counted before.
@@ -79,8 +79,8 @@ defmodule Robot.Localiser do
     if now_way >= way and now_turn >= turn and now_turned >= turned do
       belief =
         localiser.belief
-        |> Belief.slipped(frame.at, now_turned - turned)
-        |> Belief.reframe(frame.at, now_way - way, now_turn - turn)
+        |> Frame.slipped(frame.at, now_turned - turned)
+        |> Frame.reframe(frame.at, now_way - way, now_turn - turn)
 
       %{localiser | frame: frame, belief: belief}
     else
@@ -97,8 +97,8 @@ defmodule Robot.Localiser do
     belief =
       localiser.belief
       |> Belief.forget()
-      |> Belief.reframe(frame.at, position, heading)
-      |> Belief.led(frame.slip)
+      |> Frame.reframe(frame.at, position, heading)
+      |> Frame.led(frame.slip)
 
     renumber(%{localiser | frame: frame, belief: belief})
   end
@@ -175,7 +175,7 @@ defmodule Robot.Localiser do
 
   defp move(%{odometry: nil, belief: nil} = localiser, odometry) do
     belief = Belief.new(Pose.compose(localiser.start, odometry))
-    belief = if driven?(odometry), do: Belief.lost(belief), else: belief
+    belief = if driven?(odometry), do: Frame.lost(belief), else: belief
     %{localiser | odometry: odometry, belief: belief}
   end
 

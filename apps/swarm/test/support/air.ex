@@ -55,7 +55,10 @@ defmodule Swarm.Air do
     air = %{air | now: air.now + 1}
     {due, later} = Enum.split_with(air.air, fn {at, _, _, _} -> at <= air.now end)
     air = Enum.reduce(Enum.reverse(due), %{air | air: later}, &arrive/2)
-    if rem(air.now, 200) == 0, do: Enum.reduce(Map.keys(air.stations), air, &tick/2), else: air
+
+    if rem(air.now, 200) == 0,
+      do: Enum.reduce(Enum.sort(Map.keys(air.stations)), air, &tick/2),
+      else: air
   end
 
   defp tick(name, air) do

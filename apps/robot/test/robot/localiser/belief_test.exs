@@ -5,7 +5,7 @@ defmodule Robot.Localiser.BeliefTest do
   doctest Robot.Localiser.Covariance
   doctest Robot.Localiser.History
   alias Hal.Pose
-  alias Robot.Localiser.{Belief, Covariance}
+  alias Robot.Localiser.{Belief, Covariance, Frame}
 
   # Numbers that look random, and are the same in every run.
   defp draws(seed), do: :rand.seed_s(:exsss, seed)
@@ -102,7 +102,7 @@ defmodule Robot.Localiser.BeliefTest do
   end
 
   test "what turns about somebody moves on an arc: that is unsure towards it, too" do
-    turned = Belief.reframe(Belief.new(Pose.new(0, 0)), {6.0, 0.0}, 0.0, 0.09)
+    turned = Frame.reframe(Belief.new(Pose.new(0, 0)), {6.0, 0.0}, 0.0, 0.09)
     {across, along, direction} = Belief.spread(turned)
     assert_in_delta across, :math.sqrt(1.8 * 1.8 + 0.0009 + 0.75 * 0.09 * 0.09 * 36), 0.001
     assert_in_delta along, :math.sqrt(0.0009 + 0.75 * 0.09 * 0.09 * 36), 0.001
@@ -110,7 +110,7 @@ defmodule Robot.Localiser.BeliefTest do
   end
 
   test "nothing makes it lose itself in numbers, however unsure another is" do
-    belief = Belief.reframe(Belief.new(Pose.new(0, 0)), {1.0e3, 0.0}, 1.0e12, 1.0e12)
+    belief = Frame.reframe(Belief.new(Pose.new(0, 0)), {1.0e3, 0.0}, 1.0e12, 1.0e12)
     {worst, _, heading} = Belief.sd(belief)
     assert heading <= 1.01
     # 100 m by 1 rad, and by how much that arc bends.

@@ -1,7 +1,7 @@
 defmodule Robot.Localiser.MatchingTest do
   use ExUnit.Case, async: true
   alias Hal.Pose
-  alias Robot.Localiser.{Belief, Matching}
+  alias Robot.Localiser.{Belief, Frame, Matching}
   alias Robot.Sighting
   alias Vision.Blob
 
@@ -76,7 +76,7 @@ defmodule Robot.Localiser.MatchingTest do
   end
 
   test "who is unsure of its place still sees nothing before it that stands behind it" do
-    unsure = Belief.reframe(Belief.new(@here), {7.0, 0.0}, 0.0, 0.05)
+    unsure = Frame.reframe(Belief.new(@here), {7.0, 0.0}, 0.0, 0.05)
     robots = [robot(:mag2, {1.0, 0.0}), robot(:mag3, {-1.0, 0.0})]
     assert pairs(robots, [blob({1.0, 0.1})], unsure) == [{:mag2, 0, true}]
   end
@@ -116,7 +116,7 @@ defmodule Robot.Localiser.MatchingTest do
   test "one that is unsure of itself looks farther" do
     robots = [robot(:mag2, {2.0, 0.0})]
     blobs = [blob({2.0, 0.8})]
-    unsure = Belief.reframe(Belief.new(@here), {2.0, 5.0}, 0.2, 0.0)
+    unsure = Frame.reframe(Belief.new(@here), {2.0, 5.0}, 0.2, 0.0)
     assert pairs(robots, blobs) == []
     assert pairs(robots, blobs, unsure) == [{:mag2, 0, true}]
   end
