@@ -97,8 +97,6 @@ defmodule Hal.RFlex.Senses do
     {ranges(senses, at_ms), senses}
   end
 
-  defp ranges(%{sonar: nil}, _at_ms), do: []
-
   defp ranges(%{sonar: sonar}, at_ms) do
     case Sonar.ranges(sonar, at_ms) do
       nil -> []
