@@ -180,6 +180,24 @@ defmodule Robot.Localiser.Belief do
   defp mix([], _p, [], _q, []), do: []
   defp mix([a | as], p, [b | bs], q, [c | cs]), do: [a + p * b + q * c | mix(as, p, bs, q, cs)]
 
+  @doc """
+  By how much (radians) the heading goes along with each metre of the position in the direction of a unit vector, as far as
+  both are unsure together.
+  """
+  @spec turn_along(t(), {float(), float()}) :: float()
+  def turn_along(belief, {x, y}) do
+    {[_x, _y, turn | _], variance} = Covariance.project(belief.covariance, [x, y])
+    if variance > 0.0, do: turn / variance, else: 0.0
+  end
+
+  @doc "Measured to be `way` metres farther in the direction of a unit vector, by this standard deviation."
+  @spec shifted(t(), {float(), float()}, way :: float(), sd :: float()) :: t()
+  def shifted(belief, {x, y}, way, sd) do
+    {v, variance} = Covariance.project(belief.covariance, [x, y])
+    s = variance + sd * sd
+    believe(belief, v, way / s, Covariance.reduce(belief.covariance, v, s))
+  end
+
   @doc "The variance of what is measured of the pose alone, whose value changes so with x, y and heading."
   @spec variance(t(), {float(), float(), float()}) :: float()
   def variance(belief, {a, b, c}) do

@@ -8,7 +8,7 @@ defmodule Robot.Localiser.Sightings do
   (`Robot.Localiser.Matching`).
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Anchors, Belief, Matching}
+  alias Robot.Localiser.{Anchors, Belief, Matching, Silhouettes}
   alias Robot.{Percept, Sighting}
 
   # A single sighting: bearing in radians, range as a share and in metres.
@@ -28,7 +28,11 @@ defmodule Robot.Localiser.Sightings do
   def correct(belief, marks, %Percept{} = percept, %Pose{} = back) do
     {landmarks, robots} = Enum.split_with(marks, &(&1.kind == :landmark))
     picture = {percept, back}
-    belief |> see_landmarks(landmarks, picture) |> see_robots(robots, picture)
+
+    belief
+    |> see_landmarks(landmarks, picture)
+    |> Silhouettes.align(robots, percept, back)
+    |> see_robots(robots, picture)
   end
 
   # There is one landmark: whatever has its colour is it.

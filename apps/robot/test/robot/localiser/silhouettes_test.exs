@@ -1,0 +1,120 @@
+defmodule Robot.Localiser.SilhouettesTest do
+  use ExUnit.Case, async: true
+  alias Hal.{Pose, Profile}
+  alias Robot.Localiser.{Belief, Frame, Silhouettes}
+  alias Robot.Percept
+  alias Vision.Blob
+
+  @view :math.pi() / 3
+  @focal 160 / :math.tan(@view / 2)
+  @here Pose.new(0, 0)
+  @radius 0.2
+
+  # A column ahead of a robot that believes to stand behind it.
+  @column for n <- 1..4,
+              do: %{
+                key: n,
+                kind: :robot,
+                colour: "R",
+                at: {1.0 * n, 0.0},
+                sd: {0.05, 0.05, 0.0},
+                reference?: true,
+                radius: @radius
+              }
+
+  # What is to be seen of them from where it truly is: one blob of all that touch, cut at the picture's border.
+  defp picture(marks, truth, pan \\ 0.0) do
+    [{first, last} | rest] =
+      for %{at: at} <- marks, distance = Pose.distance(truth, at) do
+        bearing = Pose.bearing(truth, at) - pan
+        half = :math.asin(@radius / distance)
+        {column(bearing + half), column(bearing - half)}
+      end
+      |> Enum.sort()
+
+    spans =
+      Enum.reduce(rest, [{first, last}], fn {left, right}, [{l, r} | others] ->
+        if left <= r + 1,
+          do: [{l, max(r, right)} | others],
+          else: [{left, right}, {l, r} | others]
+      end)
+
+    blobs =
+      for {left, right} <- spans, right >= 0 and left <= 319 do
+        %Blob{
+          colour: "R",
+          area: 500,
+          share: 0.0065,
+          x: (left + right) / 2,
+          y: 120.0,
+          left: max(left, 0),
+          right: min(right, 319),
+          top: 60,
+          bottom: 180,
+          width: 320,
+          height: 240
+        }
+      end
+
+    %Percept{
+      robot: :mag1,
+      at_ms: 0,
+      profile: Profile.magellan(),
+      blobs: blobs,
+      blobs_at_ms: 0,
+      blobs_pan: pan,
+      blobs_view: @view
+    }
+  end
+
+  defp column(bearing), do: round(159.5 - @focal * :math.tan(bearing))
+
+  # Turned about the first of the column by an angle that it knows by this standard deviation.
+  defp unsure(sd), do: Frame.reframe(Belief.new(@here), {4.0, 0.0}, 0.0, sd * sd)
+
+  # Where it is that was turned about the first of the column by that angle.
+  defp turned(angle),
+    do: Pose.compose(Pose.new(4, 0, angle), Pose.new(-4, 0))
+
+  test "a robot beside the column is found by the one wide blob that it is, cut or not" do
+    for angle <- [-0.12, -0.05, 0.0, 0.07, 0.13], pan <- [0.0, 3 * angle] do
+      truth = turned(angle)
+      found = Silhouettes.align(unsure(0.1), @column, picture(@column, truth, pan), @here)
+      assert Pose.distance(found.pose, truth) < 0.12, inspect({angle, pan, found.pose, truth})
+      {sd, _, _} = Belief.sd(found)
+      assert sd < 0.2 and sd > 0.1
+    end
+  end
+
+  test "where the camera looks aside, what little it sees may be told of no place, but of no wrong one" do
+    for angle <- [-0.12, -0.05, 0.07, 0.13], pan <- [-3 * angle, -5 * angle] do
+      truth = turned(angle)
+      before = unsure(0.1)
+      found = Silhouettes.align(before, @column, picture(@column, truth, pan), @here)
+      assert found == before or Pose.distance(found.pose, truth) < 0.12
+    end
+  end
+
+  test "one that is sure enough, sees nobody, or is told of nobody stays where it is" do
+    picture = picture(@column, turned(0.1))
+    sure = unsure(0.05)
+    assert Silhouettes.align(sure, @column, picture, @here) == sure
+    unsure = unsure(0.1)
+    assert Silhouettes.align(unsure, @column, %{picture | blobs: []}, @here) == unsure
+    assert Silhouettes.align(unsure, [], picture, @here) == unsure
+  end
+
+  test "where two places fit, or none does, it stays where it is" do
+    unsure = unsure(0.1)
+    # Two abreast, of which it sees one: that may be either.
+    abreast = for y <- [0.2, -0.2], do: %{hd(@column) | key: y, at: {1.0, y}}
+    one = picture([%{hd(@column) | at: {1.0, 0.0}}], @here)
+    assert Silhouettes.align(unsure, abreast, one, @here) == unsure
+    # Robots stand where nobody told of one.
+    strangers = for n <- 1..2, do: %{hd(@column) | key: n, at: {1.2, 0.9 * (n - 1.5)}}
+    assert Silhouettes.align(unsure, @column, picture(strangers, @here), @here) == unsure
+    # And one of whom nobody knows where it is may be all that it sees.
+    anywhere = [%{hd(@column) | at: {1.0, 0.0}, sd: {1.0, 1.0, 0.0}}]
+    assert Silhouettes.align(unsure, anywhere, picture(@column, turned(0.1)), @here) == unsure
+  end
+end
