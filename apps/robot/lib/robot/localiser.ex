@@ -175,7 +175,8 @@ defmodule Robot.Localiser do
 
   defp move(%{odometry: nil, belief: nil} = localiser, odometry) do
     belief = Belief.new(Pose.compose(localiser.start, odometry))
-    belief = if driven?(odometry), do: Frame.lost(belief), else: belief
+    way = Pose.distance(odometry, {0.0, 0.0})
+    belief = if driven?(odometry, way), do: Frame.lost(belief, way), else: belief
     %{localiser | odometry: odometry, belief: belief}
   end
 
@@ -210,6 +211,5 @@ defmodule Robot.Localiser do
   end
 
   # It was started anew in the middle of its way: how it came there, and what corrected it, nobody knows any more.
-  defp driven?(%Pose{x: x, y: y, heading: heading}),
-    do: x * x + y * y > @put_down * @put_down or abs(heading) > @put_down
+  defp driven?(%Pose{heading: heading}, way), do: way > @put_down or abs(heading) > @put_down
 end

@@ -9,6 +9,10 @@ defmodule Robot.Localiser.Frame do
   @lost_position 5.0
   @lost_heading 1.0
   @far 100.0
+  # Where one is that nobody saw go, in metres and per metre, and how it is turned: by what slips in a whole turn.
+  @lost_sd 0.5
+  @lost_share 0.4
+  @lost_turn 0.6
   # A leader that is said to have turned by more since it was last heard, in radians.
   @turned_at_once 100.0
   # The state of a belief that is its leader's slip, and how much that changes in a radian turned.
@@ -98,11 +102,14 @@ defmodule Robot.Localiser.Frame do
     {pose.x + share * (x - pose.x), pose.y + share * (y - pose.y)}
   end
 
-  @doc "The same pose, of which nobody knows how it came about: less sure by metres."
-  @spec lost(Belief.t()) :: Belief.t()
-  def lost(%Belief{} = belief) do
-    position = @lost_position * @lost_position
-    variances = [position, position, @lost_heading * @lost_heading]
+  @doc """
+  The same pose, of a robot that was started when its odometry had counted already: so many metres as the crow flies, in
+  how many turns nobody knows.
+  """
+  @spec lost(Belief.t(), way :: float()) :: Belief.t()
+  def lost(%Belief{} = belief, way) do
+    position = :math.pow(min(@lost_sd + @lost_share * way, @lost_position), 2)
+    variances = [position, position, @lost_turn * @lost_turn]
     %{belief | covariance: Covariance.add(belief.covariance, variances)}
   end
 end
