@@ -4,6 +4,9 @@ defmodule Swarm.Mesh.Secret.TextTest do
   doctest Text
 
   test "random bytes are taken, in every spelling" do
+    # The same bytes in every run: with others, two of 4,500 may say a word once in a thousand runs.
+    :rand.seed(:exsss, {1, 2, 3})
+
     refused =
       for _ <- 1..500, size <- [32, 48, 64], bytes = :rand.bytes(size), spell <- spellings() do
         case Text.decode(spell.(bytes)) do
