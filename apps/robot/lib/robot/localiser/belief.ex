@@ -21,7 +21,7 @@ defmodule Robot.Localiser.Belief do
   deviations is not believed (Bar-Shalom, Li and Kirubarajan 2001).
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Anchors, Covariance}
+  alias Robot.Localiser.{Anchors, Consistency, Covariance}
 
   # x, y, heading, slip, the scales of the landmark and of robots, the leader's slip.
   @slip_sd 0.055
@@ -39,6 +39,8 @@ defmodule Robot.Localiser.Belief do
   # refusal counts two, one that is believed takes one back.
   @doubt 16
   @doubt_sd 0.3
+  # So many more pictures that contradict the pose as a whole than such that do not make it doubtful.
+  @contradictions 6
   # Marks beyond these take the place of the one that was seen least lately.
   @marks 6
   # A thing that was told to be so far from before is another one, in metres.
@@ -55,6 +57,7 @@ defmodule Robot.Localiser.Belief do
                 marks: [],
                 uses: 0,
                 refused: 0,
+                contradicted: 0,
                 drift: {0.0, 0.0, 0.0}
               ]
 
@@ -75,6 +78,7 @@ defmodule Robot.Localiser.Belief do
           marks: [mark()],
           uses: non_neg_integer(),
           refused: non_neg_integer(),
+          contradicted: non_neg_integer(),
           drift: {way :: float(), turn :: float(), turned :: float()}
         }
   @typedoc "How a measurement changes with x, y and heading, and with the scales."
@@ -318,6 +322,31 @@ defmodule Robot.Localiser.Belief do
     do: %{belief | refused: refused + 2}
 
   defp refuse(belief), do: doubt(belief)
+
+  @doc """
+  Held against a whole picture (`Robot.Localiser.Consistency`): pictures that go on contradicting the pose make it doubtful.
+
+      iex> belief = Robot.Localiser.Belief.new(Hal.Pose.new(1, 0))
+      iex> weigh = fn belief, times, verdict ->
+      ...>   Enum.reduce(1..times, belief, fn _, b -> Robot.Localiser.Belief.weigh(b, verdict) end)
+      ...> end
+      iex> belief = weigh.(belief, 5, :contradicted)
+      iex> {first, _, _} = Robot.Localiser.Belief.sd(belief)
+      iex> {then, _, _} = belief |> weigh.(1, :contradicted) |> Robot.Localiser.Belief.sd()
+      iex> {first, Float.round(then, 3)}
+      {0.03, 0.301}
+  """
+  @spec weigh(t(), Consistency.verdict()) :: t()
+  def weigh(belief, :unknown), do: belief
+
+  def weigh(belief, :consistent),
+    do: %{belief | contradicted: max(belief.contradicted - 1, 0)}
+
+  def weigh(%__MODULE__{contradicted: count} = belief, :contradicted)
+      when count + 1 >= @contradictions,
+      do: doubt(%{belief | contradicted: 0})
+
+  def weigh(belief, :contradicted), do: %{belief | contradicted: belief.contradicted + 1}
 
   @doc "The same pose, of which one is less sure by decimetres: something happened that nobody measured."
   @spec doubt(t()) :: t()

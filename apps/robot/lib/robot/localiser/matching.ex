@@ -49,7 +49,8 @@ defmodule Robot.Localiser.Matching do
           do: c
 
     for %{mark: mark, blob: blob} = one <- candidates,
-        mark.reference? and one.sure? and not cut?(blob) and one.width < @fits,
+        mark.reference? and one.sure? and one.width < @fits,
+        not cut?(blob),
         Enum.all?(candidates, &(&1.cost > one.cost + @worse or not rivals?(one, &1))) do
       %{mark: mark, blob: blob, slack: one.slack, whole?: one.width < @whole}
     end
@@ -82,7 +83,9 @@ defmodule Robot.Localiser.Matching do
       doubt = 2 * max(distance_sd - @surely, 0.0) / distance
       slack = abs(share - 1) * half
       off = max(abs(Pose.wrap(seen - expected)) - slack, 0.0)
-      cost = cost(off, bearing_sd, :math.log(share), doubt)
+      # What is cut off at the border may be as wide as it likes.
+      width = if cut?(blob), do: max(:math.log(share), 0.0), else: :math.log(share)
+      cost = cost(off, bearing_sd, width, doubt)
 
       if off < max(3 * bearing_sd, @narrow) and cost < @unlike do
         %{
@@ -92,7 +95,7 @@ defmodule Robot.Localiser.Matching do
           expected: expected,
           half: half,
           slack: slack,
-          width: abs(:math.log(share)),
+          width: abs(width),
           cost: cost,
           sure?: doubt < @doubt
         }

@@ -5,10 +5,10 @@ defmodule Robot.Localiser.Sightings do
 
   Things are seen in a direction and, where nothing hides a part of them, at a distance: the landmark by its size, a
   robot by its width. The landmark comes first: turned right by it, a robot knows better which robot is which
-  (`Robot.Localiser.Matching`).
+  (`Robot.Localiser.Matching`). At last the whole picture is held against what came of that (`Robot.Localiser.Consistency`).
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Anchors, Belief, Matching, Silhouettes}
+  alias Robot.Localiser.{Anchors, Belief, Consistency, Matching, Silhouettes}
   alias Robot.{Percept, Sighting}
 
   # A single sighting: bearing in radians, range as a share and in metres.
@@ -33,7 +33,11 @@ defmodule Robot.Localiser.Sightings do
     |> see_landmarks(landmarks, picture)
     |> Silhouettes.align(robots, percept, back)
     |> see_robots(robots, picture)
+    |> weigh(robots, picture)
   end
+
+  defp weigh(belief, robots, {percept, back}),
+    do: Belief.weigh(belief, Consistency.judge(belief, robots, percept, back))
 
   # There is one landmark: whatever has its colour is it.
   defp see_landmarks(belief, landmarks, {percept, _back} = picture) do

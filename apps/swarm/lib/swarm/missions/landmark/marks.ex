@@ -12,12 +12,12 @@ defmodule Swarm.Missions.Landmark.Marks do
   alias Swarm.Missions.Landmark.{Places, Sight, State}
 
   @robot_colour "RedRobot"
+  # How far a robot may have gone since it was heard, and how well is known where one is that is in another frame, in metres.
+  @moved_sd 0.15
+  @strange_sd 1.0
   # How well the leader knows where it is itself, in its own frame, and how well the landmark's place there: of its
   # distance so much (in metres, and per metre), and across.
   @leader_sd 0.01
-  # How far a robot may have gone since it was heard, and how well is known where one is that is in another frame, or dead.
-  @moved_sd 0.15
-  @strange_sd 1.0
   @landmark_along {0.02, 0.1}
   @landmark_across {0.005, 0.005}
   # Slower than this a robot stands, in m/s and rad/s.

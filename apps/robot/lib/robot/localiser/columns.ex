@@ -1,0 +1,84 @@
+defmodule Robot.Localiser.Columns do
+  @moduledoc """
+  Sets of columns of a camera picture, which is divided into 59 of equal width. Pure.
+
+  A set is an integer, one bit for each column; bit 0 is the leftmost.
+  """
+  import Bitwise
+  alias Hal.Pose
+  alias Robot.{Percept, Sighting}
+  alias Vision.Blob
+
+  # One bit less than a small integer of the virtual machine has.
+  @columns 59
+  # Farther aside than this of where the camera points nothing is in a picture, in radians.
+  @aside 1.3
+
+  @type t :: non_neg_integer()
+
+  @doc """
+  The columns that a disc fills, which is seen in a direction (radians, from where the robot heads) under twice `half` radians.
+
+      iex> percept = %Robot.Percept{profile: Hal.Profile.magellan(), at_ms: 0, blobs_pan: 0.0}
+      iex> Robot.Localiser.Columns.count(Robot.Localiser.Columns.span(0.0, 0.1, percept))
+      11
+  """
+  @spec span(bearing :: float(), half :: float(), Percept.t()) :: t()
+  def span(bearing, half, percept) do
+    bearing = Pose.wrap(bearing - percept.blobs_pan)
+
+    if abs(bearing) - half > @aside,
+      do: 0,
+      else: project(bearing + half, bearing - half, Sighting.field_of_view(percept))
+  end
+
+  # Left is where bearings are greater.
+  defp project(left, right, view) do
+    focal = @columns / 2 / :math.tan(view / 2)
+    column = fn bearing -> round(@columns / 2 - focal * :math.tan(bearing)) end
+    between(column.(min(left, @aside)), column.(max(right, -@aside)) - 1)
+  end
+
+  @doc "The columns that blobs of some colours fill."
+  @spec seen([Blob.t()], colours :: [String.t()]) :: t()
+  def seen(blobs, colours) do
+    for blob <- blobs, blob.colour in colours, reduce: 0 do
+      set -> set ||| blob(blob)
+    end
+  end
+
+  defp blob(%{left: left, right: right, width: width}),
+    do: between(round(left * @columns / width), round((right + 1) * @columns / width) - 1)
+
+  defp between(left, right) do
+    {left, right} = {max(left, 0), min(right, @columns - 1)}
+    if right < left, do: 0, else: (1 <<< (right + 1)) - (1 <<< left)
+  end
+
+  @doc "The columns of either set."
+  @spec union(t(), t()) :: t()
+  def union(a, b), do: a ||| b
+
+  @doc "The columns of the first set that are not in the second."
+  @spec without(t(), t()) :: t()
+  def without(a, b), do: a &&& bnot(b)
+
+  @doc "The columns that are in one of the two sets only."
+  @spec difference(t(), t()) :: t()
+  def difference(a, b), do: bxor(a, b)
+
+  @doc "Whether two sets have no column in common."
+  @spec disjoint?(t(), t()) :: boolean()
+  def disjoint?(a, b), do: (a &&& b) == 0
+
+  @doc "Whether a set has no column."
+  @spec empty?(t()) :: boolean()
+  def empty?(set), do: set == 0
+
+  @doc "How many columns a set has."
+  @spec count(t()) :: non_neg_integer()
+  def count(set), do: count(set, 0)
+
+  defp count(0, count), do: count
+  defp count(set, count), do: count(set &&& set - 1, count + 1)
+end
