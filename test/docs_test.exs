@@ -87,7 +87,7 @@ defmodule System.DocsTest do
     "nft add rule inet filter input ip saddr != 10.0.0.0/24 udp dport 4370-4371 drop" => @system,
     "erl … -proto_dist inet_tls -ssl_dist_optfile certs/mag1/ssl_dist.conf" =>
       "it is a part of a command; apps/swarm/test/swarm/mesh/certs_test.exs runs such nodes",
-    ~S(iex --sname rem-1@lab --hidden --cookie "$COOKIE" --remsh mag1@lab --erl "-start_epmd false -kernel net_ticktime 8 -epmd_module Elixir.Swarm.Mesh.Epmd -pa _build/dev/lib/swarm/ebin") =>
+    ~S(iex --sname rem-1@lab --hidden --cookie "$COOKIE" --remsh mag1@lab --erl "-start_epmd false -kernel net_ticktime 8 -epmd_module Elixir.Swarm.Mesh.Distribution.Epmd -pa _build/dev/lib/swarm/ebin") =>
       @robot
   }
 
@@ -101,7 +101,7 @@ defmodule System.DocsTest do
     "Swarm.Supervisor (rest_for_one",
     "camera -> Hal.Device",
     "idle -> search -> agree",
-    "Link --Swarm.Transport",
+    "Link --Swarm.Comms.Transport",
     # One line of a status.
     "#min1 follow (1.20",
     "#mag1 follow (-4.69",

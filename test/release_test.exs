@@ -20,7 +20,7 @@ defmodule System.ReleaseTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile}
   alias Release.Machine
-  alias Sim.{Emulator, Server, World, Worlds}
+  alias Sim.{Emulator, World}
 
   @moduletag timeout: 300_000
   @moduletag skip: why_not
@@ -65,18 +65,22 @@ defmodule System.ReleaseTest do
   end
 
   defp base(link) do
-    start_supervised!(Worlds)
-    {:ok, map} = Sim.Map.open("hall", 1)
+    start_supervised!(World.Directory)
+    {:ok, map} = Sim.Floorplan.open("hall", 1)
     robot = %{id: :mag1, profile: Profile.magellan(), pose: Pose.new(-4, 0, 0), infrared: true}
     name = make_ref()
     world = World.new!(map: map, robots: [robot], noise: :off)
-    server = start_supervised!({Server, name: name, world: world})
-    body = {Sim.Drive, world: name, robot: :mag1}
-    start_supervised!({Emulator, core: {Sim.RFlexController, []}, link: link, body: body})
+    server = start_supervised!({World.Server, name: name, world: world})
+    body = {Sim.Device.Drive, world: name, robot: :mag1}
+
+    start_supervised!(
+      {Emulator, core: {Sim.Emulator.RFlexController, []}, link: link, body: body}
+    )
+
     server
   end
 
-  defp speed(server), do: elem(Server.world(server).robots.mag1.speed, 0)
+  defp speed(server), do: elem(World.Server.world(server).robots.mag1.speed, 0)
 
   defp robot(arguments, environment) do
     options = [env: environment, stderr_to_stdout: true]

@@ -250,18 +250,18 @@ defmodule Docs.Sandbox do
     """
     alias Hal.{Pose, Profile}
     link = Path.join(File.cwd!(), "base")
-    {:ok, map} = Sim.Map.open("hall", 1)
+    {:ok, map} = Sim.Floorplan.open("hall", 1)
     body = %{id: :mag2, profile: Profile.magellan(), pose: Pose.new(-4, 0, 0), infrared: true}
     world = Sim.World.new!(map: map, robots: [body], noise: :off)
-    drive = {Sim.Drive, world: :docs, robot: :mag2}
-    base = [core: {Sim.RFlexController, []}, link: link, body: drive]
-    parts = [Sim.Worlds, {Sim.Server, name: :docs, world: world}, {Sim.Emulator, base}]
+    drive = {Sim.Device.Drive, world: :docs, robot: :mag2}
+    base = [core: {Sim.Emulator.RFlexController, []}, link: link, body: drive]
+    parts = [Sim.World.Directory, {Sim.World.Server, name: :docs, world: world}, {Sim.Emulator, base}]
     {:ok, _} = Supervisor.start_link(parts, strategy: :one_for_one)
     path = "config/robots/mag2.exs"
     text = String.replace(File.read!(path), ~r/# (distance: |angle: |ir_a: )/, "\\\\1")
     File.write!(path, String.replace(text, "/dev/ttyUSB0", link))
     {:ok, file} = Robot.File.load(path)
-    {:ok, config} = Swarm.Start.config(file)
+    {:ok, config} = Swarm.MemberSpec.config(file)
     {:ok, _} = Robot.Fleet.start_robot(Robot.Fleet, config, :permanent)
     """
   end

@@ -82,8 +82,8 @@ defmodule Netns.Watched do
   @moduledoc "The landmark mission as it is, with a line in the log for what it decides."
   @behaviour Robot.Mission
   alias Netns.Log
-  alias Swarm.Missions.Landmark
-  alias Swarm.Missions.Landmark.{Council, Places}
+  alias Missions.Landmark
+  alias Missions.Landmark.{Rounds, SlotPoses}
 
   @impl Robot.Mission
   def init(robot, options), do: Landmark.init(robot, options)
@@ -92,7 +92,7 @@ defmodule Netns.Watched do
   def handle(event, mission) do
     {phase, next, effects} = Landmark.handle(event, mission)
     with {:command, command} <- event, do: Log.note(:command, command)
-    with {:tick, _percept} <- event, do: Log.change(:view, Council.view(next))
+    with {:tick, _percept} <- event, do: Log.change(:view, Rounds.view(next))
     for {:claim, claim} <- effects, do: claim(claim)
     commit(mission.round, next.round)
     {phase, next, effects}
@@ -113,7 +113,7 @@ defmodule Netns.Watched do
   end
 
   defp slot(anchor, id) do
-    {pose, _velocity} = Places.slot(anchor, id, 0)
+    {pose, _velocity} = SlotPoses.slot(anchor, id, 0)
     {id, Float.round(pose.x, 2), Float.round(pose.y, 2)}
   end
 end
@@ -126,7 +126,7 @@ defmodule Netns.Bodies do
   """
   use GenServer
   alias Netns.Log
-  alias Sim.Server
+  alias Sim.World
 
   @every_ms 100
 
@@ -144,7 +144,7 @@ defmodule Netns.Bodies do
 
   @impl GenServer
   def handle_info(:tell, s) do
-    pose = Server.world(s.server).robots[s.robot].pose
+    pose = World.Server.world(s.server).robots[s.robot].pose
     term = :erlang.term_to_binary({s.robot, pose})
     # Who is switched off does not hear it.
     for other <- s.others, do: _ = :gen_udp.send(s.socket, other, 0, term)
@@ -159,7 +159,7 @@ defmodule Netns.Bodies do
 
   def handle_info({:udp, _socket, _path, _port, term}, s) do
     {robot, pose} = :erlang.binary_to_term(term)
-    :ok = Server.change(s.server, {:displace, robot, pose})
+    :ok = World.Server.change(s.server, {:displace, robot, pose})
     {:noreply, s}
   end
 end
@@ -173,7 +173,7 @@ defmodule Netns.Robot do
 
   @doc "Starts it; `poses` is where everybody's body stands, `folder` where log and sockets are."
   def start(id, poses, folder) do
-    {:ok, map} = Sim.Map.open("hall", length(poses))
+    {:ok, map} = Sim.Floorplan.open("hall", length(poses))
 
     bodies =
       for {robot, pose} <- poses, do: %{id: robot, profile: Setup.profile(robot), pose: pose}
@@ -182,8 +182,11 @@ defmodule Netns.Robot do
     {:ok, parts} = Supervisor.start_link([], strategy: :one_for_one)
     Process.unlink(parts)
     {:ok, _} = Supervisor.start_child(parts, {Netns.Log, {Path.join(folder, "#{id}.log"), id}})
-    {:ok, _} = Supervisor.start_child(parts, Sim.Worlds)
-    {:ok, server} = Supervisor.start_child(parts, {Sim.Server, name: {:world, id}, world: world})
+    {:ok, _} = Supervisor.start_child(parts, Sim.World.Directory)
+
+    {:ok, server} =
+      Supervisor.start_child(parts, {Sim.World.Server, name: {:world, id}, world: world})
+
     names = Keyword.keys(poses)
     {:ok, _} = Supervisor.start_child(parts, {Netns.Bodies, {server, folder, id, names}})
     {:ok, _} = Robot.Fleet.start_robot(Robot.Fleet, config(id, poses[id]))
@@ -198,12 +201,12 @@ defmodule Netns.Robot do
       id: id,
       profile: Setup.profile(id),
       start: pose,
-      drive: {Sim.Drive, device},
-      ptz: {Sim.Ptz, device},
-      camera: {Sim.Camera, device ++ [blobs: :direct]},
+      drive: {Sim.Device.Drive, device},
+      ptz: {Sim.Device.Ptz, device},
+      camera: {Sim.Device.Camera, device ++ [blobs: :direct]},
       colours: World.colours(),
       mission: {Netns.Watched, []}
     )
-    |> Swarm.Link.join()
+    |> Swarm.Comms.join()
   end
 end

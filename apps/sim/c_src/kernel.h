@@ -1,7 +1,7 @@
 /* The heavy work of a simulated world: rays among walls and discs, and camera pictures.
  *
  * Lengths are metres, doubles throughout, and every operation is done in the order of
- * Sim.Kernel.Reference, so that both give the same bits. Sizes are checked by the caller.
+ * Sim.Compute.Reference, so that both give the same bits. Sizes are checked by the caller.
  */
 #ifndef SIM_KERNEL_H
 #define SIM_KERNEL_H

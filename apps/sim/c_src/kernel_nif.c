@@ -1,4 +1,4 @@
-/* Checks the terms of Sim.Kernel.Native and calls rays.c and paint.c. */
+/* Checks the terms of Sim.Compute.Native and calls rays.c and paint.c. */
 #include <erl_nif.h>
 #include <string.h>
 
@@ -302,4 +302,4 @@ static ErlNifFunc functions[] = {
     {"paint", 5, paint, 0},
 };
 
-ERL_NIF_INIT(Elixir.Sim.Kernel.Native, functions, NULL, NULL, NULL, NULL)
+ERL_NIF_INIT(Elixir.Sim.Compute.Native, functions, NULL, NULL, NULL, NULL)

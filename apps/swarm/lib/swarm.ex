@@ -26,10 +26,13 @@ defmodule Swarm do
   sent somewhere leaves the group's mission, which goes on without it until the next start.
   """
   alias Robot.Command
-  alias Swarm.{Alarm, Door, Formation, Matrix, Status, Transport}
-  alias Swarm.Directory.{Search, Watch}
-  alias Swarm.Door.Ask
-  alias Swarm.Missions.Manual
+  alias Swarm.{Commands, Formation, Status}
+  alias Swarm.Comms.Transport
+  alias Swarm.EStop.Broadcaster
+  alias Swarm.Membership.Matrix
+  alias Swarm.Directory.{Presence, Search}
+
+  alias Missions.Manual
   alias Swarm.Status.Report
 
   @type robot :: atom() | String.t()
@@ -59,7 +62,7 @@ defmodule Swarm do
   """
   @spec follow(robot(), leader :: robot()) :: answer()
   def follow(robot, leader) do
-    with {:ok, [leader]} <- Door.robots([leader]),
+    with {:ok, [leader]} <- Commands.robots([leader]),
          do: command(robot, {:follow_the_leader, leader})
   end
 
@@ -69,14 +72,15 @@ defmodule Swarm do
   another robot may take over), `robots` (who takes part, default `:all`), `policy` (`:available`, the
   default: each part of a divided fleet leads itself, or `:majority`: only more than half of the
   fleet, whose size is the number of `robots` unless `of` says another), `lost_link` (`:stop`, `:hold` or `:continue`: what a robot does
-  that hears nobody any more; `Swarm.Missions.Landmark.Policy`).
+  that hears nobody any more; `Missions.Landmark.Policy`).
 
       Swarm.start()
       Swarm.start(formation: {:diamond, 1.0}, robots: [:mag1, :mag2, :min1])
   """
   @spec start(keyword()) :: answer()
   def start(options \\ []) do
-    with {:ok, robots, options} <- Door.start(options), do: Door.tell(robots, {:start, options})
+    with {:ok, robots, options} <- Commands.start(options),
+         do: Commands.tell(robots, {:start, options})
   end
 
   @doc """
@@ -90,9 +94,9 @@ defmodule Swarm do
   """
   @spec formation(Formation.kind(), keyword()) :: answer()
   def formation(kind, options \\ []) do
-    with {:ok, {kind, spacing}} <- Door.formation(kind, options),
-         {:ok, robots} <- Door.robots(:all) do
-      Door.any(robots, {:formation, kind, spacing})
+    with {:ok, {kind, spacing}} <- Commands.formation(kind, options),
+         {:ok, robots} <- Commands.robots(:all) do
+      Commands.any(robots, {:formation, kind, spacing})
     end
   end
 
@@ -154,17 +158,17 @@ defmodule Swarm do
 
   @doc """
   Lets this process, or that one, know of robots that join and leave, by messages `{:swarm, {:join,
-  robot, about}}` (`Swarm.About`) and `{:swarm, {:leave, robot, reason}}` (`:left`, `:nodedown`, or
+  robot, about}}` (`Swarm.Directory.RobotInfo`) and `{:swarm, {:leave, robot, reason}}` (`:left`, `:nodedown`, or
   `:silent` for 2 s). Returns the robots that are there now.
 
       {:ok, robots} = Swarm.subscribe()
   """
   @spec subscribe(pid()) :: {:ok, [atom()]} | {:error, line :: String.t()}
-  def subscribe(pid \\ self()), do: Watch.subscribe(pid)
+  def subscribe(pid \\ self()), do: Presence.subscribe(pid)
 
   @doc "Ends that."
   @spec unsubscribe(pid()) :: :ok | {:error, line :: String.t()}
-  def unsubscribe(pid \\ self()), do: Watch.unsubscribe(pid)
+  def unsubscribe(pid \\ self()), do: Presence.unsubscribe(pid)
 
   @doc """
   Stops all robots, one, or a list of them, whatever they are at: no mission is asked. `:ok` when each one's
@@ -185,8 +189,8 @@ defmodule Swarm do
   """
   @spec estop() :: answer()
   def estop do
-    call = Alarm.sound()
-    with {:ok, robots} <- Door.robots(:all), do: Door.tell(robots, {:estop, call})
+    call = Broadcaster.sound()
+    with {:ok, robots} <- Commands.robots(:all), do: Commands.tell(robots, {:estop, call})
   end
 
   @doc """
@@ -196,7 +200,7 @@ defmodule Swarm do
   """
   @spec reset() :: answer()
   def reset do
-    Alarm.quiet(:all)
+    Broadcaster.quiet(:all)
     command(:all, :reset)
   end
 
@@ -231,16 +235,16 @@ defmodule Swarm do
 
   @doc false
   @spec ask(atom(), term()) :: term()
-  def ask(robot, request), do: Ask.ask([robot], request)[robot]
+  def ask(robot, request), do: Commands.Client.ask([robot], request)[robot]
 
   # For the robot itself, not for its mission.
   defp command(to, request) when request in [:reset, :arm, :disarm, :acknowledge] do
-    with {:ok, robots} <- Door.robots(to), do: Door.tell(robots, request)
+    with {:ok, robots} <- Commands.robots(to), do: Commands.tell(robots, request)
   end
 
   defp command(to, request) do
-    with {:ok, robots} <- Door.robots(to),
+    with {:ok, robots} <- Commands.robots(to),
          {:ok, request} <- Manual.check(request),
-         do: Door.tell(robots, request)
+         do: Commands.tell(robots, request)
   end
 end

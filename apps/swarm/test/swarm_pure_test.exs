@@ -1,14 +1,14 @@
 defmodule SwarmPureTest do
   use ExUnit.Case, async: true
   doctest Swarm.Formation
-  doctest Swarm.Assignment
-  doctest Swarm.Chain
-  doctest Swarm.Election
-  doctest Swarm.Trail
-  doctest Swarm.Room
-  doctest Swarm.Round.Record
+  doctest Swarm.Formation.Assignment
+  doctest Swarm.Formation.Chain
+  doctest Swarm.Agreement.Election
+  doctest Swarm.Formation.Trail
+  doctest Swarm.Formation.FreeSlots
+  doctest Swarm.Agreement.Round.Record
   doctest Swarm.Message
-  doctest Swarm.Heartbeat
-  doctest Swarm.Anchor
-  doctest Swarm.Missions.Landmark.Phases
+  doctest Swarm.Membership.Heartbeat
+  doctest Swarm.Formation.Reference
+  doctest Missions.Landmark.Transitions
 end

@@ -2,7 +2,9 @@ defmodule Console.Demo do
   @moduledoc """
   The demo without a view: the run in lockstep, its stages as lines, then report, picture and summary.
   """
-  alias Console.{Fleet, Options, Output, Picture, Progress, Report, Track, Words}
+  alias Console.{Fleet, Options, Picture, Report}
+  alias Console.Cli.{Format, Output, Progress}
+  alias Console.Picture.RunTrack
 
   @progress_ms 100
 
@@ -56,13 +58,13 @@ defmodule Console.Demo do
   def heading(options) do
     {kind, spacing} = options.formation
 
-    "#{Words.count(length(options.robots), "robot")} (#{Fleet.describe(options.robots)}) in " <>
-      "#{options.map}, seed #{options.seed}, #{kind} with #{Words.decimals(spacing, 1)} m spacing"
+    "#{Format.count(length(options.robots), "robot")} (#{Fleet.describe(options.robots)}) in " <>
+      "#{options.map}, seed #{options.seed}, #{kind} with #{Format.decimals(spacing, 1)} m spacing"
   end
 
   # Paths are kept only for a picture.
   defp track(%Options{picture: nil}, _scene), do: nil
-  defp track(_options, scene), do: Track.new(scene)
+  defp track(_options, scene), do: RunTrack.new(scene)
 
   defp play(run, scene) do
     run = run |> tell(scene) |> draw(scene)
@@ -72,13 +74,13 @@ defmodule Console.Demo do
     else
       trial = run.module.step(run.trial)
       scene = run.module.scene(trial)
-      play(%{run | trial: trial, track: run.track && Track.add(run.track, scene)}, scene)
+      play(%{run | trial: trial, track: run.track && RunTrack.add(run.track, scene)}, scene)
     end
   end
 
   defp tell(run, scene) do
     new = Enum.drop(scene.stages, run.told)
-    Enum.each(new, &Output.line(run.output, Words.stage(&1)))
+    Enum.each(new, &Output.line(run.output, Format.stage(&1)))
     %{run | told: run.told + length(new)}
   end
 
@@ -102,7 +104,7 @@ defmodule Console.Demo do
   defp note(%{error: nil} = scene), do: "#{scene.leader} leads"
 
   defp note(%{error: {mean, _max}} = scene),
-    do: "#{scene.leader} leads, formation error #{Words.decimals(mean, 2)} m"
+    do: "#{scene.leader} leads, formation error #{Format.decimals(mean, 2)} m"
 
   defp finish(run, options, wall_s) do
     result = run.module.result(run.trial)

@@ -31,7 +31,7 @@ defmodule Console.Fleet do
     kinds = for [kind, _count] <- parts, do: kind
 
     counts =
-      for [_kind, count] <- parts, {:ok, n} <- [Console.Values.whole(count, 0..@most)], do: n
+      for [_kind, count] <- parts, {:ok, n} <- [Console.Cli.Parse.whole(count, 0..@most)], do: n
 
     if length(counts) == length(parts) and kinds -- ["mag", "min"] == [] and
          Enum.sum(counts) in 1..@most do

@@ -3,7 +3,7 @@ defmodule Console.Live do
   A fleet that can be watched and commanded while it runs, whoever runs it.
 
   A view asks for the `scene/1` whenever it wants to draw, and hands on what people type as a
-  command that `Console.Prompt` has checked.
+  command that `Console.Terminal.Prompt` has checked.
   """
   alias Hal.Pose
 

@@ -3,7 +3,8 @@ defmodule Console.Options do
   What `mix demo` is told, checked once at the door. Pure; the options are one table, from which
   the help is made too.
   """
-  alias Console.{Arguments, Fleet, Values}
+  alias Console.{Cli, Fleet}
+  alias Console.Cli.Parse
   alias Hal.Suggest
 
   defstruct robots: nil,
@@ -45,7 +46,7 @@ defmodule Console.Options do
   def parse(arguments, folder \\ ".") do
     arguments = Enum.map(arguments, &if(&1 == "-h", do: "--help", else: &1))
 
-    with {:ok, pairs} <- Arguments.parse(arguments, table(folder)),
+    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table(folder)),
          {:ok, options} <- fleet(pairs) do
       pairs
       |> Enum.reduce(options, &put/2)
@@ -62,7 +63,7 @@ defmodule Console.Options do
 
       bin/demo [options]        (or: mix demo [options])
 
-    #{Arguments.help(table("."))}
+    #{Cli.Arguments.help(table("."))}
 
     Examples
       bin/demo                                              six robots, live in the terminal
@@ -107,30 +108,30 @@ defmodule Console.Options do
 
   defp table(folder) do
     [
-      {"robots", "N", &Values.whole(&1, 1..100), "how many robots, 1 to 100 (6)"},
+      {"robots", "N", &Parse.whole(&1, 1..100), "how many robots, 1 to 100 (6)"},
       {"fleet", "mag:N,min:N", &Fleet.parse/1, "or how many of each kind"},
-      {"seed", "S", &Values.whole(&1, 0..4_294_967_295),
+      {"seed", "S", &Parse.whole(&1, 0..4_294_967_295),
        "chance starts here; same seed, same run (1)"},
       {"map", "NAME", &map(&1, folder),
        "hall, hospital, arena, or FILE.png:WIDTHxHEIGHT in metres (hall)"},
-      {"start", "HOW", &Values.choice(&1, spread: :spread, same: :same),
+      {"start", "HOW", &Parse.choice(&1, spread: :spread, same: :same),
        "spread over the map, or all switched on at one pose: same (spread)"},
       {"landmark", "X,Y|none", &landmark/1,
        "where the landmark stands, in metres from the map's centre"},
-      {"move", "X,Y@T", &Values.at(&1, fn text -> Values.point(text) end, "X,Y@T"),
+      {"move", "X,Y@T", &Parse.at(&1, fn text -> Parse.point(text) end, "X,Y@T"),
        "the landmark glides there from second T; repeatable"},
-      {"kill", "WHO@T", &Values.at(&1, fn text -> who(text) end, "leader@T or NAME@T"),
+      {"kill", "WHO@T", &Parse.at(&1, fn text -> who(text) end, "leader@T or NAME@T"),
        "a robot dies at second T: leader, or a name; repeatable"},
-      {"loss", "P", &Values.number(&1, 0, 1), "share of radio messages lost, 0 to 1 (0)"},
-      {"noise", "HOW", &Values.choice(&1, off: :off, default: :default, slip: :slip),
+      {"loss", "P", &Parse.number(&1, 0, 1), "share of radio messages lost, 0 to 1 (0)"},
+      {"noise", "HOW", &Parse.choice(&1, off: :off, default: :default, slip: :slip),
        "of wheels and pictures: off, default, slip (default)"},
-      {"formation", "KIND[:SPACING]", &Values.formation/1,
+      {"formation", "KIND[:SPACING]", &Parse.formation/1,
        "column, line, wedge, triangle, diamond or circle;\nspacing 0.8 to 5 m (column:1)"},
-      {"assign", "HOW", &Values.choice(&1, chain: :chain, cost: :cost),
+      {"assign", "HOW", &Parse.choice(&1, chain: :chain, cost: :cost),
        "who takes which place: chain by distance, or least cost (cost)"},
-      {"leader-change", "on|off", &Values.choice(&1, on: true, off: false),
+      {"leader-change", "on|off", &Parse.choice(&1, on: true, off: false),
        "may another robot take over when it sees better? (on)"},
-      {"duration", "S", &Values.number(&1, 1, 3600),
+      {"duration", "S", &Parse.number(&1, 1, 3600),
        "simulated seconds at most (120, hospital 180;\nlive on a terminal: until you quit)"},
       {"headless", nil, nil,
        "no view, as fast as it goes (with --nodes or --hardware in real time)"},
@@ -141,7 +142,7 @@ defmodule Console.Options do
       {"json", "FILE|-", &file(&1, "", folder), "write the report (- is standard output)"},
       {"picture", "FILE.svg", &file(&1, ".svg", folder),
        "draw the paths and the formation error"},
-      {"blobs", "HOW", &Values.choice(&1, painted: :painted, direct: :direct),
+      {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
        "paint camera pictures, or skip the painting (painted)"},
       {"help", nil, nil, "this text"}
     ]
@@ -212,7 +213,7 @@ defmodule Console.Options do
   end
 
   defp hardware(text) do
-    with {:error, _allowed} <- Values.whole(text, 0..100),
+    with {:error, _allowed} <- Parse.whole(text, 0..100),
          {:error, _allowed} <- Fleet.parse(text) do
       {:error, "a whole number, or like mag:1,min:1 (kinds mag and min)#{kind_hint(text)}"}
     end
@@ -232,7 +233,7 @@ defmodule Console.Options do
   defp landmark("none"), do: {:ok, :none}
 
   defp landmark(text) do
-    with {:error, allowed} <- Values.point(text), do: {:error, allowed <> ", or none"}
+    with {:error, allowed} <- Parse.point(text), do: {:error, allowed <> ", or none"}
   end
 
   defp map(name, _folder) when name in @maps, do: {:ok, name}
@@ -245,7 +246,7 @@ defmodule Console.Options do
   end
 
   defp sized(file, width, height) do
-    with {:ok, _} <- Values.number(width, 2, 1000), {:ok, _} <- Values.number(height, 2, 1000) do
+    with {:ok, _} <- Parse.number(width, 2, 1000), {:ok, _} <- Parse.number(height, 2, 1000) do
       {:ok, "#{file}:#{width}x#{height}"}
     else
       _ -> {:error, "FILE.png:WIDTHxHEIGHT with sides from 2 to 1000 metres"}

@@ -3,7 +3,8 @@ defmodule Console.Picture do
   A run as one drawing (SVG): the floor with everybody's way, a legend, and below it the
   formation error over time. Pure; no fonts or files are needed to show it.
   """
-  alias Console.{Svg, Track, Words}
+  alias Console.Cli.Format
+  alias Console.Picture.{RunTrack, Svg}
   alias Console.Picture.{Floor, Labels, Plot}
 
   @width 1080
@@ -15,9 +16,9 @@ defmodule Console.Picture do
   @ink "#22262B"
 
   @doc "The drawing of a track, under a title."
-  @spec draw(Track.t(), String.t()) :: iodata()
-  def draw(%Track{} = track, title) do
-    ground = Console.Floorplan.of(track.first.map)
+  @spec draw(RunTrack.t(), String.t()) :: iodata()
+  def draw(%RunTrack{} = track, title) do
+    ground = Console.Picture.Floorplan.of(track.first.map)
     {left, bottom, right, top} = box = Floor.box(ground, track)
     scale = min(@floor_width / (right - left), @floor_height / (top - bottom))
     height = (top - bottom) * scale
@@ -68,7 +69,7 @@ defmodule Console.Picture do
   """
   @spec title(non_neg_integer(), String.t(), integer()) :: String.t()
   def title(count, map, seed),
-    do: "#{Words.count(count, "robot")} in #{Path.basename(map)}, seed #{seed}"
+    do: "#{Format.count(count, "robot")} in #{Path.basename(map)}, seed #{seed}"
 
   @stages_shown 14
   @robots_shown 14
@@ -91,7 +92,7 @@ defmodule Console.Picture do
 
     [
       Labels.badge(number, 9.0, y - 4.0),
-      Svg.text(Words.decimals(stage.at_s, 1) <> " s", 66, y,
+      Svg.text(Format.decimals(stage.at_s, 1) <> " s", 66, y,
         font_size: 12,
         text_anchor: "end",
         fill: @ink
@@ -147,7 +148,7 @@ defmodule Console.Picture do
 
   defp note(%{alive: false}), do: "dead"
   defp note(%{slot: nil, state: state}), do: words(state)
-  defp note(robot), do: "#{Words.decimals(Sim.Scene.slot_error(robot), 2)} m off its place"
+  defp note(robot), do: "#{Format.decimals(Sim.Scene.slot_error(robot), 2)} m off its place"
 
   defp signs do
     rows = [

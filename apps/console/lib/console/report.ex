@@ -5,7 +5,7 @@ defmodule Console.Report do
   Lengths, angles and times are rounded to three decimals. Two runs from one seed give the same
   bytes, except for `wall_s`, the only key that tells of the machine.
   """
-  alias Console.{Output, Words}
+  alias Console.Cli.{Format, Output}
   alias Sim.Trial.Claims
 
   @version Mix.Project.config()[:version]
@@ -50,7 +50,7 @@ defmodule Console.Report do
         wrong(result.claims) <> blocked(result.fleet) <> unsure(result.fleet),
       safety(result),
       leadership(result),
-      "#{Words.decimals(result.simulated_s, 1)} s simulated in #{Words.decimals(wall_s, 1)} s" <>
+      "#{Format.decimals(result.simulated_s, 1)} s simulated in #{Format.decimals(wall_s, 1)} s" <>
         " (#{speed(result.simulated_s / max(wall_s, 0.001))} times real time)"
     ]
   end
@@ -97,7 +97,7 @@ defmodule Console.Report do
   defp tidy(float), do: float
 
   defp outcome(%{leader: nil} = result, _formed?),
-    do: "No formation: #{Words.count(result.robots, "robot")}, and none of them leads."
+    do: "No formation: #{Format.count(result.robots, "robot")}, and none of them leads."
 
   defp outcome(%{formation: formation} = result, true) do
     living = Enum.count(result.fleet, & &1.alive)
@@ -112,8 +112,8 @@ defmodule Console.Report do
   defp error(%{error_mean_m: nil}), do: ""
 
   defp error(formation) do
-    ", off their places by #{Words.decimals(formation.error_mean_m, 2)} m in the mean" <>
-      " and #{Words.decimals(formation.error_max_m, 2)} m at most"
+    ", off their places by #{Format.decimals(formation.error_mean_m, 2)} m in the mean" <>
+      " and #{Format.decimals(formation.error_max_m, 2)} m at most"
   end
 
   defp wrong(claims) do
@@ -127,7 +127,7 @@ defmodule Console.Report do
     worst =
       claims |> Enum.flat_map(&[&1.worst_m, &1.worst_5s_m]) |> Enum.filter(& &1) |> Enum.max()
 
-    "#{Words.count(count, "time")}: a robot was #{Words.decimals(worst, 2)} m off"
+    "#{Format.count(count, "time")}: a robot was #{Format.decimals(worst, 2)} m off"
   end
 
   defp blocked(fleet) do
@@ -141,34 +141,34 @@ defmodule Console.Report do
 
   defp unsure(fleet) do
     case for %{state: :unsure} = robot <- fleet,
-             do: "#{robot.name} (#{Words.within(robot.uncertainty_m)})" do
+             do: "#{robot.name} (#{Format.within(robot.uncertainty_m)})" do
       [] -> ""
       [one] -> " Not sure of its place: #{one}."
       several -> " Not sure of their places: #{Enum.join(several, ", ")}."
     end
   end
 
-  defp speed(times), do: Words.decimals(times, if(times < 10, do: 1, else: 0))
+  defp speed(times), do: Format.decimals(times, if(times < 10, do: 1, else: 0))
 
   defp distance(nil), do: ""
-  defp distance(metres), do: ", #{Words.decimals(metres, 2)} m from the landmark"
+  defp distance(metres), do: ", #{Format.decimals(metres, 2)} m from the landmark"
 
   defp safety(result) do
-    collisions = result.collisions |> Words.count("collision") |> String.capitalize()
+    collisions = result.collisions |> Format.count("collision") |> String.capitalize()
 
     case result.min_separation_m do
       nil ->
         "#{collisions}."
 
       metres ->
-        "#{collisions}; nobody came nearer to another than #{Words.decimals(metres, 2)} m."
+        "#{collisions}; nobody came nearer to another than #{Format.decimals(metres, 2)} m."
     end
   end
 
   defp leadership(result) do
-    changes = result.leader_changes |> Words.count("change") |> String.capitalize()
+    changes = result.leader_changes |> Format.count("change") |> String.capitalize()
 
     "#{changes} of leader, at most #{result.leaders_at_once_max} at once; " <>
-      "#{Words.count(result.messages.sent, "message")}, #{result.messages.lost} lost."
+      "#{Format.count(result.messages.sent, "message")}, #{result.messages.lost} lost."
   end
 end

@@ -5,7 +5,8 @@ defmodule Console.Terminal do
   From the top: what is going on, the map beside the robots' table, what happened last, answers
   to commands, three things to try, the prompt.
   """
-  alias Console.{Floorplan, Words}
+  alias Console.Cli.Format
+  alias Console.Picture.Floorplan
   alias Console.Terminal.{Canvas, Editor, Style, Table}
   alias Sim.Scene
 
@@ -73,13 +74,14 @@ defmodule Console.Terminal do
 
     place =
       if columns >= 100,
-        do: "#{name} #{Words.decimals(ground.width, 0)} x #{Words.decimals(ground.height, 0)} m",
+        do:
+          "#{name} #{Format.decimals(ground.width, 0)} x #{Format.decimals(ground.height, 0)} m",
         else: name
 
     [
       {" Convoy ", :title},
-      {" #{place}  #{Words.decimals(scene.at_ms / 1000, 1)} s ", :bar},
-      {" #{kind} #{Words.decimals(spacing, 1)} m ", :bar},
+      {" #{place}  #{Format.decimals(scene.at_ms / 1000, 1)} s ", :bar},
+      {" #{kind} #{Format.decimals(spacing, 1)} m ", :bar},
       {" #{leader(scene)} ", :bar},
       {" #{error(scene)} ", :bar}
     ]
@@ -92,11 +94,11 @@ defmodule Console.Terminal do
 
   defp error(%{error: {mean, max}} = scene) do
     word = if scene.formed?, do: "formed", else: "error"
-    "#{word} #{Words.decimals(mean, 2)}/#{Words.decimals(max, 2)} m"
+    "#{word} #{Format.decimals(mean, 2)}/#{Format.decimals(max, 2)} m"
   end
 
   defp body(_scene, %{overlay: lines} = view, rows) when is_list(lines) do
-    lines = ["" | Enum.flat_map(lines, &Words.rows(&1, max(view.columns - 3, 20)))]
+    lines = ["" | Enum.flat_map(lines, &Format.rows(&1, max(view.columns - 3, 20)))]
     {Enum.take(Enum.map(lines, &[{"  " <> &1, :plain}]) ++ List.duplicate([], rows), rows), view}
   end
 
@@ -118,7 +120,7 @@ defmodule Console.Terminal do
   end
 
   defp happened(scene, count) do
-    lines = scene.stages |> Enum.take(-count) |> Enum.map(&[{Words.stage(&1), :plain}])
+    lines = scene.stages |> Enum.take(-count) |> Enum.map(&[{Format.stage(&1), :plain}])
     List.duplicate([], count - length(lines)) ++ lines
   end
 
@@ -134,7 +136,7 @@ defmodule Console.Terminal do
 
   # Its rows with the last first; of one too long for all rows the beginning says most.
   defp answer({text, style}, columns, count) do
-    for row <- text |> Words.rows(max(columns - 2, 20)) |> Enum.take(count) |> Enum.reverse(),
+    for row <- text |> Format.rows(max(columns - 2, 20)) |> Enum.take(count) |> Enum.reverse(),
         do: [{" " <> row, style}]
   end
 

@@ -1,13 +1,13 @@
 defmodule Console.BenchMeshTest do
   use ExUnit.Case, async: true
   import ExUnit.CaptureIO
-  alias Console.Bench.Mesh
-  alias Console.Bench.Mesh.{Figures, Main, Sheet}
+  alias Bench.Mesh
+  alias Bench.Mesh.{Figures, Main}
 
-  doctest Console.Bench.Mesh
-  doctest Console.Bench.Mesh.Figures
-  doctest Console.Bench.Mesh.Main
-  doctest Console.Bench.Mesh.Sheet
+  doctest Bench.Mesh
+  doctest Bench.Mesh.Figures
+  doctest Bench.Mesh.Main
+  doctest Bench.Mesh.Report
 
   defp row(name, size, ours, bare) do
     {:ok, [case]} = Mesh.choose(name)
@@ -16,7 +16,7 @@ defmodule Console.BenchMeshTest do
   end
 
   defp cells(row) do
-    [_head, _rule, line] = [row] |> Sheet.draw() |> String.split("\n", trim: true)
+    [_head, _rule, line] = [row] |> Mesh.Report.draw() |> String.split("\n", trim: true)
     line |> String.split("|", trim: true) |> Enum.map(&String.trim/1)
   end
 
@@ -50,7 +50,7 @@ defmodule Console.BenchMeshTest do
   end
 
   test "the rows are JSON" do
-    term = Sheet.term([row("ping", 3, [120], [60])], %{load_before: 0.5})
+    term = Mesh.Report.term([row("ping", 3, [120], [60])], %{load_before: 0.5})
     assert Hal.Json.encode!(term) =~ ~s("case":"ping","nodes":3)
   end
 

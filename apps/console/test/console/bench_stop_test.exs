@@ -1,11 +1,11 @@
 defmodule Console.BenchStopTest do
   use ExUnit.Case, async: false
-  alias Console.Bench.Stop
-  alias Console.Bench.Stop.{Play, Reader, Sheet}
+  alias Bench.Stop
+  alias Bench.Stop.Reader
   alias Hal.RFlex.Command
-  doctest Console.Bench.Stop
-  doctest Console.Bench.Stop.Reader
-  doctest Console.Bench.Stop.Sheet
+  doctest Bench.Stop
+  doctest Bench.Stop.Reader
+  doctest Bench.Stop.Report
 
   @moduletag :tmp_dir
 
@@ -59,7 +59,7 @@ defmodule Console.BenchStopTest do
     pull = List.last(Stop.cases())
 
     text =
-      Sheet.draw([
+      Stop.Report.draw([
         %{case: crash, times: [13_000, 15_000, 14_000], rolled: 0, known: []},
         %{case: frozen, times: [200_000, 301_000], rolled: 1, known: []},
         %{case: kill, times: [5_000, nil], rolled: 0, known: []},
@@ -77,7 +77,7 @@ defmodule Console.BenchStopTest do
   test "a robot on a real line is stopped by what stops it", %{tmp_dir: folder} do
     {:ok, cases} = Stop.choose("crash,frozen,kill,freeze,estop,bumper,pull")
 
-    for result <- Play.run(cases, 1, folder, fn _note -> :ok end) do
+    for result <- Stop.Runner.run(cases, 1, folder, fn _note -> :ok end) do
       assert [us] = result.times
       assert is_integer(us), "#{result.case.name}: no stop came"
       assert result.rolled == 0, "#{result.case.name}: it rolled again"

@@ -3,11 +3,12 @@ defmodule Console.CalibrateOdometryTest do
   use ExUnit.Case, async: false
   import ExUnit.CaptureIO
   alias Console.Calibrate.{Odometry, Options, Report}
-  alias Console.{Diff, Person}
+  alias Console.Person
+  alias Console.Cli.Diff
   alias Hal.{Pose, Profile}
-  alias Sim.{Emulator, Server, World, Worlds}
+  alias Sim.{Emulator, World}
 
-  doctest Console.Diff
+  doctest Console.Cli.Diff
   doctest Console.Calibrate.Options
   doctest Console.Calibrate.Report
   doctest Console.Calibrate.RobotFile
@@ -20,8 +21,8 @@ defmodule Console.CalibrateOdometryTest do
 
   defp base(folder, wheels) do
     {:ok, _apps} = Application.ensure_all_started(:swarm)
-    unless Worlds.running?(), do: start_supervised!(Worlds)
-    {:ok, map} = Sim.Map.open("hall", 1)
+    unless World.Directory.running?(), do: start_supervised!(World.Directory)
+    {:ok, map} = Sim.Floorplan.open("hall", 1)
 
     robot = %{
       id: :mag1,
@@ -33,14 +34,14 @@ defmodule Console.CalibrateOdometryTest do
 
     name = make_ref()
     world = World.new!(map: map, robots: [robot], noise: :off)
-    server = start_supervised!({Server, name: name, world: world})
+    server = start_supervised!({World.Server, name: name, world: world})
     link = Path.join(folder, "base")
 
     start_supervised!(
       {Emulator,
-       core: {Sim.RFlexController, kind: :magellan},
+       core: {Sim.Emulator.RFlexController, kind: :magellan},
        link: link,
-       body: {Sim.Drive, world: name, robot: :mag1}}
+       body: {Sim.Device.Drive, world: name, robot: :mag1}}
     )
 
     file = Path.join(folder, "mag1.exs")
@@ -72,7 +73,7 @@ defmodule Console.CalibrateOdometryTest do
   # He measures from where the robot stood when he said go.
   defp measure(server, answers) do
     Person.start(fn text ->
-      truth = fn -> World.truth(Server.world(server), :mag1) end
+      truth = fn -> World.truth(World.Server.world(server), :mag1) end
 
       cond do
         text =~ "go, skip or quit" ->
@@ -137,7 +138,8 @@ defmodule Console.CalibrateOdometryTest do
 
             send(
               me,
-              {:stopped, World.truth(Server.world(server), :mag1), Robot.Board.latched?(board)}
+              {:stopped, World.truth(World.Server.world(server), :mag1),
+               Robot.Board.latched?(board)}
             )
 
             "reset"
@@ -152,7 +154,7 @@ defmodule Console.CalibrateOdometryTest do
         :asked -> :ok
       end
 
-      wait(fn -> World.truth(Server.world(server), :mag1).x > 0.2 end)
+      wait(fn -> World.truth(World.Server.world(server), :mag1).x > 0.2 end)
       Person.type(person, "")
     end
 
@@ -165,7 +167,7 @@ defmodule Console.CalibrateOdometryTest do
     assert {:error, "ended by hand; nothing is written"} = Task.await(task, 60_000)
     assert_received {:stopped, pose, true}
     assert pose.x < 1.0
-    assert World.truth(Server.world(server), :mag1).x - pose.x < 0.15
+    assert World.truth(World.Server.world(server), :mag1).x - pose.x < 0.15
     assert Person.heard(person) =~ "EMERGENCY STOP: mag1 is held"
     assert Person.heard(person) =~ "stopped by hand"
     assert File.read!(file) == before
@@ -198,7 +200,7 @@ defmodule Console.CalibrateOdometryTest do
     assert {:error, "ended by hand; nothing is written"} = run(words, person)
     assert Person.heard(person) =~ "reset releases an emergency stop"
     refute File.exists?(latch)
-    assert World.truth(Server.world(server), :mag1) == Pose.new(0, 0)
+    assert World.truth(World.Server.world(server), :mag1) == Pose.new(0, 0)
   end
 
   test "nobody there: no wheel turns", %{tmp_dir: folder} do
@@ -209,7 +211,7 @@ defmodule Console.CalibrateOdometryTest do
       assert Odometry.run(options) == {:error, "ended by hand; nothing is written"}
     end)
 
-    assert World.truth(Server.world(server), :mag1) == Pose.new(0, 0)
+    assert World.truth(World.Server.world(server), :mag1) == Pose.new(0, 0)
   end
 
   test "a dry run tells, and needs no robot", %{tmp_dir: folder} do

@@ -2,8 +2,8 @@ defmodule Console.OptionsTest do
   use ExUnit.Case, async: true
   alias Console.Options
 
-  doctest Console.Arguments
-  doctest Console.Values
+  doctest Console.Cli.Arguments
+  doctest Console.Cli.Parse
   doctest Console.Fleet
   doctest Console.Options
 

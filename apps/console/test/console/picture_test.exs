@@ -2,9 +2,9 @@ defmodule Console.PictureTest do
   use ExUnit.Case, async: true
   alias Console.{Picture, Runs}
 
-  doctest Console.Ground
-  doctest Console.Floorplan
-  doctest Console.Svg
+  doctest Console.Picture.MapView
+  doctest Console.Picture.Floorplan
+  doctest Console.Picture.Svg
   doctest Console.Picture
   doctest Console.Picture.Colours
 

@@ -2,7 +2,7 @@ defmodule Console.ReportTest do
   use ExUnit.Case, async: true
   alias Console.{FakeTrial, Options, Report, Runs}
 
-  doctest Console.Words
+  doctest Console.Cli.Format
 
   defp result(line) do
     {:ok, trial} = line |> Runs.options() |> Options.trial() |> FakeTrial.new()
@@ -105,7 +105,7 @@ defmodule Console.ReportTest do
   test "a robot in a line says how sure it is of its pose" do
     scene = Runs.scene("", 12)
     [first | rest] = scene.robots
-    line = fn robot -> hd(Console.Words.one(%{scene | robots: [robot | rest]}, robot.id)) end
+    line = fn robot -> hd(Console.Cli.Format.one(%{scene | robots: [robot | rest]}, robot.id)) end
 
     assert line.(%{first | leader?: false, state: :unsure, uncertainty: 0.618}) =~
              ~r/^mag1: in its slot, but not sure of its place, at .* degrees, ±0\.62 m by its own word/

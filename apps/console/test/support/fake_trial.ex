@@ -89,7 +89,7 @@ defmodule Console.FakeTrial do
   def scene(trial) do
     %Scene{
       at_ms: trial.at_ms,
-      map: Console.Ground.room(trial.options.map, 16.0, 12.0),
+      map: Console.Picture.MapView.room(trial.options.map, 16.0, 12.0),
       robots: trial.robots,
       landmark: trial.landmark,
       leader: trial.leader,

@@ -1,6 +1,7 @@
 defmodule Console.Runs do
   @moduledoc "Runs of the fake trial for the tests of the views."
-  alias Console.{FakeTrial, Options, Track}
+  alias Console.{FakeTrial, Options}
+  alias Console.Picture.RunTrack
 
   @doc "Options from one line as typed."
   @spec options(String.t()) :: Options.t()
@@ -21,14 +22,14 @@ defmodule Console.Runs do
   end
 
   @doc "The track of a whole run."
-  @spec track(String.t()) :: Track.t()
+  @spec track(String.t()) :: RunTrack.t()
   def track(line) do
     {:ok, trial} = line |> options() |> Options.trial() |> FakeTrial.new()
-    follow(FakeTrial.step(trial), Track.new(FakeTrial.scene(trial)))
+    follow(FakeTrial.step(trial), RunTrack.new(FakeTrial.scene(trial)))
   end
 
   defp follow(trial, track) do
-    track = Track.add(track, FakeTrial.scene(trial))
+    track = RunTrack.add(track, FakeTrial.scene(trial))
     if FakeTrial.done?(trial), do: track, else: follow(FakeTrial.step(trial), track)
   end
 end

@@ -5,7 +5,7 @@ defmodule Hal.Camera do
   the last one on.
   """
 
-  @typedoc "A picture; or, of a camera that finds them by itself, its blobs, as `Vision.Eye` gives them."
+  @typedoc "A picture; or, of a camera that finds them by itself, its blobs, as `Vision.BlobDetector` gives them."
   @type reading ::
           {:frame, Hal.Frame.t()}
           | {:blobs, [struct()],

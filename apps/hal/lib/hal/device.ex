@@ -21,10 +21,10 @@ defmodule Hal.Device do
 
   That its driver has opened it makes no device online: of a line that is silent, full of noise, or leads to a base
   that hears and never answers, nobody knows where the wheels are. A drive is online once its base has
-  reported its wheels since then, and as long as it does (`Hal.Reports`); it is offline then
+  reported its wheels since then, and as long as it does (`Hal.Device.Reports`); it is offline then
   with the reason `:silent`, though its driver is open and goes on asking. A camera is online once it has given a
   picture, a pan-tilt unit once it has said where it looks; one that gives nothing for 10 s is offline (`:mute`) and
-  opened again (`Hal.Device.Signs`).
+  opened again (`Hal.Device.Liveness`).
 
   ## When a driver fails
 
@@ -47,13 +47,14 @@ defmodule Hal.Device do
   A drive that hears no speed for 500 ms stops its wheels. This is the second line behind the
   dead man's switch of whoever drives, for the case that this one is gone or stuck.
 
-  They turn only while the drive is armed (`Hal.Arming`): what is asked for before is a stop, and
+  They turn only while the drive is armed (`Hal.Device.Arming`): what is asked for before is a stop, and
   counted. With `arm: :auto` the drive arms whenever its driver is open and ready and its base's reports are
   fresh; with `:manual` a person does, after every start, by `arm/1`; with `:never` it stands, as in a dry run.
   Reports that grow old stop and disarm it. If the line is lost while they turn, `acknowledge/1`
   comes first. How it stands is the reading `{:arming, %{state: state, why: line or nil}}`.
   """
-  alias Hal.{Arming, Twist}
+  alias Hal.Twist
+  alias Hal.Device.Arming
   alias Hal.Device.{Server, State}
 
   # On a busy machine a device is slow, not gone; and whoever asks has half a second.
@@ -101,7 +102,7 @@ defmodule Hal.Device do
   @spec acknowledge(GenServer.server()) :: :ok | {:error, line :: String.t()}
   def acknowledge(device), do: order(device, :acknowledge)
 
-  @doc "How the drive is armed, with all that `Hal.Arming` counts; `nil` for what is no drive."
+  @doc "How the drive is armed, with all that `Hal.Device.Arming` counts; `nil` for what is no drive."
   @spec arming(GenServer.server()) :: Arming.t() | nil
   def arming(device), do: GenServer.call(device, :arming)
 

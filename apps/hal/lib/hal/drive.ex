@@ -14,7 +14,7 @@ defmodule Hal.Drive do
   heading (given as odometry's heading there); who does not know a reading leaves it alone.
 
   Odometry and sonar come with a report of the base and are not repeated without one: a base that tells
-  neither is taken for silent (`Hal.Reports`). A driver that hears a report and cannot make such a reading of it,
+  neither is taken for silent (`Hal.Device.Reports`). A driver that hears a report and cannot make such a reading of it,
   for want of a conversion or of its other half, says `{:report, :wheels}` or `{:report, :sonar}`.
   """
   @type reading ::

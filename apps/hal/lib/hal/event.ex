@@ -14,7 +14,7 @@ defmodule Hal.Event do
   | `[:hal, :device, :offline]` | `at_ms` | `device`, `driver`, `reason`, `line`: the reason in words; once a reason, not once a try |
   | `[:hal, :device, :watchdog]` | `at_ms` | `device`, `driver`: no speed came in time, the wheels were stopped |
   | `[:hal, :rflex, :lost]` | `at_ms`, and counters (`Hal.RFlex.Driver.counts/1`) | `port`: on this line more was lost or refused, told every 10 s |
-  | `[:hal, :device, :arming]` | `at_ms` | `device`, `driver`, `state`, `why`, `was` (the state before), `line` (how the line was lost, in words, or `nil`): whether wheels may turn has changed (`Hal.Arming`) |
+  | `[:hal, :device, :arming]` | `at_ms` | `device`, `driver`, `state`, `why`, `was` (the state before), `line` (how the line was lost, in words, or `nil`): whether wheels may turn has changed (`Hal.Device.Arming`) |
   | `[:hal, :device, :refused]` | `at_ms`, `refused` | `device`, `driver`: a speed came for wheels that are not armed, so many by now |
   | `[:hal, :event, :failure]` | | `handler`, `event`, `kind`, `reason`: a handler failed and is detached |
   | `[:vision, :view, :failed]` | `at_ms` | `view`, `reason`, `line`: what makes pictures for viewers failed, and is started again |

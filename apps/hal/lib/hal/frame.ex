@@ -13,7 +13,7 @@ defmodule Hal.Frame do
   `at_ms` is the time of exposure by the clock of the robot (monotonic, or the simulator's).
   `pan` and `tilt` (radians, left and up positive) are where the camera looked at that moment, and
   `field_of_view` how wide; `nil` where the camera does not know: who knows is its pan-tilt unit
-  (`Hal.Aim`).
+  (`Hal.Ptz.History`).
   """
 
   @enforce_keys [:format, :width, :height, :bytes, :at_ms]

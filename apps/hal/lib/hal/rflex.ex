@@ -15,7 +15,7 @@ defmodule Hal.RFlex do
   | `Hal.RFlex.Sonar`, `.Infrared`, `.Bumpers`, `.Home` | the other senses |
   | `Hal.RFlex.Queue` | which command goes next, and when |
   | `Hal.RFlex.Options` | a robot's configuration, checked |
-  | `Hal.RFlex.Console` | the phrase after which the controller cuts the power |
+  | `Hal.RFlex.PowerSwitch` | the phrase after which the controller cuts the power |
 
   There is no vendor document: the facts are what public drivers do. Where those are unsure the
   modules say so.

@@ -29,7 +29,7 @@ defmodule Hal.Serial do
   | `:speed` | baud, 1 to 20,000,000 | `115_200` |
   | `:last_words` | binary of at most 1024 bytes | `<<>>`: none |
   | `:keep_alive_ms` | 10 to 60,000 | `200` |
-  | `:module` | `Hal.Serial.Port` or `Hal.Serial.Circuits` (only `:port`) | `Hal.Serial.Port` |
+  | `:module` | `Hal.Serial.Native` or `Hal.Serial.Circuits` (only `:port`) | `Hal.Serial.Native` |
 
   ## Last words
 
@@ -56,10 +56,11 @@ defmodule Hal.Serial do
   With `:pty`, whoever opens the link is at the other end, comes and goes as he likes; what is written
   meanwhile is lost. The link is removed at the end. It replaces one that leads nowhere, and nothing else.
   """
-  alias Hal.Serial.{Line, Port}
+  alias Hal.Serial
+  alias Hal.Serial.Line
 
   @most_words 1024
-  @defaults [speed: 115_200, last_words: <<>>, keep_alive_ms: 200, module: Port]
+  @defaults [speed: 115_200, last_words: <<>>, keep_alive_ms: 200, module: Serial.Native]
   @keys [:port, :pty | Keyword.keys(@defaults)]
 
   @enforce_keys [:module, :line, :name]
@@ -187,8 +188,8 @@ defmodule Hal.Serial do
     case {options[:port], options[:pty], options[:module]} do
       {nil, nil, _} -> {:error, "serial option :port is missing: it must be the path of a device"}
       {_, nil, _} -> {:ok, options}
-      {nil, _, Port} -> {:ok, options}
-      {nil, _, module} -> wrong(:module, module, "Hal.Serial.Port where there is a :pty")
+      {nil, _, Serial.Native} -> {:ok, options}
+      {nil, _, module} -> wrong(:module, module, "Hal.Serial.Native where there is a :pty")
       {_, pty, _} -> wrong(:pty, pty, "left out where there is a :port")
     end
   end
@@ -209,7 +210,7 @@ defmodule Hal.Serial do
   defp rule(:last_words), do: "a binary of at most #{@most_words} bytes"
 
   defp rule(:module),
-    do: "Hal.Serial.Port, or Hal.Serial.Circuits where circuits_uart is (MIX_TARGET)"
+    do: "Hal.Serial.Native, or Hal.Serial.Circuits where circuits_uart is (MIX_TARGET)"
 
   defp wrong(key, value, rule),
     do: {:error, "serial option #{inspect(key)} cannot be #{show(value)}: it must be #{rule}"}

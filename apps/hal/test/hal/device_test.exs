@@ -3,7 +3,7 @@ defmodule Hal.DeviceTest do
   import ExUnit.CaptureLog
   alias Hal.{Device, Frame, Twist}
 
-  doctest Hal.Device.Signs
+  doctest Hal.Device.Liveness
   doctest Hal.Device.Words
 
   @zero Twist.zero()

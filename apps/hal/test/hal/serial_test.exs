@@ -22,8 +22,8 @@ defmodule Hal.SerialTest do
       {[port: "a", last_words: ~c"ab"], "at most 1024 bytes"},
       {[port: "a", keep_alive_ms: 9], "10 to 60000"},
       {[port: "a", keep_alive_ms: :infinity], "10 to 60000"},
-      {[port: "a", module: Enum], "Hal.Serial.Port"},
-      {[port: "a", module: No.Such], "Hal.Serial.Port"},
+      {[port: "a", module: Enum], "Hal.Serial.Native"},
+      {[port: "a", module: No.Such], "Hal.Serial.Native"},
       {[port: "a", parity: :even], "no serial option :parity: allowed are :port"},
       {[{"port", "a"}], "keyword list"},
       {:port, "keyword list"}

@@ -8,7 +8,7 @@ defmodule Robot.Board do
   | key | writer | value |
   |---|---|---|
   | `:odometry` `:sonar` `:ir` `:bumpers` `:power` `:brake` `:joystick` `:home` | `:drive` | as in `Hal.Drive` |
-  | `:arming` | `:drive` | `%{state: state, why: line or nil}` (`Hal.Arming`) |
+  | `:arming` | `:drive` | `%{state: state, why: line or nil}` (`Hal.Device.Arming`) |
   | `:ptz` | `:ptz` | as in `Hal.Ptz` |
   | `:blobs` | `:eye` | `%{blobs: [blob], pan: radians, field_of_view: radians or nil}`, at the time of the picture |
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, since when |
@@ -16,7 +16,7 @@ defmodule Robot.Board do
   | `:estop` | `:brake` | the number of the last e-stop, and of the last one cleared here |
   | `:radio` | `:link` | what was sent, heard, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
-  | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Reflex.frame/1` |
+  | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Safety.Reflex.frame/1` |
   | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil, tick: count}` |
   | `:goal` | `:executive` | the module of its goal's behaviour, or `nil` |
   | `{:hung, part}` | `:watch` | of `:gate`, `:executive` or `:pilot`: `{:silent, module}` of the behaviour or the mission in which it hangs (`nil` of the gate), `{:hung, module}` once it was ended for it |
@@ -109,7 +109,7 @@ defmodule Robot.Board do
     :ok
   end
 
-  @doc "A sink for `Hal.Device` and `Vision.Eye`: writes a reading, now, or blobs at the time of their picture; leaves alone what it does not know."
+  @doc "A sink for `Hal.Device` and `Vision.BlobDetector`: writes a reading, now, or blobs at the time of their picture; leaves alone what it does not know."
   @spec sense(t(), writer(), reading :: tuple()) :: :ok
   def sense(board, device, {:health, device, {condition, since_ms}}),
     do: put(board, device, {:health, device}, condition, since_ms)

@@ -14,10 +14,10 @@ defmodule Robot.Command do
   | `position:X:Y:THETA`, `follow:X:Y:THETA` | `{:position, pose}`, `{:follow, pose}` |
   | `blob:X:Y:THETA:SIZE:FOUND` | `{:blob, pose, size, found?}`; FOUND is 0 or 1 |
   | `lead`, `start`, `ping` | `:lead`, `:start`, `:ping` |
-  | `arm`, `disarm`, `acknowledge` | `:arm`, `:disarm`, `:acknowledge`: whether the wheels may turn (`Hal.Arming`) |
+  | `arm`, `disarm`, `acknowledge` | `:arm`, `:disarm`, `:acknowledge`: whether the wheels may turn (`Hal.Device.Arming`) |
   """
   alias Hal.Pose
-  alias Robot.Command.Words
+  alias Robot.Command
 
   @type t ::
           :stop
@@ -110,7 +110,7 @@ defmodule Robot.Command do
   end
 
   defp suggestion(word) do
-    case Words.nearest(word, @keywords) do
+    case Command.Arguments.nearest(word, @keywords) do
       nil -> "one of #{Enum.join(@keywords, ", ")} is allowed"
       near -> "did you mean #{near}?"
     end
@@ -136,7 +136,7 @@ defmodule Robot.Command do
   defp values(_keyword, [], _known, values), do: {:ok, Enum.reverse(values)}
 
   defp values(keyword, [{name, text} | rest], known, values) do
-    case Words.value(name, String.trim(text), known) do
+    case Command.Arguments.value(name, String.trim(text), known) do
       {:ok, value} ->
         values(keyword, rest, known, [value | values])
 

@@ -12,7 +12,7 @@ defmodule Robot.Config do
       the default
     * `:limits` - what to lower in the profile, as `[max_linear: 0.3]`: `:max_linear` (m/s), `:max_turn`
       (rad/s), `:max_acceleration` (m/s2), `:max_turn_acceleration` (rad/s2)
-    * `:mission` - `{module, options}` that `Robot.Pilot.start/1` starts, or `nil`
+    * `:mission` - `{module, options}` that `Robot.Control.Pilot.start/1` starts, or `nil`
     * `:companions` - `[{module, options}]`, each a `Robot.Companion`
     * `:send` - `{m, f, a}`; what the mission says goes to `apply(m, f, a ++ [to, message])`; or
       `nil`: nobody hears it
@@ -21,13 +21,13 @@ defmodule Robot.Config do
       and not by themselves, so that a test decides the order of everything
     * `:arm` - `:auto` (the default), or `:manual`: the wheels stand until a person arms them
     * `:fence` - a line that the robot does not cross, `{{x, y}, {x, y}}` or `[{x, y}, …]`, see
-      `Robot.Reflex.Fence`; or `nil`
-    * `:dry_run` - whether nothing moves, and what would is printed (`Robot.DryRun`), default `false`
+      `Robot.Safety.Reflex.Fence`; or `nil`
+    * `:dry_run` - whether nothing moves, and what would is printed (`Robot.Safety.DryRun`), default `false`
     * `:estop_file` - where the e-stop latch outlives the machine, or `nil`
-    * `:trace` - `{m, f, a}` that is told all that goes in and out, see `Robot.Trace`, or `nil`
+    * `:trace` - `{m, f, a}` that is told all that goes in and out, see `Robot.Control.Trace`, or `nil`
   """
   alias Hal.{Pose, Profile}
-  alias Robot.Reflex.Fence
+  alias Robot.Safety.Reflex.Fence
 
   @limits [:max_linear, :max_turn, :max_acceleration, :max_turn_acceleration]
 

@@ -3,7 +3,7 @@ defmodule Robot.Devices do
   What a robot senses and acts with, each beside the others, so that each falls alone:
 
       Robot.Devices (one_for_one)
-      |-- Vision.Eye           the newest frame to blobs (only with a camera)
+      |-- Vision.BlobDetector           the newest frame to blobs (only with a camera)
       |-- Vision.View          frames to pictures for people, while somebody looks (only with a camera)
       |-- Vision.Saver         keeps such pictures in a folder (only if told to)
       |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and at once to the gate;
@@ -19,7 +19,9 @@ defmodule Robot.Devices do
   falls. Whoever falls more often has something that no restart cures, and the robot goes down with it.
   """
   use Supervisor
-  alias Robot.{Board, Config, Gate, Names, Pilot}
+  alias Robot.{Board, Config, Names}
+  alias Robot.Control.Pilot
+  alias Robot.Safety.Gate
 
   @doc "Starts the devices of a robot whose board is running."
   @spec start_link(Config.t()) :: Supervisor.on_start()
@@ -29,8 +31,8 @@ defmodule Robot.Devices do
   def init(%Config{id: id} = config) do
     board = Board.find!(id)
     write = fn writer -> {Board, :sense, [board, writer]} end
-    to_eye = {Vision.Eye, :frame, [Names.via(id, :eye)]}
-    to_aim = {Vision.Eye, :aim, [Names.via(id, :eye)]}
+    to_eye = {Vision.BlobDetector, :frame, [Names.via(id, :eye)]}
+    to_aim = {Vision.BlobDetector, :aim, [Names.via(id, :eye)]}
     demand = Vision.View.demand()
     to_view = {Vision.View, :frame, [Names.via(id, :view), demand]}
 
@@ -62,7 +64,7 @@ defmodule Robot.Devices do
 
   defp eye(config, sink) do
     [
-      {Vision.Eye,
+      {Vision.BlobDetector,
        colours: config.colours,
        sink: sink,
        ptz: config.ptz != nil,

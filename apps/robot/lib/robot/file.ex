@@ -16,7 +16,7 @@ defmodule Robot.File do
   """
   alias Hal.{Pose, Profile}
   alias Robot.Config
-  alias Robot.File.{Check, Consistent, Device, Reader, Schema}
+  alias Robot.File.{Check, CrossChecks, Device, Reader, Schema}
 
   @enforce_keys [:id, :profile, :drive]
   defstruct @enforce_keys ++
@@ -47,7 +47,7 @@ defmodule Robot.File do
           limits: keyword(float()),
           start: Pose.t(),
           arm: :manual | :auto,
-          fence: Robot.Reflex.Fence.t() | nil,
+          fence: Robot.Safety.Reflex.Fence.t() | nil,
           dry_run: boolean(),
           estop_file: Path.t() | nil,
           console: keyword() | nil,
@@ -128,7 +128,7 @@ defmodule Robot.File do
          :ok <- whole(value),
          {:ok, values} <- complete(tree, Check.run(Schema.table(context), tree, [])),
          robot = robot(values),
-         [] <- problems(Consistent.problems(robot, file), tree) do
+         [] <- problems(CrossChecks.problems(robot, file), tree) do
       {:ok, robot}
     else
       {:error, {line, text}} -> {:error, ["#{file}:#{line}: #{text}"]}
@@ -138,7 +138,7 @@ defmodule Robot.File do
   end
 
   @doc """
-  What the robot is started with, as far as it is its own: `Swarm.Start` adds mission and
+  What the robot is started with, as far as it is its own: `Swarm.MemberSpec` adds mission and
   link. The drive is given the body, with the limits of this robot, if it asks for one (`profile:`).
 
   An error is a line of `Robot.Config.new/1`.

@@ -1,6 +1,6 @@
 defmodule Robot.Mission do
   @moduledoc """
-  What a robot is up to over minutes: a pure state machine, run by `Robot.Pilot` in real time and
+  What a robot is up to over minutes: a pure state machine, run by `Robot.Control.Pilot` in real time and
   by simulations in lockstep. It sends nothing, keeps no timers and reads no clock: deadlines are
   integers, compared with `percept.at_ms` at each tick.
 

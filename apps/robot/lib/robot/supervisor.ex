@@ -5,10 +5,10 @@ defmodule Robot.Supervisor do
       Robot.Supervisor (rest_for_one)
       |-- Robot.Board        the newest readings, the e-stop latch
       |-- Robot.Devices      one_for_one: eye, drive, ptz, camera; each falls alone
-      |-- Robot.Gate         the only one who drives the wheels
-      |-- Robot.Watch        sees that gate, executive and mission go on, and ends one that hangs
-      |-- Robot.Executive    percept to wish, ten times a second
-      |-- Robot.Pilot        runs the mission
+      |-- Robot.Safety.Gate         the only one who drives the wheels
+      |-- Robot.Safety.LivenessMonitor        sees that gate, executive and mission go on, and ends one that hangs
+      |-- Robot.Control.Executive    percept to wish, ten times a second
+      |-- Robot.Control.Pilot        runs the mission
       `-- companions         the radio, and what else the config names
 
   Whoever falls takes those below along, never those above. Without an executive the gate is
@@ -19,7 +19,9 @@ defmodule Robot.Supervisor do
   cure. What then happens is the fleet's to say (`Robot.Fleet`).
   """
   use Supervisor
-  alias Robot.{Board, Config, Devices, Executive, Gate, Names, Pilot, Watch}
+  alias Robot.{Board, Config, Devices, Names}
+  alias Robot.Control.{Executive, Pilot}
+  alias Robot.Safety.{Gate, LivenessMonitor}
 
   @doc "Starts a robot. `Robot.Names` must be running."
   @spec start_link(Config.t()) :: Supervisor.on_start()
@@ -42,7 +44,7 @@ defmodule Robot.Supervisor do
       {Board, config},
       {Devices, config},
       {Gate, config},
-      {Watch, config},
+      {LivenessMonitor, config},
       {Executive, {config, {Pilot, :hear, [config.id]}}},
       {Pilot, config}
     ]

@@ -1,10 +1,11 @@
 defmodule Robot.AvoidTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Twist}
-  alias Robot.{Behaviour, Body, Detour, Orca}
+  alias Robot.{Behaviour, Body}
+  alias Robot.Navigation.{Orca, PathPlanner}
   alias Robot.Behaviour.{Avoid, Follow, Goto, Move}
-  doctest Robot.Orca
-  doctest Robot.Detour
+  doctest Robot.Navigation.Orca
+  doctest Robot.Navigation.PathPlanner
 
   defp any(size), do: {size * (2 * :rand.uniform() - 1), size * (2 * :rand.uniform() - 1)}
 
@@ -79,7 +80,7 @@ defmodule Robot.AvoidTest do
       for _ <- 1..300 do
         {from, to} = {{-3.0, elem(any(1.0), 0)}, {3.0, elem(any(1.0), 0)}}
         {x, y} = any(0.8)
-        way = Detour.way(from, to, [{x, y, 0.6}])
+        way = PathPlanner.way(from, to, [{x, y, 0.6}])
         assert length_of(from, way) < 1.03 * shortest(from, to, {x, y, 0.6})
       end
     end
@@ -87,12 +88,12 @@ defmodule Robot.AvoidTest do
     test "any way it gives is free, and it finds one wherever discs leave room" do
       for _ <- 1..200 do
         discs = for _ <- 1..20, {x, y} = any(3.0), do: {x, y, 0.35}
-        way = Detour.way({-4.0, 0.0}, {4.0, 0.3}, discs)
+        way = PathPlanner.way({-4.0, 0.0}, {4.0, 0.3}, discs)
         assert way != nil
         assert List.last(way) == {4.0, 0.3}
 
         Enum.reduce(way, {-4.0, 0.0}, fn place, from ->
-          assert Detour.blocker(from, place, discs) == nil
+          assert PathPlanner.blocker(from, place, discs) == nil
           place
         end)
       end
@@ -100,7 +101,7 @@ defmodule Robot.AvoidTest do
 
     test "where there is no way it says so" do
       ring = for k <- 0..15, do: {2 * :math.cos(k * 0.3927), 2 * :math.sin(k * 0.3927), 0.45}
-      assert Detour.way({0.0, 0.0}, {5.0, 0.0}, ring) == nil
+      assert PathPlanner.way({0.0, 0.0}, {5.0, 0.0}, ring) == nil
     end
   end
 
@@ -111,7 +112,7 @@ defmodule Robot.AvoidTest do
 
   # Two tangents and the arc between, on the better side; the straight line where it is free.
   defp shortest(from, to, {x, y, r} = disc) do
-    if Detour.blocker(from, to, [disc]) do
+    if PathPlanner.blocker(from, to, [disc]) do
       {a, b} = {Pose.distance(from, {x, y}), Pose.distance(to, {x, y})}
       angle = fn {px, py} -> :math.atan2(py - y, px - x) end
       between = abs(Pose.wrap(angle.(from) - angle.(to)))
@@ -165,7 +166,7 @@ defmodule Robot.AvoidTest do
       for {extra, change} <- changes do
         body = Body.new(Pose.new(0, 0))
         {module, options} = goto
-        mind = Robot.Mind.goal(body.mind, :go, {module, options ++ extra})
+        mind = Robot.Control.Controller.goal(body.mind, :go, {module, options ++ extra})
 
         {nearest, outcome} =
           Enum.reduce_while(1..400, {%{body | mind: mind}, 9.0}, fn _, {body, nearest} ->
@@ -186,7 +187,7 @@ defmodule Robot.AvoidTest do
 
     for place <- [Pose.new(3, 0), Pose.new(3.2, 0.2)] do
       body = Body.new(Pose.new(0, 0.5, 2.0))
-      mind = Robot.Mind.goal(body.mind, :slot, {Follow, target: place})
+      mind = Robot.Control.Controller.goal(body.mind, :slot, {Follow, target: place})
       {nil, body} = Body.run(%{body | mind: mind}, 250, wreck)
       assert body.mind.last_by == :blocked
       assert Twist.zero?(body.twist)

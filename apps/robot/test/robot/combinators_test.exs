@@ -77,7 +77,10 @@ defmodule Robot.CombinatorsTest do
       Sequence.new(steps: [Goto.new(x: 1, y: 0), Goto.new(x: 1, y: 1), Goto.new(x: 0, y: 0)])
 
     body = Body.new(Pose.new(0, 0))
-    mind = Robot.Mind.goal(body.mind, :route, {Sequence, steps: elem(route, 1).steps})
+
+    mind =
+      Robot.Control.Controller.goal(body.mind, :route, {Sequence, steps: elem(route, 1).steps})
+
     assert {{:route, 1}, body} = Body.run(%{body | mind: mind}, 400)
     assert Pose.distance(body.pose, {0.0, 0.0}) < 0.11
   end
@@ -85,7 +88,14 @@ defmodule Robot.CombinatorsTest do
   test "wandering turns away from a wall and goes on" do
     wall = fn p -> %{p | sonar: List.replace_at(p.sonar, 11, max(0.0, 1.5 - p.pose.x))} end
     body = Body.new(Pose.new(0, 0))
-    {nil, body} = Body.run(%{body | mind: Robot.Mind.goal(body.mind, 1, {Wander, []})}, 60, wall)
+
+    {nil, body} =
+      Body.run(
+        %{body | mind: Robot.Control.Controller.goal(body.mind, 1, {Wander, []})},
+        60,
+        wall
+      )
+
     assert body.pose.x < 1.5
     assert abs(body.pose.heading) > 0.2
   end

@@ -3,7 +3,7 @@ defmodule Robot.CommandTest do
   alias Hal.Pose
   alias Robot.Command
   doctest Robot.Command
-  doctest Robot.Command.Words
+  doctest Robot.Command.Arguments
 
   @known [:mag1, :min1, :player1]
 

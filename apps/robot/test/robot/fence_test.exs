@@ -1,9 +1,10 @@
 defmodule Robot.FenceTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Robot.{Body, Config, Reflex}
-  alias Robot.Reflex.Fence
-  doctest Robot.Reflex.Fence
+  alias Robot.{Body, Config}
+  alias Robot.Safety.Reflex
+  alias Robot.Safety.Reflex.Fence
+  doctest Robot.Safety.Reflex.Fence
 
   @step_s 0.05
 

@@ -6,10 +6,10 @@ defmodule Robot.FileTest do
   doctest Robot.File.Check
   doctest Robot.File.Options
   doctest Robot.File.Tokens
-  doctest Robot.File.Words
+  doctest Robot.File.Printer
 
   alias Hal.Pose
-  alias Robot.File.{Reader, Schema, Words}
+  alias Robot.File.{Printer, Reader, Schema}
 
   @robots Path.expand("../../../../config/robots", __DIR__)
   @least ~s(id: :mag1, profile: :magellan, drive: {Robot.FileDrive, port: "/dev/ttyS1"})
@@ -393,7 +393,7 @@ defmodule Robot.FileTest do
   test "a node is shown as it was written" do
     for text <- ["[1, -2.5, nil]", "[{:a, \"b\"}]", "[a: true, b: Some.Module]"] do
       assert {:ok, node} = Reader.read(text)
-      assert Words.show(node) == text
+      assert Printer.show(node) == text
     end
   end
 

@@ -1,8 +1,9 @@
 defmodule Robot.LocaliserTest do
   use ExUnit.Case, async: true
-  doctest Robot.Sighting
+  doctest Robot.Percept.Sighting
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Robot.{Localiser, Percept, Sighting}
+  alias Robot.{Localiser, Percept}
+  alias Robot.Percept.Sighting
   alias Robot.Localiser.{Anchors, Belief}
   alias Vision.Blob
 

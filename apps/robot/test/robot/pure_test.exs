@@ -2,10 +2,10 @@ defmodule Robot.PureTest do
   use ExUnit.Case, async: true
   doctest Robot.Wish
   doctest Robot.Behaviour
-  doctest Robot.Watch
-  doctest Robot.Readiness
-  doctest Robot.Arbiter
-  doctest Robot.Steering
-  doctest Robot.Reflex.Body
+  doctest Robot.Safety.LivenessMonitor
+  doctest Robot.Safety.Readiness
+  doctest Robot.Control.Arbiter
+  doctest Robot.Navigation.Steering
+  doctest Robot.Safety.Reflex.Body
   doctest Robot.Behaviour.Options
 end

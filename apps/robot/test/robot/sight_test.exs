@@ -69,13 +69,13 @@ defmodule Robot.SightTest do
     send(Names.whereis(id, :ptz), {:readings, [looks]})
     # The unit's process has handed the reading on when it answers, and then the eye has it, too.
     _ = :sys.get_state(Names.whereis(id, :ptz))
-    _ = Vision.Eye.status(Names.via(id, :eye))
+    _ = Vision.BlobDetector.status(Names.via(id, :eye))
     at_ms = System.monotonic_time(:millisecond)
     {:ok, frame} = Hal.Frame.new(:yuyv, 2, 1, <<200, 70, 200, 140>>, at_ms)
     send(Names.whereis(id, :camera), {:readings, [{:frame, frame}]})
     assert_receive {:mission, {:tick, %{blobs_at_ms: ^at_ms} = percept}}, 300
     assert {percept.blobs_pan, percept.blobs_view} == {0.3, 0.7}
-    assert Robot.Sighting.field_of_view(percept) == 0.7
+    assert Robot.Percept.Sighting.field_of_view(percept) == 0.7
   end
 
   for fallen <- [:eye, :camera] do

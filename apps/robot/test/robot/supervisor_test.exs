@@ -166,7 +166,7 @@ defmodule Robot.SupervisorTest do
     assert looks.(List.duplicate(1, 41)) == ends
   end
 
-  defp swapped(tick, watch), do: Robot.Watch.look(watch, tick)
+  defp swapped(tick, watch), do: Robot.Safety.LivenessMonitor.look(watch, tick)
 
   test "a goal that is no behaviour is refused, and one of a mission ends the mission only" do
     id = rolling(:fall14)
@@ -174,7 +174,7 @@ defmodule Robot.SupervisorTest do
     [executive, pilot] = parts(id, @above)
     goal = fn goal -> Executive.goal(id, :t, goal) end
     assert {:error, "NoSuchModule is no behaviour" <> _} = goal.({NoSuchModule, []})
-    assert {:error, "Robot.Gate is no behaviour" <> _} = goal.({Gate, []})
+    assert {:error, "Robot.Safety.Gate is no behaviour" <> _} = goal.({Gate, []})
     assert {:error, "Robot.Behaviour.Goto: option x is missing"} = goal.({Behaviour.Goto, y: 1})
 
     assert {:error, "Robot.Behaviour.Goto: [1] are no options" <> _} =

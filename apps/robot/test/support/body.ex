@@ -2,7 +2,9 @@ defmodule Robot.Body do
   @moduledoc false
   # One body on a plane for tests: the gate's output moves it, its percepts feed a mind.
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Robot.{Mind, Percept, Reflex}
+  alias Robot.Percept
+  alias Robot.Control.Controller
+  alias Robot.Safety.Reflex
 
   def new(pose, profile \\ Profile.magellan()) do
     reflex = Reflex.new(profile)
@@ -12,7 +14,7 @@ defmodule Robot.Body do
       twist: Twist.zero(),
       at_ms: 0,
       reflex: reflex,
-      mind: Mind.new(profile: profile),
+      mind: Controller.new(profile: profile),
       profile: profile,
       pan: nil
     }
@@ -26,7 +28,7 @@ defmodule Robot.Body do
   def run(body, 0, _change), do: {nil, body}
 
   def run(body, ticks, change) do
-    {wish, outcome, mind} = Mind.tick(body.mind, change.(percept(body)))
+    {wish, outcome, mind} = Controller.tick(body.mind, change.(percept(body)))
     body = %{body | mind: mind} |> act(wish)
     if outcome, do: {outcome, body}, else: run(body, ticks - 1, change)
   end

@@ -3,7 +3,9 @@ defmodule Robot.Hall do
   # A fleet on a plane for tests: discs with the lag and the accelerations of their wheels, sonars that see
   # discs and walls, poses told 5 times a second, late and inexact. Everybody runs Mind and Reflex.
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Robot.{Body, Mind, Percept, Reflex}
+  alias Robot.{Body, Percept}
+  alias Robot.Control.Controller
+  alias Robot.Safety.Reflex
   alias Robot.Behaviour.Follow
 
   @lag_s 0.1
@@ -69,7 +71,7 @@ defmodule Robot.Hall do
           end
 
         b = 2 * :math.pi() * :rand.uniform()
-        mind = Mind.new(profile: profile)
+        mind = Controller.new(profile: profile)
 
         {id,
          %{
@@ -216,7 +218,7 @@ defmodule Robot.Hall do
           {id, %{r | slot: slot, velocity: velocity}}
         else
           mind =
-            Mind.goal(
+            Controller.goal(
               r.mind,
               {:drive, twist},
               {Robot.Behaviour.Move, linear: twist.linear, turn: twist.turn}
@@ -303,14 +305,14 @@ defmodule Robot.Hall do
         mind =
           if r.slot,
             do:
-              Mind.goal(
+              Controller.goal(
                 r.mind,
                 :slot,
                 {Follow, target: r.slot, velocity: r.velocity, discs: discs}
               ),
             else: r.mind
 
-        {took, {wish, _, mind}} = :timer.tc(fn -> Mind.tick(mind, percept) end)
+        {took, {wish, _, mind}} = :timer.tc(fn -> Controller.tick(mind, percept) end)
 
         reflex =
           r.reflex

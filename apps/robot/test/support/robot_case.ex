@@ -11,7 +11,9 @@ defmodule Robot.Case do
     quote do
       import Robot.Case
       alias Hal.Twist
-      alias Robot.{Acts, Board, Executive, Gate, Names, Pilot}
+      alias Robot.{Acts, Board, Names}
+      alias Robot.Control.{Executive, Pilot}
+      alias Robot.Safety.Gate
     end
   end
 
@@ -56,7 +58,7 @@ defmodule Robot.Case do
     goal = {:goal, :roll, {Robot.Acts.Roll, twist: Twist.new(0.1, 0.0)}}
     mission = {Robot.Acts.Mission, effects: [goal]}
     robot(id, Keyword.put_new(options, :mission, mission))
-    :ok = Robot.Pilot.start(id)
+    :ok = Robot.Control.Pilot.start(id)
     id
   end
 

@@ -4,12 +4,14 @@ defmodule Sim.Calibration do
   would, by the same mind and reflexes, and its true pose is what a person would have measured. Pure.
 
   Options of `new/1`: `profile` (`:magellan`), `seed` (0), `noise` (`:default`), `wheels` (what odometry is
-  wrong about, as in `Sim.Body`), `speed` (m/s, 0.3), `tape_m` (standard deviation of what is read
+  wrong about, as in `Sim.World.Body`), `speed` (m/s, 0.3), `tape_m` (standard deviation of what is read
   off a tape, 0.003) and `tape_rad` (the same of an angle, 0.009, half a degree).
   """
   alias Hal.{Pose, Profile}
-  alias Robot.{Mind, Percept, Reflex}
-  alias Robot.Behaviour.Course
+  alias Robot.Percept
+  alias Robot.Control.Controller
+  alias Robot.Safety.Reflex
+  alias Robot.Behaviour.DriveCourse
   alias Robot.Calibration.{Drive, Model}
   alias Sim.{Noise, World}
 
@@ -39,7 +41,7 @@ defmodule Sim.Calibration do
         tape_rad: 0.009
       )
 
-    {:ok, map} = Sim.Map.open("hall", 6)
+    {:ok, map} = Sim.Floorplan.open("hall", 6)
     profile = if options[:profile] == :magellan, do: Profile.magellan(), else: Profile.atrv_mini()
     robot = %{id: @id, profile: profile, pose: Pose.new(0, 0), wheels: options[:wheels]}
 
@@ -68,8 +70,8 @@ defmodule Sim.Calibration do
   def drive(%__MODULE__{} = sim, task) do
     world = World.displace(sim.world, @id, mark(task))
     before = told(world)
-    course = {Course, legs: Drive.legs(task), speed: sim.options.speed}
-    mind = Mind.goal(Mind.new(profile: sim.profile), :course, course)
+    course = {DriveCourse, legs: Drive.legs(task), speed: sim.options.speed}
+    mind = Controller.goal(Controller.new(profile: sim.profile), :course, course)
 
     s = %{
       world: world,
@@ -99,7 +101,7 @@ defmodule Sim.Calibration do
 
   defp go(s) do
     at_ms = s.world.at_ms
-    {wish, outcome, mind} = Mind.tick(s.mind, percept(s))
+    {wish, outcome, mind} = Controller.tick(s.mind, percept(s))
     s = %{s | mind: mind, reflex: Reflex.wish(s.reflex, wish.twist, at_ms)}
     s = s |> act() |> act()
 

@@ -6,10 +6,10 @@ defmodule Sim.Emulator do
 
   | option | meaning |
   |---|---|
-  | `:core` | `{module, options}`, `Sim.RFlexController` or `Sim.ViscaCamera` |
+  | `:core` | `{module, options}`, `Sim.Emulator.RFlexController` or `Sim.Emulator.ViscaCamera` |
   | `:link` | path of the link that is made to the pseudo-terminal |
-  | `:body` | `{driver, options}`, a `Hal.Drive` or `Hal.Ptz` as `Sim.Drive`, or `nil` for none |
-  | `:wire` | faults of the line, both ways, as of `Sim.Wire` |
+  | `:body` | `{driver, options}`, a `Hal.Drive` or `Hal.Ptz` as `Sim.Device.Drive`, or `nil` for none |
+  | `:wire` | faults of the line, both ways, as of `Sim.Emulator.Wire` |
   | `:name` | as in `GenServer` |
 
   A body that is not there yet, or a line that cannot be opened, is tried again and again. A line that fails is told
@@ -21,7 +21,7 @@ defmodule Sim.Emulator do
   """
   use GenServer
   alias Hal.{Event, Serial}
-  alias Sim.Wire
+  alias Sim.Emulator.Wire
 
   @retry_ms 100
 
@@ -79,7 +79,7 @@ defmodule Sim.Emulator do
   def change(emulator, function, arguments),
     do: GenServer.call(emulator, {:apply, function, arguments})
 
-  @doc "Faults of the line from now on, as of `Sim.Wire`."
+  @doc "Faults of the line from now on, as of `Sim.Emulator.Wire`."
   @spec spoil(GenServer.server(), keyword()) :: :ok | {:error, line :: String.t()}
   def spoil(emulator, options), do: GenServer.call(emulator, {:spoil, options})
 

@@ -5,13 +5,13 @@ defmodule Sim.Fleet do
   its own (`Sim.Fleet.Nodes`).
 
   This process plays the script, keeps the ledger, and answers what viewers ask; where world and
-  robots run is its crew's business (`Sim.Fleet.Crew`).
+  robots run is its crew's business (`Sim.Fleet.Backend`).
   """
   use GenServer
   alias Hal.Pose
   alias Sim.Fleet.{Local, Mission, Nodes, Said}
   alias Sim.Scene
-  alias Sim.Trial.{Finish, Ledger, Score, Script, Setup}
+  alias Sim.Trial.{Evaluation, RunLog, Scenario, Setup, Termination}
 
   @period_ms 100
 
@@ -76,7 +76,7 @@ defmodule Sim.Fleet do
   @spec server(GenServer.server()) :: pid() | nil
   def server(fleet), do: GenServer.call(fleet, :server)
 
-  @doc "Whether the run is over, as `Sim.Trial.Finish` has it."
+  @doc "Whether the run is over, as `Sim.Trial.Termination` has it."
   @spec done?(GenServer.server()) :: boolean()
   def done?(fleet), do: GenServer.call(fleet, :done?, :infinity)
 
@@ -110,8 +110,8 @@ defmodule Sim.Fleet do
       setup: setup,
       crew: crew,
       epoch_ms: epoch_ms,
-      script: Script.new(options.moves, options.kills),
-      ledger: Ledger.new(),
+      script: Scenario.new(options.moves, options.kills),
+      ledger: RunLog.new(),
       said: [],
       next: epoch_ms
     })
@@ -124,17 +124,17 @@ defmodule Sim.Fleet do
   end
 
   @impl GenServer
-  def handle_call(:scene, _from, s), do: {:reply, s |> run() |> Score.scene(), s}
-  def handle_call(:result, _from, s), do: {:reply, s |> run() |> Score.result(), s}
+  def handle_call(:scene, _from, s), do: {:reply, s |> run() |> Evaluation.scene(), s}
+  def handle_call(:result, _from, s), do: {:reply, s |> run() |> Evaluation.result(), s}
   def handle_call(:living, _from, s), do: {:reply, ask(s, :living), s}
   def handle_call(:server, _from, s), do: {:reply, ask(s, :server), s}
   def handle_call(:lines, _from, s), do: {:reply, ask(s, :lines), s}
 
   def handle_call(:done?, _from, s),
-    do: {:reply, s |> run() |> Map.put(:script, s.script) |> Finish.reached?(), s}
+    do: {:reply, s |> run() |> Map.put(:script, s.script) |> Termination.reached?(), s}
 
   def handle_call({:kill, :leader}, from, s) do
-    case Ledger.leader(s.ledger) do
+    case RunLog.leader(s.ledger) do
       nil -> {:reply, {:error, "there is no leader to kill yet"}, s}
       leader -> handle_call({:kill, leader}, from, s)
     end
@@ -160,12 +160,12 @@ defmodule Sim.Fleet do
   def handle_info(:tick, s) do
     now = now(s.epoch_ms)
     claims = ask(s, :claims)
-    worst = fn leader -> s |> run() |> Score.worst(leader) end
-    followers = fn -> s |> run() |> Score.followers() end
+    worst = fn leader -> s |> run() |> Evaluation.worst(leader) end
+    followers = fn -> s |> run() |> Evaluation.followers() end
     {told, said} = Said.look(s.said, claims)
-    ledger = s.ledger |> Ledger.note(now, claims) |> Ledger.judge(now, claims, worst)
-    ledger = ledger |> Ledger.watch(now, followers) |> tell(now, told)
-    {events, script} = Script.due(s.script, now(s.epoch_ms), Ledger.leader(ledger))
+    ledger = s.ledger |> RunLog.note(now, claims) |> RunLog.judge(now, claims, worst)
+    ledger = ledger |> RunLog.watch(now, followers) |> tell(now, told)
+    {events, script} = Scenario.due(s.script, now(s.epoch_ms), RunLog.leader(ledger))
     s = Enum.reduce(events, %{s | ledger: ledger, said: said, script: script}, &play/2)
     {:noreply, schedule(s)}
   end
@@ -203,13 +203,13 @@ defmodule Sim.Fleet do
   defp note({:stage, stage, id, facts}, s) do
     if Said.waits?(stage),
       do: %{s | said: Said.hear(s.said, {stage, id, facts})},
-      else: %{s | ledger: Ledger.stage(s.ledger, now(s.epoch_ms), stage, id, facts)}
+      else: %{s | ledger: RunLog.stage(s.ledger, now(s.epoch_ms), stage, id, facts)}
   end
 
   # At the same instant as the claims that show them.
   defp tell(ledger, at_ms, stages) do
     Enum.reduce(stages, ledger, fn {stage, id, facts}, ledger ->
-      Ledger.stage(ledger, at_ms, stage, id, facts)
+      RunLog.stage(ledger, at_ms, stage, id, facts)
     end)
   end
 

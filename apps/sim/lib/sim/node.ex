@@ -7,9 +7,9 @@ defmodule Sim.Node do
   on a command line. It becomes a node by that, starts its part, and tells the launcher, a process on
   another node. It ends when standard input closes: nobody needs it any more then.
 
-  What it tells the launcher goes by `Sim.Node.Courier`.
+  What it tells the launcher goes by `Sim.Node.Reporter`.
   """
-  alias Sim.Node.{Config, Courier}
+  alias Sim.Node.{Config, Reporter}
 
   @doc "What a part of a fleet is, in a node of its own."
   @callback start(options :: map()) ::
@@ -60,8 +60,8 @@ defmodule Sim.Node do
   defp start(%{part: {module, options}} = config) do
     Process.flag(:trap_exit, true)
     {:ok, supervisor, facts, report} = module.start(options)
-    {:ok, courier} = Courier.start_link(config.launcher, report)
-    Courier.tell(courier, {:up, Map.put(facts, :main, self())})
+    {:ok, courier} = Reporter.start_link(config.launcher, report)
+    Reporter.tell(courier, {:up, Map.put(facts, :main, self())})
     wait(supervisor, courier, config.part)
   end
 

@@ -4,12 +4,12 @@ defmodule Sim.Trial do
   the same to the byte for one seed. No process, no clock.
 
   Every 50 ms, in this order: radio, sense, mind (every 100 ms, with a new picture), reflex, act.
-  `step/1` is 100 ms. What happens on purpose (landmark moved, robots killed) is `Sim.Trial.Script`;
-  what is written down of a run is `Sim.Trial.Ledger`.
+  `step/1` is 100 ms. What happens on purpose (landmark moved, robots killed) is `Sim.Trial.Scenario`;
+  what is written down of a run is `Sim.Trial.RunLog`.
   """
   alias Hal.Pose
   alias Sim.{Radio, Scene, World}
-  alias Sim.Trial.{Cuts, Finish, Ledger, Score, Script, Setup}
+  alias Sim.Trial.{Cuts, Evaluation, RunLog, Scenario, Setup, Termination}
   alias Swarm.Member
 
   @half_ms 50
@@ -58,7 +58,7 @@ defmodule Sim.Trial do
   formation, or at rest without a landmark, for 5 s.
   """
   @spec done?(t()) :: boolean()
-  def done?(%__MODULE__{} = trial), do: Finish.reached?(trial)
+  def done?(%__MODULE__{} = trial), do: Termination.reached?(trial)
 
   @doc "Whether the fleet is in formation now, by its own judgement."
   @spec formed?(t()) :: boolean()
@@ -66,22 +66,22 @@ defmodule Sim.Trial do
 
   @doc "What a viewer sees now."
   @spec scene(t()) :: Scene.t()
-  def scene(trial), do: trial |> run() |> Score.scene()
+  def scene(trial), do: trial |> run() |> Evaluation.scene()
 
   @doc "All that the report says of the run, but for its wall time."
   @spec result(t()) :: map()
-  def result(trial), do: trial |> run() |> Score.result()
+  def result(trial), do: trial |> run() |> Evaluation.result()
 
   @doc "Moves the landmark there, as a person would push it, from now on."
   @spec move(t(), Pose.point()) :: {:ok, t()} | {:error, String.t()}
   def move(trial, place) do
     with :ok <- Setup.check_landmarks(trial.map, [place]),
-         do: {:ok, %{trial | script: Script.add_move(trial.script, place, trial.at_ms)}}
+         do: {:ok, %{trial | script: Scenario.add_move(trial.script, place, trial.at_ms)}}
   end
 
   @doc "Kills a robot, or whoever leads, now."
   @spec kill(t(), :leader | atom()) :: t()
-  def kill(trial, who), do: %{trial | script: Script.add_kill(trial.script, who, trial.at_ms)}
+  def kill(trial, who), do: %{trial | script: Scenario.add_kill(trial.script, who, trial.at_ms)}
 
   @doc "Gives a command to one living robot or to all."
   @spec command(t(), atom() | :all, term()) :: t()
@@ -132,8 +132,8 @@ defmodule Sim.Trial do
           delay_ms: options.delay_ms
         ),
       members: members,
-      script: Script.new(options.moves, options.kills),
-      ledger: Ledger.new(),
+      script: Scenario.new(options.moves, options.kills),
+      ledger: RunLog.new(),
       colours: World.colours()
     }
 
@@ -141,7 +141,7 @@ defmodule Sim.Trial do
   end
 
   defp play(trial) do
-    {events, script} = Script.due(trial.script, trial.at_ms, Ledger.leader(trial.ledger))
+    {events, script} = Scenario.due(trial.script, trial.at_ms, RunLog.leader(trial.ledger))
     Enum.reduce(events, %{trial | script: script}, &play_one/2)
   end
 
@@ -151,7 +151,7 @@ defmodule Sim.Trial do
         trial
         | world: World.kill(trial.world, id),
           members: Map.delete(trial.members, id),
-          ledger: Ledger.stage(trial.ledger, trial.at_ms, :killed, id, %{})
+          ledger: RunLog.stage(trial.ledger, trial.at_ms, :killed, id, %{})
       }
     else
       trial
@@ -162,7 +162,7 @@ defmodule Sim.Trial do
     %{
       trial
       | world: World.move_landmark(trial.world, place),
-        ledger: Ledger.stage(trial.ledger, trial.at_ms, :landmark_moved, nil, %{})
+        ledger: RunLog.stage(trial.ledger, trial.at_ms, :landmark_moved, nil, %{})
     }
   end
 
@@ -219,11 +219,11 @@ defmodule Sim.Trial do
     parts = Radio.parts(trial.radio, Enum.map(claims, &elem(&1, 0)))
     standing = for {id, member} <- trial.members, Member.stands?(member), do: id
 
-    ledger = Ledger.note(trial.ledger, trial.at_ms, claims, parts, standing)
-    worst = fn leader -> trial |> run() |> Score.worst(leader) end
-    ledger = Ledger.judge(ledger, trial.at_ms, claims, worst)
-    followers = fn -> Score.followers(%{run(trial) | ledger: ledger}) end
-    %{trial | ledger: Ledger.watch(ledger, trial.at_ms, followers)}
+    ledger = RunLog.note(trial.ledger, trial.at_ms, claims, parts, standing)
+    worst = fn leader -> trial |> run() |> Evaluation.worst(leader) end
+    ledger = RunLog.judge(ledger, trial.at_ms, claims, worst)
+    followers = fn -> Evaluation.followers(%{run(trial) | ledger: ledger}) end
+    %{trial | ledger: RunLog.watch(ledger, trial.at_ms, followers)}
   end
 
   defp act(trial) do
@@ -257,5 +257,5 @@ defmodule Sim.Trial do
   end
 
   defp effect({:stage, name, facts}, id, trial),
-    do: %{trial | ledger: Ledger.stage(trial.ledger, trial.at_ms, name, id, facts)}
+    do: %{trial | ledger: RunLog.stage(trial.ledger, trial.at_ms, name, id, facts)}
 end

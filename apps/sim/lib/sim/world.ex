@@ -12,7 +12,8 @@ defmodule Sim.World do
   edge, `nil` with fewer than two.
   """
   alias Hal.{Pose, Twist}
-  alias Sim.{Blobs, Body, Kernel, Map, Sight}
+  alias Sim.{Compute, Floorplan, World}
+  alias Sim.World.{Body, CameraFrustum}
   alias Sim.World.{Bodies, Motion, Touch}
 
   @landmark_height 1.0
@@ -30,7 +31,7 @@ defmodule Sim.World do
 
   @type id :: atom()
   @type t :: %__MODULE__{
-          map: Map.t(),
+          map: Floorplan.t(),
           seed: integer(),
           noise: Body.noise(),
           at_ms: integer(),
@@ -41,13 +42,13 @@ defmodule Sim.World do
           goal: Pose.point() | nil,
           collisions: non_neg_integer(),
           min_separation: float() | nil,
-          together: MapSet.t(Sim.Contact.pair())
+          together: MapSet.t(Sim.World.Contact.pair())
         }
 
   @doc """
   A world. `:robots` are `%{id:, profile:, pose:}` with the true pose, and `odometry:`, the first
   reading of the wheels (0, 0, 0 unless given), `infrared: true` for one that has such sensors, `wheels:` for
-  one whose odometry is wrong about them (`Sim.Body`). Wrong options
+  one whose odometry is wrong about them (`Sim.World.Body`). Wrong options
   raise `ArgumentError`.
   """
   @spec new!(keyword()) :: t()
@@ -62,7 +63,7 @@ defmodule Sim.World do
         start_ms: 0
       ])
 
-    %Map{} = map = options[:map]
+    %Floorplan{} = map = options[:map]
     noise = options[:noise]
 
     unless noise in [:off, :default, :slip],
@@ -134,7 +135,7 @@ defmodule Sim.World do
   end
 
   defp free!(map, id, pose, radius) do
-    unless Map.free?(map, Pose.point(pose), radius),
+    unless Floorplan.free?(map, Pose.point(pose), radius),
       do: raise(ArgumentError, "#{id} cannot stand at #{pose.x},#{pose.y}: there is a wall")
   end
 
@@ -179,21 +180,21 @@ defmodule Sim.World do
   def blobs(%__MODULE__{} = world, id) do
     body = Elixir.Map.fetch!(world.robots, id)
     noise = if world.noise != :off, do: {world.seed, body.index, world.step}
-    Blobs.see(world.map, Sight.of(body), poles(world, id), noise)
+    World.Blobs.see(world.map, CameraFrustum.of(body), poles(world, id), noise)
   end
 
   @doc "The picture of a robot's camera, where it looks now."
   @spec frame(t(), id()) :: Hal.Frame.t()
   def frame(%__MODULE__{} = world, id) do
     body = Elixir.Map.fetch!(world.robots, id)
-    sight = Sight.of(body)
+    sight = CameraFrustum.of(body)
     noise = if world.noise != :off, do: {world.seed, world.step, body.index}
 
     %Hal.Frame{
       format: :i420,
       width: sight.width,
       height: sight.height,
-      bytes: Kernel.paint(world.map, sight, poles(world, id), noise),
+      bytes: Compute.paint(world.map, sight, poles(world, id), noise),
       at_ms: world.at_ms,
       pan: body.pan,
       tilt: body.tilt
@@ -202,7 +203,7 @@ defmodule Sim.World do
 
   @doc "The colours of the landmark, `YellowLandmark`, and of robots, `RedRobot`."
   @spec colours() :: Vision.Colours.t()
-  defdelegate colours, to: Sim.Palette
+  defdelegate colours, to: Sim.World.Palette
 
   @doc "Where a robot really is."
   @spec truth(t(), id()) :: Pose.t()
@@ -213,7 +214,7 @@ defmodule Sim.World do
   def alive?(%__MODULE__{} = world, id), do: Elixir.Map.fetch!(world.robots, id).alive
 
   @doc "Everything upright that robot `id` can see."
-  @spec poles(t(), id()) :: [Sight.pole()]
+  @spec poles(t(), id()) :: [CameraFrustum.pole()]
   def poles(%__MODULE__{} = world, id) do
     robots =
       for other <- world.order, other != id do
@@ -261,7 +262,7 @@ defmodule Sim.World do
     noise = if world.noise != :off, do: {world.seed, draw, 0}
 
     bodies
-    |> Enum.zip(Kernel.sonar(world.map, discs, rings, noise))
+    |> Enum.zip(Compute.sonar(world.map, discs, rings, noise))
     |> Enum.reduce(world, fn {body, ranges}, world ->
       update(world, body.id, &Elixir.Map.put(&1, sense, ranges))
     end)

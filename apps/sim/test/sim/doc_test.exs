@@ -2,12 +2,12 @@ defmodule Sim.DocTest do
   use ExUnit.Case, async: true
   doctest Sim.Fleet.Mission
   doctest Sim.Fleet.Said
-  doctest Sim.Contact
+  doctest Sim.World.Contact
   doctest Sim.Lateness
-  doctest Sim.Map
-  doctest Sim.Map.Pgm
+  doctest Sim.Floorplan
+  doctest Sim.Floorplan.Pgm
   doctest Sim.Noise
-  doctest Sim.Palette
+  doctest Sim.World.Palette
   doctest Sim.Trial.Cuts
   doctest Sim.Scene
   doctest Sim.Radio

@@ -3,7 +3,7 @@ defmodule Sim.EmulatorTest do
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1]
   alias Hal.{Pose, Profile, Serial}
-  alias Sim.{Emulator, Server, World}
+  alias Sim.{Emulator, World}
   @moduletag :tmp_dir
 
   @on "1b0202002208000186a0000000030c1b03"
@@ -16,22 +16,22 @@ defmodule Sim.EmulatorTest do
   @status "1b0201000100001b03"
 
   setup %{tmp_dir: folder} = context do
-    {:ok, map} = Sim.Map.open("hall", 1)
+    {:ok, map} = Sim.Floorplan.open("hall", 1)
 
     {x, y} = Map.get(context, :place, {-2, 0})
     robot = %{id: :mag1, profile: Profile.magellan(), pose: Pose.new(x, y), infrared: true}
     world = World.new!(map: map, robots: [robot], landmark: {0.0, 0.0}, noise: :off)
     name = make_ref()
-    server = start_supervised!({Server, name: name, world: world})
+    server = start_supervised!({World.Server, name: name, world: world})
     %{server: server, world: name, link: Path.join(folder, "line")}
   end
 
   defp base(context, options \\ [], wire \\ []) do
     start_supervised!(
       {Emulator,
-       core: {Sim.RFlexController, [brake: :released] ++ options},
+       core: {Sim.Emulator.RFlexController, [brake: :released] ++ options},
        link: context.link,
-       body: {Sim.Drive, world: context.world, robot: :mag1},
+       body: {Sim.Device.Drive, world: context.world, robot: :mag1},
        wire: wire}
     )
   end
@@ -51,7 +51,7 @@ defmodule Sim.EmulatorTest do
 
   # The next report for which `match` gives something, out of whole frames.
   defp report(line, match, bytes \\ <<>>) do
-    case Sim.RFlexController.Frame.cut(bytes) do
+    case Sim.Emulator.RFlexController.Frame.cut(bytes) do
       {frames, rest, _bad} ->
         Enum.find_value(frames, fn {port, _id, opcode, data} -> match.({port, opcode, data}) end) ||
           report(line, match, rest <> more(line))
@@ -77,8 +77,8 @@ defmodule Sim.EmulatorTest do
   defp counter({2, 33, <<_::64, 0, position::signed-32, _::binary>>}), do: position
   defp counter(_other), do: nil
 
-  defp truth(server), do: World.truth(Server.world(server), :mag1)
-  defp speed(server), do: Server.world(server).robots.mag1.speed
+  defp truth(server), do: World.truth(World.Server.world(server), :mag1)
+  defp speed(server), do: World.Server.world(server).robots.mag1.speed
 
   test "the base drives by bytes, and its counters are the body's way", context do
     base(context)
@@ -201,9 +201,9 @@ defmodule Sim.EmulatorTest do
     emulator =
       start_supervised!(
         {Emulator,
-         core: {Sim.RFlexController, []},
+         core: {Sim.Emulator.RFlexController, []},
          link: context.link <> "2",
-         body: {Sim.Drive, world: :no_such_world, robot: :mag1}}
+         body: {Sim.Device.Drive, world: :no_such_world, robot: :mag1}}
       )
 
     assert_receive %{reason: :eexist}
@@ -215,9 +215,9 @@ defmodule Sim.EmulatorTest do
   test "the head turns the world's camera", context do
     start_supervised!(
       {Emulator,
-       core: {Sim.ViscaCamera, []},
+       core: {Sim.Emulator.ViscaCamera, []},
        link: context.link,
-       body: {Sim.Ptz, world: context.world, robot: :mag1}}
+       body: {Sim.Device.Ptz, world: context.world, robot: :mag1}}
     )
 
     line = line(context)
@@ -225,7 +225,7 @@ defmodule Sim.EmulatorTest do
     assert more(line) =~ <<0x90, 0x41, 0xFF>>
 
     eventually(fn ->
-      %{pan: pan, tilt: tilt} = Server.world(context.server).robots.mag1
+      %{pan: pan, tilt: tilt} = World.Server.world(context.server).robots.mag1
       abs(pan - 30 * :math.pi() / 180) < 1.0e-6 and abs(tilt + 10 * :math.pi() / 180) < 1.0e-6
     end)
 
@@ -234,9 +234,9 @@ defmodule Sim.EmulatorTest do
 
   test "wrong options are one line, and the link goes with it", context do
     for options <- [
-          [core: {Sim.RFlexController, [ghost: 1]}],
-          [core: {Sim.ViscaCamera, [power: 1]}],
-          [core: {Sim.ViscaCamera, []}, wire: [drop: 7]]
+          [core: {Sim.Emulator.RFlexController, [ghost: 1]}],
+          [core: {Sim.Emulator.ViscaCamera, [power: 1]}],
+          [core: {Sim.Emulator.ViscaCamera, []}, wire: [drop: 7]]
         ] do
       assert {:error, line} = Emulator.start_link([link: context.link] ++ options)
       assert is_binary(line)

@@ -4,7 +4,7 @@ defmodule Sim.FleetTest do
   import Swarm.Case, only: [eventually: 2]
   alias Hal.Pose
   alias Robot.{Board, Names}
-  alias Sim.{Fleet, Server, World}
+  alias Sim.{Fleet, World}
   @moduletag :capture_log
 
   defp fleet(options) do
@@ -18,7 +18,7 @@ defmodule Sim.FleetTest do
     fleet
   end
 
-  defp truth(fleet, id), do: fleet |> Fleet.server() |> Server.world() |> World.truth(id)
+  defp truth(fleet, id), do: fleet |> Fleet.server() |> World.Server.world() |> World.truth(id)
   defp stages(fleet), do: Enum.map(Fleet.scene(fleet).stages, & &1.stage)
   defp stop(fleet), do: Fleet.stop(fleet)
 
@@ -59,7 +59,7 @@ defmodule Sim.FleetTest do
 
     eventually(
       fn ->
-        Enum.all?(Server.world(Fleet.server(fleet)).robots, fn {_, body} ->
+        Enum.all?(World.Server.world(Fleet.server(fleet)).robots, fn {_, body} ->
           body.speed == {0.0, 0.0}
         end)
       end,
@@ -213,8 +213,8 @@ defmodule Sim.FleetTest do
 
   test "whoever sees that the fleet has elected a leader, or is formed, finds it so" do
     fleet = fleet(%{robots: [:mag77], landmark: :none, mission: false})
-    :ok = Robot.Pilot.start(:mag77, Formed, [])
-    :ok = Robot.Pilot.command(:mag77, :start)
+    :ok = Robot.Control.Pilot.start(:mag77, Formed, [])
+    :ok = Robot.Control.Pilot.command(:mag77, :start)
 
     # At once, and from then on.
     eventually(

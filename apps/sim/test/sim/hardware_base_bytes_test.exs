@@ -27,8 +27,13 @@ defmodule Sim.HardwareBaseBytesTest do
     stop(context)
     drive(context, Twist.new(0.0, -0.5), &(&1.pose.heading < -0.5))
     stop(context)
-    {way, _} = Sim.RFlexController.Motors.counts(Emulator.core(context.emulator).motors, 0)
-    {turn, _} = Sim.RFlexController.Motors.counts(Emulator.core(context.emulator).motors, 1)
+
+    {way, _} =
+      Sim.Emulator.RFlexController.Motors.counts(Emulator.core(context.emulator).motors, 0)
+
+    {turn, _} =
+      Sim.Emulator.RFlexController.Motors.counts(Emulator.core(context.emulator).motors, 1)
+
     assert way < 0 and turn > 0
     agree(context)
   end

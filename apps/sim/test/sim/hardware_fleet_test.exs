@@ -4,7 +4,7 @@ defmodule Sim.HardwareFleetTest do
   import Swarm.Case, only: [eventually: 2]
   alias Hal.Pose
   alias Robot.Board
-  alias Sim.{Fleet, Server, Trial, World}
+  alias Sim.{Fleet, Trial, World}
   @moduletag :capture_log
 
   test "a robot with real drivers goes where it is sent, and leaves nothing behind" do
@@ -26,13 +26,15 @@ defmodule Sim.HardwareFleetTest do
 
     for id <- [:mag61, :min61] do
       eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(id)) end, 10_000)
-      start = World.truth(Server.world(Fleet.server(fleet)), id)
+      start = World.truth(World.Server.world(Fleet.server(fleet)), id)
       place = Pose.place(start, {0.7, 0.2})
       assert Swarm.goto(id, place) == :ok
       eventually(fn -> Swarm.status(id).state == :done end, 30_000)
 
       eventually(
-        fn -> Pose.distance(World.truth(Server.world(Fleet.server(fleet)), id), place) < 0.15 end,
+        fn ->
+          Pose.distance(World.truth(World.Server.world(Fleet.server(fleet)), id), place) < 0.15
+        end,
         3_000
       )
 

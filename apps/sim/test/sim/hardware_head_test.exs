@@ -3,24 +3,24 @@ defmodule Sim.HardwareHeadTest do
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 2]
   alias Hal.{Device, Pose, Profile}
-  alias Sim.{Emulator, Server, World}
+  alias Sim.{Emulator, World}
   @moduletag :tmp_dir
 
   setup %{tmp_dir: folder} = context do
-    {:ok, map} = Sim.Map.open("hall", 1)
+    {:ok, map} = Sim.Floorplan.open("hall", 1)
     robot = %{id: :mag1, profile: Profile.magellan(), pose: Pose.new(-2, 0)}
     world = World.new!(map: map, robots: [robot], landmark: {0.0, 0.0}, noise: :off)
     name = make_ref()
-    server = start_supervised!({Server, name: name, world: world})
+    server = start_supervised!({World.Server, name: name, world: world})
     link = Path.join(folder, "camera")
     lens = {0.1, Profile.magellan().camera.field_of_view}
 
     emulator =
       start_supervised!(
         {Emulator,
-         core: {Sim.ViscaCamera, [lens: lens] ++ Map.get(context, :camera, [])},
+         core: {Sim.Emulator.ViscaCamera, [lens: lens] ++ Map.get(context, :camera, [])},
          link: link,
-         body: {Sim.Ptz, world: name, robot: :mag1},
+         body: {Sim.Device.Ptz, world: name, robot: :mag1},
          wire: Map.get(context, :wire, [])}
       )
 
@@ -38,7 +38,7 @@ defmodule Sim.HardwareHeadTest do
   @doc false
   def tell(test, reading), do: send(test, reading)
 
-  defp body(server), do: Server.world(server).robots.mag1
+  defp body(server), do: World.Server.world(server).robots.mag1
 
   defp looks?(server, pan, tilt) do
     %{pan: p, tilt: t} = body(server)

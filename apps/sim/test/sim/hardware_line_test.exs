@@ -3,23 +3,23 @@ defmodule Sim.HardwareLineTest do
   use Swarm.Case, async: false
   import ExUnit.CaptureLog
   alias Hal.Profile
-  alias Sim.{Emulator, Server, World}
+  alias Sim.{Emulator, World}
   @moduletag :tmp_dir
   @moduletag :capture_log
 
   @conversions [distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0]
 
   setup %{tmp_dir: folder} do
-    {:ok, map} = Sim.Map.open("hall", 1)
+    {:ok, map} = Sim.Floorplan.open("hall", 1)
     body = %{id: :body, profile: Profile.magellan(), pose: Pose.new(-4, 0), infrared: true}
     world = World.new!(map: map, robots: [body], noise: :off)
     name = make_ref()
-    server = start_supervised!({Server, name: name, world: world})
+    server = start_supervised!({World.Server, name: name, world: world})
     %{server: server, world: name, link: Path.join(folder, "base")}
   end
 
   defp base(context, silent) do
-    body = {Sim.Drive, world: context.world, robot: :body}
+    body = {Sim.Device.Drive, world: context.world, robot: :body}
     core = {Sim.MuteController, silent: silent}
     start_supervised!({Emulator, core: core, link: context.link, body: body})
   end
@@ -36,8 +36,8 @@ defmodule Sim.HardwareLineTest do
   end
 
   defp limits(id), do: Swarm.status(id).limits
-  defp place(context), do: Server.world(context.server).robots.body.pose
-  defp still?(context), do: Server.world(context.server).robots.body.speed == {0.0, 0.0}
+  defp place(context), do: World.Server.world(context.server).robots.body.pose
+  defp still?(context), do: World.Server.world(context.server).robots.body.speed == {0.0, 0.0}
 
   # Looks for so long whether it ever is so.
   defp never(ms, condition) do

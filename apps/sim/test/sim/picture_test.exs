@@ -1,7 +1,7 @@
 defmodule Sim.PictureTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile}
-  alias Sim.{Map, World}
+  alias Sim.{Floorplan, World}
 
   @focal 160 / :math.tan(:math.pi() / 6)
 
@@ -20,7 +20,7 @@ defmodule Sim.PictureTest do
   end
 
   defp alone(landmark, options \\ []) do
-    {:ok, map} = Map.open("hall", 12)
+    {:ok, map} = Floorplan.open("hall", 12)
 
     World.new!(
       [map: map, robots: robots([Pose.new(0, 0)]), landmark: landmark, seed: 5] ++ options
@@ -91,12 +91,12 @@ defmodule Sim.PictureTest do
   end
 
   test "blobs by geometry are those of the blob finder" do
-    {:ok, map} = Map.open("hospital", 6)
+    {:ok, map} = Floorplan.open("hospital", 6)
     ids = for k <- 1..6, do: {:"mag#{k}", 0.2}
 
     pairs =
       for seed <- 1..25,
-          {:ok, poses} = Map.starts(map, ids, seed, {0.0, 0.0}),
+          {:ok, poses} = Floorplan.starts(map, ids, seed, {0.0, 0.0}),
           world = World.new!(map: map, seed: seed, landmark: {0.0, 0.0}, robots: robots(poses)),
           {id, _} <- ids do
         direct = World.blobs(world, id)
@@ -123,7 +123,7 @@ defmodule Sim.PictureTest do
   end
 
   test "walls hide what is behind them" do
-    {:ok, map} = Map.open("hospital", 6)
+    {:ok, map} = Floorplan.open("hospital", 6)
 
     world =
       World.new!(

@@ -6,18 +6,18 @@ defmodule Sim.ProcessesTest do
   use Robot.Case, async: false
   alias Hal.Profile
   alias Sim.{Radio, World}
-  alias Swarm.{Directory, Link, Member}
+  alias Swarm.{Comms, Directory, Member}
 
   @ids [:mag1, :mag2, :min1]
   @me :mag1
-  @mission {Swarm.Missions.Landmark, formation: {:column, 1.0}, assign: :cost}
+  @mission {Missions.Landmark, formation: {:column, 1.0}, assign: :cost}
 
   setup %{seed: seed} do
-    {:ok, map} = Sim.Map.open("hall", 3)
+    {:ok, map} = Sim.Floorplan.open("hall", 3)
     profiles = %{mag1: Profile.magellan(), mag2: Profile.magellan(), min1: Profile.atrv_mini()}
     landmark = {0.0, 0.0}
     bodies = for id <- @ids, do: {id, profiles[id].radius}
-    {:ok, starts} = Sim.Map.starts(map, bodies, seed, landmark)
+    {:ok, starts} = Sim.Floorplan.starts(map, bodies, seed, landmark)
 
     robots =
       for {id, pose} <- Enum.zip(@ids, starts), do: %{id: id, profile: profiles[id], pose: pose}
@@ -66,7 +66,7 @@ defmodule Sim.ProcessesTest do
     listen(id, [:robot, :stage])
 
     transport = {__MODULE__, :carry, [self()]}
-    config = Link.join(config, transport: transport, boot: 1)
+    config = Comms.join(config, transport: transport, boot: 1)
     start_supervised!({Robot.Supervisor, config})
     :ok = Pilot.start(id)
   end
@@ -188,7 +188,7 @@ defmodule Sim.ProcessesTest do
       {:reading, {:ptz, _} = reading, _} -> send(pids.ptz, {:readings, [reading]})
       {:reading, reading, _} -> send(pids.drive, {:readings, [reading]})
       {:blobs, _, _} -> Board.sense(Board.find!(@me), :eye, input)
-      {:message, message, _} -> Link.hear(@me, message)
+      {:message, message, _} -> Comms.hear(@me, message)
       {:command, command, _} -> :ok = Swarm.ask(@me, command)
       {:tick, _} -> send(pids.executive, :tick)
       {:reflex, _} -> send(pids.gate, :step)

@@ -1,10 +1,11 @@
 defmodule Sim.WorldTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile, Twist}
-  alias Sim.{Contact, Map, World}
+  alias Sim.{Floorplan, World}
+  alias Sim.World.Contact
 
   defp hall(fleet \\ 6) do
-    {:ok, map} = Map.open("hall", fleet)
+    {:ok, map} = Floorplan.open("hall", fleet)
     map
   end
 
@@ -23,7 +24,7 @@ defmodule Sim.WorldTest do
 
     discs =
       for body <- bodies do
-        assert Map.free?(world.map, Pose.point(body.pose), body.profile.radius)
+        assert Floorplan.free?(world.map, Pose.point(body.pose), body.profile.radius)
         {body.pose.x, body.pose.y, body.profile.radius}
       end
 
@@ -187,7 +188,7 @@ defmodule Sim.WorldTest do
     for seed <- 1..3 do
       landmark = {0.0, 0.0}
       robots = for k <- 1..6, do: {:"mag#{k}", 0.2}
-      {:ok, poses} = Map.starts(hall(2), robots, seed, landmark)
+      {:ok, poses} = Floorplan.starts(hall(2), robots, seed, landmark)
 
       world =
         World.new!(
@@ -208,7 +209,7 @@ defmodule Sim.WorldTest do
   end
 
   test "nobody is ever inside the walls of a hospital, nor jumps through them" do
-    {:ok, map} = Map.open("hospital", 1)
+    {:ok, map} = Floorplan.open("hospital", 1)
     # In the corridors and doors, where walls are near.
     poses = for k <- 0..5, do: Pose.new(9.5, k * 2.0 - 5.0, k)
 
@@ -227,7 +228,7 @@ defmodule Sim.WorldTest do
   end
 
   test "a thin wall is not jumped, however fast" do
-    {:ok, map} = Map.open("hospital", 1)
+    {:ok, map} = Floorplan.open("hospital", 1)
 
     fast = %{
       Profile.magellan()

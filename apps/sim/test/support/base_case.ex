@@ -8,7 +8,7 @@ defmodule Sim.BaseCase do
   use ExUnit.CaseTemplate
   import Swarm.Case, only: [eventually: 2]
   alias Hal.{Device, Pose, Profile, Twist}
-  alias Sim.{Emulator, Server, World}
+  alias Sim.{Emulator, World}
 
   @conversions %{
     magellan: [distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0],
@@ -27,21 +27,21 @@ defmodule Sim.BaseCase do
   end
 
   setup %{tmp_dir: folder} = context do
-    {:ok, map} = Sim.Map.open("hall", 1)
+    {:ok, map} = Sim.Floorplan.open("hall", 1)
     profile = Map.get(context, :profile, Profile.magellan())
     {x, y, heading} = Map.get(context, :place, {-4, 0, 0})
     robot = %{id: :mag1, profile: profile, pose: Pose.new(x, y, heading), infrared: true}
     world = World.new!(map: map, robots: [robot], noise: :off)
     name = make_ref()
-    server = start_supervised!({Server, name: name, world: world})
+    server = start_supervised!({World.Server, name: name, world: world})
     link = Path.join(folder, "base")
 
     emulator =
       start_supervised!(
         {Emulator,
-         core: {Sim.RFlexController, [kind: profile.name] ++ Map.get(context, :base, [])},
+         core: {Sim.Emulator.RFlexController, [kind: profile.name] ++ Map.get(context, :base, [])},
          link: link,
-         body: {Sim.Drive, world: name, robot: :mag1},
+         body: {Sim.Device.Drive, world: name, robot: :mag1},
          wire: Map.get(context, :wire, [])}
       )
 
@@ -66,7 +66,7 @@ defmodule Sim.BaseCase do
   def tell(test, reading), do: send(test, reading)
 
   @doc "The robot's body, in the world as it is now."
-  def body(server), do: Server.world(server).robots.mag1
+  def body(server), do: World.Server.world(server).robots.mag1
   @doc "Whether the body stands."
   def still?(server), do: body(server).speed == {0.0, 0.0}
 

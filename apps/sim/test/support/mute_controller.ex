@@ -4,8 +4,8 @@ defmodule Sim.MuteController do
   are not sent (`:all`: none). Ports are those of the fact sheet: 2 wheels, 4 sonars.
   """
   @behaviour Sim.Emulator.Core
-  alias Sim.RFlexController
-  alias Sim.RFlexController.Frame
+  alias Sim.Emulator.RFlexController
+  alias Sim.Emulator.RFlexController.Frame
 
   @enforce_keys [:base, :silent]
   defstruct @enforce_keys ++ [pressed: []]

@@ -2,8 +2,10 @@ defmodule Swarm.Application do
   @moduledoc false
   use Application
   require Logger
-  alias Swarm.{Boot, Machine, Start}
-  alias Swarm.Mesh.{Log, Options, Refusals}
+  alias Swarm.MemberSpec
+  alias Swarm.Host.{ReleaseBoot, Systemd}
+  alias Swarm.Mesh.{Log, Options}
+  alias Swarm.Mesh.Distribution.ConnectionLog
 
   # With `config :swarm, boot: true`, as in a release, the node is the robot that its environment says.
   @impl Application
@@ -23,7 +25,7 @@ defmodule Swarm.Application do
   defp robot(false, _environment), do: {:ok, :none}
 
   defp robot(true, environment) do
-    with {:error, lines} <- Boot.robot(environment) do
+    with {:error, lines} <- ReleaseBoot.robot(environment) do
       Enum.each(lines, &Logger.error/1)
       {:error, hd(lines)}
     end
@@ -32,11 +34,11 @@ defmodule Swarm.Application do
   defp mesh(false, _robot), do: {:ok, []}
 
   defp mesh(options, robot) do
-    network = with {file, _config} <- robot, do: Start.mesh(file), else: (_none -> [])
+    network = with {file, _config} <- robot, do: MemberSpec.mesh(file), else: (_none -> [])
 
     with {:ok, mesh} <- Options.prepare(Keyword.merge(options, network)) do
       :ok = Log.attach()
-      :ok = Refusals.install()
+      :ok = ConnectionLog.install()
       {:ok, [mesh: mesh]}
     end
   end
@@ -46,7 +48,7 @@ defmodule Swarm.Application do
   defp machine(robot, environment) do
     id = with {file, _config} <- robot, do: file.id
 
-    case Machine.from_env(environment, id, System.pid()) do
+    case Systemd.from_env(environment, id, System.pid()) do
       nil -> []
       options -> [machine: options]
     end

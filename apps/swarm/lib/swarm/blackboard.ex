@@ -1,6 +1,6 @@
 defmodule Swarm.Blackboard do
   @moduledoc """
-  What the robots of the fleet tell of themselves, on every node: `Swarm.Rows` in one process a node,
+  What the robots of the fleet tell of themselves, on every node: `Swarm.Blackboard.State` in one process a node,
   readable by all without asking it.
 
       Swarm.Blackboard.put(:mag1, :door, %{open: true})        # on the node of mag1
@@ -23,12 +23,12 @@ defmodule Swarm.Blackboard do
       [:rows, node, term]` for one (`{Swarm.Mesh, :cast, []}`)
     * `:nodes` - `{m, f, a}` that gives the nodes that are alive (of the mesh's view)
     * `:repair_ms` - between two digests (1,000; `:never` for tests that call `repair/1`)
-    * `:limits` - as of `Swarm.Rows.new/1`
+    * `:limits` - as of `Swarm.Blackboard.State.new/1`
     * `:seed` - of the choice of nodes (a new one each time)
   """
-  alias Swarm.Blackboard.Keeper
-  alias Swarm.{Post, Table}
-  alias Swarm.Rows.{Carrier, Wire}
+  alias Swarm.Blackboard
+  alias Swarm.Nonblocking
+  alias Swarm.Directory.SafeTable
 
   @type age :: non_neg_integer()
 
@@ -39,8 +39,8 @@ defmodule Swarm.Blackboard do
   @doc "Starts a node's board."
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options \\ []) do
-    options = Keyword.validate!(options, Carrier.options(__MODULE__) ++ [limits: []])
-    GenServer.start_link(Keeper, options, name: options[:name])
+    options = Keyword.validate!(options, Blackboard.Gossip.options(__MODULE__) ++ [limits: []])
+    GenServer.start_link(Blackboard.Server, options, name: options[:name])
   end
 
   @doc """
@@ -59,29 +59,30 @@ defmodule Swarm.Blackboard do
   Writes a row of a robot of this node, and tells all nodes. The key is an atom or a pair such as
   `{:task, 3}`, the value any term of up to #{59_000} bytes. Errors are one line.
   """
-  @spec put(atom(), atom(), Wire.key(), term()) :: :ok | {:error, line :: String.t()}
+  @spec put(atom(), atom(), Blackboard.Codec.key(), term()) :: :ok | {:error, line :: String.t()}
   def put(board \\ __MODULE__, robot, key, value) do
-    if Wire.key?(key),
-      do: call(board, {:put, robot, key, Wire.encode(key, value)}),
+    if Blackboard.Codec.key?(key),
+      do: call(board, {:put, robot, key, Blackboard.Codec.encode(key, value)}),
       else:
         {:error, "#{inspect(key)} is no key of a row; write a name such as :door or {:task, 3}"}
   end
 
   @doc false
   # What a robot's link tells ten times a second at most: enters, writes, and waits for nothing.
-  @spec note(atom(), atom(), non_neg_integer(), [{Wire.key(), term()}]) :: :ok
+  @spec note(atom(), atom(), non_neg_integer(), [{Blackboard.Codec.key(), term()}]) :: :ok
   def note(board \\ __MODULE__, robot, boot, pairs) do
-    pairs = for {key, value} <- pairs, do: {key, Wire.encode(key, value)}
+    pairs = for {key, value} <- pairs, do: {key, Blackboard.Codec.encode(key, value)}
     GenServer.cast(board, {:note, self(), robot, boot, pairs})
   end
 
   @doc "What a robot wrote last under this key, with its age in ms, unless that is over `max_age_ms`."
-  @spec get(atom(), atom(), Wire.key(), age() | :infinity) :: {:ok, term(), age()} | :error
+  @spec get(atom(), atom(), Blackboard.Codec.key(), age() | :infinity) ::
+          {:ok, term(), age()} | :error
   def get(board \\ __MODULE__, robot, key, max_age_ms) do
-    with [{_, payload, at_ms}] <- Table.lookup(board, {robot, Wire.id(key)}),
+    with [{_, payload, at_ms}] <- SafeTable.lookup(board, {robot, Blackboard.Codec.id(key)}),
          age when age <= max_age_ms <- age(at_ms),
          # Two keys may have one number.
-         {:ok, ^key, value} <- Wire.decode(payload) do
+         {:ok, ^key, value} <- Blackboard.Codec.decode(payload) do
       {:ok, value, age}
     else
       _none -> :error
@@ -89,10 +90,10 @@ defmodule Swarm.Blackboard do
   end
 
   @doc "All rows of a robot, by key, with their ages in ms."
-  @spec rows(atom(), atom()) :: %{Wire.key() => {term(), age()}}
+  @spec rows(atom(), atom()) :: %{Blackboard.Codec.key() => {term(), age()}}
   def rows(board \\ __MODULE__, robot) do
-    for {_, payload, at_ms} <- Table.select(board, [{{{robot, :_}, :_, :_}, [], [:"$_"]}]),
-        {:ok, key, value} <- [Wire.decode(payload)],
+    for {_, payload, at_ms} <- SafeTable.select(board, [{{{robot, :_}, :_, :_}, [], [:"$_"]}]),
+        {:ok, key, value} <- [Blackboard.Codec.decode(payload)],
         into: %{},
         do: {key, {value, age(at_ms)}}
   end
@@ -101,7 +102,10 @@ defmodule Swarm.Blackboard do
   @spec robots(atom()) :: [atom()]
   def robots(board \\ __MODULE__),
     do:
-      board |> Table.select([{{{:"$1", :_}, :_, :_}, [], [:"$1"]}]) |> Enum.uniq() |> Enum.sort()
+      board
+      |> SafeTable.select([{{{:"$1", :_}, :_, :_}, [], [:"$1"]}])
+      |> Enum.uniq()
+      |> Enum.sort()
 
   @doc "Something arrived from another node."
   @spec hear(GenServer.server(), node(), term()) :: :ok
@@ -115,7 +119,7 @@ defmodule Swarm.Blackboard do
   @spec info(GenServer.server()) :: map() | {:error, line :: String.t()}
   def info(board \\ __MODULE__), do: call(board, :info)
 
-  defp call(board, request), do: Post.call(board, request, "the blackboard of this node")
+  defp call(board, request), do: Nonblocking.call(board, request, "the blackboard of this node")
 
   defp age(at_ms), do: max(now() - at_ms, 0)
   defp now, do: System.monotonic_time(:millisecond)

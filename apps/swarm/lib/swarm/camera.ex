@@ -18,7 +18,7 @@ defmodule Swarm.Camera do
   on the robot's own node (`bin/robot remote`) has them. Nothing raises, whatever it is given.
   """
   alias Robot.Names
-  alias Swarm.{Directory, Door}
+  alias Swarm.{Commands, Directory}
   alias Vision.View
 
   @doc "One picture of now as JPEG, or a line that says why there is none. Waits 5 s at most."
@@ -84,7 +84,7 @@ defmodule Swarm.Camera do
   defp one(robots) when is_list(robots) or robots == :all,
     do: {:error, "one robot is looked through, not #{inspect(robots, limit: 5)}"}
 
-  defp one(robot), do: Door.robots(robot)
+  defp one(robot), do: Commands.robots(robot)
 
   defp elsewhere(id, link) do
     where = if is_pid(link), do: "on #{node(link)}", else: "on another node"

@@ -9,8 +9,8 @@ defmodule Swarm.Directory do
   | `{:brake, :mag1}` | its brake |
   | `:robots`, `:brakes` | the links of all robots, their brakes |
   | `{:team, :blue}` | whoever entered |
-  | `{:service, :camera}`, `{:service, :camera, :mag1}` | who offers it (`Swarm.Responder`); that of one robot |
-  | `{:topic, :poses}` | who wants to be told (`Swarm.Topic`) |
+  | `{:service, :camera}`, `{:service, :camera, :mag1}` | who offers it (`Agents.Responder`); that of one robot |
+  | `{:topic, :poses}` | who wants to be told (`Agents.Topic`) |
 
   A directory that restarts is empty, and one that is down cannot be entered: who entered watches
   it (`monitor/0`), and enters again.

@@ -2,7 +2,7 @@ defmodule Swarm.Member do
   @moduledoc """
   One robot of a fleet as one pure function: the peers it hears, its mission, its mind and its
   gate, composed. `Sim.Trial` folds it in lockstep; live, the processes of `Robot.Supervisor` and
-  `Swarm.Link` run the same parts in the same order, so both do the same on the same input.
+  `Swarm.Comms` run the same parts in the same order, so both do the same on the same input.
 
   | input | from |
   |---|---|
@@ -16,10 +16,13 @@ defmodule Swarm.Member do
   Effects: `{:drive, twist}`, `{:look, pan, tilt}`, `{:send, to, message}`, `{:stage, name, map}`.
   """
   alias Hal.{Pose, Profile, Twist}
-  alias Robot.{Mind, Percept, Reflex}
+  alias Robot.Percept
+  alias Robot.Control.Controller
+  alias Robot.Safety.Reflex
   alias Robot.Localiser.Anchors
-  alias Swarm.{Heartbeat, Message, Peers, Stop}
-  alias Swarm.Link.Ear
+  alias Swarm.{EStop, Message}
+  alias Swarm.Membership.{Heartbeat, Peers}
+  alias Swarm.Comms.Receiver
 
   @beat_ms 200
 
@@ -48,9 +51,9 @@ defmodule Swarm.Member do
           options: keyword(),
           mission: term() | nil,
           halted: term() | nil,
-          mind: Mind.t(),
+          mind: Controller.t(),
           reflex: Reflex.t(),
-          ear: Ear.t(),
+          ear: Receiver.t(),
           phase: term(),
           entries: %{atom() => {term(), integer()}},
           claim: map(),
@@ -91,9 +94,9 @@ defmodule Swarm.Member do
       options: mission_options,
       mission: mission,
       phase: phase,
-      mind: Mind.new(profile: options[:profile], start: options[:start]),
+      mind: Controller.new(profile: options[:profile], start: options[:start]),
       reflex: Reflex.new(options[:profile]),
-      ear: Ear.new(options[:id])
+      ear: Receiver.new(options[:id])
     }
   end
 
@@ -108,7 +111,7 @@ defmodule Swarm.Member do
     do: {put(member, :blobs, %{blobs: blobs, pan: pan}, at_ms), []}
 
   def step(member, {:message, term, at_ms}) do
-    {heard, ear} = Ear.hear(member.ear, term, at_ms)
+    {heard, ear} = Receiver.hear(member.ear, term, at_ms)
 
     case heard do
       {:message, message} -> handle(%{member | ear: ear}, {:message, message})
@@ -117,11 +120,11 @@ defmodule Swarm.Member do
   end
 
   def step(%{ear: ear} = member, {:command, :estop, _at_ms}),
-    do: latch(member, %{ear | stop: Stop.press(ear.stop)})
+    do: latch(member, %{ear | stop: EStop.State.press(ear.stop)})
 
   def step(%{ear: ear} = member, {:command, :reset, _at_ms}) do
     reflex = Reflex.reset(member.reflex)
-    {%{member | reflex: reflex, ear: %{ear | stop: Stop.reset(ear.stop)}}, []}
+    {%{member | reflex: reflex, ear: %{ear | stop: EStop.State.reset(ear.stop)}}, []}
   end
 
   # What is asked for while all stand would otherwise begin with the reset.
@@ -129,7 +132,7 @@ defmodule Swarm.Member do
       when command != :stop,
       do: {member, []}
 
-  # Nothing that the mission could interpret, as in `Robot.Pilot`.
+  # Nothing that the mission could interpret, as in `Robot.Control.Pilot`.
   def step(member, {:command, :stop, _at_ms}), do: {halt(member), []}
 
   def step(%{mission: nil} = member, {:command, :start, _at_ms}) do
@@ -141,11 +144,11 @@ defmodule Swarm.Member do
   def step(member, {:command, command, _at_ms}), do: handle(member, {:command, command})
 
   def step(member, {:tick, at_ms}) do
-    {wish, outcome, mind} = Mind.tick(member.mind, percept(member, at_ms))
+    {wish, outcome, mind} = Controller.tick(member.mind, percept(member, at_ms))
     reflex = Reflex.wish(member.reflex, wish.twist, at_ms)
     member = %{member | mind: mind, reflex: reflex}
     {member, done} = if outcome, do: handle(member, outcome(outcome)), else: {member, []}
-    {member, effects} = handle(member, {:tick, Mind.percept(mind)})
+    {member, effects} = handle(member, {:tick, Controller.percept(mind)})
     {member, beats} = beat(member, at_ms)
     look = for pan <- List.wrap(wish.look || member.look), do: {:look, pan, 0.0}
     {member, look ++ done ++ effects ++ beats}
@@ -160,19 +163,19 @@ defmodule Swarm.Member do
   @doc "The pose that the robot believes to have, or `nil`."
   @spec pose(t()) :: Pose.t() | nil
   def pose(member) do
-    percept = Mind.percept(member.mind)
+    percept = Controller.percept(member.mind)
     percept && percept.pose
   end
 
   @doc "Within how many metres of that pose the robot is in 95 of 100 cases (`Robot.Percept`), or `nil`."
   @spec uncertainty(t()) :: float() | nil
   def uncertainty(member) do
-    with %Percept{uncertainty: %{radius: radius}} <- Mind.percept(member.mind),
+    with %Percept{uncertainty: %{radius: radius}} <- Controller.percept(member.mind),
          do: radius,
          else: (_no_pose -> nil)
   end
 
-  @doc "What the robot's mission says of it: its phase and the fields of `Swarm.Heartbeat`."
+  @doc "What the robot's mission says of it: its phase and the fields of `Swarm.Membership.Heartbeat`."
   @spec claim(t()) :: map()
   def claim(member), do: member.claim
 
@@ -211,7 +214,7 @@ defmodule Swarm.Member do
   defp halt(member) do
     %{
       member
-      | mind: member.mind |> Mind.goal(:idle, nil) |> Mind.anchors(%Anchors{}),
+      | mind: member.mind |> Controller.goal(:idle, nil) |> Controller.anchors(%Anchors{}),
         reflex: Reflex.forget(member.reflex),
         halted: halted(member),
         mission: nil,
@@ -243,10 +246,10 @@ defmodule Swarm.Member do
   end
 
   defp carry_out({:goal, tag, goal}, {member, out}),
-    do: {%{member | mind: Mind.goal(member.mind, tag, goal)}, out}
+    do: {%{member | mind: Controller.goal(member.mind, tag, goal)}, out}
 
   defp carry_out({:anchors, anchors}, {member, out}),
-    do: {%{member | mind: Mind.anchors(member.mind, anchors)}, out}
+    do: {%{member | mind: Controller.anchors(member.mind, anchors)}, out}
 
   defp carry_out({:look, pan}, {member, out}), do: {%{member | look: pan}, out}
   defp carry_out({:claim, claim}, {member, out}), do: {%{member | claim: claim}, out}
@@ -256,7 +259,7 @@ defmodule Swarm.Member do
     do: {member, []}
 
   defp beat(member, at_ms) do
-    case Mind.percept(member.mind) do
+    case Controller.percept(member.mind) do
       %Percept{pose: %Pose{}} = percept ->
         heard = Peers.heard(member.ear.peers, at_ms)
         sender = {member.boot, member.sequence + 1}

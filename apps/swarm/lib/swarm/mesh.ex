@@ -9,8 +9,9 @@ defmodule Swarm.Mesh do
   Without a mesh (`config :swarm, mesh: false`) a node's robots have only each other, and whom
   somebody has connected by hand. `docs/networking.md` tells how to set it up.
   """
-  alias Swarm.Mesh.{Book, Packet, Relay, Roster, Ways}
-  alias Swarm.{Post, Table}
+  alias Swarm.Mesh.{CommandRelay, NodeTable, Packet, Roster, Routing}
+  alias Swarm.Nonblocking
+  alias Swarm.Directory.SafeTable
 
   @typedoc """
   How a node sees the others: `number` grows with each change of who is there; for each node its
@@ -21,7 +22,7 @@ defmodule Swarm.Mesh do
           number: non_neg_integer(),
           nodes: %{
             node() => %{
-              status: Book.status(),
+              status: NodeTable.status(),
               connected: boolean(),
               hears: [node()],
               robots: [atom()],
@@ -70,7 +71,7 @@ defmodule Swarm.Mesh do
   def robots do
     heard = {{:robot, :"$1"}, :"$2", :_, :_, :"$3"}
     lately = {:>, :"$3", now() - @gone_ms}
-    Map.new(Table.select(__MODULE__, [{heard, [lately], [{{:"$1", :"$2"}}]}]))
+    Map.new(SafeTable.select(__MODULE__, [{heard, [lately], [{{:"$1", :"$2"}}]}]))
   end
 
   @doc "The robots of nodes that are not heard here, but by others that are: commands reach them by those."
@@ -78,14 +79,14 @@ defmodule Swarm.Mesh do
   def beyond do
     case book() do
       nil -> []
-      {book, _roster} -> Ways.beyond(book, now())
+      {book, _roster} -> Routing.beyond(book, now())
     end
   end
 
   @doc "The newest heartbeat heard of a robot of another node: `{boot, sequence, age_ms}`."
   @spec beat(atom()) :: {integer(), non_neg_integer(), age_ms :: non_neg_integer()} | nil
   def beat(robot) do
-    case Table.lookup(__MODULE__, {:robot, robot}) do
+    case SafeTable.lookup(__MODULE__, {:robot, robot}) do
       [{_key, _node, boot, sequence, at_ms}] -> {boot, sequence, now() - at_ms}
       [] -> nil
     end
@@ -103,7 +104,7 @@ defmodule Swarm.Mesh do
   @doc "What was dropped, by reason, since the start."
   @spec rejected() :: %{atom() => pos_integer()}
   def rejected do
-    case Table.lookup(__MODULE__, :book) do
+    case SafeTable.lookup(__MODULE__, :book) do
       [{:book, _book, _roster, rejected}] -> rejected
       [] -> %{}
     end
@@ -119,8 +120,8 @@ defmodule Swarm.Mesh do
           }
           | {:error, line :: String.t()}
   def counts do
-    case Table.lookup(__MODULE__, :radio) do
-      [{:radio, pid}] -> Post.call(pid, :counts, "the radio of this node")
+    case SafeTable.lookup(__MODULE__, :radio) do
+      [{:radio, pid}] -> Nonblocking.call(pid, :counts, "the radio of this node")
       [] -> {:error, "this node has no mesh"}
     end
   end
@@ -131,7 +132,7 @@ defmodule Swarm.Mesh do
     with {book, _roster} <- book(),
          name = Atom.to_string(node),
          true <- is_map_key(book.nodes, name) do
-      Book.status(book, name, now()) != :alive
+      NodeTable.status(book, name, now()) != :alive
     else
       _unknown -> false
     end
@@ -139,21 +140,21 @@ defmodule Swarm.Mesh do
 
   @doc """
   Sends a link's request to a robot that this node has no connection to, or a silent one, over others that
-  have (`Swarm.Mesh.Relay`). `ref` is the alias in it that is to be answered.
+  have (`Swarm.Mesh.CommandRelay`). `ref` is the alias in it that is to be answered.
   """
   @spec relay(atom(), tuple(), reference()) :: :ok | {:error, :unknown | :no_way}
   def relay(robot, request, ref) do
     with {book, roster} <- book(),
-         name when name != nil <- Ways.holder(book, robot) do
+         name when name != nil <- Routing.holder(book, robot) do
       links = for node <- Node.list(), do: Atom.to_string(node)
 
       ways =
-        for {from, to} <- Ways.ways(book, links, now()),
+        for {from, to} <- Routing.ways(book, links, now()),
             {:ok, node} <- [Roster.node(roster, from)],
             into: %{},
             do: {node, nodes(to, roster)}
 
-      Relay.send(Map.fetch!(roster.nodes, name), ways, robot, request, ref)
+      CommandRelay.send(Map.fetch!(roster.nodes, name), ways, robot, request, ref)
     else
       nil -> {:error, :unknown}
     end
@@ -161,14 +162,14 @@ defmodule Swarm.Mesh do
 
   # The table goes with the radio that made it; in between there is none.
   defp radio(request) do
-    case Table.lookup(__MODULE__, :radio) do
+    case SafeTable.lookup(__MODULE__, :radio) do
       [{:radio, pid}] -> GenServer.cast(pid, request)
       [] -> :ok
     end
   end
 
   defp book do
-    case Table.lookup(__MODULE__, :book) do
+    case SafeTable.lookup(__MODULE__, :book) do
       [{:book, book, roster, _rejected}] -> {book, roster}
       [] -> nil
     end
@@ -182,7 +183,7 @@ defmodule Swarm.Mesh do
 
         {node,
          %{
-           status: Book.status(book, name, now_ms),
+           status: NodeTable.status(book, name, now_ms),
            connected: node in connected,
            hears: nodes(entry.hears, roster),
            robots: Enum.sort(robots),

@@ -9,14 +9,17 @@ defmodule Swarm.Message do
 
   | kind | body |
   |---|---|
-  | `:heartbeat` | `Swarm.Heartbeat` |
-  | `:round` | one `Swarm.Round` letter |
-  | `:place` | `Swarm.Anchor`: a parent tells its child where the leader is supposed to be |
-  | `:relay` | a whole heartbeat or letter of another robot, for one that does not hear it (`Swarm.Relay`) |
+  | `:heartbeat` | `Swarm.Membership.Heartbeat` |
+  | `:round` | one `Swarm.Agreement.Round` letter |
+  | `:place` | `Swarm.Formation.Reference`: a parent tells its child where the leader is supposed to be |
+  | `:relay` | a whole heartbeat or letter of another robot, for one that does not hear it (`Swarm.Comms.Forwarder`) |
 
   `hops` counts the robots that have passed a message on, three at most.
   """
-  alias Swarm.{Anchor, Heartbeat, Round, Shape}
+  alias Swarm.Agreement.Round
+  alias Swarm.Formation.Reference
+  alias Swarm.Membership.Heartbeat
+  alias Swarm.Message.WireTypes
 
   @most_hops 3
 
@@ -27,24 +30,24 @@ defmodule Swarm.Message do
   @type t :: %__MODULE__{
           from: atom(),
           kind: kind(),
-          body: Heartbeat.t() | Round.Letter.t() | Anchor.t() | t(),
+          body: Heartbeat.t() | Round.Letter.t() | Reference.t() | t(),
           hops: 0..3
         }
 
   @doc """
   A message.
 
-      iex> beat = %Swarm.Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
+      iex> beat = %Swarm.Membership.Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
       iex> Swarm.Message.new(:mag1, :heartbeat, beat).kind
       :heartbeat
   """
-  @spec new(atom(), kind(), Heartbeat.t() | Round.Letter.t() | Anchor.t() | t()) :: t()
+  @spec new(atom(), kind(), Heartbeat.t() | Round.Letter.t() | Reference.t() | t()) :: t()
   def new(from, kind, body), do: %__MODULE__{from: from, kind: kind, body: body}
 
   @doc """
   Another robot's message as this robot passes it on; `:error` when it has come far enough.
 
-      iex> letter = %Swarm.Round.Letter{id: {1, 1, :mag1}, view: [:mag1], remaining_ms: 9, purpose: :search}
+      iex> letter = %Swarm.Agreement.Round.Letter{id: {1, 1, :mag1}, view: [:mag1], remaining_ms: 9, purpose: :search}
       iex> {:ok, relay} = Swarm.Message.pass_on(Swarm.Message.new(:mag1, :round, letter), :mag2)
       iex> {relay.from, relay.kind, relay.body.from, relay.body.hops}
       {:mag2, :relay, :mag1, 1}
@@ -67,10 +70,17 @@ defmodule Swarm.Message do
   def check(%__MODULE__{from: from, kind: kind, body: body} = message)
       when kind in [:heartbeat, :round, :place, :relay] do
     cond do
-      not (Shape.whole?(message, __MODULE__) and Shape.name?(from)) -> {:error, :not_a_message}
-      message.hops not in 0..@most_hops -> {:error, :not_a_message}
-      valid?(kind, body) -> {:ok, message}
-      true -> {:error, kind}
+      not (WireTypes.whole?(message, __MODULE__) and WireTypes.name?(from)) ->
+        {:error, :not_a_message}
+
+      message.hops not in 0..@most_hops ->
+        {:error, :not_a_message}
+
+      valid?(kind, body) ->
+        {:ok, message}
+
+      true ->
+        {:error, kind}
     end
   end
 
@@ -78,7 +88,7 @@ defmodule Swarm.Message do
 
   defp valid?(:heartbeat, body), do: Heartbeat.valid?(body)
   defp valid?(:round, body), do: Round.Letter.valid?(body)
-  defp valid?(:place, body), do: Anchor.valid?(body)
+  defp valid?(:place, body), do: Reference.valid?(body)
 
   # Nothing else is passed on, and nothing twice wrapped.
   defp valid?(:relay, %__MODULE__{kind: kind} = inner) when kind in [:heartbeat, :round],

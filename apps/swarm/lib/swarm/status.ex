@@ -10,19 +10,19 @@ defmodule Swarm.Status do
   (±0.62 m)` (`unsure`).
 
   Of wheels that may not turn it says `DISARMED`, with what is missing, or `LINE LOST` until a person
-  acknowledges (`Hal.Arming`; `arming` and `why`). Of a device that is not there it says why: `drive offline
+  acknowledges (`Hal.Device.Arming`; `arming` and `why`). Of a device that is not there it says why: `drive offline
   (/dev/ttyR0: no such device)` (`offline`: words by device). A robot that is slow for want of sonar is
   `BLIND`. One that stands though nobody told it to says `FAULT`, and why (`fault`).
 
   Of a robot whose gate, behaviour or mission hangs it says so, and for a minute after it was started again for that
-  (`Robot.Watch`; `hung`: `:silent` or `:hung`, in what, and how long ago, ms).
+  (`Robot.Safety.LivenessMonitor`; `hung`: `:silent` or `:hung`, in what, and how long ago, ms).
 
   A follower that does not get to its place is `BLOCKED by the landmark`, by another robot, by something
-  unknown or by `no way` (`Swarm.Missions.Landmark.Blocker`).
+  unknown or by `no way` (`Missions.Landmark.Blocker`).
 
   `age_ms` is how old its newest reading is; `rejected` counts malformed messages by kind. `hears` are
   the robots it hears itself, `view` those that it takes for there (itself too), with the view's number,
-  which grows with each that comes or goes (`Swarm.Peers`). Of whom it knows by way of others only, the line
+  which grows with each that comes or goes (`Swarm.Membership.Peers`). Of whom it knows by way of others only, the line
   says that it does not hear them. `Swarm.matrix/0` shows the same of all robots as a table.
 
   A robot that does not answer is shown as its row on the blackboard says (`from: :row`), with that
@@ -30,10 +30,11 @@ defmodule Swarm.Status do
   """
   alias Hal.Device.Words
   alias Hal.Pose
-  alias Robot.{Board, Config, Watch}
-  alias Swarm.Link.Ear
-  alias Swarm.Missions.Landmark.Blocker
-  alias Swarm.{Missions, Peers}
+  alias Robot.{Board, Config}
+  alias Robot.Safety.LivenessMonitor
+  alias Swarm.Comms.Receiver
+  alias Missions.Landmark.Blocker
+  alias Swarm.Membership.Peers
 
   @recently_ms 60_000
 
@@ -78,7 +79,7 @@ defmodule Swarm.Status do
           speed: float(),
           limits: [atom() | String.t()],
           estop: boolean(),
-          arming: Hal.Arming.state() | nil,
+          arming: Hal.Device.Arming.state() | nil,
           why: String.t() | nil,
           hung: {:silent | :hung, behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
           leader: atom() | String.t() | nil,
@@ -96,7 +97,7 @@ defmodule Swarm.Status do
         }
 
   @doc "The status of a robot of this node, from its board and its ear."
-  @spec of(Config.t(), Board.t(), Ear.t()) :: t()
+  @spec of(Config.t(), Board.t(), Receiver.t()) :: t()
   def of(config, board, ear) do
     entries = Board.entries(board)
     driving = value(entries, :driving)
@@ -157,10 +158,10 @@ defmodule Swarm.Status do
   # What hangs now, else what hung last.
   defp hung(entries) do
     hung =
-      for part <- Watch.parts(),
+      for part <- LivenessMonitor.parts(),
           {{what, module}, ago_ms} <- List.wrap(entries[{:hung, part}]),
           ago_ms < @recently_ms,
-          do: {what, Watch.words(part, module), ago_ms}
+          do: {what, LivenessMonitor.words(part, module), ago_ms}
 
     Enum.min_by(hung, fn {what, _where, ago_ms} -> {what == :hung, ago_ms} end, fn -> nil end)
   end

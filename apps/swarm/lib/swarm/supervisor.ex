@@ -4,14 +4,14 @@ defmodule Swarm.Supervisor do
 
       Swarm.Supervisor (no restarts to give)
       |-- Robot.Names            who is who on this node
-      |-- Swarm.Supervisor.Parts (one_for_one), each in the care of a Swarm.Supervisor.Tireless
+      |-- Swarm.Supervisor.Parts (one_for_one), each in the care of a Swarm.Supervisor.BackoffSupervisor
       |   |-- Swarm.Directory    who is where in the fleet
       |   |-- Swarm.Blackboard   what the robots of the fleet tell of themselves
-      |   |-- Swarm.Hints        what robots leave for each other
-      |   |-- Swarm.Directory.Watch    tells who joins and leaves
-      |   |-- Swarm.Alarm        calls all robots to stop
+      |   |-- Swarm.Blackboard.Hints        what robots leave for each other
+      |   |-- Swarm.Directory.Presence    tells who joins and leaves
+      |   |-- Swarm.EStop.Broadcaster        calls all robots to stop
       |   |-- Swarm.Mesh.Supervisor  the other nodes, where there is a mesh
-      |   `-- Swarm.Machine    tells systemd, where there is one
+      |   `-- Swarm.Host.Systemd    tells systemd, where there is one
       `-- Robot.Fleet            the robots
 
   Robots do without these parts: they drive on, and enter a new directory by themselves. However
@@ -24,7 +24,7 @@ defmodule Swarm.Supervisor do
   defmodule Parts do
     @moduledoc false
     use Supervisor
-    alias Swarm.Supervisor.Tireless
+    alias Swarm.Supervisor.BackoffSupervisor
 
     @doc false
     def start_link(options), do: Supervisor.start_link(__MODULE__, options)
@@ -32,24 +32,24 @@ defmodule Swarm.Supervisor do
     @impl Supervisor
     def init(options) do
       mesh = for mesh <- List.wrap(options[:mesh]), do: {Swarm.Mesh.Supervisor, mesh}
-      machine = for {:machine, machine} <- options, do: {Swarm.Machine, machine}
+      machine = for {:machine, machine} <- options, do: {Swarm.Host.Systemd, machine}
 
       children = [
         Swarm.Directory,
         Swarm.Blackboard,
-        Swarm.Hints,
-        Swarm.Directory.Watch,
-        Swarm.Alarm | mesh ++ machine
+        Swarm.Blackboard.Hints,
+        Swarm.Directory.Presence,
+        Swarm.EStop.Broadcaster | mesh ++ machine
       ]
 
-      tireless = for child <- children, do: {Tireless, child}
+      tireless = for child <- children, do: {BackoffSupervisor, child}
       Supervisor.init(tireless, strategy: :one_for_one, max_restarts: 5, max_seconds: 5)
     end
   end
 
   @doc """
   Starts the node's parts, without a robot; `mesh` as prepared by `Swarm.Mesh.Options.prepare/1`, `machine` the
-  options of `Swarm.Machine`.
+  options of `Swarm.Host.Systemd`.
   """
   @spec start_link(keyword()) :: Supervisor.on_start()
   def start_link(options), do: Supervisor.start_link(__MODULE__, options)

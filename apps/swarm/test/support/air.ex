@@ -3,7 +3,7 @@ defmodule Swarm.Air do
   Stations of several nodes without sockets: datagrams take 1 ms, unless they are lost or the
   link is cut; ticks come every 200 ms. Pure but for `:rand`, which ExUnit seeds.
   """
-  alias Swarm.Mesh.{Roster, Secret, Station, Strategy}
+  alias Swarm.Mesh.{Protocol, Roster, Secret, Strategy}
 
   @group {{239, 255, 67, 86}, 4371}
 
@@ -28,7 +28,7 @@ defmodule Swarm.Air do
           do: begin(Strategy.Static, Enum.map(peers, &air.addresses[&1]))
 
     station =
-      Station.new(
+      Protocol.new(
         secret: options[:secret] || secret(),
         roster: Roster.new(:"#{name}@lab", options[:fleet] || [:a, :b, :c, :d, :e, :f]),
         session: options[:session] || :rand.uniform(1_000_000_000),
@@ -62,20 +62,20 @@ defmodule Swarm.Air do
   end
 
   defp tick(name, air) do
-    act(air, name, Station.tick(air.stations[name], [], air.now, :rand.uniform()))
+    act(air, name, Protocol.tick(air.stations[name], [], air.now, :rand.uniform()))
   end
 
   def speak(air, name, to, message),
-    do: act(air, name, Station.speak(air.stations[name], to, message, air.now))
+    do: act(air, name, Protocol.speak(air.stations[name], to, message, air.now))
 
   @doc "A datagram from outside."
   def inject(air, name, datagram, address \\ {{10, 9, 9, 9}, 1}),
-    do: act(air, name, Station.hear(air.stations[name], datagram, address, air.now))
+    do: act(air, name, Protocol.hear(air.stations[name], datagram, address, air.now))
 
   defp arrive({_at, from, to, datagram}, air) do
     case air.stations do
       %{^to => station} ->
-        act(air, to, Station.hear(station, datagram, air.addresses[from], air.now))
+        act(air, to, Protocol.hear(station, datagram, air.addresses[from], air.now))
 
       _off ->
         air

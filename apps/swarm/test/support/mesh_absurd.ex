@@ -3,7 +3,10 @@ defmodule Swarm.MeshNodes.Absurd do
   What a robot with a bug would sign and send: each of the mesh's messages with each of its fields
   replaced by each term of no sense. Run on a test's node.
   """
-  alias Swarm.{Anchor, Heartbeat, Mesh, Message, Round}
+  alias Swarm.{Mesh, Message}
+  alias Swarm.Agreement.Round
+  alias Swarm.Formation.Reference
+  alias Swarm.Membership.Heartbeat
 
   @doc """
   Sends each `every`-th of them to the others, slowly enough for their sockets, and says how many it was.
@@ -48,7 +51,7 @@ defmodule Swarm.MeshNodes.Absurd do
   end
 
   defp bodies(me) do
-    anchor = %Anchor{
+    anchor = %Reference{
       leader: me,
       epoch: 1,
       sequence: 1,

@@ -6,12 +6,12 @@ defmodule Swarm.MeshNodes.Junk do
   """
 
   @names [
-    Swarm.Mesh.Relay,
-    Swarm.Mesh.Dialer,
-    Swarm.Mesh.Radio,
-    Swarm.Alarm,
-    Swarm.Directory.Watch,
-    Swarm.Hints,
+    Swarm.Mesh.CommandRelay,
+    Swarm.Mesh.Distribution.Dialer,
+    Swarm.Mesh.Server,
+    Swarm.EStop.Broadcaster,
+    Swarm.Directory.Presence,
+    Swarm.Blackboard.Hints,
     Swarm.Blackboard
   ]
 
@@ -73,7 +73,7 @@ defmodule Swarm.MeshNodes.Junk do
       [{:a, 1}],
       {},
       %{__struct__: Swarm.Message},
-      %{__struct__: Swarm.Envelope, from: 1},
+      %{__struct__: Agents.Envelope, from: 1},
       %{__struct__: :nothing},
       make_ref(),
       self(),

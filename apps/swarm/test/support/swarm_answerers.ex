@@ -3,12 +3,12 @@ defmodule Swarm.Answerers do
 
   defmodule Echo do
     @moduledoc "Answers what it is asked; `:silent` is not answered, `:raise` raises, `:die` ends it."
-    @behaviour Swarm.Responder
+    @behaviour Agents.Responder
 
-    @impl Swarm.Responder
+    @impl Agents.Responder
     def init(robot, argument), do: %{robot: robot, argument: argument, heard: 0}
 
-    @impl Swarm.Responder
+    @impl Agents.Responder
     def handle(%{content: :silent}, s), do: {:noreply, s}
     def handle(%{content: :raise}, _s), do: raise("told to")
     def handle(%{content: :die}, _s), do: Process.exit(self(), :kill)
@@ -27,31 +27,31 @@ defmodule Swarm.Answerers do
   @spec start([atom()], atom()) :: [pid()]
   def start(names, service) do
     for name <- names do
-      {:ok, pid} = Swarm.Responder.start_link(name, service: service, module: Echo)
+      {:ok, pid} = Agents.Responder.start_link(name, service: service, module: Echo)
       Process.unlink(pid)
       pid
     end
   end
 
   @doc "One that bids so much for tasks, for another node."
-  @spec start_bidder(atom(), Swarm.ContractNet.Cost.t()) :: pid()
+  @spec start_bidder(atom(), Agents.ContractNet.Cost.t()) :: pid()
   def start_bidder(name, cost) do
     options = [
       service: :tasks,
-      module: Swarm.ContractNet.Bidding,
+      module: Agents.ContractNet.Bidding,
       argument: {__MODULE__.Carry, cost}
     ]
 
-    {:ok, pid} = Swarm.Responder.start_link(name, options)
+    {:ok, pid} = Agents.Responder.start_link(name, options)
     Process.unlink(pid)
     pid
   end
 
   @doc "One that hears a topic."
-  @spec start_topic(Swarm.Envelope.topic()) :: pid()
+  @spec start_topic(Agents.Envelope.topic()) :: pid()
   def start_topic(topic) do
     options = [service: :topic_far, module: Echo, topics: [topic]]
-    {:ok, pid} = Swarm.Responder.start_link(:topic_far, options)
+    {:ok, pid} = Agents.Responder.start_link(:topic_far, options)
     Process.unlink(pid)
     pid
   end
@@ -59,14 +59,14 @@ end
 
 defmodule Swarm.Answerers.Carry do
   @moduledoc "Bids its argument for `{:carry, _}`, and does what the task says."
-  @behaviour Swarm.ContractNet
+  @behaviour Agents.ContractNet
 
-  @impl Swarm.ContractNet
+  @impl Agents.ContractNet
   def cost({:carry, _how}, _robot, cost), do: cost
   def cost(:raise, _robot, _cost), do: raise("told to")
   def cost(_other, _robot, _cost), do: :infinite
 
-  @impl Swarm.ContractNet
+  @impl Agents.ContractNet
   def work({:carry, {:tell, pid}}, robot, _cost, report) do
     report.(:on_my_way)
     send(pid, {:working, robot, self()})

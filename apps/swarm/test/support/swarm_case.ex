@@ -12,8 +12,11 @@ defmodule Swarm.Case do
       import Swarm.Case
       import Robot.Case, only: [listen: 2, kill: 2]
       alias Hal.{Pose, Twist}
-      alias Robot.{Board, Gate, Names, Pilot}
-      alias Swarm.{Directory, Heartbeat, Link, Message}
+      alias Robot.{Board, Names}
+      alias Robot.Control.Pilot
+      alias Robot.Safety.Gate
+      alias Swarm.{Comms, Directory, Message}
+      alias Swarm.Membership.Heartbeat
     end
   end
 
@@ -25,7 +28,7 @@ defmodule Swarm.Case do
   @doc "A robot with a link; link options under `:link`, the others as in `Robot.Config`."
   def robot(id, options \\ []) do
     {link, options} = Keyword.pop(options, :link, [])
-    config = id |> Robot.Case.config(options) |> Swarm.Link.join(link)
+    config = id |> Robot.Case.config(options) |> Swarm.Comms.join(link)
     start_supervised!({Robot.Supervisor, config}, id: id, restart: :temporary)
     stand(id, Pose.new(0, 0))
     if options[:drive] == nil, do: Robot.Case.online(id)
@@ -37,7 +40,7 @@ defmodule Swarm.Case do
   def robot_on(node, id, options \\ []) do
     {link, options} = Keyword.pop(options, :link, [])
     options = Keyword.put_new(options, :drive, {Hal.FakeDrive, test: self(), device: id})
-    config = id |> Robot.Case.config(options) |> Swarm.Link.join(link)
+    config = id |> Robot.Case.config(options) |> Swarm.Comms.join(link)
     {:ok, _robot} = :erpc.call(node, Robot.Fleet, :start_robot, [Robot.Fleet, config])
     :erpc.call(node, __MODULE__, :stand, [id, Pose.new(0, 0)])
     eventually(fn -> node(Swarm.Directory.whereis(id) || self()) == node end)

@@ -7,8 +7,9 @@ defmodule Swarm.Group do
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.{Behaviour, Percept}
   alias Robot.Localiser.Anchors
-  alias Swarm.{Heartbeat, Message, Peers, Stop}
-  alias Swarm.Missions.Landmark
+  alias Swarm.{EStop, Message}
+  alias Swarm.Membership.{Heartbeat, Peers}
+  alias Missions.Landmark
 
   @tick_ms 100
   @beat_ms 200
@@ -232,7 +233,7 @@ defmodule Swarm.Group do
     robot = group.robots[id]
     sender = {robot.boot, robot.sequence + 1}
     heard = Peers.heard(robot.peers, group.now)
-    beat = Heartbeat.new(sender, percept(group, id), robot.claim, heard, Stop.new())
+    beat = Heartbeat.new(sender, percept(group, id), robot.claim, heard, EStop.State.new())
     group = put_in(group.robots[id].sequence, robot.sequence + 1)
     carry_out({:send, :all, Message.new(id, :heartbeat, beat)}, id, group)
   end

@@ -24,7 +24,7 @@ defmodule Swarm.MeshNodes.Wheels do
         drive: {Hal.FakeDrive, test: self(), device: :drive}
       )
 
-    {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, Swarm.Link.join(config, link))
+    {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, Swarm.Comms.join(config, link))
     {:ok, _timer} = :timer.send_interval(@period_ms, :stand)
     {:ok, %{id: id, n: 0}}
   end

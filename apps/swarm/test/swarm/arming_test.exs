@@ -194,7 +194,7 @@ defmodule Swarm.ArmingTest do
     eventually(fn -> match?(%Status{state: :idle, by: :rest}, Swarm.status(id)) end)
     stands_while(id, fn -> assert Swarm.arm(id) == :ok end)
     roll = {Robot.Acts.Roll, twist: Twist.new(0.2, 0.0)}
-    Robot.Executive.goal(id, :roll, roll)
+    Robot.Control.Executive.goal(id, :roll, roll)
     told(id, &(&1 > 0))
     assert Hal.Device.disarm(drive) == :ok
     eventually(fn -> match?(%Status{by: :rest}, Swarm.status(id)) end)

@@ -1,7 +1,7 @@
 defmodule Swarm.BrakeNodesTest do
   use Swarm.Case, async: false
-  alias Swarm.{Cluster, Post}
-  alias Swarm.Missions.Manual
+  alias Swarm.{Cluster, Nonblocking}
+  alias Missions.Manual
   @moduletag :cluster
   @moduletag :capture_log
 
@@ -46,10 +46,10 @@ defmodule Swarm.BrakeNodesTest do
     Process.exit(stands, :kill)
 
     link = Directory.whereis(id)
-    Post.cast(link, {:stamp, ref = :erlang.alias([:reply])})
+    Nonblocking.cast(link, {:stamp, ref = :erlang.alias([:reply])})
     assert_receive {^ref, stamp}
     Cluster.freeze(far)
-    Post.cast(link, {:command, {:goto, 5.0, 5.0, nil}, :erlang.alias([:reply]), stamp})
+    Nonblocking.cast(link, {:command, {:goto, 5.0, 5.0, nil}, :erlang.alias([:reply]), stamp})
     assert Swarm.goto(id, {5, 5}) == {:error, "brake_frozen does not answer"}
     # Silent for longer than a command may be old.
     eventually(fn -> match?(%{mode: :dead}, mode.()) end)

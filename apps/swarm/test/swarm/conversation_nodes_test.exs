@@ -1,6 +1,7 @@
 defmodule Swarm.ConversationNodesTest do
   use Swarm.Case, async: false
-  alias Swarm.{Answerers, Cluster, Conversation, Envelope}
+  alias Agents.{Conversation, Envelope}
+  alias Swarm.{Answerers, Cluster}
   @moduletag :cluster
 
   defp question(content), do: Envelope.new(:query, :asker, content)

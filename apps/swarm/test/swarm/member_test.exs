@@ -2,10 +2,13 @@ defmodule Swarm.MemberTest do
   @moduledoc "Nothing that is said to a member crashes it; an emergency stop finds everybody."
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Swarm.{Anchor, Heartbeat, Member, Message, Round}
+  alias Swarm.{Member, Message}
+  alias Swarm.Agreement.Round
+  alias Swarm.Formation.Reference
+  alias Swarm.Membership.Heartbeat
 
   @beat %Heartbeat{boot: 1, sequence: 1, pose: {900, 0, 0}, twist: {0, 0}, phase: :search}
-  @anchor %Anchor{
+  @anchor %Reference{
     leader: :mag2,
     epoch: 1,
     sequence: 1,
@@ -27,7 +30,7 @@ defmodule Swarm.MemberTest do
   }
 
   defp member(id \\ :mag1) do
-    mission = {Swarm.Missions.Landmark, []}
+    mission = {Missions.Landmark, []}
 
     member =
       Member.new(id: id, profile: Profile.magellan(), start: Pose.new(0, 0), mission: mission)

@@ -1,19 +1,22 @@
 defmodule Swarm.MessageTest do
   @moduledoc "Whatever comes from outside, the ear survives it."
   use ExUnit.Case, async: true
-  alias Swarm.{Anchor, Heartbeat, Message, Round}
-  alias Swarm.Link.Ear
-  doctest Swarm.Stop
-  doctest Swarm.Stamp
-  doctest Swarm.Link.Name
-  doctest Swarm.Shape
-  doctest Ear
-  doctest Swarm.Missions.Landmark.Policy
-  doctest Swarm.Missions.Manual
-  doctest Swarm.Link.Presence
+  alias Swarm.Message
+  alias Swarm.Agreement.Round
+  alias Swarm.Formation.Reference
+  alias Swarm.Membership.Heartbeat
+  alias Swarm.Comms.Receiver
+  doctest Swarm.EStop.State
+  doctest Swarm.Commands.Freshness
+  doctest Swarm.Comms.NameClaim
+  doctest Swarm.Message.WireTypes
+  doctest Receiver
+  doctest Missions.Landmark.Policy
+  doctest Missions.Manual
+  doctest Swarm.Comms.PingReply
 
   @beat %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
-  @anchor %Anchor{
+  @anchor %Reference{
     leader: :mag1,
     epoch: 1,
     sequence: 1,
@@ -57,7 +60,7 @@ defmodule Swarm.MessageTest do
       make_ref(),
       fn -> 1 end,
       %{__struct__: Heartbeat},
-      %{__struct__: Anchor},
+      %{__struct__: Reference},
       %{__struct__: :nothing},
       <<1::3>>,
       @beat,
@@ -96,10 +99,10 @@ defmodule Swarm.MessageTest do
           do: Map.put(message, Enum.random([:from, :kind, :body]), junk()),
           else: message
 
-      {heard, ear} = Ear.hear(Ear.new(:mag2), message, 0)
+      {heard, ear} = Receiver.hear(Receiver.new(:mag2), message, 0)
 
       case heard do
-        {:peer, id} -> assert %{mode: _} = Swarm.Peers.percept(ear.peers, id, 0)
+        {:peer, id} -> assert %{mode: _} = Swarm.Membership.Peers.percept(ear.peers, id, 0)
         {:message, _message} -> :ok
         :nothing -> assert map_size(ear.rejected) == 1
       end
@@ -148,16 +151,25 @@ defmodule Swarm.MessageTest do
 
     near = %{@letter | id: {7, 1, :mag2}, view: [:mag1, :mag2]}
     assert Round.hear(round, :mag2, near, 0).id == near.id
-    assert Swarm.Stop.hear(Swarm.Stop.new(), 1_000_000, true) == Swarm.Stop.new()
+
+    assert Swarm.EStop.State.hear(Swarm.EStop.State.new(), 1_000_000, true) ==
+             Swarm.EStop.State.new()
 
     # A false sequence number of a robot is forgotten with it.
-    peers = Swarm.Peers.hear(Swarm.Peers.new(:mag2), :mag1, %{@beat | sequence: 1_000_000_000}, 0)
-    assert Swarm.Peers.hear(peers, :mag1, @beat, 1_900) == peers
-    assert Swarm.Peers.hear(peers, :mag1, @beat, 2_000).rows.mag1.beat == @beat
+    peers =
+      Swarm.Membership.Peers.hear(
+        Swarm.Membership.Peers.new(:mag2),
+        :mag1,
+        %{@beat | sequence: 1_000_000_000},
+        0
+      )
+
+    assert Swarm.Membership.Peers.hear(peers, :mag1, @beat, 1_900) == peers
+    assert Swarm.Membership.Peers.hear(peers, :mag1, @beat, 2_000).rows.mag1.beat == @beat
   end
 
   test "an anchor of an epoch that cannot be is no leader's" do
-    alias Swarm.Missions.Landmark
+    alias Missions.Landmark
     {_phase, mission, []} = Landmark.init(:mag2, [])
     far = Message.new(:mag3, :place, %{@anchor | epoch: 999_999_999})
     {_phase, same, _effects} = Landmark.handle({:message, far}, mission)
@@ -167,11 +179,14 @@ defmodule Swarm.MessageTest do
   end
 
   test "repeats of calls from two lives of a node do not take each other for new" do
-    alias Swarm.Stop
+    alias Swarm.EStop
     calls = for boot <- [7, 5], counter <- [1, 2], do: {:base@hall, boot, counter}
-    stop = calls |> Enum.reduce(Stop.new(), &Stop.call(&2, &1)) |> Stop.reset()
-    assert Enum.reduce(calls ++ calls, stop, &Stop.call(&2, &1)) == stop
-    assert Stop.call(stop, {:base@hall, 5, 3}).latched?
-    assert Stop.call(stop, {:base@hall, 8, 1}).latched?
+
+    stop =
+      calls |> Enum.reduce(EStop.State.new(), &EStop.State.call(&2, &1)) |> EStop.State.reset()
+
+    assert Enum.reduce(calls ++ calls, stop, &EStop.State.call(&2, &1)) == stop
+    assert EStop.State.call(stop, {:base@hall, 5, 3}).latched?
+    assert EStop.State.call(stop, {:base@hall, 8, 1}).latched?
   end
 end

@@ -1,9 +1,9 @@
-defmodule Swarm.Missions.ManualTest do
+defmodule Missions.ManualTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile, Twist}
   alias Robot.Behaviour.{Follow, Goto, Stop}
   alias Robot.{Command, Percept}
-  alias Swarm.Missions.Manual
+  alias Missions.Manual
 
   defp percept(at_ms, peers),
     do: %Percept{robot: :mag1, at_ms: at_ms, profile: Profile.magellan(), peers: peers}

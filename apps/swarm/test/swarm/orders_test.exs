@@ -3,7 +3,8 @@ defmodule Swarm.OrdersTest do
   use Swarm.Case, async: false
   @moduletag :capture_log
   import ExUnit.CaptureLog
-  alias Robot.{Acts, Executive}
+  alias Robot.Acts
+  alias Robot.Control.Executive
 
   @roll {Acts.Roll, twist: Twist.new(0.2, 0.0)}
 
@@ -74,7 +75,7 @@ defmodule Swarm.OrdersTest do
         # Whatever is sent to it past the door.
         {:ok, command} = Robot.Command.parse(text, [:orders_other])
         assert {:error, ^line} = Swarm.ask(id, command)
-        assert {Swarm.Missions.Landmark, _phase} = state(id)
+        assert {Missions.Landmark, _phase} = state(id)
       end
 
       assert elem(before, 0) == elem(state(id), 0)
@@ -88,7 +89,7 @@ defmodule Swarm.OrdersTest do
       assert Swarm.goto(id, {1, 1}) == :ok
       assert {:ok, line} = Swarm.tell(id, "Ping")
       assert line =~ ~r/, up for \d+ s, goto for \d+ s$/
-      assert state(id) == {Swarm.Missions.Manual, :goto}
+      assert state(id) == {Missions.Manual, :goto}
 
       assert {:ok, both} = Swarm.tell([id, other], "ping")
       assert both =~ ~r/^orders_ping on [^;]+; orders_pong on [^;]+$/
@@ -140,7 +141,7 @@ defmodule Swarm.OrdersTest do
     assert Swarm.tell(id, "move:0.2:0") == :ok
     rolls(id)
     assert Swarm.ask(id, :reset) == :ok
-    assert state(id) == {Swarm.Missions.Manual, :move}
+    assert state(id) == {Missions.Manual, :move}
   end
 
   test "a start right after a stop that is still on its way begins the mission anew" do
@@ -158,7 +159,7 @@ defmodule Swarm.OrdersTest do
 
     :ok = :sys.resume(pilot)
     assert Task.await(answer) == :ok
-    assert {Swarm.Missions.Landmark, _phase} = state(id)
+    assert {Missions.Landmark, _phase} = state(id)
     {_state, %{mission: mission}} = :sys.get_state(pilot)
     assert {:wedge, _spacing} = mission.formation
   end

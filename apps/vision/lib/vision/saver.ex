@@ -1,7 +1,7 @@
 defmodule Vision.Saver do
   @moduledoc """
   Keeps pictures of a camera in a folder (R103): one more viewer of `Vision.View`, which writes what it gets.
-  The newest are kept, the oldest go (`Vision.Saver.Shelf`); what else lies in the folder is left alone.
+  The newest are kept, the oldest go (`Vision.Saver.Retention`); what else lies in the folder is left alone.
 
   Options:
 
@@ -20,7 +20,7 @@ defmodule Vision.Saver do
   """
   use GenServer
   alias Hal.Event
-  alias Vision.Saver.{Options, Shelf}
+  alias Vision.Saver.{Options, Retention}
   alias Vision.View
 
   @rest_ms 1_000
@@ -65,7 +65,7 @@ defmodule Vision.Saver do
 
   @impl GenServer
   def handle_call(:status, _from, s) do
-    {files, bytes} = if s.shelf, do: Shelf.size(s.shelf), else: {0, 0}
+    {files, bytes} = if s.shelf, do: Retention.size(s.shelf), else: {0, 0}
     {:reply, %{files: files, bytes: bytes, saved: s.saved, why: s.why}, s}
   end
 
@@ -112,31 +112,31 @@ defmodule Vision.Saver do
       {parts, names} = Enum.split_with(names, &String.ends_with?(&1, @part))
 
       for part <- parts,
-          Shelf.time_ms(s.prefix, Path.rootname(part, @part)) != nil,
+          Retention.time_ms(s.prefix, Path.rootname(part, @part)) != nil,
           do: File.rm(Path.join(s.folder, part))
 
       there =
         for name <- names,
-            Shelf.time_ms(s.prefix, name) != nil,
+            Retention.time_ms(s.prefix, name) != nil,
             {:ok, %File.Stat{type: :regular, size: size}} <- [
               File.lstat(Path.join(s.folder, name))
             ],
             do: {name, size}
 
-      {:ok, Shelf.new(s.prefix, s.files, s.megabytes * 1_000_000, there)}
+      {:ok, Retention.new(s.prefix, s.files, s.megabytes * 1_000_000, there)}
     end
   end
 
   defp shelf(s), do: {:ok, s.shelf}
 
   defp save(s, jpeg) do
-    name = Shelf.name(s.shelf, System.system_time(:millisecond))
+    name = Retention.name(s.shelf, System.system_time(:millisecond))
     path = Path.join(s.folder, name)
 
-    with {:ok, old, shelf} <- Shelf.room(s.shelf, byte_size(jpeg)),
+    with {:ok, old, shelf} <- Retention.room(s.shelf, byte_size(jpeg)),
          :ok <- remove(old, s.folder),
          :ok <- write(path, jpeg) do
-      {:ok, %{s | shelf: Shelf.put(shelf, name, byte_size(jpeg))}}
+      {:ok, %{s | shelf: Retention.put(shelf, name, byte_size(jpeg))}}
     end
   end
 

@@ -12,7 +12,7 @@ defmodule Vision.View do
   frame. Newest wins: a frame that nobody has asked for is never copied, sent or kept.
 
   The pictures are made by an ffmpeg outside the VM (`Vision.Jpeg.Encoder`), which is there only while it is
-  needed, and started again if it ends or hangs (`Vision.View.Maker`).
+  needed, and started again if it ends or hangs (`Vision.View.EncoderControl`).
 
   Options:
 

@@ -2,7 +2,7 @@ defmodule Vision.JpegTest do
   use ExUnit.Case, async: true
   doctest Vision.Jpeg
   doctest Vision.Jpeg.Encoder
-  doctest Vision.View.Audience
+  doctest Vision.View.Subscribers
   alias Vision.Jpeg
 
   test "whatever the pieces that it comes in, the pictures are the same" do

@@ -1,9 +1,9 @@
 defmodule Vision.SaverTest do
   use ExUnit.Case, async: true
   doctest Vision.Saver.Options
-  doctest Vision.Saver.Shelf
+  doctest Vision.Saver.Retention
   alias Vision.{Saver, View}
-  alias Vision.Saver.Shelf
+  alias Vision.Saver.Retention
 
   @moduletag :tmp_dir
   @moduletag if(System.find_executable("ffmpeg"), do: [], else: [skip: "ffmpeg is missing"])
@@ -94,11 +94,11 @@ defmodule Vision.SaverTest do
     names = Enum.sort(File.ls!(folder))
     assert kept -- names == []
     pictures = names -- kept
-    assert length(pictures) == 5 and Enum.all?(pictures, &(Shelf.time_ms("mag1", &1) != nil))
+    assert length(pictures) == 5 and Enum.all?(pictures, &(Retention.time_ms("mag1", &1) != nil))
     refute Enum.any?(old, &(&1 in pictures))
 
     # They are pictures, all different.
-    times = Enum.map(pictures, &Shelf.time_ms("mag1", &1))
+    times = Enum.map(pictures, &Retention.time_ms("mag1", &1))
     assert times == Enum.sort(times) and times == Enum.uniq(times)
 
     for name <- pictures do
@@ -189,32 +189,34 @@ defmodule Vision.SaverTest do
 
   test "a clock that is set back does not bring the names out of order" do
     {shelf, names} =
-      Enum.reduce([5_000, 4_000, 4_000, 9_000, 0], {Shelf.new("mag1", 10, 100, []), []}, fn now,
-                                                                                            {shelf,
-                                                                                             names} ->
-        name = Shelf.name(shelf, now)
-        {Shelf.put(shelf, name, 1), names ++ [name]}
-      end)
+      Enum.reduce(
+        [5_000, 4_000, 4_000, 9_000, 0],
+        {Retention.new("mag1", 10, 100, []), []},
+        fn now, {shelf, names} ->
+          name = Retention.name(shelf, now)
+          {Retention.put(shelf, name, 1), names ++ [name]}
+        end
+      )
 
     assert names == Enum.sort(names) and names == Enum.uniq(names)
-    assert Shelf.size(shelf) == {5, 5}
+    assert Retention.size(shelf) == {5, 5}
     # And a new start goes on behind what is there.
-    again = Shelf.new("mag1", 10, 100, Enum.shuffle(for name <- names, do: {name, 1}))
-    assert Shelf.name(again, 0) > List.last(names)
+    again = Retention.new("mag1", 10, 100, Enum.shuffle(for name <- names, do: {name, 1}))
+    assert Retention.name(again, 0) > List.last(names)
   end
 
   test "whatever is saved, the limits hold, and only the oldest go" do
     for _ <- 1..50 do
       files = :rand.uniform(10)
 
-      Enum.reduce(1..60, {Shelf.new("mag1", files, 1_000, []), []}, fn now, {shelf, there} ->
+      Enum.reduce(1..60, {Retention.new("mag1", files, 1_000, []), []}, fn now, {shelf, there} ->
         size = :rand.uniform(500)
-        {:ok, gone, shelf} = Shelf.room(shelf, size)
+        {:ok, gone, shelf} = Retention.room(shelf, size)
         assert gone == Enum.take(there, length(gone))
-        name = Shelf.name(shelf, now)
-        shelf = Shelf.put(shelf, name, size)
+        name = Retention.name(shelf, now)
+        shelf = Retention.put(shelf, name, size)
         there = Enum.drop(there, length(gone)) ++ [name]
-        assert {count, bytes} = Shelf.size(shelf)
+        assert {count, bytes} = Retention.size(shelf)
         assert count == length(there) and count <= files and bytes <= 1_000
         {shelf, there}
       end)

@@ -2,7 +2,7 @@ defmodule Vision.ViewTest do
   use ExUnit.Case, async: true
   alias Hal.Frame
   alias Vision.View
-  alias Vision.View.{Audience, Maker, Picture}
+  alias Vision.View.{EncoderControl, Picture, Subscribers}
 
   @moduletag if(System.find_executable("ffmpeg"), do: [], else: [skip: "ffmpeg is missing"])
   @full "scale=in_range=full:out_range=full:in_color_matrix=bt601:out_color_matrix=bt601"
@@ -112,7 +112,7 @@ defmodule Vision.ViewTest do
     assert %{made: 1, viewers: 0, encoder: :open, failed: 0} = View.status(view)
     ffmpeg = children_of_view(view)
     # What the clock says after 5 s.
-    send(view, {Maker, :idle, 1})
+    send(view, {EncoderControl, :idle, 1})
     assert %{made: 1, encoder: :closed} = View.status(view)
     for pid <- ffmpeg, do: assert(gone?(pid))
   end
@@ -293,20 +293,20 @@ defmodule Vision.ViewTest do
       every = for id <- 1..3, into: %{}, do: {id, :rand.uniform(100)}
 
       audience =
-        Enum.reduce(every, Audience.new(3), fn {id, ms}, audience ->
-          {:ok, audience} = Audience.join(audience, id, ms, 0)
+        Enum.reduce(every, Subscribers.new(3), fn {id, ms}, audience ->
+          {:ok, audience} = Subscribers.join(audience, id, ms, 0)
           audience
         end)
 
       {_audience, served} =
         Enum.reduce(1..300, {audience, %{}}, fn step, {audience, served} ->
           now = 7 * step
-          due = Audience.due(audience, now)
-          {ids, audience} = Audience.serve(audience, now)
+          due = Subscribers.due(audience, now)
+          {ids, audience} = Subscribers.serve(audience, now)
           assert due == 0 == (ids != [])
           served = Enum.reduce(ids, served, &Map.update(&2, &1, 1, fn n -> n + 1 end))
           asks = Enum.filter(1..3, fn _ -> :rand.uniform(2) == 1 end)
-          {Enum.reduce(asks, audience, &Audience.ask(&2, &1)), served}
+          {Enum.reduce(asks, audience, &Subscribers.ask(&2, &1)), served}
         end)
 
       for {id, count} <- served, do: assert(count <= div(2_100, every[id]) + 2)

@@ -3,8 +3,8 @@ defmodule Console.Calibrate.Colour do
   `mix calibrate colour`: from places in a picture to the limits of a colour, what they do in that picture, and
   the colour file.
   """
-  alias Console.Calibrate.{ColourOptions, Frames, Talk}
-  alias Console.{Diff, Words}
+  alias Console.Calibrate.{ColourOptions, Frames, StdinPrompt}
+  alias Console.Cli.{Diff, Format}
   alias Vision.Calibration
   alias Vision.Calibration.Sample
   alias Vision.{Colours, Picture}
@@ -25,7 +25,7 @@ defmodule Console.Calibrate.Colour do
          frame = List.last(frames),
          :ok <- draw(options, frame, found),
          IO.puts(
-           "#{options.source}: #{frame.width} by #{frame.height} pixels, #{Words.count(length(frames), "frame")}"
+           "#{options.source}: #{frame.width} by #{frame.height} pixels, #{Format.count(length(frames), "frame")}"
          ),
          Enum.each(lines(found, options) ++ warnings(found, options), &IO.puts/1) do
       put(options, found.class)
@@ -49,7 +49,7 @@ defmodule Console.Calibrate.Colour do
   defp elsewhere(%{others: []}), do: ", all of them next to your places or too few for a blob"
 
   defp elsewhere(match),
-    do: ", #{match.background} of them in #{Words.count(length(match.others), "blob")} elsewhere"
+    do: ", #{match.background} of them in #{Format.count(length(match.others), "blob")} elsewhere"
 
   defp distance(nil, _blobs, _name), do: []
   defp distance(_metres, [], _name), do: []
@@ -60,7 +60,7 @@ defmodule Console.Calibrate.Colour do
     if largest.share > 0.5 do
       ["distance it fills more than half of the picture: too near to tell a constant"]
     else
-      constant = Words.decimals(largest.share * metres * metres, 4)
+      constant = Format.decimals(largest.share * metres * metres, 4)
 
       [
         "distance it fills #{percent(largest.share)}: in the robot file, distance: %{#{inspect(name)} => #{constant}}"
@@ -145,9 +145,9 @@ defmodule Console.Calibrate.Colour do
   defp decide(path, new, _same?, true), do: replace(path, new)
 
   defp decide(path, new, _same?, false) do
-    talk = Talk.start()
-    answer = Talk.choose(talk, "write it? (yes, no) ", ["yes", "no"])
-    Talk.stop(talk)
+    talk = StdinPrompt.start()
+    answer = StdinPrompt.choose(talk, "write it? (yes, no) ", ["yes", "no"])
+    StdinPrompt.stop(talk)
 
     case answer do
       {:ok, "yes"} -> replace(path, new)
@@ -168,5 +168,5 @@ defmodule Console.Calibrate.Colour do
   defp range({low, high}), do: "#{low} to #{high}"
   defp share(_part, 0), do: "none"
   defp share(part, all), do: percent(part / all)
-  defp percent(share), do: "#{Words.decimals(100 * share, 1)} %"
+  defp percent(share), do: "#{Format.decimals(100 * share, 1)} %"
 end

@@ -1,6 +1,7 @@
 defmodule Console.Calibrate.ColourOptions do
   @moduledoc "The command line of `mix calibrate colour`: words in, a checked map or lines out. Pure."
-  alias Console.{Arguments, Values}
+  alias Console.Cli
+  alias Console.Cli.Parse
 
   @type t :: %{
           source: String.t(),
@@ -15,8 +16,8 @@ defmodule Console.Calibrate.ColourOptions do
           metres: float() | nil
         }
 
-  @doc "The options, as `Console.Arguments` has them."
-  @spec table() :: [Arguments.option()]
+  @doc "The options, as `Console.Cli.Arguments` has them."
+  @spec table() :: [Cli.Arguments.option()]
   def table do
     [
       {"box", "X,Y,W,H", &numbers(&1, 4, "X,Y,WIDTH,HEIGHT in pixels from the top left"),
@@ -29,12 +30,12 @@ defmodule Console.Calibrate.ColourOptions do
       {"write", nil, nil, "writes it without asking; what changes is told"},
       {"picture", "FILE", &picture/1,
        "a preview, .png or .jpg: what is taken for the colour shines, all else is\ndark and grey; its blobs and your boxes are outlined"},
-      {"frames", "N", &Values.whole(&1, 1..100),
+      {"frames", "N", &Parse.whole(&1, 1..100),
        "looks at so many frames together (1 of files, 10 of cameras)"},
       {"light", "PERCENT", &light/1,
        "so much more or less light is put up with (auto: the most, up to 40,\nwith which nothing else in the picture is found)"},
-      {"min-area", "PIXELS", &Values.whole(&1, 1..1_000_000), "smaller blobs do not count (20)"},
-      {"metres", "METRES", &Values.number(&1, 0.1, 20),
+      {"min-area", "PIXELS", &Parse.whole(&1, 1..1_000_000), "smaller blobs do not count (20)"},
+      {"metres", "METRES", &Parse.number(&1, 0.1, 20),
        "the thing is so far away: tells the robot file's distance constant"},
       {"help", nil, nil, "this text"}
     ]
@@ -55,7 +56,7 @@ defmodule Console.Calibrate.ColourOptions do
   def parse(words) do
     {sources, words} = Enum.split_while(words, &(not String.starts_with?(&1, "--")))
 
-    with {:ok, given} <- Arguments.parse(words, table()) do
+    with {:ok, given} <- Cli.Arguments.parse(words, table()) do
       map = Map.new(given)
       if map["help"], do: :help, else: check(sources, given, map)
     end
@@ -99,7 +100,7 @@ defmodule Console.Calibrate.ColourOptions do
   end
 
   defp numbers(text, count, form) do
-    parts = text |> String.split(",") |> Enum.map(&Values.whole(&1, 0..65_535))
+    parts = text |> String.split(",") |> Enum.map(&Parse.whole(&1, 0..65_535))
 
     if length(parts) == count and Enum.all?(parts, &match?({:ok, _}, &1)),
       do: {:ok, parts |> Enum.map(&elem(&1, 1)) |> List.to_tuple()},
@@ -129,7 +130,7 @@ defmodule Console.Calibrate.ColourOptions do
   defp light("auto"), do: {:ok, :auto}
 
   defp light(text) do
-    case Values.number(text, 0, 90) do
+    case Parse.number(text, 0, 90) do
       {:ok, percent} -> {:ok, percent / 100}
       {:error, allowed} -> {:error, "auto or #{allowed}"}
     end

@@ -38,7 +38,7 @@ defmodule Console.Calibrate.Frames do
   end
 
   defp simulated(count) do
-    {:ok, map} = Sim.Map.open("hall", 2)
+    {:ok, map} = Sim.Floorplan.open("hall", 2)
 
     robots = [
       %{id: :mag1, profile: Profile.magellan(), pose: Pose.new(0, 0)},

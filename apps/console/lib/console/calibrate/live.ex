@@ -4,10 +4,12 @@ defmodule Console.Calibrate.Live do
   executive, gate, device. A person lets it begin each time; its wheels are armed for this course
   alone. Whatever is typed meanwhile is an emergency stop, which is held until he says `reset`.
   """
-  alias Console.Calibrate.Talk
-  alias Console.{Output, Words}
+  alias Console.Calibrate.StdinPrompt
+  alias Console.Cli.{Format, Output}
   alias Hal.Pose
-  alias Robot.{Board, Gate, Pilot}
+  alias Robot.Board
+  alias Robot.Control.Pilot
+  alias Robot.Safety.Gate
   alias Robot.Calibration.Drive
 
   @look_ms 100
@@ -41,9 +43,10 @@ defmodule Console.Calibrate.Live do
   @doc """
   One course. `{:error, line}` where it was not driven to its end; then the wheels are disarmed.
   """
-  @spec drive(atom(), keyword(), Talk.t(), Output.t()) :: {:ok, driven()} | {:error, String.t()}
+  @spec drive(atom(), keyword(), StdinPrompt.t(), Output.t()) ::
+          {:ok, driven()} | {:error, String.t()}
   def drive(robot, course, talk, output) do
-    Talk.forget(talk)
+    StdinPrompt.forget(talk)
 
     with :ok <- Swarm.arm(robot),
          %{pose: start} <- odometry(robot) || {:error, "#{robot} tells no odometry"},
@@ -89,7 +92,8 @@ defmodule Console.Calibrate.Live do
     Output.finish(s.output)
     IO.puts("EMERGENCY STOP: #{s.robot} is held")
 
-    with {:ok, "reset"} <- Talk.choose(s.talk, "type reset when it may drive again: ", ["reset"]),
+    with {:ok, "reset"} <-
+           StdinPrompt.choose(s.talk, "type reset when it may drive again: ", ["reset"]),
          do: Gate.reset(s.robot)
 
     {:error, "stopped by hand"}
@@ -116,8 +120,8 @@ defmodule Console.Calibrate.Live do
 
     Output.progress(
       s.output,
-      "by odometry #{Words.decimals(at.x, 2)},#{Words.decimals(at.y, 2)} m, turned " <>
-        "#{Words.decimals(s.turned * 180 / :math.pi(), 0)} degrees#{limits}; Enter stops it"
+      "by odometry #{Format.decimals(at.x, 2)},#{Format.decimals(at.y, 2)} m, turned " <>
+        "#{Format.decimals(s.turned * 180 / :math.pi(), 0)} degrees#{limits}; Enter stops it"
     )
 
     s

@@ -3,8 +3,18 @@ defmodule Console.Calibrate.Odometry do
   `mix calibrate odometry`: lets a robot drive what is wanted, asks what a tape says, tells what is wrong, and
   puts it into the robot's file.
   """
-  alias Console.Calibrate.{Live, Options, Plan, Question, Report, RobotFile, Simulated, Talk}
-  alias Console.Output
+  alias Console.Calibrate.{
+    Live,
+    Options,
+    Plan,
+    Question,
+    Report,
+    RobotFile,
+    Simulated,
+    StdinPrompt
+  }
+
+  alias Console.Cli.Output
   alias Robot.Calibration
   alias Robot.Calibration.{Drive, Keys}
 
@@ -46,9 +56,9 @@ defmodule Console.Calibrate.Odometry do
   defp live(options, file, conversions) do
     with {:ok, _apps} <- start_apps(),
          # It is carried to its mark by hand: where a fence is, it does not know.
-         {:ok, config} <- Swarm.Start.config(%{file | camera: nil, ptz: nil, fence: nil}),
+         {:ok, config} <- Swarm.MemberSpec.config(%{file | camera: nil, ptz: nil, fence: nil}),
          {:ok, _pid} <- start(config) do
-      talk = Talk.start()
+      talk = StdinPrompt.start()
 
       try do
         with :ok <- Live.ready(file.id) do
@@ -58,7 +68,7 @@ defmodule Console.Calibrate.Odometry do
       catch
         {:quit, line} -> {:error, line}
       after
-        Talk.stop(talk)
+        StdinPrompt.stop(talk)
         Robot.Fleet.stop_robot(Robot.Fleet, file.id)
       end
     end
@@ -80,7 +90,7 @@ defmodule Console.Calibrate.Odometry do
 
     words = ["go", "skip", "quit", "reset", "acknowledge"]
 
-    case Talk.choose(talk, "go, skip or quit? ", words) do
+    case StdinPrompt.choose(talk, "go, skip or quit? ", words) do
       {:ok, "go"} ->
         begin_course(task, file, options, talk)
 
@@ -88,7 +98,7 @@ defmodule Console.Calibrate.Odometry do
         []
 
       {:ok, "reset"} ->
-        :ok = Robot.Gate.reset(file.id)
+        :ok = Robot.Safety.Gate.reset(file.id)
         course(task, file, options, talk)
 
       {:ok, "acknowledge"} ->
@@ -117,7 +127,7 @@ defmodule Console.Calibrate.Odometry do
   defp measure(task, driven, file, options, talk) do
     {question, check} = Question.of(task)
 
-    case Talk.ask(talk, question, &answer(&1, check)) do
+    case StdinPrompt.ask(talk, question, &answer(&1, check)) do
       {:ok, :again} -> course(task, file, options, talk)
       {:ok, value} -> [{task, Map.merge(driven, Question.measured(task, value))}]
       :eof -> throw({:quit, "nobody answers; nothing is written"})

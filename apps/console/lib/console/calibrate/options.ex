@@ -1,6 +1,7 @@
 defmodule Console.Calibrate.Options do
   @moduledoc "The command line of `mix calibrate odometry`: words in, a checked map or lines out. Pure."
-  alias Console.{Arguments, Values}
+  alias Console.Cli
+  alias Console.Cli.Parse
 
   @type t :: %{
           file: Path.t() | nil,
@@ -22,39 +23,39 @@ defmodule Console.Calibrate.Options do
           wheels: keyword(float())
         }
 
-  @doc "The options, as `Console.Arguments` has them."
-  @spec table() :: [Arguments.option()]
+  @doc "The options, as `Console.Cli.Arguments` has them."
+  @spec table() :: [Cli.Arguments.option()]
   def table do
     [
       {"distance", "METRES", &zero_or(&1, 0.5, 50),
        "straight on, by odometry (3); 0: not at all"},
       {"angle", "DEGREES", &zero_or(&1, 90, 3600),
        "to the left, and as much to the right (720); 0: not at all"},
-      {"squares", "N", &Values.whole(&1, 0..50), "squares each way round (5); 0: none"},
-      {"side", "METRES", &Values.number(&1, 1, 20), "of the squares (4)"},
-      {"speed", "M/S", &Values.number(&1, 0.05, 0.5), "at most (0.2)"},
-      {"measured", "METRES", &Values.number(&1, 0.1, 100),
+      {"squares", "N", &Parse.whole(&1, 0..50), "squares each way round (5); 0: none"},
+      {"side", "METRES", &Parse.number(&1, 1, 20), "of the squares (4)"},
+      {"speed", "M/S", &Parse.number(&1, 0.05, 0.5), "at most (0.2)"},
+      {"measured", "METRES", &Parse.number(&1, 0.1, 100),
        "typed in, drives nothing: how far it truly went in a straight line\ninstead of --distance; may be repeated"},
-      {"turned", "DEGREES", &Values.number(&1, -4000, 4000),
+      {"turned", "DEGREES", &Parse.number(&1, -4000, 4000),
        "typed in: how far it truly turned instead of --angle, to the right\nnegative; may be repeated"},
-      {"cw", "X,Y", &Values.point/1,
+      {"cw", "X,Y", &Parse.point/1,
        "typed in: by how much the true end of a clockwise square was off the\nend that odometry told, metres ahead and to the left; once for each"},
-      {"ccw", "X,Y", &Values.point/1, "the same of a counter-clockwise one"},
+      {"ccw", "X,Y", &Parse.point/1, "the same of a counter-clockwise one"},
       {"write", nil, nil, "writes the robot file without asking; what changes is told"},
       {"dry-run", nil, nil, "tells what would be driven, and drives nothing"},
       {"simulate", nil, nil, "a simulated robot, measured by its true pose"},
-      {"seed", "N", &Values.whole(&1, 0..1_000_000), "of its noise (1)"},
-      {"seeds", "N", &Values.whole(&1, 1..1000),
+      {"seed", "N", &Parse.whole(&1, 0..1_000_000), "of its noise (1)"},
+      {"seeds", "N", &Parse.whole(&1, 1..1000),
        "so many robots, one after the other, and how well they do (1)"},
-      {"profile", "KIND", &Values.choice(&1, magellan: :magellan, atrv_mini: :atrv_mini),
+      {"profile", "KIND", &Parse.choice(&1, magellan: :magellan, atrv_mini: :atrv_mini),
        "magellan or atrv_mini (magellan)"},
-      {"noise", "KIND", &Values.choice(&1, off: :off, default: :default, slip: :slip),
+      {"noise", "KIND", &Parse.choice(&1, off: :off, default: :default, slip: :slip),
        "off, default or slip (default)"},
-      {"true-distance", "FACTOR", &Values.number(&1, 0.8, 1.25),
+      {"true-distance", "FACTOR", &Parse.number(&1, 0.8, 1.25),
        "what is wrong with it: metres for each one of odometry (1)"},
-      {"true-base", "FACTOR", &Values.number(&1, 0.8, 1.25),
+      {"true-base", "FACTOR", &Parse.number(&1, 0.8, 1.25),
        "its wheel base for each metre of the known one (1.02)"},
-      {"true-ratio", "FACTOR", &Values.number(&1, 0.9, 1.1),
+      {"true-ratio", "FACTOR", &Parse.number(&1, 0.9, 1.1),
        "way of its right wheel for its left one's (1.01)"},
       {"help", nil, nil, "this text"}
     ]
@@ -75,7 +76,7 @@ defmodule Console.Calibrate.Options do
   def parse(words) do
     {files, words} = files(words)
 
-    with {:ok, given} <- Arguments.parse(words, table()) do
+    with {:ok, given} <- Cli.Arguments.parse(words, table()) do
       map = Map.new(given)
 
       if map["help"],
@@ -159,8 +160,8 @@ defmodule Console.Calibrate.Options do
     do: options.distance == 0 and options.angle == 0 and options.squares == 0
 
   defp zero_or(text, least, most) do
-    with {:error, _allowed} <- Values.number(text, 0, 0),
-         {:error, allowed} <- Values.number(text, least, most),
+    with {:error, _allowed} <- Parse.number(text, 0, 0),
+         {:error, allowed} <- Parse.number(text, least, most),
          do: {:error, "0 or #{allowed}"}
   end
 end

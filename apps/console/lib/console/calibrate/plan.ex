@@ -1,7 +1,7 @@
 defmodule Console.Calibrate.Plan do
   @moduledoc "What a calibration of odometry will drive, in words. Pure."
   alias Console.Calibrate.{Options, Simulated}
-  alias Console.Words
+  alias Console.Cli.Format
   alias Robot.Calibration
   alias Robot.Calibration.Drive
 
@@ -14,11 +14,11 @@ defmodule Console.Calibrate.Plan do
     room = Enum.max([1.0, options.distance, if(options.squares > 0, do: options.side, else: 0.0)])
 
     [
-      "#{file.id} will drive, at #{Words.decimals(speed(options, file), 2)} m/s at most:"
+      "#{file.id} will drive, at #{Format.decimals(speed(options, file), 2)} m/s at most:"
       | tasks |> Enum.map(&"  #{name(&1)}: #{legs(&1)}") |> Enum.dedup() |> times(tasks)
     ] ++
       [
-        "It needs #{Words.decimals(room + 1, 1)} by #{Words.decimals(room + 1, 1)} m of flat floor, and someone " <>
+        "It needs #{Format.decimals(room + 1, 1)} by #{Format.decimals(room + 1, 1)} m of flat floor, and someone " <>
           "beside it. Clockwise squares lie to the right of its mark, others to the left.",
         "Its wheels turn only when you say go, each time; Enter stops it at once."
       ]
@@ -44,19 +44,19 @@ defmodule Console.Calibrate.Plan do
       "360 degrees to the right"
   """
   @spec name(Sim.Calibration.task()) :: String.t()
-  def name({:distance, way}), do: "#{Words.decimals(way, 2)} m straight on"
+  def name({:distance, way}), do: "#{Format.decimals(way, 2)} m straight on"
   def name({:angle, turn}) when turn > 0, do: "#{degrees(turn)} degrees to the left"
   def name({:angle, turn}), do: "#{degrees(-turn)} degrees to the right"
 
   def name({:square, direction, side}),
-    do: "a square of #{Words.decimals(side, 1)} m, #{Calibration.Model.words(direction)}"
+    do: "a square of #{Format.decimals(side, 1)} m, #{Calibration.Model.words(direction)}"
 
   defp legs(task) do
     Enum.map_join(Drive.legs(task), ", ", fn
-      {:go, way} -> "go #{Words.decimals(way, 2)}"
+      {:go, way} -> "go #{Format.decimals(way, 2)}"
       {:turn, turn} -> "turn #{degrees(turn)}"
     end)
   end
 
-  defp degrees(turn), do: Words.decimals(turn / @degree, 0)
+  defp degrees(turn), do: Format.decimals(turn / @degree, 0)
 end

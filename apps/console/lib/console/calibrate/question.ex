@@ -1,29 +1,29 @@
 defmodule Console.Calibrate.Question do
   @moduledoc "What a person is asked after a course, and what his answer means. Pure."
-  alias Console.Values
-  alias Console.Words
+  alias Console.Cli.Parse
+  alias Console.Cli.Format
   alias Hal.Pose
 
   @degree :math.pi() / 180
 
-  @doc "The question of a course, and the check of its answer (`Console.Calibrate.Talk.ask/3`)."
-  @spec of(Sim.Calibration.task()) :: {String.t(), Console.Arguments.check()}
+  @doc "The question of a course, and the check of its answer (`Console.Calibrate.StdinPrompt.ask/3`)."
+  @spec of(Sim.Calibration.task()) :: {String.t(), Console.Cli.Arguments.check()}
   def of({:distance, way}),
     do:
       {"How far is it from its mark, in a straight line, in metres? ",
-       &Values.number(&1, way / 2, way * 2)}
+       &Parse.number(&1, way / 2, way * 2)}
 
   def of({:angle, turn}) do
     far = abs(turn) / @degree
 
-    {"By how many degrees did it turn in all, such as #{Words.decimals(far, 0)}? ",
-     &Values.number(&1, far / 2, far * 2)}
+    {"By how many degrees did it turn in all, such as #{Format.decimals(far, 0)}? ",
+     &Parse.number(&1, far / 2, far * 2)}
   end
 
   def of({:square, _direction, _side}),
     do:
       {"Where does it stand, seen from its mark: X,Y in metres, ahead and to the left? ",
-       &Values.point/1}
+       &Parse.point/1}
 
   @doc "What was measured: the pose at the end and the turn, as far as this course tells of them."
   @spec measured(Sim.Calibration.task(), float() | Pose.point()) :: %{

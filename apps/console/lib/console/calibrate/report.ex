@@ -1,6 +1,6 @@
 defmodule Console.Calibrate.Report do
   @moduledoc "What a calibration of odometry found, in lines for people. Pure."
-  alias Console.Words
+  alias Console.Cli.Format
   alias Robot.Calibration
   alias Robot.Calibration.{Model, Squares}
 
@@ -68,7 +68,7 @@ defmodule Console.Calibrate.Report do
           "cannot tell that from unequal wheels, so the wheel ratio stays as it is",
       unsure(squares, length(measured.runs)),
       squares != nil && squares.after_m > @left_m &&
-        "#{Words.decimals(squares.after_m, 2)} m of the error are not explained by base and ratio: was one " <>
+        "#{Format.decimals(squares.after_m, 2)} m of the error are not explained by base and ratio: was one " <>
           "square measured wrongly, or do the wheels slip?"
     ]
     |> Enum.filter(& &1)
@@ -94,8 +94,8 @@ defmodule Console.Calibrate.Report do
         else: ""
 
     [
-      "squares      end #{Words.decimals(squares.before_m, 3)} m off; " <>
-        "#{Words.decimals(squares.after_m, 3)} m with these wheels#{sure}",
+      "squares      end #{Format.decimals(squares.before_m, 3)} m off; " <>
+        "#{Format.decimals(squares.after_m, 3)} m with these wheels#{sure}",
       "             UMBmark's formulas alone: base #{factor(formulas.base)}, ratio #{factor(formulas.ratio)}"
     ]
   end
@@ -109,8 +109,8 @@ defmodule Console.Calibrate.Report do
   @spec factor(float()) :: String.t()
   def factor(value) do
     sign = if value >= 1, do: "+", else: ""
-    "#{Words.decimals(value, 4)} (#{sign}#{percent(value - 1)})"
+    "#{Format.decimals(value, 4)} (#{sign}#{percent(value - 1)})"
   end
 
-  defp percent(share), do: "#{Words.decimals(100 * share, 2)} %"
+  defp percent(share), do: "#{Format.decimals(100 * share, 2)} %"
 end

@@ -3,8 +3,8 @@ defmodule Console.Calibrate.RobotFile do
   Puts what was found into a robot file. What changes is told before it is written, and nothing is
   written that says anything else than before but for these numbers.
   """
-  alias Console.Calibrate.Talk
-  alias Console.Diff
+  alias Console.Calibrate.StdinPrompt
+  alias Console.Cli.Diff
 
   @doc "The file, and the conversions of its drive, `nil` for a drive that has none."
   @spec load(Path.t()) :: {:ok, Robot.File.t(), keyword() | nil} | {:error, [String.t()]}
@@ -23,7 +23,7 @@ defmodule Console.Calibrate.RobotFile do
   Shows the change, and writes it when it is wanted: `:always`, or asked for by `talk`, or `:never`. The new
   file takes the place of the old one at once.
   """
-  @spec write(Path.t(), keyword(float()), :always | :never | Talk.t()) ::
+  @spec write(Path.t(), keyword(float()), :always | :never | StdinPrompt.t()) ::
           :ok | {:error, String.t()}
   def write(path, keys, wanted) do
     with {:ok, old} <- read(path),
@@ -78,8 +78,8 @@ defmodule Console.Calibrate.RobotFile do
   defp decide(path, _new, _same?, :never), do: IO.puts("#{path} not written; --write writes it")
   defp decide(path, new, _same?, :always), do: replace(path, new)
 
-  defp decide(path, new, _same?, %Talk{} = talk) do
-    case Talk.choose(talk, "write it? (yes, no) ", ["yes", "no"]) do
+  defp decide(path, new, _same?, %StdinPrompt{} = talk) do
+    case StdinPrompt.choose(talk, "write it? (yes, no) ", ["yes", "no"]) do
       {:ok, "yes"} -> replace(path, new)
       _no_or_end -> IO.puts("#{path} not written")
     end

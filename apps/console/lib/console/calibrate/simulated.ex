@@ -1,7 +1,7 @@
 defmodule Console.Calibrate.Simulated do
   @moduledoc "Calibrates simulated robots, and tells how near it came to what was put into their wheels."
   alias Console.Calibrate.Report
-  alias Console.{Output, Progress, Words}
+  alias Console.Cli.{Format, Output, Progress}
   alias Robot.Calibration
   alias Sim.Calibration, as: Simulated
 
@@ -103,8 +103,8 @@ defmodule Console.Calibrate.Simulated do
   end
 
   defp found({key, error}, wheels, truth) do
-    "#{key} #{Words.decimals(Map.fetch!(wheels, key), 4)} of #{Words.decimals(Map.fetch!(truth, key), 4)} " <>
-      "(#{Words.decimals(100 * error, 3)} % off)"
+    "#{key} #{Format.decimals(Map.fetch!(wheels, key), 4)} of #{Format.decimals(Map.fetch!(truth, key), 4)} " <>
+      "(#{Format.decimals(100 * error, 3)} % off)"
   end
 
   defp conclude(all, output) do
@@ -116,7 +116,7 @@ defmodule Console.Calibrate.Simulated do
 
       Output.line(
         output,
-        "#{key}: at most #{Words.decimals(100 * Enum.max(errors), 3)} % off, " <>
+        "#{key}: at most #{Format.decimals(100 * Enum.max(errors), 3)} % off, " <>
           "#{within} of #{length(errors)} within #{100 * goal} %"
       )
 

@@ -4,7 +4,7 @@ defmodule Console.Live.Fleet do
   door that real ones have (`Swarm`).
   """
   @behaviour Console.Live
-  alias Console.Words
+  alias Console.Cli.Format
   alias Robot.Command
   alias Sim.Fleet
 
@@ -57,9 +57,9 @@ defmodule Console.Live.Fleet do
   # Robots have no map: what lies in a wall can only be seen here.
   defp on_floor(text, map) do
     with {:ok, {:goto, x, y, _heading}} <- Command.parse(text, []),
-         true <- Sim.Map.wall?(map, {x, y}) do
-      {width, height} = Sim.Map.size(map)
-      size = "#{Words.decimals(width, 1)} x #{Words.decimals(height, 1)} m"
+         true <- Sim.Floorplan.wall?(map, {x, y}) do
+      {width, height} = Sim.Floorplan.size(map)
+      size = "#{Format.decimals(width, 1)} x #{Format.decimals(height, 1)} m"
       {:error, "no robot can stand at #{x},#{y}: map #{map.name} is #{size}, and that is a wall"}
     else
       _floor_or_no_place -> :ok

@@ -1,6 +1,6 @@
 defmodule Console.Picture.Floor do
   @moduledoc "The upper part of a run's picture: walls, everybody's way, and where all ended. Pure."
-  alias Console.{Ground, Svg, Track}
+  alias Console.Picture.{MapView, RunTrack, Svg}
   alias Console.Picture.{Colours, Labels}
   alias Hal.Pose
 
@@ -13,11 +13,11 @@ defmodule Console.Picture.Floor do
   The part of the map worth showing: all of it, or what lies round the ways when they fill
   less than most of it.
   """
-  @spec box(Ground.t(), Track.t()) :: Ground.box()
+  @spec box(MapView.t(), RunTrack.t()) :: MapView.box()
   def box(ground, track) do
     places = List.flatten(Map.values(track.ways)) ++ track.landmark
     slots = for %{slot: {_x, _y} = slot} <- track.last.robots, do: slot
-    around = &Ground.around(ground, places ++ slots, 1.0, &1)
+    around = &MapView.around(ground, places ++ slots, 1.0, &1)
     {left, bottom, right, top} = around.({5.0, 5.0})
     {wide, high} = {right - left, top - bottom}
     # As wide in proportion as the place it is drawn in, where the map has the room.
@@ -25,12 +25,12 @@ defmodule Console.Picture.Floor do
       box = around.({max(wide, @aspect * high), max(high, wide / @aspect)})
 
     if (right - left) * (top - bottom) > 0.8 * ground.width * ground.height,
-      do: Ground.box(ground),
+      do: MapView.box(ground),
       else: box
   end
 
   @doc "The drawing, `scale` pixels to the metre, its upper left corner at 0,0."
-  @spec draw(Ground.t(), Track.t(), Ground.box(), float()) :: iodata()
+  @spec draw(MapView.t(), RunTrack.t(), MapView.box(), float()) :: iodata()
   def draw(ground, track, {left, bottom, right, top} = box, scale) do
     at = fn {x, y} -> {(x - left) * scale, (top - y) * scale} end
     width = (right - left) * scale
@@ -63,7 +63,7 @@ defmodule Console.Picture.Floor do
   end
 
   @doc "Colour and dash of every robot by name."
-  @spec colours(Track.t()) :: %{atom() => {String.t(), String.t() | nil}}
+  @spec colours(RunTrack.t()) :: %{atom() => {String.t(), String.t() | nil}}
   def colours(track) do
     track.first.robots
     |> Enum.with_index()

@@ -1,6 +1,6 @@
 defmodule Console.Picture.Labels do
   @moduledoc "Names and numbered stages on a run's picture, placed so that they hide little. Pure."
-  alias Console.{Svg, Track}
+  alias Console.Picture.{RunTrack, Svg}
   alias Console.Picture.Colours
   alias Hal.Pose
 
@@ -8,7 +8,7 @@ defmodule Console.Picture.Labels do
   @halo [paint_order: "stroke", stroke: "#FFFFFF", stroke_width: 3, stroke_linejoin: "round"]
 
   @doc "All labels; `at` turns metres into pixels."
-  @spec draw(Track.t(), (Pose.point() -> {float(), float()}), float(), float()) :: iodata()
+  @spec draw(RunTrack.t(), (Pose.point() -> {float(), float()}), float(), float()) :: iodata()
   def draw(track, at, scale, width) do
     marks = marks(track, at, scale)
     taken = for {_number, {x, y}} <- marks, do: {x - 9, y - 9, 18, 18}

@@ -1,6 +1,7 @@
 defmodule Console.Picture.Plot do
   @moduledoc "The lower part of a run's picture: the formation error over time, with the stages. Pure."
-  alias Console.{Svg, Track, Words}
+  alias Console.Cli.Format
+  alias Console.Picture.{RunTrack, Svg}
   alias Console.Picture.Labels
 
   @ink "#22262B"
@@ -10,7 +11,7 @@ defmodule Console.Picture.Plot do
   @limit 0.25
 
   @doc "The plot in a field of this size, its upper left corner at 0,0; axis labels stand outside."
-  @spec draw(Track.t(), float(), float()) :: iodata()
+  @spec draw(RunTrack.t(), float(), float()) :: iodata()
   def draw(track, width, height) do
     end_s = max(track.last.at_ms / 1000, 1.0)
     top = top(track.errors)
@@ -86,7 +87,7 @@ defmodule Console.Picture.Plot do
     )
   end
 
-  defp tick(value, step), do: Words.decimals(value, if(step < 1, do: 1, else: 0))
+  defp tick(value, step), do: Format.decimals(value, if(step < 1, do: 1, else: 0))
 
   defp limit(width, y) do
     at = y.(@limit)

@@ -5,7 +5,7 @@ defmodule Console.Terminal.Canvas do
   A character is taken to be twice as high as wide, so a circle on the floor is one on the screen.
   Rows are lists of `{text, style}`; `Console.Terminal.Style` turns styles into colours.
   """
-  alias Console.Ground
+  alias Console.Picture.MapView
   alias Hal.Pose
 
   @arrows {"→", "↗", "↑", "↖", "←", "↙", "↓", "↘"}
@@ -36,7 +36,7 @@ defmodule Console.Terminal.Canvas do
   The floor for this many characters, made anew only when size, map or part shown have changed:
   looking for walls costs more than all the rest.
   """
-  @spec floor(floor() | nil, Ground.t(), Sim.Scene.t(), pos_integer(), pos_integer()) :: floor()
+  @spec floor(floor() | nil, MapView.t(), Sim.Scene.t(), pos_integer(), pos_integer()) :: floor()
   def floor(old, ground, scene, columns, rows) do
     box = part(ground, scene, columns, rows)
     key = {ground.name, box, columns, rows}
@@ -70,7 +70,7 @@ defmodule Console.Terminal.Canvas do
   # The whole map, as long as a robot's length still moves it by about one character; else the
   # part where the living robots and the landmark are, in whole steps of 2 m so that it rests.
   defp part(ground, scene, columns, rows) do
-    {left, bottom, right, top} = Ground.box(ground)
+    {left, bottom, right, top} = MapView.box(ground)
     whole = {left - @edge, bottom - @edge, right + @edge, top + @edge}
 
     if scale(whole, columns, rows) <= 0.6 do
@@ -80,7 +80,7 @@ defmodule Console.Terminal.Canvas do
         for(%{alive: true} = robot <- scene.robots, do: Pose.point(robot.pose)) ++
           List.wrap(scene.landmark)
 
-      {left, bottom, right, top} = Ground.around(ground, places, 1.0, {8.0, 8.0})
+      {left, bottom, right, top} = MapView.around(ground, places, 1.0, {8.0, 8.0})
       {outward(left, -1), outward(bottom, -1), outward(right, 1), outward(top, 1)}
     end
   end

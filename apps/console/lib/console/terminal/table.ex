@@ -1,6 +1,6 @@
 defmodule Console.Terminal.Table do
   @moduledoc "The robots as a table that never has more rows than there is room for. Pure."
-  alias Console.Words
+  alias Console.Cli.Format
   alias Sim.Scene
 
   @width 36
@@ -60,7 +60,7 @@ defmodule Console.Terminal.Table do
   defp off(robot) do
     case Scene.slot_error(robot) do
       nil -> ""
-      metres -> Words.decimals(metres, 2)
+      metres -> Format.decimals(metres, 2)
     end
   end
 
@@ -77,16 +77,16 @@ defmodule Console.Terminal.Table do
   defp within(%{uncertainty: metres}), do: "±" <> figure(metres)
 
   # Never wider than four characters.
-  defp figure(metres) when metres < 9.995, do: Words.decimals(metres, 2)
-  defp figure(metres) when metres < 99.95, do: Words.decimals(metres, 1)
-  defp figure(metres), do: Words.decimals(min(metres, 9_999), 0)
+  defp figure(metres) when metres < 9.995, do: Format.decimals(metres, 2)
+  defp figure(metres) when metres < 99.95, do: Format.decimals(metres, 1)
+  defp figure(metres), do: Format.decimals(min(metres, 9_999), 0)
 
   defp within_style(%{state: :unsure}), do: :unsure
   defp within_style(_robot), do: :dim
 
   defp sees(%{alive: false}), do: {"", :dim}
   defp sees(%{size_ppm: nil}), do: {"–", :dim}
-  defp sees(%{size_ppm: ppm}), do: {"◆ #{Words.decimals(ppm / 10_000, 1)}", :landmark}
+  defp sees(%{size_ppm: ppm}), do: {"◆ #{Format.decimals(ppm / 10_000, 1)}", :landmark}
 
   defp name(%{alive: false}), do: :dead
   defp name(%{leader?: true}), do: :leader

@@ -13,13 +13,14 @@ defmodule Mix.Tasks.Bench do
   input, or a run could not be made.
   """
   use Mix.Task
-  alias Console.{Arguments, Bench, Build, Output, Progress, Values}
+  alias Console.Cli
+  alias Console.Cli.{Build, Output, Parse, Progress}
 
   @impl Mix.Task
   def run(["demo" | arguments]) do
     Build.update()
 
-    case Arguments.parse(arguments, table()) do
+    case Cli.Arguments.parse(arguments, table()) do
       {:ok, pairs} -> pairs |> Map.new() |> measure()
       {:error, lines} -> refuse(lines)
     end
@@ -99,10 +100,10 @@ defmodule Mix.Tasks.Bench do
 
   defp table do
     [
-      {"seeds", "A-B", &Values.span(&1, 0..100_000), "which seeds (1-40)"},
+      {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds (1-40)"},
       {"cases", "NAME,NAME", &Bench.choose/1, "which cases (all)"},
       {"maps", "NAME,NAME", &maps/1, "which maps (hall,hospital)"},
-      {"blobs", "HOW", &Values.choice(&1, painted: :painted, direct: :direct),
+      {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
        "painted or direct (painted)"},
       {"markdown", "FILE", &{:ok, &1}, "write the table there too"},
       {"help", nil, nil, "this text"}
@@ -119,7 +120,7 @@ defmodule Mix.Tasks.Bench do
 
   defp help do
     cases = Enum.map_join(Bench.cases(), "\n", &"  #{String.pad_trailing(&1.name, 18)}#{&1.says}")
-    IO.puts("  mix bench demo [options]\n\n#{Arguments.help(table())}\n\nCases\n#{cases}")
+    IO.puts("  mix bench demo [options]\n\n#{Cli.Arguments.help(table())}\n\nCases\n#{cases}")
   end
 
   defp refuse(lines) do

@@ -11,7 +11,7 @@ defmodule Mix.Tasks.Calibrate do
   Exit status: 0 all went well, 1 something was wrong with the input, or with what was measured.
   """
   use Mix.Task
-  alias Console.Build
+  alias Console.Cli.Build
 
   @words ["odometry", "colour"]
 
@@ -79,7 +79,7 @@ defmodule Mix.Tasks.Calibrate do
     1996); before each a person says go, after each he types what he measured. Enter stops it at once.
     What was found is shown as the change of the robot file, and written when he says so.
 
-    #{Console.Arguments.help(Console.Calibrate.Options.table())}
+    #{Console.Cli.Arguments.help(Console.Calibrate.Options.table())}
 
     Examples:
 
@@ -110,7 +110,7 @@ defmodule Mix.Tasks.Calibrate do
     Outliers in a box are left out (edges, glare, background in its corners); what is left is widened
     by what a change of light does, as far as nothing else in the picture is taken for the colour.
 
-    #{Console.Arguments.help(Console.Calibrate.ColourOptions.table())}
+    #{Console.Cli.Arguments.help(Console.Calibrate.ColourOptions.table())}
 
     Examples:
 

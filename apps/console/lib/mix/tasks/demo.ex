@@ -10,7 +10,9 @@ defmodule Mix.Tasks.Demo do
   wrong with the input.
   """
   use Mix.Task
-  alias Console.{Build, Demo, Live, Options, Session}
+  alias Console.{Demo, Live, Options}
+  alias Console.Cli.Build
+  alias Console.Terminal.Session
 
   # Twenty robots take a third of a processor, fifty a whole one: all hear all.
   @robots_a_processor 20

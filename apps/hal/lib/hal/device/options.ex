@@ -1,6 +1,6 @@
 defmodule Hal.Device.Options do
   @moduledoc "The options of `Hal.Device`, checked once. Pure."
-  alias Hal.Arming
+  alias Hal.Device.Arming
 
   @doc "The fields of a device; `ArgumentError` names an option, its value and what it must be."
   @spec check!(keyword()) :: keyword()

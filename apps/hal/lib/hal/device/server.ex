@@ -1,10 +1,10 @@
 defmodule Hal.Device.Server do
   @moduledoc """
   The process of a device (`Hal.Device`): what comes in, and in which order it is done. What is done is
-  `Hal.Device.Work`'s and `Hal.Device.Wishes`'s.
+  `Hal.Device.Lifecycle`'s and `Hal.Device.Wishes`'s.
   """
   use GenServer
-  alias Hal.Device.{News, State, Wishes, Work}
+  alias Hal.Device.{Lifecycle, Publisher, State, Wishes}
   alias Hal.Twist
 
   @rest_ms 500
@@ -21,7 +21,7 @@ defmodule Hal.Device.Server do
 
   defp succeed(%{was: {m, f, a}} = s) do
     case apply(m, f, a) do
-      {:online, _since_ms} = health -> News.fallen(%{s | health: health})
+      {:online, _since_ms} = health -> Publisher.fallen(%{s | health: health})
       health -> %{s | health: health}
     end
   end
@@ -29,7 +29,7 @@ defmodule Hal.Device.Server do
   @impl GenServer
   def handle_continue(:open, s), do: {:noreply, open(s)}
 
-  defp open(s), do: s |> Work.open() |> Wishes.ask() |> Wishes.remind()
+  defp open(s), do: s |> Lifecycle.open() |> Wishes.ask() |> Wishes.remind()
 
   @impl GenServer
   def handle_call(:arming, _from, s), do: {:reply, s.arming, s}
@@ -43,7 +43,7 @@ defmodule Hal.Device.Server do
 
   def handle_call(order, _from, %{kind: :drive} = s)
       when order in [:arm, :disarm, :acknowledge] do
-    {answer, s} = Work.order(s, order)
+    {answer, s} = Lifecycle.order(s, order)
     {:reply, answer, s}
   end
 
@@ -52,10 +52,10 @@ defmodule Hal.Device.Server do
 
   @impl GenServer
   def handle_cast({:drive, twist}, %{kind: :drive, inner: {:open, _}} = s),
-    do: {:noreply, Work.drive(s, twist)}
+    do: {:noreply, Lifecycle.drive(s, twist)}
 
   def handle_cast({:disarm, then}, %{kind: :drive} = s) do
-    {_answer, s} = Work.order(s, :disarm)
+    {_answer, s} = Lifecycle.order(s, :disarm)
     with {m, f, a} <- then, do: apply(m, f, a)
     {:noreply, s}
   end
@@ -73,29 +73,29 @@ defmodule Hal.Device.Server do
   def handle_info({:open, _old}, s), do: {:noreply, s}
 
   def handle_info({:watchdog, ref}, %{watchdog: {_timer, ref}, inner: {:open, _}} = s) do
-    News.watchdog(s)
-    {:noreply, Work.drive_on(s, Twist.zero())}
+    Publisher.watchdog(s)
+    {:noreply, Lifecycle.drive_on(s, Twist.zero())}
   end
 
   def handle_info({:watchdog, _old}, s), do: {:noreply, s}
 
   def handle_info({:listen, ref}, %{listening: ref, inner: {:open, _}} = s),
-    do: {:noreply, s |> Work.judge() |> Work.listen()}
+    do: {:noreply, s |> Lifecycle.judge() |> Lifecycle.listen()}
 
   def handle_info({:listen, _old}, s), do: {:noreply, s}
 
   def handle_info(message, %{inner: {:open, inner}} = s) do
     case s.driver.handle_message(message, inner) do
       {:ok, [], inner} ->
-        {:noreply, Work.judge(%{s | inner: {:open, inner}})}
+        {:noreply, Lifecycle.judge(%{s | inner: {:open, inner}})}
 
       {:ok, readings, inner} ->
-        for reading <- readings, do: News.hand_on(s, reading)
-        s = Work.measured(%{s | inner: {:open, inner}}, readings)
-        {:noreply, s |> Work.judge() |> Wishes.ask()}
+        for reading <- readings, do: Publisher.hand_on(s, reading)
+        s = Lifecycle.measured(%{s | inner: {:open, inner}}, readings)
+        {:noreply, s |> Lifecycle.judge() |> Wishes.ask()}
 
       {:error, reason, inner} ->
-        {:noreply, Work.fail(s, reason, inner)}
+        {:noreply, Lifecycle.fail(s, reason, inner)}
     end
   end
 
@@ -107,7 +107,7 @@ defmodule Hal.Device.Server do
     with {:open, inner} <- s.inner, do: s.driver.terminate(inner)
 
     unless asked?(reason) do
-      News.fallen(%{s | inner: :closed})
+      Publisher.fallen(%{s | inner: :closed})
       rest()
     end
   end

@@ -5,14 +5,14 @@ defmodule Hal.Device.State do
   | module | what it does |
   |---|---|
   | `Hal.Device.Server` | the process: what comes in, in which order |
-  | `Hal.Device.Work` | opens and closes the driver, judges it, drives the wheels |
+  | `Hal.Device.Lifecycle` | opens and closes the driver, judges it, drives the wheels |
   | `Hal.Device.Wishes` | what is wished of a camera, or of a pan-tilt unit |
   | `Hal.Device.Watchdog` | stops wheels that nobody asks anything of |
-  | `Hal.Device.News` | tells sinks and events of changes |
-  | `Hal.Device.Signs`, `Hal.Arming` | pure: whether it gives signs of life; whether wheels may turn |
+  | `Hal.Device.Publisher` | tells sinks and events of changes |
+  | `Hal.Device.Liveness`, `Hal.Device.Arming` | pure: whether it gives signs of life; whether wheels may turn |
   """
-  alias Hal.Arming
-  alias Hal.Device.{Options, Signs}
+  alias Hal.Device.Arming
+  alias Hal.Device.{Liveness, Options}
 
   @enforce_keys [:kind, :device, :driver, :options, :sinks, :clock]
   defstruct @enforce_keys ++
@@ -54,7 +54,7 @@ defmodule Hal.Device.State do
           wishes: %{atom() => list()},
           about: map(),
           sonar?: boolean(),
-          signs: Signs.t() | nil,
+          signs: Liveness.t() | nil,
           listening: reference() | nil
         }
 

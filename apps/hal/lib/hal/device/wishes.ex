@@ -3,7 +3,7 @@ defmodule Hal.Device.Wishes do
   What is wished of a device beside speeds: where a pan-tilt unit is to look, and of a camera its next picture.
   The last wishes are kept, and said again to a driver that was opened anew.
   """
-  alias Hal.Device.{State, Work}
+  alias Hal.Device.{Lifecycle, State}
 
   @doc "Takes a wish, and says it if somebody is there who knows it."
   @spec wish(State.t(), callback :: atom(), arguments :: list()) :: State.t()
@@ -16,14 +16,16 @@ defmodule Hal.Device.Wishes do
 
   @doc "A camera gives its next picture only once the last one was handed on."
   @spec ask(State.t()) :: State.t()
-  def ask(%{kind: :camera, inner: {:open, inner}} = s), do: Work.done(s, s.driver.next(inner))
+  def ask(%{kind: :camera, inner: {:open, inner}} = s),
+    do: Lifecycle.done(s, s.driver.next(inner))
+
   def ask(s), do: s
 
   defp carry_out(%{inner: {:open, inner}} = s, callback) do
     arguments = s.wishes[callback] ++ [inner]
 
     if function_exported?(s.driver, callback, length(arguments)),
-      do: Work.done(s, apply(s.driver, callback, arguments)),
+      do: Lifecycle.done(s, apply(s.driver, callback, arguments)),
       else: s
   end
 

@@ -27,17 +27,17 @@ defmodule Hal.RFlex.Driver do
 
   ## Driving
 
-  A speed goes through `Hal.Ramp`, last before the wire, every 50 ms, and is repeated every 100 ms, zero
+  A speed goes through `Hal.SlewLimiter`, last before the wire, every 50 ms, and is repeated every 100 ms, zero
   too: a frame may be lost, and the controller stops by itself when it hears nothing for some time (how long
   is not known). A stop is not ramped: it is the next thing on the wire, and the controller brakes with
-  `max_braking`. What is no speed (`Hal.Ramp.check/1`) is a stop, and counted. A speed that was not
+  `max_braking`. What is no speed (`Hal.SlewLimiter.check/1`) is a stop, and counted. A speed that was not
   renewed for 500 ms is zero. The brake is released before the first speed, and again when the controller
   says that it is set; `init` sets it. A driver that was held up until the line said its last words begins
   again like that: from standing, with the brake.
 
   Without `distance` or `angle` there is no odometry, and every speed is a stop.
 
-  The line's last words are a stop of both axes and the brake, twice (`Hal.RFlex.Speech`).
+  The line's last words are a stop of both axes and the brake, twice (`Hal.RFlex.Commands`).
 
   ## Readings
 
@@ -51,8 +51,8 @@ defmodule Hal.RFlex.Driver do
   switched off and on; one that sends nothing at all for 2 s is the error `:silent`.
   """
   @behaviour Hal.Drive
-  alias Hal.{Event, Ramp, Serial, Twist}
-  alias Hal.RFlex.{Command, Decoder, Options, Outlook, Queue, Senses, Speech}
+  alias Hal.{Event, Serial, SlewLimiter, Twist}
+  alias Hal.RFlex.{Command, Commands, Decoder, Options, Outlook, Queue, Readings}
 
   @tick_ms 50
   @repeat_ms 100
@@ -94,7 +94,7 @@ defmodule Hal.RFlex.Driver do
         {:error, line} -> raise ArgumentError, line
       end
 
-    serial = Options.line(options) ++ [last_words: Speech.last_words(options)]
+    serial = Options.line(options) ++ [last_words: Commands.last_words(options)]
     with {:ok, line} <- Serial.open(serial), do: {:ok, start(options, line)}
   end
 
@@ -107,7 +107,7 @@ defmodule Hal.RFlex.Driver do
   @impl Hal.Drive
   def judge(given) do
     with {:ok, options} <- Options.new(given) do
-      senses = Speech.senses(options)
+      senses = Commands.senses(options)
       odd = Outlook.odd(options, given)
       {:ok, %{ready: Outlook.ready(options), senses: senses, odd: odd}}
     end
@@ -132,7 +132,7 @@ defmodule Hal.RFlex.Driver do
     at_ms = now(s)
 
     s =
-      case Ramp.check(twist) do
+      case SlewLimiter.check(twist) do
         :ok -> %{s | wanted: twist, wanted_ms: at_ms}
         {:error, _line} -> refuse(s, at_ms)
       end
@@ -159,7 +159,7 @@ defmodule Hal.RFlex.Driver do
   def terminate(s) do
     # Kept where the device's next opening finds it: odometry that begins again would be a leap.
     Process.put({__MODULE__, name(s.options)}, {s.senses.odometry, s.senses.frame})
-    Serial.last_words(s.line, Speech.farewell(s.options))
+    Serial.last_words(s.line, Commands.farewell(s.options))
     Serial.close(s.line)
   end
 
@@ -171,7 +171,7 @@ defmodule Hal.RFlex.Driver do
   def counts(%__MODULE__{} = s) do
     s.decoder
     |> Map.take([:packets, :skipped, :given_up, :ghosts])
-    |> Map.merge(Senses.counts(s.senses))
+    |> Map.merge(Readings.counts(s.senses))
     |> Map.merge(%{refused: s.refused, overruns: s.overruns})
   end
 
@@ -183,8 +183,8 @@ defmodule Hal.RFlex.Driver do
 
     # A process that begins knows of no way before: what it counts from now on is a frame of its own.
     {before, frame} = Process.delete({__MODULE__, name(options)}) || {nil, make_ref()}
-    queue = Enum.reduce(Speech.first_words(options), Queue.new(options.pace_ms), &put/2)
-    queue = Queue.stop(put({:brake, Command.brake()}, queue), Speech.stop(options))
+    queue = Enum.reduce(Commands.first_words(options), Queue.new(options.pace_ms), &put/2)
+    queue = Queue.stop(put({:brake, Command.brake()}, queue), Commands.stop(options))
 
     %__MODULE__{
       options: options,
@@ -192,7 +192,7 @@ defmodule Hal.RFlex.Driver do
       ref: ref,
       queue: queue,
       ramp: options.limits,
-      senses: Senses.new(options, before, frame),
+      senses: Readings.new(options, before, frame),
       heard_ms: at_ms,
       bytes_ms: at_ms,
       stepped_ms: at_ms,
@@ -212,14 +212,14 @@ defmodule Hal.RFlex.Driver do
   defp step(s, at_ms) do
     s = if at_ms - s.stepped_ms >= pause_ms(s), do: stood(s), else: s
     wanted = if known?(s), do: s.wanted, else: Twist.zero()
-    {_twist, ramp} = Ramp.step(s.ramp, wanted, (at_ms - s.stepped_ms) / 1000)
+    {_twist, ramp} = SlewLimiter.step(s.ramp, wanted, (at_ms - s.stepped_ms) / 1000)
     %{s | ramp: ramp, stepped_ms: at_ms}
   end
 
   # Whoever was away for so long comes back to a line that has said its last words.
   defp pause_ms(s), do: s.options.serial[:keep_alive_ms] || 200
 
-  defp stood(s), do: %{s | ramp: Ramp.standing(s.ramp), said: nil, released?: false}
+  defp stood(s), do: %{s | ramp: SlewLimiter.standing(s.ramp), said: nil, released?: false}
 
   defp known?(%{options: %{conversions: conversions}}),
     do: conversions.distance != nil and conversions.angle != nil
@@ -233,10 +233,10 @@ defmodule Hal.RFlex.Driver do
   defp say_speed(%{ramp: %{twist: twist}} = s, at_ms) do
     queue =
       if Twist.zero?(twist) do
-        Queue.stop(s.queue, Speech.stop(s.options))
+        Queue.stop(s.queue, Commands.stop(s.options))
       else
         before = s.said || Twist.zero()
-        Enum.reduce(Speech.speed(s.options, twist, before), release(s), &put/2)
+        Enum.reduce(Commands.speed(s.options, twist, before), release(s), &put/2)
       end
 
     again(
@@ -292,7 +292,7 @@ defmodule Hal.RFlex.Driver do
     wheels? = s.senses.motor_ms != nil and at_ms - s.senses.motor_ms < @no_wheels_ms
 
     if not wheels? and due?(s, :setup, at_ms) do
-      queue = Enum.reduce(Speech.first_words(s.options), s.queue, &put/2)
+      queue = Enum.reduce(Commands.first_words(s.options), s.queue, &put/2)
       again(%{s | queue: queue}, :setup, at_ms, @again_ms)
     else
       s
@@ -301,7 +301,7 @@ defmodule Hal.RFlex.Driver do
 
   defp standing(s, at_ms) do
     if at_ms - s.heard_ms < @no_wheels_ms and due?(s, :standing, at_ms),
-      do: {Senses.standing(s.senses), again(s, :standing, at_ms, @repeat_ms)},
+      do: {Readings.standing(s.senses), again(s, :standing, at_ms, @repeat_ms)},
       else: {[], s}
   end
 
@@ -352,10 +352,10 @@ defmodule Hal.RFlex.Driver do
   end
 
   defp packet(senses, packet, at_ms) do
-    {readings, heard} = Senses.packet(senses, packet, at_ms)
+    {readings, heard} = Readings.packet(senses, packet, at_ms)
 
-    if Senses.jumps(heard) > Senses.jumps(senses),
-      do: Senses.reframe(readings, heard, make_ref()),
+    if Readings.jumps(heard) > Readings.jumps(senses),
+      do: Readings.reframe(readings, heard, make_ref()),
       else: {readings, heard}
   end
 

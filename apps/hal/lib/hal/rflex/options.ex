@@ -3,7 +3,7 @@ defmodule Hal.RFlex.Options do
   What `Hal.RFlex.Driver` is started with, checked, with all defaults filled in. Pure.
   The table is in the driver's documentation.
   """
-  alias Hal.{Profile, Ramp, Serial}
+  alias Hal.{Profile, Serial, SlewLimiter}
   alias Hal.RFlex.{Bumpers, Conversions, Infrared}
 
   @defaults [
@@ -215,7 +215,7 @@ defmodule Hal.RFlex.Options do
     with :ok <- known([:limits], given[:limits], @limits),
          :ok <- all([:limits], given[:limits], &limit(&1, &2, profile)) do
       defaults = for key <- Enum.take(@limits, 4), do: {key, Map.fetch!(profile, key)}
-      {:ok, Ramp.new(Keyword.merge(defaults, given[:limits]))}
+      {:ok, SlewLimiter.new(Keyword.merge(defaults, given[:limits]))}
     end
   end
 

@@ -3,7 +3,7 @@ defmodule Hal.RFlex.Outlook do
   What can be said of a base by its options alone, before its line is open: whether it may be armed, what
   it reads, and what is allowed and odd all the same. Driver and `mix robot.check` ask here. Pure.
   """
-  alias Hal.RFlex.{Conversions, Options, Speech}
+  alias Hal.RFlex.{Commands, Conversions, Options}
 
   @baud 115_200
   # Robots of one kind differ by some percent; by so much no two that were public.
@@ -19,7 +19,7 @@ defmodule Hal.RFlex.Outlook do
   """
   @spec ready(Options.t()) :: :ok | {:error, line :: String.t()}
   def ready(%Options{} = options),
-    do: Conversions.ready(options.conversions, Speech.senses(options))
+    do: Conversions.ready(options.conversions, Commands.senses(options))
 
   @doc """
   What is allowed and odd, a line each, with the number that would be usual; `given` are the options as they

@@ -2,14 +2,14 @@ if Code.ensure_loaded?(Circuits.UART) do
   defmodule Hal.Serial.Circuits do
     @moduledoc """
     A serial line (`Hal.Serial`) by `circuits_uart`, for programs that have it anyway: with `MIX_TARGET`
-    other than `host`. `Hal.Serial.Port` is the one for robots with wheels, because here **the last words
+    other than `host`. `Hal.Serial.Native` is the one for robots with wheels, because here **the last words
     are said by this VM**:
 
       * at closing, when the line's process ends, and in its silence they are written as promised
       * when the VM itself is killed, frozen or has crashed they are **not**: the robot goes on until its
         controller, or somebody at the emergency stop, ends that
 
-    A process stands between the line and its owner (`Hal.Serial.Circuits.Keeper`), so that nobody waits
+    A process stands between the line and its owner (`Hal.Serial.Circuits.Server`), so that nobody waits
     for a write. What comes in piles up in the mailbox of an owner who does not look. There is no `:pty`.
 
     Errors of `open/1`: `:enoent`, `:eacces`, `:ebusy`, `:eio`, `:enotty`, `:einval`, `{:os, text}`,
@@ -17,7 +17,7 @@ if Code.ensure_loaded?(Circuits.UART) do
     `:closed`.
     """
     @behaviour Hal.Serial.Line
-    alias Hal.Serial.Circuits.Keeper
+    alias Hal.Serial.Circuits
     alias Hal.Serial.Line
 
     @out_most 4096
@@ -36,7 +36,7 @@ if Code.ensure_loaded?(Circuits.UART) do
     def open(options) do
       under_way = :atomics.new(1, [])
 
-      case GenServer.start(Keeper, {self(), under_way, options}) do
+      case GenServer.start(Circuits.Server, {self(), under_way, options}) do
         {:ok, keeper} ->
           monitor = Process.monitor(keeper)
           {:ok, %__MODULE__{keeper: keeper, monitor: monitor, under_way: under_way}}

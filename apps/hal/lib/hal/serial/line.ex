@@ -1,6 +1,6 @@
 defmodule Hal.Serial.Line do
   @moduledoc """
-  What carries a serial line (`Hal.Serial`): `Hal.Serial.Port`, which is always there, or
+  What carries a serial line (`Hal.Serial`): `Hal.Serial.Native`, which is always there, or
   `Hal.Serial.Circuits`, where `circuits_uart` is. All functions are called by the process that
   opened the line.
   """

@@ -4,7 +4,7 @@ defmodule Hal.Visca.Driver do
 
       {Hal.Device, kind: :ptz, driver: {Hal.Visca.Driver, port: "/dev/ttyS2"}, sinks: [...]}
 
-  Options: `Hal.Visca.Options`. What it does and when is `Hal.Visca.Head`, a function; this
+  Options: `Hal.Visca.Options`. What it does and when is `Hal.Visca.Session`, a function; this
   only owns the line and the clock.
 
   ## What the line allows
@@ -28,19 +28,19 @@ defmodule Hal.Visca.Driver do
 
   ## Errors
 
-  Those of `Hal.Serial` at the opening and later, and those of `Hal.Visca.Head`: `:no_answer`,
+  Those of `Hal.Serial` at the opening and later, and those of `Hal.Visca.Session`: `:no_answer`,
   `{:cameras, n}`, `{:model, code}`. After each the device closes the line and opens it again.
   """
   @behaviour Hal.Ptz
   alias Hal.Serial
-  alias Hal.Visca.{Head, Options}
+  alias Hal.Visca.{Options, Session}
 
   @enforce_keys [:line, :head]
   defstruct @enforce_keys ++ [timer: nil, wake: nil]
 
   @opaque t :: %__MODULE__{
             line: Serial.t(),
-            head: Head.t(),
+            head: Session.t(),
             timer: reference() | nil,
             wake: reference() | nil
           }
@@ -74,20 +74,21 @@ defmodule Hal.Visca.Driver do
   def explain(reason, options), do: Serial.explain(reason, "#{options[:port]}")
 
   @impl Hal.Ptz
-  def look(pan, tilt, state), do: outward(Head.look(state.head, pan, tilt, now()), state)
+  def look(pan, tilt, state), do: outward(Session.look(state.head, pan, tilt, now()), state)
 
   @impl Hal.Ptz
-  def zoom(field_of_view, state), do: outward(Head.zoom(state.head, field_of_view, now()), state)
+  def zoom(field_of_view, state),
+    do: outward(Session.zoom(state.head, field_of_view, now()), state)
 
   @impl Hal.Ptz
   def handle_message({:visca_wake, wake}, %__MODULE__{wake: wake} = state),
-    do: carry_out(Head.tick(state.head, now()), state)
+    do: carry_out(Session.tick(state.head, now()), state)
 
   def handle_message({:visca_wake, _old}, state), do: {:ok, [], state}
 
   def handle_message(message, %__MODULE__{} = state) do
     case Serial.handle(state.line, message) do
-      {:data, bytes} -> carry_out(Head.bytes(state.head, bytes, now()), state)
+      {:data, bytes} -> carry_out(Session.bytes(state.head, bytes, now()), state)
       {:error, reason} -> {:error, reason, state}
       :unknown -> {:ok, [], state}
     end
@@ -101,7 +102,7 @@ defmodule Hal.Visca.Driver do
 
   defp open(line, options) do
     {effects, head} =
-      Head.open(Keyword.take(options, [:camera, :lens, :poll_ms, :field_of_view]), now())
+      Session.open(Keyword.take(options, [:camera, :lens, :poll_ms, :field_of_view]), now())
 
     case carry_out({effects, head}, %__MODULE__{line: line, head: head}) do
       {:ok, [], state} ->
@@ -140,7 +141,7 @@ defmodule Hal.Visca.Driver do
   defp wake(state) do
     cancel(state)
 
-    case Head.wake_ms(state.head) do
+    case Session.wake_ms(state.head) do
       nil ->
         %{state | timer: nil, wake: nil}
 

@@ -18,7 +18,7 @@ defmodule Hal.Visca.Queue do
   | no completion for 10 s | the socket is taken for free: `:no_completion` |
   | other errors | `{:failed, command, reason}` |
 
-  What waits is bounded (`Hal.Visca.Lane`): a newer target takes the place of one that waits.
+  What waits is bounded (`Hal.Visca.CommandClass`): a newer target takes the place of one that waits.
 
   ## Effects
 
@@ -32,7 +32,7 @@ defmodule Hal.Visca.Queue do
   | `:network_change` | a camera of the chain was switched on; its sockets are empty |
   | `:no_answer` | the camera is silent |
   """
-  alias Hal.Visca.{Command, Lane, Reply}
+  alias Hal.Visca.{Command, CommandClass, Reply}
   alias Hal.Visca.Queue.Sockets
 
   # About 16 ms and what 32 bytes take; a USB adapter may keep bytes for 16 ms more.
@@ -82,7 +82,7 @@ defmodule Hal.Visca.Queue do
   """
   @spec push(t(), Command.t(), integer()) :: {[effect()], t()}
   def push(%__MODULE__{} = queue, command, now_ms),
-    do: say([], %{queue | waiting: Lane.put(queue.waiting, command)}, now_ms)
+    do: say([], %{queue | waiting: CommandClass.put(queue.waiting, command)}, now_ms)
 
   @doc "A reply of the camera."
   @spec heard(t(), Reply.t(), integer()) :: {[effect()], t()}
@@ -115,11 +115,11 @@ defmodule Hal.Visca.Queue do
   end
 
   @doc "Whether a command of this lane waits, or was said and has no answer."
-  @spec pending?(t(), Lane.t()) :: boolean()
+  @spec pending?(t(), CommandClass.t()) :: boolean()
   def pending?(%__MODULE__{asked: {command, _, _}} = queue, lane),
-    do: Lane.of(command) == lane or pending?(%{queue | asked: nil}, lane)
+    do: CommandClass.of(command) == lane or pending?(%{queue | asked: nil}, lane)
 
-  def pending?(queue, lane), do: Enum.any?(queue.waiting, &(Lane.of(&1) == lane))
+  def pending?(queue, lane), do: Enum.any?(queue.waiting, &(CommandClass.of(&1) == lane))
 
   # The answer to what was asked
 
@@ -201,7 +201,7 @@ defmodule Hal.Visca.Queue do
 
   defp retry(%{asked: {command, _at_ms, tries}} = queue, reason) do
     cond do
-      Enum.any?(queue.waiting, &Lane.overrides?(&1, command)) ->
+      Enum.any?(queue.waiting, &CommandClass.overrides?(&1, command)) ->
         {[], free(queue)}
 
       tries < tries(command) ->
@@ -221,7 +221,7 @@ defmodule Hal.Visca.Queue do
   defp tries({:cancel, _}), do: 2
   # Some cameras that are alone on their cable say nothing to these.
   defp tries(command) when command in [:address_set, :if_clear], do: 2
-  defp tries(command), do: if(Lane.repeatable?(command), do: @tries, else: 1)
+  defp tries(command), do: if(CommandClass.repeatable?(command), do: @tries, else: 1)
 
   defp silence(%{silent_ms: since}, now_ms) when since != nil and now_ms - since >= @silent_ms,
     do: [:no_answer]
@@ -272,9 +272,9 @@ defmodule Hal.Visca.Queue do
   defp again(%{asked: nil} = queue), do: queue
 
   defp again(%{asked: {command, _, _}} = queue) do
-    pointless? = Enum.any?(queue.waiting, &Lane.overrides?(&1, command))
+    pointless? = Enum.any?(queue.waiting, &CommandClass.overrides?(&1, command))
 
-    if pointless? or not Lane.repeatable?(command),
+    if pointless? or not CommandClass.repeatable?(command),
       do: free(queue),
       else: %{free(queue) | waiting: [command | queue.waiting]}
   end

@@ -484,13 +484,13 @@ defmodule Hal.RFlex.DriverTest do
 
   test "the console's phrase is all that is said there", %{link: link} do
     {:ok, far} = Serial.open(pty: link)
-    assert Hal.RFlex.Console.halt(port: link, phrase: "System halted") == :ok
+    assert Hal.RFlex.PowerSwitch.halt(port: link, phrase: "System halted") == :ok
     assert read(far, <<>>, 17) == "\r\nSystem halted\r\n"
     Serial.close(far)
-    assert {:error, line} = Hal.RFlex.Console.halt(port: link)
+    assert {:error, line} = Hal.RFlex.PowerSwitch.halt(port: link)
     assert line =~ "no such device"
-    assert {:error, _} = Hal.RFlex.Console.halt(port: link, phrase: "a\nb")
-    assert {:error, _} = Hal.RFlex.Console.halt(port: link, words: "x")
+    assert {:error, _} = Hal.RFlex.PowerSwitch.halt(port: link, phrase: "a\nb")
+    assert {:error, _} = Hal.RFlex.PowerSwitch.halt(port: link, words: "x")
   end
 
   defp read(_far, bytes, size) when byte_size(bytes) >= size, do: bytes

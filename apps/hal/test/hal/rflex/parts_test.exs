@@ -3,8 +3,8 @@ defmodule Hal.RFlex.PartsTest do
   alias Hal.RFlex.{Bumpers, Infrared, Queue, Sonar}
   doctest Hal.RFlex.Bumpers
   doctest Hal.RFlex.Conversions
-  doctest Hal.RFlex.Console
-  doctest Hal.RFlex.Home
+  doctest Hal.RFlex.PowerSwitch
+  doctest Hal.RFlex.IndexSwitch
   doctest Hal.RFlex.Outlook
   doctest Hal.RFlex.Infrared
   doctest Hal.RFlex.Queue
@@ -163,7 +163,7 @@ defmodule Hal.RFlex.PartsTest do
         Hal.RFlex.Options.new(port: "/dev/ttyR0", conversions: [distance: distance, angle: 1.0])
 
       assert [{{:speed, 0}, <<_::binary-6, 0, 0::32, acceleration::32, _::binary>>} | _] =
-               Hal.RFlex.Speech.stop(options)
+               Hal.RFlex.Commands.stop(options)
 
       assert acceleration >= max(distance * options.limits.max_braking - 2, 1)
     end

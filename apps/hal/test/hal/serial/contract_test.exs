@@ -5,7 +5,7 @@ defmodule Hal.Serial.ContractTest do
   alias Hal.Serial
 
   @stop "\eSTOP\r"
-  @modules [Serial.Port] ++
+  @modules [Serial.Native] ++
              if(Code.ensure_loaded?(Circuits.UART),
                do: [Module.concat(Serial, Circuits)],
                else: []

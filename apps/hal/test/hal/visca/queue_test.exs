@@ -1,7 +1,7 @@
 defmodule Hal.Visca.QueueTest do
   use ExUnit.Case, async: true
-  alias Hal.Visca.{Lane, Queue}
-  doctest Hal.Visca.Lane
+  alias Hal.Visca.{CommandClass, Queue}
+  doctest Hal.Visca.CommandClass
   doctest Hal.Visca.Queue
   doctest Hal.Visca.Queue.Sockets
 
@@ -227,7 +227,7 @@ defmodule Hal.Visca.QueueTest do
         [{:result, <<>>}, {:result, <<0::32>>}, {:result, <<0::64>>}, :network_change] ++
         [{:cameras, 1}, :cleared]
 
-    lanes = commands |> Enum.map(&Lane.of/1) |> Enum.uniq() |> length()
+    lanes = commands |> Enum.map(&CommandClass.of/1) |> Enum.uniq() |> length()
 
     for _ <- 1..300 do
       Enum.reduce(1..200, {0, Queue.new()}, fn _, {now_ms, queue} ->

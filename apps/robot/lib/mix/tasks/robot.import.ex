@@ -63,7 +63,7 @@ defmodule Mix.Tasks.Robot.Import do
          {:ok, text} <- read(file),
          colours = colours(file, options[:out]),
          wanted = [file: file, id: id, profile: profile, version: version, colours: colours],
-         {:ok, result} <- Robot.Player.import(text, wanted),
+         {:ok, result} <- Player.import(text, wanted),
          :ok <- write(result.text, options[:out]) do
       tell(result, file, options[:out])
       judge(result.text, file, options[:out])

@@ -3,7 +3,7 @@ defmodule Robot.Behaviour.Avoid do
   Lets another behaviour run, and bends or slows what it wishes so that nobody is touched (R85).
 
   A wish with a velocity is bent: round standing robots and discs on the shortest way
-  (`.Way`), past moving ones by `Robot.Orca`, a little to the right of those who come, and
+  (`.Way`), past moving ones by `Robot.Navigation.Orca`, a little to the right of those who come, and
   away from what only the sonars see. A wish without one is only slowed down (`.Brake`).
   Who gets no nearer for some seconds goes another way for a while (`.Progress`), and who stands in
   another's way makes room (`.Yield`). Where a body that will not move stands in the goal, it stands
@@ -14,8 +14,10 @@ defmodule Robot.Behaviour.Avoid do
   """
   @behaviour Robot.Behaviour
   alias Hal.{Pose, Twist}
-  alias Robot.{Behaviour, Orca, Percept, Steering, Wish}
-  alias Robot.Behaviour.Avoid.{Brake, Neighbours, Progress, Way, Yield}
+  alias Robot.{Behaviour, Percept, Wish}
+  alias Robot.Navigation.{Orca, Steering}
+  alias Robot.Behaviour.Avoid
+  alias Robot.Behaviour.Avoid.{Brake, GiveWay, Neighbours, Progress}
   alias Robot.Behaviour.Options
 
   # Metres kept to others by reaction; to standing ones less when there is no more room.
@@ -86,7 +88,7 @@ defmodule Robot.Behaviour.Avoid do
   defp safe(%Wish{velocity: {vx, vy}} = wish, percept, state) do
     speed = :math.sqrt(vx * vx + vy * vy)
 
-    if speed < 0.02 or Yield.now?(state.yield, percept.at_ms),
+    if speed < 0.02 or GiveWay.now?(state.yield, percept.at_ms),
       do: stay(wish, percept, %{state | progress: nil, velocity: nil, way: nil}),
       else: bend(wish, speed, percept, state)
   end
@@ -95,7 +97,7 @@ defmodule Robot.Behaviour.Avoid do
   defp stay(wish, percept, state) do
     robots = percept |> Neighbours.robots() |> Neighbours.near()
 
-    case Yield.note(state.yield, robots, percept.pose, percept.at_ms) do
+    case GiveWay.note(state.yield, robots, percept.pose, percept.at_ms) do
       {nil, yield} ->
         {wish, %{state | yield: yield}}
 
@@ -117,7 +119,7 @@ defmodule Robot.Behaviour.Avoid do
   end
 
   defp bend(wish, speed, percept, state) do
-    case Way.taken(wish.goal, percept, Neighbours.robots(percept), state.discs) do
+    case Avoid.Route.taken(wish.goal, percept, Neighbours.robots(percept), state.discs) do
       nil -> bend_round(wish, speed, percept, state)
       near -> beside(wish, near, speed, percept, state)
     end
@@ -147,13 +149,13 @@ defmodule Robot.Behaviour.Avoid do
     bodies = Enum.map(all, fn %{at: {x, y}, radius: radius} -> {x, y, radius} end)
     things = Neighbours.unknown(percept, bodies ++ state.discs)
     fixed = things ++ standing(state.discs, percept)
-    way = wish.goal && Way.round(state.way, wish.goal, percept, all, state.discs)
+    way = wish.goal && Avoid.Route.round(state.way, wish.goal, percept, all, state.discs)
     corners = way && way.corners
 
     {aside, progress} =
       Progress.note(
         state.progress,
-        way && Way.left(way, Pose.point(percept.pose)),
+        way && Avoid.Route.left(way, Pose.point(percept.pose)),
         percept.robot,
         percept.at_ms
       )

@@ -12,13 +12,14 @@ defmodule Robot.Behaviour.Escape do
     * a person has looked: whoever disarms the wheels or stops them by the emergency stop knows what is pressed
       then. It is no reason to move when they are armed again, until it was released once.
 
-  All the while the gate lets the robot not drive toward a side that is pressed (`Robot.Reflex`).
+  All the while the gate lets the robot not drive toward a side that is pressed (`Robot.Safety.Reflex`).
 
   Options: `distance` (metres, default 0.15), `turn` (radians, default 0.8).
   """
   @behaviour Robot.Behaviour
   alias Hal.{Pose, Twist}
-  alias Robot.{Steering, Wish}
+  alias Robot.Wish
+  alias Robot.Navigation.Steering
   alias Robot.Behaviour.Options
 
   # A robot that is held in front and behind gives up, rather than push for ever.

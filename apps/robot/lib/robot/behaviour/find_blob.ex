@@ -10,7 +10,9 @@ defmodule Robot.Behaviour.FindBlob do
   @behaviour Robot.Behaviour
   alias Hal.{Pose, Twist}
   alias Robot.Behaviour.Options
-  alias Robot.{Sighting, Steering, Wish}
+  alias Robot.Wish
+  alias Robot.Navigation.Steering
+  alias Robot.Percept.Sighting
 
   # How long a sighting is believed after the last picture that showed it.
   @memory_ms 600

@@ -12,7 +12,8 @@ defmodule Robot.Behaviour.Follow do
   """
   @behaviour Robot.Behaviour
   alias Hal.{Pose, Twist}
-  alias Robot.{Steering, Wish}
+  alias Robot.Wish
+  alias Robot.Navigation.Steering
   alias Robot.Behaviour.Options
 
   # Nearer than this it backs up rather than turn round.

@@ -10,7 +10,8 @@ defmodule Robot.Behaviour.Goto do
   """
   @behaviour Robot.Behaviour
   alias Hal.{Pose, Twist}
-  alias Robot.{Steering, Wish}
+  alias Robot.Wish
+  alias Robot.Navigation.Steering
   alias Robot.Behaviour.Options
 
   @points_there 0.09

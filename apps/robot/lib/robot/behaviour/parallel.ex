@@ -6,7 +6,8 @@ defmodule Robot.Behaviour.Parallel do
   Options: `parts`, a list of behaviours (required, at least one); `ends`, `:all` (default) or `:any`.
   """
   @behaviour Robot.Behaviour
-  alias Robot.{Arbiter, Behaviour}
+  alias Robot.Behaviour
+  alias Robot.Control.Arbiter
   alias Robot.Behaviour.Options
 
   @impl Behaviour

@@ -20,7 +20,9 @@ defmodule Robot.Behaviour.TrackBlob do
   @behaviour Robot.Behaviour
   alias Hal.{Pose, Twist}
   alias Robot.Behaviour.Options
-  alias Robot.{Gaze, Sighting, Steering, Wish}
+  alias Robot.Wish
+  alias Robot.Navigation.Steering
+  alias Robot.Percept.{CameraPointing, Sighting}
 
   # Radians: where turning begins with a camera that turns by itself, and without; where it is good enough.
   @aside :math.pi() / 6
@@ -181,7 +183,7 @@ defmodule Robot.Behaviour.TrackBlob do
   defp gently(state, _percept), do: state
 
   defp gaze(_error, %{ptz: nil}), do: 0.0
-  defp gaze(error, percept), do: Gaze.pan(error, percept)
+  defp gaze(error, percept), do: CameraPointing.pan(error, percept)
 
   # Which way it drives: it starts outside the range and stops a little inside it.
   defp driving(_driving, nil, _state), do: 0

@@ -7,7 +7,8 @@ defmodule Robot.Behaviour.Wander do
   """
   @behaviour Robot.Behaviour
   alias Hal.Twist
-  alias Robot.{Reflex, Wish}
+  alias Robot.Wish
+  alias Robot.Safety.Reflex
   alias Robot.Behaviour.Options
 
   # Metres at which something ahead makes it turn, and seconds between turns in the open.

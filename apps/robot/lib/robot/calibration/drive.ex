@@ -1,12 +1,12 @@
 defmodule Robot.Calibration.Drive do
   @moduledoc """
-  The mission of a robot that is calibrated: it drives one course (`Robot.Behaviour.Course`) and
+  The mission of a robot that is calibrated: it drives one course (`Robot.Behaviour.DriveCourse`) and
   stands. Options: those of the course. Its phase is `:driving`, then `:done` or `:blocked`. Pure.
 
   Legs for what is measured: `legs/1`.
   """
   @behaviour Robot.Mission
-  alias Robot.Behaviour.Course
+  alias Robot.Behaviour.DriveCourse
 
   @doc """
   The legs of a distance (metres), of an angle (radians), and of a square, which ends as it began.
@@ -29,7 +29,7 @@ defmodule Robot.Calibration.Drive do
   @impl Robot.Mission
   def init(_robot, options) do
     effects = [
-      {:goal, :course, {Course, options}},
+      {:goal, :course, {DriveCourse, options}},
       {:look, 0.0},
       {:claim, %{phase: :idle, standing: false}}
     ]

@@ -7,7 +7,7 @@ defmodule Robot.Devices.Log do
   """
   require Logger
   alias Hal.Event
-  alias Robot.Watch
+  alias Robot.Safety.LivenessMonitor
 
   @events [
     [:hal, :device, :online],
@@ -34,7 +34,9 @@ defmodule Robot.Devices.Log do
   @spec events() :: [Event.name()]
   def events do
     @events ++
-      for part <- Watch.parts(), what <- [:silent, :hung, :again], do: [:robot, part, what]
+      for part <- LivenessMonitor.parts(),
+          what <- [:silent, :hung, :again],
+          do: [:robot, part, what]
   end
 
   @doc false

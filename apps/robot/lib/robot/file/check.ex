@@ -18,7 +18,7 @@ defmodule Robot.File.Check do
   | `{:with, function}` | what `function.(node, path)` takes | |
   """
   alias Hal.{Pose, Suggest}
-  alias Robot.File.{Reader, Words}
+  alias Robot.File.{Printer, Reader}
 
   @farthest 10_000
 
@@ -133,7 +133,7 @@ defmodule Robot.File.Check do
           {:error, [problem(), ...]}
   def refuse(check, {line, _value} = node, path, hint \\ "") do
     allowed = if is_binary(check), do: check, else: allowed(check)
-    {:error, [{line, path, "cannot be #{Words.show(node)}: #{allowed}#{hint}"}]}
+    {:error, [{line, path, "cannot be #{Printer.show(node)}: #{allowed}#{hint}"}]}
   end
 
   @doc """

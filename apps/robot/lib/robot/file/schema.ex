@@ -5,7 +5,7 @@ defmodule Robot.File.Schema do
   """
   alias Hal.Profile
   alias Robot.File.{Check, Colours, Device}
-  alias Robot.Reflex.Fence
+  alias Robot.Safety.Reflex.Fence
 
   @formations [:column, :line, :wedge, :triangle, :diamond, :circle]
   @fleet for kind <- ~w(mag min), n <- 1..100, do: :"#{kind}#{n}"
@@ -115,7 +115,7 @@ defmodule Robot.File.Schema do
        phrase: {:text, "the words at which the controller cuts the power"}}
 
     with {:ok, options} <- Check.run(keys, node, path) do
-      case Hal.RFlex.Console.options(options) do
+      case Hal.RFlex.PowerSwitch.options(options) do
         {:ok, _all} -> {:ok, options}
         {:error, text} -> {:error, [{line, path, text}]}
       end

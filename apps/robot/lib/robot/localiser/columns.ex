@@ -6,7 +6,8 @@ defmodule Robot.Localiser.Columns do
   """
   import Bitwise
   alias Hal.Pose
-  alias Robot.{Percept, Sighting}
+  alias Robot.Percept
+  alias Robot.Percept.Sighting
   alias Vision.Blob
 
   # One bit less than a small integer of the virtual machine has.

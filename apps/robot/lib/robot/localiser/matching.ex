@@ -8,7 +8,7 @@ defmodule Robot.Localiser.Matching do
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief}
-  alias Robot.Sighting
+  alias Robot.Percept.Sighting
   alias Vision.Blob
 
   # Within this angle (radians) a robot is always looked for; one whose distance is less sure than by this share

@@ -9,7 +9,8 @@ defmodule Robot.Localiser.Sightings do
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief, Consistency, Matching, Silhouettes}
-  alias Robot.{Percept, Sighting}
+  alias Robot.Percept
+  alias Robot.Percept.Sighting
 
   # A single sighting: bearing in radians, range as a share and in metres.
   @bearing_sd 0.015

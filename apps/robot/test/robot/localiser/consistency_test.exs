@@ -2,7 +2,8 @@ defmodule Robot.Localiser.ConsistencyTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile}
   alias Robot.Localiser.{Belief, Consistency, Frame}
-  alias Robot.{Percept, Sighting}
+  alias Robot.Percept
+  alias Robot.Percept.Sighting
   alias Vision.Blob
 
   @view :math.pi() / 3

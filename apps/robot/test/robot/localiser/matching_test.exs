@@ -2,7 +2,7 @@ defmodule Robot.Localiser.MatchingTest do
   use ExUnit.Case, async: true
   alias Hal.Pose
   alias Robot.Localiser.{Belief, Frame, Matching}
-  alias Robot.Sighting
+  alias Robot.Percept.Sighting
   alias Vision.Blob
 
   @view :math.pi() / 3

@@ -7,7 +7,8 @@ defmodule Sim.Fleet.Hardware do
       supervisor (one_for_one: a device that falls is one that was switched off and on)
       `-- Sim.Emulator   two for each such robot
   """
-  alias Sim.{Drive, Emulator, Ptz, RFlexController, ViscaCamera}
+  alias Sim.{Device, Emulator}
+  alias Sim.Emulator.{RFlexController, ViscaCamera}
   alias Sim.Trial.Setup
 
   # A device falls by a fault of ours alone; the others go on.
@@ -36,12 +37,17 @@ defmodule Sim.Fleet.Hardware do
     base = [kind: profile.name, sonar_max: profile.sonar_max, ir_max: profile.ir_max]
 
     [
-      emulator({id, :base}, {RFlexController, base}, base_link(folder, robot), {Drive, body}),
+      emulator(
+        {id, :base},
+        {RFlexController, base},
+        base_link(folder, robot),
+        {Device.Drive, body}
+      ),
       emulator(
         {id, :camera},
         {ViscaCamera, lens: lens(profile)},
         camera_link(folder, robot),
-        {Ptz, body}
+        {Device.Ptz, body}
       )
     ]
   end

@@ -3,16 +3,16 @@ defmodule Sim.Fleet.Local do
   World and robots on this node: each robot the whole tree of `Robot.Supervisor`.
 
       supervisor (one_for_all, no restarts: without its world a fleet is none)
-      |-- Sim.Worlds     unless another fleet of this node has it already
-      |-- Sim.Server     the world
-      |-- Sim.Fleet.Air  a radio that loses, if any is lost
+      |-- Sim.World.Directory     unless another fleet of this node has it already
+      |-- Sim.World.Server     the world
+      |-- Sim.Fleet.RadioServer  a radio that loses, if any is lost
       |-- Sim.Fleet.Hardware  emulated devices of those that have the real drivers, if any has
       `-- Robot.Fleet    the robots, each :temporary: one that ends for good is a wreck
   """
-  @behaviour Sim.Fleet.Crew
+  @behaviour Sim.Fleet.Backend
   alias Hal.Event
-  alias Sim.Fleet.{Air, Folder, Hardware, Robot}
-  alias Sim.{Server, Worlds}
+  alias Sim.Fleet.{Folder, Hardware, RadioServer, Robot}
+  alias Sim.World
 
   @armed_ms 5_000
   @look_ms 10
@@ -20,7 +20,7 @@ defmodule Sim.Fleet.Local do
   @enforce_keys [:supervisor, :server, :air, :order, :pids, :robots, :folder]
   defstruct @enforce_keys
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def start(setup, options) do
     with {:ok, folder} <- folder(setup.options), do: {:ok, start(setup, options, folder)}
   end
@@ -33,7 +33,7 @@ defmodule Sim.Fleet.Local do
     name = make_ref()
     {:ok, supervisor} = Supervisor.start_link(parts(setup, name, folder), parts_options())
     part = fn id -> supervisor |> Supervisor.which_children() |> List.keyfind(id, 0) |> pid() end
-    {transport, air} = Air.radio(part.(Air))
+    {transport, air} = RadioServer.radio(part.(RadioServer))
     :ok = Event.attach({__MODULE__, self()}, [:robot, :stage], &__MODULE__.stage/4, self())
 
     common = %{
@@ -57,7 +57,7 @@ defmodule Sim.Fleet.Local do
 
     %__MODULE__{
       supervisor: supervisor,
-      server: part.(Server),
+      server: part.(World.Server),
       air: air,
       order: setup.options.robots,
       pids: pids,
@@ -81,51 +81,51 @@ defmodule Sim.Fleet.Local do
   @spec stage(Event.name(), map(), map(), pid()) :: term()
   def stage(_event, _measurements, about, fleet), do: send(fleet, {:stage, about})
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def begin(crew) do
     # All at once: on a busy machine a hundred pilots one after the other take long to answer.
     options = [max_concurrency: 100, ordered: false, timeout: :infinity]
     crew |> living() |> Task.async_stream(&Robot.begin/1, options) |> Stream.run()
   end
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def living(crew) do
     living = Map.values(crew.pids)
     Enum.filter(crew.order, &(&1 in living))
   end
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def claims(crew), do: for(id <- living(crew), do: {id, Robot.claim(id)})
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def kill(crew, id) do
     {pid, ^id} = Enum.find(crew.pids, fn {_pid, robot} -> robot == id end)
     Process.exit(pid, :kill)
     wreck(crew, pid)
   end
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def change(crew, change) do
-    :ok = Server.change(crew.server, change)
+    :ok = World.Server.change(crew.server, change)
     crew
   end
 
-  @impl Sim.Fleet.Crew
-  def world(crew), do: Server.world(crew.server)
+  @impl Sim.Fleet.Backend
+  def world(crew), do: World.Server.world(crew.server)
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def server(crew), do: crew.server
 
-  @impl Sim.Fleet.Crew
-  def messages(crew), do: Air.counts(crew.air)
+  @impl Sim.Fleet.Backend
+  def messages(crew), do: RadioServer.counts(crew.air)
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def lines(crew) do
     ["all robots live in process #{System.pid()}; see --nodes"] ++
       Hardware.lines(crew.robots, crew.folder)
   end
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def hear(crew, {:stage, %{robot: id, stage: stage} = about}) do
     facts = Map.drop(about, [:robot, :stage])
     {:ok, if(id in living(crew), do: [{:stage, stage, id, facts}], else: []), crew}
@@ -139,7 +139,7 @@ defmodule Sim.Fleet.Local do
   def hear(%{supervisor: supervisor}, {:EXIT, supervisor, reason}), do: {:stop, reason}
   def hear(crew, _other), do: {:ok, [], crew}
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def stop(crew) do
     Event.detach({__MODULE__, self()})
     if Process.alive?(crew.supervisor), do: Supervisor.stop(crew.supervisor, :shutdown)
@@ -152,12 +152,15 @@ defmodule Sim.Fleet.Local do
   end
 
   defp parts(%{options: options, world: world, robots: robots}, name, folder) do
-    worlds = if Worlds.running?(), do: [], else: [Worlds]
-    server = [%{id: Server, start: {Server, :start_link, [[name: name, world: world]]}}]
+    worlds = if World.Directory.running?(), do: [], else: [World.Directory]
+
+    server = [
+      %{id: World.Server, start: {World.Server, :start_link, [[name: name, world: world]]}}
+    ]
 
     worlds ++
       server ++
-      Air.parts(options.loss, options.seed) ++
+      RadioServer.parts(options.loss, options.seed) ++
       Hardware.parts(robots, name, folder) ++ [Elixir.Robot.Fleet]
   end
 

@@ -7,11 +7,12 @@ defmodule Sim.Fleet.Nodes do
   `:silent` until it speaks again. When the world's process ends, it is started again from the last
   snapshot that came from it, and the robots, which stood meanwhile, go on.
   """
-  @behaviour Sim.Fleet.Crew
+  @behaviour Sim.Fleet.Backend
   alias Sim.Fleet.Hardware
   alias Sim.Fleet.Nodes.{Child, Command, Host}
-  alias Sim.{Server, Snapshot}
-  alias Sim.Node.{Config, Courier}
+  alias Sim.World
+  alias Sim.World.Snapshot
+  alias Sim.Node.{Config, Reporter}
 
   # On a machine that is busy with much else a start takes several seconds.
   @up_ms 20_000
@@ -24,7 +25,7 @@ defmodule Sim.Fleet.Nodes do
   @typedoc "`children` by robot id and `:world`; `reports` hold claim, counts, and when they came."
   @type t :: %__MODULE__{}
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def start(setup, _options) do
     ids = [:world | setup.options.robots]
 
@@ -59,10 +60,10 @@ defmodule Sim.Fleet.Nodes do
 
       missing ->
         receive do
-          {Courier, _pid, {:up, _facts}} = message ->
+          {Reporter, _pid, {:up, _facts}} = message ->
             crew |> told(message) |> await_all(missing)
 
-          {Courier, _pid, _what} = message ->
+          {Reporter, _pid, _what} = message ->
             crew |> told(message) |> await_all(missing, deadline)
 
           {port, {:data, _text}} = message when is_port(port) ->
@@ -91,16 +92,16 @@ defmodule Sim.Fleet.Nodes do
     "#{child.node} did not come up within #{div(@up_ms, 1000)} s: #{Child.last_line(child)}"
   end
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def begin(crew) do
     for id <- living(crew), do: send(crew.children[id].up.main, :begin)
     :ok
   end
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def living(crew), do: Enum.filter(crew.setup.options.robots, &is_map_key(crew.children, &1))
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def claims(crew) do
     now = now()
 
@@ -112,7 +113,7 @@ defmodule Sim.Fleet.Nodes do
     end
   end
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def kill(crew, id) do
     {child, children} = Map.pop!(crew.children, id)
     Child.kill(child)
@@ -120,27 +121,27 @@ defmodule Sim.Fleet.Nodes do
   end
 
   # Also to our own copy: a server that is down or about to fall begins again with that.
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def change(crew, change) do
-    if pid = server(crew), do: Server.change(pid, change)
-    %{crew | world: Server.changed(crew.world, change)}
+    if pid = server(crew), do: World.Server.change(pid, change)
+    %{crew | world: World.Server.changed(crew.world, change)}
   end
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def world(crew), do: crew.world
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def server(%{children: %{world: %{up: %{server: server}}}}), do: server
   def server(_down), do: nil
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def messages(crew) do
     for {_id, {_claim, counts, _at_ms}} <- crew.reports, reduce: %{sent: 0, lost: 0} do
       all -> Map.merge(all, counts, fn _key, a, b -> a + b end)
     end
   end
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def lines(crew) do
     for id <- crew.setup.options.robots ++ [:world] do
       child = crew.children[id]
@@ -150,8 +151,8 @@ defmodule Sim.Fleet.Nodes do
     |> Kernel.++(Hardware.lines(crew.setup.robots, crew.host.home))
   end
 
-  @impl Sim.Fleet.Crew
-  def hear(crew, {Courier, pid, what}) do
+  @impl Sim.Fleet.Backend
+  def hear(crew, {Reporter, pid, what}) do
     case Enum.find(crew.children, fn {_id, child} -> child.pid == pid end) do
       {id, _child} -> heard(crew, id, what)
       nil -> {:ok, [], crew}
@@ -182,7 +183,7 @@ defmodule Sim.Fleet.Nodes do
 
   def hear(crew, _other), do: {:ok, [], crew}
 
-  @impl Sim.Fleet.Crew
+  @impl Sim.Fleet.Backend
   def stop(crew) do
     children = Map.values(crew.children)
     Enum.each(children, &Child.kill/1)

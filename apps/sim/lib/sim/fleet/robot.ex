@@ -1,9 +1,10 @@
 defmodule Sim.Fleet.Robot do
   @moduledoc "One robot of a simulated fleet on this node: its config, its start, what it claims."
-  alias Robot.{Board, Config, Pilot}
+  alias Robot.{Board, Config}
+  alias Robot.Control.Pilot
   alias Sim.Fleet.Hardware
   alias Sim.World
-  alias Swarm.Missions.Manual
+  alias Missions.Manual
 
   # Of a command for one robot alone.
   @over [:ready, :done, :found, :not_found]
@@ -26,7 +27,7 @@ defmodule Sim.Fleet.Robot do
   @doc "Starts a robot of `Sim.Trial.Setup` in a `Robot.Fleet`."
   @spec start(Supervisor.supervisor(), Sim.Trial.Setup.robot(), common()) :: {:ok, pid()}
   def start(fleet, robot, common) do
-    config = Swarm.Link.join(config(robot, common), transport: common.transport)
+    config = Swarm.Comms.join(config(robot, common), transport: common.transport)
     {:ok, _pid} = Robot.Fleet.start_robot(fleet, config)
   end
 
@@ -86,7 +87,7 @@ defmodule Sim.Fleet.Robot do
         profile: robot.profile,
         start: robot.start,
         clock: common.clock,
-        camera: {Sim.Camera, device ++ [blobs: common.blobs, clock: common.clock]},
+        camera: {Sim.Device.Camera, device ++ [blobs: common.blobs, clock: common.clock]},
         colours: World.colours(),
         mission: common.mission,
         trace: trace(common.trace, id)
@@ -97,7 +98,7 @@ defmodule Sim.Fleet.Robot do
   defp drivers(%{hardware?: true} = robot, _device, folder), do: Hardware.drivers(robot, folder)
 
   defp drivers(_simulated, device, _folder),
-    do: [drive: {Sim.Drive, device}, ptz: {Sim.Ptz, device}]
+    do: [drive: {Sim.Device.Drive, device}, ptz: {Sim.Device.Ptz, device}]
 
   defp trace(nil, _id), do: nil
   defp trace({m, f, a}, id), do: {m, f, a ++ [id]}

@@ -3,8 +3,8 @@ defmodule Sim.Node.Robot do
   One robot as the part of a node: the same tree as on a node with others.
 
       supervisor (one_for_all, no restarts: a robot that ends for good takes its node along)
-      |-- Sim.Worlds     where the world is
-      |-- Sim.Fleet.Air  a radio that loses, if any is lost
+      |-- Sim.World.Directory     where the world is
+      |-- Sim.Fleet.RadioServer  a radio that loses, if any is lost
       |-- Sim.Fleet.Hardware  emulated devices, if it has the real drivers
       `-- Robot.Fleet    the robot
 
@@ -12,19 +12,19 @@ defmodule Sim.Node.Robot do
   and `seed` of the radio.
   """
   @behaviour Sim.Node
-  alias Sim.Fleet.{Air, Hardware, Robot}
-  alias Sim.Worlds
+  alias Sim.Fleet.{Hardware, RadioServer, Robot}
+  alias Sim.World
 
   @impl Sim.Node
   def start(options) do
     children =
-      [Worlds] ++
-        Air.parts(options.loss, options.seed) ++
+      [World.Directory] ++
+        RadioServer.parts(options.loss, options.seed) ++
         Hardware.parts([options.robot], options.world, options.folder) ++ [Elixir.Robot.Fleet]
 
     {:ok, supervisor} = Supervisor.start_link(children, strategy: :one_for_all, max_restarts: 0)
     part = fn id -> for {^id, pid, _, _} <- Supervisor.which_children(supervisor), do: pid end
-    {transport, air} = Air.radio(List.first(part.(Air)))
+    {transport, air} = RadioServer.radio(List.first(part.(RadioServer)))
 
     common = %{
       world: options.world,
@@ -45,6 +45,6 @@ defmodule Sim.Node.Robot do
   def begin(options), do: Robot.begin(options.robot.id)
 
   @doc "What the robot claims of itself, and how many messages it sent."
-  @spec report(atom(), pid() | Air.counter()) :: {map(), map()}
-  def report(id, air), do: {Robot.claim(id), Air.counts(air)}
+  @spec report(atom(), pid() | RadioServer.counter()) :: {map(), map()}
+  def report(id, air), do: {Robot.claim(id), RadioServer.counts(air)}
 end

@@ -1,19 +1,25 @@
 defmodule Sim.Node.World do
   @moduledoc """
-  The world as the part of a node: `Sim.Server`, found by its name on all nodes (`Sim.Worlds`). What it
+  The world as the part of a node: `Sim.World.Server`, found by its name on all nodes (`Sim.World.Directory`). What it
   reports is a snapshot, from which it can be started again. Options: `name`, `world`.
   """
   @behaviour Sim.Node
-  alias Sim.{Server, Snapshot, Worlds}
+  alias Sim.World
+  alias Sim.World.Snapshot
 
   @impl Sim.Node
   def start(options) do
     server = [name: options.name, world: options.world]
-    children = [Worlds, %{id: Server, start: {Server, :start_link, [server]}}]
+
+    children = [
+      World.Directory,
+      %{id: World.Server, start: {World.Server, :start_link, [server]}}
+    ]
+
     {:ok, supervisor} = Supervisor.start_link(children, strategy: :one_for_all, max_restarts: 0)
 
-    {Server, pid, _type, _modules} =
-      supervisor |> Supervisor.which_children() |> List.keyfind(Server, 0)
+    {World.Server, pid, _type, _modules} =
+      supervisor |> Supervisor.which_children() |> List.keyfind(World.Server, 0)
 
     {:ok, supervisor, %{server: pid}, {__MODULE__, :report, [pid]}}
   end
@@ -23,5 +29,5 @@ defmodule Sim.Node.World do
 
   @doc "The world as it is, without what never changes."
   @spec report(pid()) :: Snapshot.t()
-  def report(server), do: server |> Server.world() |> Snapshot.of()
+  def report(server), do: server |> World.Server.world() |> Snapshot.of()
 end

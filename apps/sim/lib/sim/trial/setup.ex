@@ -14,7 +14,7 @@ defmodule Sim.Trial.Setup do
   @type robot :: %{id: atom(), profile: Profile.t(), start: Pose.t(), hardware?: boolean()}
   @type t :: %__MODULE__{
           options: map(),
-          map: Sim.Map.t(),
+          map: Sim.Floorplan.t(),
           world: World.t(),
           robots: [robot()],
           mission: {module(), keyword()}
@@ -39,18 +39,18 @@ defmodule Sim.Trial.Setup do
     landmark = landmark(options.landmark)
     places = [landmark | Enum.map(options.moves, &elem(&1, 0))]
 
-    with {:ok, map} <- Sim.Map.open(options.map, length(options.robots)),
+    with {:ok, map} <- Sim.Floorplan.open(options.map, length(options.robots)),
          :ok <- check_landmarks(map, places),
-         {:ok, starts} <- Sim.Map.starts(map, bodies, options.seed, landmark) do
+         {:ok, starts} <- Sim.Floorplan.starts(map, bodies, options.seed, landmark) do
       {:ok, build(options, map, Enum.zip(options.robots, starts), landmark)}
     end
   end
 
   @doc "Whether the landmark can stand at all these places (`nil`: nowhere)."
-  @spec check_landmarks(Sim.Map.t(), [Pose.point() | nil]) :: :ok | {:error, String.t()}
+  @spec check_landmarks(Sim.Floorplan.t(), [Pose.point() | nil]) :: :ok | {:error, String.t()}
   def check_landmarks(map, places) do
     Enum.find_value(places, :ok, fn place ->
-      case place && Sim.Map.check_landmark(map, place) do
+      case place && Sim.Floorplan.check_landmark(map, place) do
         {:error, line} -> {:error, line}
         _fine -> nil
       end
@@ -84,7 +84,7 @@ defmodule Sim.Trial.Setup do
       )
 
     mission =
-      {Swarm.Missions.Landmark,
+      {Missions.Landmark,
        [
          formation: options.formation,
          assign: options.assign,

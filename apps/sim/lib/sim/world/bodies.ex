@@ -1,6 +1,6 @@
 defmodule Sim.World.Bodies do
   @moduledoc "The solid things of a world as discs. Pure."
-  alias Sim.{Body, Contact}
+  alias Sim.World.{Body, Contact}
 
   @landmark_radius 0.15
 

@@ -1,7 +1,7 @@
 defmodule Sim.World.Motion do
   @moduledoc "One step of everything that moves: robots and the landmark. Pure."
   alias Hal.Pose
-  alias Sim.{Body, Contact}
+  alias Sim.World.{Body, Contact}
   alias Sim.World.Bodies
 
   @glide 0.3
@@ -23,7 +23,7 @@ defmodule Sim.World.Motion do
       Enum.any?(discs, fn robot ->
         gap = Contact.gap(landmark(next), robot)
         gap < @polite and gap < Contact.gap(landmark(here), robot)
-      end) or not Sim.Map.free?(world.map, next, Bodies.landmark_radius())
+      end) or not Sim.Floorplan.free?(world.map, next, Bodies.landmark_radius())
 
     cond do
       blocked? -> world

@@ -1,6 +1,6 @@
 defmodule Sim.World.Touch do
   @moduledoc "Who touches whom after a step, and what comes of it. Pure."
-  alias Sim.{Body, Contact}
+  alias Sim.World.{Body, Contact}
   alias Sim.World.Bodies
 
   @doc "The world with its contacts, the count of new ones, the least gap, and the bumpers pressed."

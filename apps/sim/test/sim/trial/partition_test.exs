@@ -3,7 +3,7 @@ defmodule Sim.Trial.PartitionTest do
   use ExUnit.Case, async: true
   import Sim.TrialRuns
   alias Sim.Trial
-  alias Sim.Trial.{Accord, Cuts}
+  alias Sim.Trial.{AgreementMetrics, Cuts}
 
   @left [:mag1, :min2, :mag3]
   @right [:mag2, :min1, :min3]
@@ -110,10 +110,10 @@ defmodule Sim.Trial.PartitionTest do
         {[:a], [[:a, :b]]}
       ]
       |> Enum.with_index()
-      |> Enum.reduce(%Accord{}, fn {{leaders, parts}, n}, accord ->
-        Accord.note(accord, n * 100, lead.(leaders), parts, [])
+      |> Enum.reduce(%AgreementMetrics{}, fn {{leaders, parts}, n}, accord ->
+        AgreementMetrics.note(accord, n * 100, lead.(leaders), parts, [])
       end)
 
-    assert Accord.report(accord).rivals_max_s == 0.2
+    assert AgreementMetrics.report(accord).rivals_max_s == 0.2
   end
 end

@@ -18,7 +18,7 @@ defmodule Mix.Tasks.Fleet.Certs do
     * `--help` - this text
   """
   use Mix.Task
-  alias Swarm.Mesh.Certs
+  alias Swarm.Mesh.Distribution.Certs
 
   @switches [fleet: :string, out: :string, force: :boolean, help: :boolean]
   @longest 65_536

@@ -1,8 +1,9 @@
 defmodule Swarm.Directory.Search do
   @moduledoc false
-  # Which robots are as wanted (`Swarm.find/1`): templates over `Swarm.About`.
-  alias Robot.Command.Words
-  alias Swarm.{About, Transport}
+  # Which robots are as wanted (`Swarm.find/1`): templates over `Swarm.Directory.RobotInfo`.
+  alias Robot.Command
+  alias Swarm.Comms.Transport
+  alias Swarm.Directory.RobotInfo
 
   @max_age_ms 10_000
   @keys [:robot, :node, :profile, :battery, :calibrated, :mission, :state, :service, :max_age_ms]
@@ -15,7 +16,7 @@ defmodule Swarm.Directory.Search do
       {max_age_ms, template} = Keyword.pop(template, :max_age_ms, @max_age_ms)
 
       for robot <- Transport.robots(),
-          template == [] or like?(About.of(robot, max_age_ms), template),
+          template == [] or like?(RobotInfo.of(robot, max_age_ms), template),
           do: robot
     else
       line when is_binary(line) -> {:error, line}
@@ -25,13 +26,13 @@ defmodule Swarm.Directory.Search do
   @doc """
   Whether a robot is as wanted.
 
-      iex> about = %Swarm.About{robot: :mag1, profile: :magellan, battery: 12.1, services: [:camera]}
+      iex> about = %Swarm.Directory.RobotInfo{robot: :mag1, profile: :magellan, battery: 12.1, services: [:camera]}
       iex> Swarm.Directory.Search.like?({:ok, about}, service: :camera, battery: {11.5, 14})
       true
       iex> Swarm.Directory.Search.like?({:ok, about}, battery: &(&1 > 13))
       false
   """
-  @spec like?({:ok, About.t()} | :error, keyword()) :: boolean()
+  @spec like?({:ok, RobotInfo.t()} | :error, keyword()) :: boolean()
   def like?({:ok, about}, template), do: Enum.all?(template, &as_wanted?(about, &1))
   def like?(:error, _template), do: false
 
@@ -55,7 +56,7 @@ defmodule Swarm.Directory.Search do
   end
 
   defp wrong({key, _wanted}) when key not in @keys do
-    near = Words.nearest(Atom.to_string(key), Enum.map(@keys, &Atom.to_string/1))
+    near = Command.Arguments.nearest(Atom.to_string(key), Enum.map(@keys, &Atom.to_string/1))
     hint = if near, do: "; did you mean #{near}?", else: ""
     "robots are not found by #{inspect(key)}: #{Enum.join(@keys, ", ")}" <> hint
   end

@@ -62,7 +62,7 @@ defmodule Swarm.Mesh.Beacon do
     }
   end
 
-  defp list?(list, fun), do: Swarm.Shape.list?(list, fun) and length(list) <= @most
+  defp list?(list, fun), do: Swarm.Message.WireTypes.list?(list, fun) and length(list) <= @most
 
   defp session?({name, session}),
     do: name?(name) and is_integer(session) and session in 0..@latest

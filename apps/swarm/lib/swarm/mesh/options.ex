@@ -12,7 +12,7 @@ defmodule Swarm.Mesh.Options do
   | `peers` | addresses to try, `["10.0.0.7:4370"]`, where multicast is blocked |
   | `strategies` | further ways to meet, `[{Module, options}]` (`Swarm.Mesh.Strategy`) |
   | `topologies` | those of `libcluster`, where it is (`MIX_TARGET`): any of its strategies then connects nodes |
-  | `dist_port` | the port that this node's distribution listens on; default: that of `Swarm.Mesh.Epmd`, or 0 where there is an epmd to ask |
+  | `dist_port` | the port that this node's distribution listens on; default: that of `Swarm.Mesh.Distribution.Epmd`, or 0 where there is an epmd to ask |
   | `full_mesh` | up to so many nodes each is connected to each; default 30 |
   | `degree` | above that, to about so many others, 2 to 30; default 8 |
   """
@@ -121,7 +121,10 @@ defmodule Swarm.Mesh.Options do
     case :init.get_argument(:epmd_module) do
       {:ok, _without_epmd} ->
         [name | _host] = String.split(Atom.to_string(node()), "@")
-        {:ok, port} = Swarm.Mesh.Epmd.listen_port_please(String.to_charlist(name), ~c"")
+
+        {:ok, port} =
+          Swarm.Mesh.Distribution.Epmd.listen_port_please(String.to_charlist(name), ~c"")
+
         port
 
       :error ->

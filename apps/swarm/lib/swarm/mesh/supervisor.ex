@@ -3,15 +3,17 @@ defmodule Swarm.Mesh.Supervisor do
   The processes of a node's mesh.
 
       Swarm.Mesh.Supervisor (rest_for_one)
-      |-- Swarm.Mesh.Radio    signed datagrams: beacons, heartbeats, rounds, rows, stops
-      |-- Swarm.Mesh.Dialer   connects the distribution, again and again
-      |-- Swarm.Mesh.Relay    commands to nodes that this one is not connected to
-      `-- Swarm.Mesh.Libcluster  where its topologies are configured
+      |-- Swarm.Mesh.Server    signed datagrams: beacons, heartbeats, rounds, rows, stops
+      |-- Swarm.Mesh.Distribution.Dialer   connects the distribution, again and again
+      |-- Swarm.Mesh.CommandRelay    commands to nodes that this one is not connected to
+      `-- Swarm.Mesh.Distribution.Libcluster  where its topologies are configured
 
   A radio that starts anew has a new session: for the others it is a node that was away for a moment.
   """
   use Supervisor
-  alias Swarm.Mesh.{Dialer, Libcluster, Options, Radio, Relay}
+  alias Swarm.Mesh
+  alias Swarm.Mesh.{CommandRelay, Options}
+  alias Swarm.Mesh.Distribution.{Dialer, Libcluster}
 
   @doc "Starts the mesh of this node, with options from `Swarm.Mesh.Options.prepare/1`."
   @spec start_link(Options.t()) :: Supervisor.on_start()
@@ -19,7 +21,9 @@ defmodule Swarm.Mesh.Supervisor do
 
   @impl Supervisor
   def init(options) do
-    children = [{Radio, options}, {Dialer, options}, {Relay, options}] ++ libcluster(options)
+    children =
+      [{Mesh.Server, options}, {Dialer, options}, {CommandRelay, options}] ++ libcluster(options)
+
     Supervisor.init(children, strategy: :rest_for_one, max_restarts: 5, max_seconds: 5)
   end
 

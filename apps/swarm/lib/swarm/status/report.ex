@@ -1,8 +1,8 @@
 defmodule Swarm.Status.Report do
   @moduledoc false
   # How robots are (`Swarm.status`): what they answer, else what their rows say.
-  alias Swarm.{Blackboard, Door, Status, Transport}
-  alias Swarm.Door.Ask
+  alias Swarm.{Blackboard, Commands, Status}
+  alias Swarm.Comms.Transport
 
   # Heard of by way of others, and as lately as one that is not gone.
   @there_ms 2_000
@@ -11,7 +11,7 @@ defmodule Swarm.Status.Report do
   @spec all() :: [Status.t()]
   def all do
     robots = Transport.robots()
-    answers = Ask.ask(robots, :status)
+    answers = Commands.Client.ask(robots, :status)
 
     relayed =
       for id <- Blackboard.robots() -- robots, {:ok, status} <- [row(id, @there_ms)], do: status
@@ -22,9 +22,9 @@ defmodule Swarm.Status.Report do
   @doc "One robot, named as in `Swarm`."
   @spec one(term()) :: Status.t() | {:error, line :: String.t()}
   def one(robot) do
-    case Door.robots(robot) do
+    case Commands.robots(robot) do
       {:ok, [id]} ->
-        with %Status{state: :no_answer} <- one(id, Ask.ask([id], :status)),
+        with %Status{state: :no_answer} <- one(id, Commands.Client.ask([id], :status)),
              do: {:error, "#{id} does not answer"}
 
       {:ok, _several} ->

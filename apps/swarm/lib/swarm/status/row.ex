@@ -6,8 +6,9 @@ defmodule Swarm.Status.Row do
   `uncertainty`, where it is known.
   """
   alias Hal.Pose
-  alias Swarm.{Shape, Status}
-  alias Swarm.Rows.Wire
+  alias Swarm.Status
+  alias Swarm.Message.WireTypes
+  alias Swarm.Blackboard
 
   # Longer than any name; what comes from outside is not printed at any length.
   @words 80
@@ -99,33 +100,37 @@ defmodule Swarm.Status.Row do
          true <- Enum.all?([limits, offline, members, deaf_to, words], &texts?/1),
          true <- Enum.all?([node, state], &is_binary/1),
          true <- Enum.all?([by, leader, fault], &(&1 == nil or is_binary(&1))),
-         true <- Enum.all?([speed, rejected, number], &Shape.number?/1) and is_boolean(estop),
-         true <- pose == nil or Shape.pose?(pose),
+         true <- Enum.all?([speed, rejected, number], &WireTypes.number?/1) and is_boolean(estop),
+         true <- pose == nil or WireTypes.pose?(pose),
          true <- power == nil or is_number(power),
-         true <- was_ms == nil or Shape.number?(was_ms) do
+         true <- was_ms == nil or WireTypes.number?(was_ms) do
       members = names(members)
 
       {:ok,
        %Status{
          robot: robot,
          from: :row,
-         node: Wire.word(node),
-         state: Wire.word(state),
-         by: by && Wire.word(by),
+         node: Blackboard.Codec.word(node),
+         state: Blackboard.Codec.word(state),
+         by: by && Blackboard.Codec.word(by),
          pose: pose && place(pose),
          uncertainty: uncertainty,
          speed: speed / 1000,
-         limits: Enum.map(limits, &Wire.word/1),
+         limits: Enum.map(limits, &Blackboard.Codec.word/1),
          estop: estop,
          arming: arming,
-         leader: leader && Wire.word(leader),
+         leader: leader && Blackboard.Codec.word(leader),
          unsure: unsure,
          blocked_by: blocked_by,
          hung: hung,
          power: power,
-         health: Map.new(offline, &{Wire.word(&1), {:offline, :unknown}}),
+         health: Map.new(offline, &{Blackboard.Codec.word(&1), {:offline, :unknown}}),
          offline:
-           for({name, line} <- Enum.zip(offline, words), into: %{}, do: {Wire.word(name), line}),
+           for(
+             {name, line} <- Enum.zip(offline, words),
+             into: %{},
+             do: {Blackboard.Codec.word(name), line}
+           ),
          fault: fault,
          hears: members -- [robot | names(deaf_to)],
          view: {number, members},
@@ -160,7 +165,10 @@ defmodule Swarm.Status.Row do
   defp metres(mm) when is_integer(mm) and mm in 0..@unsure_mm, do: {:ok, mm / 1000}
   defp metres(_other), do: :error
 
-  defp texts?(list), do: Shape.list?(list, &is_binary/1)
-  defp names(texts), do: for(text <- texts, {:ok, name} <- [Wire.robot(text)], do: name)
+  defp texts?(list), do: WireTypes.list?(list, &is_binary/1)
+
+  defp names(texts),
+    do: for(text <- texts, {:ok, name} <- [Blackboard.Codec.robot(text)], do: name)
+
   defp place({x, y, heading}), do: Pose.new(x / 1000, y / 1000, heading / 1000)
 end

@@ -6,12 +6,12 @@ defmodule Swarm.Mesh.AbsurdTest do
   alias Swarm.MeshNodes
 
   @parts [
-    Swarm.Mesh.Radio,
-    Swarm.Mesh.Dialer,
-    Swarm.Alarm,
+    Swarm.Mesh.Server,
+    Swarm.Mesh.Distribution.Dialer,
+    Swarm.EStop.Broadcaster,
     Swarm.Blackboard,
-    Swarm.Hints,
-    Swarm.Directory.Watch
+    Swarm.Blackboard.Hints,
+    Swarm.Directory.Presence
   ]
 
   defp parts(%{name: name} = node) do
@@ -50,7 +50,7 @@ defmodule Swarm.Mesh.AbsurdTest do
     for f <- [:status, :matrix, :find],
         do: assert(is_binary(inspect(MeshNodes.call(one, Swarm, f, []))))
 
-    assert is_map(MeshNodes.call(one, Swarm.Hints, :all, []))
+    assert is_map(MeshNodes.call(one, Swarm.Blackboard.Hints, :all, []))
     assert is_map(MeshNodes.call(one, Swarm.Blackboard, :rows, [two.name]))
 
     assert eventually(fn -> hears?(one, two) and hears?(two, one) end)
@@ -59,7 +59,7 @@ defmodule Swarm.Mesh.AbsurdTest do
     assert MeshNodes.call(one, Swarm, :status, [one.name]).estop
     assert eventually(fn -> MeshNodes.call(two, Swarm, :reset, []) == :ok end)
     assert :ok = MeshNodes.call(two, Swarm.Blackboard, :put, [two.name, :door, 1])
-    assert :ok = MeshNodes.call(two, Swarm.Hints, :put, [two.name, :hint, 1])
+    assert :ok = MeshNodes.call(two, Swarm.Blackboard.Hints, :put, [two.name, :hint, 1])
 
     assert eventually(fn ->
              match?(
@@ -69,7 +69,7 @@ defmodule Swarm.Mesh.AbsurdTest do
            end)
 
     assert eventually(fn ->
-             match?({:ok, 1, _}, MeshNodes.call(one, Swarm.Hints, :get, [:hint]))
+             match?({:ok, 1, _}, MeshNodes.call(one, Swarm.Blackboard.Hints, :get, [:hint]))
            end)
 
     refute MeshNodes.call(one, Swarm, :status, [one.name]).estop

@@ -7,13 +7,13 @@ defmodule Swarm.Mesh.FallsTest do
 
   @parts [
     Swarm.Blackboard,
-    Swarm.Hints,
-    Swarm.Directory.Watch,
-    Swarm.Alarm,
+    Swarm.Blackboard.Hints,
+    Swarm.Directory.Presence,
+    Swarm.EStop.Broadcaster,
     Swarm.Directory,
-    Swarm.Mesh.Relay,
-    Swarm.Mesh.Dialer,
-    Swarm.Mesh.Radio
+    Swarm.Mesh.CommandRelay,
+    Swarm.Mesh.Distribution.Dialer,
+    Swarm.Mesh.Server
   ]
   @times 5
 
@@ -44,7 +44,7 @@ defmodule Swarm.Mesh.FallsTest do
              MeshNodes.call(one, Swarm.Blackboard, :put, [one.name, :door, 0]) == :ok
            end)
 
-    assert :ok = MeshNodes.call(one, Swarm.Hints, :put, [one.name, :hint, 0])
+    assert :ok = MeshNodes.call(one, Swarm.Blackboard.Hints, :put, [one.name, :hint, 0])
     robot = pids(one)
     board = MeshNodes.call(one, Robot.Board, :find!, [one.name])
 
@@ -69,13 +69,13 @@ defmodule Swarm.Mesh.FallsTest do
            end)
 
     assert eventually(fn ->
-             match?({:ok, 0, _}, MeshNodes.call(one, Swarm.Hints, :get, [:hint]))
+             match?({:ok, 0, _}, MeshNodes.call(one, Swarm.Blackboard.Hints, :get, [:hint]))
            end)
 
-    assert :ok = MeshNodes.call(one, Swarm.Hints, :put, [one.name, :hint, 1])
+    assert :ok = MeshNodes.call(one, Swarm.Blackboard.Hints, :put, [one.name, :hint, 1])
 
     assert eventually(fn ->
-             match?({:ok, 1, _}, MeshNodes.call(two, Swarm.Hints, :get, [:hint]))
+             match?({:ok, 1, _}, MeshNodes.call(two, Swarm.Blackboard.Hints, :get, [:hint]))
            end)
 
     for node <- [one, two],

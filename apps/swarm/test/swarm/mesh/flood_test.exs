@@ -24,7 +24,7 @@ defmodule Swarm.Mesh.FloodTest do
     {:ok, _doing, at_ms} = MeshNodes.call(node, Robot.Board, :fetch, [board, :doing, :infinity])
 
     %{
-      radio: MeshNodes.call(node, Process, :whereis, [Swarm.Mesh.Radio]),
+      radio: MeshNodes.call(node, Process, :whereis, [Swarm.Mesh.Server]),
       atoms: MeshNodes.call(node, :erlang, :system_info, [:atom_count]),
       memory: MeshNodes.call(node, :erlang, :memory, [:total]),
       tick_ms: at_ms

@@ -1,21 +1,22 @@
 defmodule Swarm.Mesh.PureTest do
   use ExUnit.Case, async: true
-  alias Swarm.Mesh.{Beacon, Book, Options, Plan, Ways}
+  alias Swarm.Mesh.{Beacon, NodeTable, Options, Routing}
+  alias Swarm.Mesh.Distribution.Topology
 
   doctest Swarm.Mesh.Backoff
   doctest Swarm.Mesh.Beacon
-  doctest Swarm.Mesh.Certs
-  doctest Swarm.Mesh.Guard
+  doctest Swarm.Mesh.Distribution.Certs
+  doctest Swarm.Mesh.Packet.ReplayProtection
   doctest Swarm.Mesh.Log
   doctest Swarm.Mesh.Packet
-  doctest Swarm.Mesh.Plan
+  doctest Swarm.Mesh.Distribution.Topology
   doctest Swarm.Mesh.Roster
   doctest Swarm.Mesh.Strategy.Static
 
   test "up to 30 nodes everybody is connected to everybody, above that to few, and all hang together" do
     for count <- [2, 30, 31, 60, 100] do
       names = for n <- 1..count, do: "mag#{100 + n}@lab"
-      links = Map.new(names, &{&1, Plan.peers(&1, names, 30, 8)})
+      links = Map.new(names, &{&1, Topology.peers(&1, names, 30, 8)})
 
       if count <= 30,
         do: assert(Enum.all?(links, fn {me, peers} -> peers == names -- [me] end)),
@@ -25,7 +26,7 @@ defmodule Swarm.Mesh.PureTest do
       for {me, peers} <- links, peer <- peers, do: assert(me in links[peer])
 
       for other <- tl(names) do
-        route = Plan.route(hd(names), other, links)
+        route = Topology.route(hd(names), other, links)
         assert List.last(route) == other and length(route) <= 7
       end
     end
@@ -33,43 +34,49 @@ defmodule Swarm.Mesh.PureTest do
 
   test "the number of the view grows with a node that goes and comes, not with one that is late" do
     place = {{10, 0, 0, 7}, 4370}
-    {book, [up: "b"]} = Book.hear(Book.new("a"), "b", place, 0)
-    {late, [suspect: "b"]} = Book.age(book, 1_500)
-    {back, [up: "b"]} = Book.hear(late, "b", place, 1_600)
+    {book, [up: "b"]} = NodeTable.hear(NodeTable.new("a"), "b", place, 0)
+    {late, [suspect: "b"]} = NodeTable.age(book, 1_500)
+    {back, [up: "b"]} = NodeTable.hear(late, "b", place, 1_600)
     assert {book.number, late.number, back.number} == {1, 1, 1}
-    {gone, [gone: "b"]} = Book.age(back, 3_600)
-    {again, [up: "b"]} = Book.hear(gone, "b", place, 9_000)
+    {gone, [gone: "b"]} = NodeTable.age(back, 3_600)
+    {again, [up: "b"]} = NodeTable.hear(gone, "b", place, 9_000)
     assert {gone.number, again.number} == {2, 3}
   end
 
   test "there is no way to where no connection leads" do
-    assert Plan.route("a", "z", %{"a" => ["b"], "b" => ["a"], "z" => []}) == nil
+    assert Topology.route("a", "z", %{"a" => ["b"], "b" => ["a"], "z" => []}) == nil
   end
 
   # What "a" knows at 5 s: all of "b", of "c" that it has been silent for 3 s, though TCP has not noticed.
   defp torn(hears) do
     address = {{10, 0, 0, 1}, 1}
-    {book, _up} = Book.hear(Book.new("a"), "c", address, 2_000)
-    book = Book.robot(book, "c", :mag3, {1, 1}, 2_000)
-    {book, _up} = Book.hear(book, "b", address, 5_000)
+    {book, _up} = NodeTable.hear(NodeTable.new("a"), "c", address, 2_000)
+    book = NodeTable.robot(book, "c", :mag3, {1, 1}, 2_000)
+    {book, _up} = NodeTable.hear(book, "b", address, 5_000)
     hears = for name <- hears, do: {name, address}
-    Book.beacon(book, "b", %Beacon{sessions: [], hears: hears, links: ["a", "c"], port: 0}, 5_000)
+
+    NodeTable.beacon(
+      book,
+      "b",
+      %Beacon{sessions: [], hears: hears, links: ["a", "c"], port: 0},
+      5_000
+    )
   end
 
   test "where a link is silent the way leads over one that hears both" do
     book = torn(["a", "c"])
-    ways = Ways.ways(book, ["b", "c"], 5_000)
+    ways = Routing.ways(book, ["b", "c"], 5_000)
     assert ways == %{"a" => ["b"], "b" => ["a", "c"]}
-    assert Plan.route("a", "c", ways) == ["b", "c"]
-    assert Ways.holder(book, :mag3) == "c"
-    assert Ways.beyond(book, 5_000) == [:mag3]
+    assert Topology.route("a", "c", ways) == ["b", "c"]
+    assert Routing.holder(book, :mag3) == "c"
+    assert Routing.beyond(book, 5_000) == [:mag3]
   end
 
   test "there is no way to a node that nobody hears" do
     book = torn(["a"])
-    assert Plan.route("a", "c", Ways.ways(book, ["b", "c"], 5_000)) == nil
-    assert Ways.beyond(book, 5_000) == []
-    assert Ways.holder(book, :mag9) == nil
+    assert Topology.route("a", "c", Routing.ways(book, ["b", "c"], 5_000)) == nil
+    assert Routing.beyond(book, 5_000) == []
+    assert Routing.holder(book, :mag9) == nil
   end
 
   test "options are checked by name" do

@@ -73,7 +73,7 @@ defmodule Swarm.MeshTest do
   test "a node that has just started understands all that a fleet on its way says" do
     [one] = Cluster.start(1, robots: true)
 
-    anchor = %Swarm.Anchor{
+    anchor = %Swarm.Formation.Reference{
       leader: one.name,
       epoch: 1,
       sequence: 1,
@@ -85,7 +85,7 @@ defmodule Swarm.MeshTest do
       places: []
     }
 
-    beat = %Swarm.Heartbeat{
+    beat = %Swarm.Membership.Heartbeat{
       boot: 1,
       sequence: 1,
       pose: {0, 0, 0},
@@ -96,7 +96,7 @@ defmodule Swarm.MeshTest do
     }
 
     letters =
-      for phase <- Swarm.Missions.Landmark.Phases.phases(),
+      for phase <- Missions.Landmark.Transitions.phases(),
           do: Swarm.Message.new(one.name, :heartbeat, %{beat | phase: phase})
 
     place = Swarm.Message.new(one.name, :place, %{anchor | landmark: {0, 0}, still: true})

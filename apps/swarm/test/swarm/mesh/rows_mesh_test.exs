@@ -3,7 +3,9 @@ defmodule Swarm.RowsMeshTest do
   # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1, eventually: 2]
-  alias Swarm.{About, Blackboard, Hints, Status}
+  alias Swarm.{Blackboard, Status}
+  alias Swarm.Blackboard.Hints
+  alias Swarm.Directory.RobotInfo
   alias Swarm.MeshNodes, as: Cluster
   alias Swarm.MeshNodes.Listener
 
@@ -58,7 +60,7 @@ defmodule Swarm.RowsMeshTest do
              matrix = Cluster.call(one, Swarm, :matrix, [])
 
              Enum.all?(names, fn a ->
-               Enum.all?(names -- [a], &(Swarm.Matrix.hears?(matrix, a, &1) == true))
+               Enum.all?(names -- [a], &(Swarm.Membership.Matrix.hears?(matrix, a, &1) == true))
              end)
            end)
 
@@ -113,8 +115,8 @@ defmodule Swarm.RowsMeshTest do
     Cluster.signal(three, "STOP")
     assert {:leave, _, :silent} = eventually(fn -> news(one, :leave, three.name) end)
     Cluster.signal(three, "CONT")
-    assert {:join, _, %About{}} = eventually(fn -> news(one, :join, three.name) end)
+    assert {:join, _, %RobotInfo{}} = eventually(fn -> news(one, :join, three.name) end)
     back = Cluster.join(nodes, two.name, robots: true)
-    assert {:join, _, %About{}} = eventually(fn -> news(one, :join, back.name) end)
+    assert {:join, _, %RobotInfo{}} = eventually(fn -> news(one, :join, back.name) end)
   end
 end

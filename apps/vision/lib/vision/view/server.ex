@@ -1,11 +1,11 @@
 defmodule Vision.View.Server do
   @moduledoc """
-  The process of `Vision.View`: who looks is the matter of `Vision.View.Audience`, what makes the pictures
-  that of `Vision.View.Maker`; here they meet. It never waits for a viewer, the camera or ffmpeg.
+  The process of `Vision.View`: who looks is the matter of `Vision.View.Subscribers`, what makes the pictures
+  that of `Vision.View.EncoderControl`; here they meet. It never waits for a viewer, the camera or ffmpeg.
   """
   use GenServer
   alias Hal.Device.Words
-  alias Vision.View.{Audience, Maker}
+  alias Vision.View.{EncoderControl, Subscribers}
 
   @doc "The line for a viewer on another node than the camera's."
   @spec elsewhere(camera :: node(), viewer :: node()) :: String.t()
@@ -21,9 +21,9 @@ defmodule Vision.View.Server do
     {:ok,
      %{
        demand: options.demand,
-       audience: Audience.new(options.viewers),
+       audience: Subscribers.new(options.viewers),
        people: %{},
-       maker: Maker.new(options.ffmpeg),
+       maker: EncoderControl.new(options.ffmpeg),
        snapshot_ms: options.snapshot_ms,
        timer: nil,
        camera: :online
@@ -33,7 +33,7 @@ defmodule Vision.View.Server do
   @impl GenServer
   def handle_call(:status, _from, %{maker: maker} = s) do
     encoder = if maker.encoder, do: :open, else: :closed
-    looking = %{viewers: Audience.size(s.audience), encoder: encoder}
+    looking = %{viewers: Subscribers.size(s.audience), encoder: encoder}
     {:reply, maker |> Map.take([:made, :failed, :why]) |> Map.merge(looking), s}
   end
 
@@ -71,7 +71,7 @@ defmodule Vision.View.Server do
   def handle_cast({:unsubscribe, ref}, s), do: {:noreply, s |> leave(ref) |> look()}
 
   def handle_cast({:next, ref}, s),
-    do: {:noreply, look(%{s | audience: Audience.ask(s.audience, ref)})}
+    do: {:noreply, look(%{s | audience: Subscribers.ask(s.audience, ref)})}
 
   # Looked for again when somebody asks again.
   def handle_cast(:no_frames, s),
@@ -81,10 +81,10 @@ defmodule Vision.View.Server do
   def handle_info(:look, s), do: {:noreply, look(%{s | timer: nil})}
 
   def handle_info({:too_late, from}, s) do
-    if Audience.member?(s.audience, {:once, from}),
+    if Subscribers.member?(s.audience, {:once, from}),
       do: GenServer.reply(from, {:error, why_none(s)})
 
-    {:noreply, look(%{s | audience: Audience.leave(s.audience, {:once, from})})}
+    {:noreply, look(%{s | audience: Subscribers.leave(s.audience, {:once, from})})}
   end
 
   def handle_info({:DOWN, monitor, :process, _pid, _reason}, s) do
@@ -93,7 +93,7 @@ defmodule Vision.View.Server do
   end
 
   def handle_info(message, s) do
-    case Maker.handle(s.maker, message, now()) do
+    case EncoderControl.handle(s.maker, message, now()) do
       {:picture, picture, maker} -> {:noreply, %{s | maker: maker} |> show(picture) |> look()}
       {:ok, maker} -> {:noreply, %{s | maker: maker}}
       {:error, line, maker} -> {:noreply, %{s | maker: maker} |> refuse(line) |> look()}
@@ -103,14 +103,14 @@ defmodule Vision.View.Server do
   end
 
   @impl GenServer
-  def terminate(_reason, s), do: Maker.close(s.maker)
+  def terminate(_reason, s), do: EncoderControl.close(s.maker)
 
   defp join(s, id, every) do
-    with :ok <- Maker.able(s.maker),
-         {:ok, audience} <- Audience.join(s.audience, id, every, now()) do
+    with :ok <- EncoderControl.able(s.maker),
+         {:ok, audience} <- Subscribers.join(s.audience, id, every, now()) do
       {:ok, %{s | audience: audience}}
     else
-      {:error, :full} -> {:error, "#{Audience.size(s.audience)} look already, no more can"}
+      {:error, :full} -> {:error, "#{Subscribers.size(s.audience)} look already, no more can"}
       error -> error
     end
   end
@@ -122,7 +122,7 @@ defmodule Vision.View.Server do
 
       {{_pid, monitor}, people} ->
         Process.demonitor(monitor, [:flush])
-        %{s | people: people, audience: Audience.leave(s.audience, ref)}
+        %{s | people: people, audience: Subscribers.leave(s.audience, ref)}
     end
   end
 
@@ -142,7 +142,7 @@ defmodule Vision.View.Server do
   end
 
   defp wait(s, now) do
-    case {Maker.rests(s.maker, now), Audience.due(s.audience, now)} do
+    case {EncoderControl.rests(s.maker, now), Subscribers.due(s.audience, now)} do
       {:busy, _due} -> :busy
       {_rests, :never} -> :never
       {rests, due} -> max(rests, due)
@@ -153,7 +153,7 @@ defmodule Vision.View.Server do
   defp begin(s, frame) do
     now = now()
 
-    with 0 <- wait(s, now), {:error, line, maker} <- Maker.begin(s.maker, frame, now) do
+    with 0 <- wait(s, now), {:error, line, maker} <- EncoderControl.begin(s.maker, frame, now) do
       refuse(%{s | maker: maker}, line)
     else
       {:ok, maker} -> %{s | maker: maker}
@@ -162,7 +162,7 @@ defmodule Vision.View.Server do
   end
 
   defp show(s, picture) do
-    {ids, audience} = Audience.serve(s.audience, now())
+    {ids, audience} = Subscribers.serve(s.audience, now())
     for id <- ids, do: hand_over(id, s.people, picture)
     %{s | audience: audience}
   end
@@ -176,10 +176,10 @@ defmodule Vision.View.Server do
 
   # Whoever wants one picture now hears why there is none; those who look go on waiting.
   defp refuse(s, line) do
-    Enum.reduce(Audience.ids(s.audience), s, fn
+    Enum.reduce(Subscribers.ids(s.audience), s, fn
       {:once, from} = id, s ->
         GenServer.reply(from, {:error, line})
-        %{s | audience: Audience.leave(s.audience, id)}
+        %{s | audience: Subscribers.leave(s.audience, id)}
 
       _looking, s ->
         s

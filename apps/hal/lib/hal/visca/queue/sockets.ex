@@ -5,7 +5,7 @@ defmodule Hal.Visca.Queue.Sockets do
   Answers get lost on a line, so the books may be wrong both ways. `:unknown` stands for something
   that works and is not known: it is the first to be cancelled when its socket is needed.
   """
-  alias Hal.Visca.{Command, Lane}
+  alias Hal.Visca.{Command, CommandClass}
 
   # The longest move at full speed takes 2.5 s, zoom about as much; switching on takes longer.
   @work_ms 10_000
@@ -61,7 +61,7 @@ defmodule Hal.Visca.Queue.Sockets do
       :unknown, _since_ms -> map_size(sockets) == 2
       # A drive is done at once, and is no move that refuses another.
       {:drive, _, _}, _since_ms -> map_size(sockets) == 2
-      other, _since_ms -> Lane.overrides?(command, other)
+      other, _since_ms -> CommandClass.overrides?(command, other)
     end)
   end
 
@@ -69,8 +69,11 @@ defmodule Hal.Visca.Queue.Sockets do
 
   def in_the_way(sockets, command) do
     oldest(sockets, fn
-      :unknown, _since_ms -> false
-      old, since_ms -> Lane.overrides?(command, old) or overridden?(sockets, old, since_ms)
+      :unknown, _since_ms ->
+        false
+
+      old, since_ms ->
+        CommandClass.overrides?(command, old) or overridden?(sockets, old, since_ms)
     end) || oldest(sockets, fn work, _since_ms -> work == :unknown end)
   end
 
@@ -88,7 +91,7 @@ defmodule Hal.Visca.Queue.Sockets do
 
   defp overridden?(sockets, old, since_ms) do
     Enum.any?(sockets, fn {_, {newer, newer_ms}} ->
-      newer != :unknown and newer_ms > since_ms and Lane.overrides?(newer, old)
+      newer != :unknown and newer_ms > since_ms and CommandClass.overrides?(newer, old)
     end)
   end
 

@@ -4,7 +4,8 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   things by what the sonars see and nobody told. Pure.
   """
   alias Hal.{Pose, Twist}
-  alias Robot.{Percept, Reflex}
+  alias Robot.Percept
+  alias Robot.Safety.Reflex
 
   @typedoc "`share`: the part of the evasion that is ours."
   @type t :: %{

@@ -8,7 +8,7 @@ defmodule Sim.Fleet.Nodes.Host do
   command line and no environment.
   """
   alias Sim.Fleet.Folder
-  alias Sim.Fleet.Nodes.Mapper
+  alias Sim.Fleet.Nodes.PortMapper
   alias Swarm.Mesh.{Options, Secret}
 
   @host "127.0.0.1"
@@ -24,7 +24,7 @@ defmodule Sim.Fleet.Nodes.Host do
           ports: %{node() => :inet.port_number()},
           fleet: [atom()],
           mesh: pid() | nil,
-          named: {:by_us, Mapper.t()} | :before
+          named: {:by_us, PortMapper.t()} | :before
         }
 
   @doc "The host part of all nodes' names."
@@ -100,14 +100,14 @@ defmodule Sim.Fleet.Nodes.Host do
 
   defp name_node do
     Application.put_env(:kernel, :inet_dist_use_interface, @address)
-    mapper = Mapper.start()
+    mapper = PortMapper.start()
 
     case quietly(fn -> Node.start(@name, :longnames) end) do
       {:ok, _kernel} ->
         {:ok, {:by_us, mapper}}
 
       {:error, _reason} ->
-        Mapper.stop(mapper)
+        PortMapper.stop(mapper)
 
         {:error,
          "no nodes can be started here: #{@name} is taken by another run, or epmd does not " <>
@@ -119,7 +119,7 @@ defmodule Sim.Fleet.Nodes.Host do
 
   defp unname({:by_us, mapper}) do
     quietly(fn -> Node.stop() end)
-    Mapper.stop(mapper)
+    PortMapper.stop(mapper)
   end
 
   # The kernel tells all about a failure; one line is enough.

@@ -1,0 +1,37 @@
+defmodule Bench.Mesh.Agent do
+  @moduledoc """
+  A robot's program (`Agents.Responder`) that is measured: it answers, and it takes part in rounds in which
+  everybody writes to everybody. Whoever starts a round asks all with `{:round, others}`; an agent
+  answers when it has heard from all others.
+  """
+  @behaviour Agents.Responder
+  alias Agents.{Conversation, Envelope}
+
+  @doc "The name of the service."
+  @spec service() :: atom()
+  def service, do: :bench
+
+  @impl Agents.Responder
+  def init(robot, _argument), do: %{robot: robot, heard: 0, asked: nil}
+
+  @impl Agents.Responder
+  def handle(%{content: :ping}, s), do: {{:inform, :pong}, s}
+
+  def handle(%{content: {:round, robots}} = asked, s) do
+    word = Envelope.new(:inform, s.robot, :word)
+    others = List.delete(robots, s.robot)
+    for other <- others, do: Conversation.tell({other, service()}, word)
+    complete(%{s | asked: {asked, length(others)}})
+  end
+
+  def handle(%{content: :word}, s), do: complete(%{s | heard: s.heard + 1})
+  def handle(_other, s), do: {:noreply, s}
+
+  # The words of others may be here before the question.
+  defp complete(%{asked: {asked, all}, heard: all} = s) do
+    Conversation.post(asked.reply_to, Envelope.reply(asked, :inform, s.robot, :done))
+    {:noreply, %{s | heard: 0, asked: nil}}
+  end
+
+  defp complete(s), do: {:noreply, s}
+end

@@ -1,0 +1,179 @@
+defmodule Bench.Mesh.Convoy do
+  @moduledoc """
+  What runs in the measured nodes: robots with all their parts, on wheels that stand, with the mesh
+  as it is; and the measuring, in the node that asks. Called over standard input.
+  """
+  alias Bench.Mesh.{Agent, IdleDrive, Watch}
+  alias Agents.{Conversation, Envelope}
+  alias Swarm.{Commands, Directory, Mesh}
+
+  @patience_ms 2_000
+  @look_ms 5
+
+  @doc "Makes this node a robot's, or that of several, or of none."
+  @spec main(keyword() | false, [atom()]) :: :ok
+  def main(mesh, robots) do
+    Application.put_env(:logger, :level, :error)
+    Application.put_env(:swarm, :mesh, mesh)
+    {:ok, _apps} = Application.ensure_all_started(:swarm)
+    counters = :counters.new(max(length(robots), 1), [])
+    :persistent_term.put(__MODULE__, counters)
+    for {id, index} <- Enum.with_index(robots, 1), do: robot(id, [counters, index])
+    :ok
+  end
+
+  defp robot(id, counted) do
+    config =
+      Robot.Config.new!(
+        id: id,
+        profile: Hal.Profile.magellan(),
+        drive: {IdleDrive, []},
+        trace: {__MODULE__, :trace, counted},
+        companions: [{Agents.Responder, service: Agent.service(), module: Agent}]
+      )
+
+    {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, Swarm.Comms.join(config))
+  end
+
+  @doc "Waits until this node sees and is connected to all, and knows all robots; says when."
+  @spec full(nodes :: pos_integer(), robots :: [atom()]) :: at_ns :: integer()
+  def full(nodes, robots) do
+    if length(Node.list()) >= nodes - 1 and alive() >= nodes - 1 and
+         robots -- Directory.robots() == [] do
+      Watch.now_ns()
+    else
+      receive do
+      after
+        @look_ms -> full(nodes, robots)
+      end
+    end
+  end
+
+  defp alive, do: Enum.count(Mesh.view().nodes, fn {_node, about} -> about.status == :alive end)
+
+  @doc "Commands: asks all robots by the door, `count` times; us each."
+  @spec pings([atom()], pos_integer()) :: [float()]
+  def pings(robots, count) do
+    all = length(robots)
+    repeat(count, fn -> ^all = map_size(Commands.Client.ask(robots, :ping)) end)
+  end
+
+  @doc "Envelopes: asks all agents and gathers their answers; us each."
+  @spec gathers([atom()], pos_integer()) :: [float()]
+  def gathers(robots, count), do: asks(robots, :ping, count)
+
+  @doc "Everybody to everybody, until all have heard all; us each."
+  @spec rounds([atom()], pos_integer()) :: [float()]
+  def rounds(robots, count), do: asks(robots, {:round, robots}, count)
+
+  defp asks(robots, content, count) do
+    peers = for id <- robots, do: {id, Agent.service()}
+
+    repeat(count, fn ->
+      question = Envelope.new(:query, :base, content)
+      {:complete, _answers, []} = Conversation.gather(peers, question, @patience_ms)
+    end)
+  end
+
+  @doc "How long a robot that joins on that node takes to be told of here; us each."
+  @spec joins(node(), atom(), pos_integer()) :: [float()]
+  def joins(node, robot, count) do
+    {:ok, _there} = Swarm.subscribe()
+
+    for _ <- 1..count do
+      pid = Node.spawn(node, __MODULE__, :newcomer, [self(), robot])
+      receive do: ({:swarm, {:join, ^robot, _about}} -> :ok)
+      here_ns = Watch.now_ns()
+      at_ns = receive do: ({:joined, ^pid, at_ns} -> at_ns)
+      Process.exit(pid, :kill)
+      receive do: ({:swarm, {:leave, ^robot, _reason}} -> :ok)
+      (here_ns - at_ns) / 1_000
+    end
+  end
+
+  @doc false
+  @spec newcomer(pid(), atom()) :: :ok
+  def newcomer(asker, robot) do
+    at_ns = Watch.now_ns()
+    :ok = Directory.enter(self(), [{:robot, robot}])
+    send(asker, {:joined, self(), at_ns})
+    receive do: (:never -> :ok)
+  end
+
+  @doc """
+  Writes down when this robot is there and when not: `:join` and `:leave` as subscribers are told,
+  `:suspect` and `:gone` of its node by the datagrams.
+  """
+  @spec watch(atom(), node()) :: :ok
+  def watch(robot, node) do
+    Watch.start(
+      fn ->
+        {:ok, _there} = Swarm.subscribe()
+        for change <- [:up, :suspect, :gone], do: attach(change)
+      end,
+      fn
+        {:swarm, {:join, ^robot, _about}} -> :join
+        {:swarm, {:leave, ^robot, _reason}} -> :leave
+        {:mesh, change, ^node} -> change
+        _other -> nil
+      end
+    )
+  end
+
+  defp attach(change) do
+    Hal.Event.detach({__MODULE__, change})
+
+    :ok =
+      Hal.Event.attach({__MODULE__, change}, [:swarm, :mesh, change], &__MODULE__.note/4, self())
+  end
+
+  @doc false
+  @spec note(Hal.Event.name(), map(), map(), pid()) :: term()
+  def note([:swarm, :mesh, change], _measurements, %{node: node}, pid),
+    do: send(pid, {:mesh, change, node})
+
+  @doc "Lets this node say nothing by datagram any more, or again; says when."
+  @spec silence(boolean()) :: at_ns :: integer()
+  def silence(true), do: apply_then_now(:suspend)
+  def silence(false), do: apply_then_now(:resume)
+
+  defp apply_then_now(what) do
+    :ok = apply(:sys, what, [Mesh.Server])
+    Watch.now_ns()
+  end
+
+  @doc "How many ticks a second each robot of this node does, over so many seconds."
+  @spec rates([atom()], pos_integer()) :: [float()]
+  def rates(robots, seconds) do
+    before = ticks(robots)
+    began_ns = Watch.now_ns()
+
+    receive do
+    after
+      seconds * 1_000 -> :ok
+    end
+
+    took_s = (Watch.now_ns() - began_ns) / 1.0e9
+    for {now, then} <- Enum.zip(ticks(robots), before), do: (now - then) / took_s
+  end
+
+  defp ticks(robots) do
+    counters = :persistent_term.get(__MODULE__)
+    for {_id, index} <- Enum.with_index(robots, 1), do: :counters.get(counters, index)
+  end
+
+  @doc false
+  @spec trace(:counters.counters_ref(), pos_integer(), Robot.Control.Trace.entry()) :: :ok
+  def trace(counters, index, {:executive, :effect, {:tick, _percept}, _at_ms}),
+    do: :counters.add(counters, index, 1)
+
+  def trace(_counters, _index, _entry), do: :ok
+
+  defp repeat(count, fun), do: for(_ <- 1..count, do: timed(fun))
+
+  defp timed(fun) do
+    began = System.monotonic_time(:nanosecond)
+    fun.()
+    (System.monotonic_time(:nanosecond) - began) / 1_000
+  end
+end

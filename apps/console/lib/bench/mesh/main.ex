@@ -1,0 +1,75 @@
+defmodule Bench.Mesh.Main do
+  @moduledoc "The command `mix bench swarm`: reads its options, measures, prints the table."
+  alias Console.Cli
+  alias Console.Cli.{Output, Parse}
+  alias Bench.Mesh
+
+  alias Bench.Vm
+
+  @doc "Runs it; errors are lines."
+  @spec run([String.t()]) :: :ok | {:error, [String.t()]}
+  def run(arguments) do
+    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
+      given = Map.new(pairs)
+      if given["help"], do: help(), else: measure(given)
+    end
+  end
+
+  defp measure(given) do
+    output = Output.to(:stderr)
+    many = Map.get(given, "robots-in-one-node", 100)
+    sizes = Map.get(given, "nodes", [3, 10, 30]) ++ if(many > 0, do: [:one], else: [])
+    note = &Output.progress(output, "bench: " <> &1)
+    cases = Map.get(given, "only", Mesh.cases())
+    plan = %{cases: cases, share: Map.get(given, "share", 100) / 100, note: note}
+    before = Vm.load()
+    rows = Enum.flat_map(sizes, &Mesh.Runner.rows(&1, if(&1 == :one, do: many, else: &1), plan))
+    Output.finish(output)
+    about = %{load_before: before, load_after: Vm.load(), schedulers: System.schedulers_online()}
+    IO.write(Mesh.Report.draw(rows))
+    IO.puts("\n" <> words(about))
+    Output.json(given["json"], Mesh.Report.term(rows, about))
+  end
+
+  defp words(about) do
+    "Bare OTP: the same nodes with :pg and send alone, right before ours. Of fewer than 100 times the second " <>
+      "figure is the largest.\nLoad of the machine (1 min): #{about.load_before || "?"} before, " <>
+      "#{about.load_after || "?"} after; #{about.schedulers} processors."
+  end
+
+  defp table do
+    [
+      {"nodes", "N,N", &sizes/1, "how many nodes (3,10,30)"},
+      {"robots-in-one-node", "N", &Parse.whole(&1, 0..200),
+       "and so many robots in one node; 0 for none (100)"},
+      {"only", "NAME,NAME", &Mesh.choose/1, "which cases (all)"},
+      {"share", "PERCENT", &Parse.whole(&1, 1..1_000), "how much of the usual repetitions (100)"},
+      {"json", "FILE", &{:ok, &1}, "write the figures there too"},
+      {"help", nil, nil, "this text"}
+    ]
+  end
+
+  @doc """
+  Numbers of nodes.
+
+      iex> Bench.Mesh.Main.sizes("3,10")
+      {:ok, [3, 10]}
+      iex> Bench.Mesh.Main.sizes("1")
+      {:error, "whole numbers from 2 to 100, with commas between"}
+  """
+  @spec sizes(String.t()) :: {:ok, [pos_integer()]} | {:error, String.t()}
+  def sizes(text) do
+    numbers = text |> String.split(",") |> Enum.map(&Parse.whole(&1, 2..100))
+
+    if Enum.all?(numbers, &match?({:ok, _}, &1)),
+      do: {:ok, for({:ok, number} <- numbers, do: number)},
+      else: {:error, "whole numbers from 2 to 100, with commas between"}
+  end
+
+  defp help do
+    cases =
+      Enum.map_join(Mesh.cases(), "\n", &"  #{String.pad_trailing("#{&1.name}", 10)}#{&1.says}")
+
+    IO.puts("  mix bench swarm [options]\n\n#{Cli.Arguments.help(table())}\n\nCases\n#{cases}")
+  end
+end

@@ -1,0 +1,133 @@
+defmodule Bench.Mesh.Nodes do
+  @moduledoc """
+  Nodes to measure, each a VM of its own, reached over standard input and output, so that this process
+  is no part of what is measured. They end when it does.
+  """
+  alias Bench.Mesh
+  alias Bench.Mesh.{Bare, Watch}
+  alias Bench.Vm
+  alias Swarm.Mesh.Secret
+
+  @enforce_keys [:name, :node, :peer, :pid, :began_ns]
+  defstruct @enforce_keys
+
+  @typedoc "`began_ns` is when its start was asked for; `pid` its process of the operating system."
+  @type t :: %__MODULE__{}
+  @typedoc "All that nodes of one fleet have in common; `kind` is whose code runs there."
+  @type fleet :: %{
+          kind: :ours | :bare,
+          mesh: keyword() | false,
+          prefix: String.t(),
+          flags: list()
+        }
+
+  @host "127.0.0.1"
+  @emulator ~w(+SDcpu 1:1 +SDio 1 +A 1 +sbwt none +sbwtdcpu none +sbwtdio none)
+  @kernel ~w(-kernel prevent_overlapping_partitions false -kernel connect_all false
+             -kernel dist_auto_connect never -kernel inet_dist_use_interface {127,0,0,1})
+  @boot_ms 60_000
+
+  @doc "A fleet that knows `count` names and a base; nothing is started yet."
+  @spec fleet(:ours | :bare, pos_integer()) :: fleet()
+  def fleet(kind, count) do
+    {_, 0} = System.cmd("epmd", ["-daemon"], env: [{"ERL_EPMD_ADDRESS", @host}])
+    prefix = "b#{:rand.uniform(999_999_999)}"
+    mesh = if kind == :ours, do: mesh(prefix, count), else: false
+    %{kind: kind, mesh: mesh, prefix: prefix, flags: flags(kind)}
+  end
+
+  # Else a freeze is noticed after a minute and more.
+  defp flags(:bare), do: ~w(-kernel net_ticktime 4 -kernel logger_level none)
+  defp flags(:ours), do: []
+
+  @doc "The name of the n-th node, and of its robot; 0 is the base."
+  @spec name(fleet(), non_neg_integer()) :: atom()
+  def name(fleet, n), do: :"#{fleet.prefix}_#{n}"
+
+  defp mesh(prefix, count) do
+    secret = %Secret{
+      path: "",
+      key: :crypto.strong_rand_bytes(32),
+      cookie: :"#{Base.encode32(:crypto.strong_rand_bytes(20), padding: false)}",
+      fingerprint: ""
+    }
+
+    [
+      secret: secret,
+      fleet: for(n <- 0..(count + 1), do: :"#{prefix}_#{n}"),
+      interface: {127, 0, 0, 1},
+      port: 0,
+      # The base is one more.
+      full_mesh: max(count + 1, 2),
+      multicast: {{239, 255, 67, 86}, 20_000 + :rand.uniform(20_000)}
+    ]
+  end
+
+  @doc "Starts a node with these robots. It is up when this returns."
+  @spec start(fleet(), non_neg_integer(), [atom()], schedulers :: pos_integer()) :: t()
+  def start(fleet, n, robots, schedulers \\ 1) do
+    name = name(fleet, n)
+    began_ns = Watch.now_ns()
+
+    {peer, node} =
+      Vm.boot(
+        %{name: name, host: to_charlist(@host), longnames: true},
+        ["+S", "#{schedulers}:#{schedulers}"] ++ @emulator ++ @kernel ++ fleet.flags
+      )
+
+    code = if fleet.kind == :ours, do: Mesh.Convoy, else: Bare
+    :ok = :peer.call(peer, code, :main, [fleet.mesh, robots], @boot_ms)
+    pid = to_string(:peer.call(peer, :os, :getpid, []))
+    %__MODULE__{name: name, node: node, peer: peer, pid: pid, began_ns: began_ns}
+  end
+
+  @doc "Starts several at once."
+  @spec start_all(fleet(), [{non_neg_integer(), [atom()]}]) :: [t()]
+  def start_all(fleet, nodes) do
+    nodes
+    |> Enum.map(fn {n, robots} -> Task.async(fn -> start(fleet, n, robots) end) end)
+    |> Task.await_many(@boot_ms)
+  end
+
+  @doc "Calls a function there."
+  @spec call(t(), module(), atom(), list(), timeout()) :: term()
+  def call(node, m, f, a, timeout \\ 300_000), do: :peer.call(node.peer, m, f, a, timeout)
+
+  @doc "Sends a signal to its process: KILL, STOP, CONT; says when."
+  @spec signal(t(), String.t()) :: at_ns :: integer()
+  def signal(node, signal) do
+    at_ns = Watch.now_ns()
+    :ok = Vm.signal(node.pid, signal)
+    at_ns
+  end
+
+  @doc "Its memory: what is resident, and its share of what is resident, in bytes."
+  @spec memory(t()) :: %{rss: pos_integer() | nil, pss: pos_integer() | nil}
+  def memory(node) do
+    %{
+      rss: kilobytes("/proc/#{node.pid}/status", "VmRSS:"),
+      pss: kilobytes("/proc/#{node.pid}/smaps_rollup", "Pss:")
+    }
+  end
+
+  defp kilobytes(file, key) do
+    with {:ok, text} <- File.read(file),
+         line when is_binary(line) <-
+           text |> String.split("\n") |> Enum.find(&String.starts_with?(&1, key)),
+         {number, _kb} <- line |> String.replace(key, "") |> String.trim() |> Integer.parse() do
+      number * 1024
+    else
+      _unknown -> nil
+    end
+  end
+
+  @doc "Ends nodes, frozen or not."
+  @spec stop([t()]) :: :ok
+  def stop([]), do: :ok
+
+  def stop(nodes) do
+    _ = System.cmd("kill", ["-KILL" | Enum.map(nodes, & &1.pid)], stderr_to_stdout: true)
+    for %{peer: peer} <- nodes, Process.alive?(peer), do: Process.exit(peer, :kill)
+    :ok
+  end
+end

@@ -1,0 +1,62 @@
+defmodule Bench.Stop.Main do
+  @moduledoc "The command `mix bench stop`: reads its options, measures, prints the table."
+  alias Console.Cli
+  alias Console.Cli.{Output, Parse}
+  alias Bench.{Stop, Vm}
+
+  @doc "Runs it; errors are lines."
+  @spec run([String.t()]) :: :ok | {:error, [String.t()]}
+  def run(arguments) do
+    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
+      given = Map.new(pairs)
+      if given["help"], do: help(), else: measure(given)
+    end
+  end
+
+  defp measure(given) do
+    output = Output.to(:stderr)
+    folder = Path.join(System.tmp_dir!(), "convoy-stop-#{System.unique_integer([:positive])}")
+    File.mkdir_p!(folder)
+    cases = Map.get(given, "only", Stop.cases())
+    note = &Output.progress(output, "bench: " <> &1)
+
+    try do
+      before = Vm.load()
+      results = Stop.Runner.run(cases, Map.get(given, "times", 20), folder, note)
+      Output.finish(output)
+
+      about = %{
+        load_before: before,
+        load_after: Vm.load(),
+        schedulers: System.schedulers_online()
+      }
+
+      IO.write(Stop.Report.draw(results))
+      IO.puts("\n" <> words(about))
+      Output.json(given["json"], Stop.Report.term(results, about))
+    after
+      File.rm_rf!(folder)
+    end
+  end
+
+  defp words(about) do
+    "Times run from before the cause to when both axes were told to stand, at the line's other end. Load of the " <>
+      "machine (1 min): #{about.load_before || "?"} before, #{about.load_after || "?"} after; #{about.schedulers} processors."
+  end
+
+  defp table do
+    [
+      {"times", "N", &Parse.whole(&1, 1..1_000), "how often each is measured (20)"},
+      {"only", "NAME,NAME", &Stop.choose/1, "which cases (all)"},
+      {"json", "FILE", &{:ok, &1}, "write the figures there too, in milliseconds"},
+      {"help", nil, nil, "this text"}
+    ]
+  end
+
+  defp help do
+    cases =
+      Enum.map_join(Stop.cases(), "\n", &"  #{String.pad_trailing("#{&1.name}", 10)}#{&1.says}")
+
+    IO.puts("  mix bench stop [options]\n\n#{Cli.Arguments.help(table())}\n\nCases\n#{cases}")
+  end
+end

@@ -1,0 +1,113 @@
+defmodule Console.Cli.Arguments do
+  @moduledoc """
+  Reads the arguments of a command by a list of options. Pure.
+
+  Written for values that begin with a minus sign (`--landmark -2,1`), for options that may be
+  repeated, and for errors that say what is allowed. An option is `{name, hint, check, help}`: `hint`
+  is how its value is shown in the help, or `nil` for a switch; `check` turns the text into the value.
+  """
+  alias Hal.Suggest
+
+  @type check :: (String.t() -> {:ok, term()} | {:error, allowed :: String.t()})
+  @type option ::
+          {name :: String.t(), hint :: String.t() | nil, check() | nil, help :: String.t()}
+
+  @doc """
+  The values in the order in which they were given, or one line for each thing that is wrong.
+
+      iex> count = {"count", "N", &Console.Cli.Parse.whole(&1, 1..9), "how many"}
+      iex> Console.Cli.Arguments.parse(~w(--count 3), [count])
+      {:ok, [{"count", 3}]}
+      iex> Console.Cli.Arguments.parse(~w(--count=0 --cuont 2), [count])
+      {:error,
+       [
+         ~s(--count must be a whole number from 1 to 9, not "0"),
+         ~s(unknown option --cuont; did you mean "--count"?)
+       ]}
+  """
+  @spec parse([String.t()], [option()]) ::
+          {:ok, [{String.t(), term()}]} | {:error, [String.t()]}
+  def parse(arguments, options) do
+    results = read(arguments, options)
+
+    case for {:error, line} <- results, do: line do
+      [] -> {:ok, for({:ok, pair} <- results, do: pair)}
+      lines -> {:error, lines}
+    end
+  end
+
+  @doc "The options as aligned lines for a help text."
+  @spec help([option()]) :: String.t()
+  def help(options) do
+    rows = Enum.map(options, fn {name, hint, _check, help} -> {usage(name, hint), help} end)
+    width = rows |> Enum.map(fn {left, _help} -> String.length(left) end) |> Enum.max()
+
+    Enum.map_join(rows, "\n", fn {left, help} ->
+      lines = String.split(help, "\n")
+      indent = "\n" <> String.duplicate(" ", width + 4)
+      "  " <> String.pad_trailing(left, width) <> "  " <> Enum.join(lines, indent)
+    end)
+  end
+
+  defp usage(name, nil), do: "--#{name}"
+  defp usage(name, hint), do: "--#{name} #{hint}"
+
+  defp read([], _options), do: []
+
+  defp read(["--" <> text | rest], options) do
+    {name, inline} =
+      case String.split(text, "=", parts: 2) do
+        [name] -> {name, nil}
+        [name, value] -> {name, value}
+      end
+
+    case List.keyfind(options, name, 0) do
+      nil -> unknown(name, inline, rest, options)
+      {_name, nil, _check, _help} -> switch(name, inline, rest, options)
+      {_name, hint, check, _help} -> valued({name, hint, check}, inline, rest, options)
+    end
+  end
+
+  defp read([word | rest], options) do
+    hint = if known?(word, options), do: "; did you mean \"--#{word}\"?", else: ""
+    [{:error, "unexpected argument #{inspect(word)}#{hint}"} | read(rest, options)]
+  end
+
+  defp switch(name, nil, rest, options), do: [{:ok, {name, true}} | read(rest, options)]
+
+  defp switch(name, _value, rest, options),
+    do: [{:error, "--#{name} takes no value"} | read(rest, options)]
+
+  defp valued(option, nil, ["--" <> _ | _] = rest, options),
+    do: [missing(option) | read(rest, options)]
+
+  defp valued(option, nil, [], _options), do: [missing(option)]
+
+  defp valued(option, nil, [value | rest], options),
+    do: [checked(option, value) | read(rest, options)]
+
+  defp valued(option, value, rest, options), do: [checked(option, value) | read(rest, options)]
+
+  defp missing({name, hint, _check}), do: {:error, "--#{name} needs a value: #{hint}"}
+
+  defp checked({name, _hint, check}, text) do
+    case check.(text) do
+      {:ok, value} -> {:ok, {name, value}}
+      {:error, allowed} -> {:error, "--#{name} must be #{allowed}, not #{inspect(text)}"}
+    end
+  end
+
+  # The value of an unknown option is skipped too: one mistake, one line.
+  defp unknown(name, inline, rest, options) do
+    names = Enum.map(options, &("--" <> elem(&1, 0)))
+    error = {:error, "unknown option --#{name}#{Suggest.hint("--" <> name, names)}"}
+
+    case rest do
+      ["--" <> _ | _] -> [error | read(rest, options)]
+      [_value | rest] when inline == nil -> [error | read(rest, options)]
+      rest -> [error | read(rest, options)]
+    end
+  end
+
+  defp known?(word, options), do: List.keymember?(options, word, 0)
+end

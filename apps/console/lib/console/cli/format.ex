@@ -1,0 +1,164 @@
+defmodule Console.Cli.Format do
+  @moduledoc "What happens to a fleet, in words and figures for people. Pure."
+
+  @doc """
+  One stage as a line.
+
+      iex> Console.Cli.Format.stage(%{stage: :elected, at_s: 12.34, robot: :mag2, epoch: 3, size_ppm: 41_000})
+      "   12.3 s  elected         mag2 leads (epoch 3, landmark 4.1 % of its picture)"
+      iex> Console.Cli.Format.stage(%{stage: :search, at_s: 0.0})
+      "    0.0 s  search          every robot looks round for the landmark"
+  """
+  @spec stage(Sim.Scene.stage()) :: String.t()
+  def stage(%{stage: name, at_s: at_s} = stage) do
+    String.pad_leading(decimals(at_s, 1), 7) <>
+      " s  " <> String.pad_trailing(to_string(name), 16) <> meaning(stage)
+  end
+
+  @doc """
+  A stage's meaning alone.
+
+      iex> Console.Cli.Format.meaning(%{stage: :killed, at_s: 40, robot: :mag1})
+      "mag1 is dead"
+  """
+  @spec meaning(Sim.Scene.stage()) :: String.t()
+  def meaning(%{stage: :search}), do: "every robot looks round for the landmark"
+  def meaning(%{stage: :elected} = stage), do: "#{stage.robot} leads" <> why(stage)
+  def meaning(%{stage: :formed}), do: "every robot says that it stands in its place"
+  def meaning(%{stage: :landmark_moved}), do: "the landmark sets off"
+  def meaning(%{stage: :killed, robot: robot}), do: "#{robot} is dead"
+  def meaning(%{stage: :world_lost}), do: "the world has ended; robots stand, it is started again"
+  def meaning(%{stage: :world_back}), do: "the world goes on where it was"
+  def meaning(%{stage: :lost} = stage), do: "#{subject(stage)} has lost the landmark"
+  def meaning(%{stage: name}), do: name |> to_string() |> String.replace("_", " ")
+
+  @doc """
+  A number with a fixed count of decimals, never "-0.0".
+
+      iex> Console.Cli.Format.decimals(2, 1)
+      "2.0"
+      iex> Console.Cli.Format.decimals(-0.001, 2)
+      "0.00"
+  """
+  @spec decimals(number(), 0..15) :: String.t()
+  def decimals(number, count) do
+    text = :erlang.float_to_binary(number * 1.0, decimals: count)
+    if text =~ ~r/^-0\.?0*$/, do: String.trim_leading(text, "-"), else: text
+  end
+
+  @doc """
+  A count with its noun.
+
+      iex> {Console.Cli.Format.count(1, "robot"), Console.Cli.Format.count(6, "robot"), Console.Cli.Format.count(0, "collision")}
+      {"1 robot", "6 robots", "no collisions"}
+  """
+  @spec count(non_neg_integer(), String.t()) :: String.t()
+  def count(0, noun), do: "no #{noun}s"
+  def count(1, noun), do: "1 #{noun}"
+  def count(n, noun), do: "#{n} #{noun}s"
+
+  @doc "The fleet at this instant in one line."
+  @spec status(Sim.Scene.t()) :: String.t()
+  def status(scene) do
+    living = Enum.count(scene.robots, & &1.alive)
+    sight = Enum.count(scene.robots, &(&1.alive and &1.size_ppm != nil))
+
+    String.pad_leading(decimals(scene.at_ms / 1000, 1), 7) <>
+      " s  #{count(living, "robot")}, #{sight} with the landmark in sight, #{leader(scene)}"
+  end
+
+  @doc "Every robot in a line of its own."
+  @spec everybody(Sim.Scene.t()) :: [String.t()]
+  def everybody(scene), do: Enum.map(scene.robots, &robot/1)
+
+  @doc "One robot in a line."
+  @spec one(Sim.Scene.t(), atom()) :: [String.t()]
+  def one(scene, name), do: for(robot <- scene.robots, robot.id == name, do: robot(robot))
+
+  defp robot(%{alive: false} = robot), do: "#{robot.id}: dead, at #{pose(robot.pose)}"
+
+  defp robot(robot) do
+    slot =
+      case Sim.Scene.slot_error(robot) do
+        nil -> ""
+        metres -> ", #{decimals(metres, 2)} m off its place"
+      end
+
+    sight =
+      case robot.size_ppm do
+        nil -> ", does not see the landmark"
+        ppm -> ", the landmark fills #{decimals(ppm / 10_000, 1)} % of its picture"
+      end
+
+    doubt = if robot.uncertainty, do: ", #{within(robot.uncertainty)} by its own word", else: ""
+    role = if robot.leader?, do: " (leader)", else: ""
+    "#{robot.id}: #{state(robot)}#{role} at #{pose(robot.pose)}#{doubt}#{slot}#{sight}"
+  end
+
+  defp state(%{state: :unsure}), do: "in its slot, but not sure of its place,"
+  defp state(%{state: state}), do: state
+
+  @doc """
+  How sure a robot is of its pose, in metres.
+
+      iex> Console.Cli.Format.within(0.618)
+      "±0.62 m"
+  """
+  @spec within(number()) :: String.t()
+  def within(metres), do: "±#{decimals(metres, 2)} m"
+
+  @doc """
+  A line in rows of at most `width` characters, broken between words; the further rows are indented.
+
+      iex> Console.Cli.Format.rows("mag1: lead at 1,2, sees it", 14)
+      ["mag1: lead at", "    1,2, sees", "    it"]
+  """
+  @spec rows(String.t(), pos_integer()) :: [String.t()]
+  def rows(line, width) do
+    if String.length(line) <= width, do: [line], else: broken(line, width)
+  end
+
+  defp broken(line, width) do
+    [start] = Regex.run(~r/^ */, line)
+
+    line
+    |> String.split(" ", trim: true)
+    |> Enum.reduce([start], fn word, [row | rows] ->
+      longer = if String.trim(row) == "", do: row <> word, else: row <> " " <> word
+
+      if String.length(longer) <= width or String.trim(row) == "",
+        do: [longer | rows],
+        else: ["    " <> word, row | rows]
+    end)
+    |> Enum.reverse()
+  end
+
+  defp pose(pose) do
+    degrees = decimals(pose.heading * 180 / :math.pi(), 0)
+    "#{decimals(pose.x, 2)},#{decimals(pose.y, 2)} heading #{degrees} degrees"
+  end
+
+  defp leader(%{leader: nil}), do: "no leader"
+  defp leader(%{error: nil} = scene), do: "#{scene.leader} leads"
+
+  defp leader(%{error: {mean, max}} = scene) do
+    word = if scene.formed?, do: ", formed", else: ""
+    "#{scene.leader} leads#{word}, error #{decimals(mean, 2)} m (at most #{decimals(max, 2)} m)"
+  end
+
+  defp why(stage) do
+    parts =
+      [Map.get(stage, :epoch) && "epoch #{stage.epoch}"] ++
+        [
+          Map.get(stage, :size_ppm) &&
+            "landmark #{decimals(stage.size_ppm / 10_000, 1)} % of its picture"
+        ]
+
+    case Enum.filter(parts, & &1) do
+      [] -> ""
+      parts -> " (#{Enum.join(parts, ", ")})"
+    end
+  end
+
+  defp subject(stage), do: Map.get(stage, :robot) || "the leader"
+end

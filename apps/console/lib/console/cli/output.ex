@@ -1,0 +1,53 @@
+defmodule Console.Cli.Output do
+  @moduledoc """
+  Where a command prints: plain lines, and on a terminal a progress line that is drawn anew below them.
+  """
+
+  @clear "\r\e[K"
+
+  @enforce_keys [:device, :columns]
+  defstruct @enforce_keys
+
+  @type t :: %__MODULE__{device: IO.device(), columns: pos_integer() | nil}
+
+  @doc "Output to a device; `columns` is `nil` when it is no terminal."
+  @spec to(:stdio | :stderr) :: t()
+  def to(device), do: %__MODULE__{device: device, columns: columns(device)}
+
+  @doc "The width of the terminal behind a device, or `nil`."
+  @spec columns(:stdio | :stderr) :: pos_integer() | nil
+  def columns(device) do
+    case :io.columns(if(device == :stdio, do: :standard_io, else: :standard_error)) do
+      {:ok, columns} when columns > 0 -> columns
+      _no_terminal -> nil
+    end
+  end
+
+  @doc "A line that stays."
+  @spec line(t(), String.t()) :: :ok
+  def line(%__MODULE__{columns: nil} = output, text), do: IO.puts(output.device, text)
+  def line(%__MODULE__{} = output, text), do: IO.puts(output.device, @clear <> text)
+
+  @doc "The line that is replaced by the next one; nothing where there is no terminal."
+  @spec progress(t(), String.t()) :: :ok
+  def progress(%__MODULE__{columns: nil}, _text), do: :ok
+  def progress(%__MODULE__{} = output, text), do: IO.write(output.device, @clear <> text)
+
+  @doc "Takes the progress line away."
+  @spec finish(t()) :: :ok
+  def finish(output), do: progress(output, "")
+
+  @doc "Writes a term to the file that `--json` names, if it names one; the error is for people."
+  @spec json(Path.t() | nil, term()) :: :ok | {:error, [String.t()]}
+  def json(nil, _term), do: :ok
+
+  def json(path, term) do
+    case File.write(path, [Hal.Json.encode!(term), "\n"]) do
+      :ok ->
+        :ok
+
+      {:error, reason} ->
+        {:error, ["--json #{path} cannot be written: #{:file.format_error(reason)}"]}
+    end
+  end
+end

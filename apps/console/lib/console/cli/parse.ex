@@ -1,0 +1,199 @@
+defmodule Console.Cli.Parse do
+  @moduledoc """
+  Texts to checked values: numbers, points, choices, fleets. Pure.
+
+  Each answers `{:ok, value}` or `{:error, what_is_allowed}`, to be put behind "must be". Numbers
+  are plain decimals with few digits, so "nan", "inf" and "1e999" are not even numbers.
+  """
+
+  @formations [:column, :line, :wedge, :triangle, :diamond, :circle]
+  @kinds Enum.map(@formations, &Atom.to_string/1)
+  @longest 12
+
+  @doc "The formations by name."
+  @spec formations() :: [String.t()]
+  def formations, do: @kinds
+
+  @doc """
+  A whole number in a range.
+
+      iex> Console.Cli.Parse.whole("6", 1..100)
+      {:ok, 6}
+      iex> Console.Cli.Parse.whole("1e9", 1..100)
+      {:error, "a whole number from 1 to 100"}
+  """
+  @spec whole(String.t(), Range.t()) :: {:ok, integer()} | {:error, String.t()}
+  def whole(text, first..last//_) do
+    with true <- byte_size(text) <= @longest,
+         {number, ""} when number >= first and number <= last <- Integer.parse(text) do
+      {:ok, number}
+    else
+      _ -> {:error, "a whole number from #{first} to #{last}"}
+    end
+  end
+
+  @doc """
+  A number between two bounds.
+
+      iex> Console.Cli.Parse.number("-0.5", -1, 1)
+      {:ok, -0.5}
+      iex> Console.Cli.Parse.number("nan", 0, 1)
+      {:error, "a number from 0 to 1"}
+  """
+  @spec number(String.t(), number(), number()) :: {:ok, float()} | {:error, String.t()}
+  def number(text, least, most) do
+    with {:ok, number} when number >= least and number <= most <- decimal(text) do
+      {:ok, number}
+    else
+      _ -> {:error, "a number from #{least} to #{most}"}
+    end
+  end
+
+  @doc """
+  One of some words, as the atom it stands for.
+
+      iex> Console.Cli.Parse.choice("on", on: true, off: false)
+      {:ok, true}
+      iex> Console.Cli.Parse.choice("of", on: true, off: false)
+      {:error, ~s(on or off (did you mean "off"?\\))}
+  """
+  @spec choice(String.t(), keyword()) :: {:ok, term()} | {:error, String.t()}
+  def choice(text, words) do
+    names = Enum.map(words, fn {word, _value} -> Atom.to_string(word) end)
+
+    case Enum.find(words, fn {word, _value} -> Atom.to_string(word) == text end) do
+      {_word, value} ->
+        {:ok, value}
+
+      nil ->
+        {:error, either(names) <> suggestion(text, names)}
+    end
+  end
+
+  @doc """
+  A place, `X,Y` in metres.
+
+      iex> Console.Cli.Parse.point("-2,1.5")
+      {:ok, {-2.0, 1.5}}
+      iex> Console.Cli.Parse.point("2;1")
+      {:error, "X,Y in metres, each from -1000 to 1000"}
+  """
+  @spec point(String.t()) :: {:ok, {float(), float()}} | {:error, String.t()}
+  def point(text) do
+    with [x, y] <- String.split(text, ","),
+         {:ok, x} <- number(String.trim(x), -1000, 1000),
+         {:ok, y} <- number(String.trim(y), -1000, 1000) do
+      {:ok, {x, y}}
+    else
+      _ -> {:error, "X,Y in metres, each from -1000 to 1000"}
+    end
+  end
+
+  @doc """
+  Something at a simulated second, `WHAT@T`, `what` being checked by `check`.
+
+      iex> Console.Cli.Parse.at("3,2@40", &Console.Cli.Parse.point/1, "X,Y@T")
+      {:ok, {{3.0, 2.0}, 40.0}}
+  """
+  @spec at(String.t(), Console.Cli.Arguments.check(), String.t()) ::
+          {:ok, {term(), float()}} | {:error, String.t()}
+  def at(text, check, form) do
+    with [what, time] <- String.split(text, "@"),
+         {:ok, what} <- check.(what),
+         {:ok, at_s} <- number(time, 0, 3600) do
+      {:ok, {what, at_s}}
+    else
+      _ -> {:error, form <> ", T a simulated second from 0 to 3600"}
+    end
+  end
+
+  @doc """
+  A formation and its spacing in metres, `KIND[:SPACING]`.
+
+      iex> Console.Cli.Parse.formation("wedge:1.2")
+      {:ok, {:wedge, 1.2}}
+      iex> Console.Cli.Parse.formation("column")
+      {:ok, {:column, 1.0}}
+  """
+  @spec formation(String.t()) :: {:ok, {atom(), float()}} | {:error, String.t()}
+  def formation(text) do
+    {kind, spacing} =
+      case String.split(text, ":", parts: 2) do
+        [kind] -> {kind, "1.0"}
+        [kind, spacing] -> {kind, spacing}
+      end
+
+    with {:kind, known} when known != nil <- {:kind, Enum.find(@formations, &("#{&1}" == kind))},
+         {:ok, spacing} <- number(spacing, 0.8, 5.0) do
+      {:ok, {known, spacing}}
+    else
+      {:kind, nil} -> {:error, either(@kinds) <> suggestion(kind, @kinds)}
+      {:error, _} -> {:error, "KIND:SPACING with a spacing from 0.8 to 5 metres"}
+    end
+  end
+
+  @doc """
+  A span of whole numbers, `A-B`.
+
+      iex> Console.Cli.Parse.span("1-40", 0..100)
+      {:ok, 1..40}
+  """
+  @spec span(String.t(), Range.t()) :: {:ok, Range.t()} | {:error, String.t()}
+  def span(text, bounds) do
+    case text |> String.split("-") |> Enum.map(&whole(&1, bounds)) do
+      [{:ok, only}] -> {:ok, only..only}
+      [{:ok, first}, {:ok, last}] when first <= last -> {:ok, first..last}
+      _ -> {:error, "A-B, whole numbers from #{bounds.first} to #{bounds.last}"}
+    end
+  end
+
+  @doc """
+  What people name of a table, in its order; each entry has a `:name`.
+
+      iex> Console.Cli.Parse.named("b,a", [%{name: :a}, %{name: :b}, %{name: :c}])
+      {:ok, [%{name: :a}, %{name: :b}]}
+      iex> Console.Cli.Parse.named("d", [%{name: :a}, %{name: :b}])
+      {:error, "names of a, b, with commas between"}
+  """
+  @spec named(String.t(), [entry]) :: {:ok, [entry]} | {:error, String.t()}
+        when entry: %{:name => atom() | String.t(), optional(atom()) => term()}
+  def named(text, entries) do
+    wanted = String.split(text, ",")
+    names = Enum.map(entries, &to_string(&1.name))
+
+    if wanted -- names == [],
+      do: {:ok, Enum.filter(entries, &(to_string(&1.name) in wanted))},
+      else: {:error, "names of #{Enum.join(names, ", ")}, with commas between"}
+  end
+
+  @doc """
+  Words as people write a choice.
+
+      iex> Console.Cli.Parse.either(~w(hall hospital arena))
+      "hall, hospital or arena"
+  """
+  @spec either([String.t()]) :: String.t()
+  def either([only]), do: only
+
+  def either(words) do
+    {most, [last]} = Enum.split(words, -1)
+    Enum.join(most, ", ") <> " or " <> last
+  end
+
+  defp suggestion(text, names) do
+    case Hal.Suggest.nearest(text, names) do
+      nil -> ""
+      near -> " (did you mean #{inspect(near)}?)"
+    end
+  end
+
+  defp decimal(text) do
+    with true <- byte_size(text) <= @longest,
+         true <- text =~ ~r/^[+-]?\d+(\.\d+)?$/,
+         {number, ""} <- Float.parse(text) do
+      {:ok, number}
+    else
+      _ -> :error
+    end
+  end
+end

@@ -1,0 +1,66 @@
+defmodule Console.Picture.MapView do
+  @moduledoc """
+  A map as the views see it: its sides in metres, the origin in the middle, and where a wall is. Pure.
+  """
+
+  @enforce_keys [:name, :width, :height, :wall?]
+  defstruct @enforce_keys
+
+  @type box :: {left :: float(), bottom :: float(), right :: float(), top :: float()}
+  @type t :: %__MODULE__{
+          name: String.t(),
+          width: float(),
+          height: float(),
+          wall?: (float(), float() -> boolean())
+        }
+
+  @doc """
+  An empty room with walls of 0.2 m.
+
+      iex> room = Console.Picture.MapView.room("hall", 16.0, 12.0)
+      iex> {room.wall?.(0.0, 0.0), room.wall?.(7.95, 0.0)}
+      {false, true}
+  """
+  @spec room(String.t(), float(), float()) :: t()
+  def room(name, width, height) do
+    wall? = fn x, y -> abs(x) > width / 2 - 0.2 or abs(y) > height / 2 - 0.2 end
+    %__MODULE__{name: name, width: width, height: height, wall?: wall?}
+  end
+
+  @doc """
+  The whole map as a box.
+
+      iex> Console.Picture.MapView.box(Console.Picture.MapView.room("hall", 16.0, 12.0))
+      {-8.0, -6.0, 8.0, 6.0}
+  """
+  @spec box(t()) :: box()
+  def box(%__MODULE__{width: width, height: height}),
+    do: {-width / 2, -height / 2, width / 2, height / 2}
+
+  @doc """
+  The box round some places with a margin, grown to a least width and height, kept within the map.
+
+      iex> room = Console.Picture.MapView.room("hall", 16.0, 12.0)
+      iex> Console.Picture.MapView.around(room, [{7.0, 0.0}], 1.0, {4.0, 4.0})
+      {4.0, -2.0, 8.0, 2.0}
+  """
+  @spec around(t(), [{float(), float()}], float(), {float(), float()}) :: box()
+  def around(ground, [], _margin, _least), do: box(ground)
+
+  def around(ground, places, margin, {wide, high}) do
+    {x0, x1} = places |> Enum.map(&elem(&1, 0)) |> Enum.min_max()
+    {y0, y1} = places |> Enum.map(&elem(&1, 1)) |> Enum.min_max()
+    {left, right} = span(x0 - margin, x1 + margin, wide, ground.width / 2)
+    {bottom, top} = span(y0 - margin, y1 + margin, high, ground.height / 2)
+    {left, bottom, right, top}
+  end
+
+  defp span(low, high, least, edge) do
+    grow = max(0.0, least - (high - low)) / 2
+    {low, high} = {low - grow, high + grow}
+
+    # Shifted before it is cut, so that a fleet at a wall is still shown with its surroundings.
+    shift = max(0.0, -edge - low) - max(0.0, high - edge)
+    {max(-edge, low + shift), min(edge, high + shift)}
+  end
+end

@@ -1,0 +1,79 @@
+defmodule Console.Picture.RunTrack do
+  @moduledoc """
+  What a run leaves behind for its picture: everybody's way, and the formation error over time. Pure.
+
+  A way gets a new point when its robot has moved by 2 cm, so that long waits cost nothing.
+  """
+  alias Hal.Pose
+  alias Sim.Scene
+
+  @step_m 0.02
+
+  @enforce_keys [:first, :last, :ways, :landmark, :errors, :marks]
+  defstruct @enforce_keys
+
+  @type t :: %__MODULE__{
+          first: Scene.t(),
+          last: Scene.t(),
+          ways: %{atom() => [Pose.point()]},
+          landmark: [Pose.point()],
+          errors: [{at_s :: float(), mean :: float(), max :: float()}],
+          marks: [{Scene.stage(), Pose.point() | nil}]
+        }
+
+  @doc "The track of a run that begins with this scene."
+  @spec new(Scene.t()) :: t()
+  def new(%Scene{} = scene) do
+    add(
+      %__MODULE__{first: scene, last: scene, ways: %{}, landmark: [], errors: [], marks: []},
+      scene
+    )
+  end
+
+  @doc "The track with one more scene; lists are kept newest first."
+  @spec add(t(), Scene.t()) :: t()
+  def add(%__MODULE__{} = track, %Scene{} = scene) do
+    ways =
+      Enum.reduce(scene.robots, track.ways, fn robot, ways ->
+        Map.update(ways, robot.id, [Pose.point(robot.pose)], &step(&1, Pose.point(robot.pose)))
+      end)
+
+    %{
+      track
+      | last: scene,
+        ways: ways,
+        landmark: step(track.landmark, scene.landmark),
+        errors: error(track.errors, scene),
+        marks: mark(track.marks, scene)
+    }
+  end
+
+  defp step(way, nil), do: way
+  defp step([], place), do: [place]
+
+  defp step([newest | _] = way, place),
+    do: if(Pose.distance(newest, place) < @step_m, do: way, else: [place | way])
+
+  defp error(errors, %Scene{error: nil}), do: errors
+
+  defp error(errors, %Scene{error: {mean, max}} = scene),
+    do: [{scene.at_ms / 1000, mean, max} | errors]
+
+  # A stage is marked where it happened: at its robot, at the landmark, or at the leader.
+  defp mark(marks, scene) do
+    scene.stages
+    |> Enum.drop(length(marks))
+    |> Enum.reduce(marks, &[{&1, place(&1, scene)} | &2])
+  end
+
+  defp place(%{stage: :landmark_moved}, scene), do: scene.landmark
+
+  defp place(stage, scene) do
+    name = Map.get(stage, :robot) || scene.leader
+
+    case Enum.find(scene.robots, &(&1.id == name)) do
+      nil -> nil
+      robot -> Pose.point(robot.pose)
+    end
+  end
+end

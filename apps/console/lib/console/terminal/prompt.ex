@@ -1,0 +1,197 @@
+defmodule Console.Terminal.Prompt do
+  @moduledoc """
+  What people type while a fleet runs, checked against the fleet's names. Pure.
+
+  Names become robots by comparison; a text never becomes an atom.
+  """
+  alias Console.Fleet
+  alias Console.Cli.Parse
+  alias Hal.Suggest
+  alias Robot.Command
+
+  @words ~w(kill formation landmark move goto follow stop estop reset start status nodes tell help quit)
+
+  @type parsed ::
+          Console.Live.command() | :help | :nodes | :status | {:status, atom()} | :quit | :nothing
+
+  @doc """
+  A command, or one line that says what is allowed.
+
+      iex> Console.Terminal.Prompt.parse("kill leader", [:mag1])
+      {:ok, {:kill, :leader}}
+      iex> Console.Terminal.Prompt.parse("goto mag1 1,2", [:mag1])
+      {:ok, {:tell, [:mag1], "goto:1.0:2.0"}}
+      iex> Console.Terminal.Prompt.parse("fromation wedge", [:mag1])
+      {:error, ~s(unknown command "fromation"; did you mean "formation"?)}
+  """
+  @spec parse(String.t(), [atom()]) :: {:ok, parsed()} | {:error, String.t()}
+  def parse(text, robots) do
+    case String.split(text) do
+      [] -> {:ok, :nothing}
+      [word | rest] -> command(String.downcase(word), rest, robots)
+    end
+  end
+
+  @doc """
+  The words that may come after those before.
+
+      iex> Console.Terminal.Prompt.completions(["kill"], [:mag1])
+      ["leader", "mag1"]
+      iex> Console.Terminal.Prompt.completions(["goto", "mag1"], [:mag1])
+      []
+  """
+  @spec completions([String.t()], [atom()]) :: [String.t()]
+  def completions(before, robots) do
+    names = Enum.map(robots, &to_string/1)
+
+    case before do
+      [] -> @words ++ ["all" | names]
+      ["kill"] -> ["leader" | names]
+      ["formation"] -> Parse.formations()
+      ["landmark"] -> ["none"]
+      ["follow", _follower] -> names
+      ["tell"] -> ["all" | names]
+      [word] when word in ["goto", "follow", "stop", "start", "status"] -> names
+      _other -> []
+    end
+  end
+
+  @doc "The help, one command a line."
+  @spec help() :: [String.t()]
+  def help do
+    [
+      "kill leader, kill mag2        that robot dies",
+      "formation wedge 1.2           column, line, wedge, triangle, diamond or",
+      "                              circle, and a spacing of 0.8 to 5 m",
+      "landmark 3,2, landmark none   the landmark glides there, or is taken away",
+      "goto mag2 1,2                 one robot drives to a place",
+      "follow min1 mag2              one robot follows another",
+      "stop, stop mag2               the fleet or one robot stops and stands",
+      "start, start mag2             the mission again, from the search",
+      "estop, reset                  emergency stop of all; held until the reset",
+      "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all",
+      "status, status mag2           what everybody does",
+      "nodes                         their processes, and how to attach to one",
+      "quit                          the end (so is Ctrl-C); Tab completes"
+    ]
+  end
+
+  defp command("kill", ["leader"], _robots), do: {:ok, {:kill, :leader}}
+  defp command("kill", [name], robots), do: with_robot(name, robots, &{:kill, &1})
+
+  defp command("kill", _rest, _robots),
+    do: {:error, "kill needs one name: kill leader, kill mag1"}
+
+  defp command("formation", [kind], _robots) do
+    case Parse.formation(kind) do
+      {:ok, {kind_atom, spacing}} ->
+        {:ok, {:formation, {kind_atom, if(kind =~ ":", do: spacing)}}}
+
+      {:error, allowed} ->
+        {:error, "formation must be #{allowed}, not #{inspect(kind)}"}
+    end
+  end
+
+  defp command("formation", [kind, spacing], robots),
+    do: command("formation", [kind <> ":" <> spacing], robots)
+
+  defp command("formation", _rest, _robots),
+    do: {:error, "formation needs a kind: #{Parse.either(Parse.formations())}"}
+
+  defp command(word, ["none"], _robots) when word in ["landmark", "move"],
+    do: {:ok, {:landmark, :none}}
+
+  defp command(word, rest, _robots) when word in ["landmark", "move"],
+    do: with_point(rest, word <> " X,Y", &{:landmark, &1})
+
+  defp command("goto", [name | rest], robots) when rest != [] do
+    with {:ok, robot} <- robot(name, robots) do
+      with_point(rest, "goto NAME X,Y", fn {x, y} -> {:tell, [robot], "goto:#{x}:#{y}"} end)
+    end
+  end
+
+  defp command("goto", _rest, _robots),
+    do: {:error, "goto needs a name and a place: goto mag1 1,2"}
+
+  defp command("follow", [follower, leader], robots) do
+    with {:ok, follower} <- robot(follower, robots),
+         {:ok, leader} <- robot(leader, robots) do
+      if follower == leader,
+        do: {:error, "a robot cannot follow itself"},
+        else: {:ok, {:tell, [follower], "followtheleader:#{leader}"}}
+    end
+  end
+
+  defp command("follow", _rest, _robots), do: {:error, "follow needs two names: follow min1 mag1"}
+
+  defp command(word, [], _robots) when word in ["stop", "start"], do: {:ok, {:tell, :all, word}}
+
+  defp command(word, ["all"], _robots) when word in ["stop", "start"],
+    do: {:ok, {:tell, :all, word}}
+
+  defp command(word, [name], robots) when word in ["stop", "start"],
+    do: with_robot(name, robots, &{:tell, [&1], word})
+
+  defp command("estop", [], _robots), do: {:ok, :estop}
+  defp command("reset", [], _robots), do: {:ok, :reset}
+  defp command("status", [], _robots), do: {:ok, :status}
+  defp command("nodes", [], _robots), do: {:ok, :nodes}
+  defp command("status", [name], robots), do: with_robot(name, robots, &{:status, &1})
+  defp command(word, _rest, _robots) when word in ["help", "?"], do: {:ok, :help}
+  defp command(word, _rest, _robots) when word in ["quit", "exit", "q"], do: {:ok, :quit}
+  defp command("tell", [name | text], robots) when text != [], do: tell(name, text, robots)
+
+  defp command(word, rest, robots) do
+    cond do
+      String.contains?(word, ":") and rest == [] -> tell("all", [word], robots)
+      word in ["all" | Enum.map(robots, &to_string/1)] and rest != [] -> tell(word, rest, robots)
+      word in @words -> {:error, "#{word} is used otherwise; see help"}
+      true -> unknown(word, robots)
+    end
+  end
+
+  defp tell("all", text, robots), do: checked(:all, Enum.join(text, ":"), robots)
+
+  defp tell(name, text, robots) do
+    with {:ok, robot} <- robot(name, robots), do: checked([robot], Enum.join(text, ":"), robots)
+  end
+
+  defp checked(target, text, robots) do
+    with {:ok, command} <- Command.parse(text, robots),
+         do: {:ok, {:tell, target, Command.to_text(command)}}
+  end
+
+  defp unknown(word, robots) do
+    known = @words ++ ["all"] ++ Enum.map(robots, &to_string/1)
+
+    case Suggest.hint(word, known) do
+      "" -> {:error, "unknown command #{inspect(word)}; help lists them"}
+      hint -> {:error, "unknown command #{inspect(word)}#{hint}"}
+    end
+  end
+
+  defp with_robot(name, robots, build) do
+    with {:ok, robot} <- robot(name, robots), do: {:ok, build.(robot)}
+  end
+
+  defp robot(name, robots) do
+    case Enum.find(robots, &(Atom.to_string(&1) == name)) do
+      nil ->
+        hint = Suggest.hint(name, Enum.map(robots, &to_string/1))
+        {:error, "no robot #{inspect(name)}; there are #{Fleet.describe(robots)}#{hint}"}
+
+      robot ->
+        {:ok, robot}
+    end
+  end
+
+  # "3,2", "3, 2" and "3 2" are all places.
+  defp with_point(words, form, build) do
+    text = words |> Enum.map(&String.trim(&1, ",")) |> Enum.join(",")
+
+    case Parse.point(text) do
+      {:ok, point} -> {:ok, build.(point)}
+      {:error, allowed} -> {:error, "#{form}: the place must be #{allowed}"}
+    end
+  end
+end

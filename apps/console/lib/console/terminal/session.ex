@@ -1,0 +1,264 @@
+defmodule Console.Terminal.Session do
+  @moduledoc """
+  A live fleet before a person: full screen on a terminal, plain lines elsewhere.
+
+  One process that waits for keys or lines and for the time to draw; the fleet runs beside it.
+  It decides nothing: `Console.Terminal` draws, `Console.Terminal.Prompt` checks, `Console.Live` acts.
+  """
+  alias Console.{Demo, Options, Picture, Report, Terminal}
+  alias Console.Cli.{Format, Output}
+  alias Console.Picture.RunTrack
+  alias Console.Terminal.{Prompt, Tty}
+  alias Console.Terminal.Editor
+
+  @draw_ms 100
+  @status_s 5
+
+  @enforce_keys [:module, :live, :robots, :until_s, :mode, :output]
+  defstruct @enforce_keys ++
+              [view: nil, scene: nil, told: 0, status_s: 0, track: nil, started_ms: 0]
+
+  @doc "Runs until the time is up or somebody quits; answers with the exit status."
+  @spec run(Options.t(), module(), (map() -> {:ok, pid()} | {:error, String.t()})) :: 0 | 1 | 2
+  def run(%Options{} = options, module, start) do
+    tty = Tty.open()
+    until_s = until_s(options, tty)
+
+    try do
+      case start.(%{Options.trial(options) | duration_s: until_s || 86_400.0}) do
+        {:ok, live} -> live(options, module, live, until_s, tty)
+        {:error, line} -> refuse(line)
+      end
+    after
+      with {:ok, saved} <- tty do
+        IO.write(Terminal.leave())
+        Tty.close(saved)
+      end
+    end
+    |> finish(options)
+  end
+
+  defp until_s(%Options{duration_s: nil}, {:ok, _saved}), do: nil
+  defp until_s(options, _tty), do: Options.duration_s(options)
+
+  defp refuse(line), do: {:refused, line}
+
+  defp live(options, module, live, until_s, tty) do
+    Process.flag(:trap_exit, true)
+    mode = if tty == :error, do: :lines, else: :screen
+    reader = spawn_link(reader(mode, self()))
+    scene = module.scene(live)
+
+    session = %__MODULE__{
+      module: module,
+      live: live,
+      robots: options.robots,
+      scene: scene,
+      until_s: until_s,
+      mode: mode,
+      output: Output.to(if(options.json == "-", do: :stderr, else: :stdio)),
+      track: options.picture && RunTrack.new(scene),
+      view: %Terminal{
+        editor: Editor.new(&Prompt.completions(&1, options.robots))
+      },
+      started_ms: System.monotonic_time(:millisecond)
+    }
+
+    begin(session, options, if(Options.real_time?(options), do: module.lines(live), else: []))
+    send(self(), :draw)
+    session = loop(session)
+    Process.unlink(reader)
+    Process.exit(reader, :kill)
+    session
+  end
+
+  # Before the full screen, so that they can still be read after it.
+  defp begin(%{mode: :screen} = session, _options, lines) do
+    Enum.each(lines, &Output.line(session.output, &1))
+    IO.write(Terminal.enter())
+  end
+
+  defp begin(session, options, lines) do
+    Enum.each([Demo.heading(options) | lines], &Output.line(session.output, &1))
+    Output.line(session.output, Terminal.hint())
+  end
+
+  # Reading waits, so it has a process of its own.
+  defp reader(:screen, session), do: fn -> keys(session) end
+  defp reader(:lines, session), do: fn -> lines(session) end
+
+  defp keys(session) do
+    case IO.getn("", 1) do
+      key when is_binary(key) ->
+        send(session, {:key, key})
+        keys(session)
+
+      _closed ->
+        send(session, :quit)
+    end
+  end
+
+  defp lines(session) do
+    case IO.gets("") do
+      line when is_binary(line) ->
+        send(session, {:line, line})
+        lines(session)
+
+      _closed ->
+        :ok
+    end
+  end
+
+  defp loop(session) do
+    live = session.live
+
+    receive do
+      :draw ->
+        scene = session.module.scene(live)
+        session = %{session | scene: scene} |> draw(scene) |> tell(scene) |> track(scene)
+
+        if session.until_s && scene.at_ms >= session.until_s * 1000 do
+          session
+        else
+          Process.send_after(self(), :draw, @draw_ms)
+          loop(session)
+        end
+
+      {:key, key} ->
+        session |> key(key) |> continue()
+
+      {:line, line} ->
+        session |> obey(line) |> continue()
+
+      :quit ->
+        session
+
+      {:EXIT, ^live, {:shutdown, line}} when is_binary(line) ->
+        refuse(line)
+
+      {:EXIT, ^live, reason} ->
+        exit({:fleet_died, reason})
+
+      {:EXIT, _reader, _reason} ->
+        loop(session)
+    end
+  end
+
+  defp continue({:quit, session}), do: session
+  defp continue(session), do: loop(session)
+
+  defp key(session, key) do
+    {event, editor} = Editor.key(session.view.editor, key)
+    session = put_in(session.view.editor, editor)
+
+    case event do
+      nil -> redraw(session)
+      :quit -> {:quit, session}
+      {:choices, words} -> session |> answer(Enum.join(words, "  "), :dim) |> redraw()
+      {:line, line} -> %{session | view: %{session.view | overlay: nil}} |> obey(line) |> redraw()
+    end
+  end
+
+  defp redraw({:quit, session}), do: {:quit, session}
+  # With the scene at hand: typing must not wait for the fleet.
+  defp redraw(session), do: draw(session, session.scene)
+
+  defp draw(%{mode: :lines} = session, _scene), do: session
+
+  defp draw(session, scene) do
+    {columns, rows} = Tty.size()
+    {text, view} = Terminal.frame(scene, %{session.view | columns: columns, rows: rows})
+    IO.write(text)
+    %{session | view: view}
+  end
+
+  defp tell(%{mode: :screen} = session, _scene), do: session
+
+  defp tell(session, scene) do
+    new = Enum.drop(scene.stages, session.told)
+    Enum.each(new, &Output.line(session.output, Format.stage(&1)))
+    session = %{session | told: session.told + length(new)}
+
+    if scene.at_ms >= session.status_s * 1000 do
+      Output.line(session.output, Format.status(scene))
+      %{session | status_s: div(scene.at_ms, 1000) + @status_s}
+    else
+      session
+    end
+  end
+
+  defp track(%{track: nil} = session, _scene), do: session
+  defp track(session, scene), do: %{session | track: RunTrack.add(session.track, scene)}
+
+  defp obey(session, line) do
+    case Prompt.parse(line, session.robots) do
+      {:ok, :nothing} ->
+        session
+
+      {:ok, :quit} ->
+        {:quit, session}
+
+      {:ok, :help} ->
+        show(session, Prompt.help())
+
+      {:ok, :nodes} ->
+        show(session, session.module.lines(session.live))
+
+      {:ok, :status} ->
+        show(session, Format.everybody(session.module.scene(session.live)))
+
+      {:ok, {:status, name}} ->
+        show(session, Format.one(session.module.scene(session.live), name))
+
+      {:ok, command} ->
+        act(session, String.trim(line), command)
+
+      {:error, error} ->
+        answer(session, error, :bad)
+    end
+  end
+
+  defp act(session, line, command) do
+    case session.module.command(session.live, command) do
+      {:ok, text} -> answer(session, "#{line}: #{text}", :good)
+      {:error, error} -> answer(session, error, :bad)
+    end
+  end
+
+  defp answer(%{mode: :lines} = session, text, _style) do
+    Output.line(session.output, text)
+    session
+  end
+
+  defp answer(session, text, style),
+    do: update_in(session.view.messages, &Enum.take([{text, style} | &1], 4))
+
+  defp show(%{mode: :lines} = session, lines) do
+    Enum.each(lines, &Output.line(session.output, &1))
+    session
+  end
+
+  defp show(session, lines),
+    do: put_in(session.view.overlay, lines ++ ["", "(Enter brings the map back)"])
+
+  # After the terminal is itself again.
+  defp finish({:refused, line}, _options) do
+    IO.puts(:stderr, "demo: #{line}")
+    1
+  end
+
+  defp finish(session, options) do
+    result = session.module.result(session.live)
+    formed? = session.module.scene(session.live).formed?
+    wall_s = (System.monotonic_time(:millisecond) - session.started_ms) / 1000
+    Enum.each(Report.summary(result, formed?, wall_s), &Output.line(session.output, &1))
+    title = Picture.title(length(options.robots), options.map, options.seed)
+    drawing = session.track && fn -> Picture.draw(session.track, title) end
+    session.module.stop(session.live)
+
+    case Report.write(options, Report.json(result, wall_s), drawing, session.output) do
+      :ok -> if formed? or session.until_s == nil, do: 0, else: 2
+      {:error, line} -> refuse(line) |> finish(options)
+    end
+  end
+end

@@ -1,0 +1,63 @@
+defmodule Console.Terminal.PromptTest do
+  use ExUnit.Case, async: true
+  alias Console.Terminal.Prompt
+
+  @robots [:mag1, :mag2, :min1]
+
+  defp ok(text) do
+    {:ok, command} = Prompt.parse(text, @robots)
+    command
+  end
+
+  defp error(text) do
+    {:error, line} = Prompt.parse(text, @robots)
+    line
+  end
+
+  test "everything that can be typed" do
+    assert ok("") == :nothing
+    assert ok("kill leader") == {:kill, :leader}
+    assert ok("  KILL mag2 ") == {:kill, :mag2}
+    assert ok("formation wedge 1.2") == {:formation, {:wedge, 1.2}}
+    assert ok("formation wedge:1.2") == {:formation, {:wedge, 1.2}}
+    assert ok("formation line") == {:formation, {:line, nil}}
+    assert ok("landmark 3,2") == {:landmark, {3.0, 2.0}}
+    assert ok("landmark -3, 2") == {:landmark, {-3.0, 2.0}}
+    assert ok("move 3 2") == {:landmark, {3.0, 2.0}}
+    assert ok("landmark none") == {:landmark, :none}
+    assert ok("goto mag2 1,2") == {:tell, [:mag2], "goto:1.0:2.0"}
+    assert ok("follow min1 mag2") == {:tell, [:min1], "followtheleader:mag2"}
+    assert ok("stop") == {:tell, :all, "stop"}
+    assert ok("stop min1") == {:tell, [:min1], "stop"}
+    assert ok("start") == {:tell, :all, "start"}
+    assert ok("mag2 move:0.2:0.1") == {:tell, [:mag2], "move:0.2:0.1"}
+    assert ok("mag2 MOVE 0.2 0.1") == {:tell, [:mag2], "move:0.2:0.1"}
+    assert ok("all findblob") == {:tell, :all, "findblob"}
+    assert ok("goto:1:2") == {:tell, :all, "goto:1.0:2.0"}
+    assert ok("estop") == :estop
+    assert ok("reset") == :reset
+    assert ok("status") == :status
+    assert ok("status mag1") == {:status, :mag1}
+    assert ok("help") == :help
+    assert ok("quit") == :quit
+  end
+
+  test "what is wrong is named, with what is allowed" do
+    assert error("kil leader") =~ ~s(did you mean "kill"?)
+    assert error("kill mag9") =~ "there are mag1 to mag2, min1"
+    assert error("kill") =~ "kill leader"
+    assert error("formation vee") =~ "column, line, wedge"
+    assert error("formation wedge 9") =~ "0.8 to 5"
+    assert error("formation") =~ "needs a kind"
+    assert error("landmark nan,1") =~ "X,Y in metres"
+    assert error("landmark") =~ "X,Y in metres"
+    assert error("goto mag1") =~ "goto mag1 1,2"
+    assert error("goto mag1 inf,0") =~ "X,Y in metres"
+    assert error("follow mag1 mag1") =~ "itself"
+    assert error("mag1 goto:abc:1") =~ ~s(x cannot be "abc")
+    assert error("goto:1") =~ "y is missing"
+    assert error("all fly:1") =~ "unknown command"
+    assert error("mag1 followtheleader:mag9") =~ "mag9"
+    assert error("xyzzy") =~ "help"
+  end
+end

@@ -1,0 +1,139 @@
+defmodule Hal.Device.Lifecycle do
+  @moduledoc """
+  What a device does with its driver: opens it, opens again what failed, judges whether it gives signs of life, arms and
+  drives the wheels. Called in the device's process.
+  """
+  alias Hal.Twist
+  alias Hal.Device.Arming
+  alias Hal.Device.{Liveness, Publisher, State, Watchdog}
+
+  @retry_ms 100
+  @longest_retry_ms 5_000
+
+  @doc "Opens the driver; what fails is tried again later, by a message `{:open, ref}`."
+  @spec open(State.t()) :: State.t()
+  def open(s) do
+    case s.driver.init(s.options) do
+      {:ok, inner} ->
+        signs = Liveness.new(s.kind, s.sonar?, State.now(s))
+        %{s | inner: {:open, inner}, signs: signs} |> judge() |> listen()
+
+      {:error, reason} ->
+        s |> Publisher.health({:offline, reason}) |> Publisher.arming() |> retry()
+    end
+  end
+
+  @doc "Closes a driver that failed, and says so."
+  @spec fail(State.t(), reason :: term(), inner :: term()) :: State.t()
+  def fail(s, reason, inner) do
+    s.driver.terminate(inner)
+    s = Publisher.health(%{Watchdog.unguard(s) | inner: :closed}, {:offline, reason})
+    retry(if s.arming, do: become(s, Arming.lost(s.arming, reason)), else: s)
+  end
+
+  defp retry(s) do
+    ref = make_ref()
+    wait_ms = s.retry_ms || @retry_ms
+    Process.send_after(self(), {:open, ref}, wait_ms)
+    %{s | retry: ref, retry_ms: min(2 * wait_ms, @longest_retry_ms)}
+  end
+
+  @doc "What became of a call of the driver."
+  @spec done(State.t(), {:ok, term()} | {:error, term(), term()}) :: State.t()
+  def done(s, {:ok, inner}), do: %{s | inner: {:open, inner}}
+  def done(s, {:error, reason, inner}), do: fail(s, reason, inner)
+
+  @doc "Readings came: what they say of the device, which waits no longer than at first after its next failure."
+  @spec measured(State.t(), [term(), ...]) :: State.t()
+  def measured(s, readings) do
+    arming = s.arming && Enum.reduce(readings, s.arming, &Arming.measured(&2, &1))
+    signs = Liveness.heard(s.signs, readings, State.now(s))
+    %{s | arming: arming, signs: signs, retry_ms: nil}
+  end
+
+  @doc """
+  Whether anything is there, and a drive's wheels may turn. Those that may no longer are stopped before
+  anybody is told.
+  """
+  @spec judge(State.t()) :: State.t()
+  def judge(%{inner: {:open, inner}} = s) do
+    case {Liveness.judge(s.signs, State.now(s)), s.kind} do
+      {:online, _kind} -> s |> Publisher.health(:online) |> ready()
+      {:waiting, _kind} -> ready(s)
+      {{:offline, :silent}, :drive} -> s |> ready() |> silent()
+      {{:offline, reason}, _kind} -> fail(s, reason, inner)
+    end
+  end
+
+  def judge(s), do: s
+
+  # Its last stop may have failed.
+  defp silent(%{inner: {:open, _}} = s), do: Publisher.health(s, {:offline, :silent})
+  defp silent(s), do: s
+
+  # A driver may become ready while it is open, or tell another thing that is missing.
+  defp ready(%{kind: :drive} = s), do: become(s, Arming.ready(s.arming, readiness(s)))
+  defp ready(s), do: s
+
+  @doc "Looks again in time: silence sends no message but `{:listen, ref}`."
+  @spec listen(State.t()) :: State.t()
+  def listen(%{inner: {:open, _}} = s) do
+    ref = make_ref()
+    at_ms = State.now(s)
+    Process.send_after(self(), {:listen, ref}, Liveness.next_ms(s.signs, at_ms) - at_ms)
+    %{s | listening: ref}
+  end
+
+  def listen(s), do: s
+
+  @doc "Carries out what a person orders of the wheels, and answers."
+  @spec order(State.t(), Arming.order()) :: {:ok | {:error, line :: String.t()}, State.t()}
+  def order(s, order) do
+    {answer, arming} = Arming.order(s.arming, order, readiness(s))
+    s = become(s, arming)
+    {carried_out(order, answer, s), s}
+  end
+
+  # The stop that a disarming begins with may itself be what finds the line lost.
+  defp carried_out(:disarm, :ok, %{inner: :closed, arming: %{state: {:error, reason}}} = s),
+    do: {:error, "the line was lost (#{Publisher.words(s, reason)}) while the wheels turned"}
+
+  defp carried_out(_order, answer, _s), do: answer
+
+  # What a person can mend comes before what may come by itself.
+  defp readiness(%{inner: {:open, inner}} = s) do
+    driver = if function_exported?(s.driver, :ready, 1), do: s.driver.ready(inner), else: :ok
+    with :ok <- driver, do: Liveness.ready(s.signs, State.now(s))
+  end
+
+  defp readiness(%{health: {{:offline, reason}, _since}} = s),
+    do: {:error, "the drive is offline (#{Publisher.words(s, reason)})"}
+
+  defp readiness(_not_opened_yet), do: {:error, "the drive is not open yet"}
+
+  # Wheels that may no longer turn stop before anybody is told.
+  defp become(%{arming: before} = s, arming) do
+    s = %{s | arming: arming}
+    stop? = before.state == :armed and arming.state != :armed and s.inner != :closed
+    Publisher.arming(if stop?, do: drive_on(s, Twist.zero()), else: s)
+  end
+
+  @doc "A speed is asked for: what the driver is told is what it may be told."
+  @spec drive(State.t(), Twist.t()) :: State.t()
+  def drive(s, twist) do
+    {allowed, arming} = Arming.drive(s.arming, twist)
+    if arming.refused > s.arming.refused, do: Publisher.refused(s, arming)
+    drive_on(%{s | arming: arming}, allowed)
+  end
+
+  @doc "Tells the driver a speed."
+  @spec drive_on(State.t(), Twist.t()) :: State.t()
+  def drive_on(%{inner: {:open, inner}} = s, twist) do
+    s = Watchdog.guard(s, twist)
+
+    case s.driver.drive(twist, inner) do
+      {:ok, inner} -> %{s | inner: {:open, inner}, arming: Arming.told(s.arming, twist)}
+      {:error, reason, inner} -> fail(s, reason, inner)
+    end
+  end
+end

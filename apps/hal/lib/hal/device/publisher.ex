@@ -1,0 +1,82 @@
+defmodule Hal.Device.Publisher do
+  @moduledoc """
+  What a device tells: readings to its sinks, and each change of its health and of its arming, once, to sinks and
+  events. Decides nothing.
+  """
+  alias Hal.Event
+  alias Hal.Device.Arming
+  alias Hal.Device.{State, Words}
+
+  @doc "Hands a reading to all sinks."
+  @spec hand_on(State.t(), tuple()) :: :ok
+  def hand_on(s, reading) do
+    Enum.each(s.sinks, fn {m, f, a} -> apply(m, f, a ++ [reading]) end)
+  end
+
+  @doc "Tells how the device is, if that has changed."
+  @spec health(State.t(), :online | {:offline, reason :: term()}) :: State.t()
+  def health(%{health: {condition, _since}} = s, condition), do: s
+
+  def health(s, condition) do
+    at_ms = State.now(s)
+    health = {condition, since(s.health, condition, at_ms)}
+    hand_on(s, {:health, s.device, health})
+
+    {name, about} = change(s, condition)
+    event(s, name, at_ms, about)
+    %{s | health: health}
+  end
+
+  defp change(s, :online), do: {:online, %{again?: s.health != nil}}
+
+  defp change(s, {:offline, reason}),
+    do: {:offline, %{reason: reason, line: words(s, reason)}}
+
+  # Another reason to be offline is no new beginning.
+  defp since({{:offline, _}, since_ms}, {:offline, _}, _at_ms), do: since_ms
+  defp since(_before, _condition, at_ms), do: at_ms
+
+  @doc "Tells how a drive is armed, if that has changed."
+  @spec arming(State.t()) :: State.t()
+  def arming(%{arming: %{state: state, why: why}, armed_as: {state, why}} = s), do: s
+  def arming(%{kind: kind} = s) when kind != :drive, do: s
+
+  def arming(%{arming: %{state: state, why: why}} = s) do
+    reading = %{state: state, why: why}
+    {was, _why} = s.armed_as || {:disarmed, nil}
+    event(s, :arming, State.now(s), Map.merge(reading, %{was: was, line: lost(s, state)}))
+    hand_on(s, {:arming, reading})
+    %{s | armed_as: {state, why}}
+  end
+
+  defp lost(s, {:error, reason}), do: words(s, reason)
+  defp lost(_s, _not_lost), do: nil
+
+  @doc "Of a device that fell: its wheels were stopped, by the driver's last act or by the end of its line."
+  @spec fallen(State.t()) :: State.t()
+  def fallen(s) do
+    s = health(s, {:offline, :fell})
+    line = words(s, :fell)
+    if s.arming, do: arming(%{s | arming: Arming.ready(s.arming, {:error, line})}), else: s
+  end
+
+  @doc "A speed came for wheels that are not armed."
+  @spec refused(State.t(), Arming.t()) :: :ok
+  def refused(s, %{refused: refused}) do
+    measured = %{at_ms: State.now(s), refused: refused}
+    Event.execute([:hal, :device, :refused], measured, about(s))
+  end
+
+  @doc "The watchdog stops the wheels."
+  @spec watchdog(State.t()) :: :ok
+  def watchdog(s), do: event(s, :watchdog, State.now(s), %{})
+
+  @doc "A reason to be offline, in its driver's words."
+  @spec words(State.t(), reason :: term()) :: String.t()
+  def words(s, reason), do: Words.offline({s.driver, s.options}, reason)
+
+  defp event(s, name, at_ms, more),
+    do: Event.execute([:hal, :device, name], %{at_ms: at_ms}, Map.merge(about(s), more))
+
+  defp about(s), do: Map.merge(s.about, %{device: s.device, driver: s.driver})
+end

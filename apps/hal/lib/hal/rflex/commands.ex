@@ -1,0 +1,86 @@
+defmodule Hal.RFlex.Commands do
+  @moduledoc "The commands that a driver says as one: speeds, stops, the first words and the last. Pure."
+  alias Hal.Twist
+  alias Hal.RFlex.{Command, Options, Queue}
+
+  # Of a base whose conversion is not known. It stands, and is to brake whatever the units are.
+  @some_acceleration 100_000
+
+  @type commands :: [{Queue.key(), binary()}]
+
+  @doc "A speed, from the one `before`: faster with the acceleration, slower with the braking."
+  @spec speed(Options.t(), Twist.t(), Twist.t()) :: commands()
+  def speed(%Options{} = options, %Twist{} = twist, %Twist{} = before) do
+    %{conversions: %{distance: distance, angle: angle}, limits: limits} = options
+
+    rate =
+      if abs(twist.linear) > abs(before.linear),
+        do: limits.max_acceleration,
+        else: limits.max_braking
+
+    move = Command.move(trunc(twist.linear * distance), acceleration(distance, rate))
+    turn = Command.turn(trunc(twist.turn * angle), trunc(limits.max_turn * angle))
+    [{{:speed, 0}, move}, {{:speed, 1}, turn}]
+  end
+
+  @doc "Standing still, as soon as the limits of braking allow."
+  @spec stop(Options.t()) :: commands()
+  def stop(%Options{limits: limits} = options) do
+    braking = acceleration(options.conversions.distance, limits.max_braking)
+    [{{:speed, 0}, Command.move(0, braking)}, {{:speed, 1}, Command.turn(0)}]
+  end
+
+  @doc "What a controller is told once it is there, or there again."
+  @spec first_words(Options.t()) :: commands()
+  def first_words(%Options{conversions: conversions, limits: limits} = options) do
+    move = acceleration(conversions.distance, limits.max_acceleration)
+    turn = acceleration(conversions.angle, limits.max_turn_acceleration)
+
+    [
+      reports: Command.system_reports(options.report_period, 3),
+      inputs: Command.input_reports(options.report_period),
+      defaults: Command.defaults()
+    ] ++
+      [{{:prepare, 0}, Command.prepare(0, move)}, {{:prepare, 1}, Command.prepare(1, turn)}] ++
+      if(sonar?(options), do: [sonar: sonar_on(options)], else: []) ++
+      if(infrared?(options), do: [infrared: Command.infrared_on()], else: [])
+  end
+
+  @doc """
+  What the line hears when nobody is there to drive: both axes stop, the brake is set. All of it
+  twice, for nobody will be there either to see that a frame was lost.
+  """
+  @spec last_words(Options.t()) :: binary()
+  def last_words(%Options{} = options) do
+    stop = for {_key, bytes} <- stop(options), into: <<>>, do: bytes
+    :binary.copy(stop <> Command.brake(), 2)
+  end
+
+  @doc "The last words of a driver that ends in order: the controller is told to be silent too."
+  @spec farewell(Options.t()) :: binary()
+  def farewell(%Options{} = options) do
+    last_words(options) <>
+      if(sonar?(options), do: Command.sonar_off(), else: <<>>) <>
+      if(infrared?(options), do: Command.infrared_off(), else: <<>>) <>
+      Command.system_reports(0, 0) <> Command.input_reports(0)
+  end
+
+  @doc "Which senses a robot has, for its conversions."
+  @spec senses(Options.t()) :: [:sonar | :infrared]
+  def senses(%Options{} = options) do
+    for {sense, true} <- [sonar: sonar?(options), infrared: infrared?(options)], do: sense
+  end
+
+  defp sonar?(options), do: Enum.sum(options.sonar_banks) > 0
+
+  # Infrareds without their law are of no use; a robot drives without them.
+  defp infrared?(%{conversions: conversions} = options) do
+    Enum.sum(options.ir_banks) > 0 and (conversions.ir_a != nil or conversions.ir_b != nil)
+  end
+
+  defp sonar_on(%{sonar_times: {echo, ping, set}}), do: Command.sonar_on(echo, ping, set)
+
+  defp acceleration(nil, _rate), do: @some_acceleration
+  # Never 0: a base that is to stand with no braking at all would roll on.
+  defp acceleration(units, rate), do: max(trunc(units * rate), 2)
+end

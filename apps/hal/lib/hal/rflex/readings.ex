@@ -1,0 +1,204 @@
+defmodule Hal.RFlex.Readings do
+  @moduledoc """
+  Packets to readings: everything a robot's controller tells, in our units. Pure; the time of arrival
+  comes in, as integer milliseconds.
+  """
+  alias Hal.RFlex.{Bumpers, IndexSwitch, Infrared, Odometry, Options, Packet, Report, Sonar}
+
+  @most_volts 60.0
+
+  @enforce_keys [:odometry, :sonar, :infrared, :bumpers, :home_address, :power_offset]
+  defstruct @enforce_keys ++
+              [
+                frame: nil,
+                home: %IndexSwitch{},
+                brake: nil,
+                motor_ms: nil,
+                paired?: false,
+                counts: %{}
+              ]
+
+  @typedoc "`frame` of the odometry; `paired?`: both wheels' counters were heard; `counts`: packets that were `unknown`, `malformed`, or `implausible`."
+  @type t :: %__MODULE__{}
+
+  @doc "Senses of these options; `before` is the odometry of the same base in the same `frame`, if it goes on."
+  @spec new(Options.t(), Odometry.t() | nil, frame :: reference() | nil) :: t()
+  def new(%Options{} = options, before \\ nil, frame \\ nil) do
+    %__MODULE__{
+      frame: frame,
+      odometry: before || odometry(options),
+      sonar: sonar(options),
+      infrared: infrared(options),
+      bumpers: options.bumpers,
+      home_address: options.home,
+      power_offset: options.power_offset
+    }
+  end
+
+  @doc "Takes a packet; gives the readings it makes."
+  @spec packet(t(), Packet.t(), integer()) :: {[Hal.Drive.reading()], t()}
+  def packet(%__MODULE__{} = senses, %Packet{} = packet, at_ms) do
+    case Report.decode(packet) do
+      {:axis, report} -> axis(%{senses | motor_ms: at_ms}, report, at_ms)
+      {:sonar, records} -> sonar(senses, records, at_ms)
+      {:infrared, banks} -> infrared(senses, banks)
+      {:input, address, state} -> input(senses, address, state)
+      {:status, centivolts, brake} -> status(senses, centivolts, brake)
+      {:joystick, x, y, buttons} -> {[{:joystick, %{x: x, y: y, buttons: buttons}}], senses}
+      {:screen, _row, _bytes} -> {[], senses}
+      other -> {[], count(senses, other)}
+    end
+  end
+
+  @doc "How often a counter of the wheels has jumped, so that nobody knows how far the robot went."
+  @spec jumps(t()) :: non_neg_integer()
+  def jumps(%__MODULE__{odometry: nil}), do: 0
+  def jumps(%__MODULE__{odometry: %Odometry{jumps: jumps}}), do: jumps
+
+  @doc "Readings and senses whose odometry is in another frame."
+  @spec reframe([Hal.Drive.reading()], t(), reference()) :: {[Hal.Drive.reading()], t()}
+  def reframe(readings, %__MODULE__{} = senses, frame) do
+    readings =
+      Enum.map(readings, fn
+        {:odometry, odometry} -> {:odometry, %{odometry | frame: frame}}
+        other -> other
+      end)
+
+    {readings, %{senses | frame: frame}}
+  end
+
+  @doc "What still holds and should not grow old on the board: bumpers, which tell of changes only."
+  @spec standing(t()) :: [Hal.Drive.reading()]
+  def standing(%__MODULE__{} = senses), do: pressed(senses)
+
+  @doc "What was counted since the start, by what it is."
+  @spec counts(t()) :: map()
+  def counts(%__MODULE__{} = senses) do
+    odometry = if senses.odometry, do: Map.take(senses.odometry, [:dropped, :jumps]), else: %{}
+    unknown = if senses.sonar, do: %{sonar_ids: senses.sonar.unknown}, else: %{}
+    senses.counts |> Map.merge(odometry) |> Map.merge(unknown)
+  end
+
+  defp axis(%{odometry: nil} = senses, _report, _at_ms), do: {[{:report, :wheels}], senses}
+
+  defp axis(senses, report, at_ms) do
+    case Odometry.report(senses.odometry, report, at_ms) do
+      {nil, odometry} ->
+        believed? = odometry.dropped == senses.odometry.dropped
+        {half(senses.paired? and believed?), %{senses | odometry: odometry}}
+
+      {reading, odometry} ->
+        senses = %{senses | odometry: odometry, paired?: true}
+        {[{:odometry, %{reading | frame: senses.frame}}], senses}
+    end
+  end
+
+  # Of a pair of which the other half may come or be lost: once a pair was heard, the base is there.
+  defp half(true), do: [{:report, :wheels}]
+  defp half(false), do: []
+
+  defp sonar(%{sonar: nil} = senses, _records, _at_ms), do: {[{:report, :sonar}], senses}
+
+  defp sonar(senses, records, at_ms) do
+    senses = %{senses | sonar: Sonar.report(senses.sonar, records, at_ms)}
+    {ranges(senses, at_ms), senses}
+  end
+
+  defp ranges(%{sonar: sonar}, at_ms) do
+    case Sonar.ranges(sonar, at_ms) do
+      nil -> []
+      ranges -> [{:sonar, ranges}]
+    end
+  end
+
+  defp infrared(%{infrared: nil} = senses, _banks), do: {[], senses}
+
+  defp infrared(senses, banks) do
+    case Infrared.ranges(senses.infrared, banks) do
+      nil -> {[], count(senses, :malformed)}
+      ranges -> {[{:ir, ranges}], senses}
+    end
+  end
+
+  defp input(%{home_address: address} = senses, address, _state) when address != nil do
+    heading = if senses.odometry, do: senses.odometry.pose.heading, else: 0.0
+    home = IndexSwitch.event(senses.home, heading)
+    reading = if home.heading, do: [{:home, home.heading}], else: []
+    {reading, %{senses | home: home}}
+  end
+
+  defp input(senses, address, state) do
+    case Bumpers.report(senses.bumpers, address, state) do
+      {:ok, bumpers} ->
+        senses = %{senses | bumpers: bumpers}
+        {pressed(senses), senses}
+
+      :other ->
+        {[], count(senses, :unknown)}
+    end
+  end
+
+  defp pressed(%{bumpers: %{count: 0}}), do: []
+  # Not before a controller has said so.
+  defp pressed(%{bumpers: %{states: states}}) when states == %{}, do: []
+  defp pressed(%{bumpers: bumpers}), do: [{:bumpers, Bumpers.pressed(bumpers)}]
+
+  defp status(senses, centivolts, brake) do
+    volts = centivolts / 100 + senses.power_offset
+
+    if volts <= @most_volts,
+      do: {[{:power, volts}, {:brake, brake != 0}], %{senses | brake: brake != 0}},
+      else: {[], count(senses, :implausible)}
+  end
+
+  defp count(senses, what),
+    do: %{senses | counts: Map.update(senses.counts, what, 1, &(&1 + 1))}
+
+  defp odometry(%{conversions: %{distance: distance, angle: angle}} = options)
+       when distance != nil and angle != nil,
+       do:
+         Odometry.new(
+           distance,
+           angle,
+           options.limits.max_linear,
+           options.limits.max_turn,
+           {options.profile.wheel_base, options.conversions.wheel_ratio}
+         )
+
+  defp odometry(_options), do: nil
+
+  defp sonar(%{conversions: %{range: range}} = options) when range != nil do
+    %{sonar_min: least, sonar_max: greatest} = options.profile
+
+    Sonar.new(
+      options.sonar_banks,
+      options.sonar_stride,
+      options.sonar_age,
+      range,
+      least,
+      greatest
+    )
+  end
+
+  defp sonar(_options), do: nil
+
+  defp infrared(%{conversions: %{ir_a: a, ir_b: b}, ir_banks: [_ | _]} = options)
+       when a != nil and b != nil do
+    count = Enum.sum(options.ir_banks)
+
+    %Infrared{
+      banks: options.ir_banks,
+      base: options.ir_base_bank,
+      order: options.ir_order,
+      laws: Enum.zip(each(a, count), each(b, count)),
+      law: options.ir_law,
+      least: options.ir_min,
+      greatest: options.profile.ir_max
+    }
+  end
+
+  defp infrared(_options), do: nil
+
+  defp each(values, _count) when is_list(values), do: values
+  defp each(value, count), do: List.duplicate(value, count)
+end

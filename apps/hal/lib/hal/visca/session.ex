@@ -1,0 +1,295 @@
+defmodule Hal.Visca.Session do
+  @moduledoc """
+  A Sony EVI-D30 or D31 on its line, as a function of bytes, wishes and time: what to write, and
+  what it says of itself. Pure; `Hal.Visca.Driver` is the process round it.
+
+  **Opening**: take your numbers, clear, who are you, are you on (if not: be on), where are you.
+  A camera that was switched off and on says so in a chain, or shows it by standing elsewhere than
+  it was told; then it is opened again and gets its last target again.
+
+  **Ready**: it asks for the position every `poll_ms`, and for the zoom at each fifth time.
+
+  **Positions** that the head cannot have come to are doubted (`Hal.Visca.Session.OutlierFilter`).
+
+  **The target**: only a change is said. A head that stands still for half a second elsewhere than
+  at its target, by more than a degree, is told again, once a second at most: a damaged command
+  that the camera took for another one, or a hand, turned it away.
+
+  Effects: `{:write, bytes}`, `{:reading, reading}` (`Hal.Ptz`), `{:error, reason}` after which it
+  is closed. Reasons: `:no_answer` (nothing for 1 s, or no position for 2 s), `{:cameras, n}` (the
+  chain has fewer cameras than the number asked for), `{:model, code}` (a D70 or D100, whose units
+  are others).
+  """
+  alias Hal.Visca.{Command, Decoder, Queue, Units}
+  alias Hal.Visca.Session.{OutlierFilter, Target}
+
+  @degree :math.pi() / 180
+  @lens {4.4 * @degree, 48.8 * @degree}
+  @lost_ms 2_000
+  @zoom_each 5
+  @on_ms 3_000
+  # Other members of the family, with other units.
+  @foreign [0x040D, 0x040E]
+  # At 9600 baud a position's answer takes 11.5 ms, and its question 5.2 ms.
+  @answer_ms 11.5
+  @question_ms 5.2
+
+  @enforce_keys [:camera, :lens, :poll_ms, :decoder]
+  defstruct @enforce_keys ++
+              [
+                queue: Queue.new(),
+                step: :address,
+                target: Target.new(),
+                witness: OutlierFilter.new(),
+                zoom_wanted: nil,
+                zoom: nil,
+                position_ms: nil,
+                poll_at_ms: nil,
+                polls: 0
+              ]
+
+  @typedoc "Where the opening is."
+  @type step :: :address | :clear | :version | :power | :switch_on | :look_round | :ready
+  @opaque t :: %__MODULE__{}
+  @type effect :: {:write, binary()} | {:reading, Hal.Ptz.reading()} | {:error, reason()}
+  @type reason :: :no_answer | {:cameras, 0..7} | {:model, non_neg_integer()}
+
+  @doc """
+  Begins the opening. Options: `camera` (1 to 7, default 1), `lens` (`t:Hal.Visca.Units.lens/0`),
+  `poll_ms` (default 100), `field_of_view` (radians to zoom to once; default: leave it).
+
+      iex> {effects, _head} = Hal.Visca.Session.open([], 0)
+      iex> effects
+      [{:write, <<0x88, 0x30, 0x01, 0xFF>>}]
+  """
+  @spec open(keyword(), integer()) :: {[effect()], t()}
+  def open(options, now_ms) do
+    options = Keyword.validate!(options, camera: 1, lens: @lens, poll_ms: 100, field_of_view: nil)
+
+    head = %__MODULE__{
+      camera: options[:camera],
+      lens: options[:lens],
+      poll_ms: options[:poll_ms],
+      decoder: Decoder.new(options[:camera])
+    }
+
+    angle = options[:field_of_view]
+    head = %{head | zoom_wanted: angle && Units.zoom(angle, head.lens)}
+    done(begin(head, :address, now_ms))
+  end
+
+  @doc "Looks there (radians, left and up positive), as fast as it can; at once or once it is open."
+  @spec look(t(), float(), float(), integer()) :: {[effect()], t()}
+  def look(%__MODULE__{} = head, pan, tilt, now_ms) do
+    target = Target.want(head.target, {Units.pan(pan), Units.tilt(tilt)})
+    done(aim({[], %{head | target: target}}, now_ms))
+  end
+
+  @doc "Zooms to a horizontal field of view, in radians."
+  @spec zoom(t(), float(), integer()) :: {[effect()], t()}
+  def zoom(%__MODULE__{} = head, angle, now_ms) do
+    zoom = Units.zoom(angle, head.lens)
+
+    cond do
+      zoom == head.zoom_wanted -> {[], head}
+      head.step != :ready -> {[], %{head | zoom_wanted: zoom}}
+      true -> done(push({[], %{head | zoom_wanted: zoom}}, {:zoom_to, zoom}, now_ms))
+    end
+  end
+
+  @doc "Bytes from the line."
+  @spec bytes(t(), binary(), integer()) :: {[effect()], t()}
+  def bytes(%__MODULE__{} = head, bytes, now_ms) do
+    {replies, decoder} = Decoder.feed(head.decoder, bytes)
+
+    done(
+      Enum.reduce(replies, {[], %{head | decoder: decoder}}, fn reply, {effects, head} ->
+        {more, queue} = Queue.heard(head.queue, reply, now_ms)
+        react({effects, %{head | queue: queue}}, more, now_ms)
+      end)
+    )
+  end
+
+  @doc "Time has passed; wanted at `wake_ms/1`, allowed at any time."
+  @spec tick(t(), integer()) :: {[effect()], t()}
+  def tick(%__MODULE__{} = head, now_ms) do
+    {more, queue} = Queue.tick(head.queue, now_ms)
+    {[], %{head | queue: queue}} |> react(more, now_ms) |> poll(now_ms) |> done()
+  end
+
+  @doc "When `tick/2` is wanted."
+  @spec wake_ms(t()) :: integer() | nil
+  def wake_ms(%__MODULE__{} = head) do
+    [Queue.wake_ms(head.queue), head.poll_at_ms]
+    |> Enum.filter(& &1)
+    |> Enum.min(fn -> nil end)
+  end
+
+  @doc "Bytes that were no message, messages of other cameras, and positions that were doubted, since the opening."
+  @spec counts(t()) :: %{
+          garbage: non_neg_integer(),
+          others: non_neg_integer(),
+          doubts: non_neg_integer()
+        }
+  def counts(%__MODULE__{decoder: decoder, witness: witness}),
+    do: decoder |> Map.take([:garbage, :others]) |> Map.put(:doubts, witness.doubts)
+
+  # Opening
+
+  defp begin(head, step, now_ms), do: enter({[], head}, step, now_ms)
+
+  defp enter({effects, head}, :ready, now_ms),
+    do: ask({effects, %{head | step: :ready}}, :ready, now_ms)
+
+  # Nothing is polled but where a step says so.
+  defp enter({effects, head}, step, now_ms),
+    do: ask({effects, %{head | step: step, poll_at_ms: nil}}, step, now_ms)
+
+  defp ask(state, :address, now_ms), do: push(state, :address_set, now_ms)
+  defp ask(state, :clear, now_ms), do: push(state, :if_clear, now_ms)
+  defp ask(state, :version, now_ms), do: push(state, {:ask, :version}, now_ms)
+  defp ask(state, :power, now_ms), do: push(state, {:ask, :power}, now_ms)
+
+  # Should its word that it is on get lost, it is asked.
+  defp ask({effects, head}, :switch_on, now_ms),
+    do: push({effects, %{head | poll_at_ms: now_ms + @on_ms}}, {:power, true}, now_ms)
+
+  defp ask({effects, head}, :look_round, now_ms),
+    do: poll({effects, %{head | poll_at_ms: now_ms, position_ms: now_ms, polls: 0}}, now_ms)
+
+  defp ask({effects, head}, :ready, now_ms) do
+    state = aim({effects, %{head | target: Target.forget(head.target)}}, now_ms)
+    if head.zoom_wanted, do: push(state, {:zoom_to, head.zoom_wanted}, now_ms), else: state
+  end
+
+  defp react(state, queue_effects, now_ms),
+    do: Enum.reduce(queue_effects, state, &take(&1, &2, now_ms))
+
+  defp take({:say, command}, {effects, head}, _now_ms),
+    do: {[{:write, Command.encode(command, head.camera)} | effects], head}
+
+  defp take(:no_answer, {effects, head}, _now_ms), do: {[{:error, :no_answer} | effects], head}
+
+  defp take({:cameras, n}, {effects, %{camera: camera} = head}, _now_ms) when n < camera,
+    do: {[{:error, {:cameras, n}} | effects], head}
+
+  # Not every camera answers these; what is wrong shows further on.
+  defp take({:cameras, _n}, {_, %{step: :address}} = state, now_ms),
+    do: enter(state, :clear, now_ms)
+
+  defp take({:failed, :address_set, _}, {_, %{step: :address}} = state, now_ms),
+    do: enter(state, :clear, now_ms)
+
+  defp take(:cleared, {_, %{step: :clear}} = state, now_ms), do: enter(state, :version, now_ms)
+
+  defp take({:failed, :if_clear, _}, {_, %{step: :clear}} = state, now_ms),
+    do: enter(state, :version, now_ms)
+
+  defp take({:result, :version, %{model: model}, _}, {effects, head}, _now_ms)
+       when model in @foreign,
+       do: {[{:error, {:model, model}} | effects], head}
+
+  defp take({:result, :version, _value, _}, {_, %{step: :version}} = state, now_ms),
+    do: enter(state, :power, now_ms)
+
+  defp take({:result, :power, on?, _}, {_, %{step: :power}} = state, now_ms),
+    do: enter(state, if(on?, do: :look_round, else: :switch_on), now_ms)
+
+  defp take({:done, {:power, true}}, {_, %{step: :switch_on}} = state, now_ms),
+    do: enter(state, :power, now_ms)
+
+  defp take({:failed, {:power, true}, _reason}, {_, %{step: :switch_on}} = state, now_ms),
+    do: enter(state, :power, now_ms)
+
+  # Refused, not unheard: switched off, perhaps.
+  defp take({:failed, {:ask, :version}, reason}, {_, %{step: :version}} = state, now_ms)
+       when reason != :no_answer,
+       do: enter(state, :power, now_ms)
+
+  # Said again until it answers, or is silent for a second.
+  defp take({:failed, {:ask, inquiry}, _}, {_, %{step: inquiry}} = state, now_ms),
+    do: enter(state, inquiry, now_ms)
+
+  # Ready
+
+  defp take({:result, :zoom, zoom, _}, {effects, head}, _now_ms) when zoom <= 0x3FF,
+    do: {effects, %{head | zoom: zoom}}
+
+  defp take({:result, :position, {pan, tilt} = at, took_ms}, {effects, head} = state, now_ms) do
+    with true <- Units.position?(pan, tilt),
+         {true, witness} <- OutlierFilter.hear(head.witness, at, now_ms) do
+      target = Target.seen(head.target, at, now_ms)
+      head = %{head | position_ms: now_ms, witness: witness, target: target}
+      arrived({reading(effects, head, at, took_ms), head}, now_ms)
+    else
+      false -> state
+      {false, witness} -> {effects, %{head | witness: witness}}
+    end
+  end
+
+  defp take(:network_change, {effects, head}, now_ms),
+    do: enter({effects, %{head | zoom: nil}}, :address, now_ms)
+
+  # It is switched off, perhaps: the opening finds out.
+  defp take({:failed, _command, :not_executable}, {_, %{step: step}} = state, now_ms)
+       when step in [:look_round, :ready],
+       do: enter(state, :power, now_ms)
+
+  defp take(_else, state, _now_ms), do: state
+
+  defp arrived({effects, %{step: :look_round, zoom: zoom} = head}, now_ms) when zoom != nil,
+    do: enter({effects, head}, :ready, now_ms)
+
+  defp arrived(state, now_ms), do: aim(state, now_ms)
+
+  defp reading(effects, %{zoom: nil}, _at, _took_ms), do: effects
+
+  # The camera looked where it is between the question's last byte and the answer's first.
+  defp reading(effects, head, {pan, tilt}, took_ms) do
+    {pan, tilt} = Units.angles(pan, tilt)
+    angle = Units.field_of_view(head.zoom, head.lens)
+    age_ms = round((took_ms + @answer_ms - @question_ms) / 2)
+    [{:reading, {:ptz, %{pan: pan, tilt: tilt, field_of_view: angle, age_ms: age_ms}}} | effects]
+  end
+
+  defp aim({effects, %{step: :ready} = head}, now_ms) do
+    case Target.due(head.target, now_ms) do
+      {{pan, tilt}, target} ->
+        push({effects, %{head | target: target}}, {:look, pan, tilt, 24, 20}, now_ms)
+
+      nil ->
+        {effects, head}
+    end
+  end
+
+  defp aim(state, _now_ms), do: state
+
+  # Polling
+
+  defp poll({_, %{step: :switch_on, poll_at_ms: at_ms}} = state, now_ms) when now_ms >= at_ms,
+    do: enter(state, :power, now_ms)
+
+  defp poll({effects, %{poll_at_ms: at_ms, position_ms: seen_ms} = head}, now_ms)
+       when at_ms != nil and now_ms >= at_ms do
+    if now_ms - seen_ms >= @lost_ms do
+      {[{:error, :no_answer} | effects], head}
+    else
+      # At absolute times; what was missed is not made up for.
+      head = %{head | poll_at_ms: max(at_ms + head.poll_ms, now_ms + 1), polls: head.polls + 1}
+      state = push({effects, head}, {:ask, :position}, now_ms)
+
+      if head.zoom == nil or rem(head.polls, @zoom_each) == 0,
+        do: push(state, {:ask, :zoom}, now_ms),
+        else: state
+    end
+  end
+
+  defp poll(state, _now_ms), do: state
+
+  defp push({effects, head}, command, now_ms) do
+    {more, queue} = Queue.push(head.queue, command, now_ms)
+    react({effects, %{head | queue: queue}}, more, now_ms)
+  end
+
+  defp done({effects, head}), do: {Enum.reverse(effects), head}
+end

@@ -1,0 +1,55 @@
+defmodule Hal.Visca.Session.OutlierFilter do
+  @moduledoc """
+  Believes no position that a camera's head cannot have come to. Pure; the camera's units.
+
+  A line without checksums turns one position into another by a single bit. The head turns at most
+  by 80 degrees/s (tilt: 50), so a position beyond what it can have reached since the last one is
+  doubted until the next one says about the same.
+  """
+
+  # Units a millisecond, with a fifth to spare, and two degrees.
+  @pan_rate 80 * 8.8 * 1.2 / 1000
+  @tilt_rate 50 * 12 * 1.2 / 1000
+  @pan_slack 18
+  @tilt_slack 24
+
+  defstruct believed: nil, doubted: nil, doubts: 0
+
+  @type seen :: {pan :: integer(), tilt :: integer(), at_ms :: integer()}
+  @typedoc "`doubts`: how many positions were not believed when they came."
+  @type t :: %__MODULE__{
+          believed: seen() | nil,
+          doubted: seen() | nil,
+          doubts: non_neg_integer()
+        }
+
+  @doc "Has seen nothing."
+  @spec new() :: t()
+  def new, do: %__MODULE__{}
+
+  @doc """
+  Whether a position is believed.
+
+      iex> alias Hal.Visca.Session.OutlierFilter
+      iex> {true, witness} = OutlierFilter.hear(OutlierFilter.new(), {0, 0}, 0)
+      iex> {false, witness} = OutlierFilter.hear(witness, {256, 0}, 100)
+      iex> {believed?, _witness} = OutlierFilter.hear(witness, {258, 0}, 200)
+      iex> believed?
+      true
+  """
+  @spec hear(t(), {integer(), integer()}, integer()) :: {boolean(), t()}
+  def hear(%__MODULE__{} = witness, {pan, tilt}, now_ms) do
+    seen = {pan, tilt, now_ms}
+
+    if witness.believed == nil or near?(witness.believed, seen) or near?(witness.doubted, seen),
+      do: {true, %{witness | believed: seen, doubted: nil}},
+      else: {false, %{witness | doubted: seen, doubts: witness.doubts + 1}}
+  end
+
+  defp near?(nil, _seen), do: false
+
+  defp near?({pan, tilt, before_ms}, {p, t, at_ms}) do
+    ms = at_ms - before_ms
+    abs(p - pan) <= @pan_slack + @pan_rate * ms and abs(t - tilt) <= @tilt_slack + @tilt_rate * ms
+  end
+end

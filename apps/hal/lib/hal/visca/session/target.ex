@@ -1,0 +1,69 @@
+defmodule Hal.Visca.Session.Target do
+  @moduledoc """
+  Where a camera's head was told to look, and whether it has to be told (again). Pure; the camera's
+  units.
+
+  A new target is due at once. One that was said is due again when the head stands still elsewhere
+  for 0.5 s, by more than a degree, and 1 s after it was said last.
+  """
+  # A degree each.
+  @pan_off 9
+  @tilt_off 12
+  @still_ms 500
+  @again_ms 1_000
+
+  defstruct wanted: nil, said: nil, said_ms: nil, at: nil, since_ms: nil, now_ms: nil
+
+  @type position :: {pan :: integer(), tilt :: integer()}
+  @typedoc "`at`: where it was seen, there `since_ms`, seen last at `now_ms`."
+  @type t :: %__MODULE__{
+          wanted: position() | nil,
+          said: position() | nil,
+          said_ms: integer() | nil,
+          at: position() | nil,
+          since_ms: integer() | nil,
+          now_ms: integer() | nil
+        }
+
+  @doc "No wish yet."
+  @spec new() :: t()
+  def new, do: %__MODULE__{}
+
+  @doc "Look there."
+  @spec want(t(), position()) :: t()
+  def want(%__MODULE__{} = target, position), do: %{target | wanted: position}
+
+  @doc "The camera knows nothing of what it was told."
+  @spec forget(t()) :: t()
+  def forget(%__MODULE__{} = target), do: %{target | said: nil, said_ms: nil}
+
+  @doc "It was seen there."
+  @spec seen(t(), position(), integer()) :: t()
+  def seen(%__MODULE__{at: {pan, tilt}, since_ms: since_ms} = target, {p, t} = at, now_ms)
+      when abs(p - pan) <= 1 and abs(t - tilt) <= 1,
+      do: %{target | at: at, since_ms: since_ms, now_ms: now_ms}
+
+  def seen(%__MODULE__{} = target, at, now_ms),
+    do: %{target | at: at, since_ms: now_ms, now_ms: now_ms}
+
+  @doc """
+  The target to say now; `nil` if there is nothing to say.
+
+      iex> alias Hal.Visca.Session.Target
+      iex> {{-264, 0}, target} = Target.due(Target.want(Target.new(), {-264, 0}), 0)
+      iex> Target.due(target, 100)
+      nil
+  """
+  @spec due(t(), integer()) :: {position(), t()} | nil
+  def due(%__MODULE__{wanted: wanted} = target, now_ms) do
+    if wanted != nil and (wanted != target.said or astray?(target, now_ms)),
+      do: {wanted, %{target | said: wanted, said_ms: now_ms}}
+  end
+
+  defp astray?(%{at: nil}, _now_ms), do: false
+
+  defp astray?(%{at: {pan, tilt}, wanted: {p, t}} = target, now_ms) do
+    (abs(pan - p) > @pan_off or abs(tilt - t) > @tilt_off) and
+      target.now_ms - target.since_ms >= @still_ms and now_ms - target.said_ms >= @again_ms
+  end
+end

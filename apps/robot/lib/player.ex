@@ -1,0 +1,250 @@
+defmodule Player do
+  @moduledoc """
+  Turns a configuration file of the Player device server (1.x, 2 or 3), as the thesis's robots ran it,
+  into a robot file. Pure; `mix robot.import` is its command.
+
+  | Player's driver | becomes | by |
+  |---|---|---|
+  | `rflex`, or `rflex_position`, `rflex_sonar` and its kin | `drive`, `body`, acceleration in `limits` | `Player.RFlexOptions` |
+  | `sonyevid30` | `ptz` | `Player.CameraOptions` |
+  | `camerav4l` and its kin | `camera` | |
+  | `cmvision` | `colours` | |
+
+  What follows from several options, and from Player's own defaults, is `Player.Defaults`'s and
+  `Player.Boards`'s.
+
+  All else is left out, and told: each option and section with its line and why. Units are those of
+  `Player.Units`; where a file says something else than it seems to mean, what was assumed is
+  told as well.
+  """
+  alias Player.{Boards, CameraOptions, Parts, RFlexOptions, Sections, Units, Unsupported}
+
+  @drivers %{
+    "rflex" => :drive,
+    "sonyevid30" => :ptz,
+    "camerav4l" => :camera,
+    "camerav4l2" => :camera,
+    "camerav4lc" => :camera,
+    "camerauvc" => :camera,
+    "cmvision" => :colours
+  }
+  @modules %{drive: Hal.RFlex.Driver, ptz: Hal.Visca.Driver, camera: Hal.Camera.FFmpeg}
+  @said ~w(name driver provides requires alwayson plugin key)
+
+  @typedoc "A line of the file, what stands there, and what is to be said of it."
+  @type remark :: {line :: pos_integer(), what :: String.t(), why :: String.t()}
+
+  @type result :: %{
+          text: String.t(),
+          id: atom(),
+          profile: :magellan | :atrv_mini,
+          assumed: [remark()],
+          left: [remark()]
+        }
+
+  @doc """
+  The robot file for a configuration file's text. Options:
+
+    * `:file` - its name, for errors and the head of the new file
+    * `:id` - the robot's name; default `mag1` or `min1`
+    * `:profile` - `:magellan` or `:atrv_mini`; by default guessed
+    * `:version` - 1 or 2 (and later) for Player's; by default told by the names of its options
+    * `:colours` - `function.(name)` gives `{path, {:ok, colours} | {:error, line}}`: how the colour
+      file is named in the robot file, and what is in it
+
+  The error is one line: it names what keeps the file from being read, or says that no rFLEX is in it, or
+  which line of it leaves open what the robot's sensors are (`Player.Boards.sure/1`).
+  """
+  @spec import(String.t(), keyword()) :: {:ok, result()} | {:error, String.t()}
+  def import(text, options \\ []) do
+    file = Keyword.get(options, :file, "configuration file")
+
+    with {:ok, parsed} <- Sections.parse(text),
+         sections = Parts.join(parsed.sections),
+         units = Units.context(parsed.options, sections, options[:version]),
+         state = Enum.reduce(sections, start(parsed), &section(&1, &2, units)),
+         :ok <- based(state),
+         # What a line itself lacks comes before what lacks because of it.
+         :ok <- Boards.sure(state),
+         {profile, state} = finish(state, options),
+         :ok <- Boards.sure(state) do
+      {:ok, result(state, profile, file, options)}
+    else
+      {:error, {line, why}} -> {:error, "#{file}:#{line}: #{why}"}
+      {:error, why} -> {:error, "#{file}: #{why}"}
+    end
+  end
+
+  defp start(parsed) do
+    left =
+      for({line, name} <- parsed.includes) do
+        {line, "include \"#{name}\"", "other files are not read: import that one, or copy it in"}
+      end ++
+        for {name, line, _value} <- parsed.options, name not in ~w(unit_length unit_angle) do
+          {line, name, "says nothing about the robot"}
+        end
+
+    %{values: [], assumed: [], left: left, seen: []}
+  end
+
+  # Older files have position:0 ( driver "rflex" … ), newer ones driver ( name "rflex" … ).
+  defp section(section, state, units) do
+    name = text_of(section, "name") || text_of(section, "driver")
+
+    kind = if name in Parts.names(), do: :drive, else: Map.get(@drivers, name)
+
+    case {section.type, kind} do
+      {"driver", nil} ->
+        leave(state, section, "driver #{name}", Unsupported.driver(name, names()))
+
+      {type, nil} ->
+        leave(state, section, type, Unsupported.section(type))
+
+      {_type, kind} ->
+        first(kind, name, section, state, units)
+    end
+  end
+
+  # The plain ones first: of two that are as near, these are meant.
+  defp names, do: @drivers |> Map.keys() |> Enum.sort()
+
+  defp text_of(section, name) do
+    case List.keyfind(section.options, name, 0) do
+      {_name, _line, text} when is_binary(text) -> text
+      _none -> nil
+    end
+  end
+
+  defp leave(state, section, what, why),
+    do: %{state | left: [{section.line, what, why} | state.left]}
+
+  defp first(kind, name, section, state, units) do
+    if kind in state.seen do
+      leave(state, section, "driver #{name}", "a robot has one #{kind}; the first was taken")
+    else
+      state = %{state | seen: [kind | state.seen]}
+
+      inner =
+        for inner <- section.sections, do: {inner.line, inner.type, "nothing nests in a driver"}
+
+      options = Enum.reject(section.options, fn {name, _line, _value} -> name in @said end)
+
+      {options, again} = once(options)
+
+      left =
+        for {name, line, _value} <- again, do: {line, name, "is given twice; the first counts"}
+
+      Enum.reduce(options, %{state | left: left ++ inner ++ state.left}, fn {name, line, value},
+                                                                            state ->
+        carry(state, {line, name}, carried(kind, name, value, units, section.options))
+      end)
+    end
+  end
+
+  defp once(options) do
+    first = Enum.uniq_by(options, &elem(&1, 0))
+    {first, options -- first}
+  end
+
+  defp carried(kind, name, value, units, others) do
+    cond do
+      is_binary(value) and not plain?(value) -> {:left, "is no plain text"}
+      kind == :drive -> RFlexOptions.option(name, value, units, others)
+      true -> CameraOptions.option(kind, name, value, units)
+    end
+  end
+
+  # Marks that turn the direction of writing make a file look other than it is.
+  defp plain?(text),
+    do: String.printable?(text) and not (text =~ ~r/[\x{202A}-\x{202E}\x{2066}-\x{2069}]/u)
+
+  defp carry(state, _where, :used), do: state
+
+  defp carry(state, {line, name}, {:ok, values}),
+    do: Player.Defaults.keep(state, line, name, values)
+
+  defp carry(state, {line, name}, {:assumed, values, why}),
+    do:
+      state |> Player.Defaults.keep(line, name, values) |> Player.Defaults.assume(line, name, why)
+
+  defp carry(state, {line, name}, {:left, why}),
+    do: %{state | left: [{line, name, why} | state.left]}
+
+  defp based(state) do
+    cond do
+      :drive in state.seen ->
+        :ok
+
+      state.left == [] ->
+        {:error, "no driver is in it"}
+
+      true ->
+        {:error, "no driver \"rflex\" is in it, so it is no Magellan Pro's and no ATRV mini's"}
+    end
+  end
+
+  defp finish(state, options) do
+    state = Player.Validate.allowed(state, @modules)
+    {profile, state} = Player.Defaults.profile(state, options[:profile])
+    state = state |> Player.Defaults.complete(profile) |> Boards.complete(profile)
+    {profile, coloured(state, options[:colours])}
+  end
+
+  defp result(state, profile, file, options) do
+    id = options[:id] || if(profile == :magellan, do: :mag1, else: :min1)
+
+    %{
+      text: Player.Render.write(state, file, id, profile, @modules),
+      id: id,
+      profile: profile,
+      assumed: Enum.sort(state.assumed),
+      left: Enum.sort(state.left)
+    }
+  end
+
+  # Without colours our camera has nothing to look for.
+  defp coloured(state, read) do
+    file = Player.Defaults.value(state, [:colours, :file])
+
+    cond do
+      file == nil ->
+        blind? = &match?({[kind, _], _, _, _} when kind in [:camera, :colours], &1)
+        Player.Defaults.leave(state, blind?, "a camera needs a driver cmvision with a colorfile")
+
+      read == nil ->
+        state
+
+      true ->
+        looked(state, file, read.(file))
+    end
+  end
+
+  defp looked(state, file, {path, result}) do
+    {_, _, line, option} = List.keyfind(state.values, [:colours, :file], 0)
+
+    values =
+      List.keyreplace(state.values, [:colours, :file], 0, {[:colours, :file], path, line, option})
+
+    state = %{state | values: values}
+
+    case result do
+      {:ok, %{classes: [%{name: first} | _] = classes}} ->
+        if Enum.any?(classes, &(&1.name == "YellowLandmark")),
+          do: state,
+          else:
+            state
+            |> Player.Defaults.assume(
+              line,
+              file,
+              "its first colour, #{first}, is taken for the landmark's"
+            )
+            |> Player.Defaults.keep(line, option, [{[:policies, :colour], first}])
+
+      {:error, why} ->
+        %{
+          state
+          | left: [{line, option, "the colour file is to be put right: #{why}"} | state.left]
+        }
+    end
+  end
+end

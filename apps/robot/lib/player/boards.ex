@@ -1,0 +1,143 @@
+defmodule Player.Boards do
+  @moduledoc """
+  Which of a robot's sonars and infrareds is where, and on which board: what Player's options say of it together.
+  Pure. The state is that of `Player.Defaults`.
+  """
+  alias Hal.Profile
+
+  # What cannot be guessed: which sensor is where. A robot drives by them.
+  @sensors ~w(mmrad_sonar_poses mrad_sonar_poses num_sonars num_sonars_in_bank
+              num_sonars_possible_per_bank poses rflex_banks rflex_base_bank)
+
+  @doc """
+  Whether all that the file says of sonars and infrareds came over. If not, which line did not, and why: a robot
+  whose sensors are elsewhere than it thinks is worse than none.
+  """
+  @spec sure(Player.Defaults.t()) :: :ok | {:error, {line :: pos_integer(), why :: String.t()}}
+  def sure(state) do
+    case Enum.sort(for {_, name, _} = remark <- state.left, name in @sensors, do: remark) do
+      [] -> :ok
+      [{line, name, why} | _more] -> {:error, {line, "#{name}: #{why}"}}
+    end
+  end
+
+  @doc "Boards and poses that go together, for a body of that kind."
+  @spec complete(Player.Defaults.t(), :magellan | :atrv_mini) :: Player.Defaults.t()
+  def complete(state, kind) do
+    body = apply(Profile, kind, [])
+    state |> banked(body) |> ringed(body)
+  end
+
+  # Our profile's sonars are there when the file has no poses.
+  defp banked(state, body) do
+    banks = Player.Defaults.value(state, [:drive, :sonar_banks])
+    sonars = Player.Defaults.value(state, [:body, :sonars])
+    count = length(sonars || body.sonars)
+
+    cond do
+      banks == nil and sonars != nil and rem(count, 8) != 0 ->
+        {_, _, line, _option} = List.keyfind(state.values, [:body, :sonars], 0)
+
+        why = "is not given: taken for boards of 8, #{count} sonars in all"
+        Player.Defaults.assume(state, line, "num_sonars_in_bank", why)
+
+      banks == nil or (sonars != nil and Enum.sum(banks) == count) ->
+        state
+
+      Enum.sum(banks) == count ->
+        {_, _, line, option} = List.keyfind(state.values, [:drive, :sonar_banks], 0)
+
+        Player.Defaults.assume(
+          state,
+          line,
+          option,
+          "no poses are given: those of a #{body.name} are taken"
+        )
+
+      true ->
+        why =
+          "adds up to #{Enum.sum(banks)} sonars, and there are no poses; a #{body.name} has #{count}"
+
+        Player.Defaults.leave(state, &match?({[:drive, :sonar_banks], _, _, _}, &1), why)
+    end
+  end
+
+  # Player's poses are in the order of the reports, unlike those of our profile.
+  defp ringed(state, body) do
+    case Player.Defaults.value(state, [:body, :irs]) do
+      nil ->
+        unplaced(state, Player.Defaults.value(state, [:drive, :ir_banks]), body)
+
+      irs ->
+        state =
+          Player.Defaults.keep(state, 1, "poses", [
+            {[:drive, :ir_order], Enum.to_list(0..(length(irs) - 1))}
+          ])
+
+        state |> boarded(length(irs)) |> calibrated(length(irs))
+    end
+  end
+
+  defp unplaced(state, nil, _body), do: state
+
+  defp unplaced(state, banks, body) do
+    if Enum.sum(banks) == length(body.irs) do
+      {_, _, line, option} = List.keyfind(state.values, [:drive, :ir_banks], 0)
+
+      Player.Defaults.assume(
+        state,
+        line,
+        option,
+        "no poses are given: those of a #{body.name} are taken"
+      )
+    else
+      why = "adds up to #{Enum.sum(banks)} infrareds, and there are no poses of them"
+      Player.Defaults.leave(state, &match?({[:drive, :ir_banks], _, _, _}, &1), why)
+    end
+  end
+
+  defp boarded(state, irs) do
+    banks = Player.Defaults.value(state, [:drive, :ir_banks])
+
+    cond do
+      banks == nil ->
+        Player.Defaults.keep(state, 1, "poses", [{[:drive, :ir_banks], boards(irs)}])
+
+      Enum.sum(banks) == irs ->
+        state
+
+      true ->
+        state
+        |> Player.Defaults.leave(
+          &match?({[:drive, :ir_banks], _, _, _}, &1),
+          "is not for #{irs} infrareds"
+        )
+        |> boarded(irs)
+    end
+  end
+
+  defp boards(irs) when irs <= 8, do: [irs]
+  defp boards(irs), do: [8 | boards(irs - 8)]
+
+  defp calibrated(state, irs) do
+    case Player.Defaults.value(state, [:drive, :conversions, :ir_a]) do
+      as when is_list(as) and length(as) != irs ->
+        calibration? =
+          &match?({[:drive, :conversions, name], _, _, _} when name in [:ir_a, :ir_b], &1)
+
+        Player.Defaults.leave(
+          state,
+          calibration?,
+          "is for #{length(as)} infrareds, not for #{irs}"
+        )
+
+      nil ->
+        {_, _, line, _option} = List.keyfind(state.values, [:body, :irs], 0)
+        why = "is not given, so that no infrared is read"
+        Player.Defaults.assume(state, line, "rflex_ir_calib", why)
+
+      _one_or_as_many ->
+        state
+    end
+  end
+end

@@ -1,0 +1,64 @@
+defmodule Player.Validate do
+  @moduledoc """
+  Leaves out what a robot file cannot say, though Player's file could: each value that came over is held
+  against the table of robot files and against its driver. Pure but for asking which drivers there are.
+  """
+  alias Robot.File.{Check, Device, Schema}
+
+  @least %{drive: [port: "/dev/null"], ptz: [port: "/dev/null"], camera: [source: "/dev/video0"]}
+
+  @doc "The state with only such values as are allowed one by one; `modules` are the drivers by kind."
+  @spec allowed(Player.Defaults.t(), %{atom() => module()}) :: Player.Defaults.t()
+  def allowed(state, modules) do
+    for {path, value, _line, _option} = entry <- state.values,
+        why = refused(path, value, modules),
+        reduce: state do
+      state -> Player.Defaults.leave(state, &(&1 == entry), why)
+    end
+  end
+
+  defp refused([:body | keys], value, _modules) do
+    check = Enum.reduce(keys, Schema.body(), fn key, {:keys, table} -> table[key] end)
+
+    case Check.run(check, tree(value), []) do
+      {:ok, _value} -> nil
+      {:error, [{_line, _path, text} | _more]} -> text
+    end
+  end
+
+  # By itself, and so without what only others of its kind make right.
+  defp refused([kind | path], value, modules) when is_map_key(@least, kind) do
+    options = Keyword.merge(@least[kind], nest(path, plain(value)))
+
+    with true <- Code.ensure_loaded?(modules[kind]),
+         [line | _more] <- Device.refused(modules[kind], options) do
+      line
+    else
+      _well_or_unknown -> nil
+    end
+  end
+
+  defp refused(_path, _value, _modules), do: nil
+
+  # The ends of a time that is put together later are no options; segments go with their count.
+  defp nest([:sonar_times, _name], _us), do: []
+  defp nest([:bumpers, :segments], _segments), do: []
+  defp nest([key], value), do: [{key, value}]
+  defp nest([key | path], value), do: [{key, nest(path, value)}]
+
+  defp tree(list) when is_list(list), do: {1, {:list, Enum.map(list, &tree/1)}}
+  defp tree({:deg, degrees}), do: {1, degrees * :math.pi() / 180}
+
+  defp tree(tuple) when is_tuple(tuple),
+    do: {1, {:tuple, tuple |> Tuple.to_list() |> Enum.map(&tree/1)}}
+
+  defp tree(value), do: {1, value}
+
+  defp plain({:deg, degrees}), do: degrees * :math.pi() / 180
+
+  defp plain(tuple) when is_tuple(tuple),
+    do: tuple |> Tuple.to_list() |> Enum.map(&plain/1) |> List.to_tuple()
+
+  defp plain(list) when is_list(list), do: Enum.map(list, &plain/1)
+  defp plain(value), do: value
+end

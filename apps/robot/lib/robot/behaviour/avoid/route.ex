@@ -1,0 +1,140 @@
+defmodule Robot.Behaviour.Avoid.Route do
+  @moduledoc """
+  The way to a goal round all that stands, and sticking to it: a roomy way rather than a tight one
+  unless it is much longer, and the way chosen before rather than one that is hardly shorter.
+  Without that, a robot before two equally good ways would go to and fro between them. Pure.
+  """
+  alias Hal.Pose
+  alias Robot.Percept
+  alias Robot.Navigation.PathPlanner
+  alias Robot.Behaviour.Avoid.Neighbours
+
+  @enforce_keys [:corners, :goal, :at_ms]
+  defstruct @enforce_keys
+
+  @type t :: %__MODULE__{corners: [Pose.point(), ...], goal: Pose.point(), at_ms: integer()}
+
+  # Metres kept between the bodies: if possible, if need be, at least.
+  @roomy 0.2
+  @tight 0.1
+  @tightest 0.06
+  # A roomy way may be this much longer (metres) than a tight one.
+  @detour 2.0
+  # A new way must be this much shorter than the old one, and is looked for this often.
+  @better 0.5
+  @again_ms 800
+  # A goal that moved farther than this is another one.
+  @same_goal 0.4
+
+  @doc """
+  Where to stand instead of a goal in which something stands that will not move (a dead or
+  holding robot, a disc): the place nearest to us beside it. `nil` where the goal is free.
+  """
+  @spec taken(Pose.point() | nil, Percept.t(), [Neighbours.t()], [PathPlanner.disc()]) ::
+          Pose.point() | nil
+  def taken(nil, _percept, _robots, _discs), do: nil
+
+  def taken(goal, percept, robots, discs) do
+    fixed = for(r <- robots, r.fixed?, do: body(r)) ++ discs
+    own = percept.profile.radius
+
+    Enum.find_value(fixed, fn {x, y, radius} ->
+      limit = own + radius + @tightest
+      distance = Pose.distance(goal, {x, y})
+
+      if distance < limit - 0.02 do
+        # On the side of the goal where it is off the body's middle, else on ours.
+        side = if distance > 0.15, do: goal, else: Pose.point(percept.pose)
+        angle = :math.atan2(elem(side, 1) - y, elem(side, 0) - x)
+        {x + (limit + 0.04) * :math.cos(angle), y + (limit + 0.04) * :math.sin(angle)}
+      end
+    end)
+  end
+
+  @doc "The corners still ahead, the goal last; where there is no way, the straight one."
+  @spec round(t() | nil, Pose.point(), Percept.t(), [Neighbours.t()], [PathPlanner.disc()]) :: t()
+  def round(old, goal, percept, robots, discs) do
+    from = Pose.point(percept.pose)
+    own = percept.profile.radius
+    bodies = fn fixed? -> for r <- robots, r.standing?, r.fixed? or not fixed?, do: body(r) end
+    grown = fn list, margin -> Enum.map(list, &grow(&1, own, margin, from, goal)) end
+    all = bodies.(false) ++ discs
+    kept = keep(old, goal, from, grown.(all, @tightest))
+
+    if kept != nil and percept.at_ms - kept.at_ms < @again_ms do
+      kept
+    else
+      corners =
+        roomy(from, goal, grown.(all, @roomy), fn ->
+          PathPlanner.way(from, goal, grown.(all, @tight))
+        end) ||
+          PathPlanner.way(from, goal, grown.(all, @tightest)) ||
+          PathPlanner.way(from, goal, grown.(bodies.(true) ++ discs, @tight)) || [goal]
+
+      better(kept, %__MODULE__{corners: corners, goal: goal, at_ms: percept.at_ms}, from)
+    end
+  end
+
+  defp body(%{at: {x, y}, radius: radius}), do: {x, y, radius}
+
+  defp better(nil, new, _from), do: new
+
+  defp better(kept, new, from) do
+    if left(kept, from) > left(new, from) + @better, do: new, else: %{kept | at_ms: new.at_ms}
+  end
+
+  @doc "How far it is along the way (metres)."
+  @spec left(t(), Pose.point()) :: float()
+  def left(%__MODULE__{corners: corners}, from), do: length_of(corners, from)
+
+  # The old way from here, as far as it is still free: a corner is behind when the next one is in view.
+  defp keep(nil, _goal, _from, _discs), do: nil
+
+  defp keep(old, goal, from, discs) do
+    if Pose.distance(old.goal, goal) < @same_goal do
+      corners = List.replace_at(old.corners, -1, goal)
+      corners = prune(corners, from, discs)
+      if free?(corners, from, discs), do: %{old | corners: corners}
+    end
+  end
+
+  defp prune([_ | [next | _] = rest] = corners, from, discs) do
+    if PathPlanner.blocker(from, next, discs) == nil, do: prune(rest, from, discs), else: corners
+  end
+
+  defp prune(corners, _from, _discs), do: corners
+
+  defp free?([], _from, _discs), do: true
+
+  defp free?([place | rest], from, discs),
+    do: PathPlanner.blocker(from, place, discs) == nil and free?(rest, place, discs)
+
+  # A body by its margin larger, unless we or our goal are nearer than that: then as large as may be.
+  defp grow({x, y, radius}, own, margin, from, goal) do
+    tight = own + radius + min(margin, @tightest)
+    room = min(Pose.distance(from, {x, y}), Pose.distance(goal, {x, y})) - 0.01
+    {x, y, (own + radius + margin) |> min(room) |> max(min(tight, room))}
+  end
+
+  defp roomy(from, goal, discs, tight) do
+    way = PathPlanner.way(from, goal, discs)
+
+    cond do
+      way == nil -> tight.()
+      length_of(way, from) < Pose.distance(from, goal) + @detour -> way
+      true -> Enum.min_by([{way, 0.0}, {tight.(), @detour}], &cost(&1, from)) |> elem(0)
+    end
+  end
+
+  defp cost({nil, _}, _from), do: 1.0e9
+  defp cost({way, extra}, from), do: length_of(way, from) + extra
+
+  defp length_of(way, from) do
+    {length, _} =
+      Enum.reduce(way, {0.0, from}, fn place, {length, from} ->
+        {length + Pose.distance(from, place), place}
+      end)
+
+    length
+  end
+end

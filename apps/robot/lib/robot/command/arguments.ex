@@ -1,0 +1,105 @@
+defmodule Robot.Command.Arguments do
+  @moduledoc """
+  The words a command is made of: numbers, names of robots and colours, and the nearest known word
+  to one mistyped. Pure; nothing read ever becomes an atom.
+  """
+
+  # Farther than this is no place, speed or size of ours.
+  @greatest 1.0e6
+
+  @doc """
+  The value of an argument, or what is allowed for it.
+
+      iex> Robot.Command.Arguments.value(:x, "1e3", [])
+      {:ok, 1000.0}
+      iex> Robot.Command.Arguments.value(:x, "1,5", [])
+      {:error, "a number is allowed, as in 2, -0.5 or 1.0e-3"}
+      iex> Robot.Command.Arguments.value(:name, "mag9", [:mag1, :mag2])
+      {:error, "one of mag1, mag2 is allowed"}
+  """
+  @spec value(atom(), String.t(), [atom()]) :: {:ok, term()} | {:error, String.t()}
+  def value(:name, text, known) do
+    case Enum.find(known, &(Atom.to_string(&1) == text)) do
+      nil -> {:error, names(known)}
+      id -> {:ok, id}
+    end
+  end
+
+  def value(:colour, "", _known), do: {:error, "a colour's name is allowed"}
+  def value(:colour, text, _known), do: {:ok, text}
+  def value(:found, "0", _known), do: {:ok, false}
+  def value(:found, "1", _known), do: {:ok, true}
+  def value(:found, _text, _known), do: {:error, "0 or 1 is allowed"}
+
+  def value(:size, text, _known) do
+    case number(text) do
+      {:ok, size} when size < 0 -> {:error, "a number from 0 is allowed"}
+      other -> other
+    end
+  end
+
+  def value(_name, text, _known), do: number(text)
+
+  defp names([]), do: "no robot is known"
+  defp names(known), do: "one of #{Enum.map_join(known, ", ", &Atom.to_string/1)} is allowed"
+
+  defp number(text) do
+    if Regex.match?(pattern(), text),
+      do: text |> float() |> in_range(),
+      else: {:error, "a number is allowed, as in 2, -0.5 or 1.0e-3"}
+  end
+
+  # A point whatever the locale; no sign of infinity, no words.
+  defp pattern, do: ~r/\A[+-]?(\d{1,20}(\.\d{0,20})?|\.\d{1,20})([eE][+-]?\d{1,3})?\z/
+
+  # Erlang wants digits on both sides of the point, and refuses what overflows by raising.
+  defp float(text) do
+    {mantissa, exponent} =
+      case String.split(String.downcase(text), "e") do
+        [mantissa] -> {mantissa, 0}
+        [mantissa, exponent] -> {mantissa, String.to_integer(exponent)}
+      end
+
+    {sign, digits} =
+      case mantissa do
+        "-" <> digits -> {"-", digits}
+        "+" <> digits -> {"", digits}
+        digits -> {"", digits}
+      end
+
+    [whole | part] = String.split(digits, ".")
+    whole = if whole == "", do: "0", else: whole
+    part = if part in [[], [""]], do: "0", else: hd(part)
+
+    # Beyond these exponents the number is out of range, or nothing, whatever its digits.
+    cond do
+      exponent > 40 -> if String.match?(digits, ~r/[1-9]/), do: :too_large, else: 0.0
+      exponent < -60 -> 0.0
+      true -> String.to_float("#{sign}#{whole}.#{part}e#{exponent}")
+    end
+  end
+
+  defp in_range(number) when is_float(number) and abs(number) <= @greatest, do: {:ok, number}
+  defp in_range(_number), do: {:error, "a number from -1000000 to 1000000 is allowed"}
+
+  @doc """
+  The word most like this one, if any is rather like it.
+
+      iex> Robot.Command.Arguments.nearest("fidnblob", ["findblob", "goto"])
+      "findblob"
+      iex> Robot.Command.Arguments.nearest("xyz", ["findblob", "goto"])
+      nil
+      iex> Robot.Command.Arguments.nearest(<<"got", 0xFF>>, ["findblob", "goto"])
+      nil
+  """
+  @spec nearest(String.t(), [String.t()]) :: String.t() | nil
+  def nearest(word, words) do
+    # Newer Elixirs do not compare what is not text.
+    words = if String.valid?(word), do: words, else: []
+
+    case words |> Enum.map(&{String.jaro_distance(word, &1), &1}) |> Enum.max(fn -> nil end) do
+      {likeness, near} when likeness > 0.7 -> near
+      _ -> nil
+    end
+  end
+end

@@ -1,0 +1,31 @@
+defmodule Robot.Control.Arbiter do
+  @moduledoc """
+  Chooses among wishes (R88): the heaviest wins. The behaviour that won last has a tenth more
+  weight, so that two of nearly equal weight do not alternate; among equals the first in the list
+  wins. Pure.
+  """
+  alias Robot.Wish
+
+  @stubbornness 1.1
+
+  @doc """
+  The winning wish, or `nil` where nobody wishes anything.
+
+      iex> wish = fn by, weight -> Robot.Wish.new(by, Hal.Twist.zero(), weight) end
+      iex> Robot.Control.Arbiter.choose([wish.(:rest, 0.1), wish.(:goto, 0.5), nil], nil).by
+      :goto
+      iex> Robot.Control.Arbiter.choose([wish.(:goto, 0.5), wish.(:move, 0.52)], :goto).by
+      :goto
+      iex> Robot.Control.Arbiter.choose([], :goto)
+      nil
+  """
+  @spec choose([Wish.t() | nil], last_by :: atom()) :: Wish.t() | nil
+  def choose(wishes, last_by) do
+    wishes
+    |> Enum.reject(&is_nil/1)
+    |> Enum.max_by(&weight(&1, last_by), &>=/2, fn -> nil end)
+  end
+
+  defp weight(%Wish{by: by, weight: weight}, by), do: weight * @stubbornness
+  defp weight(%Wish{weight: weight}, _last_by), do: weight
+end

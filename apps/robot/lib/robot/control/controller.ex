@@ -1,0 +1,120 @@
+defmodule Robot.Control.Controller do
+  @moduledoc """
+  One whole tick of a robot's thinking as a function: the present goal, wrapped in
+  `Robot.Behaviour.Avoid`, the escape from whatever was touched, and rest all wish; the arbiter
+  chooses. Pure.
+
+  A goal carries a tag. Setting a goal with the tag it already has changes the options of the
+  running behaviour (a target that moves); another tag starts afresh. A goal that has ended
+  stays ended until another tag comes.
+
+  Besides its behaviour's own options a goal takes `discs: [{x, y, radius}]`: standing things to go
+  round, in the map frame, metres.
+  """
+  alias Hal.Profile
+  alias Robot.{Behaviour, Localiser, Percept, Wish}
+  alias Robot.Control.Arbiter
+  alias Robot.Behaviour.{Avoid, Escape, Rest}
+
+  @enforce_keys [:profile, :escape, :rest]
+  defstruct @enforce_keys ++
+              [tag: nil, module: nil, goal: nil, last_by: nil, localiser: nil, percept: nil]
+
+  @type t :: %__MODULE__{
+          profile: Profile.t(),
+          escape: Behaviour.t(),
+          rest: Behaviour.t(),
+          tag: term(),
+          module: module() | nil,
+          goal: Behaviour.t() | nil,
+          last_by: atom(),
+          localiser: Localiser.t() | nil,
+          percept: Percept.t() | nil
+        }
+
+  @doc """
+  A mind without a goal. Options: `profile` (required), and `start`, the pose in the map frame at
+  which the odometry says zero; with it the mind keeps the percept's pose by `Robot.Localiser`.
+  """
+  @spec new(keyword()) :: t()
+  def new(options) do
+    options = Keyword.validate!(options, [:profile, start: nil])
+
+    case options[:profile] do
+      %Profile{} = profile ->
+        %__MODULE__{
+          profile: profile,
+          escape: Escape.new([]),
+          rest: Rest.new([]),
+          localiser: options[:start] && Localiser.new(options[:start])
+        }
+
+      other ->
+        raise ArgumentError,
+              "option profile cannot be #{inspect(other)}: a %Hal.Profile{} is allowed"
+    end
+  end
+
+  @doc "Sets, changes or (with `nil`) drops the goal."
+  @spec goal(t(), tag :: term(), {module(), keyword()} | nil) :: t()
+  def goal(%__MODULE__{} = mind, _tag, nil), do: %{mind | tag: nil, module: nil, goal: nil}
+
+  def goal(%__MODULE__{tag: tag, module: module, goal: nil} = mind, tag, {module, _options}),
+    do: mind
+
+  def goal(%__MODULE__{tag: tag, module: module} = mind, tag, {module, options}),
+    do: %{mind | goal: Behaviour.update(mind.goal, options)}
+
+  def goal(%__MODULE__{} = mind, tag, {module, options}) do
+    {discs, options} = Keyword.pop(options, :discs, [])
+    goal = Avoid.new(inner: module.new(options), discs: discs)
+    %{mind | tag: tag, module: module, goal: goal}
+  end
+
+  @doc "References for the estimate of the pose, from now on."
+  @spec anchors(t(), Localiser.Anchors.t()) :: t()
+  def anchors(%__MODULE__{localiser: nil} = mind, _anchors), do: mind
+
+  def anchors(%__MODULE__{} = mind, anchors),
+    do: %{mind | localiser: Localiser.anchors(mind.localiser, anchors)}
+
+  @doc "The percept of the last tick, with the pose that the mind made of it."
+  @spec percept(t()) :: Percept.t() | nil
+  def percept(%__MODULE__{percept: percept}), do: percept
+
+  @doc "Why the robot stands though nobody told it to, in one line for people; `nil` where it does not."
+  @spec fault(t()) :: String.t() | nil
+  def fault(%__MODULE__{escape: {Escape, state}}), do: Escape.fault(state)
+
+  @doc """
+  One tick: the chosen wish (its `by` says whose), and the goal's outcome at the tick it ends.
+  """
+  @spec tick(t(), Percept.t()) :: {Wish.t(), {tag :: term(), integer()} | nil, t()}
+  def tick(%__MODULE__{} = mind, %Percept{} = percept) do
+    {percept, mind} = locate(mind, percept)
+    {escaping, escape, nil} = run(mind.escape, percept)
+    {resting, rest, nil} = run(mind.rest, percept)
+    {wanted, goal, outcome} = run(mind.goal, percept)
+
+    wish = Arbiter.choose([escaping, wanted, resting], mind.last_by)
+    wish = if wish.look == nil and wanted != nil, do: %{wish | look: wanted.look}, else: wish
+    mind = %{mind | escape: escape, rest: rest, goal: goal, last_by: wish.by}
+    {wish, outcome && {mind.tag, outcome}, mind}
+  end
+
+  defp locate(%{localiser: nil} = mind, percept), do: {percept, %{mind | percept: percept}}
+
+  defp locate(mind, percept) do
+    {percept, localiser} = Localiser.update(mind.localiser, percept)
+    {percept, %{mind | localiser: localiser, percept: percept}}
+  end
+
+  defp run(nil, _percept), do: {nil, nil, nil}
+
+  defp run(behaviour, percept) do
+    case Behaviour.tick(behaviour, percept) do
+      {:running, wish, behaviour} -> {wish, behaviour, nil}
+      {:done, outcome, wish} -> {wish, nil, outcome}
+    end
+  end
+end

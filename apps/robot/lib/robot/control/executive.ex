@@ -1,0 +1,210 @@
+defmodule Robot.Control.Executive do
+  @moduledoc """
+  Ten times a second: reads the board once, lets `Robot.Control.Controller` think, hands its wish to the gate
+  and the percept to the pilot. It never calls anyone, so nobody can hold it up; whatever takes
+  long (vision, planning) is a process of its own that writes to the board.
+
+  A behaviour that hangs holds up all of it. `Robot.Safety.LivenessMonitor` sees that, and ends it.
+
+  It starts idle: goals live here, and are gone when it falls. The first that it does is to have the gate
+  forget what the one before it wished.
+  """
+  use GenServer
+  alias Hal.{Device, Event}
+  alias Robot.{Behaviour, Board, Config, Names, Percept}
+  alias Robot.Control.{Controller, Trace}
+  alias Robot.Safety.{DryRun, Gate}
+  alias Robot.Localiser.Anchors
+
+  @period_ms 100
+  @slow_us 50_000
+
+  @doc """
+  Starts the executive of a robot. It knows nobody above: what it perceived goes, as `{:tick, percept}`,
+  and what came of a goal, as `{:outcome, tag, integer}`, to the sink: `apply(m, f, a ++ [event])`.
+  """
+  @spec start_link({Config.t(), sink :: Config.call()}) :: GenServer.on_start()
+  def start_link({%Config{} = config, {_m, _f, _a} = sink}),
+    do: GenServer.start_link(__MODULE__, {config, sink}, name: Names.via(config.id, :executive))
+
+  @doc """
+  Sets, changes or (`nil`) drops the goal, as in `Robot.Control.Controller.goal/3`. Refused, in a line, where no such robot
+  runs on this node, and a goal that is no behaviour, or none with these options.
+  """
+  @spec goal(robot :: atom(), tag :: term(), {module(), keyword()} | nil) ::
+          :ok | {:error, line :: String.t()}
+  def goal(robot, tag, goal) do
+    with :ok <- Behaviour.check(goal) do
+      if Names.whereis(robot, :executive),
+        do: set(robot, tag, goal),
+        else: {:error, "no robot #{inspect(robot)} runs on this node"}
+    end
+  end
+
+  @doc "The same for the pilot, which has checked the goal, and lives no longer than the executive."
+  @spec set(robot :: atom(), tag :: term(), {module(), keyword()} | nil) :: :ok
+  def set(robot, tag, goal), do: cast(robot, {:goal, tag, goal})
+
+  @doc """
+  Applies `then` as soon as all that was said to the executive before is taken in: whoever waits for that
+  hears nothing from one that hangs.
+  """
+  @spec confirm(robot :: atom(), then :: Config.call()) :: :ok
+  def confirm(robot, {_m, _f, _a} = then), do: cast(robot, {:confirm, then})
+
+  @doc """
+  Drops the goal and all else that the mission said, and has the gate forget the wish behind them, after
+  every wish from before; then the gate applies `then`.
+  """
+  @spec stand(robot :: atom(), then :: Config.call() | nil) :: :ok
+  def stand(robot, then \\ nil), do: cast(robot, {:stand, then})
+
+  @doc "Sets the references that the estimate of the pose is corrected by."
+  @spec anchors(robot :: atom(), Anchors.t()) :: :ok
+  def anchors(robot, anchors), do: cast(robot, {:anchors, anchors})
+
+  @doc "Where the camera looks while no behaviour cares; `nil` leaves it where it is."
+  @spec look(robot :: atom(), pan :: float() | nil) :: :ok
+  def look(robot, pan), do: cast(robot, {:look, pan})
+
+  defp cast(robot, message), do: GenServer.cast(Names.via(robot, :executive), message)
+
+  @impl GenServer
+  def init({%Config{id: id} = config, sink}) do
+    Gate.forget(id)
+    board = Board.find!(id)
+    at_ms = Config.now(config)
+    doing = %{by: :idle, weight: 0.0, outcome: nil, fault: nil, tick: 0}
+    Board.put(board, :executive, :doing, doing, at_ms)
+    Board.put(board, :executive, :goal, nil, at_ms)
+    Event.execute([:robot, :executive, :start], %{at_ms: at_ms}, %{robot: id})
+
+    s = %{
+      config: config,
+      board: board,
+      sink: sink,
+      mind: Controller.new(profile: config.profile, start: config.start),
+      look: nil,
+      behaviour_looks?: false,
+      told: nil,
+      tick: 0,
+      next: System.monotonic_time(:millisecond)
+    }
+
+    {:ok, schedule(s)}
+  end
+
+  @impl GenServer
+  def handle_cast({:goal, tag, goal} = input, s) do
+    Trace.input(s.config, :executive, input, Config.now(s.config))
+    {:noreply, pursue(s, Controller.goal(s.mind, tag, goal))}
+  end
+
+  def handle_cast({:confirm, {m, f, a}}, s) do
+    apply(m, f, a)
+    {:noreply, s}
+  end
+
+  def handle_cast({:stand, then}, s) do
+    Trace.input(s.config, :executive, :stand, Config.now(s.config))
+    Gate.forget(s.config.id, then)
+    mind = s.mind |> Controller.goal(:idle, nil) |> Controller.anchors(%Anchors{})
+    {:noreply, pursue(%{s | look: nil}, mind)}
+  end
+
+  def handle_cast({:anchors, anchors} = input, s) do
+    Trace.input(s.config, :executive, input, Config.now(s.config))
+    {:noreply, %{s | mind: Controller.anchors(s.mind, anchors)}}
+  end
+
+  def handle_cast({:look, pan} = input, s) do
+    at_ms = Config.now(s.config)
+    Trace.input(s.config, :executive, input, at_ms)
+    # The mission looks by the percept of this tick: its word is not for the next one.
+    s = if s.behaviour_looks? or pan == s.look, do: s, else: look(s, pan, at_ms)
+    {:noreply, %{s | look: pan}}
+  end
+
+  @impl GenServer
+  def handle_info(:tick, s) do
+    begun = System.monotonic_time(:microsecond)
+    s = tick(s, Config.now(s.config))
+    took = System.monotonic_time(:microsecond) - begun
+
+    if took > @slow_us do
+      measured = %{at_ms: Config.now(s.config), duration_ms: div(took, 1_000)}
+      Event.execute([:robot, :executive, :slow], measured, %{robot: s.config.id})
+    end
+
+    {:noreply, schedule(s)}
+  end
+
+  def handle_info(_other, s), do: {:noreply, s}
+
+  # Written down before its first tick, which may be its last.
+  defp pursue(%{mind: %{module: module}} = s, %{module: module} = mind), do: %{s | mind: mind}
+
+  defp pursue(s, mind) do
+    Board.put(s.board, :executive, :goal, mind.module, Config.now(s.config))
+    %{s | mind: mind}
+  end
+
+  defp tick(%{config: config, board: board} = s, at_ms) do
+    raw = Percept.Snapshot.take(board, config.profile, at_ms)
+    Trace.input(config, :executive, {:tick, raw}, at_ms)
+    {wish, outcome, mind} = Controller.tick(s.mind, raw)
+    percept = Controller.percept(mind)
+
+    Gate.wish(config.id, wish.twist)
+    Trace.effect(config, :executive, {:wish, wish}, at_ms)
+    s = look(s, wish.look || s.look, at_ms)
+
+    fault = fault(s, Controller.fault(mind), at_ms)
+    doing = %{by: wish.by, weight: wish.weight, outcome: outcome, fault: fault, tick: s.tick + 1}
+    Board.put(board, :executive, :doing, doing, at_ms)
+    if percept.pose, do: place(board, percept, at_ms)
+
+    # The outcome first: the mission knows what came of its goal when it sees the next percept.
+    with {tag, outcome} <- outcome, do: tell(s, {:outcome, tag, outcome}, at_ms)
+    tell(s, {:tick, percept}, at_ms)
+    %{s | mind: mind, tick: doing.tick, behaviour_looks?: wish.look != nil}
+  end
+
+  defp place(board, %{pose: pose, uncertainty: uncertainty}, at_ms) do
+    Board.put(board, :executive, :pose, pose, at_ms)
+    Board.put(board, :executive, :uncertainty, uncertainty, at_ms)
+  end
+
+  # Told when it changes.
+  defp fault(s, line, at_ms) do
+    if line != Controller.fault(s.mind),
+      do: Event.execute([:robot, :fault], %{at_ms: at_ms}, %{robot: s.config.id, line: line})
+
+    line
+  end
+
+  defp look(%{config: %{ptz: ptz}} = s, pan, _at_ms) when pan == nil or ptz == nil, do: s
+
+  defp look(%{config: %{dry_run: true}} = s, pan, at_ms),
+    do: %{s | told: DryRun.tell(s.config.id, {:look, pan}, s.told, at_ms)}
+
+  defp look(%{config: config} = s, pan, at_ms) do
+    Device.look(Names.via(config.id, :ptz), pan, 0.0)
+    Trace.effect(config, :executive, {:look, pan}, at_ms)
+    s
+  end
+
+  defp tell(%{sink: {m, f, a}} = s, event, at_ms) do
+    apply(m, f, a ++ [event])
+    Trace.effect(s.config, :executive, event, at_ms)
+  end
+
+  # At absolute times, so that the pace does not drift; ticks that were missed are not made up for.
+  defp schedule(%{config: %{pace: :manual}} = s), do: s
+
+  defp schedule(s) do
+    next = max(s.next + @period_ms, System.monotonic_time(:millisecond))
+    Process.send_after(self(), :tick, next, abs: true)
+    %{s | next: next}
+  end
+end

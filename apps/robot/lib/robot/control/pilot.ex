@@ -1,0 +1,274 @@
+defmodule Robot.Control.Pilot do
+  @moduledoc """
+  Runs one robot's mission. A `gen_statem` whose state is `:idle` or `{mission, phase}`, so that
+  `:sys.get_state/1` shows what the robot is up to. It carries the mission's effects out and
+  decides nothing.
+
+  It starts idle, and tells the executive so: after a failure in the mission the robot stands
+  until a person starts it again.
+
+  A stop is not the mission's to interpret. The pilot takes the mission out of command, whatever it is
+  at, and the stop goes on to the executive, which drops its goal, and from there to the gate, after
+  every older wish. Only the gate says that it is done.
+
+  The mission's callbacks are somebody else's code. While one is called, the board says so under `:asking`, so that
+  `Robot.Safety.LivenessMonitor` sees one that never returns, and ends the pilot.
+
+  Where a person arms the wheels (`arm: :manual`), every change of that ends what the robot is at: when they
+  are disarmed or lost, and when they are armed again, which is never the start of a motion.
+
+  | effect | goes to |
+  |---|---|
+  | `{:goal, tag, goal}`, `{:anchors, anchors}`, `{:look, pan}` | the executive |
+  | `{:send, to, message}` | the config's `:send`; lost without one |
+  | `{:claim, map}` | the board, under `:mission`, for the heartbeat to carry |
+  | `{:stage, name, map}` | the event `[:robot, :stage]` |
+  """
+  @behaviour :gen_statem
+  alias Hal.Event
+  alias Robot.{Behaviour, Board, Config, Names}
+  alias Robot.Control.{Executive, Trace}
+  alias Robot.Localiser.Anchors
+
+  # On a busy machine a pilot is slow, not gone.
+  @call_ms 5_000
+
+  @doc "A child of the robot's supervisor."
+  @spec child_spec(Config.t()) :: Supervisor.child_spec()
+  def child_spec(config), do: %{id: __MODULE__, start: {__MODULE__, :start_link, [config]}}
+
+  @doc "Starts the pilot of a robot."
+  @spec start_link(Config.t()) :: :gen_statem.start_ret()
+  def start_link(%Config{} = config),
+    do: :gen_statem.start_link(Names.via(config.id, :pilot), __MODULE__, config, [])
+
+  @doc "Starts the mission of the robot's config, in place of a running one."
+  @spec start(robot :: atom()) :: :ok | {:error, :no_mission}
+  def start(robot), do: call(robot, :start)
+
+  @doc "Starts a mission, in place of a running one."
+  @spec start(robot :: atom(), module(), keyword()) :: :ok | {:error, :no_mission}
+  def start(robot, module, options), do: call(robot, {:start, module, options})
+
+  @doc "Ends the mission. When this returns, the gate has been told to stand, and no older wish follows."
+  @spec stop(robot :: atom()) :: :ok
+  def stop(robot), do: call(robot, :stop)
+
+  @doc """
+  The same for those who must not wait. Once it is done, `then` is applied; never, where the pilot, the
+  executive or the gate hangs or falls meanwhile.
+  """
+  @spec halt(robot :: atom(), then :: Config.call() | nil) :: :ok
+  def halt(robot, then \\ nil),
+    do: :gen_statem.cast(Names.via(robot, :pilot), {:halt, then})
+
+  @doc """
+  Takes up the mission that the last stop has ended, from its beginning, with what people had asked of it
+  (`c:Robot.Mission.halted/1`). `{:error, :idle}` where there is nothing to take up.
+  """
+  @spec resume(robot :: atom()) :: :ok | {:error, :idle}
+  def resume(robot), do: call(robot, :resume)
+
+  @doc "Hands a command to the mission. `:ok` means that it has it, not that it is done."
+  @spec command(robot :: atom(), command :: term()) :: :ok | {:error, :idle}
+  def command(robot, command), do: call(robot, {:command, command})
+
+  @doc """
+  An event of `Robot.Mission`: a tick or an outcome from the executive, a message from another robot,
+  checked by whoever heard it. Of several ticks that wait, only the newest is handled.
+  """
+  @spec hear(robot :: atom(), Robot.Mission.event()) :: :ok
+  def hear(robot, event), do: :gen_statem.cast(Names.via(robot, :pilot), event)
+
+  @doc "A sink for the drive: that the wheels may turn, or may no longer, is the pilot's affair, too."
+  @spec sense(robot :: atom(), reading :: tuple()) :: :ok
+  def sense(robot, {:arming, %{state: state}}),
+    do: :gen_statem.cast(Names.via(robot, :pilot), {:arming, state})
+
+  def sense(_robot, _reading), do: :ok
+
+  defp call(robot, request), do: :gen_statem.call(Names.via(robot, :pilot), request, @call_ms)
+
+  @impl :gen_statem
+  def callback_mode, do: :handle_event_function
+
+  @impl :gen_statem
+  def init(%Config{} = config) do
+    data = %{
+      config: config,
+      board: Board.find!(config.id),
+      mission: nil,
+      claim: %{},
+      halted: nil,
+      since_ms: Config.now(config)
+    }
+
+    # The pilot before this one may have ended within its mission, and the executive may still follow a goal of it.
+    Board.delete(data.board, :pilot, :asking)
+    rest(data)
+    {:ok, :idle, told(:idle, data)}
+  end
+
+  @impl :gen_statem
+  def handle_event({:call, from}, :start, _state, %{config: %{mission: nil}}),
+    do: {:keep_state_and_data, [{:reply, from, {:error, :no_mission}}]}
+
+  def handle_event({:call, from}, :start, state, %{config: %{mission: {module, options}}} = data),
+    do: handle_event({:call, from}, {:start, module, options}, state, data)
+
+  def handle_event({:call, from}, {:start, module, options} = input, state, data) do
+    if Code.ensure_loaded?(module) and function_exported?(module, :init, 2) do
+      heard(input, data)
+      rest(data)
+      result = asking(module, :init, [data.config.id, options], data)
+      data = %{data | claim: %{}, halted: nil}
+      follow(result, module, state, data, [{:reply, from, :ok}])
+    else
+      {:keep_state_and_data, [{:reply, from, {:error, :no_mission}}]}
+    end
+  end
+
+  def handle_event({:call, from}, :stop, state, data),
+    do: halt(state, {:gen_statem, :reply, [from, :ok]}, data)
+
+  def handle_event(:cast, {:halt, then}, state, data), do: halt(state, then, data)
+
+  def handle_event(:cast, {:arming, _state}, state, %{config: config} = data) do
+    if config.arm == :manual and not config.dry_run,
+      do: halt(state, nil, data),
+      else: :keep_state_and_data
+  end
+
+  def handle_event({:call, from}, :resume, :idle, %{halted: {module, mission}} = data) do
+    data = %{data | mission: mission, halted: nil}
+    result = handle({:command, :start}, module, data)
+    follow(result, module, :idle, data, [{:reply, from, :ok}])
+  end
+
+  def handle_event({:call, from}, :resume, _state, _data),
+    do: {:keep_state_and_data, [{:reply, from, {:error, :idle}}]}
+
+  def handle_event({:call, from}, {:command, _command}, :idle, _data),
+    do: {:keep_state_and_data, [{:reply, from, {:error, :idle}}]}
+
+  def handle_event({:call, from}, {:command, _command} = event, {module, _} = state, data),
+    do: follow(handle(event, module, data), module, state, data, [{:reply, from, :ok}])
+
+  def handle_event(:cast, _event, :idle, _data), do: :keep_state_and_data
+
+  def handle_event(:cast, event, {module, _phase} = state, data),
+    do: event |> newest() |> handle(module, data) |> follow(module, state, data, [])
+
+  def handle_event(:info, _unknown, _state, _data), do: :keep_state_and_data
+
+  # Whoever is answered finds the robot idle. The mission is asked last: it has no say in this.
+  defp halt(state, then, data) do
+    heard(:stop, data)
+    data = changed(state, :idle, %{data | claim: %{}})
+    Executive.stand(data.config.id, then)
+    {:next_state, :idle, %{data | halted: halted(state, data), mission: nil}}
+  end
+
+  defp halted(:idle, data), do: data.halted
+
+  defp halted({module, _phase}, data) do
+    left =
+      if function_exported?(module, :halted, 1),
+        do: asking(module, :halted, [data.mission], data)
+
+    if left != nil, do: {module, left}
+  end
+
+  # Percepts that came in meanwhile are further down in our own mailbox.
+  defp newest({:tick, _percept} = tick) do
+    receive do
+      {:"$gen_cast", {:tick, _newer} = newer} -> newest(newer)
+    after
+      0 -> tick
+    end
+  end
+
+  defp newest(event), do: event
+
+  defp handle(event, module, data) do
+    heard(event, data)
+    asking(module, :handle, [event, data.mission], data)
+  end
+
+  # No two calls are noted alike.
+  defp asking(module, callback, arguments, %{board: board, config: config}) do
+    call = {module, System.unique_integer()}
+    Board.put(board, :pilot, :asking, call, Config.now(config))
+    result = apply(module, callback, arguments)
+    Board.delete(board, :pilot, :asking)
+    result
+  end
+
+  defp follow({phase, mission, effects}, module, state, data, replies) do
+    data = Enum.reduce(effects, %{data | mission: mission}, &carry_out/2)
+    {:next_state, {module, phase}, changed(state, {module, phase}, data), replies}
+  end
+
+  defp carry_out(effect, data) do
+    Trace.effect(data.config, :pilot, effect, Config.now(data.config))
+    carry_out(effect, data.config, data)
+  end
+
+  defp carry_out({:goal, tag, goal}, config, data) do
+    # A wrong one is the mission's fault, which falls with it, and not the executive's.
+    with {:error, line} <- Behaviour.check(goal), do: raise(ArgumentError, line)
+    Executive.set(config.id, tag, goal)
+    data
+  end
+
+  defp carry_out({:anchors, anchors}, config, data) do
+    Executive.anchors(config.id, anchors)
+    data
+  end
+
+  defp carry_out({:look, pan}, config, data) do
+    Executive.look(config.id, pan)
+    data
+  end
+
+  defp carry_out({:send, _to, _message}, %{send: nil}, data), do: data
+
+  defp carry_out({:send, to, message}, %{send: {m, f, a}}, data) do
+    apply(m, f, a ++ [to, message])
+    data
+  end
+
+  defp carry_out({:claim, claim}, _config, data), do: %{data | claim: claim}
+
+  defp carry_out({:stage, stage, about}, config, data) do
+    about = Map.merge(%{robot: config.id, stage: stage}, about)
+    Event.execute([:robot, :stage], %{at_ms: Config.now(config)}, about)
+    data
+  end
+
+  defp rest(%{config: %{id: id}}) do
+    Executive.set(id, :idle, nil)
+    Executive.anchors(id, %Anchors{})
+    Executive.look(id, nil)
+  end
+
+  defp heard(input, data), do: Trace.input(data.config, :pilot, input, Config.now(data.config))
+
+  defp changed(state, state, data), do: written(state, data)
+  defp changed(_before, state, data), do: told(state, %{data | since_ms: Config.now(data.config)})
+
+  defp told(state, data) do
+    data = written(state, data)
+    at_ms = data.since_ms
+    Trace.effect(data.config, :pilot, {:phase, state}, at_ms)
+    about = %{robot: data.config.id, state: state}
+    Event.execute([:robot, :pilot, :phase], %{at_ms: at_ms}, about)
+    data
+  end
+
+  defp written(state, data) do
+    entry = %{state: state, claim: data.claim, since_ms: data.since_ms}
+    Board.put(data.board, :pilot, :mission, entry, Config.now(data.config))
+    data
+  end
+end

@@ -1,0 +1,76 @@
+defmodule Robot.File.CrossChecks do
+  @moduledoc "What the keys of a robot file must be to each other, and no single key can know. Pure."
+  alias Robot.File.{Check, Device, Schema}
+
+  @doc "All that does not fit: the keys it is about, and what is wrong; `file` is the file's path."
+  @spec problems(Robot.File.t(), Path.t()) :: [{[String.t(), ...], String.t()}]
+  def problems(robot, file) do
+    Enum.reject(
+      [
+        named(robot, file),
+        seen(robot),
+        kept(robot),
+        majority(robot.policies),
+        colour(robot) | limits(robot) ++ driven(robot)
+      ],
+      &(&1 == nil)
+    )
+  end
+
+  # A file that was copied for another robot and not changed would make two of one name.
+  defp named(robot, file) do
+    name = Path.basename(file, ".exs")
+
+    if Enum.any?(Schema.fleet(), &(Atom.to_string(&1) == name and &1 != robot.id)),
+      do: {["id"], "is #{inspect(robot.id)}, but the file is named #{name}.exs"}
+  end
+
+  defp seen(%{camera: camera, colours: nil}) when camera != nil,
+    do: {["colours"], "is missing: a robot with a camera must have colours"}
+
+  defp seen(_robot), do: nil
+
+  defp kept(%{save_pictures: nil}), do: nil
+
+  defp kept(%{camera: nil}),
+    do: {["save_pictures"], "is for a robot with a camera, and it has none"}
+
+  defp kept(%{save_pictures: options}) do
+    with {:error, line} <- Vision.Saver.options(options),
+         do: {["save_pictures"], line},
+         else: (_well -> nil)
+  end
+
+  defp majority(policies) do
+    if policies[:policy] == :majority and policies[:of] == nil,
+      do: {["policies"], "policy: :majority needs of:, the number of robots of the fleet"}
+  end
+
+  defp colour(%{colours: nil}), do: nil
+
+  defp colour(%{colours: colours, policies: policies}) do
+    names = Enum.map(colours.classes, & &1.name)
+    colour = policies[:colour]
+
+    if colour != nil and colour not in names,
+      do:
+        {["policies", "colour"],
+         "cannot be #{inspect(colour)}: the colours are #{Enum.join(names, ", ")}" <>
+           Check.meant(colour, names, "")}
+  end
+
+  # A drive knows what it can do with a body: how many sensors it reads, how fast it may go.
+  defp driven(%{drive: drive, profile: profile}) do
+    case Device.fit(drive, profile) do
+      {:ok, _drive} -> []
+      {:error, lines} -> for line <- lines, do: {["drive"], line}
+    end
+  end
+
+  defp limits(%{limits: limits, profile: profile}) do
+    for {name, value} <- limits, most = Map.fetch!(profile, name), value > most do
+      {["limits", Atom.to_string(name)],
+       "cannot be #{value}: a #{profile.name} can do #{most} at most"}
+    end
+  end
+end

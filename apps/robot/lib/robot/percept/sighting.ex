@@ -1,0 +1,146 @@
+defmodule Robot.Percept.Sighting do
+  @moduledoc """
+  From a blob in a picture to a direction and a place: pinhole camera, landmarks upright. Pure.
+
+  A picture is old when it is looked at: the robot has turned meanwhile. So `of/3` first takes the
+  direction to the map by the pose at exposure, and then looks at it from the present pose.
+  """
+  alias Hal.Pose
+  alias Robot.Percept
+  alias Vision.Blob
+
+  @typedoc """
+  What the camera says about one coloured thing. `bearing` is relative to the body now, left
+  positive; `direction` is in the map frame, `nil` without a pose.
+  """
+  @type t :: %{
+          bearing: float(),
+          direction: float() | nil,
+          distance: float() | nil,
+          share: float(),
+          at_ms: integer() | nil
+        }
+
+  # Boxes this many pixels apart still touch: a border between two colours belongs to neither.
+  @touch 3
+  # A clipped blob that covers more of the picture than this is too near to be measured.
+  @too_near_share 0.2
+
+  @doc "The sighting of the largest blob of a colour (`nil`: of any), or `nil`; see `largest/3`."
+  @spec of(Percept.t(), String.t() | nil, float()) :: t() | nil
+  def of(percept, colour, min_share \\ 0.0) do
+    with %Blob{} = blob <- largest(percept, colour, min_share) do
+      seen = bearing(blob, percept.blobs_pan, field_of_view(percept))
+      exposed = percept.blobs_pose || percept.pose
+      direction = exposed && Pose.wrap(exposed.heading + seen)
+
+      %{
+        bearing:
+          if(direction && percept.pose,
+            do: Pose.wrap(direction - percept.pose.heading),
+            else: seen
+          ),
+        direction: direction,
+        distance:
+          if(blob.clipped? and blob.share > @too_near_share, do: nil, else: blob.distance),
+        share: blob.share,
+        at_ms: percept.blobs_at_ms
+      }
+    end
+  end
+
+  @doc """
+  Direction of a blob's centre seen from the robot's body, in radians, left positive: where the
+  camera looked, and the angle within the picture.
+
+      iex> blob = %Vision.Blob{colour: "Y", area: 100, share: 0.01, x: 159.5, y: 1.0, left: 0, top: 0,
+      ...>   right: 1, bottom: 1, width: 320, height: 240}
+      iex> Robot.Percept.Sighting.bearing(blob, 0.25, 1.0)
+      0.25
+  """
+  @spec bearing(Blob.t(), pan :: float(), field_of_view :: float()) :: float()
+  def bearing(%Blob{x: x, width: width}, pan, field_of_view) do
+    focal = width / 2 / :math.tan(field_of_view / 2)
+    Pose.wrap(pan + :math.atan(((width - 1) / 2 - x) / focal))
+  end
+
+  @doc """
+  Where a blob at `distance` (metres) in direction `bearing` stands, seen from `pose`.
+
+      iex> {x, y} = Robot.Percept.Sighting.place(Hal.Pose.new(1, 0, 0), 0.0, 2.0)
+      iex> {x, y}
+      {3.0, 0.0}
+  """
+  @spec place(Pose.t(), float(), float()) :: Pose.point()
+  def place(%Pose{} = pose, bearing, distance),
+    do:
+      Pose.place(pose, {
+        distance * :math.cos(bearing),
+        distance * :math.sin(bearing)
+      })
+
+  @doc """
+  The distance of a blob, or `nil` where nothing can be said: no constant for the colour, the blob
+  clipped by the picture's border, or something of another colour in front of it (boxes that
+  touch), which hides a part of its area.
+  """
+  @spec distance(Blob.t(), [Blob.t()]) :: float() | nil
+  def distance(%Blob{clipped?: true}, _blobs), do: nil
+
+  def distance(%Blob{} = blob, blobs), do: if(hidden?(blob, blobs), do: nil, else: blob.distance)
+
+  @doc "Whether something of another colour may hide a part of it: boxes that touch."
+  @spec hidden?(Blob.t(), [Blob.t()]) :: boolean()
+  def hidden?(%Blob{} = blob, blobs),
+    do: Enum.any?(blobs, &(&1.colour != blob.colour and touch?(&1, blob)))
+
+  defp touch?(a, b) do
+    a.left <= b.right + @touch and b.left <= a.right + @touch and a.top <= b.bottom + @touch and
+      b.top <= a.bottom + @touch
+  end
+
+  @doc """
+  How wide (in pixels) an upright cylinder of this radius at this distance (metres, of its axis) is in a picture of this width
+  and field of view (radians); `nil` from within.
+
+      iex> round(Robot.Percept.Sighting.width(0.2, 1.0, 320, :math.pi() / 3))
+      113
+  """
+  @spec width(radius :: float(), distance :: float(), pos_integer(), float()) :: float() | nil
+  def width(radius, distance, picture, field_of_view) when distance > radius do
+    focal = picture / 2 / :math.tan(field_of_view / 2)
+    2 * focal * :math.tan(:math.asin(radius / distance))
+  end
+
+  def width(_radius, _distance, _picture, _field_of_view), do: nil
+
+  @doc "The distance of an upright cylinder of this radius (metres) that a blob shows in all its width."
+  @spec distance_by_width(Blob.t(), radius :: float(), field_of_view :: float()) :: float()
+  def distance_by_width(%Blob{} = blob, radius, field_of_view) do
+    focal = blob.width / 2 / :math.tan(field_of_view / 2)
+    radius / :math.sin(:math.atan((blob.right - blob.left + 1) / 2 / focal))
+  end
+
+  @doc """
+  The horizontal field of view of the percept's picture: as it was taken, or what the unit says, or
+  the profile's.
+  """
+  @spec field_of_view(Percept.t()) :: float()
+  def field_of_view(%Percept{blobs_view: angle}) when angle != nil, do: angle
+  def field_of_view(%Percept{ptz: %{field_of_view: angle}}), do: angle
+  def field_of_view(%Percept{profile: profile}), do: profile.camera.field_of_view
+
+  @doc """
+  The largest blob of a colour (`nil`: of any) with at least this share of the picture; `nil`
+  without one, or without a fresh picture. Of equally large ones the topmost, then the leftmost.
+  """
+  @spec largest(Percept.t(), String.t() | nil, float()) :: Blob.t() | nil
+  def largest(percept, colour, min_share \\ 0.0)
+  def largest(%Percept{blobs: nil}, _colour, _min_share), do: nil
+
+  def largest(%Percept{blobs: blobs}, colour, min_share) do
+    blobs
+    |> Enum.filter(&(&1.share >= min_share and colour in [nil, &1.colour]))
+    |> Enum.max_by(&{&1.area, -&1.top, -&1.left}, fn -> nil end)
+  end
+end

@@ -1,0 +1,105 @@
+defmodule Robot.Safety.Readiness do
+  @moduledoc """
+  Whether an order that can move a robot would be carried out now, and whether one that stops it reaches its wheels,
+  by what its board says of the drive: an order is for now, and shall not begin to move the robot later, when somebody
+  arms it.
+
+  A drive that arms by itself (`arm: :auto`) and has not said anything yet is just coming up, and counts as
+  ready. In a dry run nothing moves, and what would is the question: every order is taken.
+  """
+  alias Hal.Device.Words
+  alias Robot.{Board, Config}
+
+  @typedoc "What the board says under `:arming` and under `{:health, :drive}`; `nil` for nothing yet."
+  @type arming :: %{state: Hal.Device.Arming.state(), why: String.t() | nil} | nil
+  @type health :: :online | {:offline, reason :: term()} | nil
+
+  @doc "The same of a robot of this node."
+  @spec of(Config.t(), Board.t()) :: :ok | {:error, line :: String.t()}
+  def of(%Config{dry_run: true}, _board), do: :ok
+
+  def of(%Config{arm: policy, drive: drive}, board) do
+    case entry(board, {:health, :drive}) do
+      {:offline, reason} ->
+        judge(policy, entry(board, :arming), {:offline, Words.offline(drive, reason)})
+
+      health ->
+        judge(policy, entry(board, :arming), health)
+    end
+  end
+
+  @doc """
+  `:ok`, or the reason, which names no robot. A text for why the drive is offline is taken as it is.
+
+      iex> Robot.Safety.Readiness.judge(:manual, %{state: :armed, why: nil}, :online)
+      :ok
+      iex> Robot.Safety.Readiness.judge(:manual, %{state: :disarmed, why: nil}, :online)
+      {:error, "its wheels are disarmed; arm it first"}
+      iex> Robot.Safety.Readiness.judge(:auto, %{state: :disarmed, why: "conversion distance is missing"}, :online)
+      {:error, "its wheels are disarmed (conversion distance is missing)"}
+      iex> Robot.Safety.Readiness.judge(:auto, %{state: :disarmed, why: nil}, {:offline, :enoent})
+      {:error, "its drive is offline (:enoent)"}
+      iex> Robot.Safety.Readiness.judge(:manual, %{state: {:error, :eio}, why: nil}, :online)
+      {:error, "its line was lost (:eio) while the wheels turned; look, acknowledge, and arm it"}
+      iex> for policy <- [:auto, :manual], do: Robot.Safety.Readiness.judge(policy, nil, nil)
+      [:ok, {:error, "its drive is not open yet"}]
+  """
+  @spec judge(:auto | :manual, arming(), health()) :: :ok | {:error, line :: String.t()}
+  def judge(_policy, %{state: {:error, reason}}, _health),
+    do:
+      {:error,
+       "its line was lost (#{brief(reason)}) while the wheels turned; look, acknowledge, and arm it"}
+
+  def judge(_policy, _arming, {:offline, reason}),
+    do: {:error, "its drive is offline (#{brief(reason)})"}
+
+  def judge(_policy, %{state: :armed}, _health), do: :ok
+
+  def judge(_policy, %{state: :disarmed, why: nil}, _health),
+    do: {:error, "its wheels are disarmed; arm it first"}
+
+  def judge(_policy, %{state: :disarmed, why: why}, _health),
+    do: {:error, "its wheels are disarmed (#{why})"}
+
+  def judge(:auto, nil, _health), do: :ok
+  def judge(:manual, nil, _health), do: {:error, "its drive is not open yet"}
+
+  @doc """
+  Whether a stop that the gate has carried out is one of the wheels, too. Not where the line was lost while
+  they turned, and is not back: then nobody can say anything to them, and the line says so. A line that is opened again
+  begins with a stop.
+  """
+  @spec stopped(Board.t()) :: :ok | {:error, line :: String.t()}
+  def stopped(board), do: reached(entry(board, :arming), entry(board, {:health, :drive}))
+
+  @doc """
+  The same by what the board says.
+
+      iex> Robot.Safety.Readiness.reached(%{state: {:error, :unplugged}, why: nil}, {:offline, :unplugged})
+      {:error,
+       "its line was lost (:unplugged) while the wheels turned, and is not back: its gate stands, but nobody can " <>
+         "say anything to the wheels; use the robot's own emergency stop"}
+      iex> Robot.Safety.Readiness.reached(%{state: {:error, :unplugged}, why: nil}, :online)
+      :ok
+      iex> Robot.Safety.Readiness.reached(%{state: :disarmed, why: nil}, {:offline, :enoent})
+      :ok
+  """
+  @spec reached(arming(), health()) :: :ok | {:error, line :: String.t()}
+  def reached(%{state: {:error, reason}}, {:offline, _since}) do
+    {:error,
+     "its line was lost (#{brief(reason)}) while the wheels turned, and is not back: its gate stands, but " <>
+       "nobody can say anything to the wheels; use the robot's own emergency stop"}
+  end
+
+  def reached(_arming, _health), do: :ok
+
+  defp brief(words) when is_binary(words), do: words
+  defp brief(reason), do: inspect(reason, limit: 5, printable_limit: 40)
+
+  defp entry(board, key) do
+    case Board.fetch(board, key, :infinity) do
+      {:ok, value, _at_ms} -> value
+      :error -> nil
+    end
+  end
+end

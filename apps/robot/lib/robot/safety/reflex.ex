@@ -1,0 +1,287 @@
+defmodule Robot.Safety.Reflex do
+  @moduledoc """
+  The gate before the wheels as a function: whatever is wished, what comes out is safe. It is no
+  part of the market of wishes; it limits whoever won there. Pure: `wish/3` and `sense/3` tell it
+  what happened, `step/2` (every 50 ms) says what the wheels may do now, and why it is less than wished.
+
+  In this order, each with its name in `limits`:
+
+  | limit | what it does |
+  |---|---|
+  | `:estop` | latched: stands until `reset/1`; wishes from before are forgotten |
+  | `:disarmed` | the drive is not armed: stands (`Hal.Device.Arming`) |
+  | `:dead_man` | no wish for 200 ms: stands |
+  | `:refused` | the wish was no number, or absurdly large: stands |
+  | `:speed` | the profile's greatest speeds |
+  | `:bumper` | no driving toward a touched side; away and turning are free |
+  | `:near` | slow enough to stop 0.15 m before what the sonars see in the direction of motion |
+  | `:corner` | a robot longer than wide turns its corners into nothing |
+  | `:fence` | stops before the line of its fence (`Robot.Safety.Reflex.Fence`); not knowing where it is, it stands |
+  | `:blind` | no sonar reading for 500 ms, though it has sonars: at most 0.1 m/s |
+  | `:acceleration` | the profile's accelerations; braking before a near thing may be twice as hard |
+
+  `:estop`, `:disarmed`, `:dead_man`, `:refused` and `:bumper` set the speed to zero at once: how hard the wheels
+  then brake is the base's own affair. Everything else is continuous.
+  """
+  alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Robot.Safety.Reflex.{Body, Fence}
+
+  @dead_man_ms 200
+  @blind_ms 500
+  @blind_speed 0.1
+  @lost_ms 500
+  # No base drives or turns this fast: such a number is a fault of the one who wished.
+  @absurd 100.0
+  # The step that accelerations are counted with is never longer than this, whatever the clock did.
+  @longest_step_ms 200
+
+  @enforce_keys [:profile]
+  defstruct @enforce_keys ++
+              [
+                wish: nil,
+                wish_at_ms: nil,
+                sonar: [],
+                sonar_at_ms: nil,
+                bumpers: [],
+                latched?: false,
+                armed?: true,
+                fence: nil,
+                start: nil,
+                frame: nil,
+                place: nil,
+                twist: %Twist{linear: 0.0, turn: 0.0},
+                at_ms: nil
+              ]
+
+  @type t :: %__MODULE__{
+          profile: Profile.t(),
+          wish: {float(), float()} | :refused | nil,
+          wish_at_ms: integer() | nil,
+          sonar: [Body.point()],
+          sonar_at_ms: integer() | nil,
+          bumpers: [0..15],
+          latched?: boolean(),
+          armed?: boolean(),
+          fence: Fence.t() | nil,
+          start: Pose.t() | nil,
+          frame: {:is, reference() | nil} | nil,
+          place: {Pose.t(), integer()} | nil,
+          twist: Twist.t(),
+          at_ms: integer() | nil
+        }
+
+  @type limit ::
+          :estop
+          | :disarmed
+          | :dead_man
+          | :refused
+          | :speed
+          | :bumper
+          | :near
+          | :corner
+          | :fence
+          | :blind
+          | :acceleration
+
+  @doc """
+  A gate that stands. Options: `latched?` (default false), for a latch that survived a restart;
+  `armed?` (default true), until a reading `{:arming, …}` says otherwise; `fence` (`Robot.Safety.Reflex.Fence`,
+  default none), with `start`, the pose at which the odometry says zero (default the origin), and `frame`, what
+  `frame/1` said of the gate before it.
+
+  A fence believes odometry of one frame only, the first (`Hal.Odometry`). In another one zero is not the
+  start any more but wherever the robot was: that place is not known, and the robot stands until it is started
+  again at its start.
+  """
+  @spec new(Profile.t(), keyword()) :: t()
+  def new(%Profile{} = profile, options \\ []) do
+    options =
+      Keyword.validate!(options,
+        latched?: false,
+        armed?: true,
+        fence: nil,
+        start: Pose.new(0, 0),
+        frame: nil
+      )
+
+    %__MODULE__{
+      profile: profile,
+      latched?: options[:latched?] == true,
+      armed?: options[:armed?] == true,
+      fence: options[:fence],
+      start: options[:start],
+      frame: options[:frame]
+    }
+  end
+
+  @doc "The frame of odometry that the fence is laid in; `nil` before the first reading, and without a fence."
+  @spec frame(t()) :: {:is, reference() | nil} | nil
+  def frame(%__MODULE__{frame: frame}), do: frame
+
+  @doc "Takes a wish. Anything at all may come: what is no sensible number counts as a wish to stop."
+  @spec wish(t(), Twist.t() | term(), integer()) :: t()
+  def wish(%__MODULE__{latched?: true} = reflex, _twist, _at_ms), do: reflex
+
+  def wish(%__MODULE__{} = reflex, %{linear: linear, turn: turn}, at_ms) do
+    wish = if sane?(linear) and sane?(turn), do: {linear * 1.0, turn * 1.0}, else: :refused
+    %{reflex | wish: wish, wish_at_ms: at_ms}
+  end
+
+  def wish(%__MODULE__{} = reflex, _other, at_ms),
+    do: %{reflex | wish: :refused, wish_at_ms: at_ms}
+
+  defp sane?(number), do: is_number(number) and number > -@absurd and number < @absurd
+
+  @doc "Whoever wished is no more: stands until somebody else wishes, and at once, for nobody brakes gently now."
+  @spec forget(t()) :: t()
+  def forget(%__MODULE__{} = reflex), do: %{reflex | wish: nil, wish_at_ms: nil}
+
+  @doc "Takes a reading; those that no limit needs are ignored."
+  @spec sense(t(), Hal.Drive.reading() | term(), integer()) :: t()
+  def sense(%__MODULE__{} = reflex, {:sonar, ranges}, at_ms) when is_list(ranges),
+    do: %{reflex | sonar: Body.points(reflex.profile, ranges), sonar_at_ms: at_ms}
+
+  def sense(%__MODULE__{} = reflex, {:bumpers, pressed}, _at_ms) when is_list(pressed),
+    do: %{reflex | bumpers: pressed}
+
+  def sense(%__MODULE__{fence: %Fence{}} = reflex, {:odometry, %Odometry{} = odometry}, at_ms) do
+    case reflex.frame || {:is, odometry.frame} do
+      {:is, frame} when frame == odometry.frame ->
+        place = {Pose.compose(reflex.start, odometry.pose), at_ms}
+        %{reflex | frame: {:is, frame}, place: place}
+
+      _another ->
+        %{reflex | place: nil}
+    end
+  end
+
+  # What was wished before it was armed, or disarmed, counts no more.
+  def sense(%__MODULE__{armed?: before?} = reflex, {:arming, %{state: state}}, _at_ms) do
+    case state == :armed do
+      ^before? -> reflex
+      armed? -> %{reflex | armed?: armed?, wish: nil, wish_at_ms: nil}
+    end
+  end
+
+  def sense(%__MODULE__{} = reflex, _reading, _at_ms), do: reflex
+
+  @doc "Latches the emergency stop."
+  @spec estop(t()) :: t()
+  def estop(%__MODULE__{} = reflex),
+    do: %{reflex | latched?: true, wish: nil, wish_at_ms: nil}
+
+  @doc "Releases the latch. The robot still stands until a new wish comes."
+  @spec reset(t()) :: t()
+  def reset(%__MODULE__{} = reflex), do: %{reflex | latched?: false}
+
+  @doc "What the wheels may do from now until the next step, and which limits made it less than wished."
+  @spec step(t(), integer()) :: {Twist.t(), [limit()], t()}
+  def step(%__MODULE__{} = reflex, at_ms) do
+    {twist, limits} =
+      case wanted(reflex, at_ms) do
+        {:stop, limit} -> {Twist.zero(), [limit]}
+        {linear, turn} -> limit(reflex, linear, turn, at_ms)
+      end
+
+    {twist, limits, %{reflex | twist: twist, at_ms: at_ms}}
+  end
+
+  defp wanted(%{latched?: true}, _at_ms), do: {:stop, :estop}
+  defp wanted(%{armed?: false}, _at_ms), do: {:stop, :disarmed}
+  defp wanted(%{wish: nil}, _at_ms), do: {:stop, :dead_man}
+
+  defp wanted(%{wish_at_ms: wish_at_ms}, at_ms) when at_ms - wish_at_ms > @dead_man_ms,
+    do: {:stop, :dead_man}
+
+  defp wanted(%{wish: :refused}, _at_ms), do: {:stop, :refused}
+  defp wanted(%{wish: wish}, _at_ms), do: wish
+
+  defp limit(reflex, linear, turn, at_ms) do
+    %{profile: profile, twist: last} = reflex
+    {linear, turn, limits} = speed(linear, turn, profile, [])
+    {safe_linear, limits} = linear |> near(reflex, at_ms, limits)
+    {safe_turn, limits} = corner(turn, reflex, limits)
+    {safe_linear, limits} = fence(safe_linear, safe_turn, reflex, at_ms, limits)
+    seconds = step_s(reflex.at_ms, at_ms)
+
+    {ramped, limits} = ramp(last.linear, safe_linear, profile.max_acceleration * seconds, limits)
+
+    {turned, limits} = ramp(last.turn, safe_turn, profile.max_turn_acceleration * seconds, limits)
+
+    # A touched side is no matter of ramps.
+    {ramped, limits} = bumper(ramped, reflex, limits)
+    {Twist.new(ramped, turned), Enum.reverse(limits)}
+  end
+
+  defp speed(linear, turn, profile, limits) do
+    safe_linear = clamp(linear, profile.max_linear)
+    safe_turn = clamp(turn, profile.max_turn)
+    changed? = safe_linear != linear or safe_turn != turn
+    {safe_linear, safe_turn, if(changed?, do: [:speed | limits], else: limits)}
+  end
+
+  defp near(linear, reflex, at_ms, limits) do
+    if blind?(reflex, at_ms),
+      do: lower(linear, @blind_speed, :blind, limits),
+      else: lower(linear, Body.free_speed(reflex.profile, reflex.sonar, linear), :near, limits)
+  end
+
+  defp blind?(%{profile: %{sonars: []}}, _at_ms), do: false
+  defp blind?(%{sonar_at_ms: nil}, _at_ms), do: true
+  defp blind?(%{sonar_at_ms: sonar_at_ms}, at_ms), do: at_ms - sonar_at_ms > @blind_ms
+
+  defp corner(turn, reflex, limits),
+    do: lower(turn, Body.free_turn(reflex.profile, reflex.sonar, turn), :corner, limits)
+
+  defp fence(linear, _turn, %{fence: nil}, _at_ms, limits), do: {linear, limits}
+
+  defp fence(linear, turn, %{place: {pose, then_ms}} = reflex, at_ms, limits)
+       when at_ms - then_ms <= @lost_ms do
+    # It turns as it did, and will as it may: on its way from the one to the other.
+    turns = Enum.uniq([reflex.twist.turn, turn])
+    age_s = max(at_ms - then_ms, 0) / 1000
+    free = Fence.free_speed(reflex.fence, reflex.profile, pose, linear, turns, age_s)
+    lower(linear, free, :fence, limits)
+  end
+
+  defp fence(linear, _turn, _lost, _at_ms, limits), do: lower(linear, 0.0, :fence, limits)
+
+  defp bumper(linear, %{bumpers: []}, limits), do: {linear, limits}
+
+  defp bumper(linear, reflex, limits) do
+    count = max(reflex.profile.bumpers, 1)
+
+    toward? =
+      Enum.any?(reflex.bumpers, fn segment ->
+        is_integer(segment) and
+          :math.cos(2 * :math.pi() * segment / count) * linear > 0.05 * abs(linear)
+      end)
+
+    if toward? and linear != 0.0, do: {0.0, [:bumper | limits]}, else: {linear, limits}
+  end
+
+  defp lower(value, limit, name, limits) do
+    if abs(value) > limit, do: {clamp(value, limit), [name | limits]}, else: {value, limits}
+  end
+
+  # Braking may be twice as hard as speeding up: what comes near is noticed late by as much.
+  defp ramp(from, to, most, limits) do
+    low = if from > 0, do: max(from - 2 * most, min(-most, 0.0)), else: from - most
+    high = if from < 0, do: min(from + 2 * most, max(most, 0.0)), else: from + most
+
+    cond do
+      to < low -> {low, [:acceleration | limits]}
+      to > high -> {high, [:acceleration | limits]}
+      true -> {to, limits}
+    end
+  end
+
+  defp step_s(nil, _at_ms), do: 0.05
+
+  defp step_s(last_ms, at_ms),
+    do: (at_ms - last_ms) |> max(0) |> min(@longest_step_ms) |> Kernel./(1000)
+
+  defp clamp(value, limit) when value > limit, do: limit * 1.0
+  defp clamp(value, limit) when value < -limit, do: -limit * 1.0
+  defp clamp(value, _limit), do: value
+end

@@ -1,0 +1,130 @@
+defmodule Robot.Control.PilotTest do
+  use Robot.Case, async: false
+  @moduletag :capture_log
+
+  defp flown(id, options \\ []) do
+    robot(id, Keyword.put(options, :mission, {Acts.Mission, test: self()}))
+    :ok = Pilot.start(id)
+    assert_receive {:mission, {:init, ^id}}
+    id
+  end
+
+  test "is idle until told, and says so" do
+    id = robot(:pilot1)
+    assert Pilot.command(id, :anything) == {:error, :idle}
+    assert Pilot.start(id) == {:error, :no_mission}
+    assert Pilot.start(id, No.Such.Mission, []) == {:error, :no_mission}
+    assert {:idle, _} = :sys.get_state(Names.whereis(id, :pilot))
+    assert Pilot.start(id, Acts.Mission, test: self()) == :ok
+    assert {{Acts.Mission, :ready}, _} = :sys.get_state(Names.whereis(id, :pilot))
+    assert Pilot.stop(id) == :ok
+    assert {:idle, _} = :sys.get_state(Names.whereis(id, :pilot))
+  end
+
+  test "hands ticks, outcomes, messages and commands to the mission" do
+    id = flown(:pilot2)
+    assert_receive {:mission, {:tick, %Robot.Percept{robot: ^id}}}
+    Pilot.hear(id, {:message, %{hello: 1}})
+    assert_receive {:mission, {:message, %{hello: 1}}}
+    assert Pilot.command(id, :go) == :ok
+    assert_receive {:mission, {:command, :go}}
+    goal = {:goal, :soon, {Acts.Roll, outcome: 7, twist: Twist.zero()}}
+    assert Pilot.command(id, {:do, :ready, [goal]}) == :ok
+    assert_receive {:mission, {:outcome, :soon, 7}}
+    assert_receive {:mission, {:tick, _}}
+  end
+
+  test "carries out every kind of effect" do
+    ptz = {Hal.FakePtz, test: self(), device: :ptz}
+
+    id =
+      flown(:pilot3,
+        send: {__MODULE__, :say, [self()]},
+        ptz: ptz
+      )
+
+    listen(id, [:robot, :stage])
+    listen(id, [:robot, :pilot, :phase])
+
+    effects = [
+      {:goal, :roll, {Acts.Roll, twist: Twist.new(0.1, 0.0)}},
+      {:send, :all, %{epoch: 1}},
+      {:claim, %{slot: 2}},
+      {:stage, :elected, %{epoch: 1}}
+    ]
+
+    assert Pilot.command(id, {:do, :lead, effects}) == :ok
+    assert_received {:said, :all, %{epoch: 1}}
+    assert_received {[:robot, :stage], %{robot: ^id, stage: :elected, epoch: 1}}
+    assert_received {[:robot, :pilot, :phase], %{state: {Acts.Mission, :lead}}}
+    {:ok, %{claim: %{slot: 2}}, _} = Board.fetch(Board.find!(id), :mission, 1_000)
+    rolls()
+    assert_receive {:ptz, {:look, 0.25, _}, _}
+
+    assert Pilot.command(id, {:do, :lead, [{:goal, :none, nil}, {:look, -0.5}]}) == :ok
+    assert_receive {:ptz, {:look, -0.5, _}, _}
+  end
+
+  @doc false
+  def say(test, to, message), do: send(test, {:said, to, message})
+
+  test "of the ticks that wait only the newest is handled" do
+    id = flown(:pilot4)
+    [pilot, executive] = parts(id, [:pilot, :executive])
+    :ok = :sys.suspend(executive)
+    :ok = :sys.suspend(pilot)
+    ticks = for n <- 1..9, do: %Robot.Percept{robot: id, at_ms: n, profile: nil}
+    Enum.each(ticks, &Pilot.hear(id, {:tick, &1}))
+    :ok = :sys.resume(pilot)
+    assert_receive {:mission, {:tick, %{at_ms: 9}}}
+    for n <- 1..8, do: refute_received({:mission, {:tick, %{at_ms: ^n}}})
+  end
+
+  test "a stop ends a mission that does not care, and a goal of nobody's, before it returns" do
+    roll = {Acts.Roll, twist: Twist.new(0.1, 0.0)}
+    id = flown(:pilot6)
+    :ok = Pilot.command(id, {:do, :ready, [{:goal, :roll, roll}]})
+    rolls()
+    assert Pilot.stop(id) == :ok
+    # What the drive is told from now on was asked for after the answer.
+    :sys.get_state(Names.whereis(id, :drive))
+    stands(250)
+    assert {:ok, %{state: :idle, claim: claim}, _} = Board.fetch(Board.find!(id), :mission, 1_000)
+    assert claim == %{}
+    refute_received {:mission, {:command, :stop}}
+
+    # Without a mission.
+    Executive.goal(id, :roll, roll)
+    rolls()
+    Pilot.halt(id, {Kernel, :send, [self(), :stopped]})
+    assert_receive :stopped
+    :sys.get_state(Names.whereis(id, :drive))
+    stands(250)
+    assert Pilot.resume(id) == {:error, :idle}
+  end
+
+  test "what a mission leaves of itself when it is stopped is taken up by the next start" do
+    id = flown(:pilot7, [])
+    :ok = Pilot.stop(id)
+    assert Pilot.resume(id) == {:error, :idle}
+    assert Pilot.start(id, Acts.Mission, test: self(), halted: :left) == :ok
+    assert Pilot.stop(id) == :ok
+    assert {:idle, %{mission: nil}} = :sys.get_state(Names.whereis(id, :pilot))
+    # A second stop takes nothing away.
+    assert Pilot.stop(id) == :ok
+    assert Pilot.command(id, :go) == {:error, :idle}
+    assert Pilot.resume(id) == :ok
+    assert_receive {:mission, {:command, :start}}
+    assert {{Acts.Mission, :left}, _} = :sys.get_state(Names.whereis(id, :pilot))
+    assert Pilot.resume(id) == {:error, :idle}
+  end
+
+  test "another mission takes the place of a running one" do
+    id = flown(:pilot5)
+    goal = {:goal, :roll, {Acts.Roll, twist: Twist.new(0.1, 0.0)}}
+    :ok = Pilot.command(id, {:do, :ready, [goal]})
+    rolls()
+    :ok = Pilot.start(id)
+    assert_receive {:drive, {:drive, stop}, _} when stop == %Twist{linear: 0.0, turn: 0.0}, 400
+  end
+end

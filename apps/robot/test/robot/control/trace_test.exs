@@ -1,0 +1,113 @@
+defmodule Robot.Control.TraceTest do
+  @moduledoc "What the processes do is what the functions say: recorded inputs, fed to both."
+  use Robot.Case, async: false
+  alias Hal.{Odometry, Pose}
+  alias Robot.Control.Controller
+  alias Robot.Safety.Reflex
+
+  test "gate, executive and pilot do what the pure functions do on the same input" do
+    profile = Hal.Profile.magellan()
+    start = Pose.new(1, 2)
+    roll = fn v -> {:goal, :roll, {Acts.Roll, twist: Twist.new(v, 0.1)}} end
+
+    table = :ets.new(__MODULE__, [:ordered_set, :public])
+
+    id =
+      robot(:trace1,
+        start: start,
+        ptz: {Hal.FakePtz, test: self(), device: :ptz},
+        mission: {Acts.Mission, test: self(), effects: [roll.(0.3), {:look, 0.5}]},
+        trace: {__MODULE__, :record, [table]}
+      )
+
+    drive = Names.whereis(id, :drive)
+    free = List.duplicate(5.1, 16)
+    odometry = fn x -> {:odometry, %Odometry{pose: Pose.new(x, 0), twist: Twist.zero()}} end
+
+    send(drive, {:readings, [odometry.(0.0), {:sonar, free}]})
+    :ok = Pilot.start(id)
+    two_ticks()
+    send(drive, {:readings, [odometry.(0.1), {:sonar, List.replace_at(free, 11, 0.4)}]})
+    two_ticks()
+    :ok = Pilot.command(id, {:do, :ready, [roll.(0.2), {:stage, :faster, %{}}]})
+    two_ticks()
+    send(drive, {:readings, [odometry.(0.2), {:bumpers, [0, 1]}, {:sonar, free}]})
+    Pilot.hear(id, {:message, %{hello: 1}})
+    two_ticks()
+    :ok = Gate.estop(id)
+    two_ticks()
+    :ok = Gate.reset(id)
+    goal = {:goal, :end, {Acts.Roll, outcome: 5, twist: Twist.zero()}}
+    :ok = Pilot.command(id, {:do, :ready, [goal, {:look, nil}]})
+    assert_receive {:mission, {:outcome, :end, 5}}
+    two_ticks()
+    stop_supervised!(id)
+
+    entries = for {_order, entry} <- :ets.tab2list(table), do: entry
+    assert compare(entries, :gate, Reflex.new(profile), &gate/3) > 20
+    mind = Controller.new(profile: profile, start: start)
+    assert compare(entries, :executive, {mind, nil, false}, &executive/3) > 20
+    assert compare(entries, :pilot, nil, &pilot/3) == 6
+  end
+
+  @doc false
+  def record(table, entry), do: :ets.insert(table, {System.unique_integer([:monotonic]), entry})
+
+  defp two_ticks do
+    for _ <- 1..2, do: assert_receive({:mission, {:tick, _}})
+  end
+
+  # Plays the role's recorded inputs to the function, and compares. The robot was switched off in
+  # the middle of something, so its last effects may be missing.
+  defp compare(entries, role, state, step) do
+    inputs = for {^role, :input, what, at_ms} <- entries, do: {what, at_ms}
+    effects = for {^role, :effect, what, _} <- entries, not match?({:phase, _}, what), do: what
+
+    {expected, _state} =
+      Enum.flat_map_reduce(inputs, state, fn {what, at_ms}, state -> step.(what, at_ms, state) end)
+
+    assert List.starts_with?(expected, effects)
+    assert length(expected) - length(effects) < 4
+    length(effects)
+  end
+
+  defp gate({:wish, twist}, at_ms, reflex), do: {[], Reflex.wish(reflex, twist, at_ms)}
+  defp gate({:sense, reading}, at_ms, reflex), do: {[], Reflex.sense(reflex, reading, at_ms)}
+  defp gate(:forget, _at_ms, reflex), do: {[], Reflex.forget(reflex)}
+  defp gate(:estop, _at_ms, reflex), do: {[], Reflex.estop(reflex)}
+  defp gate(:reset, _at_ms, reflex), do: {[], Reflex.reset(reflex)}
+
+  defp gate(:step, at_ms, reflex) do
+    {twist, limits, reflex} = Reflex.step(reflex, at_ms)
+    {[{:drive, twist, limits}], reflex}
+  end
+
+  defp executive({:goal, tag, goal}, _at_ms, {mind, look, looks?}),
+    do: {[], {Controller.goal(mind, tag, goal), look, looks?}}
+
+  defp executive({:anchors, anchors}, _at_ms, {mind, look, looks?}),
+    do: {[], {Controller.anchors(mind, anchors), look, looks?}}
+
+  defp executive({:look, pan}, _at_ms, {mind, look, looks?}) do
+    news = if looks? or pan in [nil, look], do: [], else: [{:look, pan}]
+    {news, {mind, pan, looks?}}
+  end
+
+  defp executive({:tick, percept}, _at_ms, {mind, look, _looks?}) do
+    {wish, outcome, mind} = Controller.tick(mind, percept)
+    looks = for pan <- List.wrap(wish.look || look), do: {:look, pan}
+    outcomes = for {tag, outcome} <- List.wrap(outcome), do: {:outcome, tag, outcome}
+    effects = [{:wish, wish}] ++ looks ++ outcomes ++ [{:tick, Controller.percept(mind)}]
+    {effects, {mind, look, wish.look != nil}}
+  end
+
+  defp pilot({:start, module, options}, _at_ms, nil) do
+    {_phase, mission, effects} = module.init(:trace1, options)
+    {effects, {module, mission}}
+  end
+
+  defp pilot(event, _at_ms, {module, mission}) do
+    {_phase, mission, effects} = module.handle(event, mission)
+    {effects, {module, mission}}
+  end
+end

@@ -1,0 +1,58 @@
+defmodule Robot.Safety.DryRunTest do
+  use Robot.Case, async: false
+  import ExUnit.CaptureLog
+  alias Robot.Safety.DryRun
+  doctest Robot.Safety.DryRun
+
+  @moduletag :capture_log
+
+  defp until_line(id, text) do
+    assert_receive {[:robot, :dry_run], %{robot: ^id, line: line}}, 1_000
+    if line =~ text, do: line, else: until_line(id, text)
+  end
+
+  test "everything thinks, nothing moves, what would move is told once and printed" do
+    listen(:dry1, [:robot, :dry_run])
+    Logger.put_module_level(DryRun, :info)
+    on_exit(fn -> Logger.delete_module_level(DryRun) end)
+
+    log =
+      capture_log(fn ->
+        id = rolling(:dry1, dry_run: true)
+        assert until_line(id, "0.10 m/s") =~ "dry run: dry1 would drive at 0.10 m/s"
+        # The mission runs and the gate is as busy as ever.
+        assert {:ok, %{by: :roll}, _} = Board.fetch(Board.find!(id), :doing, 500)
+
+        assert {:ok, %{twist: twist, limits: limits}, _} =
+                 Board.fetch(Board.find!(id), :driving, 500)
+
+        assert twist == Twist.zero() and :dry_run in limits
+        stands(200)
+        # The same again is no news.
+        refute_receive {[:robot, :dry_run], _}, 200
+        # Nobody can let the wheels loose by another way.
+        drive = Names.whereis(id, :drive)
+        assert Hal.Device.arm(drive) == {:error, "this is a dry run: the wheels stand"}
+        Hal.Device.drive(drive, Twist.new(0.3, 0.0))
+        assert Hal.Device.arming(drive).state == :disarmed
+        stands(100)
+      end)
+
+    assert log =~ "dry run: dry1 would drive at 0.10 m/s"
+  end
+
+  test "the camera's head stays where it is, too" do
+    listen(:dry2, [:robot, :dry_run])
+    id = robot(:dry2, dry_run: true, ptz: {Hal.FakePtz, test: self(), device: :ptz})
+    assert_receive {:ptz, :init, _}
+    Executive.look(id, -0.5)
+    until_line(id, "would look 29 deg to the right")
+    refute_receive {:ptz, {:look, _, _}, _}, 200
+  end
+
+  test "what changes by less than a person sees is not told" do
+    first = DryRun.tell(:dry3, {:drive, Twist.new(0.3, 0.0), []}, nil, 0)
+    assert DryRun.tell(:dry3, {:drive, Twist.new(0.301, 0.001), []}, first, 50) == first
+    assert DryRun.tell(:dry3, {:drive, Twist.new(0.32, 0.0), []}, first, 50) != first
+  end
+end

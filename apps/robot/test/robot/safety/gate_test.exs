@@ -1,0 +1,158 @@
+defmodule Robot.Safety.GateTest do
+  use Robot.Case, async: false
+  @moduletag :capture_log
+
+  @zero Twist.zero()
+
+  # What the gate did next, in the order of its own trace.
+  defp after_sense(ranges) do
+    receive do
+      {:gate, :input, {:sense, {:sonar, ^ranges}}, at_ms} ->
+        assert_receive {:gate, kind1, what1, ^at_ms}
+        assert_receive {:gate, kind2, what2, ^at_ms}
+        [{kind1, what1, at_ms}, {kind2, what2, at_ms}]
+
+      {:gate, _kind, _what, _at_ms} ->
+        after_sense(ranges)
+    after
+      500 -> flunk("the gate did not hear the sonar")
+    end
+  end
+
+  test "a touched bumper stops the wheels within 50 ms" do
+    id = rolling(:gate1)
+    rolls()
+    send(Names.whereis(id, :drive), {:readings, [{:bumpers, [0]}]})
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v == 0.0, 50
+    {:ok, %{limits: limits}, _} = Board.fetch(Board.find!(id), :driving, 100)
+    assert :bumper in limits
+  end
+
+  test "a near sonar stops the wheels when it arrives, not at the next step" do
+    test = self()
+    id = rolling(:gate2, trace: {Kernel, :send, [test]})
+    rolls()
+    near = List.duplicate(5.1, 16) |> List.replace_at(11, 0.1)
+    send(Names.whereis(id, :drive), {:readings, [{:sonar, near}]})
+    assert [{:input, :step, at_ms}, {:effect, {:drive, twist, limits}, at_ms}] = after_sense(near)
+    assert :near in limits
+    assert twist.linear < 0.1
+  end
+
+  test "e-stop is latched, survives the gate and the executive, and only a reset clears it" do
+    id = rolling(:gate3)
+    rolls()
+    listen(id, [:robot, :gate, :start])
+    listen(id, [:robot, :pilot, :phase])
+    assert Gate.estop(id) == :ok
+    assert Board.latched?(Board.find!(id))
+    stands(250)
+
+    kill(id, :gate)
+    assert_receive {[:robot, :gate, :start], %{latched?: true}}
+    assert_receive {[:robot, :pilot, :phase], %{state: :idle}}
+    assert Pilot.start(id) == :ok
+    stands(250)
+
+    assert {:ok, %{twist: twist, limits: [:estop]}, _} =
+             Board.fetch(Board.find!(id), :driving, 100)
+
+    assert Twist.zero?(twist)
+
+    assert Gate.reset(id) == :ok
+    refute Board.latched?(Board.find!(id))
+    rolls()
+  end
+
+  def wait(_event, _measured, %{robot: :gate8}, test) do
+    send(test, {:writing, self()})
+    receive(do: (:written -> :ok), after: (1_000 -> :ok))
+  end
+
+  def wait(_event, _measured, _others, _test), do: :ok
+
+  @tag :tmp_dir
+  test "an e-stop stops the wheels before its file is written", %{tmp_dir: folder} do
+    # A disk that takes its time: who hears that it failed makes the gate wait.
+    event = [:robot, :estop_file, :error]
+    :ok = Hal.Event.attach(:gate8, event, &__MODULE__.wait/4, self())
+    on_exit(fn -> Hal.Event.detach(:gate8) end)
+    id = rolling(:gate8, estop_file: Path.join(folder, "missing/estop"))
+    rolls()
+    answer = Task.async(fn -> Gate.estop(id) end)
+    assert_receive {:writing, gate}
+    assert_receive {:drive, {:drive, twist}, _} when twist == @zero, 300
+    assert Board.latched?(Board.find!(id))
+    assert Task.yield(answer, 0) == nil
+    send(gate, :written)
+    assert Task.await(answer) == :ok
+  end
+
+  test "a gate that starts again does not lay its fence in another frame of odometry" do
+    {:ok, fence} = Robot.Safety.Reflex.Fence.new({{-50, -50}, {50, 50}})
+    id = rolling(:gate6, fence: fence)
+    board = Board.find!(id)
+
+    tell = fn frame ->
+      odometry = %Hal.Odometry{pose: Hal.Pose.new(0, 0), twist: @zero, frame: frame}
+      Gate.sense(id, {:odometry, odometry})
+      # The gate has heard it when it answers.
+      Gate.reset(id)
+    end
+
+    tell.(frame = make_ref())
+    assert {:ok, {:is, ^frame}, _} = Board.fetch(board, :frame, :infinity)
+    assert %{reflex: %{place: {_pose, _at_ms}}} = :sys.get_state(Names.via(id, :gate))
+    listen(id, [:robot, :gate, :start])
+    kill(id, :gate)
+    assert_receive {[:robot, :gate, :start], _}
+    tell.(make_ref())
+    assert {:ok, {:is, ^frame}, _} = Board.fetch(board, :frame, :infinity)
+    assert %{reflex: %{place: nil}} = :sys.get_state(Names.via(id, :gate))
+  end
+
+  test "a gate that starts again knows that its drive is not armed" do
+    id = rolling(:gate5, arm: :manual)
+    eventually_limits(id, [:disarmed])
+    stands(250)
+    :ok = Hal.Device.arm(Names.whereis(id, :drive))
+    # What it was told before is forgotten.
+    stands(250)
+    :ok = Pilot.start(id)
+    rolls()
+    :ok = Hal.Device.disarm(Names.whereis(id, :drive))
+    listen(id, [:robot, :gate, :start])
+    listen(id, [:robot, :gate, :limits])
+    kill(id, :gate)
+    assert_receive {[:robot, :gate, :start], %{latched?: false}}
+    # Its first word is why it stands.
+    assert_receive {[:robot, :gate, :limits], %{limits: limits}}
+    assert limits == [:disarmed]
+  end
+
+  defp eventually_limits(id, limits) do
+    listen(id, [:robot, :gate, :limits])
+
+    case Board.fetch(Board.find!(id), :driving, :infinity) do
+      {:ok, %{limits: ^limits}, _at_ms} -> :ok
+      _others -> assert_receive {[:robot, :gate, :limits], %{limits: ^limits}}
+    end
+
+    Hal.Event.detach({Robot.Case, id, [:robot, :gate, :limits]})
+  end
+
+  test "whatever is wished, only sane speeds come out" do
+    id = robot(:gate4)
+    assert_receive {:drive, {:drive, twist}, _} when twist == @zero
+    for part <- [:watch, :executive], do: :ok = :sys.suspend(Names.whereis(id, part))
+
+    for wish <- [%{linear: :nan, turn: 0.0}, %{linear: 1.0e308, turn: 0.0}, :nonsense] do
+      Gate.wish(id, wish)
+      forget_drives()
+      assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v == 0.0, 200
+    end
+
+    Gate.wish(id, Twist.new(50.0, 0.0))
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v > 0 and v <= 0.1, 200
+  end
+end

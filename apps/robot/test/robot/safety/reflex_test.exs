@@ -1,0 +1,215 @@
+defmodule Robot.Safety.ReflexTest do
+  use ExUnit.Case, async: true
+  alias Hal.{Profile, Twist}
+  alias Robot.{Body, Wish}
+  alias Robot.Control.Arbiter
+  alias Robot.Safety.Reflex
+
+  defp gate(profile \\ Profile.magellan()),
+    do: profile |> Reflex.new() |> Reflex.sense({:sonar, Body.silence(profile)}, 0)
+
+  # Wishes and steps each 50 ms; gives the last twist, its limits and the gate.
+  defp run(reflex, twist, from_ms, steps) do
+    Enum.reduce(0..(steps - 1), {nil, [], reflex}, fn k, {_, _, reflex} ->
+      at_ms = from_ms + 50 * k
+
+      reflex
+      |> Reflex.sense({:sonar, Body.silence(reflex.profile)}, at_ms)
+      |> Reflex.wish(twist, at_ms)
+      |> Reflex.step(at_ms)
+    end)
+  end
+
+  test "stands until somebody wishes, and again 200 ms after the last wish" do
+    assert {twist, [:dead_man], _} = Reflex.step(gate(), 0)
+    assert Twist.zero?(twist)
+    {twist, _, reflex} = run(gate(), Twist.new(0.3, 0), 0, 20)
+    assert twist.linear == 0.3
+    assert {%Twist{linear: 0.3}, _, reflex} = Reflex.step(reflex, 1150)
+    assert {twist, [:dead_man], _} = Reflex.step(reflex, 1151)
+    assert Twist.zero?(twist)
+  end
+
+  test "speeds up no faster than the profile allows" do
+    {a, limits, reflex} = run(gate(), Twist.new(0.5, 1.0), 0, 1)
+    assert a == Twist.new(0.025, 0.05)
+    assert :acceleration in limits
+    {b, [], _} = run(reflex, Twist.new(0.5, 1.0), 50, 20)
+    assert b == Twist.new(0.5, 1.0)
+  end
+
+  test "an emergency stop is latched; after a reset a new wish is needed" do
+    {_, _, reflex} = run(gate(), Twist.new(0.5, 0), 0, 20)
+    stopped = Reflex.estop(reflex)
+    assert {twist, [:estop], stopped} = Reflex.step(stopped, 1000)
+    assert Twist.zero?(twist)
+    {twist, [:estop], stopped} = run(stopped, Twist.new(0.5, 0), 1050, 5)
+    assert Twist.zero?(twist)
+    released = Reflex.reset(stopped)
+    assert {_, [:dead_man], released} = Reflex.step(released, 1300)
+    assert {%Twist{linear: v}, _, _} = run(released, Twist.new(0.5, 0), 1350, 1)
+    assert v > 0
+    assert Reflex.new(Profile.magellan(), latched?: true).latched?
+  end
+
+  test "when whoever wished is no more, it stands at once, not by a ramp" do
+    {_, _, reflex} = run(gate(), Twist.new(0.5, 1.0), 0, 30)
+    assert {twist, [:dead_man], reflex} = reflex |> Reflex.forget() |> Reflex.step(1_500)
+    assert Twist.zero?(twist)
+    assert {%Twist{linear: v}, _, _} = run(reflex, Twist.new(0.5, 0.0), 1_550, 1)
+    assert v > 0
+  end
+
+  test "a drive that is not armed stands at once, and begins again from standing" do
+    {_, _, reflex} = run(gate(), Twist.new(0.5, 1.0), 0, 30)
+
+    for state <- [:disarmed, {:error, :unplugged}] do
+      stopped = Reflex.sense(reflex, {:arming, %{state: state, why: nil}}, 1_500)
+      assert {twist, [:disarmed], stopped} = run(stopped, Twist.new(0.5, 1.0), 1_500, 10)
+      assert Twist.zero?(twist)
+      armed = Reflex.sense(stopped, {:arming, %{state: :armed, why: nil}}, 2_000)
+      assert {first, [:acceleration | _], _} = run(armed, Twist.new(0.5, 1.0), 2_000, 1)
+      assert first == Twist.new(0.025, 0.05)
+      # The latch is stronger, and told first.
+      assert {_, [:estop], _} = Reflex.step(Reflex.estop(stopped), 2_000)
+    end
+
+    fresh = Reflex.new(Profile.magellan(), armed?: false)
+    assert {_, [:disarmed], _} = run(fresh, Twist.new(0.5, 0.0), 0, 3)
+  end
+
+  test "a touched side stops driving toward it, not away and not turning" do
+    for {segment, stops} <- [
+          {0, :ahead},
+          {1, :ahead},
+          {15, :ahead},
+          {8, :back},
+          {7, :back},
+          {4, :none}
+        ] do
+      {_, _, reflex} = run(gate(), Twist.new(0.3, 0.2), 0, 20)
+      touched = Reflex.sense(reflex, {:bumpers, [segment]}, 1000)
+      {ahead, limits, _} = run(touched, Twist.new(0.3, 0.2), 1000, 1)
+      assert ahead.linear == if(stops == :ahead, do: 0.0, else: 0.3)
+      assert :bumper in limits == (stops == :ahead)
+      assert ahead.turn == 0.2
+      {back, _, _} = run(touched, Twist.new(-0.3, 0), 1000, 30)
+      assert back.linear == if(stops == :back, do: 0.0, else: -0.3)
+    end
+  end
+
+  test "stops before what the sonars see in the direction of motion, and turns freely there" do
+    for profile <- [Profile.magellan(), Profile.atrv_mini()] do
+      ahead = Enum.find_index(profile.sonars, &(abs(&1.heading) < 0.01))
+      # Drives at a wall from 3 m: it stands before it, and with room left.
+      {gap, _} =
+        Enum.reduce(0..600, {3.0, gate(profile)}, fn k, {gap, reflex} ->
+          from_sonar = gap + profile.radius - Enum.at(profile.sonars, ahead).x
+          sonar = List.replace_at(Body.silence(profile), ahead, from_sonar)
+          reflex = Reflex.sense(reflex, {:sonar, sonar}, 50 * k)
+          reflex = Reflex.wish(reflex, Twist.new(0.5, 0.3), 50 * k)
+          {twist, _, reflex} = Reflex.step(reflex, 50 * k)
+          assert k < 10 or twist.turn == 0.3
+          assert gap > 0.125
+          {gap - 0.05 * twist.linear, reflex}
+        end)
+
+      assert gap < 0.18
+
+      sonar = List.replace_at(Body.silence(profile), ahead, 0.1)
+      reflex = profile |> Reflex.new() |> Reflex.sense({:sonar, sonar}, 0)
+      {twist, _, _} = reflex |> Reflex.wish(Twist.new(-0.3, 0), 0) |> Reflex.step(0)
+      assert twist.linear < 0
+      {twist, limits, _} = reflex |> Reflex.wish(Twist.new(0.3, 0), 0) |> Reflex.step(0)
+      assert {twist.linear, :near in limits} == {0.0, true}
+    end
+  end
+
+  test "without fresh sonars it creeps; a robot that has none does not" do
+    {twist, limits, _} =
+      Enum.reduce(0..40, {nil, [], gate()}, fn k, {_, _, reflex} ->
+        reflex |> Reflex.wish(Twist.new(0.5, 0), 50 * k) |> Reflex.step(50 * k)
+      end)
+
+    assert twist.linear == 0.1
+    assert :blind in limits
+    {twist, [], _} = run(Reflex.new(%{Profile.magellan() | sonars: []}), Twist.new(0.5, 0), 0, 30)
+    assert twist.linear == 0.5
+  end
+
+  test "the arbiter never beats the gate" do
+    numbers = [
+      0.0,
+      0.1,
+      -0.4,
+      3,
+      1.0e308,
+      -1.0e308,
+      99.0,
+      -50,
+      :nan,
+      nil,
+      "1",
+      {1, 2},
+      Bitwise.bsl(1, 4000)
+    ]
+
+    for _ <- 1..300 do
+      profile = Enum.random([Profile.magellan(), Profile.atrv_mini()])
+
+      Enum.reduce(1..40, {Reflex.new(profile), 0}, fn _, {reflex, at_ms} ->
+        at_ms = at_ms + Enum.random([10, 50, 50, 50, 130, 400])
+
+        wishes =
+          for by <- [:a, :b], do: %Wish{by: by, weight: :rand.uniform(), twist: twist(numbers)}
+
+        before = reflex.twist
+
+        reflex =
+          if :rand.uniform(3) > 1,
+            do: Reflex.wish(reflex, Arbiter.choose(wishes, :a).twist, at_ms),
+            else: reflex
+
+        reflex =
+          if :rand.uniform(9) == 1,
+            do: Reflex.wish(reflex, Enum.random([nil, :go, %{}, 7]), at_ms),
+            else: reflex
+
+        reflex = reflex |> Reflex.sense(reading(profile), at_ms)
+        reflex = if :rand.uniform(30) == 1, do: Reflex.estop(reflex), else: reflex
+        reflex = if :rand.uniform(20) == 1, do: Reflex.reset(reflex), else: reflex
+        since = reflex.at_ms
+        {twist, limits, reflex} = Reflex.step(reflex, at_ms)
+
+        assert Enum.all?([twist.linear, twist.turn], &is_float/1)
+        assert abs(twist.linear) <= profile.max_linear
+        assert abs(twist.turn) <= profile.max_turn
+        seconds = if since, do: min(at_ms - since, 200) / 1000, else: 0.05
+        dv = profile.max_acceleration * seconds + 1.0e-9
+        dw = profile.max_turn_acceleration * seconds + 1.0e-9
+
+        # Speeding up is never faster than the profile; braking at most twice; a hard stop is a stop.
+        assert abs(twist.linear) - abs(before.linear) <= dv
+        assert abs(twist.turn) - abs(before.turn) <= dw
+        assert twist.linear == 0.0 or abs(twist.linear - before.linear) <= 2 * dv
+        if reflex.latched?, do: assert(Twist.zero?(twist) and limits == [:estop])
+        {reflex, at_ms}
+      end)
+    end
+  end
+
+  defp twist(numbers), do: %Twist{linear: Enum.random(numbers), turn: Enum.random(numbers)}
+
+  defp reading(profile) do
+    Enum.random([
+      {:sonar, for(_ <- profile.sonars, do: 5.2 * :rand.uniform())},
+      {:sonar, [:broken | Body.silence(profile)]},
+      {:sonar, []},
+      {:bumpers, [:rand.uniform(16) - 1]},
+      {:bumpers, []},
+      {:bumpers, [:x]},
+      {:power, 24.0},
+      :rubbish
+    ])
+  end
+end

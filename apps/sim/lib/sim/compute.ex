@@ -1,0 +1,116 @@
+defmodule Sim.Compute do
+  @moduledoc """
+  The heavy work of a world: distance fields, sonar rays, camera pictures. In C where the library was
+  built, else in Elixir; both give the same bits, because every operation is an addition,
+  multiplication, division or square root of doubles in the same order.
+  """
+  alias Sim.Compute
+  alias Sim.Compute.Reference
+  alias Sim.World.{CameraFrustum, Palette}
+
+  @typedoc "What noise is drawn for; `nil` for none."
+  @type noise :: {seed :: integer(), step :: integer(), robot :: non_neg_integer()} | nil
+
+  @typedoc "A body: place and radius."
+  @type disc :: {float(), float(), float()}
+
+  @typedoc """
+  One robot's sonars: which of the discs it is itself, its place, cosine and sine of its heading, limits
+  of range, and for each sensor 12 doubles: place and the five directions of its cone.
+  """
+  @type ring ::
+          {index :: non_neg_integer(), x :: float(), y :: float(), cosine :: float(),
+           sine :: float(), least :: float(), most :: float(), geometry :: binary()}
+
+  @typedoc """
+  What a column of a picture shows of one pole: its rows and brightness.
+  """
+  @type piece ::
+          {column :: non_neg_integer(), Palette.kind(), first :: non_neg_integer(),
+           last :: non_neg_integer(), luma :: byte()}
+
+  # More robots than this may take longer than a normal scheduler should be held.
+  @few 32
+
+  @table 4096
+  @widest 4096
+
+  @doc "The field of a plan, one byte a cell, 0 free: see `Sim.Floorplan`."
+  @spec field(binary(), pos_integer(), pos_integer()) :: binary()
+  def field(walls, width, height) when byte_size(walls) == width * height,
+    do: module().field(walls, width, height)
+
+  @doc """
+  The sonar ranges of all rings. Noise is N(0, 0.01 + 0.01 r), for robot and sensor; its robot
+  is each ring's own.
+  """
+  @spec sonar(Sim.Floorplan.t(), [disc()], [ring()], noise()) :: [[float()]]
+  def sonar(map, discs, rings, noise) do
+    packed =
+      for {x, y, r} <- discs,
+          into: <<>>,
+          do: <<x::float-native, y::float-native, r::float-native>>
+
+    sonar(module(), pack(map), packed, rings, narrow(noise))
+  end
+
+  defp sonar(Compute.Native, map, discs, rings, noise) when length(rings) <= @few,
+    do: Compute.Native.sonar_few(map, discs, rings, noise)
+
+  defp sonar(Compute.Native, map, discs, rings, noise),
+    do: Compute.Native.sonar_many(map, discs, rings, noise)
+
+  defp sonar(module, map, discs, rings, noise), do: module.sonar_few(map, discs, rings, noise)
+
+  @doc "The pieces of poles that a camera sees, by columns from the left, the nearest first."
+  @spec look(Sim.Floorplan.t(), CameraFrustum.t(), [CameraFrustum.pole()]) :: [piece()]
+  def look(map, %CameraFrustum{} = sight, poles) do
+    pieces = module().look(pack(map), pack(sight), pack(poles))
+
+    for <<column::16-native, top::16-native, bottom::16-native, kind, luma <- pieces>>,
+      do: {column, Palette.kind(kind), top, bottom, luma}
+  end
+
+  @doc """
+  The bytes of an I420 picture. Noise is N(0, 3) for luma, N(0, 2) for chroma, and salt: one luma in
+  a thousand is white or black.
+  """
+  @spec paint(Sim.Floorplan.t(), CameraFrustum.t(), [CameraFrustum.pole()], noise()) :: binary()
+  def paint(map, %CameraFrustum{} = sight, poles, noise),
+    do: module().paint(pack(map), pack(sight), pack(poles), narrow(noise), tables())
+
+  # A picture's noise: sd 3 for luma, 2 for chroma. A row starts anywhere in the first @table draws.
+  @tables (for {sd, use} <- [{3, 0}, {2, 1}], k <- 0..(@table + @widest - 1), into: <<>> do
+             <<round(sd * Sim.Noise.gauss(Sim.Noise.hash(0, 0x9A17, use, rem(k, @table))))::8-signed>>
+           end)
+
+  @doc "The draws that pictures are blurred with, as `paint` takes them."
+  @spec tables() :: binary()
+  def tables, do: @tables
+
+  @doc "The arguments of the kernels as they take them."
+  @spec pack(Sim.Floorplan.t() | CameraFrustum.t() | [CameraFrustum.pole()]) :: tuple() | binary()
+  def pack(%{field: field, width: width, height: height, cell: cell}),
+    do: {field, width, height, cell}
+
+  def pack(%CameraFrustum{} = s),
+    do: {s.x, s.y, s.cosine, s.sine, s.eye, s.focal, s.horizon, s.width, s.height}
+
+  def pack(poles) when is_list(poles) do
+    for {x, y, r, height, kind} <- poles, into: <<>> do
+      %{paint: {luma, u, v}} = Palette.of(kind)
+
+      <<x::float-native, y::float-native, r::float-native, height::float-native,
+        Palette.index(kind), luma, u, v>>
+    end
+  end
+
+  defp narrow(nil), do: nil
+
+  defp narrow({seed, step, robot}) do
+    import Bitwise
+    {seed &&& 0xFFFFFFFF, step &&& 0xFFFFFFFF, robot}
+  end
+
+  defp module, do: if(Compute.Native.loaded?(), do: Compute.Native, else: Reference)
+end

@@ -1,0 +1,127 @@
+defmodule Sim.Compute.Columns do
+  @moduledoc "One column of a picture at a time, in plain Elixir: the meaning of `paint.c`. Pure."
+  alias Sim.Compute.Rays
+
+  @nearest 0.01
+  @farthest 1.0e6
+  @wall_height 2.5
+  # The lamp rides beside the camera, 8 degrees to its left.
+  @lamp_cosine 0.9902680687415704
+  @lamp_sine 0.13917310096006544
+
+  @type paint :: {kind :: byte(), luma :: byte(), u :: byte(), v :: byte()}
+  @type pole :: {x :: float(), y :: float(), radius :: float(), height :: float(), paint()}
+  @type piece :: {top :: non_neg_integer(), bottom :: non_neg_integer(), paint(), luma :: byte()}
+  @type room :: {wall_top :: integer(), wall_bottom :: integer(), wall_luma :: byte()}
+
+  @doc "The poles of a packed binary that this camera may see, each with the columns it can cover, rather too many than too few."
+  @spec poles(tuple(), binary()) :: [{Range.t(), pole()}]
+  def poles(sight, packed) do
+    for <<x::float-native, y::float-native, r::float-native, height::float-native, kind, luma, u,
+          v <- packed>>,
+        range <- [range(sight, x, y, r)],
+        range.first <= range.last,
+        do: {range, {x, y, r, height, {kind, luma, u, v}}}
+  end
+
+  defp range({sx, sy, cosine, sine, _eye, focal, _horizon, width, _height}, x, y, r) do
+    dx = x - sx
+    dy = y - sy
+    depth = cosine * dx + sine * dy
+    side = cosine * dy - sine * dx
+    middle = (width - 1) / 2
+
+    cond do
+      depth <= -r ->
+        1..0//1
+
+      depth <= 2 * r ->
+        0..(width - 1)//1
+
+      true ->
+        left = middle - focal * ((side + r) / if(side + r < 0.0, do: depth + r, else: depth - r))
+
+        right = middle - focal * ((side - r) / if(side - r < 0.0, do: depth - r, else: depth + r))
+
+        max(floor(left) - 1, 0)..min(ceil(right) + 1, width - 1)//1
+    end
+  end
+
+  @doc """
+  A column: its wall (`nil` when only the poles are asked for) and the visible pieces, the nearest first.
+  """
+  @spec column(tuple(), tuple(), [{Range.t(), pole()}], non_neg_integer(), :poles | :walls) ::
+          {room() | nil, [piece()]}
+  def column(map, {x, y, cosine, sine, _, focal, _, width, height} = sight, poles, column, what) do
+    k = ((width - 1) / 2 - column) / focal
+    rx = cosine - sine * k
+    ry = sine + cosine * k
+
+    hits =
+      for {range, pole} <- poles,
+          column in range,
+          depth = meet(sight, pole, rx, ry),
+          do: {depth, pole}
+
+    hits = Enum.sort_by(hits, &elem(&1, 0))
+
+    case {what, List.last(hits)} do
+      {:poles, nil} ->
+        {nil, []}
+
+      {:poles, {farthest, _}} ->
+        {wall, _axis} = Rays.wall(map, x, y, rx, ry, farthest)
+        {nil, cut(hits, sight, rx, ry, wall, height)}
+
+      {:walls, _} ->
+        {wall, axis} = Rays.wall(map, x, y, rx, ry, @farthest)
+        {room(sight, wall, axis), cut(hits, sight, rx, ry, wall, height)}
+    end
+  end
+
+  defp room({_, _, _, _, eye, focal, horizon, _width, height}, wall, axis) do
+    wall = max(wall, @nearest)
+    top = ceil(horizon - focal * (@wall_height - eye) / wall)
+    bottom = floor(horizon + focal * eye / wall)
+    luma = 150 - min(trunc(wall * 4), 70) - if(axis == 1, do: 14, else: 0)
+    {top |> max(0) |> min(height), bottom |> max(-1) |> min(height - 1), luma}
+  end
+
+  # The depth at which a ray meets a pole.
+  defp meet({sx, sy, _, _, _, _, _, _, _}, {x, y, r, _height, _paint}, rx, ry) do
+    mx = x - sx
+    my = y - sy
+    a = rx * rx + ry * ry
+    b = mx * rx + my * ry
+    under = b * b - a * (mx * mx + my * my - r * r)
+    if b > 0.0 and under >= 0.0, do: max((b - :math.sqrt(under)) / a, @nearest)
+  end
+
+  # All stand on the floor, so what is nearer hides everything below its upper edge.
+  defp cut([{depth, pole} | rest], sight, rx, ry, wall, covered)
+       when covered > 0 and depth <= wall do
+    {_, _, _, _, eye, focal, horizon, _, _} = sight
+    {_, _, _, height, paint} = pole
+    top = max(ceil(horizon - focal * (height - eye) / depth), 0)
+    bottom = min(floor(horizon + focal * eye / depth), covered - 1)
+
+    if top <= bottom do
+      piece = {top, bottom, paint, luma(sight, pole, rx, ry, depth)}
+      [piece | cut(rest, sight, rx, ry, wall, top)]
+    else
+      cut(rest, sight, rx, ry, wall, covered)
+    end
+  end
+
+  defp cut(_hits, _sight, _rx, _ry, _wall, _covered), do: []
+
+  defp luma({sx, sy, _, _, _, _, _, _, _}, {x, y, r, _height, {_, paint, _, _}}, rx, ry, depth) do
+    nx = (sx + rx * depth - x) / r
+    ny = (sy + ry * depth - y) / r
+    length = :math.sqrt(rx * rx + ry * ry)
+    lx = (ry * @lamp_sine - rx * @lamp_cosine) / length
+    ly = (0.0 - rx * @lamp_sine - ry * @lamp_cosine) / length
+    shade = 0.6 + 0.4 * (nx * lx + ny * ly)
+    trunc(paint * shade + 0.5) |> max(0) |> min(255)
+  end
+end

@@ -1,0 +1,31 @@
+defmodule Sim.Compute.Native do
+  @moduledoc false
+  # The kernels in C; `Sim.Compute` documents them. Every size is checked over there: wrong terms raise ArgumentError.
+  @on_load :load
+
+  @doc false
+  def load do
+    # Without the library the stubs remain, and the reference does the work.
+    _ = :erlang.load_nif(to_charlist(Application.app_dir(:sim, "priv/kernel")), 0)
+    :ok
+  end
+
+  @spec loaded?() :: boolean()
+  # The library replaces this. A plain `false` would tell compilers that infer types that it never is.
+  def loaded?, do: not function_exported?(__MODULE__, :loaded?, 0)
+
+  @spec field(binary(), pos_integer(), pos_integer()) :: binary()
+  def field(_walls, _width, _height), do: :erlang.nif_error(:nif_not_loaded)
+
+  @spec sonar_few(tuple(), binary(), [tuple()], tuple() | nil) :: [[float()]]
+  def sonar_few(_map, _discs, _rings, _noise), do: :erlang.nif_error(:nif_not_loaded)
+
+  @spec sonar_many(tuple(), binary(), [tuple()], tuple() | nil) :: [[float()]]
+  def sonar_many(_map, _discs, _rings, _noise), do: :erlang.nif_error(:nif_not_loaded)
+
+  @spec look(tuple(), tuple(), binary()) :: binary()
+  def look(_map, _sight, _poles), do: :erlang.nif_error(:nif_not_loaded)
+
+  @spec paint(tuple(), tuple(), binary(), tuple() | nil, binary()) :: binary()
+  def paint(_map, _sight, _poles, _noise, _tables), do: :erlang.nif_error(:nif_not_loaded)
+end

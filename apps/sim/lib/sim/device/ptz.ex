@@ -1,0 +1,43 @@
+defmodule Sim.Device.Ptz do
+  @moduledoc "The pan-tilt unit of a robot in a simulated world. Options as for `Sim.Device.Drive`."
+  @behaviour Hal.Ptz
+  alias Sim.{Lateness, World}
+
+  @impl Hal.Ptz
+  def init(options) do
+    options = Keyword.validate!(options, [:world, :robot])
+
+    with {:ok, line} <- World.Server.attach(options[:world], options[:robot], :ptz),
+         do: {:ok, %{line: line, robot: options[:robot], least: nil}}
+  end
+
+  @impl Hal.Ptz
+  def look(pan, tilt, %{line: {server, _}} = ptz) do
+    World.Server.look(server, ptz.robot, pan, tilt)
+    {:ok, ptz}
+  end
+
+  @doc "Takes any angle from 0.05 to 3 radians, at once."
+  @impl Hal.Ptz
+  def zoom(field_of_view, %{line: {server, _}} = ptz) do
+    World.Server.zoom(server, ptz.robot, field_of_view)
+    {:ok, ptz}
+  end
+
+  @impl Hal.Ptz
+  def handle_message({:world, server, {:readings, sent_ms, all}}, %{line: {server, _}} = ptz) do
+    {late?, least} = Lateness.late?(ptz.least, sent_ms, System.monotonic_time(:millisecond))
+    {:ok, if(late?, do: [], else: all), %{ptz | least: least}}
+  end
+
+  def handle_message({:world, server, {:error, reason}}, %{line: {server, _}} = ptz),
+    do: {:error, reason, ptz}
+
+  def handle_message({:DOWN, monitor, _, _, _}, %{line: {_, monitor}} = ptz),
+    do: {:error, :no_world, ptz}
+
+  def handle_message(_other, ptz), do: {:ok, [], ptz}
+
+  @impl Hal.Ptz
+  def terminate(ptz), do: World.Server.detach(ptz.line, ptz.robot, :ptz)
+end

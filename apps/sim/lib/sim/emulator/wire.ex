@@ -1,0 +1,166 @@
+defmodule Sim.Emulator.Wire do
+  @moduledoc """
+  One direction of a serial line that is not perfect: bytes are lost, come twice, come with one bit
+  turned, or come late; and a line can be pulled. Pure: what happens to the n-th byte is a hash of the seed, the
+  direction and n (`Sim.Noise`), so the same bytes meet the same faults again.
+
+  | option | allowed | default |
+  |---|---|---|
+  | `:drop`, `:double`, `:flip` | share of bytes, 0 to 1, together 1 at most | 0 |
+  | `:delay_ms` | `{least, most}`, whole milliseconds, for what is sent at one time | `{0, 0}` |
+  | `:seed` | whole number | 0 |
+  | `:way` | whole number that tells directions of one seed apart | 0 |
+
+  Bytes never overtake each other.
+  """
+  import Bitwise
+  alias Sim.Noise
+
+  @enforce_keys [:drop, :double, :flip, :delay_ms, :seed, :way]
+  defstruct @enforce_keys ++
+              [count: 0, sent: 0, queue: :queue.new(), last_ms: nil, plugged?: true]
+
+  @type t :: %__MODULE__{}
+
+  @defaults [drop: 0, double: 0, flip: 0, delay_ms: {0, 0}, seed: 0, way: 0]
+
+  @doc """
+  A wire, or one line that names what is wrong with its options.
+
+      iex> {:ok, wire} = Sim.Emulator.Wire.new(drop: 0.02)
+      iex> wire.flip
+      0
+      iex> Sim.Emulator.Wire.new(drop: 2)
+      {:error, "wire option :drop cannot be 2: a share from 0 to 1"}
+  """
+  @spec new(keyword()) :: {:ok, t()} | {:error, line :: String.t()}
+  def new(options \\ []) do
+    wrong =
+      Enum.find_value(options, fn {name, value} ->
+        cond do
+          not Keyword.has_key?(@defaults, name) ->
+            "unknown wire option #{inspect(name)}: #{Enum.join(Keyword.keys(@defaults), ", ")}"
+
+          not valid?(name, value) ->
+            "wire option #{inspect(name)} cannot be #{inspect(value)}: #{allowed(name)}"
+
+          true ->
+            nil
+        end
+      end)
+
+    options = Keyword.merge(@defaults, options)
+
+    cond do
+      wrong ->
+        {:error, wrong}
+
+      faults(options) > 1 ->
+        {:error, "wire options :drop, :double and :flip are 1 at most together"}
+
+      true ->
+        {:ok, struct!(__MODULE__, options)}
+    end
+  end
+
+  defp faults(options), do: options[:drop] + options[:double] + options[:flip]
+
+  defp valid?(name, share) when name in [:drop, :double, :flip],
+    do: is_number(share) and share >= 0 and share <= 1
+
+  defp valid?(:delay_ms, {least, most}),
+    do: is_integer(least) and is_integer(most) and least in 0..most//1 and most <= 60_000
+
+  defp valid?(:delay_ms, _other), do: false
+  defp valid?(_seed_or_way, value), do: is_integer(value)
+
+  defp allowed(name) when name in [:drop, :double, :flip], do: "a share from 0 to 1"
+  defp allowed(:delay_ms), do: "{least, most}, whole milliseconds up to 60000"
+  defp allowed(_seed_or_way), do: "a whole number"
+
+  @doc """
+  Sends bytes into the wire; a pulled one takes none.
+
+      iex> {:ok, wire} = Sim.Emulator.Wire.new(delay_ms: {5, 5})
+      iex> {early, wire} = wire |> Sim.Emulator.Wire.put("ab", 100) |> Sim.Emulator.Wire.take(104)
+      iex> {late, _wire} = Sim.Emulator.Wire.take(wire, 105)
+      iex> {early, late}
+      {"", "ab"}
+  """
+  @spec put(t(), iodata(), integer()) :: t()
+  def put(%__MODULE__{plugged?: false} = wire, _bytes, _at_ms), do: wire
+
+  def put(%__MODULE__{} = wire, bytes, at_ms) do
+    case IO.iodata_to_binary(bytes) do
+      <<>> -> wire
+      bytes -> queue(wire, spoil(wire, bytes), byte_size(bytes), at_ms)
+    end
+  end
+
+  defp queue(%{delay_ms: {least, most}} = wire, bytes, size, at_ms) do
+    draw = Noise.hash(wire.seed, wire.way, wire.sent, 1)
+    due_ms = at_ms + least + rem(draw, most - least + 1)
+    due_ms = if wire.last_ms, do: max(due_ms, wire.last_ms), else: due_ms
+
+    %{
+      wire
+      | count: wire.count + size,
+        sent: wire.sent + 1,
+        last_ms: due_ms,
+        queue: :queue.in({due_ms, bytes}, wire.queue)
+    }
+  end
+
+  defp spoil(%{drop: drop, double: double, flip: flip}, bytes)
+       when drop == 0 and double == 0 and flip == 0,
+       do: bytes
+
+  defp spoil(%{count: count} = wire, bytes) do
+    for {byte, k} <- Enum.with_index(:binary.bin_to_list(bytes), count),
+        draw = Noise.unit(Noise.hash(wire.seed, wire.way, k, 0)),
+        into: <<>>,
+        do: spoil_one(wire, byte, draw, k)
+  end
+
+  defp spoil_one(%{drop: drop}, _byte, draw, _k) when draw < drop, do: <<>>
+
+  defp spoil_one(%{drop: drop, double: double}, byte, draw, _k) when draw < drop + double,
+    do: <<byte, byte>>
+
+  defp spoil_one(%{drop: drop, double: double, flip: flip} = wire, byte, draw, k)
+       when draw < drop + double + flip,
+       do: <<bxor(byte, 1 <<< rem(Noise.hash(wire.seed, wire.way, k, 2), 8))>>
+
+  defp spoil_one(_wire, byte, _draw, _k), do: <<byte>>
+
+  @doc "What has come out at the other end by now."
+  @spec take(t(), integer()) :: {binary(), t()}
+  def take(%__MODULE__{} = wire, at_ms), do: take(wire, at_ms, [])
+
+  defp take(wire, at_ms, taken) do
+    case :queue.peek(wire.queue) do
+      {:value, {due_ms, bytes}} when due_ms <= at_ms ->
+        take(%{wire | queue: :queue.drop(wire.queue)}, at_ms, [taken | bytes])
+
+      _later_or_empty ->
+        {IO.iodata_to_binary(taken), wire}
+    end
+  end
+
+  @doc "When something comes out next; `nil` when nothing is on its way."
+  @spec next_ms(t()) :: integer() | nil
+  def next_ms(%__MODULE__{queue: queue}) do
+    case :queue.peek(queue) do
+      {:value, {due_ms, _bytes}} -> due_ms
+      :empty -> nil
+    end
+  end
+
+  @doc "Pulls the wire: what is on its way is lost, and all that is put into it until it is plugged."
+  @spec pull(t()) :: t()
+  def pull(%__MODULE__{} = wire), do: %{wire | plugged?: false, queue: :queue.new(), last_ms: nil}
+
+  @doc "Plugs it again."
+  @spec plug(t()) :: t()
+  def plug(%__MODULE__{} = wire), do: %{wire | plugged?: true}
+end

@@ -1,0 +1,83 @@
+defmodule Sim.Fleet.Nodes.PortMapper do
+  @moduledoc """
+  Erlang's port mapper (epmd) for as long as we need it: where none answers, one is started, and it ends with
+  the run, however that ends. One that was there before is left alone, and so is ours while others use it.
+  """
+
+  @host "127.0.0.1"
+  @address {127, 0, 0, 1}
+  @up_ms 2_000
+  @down_ms 3_000
+  # It reads until it is told, or until the VM has ended, however. An epmd with names does not end: those of
+  # our own nodes go in a moment, those of others stay, and with them the epmd.
+  @keeper """
+  trap '' INT TERM HUP
+  read -r _told
+  left=50
+  until "$1" -kill >/dev/null 2>&1; do
+    "$1" -names >/dev/null 2>&1 || exit 0
+    left=$((left - 1))
+    [ "$left" -gt 0 ] || exit 0
+    sleep 0.05
+  done
+  """
+
+  @typedoc "What ends the epmd that we started; `nil` where it is not ours."
+  @type t :: port() | nil
+
+  @doc "Sees to it that one answers, if that can be; its keeper belongs to the calling process."
+  @spec start() :: t()
+  def start do
+    program = System.find_executable("epmd") || Path.join(erts(), "epmd")
+
+    if not there?() and File.exists?(program) do
+      # A daemon, which does not hold our terminal. It returns before it listens.
+      System.cmd(program, ["-daemon"], env: [{"ERL_EPMD_ADDRESS", @host}])
+      await(now() + @up_ms)
+      sh = System.find_executable("sh")
+      options = [:exit_status, :hide, args: ["-c", @keeper, "keeper", program]]
+      Port.open({:spawn_executable, sh}, options)
+    end
+  end
+
+  @doc "Ends it, where it is ours and nobody else uses it. Our own node must have left it before."
+  @spec stop(t()) :: :ok
+  def stop(nil), do: :ok
+
+  def stop(keeper) do
+    Port.command(keeper, "end\n")
+
+    receive do
+      {^keeper, {:exit_status, _status}} -> :ok
+    after
+      @down_ms -> :ok
+    end
+  end
+
+  defp await(deadline) do
+    if not there?() and now() < deadline do
+      receive do
+      after
+        20 -> await(deadline)
+      end
+    end
+  end
+
+  defp there? do
+    case :gen_tcp.connect(@address, port(), [], 100) do
+      {:ok, socket} -> :gen_tcp.close(socket) == :ok
+      {:error, _none} -> false
+    end
+  end
+
+  defp port do
+    case Integer.parse(System.get_env("ERL_EPMD_PORT", "")) do
+      {port, ""} when port in 1..65_535 -> port
+      _default -> 4369
+    end
+  end
+
+  defp erts, do: Path.join([:code.root_dir(), "erts-#{:erlang.system_info(:version)}", "bin"])
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

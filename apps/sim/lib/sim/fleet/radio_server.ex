@@ -1,0 +1,99 @@
+defmodule Sim.Fleet.RadioServer do
+  @moduledoc """
+  Two radios for simulated robots, as transports of `Swarm.Comms`: one that counts and hands on at
+  once, and one that loses and delays by `Sim.Radio`.
+  """
+  use GenServer
+  alias Robot.Names
+  alias Sim.Radio
+  alias Swarm.{Comms, Mesh}
+
+  @poll_ms 5
+
+  @typedoc "What was sent, for the radio that never loses."
+  @type counter :: :counters.counters_ref()
+
+  @doc "The part of a fleet's tree that loses `loss` of all messages; none where none is lost."
+  @spec parts(number(), integer()) :: [Supervisor.child_spec()]
+  def parts(loss, seed) when loss > 0,
+    do: [%{id: __MODULE__, start: {__MODULE__, :start_link, [[seed: seed, loss: loss]]}}]
+
+  def parts(_no_loss, _seed), do: []
+
+  @doc "The transport of that part, or of none, and what counts its messages."
+  @spec radio(pid() | nil) :: {{module(), atom(), list()}, pid() | counter()}
+  def radio(nil), do: clear()
+  def radio(air), do: {transport(air), air}
+
+  @doc "The transport that never loses, and its counter."
+  @spec clear() :: {{module(), atom(), list()}, counter()}
+  def clear do
+    counter = :counters.new(1, [:write_concurrency])
+    {{__MODULE__, :hand_on, [counter]}, counter}
+  end
+
+  @doc false
+  @spec hand_on(counter(), atom(), [atom()], Swarm.Message.t()) :: :ok
+  def hand_on(counter, from, to, message) do
+    :counters.add(counter, 1, length(to))
+    Swarm.Comms.Transport.transmit(from, to, message)
+  end
+
+  @doc "Starts a radio that loses and delays; options as of `Sim.Radio.new/1`."
+  @spec start_link(keyword()) :: GenServer.on_start()
+  def start_link(options), do: GenServer.start_link(__MODULE__, Radio.new(options))
+
+  @doc "Its transport."
+  @spec transport(pid()) :: {module(), atom(), list()}
+  def transport(air), do: {__MODULE__, :transmit, [air]}
+
+  @doc false
+  @spec transmit(pid(), atom(), [atom()], Swarm.Message.t()) :: :ok
+  def transmit(air, from, to, message), do: GenServer.cast(air, {:transmit, from, to, message})
+
+  @doc "What was sent and lost so far, by either radio."
+  @spec counts(pid() | counter()) :: %{sent: non_neg_integer(), lost: non_neg_integer()}
+  def counts(air) when is_pid(air), do: GenServer.call(air, :counts)
+  def counts(counter), do: %{sent: :counters.get(counter, 1), lost: 0}
+
+  @impl GenServer
+  def init(radio), do: {:ok, %{radio: radio, polling?: false}}
+
+  @impl GenServer
+  def handle_cast({:transmit, from, to, message}, s),
+    do: {:noreply, poll(%{s | radio: Radio.send(s.radio, now(), from, to, message)})}
+
+  @impl GenServer
+  def handle_call(:counts, _from, s), do: {:reply, Map.take(s.radio, [:sent, :lost]), s}
+
+  @impl GenServer
+  def handle_info(:poll, s) do
+    {letters, radio} = Radio.receive(s.radio, now())
+    for {to, _from, message} <- letters, do: deliver(to, message)
+    {:noreply, poll(%{s | radio: radio, polling?: false})}
+  end
+
+  defp poll(%{polling?: true} = s), do: s
+
+  defp poll(s) do
+    if :gb_sets.is_empty(s.radio.queue) do
+      s
+    else
+      Process.send_after(self(), :poll, @poll_ms)
+      %{s | polling?: true}
+    end
+  end
+
+  # One by one: what one robot misses, another may hear. Where a robot is, its first heartbeats tell,
+  # and until then those of others go to everybody.
+  defp deliver(to, %{kind: kind} = message) do
+    cond do
+      Names.whereis(to, :link) -> Comms.hear(to, message)
+      is_map_key(Mesh.robots(), to) -> Mesh.speak([to], message)
+      kind == :heartbeat -> Mesh.speak(:all, message)
+      true -> :ok
+    end
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

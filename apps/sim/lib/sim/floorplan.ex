@@ -1,0 +1,120 @@
+defmodule Sim.Floorplan do
+  @moduledoc """
+  A floor plan of square cells, wall or free. The origin is at the centre, x right, y up, in metres;
+  outside of the plan all is wall. Pure.
+
+  `field` has one byte a cell, rows from the lowest y: the distance to the nearest wall in cells,
+  counted as a king moves in chess and at most 255; 0 is wall. Rays and bodies jump by it.
+  `room` is the rectangle round the origin where a fleet starts.
+  """
+  alias Sim.Floorplan.{Clearance, Drawing, Image, Starts}
+
+  @enforce_keys [:name, :width, :height, :cell, :field, :room]
+  defstruct @enforce_keys
+
+  @type point :: {x :: float(), y :: float()}
+  @type rectangle :: {left :: float(), low :: float(), right :: float(), high :: float()}
+  @type t :: %__MODULE__{
+          name: String.t(),
+          width: pos_integer(),
+          height: pos_integer(),
+          cell: float(),
+          field: binary(),
+          room: rectangle()
+        }
+
+  @doc """
+  A map by its name, with room for a fleet of this size: `"hall"`, `"hospital"`, `"arena"`, or a
+  bitmap with its size in metres, such as `"floor.png:16x12"`.
+
+      iex> {:ok, map} = Sim.Floorplan.open("hall", 6)
+      iex> Sim.Floorplan.size(map)
+      {18.0, 18.0}
+      iex> Sim.Floorplan.open("mars", 6)
+      {:error, "unknown map mars: hall, hospital, arena or FILE.png:WIDTHxHEIGHT in metres"}
+  """
+  @spec open(String.t(), pos_integer()) :: {:ok, t()} | {:error, String.t()}
+  def open(name, fleet) when name in ["hall", "hospital", "arena"] and fleet > 0,
+    do: {:ok, struct!(__MODULE__, Drawing.draw(name, fleet))}
+
+  def open(name, _fleet),
+    do: with({:ok, fields} <- Image.open(name), do: {:ok, struct!(__MODULE__, fields)})
+
+  @doc "Width and height in metres."
+  @spec size(t()) :: {float(), float()}
+  def size(%__MODULE__{} = map),
+    do: {Float.round(map.width * map.cell, 6), Float.round(map.height * map.cell, 6)}
+
+  @doc """
+  Whether there is wall at this point.
+
+      iex> {:ok, map} = Sim.Floorplan.open("hall", 6)
+      iex> {Sim.Floorplan.wall?(map, {0.0, 0.0}), Sim.Floorplan.wall?(map, {99.0, 0.0})}
+      {false, true}
+  """
+  @spec wall?(t(), point()) :: boolean()
+  def wall?(%__MODULE__{} = map, point), do: Clearance.steps(map, point) == 0
+
+  @doc """
+  Whether a disc of this radius fits here.
+
+      iex> {:ok, map} = Sim.Floorplan.open("hall", 6)
+      iex> {Sim.Floorplan.free?(map, {8.5, 0.0}, 0.4), Sim.Floorplan.free?(map, {8.5, 0.0}, 0.6)}
+      {true, false}
+  """
+  @spec free?(t(), point(), number()) :: boolean()
+  def free?(%__MODULE__{} = map, point, radius), do: clearance(map, point, radius) >= radius
+
+  @doc """
+  Distance from a point to the nearest wall, exact where it is less than `limit`, else at least
+  `limit`; 0 inside a wall.
+
+      iex> {:ok, map} = Sim.Floorplan.open("hall", 6)
+      iex> Sim.Floorplan.clearance(map, {8.5, 0.0}, 1.0)
+      0.5
+  """
+  @spec clearance(t(), point(), number()) :: float()
+  defdelegate clearance(map, point, limit), to: Clearance, as: :of
+
+  @doc "The nearest points of all wall cells closer than `limit`, each with its distance."
+  @spec near(t(), point(), number()) :: [{distance :: float(), point()}]
+  defdelegate near(map, point, limit), to: Clearance
+
+  @doc """
+  Poses to start from: in the room, at least 1.0 m between centres, 0.7 m from walls, 1.2 m from
+  the landmark, headings at random. One for each `{id, radius}`, all from the seed.
+
+      iex> {:ok, map} = Sim.Floorplan.open("hall", 2)
+      iex> {:ok, [a, b]} = Sim.Floorplan.starts(map, [mag1: 0.2, mag2: 0.2], 1, {0.0, 0.0})
+      iex> Hal.Pose.distance(a, b) >= 1.0
+      true
+  """
+  @spec starts(t(), [{atom(), float()}], integer(), point() | nil) ::
+          {:ok, [Hal.Pose.t()]} | {:error, String.t()}
+  def starts(%__MODULE__{} = map, robots, seed, landmark),
+    do: Starts.spread(map, robots, seed, landmark)
+
+  @doc """
+  Whether the landmark, 0.15 m in radius, can stand here.
+
+      iex> {:ok, map} = Sim.Floorplan.open("hall", 6)
+      iex> Sim.Floorplan.check_landmark(map, {9.0, 0.0})
+      {:error, "the landmark cannot stand at 9.0,0.0 of map hall: there is a wall"}
+  """
+  @spec check_landmark(t(), point()) :: :ok | {:error, String.t()}
+  def check_landmark(%__MODULE__{} = map, {x, y}) do
+    {right, high} = size(map)
+
+    cond do
+      abs(x) > right / 2 or abs(y) > high / 2 ->
+        {:error,
+         "the landmark cannot stand at #{x},#{y}: map #{map.name} is #{right} x #{high} m round its centre"}
+
+      free?(map, {x * 1.0, y * 1.0}, 0.15) ->
+        :ok
+
+      true ->
+        {:error, "the landmark cannot stand at #{x},#{y} of map #{map.name}: there is a wall"}
+    end
+  end
+end

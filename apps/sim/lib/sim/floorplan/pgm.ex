@@ -1,0 +1,90 @@
+defmodule Sim.Floorplan.Pgm do
+  @moduledoc "Reads PGM pictures as walls, plain (P2) and raw (P5), of up to 255 greys. Pure."
+  @typedoc "Rows from the top, one byte a pixel, 1 is wall."
+  @type picture :: {width :: pos_integer(), height :: pos_integer(), rows :: [binary()]}
+
+  @damaged {:error, "the picture is damaged"}
+
+  @doc """
+  The picture after the two letters of its kind, of at most so many pixels.
+
+      iex> Sim.Floorplan.Pgm.decode(?2, "\\n# a comment\\n3 2\\n255\\n0 255 255\\n255 255 100\\n", 99)
+      {:ok, {3, 2, [<<1, 0, 0>>, <<0, 0, 1>>]}}
+      iex> Sim.Floorplan.Pgm.decode(?5, "\\n3 2\\n255\\nabc", 99)
+      {:error, "the picture is damaged"}
+  """
+  @spec decode(?2 | ?5, binary(), pos_integer()) :: {:ok, picture()} | {:error, String.t()}
+  def decode(kind, bytes, most_pixels) do
+    with {:ok, width, bytes} <- number(bytes),
+         {:ok, height, bytes} <- number(bytes),
+         {:ok, most, <<blank, bytes::binary>>} when blank in ~c" \t\r\n" <- number(bytes) do
+      cond do
+        width < 1 or height < 1 or most < 1 ->
+          @damaged
+
+        width * height > most_pixels ->
+          {:error, "#{width} x #{height} pixels are too many"}
+
+        most > 255 ->
+          {:error, "more than 255 greys are not read, save it with 8 bits"}
+
+        true ->
+          pixels(kind, bytes, width, height, most)
+      end
+    else
+      _ -> @damaged
+    end
+  end
+
+  defp pixels(?5, bytes, width, height, most) when byte_size(bytes) >= width * height do
+    pixels =
+      for <<grey <- binary_part(bytes, 0, width * height)>>, into: <<>>, do: wall(grey, most)
+
+    {:ok, {width, height, cut(pixels, width)}}
+  end
+
+  defp pixels(?2, bytes, width, height, most) do
+    case plain(bytes, width * height, most, []) do
+      {:ok, pixels} -> {:ok, {width, height, cut(pixels, width)}}
+      :error -> @damaged
+    end
+  end
+
+  defp pixels(_kind, _bytes, _width, _height, _most), do: @damaged
+
+  defp plain(_bytes, 0, _most, done), do: {:ok, done |> Enum.reverse() |> IO.iodata_to_binary()}
+
+  defp plain(bytes, left, most, done) do
+    case number(bytes) do
+      {:ok, grey, bytes} -> plain(bytes, left - 1, most, [wall(grey, most) | done])
+      :error -> :error
+    end
+  end
+
+  defp cut(pixels, width) do
+    for row <- 0..(div(byte_size(pixels), width) - 1)//1,
+        do: binary_part(pixels, row * width, width)
+  end
+
+  defp wall(grey, most) when grey * 255 < 128 * most, do: <<1>>
+  defp wall(_grey, _most), do: <<0>>
+
+  defp number(<<blank, rest::binary>>) when blank in ~c" \t\r\n", do: number(rest)
+
+  defp number(<<"#", rest::binary>>) do
+    case :binary.split(rest, "\n") do
+      [_comment, rest] -> number(rest)
+      _no_end -> :error
+    end
+  end
+
+  defp number(<<digit, _::binary>> = bytes) when digit in ?0..?9, do: digits(bytes, 0)
+  defp number(_other), do: :error
+
+  # No number of ours has more than nine digits.
+  defp digits(<<digit, rest::binary>>, number) when digit in ?0..?9 and number < 100_000_000,
+    do: digits(rest, 10 * number + digit - ?0)
+
+  defp digits(<<digit, _::binary>>, _number) when digit in ?0..?9, do: :error
+  defp digits(rest, number), do: {:ok, number, rest}
+end

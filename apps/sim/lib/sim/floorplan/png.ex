@@ -1,0 +1,190 @@
+defmodule Sim.Floorplan.Png do
+  @moduledoc """
+  Reads PNG pictures as walls: grey of 1, 2, 4 or 8 bits, grey with alpha, RGB, RGBA of 8 bits a channel, and
+  palettes; not interlaced. What is transparent is white. Pure.
+  """
+  @typedoc "Rows from the top, one byte a pixel, 1 is wall."
+  @type picture :: {width :: pos_integer(), height :: pos_integer(), rows :: [binary()]}
+
+  @damaged {:error, "the picture is damaged"}
+
+  @doc "The picture in the chunks that follow the signature, of at most `most` pixels."
+  @spec decode(binary(), pos_integer()) :: {:ok, picture()} | {:error, String.t()}
+  def decode(chunks, most) do
+    with {:ok, [{"IHDR", header} | chunks]} <- chunks(chunks, []),
+         {:ok, {width, height, _, _} = header} <- header(header, most),
+         {:ok, bytes} <- inflate(for({"IDAT", data} <- chunks, do: data), size(header)) do
+      palette = palette(chunks)
+      rows = bytes |> rows(header) |> Enum.map(&walls(&1, header, palette))
+
+      if Enum.all?(rows, &(byte_size(&1) == width)),
+        do: {:ok, {width, height, rows}},
+        else: @damaged
+    else
+      {:ok, _no_header} -> @damaged
+      {:error, reason} -> {:error, reason}
+    end
+  end
+
+  defp chunks(
+         <<length::32, type::binary-size(4), data::binary-size(length), crc::32, rest::binary>>,
+         seen
+       ) do
+    cond do
+      :erlang.crc32([type, data]) != crc -> @damaged
+      type == "IEND" -> {:ok, Enum.reverse(seen)}
+      true -> chunks(rest, [{type, data} | seen])
+    end
+  end
+
+  defp chunks(_cut_short, _seen), do: @damaged
+
+  # Channels of each colour type.
+  @channels %{0 => 1, 2 => 3, 3 => 1, 4 => 2, 6 => 4}
+
+  defp header(<<width::32, height::32, depth, type, 0, 0, interlace>>, most)
+       when is_map_key(@channels, type) and width > 0 and height > 0 do
+    cond do
+      interlace != 0 -> {:error, "interlaced PNGs are not read, save it without interlacing"}
+      depth == 16 -> {:error, "16 bits a channel are not read, save it with 8"}
+      depth not in [1, 2, 4, 8] or (depth < 8 and type not in [0, 3]) -> @damaged
+      width * height > most -> {:error, "#{width} x #{height} pixels are too many"}
+      true -> {:ok, {width, height, depth, type}}
+    end
+  end
+
+  defp header(_other, _most), do: @damaged
+
+  defp stride({width, _height, depth, type}), do: div(width * depth * @channels[type] + 7, 8)
+  defp size({_, height, _, _} = header), do: height * (stride(header) + 1)
+
+  # Never more than the header says, whatever the data would unpack to.
+  defp inflate(data, size) do
+    z = :zlib.open()
+    :ok = :zlib.inflateInit(z)
+
+    try do
+      inflate(z, :zlib.safeInflate(z, data), [], size)
+    rescue
+      _damaged in [ErlangError, ArgumentError] -> @damaged
+    after
+      :zlib.close(z)
+    end
+  end
+
+  defp inflate(z, {state, output}, done, left) do
+    left = left - IO.iodata_length(output)
+    done = [done | output]
+
+    cond do
+      left <= 0 -> {:ok, done |> IO.iodata_to_binary()}
+      state == :finished -> @damaged
+      # Data that ends too early gives nothing more, for ever.
+      output == [] -> @damaged
+      true -> inflate(z, :zlib.safeInflate(z, []), done, left)
+    end
+  end
+
+  defp palette(chunks) do
+    {_, colours} = List.keyfind(chunks, "PLTE", 0, {"PLTE", <<>>})
+    {_, alphas} = List.keyfind(chunks, "tRNS", 0, {"tRNS", <<>>})
+    alphas = :binary.bin_to_list(alphas)
+
+    for {<<rgb::binary-size(3)>>, k} <-
+          Enum.with_index(for <<c::binary-size(3) <- colours>>, do: c),
+        into: %{},
+        do: {k, dark(rgb, Enum.at(alphas, k, 255))}
+  end
+
+  defp rows(bytes, {_, height, depth, type} = header) do
+    stride = stride(header)
+    pixel = max(div(depth * @channels[type], 8), 1)
+    zero = List.duplicate(0, stride)
+
+    {rows, _} =
+      Enum.map_reduce(0..(height - 1), zero, fn j, above ->
+        <<filter, row::binary>> = binary_part(bytes, j * (stride + 1), stride + 1)
+        row = unfilter(filter, :binary.bin_to_list(row), above, pixel)
+        {row, row}
+      end)
+
+    rows
+  end
+
+  defp unfilter(0, row, _above, _pixel), do: row
+
+  defp unfilter(2, row, above, _pixel),
+    do: Enum.zip_with(row, above, fn x, b -> rem(x + b, 256) end)
+
+  # What is left of a byte is what was done `pixel` bytes before it; before the row there is 0.
+  defp unfilter(filter, row, above, pixel) do
+    before = List.duplicate(0, pixel)
+    done = filter(filter, row, above, before ++ above, before, pixel)
+    done |> Enum.reverse() |> Enum.drop(pixel)
+  end
+
+  defp filter(_filter, [], _above, _corner, done, _pixel), do: done
+
+  defp filter(filter, [x | row], [b | above], [c | corner], done, pixel) do
+    a = left(done, pixel)
+    value = rem(x + guess(filter, a, b, c), 256)
+    filter(filter, row, above, corner, [value | done], pixel)
+  end
+
+  defp left([a | _], 1), do: a
+  defp left([_, a | _], 2), do: a
+  defp left([_, _, a | _], 3), do: a
+  defp left([_, _, _, a | _], 4), do: a
+
+  defp guess(1, a, _b, _c), do: a
+  defp guess(3, a, b, _c), do: div(a + b, 2)
+
+  defp guess(4, a, b, c) do
+    {pa, pb, pc} = {abs(b - c), abs(a - c), abs(a + b - 2 * c)}
+
+    cond do
+      pa <= pb and pa <= pc -> a
+      pb <= pc -> b
+      true -> c
+    end
+  end
+
+  # An unknown filter is left as it is; the picture will look wrong, not crash.
+  defp guess(_unknown, _a, _b, _c), do: 0
+
+  for depth <- [1, 2, 4, 8, 16] do
+    defp samples(bytes, unquote(depth)), do: for(<<s::size(unquote(depth)) <- bytes>>, do: s)
+  end
+
+  defp walls(row, {width, _, depth, type}, palette) do
+    bytes = :binary.list_to_bin(row)
+
+    case type do
+      0 ->
+        for grey <- samples(bytes, depth),
+            into: <<>>,
+            do: wall(2 * grey < Bitwise.bsl(1, depth))
+
+      2 ->
+        for <<rgb::binary-size(3) <- bytes>>, into: <<>>, do: wall(dark(rgb, 255))
+
+      3 ->
+        for k <- samples(bytes, depth), into: <<>>, do: wall(Map.get(palette, k, true))
+
+      4 ->
+        for <<grey, alpha <- bytes>>, into: <<>>, do: wall(dark(<<grey, grey, grey>>, alpha))
+
+      6 ->
+        for <<rgb::binary-size(3), alpha <- bytes>>, into: <<>>, do: wall(dark(rgb, alpha))
+    end
+    # The last byte of a row may hold more pixels than there are.
+    |> binary_part(0, width)
+  end
+
+  defp wall(true), do: <<1>>
+  defp wall(false), do: <<0>>
+
+  # Darker than half over white.
+  defp dark(<<r, g, b>>, alpha),
+    do: 255 * 1000 * 255 - alpha * (255_000 - (299 * r + 587 * g + 114 * b)) < 128_000 * 255
+end

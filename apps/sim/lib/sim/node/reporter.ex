@@ -1,0 +1,67 @@
+defmodule Sim.Node.Reporter do
+  @moduledoc """
+  Tells a fleet's launcher what its part says of itself, ten times a second, and each stage of a robot
+  of this node. A launcher that cannot be reached at once misses it: the next report is the newer one.
+
+  What it sends are messages `{Sim.Node.Reporter, pid, what}`, with the number of this process of the
+  operating system: `{:up, facts}`, `{:report, term}`, `{:stage, about}`.
+  """
+  use GenServer
+  alias Hal.Event
+
+  @period_ms 100
+
+  @doc "Starts it; `report` is `{m, f, a}`, called each time."
+  @spec start_link(pid(), {module(), atom(), list()}) :: GenServer.on_start()
+  def start_link(launcher, report), do: GenServer.start_link(__MODULE__, {launcher, report})
+
+  @doc "Tells the launcher something once; again and again until there is a way to it."
+  @spec tell(pid(), term()) :: :ok
+  def tell(courier, what), do: GenServer.cast(courier, {:tell, what})
+
+  @doc false
+  @spec stage(Event.name(), map(), map(), pid()) :: :ok
+  def stage(_event, _measurements, about, courier), do: tell(courier, {:stage, about})
+
+  @impl GenServer
+  def init({launcher, report}) do
+    :ok = Event.attach(__MODULE__, [:robot, :stage], &__MODULE__.stage/4, self())
+    me = System.pid() |> String.to_integer()
+    {:ok, schedule(%{launcher: launcher, report: report, me: me, waiting: [], next: now()})}
+  end
+
+  @impl GenServer
+  def handle_cast({:tell, what}, s), do: {:noreply, deliver(%{s | waiting: s.waiting ++ [what]})}
+
+  @impl GenServer
+  def handle_info(:report, %{report: {m, f, a}} = s) do
+    s = deliver(s)
+    if s.waiting == [], do: post(s, {:report, apply(m, f, a)})
+    {:noreply, schedule(s)}
+  end
+
+  # In their order: a stage before the one that follows it.
+  defp deliver(%{waiting: []} = s), do: s
+
+  defp deliver(%{waiting: [first | rest]} = s) do
+    case post(s, first) do
+      :ok -> deliver(%{s | waiting: rest})
+      # A run has a dozen stages; more than so many is a launcher that is gone.
+      _not_now -> %{s | waiting: Enum.take(s.waiting, -100)}
+    end
+  end
+
+  defp post(%{launcher: launcher} = s, what) do
+    if node(launcher) in Node.list(),
+      do: :erlang.send(launcher, {__MODULE__, s.me, what}, [:nosuspend, :noconnect]),
+      else: :noconnect
+  end
+
+  defp schedule(s) do
+    next = max(s.next + @period_ms, now())
+    Process.send_after(self(), :report, next, abs: true)
+    %{s | next: next}
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

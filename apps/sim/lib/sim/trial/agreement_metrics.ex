@@ -1,0 +1,122 @@
+defmodule Sim.Trial.AgreementMetrics do
+  @moduledoc """
+  How well a fleet agrees, judged from outside, part by part of a radio that may be cut: two leaders
+  in one part, and for how long; after a cut is mended, when one leads all, when they are in
+  formation, and how long robots stood still for it. Pure; fed every 100 ms.
+
+  A part is where everybody can reach everybody, if need be by way of others (`Sim.Radio.parts/2`).
+  """
+
+  defstruct rivals_ms: nil, rivals_worst_ms: 0, parts: nil, heals: []
+
+  @typedoc """
+  One time that parts became fewer: when, how many robots led then, in milliseconds from there until
+  one led all and until the fleet was in formation, and for how long somebody stood still, from the
+  first that stood to the last that went on; `nil` where that has not come yet.
+  """
+  @type heal :: %{
+          at_ms: integer(),
+          leaders: non_neg_integer(),
+          one_ms: integer() | nil,
+          formed_ms: integer() | nil,
+          stood_ms: integer() | nil,
+          stands_ms: integer() | nil
+        }
+
+  @typedoc "Since `rivals_ms` some part has more than one leader; `heals` has the newest first."
+  @type t :: %__MODULE__{
+          rivals_ms: integer() | nil,
+          rivals_worst_ms: non_neg_integer(),
+          parts: non_neg_integer() | nil,
+          heals: [heal()]
+        }
+
+  @doc """
+  One tick: what the living claim, the parts they are in, and who stands because the mission says so.
+  """
+  @spec note(t(), integer(), [{atom(), map()}], [[atom()]], [atom()]) :: t()
+  def note(accord, at_ms, claims, parts, standing) do
+    leaders = for {id, %{phase: :lead}} <- claims, do: id
+
+    accord
+    |> rivals(at_ms, parts, leaders)
+    |> heal(at_ms, length(parts), leaders)
+    |> follow(at_ms, parts, claims, standing)
+  end
+
+  @doc "For the report: seconds, oldest first."
+  @spec report(t()) :: map()
+  def report(accord) do
+    %{
+      rivals_max_s: accord.rivals_worst_ms / 1000,
+      heals:
+        for heal <- Enum.reverse(accord.heals) do
+          %{
+            at_s: heal.at_ms / 1000,
+            leaders: heal.leaders,
+            one_leader_s: seconds(heal.one_ms),
+            formed_s: seconds(heal.formed_ms),
+            stood_s: seconds(heal.stood_ms)
+          }
+        end
+    }
+  end
+
+  defp seconds(nil), do: nil
+  defp seconds(ms), do: ms / 1000
+
+  defp rivals(accord, at_ms, parts, leaders) do
+    if Enum.any?(parts, fn part -> Enum.count(leaders, &(&1 in part)) > 1 end) do
+      since = accord.rivals_ms || at_ms
+      worst = max(accord.rivals_worst_ms, at_ms - since + 100)
+      %{accord | rivals_ms: since, rivals_worst_ms: worst}
+    else
+      %{accord | rivals_ms: nil}
+    end
+  end
+
+  defp heal(%{parts: before} = accord, at_ms, parts, leaders)
+       when before != nil and parts < before do
+    heal = %{
+      at_ms: at_ms,
+      leaders: length(leaders),
+      one_ms: nil,
+      formed_ms: nil,
+      stood_ms: nil,
+      stands_ms: nil
+    }
+
+    %{accord | parts: parts, heals: [heal | accord.heals]}
+  end
+
+  defp heal(accord, _at_ms, parts, _leaders), do: %{accord | parts: parts}
+
+  defp follow(%{heals: []} = accord, _at_ms, _parts, _claims, _standing), do: accord
+
+  defp follow(%{heals: [heal | older]} = accord, at_ms, parts, claims, standing) do
+    one? = length(parts) == 1 and one?(claims)
+    formed? = one? and Enum.any?(claims, fn {_id, claim} -> claim[:formed] == true end)
+    past = at_ms - heal.at_ms
+    heal = if one?, do: %{heal | one_ms: heal.one_ms || past}, else: heal
+    heal = if formed?, do: %{heal | formed_ms: heal.formed_ms || past}, else: heal
+    %{accord | heals: [stand(heal, at_ms, standing) | older]}
+  end
+
+  # The first time that somebody stands after the mending, until nobody does.
+  defp stand(%{stood_ms: nil, stands_ms: nil} = heal, _at_ms, []), do: heal
+  defp stand(%{stood_ms: nil, stands_ms: nil} = heal, at_ms, _), do: %{heal | stands_ms: at_ms}
+  defp stand(%{stood_ms: nil} = heal, at_ms, []), do: %{heal | stood_ms: at_ms - heal.stands_ms}
+  defp stand(heal, _at_ms, _standing), do: heal
+
+  defp one?(claims) do
+    case Enum.uniq(for {_id, claim} <- claims, do: {claim[:leader], claim[:epoch]}) do
+      [{leader, _epoch}] when leader != nil ->
+        Enum.all?(claims, fn {id, claim} ->
+          claim[:phase] == if(id == leader, do: :lead, else: :follow)
+        end)
+
+      _several ->
+        false
+    end
+  end
+end

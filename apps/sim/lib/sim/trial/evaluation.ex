@@ -1,0 +1,196 @@
+defmodule Sim.Trial.Evaluation do
+  @moduledoc """
+  A run judged from outside, by true poses: how far each robot is from its slot, counted from the
+  leader's true pose. Robots never see this. Pure.
+  """
+  alias Hal.Pose
+  alias Sim.{Scene, World}
+  alias Sim.Trial.{AgreementMetrics, Claims, RunLog, Setup, Stuck}
+  alias Swarm.Formation
+  alias Swarm.Formation.Reference
+  alias Missions.Landmark.Blocker
+
+  @typedoc "A run at one instant; `claims` are those of the living."
+  @type run :: %{
+          at_ms: non_neg_integer(),
+          options: map(),
+          world: World.t(),
+          ledger: RunLog.t(),
+          claims: %{atom() => map()},
+          messages: %{sent: non_neg_integer(), lost: non_neg_integer()}
+        }
+
+  @doc "What a viewer sees."
+  @spec scene(run()) :: Scene.t()
+  def scene(run) do
+    leader = RunLog.leader(run.ledger)
+    slots = slots(run, leader)
+
+    robots =
+      for id <- run.options.robots do
+        claim = run.claims[id]
+        {_index, slot} = Map.get(slots, id, {nil, nil})
+
+        %{
+          id: id,
+          pose: World.truth(run.world, id),
+          radius: Setup.profile(id).radius,
+          alive: claim != nil,
+          state: state(claim),
+          slot: slot && Pose.point(slot),
+          leader?: id == leader,
+          uncertainty: claim[:uncertainty],
+          size_ppm: size(claim)
+        }
+      end
+
+    %Scene{
+      at_ms: run.at_ms,
+      map: run.world.map,
+      landmark: run.world.landmark,
+      robots: robots,
+      leader: leader,
+      epoch: run.ledger.epoch,
+      formation: formation(run, leader),
+      error: error(robots),
+      formed?: RunLog.formed?(run.ledger),
+      stages: RunLog.stages(run.ledger)
+    }
+  end
+
+  @doc "The report of a run, but for its wall time; keys as in the report."
+  @spec result(run()) :: map()
+  def result(run) do
+    scene = scene(run)
+    leader = scene.leader
+    slots = slots(run, leader)
+    {mean, max} = scene.error || {nil, nil}
+    {kind, spacing} = scene.formation
+
+    %{
+      seed: run.options.seed,
+      map: run.options.map,
+      robots: length(run.options.robots),
+      simulated_s: run.at_ms / 1000,
+      stages: scene.stages,
+      leader: leader,
+      leaders_at_once_max: run.ledger.leaders_at_once_max,
+      leader_changes: max(run.ledger.elections - 1, 0),
+      formation: %{
+        kind: kind,
+        spacing_m: spacing,
+        error_mean_m: mean,
+        error_max_m: max,
+        share_of_time_formed: RunLog.share_formed(run.ledger)
+      },
+      landmark_distance_m:
+        leader && scene.landmark &&
+          Pose.distance(World.truth(run.world, leader), scene.landmark),
+      collisions: run.world.collisions,
+      min_separation_m: run.world.min_separation,
+      claims: Claims.report(run.ledger.claims, run.at_ms, &worst(run, &1)),
+      stuck: Stuck.report(run.ledger.stuck),
+      messages: run.messages,
+      agreement: AgreementMetrics.report(run.ledger.accord),
+      fleet: for(r <- scene.robots, do: row(r, Map.get(slots, r.id), run.claims[r.id]))
+    }
+  end
+
+  @doc "How far the worst living robot of a leader's shape is from its slot, in metres; `nil` where it leads nobody."
+  @spec worst(run(), leader :: atom()) :: float() | nil
+  def worst(run, leader) do
+    errors =
+      for {id, {_place, slot}} <- slots(run, leader),
+          is_map_key(run.claims, id),
+          do: Pose.distance(World.truth(run.world, id), slot)
+
+    Enum.max(errors, fn -> nil end)
+  end
+
+  @doc "The living followers of whom `Sim.Trial.Stuck` judges whether they get on."
+  @spec followers(run()) :: [Stuck.row()]
+  def followers(run) do
+    leader = RunLog.leader(run.ledger)
+    shape = {leader, formation(run, leader)}
+
+    for {id, {_place, slot}} <- slots(run, leader), claim = run.claims[id], claim != nil do
+      error_m = Pose.distance(World.truth(run.world, id), slot)
+      %{id: id, claim: claim, error_m: error_m, slot: slot, shape: shape}
+    end
+  end
+
+  defp row(robot, slot, claim) do
+    %{
+      name: robot.id,
+      alive: robot.alive,
+      state: robot.state,
+      blocked_by: Blocker.words(claim[:blocked_by]),
+      x: robot.pose.x,
+      y: robot.pose.y,
+      theta: robot.pose.heading,
+      slot: if(robot.leader?, do: 0, else: slot && elem(slot, 0)),
+      error_m: Scene.slot_error(robot),
+      uncertainty_m: robot.uncertainty,
+      size_ppm: robot.size_ppm
+    }
+  end
+
+  # Slot number and true pose of each follower that the leader has in its order.
+  defp slots(_run, nil), do: %{}
+
+  defp slots(run, leader) do
+    case run.claims[leader] do
+      %{anchor: %Reference{} = anchor} ->
+        pose = World.truth(run.world, leader)
+        landmark = run.world.landmark
+        distance = if landmark, do: Pose.distance(pose, landmark), else: 1.6
+
+        anchor
+        |> true_slots(pose, distance)
+        |> Enum.zip(anchor.order)
+        |> Map.new(fn {{place, slot}, id} -> {id, {place, slot}} end)
+
+      _no_anchor ->
+        %{}
+    end
+  end
+
+  # The slots as the leader means them, hung from where it really stands.
+  defp true_slots(%Reference{trail: nil} = anchor, pose, distance) do
+    slots = anchor.formation |> Formation.slots(anchor.size, distance) |> List.to_tuple()
+    for place <- anchor.places, do: {place, Pose.compose(pose, elem(slots, place - 1))}
+  end
+
+  defp true_slots(%Reference{trail: trail, pose: {x, y, heading}}, pose, _distance) do
+    believed = Pose.new(x / 1000, y / 1000, heading / 1000)
+
+    for {{sx, sy, sh}, place} <- Enum.with_index(trail, 1) do
+      slot = Pose.relative(believed, Pose.new(sx / 1000, sy / 1000, sh / 1000))
+      {place, Pose.compose(pose, slot)}
+    end
+  end
+
+  defp formation(run, leader) do
+    case leader && run.claims[leader] do
+      %{anchor: %{formation: formation}} -> formation
+      _none -> run.options.formation
+    end
+  end
+
+  defp error(robots) do
+    case for robot <- robots, robot.alive, e = Scene.slot_error(robot), do: e do
+      [] -> nil
+      errors -> {Enum.sum(errors) / length(errors), Enum.max(errors)}
+    end
+  end
+
+  defp state(nil), do: :dead
+  defp state(%{blocked: true}), do: :blocked
+  defp state(%{phase: :follow, in_place: true}), do: :in_place
+  defp state(%{phase: :follow, unsure: true}), do: :unsure
+  defp state(%{phase: phase}), do: phase
+  defp state(_new), do: :idle
+
+  defp size(%{sight: %{size_ppm: size}}), do: size
+  defp size(_blind), do: nil
+end

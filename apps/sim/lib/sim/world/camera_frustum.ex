@@ -1,0 +1,46 @@
+defmodule Sim.World.CameraFrustum do
+  @moduledoc """
+  Where a robot's camera is and what its picture can hold. Pure.
+
+  A pinhole camera over the robot's centre; the horizon moves with the tilt as with a camera whose
+  film is shifted, so that upright edges stay columns. Pixel centres lie at whole numbers.
+  """
+  alias Sim.Trig
+
+  @enforce_keys [:x, :y, :cosine, :sine, :eye, :focal, :horizon, :width, :height]
+  defstruct @enforce_keys
+
+  @type t :: %__MODULE__{
+          x: float(),
+          y: float(),
+          cosine: float(),
+          sine: float(),
+          eye: float(),
+          focal: float(),
+          horizon: float(),
+          width: pos_integer(),
+          height: pos_integer()
+        }
+
+  @typedoc "Something upright and round: place, radius, height, and what it is."
+  @type pole :: {float(), float(), radius :: float(), height :: float(), Sim.World.Palette.kind()}
+
+  @doc "The camera of a body, with pictures of the profile's size."
+  @spec of(Sim.World.Body.t()) :: t()
+  def of(%Sim.World.Body{pose: pose, profile: %{camera: camera}} = body) do
+    {c, s} = Trig.cos_sin(pose.heading + body.pan)
+    focal = camera.width / 2 / Trig.tan(body.field_of_view / 2)
+
+    %__MODULE__{
+      x: pose.x,
+      y: pose.y,
+      cosine: c,
+      sine: s,
+      eye: camera.mount_height * 1.0,
+      focal: focal,
+      horizon: (camera.height - 1) / 2 + focal * Trig.tan(body.tilt),
+      width: camera.width,
+      height: camera.height
+    }
+  end
+end

@@ -1,0 +1,276 @@
+defmodule Sim.World.Server do
+  @moduledoc """
+  A world in real time: 50 ms every 50 ms. Simulated devices attach to it; it tells them what they
+  sense, and does what they ask for. It knows no robots' processes, only devices.
+
+  After each step a drive gets its readings and a pan-tilt unit its own; after each second one a
+  camera that has asked gets what moves, and paints its picture itself on the ground that it was
+  given when it attached (`Sim.World.CameraView`). A message to a device is `{:world, server, what}` with
+  `{:readings, sent_ms, list}`, `{:ground, ground}`, `{:view, moving}` or `{:error, :unknown_robot}`.
+
+  Devices may be on other nodes. Nothing here waits for one of them once it is attached: what cannot be
+  sent at once is lost, and what comes late is old (`Sim.Lateness`).
+
+  Wheels stand when the process of their drive ends, and also when no speed has come for 500 ms: that is
+  the body's own watchdog, for a robot that is frozen and can tell nothing any more.
+
+  Steps are set by absolute times, so the pace does not drift. A step that came late is not made up
+  for: then the world is slow, and says so by the event `[:sim, :server, :late]` with `late_ms`.
+  """
+  use GenServer
+  alias Hal.{Event, Pose, Twist}
+  alias Sim.World
+  alias Sim.World.CameraView
+
+  @step_ms 50
+  @late_ms 50
+  @watchdog_steps 10
+
+  @enforce_keys [:name, :world, :next]
+  defstruct @enforce_keys ++
+              [devices: %{}, owners: %{}, driven: %{}, asked: MapSet.new(), stats: nil]
+
+  @type kind :: :drive | :ptz | :camera
+  @type change ::
+          {:kill, robot :: atom()}
+          | {:displace, robot :: atom(), Pose.t()}
+          | {:move, Pose.point() | nil}
+  @type stats :: %{
+          steps: non_neg_integer(),
+          late_ms_max: non_neg_integer(),
+          late_ms_sum: non_neg_integer(),
+          busy_us: non_neg_integer(),
+          busy_us_max: non_neg_integer()
+        }
+
+  @doc "Starts a world's server. Options: `name` (any term), `world` (`Sim.World`)."
+  @spec start_link(keyword()) :: GenServer.on_start()
+  def start_link(options) do
+    options = Keyword.validate!(options, [:name, :world])
+    GenServer.start_link(__MODULE__, {options[:name], options[:world]})
+  end
+
+  @doc """
+  Attaches the calling process to a robot's body in a world, as its drive, pan-tilt unit or camera, in
+  place of the one before. Whoever attaches watches the server; the reference is of that monitor.
+  """
+  @spec attach(name :: term(), robot :: atom(), kind()) ::
+          {:ok, {pid(), reference()}} | {:error, :no_world}
+  def attach(name, robot, kind) do
+    case World.Directory.find(name) do
+      nil ->
+        {:error, :no_world}
+
+      server ->
+        post(server, {:attach, robot, kind, self()})
+        {:ok, {server, Process.monitor(server)}}
+    end
+  end
+
+  @doc "Detaches the calling process."
+  @spec detach({pid(), reference()}, robot :: atom(), kind()) :: :ok
+  def detach({server, monitor}, robot, kind) do
+    Process.demonitor(monitor, [:flush])
+    post(server, {:detach, robot, kind, self()})
+  end
+
+  @doc "The speed that a robot's wheels shall have."
+  @spec drive(pid(), robot :: atom(), Twist.t()) :: :ok
+  def drive(server, robot, twist), do: post(server, {:drive, robot, twist})
+
+  @doc "Where a robot's camera shall look."
+  @spec look(pid(), robot :: atom(), float(), float()) :: :ok
+  def look(server, robot, pan, tilt), do: post(server, {:look, robot, pan, tilt})
+
+  @doc "What field of view a robot's camera shall have, in radians."
+  @spec zoom(pid(), robot :: atom(), float()) :: :ok
+  def zoom(server, robot, angle), do: post(server, {:zoom, robot, angle})
+
+  @doc "Asks for the next view, for the camera attached."
+  @spec next(pid(), robot :: atom()) :: :ok
+  def next(server, robot), do: post(server, {:next, robot})
+
+  @doc "The world as it is."
+  @spec world(GenServer.server()) :: World.t()
+  def world(server), do: GenServer.call(server, :world)
+
+  @doc "How punctual it was, and how busy, since the last time that somebody asked."
+  @spec stats(GenServer.server()) :: stats()
+  def stats(server), do: GenServer.call(server, :stats)
+
+  @doc "Does one of these to a world, without waiting for a server that may be on another node."
+  @spec change(pid(), change()) :: :ok
+  def change(server, change), do: post(server, {:change, change})
+
+  @doc """
+  The same to a world as a value: a robot's body stops for ever, or is lifted to another pose; the landmark
+  glides there, or is taken away by `nil`.
+  """
+  @spec changed(World.t(), change()) :: World.t()
+  def changed(world, {:kill, robot}), do: World.kill(world, robot)
+  def changed(world, {:displace, robot, pose}), do: World.displace(world, robot, pose)
+  def changed(world, {:move, nil}), do: World.place_landmark(world, nil)
+  def changed(world, {:move, place}), do: World.move_landmark(world, place)
+
+  @impl GenServer
+  def init({name, %World{} = world}) do
+    # Time does not wait for those who live in it.
+    Process.flag(:priority, :high)
+    :ok = World.Directory.enter(name, self())
+    next = System.monotonic_time(:millisecond)
+    {:ok, schedule(%__MODULE__{name: name, world: world, next: next, stats: new_stats()})}
+  end
+
+  @impl GenServer
+  def handle_call(:world, _from, s), do: {:reply, s.world, s}
+  def handle_call(:stats, _from, s), do: {:reply, s.stats, %{s | stats: new_stats()}}
+
+  @impl GenServer
+  def handle_cast({:attach, robot, kind, pid}, s) do
+    if is_map_key(s.world.robots, robot) do
+      s = disown(s, {robot, kind, pid})
+      owners = Map.put(s.owners, Process.monitor(pid), {robot, kind, pid})
+      if kind == :camera, do: hand(pid, {:ground, CameraView.ground(s.world, robot)})
+      {:noreply, %{s | devices: Map.put(s.devices, {robot, kind}, pid), owners: owners}}
+    else
+      hand(pid, {:error, :unknown_robot})
+      {:noreply, s}
+    end
+  end
+
+  def handle_cast({:detach, robot, kind, pid}, s),
+    do: {:noreply, s |> disown({robot, kind, pid}) |> release(robot, kind, pid)}
+
+  def handle_cast({:drive, robot, twist}, s) do
+    world = World.drive(s.world, robot, twist)
+    {:noreply, %{s | world: world, driven: Map.put(s.driven, robot, world.step)}}
+  end
+
+  def handle_cast({:change, change}, s), do: {:noreply, %{s | world: changed(s.world, change)}}
+
+  def handle_cast({:look, robot, pan, tilt}, s),
+    do: {:noreply, %{s | world: World.look(s.world, robot, pan, tilt)}}
+
+  def handle_cast({:zoom, robot, angle}, s),
+    do: {:noreply, %{s | world: World.zoom(s.world, robot, angle)}}
+
+  def handle_cast({:next, robot}, s), do: {:noreply, %{s | asked: MapSet.put(s.asked, robot)}}
+
+  @impl GenServer
+  def handle_info(:step, s) do
+    begun = System.monotonic_time(:microsecond)
+    s = watch(s)
+    s = %{s | world: World.step(s.world, @step_ms)}
+    tell(s)
+    s = show(s)
+    {:noreply, s |> note(begun) |> schedule()}
+  end
+
+  def handle_info({:DOWN, monitor, :process, _pid, _reason}, s) do
+    case Map.pop(s.owners, monitor) do
+      {{robot, kind, pid}, owners} ->
+        {:noreply, release(%{s | owners: owners}, robot, kind, pid)}
+
+      {nil, _owners} ->
+        {:noreply, s}
+    end
+  end
+
+  # By steps of the world: on a busy machine all are slow together.
+  defp watch(%{world: %{step: step}} = s) do
+    silent = for {id, at} <- s.driven, step - at >= @watchdog_steps, do: id
+    world = Enum.reduce(silent, s.world, &stand(&2, &1))
+    %{s | world: world, driven: Map.drop(s.driven, silent)}
+  end
+
+  defp stand(world, id), do: World.drive(world, id, Twist.zero())
+
+  # A device that fails attaches again and again in one process.
+  defp disown(s, owner) do
+    monitors = for {monitor, ^owner} <- s.owners, do: monitor
+    Enum.each(monitors, &Process.demonitor(&1, [:flush]))
+    %{s | owners: Map.drop(s.owners, monitors)}
+  end
+
+  # Another process may have attached meanwhile.
+  defp release(s, robot, kind, pid) do
+    case s.devices do
+      %{{^robot, ^kind} => ^pid} ->
+        world = if kind == :drive, do: stand(s.world, robot), else: s.world
+        %{s | world: world, devices: Map.delete(s.devices, {robot, kind})}
+
+      _another ->
+        s
+    end
+  end
+
+  defp tell(%{devices: devices, world: world}) do
+    for id <- world.order do
+      {ptz, readings} = world |> World.readings(id) |> Enum.split_with(&match?({:ptz, _}, &1))
+      tell(devices, {id, :drive}, readings)
+      tell(devices, {id, :ptz}, ptz)
+    end
+  end
+
+  defp tell(_devices, _device, []), do: :ok
+
+  defp tell(devices, device, readings) do
+    case devices do
+      %{^device => pid} -> hand(pid, {:readings, System.monotonic_time(:millisecond), readings})
+      _none -> :ok
+    end
+  end
+
+  # Ten pictures a second.
+  defp show(%{world: %{at_ms: at_ms}} = s) when rem(at_ms, 2 * @step_ms) != 0, do: s
+
+  defp show(%{world: world} = s) do
+    poses = CameraView.poses(world)
+
+    told =
+      for id <- s.asked, pid = s.devices[{id, :camera}] do
+        alive? = World.alive?(world, id)
+        if not alive? or hand(pid, {:view, CameraView.moving(world, poses, id)}) == :ok, do: id
+      end
+
+    %{s | asked: MapSet.difference(s.asked, MapSet.new(told))}
+  end
+
+  # Without these options a send waits for a full buffer, or dials a node that is gone.
+  defp hand(pid, what) do
+    :erlang.send(pid, {:world, self(), what}, [:nosuspend, :noconnect])
+  end
+
+  defp post(server, request) do
+    :erlang.send(server, {:"$gen_cast", request}, [:nosuspend, :noconnect])
+    :ok
+  end
+
+  defp note(s, begun) do
+    late_ms = max(div(begun, 1_000) - s.next, 0)
+    busy_us = System.monotonic_time(:microsecond) - begun
+    about = %{world: s.name}
+    if late_ms > @late_ms, do: Event.execute([:sim, :server, :late], %{late_ms: late_ms}, about)
+
+    stats = s.stats
+
+    %{
+      s
+      | stats: %{
+          steps: stats.steps + 1,
+          late_ms_max: max(stats.late_ms_max, late_ms),
+          late_ms_sum: stats.late_ms_sum + late_ms,
+          busy_us: stats.busy_us + busy_us,
+          busy_us_max: max(stats.busy_us_max, busy_us)
+        }
+    }
+  end
+
+  defp new_stats, do: %{steps: 0, late_ms_max: 0, late_ms_sum: 0, busy_us: 0, busy_us_max: 0}
+
+  defp schedule(s) do
+    next = max(s.next + @step_ms, System.monotonic_time(:millisecond))
+    Process.send_after(self(), :step, next, abs: true)
+    %{s | next: next}
+  end
+end

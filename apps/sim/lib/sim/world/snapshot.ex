@@ -1,0 +1,37 @@
+defmodule Sim.World.Snapshot do
+  @moduledoc """
+  What of a world has changed since its start, small enough to be sent ten times a second; with the
+  world as it began, it gives the whole world back. Pure.
+
+  A world that is started again from it goes on where it was: only the sonars are fired anew by its
+  first step.
+  """
+  alias Sim.World
+  alias Sim.World.Body
+
+  @moving ~w(step at_ms landmark goal collisions min_separation together)a
+  @body ~w(pose odometry alive wanted ramp speed measured turn look pan tilt field_of_view pressed)a
+
+  @type t :: {[term()], [[term()]]}
+
+  @doc "The changed parts of a world."
+  @spec of(World.t()) :: t()
+  def of(%World{} = world) do
+    {values(world, @moving), for(id <- world.order, do: values(world.robots[id], @body))}
+  end
+
+  @doc "The world that began as `begun`, as it was at the snapshot."
+  @spec onto(World.t(), t()) :: World.t()
+  def onto(%World{} = begun, {world, bodies}) do
+    robots =
+      for {id, body} <- Enum.zip(begun.order, bodies), into: %{} do
+        %Body{} = at_start = begun.robots[id]
+        {id, changed(at_start, @body, body)}
+      end
+
+    changed(%{begun | robots: robots}, @moving, world)
+  end
+
+  defp values(struct, keys), do: Enum.map(keys, &Map.fetch!(struct, &1))
+  defp changed(struct, keys, values), do: struct!(struct, Enum.zip(keys, values))
+end

@@ -1,0 +1,233 @@
+defmodule Sim.ComputeTest do
+  use ExUnit.Case, async: true
+  alias Sim.Compute
+  alias Sim.Compute.{Rays, Reference}
+  alias Sim.World.CameraFrustum
+
+  # A plan of 10 to 60 cells a side with a few walls in it, and things to look at.
+  defp plan do
+    {width, height} = {9 + :rand.uniform(50), 9 + :rand.uniform(50)}
+    share = :rand.uniform() * 0.2
+
+    walls =
+      for _ <- 1..(width * height),
+          into: <<>>,
+          do: if(:rand.uniform() < share, do: <<1>>, else: <<0>>)
+
+    {walls, width, height}
+  end
+
+  defp map({walls, width, height}),
+    do: {Reference.field(walls, width, height), width, height, 0.05 + :rand.uniform() * 0.2}
+
+  # Somewhere in the plan or just outside of it.
+  defp place({_field, width, height, cell}),
+    do:
+      {(:rand.uniform() - 0.5) * 1.1 * width * cell,
+       (:rand.uniform() - 0.5) * 1.1 * height * cell}
+
+  # Directions along the axes and the diagonals are the hard ones.
+  defp heading,
+    do:
+      if(:rand.uniform(3) == 1,
+        do: (:rand.uniform(8) - 4) * :math.pi() / 4,
+        else: :rand.uniform() * 7
+      )
+
+  defp direction, do: Sim.Trig.cos_sin(heading())
+
+  defp noise,
+    do:
+      if(:rand.uniform(4) > 1,
+        do: {:rand.uniform(0xFFFFFFFF), :rand.uniform(1000), :rand.uniform(9)}
+      )
+
+  defp discs(map, count) do
+    for _ <- 1..count//1, {x, y} = place(map), into: <<>> do
+      <<x::float-native, y::float-native, 0.1 + :rand.uniform() / 3::float-native>>
+    end
+  end
+
+  defp rings(map, count) do
+    for index <- 0..(count - 1)//1 do
+      {x, y} = place(map)
+      {c, s} = direction()
+
+      geometry =
+        for _ <- 1..4, into: <<>> do
+          for(
+            {a, b} <- Enum.map(1..5, fn _ -> direction() end),
+            into: <<>>,
+            do: <<a::float-native, b::float-native>>
+          )
+          |> then(
+            &(<<:rand.uniform() - 0.5::float-native, :rand.uniform() - 0.5::float-native>> <> &1)
+          )
+        end
+
+      {index, x, y, c, s, 0.15, 5.1, geometry}
+    end
+  end
+
+  defp sight(map) do
+    {x, y} = place(map)
+    {c, s} = direction()
+    horizon = if :rand.uniform(2) == 1, do: 23.5, else: :rand.uniform() * 60
+
+    {x, y, c, s, 0.6, 20.0 + :rand.uniform() * 50, horizon, 2 * :rand.uniform(40),
+     2 * :rand.uniform(30)}
+  end
+
+  defp poles(map, count) do
+    for _ <- 1..count//1, {x, y} = place(map), into: <<>> do
+      <<x::float-native, y::float-native, 0.05 + :rand.uniform() / 2::float-native,
+        0.2 + :rand.uniform()::float-native, :rand.uniform(2) - 1, 205, 75, 137>>
+    end
+    # All of a kind are painted alike.
+    |> repaint()
+  end
+
+  defp repaint(poles) do
+    for <<shape::binary-size(32), kind, _paint::binary-size(3) <- poles>>, into: <<>> do
+      <<shape::binary, kind,
+        if(kind == 0, do: <<205, 75, 137>>, else: <<100, 100, 210>>)::binary>>
+    end
+  end
+
+  test "the library is there" do
+    assert Compute.Native.loaded?()
+  end
+
+  test "both find the same distance fields, and they are the king's distances" do
+    for _ <- 1..60 do
+      {walls, width, height} = plan()
+      field = Compute.Native.field(walls, width, height)
+      assert field == Reference.field(walls, width, height)
+
+      for _ <- 1..20 do
+        {i, j} = {:rand.uniform(width) - 1, :rand.uniform(height) - 1}
+        assert :binary.at(field, j * width + i) == king(walls, width, height, i, j)
+      end
+    end
+  end
+
+  defp king(walls, width, height, i, j) do
+    border = Enum.min([i + 1, width - i, j + 1, height - j])
+
+    for y <- 0..(height - 1),
+        x <- 0..(width - 1),
+        :binary.at(walls, y * width + x) != 0,
+        reduce: border do
+      least -> min(least, max(abs(x - i), abs(y - j)))
+    end
+  end
+
+  test "sonars: native and reference agree to the bit" do
+    for _ <- 1..150 do
+      map = map(plan())
+      count = :rand.uniform(6) - 1
+      {discs, rings, noise} = {discs(map, count), rings(map, count), noise()}
+      ranges = Compute.Native.sonar_few(map, discs, rings, noise)
+      assert ranges == Reference.sonar_few(map, discs, rings, noise)
+      assert ranges == Compute.Native.sonar_many(map, discs, rings, noise)
+    end
+  end
+
+  test "a jumping ray meets the wall that a creeping one meets" do
+    for _ <- 1..300 do
+      {_field, width, height, cell} = map = map(plan())
+      {x, y} = place(map)
+      {rx, ry} = direction()
+      {t, _axis} = Rays.wall(map, x, y, rx, ry, 50.0)
+
+      wall? = fn t ->
+        {px, py} = {x + rx * t + width * cell / 2, y + ry * t + height * cell / 2}
+        {i, j} = {floor(px / cell), floor(py / cell)}
+
+        i < 0 or j < 0 or i >= width or j >= height or
+          :binary.at(elem(map, 0), j * width + i) == 0
+      end
+
+      # Just behind the hit is wall; before it there is none, but for corners cut by less than a step.
+      assert t == 0.0 or Enum.any?([1.0e-9, 1.0e-6], &wall?.(t + &1))
+      crept = Enum.count(1..trunc(t / 0.01)//1, &wall?.(&1 * 0.01 - 0.005))
+      assert crept == 0
+    end
+  end
+
+  test "looking: native and reference agree" do
+    for _ <- 1..150 do
+      map = map(plan())
+      {sight, poles} = {sight(map), poles(map, :rand.uniform(9) - 1)}
+      assert Compute.Native.look(map, sight, poles) == Reference.look(map, sight, poles)
+    end
+  end
+
+  test "painting: native and reference agree to the byte" do
+    for _ <- 1..60 do
+      map = map(plan())
+      {sight, poles, noise} = {sight(map), poles(map, :rand.uniform(9) - 1), noise()}
+      picture = Compute.Native.paint(map, sight, poles, noise, Compute.tables())
+      assert picture == Reference.paint(map, sight, poles, noise, Compute.tables())
+      {width, height} = {elem(sight, 7), elem(sight, 8)}
+      assert {:ok, byte_size(picture)} == Hal.Frame.byte_size(:i420, width, height)
+    end
+  end
+
+  test "wrong terms are refused, not computed with" do
+    map = map({<<0::80>>, 5, 2})
+    {field, _, _, cell} = map
+    sight = sight(map)
+    tables = Compute.tables()
+    badarg = fn call -> assert_raise ArgumentError, call end
+    badarg.(fn -> Compute.Native.field(<<0::80>>, 5, 3) end)
+    badarg.(fn -> Compute.Native.field(<<>>, 0, 0) end)
+    badarg.(fn -> Compute.Native.sonar_few({field, 5, 3, cell}, <<>>, [], nil) end)
+    badarg.(fn -> Compute.Native.sonar_few(map, <<1>>, [], nil) end)
+    badarg.(fn -> Compute.Native.sonar_few(map, <<>>, [:no], nil) end)
+
+    badarg.(fn ->
+      Compute.Native.sonar_few(map, <<>>, [{0, 1.0e9, 0.0, 1.0, 0.0, 0.1, 5.0, <<>>}], nil)
+    end)
+
+    badarg.(fn ->
+      Compute.Native.sonar_few(map, <<>>, [{0, 0.0, 0.0, 1.0, 0.0, 0.1, 5.0, <<1>>}], nil)
+    end)
+
+    badarg.(fn -> Compute.Native.sonar_few(map, <<-1::64>>, [], nil) end)
+    badarg.(fn -> Compute.Native.sonar_few(map, <<>>, [], {-1, 0, 0}) end)
+    badarg.(fn -> Compute.Native.sonar_few(map, <<>>, [] ++ :tail, nil) end)
+    badarg.(fn -> Compute.Native.look(map, put_elem(sight, 7, 5000), <<>>) end)
+    badarg.(fn -> Compute.Native.look(map, put_elem(sight, 8, 3), <<>>) end)
+    badarg.(fn -> Compute.Native.look(map, sight, <<0::288>>) end)
+    badarg.(fn -> Compute.Native.paint(map, sight, <<>>, nil, <<tables::binary, 0>>) end)
+    badarg.(fn -> Compute.Native.paint(map, put_elem(sight, 5, 0.0), <<>>, nil, tables) end)
+    assert Compute.Native.look(map, sight, <<>>) == <<>>
+  end
+
+  test "draws are even, normal, and apart from each other" do
+    draws = for k <- 1..20_000, do: Sim.Noise.gauss(Sim.Noise.hash(1, 2, 3, k))
+    mean = Enum.sum(draws) / 20_000
+    assert_in_delta mean, 0.0, 0.03
+    assert_in_delta Enum.sum(Enum.map(draws, &(&1 * &1))) / 20_000, 1.0, 0.05
+    next = Enum.zip_with(draws, tl(draws), &(&1 * &2))
+    assert_in_delta Enum.sum(next) / 20_000, 0.0, 0.03
+    steps = for step <- 1..20_000, do: Sim.Noise.unit(Sim.Noise.hash(1, step, 3, 4))
+    assert_in_delta Enum.sum(steps) / 20_000, 0.5, 0.01
+  end
+
+  test "a camera's sight" do
+    body =
+      Sim.World.Body.new(
+        %{id: :mag1, profile: Hal.Profile.magellan(), pose: Hal.Pose.new(1, 2)},
+        0,
+        1,
+        :off
+      )
+
+    assert %CameraFrustum{x: 1.0, y: 2.0, width: 320, height: 240, horizon: 119.5} =
+             CameraFrustum.of(body)
+
+    assert_in_delta CameraFrustum.of(body).focal, 277.128, 0.001
+  end
+end

@@ -1,0 +1,140 @@
+defmodule Sim.World.ServerTest do
+  @moduledoc "A world in real time, and the devices that find it by its name."
+  use ExUnit.Case, async: false
+  @moduletag :capture_log
+  import Swarm.Case, only: [eventually: 1]
+  alias Hal.{Device, Pose, Profile, Twist}
+  alias Sim.World
+
+  setup do
+    unless World.Directory.running?(), do: start_supervised!(World.Directory)
+    {:ok, map} = Sim.Floorplan.open("hall", 1)
+    robot = %{id: :mag1, profile: Profile.magellan(), pose: Pose.new(-2, 0)}
+    world = World.new!(map: map, robots: [robot], landmark: {0.0, 0.0}, noise: :off)
+    %{world: world, name: make_ref()}
+  end
+
+  defp serve(name, world),
+    do: start_supervised!({World.Server, name: name, world: world}, id: name, restart: :temporary)
+
+  defp device(kind, driver, options) do
+    sink = {__MODULE__, :tell, [self(), kind]}
+    device = [kind: kind, driver: {driver, options}, sinks: [sink]]
+    start_supervised!({Device, device}, restart: :temporary, id: {kind, make_ref()})
+  end
+
+  @doc false
+  def tell(test, kind, reading), do: send(test, {kind, reading})
+
+  defp x(server), do: World.truth(World.Server.world(server), :mag1).x
+
+  test "a device waits for its world, and for the next one when it ends", %{
+    world: world,
+    name: name
+  } do
+    drive = device(:drive, Sim.Device.Drive, world: name, robot: :mag1)
+    assert_receive {:drive, {:health, :drive, {{:offline, :no_world}, _}}}, 3_000
+    server = serve(name, world)
+    assert_receive {:drive, {:health, :drive, {:online, _}}}, 5_000
+    assert_receive {:drive, {:odometry, _}}, 3_000
+    assert_receive {:drive, {:sonar, sonar}}, 3_000
+    assert length(sonar) == 16
+    refute_received {:drive, {:ptz, _}}
+
+    Process.exit(server, :kill)
+    assert_receive {:drive, {:health, :drive, {{:offline, :no_world}, _}}}, 5_000
+    stop_supervised(name)
+    serve(name, world)
+    assert_receive {:drive, {:health, :drive, {:online, _}}}, 5_000
+    assert Process.alive?(drive)
+  end
+
+  test "a device that attaches again and again is watched once, and not after it has left", %{
+    world: world,
+    name: name
+  } do
+    server = serve(name, world)
+
+    watched = fn ->
+      server |> Process.info(:monitors) |> elem(1) |> Enum.count(&(&1 == {:process, self()}))
+    end
+
+    for _ <- 1..3 do
+      {:ok, line} = World.Server.attach(name, :mag1, :drive)
+      # The call comes after the cast, so it has been carried out.
+      %World{} = World.Server.world(server)
+      assert watched.() == 1
+      World.Server.detach(line, :mag1, :drive)
+    end
+
+    {:ok, line} = World.Server.attach(name, :mag1, :drive)
+    {:ok, _again} = World.Server.attach(name, :mag1, :drive)
+    %World{} = World.Server.world(server)
+    assert watched.() == 1
+    World.Server.detach(line, :mag1, :drive)
+    %World{} = World.Server.world(server)
+    assert watched.() == 0
+  end
+
+  test "wheels do as asked, and stand when whoever drives them is gone", %{
+    world: world,
+    name: name
+  } do
+    server = serve(name, world)
+    drive = device(:drive, Sim.Device.Drive, world: name, robot: :mag1)
+    assert_receive {:drive, {:odometry, _}}, 3_000
+    Device.drive(drive, Twist.new(0.3, 0))
+    eventually(fn -> x(server) > -1.98 end)
+    monitor = Process.monitor(drive)
+    Process.exit(drive, :kill)
+    assert_receive {:DOWN, ^monitor, _, _, :killed}, 3_000
+    eventually(fn -> World.Server.world(server).robots.mag1.speed == {0.0, 0.0} end)
+    assert x(server) < -1.5
+  end
+
+  test "a camera paints its pictures, or finds blobs without painting", %{
+    world: world,
+    name: name
+  } do
+    serve(name, world)
+    device(:camera, Sim.Device.Camera, world: name, robot: :mag1)
+    assert_receive {:camera, {:frame, %Hal.Frame{format: :i420} = frame}}, 3_000
+    {:ok, [%{colour: "YellowLandmark"} = painted]} = Vision.blobs(frame, World.colours())
+
+    device(:camera, Sim.Device.Camera, world: name, robot: :mag1, blobs: :direct)
+
+    assert_receive {:camera,
+                    {:blobs, [%{colour: "YellowLandmark"} = direct], %{at_ms: _, pan: pan}}},
+                   500
+
+    assert_in_delta painted.x, direct.x, 3
+    assert pan == 0.0
+
+    for _ <- 1..3, do: assert_receive({:camera, {:blobs, _, _}}, 2_000)
+  end
+
+  test "a pan-tilt unit turns and tells where it looks", %{world: world, name: name} do
+    serve(name, world)
+    ptz = device(:ptz, Sim.Device.Ptz, world: name, robot: :mag1)
+    assert_receive {:ptz, {:ptz, %{pan: pan}}}, 3_000
+    assert pan == 0.0
+    Device.look(ptz, 0.5, 0.0)
+    assert_receive {:ptz, {:ptz, %{pan: pan}}} when pan > 0.45, 5_000
+  end
+
+  test "who is not in the world is told so", %{world: world, name: name} do
+    serve(name, world)
+    device(:drive, Sim.Device.Drive, world: name, robot: :mag9)
+    assert_receive {:drive, {:health, :drive, {{:offline, :unknown_robot}, _}}}, 3_000
+  end
+
+  test "the pace does not drift", %{world: world, name: name} do
+    server = serve(name, world)
+    before = {World.Server.world(server).at_ms, System.monotonic_time(:millisecond)}
+    eventually(fn -> World.Server.world(server).at_ms >= elem(before, 0) + 1_500 end)
+    took = System.monotonic_time(:millisecond) - elem(before, 1)
+    assert took in 1_400..6_000
+    assert %{steps: steps, late_ms_max: _} = World.Server.stats(server)
+    assert steps >= 30
+  end
+end

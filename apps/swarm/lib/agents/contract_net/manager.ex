@@ -1,0 +1,203 @@
+defmodule Agents.ContractNet.Manager do
+  @moduledoc """
+  Gives one task to whoever does it for least. Pure; time is passed in, in milliseconds.
+
+      announce --all have bid, or 0.5 s--> award --done--> over
+         ^                                   |
+         '--- nobody bid, winner gone, ------'
+              failed, or silent for 5 s
+
+  The smallest `{cost, peer}` wins, so that nothing depends on who was first to answer. Each
+  announcement is a *round* with a number, which all its letters carry. A winner that failed is not
+  asked again. One that was given up and reports after all is told to stop; if it has done the task,
+  the task is done, and whoever does it now is told to stop. A task may be done twice, never not at all
+  while somebody can: what must happen once at most is no task for an auction.
+
+  `start/4` takes `:bid_ms` (500), `:silence_ms` (5000) and `:rounds` (3), how often it is announced.
+  Functions return the letters to send, `{peer, performative, content}`.
+  """
+  alias Swarm.Message.WireTypes
+
+  @enforce_keys [:task, :peers, :bid_ms, :silence_ms, :rounds]
+  defstruct @enforce_keys ++
+              [
+                phase: :bidding,
+                round: 0,
+                bids: %{},
+                winner: nil,
+                awarded: [],
+                due_ms: 0,
+                outcome: nil
+              ]
+
+  @type peer :: term()
+  @type letter :: {peer(), Agents.Envelope.performative(), content :: term()}
+  @type outcome ::
+          {:ok, winner :: peer(), result :: term()} | {:error, :nobody | :no_bids | :given_up}
+  @typedoc "`due_ms` is when time alone changes something; `bids` holds a cost, or `:refused`; `awarded` who ever won."
+  @type t :: %__MODULE__{
+          task: term(),
+          peers: [peer()],
+          bid_ms: pos_integer(),
+          silence_ms: pos_integer(),
+          rounds: pos_integer(),
+          phase: :bidding | :working | :over,
+          round: non_neg_integer(),
+          bids: %{peer() => number() | :refused},
+          winner: peer() | nil,
+          awarded: [peer()],
+          due_ms: integer(),
+          outcome: outcome() | nil
+        }
+
+  @doc "Announces a task."
+  @spec start(term(), [peer()], keyword(), integer()) :: {t(), [letter()]}
+  def start(task, peers, options, now_ms) do
+    fields = [task: task, peers: Enum.sort(Enum.uniq(peers))]
+    announce(struct!(__MODULE__, fields ++ options!(options)), :nobody, now_ms)
+  end
+
+  @doc "The options of a manager, whole; wrong ones raise with one line."
+  @spec options!(keyword()) :: keyword()
+  def options!(options) do
+    options = Keyword.validate!(options, bid_ms: 500, silence_ms: 5_000, rounds: 3)
+
+    for {option, value} <- options, not (WireTypes.ms?(value) and value > 0) do
+      raise ArgumentError,
+            "#{option} cannot be #{inspect(value, limit: 5)}: a whole number above 0, ms up to a day"
+    end
+
+    options
+  end
+
+  @doc "A letter came from one of the peers. What makes no sense changes nothing."
+  @spec hear(t(), peer(), Agents.Envelope.performative(), term(), integer()) :: {t(), [letter()]}
+  def hear(%{phase: :bidding, round: round} = m, peer, :propose, {round, cost}, now_ms)
+      when is_number(cost),
+      do: bid(m, peer, cost, now_ms)
+
+  # It has an answer to wait for, and its bid would bind it in vain.
+  def hear(m, peer, :propose, {round, _cost}, _now_ms), do: {m, [{peer, :reject, round}]}
+
+  def hear(%{phase: :bidding, round: round} = m, peer, :refuse, {round, _why}, now_ms),
+    do: bid(m, peer, :refused, now_ms)
+
+  def hear(%{phase: :over} = m, peer, :inform, {round, :progress, _note}, _now_ms),
+    do: {m, [{peer, :cancel, round}]}
+
+  def hear(%{phase: :over} = m, _peer, _performative, _content, _now_ms), do: {m, []}
+
+  def hear(%{phase: :bidding} = m, peer, :failure, _why, now_ms),
+    do: bid(m, peer, :refused, now_ms)
+
+  def hear(m, peer, :inform, {_round, :done, result}, _now_ms) do
+    letters = for {other, told} <- bound(m), other != peer, do: {other, told, m.round}
+
+    if peer in m.awarded,
+      do: {%{m | phase: :over, outcome: {:ok, peer, result}}, letters},
+      else: {m, []}
+  end
+
+  def hear(
+        %{phase: :working, winner: peer, round: round} = m,
+        peer,
+        performative,
+        content,
+        now_ms
+      ) do
+    case {performative, content} do
+      {:agree, ^round} -> {%{m | due_ms: now_ms + m.silence_ms}, []}
+      {:inform, {^round, :progress, _note}} -> {%{m | due_ms: now_ms + m.silence_ms}, []}
+      {:refuse, {^round, _why}} -> announce(m, :given_up, now_ms)
+      {:failure, {^round, _why}} -> m |> without(peer) |> announce(:given_up, now_ms)
+      # It could not even read what it was told.
+      {:failure, :error} -> m |> without(peer) |> announce(:given_up, now_ms)
+      _other -> {m, []}
+    end
+  end
+
+  def hear(m, peer, :inform, {round, :progress, _note}, _now_ms),
+    do: {m, [{peer, :cancel, round}]}
+
+  def hear(m, _peer, _performative, _content, _now_ms), do: {m, []}
+
+  @doc "A peer is gone, or cannot be reached."
+  @spec gone(t(), peer(), integer()) :: {t(), [letter()]}
+  def gone(%{phase: :over} = m, _peer, _now_ms), do: {m, []}
+
+  def gone(%{phase: :working, winner: peer} = m, peer, now_ms),
+    do: m |> without(peer) |> announce(:given_up, now_ms)
+
+  def gone(m, peer, now_ms), do: m |> without(peer) |> decide(now_ms)
+
+  @doc "Time has passed; call it at `due_ms`."
+  @spec tick(t(), integer()) :: {t(), [letter()]}
+  def tick(%{due_ms: due_ms} = m, now_ms) when now_ms < due_ms, do: {m, []}
+  def tick(%{phase: :over} = m, _now_ms), do: {m, []}
+
+  def tick(%{phase: :bidding} = m, now_ms) do
+    case best(m) do
+      nil -> announce(m, :no_bids, now_ms)
+      winner -> award(m, winner, now_ms)
+    end
+  end
+
+  def tick(%{phase: :working, winner: winner} = m, now_ms) do
+    cancel = {winner, :cancel, m.round}
+    {m, letters} = m |> without(winner) |> announce(:given_up, now_ms)
+    {m, [cancel | letters]}
+  end
+
+  defp bid(m, peer, cost, now_ms) do
+    if peer in m.peers,
+      do: decide(%{m | bids: Map.put_new(m.bids, peer, cost)}, now_ms),
+      else: {m, []}
+  end
+
+  # Before the deadline only when nobody is left to wait for, and somebody bids: those that are busy
+  # may be free in the next round.
+  defp decide(%{phase: :bidding} = m, now_ms) do
+    winner = best(m)
+
+    cond do
+      m.peers == [] -> over(m, :nobody)
+      winner && Enum.all?(m.peers, &is_map_key(m.bids, &1)) -> award(m, winner, now_ms)
+      true -> {m, []}
+    end
+  end
+
+  defp decide(m, _now_ms), do: {m, []}
+
+  defp best(m) do
+    bids = for {peer, cost} <- m.bids, is_number(cost), do: {cost, peer}
+    with {_cost, peer} <- Enum.min(bids, fn -> nil end), do: peer
+  end
+
+  defp award(m, winner, now_ms) do
+    others =
+      for {peer, cost} <- m.bids, is_number(cost), peer != winner, do: {peer, :reject, m.round}
+
+    m = %{m | phase: :working, winner: winner, due_ms: now_ms + m.silence_ms}
+    m = %{m | awarded: [winner | m.awarded]}
+    {m, [{winner, :accept, m.round} | others]}
+  end
+
+  defp announce(%{round: round, rounds: round} = m, why, _now_ms), do: over(m, why)
+  defp announce(%{peers: []} = m, _why, _now_ms), do: over(m, :nobody)
+
+  defp announce(m, _why, now_ms) do
+    round = m.round + 1
+    due_ms = now_ms + m.bid_ms
+    m = %{m | phase: :bidding, round: round, bids: %{}, winner: nil, due_ms: due_ms}
+    {m, for(peer <- m.peers, do: {peer, :cfp, {round, m.task, m.bid_ms}})}
+  end
+
+  defp over(m, why), do: {%{m | phase: :over, outcome: {:error, why}}, []}
+
+  defp without(m, peer),
+    do: %{m | peers: List.delete(m.peers, peer), bids: Map.delete(m.bids, peer)}
+
+  # Who is bound to this manager now.
+  defp bound(%{phase: :working} = m), do: [{m.winner, :cancel}]
+  defp bound(m), do: for({peer, cost} <- m.bids, is_number(cost), do: {peer, :reject})
+end

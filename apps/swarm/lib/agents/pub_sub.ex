@@ -1,0 +1,46 @@
+defmodule Agents.PubSub do
+  @moduledoc """
+  Events between the processes of one node, whoever carries them: `Agents.PubSub.Local`, which is always
+  there, or `Agents.PubSub.Phoenix`, where `phoenix_pubsub` is. For news between robots, see `Agents.Topic`.
+
+      children = [{Agents.PubSub.Local, name: Hall.Events}]
+      bus = {Agents.PubSub.Local, Hall.Events}
+
+      :ok = Agents.PubSub.subscribe(bus, "blobs:mag1")
+      :ok = Agents.PubSub.broadcast(bus, "blobs:mag1", {:blobs, []})
+
+  Whoever starts a bus supervises it, and hands `{module, name}` to those who are to use it. Topics
+  are text. Messages arrive as they are; who subscribes twice gets them twice. A subscription ends with
+  its process, or with the bus.
+  """
+
+  @type name :: atom()
+  @type bus :: {module(), name()}
+  @type topic :: String.t()
+
+  @doc "The bus as a child. Option: `:name`."
+  @callback child_spec(keyword()) :: Supervisor.child_spec()
+
+  @doc "The calling process gets what is told under this topic."
+  @callback subscribe(name(), topic()) :: :ok | {:error, :down}
+
+  @doc "No longer, however often it has subscribed."
+  @callback unsubscribe(name(), topic()) :: :ok | {:error, :down}
+
+  @doc "Tells all subscribers on this node."
+  @callback broadcast(name(), topic(), message :: term()) :: :ok | {:error, :down}
+
+  @doc "Subscribes the calling process. `{:error, :down}`: there is no such bus now."
+  @spec subscribe(bus(), topic()) :: :ok | {:error, :down}
+  def subscribe({module, name}, topic) when is_binary(topic), do: module.subscribe(name, topic)
+
+  @doc "Ends all subscriptions of the calling process to a topic."
+  @spec unsubscribe(bus(), topic()) :: :ok | {:error, :down}
+  def unsubscribe({module, name}, topic) when is_binary(topic),
+    do: module.unsubscribe(name, topic)
+
+  @doc "Tells all subscribers of a topic on this node."
+  @spec broadcast(bus(), topic(), term()) :: :ok | {:error, :down}
+  def broadcast({module, name}, topic, message) when is_binary(topic),
+    do: module.broadcast(name, topic, message)
+end

@@ -1,0 +1,112 @@
+defmodule Agents.Topic do
+  @moduledoc """
+  News for whoever wants them, on all connected nodes.
+
+      {:ok, poses} = Agents.Topic.subscribe(:poses, template: [from: :mag1], limit: 20)
+      Agents.Topic.publish(:poses, :mag1, {1.0, 2.0}, class: :telemetry)
+      {:ok, envelope} = Agents.Topic.next(poses, 1_000)
+
+  A topic is an atom of the program, or text; on each node `{:topic, name}` is a group of the directory.
+  Nothing is kept for those who come later, and publishing waits for nobody.
+
+  Each subscription is a small process that keeps what its owner has not asked for yet, no more than a
+  limit, by the rules of `Agents.Mailbox`: a slow reader loses old telemetry, and nobody else anything. It
+  ends with its owner. A process with other things to do asks with `more/1`, and gets one message
+  `{:topic, subscription, envelope}` for it. A `Agents.Responder` has its own way, `:topics`.
+  """
+  alias Agents.{Conversation, Envelope, Mailbox, Template}
+  alias Swarm.Directory
+  alias Agents.Topic.Subscription
+
+  @limit 100
+
+  @doc """
+  Subscribes the calling process. Options: `:limit`, how many envelopes may wait (default #{@limit}), and
+  `:template`, which ones (`Agents.Template`). Wrong ones are an error of one line.
+  """
+  @spec subscribe(Envelope.topic(), keyword()) :: {:ok, pid()} | {:error, line :: String.t()}
+  def subscribe(topic, options \\ []) do
+    with :ok <- named(topic),
+         :ok <- known(options),
+         {:ok, limit} <- Mailbox.limit(Keyword.get(options, :limit, @limit)),
+         {:ok, template} <- Template.check(Keyword.get(options, :template, [])),
+         do: Subscription.start_link(self(), topic, limit, template)
+  end
+
+  @doc "Ends a subscription. What it has sent already may still be in the mailbox of its owner."
+  @spec unsubscribe(subscription :: pid()) :: :ok
+  def unsubscribe(subscription), do: GenServer.cast(subscription, {:unsubscribe, self()})
+
+  @doc "Asks for one more envelope, which comes as a message, at once or when there is one."
+  @spec more(subscription :: pid()) :: :ok
+  def more(subscription), do: GenServer.cast(subscription, {:more, self()})
+
+  @doc "Waits for one envelope; not beside `more/1`. `:none`: nothing within the time, or no subscription."
+  @spec next(subscription :: pid(), timeout_ms :: non_neg_integer()) ::
+          {:ok, Envelope.t()} | :none
+  def next(subscription, timeout_ms) do
+    Conversation.patience!(timeout_ms)
+    more(subscription)
+
+    receive do
+      {:topic, ^subscription, envelope} -> {:ok, envelope}
+    after
+      timeout_ms -> take_back(subscription)
+    end
+  end
+
+  # Else what comes later would lie in the mailbox of one who no longer waits for it. What was on its
+  # way meanwhile is here before the answer is.
+  defp take_back(subscription) do
+    :ok = GenServer.call(subscription, :take_back)
+
+    receive do
+      {:topic, ^subscription, envelope} -> {:ok, envelope}
+    after
+      0 -> :none
+    end
+  catch
+    :exit, _ended -> :none
+  end
+
+  @doc "What a subscription has dropped so far, by reason, and how many envelopes wait."
+  @spec counts(subscription :: pid()) :: %{atom() => non_neg_integer()}
+  def counts(subscription), do: GenServer.call(subscription, :counts)
+
+  @doc """
+  Tells the subscribers of a topic on all nodes that this one is connected to, and returns how many
+  that is. Options as in `Agents.Envelope.new/4`. What no envelope can hold raises.
+  """
+  @spec publish(Envelope.topic(), from :: atom(), content :: term(), keyword()) ::
+          non_neg_integer()
+  def publish(topic, from, content, options \\ []) do
+    envelope = Envelope.new(:inform, from, content, under(topic, options))
+    Enum.count(Directory.members({:topic, topic}), &(Conversation.post(&1, envelope) == :ok))
+  end
+
+  # What is no list of options is refused by the envelope.
+  defp under(topic, options) do
+    if is_list(options) and not List.improper?(options),
+      do: options ++ [topic: topic],
+      else: options
+  end
+
+  defp named(topic) do
+    if Envelope.topic?(topic),
+      do: :ok,
+      else: {:error, "#{inspect(topic)} is no topic; write an atom, or text of 1 to 255 bytes"}
+  end
+
+  defp known(options) do
+    cond do
+      not Keyword.keyword?(options) ->
+        {:error, "#{inspect(options)} are no options; there are limit and template"}
+
+      unknown = Enum.find(Keyword.keys(options), &(&1 not in [:limit, :template])) ->
+        {:error, "unknown option #{inspect(unknown)}: limit or template"}
+
+      true ->
+        :ok
+    end
+  end
+end

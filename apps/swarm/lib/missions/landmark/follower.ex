@@ -1,0 +1,264 @@
+defmodule Missions.Landmark.Follower do
+  @moduledoc """
+  What a follower does: drive to its slot, keep an eye on what it can correct its pose by, and
+  pass the anchor on to its child. Pure.
+
+  Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard). Meanwhile
+  it looks at the landmark, since the next it may be asked for is how large it sees it.
+
+  One that stands in its slot by its own estimate, and does not know its place well enough to say so
+  (`Missions.Landmark.Marks.sure?/2`), is `unsure?`: neither in place nor blocked.
+  """
+  alias Hal.Pose
+  alias Robot.Behaviour
+  alias Robot.Percept.CameraPointing
+  alias Robot.Behaviour.Avoid.Neighbours
+  alias Swarm.Message
+  alias Swarm.Formation.Chain
+  alias Missions.Landmark
+  alias Missions.Landmark.{Blocker, LandmarkTrack, Marks, SlotPoses}
+
+  @lease_ms 1_000
+  @in_place 0.25
+  @near 0.15
+  @slow 0.05
+  # The camera looks at the landmark and at the robot ahead in turn.
+  @gaze_ms 1_500
+
+  # A slot is blocked when something unknown stands in it for so long, or no way leads nearer.
+  @obstacle_ms 2_000
+  @stuck_ms 8_000
+  @progress 0.1
+  @reach 2.0
+  @clear 0.1
+  # Wherever it is: who has come no nearer for so long, to one place of one shape, does not get on.
+  @late_ms 15_000
+  @elsewhere 1.0
+
+  defstruct in_place?: false,
+            unsure?: false,
+            holding?: false,
+            blocked?: false,
+            blocker: nil,
+            late: nil,
+            told: {0, 0},
+            landmark: nil,
+            slot: nil,
+            best: nil,
+            best_ms: 0,
+            obstacle_ms: nil
+
+  @typedoc """
+  `told` is the epoch and sequence number of the anchor that was last passed on, `landmark` where the
+  landmark stood when this robot was last in place. `best` is the least distance to `slot` so far, and
+  `best_ms` when it was reached; since `obstacle_ms` something unknown stands in the slot. `late` is the same over
+  all small moves of the slot: shape, slot, least distance, and when that was reached. `blocker` is what a blocked
+  robot is blocked by.
+  """
+  @type t :: %__MODULE__{
+          in_place?: boolean(),
+          unsure?: boolean(),
+          holding?: boolean(),
+          blocked?: boolean(),
+          blocker: Blocker.t() | nil,
+          late: {shape :: term(), Pose.t(), float(), integer()} | nil,
+          told: {non_neg_integer(), non_neg_integer()},
+          landmark: {integer(), integer()} | nil,
+          slot: Pose.t() | nil,
+          best: float() | nil,
+          best_ms: integer(),
+          obstacle_ms: integer() | nil
+        }
+
+  @doc "Not attending anybody yet."
+  @spec new() :: t()
+  def new, do: %__MODULE__{}
+
+  @doc "Begins to follow."
+  @spec begin(Landmark.State.t()) :: Landmark.State.t()
+  def begin(mission), do: %{mission | attend: new(), scan: nil}
+
+  @doc "One tick of following."
+  @spec act(Landmark.State.t()) :: {Landmark.State.t(), [tuple()]}
+  def act(mission) do
+    age_ms = mission.now_ms - (mission.anchor_ms || mission.now_ms)
+    place = mission.anchor && SlotPoses.slot(mission.anchor, mission.me, age_ms)
+
+    if place == nil or age_ms > @lease_ms or mission.percept.pose == nil do
+      {%{mission | attend: wait(mission.attend, age_ms)},
+       [{:goal, :stand, {Behaviour.Stop, []}}, {:look, look_out(mission)}]}
+    else
+      attend(mission, place, age_ms)
+    end
+  end
+
+  # A leader that is silent for longer than a lease leaves its followers where they are.
+  defp wait(attend, age_ms) do
+    silent? = age_ms >= @late_ms
+    blocker = if silent?, do: :no_anchor
+
+    %{
+      attend
+      | in_place?: false,
+        unsure?: false,
+        holding?: true,
+        blocked?: silent?,
+        blocker: blocker
+    }
+  end
+
+  defp attend(mission, {slot, velocity}, age_ms) do
+    error = Pose.distance(mission.percept.pose, slot)
+    slow? = Landmark.State.slow?(mission.percept, @slow)
+    {vx, vy} = velocity
+    resting? = slow? and vx * vx + vy * vy < @slow * @slow
+    there? = slow? and error <= @in_place
+    sure? = Marks.sure?(mission, error)
+
+    {told, place} = pass_on(mission)
+
+    mission = %{
+      mission
+      | place: slot,
+        attend: %{
+          mission.attend
+          | in_place?: there? and sure?,
+            unsure?: there? and not sure?,
+            holding?: resting? and error <= @near,
+            told: told,
+            # Where the landmark stood when this robot was last in place, or began to follow.
+            landmark: landmark(mission, there?)
+        }
+    }
+
+    mission = %{mission | attend: mission |> block(slot, error) |> late(mission, slot, error)}
+    options = [target: slot, velocity: velocity, discs: discs(mission.anchor)]
+    goal = {:goal, {:slot, mission.epoch}, {Behaviour.Follow, options}}
+
+    {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, Marks.anchors(mission)}]}
+  end
+
+  # Nothing blocks a robot that stands where it wants to be, as far as it knows.
+  defp block(%{attend: %{in_place?: in_place?, unsure?: unsure?} = attend} = mission, slot, error)
+       when in_place? or unsure?,
+       do: fresh(attend, slot, error, mission.now_ms)
+
+  defp block(%{attend: attend, now_ms: now} = mission, slot, error) do
+    cond do
+      attend.slot == nil or Pose.distance(attend.slot, slot) > 0.2 ->
+        fresh(attend, slot, error, now)
+
+      error < attend.best - @progress ->
+        %{watch(attend, mission, slot, error) | best: error, best_ms: now}
+
+      true ->
+        attend = watch(attend, mission, slot, error)
+        obstacle? = attend.obstacle_ms != nil and now - attend.obstacle_ms >= @obstacle_ms
+        stuck? = error < @reach and now - attend.best_ms >= @stuck_ms
+        %{attend | blocked?: obstacle? or stuck?}
+    end
+  end
+
+  # Farther off, or where the slot trembles, time alone tells that a robot does not get on.
+  defp late(%{in_place?: in_place?, unsure?: unsure?} = attend, _mission, _slot, _error)
+       when in_place? or unsure?,
+       do: %{attend | late: nil, blocker: nil}
+
+  defp late(attend, %{anchor: anchor, now_ms: now} = mission, slot, error) do
+    shape = {anchor.leader, anchor.formation}
+    late = patience(attend.late, shape, slot, error, now)
+    {_shape, _slot, _best, since_ms} = late
+    blocked? = attend.blocked? or now - since_ms >= @late_ms
+    %{attend | late: late, blocked?: blocked?, blocker: blocker(attend, mission, slot, blocked?)}
+  end
+
+  defp patience({shape, place, best, since_ms}, shape, slot, error, now) do
+    cond do
+      Pose.distance(place, slot) > @elsewhere -> {shape, slot, error, now}
+      error < best - @progress -> {shape, place, error, now}
+      true -> {shape, place, best, since_ms}
+    end
+  end
+
+  defp patience(_none_or_other, shape, slot, error, now), do: {shape, slot, error, now}
+
+  # Named once, when the robot gives up: while it stands and waits, what passes by is not to blame.
+  defp blocker(_attend, _mission, _slot, false), do: nil
+
+  defp blocker(%{blocker: nil}, mission, slot, true),
+    do: Blocker.find(mission.percept, slot, SlotPoses.landmark(mission.anchor))
+
+  defp blocker(attend, _mission, _slot, true), do: attend.blocker
+
+  defp fresh(attend, slot, error, now) do
+    %{attend | slot: slot, best: error, best_ms: now, obstacle_ms: nil, blocked?: false}
+  end
+
+  defp watch(attend, mission, slot, error) do
+    if error < @reach and obstacle?(mission, slot),
+      do: %{attend | obstacle_ms: attend.obstacle_ms || mission.now_ms},
+      else: %{attend | obstacle_ms: nil}
+  end
+
+  # Something that the sonars see where this robot should stand, and that nobody has told of.
+  defp obstacle?(%{percept: percept, anchor: anchor}, slot) do
+    robots = for {_id, peer} <- percept.peers, do: {peer.pose.x, peer.pose.y, peer.radius}
+
+    percept
+    |> Neighbours.unknown(robots ++ discs(anchor))
+    |> Enum.any?(&(Pose.distance(slot, &1.at) < percept.profile.radius + @clear))
+  end
+
+  defp landmark(%{anchor: anchor, attend: attend}, in_place?),
+    do: if(in_place? or attend.landmark == nil, do: anchor.landmark, else: attend.landmark)
+
+  # From parent to child: n - 1 messages for the whole group (R28, R53).
+  defp pass_on(%{anchor: anchor, attend: attend} = mission) do
+    news = {anchor.epoch, anchor.sequence}
+    child = Chain.child([anchor.leader | anchor.order], mission.me)
+
+    if news > attend.told and child != nil,
+      do: {news, [{:send, [child], Message.new(mission.me, :place, anchor)}]},
+      else: {attend.told, []}
+  end
+
+  # Nobody drives through the landmark.
+  defp discs(anchor) do
+    case SlotPoses.landmark(anchor) do
+      nil -> []
+      {x, y} -> [{x, y, LandmarkTrack.radius()}]
+    end
+  end
+
+  # Pan towards the landmark or towards the robot ahead, whichever's turn it is and can be seen.
+  defp look(%{anchor: anchor, percept: percept} = mission, age_ms) do
+    {leader, _twist} = SlotPoses.leader(anchor, age_ms)
+    targets = [SlotPoses.landmark(anchor) || Pose.point(leader), ahead(mission, leader)]
+    turn = rem(div(mission.now_ms, @gaze_ms), 2)
+    {first, [second]} = List.pop_at(targets, turn)
+
+    Enum.find_value([first, second], 0.0, fn place ->
+      bearing = Pose.bearing(percept.pose, place)
+      if CameraPointing.within?(bearing, percept), do: CameraPointing.pan(bearing, percept)
+    end)
+  end
+
+  # Where the landmark was when somebody last knew.
+  defp look_out(%{percept: %{pose: nil}}), do: 0.0
+
+  defp look_out(%{anchor: anchor, sight: sight, percept: percept}) do
+    place = (anchor && SlotPoses.landmark(anchor)) || (sight && sight.place)
+    bearing = if place, do: Pose.bearing(percept.pose, place), else: 0.0
+
+    if CameraPointing.within?(bearing, percept),
+      do: CameraPointing.pan(bearing, percept),
+      else: 0.0
+  end
+
+  defp ahead(%{anchor: anchor, percept: percept} = mission, leader) do
+    case anchor.order |> Enum.take_while(&(&1 != mission.me)) |> List.last() do
+      nil -> Pose.point(leader)
+      id -> if peer = percept.peers[id], do: Pose.point(peer.pose), else: Pose.point(leader)
+    end
+  end
+end

@@ -1,0 +1,99 @@
+defmodule Missions.Landmark.LandmarkTrack do
+  @moduledoc """
+  What a robot knows of the landmark by its own eyes: how large it sees it, and where it stands
+  (map frame). Pure.
+  """
+  alias Hal.Pose
+  alias Robot.Percept
+  alias Robot.Percept.Sighting
+
+  @enforce_keys [:at_ms, :size_ppm, :bearing]
+  defstruct @enforce_keys ++ [distance: nil, place: nil, place_ms: nil, moving?: false]
+
+  @type t :: %__MODULE__{
+          at_ms: integer(),
+          size_ppm: pos_integer(),
+          bearing: float(),
+          distance: float() | nil,
+          place: Pose.point() | nil,
+          place_ms: integer() | nil,
+          moving?: boolean()
+        }
+
+  # The share that one picture has in the estimate of the place (pictures come at 10 Hz), and
+  # how far off it must be to start a new estimate.
+  @gain 0.2
+  @jump 0.6
+  @moving 0.1
+
+  # An upright pole, in metres.
+  @radius 0.15
+
+  @doc "The radius of the landmark, in metres."
+  @spec radius() :: float()
+  def radius, do: @radius
+
+  @doc "The sight after one more percept; an old one stays when the landmark is not in the picture."
+  @spec update(t() | nil, Percept.t(), String.t()) :: t() | nil
+  def update(old, %Percept{blobs_pose: nil}, _colour), do: old
+  def update(%{at_ms: at_ms} = old, %Percept{blobs_at_ms: at_ms}, _colour), do: old
+
+  def update(old, percept, colour) do
+    case Sighting.largest(percept, colour) do
+      nil ->
+        old
+
+      blob ->
+        view = Sighting.field_of_view(percept)
+        bearing = Sighting.bearing(blob, percept.blobs_pan, view)
+
+        distance = distance(blob, percept.blobs, view)
+        seen = distance && Sighting.place(percept.blobs_pose, bearing, distance)
+
+        place = smooth(old && old.place, seen)
+
+        %__MODULE__{
+          at_ms: percept.blobs_at_ms,
+          size_ppm: max(round(blob.share * 1_000_000), 1),
+          bearing: Pose.bearing(percept.pose, Sighting.place(percept.blobs_pose, bearing, 5.0)),
+          distance: distance,
+          place: place,
+          place_ms: if(seen, do: percept.blobs_at_ms, else: old && old.place_ms),
+          moving?: seen != nil and place != nil and Pose.distance(seen, place) > @moving
+        }
+    end
+  end
+
+  # A pole whose foot or top is out of the picture is as wide as before.
+  defp distance(%{clipped?: true, left: left, right: right, width: width} = blob, blobs, view)
+       when left > 0 and right < width - 1 do
+    unless Sighting.hidden?(blob, blobs),
+      do: Sighting.distance_by_width(blob, @radius, view)
+  end
+
+  defp distance(blob, blobs, _view), do: Sighting.distance(blob, blobs)
+
+  @doc """
+  Whether the place is known for sure: seen within the last `ms`, in all its width, and standing. Where a landmark
+  goes that is clipped at the side nobody sees.
+  """
+  @spec still?(t() | nil, integer(), pos_integer()) :: boolean()
+  def still?(%{place_ms: place_ms, moving?: false}, now_ms, ms) when place_ms != nil,
+    do: now_ms - place_ms <= ms
+
+  def still?(_sight, _now_ms, _ms), do: false
+
+  @doc "Whether the landmark was seen within the last `ms`."
+  @spec fresh?(t() | nil, integer(), pos_integer()) :: boolean()
+  def fresh?(nil, _now_ms, _ms), do: false
+  def fresh?(%{at_ms: at_ms}, now_ms, ms), do: now_ms - at_ms <= ms
+
+  defp smooth(nil, seen), do: seen
+  defp smooth(place, nil), do: place
+
+  defp smooth({x, y} = place, {sx, sy} = seen) do
+    if Pose.distance(place, seen) > @jump,
+      do: seen,
+      else: {x + @gain * (sx - x), y + @gain * (sy - y)}
+  end
+end

@@ -1,0 +1,161 @@
+defmodule Missions.Landmark.Marks do
+  @moduledoc """
+  What a follower finds its pose by: the leader's frame, the landmark as the leader told it, and the robots
+  ahead of it in the order where they say they are, each as sure as it says. And when that makes it sure
+  enough to say that it is in its place. Pure.
+
+  Only those ahead in the order, so that corrections run one way, from the leader down. All others may be seen, too,
+  and must not be taken for one of these.
+  """
+  alias Hal.Pose
+  alias Robot.Localiser.Anchors
+  alias Missions.Landmark
+  alias Missions.Landmark.{LandmarkTrack, SlotPoses}
+
+  @robot_colour "RedRobot"
+  # How far a robot may have gone since it was heard, and how well is known where one is that is in another frame, in metres.
+  @moved_sd 0.15
+  @strange_sd 1.0
+  # How well the leader knows where it is itself, in its own frame, and how well the landmark's place there: of its
+  # distance so much (in metres, and per metre), and across.
+  @leader_sd 0.01
+  @landmark_along {0.02, 0.1}
+  @landmark_across {0.005, 0.005}
+  # Slower than this a robot stands, in m/s and rad/s.
+  @slow 0.05
+  # A robot in its place is no farther from it than this, in 95 of 100 cases, in metres.
+  @tolerance 0.5
+
+  @doc "The anchors of a follower that has a pose and an anchor of its leader."
+  @spec anchors(Landmark.State.t()) :: Anchors.t()
+  def anchors(%{anchor: anchor, percept: percept} = mission) do
+    {leader, _twist} = SlotPoses.leader(anchor, mission.now_ms - mission.anchor_ms)
+    ahead = [anchor.leader | Enum.take_while(anchor.order, &(&1 != mission.me))]
+
+    # In an order that no virtual machine chooses: each correction changes the next.
+    robots =
+      for {id, peer} <- Enum.sort(percept.peers) do
+        %{
+          key: {:robot, id},
+          kind: :robot,
+          colour: @robot_colour,
+          at: Pose.point(if id == anchor.leader, do: leader, else: peer.pose),
+          sd: spread(id, peer, anchor),
+          reference?: id in ahead and standing?(peer) and told?(id, peer, anchor),
+          radius: peer.radius
+        }
+      end
+
+    %Anchors{frame: frame(mission, leader), marks: landmark(mission) ++ robots}
+  end
+
+  # A landmark that moves is somewhere else by now.
+  defp landmark(%{anchor: %{still: true, landmark: place} = anchor} = mission)
+       when place != nil do
+    [
+      %{
+        key: :landmark,
+        kind: :landmark,
+        colour: mission.colour,
+        at: SlotPoses.landmark(anchor),
+        sd: landmark_spread(anchor),
+        reference?: true,
+        radius: LandmarkTrack.radius()
+      }
+    ]
+  end
+
+  defp landmark(_mission), do: []
+
+  defp landmark_spread(%{pose: {x, y, _heading}, landmark: {lx, ly}}) do
+    {dx, dy} = {(lx - x) / 1000, (ly - y) / 1000}
+    distance = :math.sqrt(dx * dx + dy * dy)
+    grown = fn {sd, per_metre} -> sd + per_metre * distance end
+    {grown.(@landmark_along), grown.(@landmark_across), :math.atan2(dy, dx)}
+  end
+
+  # What a moving robot told is where it was, and where a dead one came to rest nobody knows.
+  defp standing?(%{mode: :dead}), do: false
+
+  defp standing?(%{mode: :moving, twist: twist}),
+    do: abs(twist.linear) < @slow and abs(twist.turn) < @slow
+
+  defp standing?(_holding), do: true
+
+  # Who is not in the leader's frame yet cannot tell where it is there.
+  defp told?(leader, _peer, %{leader: leader}), do: true
+
+  defp told?(_id, %{beat: %{sd: sd, leader: leader, epoch: epoch}}, anchor),
+    do: sd != nil and leader == anchor.leader and epoch == anchor.epoch
+
+  defp told?(_id, _peer, _anchor), do: false
+
+  defp spread(leader, _peer, %{leader: leader}), do: {@leader_sd, @leader_sd, 0.0}
+
+  defp spread(id, peer, anchor) do
+    if told?(id, peer, anchor) do
+      {worst, least, mrad} = peer.beat.sd
+      since = if standing?(peer), do: 0.0, else: @moved_sd
+      {worst / 1000 + since, least / 1000 + since, mrad / 1000}
+    else
+      {@strange_sd, @strange_sd, 0.0}
+    end
+  end
+
+  defp frame(%{anchor: %{drift: {way, turn, turned}} = anchor} = mission, leader) do
+    {position, heading} = variances(anchor.sd)
+
+    %{
+      key: key(mission),
+      base: anchor.base,
+      at: Pose.point(leader),
+      position: position,
+      heading: heading,
+      start: variances(anchor.start_sd),
+      drift: {way / 1.0e6, turn / 1.0e6, turned / 1000},
+      slip: anchor.slip / 1000
+    }
+  end
+
+  defp variances({mm, mrad}), do: {mm * mm / 1.0e6, mrad * mrad / 1.0e6}
+
+  # A leader that was started anew numbers its frames anew.
+  defp key(%{anchor: %{leader: leader, frame: number}, percept: percept}) do
+    case percept.peers do
+      %{^leader => %{beat: %{boot: boot}}} -> {leader, boot, number}
+      _nothing_heard -> {leader, nil, number}
+    end
+  end
+
+  @doc """
+  How well a robot knows its place in its leader's frame, as heartbeats tell it: the standard deviation of its
+  position along the worst direction and across it (mm), and that direction (mrad); `nil` where it has not come into
+  that frame yet, or has none.
+  """
+  @spec told(Landmark.State.t()) :: Swarm.Membership.Heartbeat.spread() | nil
+  def told(%{anchor: %{}, percept: %{uncertainty: %{frame: frame, spread: spread}}} = mission) do
+    {worst, least, direction} = spread
+
+    if frame == key(mission),
+      do: {millimetres(worst), millimetres(least), round(direction * 1000)}
+  end
+
+  def told(_mission), do: nil
+
+  defp millimetres(metres), do: min(round(metres * 1000), 100_000)
+
+  @doc """
+  Whether a follower that believes it is this far from its slot (metres) is within half a metre of it in 95 of 100 cases.
+
+      iex> peers = %{mag2: %{beat: %{boot: 7}}}
+      iex> percept = %{uncertainty: %{radius: 0.3, frame: {:mag2, 7, 3}}, peers: peers}
+      iex> mission = %{anchor: %{leader: :mag2, frame: 3}, percept: percept}
+      iex> Enum.map([0.1, 0.25], &Missions.Landmark.Marks.sure?(mission, &1))
+      [true, false]
+  """
+  @spec sure?(Landmark.State.t() | map(), error :: float()) :: boolean()
+  def sure?(%{percept: %{uncertainty: %{frame: frame, radius: radius}}} = mission, error),
+    do: frame == key(mission) and error + radius <= @tolerance
+
+  def sure?(_mission, _error), do: false
+end

@@ -1,0 +1,139 @@
+defmodule Missions.Landmark.Policy do
+  @moduledoc """
+  What a robot may do with those it can reach. Pure.
+
+  **Who may lead.** `policy: :available` (the default): every part of a fleet leads itself.
+  `policy: :majority, of: n`: only a part with more than half of `n` robots may lead; the others stand
+  still until they are enough again, and their leader abdicates within its lease. Of 4 robots, 2 are
+  not enough. A robot that a leader may still count on reports in no round without this leader until that
+  lease is over, so that no other one leads before. The number travels in every report and in the anchor, and the greatest that is heard
+  counts, so that all of a part judge alike.
+
+  **Lost link.** A robot that was with others in this mission, and has heard nobody for 2 s, does
+  what `lost_link` says until it hears somebody:
+
+  | `lost_link` | what it does |
+  |---|---|
+  | `:stop` | stands at once, where it is |
+  | `:hold` | goes to the place that it was given last, and stands there |
+  | `:continue` | goes on by itself: searches, and leads itself where it may |
+
+  Without the option followers stop, leaders and searchers continue; one that is given holds for all.
+  A robot that never met anybody has lost nobody.
+  """
+  alias Swarm.Agreement.Election
+  alias Swarm.Membership.Peers
+  alias Missions.Landmark
+
+  @links [:stop, :hold, :continue]
+  @most 1_000
+  # A heartbeat lists who was heard in the last second.
+  @heard_ms 1_000
+  # A leader's lease, and the time that a heartbeat may be under way.
+  @vow_ms 1_800
+  # Who has only just been started has heard nobody yet.
+  @gather_ms 2_000
+
+  @doc """
+  The options of a mission checked: the fleet's size of which a majority is asked for, 0 for no such
+  rule, and what to do without a link.
+
+      iex> Missions.Landmark.Policy.options(policy: :majority, of: 4)
+      {:ok, {4, nil}}
+      iex> Missions.Landmark.Policy.options(policy: :majority)
+      {:error, "policy :majority needs of: the number of robots of the fleet, 1 to 1000"}
+      iex> Missions.Landmark.Policy.options(lost_link: :wait)
+      {:error, "lost_link cannot be :wait: :stop, :hold or :continue"}
+  """
+  @spec options(keyword()) ::
+          {:ok, {of :: 0..1_000, lost_link :: :stop | :hold | :continue | nil}}
+          | {:error, line :: String.t()}
+  def options(options) do
+    policy = Keyword.get(options, :policy, :available)
+    link = Keyword.get(options, :lost_link)
+    of = Keyword.get(options, :of)
+
+    cond do
+      policy not in [:available, :majority] ->
+        {:error, "policy cannot be #{inspect(policy)}: :available or :majority"}
+
+      link not in [nil | @links] ->
+        {:error, "lost_link cannot be #{inspect(link)}: :stop, :hold or :continue"}
+
+      of != nil and not (is_integer(of) and of in 1..@most) ->
+        {:error, "of cannot be #{inspect(of)}: the number of robots of the fleet, 1 to #{@most}"}
+
+      policy == :majority and of == nil ->
+        {:error, "policy :majority needs of: the number of robots of the fleet, 1 to #{@most}"}
+
+      policy == :majority ->
+        {:ok, {of, link}}
+
+      true ->
+        {:ok, {0, link}}
+    end
+  end
+
+  @doc "Notes once a tick whether this robot has company."
+  @spec update(Landmark.State.t()) :: Landmark.State.t()
+  def update(%{phase: :idle} = mission),
+    do: %{mission | met?: false, vow: nil, gather_ms: mission.now_ms + @gather_ms}
+
+  def update(mission) do
+    mission = %{mission | met?: mission.met? or company?(mission)}
+    if tells?(mission), do: vow(mission, mission.leader), else: mission
+  end
+
+  # Whether its heartbeats say that it follows this leader and hears it.
+  defp tells?(%{leader: leader, me: me}) when leader in [nil, me], do: false
+
+  defp tells?(%{leader: leader} = mission) do
+    case mission.percept.peers do
+      %{^leader => %{direct_ms: at_ms}} when at_ms != nil ->
+        mission.now_ms - at_ms < @heard_ms
+
+      _unheard ->
+        false
+    end
+  end
+
+  @doc "Notes that this leader, or `nil` for one that is not known, may count on this robot from now on."
+  @spec vow(Landmark.State.t(), atom()) :: Landmark.State.t()
+  def vow(mission, leader), do: %{mission | vow: {leader, mission.now_ms}}
+
+  @doc "Whether a leader who is not among these may still count on this robot."
+  @spec bound?(Landmark.State.t(), [atom()]) :: boolean()
+  def bound?(%{of: of, vow: vow}, _view) when of == 0 or vow == nil, do: false
+
+  def bound?(%{vow: {leader, at_ms}} = mission, view),
+    do: leader not in view and mission.now_ms - at_ms < @vow_ms
+
+  @doc "Whether it was with others, and hears nobody any more."
+  @spec lost?(Landmark.State.t()) :: boolean()
+  def lost?(mission), do: mission.met? and not company?(mission)
+
+  @doc "Whether anybody is heard."
+  @spec company?(Landmark.State.t()) :: boolean()
+  def company?(mission),
+    do: Peers.taking_part(mission.percept.peers, mission.now_ms) != %{}
+
+  @doc "What this robot does without a link, by what it was last."
+  @spec lost_link(Landmark.State.t()) :: :stop | :hold | :continue
+  def lost_link(%{lost_link: nil, role: :follower}), do: :stop
+  def lost_link(%{lost_link: nil}), do: :continue
+  def lost_link(%{lost_link: link}), do: link
+
+  @doc "Whether so many robots may have a leader."
+  @spec enough?(Landmark.State.t(), non_neg_integer()) :: boolean()
+  def enough?(mission, robots), do: Election.enough?(robots, mission.of)
+
+  @doc "Whether this robot may open a round among so many."
+  @spec may_open?(Landmark.State.t(), non_neg_integer()) :: boolean()
+  def may_open?(mission, robots),
+    do: enough?(mission, robots) and not (lost?(mission) and lost_link(mission) != :continue)
+
+  @doc "Whether there are too few to have a leader; right after the start they are given time."
+  @spec short?(Landmark.State.t(), non_neg_integer()) :: boolean()
+  def short?(mission, robots),
+    do: not enough?(mission, robots) and mission.now_ms >= mission.gather_ms
+end

@@ -1,0 +1,77 @@
+defmodule Missions.Landmark.ReferenceInbox do
+  @moduledoc """
+  Whose anchor a robot believes, and when it joins a leader who names it. Pure.
+  """
+  alias Swarm.Agreement.Round
+  alias Swarm.Formation.Reference
+  alias Missions.Landmark
+
+  # No fleet elects that often unheard; taken over, it would leave no room for epochs to come.
+  @leap 1_000_000
+  # An anchor this old is not joined any more.
+  @news_ms 500
+
+  @doc """
+  The leader's heartbeats carry the anchor too; the last one of a leader that fell silent is no news.
+  """
+  @spec beats(Landmark.State.t()) :: Landmark.State.t()
+  def beats(%{now_ms: now} = mission) do
+    Enum.reduce(mission.percept.peers, mission, fn
+      {_id, %{at_ms: at_ms, beat: %{anchor: %Reference{} = anchor}}}, mission
+      when now - at_ms < @news_ms ->
+        anchor(mission, anchor)
+
+      _silent, mission ->
+        mission
+    end)
+  end
+
+  @doc """
+  Hears an anchor. Only one of the own leader, or one of a later epoch that names this robot, counts,
+  and only one that is news. Of other leaders one learns what people have asked for meanwhile.
+  """
+  @spec anchor(Landmark.State.t(), Reference.t()) :: Landmark.State.t()
+  def anchor(%{me: me} = mission, %Reference{leader: leader} = anchor) when leader != me do
+    ours? = anchor.epoch == mission.epoch and mission.leader in [nil, leader]
+    later? = anchor.epoch > mission.epoch and anchor.epoch <= mission.epoch + @leap
+
+    cond do
+      not (ours? or (later? and me in anchor.order)) ->
+        if anchor.asked_no > mission.asked_no, do: take_up(mission, anchor), else: mission
+
+      Reference.newest(mission.anchor, anchor) != mission.anchor ->
+        take_up(%{mission | anchor: anchor, anchor_ms: mission.now_ms}, anchor)
+
+      true ->
+        mission
+    end
+  end
+
+  def anchor(mission, _own), do: mission
+
+  # A person may have asked for another shape while this anchor was under way.
+  defp take_up(%{asked_no: known} = mission, %Reference{asked_no: number} = anchor)
+       when number >= known,
+       do: %{
+         mission
+         | formation: anchor.asked || anchor.formation,
+           asked_no: number,
+           of: max(mission.of, anchor.of)
+       }
+
+  defp take_up(mission, _older), do: mission
+
+  @doc """
+  Whether a leader names this robot now, which has come late or back, or has missed the end of a
+  round, so that it joins without one.
+  """
+  @spec joined?(Landmark.State.t()) :: boolean()
+  def joined?(%{anchor: nil}), do: false
+
+  def joined?(mission) do
+    anchor = mission.anchor
+
+    anchor.epoch >= mission.epoch and mission.me in anchor.order and
+      mission.now_ms - mission.anchor_ms < @news_ms and not Round.open?(mission.round)
+  end
+end

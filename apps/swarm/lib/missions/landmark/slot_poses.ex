@@ -1,0 +1,74 @@
+defmodule Missions.Landmark.SlotPoses do
+  @moduledoc """
+  From the leader's anchor to the place of one robot: its slot in the map frame, and how fast that
+  slot moves. Pure.
+
+  A robot follows where the leader is supposed to be (R53): the anchor's pose carried on by its
+  speed for as long as it has been under way, half a second at most.
+  """
+  alias Hal.{Pose, Twist}
+  alias Swarm.Formation
+  alias Swarm.Formation.Reference
+
+  @ahead_ms 500
+  @default_distance 1.2
+
+  @doc "The leader's pose and speed out of an anchor that is `age_ms` old."
+  @spec leader(Reference.t(), non_neg_integer()) :: {Pose.t(), Twist.t()}
+  def leader(%Reference{pose: {x, y, heading}, twist: {linear, turn}}, age_ms) do
+    pose = Pose.new(x / 1000, y / 1000, heading / 1000)
+    twist = Twist.new(linear / 1000, turn / 1000)
+    dt = min(age_ms, @ahead_ms) / 1000
+    middle = pose.heading + twist.turn * dt / 2
+
+    {Pose.new(
+       pose.x + twist.linear * dt * :math.cos(middle),
+       pose.y + twist.linear * dt * :math.sin(middle),
+       pose.heading + twist.turn * dt
+     ), twist}
+  end
+
+  @doc "How far ahead of the leader the landmark stands, in metres."
+  @spec landmark_distance(Reference.t()) :: float()
+  def landmark_distance(%Reference{landmark: nil}), do: @default_distance
+
+  def landmark_distance(%Reference{landmark: {lx, ly}, pose: {x, y, _heading}}),
+    do: Pose.distance({x / 1000, y / 1000}, {lx / 1000, ly / 1000})
+
+  @doc "The place of the landmark in an anchor, in metres, or `nil`."
+  @spec landmark(Reference.t()) :: Pose.point() | nil
+  def landmark(%Reference{landmark: nil}), do: nil
+  def landmark(%Reference{landmark: {x, y}}), do: {x / 1000, y / 1000}
+
+  @doc "The slot of a robot and its velocity; `nil` where the anchor does not name it."
+  @spec slot(Reference.t(), atom(), non_neg_integer()) :: {Pose.t(), {float(), float()}} | nil
+  def slot(%Reference{order: order} = anchor, robot, age_ms) do
+    case Enum.find_index(order, &(&1 == robot)) do
+      nil -> nil
+      index -> slot_at(anchor, index, age_ms)
+    end
+  end
+
+  # A trail lies still, whatever the leader does on it.
+  defp slot_at(%Reference{trail: [_ | _] = trail}, index, _age_ms) do
+    {x, y, heading} = Enum.at(trail, index)
+    {Pose.new(x / 1000, y / 1000, heading / 1000), {0.0, 0.0}}
+  end
+
+  defp slot_at(anchor, index, age_ms) do
+    slot =
+      anchor.formation
+      |> Formation.slots(anchor.size, landmark_distance(anchor))
+      |> Enum.at(Enum.at(anchor.places, index) - 1)
+
+    {pose, twist} = leader(anchor, age_ms)
+    place = Pose.compose(pose, slot)
+    {place, velocity(pose, twist, place)}
+  end
+
+  # A point of a turning body: v_L + w x r.
+  defp velocity(pose, twist, place) do
+    {twist.linear * :math.cos(pose.heading) - twist.turn * (place.y - pose.y),
+     twist.linear * :math.sin(pose.heading) + twist.turn * (place.x - pose.x)}
+  end
+end

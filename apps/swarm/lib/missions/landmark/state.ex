@@ -1,0 +1,120 @@
+defmodule Missions.Landmark.State do
+  @moduledoc """
+  What one robot keeps of the landmark mission between two events, and what all parts of the
+  mission ask of it. Pure. The parts' own states are under `lead`, `attend`, `round`, `sight`.
+  """
+  alias Hal.{Pose, Twist}
+  alias Missions.Landmark.LandmarkTrack
+
+  @colour "YellowLandmark"
+  @sight_ms 700
+
+  @enforce_keys [:me, :formation, :assign, :leader_change?]
+  defstruct @enforce_keys ++
+              [
+                asked_no: 0,
+                colour: @colour,
+                percept: nil,
+                now_ms: 0,
+                phase: :idle,
+                since_ms: 0,
+                started?: false,
+                scan: nil,
+                sight: nil,
+                tries: 0,
+                round: nil,
+                verdict: nil,
+                rescan?: false,
+                order: [],
+                epoch: 0,
+                leader: nil,
+                size_ppm: nil,
+                anchor: nil,
+                anchor_ms: nil,
+                trail: [],
+                lead: nil,
+                attend: nil,
+                challenge: nil,
+                of: 0,
+                lost_link: nil,
+                role: :searcher,
+                met?: false,
+                gather_ms: 0,
+                vow: nil,
+                place: nil,
+                led: 0,
+                rival_ms: nil,
+                higher_ms: nil,
+                relay: %Swarm.Comms.Forwarder{}
+              ]
+
+  @typedoc """
+  `asked_no` counts the shapes that people asked for, so that an older anchor does not undo the
+  newest. `since_ms` is when the phase began, `scan` how the last turn ended, `rescan?` that the next round
+  needs a new one, `tries` how many searches found nothing, `verdict` what the last round said until a
+  phase has acted on it, `order` the followers by slot. `epoch` and `leader` are those that the robot
+  belongs to, `size_ppm` is the size that elected the leader, `anchor_ms` when the anchor came.
+
+  `of` is the size of the fleet of which a majority is needed, 0 for none; `role` what it was last,
+  `met?` whether it has had company, `vow` which leader may count on it, and when it last could, `place` where it was told to stand last. `led` is how many robots
+  it leads, or led when the round began; since `rival_ms` it hears another leader, since `higher_ms` a later epoch.
+  """
+  @type t :: %__MODULE__{
+          me: atom(),
+          formation: Swarm.Formation.t(),
+          asked_no: non_neg_integer(),
+          assign: Swarm.Formation.Assignment.method(),
+          leader_change?: boolean(),
+          colour: String.t(),
+          percept: Robot.Percept.t() | nil,
+          now_ms: integer(),
+          phase: Missions.Landmark.Transitions.phase(),
+          since_ms: integer(),
+          started?: boolean(),
+          scan: :found | :nothing | nil,
+          sight: LandmarkTrack.t() | nil,
+          tries: non_neg_integer(),
+          round: Swarm.Agreement.Round.t() | nil,
+          verdict: {:leader, atom()} | :nobody | nil,
+          rescan?: boolean(),
+          order: [atom()],
+          epoch: non_neg_integer(),
+          leader: atom() | nil,
+          size_ppm: non_neg_integer() | nil,
+          anchor: Swarm.Formation.Reference.t() | nil,
+          anchor_ms: integer() | nil,
+          trail: Swarm.Formation.Trail.t(),
+          lead: Missions.Landmark.Leader.t() | nil,
+          attend: Missions.Landmark.Follower.t() | nil,
+          challenge: :open | {:nearer | :blind, since_ms :: integer()} | nil,
+          of: non_neg_integer(),
+          lost_link: :stop | :hold | :continue | nil,
+          role: :searcher | :leader | :follower,
+          met?: boolean(),
+          gather_ms: integer(),
+          vow: {leader :: atom(), at_ms :: integer()} | nil,
+          place: Pose.t() | nil,
+          led: non_neg_integer(),
+          rival_ms: integer() | nil,
+          higher_ms: integer() | nil,
+          relay: Swarm.Comms.Forwarder.t()
+        }
+
+  @doc "The colour of the landmark unless told otherwise."
+  @spec colour() :: String.t()
+  def colour, do: @colour
+
+  @doc "Whether the landmark is in this robot's picture."
+  @spec sees?(t()) :: boolean()
+  def sees?(mission), do: LandmarkTrack.fresh?(mission.sight, mission.now_ms, @sight_ms)
+
+  @doc "Whether a robot moves slower than `limit` m/s, as far as its wheels say."
+  @spec slow?(Robot.Percept.t(), float()) :: boolean()
+  def slow?(%{odometry: %{twist: %Twist{linear: linear}}}, limit), do: abs(linear) < limit
+  def slow?(_percept, _limit), do: true
+
+  @doc "A pose in whole millimetres and milliradians, as robots tell it."
+  @spec millimetres(Pose.t()) :: {integer(), integer(), integer()}
+  def millimetres(%Pose{x: x, y: y, heading: heading}),
+    do: {round(x * 1000), round(y * 1000), round(heading * 1000)}
+end

@@ -1,0 +1,135 @@
+defmodule Missions.Landmark.Transitions do
+  @moduledoc """
+  The mission as one table (R59): what a robot does in each phase, and what leads out of it.
+  Conditions are asked in the order of the row; the first that holds wins. To insert a phase,
+  insert a row. A stop is in no row: it ends the mission from outside, in every phase, and leaves it `:idle`.
+
+  | phase | does | |
+  |---|---|---|
+  | `:idle` | stands | until it is started |
+  | `:search` | turns once round, looking for the landmark, and listens | the thesis's parallel state |
+  | `:agree` | stands, report in, until the round commits | report and collect |
+  | `:wander` | roams a little | after a round in which nobody had found it |
+  | `:rest` | stands | the landmark is nowhere; starts again when it sees one |
+  | `:lead` | tracks the landmark, tells the others where it is | |
+  | `:follow` | drives to its slot, tells its child | |
+  | `:wait` | stands | too few robots to have a leader |
+  | `:halt` | stands | has lost everybody, `lost_link: :stop` |
+  | `:hold` | goes to the place it was given last | has lost everybody, `lost_link: :hold` |
+
+  | condition | holds when |
+  |---|---|
+  | `:started` | a person has said so |
+  | `:elected`, `:led` | a round has made this robot the leader, or another, or one names it in its order |
+  | `:nobody`, `:nobody_again` | a round in which nobody had found the landmark; the third in a row |
+  | `:scanned` | the turn is over, whatever it showed |
+  | `:scan_wanted` | a round waits for a scan that this robot has not made |
+  | `:sighted` | the landmark is in the picture, or a round waits for a scan |
+  | `:roamed` | it has roamed for long enough |
+  | `:deposed` | others follow a later leader, or nobody hears this one |
+  | `:superseded` | a leader of a later epoch names this robot in its order |
+  | `:round_open` | a round is under way |
+  | `:lost_stop`, `:lost_hold` | it has lost everybody, and is to do that then (`Policy`) |
+  | `:company` | somebody is heard |
+  | `:short`, `:enough` | there are too few robots to have a leader; not too few |
+  """
+
+  @table [
+    idle: {:stand, started: :search},
+    search:
+      {:scan,
+       elected: :lead,
+       led: :follow,
+       nobody_again: :rest,
+       nobody: :wander,
+       lost_stop: :halt,
+       lost_hold: :hold,
+       short: :wait,
+       scanned: :agree},
+    agree:
+      {:stand,
+       elected: :lead,
+       led: :follow,
+       nobody_again: :rest,
+       nobody: :wander,
+       lost_stop: :halt,
+       lost_hold: :hold,
+       short: :wait,
+       scan_wanted: :search},
+    wander:
+      {:roam,
+       led: :follow,
+       lost_stop: :halt,
+       lost_hold: :hold,
+       short: :wait,
+       sighted: :search,
+       roamed: :search},
+    rest:
+      {:stand, led: :follow, lost_stop: :halt, lost_hold: :hold, short: :wait, sighted: :search},
+    lead: {:lead, lost_stop: :halt, lost_hold: :hold, deposed: :agree, round_open: :agree},
+    follow:
+      {:follow,
+       lost_stop: :halt, lost_hold: :hold, round_open: :agree, superseded: :agree, short: :wait},
+    wait: {:stand, led: :follow, round_open: :agree, enough: :agree},
+    halt: {:stand, led: :follow, company: :agree},
+    hold: {:hold, led: :follow, company: :agree}
+  ]
+
+  @type phase ::
+          :idle
+          | :search
+          | :agree
+          | :wander
+          | :rest
+          | :lead
+          | :follow
+          | :wait
+          | :halt
+          | :hold
+  @type activity :: :stand | :scan | :roam | :lead | :follow | :hold
+  @type condition ::
+          :started
+          | :elected
+          | :led
+          | :nobody
+          | :nobody_again
+          | :scanned
+          | :scan_wanted
+          | :sighted
+          | :roamed
+          | :deposed
+          | :superseded
+          | :round_open
+          | :lost_stop
+          | :lost_hold
+          | :company
+          | :short
+          | :enough
+
+  @doc "The phases in the order of the table."
+  @spec phases() :: [phase()]
+  def phases, do: Keyword.keys(@table)
+
+  @doc """
+  What a robot does in a phase.
+
+      iex> Missions.Landmark.Transitions.activity(:search)
+      :scan
+  """
+  @spec activity(phase()) :: activity()
+  def activity(phase), do: @table |> Keyword.fetch!(phase) |> elem(0)
+
+  @doc """
+  The phase that follows, given what holds.
+
+      iex> Missions.Landmark.Transitions.next(:agree, &(&1 == :led))
+      :follow
+      iex> Missions.Landmark.Transitions.next(:rest, fn _ -> false end)
+      :rest
+  """
+  @spec next(phase(), (condition() -> boolean())) :: phase()
+  def next(phase, holds?) do
+    {_activity, exits} = Keyword.fetch!(@table, phase)
+    Enum.find_value(exits, phase, fn {condition, next} -> holds?.(condition) && next end)
+  end
+end

@@ -1,0 +1,313 @@
+defmodule Swarm.Agreement.Round do
+  @moduledoc """
+  Agreement on shared inputs: in the end every member of a view holds the same record, and knows
+  that the others do. Pure; time is passed in, in milliseconds.
+
+      collect --all reports-------------------------> digest --all digests equal--> committed
+              --the deadline--> echo --200 ms---------^
+
+  No process can know what the last message did, so time-outs give progress and digests give
+  safety: each member freezes what it holds, signs it with a digest that is final for the round's
+  id, and commits only when it has the same digest of the whole view. A different digest, or a
+  member that is gone, opens a new round with a higher id; the highest id heard wins everywhere.
+
+  Ids are `{epoch, counter, initiator}`: the epoch is that of the leadership which the round will
+  found, the counter grows with each new try.
+  """
+  alias Swarm.Agreement.Round.{Letter, Record}
+
+  @leap 1_000_000
+  # Letters are repeated every 100 ms, more rarely in a large group: all to all grows with its square.
+  @repeat_ms 100
+  @repeat_ms_per_robot 8
+  # For so long reports are told on: before the digest when some are missing, else along with it.
+  @echo_ms 200
+  # Counted in repeats: when a missing digest is asked for, and when a round is given up.
+  @ask_after 4
+  @give_up_after 25
+  # After its commit a member goes on answering, for those that missed the last digest.
+  @linger_ms 2_000
+
+  @enforce_keys [:me]
+  defstruct @enforce_keys ++
+              [
+                id: nil,
+                view: [],
+                phase: :none,
+                purpose: :search,
+                deadline_ms: 0,
+                since_ms: 0,
+                said_ms: nil,
+                report: :busy,
+                reports: %{},
+                digests: %{},
+                digest: nil,
+                echo?: false,
+                highest: {0, 0}
+              ]
+
+  @type phase :: :none | :collect | :echo | :digest | :committed
+  @typedoc """
+  `report` is the own one, `reports` and `digests` are what was heard of all, `said_ms` is when this
+  robot spoke last, `since_ms` when the phase began, `highest` the highest epoch and counter known.
+  """
+  @type t :: %__MODULE__{
+          me: atom(),
+          id: Letter.id() | nil,
+          view: [atom()],
+          phase: phase(),
+          purpose: :search | :change,
+          deadline_ms: integer(),
+          since_ms: integer(),
+          said_ms: integer() | nil,
+          report: :busy | Swarm.Agreement.Election.report(),
+          reports: %{atom() => Swarm.Agreement.Election.report()},
+          digests: %{atom() => binary()},
+          digest: binary() | nil,
+          echo?: boolean(),
+          highest: {epoch :: non_neg_integer(), counter :: non_neg_integer()}
+        }
+
+  @doc "No round yet."
+  @spec new(atom()) :: t()
+  def new(me), do: %__MODULE__{me: me}
+
+  @doc """
+  Opens a round among `view` (which holds the opener), for the leadership of `epoch`. Its counter
+  is above any that was heard of.
+  """
+  @spec open(t(), pos_integer(), [atom()], :search | :change, pos_integer(), integer()) :: t()
+  def open(round, epoch, view, purpose, length_ms, now_ms) do
+    {top, counter} = fenced(round).highest
+    counter = if epoch >= top, do: counter, else: 0
+    epoch = max(epoch, top)
+    enter(round, {epoch, counter + 1, round.me}, view, purpose, length_ms, now_ms)
+  end
+
+  @doc "Sets the own report: `:busy` while the scan goes on, then the result, which is final for this id."
+  @spec report(t(), :busy | Swarm.Agreement.Election.report()) :: t()
+  def report(%{phase: :collect, report: :busy} = round, report) when is_map(report),
+    do: %{round | report: report, reports: Map.put(round.reports, round.me, report), said_ms: nil}
+
+  def report(round, _report), do: round
+
+  @doc "Whether a round is under way."
+  @spec open?(t()) :: boolean()
+  def open?(round), do: round.phase in [:collect, :echo, :digest]
+
+  @doc "Hears a letter. A higher id takes this robot along if it is in the view; a lower one is dropped."
+  @spec hear(t(), atom(), Letter.t(), integer()) :: t()
+  def hear(%{me: me} = round, from, %Letter{} = letter, now_ms) when from != me do
+    if leap?(letter.id, round.highest),
+      do: round,
+      else: round |> note(letter.id) |> heed(from, letter, now_ms)
+  end
+
+  def hear(round, _from, _letter, _now_ms), do: round
+
+  # No fleet gets that far at once; taken over, such an id would leave no room for the next ones.
+  defp leap?({epoch, counter, _initiator}, {epoch, highest}), do: counter > highest + @leap
+
+  defp leap?({epoch, counter, _initiator}, {highest, _counter}),
+    do: epoch > highest + @leap or counter > @leap
+
+  defp heed(round, from, letter, now_ms) do
+    cond do
+      letter.id == round.id ->
+        take(round, from, letter)
+
+      supersedes?(letter.id, round) and round.me in letter.view ->
+        join(round, from, letter, now_ms)
+
+      true ->
+        round
+    end
+  end
+
+  @doc """
+  One tick: the letters to send to all of the view, and whether something came of it.
+
+  `{:commit, record}` comes once. `{:failed, :mismatch | :timeout}` asks for a new round.
+  """
+  @spec tick(t(), integer()) ::
+          {t(), [Letter.t()], nil | {:commit, Record.t()} | {:failed, :mismatch | :timeout}}
+  def tick(%{phase: :none} = round, _now_ms), do: {round, [], nil}
+
+  def tick(round, now_ms) do
+    round = advance(round, now_ms)
+    {round, letters} = speak(round, now_ms)
+
+    cond do
+      round.phase == :digest and agreed?(round) ->
+        {%{round | phase: :committed, since_ms: now_ms}, letters, {:commit, record(round)}}
+
+      round.phase == :digest and differing?(round) ->
+        {leave(round), letters, {:failed, :mismatch}}
+
+      round.phase == :digest and now_ms - round.since_ms > @give_up_after * repeat_ms(round) ->
+        {leave(round), letters, {:failed, :timeout}}
+
+      true ->
+        {round, letters, nil}
+    end
+  end
+
+  @doc "Leaves a round; what this robot said in it stands."
+  @spec leave(t()) :: t()
+  def leave(round), do: %{fenced(round) | phase: :none}
+
+  defp record(round),
+    do: %Record{
+      id: round.id,
+      view: round.view,
+      reports: Record.freeze(round.view, round.reports),
+      digest: round.digest
+    }
+
+  defp enter(round, id, view, purpose, length_ms, now_ms) do
+    round
+    |> note(id)
+    |> Map.merge(%{
+      id: id,
+      view: Enum.sort(view),
+      purpose: purpose,
+      phase: :collect,
+      deadline_ms: now_ms + length_ms,
+      since_ms: now_ms,
+      said_ms: nil,
+      report: :busy,
+      reports: %{},
+      digests: %{},
+      digest: nil,
+      echo?: false
+    })
+  end
+
+  defp join(round, from, letter, now_ms) do
+    round
+    |> enter(letter.id, letter.view, letter.purpose, max(letter.remaining_ms, 0), now_ms)
+    |> take(from, letter)
+  end
+
+  # The first report of a robot in a round is final; reports are frozen once the digest is out.
+  defp take(round, from, letter) do
+    round = if letter.digest, do: put_digest(round, from, letter.digest), else: round
+    round = if letter.ask, do: %{round | said_ms: nil, echo?: true}, else: round
+
+    if round.phase in [:collect, :echo],
+      do: round |> keep(%{from => letter.report}) |> keep(letter.known || %{}),
+      else: round
+  end
+
+  defp keep(round, reports) do
+    news =
+      for {id, report} <- reports,
+          is_map(report),
+          not is_map_key(round.reports, id),
+          id in round.view,
+          into: %{},
+          do: {id, report}
+
+    if news == %{}, do: round, else: %{round | reports: Map.merge(round.reports, news)}
+  end
+
+  defp put_digest(round, from, digest) do
+    if from in round.view,
+      do: %{round | digests: Map.put_new(round.digests, from, digest)},
+      else: round
+  end
+
+  defp advance(%{phase: :collect} = round, now_ms) do
+    cond do
+      # Not at the tick of its opening: whoever opened it has to stand first.
+      whole?(round) and now_ms > round.since_ms -> freeze(round, now_ms)
+      now_ms < round.deadline_ms -> round
+      true -> %{round | phase: :echo, since_ms: now_ms, said_ms: nil, echo?: true}
+    end
+  end
+
+  defp advance(%{phase: :echo} = round, now_ms) do
+    if now_ms - round.since_ms >= @echo_ms,
+      do: freeze(round, now_ms),
+      else: %{round | echo?: true}
+  end
+
+  defp advance(%{phase: :digest} = round, now_ms) when now_ms - round.since_ms < @echo_ms,
+    do: %{round | echo?: round.echo? or whole?(round)}
+
+  defp advance(round, _now_ms), do: round
+
+  defp whole?(round), do: Enum.all?(round.view, &is_map_key(round.reports, &1))
+
+  defp freeze(round, now_ms) do
+    digest = Record.digest(round.id, Record.freeze(round.view, round.reports))
+
+    %{
+      round
+      | phase: :digest,
+        since_ms: now_ms,
+        said_ms: nil,
+        digest: digest,
+        echo?: whole?(round)
+    }
+    |> put_digest(round.me, digest)
+  end
+
+  defp speak(%{phase: :committed} = round, now_ms) do
+    if now_ms - round.since_ms <= @linger_ms,
+      do: say(round, now_ms),
+      else: {round, []}
+  end
+
+  defp speak(round, now_ms), do: say(round, now_ms)
+
+  defp say(round, now_ms) do
+    if round.said_ms == nil or now_ms - round.said_ms >= repeat_ms(round) do
+      letter = %Letter{
+        id: round.id,
+        view: round.view,
+        purpose: round.purpose,
+        remaining_ms: round.deadline_ms - now_ms,
+        report: round.report,
+        known: if(round.echo?, do: round.reports),
+        digest: round.digest,
+        ask: round.phase == :digest and now_ms - round.since_ms >= @ask_after * repeat_ms(round)
+      }
+
+      {%{round | said_ms: now_ms, echo?: false}, [letter]}
+    else
+      {round, []}
+    end
+  end
+
+  defp repeat_ms(round), do: max(@repeat_ms, @repeat_ms_per_robot * length(round.view))
+
+  defp agreed?(round),
+    do: Enum.all?(round.view, &(Map.get(round.digests, &1) == round.digest))
+
+  defp differing?(round), do: Enum.any?(round.digests, fn {_id, d} -> d != round.digest end)
+
+  # A round whose digest is out may have been committed by others: what follows it is a new epoch.
+  defp fenced(%{phase: phase, id: {epoch, _counter, initiator}} = round)
+       when phase in [:digest, :committed],
+       do: note(round, {epoch + 1, 0, initiator})
+
+  defp fenced(round), do: round
+
+  defp note(round, {epoch, counter, _initiator}),
+    do: %{round | highest: max(round.highest, {epoch, counter})}
+
+  # Whoever has sent its digest goes on to another round of the same epoch only with one who has
+  # not sent any: else two rounds could found the same epoch.
+  defp supersedes?(_id, %{id: nil}), do: true
+
+  defp supersedes?({epoch, _counter, initiator} = id, %{id: {own, _, _}} = round) do
+    case round.phase do
+      :committed -> epoch > own
+      :digest -> epoch > own or (id > round.id and unsigned?(round, initiator))
+      _open_or_left -> id > round.id
+    end
+  end
+
+  defp unsigned?(round, id), do: id in round.view and not is_map_key(round.digests, id)
+end

@@ -1,0 +1,59 @@
+defmodule Swarm.Agreement.Round.Letter do
+  @moduledoc """
+  What is said in a round. Every letter carries the round's id, its view and the time that is
+  left (no shared clock is needed), the sender's own report, and, once it is final, its digest.
+  `known` is the map of all reports that the sender holds, sent as an echo when the reports are
+  in, or when somebody asked. `purpose` says why the round is held.
+  """
+  alias Swarm.Message.WireTypes
+
+  @enforce_keys [:id, :view, :remaining_ms, :purpose]
+  defstruct @enforce_keys ++ [report: nil, known: nil, digest: nil, ask: false]
+
+  @type id :: {epoch :: pos_integer(), counter :: pos_integer(), initiator :: atom()}
+  @type t :: %__MODULE__{
+          id: id(),
+          view: [atom()],
+          remaining_ms: integer(),
+          purpose: :search | :change,
+          report: :busy | Swarm.Agreement.Election.report(),
+          known: %{atom() => Swarm.Agreement.Election.report()} | nil,
+          digest: binary() | nil,
+          ask: boolean()
+        }
+
+  # More than any round lasts, and more robots than any fleet has.
+  @longest_ms 120_000
+  @most 1_000
+
+  @doc "Whether a term from outside is a letter."
+  @spec valid?(term()) :: boolean()
+  def valid?(%__MODULE__{id: {epoch, counter, initiator}} = letter) do
+    WireTypes.whole?(letter, __MODULE__) and WireTypes.count?(epoch) and epoch > 0 and
+      WireTypes.count?(counter) and counter > 0 and WireTypes.name?(initiator) and
+      WireTypes.number?(letter.remaining_ms) and letter.remaining_ms <= @longest_ms and
+      letter.purpose in [:search, :change] and WireTypes.names?(letter.view) and
+      WireTypes.distinct?(letter.view) and
+      (letter.report == :busy or report?(letter.report)) and
+      (letter.known == nil or known?(letter.known)) and
+      (letter.digest == nil or (is_binary(letter.digest) and byte_size(letter.digest) == 32)) and
+      is_boolean(letter.ask)
+  end
+
+  def valid?(_term), do: false
+
+  defp known?(known) when is_map(known) and not is_struct(known),
+    do: Enum.all?(known, fn {id, report} -> WireTypes.name?(id) and report?(report) end)
+
+  defp known?(_other), do: false
+
+  defp report?(nil), do: true
+
+  defp report?(%{found: found, size_ppm: size, pose: pose, led: led, of: of} = report) do
+    map_size(report) == 5 and is_boolean(found) and is_integer(size) and size in 0..1_000_000 and
+      WireTypes.pose?(pose) and is_integer(led) and led in 0..@most and is_integer(of) and
+      of in 0..@most
+  end
+
+  defp report?(_other), do: false
+end

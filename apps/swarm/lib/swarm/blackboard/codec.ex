@@ -1,0 +1,256 @@
+defmodule Swarm.Blackboard.Codec do
+  @moduledoc """
+  What blackboards say to each other, in datagrams: rows, and what is needed to find out who lacks
+  which. Pure.
+
+  | term | means |
+  |---|---|
+  | `{:rows, [{name, id, incarnation, sequence, age_ms, payload}]}` | rows |
+  | `{:digest, first, until, [{name, hash}]}` | of the robots named so, this is what I have |
+  | `{:have, [{name, [{id, incarnation, sequence}]}]}` | of these I have these rows: send what I lack |
+  | `{:want, [{name, id}]}` | send these |
+
+  Names of robots travel as text, keys as a number, and keys with their values as bytes, so that
+  a node relays what it has no words for; nothing that arrives becomes an atom.
+  """
+  alias Swarm.Blackboard
+  alias Swarm.Message.WireTypes
+  alias Swarm.Blackboard.AntiEntropy
+
+  # Of the payload of a datagram; larger terms go alone.
+  @datagram 1_200
+  # Terms that are compressed may be far larger than their bytes.
+  @compressed 80
+  @ids 4_294_967_296
+  # Times of day in ms, or, on clocks that count finer, in ns: until the year 2160. Who is outbid by such a
+  # number, however wrong, has one left that is higher.
+  @latest 6_000_000_000_000_000_000
+  # No robot writes as often in one life.
+  @most 1_000_000_000_000_000
+  @oldest_ms 1_000_000_000
+
+  @type key :: atom() | {atom(), atom() | integer()}
+  @type id :: non_neg_integer()
+
+  @doc """
+  Whether it can be the key of a row: a name, or a name with one of what.
+
+      iex> for key <- [:about, {:task, 3}, nil, "about", {:a, :b, :c}], do: Swarm.Blackboard.Codec.key?(key)
+      [true, true, false, false, false]
+  """
+  @spec key?(term()) :: boolean()
+  def key?({name, of}),
+    do: WireTypes.name?(name) and (WireTypes.name?(of) or WireTypes.number?(of))
+
+  def key?(name), do: WireTypes.name?(name)
+
+  @doc "The number of a key, the same on every machine."
+  @spec id(key()) :: id()
+  def id(key), do: :erlang.phash2(key, @ids)
+
+  @doc """
+  A key and its value as bytes, and back.
+
+      iex> Swarm.Blackboard.Codec.decode(Swarm.Blackboard.Codec.encode(:about, %{battery: 12.1}))
+      {:ok, :about, %{battery: 12.1}}
+      iex> Swarm.Blackboard.Codec.decode("junk")
+      :error
+  """
+  @spec encode(key(), term()) :: binary()
+  def encode(key, value), do: :erlang.term_to_binary({key, value}, minor_version: 2)
+
+  @doc "Back; `:error` also where a name in it is not known on this node."
+  @spec decode(binary()) :: {:ok, key(), term()} | :error
+  def decode(<<131, @compressed, _rest::binary>>), do: :error
+
+  def decode(payload) do
+    case :erlang.binary_to_term(payload, [:safe]) do
+      {key, value} -> {:ok, key, value}
+      _other -> :error
+    end
+  rescue
+    ArgumentError -> :error
+  end
+
+  @doc "Rows as terms for datagrams."
+  @spec tell([Blackboard.State.row()]) :: [term()]
+  def tell(rows) do
+    for {robot, id, {incarnation, sequence}, age_ms, payload} <- rows do
+      {Atom.to_string(robot), id, incarnation, sequence, age_ms, payload}
+    end
+    |> pack()
+    |> Enum.map(&{:rows, &1})
+  end
+
+  @doc "A digest as terms for datagrams, each of which says of which names it is."
+  @spec digest(AntiEntropy.digest()) :: [term()]
+  def digest(digest) do
+    parts = pack(for {robot, hash} <- digest, do: {Atom.to_string(robot), hash})
+    firsts = parts |> Enum.drop(1) |> Enum.map(fn [{name, _hash} | _] -> name end)
+
+    case Enum.zip([parts, ["" | firsts], firsts ++ [nil]]) do
+      [] -> [{:digest, "", nil, []}]
+      parts -> for {part, first, until} <- parts, do: {:digest, first, until, part}
+    end
+  end
+
+  @doc "Stamps as terms for datagrams."
+  @spec have([{atom(), [{id(), Blackboard.State.stamp()}]}]) :: [term()]
+  def have(stamps) do
+    for {robot, stamps} <- stamps do
+      {Atom.to_string(robot), for({id, {incarnation, n}} <- stamps, do: {id, incarnation, n})}
+    end
+    |> pack()
+    |> Enum.map(&{:have, &1})
+  end
+
+  @doc "Wishes as terms for datagrams."
+  @spec want([{atom(), id()}]) :: [term()]
+  def want(wanted) do
+    pack(for {robot, id} <- wanted, do: {Atom.to_string(robot), id}) |> Enum.map(&{:want, &1})
+  end
+
+  @doc """
+  Lists of terms, each list small enough for a datagram; what is too large for that goes alone.
+
+      iex> Swarm.Blackboard.Codec.pack([])
+      []
+      iex> for part <- Swarm.Blackboard.Codec.pack(Enum.map(1..3, &{&1, :binary.copy("x", 500)})), do: length(part)
+      [2, 1]
+  """
+  @spec pack([term()]) :: [[term(), ...]]
+  def pack(terms) do
+    # What stands round the list, and the name of what it is a list of, with two bounds.
+    room = @datagram - 100
+
+    terms
+    |> Enum.chunk_while(
+      {[], 0},
+      fn term, {part, size} ->
+        bytes = :erlang.external_size(term)
+
+        if part != [] and size + bytes > room,
+          do: {:cont, Enum.reverse(part), {[term], bytes}},
+          else: {:cont, {[term | part], size + bytes}}
+      end,
+      fn {part, _size} ->
+        if part == [], do: {:cont, []}, else: {:cont, Enum.reverse(part), []}
+      end
+    )
+  end
+
+  @type heard ::
+          {:rows, [Blackboard.State.row()]}
+          | {:digest, String.t(), String.t() | nil, AntiEntropy.digest()}
+          | {:have, [{atom(), [{id(), Blackboard.State.stamp()}]}]}
+          | {:want, [{atom(), id()}]}
+
+  @doc """
+  What a term from outside says, and how much of it was dropped: entries of no sense, and those
+  of robots whose names are not known here.
+
+      iex> Swarm.Blackboard.Codec.read({:want, [{"mag1", 5}, :junk]})
+      {{:want, [mag1: 5]}, 1}
+      iex> Swarm.Blackboard.Codec.read(%{junk: 1})
+      :error
+  """
+  @spec read(term()) :: {heard(), dropped :: non_neg_integer()} | :error
+  def read({:rows, list}) do
+    with {:ok, rows, dropped} <- each(list, &row/1), do: {{:rows, rows}, dropped}
+  end
+
+  def read({:digest, first, until, list})
+      when is_binary(first) and (until == nil or is_binary(until)) do
+    with {:ok, digest, dropped} <- each(list, &hash/1),
+         do: {{:digest, first, until, digest}, dropped}
+  end
+
+  def read({:have, list}) do
+    with {:ok, stamps, dropped} <- each(list, &stamps/1), do: {{:have, stamps}, dropped}
+  end
+
+  def read({:want, list}) do
+    with {:ok, wanted, dropped} <- each(list, &wish/1), do: {{:want, wanted}, dropped}
+  end
+
+  def read(_other), do: :error
+
+  defp each(list, read) do
+    if WireTypes.list?(list, fn _any -> true end) do
+      good = for term <- list, {:ok, good} <- [read.(term)], do: good
+      {:ok, good, length(list) - length(good)}
+    else
+      :error
+    end
+  end
+
+  defguardp stamp?(incarnation, n)
+            when is_integer(incarnation) and incarnation >= 0 and incarnation <= @latest and
+                   is_integer(n) and n >= 0 and n <= @most
+
+  defguardp id?(id) when is_integer(id) and id >= 0 and id < @ids
+
+  defp row({name, id, incarnation, n, age_ms, payload})
+       when id?(id) and stamp?(incarnation, n) and age_ms in 0..@oldest_ms and
+              is_binary(payload) do
+    with {:ok, robot} <- robot(name), do: {:ok, {robot, id, {incarnation, n}, age_ms, payload}}
+  end
+
+  defp row(_other), do: :error
+
+  defp hash({name, hash}) when id?(hash) do
+    with {:ok, robot} <- robot(name), do: {:ok, {robot, hash}}
+  end
+
+  defp hash(_other), do: :error
+
+  defp wish({name, id}) when id?(id) do
+    with {:ok, robot} <- robot(name), do: {:ok, {robot, id}}
+  end
+
+  defp wish(_other), do: :error
+
+  defp stamps({name, list}) do
+    with {:ok, robot} <- robot(name),
+         {:ok, stamps, 0} <- each(list, &stamp/1),
+         do: {:ok, {robot, stamps}},
+         else: (_other -> :error)
+  end
+
+  defp stamps(_other), do: :error
+
+  defp stamp({id, incarnation, n}) when id?(id) and stamp?(incarnation, n),
+    do: {:ok, {id, {incarnation, n}}}
+
+  defp stamp(_other), do: :error
+
+  @doc """
+  The atom of a name, if there is one.
+
+      iex> Swarm.Blackboard.Codec.robot("mag1")
+      {:ok, :mag1}
+      iex> Swarm.Blackboard.Codec.robot("no robot was ever called so")
+      :error
+  """
+  @spec robot(term()) :: {:ok, atom()} | :error
+  def robot(name) when is_binary(name) and byte_size(name) in 1..255 do
+    robot = String.to_existing_atom(name)
+    if WireTypes.name?(robot), do: {:ok, robot}, else: :error
+  rescue
+    ArgumentError -> :error
+  end
+
+  def robot(_other), do: :error
+
+  @typedoc "A name that travelled as text, where there is no such atom."
+  @type word :: atom() | String.t()
+
+  @doc "A name that travelled as text: its atom, or the text where this node has none."
+  @spec word(String.t()) :: word()
+  def word(text) do
+    case robot(text) do
+      {:ok, atom} -> atom
+      :error -> text
+    end
+  end
+end

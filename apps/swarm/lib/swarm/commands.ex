@@ -1,0 +1,201 @@
+defmodule Swarm.Commands do
+  @moduledoc false
+  # What `Swarm` needs: who is meant, is it allowed, and what do they answer.
+  alias Robot.Command
+  alias Swarm.Formation
+  alias Swarm.Comms.Transport
+  alias Swarm.Commands
+  alias Swarm.Comms.CommandHandler
+  alias Missions.Landmark.Policy
+
+  @doc "The ids of the robots meant, which all exist, or one line."
+  @spec robots(term()) :: {:ok, [atom(), ...]} | {:error, String.t()}
+  def robots(:all) do
+    case Transport.robots() do
+      [] -> {:error, "there are no robots here"}
+      robots -> {:ok, robots}
+    end
+  end
+
+  def robots([]), do: {:error, "[] names no robot; write a name, a list of names or :all"}
+
+  def robots(names) when is_list(names) do
+    known = Transport.robots()
+
+    with false <- List.improper?(names),
+         {:ok, ids} <- named(names, known) do
+      {:ok, Enum.uniq(ids)}
+    else
+      true -> {:error, "#{inspect(names)} is no list of robots"}
+      error -> error
+    end
+  end
+
+  def robots(name), do: robots([name])
+
+  defp named(names, known) do
+    Enum.reduce_while(names, {:ok, []}, fn name, {:ok, ids} ->
+      case Enum.find(known, &(&1 == name or Atom.to_string(&1) == name)) do
+        nil -> {:halt, {:error, unknown(name, known)}}
+        id -> {:cont, {:ok, ids ++ [id]}}
+      end
+    end)
+  end
+
+  defp unknown(name, known) do
+    there = if known == [], do: "none", else: Enum.join(known, ", ")
+    word = if is_binary(name), do: name, else: String.trim_leading(inspect(name), ":")
+
+    "no robot #{inspect(name)}; there are #{there}" <>
+      hint(word, Enum.map(known, &Atom.to_string/1))
+  end
+
+  defp hint(word, known) do
+    case Command.Arguments.nearest(word, known) do
+      nil -> ""
+      near -> "; did you mean #{near}?"
+    end
+  end
+
+  @doc "Checks the options of a start: who takes part, and the mission's own."
+  @spec start(term()) :: {:ok, [atom()], keyword()} | {:error, String.t()}
+  def start(options) do
+    with :ok <-
+           keyword(options, "formation, assign, leader_change, policy, of, lost_link, robots"),
+         {:ok, robots} <- robots(Keyword.get(options, :robots, :all)),
+         {:ok, options} <- mission(Keyword.delete(options, :robots), length(robots)),
+         {:ok, options} <- fleet_size(options, length(robots)),
+         do: {:ok, robots, options}
+  end
+
+  @doc "Checks a formation."
+  @spec formation(term(), term()) :: {:ok, Formation.t()} | {:error, String.t()}
+  def formation(kind, options, robots \\ nil)
+
+  def formation(kind, options, robots) do
+    with :ok <- keyword(options, "spacing, length or side"),
+         {:ok, kind} <- kind(kind),
+         :ok <- numbers(options),
+         do: Formation.new(kind, fleet(kind, options, robots || length(Transport.robots())))
+  end
+
+  @doc """
+  Tells the robots; `:ok` when all accept, or `{:ok, line}` with what they say to it, else one line about
+  those that do not, and what the others say.
+  """
+  @spec tell([atom()], term()) :: Swarm.answer() | {:ok, line :: String.t()}
+  def tell(robots, request) do
+    answers = Commands.Client.ask(robots, request)
+    said = for id <- robots, {:ok, line} <- [answers[id]], do: line
+    accepted? = &(&1 == :ok or match?({:ok, _line}, &1))
+    refusals = for id <- robots, not accepted?.(answers[id]), do: refusal(id, answers[id])
+
+    case {refusals, said} do
+      {[], []} -> :ok
+      {[], said} -> {:ok, Enum.join(said, "; ")}
+      {refusals, said} -> {:error, (refusals ++ said) |> Enum.uniq() |> Enum.join("; ")}
+    end
+  end
+
+  @doc """
+  The same of what only robots on a mission can take: that others have none is no refusal, if one has. A robot
+  that does not answer may be the one that leads, so it is named.
+  """
+  @spec any([atom()], term()) :: Swarm.answer()
+  def any(robots, request) do
+    answers = Commands.Client.ask(robots, request)
+    {taken, others} = Enum.split_with(robots, &(answers[&1] == :ok))
+    others = Enum.reject(others, &(answers[&1] == CommandHandler.shapeless(&1)))
+    lines = others |> Enum.map(&refusal(&1, answers[&1])) |> Enum.uniq()
+
+    case {taken, lines} do
+      {[_ | _], []} -> :ok
+      {[], []} -> {:error, "no robot is on a mission that has a formation; start it first"}
+      {[], lines} -> {:error, Enum.join(lines, "; ")}
+      {_taken, lines} -> {:error, Enum.join(lines ++ ["the others took it"], "; ")}
+    end
+  end
+
+  defp refusal(id, nil), do: "#{id} does not answer"
+  defp refusal(_id, {:error, line}) when is_binary(line), do: line
+  defp refusal(id, {:error, reason}), do: "#{id} refuses: #{inspect(reason)}"
+
+  defp mission(options, robots) do
+    Enum.reduce_while(options, {:ok, []}, fn option, {:ok, checked} ->
+      case option(option, robots) do
+        {:ok, option} -> {:cont, {:ok, checked ++ [option]}}
+        {:error, line} -> {:halt, {:error, line}}
+      end
+    end)
+  end
+
+  defp option({:formation, {kind, spacing}}, robots) do
+    with {:ok, formation} <- formation(kind, [spacing: spacing], robots),
+         do: {:ok, {:formation, formation}}
+  end
+
+  defp option({:formation, kind}, robots) do
+    with {:ok, formation} <- formation(kind, [], robots), do: {:ok, {:formation, formation}}
+  end
+
+  defp option({:assign, how} = option, _robots) when how in [:chain, :cost], do: {:ok, option}
+
+  defp option({:assign, other}, _robots),
+    do: {:error, "assign cannot be #{inspect(other)}: :chain or :cost"}
+
+  defp option({:leader_change, on?} = option, _robots) when is_boolean(on?), do: {:ok, option}
+
+  defp option({:leader_change, other}, _robots),
+    do: {:error, "leader_change cannot be #{inspect(other)}: true or false"}
+
+  defp option({key, _value} = option, _robots) when key in [:policy, :of, :lost_link],
+    do: {:ok, option}
+
+  defp option({key, _value}, _robots) do
+    names = ~w(formation assign leader_change policy of lost_link robots)
+
+    {:error,
+     "unknown option #{inspect(key)}: #{Enum.join(names, ", ")}" <>
+       hint(Atom.to_string(key), names)}
+  end
+
+  # A majority is one of those that are started, unless told otherwise.
+  defp fleet_size(options, robots) do
+    options =
+      if options[:policy] == :majority, do: Keyword.put_new(options, :of, robots), else: options
+
+    with {:ok, _policy} <- Policy.options(options), do: {:ok, options}
+  end
+
+  defp kind(kind) do
+    kinds = Formation.kinds()
+
+    case Enum.find(kinds, &(&1 == kind or Atom.to_string(&1) == kind)) do
+      nil ->
+        {:error, line} = Formation.new(kind)
+        word = if is_binary(kind), do: kind, else: String.trim_leading(inspect(kind), ":")
+        {:error, line <> hint(word, Enum.map(kinds, &Atom.to_string/1))}
+
+      known ->
+        {:ok, known}
+    end
+  end
+
+  defp numbers(options) do
+    case Enum.reject(options, fn {_key, value} -> is_number(value) end) do
+      [] -> :ok
+      [{key, value} | _] -> {:error, "#{key} cannot be #{inspect(value)}: a number of metres"}
+    end
+  end
+
+  # Only a whole length or side needs to know how many there are.
+  defp fleet(_kind, options, robots) do
+    if options[:length] || options[:side], do: options ++ [robots: robots], else: options
+  end
+
+  defp keyword(options, allowed) do
+    if Keyword.keyword?(options),
+      do: :ok,
+      else: {:error, "#{inspect(options)} are no options; allowed are #{allowed}"}
+  end
+end

@@ -1,0 +1,266 @@
+defmodule Swarm.Comms do
+  @moduledoc """
+  A robot's ear and mouth, a companion of its pilot (`Robot.Companion`).
+
+  Ear: whatever arrives passes `Swarm.Message.check/1`; what is malformed is dropped and counted.
+  Heartbeats become peers on the robot's board, everything else goes to the pilot. Mouth: what the
+  mission says goes out, and five times a second a heartbeat, with what the board says of the robot.
+
+  An e-stop spreads with the heartbeats, also one that was pressed on the robot's gate; how it
+  stands is `Swarm.EStop`'s to say, which is started beside the link. Of two robots of one name the
+  later one (`Swarm.Comms.NameClaim`) stops and falls silent, with the event `[:swarm, :link, :duplicate_id]`.
+
+  | part | what it does |
+  |---|---|
+  | `Swarm.Comms.Receiver` | judges what is heard |
+  | `Swarm.Comms.PeerWriter` | writes the peers on the board |
+  | `Swarm.Comms.Sender` | speaks, sends the heartbeats |
+  | `Swarm.Comms.CommandHandler` | answers people, if what they ask is not too old (`Swarm.Commands.Freshness`) |
+  | `Swarm.Comms.LoadShedder` | keeps the mailbox short |
+
+  `join/2` makes a config with a link. Its options:
+
+    * `:transport` - `{m, f, a}`; a message goes to `apply(m, f, a ++ [from, ids, message])`, and
+      arrives by `hear/2`. Default: `Swarm.Comms.Transport.transmit/3`
+    * `:boot` - a number that grows with every start; default the time of day
+  """
+  use GenServer
+  alias Hal.Event
+  alias Robot.{Board, Config, Names}
+  alias Robot.Control.{Executive, Pilot}
+  alias Swarm.{EStop, Message, Nonblocking}
+  alias Swarm.Commands.Freshness
+  alias Swarm.Comms.Transport
+  alias Swarm.Directory.RobotInfo
+  alias Swarm.Message.WireTypes
+  alias Swarm.Comms.{CommandHandler, LoadShedder, NameClaim, PeerWriter, Receiver, Sender}
+
+  @behaviour Robot.Companion
+
+  @tick_ms 100
+  @rivals_every 10
+  # So many messages are handled between two looks at how many wait.
+  @look_every 64
+
+  @doc "The config of a robot that talks: with a link, which its mission speaks through, and a brake."
+  @spec join(Config.t(), keyword()) :: Config.t()
+  def join(%Config{} = config, options \\ []) do
+    options = Keyword.validate!(options, [:boot, transport: {Transport, :transmit, []}])
+    # The brake first: whoever is listed later falls with those before, never takes them along.
+    companions = config.companions ++ [{EStop, []}, {__MODULE__, options}]
+    %{config | send: {__MODULE__, :say, [config.id]}, companions: companions}
+  end
+
+  @impl Robot.Companion
+  def child_spec({config, options}),
+    do: %{id: __MODULE__, start: {__MODULE__, :start_link, [config, options]}}
+
+  @doc "Starts the link of a robot, as its supervisor does."
+  @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
+  def start_link(%Config{} = config, options) do
+    GenServer.start_link(__MODULE__, {config, options},
+      name: Names.via(config.id, :link),
+      spawn_opt: [message_queue_data: :off_heap]
+    )
+  end
+
+  @doc """
+  Says something to one robot, to several, or to all others, and returns who is addressed: of `:all`
+  those that are known here (`Swarm.Comms.Transport.robots/0`). Nobody is waited for, and nobody says whether it was heard.
+  """
+  @spec say(robot :: atom(), to :: atom() | [atom()] | :all, Message.t()) :: [atom()]
+  def say(robot, to, message) do
+    ids = List.delete(addressed(to), robot)
+    GenServer.cast(Names.via(robot, :link), {:say, ids, message})
+    ids
+  end
+
+  @doc "Something arrived for a robot of this node, by whatever transport."
+  @spec hear(robot :: atom(), term()) :: :ok
+  def hear(robot, term), do: GenServer.cast(Names.via(robot, :link), {:hear, term})
+
+  @doc "A heartbeat of a robot of this one's name came from another node, from that life of it."
+  @spec rival(robot :: atom(), NameClaim.identity()) :: :ok
+  def rival(robot, {_boot, _node} = other),
+    do: GenServer.cast(Names.via(robot, :link), {:rival, other, nil})
+
+  @impl GenServer
+  def init({%Config{id: id} = config, options}) do
+    board = Board.find!(id)
+    boot = options[:boot] || System.system_time(:millisecond)
+    transport = options[:transport] || {Transport, :transmit, []}
+
+    s = %{
+      config: config,
+      id: id,
+      board: board,
+      ear: Receiver.new(id, EStop.written(board)),
+      chart: PeerWriter.new(board),
+      mouth: Sender.new(config, board, transport, boot),
+      name: NameClaim.new(id, {boot, node()}),
+      unseen: 0,
+      noted: nil,
+      next: System.monotonic_time(:millisecond)
+    }
+
+    EStop.present(id, true)
+    {:ok, schedule(s), {:continue, :enter}}
+  end
+
+  @impl GenServer
+  def handle_continue(:enter, s), do: {:noreply, %{s | name: NameClaim.enter(s.name)}}
+
+  # Links are found in the directory, so anything may come here from anywhere: what would make this
+  # process fall is counted instead.
+  @impl GenServer
+  def handle_call(_unknown, _from, s), do: {:noreply, reject(s)}
+
+  @impl GenServer
+  def handle_cast({:say, ids, %Message{} = message}, s) do
+    if WireTypes.names?(ids),
+      do: {:noreply, %{s | mouth: Sender.speak(s.mouth, ids, message)}},
+      else: {:noreply, reject(s)}
+  end
+
+  def handle_cast({:hear, term}, s) do
+    at_ms = Config.now(s.config)
+    {heard, ear} = Receiver.hear(s.ear, term, at_ms)
+    {:noreply, s |> stop(ear, term) |> heard(heard, at_ms) |> relieve()}
+  end
+
+  def handle_cast({:command, request, ref}, s) when is_reference(ref),
+    do: {:noreply, command(s, request, ref, nil)}
+
+  def handle_cast({:command, request, ref, stamp}, s) when is_reference(ref),
+    do: {:noreply, command(s, request, ref, stamp)}
+
+  def handle_cast({:stamp, ref}, s) when is_reference(ref) do
+    {stamp, mouth} = Sender.stamp(s.mouth)
+    Nonblocking.answer(ref, stamp)
+    {:noreply, %{s | mouth: mouth}}
+  end
+
+  def handle_cast(:stop, s), do: {:noreply, latch(s, EStop.written(s.board))}
+
+  def handle_cast({:rejected, why}, s) when is_atom(why),
+    do: {:noreply, %{s | ear: Receiver.reject(s.ear, why)}}
+
+  def handle_cast({:rival, {boot, node} = other, link}, s)
+      when is_integer(boot) and is_atom(node) and (is_pid(link) or link == nil) do
+    case NameClaim.rival(s.name, other, link) do
+      {false, name} -> {:noreply, %{s | name: name}}
+      {true, name} -> {:noreply, give_way(%{s | name: name}, node)}
+    end
+  end
+
+  def handle_cast(_unknown, s), do: {:noreply, reject(s)}
+
+  @impl GenServer
+  def handle_info(:tick, s), do: {:noreply, s |> tick(Config.now(s.config)) |> schedule()}
+
+  def handle_info(message, s) do
+    case NameClaim.arrived(s.name, message) do
+      {:ok, name} -> {:noreply, %{s | name: name}}
+      :other -> {:noreply, reject(s)}
+    end
+  end
+
+  defp heard(s, {:peer, id}, at_ms),
+    do: %{s | chart: PeerWriter.heard(s.chart, s.ear.peers, id, at_ms)}
+
+  defp heard(s, {:message, message}, _at_ms) do
+    Pilot.hear(s.id, {:message, message})
+    s
+  end
+
+  defp heard(s, :nothing, _at_ms), do: s
+
+  defp tick(s, at_ms) do
+    s = note(follow(s))
+    s = %{s | chart: PeerWriter.grow_old(s.chart, s.ear.peers, at_ms)}
+    counts = %{sent: s.mouth.sent, heard: s.ear.heard, rejected: s.ear.rejected}
+    Board.put(s.board, :link, :radio, counts, at_ms)
+    s = %{s | mouth: Sender.tick(s.mouth, s.ear, at_ms)}
+    if rem(s.mouth.ticks, @rivals_every) == 0, do: NameClaim.challenge(s.name)
+    s
+  end
+
+  defp note(s) do
+    noted =
+      if NameClaim.left?(s.name),
+        do: RobotInfo.leave(s.noted, s.id),
+        else: RobotInfo.note(s.noted, s.config, s.board, s.mouth.stamps.boot, s.ear)
+
+    %{s | noted: noted}
+  end
+
+  # Who knows no better way than the link finds the brake through it.
+  defp command(s, request, ref, stamp) do
+    case Freshness.judge(s.mouth.stamps, request, ref, stamp, Config.now(s.config)) do
+      :ok ->
+        if EStop.takes?(request),
+          do: EStop.take(s.id, request, ref),
+          else: answer(s, CommandHandler.answer(request, s.config, s.board, s.ear), ref)
+
+        s
+
+      {:error, age} ->
+        Nonblocking.answer(ref, Freshness.refusal(s.id, age))
+        %{s | ear: Receiver.reject(s.ear, :too_old)}
+    end
+  end
+
+  # The pilot has taken an order; that the executive has it, too, only that one can say.
+  defp answer(s, :accepted, ref), do: Executive.confirm(s.id, {Nonblocking, :answer, [ref, :ok]})
+  defp answer(_s, answer, ref), do: Nonblocking.answer(ref, answer)
+
+  # The brake knows best; it is only asked where a heartbeat seems to change something.
+  defp stop(%{ear: %{stop: stop}} = s, %{stop: stop} = ear, _term), do: %{s | ear: ear}
+
+  defp stop(s, ear, %Message{kind: :relay, body: inner}), do: stop(s, ear, inner)
+
+  defp stop(s, ear, %Message{body: beat}),
+    do: latch(%{s | ear: %{ear | stop: s.ear.stop}}, EStop.beat(s.id, beat.estop, beat.latched))
+
+  # A stop may have been pressed on the robot itself.
+  defp follow(s) do
+    if Board.latched?(s.board) == s.ear.stop.latched?,
+      do: s,
+      else: latch(s, EStop.follow(s.id))
+  end
+
+  defp latch(%{ear: %{stop: before} = ear} = s, stop) do
+    s = %{s | ear: %{ear | stop: stop}}
+    if stop.latched? == before.latched?, do: s, else: %{s | mouth: Sender.urge(s.mouth, s.ear)}
+  end
+
+  defp give_way(s, other) do
+    EStop.present(s.id, false)
+    Pilot.halt(s.id)
+    Event.execute([:swarm, :link, :duplicate_id], %{}, %{robot: s.id, other: other})
+    %{s | mouth: %{s.mouth | silent?: true}}
+  end
+
+  defp addressed(:all), do: Transport.robots()
+  defp addressed(ids) when is_list(ids), do: ids
+  defp addressed(id), do: [id]
+
+  defp reject(s), do: relieve(%{s | ear: Receiver.reject(s.ear, :not_a_message)})
+
+  defp relieve(%{unseen: unseen} = s) when unseen < @look_every, do: %{s | unseen: unseen + 1}
+
+  defp relieve(s) do
+    case LoadShedder.relieve([:tick | NameClaim.timers(s.name)]) do
+      0 -> %{s | unseen: 0}
+      dropped -> %{s | unseen: 0, ear: Receiver.reject(s.ear, :flooded, dropped)}
+    end
+  end
+
+  defp schedule(%{config: %{pace: :manual}} = s), do: s
+
+  defp schedule(s) do
+    next = max(s.next + @tick_ms, System.monotonic_time(:millisecond))
+    Process.send_after(self(), :tick, next, abs: true)
+    %{s | next: next}
+  end
+end

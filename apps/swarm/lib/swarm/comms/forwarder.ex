@@ -1,0 +1,134 @@
+defmodule Swarm.Comms.Forwarder do
+  @moduledoc """
+  What a robot passes on for those that do not hear each other, so that robots that are connected by
+  way of others act as one group. Pure.
+
+  Everybody's heartbeat lists whom it hears. Where one robot's list lacks another for a while, one
+  that both are in touch with passes on the one's heartbeats, its round letters as well, straight to
+  the other. Of several that could, the first two by name do. Letters go over three relays
+  at most, heartbeats stop where they are known. What came by a relay counts as a sign of life, but not as heard, so that the relay goes on
+  for as long as it is needed.
+  """
+  alias Swarm.Message
+  alias Swarm.Membership.{Heartbeat, NameSet}
+
+  # A robot that has just come is not in anybody's list yet.
+  @patience_ms 300
+  # Letters are repeated every 100 ms; by several ways the same comes more often.
+  @repeat_ms 90
+  @alive_ms 1_000
+  @relays 2
+
+  defstruct missing: %{}, beats: %{}, letters: %{}
+
+  @typedoc """
+  `missing` says since when a robot (the second of the pair) has not heard another; `beats` and `letters`
+  what was passed on last from whom to whom.
+  """
+  @type t :: %__MODULE__{
+          missing: %{{atom(), atom()} => integer()},
+          beats: %{{atom(), atom()} => {integer(), integer()}},
+          letters: %{{atom(), atom()} => {non_neg_integer(), integer()}}
+        }
+
+  @typedoc "The peers of a percept."
+  @type peers :: %{atom() => Robot.Percept.peer()}
+
+  @doc "Nothing passed on yet."
+  @spec new() :: t()
+  def new, do: %__MODULE__{}
+
+  @doc "The heartbeats to pass on now, as `{:send, [to], message}`."
+  @spec beats(t(), atom(), peers(), integer()) :: {t(), [{:send, [atom()], Message.t()}]}
+  def beats(relay, me, peers, now_ms) do
+    alive = for {id, %{beat: %Heartbeat{}} = peer} <- peers, alive?(peer, now_ms), do: {id, peer}
+    alive = Enum.sort(alive)
+    names = Enum.map(alive, &elem(&1, 0))
+    all = NameSet.new([me | names])
+
+    pairs =
+      for {to, %{beat: %{heard: heard}}} <- alive,
+          not NameSet.all_but?(heard, all, to),
+          NameSet.member?(heard, me),
+          from <- names -- NameSet.names(heard),
+          from != to,
+          do: {from, to}
+
+    missing = Map.new(pairs, &{&1, Map.get(relay.missing, &1, now_ms)})
+
+    relay = %{
+      relay
+      | missing: missing,
+        beats: Map.take(relay.beats, pairs),
+        letters: Map.take(relay.letters, pairs)
+    }
+
+    known = Map.new(alive)
+
+    for {from, to} = pair <- pairs,
+        now_ms - missing[pair] >= @patience_ms,
+        mine?(me, from, to, known, now_ms),
+        reduce: {relay, []} do
+      {relay, sent} -> beat(relay, me, pair, known[from], sent)
+    end
+  end
+
+  defp beat(relay, me, {from, to} = pair, %{beat: beat} = peer, sent) do
+    number = {beat.boot, beat.sequence}
+    # How far it has come is not known here: what is not heard itself has come over one at least.
+    hops = if peer.direct_ms == peer.at_ms, do: 0, else: 2
+    message = %{Message.new(from, :heartbeat, beat) | hops: hops}
+
+    with true <- relay.beats[pair] != number,
+         {:ok, relayed} <- Message.pass_on(message, me) do
+      {put_in(relay.beats[pair], number), [{:send, [to], relayed} | sent]}
+    else
+      _told_already -> {relay, sent}
+    end
+  end
+
+  @doc "The same for a letter that was heard just now, to those of its view that lack its sender."
+  @spec letter(t(), atom(), peers(), Message.t(), integer()) ::
+          {t(), [{:send, [atom()], Message.t()}]}
+  def letter(%{missing: missing} = relay, _me, _peers, _message, _now_ms) when missing == %{},
+    do: {relay, []}
+
+  def letter(relay, me, peers, %Message{kind: :round, from: from, body: letter} = message, now_ms) do
+    content = :erlang.phash2(%{letter | remaining_ms: 0})
+
+    for to <- letter.view,
+        to not in [me, from],
+        is_map_key(relay.missing, {from, to}),
+        mine?(me, from, to, peers, now_ms),
+        fresh?(relay.letters[{from, to}], content, now_ms),
+        {:ok, relayed} <- [Message.pass_on(message, me)],
+        reduce: {relay, []} do
+      {relay, sent} ->
+        {put_in(relay.letters[{from, to}], {content, now_ms}), [{:send, [to], relayed} | sent]}
+    end
+  end
+
+  defp fresh?({content, at_ms}, content, now_ms), do: now_ms - at_ms >= @repeat_ms
+  defp fresh?(_other, _content, _now_ms), do: true
+
+  # Of those that hear the one and are heard by the other the first do it; where there are none,
+  # everybody who has it by a relay.
+  defp mine?(me, from, to, peers, now_ms) do
+    ways =
+      for {id, peer} <- peers,
+          id not in [from, to],
+          alive?(peer, now_ms),
+          NameSet.member?(peer.beat.heard, from) and NameSet.member?(peers[to].beat.heard, id),
+          do: id
+
+    if heard?(peers[from], now_ms),
+      do: me in Enum.take(Enum.sort([me | ways]), @relays),
+      else: ways == [] and is_map_key(peers, from)
+  end
+
+  defp heard?(%{direct_ms: at_ms}, now_ms) when at_ms != nil, do: now_ms - at_ms < @alive_ms
+  defp heard?(_relayed_or_unknown, _now_ms), do: false
+
+  defp alive?(%{at_ms: at_ms, beat: %Heartbeat{}}, now_ms), do: now_ms - at_ms < @alive_ms
+  defp alive?(_silent, _now_ms), do: false
+end

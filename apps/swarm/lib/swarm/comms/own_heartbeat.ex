@@ -1,0 +1,48 @@
+defmodule Swarm.Comms.OwnHeartbeat do
+  @moduledoc """
+  The heartbeat of a live robot: what its board says of it. `Swarm.Member` makes the same in lockstep.
+  """
+  alias Robot.{Board, Config, Percept}
+  alias Swarm.Message
+  alias Swarm.Membership.{Heartbeat, Peers}
+  alias Swarm.Comms.Receiver
+
+  @odometry_ms 300
+
+  @doc """
+  The message with the heartbeat of this number, `{boot, sequence}`. A robot that has no pose yet has
+  nothing to say; one whose executive fell stands where it was.
+  """
+  @spec message(Config.t(), Board.t(), Receiver.t(), {integer(), non_neg_integer()}, integer()) ::
+          {:ok, Message.t()} | :error
+  def message(config, board, ear, sender, at_ms) do
+    with {:ok, pose, _then} <- Board.fetch(board, :pose, :infinity, at_ms) do
+      percept = %Percept{
+        robot: config.id,
+        at_ms: at_ms,
+        profile: config.profile,
+        pose: pose,
+        odometry: odometry(board, at_ms)
+      }
+
+      heard = Peers.heard(ear.peers, at_ms)
+      beat = Heartbeat.new(sender, percept, claim(board), heard, ear.stop)
+      {:ok, Message.new(config.id, :heartbeat, beat)}
+    end
+  end
+
+  defp odometry(board, at_ms) do
+    case Board.fetch(board, :odometry, @odometry_ms, at_ms) do
+      {:ok, odometry, _then} -> odometry
+      :error -> nil
+    end
+  end
+
+  defp claim(board) do
+    case Board.fetch(board, :mission, :infinity) do
+      {:ok, %{state: :idle}, _at_ms} -> %{standing: true}
+      {:ok, %{claim: claim}, _at_ms} -> claim
+      :error -> %{}
+    end
+  end
+end

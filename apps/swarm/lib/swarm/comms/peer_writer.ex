@@ -1,0 +1,39 @@
+defmodule Swarm.Comms.PeerWriter do
+  @moduledoc """
+  The other robots, on the board of one: a row for each, `{:peer, id}`, written when it is heard, and
+  once more when it is gone.
+  """
+  alias Robot.Board
+  alias Swarm.Membership.Peers
+
+  @enforce_keys [:board]
+  defstruct @enforce_keys ++ [gone: MapSet.new()]
+
+  @type t :: %__MODULE__{board: Board.t(), gone: MapSet.t(atom())}
+
+  @doc "Nobody yet."
+  @spec new(Board.t()) :: t()
+  def new(board), do: %__MODULE__{board: board}
+
+  @doc "One was heard. A hundred robots tell each other fifty thousand times a second, so only its row is written."
+  @spec heard(t(), Peers.t(), atom(), integer()) :: t()
+  def heard(%__MODULE__{} = chart, peers, id, at_ms) do
+    show(chart, peers, id, at_ms)
+    %{chart | gone: MapSet.delete(chart.gone, id)}
+  end
+
+  @doc "Of a robot that is gone nothing arrives, so somebody has to write down that it is."
+  @spec grow_old(t(), Peers.t(), integer()) :: t()
+  def grow_old(%__MODULE__{} = chart, peers, at_ms) do
+    for id <- Peers.gone(peers, at_ms), id not in chart.gone, reduce: chart do
+      chart ->
+        show(chart, peers, id, at_ms)
+        %{chart | gone: MapSet.put(chart.gone, id)}
+    end
+  end
+
+  defp show(chart, peers, id, at_ms) do
+    peer = Peers.percept(peers, id, at_ms)
+    Board.put(chart.board, :link, {:peer, id}, peer, peer.at_ms)
+  end
+end

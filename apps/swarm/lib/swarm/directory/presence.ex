@@ -1,0 +1,209 @@
+defmodule Swarm.Directory.Presence do
+  @moduledoc """
+  Tells who asked for it when robots join and leave (`Swarm.subscribe/0`).
+
+  A robot joins with the first word of it, by the directory or by radio. It leaves when its link
+  leaves the directory, which a node that is killed does at once; or, where it was heard by radio,
+  when it has been silent for 2 s, however many connections to it seem to stand. A robot whose
+  connection ended, and that is heard on, joins again as soon as that is certain.
+  """
+  use GenServer
+  alias Swarm.{Directory, Mesh, Nonblocking}
+  alias Swarm.Directory.RobotInfo
+
+  @look_ms 100
+  # A killed robot's last heartbeat counts for 2 s.
+  @certain_ms 2_500
+  # Links enter a new scope by themselves, a node's at once and others' when they connect.
+  @settle_ms 1_000
+
+  @type reason :: :left | :nodedown | :silent
+
+  @doc "Starts the watch of this node."
+  @spec start_link(term()) :: GenServer.on_start()
+  def start_link(_options), do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
+
+  @doc "The process will be told from now on; the robots that are there now are returned."
+  @spec subscribe(pid()) :: {:ok, [atom()]} | {:error, line :: String.t()}
+  def subscribe(pid) when is_pid(pid), do: call({:subscribe, pid})
+
+  def subscribe(other),
+    do: {:error, "#{inspect(other)} cannot be told of robots; a process of this node can"}
+
+  @doc "It will not be told any more."
+  @spec unsubscribe(pid()) :: :ok | {:error, line :: String.t()}
+  def unsubscribe(pid), do: call({:unsubscribe, pid})
+
+  defp call(request), do: Nonblocking.call(__MODULE__, request, "the directory of this node")
+
+  @impl GenServer
+  def init([]) do
+    Process.send_after(self(), :look, @look_ms)
+
+    empty = %{
+      ref: nil,
+      scope: nil,
+      pids: %{},
+      told: %{},
+      heard: %{},
+      doubt: %{},
+      subscribers: %{}
+    }
+
+    {:ok, enter(empty)}
+  end
+
+  @impl GenServer
+  def handle_call({:subscribe, pid}, _from, s) when is_pid(pid) and node(pid) == node() do
+    subscribers = Map.put_new_lazy(s.subscribers, pid, fn -> Process.monitor(pid) end)
+    {:reply, {:ok, s.told |> Map.keys() |> Enum.sort()}, %{s | subscribers: subscribers}}
+  end
+
+  def handle_call({:subscribe, pid}, _from, s),
+    do: {:reply, {:error, "#{inspect(pid)} is not of this node: subscribe there"}, s}
+
+  def handle_call({:unsubscribe, pid}, _from, s), do: {:reply, :ok, forget(s, pid)}
+
+  # It has a name that connected nodes can send to, so anything may come here.
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info({ref, :join, {:robot, robot}, pids}, %{ref: ref} = s) do
+    pids = Enum.uniq(pids ++ Map.get(s.pids, robot, []))
+
+    {:noreply,
+     s
+     |> Map.put(:pids, Map.put(s.pids, robot, pids))
+     |> settle_doubt(robot)
+     |> judge(robot, :left)}
+  end
+
+  def handle_info({ref, :leave, {:robot, robot}, gone}, %{ref: ref} = s) do
+    case Map.get(s.pids, robot, []) -- gone do
+      [] ->
+        doubt = if is_map_key(s.heard, robot), do: Map.put(s.doubt, robot, now()), else: s.doubt
+        s = %{s | pids: Map.delete(s.pids, robot), doubt: doubt}
+        {:noreply, judge(s, robot, reason(gone))}
+
+      pids ->
+        {:noreply, %{s | pids: Map.put(s.pids, robot, pids)}}
+    end
+  end
+
+  def handle_info({ref, _what, _group, _pids}, %{ref: ref} = s), do: {:noreply, s}
+  def handle_info(:look, s), do: {:noreply, look(s)}
+  def handle_info(:enter, s), do: {:noreply, enter(s)}
+  def handle_info(:settled, s), do: {:noreply, all(s, :left)}
+
+  # The robots are not gone because the directory is.
+  def handle_info({:DOWN, scope, :process, _pid, _reason}, %{scope: scope} = s) do
+    Process.send_after(self(), :enter, @look_ms)
+    {:noreply, %{s | ref: nil, scope: nil}}
+  end
+
+  def handle_info({:DOWN, _ref, :process, pid, _reason}, s), do: {:noreply, forget(s, pid)}
+  def handle_info(_unknown, s), do: {:noreply, s}
+
+  defp enter(s) do
+    scope = Directory.monitor()
+    {ref, groups} = :pg.monitor_scope(Directory)
+    pids = for {{:robot, robot}, [_ | _] = pids} <- groups, into: %{}, do: {robot, pids}
+    s = %{s | ref: ref, scope: scope, pids: pids}
+    joined = Enum.reduce(Map.keys(pids), s, &judge(&2, &1, :left))
+    # Whoever is missing may only not have entered again yet.
+    Process.send_after(self(), :settled, @settle_ms)
+    joined
+  catch
+    :exit, {:noproc, _call} ->
+      Process.send_after(self(), :enter, @look_ms)
+      s
+  end
+
+  defp look(s) do
+    Process.send_after(self(), :look, @look_ms)
+    heard = Mesh.robots()
+    certain = now() - @certain_ms
+    doubt = Map.filter(s.doubt, fn {_robot, since_ms} -> since_ms > certain end)
+    # Of those heard once, the radio says whether they are there.
+    known =
+      Map.merge(
+        Map.new(s.heard, fn {robot, _} -> {robot, false} end),
+        Map.new(heard, fn {robot, _} -> {robot, true} end)
+      )
+
+    changed = for {robot, there?} <- known, s.heard[robot] != there?, do: robot
+    changed = changed ++ (Map.keys(s.doubt) -- Map.keys(doubt))
+    Enum.reduce(changed, %{s | heard: known, doubt: doubt}, &judge(&2, &1, :silent)) |> tidy()
+  end
+
+  # Who is neither in the directory nor heard needs no memory.
+  defp tidy(s) do
+    heard = Map.filter(s.heard, fn {robot, there?} -> there? or is_map_key(s.pids, robot) end)
+    %{s | heard: heard}
+  end
+
+  defp all(%{ref: nil} = s, _reason), do: s
+  defp all(s, reason), do: Enum.reduce(Map.keys(s.told), s, &judge(&2, &1, reason))
+
+  defp judge(s, robot, reason) do
+    case {there?(s, robot), s.told} do
+      {true, %{^robot => _node}} ->
+        s
+
+      {true, told} ->
+        tell(%{s | told: Map.put(told, robot, true)}, {:join, robot, about(s, robot)})
+
+      {false, %{^robot => _node} = told} ->
+        tell(%{s | told: Map.delete(told, robot)}, {:leave, robot, reason})
+
+      {false, _told} ->
+        s
+    end
+  end
+
+  defp there?(s, robot) do
+    pids = Map.get(s.pids, robot, [])
+
+    cond do
+      Enum.any?(pids, &(node(&1) == node())) -> true
+      is_map_key(s.doubt, robot) -> false
+      is_map_key(s.heard, robot) -> s.heard[robot]
+      true -> pids != []
+    end
+  end
+
+  defp settle_doubt(s, robot),
+    do: %{s | doubt: Map.delete(s.doubt, robot), heard: Map.delete(s.heard, robot)}
+
+  defp about(s, robot) do
+    case RobotInfo.of(robot, :infinity) do
+      {:ok, about} ->
+        about
+
+      :error ->
+        %RobotInfo{
+          robot: robot,
+          node: s.pids |> Map.get(robot, []) |> Enum.map(&node/1) |> List.first()
+        }
+    end
+  end
+
+  defp reason([pid | _]),
+    do: if(node(pid) == node() or node(pid) in Node.list(), do: :left, else: :nodedown)
+
+  defp tell(s, news) do
+    for {pid, _ref} <- s.subscribers, do: send(pid, {:swarm, news})
+    s
+  end
+
+  defp forget(s, pid) do
+    {ref, subscribers} = Map.pop(s.subscribers, pid)
+    if ref, do: Process.demonitor(ref, [:flush])
+    %{s | subscribers: subscribers}
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

@@ -1,0 +1,38 @@
+defmodule Swarm.Directory.RemoteMonitor do
+  @moduledoc """
+  Tells when processes end, wherever they are, without ever waiting for their nodes. To monitor a
+  process of another node waits while the connection is full, so a process of its own does it.
+  """
+
+  @doc """
+  Watches `%{alias => pid}` for the calling process. When one ends, or its node does, the message
+  `{Swarm.Directory.RemoteMonitor, alias, :gone}` is sent to that alias of the caller.
+  """
+  @spec start(%{reference() => pid()}) :: watch :: pid()
+  def start(pids) do
+    owner = self()
+
+    spawn(fn ->
+      own = Process.monitor(owner)
+      watch(own, Map.new(pids, fn {ref, pid} -> {Process.monitor(pid), ref} end))
+    end)
+  end
+
+  @doc "Ends it. What it has told already may still be on its way to an alias that is open."
+  @spec stop(watch :: pid()) :: :ok
+  def stop(watch) do
+    Process.exit(watch, :kill)
+    :ok
+  end
+
+  defp watch(own, watched) do
+    receive do
+      {:DOWN, ^own, :process, _owner, _reason} ->
+        :ok
+
+      {:DOWN, monitor, :process, _pid, _reason} when is_map_key(watched, monitor) ->
+        send(watched[monitor], {__MODULE__, watched[monitor], :gone})
+        watch(own, watched)
+    end
+  end
+end

@@ -1,0 +1,198 @@
+defmodule Swarm.Directory.RobotInfo do
+  @moduledoc """
+  What a robot is, for whoever looks for one (`Swarm.find/1`): the row `{robot, :about}` of the
+  blackboard, written by the robot's link once a second, and at once when its mission changes.
+
+  | field | is |
+  |---|---|
+  | `profile` | `:magellan`, `:atrv_mini` |
+  | `battery` | volts, `nil` where it is not measured |
+  | `calibrated` | `true` unless said otherwise |
+  | `mission`, `state` | what it is at: `:landmark` and `:follow`; `nil` and `:idle` |
+  | `services` | what it has: `:drive`, `:camera`, `:ptz`, and what was said |
+  | `node`, `age_ms` | where it is; how long ago it said so |
+
+  What only somebody else knows of a robot is said by `say/2`, on its node.
+
+  Names travel as text, and are text here too where this node has no such atom.
+  """
+  alias Robot.{Board, Config}
+  alias Robot.Safety.LivenessMonitor
+  alias Swarm.{Blackboard, Status}
+  alias Swarm.Message.WireTypes
+  alias Swarm.Comms.Receiver
+
+  # A link ticks ten times a second.
+  @every 10
+  @sayable [:calibrated, :services]
+
+  @enforce_keys [:robot]
+  defstruct @enforce_keys ++
+              [
+                node: nil,
+                profile: nil,
+                battery: nil,
+                calibrated: true,
+                mission: nil,
+                state: :idle,
+                services: [],
+                age_ms: nil
+              ]
+
+  @type t :: %__MODULE__{
+          robot: atom(),
+          node: Blackboard.Codec.word() | nil,
+          profile: Blackboard.Codec.word() | nil,
+          battery: number() | nil,
+          calibrated: boolean(),
+          mission: Blackboard.Codec.word() | nil,
+          state: Blackboard.Codec.word(),
+          services: [Blackboard.Codec.word()],
+          age_ms: non_neg_integer() | nil
+        }
+
+  @typedoc "What was told last, and in how many ticks it is told again."
+  @type noted :: nil | {non_neg_integer(), term()}
+
+  @doc """
+  Writes a robot's rows `:about` and `:status`, if it is time or something changed; called at each tick of
+  its link. Waits for nothing.
+  """
+  @spec note(noted(), Config.t(), Board.t(), boot :: non_neg_integer(), Receiver.t()) :: noted()
+  def note(noted, config, board, boot, ear) do
+    health = Board.health(board, :drive)
+    hung = for part <- LivenessMonitor.parts(), do: Board.fetch(board, {:hung, part}, :infinity)
+    arming = Board.fetch(board, :arming, :infinity)
+    doing = {doing(board), Board.latched?(board), arming, health, hung}
+
+    case noted do
+      {left, ^doing} when left > 0 ->
+        {left - 1, doing}
+
+      _due ->
+        status = Status.Row.encode(Status.of(config, board, ear))
+        Blackboard.note(config.id, boot, about: row(config, board), status: status)
+        {@every - 1, doing}
+    end
+  end
+
+  @doc "A robot that has given way to another of its name writes no more, and hears of that one."
+  @spec leave(noted(), atom()) :: nil
+  def leave(nil, _robot), do: nil
+
+  def leave(_noted, robot) do
+    Blackboard.leave(robot)
+    nil
+  end
+
+  defp doing(board) do
+    case Board.fetch(board, :mission, :infinity) do
+      {:ok, %{state: {module, phase}}, _at_ms} -> {module, phase}
+      _idle -> nil
+    end
+  end
+
+  defp row(config, board) do
+    {mission, state} = words(doing(board))
+    said = said(config.id)
+
+    %{
+      node: Atom.to_string(node()),
+      profile: Atom.to_string(config.profile.name),
+      battery: battery(board),
+      calibrated: Keyword.get(said, :calibrated, true),
+      mission: mission,
+      state: state,
+      services: Enum.uniq(devices(config) ++ Keyword.get(said, :services, []))
+    }
+  end
+
+  defp words(nil), do: {nil, "idle"}
+
+  defp words({module, phase}),
+    do: {module |> Module.split() |> List.last() |> Macro.underscore(), Atom.to_string(phase)}
+
+  defp battery(board) do
+    case Board.fetch(board, :power, :infinity) do
+      {:ok, volts, _at_ms} when is_number(volts) -> volts
+      _unknown -> nil
+    end
+  end
+
+  defp devices(config) do
+    for device <- [:drive, :camera, :ptz], Map.get(config, device), do: Atom.to_string(device)
+  end
+
+  defp said(robot) do
+    with {:ok, said, _age_ms} <- Blackboard.get(robot, :said, :infinity),
+         true <- Keyword.keyword?(said) do
+      said
+    else
+      _nothing -> []
+    end
+  end
+
+  @doc """
+  Says something of a robot of this node that only others know; it is in its next row.
+
+      Swarm.Directory.RobotInfo.say(:mag1, calibrated: false)
+      Swarm.Directory.RobotInfo.say(:mag1, services: [:gripper])
+  """
+  @spec say(atom(), keyword()) :: :ok | {:error, line :: String.t()}
+  def say(robot, facts) do
+    case Keyword.keyword?(facts) and Enum.find(facts, &(not sayable?(&1))) do
+      nil ->
+        facts = Keyword.replace_lazy(facts, :services, &Enum.map(&1, fn name -> "#{name}" end))
+        Blackboard.put(robot, :said, Keyword.merge(said(robot), facts))
+
+      false ->
+        {:error, "#{inspect(facts)} are no facts; allowed are #{Enum.join(@sayable, ", ")}"}
+
+      {key, value} ->
+        {:error,
+         "#{inspect(key)} cannot be #{inspect(value)}: write calibrated: true or false, services: [:name]"}
+    end
+  end
+
+  defp sayable?({:calibrated, on?}), do: is_boolean(on?)
+  defp sayable?({:services, names}), do: WireTypes.names?(names)
+  defp sayable?(_other), do: false
+
+  @doc "What is known of a robot, unless that is older than this in ms."
+  @spec of(atom(), non_neg_integer() | :infinity) :: {:ok, t()} | :error
+  def of(robot, max_age_ms) do
+    with {:ok, row, age_ms} <- Blackboard.get(robot, :about, max_age_ms),
+         do: read(robot, row, age_ms)
+  end
+
+  @doc """
+  Reads a row, whatever is in it.
+
+      iex> Swarm.Directory.RobotInfo.read(:mag1, %{junk: 1}, 5)
+      :error
+  """
+  @spec read(atom(), term(), non_neg_integer()) :: {:ok, t()} | :error
+  def read(robot, row, age_ms) do
+    with %{node: node, profile: profile, battery: battery, calibrated: calibrated} <- row,
+         %{mission: mission, state: state, services: services} <- row,
+         true <- Enum.all?([node, profile, state], &is_binary/1),
+         true <- is_boolean(calibrated) and (battery == nil or is_number(battery)),
+         true <-
+           (mission == nil or is_binary(mission)) and WireTypes.list?(services, &is_binary/1) do
+      {:ok,
+       %__MODULE__{
+         robot: robot,
+         node: Blackboard.Codec.word(node),
+         profile: Blackboard.Codec.word(profile),
+         battery: battery,
+         calibrated: calibrated,
+         mission: mission && Blackboard.Codec.word(mission),
+         state: Blackboard.Codec.word(state),
+         services: Enum.map(services, &Blackboard.Codec.word/1),
+         age_ms: age_ms
+       }}
+    else
+      _other -> :error
+    end
+  end
+end

@@ -1,0 +1,84 @@
+defmodule Swarm.EStop do
+  @moduledoc """
+  A robot's emergency brake: a companion beside its link, of high priority, with a mailbox of its
+  own. What stops the robot comes here (`:estop`, `:reset`, `:stop` and `:disarm` of people, calls of `Swarm.EStop.Broadcaster`)
+  and goes to the gate at once, also where the link is flooded, hangs or is dead.
+
+  It alone decides how the emergency stop stands (`Swarm.EStop.State`), and writes it on the board under
+  `:estop`. The link asks it about what heartbeats say, and is told of each change, so that the next
+  heartbeats, which follow at once, spread it.
+
+  A stop goes to gate, executive and pilot at once, so that none that hangs holds up the others. It is
+  answered by the last of them, the gate, when the mission is out of command and no older wish can follow
+  (`Robot.Control.Pilot.halt/2`); where that does not come, by nobody. Where nothing reaches the wheels, the answer says so
+  (`Robot.Safety.Readiness.stopped/1`), to stop, disarm and e-stop alike.
+
+  A reset goes the same way first: the gate is released once what the robot was at has ended, and unless
+  somebody stops it again meanwhile.
+
+  A stop is obeyed however old it is; a reset that a person gave on another node bears a stamp
+  (`Swarm.Commands.Freshness`), which is asked for here.
+
+  This is its door; the process is `Swarm.EStop.Server`, what it does `Swarm.EStop.Actions`.
+  """
+  alias Robot.{Board, Config, Names}
+  alias Swarm.EStop
+
+  @behaviour Robot.Companion
+
+  @impl Robot.Companion
+  def child_spec({config, options}),
+    do: %{id: __MODULE__, start: {__MODULE__, :start_link, [config, options]}}
+
+  @doc "Starts the brake of a robot, as its supervisor does."
+  @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
+  def start_link(%Config{} = config, _options) do
+    GenServer.start_link(EStop.Server, config,
+      name: Names.via(config.id, :brake),
+      spawn_opt: [priority: :high, message_queue_data: :off_heap]
+    )
+  end
+
+  @doc "A call to stop came from a node, by datagram: for all robots of this one."
+  @spec hear(node(), term()) :: :ok
+  def hear(_node, {:estop, call, age_ms} = term) do
+    if EStop.State.call?(call) and EStop.State.age?(age_ms),
+      do: Enum.each(Names.all(:brake), &GenServer.cast(&1, term))
+
+    :ok
+  end
+
+  def hear(_node, _malformed), do: :ok
+
+  @doc """
+  What a heartbeat that the link of this robot heard says of the emergency stop; returns how the stop
+  stands with it.
+  """
+  @spec beat(robot :: atom(), number :: non_neg_integer(), latched? :: boolean()) ::
+          EStop.State.t()
+  def beat(robot, number, latched?),
+    do: GenServer.call(Names.via(robot, :brake), {:beat, number, latched?})
+
+  @doc "The gate's latch may be another than this brake knows: buttons set it too."
+  @spec follow(robot :: atom()) :: EStop.State.t()
+  def follow(robot), do: GenServer.call(Names.via(robot, :brake), :follow)
+
+  @doc "How the stop stands as the last brake wrote it down; before the first, by the gate's latch."
+  @spec written(Board.t()) :: EStop.State.t()
+  defdelegate written(board), to: EStop.Actions
+
+  @doc "Whether a request is for the brake; all others are for the link."
+  @spec takes?(request :: term()) :: boolean()
+  def takes?({:estop, _call}), do: true
+  def takes?(request), do: request in [:stop, :disarm, :estop, :reset]
+
+  @doc "Takes a request for the brake from the robot's link, which has looked how old it is."
+  @spec take(robot :: atom(), request :: term(), reference()) :: :ok
+  def take(robot, request, ref),
+    do: GenServer.cast(Names.via(robot, :brake), {:in_time, request, ref})
+
+  @doc "The robot is there for commands by its name, or no longer: another of that name was first."
+  @spec present(robot :: atom(), boolean()) :: :ok
+  def present(robot, present?),
+    do: GenServer.cast(Names.via(robot, :brake), {:present, present?})
+end

@@ -1,0 +1,24 @@
+defmodule Swarm.EStop.Answer do
+  @moduledoc "What a gate that has carried out a stop says to the brake, or to whoever asked for it."
+  alias Robot.{Board, Names}
+  alias Robot.Safety.Readiness
+  alias Swarm.Nonblocking
+
+  @doc """
+  What the robot was at has ended, says its gate: it may be released, before that time (monotonic, ms; who asked for
+  it hears nothing later), and if nobody has stopped it since it was
+  in the state that `pressed` stands for.
+  """
+  @spec release(atom(), pressed :: reference(), until_ms :: integer(), reference()) :: :ok
+  def release(robot, pressed, until_ms, ref),
+    do: GenServer.cast(Names.via(robot, :brake), {:release, pressed, until_ms, ref})
+
+  @doc "What the robot was at has ended, says its gate, which stands: answers whether its wheels do."
+  @spec stood(atom(), reference()) :: :ok
+  def stood(robot, ref), do: Nonblocking.answer(ref, stopped(robot, Board.find!(robot)))
+
+  @doc "Whether a stop of the gate is one of the wheels."
+  @spec stopped(atom(), Board.t()) :: :ok | {:error, line :: String.t()}
+  def stopped(robot, board),
+    do: with({:error, line} <- Readiness.stopped(board), do: {:error, "#{robot}: #{line}"})
+end

@@ -1,0 +1,125 @@
+defmodule Swarm.EStop.Broadcaster do
+  @moduledoc """
+  The voice of the emergency stop, one for a node, so that a node without a robot has it too.
+
+  `sound/0` sends a call to stop to every brake in the directory and, by signed datagrams, to every
+  node. That happens at once, in the caller; this process then repeats it, ten times in all, one
+  each 100 ms, whatever has become of the caller. Every call has an identity (`t:Swarm.EStop.State.call/0`),
+  so that a robot obeys it once, and an age, counted by
+  those who have it: what is older than a person's reset does not stop the robot again. Whoever hears a call for the first time passes it on, so that it also
+  reaches those that hear him but not its sender. A reset ends the repeats, so that a robot that is
+  switched on afterwards is not stopped by one.
+  """
+  use GenServer
+  alias Swarm.{Directory, EStop, Nonblocking}
+  alias Swarm.Message.WireTypes
+
+  @times 10
+  @passed_on 3
+  @every_ms 100
+  # More calls at a time are not different any more, and not passed on.
+  @most 16
+
+  @doc "Starts it, as a node's supervisor does."
+  @spec start_link(term()) :: GenServer.on_start()
+  def start_link(_options), do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
+
+  @doc "Calls all robots to stop, and returns the call's identity."
+  @spec sound() :: EStop.State.call()
+  def sound do
+    call = {node(), boot(), System.unique_integer([:positive, :monotonic])}
+    send_out(call, 0)
+    GenServer.cast(__MODULE__, {:repeat, call, @times - 1})
+    call
+  end
+
+  @doc "Passes on a call that was heard; one of this node's own is being repeated anyway."
+  @spec pass_on(EStop.State.call(), age_ms :: non_neg_integer()) :: :ok
+  def pass_on({node, _boot, _counter}, _age_ms) when node == node(), do: :ok
+  def pass_on(call, age_ms), do: GenServer.cast(__MODULE__, {:pass_on, call, age_ms})
+
+  @doc "A person has reset what these calls stopped: they are repeated no more."
+  @spec quiet(:all | [{node(), {integer(), integer()}}]) :: :ok
+  def quiet(calls), do: GenServer.cast(__MODULE__, {:quiet, calls})
+
+  @impl GenServer
+  def init([]) do
+    Process.flag(:priority, :high)
+    {:ok, %{left: %{}, heard: %EStop.State{}}}
+  end
+
+  # It has a name that connected nodes can send to, so anything may come here.
+  @impl GenServer
+  def handle_cast({:repeat, call, times}, s) when times in 1..@times,
+    do: {:noreply, if(EStop.State.call?(call), do: repeat(s, call, times, now()), else: s)}
+
+  def handle_cast({:pass_on, call, age_ms}, s) do
+    whole? = EStop.State.call?(call) and EStop.State.age?(age_ms)
+    {:noreply, if(whole?, do: pass_on(s, call, age_ms), else: s)}
+  end
+
+  def handle_cast({:quiet, :all}, s), do: {:noreply, %{s | left: %{}}}
+
+  def handle_cast({:quiet, calls}, s) do
+    heard = %EStop.State{
+      calls: if(WireTypes.list?(calls, &match?({_, {_, _}}, &1)), do: calls, else: [])
+    }
+
+    over = for {call, _times} <- s.left, EStop.State.call(heard, call) == heard, do: call
+    {:noreply, %{s | left: Map.drop(s.left, over)}}
+  end
+
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info({:again, call}, s) do
+    case s.left do
+      %{^call => {left, since_ms}} ->
+        send_out(call, now() - since_ms)
+        {:noreply, repeat(%{s | left: Map.delete(s.left, call)}, call, left - 1, since_ms)}
+
+      _none ->
+        {:noreply, s}
+    end
+  end
+
+  def handle_info(_unknown, s), do: {:noreply, s}
+
+  defp pass_on(%{left: left} = s, _call, _age_ms) when map_size(left) >= @most, do: s
+
+  # Many robots of this node may have heard it.
+  defp pass_on(s, call, age_ms) do
+    case EStop.State.call(s.heard, call) do
+      heard when heard == s.heard ->
+        s
+
+      heard ->
+        send_out(call, age_ms)
+        repeat(%{s | heard: heard}, call, @passed_on - 1, now() - age_ms)
+    end
+  end
+
+  defp repeat(s, _call, 0, _since_ms), do: s
+  defp repeat(%{left: left} = s, _call, _times, _since_ms) when map_size(left) >= @most, do: s
+
+  defp repeat(s, call, times, since_ms) do
+    Process.send_after(self(), {:again, call}, @every_ms)
+    %{s | left: Map.put(s.left, call, {times, since_ms})}
+  end
+
+  defp send_out(call, age_ms) do
+    for brake <- Directory.members(:brakes), do: Nonblocking.cast(brake, {:estop, call, age_ms})
+    Swarm.Mesh.cast(:stop, {:estop, call, age_ms})
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+
+  # When this VM was started, by the time of day.
+  defp boot do
+    started = :erlang.system_info(:start_time) + :erlang.time_offset()
+    System.convert_time_unit(started, :native, :millisecond)
+  end
+end

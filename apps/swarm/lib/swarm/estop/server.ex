@@ -1,0 +1,124 @@
+defmodule Swarm.EStop.Server do
+  @moduledoc "The process of a robot's brake (`Swarm.EStop`): what comes in. What it does is `Swarm.EStop.Actions`'s."
+  use GenServer
+  alias Robot.{Board, Config, Names}
+  alias Robot.Safety.Gate
+  alias Swarm.EStop
+  alias Swarm.{Directory, Nonblocking}
+  alias Swarm.Commands.Freshness
+
+  @impl GenServer
+  def init(%Config{id: id} = config) do
+    board = Board.find!(id)
+
+    s = %{
+      config: config,
+      id: id,
+      board: board,
+      stop: EStop.Actions.written(board),
+      stamps: Freshness.new(System.system_time(:nanosecond)),
+      brakes: nil,
+      name: nil,
+      pressed: make_ref(),
+      reset_ms: nil
+    }
+
+    {:ok, EStop.Actions.write(s), {:continue, :enter}}
+  end
+
+  @impl GenServer
+  def handle_continue(:enter, s) do
+    # A stop that was written down by the brake before this one may not have reached the gate.
+    if s.stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id)
+
+    {:noreply,
+     %{
+       s
+       | brakes: Directory.Membership.enter([:brakes]),
+         name: Directory.Membership.enter([{:brake, s.id}])
+     }}
+  end
+
+  @impl GenServer
+  def handle_call({:beat, number, latched?}, _from, s)
+      when is_integer(number) and number >= 0 and is_boolean(latched?) do
+    s = EStop.Actions.become(s, EStop.State.hear(s.stop, number, latched?))
+    {:reply, s.stop, s}
+  end
+
+  def handle_call(:follow, _from, s) do
+    s = EStop.Actions.become(s, EStop.State.follow(s.stop, Board.latched?(s.board)))
+    {:reply, s.stop, s}
+  end
+
+  # Brakes are found in the directory, so anything may come here from anywhere, and counts as
+  # nothing.
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_cast({:estop, call, age_ms}, s),
+    do: {:noreply, EStop.Actions.called(s, call, age_ms)}
+
+  def handle_cast({:command, request, ref}, s) when is_reference(ref),
+    do: {:noreply, command(s, request, ref, nil)}
+
+  def handle_cast({:command, request, ref, stamp}, s) when is_reference(ref),
+    do: {:noreply, command(s, request, ref, stamp)}
+
+  def handle_cast({:in_time, request, ref}, s) when is_reference(ref),
+    do: {:noreply, EStop.Actions.obey(s, request, ref)}
+
+  # Nobody else knows this reference.
+  def handle_cast({:release, pressed, until_ms, ref}, %{pressed: pressed} = s)
+      when is_integer(until_ms) and is_reference(ref) do
+    if System.monotonic_time(:millisecond) < until_ms do
+      s = EStop.Actions.released(s)
+      Nonblocking.answer(ref, :ok)
+      {:noreply, s}
+    else
+      {:noreply, s}
+    end
+  end
+
+  def handle_cast({:release, pressed, _until_ms, ref}, s)
+      when is_reference(pressed) and is_reference(ref) do
+    Nonblocking.answer(ref, {:error, "#{s.id} was stopped again meanwhile; reset it again"})
+    {:noreply, s}
+  end
+
+  def handle_cast({:stamp, ref}, s) when is_reference(ref) do
+    {stamp, stamps} = Freshness.issue(s.stamps, Config.now(s.config))
+    Nonblocking.answer(ref, stamp)
+    {:noreply, %{s | stamps: stamps}}
+  end
+
+  def handle_cast({:present, true}, %{name: %{left?: true}} = s),
+    do: {:noreply, %{s | name: Directory.Membership.enter([{:brake, s.id}])}}
+
+  def handle_cast({:present, false}, s),
+    do: {:noreply, %{s | name: Directory.Membership.leave(s.name)}}
+
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info(message, s) do
+    case {Directory.Membership.arrived(s.brakes, message),
+          Directory.Membership.arrived(s.name, message)} do
+      {{:ok, brakes}, :other} -> {:noreply, %{s | brakes: brakes}}
+      {:other, {:ok, name}} -> {:noreply, %{s | name: name}}
+      {:other, :other} -> {:noreply, s}
+    end
+  end
+
+  defp command(s, request, ref, stamp) do
+    case Freshness.judge(s.stamps, request, ref, stamp, Config.now(s.config)) do
+      :ok ->
+        EStop.Actions.obey(s, request, ref)
+
+      {:error, age} ->
+        GenServer.cast(Names.via(s.id, :link), {:rejected, :too_old})
+        Nonblocking.answer(ref, Freshness.refusal(s.id, age))
+        s
+    end
+  end
+end

@@ -1,0 +1,148 @@
+defmodule Swarm.EStop.State do
+  @moduledoc """
+  How an emergency stop spreads and is cleared, as a function. Pure.
+
+  Stops are numbered. Every heartbeat tells the highest number that its robot knows, and whether
+  its own latch is set; a robot latches when it hears of a set latch with a number that no person
+  has cleared here. So one that a person has reset is not caught again by a neighbour that nobody
+  has reset yet, and one that joins a fleet whose stop is long cleared is not stopped by it.
+
+  A call to stop (`Swarm.EStop.Broadcaster`) is sent many times, and comes by several ways. `calls` remembers the
+  last one of each node's life, so that a late repeat does not latch again what a person has reset.
+  """
+  alias Swarm.Message.WireTypes
+
+  @leap 100_000
+  @callers 64
+  # Boots are times in ms, or, on clocks that count finer, in ns.
+  @latest 0xFFFFFFFFFFFFFFFF
+
+  defstruct known: 0, cleared: 0, latched?: false, calls: []
+
+  @typedoc "Which call to stop it is: who calls, that node's life, and the how manieth of its calls."
+  @type call :: {node(), boot :: integer(), counter :: integer()}
+
+  @type t :: %__MODULE__{
+          known: non_neg_integer(),
+          cleared: non_neg_integer(),
+          latched?: boolean(),
+          calls: [{node(), {boot :: integer(), counter :: integer()}}]
+        }
+
+  @doc "No stop known; `latched?` when the robot's own latch has survived a restart."
+  @spec new(boolean()) :: t()
+  def new(latched? \\ false), do: if(latched?, do: press(%__MODULE__{}), else: %__MODULE__{})
+
+  @doc """
+  Somebody stops the fleet here.
+
+      iex> Swarm.EStop.State.press(Swarm.EStop.State.new()).latched?
+      true
+  """
+  @spec press(t()) :: t()
+  def press(%__MODULE__{known: known} = stop), do: %{stop | known: known + 1, latched?: true}
+
+  @doc """
+  Hears a call to stop; one that was heard before changes nothing. A robot that stands by a stop
+  already gives it no new number: its own and its neighbours' numbers could otherwise run past each
+  other while a person resets them.
+
+      iex> call = {:base@hall, 1_700_000_000_000, 1}
+      iex> stop = Swarm.EStop.State.call(Swarm.EStop.State.new(), call)
+      iex> {stop.known, stop.latched?}
+      {1, true}
+      iex> stop |> Swarm.EStop.State.reset() |> Swarm.EStop.State.call(call) |> Map.fetch!(:latched?)
+      false
+  """
+  @spec call(t(), call()) :: t()
+  def call(%__MODULE__{} = stop, {node, boot, counter}) do
+    # Of each life of a node on its own: repeats of its calls in two lives would else take each
+    # other for new, and robots would pass them on to each other for ever.
+    case Enum.split_with(stop.calls, &match?({^node, {^boot, _last}}, &1)) do
+      {[{_node, {_boot, last}} | _], _others} when counter <= last ->
+        stop
+
+      {_before, others} ->
+        stop = %{stop | calls: Enum.take([{node, {boot, counter}} | others], @callers)}
+        if stop.latched?, do: stop, else: press(stop)
+    end
+  end
+
+  @doc """
+  Remembers a call that was made before a person reset this robot, and is heard for the first time only
+  now: it stops nothing any more.
+
+      iex> call = {:base@hall, 1_700_000_000_000, 1}
+      iex> stop = Swarm.EStop.State.late(Swarm.EStop.State.new(), call)
+      iex> Swarm.EStop.State.call(stop, call).latched?
+      false
+  """
+  @spec late(t(), call()) :: t()
+  def late(%__MODULE__{} = stop, call), do: %{stop | calls: call(stop, call).calls}
+
+  @doc "Whether a term from outside can be the age of a call, in ms: a day at most."
+  @spec age?(term()) :: boolean()
+  def age?(term), do: is_integer(term) and term in 0..86_400_000
+
+  @doc """
+  Whether a term from outside is a call to stop.
+
+      iex> for term <- [{:base@hall, 1, 1}, {nil, 1, 1}, {:base@hall, 1}], do: Swarm.EStop.State.call?(term)
+      [true, false, false]
+  """
+  @spec call?(term()) :: boolean()
+  def call?({node, boot, counter}),
+    do: WireTypes.name?(node) and number?(boot) and number?(counter)
+
+  def call?(_other), do: false
+
+  defp number?(number), do: is_integer(number) and number in 0..@latest
+
+  @doc """
+  Follows the latch of the robot, which its gate's own buttons set and clear too: a stop pressed
+  on the robot itself spreads like any other.
+
+      iex> Swarm.EStop.State.follow(Swarm.EStop.State.new(), true).known
+      1
+  """
+  @spec follow(t(), latched? :: boolean()) :: t()
+  def follow(%__MODULE__{latched?: latched?} = stop, latched?), do: stop
+  def follow(stop, true), do: press(stop)
+  def follow(stop, false), do: reset(stop)
+
+  @doc """
+  Hears what a neighbour's heartbeat says: its number, and whether its latch is set.
+
+      iex> stop = Swarm.EStop.State.hear(Swarm.EStop.State.new(), 3, true)
+      iex> stop.latched?
+      true
+      iex> Swarm.EStop.State.hear(Swarm.EStop.State.reset(stop), 3, true).latched?
+      false
+      iex> Swarm.EStop.State.hear(Swarm.EStop.State.new(), 3, false).latched?
+      false
+  """
+  @spec hear(t(), non_neg_integer(), boolean()) :: t()
+  def hear(%__MODULE__{} = stop, number, latched?) do
+    cond do
+      # No fleet counts that far at once; taken over, it would leave no room for numbers to come.
+      number > stop.known + @leap ->
+        stop
+
+      latched? and number > stop.cleared ->
+        %{stop | known: max(stop.known, number), latched?: true}
+
+      # A stop pressed here before this robot knew how far the fleet had counted: others take
+      # it for one that is cleared, so it gets a number that nobody has cleared.
+      stop.latched? and number > stop.known ->
+        %{stop | known: number + 1}
+
+      true ->
+        %{stop | known: max(stop.known, number)}
+    end
+  end
+
+  @doc "A person clears this robot's latch."
+  @spec reset(t()) :: t()
+  def reset(%__MODULE__{known: known} = stop),
+    do: %{stop | cleared: known, latched?: false}
+end

@@ -1,0 +1,51 @@
+defmodule Swarm.Formation.FreeSlots do
+  @moduledoc """
+  Which slots of a shape can be taken at all: a body that stays where it was (a dead robot) leaves no
+  room for another. The shape is made larger by as many slots as are lost. Pure; metres.
+  """
+  alias Hal.Pose
+  alias Swarm.Formation
+
+  # From skin to skin between a standing robot and a dead one.
+  @gap 0.2
+  # A shape may lose this many slots before it is taken as it is.
+  @most 20
+
+  @typedoc "The size of the whole shape, the leader included, and the numbers of the slots that are used."
+  @type t :: {size :: pos_integer(), places :: [pos_integer()]}
+
+  @doc """
+  The slots for so many followers round a leader at `pose`, without those that `bodies`
+  (`{x, y, radius}`) take away. `radius` is that of the largest follower.
+
+      iex> Swarm.Formation.FreeSlots.places({:column, 1.0}, 3, Hal.Pose.new(0, 0), 1.6, [], 0.2)
+      {4, [1, 2, 3]}
+      iex> Swarm.Formation.FreeSlots.places({:column, 1.0}, 3, Hal.Pose.new(0, 0), 1.6, [{-2.1, 0.0, 0.2}], 0.2)
+      {5, [1, 3, 4]}
+  """
+  @spec places(Formation.t(), non_neg_integer(), Pose.t(), float(), [tuple()], float()) :: t()
+  def places(formation, followers, pose, landmark_distance, bodies, radius) do
+    Enum.find_value(followers..(followers + @most), whole(followers), fn slots ->
+      free =
+        formation
+        |> Formation.slots(slots + 1, landmark_distance)
+        |> Enum.with_index(1)
+        |> Enum.filter(fn {slot, _k} -> free?(Pose.compose(pose, slot), bodies, radius) end)
+
+      if length(free) >= followers,
+        do: {slots + 1, free |> Enum.take(followers) |> Enum.map(&elem(&1, 1))}
+    end)
+  end
+
+  @doc "All slots of a shape without gaps."
+  @spec whole(non_neg_integer()) :: t()
+  def whole(followers), do: {followers + 1, Enum.to_list(1..followers//1)}
+
+  @doc "Whether a robot of this radius can stand there."
+  @spec free?(Pose.t(), [{float(), float(), float()}], float()) :: boolean()
+  def free?(place, bodies, radius) do
+    Enum.all?(bodies, fn {x, y, other} ->
+      Pose.distance(place, {x, y}) >= radius + other + @gap
+    end)
+  end
+end

@@ -1,0 +1,58 @@
+defmodule Swarm.Formation.Trail do
+  @moduledoc """
+  The way that a robot has come, and places along it. Pure; metres, newest point first.
+
+  A column along the leader's trail goes where the leader went: through the door that it came
+  through, not through the wall beside it.
+  """
+  alias Hal.Pose
+
+  @step 0.1
+  @most 400
+
+  @type t :: [Pose.point()]
+
+  @doc """
+  The trail with one more pose; steps under 0.1 m are not written down.
+
+      iex> [] |> Swarm.Formation.Trail.note(Hal.Pose.new(0, 0)) |> Swarm.Formation.Trail.note(Hal.Pose.new(0.05, 0)) |> length()
+      1
+  """
+  @spec note(t(), Pose.t()) :: t()
+  def note([], pose), do: [Pose.point(pose)]
+
+  def note([last | _] = trail, pose) do
+    if Pose.distance(last, pose) >= @step,
+      do: Enum.take([Pose.point(pose) | trail], @most),
+      else: trail
+  end
+
+  @doc """
+  The place `way` metres behind `pose` along the trail, looking forward along it. Where the trail is
+  too short it is carried on straight.
+
+      iex> trail = [{2.0, 0.0}, {1.0, 0.0}, {1.0, -1.0}]
+      iex> Swarm.Formation.Trail.behind(trail, Hal.Pose.new(2, 0), 1.5) |> Hal.Pose.distance({1.0, -0.5})
+      0.0
+      iex> Swarm.Formation.Trail.behind([], Hal.Pose.new(2, 0), 1.5)
+      Hal.Pose.new(0.5, 0)
+  """
+  @spec behind(t(), Pose.t(), float()) :: Pose.t()
+  def behind(trail, pose, way) do
+    {x, y} = Pose.point(pose)
+    back = {-:math.cos(pose.heading), -:math.sin(pose.heading)}
+    walk({x, y}, trail, way, back)
+  end
+
+  defp walk({x, y}, [], way, {bx, by}),
+    do: Pose.new(x + way * bx, y + way * by, :math.atan2(-by, -bx))
+
+  defp walk({x, y} = from, [{nx, ny} = next | rest], way, back) do
+    step = Pose.distance(from, next)
+    back = if step > 1.0e-6, do: {(nx - x) / step, (ny - y) / step}, else: back
+
+    if step < way,
+      do: walk(next, rest, way - step, back),
+      else: walk(from, [], way, back)
+  end
+end

@@ -1,0 +1,100 @@
+defmodule Swarm.Host.HealthCheck do
+  @moduledoc """
+  Whether a robot of this node lives, by what its parts did and not by what they say: the gate writes to
+  the board twenty times a second, the executive ten times, and what the gate sends to the drive is taken. Asks no
+  process, so nothing that hangs can hold it up.
+  """
+  alias Robot.{Board, Names}
+
+  @silent_ms 1_000
+  # The gate sends 20 messages a second: this is what a drive leaves lying that hangs for 10 s. One that opens
+  # its line may hang for 5 s.
+  @backlog 200
+
+  @typedoc "The words are one line for people."
+  @type t :: {well? :: boolean(), words :: String.t()}
+
+  @doc "The pulse of a robot of this node."
+  @spec of(robot :: atom()) :: t()
+  def of(robot) do
+    case Board.find(robot) do
+      {:ok, board} -> judge(robot, ages(board), backlog(robot), offline(board) || arming(board))
+      :error -> {false, "#{robot} is not there"}
+    end
+  end
+
+  @doc """
+  The same, judged from how old (ms) the last work of gate and executive is, `nil` for none, how many
+  messages wait for the drive, and how the drive is armed, or that it is offline.
+
+      iex> Swarm.Host.HealthCheck.judge(:mag1, [gate: 12, executive: 80], 0, %{state: :disarmed, why: nil})
+      {true, "mag1 is disarmed"}
+      iex> Swarm.Host.HealthCheck.judge(:mag1, [gate: 12, executive: 80], 0, :offline)
+      {true, "mag1 is there, and its drive is offline"}
+      iex> Swarm.Host.HealthCheck.judge(:mag1, [gate: 2_500, executive: 80], 0, nil)
+      {false, "mag1: its gate has done nothing for 2.5 s"}
+  """
+  @spec judge(atom(), keyword(integer() | nil), non_neg_integer() | nil, map() | :offline | nil) ::
+          t()
+  def judge(robot, ages, backlog, arming) do
+    case Enum.find(ages, fn {_part, age_ms} -> age_ms == nil or age_ms > @silent_ms end) do
+      {part, nil} ->
+        {false, "#{robot}: its #{part} has done nothing yet"}
+
+      {part, ms} ->
+        {false, "#{robot}: its #{part} has done nothing for #{ms / 1_000} s"}
+
+      nil when backlog == nil ->
+        {false, "#{robot}: its drive is gone"}
+
+      nil when backlog > @backlog ->
+        {false, "#{robot}: its drive hangs, #{backlog} messages wait"}
+
+      nil ->
+        {true, "#{robot} #{words(arming)}"}
+    end
+  end
+
+  defp ages(board) do
+    now = Board.now(board)
+
+    for {part, key} <- [gate: :driving, executive: :doing] do
+      case Board.fetch(board, key, :infinity, now) do
+        {:ok, _value, at_ms} -> {part, now - at_ms}
+        :error -> {part, nil}
+      end
+    end
+  end
+
+  defp backlog(robot) do
+    with pid when is_pid(pid) <- Names.whereis(robot, :drive),
+         {:message_queue_len, length} <- Process.info(pid, :message_queue_len),
+         do: length,
+         else: (_gone -> nil)
+  end
+
+  defp arming(board) do
+    case Board.fetch(board, :arming, :infinity) do
+      {:ok, arming, _at_ms} -> arming
+      :error -> nil
+    end
+  end
+
+  # What was lost in motion is told first.
+  defp offline(board) do
+    case {Board.health(board, :drive), arming(board)} do
+      {_health, %{state: {:error, _reason}}} -> nil
+      {{{:offline, _reason}, _since_ms}, _arming} -> :offline
+      _online -> nil
+    end
+  end
+
+  defp words(:offline), do: "is there, and its drive is offline"
+
+  defp words(%{state: state, why: why}) when is_atom(state) and is_binary(why),
+    do: "is #{state}: #{why}"
+
+  defp words(%{state: state}) when is_atom(state), do: "is #{state}"
+  defp words(%{state: {:error, _reason}}), do: "has lost its line, and waits to be acknowledged"
+  defp words(nil), do: "waits for its drive"
+end

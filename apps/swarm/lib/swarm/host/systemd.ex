@@ -1,0 +1,95 @@
+defmodule Swarm.Host.Systemd do
+  @moduledoc """
+  Tells the machine's supervisor (systemd, by its protocol `sd_notify`) that the robot is up, how it is,
+  and, as long as that is so, that it is alive.
+
+  The sign of life is given only while the robot is well (`Swarm.Host.HealthCheck`): its gate and its executive did their
+  work within the last second, and the drive's process takes its messages. It is not a timer's that
+  ticks beside a robot that hangs. What a supervisor of the VM mends is mended before systemd's
+  patience ends; what none can mend (a part that hangs, a VM that stands still) ends in a fresh start
+  of everything. The wheels have stopped long before, by the port program's last words.
+
+  Options: `:socket`, the path that systemd gave, `@name` for an abstract one; `:robot`, whose life it is, `nil` for a
+  node without; `:period_ms`, how often it looks; `:pulse`, a function in place of `Pulse.of/1`.
+  """
+  use GenServer
+  alias Swarm.Host.HealthCheck
+
+  @period_ms 1_000
+
+  @doc "Starts it; `from_env/3` makes the options."
+  @spec start_link(keyword()) :: GenServer.on_start()
+  def start_link(options), do: GenServer.start_link(__MODULE__, options)
+
+  @doc """
+  The options for a robot, from what systemd has put into the environment of the process `os_pid`; `nil` where
+  nobody wants to be told.
+
+      iex> Swarm.Host.Systemd.from_env(%{"NOTIFY_SOCKET" => "/run/n", "WATCHDOG_USEC" => "2000000"}, :mag1, "7")
+      [socket: "/run/n", robot: :mag1, period_ms: 500]
+      iex> Swarm.Host.Systemd.from_env(%{}, :mag1, "7")
+      nil
+  """
+  @spec from_env(Swarm.Host.ReleaseBoot.environment(), atom() | nil, os_pid :: String.t()) ::
+          keyword() | nil
+  def from_env(environment, robot, os_pid) do
+    case Map.get(environment, "NOTIFY_SOCKET", "") do
+      "" -> nil
+      socket -> [socket: socket, robot: robot, period_ms: period(environment, os_pid)]
+    end
+  end
+
+  @impl GenServer
+  def init(options) do
+    # Before all else that has to be done: who is late here is taken for dead.
+    Process.flag(:priority, :high)
+    {:ok, socket} = :gen_udp.open(0, [:local, active: false])
+
+    s = %{
+      socket: socket,
+      to: {:local, address(options[:socket])},
+      robot: options[:robot],
+      period_ms: options[:period_ms] || @period_ms,
+      pulse: options[:pulse] || (&HealthCheck.of/1),
+      ready?: false
+    }
+
+    {:ok, s, {:continue, :look}}
+  end
+
+  @impl GenServer
+  def handle_continue(:look, s), do: {:noreply, look(s)}
+
+  @impl GenServer
+  def handle_info(:look, s), do: {:noreply, look(s)}
+  def handle_info(_other, s), do: {:noreply, s}
+
+  defp look(s) do
+    Process.send_after(self(), :look, s.period_ms)
+    {well?, words} = if s.robot, do: s.pulse.(s.robot), else: {true, "a node without a robot"}
+    tell(s, words, well?)
+    %{s | ready?: s.ready? or well?}
+  end
+
+  # A supervisor that does not listen now will, or starts us again.
+  defp tell(s, words, well?) do
+    ready = if well? and not s.ready?, do: ["READY=1\n"], else: []
+    alive = if well?, do: ["WATCHDOG=1\n"], else: []
+    :gen_udp.send(s.socket, s.to, 0, [ready, alive, "STATUS=", one_line(words), "\n"])
+  end
+
+  defp one_line(words), do: String.replace(words, ~r/\s+/, " ")
+
+  # Four looks within the time that systemd waits, and at least one a second.
+  defp period(environment, os_pid) do
+    with ^os_pid <- Map.get(environment, "WATCHDOG_PID", os_pid),
+         {usec, ""} when usec > 0 <- Integer.parse(Map.get(environment, "WATCHDOG_USEC", "")) do
+      usec |> div(4_000) |> max(10) |> min(@period_ms)
+    else
+      _no_watchdog -> @period_ms
+    end
+  end
+
+  defp address("@" <> name), do: <<0>> <> name
+  defp address(path), do: path
+end

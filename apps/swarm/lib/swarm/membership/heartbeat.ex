@@ -1,0 +1,136 @@
+defmodule Swarm.Membership.Heartbeat do
+  @moduledoc """
+  What a robot tells all others five times a second: where it is, what it is at, whom it hears,
+  whom it follows. Whole numbers only: mm, mrad, mm/s, mrad/s, millionths of a picture.
+
+  `estop` is the number of the last emergency stop that it knows, 0 for none, and `latched` says
+  whether its own latch is set (`Swarm.EStop.State`). `sight` is its newest view of the landmark: relative
+  size and estimated distance, `nil` where it does not see it. `anchor` is there in the leader's
+  heartbeats only. `in_place` says that a follower is in its slot, `unsure` that it believes so and is not sure
+  enough. `sd` is how well it knows its place in its leader's frame, `nil` outside of
+  it. `boot` is its life's number, which grows with every start.
+  """
+  alias Swarm.Membership.NameSet
+  alias Swarm.Message.WireTypes
+
+  @enforce_keys [:boot, :sequence, :pose, :twist]
+  defstruct @enforce_keys ++
+              [
+                radius: 200,
+                sd: nil,
+                phase: :idle,
+                epoch: 0,
+                leader: nil,
+                heard: <<>>,
+                sight: nil,
+                standing: false,
+                in_place: false,
+                unsure: false,
+                blocked: false,
+                formed: false,
+                estop: 0,
+                latched: false,
+                anchor: nil
+              ]
+
+  @typedoc "Standard deviations of a place in mm, along the worst direction and across it, and that direction in mrad."
+  @type spread :: {worst :: non_neg_integer(), least :: non_neg_integer(), direction :: integer()}
+
+  @type t :: %__MODULE__{
+          boot: integer(),
+          sequence: non_neg_integer(),
+          pose: {x :: integer(), y :: integer(), heading :: integer()},
+          twist: {linear :: integer(), turn :: integer()},
+          radius: pos_integer(),
+          sd: spread() | nil,
+          phase: atom(),
+          epoch: non_neg_integer(),
+          leader: atom() | nil,
+          heard: NameSet.t(),
+          sight: %{size_ppm: pos_integer(), distance: pos_integer() | nil} | nil,
+          standing: boolean(),
+          in_place: boolean(),
+          unsure: boolean(),
+          blocked: boolean(),
+          formed: boolean(),
+          estop: non_neg_integer(),
+          latched: boolean(),
+          anchor: Swarm.Formation.Reference.t() | nil
+        }
+
+  # Boot numbers may be times in ms, or, on clocks that count finer, in ns. Numbers of stops cannot be made
+  # to run so far, for nobody follows a leap (`Swarm.EStop.State`).
+  @latest 0xFFFFFFFFFFFFFFFF
+
+  @doc """
+  The heartbeat of a robot: what it perceives, what its mission claims, whom it hears. A percept
+  without odometry stands still.
+  """
+  @spec new(
+          {integer(), non_neg_integer()},
+          Robot.Percept.t(),
+          map(),
+          [atom()],
+          Swarm.EStop.State.t()
+        ) ::
+          t()
+  def new({boot, sequence}, %Robot.Percept{pose: pose} = percept, claim, heard, stop) do
+    twist = if percept.odometry, do: percept.odometry.twist, else: Hal.Twist.zero()
+
+    beat = %__MODULE__{
+      boot: boot,
+      sequence: sequence,
+      pose: {round(pose.x * 1000), round(pose.y * 1000), round(pose.heading * 1000)},
+      twist: {round(twist.linear * 1000), round(twist.turn * 1000)},
+      radius: round(percept.profile.radius * 1000),
+      heard: NameSet.new(heard),
+      estop: stop.known,
+      latched: stop.latched?
+    }
+
+    # These are for people, who ask the robot itself.
+    struct!(beat, Map.drop(claim, [:blocked_by, :uncertainty]))
+  end
+
+  @doc """
+  Whether a term from outside is a heartbeat with sane numbers.
+
+      iex> Swarm.Membership.Heartbeat.valid?(%Swarm.Membership.Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}})
+      true
+      iex> Swarm.Membership.Heartbeat.valid?(%Swarm.Membership.Heartbeat{boot: 1, sequence: 1, pose: {0, 1.5, 0}, twist: {0, 0}})
+      false
+  """
+  @spec valid?(term()) :: boolean()
+  def valid?(%__MODULE__{twist: {linear, turn}} = beat) do
+    WireTypes.whole?(beat, __MODULE__) and WireTypes.pose?(beat.pose) and
+      WireTypes.number?(linear) and
+      WireTypes.number?(turn) and WireTypes.boot?(beat.boot) and
+      WireTypes.count?(beat.sequence) and beat.radius in 50..2000 and
+      sd?(beat.sd) and WireTypes.name?(beat.phase) and
+      WireTypes.count?(beat.epoch) and (beat.leader == nil or WireTypes.name?(beat.leader)) and
+      NameSet.valid?(beat.heard) and sight?(beat.sight) and
+      Enum.all?(
+        [beat.standing, beat.in_place, beat.unsure, beat.blocked, beat.formed, beat.latched],
+        &is_boolean/1
+      ) and beat.estop in 0..@latest and
+      (beat.anchor == nil or Swarm.Formation.Reference.valid?(beat.anchor))
+  end
+
+  def valid?(_term), do: false
+
+  defp sd?(nil), do: true
+
+  defp sd?({worst, least, direction}),
+    do: worst in 0..100_000 and least in 0..100_000 and direction in -4_000..4_000
+
+  defp sd?(_other), do: false
+
+  defp sight?(nil), do: true
+
+  defp sight?(%{size_ppm: size, distance: distance} = sight),
+    do:
+      map_size(sight) == 2 and size in 0..1_000_000 and
+        (distance == nil or distance in 0..1_000_000)
+
+  defp sight?(_other), do: false
+end

@@ -1,0 +1,189 @@
+defmodule Swarm.Membership.Peers do
+  @moduledoc """
+  Who is there, by what is heard: the newest heartbeat of each robot, and its age. Pure; times are
+  the listener's own, in milliseconds.
+
+  A peer is suspect after 1 s of silence and gone after 2 s. A gone robot's last pose stays known,
+  as an obstacle, until it is heard from elsewhere. A robot that comes back with a higher boot
+  number starts anew; within one boot only newer sequence numbers count, so that late and doubled
+  heartbeats do no harm, those of a robot's former life included. Boot numbers may be times of day,
+  and clocks are set back: from a robot that is gone any number is believed.
+
+  A heartbeat may come by way of a third robot (`Swarm.Comms.Forwarder`): it counts as a sign of life, but not
+  as heard. Who is there has a number (`members/2`) that grows whenever a robot comes, goes, or comes
+  back as another life.
+  """
+  alias Hal.{Pose, Twist}
+  alias Swarm.Membership.Heartbeat
+
+  @suspect_ms 1_000
+  @gone_ms 2_000
+
+  @enforce_keys [:me]
+  defstruct @enforce_keys ++ [rows: %{}, changes: 0]
+
+  @typedoc "`at_ms` is when the robot was last heard of, `direct_ms` when it was heard itself, `nil` for never."
+  @type row :: %{beat: Heartbeat.t(), at_ms: integer(), direct_ms: integer() | nil}
+  @typedoc "`changes` counts those who came, came back or restarted, up to the last heartbeat."
+  @type t :: %__MODULE__{
+          me: atom(),
+          rows: %{atom() => row()},
+          changes: non_neg_integer()
+        }
+  @type status :: :alive | :suspect | :gone
+
+  @doc "Nobody heard yet."
+  @spec new(atom()) :: t()
+  def new(me), do: %__MODULE__{me: me}
+
+  @doc """
+  Hears a heartbeat, itself or (`direct?` false) by way of another robot; an old one, or one of the
+  robot's own name, changes nothing.
+  """
+  @spec hear(t(), atom(), Heartbeat.t(), integer(), direct? :: boolean()) :: t()
+  def hear(peers, from, beat, now_ms, direct? \\ true)
+  def hear(%{me: me} = peers, me, _beat, _now_ms, _direct?), do: peers
+
+  def hear(peers, from, beat, now_ms, direct?) do
+    old = peers.rows[from]
+
+    cond do
+      news?(old, beat, now_ms) ->
+        direct_ms = if direct?, do: now_ms, else: old && old.direct_ms
+        row = %{beat: beat, at_ms: now_ms, direct_ms: direct_ms}
+        changes = peers.changes + change(old, beat, now_ms)
+        %{peers | rows: Map.put(peers.rows, from, row), changes: changes}
+
+      # The same by the straight way, which was overtaken.
+      direct? and same?(old.beat, beat) and old.direct_ms != old.at_ms ->
+        %{peers | rows: Map.put(peers.rows, from, %{old | direct_ms: old.at_ms})}
+
+      true ->
+        peers
+    end
+  end
+
+  # Who comes counts one; who was away, one for its going and one for its return.
+  defp change(nil, _beat, _now_ms), do: 1
+  defp change(%{at_ms: at_ms}, _beat, now_ms) when now_ms - at_ms >= @gone_ms, do: 2
+  defp change(%{beat: %{boot: boot}}, %{boot: boot}, _now_ms), do: 0
+  defp change(_former_life, _beat, _now_ms), do: 1
+
+  defp same?(%{boot: boot, sequence: sequence}, beat),
+    do: beat.boot == boot and beat.sequence == sequence
+
+  defp news?(nil, _beat, _now_ms), do: true
+
+  # So that a number that was wrong does no lasting harm.
+  defp news?(%{at_ms: at_ms}, _beat, now_ms) when now_ms - at_ms >= @gone_ms, do: true
+
+  defp news?(%{beat: %{boot: boot, sequence: sequence}}, %{boot: boot} = beat, _now_ms),
+    do: beat.sequence > sequence
+
+  defp news?(%{beat: %{boot: boot}}, beat, _now_ms), do: beat.boot > boot
+
+  @doc "How a robot is, judged by its silence; an unknown one is gone."
+  @spec status(t(), atom(), integer()) :: status()
+  def status(%{me: me}, me, _now_ms), do: :alive
+
+  def status(peers, id, now_ms) do
+    case peers.rows do
+      %{^id => %{at_ms: at_ms}} when now_ms - at_ms < @suspect_ms -> :alive
+      %{^id => %{at_ms: at_ms}} when now_ms - at_ms < @gone_ms -> :suspect
+      _silent -> :gone
+    end
+  end
+
+  @doc "The names of all that are not gone, this robot too, sorted."
+  @spec view(t(), integer()) :: [atom()]
+  def view(peers, now_ms) do
+    others = for {id, %{at_ms: at_ms}} <- peers.rows, now_ms - at_ms < @gone_ms, do: id
+
+    Enum.sort([peers.me | others])
+  end
+
+  @doc "The names of those that are gone."
+  @spec gone(t(), integer()) :: [atom()]
+  def gone(peers, now_ms),
+    do: for({id, %{at_ms: at_ms}} <- peers.rows, now_ms - at_ms >= @gone_ms, do: id)
+
+  @doc """
+  The names of those heard within the last second, not by way of another, sorted; this is what a
+  heartbeat lists as heard.
+  """
+  @spec heard(t(), integer()) :: [atom()]
+  def heard(peers, now_ms) do
+    Enum.sort(
+      for {id, %{direct_ms: at_ms}} <- peers.rows,
+          at_ms != nil and now_ms - at_ms < @suspect_ms,
+          do: id
+    )
+  end
+
+  @doc """
+  All other robots that are not gone, each with the number of its life, sorted, and the number of this
+  view: it grows with every robot that comes, goes, or comes back as another life.
+
+      iex> beat = %Swarm.Membership.Heartbeat{boot: 7, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
+      iex> peers = Swarm.Membership.Peers.hear(Swarm.Membership.Peers.new(:mag1), :mag2, beat, 0)
+      iex> {Swarm.Membership.Peers.members(peers, 100), Swarm.Membership.Peers.members(peers, 2_000)}
+      {{1, [mag2: 7]}, {2, []}}
+  """
+  @spec members(t(), integer()) :: {number :: non_neg_integer(), [{atom(), boot :: integer()}]}
+  def members(peers, now_ms) do
+    there =
+      for {id, %{at_ms: at_ms, beat: beat}} <- peers.rows,
+          now_ms - at_ms < @gone_ms,
+          do: {id, beat.boot}
+
+    {view_number(peers, now_ms), Enum.sort(there)}
+  end
+
+  @doc "The number of the view of `members/2`."
+  @spec view_number(t(), integer()) :: non_neg_integer()
+  def view_number(peers, now_ms), do: peers.changes + length(gone(peers, now_ms))
+
+  @doc "The newest heartbeats of all that are not gone, by name, without this robot's."
+  @spec beats(t(), integer()) :: %{atom() => Heartbeat.t()}
+  def beats(peers, now_ms) do
+    for {id, %{at_ms: at_ms, beat: beat}} <- peers.rows, now_ms - at_ms < @gone_ms, into: %{} do
+      {id, beat}
+    end
+  end
+
+  @doc "The peers as a percept shows them, for the avoidance."
+  @spec percepts(t(), integer()) :: %{atom() => Robot.Percept.peer()}
+  def percepts(peers, now_ms),
+    do: Map.new(peers.rows, fn {id, row} -> {id, percept(row, now_ms)} end)
+
+  @doc "One of them; of a robot that was heard once."
+  @spec percept(t(), atom(), integer()) :: Robot.Percept.peer()
+  def percept(peers, id, now_ms), do: percept(Map.fetch!(peers.rows, id), now_ms)
+
+  defp percept(%{beat: beat, at_ms: at_ms, direct_ms: direct_ms}, now_ms) do
+    {x, y, heading} = beat.pose
+    {linear, turn} = beat.twist
+
+    %{
+      pose: Pose.new(x / 1000, y / 1000, heading / 1000),
+      twist: Twist.new(linear / 1000, turn / 1000),
+      radius: beat.radius / 1000,
+      at_ms: at_ms,
+      direct_ms: direct_ms,
+      mode: mode(beat, now_ms - at_ms),
+      beat: beat
+    }
+  end
+
+  @doc "The newest heartbeats of all in a percept's peers that are not gone, by name."
+  @spec taking_part(%{atom() => Robot.Percept.peer()}, integer()) :: %{atom() => Heartbeat.t()}
+  def taking_part(peers, now_ms) do
+    for {id, %{at_ms: at_ms, beat: beat}} <- peers, now_ms - at_ms < @gone_ms, into: %{} do
+      {id, beat}
+    end
+  end
+
+  defp mode(_beat, age_ms) when age_ms >= @gone_ms, do: :dead
+  defp mode(%{standing: true}, _age_ms), do: :holding
+  defp mode(_beat, _age_ms), do: :moving
+end

@@ -1,0 +1,97 @@
+defmodule Swarm.Mesh.Packet.Filter do
+  @moduledoc """
+  What a station makes of a datagram before it changes anything by it: whether it is new, signed, of the fleet and
+  of sense. Pure. Whether it was made now is for `Swarm.Mesh.Packet.ReplayProtection`.
+  """
+  alias Swarm.Mesh.{Beacon, NodeTable, Packet, Roster}
+  alias Swarm.Mesh.Packet.ReplayProtection
+  alias Swarm.Message
+  alias Swarm.Message.WireTypes
+
+  @services [:rows, :hints, :stop]
+  # So many datagrams of unknown origin are looked into a second.
+  @strange_per_second 2_000
+
+  @type body :: Beacon.t() | {:all | [atom()], Message.t()} | {service :: atom(), term()}
+  @type refusal ::
+          Packet.refusal()
+          | Packet.kind()
+          | :own
+          | :doubled
+          | :throttled
+          | :unknown_robot
+          | {:unknown_node, String.t()}
+
+  @doc """
+  Reads a datagram from there: the packet, the node that made it and what it says. `:own` is this station's
+  own, heard by multicast.
+  """
+  @spec read(Swarm.Mesh.Protocol.t(), binary(), Swarm.Mesh.Strategy.address()) ::
+          {:ok, Packet.t(), node(), body()} | {:error, refusal()}
+  def read(station, datagram, address) do
+    with :ok <- original(Packet.peek(datagram), station.guard),
+         :ok <- patience(station, address),
+         {:ok, packet} <- Packet.open(datagram, station.secret.key),
+         :ok <- foreign(packet, station),
+         {:ok, node} <- known(packet.sender, station.roster),
+         {:ok, term} <- Packet.unpack(packet.payload),
+         {:ok, body} <- body(packet.kind, term, station) do
+      {:ok, packet, node, body}
+    end
+  end
+
+  # Garbage costs a signature each; beyond a measure only those who are known are listened to.
+  defp patience(station, address) do
+    if station.strange < @strange_per_second or address in NodeTable.addresses(station.book),
+      do: :ok,
+      else: {:error, :throttled}
+  end
+
+  defp foreign(%{sender: name, session: session}, %{name: name, session: session}),
+    do: {:error, :own}
+
+  defp foreign(_packet, _station), do: :ok
+
+  defp known(name, roster) do
+    case Roster.node(roster, name) do
+      {:ok, node} -> {:ok, node}
+      :error -> {:error, {:unknown_node, name}}
+    end
+  end
+
+  # Half of all datagrams are copies, one by multicast and one by name: those cost no signature.
+  defp original({:ok, {name, session, sequence}}, guard) do
+    if ReplayProtection.copy?(guard, name, session, sequence), do: {:error, :doubled}, else: :ok
+  end
+
+  defp original(:error, _guard), do: :ok
+
+  defp body(:beacon, term, station) do
+    case Beacon.check(term) do
+      {:ok, beacon} -> {:ok, Beacon.known(beacon, station.roster.nodes)}
+      :error -> {:error, :beacon}
+    end
+  end
+
+  defp body(:message, {to, message}, station) do
+    with true <- to == :all or WireTypes.names?(to),
+         {:ok, %Message{} = message} <- Message.check(message),
+         true <- ours?(message, station.roster) || :unknown_robot do
+      {:ok, {to, message}}
+    else
+      :unknown_robot -> {:error, :unknown_robot}
+      _malformed -> {:error, :message}
+    end
+  end
+
+  defp body(:service, {service, term}, _station) when service in @services,
+    do: {:ok, {service, term}}
+
+  defp body(kind, _other, _station), do: {:error, kind}
+
+  # Of one that is passed on its first sender, too.
+  defp ours?(%Message{kind: :relay, from: from, body: inner}, roster),
+    do: Roster.robot?(roster, from) and ours?(inner, roster)
+
+  defp ours?(%Message{from: from}, roster), do: Roster.robot?(roster, from)
+end

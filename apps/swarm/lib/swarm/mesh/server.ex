@@ -1,0 +1,229 @@
+defmodule Swarm.Mesh.Server do
+  @moduledoc """
+  The process round `Swarm.Mesh.Protocol`: it owns the sockets, keeps the time and carries effects
+  out. What others ask often is in a table that anybody reads (`Swarm.Mesh`).
+
+  Sockets that cannot be opened are tried again with back-off; a robot without a network drives on.
+  """
+  use GenServer
+  alias Hal.Event
+  alias Robot.Names
+  alias Swarm.{Comms, Nonblocking}
+  alias Swarm.Message.WireTypes
+  alias Swarm.Mesh.{Backoff, Options, Protocol, Roster, Sockets}
+  alias Swarm.Mesh.Distribution.{Dialer, Epmd}
+
+  @tick_ms 200
+  @rejoin_every 50
+  @receivers %{rows: Swarm.Blackboard, hints: Swarm.Blackboard.Hints, stop: Swarm.EStop}
+
+  @doc "Starts the radio of this node."
+  @spec start_link(Options.t()) :: GenServer.on_start()
+  def start_link(%Options{} = options),
+    do: GenServer.start_link(__MODULE__, options, name: __MODULE__)
+
+  @impl GenServer
+  def init(%Options{} = options) do
+    # Heartbeats must not wait behind a busy robot.
+    Process.flag(:priority, :high)
+    table = :ets.new(Swarm.Mesh, [:named_table, :protected, read_concurrency: true])
+    :ets.insert(table, {:radio, self()})
+    <<session::64>> = :crypto.strong_rand_bytes(8)
+    load()
+
+    station =
+      Protocol.new(
+        secret: options.secret,
+        roster: Roster.new(node(), options.fleet),
+        session: session,
+        strategies: options.started,
+        port: options.dist_port,
+        group: group(options)
+      )
+
+    s = %{
+      options: options,
+      station: station,
+      sockets: nil,
+      backoff: Backoff.new(now()),
+      table: table,
+      chance: :rand.seed_s(:exsss, session),
+      ticks: 0,
+      links: Names.all(:link),
+      sent: 0,
+      heard: 0,
+      next: now()
+    }
+
+    {:ok, s |> open() |> publish() |> schedule()}
+  end
+
+  # Heartbeats go to all by name, and by multicast besides, since either way may be blocked; on the
+  # loopback nothing is, and what thirty nodes of one machine send each other twice takes half of it.
+  defp group(%{multicast: false}), do: nil
+  defp group(%{interface: {127, _, _, _}}), do: nil
+  defp group(%{multicast: group}), do: group
+
+  # Words that come as atoms are known once the modules that say them are loaded, which without a
+  # release is when they are first called: a robot that has just been switched on would not understand
+  # what a leader says.
+  defp load do
+    for app <- [:hal, :swarm],
+        module <- Application.spec(app, :modules) || [],
+        do: {:module, _} = Code.ensure_loaded(module)
+  end
+
+  @impl GenServer
+  def handle_cast({:speak, to, message}, s) do
+    if to == :all or WireTypes.names?(to),
+      do: {:noreply, run(s, Protocol.speak(s.station, to, message, now()))},
+      else: {:noreply, s}
+  end
+
+  def handle_cast({:serve, service, to, term}, s)
+      when is_map_key(@receivers, service) and is_atom(to),
+      do: {:noreply, run(s, Protocol.serve(s.station, service, to, term))}
+
+  # To a node that the distribution is connected to, however that came about.
+  def handle_cast({:introduce, node}, s) when is_atom(node) do
+    if s.sockets, do: Nonblocking.cast({__MODULE__, node}, {:knock, node(), s.sockets.port})
+    {:noreply, s}
+  end
+
+  def handle_cast({:knock, node, port}, s) when is_atom(node) and port in 1..65_535 do
+    case ip(node) do
+      nil -> {:noreply, s}
+      ip -> {:noreply, run(s, Protocol.knock(s.station, {ip, port}, now()))}
+    end
+  end
+
+  # Connected nodes may send anything.
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_call(:counts, _from, s) do
+    counts = %{sent: s.sent, heard: s.heard, rejected: s.station.rejected}
+    {:reply, Map.put(counts, :port, s.sockets && s.sockets.port), s}
+  end
+
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info({:udp, socket, ip, port, datagram}, %{sockets: %Sockets{} = sockets} = s)
+      when socket == sockets.own or socket == sockets.group do
+    s = %{s | heard: s.heard + 1}
+    {:noreply, run(s, Protocol.hear(s.station, datagram, {ip, port}, now()))}
+  end
+
+  def handle_info({:udp_passive, socket}, %{sockets: %Sockets{} = sockets} = s)
+      when socket == sockets.own or socket == sockets.group do
+    Sockets.again(socket)
+    {:noreply, s}
+  end
+
+  def handle_info(:tick, s) do
+    {chance, state} = :rand.uniform_s(s.chance)
+    s = open(%{s | chance: state, ticks: s.ticks + 1, links: Names.all(:link)})
+    if s.sockets && rem(s.ticks, @rejoin_every) == 0, do: Sockets.rejoin(s.sockets)
+    s = run(s, Protocol.tick(s.station, Dialer.links(), now(), chance))
+    {:noreply, s |> publish() |> schedule()}
+  end
+
+  # A reset of the network shows as an error on the socket.
+  def handle_info({:udp_error, _socket, _reason}, s), do: {:noreply, s}
+  def handle_info(_other, s), do: {:noreply, s}
+
+  defp open(%{sockets: nil} = s) do
+    if Backoff.due?(s.backoff, now()), do: try_open(s), else: s
+  end
+
+  defp open(s), do: s
+
+  defp try_open(s) do
+    case Sockets.open(s.options) do
+      {:ok, sockets} ->
+        %{s | sockets: sockets}
+
+      {:error, reason} ->
+        about = %{reason: reason, interface: s.options.interface, port: s.options.port}
+        Event.execute([:swarm, :mesh, :no_network], %{}, about)
+        {chance, state} = :rand.uniform_s(s.chance)
+        %{s | chance: state, backoff: Backoff.tried(s.backoff, now(), chance)}
+    end
+  end
+
+  defp run(s, {station, effects}) do
+    changed? = Enum.any?(effects, &match?({:node, _, _}, &1))
+    s = Enum.reduce(effects, %{s | station: station}, &carry_out/2)
+    if changed?, do: publish(s), else: s
+  end
+
+  defp carry_out({:send, _address, _datagram}, %{sockets: nil} = s), do: s
+
+  defp carry_out({:send, address, datagram}, s) do
+    # What the network does not take now is lost, as any datagram may be.
+    _ = Sockets.send(s.sockets, address, datagram)
+    %{s | sent: s.sent + 1}
+  end
+
+  defp carry_out({:beat, robot, node, {boot, sequence}}, s) do
+    :ets.insert(s.table, {{:robot, robot}, node, boot, sequence, now()})
+    if Names.whereis(robot, :link), do: Comms.rival(robot, {boot, node})
+    s
+  end
+
+  defp carry_out({:deliver, :all, message}, s) do
+    for link <- s.links, do: GenServer.cast(link, {:hear, message})
+    s
+  end
+
+  defp carry_out({:deliver, ids, message}, s) do
+    for id <- ids, link = Names.whereis(id, :link), do: GenServer.cast(link, {:hear, message})
+    s
+  end
+
+  defp carry_out({:serve, service, node, term}, s) do
+    Map.fetch!(@receivers, service).hear(node, term)
+    s
+  end
+
+  defp carry_out({:node, change, node}, s) do
+    Event.execute([:swarm, :mesh, change], %{at_ms: now()}, %{node: node})
+    Dialer.note(change, node)
+    s
+  end
+
+  defp carry_out({:learn, name, ip, port}, s) do
+    _ = Epmd.learn(name, ip, port)
+    s
+  end
+
+  defp carry_out({:event, name, about}, s) do
+    Event.execute([:swarm, :mesh, name], %{at_ms: now()}, about)
+    s
+  end
+
+  # The book, for those who read it without asking.
+  defp publish(s) do
+    :ets.insert(s.table, {:book, s.station.book, s.station.roster, s.station.rejected})
+    s
+  end
+
+  # The address that the connection to a node goes to.
+  defp ip(node) do
+    with {:ok, info} <- :net_kernel.node_info(node),
+         {:net_address, {{_, _, _, _} = ip, _port}, _host, _protocol, _family} <- info[:address] do
+      ip
+    else
+      _not_connected -> nil
+    end
+  end
+
+  defp schedule(s) do
+    next = max(s.next + @tick_ms, now())
+    Process.send_after(self(), :tick, next, abs: true)
+    %{s | next: next}
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

@@ -1,0 +1,109 @@
+defmodule Swarm.Supervisor.BackoffSupervisor do
+  @moduledoc """
+  Keeps one part of a node running, for ever: it is started again at once when it falls, and with back-off
+  when it falls again and again. So what a part falls over each time somebody sends it costs the
+  node that part for a while, and not its robots, which do without.
+
+  Each fall is an event, `[:swarm, :part, :fell]`, with the part's `id` and the `reason`. A part that
+  cannot be started with the node is the node's failure, as under any supervisor.
+  """
+  use GenServer
+  alias Hal.Event
+  alias Swarm.Mesh.Backoff
+
+  # So many falls within that time are not the rule yet.
+  @falls 5
+  @within_ms 5_000
+  @patience_ms 5_000
+
+  @doc "A part's child spec, in the care of such a process."
+  @spec child_spec(Supervisor.child_spec() | {module(), term()} | module()) ::
+          Supervisor.child_spec()
+  def child_spec(part) do
+    %{id: id} = spec = Supervisor.child_spec(part, [])
+    %{id: id, start: {__MODULE__, :start_link, [spec]}, shutdown: 2 * @patience_ms}
+  end
+
+  @doc "Starts the part, and keeps it."
+  @spec start_link(Supervisor.child_spec()) :: GenServer.on_start()
+  def start_link(spec), do: GenServer.start_link(__MODULE__, spec)
+
+  @impl GenServer
+  def init(%{id: id, start: start}) do
+    Process.flag(:trap_exit, true)
+    s = %{id: id, start: start, pid: nil, falls: [], backoff: Backoff.new(now())}
+
+    case begin(start) do
+      {:ok, pid} -> {:ok, %{s | pid: pid}}
+      {:error, reason} -> {:stop, reason}
+    end
+  end
+
+  @impl GenServer
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info({:EXIT, pid, reason}, %{pid: pid} = s) do
+    Event.execute([:swarm, :part, :fell], %{at_ms: now()}, %{id: s.id, reason: reason})
+    falls = [now() | Enum.filter(s.falls, &(now() - &1 < @within_ms))]
+    {:noreply, again(%{s | pid: nil, falls: falls})}
+  end
+
+  def handle_info(:again, %{pid: nil} = s) do
+    case begin(s.start) do
+      {:ok, pid} -> {:noreply, %{s | pid: pid}}
+      {:error, _reason} -> {:noreply, later(s)}
+    end
+  end
+
+  def handle_info(_unknown, s), do: {:noreply, s}
+
+  @impl GenServer
+  def terminate(_reason, %{pid: nil}), do: :ok
+
+  def terminate(_reason, %{pid: pid}) do
+    ref = Process.monitor(pid)
+    Process.exit(pid, :shutdown)
+
+    receive do
+      {:DOWN, ^ref, :process, _pid, _reason} -> :ok
+    after
+      @patience_ms -> Process.exit(pid, :kill)
+    end
+  end
+
+  # A part of a former life of this process may be about to end with that.
+  defp begin({m, f, a} = start) do
+    case apply(m, f, a) do
+      {:error, {:already_started, former}} ->
+        ref = Process.monitor(former)
+
+        receive do
+          {:DOWN, ^ref, :process, _pid, _reason} -> begin(start)
+        after
+          @patience_ms -> {:error, {:already_started, former}}
+        end
+
+      started ->
+        started
+    end
+  end
+
+  defp again(%{falls: falls} = s) when length(falls) > @falls, do: later(s)
+
+  defp again(s) do
+    send(self(), :again)
+    %{s | backoff: Backoff.new(now())}
+  end
+
+  defp later(s) do
+    backoff = Backoff.tried(s.backoff, now(), 0.5)
+    Process.send_after(self(), :again, backoff.due_ms, abs: true)
+    %{s | backoff: backoff}
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

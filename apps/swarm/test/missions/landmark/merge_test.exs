@@ -1,0 +1,53 @@
+defmodule Missions.Landmark.MergeTest do
+  @moduledoc "Whom a leader leaves to another one, when two parts of a fleet meet."
+  use ExUnit.Case, async: true
+  alias Swarm.Membership.Heartbeat
+  alias Missions.Landmark
+  alias Missions.Landmark.Merge
+
+  defp beat(phase, leader) do
+    %Heartbeat{
+      boot: 1,
+      sequence: 1,
+      pose: {0, 0, 0},
+      twist: {0, 0},
+      phase: phase,
+      leader: leader,
+      epoch: 2
+    }
+  end
+
+  # What mag1, which leads, hears of the others.
+  defp theirs(beats) do
+    peers = Map.new(beats, fn {id, beat} -> {id, %{at_ms: 1_000, beat: beat}} end)
+
+    mission = %Landmark.State{
+      me: :mag1,
+      formation: {:line, 1.0},
+      assign: :cost,
+      leader_change?: true,
+      phase: :lead,
+      now_ms: 1_000,
+      percept: %{peers: peers}
+    }
+
+    beats |> Keyword.keys() |> Merge.theirs(mission)
+  end
+
+  test "another leader and its followers are left to it" do
+    assert theirs(mag2: beat(:lead, :mag2), mag3: beat(:follow, :mag2)) == [:mag2, :mag3]
+  end
+
+  test "a follower that is heard before its leader is, too" do
+    assert theirs(mag3: beat(:follow, :mag2)) == [:mag3]
+  end
+
+  test "who is alone, is the own follower, or follows one that leads no more is free" do
+    assert theirs(
+             mag2: beat(:follow, :mag1),
+             mag3: beat(:agree, nil),
+             mag4: beat(:follow, :mag2),
+             mag5: beat(:search, nil)
+           ) == []
+  end
+end

@@ -1,0 +1,109 @@
+defmodule Missions.Landmark.UnsureTest do
+  @moduledoc "A follower that stands in its slot by its own estimate, and is not sure enough to say so."
+  use ExUnit.Case, async: true
+  alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Robot.Percept
+  alias Swarm.EStop
+  alias Swarm.Formation.Reference
+  alias Swarm.Membership.Heartbeat
+  alias Missions.Landmark
+  alias Missions.Landmark.{Follower, Shape}
+
+  doctest Missions.Landmark.Marks
+
+  @column {:column, 1.0}
+
+  defp percept(fields) do
+    plain = %Percept{robot: :mag2, at_ms: 0, profile: Profile.magellan(), peers: %{}}
+    odometry = %Odometry{pose: Pose.new(0, 0), twist: Twist.zero()}
+    struct!(%{plain | pose: Pose.new(0, 0), odometry: odometry}, fields)
+  end
+
+  defp mission(fields) do
+    plain = %Landmark.State{me: :mag2, formation: @column, assign: :cost, leader_change?: true}
+    struct!(plain, fields)
+  end
+
+  # A follower that is never moved, `off` metres from its slot, for `seconds`; it is in its leader's frame.
+  defp stand(off, radius, seconds) do
+    mission = mission(phase: :follow, leader: :mag1, epoch: 1, attend: Follower.new())
+
+    uncertainty = %{
+      radius: radius,
+      position: radius / 2,
+      heading: 0.1,
+      frame: {:mag1, nil, 0}
+    }
+
+    Enum.reduce(0..(seconds * 10), mission, fn tick, mission ->
+      now = tick * 100
+
+      anchor = %Reference{
+        leader: :mag1,
+        epoch: 1,
+        sequence: tick + 1,
+        pose: {round(off * 1000) + 1000, 0, 0},
+        twist: {0, 0},
+        formation: @column,
+        order: [:mag2],
+        size: 2,
+        places: [1],
+        landmark: nil,
+        still: true
+      }
+
+      percept = percept(at_ms: now, uncertainty: uncertainty)
+      mission = %{mission | anchor: anchor, anchor_ms: now, percept: percept, now_ms: now}
+      {mission, _effects} = Follower.act(mission)
+      mission
+    end).attend
+  end
+
+  test "it says that, and neither that it is in place nor that it is blocked" do
+    assert %{unsure?: true, in_place?: false} = stand(0.1, 0.62, 1)
+    assert %{unsure?: true, blocked?: false, blocker: nil, late: nil} = stand(0.1, 0.62, 30)
+    assert %{unsure?: false, in_place?: true} = stand(0.1, 0.3, 1)
+  end
+
+  test "nobody asks how sure one is that is still on its way, or does not get there" do
+    assert %{unsure?: false} = stand(0.6, 0.62, 1)
+    assert %{unsure?: false, blocked?: true} = stand(0.6, 0.62, 16)
+  end
+
+  test "heartbeats carry the word, and nothing else in its place" do
+    beat =
+      Heartbeat.new({1, 1}, percept([]), %{phase: :follow, unsure: true}, [], EStop.State.new())
+
+    assert beat.unsure and Heartbeat.valid?(beat)
+    for junk <- [nil, 1, "true"], do: refute(Heartbeat.valid?(%{beat | unsure: junk}))
+  end
+
+  # What the leader makes of its followers' words, long after it began.
+  defp squeeze(words) do
+    peers =
+      for {id, word} <- words, into: %{} do
+        claim = Map.merge(%{phase: :follow, standing: true}, word)
+        beat = Heartbeat.new({1, 1}, percept([]), claim, [], EStop.State.new())
+        pose = Pose.new(5.0, 5.0)
+        twist = Twist.zero()
+        {id, %{pose: pose, twist: twist, radius: 0.2, at_ms: 0, mode: :holding, beat: beat}}
+      end
+
+    mission =
+      mission(
+        me: :mag1,
+        now_ms: 5_000,
+        order: Map.keys(peers),
+        percept: percept(peers: Map.new(peers, fn {id, peer} -> {id, %{peer | at_ms: 5_000}} end))
+      )
+
+    Shape.update(Shape.new(), mission, 1.6).squeeze
+  end
+
+  test "the shape is not closed up for it, and it does not hold that up for one that is blocked" do
+    assert squeeze(%{mag2: %{in_place: true}, mag3: %{unsure: true}}) == 0
+    assert squeeze(%{mag2: %{blocked: true}, mag3: %{in_place: true}}) == 1
+    assert squeeze(%{mag2: %{blocked: true}, mag3: %{unsure: true}}) == 1
+    assert squeeze(%{mag2: %{blocked: true}, mag3: %{}}) == 0
+  end
+end

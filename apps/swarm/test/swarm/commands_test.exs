@@ -1,0 +1,197 @@
+defmodule Swarm.CommandsTest do
+  use Swarm.Case, async: false
+  @moduletag :capture_log
+
+  defp line({:error, line}) do
+    assert is_binary(line)
+    refute line =~ "\n"
+    line
+  end
+
+  defp state(id),
+    do: Board.fetch(Board.find!(id), :mission, :infinity) |> elem(1) |> Map.fetch!(:state)
+
+  defp mission(id) do
+    {_state, %{mission: mission}} = :sys.get_state(Names.whereis(id, :pilot))
+    mission
+  end
+
+  # A camera that shows nothing, and what it looks for.
+  defp eyes do
+    box = %{y: {80, 240}, u: {60, 90}, v: {130, 145}}
+    classes = for name <- ["Yellow", "Red"], do: Map.put(box, :name, name)
+    {:ok, colours} = Vision.Colours.new(classes)
+    [camera: {Hal.FakeCamera, test: self(), device: :camera}, colours: colours]
+  end
+
+  # The behaviour that drives it now.
+  defp doing(id) do
+    with {:ok, %{by: behaviour}, _age} <- Board.fetch(Board.find!(id), :doing, 300), do: behaviour
+  end
+
+  # Wheels that say, ten times a second, that it turns to the left: once round in 1.3 s.
+  defp turning(id) do
+    turn = fn n -> stand(id, Pose.new(0, 0, Pose.wrap(0.5 * n))) end
+    start_supervised!({Task, fn -> Enum.each(Stream.interval(100), turn) end}, id: {:turning, id})
+  end
+
+  test "single commands work from idle and replace each other" do
+    id = robot(:door1, eyes())
+    standing([id])
+    assert Swarm.goto(id, {2.0, 1}) == :ok
+    assert state(id) == {Missions.Manual, :goto}
+    eventually(fn -> doing(id) == :goto end)
+
+    assert Swarm.tell("door1", "MOVE:0.1:0") == :ok
+    eventually(fn -> doing(id) == :move end)
+
+    assert %Swarm.Status{state: :move, robot: :door1} = Swarm.status(id)
+    assert Swarm.stop(id) == :ok
+    assert state(id) == :idle
+    eventually(fn -> doing(id) == :rest end)
+
+    assert Swarm.tell([id], "findblob:Yellow") == :ok
+    assert Swarm.tell(id, "lead") == :ok
+    assert {:ok, "door1 on " <> _} = Swarm.tell(id, "ping")
+    assert Swarm.goto(id, {1, 2, 1.5}) == :ok
+    assert Swarm.goto(id, Pose.new(1, 2)) == :ok
+  end
+
+  test "a colour that a robot does not know is refused, with those that it looks for" do
+    id = robot(:door_sees, eyes())
+    blind = robot(:door_blind)
+    standing([id, blind])
+
+    assert Swarm.tell(id, "findblob:Blue") ==
+             {:error, ~s(door_sees knows no colour "Blue"; it looks for Yellow, Red)}
+
+    assert state(id) == :idle
+    assert Swarm.tell(id, "findblob") == :ok
+    assert Swarm.tell(blind, "findblob") == {:error, "door_blind has no camera to look with"}
+    assert Swarm.tell(id, "findblob:Red") == :ok
+    assert state(id) == {Missions.Manual, :find_blob}
+    # A full turn shows nothing.
+    :ok = stop_supervised({:wheels, [id, blind]})
+    turning(id)
+    eventually(fn -> Swarm.status(id).state == :not_found end, 20_000)
+  end
+
+  test "robots follow each other, but in no circle" do
+    [a, b, c] = for k <- 1..3, do: robot(:"door_follow#{k}")
+    standing([a, b, c])
+    assert line(Swarm.follow(a, a)) =~ "itself"
+    assert Swarm.follow(a, b) == :ok
+    assert Swarm.follow(b, c) == :ok
+
+    leader = fn id, of ->
+      match?({:ok, %{beat: %{leader: ^of}}, _}, Board.fetch(Board.find!(c), {:peer, id}, 1_000))
+    end
+
+    eventually(fn -> leader.(a, b) and leader.(b, c) end)
+    assert line(Swarm.follow(c, a)) =~ "door_follow1 -> door_follow2 -> door_follow3"
+    assert line(Swarm.tell(c, "followtheleader:nobody")) =~ "nobody"
+    assert Swarm.stop([a, b]) == :ok
+    eventually(fn -> leader.(a, nil) end)
+    assert Swarm.follow(c, a) == :ok
+  end
+
+  test "the mission starts, takes a formation, stops, and is left by whoever is sent elsewhere" do
+    id = robot(:door_group)
+    assert line(Swarm.formation(:wedge)) =~ "start it first"
+    assert Swarm.start(robots: [id], formation: :line) == :ok
+    assert {Missions.Landmark, _} = state(id)
+    standing([id])
+    eventually(fn -> state(id) != {Missions.Landmark, :idle} end)
+    assert Swarm.formation(:wedge, spacing: 1.2) == :ok
+    assert Swarm.formation("column") == :ok
+    assert Swarm.stop(id) == :ok
+    assert state(id) == :idle
+    assert Swarm.start() == :ok
+    assert {Missions.Landmark, _} = state(id)
+    eventually(fn -> state(id) != {Missions.Landmark, :idle} end)
+    # The shape that was asked for last.
+    assert {:column, 1.0} = mission(id).formation
+    assert Swarm.goto(id, {1, 1}) == :ok
+    assert state(id) == {Missions.Manual, :goto}
+    assert Swarm.start() == :ok
+    assert {Missions.Landmark, _} = state(id)
+  end
+
+  test "a formation is :ok only when all on the mission have it; who does not answer is named" do
+    for id <- [:shape1, :shape2, :shape3], do: robot(id)
+    standing([:shape1, :shape2, :shape3])
+    assert Swarm.start(robots: [:shape1, :shape2]) == :ok
+    # The third is on none.
+    assert Swarm.formation(:wedge) == :ok
+    link = Names.whereis(:shape2, :link)
+    :ok = :sys.suspend(link)
+    told = "shape2 does not answer; the others took it"
+    assert Swarm.formation(:column) == {:error, told}
+    :ok = :sys.resume(link)
+    assert Swarm.estop() == :ok
+    assert {:error, line} = Swarm.formation(:wedge)
+    assert line =~ "shape1 is held by the emergency stop; reset it first; shape2 is held by"
+    assert Swarm.reset() == :ok
+  end
+
+  test "wrong input is one line that says what is allowed, and never raises" do
+    id = robot(:door_wrong)
+    assert line(Swarm.goto(:door_wrnog, {1, 1})) =~ "did you mean door_wrong?"
+    assert line(Swarm.goto(id, {:nan, 1})) =~ "number"
+    assert line(Swarm.formation(:wegde)) =~ "did you mean wedge?"
+    assert line(Swarm.formation(:line, length: "4")) =~ "metres"
+    assert line(Swarm.start(assign: :luck)) =~ ":chain or :cost"
+    assert line(Swarm.start(leader_chnage: true)) =~ "did you mean leader_change?"
+
+    wrong = [
+      nil,
+      :nobody,
+      "nobody",
+      1,
+      1.5,
+      {},
+      {1},
+      %{},
+      [],
+      [nil],
+      [id | id],
+      [[id]],
+      self(),
+      "",
+      -1,
+      {1, :inf},
+      {nil, nil}
+    ]
+
+    for term <- wrong do
+      line(Swarm.goto(term, {1, 1}))
+      line(Swarm.goto(id, term))
+      line(Swarm.follow(term, id))
+      line(Swarm.follow(id, term))
+      line(Swarm.tell(term, "ping"))
+      line(Swarm.tell(id, term))
+      line(Swarm.status(term))
+      line(Swarm.stop(term))
+      line(Swarm.formation(term))
+      if term != [], do: line(Swarm.formation(:wedge, term))
+      if term != [], do: line(Swarm.start(term))
+      line(Swarm.formation(:wedge, spacing: term))
+      line(Swarm.start(formation: term))
+      line(Swarm.start(robots: term))
+    end
+  end
+
+  test "a robot that does not answer is named within half a second" do
+    id = robot(:door_deaf)
+    :ok = :sys.suspend(Names.whereis(id, :link))
+    {took, answer} = :timer.tc(fn -> Swarm.goto(id, {1, 1}) end)
+    assert line(answer) == "door_deaf does not answer"
+    assert took in 450_000..700_000
+    assert Enum.any?(Swarm.status(), &match?(%{robot: :door_deaf, state: :no_answer}, &1))
+    # What stops it does not pass its link.
+    assert Swarm.stop(id) == :ok
+    :ok = :sys.resume(Names.whereis(id, :link))
+    assert %Swarm.Status{} = Swarm.status(id)
+    refute_received {_alias, :door_deaf, _answer}
+  end
+end

@@ -1,0 +1,105 @@
+defmodule Swarm.Comms.ForwarderTest do
+  use ExUnit.Case, async: true
+  alias Swarm.Message
+  alias Swarm.Agreement.Round
+  alias Swarm.Comms.Forwarder
+  alias Swarm.Membership.{Heartbeat, Peers}
+
+  # What mag2 hears of mag1 and mag3, who list these as heard; numbered by time.
+  defp peers(heard, now_ms) do
+    beats =
+      for {id, list} <- heard do
+        beat = %Heartbeat{
+          boot: 1,
+          sequence: now_ms,
+          pose: {0, 0, 0},
+          twist: {0, 0},
+          heard: Swarm.Membership.NameSet.new(list)
+        }
+
+        {id, beat}
+      end
+
+    beats
+    |> Enum.reduce(Peers.new(:mag2), fn {id, beat}, p -> Peers.hear(p, id, beat, now_ms) end)
+    |> Peers.percepts(now_ms)
+  end
+
+  # So many ticks of 100 ms, with new heartbeats at each; what was sent in the last one.
+  defp run(heard, ticks, me \\ :mag2) do
+    Enum.reduce(1..ticks, {Forwarder.new(), []}, fn n, {relay, _sent} ->
+      Forwarder.beats(relay, me, peers(heard, n * 100), n * 100)
+    end)
+  end
+
+  @apart [mag1: [:mag2], mag3: [:mag2]]
+
+  test "passes on the heartbeats of two that do not hear each other, each once" do
+    assert {_relay, []} = run(@apart, 3)
+    {relay, sent} = run(@apart, 4)
+    assert [{[:mag1], :mag3, 1}, {[:mag3], :mag1, 1}] = summary(sent)
+    # The same again, without a new heartbeat.
+    assert {_relay, []} = Forwarder.beats(relay, :mag2, peers(@apart, 400), 450)
+    for {:send, _to, message} <- sent, do: assert({:ok, ^message} = Message.check(message))
+  end
+
+  defp summary(sent) do
+    Enum.sort(
+      for {:send, to, %{kind: :relay, from: :mag2, body: inner}} <- sent,
+          do: {to, inner.from, inner.hops}
+    )
+  end
+
+  test "nothing where all hear each other, nor for one that does not hear this robot" do
+    assert {%{missing: missing}, []} = run([mag1: [:mag2, :mag3], mag3: [:mag1, :mag2]], 10)
+    assert missing == %{}
+    assert {_relay, []} = run([mag1: [], mag3: [:mag1, :mag2]], 10)
+  end
+
+  test "of several that could, the first two do" do
+    all = [:aaa, :bbb, :mag1, :mag2, :mag3]
+    others = [aaa: all -- [:aaa], bbb: all -- [:bbb]]
+    apart = [mag1: [:aaa, :bbb, :mag2], mag3: [:aaa, :bbb, :mag2]] ++ others
+    assert {_relay, []} = run(apart, 10)
+    one = [mag1: [:aaa, :mag2], mag3: [:aaa, :bbb, :mag2]] ++ others
+    # Of what mag1 lacks, aaa is one way and this robot the other.
+    {_relay, sent} = run(one, 10)
+    assert summary(sent) == [{[:mag1], :bbb, 1}, {[:mag1], :mag3, 1}]
+  end
+
+  test "letters too, but the same not more often than they are repeated" do
+    {relay, _sent} = run(@apart, 4)
+    peers = peers(@apart, 400)
+    view = [:mag1, :mag2, :mag3]
+    letter = %Round.Letter{id: {1, 1, :mag1}, view: view, remaining_ms: 90, purpose: :search}
+    hear = &Forwarder.letter(&1, :mag2, peers, Message.new(:mag1, :round, &2), &3)
+
+    assert {relay, [{:send, [:mag3], %{body: %{from: :mag1, hops: 1}}}]} =
+             hear.(relay, letter, 400)
+
+    assert {relay, []} = hear.(relay, %{letter | remaining_ms: 50}, 440)
+    assert {relay, [_]} = hear.(relay, %{letter | report: nil, ask: true}, 450)
+    assert {_relay, [_]} = hear.(relay, %{letter | ask: true, report: nil}, 540)
+    far = %{Message.new(:mag1, :round, letter) | hops: 3}
+    assert {_, []} = Forwarder.letter(relay, :mag2, peers, far, 900)
+  end
+
+  test "only whole heartbeats and letters are relayed, and once wrapped" do
+    beat = %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
+    {:ok, relay} = Message.pass_on(Message.new(:mag1, :heartbeat, beat), :mag2)
+    assert {:ok, ^relay} = Message.check(relay)
+    inner = relay.body
+
+    for body <- [
+          nil,
+          beat,
+          relay,
+          %{inner | hops: 0},
+          %{inner | hops: 4},
+          %{inner | hops: :far},
+          %{inner | body: nil},
+          %{inner | from: nil}
+        ],
+        do: assert({:error, :relay} = Message.check(%{relay | body: body}))
+  end
+end

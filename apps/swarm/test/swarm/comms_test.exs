@@ -1,0 +1,265 @@
+defmodule Swarm.CommsTest do
+  use Robot.Case, async: false
+  @moduletag :capture_log
+  alias Hal.{Odometry, Pose}
+  alias Swarm.{Comms, Directory, Message}
+  alias Swarm.Membership.Heartbeat
+
+  # A robot that talks, and knows where it is.
+  defp talking(id, options \\ []) do
+    {link, options} = Keyword.pop(options, :link, [])
+    drive = {Hal.FakeDrive, test: self(), device: id}
+    config = config(id, Keyword.put(options, :drive, drive))
+    start_supervised!({Robot.Supervisor, Comms.join(config, link)}, id: id, restart: :temporary)
+    place(id)
+    until(id, fn _ -> Directory.whereis(id) != nil end)
+    id
+  end
+
+  defp place(id) do
+    odometry = {:odometry, %Odometry{pose: Pose.new(0, 0), twist: Twist.zero()}}
+    send(Names.whereis(id, :drive), {:readings, [odometry, {:bumpers, []}]})
+  end
+
+  # Reads the board again at each heartbeat, instead of sleeping.
+  defp until(id, check, tries \\ 100) do
+    cond do
+      check.(Board.find!(id)) -> :ok
+      tries == 0 -> flunk("#{id} did not come to it: #{inspect(Swarm.status(id))}")
+      true -> receive(do: (:never -> :ok), after: (20 -> until(id, check, tries - 1)))
+    end
+  end
+
+  # Odometry comes again and again, as from wheels: a place that is 300 ms old is none.
+  defp rolls_of(id, tries \\ 10) do
+    place(id)
+
+    receive do
+      {^id, {:drive, %Twist{linear: v, turn: w}}, _} when v != 0 or w != 0 -> :ok
+    after
+      100 ->
+        if tries == 0, do: flunk("#{id} does not roll: #{inspect(Swarm.status(id))}")
+        rolls_of(id, tries - 1)
+    end
+  end
+
+  defp forget(id) do
+    receive do
+      {^id, {:drive, _}, _} -> forget(id)
+    after
+      0 -> :ok
+    end
+  end
+
+  test "robots hear each other, and see each other grow old" do
+    for id <- [:link1, :link2], do: talking(id, start: Pose.new(1, 2))
+
+    until(:link1, &match?(%{link2: %{mode: :holding}}, Board.peers(&1)))
+    assert %{link2: %{pose: pose, beat: %Heartbeat{}}} = Board.peers(Board.find!(:link1))
+    assert Pose.distance(pose, {1.0, 2.0}) < 0.01
+    until(:link2, &is_map_key(Board.peers(&1), :link1))
+    stop_supervised!(:link2)
+    until(:link1, &match?(%{link2: %{mode: :dead}}, Board.peers(&1)), 200)
+  end
+
+  test "what is malformed is dropped, counted and shown, and crashes nobody" do
+    id = talking(:link3)
+    link = Names.whereis(id, :link)
+    for junk <- [:junk, %{a: 1}, nil, "text", {:robot, 1}], do: Comms.hear(id, junk)
+    Comms.hear(id, Message.new(:link4, :heartbeat, %{boot: "x"}))
+    Comms.hear(id, Message.new(:link4, :round, :nonsense))
+    send(link, :what)
+    GenServer.cast(link, {:unknown, 1})
+
+    until(id, fn board ->
+      match?(
+        {:ok, %{rejected: %{not_a_message: 7, heartbeat: 1, round: 1}}, _},
+        Board.fetch(board, :radio, :infinity)
+      )
+    end)
+
+    assert %{rejected: %{heartbeat: 1}} = Swarm.status(id)
+    assert inspect(Swarm.status(id)) =~ "dropped 9 messages"
+    assert Names.whereis(id, :link) == link
+  end
+
+  test "whatever is sent to a link in whatever envelope: nothing of the robot falls" do
+    id = talking(:linkattacked)
+    parts = parts(id, [:link, :pilot, :executive, :gate])
+    [link, pilot | _] = parts
+    ref = :erlang.alias([:reply])
+    deep = Enum.reduce(1..10_000, [], fn _, deep -> {deep} end)
+
+    junk = [
+      :x,
+      nil,
+      -1.5,
+      "text",
+      [1 | 2],
+      %{},
+      {:a, :b, :c},
+      deep,
+      self(),
+      :binary.copy("x", 100_000)
+    ]
+
+    for junk <- junk do
+      send(link, junk)
+
+      for {tag, junk} <- [{:"$gen_cast", junk}, {:"$gen_call", junk}, {:rival, junk}],
+          do: send(link, {tag, junk})
+
+      send(link, {:"$gen_call", {self(), make_ref()}, junk})
+      for word <- [:say, :command, :rival, :hear], do: GenServer.cast(link, {word, junk})
+      for word <- [:say, :command, :rival], do: GenServer.cast(link, {word, junk, junk})
+      GenServer.cast(link, {:say, [:mag1], junk})
+      GenServer.cast(link, {:rival, {junk, node()}, self()})
+      GenServer.cast(link, {:command, junk, self()})
+      GenServer.cast(link, {:command, junk, ref})
+
+      for word <- [:start, :goto, :move, :follow_the_leader, :find_blob, :position, :subscribe],
+          do: GenServer.cast(link, {:command, {word, junk}, ref})
+
+      GenServer.cast(link, {:command, {:start, [formation: junk]}, ref})
+      GenServer.cast(link, {:command, {:start, [{:assign, junk}]}, ref})
+      GenServer.cast(link, {:command, {:goto, junk, 1.0, nil}, ref})
+      GenServer.cast(link, {:command, {:formation, junk, junk}, ref})
+      GenServer.cast(pilot, junk)
+      Comms.hear(id, Message.new(:linkother, :command, junk))
+    end
+
+    assert Swarm.ask(id, :stop) == :ok
+    assert %{rejected: %{not_a_message: dropped}} = Swarm.status(id)
+    assert dropped > 50
+    assert Swarm.ask(id, {:goto, :far, 0.0, nil}) |> elem(1) =~ "goto cannot take :far"
+    assert Swarm.ask(id, {:dance, 1}) |> elem(1) =~ "{:dance, 1} is no command"
+    assert Swarm.ask(id, {:start, [assign: :luck]}) |> elem(1) =~ "assign"
+    assert parts(id, [:link, :pilot, :executive, :gate]) == parts
+  end
+
+  test "an e-stop spreads, survives the link, and is not caught again after a reset" do
+    ids = for id <- [:link5, :link6, :link7], do: talking(id)
+    for id <- ids, do: assert(Swarm.ask(id, {:move, 0.1, 0.0}) == :ok)
+    for id <- ids, do: rolls_of(id)
+
+    # One is told; the others hear of it.
+    assert Swarm.ask(:link5, :estop) == :ok
+    for id <- ids, do: until(id, &Board.latched?/1)
+    kill(:link6, :link)
+    until(:link6, fn _ -> Names.whereis(:link6, :link) != nil end)
+    assert Board.latched?(Board.find!(:link6))
+
+    # One after the other is reset, and stays so though the others still tell of the stop.
+    for id <- ids, do: assert(Swarm.ask(id, :reset) == :ok)
+    for id <- ids, do: refute(Board.latched?(Board.find!(id)))
+
+    # What was wished before the stop is forgotten: only a new command moves a robot.
+    for id <- ids, do: until(id, &match?({:ok, %{by: :rest}, _}, Board.fetch(&1, :doing, 500)))
+    for id <- ids, do: forget(id)
+    for id <- ids, do: assert(Swarm.ask(id, {:move, 0.1, 0.0}) == :ok)
+    for id <- ids, do: rolls_of(id)
+    assert Swarm.ask(:link7, :estop) == :ok
+    for id <- ids, do: until(id, &Board.latched?/1)
+  end
+
+  test "the directory falls: robots drive on, and enter the new one by themselves" do
+    id = talking(:link8)
+    assert Swarm.ask(id, {:move, 0.1, 0.0}) == :ok
+    rolls_of(id)
+    [link, gate, executive] = parts(id, [:link, :gate, :executive])
+    scope = Process.whereis(Directory)
+    monitor = Process.monitor(scope)
+    Process.exit(scope, :kill)
+    assert_receive {:DOWN, ^monitor, _, _, :killed}
+    forget(id)
+    until(id, fn _ -> Directory.whereis(id) == link end)
+    rolls_of(id)
+    assert parts(id, [:link, :gate, :executive]) == [link, gate, executive]
+  end
+
+  test "of two robots of one name the later one gives way" do
+    id = talking(:link9, link: [boot: 1_000])
+    :ok = Hal.Event.attach(:link9, [:swarm, :link, :duplicate_id], &__MODULE__.tell/4, self())
+    on_exit(fn -> Hal.Event.detach(:link9) end)
+    link = Names.whereis(id, :link)
+    until(id, fn _ -> Directory.whereis(id) == link end)
+
+    # A later one is told so, and nothing changes.
+    GenServer.cast(link, {:rival, {2_000, node()}, self()})
+    assert_receive {:"$gen_cast", {:rival, {1_000, _}, ^link}}
+    assert Directory.members({:robot, id}) == [link]
+
+    # In the presence of an earlier one this one stops, and falls silent.
+    :ok = Directory.enter(self(), [{:robot, id}])
+    GenServer.cast(link, {:rival, {500, node()}, self()})
+    assert_receive {:event, %{robot: ^id}}
+    assert Directory.members({:robot, id}) == [self()]
+    {:ok, %{state: :idle}, _} = Board.fetch(Board.find!(id), :mission, :infinity)
+    :ok = Directory.leave(self(), [{:robot, id}])
+  end
+
+  @doc false
+  def tell(_event, _measurements, metadata, test), do: send(test, {:event, metadata})
+
+  test "a link that falls takes nothing of the robot along" do
+    id = talking(:link10)
+    parts = parts(id, [:gate, :executive, :pilot])
+    kill(id, :link)
+    until(id, fn _ -> Directory.whereis(id) != nil and Names.whereis(id, :link) != nil end)
+    assert parts(id, [:gate, :executive, :pilot]) == parts
+  end
+
+  test "a transport of one's own" do
+    id = talking(:link11, link: [transport: {__MODULE__, :carry, [self()]}])
+    Comms.say(id, [:mag7, :link11], Message.new(id, :place, :start))
+    assert_receive {:carried, ^id, [:mag7], %Message{body: :start}}
+    assert_receive {:carried, ^id, _all, %Message{kind: :heartbeat}}, 500
+  end
+
+  @doc false
+  def carry(test, from, ids, message), do: send(test, {:carried, from, ids, message})
+
+  test "says who is addressed" do
+    ids = for id <- [:link12, :link13, :link14], do: talking(id)
+    message = Message.new(:link12, :place, :start)
+    all = Comms.say(:link12, :all, message)
+    assert all -- ids == all -- [:link13, :link14]
+    assert Comms.say(:link12, :link13, message) == [:link13]
+    assert Comms.say(:link12, [:link12, :link14], message) == [:link14]
+  end
+
+  test "a stop pressed on a robot's own gate spreads, and a newcomer is not stopped by a cleared one" do
+    ids = for id <- [:link15, :link16], do: talking(id)
+    until(:link16, &is_map_key(Board.peers(&1), :link15))
+    :ok = Gate.estop(:link15)
+    for id <- ids, do: until(id, &Board.latched?/1)
+    assert Swarm.reset() == :ok
+    talking(:link17)
+    until(:link17, &match?(%{link15: %{beat: %{estop: n}}} when n > 0, Board.peers(&1)))
+    refute Board.latched?(Board.find!(:link17))
+
+    # It has the same number as the others, so that its own stop is news to them.
+    assert Swarm.ask(:link17, :estop) == :ok
+    assert Board.latched?(Board.find!(:link17))
+    for id <- ids, do: until(id, &Board.latched?/1)
+    assert Swarm.reset() == :ok
+  end
+
+  test "many robots of one node hear each other, five times a second" do
+    ids = for k <- 1..12, do: talking(:"linkmany#{k}")
+    [first, second | _] = Swarm.Case.standing(ids)
+
+    beat = fn ->
+      case Board.peers(Board.find!(first)) do
+        %{^second => %{beat: beat}} -> beat
+        _not_yet -> %{sequence: 0, heard: <<>>}
+      end
+    end
+
+    until(first, fn _ -> ids -- [second | Swarm.Membership.NameSet.names(beat.().heard)] == [] end)
+
+    {begun, from} = {System.monotonic_time(:millisecond), beat.().sequence}
+    until(first, fn _ -> beat.().sequence >= from + 6 end)
+    assert (System.monotonic_time(:millisecond) - begun) in 900..6_000
+  end
+end

@@ -1,0 +1,183 @@
+defmodule Swarm.EStopTest do
+  use Swarm.Case, async: false
+  @moduletag :capture_log
+  alias Swarm.EStop
+  alias Swarm.EStop.Broadcaster
+
+  defp latched?(id), do: Board.latched?(Board.find!(id))
+
+  defp stop_of(id) do
+    {:ok, stop, _at_ms} = Board.fetch(Board.find!(id), :estop, :infinity)
+    stop
+  end
+
+  # Another one in each test: a node remembers what it heard.
+  defp call(counter),
+    do: {:base@hall, 1_700_000_000_000, 10 * Process.get(:ten) + counter}
+
+  setup do
+    Process.put(:ten, System.unique_integer([:positive, :monotonic]))
+    :ok
+  end
+
+  test "an e-stop does not wait for a link that hangs, nor does a stop or the reset" do
+    id = robot(:brake_hangs)
+    link = Names.whereis(id, :link)
+    assert Swarm.goto(id, {1, 1}) == :ok
+    :ok = :sys.suspend(link)
+    assert Swarm.stop(id) == :ok
+    assert Swarm.estop() == :ok
+    assert latched?(id)
+    assert Swarm.reset() == :ok
+    refute latched?(id)
+    :ok = :sys.resume(link)
+
+    # The mission ended with the stop, before the reset.
+    assert {:ok, %{state: :idle}, _} = Board.fetch(Board.find!(id), :mission, :infinity)
+  end
+
+  test "an e-stop reaches a robot whose link is dead, and is spread by the link that follows" do
+    [a, b] = standing(for id <- [:brake_dead, :brake_beside], do: robot(id))
+    eventually(fn -> is_map_key(Board.peers(Board.find!(b)), a) end)
+    link = Names.whereis(a, :link)
+    :ok = :sys.suspend(link)
+    # Only this one is called.
+    assert Swarm.ask(a, {:estop, call(1)}) == :ok
+    assert latched?(a)
+    kill(a, :link)
+    eventually(fn -> latched?(b) end)
+    assert Swarm.reset() == :ok
+  end
+
+  test "all robots of a node hear a call that comes by datagram; junk does nothing" do
+    [a, b] = for id <- [:brake_air1, :brake_air2], do: robot(id)
+
+    for junk <- [
+          :x,
+          {:estop, call(1)},
+          {:estop, :x, 0},
+          {:estop, {1, 2, 3}, 0},
+          {:estop, {nil, 1, 1}, 0},
+          {:estop, call(1), -1},
+          {:estop, call(1), nil},
+          {:reset, call(1)}
+        ] do
+      assert EStop.hear(:base@hall, junk) == :ok
+      GenServer.cast(Names.whereis(a, :brake), junk)
+      send(Names.whereis(a, :brake), junk)
+    end
+
+    refute latched?(a)
+    assert EStop.hear(:base@hall, {:estop, call(7), 0}) == :ok
+    for id <- [a, b], do: eventually(fn -> latched?(id) end)
+
+    # Repeats, late ones too, do not undo what a person has done.
+    assert Swarm.reset() == :ok
+    for counter <- [7, 6, 7], do: EStop.hear(:base@hall, {:estop, call(counter), 0})
+    for id <- [a, b], do: assert({{:ok, _}, false} = {Swarm.ask(id, :ping), latched?(id)})
+
+    for id <- [a, b],
+        do: assert(%EStop.State{latched?: false, known: n, cleared: n} = stop_of(id))
+
+    # Nor does one that is heard for the first time now, and was made before; on a node that was cut off, say.
+    far = {:far@hall, 1, 1}
+    assert EStop.hear(:base@hall, {:estop, far, 60_000}) == :ok
+    for id <- [a, b], do: assert({{:ok, _}, false} = {Swarm.ask(id, :ping), latched?(id)})
+    # The next call does.
+    assert EStop.hear(:base@hall, {:estop, call(8), 0}) == :ok
+    for id <- [a, b], do: eventually(fn -> latched?(id) end)
+    assert Swarm.reset() == :ok
+  end
+
+  test "what was heard survives the brake, and the latch is carried out by the next one" do
+    id = robot(:brake_falls)
+    assert Swarm.ask(id, {:estop, call(1)}) == :ok
+    assert Swarm.reset() == :ok
+    [gate, pilot] = [Names.whereis(id, :gate), Names.whereis(id, :pilot)]
+    brake = kill(id, :brake)
+    eventually(fn -> (now = Names.whereis(id, :brake)) && now != brake end)
+    eventually(fn -> Directory.members({:brake, id}) == [Names.whereis(id, :brake)] end)
+    EStop.hear(:base@hall, {:estop, call(1), 0})
+    assert Swarm.ask(id, :stop) == :ok
+    refute latched?(id)
+    assert [gate, pilot] == [Names.whereis(id, :gate), Names.whereis(id, :pilot)]
+  end
+
+  test "the call is repeated, whatever becomes of the caller, and passed on once" do
+    id = robot(:brake_repeat)
+    :ok = Directory.enter(self(), [:brakes])
+    {caller, monitor} = spawn_monitor(fn -> exit({:called, Broadcaster.sound()}) end)
+    assert_receive {:DOWN, ^monitor, :process, ^caller, {:called, call}}
+    for _ <- 1..10, do: assert_receive({:"$gen_cast", {:estop, ^call, _age}})
+    assert latched?(id)
+
+    # A person ends it.
+    call = Broadcaster.sound()
+    assert_receive {:"$gen_cast", {:estop, ^call, _age}}
+    assert Swarm.reset() == :ok
+    :sys.get_state(Broadcaster)
+    refute_receive {:"$gen_cast", {:estop, ^call, _age}}, 150
+
+    # Of another node's call each hears from each that heard it, three times.
+    EStop.hear(:base@hall, {:estop, call(1), 0})
+    far = call(1)
+    for _ <- 1..3, do: assert_receive({:"$gen_cast", {:estop, ^far, _age}})
+    refute_received {:"$gen_cast", {:estop, _more, _age}}
+    :ok = Directory.leave(self(), [:brakes])
+    assert Swarm.reset() == :ok
+  end
+
+  test "a stop spreads by heartbeats that are sent at once and ten times more" do
+    [a, b] =
+      for id <- [:brake_beats1, :brake_beats2],
+          do: robot(id, link: [transport: {__MODULE__, :carry, [self()]}])
+
+    standing([a, b])
+    assert_receive {:carried, ^a, %Message{body: %Heartbeat{latched: false, sequence: before}}}
+    :ok = Gate.estop(a)
+    assert_receive {:carried, ^a, %Message{body: %Heartbeat{latched: true}} = message}
+    assert message.body.estop == 1
+    assert message.body.sequence - before < 10
+    Comms.hear(b, message)
+    assert_receive {:carried, ^b, %Message{body: %Heartbeat{latched: true, estop: 1}}}
+    eventually(fn -> latched?(b) end)
+    for _ <- 1..10, do: assert_receive({:carried, ^b, %Message{kind: :heartbeat}})
+    assert Swarm.reset() == :ok
+  end
+
+  @doc false
+  def carry(test, from, _ids, message), do: send(test, {:carried, from, message})
+
+  test "an e-stop, and its reset, get through to a flooded robot, whose mailbox stays short" do
+    id = robot(:brake_flooded)
+    link = Names.whereis(id, :link)
+    flood = start_supervised!({Task, fn -> pour(link, id) end})
+    eventually(fn -> flooded(id) > 0 end)
+    assert Swarm.estop() == :ok
+    assert latched?(id)
+    assert {:ok, _} = Swarm.ask(id, :ping)
+    assert Swarm.reset() == :ok
+    refute latched?(id)
+    stop_supervised!(Task)
+    refute Process.alive?(flood)
+    {:message_queue_len, queued} = Process.info(link, :message_queue_len)
+    assert queued < 100_000
+  end
+
+  defp pour(link, id) do
+    beat = %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
+    message = Message.new(:brake_pouring, :heartbeat, beat)
+
+    for _ <- 1..1_000, do: GenServer.cast(link, {:hear, message})
+    for _ <- 1..100, do: GenServer.cast(link, :junk)
+    for _ <- 1..100, do: send(link, {:junk, id})
+    pour(link, id)
+  end
+
+  defp flooded(id) do
+    case Board.fetch(Board.find!(id), :radio, :infinity) do
+      {:ok, %{rejected: %{flooded: n}}, _at_ms} -> n
+      _none -> 0
+    end
+  end
+end

@@ -1,0 +1,151 @@
+defmodule Vision.BlobDetector do
+  @moduledoc """
+  The process that makes blobs of frames. It works on the newest frame only: older ones that
+  wait in its mailbox are dropped, so it never falls behind its camera.
+
+  Options:
+
+    * `:colours` - the `Vision.Colours` to look for
+    * `:sink` - `{m, f, a}`; each frame that was read gives
+      `apply(m, f, a ++ [{:blobs, blobs, %{at_ms: …, pan: …, tilt: …, field_of_view: …}}])`, also without blobs
+    * `:backend` - a `Vision.Backend`; by default the fastest that reads the frame
+    * `:ptz` - `true`: the camera sits on a pan-tilt unit, whose readings come to `aim/2`
+    * `:clock` - `{m, f, a}` giving integer milliseconds, that of the frames
+    * `:name` - as in `GenServer`
+
+  A frame of a camera that knows where it looked is taken at its word. Another gets its direction
+  and field of view from the pan-tilt unit, as they were when it was taken (`Hal.Ptz.History`); without
+  a unit the camera looks ahead, and how wide is not said. With a unit that has said nothing for a
+  second nobody knows where the camera looks: such a frame counts as wrong (`:no_aim`).
+
+  A frame that cannot be read gives nothing, so that its blobs grow old at the sink: "seen
+  nothing" and "did not see" are not the same. `status/1` counts them.
+
+  A camera's device feeds it with the sink `{Vision.BlobDetector, :frame, [eye]}`, a pan-tilt unit's with
+  `{Vision.BlobDetector, :aim, [eye]}`.
+  """
+  use GenServer
+  alias Hal.{Frame, Ptz}
+  alias Vision.Colours
+
+  @type meta :: %{
+          at_ms: integer(),
+          pan: float(),
+          tilt: float(),
+          field_of_view: float() | nil
+        }
+  @type status :: %{
+          read: non_neg_integer(),
+          dropped: non_neg_integer(),
+          wrong: non_neg_integer(),
+          last_error: term()
+        }
+
+  @doc "Starts the eye. Wrong options raise `ArgumentError`."
+  @spec start_link(keyword()) :: GenServer.on_start()
+  def start_link(options) do
+    {name, options} = Keyword.split(options, [:name])
+    GenServer.start_link(__MODULE__, check!(options), name)
+  end
+
+  @doc "Hands a frame, or a camera's reading, to the eye. Other readings (a device's health) are passed over."
+  @spec frame(GenServer.server(), Frame.t() | Hal.Camera.reading() | tuple()) :: :ok
+  def frame(eye, %Frame{} = frame), do: GenServer.cast(eye, {:frame, frame})
+  def frame(eye, {:frame, frame}), do: GenServer.cast(eye, {:frame, frame})
+  def frame(_eye, _other_reading), do: :ok
+
+  @doc "Hands a pan-tilt unit's reading to the eye. Its health is passed over."
+  @spec aim(GenServer.server(), Hal.Ptz.reading() | tuple()) :: :ok
+  def aim(eye, {:ptz, reading}), do: GenServer.cast(eye, {:aim, reading})
+  def aim(_eye, _other_reading), do: :ok
+
+  @doc "How many frames were read, dropped for a newer one, and wrong, and what was wrong with the last of these."
+  @spec status(GenServer.server()) :: status()
+  def status(eye), do: GenServer.call(eye, :status)
+
+  @impl GenServer
+  def init(options) do
+    counts = %{read: 0, dropped: 0, wrong: 0, last_error: nil}
+    {:ok, Map.merge(Map.new(options), %{counts: counts, aim: Ptz.History.new()})}
+  end
+
+  @impl GenServer
+  def handle_cast({:aim, reading}, state), do: {:noreply, note(reading, state)}
+
+  def handle_cast({:frame, frame}, state) do
+    {frame, dropped} = newest(frame, 0)
+    state = state |> count(:dropped, dropped) |> newest_aim()
+
+    with {:ok, frame} <- direct(frame, state), {:ok, blobs} <- read(frame, state) do
+      {m, f, a} = state.sink
+      meta = Map.take(frame, [:at_ms, :pan, :tilt, :field_of_view])
+      apply(m, f, a ++ [{:blobs, blobs, meta}])
+      {:noreply, count(state, :read, 1)}
+    else
+      {:error, reason} ->
+        {:noreply, state |> count(:wrong, 1) |> put_in([:counts, :last_error], reason)}
+    end
+  end
+
+  @impl GenServer
+  def handle_call(:status, _from, state), do: {:reply, state.counts, state}
+
+  # The frames that came in the meantime are further down in our own mailbox.
+  defp newest(frame, dropped) do
+    receive do
+      {:"$gen_cast", {:frame, newer}} -> newest(newer, dropped + 1)
+    after
+      0 -> {frame, dropped}
+    end
+  end
+
+  # What the pan-tilt unit said in the meantime: some of it before this frame was taken.
+  defp newest_aim(state) do
+    receive do
+      {:"$gen_cast", {:aim, reading}} -> newest_aim(note(reading, state))
+    after
+      0 -> state
+    end
+  end
+
+  defp note(reading, %{clock: {m, f, a}} = state),
+    do: %{state | aim: Ptz.History.note(state.aim, reading, apply(m, f, a))}
+
+  defp direct(%Frame{pan: nil} = frame, %{ptz: true, aim: aim}) do
+    case Ptz.History.at(aim, frame.at_ms) do
+      nil -> {:error, :no_aim}
+      direction -> {:ok, struct!(frame, direction)}
+    end
+  end
+
+  defp direct(%Frame{pan: nil} = frame, _state), do: {:ok, %{frame | pan: 0.0, tilt: 0.0}}
+  defp direct(%Frame{tilt: nil} = frame, _state), do: {:ok, %{frame | tilt: 0.0}}
+  defp direct(frame, _state), do: {:ok, frame}
+
+  defp read(%Frame{} = frame, state), do: Vision.blobs(frame, state.colours, state.backend)
+  defp read(_other, _state), do: {:error, :no_frame}
+
+  defp count(state, what, n), do: update_in(state, [:counts, what], &(&1 + n))
+
+  defp check!(options) do
+    options =
+      Keyword.validate!(options, [
+        :colours,
+        :sink,
+        backend: nil,
+        ptz: false,
+        clock: {System, :monotonic_time, [:millisecond]}
+      ])
+
+    unless is_boolean(options[:ptz]),
+      do: raise(ArgumentError, "eye option :ptz must be true or false")
+
+    unless match?(%Colours{}, options[:colours]),
+      do: raise(ArgumentError, "eye option :colours must be a %Vision.Colours{}")
+
+    case options[:sink] do
+      {m, f, a} when is_atom(m) and is_atom(f) and is_list(a) -> options
+      other -> raise(ArgumentError, "eye option :sink must be {m, f, a}, not #{inspect(other)}")
+    end
+  end
+end

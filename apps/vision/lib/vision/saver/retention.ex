@@ -1,0 +1,106 @@
+defmodule Vision.Saver.Retention do
+  @moduledoc """
+  Which pictures of one robot lie in a folder, what the next one is called, and which go to make room for it.
+  Pure. Names are `mag1-20260102T030405.678Z.jpg`, in UTC, so that they sort by time; a clock that is set back
+  does not bring the order about: the next name is then a millisecond behind the last one.
+  """
+
+  @enforce_keys [:prefix, :files, :bytes]
+  defstruct @enforce_keys ++ [kept: :queue.new(), count: 0, total: 0, last_ms: 0]
+
+  @opaque t :: %__MODULE__{
+            prefix: String.t(),
+            files: pos_integer(),
+            bytes: pos_integer(),
+            kept: :queue.queue({String.t(), non_neg_integer()}),
+            count: non_neg_integer(),
+            total: non_neg_integer(),
+            last_ms: integer()
+          }
+
+  @doc "A shelf for the pictures of this name, at most so many files and bytes; `there` is what lies in the folder, `{name, bytes}` each."
+  @spec new(String.t(), pos_integer(), pos_integer(), [{String.t(), non_neg_integer()}]) :: t()
+  def new(prefix, files, bytes, there) do
+    shelf = %__MODULE__{prefix: prefix, files: files, bytes: bytes}
+
+    for({name, size} <- there, time_ms(prefix, name) != nil, do: {name, size})
+    |> Enum.sort()
+    |> Enum.reduce(shelf, fn {name, size}, shelf -> put(shelf, name, size) end)
+  end
+
+  @doc "What the next picture is called; the time is the wall clock's, milliseconds since 1970."
+  @spec name(t(), now_ms :: integer()) :: String.t()
+  def name(%__MODULE__{prefix: prefix, last_ms: last_ms}, now_ms) do
+    {:ok, time} = DateTime.from_unix(max(now_ms, last_ms + 1), :millisecond)
+    prefix <> Calendar.strftime(time, "-%Y%m%dT%H%M%S.%fZ.jpg")
+  end
+
+  @doc """
+  The names that must go, oldest first, before a picture of this size finds room; an error where it never does.
+
+      iex> alias Vision.Saver.Retention
+      iex> shelf = Retention.new("mag1", 2, 1_000, [])
+      iex> one = Retention.name(shelf, 1_767_323_045_678)
+      "mag1-20260102T030405.678Z.jpg"
+      iex> shelf = Retention.put(shelf, one, 600)
+      iex> Retention.room(shelf, 400)
+      {:ok, [], shelf}
+      iex> {:ok, ["mag1-20260102T030405.678Z.jpg"], _shelf} = Retention.room(shelf, 401)
+      iex> Retention.room(shelf, 1_001)
+      {:error, :too_large}
+  """
+  @spec room(t(), size :: non_neg_integer()) :: {:ok, [String.t()], t()} | {:error, :too_large}
+  def room(%__MODULE__{bytes: bytes}, size) when size > bytes, do: {:error, :too_large}
+
+  def room(shelf, size) do
+    {gone, shelf} = clear(shelf, size, [])
+    {:ok, Enum.reverse(gone), shelf}
+  end
+
+  defp clear(%{count: count, total: total} = shelf, size, gone) do
+    if count >= shelf.files or total + size > shelf.bytes do
+      {{:value, {name, bytes}}, kept} = :queue.out(shelf.kept)
+      clear(%{shelf | kept: kept, count: count - 1, total: total - bytes}, size, [name | gone])
+    else
+      {gone, shelf}
+    end
+  end
+
+  @doc "A picture of this name and size was put there; it is the newest."
+  @spec put(t(), String.t(), size :: non_neg_integer()) :: t()
+  def put(%__MODULE__{} = shelf, name, size) do
+    %{
+      shelf
+      | kept: :queue.in({name, size}, shelf.kept),
+        count: shelf.count + 1,
+        total: shelf.total + size,
+        last_ms: max(shelf.last_ms, time_ms(shelf.prefix, name))
+    }
+  end
+
+  @doc """
+  When the picture of this name was saved; `nil` if it is none of ours, which nobody may remove.
+
+      iex> Vision.Saver.Retention.time_ms("mag1", "mag1-20260102T030405.678Z.jpg")
+      1_767_323_045_678
+      iex> Vision.Saver.Retention.time_ms("mag1", "mag1-holiday.jpg")
+      nil
+  """
+  @spec time_ms(prefix :: String.t(), name :: String.t()) :: integer() | nil
+  def time_ms(prefix, name) do
+    with true <- String.starts_with?(name, prefix),
+         {_prefix, <<?-, time::binary-size(20), ".jpg">>} <-
+           :erlang.split_binary(name, byte_size(prefix)),
+         <<y::binary-4, mo::binary-2, d::binary-2, ?T, h::binary-2, mi::binary-2, s::binary-2, ?.,
+           ms::binary-3, ?Z>> <- time,
+         {:ok, time, 0} <- DateTime.from_iso8601("#{y}-#{mo}-#{d}T#{h}:#{mi}:#{s}.#{ms}Z") do
+      DateTime.to_unix(time, :millisecond)
+    else
+      _other -> nil
+    end
+  end
+
+  @doc "How many pictures there are, and how many bytes."
+  @spec size(t()) :: {files :: non_neg_integer(), bytes :: non_neg_integer()}
+  def size(%__MODULE__{count: count, total: total}), do: {count, total}
+end

@@ -1,0 +1,175 @@
+defmodule Vision.BlobDetectorTest do
+  use ExUnit.Case, async: true
+  alias Hal.Frame
+  alias Vision.{BlobDetector, Colours}
+
+  setup do
+    {:ok, colours} =
+      Colours.new([%{name: "Yellow", y: {170, 240}, u: {60, 90}, v: {130, 145}}], min_area: 2)
+
+    eye = start_supervised!({BlobDetector, colours: colours, sink: {Kernel, :send, [self()]}})
+    %{eye: eye, colours: colours}
+  end
+
+  defp frame(at_ms) do
+    {:ok, frame} = Frame.new(:yuyv, 2, 1, <<200, 70, 200, 140>>, at_ms)
+    %{frame | pan: 0.5}
+  end
+
+  test "blobs go to the sink with the time and direction of the frame", %{eye: eye} do
+    :ok = BlobDetector.frame(eye, {:frame, frame(7)})
+    assert_receive {:blobs, [%{colour: "Yellow", area: 2}], %{at_ms: 7, pan: 0.5, tilt: tilt}}
+    assert tilt == 0.0
+  end
+
+  test "only the newest frame of those that wait is read", %{eye: eye} do
+    :sys.suspend(eye)
+    for at_ms <- 1..20, do: BlobDetector.frame(eye, frame(at_ms))
+    :sys.resume(eye)
+    assert_receive {:blobs, _, %{at_ms: 20}}
+    assert %{read: 1, dropped: 19} = BlobDetector.status(eye)
+    refute_received {:blobs, _, _}
+  end
+
+  test "wrong frames are counted and give nothing", %{eye: eye} do
+    BlobDetector.frame(eye, %{frame(1) | bytes: <<1>>})
+    assert %{wrong: 1, last_error: {:bytes, 1, :expected, 4}} = BlobDetector.status(eye)
+    BlobDetector.frame(eye, {:frame, :nonsense})
+    assert %{wrong: 2, read: 0, last_error: :no_frame} = BlobDetector.status(eye)
+    BlobDetector.frame(eye, {:health, :camera, {:online, 0}})
+    refute_received {:blobs, _, _}
+  end
+
+  @tag if(System.find_executable("ffmpeg"), do: [], else: [skip: "ffmpeg is missing"])
+  test "a camera's device feeds it, and its end or health is nothing to it", %{eye: eye} do
+    source = "lavfi:color=color=0xDCCD5A:size=32x24:rate=50:duration=0.1"
+
+    start_supervised!(
+      {Hal.Device,
+       kind: :camera,
+       driver: {Hal.Camera.FFmpeg, source: source},
+       sinks: [{BlobDetector, :frame, [eye]}, {Kernel, :send, [self()]}]}
+    )
+
+    assert_receive {:blobs, [%{colour: "Yellow", share: 1.0}], _meta}, 10_000
+    assert_receive {:health, :camera, {{:offline, :eof}, _since_ms}}, 10_000
+    assert BlobDetector.status(eye).wrong == 0
+  end
+
+  describe "on a pan-tilt unit" do
+    setup %{colours: colours} do
+      sink = {Kernel, :send, [self()]}
+      clock = {__MODULE__, :time, [start_supervised!({Agent, fn -> 1_000 end})]}
+      options = [colours: colours, sink: sink, ptz: true, clock: clock]
+
+      %{
+        eye: start_supervised!({BlobDetector, options}, id: :eye_on_ptz),
+        clock: List.first(elem(clock, 2))
+      }
+    end
+
+    defp looks(eye, clock, at_ms, pan) do
+      Agent.update(clock, fn _ -> at_ms end)
+      BlobDetector.aim(eye, {:ptz, %{pan: pan, tilt: 0.1, field_of_view: 0.8}})
+      # It has taken the time by now.
+      BlobDetector.status(eye)
+    end
+
+    test "a frame that does not know where it looked gets what held when it was taken", context do
+      %{eye: eye, clock: clock} = context
+      looks(eye, clock, 1_000, 0.0)
+      looks(eye, clock, 1_100, 0.4)
+      BlobDetector.frame(eye, %{frame(1_050) | pan: nil})
+      assert_receive {:blobs, [_], %{at_ms: 1_050} = meta}
+      assert_in_delta meta.pan, 0.2, 1.0e-9
+      assert_in_delta meta.tilt, 0.1, 1.0e-9
+      assert_in_delta meta.field_of_view, 0.8, 1.0e-9
+      # One that knows is taken at its word.
+      BlobDetector.frame(eye, frame(1_060))
+      assert_receive {:blobs, [_], %{at_ms: 1_060, pan: 0.5, field_of_view: nil}}
+    end
+
+    test "nobody knows where it looked: no blobs, which is not the same as none seen", context do
+      %{eye: eye, clock: clock} = context
+      BlobDetector.frame(eye, %{frame(1_000) | pan: nil})
+      assert %{wrong: 1, last_error: :no_aim} = BlobDetector.status(eye)
+      looks(eye, clock, 1_000, 0.3)
+      BlobDetector.aim(eye, {:health, :ptz, {:online, 0}})
+      BlobDetector.frame(eye, %{frame(1_900) | pan: nil})
+      assert_receive {:blobs, [_], %{at_ms: 1_900, pan: 0.3}}
+      BlobDetector.frame(eye, %{frame(2_001) | pan: nil})
+      assert %{wrong: 2} = BlobDetector.status(eye)
+      refute_received {:blobs, _, _}
+    end
+
+    test "readings that wait behind a frame are heard before it is looked at", context do
+      %{eye: eye, clock: clock} = context
+      looks(eye, clock, 1_000, 0.0)
+      Agent.update(clock, fn _ -> 1_100 end)
+      :sys.suspend(eye)
+      BlobDetector.frame(eye, %{frame(1_050) | pan: nil})
+      BlobDetector.aim(eye, {:ptz, %{pan: 0.4, tilt: 0.1, field_of_view: 0.8}})
+      :sys.resume(eye)
+      assert_receive {:blobs, [_], %{pan: pan}}
+      assert_in_delta pan, 0.2, 1.0e-9
+    end
+  end
+
+  def time(agent), do: Agent.get(agent, & &1)
+
+  @tag if(System.find_executable("ffmpeg"), do: [], else: [skip: "ffmpeg is missing"])
+  test "pictures of ffmpeg bear the direction of a unit that turns meanwhile", context do
+    sink = {Kernel, :send, [self()]}
+    options = [colours: context.colours, sink: sink, ptz: true]
+    eye = start_supervised!({BlobDetector, options}, id: :turning)
+    # 0.5 rad/s, told each 50 ms, from before the first picture on.
+    begun_ms = System.monotonic_time(:millisecond)
+    pan = fn at_ms -> (at_ms - begun_ms) / 2_000 end
+
+    tell = fn ->
+      reading = %{pan: pan.(System.monotonic_time(:millisecond)), tilt: 0.0, field_of_view: 0.8}
+      BlobDetector.aim(eye, {:ptz, reading})
+    end
+
+    tell.()
+    {:ok, timer} = :timer.apply_interval(50, Kernel, :apply, [tell, []])
+
+    start_supervised!(
+      {Hal.Device,
+       kind: :camera,
+       driver:
+         {Hal.Camera.FFmpeg, source: "lavfi:color=color=0xDCCD5A:size=32x24:rate=25:duration=1"},
+       sinks: [{BlobDetector, :frame, [eye]}]}
+    )
+
+    metas =
+      for _ <- 1..10 do
+        assert_receive {:blobs, [_], meta}, 10_000
+        meta
+      end
+
+    :timer.cancel(timer)
+    assert List.last(metas).pan > List.first(metas).pan + 0.1
+
+    for meta <- metas do
+      assert_in_delta meta.pan, pan.(meta.at_ms), 0.01
+      assert_in_delta meta.field_of_view, 0.8, 1.0e-9
+    end
+  end
+
+  test "wrong options are named", %{colours: colours} do
+    assert_raise ArgumentError, ~r/:colours/, fn ->
+      BlobDetector.start_link(sink: {Kernel, :send, []})
+    end
+
+    assert_raise ArgumentError, ~r/:sink/, fn ->
+      BlobDetector.start_link(colours: colours, sink: self())
+    end
+
+    assert_raise ArgumentError, ~r/:size/, fn -> BlobDetector.start_link(size: 3) end
+
+    assert_raise ArgumentError, ~r/:ptz/, fn ->
+      BlobDetector.start_link(colours: colours, sink: {Kernel, :send, []}, ptz: 3)
+    end
+  end
+end
