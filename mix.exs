@@ -11,11 +11,11 @@ defmodule Convoy.MixProject do
     ]
   end
 
-  # `robot` is for real hardware; `fleet` holds everything: robots, worlds, the view of people.
-  # Both have ssl, for distribution by TLS (rel/env.sh.eex).
+  # `robot` is for real hardware; `fleet` holds robots, worlds and the view of people. Both have ssl, for
+  # distribution by TLS (rel/env.sh.eex). Neither has benchmarks or the importer of Player's files.
   defp releases do
     tls = [ssl: :permanent, runtime_tools: :permanent]
-    robot = Keyword.new([:hal, :vision, :robot, :swarm], &{&1, :permanent})
+    robot = Keyword.new([:hal, :vision, :robot, :swarm, :agents], &{&1, :permanent})
     fleet = robot ++ [sim: :permanent, console: :permanent]
 
     # No cookie is made at build time: a robot's comes from its fleet's secret. `h` in a robot's shell

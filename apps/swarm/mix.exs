@@ -20,7 +20,7 @@ defmodule Swarm.MixProject do
 
   # Adapters for what Hex has; with MIX_TARGET=robot. Nothing here needs them.
   defp packages(:host), do: []
-  defp packages(_target), do: [{:libcluster, "~> 3.5"}, {:phoenix_pubsub, "~> 2.1"}]
+  defp packages(_target), do: [{:libcluster, "~> 3.5"}]
 
   defp elixirc_paths(:test), do: ["lib", "test/support"]
   defp elixirc_paths(_env), do: ["lib"]

@@ -126,7 +126,11 @@ defmodule Docs.LookedAt do
   end
 
   defp loaded,
-    do: Enum.flat_map([:hal, :vision, :robot, :swarm, :sim], &Application.spec(&1, :modules))
+    do:
+      Enum.flat_map(
+        [:hal, :vision, :robot, :swarm, :agents, :player, :sim],
+        &Application.spec(&1, :modules)
+      )
 
   defp exported(module, name, after_name) do
     arities =

@@ -73,7 +73,7 @@ defmodule Swarm.MeshNodes.Junk do
       [{:a, 1}],
       {},
       %{__struct__: Swarm.Message},
-      %{__struct__: Agents.Envelope, from: 1},
+      %{__struct__: Swarm.Member, from: 1},
       %{__struct__: :nothing},
       make_ref(),
       self(),

@@ -1,23 +1,15 @@
 defmodule Mix.Tasks.RobotTest do
   use ExUnit.Case, async: false
-  import ExUnit.CaptureIO
-  alias Mix.Tasks.Robot.{Check, Import}
+  alias Mix.Tasks.Robot.Check
 
   @moduletag :tmp_dir
   @robots Path.expand("../../../../../config/robots", __DIR__)
-  @player """
-  driver ( name "rflex" rflex_serial_port "/dev/ttyS1" mm_length 500 mm_width 300
-    odo_distance_conversion 190 odo_angle_conversion 60000 sonar_2nd_bank_start 8 )
-  driver ( name "cmvision" colorfile "color.cfg" )
-  """
 
   setup %{tmp_dir: folder} do
     Mix.shell(Mix.Shell.Process)
     on_exit(fn -> Mix.shell(Mix.Shell.IO) end)
     File.cp!(Path.join(@robots, "landmark.txt"), Path.join(folder, "color.cfg"))
-    file = Path.join(folder, "old.cfg")
-    File.write!(file, @player)
-    {:ok, player: file}
+    :ok
   end
 
   defp said do
@@ -150,121 +142,5 @@ defmodule Mix.Tasks.RobotTest do
     assert refused(Check, ["--colour"]) == ["--colour is no option; --help lists them"]
     Check.run(["--help"])
     assert [_well | _lines] = said()
-  end
-
-  test "a Player file becomes a robot file that is well", %{tmp_dir: folder, player: file} do
-    out = Path.join(folder, "min7.exs")
-    told = capture_io(:stderr, fn -> Import.run([file, "-o", out]) end)
-    assert told =~ "#{file}:2: sonar_2nd_bank_start: all sonars are one list here"
-    assert told =~ "Assumed; look whether it is so:"
-    assert told =~ "#{out} written: 1 assumed, 1 not carried over"
-
-    assert {:ok, %{id: :min7} = robot} = Robot.File.load(out)
-    assert {:ok, _config} = Robot.File.config(robot)
-    assert [%{name: "YellowLandmark"}] = robot.colours.classes
-
-    assert refused(Import, [file, "-o", out]) == [
-             "#{out} is there already; --force writes over it"
-           ]
-
-    capture_io(:stderr, fn ->
-      Import.run([file, "-o", out, "--force", "--profile", "magellan"])
-    end)
-
-    assert {:ok, %{id: :min7, profile: %{name: :magellan}}} = Robot.File.load(out)
-  end
-
-  test "what came over and is odd is told at once", %{tmp_dir: folder, player: file} do
-    File.write!(file, String.replace(@player, "conversion 190", "conversion 19"))
-    out = Path.join(folder, "min7.exs")
-    told = capture_io(:stderr, fn -> Import.run([file, "-o", out]) end)
-
-    assert told =~
-             "Odd; look whether it is meant:\n  drive: conversions.distance: 19000.0 units a metre"
-
-    File.write!(
-      file,
-      String.replace(
-        @player,
-        "conversion 190",
-        "conversion 190 num_sonars 3 mmrad_sonar_poses [0 1 0]"
-      )
-    )
-
-    assert [line] = refused(Import, [file, "-o", out, "--force"])
-    assert line =~ "mmrad_sonar_poses: there are poses for 1 sonars, and num_sonars says 3"
-  end
-
-  test "elsewhere, the colour file is named by its whole path", %{tmp_dir: folder, player: file} do
-    out = Path.join([folder, "robots", "min1.exs"])
-    File.mkdir_p!(Path.dirname(out))
-    capture_io(:stderr, fn -> Import.run([file, "-o", out]) end)
-    assert {:ok, robot} = Robot.File.load(out)
-    assert robot.colours != nil
-    assert File.read!(out) =~ Path.join(folder, "color.cfg")
-  end
-
-  test "without OUT only the robot file is on standard output", %{player: file} do
-    {text, _told} =
-      with_io(:stderr, fn -> capture_io(fn -> Import.run([file, "--name", "min2"]) end) end)
-
-    assert {:ok, %{id: :min2}} =
-             Robot.File.parse(text,
-               colours: fn "color.cfg", _ ->
-                 Vision.Colours.read(Path.join(@robots, "landmark.txt"))
-               end
-             )
-  end
-
-  test "a colour file that is not there is told, and the rest is written", %{
-    player: file,
-    tmp_dir: folder
-  } do
-    File.rm!(Path.join(folder, "color.cfg"))
-    out = Path.join(folder, "min1.exs")
-    told = capture_io(:stderr, fn -> assert refused(Import, [file, "-o", out]) == [] end)
-    assert told =~ "colorfile: the colour file is to be put right: "
-    assert {:error, [line]} = Robot.File.load(out)
-    assert line =~ "color.cfg: no such file or directory"
-    assert told =~ "To be put right; no robot starts with this:\n  #{line}\n"
-
-    told = capture_io(:stderr, fn -> capture_io(fn -> refused(Import, [file]) end) end)
-    assert told =~ ~r/^  robot file:\d+: colours: .*color.cfg: no such file or directory$/m
-  end
-
-  test "a driver that is not known is told with the one that may be meant", context do
-    camera = ~s|driver ( name "camerav41" port "/dev/video1" )\n|
-    File.write!(context.player, @player <> camera)
-    out = Path.join(context.tmp_dir, "min1.exs")
-    told = capture_io(:stderr, fn -> Import.run([context.player, "-o", out]) end)
-
-    assert told =~
-             ":4: driver camerav41: none of our drivers does what it does; was camerav4l meant?"
-  end
-
-  test "wrong words are one line", %{tmp_dir: folder, player: file} do
-    for {words, line} <- [
-          {[], "which file? mix robot.import FILE"},
-          {[file, file], "one file at a time, not 2"},
-          {[file, "--outt", "x"], "--outt is no option; --help lists them"},
-          {[file, "--player", "3"], "--player cannot be 3: 1 for 1.x, 2 for later ones"},
-          {[file, "--player", "x"], "--player cannot be x; --help tells"},
-          {[file, "--profile", "magelan"],
-           "--profile cannot be magelan: magellan or atrv_mini; did you mean magellan?"},
-          {[file, "--name", "rover"], "--name rover is no robot: mag1 to mag100, min1 to min100"},
-          {[file, "--name", "mag1", "-o", "mag2.exs"],
-           "--name mag1 does not go with a file named mag2.exs"},
-          {[folder], "#{folder}: is a directory, where a file is needed"},
-          {["none.cfg"], "none.cfg: no such file or directory"},
-          {[file, "-o", Path.join(folder, "no/x.exs")],
-           "#{Path.join(folder, "no/x.exs")} cannot be written: no such file or directory"}
-        ] do
-      assert refused(Import, words) == [line]
-    end
-
-    File.write!(file, "driver\n( name")
-    assert refused(Import, [file]) == ["#{file}:2: name has no value"]
-    Import.run(["--help"])
-    assert ["Makes a robot file" <> _rest] = said()
   end
 end

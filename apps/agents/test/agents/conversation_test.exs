@@ -1,7 +1,7 @@
 defmodule Agents.ConversationTest do
   use Swarm.Case, async: false
   alias Agents.{Conversation, Envelope, Responder}
-  alias Swarm.Answerers
+  alias Agents.Answerers
 
   defp service(name, service \\ :echo) do
     options = [service: service, module: Answerers.Echo]

@@ -2,7 +2,7 @@ defmodule Agents.Conversation do
   @moduledoc """
   Asking others, and waiting no longer than told: for one answer, or for those of many.
 
-      alias Swarm.{Conversation, Envelope}
+      alias Agents.{Conversation, Envelope}
       question = Envelope.new(:query, :mag1, :battery)
       {:ok, answer} = Conversation.request({:min1, :power}, question, 500)
       {:partial, answers, [{:min2, :power}]} =
@@ -116,7 +116,7 @@ defmodule Agents.Conversation do
   def peers!(peers) do
     if is_list(peers) and not List.improper?(peers),
       do: Enum.uniq(peers),
-      else: raise(ArgumentError, "#{brief(peers)} is no list of peers")
+      else: raise(ArgumentError, "#{brief(peers)} is not a list of peers")
   end
 
   defp brief(term), do: inspect(term, limit: 5, printable_limit: 40)

@@ -1,7 +1,8 @@
 defmodule Swarm.ConversationNodesTest do
   use Swarm.Case, async: false
   alias Agents.{Conversation, Envelope}
-  alias Swarm.{Answerers, Cluster}
+  alias Agents.Answerers
+  alias Swarm.Cluster
   @moduletag :cluster
 
   defp question(content), do: Envelope.new(:query, :asker, content)

@@ -1,7 +1,8 @@
 defmodule Agents.TopicTest do
   use Swarm.Case, async: false
   alias Agents.{Conversation, Envelope, Responder, Topic}
-  alias Swarm.{Answerers, Cluster}
+  alias Agents.Answerers
+  alias Swarm.Cluster
 
   defp members(topic, count),
     do: eventually(fn -> length(Directory.members({:topic, topic})) == count end)

@@ -1,4 +1,4 @@
-defmodule Swarm.Answerers do
+defmodule Agents.Answerers do
   @moduledoc "Services for tests; compiled, so that they run on other nodes too."
 
   defmodule Echo do
@@ -57,7 +57,7 @@ defmodule Swarm.Answerers do
   end
 end
 
-defmodule Swarm.Answerers.Carry do
+defmodule Agents.Answerers.Carry do
   @moduledoc "Bids its argument for `{:carry, _}`, and does what the task says."
   @behaviour Agents.ContractNet
 

@@ -1,7 +1,8 @@
 defmodule Agents.ContractNet.NodesTest do
   use Swarm.Case, async: false
   alias Agents.ContractNet
-  alias Swarm.{Answerers, Cluster}
+  alias Agents.Answerers
+  alias Swarm.Cluster
   @moduletag :cluster
 
   defp bidders(nodes, bids) do

@@ -2,7 +2,7 @@ defmodule Agents.ContractNet.AuctionTest do
   use Swarm.Case, async: false
   @moduletag :capture_log
   alias Agents.{ContractNet, Conversation, Envelope, Responder}
-  alias Swarm.Answerers
+  alias Agents.Answerers
   alias Agents.ContractNet.Bidding
 
   defp bidder(name, cost) do
