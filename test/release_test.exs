@@ -309,9 +309,9 @@ defmodule System.ReleaseTest do
       for {arguments, line} <- [
             {[], "where is the robot?"},
             {["root@machine"], "which robot is root@machine?"},
-            {["-oProxyCommand=x", "mag1"], "is no option"},
-            {["a;b", "mag1"], "a;b is no host"},
-            {["root@machine", "../mag1"], "../mag1 is no name"},
+            {["-oProxyCommand=x", "mag1"], "is not an option"},
+            {["a;b", "mag1"], "a;b is not a host"},
+            {["root@machine", "../mag1"], "../mag1 is not a name"},
             {["root@machine", "mag1", "mag2"], "what is mag2?"},
             {["root@machine", "mag1", "--fil", "x"], "did you mean --file?"},
             {["root@machine", "mag1", "--file"], "--file needs a value"},

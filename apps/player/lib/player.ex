@@ -148,7 +148,7 @@ defmodule Player do
 
   defp carried(kind, name, value, units, others) do
     cond do
-      is_binary(value) and not plain?(value) -> {:left, "is no plain text"}
+      is_binary(value) and not plain?(value) -> {:left, "is not plain text"}
       kind == :drive -> RFlexOptions.option(name, value, units, others)
       true -> CameraOptions.option(kind, name, value, units)
     end

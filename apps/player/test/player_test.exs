@@ -125,7 +125,7 @@ defmodule PlayerTest do
              {16, "sonar_2nd_bank_start", "all sonars are one list here"},
              {20, "rflex_joy_pos_ratio", "the joystick is read, but drives nothing by itself"},
              {21, "odo_distence_conversion",
-              "is no option of rflex; was odo_distance_conversion meant?"},
+              "is not an option of rflex; was odo_distance_conversion meant?"},
              {26, "driver festival", "no speech"},
              {27, "include \"more.inc\"",
               "other files are not read: import that one, or copy it in"}
@@ -323,7 +323,8 @@ defmodule PlayerTest do
           {%{sonars: few},
            "10: mrad_sonar_poses: there are poses for 40 sonars, and num_sonars_in_bank says 48"},
           {%{sonars: askew}, "10: mrad_sonar_poses: neither as theta, x, y nor as x, y, theta"},
-          {%{sonars: "1 2"}, "10: mrad_sonar_poses: is no list of three numbers for each sensor"},
+          {%{sonars: "1 2"},
+           "10: mrad_sonar_poses: is not a list of three numbers for each sensor"},
           {%{count: 46}, "9: num_sonars_in_bank: adds up to 48 sonars, and num_sonars is 46"},
           {%{boards: "4 4 4 4 4 5"},
            "12: poses: there are poses for 24 infrareds, and rflex_banks says 25"},
@@ -503,9 +504,9 @@ defmodule PlayerTest do
           {"\n)", "x.cfg:2: ) stands where an option or a section should"},
           {"driver (\n 5 )", "x.cfg:2: 5 stands where the name of an option should"},
           {"define x ( a 1 )", "x.cfg:1: define is written: define new_name old_name ( … )"},
-          {"a 1.2.3", "x.cfg:1: 1.2.3 is no number"},
-          {"a 1e999", "x.cfg:1: 1e999 is no number"},
-          {"a\n  b" <> <<200>>, "x.cfg:2: byte 200 is no part of a configuration file"},
+          {"a 1.2.3", "x.cfg:1: 1.2.3 is not a number"},
+          {"a 1e999", "x.cfg:1: 1e999 is not a number"},
+          {"a\n  b" <> <<200>>, "x.cfg:2: byte 200 is not a part of a configuration file"},
           {"", "x.cfg: no driver is in it"},
           {"driver ( name \"p2os\" )",
            "x.cfg: no driver \"rflex\" is in it, so it is no Magellan Pro's and no ATRV mini's"},
@@ -526,7 +527,7 @@ defmodule PlayerTest do
     for port <- ["/dev/tty\u202E1", "/dev/" <> <<255>>, "a\tb\u0000"] do
       text = "driver ( name \"rflex\" rflex_serial_port \"#{port}\" )"
       assert {:ok, result} = Player.import(text)
-      assert {1, "rflex_serial_port", "is no plain text"} in result.left
+      assert {1, "rflex_serial_port", "is not plain text"} in result.left
       assert options(again(result.text))[:port] == "/dev/ttyR0"
     end
 

@@ -53,7 +53,7 @@ defmodule Swarm do
   def goto(_robot, place),
     do:
       {:error,
-       "#{inspect(place)} is no place; write {x, y} or {x, y, heading} in metres and radians"}
+       "#{inspect(place)} is not a place; write {x, y} or {x, y, heading} in metres and radians"}
 
   @doc """
   Lets a robot follow another, one metre behind it, until told otherwise.
@@ -121,7 +121,8 @@ defmodule Swarm do
   end
 
   def tell(_to, other),
-    do: {:error, "#{inspect(other)} is no command; write one as text, such as \"goto:2.0:1.0\""}
+    do:
+      {:error, "#{inspect(other)} is not a command; write one as text, such as \"goto:2.0:1.0\""}
 
   @doc """
   How all robots are, one line each in `iex`; those that do not answer by their rows. Each has its numbered

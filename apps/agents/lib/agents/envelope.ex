@@ -246,7 +246,7 @@ defmodule Agents.Envelope do
 
   defp put(other, _envelope) do
     raise ArgumentError,
-          "#{inspect(other)} is no option of an envelope; there are #{inspect(@options)}"
+          "#{inspect(other)} is not an option of an envelope; there are #{inspect(@options)}"
   end
 
   defp checked!({:ok, envelope}), do: envelope

@@ -14,7 +14,7 @@ defmodule Agents.Inbox do
         end
       end
 
-  What is no envelope, or a malformed one, is dropped and counted (`rejected`); what the template does
+  What is not an envelope, or a malformed one, is dropped and counted (`rejected`); what the template does
   not want is dropped (`unwanted`).
   """
   alias Agents.{Envelope, Mailbox, Template}

@@ -42,7 +42,7 @@ defmodule Agents.Responder do
   @doc "An envelope, checked but for its content: what to answer, and the next state."
   @callback handle(Envelope.t(), state :: term()) :: {answer() | :noreply, state :: term()}
 
-  @doc "A message that is no envelope, from anywhere; without this callback it is counted as rejected."
+  @doc "A message that is not an envelope, from anywhere; without this callback it is counted as rejected."
   @callback info(message :: term(), state :: term()) :: state :: term()
 
   @optional_callbacks info: 2

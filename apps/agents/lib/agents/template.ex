@@ -86,11 +86,11 @@ defmodule Agents.Template do
 
   defp fault({which, templates}) when which in [:all, :any] and is_list(templates) do
     if List.improper?(templates),
-      do: "#{inspect(templates)} is no list of templates",
+      do: "#{inspect(templates)} is not a list of templates",
       else: Enum.find_value(templates, &fault/1)
   end
 
   defp fault(other),
     do:
-      "#{inspect(other)} is no template; write fields as [from: :mag1], or {:all, …}, {:any, …}, {:not, …}"
+      "#{inspect(other)} is not a template; write fields as [from: :mag1], or {:all, …}, {:any, …}, {:not, …}"
 end

@@ -84,7 +84,7 @@ defmodule Agents.Topic do
     Enum.count(Directory.members({:topic, topic}), &(Conversation.post(&1, envelope) == :ok))
   end
 
-  # What is no list of options is refused by the envelope.
+  # What is not a list of options is refused by the envelope.
   defp under(topic, options) do
     if is_list(options) and not List.improper?(options),
       do: options ++ [topic: topic],
@@ -94,13 +94,13 @@ defmodule Agents.Topic do
   defp named(topic) do
     if Envelope.topic?(topic),
       do: :ok,
-      else: {:error, "#{inspect(topic)} is no topic; write an atom, or text of 1 to 255 bytes"}
+      else: {:error, "#{inspect(topic)} is not a topic; write an atom, or text of 1 to 255 bytes"}
   end
 
   defp known(options) do
     cond do
       not Keyword.keyword?(options) ->
-        {:error, "#{inspect(options)} are no options; there are limit and template"}
+        {:error, "#{inspect(options)} are not options; there are limit and template"}
 
       unknown = Enum.find(Keyword.keys(options), &(&1 not in [:limit, :template])) ->
         {:error, "unknown option #{inspect(unknown)}: limit or template"}

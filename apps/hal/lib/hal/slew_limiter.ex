@@ -64,11 +64,11 @@ defmodule Hal.SlewLimiter do
   def check(%Twist{linear: linear, turn: turn}),
     do: {:error, "a speed of #{show(linear)} m/s and #{show(turn)} rad/s is none"}
 
-  def check(other), do: {:error, "#{show(other)} is no speed"}
+  def check(other), do: {:error, "#{show(other)} is not a speed"}
 
   @doc """
   The speed now, when `wanted` is asked for and `seconds` have gone by since the last step; steps
-  longer than 0.2 s count as that. What is no speed (`check/1`) is taken for a stop.
+  longer than 0.2 s count as that. What is not a speed (`check/1`) is taken for a stop.
 
       iex> ramp = Hal.SlewLimiter.new(max_linear: 0.5, max_turn: 1, max_acceleration: 0.5, max_turn_acceleration: 1)
       iex> {twist, ramp} = Hal.SlewLimiter.step(ramp, Hal.Twist.new(99, 0), 0.1)

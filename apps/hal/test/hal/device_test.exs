@@ -73,7 +73,7 @@ defmodule Hal.DeviceTest do
     send(pid, {:fail, :eio})
     assert_receive {:drive, :terminate, ^pid}
     assert_receive {:health, :drive, {{:offline, :eio}, _}}
-    # Nobody is there to drive meanwhile, and that is no error.
+    # Nobody is there to drive meanwhile, and that is not an error.
     Device.drive(pid, Twist.new(0.1, 0.0))
     assert_receive {:health, :drive, {:online, _}}
     refute_received {:drive, {:drive, _}, _}

@@ -17,7 +17,7 @@ defmodule Player.CameraOptions do
 
     if tele > 0 and wide > tele,
       do: {:ok, [{[:ptz, :lens], List.to_tuple(ends)}]},
-      else: {:left, "is no pair of angles that grow"}
+      else: {:left, "is not a pair of angles that grow"}
   end
 
   def option(:ptz, _name, _value, _context), do: {:left, "our driver decides that by itself"}

@@ -5,7 +5,7 @@ defmodule Player.Senses do
   alias Player.{Poses, Units}
 
   @doc """
-  What becomes of one option, `others` being all of that driver; nil of an option that is no sensor's, or
+  What becomes of one option, `others` being all of that driver; nil of an option that is not a sensor's, or
   has a value that it cannot have.
   """
   @spec option(String.t(), Player.Sections.value(), Units.context(), [tuple()]) ::
@@ -60,7 +60,7 @@ defmodule Player.Senses do
       {as, bs} = pairs |> Enum.map(&calibration(&1, context)) |> Enum.unzip()
       {:ok, [{[:drive, :conversions, :ir_a], one(as)}, {[:drive, :conversions, :ir_b], one(bs)}]}
     else
-      {:left, "is no list of pairs a b, a from 1.0e-9 to 1.0e9, b from -10 to 10"}
+      {:left, "is not a list of pairs a b, a from 1.0e-9 to 1.0e9, b from -10 to 10"}
     end
   end
 
@@ -251,7 +251,7 @@ defmodule Player.Senses do
   defp triples(numbers) do
     if Enum.all?(numbers, &is_number/1) and rem(length(numbers), 3) == 0 and numbers != [],
       do: {:ok, numbers |> Enum.chunk_every(3) |> Enum.map(&List.to_tuple/1)},
-      else: {:left, "is no list of three numbers for each sensor"}
+      else: {:left, "is not a list of three numbers for each sensor"}
   end
 
   defp pair?([a, b]),

@@ -55,7 +55,7 @@ defmodule Player.Tokens do
   end
 
   defp cut(<<c, _::binary>>, line, _done),
-    do: {:error, {line, "byte #{c} is no part of a configuration file"}}
+    do: {:error, {line, "byte #{c} is not a part of a configuration file"}}
 
   defp unclosed(line), do: {:error, {line, "the text that begins here has no closing \""}}
 
@@ -97,7 +97,7 @@ defmodule Player.Tokens do
         cut(rest, line, [{:number, line, number} | done])
 
       _no ->
-        {:error, {line, "#{binary_part(word, 0, min(byte_size(word), 40))} is no number"}}
+        {:error, {line, "#{binary_part(word, 0, min(byte_size(word), 40))} is not a number"}}
     end
   end
 

@@ -44,9 +44,9 @@ defmodule Player.Unsupported do
     end)
   end
 
-  @doc "Why a section is left out that is no driver."
+  @doc "Why a section is left out that is not a driver."
   @spec section(String.t()) :: String.t()
   def section("window"), do: "a window of the simulator"
   def section("rule"), do: "names are given out by rules only in simulation"
-  def section(_type), do: "is no driver that is known"
+  def section(_type), do: "is not a driver that is known"
 end

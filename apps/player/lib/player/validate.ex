@@ -40,7 +40,7 @@ defmodule Player.Validate do
 
   defp refused(_path, _value, _modules), do: nil
 
-  # The ends of a time that is put together later are no options; segments go with their count.
+  # The ends of a time that is put together later are not options; segments go with their count.
   defp nest([:sonar_times, _name], _us), do: []
   defp nest([:bumpers, :segments], _segments), do: []
   defp nest([key], value), do: [{key, value}]

@@ -30,7 +30,7 @@ defmodule Robot.Behaviour do
       iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: 1.0, y: 2.0})
       :ok
       iex> Robot.Behaviour.check({NoSuchModule, []})
-      {:error, "NoSuchModule is no behaviour: a module with new/1 and tick/2 is allowed"}
+      {:error, "NoSuchModule is not a behaviour: a module with new/1 and tick/2 is allowed"}
       iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: :far, y: 2.0})
       {:error, "Robot.Behaviour.Goto: option x cannot be :far: a number from -1.0e6 to 1.0e6 is allowed"}
   """
@@ -40,19 +40,20 @@ defmodule Robot.Behaviour do
   def check({module, options}) when is_atom(module) and is_list(options) do
     cond do
       not Keyword.keyword?(options) ->
-        {:error, "#{inspect(module)}: #{brief(options)} are no options: [key: value] is allowed"}
+        {:error, "#{inspect(module)}: #{brief(options)} are not options: [key: value] is allowed"}
 
       Code.ensure_loaded?(module) and function_exported?(module, :new, 1) and
           function_exported?(module, :tick, 2) ->
         made(module, Keyword.delete(options, :discs))
 
       true ->
-        {:error, "#{inspect(module)} is no behaviour: a module with new/1 and tick/2 is allowed"}
+        {:error,
+         "#{inspect(module)} is not a behaviour: a module with new/1 and tick/2 is allowed"}
     end
   end
 
   def check(other),
-    do: {:error, "#{brief(other)} is no goal: {module, options} or nil is allowed"}
+    do: {:error, "#{brief(other)} is not a goal: {module, options} or nil is allowed"}
 
   # Wrong options raise, by contract.
   defp made(module, options) do

@@ -10,7 +10,7 @@ defmodule Robot.File do
   All that is wrong with a file is said at once, each problem on a line that names file, line, key
   and what is allowed:
 
-      config/robots/mag1.exs:7: limits.max_liner: is no key; did you mean max_linear?
+      config/robots/mag1.exs:7: limits.max_liner: is not a key; did you mean max_linear?
 
   A real robot arms by hand: `arm: :manual` is the default here, not in `Robot.Config`.
   """
@@ -110,7 +110,7 @@ defmodule Robot.File do
 
       iex> Robot.File.parse("[id: :mag1, profil: :magellan, arm: :manaul]", file: "mag1.exs")
       {:error, [
-        "mag1.exs:1: profil: is no key; did you mean profile?",
+        "mag1.exs:1: profil: is not a key; did you mean profile?",
         "mag1.exs:1: arm: cannot be :manaul: allowed: :manual, :auto; did you mean :manual?",
         "mag1.exs:1: profile: is missing",
         "mag1.exs:1: drive: is missing"]}

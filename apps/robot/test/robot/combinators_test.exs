@@ -67,7 +67,7 @@ defmodule Robot.CombinatorsTest do
     spin = Fsm.new(start: :b, states: %{b: {Once, run: fn _ -> 0 end}}, next: %{{:b, 0} => :b})
     assert {:never, _, _} = run(spin)
 
-    assert_raise ArgumentError, ~r/:c, which is no state/, fn ->
+    assert_raise ArgumentError, ~r/:c, which is not a state/, fn ->
       Fsm.new(start: :a, states: states, next: %{{:a, 1} => :c})
     end
   end

@@ -186,7 +186,7 @@ defmodule Robot.FenceTest do
     assert :fence in limits
   end
 
-  test "odometry that begins again in another frame is no place: it stands" do
+  test "odometry that begins again in another frame is not a place: it stands" do
     profile = Profile.magellan()
     room = fence({{-3, -2}, {3, 2}})
     [one, other] = [make_ref(), make_ref()]

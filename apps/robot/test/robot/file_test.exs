@@ -93,7 +93,7 @@ defmodule Robot.FileTest do
     assert {:ok, %{save_pictures: nil}} = parse("#{camera}", colours: colours())
 
     assert lines("save_pictures: [folder: 7, rate: 0, file: 3]") == [
-             "mag1.exs:2: save_pictures.file: is no key; did you mean files?",
+             "mag1.exs:2: save_pictures.file: is not a key; did you mean files?",
              "mag1.exs:2: save_pictures.folder: cannot be 7: the path of a folder is allowed",
              "mag1.exs:2: save_pictures.rate: cannot be 0: a number from 0.001 to 30.0 pictures a second is allowed"
            ]
@@ -125,9 +125,9 @@ defmodule Robot.FileTest do
     """
 
     assert lines(text) == [
-             "mag1.exs:2: limits.max_liner: is no key; did you mean max_linear?",
+             "mag1.exs:2: limits.max_liner: is not a key; did you mean max_linear?",
              "mag1.exs:2: limits.max_turn: cannot be \"fast\": a number from 0.01 to 10.0 rad/s is allowed",
-             "mag1.exs:3: strat: is no key; did you mean start?",
+             "mag1.exs:3: strat: is not a key; did you mean start?",
              "mag1.exs:4: arm: cannot be :maual: allowed: :manual, :auto; did you mean :manual?",
              "mag1.exs:5: start: cannot be {0, 0}: {x, y, heading} is allowed, metres up to 10000 and radians, such as {1.0, 0.5, deg(90)}",
              "mag1.exs:6: body.radius: cannot be 90: a number from 0.05 to 1.5 m is allowed",
@@ -138,7 +138,7 @@ defmodule Robot.FileTest do
 
   test "a key that is like none gets the list of those that there are" do
     assert [line] = lines("network: [zzz: 1]")
-    assert line =~ "network.zzz: is no key: there are secret_file, interface"
+    assert line =~ "network.zzz: is not a key: there are secret_file, interface"
   end
 
   test "a key twice is refused" do
@@ -165,7 +165,7 @@ defmodule Robot.FileTest do
 
     assert size =~ "camera option :size cannot be {1, 1}"
     assert [line] = lines("ptz: {Robot.FilePtz, no_such_option_of_anybody: 1}")
-    assert line =~ "ptz.no_such_option_of_anybody: is no option of any driver"
+    assert line =~ "ptz.no_such_option_of_anybody: is not an option of any driver"
     assert [line] = lines("ptz: {Robot.FilePtz, serial: :no_such_name_of_anybody}")
     assert line =~ "ptz.serial: cannot be :no_such_name_of_anybody"
 
@@ -176,9 +176,9 @@ defmodule Robot.FileTest do
              )
 
     assert lines == [
-             "mag1.exs:3: drive.convesions: is no option; did you mean conversions?",
-             "mag1.exs:4: drive.conversions.distanse: is no option; did you mean distance?",
-             "mag1.exs:4: drive.conversions.x: is no option: there are angle, distance"
+             "mag1.exs:3: drive.convesions: is not an option; did you mean conversions?",
+             "mag1.exs:4: drive.conversions.distanse: is not an option; did you mean distance?",
+             "mag1.exs:4: drive.conversions.x: is not an option: there are angle, distance"
            ]
 
     assert {:error, ["mag1.exs:1: drive: drive option :port is missing"]} =
@@ -260,7 +260,7 @@ defmodule Robot.FileTest do
     end
   end
 
-  test "text that is no robot file ends in one line" do
+  test "text that is not a robot file ends in one line" do
     for {text, words} <- [
           {"", "is empty"},
           {"# only this", "is empty"},
@@ -276,9 +276,9 @@ defmodule Robot.FileTest do
           {"[id: , a: 1]", "a value is missing before ,"},
           {"[id: \n profile: 1]", "a value is missing before profile:"},
           {"[id::mag1]", "a space is missing after id:"},
-          {"[start: {1.5m, 0}]", "1.5m is no number"},
-          {"[start: 1.0e400]", "1.0e400 is no number"},
-          {"[start: 1e5]", "1e5 is no number"},
+          {"[start: {1.5m, 0}]", "1.5m is not a number"},
+          {"[start: 1.0e400]", "1.0e400 is not a number"},
+          {"[start: 1e5]", "1e5 is not a number"},
           {"[start: \"abc]", "no closing"},
           {"[start: \"a\\x\"]", "only"},
           {"[start: {a: 1, 2}]", "in a tuple, keys come last"},

@@ -173,14 +173,14 @@ defmodule Robot.SupervisorTest do
     rolls()
     [executive, pilot] = parts(id, @above)
     goal = fn goal -> Executive.goal(id, :t, goal) end
-    assert {:error, "NoSuchModule is no behaviour" <> _} = goal.({NoSuchModule, []})
-    assert {:error, "Robot.Safety.Gate is no behaviour" <> _} = goal.({Gate, []})
+    assert {:error, "NoSuchModule is not a behaviour" <> _} = goal.({NoSuchModule, []})
+    assert {:error, "Robot.Safety.Gate is not a behaviour" <> _} = goal.({Gate, []})
     assert {:error, "Robot.Behaviour.Goto: option x is missing"} = goal.({Behaviour.Goto, y: 1})
 
-    assert {:error, "Robot.Behaviour.Goto: [1] are no options" <> _} =
+    assert {:error, "Robot.Behaviour.Goto: [1] are not options" <> _} =
              goal.({Behaviour.Goto, [1]})
 
-    assert {:error, ":roll is no goal" <> _} = goal.(:roll)
+    assert {:error, ":roll is not a goal" <> _} = goal.(:roll)
     roll = {Acts.Roll, twist: Twist.zero()}
     assert Executive.goal(:fall_nobody, :t, roll) |> elem(1) =~ "no robot :fall_nobody runs"
     rolls()
@@ -188,7 +188,7 @@ defmodule Robot.SupervisorTest do
 
     listen(id)
     bad = {:do, :ready, [{:goal, :t, {NoSuchModule, []}}]}
-    assert inspect(catch_exit(Pilot.command(id, bad))) =~ "NoSuchModule is no behaviour"
+    assert inspect(catch_exit(Pilot.command(id, bad))) =~ "NoSuchModule is not a behaviour"
     assert_receive {[:robot, :pilot, :phase], %{state: :idle}}
     assert Names.whereis(id, :executive) == executive
   end

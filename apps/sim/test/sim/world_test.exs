@@ -94,7 +94,7 @@ defmodule Sim.WorldTest do
     assert reading(world, :mag1, :bumpers) == [0]
   end
 
-  test "the landmark is solid, and touching it is no collision" do
+  test "the landmark is solid, and touching it is not a collision" do
     world =
       world([robot(:mag1, 0, 0)], landmark: {1.0, 0.0})
       |> World.drive(:mag1, Twist.new(0.5, 0.0))

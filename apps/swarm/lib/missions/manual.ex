@@ -80,7 +80,7 @@ defmodule Missions.Manual do
   def check(command) do
     if known?(command),
       do: {:ok, command},
-      else: {:error, "#{brief(command)} is no command; those of Robot.Command are allowed"}
+      else: {:error, "#{brief(command)} is not a command; those of Robot.Command are allowed"}
   end
 
   defp known?(word) when word in [:stop, :lead, :start, :ping], do: true
@@ -94,7 +94,7 @@ defmodule Missions.Manual do
 
   defp turn(heading), do: Pose.wrap(heading)
 
-  # NaN and the infinities are no numbers of this language, so they cannot come.
+  # NaN and the infinities are not numbers of this language, so they cannot come.
   defp numbers(word, list, most, build) do
     case Enum.reject(list, &(is_number(&1) and abs(&1) <= most)) do
       [] ->

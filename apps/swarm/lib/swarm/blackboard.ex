@@ -64,7 +64,8 @@ defmodule Swarm.Blackboard do
     if Blackboard.Codec.key?(key),
       do: call(board, {:put, robot, key, Blackboard.Codec.encode(key, value)}),
       else:
-        {:error, "#{inspect(key)} is no key of a row; write a name such as :door or {:task, 3}"}
+        {:error,
+         "#{inspect(key)} is not a key of a row; write a name such as :door or {:task, 3}"}
   end
 
   @doc false

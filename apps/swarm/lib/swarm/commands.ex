@@ -26,7 +26,7 @@ defmodule Swarm.Commands do
          {:ok, ids} <- named(names, known) do
       {:ok, Enum.uniq(ids)}
     else
-      true -> {:error, "#{inspect(names)} is no list of robots"}
+      true -> {:error, "#{inspect(names)} is not a list of robots"}
       error -> error
     end
   end
@@ -98,7 +98,7 @@ defmodule Swarm.Commands do
   end
 
   @doc """
-  The same of what only robots on a mission can take: that others have none is no refusal, if one has. A robot
+  The same of what only robots on a mission can take: that others have none is not a refusal, if one has. A robot
   that does not answer may be the one that leads, so it is named.
   """
   @spec any([atom()], term()) :: Swarm.answer()
@@ -196,6 +196,6 @@ defmodule Swarm.Commands do
   defp keyword(options, allowed) do
     if Keyword.keyword?(options),
       do: :ok,
-      else: {:error, "#{inspect(options)} are no options; allowed are #{allowed}"}
+      else: {:error, "#{inspect(options)} are not options; allowed are #{allowed}"}
   end
 end

@@ -50,7 +50,7 @@ defmodule Swarm.BlackboardTest do
     assert {:error, line} = Blackboard.put(a, "mag1", :door, 1)
 
     assert line ==
-             ~s("mag1" is no robot of this node; each robot writes its own rows, on its node)
+             ~s("mag1" is not a robot of this node; each robot writes its own rows, on its node)
   end
 
   test "what was lost is repaired, by way of third parties too" do

@@ -132,7 +132,7 @@ defmodule Swarm.CommsTest do
     assert %{rejected: %{not_a_message: dropped}} = Swarm.status(id)
     assert dropped > 50
     assert Swarm.ask(id, {:goto, :far, 0.0, nil}) |> elem(1) =~ "goto cannot take :far"
-    assert Swarm.ask(id, {:dance, 1}) |> elem(1) =~ "{:dance, 1} is no command"
+    assert Swarm.ask(id, {:dance, 1}) |> elem(1) =~ "{:dance, 1} is not a command"
     assert Swarm.ask(id, {:start, [assign: :luck]}) |> elem(1) =~ "assign"
     assert parts(id, [:link, :pilot, :executive, :gate]) == parts
   end

@@ -168,7 +168,7 @@ defmodule Swarm.MessageTest do
     assert Swarm.Membership.Peers.hear(peers, :mag1, @beat, 2_000).rows.mag1.beat == @beat
   end
 
-  test "an anchor of an epoch that cannot be is no leader's" do
+  test "an anchor of an epoch that cannot be is not a leader's" do
     alias Missions.Landmark
     {_phase, mission, []} = Landmark.init(:mag2, [])
     far = Message.new(:mag3, :place, %{@anchor | epoch: 999_999_999})

@@ -25,7 +25,7 @@ defmodule Vision.Blobs do
   looked at; `:patience_ms` (10,000) is the longest wait for a frame.
 
   A file gives each of its frames, as fast as they are looked at; a device or stream the newest.
-  The error is one line. A source that ends after at least one frame is no error.
+  The error is one line. A source that ends after at least one frame is not an error.
   """
   @spec run(String.t(), Colours.t(), (seen() -> :halt | term()), keyword()) ::
           {:ok, summary()} | :halted | {:error, String.t()}

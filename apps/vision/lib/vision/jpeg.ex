@@ -33,7 +33,7 @@ defmodule Vision.Jpeg do
   end
 
   @doc """
-  The longest JPEG that such a frame can become; what is longer is no picture.
+  The longest JPEG that such a frame can become; what is longer is not a picture.
 
       iex> Vision.Jpeg.longest({:yuyv, 320, 240})
       372_736

@@ -156,7 +156,7 @@ defmodule Vision.View do
          "rate cannot be #{shown(rate)}: pictures a second are allowed, #{lowest} to #{highest}"}
 
       other ->
-        {:error, "#{shown(other)} is no option of a viewer; it has rate: pictures a second"}
+        {:error, "#{shown(other)} is not an option of a viewer; it has rate: pictures a second"}
     end
   end
 

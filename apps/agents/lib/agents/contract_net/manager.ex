@@ -11,7 +11,7 @@ defmodule Agents.ContractNet.Manager do
   announcement is a *round* with a number, which all its letters carry. A winner that failed is not
   asked again. One that was given up and reports after all is told to stop; if it has done the task,
   the task is done, and whoever does it now is told to stop. A task may be done twice, never not at all
-  while somebody can: what must happen once at most is no task for an auction.
+  while somebody can: what must happen once at most is not a task for an auction.
 
   `start/4` takes `:bid_ms` (500), `:silence_ms` (5000) and `:rounds` (3), how often it is announced.
   Functions return the letters to send, `{peer, performative, content}`.

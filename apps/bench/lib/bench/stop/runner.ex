@@ -147,7 +147,7 @@ defmodule Bench.Stop.Runner do
     {Map.put(stop, :known_us, known_us), s}
   end
 
-  # A shell that waits with the signal: to start one takes long on a busy machine, and is no part of a stop.
+  # A shell that waits with the signal: to start one takes long on a busy machine, and is not a part of a stop.
   defp signaller(pid, signal) do
     script = "echo ready; read go; kill -#{signal} #{pid}"
     options = [:binary, :exit_status, args: ["-c", script]]

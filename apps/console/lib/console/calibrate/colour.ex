@@ -137,7 +137,7 @@ defmodule Console.Calibrate.Colour do
         {:error, "#{:file.format_error(reason)}"}
 
       _large_or_strange ->
-        {:error, "is no colour file"}
+        {:error, "is not a colour file"}
     end
   end
 

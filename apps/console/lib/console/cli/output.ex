@@ -10,7 +10,7 @@ defmodule Console.Cli.Output do
 
   @type t :: %__MODULE__{device: IO.device(), columns: pos_integer() | nil}
 
-  @doc "Output to a device; `columns` is `nil` when it is no terminal."
+  @doc "Output to a device; `columns` is `nil` when it is not a terminal."
   @spec to(:stdio | :stderr) :: t()
   def to(device), do: %__MODULE__{device: device, columns: columns(device)}
 

@@ -9,7 +9,7 @@ defmodule Hal.Device.Arming do
   | `{:error, reason}` | stand | a person acknowledges that the line was lost while they turned |
 
   With the policy `:manual` (real robots) nothing arms but a person, after each start and each loss
-  of the line. With `:auto` (simulated ones) it arms by itself, and a loss is no error; but where a
+  of the line. With `:auto` (simulated ones) it arms by itself, and a loss is not an error; but where a
   person has disarmed, only a person arms. With `:never` nobody arms: a dry run.
 
   A drive is ready while its line is open, its driver lacks nothing (`c:Hal.Drive.ready/1`) and its base's
@@ -134,7 +134,7 @@ defmodule Hal.Device.Arming do
     {Twist.zero(), %{arming | refused: refused}}
   end
 
-  @doc "The driver has taken this speed; what is no speed it takes for a stop."
+  @doc "The driver has taken this speed; what is not a speed it takes for a stop."
   @spec told(t(), Twist.t()) :: t()
   def told(%__MODULE__{} = arming, %Twist{linear: linear, turn: turn} = twist)
       when is_float(linear) and is_float(turn),

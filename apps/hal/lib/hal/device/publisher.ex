@@ -32,7 +32,7 @@ defmodule Hal.Device.Publisher do
   defp change(s, {:offline, reason}),
     do: {:offline, %{reason: reason, line: words(s, reason)}}
 
-  # Another reason to be offline is no new beginning.
+  # Another reason to be offline is not a new beginning.
   defp since({{:offline, _}, since_ms}, {:offline, _}, _at_ms), do: since_ms
   defp since(_before, _condition, at_ms), do: at_ms
 

@@ -30,7 +30,7 @@ defmodule Hal.RFlex.Driver do
   A speed goes through `Hal.SlewLimiter`, last before the wire, every 50 ms, and is repeated every 100 ms, zero
   too: a frame may be lost, and the controller stops by itself when it hears nothing for some time (how long
   is not known). A stop is not ramped: it is the next thing on the wire, and the controller brakes with
-  `max_braking`. What is no speed (`Hal.SlewLimiter.check/1`) is a stop, and counted. A speed that was not
+  `max_braking`. What is not a speed (`Hal.SlewLimiter.check/1`) is a stop, and counted. A speed that was not
   renewed for 500 ms is zero. The brake is released before the first speed, and again when the controller
   says that it is set; `init` sets it. A driver that was held up until the line said its last words begins
   again like that: from standing, with the brake.

@@ -185,7 +185,7 @@ defmodule Hal.RFlex.Options do
   defp floats({key, values}) when is_list(values), do: {key, Enum.map(values, &(&1 * 1.0))}
   defp floats({key, value}), do: {key, value && value * 1.0}
 
-  # The two wheels of a base differ by some thousandths; what differs by more is no pair.
+  # The two wheels of a base differ by some thousandths; what differs by more is not a pair.
   defp conversion(:wheel_ratio, value) do
     if number?(value, 0.8, 1.25), do: :ok, else: "a number from 0.8 to 1.25"
   end

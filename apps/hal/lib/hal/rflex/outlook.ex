@@ -46,7 +46,7 @@ defmodule Hal.RFlex.Outlook do
 
       if rem(count, 8) != 0,
         do:
-          "#{key}: is not given, and #{count} poses are no full boards of 8 " <>
+          "#{key}: is not given, and #{count} poses are not full boards of 8 " <>
             "(#{count - rem(count, 8)} or #{count - rem(count, 8) + 8} would be); " <>
             "taken for #{inspect(banks, charlists: :as_lists)}"
     end

@@ -80,7 +80,7 @@ defmodule Hal.Device.ArmingTest do
     end
   end
 
-  test "what is no speed was no speed to be lost at" do
+  test "what is not a speed was no speed to be lost at" do
     {:ok, armed} = Arming.order(Arming.new(:manual), :arm, :ok)
 
     assert Arming.lost(Arming.told(armed, %Twist{linear: :nan, turn: 0.0}), :eio).state ==

@@ -77,7 +77,7 @@ defmodule Hal.Visca.CommandTest do
     end
   end
 
-  test "what is no command, or out of range, is refused by name" do
+  test "what is not a command, or out of range, is refused by name" do
     for wrong <- [
           {:look, 881, 0, 24, 20},
           {:look, 0, 301, 24, 20},

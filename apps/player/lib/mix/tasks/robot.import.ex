@@ -38,7 +38,7 @@ defmodule Mix.Tasks.Robot.Import do
   def run(words) do
     case OptionParser.parse(words, strict: @switches, aliases: [o: :out]) do
       {_options, _files, [{word, nil} | _]} ->
-        refuse("#{word} is no option; --help lists them")
+        refuse("#{word} is not an option; --help lists them")
 
       {_options, _files, [{word, value} | _]} ->
         refuse("#{word} cannot be #{value}; --help tells")
@@ -109,7 +109,7 @@ defmodule Mix.Tasks.Robot.Import do
 
       asked == nil ->
         hint = Check.meant(options[:name], Enum.take(Schema.fleet(), 9), "")
-        {:error, "--name #{options[:name]} is no robot: mag1 to mag100, min1 to min100#{hint}"}
+        {:error, "--name #{options[:name]} is not a robot: mag1 to mag100, min1 to min100#{hint}"}
 
       named not in [nil, asked] ->
         {:error, "--name #{asked} does not go with a file named #{named}.exs"}

@@ -21,7 +21,7 @@ defmodule Mix.Tasks.Robot.Check do
   def run(words) do
     case OptionParser.parse(words, strict: [help: :boolean]) do
       {_options, _files, [{word, _value} | _]} ->
-        refuse(["#{word} is no option; --help lists them"])
+        refuse(["#{word} is not an option; --help lists them"])
 
       {[help: true], _files, []} ->
         Mix.shell().info(@moduledoc)

@@ -26,7 +26,7 @@ defmodule Robot.Behaviour.Fsm do
     start = Options.check!(options, :start, &is_map_key(states, &1), "one of the states")
 
     for {{from, _outcome}, to} <- next, state <- [from, to], not is_map_key(states, state) do
-      raise ArgumentError, "option next names #{inspect(state)}, which is no state"
+      raise ArgumentError, "option next names #{inspect(state)}, which is not a state"
     end
 
     {__MODULE__, %{states: states, next: next, at: start, running: enter(states, start)}}

@@ -4,7 +4,7 @@ defmodule Robot.Command.Arguments do
   to one mistyped. Pure; nothing read ever becomes an atom.
   """
 
-  # Farther than this is no place, speed or size of ours.
+  # Farther than this is not a place, speed or size of ours.
   @greatest 1.0e6
 
   @doc """

@@ -29,7 +29,7 @@ defmodule Robot.Control.Executive do
 
   @doc """
   Sets, changes or (`nil`) drops the goal, as in `Robot.Control.Controller.goal/3`. Refused, in a line, where no such robot
-  runs on this node, and a goal that is no behaviour, or none with these options.
+  runs on this node, and a goal that is not a behaviour, or none with these options.
   """
   @spec goal(robot :: atom(), tag :: term(), {module(), keyword()} | nil) ::
           :ok | {:error, line :: String.t()}

@@ -33,7 +33,7 @@ defmodule Robot.File.Check do
       iex> sizes = {:keys, length: {:number, 0.1, 2.0, "m"}, width: {:number, 0.1, 2.0, "m"}}
       iex> Robot.File.Check.run(sizes, node, ["body"])
       {:error, [
-        {3, ["body", "lenght"], "is no key; did you mean length?"},
+        {3, ["body", "lenght"], "is not a key; did you mean length?"},
         {4, ["body", "width"], "cannot be 900: a number from 0.1 to 2.0 m is allowed"}]}
       iex> Robot.File.Check.run({:one_of, [:manual, :auto]}, {1, {:name, "auto"}}, [])
       {:ok, :auto}
@@ -88,7 +88,7 @@ defmodule Robot.File.Check do
 
     wrong =
       for {name, line, _node} <- keys, name not in names do
-        {line, path ++ [name], "is no key#{meant(name, known, "")}#{choice(name, known)}"}
+        {line, path ++ [name], "is not a key#{meant(name, known, "")}#{choice(name, known)}"}
       end
 
     found = Enum.map(table, fn {key, check} -> {key, find(check, keys, key, path)} end)

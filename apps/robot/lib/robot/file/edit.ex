@@ -39,7 +39,7 @@ defmodule Robot.File.Edit do
     end
   end
 
-  # Text and remarks as blanks, byte for byte: what stands in them is no key.
+  # Text and remarks as blanks, byte for byte: what stands in them is not a key.
   defp bare(text) do
     Regex.replace(~r/"(?:\\.|[^"\\])*"|#[^\n]*/s, text, fn hit ->
       String.duplicate(" ", byte_size(hit))

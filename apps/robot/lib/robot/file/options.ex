@@ -17,7 +17,7 @@ defmodule Robot.File.Options do
     strange =
       for {name, line, _node} <- keys, not option?(name, names) do
         {line, path ++ [name],
-         "is no option#{Check.meant(name, names, "")}#{choice(name, names)}"}
+         "is not an option#{Check.meant(name, names, "")}#{choice(name, names)}"}
       end
 
     twice =

@@ -28,7 +28,7 @@ defmodule Robot.File.Tokens do
       iex> Robot.File.Tokens.cut("[id: :mag1] # its name")
       {:ok, [{:mark, 1, "["}, {:key, 1, "id"}, {:name, 1, "mag1"}, {:mark, 1, "]"}, {:end, 1, nil}]}
       iex> Robot.File.Tokens.cut("[a: 1,\\n b: 0x]")
-      {:error, {2, "0x is no number"}}
+      {:error, {2, "0x is not a number"}}
   """
   @spec cut(String.t()) :: {:ok, [token()]} | {:error, {pos_integer(), String.t()}}
   def cut(text), do: cut(text, 1, [])
@@ -115,7 +115,7 @@ defmodule Robot.File.Tokens do
          {:ok, number} <- value(String.replace(word, "_", "")) do
       cut(rest(text, word), line, [{:number, line, number} | tokens])
     else
-      _no -> {:error, {line, "#{shorten(word)} is no number"}}
+      _no -> {:error, {line, "#{shorten(word)} is not a number"}}
     end
   end
 

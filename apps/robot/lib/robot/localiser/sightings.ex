@@ -111,7 +111,7 @@ defmodule Robot.Localiser.Sightings do
     Belief.correct(belief, mark.key, seen - distance * (1 + scale), slope, noise)
   end
 
-  # The variances of where it is, towards the thing and across. What is measured of a thing is no straight line over
+  # The variances of where it is, towards the thing and across. What is measured of a thing is not a straight line over
   # where the robot may be: what it bends by there counts as noise (second-order filter, Bar-Shalom, Li and Kirubarajan 2001).
   defp spread(belief, %{sd: sd}, {dx, dy, distance}) do
     {x, y} = {dx / distance, dy / distance}

@@ -118,7 +118,7 @@ defmodule Robot.Safety.Reflex do
   @spec frame(t()) :: {:is, reference() | nil} | nil
   def frame(%__MODULE__{frame: frame}), do: frame
 
-  @doc "Takes a wish. Anything at all may come: what is no sensible number counts as a wish to stop."
+  @doc "Takes a wish. Anything at all may come: what is not a sensible number counts as a wish to stop."
   @spec wish(t(), Twist.t() | term(), integer()) :: t()
   def wish(%__MODULE__{latched?: true} = reflex, _twist, _at_ms), do: reflex
 

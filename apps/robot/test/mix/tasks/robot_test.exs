@@ -111,7 +111,7 @@ defmodule Mix.Tasks.RobotTest do
           {file.(well, keys: ", limits: [max_acceleration: 0.05]"),
            "limits.max_acceleration: with 0.05 m/s2 it takes 10 s to drive at full speed; 0.5 is usual"},
           {file.(well, keys: ", #{fifty}"),
-           "drive: sonar_banks: is not given, and 50 poses are no full boards of 8 (48 or 56 would be)"},
+           "drive: sonar_banks: is not given, and 50 poses are not full boards of 8 (48 or 56 would be)"},
           {file.(far, []),
            "drive: conversions.distance: 31.387 units a metre is odd; 31387.0 is usual"},
           {file.(well, drive: ", speed: 9600"),
@@ -134,12 +134,12 @@ defmodule Mix.Tasks.RobotTest do
 
     assert lines == [
              "#{bad}:1: profile: cannot be :magelan: allowed: :magellan, :atrv_mini; did you mean :magellan?",
-             "#{bad}:2: dirve: is no key; did you mean drive?",
+             "#{bad}:2: dirve: is not a key; did you mean drive?",
              "#{bad}:1: drive: is missing",
              "none.exs: no such file or directory"
            ]
 
-    assert refused(Check, ["--colour"]) == ["--colour is no option; --help lists them"]
+    assert refused(Check, ["--colour"]) == ["--colour is not an option; --help lists them"]
     Check.run(["--help"])
     assert [_well | _lines] = said()
   end

@@ -18,7 +18,7 @@ defmodule Sim.World.Touch do
     at_wall = for {index, {[_ | _], _}} <- walls, do: {index, :wall}
     near_wall = for {index, {_, true}} <- walls, do: {index, :wall}
 
-    # The landmark is the last disc: touching it presses bumpers but is no collision.
+    # The landmark is the last disc: touching it presses bumpers but is not a collision.
     now = MapSet.new(at_wall ++ for({_, j} = pair <- touching, j < count, do: pair))
     near = MapSet.new(near_wall ++ together)
     new = now |> MapSet.difference(world.together) |> MapSet.size()

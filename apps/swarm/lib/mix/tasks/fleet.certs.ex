@@ -27,7 +27,7 @@ defmodule Mix.Tasks.Fleet.Certs do
   def run(words) do
     case OptionParser.parse(words, strict: @switches) do
       {_options, _names, [{word, _value} | _]} ->
-        refuse("#{word} is no option; --help lists them")
+        refuse("#{word} is not an option; --help lists them")
 
       {options, names, []} ->
         run(options, names)
@@ -69,7 +69,7 @@ defmodule Mix.Tasks.Fleet.Certs do
       lines = for line <- String.split(text, ["\n", "\r"]), do: hd(String.split(line, "#"))
       {:ok, Enum.flat_map(lines, &String.split/1)}
     else
-      {:ok, _other} -> {:error, "--fleet #{path} is no file of names"}
+      {:ok, _other} -> {:error, "--fleet #{path} is not a file of names"}
       {:error, why} -> {:error, "--fleet #{path} cannot be read: #{:file.format_error(why)}"}
     end
   end
@@ -79,7 +79,7 @@ defmodule Mix.Tasks.Fleet.Certs do
   defp check(names) do
     case Enum.reject(names, &Certs.name?/1) do
       [] -> {:ok, names}
-      [wrong | _] -> {:error, "#{inspect(wrong)} is no robot's name; names are as mag1"}
+      [wrong | _] -> {:error, "#{inspect(wrong)} is not a robot's name; names are as mag1"}
     end
   end
 

@@ -20,7 +20,7 @@ defmodule Mix.Tasks.Fleet.Secret do
   def run(words) do
     case OptionParser.parse(words, strict: [force: :boolean, help: :boolean]) do
       {_options, _files, [{word, _value} | _]} ->
-        refuse("#{word} is no option; --help lists them")
+        refuse("#{word} is not an option; --help lists them")
 
       {options, files, []} ->
         run(options, files)

@@ -55,10 +55,10 @@ defmodule Swarm.Blackboard.Hints do
   defp check(robot, key) do
     cond do
       not WireTypes.name?(robot) ->
-        {:error, "#{inspect(robot)} is no robot that could write a hint"}
+        {:error, "#{inspect(robot)} is not a robot that could write a hint"}
 
       not Blackboard.Codec.key?(key) ->
-        {:error, "#{inspect(key)} is no key of a hint; write a name or {:searched, 7}"}
+        {:error, "#{inspect(key)} is not a key of a hint; write a name or {:searched, 7}"}
 
       true ->
         :ok

@@ -141,7 +141,8 @@ defmodule Swarm.Blackboard.Server do
   end
 
   defp line(:not_own, robot, _key, _payload, _s),
-    do: "#{inspect(robot)} is no robot of this node; each robot writes its own rows, on its node"
+    do:
+      "#{inspect(robot)} is not a robot of this node; each robot writes its own rows, on its node"
 
   defp line(:bytes, _robot, key, payload, s),
     do:

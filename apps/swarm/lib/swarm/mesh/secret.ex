@@ -79,7 +79,7 @@ defmodule Swarm.Mesh.Secret do
 
   @doc """
   Gives this node the fleet's cookie, whatever cookie it was started with. When it was another one,
-  all nodes that are connected by it are cut off: they got in by a cookie that is none of ours.
+  all nodes that are connected by it are cut off: they got in by a cookie that is not one of ours.
   """
   @spec apply_cookie(t()) :: :ok | {:error, line :: String.t()}
   def apply_cookie(%Secret{cookie: cookie}) do

@@ -16,7 +16,7 @@ defmodule Mix.Tasks.Fleet.SecretTest do
   end
 
   test "wrong words are one line" do
-    assert refused(Task, ["--colour"]) == "--colour is no option; --help lists them"
+    assert refused(Task, ["--colour"]) == "--colour is not an option; --help lists them"
     assert refused(Task, ["one", "two"]) == "one file, not 2: one two"
     Task.run(["--help"])
     assert_received {:mix_shell, :info, ["Makes the one secret" <> _rest]}

@@ -60,7 +60,7 @@ defmodule Swarm.Host.ReleaseBootTest do
     File.write!(environment["CONVOY_ROBOT_FILE"], file(", arm: :maual, limit: []"))
     assert {:error, lines} = ReleaseBoot.robot(environment)
     assert Enum.any?(lines, &(&1 =~ "mag1.exs:1: arm: cannot be :maual"))
-    assert Enum.any?(lines, &(&1 =~ "limit: is no key; did you mean limits?"))
+    assert Enum.any?(lines, &(&1 =~ "limit: is not a key; did you mean limits?"))
     assert {1, [], ^lines} = ReleaseBoot.answer("start", environment)
     assert {1, [], ^lines} = ReleaseBoot.answer("check", environment)
   end

@@ -104,7 +104,7 @@ defmodule Vision.Jpeg.Encoder do
   """
   @spec explain(reason()) :: String.t()
   def explain(:no_ffmpeg), do: Hal.Camera.FFmpeg.explain(:no_ffmpeg)
-  def explain(:unreadable), do: "ffmpeg gave something that is no picture"
+  def explain(:unreadable), do: "ffmpeg gave something that is not a picture"
   def explain(:busy), do: "ffmpeg takes no frame"
   def explain(:late), do: "ffmpeg gave no picture in time"
   def explain(:no_frame), do: "the camera gave a frame that is none"

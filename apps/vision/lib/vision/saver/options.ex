@@ -19,7 +19,7 @@ defmodule Vision.Saver.Options do
     if Keyword.keyword?(options),
       do: checked(options, Enum.find(options, fn {key, value} -> not valid?(key, value) end)),
       else:
-        {:error, "#{shown(options)} is no list of options such as [folder: \"/var/pictures\"]"}
+        {:error, "#{shown(options)} is not a list of options such as [folder: \"/var/pictures\"]"}
   end
 
   defp checked(_options, {key, value}) when key in @keys,

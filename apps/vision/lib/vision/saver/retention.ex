@@ -79,7 +79,7 @@ defmodule Vision.Saver.Retention do
   end
 
   @doc """
-  When the picture of this name was saved; `nil` if it is none of ours, which nobody may remove.
+  When the picture of this name was saved; `nil` if it is not one of ours, which nobody may remove.
 
       iex> Vision.Saver.Retention.time_ms("mag1", "mag1-20260102T030405.678Z.jpg")
       1_767_323_045_678

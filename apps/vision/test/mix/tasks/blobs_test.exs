@@ -73,7 +73,7 @@ defmodule Mix.Tasks.BlobsTest do
   end
 
   if File.exists?("/dev/full") do
-    test "a report that cannot be written is no success", %{colours: colours} do
+    test "a report that cannot be written is not success", %{colours: colours} do
       words = [@source, "--colours", colours, "--json", "/dev/full"]
       line = capture_io(:stderr, fn -> assert catch_exit(Blobs.run(words)) == {:shutdown, 1} end)
       assert line =~ "--json /dev/full cannot be written: no space left on device"

@@ -9,7 +9,7 @@ defmodule Sim.Emulator.RFlexController.Frame do
 
   @start <<0x1B, 0x02>>
 
-  # The longest command has 21 bytes. What claims to have more is no command, and not waited for.
+  # The longest command has 21 bytes. What claims to have more is not a command, and not waited for.
   @longest 32
 
   @typedoc "Port, id, opcode, data."

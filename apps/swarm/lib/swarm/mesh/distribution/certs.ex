@@ -34,7 +34,7 @@ defmodule Swarm.Mesh.Distribution.Certs do
     own = Path.join(folder, name)
 
     cond do
-      not name?(name) -> {:error, "#{inspect(name)} is no robot's name; names are as mag1"}
+      not name?(name) -> {:error, "#{inspect(name)} is not a robot's name; names are as mag1"}
       File.exists?(Path.join(own, "cert.pem")) and not force? -> {:ok, :kept}
       true -> make_robot(folder, own, name)
     end

@@ -9,7 +9,7 @@ defmodule Swarm.Mesh.Secret.File do
 
   @doc """
   The text of a secret file, or what is wrong with the file, as the end of a sentence. A file that
-  others than its owner may read or write is refused, and so is all that is no file.
+  others than its owner may read or write is refused, and so is all that is not a file.
   """
   @spec read(Path.t()) :: {:ok, String.t()} | {:error, String.t()}
   def read(path) do

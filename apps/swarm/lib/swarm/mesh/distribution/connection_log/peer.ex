@@ -6,7 +6,7 @@ defmodule Swarm.Mesh.Distribution.ConnectionLog.Peer do
 
   @doc "The `verify_fun` of `ssl_dist.conf`: decides as OTP does but for host names, and remembers whom it was about."
   @spec verify(tuple(), term(), term()) :: {:valid | :unknown | :fail, term()}
-  # OTP compares the host part of the node's name with the names in the certificate. Ours is no host's.
+  # OTP compares the host part of the node's name with the names in the certificate. Ours is not a host's.
   def verify(_certificate, {:bad_cert, :hostname_check_failed}, state), do: {:valid, state}
 
   def verify(certificate, {:bad_cert, _reason} = problem, _state) do

@@ -25,7 +25,7 @@ defmodule Swarm.Mesh.Distribution.ConnectionLog.Reasons do
 
   @doc """
   Who was refused, they or us, whom it is about, if known, and why; `:known` for what was reported before in other words;
-  `:ignore` for all that is no refusal.
+  `:ignore` for all that is not a refusal.
 
       iex> Swarm.Mesh.Distribution.ConnectionLog.Reasons.read({~c"** Connection attempt from node ~w rejected. Invalid challenge reply. **~n", [:spy@lab]}, {nil, nil})
       {:them, "spy@lab", "wrong cookie: another secret"}
