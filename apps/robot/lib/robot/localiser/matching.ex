@@ -49,8 +49,7 @@ defmodule Robot.Localiser.Matching do
           do: c
 
     for %{mark: mark, blob: blob} = one <- candidates,
-        mark.reference? and one.sure? and one.width < @fits,
-        not cut?(blob),
+        mark.reference? and one.sure? and not cut?(blob) and one.width < @fits,
         Enum.all?(candidates, &(&1.cost > one.cost + @worse or not rivals?(one, &1))) do
       %{mark: mark, blob: blob, slack: one.slack, whole?: one.width < @whole}
     end
@@ -83,9 +82,7 @@ defmodule Robot.Localiser.Matching do
       doubt = 2 * max(distance_sd - @surely, 0.0) / distance
       slack = abs(share - 1) * half
       off = max(abs(Pose.wrap(seen - expected)) - slack, 0.0)
-      # What is cut off at the border may be as wide as it likes.
-      width = if cut?(blob), do: max(:math.log(share), 0.0), else: :math.log(share)
-      cost = cost(off, bearing_sd, width, doubt)
+      cost = cost(off, bearing_sd, :math.log(share), doubt)
 
       if off < max(3 * bearing_sd, @narrow) and cost < @unlike do
         %{
@@ -95,7 +92,7 @@ defmodule Robot.Localiser.Matching do
           expected: expected,
           half: half,
           slack: slack,
-          width: abs(width),
+          width: abs(:math.log(share)),
           cost: cost,
           sure?: doubt < @doubt
         }

@@ -113,15 +113,6 @@ defmodule Robot.Localiser.MatchingTest do
     assert pairs(robots, [%{blob({2.0, 0.0}) | bottom: 239, clipped?: true}]) != []
   end
 
-  test "a robot that may be the one of which the border cuts a part off is no other blob" do
-    robot = robot(:mag2, {1.0, 0.5})
-    unsure = Frame.reframe(Belief.new(@here), {1.0, 0.0}, 0.09, 0.0)
-    other = blob({1.0, 0.2})
-    cut = %{blob({1.0, 0.5}) | left: 0, right: 18, x: 9.0}
-    assert pairs([robot], [other], unsure) == [{:mag2, 0, true}]
-    assert pairs([robot], [cut, other], unsure) == []
-  end
-
   test "one that is unsure of itself looks farther" do
     robots = [robot(:mag2, {2.0, 0.0})]
     blobs = [blob({2.0, 0.8})]
