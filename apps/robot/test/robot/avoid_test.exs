@@ -166,10 +166,13 @@ defmodule Robot.AvoidTest do
       for {extra, change} <- changes do
         body = Body.new(Pose.new(0, 0))
         {module, options} = goto
-        mind = Robot.Control.Controller.goal(body.mind, :go, {module, options ++ extra})
+
+        controller =
+          Robot.Control.Controller.goal(body.controller, :go, {module, options ++ extra})
 
         {nearest, outcome} =
-          Enum.reduce_while(1..400, {%{body | mind: mind}, 9.0}, fn _, {body, nearest} ->
+          Enum.reduce_while(1..400, {%{body | controller: controller}, 9.0}, fn _,
+                                                                                {body, nearest} ->
             case Body.run(body, 1, change) do
               {nil, body} -> {:cont, {body, min(nearest, Pose.distance(body.pose, {2.0, 0.05}))}}
               {outcome, _} -> {:halt, {nearest, outcome}}
@@ -187,9 +190,9 @@ defmodule Robot.AvoidTest do
 
     for place <- [Pose.new(3, 0), Pose.new(3.2, 0.2)] do
       body = Body.new(Pose.new(0, 0.5, 2.0))
-      mind = Robot.Control.Controller.goal(body.mind, :slot, {Follow, target: place})
-      {nil, body} = Body.run(%{body | mind: mind}, 250, wreck)
-      assert body.mind.last_by == :blocked
+      controller = Robot.Control.Controller.goal(body.controller, :slot, {Follow, target: place})
+      {nil, body} = Body.run(%{body | controller: controller}, 250, wreck)
+      assert body.controller.last_by == :blocked
       assert Twist.zero?(body.twist)
       distance = Pose.distance(body.pose, {3.0, 0.0})
       assert distance > 0.42 and distance < 0.62

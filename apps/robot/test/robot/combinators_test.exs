@@ -78,10 +78,14 @@ defmodule Robot.CombinatorsTest do
 
     body = Body.new(Pose.new(0, 0))
 
-    mind =
-      Robot.Control.Controller.goal(body.mind, :route, {Sequence, steps: elem(route, 1).steps})
+    controller =
+      Robot.Control.Controller.goal(
+        body.controller,
+        :route,
+        {Sequence, steps: elem(route, 1).steps}
+      )
 
-    assert {{:route, 1}, body} = Body.run(%{body | mind: mind}, 400)
+    assert {{:route, 1}, body} = Body.run(%{body | controller: controller}, 400)
     assert Pose.distance(body.pose, {0.0, 0.0}) < 0.11
   end
 
@@ -91,7 +95,7 @@ defmodule Robot.CombinatorsTest do
 
     {nil, body} =
       Body.run(
-        %{body | mind: Robot.Control.Controller.goal(body.mind, 1, {Wander, []})},
+        %{body | controller: Robot.Control.Controller.goal(body.controller, 1, {Wander, []})},
         60,
         wall
       )

@@ -1,6 +1,6 @@
 defmodule Robot.Body do
   @moduledoc false
-  # One body on a plane for tests: the gate's output moves it, its percepts feed a mind.
+  # One body on a plane for tests: the gate's output moves it, its percepts feed a controller.
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.Percept
   alias Robot.Control.Controller
@@ -14,7 +14,7 @@ defmodule Robot.Body do
       twist: Twist.zero(),
       at_ms: 0,
       reflex: reflex,
-      mind: Controller.new(profile: profile),
+      controller: Controller.new(profile: profile),
       profile: profile,
       pan: nil
     }
@@ -23,13 +23,13 @@ defmodule Robot.Body do
   @doc "The same with a camera on a pan-tilt unit, that looks ahead."
   def with_head(body), do: %{body | pan: 0.0}
 
-  @doc "Runs the mind for some ticks; `change` may change each percept; gives outcome and body."
+  @doc "Runs the controller for some ticks; `change` may change each percept; gives outcome and body."
   def run(body, ticks, change \\ & &1)
   def run(body, 0, _change), do: {nil, body}
 
   def run(body, ticks, change) do
-    {wish, outcome, mind} = Controller.tick(body.mind, change.(percept(body)))
-    body = %{body | mind: mind} |> act(wish)
+    {wish, outcome, controller} = Controller.tick(body.controller, change.(percept(body)))
+    body = %{body | controller: controller} |> act(wish)
     if outcome, do: {outcome, body}, else: run(body, ticks - 1, change)
   end
 

@@ -1,7 +1,7 @@
 defmodule Robot.Hall do
   @moduledoc false
   # A fleet on a plane for tests: discs with the lag and the accelerations of their wheels, sonars that see
-  # discs and walls, poses told 5 times a second, late and inexact. Everybody runs Mind and Reflex.
+  # discs and walls, poses told 5 times a second, late and inexact. Everybody runs Controller and Reflex.
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.{Body, Percept}
   alias Robot.Control.Controller
@@ -71,7 +71,7 @@ defmodule Robot.Hall do
           end
 
         b = 2 * :math.pi() * :rand.uniform()
-        mind = Controller.new(profile: profile)
+        controller = Controller.new(profile: profile)
 
         {id,
          %{
@@ -81,7 +81,7 @@ defmodule Robot.Hall do
            twist: Twist.zero(),
            next: pose,
            reflex: Reflex.new(profile),
-           mind: mind,
+           controller: controller,
            slot: assigned[id],
            velocity: {0.0, 0.0},
            bias: {@bias * :math.cos(b), @bias * :math.sin(b)},
@@ -217,14 +217,14 @@ defmodule Robot.Hall do
           velocity = {c - twist.turn * (slot.y - lead.y), s + twist.turn * (slot.x - lead.x)}
           {id, %{r | slot: slot, velocity: velocity}}
         else
-          mind =
+          controller =
             Controller.goal(
-              r.mind,
+              r.controller,
               {:drive, twist},
               {Robot.Behaviour.Move, linear: twist.linear, turn: twist.turn}
             )
 
-          {id, %{r | mind: mind}}
+          {id, %{r | controller: controller}}
         end
       end)
 
@@ -302,24 +302,24 @@ defmodule Robot.Hall do
           driving: %{twist: r.twist, limits: r.limits}
         }
 
-        mind =
+        controller =
           if r.slot,
             do:
               Controller.goal(
-                r.mind,
+                r.controller,
                 :slot,
                 {Follow, target: r.slot, velocity: r.velocity, discs: discs}
               ),
-            else: r.mind
+            else: r.controller
 
-        {took, {wish, _, mind}} = :timer.tc(fn -> Controller.tick(mind, percept) end)
+        {took, {wish, _, controller}} = :timer.tc(fn -> Controller.tick(controller, percept) end)
 
         reflex =
           r.reflex
           |> Reflex.sense({:sonar, sonar}, hall.at_ms)
           |> Reflex.wish(wish.twist, hall.at_ms)
 
-        {{id, %{r | mind: mind, reflex: reflex, by: wish}}, us + took}
+        {{id, %{r | controller: controller, reflex: reflex, by: wish}}, us + took}
       end)
 
     %{hall | robots: Map.new(robots), tick_us: [us / map_size(hall.robots) | hall.tick_us]}

@@ -1,7 +1,7 @@
 defmodule Sim.Calibration do
   @moduledoc """
   A calibration of odometry in a simulated hall, in lockstep: one robot drives the courses that a real one
-  would, by the same mind and reflexes, and its true pose is what a person would have measured. Pure.
+  would, by the same controller and reflexes, and its true pose is what a person would have measured. Pure.
 
   Options of `new/1`: `profile` (`:magellan`), `seed` (0), `noise` (`:default`), `wheels` (what odometry is
   wrong about, as in `Sim.World.Body`), `speed` (m/s, 0.3), `tape_m` (standard deviation of what is read
@@ -71,11 +71,11 @@ defmodule Sim.Calibration do
     world = World.displace(sim.world, @id, mark(task))
     before = told(world)
     course = {DriveCourse, legs: Drive.legs(task), speed: sim.options.speed}
-    mind = Controller.goal(Controller.new(profile: sim.profile), :course, course)
+    controller = Controller.goal(Controller.new(profile: sim.profile), :course, course)
 
     s = %{
       world: world,
-      mind: mind,
+      controller: controller,
       reflex: Reflex.new(sim.profile),
       profile: sim.profile,
       turns: {0.0, 0.0},
@@ -96,13 +96,13 @@ defmodule Sim.Calibration do
 
   defp told(world), do: world.robots[@id].odometry
 
-  # As `Sim.Trial` has it: mind and reflex, act, reflex again 50 ms later.
+  # As `Sim.Trial` has it: controller and reflex, act, reflex again 50 ms later.
   defp go(%{world: %{at_ms: at_ms}, until_ms: until_ms} = s) when at_ms > until_ms, do: {2, s}
 
   defp go(s) do
     at_ms = s.world.at_ms
-    {wish, outcome, mind} = Controller.tick(s.mind, percept(s))
-    s = %{s | mind: mind, reflex: Reflex.wish(s.reflex, wish.twist, at_ms)}
+    {wish, outcome, controller} = Controller.tick(s.controller, percept(s))
+    s = %{s | controller: controller, reflex: Reflex.wish(s.reflex, wish.twist, at_ms)}
     s = s |> act() |> act()
 
     case outcome do

@@ -4,8 +4,8 @@ defmodule Sim.Fleet do
   them may be killed: on this node (`Sim.Fleet.Local`), or each in a process of the operating system of
   its own (`Sim.Fleet.Nodes`).
 
-  This process plays the script, keeps the ledger, and answers what viewers ask; where world and
-  robots run is its crew's business (`Sim.Fleet.Backend`).
+  This process plays the script, keeps the run log, and answers what viewers ask; where world and
+  robots run is its backend's business (`Sim.Fleet.Backend`).
   """
   use GenServer
   alias Hal.Pose
@@ -32,15 +32,15 @@ defmodule Sim.Fleet do
   def start_link(options \\ []) do
     options = Map.new(options)
     {own, options} = Map.split(options, [:mission, :trace, :nodes])
-    crew = if own[:nodes], do: Nodes, else: Local
+    backend = if own[:nodes], do: Nodes, else: Local
 
     with {:ok, setup} <- Setup.new(options),
          {:ok, setup, begin?} <-
-           Mission.choose(setup, Map.get(own, :mission, true), crew == Nodes),
+           Mission.choose(setup, Map.get(own, :mission, true), backend == Nodes),
          :ok <- free(setup.options.robots) do
       {:ok, _apps} = Application.ensure_all_started(:swarm)
       answer = make_ref()
-      start = {setup, crew, Map.put(own, :mission, begin?), {self(), answer}}
+      start = {setup, backend, Map.put(own, :mission, begin?), {self(), answer}}
 
       # What could not start has ended well, and said why.
       with :ignore <- GenServer.start_link(__MODULE__, start) do
@@ -94,10 +94,10 @@ defmodule Sim.Fleet do
     Process.flag(:trap_exit, true)
 
     case module.start(setup, Keyword.take(Map.to_list(own), [:trace])) do
-      {:ok, crew} ->
+      {:ok, backend} ->
         epoch_ms = System.monotonic_time(:millisecond)
 
-        {:ok, begun(setup, {module, crew}, epoch_ms), {:continue, {:begin, own.mission}}}
+        {:ok, begun(setup, {module, backend}, epoch_ms), {:continue, {:begin, own.mission}}}
 
       {:error, line} ->
         send(caller, {answer, line})
@@ -105,13 +105,13 @@ defmodule Sim.Fleet do
     end
   end
 
-  defp begun(%Setup{options: options} = setup, crew, epoch_ms) do
+  defp begun(%Setup{options: options} = setup, backend, epoch_ms) do
     schedule(%{
       setup: setup,
-      crew: crew,
+      backend: backend,
       epoch_ms: epoch_ms,
       script: Scenario.new(options.moves, options.kills),
-      ledger: RunLog.new(),
+      run_log: RunLog.new(),
       said: [],
       next: epoch_ms
     })
@@ -134,7 +134,7 @@ defmodule Sim.Fleet do
     do: {:reply, s |> run() |> Map.put(:script, s.script) |> Termination.reached?(), s}
 
   def handle_call({:kill, :leader}, from, s) do
-    case RunLog.leader(s.ledger) do
+    case RunLog.leader(s.run_log) do
       nil -> {:reply, {:error, "there is no leader to kill yet"}, s}
       leader -> handle_call({:kill, leader}, from, s)
     end
@@ -163,17 +163,20 @@ defmodule Sim.Fleet do
     worst = fn leader -> s |> run() |> Evaluation.worst(leader) end
     followers = fn -> s |> run() |> Evaluation.followers() end
     {told, said} = Said.look(s.said, claims)
-    ledger = s.ledger |> RunLog.note(now, claims) |> RunLog.judge(now, claims, worst)
-    ledger = ledger |> RunLog.watch(now, followers) |> tell(now, told)
-    {events, script} = Scenario.due(s.script, now(s.epoch_ms), RunLog.leader(ledger))
-    s = Enum.reduce(events, %{s | ledger: ledger, said: said, script: script}, &play/2)
+    run_log = s.run_log |> RunLog.note(now, claims) |> RunLog.judge(now, claims, worst)
+    run_log = run_log |> RunLog.watch(now, followers) |> tell(now, told)
+    {events, script} = Scenario.due(s.script, now(s.epoch_ms), RunLog.leader(run_log))
+    s = Enum.reduce(events, %{s | run_log: run_log, said: said, script: script}, &play/2)
     {:noreply, schedule(s)}
   end
 
-  def handle_info(message, %{crew: {module, crew}} = s) do
-    case module.hear(crew, message) do
-      {:ok, events, crew} -> {:noreply, Enum.reduce(events, %{s | crew: {module, crew}}, &note/2)}
-      {:stop, reason} -> {:stop, reason, s}
+  def handle_info(message, %{backend: {module, backend}} = s) do
+    case module.hear(backend, message) do
+      {:ok, events, backend} ->
+        {:noreply, Enum.reduce(events, %{s | backend: {module, backend}}, &note/2)}
+
+      {:stop, reason} ->
+        {:stop, reason, s}
     end
   end
 
@@ -203,13 +206,13 @@ defmodule Sim.Fleet do
   defp note({:stage, stage, id, facts}, s) do
     if Said.waits?(stage),
       do: %{s | said: Said.hear(s.said, {stage, id, facts})},
-      else: %{s | ledger: RunLog.stage(s.ledger, now(s.epoch_ms), stage, id, facts)}
+      else: %{s | run_log: RunLog.stage(s.run_log, now(s.epoch_ms), stage, id, facts)}
   end
 
   # At the same instant as the claims that show them.
-  defp tell(ledger, at_ms, stages) do
-    Enum.reduce(stages, ledger, fn {stage, id, facts}, ledger ->
-      RunLog.stage(ledger, at_ms, stage, id, facts)
+  defp tell(run_log, at_ms, stages) do
+    Enum.reduce(stages, run_log, fn {stage, id, facts}, run_log ->
+      RunLog.stage(run_log, at_ms, stage, id, facts)
     end)
   end
 
@@ -218,7 +221,7 @@ defmodule Sim.Fleet do
       at_ms: now(s.epoch_ms),
       options: s.setup.options,
       world: ask(s, :world),
-      ledger: s.ledger,
+      run_log: s.run_log,
       claims: Map.new(ask(s, :claims)),
       messages: ask(s, :messages)
     }
@@ -226,10 +229,10 @@ defmodule Sim.Fleet do
 
   defp now(epoch_ms), do: System.monotonic_time(:millisecond) - epoch_ms
 
-  defp ask(%{crew: {module, crew}}, what), do: apply(module, what, [crew])
+  defp ask(%{backend: {module, backend}}, what), do: apply(module, what, [backend])
 
-  defp become(%{crew: {module, crew}} = s, what, arguments),
-    do: %{s | crew: {module, apply(module, what, [crew | arguments])}}
+  defp become(%{backend: {module, backend}} = s, what, arguments),
+    do: %{s | backend: {module, apply(module, what, [backend | arguments])}}
 
   defp schedule(s) do
     next = max(s.next + @period_ms, System.monotonic_time(:millisecond))

@@ -60,25 +60,25 @@ defmodule Sim.Node do
   defp start(%{part: {module, options}} = config) do
     Process.flag(:trap_exit, true)
     {:ok, supervisor, facts, report} = module.start(options)
-    {:ok, courier} = Reporter.start_link(config.launcher, report)
-    Reporter.tell(courier, {:up, Map.put(facts, :main, self())})
-    wait(supervisor, courier, config.part)
+    {:ok, reporter} = Reporter.start_link(config.launcher, report)
+    Reporter.tell(reporter, {:up, Map.put(facts, :main, self())})
+    wait(supervisor, reporter, config.part)
   end
 
-  defp wait(supervisor, courier, {module, options} = part) do
+  defp wait(supervisor, reporter, {module, options} = part) do
     receive do
       :begin ->
         module.begin(options)
-        wait(supervisor, courier, part)
+        wait(supervisor, reporter, part)
 
       {:EXIT, ^supervisor, reason} ->
         fail("its parts have ended: #{inspect(reason, limit: 20)}")
 
-      {:EXIT, ^courier, reason} ->
-        fail("its courier has ended: #{inspect(reason, limit: 20)}")
+      {:EXIT, ^reporter, reason} ->
+        fail("its reporter has ended: #{inspect(reason, limit: 20)}")
 
       _other ->
-        wait(supervisor, courier, part)
+        wait(supervisor, reporter, part)
     end
   end
 

@@ -3,7 +3,7 @@ defmodule Sim.Trial do
   A whole mission as a function: members, radio and world folded in lockstep, as fast as it goes,
   the same to the byte for one seed. No process, no clock.
 
-  Every 50 ms, in this order: radio, sense, mind (every 100 ms, with a new picture), reflex, act.
+  Every 50 ms, in this order: radio, sense, think (every 100 ms, with a new picture), reflex, act.
   `step/1` is 100 ms. What happens on purpose (landmark moved, robots killed) is `Sim.Trial.Scenario`;
   what is written down of a run is `Sim.Trial.RunLog`.
   """
@@ -14,7 +14,7 @@ defmodule Sim.Trial do
 
   @half_ms 50
 
-  @enforce_keys [:options, :map, :world, :radio, :members, :script, :ledger, :colours]
+  @enforce_keys [:options, :map, :world, :radio, :members, :script, :run_log, :colours]
   defstruct @enforce_keys ++ [at_ms: 0]
 
   @type t :: %__MODULE__{at_ms: non_neg_integer()}
@@ -107,7 +107,7 @@ defmodule Sim.Trial do
       at_ms: trial.at_ms,
       options: trial.options,
       world: trial.world,
-      ledger: trial.ledger,
+      run_log: trial.run_log,
       claims: Map.new(claims(trial)),
       messages: %{sent: trial.radio.sent, lost: trial.radio.lost}
     }
@@ -133,7 +133,7 @@ defmodule Sim.Trial do
         ),
       members: members,
       script: Scenario.new(options.moves, options.kills),
-      ledger: RunLog.new(),
+      run_log: RunLog.new(),
       colours: World.colours()
     }
 
@@ -141,7 +141,7 @@ defmodule Sim.Trial do
   end
 
   defp play(trial) do
-    {events, script} = Scenario.due(trial.script, trial.at_ms, RunLog.leader(trial.ledger))
+    {events, script} = Scenario.due(trial.script, trial.at_ms, RunLog.leader(trial.run_log))
     Enum.reduce(events, %{trial | script: script}, &play_one/2)
   end
 
@@ -151,7 +151,7 @@ defmodule Sim.Trial do
         trial
         | world: World.kill(trial.world, id),
           members: Map.delete(trial.members, id),
-          ledger: RunLog.stage(trial.ledger, trial.at_ms, :killed, id, %{})
+          run_log: RunLog.stage(trial.run_log, trial.at_ms, :killed, id, %{})
       }
     else
       trial
@@ -162,7 +162,7 @@ defmodule Sim.Trial do
     %{
       trial
       | world: World.move_landmark(trial.world, place),
-        ledger: RunLog.stage(trial.ledger, trial.at_ms, :landmark_moved, nil, %{})
+        run_log: RunLog.stage(trial.run_log, trial.at_ms, :landmark_moved, nil, %{})
     }
   end
 
@@ -219,11 +219,11 @@ defmodule Sim.Trial do
     parts = Radio.parts(trial.radio, Enum.map(claims, &elem(&1, 0)))
     standing = for {id, member} <- trial.members, Member.stands?(member), do: id
 
-    ledger = RunLog.note(trial.ledger, trial.at_ms, claims, parts, standing)
+    run_log = RunLog.note(trial.run_log, trial.at_ms, claims, parts, standing)
     worst = fn leader -> trial |> run() |> Evaluation.worst(leader) end
-    ledger = RunLog.judge(ledger, trial.at_ms, claims, worst)
-    followers = fn -> Evaluation.followers(%{run(trial) | ledger: ledger}) end
-    %{trial | ledger: RunLog.watch(ledger, trial.at_ms, followers)}
+    run_log = RunLog.judge(run_log, trial.at_ms, claims, worst)
+    followers = fn -> Evaluation.followers(%{run(trial) | run_log: run_log}) end
+    %{trial | run_log: RunLog.watch(run_log, trial.at_ms, followers)}
   end
 
   defp act(trial) do
@@ -257,5 +257,5 @@ defmodule Sim.Trial do
   end
 
   defp effect({:stage, name, facts}, id, trial),
-    do: %{trial | ledger: RunLog.stage(trial.ledger, trial.at_ms, name, id, facts)}
+    do: %{trial | run_log: RunLog.stage(trial.run_log, trial.at_ms, name, id, facts)}
 end

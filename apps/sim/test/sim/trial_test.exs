@@ -25,8 +25,8 @@ defmodule Sim.TrialTest do
   test "the leader is the one that saw the landmark largest, of those in the record" do
     for seed <- 1..4 do
       {:ok, trial} = Trial.new(%{seed: seed, blobs: :direct})
-      trial = until(trial, &(Sim.Trial.RunLog.leader(&1.ledger) != nil))
-      leader = Sim.Trial.RunLog.leader(trial.ledger)
+      trial = until(trial, &(Sim.Trial.RunLog.leader(&1.run_log) != nil))
+      leader = Sim.Trial.RunLog.leader(trial.run_log)
       reports = trial.members[leader].mission.round.reports
       assert map_size(reports) == 6
       assert reports[leader].found
@@ -93,7 +93,7 @@ defmodule Sim.TrialTest do
   test "a gap in the middle closes, without a new election" do
     {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct, kills: []})
     trial = until(trial, &Trial.formed?/1)
-    leader = Sim.Trial.RunLog.leader(trial.ledger)
+    leader = Sim.Trial.RunLog.leader(trial.run_log)
     second = Enum.at(trial.members[leader].mission.order, 1)
     trial = trial |> Trial.kill(second) |> to_the_end() |> assert_formed()
     assert Trial.result(trial).leader_changes == 0

@@ -78,7 +78,7 @@ defmodule Sim.WorldTest do
     assert again.collisions == 2
   end
 
-  test "stops at another robot, dead or alive; the gap is kept in mind" do
+  test "stops at another robot, dead or alive; the gap is kept in controller" do
     world =
       world([robot(:mag1, 0, 0), robot(:mag2, 1, 0)])
       |> World.kill(:mag2)

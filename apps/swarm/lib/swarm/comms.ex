@@ -1,13 +1,13 @@
 defmodule Swarm.Comms do
   @moduledoc """
-  A robot's ear and mouth, a companion of its pilot (`Robot.Companion`).
+  A robot's end of all messages, a companion of its pilot (`Robot.Companion`).
 
-  Ear: whatever arrives passes `Swarm.Message.check/1`; what is malformed is dropped and counted.
-  Heartbeats become peers on the robot's board, everything else goes to the pilot. Mouth: what the
-  mission says goes out, and five times a second a heartbeat, with what the board says of the robot.
+  In: `Swarm.Message.check/1` checks every message; malformed ones are dropped and counted. Heartbeats become
+  peers on the robot's board, everything else goes to the pilot. Out: what the mission says and, five times a
+  second, a heartbeat with what the board says of the robot.
 
   An e-stop spreads with the heartbeats, also one that was pressed on the robot's gate; how it
-  stands is `Swarm.EStop`'s to say, which is started beside the link. Of two robots of one name the
+  stands is `Swarm.EStop`'s to say, which is started beside the comms process. Of two robots of one name the
   later one (`Swarm.Comms.NameClaim`) stops and falls silent, with the event `[:swarm, :link, :duplicate_id]`.
 
   | part | what it does |
@@ -18,7 +18,7 @@ defmodule Swarm.Comms do
   | `Swarm.Comms.CommandHandler` | answers people, if what they ask is not too old (`Swarm.Commands.Freshness`) |
   | `Swarm.Comms.LoadShedder` | keeps the mailbox short |
 
-  `join/2` makes a config with a link. Its options:
+  `join/2` makes a config with a comms process. Its options:
 
     * `:transport` - `{m, f, a}`; a message goes to `apply(m, f, a ++ [from, ids, message])`, and
       arrives by `hear/2`. Default: `Swarm.Comms.Transport.transmit/3`
@@ -42,7 +42,7 @@ defmodule Swarm.Comms do
   # So many messages are handled between two looks at how many wait.
   @look_every 64
 
-  @doc "The config of a robot that talks: with a link, which its mission speaks through, and a brake."
+  @doc "The config of a robot that talks: with a comms process, which its mission speaks through, and a brake."
   @spec join(Config.t(), keyword()) :: Config.t()
   def join(%Config{} = config, options \\ []) do
     options = Keyword.validate!(options, [:boot, transport: {Transport, :transmit, []}])
@@ -55,7 +55,7 @@ defmodule Swarm.Comms do
   def child_spec({config, options}),
     do: %{id: __MODULE__, start: {__MODULE__, :start_link, [config, options]}}
 
-  @doc "Starts the link of a robot, as its supervisor does."
+  @doc "Starts the comms process of a robot, as its supervisor does."
   @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
   def start_link(%Config{} = config, options) do
     GenServer.start_link(__MODULE__, {config, options},
@@ -94,9 +94,9 @@ defmodule Swarm.Comms do
       config: config,
       id: id,
       board: board,
-      ear: Receiver.new(id, EStop.written(board)),
+      receiver: Receiver.new(id, EStop.written(board)),
       chart: PeerWriter.new(board),
-      mouth: Sender.new(config, board, transport, boot),
+      sender: Sender.new(config, board, transport, boot),
       name: NameClaim.new(id, {boot, node()}),
       unseen: 0,
       noted: nil,
@@ -118,14 +118,14 @@ defmodule Swarm.Comms do
   @impl GenServer
   def handle_cast({:say, ids, %Message{} = message}, s) do
     if WireTypes.names?(ids),
-      do: {:noreply, %{s | mouth: Sender.speak(s.mouth, ids, message)}},
+      do: {:noreply, %{s | sender: Sender.speak(s.sender, ids, message)}},
       else: {:noreply, reject(s)}
   end
 
   def handle_cast({:hear, term}, s) do
     at_ms = Config.now(s.config)
-    {heard, ear} = Receiver.hear(s.ear, term, at_ms)
-    {:noreply, s |> stop(ear, term) |> heard(heard, at_ms) |> relieve()}
+    {heard, receiver} = Receiver.hear(s.receiver, term, at_ms)
+    {:noreply, s |> stop(receiver, term) |> heard(heard, at_ms) |> relieve()}
   end
 
   def handle_cast({:command, request, ref}, s) when is_reference(ref),
@@ -135,15 +135,15 @@ defmodule Swarm.Comms do
     do: {:noreply, command(s, request, ref, stamp)}
 
   def handle_cast({:stamp, ref}, s) when is_reference(ref) do
-    {stamp, mouth} = Sender.stamp(s.mouth)
+    {stamp, sender} = Sender.stamp(s.sender)
     Nonblocking.answer(ref, stamp)
-    {:noreply, %{s | mouth: mouth}}
+    {:noreply, %{s | sender: sender}}
   end
 
   def handle_cast(:stop, s), do: {:noreply, latch(s, EStop.written(s.board))}
 
   def handle_cast({:rejected, why}, s) when is_atom(why),
-    do: {:noreply, %{s | ear: Receiver.reject(s.ear, why)}}
+    do: {:noreply, %{s | receiver: Receiver.reject(s.receiver, why)}}
 
   def handle_cast({:rival, {boot, node} = other, link}, s)
       when is_integer(boot) and is_atom(node) and (is_pid(link) or link == nil) do
@@ -166,7 +166,7 @@ defmodule Swarm.Comms do
   end
 
   defp heard(s, {:peer, id}, at_ms),
-    do: %{s | chart: PeerWriter.heard(s.chart, s.ear.peers, id, at_ms)}
+    do: %{s | chart: PeerWriter.heard(s.chart, s.receiver.peers, id, at_ms)}
 
   defp heard(s, {:message, message}, _at_ms) do
     Pilot.hear(s.id, {:message, message})
@@ -177,11 +177,11 @@ defmodule Swarm.Comms do
 
   defp tick(s, at_ms) do
     s = note(follow(s))
-    s = %{s | chart: PeerWriter.grow_old(s.chart, s.ear.peers, at_ms)}
-    counts = %{sent: s.mouth.sent, heard: s.ear.heard, rejected: s.ear.rejected}
+    s = %{s | chart: PeerWriter.grow_old(s.chart, s.receiver.peers, at_ms)}
+    counts = %{sent: s.sender.sent, heard: s.receiver.heard, rejected: s.receiver.rejected}
     Board.put(s.board, :link, :radio, counts, at_ms)
-    s = %{s | mouth: Sender.tick(s.mouth, s.ear, at_ms)}
-    if rem(s.mouth.ticks, @rivals_every) == 0, do: NameClaim.challenge(s.name)
+    s = %{s | sender: Sender.tick(s.sender, s.receiver, at_ms)}
+    if rem(s.sender.ticks, @rivals_every) == 0, do: NameClaim.challenge(s.name)
     s
   end
 
@@ -189,24 +189,24 @@ defmodule Swarm.Comms do
     noted =
       if NameClaim.left?(s.name),
         do: RobotInfo.leave(s.noted, s.id),
-        else: RobotInfo.note(s.noted, s.config, s.board, s.mouth.stamps.boot, s.ear)
+        else: RobotInfo.note(s.noted, s.config, s.board, s.sender.stamps.boot, s.receiver)
 
     %{s | noted: noted}
   end
 
-  # Who knows no better way than the link finds the brake through it.
+  # Who knows no better way than the comms process finds the brake through it.
   defp command(s, request, ref, stamp) do
-    case Freshness.judge(s.mouth.stamps, request, ref, stamp, Config.now(s.config)) do
+    case Freshness.judge(s.sender.stamps, request, ref, stamp, Config.now(s.config)) do
       :ok ->
         if EStop.takes?(request),
           do: EStop.take(s.id, request, ref),
-          else: answer(s, CommandHandler.answer(request, s.config, s.board, s.ear), ref)
+          else: answer(s, CommandHandler.answer(request, s.config, s.board, s.receiver), ref)
 
         s
 
       {:error, age} ->
         Nonblocking.answer(ref, Freshness.refusal(s.id, age))
-        %{s | ear: Receiver.reject(s.ear, :too_old)}
+        %{s | receiver: Receiver.reject(s.receiver, :too_old)}
     end
   end
 
@@ -215,44 +215,52 @@ defmodule Swarm.Comms do
   defp answer(_s, answer, ref), do: Nonblocking.answer(ref, answer)
 
   # The brake knows best; it is only asked where a heartbeat seems to change something.
-  defp stop(%{ear: %{stop: stop}} = s, %{stop: stop} = ear, _term), do: %{s | ear: ear}
+  defp stop(%{receiver: %{stop: stop}} = s, %{stop: stop} = receiver, _term),
+    do: %{s | receiver: receiver}
 
-  defp stop(s, ear, %Message{kind: :relay, body: inner}), do: stop(s, ear, inner)
+  defp stop(s, receiver, %Message{kind: :relay, body: inner}), do: stop(s, receiver, inner)
 
-  defp stop(s, ear, %Message{body: beat}),
-    do: latch(%{s | ear: %{ear | stop: s.ear.stop}}, EStop.beat(s.id, beat.estop, beat.latched))
+  defp stop(s, receiver, %Message{body: beat}),
+    do:
+      latch(
+        %{s | receiver: %{receiver | stop: s.receiver.stop}},
+        EStop.beat(s.id, beat.estop, beat.latched)
+      )
 
   # A stop may have been pressed on the robot itself.
   defp follow(s) do
-    if Board.latched?(s.board) == s.ear.stop.latched?,
+    if Board.latched?(s.board) == s.receiver.stop.latched?,
       do: s,
       else: latch(s, EStop.follow(s.id))
   end
 
-  defp latch(%{ear: %{stop: before} = ear} = s, stop) do
-    s = %{s | ear: %{ear | stop: stop}}
-    if stop.latched? == before.latched?, do: s, else: %{s | mouth: Sender.urge(s.mouth, s.ear)}
+  defp latch(%{receiver: %{stop: before} = receiver} = s, stop) do
+    s = %{s | receiver: %{receiver | stop: stop}}
+
+    if stop.latched? == before.latched?,
+      do: s,
+      else: %{s | sender: Sender.urge(s.sender, s.receiver)}
   end
 
   defp give_way(s, other) do
     EStop.present(s.id, false)
     Pilot.halt(s.id)
     Event.execute([:swarm, :link, :duplicate_id], %{}, %{robot: s.id, other: other})
-    %{s | mouth: %{s.mouth | silent?: true}}
+    %{s | sender: %{s.sender | silent?: true}}
   end
 
   defp addressed(:all), do: Transport.robots()
   defp addressed(ids) when is_list(ids), do: ids
   defp addressed(id), do: [id]
 
-  defp reject(s), do: relieve(%{s | ear: Receiver.reject(s.ear, :not_a_message)})
+  defp reject(s), do: relieve(%{s | receiver: Receiver.reject(s.receiver, :not_a_message)})
 
   defp relieve(%{unseen: unseen} = s) when unseen < @look_every, do: %{s | unseen: unseen + 1}
 
   defp relieve(s) do
     case LoadShedder.relieve([:tick | NameClaim.timers(s.name)]) do
       0 -> %{s | unseen: 0}
-      dropped -> %{s | unseen: 0, ear: Receiver.reject(s.ear, :flooded, dropped)}
+      dropped -> %{s | unseen: 0, receiver: Receiver.reject(s.receiver, :flooded, dropped)}
     end
   end
 

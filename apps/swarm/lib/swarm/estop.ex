@@ -1,11 +1,11 @@
 defmodule Swarm.EStop do
   @moduledoc """
-  A robot's emergency brake: a companion beside its link, of high priority, with a mailbox of its
+  A robot's emergency stop: a companion beside its comms process, of high priority, with a mailbox of its
   own. What stops the robot comes here (`:estop`, `:reset`, `:stop` and `:disarm` of people, calls of `Swarm.EStop.Broadcaster`)
-  and goes to the gate at once, also where the link is flooded, hangs or is dead.
+  and goes to the gate at once, also where the comms process is flooded, hangs or is dead.
 
   It alone decides how the emergency stop stands (`Swarm.EStop.State`), and writes it on the board under
-  `:estop`. The link asks it about what heartbeats say, and is told of each change, so that the next
+  `:estop`. The comms process asks it about what heartbeats say, and is told of each change, so that the next
   heartbeats, which follow at once, spread it.
 
   A stop goes to gate, executive and pilot at once, so that none that hangs holds up the others. It is
@@ -30,7 +30,7 @@ defmodule Swarm.EStop do
   def child_spec({config, options}),
     do: %{id: __MODULE__, start: {__MODULE__, :start_link, [config, options]}}
 
-  @doc "Starts the brake of a robot, as its supervisor does."
+  @doc "Starts the e-stop process of a robot, as its supervisor does."
   @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
   def start_link(%Config{} = config, _options) do
     GenServer.start_link(EStop.Server, config,
@@ -51,7 +51,7 @@ defmodule Swarm.EStop do
   def hear(_node, _malformed), do: :ok
 
   @doc """
-  What a heartbeat that the link of this robot heard says of the emergency stop; returns how the stop
+  What a heartbeat that the comms process of this robot heard says of the emergency stop; returns how the stop
   stands with it.
   """
   @spec beat(robot :: atom(), number :: non_neg_integer(), latched? :: boolean()) ::
@@ -67,12 +67,12 @@ defmodule Swarm.EStop do
   @spec written(Board.t()) :: EStop.State.t()
   defdelegate written(board), to: EStop.Actions
 
-  @doc "Whether a request is for the brake; all others are for the link."
+  @doc "Whether a request is for the e-stop process; all others are for the comms process."
   @spec takes?(request :: term()) :: boolean()
   def takes?({:estop, _call}), do: true
   def takes?(request), do: request in [:stop, :disarm, :estop, :reset]
 
-  @doc "Takes a request for the brake from the robot's link, which has looked how old it is."
+  @doc "Takes a request for the e-stop process from the robot's comms process, which has looked how old it is."
   @spec take(robot :: atom(), request :: term(), reference()) :: :ok
   def take(robot, request, ref),
     do: GenServer.cast(Names.via(robot, :brake), {:in_time, request, ref})

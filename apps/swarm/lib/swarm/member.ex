@@ -1,6 +1,6 @@
 defmodule Swarm.Member do
   @moduledoc """
-  One robot of a fleet as one pure function: the peers it hears, its mission, its mind and its
+  One robot of a fleet as one pure function: the peers it hears, its mission, its controller and its
   gate, composed. `Sim.Trial` folds it in lockstep; live, the processes of `Robot.Supervisor` and
   `Swarm.Comms` run the same parts in the same order, so both do the same on the same input.
 
@@ -10,7 +10,7 @@ defmodule Swarm.Member do
   | `{:blobs, blobs, %{at_ms:, pan:}}` | the eye |
   | `{:message, term, at_ms}` | another robot |
   | `{:command, command, at_ms}` | a person |
-  | `{:tick, at_ms}` | the clock, 10 Hz: mind, then mission, then (5 Hz) the heartbeat |
+  | `{:tick, at_ms}` | the clock, 10 Hz: controller, then mission, then (5 Hz) the heartbeat |
   | `{:reflex, at_ms}` | the clock, 20 Hz: the gate |
 
   Effects: `{:drive, twist}`, `{:look, pan, tilt}`, `{:send, to, message}`, `{:stage, name, map}`.
@@ -26,7 +26,17 @@ defmodule Swarm.Member do
 
   @beat_ms 200
 
-  @enforce_keys [:id, :profile, :boot, :module, :options, :mission, :mind, :reflex, :ear]
+  @enforce_keys [
+    :id,
+    :profile,
+    :boot,
+    :module,
+    :options,
+    :mission,
+    :controller,
+    :reflex,
+    :receiver
+  ]
   defstruct @enforce_keys ++
               [
                 phase: :idle,
@@ -41,7 +51,7 @@ defmodule Swarm.Member do
   @typedoc """
   `mission` is `nil` between a stop and the next start, and `halted` what is left of it for that
   (`c:Robot.Mission.halted/1`). `entries` is what was sensed last, by name, and when; `phase`, `claim` and `look` are what the
-  mission said last; `ear` is what was heard: peers, emergency stop, rejected messages.
+  mission said last; `receiver` is what was heard: peers, emergency stop, rejected messages.
   """
   @type t :: %__MODULE__{
           id: atom(),
@@ -51,9 +61,9 @@ defmodule Swarm.Member do
           options: keyword(),
           mission: term() | nil,
           halted: term() | nil,
-          mind: Controller.t(),
+          controller: Controller.t(),
           reflex: Reflex.t(),
-          ear: Receiver.t(),
+          receiver: Receiver.t(),
           phase: term(),
           entries: %{atom() => {term(), integer()}},
           claim: map(),
@@ -94,9 +104,9 @@ defmodule Swarm.Member do
       options: mission_options,
       mission: mission,
       phase: phase,
-      mind: Controller.new(profile: options[:profile], start: options[:start]),
+      controller: Controller.new(profile: options[:profile], start: options[:start]),
       reflex: Reflex.new(options[:profile]),
-      ear: Receiver.new(options[:id])
+      receiver: Receiver.new(options[:id])
     }
   end
 
@@ -111,24 +121,26 @@ defmodule Swarm.Member do
     do: {put(member, :blobs, %{blobs: blobs, pan: pan}, at_ms), []}
 
   def step(member, {:message, term, at_ms}) do
-    {heard, ear} = Receiver.hear(member.ear, term, at_ms)
+    {heard, receiver} = Receiver.hear(member.receiver, term, at_ms)
 
     case heard do
-      {:message, message} -> handle(%{member | ear: ear}, {:message, message})
-      _peer_or_nothing -> latch(member, ear)
+      {:message, message} -> handle(%{member | receiver: receiver}, {:message, message})
+      _peer_or_nothing -> latch(member, receiver)
     end
   end
 
-  def step(%{ear: ear} = member, {:command, :estop, _at_ms}),
-    do: latch(member, %{ear | stop: EStop.State.press(ear.stop)})
+  def step(%{receiver: receiver} = member, {:command, :estop, _at_ms}),
+    do: latch(member, %{receiver | stop: EStop.State.press(receiver.stop)})
 
-  def step(%{ear: ear} = member, {:command, :reset, _at_ms}) do
+  def step(%{receiver: receiver} = member, {:command, :reset, _at_ms}) do
     reflex = Reflex.reset(member.reflex)
-    {%{member | reflex: reflex, ear: %{ear | stop: EStop.State.reset(ear.stop)}}, []}
+
+    {%{member | reflex: reflex, receiver: %{receiver | stop: EStop.State.reset(receiver.stop)}},
+     []}
   end
 
   # What is asked for while all stand would otherwise begin with the reset.
-  def step(%{ear: %{stop: %{latched?: true}}} = member, {:command, command, _at_ms})
+  def step(%{receiver: %{stop: %{latched?: true}}} = member, {:command, command, _at_ms})
       when command != :stop,
       do: {member, []}
 
@@ -144,11 +156,11 @@ defmodule Swarm.Member do
   def step(member, {:command, command, _at_ms}), do: handle(member, {:command, command})
 
   def step(member, {:tick, at_ms}) do
-    {wish, outcome, mind} = Controller.tick(member.mind, percept(member, at_ms))
+    {wish, outcome, controller} = Controller.tick(member.controller, percept(member, at_ms))
     reflex = Reflex.wish(member.reflex, wish.twist, at_ms)
-    member = %{member | mind: mind, reflex: reflex}
+    member = %{member | controller: controller, reflex: reflex}
     {member, done} = if outcome, do: handle(member, outcome(outcome)), else: {member, []}
-    {member, effects} = handle(member, {:tick, Controller.percept(mind)})
+    {member, effects} = handle(member, {:tick, Controller.percept(controller)})
     {member, beats} = beat(member, at_ms)
     look = for pan <- List.wrap(wish.look || member.look), do: {:look, pan, 0.0}
     {member, look ++ done ++ effects ++ beats}
@@ -163,14 +175,14 @@ defmodule Swarm.Member do
   @doc "The pose that the robot believes to have, or `nil`."
   @spec pose(t()) :: Pose.t() | nil
   def pose(member) do
-    percept = Controller.percept(member.mind)
+    percept = Controller.percept(member.controller)
     percept && percept.pose
   end
 
   @doc "Within how many metres of that pose the robot is in 95 of 100 cases (`Robot.Percept`), or `nil`."
   @spec uncertainty(t()) :: float() | nil
   def uncertainty(member) do
-    with %Percept{uncertainty: %{radius: radius}} <- Controller.percept(member.mind),
+    with %Percept{uncertainty: %{radius: radius}} <- Controller.percept(member.controller),
          do: radius,
          else: (_no_pose -> nil)
   end
@@ -181,7 +193,7 @@ defmodule Swarm.Member do
 
   @doc "Whether the mission lets the robot stand and wait, for a round, a leader or a person."
   @spec stands?(t()) :: boolean()
-  def stands?(member), do: member.mission == nil or member.mind.tag == :stand
+  def stands?(member), do: member.mission == nil or member.controller.tag == :stand
 
   defp put(member, key, value, at_ms),
     do: %{member | entries: Map.put(member.entries, key, {value, at_ms})}
@@ -192,7 +204,7 @@ defmodule Swarm.Member do
         robot: member.id,
         at_ms: at_ms,
         profile: member.profile,
-        peers: Peers.percepts(member.ear.peers, at_ms)
+        peers: Peers.percepts(member.receiver.peers, at_ms)
       },
       fn key, limit_ms ->
         case member.entries do
@@ -205,16 +217,20 @@ defmodule Swarm.Member do
 
   # An e-stop spreads with every heartbeat.
   # The mission ends with it: after the reset nothing moves until somebody says so.
-  defp latch(%{ear: %{stop: %{latched?: false}}} = member, %{stop: %{latched?: true}} = ear) do
-    {halt(%{member | reflex: Reflex.estop(member.reflex), ear: ear}), []}
+  defp latch(
+         %{receiver: %{stop: %{latched?: false}}} = member,
+         %{stop: %{latched?: true}} = receiver
+       ) do
+    {halt(%{member | reflex: Reflex.estop(member.reflex), receiver: receiver}), []}
   end
 
-  defp latch(member, ear), do: {%{member | ear: ear}, []}
+  defp latch(member, receiver), do: {%{member | receiver: receiver}, []}
 
   defp halt(member) do
     %{
       member
-      | mind: member.mind |> Controller.goal(:idle, nil) |> Controller.anchors(%Anchors{}),
+      | controller:
+          member.controller |> Controller.goal(:idle, nil) |> Controller.anchors(%Anchors{}),
         reflex: Reflex.forget(member.reflex),
         halted: halted(member),
         mission: nil,
@@ -246,10 +262,10 @@ defmodule Swarm.Member do
   end
 
   defp carry_out({:goal, tag, goal}, {member, out}),
-    do: {%{member | mind: Controller.goal(member.mind, tag, goal)}, out}
+    do: {%{member | controller: Controller.goal(member.controller, tag, goal)}, out}
 
   defp carry_out({:anchors, anchors}, {member, out}),
-    do: {%{member | mind: Controller.anchors(member.mind, anchors)}, out}
+    do: {%{member | controller: Controller.anchors(member.controller, anchors)}, out}
 
   defp carry_out({:look, pan}, {member, out}), do: {%{member | look: pan}, out}
   defp carry_out({:claim, claim}, {member, out}), do: {%{member | claim: claim}, out}
@@ -259,12 +275,12 @@ defmodule Swarm.Member do
     do: {member, []}
 
   defp beat(member, at_ms) do
-    case Controller.percept(member.mind) do
+    case Controller.percept(member.controller) do
       %Percept{pose: %Pose{}} = percept ->
-        heard = Peers.heard(member.ear.peers, at_ms)
+        heard = Peers.heard(member.receiver.peers, at_ms)
         sender = {member.boot, member.sequence + 1}
         claim = if member.mission == nil, do: %{standing: true}, else: member.claim
-        beat = Heartbeat.new(sender, percept, claim, heard, member.ear.stop)
+        beat = Heartbeat.new(sender, percept, claim, heard, member.receiver.stop)
 
         {%{member | sequence: member.sequence + 1, beat_ms: at_ms},
          [{:send, :all, Message.new(member.id, :heartbeat, beat)}]}

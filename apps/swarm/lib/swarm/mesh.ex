@@ -77,9 +77,9 @@ defmodule Swarm.Mesh do
   @doc "The robots of nodes that are not heard here, but by others that are: commands reach them by those."
   @spec beyond() :: [atom()]
   def beyond do
-    case book() do
+    case node_table() do
       nil -> []
-      {book, _roster} -> Routing.beyond(book, now())
+      {node_table, _roster} -> Routing.beyond(node_table, now())
     end
   end
 
@@ -95,17 +95,17 @@ defmodule Swarm.Mesh do
   @doc "Who is there, as seen from here."
   @spec view() :: view()
   def view do
-    case book() do
+    case node_table() do
       nil -> %{number: 0, nodes: %{}}
-      {book, roster} -> view(book, roster, now(), Node.list())
+      {node_table, roster} -> view(node_table, roster, now(), Node.list())
     end
   end
 
   @doc "What was dropped, by reason, since the start."
   @spec rejected() :: %{atom() => pos_integer()}
   def rejected do
-    case SafeTable.lookup(__MODULE__, :book) do
-      [{:book, _book, _roster, rejected}] -> rejected
+    case SafeTable.lookup(__MODULE__, :node_table) do
+      [{:node_table, _book, _roster, rejected}] -> rejected
       [] -> %{}
     end
   end
@@ -129,10 +129,10 @@ defmodule Swarm.Mesh do
   @doc "Whether a node is known and has not been heard for a second, whatever its connection says."
   @spec silent?(node()) :: boolean()
   def silent?(node) do
-    with {book, _roster} <- book(),
+    with {node_table, _roster} <- node_table(),
          name = Atom.to_string(node),
-         true <- is_map_key(book.nodes, name) do
-      NodeTable.status(book, name, now()) != :alive
+         true <- is_map_key(node_table.nodes, name) do
+      NodeTable.status(node_table, name, now()) != :alive
     else
       _unknown -> false
     end
@@ -144,12 +144,12 @@ defmodule Swarm.Mesh do
   """
   @spec relay(atom(), tuple(), reference()) :: :ok | {:error, :unknown | :no_way}
   def relay(robot, request, ref) do
-    with {book, roster} <- book(),
-         name when name != nil <- Routing.holder(book, robot) do
+    with {node_table, roster} <- node_table(),
+         name when name != nil <- Routing.holder(node_table, robot) do
       links = for node <- Node.list(), do: Atom.to_string(node)
 
       ways =
-        for {from, to} <- Routing.ways(book, links, now()),
+        for {from, to} <- Routing.ways(node_table, links, now()),
             {:ok, node} <- [Roster.node(roster, from)],
             into: %{},
             do: {node, nodes(to, roster)}
@@ -168,22 +168,22 @@ defmodule Swarm.Mesh do
     end
   end
 
-  defp book do
-    case SafeTable.lookup(__MODULE__, :book) do
-      [{:book, book, roster, _rejected}] -> {book, roster}
+  defp node_table do
+    case SafeTable.lookup(__MODULE__, :node_table) do
+      [{:node_table, node_table, roster, _rejected}] -> {node_table, roster}
       [] -> nil
     end
   end
 
-  defp view(book, roster, now_ms, connected) do
+  defp view(node_table, roster, now_ms, connected) do
     nodes =
-      for {name, entry} <- book.nodes, into: %{} do
+      for {name, entry} <- node_table.nodes, into: %{} do
         node = Map.fetch!(roster.nodes, name)
         robots = for {id, {at_ms, _, _}} <- entry.robots, now_ms - at_ms < @gone_ms, do: id
 
         {node,
          %{
-           status: NodeTable.status(book, name, now_ms),
+           status: NodeTable.status(node_table, name, now_ms),
            connected: node in connected,
            hears: nodes(entry.hears, roster),
            robots: Enum.sort(robots),
@@ -191,7 +191,7 @@ defmodule Swarm.Mesh do
          }}
       end
 
-    %{number: book.number, nodes: nodes}
+    %{number: node_table.number, nodes: nodes}
   end
 
   defp nodes(names, roster),

@@ -2,8 +2,8 @@ defmodule Swarm.Message do
   @moduledoc """
   What robots say to each other: who, what kind, and a body whose shape the kind fixes.
 
-  Whatever comes from outside passes `check/1` once, at the ear: a malformed message is an error
-  with a reason, to be dropped and counted, and nothing behind the ear has to doubt a message.
+  Whatever comes from outside passes `check/1` once, at the receiver: a malformed message is an error
+  with a reason, to be dropped and counted, and nothing behind the receiver has to doubt a message.
   Nothing becomes an atom here. Commands are a person's, and come by another way (`Swarm`): no
   robot can start another by a message.
 

@@ -96,9 +96,9 @@ defmodule Swarm.Status do
           age_ms: non_neg_integer() | nil
         }
 
-  @doc "The status of a robot of this node, from its board and its ear."
+  @doc "The status of a robot of this node, from its board and its receiver."
   @spec of(Config.t(), Board.t(), Receiver.t()) :: t()
-  def of(config, board, ear) do
+  def of(config, board, receiver) do
     entries = Board.entries(board)
     driving = value(entries, :driving)
     mission = value(entries, :mission)
@@ -130,10 +130,13 @@ defmodule Swarm.Status do
           into: %{},
           do: {device, words(config, device, reason)}
         ),
-      peers: Map.new(ear.peers.rows, fn {id, _} -> {id, Peers.status(ear.peers, id, now_ms)} end),
-      hears: Peers.heard(ear.peers, now_ms),
-      view: {Peers.view_number(ear.peers, now_ms), Peers.view(ear.peers, now_ms)},
-      rejected: ear.rejected,
+      peers:
+        Map.new(receiver.peers.rows, fn {id, _} ->
+          {id, Peers.status(receiver.peers, id, now_ms)}
+        end),
+      hears: Peers.heard(receiver.peers, now_ms),
+      view: {Peers.view_number(receiver.peers, now_ms), Peers.view(receiver.peers, now_ms)},
+      rejected: receiver.rejected,
       age_ms: age(entries)
     }
   end

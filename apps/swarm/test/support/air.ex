@@ -27,7 +27,7 @@ defmodule Swarm.Air do
       for peers <- List.wrap(options[:peers] && [options[:peers]]),
           do: begin(Strategy.Static, Enum.map(peers, &air.addresses[&1]))
 
-    station =
+    protocol =
       Protocol.new(
         secret: options[:secret] || secret(),
         roster: Roster.new(:"#{name}@lab", options[:fleet] || [:a, :b, :c, :d, :e, :f]),
@@ -37,7 +37,7 @@ defmodule Swarm.Air do
         group: group
       )
 
-    put_in(air.stations[name], station)
+    put_in(air.stations[name], protocol)
   end
 
   defp begin(module, options) do
@@ -74,16 +74,16 @@ defmodule Swarm.Air do
 
   defp arrive({_at, from, to, datagram}, air) do
     case air.stations do
-      %{^to => station} ->
-        act(air, to, Protocol.hear(station, datagram, air.addresses[from], air.now))
+      %{^to => protocol} ->
+        act(air, to, Protocol.hear(protocol, datagram, air.addresses[from], air.now))
 
       _off ->
         air
     end
   end
 
-  defp act(air, name, {station, effects}) do
-    Enum.reduce(effects, put_in(air.stations[name], station), &effect(&1, name, &2))
+  defp act(air, name, {protocol, effects}) do
+    Enum.reduce(effects, put_in(air.stations[name], protocol), &effect(&1, name, &2))
   end
 
   defp effect({:send, @group, datagram}, name, air) do

@@ -96,9 +96,9 @@ defmodule Swarm.BlackboardTest do
   test "only a robot of this node writes its rows, by keys that are names" do
     {[a, b], _air} = boards(2)
     assert {:error, line} = Blackboard.put(a, b, :x, 1)
-    assert line =~ "no robot of this node"
+    assert line =~ "is not a robot of this node"
     assert {:error, line} = Blackboard.put(a, a, "x", 1)
-    assert line =~ "no key"
+    assert line =~ "is not a key"
     assert {:error, line} = Blackboard.put(:no_board_here, a, :x, 1)
     assert line =~ "does not answer"
     assert Blackboard.get(:no_board_here, a, :x, 1) == :error

@@ -47,7 +47,7 @@ defmodule Swarm.MemberTest do
   end
 
   defp hear(member, term, at_ms \\ 100), do: elem(Member.step(member, {:message, term, at_ms}), 0)
-  defp rejected(member), do: member.ear.rejected |> Map.values() |> Enum.sum()
+  defp rejected(member), do: member.receiver.rejected |> Map.values() |> Enum.sum()
   defp deep(n), do: Enum.reduce(1..n, nil, fn _, term -> [term] end)
 
   defp junk do
@@ -152,22 +152,25 @@ defmodule Swarm.MemberTest do
         ] do
       before = member()
       later = hear(before, term)
-      assert later.ear.rejected == %{reason => 1}, inspect(term, limit: 5)
+      assert later.receiver.rejected == %{reason => 1}, inspect(term, limit: 5)
       assert later.mission == before.mission
     end
   end
 
   test "whole messages are heard" do
     for {kind, body} <- [heartbeat: @beat, place: @anchor, round: @letter],
-        do: assert(hear(member(), Message.new(:mag2, kind, body)).ear.rejected == %{})
+        do: assert(hear(member(), Message.new(:mag2, kind, body)).receiver.rejected == %{})
   end
 
   test "an emergency stop spreads by heartbeats, and its own echo does not bring it back" do
     {one, _} = Member.step(member(), {:command, :estop, 0})
-    assert one.ear.stop.latched?
-    pressed = Message.new(:mag2, :heartbeat, %{@beat | estop: one.ear.stop.known, latched: true})
+    assert one.receiver.stop.latched?
+
+    pressed =
+      Message.new(:mag2, :heartbeat, %{@beat | estop: one.receiver.stop.known, latched: true})
+
     two = hear(member(:mag3), pressed)
-    assert two.ear.stop == one.ear.stop
+    assert two.receiver.stop == one.receiver.stop
     assert sense(two, 100).phase == :idle
     {_, [{:drive, twist}]} = Member.step(two, {:reflex, 100})
     assert Twist.zero?(twist)
@@ -175,11 +178,11 @@ defmodule Swarm.MemberTest do
     # Reset by a person; the neighbour, not reset yet, repeats the old number.
     {two, _} = Member.step(two, {:command, :reset, 200})
     two = hear(two, put_in(pressed.body.sequence, 2), 300)
-    refute two.ear.stop.latched?
+    refute two.receiver.stop.latched?
 
     # The next stop has the next number, and counts.
     {two, _} = Member.step(two, {:command, :estop, 400})
-    assert two.ear.stop.known == one.ear.stop.known + 1
+    assert two.receiver.stop.known == one.receiver.stop.known + 1
   end
 
   defmodule Deaf do

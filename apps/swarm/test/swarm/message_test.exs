@@ -1,5 +1,5 @@
 defmodule Swarm.MessageTest do
-  @moduledoc "Whatever comes from outside, the ear survives it."
+  @moduledoc "Whatever comes from outside, the receiver survives it."
   use ExUnit.Case, async: true
   alias Swarm.Message
   alias Swarm.Agreement.Round
@@ -99,12 +99,12 @@ defmodule Swarm.MessageTest do
           do: Map.put(message, Enum.random([:from, :kind, :body]), junk()),
           else: message
 
-      {heard, ear} = Receiver.hear(Receiver.new(:mag2), message, 0)
+      {heard, receiver} = Receiver.hear(Receiver.new(:mag2), message, 0)
 
       case heard do
-        {:peer, id} -> assert %{mode: _} = Swarm.Membership.Peers.percept(ear.peers, id, 0)
+        {:peer, id} -> assert %{mode: _} = Swarm.Membership.Peers.percept(receiver.peers, id, 0)
         {:message, _message} -> :ok
-        :nothing -> assert map_size(ear.rejected) == 1
+        :nothing -> assert map_size(receiver.rejected) == 1
       end
     end
   end

@@ -56,7 +56,7 @@ defmodule Vision.Saver do
 
   @impl GenServer
   def init(options) do
-    state = %{shelf: nil, ref: nil, saved: 0, why: nil, rest_ms: @rest_ms}
+    state = %{retention: nil, ref: nil, saved: 0, why: nil, rest_ms: @rest_ms}
     {:ok, Map.merge(Map.new(options), state), {:continue, :again}}
   end
 
@@ -65,7 +65,7 @@ defmodule Vision.Saver do
 
   @impl GenServer
   def handle_call(:status, _from, s) do
-    {files, bytes} = if s.shelf, do: Retention.size(s.shelf), else: {0, 0}
+    {files, bytes} = if s.retention, do: Retention.size(s.retention), else: {0, 0}
     {:reply, %{files: files, bytes: bytes, saved: s.saved, why: s.why}, s}
   end
 
@@ -78,7 +78,7 @@ defmodule Vision.Saver do
 
       {:error, reason} ->
         # What lies there is looked at anew: a person may have made room, or changed the disk.
-        {:noreply, failed(%{s | shelf: nil}, reason)}
+        {:noreply, failed(%{s | retention: nil}, reason)}
     end
   end
 
@@ -93,8 +93,8 @@ defmodule Vision.Saver do
   def handle_info(_late, s), do: {:noreply, s}
 
   defp again(s) do
-    with {:ok, shelf} <- shelf(s), {:ok, ref} <- look(s) do
-      %{s | shelf: shelf, ref: ref}
+    with {:ok, retention} <- retention(s), {:ok, ref} <- look(s) do
+      %{s | retention: retention, ref: ref}
     else
       {:error, reason} -> failed(s, reason)
     end
@@ -107,7 +107,7 @@ defmodule Vision.Saver do
     {:ok, s.ref}
   end
 
-  defp shelf(%{shelf: nil} = s) do
+  defp retention(%{retention: nil} = s) do
     with {:ok, names} <- File.ls(s.folder) do
       {parts, names} = Enum.split_with(names, &String.ends_with?(&1, @part))
 
@@ -127,16 +127,16 @@ defmodule Vision.Saver do
     end
   end
 
-  defp shelf(s), do: {:ok, s.shelf}
+  defp retention(s), do: {:ok, s.retention}
 
   defp save(s, jpeg) do
-    name = Retention.name(s.shelf, System.system_time(:millisecond))
+    name = Retention.name(s.retention, System.system_time(:millisecond))
     path = Path.join(s.folder, name)
 
-    with {:ok, old, shelf} <- Retention.room(s.shelf, byte_size(jpeg)),
+    with {:ok, old, retention} <- Retention.room(s.retention, byte_size(jpeg)),
          :ok <- remove(old, s.folder),
          :ok <- write(path, jpeg) do
-      {:ok, %{s | shelf: Retention.put(shelf, name, byte_size(jpeg))}}
+      {:ok, %{s | retention: Retention.put(retention, name, byte_size(jpeg))}}
     end
   end
 

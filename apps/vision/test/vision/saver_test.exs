@@ -188,18 +188,18 @@ defmodule Vision.SaverTest do
   end
 
   test "a clock that is set back does not bring the names out of order" do
-    {shelf, names} =
+    {retention, names} =
       Enum.reduce(
         [5_000, 4_000, 4_000, 9_000, 0],
         {Retention.new("mag1", 10, 100, []), []},
-        fn now, {shelf, names} ->
-          name = Retention.name(shelf, now)
-          {Retention.put(shelf, name, 1), names ++ [name]}
+        fn now, {retention, names} ->
+          name = Retention.name(retention, now)
+          {Retention.put(retention, name, 1), names ++ [name]}
         end
       )
 
     assert names == Enum.sort(names) and names == Enum.uniq(names)
-    assert Retention.size(shelf) == {5, 5}
+    assert Retention.size(retention) == {5, 5}
     # And a new start goes on behind what is there.
     again = Retention.new("mag1", 10, 100, Enum.shuffle(for name <- names, do: {name, 1}))
     assert Retention.name(again, 0) > List.last(names)
@@ -209,16 +209,17 @@ defmodule Vision.SaverTest do
     for _ <- 1..50 do
       files = :rand.uniform(10)
 
-      Enum.reduce(1..60, {Retention.new("mag1", files, 1_000, []), []}, fn now, {shelf, there} ->
+      Enum.reduce(1..60, {Retention.new("mag1", files, 1_000, []), []}, fn now,
+                                                                           {retention, there} ->
         size = :rand.uniform(500)
-        {:ok, gone, shelf} = Retention.room(shelf, size)
+        {:ok, gone, retention} = Retention.room(retention, size)
         assert gone == Enum.take(there, length(gone))
-        name = Retention.name(shelf, now)
-        shelf = Retention.put(shelf, name, size)
+        name = Retention.name(retention, now)
+        retention = Retention.put(retention, name, size)
         there = Enum.drop(there, length(gone)) ++ [name]
-        assert {count, bytes} = Retention.size(shelf)
+        assert {count, bytes} = Retention.size(retention)
         assert count == length(there) and count <= files and bytes <= 1_000
-        {shelf, there}
+        {retention, there}
       end)
     end
   end

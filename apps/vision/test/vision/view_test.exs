@@ -292,21 +292,21 @@ defmodule Vision.ViewTest do
     for _ <- 1..100 do
       every = for id <- 1..3, into: %{}, do: {id, :rand.uniform(100)}
 
-      audience =
-        Enum.reduce(every, Subscribers.new(3), fn {id, ms}, audience ->
-          {:ok, audience} = Subscribers.join(audience, id, ms, 0)
-          audience
+      subscribers =
+        Enum.reduce(every, Subscribers.new(3), fn {id, ms}, subscribers ->
+          {:ok, subscribers} = Subscribers.join(subscribers, id, ms, 0)
+          subscribers
         end)
 
       {_audience, served} =
-        Enum.reduce(1..300, {audience, %{}}, fn step, {audience, served} ->
+        Enum.reduce(1..300, {subscribers, %{}}, fn step, {subscribers, served} ->
           now = 7 * step
-          due = Subscribers.due(audience, now)
-          {ids, audience} = Subscribers.serve(audience, now)
+          due = Subscribers.due(subscribers, now)
+          {ids, subscribers} = Subscribers.serve(subscribers, now)
           assert due == 0 == (ids != [])
           served = Enum.reduce(ids, served, &Map.update(&2, &1, 1, fn n -> n + 1 end))
           asks = Enum.filter(1..3, fn _ -> :rand.uniform(2) == 1 end)
-          {Enum.reduce(asks, audience, &Subscribers.ask(&2, &1)), served}
+          {Enum.reduce(asks, subscribers, &Subscribers.ask(&2, &1)), served}
         end)
 
       for {id, count} <- served, do: assert(count <= div(2_100, every[id]) + 2)

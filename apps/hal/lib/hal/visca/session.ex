@@ -40,7 +40,7 @@ defmodule Hal.Visca.Session do
                 queue: Queue.new(),
                 step: :address,
                 target: Target.new(),
-                witness: OutlierFilter.new(),
+                outliers: OutlierFilter.new(),
                 zoom_wanted: nil,
                 zoom: nil,
                 position_ms: nil,
@@ -131,8 +131,8 @@ defmodule Hal.Visca.Session do
           others: non_neg_integer(),
           doubts: non_neg_integer()
         }
-  def counts(%__MODULE__{decoder: decoder, witness: witness}),
-    do: decoder |> Map.take([:garbage, :others]) |> Map.put(:doubts, witness.doubts)
+  def counts(%__MODULE__{decoder: decoder, outliers: outliers}),
+    do: decoder |> Map.take([:garbage, :others]) |> Map.put(:doubts, outliers.doubts)
 
   # Opening
 
@@ -217,13 +217,13 @@ defmodule Hal.Visca.Session do
 
   defp take({:result, :position, {pan, tilt} = at, took_ms}, {effects, head} = state, now_ms) do
     with true <- Units.position?(pan, tilt),
-         {true, witness} <- OutlierFilter.hear(head.witness, at, now_ms) do
+         {true, outliers} <- OutlierFilter.hear(head.outliers, at, now_ms) do
       target = Target.seen(head.target, at, now_ms)
-      head = %{head | position_ms: now_ms, witness: witness, target: target}
+      head = %{head | position_ms: now_ms, outliers: outliers, target: target}
       arrived({reading(effects, head, at, took_ms), head}, now_ms)
     else
       false -> state
-      {false, witness} -> {effects, %{head | witness: witness}}
+      {false, outliers} -> {effects, %{head | outliers: outliers}}
     end
   end
 

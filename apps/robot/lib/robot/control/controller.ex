@@ -33,8 +33,8 @@ defmodule Robot.Control.Controller do
         }
 
   @doc """
-  A mind without a goal. Options: `profile` (required), and `start`, the pose in the map frame at
-  which the odometry says zero; with it the mind keeps the percept's pose by `Robot.Localiser`.
+  A controller without a goal. Options: `profile` (required), and `start`, the pose in the map frame at
+  which the odometry says zero; with it the controller keeps the percept's pose by `Robot.Localiser`.
   """
   @spec new(keyword()) :: t()
   def new(options) do
@@ -57,28 +57,33 @@ defmodule Robot.Control.Controller do
 
   @doc "Sets, changes or (with `nil`) drops the goal."
   @spec goal(t(), tag :: term(), {module(), keyword()} | nil) :: t()
-  def goal(%__MODULE__{} = mind, _tag, nil), do: %{mind | tag: nil, module: nil, goal: nil}
+  def goal(%__MODULE__{} = controller, _tag, nil),
+    do: %{controller | tag: nil, module: nil, goal: nil}
 
-  def goal(%__MODULE__{tag: tag, module: module, goal: nil} = mind, tag, {module, _options}),
-    do: mind
+  def goal(
+        %__MODULE__{tag: tag, module: module, goal: nil} = controller,
+        tag,
+        {module, _options}
+      ),
+      do: controller
 
-  def goal(%__MODULE__{tag: tag, module: module} = mind, tag, {module, options}),
-    do: %{mind | goal: Behaviour.update(mind.goal, options)}
+  def goal(%__MODULE__{tag: tag, module: module} = controller, tag, {module, options}),
+    do: %{controller | goal: Behaviour.update(controller.goal, options)}
 
-  def goal(%__MODULE__{} = mind, tag, {module, options}) do
+  def goal(%__MODULE__{} = controller, tag, {module, options}) do
     {discs, options} = Keyword.pop(options, :discs, [])
     goal = Avoid.new(inner: module.new(options), discs: discs)
-    %{mind | tag: tag, module: module, goal: goal}
+    %{controller | tag: tag, module: module, goal: goal}
   end
 
   @doc "References for the estimate of the pose, from now on."
   @spec anchors(t(), Localiser.Anchors.t()) :: t()
-  def anchors(%__MODULE__{localiser: nil} = mind, _anchors), do: mind
+  def anchors(%__MODULE__{localiser: nil} = controller, _anchors), do: controller
 
-  def anchors(%__MODULE__{} = mind, anchors),
-    do: %{mind | localiser: Localiser.anchors(mind.localiser, anchors)}
+  def anchors(%__MODULE__{} = controller, anchors),
+    do: %{controller | localiser: Localiser.anchors(controller.localiser, anchors)}
 
-  @doc "The percept of the last tick, with the pose that the mind made of it."
+  @doc "The percept of the last tick, with the pose that the controller made of it."
   @spec percept(t()) :: Percept.t() | nil
   def percept(%__MODULE__{percept: percept}), do: percept
 
@@ -90,23 +95,24 @@ defmodule Robot.Control.Controller do
   One tick: the chosen wish (its `by` says whose), and the goal's outcome at the tick it ends.
   """
   @spec tick(t(), Percept.t()) :: {Wish.t(), {tag :: term(), integer()} | nil, t()}
-  def tick(%__MODULE__{} = mind, %Percept{} = percept) do
-    {percept, mind} = locate(mind, percept)
-    {escaping, escape, nil} = run(mind.escape, percept)
-    {resting, rest, nil} = run(mind.rest, percept)
-    {wanted, goal, outcome} = run(mind.goal, percept)
+  def tick(%__MODULE__{} = controller, %Percept{} = percept) do
+    {percept, controller} = locate(controller, percept)
+    {escaping, escape, nil} = run(controller.escape, percept)
+    {resting, rest, nil} = run(controller.rest, percept)
+    {wanted, goal, outcome} = run(controller.goal, percept)
 
-    wish = Arbiter.choose([escaping, wanted, resting], mind.last_by)
+    wish = Arbiter.choose([escaping, wanted, resting], controller.last_by)
     wish = if wish.look == nil and wanted != nil, do: %{wish | look: wanted.look}, else: wish
-    mind = %{mind | escape: escape, rest: rest, goal: goal, last_by: wish.by}
-    {wish, outcome && {mind.tag, outcome}, mind}
+    controller = %{controller | escape: escape, rest: rest, goal: goal, last_by: wish.by}
+    {wish, outcome && {controller.tag, outcome}, controller}
   end
 
-  defp locate(%{localiser: nil} = mind, percept), do: {percept, %{mind | percept: percept}}
+  defp locate(%{localiser: nil} = controller, percept),
+    do: {percept, %{controller | percept: percept}}
 
-  defp locate(mind, percept) do
-    {percept, localiser} = Localiser.update(mind.localiser, percept)
-    {percept, %{mind | localiser: localiser, percept: percept}}
+  defp locate(controller, percept) do
+    {percept, localiser} = Localiser.update(controller.localiser, percept)
+    {percept, %{controller | localiser: localiser, percept: percept}}
   end
 
   defp run(nil, _percept), do: {nil, nil, nil}

@@ -83,7 +83,7 @@ defmodule Robot.Control.Executive do
       config: config,
       board: board,
       sink: sink,
-      mind: Controller.new(profile: config.profile, start: config.start),
+      controller: Controller.new(profile: config.profile, start: config.start),
       look: nil,
       behaviour_looks?: false,
       told: nil,
@@ -97,7 +97,7 @@ defmodule Robot.Control.Executive do
   @impl GenServer
   def handle_cast({:goal, tag, goal} = input, s) do
     Trace.input(s.config, :executive, input, Config.now(s.config))
-    {:noreply, pursue(s, Controller.goal(s.mind, tag, goal))}
+    {:noreply, pursue(s, Controller.goal(s.controller, tag, goal))}
   end
 
   def handle_cast({:confirm, {m, f, a}}, s) do
@@ -108,13 +108,13 @@ defmodule Robot.Control.Executive do
   def handle_cast({:stand, then}, s) do
     Trace.input(s.config, :executive, :stand, Config.now(s.config))
     Gate.forget(s.config.id, then)
-    mind = s.mind |> Controller.goal(:idle, nil) |> Controller.anchors(%Anchors{})
-    {:noreply, pursue(%{s | look: nil}, mind)}
+    controller = s.controller |> Controller.goal(:idle, nil) |> Controller.anchors(%Anchors{})
+    {:noreply, pursue(%{s | look: nil}, controller)}
   end
 
   def handle_cast({:anchors, anchors} = input, s) do
     Trace.input(s.config, :executive, input, Config.now(s.config))
-    {:noreply, %{s | mind: Controller.anchors(s.mind, anchors)}}
+    {:noreply, %{s | controller: Controller.anchors(s.controller, anchors)}}
   end
 
   def handle_cast({:look, pan} = input, s) do
@@ -142,24 +142,25 @@ defmodule Robot.Control.Executive do
   def handle_info(_other, s), do: {:noreply, s}
 
   # Written down before its first tick, which may be its last.
-  defp pursue(%{mind: %{module: module}} = s, %{module: module} = mind), do: %{s | mind: mind}
+  defp pursue(%{controller: %{module: module}} = s, %{module: module} = controller),
+    do: %{s | controller: controller}
 
-  defp pursue(s, mind) do
-    Board.put(s.board, :executive, :goal, mind.module, Config.now(s.config))
-    %{s | mind: mind}
+  defp pursue(s, controller) do
+    Board.put(s.board, :executive, :goal, controller.module, Config.now(s.config))
+    %{s | controller: controller}
   end
 
   defp tick(%{config: config, board: board} = s, at_ms) do
     raw = Percept.Snapshot.take(board, config.profile, at_ms)
     Trace.input(config, :executive, {:tick, raw}, at_ms)
-    {wish, outcome, mind} = Controller.tick(s.mind, raw)
-    percept = Controller.percept(mind)
+    {wish, outcome, controller} = Controller.tick(s.controller, raw)
+    percept = Controller.percept(controller)
 
     Gate.wish(config.id, wish.twist)
     Trace.effect(config, :executive, {:wish, wish}, at_ms)
     s = look(s, wish.look || s.look, at_ms)
 
-    fault = fault(s, Controller.fault(mind), at_ms)
+    fault = fault(s, Controller.fault(controller), at_ms)
     doing = %{by: wish.by, weight: wish.weight, outcome: outcome, fault: fault, tick: s.tick + 1}
     Board.put(board, :executive, :doing, doing, at_ms)
     if percept.pose, do: place(board, percept, at_ms)
@@ -167,7 +168,7 @@ defmodule Robot.Control.Executive do
     # The outcome first: the mission knows what came of its goal when it sees the next percept.
     with {tag, outcome} <- outcome, do: tell(s, {:outcome, tag, outcome}, at_ms)
     tell(s, {:tick, percept}, at_ms)
-    %{s | mind: mind, tick: doing.tick, behaviour_looks?: wish.look != nil}
+    %{s | controller: controller, tick: doing.tick, behaviour_looks?: wish.look != nil}
   end
 
   defp place(board, %{pose: pose, uncertainty: uncertainty}, at_ms) do
@@ -177,7 +178,7 @@ defmodule Robot.Control.Executive do
 
   # Told when it changes.
   defp fault(s, line, at_ms) do
-    if line != Controller.fault(s.mind),
+    if line != Controller.fault(s.controller),
       do: Event.execute([:robot, :fault], %{at_ms: at_ms}, %{robot: s.config.id, line: line})
 
     line

@@ -47,7 +47,7 @@ defmodule Robot.Navigation.Steering do
 
   @doc """
   An angle to turn by. What lies straight behind is always reached by turning left, so that noise
-  about half a turn cannot make a robot change its mind.
+  about half a turn cannot make a robot change its controller.
 
       iex> Robot.Navigation.Steering.turn_error(-3.14) > 0
       true

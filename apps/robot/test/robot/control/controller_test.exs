@@ -5,7 +5,8 @@ defmodule Robot.Control.ControllerTest do
   alias Robot.Control.Controller
   alias Robot.Behaviour.{FindBlob, Follow, Goto, Move, Stop, TrackBlob}
 
-  defp with_goal(body, tag, goal), do: %{body | mind: Controller.goal(body.mind, tag, goal)}
+  defp with_goal(body, tag, goal),
+    do: %{body | controller: Controller.goal(body.controller, tag, goal)}
 
   test "goes to any place from any pose, says so once, and then rests" do
     for _ <- 1..60 do
@@ -17,7 +18,7 @@ defmodule Robot.Control.ControllerTest do
       assert Pose.distance(body.pose, {1.0, -0.5}) < 0.21
       assert abs(Pose.wrap(body.pose.heading - 1.0)) < 0.1
       {nil, body} = body |> with_goal(:there, goal) |> Body.run(20)
-      assert body.mind.last_by == :rest
+      assert body.controller.last_by == :rest
       assert Twist.zero?(body.twist)
     end
   end
@@ -152,9 +153,9 @@ defmodule Robot.Control.ControllerTest do
     assert body.twist.linear == 0.3
     {nil, body} = body |> with_goal(2, {Stop, []}) |> Body.run(20)
     assert Twist.zero?(body.twist)
-    assert body.mind.last_by == :stop
+    assert body.controller.last_by == :stop
     {nil, body} = body |> with_goal(3, nil) |> Body.run(1)
-    assert body.mind.last_by == :rest
+    assert body.controller.last_by == :rest
   end
 
   test "backs off from what it touched" do

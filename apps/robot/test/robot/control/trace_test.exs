@@ -45,8 +45,8 @@ defmodule Robot.Control.TraceTest do
 
     entries = for {_order, entry} <- :ets.tab2list(table), do: entry
     assert compare(entries, :gate, Reflex.new(profile), &gate/3) > 20
-    mind = Controller.new(profile: profile, start: start)
-    assert compare(entries, :executive, {mind, nil, false}, &executive/3) > 20
+    controller = Controller.new(profile: profile, start: start)
+    assert compare(entries, :executive, {controller, nil, false}, &executive/3) > 20
     assert compare(entries, :pilot, nil, &pilot/3) == 6
   end
 
@@ -82,23 +82,23 @@ defmodule Robot.Control.TraceTest do
     {[{:drive, twist, limits}], reflex}
   end
 
-  defp executive({:goal, tag, goal}, _at_ms, {mind, look, looks?}),
-    do: {[], {Controller.goal(mind, tag, goal), look, looks?}}
+  defp executive({:goal, tag, goal}, _at_ms, {controller, look, looks?}),
+    do: {[], {Controller.goal(controller, tag, goal), look, looks?}}
 
-  defp executive({:anchors, anchors}, _at_ms, {mind, look, looks?}),
-    do: {[], {Controller.anchors(mind, anchors), look, looks?}}
+  defp executive({:anchors, anchors}, _at_ms, {controller, look, looks?}),
+    do: {[], {Controller.anchors(controller, anchors), look, looks?}}
 
-  defp executive({:look, pan}, _at_ms, {mind, look, looks?}) do
+  defp executive({:look, pan}, _at_ms, {controller, look, looks?}) do
     news = if looks? or pan in [nil, look], do: [], else: [{:look, pan}]
-    {news, {mind, pan, looks?}}
+    {news, {controller, pan, looks?}}
   end
 
-  defp executive({:tick, percept}, _at_ms, {mind, look, _looks?}) do
-    {wish, outcome, mind} = Controller.tick(mind, percept)
+  defp executive({:tick, percept}, _at_ms, {controller, look, _looks?}) do
+    {wish, outcome, controller} = Controller.tick(controller, percept)
     looks = for pan <- List.wrap(wish.look || look), do: {:look, pan}
     outcomes = for {tag, outcome} <- List.wrap(outcome), do: {:outcome, tag, outcome}
-    effects = [{:wish, wish}] ++ looks ++ outcomes ++ [{:tick, Controller.percept(mind)}]
-    {effects, {mind, look, wish.look != nil}}
+    effects = [{:wish, wish}] ++ looks ++ outcomes ++ [{:tick, Controller.percept(controller)}]
+    {effects, {controller, look, wish.look != nil}}
   end
 
   defp pilot({:start, module, options}, _at_ms, nil) do

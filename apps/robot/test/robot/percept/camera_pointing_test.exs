@@ -12,7 +12,11 @@ defmodule Robot.Percept.CameraPointingTest do
 
   defp tracker(profile \\ Hal.Profile.magellan()) do
     body = Pose.new(0, 0) |> Body.new(profile) |> Body.with_head()
-    %{body | mind: Controller.goal(body.mind, :lead, {TrackBlob, near: 1.0, far: 3.0})}
+
+    %{
+      body
+      | controller: Controller.goal(body.controller, :lead, {TrackBlob, near: 1.0, far: 3.0})
+    }
   end
 
   # On a circle of 2 m round the robot.
@@ -66,7 +70,7 @@ defmodule Robot.Percept.CameraPointingTest do
       for pan <- [fn bearing, _percept -> bearing end, &CameraPointing.pan/2] do
         body = Pose.new(0, 0) |> Body.new() |> Body.with_head()
         goal = {Move, linear: 0.0, turn: 0.4}
-        body = %{body | mind: Controller.goal(body.mind, 1, goal)}
+        body = %{body | controller: Controller.goal(body.controller, 1, goal)}
         place = at(60)
 
         {_body, offs} =

@@ -3,52 +3,52 @@ defmodule Sim.Fleet.Backend do
   Where the robots and the world of a `Sim.Fleet` run: in this process of the operating system
   (`Sim.Fleet.Local`), or each in one of its own (`Sim.Fleet.Nodes`).
 
-  All is called in the fleet's process. What a crew makes of a message are events for the fleet's
-  ledger.
+  All is called in the fleet's process. What a backend makes of a message are events for the fleet's
+  run_log.
   """
   alias Sim.World
   alias Sim.Trial.Setup
 
-  @type crew :: term()
+  @type backend :: term()
 
   @typedoc "A robot died, and nobody of us killed it; or something is to be written down."
   @type event :: {:killed, atom()} | {:stage, atom(), atom() | nil, map()}
 
   @doc "Starts world and robots, all idle."
   @callback start(Setup.t(), keyword()) ::
-              {:ok, crew()} | {:error, line :: String.t()}
+              {:ok, backend()} | {:error, line :: String.t()}
 
   @doc "Begins the mission on all of them."
-  @callback begin(crew()) :: :ok
+  @callback begin(backend()) :: :ok
 
   @doc "The robots that live, in the order of the fleet."
-  @callback living(crew()) :: [atom()]
+  @callback living(backend()) :: [atom()]
 
   @doc "What each of them claims of itself."
-  @callback claims(crew()) :: [{atom(), map()}]
+  @callback claims(backend()) :: [{atom(), map()}]
 
   @doc "Kills a living robot at once."
-  @callback kill(crew(), atom()) :: crew()
+  @callback kill(backend(), atom()) :: backend()
 
   @doc "Changes the world."
-  @callback change(crew(), World.Server.change()) :: crew()
+  @callback change(backend(), World.Server.change()) :: backend()
 
   @doc "The world as it is."
-  @callback world(crew()) :: World.t()
+  @callback world(backend()) :: World.t()
 
   @doc "Its server; `nil` while there is none."
-  @callback server(crew()) :: pid() | nil
+  @callback server(backend()) :: pid() | nil
 
   @doc "Messages between robots so far."
-  @callback messages(crew()) :: %{sent: non_neg_integer(), lost: non_neg_integer()}
+  @callback messages(backend()) :: %{sent: non_neg_integer(), lost: non_neg_integer()}
 
   @doc "How to reach the processes of the operating system, a line each."
-  @callback lines(crew()) :: [String.t()]
+  @callback lines(backend()) :: [String.t()]
 
   @doc "Any message to the fleet that it does not know itself."
-  @callback hear(crew(), message :: term()) ::
-              {:ok, [event()], crew()} | {:stop, reason :: term()}
+  @callback hear(backend(), message :: term()) ::
+              {:ok, [event()], backend()} | {:stop, reason :: term()}
 
   @doc "Ends all of it."
-  @callback stop(crew()) :: term()
+  @callback stop(backend()) :: term()
 end

@@ -82,73 +82,73 @@ defmodule Sim.Fleet.Local do
   def stage(_event, _measurements, about, fleet), do: send(fleet, {:stage, about})
 
   @impl Sim.Fleet.Backend
-  def begin(crew) do
+  def begin(backend) do
     # All at once: on a busy machine a hundred pilots one after the other take long to answer.
     options = [max_concurrency: 100, ordered: false, timeout: :infinity]
-    crew |> living() |> Task.async_stream(&Robot.begin/1, options) |> Stream.run()
+    backend |> living() |> Task.async_stream(&Robot.begin/1, options) |> Stream.run()
   end
 
   @impl Sim.Fleet.Backend
-  def living(crew) do
-    living = Map.values(crew.pids)
-    Enum.filter(crew.order, &(&1 in living))
+  def living(backend) do
+    living = Map.values(backend.pids)
+    Enum.filter(backend.order, &(&1 in living))
   end
 
   @impl Sim.Fleet.Backend
-  def claims(crew), do: for(id <- living(crew), do: {id, Robot.claim(id)})
+  def claims(backend), do: for(id <- living(backend), do: {id, Robot.claim(id)})
 
   @impl Sim.Fleet.Backend
-  def kill(crew, id) do
-    {pid, ^id} = Enum.find(crew.pids, fn {_pid, robot} -> robot == id end)
+  def kill(backend, id) do
+    {pid, ^id} = Enum.find(backend.pids, fn {_pid, robot} -> robot == id end)
     Process.exit(pid, :kill)
-    wreck(crew, pid)
+    wreck(backend, pid)
   end
 
   @impl Sim.Fleet.Backend
-  def change(crew, change) do
-    :ok = World.Server.change(crew.server, change)
-    crew
+  def change(backend, change) do
+    :ok = World.Server.change(backend.server, change)
+    backend
   end
 
   @impl Sim.Fleet.Backend
-  def world(crew), do: World.Server.world(crew.server)
+  def world(backend), do: World.Server.world(backend.server)
 
   @impl Sim.Fleet.Backend
-  def server(crew), do: crew.server
+  def server(backend), do: backend.server
 
   @impl Sim.Fleet.Backend
-  def messages(crew), do: RadioServer.counts(crew.air)
+  def messages(backend), do: RadioServer.counts(backend.air)
 
   @impl Sim.Fleet.Backend
-  def lines(crew) do
+  def lines(backend) do
     ["all robots live in process #{System.pid()}; see --nodes"] ++
-      Hardware.lines(crew.robots, crew.folder)
+      Hardware.lines(backend.robots, backend.folder)
   end
 
   @impl Sim.Fleet.Backend
-  def hear(crew, {:stage, %{robot: id, stage: stage} = about}) do
+  def hear(backend, {:stage, %{robot: id, stage: stage} = about}) do
     facts = Map.drop(about, [:robot, :stage])
-    {:ok, if(id in living(crew), do: [{:stage, stage, id, facts}], else: []), crew}
+    {:ok, if(id in living(backend), do: [{:stage, stage, id, facts}], else: []), backend}
   end
 
   # However it ended: killed, or with its restarts used up.
-  def hear(%{pids: pids} = crew, {:DOWN, _monitor, :process, pid, _reason})
+  def hear(%{pids: pids} = backend, {:DOWN, _monitor, :process, pid, _reason})
       when is_map_key(pids, pid),
-      do: {:ok, [{:killed, pids[pid]}], wreck(crew, pid)}
+      do: {:ok, [{:killed, pids[pid]}], wreck(backend, pid)}
 
   def hear(%{supervisor: supervisor}, {:EXIT, supervisor, reason}), do: {:stop, reason}
-  def hear(crew, _other), do: {:ok, [], crew}
+  def hear(backend, _other), do: {:ok, [], backend}
 
   @impl Sim.Fleet.Backend
-  def stop(crew) do
+  def stop(backend) do
     Event.detach({__MODULE__, self()})
-    if Process.alive?(crew.supervisor), do: Supervisor.stop(crew.supervisor, :shutdown)
-    if crew.folder, do: Folder.remove(crew.folder)
+    if Process.alive?(backend.supervisor), do: Supervisor.stop(backend.supervisor, :shutdown)
+    if backend.folder, do: Folder.remove(backend.folder)
   end
 
-  defp wreck(crew, pid) do
-    {id, pids} = Map.pop!(crew.pids, pid)
-    change(%{crew | pids: pids}, {:kill, id})
+  defp wreck(backend, pid) do
+    {id, pids} = Map.pop!(backend.pids, pid)
+    change(%{backend | pids: pids}, {:kill, id})
   end
 
   defp parts(%{options: options, world: world, robots: robots}, name, folder) do

@@ -4,7 +4,7 @@ defmodule Sim.Fleet.Said do
   its fleet is formed. Pure.
 
   A robot tells a stage by an event, and claims the same on its board, which the fleet looks at ten times a second. Told
-  at once, the stage would be on the screen while the ledger still says the opposite. So it waits for the claim. One that no claim
+  at once, the stage would be on the screen while the run log still says the opposite. So it waits for the claim. One that no claim
   shows within 5 looks, 0.5 s, was withdrawn at once, and is told all the same: it was said.
   """
 

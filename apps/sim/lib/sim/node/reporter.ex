@@ -17,11 +17,11 @@ defmodule Sim.Node.Reporter do
 
   @doc "Tells the launcher something once; again and again until there is a way to it."
   @spec tell(pid(), term()) :: :ok
-  def tell(courier, what), do: GenServer.cast(courier, {:tell, what})
+  def tell(reporter, what), do: GenServer.cast(reporter, {:tell, what})
 
   @doc false
   @spec stage(Event.name(), map(), map(), pid()) :: :ok
-  def stage(_event, _measurements, about, courier), do: tell(courier, {:stage, about})
+  def stage(_event, _measurements, about, reporter), do: tell(reporter, {:stage, about})
 
   @impl GenServer
   def init({launcher, report}) do

@@ -15,7 +15,7 @@ defmodule Sim.Trial.Evaluation do
           at_ms: non_neg_integer(),
           options: map(),
           world: World.t(),
-          ledger: RunLog.t(),
+          run_log: RunLog.t(),
           claims: %{atom() => map()},
           messages: %{sent: non_neg_integer(), lost: non_neg_integer()}
         }
@@ -23,7 +23,7 @@ defmodule Sim.Trial.Evaluation do
   @doc "What a viewer sees."
   @spec scene(run()) :: Scene.t()
   def scene(run) do
-    leader = RunLog.leader(run.ledger)
+    leader = RunLog.leader(run.run_log)
     slots = slots(run, leader)
 
     robots =
@@ -50,11 +50,11 @@ defmodule Sim.Trial.Evaluation do
       landmark: run.world.landmark,
       robots: robots,
       leader: leader,
-      epoch: run.ledger.epoch,
+      epoch: run.run_log.epoch,
       formation: formation(run, leader),
       error: error(robots),
-      formed?: RunLog.formed?(run.ledger),
-      stages: RunLog.stages(run.ledger)
+      formed?: RunLog.formed?(run.run_log),
+      stages: RunLog.stages(run.run_log)
     }
   end
 
@@ -74,24 +74,24 @@ defmodule Sim.Trial.Evaluation do
       simulated_s: run.at_ms / 1000,
       stages: scene.stages,
       leader: leader,
-      leaders_at_once_max: run.ledger.leaders_at_once_max,
-      leader_changes: max(run.ledger.elections - 1, 0),
+      leaders_at_once_max: run.run_log.leaders_at_once_max,
+      leader_changes: max(run.run_log.elections - 1, 0),
       formation: %{
         kind: kind,
         spacing_m: spacing,
         error_mean_m: mean,
         error_max_m: max,
-        share_of_time_formed: RunLog.share_formed(run.ledger)
+        share_of_time_formed: RunLog.share_formed(run.run_log)
       },
       landmark_distance_m:
         leader && scene.landmark &&
           Pose.distance(World.truth(run.world, leader), scene.landmark),
       collisions: run.world.collisions,
       min_separation_m: run.world.min_separation,
-      claims: Claims.report(run.ledger.claims, run.at_ms, &worst(run, &1)),
-      stuck: Stuck.report(run.ledger.stuck),
+      claims: Claims.report(run.run_log.claims, run.at_ms, &worst(run, &1)),
+      stuck: Stuck.report(run.run_log.stuck),
       messages: run.messages,
-      agreement: AgreementMetrics.report(run.ledger.accord),
+      agreement: AgreementMetrics.report(run.run_log.accord),
       fleet: for(r <- scene.robots, do: row(r, Map.get(slots, r.id), run.claims[r.id]))
     }
   end
@@ -110,7 +110,7 @@ defmodule Sim.Trial.Evaluation do
   @doc "The living followers of whom `Sim.Trial.Stuck` judges whether they get on."
   @spec followers(run()) :: [Stuck.row()]
   def followers(run) do
-    leader = RunLog.leader(run.ledger)
+    leader = RunLog.leader(run.run_log)
     shape = {leader, formation(run, leader)}
 
     for {id, {_place, slot}} <- slots(run, leader), claim = run.claims[id], claim != nil do

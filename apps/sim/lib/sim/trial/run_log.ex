@@ -48,23 +48,23 @@ defmodule Sim.Trial.RunLog do
           stuck: Sim.Trial.Stuck.t()
         }
 
-  @doc "An empty ledger."
+  @doc "An empty run log."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
   @doc "Writes a stage; a search that others have begun already is not a new one."
   @spec stage(t(), integer(), atom(), atom() | nil, map()) :: t()
-  def stage(%{searching?: true} = ledger, _at_ms, :search, _robot, _facts), do: ledger
+  def stage(%{searching?: true} = run_log, _at_ms, :search, _robot, _facts), do: run_log
 
-  def stage(ledger, at_ms, name, robot, facts) do
+  def stage(run_log, at_ms, name, robot, facts) do
     entry = Map.merge(%{stage: name, at_s: at_ms / 1000, robot: robot}, facts)
     entry = if name == :search, do: %{entry | robot: nil}, else: entry
-    ledger = %{ledger | stages: [entry | ledger.stages]}
+    run_log = %{run_log | stages: [entry | run_log.stages]}
 
     case name do
-      :search -> %{ledger | searching?: true}
-      :elected -> %{ledger | elections: ledger.elections + 1}
-      _other -> ledger
+      :search -> %{run_log | searching?: true}
+      :elected -> %{run_log | elections: run_log.elections + 1}
+      _other -> run_log
     end
   end
 
@@ -73,26 +73,26 @@ defmodule Sim.Trial.RunLog do
   stands still.
   """
   @spec note(t(), integer(), [{atom(), map()}], [[atom()]] | nil, [atom()]) :: t()
-  def note(ledger, at_ms, claims, parts \\ nil, standing \\ []) do
+  def note(run_log, at_ms, claims, parts \\ nil, standing \\ []) do
     parts = parts || [for({id, _claim} <- claims, do: id)]
     leaders = for {id, %{phase: :lead} = claim} <- claims, do: {id, claim}
     phases = for {_id, claim} <- claims, do: claim[:phase]
     formed? = Enum.any?(leaders, fn {_id, claim} -> claim[:formed] == true end)
-    elected? = ledger.elections > 0
+    elected? = run_log.elections > 0
 
     %{
-      ledger
+      run_log
       | leader: highest(leaders),
         epoch:
-          Enum.reduce(claims, ledger.epoch, fn {_id, claim}, e -> max(e, claim[:epoch] || 0) end),
-        leaders_at_once_max: max(ledger.leaders_at_once_max, at_once(leaders, parts)),
-        accord: AgreementMetrics.note(ledger.accord, at_ms, claims, parts, standing),
+          Enum.reduce(claims, run_log.epoch, fn {_id, claim}, e -> max(e, claim[:epoch] || 0) end),
+        leaders_at_once_max: max(run_log.leaders_at_once_max, at_once(leaders, parts)),
+        accord: AgreementMetrics.note(run_log.accord, at_ms, claims, parts, standing),
         searching?: :search in phases,
-        ticks: ledger.ticks + if(elected?, do: 1, else: 0),
-        formed_ticks: ledger.formed_ticks + if(elected? and formed?, do: 1, else: 0),
-        formed_ms: if(formed?, do: ledger.formed_ms || at_ms),
+        ticks: run_log.ticks + if(elected?, do: 1, else: 0),
+        formed_ticks: run_log.formed_ticks + if(elected? and formed?, do: 1, else: 0),
+        formed_ms: if(formed?, do: run_log.formed_ms || at_ms),
         rest_ms:
-          if(phases != [] and Enum.all?(phases, &(&1 == :rest)), do: ledger.rest_ms || at_ms)
+          if(phases != [] and Enum.all?(phases, &(&1 == :rest)), do: run_log.rest_ms || at_ms)
     }
   end
 
@@ -101,35 +101,35 @@ defmodule Sim.Trial.RunLog do
   of its shape is from its slot, in metres.
   """
   @spec judge(t(), integer(), [{atom(), map()}], (atom() -> float() | nil)) :: t()
-  def judge(ledger, at_ms, claims, worst) do
+  def judge(run_log, at_ms, claims, worst) do
     leaders = for {id, %{phase: :lead, formed: true}} <- claims, do: id
-    %{ledger | claims: Claims.note(ledger.claims, at_ms, leaders, worst)}
+    %{run_log | claims: Claims.note(run_log.claims, at_ms, leaders, worst)}
   end
 
   @doc "The same tick of the invariant of `Sim.Trial.Stuck`; `rows` is asked once a second."
   @spec watch(t(), integer(), (... -> [Stuck.row()])) :: t()
-  def watch(ledger, at_ms, rows), do: %{ledger | stuck: Stuck.note(ledger.stuck, at_ms, rows)}
+  def watch(run_log, at_ms, rows), do: %{run_log | stuck: Stuck.note(run_log.stuck, at_ms, rows)}
 
   @doc "Who leads now: of several the one of the highest epoch."
   @spec leader(t()) :: atom() | nil
-  def leader(ledger), do: ledger.leader
+  def leader(run_log), do: run_log.leader
 
   @doc "Whether the fleet is in formation now, by its own judgement."
   @spec formed?(t()) :: boolean()
-  def formed?(ledger), do: ledger.formed_ms != nil
+  def formed?(run_log), do: run_log.formed_ms != nil
 
   @doc "Since when the fleet has been in formation, or at rest without a landmark; `nil` if it is not."
   @spec calm_since_ms(t()) :: integer() | nil
-  def calm_since_ms(ledger), do: ledger.formed_ms || ledger.rest_ms
+  def calm_since_ms(run_log), do: run_log.formed_ms || run_log.rest_ms
 
   @doc "The stages, oldest first."
   @spec stages(t()) :: [stage()]
-  def stages(ledger), do: Enum.reverse(ledger.stages)
+  def stages(run_log), do: Enum.reverse(run_log.stages)
 
   @doc "The share of the time since the first election that the fleet was in formation."
   @spec share_formed(t()) :: float()
   def share_formed(%{ticks: 0}), do: 0.0
-  def share_formed(ledger), do: ledger.formed_ticks / ledger.ticks
+  def share_formed(run_log), do: run_log.formed_ticks / run_log.ticks
 
   # In one part: parts that cannot reach each other each have their own.
   defp at_once(leaders, parts) do

@@ -12,12 +12,12 @@ defmodule Sim.Trial.Termination do
           :at_ms => non_neg_integer(),
           :options => map(),
           :script => Scenario.t(),
-          :ledger => RunLog.t(),
+          :run_log => RunLog.t(),
           :world => Sim.World.t(),
           optional(atom()) => term()
         }) :: boolean()
   def reached?(run) do
-    calm_ms = RunLog.calm_since_ms(run.ledger)
+    calm_ms = RunLog.calm_since_ms(run.run_log)
 
     run.at_ms >= run.options.duration_s * 1000 or
       (Scenario.over?(run.script, run.world) and calm_ms != nil and

@@ -14,7 +14,7 @@ defmodule Sim.Trial.EvaluationTest do
   # The same trial with other claims.
   defp score(trial, claims) do
     trial
-    |> Map.take([:at_ms, :options, :world, :ledger])
+    |> Map.take([:at_ms, :options, :world, :run_log])
     |> Map.merge(%{claims: claims, messages: %{sent: 0, lost: 0}})
   end
 

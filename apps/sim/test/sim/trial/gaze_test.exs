@@ -23,7 +23,7 @@ defmodule Sim.Trial.GazeTest do
   defp nudged(seed) do
     {:ok, trial} = Trial.new(%{seed: seed, blobs: :direct, duration_s: 200})
     trial = formed(trial)
-    leader = Sim.Trial.RunLog.leader(trial.ledger)
+    leader = Sim.Trial.RunLog.leader(trial.run_log)
     before = trial.world.robots
     {x, y} = trial.world.landmark
     aside = before[leader].pose.heading + before[leader].pan + :math.pi() / 2

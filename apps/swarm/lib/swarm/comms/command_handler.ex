@@ -1,8 +1,8 @@
 defmodule Swarm.Comms.CommandHandler do
   @moduledoc """
-  What a robot answers to people (`Swarm`): it accepts or refuses, in one line. It runs in the
-  robot's link, so that people on any node reach it by the directory. What stops a robot, and the
-  reset, are not for the desk but for `Swarm.EStop`.
+  Answers the commands of people (`Swarm`): it accepts or refuses each, in one line. It runs in the
+  robot's comms process, which people on any node find by the directory. `Swarm.EStop` handles what stops a
+  robot, and the reset.
 
   | request | answer |
   |---|---|
@@ -30,10 +30,10 @@ defmodule Swarm.Comms.CommandHandler do
 
   @doc "Answers a request."
   @spec answer(term(), Config.t(), Board.t(), Receiver.t()) :: answer()
-  def answer(:status, config, board, ear), do: Status.of(config, board, ear)
+  def answer(:status, config, board, receiver), do: Status.of(config, board, receiver)
 
-  def answer(:ping, config, board, ear),
-    do: {:ok, PingReply.line(config, board, Status.of(config, board, ear))}
+  def answer(:ping, config, board, receiver),
+    do: {:ok, PingReply.line(config, board, Status.of(config, board, receiver))}
 
   def answer(:acknowledge, %{id: id}, _board, _ear),
     do: named(Device.acknowledge(Names.via(id, :drive)), id)
@@ -44,11 +44,11 @@ defmodule Swarm.Comms.CommandHandler do
 
   def answer(:arm, %{id: id}, _board, _ear), do: named(Device.arm(Names.via(id, :drive)), id)
 
-  def answer(request, config, board, ear) do
+  def answer(request, config, board, receiver) do
     with {:ok, request} <- checked(request),
          :ok <- well(config, board),
          :ok <- ready(request, config, board),
-         :ok <- obey(request, doing(board), config, ear),
+         :ok <- obey(request, doing(board), config, receiver),
          do: :accepted
   end
 
@@ -65,7 +65,7 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp checked(request), do: Manual.check(request)
 
-  # A pilot that hangs would not answer, and the link would wait for it and be silent to others. A gate that hangs
+  # A pilot that hangs would not answer, and the comms process would wait for it and be silent to others. A gate that hangs
   # is ended, and with it what was begun.
   defp well(%{id: id}, board) do
     hangs =
@@ -109,7 +109,7 @@ defmodule Swarm.Comms.CommandHandler do
     end
   end
 
-  defp obey(:start, doing, config, ear), do: obey({:start, []}, doing, config, ear)
+  defp obey(:start, doing, config, receiver), do: obey({:start, []}, doing, config, receiver)
 
   # A mission that the board still shows may have been stopped just now. What people had asked of it
   # outlives that.
@@ -127,8 +127,8 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp obey({:formation, _kind, _spacing}, _doing, config, _ear), do: shapeless(config.id)
 
-  defp obey({:follow_the_leader, leader} = command, doing, %{id: id} = config, ear) do
-    with :ok <- Manual.follow(id, leader, Receiver.leaders(ear, Config.now(config))),
+  defp obey({:follow_the_leader, leader} = command, doing, %{id: id} = config, receiver) do
+    with :ok <- Manual.follow(id, leader, Receiver.leaders(receiver, Config.now(config))),
          do: alone(command, doing, config)
   end
 

@@ -1,7 +1,7 @@
 defmodule Swarm.Comms.Forwarder do
   @moduledoc """
-  What a robot passes on for those that do not hear each other, so that robots that are connected by
-  way of others act as one group. Pure.
+  Forwards messages between robots that do not hear each other, so that robots that are connected only through
+  others act as one group. Pure.
 
   Everybody's heartbeat lists whom it hears. Where one robot's list lacks another for a while, one
   that both are in touch with passes on the one's heartbeats, its round letters as well, straight to

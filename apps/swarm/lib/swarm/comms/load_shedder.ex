@@ -1,8 +1,7 @@
 defmodule Swarm.Comms.LoadShedder do
   @moduledoc """
-  Keeps the mailbox of a link small, whatever is poured into it. A process cannot refuse messages,
-  but it can throw them away faster than others send them: a look at one costs far less than its
-  handling.
+  Keeps the mailbox of a robot's comms process small under a flood. A process cannot refuse messages, but it can
+  drop them faster than others send them: looking at a message costs far less than handling it.
 
   What goes first is telemetry (what is heard by radio) and junk, the oldest of it; then, if what is left
   is still too much, commands, the mission's own letters and forged messages of the system, if
@@ -57,7 +56,7 @@ defmodule Swarm.Comms.LoadShedder do
       else: drop_oldest(kept, left - 1, timers)
   end
 
-  # Nobody calls a link, and no answer to a call of its own comes when nobody waits for it.
+  # Nobody calls a comms process, and no answer to a call of its own comes when nobody waits for it.
   defp telemetry?({:"$gen_cast", cast}),
     do: not (is_tuple(cast) and tuple_size(cast) > 1 and elem(cast, 0) in @orders)
 

@@ -3,7 +3,7 @@ defmodule Swarm.Comms.NameClaim do
   A robot's claim to its name. Of two robots of one name, on whatever nodes, the one with the lower
   `{boot, node}` stays. The other leaves the directory and gives way for good.
 
-  They find each other in the directory, where both links are in one group and tell each other who
+  They find each other in the directory, where both comms processes are in one group and tell each other who
   they are, once a second; or by radio, where each hears heartbeats that are not its own.
   """
   alias Swarm.{Directory, Nonblocking}
@@ -19,7 +19,7 @@ defmodule Swarm.Comms.NameClaim do
   @spec new(atom(), identity()) :: t()
   def new(robot, me), do: %__MODULE__{robot: robot, me: me}
 
-  @doc "Enters the calling process, the robot's link, into the directory, now or when there is one."
+  @doc "Enters the calling process, the robot's comms process, into the directory, now or when there is one."
   @spec enter(t()) :: t()
   def enter(%__MODULE__{robot: robot} = name),
     do: entered(name, Directory.Membership.enter([:robots, {:robot, robot}]))
@@ -63,7 +63,7 @@ defmodule Swarm.Comms.NameClaim do
   end
 
   @doc """
-  Another of this name is there: its link, or `nil` where it was heard by radio. Says whether this one
+  Another of this name is there: its comms process, or `nil` where it was heard by radio. Says whether this one
   gives way by that; it has left the directory then.
   """
   @spec rival(t(), identity(), pid() | nil) :: {gives_way? :: boolean(), t()}

@@ -1,6 +1,6 @@
 defmodule Swarm.Comms.OwnHeartbeat do
   @moduledoc """
-  The heartbeat of a live robot: what its board says of it. `Swarm.Member` makes the same in lockstep.
+  Makes the heartbeat of a live robot from its board. `Swarm.Member` makes the same in lockstep.
   """
   alias Robot.{Board, Config, Percept}
   alias Swarm.Message
@@ -15,7 +15,7 @@ defmodule Swarm.Comms.OwnHeartbeat do
   """
   @spec message(Config.t(), Board.t(), Receiver.t(), {integer(), non_neg_integer()}, integer()) ::
           {:ok, Message.t()} | :error
-  def message(config, board, ear, sender, at_ms) do
+  def message(config, board, receiver, sender, at_ms) do
     with {:ok, pose, _then} <- Board.fetch(board, :pose, :infinity, at_ms) do
       percept = %Percept{
         robot: config.id,
@@ -25,8 +25,8 @@ defmodule Swarm.Comms.OwnHeartbeat do
         odometry: odometry(board, at_ms)
       }
 
-      heard = Peers.heard(ear.peers, at_ms)
-      beat = Heartbeat.new(sender, percept, claim(board), heard, ear.stop)
+      heard = Peers.heard(receiver.peers, at_ms)
+      beat = Heartbeat.new(sender, percept, claim(board), heard, receiver.stop)
       {:ok, Message.new(config.id, :heartbeat, beat)}
     end
   end

@@ -1,7 +1,7 @@
 defmodule Swarm.Comms.PeerWriter do
   @moduledoc """
-  The other robots, on the board of one: a row for each, `{:peer, id}`, written when it is heard, and
-  once more when it is gone.
+  Writes the other robots to a robot's board: a row `{:peer, id}` for each, when it is heard and once more when
+  it is gone.
   """
   alias Robot.Board
   alias Swarm.Membership.Peers

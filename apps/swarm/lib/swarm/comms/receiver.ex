@@ -1,6 +1,6 @@
 defmodule Swarm.Comms.Receiver do
   @moduledoc """
-  What a robot's link makes of what it hears, as a function: who is there, how the emergency stop
+  What a robot makes of the messages that it receives, as a function: who is there, how the emergency stop
   stands, and what was dropped. Pure; the same in the same order as `Swarm.Member`.
   """
   alias Swarm.{EStop, Message}
@@ -31,44 +31,45 @@ defmodule Swarm.Comms.Receiver do
   @doc """
   Hears a term from outside, whatever it is.
 
-      iex> {heard, ear} = Swarm.Comms.Receiver.hear(Swarm.Comms.Receiver.new(:mag1), "junk", 0)
-      iex> {heard, ear.rejected}
+      iex> {heard, receiver} = Swarm.Comms.Receiver.hear(Swarm.Comms.Receiver.new(:mag1), "junk", 0)
+      iex> {heard, receiver.rejected}
       {:nothing, %{not_a_message: 1}}
   """
   @spec hear(t(), term(), integer()) :: {heard(), t()}
-  def hear(%__MODULE__{} = ear, term, now_ms), do: take(ear, Message.check(term), now_ms)
+  def hear(%__MODULE__{} = receiver, term, now_ms),
+    do: take(receiver, Message.check(term), now_ms)
 
-  defp take(%{me: me} = ear, checked, now_ms) do
+  defp take(%{me: me} = receiver, checked, now_ms) do
     case checked do
       # From another robot of this name: which of the two gives way is settled elsewhere.
       {:ok, %Message{from: ^me}} ->
-        {:nothing, ear}
+        {:nothing, receiver}
 
       {:ok, %Message{kind: :relay, body: inner}} ->
-        take(ear, {:ok, inner}, now_ms)
+        take(receiver, {:ok, inner}, now_ms)
 
       {:ok, %Message{kind: :heartbeat, from: from, body: beat, hops: hops}} ->
-        peers = Peers.hear(ear.peers, from, beat, now_ms, hops == 0)
-        stop = EStop.State.hear(ear.stop, beat.estop, beat.latched)
-        {{:peer, from}, %{ear | peers: peers, stop: stop, heard: ear.heard + 1}}
+        peers = Peers.hear(receiver.peers, from, beat, now_ms, hops == 0)
+        stop = EStop.State.hear(receiver.stop, beat.estop, beat.latched)
+        {{:peer, from}, %{receiver | peers: peers, stop: stop, heard: receiver.heard + 1}}
 
       {:ok, message} ->
-        {{:message, message}, %{ear | heard: ear.heard + 1}}
+        {{:message, message}, %{receiver | heard: receiver.heard + 1}}
 
       {:error, reason} ->
-        {:nothing, reject(ear, reason)}
+        {:nothing, reject(receiver, reason)}
     end
   end
 
   @doc "Counts what was dropped, and why; several of a kind at once."
   @spec reject(t(), atom(), pos_integer()) :: t()
-  def reject(ear, reason, number \\ 1),
-    do: %{ear | rejected: Map.update(ear.rejected, reason, number, &(&1 + number))}
+  def reject(receiver, reason, number \\ 1),
+    do: %{receiver | rejected: Map.update(receiver.rejected, reason, number, &(&1 + number))}
 
   @doc "Whom each robot that is not gone follows, or says that it leads it."
   @spec leaders(t(), integer()) :: %{atom() => atom() | nil}
-  def leaders(ear, now_ms) do
-    for {id, beat} <- Peers.beats(ear.peers, now_ms), into: %{} do
+  def leaders(receiver, now_ms) do
+    for {id, beat} <- Peers.beats(receiver.peers, now_ms), into: %{} do
       {id, if(beat.leader != id, do: beat.leader)}
     end
   end

@@ -1,6 +1,6 @@
 defmodule Swarm.Comms.Sender do
   @moduledoc """
-  What a robot says, and when: its transport, its heartbeats, and which of them it sent when
+  Sends a robot's messages and heartbeats, and remembers when it sent which heartbeat
   (`Swarm.Commands.Freshness`). Five heartbeats a second; when the emergency stop changes, one at once and then ten
   a second for a second, so that it spreads within 200 ms.
   """
@@ -39,20 +39,20 @@ defmodule Swarm.Comms.Sender do
 
   @doc "Says something to these robots; one that has fallen silent does not."
   @spec speak(t(), [atom()], Message.t()) :: t()
-  def speak(%__MODULE__{silent?: true} = mouth, _ids, _message), do: mouth
+  def speak(%__MODULE__{silent?: true} = sender, _ids, _message), do: sender
 
-  def speak(%__MODULE__{transport: {m, f, a}} = mouth, ids, message) do
-    apply(m, f, a ++ [mouth.config.id, ids, message])
-    %{mouth | sent: mouth.sent + length(ids)}
+  def speak(%__MODULE__{transport: {m, f, a}} = sender, ids, message) do
+    apply(m, f, a ++ [sender.config.id, ids, message])
+    %{sender | sent: sender.sent + length(ids)}
   end
 
   @doc "A tenth of a second has passed: time for a heartbeat, or not."
   @spec tick(t(), Receiver.t(), integer()) :: t()
-  def tick(%__MODULE__{} = mouth, ear, at_ms) do
-    mouth = %{mouth | ticks: mouth.ticks + 1}
-    due? = mouth.urgent > 0 or rem(mouth.ticks, @beat_every) == 1
-    mouth = if due?, do: beat(mouth, ear, at_ms), else: mouth
-    %{mouth | urgent: max(mouth.urgent - 1, 0)}
+  def tick(%__MODULE__{} = sender, receiver, at_ms) do
+    sender = %{sender | ticks: sender.ticks + 1}
+    due? = sender.urgent > 0 or rem(sender.ticks, @beat_every) == 1
+    sender = if due?, do: beat(sender, receiver, at_ms), else: sender
+    %{sender | urgent: max(sender.urgent - 1, 0)}
   end
 
   @doc """
@@ -60,29 +60,29 @@ defmodule Swarm.Comms.Sender do
   heartbeat tells it.
   """
   @spec urge(t(), Receiver.t()) :: t()
-  def urge(%__MODULE__{config: %{pace: :manual}} = mouth, _ear), do: mouth
+  def urge(%__MODULE__{config: %{pace: :manual}} = sender, _ear), do: sender
 
-  def urge(mouth, ear),
-    do: beat(%{mouth | urgent: @urgent_ticks}, ear, Config.now(mouth.config))
+  def urge(sender, receiver),
+    do: beat(%{sender | urgent: @urgent_ticks}, receiver, Config.now(sender.config))
 
   @doc "A stamp for somebody who asks."
   @spec stamp(t()) :: {Freshness.stamp(), t()}
-  def stamp(%__MODULE__{} = mouth) do
-    {stamp, stamps} = Freshness.issue(mouth.stamps, Config.now(mouth.config))
-    {stamp, %{mouth | stamps: stamps}}
+  def stamp(%__MODULE__{} = sender) do
+    {stamp, stamps} = Freshness.issue(sender.stamps, Config.now(sender.config))
+    {stamp, %{sender | stamps: stamps}}
   end
 
-  defp beat(mouth, ear, at_ms) do
-    sequence = Freshness.last(mouth.stamps) + 1
-    sender = {mouth.stamps.boot, sequence}
+  defp beat(sender, receiver, at_ms) do
+    sequence = Freshness.last(sender.stamps) + 1
+    from = {sender.stamps.boot, sequence}
 
-    case OwnHeartbeat.message(mouth.config, mouth.board, ear, sender, at_ms) do
+    case OwnHeartbeat.message(sender.config, sender.board, receiver, from, at_ms) do
       {:ok, message} ->
-        mouth = %{mouth | stamps: Freshness.sent(mouth.stamps, sequence, at_ms)}
-        speak(mouth, List.delete(Transport.robots(), mouth.config.id), message)
+        sender = %{sender | stamps: Freshness.sent(sender.stamps, sequence, at_ms)}
+        speak(sender, List.delete(Transport.robots(), sender.config.id), message)
 
       :error ->
-        mouth
+        sender
     end
   end
 end

@@ -1,6 +1,6 @@
 defmodule Swarm.Comms.Transport do
   @moduledoc """
-  How what a robot says reaches others: those of this node get it straight into their links, those
+  How a robot's messages reach others: those of this node get them straight into their comms processes, those
   of other nodes by the mesh's datagrams. A node without a mesh speaks to those that somebody has
   connected by hand, over Erlang's distribution.
   """

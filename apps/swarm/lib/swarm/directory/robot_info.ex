@@ -59,7 +59,7 @@ defmodule Swarm.Directory.RobotInfo do
   its link. Waits for nothing.
   """
   @spec note(noted(), Config.t(), Board.t(), boot :: non_neg_integer(), Receiver.t()) :: noted()
-  def note(noted, config, board, boot, ear) do
+  def note(noted, config, board, boot, receiver) do
     health = Board.health(board, :drive)
     hung = for part <- LivenessMonitor.parts(), do: Board.fetch(board, {:hung, part}, :infinity)
     arming = Board.fetch(board, :arming, :infinity)
@@ -70,7 +70,7 @@ defmodule Swarm.Directory.RobotInfo do
         {left - 1, doing}
 
       _due ->
-        status = Status.Row.encode(Status.of(config, board, ear))
+        status = Status.Row.encode(Status.of(config, board, receiver))
         Blackboard.note(config.id, boot, about: row(config, board), status: status)
         {@every - 1, doing}
     end

@@ -1,7 +1,6 @@
 defmodule Swarm.EStop.Actions do
   @moduledoc """
-  What a robot's brake does (`Swarm.EStop`): stops, releases, writes down how the stop stands, and spreads it. Called in
-  the brake's process.
+  What a robot's e-stop process does (`Swarm.EStop`): stops, releases, records how the stop stands, and spreads it.
   """
   alias Hal.Device
   alias Robot.{Board, Config, Names}

@@ -1,5 +1,5 @@
 defmodule Swarm.EStop.Answer do
-  @moduledoc "What a gate that has carried out a stop says to the brake, or to whoever asked for it."
+  @moduledoc "What a gate that has carried out a stop says to the e-stop process, or to whoever asked for it."
   alias Robot.{Board, Names}
   alias Robot.Safety.Readiness
   alias Swarm.Nonblocking

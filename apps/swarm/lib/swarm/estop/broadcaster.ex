@@ -1,8 +1,8 @@
 defmodule Swarm.EStop.Broadcaster do
   @moduledoc """
-  The voice of the emergency stop, one for a node, so that a node without a robot has it too.
+  Broadcasts the emergency stop; one process on each node, also on a node without a robot.
 
-  `sound/0` sends a call to stop to every brake in the directory and, by signed datagrams, to every
+  `sound/0` sends a call to stop to every robot's e-stop process in the directory and, by signed datagrams, to every
   node. That happens at once, in the caller; this process then repeats it, ten times in all, one
   each 100 ms, whatever has become of the caller. Every call has an identity (`t:Swarm.EStop.State.call/0`),
   so that a robot obeys it once, and an age, counted by

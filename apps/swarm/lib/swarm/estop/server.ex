@@ -1,5 +1,5 @@
 defmodule Swarm.EStop.Server do
-  @moduledoc "The process of a robot's brake (`Swarm.EStop`): what comes in. What it does is `Swarm.EStop.Actions`'s."
+  @moduledoc "The process of `Swarm.EStop`: what comes in. `Swarm.EStop.Actions` carries it out."
   use GenServer
   alias Robot.{Board, Config, Names}
   alias Robot.Safety.Gate
@@ -28,7 +28,7 @@ defmodule Swarm.EStop.Server do
 
   @impl GenServer
   def handle_continue(:enter, s) do
-    # A stop that was written down by the brake before this one may not have reached the gate.
+    # A stop that was written down by the e-stop process before this one may not have reached the gate.
     if s.stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id)
 
     {:noreply,

@@ -10,7 +10,7 @@ defmodule Swarm.Host.ReleaseBoot do
     3. `robots/NAME.exs` of the release, as it was built or deployed.
 
   NAME is `ROBOT` of the environment. The release `robot` does not start without one; in `fleet` a name
-  without a file is a base station, a node without a robot.
+  without a file is a base protocol, a node without a robot.
   """
   alias Robot.File.Summary
   alias Swarm.Host.PowerOff

@@ -6,7 +6,7 @@ defmodule Swarm.Mesh.NodeTable do
   Of nodes that others hear, and this one does not, the address is a lead: they get beacons too.
 
   A node is suspect after 1 s of silence and gone after 2 s; what decides is datagrams, never a
-  connection. One that is gone stays in the book and is sent beacons for ever. The view's number
+  connection. One that is gone stays in the table and is sent beacons for ever. The view's number
   grows with each node that comes or goes.
   """
   alias Swarm.Mesh.Backoff
@@ -42,22 +42,22 @@ defmodule Swarm.Mesh.NodeTable do
           number: non_neg_integer()
         }
 
-  @doc "An empty book."
+  @doc "An empty node table."
   @spec new(name()) :: t()
   def new(me), do: %__MODULE__{me: me}
 
   @doc "A node was heard from there. Tells what has changed by that."
   @spec hear(t(), name(), Swarm.Mesh.Strategy.address(), integer()) :: {t(), [{:up, name()}]}
-  def hear(%{me: me} = book, me, _address, _now_ms), do: {book, []}
+  def hear(%{me: me} = node_table, me, _address, _now_ms), do: {node_table, []}
 
-  def hear(book, name, address, now_ms) do
-    case book.nodes do
+  def hear(node_table, name, address, now_ms) do
+    case node_table.nodes do
       %{^name => %{status: :alive} = entry} ->
-        {put(book, name, %{entry | address: address, heard_ms: now_ms}), []}
+        {put(node_table, name, %{entry | address: address, heard_ms: now_ms}), []}
 
       %{^name => %{status: status} = entry} ->
         entry = %{entry | address: address, heard_ms: now_ms, status: :alive}
-        up(book, name, entry, if(status == :gone, do: 1, else: 0))
+        up(node_table, name, entry, if(status == :gone, do: 1, else: 0))
 
       _unknown ->
         entry = %{
@@ -71,64 +71,65 @@ defmodule Swarm.Mesh.NodeTable do
           probe: Backoff.new(now_ms)
         }
 
-        up(book, name, entry, 1)
+        up(node_table, name, entry, 1)
     end
   end
 
   @doc "Somebody signed as this name says that this is its session; it may be an old recording."
   @spec claim(t(), name(), non_neg_integer()) :: t()
-  def claim(book, name, session), do: %{book | claims: Map.put(book.claims, name, session)}
+  def claim(node_table, name, session),
+    do: %{node_table | claims: Map.put(node_table.claims, name, session)}
 
   @doc "A beacon of a node that is let in: whom it hears, what it is connected to."
   @spec beacon(t(), name(), Swarm.Mesh.Beacon.t(), integer()) :: t()
-  def beacon(book, name, beacon, now_ms) do
-    told = Map.delete(Map.new(beacon.sessions), book.me)
+  def beacon(node_table, name, beacon, now_ms) do
+    told = Map.delete(Map.new(beacon.sessions), node_table.me)
 
-    case book.nodes do
+    case node_table.nodes do
       %{^name => entry} ->
         hears = for {name, _address} <- beacon.hears, do: name
         entry = %{entry | hears: hears, links: beacon.links, port: beacon.port}
-        told = Map.merge(book.told, told)
-        book = put(book, name, entry)
-        book = if map_size(told) <= @most, do: %{book | told: told}, else: book
-        Enum.reduce(beacon.hears, book, &lead(&2, &1, now_ms))
+        told = Map.merge(node_table.told, told)
+        node_table = put(node_table, name, entry)
+        node_table = if map_size(told) <= @most, do: %{node_table | told: told}, else: node_table
+        Enum.reduce(beacon.hears, node_table, &lead(&2, &1, now_ms))
 
       _rival_of_this_name ->
-        book
+        node_table
     end
   end
 
   # One that was heard here has an entry with an address of its own, which is the newer lead when it
   # has moved.
-  defp lead(%{me: me} = book, {me, _address}, _now_ms), do: book
+  defp lead(%{me: me} = node_table, {me, _address}, _now_ms), do: node_table
 
-  defp lead(book, {name, address}, now_ms) do
-    case book do
+  defp lead(node_table, {name, address}, now_ms) do
+    case node_table do
       %{nodes: %{^name => %{status: status, address: known}}}
       when status != :gone or known == address ->
-        %{book | leads: Map.delete(book.leads, name)}
+        %{node_table | leads: Map.delete(node_table.leads, name)}
 
       %{leads: %{^name => {^address, _backoff}}} ->
-        book
+        node_table
 
       %{leads: leads} when map_size(leads) >= @most ->
-        book
+        node_table
 
       _news ->
-        %{book | leads: Map.put(book.leads, name, {address, Backoff.new(now_ms)})}
+        %{node_table | leads: Map.put(node_table.leads, name, {address, Backoff.new(now_ms)})}
     end
   end
 
   @doc "A heartbeat of a robot on that node."
   @spec robot(t(), name(), atom(), {boot :: integer(), sequence :: integer()}, integer()) :: t()
-  def robot(book, name, id, {boot, sequence}, now_ms) do
-    case book.nodes do
+  def robot(node_table, name, id, {boot, sequence}, now_ms) do
+    case node_table.nodes do
       %{^name => entry} ->
         robots = Map.put(entry.robots, id, {now_ms, boot, sequence})
-        put(book, name, %{entry | robots: robots})
+        put(node_table, name, %{entry | robots: robots})
 
       _rival ->
-        book
+        node_table
     end
   end
 
@@ -138,15 +139,20 @@ defmodule Swarm.Mesh.NodeTable do
   """
   @spec sessions(t(), let_in :: %{name() => non_neg_integer()}, integer()) ::
           [{name(), non_neg_integer()}]
-  def sessions(book, let_in, now_ms) do
-    alive = Map.filter(let_in, fn {name, _} -> status(book, name, now_ms) == :alive end)
-    book.told |> Map.merge(let_in) |> Map.merge(book.claims) |> Map.merge(alive) |> Enum.sort()
+  def sessions(node_table, let_in, now_ms) do
+    alive = Map.filter(let_in, fn {name, _} -> status(node_table, name, now_ms) == :alive end)
+
+    node_table.told
+    |> Map.merge(let_in)
+    |> Map.merge(node_table.claims)
+    |> Map.merge(alive)
+    |> Enum.sort()
   end
 
   @doc "How a node is, by its silence."
   @spec status(t(), name(), integer()) :: status()
-  def status(book, name, now_ms) do
-    case book.nodes do
+  def status(node_table, name, now_ms) do
+    case node_table.nodes do
       %{^name => %{heard_ms: at_ms}} when now_ms - at_ms < @suspect_ms -> :alive
       %{^name => %{heard_ms: at_ms}} when now_ms - at_ms < @gone_ms -> :suspect
       _silent -> :gone
@@ -155,26 +161,29 @@ defmodule Swarm.Mesh.NodeTable do
 
   @doc "Whom this node hears, and from where, sorted."
   @spec hears(t(), integer()) :: [{name(), Swarm.Mesh.Strategy.address()}]
-  def hears(book, now_ms) do
+  def hears(node_table, now_ms) do
     Enum.sort(
-      for {name, entry} <- book.nodes,
-          status(book, name, now_ms) == :alive,
+      for {name, entry} <- node_table.nodes,
+          status(node_table, name, now_ms) == :alive,
           do: {name, entry.address}
     )
   end
 
   @doc "What time has changed: who has become suspect, who is gone."
   @spec age(t(), integer()) :: {t(), [{:suspect | :gone, name()}]}
-  def age(book, now_ms) do
-    for {name, entry} <- Enum.sort(book.nodes),
-        status = status(book, name, now_ms),
+  def age(node_table, now_ms) do
+    for {name, entry} <- Enum.sort(node_table.nodes),
+        status = status(node_table, name, now_ms),
         status != entry.status,
-        reduce: {book, []} do
-      {book, changes} ->
-        number = if status == :gone, do: book.number + 1, else: book.number
+        reduce: {node_table, []} do
+      {node_table, changes} ->
+        number = if status == :gone, do: node_table.number + 1, else: node_table.number
         probe = if status == :gone, do: Backoff.new(now_ms), else: entry.probe
-        book = put(%{book | number: number}, name, %{entry | status: status, probe: probe})
-        {book, changes ++ [{status, name}]}
+
+        node_table =
+          put(%{node_table | number: number}, name, %{entry | status: status, probe: probe})
+
+        {node_table, changes ++ [{status, name}]}
     end
   end
 
@@ -183,56 +192,62 @@ defmodule Swarm.Mesh.NodeTable do
   those that are not, and leads, at growing intervals.
   """
   @spec due(t(), boolean(), integer(), float()) :: {[Swarm.Mesh.Strategy.address()], t()}
-  def due(book, often?, now_ms, chance) do
-    {due, book} = follow(book, now_ms, chance)
+  def due(node_table, often?, now_ms, chance) do
+    {due, node_table} = follow(node_table, now_ms, chance)
 
-    for {name, entry} <- Enum.sort(book.nodes), reduce: {due, book} do
-      {due, book} ->
+    for {name, entry} <- Enum.sort(node_table.nodes), reduce: {due, node_table} do
+      {due, node_table} ->
         cond do
           entry.status != :gone and (often? or Backoff.due?(entry.probe, now_ms)) ->
             probe = %{entry.probe | due_ms: now_ms + @beacon_ms}
-            {[entry.address | due], put(book, name, %{entry | probe: probe})}
+            {[entry.address | due], put(node_table, name, %{entry | probe: probe})}
 
           entry.status == :gone and Backoff.due?(entry.probe, now_ms) ->
             probe = Backoff.tried(entry.probe, now_ms, chance)
-            {[entry.address | due], put(book, name, %{entry | probe: probe})}
+            {[entry.address | due], put(node_table, name, %{entry | probe: probe})}
 
           true ->
-            {due, book}
+            {due, node_table}
         end
     end
   end
 
-  defp follow(book, now_ms, chance) do
-    for {name, {address, backoff}} <- Enum.sort(book.leads),
+  defp follow(node_table, now_ms, chance) do
+    for {name, {address, backoff}} <- Enum.sort(node_table.leads),
         Backoff.due?(backoff, now_ms),
-        reduce: {[], book} do
-      {due, book} ->
+        reduce: {[], node_table} do
+      {due, node_table} ->
         lead = {address, Backoff.tried(backoff, now_ms, chance)}
-        {[address | due], %{book | leads: Map.put(book.leads, name, lead)}}
+        {[address | due], %{node_table | leads: Map.put(node_table.leads, name, lead)}}
     end
   end
 
   @doc "The addresses of all that are not gone."
   @spec addresses(t()) :: [Swarm.Mesh.Strategy.address()]
-  def addresses(book),
-    do: for({_name, %{status: status, address: a}} <- book.nodes, status != :gone, do: a)
+  def addresses(node_table),
+    do: for({_name, %{status: status, address: a}} <- node_table.nodes, status != :gone, do: a)
 
   @doc "The names of the nodes that hold these robots, as far as they were heard."
   @spec holders(t(), [atom()]) :: [name()]
-  def holders(book, ids),
+  def holders(node_table, ids),
     do:
       for(
-        {name, %{robots: robots}} <- book.nodes,
+        {name, %{robots: robots}} <- node_table.nodes,
         Enum.any?(ids, &is_map_key(robots, &1)),
         do: name
       )
 
   # One that was only suspect was in the view all the time.
-  defp up(book, name, entry, news) do
-    book = %{book | number: book.number + news, leads: Map.delete(book.leads, name)}
-    {put(book, name, entry), [{:up, name}]}
+  defp up(node_table, name, entry, news) do
+    node_table = %{
+      node_table
+      | number: node_table.number + news,
+        leads: Map.delete(node_table.leads, name)
+    }
+
+    {put(node_table, name, entry), [{:up, name}]}
   end
 
-  defp put(book, name, entry), do: %{book | nodes: Map.put(book.nodes, name, entry)}
+  defp put(node_table, name, entry),
+    do: %{node_table | nodes: Map.put(node_table.nodes, name, entry)}
 end

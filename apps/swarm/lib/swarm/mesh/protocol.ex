@@ -22,7 +22,7 @@ defmodule Swarm.Mesh.Protocol do
   # An answer to a stranger, no more often than this for each.
   @answer_ms 20
 
-  @enforce_keys [:secret, :roster, :name, :session, :guard, :book, :strategies, :port]
+  @enforce_keys [:secret, :roster, :name, :session, :guard, :node_table, :strategies, :port]
   defstruct @enforce_keys ++
               [
                 group: nil,
@@ -55,7 +55,7 @@ defmodule Swarm.Mesh.Protocol do
           name: String.t(),
           session: non_neg_integer(),
           guard: ReplayProtection.t(),
-          book: NodeTable.t(),
+          node_table: NodeTable.t(),
           strategies: [{module(), state :: term()}],
           port: :inet.port_number(),
           group: address() | nil,
@@ -69,7 +69,7 @@ defmodule Swarm.Mesh.Protocol do
         }
 
   @doc """
-  A station; `session` is random and new with each start, `strategies` are `{module, state}`, `group`
+  A node's side of the protocol; `session` is random and new with each start, `strategies` are `{module, state}`, `group`
   is the multicast address that heartbeats go to besides, `port` that of the distribution.
   """
   @spec new(keyword()) :: t()
@@ -85,7 +85,7 @@ defmodule Swarm.Mesh.Protocol do
       name: name,
       session: session,
       guard: ReplayProtection.new(session),
-      book: NodeTable.new(name),
+      node_table: NodeTable.new(name),
       strategies: strategies,
       port: port,
       group: options[:group]
@@ -94,85 +94,88 @@ defmodule Swarm.Mesh.Protocol do
 
   @doc "A datagram came from there."
   @spec hear(t(), binary(), address(), integer()) :: {t(), [effect()]}
-  def hear(station, datagram, address, now_ms) do
-    station = count_anew(station, div(now_ms, 1_000))
+  def hear(protocol, datagram, address, now_ms) do
+    protocol = count_anew(protocol, div(now_ms, 1_000))
 
-    case Packet.Filter.read(station, datagram, address) do
-      {:ok, packet, node, body} -> admit(station, packet, node, body, address, now_ms)
-      {:error, :own} -> {station, []}
-      {:error, reason} -> reject(station, reason, address, now_ms)
+    case Packet.Filter.read(protocol, datagram, address) do
+      {:ok, packet, node, body} -> admit(protocol, packet, node, body, address, now_ms)
+      {:error, :own} -> {protocol, []}
+      {:error, reason} -> reject(protocol, reason, address, now_ms)
     end
   end
 
   @doc "Time: five times a second. `links` are the nodes that the distribution is connected to."
   @spec tick(t(), [node()], integer(), float()) :: {t(), [effect()]}
-  def tick(station, links, now_ms, chance) do
-    station = %{station | links: for(node <- links, do: Atom.to_string(node))}
-    {book, changes} = NodeTable.age(station.book, now_ms)
-    quiet? = station.spoke_ms == nil or now_ms - station.spoke_ms >= @beat_ms
-    {due, book} = NodeTable.due(book, quiet?, now_ms, chance)
-    {targets, strategies} = ask(station.strategies, NodeTable.addresses(book), now_ms, chance)
-    station = %{station | book: book, strategies: strategies}
-    {station, sent} = send_all(station, :beacon, beacon(station, now_ms), due ++ targets)
-    {station, sent ++ changed(station, changes)}
+  def tick(protocol, links, now_ms, chance) do
+    protocol = %{protocol | links: for(node <- links, do: Atom.to_string(node))}
+    {node_table, changes} = NodeTable.age(protocol.node_table, now_ms)
+    quiet? = protocol.spoke_ms == nil or now_ms - protocol.spoke_ms >= @beat_ms
+    {due, node_table} = NodeTable.due(node_table, quiet?, now_ms, chance)
+
+    {targets, strategies} =
+      ask(protocol.strategies, NodeTable.addresses(node_table), now_ms, chance)
+
+    protocol = %{protocol | node_table: node_table, strategies: strategies}
+    {protocol, sent} = send_all(protocol, :beacon, beacon(protocol, now_ms), due ++ targets)
+    {protocol, sent ++ changed(protocol, changes)}
   end
 
   @doc "A message of a robot of this node, to all nodes or to those that hold these robots."
   @spec speak(t(), :all | [atom()], Message.t(), integer()) :: {t(), [effect()]}
-  def speak(station, :all, message, now_ms) do
-    to = NodeTable.addresses(station.book) ++ List.wrap(station.group)
-    {station, sent} = send_all(station, :message, {:all, message}, to)
-    {%{station | spoke_ms: now_ms}, sent}
+  def speak(protocol, :all, message, now_ms) do
+    to = NodeTable.addresses(protocol.node_table) ++ List.wrap(protocol.group)
+    {protocol, sent} = send_all(protocol, :message, {:all, message}, to)
+    {%{protocol | spoke_ms: now_ms}, sent}
   end
 
-  def speak(station, ids, message, _now_ms) do
-    holders = NodeTable.holders(station.book, ids)
+  def speak(protocol, ids, message, _now_ms) do
+    holders = NodeTable.holders(protocol.node_table, ids)
 
     to =
       for name <- holders,
-          entry = station.book.nodes[name],
+          entry = protocol.node_table.nodes[name],
           entry.status != :gone,
           do: entry.address
 
-    send_all(station, :message, {ids, message}, to)
+    send_all(protocol, :message, {ids, message}, to)
   end
 
   @doc "Somebody who may not know this node is there: a beacon introduces it."
   @spec knock(t(), address(), integer()) :: {t(), [effect()]}
-  def knock(station, address, now_ms),
-    do: send_all(station, :beacon, beacon(station, now_ms), [address])
+  def knock(protocol, address, now_ms),
+    do: send_all(protocol, :beacon, beacon(protocol, now_ms), [address])
 
   @doc "A service's term, to all nodes or to one."
   @spec serve(t(), atom(), :all | node(), term()) :: {t(), [effect()]}
-  def serve(station, :stop, :all, term) do
+  def serve(protocol, :stop, :all, term) do
     # A stop goes every way there is, also to those that have just been silent.
-    to = for {_name, %{address: address}} <- station.book.nodes, do: address
-    send_all(station, :service, {:stop, term}, to ++ List.wrap(station.group))
+    to = for {_name, %{address: address}} <- protocol.node_table.nodes, do: address
+    send_all(protocol, :service, {:stop, term}, to ++ List.wrap(protocol.group))
   end
 
-  def serve(station, service, :all, term),
-    do: send_all(station, :service, {service, term}, NodeTable.addresses(station.book))
+  def serve(protocol, service, :all, term),
+    do: send_all(protocol, :service, {service, term}, NodeTable.addresses(protocol.node_table))
 
-  def serve(station, service, node, term) do
-    case station.book.nodes[Atom.to_string(node)] do
-      nil -> {station, []}
-      entry -> send_all(station, :service, {service, term}, [entry.address])
+  def serve(protocol, service, node, term) do
+    case protocol.node_table.nodes[Atom.to_string(node)] do
+      nil -> {protocol, []}
+      entry -> send_all(protocol, :service, {service, term}, [entry.address])
     end
   end
 
-  defp count_anew(%{second: second} = station, second), do: station
-  defp count_anew(station, second), do: %{station | second: second, strange: 0}
+  defp count_anew(%{second: second} = protocol, second), do: protocol
+  defp count_anew(protocol, second), do: %{protocol | second: second, strange: 0}
 
-  defp admit(station, packet, node, body, address, now_ms) do
+  defp admit(protocol, packet, node, body, address, now_ms) do
     told =
       with %Beacon{sessions: sessions} <- body,
-           {_name, session} <- List.keyfind(sessions, station.name, 0),
+           {_name, session} <- List.keyfind(sessions, protocol.name, 0),
            do: session,
            else: (_none -> nil)
 
     admitted =
       ReplayProtection.admit(
-        station.guard,
+        protocol.guard,
         packet.sender,
         packet.session,
         packet.sequence,
@@ -182,69 +185,78 @@ defmodule Swarm.Mesh.Protocol do
 
     case admitted do
       {:ok, guard} ->
-        new? = ReplayProtection.session(station.guard, packet.sender) != packet.session
-        {book, changes} = NodeTable.hear(station.book, packet.sender, address, now_ms)
-        station = %{station | guard: guard, book: book}
-        {station, taken} = take(station, packet, node, body, address, now_ms)
+        new? = ReplayProtection.session(protocol.guard, packet.sender) != packet.session
 
-        # Those who have just been let in need this station's word as soon.
-        {station, sent} =
-          if new?, do: answer(station, packet, address, now_ms), else: {station, []}
+        {node_table, changes} =
+          NodeTable.hear(protocol.node_table, packet.sender, address, now_ms)
 
-        {station, changed(station, changes) ++ taken ++ sent}
+        protocol = %{protocol | guard: guard, node_table: node_table}
+        {protocol, taken} = take(protocol, packet, node, body, address, now_ms)
+
+        # Those who have just been let in need this node's word as soon.
+        {protocol, sent} =
+          if new?, do: answer(protocol, packet, address, now_ms), else: {protocol, []}
+
+        {protocol, changed(protocol, changes) ++ taken ++ sent}
 
       {:error, :stranger, guard} ->
-        answer(%{station | guard: guard}, packet, address, now_ms)
+        answer(%{protocol | guard: guard}, packet, address, now_ms)
 
       {:error, reason, guard} ->
-        reject(%{station | guard: guard}, reason, address, now_ms)
+        reject(%{protocol | guard: guard}, reason, address, now_ms)
     end
   end
 
-  defp take(station, packet, node, %Beacon{} = beacon, {ip, _port}, now_ms) do
+  defp take(protocol, packet, node, %Beacon{} = beacon, {ip, _port}, now_ms) do
     learn = if beacon.port > 0, do: [{:learn, packet.sender, ip, beacon.port}], else: []
-    rival = if node == station.roster.me, do: [{:event, :duplicate_node, %{node: node}}], else: []
 
-    {%{station | book: NodeTable.beacon(station.book, packet.sender, beacon, now_ms)},
-     learn ++ rival}
+    rival =
+      if node == protocol.roster.me, do: [{:event, :duplicate_node, %{node: node}}], else: []
+
+    {%{
+       protocol
+       | node_table: NodeTable.beacon(protocol.node_table, packet.sender, beacon, now_ms)
+     }, learn ++ rival}
   end
 
-  defp take(station, packet, node, {to, %Message{from: from} = message}, _address, now_ms) do
+  defp take(protocol, packet, node, {to, %Message{from: from} = message}, _address, now_ms) do
     case {to, message} do
       # One that is meant for some only is passed on: its robot is elsewhere.
       {:all, %{kind: :heartbeat, body: beat}} ->
         boot = {beat.boot, beat.sequence}
-        book = NodeTable.robot(station.book, packet.sender, from, boot, now_ms)
-        {%{station | book: book}, [{:beat, from, node, boot}, {:deliver, to, message}]}
+        node_table = NodeTable.robot(protocol.node_table, packet.sender, from, boot, now_ms)
+
+        {%{protocol | node_table: node_table},
+         [{:beat, from, node, boot}, {:deliver, to, message}]}
 
       _other ->
-        {station, [{:deliver, to, message}]}
+        {protocol, [{:deliver, to, message}]}
     end
   end
 
-  defp take(station, _packet, node, {service, term}, _address, _now_ms),
-    do: {station, [{:serve, service, node, term}]}
+  defp take(protocol, _packet, node, {service, term}, _address, _now_ms),
+    do: {protocol, [{:serve, service, node, term}]}
 
   # A beacon that tells the stranger its session, and so asks for its word.
-  defp answer(station, packet, address, now_ms) do
-    book = NodeTable.claim(station.book, packet.sender, packet.session)
-    station = %{station | book: book}
+  defp answer(protocol, packet, address, now_ms) do
+    node_table = NodeTable.claim(protocol.node_table, packet.sender, packet.session)
+    protocol = %{protocol | node_table: node_table}
 
-    if now_ms - Map.get(station.answered, packet.sender, now_ms - @answer_ms) >= @answer_ms do
-      station = put_in(station.answered[packet.sender], now_ms)
-      send_all(station, :beacon, beacon(station, now_ms), [address])
+    if now_ms - Map.get(protocol.answered, packet.sender, now_ms - @answer_ms) >= @answer_ms do
+      protocol = put_in(protocol.answered[packet.sender], now_ms)
+      send_all(protocol, :beacon, beacon(protocol, now_ms), [address])
     else
-      {station, []}
+      {protocol, []}
     end
   end
 
-  defp beacon(station, now_ms) do
+  defp beacon(protocol, now_ms) do
     Beacon.term(%Beacon{
       sessions:
-        NodeTable.sessions(station.book, ReplayProtection.sessions(station.guard), now_ms),
-      hears: NodeTable.hears(station.book, now_ms),
-      links: station.links,
-      port: station.port
+        NodeTable.sessions(protocol.node_table, ReplayProtection.sessions(protocol.guard), now_ms),
+      hears: NodeTable.hears(protocol.node_table, now_ms),
+      links: protocol.links,
+      port: protocol.port
     })
   end
 
@@ -261,51 +273,51 @@ defmodule Swarm.Mesh.Protocol do
   end
 
   # Sealed once: who hears it twice, by multicast and by name, counts it once.
-  defp send_all(station, _kind, _term, []), do: {station, []}
+  defp send_all(protocol, _kind, _term, []), do: {protocol, []}
 
-  defp send_all(station, kind, term, addresses) do
+  defp send_all(protocol, kind, term, addresses) do
     payload = Packet.pack(term)
 
     if byte_size(payload) > Packet.largest() do
-      reject(station, :too_big, nil, 0)
+      reject(protocol, :too_big, nil, 0)
     else
-      sequence = station.sequence + 1
+      sequence = protocol.sequence + 1
 
       datagram =
         Packet.seal(
           %Packet{
-            sender: station.name,
-            session: station.session,
+            sender: protocol.name,
+            session: protocol.session,
             sequence: sequence,
             kind: kind,
             payload: payload
           },
-          station.secret.key
+          protocol.secret.key
         )
 
       sends = for address <- Enum.uniq(addresses), do: {:send, address, datagram}
-      {%{station | sequence: sequence}, sends}
+      {%{protocol | sequence: sequence}, sends}
     end
   end
 
-  defp changed(station, changes) do
-    for {change, name} <- changes, {:ok, node} = Roster.node(station.roster, name) do
+  defp changed(protocol, changes) do
+    for {change, name} <- changes, {:ok, node} = Roster.node(protocol.roster, name) do
       {:node, change, node}
     end
   end
 
-  defp reject(station, {:unknown_node, name}, address, now_ms) do
-    {station, effects} = reject(station, :unknown_node, address, now_ms)
+  defp reject(protocol, {:unknown_node, name}, address, now_ms) do
+    {protocol, effects} = reject(protocol, :unknown_node, address, now_ms)
 
     # Signed, so it is one of ours that somebody forgot to write down; said once for each count of a hundred.
-    if rem(station.rejected.unknown_node, 100) == 1,
-      do: {station, [{:event, :unknown_node, %{name: name, address: address}} | effects]},
-      else: {station, effects}
+    if rem(protocol.rejected.unknown_node, 100) == 1,
+      do: {protocol, [{:event, :unknown_node, %{name: name, address: address}} | effects]},
+      else: {protocol, effects}
   end
 
-  defp reject(station, reason, _address, _now_ms) do
+  defp reject(protocol, reason, _address, _now_ms) do
     strange = if reason in [:unsigned, :not_ours, :version], do: 1, else: 0
-    rejected = Map.update(station.rejected, reason, 1, &(&1 + 1))
-    {%{station | rejected: rejected, strange: station.strange + strange}, []}
+    rejected = Map.update(protocol.rejected, reason, 1, &(&1 + 1))
+    {%{protocol | rejected: rejected, strange: protocol.strange + strange}, []}
   end
 end

@@ -31,7 +31,7 @@ defmodule Swarm.Mesh.Server do
     <<session::64>> = :crypto.strong_rand_bytes(8)
     load()
 
-    station =
+    protocol =
       Protocol.new(
         secret: options.secret,
         roster: Roster.new(node(), options.fleet),
@@ -43,7 +43,7 @@ defmodule Swarm.Mesh.Server do
 
     s = %{
       options: options,
-      station: station,
+      protocol: protocol,
       sockets: nil,
       backoff: Backoff.new(now()),
       table: table,
@@ -76,13 +76,13 @@ defmodule Swarm.Mesh.Server do
   @impl GenServer
   def handle_cast({:speak, to, message}, s) do
     if to == :all or WireTypes.names?(to),
-      do: {:noreply, run(s, Protocol.speak(s.station, to, message, now()))},
+      do: {:noreply, run(s, Protocol.speak(s.protocol, to, message, now()))},
       else: {:noreply, s}
   end
 
   def handle_cast({:serve, service, to, term}, s)
       when is_map_key(@receivers, service) and is_atom(to),
-      do: {:noreply, run(s, Protocol.serve(s.station, service, to, term))}
+      do: {:noreply, run(s, Protocol.serve(s.protocol, service, to, term))}
 
   # To a node that the distribution is connected to, however that came about.
   def handle_cast({:introduce, node}, s) when is_atom(node) do
@@ -93,7 +93,7 @@ defmodule Swarm.Mesh.Server do
   def handle_cast({:knock, node, port}, s) when is_atom(node) and port in 1..65_535 do
     case ip(node) do
       nil -> {:noreply, s}
-      ip -> {:noreply, run(s, Protocol.knock(s.station, {ip, port}, now()))}
+      ip -> {:noreply, run(s, Protocol.knock(s.protocol, {ip, port}, now()))}
     end
   end
 
@@ -102,7 +102,7 @@ defmodule Swarm.Mesh.Server do
 
   @impl GenServer
   def handle_call(:counts, _from, s) do
-    counts = %{sent: s.sent, heard: s.heard, rejected: s.station.rejected}
+    counts = %{sent: s.sent, heard: s.heard, rejected: s.protocol.rejected}
     {:reply, Map.put(counts, :port, s.sockets && s.sockets.port), s}
   end
 
@@ -112,7 +112,7 @@ defmodule Swarm.Mesh.Server do
   def handle_info({:udp, socket, ip, port, datagram}, %{sockets: %Sockets{} = sockets} = s)
       when socket == sockets.own or socket == sockets.group do
     s = %{s | heard: s.heard + 1}
-    {:noreply, run(s, Protocol.hear(s.station, datagram, {ip, port}, now()))}
+    {:noreply, run(s, Protocol.hear(s.protocol, datagram, {ip, port}, now()))}
   end
 
   def handle_info({:udp_passive, socket}, %{sockets: %Sockets{} = sockets} = s)
@@ -125,7 +125,7 @@ defmodule Swarm.Mesh.Server do
     {chance, state} = :rand.uniform_s(s.chance)
     s = open(%{s | chance: state, ticks: s.ticks + 1, links: Names.all(:link)})
     if s.sockets && rem(s.ticks, @rejoin_every) == 0, do: Sockets.rejoin(s.sockets)
-    s = run(s, Protocol.tick(s.station, Dialer.links(), now(), chance))
+    s = run(s, Protocol.tick(s.protocol, Dialer.links(), now(), chance))
     {:noreply, s |> publish() |> schedule()}
   end
 
@@ -152,9 +152,9 @@ defmodule Swarm.Mesh.Server do
     end
   end
 
-  defp run(s, {station, effects}) do
+  defp run(s, {protocol, effects}) do
     changed? = Enum.any?(effects, &match?({:node, _, _}, &1))
-    s = Enum.reduce(effects, %{s | station: station}, &carry_out/2)
+    s = Enum.reduce(effects, %{s | protocol: protocol}, &carry_out/2)
     if changed?, do: publish(s), else: s
   end
 
@@ -203,9 +203,13 @@ defmodule Swarm.Mesh.Server do
     s
   end
 
-  # The book, for those who read it without asking.
+  # The node table, for those who read it without asking.
   defp publish(s) do
-    :ets.insert(s.table, {:book, s.station.book, s.station.roster, s.station.rejected})
+    :ets.insert(
+      s.table,
+      {:node_table, s.protocol.node_table, s.protocol.roster, s.protocol.rejected}
+    )
+
     s
   end
 

@@ -24,7 +24,7 @@ defmodule Swarm.Host.ReleaseBootTest do
     "[id: :mag1, profile: :magellan, #{drive}#{more}]"
   end
 
-  test "the release of real robots needs a file, and says where it looked; a base station needs none" do
+  test "the release of real robots needs a file, and says where it looked; a base protocol needs none" do
     real = %{"RELEASE_NAME" => "robot", "ROBOT" => "mag9", "RELEASE_ROOT" => "/nowhere"}
 
     assert ReleaseBoot.robot(real) ==

@@ -54,7 +54,7 @@ defmodule Swarm.Mesh.FloodTest do
         end
       end
 
-      # Within the flood the robot's mind goes on, and people are answered.
+      # Within the flood the robot's controller goes on, and people are answered.
       tick_ms = state(one).tick_ms
       assert eventually(fn -> state(one).tick_ms > tick_ms + 500 end)
       assert :ok = MeshNodes.call(one, Swarm, :stop, [one.name])

@@ -34,10 +34,10 @@ defmodule Swarm.Mesh.PureTest do
 
   test "the number of the view grows with a node that goes and comes, not with one that is late" do
     place = {{10, 0, 0, 7}, 4370}
-    {book, [up: "b"]} = NodeTable.hear(NodeTable.new("a"), "b", place, 0)
-    {late, [suspect: "b"]} = NodeTable.age(book, 1_500)
+    {node_table, [up: "b"]} = NodeTable.hear(NodeTable.new("a"), "b", place, 0)
+    {late, [suspect: "b"]} = NodeTable.age(node_table, 1_500)
     {back, [up: "b"]} = NodeTable.hear(late, "b", place, 1_600)
-    assert {book.number, late.number, back.number} == {1, 1, 1}
+    assert {node_table.number, late.number, back.number} == {1, 1, 1}
     {gone, [gone: "b"]} = NodeTable.age(back, 3_600)
     {again, [up: "b"]} = NodeTable.hear(gone, "b", place, 9_000)
     assert {gone.number, again.number} == {2, 3}
@@ -50,13 +50,13 @@ defmodule Swarm.Mesh.PureTest do
   # What "a" knows at 5 s: all of "b", of "c" that it has been silent for 3 s, though TCP has not noticed.
   defp torn(hears) do
     address = {{10, 0, 0, 1}, 1}
-    {book, _up} = NodeTable.hear(NodeTable.new("a"), "c", address, 2_000)
-    book = NodeTable.robot(book, "c", :mag3, {1, 1}, 2_000)
-    {book, _up} = NodeTable.hear(book, "b", address, 5_000)
+    {node_table, _up} = NodeTable.hear(NodeTable.new("a"), "c", address, 2_000)
+    node_table = NodeTable.robot(node_table, "c", :mag3, {1, 1}, 2_000)
+    {node_table, _up} = NodeTable.hear(node_table, "b", address, 5_000)
     hears = for name <- hears, do: {name, address}
 
     NodeTable.beacon(
-      book,
+      node_table,
       "b",
       %Beacon{sessions: [], hears: hears, links: ["a", "c"], port: 0},
       5_000
@@ -64,19 +64,19 @@ defmodule Swarm.Mesh.PureTest do
   end
 
   test "where a link is silent the way leads over one that hears both" do
-    book = torn(["a", "c"])
-    ways = Routing.ways(book, ["b", "c"], 5_000)
+    node_table = torn(["a", "c"])
+    ways = Routing.ways(node_table, ["b", "c"], 5_000)
     assert ways == %{"a" => ["b"], "b" => ["a", "c"]}
     assert Topology.route("a", "c", ways) == ["b", "c"]
-    assert Routing.holder(book, :mag3) == "c"
-    assert Routing.beyond(book, 5_000) == [:mag3]
+    assert Routing.holder(node_table, :mag3) == "c"
+    assert Routing.beyond(node_table, 5_000) == [:mag3]
   end
 
   test "there is no way to a node that nobody hears" do
-    book = torn(["a"])
-    assert Topology.route("a", "c", Routing.ways(book, ["b", "c"], 5_000)) == nil
-    assert Routing.beyond(book, 5_000) == []
-    assert Routing.holder(book, :mag9) == nil
+    node_table = torn(["a"])
+    assert Topology.route("a", "c", Routing.ways(node_table, ["b", "c"], 5_000)) == nil
+    assert Routing.beyond(node_table, 5_000) == []
+    assert Routing.holder(node_table, :mag9) == nil
   end
 
   test "options are checked by name" do

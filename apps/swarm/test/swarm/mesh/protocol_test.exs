@@ -14,7 +14,7 @@ defmodule Swarm.Mesh.ProtocolTest do
   end
 
   defp hears(air, name) do
-    for {node, _address} <- NodeTable.hears(air.stations[name].book, air.now),
+    for {node, _address} <- NodeTable.hears(air.stations[name].node_table, air.now),
         do: String.first(node)
   end
 
@@ -65,11 +65,11 @@ defmodule Swarm.Mesh.ProtocolTest do
     many = for n <- 1..900, into: %{}, do: {"#{n}#{String.duplicate("x", 200)}@lab", n}
 
     for told <- [%{"c@lab" => huge}, many] do
-      spoilt = put_in(air.stations["a"].book.told, told)
+      spoilt = put_in(air.stations["a"].node_table.told, told)
       spoilt = %{spoilt | tap: []} |> Air.run(5_000)
       assert "c" in hears(spoilt, "b") and "b" in hears(spoilt, "c")
       # What a tells is refused, or, of nodes that nobody knows, not told any further.
-      assert map_size(spoilt.stations["b"].book.told) <= 3
+      assert map_size(spoilt.stations["b"].node_table.told) <= 3
 
       said =
         for datagram <- spoilt.tap,
@@ -154,7 +154,7 @@ defmodule Swarm.Mesh.ProtocolTest do
     first = air.stations["a"]
     twin = Map.put(air.addresses, "twin", {{10, 0, 0, 99}, 4370})
     air = %{air | addresses: twin} |> Air.join("twin")
-    impostor = %{air.stations["twin"] | name: "a@lab", book: NodeTable.new("a@lab")}
+    impostor = %{air.stations["twin"] | name: "a@lab", node_table: NodeTable.new("a@lab")}
     impostor = %{impostor | roster: first.roster}
     air = put_in(air.stations["twin"], impostor) |> Map.put(:out, []) |> Air.run(3_000)
 

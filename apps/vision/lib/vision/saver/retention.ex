@@ -18,14 +18,14 @@ defmodule Vision.Saver.Retention do
             last_ms: integer()
           }
 
-  @doc "A shelf for the pictures of this name, at most so many files and bytes; `there` is what lies in the folder, `{name, bytes}` each."
+  @doc "A retention for the pictures of this name, at most so many files and bytes; `there` is what lies in the folder, `{name, bytes}` each."
   @spec new(String.t(), pos_integer(), pos_integer(), [{String.t(), non_neg_integer()}]) :: t()
   def new(prefix, files, bytes, there) do
-    shelf = %__MODULE__{prefix: prefix, files: files, bytes: bytes}
+    retention = %__MODULE__{prefix: prefix, files: files, bytes: bytes}
 
     for({name, size} <- there, time_ms(prefix, name) != nil, do: {name, size})
     |> Enum.sort()
-    |> Enum.reduce(shelf, fn {name, size}, shelf -> put(shelf, name, size) end)
+    |> Enum.reduce(retention, fn {name, size}, retention -> put(retention, name, size) end)
   end
 
   @doc "What the next picture is called; the time is the wall clock's, milliseconds since 1970."
@@ -39,42 +39,43 @@ defmodule Vision.Saver.Retention do
   The names that must go, oldest first, before a picture of this size finds room; an error where it never does.
 
       iex> alias Vision.Saver.Retention
-      iex> shelf = Retention.new("mag1", 2, 1_000, [])
-      iex> one = Retention.name(shelf, 1_767_323_045_678)
+      iex> retention = Retention.new("mag1", 2, 1_000, [])
+      iex> one = Retention.name(retention, 1_767_323_045_678)
       "mag1-20260102T030405.678Z.jpg"
-      iex> shelf = Retention.put(shelf, one, 600)
-      iex> Retention.room(shelf, 400)
-      {:ok, [], shelf}
-      iex> {:ok, ["mag1-20260102T030405.678Z.jpg"], _shelf} = Retention.room(shelf, 401)
-      iex> Retention.room(shelf, 1_001)
+      iex> retention = Retention.put(retention, one, 600)
+      iex> Retention.room(retention, 400)
+      {:ok, [], retention}
+      iex> {:ok, ["mag1-20260102T030405.678Z.jpg"], _shelf} = Retention.room(retention, 401)
+      iex> Retention.room(retention, 1_001)
       {:error, :too_large}
   """
   @spec room(t(), size :: non_neg_integer()) :: {:ok, [String.t()], t()} | {:error, :too_large}
   def room(%__MODULE__{bytes: bytes}, size) when size > bytes, do: {:error, :too_large}
 
-  def room(shelf, size) do
-    {gone, shelf} = clear(shelf, size, [])
-    {:ok, Enum.reverse(gone), shelf}
+  def room(retention, size) do
+    {gone, retention} = clear(retention, size, [])
+    {:ok, Enum.reverse(gone), retention}
   end
 
-  defp clear(%{count: count, total: total} = shelf, size, gone) do
-    if count >= shelf.files or total + size > shelf.bytes do
-      {{:value, {name, bytes}}, kept} = :queue.out(shelf.kept)
-      clear(%{shelf | kept: kept, count: count - 1, total: total - bytes}, size, [name | gone])
+  defp clear(%{count: count, total: total} = retention, size, gone) do
+    if count >= retention.files or total + size > retention.bytes do
+      {{:value, {name, bytes}}, kept} = :queue.out(retention.kept)
+
+      clear(%{retention | kept: kept, count: count - 1, total: total - bytes}, size, [name | gone])
     else
-      {gone, shelf}
+      {gone, retention}
     end
   end
 
   @doc "A picture of this name and size was put there; it is the newest."
   @spec put(t(), String.t(), size :: non_neg_integer()) :: t()
-  def put(%__MODULE__{} = shelf, name, size) do
+  def put(%__MODULE__{} = retention, name, size) do
     %{
-      shelf
-      | kept: :queue.in({name, size}, shelf.kept),
-        count: shelf.count + 1,
-        total: shelf.total + size,
-        last_ms: max(shelf.last_ms, time_ms(shelf.prefix, name))
+      retention
+      | kept: :queue.in({name, size}, retention.kept),
+        count: retention.count + 1,
+        total: retention.total + size,
+        last_ms: max(retention.last_ms, time_ms(retention.prefix, name))
     }
   end
 

@@ -21,7 +21,7 @@ defmodule Vision.View.Server do
     {:ok,
      %{
        demand: options.demand,
-       audience: Subscribers.new(options.viewers),
+       subscribers: Subscribers.new(options.viewers),
        people: %{},
        maker: EncoderControl.new(options.ffmpeg),
        snapshot_ms: options.snapshot_ms,
@@ -33,7 +33,7 @@ defmodule Vision.View.Server do
   @impl GenServer
   def handle_call(:status, _from, %{maker: maker} = s) do
     encoder = if maker.encoder, do: :open, else: :closed
-    looking = %{viewers: Subscribers.size(s.audience), encoder: encoder}
+    looking = %{viewers: Subscribers.size(s.subscribers), encoder: encoder}
     {:reply, maker |> Map.take([:made, :failed, :why]) |> Map.merge(looking), s}
   end
 
@@ -71,7 +71,7 @@ defmodule Vision.View.Server do
   def handle_cast({:unsubscribe, ref}, s), do: {:noreply, s |> leave(ref) |> look()}
 
   def handle_cast({:next, ref}, s),
-    do: {:noreply, look(%{s | audience: Subscribers.ask(s.audience, ref)})}
+    do: {:noreply, look(%{s | subscribers: Subscribers.ask(s.subscribers, ref)})}
 
   # Looked for again when somebody asks again.
   def handle_cast(:no_frames, s),
@@ -81,10 +81,10 @@ defmodule Vision.View.Server do
   def handle_info(:look, s), do: {:noreply, look(%{s | timer: nil})}
 
   def handle_info({:too_late, from}, s) do
-    if Subscribers.member?(s.audience, {:once, from}),
+    if Subscribers.member?(s.subscribers, {:once, from}),
       do: GenServer.reply(from, {:error, why_none(s)})
 
-    {:noreply, look(%{s | audience: Subscribers.leave(s.audience, {:once, from})})}
+    {:noreply, look(%{s | subscribers: Subscribers.leave(s.subscribers, {:once, from})})}
   end
 
   def handle_info({:DOWN, monitor, :process, _pid, _reason}, s) do
@@ -107,10 +107,10 @@ defmodule Vision.View.Server do
 
   defp join(s, id, every) do
     with :ok <- EncoderControl.able(s.maker),
-         {:ok, audience} <- Subscribers.join(s.audience, id, every, now()) do
-      {:ok, %{s | audience: audience}}
+         {:ok, subscribers} <- Subscribers.join(s.subscribers, id, every, now()) do
+      {:ok, %{s | subscribers: subscribers}}
     else
-      {:error, :full} -> {:error, "#{Subscribers.size(s.audience)} look already, no more can"}
+      {:error, :full} -> {:error, "#{Subscribers.size(s.subscribers)} look already, no more can"}
       error -> error
     end
   end
@@ -122,7 +122,7 @@ defmodule Vision.View.Server do
 
       {{_pid, monitor}, people} ->
         Process.demonitor(monitor, [:flush])
-        %{s | people: people, audience: Subscribers.leave(s.audience, ref)}
+        %{s | people: people, subscribers: Subscribers.leave(s.subscribers, ref)}
     end
   end
 
@@ -142,7 +142,7 @@ defmodule Vision.View.Server do
   end
 
   defp wait(s, now) do
-    case {EncoderControl.rests(s.maker, now), Subscribers.due(s.audience, now)} do
+    case {EncoderControl.rests(s.maker, now), Subscribers.due(s.subscribers, now)} do
       {:busy, _due} -> :busy
       {_rests, :never} -> :never
       {rests, due} -> max(rests, due)
@@ -162,9 +162,9 @@ defmodule Vision.View.Server do
   end
 
   defp show(s, picture) do
-    {ids, audience} = Subscribers.serve(s.audience, now())
+    {ids, subscribers} = Subscribers.serve(s.subscribers, now())
     for id <- ids, do: hand_over(id, s.people, picture)
-    %{s | audience: audience}
+    %{s | subscribers: subscribers}
   end
 
   defp hand_over({:once, from}, _people, picture), do: GenServer.reply(from, {:ok, picture})
@@ -176,10 +176,10 @@ defmodule Vision.View.Server do
 
   # Whoever wants one picture now hears why there is none; those who look go on waiting.
   defp refuse(s, line) do
-    Enum.reduce(Subscribers.ids(s.audience), s, fn
+    Enum.reduce(Subscribers.ids(s.subscribers), s, fn
       {:once, from} = id, s ->
         GenServer.reply(from, {:error, line})
-        %{s | audience: Subscribers.leave(s.audience, id)}
+        %{s | subscribers: Subscribers.leave(s.subscribers, id)}
 
       _looking, s ->
         s

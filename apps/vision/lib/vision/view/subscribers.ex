@@ -21,15 +21,15 @@ defmodule Vision.View.Subscribers do
   Somebody looks, and waits for a first picture: for one at most every so many milliseconds, or `:once`.
 
       iex> alias Vision.View.Subscribers
-      iex> {:ok, audience} = Subscribers.join(Subscribers.new(1), :me, 200, 1_000)
-      iex> Subscribers.due(audience, 1_000)
+      iex> {:ok, subscribers} = Subscribers.join(Subscribers.new(1), :me, 200, 1_000)
+      iex> Subscribers.due(subscribers, 1_000)
       0
-      iex> {[:me], audience} = Subscribers.serve(audience, 1_050)
-      iex> Subscribers.due(audience, 1_050)
+      iex> {[:me], subscribers} = Subscribers.serve(subscribers, 1_050)
+      iex> Subscribers.due(subscribers, 1_050)
       :never
-      iex> audience |> Subscribers.ask(:me) |> Subscribers.due(1_100)
+      iex> subscribers |> Subscribers.ask(:me) |> Subscribers.due(1_100)
       100
-      iex> Subscribers.join(audience, :you, :once, 1_100)
+      iex> Subscribers.join(subscribers, :you, :once, 1_100)
       {:error, :full}
   """
   @spec join(t(), id(), every_ms :: pos_integer() | :once, now_ms :: integer()) ::
@@ -38,24 +38,24 @@ defmodule Vision.View.Subscribers do
       when map_size(viewers) >= most,
       do: {:error, :full}
 
-  def join(audience, id, every, now_ms) do
+  def join(subscribers, id, every, now_ms) do
     viewer = %{every: every, next_ms: now_ms, waits?: true}
-    {:ok, put_in(audience.viewers[id], viewer)}
+    {:ok, put_in(subscribers.viewers[id], viewer)}
   end
 
   @doc "Somebody asks for a next picture. Asking twice is asking once."
   @spec ask(t(), id()) :: t()
-  def ask(%__MODULE__{viewers: viewers} = audience, id) do
+  def ask(%__MODULE__{viewers: viewers} = subscribers, id) do
     case viewers do
-      %{^id => viewer} -> %{audience | viewers: %{viewers | id => %{viewer | waits?: true}}}
-      _gone -> audience
+      %{^id => viewer} -> %{subscribers | viewers: %{viewers | id => %{viewer | waits?: true}}}
+      _gone -> subscribers
     end
   end
 
   @doc "Somebody looks no more."
   @spec leave(t(), id()) :: t()
-  def leave(%__MODULE__{viewers: viewers} = audience, id),
-    do: %{audience | viewers: Map.delete(viewers, id)}
+  def leave(%__MODULE__{viewers: viewers} = subscribers, id),
+    do: %{subscribers | viewers: Map.delete(viewers, id)}
 
   @doc "Whether this one looks."
   @spec member?(t(), id()) :: boolean()
@@ -83,9 +83,9 @@ defmodule Vision.View.Subscribers do
   camera that gives its frames somewhat late does not slow the viewer down.
   """
   @spec serve(t(), now_ms :: integer()) :: {[id()], t()}
-  def serve(%__MODULE__{viewers: viewers} = audience, now_ms) do
+  def serve(%__MODULE__{viewers: viewers} = subscribers, now_ms) do
     ids = for {id, %{waits?: true, next_ms: next}} <- viewers, next <= now_ms, do: id
-    {ids, %{audience | viewers: Enum.reduce(ids, viewers, &served(&1, &2, now_ms))}}
+    {ids, %{subscribers | viewers: Enum.reduce(ids, viewers, &served(&1, &2, now_ms))}}
   end
 
   defp served(id, viewers, now_ms) do

@@ -31,19 +31,20 @@ defmodule Hal.Visca.Session.OutlierFilter do
   Whether a position is believed.
 
       iex> alias Hal.Visca.Session.OutlierFilter
-      iex> {true, witness} = OutlierFilter.hear(OutlierFilter.new(), {0, 0}, 0)
-      iex> {false, witness} = OutlierFilter.hear(witness, {256, 0}, 100)
-      iex> {believed?, _witness} = OutlierFilter.hear(witness, {258, 0}, 200)
+      iex> {true, outliers} = OutlierFilter.hear(OutlierFilter.new(), {0, 0}, 0)
+      iex> {false, outliers} = OutlierFilter.hear(outliers, {256, 0}, 100)
+      iex> {believed?, _witness} = OutlierFilter.hear(outliers, {258, 0}, 200)
       iex> believed?
       true
   """
   @spec hear(t(), {integer(), integer()}, integer()) :: {boolean(), t()}
-  def hear(%__MODULE__{} = witness, {pan, tilt}, now_ms) do
+  def hear(%__MODULE__{} = outliers, {pan, tilt}, now_ms) do
     seen = {pan, tilt, now_ms}
 
-    if witness.believed == nil or near?(witness.believed, seen) or near?(witness.doubted, seen),
-      do: {true, %{witness | believed: seen, doubted: nil}},
-      else: {false, %{witness | doubted: seen, doubts: witness.doubts + 1}}
+    if outliers.believed == nil or near?(outliers.believed, seen) or
+         near?(outliers.doubted, seen),
+       do: {true, %{outliers | believed: seen, doubted: nil}},
+       else: {false, %{outliers | doubted: seen, doubts: outliers.doubts + 1}}
   end
 
   defp near?(nil, _seen), do: false

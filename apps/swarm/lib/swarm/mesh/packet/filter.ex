@@ -1,6 +1,6 @@
 defmodule Swarm.Mesh.Packet.Filter do
   @moduledoc """
-  What a station makes of a datagram before it changes anything by it: whether it is new, signed, of the fleet and
+  What a node makes of a datagram before it changes anything by it: whether it is new, signed, of the fleet and
   of sense. Pure. Whether it was made now is for `Swarm.Mesh.Packet.ReplayProtection`.
   """
   alias Swarm.Mesh.{Beacon, NodeTable, Packet, Roster}
@@ -23,28 +23,29 @@ defmodule Swarm.Mesh.Packet.Filter do
           | {:unknown_node, String.t()}
 
   @doc """
-  Reads a datagram from there: the packet, the node that made it and what it says. `:own` is this station's
+  Reads a datagram from there: the packet, the node that made it and what it says. `:own` is this node's
   own, heard by multicast.
   """
   @spec read(Swarm.Mesh.Protocol.t(), binary(), Swarm.Mesh.Strategy.address()) ::
           {:ok, Packet.t(), node(), body()} | {:error, refusal()}
-  def read(station, datagram, address) do
-    with :ok <- original(Packet.peek(datagram), station.guard),
-         :ok <- patience(station, address),
-         {:ok, packet} <- Packet.open(datagram, station.secret.key),
-         :ok <- foreign(packet, station),
-         {:ok, node} <- known(packet.sender, station.roster),
+  def read(protocol, datagram, address) do
+    with :ok <- original(Packet.peek(datagram), protocol.guard),
+         :ok <- patience(protocol, address),
+         {:ok, packet} <- Packet.open(datagram, protocol.secret.key),
+         :ok <- foreign(packet, protocol),
+         {:ok, node} <- known(packet.sender, protocol.roster),
          {:ok, term} <- Packet.unpack(packet.payload),
-         {:ok, body} <- body(packet.kind, term, station) do
+         {:ok, body} <- body(packet.kind, term, protocol) do
       {:ok, packet, node, body}
     end
   end
 
   # Garbage costs a signature each; beyond a measure only those who are known are listened to.
-  defp patience(station, address) do
-    if station.strange < @strange_per_second or address in NodeTable.addresses(station.book),
-      do: :ok,
-      else: {:error, :throttled}
+  defp patience(protocol, address) do
+    if protocol.strange < @strange_per_second or
+         address in NodeTable.addresses(protocol.node_table),
+       do: :ok,
+       else: {:error, :throttled}
   end
 
   defp foreign(%{sender: name, session: session}, %{name: name, session: session}),
@@ -66,17 +67,17 @@ defmodule Swarm.Mesh.Packet.Filter do
 
   defp original(:error, _guard), do: :ok
 
-  defp body(:beacon, term, station) do
+  defp body(:beacon, term, protocol) do
     case Beacon.check(term) do
-      {:ok, beacon} -> {:ok, Beacon.known(beacon, station.roster.nodes)}
+      {:ok, beacon} -> {:ok, Beacon.known(beacon, protocol.roster.nodes)}
       :error -> {:error, :beacon}
     end
   end
 
-  defp body(:message, {to, message}, station) do
+  defp body(:message, {to, message}, protocol) do
     with true <- to == :all or WireTypes.names?(to),
          {:ok, %Message{} = message} <- Message.check(message),
-         true <- ours?(message, station.roster) || :unknown_robot do
+         true <- ours?(message, protocol.roster) || :unknown_robot do
       {:ok, {to, message}}
     else
       :unknown_robot -> {:error, :unknown_robot}
