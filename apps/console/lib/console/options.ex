@@ -59,7 +59,7 @@ defmodule Console.Options do
   @spec help() :: String.t()
   def help do
     """
-    A fleet of robots searches a landmark, elects a leader and follows it in formation.
+    A fleet of robots searches for a landmark, elects a leader and follows it in formation.
 
       bin/demo [options]        (or: mix demo [options])
 
