@@ -97,11 +97,14 @@ defmodule System.DocsTest do
   # How blocks begin that nobody types.
   @shown [
     "console -> sim -> swarm",
-    "console ---> sim ---> swarm",
+    "console --> sim --> swarm",
     "Swarm.Supervisor (rest_for_one",
     "camera -> Hal.Device",
     "idle -> search -> agree",
-    "Link --Swarm.Comms.Transport",
+    "Comms --Transport",
+    "camera          Hal.Device      BlobDetector",
+    "caller             Comms of mag1",
+    "caller                EStop of each robot",
     # One line of a status.
     "#min1 follow (1.20",
     "#mag1 follow (-4.69",
