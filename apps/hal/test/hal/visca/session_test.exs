@@ -209,7 +209,11 @@ defmodule Hal.Visca.SessionTest do
   end
 
   test "with 2 % of all bytes lost, doubled or flipped it still follows, and tells few wrong places" do
-    runs = for _ <- 1..5, do: follow_on_a_bad_line()
+    {times, runs} = Enum.unzip(for _ <- 1..5, do: follow_on_a_bad_line())
+
+    # One command in four is spoiled, and a wrong one is told again after a second: of 800 heads 791 came within one
+    # second, 8 within two, one within three.
+    assert Enum.count(times, &(&1 <= 1_000)) >= 3
     # How far what it says is from where the camera is: it is 20 ms old.
     off = Enum.concat(runs)
     assert length(off) > 250
@@ -226,10 +230,16 @@ defmodule Hal.Visca.SessionTest do
 
     assert state.error == nil
     off = state.off
-    # It is where it should be, within a second of the end.
-    state = state |> look(0.2) |> run(3_000)
-    assert abs(elem(state.toy.at, 0) - Hal.Visca.Units.pan(0.2)) <= 9
-    off
+    {state |> look(0.2) |> arrive(0), off}
+  end
+
+  # How long it takes, in ms, until it stays where it should be.
+  defp arrive(_state, 10_000), do: flunk("it never gets there")
+
+  defp arrive(state, ms) do
+    if abs(elem(state.toy.at, 0) - Hal.Visca.Units.pan(0.2)) <= 9 and ms >= 1_000,
+      do: ms,
+      else: state |> run(100) |> arrive(ms + 100)
   end
 
   defp spoil(bytes) do
