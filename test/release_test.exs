@@ -209,7 +209,7 @@ defmodule System.ReleaseTest do
     first = pid(ask.(["pid"]))
 
     # Longer than net_ticktime, in which neither says anything else.
-    assert {":done\n", 0} = robot(["rpc", ":timer.sleep(12_000); :done"], environment)
+    assert {":done\n", 0} = robot(["rpc", "receive do after 12_000 -> :done end"], environment)
 
     for command <- ["start", "daemon"] do
       assert {said, 1} = robot([command], environment)

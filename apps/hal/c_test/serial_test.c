@@ -498,8 +498,10 @@ static void junk(int seed)
 
 int main(void)
 {
-    char folder[] = "/tmp/serial_test_XXXXXX";
+    const char *temporary = getenv("TMPDIR");
+    char folder[4096];
 
+    snprintf(folder, sizeof folder, "%s/serial_test_XXXXXX", temporary ? temporary : "/tmp");
     signal(SIGPIPE, SIG_IGN);
     check(mkdtemp(folder) && chdir(folder) == 0, "no folder");
     command_line();

@@ -3,7 +3,7 @@ defmodule Robot.Devices do
   What a robot senses and acts with, each beside the others, so that each falls alone:
 
       Robot.Devices (one_for_one)
-      |-- Vision.BlobDetector           the newest frame to blobs (only with a camera)
+      |-- Vision.BlobDetector  the newest frame to blobs (only with a camera)
       |-- Vision.View          frames to pictures for people, while somebody looks (only with a camera)
       |-- Vision.Saver         keeps such pictures in a folder (only if told to)
       |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and at once to the gate;
