@@ -96,8 +96,8 @@ defmodule System.DocsTest do
 
   # How blocks begin that nobody types.
   @shown [
-    "console -> sim -> swarm",
-    "console --> sim --> swarm",
+    "console -> sim -> missions -> swarm",
+    "console --> sim --> missions --> swarm",
     "Swarm.Supervisor (rest_for_one",
     "camera -> Hal.Device",
     "idle -> search -> agree",

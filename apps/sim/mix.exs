@@ -19,7 +19,7 @@ defmodule Sim.MixProject do
       ],
       elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
-      deps: [{:swarm, in_umbrella: true}]
+      deps: [{:missions, in_umbrella: true}]
     ]
   end
 

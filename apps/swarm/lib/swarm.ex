@@ -32,7 +32,6 @@ defmodule Swarm do
   alias Swarm.Membership.Matrix
   alias Swarm.Directory.{Presence, Search}
 
-  alias Missions.Manual
   alias Swarm.Status.Report
 
   @type robot :: atom() | String.t()
@@ -245,7 +244,7 @@ defmodule Swarm do
 
   defp command(to, request) do
     with {:ok, robots} <- Commands.robots(to),
-         {:ok, request} <- Manual.check(request),
+         {:ok, request} <- Commands.Order.check(request),
          do: Commands.tell(robots, request)
   end
 end

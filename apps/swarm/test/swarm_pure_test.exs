@@ -10,5 +10,5 @@ defmodule SwarmPureTest do
   doctest Swarm.Message
   doctest Swarm.Membership.Heartbeat
   doctest Swarm.Formation.Reference
-  doctest Missions.Landmark.Transitions
+  doctest Swarm.Commands.Order
 end

@@ -33,7 +33,7 @@ defmodule Robot.Mission do
 
   @type result :: {phase :: term(), mission :: term(), [effect()]}
 
-  @doc "Starts the mission of this robot."
+  @doc "Starts the mission of this robot with options that `c:options/2` has checked."
   @callback init(robot :: atom(), keyword()) :: result()
 
   @doc "What happens next."
@@ -45,5 +45,12 @@ defmodule Robot.Mission do
   """
   @callback halted(mission :: term()) :: (mission :: term()) | nil
 
-  @optional_callbacks halted: 1
+  @doc """
+  The options of a start as people write them, checked and completed. `robots` is how many start together, `nil` where that is
+  not known. What was checked once passes unchanged. A mission without this callback takes no options.
+  """
+  @callback options(keyword(), robots :: pos_integer() | nil) ::
+              {:ok, keyword()} | {:error, line :: String.t()}
+
+  @optional_callbacks halted: 1, options: 2
 end

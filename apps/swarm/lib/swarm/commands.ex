@@ -2,11 +2,10 @@ defmodule Swarm.Commands do
   @moduledoc false
   # What `Swarm` needs: who is meant, is it allowed, and what do they answer.
   alias Robot.Command
-  alias Swarm.Formation
+  alias Swarm.{Formation, Missions}
   alias Swarm.Comms.Transport
   alias Swarm.Commands
   alias Swarm.Comms.CommandHandler
-  alias Missions.Landmark.Policy
 
   @doc "The ids of the robots meant, which all exist, or one line."
   @spec robots(term()) :: {:ok, [atom(), ...]} | {:error, String.t()}
@@ -60,11 +59,11 @@ defmodule Swarm.Commands do
   @doc "Checks the options of a start: who takes part, and the mission's own."
   @spec start(term()) :: {:ok, [atom()], keyword()} | {:error, String.t()}
   def start(options) do
-    with :ok <-
-           keyword(options, "formation, assign, leader_change, policy, of, lost_link, robots"),
+    with :ok <- keyword(options, "robots, and those of the mission"),
          {:ok, robots} <- robots(Keyword.get(options, :robots, :all)),
-         {:ok, options} <- mission(Keyword.delete(options, :robots), length(robots)),
-         {:ok, options} <- fleet_size(options, length(robots)),
+         {:ok, mission} <- Missions.default(),
+         options = Keyword.delete(options, :robots),
+         {:ok, options} <- Missions.options(mission, options, length(robots)),
          do: {:ok, robots, options}
   end
 
@@ -119,53 +118,6 @@ defmodule Swarm.Commands do
   defp refusal(id, nil), do: "#{id} does not answer"
   defp refusal(_id, {:error, line}) when is_binary(line), do: line
   defp refusal(id, {:error, reason}), do: "#{id} refuses: #{inspect(reason)}"
-
-  defp mission(options, robots) do
-    Enum.reduce_while(options, {:ok, []}, fn option, {:ok, checked} ->
-      case option(option, robots) do
-        {:ok, option} -> {:cont, {:ok, checked ++ [option]}}
-        {:error, line} -> {:halt, {:error, line}}
-      end
-    end)
-  end
-
-  defp option({:formation, {kind, spacing}}, robots) do
-    with {:ok, formation} <- formation(kind, [spacing: spacing], robots),
-         do: {:ok, {:formation, formation}}
-  end
-
-  defp option({:formation, kind}, robots) do
-    with {:ok, formation} <- formation(kind, [], robots), do: {:ok, {:formation, formation}}
-  end
-
-  defp option({:assign, how} = option, _robots) when how in [:chain, :cost], do: {:ok, option}
-
-  defp option({:assign, other}, _robots),
-    do: {:error, "assign cannot be #{inspect(other)}: :chain or :cost"}
-
-  defp option({:leader_change, on?} = option, _robots) when is_boolean(on?), do: {:ok, option}
-
-  defp option({:leader_change, other}, _robots),
-    do: {:error, "leader_change cannot be #{inspect(other)}: true or false"}
-
-  defp option({key, _value} = option, _robots) when key in [:policy, :of, :lost_link],
-    do: {:ok, option}
-
-  defp option({key, _value}, _robots) do
-    names = ~w(formation assign leader_change policy of lost_link robots)
-
-    {:error,
-     "unknown option #{inspect(key)}: #{Enum.join(names, ", ")}" <>
-       hint(Atom.to_string(key), names)}
-  end
-
-  # A majority is one of those that are started, unless told otherwise.
-  defp fleet_size(options, robots) do
-    options =
-      if options[:policy] == :majority, do: Keyword.put_new(options, :of, robots), else: options
-
-    with {:ok, _policy} <- Policy.options(options), do: {:ok, options}
-  end
 
   defp kind(kind) do
     kinds = Formation.kinds()

@@ -8,8 +8,7 @@ defmodule Swarm.MemberSpec do
       {:ok, _pid} = Robot.Fleet.start_robot(Robot.Fleet, config, :permanent)
   """
   alias Robot.Config
-  alias Swarm.Comms
-  alias Missions.Landmark
+  alias Swarm.{Comms, Missions}
 
   @doc "What the robot is started with; an error is one line."
   @spec config(Robot.File.t()) :: {:ok, Config.t()} | {:error, line :: String.t()}
@@ -25,14 +24,14 @@ defmodule Swarm.MemberSpec do
   def mesh(%Robot.File{network: network}), do: network
 
   defp mission(policies) do
-    {mission, options} = Keyword.pop(policies, :mission)
-
-    case mission do
-      nil ->
+    case Keyword.pop(policies, :mission) do
+      {nil, _options} ->
         {:ok, nil}
 
-      :landmark ->
-        with {:ok, _policy} <- Landmark.Policy.options(options), do: {:ok, {Landmark, options}}
+      {name, options} ->
+        with {:ok, module} <- Missions.fetch(name),
+             {:ok, options} <- Missions.options(module, options, nil),
+             do: {:ok, {module, options}}
     end
   end
 end

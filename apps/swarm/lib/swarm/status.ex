@@ -33,7 +33,6 @@ defmodule Swarm.Status do
   alias Robot.{Board, Config}
   alias Robot.Safety.LivenessMonitor
   alias Swarm.Comms.Receiver
-  alias Missions.Landmark.Blocker
   alias Swarm.Membership.Peers
 
   @recently_ms 60_000
@@ -121,7 +120,7 @@ defmodule Swarm.Status do
       hung: hung(entries),
       leader: mission |> field(:claim) |> field(:leader),
       unsure: mission |> field(:claim) |> field(:unsure) == true,
-      blocked_by: mission |> field(:claim) |> field(:blocked_by) |> Blocker.words(),
+      blocked_by: mission |> field(:claim) |> field(:blocked_by),
       power: value(entries, :power),
       health: Map.new(health),
       offline:
@@ -172,7 +171,7 @@ defmodule Swarm.Status do
   defp field(nil, _key), do: nil
   defp field(map, key), do: Map.get(map, key)
 
-  defp state(%{state: {Missions.Manual, :ready}}), do: :idle
+  defp state(%{state: {Robot.Mission.Manual, :ready}}), do: :idle
   defp state(%{state: {_module, phase}}), do: phase
   defp state(_idle), do: :idle
 

@@ -107,6 +107,8 @@ defmodule Swarm.MeshNodes do
     {:ok, _} = call(node, Application, :ensure_all_started, [:logger])
     call(node, Logger, :configure, [[level: :none]])
     call(node, Application, :put_env, [:swarm, :mesh, mesh])
+    missions = Application.get_env(:swarm, :missions, [])
+    call(node, Application, :put_env, [:swarm, :missions, missions])
     {:ok, _} = call(node, Application, :ensure_all_started, [:swarm])
     if options[:robots], do: :ok = call(node, Swarm.MeshNodes.Wheels, :robot, [node.name])
     node

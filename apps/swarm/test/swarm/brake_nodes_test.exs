@@ -1,7 +1,7 @@
 defmodule Swarm.BrakeNodesTest do
   use Swarm.Case, async: false
   alias Swarm.{Cluster, Nonblocking}
-  alias Missions.Manual
+  alias Robot.Mission.Manual
   @moduletag :cluster
   @moduletag :capture_log
 

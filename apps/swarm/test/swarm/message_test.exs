@@ -11,8 +11,6 @@ defmodule Swarm.MessageTest do
   doctest Swarm.Comms.NameClaim
   doctest Swarm.Message.WireTypes
   doctest Receiver
-  doctest Missions.Landmark.Policy
-  doctest Missions.Manual
   doctest Swarm.Comms.PingReply
 
   @beat %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
@@ -166,16 +164,6 @@ defmodule Swarm.MessageTest do
 
     assert Swarm.Membership.Peers.hear(peers, :mag1, @beat, 1_900) == peers
     assert Swarm.Membership.Peers.hear(peers, :mag1, @beat, 2_000).rows.mag1.beat == @beat
-  end
-
-  test "an anchor of an epoch that cannot be is not a leader's" do
-    alias Missions.Landmark
-    {_phase, mission, []} = Landmark.init(:mag2, [])
-    far = Message.new(:mag3, :place, %{@anchor | epoch: 999_999_999})
-    {_phase, same, _effects} = Landmark.handle({:message, far}, mission)
-    assert same.anchor == nil
-    {_phase, led, _effects} = Landmark.handle({:message, %{far | body: @anchor}}, mission)
-    assert led.anchor == @anchor
   end
 
   test "repeats of calls from two lives of a node do not take each other for new" do

@@ -4,7 +4,7 @@ defmodule Sim.Fleet.Robot do
   alias Robot.Control.Pilot
   alias Sim.Fleet.Hardware
   alias Sim.World
-  alias Missions.Manual
+  alias Robot.Mission.Manual
 
   # Of a command for one robot alone.
   @over [:ready, :done, :found, :not_found]

@@ -8,7 +8,6 @@ defmodule Sim.Trial.Evaluation do
   alias Sim.Trial.{AgreementMetrics, Claims, RunLog, Setup, Stuck}
   alias Swarm.Formation
   alias Swarm.Formation.Reference
-  alias Missions.Landmark.Blocker
 
   @typedoc "A run at one instant; `claims` are those of the living."
   @type run :: %{
@@ -124,7 +123,7 @@ defmodule Sim.Trial.Evaluation do
       name: robot.id,
       alive: robot.alive,
       state: robot.state,
-      blocked_by: Blocker.words(claim[:blocked_by]),
+      blocked_by: claim[:blocked_by],
       x: robot.pose.x,
       y: robot.pose.y,
       theta: robot.pose.heading,

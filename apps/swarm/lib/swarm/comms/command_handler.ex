@@ -21,8 +21,9 @@ defmodule Swarm.Comms.CommandHandler do
   alias Robot.{Board, Config, Names}
   alias Robot.Control.Pilot
   alias Robot.Safety.{LivenessMonitor, Readiness}
-  alias Missions.{Landmark, Manual}
-  alias Swarm.{Formation, Status}
+  alias Robot.Mission.Manual
+  alias Swarm.{Missions, Status}
+  alias Swarm.Commands.Order
   alias Swarm.Comms.{PingReply, Receiver}
 
   @typedoc "`:accepted`: the pilot has the order; it is `:ok` once the executive has it, too."
@@ -45,7 +46,7 @@ defmodule Swarm.Comms.CommandHandler do
   def answer(:arm, %{id: id}, _board, _ear), do: named(Device.arm(Names.via(id, :drive)), id)
 
   def answer(request, config, board, receiver) do
-    with {:ok, request} <- checked(request),
+    with {:ok, request} <- checked(request, config),
          :ok <- well(config, board),
          :ok <- ready(request, config, board),
          :ok <- obey(request, doing(board), config, receiver),
@@ -60,10 +61,14 @@ defmodule Swarm.Comms.CommandHandler do
   defp named({:error, line}, id), do: {:error, "#{id}: #{line}"}
 
   # People come by `Swarm`, which has checked it all; but anybody may send something here.
-  defp checked({:start, options} = request),
-    do: with(:ok <- options(options), do: {:ok, request})
+  defp checked({:start, options}, config) do
+    with {:ok, {:start, options}} <- Order.check({:start, options}),
+         {:ok, {module, _defaults}} <- mission(config),
+         {:ok, options} <- Missions.options(module, options, nil),
+         do: {:ok, {:start, options}}
+  end
 
-  defp checked(request), do: Manual.check(request)
+  defp checked(request, _config), do: Order.check(request)
 
   # A pilot that hangs would not answer, and the comms process would wait for it and be silent to others. A gate that hangs
   # is ended, and with it what was begun.
@@ -85,21 +90,6 @@ defmodule Swarm.Comms.CommandHandler do
   defp ready(_request, config, board) do
     with {:error, line} <- Readiness.of(config, board), do: {:error, "#{config.id}: #{line}"}
   end
-
-  defp options(options) do
-    if Keyword.keyword?(options) and Enum.all?(options, &option?/1),
-      do: policy(options),
-      else:
-        {:error,
-         "a mission starts with formation, assign, leader_change, policy, of and lost_link only"}
-  end
-
-  defp policy(options), do: with({:ok, _policy} <- Landmark.Policy.options(options), do: :ok)
-
-  defp option?({:formation, formation}), do: Formation.valid?(formation)
-  defp option?({:assign, how}), do: how in [:chain, :cost]
-  defp option?({:leader_change, on?}), do: is_boolean(on?)
-  defp option?({key, _value}), do: key in [:policy, :of, :lost_link]
 
   defp doing(board) do
     case Board.fetch(board, :mission, :infinity) do
@@ -128,7 +118,7 @@ defmodule Swarm.Comms.CommandHandler do
   defp obey({:formation, _kind, _spacing}, _doing, config, _ear), do: shapeless(config.id)
 
   defp obey({:follow_the_leader, leader} = command, doing, %{id: id} = config, receiver) do
-    with :ok <- Manual.follow(id, leader, Receiver.leaders(receiver, Config.now(config))),
+    with :ok <- Order.follow(id, leader, Receiver.leaders(receiver, Config.now(config))),
          do: alone(command, doing, config)
   end
 
@@ -153,10 +143,16 @@ defmodule Swarm.Comms.CommandHandler do
   defp list(names), do: Enum.join(names, ", ")
 
   defp begin(options, config) do
-    {module, defaults} = config.mission || {Landmark, []}
-    :ok = Pilot.start(config.id, module, Keyword.merge(defaults, options))
-    Pilot.command(config.id, :start)
+    with {:ok, {module, defaults}} <- mission(config) do
+      :ok = Pilot.start(config.id, module, Keyword.merge(defaults, options))
+      Pilot.command(config.id, :start)
+    end
   end
+
+  defp mission(%{mission: nil}),
+    do: with({:ok, module} <- Missions.default(), do: {:ok, {module, []}})
+
+  defp mission(%{mission: mission}), do: {:ok, mission}
 
   defp again({:group, _phase}, config), do: Pilot.command(config.id, :start)
   defp again(_idle_or_alone, _config), do: {:error, :idle}

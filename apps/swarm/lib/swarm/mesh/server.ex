@@ -68,7 +68,7 @@ defmodule Swarm.Mesh.Server do
   # release is when they are first called: a robot that has just been switched on would not understand
   # what a leader says.
   defp load do
-    for app <- [:hal, :swarm],
+    for app <- [:hal, :swarm | Swarm.Missions.apps()],
         module <- Application.spec(app, :modules) || [],
         do: {:module, _} = Code.ensure_loaded(module)
   end

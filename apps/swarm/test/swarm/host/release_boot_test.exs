@@ -47,7 +47,7 @@ defmodule Swarm.Host.ReleaseBootTest do
     environment = machine(folder, file(", policies: [mission: :landmark]"))
     assert {:ok, {%Robot.File{id: :mag1}, config}} = ReleaseBoot.robot(environment)
     assert config.arm == :manual
-    assert {Missions.Landmark, _options} = config.mission
+    assert {Swarm.StandMission, _options} = config.mission
     assert {Swarm.Comms, _options} = List.last(config.companions)
   end
 

@@ -6,15 +6,15 @@ defmodule Missions.Landmark do
 
   | part | decides |
   |---|---|
-  | `Sight` | where the landmark is, by the robot's own eyes |
-  | `Council` | when a round is opened, what is reported in it, what comes of it |
-  | `Lead` | what the leader tells: the anchor, the order, whether the shape is formed |
+  | `LandmarkTrack` | where the landmark is, by the robot's own eyes |
+  | `Rounds` | when a round is opened, what is reported in it, what comes of it |
+  | `Leader` | what the leader tells: the anchor, the order, whether the shape is formed |
   | `Shape` | a shape that there is room for |
-  | `Attend` | what a follower does: its slot, its gaze, its child |
+  | `Follower` | what a follower does: its slot, its gaze, its child |
   | `Marks` | what it finds its pose by, and whether it is sure of its place |
   | `Blocker` | what keeps it from its slot |
   | `Merge` | what becomes of two leaders that meet |
-  | `Hearing` | whose anchor it believes, and when it joins a leader who names it |
+  | `ReferenceInbox` | whose anchor it believes, and when it joins a leader who names it |
   | `Policy` | who may lead, and what a robot does that has lost everybody |
 
   Time is `percept.at_ms`, compared with whole numbers; there are no timers.
@@ -25,7 +25,7 @@ defmodule Missions.Landmark do
   alias Swarm.Agreement.Round
   alias Swarm.Comms.Forwarder
   alias Swarm.Formation.Trail
-  alias Missions.Landmark.{Follower, Leader, Marks, ReferenceInbox, Rounds}
+  alias Missions.Landmark.{Blocker, Follower, Leader, Marks, ReferenceInbox, Rounds}
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Policy, Transitions}
 
@@ -39,9 +39,7 @@ defmodule Missions.Landmark do
   @led_ms 2_000
 
   @doc """
-  A robot's mission. Options: `formation:` (`{kind, spacing}`), `assign:` (`:chain` or `:cost`),
-  `leader_change:` (whether a robot that is nearer takes over), `colour:` of the landmark, and those of
-  `Policy`: `policy:` (`:available` or `:majority`, with `of:`, the fleet's size), `lost_link:`.
+  A robot's mission, with options that `options/2` has checked (`Missions.Landmark.Options`).
   """
   @impl Robot.Mission
   def init(robot, options \\ []) do
@@ -62,6 +60,9 @@ defmodule Missions.Landmark do
 
     {mission.phase, mission, []}
   end
+
+  @impl Robot.Mission
+  defdelegate options(options, robots), to: Landmark.Options, as: :check
 
   @impl Robot.Mission
   def handle({:command, :start}, mission), do: still(%{mission | started?: true})
@@ -300,7 +301,7 @@ defmodule Missions.Landmark do
       in_place: mission.phase == :follow and mission.attend.in_place?,
       unsure: mission.phase == :follow and mission.attend.unsure?,
       blocked: mission.phase == :follow and mission.attend.blocked?,
-      blocked_by: if(mission.phase == :follow, do: mission.attend.blocker),
+      blocked_by: if(mission.phase == :follow, do: Blocker.words(mission.attend.blocker)),
       formed: leading? and mission.lead.formed?,
       anchor: if(leading?, do: mission.anchor)
     }

@@ -9,7 +9,7 @@ defmodule Missions.Landmark.PartitionTest do
   row, and then it is 2 s more (`gone`).
   """
   use ExUnit.Case, async: true
-  alias Swarm.Group
+  alias Missions.Landmark.Group
 
   @lease_ms 1_500
   @five [:mag1, :mag2, :mag3, :min1, :min2]

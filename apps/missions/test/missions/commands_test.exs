@@ -39,7 +39,7 @@ defmodule Swarm.CommandsTest do
     id = robot(:door1, eyes())
     standing([id])
     assert Swarm.goto(id, {2.0, 1}) == :ok
-    assert state(id) == {Missions.Manual, :goto}
+    assert state(id) == {Robot.Mission.Manual, :goto}
     eventually(fn -> doing(id) == :goto end)
 
     assert Swarm.tell("door1", "MOVE:0.1:0") == :ok
@@ -69,7 +69,7 @@ defmodule Swarm.CommandsTest do
     assert Swarm.tell(id, "findblob") == :ok
     assert Swarm.tell(blind, "findblob") == {:error, "door_blind has no camera to look with"}
     assert Swarm.tell(id, "findblob:Red") == :ok
-    assert state(id) == {Missions.Manual, :find_blob}
+    assert state(id) == {Robot.Mission.Manual, :find_blob}
     # A full turn shows nothing.
     :ok = stop_supervised({:wheels, [id, blind]})
     turning(id)
@@ -112,7 +112,7 @@ defmodule Swarm.CommandsTest do
     # The shape that was asked for last.
     assert {:column, 1.0} = mission(id).formation
     assert Swarm.goto(id, {1, 1}) == :ok
-    assert state(id) == {Missions.Manual, :goto}
+    assert state(id) == {Robot.Mission.Manual, :goto}
     assert Swarm.start() == :ok
     assert {Missions.Landmark, _} = state(id)
   end

@@ -3,7 +3,8 @@ defmodule Missions.Landmark.PhasesTest do
   use ExUnit.Case, async: true
   alias Robot.Behaviour
   alias Robot.Localiser.Anchors
-  alias Swarm.{Group, Message}
+  alias Missions.Landmark.Group
+  alias Swarm.Message
   alias Swarm.Agreement.Round
   alias Swarm.Formation.Reference
   alias Swarm.Membership.Heartbeat

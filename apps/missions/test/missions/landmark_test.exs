@@ -2,7 +2,8 @@ defmodule Missions.LandmarkTest do
   @moduledoc "Groups of missions over a bad radio: who leads, for how long, and who follows."
   use ExUnit.Case, async: true
   alias Hal.Pose
-  alias Swarm.{Group, Message}
+  alias Missions.Landmark.Group
+  alias Swarm.Message
   alias Missions.Landmark
 
   @three [:mag1, :mag2, :mag3]

@@ -1,4 +1,4 @@
-defmodule Swarm.Group do
+defmodule Missions.Landmark.Group do
   @moduledoc """
   A handful of landmark missions on one floor, without a world: bodies go straight to their slots,
   a scan takes half a second, and messages go over a small radio that delays, loses, doubles,

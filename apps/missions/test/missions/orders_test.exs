@@ -89,7 +89,7 @@ defmodule Swarm.OrdersTest do
       assert Swarm.goto(id, {1, 1}) == :ok
       assert {:ok, line} = Swarm.tell(id, "Ping")
       assert line =~ ~r/, up for \d+ s, goto for \d+ s$/
-      assert state(id) == {Missions.Manual, :goto}
+      assert state(id) == {Robot.Mission.Manual, :goto}
 
       assert {:ok, both} = Swarm.tell([id, other], "ping")
       assert both =~ ~r/^orders_ping on [^;]+; orders_pong on [^;]+$/
@@ -141,7 +141,7 @@ defmodule Swarm.OrdersTest do
     assert Swarm.tell(id, "move:0.2:0") == :ok
     rolls(id)
     assert Swarm.ask(id, :reset) == :ok
-    assert state(id) == {Missions.Manual, :move}
+    assert state(id) == {Robot.Mission.Manual, :move}
   end
 
   test "a start right after a stop that is still on its way begins the mission anew" do

@@ -1,0 +1,94 @@
+defmodule Robot.Mission.Manual do
+  @moduledoc """
+  One robot does what a person tells it (`Robot.Command`), one command at a time (R16, R31 to R36):
+  a robot leaves the group's mission for it, and comes back with the next start. Pure. `stop` is not a
+  mission's to carry out: the pilot ends this one like any other.
+
+  In its heartbeats the robot stays `:idle`, so that no group waits for it, and names whom it
+  follows, so that nobody can close a circle of followers.
+
+  Its phase is the command's name, then `:done`; of `find_blob`, `:found` or `:not_found`.
+
+  Whoever is followed need not do anything: its heartbeats are the position updates that a
+  subscription asked for (R27, R35), so a person who asks for one is told so, and nothing changes. A follower keeps 1 m behind its leader, stands when it has
+  not heard it for a second, and goes on when it hears it again (R34).
+  """
+  alias Hal.{Pose, Twist}
+  alias Robot.{Behaviour, Command, Percept}
+
+  @behaviour Robot.Mission
+
+  @behind 1.0
+  @silent_ms 1_000
+
+  @enforce_keys [:me]
+  defstruct @enforce_keys ++ [count: 0, command: nil, result: nil]
+
+  @type t :: %__MODULE__{
+          me: atom(),
+          count: non_neg_integer(),
+          command: Command.t() | nil,
+          result: integer() | nil
+        }
+
+  @impl Robot.Mission
+  def init(robot, _options),
+    do: {:ready, %__MODULE__{me: robot}, [{:claim, %{phase: :idle, standing: true}}]}
+
+  @impl Robot.Mission
+  def handle({:command, command}, mission) do
+    mission = %{mission | command: command, count: mission.count + 1, result: nil}
+    goal = {:goal, {:command, mission.count}, goal(command, nil)}
+    result(mission, [goal, {:look, 0.0}, {:claim, claim(mission)}])
+  end
+
+  # How a command ended, by its outcome (R12), is known to whoever asks for the robot's status.
+  def handle({:outcome, {:command, count}, outcome}, %{count: count} = mission),
+    do: result(%{mission | result: outcome}, [{:claim, %{phase: :idle, standing: true}}])
+
+  # The one followed moves, and may fall silent.
+  def handle({:tick, percept}, %{command: {:follow_the_leader, _leader} = command} = mission),
+    do: result(mission, [{:goal, {:command, mission.count}, goal(command, percept)}])
+
+  def handle(_event, mission), do: result(mission, [])
+
+  defp result(%{command: nil} = mission, effects), do: {:ready, mission, effects}
+
+  defp result(%{result: nil} = mission, effects),
+    do: {phase(mission.command), mission, effects}
+
+  defp result(%{command: {:find_blob, _colour}} = mission, effects),
+    do: {if(mission.result == 1, do: :found, else: :not_found), mission, effects}
+
+  defp result(mission, effects), do: {:done, mission, effects}
+
+  defp phase(command) when is_atom(command), do: command
+  defp phase(command), do: elem(command, 0)
+
+  defp claim(%{command: {:follow_the_leader, leader}}), do: %{phase: :idle, leader: leader}
+  defp claim(_command), do: %{phase: :idle, standing: false}
+
+  defp goal({:move, linear, turn}, _percept), do: {Behaviour.Move, linear: linear, turn: turn}
+  defp goal({:goto, x, y, nil}, _percept), do: {Behaviour.Goto, x: x, y: y}
+  defp goal({:goto, x, y, heading}, _percept), do: {Behaviour.Goto, x: x, y: y, heading: heading}
+  defp goal({:follow, %Pose{} = place}, _percept), do: {Behaviour.Follow, target: place}
+  defp goal({:find_blob, colour}, _percept), do: {Behaviour.FindBlob, colour: colour}
+
+  # Until the next percept shows where that one is.
+  defp goal({:follow_the_leader, _leader}, nil), do: {Behaviour.Stop, []}
+
+  defp goal({:follow_the_leader, leader}, %Percept{peers: peers, at_ms: now_ms}) do
+    case peers do
+      %{^leader => %{at_ms: at_ms} = peer} when now_ms - at_ms < @silent_ms -> behind(peer)
+      _silent -> {Behaviour.Stop, []}
+    end
+  end
+
+  # Whatever is carried before its camera leads it, and others follow (R35).
+  defp goal(:lead, _percept), do: {Behaviour.TrackBlob, []}
+
+  defp behind(%{pose: pose, twist: %Twist{linear: linear}}) do
+    velocity = {linear * :math.cos(pose.heading), linear * :math.sin(pose.heading)}
+    {Behaviour.Follow, target: Pose.compose(pose, Pose.new(-@behind, 0)), velocity: velocity}
+  end
+end

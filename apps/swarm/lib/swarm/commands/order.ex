@@ -1,0 +1,113 @@
+defmodule Swarm.Commands.Order do
+  @moduledoc """
+  What a person may ask of a robot, checked wherever it arrives: by whoever sends it, and again by the robot. Pure.
+  """
+  alias Hal.Pose
+  alias Robot.Command
+  alias Swarm.Formation
+  alias Swarm.Message.WireTypes
+
+  # Farther than any floor, and faster than any robot: a slip of the finger.
+  @farthest 10_000
+  @fastest 10
+
+  @typedoc "What a person may ask of a robot: a command for it alone, or one for its group."
+  @type t ::
+          Command.t() | {:start, keyword()} | {:formation, Formation.kind(), spacing :: float()}
+
+  @doc """
+  A command that a person gave, with numbers that make sense, or one line that says which does not.
+
+      iex> Swarm.Commands.Order.check({:goto, 1, 2.0, nil})
+      {:ok, {:goto, 1.0, 2.0, nil}}
+      iex> Swarm.Commands.Order.check({:goto, :far, 2.0, nil})
+      {:error, "goto cannot take :far: a number from -10000 to 10000 is allowed"}
+      iex> Swarm.Commands.Order.check({:move, 99, 0})
+      {:error, "move cannot take 99: a number from -10 to 10 is allowed"}
+  """
+  @spec check(term()) :: {:ok, t()} | {:error, line :: String.t()}
+  def check({:goto, x, y, nil}), do: numbers(:goto, [x, y], @farthest, &{:goto, &1, &2, nil})
+
+  def check({:goto, x, y, h}),
+    do: numbers(:goto, [x, y, h], @farthest, &{:goto, &1, &2, turn(&3)})
+
+  def check({:move, v, w}), do: numbers(:move, [v, w], @fastest, &{:move, &1, &2})
+
+  def check({:follow, %Pose{x: x, y: y, heading: h}}),
+    do: numbers(:follow, [x, y, h], @farthest, &{:follow, Pose.new(&1, &2, &3)})
+
+  # What robots tell each other travels in their heartbeats and rounds. A person who says it would be believed by
+  # nobody, and the robot shall not leave its mission for nothing.
+  def check({word, _robot}) when word in [:subscribe, :unsubscribe],
+    do:
+      {:error,
+       "#{word} is for no robot: each tells its pose to all, five times a second; " <>
+         "followtheleader:NAME follows one"}
+
+  def check({:position, _pose}),
+    do:
+      {:error,
+       "position is for robots only, which tell their own; goto:X:Y:THETA sends one there"}
+
+  def check({:blob, _pose, _size, _found?}),
+    do: {:error, "blob is for robots only, which report what they see; findblob lets one look"}
+
+  def check(command) do
+    if known?(command),
+      do: {:ok, command},
+      else: {:error, "#{brief(command)} is not a command; those of Robot.Command are allowed"}
+  end
+
+  defp known?(word) when word in [:stop, :lead, :start, :ping], do: true
+  defp known?({:follow_the_leader, robot}), do: WireTypes.name?(robot)
+  defp known?({:find_blob, colour}), do: colour == nil or is_binary(colour)
+  defp known?({:formation, kind, spacing}), do: Formation.valid?({kind, spacing})
+  defp known?({:start, options}), do: Keyword.keyword?(options)
+  defp known?(_other), do: false
+
+  defp brief(term), do: inspect(term, limit: 5, printable_limit: 40)
+
+  defp turn(heading), do: Pose.wrap(heading)
+
+  # NaN and the infinities are not numbers of this language, so they cannot come.
+  defp numbers(word, list, most, build) do
+    case Enum.reject(list, &(is_number(&1) and abs(&1) <= most)) do
+      [] ->
+        {:ok, apply(build, Enum.map(list, &(&1 * 1.0)))}
+
+      [wrong | _] ->
+        {:error,
+         "#{word} cannot take #{inspect(wrong)}: a number from -#{most} to #{most} is allowed"}
+    end
+  end
+
+  @doc """
+  Whether a robot may follow another: not itself, and nobody who follows it, over however many.
+  `leaders` says whom each robot follows.
+
+      iex> Swarm.Commands.Order.follow(:min1, :mag1, %{mag1: nil})
+      :ok
+      iex> Swarm.Commands.Order.follow(:mag1, :mag1, %{})
+      {:error, "mag1 cannot follow itself"}
+      iex> Swarm.Commands.Order.follow(:min1, :mag1, %{mag1: :mag2, mag2: :min1})
+      {:error, "min1 cannot follow mag1, who follows min1 (mag1 -> mag2 -> min1)"}
+  """
+  @spec follow(atom(), atom(), %{atom() => atom() | nil}) :: :ok | {:error, String.t()}
+  def follow(me, me, _leaders), do: {:error, "#{me} cannot follow itself"}
+
+  def follow(me, leader, leaders) do
+    chain = chain([leader], leaders)
+
+    if me in chain,
+      do:
+        {:error, "#{me} cannot follow #{leader}, who follows #{me} (#{Enum.join(chain, " -> ")})"},
+      else: :ok
+  end
+
+  defp chain([last | _] = seen, leaders) do
+    case leaders[last] do
+      nil -> Enum.reverse(seen)
+      next -> if next in seen, do: Enum.reverse(seen), else: chain([next | seen], leaders)
+    end
+  end
+end
