@@ -13,3 +13,6 @@ config :logger, level: if(config_env() == :test, do: :warning, else: :info)
 
 # The missions that a robot's file may name; the first is that of a robot whose file names none.
 config :swarm, missions: [landmark: Missions.Landmark]
+
+# What a build adds of its own (docs/extending.md).
+if File.exists?(Path.join(__DIR__, "extensions.exs")), do: import_config("extensions.exs")

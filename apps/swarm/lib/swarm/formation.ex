@@ -13,21 +13,38 @@ defmodule Swarm.Formation do
   | `:triangle` | filled rows of 1, 2, 3, … |
   | `:diamond` | rows of 1, 2, …, m, …, 2, 1 |
   | `:circle` | a ring of all round the landmark, the leader at its own bearing |
+
+  A build may add kinds of its own, each a `Swarm.Formation.Kind`. Its configuration names them, as the code of
+  this module is compiled with them: all robots of a fleet must have the same ones.
+
+      config :swarm, formations: [echelon: Mine.Echelon]
   """
   alias Hal.Pose
 
-  @kinds [:column, :line, :wedge, :triangle, :diamond, :circle]
+  @built_in [:column, :line, :wedge, :triangle, :diamond, :circle]
+  @added Application.compile_env(:swarm, :formations, [])
   @least_spacing 0.8
   @greatest_spacing 5.0
   # The nearest that a ring comes to the landmark: robots there still see all of it.
   @least_ring 1.6
 
-  @type kind :: :column | :line | :wedge | :triangle | :diamond | :circle
+  for {kind, module} <- @added, kind in @built_in or not is_atom(module) do
+    raise ArgumentError,
+          "config :swarm, formations: #{kind} cannot be #{inspect(module)}: a module for a new name is allowed"
+  end
+
+  @typedoc "One of the built-in kinds, or one that the build adds."
+  @type kind :: :column | :line | :wedge | :triangle | :diamond | :circle | atom()
   @type t :: {kind(), spacing :: float()}
 
-  @doc "All kinds."
+  @doc "All kinds: the built-in ones, then those that the build adds, as far as their modules are there."
   @spec kinds() :: [kind(), ...]
-  def kinds, do: @kinds
+  def kinds, do: @built_in ++ for({kind, _module} <- @added, kind?(kind), do: kind)
+
+  defp kind?(kind) when kind in @built_in, do: true
+
+  defp kind?(kind),
+    do: is_atom(kind) and @added[kind] != nil and Code.ensure_loaded?(@added[kind])
 
   @doc """
   Whether a term from outside is a formation.
@@ -37,7 +54,7 @@ defmodule Swarm.Formation do
   """
   @spec valid?(term()) :: boolean()
   def valid?({kind, spacing}),
-    do: kind in @kinds and is_float(spacing) and spacing >= @least_spacing and spacing < 100
+    do: kind?(kind) and is_float(spacing) and spacing >= @least_spacing and spacing < 100
 
   def valid?(_other), do: false
 
@@ -57,22 +74,18 @@ defmodule Swarm.Formation do
       {:error, "formation cannot be :heart: column, line, wedge, triangle, diamond or circle"}
   """
   @spec new(kind() | term(), keyword()) :: {:ok, t()} | {:error, String.t()}
-  def new(kind, options \\ [])
-
-  def new(kind, options) when kind in @kinds do
-    case Keyword.keys(options) -- allowed(kind) do
-      [] ->
-        kind |> spacing(options) |> check(kind)
+  def new(kind, options \\ []) do
+    with true <- kind?(kind), [] <- Keyword.keys(options) -- allowed(kind) do
+      kind |> spacing(options) |> check(kind)
+    else
+      false ->
+        {others, [last]} = Enum.split(kinds(), -1)
+        {:error, "formation cannot be #{inspect(kind)}: #{Enum.join(others, ", ")} or #{last}"}
 
       [key | _] ->
         {:error,
          "#{kind} takes no #{inspect(key)}: #{Enum.join(allowed(kind) -- [:robots], ", ")}"}
     end
-  end
-
-  def new(kind, _options) do
-    {:error,
-     "formation cannot be #{inspect(kind)}: column, line, wedge, triangle, diamond or circle"}
   end
 
   defp allowed(:line), do: [:spacing, :length, :robots]
@@ -166,6 +179,8 @@ defmodule Swarm.Formation do
     here = min(row_width(row, widest), robots - (k - place))
     {-(row - 1) * 1.0, (here - 1) / 2 - place}
   end
+
+  defp slot(kind, k, robots), do: @added[kind].slot(k, robots)
 
   # The row (from 1) of robot k in rows of 1, 2, …, widest, …, 2, 1, and its place in it (from 0).
   defp diamond_row(k, row, widest) do

@@ -6,13 +6,13 @@ defmodule Console.Cli.Parse do
   are plain decimals with few digits, so "nan", "inf" and "1e999" are not even numbers.
   """
 
-  @formations [:column, :line, :wedge, :triangle, :diamond, :circle]
-  @kinds Enum.map(@formations, &Atom.to_string/1)
+  alias Swarm.Formation
+
   @longest 12
 
   @doc "The formations by name."
   @spec formations() :: [String.t()]
-  def formations, do: @kinds
+  def formations, do: Enum.map(Formation.kinds(), &Atom.to_string/1)
 
   @doc """
   A whole number in a range.
@@ -123,11 +123,13 @@ defmodule Console.Cli.Parse do
         [kind, spacing] -> {kind, spacing}
       end
 
-    with {:kind, known} when known != nil <- {:kind, Enum.find(@formations, &("#{&1}" == kind))},
+    known = Enum.find(Formation.kinds(), &(Atom.to_string(&1) == kind))
+
+    with {:kind, true} <- {:kind, known != nil},
          {:ok, spacing} <- number(spacing, 0.8, 5.0) do
       {:ok, {known, spacing}}
     else
-      {:kind, nil} -> {:error, either(@kinds) <> suggestion(kind, @kinds)}
+      {:kind, false} -> {:error, either(formations()) <> suggestion(kind, formations())}
       {:error, _} -> {:error, "KIND:SPACING with a spacing from 0.8 to 5 metres"}
     end
   end
