@@ -6,4 +6,5 @@ defmodule HalTest do
   doctest Hal.Frame
   doctest Hal.Profile
   doctest Hal.Suggest
+  doctest Hal.Build
 end

@@ -9,9 +9,9 @@ defmodule Vision do
   @doc """
   The blobs of a frame: by colour in the order of the colour file, largest first.
 
-  The backend is the fastest that reads the format, unless one is given. The error is the frame's
-  (`{:bytes, got, :expected, n}`, `{:size, {w, h}}`), `{:format, format}` where the given backend does
-  not read it, or `:memory`.
+  The backend is the one given, or that of the colours, or the fastest that reads the format. The error is the frame's
+  (`{:bytes, got, :expected, n}`, `{:size, {w, h}}`), `{:format, format}` where the backend does not
+  read it, or `:memory`.
 
       iex> yellow = %{name: "Yellow", y: {170, 240}, u: {60, 90}, v: {130, 145}}
       iex> {:ok, colours} = Vision.Colours.new([yellow], min_area: 2)
@@ -23,7 +23,7 @@ defmodule Vision do
   @spec blobs(Frame.t(), Colours.t(), module() | nil) :: {:ok, [Blob.t()]} | {:error, term()}
   def blobs(%Frame{} = frame, %Colours{} = colours, backend \\ nil) do
     with :ok <- check(frame),
-         {:ok, backend} <- backend(frame.format, backend),
+         {:ok, backend} <- backend(frame.format, backend || colours.backend),
          {:ok, regions} <- backend.regions(frame, colours) do
       classes = List.to_tuple(colours.classes)
       {:ok, Enum.map(regions, &blob(&1, classes, frame))}

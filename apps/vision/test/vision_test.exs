@@ -32,6 +32,26 @@ defmodule VisionTest do
     %{colours: colours}
   end
 
+  defmodule Corner do
+    @moduledoc "Sees one pixel, whatever the picture shows."
+    @behaviour Vision.Backend
+
+    @impl Vision.Backend
+    def reads?(format), do: format == :rgb24
+
+    @impl Vision.Backend
+    def regions(_frame, _colours), do: {:ok, [{0, 1, 0, 0, 0, 0, 0, 0}]}
+  end
+
+  test "colours may name their backend, and a backend that is given goes before it" do
+    {:ok, colours} = Colours.new([@yellow], backend: Corner)
+    {:ok, frame} = Frame.new(:rgb24, 2, 1, <<0::48>>, 0)
+    assert {:ok, [%{colour: "YellowLandmark", area: 1}]} = Vision.blobs(frame, colours)
+    assert Vision.blobs(frame, colours, Reference) == {:ok, []}
+    {:ok, other} = Frame.new(:yuyv, 2, 1, <<0::32>>, 0)
+    assert Vision.blobs(other, colours) == {:error, {:format, :yuyv}}
+  end
+
   defp drawing do
     for y <- 0..239 do
       for x <- 0..319 do

@@ -29,6 +29,20 @@ defmodule Robot.FileTest do
     fn "landmark.txt", _options -> {:ok, colours} end
   end
 
+  test "colours name the detector that finds them" do
+    read = fn "lamp.txt", options ->
+      Vision.Colours.read(Path.join(@robots, "landmark.txt"), options)
+    end
+
+    colours = &"colours: [file: \"lamp.txt\", backend: #{&1}]"
+    assert {:ok, robot} = parse(colours.("Vision.Backend.Reference"), colours: read)
+    assert robot.colours.backend == Vision.Backend.Reference
+    assert [line] = lines(colours.("Mine.Lammp"), colours: read)
+    assert line =~ "a Vision.Backend of this build is allowed"
+    assert [line] = lines(colours.("Hal.Pose"), colours: read)
+    assert line =~ "backend cannot be Hal.Pose: a Vision.Backend is allowed"
+  end
+
   test "three keys make a robot, whose wheels stand until a person arms them" do
     assert {:ok, robot} = parse("")
     assert robot.profile == Hal.Profile.magellan()

@@ -1,7 +1,13 @@
 defmodule Vision.Backend do
   @moduledoc """
-  A way to find the regions of a frame. `Vision.Backend.Reference` is the meaning, in plain
-  Elixir; every other backend gives the same answer, faster.
+  A way to find the regions of a frame. `Vision.Backend.Reference` defines the answer, in plain
+  Elixir; `Vision.Backend.Native` gives the same answer, faster.
+
+  One of your own may give this answer in yet another way, or find something else, such as lamps. The option `:backend` of
+  `Vision.Colours` selects it. The colours then name what it finds: a region of class 0 becomes a blob with the name and the
+  distance of the first colour.
+
+  ## The answer of the reference
 
   A pixel's mask has bit k set where class k allows it. A region is a greatest set of pixels with
   exactly the same mask, not 0, joined by their sides (corners do not join). Its class is the

@@ -8,7 +8,7 @@ defmodule Vision.BlobDetector do
     * `:colours` - the `Vision.Colours` to look for
     * `:sink` - `{m, f, a}`; each frame that was read gives
       `apply(m, f, a ++ [{:blobs, blobs, %{at_ms: …, pan: …, tilt: …, field_of_view: …}}])`, also without blobs
-    * `:backend` - a `Vision.Backend`; by default the fastest that reads the frame
+    * `:backend` - a `Vision.Backend`; by default the first of `Vision.blobs/2` that reads the frame
     * `:ptz` - `true`: the camera sits on a pan-tilt unit, whose readings come to `aim/2`
     * `:clock` - `{m, f, a}` giving integer milliseconds, that of the frames
     * `:name` - as in `GenServer`

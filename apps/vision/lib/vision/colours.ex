@@ -23,12 +23,13 @@ defmodule Vision.Colours do
 
     * `:distance` - `%{name => k}`: a blob of that colour that fills the share s of the frame is
       `sqrt(k / s)` metres away, so `k` is the share seen from 1 m;
-    * `:min_area` - smallest blob in pixels (20); `:max_area` - largest (0: no limit).
+    * `:min_area` - smallest blob in pixels (20); `:max_area` - largest (0: no limit);
+    * `:backend` - the `Vision.Backend` that finds them (`nil`: the fastest that reads the frame).
   """
   alias Vision.Colours.Text
 
   @enforce_keys [:classes, :min_area, :max_area, :tables]
-  defstruct @enforce_keys
+  defstruct @enforce_keys ++ [backend: nil]
 
   @type limits :: {lowest :: 0..255, highest :: 0..255}
   @type class :: %{
@@ -47,7 +48,8 @@ defmodule Vision.Colours do
           classes: [class(), ...],
           min_area: pos_integer(),
           max_area: non_neg_integer(),
-          tables: binary()
+          tables: binary(),
+          backend: module() | nil
         }
 
   @most 32
@@ -115,13 +117,14 @@ defmodule Vision.Colours do
   """
   @spec new([map()], keyword()) :: {:ok, t()} | {:error, String.t()}
   def new(classes, options \\ []) do
-    options = Keyword.validate!(options, distance: %{}, min_area: 20, max_area: 0)
+    options = Keyword.validate!(options, distance: %{}, min_area: 20, max_area: 0, backend: nil)
     names = Enum.map(classes, & &1.name)
 
     with :ok <- check_count(length(classes)),
          :ok <- check_area(:min_area, options[:min_area], 1),
          :ok <- check_area(:max_area, options[:max_area], 0),
-         :ok <- check_distances(options[:distance], names) do
+         :ok <- check_distances(options[:distance], names),
+         :ok <- check_backend(options[:backend]) do
       classes = Enum.map(classes, &class(&1, options[:distance]))
 
       {:ok,
@@ -129,7 +132,8 @@ defmodule Vision.Colours do
          classes: classes,
          min_area: options[:min_area],
          max_area: options[:max_area],
-         tables: tables(classes)
+         tables: tables(classes),
+         backend: options[:backend]
        }}
     end
   end
@@ -170,6 +174,15 @@ defmodule Vision.Colours do
 
   defp check_area(option, area, least),
     do: {:error, "#{option} cannot be #{inspect(area)}: whole numbers from #{least} are allowed"}
+
+  defp check_backend(nil), do: :ok
+
+  defp check_backend(backend) do
+    if is_atom(backend) and Code.ensure_loaded?(backend) and
+         function_exported?(backend, :regions, 2),
+       do: :ok,
+       else: {:error, "backend cannot be #{inspect(backend)}: a Vision.Backend is allowed"}
+  end
 
   defp check_distances(distances, names) do
     Enum.find_value(distances, :ok, fn {name, constant} ->

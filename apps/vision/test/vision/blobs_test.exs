@@ -87,6 +87,8 @@ defmodule Vision.BlobsTest do
           {~w(a --colours c --picture p.gif), "--picture cannot be \"p.gif\""},
           {~w(a --colours c --picture /no/p.png), "--picture /no/p.png: no folder /no"},
           {~w(a --colours c --json lib), "--json cannot be \"lib\": it is a folder"},
+          {~w(a --colours c --backend Vision.Backend.Nativ),
+           "--backend cannot be \"Vision.Backend.Nativ\": a module of this build"},
           {~w(a --colours c --distance Red), "--distance cannot be \"Red\": NAME=K"},
           {~w(a --colours c --distance Red=-1), "--distance cannot be \"Red=-1\""}
         ] do

@@ -125,6 +125,9 @@ defmodule Vision.ColoursTest do
 
     assert {:error, _} = Colours.parse(@good, max_area: -1)
     assert {:error, _} = Colours.parse(@good, min_area: 2.5)
+
+    assert {:error, "colour file: backend cannot be Hal.Pose: a Vision.Backend is allowed"} =
+             Colours.parse(@good, backend: Hal.Pose)
   end
 
   defp many(n) do

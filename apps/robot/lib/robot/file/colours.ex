@@ -21,7 +21,8 @@ defmodule Robot.File.Colours do
        file: {:text, "the path of a colour file"},
        distance: {:with, &distances/2},
        min_area: put_elem(@area, 1, 1),
-       max_area: @area}
+       max_area: @area,
+       backend: {:with, &backend/2}}
 
     with {:ok, options} <- Check.run(table, node, path),
          {:ok, file} <- file(options, line, path) do
@@ -38,6 +39,16 @@ defmodule Robot.File.Colours do
       :error -> {:error, [{line, path, ~s(needs file:, the path of a colour file)}]}
     end
   end
+
+  # Whether it is a backend is for the colours to say.
+  defp backend({_line, {:module, name}} = node, path) do
+    with :error <- Hal.Build.module(name), do: refused(node, path)
+  end
+
+  defp backend(node, path), do: refused(node, path)
+
+  defp refused(node, path),
+    do: Check.refuse("a Vision.Backend of this build is allowed", node, path)
 
   defp distances({_line, {:map, pairs}}, path) do
     results =

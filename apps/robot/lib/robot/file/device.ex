@@ -7,7 +7,7 @@ defmodule Robot.File.Device do
   are compared with the atoms that there are; a file makes none. A drive that has an option `profile:`
   is given the body of the file, with its limits.
   """
-  alias Hal.Suggest
+  alias Hal.{Build, Suggest}
   alias Robot.File.{Check, Options, Reader}
 
   @kinds %{
@@ -85,16 +85,6 @@ defmodule Robot.File.Device do
     end
   end
 
-  # A module that nobody has used yet is known by its file only, which knows its own name.
-  defp built(name) do
-    with :error <- Options.existing("Elixir." <> name) do
-      case :code.where_is_file(to_charlist("Elixir.#{name}.beam")) do
-        :non_existing -> :error
-        path -> Keyword.fetch(:beam_lib.info(path), :module)
-      end
-    end
-  end
-
   # What a driver makes of the least that it can be told holds all its options, with the keys of
   # those that are lists of keys; of a driver that does not tell, nothing is known.
   defp known(module) do
@@ -121,18 +111,11 @@ defmodule Robot.File.Device do
     ours = Enum.map(@ours[kind], &inspect/1)
     hint = with nil <- Suggest.nearest(name, ours), do: hd(ours)
 
-    case built(name) do
+    case Build.module(name) do
       {:ok, module} ->
-        cond do
-          not Code.ensure_loaded?(module) ->
-            {:error, [{line, path, "there is no #{name} in this build"}]}
-
-          not function_exported?(module, function, arity) ->
-            {:error, [{line, path, "#{name} is no #{behaviour}"}]}
-
-          true ->
-            {:ok, module}
-        end
+        if function_exported?(module, function, arity),
+          do: {:ok, module},
+          else: {:error, [{line, path, "#{name} is no #{behaviour}"}]}
 
       :error ->
         hint = if hint == name, do: "", else: "; did you mean #{hint}?"

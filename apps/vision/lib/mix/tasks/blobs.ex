@@ -19,6 +19,7 @@ defmodule Mix.Tasks.Blobs do
     * `--min-area N` - smallest blob in pixels (20)
     * `--distance NAME=K` - metres for the blobs of a colour, `sqrt(K / share of the frame)`;
       may be given for each colour
+    * `--backend MODULE` - the `Vision.Backend` that finds them; by default the fastest that reads the frames
     * `--help` - this text
 
   Pixels count from the top left; `right` and `bottom` are the last inside. An odd last column
@@ -44,8 +45,9 @@ defmodule Mix.Tasks.Blobs do
   end
 
   defp find(options) do
-    with {:ok, colours} <-
-           Colours.read(options.colours, distance: options.distance, min_area: options.min_area),
+    looking_for = options |> Map.take([:distance, :min_area, :backend]) |> Map.to_list()
+
+    with {:ok, colours} <- Colours.read(options.colours, looking_for),
          {:ok, output} <- open(options.json),
          {:ok, summary} <- output |> looked(options, colours) |> close(output, options.json),
          :ok <- draw(options.picture, summary.last, colours) do

@@ -9,6 +9,7 @@ defmodule Vision.Blobs.Options do
           json: Path.t() | nil,
           picture: Path.t() | nil,
           min_area: pos_integer(),
+          backend: module() | nil,
           distance: %{String.t() => float()}
         }
 
@@ -19,6 +20,7 @@ defmodule Vision.Blobs.Options do
     json: :string,
     picture: :string,
     min_area: :integer,
+    backend: :string,
     distance: :keep,
     help: :boolean
   ]
@@ -57,6 +59,7 @@ defmodule Vision.Blobs.Options do
          :ok <- picture(given[:picture]),
          :ok <- writable("--picture", given[:picture]),
          :ok <- writable("--json", given[:json]),
+         {:ok, backend} <- backend(given[:backend]),
          {:ok, distance} <- distances(Keyword.get_values(given, :distance)) do
       {:ok,
        %{
@@ -67,6 +70,7 @@ defmodule Vision.Blobs.Options do
          json: given[:json],
          picture: given[:picture],
          min_area: given[:min_area] || 20,
+         backend: backend,
          distance: distance
        }}
     end
@@ -134,6 +138,14 @@ defmodule Vision.Blobs.Options do
       true ->
         :ok
     end
+  end
+
+  defp backend(nil), do: {:ok, nil}
+
+  # Whether it is a backend is for the colours to say.
+  defp backend(name) do
+    with :error <- Hal.Build.module(name),
+         do: {:error, "--backend cannot be #{inspect(name)}: a module of this build is allowed"}
   end
 
   defp distances(texts) do
