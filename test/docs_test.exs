@@ -207,6 +207,21 @@ defmodule System.DocsTest do
     assert strange =~ "mixx robot.check: is this typed?"
   end
 
+  test "files of Elixir in a document are formatted, and stand there once" do
+    files =
+      for document <- @documents,
+          {:file, n, path, text} <- Reader.items(File.read!(Path.join(@root, document))),
+          do: {"#{document}:#{n}", path, text}
+
+    assert files != []
+    paths = for {_at, path, _text} <- files, do: path
+    assert paths == Enum.uniq(paths)
+
+    for {at, path, text} <- files, Path.extname(path) in [".ex", ".exs"] do
+      assert text == IO.iodata_to_binary([Code.format_string!(text), "\n"]), at
+    end
+  end
+
   test "an answer may show a map in any order, and all else in its own" do
     printed = "{:ok, %{open: true, at: {1.5, \"a, b}\"}, by: %Hal.Pose{y: 2, x: 1}}, [1, 2, 3]}"
 
@@ -281,12 +296,13 @@ defmodule System.DocsTest do
 
   defp commands(items, folder) do
     for {kind, n, text, answer} <- items,
-        kind in [:shell, :prompt],
+        kind in [:shell, :prompt, :file],
         wrong = wrong(kind, text, answer, folder),
         do: "line #{n}: #{text}: #{wrong}"
   end
 
   defp wrong(:prompt, text, _answer, _folder), do: LookedAt.prompt(text)
+  defp wrong(:file, path, text, folder), do: Sandbox.write(path, text, folder)
 
   defp wrong(:shell, text, answer, folder) do
     if is_map_key(@not_run, command(text)) or lacking(text) != nil,

@@ -9,6 +9,7 @@ defmodule Docs.Reader do
     * `iex>`, or `iex(mag1@convoy)1>`, begins a line of a shell of ours, and the lines below it, up to an empty
       one, are what that prints
     * `> ` begins what is typed at the prompt of the demo
+    * a block fenced with a word and a path (`elixir apps/mine/lib/square.ex`) is a file that the reader writes
     * all else in a block is shown only, and so is what is fenced with another word than `elixir`
     * in a block fenced with `elixir`, a remark alone on the lines below an expression is its value
     * `` `in a sentence` `` a command or the name of a function is a mention
@@ -18,8 +19,9 @@ defmodule Docs.Reader do
   @type item ::
           {:shell | :iex | :prompt | :shown | :mention | :elixir, line :: pos_integer(),
            text :: String.t(), answer :: String.t()}
+          | {:file, line :: pos_integer(), path :: Path.t(), text :: String.t()}
 
-  @programs ~w(mix iex apt-get ssh scp cp sed erl ffmpeg nft robot kill mkdir)
+  @programs ~w(cd mix iex apt-get ssh scp cp sed erl ffmpeg nft robot kill mkdir)
 
   @doc "All items of a document, in order."
   @spec items(String.t()) :: [item()]
@@ -52,7 +54,12 @@ defmodule Docs.Reader do
   defp read({:fenced, "elixir", [{_line, n} | _] = lines}),
     do: [{:elixir, n, Enum.map_join(lines, "\n", &elem(&1, 0)), ""}]
 
-  defp read({:fenced, _word, [{line, n} | _]}), do: [{:shown, n, line, ""}]
+  defp read({:fenced, word, [{line, n} | _] = lines}) do
+    case String.split(word) do
+      [_language, path] -> [{:file, n, path, Enum.map_join(lines, &(elem(&1, 0) <> "\n"))}]
+      _word -> [{:shown, n, line, ""}]
+    end
+  end
 
   defp read({:indented, lines}) do
     lines = for {line, n} <- lines, do: {String.replace_prefix(line, "    ", ""), n}

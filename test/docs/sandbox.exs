@@ -8,6 +8,7 @@ defmodule Docs.Sandbox do
   alias Docs.Reader
 
   @left_out ~w(_build deps tmp .git convoy.secret certs)
+  @extensions "config/extensions.exs"
   # Nothing here meets another fleet of this machine, nor finds a camera.
   @environment [{"CONVOY_INTERFACE", "127.0.0.1"}]
 
@@ -16,6 +17,7 @@ defmodule Docs.Sandbox do
   def create(root, document) do
     folder = folder()
     File.mkdir_p!(folder)
+    extended? = File.exists?(Path.join(folder, @extensions))
     for name <- File.ls!(folder), name != "_build", do: File.rm_rf!(Path.join(folder, name))
 
     # With their times, so that nothing is built again.
@@ -24,6 +26,8 @@ defmodule Docs.Sandbox do
     end
 
     built(root, folder)
+    # What was built with another configuration is built again, and that is told to nobody.
+    if extended?, do: {_, 0} = command("mix compile", folder)
     given(document, folder)
     folder
   end
@@ -77,6 +81,14 @@ defmodule Docs.Sandbox do
 
   # The pages that go on from a secret tell how it is made.
   defp given(_document, _folder), do: :ok
+
+  @doc "Writes a file as the reader does, whose folder must be there."
+  @spec write(Path.t(), String.t(), Path.t()) :: String.t() | nil
+  def write(path, text, folder) do
+    with {:error, reason} <- File.write(Path.join(folder, path), text),
+         do: "#{:file.format_error(reason)}",
+         else: (:ok -> nil)
+  end
 
   @doc "Runs a line in the folder's shell; `nil`, or what is wrong with what came."
   @spec run(String.t(), String.t(), Path.t()) :: String.t() | nil
