@@ -16,6 +16,7 @@ defmodule Robot.Config do
     * `:companions` - `[{module, options}]`, each a `Robot.Companion`
     * `:send` - `{m, f, a}`; what the mission says goes to `apply(m, f, a ++ [to, message])`; or
       `nil`: nobody hears it
+    * `:on_latch` - `{m, f, a}`, applied by the gate whenever it has set or cleared its e-stop latch, or `nil`
     * `:clock` - `{m, f, a}` giving integer milliseconds, default the monotonic time
     * `:pace` - `:clock`, or `:manual`: gate and executive act when they are sent `:step` and `:tick`
       and not by themselves, so that a test decides the order of everything
@@ -43,6 +44,7 @@ defmodule Robot.Config do
                 mission: nil,
                 companions: [],
                 send: nil,
+                on_latch: nil,
                 clock: {System, :monotonic_time, [:millisecond]},
                 pace: :clock,
                 arm: :auto,
@@ -68,6 +70,7 @@ defmodule Robot.Config do
           mission: module_options() | nil,
           companions: [module_options()],
           send: call() | nil,
+          on_latch: call() | nil,
           clock: call(),
           pace: :clock | :manual,
           arm: :auto | :manual,
@@ -199,7 +202,9 @@ defmodule Robot.Config do
   defp valid?(:fence, fence),
     do: fence == nil or is_struct(fence, Fence) or match?({:ok, _}, Fence.new(fence))
 
-  defp valid?(option, value) when option in [:send, :trace], do: value == nil or call?(value)
+  defp valid?(option, value) when option in [:send, :on_latch, :trace],
+    do: value == nil or call?(value)
+
   defp valid?(:estop_file, path), do: path == nil or is_binary(path)
 
   defp allowed(:id), do: "an atom such as :mag1"
@@ -215,7 +220,10 @@ defmodule Robot.Config do
   defp allowed(:arm), do: ":auto or :manual"
   defp allowed(:dry_run), do: "true or false"
   defp allowed(:clock), do: "{module, function, arguments}"
-  defp allowed(option) when option in [:send, :trace], do: "{module, function, arguments} or nil"
+
+  defp allowed(option) when option in [:send, :on_latch, :trace],
+    do: "{module, function, arguments} or nil"
+
   defp allowed(:estop_file), do: "the path of a file or nil"
 
   defp module_options?({module, options}), do: is_atom(module) and Keyword.keyword?(options)

@@ -6,8 +6,8 @@ defmodule Swarm.Comms do
   peers on the robot's board, everything else goes to the pilot. Out: what the mission says and, five times a
   second, a heartbeat with what the board says of the robot.
 
-  An e-stop spreads with the heartbeats, also one that was pressed on the robot's gate; how it
-  stands is `Swarm.EStop`'s to say, which is started beside the comms process. Of two robots of one name the
+  An e-stop spreads with the heartbeats. How it stands is `Swarm.EStop`'s to say, which is started beside the comms
+  process and hears of each heartbeat that says otherwise. Of two robots of one name the
   later one (`Swarm.Comms.NameClaim`) stops and falls silent, with the event `[:swarm, :link, :duplicate_id]`.
 
   | part | what it does |
@@ -42,13 +42,22 @@ defmodule Swarm.Comms do
   # So many messages are handled between two looks at how many wait.
   @look_every 64
 
-  @doc "The config of a robot that talks: with a comms process, which its mission speaks through, and a brake."
+  @doc """
+  The config of a robot that talks: with a comms process, which its mission speaks through, and an e-stop process, which
+  its gate tells of its latch.
+  """
   @spec join(Config.t(), keyword()) :: Config.t()
   def join(%Config{} = config, options \\ []) do
     options = Keyword.validate!(options, [:boot, transport: {Transport, :transmit, []}])
     # The brake first: whoever is listed later falls with those before, never takes them along.
     companions = config.companions ++ [{EStop, []}, {__MODULE__, options}]
-    %{config | send: {__MODULE__, :say, [config.id]}, companions: companions}
+
+    %{
+      config
+      | send: {__MODULE__, :say, [config.id]},
+        on_latch: {EStop, :latch, [config.id]},
+        companions: companions
+    }
   end
 
   @impl Robot.Companion
@@ -94,7 +103,7 @@ defmodule Swarm.Comms do
       config: config,
       id: id,
       board: board,
-      receiver: Receiver.new(id, EStop.written(board)),
+      receiver: Receiver.new(id, nil),
       chart: PeerWriter.new(board),
       sender: Sender.new(config, board, transport, boot),
       name: NameClaim.new(id, {boot, node()}),
@@ -125,7 +134,7 @@ defmodule Swarm.Comms do
   def handle_cast({:hear, term}, s) do
     at_ms = Config.now(s.config)
     {heard, receiver} = Receiver.hear(s.receiver, term, at_ms)
-    {:noreply, s |> stop(receiver, term) |> heard(heard, at_ms) |> relieve()}
+    {:noreply, %{s | receiver: receiver} |> heard(heard, term, at_ms) |> relieve()}
   end
 
   def handle_cast({:command, request, ref}, s) when is_reference(ref),
@@ -140,7 +149,7 @@ defmodule Swarm.Comms do
     {:noreply, %{s | sender: sender}}
   end
 
-  def handle_cast(:stop, s), do: {:noreply, latch(s, EStop.written(s.board))}
+  def handle_cast(:stop, s), do: {:noreply, %{s | sender: Sender.urge(s.sender, s.receiver)}}
 
   def handle_cast({:rejected, why}, s) when is_atom(why),
     do: {:noreply, %{s | receiver: Receiver.reject(s.receiver, why)}}
@@ -165,18 +174,20 @@ defmodule Swarm.Comms do
     end
   end
 
-  defp heard(s, {:peer, id}, at_ms),
-    do: %{s | chart: PeerWriter.heard(s.chart, s.receiver.peers, id, at_ms)}
+  defp heard(s, {:peer, id}, message, at_ms) do
+    EStop.heard(s.id, s.board, Message.inner(message).body)
+    %{s | chart: PeerWriter.heard(s.chart, s.receiver.peers, id, at_ms)}
+  end
 
-  defp heard(s, {:message, message}, _at_ms) do
+  defp heard(s, {:message, message}, _term, _at_ms) do
     Pilot.hear(s.id, {:message, message})
     s
   end
 
-  defp heard(s, :nothing, _at_ms), do: s
+  defp heard(s, :nothing, _term, _at_ms), do: s
 
   defp tick(s, at_ms) do
-    s = note(follow(s))
+    s = note(s)
     s = %{s | chart: PeerWriter.grow_old(s.chart, s.receiver.peers, at_ms)}
     counts = %{sent: s.sender.sent, heard: s.receiver.heard, rejected: s.receiver.rejected}
     Board.put(s.board, :link, :radio, counts, at_ms)
@@ -213,34 +224,6 @@ defmodule Swarm.Comms do
   # The pilot has taken an order; that the executive has it, too, only that one can say.
   defp answer(s, :accepted, ref), do: Executive.confirm(s.id, {Nonblocking, :answer, [ref, :ok]})
   defp answer(_s, answer, ref), do: Nonblocking.answer(ref, answer)
-
-  # The brake knows best; it is only asked where a heartbeat seems to change something.
-  defp stop(%{receiver: %{stop: stop}} = s, %{stop: stop} = receiver, _term),
-    do: %{s | receiver: receiver}
-
-  defp stop(s, receiver, %Message{kind: :relay, body: inner}), do: stop(s, receiver, inner)
-
-  defp stop(s, receiver, %Message{body: beat}),
-    do:
-      latch(
-        %{s | receiver: %{receiver | stop: s.receiver.stop}},
-        EStop.beat(s.id, beat.estop, beat.latched)
-      )
-
-  # A stop may have been pressed on the robot itself.
-  defp follow(s) do
-    if Board.latched?(s.board) == s.receiver.stop.latched?,
-      do: s,
-      else: latch(s, EStop.follow(s.id))
-  end
-
-  defp latch(%{receiver: %{stop: before} = receiver} = s, stop) do
-    s = %{s | receiver: %{receiver | stop: stop}}
-
-    if stop.latched? == before.latched?,
-      do: s,
-      else: %{s | sender: Sender.urge(s.sender, s.receiver)}
-  end
 
   defp give_way(s, other) do
     EStop.present(s.id, false)

@@ -4,9 +4,13 @@ defmodule Swarm.EStop do
   own. What stops the robot comes here (`:estop`, `:reset`, `:stop` and `:disarm` of people, calls of `Swarm.EStop.Broadcaster`)
   and goes to the gate at once, also where the comms process is flooded, hangs or is dead.
 
-  It alone decides how the emergency stop stands (`Swarm.EStop.State`), and writes it on the board under
-  `:estop`. The comms process asks it about what heartbeats say, and is told of each change, so that the next
-  heartbeats, which follow at once, spread it.
+  It alone decides how the emergency stop stands (`Swarm.EStop.State`), and publishes it on the board under
+  `:estop`, for all others to read. The only other copy is the gate's latch, which this process sets. A button of the
+  gate's own sets and clears it too; the gate says so (`latch/1`), and this process follows.
+
+  Nobody else decides, and nobody waits for this process: the comms process hands on what a heartbeat says where that
+  differs from the board (`heard/3`), and is told of each change, so that the next heartbeats, which follow at once,
+  spread it.
 
   A stop goes to gate, executive and pilot at once, so that none that hangs holds up the others. It is
   answered by the last of them, the gate, when the mission is out of command and no older wish can follow
@@ -23,6 +27,7 @@ defmodule Swarm.EStop do
   """
   alias Robot.{Board, Config, Names}
   alias Swarm.EStop
+  alias Swarm.Membership.Heartbeat
 
   @behaviour Robot.Companion
 
@@ -51,19 +56,24 @@ defmodule Swarm.EStop do
   def hear(_node, _malformed), do: :ok
 
   @doc """
-  What a heartbeat that the comms process of this robot heard says of the emergency stop; returns how the stop
-  stands with it.
+  A heartbeat was heard by the robot whose board this is. It goes to the e-stop process where it would change how the
+  stop stands, and is dropped in the caller where it would not.
   """
-  @spec beat(robot :: atom(), number :: non_neg_integer(), latched? :: boolean()) ::
-          EStop.State.t()
-  def beat(robot, number, latched?),
-    do: GenServer.call(Names.via(robot, :brake), {:beat, number, latched?})
+  @spec heard(robot :: atom(), Board.t(), Heartbeat.t()) :: :ok
+  def heard(robot, board, %Heartbeat{estop: number, latched: latched?}) do
+    stop = written(board)
 
-  @doc "The gate's latch may be another than this brake knows: buttons set it too."
-  @spec follow(robot :: atom()) :: EStop.State.t()
-  def follow(robot), do: GenServer.call(Names.via(robot, :brake), :follow)
+    if EStop.State.hear(stop, number, latched?) != stop,
+      do: GenServer.cast(Names.via(robot, :brake), {:beat, number, latched?})
 
-  @doc "How the stop stands as the last brake wrote it down; before the first, by the gate's latch."
+    :ok
+  end
+
+  @doc "The gate has set or cleared its latch, by whatever button; applied by the gate (`Robot.Config`, `:on_latch`)."
+  @spec latch(robot :: atom()) :: :ok
+  def latch(robot), do: GenServer.cast(Names.via(robot, :brake), :latch)
+
+  @doc "How the stop stands as the e-stop process published it; before the first did, by the gate's latch."
   @spec written(Board.t()) :: EStop.State.t()
   defdelegate written(board), to: EStop.Actions
 

@@ -8,7 +8,8 @@ defmodule Robot.Safety.Gate do
   the gate steps when they arrive.
 
   The e-stop latch is read at the start, so that a gate that restarts is as latched as it was.
-  Only `reset/1`, a person's doing, clears it.
+  Only `reset/1`, a person's doing, clears it. Whenever the latch was set or cleared, by whomever, the gate applies the
+  config's `:on_latch`, so that whoever spreads the stop need not look for it.
 
   While the drive is not armed (`Hal.Device.Arming`) the gate asks it for nothing but to stand, so that a
   robot that a person arms begins from standing, and says why it stands. In a dry run
@@ -118,6 +119,7 @@ defmodule Robot.Safety.Gate do
     # The wheels first: the latch has a file, too, and a disk may take its time.
     Board.hold(s.board)
     s = step(%{s | reflex: Reflex.estop(s.reflex)}, at_ms)
+    tell_latch(s)
     Board.latch(s.board)
     Event.execute([:robot, :gate, :estop], %{at_ms: at_ms}, %{robot: s.config.id})
     {:reply, :ok, s}
@@ -126,6 +128,7 @@ defmodule Robot.Safety.Gate do
   def handle_call(:reset, _from, s) do
     at_ms = heard(s, :reset)
     Board.unlatch(s.board)
+    tell_latch(s)
     Event.execute([:robot, :gate, :reset], %{at_ms: at_ms}, %{robot: s.config.id})
     {:reply, :ok, %{s | reflex: Reflex.reset(s.reflex)}}
   end
@@ -195,6 +198,8 @@ defmodule Robot.Safety.Gate do
     Process.send_after(self(), :step, next, abs: true)
     %{s | next: next}
   end
+
+  defp tell_latch(s), do: with({m, f, a} <- s.config.on_latch, do: apply(m, f, a))
 
   defp heard(s, what) do
     at_ms = Config.now(s.config)

@@ -40,12 +40,15 @@ defmodule Swarm.Comms.CommandHandler do
     do: named(Device.acknowledge(Names.via(id, :drive)), id)
 
   # What is asked for while all stand would otherwise begin with the reset.
-  def answer(_request, config, _board, %{stop: %{latched?: true}}),
-    do: {:error, "#{config.id} is held by the emergency stop; reset it first"}
-
-  def answer(:arm, %{id: id}, _board, _ear), do: named(Device.arm(Names.via(id, :drive)), id)
-
   def answer(request, config, board, receiver) do
+    if Board.latched?(board),
+      do: {:error, "#{config.id} is held by the emergency stop; reset it first"},
+      else: free(request, config, board, receiver)
+  end
+
+  defp free(:arm, %{id: id}, _board, _ear), do: named(Device.arm(Names.via(id, :drive)), id)
+
+  defp free(request, config, board, receiver) do
     with {:ok, request} <- checked(request, config),
          :ok <- well(config, board),
          :ok <- ready(request, config, board),

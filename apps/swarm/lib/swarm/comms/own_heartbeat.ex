@@ -3,7 +3,7 @@ defmodule Swarm.Comms.OwnHeartbeat do
   Makes the heartbeat of a live robot from its board. `Swarm.Member` makes the same in lockstep.
   """
   alias Robot.{Board, Config, Percept}
-  alias Swarm.Message
+  alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Comms.Receiver
 
@@ -26,7 +26,7 @@ defmodule Swarm.Comms.OwnHeartbeat do
       }
 
       heard = Peers.heard(receiver.peers, at_ms)
-      beat = Heartbeat.new(sender, percept, claim(board), heard, receiver.stop)
+      beat = Heartbeat.new(sender, percept, claim(board), heard, EStop.written(board))
       {:ok, Message.new(config.id, :heartbeat, beat)}
     end
   end

@@ -1,7 +1,8 @@
 defmodule Swarm.Comms.Receiver do
   @moduledoc """
-  What a robot makes of the messages that it receives, as a function: who is there, how the emergency stop
-  stands, and what was dropped. Pure; the same in the same order as `Swarm.Member`.
+  What a robot makes of the messages that it receives, as a function: who is there, and what was dropped. Pure; the
+  same in the same order as `Swarm.Member`, which also keeps here how its emergency stop stands. A live robot's is
+  `Swarm.EStop`'s, and its receiver has none.
   """
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.Peers
@@ -12,7 +13,7 @@ defmodule Swarm.Comms.Receiver do
   @type t :: %__MODULE__{
           me: atom(),
           peers: Peers.t(),
-          stop: EStop.State.t(),
+          stop: EStop.State.t() | nil,
           heard: non_neg_integer(),
           rejected: %{atom() => pos_integer()}
         }
@@ -24,8 +25,8 @@ defmodule Swarm.Comms.Receiver do
   """
   @type heard :: {:peer, atom()} | {:message, Message.t()} | :nothing
 
-  @doc "Nothing heard yet; the emergency stop is as it was left."
-  @spec new(atom(), EStop.State.t()) :: t()
+  @doc "Nothing heard yet; `stop` is `nil` where somebody else keeps how the emergency stop stands."
+  @spec new(atom(), EStop.State.t() | nil) :: t()
   def new(me, stop \\ %EStop.State{}), do: %__MODULE__{me: me, peers: Peers.new(me), stop: stop}
 
   @doc """
@@ -50,7 +51,7 @@ defmodule Swarm.Comms.Receiver do
 
       {:ok, %Message{kind: :heartbeat, from: from, body: beat, hops: hops}} ->
         peers = Peers.hear(receiver.peers, from, beat, now_ms, hops == 0)
-        stop = EStop.State.hear(receiver.stop, beat.estop, beat.latched)
+        stop = receiver.stop && EStop.State.hear(receiver.stop, beat.estop, beat.latched)
         {{:peer, from}, %{receiver | peers: peers, stop: stop, heard: receiver.heard + 1}}
 
       {:ok, message} ->

@@ -5,7 +5,7 @@ defmodule Swarm.Comms.Sender do
   a second for a second, so that it spreads within 200 ms.
   """
   alias Robot.{Board, Config}
-  alias Swarm.Message
+  alias Swarm.{EStop, Message}
   alias Swarm.Commands.Freshness
   alias Swarm.Comms.Transport
   alias Swarm.Comms.{OwnHeartbeat, Receiver}
@@ -13,14 +13,16 @@ defmodule Swarm.Comms.Sender do
   @beat_every 2
   @urgent_ticks 10
 
-  @enforce_keys [:config, :board, :transport, :stamps]
+  @enforce_keys [:config, :board, :transport, :stamps, :latched?]
   defstruct @enforce_keys ++ [ticks: 0, urgent: 0, sent: 0, silent?: false]
 
+  @typedoc "`latched?` is what it has said of the emergency stop so far, `urgent` how many heartbeats hurry yet."
   @type t :: %__MODULE__{
           config: Config.t(),
           board: Board.t(),
           transport: Config.call(),
           stamps: Freshness.t(),
+          latched?: boolean(),
           ticks: non_neg_integer(),
           urgent: non_neg_integer(),
           sent: non_neg_integer(),
@@ -34,7 +36,8 @@ defmodule Swarm.Comms.Sender do
       config: config,
       board: board,
       transport: transport,
-      stamps: Freshness.new(boot)
+      stamps: Freshness.new(boot),
+      latched?: EStop.written(board).latched?
     }
 
   @doc "Says something to these robots; one that has fallen silent does not."
@@ -49,21 +52,30 @@ defmodule Swarm.Comms.Sender do
   @doc "A tenth of a second has passed: time for a heartbeat, or not."
   @spec tick(t(), Receiver.t(), integer()) :: t()
   def tick(%__MODULE__{} = sender, receiver, at_ms) do
-    sender = %{sender | ticks: sender.ticks + 1}
+    sender = notice(%{sender | ticks: sender.ticks + 1})
     due? = sender.urgent > 0 or rem(sender.ticks, @beat_every) == 1
     sender = if due?, do: beat(sender, receiver, at_ms), else: sender
     %{sender | urgent: max(sender.urgent - 1, 0)}
   end
 
-  @doc """
-  Something must be known everywhere soon. Where a test or a trial decides when a robot acts, the next
-  heartbeat tells it.
-  """
+  @doc "The emergency stop may have changed, which must be known everywhere soon."
   @spec urge(t(), Receiver.t()) :: t()
-  def urge(%__MODULE__{config: %{pace: :manual}} = sender, _ear), do: sender
+  def urge(%__MODULE__{} = sender, receiver) do
+    case notice(sender) do
+      ^sender -> sender
+      hurried -> beat(hurried, receiver, Config.now(sender.config))
+    end
+  end
 
-  def urge(sender, receiver),
-    do: beat(%{sender | urgent: @urgent_ticks}, receiver, Config.now(sender.config))
+  # Where a test or a trial decides when a robot acts, the next heartbeat tells it.
+  defp notice(%{config: %{pace: :manual}} = sender), do: sender
+
+  defp notice(sender) do
+    case EStop.written(sender.board).latched? do
+      same when same == sender.latched? -> sender
+      latched? -> %{sender | latched?: latched?, urgent: @urgent_ticks}
+    end
+  end
 
   @doc "A stamp for somebody who asks."
   @spec stamp(t()) :: {Freshness.stamp(), t()}

@@ -25,7 +25,7 @@ defmodule Swarm.EStop.Actions do
           optional(atom()) => term()
         }
 
-  @doc "How the stop stands as the last brake wrote it down; before the first, by the gate's latch."
+  @doc "How the stop stands as the e-stop process published it; before the first did, by the gate's latch."
   @spec written(Board.t()) :: EStop.State.t()
   def written(board) do
     case Board.fetch(board, :estop, :infinity) do
@@ -135,8 +135,7 @@ defmodule Swarm.EStop.Actions do
   # Written down before the gate is told: a brake that restarts in between knows that there is a
   # stop to carry out and to spread.
   def become(%{stop: before} = s, stop) do
-    s = write(%{s | stop: stop})
-    if stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id)
+    s = hold(write(%{s | stop: stop}))
 
     # The mission ends with it: after the reset nothing moves until somebody says so.
     if stop.latched? and not before.latched?, do: halt(s, nil)
@@ -144,6 +143,17 @@ defmodule Swarm.EStop.Actions do
     GenServer.cast(Names.via(s.id, :link), :stop)
     s
   end
+
+  @doc "Has the gate latched if the stop stands so, and it is not."
+  @spec hold(t()) :: t()
+  def hold(s) do
+    if s.stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id)
+    s
+  end
+
+  @doc "The gate's latch is as it is: a button of its own may have set or cleared it."
+  @spec follow(t()) :: t()
+  def follow(s), do: become(s, EStop.State.follow(s.stop, Board.latched?(s.board)))
 
   @doc "Writes down how the stop stands."
   @spec write(t()) :: t()

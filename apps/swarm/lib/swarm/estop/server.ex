@@ -2,7 +2,6 @@ defmodule Swarm.EStop.Server do
   @moduledoc "The process of `Swarm.EStop`: what comes in. `Swarm.EStop.Actions` carries it out."
   use GenServer
   alias Robot.{Board, Config, Names}
-  alias Robot.Safety.Gate
   alias Swarm.EStop
   alias Swarm.{Directory, Nonblocking}
   alias Swarm.Commands.Freshness
@@ -28,8 +27,9 @@ defmodule Swarm.EStop.Server do
 
   @impl GenServer
   def handle_continue(:enter, s) do
-    # A stop that was written down by the e-stop process before this one may not have reached the gate.
-    if s.stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id)
+    # A stop that was written down by the e-stop process before this one may not have reached the gate; and what was
+    # pressed on the gate since then has reached nobody.
+    s = s |> EStop.Actions.hold() |> EStop.Actions.follow()
 
     {:noreply,
      %{
@@ -40,22 +40,18 @@ defmodule Swarm.EStop.Server do
   end
 
   @impl GenServer
-  def handle_call({:beat, number, latched?}, _from, s)
-      when is_integer(number) and number >= 0 and is_boolean(latched?) do
-    s = EStop.Actions.become(s, EStop.State.hear(s.stop, number, latched?))
-    {:reply, s.stop, s}
-  end
-
-  def handle_call(:follow, _from, s) do
-    s = EStop.Actions.become(s, EStop.State.follow(s.stop, Board.latched?(s.board)))
-    {:reply, s.stop, s}
-  end
-
   # Brakes are found in the directory, so anything may come here from anywhere, and counts as
   # nothing.
   def handle_call(_unknown, _from, s), do: {:noreply, s}
 
   @impl GenServer
+  def handle_cast({:beat, number, latched?}, s)
+      when is_integer(number) and number >= 0 and is_boolean(latched?),
+      do: {:noreply, EStop.Actions.become(s, EStop.State.hear(s.stop, number, latched?))}
+
+  # As the latch is now, not as it was when the gate said so: this process may have set it again since.
+  def handle_cast(:latch, s), do: {:noreply, EStop.Actions.follow(s)}
+
   def handle_cast({:estop, call, age_ms}, s),
     do: {:noreply, EStop.Actions.called(s, call, age_ms)}
 

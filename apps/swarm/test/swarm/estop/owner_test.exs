@@ -1,0 +1,99 @@
+defmodule Swarm.EStop.OwnerTest do
+  @moduledoc "One process says how the emergency stop stands: what reaches it, and who does not wait for it."
+  use Swarm.Case, async: false
+  @moduletag :capture_log
+  alias Swarm.EStop
+
+  defp latched?(id), do: Board.latched?(Board.find!(id))
+
+  defp stop_of(id) do
+    {:ok, stop, _at_ms} = Board.fetch(Board.find!(id), :estop, :infinity)
+    stop
+  end
+
+  defp beat(number, latched?) do
+    beat = %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
+    Message.new(:owner_far, :heartbeat, %{beat | estop: number, latched: latched?})
+  end
+
+  # Everything that was sent to these processes so far has been handled, in this order.
+  defp settled(id, roles), do: for(role <- roles, do: :sys.get_state(Names.whereis(id, role)))
+
+  @doc false
+  def carry(test, from, _ids, message), do: send(test, {:carried, from, message})
+
+  test "a button of the gate's own reaches it though the comms process hangs" do
+    id = robot(:owner_button)
+    link = Names.whereis(id, :link)
+    :ok = :sys.suspend(link)
+    :ok = Gate.estop(id)
+    eventually(fn -> match?(%EStop.State{latched?: true, known: 1}, stop_of(id)) end)
+    :ok = Gate.reset(id)
+    eventually(fn -> match?(%EStop.State{latched?: false, cleared: 1}, stop_of(id)) end)
+    :ok = :sys.resume(link)
+  end
+
+  test "of a latch that changed often while it was held up it follows the last" do
+    id = robot(:owner_late)
+    brake = Names.whereis(id, :brake)
+    :ok = :sys.suspend(brake)
+    for press <- [:estop, :reset, :estop], do: :ok = apply(Gate, press, [id])
+    :ok = :sys.resume(brake)
+    settled(id, [:brake])
+    assert %EStop.State{latched?: true, known: 1} = stop_of(id)
+    assert latched?(id)
+    assert Swarm.ask(id, :reset) == :ok
+    refute latched?(id) or stop_of(id).latched?
+  end
+
+  test "what was pressed on the gate while there was none is followed by the next one" do
+    id = robot(:owner_gone)
+    brake = Names.whereis(id, :brake)
+    :ok = :sys.suspend(brake)
+    :ok = Gate.estop(id)
+    ^brake = kill(id, :brake)
+    eventually(fn -> match?(%EStop.State{latched?: true, known: 1}, stop_of(id)) end)
+    assert latched?(id)
+  end
+
+  test "the comms process waits for none that hangs, and hands on only what is news" do
+    id = robot(:owner_hangs, link: [transport: {__MODULE__, :carry, [self()]}])
+    standing([id])
+    brake = Names.whereis(id, :brake)
+    # How the stop stands already is not handed on.
+    Comms.hear(id, beat(0, false))
+    settled(id, [:link])
+    :ok = :sys.suspend(brake)
+    Comms.hear(id, beat(0, false))
+    Comms.hear(id, beat(3, true))
+    for _ <- 1..8, do: assert_receive({:carried, ^id, %Message{kind: :heartbeat}}, 1_000)
+    assert {:ok, _line} = Swarm.ask(id, :ping)
+    refute latched?(id)
+
+    {:messages, queued} = Process.info(brake, :messages)
+    beats = for {:"$gen_cast", cast} <- queued, elem(cast, 0) == :beat, do: cast
+    assert beats == [{:beat, 3, true}]
+
+    :ok = :sys.resume(brake)
+    eventually(fn -> latched?(id) end)
+    assert stop_of(id).known == 3
+    assert_receive {:carried, ^id, %Message{body: %Heartbeat{latched: true, estop: 3}}}
+    # A neighbour that nobody has reset yet does not bring it back.
+    assert Swarm.ask(id, :reset) == :ok
+    Comms.hear(id, put_in(beat(3, true).body.sequence, 2))
+    settled(id, [:link, :brake])
+    refute latched?(id)
+  end
+
+  test "it keeps up with neighbours that tell of one stop after the other, and a reset holds" do
+    id = robot(:owner_flooded)
+    link = Names.whereis(id, :link)
+    for number <- 1..20_000, do: GenServer.cast(link, {:hear, beat(number, true)})
+    eventually(fn -> Process.info(link, :message_queue_len) == {:message_queue_len, 0} end)
+    settled(id, [:link, :brake])
+    assert latched?(id)
+    assert stop_of(id).known > 0
+    assert Swarm.ask(id, :reset) == :ok
+    refute latched?(id)
+  end
+end
