@@ -102,6 +102,21 @@ defmodule Hal.Device do
   @spec acknowledge(GenServer.server()) :: :ok | {:error, line :: String.t()}
   def acknowledge(device), do: order(device, :acknowledge)
 
+  @doc """
+  Hands an order to the device for somebody else; the caller does not wait. The device applies `reply`, an `{m, f, a}`, with
+  what `arm/1`, `disarm/1` or `acknowledge/1` would have returned as its last argument; never, where it hangs or is gone. An
+  order that it comes to at `until_ms` (`System.monotonic_time/1`, ms) or later is not carried out.
+  """
+  @spec order_later(
+          GenServer.server(),
+          Arming.order(),
+          until_ms :: integer(),
+          reply :: {module(), atom(), list()}
+        ) :: :ok
+  def order_later(device, order, until_ms, {_m, _f, _a} = reply)
+      when order in [:arm, :disarm, :acknowledge] and is_integer(until_ms),
+      do: GenServer.cast(device, {:order, order, until_ms, reply})
+
   @doc "How the drive is armed, with all that `Hal.Device.Arming` counts; `nil` for what is no drive."
   @spec arming(GenServer.server()) :: Arming.t() | nil
   def arming(device), do: GenServer.call(device, :arming)

@@ -15,7 +15,7 @@ defmodule Swarm.Comms do
   | `Swarm.Comms.Receiver` | judges what is heard |
   | `Swarm.Comms.PeerWriter` | writes the peers on the board |
   | `Swarm.Comms.Sender` | speaks, sends the heartbeats |
-  | `Swarm.Comms.CommandHandler` | answers people, if what they ask is not too old (`Swarm.Commands.Freshness`) |
+  | `Swarm.Comms.CommandHandler` | answers people, if what they ask is not too old (`Swarm.Commands.Freshness`), or hands on what they ask |
   | `Swarm.Comms.LoadShedder` | keeps the mailbox short |
 
   `join/2` makes a config with a comms process. Its options:
@@ -27,7 +27,7 @@ defmodule Swarm.Comms do
   use GenServer
   alias Hal.Event
   alias Robot.{Board, Config, Names}
-  alias Robot.Control.{Executive, Pilot}
+  alias Robot.Control.Pilot
   alias Swarm.{EStop, Message, Nonblocking}
   alias Swarm.Commands.Freshness
   alias Swarm.Comms.Transport
@@ -167,6 +167,12 @@ defmodule Swarm.Comms do
   @impl GenServer
   def handle_info(:tick, s), do: {:noreply, s |> tick(Config.now(s.config)) |> schedule()}
 
+  # The drive had its time.
+  def handle_info({:unanswered, ref, answer}, s) when is_reference(ref) do
+    Nonblocking.answer(ref, answer)
+    {:noreply, s}
+  end
+
   def handle_info(message, s) do
     case NameClaim.arrived(s.name, message) do
       {:ok, name} -> {:noreply, %{s | name: name}}
@@ -211,7 +217,7 @@ defmodule Swarm.Comms do
       :ok ->
         if EStop.takes?(request),
           do: EStop.take(s.id, request, ref),
-          else: answer(s, CommandHandler.answer(request, s.config, s.board, s.receiver), ref)
+          else: CommandHandler.take(request, ref, s.config, s.board, s.receiver)
 
         s
 
@@ -220,10 +226,6 @@ defmodule Swarm.Comms do
         %{s | receiver: Receiver.reject(s.receiver, :too_old)}
     end
   end
-
-  # The pilot has taken an order; that the executive has it, too, only that one can say.
-  defp answer(s, :accepted, ref), do: Executive.confirm(s.id, {Nonblocking, :answer, [ref, :ok]})
-  defp answer(_s, answer, ref), do: Nonblocking.answer(ref, answer)
 
   defp give_way(s, other) do
     EStop.present(s.id, false)

@@ -34,21 +34,15 @@ defmodule Hal.Device.Server do
   @impl GenServer
   def handle_call(:arming, _from, s), do: {:reply, s.arming, s}
 
-  # Whoever asked has been told by now that nothing came of it, and may stand before the robot.
-  def handle_call({:arm, until_ms}, from, s) do
-    if System.monotonic_time(:millisecond) < until_ms,
-      do: handle_call(:arm, from, s),
-      else: {:reply, {:error, "the drive answers too late"}, s}
-  end
-
-  def handle_call(order, _from, %{kind: :drive} = s)
-      when order in [:arm, :disarm, :acknowledge] do
-    {answer, s} = Lifecycle.order(s, order)
+  def handle_call({:arm, until_ms}, _from, s) do
+    {answer, s} = order(s, :arm, until_ms)
     {:reply, answer, s}
   end
 
-  def handle_call(order, _from, s) when order in [:arm, :disarm, :acknowledge],
-    do: {:reply, {:error, "a #{s.kind} has no wheels that could be armed"}, s}
+  def handle_call(order, _from, s) when order in [:disarm, :acknowledge] do
+    {answer, s} = order(s, order)
+    {:reply, answer, s}
+  end
 
   @impl GenServer
   def handle_cast({:drive, twist}, %{kind: :drive, inner: {:open, _}} = s),
@@ -57,6 +51,12 @@ defmodule Hal.Device.Server do
   def handle_cast({:disarm, then}, %{kind: :drive} = s) do
     {_answer, s} = Lifecycle.order(s, :disarm)
     with {m, f, a} <- then, do: apply(m, f, a)
+    {:noreply, s}
+  end
+
+  def handle_cast({:order, order, until_ms, {m, f, a}}, s) do
+    {answer, s} = order(s, order, until_ms)
+    apply(m, f, a ++ [answer])
     {:noreply, s}
   end
 
@@ -101,6 +101,16 @@ defmodule Hal.Device.Server do
 
   # What a driver that is closed by now had asked for.
   def handle_info(_late, s), do: {:noreply, s}
+
+  # Whoever asked has been told by now that nothing came of it, and may stand before the robot.
+  defp order(s, order, until_ms) do
+    if System.monotonic_time(:millisecond) < until_ms,
+      do: order(s, order),
+      else: {{:error, "the drive answers too late"}, s}
+  end
+
+  defp order(%{kind: :drive} = s, order), do: Lifecycle.order(s, order)
+  defp order(s, _order), do: {{:error, "a #{s.kind} has no wheels that could be armed"}, s}
 
   @impl GenServer
   def terminate(reason, s) do

@@ -27,7 +27,7 @@ defmodule Robot.Control.Pilot do
   @behaviour :gen_statem
   alias Hal.Event
   alias Robot.{Behaviour, Board, Config, Names}
-  alias Robot.Control.{Executive, Trace}
+  alias Robot.Control.{Delivery, Executive, Trace}
   alias Robot.Localiser.Anchors
 
   # On a busy machine a pilot is slow, not gone.
@@ -74,6 +74,19 @@ defmodule Robot.Control.Pilot do
   def command(robot, command), do: call(robot, {:command, command})
 
   @doc """
+  Hands a command to the mission for somebody else, who is told what became of it; the caller does not wait. The
+  executive replies `:ok`, once it has what the mission made of the command, and the pilot a refusal; nobody, where one of them
+  hangs or falls meanwhile.
+  """
+  @spec deliver(robot :: atom(), command :: term(), Delivery.t()) :: :ok
+  def deliver(robot, command, %Delivery{} = delivery) do
+    with pid when is_pid(pid) <- Names.whereis(robot, :pilot),
+         do: send(pid, {:deliver, delivery, {:command, command}})
+
+    :ok
+  end
+
+  @doc """
   An event of `Robot.Mission`: a tick or an outcome from the executive, a message from another robot,
   checked by whoever heard it. Of several ticks that wait, only the newest is handled.
   """
@@ -116,15 +129,10 @@ defmodule Robot.Control.Pilot do
   def handle_event({:call, from}, :start, state, %{config: %{mission: {module, options}}} = data),
     do: handle_event({:call, from}, {:start, module, options}, state, data)
 
-  def handle_event({:call, from}, {:start, module, options} = input, state, data) do
-    if Code.ensure_loaded?(module) and function_exported?(module, :init, 2) do
-      heard(input, data)
-      rest(data)
-      result = asking(module, :init, [data.config.id, options], data)
-      data = %{data | claim: %{}, halted: nil}
-      follow(result, module, state, data, [{:reply, from, :ok}])
-    else
-      {:keep_state_and_data, [{:reply, from, {:error, :no_mission}}]}
+  def handle_event({:call, from}, {:start, module, options}, state, data) do
+    case begin(module, options, state, data) do
+      {:ok, state, data} -> {:next_state, state, data, [{:reply, from, :ok}]}
+      error -> {:keep_state_and_data, [{:reply, from, error}]}
     end
   end
 
@@ -139,10 +147,9 @@ defmodule Robot.Control.Pilot do
       else: :keep_state_and_data
   end
 
-  def handle_event({:call, from}, :resume, :idle, %{halted: {module, mission}} = data) do
-    data = %{data | mission: mission, halted: nil}
-    result = handle({:command, :start}, module, data)
-    follow(result, module, :idle, data, [{:reply, from, :ok}])
+  def handle_event({:call, from}, :resume, :idle, %{halted: {_module, _mission}} = data) do
+    {:ok, state, data} = go(:resume, {:command, :start}, :idle, data)
+    {:next_state, state, data, [{:reply, from, :ok}]}
   end
 
   def handle_event({:call, from}, :resume, _state, _data),
@@ -151,15 +158,67 @@ defmodule Robot.Control.Pilot do
   def handle_event({:call, from}, {:command, _command}, :idle, _data),
     do: {:keep_state_and_data, [{:reply, from, {:error, :idle}}]}
 
-  def handle_event({:call, from}, {:command, _command} = event, {module, _} = state, data),
-    do: follow(handle(event, module, data), module, state, data, [{:reply, from, :ok}])
+  def handle_event({:call, from}, {:command, _command} = event, {module, _} = state, data) do
+    {:ok, state, data} = go({:hand, module}, event, state, data)
+    {:next_state, state, data, [{:reply, from, :ok}]}
+  end
 
   def handle_event(:cast, _event, :idle, _data), do: :keep_state_and_data
 
-  def handle_event(:cast, event, {module, _phase} = state, data),
-    do: event |> newest() |> handle(module, data) |> follow(module, state, data, [])
+  def handle_event(:cast, event, {module, _phase} = state, data) do
+    {:ok, state, data} = go({:hand, module}, newest(event), state, data)
+    {:next_state, state, data}
+  end
+
+  def handle_event(:info, {:deliver, %Delivery{} = delivery, {:command, _} = event}, state, data) do
+    {m, f, a} = delivery.reply
+
+    with :ok <- timely(delivery, data),
+         {:ok, way} <- Delivery.way(delivery, state, data.halted),
+         {:ok, state, data} <- go(way, event, state, data) do
+      # The pilot has it; that the executive has it, too, only that one can say.
+      Executive.confirm(data.config.id, {m, f, a ++ [:ok]})
+      {:next_state, state, data}
+    else
+      refusal ->
+        apply(m, f, a ++ [refusal])
+        :keep_state_and_data
+    end
+  end
 
   def handle_event(:info, _unknown, _state, _data), do: :keep_state_and_data
+
+  # Whoever asked has been told by now that nothing came of it, or somebody has stopped the robot meanwhile.
+  defp timely(delivery, data) do
+    cond do
+      System.monotonic_time(:millisecond) >= delivery.until_ms -> {:error, :late}
+      Board.latched?(data.board) -> {:error, :held}
+      true -> :ok
+    end
+  end
+
+  # An event on its way to a mission.
+  defp go({:hand, module}, event, state, data),
+    do: event |> handle(module, data) |> follow(module, state, data)
+
+  defp go(:resume, event, :idle, %{halted: {module, mission}} = data),
+    do: go({:hand, module}, event, :idle, %{data | mission: mission, halted: nil})
+
+  defp go({:start, module, options}, event, state, data) do
+    with {:ok, state, data} <- begin(module, options, state, data),
+         do: go({:hand, module}, event, state, data)
+  end
+
+  defp begin(module, options, state, data) do
+    if Code.ensure_loaded?(module) and function_exported?(module, :init, 2) do
+      heard({:start, module, options}, data)
+      rest(data)
+      result = asking(module, :init, [data.config.id, options], data)
+      follow(result, module, state, %{data | claim: %{}, halted: nil})
+    else
+      {:error, :no_mission}
+    end
+  end
 
   # Whoever is answered finds the robot idle. The mission is asked last: it has no say in this.
   defp halt(state, then, data) do
@@ -204,9 +263,9 @@ defmodule Robot.Control.Pilot do
     result
   end
 
-  defp follow({phase, mission, effects}, module, state, data, replies) do
+  defp follow({phase, mission, effects}, module, state, data) do
     data = Enum.reduce(effects, %{data | mission: mission}, &carry_out/2)
-    {:next_state, {module, phase}, changed(state, {module, phase}, data), replies}
+    {:ok, {module, phase}, changed(state, {module, phase}, data)}
   end
 
   defp carry_out(effect, data) do

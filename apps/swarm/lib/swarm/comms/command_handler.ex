@@ -1,8 +1,10 @@
 defmodule Swarm.Comms.CommandHandler do
   @moduledoc """
-  Answers the commands of people (`Swarm`): it accepts or refuses each, in one line. It runs in the
-  robot's comms process, which people on any node find by the directory. `Swarm.EStop` handles what stops a
-  robot, and the reset.
+  Takes the commands of people (`Swarm`). It runs in the robot's comms process, which people on any node find by the
+  directory, and waits for nobody: it answers what the board can tell, refuses what cannot be, in one line, and hands on
+  the rest, with whom to answer, to the process that carries it out. That one answers: the drive's device, or the pilot,
+  which refuses, and the executive, which says that it has what became of the order. `Swarm.EStop` handles what
+  stops a robot, and the reset.
 
   | request | answer |
   |---|---|
@@ -19,49 +21,85 @@ defmodule Swarm.Comms.CommandHandler do
   """
   alias Hal.Device
   alias Robot.{Board, Config, Names}
-  alias Robot.Control.Pilot
+  alias Robot.Control.{Delivery, Pilot}
   alias Robot.Safety.{LivenessMonitor, Readiness}
   alias Robot.Mission.Manual
-  alias Swarm.{Missions, Status}
+  alias Swarm.{Missions, Nonblocking, Status}
   alias Swarm.Commands.Order
   alias Swarm.Comms.{PingReply, Receiver}
 
-  @typedoc "`:accepted`: the pilot has the order; it is `:ok` once the executive has it, too."
-  @type answer :: :ok | :accepted | {:ok, String.t()} | {:error, String.t()} | Status.t()
+  # Whoever asks has half a second (`Swarm.Commands.Client`): later nothing is begun.
+  @carry_out_ms 400
 
-  @doc "Answers a request."
-  @spec answer(term(), Config.t(), Board.t(), Receiver.t()) :: answer()
-  def answer(:status, config, board, receiver), do: Status.of(config, board, receiver)
-
-  def answer(:ping, config, board, receiver),
-    do: {:ok, PingReply.line(config, board, Status.of(config, board, receiver))}
-
-  def answer(:acknowledge, %{id: id}, _board, _ear),
-    do: named(Device.acknowledge(Names.via(id, :drive)), id)
-
-  # What is asked for while all stand would otherwise begin with the reset.
-  def answer(request, config, board, receiver) do
-    if Board.latched?(board),
-      do: {:error, "#{config.id} is held by the emergency stop; reset it first"},
-      else: free(request, config, board, receiver)
+  @doc "Takes a request, which the process behind `ref` (`Swarm.Nonblocking.answer/2`) is told the outcome of."
+  @spec take(term(), reference(), Config.t(), Board.t(), Receiver.t()) :: :ok
+  def take(request, ref, config, board, receiver) do
+    case judge(request, config, board, receiver) do
+      {:drive, order} -> drive(order, config.id, ref)
+      {:mission, ways, command} -> deliver(ways, command, config.id, ref)
+      answer -> Nonblocking.answer(ref, answer)
+    end
   end
 
-  defp free(:arm, %{id: id}, _board, _ear), do: named(Device.arm(Names.via(id, :drive)), id)
+  defp judge(:status, config, board, receiver), do: Status.of(config, board, receiver)
+
+  defp judge(:ping, config, board, receiver),
+    do: {:ok, PingReply.line(config, board, Status.of(config, board, receiver))}
+
+  defp judge(:acknowledge, _config, _board, _receiver), do: {:drive, :acknowledge}
+
+  # What is asked for while all stand would otherwise begin with the reset.
+  defp judge(request, config, board, receiver) do
+    if Board.latched?(board), do: held(config.id), else: free(request, config, board, receiver)
+  end
+
+  defp free(:arm, _config, _board, _receiver), do: {:drive, :arm}
 
   defp free(request, config, board, receiver) do
     with {:ok, request} <- checked(request, config),
          :ok <- well(config, board),
          :ok <- ready(request, config, board),
-         :ok <- obey(request, doing(board), config, receiver),
-         do: :accepted
+         :ok <- possible(request, config, receiver),
+         {:ok, ways} <- ways(request, config),
+         do: {:mission, ways, command(request)}
   end
+
+  # A drive that hangs answers nobody, so that somebody else has to; of two answers only the first arrives.
+  defp drive(order, id, ref) do
+    until_ms = System.monotonic_time(:millisecond) + @carry_out_ms
+    Device.order_later(Names.via(id, :drive), order, until_ms, {__MODULE__, :ordered, [id, ref]})
+    unanswered = {:error, "#{id}: the drive does not answer"}
+    Process.send_after(self(), {:unanswered, ref, unanswered}, until_ms, abs: true)
+    :ok
+  end
+
+  defp deliver(ways, command, id, ref) do
+    until_ms = System.monotonic_time(:millisecond) + @carry_out_ms
+    reply = {__MODULE__, :delivered, [id, command, ref]}
+    Pilot.deliver(id, command, %Delivery{ways: ways, until_ms: until_ms, reply: reply})
+  end
+
+  @doc "What became of an order for the wheels, says the drive's device; answers it to whoever asked."
+  @spec ordered(atom(), reference(), :ok | {:error, line :: String.t()}) :: :ok
+  def ordered(_id, ref, :ok), do: Nonblocking.answer(ref, :ok)
+  def ordered(id, ref, {:error, line}), do: Nonblocking.answer(ref, {:error, "#{id}: #{line}"})
+
+  @doc "What became of an order for the mission, says pilot or executive; answers it to whoever asked."
+  @spec delivered(atom(), command :: term(), reference(), :ok | Delivery.refusal()) :: :ok
+  def delivered(id, command, ref, outcome),
+    do: Nonblocking.answer(ref, answer(outcome, id, command))
+
+  defp answer(:ok, _id, _command), do: :ok
+  defp answer({:error, :held}, id, _command), do: held(id)
+  defp answer({:error, :idle}, id, _formation), do: shapeless(id)
+  defp answer({:error, :no_mission}, id, _start), do: {:error, "#{id} has no such mission"}
+  defp answer({:error, :late}, id, _command), do: {:error, "#{id} answers too late; say it again"}
+
+  defp held(id), do: {:error, "#{id} is held by the emergency stop; reset it first"}
 
   @doc "What a robot says to a formation that it has no mission for."
   @spec shapeless(atom()) :: {:error, line :: String.t()}
   def shapeless(id), do: {:error, "#{id} is on no mission that has a formation; start it first"}
-
-  defp named(:ok, _id), do: :ok
-  defp named({:error, line}, id), do: {:error, "#{id}: #{line}"}
 
   # People come by `Swarm`, which has checked it all; but anybody may send something here.
   defp checked({:start, options}, config) do
@@ -73,8 +111,8 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp checked(request, _config), do: Order.check(request)
 
-  # A pilot that hangs would not answer, and the comms process would wait for it and be silent to others. A gate that hangs
-  # is ended, and with it what was begun.
+  # A pilot that hangs would not answer, and whoever asked would not know why. A gate that hangs is ended, and with it
+  # what was begun.
   defp well(%{id: id}, board) do
     hangs =
       for part <- [:gate, :pilot],
@@ -94,42 +132,11 @@ defmodule Swarm.Comms.CommandHandler do
     with {:error, line} <- Readiness.of(config, board), do: {:error, "#{config.id}: #{line}"}
   end
 
-  defp doing(board) do
-    case Board.fetch(board, :mission, :infinity) do
-      {:ok, %{state: {Manual, phase}}, _} -> {:alone, phase}
-      {:ok, %{state: {_module, phase}}, _} -> {:group, phase}
-      _idle -> :idle
-    end
-  end
+  defp possible({:follow_the_leader, leader}, %{id: id} = config, receiver),
+    do: Order.follow(id, leader, Receiver.leaders(receiver, Config.now(config)))
 
-  defp obey(:start, doing, config, receiver), do: obey({:start, []}, doing, config, receiver)
-
-  # A mission that the board still shows may have been stopped just now. What people had asked of it
-  # outlives that.
-  defp obey({:start, []}, doing, config, _ear) do
-    with {:error, :idle} <- again(doing, config),
-         {:error, :idle} <- Pilot.resume(config.id),
-         do: begin([], config)
-  end
-
-  defp obey({:start, options}, _doing, config, _ear), do: begin(options, config)
-
-  defp obey({:formation, _kind, _spacing} = command, {:group, _phase}, config, _ear) do
-    with {:error, :idle} <- Pilot.command(config.id, command), do: shapeless(config.id)
-  end
-
-  defp obey({:formation, _kind, _spacing}, _doing, config, _ear), do: shapeless(config.id)
-
-  defp obey({:follow_the_leader, leader} = command, doing, %{id: id} = config, receiver) do
-    with :ok <- Order.follow(id, leader, Receiver.leaders(receiver, Config.now(config))),
-         do: alone(command, doing, config)
-  end
-
-  defp obey({:find_blob, colour} = command, doing, config, _ear) do
-    with :ok <- known(colour, config), do: alone(command, doing, config)
-  end
-
-  defp obey(command, doing, config, _ear), do: alone(command, doing, config)
+  defp possible({:find_blob, colour}, config, _receiver), do: known(colour, config)
+  defp possible(_request, _config, _receiver), do: :ok
 
   defp known(_colour, %{camera: nil, id: id}), do: {:error, "#{id} has no camera to look with"}
   defp known(nil, _config), do: :ok
@@ -145,11 +152,23 @@ defmodule Swarm.Comms.CommandHandler do
   defp list([name]), do: name
   defp list(names), do: Enum.join(names, ", ")
 
+  # What people had asked of a mission outlives a stop of it.
+  defp ways(:start, config), do: ways({:start, []}, config)
+
+  defp ways({:start, []}, config) do
+    with {:ok, anew} <- begin([], config),
+         do: {:ok, [{:hand, {:except, Manual}}, :resume, anew]}
+  end
+
+  defp ways({:start, options}, config),
+    do: with({:ok, anew} <- begin(options, config), do: {:ok, [anew]})
+
+  defp ways({:formation, _kind, _spacing}, _config), do: {:ok, [{:hand, {:except, Manual}}]}
+  defp ways(_alone, _config), do: {:ok, [{:hand, {:only, Manual}}, {:start, Manual, []}]}
+
   defp begin(options, config) do
-    with {:ok, {module, defaults}} <- mission(config) do
-      :ok = Pilot.start(config.id, module, Keyword.merge(defaults, options))
-      Pilot.command(config.id, :start)
-    end
+    with {:ok, {module, defaults}} <- mission(config),
+         do: {:ok, {:start, module, Keyword.merge(defaults, options)}}
   end
 
   defp mission(%{mission: nil}),
@@ -157,15 +176,6 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp mission(%{mission: mission}), do: {:ok, mission}
 
-  defp again({:group, _phase}, config), do: Pilot.command(config.id, :start)
-  defp again(_idle_or_alone, _config), do: {:error, :idle}
-
-  defp alone(command, {:alone, _phase}, config) do
-    with {:error, :idle} <- Pilot.command(config.id, command), do: alone(command, :idle, config)
-  end
-
-  defp alone(command, _idle_or_group, config) do
-    :ok = Pilot.start(config.id, Manual, [])
-    Pilot.command(config.id, command)
-  end
+  defp command({:start, _options}), do: :start
+  defp command(request), do: request
 end

@@ -1,0 +1,118 @@
+defmodule Swarm.Comms.WaitingTest do
+  @moduledoc "Whoever is slow or dead, the robot's heartbeats go on, and people are told in one line."
+  use Swarm.Case, async: false
+  @moduletag :capture_log
+
+  @doc false
+  def carry(test, from, _ids, message), do: send(test, {:carried, from, message})
+
+  # Heartbeats of a comms process that waits for somebody come later, or never.
+  defp beats(id, number) do
+    forget(id)
+
+    for _ <- 1..number,
+        do: assert_receive({:carried, ^id, %Message{kind: :heartbeat}}, 1_000)
+  end
+
+  defp forget(id) do
+    receive do
+      {:carried, ^id, _message} -> forget(id)
+    after
+      0 -> :ok
+    end
+  end
+
+  defp talking(id, options \\ []) do
+    robot(id, [link: [transport: {__MODULE__, :carry, [self()]}]] ++ options)
+    standing([id])
+    id
+  end
+
+  defp state(id) do
+    {:ok, %{state: state}, _at_ms} = Board.fetch(Board.find!(id), :mission, :infinity)
+    state
+  end
+
+  test "a pilot that hangs for seconds holds up no heartbeat, and orders of then move nobody" do
+    id = talking(:waiting_pilot)
+    pilot = Names.whereis(id, :pilot)
+    link = Names.whereis(id, :link)
+    :ok = :sys.suspend(pilot)
+    {:ok, many} = Task.Supervisor.start_link()
+
+    for order <- [:start, {:start, []}, {:goto, 1.0, 1.0, nil}, {:formation, :wedge, 1.0}] do
+      asked = Task.Supervisor.async(many, fn -> Swarm.ask(id, order) end)
+      beats(id, 4)
+      assert {order, Task.await(asked)} == {order, nil}
+    end
+
+    assert Swarm.goto(id, {1, 1}) == {:error, "waiting_pilot does not answer"}
+    assert {:ok, line} = Swarm.tell(id, "ping")
+    assert line =~ "idle"
+    assert [link, pilot] == [Names.whereis(id, :link), Names.whereis(id, :pilot)]
+    :ok = :sys.resume(pilot)
+    assert :sys.get_state(pilot) |> elem(0) == :idle
+    assert Swarm.goto(id, {1, 1}) == :ok
+    assert state(id) == {Robot.Mission.Manual, :goto}
+  end
+
+  test "a drive that hangs holds up no heartbeat, and is not armed when it goes on" do
+    id = talking(:waiting_drive, arm: :manual)
+    drive = Names.whereis(id, :drive)
+    :ok = :sys.suspend(drive)
+
+    for order <- [:arm, :acknowledge] do
+      asked = Task.async(fn -> Swarm.ask(id, order) end)
+      # The drive tells nothing of the wheels either; how fresh its reports are is another matter.
+      beats(id, 2)
+      assert Task.await(asked) == {:error, "waiting_drive: the drive does not answer"}
+    end
+
+    :ok = :sys.resume(drive)
+    assert %{state: :disarmed} = Hal.Device.arming(drive)
+    eventually(fn -> Swarm.arm(id) == :ok end)
+  end
+
+  test "a pilot that is dead holds up no heartbeat" do
+    id = talking(:waiting_dead)
+    # Nobody is there to start another one.
+    supervisor = Names.whereis(id, :robot)
+    :ok = :sys.suspend(supervisor)
+    kill(id, :pilot)
+    asked = Task.async(fn -> Swarm.goto(id, {1, 1}) end)
+    beats(id, 4)
+    assert Task.await(asked) == {:error, "waiting_dead does not answer"}
+    :ok = :sys.resume(supervisor)
+    eventually(fn -> Names.whereis(id, :pilot) != nil and Directory.whereis(id) != nil end)
+    eventually(fn -> Swarm.goto(id, {1, 1}) == :ok end)
+  end
+
+  test "an order that comes to the pilot after an emergency stop is refused there" do
+    id = talking(:waiting_held)
+    pilot = Names.whereis(id, :pilot)
+    :ok = :sys.suspend(pilot)
+    asked = Task.async(fn -> Swarm.goto(id, {1, 1}) end)
+    waits? = &match?({:deliver, _delivery, {:command, {:goto, _, _, _}}}, &1)
+
+    eventually(fn ->
+      {:messages, messages} = Process.info(pilot, :messages)
+      Enum.any?(messages, waits?)
+    end)
+
+    assert Swarm.ask(id, :estop) == :ok
+    :ok = :sys.resume(pilot)
+    held = {:error, "waiting_held is held by the emergency stop; reset it first"}
+    assert Task.await(asked) == held
+    assert state(id) == :idle
+    assert Swarm.goto(id, {1, 1}) == held
+    assert Swarm.ask(id, :reset) == :ok
+    assert Swarm.goto(id, {1, 1}) == :ok
+  end
+
+  test "a robot that is to start a mission which is not there says so, and nothing falls" do
+    id = talking(:waiting_none, mission: {No.Such.Mission, []})
+    link = Names.whereis(id, :link)
+    assert Swarm.ask(id, :start) == {:error, "waiting_none has no such mission"}
+    assert Names.whereis(id, :link) == link
+  end
+end
