@@ -220,6 +220,49 @@ defmodule Swarm.MemberTest do
     Twist.zero?(twist)
   end
 
+  test "a touch stops a member that moves at once, and only one that moves" do
+    options = [id: :mag1, profile: Profile.magellan(), start: Pose.new(0, 0), mission: {Deaf, []}]
+    {member, []} = Member.step(Member.new(options), {:command, :start, 0})
+    member = sense(member, 100)
+    touch = {:reading, {:bumpers, [0]}, 220}
+    assert {_, []} = Member.step(member, touch)
+    {member, [{:drive, _}]} = Member.step(sense(member, 200), {:reflex, 200})
+    assert {member, [{:drive, %Twist{linear: still}}]} = Member.step(member, touch)
+    assert still == 0.0
+    assert %{driving: {%{limits: limits}, 220}} = member.entries
+    assert :bumper in limits
+  end
+
+  defmodule Watcher do
+    @moduledoc "A mission that tells how wide the camera saw."
+    @behaviour Robot.Mission
+
+    @impl Robot.Mission
+    def init(_robot, _options), do: {:watching, :watcher, []}
+
+    @impl Robot.Mission
+    def handle({:tick, percept}, _mission),
+      do: {:watching, :watcher, [{:stage, :seen, Map.take(percept, [:blobs_pan, :blobs_view])}]}
+
+    def handle(_event, mission), do: {:watching, mission, []}
+  end
+
+  test "a picture keeps the field of view it was taken with, though the camera zooms on" do
+    options = [
+      id: :mag1,
+      profile: Profile.magellan(),
+      start: Pose.new(0, 0),
+      mission: {Watcher, []}
+    ]
+
+    zoomed = {:reading, {:ptz, %{pan: 0.3, tilt: 0.0, field_of_view: 0.4}}, 50}
+    picture = {:blobs, [], %{at_ms: 0, pan: 0.2, tilt: 0.0, field_of_view: 0.5}}
+    {member, []} = Member.step(Member.new(options), picture)
+    {member, []} = Member.step(member, zoomed)
+    {_member, effects} = Member.step(member, {:tick, 100})
+    assert {:stage, :seen, %{blobs_pan: 0.2, blobs_view: 0.5}} in effects
+  end
+
   test "what people asked of the group's mission outlives a stop" do
     {member, []} = Member.step(member(), {:command, {:formation, :wedge, 1.2}, 0})
     {stopped, []} = Member.step(member, {:command, :stop, 100})

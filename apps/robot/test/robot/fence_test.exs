@@ -38,7 +38,7 @@ defmodule Robot.FenceTest do
     {way, _body} =
       Enum.map_reduce(0..round(seconds / @step_s), start, fn k, body ->
         at_ms = 50 * k
-        gate = Reflex.sense(body.gate, {:sonar, Body.silence(profile)}, at_ms)
+        {gate, _urgency} = Reflex.sense(body.gate, {:sonar, Body.silence(profile)}, at_ms)
 
         gate =
           if rem(k, 2) == 0 do
@@ -46,6 +46,7 @@ defmodule Robot.FenceTest do
 
             gate
             |> Reflex.sense({:odometry, odometry}, at_ms)
+            |> elem(0)
             |> Reflex.wish(wish.(body, k), at_ms)
           else
             gate
@@ -166,17 +167,17 @@ defmodule Robot.FenceTest do
   test "not knowing where it is, it stands, and may turn" do
     profile = Profile.magellan()
     room = fence({{-3, -2}, {3, 2}})
-    gate = gate(room, profile) |> Reflex.sense({:sonar, Body.silence(profile)}, 0)
+    gate = gate(room, profile) |> Reflex.sense({:sonar, Body.silence(profile)}, 0) |> elem(0)
     at_zero = {:odometry, %Odometry{pose: Pose.new(0, 0), twist: Twist.zero()}}
 
     drive = fn gate, at_ms ->
-      gate = Reflex.sense(gate, {:sonar, Body.silence(profile)}, at_ms)
+      {gate, _urgency} = Reflex.sense(gate, {:sonar, Body.silence(profile)}, at_ms)
       Reflex.step(Reflex.wish(gate, Twist.new(0.3, 0.3), at_ms), at_ms)
     end
 
     assert {%{linear: v, turn: turn}, limits, _} = drive.(gate, 0)
     assert v == 0.0 and turn > 0 and :fence in limits
-    known = Reflex.sense(gate, at_zero, 1_000)
+    {known, _urgency} = Reflex.sense(gate, at_zero, 1_000)
     assert {%{linear: v}, _, known} = drive.(known, 1_000)
     assert v > 0
     # For half a second; then it brakes.
@@ -196,7 +197,9 @@ defmodule Robot.FenceTest do
 
       gate
       |> Reflex.sense({:sonar, Body.silence(profile)}, at_ms)
+      |> elem(0)
       |> Reflex.sense({:odometry, odometry}, at_ms)
+      |> elem(0)
       |> Reflex.wish(Twist.new(0.3, 0.0), at_ms)
       |> Reflex.step(at_ms)
     end
@@ -228,7 +231,9 @@ defmodule Robot.FenceTest do
       {twist, _, _} =
         gate
         |> Reflex.sense({:sonar, Body.silence(profile)}, 0)
+        |> elem(0)
         |> Reflex.sense(odometry, 0)
+        |> elem(0)
         |> Reflex.wish(Twist.new(0.5, 0.0), 0)
         |> Reflex.step(0)
 

@@ -54,6 +54,7 @@ defmodule Robot.Body do
       body.reflex
       |> Reflex.wish(wish.twist, body.at_ms)
       |> Reflex.sense({:sonar, silence(body.profile)}, body.at_ms)
+      |> elem(0)
 
     Enum.reduce(1..2, %{body | reflex: reflex}, fn _, body ->
       {twist, _limits, reflex} = Reflex.step(body.reflex, body.at_ms)

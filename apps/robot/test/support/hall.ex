@@ -317,6 +317,7 @@ defmodule Robot.Hall do
         reflex =
           r.reflex
           |> Reflex.sense({:sonar, sonar}, hall.at_ms)
+          |> elem(0)
           |> Reflex.wish(wish.twist, hall.at_ms)
 
         {{id, %{r | controller: controller, reflex: reflex, by: wish}}, us + took}

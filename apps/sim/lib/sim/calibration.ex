@@ -136,7 +136,7 @@ defmodule Sim.Calibration do
     reflex =
       s.world
       |> World.readings(@id)
-      |> Enum.reduce(s.reflex, &Reflex.sense(&2, &1, s.world.at_ms))
+      |> Enum.reduce(s.reflex, &elem(Reflex.sense(&2, &1, s.world.at_ms), 0))
 
     %{s | reflex: reflex}
   end

@@ -191,7 +191,8 @@ defmodule Sim.Trial do
 
   defp look(%{options: %{blobs: :direct}} = trial) do
     each(trial, fn id, trial ->
-      blobs(trial, id, World.blobs(trial.world, id), pan(trial.world, id))
+      {:ptz, aim} = trial.world |> World.readings(id) |> List.keyfind(:ptz, 0)
+      see(trial, id, World.blobs(trial.world, id), aim)
     end)
   end
 
@@ -199,17 +200,12 @@ defmodule Sim.Trial do
     each(trial, fn id, trial ->
       frame = World.frame(trial.world, id)
       {:ok, blobs} = Vision.blobs(frame, trial.colours)
-      blobs(trial, id, blobs, frame.pan)
+      see(trial, id, blobs, Map.take(frame, [:pan, :tilt, :field_of_view]))
     end)
   end
 
-  defp blobs(trial, id, blobs, pan),
-    do: input(trial, id, {:blobs, blobs, %{at_ms: trial.at_ms, pan: pan}})
-
-  defp pan(world, id) do
-    {:ptz, %{pan: pan}} = world |> World.readings(id) |> List.keyfind(:ptz, 0)
-    pan
-  end
+  defp see(trial, id, blobs, aim),
+    do: input(trial, id, {:blobs, blobs, Map.put(aim, :at_ms, trial.at_ms)})
 
   defp inputs(trial, make),
     do: each(trial, fn id, trial -> input(trial, id, make.(trial.at_ms)) end)

@@ -197,7 +197,8 @@ defmodule Sim.World do
       bytes: Compute.paint(world.map, sight, poles(world, id), noise),
       at_ms: world.at_ms,
       pan: body.pan,
-      tilt: body.tilt
+      tilt: body.tilt,
+      field_of_view: body.field_of_view
     }
   end
 

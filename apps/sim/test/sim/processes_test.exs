@@ -1,7 +1,8 @@
 defmodule Sim.ProcessesTest do
   @moduledoc """
   The processes of a robot and `Swarm.Member.step/2` get the same input, a whole mission long, and
-  do the same: every speed, every message, every look, every stage.
+  do the same: every speed, every message, every look, every stage. On the way the camera zooms, its
+  pictures are 50 ms old, and the bumper is hit between two steps of the gate.
   """
   use Robot.Case, async: false
   alias Hal.Profile
@@ -42,7 +43,9 @@ defmodule Sim.ProcessesTest do
           Map.new([:drive, :ptz, :gate, :executive, :pilot, :link], &{&1, Names.whereis(@me, &1)}),
         at_ms: 0,
         looks: {nil, nil},
+        pictures: %{},
         compared: %{drive: 0, send: 0, look: 0, stage: 0},
+        hits: [],
         phases: MapSet.new()
       }
     }
@@ -83,16 +86,19 @@ defmodule Sim.ProcessesTest do
   end
 
   defp play(run) do
-    # The gate has stepped once, at its start.
-    run = run |> sync() |> step_twin()
+    # The gate told the wheels to stop, at its start.
+    run = sync(run)
+    flush([])
     run = Enum.reduce(@ids, run, &input(&2, &1, {:command, :start, 0}))
-    run = Enum.reduce(1..450, run, fn n, run -> run |> script(n) |> tenth() end)
+    run = Enum.reduce(1..450, run, fn n, run -> run |> script(n) |> tenth(n) end)
 
     assert run.compared.drive > 900
     assert run.compared.send > 100
     assert run.compared.look > 100
     assert run.compared.stage > 0
     assert :lead in run.phases or :follow in run.phases
+    ahead = for {before, now} <- run.hits, before > 0.0, do: now
+    assert ahead != [] and Enum.all?(ahead, &(&1 == 0.0))
   end
 
   # What a person does meanwhile.
@@ -107,19 +113,27 @@ defmodule Sim.ProcessesTest do
   end
 
   defp script(run, 350), do: %{run | world: World.move_landmark(run.world, {2.0, 1.0})}
+
+  # From 60 degrees to 40 and back.
+  defp script(run, n) when n in 100..119 or n in 130..149 do
+    angle = if n < 120, do: 60 - (n - 99), else: 40 + (n - 129)
+    %{run | world: World.zoom(run.world, @me, angle * :math.pi() / 180)}
+  end
+
   defp script(run, _n), do: run
 
   # As in `Sim.Trial.step/1`.
-  defp tenth(run) do
+  defp tenth(run, n) do
     run
     |> hear()
     |> sense()
     |> see()
     |> each(&{:tick, &1})
     |> each(&{:reflex, &1})
-    |> act()
+    |> act(n)
     |> hear()
     |> sense()
+    |> expose()
     |> each(&{:reflex, &1})
     |> act()
   end
@@ -139,45 +153,47 @@ defmodule Sim.ProcessesTest do
   end
 
   defp see(run) do
-    for id <- @ids, reduce: run do
-      run ->
-        {:ptz, %{pan: pan}} = run.world |> World.readings(id) |> List.keyfind(:ptz, 0)
-        blobs = World.blobs(run.world, id)
-        input(run, id, {:blobs, blobs, %{at_ms: run.at_ms, pan: pan}})
+    for {id, {blobs, meta}} <- run.pictures, reduce: run do
+      run -> input(run, id, {:blobs, blobs, meta})
     end
+  end
+
+  # What `see/1` hands on 50 ms later, when the camera may have zoomed further.
+  defp expose(run) do
+    pictures =
+      for id <- @ids do
+        {:ptz, aim} = run.world |> World.readings(id) |> List.keyfind(:ptz, 0)
+        {id, {World.blobs(run.world, id), Map.put(aim, :at_ms, run.at_ms)}}
+      end
+
+    %{run | pictures: pictures}
   end
 
   defp each(run, make),
     do: Enum.reduce(@ids, run, fn id, run -> input(run, id, make.(run.at_ms)) end)
 
-  defp act(run), do: %{run | world: World.step(run.world, 50), at_ms: run.at_ms + 50}
+  defp act(run, n) when rem(n, 40) == 0, do: run |> act_for(20) |> hit() |> act_for(30)
+  defp act(run, _n), do: act(run)
+
+  defp act(run), do: act_for(run, 50)
+  defp act_for(run, ms), do: %{run | world: World.step(run.world, ms), at_ms: run.at_ms + ms}
+
+  # The wheels' speed before and after: nothing waits for the gate's next step.
+  defp hit(run) do
+    before = run.world.robots[@me].wanted.linear
+    run = input(run, @me, {:reading, {:bumpers, [0]}, run.at_ms})
+    %{run | hits: [{before, run.world.robots[@me].wanted.linear} | run.hits]}
+  end
 
   defp input(run, @me, input) do
     :counters.put(run.clock, 1, run.at_ms)
     run = run |> feed(input) |> sync()
     {run, mine} = member(run, @me, input)
-    live = flush([])
-
-    # A gate that acts on arrival steps at once; in lockstep the next step is never far.
-    {run, mine} =
-      if elem(input, 0) != :reflex and Enum.any?(live, &match?({:drive, _}, &1)) do
-        {run, more} = member(run, @me, {:reflex, run.at_ms})
-        {run, mine ++ more}
-      else
-        {run, mine}
-      end
-
-    compare(run, input, live, mine)
+    compare(run, input, flush([]), mine)
   end
 
   defp input(run, id, input) do
     {run, _effects} = member(run, id, input)
-    run
-  end
-
-  defp step_twin(run) do
-    {run, _stop} = member(run, @me, {:reflex, 0})
-    flush([])
     run
   end
 

@@ -7,7 +7,7 @@ defmodule Swarm.Member do
   | input | from |
   |---|---|
   | `{:reading, reading, at_ms}` | the drive, the pan-tilt unit |
-  | `{:blobs, blobs, %{at_ms:, pan:}}` | the eye |
+  | `{:blobs, blobs, meta}` | the eye (`t:Vision.BlobDetector.meta/0`) |
   | `{:message, term, at_ms}` | another robot |
   | `{:command, command, at_ms}` | a person |
   | `{:tick, at_ms}` | the clock, 10 Hz: controller, then mission, then (5 Hz) the heartbeat |
@@ -74,7 +74,7 @@ defmodule Swarm.Member do
 
   @type input ::
           {:reading, Hal.Drive.reading() | Hal.Ptz.reading(), integer()}
-          | {:blobs, [Vision.Blob.t()], %{at_ms: integer(), pan: float()}}
+          | {:blobs, [Vision.Blob.t()], Vision.BlobDetector.meta()}
           | {:message, term(), integer()}
           | {:command, term(), integer()}
           | {:tick, integer()}
@@ -113,24 +113,24 @@ defmodule Swarm.Member do
   @doc "What a member does about one input."
   @spec step(t(), input()) :: {t(), [effect()]}
   def step(member, {:reading, {key, value} = reading, at_ms}) do
-    reflex = Reflex.sense(member.reflex, reading, at_ms)
-    {%{put(member, key, value, at_ms) | reflex: reflex}, []}
+    {reflex, urgency} = Reflex.sense(member.reflex, reading, at_ms)
+    react(%{put(member, key, value, at_ms) | reflex: reflex}, urgency, at_ms)
   end
 
-  def step(member, {:blobs, blobs, %{at_ms: at_ms, pan: pan}}),
-    do: {put(member, :blobs, %{blobs: blobs, pan: pan}, at_ms), []}
+  def step(member, {:blobs, blobs, %{at_ms: at_ms, pan: pan, field_of_view: view}}),
+    do: {put(member, :blobs, %{blobs: blobs, pan: pan, field_of_view: view}, at_ms), []}
 
   def step(member, {:message, term, at_ms}) do
     {heard, receiver} = Receiver.hear(member.receiver, term, at_ms)
 
     case heard do
       {:message, message} -> handle(%{member | receiver: receiver}, {:message, message})
-      _peer_or_nothing -> latch(member, receiver)
+      _peer_or_nothing -> latch(member, receiver, at_ms)
     end
   end
 
-  def step(%{receiver: receiver} = member, {:command, :estop, _at_ms}),
-    do: latch(member, %{receiver | stop: EStop.State.press(receiver.stop)})
+  def step(%{receiver: receiver} = member, {:command, :estop, at_ms}),
+    do: latch(member, %{receiver | stop: EStop.State.press(receiver.stop)}, at_ms)
 
   def step(%{receiver: receiver} = member, {:command, :reset, _at_ms}) do
     reflex = Reflex.reset(member.reflex)
@@ -145,7 +145,7 @@ defmodule Swarm.Member do
       do: {member, []}
 
   # Nothing that the mission could interpret, as in `Robot.Control.Pilot`.
-  def step(member, {:command, :stop, _at_ms}), do: {halt(member), []}
+  def step(member, {:command, :stop, at_ms}), do: halt(member, at_ms)
 
   def step(%{mission: nil} = member, {:command, :start, _at_ms}) do
     {member, begun} = resume(member)
@@ -166,11 +166,7 @@ defmodule Swarm.Member do
     {member, look ++ done ++ effects ++ beats}
   end
 
-  def step(member, {:reflex, at_ms}) do
-    {twist, limits, reflex} = Reflex.step(member.reflex, at_ms)
-    member = put(%{member | reflex: reflex}, :driving, %{twist: twist, limits: limits}, at_ms)
-    {member, [{:drive, twist}]}
-  end
+  def step(member, {:reflex, at_ms}), do: react(member, :now, at_ms)
 
   @doc "The pose that the robot believes to have, or `nil`."
   @spec pose(t()) :: Pose.t() | nil
@@ -194,6 +190,14 @@ defmodule Swarm.Member do
   @doc "Whether the mission lets the robot stand and wait, for a round, a leader or a person."
   @spec stands?(t()) :: boolean()
   def stands?(member), do: member.mission == nil or member.controller.tag == :stand
+
+  defp react(member, :later, _at_ms), do: {member, []}
+
+  defp react(member, :now, at_ms) do
+    {twist, limits, reflex} = Reflex.step(member.reflex, at_ms)
+    member = put(%{member | reflex: reflex}, :driving, %{twist: twist, limits: limits}, at_ms)
+    {member, [{:drive, twist}]}
+  end
 
   defp put(member, key, value, at_ms),
     do: %{member | entries: Map.put(member.entries, key, {value, at_ms})}
@@ -219,25 +223,35 @@ defmodule Swarm.Member do
   # The mission ends with it: after the reset nothing moves until somebody says so.
   defp latch(
          %{receiver: %{stop: %{latched?: false}}} = member,
-         %{stop: %{latched?: true}} = receiver
+         %{stop: %{latched?: true}} = receiver,
+         at_ms
        ) do
-    {halt(%{member | reflex: Reflex.estop(member.reflex), receiver: receiver}), []}
+    member = %{member | reflex: Reflex.estop(member.reflex), receiver: receiver}
+    {member, stopped} = react(member, :now, at_ms)
+    {member, forgotten} = halt(member, at_ms)
+    {member, stopped ++ forgotten}
   end
 
-  defp latch(member, receiver), do: {%{member | receiver: receiver}, []}
+  defp latch(member, receiver, _at_ms), do: {%{member | receiver: receiver}, []}
 
-  defp halt(member) do
-    %{
-      member
-      | controller:
-          member.controller |> Controller.goal(:idle, nil) |> Controller.anchors(%Anchors{}),
-        reflex: Reflex.forget(member.reflex),
-        halted: halted(member),
-        mission: nil,
-        phase: :idle,
-        claim: %{},
-        look: nil
-    }
+  defp halt(member, at_ms) do
+    {reflex, urgency} = Reflex.forget(member.reflex)
+
+    react(
+      %{
+        member
+        | controller:
+            member.controller |> Controller.goal(:idle, nil) |> Controller.anchors(%Anchors{}),
+          reflex: reflex,
+          halted: halted(member),
+          mission: nil,
+          phase: :idle,
+          claim: %{},
+          look: nil
+      },
+      urgency,
+      at_ms
+    )
   end
 
   defp halted(%{mission: nil, halted: halted}), do: halted

@@ -4,8 +4,8 @@ defmodule Robot.Safety.Gate do
   makes of the last one goes out; it waits for nobody. No wish for 200 ms, for whatever reason,
   and it stops the robot.
 
-  A touched bumper and whatever a sonar sees do not wait for the next step: while the robot moves,
-  the gate steps when they arrive.
+  Where `Robot.Safety.Reflex` says `:now`, as of a touched bumper or a sonar while the robot moves, the gate does
+  not wait for the next step.
 
   The e-stop latch is read at the start, so that a gate that restarts is as latched as it was.
   Only `reset/1`, a person's doing, clears it. Whenever the latch was set or cleared, by whomever, the gate applies the
@@ -96,9 +96,8 @@ defmodule Robot.Safety.Gate do
 
   def handle_cast({:forget, then}, s) do
     at_ms = heard(s, :forget)
-    moving? = not Twist.zero?(s.reflex.twist)
-    s = %{s | reflex: Reflex.forget(s.reflex)}
-    s = if moving?, do: step(s, at_ms), else: s
+    {reflex, urgency} = Reflex.forget(s.reflex)
+    s = react(%{s | reflex: reflex}, urgency, at_ms)
     with {m, f, a} <- then, do: apply(m, f, a)
     {:noreply, s}
   end
@@ -108,9 +107,8 @@ defmodule Robot.Safety.Gate do
 
   def handle_cast({:sense, reading}, s) do
     at_ms = heard(s, {:sense, reading})
-    moving? = not Twist.zero?(s.reflex.twist)
-    s = frame(s, Reflex.sense(s.reflex, reading, at_ms), at_ms)
-    {:noreply, if(moving? and urgent?(reading), do: step(s, at_ms), else: s)}
+    {reflex, urgency} = Reflex.sense(s.reflex, reading, at_ms)
+    {:noreply, s |> frame(reflex, at_ms) |> react(urgency, at_ms)}
   end
 
   @impl GenServer
@@ -162,10 +160,8 @@ defmodule Robot.Safety.Gate do
     end
   end
 
-  defp urgent?({:arming, _state}), do: true
-  defp urgent?({:bumpers, [_ | _]}), do: true
-  defp urgent?({:sonar, _ranges}), do: true
-  defp urgent?(_reading), do: false
+  defp react(s, :now, at_ms), do: step(s, at_ms)
+  defp react(s, :later, _at_ms), do: s
 
   defp step(s, at_ms) do
     Trace.input(s.config, :gate, :step, at_ms)

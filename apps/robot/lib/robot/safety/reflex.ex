@@ -3,6 +3,7 @@ defmodule Robot.Safety.Reflex do
   The gate before the wheels as a function: whatever is wished, what comes out is safe. It is no
   part of the market of wishes; it limits whoever won there. Pure: `wish/3` and `sense/3` tell it
   what happened, `step/2` (every 50 ms) says what the wheels may do now, and why it is less than wished.
+  A reading that must not wait for the next step makes `sense/3` say `:now`; so does `forget/1`.
 
   In this order, each with its name in `limits`:
 
@@ -32,6 +33,8 @@ defmodule Robot.Safety.Reflex do
   @lost_ms 500
   # No base drives or turns this fast: such a number is a fault of the one who wished.
   @absurd 100.0
+  # These set a speed to zero at once.
+  @stops [:estop, :disarmed, :dead_man, :refused, :bumper]
   # The step that accelerations are counted with is never longer than this, whatever the clock did.
   @longest_step_ms 200
 
@@ -50,7 +53,8 @@ defmodule Robot.Safety.Reflex do
                 frame: nil,
                 place: nil,
                 twist: %Twist{linear: 0.0, turn: 0.0},
-                at_ms: nil
+                at_ms: nil,
+                before: {%Twist{linear: 0.0, turn: 0.0}, nil}
               ]
 
   @type t :: %__MODULE__{
@@ -67,8 +71,12 @@ defmodule Robot.Safety.Reflex do
           frame: {:is, reference() | nil} | nil,
           place: {Pose.t(), integer()} | nil,
           twist: Twist.t(),
-          at_ms: integer() | nil
+          at_ms: integer() | nil,
+          before: {Twist.t(), integer() | nil}
         }
+
+  @typedoc "Whether the next `step/2` is due at once, or with the next period."
+  @type urgency :: :now | :later
 
   @type limit ::
           :estop
@@ -132,19 +140,37 @@ defmodule Robot.Safety.Reflex do
 
   defp sane?(number), do: is_number(number) and number > -@absurd and number < @absurd
 
-  @doc "Whoever wished is no more: stands until somebody else wishes, and at once, for nobody brakes gently now."
-  @spec forget(t()) :: t()
-  def forget(%__MODULE__{} = reflex), do: %{reflex | wish: nil, wish_at_ms: nil}
+  @doc """
+  Drops the wish: its author is gone, or a stop was ordered. A robot that moves stops `:now`, without a ramp.
+  """
+  @spec forget(t()) :: {t(), urgency()}
+  def forget(%__MODULE__{} = reflex),
+    do: {%{reflex | wish: nil, wish_at_ms: nil}, if(moving?(reflex), do: :now, else: :later)}
 
-  @doc "Takes a reading; those that no limit needs are ignored."
-  @spec sense(t(), Hal.Drive.reading() | term(), integer()) :: t()
-  def sense(%__MODULE__{} = reflex, {:sonar, ranges}, at_ms) when is_list(ranges),
+  @doc """
+  Takes a reading; those that no limit needs are ignored. While the robot moves, a touched bumper, whatever a
+  sonar sees and a change of arming ask for a step `:now`.
+  """
+  @spec sense(t(), Hal.Drive.reading() | term(), integer()) :: {t(), urgency()}
+  def sense(%__MODULE__{} = reflex, reading, at_ms) do
+    urgency = if moving?(reflex) and urgent?(reading), do: :now, else: :later
+    {note(reflex, reading, at_ms), urgency}
+  end
+
+  defp moving?(reflex), do: not Twist.zero?(reflex.twist)
+
+  defp urgent?({:arming, _state}), do: true
+  defp urgent?({:bumpers, [_ | _]}), do: true
+  defp urgent?({:sonar, _ranges}), do: true
+  defp urgent?(_reading), do: false
+
+  defp note(reflex, {:sonar, ranges}, at_ms) when is_list(ranges),
     do: %{reflex | sonar: Body.points(reflex.profile, ranges), sonar_at_ms: at_ms}
 
-  def sense(%__MODULE__{} = reflex, {:bumpers, pressed}, _at_ms) when is_list(pressed),
+  defp note(reflex, {:bumpers, pressed}, _at_ms) when is_list(pressed),
     do: %{reflex | bumpers: pressed}
 
-  def sense(%__MODULE__{fence: %Fence{}} = reflex, {:odometry, %Odometry{} = odometry}, at_ms) do
+  defp note(%{fence: %Fence{}} = reflex, {:odometry, %Odometry{} = odometry}, at_ms) do
     case reflex.frame || {:is, odometry.frame} do
       {:is, frame} when frame == odometry.frame ->
         place = {Pose.compose(reflex.start, odometry.pose), at_ms}
@@ -156,14 +182,14 @@ defmodule Robot.Safety.Reflex do
   end
 
   # What was wished before it was armed, or disarmed, counts no more.
-  def sense(%__MODULE__{armed?: before?} = reflex, {:arming, %{state: state}}, _at_ms) do
+  defp note(%{armed?: before?} = reflex, {:arming, %{state: state}}, _at_ms) do
     case state == :armed do
       ^before? -> reflex
       armed? -> %{reflex | armed?: armed?, wish: nil, wish_at_ms: nil}
     end
   end
 
-  def sense(%__MODULE__{} = reflex, _reading, _at_ms), do: reflex
+  defp note(reflex, _reading, _at_ms), do: reflex
 
   @doc "Latches the emergency stop."
   @spec estop(t()) :: t()
@@ -174,16 +200,28 @@ defmodule Robot.Safety.Reflex do
   @spec reset(t()) :: t()
   def reset(%__MODULE__{} = reflex), do: %{reflex | latched?: false}
 
-  @doc "What the wheels may do from now until the next step, and which limits made it less than wished."
+  @doc """
+  What the wheels may do from now until the next step, and which limits made it less than wished.
+
+  Of several steps at one time the last counts: the speed of the one before was in force for no time, so
+  that nothing is ramped from it. Only a stop holds for the rest of that millisecond.
+  """
   @spec step(t(), integer()) :: {Twist.t(), [limit()], t()}
-  def step(%__MODULE__{} = reflex, at_ms) do
+  def step(%__MODULE__{at_ms: at_ms, before: {twist, then_ms}} = reflex, at_ms),
+    do: decide(%{reflex | twist: twist, at_ms: then_ms}, at_ms)
+
+  def step(%__MODULE__{} = reflex, at_ms), do: decide(reflex, at_ms)
+
+  defp decide(reflex, at_ms) do
     {twist, limits} =
       case wanted(reflex, at_ms) do
         {:stop, limit} -> {Twist.zero(), [limit]}
         {linear, turn} -> limit(reflex, linear, turn, at_ms)
       end
 
-    {twist, limits, %{reflex | twist: twist, at_ms: at_ms}}
+    stopped? = Enum.any?(limits, &(&1 in @stops))
+    before = if stopped?, do: {twist, at_ms}, else: {reflex.twist, reflex.at_ms}
+    {twist, limits, %{reflex | twist: twist, at_ms: at_ms, before: before}}
   end
 
   defp wanted(%{latched?: true}, _at_ms), do: {:stop, :estop}

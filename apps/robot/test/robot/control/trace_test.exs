@@ -72,8 +72,11 @@ defmodule Robot.Control.TraceTest do
   end
 
   defp gate({:wish, twist}, at_ms, reflex), do: {[], Reflex.wish(reflex, twist, at_ms)}
-  defp gate({:sense, reading}, at_ms, reflex), do: {[], Reflex.sense(reflex, reading, at_ms)}
-  defp gate(:forget, _at_ms, reflex), do: {[], Reflex.forget(reflex)}
+
+  defp gate({:sense, reading}, at_ms, reflex),
+    do: {[], elem(Reflex.sense(reflex, reading, at_ms), 0)}
+
+  defp gate(:forget, _at_ms, reflex), do: {[], elem(Reflex.forget(reflex), 0)}
   defp gate(:estop, _at_ms, reflex), do: {[], Reflex.estop(reflex)}
   defp gate(:reset, _at_ms, reflex), do: {[], Reflex.reset(reflex)}
 

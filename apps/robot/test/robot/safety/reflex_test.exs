@@ -6,7 +6,7 @@ defmodule Robot.Safety.ReflexTest do
   alias Robot.Safety.Reflex
 
   defp gate(profile \\ Profile.magellan()),
-    do: profile |> Reflex.new() |> Reflex.sense({:sonar, Body.silence(profile)}, 0)
+    do: profile |> Reflex.new() |> Reflex.sense({:sonar, Body.silence(profile)}, 0) |> elem(0)
 
   # Wishes and steps each 50 ms; gives the last twist, its limits and the gate.
   defp run(reflex, twist, from_ms, steps) do
@@ -15,6 +15,7 @@ defmodule Robot.Safety.ReflexTest do
 
       reflex
       |> Reflex.sense({:sonar, Body.silence(reflex.profile)}, at_ms)
+      |> elem(0)
       |> Reflex.wish(twist, at_ms)
       |> Reflex.step(at_ms)
     end)
@@ -54,7 +55,10 @@ defmodule Robot.Safety.ReflexTest do
 
   test "when whoever wished is no more, it stands at once, not by a ramp" do
     {_, _, reflex} = run(gate(), Twist.new(0.5, 1.0), 0, 30)
-    assert {twist, [:dead_man], reflex} = reflex |> Reflex.forget() |> Reflex.step(1_500)
+
+    assert {twist, [:dead_man], reflex} =
+             reflex |> Reflex.forget() |> elem(0) |> Reflex.step(1_500)
+
     assert Twist.zero?(twist)
     assert {%Twist{linear: v}, _, _} = run(reflex, Twist.new(0.5, 0.0), 1_550, 1)
     assert v > 0
@@ -64,10 +68,10 @@ defmodule Robot.Safety.ReflexTest do
     {_, _, reflex} = run(gate(), Twist.new(0.5, 1.0), 0, 30)
 
     for state <- [:disarmed, {:error, :unplugged}] do
-      stopped = Reflex.sense(reflex, {:arming, %{state: state, why: nil}}, 1_500)
+      {stopped, _urgency} = Reflex.sense(reflex, {:arming, %{state: state, why: nil}}, 1_500)
       assert {twist, [:disarmed], stopped} = run(stopped, Twist.new(0.5, 1.0), 1_500, 10)
       assert Twist.zero?(twist)
-      armed = Reflex.sense(stopped, {:arming, %{state: :armed, why: nil}}, 2_000)
+      {armed, _urgency} = Reflex.sense(stopped, {:arming, %{state: :armed, why: nil}}, 2_000)
       assert {first, [:acceleration | _], _} = run(armed, Twist.new(0.5, 1.0), 2_000, 1)
       assert first == Twist.new(0.025, 0.05)
       # The latch is stronger, and told first.
@@ -88,7 +92,7 @@ defmodule Robot.Safety.ReflexTest do
           {4, :none}
         ] do
       {_, _, reflex} = run(gate(), Twist.new(0.3, 0.2), 0, 20)
-      touched = Reflex.sense(reflex, {:bumpers, [segment]}, 1000)
+      {touched, _urgency} = Reflex.sense(reflex, {:bumpers, [segment]}, 1000)
       {ahead, limits, _} = run(touched, Twist.new(0.3, 0.2), 1000, 1)
       assert ahead.linear == if(stops == :ahead, do: 0.0, else: 0.3)
       assert :bumper in limits == (stops == :ahead)
@@ -98,6 +102,44 @@ defmodule Robot.Safety.ReflexTest do
     end
   end
 
+  test "while it moves, a touch, what a sonar sees, arming and a wish that is gone do not wait" do
+    {_, _, moving} = run(gate(), Twist.new(0.3, 0.2), 0, 20)
+    near = List.duplicate(0.1, 16)
+
+    for {reading, urgency} <- [
+          {{:bumpers, [0]}, :now},
+          {{:bumpers, []}, :later},
+          {{:sonar, near}, :now},
+          {{:arming, %{state: :disarmed, why: nil}}, :now},
+          {{:power, 24.0}, :later}
+        ] do
+      assert {_, ^urgency} = Reflex.sense(moving, reading, 1_010)
+      assert {_, :later} = Reflex.sense(gate(), reading, 1_010)
+    end
+
+    assert {_, :now} = Reflex.forget(moving)
+    assert {_, :later} = Reflex.forget(gate())
+  end
+
+  test "of several steps at one time the last counts, but a stop holds" do
+    {_, _, reflex} = run(gate(), Twist.new(0.3, 0.0), 0, 4)
+    {_, _, once} = reflex |> Reflex.wish(Twist.new(0.0, 0.5), 200) |> Reflex.step(200)
+
+    twice =
+      Reflex.step(Reflex.wish(elem(Reflex.step(reflex, 200), 2), once.wish |> twist(), 200), 200)
+
+    assert elem(twice, 0) == once.twist
+
+    {touched, :now} = Reflex.sense(reflex, {:bumpers, [0]}, 200)
+    {%Twist{linear: still}, _, touched} = Reflex.step(touched, 200)
+    {let_go, _} = Reflex.sense(touched, {:bumpers, []}, 200)
+    assert {%Twist{linear: ^still}, _, let_go} = Reflex.step(let_go, 200)
+    assert still == 0.0
+    assert {%Twist{linear: 0.025}, _, _} = Reflex.step(let_go, 250)
+  end
+
+  defp twist({linear, turn}), do: Twist.new(linear, turn)
+
   test "stops before what the sonars see in the direction of motion, and turns freely there" do
     for profile <- [Profile.magellan(), Profile.atrv_mini()] do
       ahead = Enum.find_index(profile.sonars, &(abs(&1.heading) < 0.01))
@@ -106,7 +148,7 @@ defmodule Robot.Safety.ReflexTest do
         Enum.reduce(0..600, {3.0, gate(profile)}, fn k, {gap, reflex} ->
           from_sonar = gap + profile.radius - Enum.at(profile.sonars, ahead).x
           sonar = List.replace_at(Body.silence(profile), ahead, from_sonar)
-          reflex = Reflex.sense(reflex, {:sonar, sonar}, 50 * k)
+          {reflex, _urgency} = Reflex.sense(reflex, {:sonar, sonar}, 50 * k)
           reflex = Reflex.wish(reflex, Twist.new(0.5, 0.3), 50 * k)
           {twist, _, reflex} = Reflex.step(reflex, 50 * k)
           assert k < 10 or twist.turn == 0.3
@@ -117,7 +159,7 @@ defmodule Robot.Safety.ReflexTest do
       assert gap < 0.18
 
       sonar = List.replace_at(Body.silence(profile), ahead, 0.1)
-      reflex = profile |> Reflex.new() |> Reflex.sense({:sonar, sonar}, 0)
+      reflex = profile |> Reflex.new() |> Reflex.sense({:sonar, sonar}, 0) |> elem(0)
       {twist, _, _} = reflex |> Reflex.wish(Twist.new(-0.3, 0), 0) |> Reflex.step(0)
       assert twist.linear < 0
       {twist, limits, _} = reflex |> Reflex.wish(Twist.new(0.3, 0), 0) |> Reflex.step(0)
@@ -175,7 +217,7 @@ defmodule Robot.Safety.ReflexTest do
             do: Reflex.wish(reflex, Enum.random([nil, :go, %{}, 7]), at_ms),
             else: reflex
 
-        reflex = reflex |> Reflex.sense(reading(profile), at_ms)
+        reflex = reflex |> Reflex.sense(reading(profile), at_ms) |> elem(0)
         reflex = if :rand.uniform(30) == 1, do: Reflex.estop(reflex), else: reflex
         reflex = if :rand.uniform(20) == 1, do: Reflex.reset(reflex), else: reflex
         since = reflex.at_ms

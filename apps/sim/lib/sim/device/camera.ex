@@ -64,8 +64,8 @@ defmodule Sim.Device.Camera do
         {:frame, %{World.frame(world, robot) | at_ms: at_ms}}
 
       :direct ->
-        %{pan: pan, tilt: tilt} = Map.fetch!(world.robots, robot)
-        {:blobs, World.blobs(world, robot), %{at_ms: at_ms, pan: pan, tilt: tilt}}
+        aim = world.robots |> Map.fetch!(robot) |> Map.take([:pan, :tilt, :field_of_view])
+        {:blobs, World.blobs(world, robot), Map.put(aim, :at_ms, at_ms)}
     end
   end
 end
