@@ -13,7 +13,7 @@ defmodule Robot.Board do
   | `:blobs` | `:eye` | `%{blobs: [blob], pan: radians, field_of_view: radians or nil}`, at the time of the picture |
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, since when |
   | `{:peer, id}` | `:link` | as in `Robot.Percept` |
-  | `:estop` | `:brake` | the number of the last e-stop, and of the last one cleared here |
+  | `:estop` | `:brake` | how the emergency stop stands, as its one owner publishes it: the last number known, the last one cleared here, the calls heard |
   | `:radio` | `:link` | what was sent, heard, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
   | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Safety.Reflex.frame/1` |
