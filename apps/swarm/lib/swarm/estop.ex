@@ -47,7 +47,7 @@ defmodule Swarm.EStop do
   @doc "A call to stop came from a node, by datagram: for all robots of this one."
   @spec hear(node(), term()) :: :ok
   def hear(_node, {:estop, call, age_ms} = term) do
-    if EStop.State.call?(call) and EStop.State.age?(age_ms),
+    if EStop.Calls.call?(call) and EStop.Calls.age?(age_ms),
       do: Enum.each(Names.all(:brake), &GenServer.cast(&1, term))
 
     :ok

@@ -96,6 +96,31 @@ defmodule Hal.Device.ArmingTest do
     assert Device.arm(pid) == :ok
   end
 
+  test "who hands an order on does not wait, and the device answers for it, but for one that is too late" do
+    pid = drive([], arm: :manual)
+    :ok = :sys.suspend(pid)
+    now_ms = System.monotonic_time(:millisecond)
+    answer = fn name -> {__MODULE__, :answer, [self(), name]} end
+    assert Device.order_later(pid, :arm, now_ms, answer.(:late)) == :ok
+    assert Device.order_later(pid, :disarm, now_ms + 60_000, answer.(:disarmed)) == :ok
+    assert Device.order_later(pid, :arm, now_ms + 60_000, answer.(:armed)) == :ok
+    refute_received {:late, _answer}
+    :ok = :sys.resume(pid)
+    assert_receive {:late, {:error, "the drive answers too late"}}
+    assert_receive {:disarmed, :ok}
+    assert_receive {:armed, :ok}
+    assert Device.arming(pid).state == :armed
+
+    ptz =
+      start_supervised!({Device, kind: :ptz, driver: {Hal.FakePtz, test: self(), device: :ptz}})
+
+    Device.order_later(ptz, :arm, now_ms + 60_000, answer.(:ptz))
+    assert_receive {:ptz, {:error, "a ptz has no wheels that could be armed"}}
+  end
+
+  @doc false
+  def answer(test, name, answer), do: send(test, {name, answer})
+
   defp drive(options, device \\ []) do
     driver = {Hal.FakeDrive, [test: self(), device: :drive] ++ options}
     device = [kind: :drive, driver: driver, sinks: [{Kernel, :send, [self()]}]] ++ device

@@ -92,7 +92,7 @@ defmodule Swarm.EStop.Actions do
   @doc "A call to stop was heard, from wherever."
   @spec called(t(), call :: term(), age_ms :: term()) :: t()
   def called(s, call, age_ms) do
-    with true <- EStop.State.call?(call) and EStop.State.age?(age_ms),
+    with true <- EStop.Calls.call?(call) and EStop.Calls.age?(age_ms),
          stop when stop != s.stop <- EStop.State.call(s.stop, call) do
       if over?(s, age_ms) do
         write(%{s | stop: EStop.State.late(s.stop, call)})

@@ -4,15 +4,15 @@ defmodule Swarm.EStop.Broadcaster do
 
   `sound/0` sends a call to stop to every robot's e-stop process in the directory and, by signed datagrams, to every
   node. That happens at once, in the caller; this process then repeats it, ten times in all, one
-  each 100 ms, whatever has become of the caller. Every call has an identity (`t:Swarm.EStop.State.call/0`),
+  each 100 ms, whatever has become of the caller. Every call has an identity (`t:Swarm.EStop.Calls.call/0`),
   so that a robot obeys it once, and an age, counted by
   those who have it: what is older than a person's reset does not stop the robot again. Whoever hears a call for the first time passes it on, so that it also
   reaches those that hear him but not its sender. A reset ends the repeats, so that a robot that is
   switched on afterwards is not stopped by one.
   """
   use GenServer
-  alias Swarm.{Directory, EStop, Nonblocking}
-  alias Swarm.Message.WireTypes
+  alias Swarm.{Directory, Nonblocking}
+  alias Swarm.EStop.Calls
 
   @times 10
   @passed_on 3
@@ -25,7 +25,7 @@ defmodule Swarm.EStop.Broadcaster do
   def start_link(_options), do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
 
   @doc "Calls all robots to stop, and returns the call's identity."
-  @spec sound() :: EStop.State.call()
+  @spec sound() :: Calls.call()
   def sound do
     call = {node(), boot(), System.unique_integer([:positive, :monotonic])}
     send_out(call, 0)
@@ -34,38 +34,35 @@ defmodule Swarm.EStop.Broadcaster do
   end
 
   @doc "Passes on a call that was heard; one of this node's own is being repeated anyway."
-  @spec pass_on(EStop.State.call(), age_ms :: non_neg_integer()) :: :ok
+  @spec pass_on(Calls.call(), age_ms :: non_neg_integer()) :: :ok
   def pass_on({node, _boot, _counter}, _age_ms) when node == node(), do: :ok
   def pass_on(call, age_ms), do: GenServer.cast(__MODULE__, {:pass_on, call, age_ms})
 
   @doc "A person has reset what these calls stopped: they are repeated no more."
-  @spec quiet(:all | [{node(), {integer(), integer()}}]) :: :ok
+  @spec quiet(:all | Calls.t()) :: :ok
   def quiet(calls), do: GenServer.cast(__MODULE__, {:quiet, calls})
 
   @impl GenServer
   def init([]) do
     Process.flag(:priority, :high)
-    {:ok, %{left: %{}, heard: %EStop.State{}}}
+    {:ok, %{left: %{}, heard: []}}
   end
 
   # It has a name that connected nodes can send to, so anything may come here.
   @impl GenServer
   def handle_cast({:repeat, call, times}, s) when times in 1..@times,
-    do: {:noreply, if(EStop.State.call?(call), do: repeat(s, call, times, now()), else: s)}
+    do: {:noreply, if(Calls.call?(call), do: repeat(s, call, times, now()), else: s)}
 
   def handle_cast({:pass_on, call, age_ms}, s) do
-    whole? = EStop.State.call?(call) and EStop.State.age?(age_ms)
+    whole? = Calls.call?(call) and Calls.age?(age_ms)
     {:noreply, if(whole?, do: pass_on(s, call, age_ms), else: s)}
   end
 
   def handle_cast({:quiet, :all}, s), do: {:noreply, %{s | left: %{}}}
 
   def handle_cast({:quiet, calls}, s) do
-    heard = %EStop.State{
-      calls: if(WireTypes.list?(calls, &match?({_, {_, _}}, &1)), do: calls, else: [])
-    }
-
-    over = for {call, _times} <- s.left, EStop.State.call(heard, call) == heard, do: call
+    calls = if Calls.heard?(calls), do: calls, else: []
+    over = for {call, _times} <- s.left, match?({false, _same}, Calls.hear(calls, call)), do: call
     {:noreply, %{s | left: Map.drop(s.left, over)}}
   end
 
@@ -92,11 +89,11 @@ defmodule Swarm.EStop.Broadcaster do
 
   # Many robots of this node may have heard it.
   defp pass_on(s, call, age_ms) do
-    case EStop.State.call(s.heard, call) do
-      heard when heard == s.heard ->
+    case Calls.hear(s.heard, call) do
+      {false, _heard} ->
         s
 
-      heard ->
+      {true, heard} ->
         send_out(call, age_ms)
         repeat(%{s | heard: heard}, call, @passed_on - 1, now() - age_ms)
     end

@@ -7,26 +7,20 @@ defmodule Swarm.EStop.State do
   has cleared here. So one that a person has reset is not caught again by a neighbour that nobody
   has reset yet, and one that joins a fleet whose stop is long cleared is not stopped by it.
 
-  A call to stop (`Swarm.EStop.Broadcaster`) is sent many times, and comes by several ways. `calls` remembers the
-  last one of each node's life, so that a late repeat does not latch again what a person has reset.
+  `calls` remembers which calls to stop were heard (`Swarm.EStop.Calls`), so that a late repeat does not latch again
+  what a person has reset.
   """
-  alias Swarm.Message.WireTypes
+  alias Swarm.EStop.Calls
 
   @leap 100_000
-  @callers 64
-  # Boots are times in ms, or, on clocks that count finer, in ns.
-  @latest 0xFFFFFFFFFFFFFFFF
 
   defstruct known: 0, cleared: 0, latched?: false, calls: []
-
-  @typedoc "Which call to stop it is: who calls, that node's life, and the how manieth of its calls."
-  @type call :: {node(), boot :: integer(), counter :: integer()}
 
   @type t :: %__MODULE__{
           known: non_neg_integer(),
           cleared: non_neg_integer(),
           latched?: boolean(),
-          calls: [{node(), {boot :: integer(), counter :: integer()}}]
+          calls: Calls.t()
         }
 
   @doc "No stop known; `latched?` when the robot's own latch has survived a restart."
@@ -54,17 +48,12 @@ defmodule Swarm.EStop.State do
       iex> stop |> Swarm.EStop.State.reset() |> Swarm.EStop.State.call(call) |> Map.fetch!(:latched?)
       false
   """
-  @spec call(t(), call()) :: t()
-  def call(%__MODULE__{} = stop, {node, boot, counter}) do
-    # Of each life of a node on its own: repeats of its calls in two lives would else take each
-    # other for new, and robots would pass them on to each other for ever.
-    case Enum.split_with(stop.calls, &match?({^node, {^boot, _last}}, &1)) do
-      {[{_node, {_boot, last}} | _], _others} when counter <= last ->
-        stop
-
-      {_before, others} ->
-        stop = %{stop | calls: Enum.take([{node, {boot, counter}} | others], @callers)}
-        if stop.latched?, do: stop, else: press(stop)
+  @spec call(t(), Calls.call()) :: t()
+  def call(%__MODULE__{} = stop, call) do
+    case Calls.hear(stop.calls, call) do
+      {false, _calls} -> stop
+      {true, calls} when stop.latched? -> %{stop | calls: calls}
+      {true, calls} -> press(%{stop | calls: calls})
     end
   end
 
@@ -77,26 +66,8 @@ defmodule Swarm.EStop.State do
       iex> Swarm.EStop.State.call(stop, call).latched?
       false
   """
-  @spec late(t(), call()) :: t()
-  def late(%__MODULE__{} = stop, call), do: %{stop | calls: call(stop, call).calls}
-
-  @doc "Whether a term from outside can be the age of a call, in ms: a day at most."
-  @spec age?(term()) :: boolean()
-  def age?(term), do: is_integer(term) and term in 0..86_400_000
-
-  @doc """
-  Whether a term from outside is a call to stop.
-
-      iex> for term <- [{:base@hall, 1, 1}, {nil, 1, 1}, {:base@hall, 1}], do: Swarm.EStop.State.call?(term)
-      [true, false, false]
-  """
-  @spec call?(term()) :: boolean()
-  def call?({node, boot, counter}),
-    do: WireTypes.name?(node) and number?(boot) and number?(counter)
-
-  def call?(_other), do: false
-
-  defp number?(number), do: is_integer(number) and number in 0..@latest
+  @spec late(t(), Calls.call()) :: t()
+  def late(%__MODULE__{} = stop, call), do: %{stop | calls: elem(Calls.hear(stop.calls, call), 1)}
 
   @doc """
   Follows the latch of the robot, which its gate's own buttons set and clear too: a stop pressed

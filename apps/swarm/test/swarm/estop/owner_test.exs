@@ -4,6 +4,8 @@ defmodule Swarm.EStop.OwnerTest do
   @moduletag :capture_log
   alias Swarm.EStop
 
+  doctest Swarm.EStop.Calls
+
   defp latched?(id), do: Board.latched?(Board.find!(id))
 
   defp stop_of(id) do
