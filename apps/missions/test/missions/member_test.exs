@@ -153,7 +153,7 @@ defmodule Swarm.MemberTest do
       before = member()
       later = hear(before, term)
       assert later.receiver.rejected == %{reason => 1}, inspect(term, limit: 5)
-      assert later.mission == before.mission
+      assert later.runner == before.runner
     end
   end
 
@@ -171,7 +171,7 @@ defmodule Swarm.MemberTest do
 
     two = hear(member(:mag3), pressed)
     assert two.receiver.stop == one.receiver.stop
-    assert sense(two, 100).phase == :idle
+    assert sense(two, 100).runner.phase == :idle
     {_, [{:drive, twist}]} = Member.step(two, {:reflex, 100})
     assert Twist.zero?(twist)
 
@@ -205,7 +205,8 @@ defmodule Swarm.MemberTest do
     assert v > 0
 
     {stopped, []} = Member.step(rolling, {:command, :stop, 200})
-    assert %{phase: :idle, mission: nil, claim: %{}} = stopped
+    assert %{phase: :idle, module: nil, mission: nil, claim: claim} = stopped.runner
+    assert claim == %{}
     assert Member.stands?(stopped)
     assert stands?(stopped, 200)
     {stopped, []} = Member.step(stopped, {:command, {:formation, :wedge, 1.0}, 300})
@@ -267,8 +268,8 @@ defmodule Swarm.MemberTest do
     {member, []} = Member.step(member(), {:command, {:formation, :wedge, 1.2}, 0})
     {stopped, []} = Member.step(member, {:command, :stop, 100})
     {started, []} = Member.step(stopped, {:command, :start, 200})
-    assert %{formation: {:wedge, 1.2}, started?: true} = started.mission
-    assert sense(started, 300).phase == :search
+    assert %{formation: {:wedge, 1.2}, started?: true} = started.runner.mission
+    assert sense(started, 300).runner.phase == :search
   end
 
   test "while it is stopped no command but stop is taken" do

@@ -160,7 +160,7 @@ defmodule Swarm.OrdersTest do
     :ok = :sys.resume(pilot)
     assert Task.await(answer) == :ok
     assert {Missions.Landmark, _phase} = state(id)
-    {_state, %{mission: mission}} = :sys.get_state(pilot)
+    {_state, %{runner: %{mission: mission}}} = :sys.get_state(pilot)
     assert {:wedge, _spacing} = mission.formation
   end
 
@@ -286,7 +286,7 @@ defmodule Swarm.OrdersTest do
       assert Swarm.formation(:wedge, spacing: 1.2) == :ok
       assert Swarm.stop(id) == :ok
       assert Swarm.start(robots: [id]) == :ok
-      {_state, %{mission: mission}} = :sys.get_state(Names.whereis(id, :pilot))
+      {_state, %{runner: %{mission: mission}}} = :sys.get_state(Names.whereis(id, :pilot))
       assert mission.formation == {:wedge, 1.2}
     end
   end

@@ -1,7 +1,7 @@
 defmodule Robot.Mission do
   @moduledoc """
-  What a robot is up to over minutes: a pure state machine, run by `Robot.Control.Pilot` in real time and
-  by simulations in lockstep. It sends nothing, keeps no timers and reads no clock: deadlines are
+  What a robot is up to over minutes: a pure state machine, run (`Robot.Mission.Runner`) by `Robot.Control.Pilot`
+  in real time and by simulations in lockstep. It sends nothing, keeps no timers and reads no clock: deadlines are
   integers, compared with `percept.at_ms` at each tick.
 
   A stop is not for the mission: the pilot ends it, and hands it nothing more. What is left of it for the
@@ -24,12 +24,19 @@ defmodule Robot.Mission do
     * `{:stage, name, map}` - something worth telling people happened
   """
   @type effect ::
-          {:goal, tag :: term(), Robot.Behaviour.t() | {module(), keyword()} | nil}
-          | {:anchors, Robot.Localiser.Anchors.t()}
-          | {:look, pan :: float()}
+          order()
           | {:send, to :: atom() | [atom()] | :all, struct()}
           | {:claim, map()}
           | {:stage, atom(), map()}
+
+  @typedoc "An effect that the controller carries out (`Robot.Control.Controller.obey/2`)."
+  @type order ::
+          {:goal, tag :: term(), Robot.Behaviour.t() | {module(), keyword()} | nil}
+          | {:anchors, Robot.Localiser.Anchors.t()}
+          | {:look, pan :: float() | nil}
+
+  @doc "Whether an effect is for the controller."
+  defguard is_order(effect) when elem(effect, 0) in [:goal, :anchors, :look]
 
   @type result :: {phase :: term(), mission :: term(), [effect()]}
 

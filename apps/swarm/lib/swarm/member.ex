@@ -18,56 +18,32 @@ defmodule Swarm.Member do
   alias Hal.{Pose, Profile, Twist}
   alias Robot.Percept
   alias Robot.Control.Controller
+  alias Robot.Mission.Runner
   alias Robot.Safety.Reflex
-  alias Robot.Localiser.Anchors
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Comms.Receiver
+  import Robot.Mission, only: [is_order: 1]
 
   @beat_ms 200
 
-  @enforce_keys [
-    :id,
-    :profile,
-    :boot,
-    :module,
-    :options,
-    :mission,
-    :controller,
-    :reflex,
-    :receiver
-  ]
-  defstruct @enforce_keys ++
-              [
-                phase: :idle,
-                halted: nil,
-                entries: %{},
-                claim: %{},
-                look: nil,
-                sequence: 0,
-                beat_ms: nil
-              ]
+  @enforce_keys [:id, :profile, :boot, :mission, :runner, :controller, :reflex, :receiver]
+  defstruct @enforce_keys ++ [entries: %{}, sequence: 0, beat_ms: nil]
 
   @typedoc """
-  `mission` is `nil` between a stop and the next start, and `halted` what is left of it for that
-  (`c:Robot.Mission.halted/1`). `entries` is what was sensed last, by name, and when; `phase`, `claim` and `look` are what the
-  mission said last; `receiver` is what was heard: peers, emergency stop, rejected messages.
+  `mission` is the one that a start begins, `runner` how it stands; `entries` is what was sensed last, by name,
+  and when; `receiver` is what was heard: peers, emergency stop, rejected messages.
   """
   @type t :: %__MODULE__{
           id: atom(),
           profile: Profile.t(),
           boot: non_neg_integer(),
-          module: module(),
-          options: keyword(),
-          mission: term() | nil,
-          halted: term() | nil,
+          mission: {module(), keyword()},
+          runner: Runner.t(),
           controller: Controller.t(),
           reflex: Reflex.t(),
           receiver: Receiver.t(),
-          phase: term(),
           entries: %{atom() => {term(), integer()}},
-          claim: map(),
-          look: float() | nil,
           sequence: non_neg_integer(),
           beat_ms: integer() | nil
         }
@@ -94,16 +70,14 @@ defmodule Swarm.Member do
   def new(options) do
     options = Keyword.validate!(options, [:id, :profile, :start, :mission, boot: 1])
     {module, mission_options} = options[:mission]
-    {phase, mission, []} = module.init(options[:id], mission_options)
+    {runner, []} = options[:id] |> Runner.new() |> Runner.start(module, mission_options)
 
     %__MODULE__{
       id: options[:id],
       profile: options[:profile],
       boot: options[:boot],
-      module: module,
-      options: mission_options,
-      mission: mission,
-      phase: phase,
+      mission: options[:mission],
+      runner: runner,
       controller: Controller.new(profile: options[:profile], start: options[:start]),
       reflex: Reflex.new(options[:profile]),
       receiver: Receiver.new(options[:id])
@@ -147,8 +121,16 @@ defmodule Swarm.Member do
   # Nothing that the mission could interpret, as in `Robot.Control.Pilot`.
   def step(member, {:command, :stop, at_ms}), do: halt(member, at_ms)
 
-  def step(%{mission: nil} = member, {:command, :start, _at_ms}) do
-    {member, begun} = resume(member)
+  def step(%{runner: %{module: nil}} = member, {:command, :start, _at_ms}) do
+    {module, options} = member.mission
+
+    {runner, begun} =
+      case Runner.resume(member.runner) do
+        {:ok, runner} -> {runner, []}
+        {:error, :idle} -> Runner.start(member.runner, module, options)
+      end
+
+    {member, begun} = carry_out(begun, %{member | runner: runner})
     {member, effects} = handle(member, {:command, :start})
     {member, begun ++ effects}
   end
@@ -159,11 +141,10 @@ defmodule Swarm.Member do
     {wish, outcome, controller} = Controller.tick(member.controller, percept(member, at_ms))
     reflex = Reflex.wish(member.reflex, wish.twist, at_ms)
     member = %{member | controller: controller, reflex: reflex}
-    {member, done} = if outcome, do: handle(member, outcome(outcome)), else: {member, []}
+    {member, done} = ended(member, outcome)
     {member, effects} = handle(member, {:tick, Controller.percept(controller)})
     {member, beats} = beat(member, at_ms)
-    look = for pan <- List.wrap(wish.look || member.look), do: {:look, pan, 0.0}
-    {member, look ++ done ++ effects ++ beats}
+    {member, look(wish.look) ++ done ++ effects ++ beats}
   end
 
   def step(member, {:reflex, at_ms}), do: react(member, :now, at_ms)
@@ -185,11 +166,11 @@ defmodule Swarm.Member do
 
   @doc "What the robot's mission says of it: its phase and the fields of `Swarm.Membership.Heartbeat`."
   @spec claim(t()) :: map()
-  def claim(member), do: member.claim
+  def claim(member), do: member.runner.claim
 
   @doc "Whether the mission lets the robot stand and wait, for a round, a leader or a person."
   @spec stands?(t()) :: boolean()
-  def stands?(member), do: member.mission == nil or member.controller.tag == :stand
+  def stands?(member), do: Runner.state(member.runner) == :idle or member.controller.tag == :stand
 
   defp react(member, :later, _at_ms), do: {member, []}
 
@@ -236,54 +217,35 @@ defmodule Swarm.Member do
 
   defp halt(member, at_ms) do
     {reflex, urgency} = Reflex.forget(member.reflex)
-
-    react(
-      %{
-        member
-        | controller:
-            member.controller |> Controller.goal(:idle, nil) |> Controller.anchors(%Anchors{}),
-          reflex: reflex,
-          halted: halted(member),
-          mission: nil,
-          phase: :idle,
-          claim: %{},
-          look: nil
-      },
-      urgency,
-      at_ms
-    )
+    controller = Controller.stand(member.controller)
+    runner = Runner.halt(member.runner)
+    react(%{member | controller: controller, reflex: reflex, runner: runner}, urgency, at_ms)
   end
 
-  defp halted(%{mission: nil, halted: halted}), do: halted
+  # The outcome first: the mission knows what came of its goal when it sees the next percept.
+  defp ended(member, nil), do: {member, []}
+  defp ended(member, {tag, result}), do: handle(member, {:outcome, tag, result})
 
-  defp halted(%{module: module, mission: mission}) do
-    if function_exported?(module, :halted, 1), do: module.halted(mission)
+  defp handle(member, event) do
+    {runner, effects} = Runner.handle(member.runner, event)
+    carry_out(effects, %{member | runner: runner})
   end
 
-  defp resume(%{halted: nil} = member),
-    do: become(member, member.module.init(member.id, member.options))
-
-  defp resume(%{halted: mission} = member), do: {%{member | mission: mission, halted: nil}, []}
-
-  defp outcome({tag, result}), do: {:outcome, tag, result}
-
-  # Out of command it hears nothing.
-  defp handle(%{mission: nil} = member, _event), do: {member, []}
-  defp handle(member, event), do: become(member, member.module.handle(event, member.mission))
-
-  defp become(member, {phase, mission, effects}) do
-    Enum.reduce(effects, {%{member | phase: phase, mission: mission}, []}, &carry_out/2)
+  defp carry_out(effects, member) do
+    {out, member} = Enum.flat_map_reduce(effects, member, &carry_out_one/2)
+    {member, out}
   end
 
-  defp carry_out({:goal, tag, goal}, {member, out}),
-    do: {%{member | controller: Controller.goal(member.controller, tag, goal)}, out}
+  defp carry_out_one(order, member) when is_order(order) do
+    {controller, pan} = Controller.obey(member.controller, order)
+    {look(pan), %{member | controller: controller}}
+  end
 
-  defp carry_out({:anchors, anchors}, {member, out}),
-    do: {%{member | controller: Controller.anchors(member.controller, anchors)}, out}
+  # The runner has it.
+  defp carry_out_one({:claim, _claim}, member), do: {[], member}
+  defp carry_out_one(effect, member), do: {[effect], member}
 
-  defp carry_out({:look, pan}, {member, out}), do: {%{member | look: pan}, out}
-  defp carry_out({:claim, claim}, {member, out}), do: {%{member | claim: claim}, out}
-  defp carry_out(effect, {member, out}), do: {member, out ++ [effect]}
+  defp look(pan), do: for(pan <- List.wrap(pan), do: {:look, pan, 0.0})
 
   defp beat(%{beat_ms: last} = member, at_ms) when last != nil and at_ms - last < @beat_ms,
     do: {member, []}
@@ -293,7 +255,10 @@ defmodule Swarm.Member do
       %Percept{pose: %Pose{}} = percept ->
         heard = Peers.heard(member.receiver.peers, at_ms)
         sender = {member.boot, member.sequence + 1}
-        claim = if member.mission == nil, do: %{standing: true}, else: member.claim
+
+        claim =
+          if Runner.state(member.runner) == :idle, do: %{standing: true}, else: claim(member)
+
         beat = Heartbeat.new(sender, percept, claim, heard, member.receiver.stop)
 
         {%{member | sequence: member.sequence + 1, beat_ms: at_ms},

@@ -8,17 +8,29 @@ defmodule Robot.Control.Controller do
   running behaviour (a target that moves); another tag starts afresh. A goal that has ended
   stays ended until another tag comes.
 
+  The camera looks where the chosen behaviour wants it, or else the one with the goal; where neither cares,
+  where the mission said last.
+
   Besides its behaviour's own options a goal takes `discs: [{x, y, radius}]`: standing things to go
   round, in the map frame, metres.
   """
   alias Hal.Profile
-  alias Robot.{Behaviour, Localiser, Percept, Wish}
+  alias Robot.{Behaviour, Localiser, Mission, Percept, Wish}
   alias Robot.Control.Arbiter
   alias Robot.Behaviour.{Avoid, Escape, Rest}
 
   @enforce_keys [:profile, :escape, :rest]
   defstruct @enforce_keys ++
-              [tag: nil, module: nil, goal: nil, last_by: nil, localiser: nil, percept: nil]
+              [
+                tag: nil,
+                module: nil,
+                goal: nil,
+                last_by: nil,
+                localiser: nil,
+                percept: nil,
+                look: nil,
+                behaviour_looks?: false
+              ]
 
   @type t :: %__MODULE__{
           profile: Profile.t(),
@@ -29,7 +41,9 @@ defmodule Robot.Control.Controller do
           goal: Behaviour.t() | nil,
           last_by: atom(),
           localiser: Localiser.t() | nil,
-          percept: Percept.t() | nil
+          percept: Percept.t() | nil,
+          look: float() | nil,
+          behaviour_looks?: boolean()
         }
 
   @doc """
@@ -83,6 +97,29 @@ defmodule Robot.Control.Controller do
   def anchors(%__MODULE__{} = controller, anchors),
     do: %{controller | localiser: Localiser.anchors(controller.localiser, anchors)}
 
+  @doc """
+  Carries out what the mission orders. With it comes where the camera is to look at once, if anywhere: the
+  mission looks by the percept of this tick, and its word is not for the next one.
+  """
+  @spec obey(t(), Mission.order()) :: {t(), pan :: float() | nil}
+  def obey(%__MODULE__{} = controller, {:goal, tag, goal}),
+    do: {goal(controller, tag, goal), nil}
+
+  def obey(%__MODULE__{} = controller, {:anchors, anchors}),
+    do: {anchors(controller, anchors), nil}
+
+  def obey(%__MODULE__{look: pan} = controller, {:look, pan}), do: {controller, nil}
+
+  def obey(%__MODULE__{} = controller, {:look, pan}) do
+    now = if controller.behaviour_looks?, do: nil, else: pan
+    {%{controller | look: pan}, now}
+  end
+
+  @doc "Drops the goal and all else that the mission ordered."
+  @spec stand(t()) :: t()
+  def stand(%__MODULE__{} = controller),
+    do: %{(controller |> goal(:idle, nil) |> anchors(%Localiser.Anchors{})) | look: nil}
+
   @doc "The percept of the last tick, with the pose that the controller made of it."
   @spec percept(t()) :: Percept.t() | nil
   def percept(%__MODULE__{percept: percept}), do: percept
@@ -92,7 +129,8 @@ defmodule Robot.Control.Controller do
   def fault(%__MODULE__{escape: {Escape, state}}), do: Escape.fault(state)
 
   @doc """
-  One tick: the chosen wish (its `by` says whose), and the goal's outcome at the tick it ends.
+  One tick: the chosen wish (its `by` says whose, its `look` where the camera looks now), and the goal's
+  outcome at the tick it ends.
   """
   @spec tick(t(), Percept.t()) :: {Wish.t(), {tag :: term(), integer()} | nil, t()}
   def tick(%__MODULE__{} = controller, %Percept{} = percept) do
@@ -103,7 +141,18 @@ defmodule Robot.Control.Controller do
 
     wish = Arbiter.choose([escaping, wanted, resting], controller.last_by)
     wish = if wish.look == nil and wanted != nil, do: %{wish | look: wanted.look}, else: wish
-    controller = %{controller | escape: escape, rest: rest, goal: goal, last_by: wish.by}
+    looks? = wish.look != nil
+    wish = %{wish | look: wish.look || controller.look}
+
+    controller = %{
+      controller
+      | escape: escape,
+        rest: rest,
+        goal: goal,
+        last_by: wish.by,
+        behaviour_looks?: looks?
+    }
+
     {wish, outcome && {controller.tag, outcome}, controller}
   end
 

@@ -11,10 +11,9 @@ defmodule Robot.Control.Executive do
   """
   use GenServer
   alias Hal.{Device, Event}
-  alias Robot.{Behaviour, Board, Config, Names, Percept}
+  alias Robot.{Behaviour, Board, Config, Mission, Names, Percept}
   alias Robot.Control.{Controller, Trace}
   alias Robot.Safety.{DryRun, Gate}
-  alias Robot.Localiser.Anchors
 
   @period_ms 100
   @slow_us 50_000
@@ -36,14 +35,14 @@ defmodule Robot.Control.Executive do
   def goal(robot, tag, goal) do
     with :ok <- Behaviour.check(goal) do
       if Names.whereis(robot, :executive),
-        do: set(robot, tag, goal),
+        do: obey(robot, {:goal, tag, goal}),
         else: {:error, "no robot #{inspect(robot)} runs on this node"}
     end
   end
 
-  @doc "The same for the pilot, which has checked the goal, and lives no longer than the executive."
-  @spec set(robot :: atom(), tag :: term(), {module(), keyword()} | nil) :: :ok
-  def set(robot, tag, goal), do: cast(robot, {:goal, tag, goal})
+  @doc "What the mission orders. Its goals have been checked (`Robot.Mission.Runner`)."
+  @spec obey(robot :: atom(), Mission.order()) :: :ok
+  def obey(robot, order), do: cast(robot, {:obey, order})
 
   @doc """
   Applies `then` as soon as all that was said to the executive before is taken in: whoever waits for that
@@ -58,14 +57,6 @@ defmodule Robot.Control.Executive do
   """
   @spec stand(robot :: atom(), then :: Config.call() | nil) :: :ok
   def stand(robot, then \\ nil), do: cast(robot, {:stand, then})
-
-  @doc "Sets the references that the estimate of the pose is corrected by."
-  @spec anchors(robot :: atom(), Anchors.t()) :: :ok
-  def anchors(robot, anchors), do: cast(robot, {:anchors, anchors})
-
-  @doc "Where the camera looks while no behaviour cares; `nil` leaves it where it is."
-  @spec look(robot :: atom(), pan :: float() | nil) :: :ok
-  def look(robot, pan), do: cast(robot, {:look, pan})
 
   defp cast(robot, message), do: GenServer.cast(Names.via(robot, :executive), message)
 
@@ -84,8 +75,6 @@ defmodule Robot.Control.Executive do
       board: board,
       sink: sink,
       controller: Controller.new(profile: config.profile, start: config.start),
-      look: nil,
-      behaviour_looks?: false,
       told: nil,
       tick: 0,
       next: System.monotonic_time(:millisecond)
@@ -95,9 +84,11 @@ defmodule Robot.Control.Executive do
   end
 
   @impl GenServer
-  def handle_cast({:goal, tag, goal} = input, s) do
-    Trace.input(s.config, :executive, input, Config.now(s.config))
-    {:noreply, pursue(s, Controller.goal(s.controller, tag, goal))}
+  def handle_cast({:obey, order}, s) do
+    at_ms = Config.now(s.config)
+    Trace.input(s.config, :executive, order, at_ms)
+    {controller, pan} = Controller.obey(s.controller, order)
+    {:noreply, s |> pursue(controller) |> look(pan, at_ms)}
   end
 
   def handle_cast({:confirm, {m, f, a}}, s) do
@@ -108,21 +99,7 @@ defmodule Robot.Control.Executive do
   def handle_cast({:stand, then}, s) do
     Trace.input(s.config, :executive, :stand, Config.now(s.config))
     Gate.forget(s.config.id, then)
-    controller = s.controller |> Controller.goal(:idle, nil) |> Controller.anchors(%Anchors{})
-    {:noreply, pursue(%{s | look: nil}, controller)}
-  end
-
-  def handle_cast({:anchors, anchors} = input, s) do
-    Trace.input(s.config, :executive, input, Config.now(s.config))
-    {:noreply, %{s | controller: Controller.anchors(s.controller, anchors)}}
-  end
-
-  def handle_cast({:look, pan} = input, s) do
-    at_ms = Config.now(s.config)
-    Trace.input(s.config, :executive, input, at_ms)
-    # The mission looks by the percept of this tick: its word is not for the next one.
-    s = if s.behaviour_looks? or pan == s.look, do: s, else: look(s, pan, at_ms)
-    {:noreply, %{s | look: pan}}
+    {:noreply, pursue(s, Controller.stand(s.controller))}
   end
 
   @impl GenServer
@@ -158,7 +135,7 @@ defmodule Robot.Control.Executive do
 
     Gate.wish(config.id, wish.twist)
     Trace.effect(config, :executive, {:wish, wish}, at_ms)
-    s = look(s, wish.look || s.look, at_ms)
+    s = look(s, wish.look, at_ms)
 
     fault = fault(s, Controller.fault(controller), at_ms)
     doing = %{by: wish.by, weight: wish.weight, outcome: outcome, fault: fault, tick: s.tick + 1}
@@ -168,7 +145,7 @@ defmodule Robot.Control.Executive do
     # The outcome first: the mission knows what came of its goal when it sees the next percept.
     with {tag, outcome} <- outcome, do: tell(s, {:outcome, tag, outcome}, at_ms)
     tell(s, {:tick, percept}, at_ms)
-    %{s | controller: controller, tick: doing.tick, behaviour_looks?: wish.look != nil}
+    %{s | controller: controller, tick: doing.tick}
   end
 
   defp place(board, %{pose: pose, uncertainty: uncertainty}, at_ms) do

@@ -19,16 +19,18 @@ defmodule Robot.Control.Pilot do
 
   | effect | goes to |
   |---|---|
-  | `{:goal, tag, goal}`, `{:anchors, anchors}`, `{:look, pan}` | the executive |
+  | orders: `{:goal, tag, goal}`, `{:anchors, anchors}`, `{:look, pan}` | the executive |
   | `{:send, to, message}` | the config's `:send`; lost without one |
   | `{:claim, map}` | the board, under `:mission`, for the heartbeat to carry |
   | `{:stage, name, map}` | the event `[:robot, :stage]` |
   """
   @behaviour :gen_statem
   alias Hal.Event
-  alias Robot.{Behaviour, Board, Config, Names}
+  alias Robot.{Board, Config, Names}
   alias Robot.Control.{Delivery, Executive, Trace}
   alias Robot.Localiser.Anchors
+  alias Robot.Mission.Runner
+  import Robot.Mission, only: [is_order: 1]
 
   # On a busy machine a pilot is slow, not gone.
   @call_ms 5_000
@@ -110,16 +112,14 @@ defmodule Robot.Control.Pilot do
     data = %{
       config: config,
       board: Board.find!(config.id),
-      mission: nil,
-      claim: %{},
-      halted: nil,
+      runner: Runner.new(config.id),
       since_ms: Config.now(config)
     }
 
     # The pilot before this one may have ended within its mission, and the executive may still follow a goal of it.
     Board.delete(data.board, :pilot, :asking)
     rest(data)
-    {:ok, :idle, told(:idle, data)}
+    {:ok, :idle, told(:idle, %{}, data)}
   end
 
   @impl :gen_statem
@@ -147,13 +147,12 @@ defmodule Robot.Control.Pilot do
       else: :keep_state_and_data
   end
 
-  def handle_event({:call, from}, :resume, :idle, %{halted: {_module, _mission}} = data) do
-    {:ok, state, data} = go(:resume, {:command, :start}, :idle, data)
-    {:next_state, state, data, [{:reply, from, :ok}]}
+  def handle_event({:call, from}, :resume, state, data) do
+    case go(:resume, {:command, :start}, state, data) do
+      {:ok, state, data} -> {:next_state, state, data, [{:reply, from, :ok}]}
+      error -> {:keep_state_and_data, [{:reply, from, error}]}
+    end
   end
-
-  def handle_event({:call, from}, :resume, _state, _data),
-    do: {:keep_state_and_data, [{:reply, from, {:error, :idle}}]}
 
   def handle_event({:call, from}, {:command, _command}, :idle, _data),
     do: {:keep_state_and_data, [{:reply, from, {:error, :idle}}]}
@@ -174,7 +173,7 @@ defmodule Robot.Control.Pilot do
     {m, f, a} = delivery.reply
 
     with :ok <- timely(delivery, data),
-         {:ok, way} <- Delivery.way(delivery, state, data.halted),
+         {:ok, way} <- Delivery.way(delivery, state, data.runner.halted),
          {:ok, state, data} <- go(way, event, state, data) do
       # The pilot has it; that the executive has it, too, only that one can say.
       Executive.confirm(data.config.id, {m, f, a ++ [:ok]})
@@ -198,11 +197,13 @@ defmodule Robot.Control.Pilot do
   end
 
   # An event on its way to a mission.
-  defp go({:hand, module}, event, state, data),
-    do: event |> handle(module, data) |> follow(module, state, data)
+  defp go({:hand, _module}, event, state, data),
+    do: event |> handle(data) |> follow(state, data)
 
-  defp go(:resume, event, :idle, %{halted: {module, mission}} = data),
-    do: go({:hand, module}, event, :idle, %{data | mission: mission, halted: nil})
+  defp go(:resume, event, state, data) do
+    with {:ok, runner} <- Runner.resume(data.runner),
+         do: go({:hand, runner.module}, event, state, %{data | runner: runner})
+  end
 
   defp go({:start, module, options}, event, state, data) do
     with {:ok, state, data} <- begin(module, options, state, data),
@@ -213,8 +214,8 @@ defmodule Robot.Control.Pilot do
     if Code.ensure_loaded?(module) and function_exported?(module, :init, 2) do
       heard({:start, module, options}, data)
       rest(data)
-      result = asking(module, :init, [data.config.id, options], data)
-      follow(result, module, state, %{data | claim: %{}, halted: nil})
+      result = asking(module, data, fn -> Runner.start(data.runner, module, options) end)
+      follow(result, state, data)
     else
       {:error, :no_mission}
     end
@@ -223,19 +224,10 @@ defmodule Robot.Control.Pilot do
   # Whoever is answered finds the robot idle. The mission is asked last: it has no say in this.
   defp halt(state, then, data) do
     heard(:stop, data)
-    data = changed(state, :idle, %{data | claim: %{}})
+    data = changed(state, :idle, %{}, data)
     Executive.stand(data.config.id, then)
-    {:next_state, :idle, %{data | halted: halted(state, data), mission: nil}}
-  end
-
-  defp halted(:idle, data), do: data.halted
-
-  defp halted({module, _phase}, data) do
-    left =
-      if function_exported?(module, :halted, 1),
-        do: asking(module, :halted, [data.mission], data)
-
-    if left != nil, do: {module, left}
+    halted = asking(data.runner.module, data, fn -> Runner.halt(data.runner) end)
+    {:next_state, :idle, %{data | runner: halted}}
   end
 
   # Percepts that came in meanwhile are further down in our own mailbox.
@@ -249,75 +241,64 @@ defmodule Robot.Control.Pilot do
 
   defp newest(event), do: event
 
-  defp handle(event, module, data) do
+  defp handle(event, data) do
     heard(event, data)
-    asking(module, :handle, [event, data.mission], data)
+    asking(data.runner.module, data, fn -> Runner.handle(data.runner, event) end)
   end
 
   # No two calls are noted alike.
-  defp asking(module, callback, arguments, %{board: board, config: config}) do
+  defp asking(nil, _data, function), do: function.()
+
+  defp asking(module, %{board: board, config: config}, function) do
     call = {module, System.unique_integer()}
     Board.put(board, :pilot, :asking, call, Config.now(config))
-    result = apply(module, callback, arguments)
+    result = function.()
     Board.delete(board, :pilot, :asking)
     result
   end
 
-  defp follow({phase, mission, effects}, module, state, data) do
-    data = Enum.reduce(effects, %{data | mission: mission}, &carry_out/2)
-    {:ok, {module, phase}, changed(state, {module, phase}, data)}
+  defp follow({runner, effects}, before, data) do
+    data = %{data | runner: runner}
+    Enum.each(effects, &carry_out(&1, data))
+    state = Runner.state(runner)
+    {:ok, state, changed(before, state, runner.claim, data)}
   end
 
-  defp carry_out(effect, data) do
-    Trace.effect(data.config, :pilot, effect, Config.now(data.config))
-    carry_out(effect, data.config, data)
+  defp carry_out(effect, %{config: config}) do
+    at_ms = Config.now(config)
+    Trace.effect(config, :pilot, effect, at_ms)
+    carry_out(effect, config, at_ms)
   end
 
-  defp carry_out({:goal, tag, goal}, config, data) do
-    # A wrong one is the mission's fault, which falls with it, and not the executive's.
-    with {:error, line} <- Behaviour.check(goal), do: raise(ArgumentError, line)
-    Executive.set(config.id, tag, goal)
-    data
-  end
+  defp carry_out(order, config, _at_ms) when is_order(order), do: Executive.obey(config.id, order)
 
-  defp carry_out({:anchors, anchors}, config, data) do
-    Executive.anchors(config.id, anchors)
-    data
-  end
+  defp carry_out({:send, _to, _message}, %{send: nil}, _at_ms), do: :ok
 
-  defp carry_out({:look, pan}, config, data) do
-    Executive.look(config.id, pan)
-    data
-  end
+  defp carry_out({:send, to, message}, %{send: {m, f, a}}, _at_ms),
+    do: apply(m, f, a ++ [to, message])
 
-  defp carry_out({:send, _to, _message}, %{send: nil}, data), do: data
+  # The runner has it.
+  defp carry_out({:claim, _claim}, _config, _at_ms), do: :ok
 
-  defp carry_out({:send, to, message}, %{send: {m, f, a}}, data) do
-    apply(m, f, a ++ [to, message])
-    data
-  end
-
-  defp carry_out({:claim, claim}, _config, data), do: %{data | claim: claim}
-
-  defp carry_out({:stage, stage, about}, config, data) do
+  defp carry_out({:stage, stage, about}, config, at_ms) do
     about = Map.merge(%{robot: config.id, stage: stage}, about)
-    Event.execute([:robot, :stage], %{at_ms: Config.now(config)}, about)
-    data
+    Event.execute([:robot, :stage], %{at_ms: at_ms}, about)
   end
 
   defp rest(%{config: %{id: id}}) do
-    Executive.set(id, :idle, nil)
-    Executive.anchors(id, %Anchors{})
-    Executive.look(id, nil)
+    for order <- [{:goal, :idle, nil}, {:anchors, %Anchors{}}, {:look, nil}],
+        do: Executive.obey(id, order)
   end
 
   defp heard(input, data), do: Trace.input(data.config, :pilot, input, Config.now(data.config))
 
-  defp changed(state, state, data), do: written(state, data)
-  defp changed(_before, state, data), do: told(state, %{data | since_ms: Config.now(data.config)})
+  defp changed(state, state, claim, data), do: written(state, claim, data)
 
-  defp told(state, data) do
-    data = written(state, data)
+  defp changed(_before, state, claim, data),
+    do: told(state, claim, %{data | since_ms: Config.now(data.config)})
+
+  defp told(state, claim, data) do
+    data = written(state, claim, data)
     at_ms = data.since_ms
     Trace.effect(data.config, :pilot, {:phase, state}, at_ms)
     about = %{robot: data.config.id, state: state}
@@ -325,8 +306,8 @@ defmodule Robot.Control.Pilot do
     data
   end
 
-  defp written(state, data) do
-    entry = %{state: state, claim: data.claim, since_ms: data.since_ms}
+  defp written(state, claim, data) do
+    entry = %{state: state, claim: claim, since_ms: data.since_ms}
     Board.put(data.board, :pilot, :mission, entry, Config.now(data.config))
     data
   end

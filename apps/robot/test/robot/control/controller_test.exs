@@ -33,6 +33,25 @@ defmodule Robot.Control.ControllerTest do
     assert body.twist.linear == 0.0
   end
 
+  test "looks where the mission says, unless the behaviour looks somewhere itself" do
+    body = Body.new(Pose.new(0, 0))
+    {controller, 0.5} = Controller.obey(body.controller, {:look, 0.5})
+    assert {^controller, nil} = Controller.obey(controller, {:look, 0.5})
+    {%{look: 0.5}, nil, controller} = Controller.tick(controller, Body.percept(body))
+
+    goal = {Robot.Acts.Roll, twist: Twist.zero()}
+    {controller, nil} = Controller.obey(controller, {:goal, :roll, goal})
+    {%{look: 0.25}, nil, controller} = Controller.tick(controller, Body.percept(body))
+    # Not before the behaviour has its next say.
+    assert {%{look: -0.5} = controller, nil} = Controller.obey(controller, {:look, -0.5})
+
+    {controller, nil} = Controller.obey(controller, {:goal, :roll, nil})
+    {%{look: -0.5}, nil, controller} = Controller.tick(controller, Body.percept(body))
+
+    {%{look: nil}, nil, _} =
+      controller |> Controller.stand() |> Controller.tick(Body.percept(body))
+  end
+
   test "without a pose it stands and waits" do
     body = Pose.new(0, 0) |> Body.new() |> with_goal(1, {Goto, x: 2.0, y: 0.0})
     {nil, body} = Body.run(body, 20, &%{&1 | pose: nil})

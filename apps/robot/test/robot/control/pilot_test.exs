@@ -109,7 +109,7 @@ defmodule Robot.Control.PilotTest do
     assert Pilot.resume(id) == {:error, :idle}
     assert Pilot.start(id, Acts.Mission, test: self(), halted: :left) == :ok
     assert Pilot.stop(id) == :ok
-    assert {:idle, %{mission: nil}} = :sys.get_state(Names.whereis(id, :pilot))
+    assert {:idle, %{runner: %{mission: nil}}} = :sys.get_state(Names.whereis(id, :pilot))
     # A second stop takes nothing away.
     assert Pilot.stop(id) == :ok
     assert Pilot.command(id, :go) == {:error, :idle}

@@ -3,6 +3,7 @@ defmodule Robot.Control.TraceTest do
   use Robot.Case, async: false
   alias Hal.{Odometry, Pose}
   alias Robot.Control.Controller
+  alias Robot.Mission.Runner
   alias Robot.Safety.Reflex
 
   test "gate, executive and pilot do what the pure functions do on the same input" do
@@ -46,7 +47,7 @@ defmodule Robot.Control.TraceTest do
     entries = for {_order, entry} <- :ets.tab2list(table), do: entry
     assert compare(entries, :gate, Reflex.new(profile), &gate/3) > 20
     controller = Controller.new(profile: profile, start: start)
-    assert compare(entries, :executive, {controller, nil, false}, &executive/3) > 20
+    assert compare(entries, :executive, controller, &executive/3) > 20
     assert compare(entries, :pilot, nil, &pilot/3) == 6
   end
 
@@ -85,32 +86,24 @@ defmodule Robot.Control.TraceTest do
     {[{:drive, twist, limits}], reflex}
   end
 
-  defp executive({:goal, tag, goal}, _at_ms, {controller, look, looks?}),
-    do: {[], {Controller.goal(controller, tag, goal), look, looks?}}
-
-  defp executive({:anchors, anchors}, _at_ms, {controller, look, looks?}),
-    do: {[], {Controller.anchors(controller, anchors), look, looks?}}
-
-  defp executive({:look, pan}, _at_ms, {controller, look, looks?}) do
-    news = if looks? or pan in [nil, look], do: [], else: [{:look, pan}]
-    {news, {controller, pan, looks?}}
-  end
-
-  defp executive({:tick, percept}, _at_ms, {controller, look, _looks?}) do
+  defp executive({:tick, percept}, _at_ms, controller) do
     {wish, outcome, controller} = Controller.tick(controller, percept)
-    looks = for pan <- List.wrap(wish.look || look), do: {:look, pan}
     outcomes = for {tag, outcome} <- List.wrap(outcome), do: {:outcome, tag, outcome}
-    effects = [{:wish, wish}] ++ looks ++ outcomes ++ [{:tick, Controller.percept(controller)}]
-    {effects, {controller, look, wish.look != nil}}
+    said = outcomes ++ [{:tick, Controller.percept(controller)}]
+    {[{:wish, wish}] ++ looks(wish.look) ++ said, controller}
   end
 
-  defp pilot({:start, module, options}, _at_ms, nil) do
-    {_phase, mission, effects} = module.init(:trace1, options)
-    {effects, {module, mission}}
+  defp executive(order, _at_ms, controller) do
+    {controller, pan} = Controller.obey(controller, order)
+    {looks(pan), controller}
   end
 
-  defp pilot(event, _at_ms, {module, mission}) do
-    {_phase, mission, effects} = module.handle(event, mission)
-    {effects, {module, mission}}
-  end
+  defp looks(pan), do: for(pan <- List.wrap(pan), do: {:look, pan})
+
+  defp pilot({:start, module, options}, _at_ms, nil),
+    do: :trace1 |> Runner.new() |> Runner.start(module, options) |> told()
+
+  defp pilot(event, _at_ms, runner), do: runner |> Runner.handle(event) |> told()
+
+  defp told({runner, effects}), do: {effects, runner}
 end

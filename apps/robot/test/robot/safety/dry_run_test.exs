@@ -46,7 +46,7 @@ defmodule Robot.Safety.DryRunTest do
     listen(:dry2, [:robot, :dry_run])
     id = robot(:dry2, dry_run: true, ptz: {Hal.FakePtz, test: self(), device: :ptz})
     assert_receive {:ptz, :init, _}
-    Executive.look(id, -0.5)
+    Executive.obey(id, {:look, -0.5})
     until_line(id, "would look 29 deg to the right")
     refute_receive {:ptz, {:look, _, _}, _}, 200
   end
