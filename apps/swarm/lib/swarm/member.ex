@@ -25,8 +25,6 @@ defmodule Swarm.Member do
   alias Swarm.Comms.Receiver
   import Robot.Mission, only: [is_order: 1]
 
-  @beat_ms 200
-
   @enforce_keys [:id, :profile, :boot, :mission, :runner, :controller, :reflex, :receiver]
   defstruct @enforce_keys ++ [entries: %{}, sequence: 0, beat_ms: nil]
 
@@ -247,25 +245,18 @@ defmodule Swarm.Member do
 
   defp look(pan), do: for(pan <- List.wrap(pan), do: {:look, pan, 0.0})
 
-  defp beat(%{beat_ms: last} = member, at_ms) when last != nil and at_ms - last < @beat_ms,
-    do: {member, []}
-
   defp beat(member, at_ms) do
-    case Controller.percept(member.controller) do
-      %Percept{pose: %Pose{}} = percept ->
-        heard = Peers.heard(member.receiver.peers, at_ms)
-        sender = {member.boot, member.sequence + 1}
+    with true <- Heartbeat.due?(member.beat_ms, at_ms),
+         %Percept{pose: %Pose{}} = percept <- Controller.percept(member.controller) do
+      heard = Peers.heard(member.receiver.peers, at_ms)
+      sender = {member.boot, member.sequence + 1}
+      claim = if Runner.state(member.runner) == :idle, do: :idle, else: claim(member)
+      beat = Heartbeat.new(sender, percept, claim, heard, member.receiver.stop)
 
-        claim =
-          if Runner.state(member.runner) == :idle, do: %{standing: true}, else: claim(member)
-
-        beat = Heartbeat.new(sender, percept, claim, heard, member.receiver.stop)
-
-        {%{member | sequence: member.sequence + 1, beat_ms: at_ms},
-         [{:send, :all, Message.new(member.id, :heartbeat, beat)}]}
-
-      _lost ->
-        {member, []}
+      {%{member | sequence: member.sequence + 1, beat_ms: at_ms},
+       [{:send, :all, Message.new(member.id, :heartbeat, beat)}]}
+    else
+      _not_due_or_lost -> {member, []}
     end
   end
 end

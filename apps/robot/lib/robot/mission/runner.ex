@@ -22,6 +22,8 @@ defmodule Robot.Mission.Runner do
           halted: {module(), mission :: term()} | nil
         }
 
+  @type state :: :idle | {module(), phase :: term()}
+
   @doc "An idle robot's."
   @spec new(robot :: atom()) :: t()
   def new(robot), do: %__MODULE__{robot: robot}
@@ -60,7 +62,7 @@ defmodule Robot.Mission.Runner do
   end
 
   @doc "What the robot is up to."
-  @spec state(t()) :: :idle | {module(), phase :: term()}
+  @spec state(t()) :: state()
   def state(%__MODULE__{module: nil}), do: :idle
   def state(%__MODULE__{module: module, phase: phase}), do: {module, phase}
 

@@ -2,7 +2,7 @@ defmodule Swarm.Comms.OwnHeartbeat do
   @moduledoc """
   Makes the heartbeat of a live robot from its board. `Swarm.Member` makes the same in lockstep.
   """
-  alias Robot.{Board, Config, Percept}
+  alias Robot.{Board, Config}
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Comms.Receiver
@@ -17,16 +17,9 @@ defmodule Swarm.Comms.OwnHeartbeat do
           {:ok, Message.t()} | :error
   def message(config, board, receiver, sender, at_ms) do
     with {:ok, pose, _then} <- Board.fetch(board, :pose, :infinity, at_ms) do
-      percept = %Percept{
-        robot: config.id,
-        at_ms: at_ms,
-        profile: config.profile,
-        pose: pose,
-        odometry: odometry(board, at_ms)
-      }
-
+      body = %{profile: config.profile, pose: pose, odometry: odometry(board, at_ms)}
       heard = Peers.heard(receiver.peers, at_ms)
-      beat = Heartbeat.new(sender, percept, claim(board), heard, EStop.written(board))
+      beat = Heartbeat.new(sender, body, claim(board), heard, EStop.written(board))
       {:ok, Message.new(config.id, :heartbeat, beat)}
     end
   end
@@ -40,7 +33,7 @@ defmodule Swarm.Comms.OwnHeartbeat do
 
   defp claim(board) do
     case Board.fetch(board, :mission, :infinity) do
-      {:ok, %{state: :idle}, _at_ms} -> %{standing: true}
+      {:ok, %{state: :idle}, _at_ms} -> :idle
       {:ok, %{claim: claim}, _at_ms} -> claim
       :error -> %{}
     end

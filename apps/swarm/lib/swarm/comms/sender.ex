@@ -9,12 +9,12 @@ defmodule Swarm.Comms.Sender do
   alias Swarm.Commands.Freshness
   alias Swarm.Comms.Transport
   alias Swarm.Comms.{OwnHeartbeat, Receiver}
+  alias Swarm.Membership.Heartbeat
 
-  @beat_every 2
   @urgent_ticks 10
 
   @enforce_keys [:config, :board, :transport, :stamps, :latched?]
-  defstruct @enforce_keys ++ [ticks: 0, urgent: 0, sent: 0, silent?: false]
+  defstruct @enforce_keys ++ [ticks: 0, beat_ms: nil, urgent: 0, sent: 0, silent?: false]
 
   @typedoc "`latched?` is what it has said of the emergency stop so far, `urgent` how many heartbeats hurry yet."
   @type t :: %__MODULE__{
@@ -24,6 +24,7 @@ defmodule Swarm.Comms.Sender do
           stamps: Freshness.t(),
           latched?: boolean(),
           ticks: non_neg_integer(),
+          beat_ms: integer() | nil,
           urgent: non_neg_integer(),
           sent: non_neg_integer(),
           silent?: boolean()
@@ -53,7 +54,7 @@ defmodule Swarm.Comms.Sender do
   @spec tick(t(), Receiver.t(), integer()) :: t()
   def tick(%__MODULE__{} = sender, receiver, at_ms) do
     sender = notice(%{sender | ticks: sender.ticks + 1})
-    due? = sender.urgent > 0 or rem(sender.ticks, @beat_every) == 1
+    due? = sender.urgent > 0 or Heartbeat.due?(sender.beat_ms, at_ms)
     sender = if due?, do: beat(sender, receiver, at_ms), else: sender
     %{sender | urgent: max(sender.urgent - 1, 0)}
   end
@@ -90,7 +91,8 @@ defmodule Swarm.Comms.Sender do
 
     case OwnHeartbeat.message(sender.config, sender.board, receiver, from, at_ms) do
       {:ok, message} ->
-        sender = %{sender | stamps: Freshness.sent(sender.stamps, sequence, at_ms)}
+        stamps = Freshness.sent(sender.stamps, sequence, at_ms)
+        sender = %{sender | stamps: stamps, beat_ms: at_ms}
         speak(sender, List.delete(Transport.robots(), sender.config.id), message)
 
       :error ->

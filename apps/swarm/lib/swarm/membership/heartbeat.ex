@@ -62,27 +62,50 @@ defmodule Swarm.Membership.Heartbeat do
   # to run so far, for nobody follows a leap (`Swarm.EStop.State`).
   @latest 0xFFFFFFFFFFFFFFFF
 
+  # Five a second. Ticks come every 100 ms, and some of them a little early.
+  @period_ms 200
+  @early_ms 50
+
   @doc """
-  The heartbeat of a robot: what it perceives, what its mission claims, whom it hears. A percept
-  without odometry stands still.
+  Whether a heartbeat is due, when the last was sent at `last_ms`; `nil` before the first.
+
+      iex> for at_ms <- [100, 199, 300], do: Swarm.Membership.Heartbeat.due?(0, at_ms)
+      [false, true, true]
+  """
+  @spec due?(last_ms :: integer() | nil, at_ms :: integer()) :: boolean()
+  def due?(nil, _at_ms), do: true
+  def due?(last_ms, at_ms), do: at_ms - last_ms >= @period_ms - @early_ms
+
+  @typedoc "What a heartbeat tells of the body; `Robot.Percept` is one."
+  @type body :: %{
+          :pose => Hal.Pose.t(),
+          :odometry => Hal.Odometry.t() | nil,
+          :profile => Hal.Profile.t(),
+          optional(atom()) => term()
+        }
+
+  @doc """
+  The heartbeat of a robot: how its body moves, what its mission claims (`:idle`: it is on none, and stands),
+  whom it hears. A body without odometry stands still.
   """
   @spec new(
           {integer(), non_neg_integer()},
-          Robot.Percept.t(),
-          map(),
+          body(),
+          claim :: map() | :idle,
           [atom()],
           Swarm.EStop.State.t()
         ) ::
           t()
-  def new({boot, sequence}, %Robot.Percept{pose: pose} = percept, claim, heard, stop) do
-    twist = if percept.odometry, do: percept.odometry.twist, else: Hal.Twist.zero()
+  def new({boot, sequence}, %{pose: pose} = body, claim, heard, stop) do
+    twist = if body.odometry, do: body.odometry.twist, else: Hal.Twist.zero()
+    claim = if claim == :idle, do: %{standing: true}, else: claim
 
     beat = %__MODULE__{
       boot: boot,
       sequence: sequence,
       pose: {round(pose.x * 1000), round(pose.y * 1000), round(pose.heading * 1000)},
       twist: {round(twist.linear * 1000), round(twist.turn * 1000)},
-      radius: round(percept.profile.radius * 1000),
+      radius: round(body.profile.radius * 1000),
       heard: NameSet.new(heard),
       estop: stop.known,
       latched: stop.latched?
