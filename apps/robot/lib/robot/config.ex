@@ -119,6 +119,13 @@ defmodule Robot.Config do
   @spec now(t()) :: integer()
   def now(%__MODULE__{clock: {m, f, a}}), do: apply(m, f, a)
 
+  @doc "A ticker for a part of this robot; `nil` where it acts when it is sent `message` (`pace: :manual`)."
+  @spec ticker(t(), message :: term(), period_ms :: pos_integer()) :: Hal.Ticker.t() | nil
+  def ticker(%__MODULE__{pace: :manual}, _message, _period_ms), do: nil
+
+  def ticker(%__MODULE__{pace: :clock}, message, period_ms),
+    do: Hal.Ticker.start(message, period_ms, period_ms)
+
   defp check(config) do
     wrong =
       config

@@ -8,7 +8,7 @@ defmodule Sim.Fleet do
   robots run is its backend's business (`Sim.Fleet.Backend`).
   """
   use GenServer
-  alias Hal.Pose
+  alias Hal.{Pose, Ticker}
   alias Sim.Fleet.{Local, Mission, Nodes, Said}
   alias Sim.Scene
   alias Sim.Trial.{Evaluation, RunLog, Scenario, Setup, Termination}
@@ -106,15 +106,15 @@ defmodule Sim.Fleet do
   end
 
   defp begun(%Setup{options: options} = setup, backend, epoch_ms) do
-    schedule(%{
+    %{
       setup: setup,
       backend: backend,
       epoch_ms: epoch_ms,
       script: Scenario.new(options.moves, options.kills),
       run_log: RunLog.new(),
       said: [],
-      next: epoch_ms
-    })
+      ticker: Ticker.start(:tick, @period_ms, @period_ms)
+    }
   end
 
   @impl GenServer
@@ -234,9 +234,5 @@ defmodule Sim.Fleet do
   defp become(%{backend: {module, backend}} = s, what, arguments),
     do: %{s | backend: {module, apply(module, what, [backend | arguments])}}
 
-  defp schedule(s) do
-    next = max(s.next + @period_ms, System.monotonic_time(:millisecond))
-    Process.send_after(self(), :tick, next, abs: true)
-    %{s | next: next}
-  end
+  defp schedule(s), do: %{s | ticker: Ticker.next(s.ticker)}
 end

@@ -25,7 +25,7 @@ defmodule Swarm.Comms do
     * `:boot` - a number that grows with every start; default the time of day
   """
   use GenServer
-  alias Hal.Event
+  alias Hal.{Event, Ticker}
   alias Robot.{Board, Config, Names}
   alias Robot.Control.Pilot
   alias Swarm.{EStop, Message, Nonblocking}
@@ -109,11 +109,11 @@ defmodule Swarm.Comms do
       name: NameClaim.new(id, {boot, node()}),
       unseen: 0,
       noted: nil,
-      next: System.monotonic_time(:millisecond)
+      ticker: Config.ticker(config, :tick, @tick_ms)
     }
 
     EStop.present(id, true)
-    {:ok, schedule(s), {:continue, :enter}}
+    {:ok, s, {:continue, :enter}}
   end
 
   @impl GenServer
@@ -249,11 +249,5 @@ defmodule Swarm.Comms do
     end
   end
 
-  defp schedule(%{config: %{pace: :manual}} = s), do: s
-
-  defp schedule(s) do
-    next = max(s.next + @tick_ms, System.monotonic_time(:millisecond))
-    Process.send_after(self(), :tick, next, abs: true)
-    %{s | next: next}
-  end
+  defp schedule(s), do: %{s | ticker: Ticker.next(s.ticker)}
 end

@@ -6,6 +6,7 @@ defmodule Console.Live.Trial do
   and so an answer may take as long as a step.
   """
   use GenServer
+  alias Hal.Ticker
   @behaviour Console.Live
 
   @step_ms 100
@@ -35,8 +36,7 @@ defmodule Console.Live.Trial do
 
   @impl GenServer
   def init({module, trial}) do
-    send(self(), :step)
-    {:ok, %{module: module, trial: trial, next_ms: now()}}
+    {:ok, %{module: module, trial: trial, ticker: Ticker.start(:step, @step_ms, 0)}}
   end
 
   @impl GenServer
@@ -53,9 +53,7 @@ defmodule Console.Live.Trial do
   @impl GenServer
   def handle_info(:step, state) do
     trial = state.module.step(state.trial)
-    next_ms = max(state.next_ms + @step_ms, now())
-    Process.send_after(self(), :step, next_ms, abs: true)
-    {:noreply, %{state | trial: trial, next_ms: next_ms}}
+    {:noreply, %{state | trial: trial, ticker: Ticker.next(state.ticker)}}
   end
 
   defp carry_out({:kill, :leader}, %{module: module, trial: trial}) do
@@ -94,6 +92,4 @@ defmodule Console.Live.Trial do
 
   defp tell(robots, command, %{module: module, trial: trial}),
     do: {:ok, Enum.reduce(robots, trial, &module.command(&2, &1, command))}
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

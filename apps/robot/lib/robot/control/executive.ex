@@ -10,7 +10,7 @@ defmodule Robot.Control.Executive do
   forget what the one before it wished.
   """
   use GenServer
-  alias Hal.{Device, Event}
+  alias Hal.{Device, Event, Ticker}
   alias Robot.{Behaviour, Board, Config, Mission, Names, Percept}
   alias Robot.Control.{Controller, Trace}
   alias Robot.Safety.{DryRun, Gate}
@@ -77,10 +77,10 @@ defmodule Robot.Control.Executive do
       controller: Controller.new(profile: config.profile, start: config.start),
       told: nil,
       tick: 0,
-      next: System.monotonic_time(:millisecond)
+      ticker: Config.ticker(config, :tick, @period_ms)
     }
 
-    {:ok, schedule(s)}
+    {:ok, s}
   end
 
   @impl GenServer
@@ -177,12 +177,5 @@ defmodule Robot.Control.Executive do
     Trace.effect(s.config, :executive, event, at_ms)
   end
 
-  # At absolute times, so that the pace does not drift; ticks that were missed are not made up for.
-  defp schedule(%{config: %{pace: :manual}} = s), do: s
-
-  defp schedule(s) do
-    next = max(s.next + @period_ms, System.monotonic_time(:millisecond))
-    Process.send_after(self(), :tick, next, abs: true)
-    %{s | next: next}
-  end
+  defp schedule(s), do: %{s | ticker: Ticker.next(s.ticker)}
 end

@@ -16,7 +16,7 @@ defmodule Robot.Safety.Gate do
   (`Robot.Safety.DryRun`) it asks for nothing else either, and tells what it would have asked for.
   """
   use GenServer
-  alias Hal.{Device, Event, Twist}
+  alias Hal.{Device, Event, Ticker, Twist}
   alias Robot.{Board, Config, Names}
   alias Robot.Control.Trace
   alias Robot.Safety.{DryRun, Reflex}
@@ -82,10 +82,10 @@ defmodule Robot.Safety.Gate do
         ),
       told: nil,
       limits: nil,
-      next: System.monotonic_time(:millisecond)
+      ticker: Config.ticker(config, :step, @period_ms)
     }
 
-    {:ok, s |> step(at_ms) |> schedule()}
+    {:ok, step(s, at_ms)}
   end
 
   @impl GenServer
@@ -186,14 +186,7 @@ defmodule Robot.Safety.Gate do
     {Twist.zero(), [:dry_run | limits], %{s | told: told}}
   end
 
-  # At absolute times, so that the pace does not drift; steps that were missed are not made up for.
-  defp schedule(%{config: %{pace: :manual}} = s), do: s
-
-  defp schedule(s) do
-    next = max(s.next + @period_ms, System.monotonic_time(:millisecond))
-    Process.send_after(self(), :step, next, abs: true)
-    %{s | next: next}
-  end
+  defp schedule(s), do: %{s | ticker: Ticker.next(s.ticker)}
 
   defp tell_latch(s), do: with({m, f, a} <- s.config.on_latch, do: apply(m, f, a))
 

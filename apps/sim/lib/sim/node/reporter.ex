@@ -7,7 +7,7 @@ defmodule Sim.Node.Reporter do
   operating system: `{:up, facts}`, `{:report, term}`, `{:stage, about}`.
   """
   use GenServer
-  alias Hal.Event
+  alias Hal.{Event, Ticker}
 
   @period_ms 100
 
@@ -27,7 +27,8 @@ defmodule Sim.Node.Reporter do
   def init({launcher, report}) do
     :ok = Event.attach(__MODULE__, [:robot, :stage], &__MODULE__.stage/4, self())
     me = System.pid() |> String.to_integer()
-    {:ok, schedule(%{launcher: launcher, report: report, me: me, waiting: [], next: now()})}
+    ticker = Ticker.start(:report, @period_ms, @period_ms)
+    {:ok, %{launcher: launcher, report: report, me: me, waiting: [], ticker: ticker}}
   end
 
   @impl GenServer
@@ -57,11 +58,5 @@ defmodule Sim.Node.Reporter do
       else: :noconnect
   end
 
-  defp schedule(s) do
-    next = max(s.next + @period_ms, now())
-    Process.send_after(self(), :report, next, abs: true)
-    %{s | next: next}
-  end
-
-  defp now, do: System.monotonic_time(:millisecond)
+  defp schedule(s), do: %{s | ticker: Ticker.next(s.ticker)}
 end

@@ -18,7 +18,7 @@ defmodule Sim.World.Server do
   for: then the world is slow, and says so by the event `[:sim, :server, :late]` with `late_ms`.
   """
   use GenServer
-  alias Hal.{Event, Pose, Twist}
+  alias Hal.{Event, Pose, Ticker, Twist}
   alias Sim.World
   alias Sim.World.CameraView
 
@@ -26,7 +26,7 @@ defmodule Sim.World.Server do
   @late_ms 50
   @watchdog_steps 10
 
-  @enforce_keys [:name, :world, :next]
+  @enforce_keys [:name, :world, :ticker]
   defstruct @enforce_keys ++
               [devices: %{}, owners: %{}, driven: %{}, asked: MapSet.new(), stats: nil]
 
@@ -117,8 +117,8 @@ defmodule Sim.World.Server do
     # Time does not wait for those who live in it.
     Process.flag(:priority, :high)
     :ok = World.Directory.enter(name, self())
-    next = System.monotonic_time(:millisecond)
-    {:ok, schedule(%__MODULE__{name: name, world: world, next: next, stats: new_stats()})}
+    ticker = Ticker.start(:step, @step_ms, @step_ms)
+    {:ok, %__MODULE__{name: name, world: world, ticker: ticker, stats: new_stats()}}
   end
 
   @impl GenServer
@@ -247,7 +247,7 @@ defmodule Sim.World.Server do
   end
 
   defp note(s, begun) do
-    late_ms = max(div(begun, 1_000) - s.next, 0)
+    late_ms = max(div(begun, 1_000) - s.ticker.due_ms, 0)
     busy_us = System.monotonic_time(:microsecond) - begun
     about = %{world: s.name}
     if late_ms > @late_ms, do: Event.execute([:sim, :server, :late], %{late_ms: late_ms}, about)
@@ -268,9 +268,5 @@ defmodule Sim.World.Server do
 
   defp new_stats, do: %{steps: 0, late_ms_max: 0, late_ms_sum: 0, busy_us: 0, busy_us_max: 0}
 
-  defp schedule(s) do
-    next = max(s.next + @step_ms, System.monotonic_time(:millisecond))
-    Process.send_after(self(), :step, next, abs: true)
-    %{s | next: next}
-  end
+  defp schedule(s), do: %{s | ticker: Ticker.next(s.ticker)}
 end

@@ -1,0 +1,40 @@
+defmodule Hal.Ticker do
+  @moduledoc """
+  Sends its owner the same message again and again, at absolute times, so that the pace does not drift. Ticks that
+  were missed are not made up for. The owner asks for each next one when it has handled the last.
+  """
+  @enforce_keys [:message, :period_ms, :due_ms]
+  defstruct @enforce_keys
+
+  @typedoc "`due_ms` is when the next message comes, or the last one was to come, in monotonic time."
+  @type t :: %__MODULE__{message: term(), period_ms: pos_integer(), due_ms: integer()}
+
+  @doc "Sends the caller the first `message`, `first_ms` from now."
+  @spec start(message :: term(), period_ms :: pos_integer(), first_ms :: non_neg_integer()) :: t()
+  def start(message, period_ms, first_ms),
+    do: arm(%__MODULE__{message: message, period_ms: period_ms, due_ms: now() + first_ms})
+
+  @doc "Sends the caller the next message; `nil`, where somebody else sets the pace, sends nothing."
+  @spec next(t()) :: t()
+  @spec next(nil) :: nil
+  def next(nil), do: nil
+
+  def next(%__MODULE__{} = ticker),
+    do: arm(%{ticker | due_ms: due(ticker.due_ms, ticker.period_ms, now())})
+
+  defp arm(ticker) do
+    Process.send_after(self(), ticker.message, ticker.due_ms, abs: true)
+    ticker
+  end
+
+  @doc """
+  When the tick after the one of `last_ms` is due: a period later, or at once, if that is over.
+
+      iex> {Hal.Ticker.due(1_000, 50, 1_020), Hal.Ticker.due(1_000, 50, 1_170)}
+      {1_050, 1_170}
+  """
+  @spec due(last_ms :: integer(), period_ms :: pos_integer(), now_ms :: integer()) :: integer()
+  def due(last_ms, period_ms, now_ms), do: max(last_ms + period_ms, now_ms)
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

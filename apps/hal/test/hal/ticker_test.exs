@@ -1,0 +1,27 @@
+defmodule Hal.TickerTest do
+  use ExUnit.Case, async: true
+  alias Hal.Ticker
+  doctest Ticker
+
+  test "keeps to its times, however late it is asked for the next" do
+    ticker = Ticker.start(:tick, 20, 0)
+    first_ms = ticker.due_ms
+    assert_receive :tick
+    refute_received :tick
+    assert Ticker.next(ticker).due_ms - first_ms >= 20
+    assert_receive :tick
+  end
+
+  test "does not make up for what was missed" do
+    now_ms = System.monotonic_time(:millisecond)
+    late = %Ticker{message: :tick, period_ms: 20, due_ms: now_ms - 10_000}
+    ticker = Ticker.next(late)
+    assert ticker.due_ms >= now_ms
+    assert_receive :tick
+    refute_received :tick
+  end
+
+  test "where somebody else sets the pace, nothing comes" do
+    assert Ticker.next(nil) == nil
+  end
+end
