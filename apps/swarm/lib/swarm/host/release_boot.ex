@@ -133,10 +133,20 @@ defmodule Swarm.Host.ReleaseBoot do
   @spec main() :: :ok
   def main do
     environment = System.get_env()
+    missions(environment)
     {status, output, errors} = answer(Map.get(environment, "RELEASE_COMMAND", ""), environment)
     Enum.each(errors, &IO.puts(:stderr, &1))
     Enum.each(output, &IO.puts/1)
     if status != 0, do: System.halt(status), else: :ok
+  end
+
+  # This VM is asked without the release's settings, as those of the start would come along. The missions that a
+  # robot file may name are settings of the build.
+  defp missions(environment) do
+    with %{"RELEASE_ROOT" => root, "RELEASE_VSN" => version} <- environment,
+         {:ok, [settings]} <- :file.consult(Path.join([root, "releases", version, "sys.config"])),
+         {:ok, missions} <- Keyword.fetch(Keyword.get(settings, :swarm, []), :missions),
+         do: Application.put_env(:swarm, :missions, missions)
   end
 
   defp halt(environment, file) do
