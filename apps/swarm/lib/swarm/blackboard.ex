@@ -1,7 +1,7 @@
 defmodule Swarm.Blackboard do
   @moduledoc """
-  What the robots of the fleet tell of themselves, on every node: `Swarm.Blackboard.State` in one process a node,
-  readable by all without asking it.
+  What the robots of the fleet tell of themselves, and leave for each other (`Swarm.Blackboard.Hints`), on every
+  node: `Swarm.Blackboard.State` in one process a node, readable by all without asking it.
 
       Swarm.Blackboard.put(:mag1, :door, %{open: true})        # on the node of mag1
       Swarm.Blackboard.get(:mag1, :door, 2_000)                # on any node
@@ -39,7 +39,16 @@ defmodule Swarm.Blackboard do
   @doc "Starts a node's board."
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options \\ []) do
-    options = Keyword.validate!(options, Blackboard.Gossip.options(__MODULE__) ++ [limits: []])
+    options =
+      Keyword.validate!(options, [
+        :seed,
+        name: __MODULE__,
+        transport: {Swarm.Mesh, :cast, []},
+        nodes: {Blackboard.Gossip, :alive, []},
+        repair_ms: 1_000,
+        limits: []
+      ])
+
     GenServer.start_link(Blackboard.Server, options, name: options[:name])
   end
 
@@ -80,7 +89,7 @@ defmodule Swarm.Blackboard do
   @spec get(atom(), atom(), Blackboard.Codec.key(), age() | :infinity) ::
           {:ok, term(), age()} | :error
   def get(board \\ __MODULE__, robot, key, max_age_ms) do
-    with [{_, payload, at_ms}] <- SafeTable.lookup(board, {robot, Blackboard.Codec.id(key)}),
+    with [{_, payload, at_ms, _}] <- SafeTable.lookup(board, {robot, Blackboard.Codec.id(key)}),
          age when age <= max_age_ms <- age(at_ms),
          # Two keys may have one number.
          {:ok, ^key, value} <- Blackboard.Codec.decode(payload) do
@@ -93,7 +102,8 @@ defmodule Swarm.Blackboard do
   @doc "All rows of a robot, by key, with their ages in ms."
   @spec rows(atom(), atom()) :: %{Blackboard.Codec.key() => {term(), age()}}
   def rows(board \\ __MODULE__, robot) do
-    for {_, payload, at_ms} <- SafeTable.select(board, [{{{robot, :_}, :_, :_}, [], [:"$_"]}]),
+    for {_, payload, at_ms, _} <-
+          SafeTable.select(board, [{{{robot, :_}, :_, :_, :_}, [], [:"$_"]}]),
         {:ok, key, value} <- [Blackboard.Codec.decode(payload)],
         into: %{},
         do: {key, {value, age(at_ms)}}
@@ -104,7 +114,7 @@ defmodule Swarm.Blackboard do
   def robots(board \\ __MODULE__),
     do:
       board
-      |> SafeTable.select([{{{:"$1", :_}, :_, :_}, [], [:"$1"]}])
+      |> SafeTable.select([{{{:"$1", :_}, :_, :_, :_}, [{:is_atom, :"$1"}], [:"$1"]}])
       |> Enum.uniq()
       |> Enum.sort()
 
@@ -116,7 +126,7 @@ defmodule Swarm.Blackboard do
   @spec repair(GenServer.server()) :: :ok
   def repair(board \\ __MODULE__), do: GenServer.cast(board, :repair)
 
-  @doc "How many robots and rows there are, and what was dropped, for people and tests."
+  @doc "How many robots, rows and hints there are, and what was dropped, for people and tests."
   @spec info(GenServer.server()) :: map() | {:error, line :: String.t()}
   def info(board \\ __MODULE__), do: call(board, :info)
 

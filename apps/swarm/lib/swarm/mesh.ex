@@ -49,14 +49,14 @@ defmodule Swarm.Mesh do
   Sends a service's term to all other nodes, by datagram: it may be lost, doubled or come out of
   order. One of more than 60,000 bytes is refused. Without a mesh nothing is sent.
   """
-  @spec cast(:rows | :hints | :stop, term()) :: :ok | {:error, :too_big}
+  @spec cast(:rows | :stop, term()) :: :ok | {:error, :too_big}
   def cast(service, term), do: serve(service, :all, term)
 
   @doc "The same, to one node."
-  @spec cast(:rows | :hints | :stop, node(), term()) :: :ok | {:error, :too_big}
+  @spec cast(:rows | :stop, node(), term()) :: :ok | {:error, :too_big}
   def cast(service, node, term), do: serve(service, node, term)
 
-  defp serve(service, to, term) when service in [:rows, :hints, :stop] do
+  defp serve(service, to, term) when service in [:rows, :stop] do
     if :erlang.external_size(term) > Packet.largest(),
       do: {:error, :too_big},
       else: radio({:serve, service, to, term})

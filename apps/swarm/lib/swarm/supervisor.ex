@@ -6,8 +6,7 @@ defmodule Swarm.Supervisor do
       |-- Robot.Names            who is who on this node
       |-- Swarm.Supervisor.Parts (one_for_one), each in the care of a Swarm.Supervisor.BackoffSupervisor
       |   |-- Swarm.Directory    who is where in the fleet
-      |   |-- Swarm.Blackboard   what the robots of the fleet tell of themselves
-      |   |-- Swarm.Blackboard.Hints        what robots leave for each other
+      |   |-- Swarm.Blackboard   what the robots tell of themselves, and leave for each other
       |   |-- Swarm.Directory.Presence    tells who joins and leaves
       |   |-- Swarm.EStop.Broadcaster        calls all robots to stop
       |   |-- Swarm.Mesh.Supervisor  the other nodes, where there is a mesh
@@ -37,7 +36,6 @@ defmodule Swarm.Supervisor do
       children = [
         Swarm.Directory,
         Swarm.Blackboard,
-        Swarm.Blackboard.Hints,
         Swarm.Directory.Presence,
         Swarm.EStop.Broadcaster | mesh ++ machine
       ]

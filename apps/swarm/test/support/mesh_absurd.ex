@@ -15,7 +15,7 @@ defmodule Swarm.MeshNodes.Absurd do
   def send_all(me, every) do
     messages = messages(me) ++ for m <- messages(me), do: %{m | kind: :relay}
     relayed = for m <- messages, do: %Message{from: me, kind: :relay, body: Map.put(m, :hops, 1)}
-    services = for service <- [:rows, :hints, :stop], term <- services(me), do: {service, term}
+    services = for service <- [:rows, :stop], term <- services(me), do: {service, term}
 
     messages = Enum.take_every(messages ++ relayed, every)
     services = Enum.take_every(services, every)
@@ -77,17 +77,21 @@ defmodule Swarm.MeshNodes.Absurd do
   defp services(me) do
     text = Atom.to_string(me)
 
-    for(tag <- [:rows, :have, :want, :hints, :digest, :estop], a <- wild(), do: {tag, a}) ++
-      for(tag <- [:rows, :have, :want, :hints], a <- wild(), do: {tag, [a]}) ++
+    for(tag <- [:rows, :have, :want, :digest, :estop], a <- wild(), do: {tag, a}) ++
+      for(tag <- [:rows, :have, :want], a <- wild(), do: {tag, [a]}) ++
       for(a <- wild(), b <- wild(), do: {:digest, a, b, [{text, 1}]}) ++
       for(a <- wild(), b <- wild(), do: {:have, a, b}) ++
       for(at <- 0..5, a <- wild(), do: {:rows, [put_elem({text, 1, 1, 1, 1, "x"}, at, a)]}) ++
-      for(at <- 0..3, a <- wild(), do: {:hints, [put_elem({1, 1, text, "x"}, at, a)]}) ++
+      for(at <- 0..5, a <- wild(), do: {:rows, [put_elem(hint(text), at, a)]}) ++
+      for(a <- wild(), b <- [{a, 1}, {text, a}], do: {:rows, [put_elem(hint(text), 3, b)]}) ++
       for(a <- wild(), do: {:rows, [{text, 1, 1, 1, 1, :erlang.term_to_binary({:about, a})}]}) ++
       for(a <- wild(), do: {:have, [{text, [{1, a, 1}, {1, 1, a}]}]}) ++
+      for(a <- wild(), do: {:have, [{<<1>>, [{1, a, {text, 1}}, {1, 1, {a, a}}]}]}) ++
       for(at <- 0..2, a <- wild(), do: {:estop, put_elem({node(), 1, 1}, at, a), 0}) ++
       for(a <- wild(), do: {:estop, {node(), 1, 1}, a}) ++ wild()
   end
+
+  defp hint(text), do: {<<1>>, 1, 1, {text, :erlang.phash2("x", 4_294_967_296)}, 1, "x"}
 
   defp wild do
     [

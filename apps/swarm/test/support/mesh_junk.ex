@@ -11,7 +11,6 @@ defmodule Swarm.MeshNodes.Junk do
     Swarm.Mesh.Server,
     Swarm.EStop.Broadcaster,
     Swarm.Directory.Presence,
-    Swarm.Blackboard.Hints,
     Swarm.Blackboard
   ]
 

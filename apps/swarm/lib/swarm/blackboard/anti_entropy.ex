@@ -3,88 +3,69 @@ defmodule Swarm.Blackboard.AntiEntropy do
   Who lacks which rows, found out in three messages: a digest; the stamps that the other has where it
   differs; the rows that this one has newer, and a wish for those that it has not. Pure.
   """
-  alias Swarm.Blackboard
+  alias Swarm.Blackboard.{Codec, Rows, State}
 
   @hashes 4_294_967_296
 
-  @typedoc "Of each robot a number that says which rows one has."
-  @type digest :: [{robot :: atom(), non_neg_integer()}]
+  @typedoc "Of each owner a number that says which rows one has."
+  @type digest :: [{Rows.owner(), non_neg_integer()}]
+  @type stamps :: [{Rows.owner(), [{Rows.key(), Rows.stamp()}]}]
 
   @doc """
-  A digest of all rows, sorted by name: one number a robot, equal where all stamps are.
+  A digest of all rows, sorted by name: one number an owner, equal where all stamps are.
 
       iex> Swarm.Blackboard.AntiEntropy.digest(Swarm.Blackboard.State.new())
       []
   """
-  @spec digest(Blackboard.State.t()) :: digest()
-  def digest(rows), do: for({robot, all} <- by_name(rows.robots), do: {robot, hash(all)})
+  @spec digest(State.t()) :: digest()
+  def digest(state) do
+    for {owner, all} <- Enum.sort_by(Rows.owners(state), fn {owner, _} -> Codec.name(owner) end),
+        do: {owner, hash(all)}
+  end
 
   @doc """
-  The robots of which another, by its digest, has other rows than this one. The digest may be a part,
+  The owners of which another, by its digest, has other rows than this one. The digest may be a part,
   of the names from `first` up to but without `until` (`nil`: to the end).
   """
-  @spec differing(Blackboard.State.t(), digest(), first :: String.t(), until :: String.t() | nil) ::
-          [atom()]
-  def differing(rows, digest, first \\ "", until \\ nil) do
-    theirs = Map.new(digest)
+  @spec differing(State.t(), digest(), first :: String.t(), until :: String.t() | nil) ::
+          [Rows.owner()]
+  def differing(state, digest, first \\ "", until \\ nil) do
+    mine = digest(state)
+    {theirs, held} = {Map.new(digest), Map.new(mine)}
     within? = fn name -> name >= first and (until == nil or name < until) end
 
-    mine =
-      for {robot, all} <- by_name(rows.robots),
-          within?.(Atom.to_string(robot)),
-          do: {robot, hash(all)}
-
-    lacked = for {robot, _hash} <- digest, not is_map_key(rows.robots, robot), do: robot
-    lacked ++ for {robot, hash} <- mine, theirs[robot] != hash, do: robot
+    for({owner, _hash} <- digest, not is_map_key(held, owner), do: owner) ++
+      for {owner, hash} <- mine, within?.(Codec.name(owner)), theirs[owner] != hash, do: owner
   end
 
-  @doc "Which rows of these robots one has."
-  @spec stamps(Blackboard.State.t(), [atom()]) :: [
-          {atom(), [{Blackboard.State.key(), Blackboard.State.stamp()}]}
-        ]
-  def stamps(rows, robots), do: for(robot <- robots, do: {robot, stamps_of(of(rows, robot))})
+  @doc "Which rows of these owners one has."
+  @spec stamps(State.t(), [Rows.owner()]) :: stamps()
+  def stamps(state, owners), do: for(owner <- owners, do: {owner, of(Rows.of(state, owner))})
 
-  @doc """
-  The rows that another lacks who has these; and `{robot, key}` of those that are newer there.
-  """
-  @spec diff(
-          Blackboard.State.t(),
-          [{atom(), [{Blackboard.State.key(), Blackboard.State.stamp()}]}],
-          integer()
-        ) ::
-          {[Blackboard.State.row()], wanted :: [{atom(), Blackboard.State.key()}]}
-  def diff(rows, theirs, now_ms) do
-    {lacked, wanted} =
-      for {robot, stamps} <- theirs do
-        had = Map.new(stamps)
-        mine = of(rows, robot)
+  @doc "The rows that another lacks who has these; and `{owner, key}` of those that are newer there."
+  @spec diff(State.t(), stamps(), integer()) ::
+          {[Rows.row()], wanted :: [{Rows.owner(), Rows.key()}]}
+  def diff(state, theirs, now_ms) do
+    lacked =
+      for {owner, stamps} <- theirs,
+          had = Map.new(stamps),
+          {_, key, stamp, _, _} = row <- Rows.rows(state, owner, now_ms),
+          newer?(stamp, had[key]),
+          do: row
 
-        {for(
-           {_, key, stamp, _, _} = row <- Blackboard.State.rows(rows, robot, now_ms),
-           newer?(stamp, had[key]),
-           do: row
-         ),
-         for(
-           {key, stamp} <- stamps,
-           newer?(stamp, mine |> Map.get(key) |> stamp()),
-           do: {robot, key}
-         )}
-      end
-      |> Enum.unzip()
+    wanted =
+      for {owner, stamps} <- theirs,
+          mine = state |> Rows.of(owner) |> of() |> Map.new(),
+          {key, stamp} <- stamps,
+          newer?(stamp, mine[key]),
+          do: {owner, key}
 
-    {Enum.concat(lacked), Enum.concat(wanted)}
+    {lacked, wanted}
   end
 
-  defp stamp(nil), do: nil
-  defp stamp({stamp, _value, _at_ms}), do: stamp
-
-  defp newer?(_stamp, nil), do: true
-  defp newer?(stamp, other), do: stamp > other
-
-  defp of(rows, robot), do: Map.get(rows.robots, robot, %{})
-  defp by_name(robots), do: Enum.sort_by(robots, fn {robot, _} -> Atom.to_string(robot) end)
+  defp newer?(stamp, other), do: other == nil or stamp > other
 
   # The same number on every machine and release.
-  defp hash(all), do: all |> stamps_of() |> :erlang.phash2(@hashes)
-  defp stamps_of(all), do: Enum.sort(for {key, {stamp, _value, _at_ms}} <- all, do: {key, stamp})
+  defp hash(all), do: :erlang.phash2(of(all), @hashes)
+  defp of(all), do: Enum.sort(for {key, {stamp, _value, _at_ms}} <- all, do: {key, stamp})
 end

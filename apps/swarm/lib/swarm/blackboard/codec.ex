@@ -6,16 +6,17 @@ defmodule Swarm.Blackboard.Codec do
   | term | means |
   |---|---|
   | `{:rows, [{name, id, incarnation, sequence, age_ms, payload}]}` | rows |
-  | `{:digest, first, until, [{name, hash}]}` | of the robots named so, this is what I have |
+  | `{:digest, first, until, [{name, hash}]}` | of those named so, this is what I have |
   | `{:have, [{name, [{id, incarnation, sequence}]}]}` | of these I have these rows: send what I lack |
   | `{:want, [{name, id}]}` | send these |
 
   Names of robots travel as text, keys as a number, and keys with their values as bytes, so that
-  a node relays what it has no words for; nothing that arrives becomes an atom.
+  a node relays what it has no words for; nothing that arrives becomes an atom. Of a hint, the name is the
+  byte of its bucket, `incarnation` its count and `sequence` `{writer, check}`; one that is deleted has an
+  empty payload.
   """
-  alias Swarm.Blackboard
+  alias Swarm.Blackboard.{AntiEntropy, Rows}
   alias Swarm.Message.WireTypes
-  alias Swarm.Blackboard.AntiEntropy
 
   # Of the payload of a datagram; larger terms go alone.
   @datagram 1_200
@@ -73,19 +74,18 @@ defmodule Swarm.Blackboard.Codec do
   end
 
   @doc "Rows as terms for datagrams."
-  @spec tell([Blackboard.State.row()]) :: [term()]
+  @spec tell([Rows.row()]) :: [term()]
   def tell(rows) do
-    for {robot, id, {incarnation, sequence}, age_ms, payload} <- rows do
-      {Atom.to_string(robot), id, incarnation, sequence, age_ms, payload}
-    end
-    |> pack()
-    |> Enum.map(&{:rows, &1})
+    rows =
+      for {owner, id, {n, m}, age_ms, value} <- rows, do: {name(owner), id, n, m, age_ms, value}
+
+    for part <- pack(rows), do: {:rows, part}
   end
 
   @doc "A digest as terms for datagrams, each of which says of which names it is."
   @spec digest(AntiEntropy.digest()) :: [term()]
   def digest(digest) do
-    parts = pack(for {robot, hash} <- digest, do: {Atom.to_string(robot), hash})
+    parts = pack(for {owner, hash} <- digest, do: {name(owner), hash})
     firsts = parts |> Enum.drop(1) |> Enum.map(fn [{name, _hash} | _] -> name end)
 
     case Enum.zip([parts, ["" | firsts], firsts ++ [nil]]) do
@@ -95,20 +95,23 @@ defmodule Swarm.Blackboard.Codec do
   end
 
   @doc "Stamps as terms for datagrams."
-  @spec have([{atom(), [{id(), Blackboard.State.stamp()}]}]) :: [term()]
+  @spec have(AntiEntropy.stamps()) :: [term()]
   def have(stamps) do
-    for {robot, stamps} <- stamps do
-      {Atom.to_string(robot), for({id, {incarnation, n}} <- stamps, do: {id, incarnation, n})}
-    end
-    |> pack()
-    |> Enum.map(&{:have, &1})
+    stamps =
+      for {owner, own} <- stamps, do: {name(owner), for({id, {n, m}} <- own, do: {id, n, m})}
+
+    for part <- pack(stamps), do: {:have, part}
   end
 
   @doc "Wishes as terms for datagrams."
-  @spec want([{atom(), id()}]) :: [term()]
-  def want(wanted) do
-    pack(for {robot, id} <- wanted, do: {Atom.to_string(robot), id}) |> Enum.map(&{:want, &1})
-  end
+  @spec want([{Rows.owner(), id()}]) :: [term()]
+  def want(wanted),
+    do: for(part <- pack(for {owner, id} <- wanted, do: {name(owner), id}), do: {:want, part})
+
+  @doc "What rows of an owner are named by: a robot's name as text, a bucket's one byte."
+  @spec name(Rows.owner()) :: binary()
+  def name(robot) when is_atom(robot), do: Atom.to_string(robot)
+  def name(bucket), do: <<bucket>>
 
   @doc """
   Lists of terms, each list small enough for a datagram; what is too large for that goes alone.
@@ -140,10 +143,10 @@ defmodule Swarm.Blackboard.Codec do
   end
 
   @type heard ::
-          {:rows, [Blackboard.State.row()]}
+          {:rows, [Rows.row()]}
           | {:digest, String.t(), String.t() | nil, AntiEntropy.digest()}
-          | {:have, [{atom(), [{id(), Blackboard.State.stamp()}]}]}
-          | {:want, [{atom(), id()}]}
+          | {:have, AntiEntropy.stamps()}
+          | {:want, [{Rows.owner(), id()}]}
 
   @doc """
   What a term from outside says, and how much of it was dropped: entries of no sense, and those
@@ -161,7 +164,7 @@ defmodule Swarm.Blackboard.Codec do
 
   def read({:digest, first, until, list})
       when is_binary(first) and (until == nil or is_binary(until)) do
-    with {:ok, digest, dropped} <- each(list, &hash/1),
+    with {:ok, digest, dropped} <- each(list, &number/1),
          do: {{:digest, first, until, digest}, dropped}
   end
 
@@ -170,7 +173,7 @@ defmodule Swarm.Blackboard.Codec do
   end
 
   def read({:want, list}) do
-    with {:ok, wanted, dropped} <- each(list, &wish/1), do: {{:want, wanted}, dropped}
+    with {:ok, wanted, dropped} <- each(list, &number/1), do: {{:want, wanted}, dropped}
   end
 
   def read(_other), do: :error
@@ -184,45 +187,52 @@ defmodule Swarm.Blackboard.Codec do
     end
   end
 
-  defguardp stamp?(incarnation, n)
-            when is_integer(incarnation) and incarnation >= 0 and incarnation <= @latest and
-                   is_integer(n) and n >= 0 and n <= @most
-
   defguardp id?(id) when is_integer(id) and id >= 0 and id < @ids
 
-  defp row({name, id, incarnation, n, age_ms, payload})
-       when id?(id) and stamp?(incarnation, n) and age_ms in 0..@oldest_ms and
-              is_binary(payload) do
-    with {:ok, robot} <- robot(name), do: {:ok, {robot, id, {incarnation, n}, age_ms, payload}}
+  defp row({name, id, n, m, age_ms, payload})
+       when id?(id) and age_ms in 0..@oldest_ms and is_binary(payload) do
+    with {:ok, owner} <- owner(name),
+         true <- stamp?(owner, id, n, m),
+         true <- is_atom(owner) or Rows.hint_stamp(n, elem(m, 0), payload) == {n, m},
+         do: {:ok, {owner, id, {n, m}, age_ms, payload}},
+         else: (_other -> :error)
   end
 
   defp row(_other), do: :error
 
-  defp hash({name, hash}) when id?(hash) do
-    with {:ok, robot} <- robot(name), do: {:ok, {robot, hash}}
+  # A hash, or a wish.
+  defp number({name, number}) when id?(number) do
+    with {:ok, owner} <- owner(name), do: {:ok, {owner, number}}
   end
 
-  defp hash(_other), do: :error
-
-  defp wish({name, id}) when id?(id) do
-    with {:ok, robot} <- robot(name), do: {:ok, {robot, id}}
-  end
-
-  defp wish(_other), do: :error
+  defp number(_other), do: :error
 
   defp stamps({name, list}) do
-    with {:ok, robot} <- robot(name),
-         {:ok, stamps, 0} <- each(list, &stamp/1),
-         do: {:ok, {robot, stamps}},
+    with {:ok, owner} <- owner(name),
+         {:ok, stamps, 0} <- each(list, &stamp(owner, &1)),
+         do: {:ok, {owner, stamps}},
          else: (_other -> :error)
   end
 
   defp stamps(_other), do: :error
 
-  defp stamp({id, incarnation, n}) when id?(id) and stamp?(incarnation, n),
-    do: {:ok, {id, {incarnation, n}}}
+  defp stamp(owner, {id, n, m}) when id?(id),
+    do: if(stamp?(owner, id, n, m), do: {:ok, {id, {n, m}}}, else: :error)
 
-  defp stamp(_other), do: :error
+  defp stamp(_owner, _other), do: :error
+
+  defp stamp?(robot, _id, incarnation, sequence) when is_atom(robot),
+    do: incarnation in 0..@latest and sequence in 0..@most
+
+  defp stamp?(bucket, id, count, {writer, check}) when id?(check),
+    do: Rows.bucket(id) == bucket and count in 1..@latest and text?(writer)
+
+  defp stamp?(_bucket, _id, _count, _other), do: false
+
+  defp text?(name), do: is_binary(name) and byte_size(name) in 1..255
+
+  defp owner(<<bucket>>) when bucket in 0..15, do: {:ok, bucket}
+  defp owner(name), do: robot(name)
 
   @doc """
   The atom of a name, if there is one.

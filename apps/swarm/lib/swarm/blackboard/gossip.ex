@@ -1,45 +1,17 @@
 defmodule Swarm.Blackboard.Gossip do
-  @moduledoc false
-  # How blackboard and hints reach other nodes: by a transport, `{m, f, a}`, that may be a test's.
+  @moduledoc "How a blackboard reaches other nodes: by a transport, `{m, f, a}`, that may be a test's."
   alias Swarm.Mesh
-
-  @repair_ms 1_000
 
   @type call :: {module(), atom(), list()}
 
-  @doc "The options that both have, with their defaults."
-  @spec options(name :: atom()) :: [atom() | {atom(), term()}]
-  def options(name) do
-    [
-      :seed,
-      name: name,
-      transport: {Mesh, :cast, []},
-      nodes: {__MODULE__, :alive, []},
-      repair_ms: @repair_ms
-    ]
-  end
-
-  @doc "Sends `:repair` to the calling process in about so many ms; never for `:never`."
-  @spec repair_later(pos_integer() | :never, :rand.state()) :: :rand.state()
-  def repair_later(:never, rand), do: rand
-
-  # Not all nodes at one moment.
-  def repair_later(ms, rand) do
-    {part, rand} = :rand.uniform_s(rand)
-    Process.send_after(self(), :repair, round(ms * (0.75 + 0.5 * part)))
-    rand
-  end
-
-  @doc "To all other nodes. What does not go out, or gets lost, is repaired later."
-  @spec cast(call(), atom(), term()) :: :ok
-  def cast({m, f, a}, service, term), do: go(m, f, a ++ [service, term])
-
-  @doc "To one of them."
-  @spec cast(call(), atom(), node(), term()) :: :ok
-  def cast({m, f, a}, service, node, term), do: go(m, f, a ++ [service, node, term])
-
-  defp go(m, f, arguments) do
-    _ok_or_too_big = apply(m, f, arguments)
+  @doc """
+  Terms to some nodes, one after the other, or to all. What does not go out, or gets lost, is repaired
+  later.
+  """
+  @spec cast(call(), [node()] | :all, [term()]) :: :ok
+  def cast({m, f, a}, nodes, terms) do
+    to = if nodes == :all, do: [[]], else: Enum.map(nodes, &[&1])
+    for to <- to, term <- terms, do: apply(m, f, a ++ [:rows | to] ++ [term])
     :ok
   end
 
@@ -58,9 +30,4 @@ defmodule Swarm.Blackboard.Gossip do
 
     {drawn |> Enum.sort() |> Enum.take(count) |> Enum.map(&elem(&1, 1)), rand}
   end
-
-  @doc "The state of a choice: from a seed, or a new one."
-  @spec seed(nil | integer()) :: :rand.state()
-  def seed(nil), do: :rand.seed_s(:exsss)
-  def seed(seed), do: :rand.seed_s(:exsss, seed)
 end

@@ -6,8 +6,8 @@ defmodule Swarm.Blackboard.Server do
   use GenServer
   alias Hal.Event
   alias Swarm.Blackboard
+  alias Swarm.Blackboard.{AntiEntropy, Rows}
   alias Swarm.Message.WireTypes
-  alias Swarm.Blackboard.AntiEntropy
 
   # Nodes that get each digest.
   @peers 2
@@ -18,7 +18,7 @@ defmodule Swarm.Blackboard.Server do
     # Sorted, so that the rows of one robot are found without looking at all.
     :ets.new(options[:name], [:ordered_set, :named_table, read_concurrency: true])
 
-    {first, rand} = :rand.uniform_s(@firsts, Blackboard.Gossip.seed(options[:seed]))
+    {first, rand} = :rand.uniform_s(@firsts, seed(options[:seed]))
 
     s = %{
       table: options[:name],
@@ -54,9 +54,20 @@ defmodule Swarm.Blackboard.Server do
     end
   end
 
+  def handle_call({:hint, writer, key, payload}, _from, s)
+      when is_binary(writer) and byte_size(writer) in 1..255 and is_binary(payload) do
+    id = Blackboard.Codec.id(key)
+
+    case Blackboard.State.put_hint(s.rows, writer, id, payload, now()) do
+      {:ok, rows} -> {:reply, :ok, written(%{s | rows: rows}, Rows.bucket(id), id)}
+      {:error, reason} -> {:reply, {:error, line(reason, writer, key, payload, s)}, s}
+    end
+  end
+
   def handle_call(:info, _from, s) do
-    rows = :ets.info(s.table, :size)
-    {:reply, %{robots: map_size(s.rows.robots), rows: rows, dropped: s.dropped}, s}
+    hints = map_size(s.rows.hints)
+    rows = :ets.info(s.table, :size) - hints
+    {:reply, %{robots: map_size(s.rows.robots), rows: rows, hints: hints, dropped: s.dropped}, s}
   end
 
   def handle_call(_unknown, _from, s), do: {:noreply, drop(s, 1)}
@@ -88,7 +99,7 @@ defmodule Swarm.Blackboard.Server do
 
     {:noreply,
      %{s | rows: rows}
-     |> show(for {robot, _key} <- gone, do: robot)
+     |> show(for {owner, _key} <- gone, uniq: true, do: owner)
      |> send_digests()
      |> schedule()}
   end
@@ -137,36 +148,41 @@ defmodule Swarm.Blackboard.Server do
     id = Blackboard.Codec.id(key)
 
     with {:ok, rows} <- Blackboard.State.put(s.rows, robot, id, payload, now()),
-         do: {:ok, %{s | rows: rows} |> show([robot]) |> say_soon(robot, id)}
+         do: {:ok, written(%{s | rows: rows}, robot, id)}
   end
+
+  defp written(s, owner, id), do: s |> show([owner]) |> say_soon(owner, id)
 
   defp line(:not_own, robot, _key, _payload, _s),
     do:
       "#{inspect(robot)} is not a robot of this node; each robot writes its own rows, on its node"
 
-  defp line(:bytes, _robot, key, payload, s),
-    do:
-      "the row #{inspect(key)} cannot have #{byte_size(payload)} bytes; it may have #{s.rows.limits.bytes}"
+  defp line(:bytes, _robot, key, payload, s), do: large("row", key, payload, s.rows.limits.bytes)
+
+  defp line(:hint_bytes, _robot, key, payload, s),
+    do: large("hint", key, payload, s.rows.limits.hint_bytes)
 
   defp line(:keys, robot, _key, _payload, s),
     do: "#{robot} cannot have more rows; it has #{s.rows.limits.keys} already"
 
+  defp large(what, key, payload, most),
+    do: "the #{what} #{inspect(key)} cannot have #{byte_size(payload)} bytes; it may have #{most}"
+
   # Several rows written at once share a datagram.
-  defp say_soon(s, robot, id) do
+  defp say_soon(s, owner, id) do
     if s.unsaid == [], do: send(self(), :push)
-    if {robot, id} in s.unsaid, do: s, else: %{s | unsaid: [{robot, id} | s.unsaid]}
+    if {owner, id} in s.unsaid, do: s, else: %{s | unsaid: [{owner, id} | s.unsaid]}
   end
 
   defp push(s) do
-    now_ms = now()
-
-    rows =
-      for {robot, id} <- Enum.reverse(s.unsaid),
-          row <- Blackboard.State.rows(s.rows, robot, id, now_ms),
-          do: row
-
-    for term <- Blackboard.Codec.tell(rows), do: Blackboard.Gossip.cast(s.transport, :rows, term)
+    terms = s |> rows(Enum.reverse(s.unsaid)) |> Blackboard.Codec.tell()
+    Blackboard.Gossip.cast(s.transport, :all, terms)
     %{s | unsaid: []}
+  end
+
+  defp rows(s, ids) do
+    now_ms = now()
+    for {owner, id} <- ids, row <- Rows.rows(s.rows, owner, id, now_ms), do: row
   end
 
   defp heard(s, node, {:rows, rows}) do
@@ -175,8 +191,8 @@ defmodule Swarm.Blackboard.Server do
   end
 
   defp heard(s, node, {:digest, first, until, digest}) do
-    robots = AntiEntropy.differing(s.rows, digest, first, until)
-    answer(s, node, Blackboard.Codec.have(AntiEntropy.stamps(s.rows, robots)))
+    owners = AntiEntropy.differing(s.rows, digest, first, until)
+    answer(s, node, Blackboard.Codec.have(AntiEntropy.stamps(s.rows, owners)))
   end
 
   defp heard(s, node, {:have, stamps}) do
@@ -184,39 +200,29 @@ defmodule Swarm.Blackboard.Server do
     answer(s, node, Blackboard.Codec.tell(lacked) ++ Blackboard.Codec.want(wanted))
   end
 
-  defp heard(s, node, {:want, wanted}) do
-    now_ms = now()
-
-    rows =
-      for {robot, id} <- Enum.uniq(wanted),
-          row <- Blackboard.State.rows(s.rows, robot, id, now_ms),
-          do: row
-
-    answer(s, node, Blackboard.Codec.tell(rows))
-  end
+  defp heard(s, node, {:want, wanted}),
+    do: answer(s, node, s |> rows(Enum.uniq(wanted)) |> Blackboard.Codec.tell())
 
   defp answer(s, node, terms) do
-    for term <- terms, do: Blackboard.Gossip.cast(s.transport, :rows, node, term)
+    Blackboard.Gossip.cast(s.transport, [node], terms)
     s
   end
 
   defp send_digests(s) do
     {nodes, rand} = Blackboard.Gossip.some(s.nodes, @peers, s.rand)
 
-    for node <- nodes,
-        term <- Blackboard.Codec.digest(AntiEntropy.digest(s.rows)),
-        do: Blackboard.Gossip.cast(s.transport, :rows, node, term)
-
+    digest = Blackboard.Codec.digest(AntiEntropy.digest(s.rows))
+    Blackboard.Gossip.cast(s.transport, nodes, digest)
     %{s | rand: rand}
   end
 
   defp noted(s, notes, from) do
-    s = show(s, Enum.uniq(for {what, robot, _} <- notes, what in [:changed, :rival], do: robot))
+    s = show(s, for({what, owner, _} <- notes, what in [:changed, :rival], uniq: true, do: owner))
 
     Enum.reduce(notes, s, fn
       {:again, robot}, s ->
         Enum.reduce(
-          Blackboard.State.rows(s.rows, robot, now()),
+          Rows.rows(s.rows, robot, now()),
           s,
           &say_soon(&2, robot, elem(&1, 1))
         )
@@ -243,26 +249,36 @@ defmodule Swarm.Blackboard.Server do
     end
   end
 
-  # The table follows the rows.
-  defp show(s, robots) do
-    for robot <- robots do
-      held = Map.get(s.rows.robots, robot, %{})
+  # The table follows the rows; who reads never finds it empty between.
+  defp show(s, owners) do
+    for {name, held} <- owners |> Enum.map(&held(s, &1)) |> Enum.uniq() do
+      shown = for {id, {stamp, payload, at_ms}} <- held, do: {{name, id}, payload, at_ms, stamp}
+      :ets.insert(s.table, shown)
 
-      :ets.insert(
-        s.table,
-        for({id, {_stamp, payload, at_ms}} <- held, do: {{robot, id}, payload, at_ms})
-      )
-
-      for id <- :ets.select(s.table, [{{{robot, :"$1"}, :_, :_}, [], [:"$1"]}]),
+      for id <- :ets.select(s.table, [{{{name, :"$1"}, :_, :_, :_}, [], [:"$1"]}]),
           not is_map_key(held, id),
-          do: :ets.delete(s.table, {robot, id})
+          do: :ets.delete(s.table, {name, id})
     end
 
     s
   end
 
+  defp held(s, robot) when is_atom(robot), do: {robot, Rows.of(s.rows, robot)}
+  # One more in a bucket may be one less in another.
+  defp held(s, _bucket), do: {Rows.shown_as(), s.rows.hints}
+
   defp drop(s, count), do: %{s | dropped: s.dropped + count}
   defp now, do: System.monotonic_time(:millisecond)
 
-  defp schedule(s), do: %{s | rand: Blackboard.Gossip.repair_later(s.repair_ms, s.rand)}
+  defp seed(nil), do: :rand.seed_s(:exsss)
+  defp seed(seed), do: :rand.seed_s(:exsss, seed)
+
+  defp schedule(%{repair_ms: :never} = s), do: s
+
+  # Not all nodes at one moment.
+  defp schedule(s) do
+    {part, rand} = :rand.uniform_s(s.rand)
+    Process.send_after(self(), :repair, round(s.repair_ms * (0.75 + 0.5 * part)))
+    %{s | rand: rand}
+  end
 end

@@ -2,12 +2,9 @@ defmodule Swarm.Blackboard.State do
   @moduledoc """
   What all robots tell of themselves, as one node knows it: `{robot, key} -> {incarnation, sequence,
   value}`. Each row has one writer, the robot itself, and the newest `{incarnation, sequence}` wins, so
-  that rows may come late, twice, in any order and by way of third parties. Pure; times are this
-  node's own, in milliseconds.
-
-  A row has an age and no time of day: it travels with its age at sending, and each who holds it adds
-  for how long. What the way took is not in it, so of two ages of one row the higher is nearer to the
-  truth.
+  that rows may come late, twice, in any order and by way of third parties. Beside them there are hints,
+  which all robots write (`put_hint/5`). Pure; times are this node's own, in milliseconds.
+  `Swarm.Blackboard.Rows` holds the rows.
 
   *Own* robots are those of this node (`enter/4`). What others say of them:
 
@@ -17,48 +14,51 @@ defmodule Swarm.Blackboard.State do
   | of a higher incarnation, and young | a rival of the same name: told (`{:rival, robot, incarnation}`), not taken |
   | of a higher incarnation, and over 5 s old | a former life, before the clock was set back: outbid |
 
-  Memory is bounded (`limits`): other robots, keys of a robot (the newest stay), bytes of a value.
-  """
+  A hint that is deleted stays as one with the value `""`, so that it does not come back, for ten minutes.
 
-  @limits %{robots: 256, keys: 32, bytes: 59_000}
+  Memory is bounded (`limits`): other robots, keys of a robot and hints (the newest stay), bytes of
+  a value.
+  """
+  alias Swarm.Blackboard.Rows
+
+  @limits %{robots: 256, keys: 32, bytes: 59_000, hints: 256, hint_bytes: 1_000}
   @rival_ms 5_000
+  # Nobody writes as often in one life, and no fleet as often unheard: a hint's count taken over from there
+  # would leave no room for what is written later.
   @leap 1_000_000_000_000
   @forget_ms 600_000
 
   @enforce_keys [:limits]
-  defstruct @enforce_keys ++ [first: 0, robots: %{}, own: %{}]
+  defstruct @enforce_keys ++ [first: 0, robots: %{}, own: %{}, hints: %{}, clock: 0]
 
-  @type key :: term()
-  @type stamp :: {incarnation :: non_neg_integer(), sequence :: non_neg_integer()}
-  @type held :: {stamp(), value :: term(), at_ms :: integer()}
+  @type key :: Rows.key()
   @type t :: %__MODULE__{
-          limits: %{robots: pos_integer(), keys: pos_integer(), bytes: pos_integer()},
+          limits: %{atom() => pos_integer()},
           first: non_neg_integer(),
-          robots: %{atom() => %{key() => held()}},
-          own: %{atom() => {boot :: non_neg_integer(), stamp()}}
+          robots: %{atom() => %{key() => Rows.held()}},
+          own: %{atom() => {boot :: non_neg_integer(), Rows.stamp()}},
+          hints: %{key() => Rows.held()},
+          clock: non_neg_integer()
         }
 
-  @typedoc "A row as it travels."
-  @type row :: {robot :: atom(), key(), stamp(), age_ms :: non_neg_integer(), value :: term()}
-
   @typedoc """
-    * `{:changed, robot, key}` - there is a newer value, or a better age
+    * `{:changed, owner, key}` - there is a newer value, or a better age
     * `{:again, robot}` - the rows of this own robot have new stamps, and must be told again
     * `{:rival, robot, incarnation}` - another robot has this own one's name
-    * `{:refused, :robots | :bytes}` - over a limit
+    * `{:refused, :robots | :bytes | :count}` - over a limit
   """
   @type note ::
-          {:changed, atom(), key()}
+          {:changed, Rows.owner(), key()}
           | {:again, atom()}
           | {:rival, atom(), non_neg_integer()}
-          | {:refused, :robots | :bytes}
+          | {:refused, :robots | :bytes | :count}
 
   @doc """
   Nothing known yet. Options are the limits, and `first`, after which sequences count: a board
   that was lost takes another one, so that no stamp is used twice within a robot's life.
 
       iex> Swarm.Blackboard.State.new(keys: 4).limits
-      %{robots: 256, keys: 4, bytes: 59_000}
+      %{robots: 256, keys: 4, bytes: 59_000, hints: 256, hint_bytes: 1_000}
   """
   @spec new(keyword(non_neg_integer())) :: t()
   def new(options \\ []) do
@@ -97,7 +97,7 @@ defmodule Swarm.Blackboard.State do
   defp own(rows, robot, boot, stamp), do: %{rows | own: Map.put(rows.own, robot, {boot, stamp})}
 
   defp newest(rows, robot) do
-    rows |> of(robot) |> Map.values() |> Enum.max_by(&elem(&1, 0), fn -> nil end)
+    rows |> Rows.of(robot) |> Map.values() |> Enum.max_by(&elem(&1, 0), fn -> nil end)
   end
 
   @doc "A robot of this node writes no more. Its rows stay, and grow old."
@@ -109,15 +109,15 @@ defmodule Swarm.Blackboard.State do
 
       iex> {rows, []} = Swarm.Blackboard.State.enter(Swarm.Blackboard.State.new(), :mag1, 7, 0)
       iex> {:ok, rows} = Swarm.Blackboard.State.put(rows, :mag1, :battery, 12.1, 100)
-      iex> Swarm.Blackboard.State.get(rows, :mag1, :battery, 150)
-      {:ok, 12.1, 50}
+      iex> Swarm.Blackboard.Rows.rows(rows, :mag1, :battery, 150)
+      [{:mag1, :battery, {7, 1}, 50, 12.1}]
       iex> Swarm.Blackboard.State.put(rows, :mag2, :battery, 12.1, 100)
       {:error, :not_own}
   """
   @spec put(t(), atom(), key(), term(), integer()) ::
           {:ok, t()} | {:error, :not_own | :bytes | :keys}
   def put(rows, robot, key, value, now_ms) do
-    mine = of(rows, robot)
+    mine = Rows.of(rows, robot)
 
     case rows.own do
       %{^robot => {boot, {incarnation, sequence}}} ->
@@ -131,7 +131,8 @@ defmodule Swarm.Blackboard.State do
             {:error, :keys}
 
           true ->
-            {:ok, rows |> own(robot, boot, stamp) |> hold(robot, key, {stamp, value, now_ms})}
+            {:ok,
+             rows |> own(robot, boot, stamp) |> Rows.hold(robot, key, {stamp, value, now_ms})}
         end
 
       _not_mine ->
@@ -145,37 +146,25 @@ defmodule Swarm.Blackboard.State do
       Enum.count(mine, &match?({_key, {{^incarnation, _}, _, _}}, &1)) >= rows.limits.keys
   end
 
-  @doc "What a robot said, and how old that is in ms."
-  @spec get(t(), atom(), key(), integer()) :: {:ok, term(), age_ms :: non_neg_integer()} | :error
-  def get(rows, robot, key, now_ms) do
-    case of(rows, robot) do
-      %{^key => {_stamp, value, at_ms}} -> {:ok, value, now_ms - at_ms}
-      _none -> :error
-    end
+  @doc """
+  A robot of any node writes the hint whose key has this number; `""` deletes it.
+
+      iex> {:ok, rows} = Swarm.Blackboard.State.put_hint(Swarm.Blackboard.State.new(), "mag1", 7, "bytes", 0)
+      iex> {:ok, {{1, {"mag1", _check}}, "bytes", 0}} = Swarm.Blackboard.Rows.held(rows, 7, 7)
+  """
+  @spec put_hint(t(), writer :: String.t(), non_neg_integer(), binary(), integer()) ::
+          {:ok, t()} | {:error, :hint_bytes}
+  def put_hint(%{limits: %{hint_bytes: most}}, _writer, _id, value, _now_ms)
+      when byte_size(value) > most,
+      do: {:error, :hint_bytes}
+
+  def put_hint(%{clock: clock} = rows, writer, id, value, now_ms) do
+    held = {Rows.hint_stamp(clock + 1, writer, value), value, now_ms}
+    {:ok, Rows.hold(%{rows | clock: clock + 1}, Rows.bucket(id), id, held)}
   end
 
-  @doc "One row as it travels now, or none."
-  @spec rows(t(), atom(), key(), integer()) :: [row()]
-  def rows(rows, robot, key, now_ms) do
-    case of(rows, robot) do
-      %{^key => {stamp, value, at_ms}} -> [{robot, key, stamp, max(now_ms - at_ms, 0), value}]
-      _none -> []
-    end
-  end
-
-  @doc "All rows of a robot as they travel now."
-  @spec rows(t(), atom(), integer()) :: [row()]
-  def rows(rows, robot, now_ms) do
-    for {key, {stamp, value, at_ms}} <- Enum.sort(of(rows, robot)),
-        do: {robot, key, stamp, max(now_ms - at_ms, 0), value}
-  end
-
-  @doc "How a row is held here: its stamp, its value, and since when by this node's clock."
-  @spec held(t(), atom(), key()) :: {:ok, held()} | :error
-  def held(rows, robot, key), do: Map.fetch(of(rows, robot), key)
-
-  @doc "Takes what is new of rows from outside."
-  @spec merge(t(), [row()], integer()) :: {t(), [note()]}
+  @doc "Takes what is new of rows from outside, unless `forget/2` would drop it at once."
+  @spec merge(t(), [Rows.row()], integer()) :: {t(), [note()]}
   def merge(rows, incoming, now_ms) do
     {rows, notes} =
       Enum.reduce(incoming, {rows, []}, fn row, {rows, notes} ->
@@ -183,7 +172,25 @@ defmodule Swarm.Blackboard.State do
         {rows, more ++ notes}
       end)
 
+    # Two that hand each other in turn what the other has just forgotten would never be rid of it.
+    {rows, _gone} =
+      forget(rows, now_ms, for({owner, _, _, _, _} <- incoming, uniq: true, do: owner))
+
     {rows, notes |> Enum.reverse() |> Enum.uniq()}
+  end
+
+  defp merge_one(rows, {bucket, id, {count, _} = stamp, age_ms, value}, now_ms)
+       when is_integer(bucket) do
+    cond do
+      bytes(value) > rows.limits.hint_bytes ->
+        {rows, [{:refused, :bytes}]}
+
+      count > rows.clock + @leap ->
+        {rows, [{:refused, :count}]}
+
+      true ->
+        take(%{rows | clock: max(rows.clock, count)}, bucket, id, {stamp, value, now_ms - age_ms})
+    end
   end
 
   defp merge_one(rows, {robot, key, stamp, age_ms, value}, now_ms) do
@@ -205,31 +212,10 @@ defmodule Swarm.Blackboard.State do
   defp others(rows),
     do: map_size(rows.robots) - Enum.count(rows.own, &is_map_key(rows.robots, elem(&1, 0)))
 
-  defp take(rows, robot, key, {stamp, value, at_ms} = new) do
-    case of(rows, robot) do
-      %{^key => {newer, _value, _at_ms}} when newer > stamp ->
-        {rows, []}
-
-      %{^key => {^stamp, _value, older}} when older <= at_ms ->
-        {rows, []}
-
-      %{^key => {^stamp, _same, _}} ->
-        {hold(rows, robot, key, {stamp, value, at_ms}), changed(robot, key)}
-
-      _older_or_none ->
-        taken(hold(rows, robot, key, new), robot, key, stamp)
-    end
+  defp take(rows, owner, key, held) do
+    {rows, taken?} = Rows.take(rows, owner, key, held)
+    {rows, if(taken?, do: [{:changed, owner, key}], else: [])}
   end
-
-  # The oldest row of too many goes, which may be this one.
-  defp taken(rows, robot, key, stamp) do
-    case held(rows, robot, key) do
-      {:ok, {^stamp, _, _}} -> {rows, changed(robot, key)}
-      _dropped -> {rows, []}
-    end
-  end
-
-  defp changed(robot, key), do: [{:changed, robot, key}]
 
   defp mine(rows, robot, key, {{incarnation, sequence} = stamp, _value, at_ms} = new, now_ms) do
     {boot, {life, count}} = rows.own[robot]
@@ -243,7 +229,7 @@ defmodule Swarm.Blackboard.State do
 
       # This robot's own words, which the board has lost since: never newer than what it says now.
       stamp > {life, count} ->
-        known? = is_map_key(of(rows, robot), key)
+        known? = is_map_key(Rows.of(rows, robot), key)
         # Nothing counts as far by itself: then another life, with numbers that will last.
         on = if sequence > count + @leap, do: {life + 1, 0}, else: {life, sequence}
         {rows, notes} = again(rows, robot, boot, on)
@@ -258,7 +244,9 @@ defmodule Swarm.Blackboard.State do
   # Old words keep their order and their ages, and get stamps that win.
   defp again(rows, robot, boot, stamp) do
     {_boot, {life, _count}} = rows.own[robot]
-    {said, former} = rows |> of(robot) |> Enum.split_with(&match?({_, {{^life, _}, _, _}}, &1))
+
+    {said, former} =
+      rows |> Rows.of(robot) |> Enum.split_with(&match?({_, {{^life, _}, _, _}}, &1))
 
     {said, stamp} =
       said
@@ -269,48 +257,46 @@ defmodule Swarm.Blackboard.State do
       end)
 
     rows = %{rows | robots: Map.put(rows.robots, robot, Map.new(said ++ former))}
-    notes = for {key, _held} <- said, note <- changed(robot, key), do: note
+    notes = for {key, _held} <- said, do: {:changed, robot, key}
     {own(rows, robot, boot, stamp), notes ++ [{:again, robot}]}
   end
 
-  defp hold(rows, robot, key, held) do
-    all = rows |> of(robot) |> Map.put(key, held)
-    %{rows | robots: Map.put(rows.robots, robot, newest_of(all, rows.limits.keys))}
-  end
-
-  # The newest of the whole: so that it does not matter in which order they came.
-  defp newest_of(all, most) when map_size(all) <= most, do: all
-
-  defp newest_of(all, _most),
-    do: Map.delete(all, all |> Enum.min_by(fn {key, held} -> {elem(held, 0), key} end) |> elem(0))
-
   @doc """
-  Forgets robots whose newest row is over ten minutes old, and words of former lives that are. Those
-  of this node are never forgotten.
+  Forgets robots whose newest row is over ten minutes old, and words of former lives and deleted hints
+  that are; words of this life of this node's own never.
   """
-  @spec forget(t(), integer()) :: {t(), gone :: [{atom(), key()}]}
-  def forget(rows, now_ms) do
+  @spec forget(t(), integer()) :: {t(), gone :: [{Rows.owner(), key()}]}
+  def forget(rows, now_ms),
+    do: forget(rows, now_ms, for({owner, _} <- Rows.owners(rows), do: owner))
+
+  defp forget(rows, now_ms, owners) do
     gone =
-      for {robot, all} <- rows.robots,
-          {{life, _}, _, _} = newest(rows, robot),
-          youngest = all |> Map.values() |> Enum.map(&elem(&1, 2)) |> Enum.max(),
-          {key, {{incarnation, _}, _, at_ms}} <- all,
-          now_ms - at_ms >= @forget_ms,
-          incarnation < life or
-            (now_ms - youngest >= @forget_ms and not is_map_key(rows.own, robot)),
-          do: {robot, key}
+      for owner <- owners,
+          all = Rows.of(rows, owner),
+          old = for({_, {_, _, at_ms}} = row <- all, now_ms - at_ms >= @forget_ms, do: row),
+          {key, {stamp, value, _}} <- old,
+          past?(rows, owner, stamp, value, length(old) == map_size(all)),
+          do: {owner, key}
 
     {Enum.reduce(gone, rows, &drop/2), gone}
   end
 
+  defp past?(_rows, bucket, _stamp, value, _all?) when is_integer(bucket), do: value == ""
+
+  defp past?(rows, robot, {incarnation, _}, _value, all?) do
+    {{life, _}, _, _} = newest(rows, robot)
+    incarnation < life or (all? and not is_map_key(rows.own, robot))
+  end
+
+  defp drop({bucket, id}, rows) when is_integer(bucket),
+    do: %{rows | hints: Map.delete(rows.hints, id)}
+
   defp drop({robot, key}, rows) do
-    case Map.delete(of(rows, robot), key) do
+    case Map.delete(Rows.of(rows, robot), key) do
       none when none == %{} -> %{rows | robots: Map.delete(rows.robots, robot)}
       left -> %{rows | robots: Map.put(rows.robots, robot, left)}
     end
   end
-
-  defp of(rows, robot), do: Map.get(rows.robots, robot, %{})
 
   defp bytes(value) when is_binary(value), do: byte_size(value)
   defp bytes(value), do: :erlang.external_size(value)

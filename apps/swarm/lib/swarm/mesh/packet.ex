@@ -9,7 +9,7 @@ defmodule Swarm.Mesh.Packet do
   sequence grows with every datagram. The signature is the first half of HMAC-SHA256 with the
   fleet's key, over all before it: a datagram that is not signed is looked at no further.
 
-  Kinds: `:beacon` (who I am, whom I know), `:message` (`Swarm.Message`), `:service` (rows, hints,
+  Kinds: `:beacon` (who I am, whom I know), `:message` (`Swarm.Message`), `:service` (rows,
   stops). Payloads are terms in the external format, read without making atoms.
   """
 

@@ -8,7 +8,7 @@ defmodule Swarm.Mesh.Protocol do
   | `{:send, address, datagram}` | out by UDP |
   | `{:deliver, to, message}` | a message for these robots of this node, or `:all` |
   | `{:beat, robot, node, {boot, sequence}}` | a heartbeat of a robot there |
-  | `{:serve, service, node, term}` | for the blackboard, the hints, the brakes |
+  | `{:serve, service, node, term}` | for the blackboard, the brakes |
   | `{:node, change, node}` | `:up`, `:suspect`, `:gone` |
   | `{:learn, name, ip, port}` | where a node's distribution listens |
   | `{:event, name, metadata}` | for whoever logs |

@@ -15,7 +15,7 @@ defmodule Swarm.Mesh.Server do
 
   @tick_ms 200
   @rejoin_every 50
-  @receivers %{rows: Swarm.Blackboard, hints: Swarm.Blackboard.Hints, stop: Swarm.EStop}
+  @receivers %{rows: Swarm.Blackboard, stop: Swarm.EStop}
 
   @doc "Starts the radio of this node."
   @spec start_link(Options.t()) :: GenServer.on_start()

@@ -24,12 +24,17 @@ defmodule Swarm.Blackboard.StateTest do
     do:
       for(
         robot <- Map.keys(rows.robots),
-        row <- Blackboard.State.rows(rows, robot, now_ms),
+        row <- Blackboard.Rows.rows(rows, robot, now_ms),
         do: row
       )
 
   defp merge(rows, incoming, now_ms),
     do: rows |> Blackboard.State.merge(incoming, now_ms) |> elem(0)
+
+  defp get(rows, robot, key, now_ms) do
+    with {:ok, {_stamp, value, at_ms}} <- Blackboard.Rows.held(rows, robot, key),
+         do: {:ok, value, now_ms - at_ms}
+  end
 
   # Rows as writers made them, each with the age it had when it was sent.
   defp history do
@@ -89,18 +94,17 @@ defmodule Swarm.Blackboard.StateTest do
           {owner, heard(other, all(owner, now_ms), now_ms)}
         end)
 
-      assert {:ok, "mine", _} = Blackboard.State.get(owner, :mag1, 7, 9_000)
-      assert {:ok, "mine", _} = Blackboard.State.get(other, :mag1, 7, 9_000)
+      assert {:ok, "mine", _} = get(owner, :mag1, 7, 9_000)
+      assert {:ok, "mine", _} = get(other, :mag1, 7, 9_000)
       owner = put!(owner, :mag1, 7, "later", 9_000)
 
-      assert {:ok, "later", _} =
-               other |> heard(all(owner, 9_000), 9_000) |> Blackboard.State.get(:mag1, 7, 9_000)
+      assert {:ok, "later", _} = other |> heard(all(owner, 9_000), 9_000) |> get(:mag1, 7, 9_000)
 
       # So it does to one that comes later.
       assert {:ok, "later", _} =
                Blackboard.State.new()
                |> heard(all(owner, 9_000), 9_000)
-               |> Blackboard.State.get(:mag1, 7, 9_000)
+               |> get(:mag1, 7, 9_000)
     end
   end
 
@@ -117,16 +121,15 @@ defmodule Swarm.Blackboard.StateTest do
     a = entered([:mag1]) |> put!(:mag1, :x, 1, 100)
     b = merge(Blackboard.State.new(), all(a, 150), 5_000)
     c = merge(Blackboard.State.new(), all(b, 5_030), 90)
-    assert Blackboard.State.get(c, :mag1, :x, 100) == {:ok, 1, 50 + 30 + 10}
+    assert get(c, :mag1, :x, 100) == {:ok, 1, 50 + 30 + 10}
 
     # The same row comes by a way on which it was held for longer: that age is nearer to the truth.
     assert {:ok, 1, 200} =
              c
              |> merge([{:mag1, :x, {1, 1}, 200, 1}], 100)
-             |> Blackboard.State.get(:mag1, :x, 100)
+             |> get(:mag1, :x, 100)
 
-    assert {:ok, 1, 90} =
-             c |> merge([{:mag1, :x, {1, 1}, 20, 1}], 100) |> Blackboard.State.get(:mag1, :x, 100)
+    assert {:ok, 1, 90} = c |> merge([{:mag1, :x, {1, 1}, 20, 1}], 100) |> get(:mag1, :x, 100)
   end
 
   test "two that exchange digests have the same rows after three messages" do
@@ -135,7 +138,7 @@ defmodule Swarm.Blackboard.StateTest do
       b = merge(Blackboard.State.new(), Enum.take_random(history(), 25), 0)
       have = AntiEntropy.stamps(b, AntiEntropy.differing(b, AntiEntropy.digest(a)))
       {lacked, wanted} = AntiEntropy.diff(a, have, 0)
-      told = for {robot, key} <- wanted, row <- Blackboard.State.rows(b, robot, key, 0), do: row
+      told = for {robot, key} <- wanted, row <- Blackboard.Rows.rows(b, robot, key, 0), do: row
       assert AntiEntropy.digest(merge(a, told, 0)) == AntiEntropy.digest(merge(b, lacked, 0))
     end
   end
@@ -153,7 +156,7 @@ defmodule Swarm.Blackboard.StateTest do
           stores =
             Map.update!(stores, writer, &put!(&1, writer, Enum.random([:a, :b]), now_ms, now_ms))
 
-          [row | _] = Blackboard.State.rows(stores[writer], writer, now_ms)
+          [row | _] = Blackboard.Rows.rows(stores[writer], writer, now_ms)
 
           Map.new(stores, fn {id, rows} ->
             {id, if(hears?.(writer, id), do: merge(rows, [row], now_ms), else: rows)}
@@ -186,7 +189,7 @@ defmodule Swarm.Blackboard.StateTest do
 
         told =
           for {robot, key} <- wanted,
-              row <- Blackboard.State.rows(stores[b], robot, key, now_ms),
+              row <- Blackboard.Rows.rows(stores[b], robot, key, now_ms),
               do: row
 
         stores =
@@ -251,16 +254,16 @@ defmodule Swarm.Blackboard.StateTest do
 
     {outbid, notes} = Blackboard.State.merge(rows, [{:mag1, :a, {9, 1}, 6_000, :old}], 10)
     assert {:again, :mag1} in notes
-    assert [{:mag1, :a, {10, 1}, 10, :mine}] = Blackboard.State.rows(outbid, :mag1, 10)
+    assert [{:mag1, :a, {10, 1}, 10, :mine}] = Blackboard.Rows.rows(outbid, :mag1, 10)
 
     # The same when the robot enters later.
     known = merge(Blackboard.State.new(), [{:mag1, :a, {9, 1}, 0, :old}], 0)
     assert {rivalled, [{:rival, :mag1, 9}]} = Blackboard.State.enter(known, :mag1, 5, 100)
-    assert Blackboard.State.rows(rivalled, :mag1, 100) == []
+    assert Blackboard.Rows.rows(rivalled, :mag1, 100) == []
     assert {entered, []} = Blackboard.State.enter(known, :mag1, 5, 6_000)
 
     assert [{:mag1, :a, {10, 1}, 0, :new}] =
-             entered |> put!(:mag1, :a, :new, 6_000) |> Blackboard.State.rows(:mag1, 6_000)
+             entered |> put!(:mag1, :a, :new, 6_000) |> Blackboard.Rows.rows(:mag1, 6_000)
   end
 
   test "a board that was lost learns its robot's sequence from the others" do
@@ -268,12 +271,12 @@ defmodule Swarm.Blackboard.StateTest do
     theirs = [{:mag1, :a, {1, 40}, 300, :older}, {:mag1, :b, {1, 39}, 300, :kept}]
     {rows, notes} = Blackboard.State.merge(rows, theirs, 10)
     assert {:again, :mag1} in notes
-    assert {:ok, :newest, 10} = Blackboard.State.get(rows, :mag1, :a, 10)
-    assert {:ok, :kept, 300} = Blackboard.State.get(rows, :mag1, :b, 10)
-    assert {:ok, {{1, 41}, :newest, 0}} = Blackboard.State.held(rows, :mag1, :a)
+    assert {:ok, :newest, 10} = get(rows, :mag1, :a, 10)
+    assert {:ok, :kept, 300} = get(rows, :mag1, :b, 10)
+    assert {:ok, {{1, 41}, :newest, 0}} = Blackboard.Rows.held(rows, :mag1, :a)
 
     other =
-      merge(merge(Blackboard.State.new(), theirs, 10), Blackboard.State.rows(rows, :mag1, 10), 10)
+      merge(merge(Blackboard.State.new(), theirs, 10), Blackboard.Rows.rows(rows, :mag1, 10), 10)
 
     assert AntiEntropy.digest(other) == AntiEntropy.digest(rows)
   end
@@ -298,6 +301,21 @@ defmodule Swarm.Blackboard.StateTest do
       merge(Blackboard.State.new(), [{:mag2, :a, {1, 1}, ten, 1}, {:mag2, :b, {1, 2}, 0, 1}], 0)
 
     assert {^fresh, []} = Blackboard.State.forget(fresh, 0)
+  end
+
+  test "two that forget in turn do not hand each other the rows of one long gone for ever" do
+    gone =
+      merge(Blackboard.State.new(), [{:mag1, :a, {1, 1}, 0, 1}, {:mag1, :b, {1, 2}, 0, 1}], 0)
+
+    {a, b} =
+      Enum.reduce(590..610, {gone, gone}, fn second, {a, b} ->
+        {a, _} = Blackboard.State.forget(a, second * 1_000)
+        a = merge(a, all(b, second * 1_000), second * 1_000)
+        {b, _} = Blackboard.State.forget(b, second * 1_000 + 500)
+        {a, merge(b, all(a, second * 1_000 + 500), second * 1_000 + 500)}
+      end)
+
+    assert a.robots == %{} and b.robots == %{}
   end
 
   test "nothing that arrives makes an atom or falls" do

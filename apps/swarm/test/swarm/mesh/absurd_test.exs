@@ -10,7 +10,6 @@ defmodule Swarm.Mesh.AbsurdTest do
     Swarm.Mesh.Distribution.Dialer,
     Swarm.EStop.Broadcaster,
     Swarm.Blackboard,
-    Swarm.Blackboard.Hints,
     Swarm.Directory.Presence
   ]
 

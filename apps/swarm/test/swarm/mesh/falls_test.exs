@@ -7,7 +7,6 @@ defmodule Swarm.Mesh.FallsTest do
 
   @parts [
     Swarm.Blackboard,
-    Swarm.Blackboard.Hints,
     Swarm.Directory.Presence,
     Swarm.EStop.Broadcaster,
     Swarm.Directory,

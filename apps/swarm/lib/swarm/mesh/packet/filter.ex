@@ -8,7 +8,7 @@ defmodule Swarm.Mesh.Packet.Filter do
   alias Swarm.Message
   alias Swarm.Message.WireTypes
 
-  @services [:rows, :hints, :stop]
+  @services [:rows, :stop]
   # So many datagrams of unknown origin are looked into a second.
   @strange_per_second 2_000
 
