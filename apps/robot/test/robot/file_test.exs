@@ -5,7 +5,6 @@ defmodule Robot.FileTest do
   doctest Robot.File.Reader
   doctest Robot.File.Check
   doctest Robot.File.Options
-  doctest Robot.File.Tokens
   doctest Robot.File.Printer
 
   alias Hal.Pose
@@ -278,26 +277,27 @@ defmodule Robot.FileTest do
     for {text, words} <- [
           {"", "is empty"},
           {"# only this", "is empty"},
-          {"[id: :mag1", "the [ of line 1 is never closed"},
-          {"[id: {:mag1", "the { of line 1 is never closed"},
-          {"[id: {:mag1]", "] cannot close the { of line 1"},
-          {"[a: 1]\n[b: 2]", "[ stands behind the end of the list"},
+          {"[id: :mag1", "missing terminator: ]"},
+          {"[id: {:mag1", "missing terminator: }"},
+          {"[id: {:mag1]", "unexpected token: ]"},
+          {"[a: 1]\n[b: 2]", "nothing can stand behind the end of the list"},
           {"%{id: :mag1}", "one list, [key: value, …]"},
           {"[1, 2]", "one list, [key: value, …]"},
           {"[1, a: 2]", "a list has keys for all its values or for none"},
-          {"[id: :mag1 profile: 1]", "a comma is missing before profile:"},
-          {"[id: ]", "a value is missing before ]"},
-          {"[id: , a: 1]", "a value is missing before ,"},
-          {"[id: \n profile: 1]", "a value is missing before profile:"},
+          {"[a: 1, 2]", "a list has keys for all its values or for none"},
+          {"[id: :mag1 profile: 1]", "a comma or a value is missing before profile:"},
+          {"[id: ]", "a comma or a value is missing before ]"},
+          {"[id: , a: 1]", "a comma or a value is missing before ,"},
+          {"[id: \n profile: 1]", "a comma or a value is missing before profile:"},
           {"[id::mag1]", "a space is missing after id:"},
-          {"[start: {1.5m, 0}]", "1.5m is not a number"},
-          {"[start: 1.0e400]", "1.0e400 is not a number"},
-          {"[start: 1e5]", "1e5 is not a number"},
-          {"[start: \"abc]", "no closing"},
-          {"[start: \"a\\x\"]", "only"},
-          {"[start: {a: 1, 2}]", "in a tuple, keys come last"},
-          {"[start: %{a: 1}]", "a value is missing before a:"},
-          {"[start: %{1}]", "a map is written %{key => value}"},
+          {"[start: {1.5m, 0}]", ~s(invalid character "m" after number 1.5)},
+          {"[start: 1.0e400]", "invalid float number 1.0e400"},
+          {"[start: 1e5]", ~s(invalid character "e" after number 1)},
+          {"[start: \"abc]", ~s(missing terminator: ")},
+          {"[start: \"a\\x\"]", "invalid hex escape character"},
+          {"[start: {a: 1, 2}]", "a comma or a value is missing before a:"},
+          {"[start: %{a: 1}]", "a map is written %{key => value}"},
+          {"[start: %{1}]", "a comma or a value is missing before }"},
           {<<"[id: ", 0xFF, "]">>, "is not text in UTF-8"},
           {String.duplicate("#", 70_000), "larger than 64 kB"}
         ] do

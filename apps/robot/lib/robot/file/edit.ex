@@ -2,6 +2,7 @@ defmodule Robot.File.Edit do
   @moduledoc """
   Changes numbers in the text of a robot file and nothing else: remarks, order and layout stay. Pure.
   """
+  alias Robot.File.Reader
 
   @doc """
   The text with these numbers under `conversions:`; those that are not there are put in. Whoever writes the
@@ -16,68 +17,59 @@ defmodule Robot.File.Edit do
   """
   @spec conversions(String.t(), keyword(number())) :: {:ok, String.t()} | {:error, String.t()}
   def conversions(text, numbers) do
-    numbers
-    |> Enum.reverse()
-    |> Enum.reduce_while({:ok, text}, fn {key, number}, {:ok, text} ->
-      case place(text) do
-        {:ok, from, size} -> {:cont, {:ok, put(text, from, size, key, "#{number}")}}
-        :error -> {:halt, {:error, "there is no list conversions: [...] in it"}}
-      end
-    end)
-  end
+    with {:ok, quoted} <- Reader.quoted(text), {_meta, items} = list <- find(quoted) do
+      places =
+        for {{:literal, _, {:name, key}}, value} <- items, into: %{}, do: {key, place(value)}
 
-  # Between the brackets.
-  defp place(text) do
-    bare = bare(text)
-
-    with [{start, length}] <- Regex.run(~r/(?<![a-z_])conversions:\s+\[/, bare, return: :index),
-         from = start + length,
-         {:ok, size} <- closing(binary_part(bare, from, byte_size(bare) - from), 0, 0) do
-      {:ok, from, size}
+      {old, new} = Enum.split_with(numbers, fn {key, _} -> places["#{key}"] != nil end)
+      changes = for {key, number} <- old, do: {places["#{key}"], "#{number}"}
+      # Those behind first, so that places stay right.
+      changes = Enum.sort(changes ++ added(list, text, new), :desc)
+      {:ok, Enum.reduce(changes, text, &change/2)}
     else
-      _none -> :error
+      nil -> {:error, "there is no list conversions: [...] in it"}
+      {:error, {line, problem}} -> {:error, "line #{line}: #{problem}"}
     end
   end
 
-  # Text and remarks as blanks, byte for byte: what stands in them is not a key.
-  defp bare(text) do
-    Regex.replace(~r/"(?:\\.|[^"\\])*"|#[^\n]*/s, text, fn hit ->
-      String.duplicate(" ", byte_size(hit))
-    end)
-  end
+  defp find({{:literal, _, {:name, "conversions"}}, {:literal, meta, items}}) when is_list(items),
+    do: {meta, items}
 
-  defp closing("]" <> _rest, 0, size), do: {:ok, size}
-  defp closing("]" <> rest, depth, size), do: closing(rest, depth - 1, size + 1)
-  defp closing("[" <> rest, depth, size), do: closing(rest, depth + 1, size + 1)
-  defp closing(<<_, rest::binary>>, depth, size), do: closing(rest, depth, size + 1)
-  defp closing(<<>>, _depth, _size), do: :error
+  defp find(tuple) when is_tuple(tuple), do: tuple |> Tuple.to_list() |> find()
+  defp find(list) when is_list(list), do: Enum.find_value(list, &find/1)
+  defp find(_other), do: nil
 
-  defp put(text, from, size, key, number) do
-    inside = binary_part(text, from, size)
-    before = binary_part(text, 0, from)
-    behind = binary_part(text, from + size, byte_size(text) - from - size)
+  # A number's line, its column, and the column behind it.
+  defp place({:literal, meta, number}) when is_number(number),
+    do: {meta[:line], meta[:column], meta[:column] + String.length(meta[:token])}
 
-    found =
-      Regex.run(~r/(?<![a-z_])#{key}:\s+([-+0-9][0-9A-Za-z_.+-]*)/, bare(inside), return: :index)
+  defp place({sign, meta, [{:literal, _, number} = literal]})
+       when sign in [:-, :+] and is_number(number),
+       do: put_elem(place(literal), 1, meta[:column])
 
-    case found do
-      [_all, {at, length}] ->
-        rest = binary_part(inside, at + length, size - at - length)
-        before <> binary_part(inside, 0, at) <> number <> rest <> behind
+  defp place(_other), do: nil
 
-      nil ->
-        before <> first("#{key}: #{number}", inside) <> behind
+  # On lines of their own where the list has lines.
+  defp added(_list, _text, []), do: []
+
+  defp added({meta, items}, text, numbers) do
+    pairs = Enum.map(numbers, fn {key, number} -> "#{key}: #{number}" end)
+    {first, column} = {meta[:line], meta[:column] + 1}
+    begins = Enum.find_value(items, meta[:closing][:line], fn {{_, key, _}, _} -> key[:line] end)
+
+    if begins == first do
+      behind = if items == [], do: "", else: ", "
+      [{{first, column, column}, Enum.join(pairs, ", ") <> behind}]
+    else
+      [indent] = Regex.run(~r/^[ \t]*/, text |> String.split("\n") |> Enum.at(first))
+      behind = if items == [], do: "\n", else: ",\n"
+      [{{first + 1, 1, 1}, indent <> Enum.join(pairs, ",\n" <> indent) <> behind}]
     end
   end
 
-  # On a line of its own where the list has lines.
-  defp first(pair, inside) do
-    comma = if String.trim(bare(inside)) == "", do: "", else: ","
-
-    case Regex.run(~r/^[ \t]*(?:#[^\n]*)?\n([ \t]*)/, inside) do
-      [_all, indent] -> "\n" <> indent <> pair <> comma <> inside
-      nil when comma == "" -> pair <> String.trim_leading(inside)
-      nil -> pair <> comma <> " " <> String.trim_leading(inside)
-    end
+  defp change({{line, from, to}, new}, text) do
+    {before, [old | behind]} = text |> String.split("\n") |> Enum.split(line - 1)
+    new = String.slice(old, 0, from - 1) <> new <> String.slice(old, (to - 1)..-1)
+    Enum.join(before ++ [new | behind], "\n")
   end
 end

@@ -16,15 +16,19 @@ defmodule Robot.File.Reader do
   A node is `{line, value}`. Names stay text here: whoever knows what is allowed at a place compares
   with that, so that no file makes an atom.
   """
-  alias Robot.File.Tokens
 
   @largest 65_536
   @deepest 32
   @largest_angle 36_000
-  @closing %{"[" => "]", "{" => "}", "%{" => "}"}
+  @mixed "a list has keys for all its values or for none"
+  @behind "nothing can stand behind the end of the list"
+  @into "nothing is put into text: \#{…} cannot be here"
+  @only ": a robot file holds values only, it is read and not run"
 
   @type tree :: {line :: pos_integer(), value :: term()}
   @type problem :: {line :: pos_integer(), text :: String.t()}
+  @typedoc "As of `Code.string_to_quoted/2`, with literals as `{:literal, meta, value}` and names as `{:name, text}`."
+  @type quoted :: term()
 
   @doc """
   The tree of a text, or the line where it stops being one.
@@ -34,24 +38,26 @@ defmodule Robot.File.Reader do
       iex> Robot.File.Reader.read("[id: :mag1,\\n arm: halt()]")
       {:error, {2, "halt cannot be here: a robot file holds values only, it is read and not run"}}
       iex> Robot.File.Reader.read("[id: :mag1\\n arm: :auto]")
-      {:error, {2, "a comma is missing before arm:"}}
+      {:error, {2, "a comma or a value is missing before arm:"}}
   """
   @spec read(String.t()) :: {:ok, tree()} | {:error, problem()}
   def read(text) do
-    with :ok <- text?(text),
-         {:ok, tokens} <- Tokens.cut(text),
-         {:ok, node, rest} <- first(tokens) do
-      case rest do
-        [{:end, _line, nil}] ->
-          {:ok, node}
-
-        [{_kind, line, _value} = token | _] ->
-          {:error, {line, "#{shown(token)} stands behind the end of the list"}}
-      end
+    case quoted(text) do
+      {:ok, {:literal, _meta, list} = quoted} when is_list(list) -> {:ok, node(quoted, 0)}
+      {:ok, {:__block__, _meta, []}} -> {:error, {1, "is empty"}}
+      {:ok, {:__block__, _meta, [_list, more | _]}} -> {:error, {line(more), @behind}}
+      {:ok, other} -> {:error, {line(other), "a robot file is one list, [key: value, …]"}}
+      {:error, problem} -> {:error, problem}
     end
+  catch
+    {:problem, line, text} -> {:error, {line, text}}
   end
 
-  defp text?(text) do
+  @doc """
+  What Elixir's parser makes of a text, with lines and columns; nothing is judged yet but that it is Elixir.
+  """
+  @spec quoted(String.t()) :: {:ok, quoted()} | {:error, problem()}
+  def quoted(text) do
     cond do
       byte_size(text) > @largest ->
         {:error, {1, "no robot file is larger than #{div(@largest, 1024)} kB"}}
@@ -60,157 +66,146 @@ defmodule Robot.File.Reader do
         {:error, {1, "is not text in UTF-8"}}
 
       true ->
-        :ok
+        # The parser puts names into its messages, and raises over one that is not an atom. So errors are
+        # found with one atom for all names.
+        with {:ok, _quoted} <- parse(text, fn _name -> :name end), do: parse(text, &{:name, &1})
     end
   end
 
-  defp first([{:end, _line, nil}]), do: {:error, {1, "is empty"}}
-  defp first([{:mark, _line, "["} | _] = tokens), do: node(tokens, 0)
+  defp parse(text, name) do
+    options = [
+      columns: true,
+      token_metadata: true,
+      # The first is of Elixir 1.16 and later.
+      emit_warnings: false,
+      warnings: false,
+      static_atoms_encoder: fn text, _meta -> {:ok, name.(text)} end,
+      literal_encoder: fn value, meta -> {:ok, {:literal, meta, value}} end
+    ]
 
-  defp first([{_kind, line, _value} | _]),
-    do: {:error, {line, "a robot file is one list, [key: value, …]"}}
+    with {:error, {meta, message, token}} <- Code.string_to_quoted(text, options),
+         do: {:error, {meta[:line], syntax(message, token, text, meta)}}
+  end
 
-  defp node([{_kind, line, _value} | _], depth) when depth > @deepest,
-    do: {:error, {line, "nothing is nested more than #{@deepest} deep"}}
+  # The parser's token may be the one name that all have; the text has the right one.
+  defp syntax("syntax error before: ", _token, text, meta) do
+    line = text |> String.split("\n") |> Enum.at(meta[:line] - 1, "")
+    rest = String.slice(line, (meta[:column] || 1) - 1, 255)
 
-  defp node([{kind, line, value} | rest], _depth) when kind in [:number, :text],
-    do: {:ok, {line, value}, rest}
-
-  defp node([{kind, line, name} | rest], _depth) when kind in [:name, :module] do
-    case rest do
-      [{:mark, at, "("} | _] -> {:error, {at, "#{name}( cannot be here#{only()}"}}
-      _value -> {:ok, {line, {kind, name}}, rest}
+    case Regex.run(~r/^\w+:?|^\S/u, rest) do
+      [word] -> "a comma or a value is missing before #{shorten(word)}"
+      nil -> "a value is missing at the end"
     end
   end
 
-  defp node([{:word, line, "true"} | rest], _depth), do: {:ok, {line, true}, rest}
-  defp node([{:word, line, "false"} | rest], _depth), do: {:ok, {line, false}, rest}
-  defp node([{:word, line, "nil"} | rest], _depth), do: {:ok, {line, nil}, rest}
+  defp syntax({before, behind}, token, _text, _meta), do: shorten(before <> token <> behind)
 
-  defp node([{:mark, _line, sign}, {:number, line, number} | rest], _depth)
-       when sign in ["-", "+"],
-       do: {:ok, {line, if(sign == "-", do: -number, else: number)}, rest}
+  defp syntax("unexpected expression after keyword list" <> _, _token, _text, _meta), do: @mixed
 
-  defp node([{:word, line, "deg"}, {:mark, _, "("} | rest], depth) do
-    case node(rest, depth + 1) do
-      {:ok, {_line, degrees}, [{:mark, _, ")"} | rest]}
-      when is_number(degrees) and abs(degrees) <= @largest_angle ->
-        {:ok, {line, degrees * :math.pi() / 180}, rest}
+  # The rest is advice for programs.
+  defp syntax(message, token, _text, _meta),
+    do: (message <> token) |> String.split([". ", "\n"]) |> hd() |> shorten()
+
+  defp node(quoted, depth) when depth > @deepest,
+    do: problem(quoted, "nothing is nested more than #{@deepest} deep")
+
+  defp node({:literal, meta, number} = quoted, _depth) when is_number(number) do
+    token = Keyword.get(meta, :token, "")
+    if byte_size(token) > 40, do: problem(quoted, "#{shorten(token)} is not a number")
+    {line(quoted), number}
+  end
+
+  defp node({:literal, meta, list} = quoted, depth) when is_list(list) do
+    if meta[:delimiter], do: refuse(quoted, "text in '")
+
+    case Enum.split_with(list, &pair?/1) do
+      {[], items} -> {line(quoted), {:list, Enum.map(items, &node(&1, depth + 1))}}
+      {pairs, []} -> {line(quoted), keys(pairs, depth + 1)}
+      _mixed -> problem(quoted, @mixed)
+    end
+  end
+
+  defp node({:literal, _meta, {:name, name}} = quoted, _depth), do: {line(quoted), {:name, name}}
+
+  defp node({:literal, _meta, {one, other}} = quoted, depth),
+    do: {line(quoted), tuple([one, other], depth + 1)}
+
+  defp node({:literal, _meta, value} = quoted, _depth), do: {line(quoted), value}
+  defp node({:{}, _meta, items} = quoted, depth), do: {line(quoted), tuple(items, depth + 1)}
+
+  defp node({:%{}, _meta, pairs} = quoted, depth) do
+    unless Enum.all?(pairs, &(pair?(&1) and not key?(&1))),
+      do: problem(quoted, "a map is written %{key => value}")
+
+    pairs = for {key, value} <- pairs, do: {node(key, depth + 1), node(value, depth + 1)}
+    {line(quoted), {:map, pairs}}
+  end
+
+  defp node({:__aliases__, _meta, names} = quoted, _depth) do
+    unless Enum.all?(names, &match?({:name, _}, &1)), do: refuse(quoted, "a call")
+    {line(quoted), {:module, Enum.map_join(names, ".", &elem(&1, 1))}}
+  end
+
+  defp node({sign, _meta, [{:literal, _, number} = quoted]}, depth)
+       when sign in [:-, :+] and is_number(number) do
+    {line, number} = node(quoted, depth)
+    {line, if(sign == :-, do: -number, else: number)}
+  end
+
+  defp node({{:name, "deg"}, _meta, arguments} = quoted, depth) when is_list(arguments) do
+    case Enum.map(arguments, &node(&1, depth + 1)) do
+      [{_line, degrees}] when is_number(degrees) and abs(degrees) <= @largest_angle ->
+        {line(quoted), degrees * :math.pi() / 180}
 
       _other ->
-        {:error,
-         {line, "deg(…) takes degrees, a number from -#{@largest_angle} to #{@largest_angle}"}}
+        takes = "a number from -#{@largest_angle} to #{@largest_angle}"
+        problem(quoted, "deg(…) takes degrees, #{takes}")
     end
   end
 
-  defp node([{:mark, line, open} | rest], depth) when is_map_key(@closing, open) do
-    with {:ok, items, rest} <- items(rest, {open, line}, depth + 1, []),
-         {:ok, value} <- value(open, items, line) do
-      {:ok, {line, value}, rest}
-    end
+  defp node({:"::", _meta, [{{:name, name}, _, nil} | _]} = quoted, _depth),
+    do: problem(quoted, "a space is missing after #{shorten(name)}:")
+
+  defp node({:<<>>, meta, _parts} = quoted, _depth),
+    do: if(meta[:delimiter], do: problem(quoted, @into), else: refuse(quoted, "<<>>"))
+
+  defp node({{:., _, [:erlang, _to_atom]}, _meta, _parts} = quoted, _depth),
+    do: problem(quoted, @into)
+
+  defp node({{:name, name}, _meta, _arguments} = quoted, _depth), do: refuse(quoted, name)
+  defp node({:__block__, _meta, _many} = quoted, _depth), do: refuse(quoted, "( )")
+  defp node({word, _, _} = quoted, _depth) when is_atom(word), do: refuse(quoted, "#{word}")
+  defp node(quoted, _depth), do: refuse(quoted, "a call")
+
+  # The keys that are the last of a tuple have no brackets.
+  defp tuple(items, depth) do
+    {:tuple,
+     Enum.map(items, fn
+       [{key, _value} | _] = pairs -> {line(key), keys(pairs, depth)}
+       item -> node(item, depth)
+     end)}
   end
 
-  defp node([{:end, line, nil} | _], _depth),
-    do: {:error, {line, "a value is missing at the end"}}
+  defp keys(pairs, depth),
+    do: {:keys, for({key, value} <- pairs, do: {key(key), line(key), node(value, depth)})}
 
-  defp node([{:mark, line, mark} | _], _depth) when mark in ["-", "+", "(", "=>"],
-    do: {:error, {line, "#{mark} cannot be here#{only()}"}}
+  defp key({:literal, _meta, {:name, name}}), do: name
+  defp key({:literal, _meta, word}), do: Atom.to_string(word)
+  defp key(quoted), do: problem(quoted, @into)
 
-  defp node([{:mark, line, mark} | _], _depth),
-    do: {:error, {line, "a value is missing before #{mark}"}}
+  defp pair?(quoted), do: is_tuple(quoted) and tuple_size(quoted) == 2
+  defp key?({{_, meta, _}, _value}), do: meta[:format] == :keyword
 
-  defp node([{:key, line, key} | _], _depth),
-    do: {:error, {line, "a value is missing before #{key}:"}}
+  # Of a list of keys without brackets the first, else nothing has no line.
+  defp line([{key, _value} | _]), do: line(key)
+  defp line({_, meta, _}), do: Keyword.get(meta, :line, 1)
+  defp line(_other), do: 1
 
-  defp node([{_kind, line, _value} = token | _], _depth),
-    do: {:error, {line, "#{shown(token)} cannot be here#{only()}"}}
+  defp refuse(quoted, what), do: problem(quoted, shorten(what) <> " cannot be here" <> @only)
 
-  # Up to the closing mark; a comma may stand behind the last.
-  defp items([{:mark, _line, mark} | rest], {open, _at}, _depth, done)
-       when mark == :erlang.map_get(open, @closing),
-       do: {:ok, Enum.reverse(done), rest}
+  @spec problem(quoted(), String.t()) :: no_return()
+  defp problem(quoted, text), do: throw({:problem, line(quoted), text})
 
-  defp items(tokens, opened, depth, done) do
-    with {:ok, item, rest} <- item(tokens, opened, depth) do
-      case rest do
-        [{:mark, _line, ","} | rest] ->
-          items(rest, opened, depth, [item | done])
-
-        [{:mark, _line, mark} | _] when mark in ["]", "}"] ->
-          close(rest, opened, depth, [item | done])
-
-        [{:end, _line, nil} | _] ->
-          {:error, never_closed(opened)}
-
-        [token | _] ->
-          {:error, {elem(token, 1), between(token)}}
-      end
-    end
-  end
-
-  defp close([{:mark, line, mark} | _] = tokens, {open, at} = opened, depth, done) do
-    if mark == @closing[open],
-      do: items(tokens, opened, depth, done),
-      else: {:error, {line, "#{mark} cannot close the #{open} of line #{at}"}}
-  end
-
-  defp item([{:end, _line, nil} | _], opened, _depth), do: {:error, never_closed(opened)}
-
-  defp item([{:key, line, key} | rest], {open, _at}, depth) when open != "%{" do
-    with {:ok, node, rest} <- node(rest, depth), do: {:ok, {key, line, node}, rest}
-  end
-
-  defp item(tokens, {"%{", _at}, depth) do
-    with {:ok, key, rest} <- node(tokens, depth) do
-      case rest do
-        [{:mark, _line, "=>"} | rest] ->
-          with {:ok, value, rest} <- node(rest, depth), do: {:ok, {key, value}, rest}
-
-        [{_kind, line, _value} | _] ->
-          {:error, {line, "a map is written %{key => value}"}}
-      end
-    end
-  end
-
-  defp item(tokens, _opened, depth), do: node(tokens, depth)
-
-  defp never_closed({open, line}), do: {line, "the #{open} of line #{line} is never closed"}
-
-  # What stands where a comma should is more often a forgotten comma than a sum.
-  defp between({:mark, _line, mark}) when mark in ["-", "+", "(", ")", "=>"],
-    do: "#{mark} cannot be here#{only()}"
-
-  defp between(token), do: "a comma is missing before #{shown(token)}"
-
-  defp only, do: ": a robot file holds values only, it is read and not run"
-
-  defp value("%{", pairs, _line), do: {:ok, {:map, pairs}}
-
-  defp value("[", items, line) do
-    case Enum.split_with(items, &key?/1) do
-      {[], nodes} -> {:ok, {:list, nodes}}
-      {keys, []} -> {:ok, {:keys, keys}}
-      _mixed -> {:error, {line, "a list has keys for all its values or for none"}}
-    end
-  end
-
-  defp value("{", items, line) do
-    case Enum.split_while(items, &(not key?(&1))) do
-      {nodes, []} ->
-        {:ok, {:tuple, nodes}}
-
-      {nodes, [{_key, at, _node} | _] = keys} ->
-        if Enum.all?(keys, &key?/1),
-          do: {:ok, {:tuple, nodes ++ [{at, {:keys, keys}}]}},
-          else: {:error, {line, "in a tuple, keys come last"}}
-    end
-  end
-
-  defp key?(item), do: tuple_size(item) == 3
-
-  defp shown({:key, _line, name}), do: name <> ":"
-  defp shown({:name, _line, name}), do: ":" <> name
-  defp shown({:text, _line, _text}), do: "text"
-  defp shown({:number, _line, number}), do: to_string(number)
-  defp shown({_kind, _line, value}), do: to_string(value)
+  defp shorten(text),
+    do: if(String.length(text) > 160, do: String.slice(text, 0, 157) <> "…", else: text)
 end
