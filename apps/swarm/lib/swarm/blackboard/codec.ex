@@ -28,6 +28,7 @@ defmodule Swarm.Blackboard.Codec do
   @latest 6_000_000_000_000_000_000
   # No robot writes as often in one life.
   @most 1_000_000_000_000_000
+  # What is older than this travels as no older.
   @oldest_ms 1_000_000_000
 
   @type key :: atom() | {atom(), atom() | integer()}
@@ -76,10 +77,11 @@ defmodule Swarm.Blackboard.Codec do
   @doc "Rows as terms for datagrams."
   @spec tell([Rows.row()]) :: [term()]
   def tell(rows) do
-    rows =
-      for {owner, id, {n, m}, age_ms, value} <- rows, do: {name(owner), id, n, m, age_ms, value}
-
-    for part <- pack(rows), do: {:rows, part}
+    for {owner, id, {n, m}, age_ms, value} <- rows do
+      {name(owner), id, n, m, min(age_ms, @oldest_ms), value}
+    end
+    |> pack()
+    |> Enum.map(&{:rows, &1})
   end
 
   @doc "A digest as terms for datagrams, each of which says of which names it is."
@@ -158,22 +160,15 @@ defmodule Swarm.Blackboard.Codec do
       :error
   """
   @spec read(term()) :: {heard(), dropped :: non_neg_integer()} | :error
-  def read({:rows, list}) do
-    with {:ok, rows, dropped} <- each(list, &row/1), do: {{:rows, rows}, dropped}
-  end
-
   def read({:digest, first, until, list})
       when is_binary(first) and (until == nil or is_binary(until)) do
     with {:ok, digest, dropped} <- each(list, &number/1),
          do: {{:digest, first, until, digest}, dropped}
   end
 
-  def read({:have, list}) do
-    with {:ok, stamps, dropped} <- each(list, &stamps/1), do: {{:have, stamps}, dropped}
-  end
-
-  def read({:want, list}) do
-    with {:ok, wanted, dropped} <- each(list, &number/1), do: {{:want, wanted}, dropped}
+  def read({what, list}) when what in [:rows, :have, :want] do
+    read = %{rows: &row/1, have: &stamps/1, want: &number/1}
+    with {:ok, heard, dropped} <- each(list, read[what]), do: {{what, heard}, dropped}
   end
 
   def read(_other), do: :error

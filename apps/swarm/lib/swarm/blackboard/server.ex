@@ -210,7 +210,6 @@ defmodule Swarm.Blackboard.Server do
 
   defp send_digests(s) do
     {nodes, rand} = Blackboard.Gossip.some(s.nodes, @peers, s.rand)
-
     digest = Blackboard.Codec.digest(AntiEntropy.digest(s.rows))
     Blackboard.Gossip.cast(s.transport, nodes, digest)
     %{s | rand: rand}
@@ -221,11 +220,7 @@ defmodule Swarm.Blackboard.Server do
 
     Enum.reduce(notes, s, fn
       {:again, robot}, s ->
-        Enum.reduce(
-          Rows.rows(s.rows, robot, now()),
-          s,
-          &say_soon(&2, robot, elem(&1, 1))
-        )
+        Enum.reduce(Map.keys(Rows.of(s.rows, robot)), s, &say_soon(&2, robot, &1))
 
       {:rival, robot, incarnation}, s ->
         rival(s, robot, incarnation, from)

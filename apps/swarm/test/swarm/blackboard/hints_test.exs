@@ -88,10 +88,10 @@ defmodule Swarm.Blackboard.HintsTest do
   end
 
   test "hints have no end, but what deleted one has: also where nodes hand it round" do
-    hour = 3_600_000
+    month = 30 * 24 * 3_600_000
     state = State.new() |> put("mag1", 1, "kept")
-    assert {^state, []} = State.forget(state, hour)
-    assert {:ok, "kept", "mag1"} = State.new() |> merge(all(state, hour), hour) |> get(1)
+    assert {^state, []} = State.forget(state, month)
+    assert {:ok, "kept", "mag1"} = State.new() |> merge(all(state, month), month) |> get(1)
 
     # Each forgets, and hears the other before that one forgets too.
     gone = State.new() |> put("mag1", 1, "")
