@@ -32,5 +32,8 @@ defmodule Hal.Camera do
   @doc "Closes the source."
   @callback terminate(state :: term()) :: :ok
 
-  @optional_callbacks explain: 2
+  @doc "What options it takes; `mix robot.check` holds robot files against it."
+  @callback option_table() :: Hal.Options.table()
+
+  @optional_callbacks explain: 2, option_table: 0
 end

@@ -60,5 +60,8 @@ defmodule Hal.Drive do
   @doc "Stops the motors and closes the line."
   @callback terminate(state :: term()) :: :ok
 
-  @optional_callbacks explain: 2, ready: 1, judge: 1
+  @doc "What options it takes; `mix robot.check` holds robot files against it."
+  @callback option_table() :: Hal.Options.table()
+
+  @optional_callbacks explain: 2, ready: 1, judge: 1, option_table: 0
 end

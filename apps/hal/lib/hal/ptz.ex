@@ -40,5 +40,8 @@ defmodule Hal.Ptz do
   @doc "Closes the line."
   @callback terminate(state :: term()) :: :ok
 
-  @optional_callbacks explain: 2, zoom: 2
+  @doc "What options it takes; `mix robot.check` holds robot files against it."
+  @callback option_table() :: Hal.Options.table()
+
+  @optional_callbacks explain: 2, zoom: 2, option_table: 0
 end

@@ -56,12 +56,25 @@ defmodule Hal.Serial do
   With `:pty`, whoever opens the link is at the other end, comes and goes as he likes; what is written
   meanwhile is lost. The link is removed at the end. It replaces one that leads nowhere, and nothing else.
   """
-  alias Hal.Serial
+  alias Hal.{Options, Serial}
   alias Hal.Serial.Line
 
   @most_words 1024
-  @defaults [speed: 115_200, last_words: <<>>, keep_alive_ms: 200, module: Serial.Native]
-  @keys [:port, :pty | Keyword.keys(@defaults)]
+  @table [
+    port: :path,
+    pty: :path,
+    speed: [{:integer, 1, 20_000_000, "baud"}, default: 115_200],
+    last_words: [
+      {:check, &__MODULE__.words?/1, "a binary of at most #{@most_words} bytes"},
+      default: <<>>
+    ],
+    keep_alive_ms: [{:integer, 10, 60_000, "ms"}, default: 200],
+    module: [
+      {:check, &__MODULE__.line?/1,
+       "Hal.Serial.Native, or Hal.Serial.Circuits where circuits_uart is (MIX_TARGET),"},
+      default: Serial.Native
+    ]
+  ]
 
   @enforce_keys [:module, :line, :name]
   defstruct @enforce_keys
@@ -120,15 +133,35 @@ defmodule Hal.Serial do
   Checks options and fills in what is missing; or says in a line what is wrong.
 
       iex> Hal.Serial.options(port: "/dev/ttyS0", speed: 0)
-      {:error, "serial option :speed cannot be 0: it must be a whole number of baud from 1 to 20000000"}
+      {:error, "serial option speed cannot be 0: a whole number from 1 to 20000000 baud is allowed"}
   """
   @spec options(keyword()) :: {:ok, keyword()} | {:error, String.t()}
   def options(options) do
-    with :ok <- check_keys(options),
-         options = Keyword.merge(@defaults, options),
-         :ok <- check_all(options),
-         do: check_ends(options)
+    with {:ok, options} <- Options.check(options, @table, "serial"), do: ends(options)
   end
+
+  defp ends(options) do
+    case {options[:port], options[:pty], options[:module]} do
+      {nil, nil, _} -> {:error, "serial option port is missing: the path of a device is allowed"}
+      {_, nil, _} -> {:ok, options}
+      {nil, _, Serial.Native} -> {:ok, options}
+      {nil, _, module} -> refuse(:module, module, "Hal.Serial.Native where there is a pty")
+      {_, pty, _} -> refuse(:pty, pty, "either port or pty")
+    end
+  end
+
+  defp refuse(key, value, allowed), do: Options.refuse("serial", [key], value, allowed)
+
+  @doc "What is allowed."
+  @spec table() :: Options.table()
+  def table, do: @table
+
+  @doc false
+  def words?(words), do: is_binary(words) and byte_size(words) <= @most_words
+
+  @doc false
+  def line?(module),
+    do: is_atom(module) and Code.ensure_loaded?(module) and function_exported?(module, :open, 1)
 
   @doc """
   An error in one line for people.
@@ -162,62 +195,4 @@ defmodule Hal.Serial do
   defp words({:os, words}), do: words
   defp words({:exit, status}), do: "the port program ended (#{inspect(status)})"
   defp words(other), do: inspect(other)
-
-  defp check_keys(options) do
-    cond do
-      not Keyword.keyword?(options) ->
-        {:error, "serial options cannot be #{show(options)}: they must be a keyword list"}
-
-      unknown = Enum.find(Keyword.keys(options), &(&1 not in @keys)) ->
-        {:error, "there is no serial option #{show(unknown)}: allowed are #{allowed()}"}
-
-      true ->
-        :ok
-    end
-  end
-
-  defp allowed, do: Enum.map_join(@keys, ", ", &inspect/1)
-
-  defp check_all(options) do
-    Enum.find_value(options, :ok, fn {key, value} ->
-      if not valid?(key, value), do: wrong(key, value, rule(key))
-    end)
-  end
-
-  defp check_ends(options) do
-    case {options[:port], options[:pty], options[:module]} do
-      {nil, nil, _} -> {:error, "serial option :port is missing: it must be the path of a device"}
-      {_, nil, _} -> {:ok, options}
-      {nil, _, Serial.Native} -> {:ok, options}
-      {nil, _, module} -> wrong(:module, module, "Hal.Serial.Native where there is a :pty")
-      {_, pty, _} -> wrong(:pty, pty, "left out where there is a :port")
-    end
-  end
-
-  defp valid?(key, path) when key in [:port, :pty],
-    do: is_binary(path) and byte_size(path) in 1..4095 and not String.contains?(path, <<0>>)
-
-  defp valid?(:speed, speed), do: is_integer(speed) and speed in 1..20_000_000
-  defp valid?(:keep_alive_ms, ms), do: is_integer(ms) and ms in 10..60_000
-  defp valid?(:last_words, words), do: is_binary(words) and byte_size(words) <= @most_words
-
-  defp valid?(:module, module),
-    do: is_atom(module) and Code.ensure_loaded?(module) and function_exported?(module, :open, 1)
-
-  defp rule(key) when key in [:port, :pty], do: "a path"
-  defp rule(:speed), do: "a whole number of baud from 1 to 20000000"
-  defp rule(:keep_alive_ms), do: "a whole number of milliseconds from 10 to 60000"
-  defp rule(:last_words), do: "a binary of at most #{@most_words} bytes"
-
-  defp rule(:module),
-    do: "Hal.Serial.Native, or Hal.Serial.Circuits where circuits_uart is (MIX_TARGET)"
-
-  defp wrong(key, value, rule),
-    do: {:error, "serial option #{inspect(key)} cannot be #{show(value)}: it must be #{rule}"}
-
-  # One line, however much there is.
-  defp show(value) do
-    text = inspect(value, limit: 20, printable_limit: 60, width: :infinity)
-    if String.length(text) > 80, do: String.slice(text, 0, 80) <> "...", else: text
-  end
 end

@@ -28,18 +28,26 @@ defmodule Hal.Suggest do
   end
 
   @doc """
-  The half-sentence to put behind an error, empty when there is nothing to suggest.
+  The half-sentence to put behind an error, empty when there is nothing to suggest. Known are words, or values
+  that `word` was to be one of.
 
       iex> Hal.Suggest.hint("hal", ["hall", "arena"])
-      ~s(; did you mean "hall"?)
+      "; did you mean hall?"
+      iex> Hal.Suggest.hint(":manaul", [nil, :manual, :auto])
+      "; did you mean :manual?"
       iex> Hal.Suggest.hint("moon", ["hall", "arena"])
       ""
   """
-  @spec hint(String.t(), [String.t()]) :: String.t()
+  @spec hint(String.t(), [term()]) :: String.t()
   def hint(word, known) do
-    case nearest(word, known) do
+    shown = Map.new(known, &{bare(to_string(&1)), if(is_binary(&1), do: &1, else: inspect(&1))})
+
+    case nearest(bare(word), Enum.map(known, &bare(to_string(&1)))) do
       nil -> ""
-      near -> "; did you mean #{inspect(near)}?"
+      near -> "; did you mean #{shown[near]}?"
     end
   end
+
+  # A name and a text are compared by their letters.
+  defp bare(word), do: word |> String.trim("\"") |> String.trim_leading(":")
 end

@@ -7,13 +7,13 @@ defmodule Hal.SerialTest do
     long = String.duplicate("x", 5000)
 
     wrong = [
-      {[], ":port is missing"},
-      {[port: ""], ":port cannot be \"\""},
-      {[port: nil, speed: 9600], ":port cannot be nil"},
-      {[port: "a\0b"], "must be a path"},
-      {[port: long], "must be a path"},
-      {[port: :ttyS0], "must be a path"},
-      {[port: "a", pty: "b"], ":pty cannot be \"b\": it must be left out"},
+      {[], "option port is missing"},
+      {[port: ""], "option port cannot be \"\""},
+      {[port: nil, speed: 9600], "option port cannot be nil"},
+      {[port: "a\0b"], "a path is allowed"},
+      {[port: long], "a path is allowed"},
+      {[port: :ttyS0], "a path is allowed"},
+      {[port: "a", pty: "b"], "option pty cannot be \"b\": either port or pty is allowed"},
       {[port: "a", speed: -5], "1 to 20000000"},
       {[port: "a", speed: 9600.0], "1 to 20000000"},
       {[port: "a", speed: 1.0e308], "1 to 20000000"},
@@ -24,9 +24,9 @@ defmodule Hal.SerialTest do
       {[port: "a", keep_alive_ms: :infinity], "10 to 60000"},
       {[port: "a", module: Enum], "Hal.Serial.Native"},
       {[port: "a", module: No.Such], "Hal.Serial.Native"},
-      {[port: "a", parity: :even], "no serial option :parity: allowed are :port"},
-      {[{"port", "a"}], "keyword list"},
-      {:port, "keyword list"}
+      {[port: "a", parity: :even], "option parity is not known: allowed are port"},
+      {[{1, "a"}], "[key: value, …] with port"},
+      {:port, "[key: value, …] with port"}
     ]
 
     for {options, words} <- wrong do

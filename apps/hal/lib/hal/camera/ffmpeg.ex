@@ -44,13 +44,16 @@ defmodule Hal.Camera.FFmpeg do
   @opaque t :: %__MODULE__{port: port(), format: Frame.format(), every: boolean()}
 
   @doc """
-  The options with their defaults, or all that is wrong with them, a line each.
+  The options with their defaults, or one line that says what is wrong.
 
-      iex> Hal.Camera.FFmpeg.options(source: "testsrc", siz: {320, 240})
-      {:error, ["camera has no option :siz; did you mean :size?"]}
+      iex> Hal.Camera.FFmpeg.options(source: "testsrc", loop: 1)
+      {:error, "camera option loop cannot be 1: true or false is allowed"}
   """
-  @spec options(keyword()) :: {:ok, keyword()} | {:error, [line :: String.t(), ...]}
+  @spec options(keyword()) :: {:ok, keyword()} | {:error, line :: String.t()}
   defdelegate options(options), to: Options, as: :check
+
+  @impl Hal.Camera
+  defdelegate option_table, to: Options, as: :table
 
   @impl Hal.Camera
   def init(options) do
@@ -179,7 +182,7 @@ defmodule Hal.Camera.FFmpeg do
   defp check!(options) do
     case options(options) do
       {:ok, options} -> options
-      {:error, lines} -> raise ArgumentError, Enum.join(lines, "; ")
+      {:error, line} -> raise ArgumentError, line
     end
   end
 end

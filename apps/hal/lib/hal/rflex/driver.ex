@@ -85,6 +85,9 @@ defmodule Hal.RFlex.Driver do
   @spec options(keyword()) :: {:ok, Options.t()} | {:error, String.t()}
   def options(options), do: Options.new(options)
 
+  @impl Hal.Drive
+  defdelegate option_table, to: Options, as: :table
+
   @doc "Opens the line, stops the wheels and sets the brake. Wrong options raise `ArgumentError`."
   @impl Hal.Drive
   def init(options) do

@@ -14,10 +14,20 @@ defmodule Hal.RFlex.PowerSwitch do
   The command is `robot halt` (`Swarm.Host.PowerOff`), off unless the robot's file has a `console:`.
   Whoever calls this is about to lose power: file systems are to be unmounted or read-only.
   """
-  alias Hal.Serial
+  alias Hal.{Options, Serial}
 
-  @keys [:port, :phrase, speed: 9600, serial: []]
-  @phrase "The system is halted"
+  @table [
+    port: [:path, required: true],
+    speed: [{:integer, 1, 20_000_000, "baud"}, default: 9_600],
+    phrase: [
+      {:check, &__MODULE__.phrase?/1, "text of 1 to 80 printable ASCII characters"},
+      default: "The system is halted"
+    ],
+    serial: [
+      {:keys, Keyword.take(Serial.table(), [:module, :keep_alive_ms])},
+      default: []
+    ]
+  ]
 
   @doc """
   The bytes of a phrase: on a line of its own.
@@ -47,32 +57,16 @@ defmodule Hal.RFlex.PowerSwitch do
   Checks options and fills in what is missing.
 
       iex> Hal.RFlex.PowerSwitch.options(port: "/dev/ttyS0", phrase: "")
-      {:error, "console option :phrase cannot be \\"\\": it must be 1 to 80 printable ASCII characters"}
+      {:error, "console option phrase cannot be \\"\\": text of 1 to 80 printable ASCII characters is allowed"}
   """
   @spec options(keyword()) :: {:ok, keyword()} | {:error, String.t()}
-  def options(options) do
-    with {:ok, options} <- known(options),
-         options = Keyword.put_new(options, :phrase, @phrase),
-         :ok <- phrase(options[:phrase]),
-         serial = [port: options[:port], speed: options[:speed]],
-         {:ok, _} <- Serial.options(serial ++ options[:serial]),
-         do: {:ok, options}
-  end
+  def options(options), do: Options.check(options, @table, "console")
 
-  defp known(options) do
-    case Keyword.validate(options, @keys) do
-      {:ok, options} -> {:ok, options}
-      {:error, [key | _]} -> {:error, "there is no console option #{inspect(key)}"}
-    end
-  end
+  @doc "What is allowed."
+  @spec table() :: Options.table()
+  def table, do: @table
 
-  defp phrase(phrase) do
-    if is_binary(phrase) and byte_size(phrase) in 1..80 and
-         Enum.all?(:binary.bin_to_list(phrase), &(&1 in 0x20..0x7E)),
-       do: :ok,
-       else:
-         {:error,
-          "console option :phrase cannot be #{inspect(phrase, printable_limit: 60)}: " <>
-            "it must be 1 to 80 printable ASCII characters"}
-  end
+  @doc false
+  def phrase?(phrase),
+    do: is_binary(phrase) and byte_size(phrase) in 1..80 and phrase =~ ~r/\A[ -~]+\z/
 end

@@ -50,6 +50,9 @@ defmodule Hal.Visca.Driver do
   defdelegate options(options), to: Options, as: :check
 
   @impl Hal.Ptz
+  defdelegate option_table, to: Options, as: :table
+
+  @impl Hal.Ptz
   def init(options) do
     case Options.check(options) do
       {:ok, options} ->

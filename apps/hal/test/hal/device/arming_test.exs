@@ -223,7 +223,7 @@ defmodule Hal.Device.ArmingTest do
 
   test "a wrong policy is named" do
     assert_raise ArgumentError,
-                 ~r/:arm cannot be :hand: it must be :auto, :manual or :never/,
+                 ~r/arm cannot be :hand: :auto, :manual or :never is allowed/,
                  fn ->
                    Device.start_link(kind: :drive, driver: {Hal.FakeDrive, []}, arm: :hand)
                  end

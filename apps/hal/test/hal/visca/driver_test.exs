@@ -109,21 +109,24 @@ defmodule Hal.Visca.DriverTest do
     assert Driver.init(port: link) == {:error, :enoent}
 
     for {wrong, words} <- [
-          {[], "camera option :port is missing"},
-          {[port: 3], ":port cannot be 3"},
-          {[port: "a", lens: {1.0, 0.5}], ":lens cannot be {1.0, 0.5}"},
+          {[], "visca option port is missing"},
+          {[port: 3], "option port cannot be 3"},
+          {[port: "a", lens: {1.0, 0.5}], "option lens cannot be {1.0, 0.5}"},
           {[port: "a", poll_ms: 5],
-           ":poll_ms cannot be 5: it must be milliseconds from 50 to 400"},
-          {[port: "a", speed: -1], ":speed cannot be -1"},
-          {[port: "a", serial: [speed: 3]], ":serial cannot be"},
-          {[port: "a", zoom: 3], "there is no camera option :zoom"},
-          {:what, "camera options cannot be :what"}
+           "option poll_ms cannot be 5: a whole number from 50 to 400 ms is allowed"},
+          {[port: "a", speed: -1], "option speed cannot be -1"},
+          {[port: "a", serial: [speed: 3]],
+           "option serial.speed is not known: allowed are keep_alive_ms, module"},
+          {[port: "a", zoom: 3], "option zoom is not known: allowed are port"},
+          {:what, "visca options cannot be :what"}
         ] do
       assert {:error, line} = Options.check(wrong)
       assert line =~ words
       refute line =~ "\n"
     end
 
-    assert_raise ArgumentError, ~r/:camera/, fn -> Driver.init(port: link, camera: 9) end
+    assert_raise ArgumentError, ~r/option camera cannot be 9/, fn ->
+      Driver.init(port: link, camera: 9)
+    end
   end
 end

@@ -1,0 +1,166 @@
+defmodule Hal.Options.Type do
+  @moduledoc """
+  The types of an option, in a table of `Hal.Options`: what they take, and how that is said. Pure.
+
+  | type | takes | gives |
+  |---|---|---|
+  | `{:number, low, high}`, `{:number, low, high, unit}` | a number | a float |
+  | `{:integer, low, high}`, `{:integer, low, high, unit}` | a whole number | the number |
+  | `:boolean` | `true`, `false` | the same |
+  | `:path`, `{:path, what}` | text of 1 to 4095 bytes without a zero | the same |
+  | `{:text, what}` | text of 1 to 255 bytes on one line, without control characters | the same |
+  | `{:one_of, values}` | one of these | the same |
+  | `{:list, type}`, `{:list, type, most}` | up to so many values (64) | a list |
+  | `{:tuple, types, what}` | a tuple of these | a tuple |
+  | `{:keys, table}` | `[key: value, …]`; a key may be text | a keyword list in the order of the table |
+  | `{:or, value, type}` | that value, or what the type takes | |
+  | `{:struct, module}` | such a struct | the same |
+  | `:mfa`, `:driver` | `{module, function, arguments}`; `{module, options}` | the same |
+  | `{:check, function, what}` | that for which `function.(value)` is `true` or `{:ok, value}` | the value |
+
+  A `:check` that knows better than `what` gives the whole sentence, `{:error, text}`, or `{:error, problems}`.
+  """
+  alias Hal.Options.Wording
+  alias Hal.Suggest
+
+  @most 64
+
+  @type t :: atom() | tuple()
+  @type problem :: Wording.problem()
+  @type result :: {:ok, term()} | {:error, [problem(), ...]}
+
+  @doc """
+  A value by its type, or all its problems, each with the keys that lead to it. Fills in no defaults.
+
+      iex> Hal.Options.Type.read({:keys, size: {:number, 0, 2, "m"}}, size: 1)
+      {:ok, [size: 1.0]}
+      iex> Hal.Options.Type.read({:list, {:integer, 0, 15}}, [3, 16])
+      {:error, [{["2"], "cannot be 16: a whole number from 0 to 15 is allowed"}]}
+      iex> Hal.Options.Type.read({:one_of, [:manual, :auto]}, :manaul)
+      {:error, [{[], "cannot be :manaul: :manual or :auto is allowed; did you mean :manual?"}]}
+      iex> Hal.Options.Type.read({:keys, length: {:number, 0.1, 2.0}, lid: :boolean}, [{"lenght", 3}])
+      {:error, [{["lenght"], "is not known: allowed are length, lid; did you mean length?"}]}
+  """
+  @spec read(t(), term()) :: result()
+  def read({:or, value, _type}, value), do: {:ok, value}
+
+  def read({:or, _value, type} = either, value) do
+    case {read(type, value), Wording.refuse(type, value)} do
+      {plain, plain} -> Wording.refuse(either, value)
+      {result, _plain} -> result
+    end
+  end
+
+  def read({:list, type}, value), do: read({:list, type, @most}, value)
+
+  def read({:list, type, most} = list, value) do
+    if is_list(value) and not List.improper?(value) and length(value) <= most,
+      do:
+        value |> Enum.with_index(1) |> Enum.map(fn {v, n} -> under(n, read(type, v)) end) |> all(),
+      else: Wording.refuse(list, value)
+  end
+
+  def read({:tuple, types, _what}, value)
+      when is_tuple(value) and tuple_size(value) == length(types) do
+    with {:ok, values} <- all(Enum.zip_with(types, Tuple.to_list(value), &read/2)),
+         do: {:ok, List.to_tuple(values)}
+  end
+
+  def read({:keys, table} = type, value),
+    do: if(keys?(value), do: keys(table, value), else: Wording.refuse(type, value))
+
+  def read({:check, function, _what} = type, value) do
+    case function.(value) do
+      true -> {:ok, value}
+      {:ok, value} -> {:ok, value}
+      {:error, text} when is_binary(text) -> {:error, [{[], text}]}
+      {:error, [_ | _] = problems} -> {:error, problems}
+      _no -> Wording.refuse(type, value)
+    end
+  end
+
+  def read(type, value) do
+    cond do
+      not takes?(type, value) -> Wording.refuse(type, value)
+      is_tuple(type) and elem(type, 0) == :number -> {:ok, value * 1.0}
+      true -> {:ok, value}
+    end
+  end
+
+  defp takes?(:boolean, value), do: is_boolean(value)
+
+  defp takes?(:path, value),
+    do: is_binary(value) and byte_size(value) in 1..4_095 and not String.contains?(value, <<0>>)
+
+  defp takes?({:path, _what}, value), do: takes?(:path, value)
+
+  defp takes?({:text, _what}, value) do
+    is_binary(value) and byte_size(value) in 1..255 and String.printable?(value) and
+      not String.match?(value, ~r/[[:cntrl:]]/)
+  end
+
+  defp takes?({:one_of, values}, value), do: value in values
+  defp takes?({:struct, module}, value), do: is_struct(value, module)
+  defp takes?(:mfa, {m, f, a}), do: is_atom(m) and is_atom(f) and is_list(a)
+  defp takes?(:driver, {m, options}), do: is_atom(m) and Keyword.keyword?(options)
+  defp takes?({:integer, l, h}, value), do: is_integer(value) and value >= l and value <= h
+  defp takes?({:integer, l, h, _unit}, value), do: takes?({:integer, l, h}, value)
+  defp takes?({:number, l, h}, value), do: is_number(value) and value >= l and value <= h
+  defp takes?({:number, l, h, _unit}, value), do: takes?({:number, l, h}, value)
+  defp takes?(_type, _value), do: false
+
+  defp keys?(list) do
+    is_list(list) and not List.improper?(list) and
+      Enum.all?(list, &match?({key, _value} when is_atom(key) or is_binary(key), &1))
+  end
+
+  defp keys(table, given) do
+    given = for {key, value} <- given, do: {to_string(key), value}
+    names = for {key, _type} <- table, do: Atom.to_string(key)
+
+    unknown =
+      for {name, _value} <- given, name not in names do
+        {[name],
+         "is not known: allowed are #{Enum.join(names, ", ")}#{Suggest.hint(name, names)}"}
+      end
+
+    found =
+      for {key, type} <- table, name = Atom.to_string(key) do
+        values = for {^name, value} <- given, do: value
+        {key, under(name, find(List.wrap(type), values))}
+      end
+
+    case Enum.uniq(unknown) ++ for({_key, {:error, some}} <- found, one <- some, do: one) do
+      [] -> {:ok, for({key, {:ok, value}} <- found, do: {key, value})}
+      problems -> {:error, problems}
+    end
+  end
+
+  defp find([type | settings], []) do
+    if settings[:required],
+      do: {:error, [{[], "is missing: #{Wording.allowed(type)} is allowed"}]},
+      else: :absent
+  end
+
+  defp find([type | settings], [value]) do
+    if value == nil and Keyword.get(settings, :default, :none) == nil,
+      do: {:ok, nil},
+      else: read(type, value)
+  end
+
+  defp find(_type, _values), do: {:error, [{[], "is given twice"}]}
+
+  defp under(key, {:error, problems}),
+    do: {:error, for({path, text} <- problems, do: {["#{key}" | path], text})}
+
+  defp under(_key, result), do: result
+
+  @doc "Joins results: all values, or all problems."
+  @spec all([result()]) :: {:ok, [term()]} | {:error, [problem(), ...]}
+  def all(results) do
+    case for {:error, problems} <- results, problem <- problems, do: problem do
+      [] -> {:ok, Enum.map(results, &elem(&1, 1))}
+      problems -> {:error, problems}
+    end
+  end
+end

@@ -1,0 +1,52 @@
+defmodule Hal.Options.Wording do
+  @moduledoc "How it is said that an option is wrong, and what is allowed. Pure."
+  alias Hal.Suggest
+
+  @longest 80
+
+  @type problem :: {path :: [String.t()], text :: String.t()}
+
+  @doc "The problem of a value that is not of a type, or not what a text says."
+  @spec refuse(Hal.Options.Type.t() | String.t(), term()) :: {:error, [problem(), ...]}
+  def refuse(type, value) do
+    hint = with({:one_of, values} <- type, do: Suggest.hint(show(value), values), else: (_ -> ""))
+    {:error, [{[], "cannot be #{show(value)}: #{allowed(type)} is allowed#{hint}"}]}
+  end
+
+  @doc """
+  What a type takes, for people.
+
+      iex> Hal.Options.Wording.allowed({:or, :off, {:list, {:integer, 0, 16, "sonars"}}})
+      ":off or a list of up to 64, each a whole number from 0 to 16 sonars,"
+  """
+  @spec allowed(Hal.Options.Type.t() | String.t()) :: String.t()
+  def allowed(text) when is_binary(text), do: text
+  def allowed(:boolean), do: "true or false"
+  def allowed(:path), do: "a path"
+  def allowed(:mfa), do: "{module, function, arguments}"
+  def allowed(:driver), do: "{module, options}"
+  def allowed({kind, what}) when kind in [:text, :path], do: what
+  def allowed({:number, low, high}), do: "a number from #{low} to #{high}"
+  def allowed({:integer, low, high}), do: "a whole number from #{low} to #{high}"
+  def allowed({type, low, high, unit}), do: "#{allowed({type, low, high})} #{unit}"
+  def allowed({:one_of, values}), do: either(Enum.map(values, &inspect/1))
+  def allowed({:struct, module}), do: "a %#{inspect(module)}{}"
+  def allowed({:or, value, type}), do: "#{inspect(value)} or #{allowed(type)}"
+  def allowed({:list, type}), do: allowed({:list, type, 64})
+  def allowed({:list, type, most}), do: "a list of up to #{most}, each #{allowed(type)},"
+  def allowed({kind, _types, what}) when kind in [:tuple, :check], do: what
+  def allowed({:keys, table}), do: "[key: value, …] with #{list(Keyword.keys(table))}"
+
+  defp either([one]), do: one
+  defp either(words), do: "#{list(Enum.drop(words, -1))} or #{List.last(words)}"
+
+  defp list(words), do: Enum.join(words, ", ")
+
+  @doc "A value on one line, however large it is."
+  @spec show(term()) :: String.t()
+  def show(value) do
+    text = inspect(value, limit: 20, printable_limit: 60, width: :infinity, charlists: :as_lists)
+
+    if String.length(text) > @longest, do: String.slice(text, 0, @longest - 1) <> "…", else: text
+  end
+end

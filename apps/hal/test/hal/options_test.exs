@@ -1,0 +1,86 @@
+defmodule Hal.OptionsTest do
+  use ExUnit.Case, async: true
+  alias Hal.Options
+  alias Hal.Options.Type
+  doctest Hal.Options
+  doctest Hal.Options.Type
+  doctest Hal.Options.Wording
+
+  @table [
+    port: [:path, required: true],
+    baud: [{:integer, 1, 9_600, "baud"}, default: 300],
+    limits: {:keys, turn: {:number, 0.0, 1.0, "rad/s"}},
+    banks: {:list, {:integer, 0, 16}, 2},
+    style: {:one_of, [:bit, :address]},
+    pace: {:or, :off, {:tuple, [{:integer, 1, 50}, :boolean], "{ms, true}"}},
+    lens: [{:check, &__MODULE__.even?/1, "an even number"}, default: nil],
+    clock: :mfa,
+    name: {:text, "a name"}
+  ]
+
+  def even?(n), do: is_integer(n) and rem(n, 2) == 0
+
+  test "all that is allowed is taken" do
+    options = [
+      pace: {3, true},
+      port: "/dev/a",
+      limits: [turn: 1],
+      banks: [16, 0],
+      style: :bit,
+      lens: nil,
+      clock: {System, :monotonic_time, []}
+    ]
+
+    assert {:ok, checked} = Options.check(options, @table, "test")
+    assert checked[:limits] == [turn: 1.0] and checked[:baud] == 300 and checked[:lens] == nil
+    assert {:ok, _} = Options.check([port: "a", pace: :off, lens: 2], @table, "test")
+  end
+
+  test "what is wrong is one line with the key, the value and what is allowed" do
+    wrong = [
+      {[port: "a\0b"], "port cannot be <<97, 0, 98>>: a path"},
+      {[port: ""], ~s|port cannot be "": a path|},
+      {[name: "a\nb"], ~S|name cannot be "a\nb": a name|},
+      {[name: <<0xFF>>], "name cannot be <<255>>: a name"},
+      {[port: nil], "port cannot be nil: a path"},
+      {[baud: 1.0], "baud cannot be 1.0: a whole number from 1 to 9600 baud is allowed"},
+      {[baud: Integer.pow(10, 400)], "baud cannot be 1000"},
+      {[limits: [turn: 1.0e308]],
+       "limits.turn cannot be 1.0e308: a number from 0.0 to 1.0 rad/s"},
+      {[limits: [turn: :nan]], "limits.turn cannot be :nan"},
+      {[limits: [trun: 1]], "limits.trun is not known: allowed are turn; did you mean turn?"},
+      {[limits: 5], "limits cannot be 5: [key: value, …] with turn is allowed"},
+      {[banks: [17]], "banks.1 cannot be 17: a whole number from 0 to 16"},
+      {[banks: [1, 2, 3]], "banks cannot be [1, 2, 3]: a list of up to 2"},
+      {[banks: [1 | 2]], "banks cannot be [1 | 2]: a list of up to 2"},
+      {[style: "bit"],
+       ~s|style cannot be "bit": :bit or :address is allowed; did you mean :bit?|},
+      {[pace: {0, true}], "pace cannot be 0: a whole number from 1 to 50"},
+      {[pace: 7], "pace cannot be 7: :off or {ms, true} is allowed"},
+      {[lens: 3], "lens cannot be 3: an even number is allowed"},
+      {[clock: :now], "clock cannot be :now: {module, function, arguments}"},
+      {[name: String.duplicate("x", 256)], "a name is allowed"},
+      {[name: "a", name: "b"], "name is given twice"},
+      {[{"nobody's option", 1}], "nobody's option is not known: allowed are port, baud"}
+    ]
+
+    for {options, words} <- wrong do
+      options = Enum.uniq_by(options ++ [port: "a"], fn {k, v} -> {k, k == :name && v} end)
+      assert {:error, line} = Options.check(options, @table, "test")
+      assert line =~ words and line =~ "test option "
+      refute line =~ "\n"
+      assert String.length(line) < 300
+      assert_raise ArgumentError, line, fn -> Options.check!(options, @table, "test") end
+    end
+
+    for options <- [:port, nil, [:port], [{1, 2}], [{:port, "a"} | 3], %{port: "a"}] do
+      assert {:error, "test options cannot be " <> _} = Options.check(options, @table, "test")
+    end
+  end
+
+  test "no atom is made of a key" do
+    count = :erlang.system_info(:atom_count)
+    for n <- 1..100, do: Type.read({:keys, @table}, [{"no such key #{n}", n}])
+    assert :erlang.system_info(:atom_count) - count < 50
+  end
+end
