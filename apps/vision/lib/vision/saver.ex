@@ -46,7 +46,7 @@ defmodule Vision.Saver do
 
     case options(given) do
       {:ok, given} -> GenServer.start_link(__MODULE__, given ++ ours, Keyword.take(ours, [:name]))
-      {:error, line} -> raise ArgumentError, "saver: " <> line
+      {:error, line} -> raise ArgumentError, line
     end
   end
 

@@ -231,7 +231,7 @@ defmodule Vision.SaverTest do
           {[files: 1.5], "files"},
           {[megabytes: 0], "megabytes"},
           {[folder: 7], "folder"},
-          {[folder: "/tmp", colour: 1], ":colour"},
+          {[folder: "/tmp", colour: 1], "colour is not known"},
           {:all, ":all"}
         ] do
       assert {:error, line} = Saver.options(bad)
