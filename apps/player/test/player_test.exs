@@ -125,7 +125,7 @@ defmodule PlayerTest do
              {16, "sonar_2nd_bank_start", "all sonars are one list here"},
              {20, "rflex_joy_pos_ratio", "the joystick is read, but drives nothing by itself"},
              {21, "odo_distence_conversion",
-              "is not an option of rflex; was odo_distance_conversion meant?"},
+              "is not an option of rflex; did you mean odo_distance_conversion?"},
              {26, "driver festival", "no speech"},
              {27, "include \"more.inc\"",
               "other files are not read: import that one, or copy it in"}

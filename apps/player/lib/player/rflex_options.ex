@@ -93,10 +93,7 @@ defmodule Player.RFlexOptions do
 
   defp reason(name) when is_map_key(@reasons, name), do: @reasons[name]
   defp reason(name) when name in @known, do: "has a value that it cannot have"
-  defp reason(name), do: "is not an option of rflex#{hint(Suggest.nearest(name, @known))}"
-
-  defp hint(nil), do: ""
-  defp hint(near), do: "; was #{near} meant?"
+  defp reason(name), do: "is not an option of rflex#{Suggest.hint(name, @known)}"
 
   defp per_metre(path, units, context, least) do
     cond do

@@ -31,16 +31,14 @@ defmodule Player.Unsupported do
       iex> Player.Unsupported.driver("festival", ["rflex", "camerav4l"])
       "no speech"
       iex> Player.Unsupported.driver("camerav41", ["rflex", "camerav4l"])
-      "none of our drivers does what it does; was camerav4l meant?"
+      "none of our drivers does what it does; did you mean camerav4l?"
   """
   @spec driver(String.t() | nil, [String.t()]) :: String.t()
   def driver(nil, _taken), do: "has no name"
 
   def driver(name, taken) do
     Map.get_lazy(@why, name, fn ->
-      near = Suggest.nearest(name, taken ++ Map.keys(@why))
-      hint = if near, do: "; was #{near} meant?", else: ""
-      "none of our drivers does what it does#{hint}"
+      "none of our drivers does what it does#{Suggest.hint(name, taken ++ Map.keys(@why))}"
     end)
   end
 

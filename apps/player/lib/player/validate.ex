@@ -3,7 +3,8 @@ defmodule Player.Validate do
   Leaves out what a robot file cannot say, though Player's file could: each value that came over is held
   against the table of robot files and against its driver. Pure but for asking which drivers there are.
   """
-  alias Robot.File.{Check, Device, Schema}
+  alias Hal.Options.Type
+  alias Robot.File.{Device, Schema}
 
   @least %{drive: [port: "/dev/null"], ptz: [port: "/dev/null"], camera: [source: "/dev/video0"]}
 
@@ -20,9 +21,9 @@ defmodule Player.Validate do
   defp refused([:body | keys], value, _modules) do
     check = Enum.reduce(keys, Schema.body(), fn key, {:keys, table} -> table[key] end)
 
-    case Check.run(check, tree(value), []) do
+    case Type.read(check, plain(value)) do
       {:ok, _value} -> nil
-      {:error, [{_line, _path, text} | _more]} -> text
+      {:error, [{_path, text} | _more]} -> text
     end
   end
 
@@ -30,12 +31,7 @@ defmodule Player.Validate do
   defp refused([kind | path], value, modules) when is_map_key(@least, kind) do
     options = Keyword.merge(@least[kind], nest(path, plain(value)))
 
-    with true <- Code.ensure_loaded?(modules[kind]),
-         [line | _more] <- Device.refused(modules[kind], options) do
-      line
-    else
-      _well_or_unknown -> nil
-    end
+    if Code.ensure_loaded?(modules[kind]), do: Device.refused_by(modules[kind], options)
   end
 
   defp refused(_path, _value, _modules), do: nil
@@ -45,14 +41,6 @@ defmodule Player.Validate do
   defp nest([:bumpers, :segments], _segments), do: []
   defp nest([key], value), do: [{key, value}]
   defp nest([key | path], value), do: [{key, nest(path, value)}]
-
-  defp tree(list) when is_list(list), do: {1, {:list, Enum.map(list, &tree/1)}}
-  defp tree({:deg, degrees}), do: {1, degrees * :math.pi() / 180}
-
-  defp tree(tuple) when is_tuple(tuple),
-    do: {1, {:tuple, tuple |> Tuple.to_list() |> Enum.map(&tree/1)}}
-
-  defp tree(value), do: {1, value}
 
   defp plain({:deg, degrees}), do: degrees * :math.pi() / 180
 

@@ -32,7 +32,7 @@ defmodule Robot.Behaviour do
       iex> Robot.Behaviour.check({NoSuchModule, []})
       {:error, "NoSuchModule is not a behaviour: a module with new/1 and tick/2 is allowed"}
       iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: :far, y: 2.0})
-      {:error, "Robot.Behaviour.Goto: option x cannot be :far: a number from -1.0e6 to 1.0e6 is allowed"}
+      {:error, "Robot.Behaviour.Goto: goto option x cannot be :far: a number from -1.0e6 to 1.0e6 m is allowed"}
   """
   @spec check(term()) :: :ok | {:error, line :: String.t()}
   def check(nil), do: :ok

@@ -27,17 +27,18 @@ defmodule Robot.Config do
     * `:estop_file` - where the e-stop latch outlives the machine, or `nil`
     * `:trace` - `{m, f, a}` that is told all that goes in and out, see `Robot.Control.Trace`, or `nil`
   """
-  alias Hal.{Pose, Profile}
+  alias Hal.{Options, Pose, Profile}
   alias Robot.Safety.Reflex.Fence
 
-  @limits [:max_linear, :max_turn, :max_acceleration, :max_turn_acceleration]
+  @limits for key <- [:max_linear, :max_turn, :max_acceleration, :max_turn_acceleration],
+              do: {key, {:number, 1.0e-6, 100.0}}
 
   @enforce_keys [:id, :profile, :drive]
   defstruct @enforce_keys ++
               [
                 ptz: nil,
                 camera: nil,
-                start: nil,
+                start: Pose.new(0, 0),
                 colours: nil,
                 save_pictures: nil,
                 limits: [],
@@ -88,22 +89,18 @@ defmodule Robot.Config do
       iex> config.start
       Hal.Pose.new(0, 0)
       iex> Robot.Config.new(id: "mag1", profile: Hal.Profile.magellan(), drive: {Some.Drive, []})
-      {:error, "robot option :id cannot be \\"mag1\\": it must be an atom such as :mag1"}
+      {:error, "robot option id cannot be \\"mag1\\": an atom such as :mag1 is allowed"}
       iex> {:ok, config} = Robot.Config.new(id: :mag1, profile: Hal.Profile.magellan(),
       ...>   drive: {Some.Drive, []}, limits: [max_linear: 0.3])
       iex> config.profile.max_linear
       0.3
-      iex> Robot.Config.new(id: :mag1, wheels: 4)
-      {:error, "unknown robot option :wheels"}
+      iex> Robot.Config.new(id: :mag1, profile: Hal.Profile.magellan(), drive: {Some.Drive, []}, arm: :hand)
+      {:error, "robot option arm cannot be :hand: :auto or :manual is allowed"}
   """
   @spec new(keyword()) :: {:ok, t()} | {:error, line :: String.t()}
   def new(options) do
-    known = %__MODULE__{id: nil, profile: nil, drive: nil, start: Pose.new(0, 0)}
-
-    case Enum.find(options, fn {key, _} -> key == :__struct__ or not is_map_key(known, key) end) do
-      nil -> check(struct!(known, options))
-      {key, _value} -> {:error, "unknown robot option #{inspect(key)}"}
-    end
+    with {:ok, options} <- Options.check(options, table(), "robot"),
+         do: check(struct!(__MODULE__, options))
   end
 
   @doc "The same, or `ArgumentError` with that line."
@@ -126,116 +123,50 @@ defmodule Robot.Config do
   def ticker(%__MODULE__{pace: :clock}, message, period_ms),
     do: Hal.Ticker.start(message, period_ms, period_ms)
 
-  defp check(config) do
-    wrong =
-      config
-      |> Map.from_struct()
-      |> Enum.sort()
-      |> Enum.find(fn {option, value} -> not valid?(option, value) end)
-
-    case wrong do
-      nil when config.camera != nil and config.colours == nil ->
-        {:error, "robot option :colours cannot be nil: a robot with a camera must have colours"}
-
-      nil when config.camera == nil and config.save_pictures != nil ->
-        {:error, "robot option :save_pictures is for a robot with a camera"}
-
-      nil ->
-        limit(fenced(config))
-
-      {:save_pictures, value} ->
-        {:error, line} = Vision.Saver.options(value)
-        {:error, "robot option :save_pictures: #{line}"}
-
-      {:fence, value} ->
-        {:error, allowed} = Fence.new(value)
-
-        {:error,
-         "robot option :fence cannot be #{inspect(value, limit: 10)}: it must be #{allowed}"}
-
-      {option, value} ->
-        {:error,
-         "robot option #{inspect(option)} cannot be #{inspect(value)}: it must be #{allowed(option)}"}
-    end
+  defp table do
+    [
+      id: [{:check, &id?/1, "an atom such as :mag1"}, required: true],
+      profile: [{:struct, Profile}, required: true],
+      drive: [:driver, required: true],
+      ptz: [:driver, default: nil],
+      camera: [:driver, default: nil],
+      start: {:struct, Pose},
+      colours: [{:struct, Vision.Colours}, default: nil],
+      save_pictures: [{:keys, Vision.Saver.Options.table()}, default: nil],
+      limits: {:keys, @limits},
+      mission: [:driver, default: nil],
+      companions: {:list, :driver},
+      send: [:mfa, default: nil],
+      on_latch: [:mfa, default: nil],
+      clock: :mfa,
+      pace: {:one_of, [:clock, :manual]},
+      arm: {:one_of, [:auto, :manual]},
+      fence: [Fence.type(), default: nil],
+      dry_run: :boolean,
+      estop_file: [{:path, "the path of a file"}, default: nil],
+      trace: [:mfa, default: nil]
+    ]
   end
 
-  defp fenced(%{fence: nil} = config), do: config
-  defp fenced(%{fence: %Fence{}} = config), do: config
+  defp id?(id), do: is_atom(id) and id not in [nil, true, false]
 
-  defp fenced(config) do
-    {:ok, fence} = Fence.new(config.fence)
-    %{config | fence: fence}
-  end
+  defp check(%{camera: nil, save_pictures: [_ | _]}),
+    do: {:error, "robot option save_pictures is for a robot with a camera"}
+
+  defp check(%{colours: nil, camera: {_driver, _options}}),
+    do: {:error, "robot option colours cannot be nil: a robot with a camera must have colours"}
 
   # A limit may be lower than what the body can do, never higher.
-  defp limit(%{profile: profile, limits: limits} = config) do
+  defp check(%{profile: profile, limits: limits} = config) do
     case Enum.find(limits, fn {name, value} -> value > Map.fetch!(profile, name) end) do
       nil ->
         {:ok, %{config | profile: struct!(profile, limits)}}
 
       {name, value} ->
+        most = Map.fetch!(profile, name)
+
         {:error,
-         "robot option :limits cannot set #{inspect(name)} to #{inspect(value)}: " <>
-           "a #{profile.name} can do #{Map.fetch!(profile, name)} at most"}
+         "robot option limits.#{name} cannot be #{value}: a #{profile.name} can do #{most} at most"}
     end
   end
-
-  defp valid?(:id, id), do: is_atom(id) and id not in [nil, true, false]
-  defp valid?(:profile, profile), do: is_struct(profile, Profile)
-  defp valid?(:drive, driver), do: module_options?(driver)
-
-  defp valid?(option, value) when option in [:ptz, :camera, :mission],
-    do: value == nil or module_options?(value)
-
-  defp valid?(:start, pose), do: is_struct(pose, Pose)
-  defp valid?(:colours, colours), do: colours == nil or is_struct(colours, Vision.Colours)
-
-  defp valid?(:save_pictures, options),
-    do: options == nil or match?({:ok, _}, Vision.Saver.options(options))
-
-  defp valid?(:limits, list) do
-    Keyword.keyword?(list) and
-      Enum.all?(list, fn {name, value} -> name in @limits and is_float(value) and value > 0 end)
-  end
-
-  defp valid?(:companions, list),
-    do: is_list(list) and Enum.all?(list, &module_options?/1)
-
-  defp valid?(:clock, clock), do: call?(clock)
-  defp valid?(:pace, pace), do: pace in [:clock, :manual]
-  defp valid?(:arm, arm), do: arm in [:auto, :manual]
-  defp valid?(:dry_run, dry?), do: is_boolean(dry?)
-
-  defp valid?(:fence, fence),
-    do: fence == nil or is_struct(fence, Fence) or match?({:ok, _}, Fence.new(fence))
-
-  defp valid?(option, value) when option in [:send, :on_latch, :trace],
-    do: value == nil or call?(value)
-
-  defp valid?(:estop_file, path), do: path == nil or is_binary(path)
-
-  defp allowed(:id), do: "an atom such as :mag1"
-  defp allowed(:profile), do: "a %Hal.Profile{}"
-  defp allowed(:drive), do: "{driver, options}"
-  defp allowed(option) when option in [:ptz, :camera], do: "{driver, options} or nil"
-  defp allowed(:mission), do: "{module, options} or nil"
-  defp allowed(:start), do: "a %Hal.Pose{}"
-  defp allowed(:colours), do: "a %Vision.Colours{} or nil"
-  defp allowed(:limits), do: "a keyword list of positive floats for #{Enum.join(@limits, ", ")}"
-  defp allowed(:companions), do: "a list of {module, options}"
-  defp allowed(:pace), do: ":clock or :manual"
-  defp allowed(:arm), do: ":auto or :manual"
-  defp allowed(:dry_run), do: "true or false"
-  defp allowed(:clock), do: "{module, function, arguments}"
-
-  defp allowed(option) when option in [:send, :on_latch, :trace],
-    do: "{module, function, arguments} or nil"
-
-  defp allowed(:estop_file), do: "the path of a file or nil"
-
-  defp module_options?({module, options}), do: is_atom(module) and Keyword.keyword?(options)
-  defp module_options?(_other), do: false
-
-  defp call?({m, f, a}), do: is_atom(m) and is_atom(f) and is_list(a)
-  defp call?(_other), do: false
 end

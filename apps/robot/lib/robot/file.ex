@@ -10,13 +10,13 @@ defmodule Robot.File do
   All that is wrong with a file is said at once, each problem on a line that names file, line, key
   and what is allowed:
 
-      config/robots/mag1.exs:7: limits.max_liner: is not a key; did you mean max_linear?
+      config/robots/mag1.exs:7: limits.max_liner: is not known: allowed are max_linear, …; did you mean max_linear?
 
   A real robot arms by hand: `arm: :manual` is the default here, not in `Robot.Config`.
   """
   alias Hal.{Pose, Profile}
   alias Robot.Config
-  alias Robot.File.{Check, CrossChecks, Device, Reader, Schema}
+  alias Robot.File.{CrossChecks, Device, Reader, Schema, Terms}
 
   @enforce_keys [:id, :profile, :drive]
   defstruct @enforce_keys ++
@@ -108,12 +108,9 @@ defmodule Robot.File do
   The robot that a text describes. Options: `file:`, its name for errors; `fleet:` as in `load/2`;
   `colours:`, a function of path and options that reads a colour file (`t:Robot.File.Colours.reader/0`).
 
-      iex> Robot.File.parse("[id: :mag1, profil: :magellan, arm: :manaul]", file: "mag1.exs")
+      iex> Robot.File.parse("[id: :mag1, profile: :magellan, drive: {Hal.RFlex.Driver, port: \\"/dev/ttyR0\\"}, arm: :manaul]", file: "mag1.exs")
       {:error, [
-        "mag1.exs:1: profil: is not a key; did you mean profile?",
-        "mag1.exs:1: arm: cannot be :manaul: allowed: :manual, :auto; did you mean :manual?",
-        "mag1.exs:1: profile: is missing",
-        "mag1.exs:1: drive: is missing"]}
+        "mag1.exs:1: arm: cannot be :manaul: :manual or :auto is allowed; did you mean :manual?"]}
   """
   @spec parse(String.t(), keyword()) :: {:ok, t()} | {:error, [String.t(), ...]}
   def parse(text, options \\ []) do
@@ -126,9 +123,9 @@ defmodule Robot.File do
 
     with {:ok, {_line, value} = tree} <- Reader.read(text),
          :ok <- whole(value),
-         {:ok, values} <- complete(tree, Check.run(Schema.table(context), tree, [])),
+         {:ok, values} <- Terms.check(tree, Schema.table(context)),
          robot = robot(values),
-         [] <- problems(CrossChecks.problems(robot, file), tree) do
+         [] <- Terms.at(CrossChecks.problems(robot, file), tree) do
       {:ok, robot}
     else
       {:error, {line, text}} -> {:error, ["#{file}:#{line}: #{text}"]}
@@ -146,34 +143,13 @@ defmodule Robot.File do
   @spec config(t()) :: {:ok, Config.t()} | {:error, String.t()}
   def config(%__MODULE__{} = robot) do
     with {:ok, config} <- robot |> Map.take(@config) |> Map.to_list() |> Config.new(),
-         {:ok, drive} <- Device.fit(robot.drive, config.profile) do
-      {:ok, %{config | drive: drive}}
-    else
-      {:error, line} when is_binary(line) -> {:error, line}
-      {:error, lines} -> {:error, Enum.join(lines, "; ")}
-    end
+         {:ok, drive} <- Device.fit(robot.drive, config.profile),
+         do: {:ok, %{config | drive: drive}}
   end
 
   defp whole({:keys, _keys}), do: :ok
   defp whole({:list, []}), do: :ok
   defp whole(_other), do: {:error, {1, "a robot file is one list, [key: value, …]"}}
-
-  # What is missing is told together with what is wrong.
-  defp complete({line, value}, result) do
-    given = for {name, _line, _node} <- keys(value), do: name
-    missing = for key <- Schema.needed(), name = Atom.to_string(key), name not in given, do: name
-
-    case {missing, result} do
-      {[], result} -> result
-      {_, {:ok, _values}} -> {:error, missing(missing, line)}
-      {_, {:error, problems}} -> {:error, problems ++ missing(missing, line)}
-    end
-  end
-
-  defp missing(names, line), do: for(name <- names, do: {line, [name], "is missing"})
-
-  defp keys({:keys, keys}), do: keys
-  defp keys({:list, []}), do: []
 
   defp robot(values) do
     {body, values} = Keyword.pop(values, :body, [])
@@ -183,11 +159,6 @@ defmodule Robot.File do
       __MODULE__,
       values |> Keyword.put(:profile, profile) |> Keyword.put_new(:start, Pose.new(0, 0))
     )
-  end
-
-  defp problems(found, {_line, {:keys, keys}}) do
-    lines = Map.new(keys, fn {name, line, _node} -> {name, line} end)
-    for {[key | _] = path, text} <- found, do: {lines[key] || 1, path, text}
   end
 
   # Whoever has so many problems solves the first ones first.

@@ -3,12 +3,10 @@ defmodule Robot.FileTest do
 
   doctest Robot.File
   doctest Robot.File.Reader
-  doctest Robot.File.Check
-  doctest Robot.File.Options
-  doctest Robot.File.Printer
+  doctest Robot.File.Terms
 
   alias Hal.Pose
-  alias Robot.File.{Printer, Reader, Schema}
+  alias Robot.File.{Reader, Schema, Terms}
 
   @robots Path.expand("../../../../config/robots", __DIR__)
   @least ~s(id: :mag1, profile: :magellan, drive: {Robot.FileDrive, port: "/dev/ttyS1"})
@@ -106,7 +104,7 @@ defmodule Robot.FileTest do
     assert {:ok, %{save_pictures: nil}} = parse("#{camera}", colours: colours())
 
     assert lines("save_pictures: [folder: 7, rate: 0, file: 3]") == [
-             "mag1.exs:2: save_pictures.file: is not a key; did you mean files?",
+             "mag1.exs:2: save_pictures.file: is not known: allowed are folder, rate, files, megabytes; did you mean files?",
              "mag1.exs:2: save_pictures.folder: cannot be 7: the path of a folder is allowed",
              "mag1.exs:2: save_pictures.rate: cannot be 0: a number from 0.001 to 30.0 pictures a second is allowed"
            ]
@@ -116,7 +114,7 @@ defmodule Robot.FileTest do
            ]
 
     assert lines("#{camera}, save_pictures: [rate: 2]", colours: colours()) == [
-             "mag1.exs:2: save_pictures: folder is missing"
+             "mag1.exs:2: save_pictures.folder: is missing: the path of a folder is allowed"
            ]
   end
 
@@ -137,21 +135,24 @@ defmodule Robot.FileTest do
     policies: [formation: {:colum, 1.0}, of: 0]
     """
 
+    {:keys, table} = Schema.table(%{fleet: Schema.fleet(), colours: nil})
+    keys = table |> Keyword.keys() |> Enum.join(", ")
+
     assert lines(text) == [
-             "mag1.exs:2: limits.max_liner: is not a key; did you mean max_linear?",
+             "mag1.exs:2: limits.max_liner: is not known: allowed are max_linear, max_turn, max_acceleration, max_turn_acceleration; did you mean max_linear?",
              "mag1.exs:2: limits.max_turn: cannot be \"fast\": a number from 0.01 to 10.0 rad/s is allowed",
-             "mag1.exs:3: strat: is not a key; did you mean start?",
-             "mag1.exs:4: arm: cannot be :maual: allowed: :manual, :auto; did you mean :manual?",
-             "mag1.exs:5: start: cannot be {0, 0}: {x, y, heading} is allowed, metres up to 10000 and radians, such as {1.0, 0.5, deg(90)}",
+             "mag1.exs:3: strat: is not known: allowed are #{keys}; did you mean start?",
+             "mag1.exs:4: arm: cannot be :maual: :manual or :auto is allowed; did you mean :manual?",
+             "mag1.exs:5: start: cannot be {0, 0}: {x, y, heading}, metres up to 10000 and radians, such as {1.0, 0.5, deg(90)}, is allowed",
              "mag1.exs:6: body.radius: cannot be 90: a number from 0.05 to 1.5 m is allowed",
-             "mag1.exs:7: policies.formation: cannot be :colum: allowed: :column, :line, :wedge, :triangle, :diamond, :circle; did you mean :column?",
+             "mag1.exs:7: policies.formation: cannot be :colum: :column, :line, :wedge, :triangle, :diamond or :circle is allowed; did you mean :column?",
              "mag1.exs:7: policies.of: cannot be 0: a whole number from 1 to 1000 is allowed"
            ]
   end
 
   test "a key that is like none gets the list of those that there are" do
     assert [line] = lines("network: [zzz: 1]")
-    assert line =~ "network.zzz: is not a key: there are secret_file, interface"
+    assert line =~ "network.zzz: is not known: allowed are secret_file, interface"
   end
 
   test "a key twice is refused" do
@@ -160,23 +161,27 @@ defmodule Robot.FileTest do
            ]
 
     assert [line] = lines("ptz: {Robot.FilePtz, port: \"a\", port: \"b\"}")
-    assert line == "mag1.exs:2: ptz.port: is given twice"
+    assert line == "mag1.exs:2: ptz.port: is given twice, first in line 2"
   end
 
   test "drivers are modules of this build, of the right kind, with options that they take" do
-    assert ["mag1.exs:2: ptz: Robot.FileDrive is no Hal.Ptz"] = lines("ptz: Robot.FileDrive")
+    assert ["mag1.exs:2: ptz: names Robot.FileDrive, which is not a Hal.Ptz"] =
+             lines("ptz: Robot.FileDrive")
+
     assert [line] = lines("camera: {Hal.Camera.FFmpg, source: \"x\"}")
     assert line =~ "cannot be Hal.Camera.FFmpg"
     assert line =~ "did you mean Hal.Camera.FFmpeg?"
     assert [line] = lines("ptz: :none")
-    assert line =~ "ptz: cannot be :none: {driver, options} is allowed"
 
-    assert ["mag1.exs:2: camera: camera option :source is missing", size] =
+    assert line =~
+             "ptz: cannot be :none: nil or {driver, options}, such as {Hal.Visca.Driver, […]}, is allowed"
+
+    assert ["mag1.exs:2: camera.source: is missing: a file, stream or device is allowed", size] =
              lines("colours: \"landmark.txt\", camera: {Hal.Camera.FFmpeg, size: {1, 1}}",
                colours: colours()
              )
 
-    assert size =~ "camera option :size cannot be {1, 1}"
+    assert size =~ "camera.size: cannot be {1, 1}: {width, height}, even numbers"
     assert [line] = lines("ptz: {Robot.FilePtz, no_such_option_of_anybody: 1}")
     assert line =~ "ptz.no_such_option_of_anybody: is not an option of any driver"
     assert [line] = lines("ptz: {Robot.FilePtz, serial: :no_such_name_of_anybody}")
@@ -189,12 +194,12 @@ defmodule Robot.FileTest do
              )
 
     assert lines == [
-             "mag1.exs:3: drive.convesions: is not an option; did you mean conversions?",
-             "mag1.exs:4: drive.conversions.distanse: is not an option; did you mean distance?",
-             "mag1.exs:4: drive.conversions.x: is not an option: there are angle, distance"
+             "mag1.exs:3: drive.convesions: is not known: allowed are port, sonar_banks, conversions, bumpers, profile; did you mean conversions?",
+             "mag1.exs:4: drive.conversions.distanse: is not known: allowed are distance, angle; did you mean distance?",
+             "mag1.exs:4: drive.conversions.x: is not known: allowed are distance, angle"
            ]
 
-    assert {:error, ["mag1.exs:1: drive: drive option :port is missing"]} =
+    assert {:error, ["mag1.exs:1: drive.port: is missing: a path is allowed"]} =
              Robot.File.parse("[id: :mag1, profile: :magellan, drive: Robot.FileDrive]",
                file: "mag1.exs"
              )
@@ -224,7 +229,7 @@ defmodule Robot.FileTest do
                "[id: :mag1, profile: :magellan, drive: {Robot.FileDrive, port: \"x\", sonar_banks: [8, 4]}]"
              )
 
-    assert line =~ "drive: drive option :sonar_banks has 12 for 16"
+    assert line =~ "drive: drive option sonar_banks has 12 for 16"
     assert {:error, [line]} = Robot.File.parse("[#{@least}]", file: "robots/mag2.exs")
     assert line == "robots/mag2.exs:1: id: is :mag1, but the file is named mag2.exs"
   end
@@ -405,9 +410,13 @@ defmodule Robot.FileTest do
   end
 
   test "a node is shown as it was written" do
-    for text <- ["[1, -2.5, nil]", "[{:a, \"b\"}]", "[a: true, b: Some.Module]"] do
+    for text <- [
+          "[1, -2.5, nil]",
+          "[{:a, 2, \"b\"}, Some.Thing, :no_atom_of_ours]",
+          "[a: true, b: Some.Module]"
+        ] do
       assert {:ok, node} = Reader.read(text)
-      assert Printer.show(node) == text
+      assert inspect(Terms.term(node)) == text
     end
   end
 
@@ -416,5 +425,6 @@ defmodule Robot.FileTest do
 
   defp all_keys({:or, _value, check}), do: all_keys(check)
   defp all_keys({:list, check, _most}), do: all_keys(check)
+  defp all_keys([check | _settings]), do: all_keys(check)
   defp all_keys(_check), do: []
 end

@@ -7,5 +7,4 @@ defmodule Robot.PureTest do
   doctest Robot.Control.Arbiter
   doctest Robot.Navigation.Steering
   doctest Robot.Safety.Reflex.Body
-  doctest Robot.Behaviour.Options
 end

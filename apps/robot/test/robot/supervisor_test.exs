@@ -175,7 +175,9 @@ defmodule Robot.SupervisorTest do
     goal = fn goal -> Executive.goal(id, :t, goal) end
     assert {:error, "NoSuchModule is not a behaviour" <> _} = goal.({NoSuchModule, []})
     assert {:error, "Robot.Safety.Gate is not a behaviour" <> _} = goal.({Gate, []})
-    assert {:error, "Robot.Behaviour.Goto: option x is missing"} = goal.({Behaviour.Goto, y: 1})
+
+    assert {:error, "Robot.Behaviour.Goto: goto option x is missing: a number" <> _} =
+             goal.({Behaviour.Goto, y: 1})
 
     assert {:error, "Robot.Behaviour.Goto: [1] are not options" <> _} =
              goal.({Behaviour.Goto, [1]})

@@ -3,26 +3,24 @@ defmodule Robot.FileDrive do
   # A drive that says what options it takes, and takes any port.
   @behaviour Hal.Drive
 
-  @keys [:port, :sonar_banks, :conversions, :bumpers, :profile]
+  @impl Hal.Drive
+  def option_table do
+    [
+      port: [:path, required: true],
+      sonar_banks: {:list, {:integer, 0, 16}},
+      conversions: {:keys, distance: {:number, 0, 1.0e6}, angle: {:number, 0, 1.0e6}},
+      bumpers: {:keys, count: {:integer, 0, 16}},
+      profile: {:struct, Hal.Profile}
+    ]
+  end
 
   def options(options) do
     sonars = options[:profile] && length(options[:profile].sonars)
     banks = options[:sonar_banks] && Enum.sum(options[:sonar_banks])
 
-    cond do
-      more = Enum.find(Keyword.keys(options), &(&1 not in @keys)) ->
-        {:error, "drive has no option #{inspect(more)}"}
-
-      options[:port] == nil ->
-        {:error, "drive option :port is missing"}
-
-      sonars && banks && sonars != banks ->
-        {:error, "drive option :sonar_banks has #{banks} for #{sonars}"}
-
-      true ->
-        {:ok,
-         Keyword.merge(Enum.map(@keys, &{&1, nil}), conversions: [distance: nil, angle: nil])}
-    end
+    if sonars && banks && sonars != banks,
+      do: {:error, "drive option sonar_banks has #{banks} for #{sonars}"},
+      else: {:ok, options}
   end
 
   @impl Hal.Drive

@@ -22,7 +22,8 @@ defmodule Mix.Tasks.Robot.Import do
     * `--help` - this text
   """
   use Mix.Task
-  alias Robot.File.{Check, Odd, Schema}
+  alias Hal.Suggest
+  alias Robot.File.{Odd, Schema}
 
   @switches [
     out: :string,
@@ -108,7 +109,7 @@ defmodule Mix.Tasks.Robot.Import do
         {:ok, named}
 
       asked == nil ->
-        hint = Check.meant(options[:name], Enum.take(Schema.fleet(), 9), "")
+        hint = Suggest.hint(options[:name], Enum.map(Enum.take(Schema.fleet(), 9), &to_string/1))
         {:error, "--name #{options[:name]} is not a robot: mag1 to mag100, min1 to min100#{hint}"}
 
       named not in [nil, asked] ->
@@ -126,7 +127,7 @@ defmodule Mix.Tasks.Robot.Import do
   defp profile("atrv_mini"), do: {:ok, :atrv_mini}
 
   defp profile(other) do
-    hint = Check.meant(other, ["magellan", "atrv_mini"], "")
+    hint = Suggest.hint(other, ["magellan", "atrv_mini"])
     {:error, "--profile cannot be #{other}: magellan or atrv_mini#{hint}"}
   end
 

@@ -128,7 +128,7 @@ defmodule Mix.Tasks.Robot.ImportTest do
     told = capture_io(:stderr, fn -> Import.run([context.player, "-o", out]) end)
 
     assert told =~
-             ":4: driver camerav41: none of our drivers does what it does; was camerav4l meant?"
+             ":4: driver camerav41: none of our drivers does what it does; did you mean camerav4l?"
   end
 
   test "wrong words are one line", %{tmp_dir: folder, player: file} do

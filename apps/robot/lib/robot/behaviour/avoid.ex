@@ -13,12 +13,11 @@ defmodule Robot.Behaviour.Avoid do
   further standing things.
   """
   @behaviour Robot.Behaviour
-  alias Hal.{Pose, Twist}
+  alias Hal.{Options, Pose, Twist}
   alias Robot.{Behaviour, Percept, Wish}
   alias Robot.Navigation.{Orca, Steering}
   alias Robot.Behaviour.Avoid
   alias Robot.Behaviour.Avoid.{Brake, GiveWay, Neighbours, Progress}
-  alias Robot.Behaviour.Options
 
   # Metres kept to others by reaction; to standing ones less when there is no more room.
   @standing_margin 0.12
@@ -37,11 +36,12 @@ defmodule Robot.Behaviour.Avoid do
 
   @impl Behaviour
   def new(options) do
-    options = Keyword.validate!(options, [:inner, discs: []])
+    table = [
+      inner: [{:check, &match?({_, _}, &1), "a behaviour"}, required: true],
+      discs: [{:check, &discs?/1, "[{x, y, radius}]"}, default: []]
+    ]
 
     state = %{
-      inner: Options.check!(options, :inner, &match?({_, _}, &1), "a behaviour"),
-      discs: Options.check!(options, :discs, &discs?/1, "[{x, y, radius}]"),
       progress: nil,
       way: nil,
       blocked?: false,
@@ -51,7 +51,7 @@ defmodule Robot.Behaviour.Avoid do
       yield: nil
     }
 
-    {__MODULE__, state}
+    {__MODULE__, Enum.into(Options.check!(options, table, "avoid"), state)}
   end
 
   defp discs?(list) when is_list(list),

@@ -12,8 +12,7 @@ defmodule Robot.Behaviour.DriveCourse do
   5 s; it stands.
   """
   @behaviour Robot.Behaviour
-  alias Hal.{Pose, Twist}
-  alias Robot.Behaviour.Options
+  alias Hal.{Options, Pose, Twist}
   alias Robot.Wish
   alias Robot.Navigation.Steering
 
@@ -31,20 +30,14 @@ defmodule Robot.Behaviour.DriveCourse do
 
   @impl Robot.Behaviour
   def new(options) do
-    options = Keyword.validate!(options, [:legs, speed: nil, turn: nil])
+    table = [
+      legs: [{:check, &legs?/1, "[{:go, metres} | {:turn, radians}]"}, required: true],
+      speed: [{:number, 0.01, 10.0, "m/s"}, default: nil],
+      turn: [{:number, 0.01, 10.0, "rad/s"}, default: nil]
+    ]
 
-    state = %{
-      legs: Options.check!(options, :legs, &legs?/1, "[{:go, metres} | {:turn, radians}]"),
-      speed: Options.optional!(options, :speed, 0.01, 10.0),
-      turn: Options.optional!(options, :turn, 0.01, 10.0),
-      mark: nil,
-      heading: nil,
-      left: nil,
-      best: nil,
-      best_ms: nil
-    }
-
-    {__MODULE__, state}
+    state = %{mark: nil, heading: nil, left: nil, best: nil, best_ms: nil}
+    {__MODULE__, Enum.into(Options.check!(options, table, "course"), state)}
   end
 
   defp legs?(legs), do: is_list(legs) and legs != [] and Enum.all?(legs, &leg?/1)

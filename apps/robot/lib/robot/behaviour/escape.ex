@@ -17,10 +17,9 @@ defmodule Robot.Behaviour.Escape do
   Options: `distance` (metres, default 0.15), `turn` (radians, default 0.8).
   """
   @behaviour Robot.Behaviour
-  alias Hal.{Pose, Twist}
+  alias Hal.{Options, Pose, Twist}
   alias Robot.Wish
   alias Robot.Navigation.Steering
-  alias Robot.Behaviour.Options
 
   # A robot that is held in front and behind gives up, rather than push for ever.
   @give_up_ms 4000
@@ -32,17 +31,13 @@ defmodule Robot.Behaviour.Escape do
 
   @impl Robot.Behaviour
   def new(options \\ []) do
-    options = Keyword.validate!(options, distance: 0.15, turn: 0.8)
+    table = [
+      distance: [{:number, 0.01, 2.0, "m"}, default: 0.15],
+      turn: [{:number, 0.0, 3.0, "rad"}, default: 0.8]
+    ]
 
-    state = %{
-      distance: Options.number!(options, :distance, 0.01, 2.0),
-      turn: Options.number!(options, :turn, 0.0, 3.0),
-      phase: :idle,
-      held: [],
-      known: []
-    }
-
-    {__MODULE__, state}
+    state = %{phase: :idle, held: [], known: []}
+    {__MODULE__, Enum.into(Options.check!(options, table, "escape"), state)}
   end
 
   @doc """

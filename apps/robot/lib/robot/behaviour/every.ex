@@ -7,25 +7,19 @@ defmodule Robot.Behaviour.Every do
   """
   @behaviour Robot.Behaviour
   alias Robot.Behaviour
-  alias Robot.Behaviour.Options
+  alias Hal.Options
 
   @impl Behaviour
   def new(options) do
-    options = Keyword.validate!(options, [:start, period_ms: 0])
+    behaviour = {:check, &match?({_, list} when is_list(list), &1), "{module, options}"}
 
-    {__MODULE__,
-     %{
-       start:
-         Options.check!(
-           options,
-           :start,
-           &(match?({_, [_ | _]}, &1) or match?({_, []}, &1)),
-           "{module, options}"
-         ),
-       period_ms: Options.number!(options, :period_ms, 0.0),
-       running: nil,
-       since_ms: nil
-     }}
+    table = [
+      start: [behaviour, required: true],
+      period_ms: [{:number, 0, 1.0e6, "ms"}, default: 0.0]
+    ]
+
+    state = %{running: nil, since_ms: nil}
+    {__MODULE__, Enum.into(Options.check!(options, table, "every"), state)}
   end
 
   @impl Behaviour

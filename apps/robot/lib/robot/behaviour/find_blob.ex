@@ -8,8 +8,7 @@ defmodule Robot.Behaviour.FindBlob do
   `speed` (rad/s, default 0.8 of the profile's), `centred` (radians, default 0.04).
   """
   @behaviour Robot.Behaviour
-  alias Hal.{Pose, Twist}
-  alias Robot.Behaviour.Options
+  alias Hal.{Options, Pose, Twist}
   alias Robot.Wish
   alias Robot.Navigation.Steering
   alias Robot.Percept.Sighting
@@ -19,22 +18,15 @@ defmodule Robot.Behaviour.FindBlob do
 
   @impl Robot.Behaviour
   def new(options) do
-    options =
-      Keyword.validate!(options, colour: nil, min_share: 0.0003, speed: nil, centred: 0.04)
+    table = [
+      colour: [{:check, &is_binary/1, "a colour's name"}, default: nil],
+      min_share: [{:number, 0.0, 1.0}, default: 0.0003],
+      speed: [{:number, 0.05, 10.0, "rad/s"}, default: nil],
+      centred: [{:number, 0.005, 1.0}, default: 0.04]
+    ]
 
-    state = %{
-      colour: Options.check!(options, :colour, &(is_nil(&1) or is_binary(&1)), "a colour's name"),
-      min_share: Options.number!(options, :min_share, 0.0, 1.0),
-      speed: Options.optional!(options, :speed, 0.05, 10.0),
-      centred: Options.number!(options, :centred, 0.005, 1.0),
-      since_ms: nil,
-      heading: nil,
-      turned: 0.0,
-      seen: nil,
-      steady: 0
-    }
-
-    {__MODULE__, state}
+    state = %{since_ms: nil, heading: nil, turned: 0.0, seen: nil, steady: 0}
+    {__MODULE__, Enum.into(Options.check!(options, table, "find_blob"), state)}
   end
 
   @impl Robot.Behaviour

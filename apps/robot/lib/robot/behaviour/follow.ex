@@ -11,10 +11,9 @@ defmodule Robot.Behaviour.Follow do
   All may be changed by `update/2` at any tick.
   """
   @behaviour Robot.Behaviour
-  alias Hal.{Pose, Twist}
+  alias Hal.{Options, Pose, Twist}
   alias Robot.Wish
   alias Robot.Navigation.Steering
-  alias Robot.Behaviour.Options
 
   # Nearer than this it backs up rather than turn round.
   @back_up 0.6
@@ -23,30 +22,17 @@ defmodule Robot.Behaviour.Follow do
 
   @impl Robot.Behaviour
   def new(options) do
-    options =
-      Keyword.validate!(options, [
-        :target,
-        velocity: {0.0, 0.0},
-        tolerance: 0.06,
-        leave: 0.12,
-        heading_tolerance: 0.05,
-        speed: nil
-      ])
+    table = [
+      target: [{:struct, Pose}, required: true],
+      velocity: [{:check, &velocity?/1, "{vx, vy} in m/s"}, default: {0.0, 0.0}],
+      tolerance: [{:number, 0.005, 10.0, "m"}, default: 0.06],
+      leave: [{:number, 0.005, 10.0, "m"}, default: 0.12],
+      heading_tolerance: [{:number, 0.005, 3.2, "rad"}, default: 0.05],
+      speed: [{:number, 0.01, 10.0, "m/s"}, default: nil]
+    ]
 
-    state = %{
-      target: Options.check!(options, :target, &match?(%Pose{}, &1), "a %Hal.Pose{}"),
-      velocity: Options.check!(options, :velocity, &velocity?/1, "{vx, vy} in m/s"),
-      tolerance: Options.number!(options, :tolerance, 0.005, 10.0),
-      leave: Options.number!(options, :leave, 0.005, 10.0),
-      heading_tolerance: Options.number!(options, :heading_tolerance, 0.005, 3.2),
-      speed: Options.optional!(options, :speed, 0.01, 10.0),
-      mode: :going,
-      turning?: true,
-      backing?: false,
-      distance: nil
-    }
-
-    {__MODULE__, state}
+    state = %{mode: :going, turning?: true, backing?: false, distance: nil}
+    {__MODULE__, Enum.into(Options.check!(options, table, "follow"), state)}
   end
 
   defp velocity?({vx, vy}), do: is_number(vx) and is_number(vy) and abs(vx) + abs(vy) < 100

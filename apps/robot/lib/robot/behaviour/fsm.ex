@@ -13,20 +13,26 @@ defmodule Robot.Behaviour.Fsm do
   """
   @behaviour Robot.Behaviour
   alias Robot.Behaviour
-  alias Robot.Behaviour.Options
+  alias Hal.Options
 
   # Transitions within one tick; more is a machine that turns in circles and takes the next tick.
   @most 8
 
   @impl Behaviour
   def new(options) do
-    options = Keyword.validate!(options, [:start, :states, next: %{}])
-    states = Options.check!(options, :states, &is_map/1, "a map of states")
-    next = Options.check!(options, :next, &is_map/1, "a map of transitions")
-    start = Options.check!(options, :start, &is_map_key(states, &1), "one of the states")
+    table = [
+      start: [{:check, &is_atom/1, "one of the states"}, required: true],
+      states: [{:check, &is_map/1, "a map of states"}, required: true],
+      next: [{:check, &is_map/1, "a map of transitions"}, default: %{}]
+    ]
 
-    for {{from, _outcome}, to} <- next, state <- [from, to], not is_map_key(states, state) do
-      raise ArgumentError, "option next names #{inspect(state)}, which is not a state"
+    options = Options.check!(options, table, "fsm")
+    %{start: start, states: states, next: next} = Map.new(options)
+
+    for state <- [start | Enum.flat_map(next, fn {{from, _outcome}, to} -> [from, to] end)],
+        not is_map_key(states, state) do
+      raise ArgumentError,
+            "fsm option next or start names #{inspect(state)}, which is not a state"
     end
 
     {__MODULE__, %{states: states, next: next, at: start, running: enter(states, start)}}

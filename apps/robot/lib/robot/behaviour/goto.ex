@@ -9,37 +9,25 @@ defmodule Robot.Behaviour.Goto do
   profile's). Outcome 1: there. Without a pose it stands and waits.
   """
   @behaviour Robot.Behaviour
-  alias Hal.{Pose, Twist}
+  alias Hal.{Options, Pose, Twist}
   alias Robot.Wish
   alias Robot.Navigation.Steering
-  alias Robot.Behaviour.Options
 
   @points_there 0.09
   @points_aside 0.26
 
   @impl Robot.Behaviour
   def new(options) do
-    options =
-      Keyword.validate!(options, [
-        :x,
-        :y,
-        heading: nil,
-        tolerance: 0.1,
-        heading_tolerance: 0.05,
-        speed: nil
-      ])
+    table = [
+      x: [{:number, -1.0e6, 1.0e6, "m"}, required: true],
+      y: [{:number, -1.0e6, 1.0e6, "m"}, required: true],
+      heading: [{:number, -1.0e6, 1.0e6, "rad"}, default: nil],
+      tolerance: [{:number, 0.005, 10.0, "m"}, default: 0.1],
+      heading_tolerance: [{:number, 0.005, 3.2, "rad"}, default: 0.05],
+      speed: [{:number, 0.01, 10.0, "m/s"}, default: nil]
+    ]
 
-    state = %{
-      x: Options.number!(options, :x),
-      y: Options.number!(options, :y),
-      heading: Options.optional!(options, :heading),
-      tolerance: Options.number!(options, :tolerance, 0.005, 10.0),
-      heading_tolerance: Options.number!(options, :heading_tolerance, 0.005, 3.2),
-      speed: Options.optional!(options, :speed, 0.01, 10.0),
-      mode: :turning
-    }
-
-    {__MODULE__, state}
+    {__MODULE__, Enum.into(Options.check!(options, table, "goto"), %{mode: :turning})}
   end
 
   @impl Robot.Behaviour

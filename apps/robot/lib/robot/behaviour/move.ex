@@ -4,16 +4,20 @@ defmodule Robot.Behaviour.Move do
   required, and `for_ms` (default `nil`, for ever), after which it ends with outcome 1.
   """
   @behaviour Robot.Behaviour
-  alias Hal.Twist
-  alias Robot.Behaviour.Options
+  alias Hal.{Options, Twist}
   alias Robot.Wish
 
   @impl Robot.Behaviour
   def new(options) do
-    options = Keyword.validate!(options, [:linear, :turn, for_ms: nil])
-    twist = Twist.new(Options.number!(options, :linear), Options.number!(options, :turn))
-    for_ms = Options.optional!(options, :for_ms, 0.0)
-    {__MODULE__, %{twist: twist, for_ms: for_ms, since_ms: nil}}
+    table = [
+      linear: [{:number, -1.0e6, 1.0e6, "m/s"}, required: true],
+      turn: [{:number, -1.0e6, 1.0e6, "rad/s"}, required: true],
+      for_ms: [{:number, 0, 1.0e6, "ms"}, default: nil]
+    ]
+
+    options = Options.check!(options, table, "move")
+    twist = Twist.new(options[:linear], options[:turn])
+    {__MODULE__, %{twist: twist, for_ms: options[:for_ms], since_ms: nil}}
   end
 
   @impl Robot.Behaviour

@@ -4,12 +4,12 @@ defmodule Robot.Behaviour.Once do
   for choosing between ways. Options: `run`, `(Robot.Percept.t() -> integer)` (required).
   """
   @behaviour Robot.Behaviour
-  alias Robot.Behaviour.Options
+  alias Hal.Options
 
   @impl Robot.Behaviour
   def new(options) do
-    options = Keyword.validate!(options, [:run])
-    {__MODULE__, Options.check!(options, :run, &is_function(&1, 1), "a function of a percept")}
+    table = [run: [{:check, &is_function(&1, 1), "a function of a percept"}, required: true]]
+    {__MODULE__, Options.check!(options, table, "once")[:run]}
   end
 
   @impl Robot.Behaviour

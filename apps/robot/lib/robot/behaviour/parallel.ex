@@ -8,15 +8,20 @@ defmodule Robot.Behaviour.Parallel do
   @behaviour Robot.Behaviour
   alias Robot.Behaviour
   alias Robot.Control.Arbiter
-  alias Robot.Behaviour.Options
+  alias Hal.Options
 
   @impl Behaviour
   def new(options) do
-    options = Keyword.validate!(options, [:parts, ends: :all])
-    parts = Options.check!(options, :parts, &match?([_ | _], &1), "a list of behaviours")
-    ends = Options.check!(options, :ends, &(&1 in [:all, :any]), ":all or :any")
-    {__MODULE__, %{parts: parts, ends: ends, last_by: nil}}
+    table = [
+      parts: [behaviours(), required: true],
+      ends: [{:one_of, [:all, :any]}, default: :all]
+    ]
+
+    options = Options.check!(options, table, "parallel")
+    {__MODULE__, %{parts: options[:parts], ends: options[:ends], last_by: nil}}
   end
+
+  defp behaviours, do: {:check, &match?([_ | _], &1), "a list of behaviours"}
 
   @impl Behaviour
   def tick(percept, state) do

@@ -7,14 +7,13 @@ defmodule Robot.Behaviour.Sequence do
   """
   @behaviour Robot.Behaviour
   alias Robot.Behaviour
-  alias Robot.Behaviour.Options
+  alias Hal.Options
 
   @impl Behaviour
   def new(options) do
-    options = Keyword.validate!(options, [:steps, while: nil])
-    steps = Options.check!(options, :steps, &match?([_ | _], &1), "a list of behaviours")
-    while = Options.check!(options, :while, &(&1 == nil or is_integer(&1)), "an integer")
-    {__MODULE__, %{steps: steps, while: while}}
+    behaviours = {:check, &match?([_ | _], &1), "a list of behaviours"}
+    table = [steps: [behaviours, required: true], while: [{:integer, -1000, 1000}, default: nil]]
+    {__MODULE__, Map.new(Options.check!(options, table, "sequence"))}
   end
 
   @impl Behaviour

@@ -18,8 +18,7 @@ defmodule Robot.Behaviour.TrackBlob do
   is where it turns to as long as it has not seen it itself.
   """
   @behaviour Robot.Behaviour
-  alias Hal.{Pose, Twist}
-  alias Robot.Behaviour.Options
+  alias Hal.{Options, Pose, Twist}
   alias Robot.Wish
   alias Robot.Navigation.Steering
   alias Robot.Percept.{CameraPointing, Sighting}
@@ -41,25 +40,19 @@ defmodule Robot.Behaviour.TrackBlob do
 
   @impl Robot.Behaviour
   def new(options) do
-    options =
-      Keyword.validate!(options,
-        colour: nil,
-        min_share: 0.0003,
-        near: 1.0,
-        far: 1.5,
-        max_turn: 0.4,
-        speed: 0.3,
-        place: nil
-      )
+    table = [
+      colour: [{:check, &is_binary/1, "a colour's name"}, default: nil],
+      min_share: [{:number, 0.0, 1.0}, default: 0.0003],
+      near: [{:number, 0.1, 20.0, "m"}, default: 1.0],
+      far: [{:number, 0.1, 20.0, "m"}, default: 1.5],
+      max_turn: [{:number, 0.01, 10.0, "rad/s"}, default: 0.4],
+      speed: [{:number, 0.01, 10.0, "m/s"}, default: 0.3],
+      place: [{:check, &place?/1, "{x, y} in metres"}, default: nil]
+    ]
+
+    options = Options.check!(options, table, "track_blob")
 
     state = %{
-      colour: Options.check!(options, :colour, &(is_nil(&1) or is_binary(&1)), "a colour's name"),
-      min_share: Options.number!(options, :min_share, 0.0, 1.0),
-      near: Options.number!(options, :near, 0.1, 20.0),
-      far: Options.number!(options, :far, 0.1, 20.0),
-      max_turn: Options.number!(options, :max_turn, 0.01, 10.0),
-      speed: Options.number!(options, :speed, 0.01, 10.0),
-      place: Options.check!(options, :place, &place?/1, "{x, y} in metres"),
       error: nil,
       side: 1,
       distance: nil,
@@ -72,13 +65,12 @@ defmodule Robot.Behaviour.TrackBlob do
       there?: false
     }
 
-    if state.near > state.far,
-      do: raise(ArgumentError, "option near cannot be #{state.near}: at most far is allowed")
+    if options[:near] > options[:far],
+      do: raise(ArgumentError, "option near cannot be #{options[:near]}: at most far is allowed")
 
-    {__MODULE__, state}
+    {__MODULE__, Enum.into(options, state)}
   end
 
-  defp place?(nil), do: true
   defp place?({x, y}), do: is_number(x) and is_number(y)
   defp place?(_other), do: false
 

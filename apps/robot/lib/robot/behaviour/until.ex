@@ -8,29 +8,23 @@ defmodule Robot.Behaviour.Until do
   """
   @behaviour Robot.Behaviour
   alias Robot.Behaviour
-  alias Robot.Behaviour.Options
+  alias Hal.Options
 
   @impl Behaviour
   def new(options) do
-    options = Keyword.validate!(options, [:inner, stop?: nil, after_ms: nil, outcome: 2])
+    table = [
+      inner: [{:check, &match?({_, _}, &1), "a behaviour"}, required: true],
+      stop?: [{:check, &is_function(&1, 1), "a function of a percept"}, default: nil],
+      after_ms: [{:number, 0, 1.0e9, "ms"}, default: nil],
+      outcome: [{:integer, -1000, 1000}, default: 2]
+    ]
+
+    options = Options.check!(options, table, "until")
 
     if options[:stop?] == nil and options[:after_ms] == nil,
-      do: raise(ArgumentError, "option stop? or after_ms is missing")
+      do: raise(ArgumentError, "until option stop? or after_ms is missing")
 
-    {__MODULE__,
-     %{
-       inner: Options.check!(options, :inner, &match?({_, _}, &1), "a behaviour"),
-       stop?:
-         Options.check!(
-           options,
-           :stop?,
-           &(&1 == nil or is_function(&1, 1)),
-           "a function of a percept"
-         ),
-       after_ms: Options.optional!(options, :after_ms, 0.0, 1.0e9),
-       outcome: Options.check!(options, :outcome, &is_integer/1, "an integer"),
-       since_ms: nil
-     }}
+    {__MODULE__, Enum.into(options, %{since_ms: nil})}
   end
 
   @impl Behaviour

@@ -6,10 +6,9 @@ defmodule Robot.Behaviour.Wander do
   Options: `speed` (m/s, default 0.3).
   """
   @behaviour Robot.Behaviour
-  alias Hal.Twist
+  alias Hal.{Options, Twist}
   alias Robot.Wish
   alias Robot.Safety.Reflex
-  alias Robot.Behaviour.Options
 
   # Metres at which something ahead makes it turn, and seconds between turns in the open.
   @near 0.7
@@ -17,8 +16,8 @@ defmodule Robot.Behaviour.Wander do
 
   @impl Robot.Behaviour
   def new(options \\ []) do
-    options = Keyword.validate!(options, speed: 0.3)
-    {__MODULE__, %{speed: Options.number!(options, :speed, 0.0, 10.0), side: nil}}
+    table = [speed: [{:number, 0.0, 10.0, "m/s"}, default: 0.3]]
+    {__MODULE__, Enum.into(Options.check!(options, table, "wander"), %{side: nil})}
   end
 
   @impl Robot.Behaviour

@@ -3,69 +3,40 @@ defmodule Robot.File.Colours do
   The colours of a robot file: the path of a CMVision colour file, or a list of keys with that path
   and the options of `Vision.Colours`.
   """
-  alias Robot.File.{Check, Reader}
+  alias Hal.Options.Type
 
-  @area {:whole, 0, 16_777_216}
+  @keys {
+    :keys,
+    # Whether it is a backend is for the colours to say.
+    file: [{:text, "the path of a colour file"}, required: true],
+    distance: {:check, &__MODULE__.distances/1, "%{\"Colour\" => share seen from 1 m}"},
+    min_area: {:integer, 1, 16_777_216},
+    max_area: {:integer, 0, 16_777_216},
+    backend: {:check, &is_atom/1, "a Vision.Backend of this build"}
+  }
 
   @typedoc "Reads a colour file; its errors are one line."
   @type reader :: (Path.t(), keyword() -> {:ok, struct()} | {:error, String.t()})
 
-  @doc "The colours that a node names."
-  @spec check(Reader.tree(), [String.t()], reader()) :: Check.result()
-  def check({line, text}, path, read) when is_binary(text),
-    do: check({line, {:keys, [{"file", line, {line, text}}]}}, path, read)
+  @doc "The type of colours, for a table."
+  @spec type(reader()) :: Type.t()
+  def type(read), do: {:check, &check(&1, read), "the path of a colour file"}
 
-  def check({line, _value} = node, path, read) do
-    table =
-      {:keys,
-       file: {:text, "the path of a colour file"},
-       distance: {:with, &distances/2},
-       min_area: put_elem(@area, 1, 1),
-       max_area: @area,
-       backend: {:with, &backend/2}}
+  defp check(path, read) when is_binary(path), do: check([file: path], read)
 
-    with {:ok, options} <- Check.run(table, node, path),
-         {:ok, file} <- file(options, line, path) do
-      case read.(file, Keyword.delete(options, :file)) do
-        {:ok, colours} -> {:ok, colours}
-        {:error, why} -> {:error, [{line, path, why}]}
-      end
-    end
+  defp check(options, read) do
+    with {:ok, options} <- Type.read(@keys, options),
+         do: read.(options[:file], Keyword.delete(options, :file))
   end
 
-  defp file(options, line, path) do
-    case Keyword.fetch(options, :file) do
-      {:ok, file} -> {:ok, file}
-      :error -> {:error, [{line, path, ~s(needs file:, the path of a colour file)}]}
-    end
+  @doc false
+  def distances(map) when is_map(map) and not is_struct(map) do
+    names =
+      {:tuple, [{:text, "the name of a colour, in double quotes,"}, {:number, 1.0e-6, 100.0}], ""}
+
+    with {:ok, pairs} <- map |> Map.to_list() |> Enum.map(&Type.read(names, &1)) |> Type.all(),
+         do: {:ok, Map.new(pairs)}
   end
 
-  # Whether it is a backend is for the colours to say.
-  defp backend({_line, {:module, name}} = node, path) do
-    with :error <- Hal.Build.module(name), do: refused(node, path)
-  end
-
-  defp backend(node, path), do: refused(node, path)
-
-  defp refused(node, path),
-    do: Check.refuse("a Vision.Backend of this build is allowed", node, path)
-
-  defp distances({_line, {:map, pairs}}, path) do
-    results =
-      for {{_, name} = key, value} <- pairs do
-        if is_binary(name),
-          do: constant(name, value, path),
-          else: Check.refuse("the name of a colour is allowed, in double quotes", key, path)
-      end
-
-    with {:ok, pairs} <- Check.all(results), do: {:ok, Map.new(pairs)}
-  end
-
-  defp distances(node, path),
-    do: Check.refuse(~s(%{"Colour" => share seen from 1 m} is allowed), node, path)
-
-  defp constant(name, value, path) do
-    with {:ok, share} <- Check.run({:number, 1.0e-6, 100.0, ""}, value, path ++ [name]),
-         do: {:ok, {name, share}}
-  end
+  def distances(_other), do: false
 end

@@ -1,6 +1,7 @@
 defmodule Robot.File.CrossChecks do
   @moduledoc "What the keys of a robot file must be to each other, and no single key can know. Pure."
-  alias Robot.File.{Check, Device, Schema}
+  alias Hal.Suggest
+  alias Robot.File.{Device, Schema}
 
   @doc "All that does not fit: the keys it is about, and what is wrong; `file` is the file's path."
   @spec problems(Robot.File.t(), Path.t()) :: [{[String.t(), ...], String.t()}]
@@ -35,11 +36,7 @@ defmodule Robot.File.CrossChecks do
   defp kept(%{camera: nil}),
     do: {["save_pictures"], "is for a robot with a camera, and it has none"}
 
-  defp kept(%{save_pictures: options}) do
-    with {:error, line} <- Vision.Saver.options(options),
-         do: {["save_pictures"], line},
-         else: (_well -> nil)
-  end
+  defp kept(_robot), do: nil
 
   defp majority(policies) do
     if policies[:policy] == :majority and policies[:of] == nil,
@@ -56,14 +53,14 @@ defmodule Robot.File.CrossChecks do
       do:
         {["policies", "colour"],
          "cannot be #{inspect(colour)}: the colours are #{Enum.join(names, ", ")}" <>
-           Check.meant(colour, names, "")}
+           Suggest.hint(colour, names)}
   end
 
   # A drive knows what it can do with a body: how many sensors it reads, how fast it may go.
   defp driven(%{drive: drive, profile: profile}) do
     case Device.fit(drive, profile) do
       {:ok, _drive} -> []
-      {:error, lines} -> for line <- lines, do: {["drive"], line}
+      {:error, line} -> [{["drive"], line}]
     end
   end
 

@@ -3,12 +3,14 @@ defmodule Robot.File.Device do
   The drivers that a robot file names, as `{Hal.RFlex.Driver, port: "/dev/ttyR0"}`.
 
   A driver is a module of this build with the callbacks of its kind. What options it takes it says
-  itself, if it exports `options/1`: `{:ok, all options} | {:error, line | [line]}`. Names in options
-  are compared with the atoms that there are; a file makes none. A drive that has an option `profile:`
-  is given the body of the file, with its limits.
+  itself, if it exports `option_table/0`; what no table can say, `options/1`: `{:ok, all options} | {:error, line}`.
+  Names in options are compared with the atoms that there are; a file makes none. A drive that has an option
+  `profile:` is given the body of the file, with its limits.
   """
-  alias Hal.{Build, Suggest}
-  alias Robot.File.{Check, Options, Reader}
+  alias Hal.Options.{Type, Wording}
+  alias Hal.Suggest
+  alias Robot.File.Terms
+  alias Robot.File.Terms.Name
 
   @kinds %{
     drive: {:drive, 2, "Hal.Drive"},
@@ -16,55 +18,62 @@ defmodule Robot.File.Device do
     camera: {:next, 1, "Hal.Camera"}
   }
   # Named here, so that their names are known before any of them is loaded.
-  @ours %{
-    drive: [Hal.RFlex.Driver],
-    ptz: [Hal.Visca.Driver],
-    camera: [Hal.Camera.FFmpeg]
-  }
+  @ours %{drive: Hal.RFlex.Driver, ptz: Hal.Visca.Driver, camera: Hal.Camera.FFmpeg}
 
-  @doc "The `{driver, options}` that a node names."
-  @spec check(:drive | :ptz | :camera, Reader.tree(), [String.t()]) :: Check.result()
-  def check(kind, {line, {:module, _name}} = module, path),
-    do: check(kind, {line, {:tuple, [module, {line, {:list, []}}]}}, path)
+  @doc "The type of a driver with its options, for a table."
+  @spec type(:drive | :ptz | :camera) :: Type.t()
+  def type(kind),
+    do: {:check, &check(kind, &1), "{driver, options}, such as {#{inspect(@ours[kind])}, […]},"}
 
-  def check(kind, {line, {:tuple, [{_, {:module, name}} = module, {_at, options}]}} = node, path) do
-    case options do
-      {:keys, keys} -> driver(kind, module, name, keys, path)
-      {:list, []} -> driver(kind, module, name, [], path)
-      _other -> refuse(kind, {line, elem(node, 1)}, path)
+  defp check(kind, {name, options}) when is_list(options) do
+    with true <- name?(name),
+         {:ok, module} <- module(kind, name),
+         {:ok, options} <- options(module, options),
+         do: {:ok, {module, options}}
+  end
+
+  defp check(kind, name), do: not is_tuple(name) and name?(name) and check(kind, {name, []})
+
+  defp name?(%Name{text: text}), do: not String.starts_with?(text, ":")
+  defp name?(name), do: is_atom(name) and match?("Elixir." <> _, Atom.to_string(name))
+
+  defp options(module, given) do
+    case {table(module), Terms.strange(Enum.map(given, &elem(&1, 1)))} do
+      {nil, nil} -> existing(given)
+      {nil, name} -> {:error, [{[key(given, name)], refused("a name that there is", name)}]}
+      {table, _name} -> Type.read({:keys, table}, given)
+    end
+    |> judged(module)
+  end
+
+  defp existing(given) do
+    case for {name, _value} <- given, is_binary(name), do: name do
+      [] -> {:ok, given}
+      names -> {:error, for(name <- names, do: {[name], "is not an option of any driver"})}
     end
   end
 
-  def check(kind, node, path), do: refuse(kind, node, path)
-
-  defp refuse(kind, node, path) do
-    [ours] = @ours[kind]
-    Check.refuse("{driver, options} is allowed, such as {#{inspect(ours)}, […]}", node, path)
+  defp judged({:ok, options}, module) do
+    with nil <- refused_by(module, options), do: {:ok, options}, else: (line -> {:error, line})
   end
 
-  defp driver(kind, {line, _} = node, name, keys, path) do
-    with {:ok, module} <- module(kind, name, node, path),
-         {:ok, options} <- Options.read(keys, path, known(module)) do
-      case refused(module, options) do
-        [] -> {:ok, {module, options}}
-        lines -> {:error, for(text <- lines, do: {line, path, text})}
-      end
-    end
+  defp judged(error, _module), do: error
+
+  defp key(given, name) do
+    Enum.find_value(given, fn {key, value} -> Terms.strange([value]) == name && to_string(key) end)
   end
 
   @doc """
-  The options of a drive with the body that they are for, if it has a place for it; or what does not fit
-  the body, a line each.
+  The options of a drive with the body that they are for, if it has a place for it; or one line that says what
+  does not fit the body.
   """
   @spec fit({module(), keyword()}, Hal.Profile.t()) ::
-          {:ok, {module(), keyword()}} | {:error, [String.t(), ...]}
+          {:ok, {module(), keyword()}} | {:error, String.t()}
   def fit({module, options}, profile) do
-    if Map.has_key?(known(module), :profile) do
+    if Keyword.has_key?(table(module) || [], :profile) do
       options = Keyword.put_new(options, :profile, profile)
-
-      with [] <- refused(module, options),
-           do: {:ok, {module, options}},
-           else: (lines -> {:error, lines})
+      line = refused_by(module, options)
+      if line, do: {:error, line}, else: {:ok, {module, options}}
     else
       {:ok, {module, options}}
     end
@@ -85,51 +94,42 @@ defmodule Robot.File.Device do
     end
   end
 
-  # What a driver makes of the least that it can be told holds all its options, with the keys of
-  # those that are lists of keys; of a driver that does not tell, nothing is known.
-  defp known(module) do
-    if function_exported?(module, :options, 1) do
-      Enum.find_value([[port: "/dev/null"], [source: "testsrc"], []], %{}, fn least ->
-        with {:ok, all} <- module.options(least), do: Map.new(pairs(all)), else: (_no -> nil)
-      end)
-    else
-      %{}
-    end
+  defp table(module) do
+    if Code.ensure_loaded?(module) and function_exported?(module, :option_table, 0),
+      do: module.option_table()
   end
 
-  defp pairs(%_{} = all), do: all |> Map.from_struct() |> pairs()
-
-  defp pairs(all) when is_map(all) or is_list(all),
-    do: Enum.map(all, fn {key, value} -> {key, below(value)} end)
-
-  defp below(%_{} = value), do: Map.new(pairs(value))
-  defp below([{key, _value} | _] = list) when is_atom(key), do: Map.new(pairs(list))
-  defp below(_value), do: %{}
-
-  defp module(kind, name, {line, _} = node, path) do
+  defp module(kind, name) do
     {function, arity, behaviour} = @kinds[kind]
-    ours = Enum.map(@ours[kind], &inspect/1)
-    hint = with nil <- Suggest.nearest(name, ours), do: hd(ours)
 
-    case Build.module(name) do
-      {:ok, module} ->
-        if function_exported?(module, function, arity),
-          do: {:ok, module},
-          else: {:error, [{line, path, "#{name} is no #{behaviour}"}]}
+    cond do
+      is_struct(name) or not Code.ensure_loaded?(name) ->
+        ours = inspect(@ours[kind])
 
-      :error ->
-        hint = if hint == name, do: "", else: "; did you mean #{hint}?"
-        Check.refuse("a driver of this build is allowed", node, path, hint)
+        {:error,
+         refused("a driver of this build such as #{ours}", name) <>
+           Suggest.hint(inspect(name), [ours])}
+
+      not function_exported?(name, function, arity) ->
+        {:error, "names #{inspect(name)}, which is not a #{behaviour}"}
+
+      true ->
+        {:ok, name}
     end
   end
 
-  @doc "What a driver has against these options, a line each; nothing if it does not tell."
-  @spec refused(module(), keyword()) :: [String.t()]
-  def refused(module, options) do
+  defp refused(allowed, value) do
+    {:error, [{[], text}]} = Wording.refuse(allowed, value)
+    text
+  end
+
+  @doc "What a driver has against these options, in one line; `nil` for nothing, or if it does not tell."
+  @spec refused_by(module(), keyword()) :: String.t() | nil
+  def refused_by(module, options) do
     # Looked for at run time: a driver may have no such function.
     case function_exported?(module, :options, 1) && module.options(options) do
-      {:error, lines} -> List.wrap(lines)
-      _well -> []
+      {:error, line} -> line
+      _well -> nil
     end
   end
 end

@@ -1,6 +1,7 @@
 defmodule Mix.Tasks.RobotTest do
   use ExUnit.Case, async: false
   alias Mix.Tasks.Robot.Check
+  alias Robot.File.Schema
 
   @moduletag :tmp_dir
   @robots Path.expand("../../../../../config/robots", __DIR__)
@@ -131,11 +132,13 @@ defmodule Mix.Tasks.RobotTest do
     bad = Path.join(folder, "bad.exs")
     File.write!(bad, "[id: :mag1, profile: :magelan,\n dirve: 1]")
     lines = refused(Check, [Path.join(@robots, "mag1.exs"), bad, "none.exs"])
+    {:keys, table} = Schema.table(%{fleet: Schema.fleet(), colours: nil})
+    keys = table |> Keyword.keys() |> Enum.join(", ")
 
     assert lines == [
-             "#{bad}:1: profile: cannot be :magelan: allowed: :magellan, :atrv_mini; did you mean :magellan?",
-             "#{bad}:2: dirve: is not a key; did you mean drive?",
-             "#{bad}:1: drive: is missing",
+             "#{bad}:1: profile: cannot be :magelan: :magellan or :atrv_mini is allowed; did you mean :magellan?",
+             "#{bad}:1: drive: is missing: {driver, options}, such as {Hal.RFlex.Driver, […]}, is allowed",
+             "#{bad}:2: dirve: is not known: allowed are #{keys}; did you mean drive?",
              "none.exs: no such file or directory"
            ]
 

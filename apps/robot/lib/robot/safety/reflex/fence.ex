@@ -63,6 +63,16 @@ defmodule Robot.Safety.Reflex.Fence do
       {:error,
        "a polygon of 3 to #{@most} corners, or two corners {{x, y}, {x, y}} of a rectangle"}
 
+  @doc "The type of a fence, for a table of `Hal.Options`: a fence, or what `new/1` makes one of."
+  @spec type() :: Hal.Options.Type.t()
+  def type, do: {:check, &read/1, "a fence"}
+
+  defp read(%__MODULE__{}), do: true
+
+  defp read(corners) do
+    with {:error, allowed} <- new(corners), do: Hal.Options.Wording.refuse(allowed, corners)
+  end
+
   defp place?({x, y}),
     do: is_number(x) and is_number(y) and abs(x) <= @farthest and abs(y) <= @farthest
 

@@ -1,0 +1,128 @@
+defmodule Robot.File.Terms do
+  @moduledoc """
+  What `Robot.File.Reader` read as plain values for `Hal.Options`, and the lines that their keys stand in. Names
+  become the atoms and modules that there are; of others none is made, they stay `Robot.File.Terms.Name`.
+  """
+  alias Hal.Build
+  alias Hal.Options.Type
+  alias Robot.File.Reader
+
+  defmodule Name do
+    @moduledoc "A name in a robot file that is no atom, shown as it was written."
+    @enforce_keys [:text]
+    defstruct @enforce_keys
+    @type t :: %__MODULE__{text: String.t()}
+
+    defimpl Inspect do
+      def inspect(%{text: text}, _options), do: text
+    end
+  end
+
+  @type problem :: {line :: pos_integer(), path :: [String.t()], text :: String.t()}
+
+  @doc """
+  The value of a tree by its type, or all problems, in the order of their lines.
+
+      iex> {:ok, tree} = Robot.File.Reader.read("[lenght: 0.4,\\n width: 900, width: 9]")
+      iex> sizes = {:keys, length: {:number, 0.1, 2.0, "m"}, width: {:number, 0.1, 2.0, "m"}}
+      iex> Robot.File.Terms.check(tree, sizes)
+      {:error, [
+        {1, ["lenght"], "is not known: allowed are length, width; did you mean length?"},
+        {2, ["width"], "is given twice, first in line 2"},
+        {2, ["width"], "cannot be 900: a number from 0.1 to 2.0 m is allowed"}]}
+  """
+  @spec check(Reader.tree(), Type.t()) :: {:ok, term()} | {:error, [problem(), ...]}
+  def check(tree, type) do
+    case {twice(tree, []), Type.read(type, term(tree))} do
+      {[], {:ok, value}} ->
+        {:ok, value}
+
+      {twice, {:ok, _value}} ->
+        {:error, twice}
+
+      {twice, {:error, problems}} ->
+        {:error, Enum.sort_by(twice ++ at(problems, tree), &elem(&1, 0))}
+    end
+  end
+
+  @doc "Problems with the lines of their keys, or of what they would be in."
+  @spec at([Type.problem()], Reader.tree()) :: [problem()]
+  def at(problems, tree), do: for({path, text} <- problems, do: {line(tree, path), path, text})
+
+  @doc """
+  A tree as a value; of keys that are given twice, the first.
+
+      iex> {:ok, tree} = Robot.File.Reader.read("[arm: :manual, id: :no_robot_of_ours]")
+      iex> inspect(Robot.File.Terms.term(tree))
+      "[arm: :manual, id: :no_robot_of_ours]"
+  """
+  @spec term(Reader.tree()) :: term()
+  def term({_line, {:list, nodes}}), do: Enum.map(nodes, &term/1)
+  def term({_line, {:tuple, nodes}}), do: nodes |> Enum.map(&term/1) |> List.to_tuple()
+  def term({_line, {:map, pairs}}), do: Map.new(pairs, fn {k, v} -> {term(k), term(v)} end)
+
+  def term({_line, {:name, name}}),
+    do: with(:error <- existing(name), do: %Name{text: ":" <> name})
+
+  def term({_line, {:module, name}}),
+    do: with(:error <- Build.module(name), do: %Name{text: name}, else: ({:ok, module} -> module))
+
+  def term({_line, {:keys, keys}}) do
+    for {name, _line, node} <- Enum.uniq_by(keys, &elem(&1, 0)), do: {key(name), term(node)}
+  end
+
+  def term({_line, value}), do: value
+
+  @doc "Whether a name that is no atom is anywhere in a value; and which."
+  @spec strange(term()) :: Name.t() | nil
+  def strange(%Name{} = name), do: name
+  def strange([_ | _] = list), do: Enum.find_value(list, &strange/1)
+  def strange(tuple) when is_tuple(tuple), do: tuple |> Tuple.to_list() |> strange()
+  def strange(map) when is_map(map) and not is_struct(map), do: map |> Map.to_list() |> strange()
+  def strange(_value), do: nil
+
+  defp key(name), do: with(:error <- existing(name), do: name)
+
+  defp existing(name) do
+    String.to_existing_atom(name)
+  rescue
+    ArgumentError -> :error
+  end
+
+  defp twice({_line, {:keys, keys}}, path) do
+    for {{name, line, node}, n} <- Enum.with_index(keys), reduce: [] do
+      problems ->
+        first = Enum.find(Enum.take(keys, n), &(elem(&1, 0) == name))
+        text = first && "is given twice, first in line #{elem(first, 1)}"
+        own = if first, do: [{line, path ++ [name], text}], else: twice(node, path ++ [name])
+        problems ++ own
+    end
+  end
+
+  defp twice({_line, {kind, nodes}}, path) when kind in [:list, :tuple],
+    do: Enum.flat_map(nodes, &twice(&1, path))
+
+  defp twice(_node, _path), do: []
+
+  defp line({line, _value}, []), do: line
+
+  defp line({line, value}, [key | path]) do
+    case below(value, key) do
+      nil -> line
+      node -> line(node, path)
+    end
+  end
+
+  defp below({:keys, keys}, key) do
+    Enum.find_value(keys, fn {name, line, node} -> name == key && {line, elem(node, 1)} end)
+  end
+
+  # The options of a driver stand behind its name.
+  defp below({:tuple, nodes}, key), do: nodes |> List.last() |> elem(1) |> below(key)
+
+  defp below({:map, pairs}, key),
+    do: Enum.find_value(pairs, &(elem(elem(&1, 0), 1) == key && elem(&1, 1)))
+
+  defp below({:list, nodes}, n), do: Enum.at(nodes, String.to_integer(n) - 1)
+  defp below(_value, _key), do: nil
+end
