@@ -1,6 +1,6 @@
 defmodule Agents.ContractNet do
   @moduledoc """
-  Tasks go to whoever does them for least (Smith 1980; FIPA's contract net).
+  Auctions of tasks: the lowest bidder gets the task (Smith 1980; FIPA's contract net).
 
       defmodule Carry do
         @behaviour Agents.ContractNet

@@ -1,6 +1,6 @@
 defmodule Agents.Conversation do
   @moduledoc """
-  Asking others, and waiting no longer than told: for one answer, or for those of many.
+  Asks other programs and waits until a deadline, for one answer or for many.
 
       alias Agents.{Conversation, Envelope}
       question = Envelope.new(:query, :mag1, :battery)

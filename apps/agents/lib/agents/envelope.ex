@@ -1,7 +1,7 @@
 defmodule Agents.Envelope do
   @moduledoc """
-  What programs on robots write to each other: what is meant, by whom, in which conversation. Pure, but for
-  the reference that a new conversation is given.
+  A message between programs on robots: its intention, its sender and its conversation. Pure,
+  except for the reference of a new conversation.
 
   Robots' own talk (heartbeats, rounds) is `Swarm.Message`. An envelope is for everything else: a
   service asks another, a mission hands out tasks, a topic tells its news. `check/1` is the one door

@@ -1,7 +1,7 @@
 defmodule Agents.Inbox do
   @moduledoc """
-  How a process reads its envelopes by the rules of `Agents.Mailbox`, though the VM's own mailbox knows
-  neither limit nor class.
+  Lets a process read its envelopes by the rules of `Agents.Mailbox`, since the VM's own mailbox
+  has neither a limit nor classes.
 
   Whatever arrives is first moved into the mailbox, which costs a microsecond, and only then is one
   envelope handled: the process sends itself a *turn*, which stands in line behind all that has come

@@ -1,6 +1,6 @@
 defmodule Agents.Mailbox do
   @moduledoc """
-  The envelopes that somebody has yet to read: never more than a limit, and the urgent ones first. Pure.
+  A bounded queue of unread envelopes, urgent ones first. Pure.
 
     * Urgent envelopes are taken first, and are never dropped to make room.
     * All others are taken in the order they came.

@@ -1,7 +1,8 @@
 defmodule Agents.PubSub do
   @moduledoc """
-  Events between the processes of one node, whoever carries them: `Agents.PubSub.Local`, which is always
-  there, or `Agents.PubSub.Phoenix`, where `phoenix_pubsub` is. For news between robots, see `Agents.Topic`.
+  Events between the processes of one node, by either of two adapters: `Agents.PubSub.Local`,
+  which is always available, or `Agents.PubSub.Phoenix`, where `phoenix_pubsub` is installed.
+  `Agents.Topic` publishes between robots.
 
       children = [{Agents.PubSub.Local, name: Hall.Events}]
       bus = {Agents.PubSub.Local, Hall.Events}

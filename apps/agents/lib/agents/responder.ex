@@ -1,7 +1,7 @@
 defmodule Agents.Responder do
   @moduledoc """
-  A robot's program that answers envelopes: a service others find by its name. A companion of the
-  robot's pilot, so that it lives and falls with the robot.
+  A program on a robot that answers envelopes: a service that others find by its name. It is a
+  companion of the robot's pilot, so that it starts and crashes with the robot.
 
       defmodule Battery do
         @behaviour Agents.Responder

@@ -1,6 +1,6 @@
 defmodule Agents.Template do
   @moduledoc """
-  Which envelopes somebody wants, as data. Pure.
+  A filter for envelopes, as data. Pure.
 
       [performative: :inform, from: :mag1]                  all of these fields
       [performative: [:agree, :refuse]]                     a list: one of these

@@ -1,7 +1,7 @@
 defmodule Bench.Mesh do
   @moduledoc """
-  What `mix bench swarm` measures, and what it is to beat: the cases with their goals, and JADE's figures,
-  which were taken on another day. Pure. Times are microseconds, memory is bytes.
+  What `mix bench swarm` measures, and what it should beat: the cases with their goals, and JADE's
+  figures, which were measured separately. Pure. Times are microseconds, memory is bytes.
   """
   alias Console.Cli.Parse
 

@@ -1,7 +1,7 @@
 defmodule Bench.Stop do
   @moduledoc """
-  What `mix bench stop` measures: how long it takes from something that goes wrong on a robot that drives at
-  full speed to the stop on its serial line, as read at the line's other end. Pure.
+  What `mix bench stop` measures: the time from a fault on a robot that drives at full speed until
+  the stop arrives at the other end of its serial line. Pure.
 
   The stop is there when both axes of the base were told a speed of zero. What the base does then is its own
   affair: it brakes.

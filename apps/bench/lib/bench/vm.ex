@@ -1,7 +1,8 @@
 defmodule Bench.Vm do
   @moduledoc """
-  Further VMs to measure, with the code of this build, reached over standard input and output: whoever
-  measures is not a part of their network. They end when this one does, frozen or not.
+  Further VMs to measure, with the code of this build, controlled over standard input and output,
+  so that the measuring process is not part of their network. They end when this one does, frozen
+  or not.
   """
 
   @boot_ms 60_000

@@ -1,6 +1,6 @@
 defmodule Console.Fleet do
   @moduledoc """
-  Which robots there are: `mag1`, `mag2`, … (Magellan Pro) and `min1`, `min2`, … (ATRV mini). Pure.
+  The robots of a fleet: `mag1`, `mag2`, … (Magellan Pro) and `min1`, `min2`, … (ATRV mini). Pure.
   """
 
   @most 100

@@ -1,6 +1,6 @@
 defmodule Console.Live do
   @moduledoc """
-  A fleet that can be watched and commanded while it runs, whoever runs it.
+  The behaviour of a fleet that can be watched and commanded while it runs.
 
   A view asks for the `scene/1` whenever it wants to draw, and hands on what people type as a
   command that `Console.Terminal.Prompt` has checked.

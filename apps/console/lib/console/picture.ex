@@ -1,6 +1,6 @@
 defmodule Console.Picture do
   @moduledoc """
-  A run as one drawing (SVG): the floor with everybody's way, a legend, and below it the
+  A run as one drawing (SVG): the floor with each robot's path, a legend, and below it the
   formation error over time. Pure; no fonts or files are needed to show it.
   """
   alias Console.Cli.Format

@@ -1,6 +1,7 @@
 defmodule Hal.Build do
   @moduledoc """
-  The modules of this build by name, for text that comes from people: the driver of a robot file, the option of a command.
+  Finds modules of this build by names that people write: the driver in a robot file, the option
+  of a command.
   """
 
   @doc """

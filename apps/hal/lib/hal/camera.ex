@@ -1,8 +1,8 @@
 defmodule Hal.Camera do
   @moduledoc """
-  A source of frames, run by `Hal.Device`. Newest wins: an implementation never queues frames,
-  it sends the next one when it is asked by `next/1`, which the device calls once it has handed
-  the last one on.
+  The behaviour of a source of frames, run by `Hal.Device`. The newest frame wins: an
+  implementation never queues frames, but sends the next one when `next/1` asks for it. The device
+  calls that once it has passed the last one on.
   """
 
   @typedoc "A picture; or, of a camera that finds them by itself, its blobs, as `Vision.BlobDetector` gives them."

@@ -1,7 +1,7 @@
 defmodule Hal.Device do
   @moduledoc """
-  The one process round any driver (`Hal.Drive`, `Hal.Ptz`, `Hal.Camera`): it opens the driver
-  after its own start, hands readings on, and opens again what went wrong.
+  The process that runs any driver (`Hal.Drive`, `Hal.Ptz`, `Hal.Camera`): it opens the driver
+  after its own start, passes readings on, and reopens the driver after errors.
 
   Options:
 

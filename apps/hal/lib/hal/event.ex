@@ -1,8 +1,8 @@
 defmodule Hal.Event do
   @moduledoc """
   Events in telemetry's shape: what happened, numbers, and about whom. Libraries never log; they
-  emit events, and whoever wants to know attaches a function. Where `:telemetry` is loaded, every
-  event is handed on to it too.
+  emit events, and listeners attach functions. If `:telemetry` is loaded, it receives every event
+  too.
 
   Before the `:hal` application is started an event is simply lost.
 

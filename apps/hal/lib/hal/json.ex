@@ -1,6 +1,6 @@
 defmodule Hal.Json do
   @moduledoc """
-  Writes JSON. Small on purpose: the reports and pages of this project need no more, and a robot
+  Writes JSON. It is deliberately small: the reports of this project need no more, and a robot
   needs no further library for it.
 
   | Elixir | JSON |

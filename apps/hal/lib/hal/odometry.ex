@@ -1,10 +1,11 @@
 defmodule Hal.Odometry do
   @moduledoc """
-  What the wheels say: the pose in the robot's own `odom` frame, and the present speed.
+  What the wheels report: the pose in the robot's own `odom` frame, and the current speed.
 
-  Poses belong together as long as `frame` is the same. A driver that had to begin again at zero, because
-  its process fell, says another one, and so does one whose base's counters jumped, because its controller was
-  switched off and on: between the two nobody knows how far the robot went.
+  Poses belong together as long as `frame` is the same. A driver that had to begin again at zero,
+  because its process crashed, reports another frame; so does one whose base's counters jumped,
+  because its controller was switched off and on: how far the robot moved between the two frames
+  is unknown.
   """
 
   @enforce_keys [:pose, :twist]

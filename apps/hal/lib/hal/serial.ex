@@ -1,7 +1,7 @@
 defmodule Hal.Serial do
   @moduledoc """
-  A serial line: raw bytes, 8 data bits, no parity, one stop bit, no flow control. Where a packet begins
-  and ends is for whoever knows the protocol.
+  A serial line: raw bytes, 8 data bits, no parity, one stop bit, no flow control. Packet
+  boundaries are the caller's business.
 
       {:ok, line} = Hal.Serial.open(port: "/dev/ttyS0", speed: 115_200, last_words: stop)
       :ok = Hal.Serial.write(line, bytes)
@@ -33,28 +33,29 @@ defmodule Hal.Serial do
 
   ## Last words
 
-  What the line is to hear when nobody is there to say it: a stop. They are written when the line is
-  closed, when its process or the whole VM ends, in whatever way, and when there was no sign of life for
-  `:keep_alive_ms`: then once, until there is one. Signs of life are `write/2`, `last_words/2` and
-  `keep_alive/1`. Bytes that were written before and would hold them up for more than 20 ms are thrown
-  away, so before the last words half a packet may stand. What this is worth without our port program,
-  see `Hal.Serial.Circuits`.
+  The last words are what the line receives when nobody is left to send it: a stop. They are
+  written when the line is closed, when its process or the whole VM ends in any way, and when
+  there was no sign of life for `:keep_alive_ms`: then once, until there is one. Signs of life are
+  `write/2`, `last_words/2` and `keep_alive/1`. Earlier bytes that would delay them by more than
+  20 ms are discarded, so half a packet may precede the last words. `Hal.Serial.Circuits` explains
+  what they are worth without our port program.
 
-  The port program itself may be frozen, and only it: then nobody can say anything on the line. `keep_alive/1`, said
-  often, gives `{:error, :frozen}` after half a second. When it goes on, it writes nothing that it was told longer
-  ago than `keep_alive_ms`, and then the last words.
+  If only the port program is frozen, nothing can be sent on the line. `keep_alive/1`, called
+  often, returns `{:error, :frozen}` after half a second. When the program resumes, it writes
+  nothing that is older than `keep_alive_ms`, and then the last words.
 
   ## Much at once
 
-  At most 4096 bytes that the line has not taken are kept. A write that does not fit is not done at all,
-  and gives `{:error, :overrun}`: a command that comes late is worth nothing, and nobody waits. The line
-  is still good then. Who does not take the bytes that come holds up the line, and it loses bytes as
-  a serial line does; nothing grows. Taking a message means giving it to `handle/2`.
+  At most 4096 bytes that the line has not taken are kept. A write that does not fit is rejected
+  with `{:error, :overrun}`: a late command is worthless, and nobody waits. The line remains
+  usable. An owner that does not take incoming bytes delays the line, which then loses bytes like
+  any serial line; nothing grows. Taking a message means passing it to `handle/2`.
 
   ## A pseudo-terminal
 
-  With `:pty`, whoever opens the link is at the other end, comes and goes as he likes; what is written
-  meanwhile is lost. The link is removed at the end. It replaces one that leads nowhere, and nothing else.
+  With `:pty`, any program may open the link, which is the other end, and close it again; what is
+  written meanwhile is lost. The link is removed at the end. It replaces one that leads nowhere,
+  and nothing else.
   """
   alias Hal.{Options, Serial}
   alias Hal.Serial.Line

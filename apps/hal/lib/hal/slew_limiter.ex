@@ -1,6 +1,6 @@
 defmodule Hal.SlewLimiter do
   @moduledoc """
-  The last limit before the wire: speeds and their changes, whatever was asked for. Pure.
+  The last limit before the wire: limits speeds and their changes, whatever was requested. Pure.
 
   Each of the two speeds is kept within its limit, grows at most by its acceleration, and shrinks at
   most by its braking, which may be more. **A speed that is to be zero is zero at once**: a stop does

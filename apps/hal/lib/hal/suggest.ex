@@ -1,5 +1,5 @@
 defmodule Hal.Suggest do
-  @moduledoc "What somebody may have meant by a word that nobody knows. Pure."
+  @moduledoc "Did-you-mean suggestions for unknown words. Pure."
 
   @near_enough 0.77
 

@@ -1,6 +1,6 @@
 defmodule Hal.Wheels do
   @moduledoc """
-  The two wheels behind a way and a turn, and what is wrong with them. Pure.
+  The two wheels behind a distance and a turn, and their errors. Pure.
 
   A base that reports its way and its turn has made both from its wheels: `way = (right + left) / 2`,
   `turn = (right - left) / base` (Siegwart and Nourbakhsh 2004, section 5.2.4). `ratio` is how much

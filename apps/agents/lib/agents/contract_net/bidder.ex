@@ -1,6 +1,6 @@
 defmodule Agents.ContractNet.Bidder do
   @moduledoc """
-  One who bids for tasks, and does one at a time. Pure; time is passed in, in milliseconds.
+  A bidder for tasks, which carries out one at a time. Pure; time is passed in, in milliseconds.
 
       free --bids--> locked --accepted--> working --finished, cancelled--> free
         ^               |

@@ -1,8 +1,8 @@
 defmodule Agents.ContractNet.Bidding do
   @moduledoc """
-  The service of a robot that bids for tasks and does them: a `Agents.Responder` whose argument is
-  `{module, argument}`, the module a `Agents.ContractNet`. The work runs in a process of its own, so that
-  the robot goes on answering; it is ended when it is cancelled.
+  The service of a robot that bids for tasks and carries them out: an `Agents.Responder` whose
+  argument is `{module, argument}`, the module a `Agents.ContractNet`. The work runs in a process
+  of its own, so that the robot keeps answering; cancelling a task ends it.
   """
   alias Agents.ContractNet.Bidder
   alias Agents.{Conversation, Envelope}

@@ -1,5 +1,5 @@
 defmodule Agents.ContractNet.Cost do
-  @moduledoc "What a task would cost a robot, so that robots can be compared. Pure."
+  @moduledoc "Estimates the cost of a task for a robot, so that bids can be compared. Pure."
 
   @type t :: number() | :infinite
 

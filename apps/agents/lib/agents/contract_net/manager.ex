@@ -1,6 +1,6 @@
 defmodule Agents.ContractNet.Manager do
   @moduledoc """
-  Gives one task to whoever does it for least. Pure; time is passed in, in milliseconds.
+  Assigns one task to the lowest bidder. Pure; time is passed in, in milliseconds.
 
       announce --all have bid, or 0.5 s--> award --done--> over
          ^                                   |

@@ -1,5 +1,5 @@
 defmodule Agents.PubSub.Local do
-  @moduledoc "Events of one node on a `Registry` (`Agents.PubSub`). Needs nothing but Elixir."
+  @moduledoc "Events of one node on a `Registry` (`Agents.PubSub`). Needs only Elixir."
   @behaviour Agents.PubSub
 
   @impl Agents.PubSub

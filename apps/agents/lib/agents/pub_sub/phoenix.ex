@@ -1,8 +1,9 @@
 if Code.ensure_loaded?(Phoenix.PubSub) do
   defmodule Agents.PubSub.Phoenix do
     @moduledoc """
-    Events of one node on `Phoenix.PubSub` (`Agents.PubSub`), for programs that have it anyway. Nothing is
-    told to other nodes: between robots a slow connection must not hold up anybody.
+    Events of one node on `Phoenix.PubSub` (`Agents.PubSub`), for programs that use it anyway.
+    Nothing is sent to other nodes, because a slow connection between robots must not delay
+    anybody.
     """
     @behaviour Agents.PubSub
 

@@ -1,7 +1,7 @@
 defmodule Bench.Mesh.Agent do
   @moduledoc """
-  A robot's program (`Agents.Responder`) that is measured: it answers, and it takes part in rounds in which
-  everybody writes to everybody. Whoever starts a round asks all with `{:round, others}`; an agent
+  A program on a robot (`Agents.Responder`) to measure: it answers, and takes part in rounds in
+  which each writes to every other. To start a round, ask all with `{:round, others}`; an agent
   answers when it has heard from all others.
   """
   @behaviour Agents.Responder

@@ -1,7 +1,7 @@
 defmodule Bench.Mesh.Bare do
   @moduledoc """
-  The same with nothing of ours on top: processes, `:pg`, `send`. Written as one would in Erlang, so that
-  a node of it loads little of Elixir.
+  The same on bare OTP: processes, `:pg`, `send`. Written in Erlang's style, so that its nodes
+  load little of Elixir.
   """
   alias Bench.Mesh.Watch
 

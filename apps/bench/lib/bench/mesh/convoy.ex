@@ -1,7 +1,7 @@
 defmodule Bench.Mesh.Convoy do
   @moduledoc """
-  What runs in the measured nodes: robots with all their parts, on wheels that stand, with the mesh
-  as it is; and the measuring, in the node that asks. Called over standard input.
+  What runs in the measured nodes: complete robots on stationary wheels, with the real mesh; and
+  the measurement, in the node that asks. Called over standard input.
   """
   alias Bench.Mesh.{Agent, IdleDrive, Watch}
   alias Agents.{Conversation, Envelope}

@@ -1,7 +1,8 @@
 defmodule Bench.Mesh.Figures do
   @moduledoc """
-  Two figures of many measured ones. Pure. The first is the median of the batches' medians, so that what
-  disturbs one batch does not count; the second is taken over all, so that nothing is hidden.
+  Reduces many measurements to two figures. Pure. The first is the median of the batches' medians,
+  so that a disturbance of one batch does not count; the second covers all measurements, so that
+  nothing is hidden.
   """
   alias Bench.Table
 

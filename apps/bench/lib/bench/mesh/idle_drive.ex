@@ -1,7 +1,7 @@
 defmodule Bench.Mesh.IdleDrive do
   @moduledoc """
-  Wheels that stand still and say so ten times a second: a robot's drive without a world. Its sonars report, but
-  see nothing.
+  A drive without a world: its wheels stand still and report that ten times a second. Its sonars
+  report, but see nothing.
   """
   @behaviour Hal.Drive
   alias Hal.{Odometry, Pose, Twist}

@@ -1,7 +1,7 @@
 defmodule Bench.Mesh.Nodes do
   @moduledoc """
-  Nodes to measure, each a VM of its own, reached over standard input and output, so that this process
-  is not a part of what is measured. They end when it does.
+  Nodes to measure, each a VM of its own. They are controlled over standard input and output, so
+  that this process is not part of the measurement, and end when it does.
   """
   alias Bench.Mesh
   alias Bench.Mesh.{Bare, Watch}

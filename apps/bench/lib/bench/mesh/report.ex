@@ -1,5 +1,5 @@
 defmodule Bench.Mesh.Report do
-  @moduledoc "What was measured as a table in Markdown, and as a term for JSON. Pure."
+  @moduledoc "Formats measurements as a table in Markdown, and as a term for JSON. Pure."
   alias Bench.Mesh
   alias Bench.Mesh.Figures
   alias Console.Cli.Format

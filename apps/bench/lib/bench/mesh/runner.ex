@@ -1,7 +1,7 @@
 defmodule Bench.Mesh.Runner do
   @moduledoc """
-  Measures one fleet: N nodes with a robot each and a base that asks, or one node with many. Bare OTP
-  first, all of it ended, then ours: neither runs beside the other.
+  Measures one fleet: N nodes with a robot each and a base that asks, or one node with many. Bare
+  OTP runs first and ends before ours starts, so that neither disturbs the other.
 
   What is fast is done in the nodes, many times over; what is slow (a start, a death) is done a few times
   from here.

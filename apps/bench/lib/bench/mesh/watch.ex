@@ -1,7 +1,8 @@
 defmodule Bench.Mesh.Watch do
   @moduledoc """
-  A process on a node that writes down when it is told of something, by the clock that all processes
-  of a machine share. Who waits for it asks over standard input, so that nothing measured is in the way.
+  A process on a node that records when it is notified of something, by the clock that all
+  processes of a machine share. It is queried over standard input, so that queries do not use what
+  is measured.
   """
 
   @doc "Starts it and calls `begin`, without an argument, in it; it knows what `see` makes of a message: a name of what happened, or `nil`."

@@ -1,8 +1,8 @@
 defmodule Bench.Stop.WireTap do
   @moduledoc """
-  The emulated base with somebody who reads along at its end of the line (`Bench.Stop.Reader`): each
-  speed that it is told, and each input that it tells, goes at once to the process of the option `:to`, as
-  `{:wire, event, at_us}`.
+  The emulated base with a tap at its end of the line (`Bench.Stop.Reader`): each speed that it is
+  told, and each input that it tells, goes at once to the process of the option `:to`, as `{:wire,
+  event, at_us}`.
   """
   @behaviour Sim.Emulator.Core
   alias Bench.Stop.Reader

@@ -1,7 +1,8 @@
 defmodule Mix.Tasks.Bench do
   @shortdoc "Measures the demo over many seeds, the swarm beside bare OTP, and how fast robots stop"
   @moduledoc """
-  `mix bench demo` runs the cases of the main job over many seeds and prints a table in Markdown.
+  `mix bench demo` runs the cases of the landmark mission over many seeds and prints a table in
+  Markdown.
 
   Two runs go at a time; the figures but for the speed are the same on every machine.
 

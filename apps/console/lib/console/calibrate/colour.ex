@@ -1,7 +1,7 @@
 defmodule Console.Calibrate.Colour do
   @moduledoc """
-  `mix calibrate colour`: from places in a picture to the limits of a colour, what they do in that picture, and
-  the colour file.
+  `mix calibrate colour`: derives the limits of a colour from places in a picture, shows their
+  effect in that picture, and writes the colour file.
   """
   alias Console.Calibrate.{ColourOptions, Frames, StdinPrompt}
   alias Console.Cli.{Diff, Format}

@@ -1,8 +1,9 @@
 defmodule Console.Calibrate.Live do
   @moduledoc """
-  Drives a robot of this node along one course, with all that stands between a wish and its wheels: mission,
-  executive, gate, device. A person lets it begin each time; its wheels are armed for this course
-  alone. Whatever is typed meanwhile is an emergency stop, which is held until he says `reset`.
+  Drives a robot of this node along one course, through everything between a wish and its wheels:
+  mission, executive, gate, device. A person starts each course; the wheels are armed for this
+  course alone. Any input meanwhile is an emergency stop, which holds until the person types
+  `reset`.
   """
   alias Console.Calibrate.StdinPrompt
   alias Console.Cli.{Format, Output}

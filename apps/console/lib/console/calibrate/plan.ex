@@ -1,5 +1,5 @@
 defmodule Console.Calibrate.Plan do
-  @moduledoc "What a calibration of odometry will drive, in words. Pure."
+  @moduledoc "Describes what a calibration of odometry will drive. Pure."
   alias Console.Calibrate.{Options, Simulated}
   alias Console.Cli.Format
   alias Robot.Calibration

@@ -1,5 +1,5 @@
 defmodule Console.Calibrate.Question do
-  @moduledoc "What a person is asked after a course, and what his answer means. Pure."
+  @moduledoc "The questions after a course, and the meaning of the answers. Pure."
   alias Console.Cli.Parse
   alias Console.Cli.Format
   alias Hal.Pose

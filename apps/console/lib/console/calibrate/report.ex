@@ -1,5 +1,5 @@
 defmodule Console.Calibrate.Report do
-  @moduledoc "What a calibration of odometry found, in lines for people. Pure."
+  @moduledoc "Formats the result of a calibration of odometry for people. Pure."
   alias Console.Cli.Format
   alias Robot.Calibration
   alias Robot.Calibration.{Model, Squares}

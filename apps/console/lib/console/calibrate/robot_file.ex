@@ -1,7 +1,7 @@
 defmodule Console.Calibrate.RobotFile do
   @moduledoc """
-  Puts what was found into a robot file. What changes is told before it is written, and nothing is
-  written that says anything else than before but for these numbers.
+  Writes the result into a robot file. It shows the change before it writes, and changes nothing
+  but these numbers.
   """
   alias Console.Calibrate.StdinPrompt
   alias Console.Cli.Diff

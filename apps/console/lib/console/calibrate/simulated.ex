@@ -1,5 +1,7 @@
 defmodule Console.Calibrate.Simulated do
-  @moduledoc "Calibrates simulated robots, and tells how near it came to what was put into their wheels."
+  @moduledoc """
+  Calibrates simulated robots, and compares the result with the true errors of their wheels.
+  """
   alias Console.Calibrate.Report
   alias Console.Cli.{Format, Output, Progress}
   alias Robot.Calibration

@@ -1,7 +1,7 @@
 defmodule Console.Calibrate.StdinPrompt do
   @moduledoc """
-  Asks a person, and hears what he types while a robot drives. One process reads standard input, line by
-  line, so that a line is never lost to a question that nobody waits for any more.
+  Asks a person, and reads what is typed while a robot drives. One process reads standard input,
+  line by line, so that no line is lost to an abandoned question.
   """
 
   @enforce_keys [:reader, :ref]

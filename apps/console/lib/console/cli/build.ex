@@ -1,5 +1,5 @@
 defmodule Console.Cli.Build do
-  @moduledoc "Brings the build up to date from within a Mix task, without a word on standard output."
+  @moduledoc "Updates the build from within a Mix task, without output on standard output."
 
   @doc "Compiles what has changed; Mix itself would run a task of an umbrella from an old build."
   @spec update() :: :ok

@@ -1,5 +1,5 @@
 defmodule Console.Cli.Diff do
-  @moduledoc "What would change in a text file, for people. Pure."
+  @moduledoc "Shows the change of a text file, for people. Pure."
 
   @doc """
   The lines that go (`-`) and come (`+`), with their numbers in the old and the new text.

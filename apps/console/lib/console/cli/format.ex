@@ -1,5 +1,5 @@
 defmodule Console.Cli.Format do
-  @moduledoc "What happens to a fleet, in words and figures for people. Pure."
+  @moduledoc "Formats events and figures of a fleet for people. Pure."
 
   @doc """
   One stage as a line.

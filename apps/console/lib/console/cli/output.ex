@@ -1,6 +1,7 @@
 defmodule Console.Cli.Output do
   @moduledoc """
-  Where a command prints: plain lines, and on a terminal a progress line that is drawn anew below them.
+  Prints the output of a command: plain lines, and on a terminal a progress line that is redrawn
+  below them.
   """
 
   @clear "\r\e[K"

@@ -1,6 +1,6 @@
 defmodule Console.Cli.Parse do
   @moduledoc """
-  Texts to checked values: numbers, points, choices, fleets. Pure.
+  Parses text into checked values: numbers, points, choices, fleets. Pure.
 
   Each answers `{:ok, value}` or `{:error, what_is_allowed}`, to be put behind "must be". Numbers
   are plain decimals with few digits, so "nan", "inf" and "1e999" are not even numbers.

@@ -1,7 +1,7 @@
 defmodule Console.Live.Fleet do
   @moduledoc """
-  A fleet of whole robots in real time: every robot its own tree of processes, commanded through the
-  door that real ones have (`Swarm`).
+  A fleet of complete robots in real time: each robot has its own tree of processes, and `Swarm`
+  commands it as it commands real ones.
   """
   @behaviour Console.Live
   alias Console.Cli.Format

@@ -1,6 +1,7 @@
 defmodule Console.Picture.Colours do
   @moduledoc """
-  What a robot is drawn with: one colour each, told apart by the colour-blind too, and its size. Pure.
+  The colour and size of each robot in a drawing; the colours are distinguishable for the
+  colour-blind. Pure.
 
   The first seven are Okabe and Ito's; larger fleets repeat them with other dash patterns.
   """

@@ -1,5 +1,7 @@
 defmodule Console.Picture.Floor do
-  @moduledoc "The upper part of a run's picture: walls, everybody's way, and where all ended. Pure."
+  @moduledoc """
+  The upper part of a run's picture: walls, each robot's path, and where each ended. Pure.
+  """
   alias Console.Picture.{MapView, RunTrack, Svg}
   alias Console.Picture.{Colours, Labels}
   alias Hal.Pose

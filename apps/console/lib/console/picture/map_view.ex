@@ -1,6 +1,6 @@
 defmodule Console.Picture.MapView do
   @moduledoc """
-  A map as the views see it: its sides in metres, the origin in the middle, and where a wall is. Pure.
+  A map as the views see it: its sides in metres, the origin in the middle, and its walls. Pure.
   """
 
   @enforce_keys [:name, :width, :height, :wall?]

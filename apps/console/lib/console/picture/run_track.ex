@@ -1,6 +1,6 @@
 defmodule Console.Picture.RunTrack do
   @moduledoc """
-  What a run leaves behind for its picture: everybody's way, and the formation error over time. Pure.
+  What a run records for its picture: each robot's path, and the formation error over time. Pure.
 
   A way gets a new point when its robot has moved by 2 cm, so that long waits cost nothing.
   """

@@ -1,6 +1,6 @@
 defmodule Console.Terminal.Editor do
   @moduledoc """
-  The line that somebody types, key by key: moving, deleting, earlier lines, completion. Pure.
+  A line editor, key by key: moving, deleting, history, completion. Pure.
 
   The view draws it, so the terminal itself must not echo.
   """

@@ -1,6 +1,6 @@
 defmodule Console.Terminal.Prompt do
   @moduledoc """
-  What people type while a fleet runs, checked against the fleet's names. Pure.
+  Parses what people type while a fleet runs, against the fleet's names. Pure.
 
   Names become robots by comparison; a text never becomes an atom.
   """

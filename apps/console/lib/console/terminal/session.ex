@@ -1,6 +1,6 @@
 defmodule Console.Terminal.Session do
   @moduledoc """
-  A live fleet before a person: full screen on a terminal, plain lines elsewhere.
+  Shows a live fleet to a person: full screen on a terminal, plain lines elsewhere.
 
   One process that waits for keys or lines and for the time to draw; the fleet runs beside it.
   It decides nothing: `Console.Terminal` draws, `Console.Terminal.Prompt` checks, `Console.Live` acts.

@@ -1,5 +1,5 @@
 defmodule Console.Terminal.Table do
-  @moduledoc "The robots as a table that never has more rows than there is room for. Pure."
+  @moduledoc "The robots as a table that fits the screen. Pure."
   alias Console.Cli.Format
   alias Sim.Scene
 

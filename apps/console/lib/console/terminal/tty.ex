@@ -1,6 +1,6 @@
 defmodule Console.Terminal.Tty do
   @moduledoc """
-  The terminal a person sits at: keys one by one instead of lines, and everything put back at the end.
+  The terminal in raw mode: single keys instead of lines, and its settings restored at the end.
 
   Ctrl-C comes as a key too: it must not stop the program while the terminal is changed.
   """

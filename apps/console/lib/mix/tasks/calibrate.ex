@@ -1,7 +1,7 @@
 defmodule Mix.Tasks.Calibrate do
   @shortdoc "Measures a robot's wheels, or a colour that it looks for"
   @moduledoc """
-  Measures what differs from robot to robot, and from room to room.
+  Calibrates a robot's odometry and the colours that its camera looks for.
 
       mix calibrate odometry config/robots/NAME.exs [options]
       mix calibrate colour SOURCE --box X,Y,WIDTH,HEIGHT --name NAME [options]

@@ -3,7 +3,7 @@ defmodule Hal.Camera.FFmpeg do
   alias Hal.Frame
 
   @moduledoc """
-  A camera that is whatever ffmpeg reads: a V4L2 device, a stream, a video file, a picture, a
+  A camera from any source that ffmpeg reads: a V4L2 device, a stream, a video file, a picture, a
   test picture (`Hal.Camera.Source`).
 
   Options:

@@ -1,7 +1,7 @@
 defmodule Hal.Camera.Source do
   @moduledoc """
-  What a camera can be told to read, and how ffmpeg is told to. Pure but for asking whether a
-  file exists.
+  The sources that a camera can read, and ffmpeg's arguments for them. Pure, except that it checks
+  whether a file exists.
 
   | source | is |
   |---|---|

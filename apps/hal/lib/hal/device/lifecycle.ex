@@ -1,7 +1,7 @@
 defmodule Hal.Device.Lifecycle do
   @moduledoc """
-  What a device does with its driver: opens it, opens again what failed, judges whether it gives signs of life, arms and
-  drives the wheels. Called in the device's process.
+  What a device does with its driver: opens it, reopens it after a failure, judges its signs of
+  life, arms and drives the wheels. Called in the device's process.
   """
   alias Hal.Twist
   alias Hal.Device.Arming

@@ -1,7 +1,8 @@
 defmodule Hal.Device.Liveness do
   @moduledoc """
-  Whether a device gives signs of life, as a function of what it reported and of time. Pure, integer milliseconds;
-  `Hal.Device` asks it. A driver that has opened its line or its program proves nothing of what is at the other end.
+  Whether a device gives signs of life, as a function of what it reported and of time. Pure,
+  integer milliseconds; `Hal.Device` asks it. An open line or program proves nothing about the
+  device at the other end.
 
   | device | is online | is no more |
   |---|---|---|

@@ -1,7 +1,7 @@
 defmodule Hal.Device.Publisher do
   @moduledoc """
-  What a device tells: readings to its sinks, and each change of its health and of its arming, once, to sinks and
-  events. Decides nothing.
+  Publishes what a device reports: readings to its sinks, and each change of its health and
+  arming, once, to sinks and events. Makes no decisions.
   """
   alias Hal.Event
   alias Hal.Device.Arming

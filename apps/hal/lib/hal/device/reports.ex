@@ -1,7 +1,8 @@
 defmodule Hal.Device.Reports do
   @moduledoc """
-  Whether a base reports what a robot needs to drive, as a function of time. Pure, integer milliseconds;
-  `Hal.Device` asks it. An open line proves nothing: a base is there once it has said where its wheels are.
+  Whether a base reports what a robot needs to drive, as a function of time. Pure, integer
+  milliseconds; `Hal.Device` asks it. An open line proves nothing: a base is present once it has
+  reported its wheels.
 
   | no report | for | then |
   |---|---|---|

@@ -1,7 +1,7 @@
 defmodule Hal.Device.Server do
   @moduledoc """
-  The process of a device (`Hal.Device`): what comes in, and in which order it is done. What is done is
-  `Hal.Device.Lifecycle`'s and `Hal.Device.Wishes`'s.
+  The process of a device (`Hal.Device`): it receives messages and decides their order.
+  `Hal.Device.Lifecycle` and `Hal.Device.Wishes` carry them out.
   """
   use GenServer
   alias Hal.Device.{Lifecycle, Publisher, State, Wishes}

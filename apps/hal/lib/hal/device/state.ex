@@ -1,6 +1,7 @@
 defmodule Hal.Device.State do
   @moduledoc """
-  What the process of a device knows: its options, what it has opened, and what it has told. Its parts work on it:
+  The state of a device's process: its options, what it has opened, and what it has published. Its
+  parts work on it:
 
   | module | what it does |
   |---|---|

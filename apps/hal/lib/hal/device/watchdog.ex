@@ -1,7 +1,7 @@
 defmodule Hal.Device.Watchdog do
   @moduledoc """
-  The second line behind whoever drives: wheels of which nothing is asked for 500 ms are to be stopped. Its
-  message is `{:watchdog, ref}`, and counts while `ref` is the one in the state.
+  The second line of defence behind the gate: it stops wheels that have received no speed for 500
+  ms. Its message is `{:watchdog, ref}`, and counts while `ref` is the one in the state.
   """
   alias Hal.Device.State
   alias Hal.Twist

@@ -1,7 +1,7 @@
 defmodule Hal.Device.Wishes do
   @moduledoc """
-  What is wished of a device beside speeds: where a pan-tilt unit is to look, and of a camera its next picture.
-  The last wishes are kept, and said again to a driver that was opened anew.
+  Requests to a device other than speeds: where a pan-tilt unit should look, and a camera's next
+  picture. The last requests are kept, and repeated to a reopened driver.
   """
   alias Hal.Device.{Lifecycle, State}
 

@@ -1,6 +1,6 @@
 defmodule Hal.Ptz.History do
   @moduledoc """
-  Where a pan-tilt unit looked, by time: for pictures of a camera that does not know. Pure.
+  Where a pan-tilt unit looked at a given time, for cameras that do not know it. Pure.
 
   A unit tells where it looks about ten times a second, a picture is taken some time in between, and
   both arrive late. So the last readings are kept with their times, and `at/2` gives the direction

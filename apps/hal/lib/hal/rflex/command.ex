@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Command do
   @moduledoc """
-  Everything we may say to the controller, as bytes ready for the line. Pure; raw units.
+  All commands to the controller, as bytes ready for the line. Pure; raw units.
 
   Axis 0 moves, axis 1 turns. A speed is always two frames, one an axis. Torques and the
   acceleration of axis 1 are the constants that public drivers send.

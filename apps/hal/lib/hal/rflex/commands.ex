@@ -1,5 +1,8 @@
 defmodule Hal.RFlex.Commands do
-  @moduledoc "The commands that a driver says as one: speeds, stops, the first words and the last. Pure."
+  @moduledoc """
+  Sequences of commands that a driver sends together: speeds, stops, initialisation and last
+  words. Pure.
+  """
   alias Hal.Twist
   alias Hal.RFlex.{Command, Options, Queue}
 

@@ -1,7 +1,8 @@
 defmodule Hal.RFlex.Conversions do
   @moduledoc """
-  A robot's own numbers between the controller's units and ours. They differ from robot to robot, by 7 %
-  and more for one model, so none of them has a default but the wheels' ratio, and a robot without them does not arm. Pure.
+  A robot's conversions between the controller's units and ours. They differ between robots of one
+  model by 7 % and more, so only the wheels' ratio has a default, and a robot without the others
+  does not arm. Pure.
 
   | name | units |
   |---|---|

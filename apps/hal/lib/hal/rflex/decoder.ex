@@ -1,7 +1,7 @@
 defmodule Hal.RFlex.Decoder do
   @moduledoc """
-  Frames out of a stream of bytes, in whatever pieces it comes: the same bytes give the same
-  packets however they are cut. Pure.
+  Extracts frames from a stream of bytes; the same bytes give the same packets however they are
+  split. Pure.
 
   What begins like a frame and is none is given up, and the search goes on **one byte after** its
   beginning, so that a damaged frame takes no sound one along.

@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Odometry do
   @moduledoc """
-  Pose and speed from the controller's two counters: of the way driven (axis 0), of the angle turned
+  Pose and speed from the controller's two counters: distance driven (axis 0) and angle turned
   (axis 1). Pure; the time of arrival comes in, as integer milliseconds.
 
   The two come in frames of their own. A pose is made of two of one period: at axis 1 if there is a new

@@ -1,7 +1,7 @@
 defmodule Hal.RFlex.Outlook do
   @moduledoc """
-  What can be said of a base by its options alone, before its line is open: whether it may be armed, what
-  it reads, and what is allowed and odd all the same. Driver and `mix robot.check` ask here. Pure.
+  Judges a base by its options alone, before its line is open: whether it may be armed, what it
+  reads, and which allowed values are unusual. The driver and `mix robot.check` use it. Pure.
   """
   alias Hal.RFlex.{Commands, Conversions, Options}
 

@@ -1,8 +1,8 @@
 defmodule Hal.RFlex.PowerSwitch do
   @moduledoc """
-  The shut-down of the whole robot: the controller listens on the computer's serial console, and cuts the
-  power once it reads there that the system has halted. An operating system that says it in other words
-  leaves the power on, so the phrase is configurable and is said by us, as the last thing.
+  The shut-down of the whole robot: the controller listens on the computer's serial console, and
+  cuts the power once it reads there that the system has halted. An operating system that uses
+  other words leaves the power on, so Convoy prints a configurable phrase as the last thing.
 
   | option | allowed | default |
   |---|---|---|

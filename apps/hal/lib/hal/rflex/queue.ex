@@ -1,7 +1,7 @@
 defmodule Hal.RFlex.Queue do
   @moduledoc """
-  What is to be said next, and when: the controller loses commands that come closer together than 10 ms.
-  Pure; a caller waits and writes.
+  Which command to send next, and when: the controller loses commands that are less than 10 ms
+  apart. Pure; the caller waits and writes.
 
   Every command has a key, and a newer one takes the place of an older one with the same key that still
   waits, in its place: so nothing is starved, a speed is never an old one, and there are never more

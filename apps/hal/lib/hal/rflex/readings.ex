@@ -1,7 +1,7 @@
 defmodule Hal.RFlex.Readings do
   @moduledoc """
-  Packets to readings: everything a robot's controller tells, in our units. Pure; the time of arrival
-  comes in, as integer milliseconds.
+  Converts packets to readings: everything that a robot's controller reports, in our units. Pure;
+  the time of arrival comes in, as integer milliseconds.
   """
   alias Hal.RFlex.{Bumpers, IndexSwitch, Infrared, Odometry, Options, Packet, Report, Sonar}
 

@@ -1,7 +1,8 @@
 defmodule Hal.RFlex.Report do
   @moduledoc """
-  What the controller says, in raw units. Pure. Longer reports than known are read as far as known;
-  shorter ones are `:malformed`; ports and opcodes that nobody knows are `:unknown`.
+  Reports of the controller, in raw units. Pure. Reports that are longer than documented are read
+  as far as documented; shorter ones are `:malformed`; undocumented ports and opcodes are
+  `:unknown`.
   """
   alias Hal.RFlex.Packet
 

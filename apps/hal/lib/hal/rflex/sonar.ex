@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Sonar do
   @moduledoc """
-  The sonars' ranges from reports that may each bring only some of them. Pure.
+  Collects the sonars' ranges from reports that may each contain only some of them. Pure.
 
   Every board (bank) numbers its inputs from a multiple of `stride` on, whether fitted or not; the
   sonars are counted bank after bank, in the order of the profile's poses. Ids that no bank has are counted

@@ -1,9 +1,9 @@
 if Code.ensure_loaded?(Circuits.UART) do
   defmodule Hal.Serial.Circuits do
     @moduledoc """
-    A serial line (`Hal.Serial`) by `circuits_uart`, for programs that have it anyway: with `MIX_TARGET`
-    other than `host`. `Hal.Serial.Native` is the one for robots with wheels, because here **the last words
-    are said by this VM**:
+    A serial line (`Hal.Serial`) by `circuits_uart`, for programs that use it anyway (`MIX_TARGET`
+    other than `host`). `Hal.Serial.Native` is the one for robots with wheels, because here **the
+    last words are said by this VM**:
 
       * at closing, when the line's process ends, and in its silence they are written as promised
       * when the VM itself is killed, frozen or has crashed they are **not**: the robot goes on until its

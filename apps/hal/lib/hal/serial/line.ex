@@ -1,8 +1,8 @@
 defmodule Hal.Serial.Line do
   @moduledoc """
-  What carries a serial line (`Hal.Serial`): `Hal.Serial.Native`, which is always there, or
-  `Hal.Serial.Circuits`, where `circuits_uart` is. All functions are called by the process that
-  opened the line.
+  The behaviour of an implementation of `Hal.Serial`: `Hal.Serial.Native`, which is always
+  available, or `Hal.Serial.Circuits`, where `circuits_uart` is installed. All functions are
+  called by the process that opened the line.
   """
 
   @type t :: term()

@@ -1,7 +1,7 @@
 defmodule Hal.Visca.Command do
   @moduledoc """
-  What is said to a VISCA camera, in the camera's own units, and its bytes (fact sheet, sections 2
-  and 4). Pure; `Hal.Visca.Units` makes these numbers of radians.
+  Commands to a VISCA camera, in the camera's own units, and their bytes (fact sheet, sections 2
+  and 4). Pure; `Hal.Visca.Units` converts radians to these numbers.
 
   | command | meaning |
   |---|---|

@@ -1,6 +1,6 @@
 defmodule Hal.Visca.CommandClass do
   @moduledoc """
-  Which commands to a camera take each other's place: of each lane at most one waits. Pure.
+  Classes of commands to a camera that replace each other: at most one of each class waits. Pure.
 
   A newer target for the head makes an older one pointless, and so it is with zoom, power and each
   inquiry. So what waits is bounded by the number of lanes, however fast commands come and however

@@ -1,6 +1,6 @@
 defmodule Hal.Visca.Decoder do
   @moduledoc """
-  Cuts what comes from the line into replies, however it was split (fact sheet, section 2). Pure.
+  Splits the bytes of the line into replies, however they arrive (fact sheet, section 2). Pure.
 
   A message ends with 0xFF, which is nowhere inside one; so after anything that went wrong the
   next message is whole again. What stands before the first header from which the rest is a reply

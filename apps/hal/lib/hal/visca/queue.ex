@@ -1,7 +1,7 @@
 defmodule Hal.Visca.Queue do
   @moduledoc """
-  What is said to one VISCA camera, and when: a state machine of its two sockets. Pure; time comes
-  in as integer milliseconds.
+  Which command to send to one VISCA camera, and when: a state machine of its two sockets. Pure;
+  time comes in as integer milliseconds.
 
   A camera accepts a command (ACK, with the socket that it took), works on it, and says when it is
   done; meanwhile it accepts one more, and answers inquiries. Its answers do not say to what they

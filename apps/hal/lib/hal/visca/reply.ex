@@ -1,6 +1,6 @@
 defmodule Hal.Visca.Reply do
   @moduledoc """
-  What a VISCA camera says (fact sheet, section 3), without its final 0xFF. Pure.
+  Replies of a VISCA camera (fact sheet, section 3), without the final 0xFF. Pure.
 
   | reply | when |
   |---|---|

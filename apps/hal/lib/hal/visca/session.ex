@@ -1,7 +1,7 @@
 defmodule Hal.Visca.Session do
   @moduledoc """
-  A Sony EVI-D30 or D31 on its line, as a function of bytes, wishes and time: what to write, and
-  what it says of itself. Pure; `Hal.Visca.Driver` is the process round it.
+  A Sony EVI-D30 or D31 on its line, as a function of bytes, requests and time: what to write, and
+  what it reports. Pure; `Hal.Visca.Driver` runs it.
 
   **Opening**: take your numbers, clear, who are you, are you on (if not: be on), where are you.
   A camera that was switched off and on says so in a chain, or shows it by standing elsewhere than

@@ -1,6 +1,6 @@
 defmodule Hal.Visca.Units do
   @moduledoc """
-  Between radians and the numbers of a Sony EVI-D30 (fact sheet, section 5). Pure.
+  Converts between radians and the numbers of a Sony EVI-D30 (fact sheet, section 5). Pure.
 
   | what | here | in the camera |
   |---|---|---|

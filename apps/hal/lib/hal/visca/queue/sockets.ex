@@ -1,6 +1,6 @@
 defmodule Hal.Visca.Queue.Sockets do
   @moduledoc """
-  The books on what works in a camera's two sockets, as far as it has said. Pure.
+  Tracks which commands occupy a camera's two sockets, as far as it has reported. Pure.
 
   Answers get lost on a line, so the books may be wrong both ways. `:unknown` stands for something
   that works and is not known: it is the first to be cancelled when its socket is needed.

@@ -1,6 +1,6 @@
 defmodule Hal.Visca.Session.OutlierFilter do
   @moduledoc """
-  Believes no position that a camera's head cannot have come to. Pure; the camera's units.
+  Rejects positions that a camera's head cannot have reached. Pure; the camera's units.
 
   A line without checksums turns one position into another by a single bit. The head turns at most
   by 80 degrees/s (tilt: 50), so a position beyond what it can have reached since the last one is

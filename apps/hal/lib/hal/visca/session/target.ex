@@ -1,6 +1,6 @@
 defmodule Hal.Visca.Session.Target do
   @moduledoc """
-  Where a camera's head was told to look, and whether it has to be told (again). Pure; the camera's
+  Where a camera's head should look, and whether to send the command (again). Pure; the camera's
   units.
 
   A new target is due at once. One that was said is due again when the head stands still elsewhere
