@@ -1,7 +1,7 @@
 defmodule Player do
   @moduledoc """
-  Turns a configuration file of the Player device server (1.x, 2 or 3), as the thesis's robots ran it,
-  into a robot file. Pure; `mix robot.import` is its command.
+  Turns a configuration file of the Player device server (1.x, 2 or 3), which the thesis's robots
+  used, into a robot file. Pure; `mix robot.import` is its command.
 
   | Player's driver | becomes | by |
   |---|---|---|

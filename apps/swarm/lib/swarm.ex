@@ -1,6 +1,6 @@
 defmodule Swarm do
   @moduledoc """
-  The door for people: commands to robots, wherever in the connected nodes they are.
+  Commands from people to robots, on any of the connected nodes.
 
       iex> Swarm.goto(:mag1, {2.0, 1.0})
       :ok

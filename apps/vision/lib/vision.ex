@@ -1,7 +1,7 @@
 defmodule Vision do
   @moduledoc """
-  Finds coloured regions in camera frames: `blobs/2`. What is a colour says `Vision.Colours`,
-  what is a region `Vision.Backend`; `Vision.Filter` chooses among blobs.
+  Finds coloured regions in camera frames: `blobs/2`. `Vision.Colours` defines colours,
+  `Vision.Backend` regions; `Vision.Filter` selects blobs.
   """
   alias Hal.Frame
   alias Vision.{Backend, Blob, Colours}

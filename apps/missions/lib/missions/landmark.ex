@@ -1,8 +1,8 @@
 defmodule Missions.Landmark do
   @moduledoc """
-  The main job (R58 to R60): search for the landmark, agree on who sees it largest, and follow
-  that robot in formation while a person moves the landmark. Pure: events in, effects out; its
-  phases are the table of `Missions.Landmark.Transitions`, its parts are modules of their own:
+  The landmark mission (R58 to R60): search for the landmark, agree on who sees it largest, and
+  follow that robot in formation while a person moves the landmark. Pure: events in, effects out.
+  `Missions.Landmark.Transitions` is the table of its phases; its parts are modules of their own:
 
   | part | decides |
   |---|---|

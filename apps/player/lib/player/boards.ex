@@ -1,6 +1,6 @@
 defmodule Player.Boards do
   @moduledoc """
-  Which of a robot's sonars and infrareds is where, and on which board: what Player's options say of it together.
+  Works out the pose and the board of each sonar and infrared from several of Player's options.
   Pure. The state is that of `Player.Defaults`.
   """
   alias Hal.Profile

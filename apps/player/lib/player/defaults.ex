@@ -1,7 +1,7 @@
 defmodule Player.Defaults do
   @moduledoc """
-  What of a robot file's values no single option of Player's can say: what its driver does unless
-  told otherwise, what one value means for another, what does not fit the body. Pure.
+  Values derived from several of Player's options or from its defaults: what its driver does by
+  default, what one value implies for another, what does not fit the body. Pure.
 
   The state is that of `Player`: values with the line and name of the option they came from,
   what was assumed, what is left out.

@@ -1,6 +1,6 @@
 defmodule Player.Parts do
   @moduledoc """
-  One base that a configuration file has in several pieces. Pure.
+  Joins a base that a configuration file splits over several drivers. Pure.
 
   Before Player had one driver `rflex`, it had one for each interface (`rflex_position`, `rflex_sonar`, `rflex_ir`,
   `rflex_bumper`, `rflex_power`), each in a section of its own, with the same options. They are one base with

@@ -1,7 +1,7 @@
 defmodule Player.Poses do
   @moduledoc """
-  Which reading of sensor poses is meant, where a file does not say: a sensor looks away from the middle of
-  its robot, so the positions decide. Pure.
+  Decides which interpretation of sensor poses is meant if a file does not say: a sensor points
+  away from the centre of its robot, so the positions decide. Pure.
   """
   alias Hal.Pose
   alias Player.Units

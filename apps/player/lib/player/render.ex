@@ -1,5 +1,5 @@
 defmodule Player.Render do
-  @moduledoc "The text of a robot file of what came over from a Player configuration. Pure."
+  @moduledoc "Writes the text of a robot file from an imported Player configuration. Pure."
   alias Robot.File.Writer
 
   @order [:id, :profile, :body, :drive, :ptz, :camera, :colours, :limits, :start, :policies]

@@ -1,6 +1,6 @@
 defmodule Player.Senses do
   @moduledoc """
-  The options of Player's `rflex` driver for sonar, infrared and bumpers, in ours. Pure.
+  Converts the options of Player's `rflex` driver for sonar, infrared and bumpers to ours. Pure.
   """
   alias Player.{Poses, Units}
 

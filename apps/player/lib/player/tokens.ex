@@ -1,6 +1,6 @@
 defmodule Player.Tokens do
   @moduledoc """
-  Cuts a configuration file of the Player device server into tokens. Pure.
+  Splits a configuration file of the Player device server into tokens. Pure.
 
   A token is `{kind, line, value}`: `:word` (also `position:0`), `:number`, `:text` (in `"`),
   `:mark` (`(`, `)`, `[`, `]`), `:end`. `#` begins a remark; commas count as blanks.

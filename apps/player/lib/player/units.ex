@@ -1,6 +1,6 @@
 defmodule Player.Units do
   @moduledoc """
-  Lengths and angles of Player's configuration files in metres and radians. Pure.
+  Converts lengths and angles of Player's configuration files to metres and radians. Pure.
 
   Player 1.x writes millimetres and degrees, Player 2 and 3 metres (or the file's `unit_length`) and
   degrees or radians (`unit_angle`). Files that were taken over from the older to the newer kept

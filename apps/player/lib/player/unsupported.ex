@@ -1,5 +1,5 @@
 defmodule Player.Unsupported do
-  @moduledoc "Why drivers and sections of Player's that have no place in a robot file are left out. Pure."
+  @moduledoc "Explains why a robot file leaves out some of Player's drivers and sections. Pure."
   alias Hal.Suggest
 
   @reasons [

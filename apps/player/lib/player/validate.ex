@@ -1,7 +1,7 @@
 defmodule Player.Validate do
   @moduledoc """
-  Leaves out what a robot file cannot say, though Player's file could: each value that came over is held
-  against the table of robot files and against its driver. Pure but for asking which drivers there are.
+  Leaves out what Player's file can say but a robot file cannot: checks each imported value
+  against the schema of robot files and against its driver. Pure, except that it looks up drivers.
   """
   alias Hal.Options.Type
   alias Robot.File.{Device, Schema}

@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour do
   @moduledoc """
   A behaviour turns what a robot perceives into a wish, one tick (100 ms) at a time. Pure: no
-  clock, no process, no chance; time is `percept.at_ms`.
+  clock, no process, no random numbers; time is `percept.at_ms`.
 
   A running behaviour is a pair `{module, state}`, so that behaviours can hold, start and combine
   others (`Robot.Behaviour.Sequence`, `.Parallel`, `.Fsm`, …). It goes on until it reports an

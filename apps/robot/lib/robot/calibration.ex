@@ -1,6 +1,7 @@
 defmodule Robot.Calibration do
   @moduledoc """
-  From what a robot's wheels said and what a person measured to what is wrong with its odometry. Pure.
+  Estimates the errors of a robot's odometry from what its wheels reported and what a person
+  measured. Pure.
 
   What is wrong are the three numbers of `Robot.Calibration.Model`: the distance is found by driving straight
   (`distance/1`), the base by turning (`angle/2`) and finer by squares, the ratio of the wheels by squares.

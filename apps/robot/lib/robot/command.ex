@@ -1,7 +1,7 @@
 defmodule Robot.Command do
   @moduledoc """
-  What a person may tell a robot in words, after the thesis's colon notation (R24, R25): keyword and
-  arguments, case does not matter. Pure; never makes an atom of what it reads, and never raises.
+  Text commands from a person to a robot, in the thesis's colon notation (R24, R25): keyword and
+  arguments, case-insensitive. Pure; never creates atoms from its input, and never raises.
 
   | text | command |
   |---|---|

@@ -1,6 +1,6 @@
 defmodule Robot.Devices do
   @moduledoc """
-  What a robot senses and acts with, each beside the others, so that each falls alone:
+  The supervisor of a robot's sensors and actuators, side by side, so that each crashes alone:
 
       Robot.Devices (one_for_one)
       |-- Vision.BlobDetector  the newest frame to blobs (only with a camera)
@@ -11,12 +11,13 @@ defmodule Robot.Devices do
       |-- Hal.Device :ptz      --> board, and where the camera looked --> eye
       `-- Hal.Device :camera   --> eye --> board, and --> view
 
-  The eye is here, and not above the gate, because a picture that it falls over must not take the
-  executive along: the blobs on the board grow old, and the robot drives on.
+  The eye is here, and not above the gate, because a picture that crashes it must not restart the
+  executive: the blobs on the board grow old, and the robot drives on.
 
-  The budget, 200 restarts in 5 s, lies above what poisoned input can cause: a camera gives at
-  most 30 pictures a second for the eye to fall over, and a device rests half a second before it
-  falls. Whoever falls more often has something that no restart cures, and the robot goes down with it.
+  The budget, 200 restarts in 5 s, is above what bad input can cause: a camera gives at most 30
+  pictures a second that could crash the blob detector, and a device waits half a second before it
+  exits. A child that crashes more often has a fault that no restart cures, and the robot goes
+  down with it.
   """
   use Supervisor
   alias Robot.{Board, Config, Names}

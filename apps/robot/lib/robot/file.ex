@@ -1,8 +1,8 @@
 defmodule Robot.File do
   @moduledoc """
-  One file says what one robot is: `config/robots/mag1.exs`. It is Elixir data, one list of keys,
-  and is read, never run (`Robot.File.Reader`); `config/robots/template.exs` shows all keys, the
-  table of them is `Robot.File.Schema`.
+  One file describes one robot: `config/robots/mag1.exs`. It is Elixir data, one list of keys, and
+  is read, never run (`Robot.File.Reader`); `config/robots/template.exs` shows all keys;
+  `Robot.File.Schema` is their table.
 
       {:ok, file} = Robot.File.load("config/robots/mag1.exs")
       {:ok, config} = Robot.File.config(file)

@@ -1,8 +1,8 @@
 defmodule Robot.Localiser do
   @moduledoc """
-  Where a robot is, and how sure that is: odometry from its start pose, corrected by what it sees of things whose
-  places it was told (`Robot.Localiser.Anchors`). Pure; the filter is `Robot.Localiser.Belief`, what it is told of
-  pictures is the matter of `Robot.Localiser.Sightings`.
+  Where a robot is, and how sure that is: odometry from its start pose, corrected by sightings of
+  objects whose places it was told (`Robot.Localiser.Anchors`). Pure; the filter is
+  `Robot.Localiser.Belief`, and `Robot.Localiser.Sightings` turns pictures into corrections.
 
   Corrections run one way, from the leader down, so that no robot ever corrects itself by its own echo.
 

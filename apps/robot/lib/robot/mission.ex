@@ -1,8 +1,8 @@
 defmodule Robot.Mission do
   @moduledoc """
-  What a robot is up to over minutes: a pure state machine, run (`Robot.Mission.Runner`) by `Robot.Control.Pilot`
-  in real time and by simulations in lockstep. It sends nothing, keeps no timers and reads no clock: deadlines are
-  integers, compared with `percept.at_ms` at each tick.
+  What a robot does over minutes: a pure state machine, run (`Robot.Mission.Runner`) by
+  `Robot.Control.Pilot` in real time and by simulations in lockstep. It sends nothing, keeps no
+  timers and reads no clock: deadlines are integers, compared with `percept.at_ms` at each tick.
 
   A stop is not for the mission: the pilot ends it, and hands it nothing more. What is left of it for the
   next start, if anything, is what `c:halted/1` says.

@@ -1,7 +1,7 @@
 defmodule Robot.Names do
   @moduledoc """
-  Names the parts of all robots of this node: a `Registry` keyed `{robot, role}`, so that any
-  number of robots live beside each other, and no name is made up at run time.
+  Names the processes of all robots of this node: a `Registry` keyed `{robot, role}`, so that any
+  number of robots can run on one node, and no atom is created at run time.
 
   Roles: `:robot` (the supervisor), `:board`, `:drive`, `:ptz`, `:camera`, `:eye`, `:view`, `:saver`, `:gate`,
   `:executive`, `:pilot`, and what companions call themselves.

@@ -1,7 +1,7 @@
 defmodule Sim.Compute do
   @moduledoc """
-  The heavy work of a world: distance fields, sonar rays, camera pictures. In C where the library was
-  built, else in Elixir; both give the same bits, because every operation is an addition,
+  The heavy work of a world: distance fields, sonar rays, camera pictures. In C if the library was
+  built, otherwise in Elixir; both give the same bits, because every operation is an addition,
   multiplication, division or square root of doubles in the same order.
   """
   alias Sim.Compute

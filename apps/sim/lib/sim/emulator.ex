@@ -1,8 +1,8 @@
 defmodule Sim.Emulator do
   @moduledoc """
-  An emulated device (`Sim.Emulator.Core`) on a pseudo-terminal, with a body: what the device at one end of the
-  line wants, the body does, and what the body feels, the device knows. At the other end, the link, a driver
-  finds it as it would find the real one.
+  An emulated device (`Sim.Emulator.Core`) on a pseudo-terminal, with a body: the body does what
+  the device wants, and the device knows what the body feels. At the other end, the link, a driver
+  finds it like a real device.
 
   | option | meaning |
   |---|---|

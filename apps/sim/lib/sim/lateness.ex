@@ -1,7 +1,7 @@
 defmodule Sim.Lateness do
   @moduledoc """
-  How late a message is, between two clocks that are not set by each other: later than the quickest
-  one so far. Pure; times in milliseconds.
+  Estimates the delay of messages between two unsynchronised clocks, relative to the fastest
+  message so far. Pure; times in milliseconds.
 
   What was held up on its way, as for a process that was frozen, comes all at once, and is old by
   then. The quickest way is forgotten slowly, 1 ms in 20 messages, so that clocks may drift.

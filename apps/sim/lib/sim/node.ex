@@ -1,6 +1,6 @@
 defmodule Sim.Node do
   @moduledoc """
-  The main program of a process of the operating system that holds one robot, or the world, of a
+  The main program of an operating-system process that runs one robot, or the world, of a
   `Sim.Fleet.Nodes`.
 
   Its first line of standard input is its whole configuration (`Sim.Node.Config`), so that nothing of it is

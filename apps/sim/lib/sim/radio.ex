@@ -1,6 +1,7 @@
 defmodule Sim.Radio do
   @moduledoc """
-  A radio that delays, loses, repeats and is cut in two, all from a seed. Pure.
+  A radio that delays, loses and duplicates messages, and can be partitioned, all from a seed.
+  Pure.
 
   What becomes of a message depends on its number alone, so the same sends give the same
   deliveries, in the order of their time and then of their number. Every copy is its own draw:

@@ -1,6 +1,6 @@
 defmodule Sim.Scene do
   @moduledoc """
-  What a viewer is shown ten times a second: a whole fleet at one instant, seen from outside.
+  A snapshot of a whole fleet, seen from outside, which viewers get ten times a second.
 
   The lockstep run and the live fleet both give it, so the terminal, the page and the picture
   draw either. Poses are true ones, in metres and radians, in the frame `map`; `at_ms` counts

@@ -1,7 +1,7 @@
 defmodule Sim.Trial do
   @moduledoc """
-  A whole mission as a function: members, radio and world folded in lockstep, as fast as it goes,
-  the same to the byte for one seed. No process, no clock.
+  A whole mission as a function: members, radio and world folded in lockstep, as fast as possible,
+  identical to the byte for the same seed. No process, no clock.
 
   Every 50 ms, in this order: radio, sense, think (every 100 ms, with a new picture), reflex, act.
   `step/1` is 100 ms. What happens on purpose (landmark moved, robots killed) is `Sim.Trial.Scenario`;

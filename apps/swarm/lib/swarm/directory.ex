@@ -1,7 +1,8 @@
 defmodule Swarm.Directory do
   @moduledoc """
-  Who is where: groups of processes over all connected nodes, on `:pg`. Groups hold robots (their
-  links), not nodes, so that a hundred robots on one node or on a hundred look alike.
+  Finds robots: groups of processes over all connected nodes, on `:pg`. Groups contain robots
+  (their comms processes), not nodes, so that a hundred robots look alike on one node or on a
+  hundred.
 
   | group | holds |
   |---|---|

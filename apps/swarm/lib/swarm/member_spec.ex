@@ -1,7 +1,7 @@
 defmodule Swarm.MemberSpec do
   @moduledoc """
-  A robot from its file, as a member of a fleet: `Robot.File` says what it is, this adds its mission and
-  its link. Pure.
+  Makes a robot from its file a member of a fleet: `Robot.File` describes the robot, this adds its
+  mission and its comms. Pure.
 
       {:ok, file} = Robot.File.load("config/robots/mag1.exs")
       {:ok, config} = Swarm.MemberSpec.config(file)

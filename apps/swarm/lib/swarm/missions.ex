@@ -5,7 +5,7 @@ defmodule Swarm.Missions do
 
       config :swarm, missions: [landmark: Missions.Landmark]
 
-  A robot whose file names no mission begins the first of them at a start.
+  A robot whose file names no mission starts the first of them.
   """
 
   @doc "The mission of this name; an error is one line."

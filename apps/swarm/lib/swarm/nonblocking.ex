@@ -1,8 +1,8 @@
 defmodule Swarm.Nonblocking do
   @moduledoc """
-  How one process sends to another that may be on another node: so that nothing ever waits for a
-  node that has gone silent. Without these options a send waits for a full buffer, or dials a node
-  that is gone. What cannot be sent now is lost.
+  Sends to processes that may be on another node, without ever waiting for a node that has gone
+  silent. Without these options a send waits for a full buffer, or dials a node that is gone. What
+  cannot be sent now is lost.
   """
 
   @doc "Casts to a `GenServer`, wherever it is."

@@ -1,6 +1,6 @@
 defmodule Swarm.Supervisor do
   @moduledoc """
-  What a node has one of, however many robots live on it.
+  The processes of which a node has one each, however many robots run on it.
 
       Swarm.Supervisor (no restarts to give)
       |-- Robot.Names            who is who on this node

@@ -1,7 +1,7 @@
 defmodule Vision.BlobDetector do
   @moduledoc """
-  The process that makes blobs of frames. It works on the newest frame only: older ones that
-  wait in its mailbox are dropped, so it never falls behind its camera.
+  The process that finds blobs in frames. It works on the newest frame only: older ones in its
+  mailbox are dropped, so it never lags behind its camera.
 
   Options:
 

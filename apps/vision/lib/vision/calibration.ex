@@ -1,6 +1,6 @@
 defmodule Vision.Calibration do
   @moduledoc """
-  The limits of a colour from places in a picture that show it. Pure.
+  Derives the limits of a colour from places in a picture that show it. Pure.
 
   A box that a person draws has other things in it: background in its corners, glare, a shadowed edge. So:
 

@@ -1,7 +1,8 @@
 defmodule Vision.Jpeg do
   @moduledoc """
-  How ffmpeg is told to make JPEG pictures of raw frames that come on its input, one for one, and how its
-  output is read: a stream of parts, each with its length. Pure; `Vision.Jpeg.Encoder` runs it.
+  The arguments with which ffmpeg encodes raw frames on its input as JPEG, one for one, and the
+  parser of its output: a stream of parts, each with its length. Pure; `Vision.Jpeg.Encoder` runs
+  it.
 
   The chroma is kept as fine as the frame has it, and so is the full range: it is what JPEG is made for.
   """

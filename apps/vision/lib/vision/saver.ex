@@ -1,7 +1,8 @@
 defmodule Vision.Saver do
   @moduledoc """
-  Keeps pictures of a camera in a folder (R103): one more viewer of `Vision.View`, which writes what it gets.
-  The newest are kept, the oldest go (`Vision.Saver.Retention`); what else lies in the folder is left alone.
+  Keeps pictures of a camera in a folder (R103): a viewer of `Vision.View` that writes what it
+  receives. The newest are kept, the oldest deleted (`Vision.Saver.Retention`); other files in the
+  folder are left alone.
 
   Options:
 

@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Blocker do
   @moduledoc """
-  What keeps a follower from its slot, by what it knows of the things about it. Pure.
+  Finds what keeps a follower from its slot, from what it knows about its surroundings. Pure.
 
   | blocker | is |
   |---|---|

@@ -1,9 +1,9 @@
 defmodule Missions.Landmark.Challenge do
   @moduledoc """
-  When a follower asks for a new leader (R76): it sees the landmark nearer than the leader does, by
-  0.5 m or a fifth of the distance, for 2 s; or the leader has not seen it for 3 s while this robot
-  does. No leader is challenged in its first 10 s, so that leadership cannot swing to and fro; and
-  as long as the landmark has not moved, a robot that passes it on the way to its slot is no
+  Decides when a follower asks for a new leader (R76): it sees the landmark nearer than the leader
+  does, by 0.5 m or a fifth of the distance, for 2 s; or the leader has not seen it for 3 s while
+  this robot does. No leader is challenged in its first 10 s, so that leadership cannot oscillate;
+  and as long as the landmark has not moved, a robot that passes it on the way to its slot is no
   challenger. Pure.
   """
   alias Swarm.Membership.Peers

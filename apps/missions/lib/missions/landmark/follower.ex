@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.Follower do
   @moduledoc """
-  What a follower does: drive to its slot, keep an eye on what it can correct its pose by, and
-  pass the anchor on to its child. Pure.
+  What a follower does: it drives to its slot, watches what it can correct its pose by, and passes
+  the reference on to its child. Pure.
 
   Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard). Meanwhile
   it looks at the landmark, since the next it may be asked for is how large it sees it.

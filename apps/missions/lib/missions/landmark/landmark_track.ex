@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.LandmarkTrack do
   @moduledoc """
-  What a robot knows of the landmark by its own eyes: how large it sees it, and where it stands
-  (map frame). Pure.
+  What a robot knows about the landmark from its own camera: its apparent size, and its place (map
+  frame). Pure.
   """
   alias Hal.Pose
   alias Robot.Percept

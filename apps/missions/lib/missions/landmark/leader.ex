@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.Leader do
   @moduledoc """
-  What the leader does besides tracking the landmark: it tells where it is supposed to be (the
-  anchor), keeps the order of the slots whole when robots go and come, and judges whether the
+  What the leader does besides tracking the landmark: it announces where it is supposed to be (the
+  reference), maintains the order of the slots when robots leave and join, and judges whether the
   shape is formed. Pure.
   """
   alias Robot.Behaviour

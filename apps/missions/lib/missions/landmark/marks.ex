@@ -1,8 +1,8 @@
 defmodule Missions.Landmark.Marks do
   @moduledoc """
-  What a follower finds its pose by: the leader's frame, the landmark as the leader told it, and the robots
-  ahead of it in the order where they say they are, each as sure as it says. And when that makes it sure
-  enough to say that it is in its place. Pure.
+  What a follower corrects its pose by: the leader's frame, the landmark at the place that the
+  leader reports, and the robots ahead of it in the order at their reported places, each with its
+  reported uncertainty. Also decides when the pose is sure enough to claim a slot. Pure.
 
   Only those ahead in the order, so that corrections run one way, from the leader down. All others may be seen, too,
   and must not be taken for one of these.

@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Merge do
   @moduledoc """
-  What becomes of two leaders that meet, as when a network that was cut is mended. Pure.
+  Decides which leader stays when two meet, for example after a network partition. Pure.
 
   They hold one round, for an epoch after both, in which each reports how many robots it leads; its
   record makes the leader of the largest part lead all (`Swarm.Agreement.Election`). The one that will

@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.ReferenceInbox do
   @moduledoc """
-  Whose anchor a robot believes, and when it joins a leader who names it. Pure.
+  Decides whose reference a robot accepts, and when it joins a leader that lists it. Pure.
   """
   alias Swarm.Agreement.Round
   alias Swarm.Formation.Reference

@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Shape do
   @moduledoc """
-  The leader's choice of a shape that there is room for. Pure.
+  The leader's choice of a shape that fits the free space. Pure.
 
   The shape is the one asked for as long as that goes. Slots that a dead robot's body takes away
   are left out. When followers say that their slots are blocked, and all others stand in theirs, the

@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.SlotPoses do
   @moduledoc """
-  From the leader's anchor to the place of one robot: its slot in the map frame, and how fast that
-  slot moves. Pure.
+  Computes one robot's slot from the leader's reference: its pose in the map frame, and its
+  velocity. Pure.
 
   A robot follows where the leader is supposed to be (R53): the anchor's pose carried on by its
   speed for as long as it has been under way, half a second at most.

@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.State do
   @moduledoc """
-  What one robot keeps of the landmark mission between two events, and what all parts of the
-  mission ask of it. Pure. The parts' own states are under `lead`, `attend`, `round`, `sight`.
+  The state of the landmark mission in one robot, and the questions that all parts of the mission
+  ask of it. Pure. The parts' own states are under `lead`, `attend`, `round`, `sight`.
   """
   alias Hal.{Pose, Twist}
   alias Missions.Landmark.LandmarkTrack

@@ -1,7 +1,7 @@
 defmodule Mix.Tasks.Robot.Import do
   @shortdoc "Makes a robot file of a Player configuration"
   @moduledoc """
-  Makes a robot file of a configuration of the Player device server, 1.x or later.
+  Converts a configuration of the Player device server, 1.x or later, into a robot file.
 
       mix robot.import FILE [-o OUT] [options]
 

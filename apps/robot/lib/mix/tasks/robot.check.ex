@@ -1,14 +1,14 @@
 defmodule Mix.Tasks.Robot.Check do
   @shortdoc "Checks robot files, and says what each robot is"
   @moduledoc """
-  Checks robot files, and says what each robot is: how fast it may go, how far it needs to stop, what it
-  feels, when its wheels turn.
+  Checks robot files, and summarises each robot: its speeds, its stopping distance, its sensors,
+  when its wheels may turn.
 
       mix robot.check [FILE…]
 
-  Without a FILE, all of `config/robots`. All that is wrong is said at once, each problem on a line
-  `file:line: key: what is allowed`; the exit status is then 1. What is allowed and odd is a WARNING, with
-  what would be usual. `docs/robots.md` tells of the keys.
+  Without a FILE, all of `config/robots`. It reports all errors at once, each on a line
+  `file:line: key: what is allowed`; the exit status is then 1. An allowed but unusual value gets
+  a WARNING, with the usual value. `docs/robots.md` describes the keys.
 
   Options:
 

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Avoid do
   @moduledoc """
-  Lets another behaviour run, and bends or slows what it wishes so that nobody is touched (R85).
+  Runs another behaviour, and bends or slows its wishes so that the robot touches nothing (R85).
 
   A wish with a velocity is bent: round standing robots and discs on the shortest way
   (`.Way`), past moving ones by `Robot.Navigation.Orca`, a little to the right of those who come, and

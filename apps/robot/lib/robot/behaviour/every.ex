@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.Every do
   @moduledoc """
-  Runs another behaviour again and again (R11): a fresh one each `period_ms`, or as soon as the
-  last one has ended, whichever is later. Never ends by itself.
+  Runs another behaviour repeatedly (R11): a new one each `period_ms`, or as soon as the last one
+  has ended, whichever is later. Never ends by itself.
 
   Options: `start`, `{module, options}` of the behaviour (required); `period_ms` (default 0: at once).
   """

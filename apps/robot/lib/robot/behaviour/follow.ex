@@ -1,9 +1,9 @@
 defmodule Robot.Behaviour.Follow do
   @moduledoc """
-  Takes and keeps a place that may move, as a slot of a formation does (R34, R49): goes with the
-  place's own velocity and adds what closes the gap. In place it turns to the target's heading
-  and stands; it leaves again only when it is clearly off, so that it never chatters. It has no
-  outcome: following ends when it is told something else.
+  Drives to a place that may move, such as a slot of a formation, and keeps to it (R34, R49): it
+  matches the place's velocity and adds a correction that closes the gap. In place, it turns to
+  the target's heading and stands; it moves again only when it is clearly off, so that it never
+  chatters. It has no outcome: following ends when it is told something else.
 
   Options: `target` (`Hal.Pose`, required), `velocity` of the target (`{vx, vy}`, map frame, m/s,
   default still), `tolerance` (metres, default 0.06), `leave` (metres off before it moves again,

@@ -1,8 +1,8 @@
 defmodule Robot.Behaviour.Goto do
   @moduledoc """
   Goes to a place and, when asked to, turns to a heading there (R33). It turns until it points at
-  the place, drives, and turns again only when it points clearly aside: two thresholds, so that it
-  does not chatter between both.
+  the place, drives, and turns again only when it points clearly away: two thresholds prevent
+  chattering between the two.
 
   Options: `x`, `y` (map frame, metres, required), `heading` (radians, default none), `tolerance`
   (metres, default 0.1), `heading_tolerance` (radians, default 0.05), `speed` (m/s, default the

@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.Once do
   @moduledoc """
-  Runs a function of the percept once and ends with the outcome it gives (R11): for checks and
-  for choosing between ways. Options: `run`, `(Robot.Percept.t() -> integer)` (required).
+  Runs a function of the percept once and ends with the outcome it gives (R11): for checks and for
+  choosing between behaviours. Options: `run`, `(Robot.Percept.t() -> integer)` (required).
   """
   @behaviour Robot.Behaviour
   alias Hal.Options

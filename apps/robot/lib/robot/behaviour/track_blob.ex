@@ -1,6 +1,7 @@
 defmodule Robot.Behaviour.TrackBlob do
   @moduledoc """
-  Keeps a coloured thing in view and at its distance (R36, R37, R82): the leader's errand. Never ends.
+  Keeps a coloured object in view and at a distance (R36, R37, R82), as the leader does with the
+  landmark. Never ends.
 
   The camera follows the thing. The body turns only when the camera is more than 30 degrees off
   its middle, and then until the thing is ahead, gently as soon as the camera is within these; or

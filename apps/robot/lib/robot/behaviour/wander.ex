@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.Wander do
   @moduledoc """
-  Drives about without an aim: straight on, and away from what comes near. Which way it turns in
-  the open follows from its name and the time, so that it is repeatable. Never ends.
+  Wanders without a goal: straight on, and away from what comes near. In open space, the direction
+  of its turns follows from its name and the time, so that it is repeatable. Never ends.
 
   Options: `speed` (m/s, default 0.3).
   """

@@ -1,7 +1,8 @@
 defmodule Robot.Calibration.Drive do
   @moduledoc """
-  The mission of a robot that is calibrated: it drives one course (`Robot.Behaviour.DriveCourse`) and
-  stands. Options: those of the course. Its phase is `:driving`, then `:done` or `:blocked`. Pure.
+  The mission of a robot under calibration: it drives one course (`Robot.Behaviour.DriveCourse`)
+  and stands. Options: those of the course. Its phase is `:driving`, then `:done` or `:blocked`.
+  Pure.
 
   Legs for what is measured: `legs/1`.
   """

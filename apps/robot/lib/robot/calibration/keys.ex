@@ -1,6 +1,6 @@
 defmodule Robot.Calibration.Keys do
   @moduledoc """
-  What a calibration makes of the conversions of a robot file. Pure.
+  Applies a calibration to the conversions of a robot file. Pure.
 
   With units per metre and radian, a base that goes further than it tells has fewer units a metre, and
   one whose wheels stand wider apart has more of them a radian:

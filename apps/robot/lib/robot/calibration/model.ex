@@ -1,6 +1,6 @@
 defmodule Robot.Calibration.Model do
   @moduledoc """
-  A base whose odometry is wrong about its wheels. Pure.
+  A model of a base whose odometry has errors in its wheels. Pure.
 
   Three numbers, each 1.0 for wheels that are what the robot takes them for:
 

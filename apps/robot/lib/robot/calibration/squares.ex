@@ -1,7 +1,7 @@
 defmodule Robot.Calibration.Squares do
   @moduledoc """
-  What squares say: the formulas of UMBmark, and from there on least squares with the whole model of the
-  wheels. Pure.
+  Estimates wheel errors from driven squares: starts with the formulas of UMBmark, then fits the
+  whole model of the wheels by least squares. Pure.
 
   The unknowns are the factor of the base and the wheel ratio; what is compared are the centres of gravity of
   the return errors of both directions, with where `Robot.Calibration.Model.predict/4` has them.

@@ -1,7 +1,7 @@
 defmodule Robot.Command.Arguments do
   @moduledoc """
-  The words a command is made of: numbers, names of robots and colours, and the nearest known word
-  to one mistyped. Pure; nothing read ever becomes an atom.
+  Arguments of text commands: numbers, names of robots and colours, and suggestions for mistyped
+  words. Pure; no input ever becomes an atom.
   """
 
   # Farther than this is not a place, speed or size of ours.

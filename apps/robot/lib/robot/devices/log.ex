@@ -1,9 +1,10 @@
 defmodule Robot.Devices.Log do
   @moduledoc """
-  What the log says of a robot: a line when a device is offline, with the reason in words, when it is back,
-  when wheels are disarmed without a person's doing, when a bumper stays pressed, when a behaviour or a mission hangs, when
-  pictures cannot be saved, when the emergency stop would not outlive the machine, and when another robot has the name.
-  Once a change: a device that is tried again and again says nothing new.
+  Writes a robot's log: a line when a device is offline, with the reason in words, when it is
+  back, when wheels are disarmed without a person's doing, when a bumper stays pressed, when a
+  behaviour or a mission hangs, when pictures cannot be saved, when the emergency stop would not
+  outlive the machine, and when another robot has the name. Once a change: a device that is tried
+  again and again says nothing new.
   """
   require Logger
   alias Hal.Event

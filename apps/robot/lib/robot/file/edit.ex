@@ -1,6 +1,7 @@
 defmodule Robot.File.Edit do
   @moduledoc """
-  Changes numbers in the text of a robot file and nothing else: remarks, order and layout stay. Pure.
+  Changes numbers in the text of a robot file and nothing else: comments, order and layout stay.
+  Pure.
   """
   alias Robot.File.Reader
 

@@ -1,7 +1,7 @@
 defmodule Robot.File.Odd do
   @moduledoc """
-  What is allowed in a robot file, and seldom meant: each a line that names the key, and what would be usual.
-  A person should look before 40 kg move. Pure.
+  Warns of values in a robot file that are allowed but seldom intended: each warning names the key
+  and the usual value. A person should look before 40 kg move. Pure.
   """
   alias Hal.{Pose, Profile}
   alias Robot.File.Device

@@ -1,6 +1,6 @@
 defmodule Robot.File.Reader do
   @moduledoc """
-  Reads a robot file as data: Elixir's notation for values, of which nothing is run. Pure.
+  Reads a robot file as data: Elixir's notation for values, none of which is executed. Pure.
 
   | may be written | becomes |
   |---|---|

@@ -1,6 +1,6 @@
 defmodule Robot.File.Summary do
   @moduledoc """
-  What a person wants to see of a robot file before 40 kg move. Pure.
+  Summarises a robot file for a person, before 40 kg move. Pure.
   """
   alias Hal.{Pose, Profile}
   alias Robot.File.{Device, Odd}

@@ -1,6 +1,7 @@
 defmodule Robot.Localiser.Anchors do
   @moduledoc """
-  What a mission tells the localiser to find its pose by: in whose frame, and which things are where. Pure data.
+  What a mission tells the localiser to correct the pose by: the frame, and the places of known
+  objects. Pure data.
 
   The frame is that of a robot that nobody corrects, the leader: what it believes of its own pose is so by definition,
   and what it is unsure of, all others are unsure of: when they come into its frame, of its pose in the one that it was in

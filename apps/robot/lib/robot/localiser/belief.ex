@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Belief do
   @moduledoc """
-  A pose and how sure one is of it: an extended Kalman filter, moved by odometry and corrected by one
+  A pose and its uncertainty: an extended Kalman filter, moved by odometry and corrected by one
   scalar measurement after another. Pure.
 
   Its states are x, y and heading, and what makes them wrong again and again:

@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Consistency do
   @moduledoc """
-  Whether a whole picture can have been taken from where a robot believes that it is. Pure.
+  Tests whether a whole picture is consistent with the estimated pose. Pure.
 
   A filter that took one robot for another is wrong and sure of itself: from then on it matches what happens to fit and has no
   use for the rest. But the rest is in the picture: robots where none can be, or none where one must be.

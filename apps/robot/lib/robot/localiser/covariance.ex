@@ -1,6 +1,7 @@
 defmodule Robot.Localiser.Covariance do
   @moduledoc """
-  A covariance matrix as a list of its rows, and what an extended Kalman filter does with it. Pure.
+  A covariance matrix as a list of its rows, and the operations of an extended Kalman filter on
+  it. Pure.
 
   Sizes stay below 20, so that lists are as fast as anything.
   """

@@ -1,6 +1,7 @@
 defmodule Robot.Localiser.Frame do
   @moduledoc """
-  What becomes of a belief in the frame of somebody else, who may be unsure of its own pose, or slip. Pure.
+  Transforms a belief into another robot's frame, whose own pose may be uncertain or drifting.
+  Pure.
   """
   alias Hal.Pose
   alias Robot.Localiser.{Belief, Covariance}

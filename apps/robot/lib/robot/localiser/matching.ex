@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Matching do
   @moduledoc """
-  Which blob is which robot: data association for things that all look the same. Pure.
+  Data association: decides which blob is which robot, though all look the same. Pure.
 
   A blob can be a robot where it is seen about there and about as wide as that robot would be. Where a
   blob could well be several robots, or a robot several blobs, nothing is said. A blob that is wider is that of

@@ -1,7 +1,7 @@
 defmodule Robot.Localiser.Sightings do
   @moduledoc """
-  What one picture says of a robot's pose: corrections of its belief by the things that are seen whose places it was
-  told. Pure.
+  Derives corrections of a robot's belief from one picture, by the visible objects whose places it
+  was told. Pure.
 
   Things are seen in a direction and, where nothing hides a part of them, at a distance: the landmark by its size, a
   robot by its width. The landmark comes first: turned right by it, a robot knows better which robot is which

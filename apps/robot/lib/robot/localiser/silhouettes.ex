@@ -1,6 +1,7 @@
 defmodule Robot.Localiser.Silhouettes do
   @moduledoc """
-  Where along the line on which it is least sure of itself a robot sees what it sees: all robots at once. Pure.
+  Searches along a robot's line of greatest uncertainty for the place where the silhouettes of all
+  robots together fit its picture. Pure.
 
   Who comes into another's frame may be off by a metre across its line of sight, and turned with it. Seen from there,
   the robots ahead of it are one wide blob, perhaps cut by the picture's border, and none of them can be told

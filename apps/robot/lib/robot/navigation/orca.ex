@@ -1,8 +1,8 @@
 defmodule Robot.Navigation.Orca do
   @moduledoc """
-  Optimal reciprocal collision avoidance (van den Berg, Guy, Lin and Manocha 2011): which velocities
-  lead to no contact within a time, when the others do their share, and the one nearest to the wished.
-  Pure; metres, seconds, map frame.
+  Optimal reciprocal collision avoidance (van den Berg, Guy, Lin and Manocha 2011): which
+  velocities avoid contact for some time if the others do their share, and which of them is
+  nearest to the desired one. Pure; metres, seconds, map frame.
 
   A half plane `{{nx, ny}, offset}` allows the velocities with `n . v >= offset`.
   """

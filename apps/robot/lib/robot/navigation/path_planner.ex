@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.PathPlanner do
   @moduledoc """
-  The shortest way round standing discs. Pure; metres.
+  The shortest path around standing discs. Pure; metres.
 
   A lazy visibility search: it looks straight at the goal, and only where a disc is in the way
   does it think about that disc, whose rim it takes as a polygon. So an open way costs one

@@ -1,6 +1,7 @@
 defmodule Robot.Navigation.Steering do
   @moduledoc """
-  From a planar velocity to the two speeds of a differential drive, and how fast to approach. Pure.
+  Converts a planar velocity to the two speeds of a differential drive, and limits the speed of
+  approach. Pure.
 
   Turning comes before driving: beyond 60 degrees of error the robot turns on the spot, nearer to
   the wanted direction it drives the faster the better it points there. Both speeds are chosen so

@@ -1,6 +1,7 @@
 defmodule Robot.Percept.Sighting do
   @moduledoc """
-  From a blob in a picture to a direction and a place: pinhole camera, landmarks upright. Pure.
+  Computes a direction and a place from a blob in a picture: pinhole camera, upright landmarks.
+  Pure.
 
   A picture is old when it is looked at: the robot has turned meanwhile. So `of/3` first takes the
   direction to the map by the pose at exposure, and then looks at it from the present pose.

@@ -1,6 +1,7 @@
 defmodule Robot.Percept.Snapshot do
   @moduledoc """
-  Takes a percept from the board: what every part of the robot last wrote, unless it is too old.
+  Takes a percept from the board: the newest value of each part of the robot, unless it is too
+  old.
 
   | reading | too old after |
   |---|---|

@@ -1,5 +1,7 @@
 defmodule Sim.Compute.Columns do
-  @moduledoc "One column of a picture at a time, in plain Elixir: the meaning of `paint.c`. Pure."
+  @moduledoc """
+  One column of a picture at a time, in plain Elixir: the reference for `paint.c`. Pure.
+  """
   alias Sim.Compute.Rays
 
   @nearest 0.01

@@ -1,5 +1,5 @@
 defmodule Sim.Compute.Rays do
-  @moduledoc "Rays among walls and discs, in plain Elixir: the meaning of `rays.c`. Pure."
+  @moduledoc "Rays among walls and discs, in plain Elixir: the reference for `rays.c`. Pure."
 
   @doc "The range of one sonar before noise: the nearest of the five rays of its cone, at most the ring's greatest."
   @spec sensor(tuple(), [Sim.Compute.disc()], Sim.Compute.ring(), binary()) :: float()

@@ -1,7 +1,7 @@
 defmodule Sim.Fleet.Folder do
   @moduledoc """
-  A run's own folder among the temporary ones, which only this user can read. It goes with the run, and what runs left
-  behind that were killed goes with the next one.
+  A run's own temporary folder, which only this user can read. It is removed with the run; the
+  next run removes what killed runs left behind.
   """
 
   @doc "Makes one."

@@ -1,7 +1,7 @@
 defmodule Sim.Fleet.Mission do
   @moduledoc """
-  What the option `mission:` of a fleet means: `true` for the mission of its setup, `false` for the same, but
-  not begun, `{module, options}` for another `Robot.Mission`, begun. Pure, but that it loads the module.
+  The option `mission:` of a fleet: `true` starts the mission of its setup, `false` does not start
+  it, `{module, options}` starts another `Robot.Mission`. Pure, except that it loads the module.
   """
   alias Sim.Trial.Setup
 

@@ -1,7 +1,7 @@
 defmodule Sim.Fleet.Said do
   @moduledoc """
-  What robots of a live fleet have said of themselves that their claims must show before it is told: that one leads, that
-  its fleet is formed. Pure.
+  Holds back announcements of a live fleet (one leads, its fleet is formed) until the robots'
+  claims show them. Pure.
 
   A robot tells a stage by an event, and claims the same on its board, which the fleet looks at ten times a second. Told
   at once, the stage would be on the screen while the run log still says the opposite. So it waits for the claim. One that no claim

@@ -1,6 +1,6 @@
 defmodule Sim.Floorplan.Drawing do
   @moduledoc """
-  The maps that come along, drawn with cells of 5 cm for a fleet of a certain size. Pure.
+  The built-in maps, drawn with cells of 5 cm for a fleet of a certain size. Pure.
 
   Each has free space round its centre for a column of the whole fleet at 1 m spacing in any direction,
   and 3 m to drive round its end.

@@ -1,6 +1,6 @@
 defmodule Sim.Floorplan.Starts do
   @moduledoc """
-  Where a fleet is switched on: spread in the room of a map, from a seed. Pure.
+  The start poses of a fleet: spread over the free area of a map, from a seed. Pure.
 
   Each robot has a straight free way to the landmark or to one placed before it, so that nobody is shut
   in another room of a strange map. The middle of the room is tried first, then all of it.

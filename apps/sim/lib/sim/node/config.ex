@@ -1,5 +1,5 @@
 defmodule Sim.Node.Config do
-  @moduledoc "What a node of a fleet is told at its start, as one line of text and back. Pure."
+  @moduledoc "The configuration of a fleet's node, encoded as one line of text and decoded. Pure."
 
   @enforce_keys [:node, :launcher, :mesh, :part]
   defstruct @enforce_keys

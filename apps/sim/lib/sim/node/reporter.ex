@@ -1,7 +1,8 @@
 defmodule Sim.Node.Reporter do
   @moduledoc """
-  Tells a fleet's launcher what its part says of itself, ten times a second, and each stage of a robot
-  of this node. A launcher that cannot be reached at once misses it: the next report is the newer one.
+  Reports the state of its part to a fleet's launcher, ten times a second, and each stage of a
+  robot of this node. If the launcher cannot be reached at once, the report is dropped: the next
+  one is newer.
 
   What it sends are messages `{Sim.Node.Reporter, pid, what}`, with the number of this process of the
   operating system: `{:up, facts}`, `{:report, term}`, `{:stage, about}`.

@@ -1,8 +1,8 @@
 defmodule Sim.Trial.AgreementMetrics do
   @moduledoc """
-  How well a fleet agrees, judged from outside, part by part of a radio that may be cut: two leaders
-  in one part, and for how long; after a cut is mended, when one leads all, when they are in
-  formation, and how long robots stood still for it. Pure; fed every 100 ms.
+  Measures from outside how well a fleet agrees, for each part of a partitioned radio: how long a
+  part has two leaders; after a partition heals, when one robot leads all, when they are in
+  formation, and how long robots stood still for that. Pure; fed every 100 ms.
 
   A part is where everybody can reach everybody, if need be by way of others (`Sim.Radio.parts/2`).
   """

@@ -1,7 +1,7 @@
 defmodule Sim.Trial.Claims do
   @moduledoc """
-  What each claim of `formed` was worth, judged from outside by true poses: how far the worst robot was
-  from its slot when the leader claimed it, and 5 s later. Pure; fed every 100 ms.
+  Judges each claim of `formed` from outside, by true poses: how far the worst robot was from its
+  slot when the leader claimed it, and 5 s later. Pure; fed every 100 ms.
 
   A claim is one leader's, from when it says `formed` until it says so no more. One that was withdrawn
   within the 5 s, as when the landmark moves, is judged by its beginning alone; so is one that a run

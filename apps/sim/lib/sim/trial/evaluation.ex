@@ -1,7 +1,7 @@
 defmodule Sim.Trial.Evaluation do
   @moduledoc """
-  A run judged from outside, by true poses: how far each robot is from its slot, counted from the
-  leader's true pose. Robots never see this. Pure.
+  Evaluates a run from outside, by true poses: how far each robot is from its slot, relative to
+  the leader's true pose. Robots never see this. Pure.
   """
   alias Hal.Pose
   alias Sim.{Scene, World}

@@ -1,7 +1,7 @@
 defmodule Sim.Trial.RunLog do
   @moduledoc """
-  What is written down of a run as it goes: its stages, its leaders, how long it was in formation.
-  Pure; fed every 100 ms with what the living robots claim.
+  Records a run: its stages, its leaders, how long it was in formation. Pure; fed every 100 ms
+  with what the living robots claim.
   """
 
   alias Sim.Trial.{AgreementMetrics, Claims, Stuck}

@@ -1,5 +1,8 @@
 defmodule Sim.Trial.Scenario do
-  @moduledoc "What is done to a fleet on purpose, and when. Pure; times in milliseconds."
+  @moduledoc """
+  Scheduled interventions in a run, such as moves of the landmark and kills. Pure; times in
+  milliseconds.
+  """
 
   @enforce_keys [:pending]
   defstruct @enforce_keys ++ [last_ms: 0]

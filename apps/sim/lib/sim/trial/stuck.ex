@@ -1,7 +1,7 @@
 defmodule Sim.Trial.Stuck do
   @moduledoc """
-  The invariant of every run: a follower that cannot get on says so. Judged from outside, by true poses.
-  Pure; fed once a second.
+  Checks the invariant of every run that a follower that makes no progress says so, from outside,
+  by true poses. Pure; fed once a second.
 
   A follower that neither claims to be in place, nor says that it is blocked, nor that it stands in its slot as far as
   it knows and is not sure of it, must have come nearer to its slot within 20 s. The time begins again when its slot is another one, or the shape is.

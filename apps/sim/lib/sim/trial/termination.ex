@@ -1,5 +1,5 @@
 defmodule Sim.Trial.Termination do
-  @moduledoc "When a run is over, in lockstep or live. Pure."
+  @moduledoc "Decides when a run is over, in lockstep or live. Pure."
   alias Sim.Trial.{Cuts, RunLog, Scenario}
 
   @calm_ms 5_000

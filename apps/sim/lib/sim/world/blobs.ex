@@ -1,7 +1,7 @@
 defmodule Sim.World.Blobs do
   @moduledoc """
-  The blobs that the blob finder would find in a robot's picture, from geometry alone: no pixel is
-  painted. For large fleets; the tests hold it against painting. Pure.
+  Computes the blobs of a robot's picture from geometry alone, without painting pixels. For large
+  fleets; tests compare it with painting. Pure.
   """
   alias Sim.{Compute, Noise}
   alias Sim.World.{CameraFrustum, Palette}

@@ -1,7 +1,7 @@
 defmodule Sim.World.CameraView do
   @moduledoc """
-  What a camera needs of a world, in two parts: the ground, which does not change and is sent once,
-  and what moves, a few numbers a robot. Pure.
+  What a camera needs to know about a world, in two parts: the static ground, sent once, and what
+  moves, a few numbers per robot. Pure.
 
   The map is most of a world's size. A hundred cameras look ten times a second, and some of them
   from another process of the operating system.

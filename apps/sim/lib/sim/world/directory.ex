@@ -1,7 +1,8 @@
 defmodule Sim.World.Directory do
   @moduledoc """
-  Where the worlds are: a `:pg` scope of its own, beside the robots' directory, so that simulated
-  devices find their world by name on any connected node, and a robot need not know who simulates it.
+  The directory of worlds: a `:pg` scope of its own, beside the robots' directory, so that
+  simulated devices find their world by name on any connected node, and a robot need not know what
+  simulates it.
   """
 
   @doc "The scope as a child."

@@ -1,7 +1,7 @@
 defmodule Sim.World.Palette do
   @moduledoc """
-  The colours of the simulated things: what they are painted with, what the blob finder
-  takes them for, and what their blobs say about distance. Pure.
+  The colours of simulated objects: how they are painted, which colour class they match, and how
+  their blobs relate to distance. Pure.
   """
 
   @enforce_keys [:name, :paint, :rgb, :thresholds, :constant]

@@ -1,7 +1,7 @@
 defmodule Sim.World.Server do
   @moduledoc """
-  A world in real time: 50 ms every 50 ms. Simulated devices attach to it; it tells them what they
-  sense, and does what they ask for. It knows no robots' processes, only devices.
+  A world in real time, in steps of 50 ms. Simulated devices attach to it; it sends them their
+  readings, and carries out their requests. It does not know processes of robots, only devices.
 
   After each step a drive gets its readings and a pan-tilt unit its own; after each second one a
   camera that has asked gets what moves, and paints its picture itself on the ground that it was

@@ -1,7 +1,7 @@
 defmodule Sim.World.Snapshot do
   @moduledoc """
-  What of a world has changed since its start, small enough to be sent ten times a second; with the
-  world as it began, it gives the whole world back. Pure.
+  The changes of a world since its start, small enough to send ten times a second; together with
+  the initial world they restore the whole world. Pure.
 
   A world that is started again from it goes on where it was: only the sonars are fired anew by its
   first step.

@@ -1,5 +1,5 @@
 defmodule Sim.World.Touch do
-  @moduledoc "Who touches whom after a step, and what comes of it. Pure."
+  @moduledoc "Detects contacts after a step, and their consequences. Pure."
   alias Sim.World.{Body, Contact}
   alias Sim.World.Bodies
 

@@ -1,8 +1,9 @@
 defmodule Mix.Tasks.Fleet.Certs do
   @shortdoc "Makes the certificates of a fleet's robots"
   @moduledoc """
-  Makes a fleet's CA, where there is none yet, and for each robot a key, a certificate signed by that
-  CA, and the options of Erlang's distribution by TLS. `docs/security.md` says how to use them.
+  Creates a fleet's CA, unless there is one, and for each robot a key, a certificate signed by
+  that CA, and the options of Erlang's distribution by TLS. `docs/security.md` says how to use
+  them.
 
       mix fleet.certs mag1 mag2 min1 [--out DIR]
       mix fleet.certs --fleet FILE

@@ -1,8 +1,8 @@
 defmodule Mix.Tasks.Fleet.Secret do
   @shortdoc "Makes the one secret of a fleet"
   @moduledoc """
-  Makes the one secret of a fleet: a small text file of 32 random bytes, for its owner alone (mode
-  0600). Copy it to every robot, and to nowhere else; `docs/security.md` says how.
+  Creates the secret of a fleet: a small text file of 32 random bytes, readable by its owner only
+  (mode 0600). Copy it to every robot, and nowhere else; `docs/security.md` says how.
 
       mix fleet.secret [FILE] [--force]
 

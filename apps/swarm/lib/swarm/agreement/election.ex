@@ -1,6 +1,7 @@
 defmodule Swarm.Agreement.Election do
   @moduledoc """
-  Who leads, as a pure function of the committed record, so that all get the same answer.
+  Elects the leader: a pure function of the committed record, so that all robots get the same
+  answer.
 
   Of those that found the landmark it is the one that sees it largest (R48); ties go to the first
   name. Where two or more leaders report, parts of a fleet have met, and the one with the highest

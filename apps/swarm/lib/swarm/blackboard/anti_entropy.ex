@@ -1,7 +1,7 @@
 defmodule Swarm.Blackboard.AntiEntropy do
   @moduledoc """
-  Who lacks which rows, found out in three messages: a digest; the stamps that the other has where it
-  differs; the rows that this one has newer, and a wish for those that it has not. Pure.
+  Finds missing rows in three messages: a digest; the stamps that the other has where it differs;
+  the rows that this one has newer, and a wish for those that it has not. Pure.
   """
   alias Swarm.Blackboard.{Codec, Rows, State}
 

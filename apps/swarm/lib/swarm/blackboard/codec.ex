@@ -1,7 +1,7 @@
 defmodule Swarm.Blackboard.Codec do
   @moduledoc """
-  What blackboards say to each other, in datagrams: rows, and what is needed to find out who lacks
-  which. Pure.
+  Encodes what blackboards exchange in datagrams: rows, and the messages that find missing ones.
+  Pure.
 
   | term | means |
   |---|---|

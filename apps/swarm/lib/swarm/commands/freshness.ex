@@ -1,6 +1,6 @@
 defmodule Swarm.Commands.Freshness do
   @moduledoc """
-  How old a command is, without a clock that robots share. Pure; times are the robot's own, in
+  Determines the age of a command without a shared clock. Pure; times are the robot's own, in
   milliseconds.
 
   Whoever commands a robot of another node writes on it which heartbeat of that robot it heard last,

@@ -1,6 +1,7 @@
 defmodule Swarm.Commands.Order do
   @moduledoc """
-  What a person may ask of a robot, checked wherever it arrives: by whoever sends it, and again by the robot. Pure.
+  Checks the orders that a person may give to a robot: at the sender, and again at the robot.
+  Pure.
   """
   alias Hal.Pose
   alias Robot.Command

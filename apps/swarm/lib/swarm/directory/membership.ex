@@ -1,9 +1,9 @@
 defmodule Swarm.Directory.Membership do
   @moduledoc """
-  How a process stays in groups of the directory, which is empty after it has restarted: the process
-  enters, watches the directory, and enters the next one, with back-off while there is none. Keep the entry
-  in the process's state, and show it every message that may be about it. A process may have several:
-  each knows its own messages.
+  Keeps a process in groups of the directory, which is empty after it has restarted: the process
+  enters, watches the directory, and enters the next one, with back-off while there is none. Keep
+  the entry in the process's state, and show it every message that may be about it. A process may
+  have several: each knows its own messages.
 
       def init(options), do: {:ok, %{entry: Swarm.Directory.Membership.enter([{:service, :battery}])}}
 

@@ -1,6 +1,6 @@
 defmodule Swarm.Directory.Presence do
   @moduledoc """
-  Tells who asked for it when robots join and leave (`Swarm.subscribe/0`).
+  Notifies subscribers when robots join or leave (`Swarm.subscribe/0`).
 
   A robot joins with the first word of it, by the directory or by radio. It leaves when its link
   leaves the directory, which a node that is killed does at once; or, where it was heard by radio,

@@ -1,7 +1,7 @@
 defmodule Swarm.Directory.RemoteMonitor do
   @moduledoc """
-  Tells when processes end, wherever they are, without ever waiting for their nodes. To monitor a
-  process of another node waits while the connection is full, so a process of its own does it.
+  Reports when processes end, on any node, without ever waiting for their nodes. Monitoring a
+  process of another node blocks while the connection is full, so a separate process does it.
   """
 
   @doc """

@@ -1,7 +1,8 @@
 defmodule Swarm.Directory.RobotInfo do
   @moduledoc """
-  What a robot is, for whoever looks for one (`Swarm.find/1`): the row `{robot, :about}` of the
-  blackboard, written by the robot's link once a second, and at once when its mission changes.
+  What a robot is, for those who look for one (`Swarm.find/1`): the row `{robot, :about}` of the
+  blackboard, written by the robot's comms process once a second, and at once when its mission
+  changes.
 
   | field | is |
   |---|---|

@@ -1,7 +1,7 @@
 defmodule Swarm.Directory.SafeTable do
   @moduledoc """
-  Reads a named table of another process of this node, without asking it. The table goes with that
-  process, perhaps between two looks; one that is not there is as an empty one.
+  Reads a named table of another process of this node, without calling it. The table disappears
+  with that process, perhaps between two reads; a missing table reads as an empty one.
   """
 
   @doc """

@@ -1,8 +1,8 @@
 defmodule Swarm.Formation.Chain do
   @moduledoc """
-  The thesis's chain: everyone's child is the robot with the next bigger distance to the leader
-  (R52), found by each robot on its own from the same poses. Equal distances are ordered by id,
-  so that any poses give one path. Pure; places in mm, as they were told.
+  The thesis's chain: everyone's child is the robot with the next greater distance to the leader
+  (R52), which each robot finds from the same poses. Equal distances are ordered by id, so that
+  any poses give one path. Pure; places in mm, as reported.
   """
 
   @type millimetres :: {integer(), integer()}

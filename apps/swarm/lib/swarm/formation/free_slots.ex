@@ -1,7 +1,7 @@
 defmodule Swarm.Formation.FreeSlots do
   @moduledoc """
-  Which slots of a shape can be taken at all: a body that stays where it was (a dead robot) leaves no
-  room for another. The shape is made larger by as many slots as are lost. Pure; metres.
+  Finds the slots of a shape that are free: a dead robot's body leaves no room for another. The
+  shape grows by as many slots as are lost. Pure; metres.
   """
   alias Hal.Pose
   alias Swarm.Formation

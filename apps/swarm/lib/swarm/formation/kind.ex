@@ -1,7 +1,7 @@
 defmodule Swarm.Formation.Kind do
   @moduledoc """
-  A shape that a build adds to those of `Swarm.Formation`, which says how it is named. Pure: every robot computes every
-  slot by itself, and all must find the same.
+  The behaviour of a shape that a build adds to those of `Swarm.Formation`, where it gets its
+  name. Pure: each robot computes the slots by itself, and all must get the same result.
 
       defmodule Mine.Echelon do
         @behaviour Swarm.Formation.Kind

@@ -1,10 +1,10 @@
 defmodule Swarm.Formation.Reference do
   @moduledoc """
-  Where the leader is supposed to be, and the shape that hangs from it: all that a follower needs
-  to compute its slot. The leader makes a new one each tick; it travels in the leader's heartbeats
-  and, from parent to child, along the chain (R28, R53: n - 1 messages), so that a follower that
-  does not hear the leader still knows its place. The newest sequence number wins; the epoch
-  fences off leaders of the past.
+  Where the leader is supposed to be, and the shape relative to it: everything that a follower
+  needs to compute its slot. The leader makes a new one each tick; it travels in the leader's
+  heartbeats and, from parent to child, along the chain (R28, R53: n - 1 messages), so that a
+  follower that does not hear the leader still knows its place. The newest sequence number wins;
+  the epoch fences off leaders of the past.
 
   Poses are `{x_mm, y_mm, mrad}` in the leader's map frame. Its own uncertainty (standard deviations in mm and mrad)
   is `sd` in the frame `base` that it was in before, and `start_sd` in that of the start poses; `frame` is the number of its own.

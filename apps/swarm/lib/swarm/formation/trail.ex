@@ -1,6 +1,6 @@
 defmodule Swarm.Formation.Trail do
   @moduledoc """
-  The way that a robot has come, and places along it. Pure; metres, newest point first.
+  The path that a robot has driven, and places along it. Pure; metres, newest point first.
 
   A column along the leader's trail goes where the leader went: through the door that it came
   through, not through the wall beside it.

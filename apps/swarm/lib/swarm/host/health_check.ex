@@ -1,8 +1,8 @@
 defmodule Swarm.Host.HealthCheck do
   @moduledoc """
-  Whether a robot of this node lives, by what its parts did and not by what they say: the gate writes to
-  the board twenty times a second, the executive ten times, and what the gate sends to the drive is taken. Asks no
-  process, so nothing that hangs can hold it up.
+  Judges whether a robot of this node is alive, by what its parts did rather than by what they
+  say: the gate writes to the board twenty times a second, the executive ten times, and what the
+  gate sends to the drive is taken. Asks no process, so nothing that hangs can hold it up.
   """
   alias Robot.{Board, Names}
 

@@ -1,7 +1,7 @@
 defmodule Swarm.Host.PowerOff do
   @moduledoc """
-  Has the controller of this machine's robot cut the power of both (`Hal.RFlex.PowerSwitch`), by the `console:` of
-  the robot's file. Without one, nothing is said to anybody.
+  Makes the controller of this machine's robot cut the power of both (`Hal.RFlex.PowerSwitch`), by
+  the `console:` of the robot's file. Without that key, it sends nothing.
 
   While a robot runs here, it has the line of its base, and the power stays on: a machine that still drives
   has not halted. So it does where the line cannot be looked at, for instance without permission. A base on another line

@@ -1,6 +1,6 @@
 defmodule Swarm.Host.ReleaseBoot do
   @moduledoc """
-  What a machine is told when a release starts on it: which robot it is, by which file, with which
+  Determines at the start of a release which robot this machine is, by which file and with which
   network. `rel/env.sh.eex` asks before Erlang starts, `Swarm.Application` when it does.
 
   The robot file is the first of these that is there:

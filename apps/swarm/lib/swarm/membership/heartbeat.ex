@@ -1,7 +1,7 @@
 defmodule Swarm.Membership.Heartbeat do
   @moduledoc """
-  What a robot tells all others five times a second: where it is, what it is at, whom it hears,
-  whom it follows. Whole numbers only: mm, mrad, mm/s, mrad/s, millionths of a picture.
+  What a robot tells all others five times a second: its pose, its state, whom it hears, whom it
+  follows. Whole numbers only: mm, mrad, mm/s, mrad/s, millionths of a picture.
 
   `estop` is the number of the last emergency stop that it knows, 0 for none, and `latched` says
   whether its own latch is set (`Swarm.EStop.State`). `sight` is its newest view of the landmark: relative

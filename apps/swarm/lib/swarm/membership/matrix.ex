@@ -1,6 +1,7 @@
 defmodule Swarm.Membership.Matrix do
   @moduledoc """
-  Who hears whom. In `iex` it is a table, a line for each robot and a column for whom it hears:
+  Who hears whom. In `iex` it prints as a table, with a line for each robot and a column for each
+  robot that it may hear:
 
       #Swarm.Membership.Matrix, 3 robots
               mag1  mag2  min1  view

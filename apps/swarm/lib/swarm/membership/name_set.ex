@@ -1,8 +1,8 @@
 defmodule Swarm.Membership.NameSet do
   @moduledoc """
-  Names in one binary, as a heartbeat lists whom a robot hears. A hundred robots tell each other fifty
-  thousand times a second; a list of a hundred names would be copied at every telling, at every writing on a
-  board and at every look at one, a binary is shared. Pure.
+  A set of names in one binary, for heartbeats that list whom a robot hears. A hundred robots
+  exchange fifty thousand heartbeats a second; a list of a hundred names would be copied at every
+  send, every write to a board and every read of one, while a binary is shared. Pure.
   """
 
   @typedoc "The names, sorted, each with a zero before and behind it."

@@ -1,6 +1,6 @@
 defmodule Swarm.Membership.Peers do
   @moduledoc """
-  Who is there, by what is heard: the newest heartbeat of each robot, and its age. Pure; times are
+  Tracks which robots are present, by the newest heartbeat of each and its age. Pure; times are
   the listener's own, in milliseconds.
 
   A peer is suspect after 1 s of silence and gone after 2 s. A gone robot's last pose stays known,

@@ -1,6 +1,6 @@
 defmodule Swarm.Message.WireTypes do
   @moduledoc """
-  What terms from outside are made of, told without trusting them in anything. Pure.
+  Validates terms from outside, without trusting them in any way. Pure.
   """
 
   # Of everything more than a thousand kilometres, or than a thousand robots, is nonsense.

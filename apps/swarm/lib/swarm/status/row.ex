@@ -1,9 +1,8 @@
 defmodule Swarm.Status.Row do
   @moduledoc """
-  A robot's status as a row of the blackboard, for those that it cannot answer: small, in whole
-  numbers (mm, mrad, mm/s) and text. Pure. Of wheels that may turn, as nearly always, it says nothing,
-  and nothing of devices that are there, nor of hanging where nothing hangs. How sure the pose is stands in mm under
-  `uncertainty`, where it is known.
+  A robot's status as a row of the blackboard, for nodes that it cannot answer: small, in whole
+  numbers (mm, mrad, mm/s) and text. Pure. It omits the normal case: wheels that may turn, devices
+  that are present, parts that do not hang. `uncertainty` is that of the pose in mm, if known.
   """
   alias Hal.Pose
   alias Swarm.Status

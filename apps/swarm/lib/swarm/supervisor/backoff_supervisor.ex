@@ -1,8 +1,8 @@
 defmodule Swarm.Supervisor.BackoffSupervisor do
   @moduledoc """
-  Keeps one part of a node running, for ever: it is started again at once when it falls, and with back-off
-  when it falls again and again. So what a part falls over each time somebody sends it costs the
-  node that part for a while, and not its robots, which do without.
+  Keeps one part of a node running, for ever: it restarts the part at once when it crashes, and
+  with back-off when it crashes repeatedly. So a message that crashes a part each time costs the
+  node that part for a while, but not its robots, which do without it.
 
   Each fall is an event, `[:swarm, :part, :fell]`, with the part's `id` and the `reason`. A part that
   cannot be started with the node is the node's failure, as under any supervisor.

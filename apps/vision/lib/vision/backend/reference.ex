@@ -1,8 +1,8 @@
 defmodule Vision.Backend.Reference do
   @moduledoc """
-  The meaning of a region in plain Elixir: every coloured pixel in a map, and a flood over it.
-  Reads every format. It compares with the limits of the classes, not by the tables, so that it
-  checks the tables of the faster backends too.
+  The definition of a region in plain Elixir: a map of all coloured pixels, and a flood fill over
+  it. It reads every format. It compares pixels with the limits of the classes, not with the
+  tables, so that it also checks the tables of the faster backends.
   """
   @behaviour Vision.Backend
   import Bitwise

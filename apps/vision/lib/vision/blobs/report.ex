@@ -1,5 +1,5 @@
 defmodule Vision.Blobs.Report do
-  @moduledoc "What was seen in a frame, as a line of JSON and as a table for people."
+  @moduledoc "Formats what was seen in a frame, as a line of JSON and as a table for people."
   alias Vision.{Blob, Blobs}
 
   @doc """

@@ -1,6 +1,6 @@
 defmodule Vision.Calibration.Match do
   @moduledoc """
-  How well a colour's limits tell the thing that was shown from all else in a picture. Pure.
+  Measures how well a colour's limits separate an object from the rest of a picture. Pure.
 
   What is found and touches a place that was shown is the thing itself; every other blob is background.
   """

@@ -1,6 +1,6 @@
 defmodule Vision.Calibration.Sample do
   @moduledoc """
-  Places in a picture, and the pixels that are there. Pure.
+  Places in a picture, and their pixels. Pure.
 
   A place is `{:point, {x, y}}`, which stands for 5 by 5 pixels round it, or `{:box, {x, y, width, height}}`;
   pixels count from the top left.

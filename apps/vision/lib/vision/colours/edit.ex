@@ -1,6 +1,7 @@
 defmodule Vision.Colours.Edit do
   @moduledoc """
-  Puts a colour into the text of a CMVision colour file; comments and the other colours stay. Pure.
+  Writes a colour into the text of a CMVision colour file; comments and the other colours stay.
+  Pure.
   """
   alias Vision.Colours
 

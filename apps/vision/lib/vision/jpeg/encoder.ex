@@ -1,8 +1,8 @@
 defmodule Vision.Jpeg.Encoder do
   @moduledoc """
-  One running ffmpeg that makes JPEG pictures of frames of one shape, one at a time. It runs outside the
-  VM, with one thread and, where there is `nice`, behind everything that drives the robot; and it ends with
-  the process that opened it, or with the VM, because its input ends.
+  A running ffmpeg that encodes frames of one shape as JPEG, one at a time. It runs outside the
+  VM, with one thread and, if `nice` exists, with lower priority than everything that drives the
+  robot. It ends with the process that opened it, or with the VM, because its input ends.
 
   The process that opens it gets its messages, must trap exits, and gives them to `handle/2`. Nothing here
   waits, not even for an ffmpeg that hangs: whoever has waited long enough calls `close/1`.

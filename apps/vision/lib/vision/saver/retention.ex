@@ -1,8 +1,9 @@
 defmodule Vision.Saver.Retention do
   @moduledoc """
-  Which pictures of one robot lie in a folder, what the next one is called, and which go to make room for it.
-  Pure. Names are `mag1-20260102T030405.678Z.jpg`, in UTC, so that they sort by time; a clock that is set back
-  does not bring the order about: the next name is then a millisecond behind the last one.
+  Decides which pictures of one robot a folder keeps: the name of the next one, and which are
+  deleted to make room. Pure. Names are `mag1-20260102T030405.678Z.jpg`, in UTC, so that they sort
+  by time. If the clock is set back, the order stays: the next name is then a millisecond after
+  the last one.
   """
 
   @enforce_keys [:prefix, :files, :bytes]

@@ -1,7 +1,8 @@
 defmodule Vision.View.EncoderControl do
   @moduledoc """
-  Makes pictures of frames, one at a time, with an encoder that is there only as long as it is needed: started
-  for the first frame, for each of another shape, and after it failed; closed after 5 s without a picture.
+  Encodes frames as pictures, one at a time, with an encoder that runs only while it is needed:
+  started for the first frame, for frames of another shape, and after a failure; closed after 5 s
+  without a picture.
 
   An encoder that ends, or needs more than 5 s for a picture, is followed by a rest of 100 ms, 200 ms, … up
   to 5 s. The owner traps exits and hands all messages to `handle/3`. Times are integer milliseconds.

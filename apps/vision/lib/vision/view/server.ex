@@ -1,7 +1,8 @@
 defmodule Vision.View.Server do
   @moduledoc """
-  The process of `Vision.View`: who looks is the matter of `Vision.View.Subscribers`, what makes the pictures
-  that of `Vision.View.EncoderControl`; here they meet. It never waits for a viewer, the camera or ffmpeg.
+  The process of `Vision.View`: it connects `Vision.View.Subscribers`, who is watching, with
+  `Vision.View.EncoderControl`, which encodes the pictures. It never waits for a viewer, the
+  camera or ffmpeg.
   """
   use GenServer
   alias Hal.Device.Words

@@ -1,6 +1,6 @@
 defmodule Vision.View.Subscribers do
   @moduledoc """
-  Who looks through a camera, who of them waits for a picture, and when the next one is to be made. Pure;
+  Who is watching a camera, who of them waits for a picture, and when the next one is due. Pure;
   times are integer milliseconds.
 
   A viewer gets a picture for each time it asks, and not faster than its rate. One that does not ask, because it

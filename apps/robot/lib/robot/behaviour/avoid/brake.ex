@@ -1,7 +1,8 @@
 defmodule Robot.Behaviour.Avoid.Brake do
   @moduledoc """
-  The last look before a speed goes out: would a robot that drives on for a moment and then brakes
-  come too near to anybody, who does the same? If so it drives slower, or not at all. Turning is free. Pure.
+  The last check of a speed: if the robot drove on for a moment and then braked, would it come too
+  near to another that does the same? If so, it drives slower, or not at all. Turning is
+  unrestricted. Pure.
 
   Steering cannot follow a wished velocity at once; this is what makes the difference harmless.
   """

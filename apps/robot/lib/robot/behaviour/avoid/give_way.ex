@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.Avoid.GiveWay do
   @moduledoc """
-  Makes way: a robot that stands in its place may be what keeps another from its own. Who has another
-  moving robot close by for some seconds steps aside for a moment, and then comes back. Pure.
+  Gives way: a robot that stands in its place may block another's path. If another moving robot
+  stays close for some seconds, this one steps aside for a moment, and then returns. Pure.
 
   Neighbours in a formation stand farther apart than that, so those never drive each other off.
   """

@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.Avoid.Neighbours do
   @moduledoc """
-  What stands or moves about a robot, as discs in the map frame: other robots by what they told,
-  things by what the sonars see and nobody told. Pure.
+  What is around a robot, as discs in the map frame: other robots by their own reports, and
+  obstacles that the sonars see and no robot reported. Pure.
   """
   alias Hal.{Pose, Twist}
   alias Robot.Percept

@@ -1,8 +1,8 @@
 defmodule Robot.Behaviour.Avoid.Progress do
   @moduledoc """
-  Notices that a robot gets no nearer to its goal though it wants to, and then sends it aside for a
-  while: to which side and for how long follows from its name and the number of tries, so that
-  two who block each other do not do the same for ever. Pure.
+  Notices that a robot makes no progress to its goal, and then sends it aside for a while. The
+  side and the duration follow from its name and the number of attempts, so that two robots that
+  block each other do not mirror each other for ever. Pure.
   """
 
   @enforce_keys [:best, :since_ms]

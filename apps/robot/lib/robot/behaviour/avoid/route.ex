@@ -1,8 +1,8 @@
 defmodule Robot.Behaviour.Avoid.Route do
   @moduledoc """
-  The way to a goal round all that stands, and sticking to it: a roomy way rather than a tight one
-  unless it is much longer, and the way chosen before rather than one that is hardly shorter.
-  Without that, a robot before two equally good ways would go to and fro between them. Pure.
+  Chooses a route to a goal around standing obstacles, and keeps to it: a wide route is preferred
+  unless it is much longer, and so is the previous route unless another is clearly shorter.
+  Without that, a robot between two equally good routes would oscillate. Pure.
   """
   alias Hal.Pose
   alias Robot.Percept

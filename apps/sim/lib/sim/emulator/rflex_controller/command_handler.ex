@@ -1,7 +1,7 @@
 defmodule Sim.Emulator.RFlexController.CommandHandler do
   @moduledoc """
-  What a controller does with the frames it takes (fact sheet rFLEX, sections 3 to 9). Pure. Orders that it does not
-  know are counted, and nothing else.
+  Carries out the frames that a controller receives (fact sheet rFLEX, sections 3 to 9). Pure.
+  Unknown orders are only counted.
 
   What the sheet leaves open: setting the defaults stops both axes by their accelerations; periods of reports of
   motion and inputs are microseconds, the infrared's milliseconds; 10 ms is the shortest.

@@ -1,7 +1,8 @@
 defmodule Sim.Emulator.RFlexController.Motors do
   @moduledoc """
-  Both axes of the controller, forward and turn: commanded speeds with their accelerations, the brake, the stop when
-  commands fail to come, and the counters. Pure; counts are the controller's, times milliseconds.
+  Both axes of the controller, forward and turn: commanded speeds with their accelerations, the
+  brake, the stop when commands are missing, and the counters. Pure; counts are the controller's,
+  times milliseconds.
 
   What the sheet leaves open: an acceleration of 0 leaves the axis with the one before; a set brake stops the
   wheels at once, and takes no speed while it is set; an axis gets no faster than a base of that size can, 2.5 m/s and

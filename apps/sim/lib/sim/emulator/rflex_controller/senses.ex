@@ -1,7 +1,7 @@
 defmodule Sim.Emulator.RFlexController.Senses do
   @moduledoc """
-  What the body feels, in the numbers that a controller's boards give for it: bumpers as digital inputs, infrared as
-  bytes of a converter (fact sheet rFLEX, sections 6, 7 and 12). Pure.
+  Converts what the body feels to the numbers of a controller's boards: bumpers as digital inputs,
+  infrared as bytes of a converter (fact sheet rFLEX, sections 6, 7 and 12). Pure.
   """
 
   @doc """

@@ -1,7 +1,7 @@
 defmodule Sim.Emulator.RFlexController.State do
   @moduledoc """
-  What a controller remembers. Pure. Times are milliseconds; `counts` tells what came: good frames, bad beginnings,
-  unknown or lost orders, and turns with an 1B that should not be in them.
+  The state of a controller. Pure. Times are milliseconds; `counts` counts what arrived: good
+  frames, bad frame starts, unknown or lost orders, and turns with a forbidden byte 1B.
   """
   alias Sim.Emulator.RFlexController
   alias Sim.Emulator.RFlexController.{Frame, Motors, Senses}

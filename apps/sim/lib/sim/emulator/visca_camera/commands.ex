@@ -1,7 +1,7 @@
 defmodule Sim.Emulator.ViscaCamera.Commands do
   @moduledoc """
-  What a camera can be told (fact sheet VISCA, section 4). Pure. First it is seen whether a command makes sense, then
-  whether a socket is free, then whether it can be carried out now.
+  The commands of a camera (fact sheet VISCA, section 4). Pure. It checks first whether a command
+  is valid, then whether a socket is free, then whether the command can be carried out now.
   """
   alias Sim.Emulator.ViscaCamera
   alias Sim.Emulator.ViscaCamera.{Head, Packet}

@@ -1,6 +1,7 @@
 defmodule Sim.Emulator.ViscaCamera.State do
   @moduledoc """
-  What a camera remembers: its head, its two sockets, what it will answer and when. Pure; times in milliseconds.
+  The state of a camera: its head, its two sockets, and its pending answers. Pure; times in
+  milliseconds.
 
   A socket is free (`nil`) or holds what its command waits for: `:way`, `:zoom`, `:drive` or `{:until, at_ms}`.
   """

@@ -1,5 +1,7 @@
 defmodule Sim.Fleet.Nodes.Command do
-  @moduledoc "How a node is started, and how a person reaches it: commands and lines as text. Pure."
+  @moduledoc """
+  The commands that start a node, and those by which a person reaches it, as text. Pure.
+  """
 
   # A robot has little to do: one scheduler, no busy waiting (there are more nodes than processors),
   # and few threads.

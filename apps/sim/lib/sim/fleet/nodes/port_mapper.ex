@@ -1,7 +1,8 @@
 defmodule Sim.Fleet.Nodes.PortMapper do
   @moduledoc """
-  Erlang's port mapper (epmd) for as long as we need it: where none answers, one is started, and it ends with
-  the run, however that ends. One that was there before is left alone, and so is ours while others use it.
+  Erlang's port mapper (epmd) for the duration of a run: if none answers, one is started, which
+  ends with the run in any case. An existing one is left alone, and so is ours while others use
+  it.
   """
 
   @host "127.0.0.1"

@@ -1,9 +1,9 @@
 defmodule Swarm.Agreement.Round.Letter do
   @moduledoc """
-  What is said in a round. Every letter carries the round's id, its view and the time that is
-  left (no shared clock is needed), the sender's own report, and, once it is final, its digest.
-  `known` is the map of all reports that the sender holds, sent as an echo when the reports are
-  in, or when somebody asked. `purpose` says why the round is held.
+  A message of a round. Every letter carries the round's id, its view and the time that is left
+  (no shared clock is needed), the sender's own report, and, once it is final, its digest. `known`
+  is the map of all reports that the sender holds, sent as an echo when the reports are in, or
+  when somebody asked. `purpose` says why the round is held.
   """
   alias Swarm.Message.WireTypes
 
