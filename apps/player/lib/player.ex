@@ -179,7 +179,8 @@ defmodule Player do
         {:error, "no driver is in it"}
 
       true ->
-        {:error, "no driver \"rflex\" is in it, so it is no Magellan Pro's and no ATRV mini's"}
+        {:error,
+         "no driver \"rflex\" is in it, so it is neither a Magellan Pro's nor an ATRV mini's"}
     end
   end
 

@@ -509,7 +509,7 @@ defmodule PlayerTest do
           {"a\n  b" <> <<200>>, "x.cfg:2: byte 200 is not a part of a configuration file"},
           {"", "x.cfg: no driver is in it"},
           {"driver ( name \"p2os\" )",
-           "x.cfg: no driver \"rflex\" is in it, so it is no Magellan Pro's and no ATRV mini's"},
+           "x.cfg: no driver \"rflex\" is in it, so it is neither a Magellan Pro's nor an ATRV mini's"},
           {String.duplicate("a ( ", 30), "x.cfg:1: nothing is nested more than 20 deep"},
           {"a " <> String.duplicate("[ ", 30), "x.cfg:1: nothing is nested more than 20 deep"}
         ] do

@@ -69,7 +69,11 @@ defmodule Agents.Responder do
 
     unless is_list(options[:topics]) and not List.improper?(options[:topics]) and
              Enum.all?(options[:topics], &Envelope.topic?/1),
-           do: raise(ArgumentError, "#{inspect(options[:topics])} are no topics: atoms or text")
+           do:
+             raise(
+               ArgumentError,
+               "#{inspect(options[:topics])} are not topics: atoms or text are allowed"
+             )
 
     unless responder?(options[:module]),
       do:

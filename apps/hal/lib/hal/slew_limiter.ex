@@ -53,7 +53,7 @@ defmodule Hal.SlewLimiter do
       iex> Hal.SlewLimiter.check(Hal.Twist.new(99, 0))
       :ok
       iex> Hal.SlewLimiter.check(%Hal.Twist{linear: :nan, turn: 0.0})
-      {:error, "a speed of :nan m/s and 0.0 rad/s is none"}
+      {:error, "a speed of :nan m/s and 0.0 rad/s is not a speed"}
   """
   @spec check(term()) :: :ok | {:error, String.t()}
   def check(%Twist{linear: linear, turn: turn})
@@ -62,7 +62,7 @@ defmodule Hal.SlewLimiter do
       do: :ok
 
   def check(%Twist{linear: linear, turn: turn}),
-    do: {:error, "a speed of #{show(linear)} m/s and #{show(turn)} rad/s is none"}
+    do: {:error, "a speed of #{show(linear)} m/s and #{show(turn)} rad/s is not a speed"}
 
   def check(other), do: {:error, "#{show(other)} is not a speed"}
 

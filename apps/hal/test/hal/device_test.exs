@@ -102,7 +102,7 @@ defmodule Hal.DeviceTest do
       assert_receive {:drive, :terminate, ^pid}
       # Before the next one is started, 500 ms later.
       assert_receive {:health, :drive, {{:offline, :fell}, _since}}, 400
-      assert_receive {:arming, %{state: :disarmed, why: "its process fell" <> _}}, 400
+      assert_receive {:arming, %{state: :disarmed, why: "its process crashed" <> _}}, 400
       assert Process.alive?(pid)
     end)
   end
@@ -115,8 +115,8 @@ defmodule Hal.DeviceTest do
     pid = start_supervised!({Device, [kind: :drive, driver: driver] ++ options})
     # Already when its start returns.
     assert_received {:health, :drive, {{:offline, :fell}, since}} when since != 7
-    assert_received {:arming, %{state: :disarmed, why: "its process fell" <> _}}
-    line = "its process fell, and is started again"
+    assert_received {:arming, %{state: :disarmed, why: "its process crashed" <> _}}
+    line = "its process crashed, and is started again"
     assert_received {:offline, %{reason: :fell, line: ^line}}
     assert_receive {:online, %{again?: true}}
     armed(pid)

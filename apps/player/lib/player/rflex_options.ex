@@ -102,7 +102,7 @@ defmodule Player.RFlexOptions do
 
       units < least ->
         {:assumed, [{path, Float.round(units * 1000.0, 6)}],
-         "taken for units per millimetre: #{units} per metre is no rFLEX"}
+         "taken for units per millimetre: #{units} per metre is not an rFLEX value"}
 
       true ->
         {:ok, [{path, units * 1.0}]}

@@ -85,7 +85,7 @@ defmodule Robot.Command do
   def parse(text, known) when is_binary(text) and byte_size(text) <= @longest do
     if String.printable?(text),
       do: text |> String.trim() |> String.split(":") |> command(known),
-      else: {:error, "a command cannot have bytes that are no text"}
+      else: {:error, "a command cannot contain bytes that are not text"}
   end
 
   def parse(text, _known) when is_binary(text),

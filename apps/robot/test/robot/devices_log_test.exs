@@ -36,7 +36,7 @@ defmodule Robot.Devices.LogTest do
   test "what hangs is one line when it is noticed, and one when it is over" do
     about = %{robot: :mag1, behaviour: Acts.Hang, line: "Acts.Hang"}
     assert Log.line(:silent, about) == {:warning, "mag1 hangs in Acts.Hang"}
-    assert Log.line(:again, about) == {:info, "mag1 hangs no more in Acts.Hang"}
+    assert Log.line(:again, about) == {:info, "mag1 no longer hangs in Acts.Hang"}
 
     assert Log.line(:hung, about) ==
              {:error, "mag1 hung in Acts.Hang for 2 s: started again, idle"}

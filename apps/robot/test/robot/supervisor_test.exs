@@ -335,7 +335,7 @@ defmodule Robot.SupervisorTest do
     assert_receive {:opens, second} when second != first
     assert {:ok, {:offline, :fell}, _} = Board.fetch(board, {:health, :drive}, :infinity)
     assert {:ok, arming, _at_ms} = Board.fetch(board, :arming, :infinity)
-    assert arming == %{state: :disarmed, why: "its process fell, and is started again"}
+    assert arming == %{state: :disarmed, why: "its process crashed, and is started again"}
     assert_received {[:hal, :device, :offline], %{reason: :fell}}
     send(second, :open)
     assert_receive {[:hal, :device, :online], %{again?: true}}

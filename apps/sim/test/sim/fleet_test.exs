@@ -184,7 +184,7 @@ defmodule Sim.FleetTest do
     stop(fleet)
 
     for {mission, nodes?, word} <- [
-          {{NoSuchModule, []}, false, "NoSuchModule is no Robot.Mission"},
+          {{NoSuchModule, []}, false, "NoSuchModule is not a Robot.Mission"},
           {{Turn, [1]}, false, "options"},
           {:patrol, false, "true, false or"},
           {{Turn, rate: 0.3}, true, "with nodes"}

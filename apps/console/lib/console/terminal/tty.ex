@@ -9,7 +9,7 @@ defmodule Console.Terminal.Tty do
 
   @type saved :: {device :: String.t(), settings :: String.t()}
 
-  @doc "Switches to single keys; `:error` where standard input and output are no terminal."
+  @doc "Switches to single keys; `:error` if standard input and output are not a terminal."
   @spec open() :: {:ok, saved()} | :error
   def open do
     # Not by asking for the columns: a terminal may not know its size.

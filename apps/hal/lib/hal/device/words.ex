@@ -12,10 +12,10 @@ defmodule Hal.Device.Words do
       iex> Hal.Device.Words.offline({Some.Driver, []}, :odd)
       ":odd"
       iex> Hal.Device.Words.offline({Hal.RFlex.Driver, port: "/dev/ttyR0"}, :fell)
-      "its process fell, and is started again"
+      "its process crashed, and is started again"
   """
   @spec offline({driver :: module() | nil, options :: keyword()}, reason :: term()) :: String.t()
-  def offline(_driver, :fell), do: "its process fell, and is started again"
+  def offline(_driver, :fell), do: "its process crashed, and is started again"
 
   def offline({driver, options}, reason) do
     if driver != nil and Code.ensure_loaded?(driver) and function_exported?(driver, :explain, 2),

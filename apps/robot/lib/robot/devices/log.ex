@@ -78,7 +78,7 @@ defmodule Robot.Devices.Log do
   def line(:fault, %{robot: robot, line: line}), do: {:warning, "#{robot} stands: #{line}"}
 
   def line(:silent, about), do: {:warning, "#{about.robot} hangs in #{about.line}"}
-  def line(:again, about), do: {:info, "#{about.robot} hangs no more in #{about.line}"}
+  def line(:again, about), do: {:info, "#{about.robot} no longer hangs in #{about.line}"}
 
   def line(:hung, about),
     do: {:error, "#{about.robot} hung in #{about.line} for 2 s: started again, idle"}

@@ -12,7 +12,7 @@ defmodule Sim.Fleet.Mission do
   The setup with that mission, and whether it is to begin; or one line.
 
       iex> Sim.Fleet.Mission.choose(%{mission: nil}, {NoSuchModule, []}, false)
-      {:error, "mission cannot be {NoSuchModule, []}: NoSuchModule is no Robot.Mission (init/2 and handle/2)"}
+      {:error, "mission cannot be {NoSuchModule, []}: NoSuchModule is not a Robot.Mission (init/2 and handle/2)"}
       iex> Sim.Fleet.Mission.choose(%{mission: nil}, :patrol, false)
       {:error, "mission cannot be :patrol: true, false or {module, options} is allowed"}
   """
@@ -27,7 +27,7 @@ defmodule Sim.Fleet.Mission do
 
       not mission?(module) ->
         {:error,
-         "mission cannot be #{brief(mission)}: #{inspect(module)} is no Robot.Mission " <>
+         "mission cannot be #{brief(mission)}: #{inspect(module)} is not a Robot.Mission " <>
            "(init/2 and handle/2)"}
 
       nodes? and Application.get_application(module) not in @apps ->

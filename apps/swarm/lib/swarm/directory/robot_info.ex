@@ -147,7 +147,7 @@ defmodule Swarm.Directory.RobotInfo do
         Blackboard.put(robot, :said, Keyword.merge(said(robot), facts))
 
       false ->
-        {:error, "#{inspect(facts)} are no facts; allowed are #{Enum.join(@sayable, ", ")}"}
+        {:error, "#{inspect(facts)} are not facts; allowed are #{Enum.join(@sayable, ", ")}"}
 
       {key, value} ->
         {:error,

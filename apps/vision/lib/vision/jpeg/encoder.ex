@@ -107,7 +107,7 @@ defmodule Vision.Jpeg.Encoder do
   def explain(:unreadable), do: "ffmpeg gave something that is not a picture"
   def explain(:busy), do: "ffmpeg takes no frame"
   def explain(:late), do: "ffmpeg gave no picture in time"
-  def explain(:no_frame), do: "the camera gave a frame that is none"
+  def explain(:no_frame), do: "the camera gave something that is not a frame"
 
   def explain({:exit, reason}),
     do: "ffmpeg ended (#{inspect(reason, limit: 5, printable_limit: 40)})"

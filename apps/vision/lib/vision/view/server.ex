@@ -111,7 +111,7 @@ defmodule Vision.View.Server do
          {:ok, subscribers} <- Subscribers.join(s.subscribers, id, every, now()) do
       {:ok, %{s | subscribers: subscribers}}
     else
-      {:error, :full} -> {:error, "#{Subscribers.size(s.subscribers)} look already, no more can"}
+      {:error, :full} -> {:error, "#{Subscribers.size(s.subscribers)} viewers are the maximum"}
       error -> error
     end
   end
