@@ -14,7 +14,7 @@ defmodule Robot.Board do
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, since when |
   | `{:peer, id}` | `:link` | as in `Robot.Percept` |
   | `:estop` | `:brake` | how the emergency stop stands, as its one owner publishes it: the last number known, the last one cleared here, the calls heard |
-  | `:radio` | `:link` | what was sent, heard, and refused as malformed |
+  | `:radio` | `:link` | how many messages were sent, heard, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
   | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Safety.Reflex.frame/1` |
   | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil, tick: count}` |

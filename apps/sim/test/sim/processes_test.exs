@@ -231,7 +231,7 @@ defmodule Sim.ProcessesTest do
     receive do
       {:drive, {:drive, twist}, _pid} -> flush([{:drive, twist} | effects])
       {:ptz, {:look, pan, tilt}, _pid} -> flush([{:look, pan, tilt} | effects])
-      {:carried, ids, message} -> flush([{:send, ids, message} | effects])
+      {:carried, ids, message} -> flush([{:send, addressed(ids, @me), message} | effects])
       {[:robot, :stage], about} -> flush([stage(about) | effects])
     after
       0 -> Enum.reverse(effects)

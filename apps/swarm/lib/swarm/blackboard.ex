@@ -44,7 +44,7 @@ defmodule Swarm.Blackboard do
         :seed,
         name: __MODULE__,
         transport: {Swarm.Mesh, :cast, []},
-        nodes: {Blackboard.Gossip, :alive, []},
+        nodes: {Swarm.Mesh, :alive, []},
         repair_ms: 1_000,
         limits: []
       ])

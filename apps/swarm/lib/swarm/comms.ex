@@ -20,7 +20,8 @@ defmodule Swarm.Comms do
 
   `join/2` makes a config with a comms process. Its options:
 
-    * `:transport` - `{m, f, a}`; a message goes to `apply(m, f, a ++ [from, ids, message])`, and
+    * `:transport` - `{m, f, a}`; a message goes to `apply(m, f, a ++ [from, to, message])`, with `to` a list of
+      robots or, for heartbeats, `:all`, and
       arrives by `hear/2`. Default: `Swarm.Comms.Transport.transmit/3`
     * `:boot` - a number that grows with every start; default the time of day
   """

@@ -9,9 +9,8 @@ defmodule Swarm.Mesh do
   Without a mesh (`config :swarm, mesh: false`) a node's robots have only each other, and whom
   somebody has connected by hand. `docs/networking.md` tells how to set it up.
   """
-  alias Swarm.Mesh.{CommandRelay, NodeTable, Packet, Roster, Routing}
+  alias Swarm.Mesh.{CommandRelay, NodeTable, Packet, Routing, Table}
   alias Swarm.Nonblocking
-  alias Swarm.Directory.SafeTable
 
   @typedoc """
   How a node sees the others: `number` grows with each change of who is there; for each node its
@@ -36,79 +35,94 @@ defmodule Swarm.Mesh do
 
   @doc "Whether this node has a mesh."
   @spec running?() :: boolean()
-  def running?, do: :ets.whereis(__MODULE__) != :undefined
+  def running?, do: Table.there?()
 
   @doc """
   Sends a robot's message by datagram, which may be lost: to all other nodes, or to those that hold
   these robots. Without a mesh nothing is sent.
   """
-  @spec speak(:all | [atom()], Swarm.Message.t()) :: :ok
-  def speak(to, message), do: radio({:speak, to, message})
+  @spec speak(:all | [atom()], message :: term()) :: :ok
+  def speak(to, message), do: tell({:speak, to, message})
 
   @doc """
   Sends a service's term to all other nodes, by datagram: it may be lost, doubled or come out of
-  order. One of more than 60,000 bytes is refused. Without a mesh nothing is sent.
+  order. One of more than 60,000 bytes is refused. Without a mesh nothing is sent. The services are those of
+  the node's consumer (`c:Swarm.Mesh.Consumer.services/0`).
   """
-  @spec cast(:rows | :stop, term()) :: :ok | {:error, :too_big}
+  @spec cast(service :: atom(), term()) :: :ok | {:error, :too_big}
   def cast(service, term), do: serve(service, :all, term)
 
   @doc "The same, to one node."
-  @spec cast(:rows | :stop, node(), term()) :: :ok | {:error, :too_big}
+  @spec cast(service :: atom(), node(), term()) :: :ok | {:error, :too_big}
   def cast(service, node, term), do: serve(service, node, term)
 
-  defp serve(service, to, term) when service in [:rows, :stop] do
+  @doc """
+  The same, every way there is: by multicast, too, and also to nodes that have just been silent.
+  """
+  @spec broadcast(service :: atom(), term()) :: :ok | {:error, :too_big}
+  def broadcast(service, term), do: serve(service, :everywhere, term)
+
+  defp serve(service, to, term) do
     if :erlang.external_size(term) > Packet.largest(),
       do: {:error, :too_big},
-      else: radio({:serve, service, to, term})
+      else: tell({:serve, service, to, term})
   end
 
   @doc "Tells a connected node where this one is to be heard, and so gets to hear it."
   @spec introduce(node()) :: :ok
-  def introduce(node), do: radio({:introduce, node})
+  def introduce(node), do: tell({:introduce, node})
 
   @doc "The robots of other nodes that were heard within the last 2 s, and their nodes."
   @spec robots() :: %{atom() => node()}
-  def robots do
-    heard = {{:robot, :"$1"}, :"$2", :_, :_, :"$3"}
-    lately = {:>, :"$3", now() - @gone_ms}
-    Map.new(SafeTable.select(__MODULE__, [{heard, [lately], [{{:"$1", :"$2"}}]}]))
-  end
+  def robots, do: Map.new(Table.robots(now() - @gone_ms + 1))
 
-  @doc "The robots of nodes that are not heard here, but by others that are: commands reach them by those."
+  @doc "Whether a robot of another node was heard within the last 2 s."
+  @spec heard?(atom()) :: boolean()
+  def heard?(robot), do: match?({_boot, _sequence, age} when age < @gone_ms, beat(robot))
+
+  @doc """
+  The robots of nodes that are not heard here, but by others that are, sorted: commands reach them by those.
+  As it was within the last 200 ms.
+  """
   @spec beyond() :: [atom()]
-  def beyond do
-    case node_table() do
-      nil -> []
-      {node_table, _roster} -> Routing.beyond(node_table, now())
-    end
-  end
+  def beyond, do: Table.value(:beyond, [])
 
   @doc "The newest heartbeat heard of a robot of another node: `{boot, sequence, age_ms}`."
   @spec beat(atom()) :: {integer(), non_neg_integer(), age_ms :: non_neg_integer()} | nil
   def beat(robot) do
-    case SafeTable.lookup(__MODULE__, {:robot, robot}) do
-      [{_key, _node, boot, sequence, at_ms}] -> {boot, sequence, now() - at_ms}
-      [] -> nil
-    end
+    with {_node, boot, sequence, at_ms} <- Table.robot(robot),
+         do: {boot, sequence, now() - at_ms}
   end
 
-  @doc "Who is there, as seen from here."
+  @doc "The other nodes that are heard now."
+  @spec alive() :: [node()]
+  def alive, do: Table.nodes(NodeTable.alive_since(now()))
+
+  @doc "Who is there, as seen from here: for people and for tests, as it copies all that is known."
   @spec view() :: view()
   def view do
-    case node_table() do
-      nil -> %{number: 0, nodes: %{}}
-      {node_table, roster} -> view(node_table, roster, now(), Node.list())
-    end
+    now_ms = now()
+    connected = Node.list()
+    held = Enum.group_by(robots(), &elem(&1, 1), &elem(&1, 0))
+
+    nodes =
+      for {node, heard_ms, hears} <- Table.all(), into: %{} do
+        {node,
+         %{
+           status: NodeTable.status(heard_ms, now_ms),
+           connected: node in connected,
+           hears: hears,
+           robots: Enum.sort(Map.get(held, node, [])),
+           age_ms: now_ms - heard_ms
+         }}
+      end
+
+    %{number: Table.value(:number, 0), nodes: nodes}
   end
 
-  @doc "What was dropped, by reason, since the start."
+  @doc "What was dropped, by reason, since the start; as it was within the last 200 ms."
   @spec rejected() :: %{atom() => pos_integer()}
-  def rejected do
-    case SafeTable.lookup(__MODULE__, :node_table) do
-      [{:node_table, _book, _roster, rejected}] -> rejected
-      [] -> %{}
-    end
-  end
+  def rejected, do: Table.value(:rejected, %{})
 
   @doc "How many datagrams the radio has sent, heard and rejected, and its UDP port; `nil` without a network."
   @spec counts() ::
@@ -120,82 +134,40 @@ defmodule Swarm.Mesh do
           }
           | {:error, line :: String.t()}
   def counts do
-    case SafeTable.lookup(__MODULE__, :radio) do
-      [{:radio, pid}] -> Nonblocking.call(pid, :counts, "the radio of this node")
-      [] -> {:error, "this node has no mesh"}
+    case Table.value(:server, nil) do
+      nil -> {:error, "this node has no mesh"}
+      pid -> Nonblocking.call(pid, :counts, "the radio of this node")
     end
   end
 
   @doc "Whether a node is known and has not been heard for a second, whatever its connection says."
   @spec silent?(node()) :: boolean()
   def silent?(node) do
-    with {node_table, _roster} <- node_table(),
-         name = Atom.to_string(node),
-         true <- is_map_key(node_table.nodes, name) do
-      NodeTable.status(node_table, name, now()) != :alive
-    else
-      _unknown -> false
-    end
+    heard_ms = Table.heard_ms(node)
+    heard_ms != nil and NodeTable.status(heard_ms, now()) != :alive
   end
 
   @doc """
-  Sends a link's request to a robot that this node has no connection to, or a silent one, over others that
+  Sends a request to a robot that this node has no connection to, or a silent one, over others that
   have (`Swarm.Mesh.CommandRelay`). `ref` is the alias in it that is to be answered.
   """
   @spec relay(atom(), tuple(), reference()) :: :ok | {:error, :unknown | :no_way}
   def relay(robot, request, ref) do
-    with {node_table, roster} <- node_table(),
-         name when name != nil <- Routing.holder(node_table, robot) do
-      links = for node <- Node.list(), do: Atom.to_string(node)
+    case Table.robot(robot) do
+      nil ->
+        {:error, :unknown}
 
-      ways =
-        for {from, to} <- Routing.ways(node_table, links, now()),
-            {:ok, node} <- [Roster.node(roster, from)],
-            into: %{},
-            do: {node, nodes(to, roster)}
-
-      CommandRelay.send(Map.fetch!(roster.nodes, name), ways, robot, request, ref)
-    else
-      nil -> {:error, :unknown}
+      {node, _boot, _sequence, _at_ms} ->
+        ways = Routing.ways(node(), Node.list(), Table.onward(NodeTable.alive_since(now())))
+        CommandRelay.send(node, ways, robot, request, ref)
     end
   end
 
-  # The table goes with the radio that made it; in between there is none.
-  defp radio(request) do
-    case SafeTable.lookup(__MODULE__, :radio) do
-      [{:radio, pid}] -> GenServer.cast(pid, request)
-      [] -> :ok
-    end
+  # The table goes with the server that made it; in between there is none.
+  defp tell(request) do
+    with pid when pid != nil <- Table.value(:server, nil), do: GenServer.cast(pid, request)
+    :ok
   end
-
-  defp node_table do
-    case SafeTable.lookup(__MODULE__, :node_table) do
-      [{:node_table, node_table, roster, _rejected}] -> {node_table, roster}
-      [] -> nil
-    end
-  end
-
-  defp view(node_table, roster, now_ms, connected) do
-    nodes =
-      for {name, entry} <- node_table.nodes, into: %{} do
-        node = Map.fetch!(roster.nodes, name)
-        robots = for {id, {at_ms, _, _}} <- entry.robots, now_ms - at_ms < @gone_ms, do: id
-
-        {node,
-         %{
-           status: NodeTable.status(node_table, name, now_ms),
-           connected: node in connected,
-           hears: nodes(entry.hears, roster),
-           robots: Enum.sort(robots),
-           age_ms: now_ms - entry.heard_ms
-         }}
-      end
-
-    %{number: node_table.number, nodes: nodes}
-  end
-
-  defp nodes(names, roster),
-    do: for(name <- names, {:ok, node} <- [Roster.node(roster, name)], do: node)
 
   defp now, do: System.monotonic_time(:millisecond)
 end

@@ -23,6 +23,7 @@ defmodule Swarm.Supervisor do
   defmodule Parts do
     @moduledoc false
     use Supervisor
+    alias Swarm.MeshConsumer
     alias Swarm.Supervisor.BackoffSupervisor
 
     @doc false
@@ -30,7 +31,9 @@ defmodule Swarm.Supervisor do
 
     @impl Supervisor
     def init(options) do
-      mesh = for mesh <- List.wrap(options[:mesh]), do: {Swarm.Mesh.Supervisor, mesh}
+      mesh =
+        for mesh <- List.wrap(options[:mesh]), do: {Swarm.Mesh.Supervisor, {mesh, MeshConsumer}}
+
       machine = for {:machine, machine} <- options, do: {Swarm.Host.Systemd, machine}
 
       children = [

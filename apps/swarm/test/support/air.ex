@@ -34,7 +34,9 @@ defmodule Swarm.Air do
         session: options[:session] || :rand.uniform(1_000_000_000),
         strategies: gossip ++ static,
         port: 0,
-        group: group
+        group: group,
+        consumer: Swarm.MeshConsumer,
+        services: [:rows]
       )
 
     put_in(air.stations[name], protocol)

@@ -19,7 +19,7 @@ defmodule Swarm.BrakeRadioTest do
     assert others -- Map.keys(MeshNodes.call(base, Swarm.Mesh, :robots, [])) == []
 
     call = {:estop, {base.node, 1, 1}, 0}
-    assert MeshNodes.call(base, Swarm.Mesh, :cast, [:stop, call]) == :ok
+    assert MeshNodes.call(base, Swarm.Mesh, :broadcast, [:stop, call]) == :ok
     for node <- robots, do: eventually(fn -> latched?(node) end)
     # Their heartbeats tell the sender's own robot, which no datagram of its own reaches.
     eventually(fn -> latched?(base) end)

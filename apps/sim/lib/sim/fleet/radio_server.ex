@@ -7,6 +7,7 @@ defmodule Sim.Fleet.RadioServer do
   alias Robot.Names
   alias Sim.Radio
   alias Swarm.{Comms, Mesh}
+  alias Swarm.Comms.Transport
 
   @poll_ms 5
 
@@ -33,10 +34,10 @@ defmodule Sim.Fleet.RadioServer do
   end
 
   @doc false
-  @spec hand_on(counter(), atom(), [atom()], Swarm.Message.t()) :: :ok
+  @spec hand_on(counter(), atom(), :all | [atom()], Swarm.Message.t()) :: :ok
   def hand_on(counter, from, to, message) do
-    :counters.add(counter, 1, length(to))
-    Swarm.Comms.Transport.transmit(from, to, message)
+    :counters.add(counter, 1, length(addressed(from, to)))
+    Transport.transmit(from, to, message)
   end
 
   @doc "Starts a radio that loses and delays; options as of `Sim.Radio.new/1`."
@@ -48,8 +49,13 @@ defmodule Sim.Fleet.RadioServer do
   def transport(air), do: {__MODULE__, :transmit, [air]}
 
   @doc false
-  @spec transmit(pid(), atom(), [atom()], Swarm.Message.t()) :: :ok
-  def transmit(air, from, to, message), do: GenServer.cast(air, {:transmit, from, to, message})
+  @spec transmit(pid(), atom(), :all | [atom()], Swarm.Message.t()) :: :ok
+  def transmit(air, from, to, message),
+    do: GenServer.cast(air, {:transmit, from, addressed(from, to), message})
+
+  # Each counts by itself, and is lost by itself.
+  defp addressed(from, :all), do: List.delete(Transport.robots(), from)
+  defp addressed(_from, ids), do: ids
 
   @doc "What was sent and lost so far, by either radio."
   @spec counts(pid() | counter()) :: %{sent: non_neg_integer(), lost: non_neg_integer()}
@@ -89,7 +95,7 @@ defmodule Sim.Fleet.RadioServer do
   defp deliver(to, %{kind: kind} = message) do
     cond do
       Names.whereis(to, :link) -> Comms.hear(to, message)
-      is_map_key(Mesh.robots(), to) -> Mesh.speak([to], message)
+      Mesh.heard?(to) -> Mesh.speak([to], message)
       kind == :heartbeat -> Mesh.speak(:all, message)
       true -> :ok
     end

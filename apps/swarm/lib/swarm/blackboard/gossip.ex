@@ -1,6 +1,5 @@
 defmodule Swarm.Blackboard.Gossip do
   @moduledoc "How a blackboard reaches other nodes: by a transport, `{m, f, a}`, that may be a test's."
-  alias Swarm.Mesh
 
   @type call :: {module(), atom(), list()}
 
@@ -14,10 +13,6 @@ defmodule Swarm.Blackboard.Gossip do
     for to <- to, term <- terms, do: apply(m, f, a ++ [:rows | to] ++ [term])
     :ok
   end
-
-  @doc "The nodes that the mesh hears now."
-  @spec alive() :: [node()]
-  def alive, do: for({node, %{status: :alive}} <- Mesh.view().nodes, do: node)
 
   @doc "Some of the nodes, chosen at random."
   @spec some(call(), pos_integer(), :rand.state()) :: {[node()], :rand.state()}

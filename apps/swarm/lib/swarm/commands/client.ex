@@ -76,7 +76,7 @@ defmodule Swarm.Commands.Client do
 
     cond do
       pid && not Mesh.silent?(node(pid)) -> pid
-      pid || is_map_key(Mesh.robots(), id) || id in Mesh.beyond() -> {:relay, pid}
+      pid || Mesh.heard?(id) || id in Mesh.beyond() -> {:relay, pid}
       true -> nil
     end
   end

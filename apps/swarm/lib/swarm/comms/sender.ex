@@ -7,7 +7,6 @@ defmodule Swarm.Comms.Sender do
   alias Robot.{Board, Config}
   alias Swarm.{EStop, Message}
   alias Swarm.Commands.Freshness
-  alias Swarm.Comms.Transport
   alias Swarm.Comms.{OwnHeartbeat, Receiver}
   alias Swarm.Membership.Heartbeat
 
@@ -41,13 +40,13 @@ defmodule Swarm.Comms.Sender do
       latched?: EStop.written(board).latched?
     }
 
-  @doc "Says something to these robots; one that has fallen silent does not."
-  @spec speak(t(), [atom()], Message.t()) :: t()
-  def speak(%__MODULE__{silent?: true} = sender, _ids, _message), do: sender
+  @doc "Says something to these robots, or to all; one that has fallen silent does not."
+  @spec speak(t(), :all | [atom()], Message.t()) :: t()
+  def speak(%__MODULE__{silent?: true} = sender, _to, _message), do: sender
 
-  def speak(%__MODULE__{transport: {m, f, a}} = sender, ids, message) do
-    apply(m, f, a ++ [sender.config.id, ids, message])
-    %{sender | sent: sender.sent + length(ids)}
+  def speak(%__MODULE__{transport: {m, f, a}} = sender, to, message) do
+    apply(m, f, a ++ [sender.config.id, to, message])
+    %{sender | sent: sender.sent + 1}
   end
 
   @doc "A tenth of a second has passed: time for a heartbeat, or not."
@@ -93,7 +92,7 @@ defmodule Swarm.Comms.Sender do
       {:ok, message} ->
         stamps = Freshness.sent(sender.stamps, sequence, at_ms)
         sender = %{sender | stamps: stamps, beat_ms: at_ms}
-        speak(sender, List.delete(Transport.robots(), sender.config.id), message)
+        speak(sender, :all, message)
 
       :error ->
         sender

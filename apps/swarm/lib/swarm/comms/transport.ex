@@ -20,27 +20,36 @@ defmodule Swarm.Comms.Transport do
   end
 
   @doc """
-  The transport of links (`Swarm.Comms`). With a mesh the robot's own heartbeats go to everybody known, whoever is named.
-  Nobody is waited for.
+  The transport of links (`Swarm.Comms`): to these robots, or to all others that can be reached without asking who
+  that is. Nobody is waited for.
   """
-  @spec transmit(from :: atom(), [atom()], Message.t()) :: :ok
-  def transmit(from, ids, %Message{} = message) do
-    if Mesh.running?() do
-      {here, there} = Enum.split_with(ids, &(Names.whereis(&1, :link) != nil))
-      for id <- here, do: GenServer.cast(Names.via(id, :link), {:hear, message})
-      to = if own_beat?(from, message), do: :all, else: there
-      if to != [], do: Mesh.speak(to, message)
-      :ok
-    else
-      for id <- ids,
-          link <- Directory.members({:robot, id}),
-          do: Nonblocking.cast(link, {:hear, message})
-
-      :ok
-    end
+  @spec transmit(from :: atom(), :all | [atom()], Message.t()) :: :ok
+  def transmit(from, to, %Message{} = message) do
+    if Mesh.running?(),
+      do: by_mesh(from, to, message),
+      else: by_distribution(from, to, message)
   end
 
-  # One that is passed on for another robot is meant for those named.
-  defp own_beat?(from, %Message{kind: kind, from: author}),
-    do: kind == :heartbeat and author == from
+  defp by_mesh(from, :all, message) do
+    own = Names.whereis(from, :link)
+    for link <- Names.all(:link), link != own, do: GenServer.cast(link, {:hear, message})
+    Mesh.speak(:all, message)
+  end
+
+  defp by_mesh(_from, ids, message) do
+    {here, there} = Enum.split_with(ids, &(Names.whereis(&1, :link) != nil))
+    for id <- here, do: GenServer.cast(Names.via(id, :link), {:hear, message})
+    if there != [], do: Mesh.speak(there, message), else: :ok
+  end
+
+  defp by_distribution(from, :all, message),
+    do: by_distribution(from, List.delete(Directory.robots(), from), message)
+
+  defp by_distribution(_from, ids, message) do
+    for id <- ids,
+        link <- Directory.members({:robot, id}),
+        do: Nonblocking.cast(link, {:hear, message})
+
+    :ok
+  end
 end

@@ -109,7 +109,7 @@ defmodule Swarm.EStop.Broadcaster do
 
   defp send_out(call, age_ms) do
     for brake <- Directory.members(:brakes), do: Nonblocking.cast(brake, {:estop, call, age_ms})
-    Swarm.Mesh.cast(:stop, {:estop, call, age_ms})
+    Swarm.Mesh.broadcast(:stop, {:estop, call, age_ms})
   end
 
   defp now, do: System.monotonic_time(:millisecond)

@@ -6,6 +6,7 @@ defmodule Swarm.Mesh.Beacon do
   """
 
   alias Swarm.Mesh.Strategy.Static
+  alias Swarm.Mesh.WireTerm
 
   @enforce_keys [:sessions, :hears, :links, :port]
   defstruct @enforce_keys
@@ -62,7 +63,7 @@ defmodule Swarm.Mesh.Beacon do
     }
   end
 
-  defp list?(list, fun), do: Swarm.Message.WireTypes.list?(list, fun) and length(list) <= @most
+  defp list?(list, fun), do: WireTerm.list?(list, fun) and length(list) <= @most
 
   defp session?({name, session}),
     do: name?(name) and is_integer(session) and session in 0..@latest

@@ -153,11 +153,25 @@ defmodule Swarm.Mesh.NodeTable do
   @spec status(t(), name(), integer()) :: status()
   def status(node_table, name, now_ms) do
     case node_table.nodes do
-      %{^name => %{heard_ms: at_ms}} when now_ms - at_ms < @suspect_ms -> :alive
-      %{^name => %{heard_ms: at_ms}} when now_ms - at_ms < @gone_ms -> :suspect
-      _silent -> :gone
+      %{^name => %{heard_ms: heard_ms}} -> status(heard_ms, now_ms)
+      _unknown -> :gone
     end
   end
+
+  @doc """
+  The same, of a node that was last heard then.
+
+      iex> for now_ms <- [999, 1_000, 2_000], do: Swarm.Mesh.NodeTable.status(0, now_ms)
+      [:alive, :suspect, :gone]
+  """
+  @spec status(heard_ms :: integer(), now_ms :: integer()) :: status()
+  def status(heard_ms, now_ms) when now_ms - heard_ms < @suspect_ms, do: :alive
+  def status(heard_ms, now_ms) when now_ms - heard_ms < @gone_ms, do: :suspect
+  def status(_heard_ms, _now_ms), do: :gone
+
+  @doc "From when on a node must have been heard to count as alive now."
+  @spec alive_since(now_ms :: integer()) :: integer()
+  def alive_since(now_ms), do: now_ms - @suspect_ms + 1
 
   @doc "Whom this node hears, and from where, sorted."
   @spec hears(t(), integer()) :: [{name(), Swarm.Mesh.Strategy.address()}]

@@ -6,23 +6,23 @@ defmodule Swarm.Mesh.Protocol do
   | effect | means |
   |---|---|
   | `{:send, address, datagram}` | out by UDP |
-  | `{:deliver, to, message}` | a message for these robots of this node, or `:all` |
+  | `{:deliver, to, node, message}` | a message from there for these robots of this node, or `:all` |
   | `{:beat, robot, node, {boot, sequence}}` | a heartbeat of a robot there |
-  | `{:serve, service, node, term}` | for the blackboard, the brakes |
+  | `{:serve, service, node, term}` | for who takes that service's terms |
   | `{:node, change, node}` | `:up`, `:suspect`, `:gone` |
   | `{:learn, name, ip, port}` | where a node's distribution listens |
   | `{:event, name, metadata}` | for whoever logs |
   """
   alias Swarm.Mesh.{Beacon, NodeTable, Packet, Roster}
   alias Swarm.Mesh.Packet.ReplayProtection
-  alias Swarm.Message
 
   # Without a heartbeat of a robot of its own a node shows as often by beacons that it is there.
   @beat_ms 200
   # An answer to a stranger, no more often than this for each.
   @answer_ms 20
 
-  @enforce_keys [:secret, :roster, :name, :session, :guard, :node_table, :strategies, :port]
+  @enforce_keys [:secret, :roster, :name, :session, :guard, :node_table, :strategies, :port] ++
+                  [:consumer, :services]
   defstruct @enforce_keys ++
               [
                 group: nil,
@@ -38,13 +38,14 @@ defmodule Swarm.Mesh.Protocol do
   @type address :: Swarm.Mesh.Strategy.address()
   @type effect ::
           {:send, address(), binary()}
-          | {:deliver, :all | [atom()], Message.t()}
+          | {:deliver, :all | [atom()], node(), message :: term()}
           | {:beat, atom(), node(), {boot :: integer(), sequence :: integer()}}
           | {:serve, atom(), node(), term()}
           | {:node, :up | :suspect | :gone, node()}
           | {:learn, String.t(), :inet.ip4_address(), :inet.port_number()}
           | {:event, atom(), map()}
   @typedoc """
+  `consumer` reads messages (`Swarm.Mesh.Consumer`), `services` are those whose terms are let in;
   `group` is the multicast address that heartbeats go to besides, `links` to whom the distribution is connected,
   `spoke_ms` when a robot of this node was last heard by all, `answered` when a stranger last got an answer;
   `second` is the one in which `strange` counts what nobody of the fleet has signed.
@@ -58,6 +59,8 @@ defmodule Swarm.Mesh.Protocol do
           node_table: NodeTable.t(),
           strategies: [{module(), state :: term()}],
           port: :inet.port_number(),
+          consumer: module(),
+          services: [atom()],
           group: address() | nil,
           sequence: non_neg_integer(),
           links: [String.t()],
@@ -70,26 +73,16 @@ defmodule Swarm.Mesh.Protocol do
 
   @doc """
   A node's side of the protocol; `session` is random and new with each start, `strategies` are `{module, state}`, `group`
-  is the multicast address that heartbeats go to besides, `port` that of the distribution.
+  is the multicast address that heartbeats go to besides, `port` that of the distribution, `consumer` who reads
+  messages, and `services` whose terms are let in.
   """
   @spec new(keyword()) :: t()
   def new(options) do
-    [secret, roster, session, strategies, port] =
-      Enum.map([:secret, :roster, :session, :strategies, :port], &Keyword.fetch!(options, &1))
-
+    %{roster: roster, session: session} = Map.new(options)
     name = Atom.to_string(roster.me)
 
-    %__MODULE__{
-      secret: secret,
-      roster: roster,
-      name: name,
-      session: session,
-      guard: ReplayProtection.new(session),
-      node_table: NodeTable.new(name),
-      strategies: strategies,
-      port: port,
-      group: options[:group]
-    }
+    own = [name: name, guard: ReplayProtection.new(session), node_table: NodeTable.new(name)]
+    struct!(__MODULE__, options ++ own)
   end
 
   @doc "A datagram came from there."
@@ -121,7 +114,7 @@ defmodule Swarm.Mesh.Protocol do
   end
 
   @doc "A message of a robot of this node, to all nodes or to those that hold these robots."
-  @spec speak(t(), :all | [atom()], Message.t(), integer()) :: {t(), [effect()]}
+  @spec speak(t(), :all | [atom()], message :: term(), integer()) :: {t(), [effect()]}
   def speak(protocol, :all, message, now_ms) do
     to = NodeTable.addresses(protocol.node_table) ++ List.wrap(protocol.group)
     {protocol, sent} = send_all(protocol, :message, {:all, message}, to)
@@ -145,12 +138,14 @@ defmodule Swarm.Mesh.Protocol do
   def knock(protocol, address, now_ms),
     do: send_all(protocol, :beacon, beacon(protocol, now_ms), [address])
 
-  @doc "A service's term, to all nodes or to one."
-  @spec serve(t(), atom(), :all | node(), term()) :: {t(), [effect()]}
-  def serve(protocol, :stop, :all, term) do
-    # A stop goes every way there is, also to those that have just been silent.
+  @doc """
+  A service's term, to one node, to all, or `:everywhere`: also to those that have just been silent, and by
+  multicast besides.
+  """
+  @spec serve(t(), atom(), :all | :everywhere | node(), term()) :: {t(), [effect()]}
+  def serve(protocol, service, :everywhere, term) do
     to = for {_name, %{address: address}} <- protocol.node_table.nodes, do: address
-    send_all(protocol, :service, {:stop, term}, to ++ List.wrap(protocol.group))
+    send_all(protocol, :service, {service, term}, to ++ List.wrap(protocol.group))
   end
 
   def serve(protocol, service, :all, term),
@@ -219,20 +214,24 @@ defmodule Swarm.Mesh.Protocol do
      }, learn ++ rival}
   end
 
-  defp take(protocol, packet, node, {to, %Message{from: from} = message}, _address, now_ms) do
-    case {to, message} do
-      # One that is meant for some only is passed on: its robot is elsewhere.
-      {:all, %{kind: :heartbeat, body: beat}} ->
-        boot = {beat.boot, beat.sequence}
-        node_table = NodeTable.robot(protocol.node_table, packet.sender, from, boot, now_ms)
+  # A heartbeat that is meant for some only is passed on: its robot is elsewhere.
+  defp take(
+         protocol,
+         packet,
+         node,
+         {:all, message, %{beat: {_, _} = beat} = about},
+         _from,
+         now_ms
+       ) do
+    from = hd(about.robots)
+    node_table = NodeTable.robot(protocol.node_table, packet.sender, from, beat, now_ms)
 
-        {%{protocol | node_table: node_table},
-         [{:beat, from, node, boot}, {:deliver, to, message}]}
-
-      _other ->
-        {protocol, [{:deliver, to, message}]}
-    end
+    {%{protocol | node_table: node_table},
+     [{:beat, from, node, beat}, {:deliver, :all, node, message}]}
   end
+
+  defp take(protocol, _packet, node, {to, message, _about}, _address, _now_ms),
+    do: {protocol, [{:deliver, to, node, message}]}
 
   defp take(protocol, _packet, node, {service, term}, _address, _now_ms),
     do: {protocol, [{:serve, service, node, term}]}

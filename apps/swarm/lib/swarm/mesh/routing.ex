@@ -5,46 +5,46 @@ defmodule Swarm.Mesh.Routing do
   """
   alias Swarm.Mesh.NodeTable
 
-  @doc "The node that holds a robot, as far as anybody there was ever heard; of several the one heard last."
-  @spec holder(NodeTable.t(), atom()) :: NodeTable.name() | nil
-  def holder(node_table, id) do
-    held = for {name, %{robots: %{^id => {at_ms, _, _}}}} <- node_table.nodes, do: {at_ms, name}
-    if held != [], do: held |> Enum.max() |> elem(1)
-  end
-
   @doc "The robots of nodes that are not heard here, but by others that are, sorted."
   @spec beyond(NodeTable.t(), integer()) :: [atom()]
   def beyond(node_table, now_ms) do
-    alive = alive(node_table, now_ms)
-    heard = Enum.uniq(for name <- alive, other <- node_table.nodes[name].hears, do: other)
+    {alive, silent} =
+      Enum.split_with(node_table.nodes, fn {_name, entry} ->
+        NodeTable.status(entry.heard_ms, now_ms) == :alive
+      end)
 
-    Enum.sort(
-      for name <- heard -- [node_table.me | alive],
-          %{robots: robots} <- [node_table.nodes[name]],
-          {id, _heard} <- robots,
-          do: id
-    )
-  end
+    # Mostly nobody is silent, and then nothing has to be gone through.
+    case for({name, %{robots: robots}} when robots != %{} <- silent, do: {name, robots}) do
+      [] ->
+        []
 
-  @doc """
-  The connections over which something gets on now, of this node (`links`) and of those it hears. One
-  to a node that its own end does not hear is silent, though TCP may take a minute to say so.
-  """
-  @spec ways(NodeTable.t(), links :: [NodeTable.name()], integer()) :: %{
-          NodeTable.name() => [NodeTable.name()]
-        }
-  def ways(node_table, links, now_ms) do
-    alive = alive(node_table, now_ms)
-
-    for name <- alive,
-        entry = node_table.nodes[name],
-        into: %{node_table.me => common(links, alive)} do
-      {name, common(entry.links, entry.hears)}
+      silent ->
+        heard = for {_name, %{hears: hears}} <- alive, name <- hears, into: MapSet.new(), do: name
+        Enum.sort(for {name, robots} <- silent, name in heard, {id, _beat} <- robots, do: id)
     end
   end
 
-  defp alive(node_table, now_ms),
-    do: for({name, _address} <- NodeTable.hears(node_table, now_ms), do: name)
+  @doc """
+  The connections of a node over which something gets on. One to a node that its own end does not hear
+  is silent, though TCP may take a minute to say so.
 
-  defp common(links, heard), do: Enum.filter(links, &(&1 in heard))
+      iex> Swarm.Mesh.Routing.onward(%{links: ["b", "c"], hears: ["c", "d"]})
+      ["c"]
+  """
+  @spec onward(%{
+          required(:links) => [NodeTable.name()],
+          required(:hears) => [NodeTable.name()],
+          optional(any()) => any()
+        }) :: [NodeTable.name()]
+  def onward(%{links: links, hears: hears}), do: Enum.filter(links, &(&1 in hears))
+
+  @doc """
+  The connections over which something gets on now: those of the nodes that `me` hears, as `onward/1` gives them,
+  and its own (`links`) to these.
+
+      iex> Swarm.Mesh.Routing.ways(:a, [:b, :c], %{b: [:a, :c]})
+      %{a: [:b], b: [:a, :c]}
+  """
+  @spec ways(name, links :: [name], %{name => [name]}) :: %{name => [name]} when name: term()
+  def ways(me, links, alive), do: Map.put(alive, me, Enum.filter(links, &is_map_key(alive, &1)))
 end

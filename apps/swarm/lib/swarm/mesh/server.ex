@@ -1,35 +1,32 @@
 defmodule Swarm.Mesh.Server do
   @moduledoc """
   The process round `Swarm.Mesh.Protocol`: it owns the sockets, keeps the time and carries effects
-  out. What others ask often is in a table that anybody reads (`Swarm.Mesh`).
+  out. What others ask often is in a table that anybody reads (`Swarm.Mesh.Table`). What it hears goes
+  to the consumer that it is given at its start (`Swarm.Mesh.Consumer`).
 
   Sockets that cannot be opened are tried again with back-off; a robot without a network drives on.
   """
   use GenServer
   alias Hal.Event
-  alias Robot.Names
-  alias Swarm.{Comms, Nonblocking}
-  alias Swarm.Message.WireTypes
-  alias Swarm.Mesh.{Backoff, Options, Protocol, Roster, Sockets}
+  alias Swarm.Nonblocking
+  alias Swarm.Mesh.{Backoff, Options, Protocol, Roster, Sockets, Table, WireTerm}
   alias Swarm.Mesh.Distribution.{Dialer, Epmd}
 
   @tick_ms 200
   @rejoin_every 50
-  @receivers %{rows: Swarm.Blackboard, stop: Swarm.EStop}
 
-  @doc "Starts the radio of this node."
-  @spec start_link(Options.t()) :: GenServer.on_start()
-  def start_link(%Options{} = options),
-    do: GenServer.start_link(__MODULE__, options, name: __MODULE__)
+  @doc "Starts the radio of this node, with the module that takes what it hears."
+  @spec start_link({Options.t(), consumer :: module()}) :: GenServer.on_start()
+  def start_link({%Options{}, _consumer} = start),
+    do: GenServer.start_link(__MODULE__, start, name: __MODULE__)
 
   @impl GenServer
-  def init(%Options{} = options) do
+  def init({%Options{} = options, consumer}) do
     # Heartbeats must not wait behind a busy robot.
     Process.flag(:priority, :high)
-    table = :ets.new(Swarm.Mesh, [:named_table, :protected, read_concurrency: true])
-    :ets.insert(table, {:radio, self()})
+    written = Table.new()
     <<session::64>> = :crypto.strong_rand_bytes(8)
-    load()
+    services = consumer.services()
 
     protocol =
       Protocol.new(
@@ -38,18 +35,21 @@ defmodule Swarm.Mesh.Server do
         session: session,
         strategies: options.started,
         port: options.dist_port,
-        group: group(options)
+        group: group(options),
+        consumer: consumer,
+        services: Map.keys(services)
       )
 
     s = %{
       options: options,
+      consumer: consumer,
+      services: services,
       protocol: protocol,
       sockets: nil,
       backoff: Backoff.new(now()),
-      table: table,
+      written: written,
       chance: :rand.seed_s(:exsss, session),
       ticks: 0,
-      links: Names.all(:link),
       sent: 0,
       heard: 0,
       next: now()
@@ -64,24 +64,15 @@ defmodule Swarm.Mesh.Server do
   defp group(%{interface: {127, _, _, _}}), do: nil
   defp group(%{multicast: group}), do: group
 
-  # Words that come as atoms are known once the modules that say them are loaded, which without a
-  # release is when they are first called: a robot that has just been switched on would not understand
-  # what a leader says.
-  defp load do
-    for app <- [:hal, :swarm | Swarm.Missions.apps()],
-        module <- Application.spec(app, :modules) || [],
-        do: {:module, _} = Code.ensure_loaded(module)
-  end
-
   @impl GenServer
   def handle_cast({:speak, to, message}, s) do
-    if to == :all or WireTypes.names?(to),
+    if to == :all or WireTerm.names?(to),
       do: {:noreply, run(s, Protocol.speak(s.protocol, to, message, now()))},
       else: {:noreply, s}
   end
 
-  def handle_cast({:serve, service, to, term}, s)
-      when is_map_key(@receivers, service) and is_atom(to),
+  def handle_cast({:serve, service, to, term}, %{services: services} = s)
+      when is_map_key(services, service) and is_atom(to),
       do: {:noreply, run(s, Protocol.serve(s.protocol, service, to, term))}
 
   # To a node that the distribution is connected to, however that came about.
@@ -123,7 +114,7 @@ defmodule Swarm.Mesh.Server do
 
   def handle_info(:tick, s) do
     {chance, state} = :rand.uniform_s(s.chance)
-    s = open(%{s | chance: state, ticks: s.ticks + 1, links: Names.all(:link)})
+    s = open(%{s | chance: state, ticks: s.ticks + 1})
     if s.sockets && rem(s.ticks, @rejoin_every) == 0, do: Sockets.rejoin(s.sockets)
     s = run(s, Protocol.tick(s.protocol, Dialer.links(), now(), chance))
     {:noreply, s |> publish() |> schedule()}
@@ -166,24 +157,19 @@ defmodule Swarm.Mesh.Server do
     %{s | sent: s.sent + 1}
   end
 
-  defp carry_out({:beat, robot, node, {boot, sequence}}, s) do
-    :ets.insert(s.table, {{:robot, robot}, node, boot, sequence, now()})
-    if Names.whereis(robot, :link), do: Comms.rival(robot, {boot, node})
+  defp carry_out({:beat, robot, node, beat}, s) do
+    Table.beat(robot, node, beat, now())
     s
   end
 
-  defp carry_out({:deliver, :all, message}, s) do
-    for link <- s.links, do: GenServer.cast(link, {:hear, message})
-    s
-  end
-
-  defp carry_out({:deliver, ids, message}, s) do
-    for id <- ids, link = Names.whereis(id, :link), do: GenServer.cast(link, {:hear, message})
+  defp carry_out({:deliver, to, node, message}, s) do
+    s.consumer.deliver(to, node, message)
     s
   end
 
   defp carry_out({:serve, service, node, term}, s) do
-    Map.fetch!(@receivers, service).hear(node, term)
+    {m, f, a} = Map.fetch!(s.services, service)
+    apply(m, f, a ++ [node, term])
     s
   end
 
@@ -203,15 +189,9 @@ defmodule Swarm.Mesh.Server do
     s
   end
 
-  # The node table, for those who read it without asking.
-  defp publish(s) do
-    :ets.insert(
-      s.table,
-      {:node_table, s.protocol.node_table, s.protocol.roster, s.protocol.rejected}
-    )
-
-    s
-  end
+  # For those who read it without asking.
+  defp publish(%{protocol: %{node_table: node_table, roster: roster, rejected: rejected}} = s),
+    do: %{s | written: Table.write(s.written, node_table, roster, rejected, now())}
 
   # The address that the connection to a node goes to.
   defp ip(node) do

@@ -15,14 +15,17 @@ defmodule Swarm.Mesh.Supervisor do
   alias Swarm.Mesh.{CommandRelay, Options}
   alias Swarm.Mesh.Distribution.{Dialer, Libcluster}
 
-  @doc "Starts the mesh of this node, with options from `Swarm.Mesh.Options.prepare/1`."
-  @spec start_link(Options.t()) :: Supervisor.on_start()
-  def start_link(%Options{} = options), do: Supervisor.start_link(__MODULE__, options)
+  @doc """
+  Starts the mesh of this node, with options from `Swarm.Mesh.Options.prepare/1` and the module that takes what
+  it hears (`Swarm.Mesh.Consumer`).
+  """
+  @spec start_link({Options.t(), consumer :: module()}) :: Supervisor.on_start()
+  def start_link({%Options{}, _consumer} = start), do: Supervisor.start_link(__MODULE__, start)
 
   @impl Supervisor
-  def init(options) do
+  def init({options, consumer} = start) do
     children =
-      [{Mesh.Server, options}, {Dialer, options}, {CommandRelay, options}] ++ libcluster(options)
+      [{Mesh.Server, start}, {Dialer, options}, {CommandRelay, consumer}] ++ libcluster(options)
 
     Supervisor.init(children, strategy: :rest_for_one, max_restarts: 5, max_seconds: 5)
   end

@@ -2,11 +2,11 @@ defmodule Swarm.Message.WireTypes do
   @moduledoc """
   Validates terms from outside, without trusting them in any way. Pure.
   """
+  alias Swarm.Mesh.WireTerm
 
   # Of everything more than a thousand kilometres, or than a thousand robots, is nonsense.
   @far 1_000_000_000
   @count 500_000_000
-  @most 1_000
   @day_ms 86_400_000
   @latest 0xFFFFFFFFFFFFFFFF
 
@@ -31,7 +31,7 @@ defmodule Swarm.Message.WireTypes do
       [true, false, false, false]
   """
   @spec name?(term()) :: boolean()
-  def name?(term), do: is_atom(term) and term not in [nil, true, false]
+  defdelegate name?(term), to: WireTerm
 
   @doc """
   Whether it is a list of names, no more than the largest fleet has.
@@ -40,7 +40,7 @@ defmodule Swarm.Message.WireTypes do
       [true, false, false]
   """
   @spec names?(term()) :: boolean()
-  def names?(term), do: list?(term, &name?/1)
+  defdelegate names?(term), to: WireTerm
 
   @doc """
   Whether nothing is twice in a list.
@@ -58,10 +58,7 @@ defmodule Swarm.Message.WireTypes do
       [true, false, false, false]
   """
   @spec list?(term(), (term() -> boolean())) :: boolean()
-  def list?(term, check) do
-    is_list(term) and not List.improper?(term) and length(term) <= @most and
-      Enum.all?(term, check)
-  end
+  defdelegate list?(term, check), to: WireTerm
 
   @doc """
   Whether it is a whole number that a length in mm, an angle in mrad or a number of anything can be.

@@ -8,10 +8,13 @@ defmodule Swarm.Mesh.PureTest do
   doctest Swarm.Mesh.Distribution.Certs
   doctest Swarm.Mesh.Packet.ReplayProtection
   doctest Swarm.Mesh.Log
+  doctest Swarm.Mesh.NodeTable
   doctest Swarm.Mesh.Packet
   doctest Swarm.Mesh.Distribution.Topology
   doctest Swarm.Mesh.Roster
+  doctest Swarm.Mesh.Routing
   doctest Swarm.Mesh.Strategy.Static
+  doctest Swarm.Mesh.WireTerm
 
   test "up to 30 nodes everybody is connected to everybody, above that to few, and all hang together" do
     for count <- [2, 30, 31, 60, 100] do
@@ -65,18 +68,23 @@ defmodule Swarm.Mesh.PureTest do
 
   test "where a link is silent the way leads over one that hears both" do
     node_table = torn(["a", "c"])
-    ways = Routing.ways(node_table, ["b", "c"], 5_000)
+    ways = Routing.ways("a", ["b", "c"], onward(node_table))
     assert ways == %{"a" => ["b"], "b" => ["a", "c"]}
     assert Topology.route("a", "c", ways) == ["b", "c"]
-    assert Routing.holder(node_table, :mag3) == "c"
     assert Routing.beyond(node_table, 5_000) == [:mag3]
   end
 
   test "there is no way to a node that nobody hears" do
     node_table = torn(["a"])
-    assert Topology.route("a", "c", Routing.ways(node_table, ["b", "c"], 5_000)) == nil
+    assert Topology.route("a", "c", Routing.ways("a", ["b", "c"], onward(node_table))) == nil
     assert Routing.beyond(node_table, 5_000) == []
-    assert Routing.holder(node_table, :mag9) == nil
+  end
+
+  # Of those that are heard at 5 s.
+  defp onward(node_table) do
+    for {name, _address} <- NodeTable.hears(node_table, 5_000),
+        into: %{},
+        do: {name, Routing.onward(node_table.nodes[name])}
   end
 
   test "options are checked by name" do

@@ -92,13 +92,13 @@ defmodule Swarm.Mesh.ProtocolTest do
 
     assert delivered(none) == []
     assert none.stations["b"].rejected[:unknown_robot] == 1
-    assert [{_at, "b", {:deliver, [:b], _}}] = delivered(one)
+    assert [{_at, "b", {:deliver, [:b], :a@lab, _}}] = delivered(one)
   end
 
   test "a heartbeat arrives once though it comes by multicast and by name" do
     air = Air.new() |> Air.join("a") |> Air.join("b") |> Air.run(1_000)
     air = air |> Air.speak("a", :all, beat(:a, 1)) |> Air.run(5)
-    assert [{_at, "b", {:deliver, :all, message}}] = delivered(air)
+    assert [{_at, "b", {:deliver, :all, :a@lab, message}}] = delivered(air)
     assert message == beat(:a, 1)
     assert air.stations["b"].rejected == %{doubled: 1}
   end
@@ -107,10 +107,10 @@ defmodule Swarm.Mesh.ProtocolTest do
     air = Air.new() |> Air.join("a") |> Air.join("b") |> Air.join("c") |> Air.run(1_000)
     air = air |> Air.speak("b", :all, beat(:b, 1)) |> Air.run(5) |> Map.put(:out, [])
     air = air |> Air.speak("a", [:b, :c], beat(:a, 1)) |> Air.run(5)
-    assert [{_at, "b", {:deliver, [:b, :c], _message}}] = delivered(air)
+    assert [{_at, "b", {:deliver, [:b, :c], :a@lab, _message}}] = delivered(air)
   end
 
-  defp delivered(air), do: Enum.filter(air.out, &match?({_, _, {:deliver, _, _}}, &1))
+  defp delivered(air), do: Enum.filter(air.out, &match?({_, _, {:deliver, _, _, _}}, &1))
 
   test "another fleet on the same group is not heard, and hears nothing" do
     air = Air.new() |> Air.join("a") |> Air.join("b", secret: Air.secret("x")) |> Air.run(2_000)

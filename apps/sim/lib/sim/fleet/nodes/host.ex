@@ -56,7 +56,7 @@ defmodule Sim.Fleet.Nodes.Host do
            named: named
          },
          {:ok, options} <- Options.prepare(mesh(host, node())),
-         {:ok, mesh} <- Swarm.Mesh.Supervisor.start_link(options),
+         {:ok, mesh} <- Swarm.Mesh.Supervisor.start_link({options, Swarm.MeshConsumer}),
          do: {:ok, %{host | mesh: mesh}}
   end
 

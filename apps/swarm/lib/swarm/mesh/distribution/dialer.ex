@@ -99,8 +99,7 @@ defmodule Swarm.Mesh.Distribution.Dialer do
 
   # Whoever is connected, by whatever means, shall be heard too.
   defp introduce do
-    alive = for {node, %{status: :alive}} <- Swarm.Mesh.view().nodes, do: node
-    for node <- links() -- alive, do: Swarm.Mesh.introduce(node)
+    for node <- links() -- Swarm.Mesh.alive(), do: Swarm.Mesh.introduce(node)
   end
 
   defp dial(s) do

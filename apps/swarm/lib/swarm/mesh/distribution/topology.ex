@@ -36,7 +36,7 @@ defmodule Swarm.Mesh.Distribution.Topology do
       iex> Swarm.Mesh.Distribution.Topology.route("a", "c", %{"a" => ["b"], "b" => ["a", "c"]})
       ["b", "c"]
   """
-  @spec route(String.t(), String.t(), %{String.t() => [String.t()]}) :: [String.t()] | nil
+  @spec route(name, name, %{name => [name]}) :: [name] | nil when name: term()
   def route(me, target, links), do: search([[me]], target, links, MapSet.new([me]))
 
   defp chords(me, all, count, degree) do

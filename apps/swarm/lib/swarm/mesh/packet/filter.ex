@@ -3,16 +3,16 @@ defmodule Swarm.Mesh.Packet.Filter do
   What a node makes of a datagram before it changes anything by it: whether it is new, signed, of the fleet and
   of sense. Pure. Whether it was made now is for `Swarm.Mesh.Packet.ReplayProtection`.
   """
-  alias Swarm.Mesh.{Beacon, NodeTable, Packet, Roster}
+  alias Swarm.Mesh.{Beacon, Consumer, NodeTable, Packet, Roster, WireTerm}
   alias Swarm.Mesh.Packet.ReplayProtection
-  alias Swarm.Message
-  alias Swarm.Message.WireTypes
 
-  @services [:rows, :stop]
   # So many datagrams of unknown origin are looked into a second.
   @strange_per_second 2_000
 
-  @type body :: Beacon.t() | {:all | [atom()], Message.t()} | {service :: atom(), term()}
+  @type body ::
+          Beacon.t()
+          | {:all | [atom()], message :: term(), Consumer.about()}
+          | {service :: atom(), term()}
   @type refusal ::
           Packet.refusal()
           | Packet.kind()
@@ -74,25 +74,22 @@ defmodule Swarm.Mesh.Packet.Filter do
     end
   end
 
-  defp body(:message, {to, message}, protocol) do
-    with true <- to == :all or WireTypes.names?(to),
-         {:ok, %Message{} = message} <- Message.check(message),
-         true <- ours?(message, protocol.roster) || :unknown_robot do
-      {:ok, {to, message}}
+  defp body(:message, {to, term}, protocol) do
+    with true <- to == :all or WireTerm.names?(to),
+         {:ok, message, about} <- protocol.consumer.read(term) do
+      if Enum.all?(about.robots, &Roster.robot?(protocol.roster, &1)),
+        do: {:ok, {to, message, about}},
+        else: {:error, :unknown_robot}
     else
-      :unknown_robot -> {:error, :unknown_robot}
       _malformed -> {:error, :message}
     end
   end
 
-  defp body(:service, {service, term}, _station) when service in @services,
-    do: {:ok, {service, term}}
+  defp body(:service, {service, term}, protocol) do
+    if service in protocol.services,
+      do: {:ok, {service, term}},
+      else: {:error, :service}
+  end
 
-  defp body(kind, _other, _station), do: {:error, kind}
-
-  # Of one that is passed on its first sender, too.
-  defp ours?(%Message{kind: :relay, from: from, body: inner}, roster),
-    do: Roster.robot?(roster, from) and ours?(inner, roster)
-
-  defp ours?(%Message{from: from}, roster), do: Roster.robot?(roster, from)
+  defp body(kind, _other, _protocol), do: {:error, kind}
 end

@@ -1,0 +1,62 @@
+defmodule Swarm.MeshConsumer do
+  @moduledoc """
+  What the robots of this node do with what the mesh hears: messages go to their comms processes, commands too,
+  rows and stops to those parts of the node.
+  """
+  alias Robot.Names
+  alias Swarm.{Blackboard, Comms, EStop, Message, Missions}
+
+  @behaviour Swarm.Mesh.Consumer
+
+  # Words that come as atoms are known once the modules that say them are loaded, which without a
+  # release is when they are first called: a robot that has just been switched on would not understand
+  # what a leader says.
+  @impl Swarm.Mesh.Consumer
+  def services do
+    for app <- [:hal, :swarm | Missions.apps()],
+        module <- Application.spec(app, :modules) || [],
+        do: {:module, _} = Code.ensure_loaded(module)
+
+    %{rows: {Blackboard, :hear, []}, stop: {EStop, :hear, []}}
+  end
+
+  @impl Swarm.Mesh.Consumer
+  def read(term) do
+    case Message.check(term) do
+      {:ok, message} -> {:ok, message, %{robots: authors(message), beat: beat(message)}}
+      {:error, _reason} -> :error
+    end
+  end
+
+  defp authors(%Message{kind: :relay, from: from, body: inner}), do: [from | authors(inner)]
+  defp authors(%Message{from: from}), do: [from]
+
+  defp beat(%Message{kind: :heartbeat, body: beat}), do: {beat.boot, beat.sequence}
+  defp beat(_other), do: nil
+
+  @impl Swarm.Mesh.Consumer
+  def deliver(:all, node, message) do
+    rival(message, node)
+    for link <- Names.all(:link), do: GenServer.cast(link, {:hear, message})
+    :ok
+  end
+
+  def deliver(ids, _node, message) do
+    for id <- ids, link = Names.whereis(id, :link), do: GenServer.cast(link, {:hear, message})
+    :ok
+  end
+
+  # A robot of another node has the name of one of this node.
+  defp rival(%Message{kind: :heartbeat, from: from, body: beat}, node),
+    do: if(Names.whereis(from, :link), do: Comms.rival(from, {beat.boot, node}))
+
+  defp rival(_other, _node), do: :ok
+
+  @impl Swarm.Mesh.Consumer
+  def command(robot, request) do
+    case Names.whereis(robot, :link) do
+      nil -> :error
+      link -> GenServer.cast(link, request)
+    end
+  end
+end

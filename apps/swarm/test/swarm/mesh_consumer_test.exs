@@ -1,0 +1,46 @@
+defmodule Swarm.MeshConsumerTest do
+  use Swarm.Case, async: true
+  alias Swarm.Agreement.Round.Letter
+  alias Swarm.MeshConsumer
+
+  defp beat(id) do
+    beat = %Heartbeat{boot: 7, sequence: 9, pose: {0, 0, 0}, twist: {0, 0}}
+    Message.new(id, :heartbeat, beat)
+  end
+
+  test "a message is told by its authors, a heartbeat by its number" do
+    assert MeshConsumer.read(beat(:mag1)) == {:ok, beat(:mag1), %{robots: [:mag1], beat: {7, 9}}}
+    letter = %Letter{id: {1, 1, :mag1}, view: [:mag1], remaining_ms: 9, purpose: :search}
+    letter = Message.new(:mag1, :round, letter)
+    assert {:ok, ^letter, %{robots: [:mag1], beat: nil}} = MeshConsumer.read(letter)
+
+    # One that is passed on is no heartbeat of who passes it on.
+    {:ok, relay} = Message.pass_on(beat(:mag2), :mag1)
+    assert {:ok, ^relay, %{robots: [:mag1, :mag2], beat: nil}} = MeshConsumer.read(relay)
+    for junk <- [nil, :junk, %{relay | body: 1}], do: assert(MeshConsumer.read(junk) == :error)
+  end
+
+  test "each service has somebody who hears it" do
+    services = MeshConsumer.services()
+    assert Enum.sort(Map.keys(services)) == [:rows, :stop]
+
+    for {_service, {m, f, a}} <- services,
+        do: assert(function_exported?(m, f, length(a) + 2))
+  end
+
+  test "messages and commands reach the comms process of a robot, and of nobody else" do
+    {:ok, _} = Registry.register(Names, {:consumer1, :link}, nil)
+    assert MeshConsumer.deliver([:consumer1, :consumer_away], :b@lab, beat(:mag1)) == :ok
+    assert_received {:"$gen_cast", {:hear, %Message{from: :mag1}}}
+    assert MeshConsumer.command(:consumer1, {:stamp, :ref}) == :ok
+    assert_received {:"$gen_cast", {:stamp, :ref}}
+    assert MeshConsumer.command(:consumer_away, {:stamp, :ref}) == :error
+
+    # Another robot of this name is a rival, if it speaks for itself.
+    assert MeshConsumer.deliver(:all, :b@lab, beat(:consumer1)) == :ok
+    assert_received {:"$gen_cast", {:rival, {7, :b@lab}, nil}}
+    assert_received {:"$gen_cast", {:hear, _}}
+    assert MeshConsumer.deliver([:consumer1], :b@lab, beat(:consumer1)) == :ok
+    refute_received {:"$gen_cast", {:rival, _, _}}
+  end
+end
