@@ -15,7 +15,10 @@ defmodule Convoy.MixProject do
   # distribution by TLS (rel/env.sh.eex). Neither has benchmarks or the importer of Player's files.
   defp releases do
     tls = [ssl: :permanent, runtime_tools: :permanent]
-    robot = Keyword.new([:hal, :vision, :robot, :swarm, :missions, :agents], &{&1, :permanent})
+
+    robot =
+      Keyword.new([:hal, :vision, :robot, :mesh, :swarm, :missions, :agents], &{&1, :permanent})
+
     fleet = robot ++ [sim: :permanent, console: :permanent]
 
     # No cookie is made at build time: a robot's comes from its fleet's secret. `h` in a robot's shell

@@ -20,7 +20,7 @@ if name = robot || System.get_env("CONVOY_NODE") do
       {:error, :einval} -> []
     end
 
-  dist_port = number.("CONVOY_DIST_PORT", Swarm.Mesh.Distribution.Epmd.default_port(name))
+  dist_port = number.("CONVOY_DIST_PORT", Mesh.Distribution.Epmd.default_port(name))
 
   # In a release the node is the robot of its file (`Swarm.Host.ReleaseBoot`).
   config :swarm,

@@ -67,7 +67,7 @@ defmodule System.NetnsTest do
     Fleet.await(fleet, "all have met", @patience_ms, fn _lines ->
       Enum.all?(@all, fn robot ->
         Fleet.call(fleet, robot, Swarm.Directory, :robots, []) == @all and
-          map_size(Fleet.call(fleet, robot, Swarm.Mesh, :robots, [])) == length(@all) - 1
+          map_size(Fleet.call(fleet, robot, Mesh, :robots, [])) == length(@all) - 1
       end)
     end)
   end

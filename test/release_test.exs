@@ -43,7 +43,7 @@ defmodule System.ReleaseTest do
 
     File.mkdir_p!(folder)
     on_exit(fn -> File.rm_rf!(folder) end)
-    {:ok, _secret} = Swarm.Mesh.Secret.create(Path.join(folder, "secret"), false)
+    {:ok, _secret} = Mesh.Secret.create(Path.join(folder, "secret"), false)
     %{folder: folder}
   end
 
@@ -118,7 +118,7 @@ defmodule System.ReleaseTest do
 
   test "it is lean, and its programs may be run" do
     apps = for path <- File.ls!(Path.join(@release, "lib")), do: hd(String.split(path, "-"))
-    for app <- ~w(hal vision robot swarm missions agents), do: assert(app in apps)
+    for app <- ~w(hal vision robot mesh swarm missions agents), do: assert(app in apps)
     for app <- ~w(sim console player bench), do: refute(app in apps)
     for app <- ~w(sim console mix ex_unit), do: refute(app in apps)
 

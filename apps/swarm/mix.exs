@@ -12,15 +12,11 @@ defmodule Swarm.MixProject do
       elixir: "~> 1.14",
       elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
-      deps: [{:robot, in_umbrella: true} | packages(Mix.target())]
+      deps: [{:robot, in_umbrella: true}, {:mesh, in_umbrella: true}]
     ]
   end
 
   def application, do: [mod: {Swarm.Application, []}, extra_applications: [:logger, :crypto]]
-
-  # Adapters for what Hex has; with MIX_TARGET=robot. Nothing here needs them.
-  defp packages(:host), do: []
-  defp packages(_target), do: [{:libcluster, "~> 3.5"}]
 
   defp elixirc_paths(:test), do: ["lib", "test/support"]
   defp elixirc_paths(_env), do: ["lib"]

@@ -128,7 +128,7 @@ defmodule Docs.LookedAt do
   defp loaded,
     do:
       Enum.flat_map(
-        [:hal, :vision, :robot, :swarm, :missions, :agents, :player, :sim],
+        [:hal, :vision, :robot, :mesh, :swarm, :missions, :agents, :player, :sim],
         &Application.spec(&1, :modules)
       )
 

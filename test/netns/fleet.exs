@@ -6,11 +6,11 @@ defmodule Netns.Fleet do
   """
   use Agent
   alias Netns.{Log, Net, Story}
-  alias Swarm.Mesh.Secret
-  alias Swarm.Mesh.Distribution.Epmd
+  alias Mesh.Secret
+  alias Mesh.Distribution.Epmd
 
   @flags ~w(-kernel prevent_overlapping_partitions false -kernel connect_all false
-            -kernel dist_auto_connect never -start_epmd false -epmd_module Elixir.Swarm.Mesh.Distribution.Epmd
+            -kernel dist_auto_connect never -start_epmd false -epmd_module Elixir.Mesh.Distribution.Epmd
             -kernel logger_level none
             +S 1:1 +SDio 1 +sbwt none +sbwtdcpu none +sbwtdio none)
   # How often the logs are read while something is awaited.

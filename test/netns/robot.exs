@@ -52,7 +52,7 @@ defmodule Netns.Log do
 
   @impl GenServer
   def handle_info(:look, s) do
-    mesh = Swarm.Mesh.view()
+    mesh = Mesh.view()
     alive = for {node, %{status: :alive}} <- mesh.nodes, do: node
     s = changed(s, now(), :mesh, {mesh.number, Enum.sort(alive)})
 

@@ -36,15 +36,15 @@ defmodule Hal.Event do
   | `[:robot, :gate, :silent]`, `[:robot, :gate, :hung]`, `[:robot, :gate, :again]` | `at_ms` | `robot`, `line`: the same of a gate that does not step |
   | `[:robot, :pilot, :phase]` | `at_ms` | `robot`, `state`: `:idle` or `{mission, phase}` |
   | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and what the mission adds |
-  | `[:swarm, :mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): a node was not let in, or would not have us |
+  | `[:mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): a node was not let in, or would not have us |
   | `[:swarm, :part, :fell]` | `at_ms` | `id`, `reason`: a part of the node; it starts again |
   | `[:swarm, :link, :duplicate_id]` | | `robot`, `other`: a robot of this name was there before; this one is silent |
-  | `[:swarm, :mesh, :up]`, `[:swarm, :mesh, :suspect]`, `[:swarm, :mesh, :gone]` | `at_ms` | `node`: by datagrams |
-  | `[:swarm, :mesh, :connected]`, `[:swarm, :mesh, :disconnected]` | `at_ms` | `node`: by Erlang's distribution |
-  | `[:swarm, :mesh, :unknown_node]` | `at_ms` | `name`, `address`: has the secret, but is not in the roster |
-  | `[:swarm, :mesh, :duplicate_node]` | `at_ms` | `node`: another one calls itself like this one |
-  | `[:swarm, :mesh, :no_network]` | | `reason`, `interface`, `port`: no socket; tried again |
-  | `[:swarm, :mesh, :libcluster]` | `at_ms` | `reason`: it ended, and starts again |
+  | `[:mesh, :up]`, `[:mesh, :suspect]`, `[:mesh, :gone]` | `at_ms` | `node`: by datagrams |
+  | `[:mesh, :connected]`, `[:mesh, :disconnected]` | `at_ms` | `node`: by Erlang's distribution |
+  | `[:mesh, :unknown_node]` | `at_ms` | `name`, `address`: has the secret, but is not in the roster |
+  | `[:mesh, :duplicate_node]` | `at_ms` | `node`: another one calls itself like this one |
+  | `[:mesh, :no_network]` | | `reason`, `interface`, `port`: no socket; tried again |
+  | `[:mesh, :libcluster]` | `at_ms` | `reason`: it ended, and starts again |
   | `[:swarm, :responder, :failure]` | | `robot`, `service`, `kind`, `reason`: a service's code raised |
   | `[:swarm, :blackboard, :rival]` | | `robot`, `incarnation`, `node`: rows of another robot of this name came from there |
   | `[:sim, :emulator, :line]` | `at_ms` | `link`, `reason`: an emulated device has no line; tried again |

@@ -2,7 +2,7 @@ defmodule Swarm.MemberSpecTest do
   use ExUnit.Case, async: true
   alias Robot.File.Schema
   alias Swarm.{Comms, Formation, MemberSpec}
-  alias Swarm.Mesh.{Options, Roster}
+  alias Mesh.{Options, Roster}
   alias Missions.Landmark
 
   @robots Path.expand("../../../../config/robots", __DIR__)
@@ -56,7 +56,7 @@ defmodule Swarm.MemberSpecTest do
 
   test "all that a file's network may say, the mesh takes" do
     secret = Path.join(System.tmp_dir!(), "start_#{System.unique_integer([:positive])}")
-    {:ok, _secret} = Swarm.Mesh.Secret.create(secret, false)
+    {:ok, _secret} = Mesh.Secret.create(secret, false)
     on_exit(fn -> File.rm(secret) end)
 
     for more <- [

@@ -2,10 +2,10 @@ defmodule Swarm.Application do
   @moduledoc false
   use Application
   require Logger
+  alias Mesh.{Log, Options}
+  alias Mesh.Distribution.ConnectionLog
   alias Swarm.MemberSpec
   alias Swarm.Host.{ReleaseBoot, Systemd}
-  alias Swarm.Mesh.{Log, Options}
-  alias Swarm.Mesh.Distribution.ConnectionLog
 
   # With `config :swarm, boot: true`, as in a release, the node is the robot that its environment says.
   @impl Application

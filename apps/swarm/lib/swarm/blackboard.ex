@@ -20,15 +20,14 @@ defmodule Swarm.Blackboard do
 
     * `:name` - of the process and its table (`#{inspect(__MODULE__)}`)
     * `:transport` - `{m, f, a}`, called with `a ++ [:rows, term]` for all other nodes and `a ++
-      [:rows, node, term]` for one (`{Swarm.Mesh, :cast, []}`)
+      [:rows, node, term]` for one (`{Mesh, :cast, []}`)
     * `:nodes` - `{m, f, a}` that gives the nodes that are alive (of the mesh's view)
     * `:repair_ms` - between two digests (1,000; `:never` for tests that call `repair/1`)
     * `:limits` - as of `Swarm.Blackboard.State.new/1`
     * `:seed` - of the choice of nodes (a new one each time)
   """
   alias Swarm.Blackboard
-  alias Swarm.Nonblocking
-  alias Swarm.Directory.SafeTable
+  alias Mesh.{Nonblocking, SafeTable}
 
   @type age :: non_neg_integer()
 
@@ -43,8 +42,8 @@ defmodule Swarm.Blackboard do
       Keyword.validate!(options, [
         :seed,
         name: __MODULE__,
-        transport: {Swarm.Mesh, :cast, []},
-        nodes: {Swarm.Mesh, :alive, []},
+        transport: {Mesh, :cast, []},
+        nodes: {Mesh, :alive, []},
         repair_ms: 1_000,
         limits: []
       ])

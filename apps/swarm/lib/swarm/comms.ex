@@ -29,7 +29,8 @@ defmodule Swarm.Comms do
   alias Hal.{Event, Ticker}
   alias Robot.{Board, Config, Names}
   alias Robot.Control.Pilot
-  alias Swarm.{EStop, Message, Nonblocking}
+  alias Mesh.Nonblocking
+  alias Swarm.{EStop, Message}
   alias Swarm.Commands.Freshness
   alias Swarm.Comms.Transport
   alias Swarm.Directory.RobotInfo

@@ -19,7 +19,7 @@ defmodule Swarm.MemberSpec do
     end
   end
 
-  @doc "The options of the node's mesh (`Swarm.Mesh.Options`) that the file gives."
+  @doc "The options of the node's mesh (`Mesh.Options`) that the file gives."
   @spec mesh(Robot.File.t()) :: keyword()
   def mesh(%Robot.File{network: network}), do: network
 

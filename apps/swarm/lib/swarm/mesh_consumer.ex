@@ -1,26 +1,26 @@
 defmodule Swarm.MeshConsumer do
   @moduledoc """
-  What the robots of this node do with what the mesh hears: messages go to their comms processes, commands too,
-  rows and stops to those parts of the node.
+  Receives what the mesh hears for the robots of this node: messages and commands go to their comms
+  processes, the terms of services to the blackboard and the emergency stop.
   """
   alias Robot.Names
   alias Swarm.{Blackboard, Comms, EStop, Message, Missions}
 
-  @behaviour Swarm.Mesh.Consumer
+  @behaviour Mesh.Consumer
 
   # Words that come as atoms are known once the modules that say them are loaded, which without a
   # release is when they are first called: a robot that has just been switched on would not understand
   # what a leader says.
-  @impl Swarm.Mesh.Consumer
+  @impl Mesh.Consumer
   def services do
-    for app <- [:hal, :swarm | Missions.apps()],
+    for app <- [:hal, :mesh, :swarm | Missions.apps()],
         module <- Application.spec(app, :modules) || [],
         do: {:module, _} = Code.ensure_loaded(module)
 
     %{rows: {Blackboard, :hear, []}, stop: {EStop, :hear, []}}
   end
 
-  @impl Swarm.Mesh.Consumer
+  @impl Mesh.Consumer
   def read(term) do
     case Message.check(term) do
       {:ok, message} -> {:ok, message, %{robots: authors(message), beat: beat(message)}}
@@ -34,7 +34,7 @@ defmodule Swarm.MeshConsumer do
   defp beat(%Message{kind: :heartbeat, body: beat}), do: {beat.boot, beat.sequence}
   defp beat(_other), do: nil
 
-  @impl Swarm.Mesh.Consumer
+  @impl Mesh.Consumer
   def deliver(:all, node, message) do
     rival(message, node)
     for link <- Names.all(:link), do: GenServer.cast(link, {:hear, message})
@@ -46,13 +46,13 @@ defmodule Swarm.MeshConsumer do
     :ok
   end
 
-  # A robot of another node has the name of one of this node.
+  # A robot on another node has the name of one of this node.
   defp rival(%Message{kind: :heartbeat, from: from, body: beat}, node),
     do: if(Names.whereis(from, :link), do: Comms.rival(from, {beat.boot, node}))
 
   defp rival(_other, _node), do: :ok
 
-  @impl Swarm.Mesh.Consumer
+  @impl Mesh.Consumer
   def command(robot, request) do
     case Names.whereis(robot, :link) do
       nil -> :error

@@ -3,15 +3,15 @@ defmodule Swarm.Supervisor do
   The processes of which a node has one each, however many robots run on it.
 
       Swarm.Supervisor (no restarts to give)
-      |-- Robot.Names            who is who on this node
+      |-- Robot.Names                   who is who on this node
       |-- Swarm.Supervisor.Parts (one_for_one), each in the care of a Swarm.Supervisor.BackoffSupervisor
-      |   |-- Swarm.Directory    who is where in the fleet
-      |   |-- Swarm.Blackboard   what the robots tell of themselves, and leave for each other
-      |   |-- Swarm.Directory.Presence    tells who joins and leaves
-      |   |-- Swarm.EStop.Broadcaster        calls all robots to stop
-      |   |-- Swarm.Mesh.Supervisor  the other nodes, where there is a mesh
-      |   `-- Swarm.Host.Systemd    tells systemd, where there is one
-      `-- Robot.Fleet            the robots
+      |   |-- Swarm.Directory           who is where in the fleet
+      |   |-- Swarm.Blackboard          what the robots tell of themselves, and leave for each other
+      |   |-- Swarm.Directory.Presence  tells who joins and leaves
+      |   |-- Swarm.EStop.Broadcaster   calls all robots to stop
+      |   |-- Mesh.Supervisor           the other nodes, where there is a mesh; Swarm.MeshConsumer hears it
+      |   `-- Swarm.Host.Systemd        tells systemd, where there is one
+      `-- Robot.Fleet                   the robots
 
   Robots do without these parts: they drive on, and enter a new directory by themselves. However
   often a part falls, it is started again, and no robot ends for it. A fleet that
@@ -31,8 +31,7 @@ defmodule Swarm.Supervisor do
 
     @impl Supervisor
     def init(options) do
-      mesh =
-        for mesh <- List.wrap(options[:mesh]), do: {Swarm.Mesh.Supervisor, {mesh, MeshConsumer}}
+      mesh = for mesh <- List.wrap(options[:mesh]), do: {Mesh.Supervisor, {mesh, MeshConsumer}}
 
       machine = for {:machine, machine} <- options, do: {Swarm.Host.Systemd, machine}
 
@@ -49,7 +48,7 @@ defmodule Swarm.Supervisor do
   end
 
   @doc """
-  Starts the node's parts, without a robot; `mesh` as prepared by `Swarm.Mesh.Options.prepare/1`, `machine` the
+  Starts the node's parts, without a robot; `mesh` as prepared by `Mesh.Options.prepare/1`, `machine` the
   options of `Swarm.Host.Systemd`.
   """
   @spec start_link(keyword()) :: Supervisor.on_start()

@@ -3,7 +3,7 @@ defmodule Swarm.MeshNodes.Absurd do
   What a robot with a bug would sign and send: each of the mesh's messages with each of its fields
   replaced by each term of no sense. Run on a test's node.
   """
-  alias Swarm.{Mesh, Message}
+  alias Swarm.Message
   alias Swarm.Agreement.Round
   alias Swarm.Formation.Reference
   alias Swarm.Membership.Heartbeat

@@ -6,9 +6,9 @@ defmodule Swarm.MeshNodes.Junk do
   """
 
   @names [
-    Swarm.Mesh.CommandRelay,
-    Swarm.Mesh.Distribution.Dialer,
-    Swarm.Mesh.Server,
+    Mesh.CommandRelay,
+    Mesh.Distribution.Dialer,
+    Mesh.Server,
     Swarm.EStop.Broadcaster,
     Swarm.Directory.Presence,
     Swarm.Blackboard

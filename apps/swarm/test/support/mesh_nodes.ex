@@ -5,7 +5,7 @@ defmodule Swarm.MeshNodes do
   several checkouts may run at once.
 
       nodes = Swarm.MeshNodes.start(3)
-      Swarm.MeshNodes.call(hd(nodes), Swarm.Mesh, :view, [])
+      Swarm.MeshNodes.call(hd(nodes), Mesh, :view, [])
       Swarm.MeshNodes.signal(hd(nodes), "KILL")
 
   `start/2` takes `mesh: false` for nodes without a mesh, mesh options under `mesh: [...]`, further
@@ -13,7 +13,7 @@ defmodule Swarm.MeshNodes do
   `one_by_one: true` for nodes that join the fleet in their order, not all at once.
   """
   import ExUnit.Callbacks, only: [on_exit: 1]
-  alias Swarm.Mesh.Secret
+  alias Mesh.Secret
 
   @enforce_keys [:peer, :node, :name, :pid]
   defstruct @enforce_keys

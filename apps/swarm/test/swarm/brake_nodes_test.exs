@@ -1,7 +1,8 @@
 defmodule Swarm.BrakeNodesTest do
   use Swarm.Case, async: false
-  alias Swarm.{Cluster, Nonblocking}
+  alias Mesh.Nonblocking
   alias Robot.Mission.Manual
+  alias Swarm.Cluster
   @moduletag :cluster
   @moduletag :capture_log
 

@@ -14,12 +14,12 @@ defmodule Swarm.BrakeRadioTest do
   test "a stop that comes by datagram alone holds the robots of all other nodes" do
     [base | robots] = nodes = MeshNodes.start(3, robots: true)
     others = for node <- robots, do: node.name
-    hears? = fn node -> map_size(MeshNodes.call(node, Swarm.Mesh, :robots, [])) == 2 end
+    hears? = fn node -> map_size(MeshNodes.call(node, Mesh, :robots, [])) == 2 end
     for node <- nodes, do: eventually(fn -> hears?.(node) end)
-    assert others -- Map.keys(MeshNodes.call(base, Swarm.Mesh, :robots, [])) == []
+    assert others -- Map.keys(MeshNodes.call(base, Mesh, :robots, [])) == []
 
     call = {:estop, {base.node, 1, 1}, 0}
-    assert MeshNodes.call(base, Swarm.Mesh, :broadcast, [:stop, call]) == :ok
+    assert MeshNodes.call(base, Mesh, :broadcast, [:stop, call]) == :ok
     for node <- robots, do: eventually(fn -> latched?(node) end)
     # Their heartbeats tell the sender's own robot, which no datagram of its own reaches.
     eventually(fn -> latched?(base) end)

@@ -5,7 +5,7 @@ defmodule Bench.Mesh.Convoy do
   """
   alias Bench.Mesh.{Agent, IdleDrive, Watch}
   alias Agents.{Conversation, Envelope}
-  alias Swarm.{Commands, Directory, Mesh}
+  alias Swarm.{Commands, Directory}
 
   @patience_ms 2_000
   @look_ms 5
@@ -123,13 +123,12 @@ defmodule Bench.Mesh.Convoy do
   defp attach(change) do
     Hal.Event.detach({__MODULE__, change})
 
-    :ok =
-      Hal.Event.attach({__MODULE__, change}, [:swarm, :mesh, change], &__MODULE__.note/4, self())
+    :ok = Hal.Event.attach({__MODULE__, change}, [:mesh, change], &__MODULE__.note/4, self())
   end
 
   @doc false
   @spec note(Hal.Event.name(), map(), map(), pid()) :: term()
-  def note([:swarm, :mesh, change], _measurements, %{node: node}, pid),
+  def note([:mesh, change], _measurements, %{node: node}, pid),
     do: send(pid, {:mesh, change, node})
 
   @doc "Lets this node say nothing by datagram any more, or again; says when."

@@ -3,10 +3,9 @@ defmodule Bench.Mesh.Nodes do
   Nodes to measure, each a VM of its own. They are controlled over standard input and output, so
   that this process is not part of the measurement, and end when it does.
   """
-  alias Bench.Mesh
-  alias Bench.Mesh.{Bare, Watch}
+  alias Bench.Mesh.{Bare, Convoy, Watch}
   alias Bench.Vm
-  alias Swarm.Mesh.Secret
+  alias Mesh.Secret
 
   @enforce_keys [:name, :node, :peer, :pid, :began_ns]
   defstruct @enforce_keys
@@ -75,7 +74,7 @@ defmodule Bench.Mesh.Nodes do
         ["+S", "#{schedulers}:#{schedulers}"] ++ @emulator ++ @kernel ++ fleet.flags
       )
 
-    code = if fleet.kind == :ours, do: Mesh.Convoy, else: Bare
+    code = if fleet.kind == :ours, do: Convoy, else: Bare
     :ok = :peer.call(peer, code, :main, [fleet.mesh, robots], @boot_ms)
     pid = to_string(:peer.call(peer, :os, :getpid, []))
     %__MODULE__{name: name, node: node, peer: peer, pid: pid, began_ns: began_ns}

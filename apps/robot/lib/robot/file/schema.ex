@@ -83,7 +83,7 @@ defmodule Robot.File.Schema do
      max_turn_acceleration: {:number, 0.01, 10.0, "rad/s2"}}
   end
 
-  @doc "What a node's mesh takes; `Swarm.Mesh.Options` has more that no file can say."
+  @doc "What a node's mesh takes; `Mesh.Options` has more that no file can say."
   @spec network() :: Type.t()
   def network do
     {:keys,

@@ -6,7 +6,7 @@ defmodule Sim.Fleet.Mission do
   alias Sim.Trial.Setup
 
   # What a process of its own has on board.
-  @apps [:hal, :vision, :robot, :swarm, :sim]
+  @apps [:hal, :vision, :robot, :mesh, :swarm, :missions, :sim]
 
   @doc """
   The setup with that mission, and whether it is to begin; or one line.

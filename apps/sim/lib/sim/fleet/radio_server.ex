@@ -6,7 +6,7 @@ defmodule Sim.Fleet.RadioServer do
   use GenServer
   alias Robot.Names
   alias Sim.Radio
-  alias Swarm.{Comms, Mesh}
+  alias Swarm.Comms
   alias Swarm.Comms.Transport
 
   @poll_ms 5

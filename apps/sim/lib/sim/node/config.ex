@@ -6,7 +6,7 @@ defmodule Sim.Node.Config do
 
   @typedoc """
   `launcher` is the process that hears of everything, `mesh` are the options of
-  `Swarm.Mesh.Options`, `part` is a
+  `Mesh.Options`, `part` is a
   `Sim.Node` with its options.
   """
   @type t :: %__MODULE__{

@@ -12,10 +12,9 @@ defmodule Swarm.Blackboard.Hints do
   256 of them, deleted ones of the last ten minutes too; the newest stay. They spread as rows do, and
   live as long as a node is there that has them.
   """
+  alias Mesh.{Nonblocking, SafeTable}
   alias Swarm.Blackboard.{Codec, Rows}
-  alias Swarm.Directory.SafeTable
   alias Swarm.Message.WireTypes
-  alias Swarm.Nonblocking
 
   @board Swarm.Blackboard
 

@@ -4,7 +4,8 @@ defmodule Swarm.Commands.Client do
   # brake, all else to its link. A command for another node bears a stamp (`Swarm.Commands.Freshness`); who has
   # none at hand asks the robot for one first.
   alias Robot.{Board, Names}
-  alias Swarm.{Directory, EStop, Mesh, Nonblocking}
+  alias Mesh.Nonblocking
+  alias Swarm.{Directory, EStop}
   alias Swarm.Commands.Freshness
 
   @answer_ms 500

@@ -24,14 +24,15 @@ defmodule Swarm.Comms.CommandHandler do
   alias Robot.Control.{Delivery, Pilot}
   alias Robot.Safety.{LivenessMonitor, Readiness}
   alias Robot.Mission.Manual
-  alias Swarm.{Missions, Nonblocking, Status}
+  alias Mesh.Nonblocking
+  alias Swarm.{Missions, Status}
   alias Swarm.Commands.Order
   alias Swarm.Comms.{PingReply, Receiver}
 
   # Whoever asks has half a second (`Swarm.Commands.Client`): later nothing is begun.
   @carry_out_ms 400
 
-  @doc "Takes a request, which the process behind `ref` (`Swarm.Nonblocking.answer/2`) is told the outcome of."
+  @doc "Takes a request, which the process behind `ref` (`Mesh.Nonblocking.answer/2`) is told the outcome of."
   @spec take(term(), reference(), Config.t(), Board.t(), Receiver.t()) :: :ok
   def take(request, ref, config, board, receiver) do
     case judge(request, config, board, receiver) do

@@ -6,7 +6,8 @@ defmodule Swarm.Comms.NameClaim do
   They find each other in the directory, where both comms processes are in one group and tell each other who
   they are, once a second; or by radio, where each hears heartbeats that are not its own.
   """
-  alias Swarm.{Directory, Nonblocking}
+  alias Mesh.Nonblocking
+  alias Swarm.Directory
 
   @enforce_keys [:robot, :me]
   defstruct @enforce_keys ++ [entry: nil]

@@ -5,7 +5,8 @@ defmodule Swarm.Comms.Transport do
   connected by hand, over Erlang's distribution.
   """
   alias Robot.Names
-  alias Swarm.{Directory, Mesh, Message, Nonblocking}
+  alias Mesh.Nonblocking
+  alias Swarm.{Directory, Message}
 
   @doc """
   All robots that can be spoken to, sorted: in the directory, heard by radio from nodes that this one

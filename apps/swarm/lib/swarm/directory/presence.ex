@@ -8,7 +8,8 @@ defmodule Swarm.Directory.Presence do
   connection ended, and that is heard on, joins again as soon as that is certain.
   """
   use GenServer
-  alias Swarm.{Directory, Mesh, Nonblocking}
+  alias Mesh.Nonblocking
+  alias Swarm.Directory
   alias Swarm.Directory.RobotInfo
 
   @look_ms 100

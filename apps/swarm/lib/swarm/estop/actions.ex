@@ -6,7 +6,8 @@ defmodule Swarm.EStop.Actions do
   alias Robot.{Board, Config, Names}
   alias Robot.Control.{Executive, Pilot}
   alias Robot.Safety.Gate
-  alias Swarm.{EStop, Nonblocking}
+  alias Mesh.Nonblocking
+  alias Swarm.EStop
   alias Swarm.EStop.Broadcaster
 
   # Whoever asks has half a second (`Swarm.Commands.Client`): a robot that nobody was told of stays held.

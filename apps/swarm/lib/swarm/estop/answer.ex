@@ -2,7 +2,7 @@ defmodule Swarm.EStop.Answer do
   @moduledoc "What a gate that has carried out a stop says to the e-stop process, or to whoever asked for it."
   alias Robot.{Board, Names}
   alias Robot.Safety.Readiness
-  alias Swarm.Nonblocking
+  alias Mesh.Nonblocking
 
   @doc """
   What the robot was at has ended, says its gate: it may be released, before that time (monotonic, ms; who asked for

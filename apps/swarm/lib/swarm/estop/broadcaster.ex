@@ -11,7 +11,8 @@ defmodule Swarm.EStop.Broadcaster do
   switched on afterwards is not stopped by one.
   """
   use GenServer
-  alias Swarm.{Directory, Nonblocking}
+  alias Mesh.Nonblocking
+  alias Swarm.Directory
   alias Swarm.EStop.Calls
 
   @times 10
@@ -109,7 +110,7 @@ defmodule Swarm.EStop.Broadcaster do
 
   defp send_out(call, age_ms) do
     for brake <- Directory.members(:brakes), do: Nonblocking.cast(brake, {:estop, call, age_ms})
-    Swarm.Mesh.broadcast(:stop, {:estop, call, age_ms})
+    Mesh.broadcast(:stop, {:estop, call, age_ms})
   end
 
   defp now, do: System.monotonic_time(:millisecond)

@@ -3,7 +3,8 @@ defmodule Swarm.EStop.Server do
   use GenServer
   alias Robot.{Board, Config, Names}
   alias Swarm.EStop
-  alias Swarm.{Directory, Nonblocking}
+  alias Mesh.Nonblocking
+  alias Swarm.Directory
   alias Swarm.Commands.Freshness
 
   @impl GenServer

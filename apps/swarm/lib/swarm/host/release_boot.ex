@@ -14,8 +14,8 @@ defmodule Swarm.Host.ReleaseBoot do
   """
   alias Robot.File.Summary
   alias Swarm.Host.PowerOff
-  alias Swarm.Mesh.Secret
-  alias Swarm.Mesh.Distribution.Epmd
+  alias Mesh.Secret
+  alias Mesh.Distribution.Epmd
   alias Swarm.MemberSpec
 
   @machine "/etc/convoy/robots"

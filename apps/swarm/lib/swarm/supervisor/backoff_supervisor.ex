@@ -9,7 +9,7 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
   """
   use GenServer
   alias Hal.Event
-  alias Swarm.Mesh.Backoff
+  alias Mesh.Backoff
 
   # So many falls within that time are not the rule yet.
   @falls 5

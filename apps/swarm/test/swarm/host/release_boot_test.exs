@@ -1,7 +1,7 @@
 defmodule Swarm.Host.ReleaseBootTest do
   use ExUnit.Case, async: true
   alias Swarm.Host.ReleaseBoot
-  alias Swarm.Mesh.Secret
+  alias Mesh.Secret
 
   doctest ReleaseBoot
 

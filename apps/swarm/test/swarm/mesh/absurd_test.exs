@@ -6,8 +6,8 @@ defmodule Swarm.Mesh.AbsurdTest do
   alias Swarm.MeshNodes
 
   @parts [
-    Swarm.Mesh.Server,
-    Swarm.Mesh.Distribution.Dialer,
+    Mesh.Server,
+    Mesh.Distribution.Dialer,
     Swarm.EStop.Broadcaster,
     Swarm.Blackboard,
     Swarm.Directory.Presence
@@ -20,7 +20,7 @@ defmodule Swarm.Mesh.AbsurdTest do
   end
 
   defp hears?(one, two),
-    do: match?(%{status: :alive}, MeshNodes.call(one, Swarm.Mesh, :view, []).nodes[two.node])
+    do: match?(%{status: :alive}, MeshNodes.call(one, Mesh, :view, []).nodes[two.node])
 
   test "it fells nothing and moves nobody, and is understood when it makes sense again" do
     [one, two] = MeshNodes.start(2, robots: true)
@@ -30,15 +30,15 @@ defmodule Swarm.Mesh.AbsurdTest do
     MeshNodes.call(two, Swarm.MeshNodes.Absurd, :send_all, [two.name, 7], 60_000)
     before = parts(one)
     atoms = MeshNodes.call(one, :erlang, :system_info, [:atom_count])
-    heard = MeshNodes.call(one, Swarm.Mesh, :counts, []).heard
+    heard = MeshNodes.call(one, Mesh, :counts, []).heard
 
     sent = MeshNodes.call(two, Swarm.MeshNodes.Absurd, :send_all, [two.name, 2], 60_000)
     # What is larger than a datagram does not even go out.
     assert eventually(fn ->
-             MeshNodes.call(one, Swarm.Mesh, :counts, []).heard - heard > sent / 2
+             MeshNodes.call(one, Mesh, :counts, []).heard - heard > sent / 2
            end)
 
-    assert MeshNodes.call(one, Swarm.Mesh, :rejected, [])[:message] > 100
+    assert MeshNodes.call(one, Mesh, :rejected, [])[:message] > 100
 
     assert parts(one) == before
     assert MeshNodes.call(one, :erlang, :system_info, [:atom_count]) - atoms < 10

@@ -10,9 +10,9 @@ defmodule Swarm.Mesh.FallsTest do
     Swarm.Directory.Presence,
     Swarm.EStop.Broadcaster,
     Swarm.Directory,
-    Swarm.Mesh.CommandRelay,
-    Swarm.Mesh.Distribution.Dialer,
-    Swarm.Mesh.Server
+    Mesh.CommandRelay,
+    Mesh.Distribution.Dialer,
+    Mesh.Server
   ]
   @times 5
 
@@ -25,7 +25,7 @@ defmodule Swarm.Mesh.FallsTest do
   end
 
   defp whole?(one, two) do
-    seen = MeshNodes.call(one, Swarm.Mesh, :view, []).nodes
+    seen = MeshNodes.call(one, Mesh, :view, []).nodes
     match?(%{^two => %{status: :alive, connected: true}}, seen)
   end
 

@@ -3,20 +3,20 @@ defmodule Swarm.Mesh.FloodTest do
   use ExUnit.Case, async: false
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes
-  alias Swarm.Mesh.Packet
+  alias Mesh.Packet
 
   @datagrams 100_000
 
   setup do
     [one, two] = MeshNodes.start(2, robots: true)
-    %{port: port} = MeshNodes.call(one, Swarm.Mesh, :counts, [])
+    %{port: port} = MeshNodes.call(one, Mesh, :counts, [])
     {:ok, socket} = :gen_udp.open(0, [:binary, active: false, ip: {127, 0, 0, 1}])
     assert eventually(fn -> hears?(one, two) end)
     %{one: one, two: two, send: &:gen_udp.send(socket, {127, 0, 0, 1}, port, &1)}
   end
 
   defp hears?(one, two) do
-    match?(%{status: :alive}, MeshNodes.call(one, Swarm.Mesh, :view, []).nodes[two.node])
+    match?(%{status: :alive}, MeshNodes.call(one, Mesh, :view, []).nodes[two.node])
   end
 
   defp state(node) do
@@ -24,7 +24,7 @@ defmodule Swarm.Mesh.FloodTest do
     {:ok, _doing, at_ms} = MeshNodes.call(node, Robot.Board, :fetch, [board, :doing, :infinity])
 
     %{
-      radio: MeshNodes.call(node, Process, :whereis, [Swarm.Mesh.Server]),
+      radio: MeshNodes.call(node, Process, :whereis, [Mesh.Server]),
       atoms: MeshNodes.call(node, :erlang, :system_info, [:atom_count]),
       memory: MeshNodes.call(node, :erlang, :memory, [:total]),
       tick_ms: at_ms
@@ -58,12 +58,12 @@ defmodule Swarm.Mesh.FloodTest do
       tick_ms = state(one).tick_ms
       assert eventually(fn -> state(one).tick_ms > tick_ms + 500 end)
       assert :ok = MeshNodes.call(one, Swarm, :stop, [one.name])
-      assert %{not_ours: _, throttled: _} = MeshNodes.call(one, Swarm.Mesh, :rejected, [])
+      assert %{not_ours: _, throttled: _} = MeshNodes.call(one, Mesh, :rejected, [])
       state(one)
     end
 
     # A module that is loaded brings its own atoms, and memory.
-    for app <- [:kernel, :stdlib, :elixir, :hal, :vision, :robot, :swarm] do
+    for app <- [:kernel, :stdlib, :elixir, :hal, :vision, :robot, :mesh, :swarm] do
       modules = MeshNodes.call(one, Application, :spec, [app, :modules])
       MeshNodes.call(one, :code, :ensure_modules_loaded, [modules])
     end

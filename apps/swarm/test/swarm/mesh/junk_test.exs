@@ -22,7 +22,7 @@ defmodule Swarm.Mesh.JunkTest do
   end
 
   defp hears?(one, two),
-    do: match?(%{status: :alive}, MeshNodes.call(one, Swarm.Mesh, :view, []).nodes[two.node])
+    do: match?(%{status: :alive}, MeshNodes.call(one, Mesh, :view, []).nodes[two.node])
 
   defp grown(node) do
     for pid <- MeshNodes.call(node, Process, :list, []),

@@ -11,7 +11,7 @@ defmodule Swarm.MeshSizeTest do
   defp others(node, nodes), do: Enum.sort(for n <- nodes, n.node != node.node, do: n.node)
 
   defp met?(node, nodes) do
-    seen = Cluster.call(node, Swarm.Mesh, :view, []).nodes
+    seen = Cluster.call(node, Mesh, :view, []).nodes
     alive = for {other, %{status: :alive}} <- seen, do: other
     Enum.sort(alive) == others(node, nodes)
   end

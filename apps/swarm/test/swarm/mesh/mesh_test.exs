@@ -6,7 +6,7 @@ defmodule Swarm.MeshTest do
   alias Swarm.MeshNodes, as: Cluster
 
   defp alive(node) do
-    for {other, %{status: :alive}} <- Cluster.call(node, Swarm.Mesh, :view, []).nodes, do: other
+    for {other, %{status: :alive}} <- Cluster.call(node, Mesh, :view, []).nodes, do: other
   end
 
   defp linked(node), do: Cluster.call(node, Node, :list, [])
@@ -28,7 +28,7 @@ defmodule Swarm.MeshTest do
 
     # Its robot is in its next beacon.
     assert eventually(fn ->
-             seen = Cluster.call(one, Swarm.Mesh, :view, []).nodes[two.node]
+             seen = Cluster.call(one, Mesh, :view, []).nodes[two.node]
              %{status: :alive, connected: true, robots: robots} = seen
              robots == [two.name]
            end)
@@ -60,11 +60,11 @@ defmodule Swarm.MeshTest do
     # A cookie that only these two have for each other: neither can connect again.
     Cluster.call(one, :erlang, :set_cookie, [two.node, :wrong])
     true = Cluster.call(one, Node, :disconnect, [two.node])
-    number = Cluster.call(three, Swarm.Mesh, :view, []).number
+    number = Cluster.call(three, Mesh, :view, []).number
     assert eventually(fn -> two.node not in linked(one) end)
     assert Enum.sort(linked(three)) == others(three, nodes)
     assert met?(one, nodes) and met?(two, nodes)
-    assert Cluster.call(three, Swarm.Mesh, :view, []).number == number
+    assert Cluster.call(three, Mesh, :view, []).number == number
 
     # The command goes by way of the third.
     assert eventually(fn -> Cluster.call(one, Swarm, :stop, [two.name]) == :ok end)
@@ -72,7 +72,7 @@ defmodule Swarm.MeshTest do
 
   test "where multicast is blocked a list of addresses does" do
     [one] = Cluster.start(1, mesh: [multicast: false])
-    %{port: port} = Cluster.call(one, Swarm.Mesh, :counts, [])
+    %{port: port} = Cluster.call(one, Mesh, :counts, [])
     mesh = Cluster.call(one, Application, :get_env, [:swarm, :mesh])
     peers = Keyword.put(mesh, :peers, ["127.0.0.1:#{port}"])
     Cluster.call(one, Application, :put_env, [:swarm, :mesh, peers])

@@ -101,7 +101,7 @@ defmodule Swarm.RowsMeshTest do
     # Both planes know of both before anything happens.
     for other <- [two, three] do
       assert eventually(fn ->
-               Map.has_key?(Cluster.call(one, Swarm.Mesh, :robots, []), other.name)
+               Map.has_key?(Cluster.call(one, Mesh, :robots, []), other.name)
              end)
 
       assert eventually(fn ->

@@ -8,7 +8,7 @@ defmodule Sim.Fleet.Nodes.Child do
   alias Sim.Node.Config
 
   # With the shell, for those who attach.
-  @apps [:elixir, :iex, :logger, :hal, :vision, :robot, :swarm, :missions, :sim]
+  @apps [:elixir, :iex, :logger, :hal, :vision, :robot, :mesh, :swarm, :missions, :sim]
   @own_flags ~w(ERL_FLAGS ERL_AFLAGS ERL_ZFLAGS ELIXIR_ERL_OPTIONS)
   @kept_bytes 4_000
   @end_ms 2_000

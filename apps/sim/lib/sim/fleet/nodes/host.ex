@@ -9,7 +9,7 @@ defmodule Sim.Fleet.Nodes.Host do
   """
   alias Sim.Fleet.Folder
   alias Sim.Fleet.Nodes.PortMapper
-  alias Swarm.Mesh.{Options, Secret}
+  alias Mesh.{Options, Secret}
 
   @host "127.0.0.1"
   @address {127, 0, 0, 1}
@@ -56,7 +56,7 @@ defmodule Sim.Fleet.Nodes.Host do
            named: named
          },
          {:ok, options} <- Options.prepare(mesh(host, node())),
-         {:ok, mesh} <- Swarm.Mesh.Supervisor.start_link({options, Swarm.MeshConsumer}),
+         {:ok, mesh} <- Mesh.Supervisor.start_link({options, Swarm.MeshConsumer}),
          do: {:ok, %{host | mesh: mesh}}
   end
 
@@ -88,7 +88,7 @@ defmodule Sim.Fleet.Nodes.Host do
   end
 
   defp alone do
-    if Swarm.Mesh.running?(),
+    if Mesh.running?(),
       do:
         {:error, "this node belongs to a mesh already; robots in nodes of their own need another"},
       else: :ok

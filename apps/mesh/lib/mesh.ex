@@ -1,0 +1,172 @@
+defmodule Mesh do
+  @moduledoc """
+  A node among others: who is there, and how to reach them.
+
+  Two planes. Datagrams carry what must be new or is worth nothing, and they alone decide who is
+  alive: after a cut the next one arrives at once. Erlang's distribution carries what needs an
+  answer. A connection that has gone silent holds up nobody, and one that is lost changes no view.
+
+  Without a mesh (`config :swarm, mesh: false`) a node's robots have only each other, and whom
+  somebody has connected by hand. `docs/networking.md` tells how to set it up.
+  """
+  alias Mesh.{CommandRelay, NodeTable, Nonblocking, Packet, Routing, Table}
+
+  @typedoc """
+  How a node sees the others: `number` grows with each change of who is there; for each node its
+  `status`, whether the distribution is `connected`, whom it `hears`, which `robots` it holds, and how
+  long ago it was heard.
+  """
+  @type view :: %{
+          number: non_neg_integer(),
+          nodes: %{
+            node() => %{
+              status: NodeTable.status(),
+              connected: boolean(),
+              hears: [node()],
+              robots: [atom()],
+              age_ms: non_neg_integer()
+            }
+          }
+        }
+
+  # A robot whose heartbeat is older is gone.
+  @gone_ms 2_000
+
+  @doc "Whether this node has a mesh."
+  @spec running?() :: boolean()
+  def running?, do: Table.there?()
+
+  @doc """
+  Sends a robot's message by datagram, which may be lost: to all other nodes, or to those that hold
+  these robots. Without a mesh nothing is sent.
+  """
+  @spec speak(:all | [atom()], message :: term()) :: :ok
+  def speak(to, message), do: tell({:speak, to, message})
+
+  @doc """
+  Sends a service's term to all other nodes, by datagram: it may be lost, doubled or come out of
+  order. One of more than 60,000 bytes is refused. Without a mesh nothing is sent. The node's consumer defines the
+  services (`c:Mesh.Consumer.services/0`).
+  """
+  @spec cast(service :: atom(), term()) :: :ok | {:error, :too_big}
+  def cast(service, term), do: serve(service, :all, term)
+
+  @doc "The same, to one node."
+  @spec cast(service :: atom(), node(), term()) :: :ok | {:error, :too_big}
+  def cast(service, node, term), do: serve(service, node, term)
+
+  @doc """
+  Sends a service's term by every route: to all nodes, including those that have been silent, and by multicast.
+  """
+  @spec broadcast(service :: atom(), term()) :: :ok | {:error, :too_big}
+  def broadcast(service, term), do: serve(service, :everywhere, term)
+
+  defp serve(service, to, term) do
+    if :erlang.external_size(term) > Packet.largest(),
+      do: {:error, :too_big},
+      else: tell({:serve, service, to, term})
+  end
+
+  @doc "Tells a connected node where this one is to be heard, and so gets to hear it."
+  @spec introduce(node()) :: :ok
+  def introduce(node), do: tell({:introduce, node})
+
+  @doc "The robots of other nodes that were heard within the last 2 s, and their nodes."
+  @spec robots() :: %{atom() => node()}
+  def robots, do: Map.new(Table.robots(now() - @gone_ms + 1))
+
+  @doc "Whether a robot of another node was heard within the last 2 s."
+  @spec heard?(atom()) :: boolean()
+  def heard?(robot), do: match?({_boot, _sequence, age} when age < @gone_ms, beat(robot))
+
+  @doc """
+  The robots on nodes that this node does not hear but that others hear, sorted: commands reach them over those
+  others. At most 200 ms old.
+  """
+  @spec beyond() :: [atom()]
+  def beyond, do: Table.value(:beyond, [])
+
+  @doc "The newest heartbeat heard of a robot of another node: `{boot, sequence, age_ms}`."
+  @spec beat(atom()) :: {integer(), non_neg_integer(), age_ms :: non_neg_integer()} | nil
+  def beat(robot) do
+    with {_node, boot, sequence, at_ms} <- Table.robot(robot),
+         do: {boot, sequence, now() - at_ms}
+  end
+
+  @doc "The other nodes that this node hears now."
+  @spec alive() :: [node()]
+  def alive, do: Table.nodes(NodeTable.alive_since(now()))
+
+  @doc "All nodes as seen from here. Copies everything that is known, so it is for people and tests."
+  @spec view() :: view()
+  def view do
+    now_ms = now()
+    connected = Node.list()
+    held = Enum.group_by(robots(), &elem(&1, 1), &elem(&1, 0))
+
+    nodes =
+      for {node, heard_ms, hears} <- Table.all(), into: %{} do
+        {node,
+         %{
+           status: NodeTable.status(heard_ms, now_ms),
+           connected: node in connected,
+           hears: hears,
+           robots: Enum.sort(Map.get(held, node, [])),
+           age_ms: now_ms - heard_ms
+         }}
+      end
+
+    %{number: Table.value(:number, 0), nodes: nodes}
+  end
+
+  @doc "What was dropped, by reason, since the start; at most 200 ms old."
+  @spec rejected() :: %{atom() => pos_integer()}
+  def rejected, do: Table.value(:rejected, %{})
+
+  @doc "How many datagrams the radio has sent, heard and rejected, and its UDP port; `nil` without a network."
+  @spec counts() ::
+          %{
+            sent: non_neg_integer(),
+            heard: non_neg_integer(),
+            rejected: %{atom() => pos_integer()},
+            port: :inet.port_number() | nil
+          }
+          | {:error, line :: String.t()}
+  def counts do
+    case Table.value(:server, nil) do
+      nil -> {:error, "this node has no mesh"}
+      pid -> Nonblocking.call(pid, :counts, "the radio of this node")
+    end
+  end
+
+  @doc "Whether a node is known and has not been heard for a second, whatever its connection says."
+  @spec silent?(node()) :: boolean()
+  def silent?(node) do
+    heard_ms = Table.heard_ms(node)
+    heard_ms != nil and NodeTable.status(heard_ms, now()) != :alive
+  end
+
+  @doc """
+  Sends a request to a robot that this node has no connection to, or a silent one, over others that
+  have (`Mesh.CommandRelay`). `ref` is the alias in it that is to be answered.
+  """
+  @spec relay(atom(), tuple(), reference()) :: :ok | {:error, :unknown | :no_way}
+  def relay(robot, request, ref) do
+    case Table.robot(robot) do
+      nil ->
+        {:error, :unknown}
+
+      {node, _boot, _sequence, _at_ms} ->
+        ways = Routing.ways(node(), Node.list(), Table.onward(NodeTable.alive_since(now())))
+        CommandRelay.send(node, ways, robot, request, ref)
+    end
+  end
+
+  # Between two servers there is no table, and nobody to tell.
+  defp tell(request) do
+    with pid when pid != nil <- Table.value(:server, nil), do: GenServer.cast(pid, request)
+    :ok
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

@@ -1,0 +1,92 @@
+defmodule Mesh.Distribution.ConnectionLog do
+  @moduledoc """
+  Says in one line who was not let in, from where, and why. Erlang reports such things in several
+  ways, some over many lines, none with an address; this filter of the logger makes them
+
+      refused mag3 at 10.0.0.13:53312: its certificate is of another fleet (unknown CA)
+
+  and the event `[:mesh, :refused]`. The filter runs in the process that reports, which
+  holds the connection: there the address is known. At most five lines a second are said, so that
+  nobody fills a disk by knocking; the events of the others are dropped with them.
+
+  A node without TLS that is called by one with it hangs up without a word; the caller says it.
+  """
+  alias Hal.Event
+  alias Mesh.Distribution.ConnectionLog
+  alias Mesh.Distribution.ConnectionLog.Peer
+
+  @per_second 5
+  @hops 3
+
+  @doc "Puts the filter before all handlers of the logger. More than once is as once."
+  @spec install() :: :ok
+  def install do
+    state = :atomics.new(2, [])
+    _ = :logger.add_primary_filter(__MODULE__, {&__MODULE__.filter/2, state})
+    :ok
+  end
+
+  @doc false
+  @spec filter(:logger.log_event(), :atomics.atomics_ref()) :: :logger.filter_return()
+  def filter(%{msg: message} = event, state) do
+    case ConnectionLog.Reasons.read(message, Peer.seen()) do
+      :ignore -> :ignore
+      :known -> :stop
+      refusal -> if room?(state), do: say(event, refusal), else: :stop
+    end
+  end
+
+  defp say(event, {whom, who, why}) do
+    address = address()
+    now = System.monotonic_time(:millisecond)
+    about = %{refused: whom, who: who, address: address, why: why}
+    Event.execute([:mesh, :refused], %{at_ms: now}, about)
+    place = "#{who || "a node"} at #{address || "an unknown address"}"
+    line = if whom == :us, do: "#{place} refused us: #{why}", else: "refused #{place}: #{why}"
+
+    %{
+      event
+      | level: :warning,
+        msg: {:string, line},
+        meta: Map.take(event.meta, [:time, :gl, :pid])
+    }
+  end
+
+  # The second that is being counted, and how many were said in it.
+  defp room?(state) do
+    second = System.monotonic_time(:second)
+    if :atomics.exchange(state, 1, second) != second, do: :atomics.put(state, 2, 0)
+    :atomics.add_get(state, 2, 1) <= @per_second
+  end
+
+  # The socket belongs to this process, or with TLS to one that is linked to it over a few others of
+  # the same connection. What has a name belongs to all connections and is not entered.
+  defp address do
+    case self() |> ports([], @hops) |> Enum.uniq() do
+      [address] -> address
+      _none_or_many -> nil
+    end
+  end
+
+  defp ports(pid, from, hops) do
+    case Process.info(pid, [:links, :registered_name]) do
+      [links: links, registered_name: name] when name == [] or pid == self() ->
+        Enum.flat_map(links -- from, &linked(&1, [pid | from], hops))
+
+      _named_or_gone ->
+        []
+    end
+  end
+
+  defp linked(port, _from, _hops) when is_port(port) do
+    case :inet.peername(port) do
+      {:ok, {ip, number}} -> ["#{:inet.ntoa(ip)}:#{number}"]
+      _no_connection -> []
+    end
+  end
+
+  defp linked(pid, from, hops) when is_pid(pid) and node(pid) == node() and hops > 0,
+    do: ports(pid, from, hops - 1)
+
+  defp linked(_other, _from, _hops), do: []
+end

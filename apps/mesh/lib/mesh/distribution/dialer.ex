@@ -1,0 +1,148 @@
+defmodule Mesh.Distribution.Dialer do
+  @moduledoc """
+  Connects this node's distribution to those that the plan names, again and again, for ever, with
+  back-off. A connection attempt blocks for seconds where packets vanish, so each has a process of
+  its own, and no more than four run at once.
+
+  Whether a node is alive is not decided here: that is told by datagrams (`Mesh.NodeTable`).
+  """
+  use GenServer
+  alias Hal.Event
+  alias Mesh.{Backoff, Options, Roster}
+  alias Mesh.Distribution.Topology
+
+  @tick_ms 200
+  # So long the one whose part it is has to connect before the other tries.
+  @grace_ms 3_000
+  @at_once 4
+  # In ticks: how often a node that is connected, but not heard, is told this one's address.
+  @introduce_every 25
+
+  @doc "Starts the dialer of this node."
+  @spec start_link(Options.t()) :: GenServer.on_start()
+  def start_link(%Options{} = options),
+    do: GenServer.start_link(__MODULE__, options, name: __MODULE__)
+
+  @doc "Tells it of a node."
+  @spec note(:up | :suspect | :gone, node()) :: :ok
+  def note(change, node), do: GenServer.cast(__MODULE__, {:note, change, node})
+
+  @doc "The nodes that this one is connected to, sorted."
+  @spec links() :: [node()]
+  def links, do: Enum.sort(Node.list())
+
+  @impl GenServer
+  def init(options) do
+    :ok = :net_kernel.monitor_nodes(true)
+    now = now()
+    chance = :rand.seed_s(:exsss, :erlang.phash2(node()))
+
+    # A dialer before this one may have been told of nodes already.
+    known = for node <- Map.keys(Mesh.view().nodes), into: %{}, do: {node, row(now)}
+    fleet = MapSet.new(Map.values(Roster.new(node(), options.fleet).nodes))
+
+    {:ok,
+     schedule(%{
+       options: options,
+       fleet: fleet,
+       known: known,
+       dialling: %{},
+       chance: chance,
+       ticks: 1
+     })}
+  end
+
+  # It has a name that connected nodes can send to, so anything may come here.
+  @impl GenServer
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_cast({:note, :up, node}, s) do
+    if node in s.fleet,
+      do: {:noreply, dial(%{s | known: Map.put(s.known, node, row(now()))})},
+      else: {:noreply, s}
+  end
+
+  def handle_cast(_silent_or_unknown, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info(:tick, s) do
+    if rem(s.ticks, @introduce_every) == 0, do: introduce()
+    {:noreply, schedule(dial(%{s | ticks: s.ticks + 1}))}
+  end
+
+  def handle_info({:nodeup, node}, s) when is_atom(node) do
+    Event.execute([:mesh, :connected], %{at_ms: now()}, %{node: node})
+    Mesh.introduce(node)
+    {:noreply, s}
+  end
+
+  def handle_info({:nodedown, node}, s) when is_atom(node) do
+    Event.execute([:mesh, :disconnected], %{at_ms: now()}, %{node: node})
+    now = now()
+
+    known =
+      case s.known do
+        %{^node => row} -> %{s.known | node => %{row | since_ms: now, backoff: Backoff.new(now)}}
+        known -> known
+      end
+
+    {:noreply, dial(%{s | known: known})}
+  end
+
+  def handle_info({:DOWN, monitor, :process, _pid, _reason}, s),
+    do: {:noreply, %{s | dialling: Map.delete(s.dialling, monitor)}}
+
+  def handle_info(_other, s), do: {:noreply, s}
+
+  defp row(now), do: %{since_ms: now, backoff: Backoff.new(now)}
+
+  # Whoever is connected, by whatever means, shall be heard too.
+  defp introduce do
+    for node <- links() -- Mesh.alive(), do: Mesh.introduce(node)
+  end
+
+  defp dial(s) do
+    now = now()
+    busy = Map.values(s.dialling)
+
+    wanted(s)
+    |> Enum.reject(&(&1 in busy))
+    |> Enum.filter(&due?(s.known[&1], &1, now))
+    |> Enum.take(@at_once - length(busy))
+    |> Enum.reduce(s, &attempt(&1, &2, now))
+  end
+
+  defp wanted(s) do
+    names = Map.new(s.known, fn {node, _row} -> {Atom.to_string(node), node} end)
+    %{full_mesh: full_mesh, degree: degree} = s.options
+    peers = Topology.peers(Atom.to_string(node()), Map.keys(names), full_mesh, degree)
+    Enum.map(peers, &Map.fetch!(names, &1)) -- links()
+  end
+
+  defp due?(row, node, now) do
+    mine? = Topology.dials?(Atom.to_string(node()), Atom.to_string(node))
+    (mine? or now - row.since_ms >= @grace_ms) and Backoff.due?(row.backoff, now)
+  end
+
+  defp attempt(node, s, now) do
+    {_pid, monitor} = spawn_monitor(fn -> :net_kernel.connect_node(node) end)
+    {chance, state} = :rand.uniform_s(s.chance)
+    row = s.known[node]
+    row = %{row | backoff: Backoff.tried(row.backoff, now, chance)}
+
+    %{
+      s
+      | known: Map.put(s.known, node, row),
+        chance: state,
+        dialling: Map.put(s.dialling, monitor, node)
+    }
+  end
+
+  defp schedule(s) do
+    Process.send_after(self(), :tick, @tick_ms)
+    s
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

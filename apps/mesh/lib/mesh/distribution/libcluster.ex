@@ -1,0 +1,45 @@
+defmodule Mesh.Distribution.Libcluster do
+  @moduledoc """
+  Runs libcluster's topologies, where libcluster is: any of its strategies then connects nodes, and
+  connected nodes introduce themselves to each other's radio. What falls in there does not take the
+  mesh along; it is started again with back-off.
+  """
+  use GenServer
+  alias Hal.Event
+  alias Mesh.Backoff
+
+  @doc "Starts it; `topologies` as libcluster takes them."
+  @spec start_link(keyword()) :: GenServer.on_start()
+  def start_link(topologies), do: GenServer.start_link(__MODULE__, topologies)
+
+  @impl GenServer
+  def init(topologies) do
+    Process.flag(:trap_exit, true)
+    {:ok, %{topologies: topologies, backoff: Backoff.new(now())}, {:continue, :start}}
+  end
+
+  @impl GenServer
+  def handle_continue(:start, s), do: {:noreply, start(s)}
+
+  @impl GenServer
+  def handle_info(:start, s), do: {:noreply, start(s)}
+  def handle_info({:EXIT, _supervisor, reason}, s), do: {:noreply, later(s, reason)}
+  def handle_info(_other, s), do: {:noreply, s}
+
+  # Not a dependency: the module is there or it is not, as `Mesh.Options` has found out. Of a
+  # failed start its `:EXIT` tells too.
+  defp start(s) do
+    arguments = [s.topologies, [name: Mesh.Distribution.Libcluster.Topologies]]
+    _ = apply(Cluster.Supervisor, :start_link, [arguments])
+    s
+  end
+
+  defp later(s, reason) do
+    Event.execute([:mesh, :libcluster], %{at_ms: now()}, %{reason: reason})
+    backoff = Backoff.tried(s.backoff, now(), 0.5)
+    Process.send_after(self(), :start, backoff.due_ms, abs: true)
+    %{s | backoff: backoff}
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

@@ -1,0 +1,65 @@
+defmodule Mesh.Log do
+  @moduledoc """
+  What the log says of the mesh: one line for what a person may want to know. Everything else
+  of the mesh tells by events only.
+  """
+  require Logger
+  alias Hal.Event
+
+  @events [
+    :up,
+    :gone,
+    :connected,
+    :disconnected,
+    :no_network,
+    :unknown_node,
+    :duplicate_node,
+    :libcluster
+  ]
+
+  @doc "Attaches the log to the mesh's events; once a node."
+  @spec attach() :: :ok
+  def attach do
+    for event <- @events do
+      _ = Event.attach({__MODULE__, event}, [:mesh, event], &__MODULE__.write/4, nil)
+    end
+
+    :ok
+  end
+
+  @doc false
+  @spec write(Event.name(), map(), map(), term()) :: :ok
+  def write([:mesh, event], _measurements, about, _config) do
+    {level, line} = line(event, about)
+    Logger.log(level, line)
+  end
+
+  @doc """
+  The line.
+
+      iex> Mesh.Log.line(:gone, %{node: :mag1@lab})
+      {:info, "mesh: mag1@lab is gone"}
+  """
+  @spec line(atom(), map()) :: {Logger.level(), String.t()}
+  def line(:up, %{node: node}), do: {:info, "mesh: hears #{node}"}
+  def line(:gone, %{node: node}), do: {:info, "mesh: #{node} is gone"}
+  def line(:connected, %{node: node}), do: {:debug, "mesh: connected to #{node}"}
+  def line(:disconnected, %{node: node}), do: {:debug, "mesh: not connected to #{node} any more"}
+
+  def line(:no_network, %{reason: reason, interface: ip, port: port}) do
+    {:warning,
+     "mesh: no UDP on #{:inet.ntoa(ip)}, port #{port}: #{:inet.format_error(reason)}; trying again"}
+  end
+
+  def line(:unknown_node, %{name: name, address: {ip, _port}}) do
+    {:warning,
+     "mesh: #{inspect(name)} at #{:inet.ntoa(ip)} has the fleet's secret, but is not in this node's " <>
+       "fleet or has another host part; see the option fleet"}
+  end
+
+  def line(:libcluster, %{reason: reason}),
+    do: {:warning, "mesh: libcluster ended, and starts again: #{inspect(reason, limit: 10)}"}
+
+  def line(:duplicate_node, %{node: node}),
+    do: {:error, "mesh: another node calls itself #{node}; rename one of the two"}
+end

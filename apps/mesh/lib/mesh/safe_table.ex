@@ -1,0 +1,27 @@
+defmodule Mesh.SafeTable do
+  @moduledoc """
+  Reads a named table of another process of this node, without calling it. The table disappears
+  with that process, perhaps between two reads; a missing table reads as an empty one.
+  """
+
+  @doc """
+  The rows of a key.
+
+      iex> Mesh.SafeTable.lookup(:no_such_table, :key)
+      []
+  """
+  @spec lookup(atom(), term()) :: [tuple()]
+  def lookup(table, key) do
+    :ets.lookup(table, key)
+  rescue
+    ArgumentError -> []
+  end
+
+  @doc "What a match specification, which is a constant of its caller, finds."
+  @spec select(atom(), :ets.match_spec()) :: [term()]
+  def select(table, match) do
+    :ets.select(table, match)
+  rescue
+    ArgumentError -> []
+  end
+end

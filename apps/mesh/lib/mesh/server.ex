@@ -1,0 +1,212 @@
+defmodule Mesh.Server do
+  @moduledoc """
+  The process round `Mesh.Protocol`: it owns the sockets, keeps the time and carries effects
+  out. What others ask often is in a table that anybody reads (`Mesh.Table`). What it hears goes
+  to the consumer that it is given at its start (`Mesh.Consumer`).
+
+  Sockets that cannot be opened are tried again with back-off; a robot without a network drives on.
+  """
+  use GenServer
+  alias Hal.Event
+  alias Mesh.{Backoff, Nonblocking, Options, Protocol, Roster, Sockets, Table, WireTerm}
+  alias Mesh.Distribution.{Dialer, Epmd}
+
+  @tick_ms 200
+  @rejoin_every 50
+
+  @doc "Starts the radio of this node, with the module that takes what it hears."
+  @spec start_link({Options.t(), consumer :: module()}) :: GenServer.on_start()
+  def start_link({%Options{}, _consumer} = start),
+    do: GenServer.start_link(__MODULE__, start, name: __MODULE__)
+
+  @impl GenServer
+  def init({%Options{} = options, consumer}) do
+    # Heartbeats must not wait behind a busy robot.
+    Process.flag(:priority, :high)
+    written = Table.new()
+    <<session::64>> = :crypto.strong_rand_bytes(8)
+    services = consumer.services()
+
+    protocol =
+      Protocol.new(
+        secret: options.secret,
+        roster: Roster.new(node(), options.fleet),
+        session: session,
+        strategies: options.started,
+        port: options.dist_port,
+        group: group(options),
+        consumer: consumer,
+        services: Map.keys(services)
+      )
+
+    s = %{
+      options: options,
+      consumer: consumer,
+      services: services,
+      protocol: protocol,
+      sockets: nil,
+      backoff: Backoff.new(now()),
+      written: written,
+      chance: :rand.seed_s(:exsss, session),
+      ticks: 0,
+      sent: 0,
+      heard: 0,
+      next: now()
+    }
+
+    {:ok, s |> open() |> publish() |> schedule()}
+  end
+
+  # Heartbeats go to all by name, and by multicast besides, since either way may be blocked; on the
+  # loopback nothing is, and what thirty nodes of one machine send each other twice takes half of it.
+  defp group(%{multicast: false}), do: nil
+  defp group(%{interface: {127, _, _, _}}), do: nil
+  defp group(%{multicast: group}), do: group
+
+  @impl GenServer
+  def handle_cast({:speak, to, message}, s) do
+    if to == :all or WireTerm.names?(to),
+      do: {:noreply, run(s, Protocol.speak(s.protocol, to, message, now()))},
+      else: {:noreply, s}
+  end
+
+  def handle_cast({:serve, service, to, term}, %{services: services} = s)
+      when is_map_key(services, service) and is_atom(to),
+      do: {:noreply, run(s, Protocol.serve(s.protocol, service, to, term))}
+
+  # To a node that the distribution is connected to, however that came about.
+  def handle_cast({:introduce, node}, s) when is_atom(node) do
+    if s.sockets, do: Nonblocking.cast({__MODULE__, node}, {:knock, node(), s.sockets.port})
+    {:noreply, s}
+  end
+
+  def handle_cast({:knock, node, port}, s) when is_atom(node) and port in 1..65_535 do
+    case ip(node) do
+      nil -> {:noreply, s}
+      ip -> {:noreply, run(s, Protocol.knock(s.protocol, {ip, port}, now()))}
+    end
+  end
+
+  # Connected nodes may send anything.
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_call(:counts, _from, s) do
+    counts = %{sent: s.sent, heard: s.heard, rejected: s.protocol.rejected}
+    {:reply, Map.put(counts, :port, s.sockets && s.sockets.port), s}
+  end
+
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_info({:udp, socket, ip, port, datagram}, %{sockets: %Sockets{} = sockets} = s)
+      when socket == sockets.own or socket == sockets.group do
+    s = %{s | heard: s.heard + 1}
+    {:noreply, run(s, Protocol.hear(s.protocol, datagram, {ip, port}, now()))}
+  end
+
+  def handle_info({:udp_passive, socket}, %{sockets: %Sockets{} = sockets} = s)
+      when socket == sockets.own or socket == sockets.group do
+    Sockets.again(socket)
+    {:noreply, s}
+  end
+
+  def handle_info(:tick, s) do
+    {chance, state} = :rand.uniform_s(s.chance)
+    s = open(%{s | chance: state, ticks: s.ticks + 1})
+    if s.sockets && rem(s.ticks, @rejoin_every) == 0, do: Sockets.rejoin(s.sockets)
+    s = run(s, Protocol.tick(s.protocol, Dialer.links(), now(), chance))
+    {:noreply, s |> publish() |> schedule()}
+  end
+
+  # A reset of the network shows as an error on the socket.
+  def handle_info({:udp_error, _socket, _reason}, s), do: {:noreply, s}
+  def handle_info(_other, s), do: {:noreply, s}
+
+  defp open(%{sockets: nil} = s) do
+    if Backoff.due?(s.backoff, now()), do: try_open(s), else: s
+  end
+
+  defp open(s), do: s
+
+  defp try_open(s) do
+    case Sockets.open(s.options) do
+      {:ok, sockets} ->
+        %{s | sockets: sockets}
+
+      {:error, reason} ->
+        about = %{reason: reason, interface: s.options.interface, port: s.options.port}
+        Event.execute([:mesh, :no_network], %{}, about)
+        {chance, state} = :rand.uniform_s(s.chance)
+        %{s | chance: state, backoff: Backoff.tried(s.backoff, now(), chance)}
+    end
+  end
+
+  defp run(s, {protocol, effects}) do
+    changed? = Enum.any?(effects, &match?({:node, _, _}, &1))
+    s = Enum.reduce(effects, %{s | protocol: protocol}, &carry_out/2)
+    if changed?, do: publish(s), else: s
+  end
+
+  defp carry_out({:send, _address, _datagram}, %{sockets: nil} = s), do: s
+
+  defp carry_out({:send, address, datagram}, s) do
+    # What the network does not take now is lost, as any datagram may be.
+    _ = Sockets.send(s.sockets, address, datagram)
+    %{s | sent: s.sent + 1}
+  end
+
+  defp carry_out({:beat, robot, node, beat}, s) do
+    Table.beat(robot, node, beat, now())
+    s
+  end
+
+  defp carry_out({:deliver, to, node, message}, s) do
+    s.consumer.deliver(to, node, message)
+    s
+  end
+
+  defp carry_out({:serve, service, node, term}, s) do
+    {m, f, a} = Map.fetch!(s.services, service)
+    apply(m, f, a ++ [node, term])
+    s
+  end
+
+  defp carry_out({:node, change, node}, s) do
+    Event.execute([:mesh, change], %{at_ms: now()}, %{node: node})
+    Dialer.note(change, node)
+    s
+  end
+
+  defp carry_out({:learn, name, ip, port}, s) do
+    _ = Epmd.learn(name, ip, port)
+    s
+  end
+
+  defp carry_out({:event, name, about}, s) do
+    Event.execute([:mesh, name], %{at_ms: now()}, about)
+    s
+  end
+
+  # For those who read it without asking.
+  defp publish(%{protocol: %{node_table: node_table, roster: roster, rejected: rejected}} = s),
+    do: %{s | written: Table.write(s.written, node_table, roster, rejected, now())}
+
+  # The address that the connection to a node goes to.
+  defp ip(node) do
+    with {:ok, info} <- :net_kernel.node_info(node),
+         {:net_address, {{_, _, _, _} = ip, _port}, _host, _protocol, _family} <- info[:address] do
+      ip
+    else
+      _not_connected -> nil
+    end
+  end
+
+  defp schedule(s) do
+    next = max(s.next + @tick_ms, now())
+    Process.send_after(self(), :tick, next, abs: true)
+    %{s | next: next}
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

@@ -1,0 +1,93 @@
+defmodule Mix.Tasks.Fleet.Certs do
+  @shortdoc "Makes the certificates of a fleet's robots"
+  @moduledoc """
+  Creates a fleet's CA, unless there is one, and for each robot a key, a certificate signed by
+  that CA, and the options of Erlang's distribution by TLS. `docs/security.md` says how to use
+  them.
+
+      mix fleet.certs mag1 mag2 min1 [--out DIR]
+      mix fleet.certs --fleet FILE
+
+  What is there is kept: to add a robot later, run it again with its name. Needs `openssl`.
+
+  Options:
+
+    * `--fleet FILE` - the names of robots, one a line; `#` begins a remark
+    * `--out DIR` - the folder (`certs`, which git does not see); copy `DIR/mag1` to mag1, and keep
+      `DIR/ca-key.pem` to yourself
+    * `--force` - make new keys and certificates for these robots; never a new CA
+    * `--help` - this text
+  """
+  use Mix.Task
+  alias Mesh.Distribution.Certs
+
+  @switches [fleet: :string, out: :string, force: :boolean, help: :boolean]
+  @longest 65_536
+
+  @impl Mix.Task
+  def run(words) do
+    case OptionParser.parse(words, strict: @switches) do
+      {_options, _names, [{word, _value} | _]} ->
+        refuse("#{word} is not an option; --help lists them")
+
+      {options, names, []} ->
+        run(options, names)
+    end
+  end
+
+  defp run(options, names) do
+    if options[:help] do
+      Mix.shell().info(@moduledoc)
+    else
+      with {:ok, more} <- listed(options[:fleet]),
+           {:ok, names} <- check(Enum.uniq(names ++ more)),
+           folder = options[:out] || "certs",
+           {:ok, ca} <- Certs.ca(folder) do
+        tell("#{folder}/ca.pem", ca)
+        robots(folder, names, options[:force] || false)
+      else
+        {:error, line} -> refuse(line)
+      end
+    end
+  end
+
+  defp robots(folder, names, force?) do
+    for name <- names do
+      case Certs.robot(folder, name, force?) do
+        {:ok, done} -> tell("#{folder}/#{name}", done)
+        {:error, line} -> refuse(line)
+      end
+    end
+
+    :ok
+  end
+
+  defp listed(nil), do: {:ok, []}
+
+  defp listed(path) do
+    with {:ok, %File.Stat{type: :regular, size: size}} when size <= @longest <- File.stat(path),
+         {:ok, text} <- File.read(path) do
+      lines = for line <- String.split(text, ["\n", "\r"]), do: hd(String.split(line, "#"))
+      {:ok, Enum.flat_map(lines, &String.split/1)}
+    else
+      {:ok, _other} -> {:error, "--fleet #{path} is not a file of names"}
+      {:error, why} -> {:error, "--fleet #{path} cannot be read: #{:file.format_error(why)}"}
+    end
+  end
+
+  defp check([]), do: {:error, "which robots? Give their names, or --fleet FILE"}
+
+  defp check(names) do
+    case Enum.reject(names, &Certs.name?/1) do
+      [] -> {:ok, names}
+      [wrong | _] -> {:error, "#{inspect(wrong)} is not a robot's name; names are as mag1"}
+    end
+  end
+
+  defp tell(path, done), do: Mix.shell().info("#{path} #{done}")
+
+  defp refuse(line) do
+    Mix.shell().error(line)
+    exit({:shutdown, 1})
+  end
+end

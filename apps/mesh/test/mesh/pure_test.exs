@@ -1,0 +1,119 @@
+defmodule Mesh.PureTest do
+  use ExUnit.Case, async: true
+  alias Mesh.{Beacon, NodeTable, Options, Routing}
+  alias Mesh.Distribution.Topology
+
+  doctest Mesh.Backoff
+  doctest Mesh.Beacon
+  doctest Mesh.Distribution.Certs
+  doctest Mesh.Packet.ReplayProtection
+  doctest Mesh.Log
+  doctest Mesh.NodeTable
+  doctest Mesh.Packet
+  doctest Mesh.Distribution.Topology
+  doctest Mesh.Roster
+  doctest Mesh.Routing
+  doctest Mesh.Strategy.Static
+  doctest Mesh.WireTerm
+
+  test "up to 30 nodes everybody is connected to everybody, above that to few, and all hang together" do
+    for count <- [2, 30, 31, 60, 100] do
+      names = for n <- 1..count, do: "mag#{100 + n}@lab"
+      links = Map.new(names, &{&1, Topology.peers(&1, names, 30, 8)})
+
+      if count <= 30,
+        do: assert(Enum.all?(links, fn {me, peers} -> peers == names -- [me] end)),
+        else: assert(Enum.all?(links, fn {_me, peers} -> length(peers) in 6..8 end))
+
+      # What one plans the other plans too.
+      for {me, peers} <- links, peer <- peers, do: assert(me in links[peer])
+
+      for other <- tl(names) do
+        route = Topology.route(hd(names), other, links)
+        assert List.last(route) == other and length(route) <= 7
+      end
+    end
+  end
+
+  test "the number of the view grows with a node that goes and comes, not with one that is late" do
+    place = {{10, 0, 0, 7}, 4370}
+    {node_table, [up: "b"]} = NodeTable.hear(NodeTable.new("a"), "b", place, 0)
+    {late, [suspect: "b"]} = NodeTable.age(node_table, 1_500)
+    {back, [up: "b"]} = NodeTable.hear(late, "b", place, 1_600)
+    assert {node_table.number, late.number, back.number} == {1, 1, 1}
+    {gone, [gone: "b"]} = NodeTable.age(back, 3_600)
+    {again, [up: "b"]} = NodeTable.hear(gone, "b", place, 9_000)
+    assert {gone.number, again.number} == {2, 3}
+  end
+
+  test "there is no way to where no connection leads" do
+    assert Topology.route("a", "z", %{"a" => ["b"], "b" => ["a"], "z" => []}) == nil
+  end
+
+  # What "a" knows at 5 s: all of "b", of "c" that it has been silent for 3 s, though TCP has not noticed.
+  defp torn(hears) do
+    address = {{10, 0, 0, 1}, 1}
+    {node_table, _up} = NodeTable.hear(NodeTable.new("a"), "c", address, 2_000)
+    node_table = NodeTable.robot(node_table, "c", :mag3, {1, 1}, 2_000)
+    {node_table, _up} = NodeTable.hear(node_table, "b", address, 5_000)
+    hears = for name <- hears, do: {name, address}
+
+    NodeTable.beacon(
+      node_table,
+      "b",
+      %Beacon{sessions: [], hears: hears, links: ["a", "c"], port: 0},
+      5_000
+    )
+  end
+
+  test "where a link is silent the way leads over one that hears both" do
+    node_table = torn(["a", "c"])
+    ways = Routing.ways("a", ["b", "c"], onward(node_table))
+    assert ways == %{"a" => ["b"], "b" => ["a", "c"]}
+    assert Topology.route("a", "c", ways) == ["b", "c"]
+    assert Routing.beyond(node_table, 5_000) == [:mag3]
+  end
+
+  test "there is no way to a node that nobody hears" do
+    node_table = torn(["a"])
+    assert Topology.route("a", "c", Routing.ways("a", ["b", "c"], onward(node_table))) == nil
+    assert Routing.beyond(node_table, 5_000) == []
+  end
+
+  # Of those that are heard at 5 s.
+  defp onward(node_table) do
+    for {name, _address} <- NodeTable.hears(node_table, 5_000),
+        into: %{},
+        do: {name, Routing.onward(node_table.nodes[name])}
+  end
+
+  test "options are checked by name" do
+    secret = Mesh.Air.secret()
+
+    for {options, word} <- [
+          {[prot: 1], "no option :prot"},
+          {[port: -1], "mesh port is a whole number from 0 to 65535, not -1"},
+          {[multicast: {{10, 0, 0, 1}, 1}], "mesh multicast"},
+          {[multicast: {{239, 999, 0, 1}, 1}], "mesh multicast"},
+          {[multicast: "239.0.0.1:1"], "mesh multicast"},
+          {[peers: ["10.0.0.1"]], ~s(not "10.0.0.1")},
+          {[peers: :all], "peers are addresses"},
+          {[interface: "eth0"], "mesh interface"},
+          {[multicast: nil], "mesh multicast"},
+          {[fleet: [:"mag1\n"]], "fleet names robots by atoms"},
+          {[fleet: ["mag1"]], "fleet names robots by atoms"},
+          {[strategies: [String]], "strategies are {Module, options}"},
+          {[strategies: [{String, 1}]], "strategy String is no Mesh.Strategy"},
+          {[secret: "cookie"], "mesh secret_file"},
+          {[full_mesh: 1], "mesh full_mesh"},
+          {[topologies: [lab: [strategy: Nowhere]]], "mesh topologies need libcluster"},
+          {[topologies: :lab], "mesh topologies are libcluster's"}
+        ] do
+      assert {:error, line} = Options.new(Keyword.merge([secret: secret], options))
+      assert line =~ word
+      refute line =~ "\n"
+    end
+
+    assert {:ok, %Options{port: 4370}} = Options.new(secret: secret)
+  end
+end

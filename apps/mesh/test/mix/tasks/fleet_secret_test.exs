@@ -1,0 +1,24 @@
+defmodule Mix.Tasks.Fleet.SecretTest do
+  use Mesh.TaskCase, async: false
+  alias Mix.Tasks.Fleet.Secret, as: Task
+
+  test "makes one, says its fingerprint, and keeps what is there", %{tmp_dir: folder} do
+    path = Path.join(folder, "secret")
+    Task.run([path])
+    assert_received {:mix_shell, :info, [line]}
+    {:ok, secret} = Mesh.Secret.load(path)
+    assert line == "#{path} made, fingerprint #{secret.fingerprint}; copy it to every robot"
+
+    assert refused(Task, [path]) =~ "is there already; --force writes over it"
+    Task.run([path, "--force"])
+    assert {:ok, other} = Mesh.Secret.load(path)
+    assert other.fingerprint != secret.fingerprint
+  end
+
+  test "wrong words are one line" do
+    assert refused(Task, ["--colour"]) == "--colour is not an option; --help lists them"
+    assert refused(Task, ["one", "two"]) == "one file, not 2: one two"
+    Task.run(["--help"])
+    assert_received {:mix_shell, :info, ["Makes the one secret" <> _rest]}
+  end
+end

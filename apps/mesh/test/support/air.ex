@@ -1,0 +1,111 @@
+defmodule Mesh.Air do
+  @moduledoc """
+  Stations of several nodes without sockets: datagrams take 1 ms, unless they are lost or the
+  link is cut; ticks come every 200 ms. Pure but for `:rand`, which ExUnit seeds.
+  """
+  alias Mesh.{Protocol, Roster, Secret, Strategy}
+
+  @group {{239, 255, 67, 86}, 4371}
+
+  defstruct now: 0, stations: %{}, addresses: %{}, air: [], cut: [], loss: 0.0, out: [], tap: []
+
+  def secret(key \\ "k") do
+    %Secret{path: "", key: String.duplicate(key, 32), cookie: :none, fingerprint: ""}
+  end
+
+  def new(options \\ []), do: struct!(__MODULE__, options)
+
+  @doc "Switches a node on; `multicast: false` and `peers: [names]` for a network without multicast."
+  def join(air, name, options \\ []) do
+    number = Enum.count(air.addresses) + 1
+    address = Map.get(air.addresses, name, {{10, 0, 0, number}, 4370})
+    air = %{air | addresses: Map.put(air.addresses, name, address)}
+    group = if Keyword.get(options, :multicast, true), do: @group
+    gossip = for group <- List.wrap(group), do: begin(Strategy.Gossip, group)
+
+    static =
+      for peers <- List.wrap(options[:peers] && [options[:peers]]),
+          do: begin(Strategy.Static, Enum.map(peers, &air.addresses[&1]))
+
+    protocol =
+      Protocol.new(
+        secret: options[:secret] || secret(),
+        roster: Roster.new(:"#{name}@lab", options[:fleet] || [:a, :b, :c, :d, :e, :f]),
+        session: options[:session] || :rand.uniform(1_000_000_000),
+        strategies: gossip ++ static,
+        port: 0,
+        group: group,
+        consumer: Mesh.FakeConsumer,
+        services: [:rows]
+      )
+
+    put_in(air.stations[name], protocol)
+  end
+
+  defp begin(module, options) do
+    {:ok, state} = module.init(options)
+    {module, state}
+  end
+
+  def leave(air, name), do: %{air | stations: Map.delete(air.stations, name)}
+
+  @doc "Lets time go by."
+  def run(air, 0), do: air
+  def run(air, ms), do: air |> step() |> run(ms - 1)
+
+  defp step(air) do
+    air = %{air | now: air.now + 1}
+    {due, later} = Enum.split_with(air.air, fn {at, _, _, _} -> at <= air.now end)
+    air = Enum.reduce(Enum.reverse(due), %{air | air: later}, &arrive/2)
+
+    if rem(air.now, 200) == 0,
+      do: Enum.reduce(Enum.sort(Map.keys(air.stations)), air, &tick/2),
+      else: air
+  end
+
+  defp tick(name, air) do
+    act(air, name, Protocol.tick(air.stations[name], [], air.now, :rand.uniform()))
+  end
+
+  def speak(air, name, to, message),
+    do: act(air, name, Protocol.speak(air.stations[name], to, message, air.now))
+
+  @doc "A datagram from outside."
+  def inject(air, name, datagram, address \\ {{10, 9, 9, 9}, 1}),
+    do: act(air, name, Protocol.hear(air.stations[name], datagram, address, air.now))
+
+  defp arrive({_at, from, to, datagram}, air) do
+    case air.stations do
+      %{^to => protocol} ->
+        act(air, to, Protocol.hear(protocol, datagram, air.addresses[from], air.now))
+
+      _off ->
+        air
+    end
+  end
+
+  defp act(air, name, {protocol, effects}) do
+    Enum.reduce(effects, put_in(air.stations[name], protocol), &effect(&1, name, &2))
+  end
+
+  defp effect({:send, @group, datagram}, name, air) do
+    for {other, %{group: group}} <- air.stations, group != nil, reduce: air do
+      air -> put(air, name, other, datagram)
+    end
+  end
+
+  defp effect({:send, address, datagram}, name, air) do
+    case Enum.find(air.addresses, fn {_name, there} -> there == address end) do
+      {other, _address} -> put(air, name, other, datagram)
+      nil -> air
+    end
+  end
+
+  defp effect(effect, name, air), do: %{air | out: [{air.now, name, effect} | air.out]}
+
+  defp put(air, from, to, datagram) do
+    air = %{air | tap: [datagram | air.tap]}
+    lost? = :rand.uniform() < air.loss or {from, to} in air.cut
+    if lost?, do: air, else: %{air | air: [{air.now + 1, from, to, datagram} | air.air]}
+  end
+end
