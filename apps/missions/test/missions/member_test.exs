@@ -164,13 +164,12 @@ defmodule Swarm.MemberTest do
 
   test "an emergency stop spreads by heartbeats, and its own echo does not bring it back" do
     {one, _} = Member.step(member(), {:command, :estop, 0})
-    assert one.receiver.stop.latched?
+    assert one.stop.latched?
 
-    pressed =
-      Message.new(:mag2, :heartbeat, %{@beat | estop: one.receiver.stop.known, latched: true})
+    pressed = Message.new(:mag2, :heartbeat, %{@beat | estop: one.stop.known, latched: true})
 
     two = hear(member(:mag3), pressed)
-    assert two.receiver.stop == one.receiver.stop
+    assert two.stop == one.stop
     assert sense(two, 100).runner.phase == :idle
     {_, [{:drive, twist}]} = Member.step(two, {:reflex, 100})
     assert Twist.zero?(twist)
@@ -178,11 +177,11 @@ defmodule Swarm.MemberTest do
     # Reset by a person; the neighbour, not reset yet, repeats the old number.
     {two, _} = Member.step(two, {:command, :reset, 200})
     two = hear(two, put_in(pressed.body.sequence, 2), 300)
-    refute two.receiver.stop.latched?
+    refute two.stop.latched?
 
     # The next stop has the next number, and counts.
     {two, _} = Member.step(two, {:command, :estop, 400})
-    assert two.receiver.stop.known == one.receiver.stop.known + 1
+    assert two.stop.known == one.stop.known + 1
   end
 
   defmodule Deaf do

@@ -12,7 +12,7 @@ defmodule Swarm.Comms do
 
   | part | what it does |
   |---|---|
-  | `Swarm.Comms.Receiver` | judges what is heard |
+  | `Swarm.Message.Receiver` | judges what is heard |
   | `Swarm.Comms.PeerWriter` | writes the peers on the board |
   | `Swarm.Comms.Sender` | speaks, sends the heartbeats |
   | `Swarm.Comms.CommandHandler` | answers people, if what they ask is not too old (`Swarm.Commands.Freshness`), or hands on what they ask |
@@ -34,8 +34,8 @@ defmodule Swarm.Comms do
   alias Swarm.Commands.Freshness
   alias Swarm.Comms.Transport
   alias Swarm.Directory.RobotInfo
-  alias Swarm.Message.WireTypes
-  alias Swarm.Comms.{CommandHandler, LoadShedder, NameClaim, PeerWriter, Receiver, Sender}
+  alias Swarm.Message.{Receiver, WireTypes}
+  alias Swarm.Comms.{CommandHandler, LoadShedder, NameClaim, PeerWriter, Sender}
 
   @behaviour Robot.Companion
 
@@ -105,7 +105,7 @@ defmodule Swarm.Comms do
       config: config,
       id: id,
       board: board,
-      receiver: Receiver.new(id, nil),
+      receiver: Receiver.new(id),
       chart: PeerWriter.new(board),
       sender: Sender.new(config, board, transport, boot),
       name: NameClaim.new(id, {boot, node()}),
@@ -136,7 +136,7 @@ defmodule Swarm.Comms do
   def handle_cast({:hear, term}, s) do
     at_ms = Config.now(s.config)
     {heard, receiver} = Receiver.hear(s.receiver, term, at_ms)
-    {:noreply, %{s | receiver: receiver} |> heard(heard, term, at_ms) |> relieve()}
+    {:noreply, %{s | receiver: receiver} |> heard(heard, at_ms) |> relieve()}
   end
 
   def handle_cast({:command, request, ref}, s) when is_reference(ref),
@@ -182,17 +182,17 @@ defmodule Swarm.Comms do
     end
   end
 
-  defp heard(s, {:peer, id}, message, at_ms) do
-    EStop.heard(s.id, s.board, Message.inner(message).body)
+  defp heard(s, {:heartbeat, id, beat}, at_ms) do
+    EStop.heard(s.id, s.board, beat)
     %{s | chart: PeerWriter.heard(s.chart, s.receiver.peers, id, at_ms)}
   end
 
-  defp heard(s, {:message, message}, _term, _at_ms) do
+  defp heard(s, {:message, message}, _at_ms) do
     Pilot.hear(s.id, {:message, message})
     s
   end
 
-  defp heard(s, :nothing, _term, _at_ms), do: s
+  defp heard(s, :nothing, _at_ms), do: s
 
   defp tick(s, at_ms) do
     s = note(s)

@@ -22,15 +22,15 @@ defmodule Swarm.Member do
   alias Robot.Safety.Reflex
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
-  alias Swarm.Comms.Receiver
+  alias Swarm.Message.Receiver
   import Robot.Mission, only: [is_order: 1]
 
   @enforce_keys [:id, :profile, :boot, :mission, :runner, :controller, :reflex, :receiver]
-  defstruct @enforce_keys ++ [entries: %{}, sequence: 0, beat_ms: nil]
+  defstruct @enforce_keys ++ [stop: %EStop.State{}, entries: %{}, sequence: 0, beat_ms: nil]
 
   @typedoc """
   `mission` is the one that a start begins, `runner` how it stands; `entries` is what was sensed last, by name,
-  and when; `receiver` is what was heard: peers, emergency stop, rejected messages.
+  and when; `receiver` is what was heard: peers, rejected messages; `stop` is how the emergency stop stands.
   """
   @type t :: %__MODULE__{
           id: atom(),
@@ -41,6 +41,7 @@ defmodule Swarm.Member do
           controller: Controller.t(),
           reflex: Reflex.t(),
           receiver: Receiver.t(),
+          stop: EStop.State.t(),
           entries: %{atom() => {term(), integer()}},
           sequence: non_neg_integer(),
           beat_ms: integer() | nil
@@ -94,25 +95,19 @@ defmodule Swarm.Member do
 
   def step(member, {:message, term, at_ms}) do
     {heard, receiver} = Receiver.hear(member.receiver, term, at_ms)
-
-    case heard do
-      {:message, message} -> handle(%{member | receiver: receiver}, {:message, message})
-      _peer_or_nothing -> latch(member, receiver, at_ms)
-    end
+    heard(%{member | receiver: receiver}, heard, at_ms)
   end
 
-  def step(%{receiver: receiver} = member, {:command, :estop, at_ms}),
-    do: latch(member, %{receiver | stop: EStop.State.press(receiver.stop)}, at_ms)
+  def step(member, {:command, :estop, at_ms}),
+    do: latch(member, EStop.State.press(member.stop), at_ms)
 
-  def step(%{receiver: receiver} = member, {:command, :reset, _at_ms}) do
-    reflex = Reflex.reset(member.reflex)
-
-    {%{member | reflex: reflex, receiver: %{receiver | stop: EStop.State.reset(receiver.stop)}},
-     []}
+  def step(member, {:command, :reset, _at_ms}) do
+    stop = EStop.State.reset(member.stop)
+    {%{member | reflex: Reflex.reset(member.reflex), stop: stop}, []}
   end
 
   # What is asked for while all stand would otherwise begin with the reset.
-  def step(%{receiver: %{stop: %{latched?: true}}} = member, {:command, command, _at_ms})
+  def step(%{stop: %{latched?: true}} = member, {:command, command, _at_ms})
       when command != :stop,
       do: {member, []}
 
@@ -170,6 +165,12 @@ defmodule Swarm.Member do
   @spec stands?(t()) :: boolean()
   def stands?(member), do: Runner.state(member.runner) == :idle or member.controller.tag == :stand
 
+  defp heard(member, {:message, message}, _at_ms), do: handle(member, {:message, message})
+  defp heard(member, :nothing, _at_ms), do: {member, []}
+
+  defp heard(member, {:heartbeat, _id, beat}, at_ms),
+    do: latch(member, EStop.State.hear(member.stop, beat.estop, beat.latched), at_ms)
+
   defp react(member, :later, _at_ms), do: {member, []}
 
   defp react(member, :now, at_ms) do
@@ -201,17 +202,17 @@ defmodule Swarm.Member do
   # An e-stop spreads with every heartbeat.
   # The mission ends with it: after the reset nothing moves until somebody says so.
   defp latch(
-         %{receiver: %{stop: %{latched?: false}}} = member,
-         %{stop: %{latched?: true}} = receiver,
+         %{stop: %{latched?: false}} = member,
+         %{latched?: true} = stop,
          at_ms
        ) do
-    member = %{member | reflex: Reflex.estop(member.reflex), receiver: receiver}
+    member = %{member | reflex: Reflex.estop(member.reflex), stop: stop}
     {member, stopped} = react(member, :now, at_ms)
     {member, forgotten} = halt(member, at_ms)
     {member, stopped ++ forgotten}
   end
 
-  defp latch(member, receiver, _at_ms), do: {%{member | receiver: receiver}, []}
+  defp latch(member, stop, _at_ms), do: {%{member | stop: stop}, []}
 
   defp halt(member, at_ms) do
     {reflex, urgency} = Reflex.forget(member.reflex)
@@ -251,7 +252,7 @@ defmodule Swarm.Member do
       heard = Peers.heard(member.receiver.peers, at_ms)
       sender = {member.boot, member.sequence + 1}
       claim = if Runner.state(member.runner) == :idle, do: :idle, else: claim(member)
-      beat = Heartbeat.new(sender, percept, claim, heard, member.receiver.stop)
+      beat = Heartbeat.new(sender, percept, claim, heard, member.stop)
 
       {%{member | sequence: member.sequence + 1, beat_ms: at_ms},
        [{:send, :all, Message.new(member.id, :heartbeat, beat)}]}

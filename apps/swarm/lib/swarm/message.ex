@@ -86,11 +86,6 @@ defmodule Swarm.Message do
 
   def check(_term), do: {:error, :not_a_message}
 
-  @doc "What was passed on, out of its wrapping; any other message as it is. Of a message that was checked."
-  @spec inner(t()) :: t()
-  def inner(%__MODULE__{kind: :relay, body: inner}), do: inner
-  def inner(%__MODULE__{} = message), do: message
-
   defp valid?(:heartbeat, body), do: Heartbeat.valid?(body)
   defp valid?(:round, body), do: Round.Letter.valid?(body)
   defp valid?(:place, body), do: Reference.valid?(body)

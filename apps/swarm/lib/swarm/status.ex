@@ -32,7 +32,7 @@ defmodule Swarm.Status do
   alias Hal.Pose
   alias Robot.{Board, Config}
   alias Robot.Safety.LivenessMonitor
-  alias Swarm.Comms.Receiver
+  alias Swarm.Message.Receiver
   alias Swarm.Membership.Peers
 
   @recently_ms 60_000

@@ -5,7 +5,7 @@ defmodule Swarm.MessageTest do
   alias Swarm.Agreement.Round
   alias Swarm.Formation.Reference
   alias Swarm.Membership.Heartbeat
-  alias Swarm.Comms.Receiver
+  alias Swarm.Message.Receiver
   doctest Swarm.EStop.State
   doctest Swarm.Commands.Freshness
   doctest Swarm.Comms.NameClaim
@@ -100,9 +100,14 @@ defmodule Swarm.MessageTest do
       {heard, receiver} = Receiver.hear(Receiver.new(:mag2), message, 0)
 
       case heard do
-        {:peer, id} -> assert %{mode: _} = Swarm.Membership.Peers.percept(receiver.peers, id, 0)
-        {:message, _message} -> :ok
-        :nothing -> assert map_size(receiver.rejected) == 1
+        {:heartbeat, id, _beat} ->
+          assert %{mode: _} = Swarm.Membership.Peers.percept(receiver.peers, id, 0)
+
+        {:message, _message} ->
+          :ok
+
+        :nothing ->
+          assert map_size(receiver.rejected) == 1
       end
     end
   end

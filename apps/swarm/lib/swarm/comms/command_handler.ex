@@ -27,7 +27,8 @@ defmodule Swarm.Comms.CommandHandler do
   alias Mesh.Nonblocking
   alias Swarm.{Missions, Status}
   alias Swarm.Commands.Order
-  alias Swarm.Comms.{PingReply, Receiver}
+  alias Swarm.Comms.PingReply
+  alias Swarm.Message.Receiver
 
   # Whoever asks has half a second (`Swarm.Commands.Client`): later nothing is begun.
   @carry_out_ms 400

@@ -5,7 +5,7 @@ defmodule Swarm.Comms.OwnHeartbeat do
   alias Robot.{Board, Config}
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
-  alias Swarm.Comms.Receiver
+  alias Swarm.Message.Receiver
 
   @odometry_ms 300
 

@@ -7,7 +7,8 @@ defmodule Swarm.Comms.Sender do
   alias Robot.{Board, Config}
   alias Swarm.{EStop, Message}
   alias Swarm.Commands.Freshness
-  alias Swarm.Comms.{OwnHeartbeat, Receiver}
+  alias Swarm.Comms.OwnHeartbeat
+  alias Swarm.Message.Receiver
   alias Swarm.Membership.Heartbeat
 
   @urgent_ticks 10

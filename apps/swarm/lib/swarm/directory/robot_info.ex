@@ -21,7 +21,7 @@ defmodule Swarm.Directory.RobotInfo do
   alias Robot.Safety.LivenessMonitor
   alias Swarm.{Blackboard, Status}
   alias Swarm.Message.WireTypes
-  alias Swarm.Comms.Receiver
+  alias Swarm.Message.Receiver
 
   # A link ticks ten times a second.
   @every 10

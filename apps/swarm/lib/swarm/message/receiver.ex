@@ -1,38 +1,36 @@
-defmodule Swarm.Comms.Receiver do
+defmodule Swarm.Message.Receiver do
   @moduledoc """
-  What a robot makes of the messages that it receives, as a function: who is there, and what was dropped. Pure; the
-  same in the same order as `Swarm.Member`, which also keeps here how its emergency stop stands. A live robot's is
-  `Swarm.EStop`'s, and its receiver has none.
+  What a robot makes of the messages that it receives, as a function: who is there, and what was dropped. Pure;
+  `Swarm.Comms` uses it live and `Swarm.Member` in lockstep.
   """
-  alias Swarm.{EStop, Message}
-  alias Swarm.Membership.Peers
+  alias Swarm.Membership.{Heartbeat, Peers}
+  alias Swarm.Message
 
-  @enforce_keys [:me, :peers, :stop]
+  @enforce_keys [:me, :peers]
   defstruct @enforce_keys ++ [heard: 0, rejected: %{}]
 
   @type t :: %__MODULE__{
           me: atom(),
           peers: Peers.t(),
-          stop: EStop.State.t() | nil,
           heard: non_neg_integer(),
           rejected: %{atom() => pos_integer()}
         }
 
   @typedoc """
-    * `{:peer, id}` - a heartbeat, by which the peers and perhaps the stop have changed
+    * `{:heartbeat, id, beat}` - of a peer, which is noted; what it says of the emergency stop is for the caller
     * `{:message, message}` - for the mission
     * `:nothing` - dropped
   """
-  @type heard :: {:peer, atom()} | {:message, Message.t()} | :nothing
+  @type heard :: {:heartbeat, atom(), Heartbeat.t()} | {:message, Message.t()} | :nothing
 
-  @doc "Nothing heard yet; `stop` is `nil` where somebody else keeps how the emergency stop stands."
-  @spec new(atom(), EStop.State.t() | nil) :: t()
-  def new(me, stop \\ %EStop.State{}), do: %__MODULE__{me: me, peers: Peers.new(me), stop: stop}
+  @doc "Nothing heard yet."
+  @spec new(atom()) :: t()
+  def new(me), do: %__MODULE__{me: me, peers: Peers.new(me)}
 
   @doc """
   Hears a term from outside, whatever it is.
 
-      iex> {heard, receiver} = Swarm.Comms.Receiver.hear(Swarm.Comms.Receiver.new(:mag1), "junk", 0)
+      iex> {heard, receiver} = Swarm.Message.Receiver.hear(Swarm.Message.Receiver.new(:mag1), "junk", 0)
       iex> {heard, receiver.rejected}
       {:nothing, %{not_a_message: 1}}
   """
@@ -51,8 +49,7 @@ defmodule Swarm.Comms.Receiver do
 
       {:ok, %Message{kind: :heartbeat, from: from, body: beat, hops: hops}} ->
         peers = Peers.hear(receiver.peers, from, beat, now_ms, hops == 0)
-        stop = receiver.stop && EStop.State.hear(receiver.stop, beat.estop, beat.latched)
-        {{:peer, from}, %{receiver | peers: peers, stop: stop, heard: receiver.heard + 1}}
+        {{:heartbeat, from, beat}, %{receiver | peers: peers, heard: receiver.heard + 1}}
 
       {:ok, message} ->
         {{:message, message}, %{receiver | heard: receiver.heard + 1}}
