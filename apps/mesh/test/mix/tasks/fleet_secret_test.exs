@@ -19,6 +19,6 @@ defmodule Mix.Tasks.Fleet.SecretTest do
     assert refused(Task, ["--colour"]) == "--colour is not an option; --help lists them"
     assert refused(Task, ["one", "two"]) == "one file, not 2: one two"
     Task.run(["--help"])
-    assert_received {:mix_shell, :info, ["Makes the one secret" <> _rest]}
+    assert_received {:mix_shell, :info, ["Creates the secret of a fleet" <> _rest]}
   end
 end
