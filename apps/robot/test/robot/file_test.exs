@@ -295,6 +295,8 @@ defmodule Robot.FileTest do
           {"[id: , a: 1]", "a comma or a value is missing before ,"},
           {"[id: \n profile: 1]", "a comma or a value is missing before profile:"},
           {"[id::mag1]", "a space is missing after id:"},
+          {"[a: 1, id:\"mag1\"]", "must be followed by space after: id:"},
+          {"[a: 1,\n id::mag1]", "what follows this comma has no key"},
           {"[start: {1.5m, 0}]", ~s(invalid character "m" after number 1.5)},
           {"[start: 1.0e400]", "invalid float number 1.0e400"},
           {"[start: 1e5]", ~s(invalid character "e" after number 1)},

@@ -20,6 +20,8 @@ defmodule Robot.File.Reader do
   @largest 65_536
   @deepest 32
   @largest_angle 36_000
+  # For all names, where the parser makes errors of them.
+  @name :"…"
   @mixed "a list has keys for all its values or for none"
   @behind "nothing can stand behind the end of the list"
   @into "nothing is put into text: \#{…} cannot be here"
@@ -68,7 +70,7 @@ defmodule Robot.File.Reader do
       true ->
         # The parser puts names into its messages, and raises over one that is not an atom. So errors are
         # found with one atom for all names.
-        with {:ok, _quoted} <- parse(text, fn _name -> :name end), do: parse(text, &{:name, &1})
+        with {:ok, _quoted} <- parse(text, fn _name -> @name end), do: parse(text, &{:name, &1})
     end
   end
 
@@ -87,24 +89,34 @@ defmodule Robot.File.Reader do
          do: {:error, {meta[:line], syntax(message, token, text, meta)}}
   end
 
-  # The parser's token may be the one name that all have; the text has the right one.
+  # The parser's token may be the name that all have; the text has the right one.
   defp syntax("syntax error before: ", _token, text, meta) do
-    line = text |> String.split("\n") |> Enum.at(meta[:line] - 1, "")
-    rest = String.slice(line, (meta[:column] || 1) - 1, 255)
-
-    case Regex.run(~r/^\w+:?|^\S/u, rest) do
-      [word] -> "a comma or a value is missing before #{shorten(word)}"
+    case word(text, meta) do
       nil -> "a value is missing at the end"
+      word -> "a comma or a value is missing before #{shorten(word)}"
     end
   end
 
+  # The place is that of the comma.
+  defp syntax("unexpected expression after keyword list" <> _, _token, _text, _meta),
+    do: "what follows this comma has no key: #{@mixed}"
+
   defp syntax({before, behind}, token, _text, _meta), do: shorten(before <> token <> behind)
 
-  defp syntax("unexpected expression after keyword list" <> _, _token, _text, _meta), do: @mixed
+  # What follows the first sentence is advice for programs.
+  defp syntax(message, token, text, meta) do
+    word = String.trim_trailing(word(text, meta) || "", ":")
+    message = message <> String.replace(token, "#{@name}", word)
+    # Newer parsers name the line of the opening bracket, and this one beside it.
+    end_line = if line = meta[:end_line], do: " in line #{line}", else: ""
+    (message |> String.split([". ", "\n"]) |> hd() |> shorten()) <> end_line
+  end
 
-  # The rest is advice for programs.
-  defp syntax(message, token, _text, _meta),
-    do: (message <> token) |> String.split([". ", "\n"]) |> hd() |> shorten()
+  defp word(text, meta) do
+    line = text |> String.split("\n") |> Enum.at(meta[:line] - 1, "")
+    rest = String.slice(line, (meta[:column] || 1) - 1, 255)
+    with [word] <- Regex.run(~r/^\w+:?|^\S/u, rest), do: word
+  end
 
   defp node(quoted, depth) when depth > @deepest,
     do: problem(quoted, "nothing is nested more than #{@deepest} deep")
