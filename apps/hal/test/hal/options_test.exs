@@ -15,7 +15,9 @@ defmodule Hal.OptionsTest do
     pace: {:or, :off, {:tuple, [{:integer, 1, 50}, :boolean], "{ms, true}"}},
     lens: [{:check, &__MODULE__.even?/1, "an even number"}, default: nil],
     clock: :mfa,
-    name: {:text, "a name"}
+    name: {:text, "a name"},
+    delay_ms: {:span, 0, 500, "whole ms"},
+    seed: :integer
   ]
 
   def even?(n), do: is_integer(n) and rem(n, 2) == 0
@@ -28,6 +30,8 @@ defmodule Hal.OptionsTest do
       banks: [16, 0],
       style: :bit,
       lens: nil,
+      delay_ms: {0, 500},
+      seed: -7,
       clock: {System, :monotonic_time, []}
     ]
 
@@ -58,6 +62,9 @@ defmodule Hal.OptionsTest do
       {[pace: {0, true}], "pace cannot be 0: a whole number from 1 to 50"},
       {[pace: 7], "pace cannot be 7: :off or {ms, true} is allowed"},
       {[lens: 3], "lens cannot be 3: an even number is allowed"},
+      {[delay_ms: {5, 4}],
+       "delay_ms cannot be {5, 4}: {least, most}, whole ms from 0 to 500, is"},
+      {[seed: 1.0], "seed cannot be 1.0: a whole number is allowed"},
       {[clock: :now], "clock cannot be :now: {module, function, arguments}"},
       {[name: String.duplicate("x", 256)], "a name is allowed"},
       {[name: "a", name: "b"], "name is given twice"},

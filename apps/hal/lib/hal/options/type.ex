@@ -6,6 +6,8 @@ defmodule Hal.Options.Type do
   |---|---|---|
   | `{:number, low, high}`, `{:number, low, high, unit}` | a number | a float |
   | `{:integer, low, high}`, `{:integer, low, high, unit}` | a whole number | the number |
+  | `{:span, low, high, unit}` | `{least, most}`, ascending whole numbers of this range | the same |
+  | `:integer` | any whole number, such as a seed | the same |
   | `:boolean` | `true`, `false` | the same |
   | `:path`, `{:path, what}` | text of 1 to 4095 bytes without a zero | the same |
   | `{:text, what}` | text of 1 to 255 bytes on one line, without control characters | the same |
@@ -88,6 +90,7 @@ defmodule Hal.Options.Type do
   end
 
   defp takes?(:boolean, value), do: is_boolean(value)
+  defp takes?(:integer, value), do: is_integer(value)
 
   defp takes?(:path, value),
     do: is_binary(value) and byte_size(value) in 1..4_095 and not String.contains?(value, <<0>>)
@@ -105,6 +108,10 @@ defmodule Hal.Options.Type do
   defp takes?(:driver, {m, options}), do: is_atom(m) and Keyword.keyword?(options)
   defp takes?({:integer, l, h}, value), do: is_integer(value) and value >= l and value <= h
   defp takes?({:integer, l, h, _unit}, value), do: takes?({:integer, l, h}, value)
+
+  defp takes?({:span, low, high, _unit}, {least, most}),
+    do: is_integer(least) and is_integer(most) and low <= least and least <= most and most <= high
+
   defp takes?({:number, l, h}, value), do: is_number(value) and value >= l and value <= h
   defp takes?({:number, l, h, _unit}, value), do: takes?({:number, l, h}, value)
   defp takes?(_type, _value), do: false

@@ -22,12 +22,14 @@ defmodule Hal.Options.Wording do
   @spec allowed(Hal.Options.Type.t() | String.t()) :: String.t()
   def allowed(text) when is_binary(text), do: text
   def allowed(:boolean), do: "true or false"
+  def allowed(:integer), do: "a whole number"
   def allowed(:path), do: "a path"
   def allowed(:mfa), do: "{module, function, arguments}"
   def allowed(:driver), do: "{module, options}"
   def allowed({kind, what}) when kind in [:text, :path], do: what
   def allowed({:number, low, high}), do: "a number from #{low} to #{high}"
   def allowed({:integer, low, high}), do: "a whole number from #{low} to #{high}"
+  def allowed({:span, low, high, unit}), do: "{least, most}, #{unit} from #{low} to #{high},"
   def allowed({type, low, high, unit}), do: "#{allowed({type, low, high})} #{unit}"
   def allowed({:one_of, values}), do: either(Enum.map(values, &inspect/1))
   def allowed({:struct, module}), do: "a %#{inspect(module)}{}"
