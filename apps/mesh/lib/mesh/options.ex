@@ -16,24 +16,27 @@ defmodule Mesh.Options do
   | `full_mesh` | up to so many nodes each is connected to each; default 30 |
   | `degree` | above that, to about so many others, 2 to 30; default 8 |
   """
+  alias Hal.Options
   alias Mesh.{Roster, Secret, Strategy}
 
-  @defaults [
-    secret: nil,
-    secret_file: nil,
-    fleet: nil,
-    interface: {0, 0, 0, 0},
-    port: 4370,
-    multicast: {{239, 255, 67, 86}, 4371},
-    peers: [],
-    strategies: [],
-    topologies: [],
-    dist_port: nil,
-    full_mesh: 30,
-    degree: 8
+  @gossip {{239, 255, 67, 86}, 4371}
+  # Addresses are for the strategies to check.
+  @table [
+    secret_file: [{:path, "the path of the fleet's secret"}, default: nil],
+    interface: [:ipv4, default: {0, 0, 0, 0}],
+    port: [{:integer, 0, 65_535}, default: 4370],
+    dist_port: [{:integer, 0, 65_535}, default: nil],
+    full_mesh: [{:integer, 2, 1_000, "nodes"}, default: 30],
+    degree: [{:integer, 2, 30, "nodes"}, default: 8],
+    fleet: [Roster.type(), default: nil],
+    secret: [{:struct, Secret}, default: nil],
+    multicast: [{:check, &__MODULE__.given?/1, "a group and a port, or false,"}, default: @gossip],
+    peers: [{:check, &is_list/1, ~s(a list of addresses such as "10.0.0.7:4370")}, default: []],
+    strategies: [{:check, &is_list/1, "a list of {Module, options}"}, default: []],
+    topologies: [{:check, &__MODULE__.topologies/1, "libcluster's"}, default: []]
   ]
 
-  defstruct Keyword.keys(@defaults) ++ [started: []]
+  defstruct Keyword.keys(@table) ++ [started: []]
 
   @typedoc "Checked: `started` are the strategies with their states, and nothing that is needed is `nil` any more."
   @type t :: %__MODULE__{
@@ -55,19 +58,12 @@ defmodule Mesh.Options do
   @doc "Checks options; an error is one line that names the option and what is allowed."
   @spec new(keyword()) :: {:ok, t()} | {:error, String.t()}
   def new(options) do
-    with :ok <- known(options),
-         options = struct!(__MODULE__, Keyword.merge(@defaults, options)),
+    with {:ok, options} <- Options.check(options, @table, "mesh"),
+         options = struct!(__MODULE__, options),
          {:ok, secret} <- secret(options),
-         fleet = options.fleet || Roster.fleet(),
-         :ok <- Roster.check(fleet),
-         :ok <- ip(options.interface),
-         :ok <- number(:port, options.port, 0..65_535),
-         dist_port = options.dist_port || own_port(),
-         :ok <- number(:dist_port, dist_port, 0..65_535),
-         :ok <- topologies(options.topologies),
-         :ok <- number(:full_mesh, options.full_mesh, 2..1_000),
-         :ok <- number(:degree, options.degree, 2..30),
          {:ok, started} <- start(options) do
+      fleet = if options.fleet in [nil, []], do: Roster.fleet(), else: options.fleet
+      dist_port = options.dist_port || own_port()
       {:ok, %{options | dist_port: dist_port, secret: secret, fleet: fleet, started: started}}
     end
   end
@@ -83,38 +79,9 @@ defmodule Mesh.Options do
          do: {:ok, options}
   end
 
-  defp known(options) do
-    case Keyword.keyword?(options) && Keyword.keys(options) -- Keyword.keys(@defaults) do
-      false ->
-        {:error,
-         "mesh takes options such as [secret_file: \"…\"], not #{inspect(options, limit: 3)}"}
-
-      [] ->
-        :ok
-
-      [key | _] ->
-        {:error,
-         "mesh has no option #{inspect(key)}; it has #{Enum.join(Keyword.keys(@defaults), ", ")}"}
-    end
-  end
-
   defp secret(%{secret: %Secret{} = secret}), do: {:ok, secret}
-  defp secret(%{secret: nil, secret_file: nil}), do: Secret.from_env()
-  defp secret(%{secret: nil, secret_file: file}) when is_binary(file), do: Secret.load(file)
-  defp secret(_other), do: {:error, "mesh secret_file is the path of the fleet's secret"}
-
-  defp ip({a, b, c, d}) when a in 0..255 and b in 0..255 and c in 0..255 and d in 0..255, do: :ok
-
-  defp ip(other),
-    do: {:error, "mesh interface is an IPv4 address such as {10, 0, 0, 7}, not #{inspect(other)}"}
-
-  defp number(key, value, range) do
-    if is_integer(value) and value in range,
-      do: :ok,
-      else:
-        {:error,
-         "mesh #{key} is a whole number from #{range.first} to #{range.last}, not #{inspect(value)}"}
-  end
+  defp secret(%{secret_file: nil}), do: Secret.from_env()
+  defp secret(%{secret_file: file}), do: Secret.load(file)
 
   # Without an epmd others are told in beacons.
   defp own_port do
@@ -131,19 +98,26 @@ defmodule Mesh.Options do
     end
   end
 
-  defp topologies([]), do: :ok
+  # `nil` is not left out.
+  @doc false
+  def given?(group), do: group != nil
 
-  defp topologies(topologies) do
+  @doc false
+  def topologies([]), do: true
+
+  def topologies(topologies) do
     cond do
       not Keyword.keyword?(topologies) ->
-        {:error, "mesh topologies are libcluster's: [name: [strategy: Module, config: [...]]]"}
+        Options.Wording.refuse(
+          "[name: [strategy: Module, config: […]]] of libcluster",
+          topologies
+        )
 
       not Code.ensure_loaded?(Cluster.Supervisor) ->
-        {:error,
-         "mesh topologies need libcluster; build with MIX_TARGET=robot where Hex is, or use peers"}
+        {:error, "need libcluster; build with MIX_TARGET=robot where Hex is, or use peers"}
 
       true ->
-        :ok
+        true
     end
   end
 
@@ -152,27 +126,25 @@ defmodule Mesh.Options do
 
     static = if options.peers != [], do: [{Strategy.Static, options.peers}], else: []
 
-    with true <-
-           is_list(options.strategies) ||
-             {:error, "mesh strategies is a list of {Module, options}"} do
-      Enum.reduce_while(gossip ++ static ++ options.strategies, {:ok, []}, fn strategy,
-                                                                              {:ok, done} ->
-        case begin(strategy) do
-          {:ok, state} -> {:cont, {:ok, done ++ [state]}}
-          {:error, line} -> {:halt, {:error, "mesh #{line}"}}
-        end
-      end)
-    end
+    Enum.reduce_while(gossip ++ static ++ options.strategies, {:ok, []}, fn strategy,
+                                                                            {:ok, done} ->
+      case begin(strategy) do
+        {:ok, state} -> {:cont, {:ok, done ++ [state]}}
+        {:error, line} -> {:halt, {:error, "mesh option #{line}"}}
+      end
+    end)
   end
 
   defp begin({module, options}) when is_atom(module) do
     if Code.ensure_loaded?(module) and function_exported?(module, :targets, 4) do
       with {:ok, state} <- module.init(options), do: {:ok, {module, state}}
     else
-      {:error, "strategy #{inspect(module)} is no Mesh.Strategy"}
+      {:error, "strategies names #{inspect(module)}, which is not a Mesh.Strategy"}
     end
   end
 
-  defp begin(other),
-    do: {:error, "strategies are {Module, options}, not #{inspect(other, limit: 3)}"}
+  defp begin(other) do
+    {:error, [{[], text}]} = Options.Wording.refuse("{Module, options}", other)
+    {:error, "strategies #{text}"}
+  end
 end

@@ -42,27 +42,12 @@ defmodule Mesh.Roster do
   @spec fleet() :: [atom(), ...]
   def fleet, do: for(kind <- ~w(mag min), n <- 1..100, do: :"#{kind}#{n}")
 
-  @doc """
-  Whether a configured fleet is one: a list of names.
+  @doc "The type of a configured fleet, for a table of `Hal.Options`: a list of names."
+  @spec type() :: Hal.Options.Type.t()
+  def type, do: {:list, {:check, &__MODULE__.name?/1, "a robot's name such as :mag1"}, @most}
 
-      iex> Mesh.Roster.check([:mag1, "mag2"])
-      {:error, ~s(fleet names robots by atoms such as :mag1, not "mag2")}
-  """
-  @spec check(term()) :: :ok | {:error, String.t()}
-  def check(fleet) when is_list(fleet) and length(fleet) in 1..@most do
-    case Enum.reject(
-           fleet,
-           &(is_atom(&1) and Regex.match?(~r/\A[a-z][a-z0-9_]{0,30}\z/, "#{&1}"))
-         ) do
-      [] -> :ok
-      [wrong | _] -> {:error, "fleet names robots by atoms such as :mag1, not #{inspect(wrong)}"}
-    end
-  end
-
-  def check(other),
-    do:
-      {:error,
-       "fleet is a list of 1 to #{@most} names such as [:mag1, :min1], not #{inspect(other, limit: 5)}"}
+  @doc false
+  def name?(name), do: is_atom(name) and Regex.match?(~r/\A[a-z][a-z0-9_]{0,30}\z/, "#{name}")
 
   @doc "The node of that name, if it is known."
   @spec node(t(), String.t()) :: {:ok, node()} | :error

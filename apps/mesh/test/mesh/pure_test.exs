@@ -91,23 +91,30 @@ defmodule Mesh.PureTest do
     secret = Mesh.Air.secret()
 
     for {options, word} <- [
-          {[prot: 1], "no option :prot"},
-          {[port: -1], "mesh port is a whole number from 0 to 65535, not -1"},
-          {[multicast: {{10, 0, 0, 1}, 1}], "mesh multicast"},
-          {[multicast: {{239, 999, 0, 1}, 1}], "mesh multicast"},
-          {[multicast: "239.0.0.1:1"], "mesh multicast"},
-          {[peers: ["10.0.0.1"]], ~s(not "10.0.0.1")},
-          {[peers: :all], "peers are addresses"},
-          {[interface: "eth0"], "mesh interface"},
-          {[multicast: nil], "mesh multicast"},
-          {[fleet: [:"mag1\n"]], "fleet names robots by atoms"},
-          {[fleet: ["mag1"]], "fleet names robots by atoms"},
-          {[strategies: [String]], "strategies are {Module, options}"},
-          {[strategies: [{String, 1}]], "strategy String is no Mesh.Strategy"},
-          {[secret: "cookie"], "mesh secret_file"},
-          {[full_mesh: 1], "mesh full_mesh"},
-          {[topologies: [lab: [strategy: Nowhere]]], "mesh topologies need libcluster"},
-          {[topologies: :lab], "mesh topologies are libcluster's"}
+          {[prot: 1], "mesh option prot is not known: allowed are secret_file"},
+          {[port: -1],
+           "mesh option port cannot be -1: a whole number from 0 to 65535 is allowed"},
+          {[multicast: {{10, 0, 0, 1}, 1}],
+           "mesh option multicast cannot be {{10, 0, 0, 1}, 1}: a group"},
+          {[multicast: {{239, 999, 0, 1}, 1}], "mesh option multicast cannot be"},
+          {[multicast: "239.0.0.1:1"], "mesh option multicast cannot be"},
+          {[peers: ["10.0.0.1"]],
+           ~s(mesh option peers cannot be "10.0.0.1": an address such as "10.0.0.7:4370")},
+          {[peers: :all], "mesh option peers cannot be :all: a list of addresses such as"},
+          {[interface: "eth0"], ~s(mesh option interface cannot be "eth0": an IPv4 address)},
+          {[multicast: nil], "mesh option multicast cannot be nil"},
+          {[fleet: [:"mag1\n"]], "mesh option fleet.1 cannot be"},
+          {[fleet: ["mag1"]],
+           ~s(mesh option fleet.1 cannot be "mag1": a robot's name such as :mag1)},
+          {[strategies: [String]],
+           "mesh option strategies cannot be String: {Module, options} is allowed"},
+          {[strategies: [{String, 1}]],
+           "strategies names String, which is not a Mesh.Strategy"},
+          {[secret: "cookie"],
+           ~s(mesh option secret cannot be "cookie": a %Mesh.Secret{} is)},
+          {[full_mesh: 1], "mesh option full_mesh cannot be 1: a whole number from 2 to 1000"},
+          {[topologies: [lab: [strategy: Nowhere]]], "mesh option topologies need libcluster"},
+          {[topologies: :lab], "mesh option topologies cannot be :lab: [name: [strategy"}
         ] do
       assert {:error, line} = Options.new(Keyword.merge([secret: secret], options))
       assert line =~ word

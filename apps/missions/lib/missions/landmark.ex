@@ -43,7 +43,7 @@ defmodule Missions.Landmark do
   """
   @impl Robot.Mission
   def init(robot, options \\ []) do
-    {:ok, {of, lost_link}} = Policy.options(options)
+    {of, lost_link} = Policy.of(options)
 
     mission = %Landmark.State{
       me: robot,

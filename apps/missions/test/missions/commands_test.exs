@@ -138,8 +138,11 @@ defmodule Swarm.CommandsTest do
     id = robot(:door_wrong)
     assert line(Swarm.goto(:door_wrnog, {1, 1})) =~ "did you mean door_wrong?"
     assert line(Swarm.goto(id, {:nan, 1})) =~ "number"
-    assert line(Swarm.formation(:wegde)) =~ "did you mean wedge?"
-    assert line(Swarm.formation(:line, length: "4")) =~ "metres"
+    assert line(Swarm.formation(:wegde)) =~ "did you mean :wedge?"
+
+    assert line(Swarm.formation(:line, length: "4")) =~
+             ~s(line option length cannot be "4": a number from 0.0 to 1.0e3 m is)
+
     assert line(Swarm.start(assign: :luck)) =~ ":chain or :cost"
     assert line(Swarm.start(leader_chnage: true)) =~ "did you mean leader_change?"
 

@@ -47,7 +47,7 @@ defmodule Swarm.MemberSpecTest do
                )
 
       assert {:ok, %{mission: {Landmark, options}}} = MemberSpec.config(file)
-      assert Landmark.Policy.options(options) == {:ok, {6, link}}
+      assert Landmark.Policy.of(options) == {6, link}
     end
 
     assert {:ok, file} = parse("policies: [formation: {:wedge, 1.0}]")

@@ -37,7 +37,7 @@ defmodule Missions.PureTest do
 
   test "a majority of a number that nobody knows is refused" do
     assert {:error, line} = Landmark.Options.check([policy: :majority], nil)
-    assert line =~ "of:"
+    assert line =~ "option of is missing"
     assert {:ok, options} = Landmark.Options.check([policy: :majority], 5)
     assert options[:of] == 5
   end

@@ -1,7 +1,7 @@
 defmodule Swarm.Commands do
   @moduledoc false
   # What `Swarm` needs: who is meant, is it allowed, and what do they answer.
-  alias Robot.Command
+  alias Hal.{Options, Suggest}
   alias Swarm.{Formation, Missions}
   alias Swarm.Comms.Transport
   alias Swarm.Commands
@@ -46,20 +46,13 @@ defmodule Swarm.Commands do
     word = if is_binary(name), do: name, else: String.trim_leading(inspect(name), ":")
 
     "no robot #{inspect(name)}; there are #{there}" <>
-      hint(word, Enum.map(known, &Atom.to_string/1))
-  end
-
-  defp hint(word, known) do
-    case Command.Arguments.nearest(word, known) do
-      nil -> ""
-      near -> "; did you mean #{near}?"
-    end
+      Suggest.hint(word, Enum.map(known, &Atom.to_string/1))
   end
 
   @doc "Checks the options of a start: who takes part, and the mission's own."
   @spec start(term()) :: {:ok, [atom()], keyword()} | {:error, String.t()}
   def start(options) do
-    with :ok <- keyword(options, "robots, and those of the mission"),
+    with {:ok, options} <- keyword(options),
          {:ok, robots} <- robots(Keyword.get(options, :robots, :all)),
          {:ok, mission} <- Missions.default(),
          options = Keyword.delete(options, :robots),
@@ -67,15 +60,23 @@ defmodule Swarm.Commands do
          do: {:ok, robots, options}
   end
 
-  @doc "Checks a formation."
-  @spec formation(term(), term()) :: {:ok, Formation.t()} | {:error, String.t()}
-  def formation(kind, options, robots \\ nil)
+  defp keyword(options) do
+    if Keyword.keyword?(options),
+      do: {:ok, options},
+      else:
+        Options.refuse(
+          "start",
+          [],
+          options,
+          "[key: value, …] with robots, and those of the mission,"
+        )
+  end
 
-  def formation(kind, options, robots) do
-    with :ok <- keyword(options, "spacing, length or side"),
-         {:ok, kind} <- kind(kind),
-         :ok <- numbers(options),
-         do: Formation.new(kind, fleet(kind, options, robots || length(Transport.robots())))
+  @doc "Checks a formation."
+  @spec formation(term(), term(), pos_integer() | nil) ::
+          {:ok, Formation.t()} | {:error, String.t()}
+  def formation(kind, options, robots \\ nil) do
+    Formation.new(kind, fleet(options, robots || length(Transport.robots())))
   end
 
   @doc """
@@ -119,35 +120,10 @@ defmodule Swarm.Commands do
   defp refusal(_id, {:error, line}) when is_binary(line), do: line
   defp refusal(id, {:error, reason}), do: "#{id} refuses: #{inspect(reason)}"
 
-  defp kind(kind) do
-    kinds = Formation.kinds()
-
-    case Enum.find(kinds, &(&1 == kind or Atom.to_string(&1) == kind)) do
-      nil ->
-        {:error, line} = Formation.new(kind)
-        word = if is_binary(kind), do: kind, else: String.trim_leading(inspect(kind), ":")
-        {:error, line <> hint(word, Enum.map(kinds, &Atom.to_string/1))}
-
-      known ->
-        {:ok, known}
-    end
-  end
-
-  defp numbers(options) do
-    case Enum.reject(options, fn {_key, value} -> is_number(value) end) do
-      [] -> :ok
-      [{key, value} | _] -> {:error, "#{key} cannot be #{inspect(value)}: a number of metres"}
-    end
-  end
-
   # Only a whole length or side needs to know how many there are.
-  defp fleet(_kind, options, robots) do
-    if options[:length] || options[:side], do: options ++ [robots: robots], else: options
-  end
-
-  defp keyword(options, allowed) do
-    if Keyword.keyword?(options),
-      do: :ok,
-      else: {:error, "#{inspect(options)} are not options; allowed are #{allowed}"}
+  defp fleet(options, robots) do
+    if Keyword.keyword?(options) and (options[:length] || options[:side]) != nil,
+      do: options ++ [robots: robots],
+      else: options
   end
 end

@@ -19,12 +19,14 @@ defmodule Swarm.Formation do
 
       config :swarm, formations: [echelon: Mine.Echelon]
   """
-  alias Hal.Pose
+  alias Hal.{Options, Pose}
+  alias Hal.Options.{Type, Wording}
 
   @built_in [:column, :line, :wedge, :triangle, :diamond, :circle]
   @added Application.compile_env(:swarm, :formations, [])
   @least_spacing 0.8
-  @greatest_spacing 5.0
+  @spacing {:number, @least_spacing, 5.0, "m"}
+  @metres {:number, 0.0, 1_000.0, "m"}
   # The nearest that a ring comes to the landmark: robots there still see all of it.
   @least_ring 1.6
 
@@ -69,28 +71,46 @@ defmodule Swarm.Formation do
       iex> Swarm.Formation.new(:triangle, side: 3.0, robots: 6)
       {:ok, {:triangle, 1.5}}
       iex> Swarm.Formation.new(:column, spacing: 0.1)
-      {:error, "spacing cannot be 0.1: 0.8 to 5.0 m"}
-      iex> Swarm.Formation.new(:heart, [])
-      {:error, "formation cannot be :heart: column, line, wedge, triangle, diamond or circle"}
+      {:error, "column option spacing cannot be 0.1: a number from 0.8 to 5.0 m is allowed"}
+      iex> {:error, line} = Swarm.Formation.new("hart", [])
+      iex> line =~ ~s(formation cannot be "hart": :column, :line, :wedge)
+      true
   """
-  @spec new(kind() | term(), keyword()) :: {:ok, t()} | {:error, String.t()}
+  @spec new(kind() | String.t() | term(), keyword()) :: {:ok, t()} | {:error, String.t()}
   def new(kind, options \\ []) do
-    with true <- kind?(kind), [] <- Keyword.keys(options) -- allowed(kind) do
-      kind |> spacing(options) |> check(kind)
+    with {:kind, {:ok, kind}} <- {:kind, read_kind(kind)},
+         {:ok, options} <- Options.check(options, allowed(kind), Atom.to_string(kind)),
+         {:ok, spacing} <- Type.read(@spacing, spacing(kind, options)) do
+      {:ok, {kind, spacing}}
     else
-      false ->
-        {others, [last]} = Enum.split(kinds(), -1)
-        {:error, "formation cannot be #{inspect(kind)}: #{Enum.join(others, ", ")} or #{last}"}
-
-      [key | _] ->
-        {:error,
-         "#{kind} takes no #{inspect(key)}: #{Enum.join(allowed(kind) -- [:robots], ", ")}"}
+      {:kind, {:error, [{[], text}]}} -> {:error, "formation #{text}"}
+      {:error, [{[], text}]} -> {:error, "spacing #{text}"}
+      {:error, line} -> {:error, line}
     end
   end
 
-  defp allowed(:line), do: [:spacing, :length, :robots]
-  defp allowed(:triangle), do: [:spacing, :side, :robots]
-  defp allowed(_kind), do: [:spacing, :robots]
+  @doc "The type of a formation, `{kind, spacing}` or a kind (1 m), for a table of `Hal.Options`."
+  @spec type() :: Type.t()
+  def type, do: {:check, &read/1, "a formation"}
+
+  defp read({kind, spacing}) do
+    with {:ok, kind} <- read_kind(kind),
+         {:ok, spacing} <- Type.read(@spacing, spacing),
+         do: {:ok, {kind, spacing}}
+  end
+
+  defp read(kind), do: read({kind, 1.0})
+
+  defp read_kind(kind) do
+    case Enum.find(kinds(), &(&1 == kind or Atom.to_string(&1) == kind)) do
+      nil -> Wording.refuse({:one_of, kinds()}, kind)
+      kind -> {:ok, kind}
+    end
+  end
+
+  defp allowed(:line), do: [{:length, @metres} | allowed(:column)]
+  defp allowed(:triangle), do: [{:side, @metres} | allowed(:column)]
+  defp allowed(_kind), do: [spacing: [@spacing, default: 1.0], robots: {:integer, 1, 1_000_000}]
 
   defp spacing(kind, options) do
     robots = options[:robots] || 2
@@ -98,18 +118,9 @@ defmodule Swarm.Formation do
     cond do
       kind == :line and is_number(options[:length]) -> options[:length] / max(robots - 1, 1)
       kind == :triangle and is_number(options[:side]) -> options[:side] / max(rows(robots) - 1, 1)
-      true -> Keyword.get(options, :spacing, 1.0)
+      true -> options[:spacing]
     end
   end
-
-  defp check(spacing, kind)
-       when is_number(spacing) and spacing >= @least_spacing and spacing <= @greatest_spacing,
-       do: {:ok, {kind, spacing * 1.0}}
-
-  defp check(spacing, _kind),
-    do:
-      {:error,
-       "spacing cannot be #{inspect(spacing)}: #{@least_spacing} to #{@greatest_spacing} m"}
 
   @doc "The least spacing, to which a shape closes up where there is little room."
   @spec least_spacing() :: float()

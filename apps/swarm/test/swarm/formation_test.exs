@@ -42,6 +42,8 @@ defmodule Swarm.FormationTest do
   test "nonsense is refused by name" do
     assert {:error, line} = Formation.new(:column, spacing: 1.0e308)
     assert line =~ "0.8 to 5.0"
-    assert {:error, "column takes no :length" <> _} = Formation.new(:column, length: 3)
+
+    assert {:error, "column option length is not known: allowed are spacing, robots"} =
+             Formation.new(:column, length: 3)
   end
 end

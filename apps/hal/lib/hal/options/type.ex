@@ -10,6 +10,7 @@ defmodule Hal.Options.Type do
   | `:integer` | any whole number, such as a seed | the same |
   | `:boolean` | `true`, `false` | the same |
   | `:path`, `{:path, what}` | text of 1 to 4095 bytes without a zero | the same |
+  | `:ipv4` | an address, as text or `{a, b, c, d}` | the tuple |
   | `{:text, what}` | text of 1 to 255 bytes on one line, without control characters | the same |
   | `{:one_of, values}` | one of these | the same |
   | `{:list, type}`, `{:list, type, most}` | up to so many values (64) | a list |
@@ -81,6 +82,11 @@ defmodule Hal.Options.Type do
     end
   end
 
+  def read(:ipv4, value) when is_binary(value) do
+    with {:error, _reason} <- :inet.parse_ipv4strict_address(to_charlist(value)),
+         do: Wording.refuse(:ipv4, value)
+  end
+
   def read(type, value) do
     cond do
       not takes?(type, value) -> Wording.refuse(type, value)
@@ -94,6 +100,9 @@ defmodule Hal.Options.Type do
 
   defp takes?(:path, value),
     do: is_binary(value) and byte_size(value) in 1..4_095 and not String.contains?(value, <<0>>)
+
+  defp takes?(:ipv4, ip),
+    do: is_tuple(ip) and tuple_size(ip) == 4 and Enum.all?(Tuple.to_list(ip), &(&1 in 0..255))
 
   defp takes?({:path, _what}, value), do: takes?(:path, value)
 

@@ -24,6 +24,7 @@ defmodule Hal.Options.Wording do
   def allowed(:boolean), do: "true or false"
   def allowed(:integer), do: "a whole number"
   def allowed(:path), do: "a path"
+  def allowed(:ipv4), do: ~s(an IPv4 address such as "10.0.0.7")
   def allowed(:mfa), do: "{module, function, arguments}"
   def allowed(:driver), do: "{module, options}"
   def allowed({kind, what}) when kind in [:text, :path], do: what

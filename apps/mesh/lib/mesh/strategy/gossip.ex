@@ -5,6 +5,7 @@ defmodule Mesh.Strategy.Gossip do
   group's address and port.
   """
   @behaviour Mesh.Strategy
+  alias Hal.Options.Wording
   alias Mesh.Strategy.Static
 
   @every_ms 1_000
@@ -16,8 +17,9 @@ defmodule Mesh.Strategy.Gossip do
         {:ok, %{group: group, due_ms: nil}}
 
       _none ->
-        {:error,
-         "multicast is a group and a port such as {{239, 255, 67, 86}, 4371}, or false, not #{inspect(group, limit: 5, printable_limit: 60)}"}
+        group_of = "a group and a port such as {{239, 255, 67, 86}, 4371}, or false,"
+        {:error, [{[], text}]} = Wording.refuse(group_of, group)
+        {:error, "multicast #{text}"}
     end
   end
 

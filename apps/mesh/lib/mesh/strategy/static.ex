@@ -5,6 +5,7 @@ defmodule Mesh.Strategy.Static do
   beacons tell of the others. Its option is the list, of `{{10, 0, 0, 7}, 4370}` or `"10.0.0.7:4370"`.
   """
   @behaviour Mesh.Strategy
+  alias Hal.Options.Wording
   alias Mesh.Backoff
 
   @most 1_000
@@ -67,7 +68,8 @@ defmodule Mesh.Strategy.Static do
   # One chance for all, another part of it for each.
   defp spread(chance, turn), do: :math.fmod(chance + turn * 0.618, 1.0)
 
-  defp line(wrong),
-    do:
-      "peers are addresses such as \"10.0.0.7:4370\" (UDP), not #{inspect(wrong, limit: 5, printable_limit: 60)}"
+  defp line(wrong) do
+    {:error, [{[], text}]} = Wording.refuse(~s(an address such as "10.0.0.7:4370" (UDP\)), wrong)
+    "peers #{text}"
+  end
 end

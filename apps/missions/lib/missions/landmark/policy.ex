@@ -25,8 +25,6 @@ defmodule Missions.Landmark.Policy do
   alias Swarm.Membership.Peers
   alias Missions.Landmark
 
-  @links [:stop, :hold, :continue]
-  @most 1_000
   # A heartbeat lists who was heard in the last second.
   @heard_ms 1_000
   # A leader's lease, and the time that a heartbeat may be under way.
@@ -35,43 +33,16 @@ defmodule Missions.Landmark.Policy do
   @gather_ms 2_000
 
   @doc """
-  The options of a mission checked: the fleet's size of which a majority is asked for, 0 for no such
-  rule, and what to do without a link.
+  Of the options of a mission (`Missions.Landmark.Options`) the fleet's size of which a majority is asked for, 0
+  for no such rule, and what to do without a link.
 
-      iex> Missions.Landmark.Policy.options(policy: :majority, of: 4)
-      {:ok, {4, nil}}
-      iex> Missions.Landmark.Policy.options(policy: :majority)
-      {:error, "policy :majority needs of: the number of robots of the fleet, 1 to 1000"}
-      iex> Missions.Landmark.Policy.options(lost_link: :wait)
-      {:error, "lost_link cannot be :wait: :stop, :hold or :continue"}
+      iex> Missions.Landmark.Policy.of([policy: :majority, of: 4])
+      {4, nil}
   """
-  @spec options(keyword()) ::
-          {:ok, {of :: 0..1_000, lost_link :: :stop | :hold | :continue | nil}}
-          | {:error, line :: String.t()}
-  def options(options) do
-    policy = Keyword.get(options, :policy, :available)
-    link = Keyword.get(options, :lost_link)
-    of = Keyword.get(options, :of)
-
-    cond do
-      policy not in [:available, :majority] ->
-        {:error, "policy cannot be #{inspect(policy)}: :available or :majority"}
-
-      link not in [nil | @links] ->
-        {:error, "lost_link cannot be #{inspect(link)}: :stop, :hold or :continue"}
-
-      of != nil and not (is_integer(of) and of in 1..@most) ->
-        {:error, "of cannot be #{inspect(of)}: the number of robots of the fleet, 1 to #{@most}"}
-
-      policy == :majority and of == nil ->
-        {:error, "policy :majority needs of: the number of robots of the fleet, 1 to #{@most}"}
-
-      policy == :majority ->
-        {:ok, {of, link}}
-
-      true ->
-        {:ok, {0, link}}
-    end
+  @spec of(keyword()) :: {of :: 0..1_000, lost_link :: :stop | :hold | :continue | nil}
+  def of(options) do
+    of = if options[:policy] == :majority, do: Keyword.fetch!(options, :of), else: 0
+    {of, options[:lost_link]}
   end
 
   @doc "Notes once a tick whether this robot has company."

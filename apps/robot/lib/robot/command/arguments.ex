@@ -1,7 +1,6 @@
 defmodule Robot.Command.Arguments do
   @moduledoc """
-  Arguments of text commands: numbers, names of robots and colours, and suggestions for mistyped
-  words. Pure; no input ever becomes an atom.
+  The words a command is made of: numbers, names of robots and colours. Pure; nothing read ever becomes an atom.
   """
 
   # Farther than this is not a place, speed or size of ours.
@@ -81,25 +80,4 @@ defmodule Robot.Command.Arguments do
 
   defp in_range(number) when is_float(number) and abs(number) <= @greatest, do: {:ok, number}
   defp in_range(_number), do: {:error, "a number from -1000000 to 1000000 is allowed"}
-
-  @doc """
-  The word most like this one, if any is rather like it.
-
-      iex> Robot.Command.Arguments.nearest("fidnblob", ["findblob", "goto"])
-      "findblob"
-      iex> Robot.Command.Arguments.nearest("xyz", ["findblob", "goto"])
-      nil
-      iex> Robot.Command.Arguments.nearest(<<"got", 0xFF>>, ["findblob", "goto"])
-      nil
-  """
-  @spec nearest(String.t(), [String.t()]) :: String.t() | nil
-  def nearest(word, words) do
-    # Newer Elixirs do not compare what is not text.
-    words = if String.valid?(word), do: words, else: []
-
-    case words |> Enum.map(&{String.jaro_distance(word, &1), &1}) |> Enum.max(fn -> nil end) do
-      {likeness, near} when likeness > 0.7 -> near
-      _ -> nil
-    end
-  end
 end

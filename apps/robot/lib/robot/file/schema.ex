@@ -88,9 +88,9 @@ defmodule Robot.File.Schema do
   def network do
     {:keys,
      secret_file: {:path, "the path of the fleet's secret"},
-     interface: ip(),
+     interface: :ipv4,
      port: {:integer, 0, 65_535},
-     multicast: {:or, false, {:tuple, [ip(), {:integer, 1, 65_535}], ~s({"239.255.67.86", 4371})}},
+     multicast: {:or, false, {:tuple, [:ipv4, {:integer, 1, 65_535}], ~s({"239.255.67.86", 4371})}},
      peers: {:list, {:check, &peer?/1, ~s(address and port, such as "10.0.0.7:4370",)}, 1_000},
      dist_port: {:integer, 0, 65_535},
      full_mesh: {:integer, 2, 1_000},
@@ -130,20 +130,10 @@ defmodule Robot.File.Schema do
 
   defp place(_other, _most), do: false
 
-  defp ip, do: {:check, &ip/1, ~s(an IPv4 address, such as "10.0.0.7",)}
-
-  defp ip({a, b, c, d} = ip) when a in 0..255 and b in 0..255 and c in 0..255 and d in 0..255,
-    do: {:ok, ip}
-
-  defp ip(text) when is_binary(text),
-    do: text |> to_charlist() |> :inet.parse_ipv4strict_address()
-
-  defp ip(_other), do: false
-
   defp peer?(text) do
     with true <- is_binary(text),
          [ip, port] <- String.split(text, ":"),
-         {:ok, _ip} <- ip(ip),
+         {:ok, _ip} <- Type.read(:ipv4, ip),
          {port, ""} <- Integer.parse(port),
          do: port in 1..65_535,
          else: (_no -> false)

@@ -1,7 +1,7 @@
 defmodule Swarm.Directory.Search do
   @moduledoc false
   # Which robots are as wanted (`Swarm.find/1`): templates over `Swarm.Directory.RobotInfo`.
-  alias Robot.Command
+  alias Hal.Suggest
   alias Swarm.Comms.Transport
   alias Swarm.Directory.RobotInfo
 
@@ -56,9 +56,9 @@ defmodule Swarm.Directory.Search do
   end
 
   defp wrong({key, _wanted}) when key not in @keys do
-    near = Command.Arguments.nearest(Atom.to_string(key), Enum.map(@keys, &Atom.to_string/1))
-    hint = if near, do: "; did you mean #{near}?", else: ""
-    "robots are not found by #{inspect(key)}: #{Enum.join(@keys, ", ")}" <> hint
+    names = Enum.map(@keys, &Atom.to_string/1)
+    hint = Suggest.hint(Atom.to_string(key), names)
+    "robots are not found by #{inspect(key)}: #{Enum.join(names, ", ")}#{hint}"
   end
 
   defp wrong({key, wanted}) do

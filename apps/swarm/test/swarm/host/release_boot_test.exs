@@ -60,7 +60,7 @@ defmodule Swarm.Host.ReleaseBootTest do
     File.write!(environment["CONVOY_ROBOT_FILE"], file(", arm: :maual, limit: []"))
     assert {:error, lines} = ReleaseBoot.robot(environment)
     assert Enum.any?(lines, &(&1 =~ "mag1.exs:1: arm: cannot be :maual"))
-    assert Enum.any?(lines, &(&1 =~ "limit: is not a key; did you mean limits?"))
+    assert Enum.any?(lines, &(&1 =~ "limit: is not known: allowed are id, profile"))
     assert {1, [], ^lines} = ReleaseBoot.answer("start", environment)
     assert {1, [], ^lines} = ReleaseBoot.answer("check", environment)
   end
@@ -242,10 +242,10 @@ defmodule Swarm.Host.ReleaseBootTest do
     test "does not say it for a file that is wrong", %{tmp_dir: folder} do
       environment = machine(folder, file(~s(, console: [port: "/dev/ttyS0", phrase: "häh"])))
       assert {1, [], [line]} = ReleaseBoot.answer("halt", environment)
-      assert line =~ "console: console option :phrase cannot be"
+      assert line =~ "console.phrase: cannot be"
       environment = machine(folder, file(~s(, console: [phrase: "x"])))
       assert {1, [], [line]} = ReleaseBoot.answer("halt", environment)
-      assert line =~ "console: serial option :port"
+      assert line =~ "console.port: is missing"
     end
   end
 
