@@ -7,7 +7,16 @@ defmodule Sim.Radio do
   deliveries, in the order of their time and then of their number. Every copy is its own draw:
   one message to five robots can reach three of them. A message may overtake an earlier one.
   """
+  alias Hal.Options
   alias Sim.Noise
+
+  @table [
+    seed: [:integer, required: true],
+    loss: [{:number, 0, 1}, default: 0.0],
+    duplicates: [{:number, 0, 1}, default: 0.0],
+    delay_ms: [{:span, 0, 3_600_000, "whole ms"}, default: {5, 50}],
+    cut: [{:check, &is_list/1, "[{:mag1, :mag2}, …]"}, default: []]
+  ]
 
   @enforce_keys [:seed, :loss, :delay_ms, :duplicates]
   defstruct @enforce_keys ++ [cut: MapSet.new(), queue: :gb_sets.new(), next: 0, sent: 0, lost: 0]
@@ -30,25 +39,11 @@ defmodule Sim.Radio do
   and greatest delay, `:cut` the pairs that cannot hear each other. Wrong options raise `ArgumentError`.
 
       iex> Sim.Radio.new(seed: 1, loss: 2.0)
-      ** (ArgumentError) radio option :loss cannot be 2.0: a probability from 0 to 1
+      ** (ArgumentError) radio option loss cannot be 2.0: a number from 0 to 1 is allowed
   """
   @spec new(keyword()) :: t()
   def new(options) do
-    options =
-      Keyword.validate!(options, [:seed, loss: 0.0, delay_ms: {5, 50}, duplicates: 0.0, cut: []])
-
-    unless is_integer(options[:seed]), do: wrong!(:seed, options[:seed], "an integer")
-    Enum.each([:loss, :duplicates], &probability!(&1, options[&1]))
-
-    case options[:delay_ms] do
-      {least, most}
-      when is_integer(least) and is_integer(most) and 0 <= least and least <= most ->
-        :ok
-
-      other ->
-        wrong!(:delay_ms, other, "{least, greatest} in whole milliseconds")
-    end
-
+    options = Options.check!(options, @table, "radio")
     {cut, options} = Keyword.pop!(options, :cut)
     cut(struct!(__MODULE__, options), cut)
   end
@@ -132,13 +127,5 @@ defmodule Sim.Radio do
         do: take(%{radio | queue: rest}, at_ms, [{to, from, message} | taken]),
         else: {Enum.reverse(taken), radio}
     end
-  end
-
-  defp probability!(_name, value) when is_number(value) and value >= 0 and value <= 1, do: :ok
-  defp probability!(name, value), do: wrong!(name, value, "a probability from 0 to 1")
-
-  defp wrong!(name, value, allowed) do
-    raise ArgumentError,
-          "radio option #{inspect(name)} cannot be #{inspect(value)}: #{allowed}"
   end
 end

@@ -11,12 +11,20 @@ defmodule Sim.World do
   are more than 1 cm apart. `min_separation` is the least gap between two robots so far, edge to
   edge, `nil` with fewer than two.
   """
-  alias Hal.{Pose, Twist}
+  alias Hal.{Options, Pose, Twist}
   alias Sim.{Compute, Floorplan, World}
   alias Sim.World.{Body, CameraFrustum}
   alias Sim.World.{Bodies, Motion, Touch}
 
   @landmark_height 1.0
+  @table [
+    map: [{:struct, Floorplan}, required: true],
+    robots: [{:check, &is_list/1, "a list of robots"}, required: true],
+    landmark: [{:check, &is_tuple/1, "{x, y} in metres"}, default: nil],
+    seed: [:integer, default: 0],
+    noise: [{:one_of, [:off, :default, :slip]}, default: :default],
+    start_ms: [:integer, default: 0]
+  ]
 
   @enforce_keys [:map, :seed, :noise, :at_ms, :order, :robots]
   defstruct @enforce_keys ++
@@ -53,30 +61,12 @@ defmodule Sim.World do
   """
   @spec new!(keyword()) :: t()
   def new!(options) do
-    options =
-      Keyword.validate!(options, [
-        :map,
-        :robots,
-        landmark: nil,
-        seed: 0,
-        noise: :default,
-        start_ms: 0
-      ])
-
-    %Floorplan{} = map = options[:map]
-    noise = options[:noise]
-
-    unless noise in [:off, :default, :slip],
-      do:
-        raise(
-          ArgumentError,
-          "world option :noise cannot be #{inspect(noise)}: :off, :default or :slip"
-        )
-
+    options = Options.check!(options, @table, "world")
+    %{map: map, noise: noise} = Map.new(options)
     ids = Enum.map(options[:robots], & &1.id)
 
     unless ids == Enum.uniq(ids),
-      do: raise(ArgumentError, "world option :robots names a robot twice")
+      do: raise(ArgumentError, "world option robots names a robot twice")
 
     Enum.each(options[:robots], &free!(map, &1.id, &1.pose, &1.profile.radius))
 

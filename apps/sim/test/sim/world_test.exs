@@ -277,7 +277,9 @@ defmodule Sim.WorldTest do
   end
 
   test "wrong options are named" do
-    assert_raise ArgumentError, ~r/:noise cannot be :loud/, fn -> world([], noise: :loud) end
+    assert_raise ArgumentError,
+                 ~r/option noise cannot be :loud: :off, :default or :slip is allowed/,
+                 fn -> world([], noise: :loud) end
 
     assert_raise ArgumentError, ~r/there is a wall/, fn ->
       World.displace(world([robot(:mag1, 0, 0)]), :mag1, Pose.new(50, 0))

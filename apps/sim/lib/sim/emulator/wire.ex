@@ -14,6 +14,7 @@ defmodule Sim.Emulator.Wire do
   Bytes never overtake each other.
   """
   import Bitwise
+  alias Hal.Options
   alias Sim.Noise
 
   @enforce_keys [:drop, :double, :flip, :delay_ms, :seed, :way]
@@ -22,61 +23,32 @@ defmodule Sim.Emulator.Wire do
 
   @type t :: %__MODULE__{}
 
-  @defaults [drop: 0, double: 0, flip: 0, delay_ms: {0, 0}, seed: 0, way: 0]
+  @table [
+    drop: [{:number, 0, 1}, default: 0.0],
+    double: [{:number, 0, 1}, default: 0.0],
+    flip: [{:number, 0, 1}, default: 0.0],
+    delay_ms: [{:span, 0, 60_000, "whole ms"}, default: {0, 0}],
+    seed: [:integer, default: 0],
+    way: [:integer, default: 0]
+  ]
 
   @doc """
   A wire, or one line that names what is wrong with its options.
 
       iex> {:ok, wire} = Sim.Emulator.Wire.new(drop: 0.02)
       iex> wire.flip
-      0
+      0.0
       iex> Sim.Emulator.Wire.new(drop: 2)
-      {:error, "wire option :drop cannot be 2: a share from 0 to 1"}
+      {:error, "wire option drop cannot be 2: a number from 0 to 1 is allowed"}
   """
   @spec new(keyword()) :: {:ok, t()} | {:error, line :: String.t()}
   def new(options \\ []) do
-    wrong =
-      Enum.find_value(options, fn {name, value} ->
-        cond do
-          not Keyword.has_key?(@defaults, name) ->
-            "unknown wire option #{inspect(name)}: #{Enum.join(Keyword.keys(@defaults), ", ")}"
-
-          not valid?(name, value) ->
-            "wire option #{inspect(name)} cannot be #{inspect(value)}: #{allowed(name)}"
-
-          true ->
-            nil
-        end
-      end)
-
-    options = Keyword.merge(@defaults, options)
-
-    cond do
-      wrong ->
-        {:error, wrong}
-
-      faults(options) > 1 ->
-        {:error, "wire options :drop, :double and :flip are 1 at most together"}
-
-      true ->
-        {:ok, struct!(__MODULE__, options)}
+    with {:ok, options} <- Options.check(options, @table, "wire") do
+      if options[:drop] + options[:double] + options[:flip] > 1,
+        do: {:error, "wire options drop, double and flip are 1 at most together"},
+        else: {:ok, struct!(__MODULE__, options)}
     end
   end
-
-  defp faults(options), do: options[:drop] + options[:double] + options[:flip]
-
-  defp valid?(name, share) when name in [:drop, :double, :flip],
-    do: is_number(share) and share >= 0 and share <= 1
-
-  defp valid?(:delay_ms, {least, most}),
-    do: is_integer(least) and is_integer(most) and least in 0..most//1 and most <= 60_000
-
-  defp valid?(:delay_ms, _other), do: false
-  defp valid?(_seed_or_way, value), do: is_integer(value)
-
-  defp allowed(name) when name in [:drop, :double, :flip], do: "a share from 0 to 1"
-  defp allowed(:delay_ms), do: "{least, most}, whole milliseconds up to 60000"
-  defp allowed(_seed_or_way), do: "a whole number"
 
   @doc """
   Sends bytes into the wire; a pulled one takes none.

@@ -66,12 +66,12 @@ defmodule Sim.Emulator.WireTest do
 
   test "what cannot be is named" do
     for {options, name} <- [
-          {[drop: -0.1], ":drop"},
-          {[flip: :nan], ":flip"},
-          {[delay_ms: 5], ":delay_ms"},
-          {[delay_ms: {5, 4}], ":delay_ms"},
-          {[seed: 0.5], ":seed"},
-          {[dorp: 1], ":dorp"},
+          {[drop: -0.1], "option drop "},
+          {[flip: :nan], "option flip "},
+          {[delay_ms: 5], "option delay_ms "},
+          {[delay_ms: {5, 4}], "option delay_ms "},
+          {[seed: 0.5], "option seed "},
+          {[dorp: 1], "option dorp "},
           {[drop: 0.5, flip: 0.6], "together"}
         ] do
       assert {:error, line} = Wire.new(options)

@@ -25,45 +25,60 @@ defmodule Sim.Emulator.RFlexController.Options do
   | `:home` | `{address, from, to}` or `nil` | switch that is closed between two bearings, radians |
   | `:id` | byte | of the first report (0) |
   """
+  alias Hal.Options
 
-  @magellan %{
-    kind: :magellan,
-    conversions: [distance: 31_387, angle: 4654.2, range: 1474, ir_a: 4000, ir_b: -2],
-    sonar_banks: [8, 8],
-    ir_banks: [8, 8],
-    # The second board counts from right of the front outwards, then from the left to the front.
-    ir_wiring: Enum.to_list(0..7) ++ [12, 13, 14, 15, 8, 9, 10, 11],
-    sonar_per_report: 4,
-    missed_echo: 0x7FFF,
-    sonar_max: 5.1,
-    ir_max: 0.8,
-    bumper_style: :bit,
-    bumper_base: 0x40,
-    bumpers: 16,
-    counters: {0, 0},
-    timeout_ms: 1_000,
-    brake: :set,
-    ghost: :infrared,
-    escape: :drop,
-    pace: :off,
-    give_up_ms: 50,
-    phrase: "The system is halted",
-    power_offset: 0.0,
-    home: nil,
-    id: 0
-  }
+  @factor {:check, &__MODULE__.factor?/1, "a number, not 0,"}
+  @conversions [distance: @factor, angle: @factor, range: @factor, ir_a: @factor, ir_b: @factor]
+  @word {:integer, -0x80000000, 0x7FFFFFFF}
+  # The second board counts from right of the front outwards, then from the left to the front.
+  @wiring Enum.to_list(0..7) ++ [12, 13, 14, 15, 8, 9, 10, 11]
 
-  @atrv_mini %{
-    @magellan
-    | kind: :atrv_mini,
-      conversions: [distance: 190_000, angle: 60_000, range: 1476, ir_a: 4000, ir_b: -2],
-      ir_banks: [],
-      ir_wiring: [],
-      bumpers: 0,
-      power_offset: 1.2
-  }
+  @table [
+    kind: [{:one_of, [:magellan, :atrv_mini]}, default: :magellan],
+    conversions: [
+      {:keys, @conversions},
+      default: [distance: 31_387, angle: 4654.2, range: 1474, ir_a: 4000, ir_b: -2]
+    ],
+    sonar_banks: [{:list, {:integer, 0, 16}}, default: [8, 8]],
+    ir_banks: [{:list, {:integer, 0, 8}}, default: [8, 8]],
+    ir_wiring: [{:list, {:integer, 0, 63}}, default: @wiring],
+    sonar_per_report: [{:integer, 1, 64}, default: 4],
+    missed_echo: [{:integer, 0, 0xFFFF}, default: 0x7FFF],
+    sonar_max: [{:number, 1.0e-3, 1_000, "m"}, default: 5.1],
+    ir_max: [{:number, 1.0e-3, 1_000, "m"}, default: 0.8],
+    bumper_style: [{:one_of, [:bit, :address]}, default: :bit],
+    bumper_base: [{:integer, 0, 255}, default: 0x40],
+    bumpers: [{:integer, 0, 16}, default: 16],
+    counters: [{:tuple, [@word, @word], "{distance, bearing}, whole numbers,"}, default: {0, 0}],
+    timeout_ms: [{:or, :off, {:integer, 1, 3_600_000, "ms"}}, default: 1_000],
+    brake: [{:one_of, [:set, :released]}, default: :set],
+    ghost: [{:one_of, [:off, :infrared, :all]}, default: :infrared],
+    escape: [{:one_of, [:drop, :take]}, default: :drop],
+    pace: [
+      {:or, :off, {:tuple, [{:integer, 1, 60_000}, {:integer, 1, 60_000}], "{ms, room}"}},
+      default: :off
+    ],
+    give_up_ms: [{:integer, 1, 10_000, "ms"}, default: 50],
+    phrase: [
+      {:or, nil, {:check, &__MODULE__.phrase?/1, "text of up to 256 bytes"}},
+      default: "The system is halted"
+    ],
+    power_offset: [{:number, -100, 100, "V"}, default: 0.0],
+    home: [
+      {:tuple, [{:integer, 0, 255}, {:number, -100, 100}, {:number, -100, 100}],
+       "{address, from, to}"},
+      default: nil
+    ],
+    id: [{:integer, 0, 255}, default: 0]
+  ]
 
-  @names @magellan |> Map.keys() |> Enum.sort()
+  @atrv_mini [
+    conversions: [distance: 190_000, angle: 60_000, range: 1476, ir_a: 4000, ir_b: -2],
+    ir_banks: [],
+    ir_wiring: [],
+    bumpers: 0,
+    power_offset: 1.2
+  ]
 
   @doc """
   All options of a controller, or one line that names what is wrong.
@@ -72,94 +87,22 @@ defmodule Sim.Emulator.RFlexController.Options do
       iex> {options.conversions[:angle], options.timeout_ms}
       {60000, :off}
       iex> Sim.Emulator.RFlexController.Options.check(ghost: :yes)
-      {:error, "controller option :ghost cannot be :yes: :off, :infrared or :all"}
+      {:error, "controller option ghost cannot be :yes: :off, :infrared or :all is allowed"}
   """
   @spec check(keyword()) :: {:ok, map()} | {:error, line :: String.t()}
   def check(asked) do
-    with {:ok, base} <- base(Keyword.get(asked, :kind, :magellan)) do
-      Enum.reduce_while(asked, {:ok, base}, &take/2)
+    with {:ok, options} <- Options.check(asked, @table, "controller") do
+      kind = if options[:kind] == :atrv_mini, do: @atrv_mini, else: []
+      usual = @table |> Options.defaults() |> Keyword.merge(kind)
+      given = Keyword.take(options, Keyword.keys(asked))
+      conversions = Keyword.merge(usual[:conversions], given[:conversions] || [])
+      {:ok, usual |> Keyword.merge(given) |> Map.new() |> Map.put(:conversions, conversions)}
     end
   end
 
-  defp base(:magellan), do: {:ok, @magellan}
-  defp base(:atrv_mini), do: {:ok, @atrv_mini}
-  defp base(other), do: refuse(:kind, other, ":magellan or :atrv_mini")
+  @doc false
+  def factor?(number), do: is_number(number) and number != 0
 
-  defp take({name, _value}, _options) when name not in @names do
-    {:halt, {:error, "unknown controller option #{inspect(name)}: #{Enum.join(@names, ", ")}"}}
-  end
-
-  defp take({:conversions, value}, {:ok, options}) do
-    known = Keyword.keys(@magellan.conversions)
-
-    if Keyword.keyword?(value) and
-         Enum.all?(value, fn {name, number} ->
-           name in known and is_number(number) and number != 0
-         end),
-       do: {:cont, {:ok, Map.update!(options, :conversions, &Keyword.merge(&1, value))}},
-       else: {:halt, refuse(:conversions, value, "numbers for #{Enum.join(known, ", ")}, not 0")}
-  end
-
-  defp take({name, value}, {:ok, options}) do
-    case allowed(name, value) do
-      true -> {:cont, {:ok, Map.put(options, name, value)}}
-      allowed -> {:halt, refuse(name, value, allowed)}
-    end
-  end
-
-  defp refuse(name, value, allowed),
-    do: {:error, "controller option #{inspect(name)} cannot be #{inspect(value)}: #{allowed}"}
-
-  defp allowed(:kind, _checked), do: true
-  defp allowed(:sonar_banks, list), do: banks?(list, 16) or "a list of 0 to 16 for each board"
-  defp allowed(:ir_banks, list), do: banks?(list, 8) or "a list of 0 to 8 for each board"
-
-  defp allowed(:ir_wiring, list),
-    do: banks?(list, 63) or "a list of places in the profile, from 0"
-
-  defp allowed(:sonar_per_report, n), do: (is_integer(n) and n in 1..64) or "1 to 64"
-  defp allowed(:missed_echo, n), do: (is_integer(n) and n in 0..0xFFFF) or "0 to 0xFFFF"
-
-  defp allowed(name, metres) when name in [:sonar_max, :ir_max],
-    do: (is_number(metres) and metres > 0) or "metres"
-
-  defp allowed(:bumper_style, style), do: style in [:bit, :address] or ":bit or :address"
-  defp allowed(:bumpers, n), do: (is_integer(n) and n in 0..16) or "0 to 16"
-
-  defp allowed(name, n) when name in [:id, :bumper_base],
-    do: (is_integer(n) and n in 0..255) or "a byte"
-
-  defp allowed(:counters, {a, b}) when is_integer(a) and is_integer(b), do: true
-  defp allowed(:counters, _other), do: "{distance, bearing}, whole numbers"
-  defp allowed(:timeout_ms, n), do: n == :off or positive?(n) or "whole milliseconds or :off"
-  defp allowed(:brake, brake), do: brake in [:set, :released] or ":set or :released"
-  defp allowed(:ghost, ghost), do: ghost in [:off, :infrared, :all] or ":off, :infrared or :all"
-  defp allowed(:escape, escape), do: escape in [:drop, :take] or ":drop or :take"
-  defp allowed(:pace, :off), do: true
-
-  defp allowed(:pace, {ms, room})
-       when is_integer(ms) and is_integer(room) and ms > 0 and room > 0,
-       do: true
-
-  defp allowed(:pace, _other), do: "{ms, room} or :off"
-  defp allowed(:give_up_ms, n), do: (is_integer(n) and n in 1..10_000) or "1 to 10000"
-
-  defp allowed(:phrase, text),
-    do: text == nil or (is_binary(text) and byte_size(text) in 1..256) or "up to 256 bytes or nil"
-
-  defp allowed(:power_offset, volts), do: is_number(volts) or "volts"
-  defp allowed(:home, nil), do: true
-
-  defp allowed(:home, {address, from, to})
-       when address in 0..255 and is_number(from) and is_number(to),
-       do: true
-
-  defp allowed(:home, _other), do: "{address, from, to} or nil"
-
-  defp positive?(n), do: is_integer(n) and n > 0
-
-  defp banks?(list, most),
-    do:
-      is_list(list) and length(list) <= 64 and
-        Enum.all?(list, &(is_integer(&1) and &1 in 0..most))
+  @doc false
+  def phrase?(text), do: is_binary(text) and byte_size(text) in 1..256
 end

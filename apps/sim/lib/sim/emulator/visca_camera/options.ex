@@ -15,18 +15,23 @@ defmodule Sim.Emulator.ViscaCamera.Options do
   | `:announce` | whether it tells the chain when it gets current again | true |
   """
 
-  @defaults %{
-    latency_ms: 16,
-    power: :on,
-    power_on_ms: 2_000,
-    drive_done: :at_once,
-    zoom_ms: 2_000,
-    lens: {4.4 * :math.pi() / 180, 48.8 * :math.pi() / 180},
-    drop: 0,
-    seed: 0,
-    announce: true
-  }
-  @names @defaults |> Map.keys() |> Enum.sort()
+  alias Hal.Options
+
+  @degree :math.pi() / 180
+  @table [
+    latency_ms: [{:integer, 0, 1_000, "ms"}, default: 16],
+    power: [{:one_of, [:on, :off]}, default: :on],
+    power_on_ms: [{:integer, 0, 60_000, "ms"}, default: 2_000],
+    drive_done: [{:one_of, [:at_once, :at_stop]}, default: :at_once],
+    zoom_ms: [{:integer, 1, 60_000, "ms"}, default: 2_000],
+    lens: [
+      {:check, &__MODULE__.lens?/1, "{tele, wide} in radians, ascending, less than 3,"},
+      default: {4.4 * @degree, 48.8 * @degree}
+    ],
+    drop: [{:number, 0, 1}, default: 0],
+    seed: [:integer, default: 0],
+    announce: [:boolean, default: true]
+  ]
 
   @doc """
   All options, or one line that names what is wrong.
@@ -35,40 +40,17 @@ defmodule Sim.Emulator.ViscaCamera.Options do
       iex> {options.latency_ms, options.power}
       {5, :on}
       iex> Sim.Emulator.ViscaCamera.Options.check(power: 1)
-      {:error, "camera option :power cannot be 1: :on or :off"}
+      {:error, "emulated camera option power cannot be 1: :on or :off is allowed"}
   """
   @spec check(keyword()) :: {:ok, map()} | {:error, line :: String.t()}
-  def check(asked), do: Enum.reduce_while(asked, {:ok, @defaults}, &take/2)
-
-  defp take({name, _value}, _options) when name not in @names,
-    do: {:halt, {:error, "unknown camera option #{inspect(name)}: #{Enum.join(@names, ", ")}"}}
-
-  defp take({name, value}, {:ok, options}) do
-    case allowed(name, value) do
-      true ->
-        {:cont, {:ok, Map.put(options, name, value)}}
-
-      allowed ->
-        {:halt,
-         {:error, "camera option #{inspect(name)} cannot be #{inspect(value)}: #{allowed}"}}
-    end
+  def check(asked) do
+    with {:ok, options} <- Options.check(asked, @table, "emulated camera"),
+         do: {:ok, Map.new(options)}
   end
 
-  defp allowed(:latency_ms, ms), do: (is_integer(ms) and ms in 0..1_000) or "0 to 1000"
-  defp allowed(:power, power), do: power in [:on, :off] or ":on or :off"
-  defp allowed(:power_on_ms, ms), do: (is_integer(ms) and ms in 0..60_000) or "0 to 60000"
-  defp allowed(:zoom_ms, ms), do: (is_integer(ms) and ms in 1..60_000) or "1 to 60000"
+  @doc false
+  def lens?({tele, wide}),
+    do: is_number(tele) and is_number(wide) and tele > 0 and wide > tele and wide < 3
 
-  defp allowed(:lens, {tele, wide})
-       when is_number(tele) and is_number(wide) and tele > 0 and wide > tele and wide < 3,
-       do: true
-
-  defp allowed(:lens, _other), do: "{tele, wide} in radians, less than 3"
-  defp allowed(:drive_done, when?), do: when? in [:at_once, :at_stop] or ":at_once or :at_stop"
-
-  defp allowed(:drop, share),
-    do: (is_number(share) and share >= 0 and share <= 1) or "a share from 0 to 1"
-
-  defp allowed(:seed, seed), do: is_integer(seed) or "a whole number"
-  defp allowed(:announce, yes?), do: is_boolean(yes?) or "true or false"
+  def lens?(_other), do: false
 end
