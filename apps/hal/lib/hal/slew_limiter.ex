@@ -1,6 +1,7 @@
 defmodule Hal.SlewLimiter do
   @moduledoc """
-  The last limit before the wire: limits speeds and their changes, whatever was requested. Pure.
+  The last limit before the wire: limits speeds and their changes, whatever was requested. Pure. Its ramp,
+  `approach/4`, is also that of `Robot.Safety.Reflex`.
 
   Each of the two speeds is kept within its limit, grows at most by its acceleration, and shrinks at
   most by its braking, which may be more. **A speed that is to be zero is zero at once**: a stop does
@@ -108,18 +109,28 @@ defmodule Hal.SlewLimiter do
 
   defp axis(_now, wanted, _faster, _slower) when wanted == 0.0, do: 0.0
 
-  defp axis(now, wanted, faster, slower) do
-    cond do
-      now * wanted < 0 -> sign(now) * max(abs(now) - slower, 0.0)
-      abs(wanted) < abs(now) -> sign(now) * max(abs(now) - slower, abs(wanted))
-      true -> sign(wanted) * min(abs(now) + faster, abs(wanted))
-    end
+  defp axis(now, wanted, faster, slower) when now * wanted < 0,
+    do: approach(now, 0.0, faster, slower)
+
+  defp axis(now, wanted, faster, slower), do: approach(now, wanted, faster, slower)
+
+  @doc """
+  One step from a speed towards another: it grows by at most `faster` and shrinks by at most `slower`. Where it
+  passes zero within the step, it comes no further than it would from standing.
+
+      iex> for to <- [0.5, 0.31, 0.1, -0.5], do: Hal.SlewLimiter.approach(0.3, to, 0.03125, 0.0625)
+      [0.33125, 0.31, 0.2375, 0.2375]
+      iex> Hal.SlewLimiter.approach(0.03125, -0.5, 0.03125, 0.125)
+      -0.03125
+  """
+  @spec approach(from :: float(), to :: float(), faster :: float(), slower :: float()) :: float()
+  def approach(from, to, faster, slower) do
+    low = if from > 0, do: max(from - slower, min(-faster, 0.0)), else: from - faster
+    high = if from < 0, do: min(from + slower, max(faster, 0.0)), else: from + faster
+    to |> max(low) |> min(high)
   end
 
   defp clamp(value, most), do: value |> max(-most) |> min(most)
-
-  defp sign(value) when value < 0, do: -1.0
-  defp sign(_value), do: 1.0
 
   defp show(value), do: inspect(value, limit: 5, printable_limit: 40, width: :infinity)
 end

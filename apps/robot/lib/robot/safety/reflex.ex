@@ -24,7 +24,7 @@ defmodule Robot.Safety.Reflex do
   `:estop`, `:disarmed`, `:dead_man`, `:refused` and `:bumper` set the speed to zero at once: how hard the wheels
   then brake is the base's own affair. Everything else is continuous.
   """
-  alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Hal.{Odometry, Pose, Profile, SlewLimiter, Twist}
   alias Robot.Safety.Reflex.{Body, Fence}
 
   @dead_man_ms 200
@@ -304,13 +304,9 @@ defmodule Robot.Safety.Reflex do
 
   # Braking may be twice as hard as speeding up: what comes near is noticed late by as much.
   defp ramp(from, to, most, limits) do
-    low = if from > 0, do: max(from - 2 * most, min(-most, 0.0)), else: from - most
-    high = if from < 0, do: min(from + 2 * most, max(most, 0.0)), else: from + most
-
-    cond do
-      to < low -> {low, [:acceleration | limits]}
-      to > high -> {high, [:acceleration | limits]}
-      true -> {to, limits}
+    case SlewLimiter.approach(from, to, most, 2 * most) do
+      ramped when ramped == to -> {to, limits}
+      ramped -> {ramped, [:acceleration | limits]}
     end
   end
 
