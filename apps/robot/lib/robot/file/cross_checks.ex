@@ -1,5 +1,5 @@
 defmodule Robot.File.CrossChecks do
-  @moduledoc "What the keys of a robot file must be to each other, and no single key can know. Pure."
+  @moduledoc "Checks of a robot file that involve several keys. Pure."
   alias Hal.Suggest
   alias Robot.File.{Device, Schema}
 

@@ -1,10 +1,10 @@
 defmodule Swarm.Blackboard.State do
   @moduledoc """
-  What all robots tell of themselves, as one node knows it: `{robot, key} -> {incarnation, sequence,
-  value}`. Each row has one writer, the robot itself, and the newest `{incarnation, sequence}` wins, so
-  that rows may come late, twice, in any order and by way of third parties. Beside them there are hints,
-  which all robots write (`put_hint/5`). Pure; times are this node's own, in milliseconds.
-  `Swarm.Blackboard.Rows` holds the rows.
+  What all robots publish about themselves, as one node knows it: `{robot, key} -> {incarnation,
+  sequence, value}`. Each row has one writer, the robot itself, and the newest `{incarnation,
+  sequence}` wins, so that rows may arrive late, twice, in any order and through third parties.
+  Beside them there are hints, which all robots write (`put_hint/5`). Pure; times are this node's
+  own, in milliseconds. `Swarm.Blackboard.Rows` holds the rows.
 
   *Own* robots are those of this node (`enter/4`). What others say of them:
 
