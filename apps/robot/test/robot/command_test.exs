@@ -61,7 +61,7 @@ defmodule Robot.CommandTest do
           {"halt", ~r/unknown command "halt"/},
           {"folow:1:2:3", ~r/did you mean follow\?/},
           {"qqqq", ~r/one of stop, move/},
-          {<<255, 1>>, ~r/no text/},
+          {<<255, 1>>, ~r/not text/},
           {String.duplicate("a", 501), ~r/longer than 500/},
           {:stop, ~r/must be text/}
         ] do

@@ -155,6 +155,6 @@ defmodule Mix.Tasks.Robot.ImportTest do
     File.write!(file, "driver\n( name")
     assert refused(Import, [file]) == ["#{file}:2: name has no value"]
     Import.run(["--help"])
-    assert ["Makes a robot file" <> _rest] = said()
+    assert ["Converts a configuration of the Player" <> _rest] = said()
   end
 end
