@@ -8,7 +8,6 @@ defmodule Docs.Sandbox do
   alias Docs.Reader
 
   @left_out ~w(_build deps tmp .git convoy.secret certs)
-  @extensions "config/extensions.exs"
   # Nothing here meets another fleet of this machine, nor finds a camera.
   @environment [{"CONVOY_INTERFACE", "127.0.0.1"}]
 
@@ -17,7 +16,6 @@ defmodule Docs.Sandbox do
   def create(root, document) do
     folder = folder()
     File.mkdir_p!(folder)
-    extended? = File.exists?(Path.join(folder, @extensions))
     for name <- File.ls!(folder), name != "_build", do: File.rm_rf!(Path.join(folder, name))
 
     # With their times, so that nothing is built again.
@@ -26,8 +24,6 @@ defmodule Docs.Sandbox do
     end
 
     built(root, folder)
-    # What was built with another configuration is built again, and that is told to nobody.
-    if extended?, do: {_, 0} = command("mix compile", folder)
     given(document, folder)
     folder
   end

@@ -14,8 +14,8 @@ defmodule Swarm.Formation do
   | `:diamond` | rows of 1, 2, …, m, …, 2, 1 |
   | `:circle` | a ring of all round the landmark, the leader at its own bearing |
 
-  A build may add kinds of its own, each a `Swarm.Formation.Kind`. Its configuration names them, as the code of
-  this module is compiled with them: all robots of a fleet must have the same ones.
+  A build may add kinds of its own, each a `Swarm.Formation.Kind`, which its configuration names. All robots of a fleet
+  must have the same ones.
 
       config :swarm, formations: [echelon: Mine.Echelon]
   """
@@ -23,17 +23,11 @@ defmodule Swarm.Formation do
   alias Hal.Options.{Type, Wording}
 
   @built_in [:column, :line, :wedge, :triangle, :diamond, :circle]
-  @added Application.compile_env(:swarm, :formations, [])
   @least_spacing 0.8
   @spacing {:number, @least_spacing, 5.0, "m"}
   @metres {:number, 0.0, 1_000.0, "m"}
   # The nearest that a ring comes to the landmark: robots there still see all of it.
   @least_ring 1.6
-
-  for {kind, module} <- @added, kind in @built_in or not is_atom(module) do
-    raise ArgumentError,
-          "config :swarm, formations: #{kind} cannot be #{inspect(module)}: a module for a new name is allowed"
-  end
 
   @typedoc "One of the built-in kinds, or one that the build adds."
   @type kind :: :column | :line | :wedge | :triangle | :diamond | :circle | atom()
@@ -41,12 +35,19 @@ defmodule Swarm.Formation do
 
   @doc "All kinds: the built-in ones, then those that the build adds, as far as their modules are there."
   @spec kinds() :: [kind(), ...]
-  def kinds, do: @built_in ++ for({kind, _module} <- @added, kind?(kind), do: kind)
+  def kinds, do: Enum.uniq(@built_in ++ for({kind, _module} <- added(), kind?(kind), do: kind))
 
   defp kind?(kind) when kind in @built_in, do: true
+  defp kind?(kind) when not is_atom(kind), do: false
 
-  defp kind?(kind),
-    do: is_atom(kind) and @added[kind] != nil and Code.ensure_loaded?(@added[kind])
+  defp kind?(kind) do
+    case Keyword.fetch(added(), kind) do
+      {:ok, module} -> Code.ensure_loaded?(module)
+      :error -> false
+    end
+  end
+
+  defp added, do: Application.get_env(:swarm, :formations, [])
 
   @doc """
   Whether a term from outside is a formation.
@@ -191,7 +192,7 @@ defmodule Swarm.Formation do
     {-(row - 1) * 1.0, (here - 1) / 2 - place}
   end
 
-  defp slot(kind, k, robots), do: @added[kind].slot(k, robots)
+  defp slot(kind, k, robots), do: Keyword.fetch!(added(), kind).slot(k, robots)
 
   # The row (from 1) of robot k in rows of 1, 2, …, widest, …, 2, 1, and its place in it (from 0).
   defp diamond_row(k, row, widest) do

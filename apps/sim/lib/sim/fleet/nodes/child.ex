@@ -35,7 +35,8 @@ defmodule Sim.Fleet.Nodes.Child do
       [{~c"HOME", to_charlist(home)}, {~c"ERL_CRASH_DUMP_BYTES", ~c"0"}] ++
         for(v <- @own_flags, do: {to_charlist(v), false})
 
-    arguments = [erl | Command.arguments(folders())]
+    formations = Application.get_env(:swarm, :formations, [])
+    arguments = [erl | Command.arguments(folders(formations), formations)]
     options = [:binary, :exit_status, :stderr_to_stdout, args: arguments, env: environment]
     port = Port.open({:spawn_executable, leash}, options)
 
@@ -97,11 +98,15 @@ defmodule Sim.Fleet.Nodes.Child do
   end
 
   # Those of this build: what runs here runs there.
-  defp folders do
+  defp folders(formations) do
     consolidated =
       for path <- :code.get_path(), List.to_string(path) =~ ~r"consolidated$", do: path
 
     apps = for app <- @apps, do: Path.join(to_string(:code.lib_dir(app)), "ebin")
-    Enum.map(consolidated, &List.to_string/1) ++ apps
+    # Formations of a build's own are in apps of its own.
+    added = for {_kind, module} <- formations, path = :code.which(module), is_list(path), do: path
+
+    Enum.map(consolidated, &List.to_string/1) ++
+      apps ++ Enum.uniq(Enum.map(added, &Path.dirname/1))
   end
 end

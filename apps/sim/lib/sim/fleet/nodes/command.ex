@@ -12,15 +12,23 @@ defmodule Sim.Fleet.Nodes.Command do
              -kernel dist_auto_connect never -kernel inet_dist_use_interface {127,0,0,1})
 
   @doc """
-  The arguments of `erl` for a node, with the code of these folders.
+  The arguments of `erl` for a node, with the code of these folders, and the formations that this build adds.
 
       iex> Sim.Fleet.Nodes.Command.arguments(["a/ebin"]) |> Enum.take(-5)
       ["-pa", "a/ebin", "-s", "Elixir.Sim.Node", "main"]
+      iex> Sim.Fleet.Nodes.Command.arguments([], echelon: Mine.Echelon) |> Enum.take(-6)
+      ["-swarm", "formations", "[{echelon,'Elixir.Mine.Echelon'}]", "-s", "Elixir.Sim.Node", "main"]
   """
-  @spec arguments([Path.t()]) :: [String.t()]
-  def arguments(folders) do
-    ["-noshell"] ++ @emulator ++ @kernel ++ ["-pa" | folders] ++ ["-s", "Elixir.Sim.Node", "main"]
+  @spec arguments([Path.t()], [{atom(), module()}]) :: [String.t()]
+  def arguments(folders, formations \\ []) do
+    ["-noshell"] ++
+      @emulator ++
+      @kernel ++
+      ["-pa" | folders] ++ formations(formations) ++ ["-s", "Elixir.Sim.Node", "main"]
   end
+
+  defp formations([]), do: []
+  defp formations(added), do: ["-swarm", "formations", to_string(:io_lib.format("~0p", [added]))]
 
   @doc """
   A node's name.
