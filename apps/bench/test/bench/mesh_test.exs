@@ -1,4 +1,4 @@
-defmodule Console.BenchMeshTest do
+defmodule Bench.MeshTest do
   use ExUnit.Case, async: true
   import ExUnit.CaptureIO
   alias Bench.Mesh

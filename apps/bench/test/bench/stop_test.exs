@@ -1,4 +1,4 @@
-defmodule Console.BenchStopTest do
+defmodule Bench.StopTest do
   use ExUnit.Case, async: false
   alias Bench.Stop
   alias Bench.Stop.Reader

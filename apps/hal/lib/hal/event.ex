@@ -38,7 +38,7 @@ defmodule Hal.Event do
   | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and what the mission adds |
   | `[:mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): a node was not let in, or would not have us |
   | `[:swarm, :part, :fell]` | `at_ms` | `id`, `reason`: a part of the node; it starts again |
-  | `[:swarm, :link, :duplicate_id]` | | `robot`, `other`: a robot of this name was there before; this one is silent |
+  | `[:swarm, :comms, :duplicate_id]` | | `robot`, `other`: a robot of this name was there before; this one is silent |
   | `[:mesh, :up]`, `[:mesh, :suspect]`, `[:mesh, :gone]` | `at_ms` | `node`: by datagrams |
   | `[:mesh, :connected]`, `[:mesh, :disconnected]` | `at_ms` | `node`: by Erlang's distribution |
   | `[:mesh, :unknown_node]` | `at_ms` | `name`, `address`: has the secret, but is not in the roster |

@@ -123,7 +123,7 @@ defmodule Swarm.CommandsTest do
     assert Swarm.start(robots: [:shape1, :shape2]) == :ok
     # The third is on none.
     assert Swarm.formation(:wedge) == :ok
-    link = Names.whereis(:shape2, :link)
+    link = Names.whereis(:shape2, :comms)
     :ok = :sys.suspend(link)
     told = "shape2 does not answer; the others took it"
     assert Swarm.formation(:column) == {:error, told}
@@ -186,14 +186,14 @@ defmodule Swarm.CommandsTest do
 
   test "a robot that does not answer is named within half a second" do
     id = robot(:door_deaf)
-    :ok = :sys.suspend(Names.whereis(id, :link))
+    :ok = :sys.suspend(Names.whereis(id, :comms))
     {took, answer} = :timer.tc(fn -> Swarm.goto(id, {1, 1}) end)
     assert line(answer) == "door_deaf does not answer"
     assert took in 450_000..700_000
     assert Enum.any?(Swarm.status(), &match?(%{robot: :door_deaf, state: :no_answer}, &1))
     # What stops it does not pass its link.
     assert Swarm.stop(id) == :ok
-    :ok = :sys.resume(Names.whereis(id, :link))
+    :ok = :sys.resume(Names.whereis(id, :comms))
     assert %Swarm.Status{} = Swarm.status(id)
     refute_received {_alias, :door_deaf, _answer}
   end

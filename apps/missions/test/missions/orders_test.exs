@@ -93,10 +93,10 @@ defmodule Swarm.OrdersTest do
 
       assert {:ok, both} = Swarm.tell([id, other], "ping")
       assert both =~ ~r/^orders_ping on [^;]+; orders_pong on [^;]+$/
-      :ok = :sys.suspend(Names.whereis(other, :link))
+      :ok = :sys.suspend(Names.whereis(other, :comms))
       assert {:error, line} = Swarm.tell([id, other], "ping")
       assert line =~ ~r/^orders_pong does not answer; orders_ping on /
-      :ok = :sys.resume(Names.whereis(other, :link))
+      :ok = :sys.resume(Names.whereis(other, :comms))
       assert Swarm.estop() == :ok
       held = ~r/^orders_ping .*, idle for \d+ s, E-STOP$/
       eventually(fn -> elem(Swarm.tell(id, "ping"), 1) =~ held end)
@@ -118,13 +118,13 @@ defmodule Swarm.OrdersTest do
     eventually(fn -> state(id) == :idle end)
     # Who reset it was told nothing, so it is held still.
     :sys.get_state(Names.whereis(id, :gate))
-    :sys.get_state(Names.whereis(id, :brake))
+    :sys.get_state(Names.whereis(id, :estop))
     assert Board.latched?(Board.find!(id))
 
     # A person presses again while the reset is under way.
     :ok = :sys.suspend(pilot)
     ref = :erlang.alias([:reply])
-    GenServer.cast(Names.whereis(id, :brake), {:command, :reset, ref})
+    GenServer.cast(Names.whereis(id, :estop), {:command, :reset, ref})
     assert Swarm.ask(id, :estop) == :ok
     :ok = :sys.resume(pilot)
     assert_receive {^ref, {:error, "orders_reset was stopped again meanwhile" <> _}}
@@ -176,7 +176,7 @@ defmodule Swarm.OrdersTest do
     assert_receive {[:robot, :executive, :hung], %{behaviour: Acts.Hang}}, 10_000
 
     eventually(fn ->
-      pid = Names.whereis(id, :link)
+      pid = Names.whereis(id, :comms)
 
       pid != nil and Names.whereis(id, :pilot) not in [nil, before] and
         Directory.whereis(id) == pid
@@ -220,7 +220,7 @@ defmodule Swarm.OrdersTest do
         eventually(told)
         assert_receive {[:robot, :pilot, :hung], %{mission: Acts.Mission}}, 10_000
         eventually(fn -> Names.whereis(id, :pilot) not in [nil, before] end)
-        eventually(fn -> Directory.whereis(id) == Names.whereis(id, :link) end)
+        eventually(fn -> Directory.whereis(id) == Names.whereis(id, :comms) end)
       end)
 
     assert log =~ "orders_hung hangs in #{where}\n"

@@ -10,11 +10,11 @@ defmodule Robot.Board do
   | `:odometry` `:sonar` `:ir` `:bumpers` `:power` `:brake` `:joystick` `:home` | `:drive` | as in `Hal.Drive` |
   | `:arming` | `:drive` | `%{state: state, why: line or nil}` (`Hal.Device.Arming`) |
   | `:ptz` | `:ptz` | as in `Hal.Ptz` |
-  | `:blobs` | `:eye` | `%{blobs: [blob], pan: radians, field_of_view: radians or nil}`, at the time of the picture |
+  | `:blobs` | `:blob_detector` | `%{blobs: [blob], pan: radians, field_of_view: radians or nil}`, at the time of the picture |
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, since when |
-  | `{:peer, id}` | `:link` | as in `Robot.Percept` |
-  | `:estop` | `:brake` | how the emergency stop stands, as its one owner publishes it: the last number known, the last one cleared here, the calls heard |
-  | `:radio` | `:link` | how many messages were sent, heard, and refused as malformed |
+  | `{:peer, id}` | `:comms` | as in `Robot.Percept` |
+  | `:estop` | `:estop` | how the emergency stop stands, as its one owner publishes it: the last number known, the last one cleared here, the calls heard |
+  | `:radio` | `:comms` | how many messages were sent, heard, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
   | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Safety.Reflex.frame/1` |
   | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil, tick: count}` |
@@ -49,7 +49,16 @@ defmodule Robot.Board do
         }
 
   @type writer ::
-          :drive | :ptz | :camera | :eye | :link | :brake | :gate | :watch | :executive | :pilot
+          :drive
+          | :ptz
+          | :camera
+          | :blob_detector
+          | :comms
+          | :estop
+          | :gate
+          | :watch
+          | :executive
+          | :pilot
 
   @writers %{
     odometry: :drive,
@@ -62,7 +71,7 @@ defmodule Robot.Board do
     home: :drive,
     arming: :drive,
     ptz: :ptz,
-    blobs: :eye,
+    blobs: :blob_detector,
     driving: :gate,
     frame: :gate,
     doing: :executive,
@@ -71,8 +80,8 @@ defmodule Robot.Board do
     uncertainty: :executive,
     mission: :pilot,
     asking: :pilot,
-    estop: :brake,
-    radio: :link
+    estop: :estop,
+    radio: :comms
   }
 
   @doc "Starts the board of a robot."
@@ -114,9 +123,9 @@ defmodule Robot.Board do
   def sense(board, device, {:health, device, {condition, since_ms}}),
     do: put(board, device, {:health, device}, condition, since_ms)
 
-  def sense(board, :eye, {:blobs, blobs, %{at_ms: at_ms, pan: pan} = meta}) do
+  def sense(board, :blob_detector, {:blobs, blobs, %{at_ms: at_ms, pan: pan} = meta}) do
     view = Map.get(meta, :field_of_view)
-    put(board, :eye, :blobs, %{blobs: blobs, pan: pan, field_of_view: view}, at_ms)
+    put(board, :blob_detector, :blobs, %{blobs: blobs, pan: pan, field_of_view: view}, at_ms)
   end
 
   # What only a driver of its own knows is nobody's here, and no reason for it to fall.
@@ -220,7 +229,7 @@ defmodule Robot.Board do
     end
   end
 
-  defp writer({:peer, _id}), do: :link
+  defp writer({:peer, _id}), do: :comms
   defp writer({:health, device}), do: device
   defp writer({:hung, _part}), do: :watch
   defp writer(key), do: Map.get(@writers, key)

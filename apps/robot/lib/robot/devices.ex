@@ -8,10 +8,10 @@ defmodule Robot.Devices do
       |-- Vision.Saver         keeps such pictures in a folder (only if told to)
       |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and at once to the gate;
       |                        whether they may turn --> the pilot, too
-      |-- Hal.Device :ptz      --> board, and where the camera looked --> eye
-      `-- Hal.Device :camera   --> eye --> board, and --> view
+      |-- Hal.Device :ptz      --> board, and where the camera looked --> blob detector
+      `-- Hal.Device :camera   --> blob detector --> board, and --> view
 
-  The eye is here, and not above the gate, because a picture that crashes it must not restart the
+  The blob detector is here, and not above the gate, because a picture that crashes it must not restart the
   executive: the blobs on the board grow old, and the robot drives on.
 
   The budget, 200 restarts in 5 s, is above what bad input can cause: a camera gives at most 30
@@ -32,13 +32,13 @@ defmodule Robot.Devices do
   def init(%Config{id: id} = config) do
     board = Board.find!(id)
     write = fn writer -> {Board, :sense, [board, writer]} end
-    to_eye = {Vision.BlobDetector, :frame, [Names.via(id, :eye)]}
-    to_aim = {Vision.BlobDetector, :aim, [Names.via(id, :eye)]}
+    to_detector = {Vision.BlobDetector, :frame, [Names.via(id, :blob_detector)]}
+    to_aim = {Vision.BlobDetector, :aim, [Names.via(id, :blob_detector)]}
     demand = Vision.View.demand()
     to_view = {Vision.View, :frame, [Names.via(id, :view), demand]}
 
     children =
-      eye(config, write.(:eye)) ++
+      blob_detector(config, write.(:blob_detector)) ++
         view(config, demand) ++
         saver(config) ++
         device(config, board, :drive, [
@@ -47,30 +47,33 @@ defmodule Robot.Devices do
           {Pilot, :sense, [id]}
         ]) ++
         device(config, board, :ptz, [write.(:ptz) | if(config.camera, do: [to_aim], else: [])]) ++
-        device(config, board, :camera, [{__MODULE__, :health, [board]}, to_eye, to_view])
+        device(config, board, :camera, [{__MODULE__, :health, [board]}, to_detector, to_view])
 
     Supervisor.init(children, strategy: :one_for_one, max_restarts: 200, max_seconds: 5)
   end
 
   @doc """
-  A sink for the camera: its frames are for the eye, its health for the board, and so are the blobs of
+  A sink for the camera: its frames are for the blob detector, its health for the board, and so are the blobs of
   a camera that finds them by itself.
   """
   @spec health(Board.t(), tuple()) :: :ok
   def health(board, {:health, device, _status} = reading), do: Board.sense(board, device, reading)
-  def health(board, {:blobs, _blobs, _when} = reading), do: Board.sense(board, :eye, reading)
+
+  def health(board, {:blobs, _blobs, _when} = reading),
+    do: Board.sense(board, :blob_detector, reading)
+
   def health(_board, _frame), do: :ok
 
-  defp eye(%Config{camera: nil}, _sink), do: []
+  defp blob_detector(%Config{camera: nil}, _sink), do: []
 
-  defp eye(config, sink) do
+  defp blob_detector(config, sink) do
     [
       {Vision.BlobDetector,
        colours: config.colours,
        sink: sink,
        ptz: config.ptz != nil,
        clock: config.clock,
-       name: Names.via(config.id, :eye)}
+       name: Names.via(config.id, :blob_detector)}
     ]
   end
 

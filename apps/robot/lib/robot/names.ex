@@ -3,7 +3,7 @@ defmodule Robot.Names do
   Names the processes of all robots of this node: a `Registry` keyed `{robot, role}`, so that any
   number of robots can run on one node, and no atom is created at run time.
 
-  Roles: `:robot` (the supervisor), `:board`, `:drive`, `:ptz`, `:camera`, `:eye`, `:view`, `:saver`, `:gate`,
+  Roles: `:robot` (the supervisor), `:board`, `:drive`, `:ptz`, `:camera`, `:blob_detector`, `:view`, `:saver`, `:gate`,
   `:executive`, `:pilot`, and what companions call themselves.
   """
 

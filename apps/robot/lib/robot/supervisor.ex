@@ -4,7 +4,7 @@ defmodule Robot.Supervisor do
 
       Robot.Supervisor (rest_for_one)
       |-- Robot.Board        the newest readings, the e-stop latch
-      |-- Robot.Devices      one_for_one: eye, drive, ptz, camera; each falls alone
+      |-- Robot.Devices      one_for_one: blob detector, drive, ptz, camera; each crashes alone
       |-- Robot.Safety.Gate         the only one who drives the wheels
       |-- Robot.Safety.LivenessMonitor        sees that gate, executive and mission go on, and ends one that hangs
       |-- Robot.Control.Executive    percept to wish, ten times a second

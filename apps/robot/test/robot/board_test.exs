@@ -23,9 +23,9 @@ defmodule Robot.BoardTest do
     assert_raise ArgumentError, fn -> Board.put(board, :executive, :sonar, [], 0) end
     assert_raise ArgumentError, fn -> Board.put(board, :drive, :nonsense, [], 0) end
     assert_raise ArgumentError, fn -> Board.put(board, :ptz, {:health, :drive}, :online, 0) end
-    assert Board.put(board, :link, {:peer, :mag2}, %{}, 0) == :ok
+    assert Board.put(board, :comms, {:peer, :mag2}, %{}, 0) == :ok
     assert Board.peers(board) == %{mag2: %{}}
-    assert Board.delete(board, :link, {:peer, :mag2}) == :ok
+    assert Board.delete(board, :comms, {:peer, :mag2}) == :ok
     assert Board.peers(board) == %{}
   end
 
@@ -95,8 +95,8 @@ defmodule Robot.BoardTest do
     Board.put(board, :drive, :sonar, [1.0], 1_000)
     Board.put(board, :drive, :bumpers, [3], 900)
     Board.put(board, :drive, :power, 24.0, 0)
-    Board.put(board, :eye, :blobs, %{blobs: [], pan: 0.5}, 800)
-    Board.put(board, :link, {:peer, :mag2}, %{mode: :dead}, 0)
+    Board.put(board, :blob_detector, :blobs, %{blobs: [], pan: 0.5}, 800)
+    Board.put(board, :comms, {:peer, :mag2}, %{mode: :dead}, 0)
 
     assert %Percept{sonar: [1.0], bumpers: [3], power: 24.0, blobs: [], blobs_at_ms: 800} =
              percept = Percept.Snapshot.take(board, profile, 1_200)

@@ -46,7 +46,7 @@ defmodule Robot.Devices.LogTest do
     for event <- [
           [:robot, :estop_file, :error],
           [:vision, :saver, :failed],
-          [:swarm, :link, :duplicate_id]
+          [:swarm, :comms, :duplicate_id]
         ],
         do: assert(event in Log.events())
 

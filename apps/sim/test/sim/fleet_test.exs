@@ -107,7 +107,7 @@ defmodule Sim.FleetTest do
     kill(:mag91, :executive)
 
     eventually(
-      fn -> Names.whereis(:mag91, :link) && match?({:ok, _}, Swarm.tell(:mag91, "ping")) end,
+      fn -> Names.whereis(:mag91, :comms) && match?({:ok, _}, Swarm.tell(:mag91, "ping")) end,
       6_000
     )
 

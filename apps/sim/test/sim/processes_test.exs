@@ -40,7 +40,10 @@ defmodule Sim.ProcessesTest do
         members: members,
         clock: clock,
         pids:
-          Map.new([:drive, :ptz, :gate, :executive, :pilot, :link], &{&1, Names.whereis(@me, &1)}),
+          Map.new(
+            [:drive, :ptz, :gate, :executive, :pilot, :comms],
+            &{&1, Names.whereis(@me, &1)}
+          ),
         at_ms: 0,
         looks: {nil, nil},
         pictures: %{},
@@ -203,7 +206,7 @@ defmodule Sim.ProcessesTest do
     case input do
       {:reading, {:ptz, _} = reading, _} -> send(pids.ptz, {:readings, [reading]})
       {:reading, reading, _} -> send(pids.drive, {:readings, [reading]})
-      {:blobs, _, _} -> Board.sense(Board.find!(@me), :eye, input)
+      {:blobs, _, _} -> Board.sense(Board.find!(@me), :blob_detector, input)
       {:message, message, _} -> Comms.hear(@me, message)
       {:command, command, _} -> :ok = Swarm.ask(@me, command)
       {:tick, _} -> send(pids.executive, :tick)
@@ -212,7 +215,7 @@ defmodule Sim.ProcessesTest do
 
     if elem(input, 0) == :tick do
       run = sync(run)
-      send(pids.link, :tick)
+      send(pids.comms, :tick)
       run
     else
       run
@@ -221,7 +224,18 @@ defmodule Sim.ProcessesTest do
 
   # In the order in which one hands on to the next; any answer says that what came before is done.
   defp sync(%{pids: pids} = run) do
-    for role <- [:drive, :ptz, :link, :executive, :pilot, :executive, :gate, :link, :drive, :ptz],
+    for role <- [
+          :drive,
+          :ptz,
+          :comms,
+          :executive,
+          :pilot,
+          :executive,
+          :gate,
+          :comms,
+          :drive,
+          :ptz
+        ],
         do: :sys.statistics(pids[role], :get)
 
     run

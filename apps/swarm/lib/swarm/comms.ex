@@ -8,7 +8,7 @@ defmodule Swarm.Comms do
 
   An e-stop spreads with the heartbeats. How it stands is `Swarm.EStop`'s to say, which is started beside the comms
   process and hears of each heartbeat that says otherwise. Of two robots of one name the
-  later one (`Swarm.Comms.NameClaim`) stops and falls silent, with the event `[:swarm, :link, :duplicate_id]`.
+  later one (`Swarm.Comms.NameClaim`) stops and falls silent, with the event `[:swarm, :comms, :duplicate_id]`.
 
   | part | what it does |
   |---|---|
@@ -70,7 +70,7 @@ defmodule Swarm.Comms do
   @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
   def start_link(%Config{} = config, options) do
     GenServer.start_link(__MODULE__, {config, options},
-      name: Names.via(config.id, :link),
+      name: Names.via(config.id, :comms),
       spawn_opt: [message_queue_data: :off_heap]
     )
   end
@@ -82,18 +82,18 @@ defmodule Swarm.Comms do
   @spec say(robot :: atom(), to :: atom() | [atom()] | :all, Message.t()) :: [atom()]
   def say(robot, to, message) do
     ids = List.delete(addressed(to), robot)
-    GenServer.cast(Names.via(robot, :link), {:say, ids, message})
+    GenServer.cast(Names.via(robot, :comms), {:say, ids, message})
     ids
   end
 
   @doc "Something arrived for a robot of this node, by whatever transport."
   @spec hear(robot :: atom(), term()) :: :ok
-  def hear(robot, term), do: GenServer.cast(Names.via(robot, :link), {:hear, term})
+  def hear(robot, term), do: GenServer.cast(Names.via(robot, :comms), {:hear, term})
 
   @doc "A heartbeat of a robot of this one's name came from another node, from that life of it."
   @spec rival(robot :: atom(), NameClaim.identity()) :: :ok
   def rival(robot, {_boot, _node} = other),
-    do: GenServer.cast(Names.via(robot, :link), {:rival, other, nil})
+    do: GenServer.cast(Names.via(robot, :comms), {:rival, other, nil})
 
   @impl GenServer
   def init({%Config{id: id} = config, options}) do
@@ -198,7 +198,7 @@ defmodule Swarm.Comms do
     s = note(s)
     s = %{s | chart: PeerWriter.grow_old(s.chart, s.receiver.peers, at_ms)}
     counts = %{sent: s.sender.sent, heard: s.receiver.heard, rejected: s.receiver.rejected}
-    Board.put(s.board, :link, :radio, counts, at_ms)
+    Board.put(s.board, :comms, :radio, counts, at_ms)
     s = %{s | sender: Sender.tick(s.sender, s.receiver, at_ms)}
     if rem(s.sender.ticks, @rivals_every) == 0, do: NameClaim.challenge(s.name)
     s
@@ -232,7 +232,7 @@ defmodule Swarm.Comms do
   defp give_way(s, other) do
     EStop.present(s.id, false)
     Pilot.halt(s.id)
-    Event.execute([:swarm, :link, :duplicate_id], %{}, %{robot: s.id, other: other})
+    Event.execute([:swarm, :comms, :duplicate_id], %{}, %{robot: s.id, other: other})
     %{s | sender: %{s.sender | silent?: true}}
   end
 

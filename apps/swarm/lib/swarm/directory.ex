@@ -6,9 +6,9 @@ defmodule Swarm.Directory do
 
   | group | holds |
   |---|---|
-  | `{:robot, :mag1}` | the link of that robot |
-  | `{:brake, :mag1}` | its brake |
-  | `:robots`, `:brakes` | the links of all robots, their brakes |
+  | `{:robot, :mag1}` | the comms process of that robot |
+  | `{:estop, :mag1}` | its e-stop process |
+  | `:robots`, `:estops` | the comms processes of all robots, their e-stop processes |
   | `{:team, :blue}` | whoever entered |
   | `{:service, :camera}`, `{:service, :camera, :mag1}` | who offers it (`Agents.Responder`); that of one robot |
   | `{:topic, :poses}` | who wants to be told (`Agents.Topic`) |
@@ -19,9 +19,9 @@ defmodule Swarm.Directory do
 
   @type group ::
           :robots
-          | :brakes
+          | :estops
           | {:robot, atom()}
-          | {:brake, atom()}
+          | {:estop, atom()}
           | {:team, atom()}
           | {:service, atom()}
           | {:service, atom(), robot :: atom()}

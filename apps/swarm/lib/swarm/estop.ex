@@ -39,7 +39,7 @@ defmodule Swarm.EStop do
   @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
   def start_link(%Config{} = config, _options) do
     GenServer.start_link(EStop.Server, config,
-      name: Names.via(config.id, :brake),
+      name: Names.via(config.id, :estop),
       spawn_opt: [priority: :high, message_queue_data: :off_heap]
     )
   end
@@ -48,7 +48,7 @@ defmodule Swarm.EStop do
   @spec hear(node(), term()) :: :ok
   def hear(_node, {:estop, call, age_ms} = term) do
     if EStop.Calls.call?(call) and EStop.Calls.age?(age_ms),
-      do: Enum.each(Names.all(:brake), &GenServer.cast(&1, term))
+      do: Enum.each(Names.all(:estop), &GenServer.cast(&1, term))
 
     :ok
   end
@@ -64,14 +64,14 @@ defmodule Swarm.EStop do
     stop = written(board)
 
     if EStop.State.hear(stop, number, latched?) != stop,
-      do: GenServer.cast(Names.via(robot, :brake), {:beat, number, latched?})
+      do: GenServer.cast(Names.via(robot, :estop), {:beat, number, latched?})
 
     :ok
   end
 
   @doc "The gate has set or cleared its latch, by whatever button; applied by the gate (`Robot.Config`, `:on_latch`)."
   @spec latch(robot :: atom()) :: :ok
-  def latch(robot), do: GenServer.cast(Names.via(robot, :brake), :latch)
+  def latch(robot), do: GenServer.cast(Names.via(robot, :estop), :latch)
 
   @doc "How the stop stands as the e-stop process published it; before the first did, by the gate's latch."
   @spec written(Board.t()) :: EStop.State.t()
@@ -85,10 +85,10 @@ defmodule Swarm.EStop do
   @doc "Takes a request for the e-stop process from the robot's comms process, which has looked how old it is."
   @spec take(robot :: atom(), request :: term(), reference()) :: :ok
   def take(robot, request, ref),
-    do: GenServer.cast(Names.via(robot, :brake), {:in_time, request, ref})
+    do: GenServer.cast(Names.via(robot, :estop), {:in_time, request, ref})
 
   @doc "The robot is there for commands by its name, or no longer: another of that name was first."
   @spec present(robot :: atom(), boolean()) :: :ok
   def present(robot, present?),
-    do: GenServer.cast(Names.via(robot, :brake), {:present, present?})
+    do: GenServer.cast(Names.via(robot, :estop), {:present, present?})
 end

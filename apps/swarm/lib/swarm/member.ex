@@ -7,7 +7,7 @@ defmodule Swarm.Member do
   | input | from |
   |---|---|
   | `{:reading, reading, at_ms}` | the drive, the pan-tilt unit |
-  | `{:blobs, blobs, meta}` | the eye (`t:Vision.BlobDetector.meta/0`) |
+  | `{:blobs, blobs, meta}` | the blob detector (`t:Vision.BlobDetector.meta/0`) |
   | `{:message, term, at_ms}` | another robot |
   | `{:command, command, at_ms}` | a person |
   | `{:tick, at_ms}` | the clock, 10 Hz: controller, then mission, then (5 Hz) the heartbeat |

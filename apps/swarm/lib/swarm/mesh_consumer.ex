@@ -37,24 +37,24 @@ defmodule Swarm.MeshConsumer do
   @impl Mesh.Consumer
   def deliver(:all, node, message) do
     rival(message, node)
-    for link <- Names.all(:link), do: GenServer.cast(link, {:hear, message})
+    for link <- Names.all(:comms), do: GenServer.cast(link, {:hear, message})
     :ok
   end
 
   def deliver(ids, _node, message) do
-    for id <- ids, link = Names.whereis(id, :link), do: GenServer.cast(link, {:hear, message})
+    for id <- ids, link = Names.whereis(id, :comms), do: GenServer.cast(link, {:hear, message})
     :ok
   end
 
   # A robot on another node has the name of one of this node.
   defp rival(%Message{kind: :heartbeat, from: from, body: beat}, node),
-    do: if(Names.whereis(from, :link), do: Comms.rival(from, {beat.boot, node}))
+    do: if(Names.whereis(from, :comms), do: Comms.rival(from, {beat.boot, node}))
 
   defp rival(_other, _node), do: :ok
 
   @impl Mesh.Consumer
   def command(robot, request) do
-    case Names.whereis(robot, :link) do
+    case Names.whereis(robot, :comms) do
       nil -> :error
       link -> GenServer.cast(link, request)
     end

@@ -24,7 +24,7 @@ defmodule Swarm.MeshNodes.Junk do
   """
   @spec pour(robot :: atom()) :: [atom() | {atom(), atom()}]
   def pour(robot) do
-    found = for name <- @names ++ [{robot, :link}, {robot, :brake}], do: {name, pid(name)}
+    found = for name <- @names ++ [{robot, :comms}, {robot, :estop}], do: {name, pid(name)}
     terms = terms()
     for {_name, pid} <- found, term <- terms, do: send_all(pid, term)
     for {name, pid} <- found, not looked?(pid) or pid(name) != pid, do: name

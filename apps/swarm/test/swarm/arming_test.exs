@@ -232,7 +232,7 @@ defmodule Swarm.ArmingTest do
 
     for {request, answer} <- [disarm: :ok, arm: :too_late, acknowledge: :too_late] do
       ref = :erlang.alias([:reply])
-      role = if request == :disarm, do: :brake, else: :link
+      role = if request == :disarm, do: :estop, else: :comms
       GenServer.cast(Names.whereis(id, role), {:command, request, ref, old})
       assert_receive {^ref, got}
       if answer == :ok, do: assert(got == :ok), else: assert(elem(got, 1) =~ "too late")
@@ -240,7 +240,7 @@ defmodule Swarm.ArmingTest do
 
     shows(id, "DISARMED")
     assert Swarm.arm(id) == :ok
-    link = Names.whereis(id, :link)
+    link = Names.whereis(id, :comms)
     :ok = :sys.suspend(link)
     assert Swarm.disarm(id) == :ok
     eventually(fn -> Hal.Device.arming(Names.whereis(id, :drive)).state == :disarmed end)

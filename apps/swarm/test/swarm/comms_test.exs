@@ -64,7 +64,7 @@ defmodule Swarm.CommsTest do
 
   test "what is malformed is dropped, counted and shown, and crashes nobody" do
     id = talking(:link3)
-    link = Names.whereis(id, :link)
+    link = Names.whereis(id, :comms)
     for junk <- [:junk, %{a: 1}, nil, "text", {:robot, 1}], do: Comms.hear(id, junk)
     Comms.hear(id, Message.new(:link4, :heartbeat, %{boot: "x"}))
     Comms.hear(id, Message.new(:link4, :round, :nonsense))
@@ -80,12 +80,12 @@ defmodule Swarm.CommsTest do
 
     assert %{rejected: %{heartbeat: 1}} = Swarm.status(id)
     assert inspect(Swarm.status(id)) =~ "dropped 9 messages"
-    assert Names.whereis(id, :link) == link
+    assert Names.whereis(id, :comms) == link
   end
 
   test "whatever is sent to a link in whatever envelope: nothing of the robot falls" do
     id = talking(:linkattacked)
-    parts = parts(id, [:link, :pilot, :executive, :gate])
+    parts = parts(id, [:comms, :pilot, :executive, :gate])
     [link, pilot | _] = parts
     ref = :erlang.alias([:reply])
     deep = Enum.reduce(1..10_000, [], fn _, deep -> {deep} end)
@@ -134,7 +134,7 @@ defmodule Swarm.CommsTest do
     assert Swarm.ask(id, {:goto, :far, 0.0, nil}) |> elem(1) =~ "goto cannot take :far"
     assert Swarm.ask(id, {:dance, 1}) |> elem(1) =~ "{:dance, 1} is not a command"
     assert Swarm.ask(id, {:start, [assign: :luck]}) |> elem(1) =~ "assign"
-    assert parts(id, [:link, :pilot, :executive, :gate]) == parts
+    assert parts(id, [:comms, :pilot, :executive, :gate]) == parts
   end
 
   test "an e-stop spreads, survives the link, and is not caught again after a reset" do
@@ -145,8 +145,8 @@ defmodule Swarm.CommsTest do
     # One is told; the others hear of it.
     assert Swarm.ask(:link5, :estop) == :ok
     for id <- ids, do: until(id, &Board.latched?/1)
-    kill(:link6, :link)
-    until(:link6, fn _ -> Names.whereis(:link6, :link) != nil end)
+    kill(:link6, :comms)
+    until(:link6, fn _ -> Names.whereis(:link6, :comms) != nil end)
     assert Board.latched?(Board.find!(:link6))
 
     # One after the other is reset, and stays so though the others still tell of the stop.
@@ -166,7 +166,7 @@ defmodule Swarm.CommsTest do
     id = talking(:link8)
     assert Swarm.ask(id, {:move, 0.1, 0.0}) == :ok
     rolls_of(id)
-    [link, gate, executive] = parts(id, [:link, :gate, :executive])
+    [link, gate, executive] = parts(id, [:comms, :gate, :executive])
     scope = Process.whereis(Directory)
     monitor = Process.monitor(scope)
     Process.exit(scope, :kill)
@@ -174,14 +174,14 @@ defmodule Swarm.CommsTest do
     forget(id)
     until(id, fn _ -> Directory.whereis(id) == link end)
     rolls_of(id)
-    assert parts(id, [:link, :gate, :executive]) == [link, gate, executive]
+    assert parts(id, [:comms, :gate, :executive]) == [link, gate, executive]
   end
 
   test "of two robots of one name the later one gives way" do
     id = talking(:link9, link: [boot: 1_000])
-    :ok = Hal.Event.attach(:link9, [:swarm, :link, :duplicate_id], &__MODULE__.tell/4, self())
+    :ok = Hal.Event.attach(:link9, [:swarm, :comms, :duplicate_id], &__MODULE__.tell/4, self())
     on_exit(fn -> Hal.Event.detach(:link9) end)
-    link = Names.whereis(id, :link)
+    link = Names.whereis(id, :comms)
     until(id, fn _ -> Directory.whereis(id) == link end)
 
     # A later one is told so, and nothing changes.
@@ -204,8 +204,8 @@ defmodule Swarm.CommsTest do
   test "a link that falls takes nothing of the robot along" do
     id = talking(:link10)
     parts = parts(id, [:gate, :executive, :pilot])
-    kill(id, :link)
-    until(id, fn _ -> Directory.whereis(id) != nil and Names.whereis(id, :link) != nil end)
+    kill(id, :comms)
+    until(id, fn _ -> Directory.whereis(id) != nil and Names.whereis(id, :comms) != nil end)
     assert parts(id, [:gate, :executive, :pilot]) == parts
   end
 

@@ -22,7 +22,7 @@ defmodule Swarm.EStopTest do
 
   test "an e-stop does not wait for a link that hangs, nor does a stop or the reset" do
     id = robot(:brake_hangs)
-    link = Names.whereis(id, :link)
+    link = Names.whereis(id, :comms)
     assert Swarm.goto(id, {1, 1}) == :ok
     :ok = :sys.suspend(link)
     assert Swarm.stop(id) == :ok
@@ -39,12 +39,12 @@ defmodule Swarm.EStopTest do
   test "an e-stop reaches a robot whose link is dead, and is spread by the link that follows" do
     [a, b] = standing(for id <- [:brake_dead, :brake_beside], do: robot(id))
     eventually(fn -> is_map_key(Board.peers(Board.find!(b)), a) end)
-    link = Names.whereis(a, :link)
+    link = Names.whereis(a, :comms)
     :ok = :sys.suspend(link)
     # Only this one is called.
     assert Swarm.ask(a, {:estop, call(1)}) == :ok
     assert latched?(a)
-    kill(a, :link)
+    kill(a, :comms)
     eventually(fn -> latched?(b) end)
     assert Swarm.reset() == :ok
   end
@@ -63,8 +63,8 @@ defmodule Swarm.EStopTest do
           {:reset, call(1)}
         ] do
       assert EStop.hear(:base@hall, junk) == :ok
-      GenServer.cast(Names.whereis(a, :brake), junk)
-      send(Names.whereis(a, :brake), junk)
+      GenServer.cast(Names.whereis(a, :estop), junk)
+      send(Names.whereis(a, :estop), junk)
     end
 
     refute latched?(a)
@@ -94,9 +94,9 @@ defmodule Swarm.EStopTest do
     assert Swarm.ask(id, {:estop, call(1)}) == :ok
     assert Swarm.reset() == :ok
     [gate, pilot] = [Names.whereis(id, :gate), Names.whereis(id, :pilot)]
-    brake = kill(id, :brake)
-    eventually(fn -> (now = Names.whereis(id, :brake)) && now != brake end)
-    eventually(fn -> Directory.members({:brake, id}) == [Names.whereis(id, :brake)] end)
+    brake = kill(id, :estop)
+    eventually(fn -> (now = Names.whereis(id, :estop)) && now != brake end)
+    eventually(fn -> Directory.members({:estop, id}) == [Names.whereis(id, :estop)] end)
     EStop.hear(:base@hall, {:estop, call(1), 0})
     assert Swarm.ask(id, :stop) == :ok
     refute latched?(id)
@@ -105,7 +105,7 @@ defmodule Swarm.EStopTest do
 
   test "the call is repeated, whatever becomes of the caller, and passed on once" do
     id = robot(:brake_repeat)
-    :ok = Directory.enter(self(), [:brakes])
+    :ok = Directory.enter(self(), [:estops])
     {caller, monitor} = spawn_monitor(fn -> exit({:called, Broadcaster.sound()}) end)
     assert_receive {:DOWN, ^monitor, :process, ^caller, {:called, call}}
     for _ <- 1..10, do: assert_receive({:"$gen_cast", {:estop, ^call, _age}})
@@ -123,7 +123,7 @@ defmodule Swarm.EStopTest do
     far = call(1)
     for _ <- 1..3, do: assert_receive({:"$gen_cast", {:estop, ^far, _age}})
     refute_received {:"$gen_cast", {:estop, _more, _age}}
-    :ok = Directory.leave(self(), [:brakes])
+    :ok = Directory.leave(self(), [:estops])
     assert Swarm.reset() == :ok
   end
 
@@ -150,7 +150,7 @@ defmodule Swarm.EStopTest do
 
   test "an e-stop, and its reset, get through to a flooded robot, whose mailbox stays short" do
     id = robot(:brake_flooded)
-    link = Names.whereis(id, :link)
+    link = Names.whereis(id, :comms)
     flood = start_supervised!({Task, fn -> pour(link, id) end})
     eventually(fn -> flooded(id) > 0 end)
     assert Swarm.estop() == :ok

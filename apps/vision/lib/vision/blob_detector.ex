@@ -21,8 +21,8 @@ defmodule Vision.BlobDetector do
   A frame that cannot be read gives nothing, so that its blobs grow old at the sink: "seen
   nothing" and "did not see" are not the same. `status/1` counts them.
 
-  A camera's device feeds it with the sink `{Vision.BlobDetector, :frame, [eye]}`, a pan-tilt unit's with
-  `{Vision.BlobDetector, :aim, [eye]}`.
+  A camera's device feeds it with the sink `{Vision.BlobDetector, :frame, [detector]}`, a pan-tilt unit's with
+  `{Vision.BlobDetector, :aim, [detector]}`.
   """
   use GenServer
   alias Hal.{Frame, Ptz}
@@ -41,27 +41,27 @@ defmodule Vision.BlobDetector do
           last_error: term()
         }
 
-  @doc "Starts the eye. Wrong options raise `ArgumentError`."
+  @doc "Starts the blob detector. Wrong options raise `ArgumentError`."
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options) do
     {name, options} = Keyword.split(options, [:name])
     GenServer.start_link(__MODULE__, check!(options), name)
   end
 
-  @doc "Hands a frame, or a camera's reading, to the eye. Other readings (a device's health) are passed over."
+  @doc "Hands a frame, or a camera's reading, to the blob detector. Other readings (a device's health) are passed over."
   @spec frame(GenServer.server(), Frame.t() | Hal.Camera.reading() | tuple()) :: :ok
-  def frame(eye, %Frame{} = frame), do: GenServer.cast(eye, {:frame, frame})
-  def frame(eye, {:frame, frame}), do: GenServer.cast(eye, {:frame, frame})
+  def frame(detector, %Frame{} = frame), do: GenServer.cast(detector, {:frame, frame})
+  def frame(detector, {:frame, frame}), do: GenServer.cast(detector, {:frame, frame})
   def frame(_eye, _other_reading), do: :ok
 
-  @doc "Hands a pan-tilt unit's reading to the eye. Its health is passed over."
+  @doc "Hands a pan-tilt unit's reading to the blob detector. Its health is passed over."
   @spec aim(GenServer.server(), Hal.Ptz.reading() | tuple()) :: :ok
-  def aim(eye, {:ptz, reading}), do: GenServer.cast(eye, {:aim, reading})
+  def aim(detector, {:ptz, reading}), do: GenServer.cast(detector, {:aim, reading})
   def aim(_eye, _other_reading), do: :ok
 
   @doc "How many frames were read, dropped for a newer one, and wrong, and what was wrong with the last of these."
   @spec status(GenServer.server()) :: status()
-  def status(eye), do: GenServer.call(eye, :status)
+  def status(detector), do: GenServer.call(detector, :status)
 
   @impl GenServer
   def init(options) do
@@ -138,14 +138,20 @@ defmodule Vision.BlobDetector do
       ])
 
     unless is_boolean(options[:ptz]),
-      do: raise(ArgumentError, "eye option :ptz must be true or false")
+      do: raise(ArgumentError, "blob detector option :ptz must be true or false")
 
     unless match?(%Colours{}, options[:colours]),
-      do: raise(ArgumentError, "eye option :colours must be a %Vision.Colours{}")
+      do: raise(ArgumentError, "blob detector option :colours must be a %Vision.Colours{}")
 
     case options[:sink] do
-      {m, f, a} when is_atom(m) and is_atom(f) and is_list(a) -> options
-      other -> raise(ArgumentError, "eye option :sink must be {m, f, a}, not #{inspect(other)}")
+      {m, f, a} when is_atom(m) and is_atom(f) and is_list(a) ->
+        options
+
+      other ->
+        raise(
+          ArgumentError,
+          "blob detector option :sink must be {m, f, a}, not #{inspect(other)}"
+        )
     end
   end
 end

@@ -7,8 +7,10 @@ defmodule Vision.BlobDetectorTest do
     {:ok, colours} =
       Colours.new([%{name: "Yellow", y: {170, 240}, u: {60, 90}, v: {130, 145}}], min_area: 2)
 
-    eye = start_supervised!({BlobDetector, colours: colours, sink: {Kernel, :send, [self()]}})
-    %{eye: eye, colours: colours}
+    detector =
+      start_supervised!({BlobDetector, colours: colours, sink: {Kernel, :send, [self()]}})
+
+    %{detector: detector, colours: colours}
   end
 
   defp frame(at_ms) do
@@ -16,44 +18,44 @@ defmodule Vision.BlobDetectorTest do
     %{frame | pan: 0.5}
   end
 
-  test "blobs go to the sink with the time and direction of the frame", %{eye: eye} do
-    :ok = BlobDetector.frame(eye, {:frame, frame(7)})
+  test "blobs go to the sink with the time and direction of the frame", %{detector: detector} do
+    :ok = BlobDetector.frame(detector, {:frame, frame(7)})
     assert_receive {:blobs, [%{colour: "Yellow", area: 2}], %{at_ms: 7, pan: 0.5, tilt: tilt}}
     assert tilt == 0.0
   end
 
-  test "only the newest frame of those that wait is read", %{eye: eye} do
-    :sys.suspend(eye)
-    for at_ms <- 1..20, do: BlobDetector.frame(eye, frame(at_ms))
-    :sys.resume(eye)
+  test "only the newest frame of those that wait is read", %{detector: detector} do
+    :sys.suspend(detector)
+    for at_ms <- 1..20, do: BlobDetector.frame(detector, frame(at_ms))
+    :sys.resume(detector)
     assert_receive {:blobs, _, %{at_ms: 20}}
-    assert %{read: 1, dropped: 19} = BlobDetector.status(eye)
+    assert %{read: 1, dropped: 19} = BlobDetector.status(detector)
     refute_received {:blobs, _, _}
   end
 
-  test "wrong frames are counted and give nothing", %{eye: eye} do
-    BlobDetector.frame(eye, %{frame(1) | bytes: <<1>>})
-    assert %{wrong: 1, last_error: {:bytes, 1, :expected, 4}} = BlobDetector.status(eye)
-    BlobDetector.frame(eye, {:frame, :nonsense})
-    assert %{wrong: 2, read: 0, last_error: :no_frame} = BlobDetector.status(eye)
-    BlobDetector.frame(eye, {:health, :camera, {:online, 0}})
+  test "wrong frames are counted and give nothing", %{detector: detector} do
+    BlobDetector.frame(detector, %{frame(1) | bytes: <<1>>})
+    assert %{wrong: 1, last_error: {:bytes, 1, :expected, 4}} = BlobDetector.status(detector)
+    BlobDetector.frame(detector, {:frame, :nonsense})
+    assert %{wrong: 2, read: 0, last_error: :no_frame} = BlobDetector.status(detector)
+    BlobDetector.frame(detector, {:health, :camera, {:online, 0}})
     refute_received {:blobs, _, _}
   end
 
   @tag if(System.find_executable("ffmpeg"), do: [], else: [skip: "ffmpeg is missing"])
-  test "a camera's device feeds it, and its end or health is nothing to it", %{eye: eye} do
+  test "a camera's device feeds it, and its end or health is nothing to it", %{detector: detector} do
     source = "lavfi:color=color=0xDCCD5A:size=32x24:rate=50:duration=0.1"
 
     start_supervised!(
       {Hal.Device,
        kind: :camera,
        driver: {Hal.Camera.FFmpeg, source: source},
-       sinks: [{BlobDetector, :frame, [eye]}, {Kernel, :send, [self()]}]}
+       sinks: [{BlobDetector, :frame, [detector]}, {Kernel, :send, [self()]}]}
     )
 
     assert_receive {:blobs, [%{colour: "Yellow", share: 1.0}], _meta}, 10_000
     assert_receive {:health, :camera, {{:offline, :eof}, _since_ms}}, 10_000
-    assert BlobDetector.status(eye).wrong == 0
+    assert BlobDetector.status(detector).wrong == 0
   end
 
   describe "on a pan-tilt unit" do
@@ -63,53 +65,53 @@ defmodule Vision.BlobDetectorTest do
       options = [colours: colours, sink: sink, ptz: true, clock: clock]
 
       %{
-        eye: start_supervised!({BlobDetector, options}, id: :eye_on_ptz),
+        detector: start_supervised!({BlobDetector, options}, id: :detector_on_ptz),
         clock: List.first(elem(clock, 2))
       }
     end
 
-    defp looks(eye, clock, at_ms, pan) do
+    defp looks(detector, clock, at_ms, pan) do
       Agent.update(clock, fn _ -> at_ms end)
-      BlobDetector.aim(eye, {:ptz, %{pan: pan, tilt: 0.1, field_of_view: 0.8}})
+      BlobDetector.aim(detector, {:ptz, %{pan: pan, tilt: 0.1, field_of_view: 0.8}})
       # It has taken the time by now.
-      BlobDetector.status(eye)
+      BlobDetector.status(detector)
     end
 
     test "a frame that does not know where it looked gets what held when it was taken", context do
-      %{eye: eye, clock: clock} = context
-      looks(eye, clock, 1_000, 0.0)
-      looks(eye, clock, 1_100, 0.4)
-      BlobDetector.frame(eye, %{frame(1_050) | pan: nil})
+      %{detector: detector, clock: clock} = context
+      looks(detector, clock, 1_000, 0.0)
+      looks(detector, clock, 1_100, 0.4)
+      BlobDetector.frame(detector, %{frame(1_050) | pan: nil})
       assert_receive {:blobs, [_], %{at_ms: 1_050} = meta}
       assert_in_delta meta.pan, 0.2, 1.0e-9
       assert_in_delta meta.tilt, 0.1, 1.0e-9
       assert_in_delta meta.field_of_view, 0.8, 1.0e-9
       # One that knows is taken at its word.
-      BlobDetector.frame(eye, frame(1_060))
+      BlobDetector.frame(detector, frame(1_060))
       assert_receive {:blobs, [_], %{at_ms: 1_060, pan: 0.5, field_of_view: nil}}
     end
 
     test "nobody knows where it looked: no blobs, which is not the same as none seen", context do
-      %{eye: eye, clock: clock} = context
-      BlobDetector.frame(eye, %{frame(1_000) | pan: nil})
-      assert %{wrong: 1, last_error: :no_aim} = BlobDetector.status(eye)
-      looks(eye, clock, 1_000, 0.3)
-      BlobDetector.aim(eye, {:health, :ptz, {:online, 0}})
-      BlobDetector.frame(eye, %{frame(1_900) | pan: nil})
+      %{detector: detector, clock: clock} = context
+      BlobDetector.frame(detector, %{frame(1_000) | pan: nil})
+      assert %{wrong: 1, last_error: :no_aim} = BlobDetector.status(detector)
+      looks(detector, clock, 1_000, 0.3)
+      BlobDetector.aim(detector, {:health, :ptz, {:online, 0}})
+      BlobDetector.frame(detector, %{frame(1_900) | pan: nil})
       assert_receive {:blobs, [_], %{at_ms: 1_900, pan: 0.3}}
-      BlobDetector.frame(eye, %{frame(2_001) | pan: nil})
-      assert %{wrong: 2} = BlobDetector.status(eye)
+      BlobDetector.frame(detector, %{frame(2_001) | pan: nil})
+      assert %{wrong: 2} = BlobDetector.status(detector)
       refute_received {:blobs, _, _}
     end
 
     test "readings that wait behind a frame are heard before it is looked at", context do
-      %{eye: eye, clock: clock} = context
-      looks(eye, clock, 1_000, 0.0)
+      %{detector: detector, clock: clock} = context
+      looks(detector, clock, 1_000, 0.0)
       Agent.update(clock, fn _ -> 1_100 end)
-      :sys.suspend(eye)
-      BlobDetector.frame(eye, %{frame(1_050) | pan: nil})
-      BlobDetector.aim(eye, {:ptz, %{pan: 0.4, tilt: 0.1, field_of_view: 0.8}})
-      :sys.resume(eye)
+      :sys.suspend(detector)
+      BlobDetector.frame(detector, %{frame(1_050) | pan: nil})
+      BlobDetector.aim(detector, {:ptz, %{pan: 0.4, tilt: 0.1, field_of_view: 0.8}})
+      :sys.resume(detector)
       assert_receive {:blobs, [_], %{pan: pan}}
       assert_in_delta pan, 0.2, 1.0e-9
     end
@@ -121,14 +123,14 @@ defmodule Vision.BlobDetectorTest do
   test "pictures of ffmpeg bear the direction of a unit that turns meanwhile", context do
     sink = {Kernel, :send, [self()]}
     options = [colours: context.colours, sink: sink, ptz: true]
-    eye = start_supervised!({BlobDetector, options}, id: :turning)
+    detector = start_supervised!({BlobDetector, options}, id: :turning)
     # 0.5 rad/s, told each 50 ms, from before the first picture on.
     begun_ms = System.monotonic_time(:millisecond)
     pan = fn at_ms -> (at_ms - begun_ms) / 2_000 end
 
     tell = fn ->
       reading = %{pan: pan.(System.monotonic_time(:millisecond)), tilt: 0.0, field_of_view: 0.8}
-      BlobDetector.aim(eye, {:ptz, reading})
+      BlobDetector.aim(detector, {:ptz, reading})
     end
 
     tell.()
@@ -139,7 +141,7 @@ defmodule Vision.BlobDetectorTest do
        kind: :camera,
        driver:
          {Hal.Camera.FFmpeg, source: "lavfi:color=color=0xDCCD5A:size=32x24:rate=25:duration=1"},
-       sinks: [{BlobDetector, :frame, [eye]}]}
+       sinks: [{BlobDetector, :frame, [detector]}]}
     )
 
     metas =

@@ -18,7 +18,7 @@ defmodule Robot.Devices.Log do
     [:robot, :estop_file, :error],
     [:vision, :saver, :failed],
     [:vision, :saver, :healed],
-    [:swarm, :link, :duplicate_id]
+    [:swarm, :comms, :duplicate_id]
   ]
 
   @doc "Attaches the log to the devices' events; once a node."

@@ -94,7 +94,7 @@ defmodule Sim.Fleet.RadioServer do
   # and until then those of others go to everybody.
   defp deliver(to, %{kind: kind} = message) do
     cond do
-      Names.whereis(to, :link) -> Comms.hear(to, message)
+      Names.whereis(to, :comms) -> Comms.hear(to, message)
       Mesh.heard?(to) -> Mesh.speak([to], message)
       kind == :heartbeat -> Mesh.speak(:all, message)
       true -> :ok

@@ -1,7 +1,7 @@
 defmodule Swarm.Commands.Client do
   @moduledoc false
   # Asks robots, wherever they are, and gathers what they answer. What stops a robot goes to its
-  # brake, all else to its link. A command for another node bears a stamp (`Swarm.Commands.Freshness`); who has
+  # e-stop process, all else to its comms. A command for another node bears a stamp (`Swarm.Commands.Freshness`); who has
   # none at hand asks the robot for one first.
   alias Robot.{Board, Names}
   alias Mesh.Nonblocking
@@ -73,7 +73,7 @@ defmodule Swarm.Commands.Client do
   # The nearest process that takes the request. Where its node is not connected, or not heard, the way by
   # others comes first, `{:relay, process or nil}`; `nil` where nobody knows the robot.
   defp whereabouts(id, request) do
-    pid = if(EStop.takes?(request), do: nearest({:brake, id})) || Directory.whereis(id)
+    pid = if(EStop.takes?(request), do: nearest({:estop, id})) || Directory.whereis(id)
 
     cond do
       pid && not Mesh.silent?(node(pid)) -> pid
@@ -94,7 +94,7 @@ defmodule Swarm.Commands.Client do
       not Freshness.needed?(request) or (is_pid(to) and node(to) == node()) ->
         post(id, to, request, nil)
 
-      # A brake knows its own stamps only.
+      # An e-stop process knows its own stamps only.
       stamp = request != :reset && stamp(id) ->
         post(id, to, request, stamp)
 

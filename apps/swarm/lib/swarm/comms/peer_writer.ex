@@ -34,6 +34,6 @@ defmodule Swarm.Comms.PeerWriter do
 
   defp show(chart, peers, id, at_ms) do
     peer = Peers.percept(peers, id, at_ms)
-    Board.put(chart.board, :link, {:peer, id}, peer, peer.at_ms)
+    Board.put(chart.board, :comms, {:peer, id}, peer, peer.at_ms)
   end
 end

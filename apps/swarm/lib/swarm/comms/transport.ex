@@ -32,14 +32,14 @@ defmodule Swarm.Comms.Transport do
   end
 
   defp by_mesh(from, :all, message) do
-    own = Names.whereis(from, :link)
-    for link <- Names.all(:link), link != own, do: GenServer.cast(link, {:hear, message})
+    own = Names.whereis(from, :comms)
+    for link <- Names.all(:comms), link != own, do: GenServer.cast(link, {:hear, message})
     Mesh.speak(:all, message)
   end
 
   defp by_mesh(_from, ids, message) do
-    {here, there} = Enum.split_with(ids, &(Names.whereis(&1, :link) != nil))
-    for id <- here, do: GenServer.cast(Names.via(id, :link), {:hear, message})
+    {here, there} = Enum.split_with(ids, &(Names.whereis(&1, :comms) != nil))
+    for id <- here, do: GenServer.cast(Names.via(id, :comms), {:hear, message})
     if there != [], do: Mesh.speak(there, message), else: :ok
   end
 

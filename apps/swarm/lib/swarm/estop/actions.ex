@@ -141,7 +141,7 @@ defmodule Swarm.EStop.Actions do
     # The mission ends with it: after the reset nothing moves until somebody says so.
     if stop.latched? and not before.latched?, do: halt(s, nil)
 
-    GenServer.cast(Names.via(s.id, :link), :stop)
+    GenServer.cast(Names.via(s.id, :comms), :stop)
     s
   end
 
@@ -159,7 +159,7 @@ defmodule Swarm.EStop.Actions do
   @doc "Writes down how the stop stands."
   @spec write(t()) :: t()
   def write(s) do
-    Board.put(s.board, :brake, :estop, s.stop, Config.now(s.config))
+    Board.put(s.board, :estop, :estop, s.stop, Config.now(s.config))
     s
   end
 end

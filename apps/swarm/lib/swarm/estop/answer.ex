@@ -11,7 +11,7 @@ defmodule Swarm.EStop.Answer do
   """
   @spec release(atom(), pressed :: reference(), until_ms :: integer(), reference()) :: :ok
   def release(robot, pressed, until_ms, ref),
-    do: GenServer.cast(Names.via(robot, :brake), {:release, pressed, until_ms, ref})
+    do: GenServer.cast(Names.via(robot, :estop), {:release, pressed, until_ms, ref})
 
   @doc "What the robot was at has ended, says its gate, which stands: answers whether its wheels do."
   @spec stood(atom(), reference()) :: :ok

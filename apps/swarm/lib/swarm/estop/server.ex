@@ -35,8 +35,8 @@ defmodule Swarm.EStop.Server do
     {:noreply,
      %{
        s
-       | brakes: Directory.Membership.enter([:brakes]),
-         name: Directory.Membership.enter([{:brake, s.id}])
+       | brakes: Directory.Membership.enter([:estops]),
+         name: Directory.Membership.enter([{:estop, s.id}])
      }}
   end
 
@@ -90,7 +90,7 @@ defmodule Swarm.EStop.Server do
   end
 
   def handle_cast({:present, true}, %{name: %{left?: true}} = s),
-    do: {:noreply, %{s | name: Directory.Membership.enter([{:brake, s.id}])}}
+    do: {:noreply, %{s | name: Directory.Membership.enter([{:estop, s.id}])}}
 
   def handle_cast({:present, false}, s),
     do: {:noreply, %{s | name: Directory.Membership.leave(s.name)}}
@@ -113,7 +113,7 @@ defmodule Swarm.EStop.Server do
         EStop.Actions.obey(s, request, ref)
 
       {:error, age} ->
-        GenServer.cast(Names.via(s.id, :link), {:rejected, :too_old})
+        GenServer.cast(Names.via(s.id, :comms), {:rejected, :too_old})
         Nonblocking.answer(ref, Freshness.refusal(s.id, age))
         s
     end

@@ -25,39 +25,39 @@ defmodule Swarm.Commands.FreshnessTest do
 
   test "a command is obeyed for 2 s after the heartbeat that it names" do
     {id, clock} = timed(:stamp_old, link: [boot: 7])
-    assert {7, n} = stamp = say(id, :link, {:stamp})
-    assert say(id, :link, {:stamp}) == stamp
+    assert {7, n} = stamp = say(id, :comms, {:stamp})
+    assert say(id, :comms, {:stamp}) == stamp
     :counters.put(clock, 1, 2_000)
-    assert order(id, :link, {:goto, 1.0, 1.0, nil}, stamp) == :ok
+    assert order(id, :comms, {:goto, 1.0, 1.0, nil}, stamp) == :ok
     :counters.put(clock, 1, 20_000)
-    assert {:error, line} = order(id, :link, {:goto, 2.0, 1.0, nil}, stamp)
+    assert {:error, line} = order(id, :comms, {:goto, 2.0, 1.0, nil}, stamp)
 
     assert line ==
              "stamp_old got this too late, 20.0 s old; at most 2 s are allowed, say it again"
 
     for stamp <- [{6, n}, {7, n + 1}, {7, -1}, :junk, {7, self()}, "text", {7, 1.5}] do
-      assert {:error, line} = order(id, :link, {:goto, 2.0, 1.0, nil}, stamp)
+      assert {:error, line} = order(id, :comms, {:goto, 2.0, 1.0, nil}, stamp)
       assert line =~ "stamp_old got this too late"
     end
 
     assert %{rejected: %{too_old: 8}} = Swarm.status(id)
     # At any age.
-    assert order(id, :link, :stop, stamp) == :ok
-    assert order(id, :brake, :stop, stamp) == :ok
-    assert {:ok, _} = order(id, :link, :ping, stamp)
-    assert order(id, :link, {:goto, 2.0, 1.0, nil}, say(id, :link, {:stamp})) == :ok
+    assert order(id, :comms, :stop, stamp) == :ok
+    assert order(id, :estop, :stop, stamp) == :ok
+    assert {:ok, _} = order(id, :comms, :ping, stamp)
+    assert order(id, :comms, {:goto, 2.0, 1.0, nil}, say(id, :comms, {:stamp})) == :ok
   end
 
   test "a reset that comes late does not release what was stopped meanwhile" do
     {id, clock} = timed(:stamp_reset)
-    stamp = say(id, :brake, {:stamp})
+    stamp = say(id, :estop, {:stamp})
     :counters.put(clock, 1, 5_000)
-    assert order(id, :brake, :estop, nil) == :ok
-    assert {:error, "stamp_reset got this too late" <> _} = order(id, :brake, :reset, stamp)
+    assert order(id, :estop, :estop, nil) == :ok
+    assert {:error, "stamp_reset got this too late" <> _} = order(id, :estop, :reset, stamp)
     assert Board.latched?(Board.find!(id))
     # It comes to the link where it was relayed.
-    assert {:error, _} = order(id, :link, :reset, stamp)
-    assert order(id, :link, :reset, say(id, :link, {:stamp})) == :ok
+    assert {:error, _} = order(id, :comms, :reset, stamp)
+    assert order(id, :comms, :reset, say(id, :comms, {:stamp})) == :ok
     refute Board.latched?(Board.find!(id))
     assert %{rejected: %{too_old: 2}} = Swarm.status(id)
   end
@@ -84,17 +84,17 @@ defmodule Swarm.Commands.FreshnessTest do
 
   test "of two of one name heard by radio the later one gives way, and can still be stopped" do
     id = robot(:stamp_twin, link: [boot: 1_000])
-    :ok = listen(id, [:swarm, :link, :duplicate_id])
-    link = Names.whereis(id, :link)
+    :ok = listen(id, [:swarm, :comms, :duplicate_id])
+    link = Names.whereis(id, :comms)
     assert Comms.rival(id, {1, node()}) == :ok
     assert Comms.rival(id, {1_001, :twin@far}) == :ok
     assert {:ok, _} = Swarm.ask(id, :ping)
     assert Directory.members({:robot, id}) == [link]
 
     assert Comms.rival(id, {999, :twin@far}) == :ok
-    assert_receive {[:swarm, :link, :duplicate_id], %{other: :twin@far}}
+    assert_receive {[:swarm, :comms, :duplicate_id], %{other: :twin@far}}
     assert Directory.members({:robot, id}) == []
-    eventually(fn -> Directory.members({:brake, id}) == [] end)
+    eventually(fn -> Directory.members({:estop, id}) == [] end)
     assert {:ok, %{state: :idle}, _} = Board.fetch(Board.find!(id), :mission, :infinity)
     Swarm.estop()
     eventually(fn -> Board.latched?(Board.find!(id)) end)
@@ -102,7 +102,7 @@ defmodule Swarm.Commands.FreshnessTest do
     Swarm.reset()
 
     # The next link claims the name again, and the brake with it.
-    kill(id, :link)
-    eventually(fn -> Directory.members({:brake, id}) == [Names.whereis(id, :brake)] end)
+    kill(id, :comms)
+    eventually(fn -> Directory.members({:estop, id}) == [Names.whereis(id, :estop)] end)
   end
 end

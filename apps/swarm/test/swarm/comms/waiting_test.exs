@@ -36,7 +36,7 @@ defmodule Swarm.Comms.WaitingTest do
   test "a pilot that hangs for seconds holds up no heartbeat, and orders of then move nobody" do
     id = talking(:waiting_pilot)
     pilot = Names.whereis(id, :pilot)
-    link = Names.whereis(id, :link)
+    link = Names.whereis(id, :comms)
     :ok = :sys.suspend(pilot)
     {:ok, many} = Task.Supervisor.start_link()
 
@@ -49,7 +49,7 @@ defmodule Swarm.Comms.WaitingTest do
     assert Swarm.goto(id, {1, 1}) == {:error, "waiting_pilot does not answer"}
     assert {:ok, line} = Swarm.tell(id, "ping")
     assert line =~ "idle"
-    assert [link, pilot] == [Names.whereis(id, :link), Names.whereis(id, :pilot)]
+    assert [link, pilot] == [Names.whereis(id, :comms), Names.whereis(id, :pilot)]
     :ok = :sys.resume(pilot)
     assert :sys.get_state(pilot) |> elem(0) == :idle
     assert Swarm.goto(id, {1, 1}) == :ok
@@ -111,8 +111,8 @@ defmodule Swarm.Comms.WaitingTest do
 
   test "a robot that is to start a mission which is not there says so, and nothing falls" do
     id = talking(:waiting_none, mission: {No.Such.Mission, []})
-    link = Names.whereis(id, :link)
+    link = Names.whereis(id, :comms)
     assert Swarm.ask(id, :start) == {:error, "waiting_none has no such mission"}
-    assert Names.whereis(id, :link) == link
+    assert Names.whereis(id, :comms) == link
   end
 end

@@ -26,7 +26,7 @@ defmodule Swarm.EStop.OwnerTest do
 
   test "a button of the gate's own reaches it though the comms process hangs" do
     id = robot(:owner_button)
-    link = Names.whereis(id, :link)
+    link = Names.whereis(id, :comms)
     :ok = :sys.suspend(link)
     :ok = Gate.estop(id)
     eventually(fn -> match?(%EStop.State{latched?: true, known: 1}, stop_of(id)) end)
@@ -37,11 +37,11 @@ defmodule Swarm.EStop.OwnerTest do
 
   test "of a latch that changed often while it was held up it follows the last" do
     id = robot(:owner_late)
-    brake = Names.whereis(id, :brake)
+    brake = Names.whereis(id, :estop)
     :ok = :sys.suspend(brake)
     for press <- [:estop, :reset, :estop], do: :ok = apply(Gate, press, [id])
     :ok = :sys.resume(brake)
-    settled(id, [:brake])
+    settled(id, [:estop])
     assert %EStop.State{latched?: true, known: 1} = stop_of(id)
     assert latched?(id)
     assert Swarm.ask(id, :reset) == :ok
@@ -50,10 +50,10 @@ defmodule Swarm.EStop.OwnerTest do
 
   test "what was pressed on the gate while there was none is followed by the next one" do
     id = robot(:owner_gone)
-    brake = Names.whereis(id, :brake)
+    brake = Names.whereis(id, :estop)
     :ok = :sys.suspend(brake)
     :ok = Gate.estop(id)
-    ^brake = kill(id, :brake)
+    ^brake = kill(id, :estop)
     eventually(fn -> match?(%EStop.State{latched?: true, known: 1}, stop_of(id)) end)
     assert latched?(id)
   end
@@ -61,10 +61,10 @@ defmodule Swarm.EStop.OwnerTest do
   test "the comms process waits for none that hangs, and hands on only what is news" do
     id = robot(:owner_hangs, link: [transport: {__MODULE__, :carry, [self()]}])
     standing([id])
-    brake = Names.whereis(id, :brake)
+    brake = Names.whereis(id, :estop)
     # How the stop stands already is not handed on.
     Comms.hear(id, beat(0, false))
-    settled(id, [:link])
+    settled(id, [:comms])
     :ok = :sys.suspend(brake)
     Comms.hear(id, beat(0, false))
     Comms.hear(id, beat(3, true))
@@ -83,16 +83,16 @@ defmodule Swarm.EStop.OwnerTest do
     # A neighbour that nobody has reset yet does not bring it back.
     assert Swarm.ask(id, :reset) == :ok
     Comms.hear(id, put_in(beat(3, true).body.sequence, 2))
-    settled(id, [:link, :brake])
+    settled(id, [:comms, :estop])
     refute latched?(id)
   end
 
   test "it keeps up with neighbours that tell of one stop after the other, and a reset holds" do
     id = robot(:owner_flooded)
-    link = Names.whereis(id, :link)
+    link = Names.whereis(id, :comms)
     for number <- 1..20_000, do: GenServer.cast(link, {:hear, beat(number, true)})
     eventually(fn -> Process.info(link, :message_queue_len) == {:message_queue_len, 0} end)
-    settled(id, [:link, :brake])
+    settled(id, [:comms, :estop])
     assert latched?(id)
     assert stop_of(id).known > 0
     assert Swarm.ask(id, :reset) == :ok

@@ -14,7 +14,7 @@ defmodule Swarm.Mesh.AbsurdTest do
   ]
 
   defp parts(%{name: name} = node) do
-    roles = [:link, :brake, :pilot, :executive, :gate]
+    roles = [:comms, :estop, :pilot, :executive, :gate]
     named = for role <- roles, do: MeshNodes.call(node, Robot.Names, :whereis, [name, role])
     named ++ for part <- @parts, do: MeshNodes.call(node, Process, :whereis, [part])
   end

@@ -1,4 +1,4 @@
-defmodule Sim.Trial.GazeTest do
+defmodule Sim.Trial.CameraPointingTest do
   @moduledoc "What becomes of a formation when the landmark moves a little: nothing but the cameras' directions."
   use ExUnit.Case, async: true
   alias Hal.Pose

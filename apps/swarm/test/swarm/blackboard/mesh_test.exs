@@ -1,4 +1,4 @@
-defmodule Swarm.RowsMeshTest do
+defmodule Swarm.Blackboard.MeshTest do
   # Real nodes on loopback.
   # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
   use ExUnit.Case, async: true

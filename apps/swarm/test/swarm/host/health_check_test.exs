@@ -1,4 +1,4 @@
-defmodule Swarm.Host.Systemd.PulseTest do
+defmodule Swarm.Host.HealthCheckTest do
   use ExUnit.Case, async: true
   use Swarm.Case
   alias Swarm.Host.HealthCheck

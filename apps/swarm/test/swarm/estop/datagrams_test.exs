@@ -1,4 +1,4 @@
-defmodule Swarm.BrakeRadioTest do
+defmodule Swarm.EStop.DatagramsTest do
   # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1]

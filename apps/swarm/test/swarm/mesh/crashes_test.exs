@@ -1,4 +1,4 @@
-defmodule Swarm.Mesh.FallsTest do
+defmodule Swarm.Mesh.CrashesTest do
   # Parts of a node fall, each more often than any supervisor would forgive.
   # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
   use ExUnit.Case, async: true
@@ -30,7 +30,7 @@ defmodule Swarm.Mesh.FallsTest do
   end
 
   defp pids(%{name: name} = node) do
-    for role <- [:robot, :board, :drive, :gate, :executive, :pilot, :brake, :link],
+    for role <- [:robot, :board, :drive, :gate, :executive, :pilot, :estop, :comms],
         do: MeshNodes.call(node, Robot.Names, :whereis, [name, role])
   end
 

@@ -1,4 +1,4 @@
-defmodule Mesh.Distribution.ConnectionLog.WordsTest do
+defmodule Mesh.Distribution.ConnectionLog.ReasonsTest do
   use ExUnit.Case, async: true
   alias Mesh.Distribution.ConnectionLog
   doctest ConnectionLog.Reasons

@@ -1,4 +1,4 @@
-defmodule Swarm.BrakeNodesTest do
+defmodule Swarm.EStop.NodesTest do
   use Swarm.Case, async: false
   alias Mesh.Nonblocking
   alias Robot.Mission.Manual
@@ -12,7 +12,7 @@ defmodule Swarm.BrakeNodesTest do
     [base, one, two] = Cluster.start_nodes(3)
     robot_on(one, :brake_n1)
     robot_on(two, :brake_n2)
-    eventually(fn -> length(:erpc.call(base, Directory, :members, [:brakes])) == 2 end)
+    eventually(fn -> length(:erpc.call(base, Directory, :members, [:estops])) == 2 end)
     # It has heard no heartbeat, so it asks how old its command may be.
     assert :erpc.call(base, Swarm, :goto, [:brake_n1, {1, 1}]) == :ok
     assert entry(one, :brake_n1, :mission).state == {Manual, :goto}

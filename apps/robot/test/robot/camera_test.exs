@@ -1,4 +1,4 @@
-defmodule Robot.SightTest do
+defmodule Robot.CameraTest do
   @moduledoc "What the robot sees, and that it drives on when it does not."
   use Robot.Case, async: false
   @moduletag :capture_log
@@ -67,9 +67,10 @@ defmodule Robot.SightTest do
     id = seeing(:sight_ptz, ptz: {Hal.FakePtz, test: self(), device: :ptz})
     looks = {:ptz, %{pan: 0.3, tilt: 0.1, field_of_view: 0.7}}
     send(Names.whereis(id, :ptz), {:readings, [looks]})
-    # The unit's process has handed the reading on when it answers, and then the eye has it, too.
+
+    # The unit's process has handed the reading on when it answers, and then the detector has it, too.
     _ = :sys.get_state(Names.whereis(id, :ptz))
-    _ = Vision.BlobDetector.status(Names.via(id, :eye))
+    _ = Vision.BlobDetector.status(Names.via(id, :blob_detector))
     at_ms = System.monotonic_time(:millisecond)
     {:ok, frame} = Hal.Frame.new(:yuyv, 2, 1, <<200, 70, 200, 140>>, at_ms)
     send(Names.whereis(id, :camera), {:readings, [{:frame, frame}]})
@@ -78,7 +79,7 @@ defmodule Robot.SightTest do
     assert Robot.Percept.Sighting.field_of_view(percept) == 0.7
   end
 
-  for fallen <- [:eye, :camera] do
+  for fallen <- [:blob_detector, :camera] do
     test "#{fallen} is killed: blobs grow old, driving goes on, and it sees again" do
       id = seeing(:"sight_#{unquote(fallen)}")
       sees(id)
@@ -97,10 +98,10 @@ defmodule Robot.SightTest do
   test "a camera that crashes rests, restarts alone, and sees again" do
     id = seeing(:sight4)
     assert_receive {:camera, :init, camera}
-    parts = parts(id, [:eye, :gate, :executive])
+    parts = parts(id, [:blob_detector, :gate, :executive])
     send(camera, :raise)
     assert_receive {:camera, :init, other} when other != camera, 1_000
-    assert parts(id, [:eye, :gate, :executive]) == parts
+    assert parts(id, [:blob_detector, :gate, :executive]) == parts
     assert_receive {:camera, :next, ^other}
     sees(id)
     {:ok, :online, _} = Board.fetch(Board.find!(id), {:health, :camera}, :infinity)
