@@ -169,6 +169,8 @@ defmodule Netns.Fleet do
     for {module, code} <- s.shipped,
         do: {:module, _} = call.(:code, :load_binary, [module, ~c"test", code])
 
+    missions = Application.fetch_env!(:swarm, :missions)
+    :ok = call.(Application, :put_env, [:swarm, :missions, missions])
     :ok = call.(Application, :put_env, [:swarm, :mesh, mesh(s.net, robot, address)])
     for app <- [:swarm, :sim], do: {:ok, _} = call.(Application, :ensure_all_started, [app])
     :ok = call.(Netns.Robot, :start, [robot, poses, s.folder])
