@@ -1,70 +1,9 @@
-defmodule System.NodesTest do
-  @moduledoc """
-  `bin/demo --nodes` from outside: its processes are killed as a person would, by their numbers.
+Code.require_file("nodes/case.exs", __DIR__)
 
-  A port mapper of its own keeps it apart from other fleets on the machine.
-  """
-  use ExUnit.Case, async: true
-
-  @moduletag timeout: 120_000
-  @root Path.expand("..", __DIR__)
-
-  setup do
-    port = free_port()
-    environment = [{"ERL_EPMD_PORT", "#{port}"}, {"ERL_EPMD_ADDRESS", "127.0.0.1"}]
-    on_exit(fn -> System.cmd("epmd", ["-kill"], env: environment, stderr_to_stdout: true) end)
-    %{environment: environment}
-  end
-
-  # None of those that the system hands out by itself, to another test perhaps.
-  defp free_port do
-    port = 20_000 + :rand.uniform(10_000)
-
-    case :gen_tcp.listen(port, ip: {127, 0, 0, 1}) do
-      {:ok, socket} ->
-        :gen_tcp.close(socket)
-        port
-
-      {:error, :eaddrinuse} ->
-        free_port()
-    end
-  end
-
-  defp start(line, environment) do
-    arguments = OptionParser.split("--nodes --headless --blobs direct --json - " <> line)
-    environment = for {name, value} <- environment, do: {to_charlist(name), to_charlist(value)}
-    options = [:binary, :exit_status, :stderr_to_stdout, args: arguments, env: environment]
-    port = Port.open({:spawn_executable, Path.join(@root, "bin/demo")}, options)
-    {:os_pid, pid} = Port.info(port, :os_pid)
-    on_exit(fn -> System.cmd("kill", ["#{pid}"], stderr_to_stdout: true) end)
-    port
-  end
-
-  defp await(port, pattern, said \\ "") do
-    if said =~ pattern do
-      said
-    else
-      assert_receive {^port, {:data, more}}, 60_000, "nothing more after: " <> said
-      await(port, pattern, said <> more)
-    end
-  end
-
-  defp ending(port, said) do
-    receive do
-      {^port, {:data, more}} -> ending(port, said <> more)
-      {^port, {:exit_status, status}} -> {said, status}
-    after
-      60_000 -> flunk("the demo goes on: " <> said)
-    end
-  end
-
-  defp pid(said, name) do
-    [_line, pid] = Regex.run(~r/^#{name} +pid (\d+) node #{name}@/m, said)
-    pid
-  end
-
-  defp kill(pid), do: {_text, 0} = System.cmd("kill", ["-KILL", pid])
-  defp there?(pid), do: match?({_, 0}, System.cmd("kill", ["-0", pid], stderr_to_stdout: true))
+# Each is a module of its own, so that they wait side by side.
+defmodule System.NodesLeaderTest do
+  @moduledoc "`bin/demo --nodes` from outside: its leader's process is killed as a person would, by its number."
+  use Nodes.Case, async: true
 
   test "kill -9 of the leader's process: another leads, and the report tells", %{environment: env} do
     port = start("--robots 3 --duration 45", env)
@@ -85,6 +24,11 @@ defmodule System.NodesTest do
     refute Enum.any?(processes, &there?/1)
     refute mapped?(env)
   end
+end
+
+defmodule System.NodesWorldTest do
+  @moduledoc "`bin/demo --nodes` from outside: the process of its world is killed."
+  use Nodes.Case, async: true
 
   test "kill -9 of the world's process: it comes back, and robots go on", %{environment: env} do
     port = start("--robots 2 --duration 45", env)
@@ -97,6 +41,11 @@ defmodule System.NodesTest do
     assert said =~ ~r/"name":"mag1","alive":true/
     assert said =~ ~r/"name":"min1","alive":true/
   end
+end
+
+defmodule System.NodesLauncherTest do
+  @moduledoc "`bin/demo --nodes` from outside: what was started is killed."
+  use Nodes.Case, async: true
 
   test "kill -9 of what was started: all that it started ends with it", %{environment: env} do
     if match?({_, 0}, System.cmd("sh", ["-c", "setpriv --pdeathsig TERM true 2>&1"])) do
@@ -108,30 +57,6 @@ defmodule System.NodesTest do
       deadline = System.monotonic_time(:millisecond) + 15_000
       ended(processes, deadline)
       unmapped(env, deadline)
-    end
-  end
-
-  # Whether the port mapper that the run started is still there.
-  defp mapped?(env),
-    do: match?({_, 0}, System.cmd("epmd", ["-names"], env: env, stderr_to_stdout: true))
-
-  defp unmapped(env, deadline) do
-    if mapped?(env) do
-      assert System.monotonic_time(:millisecond) < deadline, "its epmd goes on"
-      unmapped(env, deadline)
-    end
-  end
-
-  defp ended(processes, deadline) do
-    case Enum.filter(processes, &there?/1) do
-      [] ->
-        :ok
-
-      left ->
-        if(System.monotonic_time(:millisecond) > deadline,
-          do: flunk("#{inspect(left)} go on"),
-          else: ended(left, deadline)
-        )
     end
   end
 end

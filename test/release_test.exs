@@ -1,4 +1,4 @@
-Code.require_file("release/machine.exs", __DIR__)
+for file <- ~w(case machine), do: Code.require_file("release/#{file}.exs", __DIR__)
 
 # What a release takes from the machine that builds it.
 erts = Path.join(:code.root_dir(), "erts-#{:erlang.system_info(:version)}/bin")
@@ -15,54 +15,14 @@ if no_machine, do: IO.puts("rel/deploy is not tested: #{no_machine}")
 defmodule System.ReleaseTest do
   @moduledoc """
   The release of real robots, from outside: it is built, started, commanded, killed and started again, with the
-  real driver on an emulated base; and deployed to a bare machine.
+  real driver on an emulated base.
   """
-  use ExUnit.Case, async: true
+  use Release.Case, async: true
   alias Hal.{Pose, Profile}
-  alias Release.Machine
   alias Sim.{Emulator, World}
 
-  @moduletag timeout: 300_000
   @moduletag skip: why_not
   @root Path.expand("..", __DIR__)
-  @release Path.join(@root, "_build/prod/rel/robot")
-
-  setup_all do
-    environment = [{"MIX_ENV", "prod"}, {"MIX_TARGET", nil}]
-    arguments = ["release", "robot", "--overwrite", "--quiet"]
-    options = [cd: @root, env: environment, stderr_to_stdout: true]
-    {said, status} = System.cmd("mix", arguments, options)
-    assert status == 0, said
-    {:ok, _started} = Application.ensure_all_started(:hal)
-    :ok
-  end
-
-  setup do
-    folder =
-      Path.join(System.tmp_dir!(), "convoy-release-#{System.pid()}-#{:rand.uniform(10_000)}")
-
-    File.mkdir_p!(folder)
-    on_exit(fn -> File.rm_rf!(folder) end)
-    {:ok, _secret} = Mesh.Secret.create(Path.join(folder, "secret"), false)
-    %{folder: folder}
-  end
-
-  # Ports of its own, so that it meets no other fleet of this machine.
-  defp robot_file(path, port, more \\ "") do
-    {:ok, socket} = :gen_tcp.listen(0, ip: {127, 0, 0, 1})
-    {:ok, free} = :inet.port(socket)
-    :gen_tcp.close(socket)
-
-    File.write!(path, """
-    [
-      id: :mag1,
-      profile: :magellan,
-      drive: {Hal.RFlex.Driver, [port: "#{port}", conversions: [distance: 31_387.0, angle: 4654.2,
-        range: 1474.0, ir_a: 4000.0, ir_b: -2.0]]},
-      network: [interface: "127.0.0.1", port: 0, multicast: false, dist_port: #{free}]#{more}
-    ]
-    """)
-  end
 
   defp base(link) do
     start_supervised!(World.Directory)
@@ -82,23 +42,6 @@ defmodule System.ReleaseTest do
 
   defp speed(server), do: elem(World.Server.world(server).robots.mag1.speed, 0)
 
-  defp robot(arguments, environment) do
-    options = [env: environment, stderr_to_stdout: true]
-    System.cmd(Path.join(@root, "bin/robot"), arguments, options)
-  end
-
-  # Asks until the answer is such.
-  defp until(pattern, ask, left_ms \\ 20_000) do
-    began = System.monotonic_time(:millisecond)
-    {said, _status} = ask.()
-
-    cond do
-      said =~ pattern -> said
-      left_ms < 0 -> flunk("it never said #{inspect(pattern)}, but: #{said}")
-      true -> until(pattern, ask, left_ms - (System.monotonic_time(:millisecond) - began) - 1)
-    end
-  end
-
   defp wait(true?, ms \\ 15_000) do
     cond do
       true?.() -> :ok
@@ -107,17 +50,8 @@ defmodule System.ReleaseTest do
     end
   end
 
-  defp there?(pid), do: match?({_, 0}, System.cmd("kill", ["-0", pid], stderr_to_stdout: true))
-
-  # The number of the robot's process, which ends with the test.
-  defp pid(ask) do
-    pid = ask |> then(&until(~r/^\d+$/m, &1)) |> String.trim()
-    on_exit(fn -> System.cmd("kill", ["-KILL", pid], stderr_to_stdout: true) end)
-    pid
-  end
-
   test "it is lean, and its programs may be run" do
-    apps = for path <- File.ls!(Path.join(@release, "lib")), do: hd(String.split(path, "-"))
+    apps = for path <- File.ls!(Path.join(release(), "lib")), do: hd(String.split(path, "-"))
     for app <- ~w(hal vision robot mesh swarm missions agents), do: assert(app in apps)
     for app <- ~w(sim console player bench), do: refute(app in apps)
     for app <- ~w(sim console mix ex_unit), do: refute(app in apps)
@@ -127,7 +61,7 @@ defmodule System.ReleaseTest do
           {"hal*/priv/newest_frame", 0o111},
           {"vision*/priv/blobs.so", 0}
         ] do
-      assert [file] = Path.wildcard(Path.join([@release, "lib", name]))
+      assert [file] = Path.wildcard(Path.join([release(), "lib", name]))
       assert Bitwise.band(File.stat!(file).mode, mode) == mode
     end
   end
@@ -190,6 +124,52 @@ defmodule System.ReleaseTest do
     end
   end
 
+  test "in a clone, a robot that comes along is checked with the secret of the environment", %{
+    folder: folder
+  } do
+    environment = [{"ROBOT", "mag1"}, {"CONVOY_SECRET_FILE", Path.join(folder, "secret")}]
+    assert {said, 0} = robot(["check"], environment)
+    assert said =~ ~r/robots\/mag1.exs: well/
+  end
+
+  test "what is wrong is said in a line, and nothing starts", %{folder: folder} do
+    file = Path.join(folder, "mag1.exs")
+    robot_file(file, "/dev/ttyS1", ", arm: :maual")
+    secret = Path.join(folder, "secret")
+    environment = [{"ROBOT", "mag1"}, {"CONVOY_ROBOT_FILE", file}, {"CONVOY_SECRET_FILE", secret}]
+    assert {said, 1} = robot(["start"], environment)
+    assert said =~ ~r/mag1.exs:\d+: arm: cannot be :maual.*did you mean :manual/
+
+    assert {said, 1} =
+             robot(["start"], List.keyreplace(environment, "ROBOT", 0, {"ROBOT", "mag2"}))
+
+    assert said =~ "arm: cannot be :maual"
+    robot_file(file, "/dev/ttyS1")
+    File.rm!(secret)
+    assert {said, 1} = robot(["start"], environment)
+    assert said =~ "make one: (umask 077;"
+
+    for {word, meant} <- [{"stpo", "stop"}, {"reomte", "remote"}, {"daemn", "daemon"}] do
+      assert {said, 1} = robot([word], environment)
+      assert said =~ "did you mean #{meant}?"
+    end
+  end
+
+  @tag skip: unless(System.find_executable("systemd-analyze"), do: "systemd-analyze is not here")
+  test "the unit for systemd is one", %{folder: folder} do
+    # Its program is on robots only.
+    unit = File.read!(Path.join(@root, "rel/convoy.service"))
+    path = Path.join(folder, "convoy.service")
+    File.write!(path, String.replace(unit, ~r/^ExecStart=.*/m, "ExecStart=/bin/true"))
+    assert {"", 0} = System.cmd("systemd-analyze", ["verify", path], stderr_to_stdout: true)
+  end
+end
+
+defmodule System.ReleaseAgainTest do
+  @moduledoc "The release of real robots, started twice, and again right after it was stopped."
+  use Release.Case, async: true
+  @moduletag skip: why_not
+
   test "a question may take long; a second start, and one right after a stop, are said in words",
        %{
          folder: folder
@@ -226,44 +206,21 @@ defmodule System.ReleaseTest do
     assert second != first
 
     # Also without our own command, which waits for the end.
-    release = Path.join(@release, "bin/robot")
+    release = Path.join(release(), "bin/robot")
     options = [env: environment, stderr_to_stdout: true]
     assert {_said, 0} = System.cmd(release, ["stop"], options)
     assert {"", 0} = System.cmd(release, ["daemon"], options)
     assert pid(ask.(["pid"])) not in [first, second]
     assert {"", 0} = robot(["stop"], environment)
   end
+end
 
-  test "in a clone, a robot that comes along is checked with the secret of the environment", %{
-    folder: folder
-  } do
-    environment = [{"ROBOT", "mag1"}, {"CONVOY_SECRET_FILE", Path.join(folder, "secret")}]
-    assert {said, 0} = robot(["check"], environment)
-    assert said =~ ~r/robots\/mag1.exs: well/
-  end
-
-  test "what is wrong is said in a line, and nothing starts", %{folder: folder} do
-    file = Path.join(folder, "mag1.exs")
-    robot_file(file, "/dev/ttyS1", ", arm: :maual")
-    secret = Path.join(folder, "secret")
-    environment = [{"ROBOT", "mag1"}, {"CONVOY_ROBOT_FILE", file}, {"CONVOY_SECRET_FILE", secret}]
-    assert {said, 1} = robot(["start"], environment)
-    assert said =~ ~r/mag1.exs:\d+: arm: cannot be :maual.*did you mean :manual/
-
-    assert {said, 1} =
-             robot(["start"], List.keyreplace(environment, "ROBOT", 0, {"ROBOT", "mag2"}))
-
-    assert said =~ "arm: cannot be :maual"
-    robot_file(file, "/dev/ttyS1")
-    File.rm!(secret)
-    assert {said, 1} = robot(["start"], environment)
-    assert said =~ "make one: (umask 077;"
-
-    for {word, meant} <- [{"stpo", "stop"}, {"reomte", "remote"}, {"daemn", "daemon"}] do
-      assert {said, 1} = robot([word], environment)
-      assert said =~ "did you mean #{meant}?"
-    end
-  end
+defmodule System.DeployTest do
+  @moduledoc "The release of real robots, deployed to a bare machine."
+  use Release.Case, async: true
+  alias Release.Machine
+  @moduletag skip: why_not
+  @root Path.expand("..", __DIR__)
 
   describe "rel/deploy" do
     @describetag skip: no_machine
@@ -401,14 +358,5 @@ defmodule System.ReleaseTest do
         assert current(context) == {:ok, release}
       end
     end
-  end
-
-  @tag skip: unless(System.find_executable("systemd-analyze"), do: "systemd-analyze is not here")
-  test "the unit for systemd is one", %{folder: folder} do
-    # Its program is on robots only.
-    unit = File.read!(Path.join(@root, "rel/convoy.service"))
-    path = Path.join(folder, "convoy.service")
-    File.write!(path, String.replace(unit, ~r/^ExecStart=.*/m, "ExecStart=/bin/true"))
-    assert {"", 0} = System.cmd("systemd-analyze", ["verify", path], stderr_to_stdout: true)
   end
 end

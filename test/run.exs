@@ -1,16 +1,33 @@
 # The tests of the whole system. Fails when a test fails, and when there was none.
+#
+#   mix run --no-start test/run.exs [FILE...] [--except WORD] [--long]
+#
+# `--except` leaves out the files with that word in their names, `--long` all but the tests tagged `:long`.
+{options, files} = OptionParser.parse!(System.argv(), strict: [except: :string, long: :boolean])
+
 ExUnit.start(autorun: false)
 Code.require_file("start.exs", __DIR__)
+
+if options[:long], do: ExUnit.configure(include: [:long], exclude: [:test])
+
+# Most of these tests wait for programs that they have started.
+ExUnit.configure(max_cases: 3 * System.schedulers_online())
 
 # Everything is built by now. Newer Mix tells commands that run side by side to wait for each other's
 # look at the build, and what they print is compared.
 System.put_env("MIX_OS_CONCURRENCY_LOCK", "0")
 
-for file <- __DIR__ |> Path.join("**/*_test.exs") |> Path.wildcard() |> Enum.sort(),
+files =
+  if files == [],
+    do: __DIR__ |> Path.join("**/*_test.exs") |> Path.wildcard() |> Enum.sort(),
+    else: Enum.map(files, &Path.expand/1)
+
+for file <- files,
+    options[:except] == nil or not String.contains?(Path.basename(file), options[:except]),
     do: Code.require_file(file)
 
 case ExUnit.run() do
-  %{total: 0} ->
+  %{total: total, excluded: total} ->
     IO.puts(:stderr, "test/run.exs: there was no test to run")
     System.halt(1)
 

@@ -1,5 +1,10 @@
 # How every suite of the project starts, of the apps and of the whole system.
 Code.require_file("skipped.exs", __DIR__)
 
-# On a busy machine a message may take its time; nothing waits longer than it must.
-ExUnit.start(assert_receive_timeout: 3_000, formatters: [ExUnit.CLIFormatter, Convoy.Skipped])
+# On a busy machine a message may take its time; nothing waits longer than it must. Tests tagged `:long` are
+# for `bin/test long`, those tagged `:slow` are left out by `bin/test quick`.
+ExUnit.start(
+  assert_receive_timeout: 3_000,
+  exclude: [:long],
+  formatters: [ExUnit.CLIFormatter, Convoy.Skipped]
+)

@@ -185,8 +185,14 @@ defmodule Docs.LookedAt do
 
   defp help(program, words, folder), do: help_of(program, words, folder)
 
+  # It says the same in every copy: asked once.
   defp help_of(program, words, folder) do
-    {text, 0} = Sandbox.command(Enum.join([program | words] ++ ["--help"], " "), folder)
-    text
+    line = Enum.join([program | words] ++ ["--help"], " ")
+
+    with nil <- :persistent_term.get({__MODULE__, line}, nil) do
+      {text, 0} = Sandbox.command(line, folder)
+      :persistent_term.put({__MODULE__, line}, text)
+      text
+    end
   end
 end

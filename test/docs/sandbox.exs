@@ -16,13 +16,13 @@ defmodule Docs.Sandbox do
   def create(root, document) do
     folder = folder()
     File.mkdir_p!(folder)
-    for name <- File.ls!(folder), name != "_build", do: File.rm_rf!(Path.join(folder, name))
 
-    # With their times, so that nothing is built again.
-    for name <- File.ls!(root), name not in @left_out do
-      {_, 0} = System.cmd("cp", ["-a", Path.join(root, name), folder])
-    end
+    # What was built with another configuration goes as well: the old files come back with their times, by which Mix
+    # sees no change.
+    kept = if File.exists?(Path.join(folder, @extensions)), do: [], else: ["_build"]
+    for name <- File.ls!(folder) -- kept, do: File.rm_rf!(Path.join(folder, name))
 
+    copy(root, folder, File.ls!(root) -- @left_out)
     built(root, folder)
     given(document, folder)
     folder
@@ -43,13 +43,25 @@ defmodule Docs.Sandbox do
     mine = to_string(Mix.env())
 
     unless File.exists?(to) do
-      File.mkdir_p!(to)
-      {_, 0} = System.cmd("cp", ["-a", Path.join(from, mine), to])
+      File.mkdir_p!(Path.join([to, mine, "lib"]))
+      copy(Path.join(from, mine), Path.join(to, mine), File.ls!(Path.join(from, mine)) -- ["lib"])
+
+      # The suites of the apps, which may run beside this one, write their protocols meanwhile.
+      for app <- File.ls!(Path.join([from, mine, "lib"])) do
+        [app_from, app_to] = for top <- [from, to], do: Path.join([top, mine, "lib", app])
+        File.mkdir_p!(app_to)
+        copy(app_from, app_to, File.ls!(app_from) -- ["consolidated"])
+      end
 
       for name <- File.ls!(from),
           name != mine,
           do: File.ln_s!(Path.join(from, name), Path.join(to, name))
     end
+  end
+
+  # With their times, so that nothing is built again.
+  defp copy(from, to, names) do
+    {_, 0} = System.cmd("cp", ["-a" | Enum.map(names, &Path.join(from, &1))] ++ [to])
   end
 
   # A picture with two colours, and the colour file that the page shows.

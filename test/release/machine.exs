@@ -1,7 +1,8 @@
 defmodule Release.Machine do
   @moduledoc """
   A bare machine to deploy to: a folder with the programs of this one, and its own `/etc`, `/opt`, `/usr/local` and
-  `/var`. `ssh` is a script that enters it as root. Needs root and mount namespaces.
+  `/var`. `ssh` is a script that enters it as root, with the mark by which `bin/test` knows its programs. Needs root
+  and mount namespaces.
   """
 
   @folders ~w(etc opt var/lib run tmp root home dev proc usr local)
@@ -17,7 +18,7 @@ defmodule Release.Machine do
     mount --bind local usr/local
     mount --rbind /dev dev
     mount --rbind /proc proc
-    exec env -i PATH="$PATH" chroot . sh -c "$2"
+    exec env -i PATH="$PATH" ${CONVOY_RUN:+CONVOY_RUN="$CONVOY_RUN"} chroot . sh -c "$2"
   ' sh MACHINE "$2"
   """
 

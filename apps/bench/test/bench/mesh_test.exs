@@ -3,6 +3,7 @@ defmodule Bench.MeshTest do
   import ExUnit.CaptureIO
   alias Bench.Mesh
   alias Bench.Mesh.{Figures, Main}
+  @moduletag :slow
 
   doctest Bench.Mesh
   doctest Bench.Mesh.Figures

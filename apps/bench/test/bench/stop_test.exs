@@ -3,6 +3,7 @@ defmodule Bench.StopTest do
   alias Bench.Stop
   alias Bench.Stop.Reader
   alias Hal.RFlex.Command
+  @moduletag :slow
   doctest Bench.Stop
   doctest Bench.Stop.Reader
   doctest Bench.Stop.Report

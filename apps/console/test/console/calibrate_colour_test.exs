@@ -2,6 +2,7 @@ defmodule Console.CalibrateColourTest do
   use ExUnit.Case, async: true
   import ExUnit.CaptureIO
   alias Console.Calibrate.{Colour, ColourOptions}
+  @moduletag :slow
 
   doctest Console.Calibrate.ColourOptions
   doctest Console.Calibrate.Plan

@@ -1,5 +1,6 @@
 defmodule Swarm.CommandsTest do
   use Swarm.Case, async: false
+  @moduletag :slow
   @moduletag :capture_log
 
   defp line({:error, line}) do

@@ -1,6 +1,7 @@
 defmodule Swarm.OrdersTest do
   @moduledoc "What is answered to an order is what became of it."
   use Swarm.Case, async: false
+  @moduletag :slow
   @moduletag :capture_log
   import ExUnit.CaptureLog
   alias Robot.Acts

@@ -4,6 +4,7 @@ defmodule Robot.FenceTest do
   alias Robot.{Body, Config}
   alias Robot.Safety.Reflex
   alias Robot.Safety.Reflex.Fence
+  @moduletag :slow
   doctest Robot.Safety.Reflex.Fence
 
   @step_s 0.05

@@ -1,6 +1,7 @@
 defmodule Robot.HallTest do
   use ExUnit.Case, async: true
   alias Robot.Hall
+  @moduletag :slow
 
   # Small samples of what was measured over many seeds: everybody arrives, nobody touches anybody.
   for {n, shape, assign, seeds, limit_s} <- [

@@ -3,6 +3,7 @@ defmodule Sim.CalibrationTest do
   use ExUnit.Case, async: true
   alias Robot.Calibration
   alias Sim.Calibration, as: Simulated
+  @moduletag :slow
 
   @errors [distance: 1.01, base: 1.02, ratio: 1.01]
 
@@ -36,8 +37,14 @@ defmodule Sim.CalibrationTest do
 
   defp off(found, truth), do: abs(found / truth - 1)
 
-  for {profile, seeds} <- [magellan: 1..20, atrv_mini: 21..24] do
-    test "5 squares each way find base and wheel ratio of the #{profile} for each seed" do
+  for {profile, seeds, tags} <- [
+        {:magellan, 1..4, []},
+        {:atrv_mini, 21..21, []},
+        {:magellan, 5..20, [long: true]},
+        {:atrv_mini, 22..24, [long: true]}
+      ] do
+    @tag tags
+    test "5 squares each way find base and wheel ratio of the #{profile} for seeds #{inspect(seeds)}" do
       for seed <- unquote(Macro.escape(seeds)) do
         {truth, found, squares, _measured} =
           run([seed: seed, wheels: @errors, profile: unquote(profile)], 5)

@@ -1,6 +1,7 @@
 defmodule Sim.HardwareBaseBytesTest do
   @moduledoc "The driver of real bases: its pauses between commands, escaped bytes, and counters at their ends."
   use Sim.BaseCase, async: true
+  @moduletag :slow
 
   # On a machine that is busy the bytes of a moment's sleep come to the emulator all at once, however well they were
   # spaced. Of commands that are not spaced, at least every other would be lost, all the time.

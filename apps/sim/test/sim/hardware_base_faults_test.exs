@@ -1,6 +1,7 @@
 defmodule Sim.HardwareBaseFaultsTest do
   @moduledoc "The driver of real bases on a line that loses, doubles and changes bytes."
   use Sim.BaseCase, async: true
+  @moduletag :slow
 
   for seed <- 1..3 do
     @tag wire: [drop: 0.01, double: 0.005, flip: 0.005, seed: seed]

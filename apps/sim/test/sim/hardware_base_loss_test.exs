@@ -1,6 +1,7 @@
 defmodule Sim.HardwareBaseLossTest do
   @moduledoc "The driver of real bases when the line, or the controller, is gone for a while."
   use Sim.BaseCase, async: true
+  @moduletag :slow
 
   test "unplugged in motion the body stops; plugged it goes on, and knows where it is", context do
     drive(context, Twist.new(0.3, 0.0), &(&1.pose.x > -3.7))

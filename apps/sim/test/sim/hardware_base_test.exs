@@ -1,6 +1,7 @@
 defmodule Sim.HardwareBaseTest do
   @moduledoc "The driver of real bases: what it tells the controller, and what it hears of it."
   use Sim.BaseCase, async: true
+  @moduletag :slow
 
   test "it drives, turns and stops, and its odometry is the body's way", context do
     {fastest, _} = drive(context, Twist.new(0.3, 0.0), &(&1.pose.x > -3.0))

@@ -5,6 +5,7 @@ defmodule Sim.HardwareFleetTest do
   alias Hal.Pose
   alias Robot.Board
   alias Sim.{Fleet, Trial, World}
+  @moduletag :slow
   @moduletag :capture_log
 
   test "a robot with real drivers goes where it is sent, and leaves nothing behind" do

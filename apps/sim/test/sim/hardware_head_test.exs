@@ -4,6 +4,7 @@ defmodule Sim.HardwareHeadTest do
   import Swarm.Case, only: [eventually: 2]
   alias Hal.{Device, Pose, Profile}
   alias Sim.{Emulator, World}
+  @moduletag :slow
   @moduletag :tmp_dir
 
   setup %{tmp_dir: folder} = context do

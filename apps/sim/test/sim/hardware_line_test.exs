@@ -1,9 +1,10 @@
 defmodule Sim.HardwareLineTest do
   @moduledoc "A whole robot at the end of a line whose other end is silent, mute, or falls silent."
-  use Swarm.Case, async: false
+  use Swarm.Case, async: true
   import ExUnit.CaptureLog
   alias Hal.Profile
   alias Sim.{Emulator, World}
+  @moduletag :slow
   @moduletag :tmp_dir
   @moduletag :capture_log
 

@@ -3,6 +3,7 @@ defmodule Sim.TrialTest do
   use ExUnit.Case, async: true
   import Sim.TrialRuns
   alias Sim.Trial
+  @moduletag :slow
 
   defp stages(trial), do: Enum.map(Trial.result(trial).stages, & &1.stage)
 

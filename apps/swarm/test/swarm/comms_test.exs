@@ -1,5 +1,6 @@
 defmodule Swarm.CommsTest do
   use Robot.Case, async: false
+  @moduletag :slow
   @moduletag :capture_log
   alias Hal.{Odometry, Pose}
   alias Swarm.{Comms, Directory, Message}

@@ -2,6 +2,7 @@ defmodule Vision.BlobDetectorTest do
   use ExUnit.Case, async: true
   alias Hal.Frame
   alias Vision.{BlobDetector, Colours}
+  @moduletag :slow
 
   setup do
     {:ok, colours} =

@@ -2,6 +2,7 @@ defmodule Vision.PhotographsTest do
   @moduledoc "Real photographs and a real recording, with what a person sees in them."
   use ExUnit.Case, async: true
   alias Vision.{Blobs, Colours, Filter, Photos}
+  @moduletag :slow
 
   @moduletag Photos.tags(~w(smarties.png fruits.jpg vtest.avi))
 

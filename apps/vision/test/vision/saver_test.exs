@@ -1,5 +1,6 @@
 defmodule Vision.SaverTest do
   use ExUnit.Case, async: true
+  @moduletag :slow
   doctest Vision.Saver.Options
   doctest Vision.Saver.Retention
   alias Vision.{Saver, View}

@@ -2,6 +2,7 @@ defmodule Hal.Device.ArmingTest do
   use ExUnit.Case, async: true
   alias Hal.{Device, Odometry, Pose, Twist}
   alias Hal.Device.Arming
+  @moduletag :slow
   doctest Hal.Device.Arming
 
   @zero Twist.zero()

@@ -2,6 +2,7 @@ defmodule Hal.Device.ReportsTest do
   use ExUnit.Case, async: true
   alias Hal.{Device, Odometry, Pose, Twist}
   alias Hal.Device.Reports
+  @moduletag :slow
   doctest Hal.Device.Reports
 
   @zero Twist.zero()

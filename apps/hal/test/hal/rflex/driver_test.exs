@@ -2,6 +2,7 @@ defmodule Hal.RFlex.DriverTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, RFlexBase, Serial, Twist}
   alias Hal.RFlex.Driver
+  @moduletag :slow
   doctest Hal.RFlex.Driver
 
   @conversions [distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0]

@@ -2,6 +2,7 @@ defmodule Hal.Serial.LastWordsTest do
   use ExUnit.Case, async: true
   import Hal.Lines
   alias Hal.{LineHolder, Serial}
+  @moduletag :slow
 
   @stop "\eSTOP\r"
 

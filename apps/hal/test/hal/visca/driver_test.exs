@@ -2,6 +2,7 @@ defmodule Hal.Visca.DriverTest do
   use ExUnit.Case, async: true
   alias Hal.{Device, Serial, ViscaToy}
   alias Hal.Visca.{Driver, Options}
+  @moduletag :slow
   doctest Hal.Visca.Options
 
   setup do

@@ -10,6 +10,7 @@ defmodule Missions.Landmark.PartitionTest do
   """
   use ExUnit.Case, async: true
   alias Missions.Landmark.Group
+  @moduletag :slow
 
   @lease_ms 1_500
   @five [:mag1, :mag2, :mag3, :min1, :min2]
@@ -56,8 +57,15 @@ defmodule Missions.Landmark.PartitionTest do
     ])
   end
 
-  test "cut at any moment, under loss, doubles and disorder: one digest a round, one leader a part" do
-    for _ <- 1..40 do
+  test "cut at any moment, under loss, doubles and disorder: one digest a round, one leader a part",
+    do: any_cuts(10)
+
+  @tag :long
+  test "cut at any moment, under loss, doubles and disorder: one digest a round, one leader a part, 40 times",
+    do: any_cuts(40)
+
+  defp any_cuts(times) do
+    for _ <- 1..times do
       loss = :rand.uniform() * 0.3
       radio = [loss: loss, doubled: 0.2, delay_ms: {5, Enum.random([50, 150])}]
       link = Enum.random([nil, :continue])
@@ -76,8 +84,14 @@ defmodule Missions.Landmark.PartitionTest do
     end
   end
 
-  test "with a crash at any moment the others agree within 5 s at 10 % loss" do
-    for _ <- 1..40 do
+  test "with a crash at any moment the others agree within 5 s at 10 % loss", do: any_crashes(10)
+
+  @tag :long
+  test "with a crash at any moment the others agree within 5 s at 10 % loss, 40 times",
+    do: any_crashes(40)
+
+  defp any_crashes(times) do
+    for _ <- 1..times do
       group = group(@five, loss: 0.1, doubled: 0.1) |> Group.run(:rand.uniform() * 6 + 0.1)
       # From the first second on, so in every phase of the first round and of leading.
       dead = Enum.random([Enum.random(@five) | leading(group)])

@@ -5,6 +5,7 @@ defmodule Robot.Control.TraceTest do
   alias Robot.Control.Controller
   alias Robot.Mission.Runner
   alias Robot.Safety.Reflex
+  @moduletag :slow
 
   test "gate, executive and pilot do what the pure functions do on the same input" do
     profile = Hal.Profile.magellan()

@@ -3,6 +3,7 @@ defmodule Sim.Trial.CameraPointingTest do
   use ExUnit.Case, async: true
   alias Hal.Pose
   alias Sim.Trial
+  @moduletag :slow
 
   @degree :math.pi() / 180
 

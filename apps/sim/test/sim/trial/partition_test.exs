@@ -4,6 +4,7 @@ defmodule Sim.Trial.PartitionTest do
   import Sim.TrialRuns
   alias Sim.Trial
   alias Sim.Trial.{AgreementMetrics, Cuts}
+  @moduletag :slow
 
   @left [:mag1, :min2, :mag3]
   @right [:mag2, :min1, :min3]

@@ -4,6 +4,7 @@ defmodule Sim.Trial.StuckTest do
   alias Hal.Pose
   alias Sim.Trial
   alias Sim.Trial.Stuck
+  @moduletag :slow
 
   @claim %{phase: :follow, in_place: false, unsure: false, blocked: false}
 

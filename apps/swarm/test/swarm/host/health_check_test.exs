@@ -1,5 +1,6 @@
 defmodule Swarm.Host.HealthCheckTest do
   use ExUnit.Case, async: true
+  @moduletag :slow
   use Swarm.Case
   alias Swarm.Host.HealthCheck
 

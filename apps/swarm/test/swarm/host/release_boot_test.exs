@@ -2,6 +2,7 @@ defmodule Swarm.Host.ReleaseBootTest do
   use ExUnit.Case, async: true
   alias Swarm.Host.ReleaseBoot
   alias Mesh.Secret
+  @moduletag :slow
 
   doctest ReleaseBoot
 

@@ -4,6 +4,7 @@ defmodule Swarm.Mesh.FloodTest do
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes
   alias Mesh.Packet
+  @moduletag :slow
 
   @datagrams 100_000
 

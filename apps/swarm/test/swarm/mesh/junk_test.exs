@@ -5,6 +5,7 @@ defmodule Swarm.Mesh.JunkTest do
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes
   alias Swarm.MeshNodes.Junk
+  @moduletag :slow
 
   test "nothing that a node can be sent fells or fattens anything" do
     [one, two] = MeshNodes.start(2, robots: true)

@@ -4,6 +4,7 @@ defmodule Swarm.MeshTest do
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1, eventually: 2]
   alias Swarm.MeshNodes, as: Cluster
+  @moduletag :slow
 
   defp alive(node) do
     for {other, %{status: :alive}} <- Cluster.call(node, Mesh, :view, []).nodes, do: other

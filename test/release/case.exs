@@ -1,0 +1,93 @@
+defmodule Release.Case do
+  @moduledoc """
+  The release of real robots as a program: it is built once for all tests that use this, each of which has a folder with
+  a secret. Processes that a test asks for end with it.
+  """
+  use ExUnit.CaseTemplate
+
+  @root Path.expand("../..", __DIR__)
+
+  using do
+    quote do
+      import Release.Case
+      @moduletag timeout: 300_000
+    end
+  end
+
+  setup_all do
+    # Whoever comes first builds it, and the others wait.
+    :global.trans({__MODULE__, self()}, fn ->
+      unless :persistent_term.get(__MODULE__, false), do: build()
+      :persistent_term.put(__MODULE__, true)
+    end)
+
+    {:ok, _started} = Application.ensure_all_started(:hal)
+    :ok
+  end
+
+  defp build do
+    environment = [{"MIX_ENV", "prod"}, {"MIX_TARGET", nil}]
+    arguments = ["release", "robot", "--overwrite", "--quiet"]
+    options = [cd: @root, env: environment, stderr_to_stdout: true]
+    {said, status} = System.cmd("mix", arguments, options)
+    assert status == 0, said
+  end
+
+  setup do
+    folder =
+      Path.join(System.tmp_dir!(), "convoy-release-#{System.pid()}-#{:rand.uniform(10_000)}")
+
+    File.mkdir_p!(folder)
+    on_exit(fn -> File.rm_rf!(folder) end)
+    {:ok, _secret} = Mesh.Secret.create(Path.join(folder, "secret"), false)
+    %{folder: folder}
+  end
+
+  @doc "Where the release is."
+  def release, do: Path.join(@root, "_build/prod/rel/robot")
+
+  @doc "Writes a robot file, with ports of its own, so that it meets no other fleet of this machine."
+  def robot_file(path, port, more \\ "") do
+    {:ok, socket} = :gen_tcp.listen(0, ip: {127, 0, 0, 1})
+    {:ok, free} = :inet.port(socket)
+    :gen_tcp.close(socket)
+
+    File.write!(path, """
+    [
+      id: :mag1,
+      profile: :magellan,
+      drive: {Hal.RFlex.Driver, [port: "#{port}", conversions: [distance: 31_387.0, angle: 4654.2,
+        range: 1474.0, ir_a: 4000.0, ir_b: -2.0]]},
+      network: [interface: "127.0.0.1", port: 0, multicast: false, dist_port: #{free}]#{more}
+    ]
+    """)
+  end
+
+  @doc "What `bin/robot` prints, and its status."
+  def robot(arguments, environment) do
+    options = [env: environment, stderr_to_stdout: true]
+    System.cmd(Path.join(@root, "bin/robot"), arguments, options)
+  end
+
+  @doc "Asks until the answer is such."
+  def until(pattern, ask, left_ms \\ 20_000) do
+    began = System.monotonic_time(:millisecond)
+    {said, _status} = ask.()
+
+    cond do
+      said =~ pattern -> said
+      left_ms < 0 -> flunk("it never said #{inspect(pattern)}, but: #{said}")
+      true -> until(pattern, ask, left_ms - (System.monotonic_time(:millisecond) - began) - 1)
+    end
+  end
+
+  @doc "Whether there is such a process."
+  def there?(pid), do: match?({_, 0}, System.cmd("kill", ["-0", pid], stderr_to_stdout: true))
+
+  @doc "The number of the robot's process, which ends with the test."
+  def pid(ask) do
+    pid = ask |> then(&until(~r/^\d+$/m, &1)) |> String.trim()
+    on_exit(fn -> System.cmd("kill", ["-KILL", pid], stderr_to_stdout: true) end)
+    pid
+  end
+end
