@@ -17,10 +17,7 @@ defmodule Docs.Sandbox do
     folder = folder()
     File.mkdir_p!(folder)
 
-    # What was built with another configuration goes as well: the old files come back with their times, by which Mix
-    # sees no change.
-    kept = if File.exists?(Path.join(folder, @extensions)), do: [], else: ["_build"]
-    for name <- File.ls!(folder) -- kept, do: File.rm_rf!(Path.join(folder, name))
+    for name <- File.ls!(folder), name != "_build", do: File.rm_rf!(Path.join(folder, name))
 
     copy(root, folder, File.ls!(root) -- @left_out)
     built(root, folder)

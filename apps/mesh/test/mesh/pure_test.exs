@@ -108,10 +108,8 @@ defmodule Mesh.PureTest do
            ~s(mesh option fleet.1 cannot be "mag1": a robot's name such as :mag1)},
           {[strategies: [String]],
            "mesh option strategies cannot be String: {Module, options} is allowed"},
-          {[strategies: [{String, 1}]],
-           "strategies names String, which is not a Mesh.Strategy"},
-          {[secret: "cookie"],
-           ~s(mesh option secret cannot be "cookie": a %Mesh.Secret{} is)},
+          {[strategies: [{String, 1}]], "strategies names String, which is not a Mesh.Strategy"},
+          {[secret: "cookie"], ~s(mesh option secret cannot be "cookie": a %Mesh.Secret{} is)},
           {[full_mesh: 1], "mesh option full_mesh cannot be 1: a whole number from 2 to 1000"},
           {[topologies: [lab: [strategy: Nowhere]]], "mesh option topologies need libcluster"},
           {[topologies: :lab], "mesh option topologies cannot be :lab: [name: [strategy"}

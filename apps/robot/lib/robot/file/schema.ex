@@ -90,7 +90,8 @@ defmodule Robot.File.Schema do
      secret_file: {:path, "the path of the fleet's secret"},
      interface: :ipv4,
      port: {:integer, 0, 65_535},
-     multicast: {:or, false, {:tuple, [:ipv4, {:integer, 1, 65_535}], ~s({"239.255.67.86", 4371})}},
+     multicast:
+       {:or, false, {:tuple, [:ipv4, {:integer, 1, 65_535}], ~s({"239.255.67.86", 4371})}},
      peers: {:list, {:check, &peer?/1, ~s(address and port, such as "10.0.0.7:4370",)}, 1_000},
      dist_port: {:integer, 0, 65_535},
      full_mesh: {:integer, 2, 1_000},
