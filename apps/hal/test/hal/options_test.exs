@@ -17,7 +17,8 @@ defmodule Hal.OptionsTest do
     clock: :mfa,
     name: {:text, "a name"},
     delay_ms: {:span, 0, 500, "whole ms"},
-    seed: :integer
+    seed: :integer,
+    address: :ipv4
   ]
 
   def even?(n), do: is_integer(n) and rem(n, 2) == 0
@@ -64,6 +65,9 @@ defmodule Hal.OptionsTest do
       {[lens: 3], "lens cannot be 3: an even number is allowed"},
       {[delay_ms: {5, 4}],
        "delay_ms cannot be {5, 4}: {least, most}, whole ms from 0 to 500, is"},
+      {[address: <<0xFF>>], "address cannot be <<255>>: an IPv4 address such as"},
+      {[address: "10.0.0.256"], "address cannot be"},
+      {[address: {1, 2, 3}], "address cannot be {1, 2, 3}: an IPv4 address"},
       {[seed: 1.0], "seed cannot be 1.0: a whole number is allowed"},
       {[clock: :now], "clock cannot be :now: {module, function, arguments}"},
       {[name: String.duplicate("x", 256)], "a name is allowed"},

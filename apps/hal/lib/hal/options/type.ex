@@ -83,7 +83,7 @@ defmodule Hal.Options.Type do
   end
 
   def read(:ipv4, value) when is_binary(value) do
-    with {:error, _reason} <- :inet.parse_ipv4strict_address(to_charlist(value)),
+    with {:error, _reason} <- :inet.parse_ipv4strict_address(:binary.bin_to_list(value)),
          do: Wording.refuse(:ipv4, value)
   end
 

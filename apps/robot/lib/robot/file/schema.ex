@@ -83,9 +83,7 @@ defmodule Robot.File.Schema do
      max_turn_acceleration: {:number, 0.01, 10.0, "rad/s2"}}
   end
 
-  @doc "What a node's mesh takes; `Mesh.Options` has more that no file can say."
-  @spec network() :: Type.t()
-  def network do
+  defp network do
     {:keys,
      secret_file: {:path, "the path of the fleet's secret"},
      interface: :ipv4,
