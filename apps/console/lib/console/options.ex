@@ -40,7 +40,7 @@ defmodule Console.Options do
       iex> {options.robots, options.landmark}
       {[:mag1, :mag2, :min1], {-2.0, 1.0}}
       iex> Console.Options.parse(~w(--robots -3))
-      {:error, [~s(--robots must be a whole number from 1 to 100, not "-3")]}
+      {:error, [~s(--robots cannot be "-3": a whole number from 1 to 100 is allowed)]}
   """
   @spec parse([String.t()], Path.t()) :: {:ok, t()} | {:error, [String.t()]}
   def parse(arguments, folder \\ ".") do
@@ -215,14 +215,14 @@ defmodule Console.Options do
   defp hardware(text) do
     with {:error, _allowed} <- Parse.whole(text, 0..100),
          {:error, _allowed} <- Fleet.parse(text) do
-      {:error, "a whole number, or like mag:1,min:1 (kinds mag and min)#{kind_hint(text)}"}
+      {:error, {"a whole number, or like mag:1,min:1 (kinds mag and min),", kind_hint(text)}}
     end
   end
 
   # As people type it: a kind without a number, a robot's name.
   defp kind_hint(text) do
     case Regex.run(~r/^(mag|min)(\d*)$/, text) do
-      [_all, kind, _number] -> " (did you mean \"#{kind}:1\"?)"
+      [_all, kind, _number] -> "; did you mean #{kind}:1?"
       nil -> ""
     end
   end
@@ -240,8 +240,11 @@ defmodule Console.Options do
 
   defp map(text, folder) do
     case Regex.run(~r/^(.+\.(?:png|pgm)):(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)$/i, text) do
-      [_, file, width, height] -> sized(from(file, folder), width, height)
-      nil -> {:error, "hall, hospital, arena or FILE.png:WIDTHxHEIGHT#{map_hint(text)}"}
+      [_, file, width, height] ->
+        sized(from(file, folder), width, height)
+
+      nil ->
+        {:error, {"hall, hospital, arena or FILE.png:WIDTHxHEIGHT", Suggest.hint(text, @maps)}}
     end
   end
 
@@ -250,13 +253,6 @@ defmodule Console.Options do
       {:ok, "#{file}:#{width}x#{height}"}
     else
       _ -> {:error, "FILE.png:WIDTHxHEIGHT with sides from 2 to 1000 metres"}
-    end
-  end
-
-  defp map_hint(text) do
-    case Suggest.nearest(text, @maps) do
-      nil -> ""
-      near -> " (did you mean #{inspect(near)}?)"
     end
   end
 

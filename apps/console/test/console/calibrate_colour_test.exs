@@ -110,20 +110,20 @@ defmodule Console.CalibrateColourTest do
           {~w(sim --name A), "where is it? --box X,Y,WIDTH,HEIGHT or --point X,Y"},
           {~w(sim --point 1,1), "what is it called? --name NAME"},
           {~w(sim --point 1,-1 --name A),
-           ~s(--point must be X,Y in pixels from the top left, not "1,-1")},
+           ~s(--point cannot be "1,-1": X,Y in pixels from the top left is allowed)},
           {~w(sim a.png --point 1,1 --name A), "2 sources (sim, a.png): one is allowed"},
           {~w(sim --point 1,1 --name A --light 95),
-           ~s(--light must be auto or a number from 0 to 90, not "95")},
+           ~s(--light cannot be "95": auto or a number from 0 to 90 is allowed)},
           {~w(sim --point 1,1 --name A --picture a.gif),
-           ~s(--picture must be a name that ends in .png or .jpg, not "a.gif")},
+           ~s(--picture cannot be "a.gif": a name that ends in .png or .jpg is allowed)},
           {~w(sim --point 1,1 --name A --write), "--write needs --colours FILE"},
           {~w(sim --point 1,1 --name A --pciture a.png),
-           ~s(unknown option --pciture; did you mean "--picture"?)}
+           ~s(unknown option --pciture; did you mean --picture?)}
         ] do
       assert ColourOptions.parse(words) == {:error, [line]}
     end
 
-    assert {:error, ["--name must be one word of up to 60 letters, not \"a b\""]} =
+    assert {:error, ["--name cannot be \"a b\": one word of up to 60 letters is allowed"]} =
              ColourOptions.parse(["sim", "--point", "1,1", "--name", "a b"])
   end
 end

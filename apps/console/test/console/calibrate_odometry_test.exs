@@ -254,16 +254,17 @@ defmodule Console.CalibrateOdometryTest do
 
   test "wrong words are told", %{tmp_dir: folder} do
     for {words, line} <- [
-          {~w(mag1.exs --side 0.1), ~s(--side must be a number from 1 to 20, not "0.1")},
+          {~w(mag1.exs --side 0.1), ~s(--side cannot be "0.1": a number from 1 to 20 is allowed)},
           {~w(mag1.exs --distance 0.1),
-           ~s(--distance must be 0 or a number from 0.5 to 50, not "0.1")},
+           ~s(--distance cannot be "0.1": 0 or a number from 0.5 to 50 is allowed)},
           {~w(mag1.exs --squares 1e9),
-           ~s(--squares must be a whole number from 0 to 50, not "1e9")},
-          {~w(mag1.exs --cw 1), ~s(--cw must be X,Y in metres, each from -1000 to 1000, not "1")},
+           ~s(--squares cannot be "1e9": a whole number from 0 to 50 is allowed)},
+          {~w(mag1.exs --cw 1),
+           ~s(--cw cannot be "1": X,Y in metres, each from -1000 to 1000 is allowed)},
           {~w(mag1.exs --seed 3), "--seed is for a simulated robot: with --simulate"},
           {~w(mag1.exs --simulate), "a simulated robot has no file: mag1.exs or --simulate"},
           {~w(mag1.exs mag2.exs), "one robot file at a time, not 2: mag1.exs, mag2.exs"},
-          {~w(mag1.exs --dry-rum), ~s(unknown option --dry-rum; did you mean "--dry-run"?)}
+          {~w(mag1.exs --dry-rum), ~s(unknown option --dry-rum; did you mean --dry-run?)}
         ] do
       assert Options.parse(words) == {:error, [line]}
     end

@@ -48,9 +48,9 @@ defmodule Console.Calibrate.ColourOptions do
       iex> {options.source, options.places, options.tolerance}
       {"a.png", [box: {10, 20, 60, 80}], :auto}
       iex> Console.Calibrate.ColourOptions.parse(~w(a.png --box 10,20 --name Red))
-      {:error, [~s(--box must be X,Y,WIDTH,HEIGHT in pixels from the top left, not "10,20")]}
+      {:error, [~s(--box cannot be "10,20": X,Y,WIDTH,HEIGHT in pixels from the top left is allowed)]}
       iex> Console.Calibrate.ColourOptions.parse(~w(a.png --nmae Red))
-      {:error, [~s(unknown option --nmae; did you mean "--name"?)]}
+      {:error, ["unknown option --nmae; did you mean --name?"]}
   """
   @spec parse([String.t()]) :: {:ok, t()} | :help | {:error, [String.t()]}
   def parse(words) do

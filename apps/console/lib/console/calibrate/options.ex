@@ -68,7 +68,7 @@ defmodule Console.Calibrate.Options do
       iex> {options.file, options.mode, options.squares, options.side}
       {"config/robots/mag1.exs", :drive, 3, 4.0}
       iex> Console.Calibrate.Options.parse(~w(mag1.exs --sqares 3))
-      {:error, [~s(unknown option --sqares; did you mean "--squares"?)]}
+      {:error, ["unknown option --sqares; did you mean --squares?"]}
       iex> Console.Calibrate.Options.parse(~w(--squares 3))
       {:error, ["which robot? mix calibrate odometry config/robots/NAME.exs, or --simulate"]}
   """

@@ -6,9 +6,12 @@ defmodule Console.Cli.Arguments do
   repeated, and for errors that say what is allowed. An option is `{name, hint, check, help}`: `hint`
   is how its value is shown in the help, or `nil` for a switch; `check` turns the text into the value.
   """
+  alias Hal.Options.Wording
   alias Hal.Suggest
 
-  @type check :: (String.t() -> {:ok, term()} | {:error, allowed :: String.t()})
+  @typedoc "What is allowed, and what may have been meant."
+  @type allowed :: String.t() | {String.t(), hint :: String.t()}
+  @type check :: (String.t() -> {:ok, term()} | {:error, allowed()})
   @type option ::
           {name :: String.t(), hint :: String.t() | nil, check() | nil, help :: String.t()}
 
@@ -21,8 +24,8 @@ defmodule Console.Cli.Arguments do
       iex> Console.Cli.Arguments.parse(~w(--count=0 --cuont 2), [count])
       {:error,
        [
-         ~s(--count must be a whole number from 1 to 9, not "0"),
-         ~s(unknown option --cuont; did you mean "--count"?)
+         ~s(--count cannot be "0": a whole number from 1 to 9 is allowed),
+         "unknown option --cuont; did you mean --count?"
        ]}
   """
   @spec parse([String.t()], [option()]) ::
@@ -69,7 +72,7 @@ defmodule Console.Cli.Arguments do
   end
 
   defp read([word | rest], options) do
-    hint = if known?(word, options), do: "; did you mean \"--#{word}\"?", else: ""
+    hint = if known?(word, options), do: "; did you mean --#{word}?", else: ""
     [{:error, "unexpected argument #{inspect(word)}#{hint}"} | read(rest, options)]
   end
 
@@ -93,9 +96,23 @@ defmodule Console.Cli.Arguments do
   defp checked({name, _hint, check}, text) do
     case check.(text) do
       {:ok, value} -> {:ok, {name, value}}
-      {:error, allowed} -> {:error, "--#{name} must be #{allowed}, not #{inspect(text)}"}
+      {:error, allowed} -> refuse("--#{name}", text, allowed)
     end
   end
+
+  @doc """
+  The error for a text that is not what is allowed, in the words of `Hal.Options`.
+
+      iex> Console.Cli.Arguments.refuse("--map", "hal", {"hall or arena", "; did you mean hall?"})
+      {:error, ~s(--map cannot be "hal": hall or arena is allowed; did you mean hall?)}
+  """
+  @spec refuse(String.t(), String.t(), allowed()) :: {:error, String.t()}
+  def refuse(name, text, {allowed, hint}) do
+    {:error, [{[], words}]} = Wording.refuse(allowed, text)
+    {:error, "#{name} #{words}#{hint}"}
+  end
+
+  def refuse(name, text, allowed), do: refuse(name, text, {allowed, ""})
 
   # The value of an unknown option is skipped too: one mistake, one line.
   defp unknown(name, inline, rest, options) do

@@ -2,7 +2,7 @@ defmodule Console.Cli.Parse do
   @moduledoc """
   Parses text into checked values: numbers, points, choices, fleets. Pure.
 
-  Each answers `{:ok, value}` or `{:error, what_is_allowed}`, to be put behind "must be". Numbers
+  Each answers `{:ok, value}` or `{:error, what_is_allowed}`, with a hint where there is one. Numbers
   are plain decimals with few digits, so "nan", "inf" and "1e999" are not even numbers.
   """
 
@@ -55,9 +55,10 @@ defmodule Console.Cli.Parse do
       iex> Console.Cli.Parse.choice("on", on: true, off: false)
       {:ok, true}
       iex> Console.Cli.Parse.choice("of", on: true, off: false)
-      {:error, ~s(on or off (did you mean "off"?\\))}
+      {:error, {"on or off", "; did you mean off?"}}
   """
-  @spec choice(String.t(), keyword()) :: {:ok, term()} | {:error, String.t()}
+  @spec choice(String.t(), keyword()) ::
+          {:ok, term()} | {:error, Console.Cli.Arguments.allowed()}
   def choice(text, words) do
     names = Enum.map(words, fn {word, _value} -> Atom.to_string(word) end)
 
@@ -66,7 +67,7 @@ defmodule Console.Cli.Parse do
         {:ok, value}
 
       nil ->
-        {:error, either(names) <> suggestion(text, names)}
+        {:error, {either(names), Hal.Suggest.hint(text, names)}}
     end
   end
 
@@ -115,7 +116,8 @@ defmodule Console.Cli.Parse do
       iex> Console.Cli.Parse.formation("column")
       {:ok, {:column, 1.0}}
   """
-  @spec formation(String.t()) :: {:ok, {atom(), float()}} | {:error, String.t()}
+  @spec formation(String.t()) ::
+          {:ok, {atom(), float()}} | {:error, Console.Cli.Arguments.allowed()}
   def formation(text) do
     {kind, spacing} =
       case String.split(text, ":", parts: 2) do
@@ -129,7 +131,7 @@ defmodule Console.Cli.Parse do
          {:ok, spacing} <- number(spacing, 0.8, 5.0) do
       {:ok, {known, spacing}}
     else
-      {:kind, false} -> {:error, either(formations()) <> suggestion(kind, formations())}
+      {:kind, false} -> {:error, {either(formations()), Hal.Suggest.hint(kind, formations())}}
       {:error, _} -> {:error, "KIND:SPACING with a spacing from 0.8 to 5 metres"}
     end
   end
@@ -180,13 +182,6 @@ defmodule Console.Cli.Parse do
   def either(words) do
     {most, [last]} = Enum.split(words, -1)
     Enum.join(most, ", ") <> " or " <> last
-  end
-
-  defp suggestion(text, names) do
-    case Hal.Suggest.nearest(text, names) do
-      nil -> ""
-      near -> " (did you mean #{inspect(near)}?)"
-    end
   end
 
   defp decimal(text) do

@@ -5,6 +5,7 @@ defmodule Console.Terminal.Prompt do
   Names become robots by comparison; a text never becomes an atom.
   """
   alias Console.Fleet
+  alias Console.Cli
   alias Console.Cli.Parse
   alias Hal.Suggest
   alias Robot.Command
@@ -22,7 +23,7 @@ defmodule Console.Terminal.Prompt do
       iex> Console.Terminal.Prompt.parse("goto mag1 1,2", [:mag1])
       {:ok, {:tell, [:mag1], "goto:1.0:2.0"}}
       iex> Console.Terminal.Prompt.parse("fromation wedge", [:mag1])
-      {:error, ~s(unknown command "fromation"; did you mean "formation"?)}
+      {:error, ~s(unknown command "fromation"; did you mean formation?)}
   """
   @spec parse(String.t(), [atom()]) :: {:ok, parsed()} | {:error, String.t()}
   def parse(text, robots) do
@@ -88,7 +89,7 @@ defmodule Console.Terminal.Prompt do
         {:ok, {:formation, {kind_atom, if(kind =~ ":", do: spacing)}}}
 
       {:error, allowed} ->
-        {:error, "formation must be #{allowed}, not #{inspect(kind)}"}
+        Cli.Arguments.refuse("formation", kind, allowed)
     end
   end
 

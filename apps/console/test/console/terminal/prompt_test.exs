@@ -43,7 +43,7 @@ defmodule Console.Terminal.PromptTest do
   end
 
   test "what is wrong is named, with what is allowed" do
-    assert error("kil leader") =~ ~s(did you mean "kill"?)
+    assert error("kil leader") =~ "did you mean kill?"
     assert error("kill mag9") =~ "there are mag1 to mag2, min1"
     assert error("kill") =~ "kill leader"
     assert error("formation vee") =~ "column, line, wedge"

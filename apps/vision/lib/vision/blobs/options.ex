@@ -1,6 +1,8 @@
 defmodule Vision.Blobs.Options do
   @moduledoc "The command line of `mix blobs`: words in, a checked map or one clear line out."
 
+  alias Hal.Suggest
+
   @type t :: %{
           source: String.t(),
           colours: Path.t(),
@@ -35,7 +37,8 @@ defmodule Vision.Blobs.Options do
       iex> {options.source, options.every, options.distance}
       {"a.png", 1, %{"Red" => 0.02}}
       iex> Vision.Blobs.Options.parse(~w(a.png --colors c.txt))
-      {:error, "unknown option --colors; did you mean --colours?"}
+      {:error, "unknown option --colors: known are --colours, --every, --frames, --json, --picture, " <>
+        "--min-area, --backend, --distance, --help; did you mean --colours?"}
       iex> Vision.Blobs.Options.parse(["--help"])
       :help
   """
@@ -80,18 +83,15 @@ defmodule Vision.Blobs.Options do
     known = Enum.map(Keyword.keys(@switches), &("--" <> String.replace("#{&1}", "_", "-")))
 
     cond do
-      option in known and value == nil -> "#{option} needs a value"
-      option in known -> "#{option} cannot be #{inspect(value)}: a whole number is allowed"
-      true -> "unknown option #{option}" <> suggestion(option, known)
+      option in known and value == nil ->
+        "#{option} needs a value"
+
+      option in known ->
+        "#{option} cannot be #{inspect(value)}: a whole number is allowed"
+
+      true ->
+        "unknown option #{option}: known are #{Enum.join(known, ", ")}#{Suggest.hint(option, known)}"
     end
-  end
-
-  defp suggestion(option, known) do
-    best = Enum.max_by(known, &String.jaro_distance(option, &1))
-
-    if String.jaro_distance(option, best) > 0.8,
-      do: "; did you mean #{best}?",
-      else: "; known are #{Enum.join(known, ", ")}"
   end
 
   defp one_source([""]), do: one_source([])
