@@ -28,7 +28,7 @@ defmodule Sim.TrialTest do
       {:ok, trial} = Trial.new(%{seed: seed, blobs: :direct})
       trial = until(trial, &(Sim.Trial.RunLog.leader(&1.run_log) != nil))
       leader = Sim.Trial.RunLog.leader(trial.run_log)
-      reports = trial.members[leader].mission.round.reports
+      reports = trial.members[leader].runner.mission.round.reports
       assert map_size(reports) == 6
       assert reports[leader].found
 
@@ -95,7 +95,7 @@ defmodule Sim.TrialTest do
     {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct, kills: []})
     trial = until(trial, &Trial.formed?/1)
     leader = Sim.Trial.RunLog.leader(trial.run_log)
-    second = Enum.at(trial.members[leader].mission.order, 1)
+    second = Enum.at(trial.members[leader].runner.mission.order, 1)
     trial = trial |> Trial.kill(second) |> to_the_end() |> assert_formed()
     assert Trial.result(trial).leader_changes == 0
     assert Trial.result(trial).leader == leader

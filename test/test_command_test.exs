@@ -1,0 +1,138 @@
+defmodule System.TestCommandTest do
+  @moduledoc "What `bin/test` makes of steps that fail, hang or hold no test; the steps are programs of our own making."
+  use ExUnit.Case, async: true
+
+  @moduletag :tmp_dir
+  @root Path.expand("..", __DIR__)
+  # What its children inherit, whatever runs this test.
+  @own [{"CONVOY_RUN", nil}, {"CONVOY_SKIPPED", nil}, {"JOBS", "2"}]
+
+  # A project of two apps, in which `mix` is this script.
+  setup %{tmp_dir: folder} do
+    script(folder, "bin/setup", "exit 0")
+    script(folder, "bin/test-c", "echo all well")
+    script(folder, "bin/opencv-data", "exit 0")
+    File.cp!(Path.join(@root, "bin/test"), Path.join(folder, "bin/test"))
+
+    for {app, calls} <- [upper: "[{:lower, in_umbrella: true}]", lower: "[]"] do
+      path = Path.join(folder, "apps/#{app}/mix.exs")
+      File.mkdir_p!(Path.dirname(path))
+      File.write!(path, calls)
+    end
+
+    :ok
+  end
+
+  defp script(folder, name, text) do
+    path = Path.join(folder, name)
+    File.mkdir_p!(Path.dirname(path))
+    File.write!(path, "#!/bin/sh\n" <> text <> "\n")
+    File.chmod!(path, 0o755)
+  end
+
+  defp bin_test(folder, arguments, mix) do
+    script(folder, "path/mix", mix)
+
+    System.cmd(Path.join(folder, "bin/test"), arguments,
+      env: environment(folder),
+      stderr_to_stdout: true
+    )
+  end
+
+  defp environment(folder),
+    do: [{"PATH", Path.join(folder, "path") <> ":" <> System.get_env("PATH")} | @own]
+
+  test "each step's output is whole, and in an order: apps behind those that they call", %{
+    tmp_dir: folder
+  } do
+    assert {said, 0} = bin_test(folder, [], ~s(echo "mix $*"; echo "5 tests, 0 failures"))
+    assert said =~ ~r/== lower: tests\nmix test.*\n5 tests.*\n\n== upper: tests\nmix test/
+    assert said =~ ~r/== how long each step took.*\d s  lower: tests\n.*\d s  in all\n$/s
+    assert said =~ "mix run --no-start test/run.exs --except netns"
+  end
+
+  test "the first failure is told with all that it said, and which step it was", %{
+    tmp_dir: folder
+  } do
+    mix =
+      ~S|case "$PWD $1" in */lower\ test) echo "not so"; exit 3 ;; esac; echo "1 test, 0 failures"|
+
+    assert {said, 1} = bin_test(folder, [], mix)
+
+    assert said =~
+             ~r/== lower: tests: FAILED after \d+ s with status 3. All that it said:\nnot so\n/
+
+    assert said =~ "bin/test: FAILED: lower: tests"
+  end
+
+  test "a suite without a test fails", %{tmp_dir: folder} do
+    assert {said, 1} = bin_test(folder, ["quick"], ~s(echo "0 tests, 0 failures"))
+
+    assert said =~
+             "bin/test: this suite ran no test: mix test --warnings-as-errors --exclude slow"
+  end
+
+  test "what is not known is told in a line, with what may be meant", %{tmp_dir: folder} do
+    for {words, line} <- [
+          {["qick"], "qick is not known; did you mean quick?"},
+          {["--long"], "--long is not known; did you mean long?"},
+          {["all"], "all is not known; quick and long are"},
+          {["quick", "long"], "one of quick and long at a time"}
+        ] do
+      assert {said, 2} = bin_test(folder, words, "exit 1")
+      assert [one] = String.split(said, "\n", trim: true)
+      assert one =~ line
+    end
+
+    assert {help, 0} = bin_test(folder, ["--help"], "exit 1")
+    assert help =~ "bin/test quick leaves out"
+  end
+
+  # By the mark in their environment, also where they have left their parent.
+  if File.dir?("/proc/self") do
+    for signal <- ~w(TERM KILL) do
+      test "nothing is left of it after a kill -#{signal}", %{tmp_dir: folder} do
+        child = Path.join(folder, "child")
+        mkfifo = Path.join(folder, "started")
+        {_, 0} = System.cmd("mkfifo", [mkfifo])
+
+        script(
+          folder,
+          "path/mix",
+          "echo $TMPDIR >#{child}; setsid sleep 60 & echo up >#{mkfifo}; wait"
+        )
+
+        program = Path.join(folder, "bin/test")
+
+        env =
+          for {name, value} <- environment(folder),
+              do: {to_charlist(name), (value && to_charlist(value)) || false}
+
+        port =
+          Port.open({:spawn_executable, program}, [
+            :binary,
+            :exit_status,
+            args: ["quick"],
+            env: env
+          ])
+
+        {:os_pid, pid} = Port.info(port, :os_pid)
+        {"up" <> _, 0} = System.cmd("head", ["-n", "1", mkfifo])
+        {_, 0} = System.cmd("kill", ["-#{unquote(signal)}", "#{pid}"])
+        assert_receive {^port, {:exit_status, _status}}, 30_000
+        work = child |> File.read!() |> String.trim() |> Path.dirname()
+        gone(work, System.monotonic_time(:millisecond) + 15_000)
+
+        assert {"", _none} =
+                 System.cmd("sh", ["-c", "grep -lzsx 'CONVOY_RUN=#{work}' /proc/[0-9]*/environ"])
+      end
+    end
+
+    defp gone(work, deadline) do
+      if File.exists?(work) do
+        assert System.monotonic_time(:millisecond) < deadline, "#{work} is still there"
+        receive(do: (:never -> :ok), after: (20 -> gone(work, deadline)))
+      end
+    end
+  end
+end
