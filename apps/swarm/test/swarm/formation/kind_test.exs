@@ -22,17 +22,15 @@ defmodule Swarm.Formation.KindTest do
     assert {:ok, {:ladder, 1.5} = formation} = Formation.new(:ladder, spacing: 1.5)
     assert Formation.valid?(formation)
     assert Formation.slots(formation, 3) == [Pose.new(0, 1.5), Pose.new(-1.5, 0)]
-    assert {:error, "ladder takes no :length: spacing"} = Formation.new(:ladder, length: 3)
+    assert {:error, line} = Formation.new(:ladder, length: 3)
+    assert line =~ "ladder" and line =~ "length"
   end
 
   test "one whose module is not in this build is not known, nor is any other" do
     refute :gone in Formation.kinds()
     refute Formation.valid?({:gone, 1.0})
     assert {:error, line} = Formation.new(:gone)
-
-    assert line =~
-             "formation cannot be :gone: column, line, wedge, triangle, diamond, circle or ladder"
-
+    assert line =~ "formation cannot be :gone" and line =~ "ladder"
     refute Formation.valid?({"ladder", 1.0})
   end
 end
