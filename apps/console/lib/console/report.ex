@@ -3,7 +3,7 @@ defmodule Console.Report do
   The report of a run: fixed keys in a fixed order, and the summary for people.
 
   Lengths, angles and times are rounded to three decimals. Two runs from one seed give the same
-  bytes, except for `wall_s`, the only key that tells of the machine.
+  bytes, except for `wall_s`, the only key that depends on the machine.
   """
   alias Console.Cli.{Format, Output}
   alias Sim.Trial.Claims

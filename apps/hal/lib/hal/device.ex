@@ -12,46 +12,49 @@ defmodule Hal.Device do
     * `:device` - what it is called in its health, by default its kind
     * `:arm` - of a drive: `:auto` (the default), `:manual` or `:never`, see below
     * `:sonar` - of a drive: whether its base has sonars (default false), without which it is not armed
-    * `:was` - `{m, f, a}` that gives the status which its sinks know of the process before it, or `nil`
+    * `:was` - `{m, f, a}` that gives the last status of the previous process that its sinks know,
+      or `nil`
     * `:about` - a map that its events have beside their own, such as `%{robot: :mag1}`
     * `:name` - as in `GenServer`
     * `:clock` - `{m, f, a}` giving integer milliseconds
 
   ## Online
 
-  That its driver has opened it makes no device online: of a line that is silent, full of noise, or leads to a base
-  that hears and never answers, nobody knows where the wheels are. A drive is online once its base has
-  reported its wheels since then, and as long as it does (`Hal.Device.Reports`); it is offline then
-  with the reason `:silent`, though its driver is open and goes on asking. A camera is online once it has given a
-  picture, a pan-tilt unit once it has said where it looks; one that gives nothing for 10 s is offline (`:mute`) and
-  opened again (`Hal.Device.Liveness`).
+  An open driver does not make a device online: if a line is silent, full of noise, or leads to a
+  base that never answers, nobody knows where the wheels are. A drive is online once its base has
+  reported its wheels since the opening, and as long as it does (`Hal.Device.Reports`); otherwise
+  it is offline with the reason `:silent`, although its driver is open and keeps asking. A camera
+  is online once it has given a picture, a pan-tilt unit once it has reported where it looks; one
+  that gives nothing for 10 s is offline (`:mute`) and is reopened (`Hal.Device.Liveness`).
 
   ## When a driver fails
 
-  An error that a driver *returns* is expected: the device says so, closes the driver, and tries
-  again after 100 ms, 200 ms, … up to 5 s. The first reading after an opening brings the wait back
-  to 100 ms, so that a driver that opens well and then fails is not reopened ten times a second.
+  An error that a driver *returns* is expected: the device reports it, closes the driver, and
+  tries again after 100 ms, 200 ms, … up to 5 s. The first reading after an opening resets the
+  wait to 100 ms, so that a driver that opens and then fails is not reopened ten times a second.
 
-  A driver that *raises* takes the device down, which its supervisor restarts. It closes the
-  driver, says that it is offline (`:fell`) and disarmed, and rests for 500 ms before it goes, so that a driver
-  which falls over every message cannot use up the supervisor's restarts, and with them the robot's other devices.
-  A device that is killed can say nothing; the one that follows says it first (`:was`).
+  A driver that *raises* crashes the device, which its supervisor restarts. Before it exits, the
+  device closes the driver, reports that it is offline (`:fell`) and disarmed, and waits for 500
+  ms, so that a driver that crashes on every message cannot use up the supervisor's restarts, and
+  with them the robot's other devices. A device that is killed cannot report anything; its
+  successor does so first (`:was`).
 
   ## Wishes
 
-  Wheels that are offline do not hear what is asked of them: a speed is for now. A pan-tilt unit
-  is asked where to look; once it is (again) online, its device tells it the last of that.
+  A speed for an offline drive is lost, because a speed is valid only now. The last direction for
+  a pan-tilt unit is kept, and sent once the unit is online (again).
 
   ## Wheels
 
-  A drive that hears no speed for 500 ms stops its wheels. This is the second line behind the
-  dead man's switch of whoever drives, for the case that this one is gone or stuck.
+  A drive that receives no speed for 500 ms stops its wheels. This is the second line of defence
+  behind the dead man's switch of the gate, in case the gate is gone or stuck.
 
-  They turn only while the drive is armed (`Hal.Device.Arming`): what is asked for before is a stop, and
-  counted. With `arm: :auto` the drive arms whenever its driver is open and ready and its base's reports are
-  fresh; with `:manual` a person does, after every start, by `arm/1`; with `:never` it stands, as in a dry run.
-  Reports that grow old stop and disarm it. If the line is lost while they turn, `acknowledge/1`
-  comes first. How it stands is the reading `{:arming, %{state: state, why: line or nil}}`.
+  The wheels turn only while the drive is armed (`Hal.Device.Arming`): an earlier speed becomes a
+  stop, and is counted. With `arm: :auto` the drive arms whenever its driver is open and ready and
+  its base's reports are fresh; with `:manual` a person arms it after every start, by `arm/1`;
+  with `:never` it stands, as in a dry run. Stale reports stop and disarm it. If the line was lost
+  while the wheels turned, `acknowledge/1` is needed first. The reading `{:arming, %{state: state,
+  why: line or nil}}` gives the state.
   """
   alias Hal.Twist
   alias Hal.Device.Arming
@@ -117,7 +120,7 @@ defmodule Hal.Device do
       when order in [:arm, :disarm, :acknowledge] and is_integer(until_ms),
       do: GenServer.cast(device, {:order, order, until_ms, reply})
 
-  @doc "How the drive is armed, with all that `Hal.Device.Arming` counts; `nil` for what is no drive."
+  @doc "How the drive is armed, with all that `Hal.Device.Arming` counts; `nil` for a device that is not a drive."
   @spec arming(GenServer.server()) :: Arming.t() | nil
   def arming(device), do: GenServer.call(device, :arming)
 

@@ -12,9 +12,9 @@ defmodule Swarm.Blackboard do
   the robots that differ, and both send what the other lacks, of third parties too. So a row comes
   to nodes that the robot's own never reaches.
 
-  A robot's rows are written on its node only, after it entered (`enter/2`; its link does that). Its
-  life's number is in them. An event `[:swarm, :blackboard, :rival]` tells of another robot of the
-  same name; what that one says is not taken over.
+  A robot's rows are written on its node only, after it entered (`enter/2`; its link does that).
+  Its life's number is in them. An event `[:swarm, :blackboard, :rival]` reports another robot of
+  the same name; what that one says is not taken over.
 
   Options of `start_link/1`, with their defaults:
 

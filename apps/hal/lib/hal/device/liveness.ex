@@ -4,7 +4,7 @@ defmodule Hal.Device.Liveness do
   integer milliseconds; `Hal.Device` asks it. An open line or program proves nothing about the
   device at the other end.
 
-  | device | is online | is no more |
+  | device | is online | is no longer |
   |---|---|---|
   | drive | once its base has reported its wheels since the opening, and as long as it does | by `Hal.Device.Reports`: `:silent`; it goes on being asked |
   | camera | once it has given a picture, or blobs, since the opening | without one for 10 s: `:mute`; it is opened again |
@@ -33,7 +33,7 @@ defmodule Hal.Device.Liveness do
   def new(kind, _sonar?, at_ms) when kind in [:ptz, :camera],
     do: %__MODULE__{kind: kind, since_ms: at_ms}
 
-  @doc "Takes readings that came at this time; none is no sign."
+  @doc "Takes readings that came at this time; an empty list is not a sign of life."
   @spec heard(t(), [term()], at_ms :: integer()) :: t()
   def heard(%__MODULE__{} = signs, [], _at_ms), do: signs
 

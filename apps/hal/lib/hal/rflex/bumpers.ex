@@ -37,7 +37,7 @@ defmodule Hal.RFlex.Bumpers do
   def default_segments(:address, count),
     do: for(k <- 0..(count - 1)//1, do: div(16 * k, count))
 
-  @doc "Takes an input; `:other` if it is none of a bumper."
+  @doc "Takes an input; `:other` if it does not belong to a bumper."
   @spec report(t(), byte(), byte()) :: {:ok, t()} | :other
   def report(%__MODULE__{base: base} = bumpers, address, state) do
     if address >= base and address < base + addresses(bumpers),

@@ -3,7 +3,7 @@ defmodule Hal.RFlex.Decoder do
   Extracts frames from a stream of bytes; the same bytes give the same packets however they are
   split. Pure.
 
-  What begins like a frame and is none is given up, and the search goes on **one byte after** its
+  What begins like a frame but is not one is given up, and the search goes on **one byte after** its
   beginning, so that a damaged frame takes no sound one along.
 
   ## Ghost bytes

@@ -10,7 +10,7 @@ defmodule Hal.RFlex.Odometry do
 
   ## What is not believed
 
-  A counter is 32 bits, and wraps. What is no movement at all is **dropped** and counted:
+  A counter is 32 bits, and wraps. What cannot be a movement is **dropped** and counted:
 
     * a step longer than 1.5 times the limit speed allows for in the time since, and 0.3 s more (for
       reports that were held up and come at once; after 2 s the time counts no more)

@@ -57,7 +57,7 @@ defmodule Hal.Visca.Command do
   defguardp tilt?(n) when n in -300..300
 
   @doc """
-  The bytes of a command to camera 1 to 7. A command that is none raises `ArgumentError`.
+  The bytes of a command to camera 1 to 7. An unknown command raises `ArgumentError`.
 
       iex> Hal.Visca.Command.encode({:look, -264, -120, 24, 20}, 1)
       <<0x81, 0x01, 0x06, 0x02, 0x18, 0x14, 0x0F, 0x0E, 0x0F, 0x08, 0x0F, 0x0F, 0x08, 0x08, 0xFF>>

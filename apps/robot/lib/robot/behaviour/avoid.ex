@@ -2,12 +2,13 @@ defmodule Robot.Behaviour.Avoid do
   @moduledoc """
   Runs another behaviour, and bends or slows its wishes so that the robot touches nothing (R85).
 
-  A wish with a velocity is bent: round standing robots and discs on the shortest way
-  (`.Way`), past moving ones by `Robot.Navigation.Orca`, a little to the right of those who come, and
-  away from what only the sonars see. A wish without one is only slowed down (`.Brake`).
-  Who gets no nearer for some seconds goes another way for a while (`.Progress`), and who stands in
-  another's way makes room (`.Yield`). Where a body that will not move stands in the goal, it stands
-  as near as may be, and its wish says `by: :blocked`. A robot with nobody about gets its wish unchanged.
+  A wish with a velocity is bent: round standing robots and discs on the shortest way (`.Way`),
+  past moving ones by `Robot.Navigation.Orca`, a little to the right of those who come, and away
+  from what only the sonars see. A wish without one is only slowed down (`.Brake`). Who gets no
+  nearer for some seconds goes another way for a while (`.Progress`), and who stands in another's
+  way makes room (`.Yield`). Where a body that will not move stands in the goal, it stands as near
+  as possible, and its wish says `by: :blocked`. A robot with nobody about gets its wish
+  unchanged.
 
   Options: `inner`, the behaviour (required); `discs`, `[{x, y, radius}]` in the map frame, metres:
   further standing things.

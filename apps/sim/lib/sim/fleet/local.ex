@@ -2,7 +2,7 @@ defmodule Sim.Fleet.Local do
   @moduledoc """
   World and robots on this node: each robot the whole tree of `Robot.Supervisor`.
 
-      supervisor (one_for_all, no restarts: without its world a fleet is none)
+      supervisor (one_for_all, no restarts: a fleet cannot exist without its world)
       |-- Sim.World.Directory     unless another fleet of this node has it already
       |-- Sim.World.Server     the world
       |-- Sim.Fleet.RadioServer  a radio that loses, if any is lost

@@ -7,7 +7,7 @@ defmodule Swarm.Agreement.Election do
   name. Where two or more leaders report, parts of a fleet have met, and the one with the highest
   {robots led, size, name} leads all: the fewest have to turn to another.
 
-  Under the policy `:majority` (`of` is the fleet's size) nobody leads a view that is no more than
+  Under the policy `:majority` (`of` is the fleet's size) nobody leads a view that is not more than
   half of the fleet.
   """
 

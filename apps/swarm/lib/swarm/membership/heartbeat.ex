@@ -76,7 +76,7 @@ defmodule Swarm.Membership.Heartbeat do
   def due?(nil, _at_ms), do: true
   def due?(last_ms, at_ms), do: at_ms - last_ms >= @period_ms - @early_ms
 
-  @typedoc "What a heartbeat tells of the body; `Robot.Percept` is one."
+  @typedoc "What a heartbeat says about the body; `Robot.Percept` is one."
   @type body :: %{
           :pose => Hal.Pose.t(),
           :odometry => Hal.Odometry.t() | nil,
