@@ -415,7 +415,7 @@ defmodule Robot.FileTest do
     for text <- [
           "[1, -2.5, nil]",
           "[{:a, 2, \"b\"}, Some.Thing, :no_atom_of_ours]",
-          "[a: true, b: Some.Module]"
+          "[arm: true, id: Some.Module]"
         ] do
       assert {:ok, node} = Reader.read(text)
       assert inspect(Terms.term(node)) == text

@@ -64,8 +64,15 @@ defmodule Robot.File.Terms do
   def term({_line, {:name, name}}),
     do: with(:error <- existing(name), do: %Name{text: ":" <> name})
 
-  def term({_line, {:module, name}}),
-    do: with(:error <- Build.module(name), do: %Name{text: name}, else: ({:ok, module} -> module))
+  # A driver's options follow its name: what they may be named are atoms once its table is there.
+  def term({_line, {:module, name}}) do
+    with {:ok, module} <- Build.module(name) do
+      if function_exported?(module, :option_table, 0), do: module.option_table()
+      module
+    else
+      :error -> %Name{text: name}
+    end
+  end
 
   def term({_line, {:keys, keys}}) do
     for {name, _line, node} <- Enum.uniq_by(keys, &elem(&1, 0)), do: {key(name), term(node)}
