@@ -5,7 +5,7 @@ defmodule Docs.LookedAt do
   """
   alias Docs.Sandbox
 
-  @ours ~w(Hal Vision Robot Swarm Sim Console Mix)
+  @ours ~w(Hal Vision Robot Mesh Swarm Missions Sim Console Mix)
 
   @doc "Of a command's words."
   @spec command([String.t()], Path.t()) :: String.t() | nil

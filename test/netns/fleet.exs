@@ -172,7 +172,8 @@ defmodule Netns.Fleet do
     missions = Application.fetch_env!(:swarm, :missions)
     :ok = call.(Application, :put_env, [:swarm, :missions, missions])
     :ok = call.(Application, :put_env, [:swarm, :mesh, mesh(s.net, robot, address)])
-    for app <- [:swarm, :sim], do: {:ok, _} = call.(Application, :ensure_all_started, [app])
+    # Together, so that the missions are there when the mesh begins: it must know their atoms.
+    {:ok, _} = call.(Application, :ensure_all_started, [:sim])
     :ok = call.(Netns.Robot, :start, [robot, poses, s.folder])
     {robot, %{peer: peer, node: node, pid: "#{call.(:os, :getpid, [])}"}}
   end

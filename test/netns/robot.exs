@@ -86,6 +86,9 @@ defmodule Netns.Watched do
   alias Missions.Landmark.{Rounds, SlotPoses}
 
   @impl Robot.Mission
+  defdelegate options(options, robots), to: Landmark
+
+  @impl Robot.Mission
   def init(robot, options), do: Landmark.init(robot, options)
 
   @impl Robot.Mission
