@@ -92,6 +92,9 @@ defmodule Netns.Watched do
   def init(robot, options), do: Landmark.init(robot, options)
 
   @impl Robot.Mission
+  defdelegate options(options, robots), to: Landmark
+
+  @impl Robot.Mission
   def handle(event, mission) do
     {phase, next, effects} = Landmark.handle(event, mission)
     with {:command, command} <- event, do: Log.note(:command, command)
