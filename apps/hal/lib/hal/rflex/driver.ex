@@ -30,8 +30,8 @@ defmodule Hal.RFlex.Driver do
   A speed goes through `Hal.SlewLimiter`, last before the wire, every 50 ms, and is repeated every 100 ms, zero
   too: a frame may be lost, and the controller stops by itself when it hears nothing for some time (how long
   is not known). A stop is not ramped: it is the next thing on the wire, and the controller brakes with
-  `max_braking`. What is not a speed (`Hal.SlewLimiter.check/1`) is a stop, and counted. A speed that was not
-  renewed for 500 ms is zero. The brake is released before the first speed, and again when the controller
+  `max_braking`. What is not a speed (`Hal.SlewLimiter.check/1`) is a stop, and counted. That a speed is
+  renewed is the affair of `Hal.Device`. The brake is released before the first speed, and again when the controller
   says that it is set; `init` sets it. A driver that was held up until the line said its last words begins
   again like that: from standing, with the brake.
 
@@ -56,7 +56,6 @@ defmodule Hal.RFlex.Driver do
 
   @tick_ms 50
   @repeat_ms 100
-  @watchdog_ms 500
   @status_ms 500
   @idle_ms 30
   @no_wheels_ms 500
@@ -69,7 +68,6 @@ defmodule Hal.RFlex.Driver do
               [
                 decoder: Decoder.new(),
                 wanted: Twist.zero(),
-                wanted_ms: nil,
                 said: nil,
                 due: %{},
                 pump: nil,
@@ -136,8 +134,8 @@ defmodule Hal.RFlex.Driver do
 
     s =
       case SlewLimiter.check(twist) do
-        :ok -> %{s | wanted: twist, wanted_ms: at_ms}
-        {:error, _line} -> refuse(s, at_ms)
+        :ok -> %{s | wanted: twist}
+        {:error, _line} -> refuse(s)
       end
 
     s |> step(at_ms) |> say(at_ms) |> pump(at_ms)
@@ -208,8 +206,7 @@ defmodule Hal.RFlex.Driver do
 
   defp put({key, bytes}, queue), do: Queue.put(queue, key, bytes)
 
-  defp refuse(s, at_ms),
-    do: %{s | wanted: Twist.zero(), wanted_ms: at_ms, refused: s.refused + 1}
+  defp refuse(s), do: %{s | wanted: Twist.zero(), refused: s.refused + 1}
 
   # What the wheels are to do now.
   defp step(s, at_ms) do
@@ -255,7 +252,7 @@ defmodule Hal.RFlex.Driver do
 
   defp tick(s, at_ms) do
     Process.send_after(self(), {__MODULE__, s.ref, :tick}, @tick_ms)
-    {readings, s} = s |> watch(at_ms) |> idle(at_ms)
+    {readings, s} = idle(s, at_ms)
     s = s |> step(at_ms) |> say(at_ms) |> ask(at_ms) |> set_up(at_ms) |> tell(at_ms)
     {standing, s} = standing(s, at_ms)
 
@@ -264,12 +261,6 @@ defmodule Hal.RFlex.Driver do
          {:ok, s} <- pump(s, at_ms),
          do: {:ok, readings ++ standing, s}
   end
-
-  defp watch(%{wanted_ms: wanted_ms} = s, at_ms)
-       when wanted_ms != nil and at_ms - wanted_ms >= @watchdog_ms,
-       do: %{s | wanted: Twist.zero(), wanted_ms: nil}
-
-  defp watch(s, _at_ms), do: s
 
   defp idle(s, at_ms) do
     if Decoder.waiting?(s.decoder) and at_ms - s.bytes_ms >= @idle_ms do

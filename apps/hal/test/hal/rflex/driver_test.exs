@@ -210,23 +210,6 @@ defmodule Hal.RFlex.DriverTest do
     close(t)
   end
 
-  test "a speed that is not renewed is over after half a second", %{link: link} do
-    t = open(link) |> until(said?({:infrared, 2})) |> forget()
-    started = System.monotonic_time(:millisecond)
-    t = drive(t, 0.4, 0.0)
-
-    t =
-      until(t, fn t ->
-        match?(
-          [{:turn, 0, _}, {:move, 0, _} | _],
-          Enum.reverse(t.heard) |> Enum.filter(&is_tuple/1)
-        ) and Enum.any?(t.heard, &match?({:move, speed, _} when speed > 0, &1))
-      end)
-
-    assert System.monotonic_time(:millisecond) - started >= 500
-    close(t)
-  end
-
   def clock(counter), do: :counters.get(counter, 1)
 
   test "a driver that was held up begins from standing, with the brake", %{link: link} do

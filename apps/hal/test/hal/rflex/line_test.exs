@@ -45,7 +45,7 @@ defmodule Hal.RFlex.LineTest do
         end
     after
       20 ->
-        Device.drive(t.device, Twist.new(0.3, 0.2))
+        if t.drives?, do: Device.drive(t.device, Twist.new(0.3, 0.2))
         with bytes when is_binary(bytes) <- says.(:now), do: Serial.write(t.far, bytes)
 
         if System.monotonic_time(:millisecond) < until_ms,
@@ -62,7 +62,7 @@ defmodule Hal.RFlex.LineTest do
 
   defp begin(link, far, options \\ []) do
     device = device(link, options)
-    %{device: device, far: far, rest: <<>>, heard: [], health: [], arming: []}
+    %{device: device, far: far, rest: <<>>, heard: [], health: [], arming: [], drives?: true}
   end
 
   defp moves(t),
@@ -142,6 +142,54 @@ defmodule Hal.RFlex.LineTest do
     assert List.last(t.health) == :online
     assert moves(t) == []
     assert Device.arm(t.device) == :ok
+  end
+
+  test "a speed that is not renewed is over after half a second", %{link: link, far: far} do
+    all = for id <- Enum.to_list(0..7) ++ Enum.to_list(16..23), do: {id, 1474}
+    counter = :counters.new(1, [])
+
+    reports = fn what ->
+      if what == :now do
+        :counters.add(counter, 1, 20)
+        RFlexBase.wheels(:counters.get(counter, 1), 100, 100) <> RFlexBase.sonar(all)
+      end
+    end
+
+    t = begin(link, far) |> armed(now_ms() + 5_000, reports)
+    t = play(t, 600, reports)
+    assert moves(t) != []
+
+    started_ms = now_ms()
+    t = stand(%{t | heard: [], drives?: false}, started_ms + 5_000, reports)
+    # The last speed was asked for at most so long before.
+    assert now_ms() - started_ms >= 400
+    assert moves(play(%{t | heard: []}, 300, reports)) == []
+    assert List.last(t.arming) == :armed
+  end
+
+  defp armed(t, deadline_ms, says) do
+    t = play(t, 100, says)
+
+    case Device.arm(t.device) do
+      :ok ->
+        t
+
+      {:error, line} ->
+        if now_ms() > deadline_ms, do: flunk(line), else: armed(t, deadline_ms, says)
+    end
+  end
+
+  defp now_ms, do: System.monotonic_time(:millisecond)
+
+  # Until the last word to the wheels is a stop.
+  defp stand(t, deadline_ms, says) do
+    said = for {what, speed, _} <- t.heard, what in [:move, :turn], do: speed
+
+    cond do
+      Enum.take(said, -2) == [0, 0] -> t
+      now_ms() > deadline_ms -> flunk("it goes on: #{inspect(said)}")
+      true -> t |> play(20, says) |> stand(deadline_ms, says)
+    end
   end
 
   test "without its conversions a base that answers is online, and says what it lacks", %{
