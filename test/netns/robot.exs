@@ -86,9 +86,6 @@ defmodule Netns.Watched do
   alias Missions.Landmark.{Rounds, SlotPoses}
 
   @impl Robot.Mission
-  defdelegate options(options, robots), to: Landmark
-
-  @impl Robot.Mission
   def init(robot, options), do: Landmark.init(robot, options)
 
   @impl Robot.Mission
