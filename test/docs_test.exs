@@ -183,10 +183,10 @@ defmodule System.DocsTest do
     assert [nowhere, ill, prompt] = commands
     assert nowhere =~ "line 3: mix robot.check config/robots/mag9.exs: status 1"
     assert ill =~ "line 4: mix robot.check config/robots/min1.exs: printed instead"
-    assert prompt =~ ~s(did you mean "kill"?)
+    assert prompt =~ "did you mean kill?"
     assert [task, option, function, module, word] = mentions(items, folder)
     assert task =~ "there is no mix robot.chek"
-    assert option =~ ~s(did you mean "--nodes"?)
+    assert option =~ "did you mean --nodes?"
     assert function =~ "Swarm.stopp(): there is no such function"
     assert module =~ "there is no Swarm.Mash"
     assert word =~ "there is no stat"

@@ -97,7 +97,7 @@ defmodule System.ReleaseTest do
     move = ~s|Swarm.tell(:mag1, "move:0.2:0")|
     assert {said, 0} = robot(["rpc", ~s|{Swarm.tell(:mag1, "armm"), #{move}}|], environment)
     refused = ~S|{:error, "mag1: its wheels are disarmed; arm it first"}|
-    assert said =~ ~r/^{{:error, ".*"},\s+#{Regex.escape(refused)}}$/m
+    assert said =~ ~r/^{{:error,\s+".*"},\s+#{Regex.escape(refused)}}$/m
     assert speed(server) == 0.0
     until(~r/^{:ok, :ok}$/m, ask.(["rpc", "{Swarm.arm(:mag1), #{move}}"]))
     wait(fn -> speed(server) > 0.1 end)

@@ -26,6 +26,13 @@ defmodule Robot.FileTest do
     fn "landmark.txt", _options -> {:ok, colours} end
   end
 
+  test "a file without a key is told what is missing" do
+    for text <- ["[]", "[id: :mag1]"] do
+      assert {:error, lines} = Robot.File.parse(text, file: "mag1.exs")
+      assert Enum.any?(lines, &(&1 =~ "mag1.exs:1: drive: is missing"))
+    end
+  end
+
   test "colours name the detector that finds them" do
     read = fn "lamp.txt", options ->
       Vision.Colours.read(Path.join(@robots, "landmark.txt"), options)

@@ -130,6 +130,12 @@ defmodule Robot.File.Terms do
   defp below({:map, pairs}, key),
     do: Enum.find_value(pairs, &(elem(elem(&1, 0), 1) == key && elem(&1, 1)))
 
-  defp below({:list, nodes}, n), do: Enum.at(nodes, String.to_integer(n) - 1)
+  # A list of keys without any is read as an empty list.
+  defp below({:list, nodes}, n) do
+    with {place, ""} when place > 0 <- Integer.parse(n),
+         do: Enum.at(nodes, place - 1),
+         else: (_key -> nil)
+  end
+
   defp below(_value, _key), do: nil
 end
