@@ -11,7 +11,7 @@ end
 
 config :logger, level: if(config_env() == :test, do: :warning, else: :info)
 
-# The missions that a robot's file may name; the first is that of a robot whose file names none.
+# The missions by name; the first is that of a robot whose file names none.
 config :swarm, missions: [landmark: Missions.Landmark]
 
 # What a build adds of its own (docs/extending.md).

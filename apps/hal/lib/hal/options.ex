@@ -8,6 +8,9 @@ defmodule Hal.Options do
   """
   alias Hal.Options.{Type, Wording}
 
+  # So many problems are told at once.
+  @told 10
+
   @type table :: [{atom(), Type.t() | [Type.t() | {:required | :default, term()}]}]
 
   @doc """
@@ -68,8 +71,11 @@ defmodule Hal.Options do
   @spec line([Type.problem(), ...], subject :: String.t()) :: String.t()
   def line([{[], text} | _], subject), do: "#{subject} options #{text}"
 
-  def line(problems, subject),
-    do: "#{subject} option " <> Enum.map_join(problems, "; ", &text/1)
+  def line(problems, subject) do
+    {told, others} = Enum.split(problems, @told)
+    more = if others == [], do: "", else: "; and #{length(others)} more"
+    "#{subject} option " <> Enum.map_join(told, "; ", &text/1) <> more
+  end
 
   defp text({path, text}), do: "#{Enum.join(path, ".")} #{text}"
 end

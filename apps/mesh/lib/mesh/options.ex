@@ -31,8 +31,11 @@ defmodule Mesh.Options do
     fleet: [Roster.type(), default: nil],
     secret: [{:struct, Secret}, default: nil],
     multicast: [{:check, &__MODULE__.given?/1, "a group and a port, or false,"}, default: @gossip],
-    peers: [{:check, &is_list/1, ~s(a list of addresses such as "10.0.0.7:4370")}, default: []],
-    strategies: [{:check, &is_list/1, "a list of {Module, options}"}, default: []],
+    peers: [
+      {:check, &Hal.Options.Type.list?/1, ~s(a list of addresses such as "10.0.0.7:4370")},
+      default: []
+    ],
+    strategies: [{:check, &Hal.Options.Type.list?/1, "a list of {Module, options}"}, default: []],
     topologies: [{:check, &__MODULE__.topologies/1, "libcluster's"}, default: []]
   ]
 
@@ -62,7 +65,7 @@ defmodule Mesh.Options do
          options = struct!(__MODULE__, options),
          {:ok, secret} <- secret(options),
          {:ok, started} <- start(options) do
-      fleet = if options.fleet in [nil, []], do: Roster.fleet(), else: options.fleet
+      fleet = options.fleet || Roster.fleet()
       dist_port = options.dist_port || own_port()
       {:ok, %{options | dist_port: dist_port, secret: secret, fleet: fleet, started: started}}
     end

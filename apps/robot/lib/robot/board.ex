@@ -14,6 +14,7 @@ defmodule Robot.Board do
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, since when |
   | `{:peer, id}` | `:comms` | as in `Robot.Percept` |
   | `:estop` | `:estop` | how the emergency stop stands, as its one owner publishes it: the last number known, the last one cleared here, the calls heard |
+  | `:stopped` | `:estop` | when it was stopped last, by whatever stop: `System.monotonic_time/1`, microseconds |
   | `:radio` | `:comms` | how many messages were sent, heard, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
   | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Safety.Reflex.frame/1` |
@@ -81,6 +82,7 @@ defmodule Robot.Board do
     mission: :pilot,
     asking: :pilot,
     estop: :estop,
+    stopped: :estop,
     radio: :comms
   }
 

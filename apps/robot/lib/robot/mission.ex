@@ -38,7 +38,7 @@ defmodule Robot.Mission do
   @doc "Whether an effect is for the controller."
   defguard is_order(effect) when elem(effect, 0) in [:goal, :anchors, :look]
 
-  @type result :: {phase :: term(), mission :: term(), [effect()]}
+  @type result :: {phase :: atom(), mission :: term(), [effect()]}
 
   @doc "Starts the mission of this robot with options that `c:options/2` has checked."
   @callback init(robot :: atom(), keyword()) :: result()

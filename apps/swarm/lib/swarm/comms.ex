@@ -213,13 +213,13 @@ defmodule Swarm.Comms do
     %{s | noted: noted}
   end
 
-  # Who knows no better way than the comms process finds the brake through it.
+  # Who knows no better way than the comms process finds the e-stop process through it.
   defp command(s, request, ref, stamp) do
-    case Freshness.judge(s.sender.stamps, request, ref, stamp, Config.now(s.config)) do
-      :ok ->
+    case fresh(s, request, ref, stamp) do
+      {:ok, asked} ->
         if EStop.takes?(request),
           do: EStop.take(s.id, request, ref),
-          else: CommandHandler.take(request, ref, s.config, s.board, s.receiver)
+          else: CommandHandler.take(request, {ref, asked}, s.config, s.board, s.receiver)
 
         s
 
@@ -227,6 +227,18 @@ defmodule Swarm.Comms do
         Nonblocking.answer(ref, Freshness.refusal(s.id, age))
         %{s | receiver: Receiver.reject(s.receiver, :too_old)}
     end
+  end
+
+  # When it was asked, as far as that is known here; else now.
+  defp fresh(s, _request, ref, {:asked, asked}) when is_integer(asked) and node(ref) == node() do
+    now = System.monotonic_time(:microsecond)
+    with :ok <- Freshness.local(asked, now, EStop.stopped(s.board)), do: {:ok, asked}
+  end
+
+  defp fresh(s, request, ref, stamp) do
+    with :ok <-
+           Freshness.judge(s.sender.stamps, request, ref, stamp, Config.now(s.config)),
+         do: {:ok, System.monotonic_time(:microsecond)}
   end
 
   defp give_way(s, other) do

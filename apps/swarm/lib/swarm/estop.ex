@@ -73,6 +73,14 @@ defmodule Swarm.EStop do
   @spec latch(robot :: atom()) :: :ok
   def latch(robot), do: GenServer.cast(Names.via(robot, :estop), :latch)
 
+  @doc "When the robot was stopped last, by whatever stop (`System.monotonic_time/1`, microseconds); `nil` if never."
+  @spec stopped(Board.t()) :: integer() | nil
+  def stopped(board) do
+    with {:ok, at, _at_ms} <- Board.fetch(board, :stopped, :infinity),
+         do: at,
+         else: (:error -> nil)
+  end
+
   @doc "How the stop stands as the e-stop process published it; before the first did, by the gate's latch."
   @spec written(Board.t()) :: EStop.State.t()
   defdelegate written(board), to: EStop.Actions

@@ -1,6 +1,6 @@
 defmodule Swarm.Missions do
   @moduledoc """
-  The missions for groups that this node knows, by the names that robot files use. They live in apps above this
+  The missions for groups that this node knows, by name. They live in apps above this
   one, so the configuration lists them:
 
       config :swarm, missions: [landmark: Missions.Landmark]
@@ -36,9 +36,20 @@ defmodule Swarm.Missions do
           {:ok, keyword()} | {:error, line :: String.t()}
   def options(module, options, robots) do
     cond do
-      function_exported?(module, :options, 2) -> module.options(options, robots)
+      not Code.ensure_loaded?(module) -> {:error, "#{inspect(module)} is not part of this build"}
+      function_exported?(module, :options, 2) -> checked(module, module.options(options, robots))
       options == [] -> {:ok, []}
       true -> {:error, "#{inspect(module)} takes no options"}
+    end
+  end
+
+  defp checked(_module, {:error, line} = error) when is_binary(line), do: error
+
+  defp checked(module, answer) do
+    with {:ok, options} <- answer, true <- Keyword.keyword?(options) do
+      {:ok, options}
+    else
+      _other -> {:error, "#{inspect(module)}.options/2 answers neither options nor one line"}
     end
   end
 

@@ -32,6 +32,10 @@ defmodule Hal.Options.Type do
   @type problem :: Wording.problem()
   @type result :: {:ok, term()} | {:error, [problem(), ...]}
 
+  @doc "Whether a value is a list with an end."
+  @spec list?(term()) :: boolean()
+  def list?(value), do: is_list(value) and not List.improper?(value)
+
   @doc """
   A value by its type, or all its problems, each with the keys that lead to it. Fills in no defaults.
 

@@ -20,7 +20,7 @@ defmodule Missions.Landmark.Options do
       formation: Formation.type(),
       assign: {:one_of, [:chain, :cost]},
       leader_change: :boolean,
-      colour: {:check, &is_binary/1, "the name of a colour, in quotes,"},
+      colour: {:text, "the name of a colour, in quotes,"},
       policy: {:one_of, [:available, :majority]},
       of: [{:integer, 1, 1_000, "robots of the fleet"}, default: nil],
       lost_link: [{:one_of, [:stop, :hold, :continue]}, default: nil]
@@ -42,7 +42,10 @@ defmodule Missions.Landmark.Options do
           {:ok, keyword()} | {:error, line :: String.t()}
   def check(options, robots) do
     with {:ok, checked} <- Options.check(options, table(), "landmark") do
-      given = for {key, _value} = option <- checked, Keyword.has_key?(options, key), do: option
+      given =
+        for {key, _value} = option <- checked,
+            Enum.any?(options, fn {name, _} -> to_string(name) == to_string(key) end),
+            do: option
 
       case {given[:policy], given[:of] || robots} do
         {:majority, nil} -> {:error, missing()}

@@ -13,7 +13,7 @@ defmodule Robot.Control.Delivery do
   """
 
   @enforce_keys [:ways, :until_ms, :reply]
-  defstruct @enforce_keys
+  defstruct @enforce_keys ++ [asked: nil]
 
   @type way ::
           {:hand, {:only | :except, module()}}
@@ -24,16 +24,22 @@ defmodule Robot.Control.Delivery do
   @type open :: {:hand, module()} | :resume | {:start, module(), options :: keyword()}
 
   @typedoc """
-  Why a command reached no mission: no way was open; there is no such mission; the emergency stop holds the robot; it is
-  later than `until_ms`.
+  Why a command reached no mission: no way was open; there is no such mission; the emergency stop holds the robot; it
+  was stopped since this was asked; it is later than `until_ms`.
   """
-  @type refusal :: {:error, :idle | :no_mission | :held | :late}
+  @type refusal :: {:error, :idle | :no_mission | :held | :stopped | :late}
 
   @typedoc """
-  `until_ms` is when whoever asked stops waiting (`System.monotonic_time/1`, ms): later nothing is begun. `reply`
+  `until_ms` is when whoever asked stops waiting (`System.monotonic_time/1`, ms): later nothing is begun. `asked` is when that was
+  (`System.monotonic_time/1`, microseconds; `nil` where nobody knows): what was asked before a stop ended with it. `reply`
   is applied with `:ok` or a refusal as its last argument.
   """
-  @type t :: %__MODULE__{ways: [way()], until_ms: integer(), reply: Robot.Config.call()}
+  @type t :: %__MODULE__{
+          ways: [way()],
+          asked: integer() | nil,
+          until_ms: integer(),
+          reply: Robot.Config.call()
+        }
 
   @doc """
   The first way that is open, for a pilot in this state, after a stop that left this.

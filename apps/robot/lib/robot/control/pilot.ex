@@ -192,7 +192,17 @@ defmodule Robot.Control.Pilot do
     cond do
       System.monotonic_time(:millisecond) >= delivery.until_ms -> {:error, :late}
       Board.latched?(data.board) -> {:error, :held}
+      stopped?(delivery.asked, data.board) -> {:error, :stopped}
       true -> :ok
+    end
+  end
+
+  defp stopped?(nil, _board), do: false
+
+  defp stopped?(asked, board) do
+    case Board.fetch(board, :stopped, :infinity) do
+      {:ok, stopped, _at_ms} -> asked < stopped
+      :error -> false
     end
   end
 

@@ -17,12 +17,12 @@ defmodule Robot.Mission.Runner do
           robot: atom(),
           module: module() | nil,
           mission: term(),
-          phase: term(),
+          phase: atom(),
           claim: map(),
           halted: {module(), mission :: term()} | nil
         }
 
-  @type state :: :idle | {module(), phase :: term()}
+  @type state :: :idle | {module(), phase :: atom()}
 
   @doc "An idle robot's."
   @spec new(robot :: atom()) :: t()
@@ -66,12 +66,12 @@ defmodule Robot.Mission.Runner do
   def state(%__MODULE__{module: nil}), do: :idle
   def state(%__MODULE__{module: module, phase: phase}), do: {module, phase}
 
-  defp follow(runner, {phase, mission, effects}) do
+  defp follow(runner, {phase, mission, effects}) when is_atom(phase) and is_list(effects) do
     runner = %{runner | phase: phase, mission: mission}
     {Enum.reduce(effects, runner, &note/2), effects}
   end
 
-  defp note({:claim, claim}, runner), do: %{runner | claim: claim}
+  defp note({:claim, claim}, runner) when is_map(claim), do: %{runner | claim: claim}
 
   # A wrong one is the mission's fault, which crashes with it, and not the controller.
   defp note({:goal, _tag, goal}, runner) do

@@ -1,6 +1,7 @@
 defmodule Sim.Trial.Options do
   @moduledoc "What a run may be asked for, with its defaults, checked. Pure."
   alias Hal.Options
+  alias Hal.Options.Type
   alias Missions.Landmark
   alias Sim.Trial.Cuts
 
@@ -19,16 +20,19 @@ defmodule Sim.Trial.Options do
     ],
     start: [{:one_of, [:spread, :same]}, default: :spread],
     landmark: [{:or, :default, {:or, :none, @place}}, default: :default],
-    moves: [{:check, &is_list/1, "[{{x, y}, at_s}]"}, default: []],
-    kills: [{:check, &is_list/1, "[{robot, at_s}]"}, default: []],
+    moves: [{:check, &__MODULE__.moves?/1, "[{{x, y}, at_s}]"}, default: []],
+    kills: [{:check, &__MODULE__.kills?/1, "[{robot, at_s}]"}, default: []],
     loss: [{:number, 0, 1}, default: 0.0],
     duplicates: [{:number, 0, 1}, default: 0.0],
     delay_ms: [{:span, 0, 3_600_000, "whole ms"}, default: {5, 50}],
-    cuts: [{:check, &is_list/1, "[{from_s, to_s, [[:mag1], [:mag2]]}]"}, default: []],
+    cuts: [{:check, &__MODULE__.cuts?/1, "[{from_s, to_s, [[:mag1], [:mag2]]}]"}, default: []],
     noise: [{:one_of, [:off, :default, :slip]}, default: :default],
-    duration_s: [{:check, &is_number/1, "seconds"}, default: 120],
+    duration_s: [{:check, &__MODULE__.duration?/1, "seconds, 0 to 1000000,"}, default: 120],
     blobs: [{:one_of, [:painted, :direct]}, default: :painted],
-    hardware: [{:check, &is_list/1, "a list of robots of this run, [:mag1],"}, default: []]
+    hardware: [
+      {:check, &__MODULE__.ids?/1, "a list of robots of this run, [:mag1],"},
+      default: []
+    ]
   ]
   # Those of the mission, less what the robots know themselves.
   @mission [formation: {:column, 1.0}, assign: :cost, leader_change: true, policy: :available] ++
@@ -81,8 +85,37 @@ defmodule Sim.Trial.Options do
   defp refuse(key, value, allowed), do: Options.refuse("trial", [key], value, allowed)
 
   @doc false
-  def robots?([_ | _] = robots), do: Enum.all?(robots, &robot?/1) and robots == Enum.uniq(robots)
+  def robots?([_ | _] = robots),
+    do: Type.list?(robots) and Enum.all?(robots, &robot?/1) and robots == Enum.uniq(robots)
+
   def robots?(_other), do: false
+
+  @doc false
+  def duration?(seconds), do: is_number(seconds) and seconds >= 0 and seconds <= 1_000_000
+
+  @doc false
+  def moves?(moves), do: Type.list?(moves) and Enum.all?(moves, &move?/1)
+
+  defp move?({{x, y}, at_s}), do: is_number(x) and is_number(y) and is_number(at_s)
+  defp move?(_other), do: false
+
+  @doc false
+  def kills?(kills), do: Type.list?(kills) and Enum.all?(kills, &kill?/1)
+
+  defp kill?({robot, at_s}), do: is_atom(robot) and is_number(at_s)
+  defp kill?(_other), do: false
+
+  @doc false
+  def cuts?(cuts), do: Type.list?(cuts) and Enum.all?(cuts, &cut?/1)
+
+  defp cut?({from_s, to_s, groups}),
+    do:
+      is_number(from_s) and is_number(to_s) and Type.list?(groups) and Enum.all?(groups, &ids?/1)
+
+  defp cut?(_other), do: false
+
+  @doc false
+  def ids?(ids), do: Type.list?(ids) and Enum.all?(ids, &is_atom/1)
 
   defp robot?(id) when is_atom(id), do: String.starts_with?(Atom.to_string(id), ["mag", "min"])
   defp robot?(_other), do: false

@@ -91,8 +91,11 @@ defmodule Swarm.Commands.Client do
 
   defp first(id, to, request) do
     cond do
-      not Freshness.needed?(request) or (is_pid(to) and node(to) == node()) ->
+      not Freshness.needed?(request) ->
         post(id, to, request, nil)
+
+      is_pid(to) and node(to) == node() ->
+        post(id, to, request, {:asked, System.monotonic_time(:microsecond)})
 
       # An e-stop process knows its own stamps only.
       stamp = request != :reset && stamp(id) ->

@@ -19,6 +19,8 @@ defmodule Swarm.Commands.Freshness do
 
   @keep 32
   @too_old_ms 2_000
+  # Whoever asks on this node gives up then (`Swarm.Commands.Client`).
+  @local_us 500_000
   # Who asks for stamps again and again shall not push heartbeats out of the memory.
   @anew_ms 200
 
@@ -97,8 +99,30 @@ defmodule Swarm.Commands.Freshness do
       else: :ok
   end
 
+  @doc """
+  Whether what was asked on this node at `asked` may begin at `now`, the last stop being that of `stopped`: microseconds
+  of `System.monotonic_time/1`. Whoever asked waits for half a second, and what was asked before a stop ended with it.
+
+      iex> Swarm.Commands.Freshness.local(1_000_000, 1_200_000, 900_000)
+      :ok
+      iex> Swarm.Commands.Freshness.local(1_000_000, 1_200_000, 1_100_000)
+      {:error, :stopped}
+      iex> Swarm.Commands.Freshness.local(1_000_000, 1_700_000, nil)
+      {:error, 700}
+  """
+  @spec local(asked :: integer(), now :: integer(), stopped :: integer() | nil) ::
+          :ok | {:error, age_ms :: pos_integer() | :unknown | :stopped}
+  def local(asked, now, _stopped) when asked > now, do: {:error, :unknown}
+  def local(asked, _now, stopped) when stopped != nil and asked < stopped, do: {:error, :stopped}
+  def local(asked, now, _stopped) when now - asked < @local_us, do: :ok
+  def local(asked, now, _stopped), do: {:error, div(now - asked, 1_000)}
+
   @doc "What a robot answers to a command that it does not obey for its age."
-  @spec refusal(robot :: atom(), age_ms :: integer() | :unknown) :: {:error, String.t()}
+  @spec refusal(robot :: atom(), age_ms :: integer() | :unknown | :stopped) ::
+          {:error, String.t()}
+  def refusal(robot, :stopped),
+    do: {:error, "#{robot} was stopped after this was asked; say it again"}
+
   def refusal(robot, :unknown),
     do: {:error, "#{robot} got this too late to know how old it is; say it again"}
 

@@ -26,19 +26,25 @@ defmodule Swarm.Comms.CommandHandler do
   alias Robot.Mission.Manual
   alias Mesh.Nonblocking
   alias Swarm.{Missions, Status}
-  alias Swarm.Commands.Order
+  alias Swarm.Commands.{Freshness, Order}
   alias Swarm.Comms.PingReply
   alias Swarm.Message.Receiver
 
   # Whoever asks has half a second (`Swarm.Commands.Client`): later nothing is begun.
   @carry_out_ms 400
+  # The drive may begin at the last moment, and takes a while.
+  @drive_ms 50
 
-  @doc "Takes a request, which the process behind `ref` (`Mesh.Nonblocking.answer/2`) is told the outcome of."
-  @spec take(term(), reference(), Config.t(), Board.t(), Receiver.t()) :: :ok
-  def take(request, ref, config, board, receiver) do
+  @doc """
+  Takes a request that was asked at `asked` (`System.monotonic_time/1`, microseconds). The process behind `ref` is
+  told the outcome (`Mesh.Nonblocking.answer/2`).
+  """
+  @spec take(term(), {reference(), asked :: integer()}, Config.t(), Board.t(), Receiver.t()) ::
+          :ok
+  def take(request, {ref, asked}, config, board, receiver) do
     case judge(request, config, board, receiver) do
-      {:drive, order} -> drive(order, config.id, ref)
-      {:mission, ways, command} -> deliver(ways, command, config.id, ref)
+      {:drive, order} -> drive(order, config.id, ref, asked)
+      {:mission, ways, command} -> deliver(ways, command, config.id, ref, asked)
       answer -> Nonblocking.answer(ref, answer)
     end
   end
@@ -67,18 +73,24 @@ defmodule Swarm.Comms.CommandHandler do
   end
 
   # A drive that hangs answers nobody, so that somebody else has to; of two answers only the first arrives.
-  defp drive(order, id, ref) do
-    until_ms = System.monotonic_time(:millisecond) + @carry_out_ms
+  defp drive(order, id, ref, asked) do
+    until_ms = div(asked, 1_000) + @carry_out_ms
     Device.order_later(Names.via(id, :drive), order, until_ms, {__MODULE__, :ordered, [id, ref]})
     unanswered = {:error, "#{id}: the drive does not answer"}
-    Process.send_after(self(), {:unanswered, ref, unanswered}, until_ms, abs: true)
+    Process.send_after(self(), {:unanswered, ref, unanswered}, until_ms + @drive_ms, abs: true)
     :ok
   end
 
-  defp deliver(ways, command, id, ref) do
-    until_ms = System.monotonic_time(:millisecond) + @carry_out_ms
+  defp deliver(ways, command, id, ref, asked) do
+    until_ms = div(asked, 1_000) + @carry_out_ms
     reply = {__MODULE__, :delivered, [id, command, ref]}
-    Pilot.deliver(id, command, %Delivery{ways: ways, until_ms: until_ms, reply: reply})
+
+    Pilot.deliver(id, command, %Delivery{
+      ways: ways,
+      asked: asked,
+      until_ms: until_ms,
+      reply: reply
+    })
   end
 
   @doc "What became of an order for the wheels, says the drive's device; answers it to whoever asked."
@@ -96,6 +108,8 @@ defmodule Swarm.Comms.CommandHandler do
   defp answer({:error, :idle}, id, _formation), do: shapeless(id)
   defp answer({:error, :no_mission}, id, _start), do: {:error, "#{id} has no such mission"}
   defp answer({:error, :late}, id, _command), do: {:error, "#{id} answers too late; say it again"}
+
+  defp answer({:error, :stopped}, id, _command), do: Freshness.refusal(id, :stopped)
 
   defp held(id), do: {:error, "#{id} is held by the emergency stop; reset it first"}
 

@@ -59,11 +59,16 @@ defmodule Swarm.EStop.Actions do
     s
   end
 
-  # Whoever is not held drives on.
+  # Whoever is not held drives on. A button of the gate's own may have been pressed since this was asked.
   def obey(s, :reset, ref) do
-    s = released(s)
-    Nonblocking.answer(ref, :ok)
-    s
+    if Board.latched?(s.board) do
+      Nonblocking.answer(ref, {:error, "#{s.id} was stopped meanwhile; reset it again"})
+      follow(s)
+    else
+      s = released(s)
+      Nonblocking.answer(ref, :ok)
+      s
+    end
   end
 
   def obey(s, request, ref) do
@@ -117,7 +122,10 @@ defmodule Swarm.EStop.Actions do
 
   # The gate stands at once. The goal goes also where the pilot is stuck in its mission, and again
   # when the mission is out of command: it may have set another meanwhile.
-  defp halt(%{id: id}, then) do
+  defp halt(%{id: id} = s, then) do
+    # What was asked before this begins nothing after it (`Swarm.Commands.Freshness.local/3`, `Robot.Control.Pilot`).
+    now = System.monotonic_time(:microsecond)
+    Board.put(s.board, :estop, :stopped, now, Config.now(s.config))
     :ok = Gate.forget(id)
     :ok = Executive.stand(id)
     :ok = Pilot.halt(id, then)
@@ -133,7 +141,7 @@ defmodule Swarm.EStop.Actions do
   @spec become(t(), EStop.State.t()) :: t()
   def become(%{stop: stop} = s, stop), do: s
 
-  # Written down before the gate is told: a brake that restarts in between knows that there is a
+  # Written down before the gate is told: an e-stop process that restarts in between knows that there is a
   # stop to carry out and to spread.
   def become(%{stop: before} = s, stop) do
     s = hold(write(%{s | stop: stop}))
@@ -154,7 +162,19 @@ defmodule Swarm.EStop.Actions do
 
   @doc "The gate's latch is as it is: a button of its own may have set or cleared it."
   @spec follow(t()) :: t()
-  def follow(s), do: become(s, EStop.State.follow(s.stop, Board.latched?(s.board)))
+  def follow(s) do
+    latched? = Board.latched?(s.board)
+    # A reset that is being carried out was asked before this.
+    s = if latched?, do: %{s | pressed: make_ref()}, else: s
+    become(s, EStop.State.follow(s.stop, latched?))
+  end
+
+  @doc "A heartbeat said that of the stop of its robot."
+  @spec heard(t(), number :: non_neg_integer(), latched? :: boolean()) :: t()
+  def heard(s, number, latched?) do
+    s = if latched? and number > s.stop.known, do: %{s | pressed: make_ref()}, else: s
+    become(s, EStop.State.hear(s.stop, number, latched?))
+  end
 
   @doc "Writes down how the stop stands."
   @spec write(t()) :: t()

@@ -109,7 +109,7 @@ defmodule Swarm.EStop.Broadcaster do
   end
 
   defp send_out(call, age_ms) do
-    for brake <- Directory.members(:estops), do: Nonblocking.cast(brake, {:estop, call, age_ms})
+    for pid <- Directory.members(:estops), do: Nonblocking.cast(pid, {:estop, call, age_ms})
     Mesh.broadcast(:stop, {:estop, call, age_ms})
   end
 

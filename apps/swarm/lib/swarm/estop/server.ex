@@ -17,7 +17,7 @@ defmodule Swarm.EStop.Server do
       board: board,
       stop: EStop.Actions.written(board),
       stamps: Freshness.new(System.system_time(:nanosecond)),
-      brakes: nil,
+      group: nil,
       name: nil,
       pressed: make_ref(),
       reset_ms: nil
@@ -35,20 +35,20 @@ defmodule Swarm.EStop.Server do
     {:noreply,
      %{
        s
-       | brakes: Directory.Membership.enter([:estops]),
+       | group: Directory.Membership.enter([:estops]),
          name: Directory.Membership.enter([{:estop, s.id}])
      }}
   end
 
   @impl GenServer
-  # Brakes are found in the directory, so anything may come here from anywhere, and counts as
+  # E-stop processes are found in the directory, so anything may come here from anywhere, and counts as
   # nothing.
   def handle_call(_unknown, _from, s), do: {:noreply, s}
 
   @impl GenServer
   def handle_cast({:beat, number, latched?}, s)
       when is_integer(number) and number >= 0 and is_boolean(latched?),
-      do: {:noreply, EStop.Actions.become(s, EStop.State.hear(s.stop, number, latched?))}
+      do: {:noreply, EStop.Actions.heard(s, number, latched?)}
 
   # As the latch is now, not as it was when the gate said so: this process may have set it again since.
   def handle_cast(:latch, s), do: {:noreply, EStop.Actions.follow(s)}
@@ -99,16 +99,22 @@ defmodule Swarm.EStop.Server do
 
   @impl GenServer
   def handle_info(message, s) do
-    case {Directory.Membership.arrived(s.brakes, message),
+    case {Directory.Membership.arrived(s.group, message),
           Directory.Membership.arrived(s.name, message)} do
-      {{:ok, brakes}, :other} -> {:noreply, %{s | brakes: brakes}}
+      {{:ok, group}, :other} -> {:noreply, %{s | group: group}}
       {:other, {:ok, name}} -> {:noreply, %{s | name: name}}
       {:other, :other} -> {:noreply, s}
     end
   end
 
+  defp fresh(_s, _request, ref, {:asked, asked}) when is_integer(asked) and node(ref) == node(),
+    do: Freshness.local(asked, System.monotonic_time(:microsecond), nil)
+
+  defp fresh(s, request, ref, stamp),
+    do: Freshness.judge(s.stamps, request, ref, stamp, Config.now(s.config))
+
   defp command(s, request, ref, stamp) do
-    case Freshness.judge(s.stamps, request, ref, stamp, Config.now(s.config)) do
+    case fresh(s, request, ref, stamp) do
       :ok ->
         EStop.Actions.obey(s, request, ref)
 

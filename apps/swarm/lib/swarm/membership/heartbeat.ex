@@ -112,7 +112,8 @@ defmodule Swarm.Membership.Heartbeat do
     }
 
     # These are for people, who ask the robot itself.
-    struct!(beat, Map.drop(claim, [:blocked_by, :uncertainty]))
+    # So is what a mission of one's own may claim besides.
+    struct(beat, Map.drop(claim, [:blocked_by, :uncertainty]))
   end
 
   @doc """

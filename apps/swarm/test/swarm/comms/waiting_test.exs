@@ -87,6 +87,40 @@ defmodule Swarm.Comms.WaitingTest do
     eventually(fn -> Swarm.goto(id, {1, 1}) == :ok end)
   end
 
+  test "an order that waited in front of a held-up comms process begins nothing after a stop, or once nobody waits" do
+    id = talking(:waiting_comms)
+    comms = Names.whereis(id, :comms)
+    :ok = :sys.suspend(comms)
+    asked = Task.async(fn -> Swarm.tell(id, "move:0.2:0") end)
+    eventually(fn -> Process.info(comms, :message_queue_len) != {:message_queue_len, 0} end)
+    assert Swarm.stop(id) == :ok
+    :ok = :sys.resume(comms)
+    assert {:error, line} = Task.await(asked)
+    assert line =~ "was stopped after this was asked"
+    assert state(id) == :idle
+
+    :ok = :sys.suspend(comms)
+    assert Swarm.tell(id, "move:0.2:0") == {:error, "waiting_comms does not answer"}
+    :ok = :sys.resume(comms)
+    assert {:ok, _line} = Swarm.tell(id, "ping")
+    _handled = :sys.get_state(Names.whereis(id, :pilot))
+    assert state(id) == :idle
+    assert Swarm.tell(id, "move:0.2:0") == :ok
+  end
+
+  test "a held-up order to arm does not undo a disarm" do
+    id = talking(:waiting_arm, arm: :manual)
+    comms = Names.whereis(id, :comms)
+    drive = Names.whereis(id, :drive)
+    :ok = :sys.suspend(comms)
+    asked = Task.async(fn -> Swarm.arm(id) end)
+    eventually(fn -> Process.info(comms, :message_queue_len) != {:message_queue_len, 0} end)
+    assert Swarm.disarm(id) == :ok
+    :ok = :sys.resume(comms)
+    assert {:error, _line} = Task.await(asked)
+    assert %{state: :disarmed} = Hal.Device.arming(drive)
+  end
+
   test "an order that comes to the pilot after an emergency stop is refused there" do
     id = talking(:waiting_held)
     pilot = Names.whereis(id, :pilot)
