@@ -537,6 +537,12 @@ defmodule PlayerTest do
     assert options(again(result.text))[:port] == "a\#{1}\\\\b"
   end
 
+  test "a number of sonars that is not a number is told, beside poses" do
+    text = ~s|driver ( name "rflex" num_sonars "+" mrad_sonar_poses [0 200 0 1.5708 0 200] )|
+    assert {:error, line} = Player.import(text)
+    assert line =~ "num_sonars: has a value that it cannot have"
+  end
+
   test "random damage never raises, and what comes over is always a robot" do
     bytes = ~c"[](),\"#.-+ \n\t0159azAZ_:" ++ [0, 200, 255]
 

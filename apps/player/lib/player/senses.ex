@@ -191,8 +191,11 @@ defmodule Player.Senses do
   end
 
   defp sonars(others) do
-    total("num_sonars_in_bank", others) ||
-      with(count when is_integer(count) <- value("num_sonars", others), do: {count, "num_sonars"})
+    case total("num_sonars_in_bank", others) || value("num_sonars", others) do
+      {count, name} when is_integer(count) -> {count, name}
+      count when is_integer(count) -> {count, "num_sonars"}
+      _not_a_number -> nil
+    end
   end
 
   defp infrareds(others), do: total("rflex_banks", others)

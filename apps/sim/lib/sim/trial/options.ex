@@ -25,7 +25,7 @@ defmodule Sim.Trial.Options do
     loss: [{:number, 0, 1}, default: 0.0],
     duplicates: [{:number, 0, 1}, default: 0.0],
     delay_ms: [{:span, 0, 3_600_000, "whole ms"}, default: {5, 50}],
-    cuts: [{:check, &__MODULE__.cuts?/1, "[{from_s, to_s, [[:mag1], [:mag2]]}]"}, default: []],
+    cuts: [{:check, &Type.list?/1, "[{from_s, to_s, [[:mag1], [:mag2]]}]"}, default: []],
     noise: [{:one_of, [:off, :default, :slip]}, default: :default],
     duration_s: [{:check, &__MODULE__.duration?/1, "seconds, 0 to 1000000,"}, default: 120],
     blobs: [{:one_of, [:painted, :direct]}, default: :painted],
@@ -104,15 +104,6 @@ defmodule Sim.Trial.Options do
 
   defp kill?({robot, at_s}), do: is_atom(robot) and is_number(at_s)
   defp kill?(_other), do: false
-
-  @doc false
-  def cuts?(cuts), do: Type.list?(cuts) and Enum.all?(cuts, &cut?/1)
-
-  defp cut?({from_s, to_s, groups}),
-    do:
-      is_number(from_s) and is_number(to_s) and Type.list?(groups) and Enum.all?(groups, &ids?/1)
-
-  defp cut?(_other), do: false
 
   @doc false
   def ids?(ids), do: Type.list?(ids) and Enum.all?(ids, &is_atom/1)
