@@ -63,9 +63,9 @@ defmodule Mesh.Options do
   def new(options) do
     with {:ok, options} <- Options.check(options, @table, "mesh"),
          options = struct!(__MODULE__, options),
+         {:ok, fleet} <- fleet(options.fleet),
          {:ok, secret} <- secret(options),
          {:ok, started} <- start(options) do
-      fleet = options.fleet || Roster.fleet()
       dist_port = options.dist_port || own_port()
       {:ok, %{options | dist_port: dist_port, secret: secret, fleet: fleet, started: started}}
     end
@@ -81,6 +81,10 @@ defmodule Mesh.Options do
          :ok <- Secret.apply_cookie(options.secret),
          do: {:ok, options}
   end
+
+  defp fleet(nil), do: {:ok, Roster.fleet()}
+  defp fleet([_ | _] = names), do: {:ok, names}
+  defp fleet([]), do: Hal.Options.refuse("mesh", [:fleet], [], "one robot's name at least")
 
   defp secret(%{secret: %Secret{} = secret}), do: {:ok, secret}
   defp secret(%{secret_file: nil}), do: Secret.from_env()

@@ -42,15 +42,9 @@ defmodule Mesh.Roster do
   @spec fleet() :: [atom(), ...]
   def fleet, do: for(kind <- ~w(mag min), n <- 1..100, do: :"#{kind}#{n}")
 
-  @doc "The type of a configured fleet, for a table of `Hal.Options`: a list of names, which is not empty."
+  @doc "The type of a configured fleet, for a table of `Hal.Options`: a list of names."
   @spec type() :: Hal.Options.Type.t()
-  def type, do: {:check, &__MODULE__.fleet?/1, "a list of 1 to #{@most} names such as :mag1"}
-
-  @doc false
-  def fleet?([_ | _] = names),
-    do: Hal.Options.Type.list?(names) and length(names) <= @most and Enum.all?(names, &name?/1)
-
-  def fleet?(_other), do: false
+  def type, do: {:list, {:check, &__MODULE__.name?/1, "a robot's name such as :mag1"}, @most}
 
   @doc false
   def name?(name), do: is_atom(name) and Regex.match?(~r/\A[a-z][a-z0-9_]{0,30}\z/, "#{name}")

@@ -103,6 +103,7 @@ defmodule Mesh.PureTest do
           {[peers: :all], "mesh option peers cannot be :all: a list of addresses such as"},
           {[interface: "eth0"], ~s(mesh option interface cannot be "eth0": an IPv4 address)},
           {[multicast: nil], "mesh option multicast cannot be nil"},
+          {[fleet: []], "mesh option fleet cannot be []"},
           {[fleet: [:"mag1\n"]], "mesh option fleet.1 cannot be"},
           {[fleet: ["mag1"]],
            ~s(mesh option fleet.1 cannot be "mag1": a robot's name such as :mag1)},
