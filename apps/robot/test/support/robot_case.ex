@@ -88,7 +88,7 @@ defmodule Robot.Case do
   end
 
   @doc "Waits until the wheels roll."
-  def rolls(ms \\ 400) do
+  def rolls(ms \\ 3_000) do
     assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v > 0, ms
     forget_drives()
   end
