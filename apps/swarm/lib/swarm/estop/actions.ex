@@ -169,13 +169,6 @@ defmodule Swarm.EStop.Actions do
     become(s, EStop.State.follow(s.stop, latched?))
   end
 
-  @doc "A heartbeat said that of the stop of its robot."
-  @spec heard(t(), number :: non_neg_integer(), latched? :: boolean()) :: t()
-  def heard(s, number, latched?) do
-    s = if latched? and number > s.stop.known, do: %{s | pressed: make_ref()}, else: s
-    become(s, EStop.State.hear(s.stop, number, latched?))
-  end
-
   @doc "Writes down how the stop stands."
   @spec write(t()) :: t()
   def write(s) do

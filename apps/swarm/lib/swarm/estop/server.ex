@@ -48,7 +48,7 @@ defmodule Swarm.EStop.Server do
   @impl GenServer
   def handle_cast({:beat, number, latched?}, s)
       when is_integer(number) and number >= 0 and is_boolean(latched?),
-      do: {:noreply, EStop.Actions.heard(s, number, latched?)}
+      do: {:noreply, EStop.Actions.become(s, EStop.State.hear(s.stop, number, latched?))}
 
   # As the latch is now, not as it was when the gate said so: this process may have set it again since.
   def handle_cast(:latch, s), do: {:noreply, EStop.Actions.follow(s)}
