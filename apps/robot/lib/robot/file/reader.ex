@@ -213,6 +213,7 @@ defmodule Robot.File.Reader do
   defp line({_, meta, _}), do: Keyword.get(meta, :line, 1)
   defp line(_other), do: 1
 
+  @spec refuse(quoted(), String.t()) :: no_return()
   defp refuse(quoted, what), do: problem(quoted, shorten(what) <> " cannot be here" <> @only)
 
   @spec problem(quoted(), String.t()) :: no_return()
