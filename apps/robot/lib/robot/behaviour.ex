@@ -7,6 +7,7 @@ defmodule Robot.Behaviour do
   others (`Robot.Behaviour.Sequence`, `.Parallel`, `.Fsm`, …). It goes on until it reports an
   outcome, an integer as in the thesis (R12), which combinators use to choose what comes next.
   """
+  alias Hal.Options.Type
   alias Robot.{Percept, Wish}
 
   @type t :: {module(), state :: term()}
@@ -33,6 +34,8 @@ defmodule Robot.Behaviour do
       {:error, "NoSuchModule is not a behaviour: a module with new/1 and tick/2 is allowed"}
       iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: :far, y: 2.0})
       {:error, "Robot.Behaviour.Goto: goto option x cannot be :far: a number from -1.0e6 to 1.0e6 m is allowed"}
+      iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: 1.0, y: 2.0, discs: :junk})
+      {:error, "option discs cannot be :junk: [{x, y, radius}] in metres is allowed"}
   """
   @spec check(term()) :: :ok | {:error, line :: String.t()}
   def check(nil), do: :ok
@@ -44,7 +47,7 @@ defmodule Robot.Behaviour do
 
       Code.ensure_loaded?(module) and function_exported?(module, :new, 1) and
           function_exported?(module, :tick, 2) ->
-        made(module, Keyword.delete(options, :discs))
+        with :ok <- discs(options), do: made(module, Keyword.delete(options, :discs))
 
       true ->
         {:error,
@@ -54,6 +57,26 @@ defmodule Robot.Behaviour do
 
   def check(other),
     do: {:error, "#{brief(other)} is not a goal: {module, options} or nil is allowed"}
+
+  # What every goal may have besides (`Robot.Behaviour.Avoid`).
+  defp discs(options) do
+    discs = Keyword.get(options, :discs, [])
+
+    if discs?(discs),
+      do: :ok,
+      else:
+        {:error, "option discs cannot be #{brief(discs)}: [{x, y, radius}] in metres is allowed"}
+  end
+
+  @doc "Whether these are discs to go round: `[{x, y, radius}]` in the map frame, metres."
+  @spec discs?(term()) :: boolean()
+  def discs?(discs),
+    do:
+      Type.list?(discs) and
+        Enum.all?(
+          discs,
+          &match?({x, y, r} when is_number(x) and is_number(y) and is_number(r) and r > 0, &1)
+        )
 
   # Wrong options raise, by contract.
   defp made(module, options) do

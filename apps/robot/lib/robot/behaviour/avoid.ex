@@ -39,7 +39,7 @@ defmodule Robot.Behaviour.Avoid do
   def new(options) do
     table = [
       inner: [{:check, &match?({_, _}, &1), "a behaviour"}, required: true],
-      discs: [{:check, &discs?/1, "[{x, y, radius}]"}, default: []]
+      discs: [{:check, &Behaviour.discs?/1, "[{x, y, radius}]"}, default: []]
     ]
 
     state = %{
@@ -54,11 +54,6 @@ defmodule Robot.Behaviour.Avoid do
 
     {__MODULE__, Enum.into(Options.check!(options, table, "avoid"), state)}
   end
-
-  defp discs?(list) when is_list(list),
-    do: Enum.all?(list, &match?({x, y, r} when is_number(x) and is_number(y) and r > 0, &1))
-
-  defp discs?(_), do: false
 
   @impl Behaviour
   def update(options, state) do
