@@ -130,6 +130,8 @@ defmodule System.DocsTest do
   setup_all do
     Sandbox.remove()
     on_exit(&Sandbox.remove/0)
+    Sandbox.prepare(@root)
+    :ok
   end
 
   for document <- @documents do

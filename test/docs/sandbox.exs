@@ -2,14 +2,18 @@ defmodule Docs.Sandbox do
   @moduledoc """
   A copy of the project for the commands of one document, and the shells in which its `iex>` lines are typed.
 
-  All copies are made in one place, one after the other, with what was built, which is copied once: newer Mix builds all
-  again in another folder, and what the project itself goes on with stays as it is.
+  All copies are made in one place, one after the other, with what was built, which is copied and brought up to date
+  once, before the first document: what the project itself goes on with stays as it is.
   """
   alias Docs.Reader
 
   @left_out ~w(_build deps tmp .git convoy.secret certs)
   # Nothing here meets another fleet of this machine, nor finds a camera.
   @environment [{"CONVOY_INTERFACE", "127.0.0.1"}]
+
+  @doc "Makes the folder, with what was built in it. Where Mix builds all again, this takes as long as that."
+  @spec prepare(Path.t()) :: Path.t()
+  def prepare(root), do: create(root, "none")
 
   @doc "The folder, with what the document takes for granted."
   @spec create(Path.t(), String.t()) :: Path.t()
@@ -53,6 +57,10 @@ defmodule Docs.Sandbox do
       for name <- File.ls!(from),
           name != mine,
           do: File.ln_s!(Path.join(from, name), Path.join(to, name))
+
+      # Newer Mix builds all again in another folder: no command of a document has to wait for that.
+      {printed, status} = System.cmd("mix", ["compile"], cd: folder, stderr_to_stdout: true)
+      status == 0 || raise "mix compile in #{folder}: status #{status}: #{printed}"
     end
   end
 
