@@ -309,7 +309,8 @@ defmodule Robot.FileTest do
           {"[start: 1e5]", ~s(invalid character "e" after number 1)},
           {"[start: \"abc]", ~s(missing terminator: ")},
           {"[start: \"a\\x\"]", "invalid hex escape character"},
-          {"[start: {a: 1, 2}]", "a comma or a value is missing before a:"},
+          # Elixir 1.14 finds the first fault here, newer ones the second.
+          {"[start: {a: 1, 2}]", ~r/is missing before a:|what follows this comma has no key/},
           {"[start: %{a: 1}]", "a map is written %{key => value}"},
           {"[start: %{1}]", "a comma or a value is missing before }"},
           {<<"[id: ", 0xFF, "]">>, "is not text in UTF-8"},

@@ -254,7 +254,8 @@ defmodule Robot.SupervisorTest do
     rolls()
     :ok = :sys.suspend(Names.whereis(id, :gate))
     forget_drives()
-    assert_receive {:drive, {:drive, twist}, _} when twist == @zero, 600
+    # After 500 ms; before the liveness monitor ends the gate, which would stop them as well.
+    assert_receive {:drive, {:drive, twist}, _} when twist == @zero, 1_500
   end
 
   test "a gate that hangs is named within 0.5 s, and ended after 2 s: all above it restarts idle" do

@@ -142,13 +142,12 @@ defmodule Swarm.Comms do
   def handle_cast({:command, request, ref}, s) when is_reference(ref),
     do: {:noreply, command(s, request, ref, nil)}
 
-  def handle_cast({:command, request, ref, stamp}, s) when is_reference(ref),
-    do: {:noreply, command(s, request, ref, stamp)}
+  def handle_cast({:command, request, ref, order}, s) when is_reference(ref),
+    do: {:noreply, command(s, request, ref, order)}
 
   def handle_cast({:stamp, ref}, s) when is_reference(ref) do
-    {stamp, sender} = Sender.stamp(s.sender)
-    Nonblocking.answer(ref, stamp)
-    {:noreply, %{s | sender: sender}}
+    Nonblocking.answer(ref, Freshness.stamp(s.sender.boot, now_us()))
+    {:noreply, s}
   end
 
   def handle_cast(:stop, s), do: {:noreply, %{s | sender: Sender.urge(s.sender, s.receiver)}}
@@ -208,38 +207,31 @@ defmodule Swarm.Comms do
     noted =
       if NameClaim.left?(s.name),
         do: RobotInfo.leave(s.noted, s.id),
-        else: RobotInfo.note(s.noted, s.config, s.board, s.sender.stamps.boot, s.receiver)
+        else: RobotInfo.note(s.noted, s.config, s.board, s.sender.boot, s.receiver)
 
     %{s | noted: noted}
   end
 
   # Who knows no better way than the comms process finds the e-stop process through it.
-  defp command(s, request, ref, stamp) do
-    case fresh(s, request, ref, stamp) do
+  defp command(s, request, ref, order) do
+    here? = node(ref) == node()
+    stopped = EStop.stopped(s.board)
+
+    case Freshness.judge(s.sender.boot, request, order, here?, now_us(), stopped) do
       {:ok, asked} ->
         if EStop.takes?(request),
-          do: EStop.take(s.id, request, ref),
+          do: EStop.take(s.id, request, {ref, asked}),
           else: CommandHandler.take(request, {ref, asked}, s.config, s.board, s.receiver)
 
         s
 
-      {:error, age} ->
-        Nonblocking.answer(ref, Freshness.refusal(s.id, age))
+      {:error, why} ->
+        Nonblocking.answer(ref, Freshness.refusal(s.id, why))
         %{s | receiver: Receiver.reject(s.receiver, :too_old)}
     end
   end
 
-  # When it was asked, as far as that is known here; else now.
-  defp fresh(s, _request, ref, {:asked, asked}) when is_integer(asked) and node(ref) == node() do
-    now = System.monotonic_time(:microsecond)
-    with :ok <- Freshness.local(asked, now, EStop.stopped(s.board)), do: {:ok, asked}
-  end
-
-  defp fresh(s, request, ref, stamp) do
-    with :ok <-
-           Freshness.judge(s.sender.stamps, request, ref, stamp, Config.now(s.config)),
-         do: {:ok, System.monotonic_time(:microsecond)}
-  end
+  defp now_us, do: System.monotonic_time(:microsecond)
 
   defp give_way(s, other) do
     EStop.present(s.id, false)

@@ -90,10 +90,13 @@ defmodule Swarm.EStop do
   def takes?({:estop, _call}), do: true
   def takes?(request), do: request in [:stop, :disarm, :estop, :reset]
 
-  @doc "Takes a request for the e-stop process from the robot's comms process, which has looked how old it is."
-  @spec take(robot :: atom(), request :: term(), reference()) :: :ok
-  def take(robot, request, ref),
-    do: GenServer.cast(Names.via(robot, :estop), {:in_time, request, ref})
+  @doc """
+  Takes a request for the e-stop process from the robot's comms process, which has determined when it was given
+  (`Swarm.Commands.Freshness`).
+  """
+  @spec take(robot :: atom(), request :: term(), {reference(), given_us :: integer()}) :: :ok
+  def take(robot, request, {ref, given_us}),
+    do: GenServer.cast(Names.via(robot, :estop), {:in_time, request, ref, given_us})
 
   @doc "The robot is there for commands by its name, or no longer: another of that name was first."
   @spec present(robot :: atom(), boolean()) :: :ok

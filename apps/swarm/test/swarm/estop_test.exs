@@ -115,6 +115,7 @@ defmodule Swarm.EStopTest do
     # A person ends it.
     call = Broadcaster.sound()
     assert_receive {:"$gen_cast", {:estop, ^call, _age}}
+    assert Swarm.ask(id, {:estop, call}) == :ok
     assert Swarm.reset() == :ok
     :sys.get_state(Broadcaster)
     refute_receive {:"$gen_cast", {:estop, ^call, _age}}, 150

@@ -48,13 +48,18 @@ defmodule Robot.Safety.Gate do
 
   def sense(_robot, _reading), do: :ok
 
-  @doc "Stops the robot until `reset/1`. When this returns, the latch is set and the stop sent."
-  @spec estop(robot :: atom()) :: :ok
-  def estop(robot), do: GenServer.call(Names.via(robot, :gate), :estop)
+  @doc """
+  Stops the robot until `reset/1`. When this returns, the latch is set and the stop sent. Whoever owns the state of the
+  e-stop, and sets the latch by it, does so with `tell: false`: the config's `:on_latch` is not applied then.
+  """
+  @spec estop(robot :: atom(), tell: boolean()) :: :ok
+  def estop(robot, options \\ []),
+    do: GenServer.call(Names.via(robot, :gate), {:estop, Keyword.get(options, :tell, true)})
 
-  @doc "Clears the e-stop: wishes count again. Whoever resets has looked where the robot would go."
-  @spec reset(robot :: atom()) :: :ok
-  def reset(robot), do: GenServer.call(Names.via(robot, :gate), :reset)
+  @doc "Clears the e-stop: wishes count again. Whoever resets has looked where the robot would go. `:tell` as above."
+  @spec reset(robot :: atom(), tell: boolean()) :: :ok
+  def reset(robot, options \\ []),
+    do: GenServer.call(Names.via(robot, :gate), {:reset, Keyword.get(options, :tell, true)})
 
   @impl GenServer
   def init(%Config{id: id} = config) do
@@ -112,21 +117,21 @@ defmodule Robot.Safety.Gate do
   end
 
   @impl GenServer
-  def handle_call(:estop, _from, s) do
+  def handle_call({:estop, tell?}, _from, s) do
     at_ms = heard(s, :estop)
     # The wheels first: the latch has a file, too, and a disk may take its time.
     Board.hold(s.board)
     s = step(%{s | reflex: Reflex.estop(s.reflex)}, at_ms)
-    tell_latch(s)
+    if tell?, do: tell_latch(s)
     Board.latch(s.board)
     Event.execute([:robot, :gate, :estop], %{at_ms: at_ms}, %{robot: s.config.id})
     {:reply, :ok, s}
   end
 
-  def handle_call(:reset, _from, s) do
+  def handle_call({:reset, tell?}, _from, s) do
     at_ms = heard(s, :reset)
     Board.unlatch(s.board)
-    tell_latch(s)
+    if tell?, do: tell_latch(s)
     Event.execute([:robot, :gate, :reset], %{at_ms: at_ms}, %{robot: s.config.id})
     {:reply, :ok, %{s | reflex: Reflex.reset(s.reflex)}}
   end

@@ -1,16 +1,13 @@
 defmodule Swarm.Commands.Client do
   @moduledoc false
   # Asks robots, wherever they are, and gathers what they answer. What stops a robot goes to its
-  # e-stop process, all else to its comms. A command for another node bears a stamp (`Swarm.Commands.Freshness`); who has
-  # none at hand asks the robot for one first.
-  alias Robot.{Board, Names}
+  # e-stop process, all else to its comms. For an order to another node, the robot is first asked for a stamp
+  # (`Swarm.Commands.Freshness`).
   alias Mesh.Nonblocking
   alias Swarm.{Directory, EStop}
   alias Swarm.Commands.Freshness
 
   @answer_ms 500
-  # Half of what is too old for the robot: the other half is for the way there.
-  @fresh_ms 1_000
 
   @doc """
   What the robots answer within half a second; who does not is not in the map. All are asked at once,
@@ -18,16 +15,17 @@ defmodule Swarm.Commands.Client do
   """
   @spec ask([atom()], term()) :: %{atom() => term()}
   def ask(robots, request) do
-    deadline = System.monotonic_time(:millisecond) + @answer_ms
+    given_us = System.monotonic_time(:microsecond)
+    deadline = div(given_us, 1_000) + @answer_ms
 
     waiting =
       for id <- robots,
           to = whereabouts(id, request),
-          asked = first(id, to, request),
+          asked = first(id, to, request, given_us),
           into: %{},
           do: asked
 
-    gather(waiting, request, %{}, deadline)
+    gather(waiting, {request, given_us}, %{}, deadline)
   end
 
   defp gather(waiting, _request, answers, _deadline) when map_size(waiting) == 0, do: answers
@@ -38,7 +36,7 @@ defmodule Swarm.Commands.Client do
         case Map.pop!(waiting, ref) do
           {{:stamp, id, to}, waiting} ->
             waiting =
-              case post(id, to, request, answer) do
+              case stamped(id, to, request, answer) do
                 {ref, about} -> Map.put(waiting, ref, about)
                 nil -> waiting
               end
@@ -89,28 +87,27 @@ defmodule Swarm.Commands.Client do
     end
   end
 
-  defp first(id, to, request) do
+  defp first(id, to, request, given_us) do
     cond do
-      not Freshness.needed?(request) ->
-        post(id, to, request, nil)
-
-      is_pid(to) and node(to) == node() ->
-        post(id, to, request, {:asked, System.monotonic_time(:microsecond)})
-
-      # An e-stop process knows its own stamps only.
-      stamp = request != :reset && stamp(id) ->
-        post(id, to, request, stamp)
-
-      true ->
-        post(id, to, :stamp)
+      not Freshness.needed?(request) -> post(id, to, request, nil)
+      is_pid(to) and node(to) == node() -> post(id, to, request, {:asked, given_us})
+      true -> post(id, to, :stamp)
     end
+  end
+
+  defp stamped(id, to, {request, given_us}, stamp) do
+    waited_us = System.monotonic_time(:microsecond) - given_us
+
+    with {:ok, order} <- Freshness.given(stamp, waited_us),
+         do: post(id, to, request, order),
+         else: (:error -> nil)
   end
 
   defp post(id, to, :stamp), do: cast(id, to, {:stamp}, {:stamp, id, to})
   defp post(id, to, request, nil), do: cast(id, to, {:command, request}, {:command, id})
 
-  defp post(id, to, request, stamp),
-    do: cast(id, to, {:command, request, stamp}, {:command, id})
+  defp post(id, to, request, order),
+    do: cast(id, to, {:command, request, order}, {:command, id})
 
   # By an alias: an answer that comes too late finds no mailbox. `nil` where no way leads there.
   defp cast(id, to, order, about) do
@@ -137,22 +134,5 @@ defmodule Swarm.Commands.Client do
 
   defp with_ref({:stamp}, ref), do: {:stamp, ref}
   defp with_ref({:command, request}, ref), do: {:command, request, ref}
-  defp with_ref({:command, request, stamp}, ref), do: {:command, request, ref, stamp}
-
-  # The newest heartbeat of a robot that this node has heard, by its radio or by one of its robots.
-  defp stamp(id) do
-    case Mesh.beat(id) do
-      {boot, sequence, age_ms} when age_ms < @fresh_ms -> {boot, sequence}
-      _old_or_none -> Enum.find_value(Names.robots(), &heard(&1, id))
-    end
-  end
-
-  defp heard(here, id) do
-    with {:ok, board} <- Board.find(here),
-         {:ok, %{beat: beat}, _at_ms} <- Board.fetch(board, {:peer, id}, @fresh_ms) do
-      {beat.boot, beat.sequence}
-    else
-      :error -> nil
-    end
-  end
+  defp with_ref({:command, request, order}, ref), do: {:command, request, ref, order}
 end

@@ -1,81 +1,50 @@
 defmodule Swarm.Commands.Freshness do
   @moduledoc """
-  Determines the age of a command without a shared clock. Pure; times are the robot's own, in
-  milliseconds.
+  Determines when an order was given, without a shared clock, and whether a robot is still to obey it. Pure; times are
+  `System.monotonic_time/1` of the robot's node, in microseconds.
 
-  Whoever commands a robot of another node writes on it which heartbeat of that robot it heard last,
-  `{boot, sequence}`, or asks the robot for such a stamp. The robot knows when it sent that
-  heartbeat. So what was queued while a link was cut, or the robot was frozen, is told from what
-  somebody wants now: it names a heartbeat that is older than 2 s, or one of another life.
+  Whoever orders on another node first asks the robot for a stamp, which holds the robot's time. The order then carries
+  that time, minus how long the stamp took (`given/2`). So it was given at that time or later. The robot refuses an
+  order that is older than half a second, because whoever gave it no longer waits for an answer; one of another life of
+  the process that made the stamp; and one that was given before the robot was last stopped.
 
-      iex> sent = Swarm.Commands.Freshness.new(7) |> Swarm.Commands.Freshness.sent(1, 1_000)
-      iex> Swarm.Commands.Freshness.check(sent, {7, 1}, 1_400)
-      :ok
-      iex> Swarm.Commands.Freshness.check(sent, {7, 1}, 21_000)
-      {:error, 20_000}
-      iex> Swarm.Commands.Freshness.check(sent, {6, 1}, 1_400)
+      iex> alias Swarm.Commands.Freshness
+      iex> stamp = Freshness.stamp(7, 1_000_000)
+      iex> {:ok, order} = Freshness.given(stamp, 80_000)
+      iex> order
+      {7, 970_000}
+      iex> Freshness.check(7, order, 1_200_000, nil)
+      {:ok, 970_000}
+      iex> Freshness.check(7, order, 1_200_000, 980_000)
+      {:error, :stopped}
+      iex> Freshness.check(7, order, 2_970_000, nil)
+      {:error, 2_000}
+      iex> Freshness.check(8, order, 1_200_000, nil)
       {:error, :unknown}
   """
 
-  @keep 32
-  @too_old_ms 2_000
-  # Whoever asks on this node gives up then (`Swarm.Commands.Client`).
-  @local_us 500_000
-  # Who asks for stamps again and again shall not push heartbeats out of the memory.
-  @anew_ms 200
+  # How long whoever orders waits for an answer (`Swarm.Commands.Client`).
+  @longest_us 500_000
+  # The way back of a stamp. Who stops a robot and then starts it shall not be refused because that way was slow once;
+  # and nobody can tell the order of two things that people do on two machines within this time.
+  @way_back_us 50_000
 
-  @enforce_keys [:boot]
-  defstruct @enforce_keys ++ [beats: []]
+  @typedoc "The number of a process's life, and a time."
+  @type stamp :: {life :: integer(), at_us :: integer()}
 
-  @type stamp :: {boot :: integer(), sequence :: non_neg_integer()}
-  @type t :: %__MODULE__{
-          boot: integer(),
-          beats: [{sequence :: non_neg_integer(), at_ms :: integer()}]
-        }
+  @typedoc "Why an order is not obeyed: its age, which may be unknown, or a stop since it was given."
+  @type refusal :: age_ms :: pos_integer() | :unknown | :stopped
 
-  @doc "Nothing sent yet in the life of this number."
-  @spec new(integer()) :: t()
-  def new(boot), do: %__MODULE__{boot: boot}
+  @doc "A stamp for somebody who asks now."
+  @spec stamp(life :: integer(), now_us :: integer()) :: stamp()
+  def stamp(life, now_us), do: {life, now_us}
 
-  @doc "A heartbeat goes out now. The last 32 are remembered."
-  @spec sent(t(), non_neg_integer(), integer()) :: t()
-  def sent(%__MODULE__{beats: beats} = sent, sequence, now_ms),
-    do: %{sent | beats: Enum.take([{sequence, now_ms} | beats], @keep)}
+  @doc "What an order carries whose stamp came so long after the order was given; `:error` where the stamp is none."
+  @spec given(term(), waited_us :: non_neg_integer()) :: {:ok, stamp()} | :error
+  def given({life, at_us}, waited_us) when is_integer(life) and is_integer(at_us),
+    do: {:ok, {life, at_us - max(waited_us - @way_back_us, 0)}}
 
-  @doc "The number of the last heartbeat, 0 before the first."
-  @spec last(t()) :: non_neg_integer()
-  def last(%__MODULE__{beats: []}), do: 0
-  def last(%__MODULE__{beats: [{sequence, _at_ms} | _]}), do: sequence
-
-  @doc """
-  A stamp for somebody who asks: the last heartbeat's, or, if that is some time ago, one with a
-  number of its own, which no heartbeat will have.
-
-      iex> {stamp, sent} = Swarm.Commands.Freshness.issue(Swarm.Commands.Freshness.new(7), 5_000)
-      iex> {stamp, Swarm.Commands.Freshness.check(sent, stamp, 6_000), Swarm.Commands.Freshness.last(sent)}
-      {{7, 1}, :ok, 1}
-  """
-  @spec issue(t(), integer()) :: {stamp(), t()}
-  def issue(%__MODULE__{boot: boot, beats: [{sequence, at_ms} | _]} = sent, now_ms)
-      when now_ms - at_ms < @anew_ms,
-      do: {{boot, sequence}, sent}
-
-  def issue(sent, now_ms) do
-    sequence = last(sent) + 1
-    {{sent.boot, sequence}, sent(sent, sequence, now_ms)}
-  end
-
-  @doc "Whether what bears this stamp is to be obeyed; if not, the stamp's age, where it is known."
-  @spec check(t(), term(), integer()) :: :ok | {:error, age_ms :: integer() | :unknown}
-  def check(%__MODULE__{boot: boot, beats: beats}, {boot, sequence}, now_ms) do
-    case List.keyfind(beats, sequence, 0) do
-      {_sequence, at_ms} when now_ms - at_ms <= @too_old_ms -> :ok
-      {_sequence, at_ms} -> {:error, now_ms - at_ms}
-      nil -> {:error, :unknown}
-    end
-  end
-
-  def check(_sent, _stamp, _now_ms), do: {:error, :unknown}
+  def given(_other, _waited_us), do: :error
 
   @doc """
   Whether a request needs a stamp. A stop is obeyed at any age, and questions do no harm.
@@ -88,38 +57,56 @@ defmodule Swarm.Commands.Freshness do
   def needed?(request), do: request not in [:stop, :disarm, :estop, :status, :ping]
 
   @doc """
-  Whether a robot is to obey a request now. One without a stamp is obeyed where whoever asked, by the
-  reference that is to be answered, is on this node: it was not queued on the way.
+  Whether a process of this life obeys a request now, and when the request was given, as far as that is known here; else
+  now. `stopped_us` is when the robot was last stopped, `nil` if it never was. An order is given on this node where
+  `here?` says so, and then carries `{:asked, at_us}`, or nothing where it was not queued on the way.
+
+      iex> alias Swarm.Commands.Freshness
+      iex> Freshness.judge(7, :start, {:asked, 1_000_000}, true, 1_200_000, 900_000)
+      {:ok, 1_000_000}
+      iex> Freshness.judge(7, :start, {:asked, 1_000_000}, false, 1_200_000, 900_000)
+      {:error, :unknown}
+      iex> Freshness.judge(7, :stop, nil, false, 1_200_000, 900_000)
+      {:ok, 1_200_000}
   """
-  @spec judge(t(), request :: term(), reference(), stamp :: term(), integer()) ::
-          :ok | {:error, age_ms :: integer() | :unknown}
-  def judge(sent, request, ref, stamp, now_ms) do
-    if needed?(request) and (stamp != nil or node(ref) != node()),
-      do: check(sent, stamp, now_ms),
-      else: :ok
+  @spec judge(
+          life :: integer(),
+          request :: term(),
+          order :: term(),
+          here? :: boolean(),
+          now_us :: integer(),
+          stopped_us :: integer() | nil
+        ) :: {:ok, given_us :: integer()} | {:error, refusal()}
+  def judge(life, request, order, here?, now_us, stopped_us) do
+    if needed?(request),
+      do: judge(life, order, here?, now_us, stopped_us),
+      else: {:ok, now_us}
   end
 
-  @doc """
-  Whether what was asked on this node at `asked` may begin at `now`, the last stop being that of `stopped`: microseconds
-  of `System.monotonic_time/1`. Whoever asked waits for half a second, and what was asked before a stop ended with it.
+  defp judge(life, order, here?, now_us, stopped_us) do
+    case order do
+      {:asked, at_us} when here? -> check(life, {life, at_us}, now_us, stopped_us)
+      nil when here? -> {:ok, now_us}
+      order -> check(life, order, now_us, stopped_us)
+    end
+  end
 
-      iex> Swarm.Commands.Freshness.local(1_000_000, 1_200_000, 900_000)
-      :ok
-      iex> Swarm.Commands.Freshness.local(1_000_000, 1_200_000, 1_100_000)
-      {:error, :stopped}
-      iex> Swarm.Commands.Freshness.local(1_000_000, 1_700_000, nil)
-      {:error, 700}
-  """
-  @spec local(asked :: integer(), now :: integer(), stopped :: integer() | nil) ::
-          :ok | {:error, age_ms :: pos_integer() | :unknown | :stopped}
-  def local(asked, now, _stopped) when asked > now, do: {:error, :unknown}
-  def local(asked, _now, stopped) when stopped != nil and asked < stopped, do: {:error, :stopped}
-  def local(asked, now, _stopped) when now - asked < @local_us, do: :ok
-  def local(asked, now, _stopped), do: {:error, div(now - asked, 1_000)}
+  @doc "Whether an order that carries this is obeyed now by a process of this life, and when it was given."
+  @spec check(integer(), term(), integer(), integer() | nil) ::
+          {:ok, given_us :: integer()} | {:error, refusal()}
+  def check(life, {life, given_us}, now_us, stopped_us)
+      when is_integer(given_us) and given_us <= now_us do
+    cond do
+      now_us - given_us >= @longest_us -> {:error, div(now_us - given_us, 1_000)}
+      stopped_us != nil and given_us < stopped_us -> {:error, :stopped}
+      true -> {:ok, given_us}
+    end
+  end
 
-  @doc "What a robot answers to a command that it does not obey for its age."
-  @spec refusal(robot :: atom(), age_ms :: integer() | :unknown | :stopped) ::
-          {:error, String.t()}
+  def check(_life, _order, _now_us, _stopped_us), do: {:error, :unknown}
+
+  @doc "What a robot answers to an order that it does not obey."
+  @spec refusal(robot :: atom(), refusal()) :: {:error, String.t()}
   def refusal(robot, :stopped),
     do: {:error, "#{robot} was stopped after this was asked; say it again"}
 
@@ -130,6 +117,6 @@ defmodule Swarm.Commands.Freshness do
     seconds = :erlang.float_to_binary(age_ms / 1000, decimals: 1)
 
     {:error,
-     "#{robot} got this too late, #{seconds} s old; at most 2 s are allowed, say it again"}
+     "#{robot} got this too late, #{seconds} s old; at most 0.5 s are allowed, say it again"}
   end
 end

@@ -1,28 +1,31 @@
 defmodule Swarm.Comms.Sender do
   @moduledoc """
-  Sends a robot's messages and heartbeats, and remembers when it sent which heartbeat
-  (`Swarm.Commands.Freshness`). Five heartbeats a second; when the emergency stop changes, one at once and then ten
-  a second for a second, so that it spreads within 200 ms.
+  Sends a robot's messages and heartbeats. Five heartbeats a second; when the emergency stop changes, one at once and
+  then ten a second for a second, so that it spreads within 200 ms.
   """
   alias Robot.{Board, Config}
   alias Swarm.{EStop, Message}
-  alias Swarm.Commands.Freshness
   alias Swarm.Comms.OwnHeartbeat
   alias Swarm.Message.Receiver
   alias Swarm.Membership.Heartbeat
 
   @urgent_ticks 10
 
-  @enforce_keys [:config, :board, :transport, :stamps, :latched?]
-  defstruct @enforce_keys ++ [ticks: 0, beat_ms: nil, urgent: 0, sent: 0, silent?: false]
+  @enforce_keys [:config, :board, :transport, :boot, :latched?]
+  defstruct @enforce_keys ++
+              [sequence: 0, ticks: 0, beat_ms: nil, urgent: 0, sent: 0, silent?: false]
 
-  @typedoc "`latched?` is what it has said of the emergency stop so far, `urgent` how many heartbeats hurry yet."
+  @typedoc """
+  `sequence` is the number of its last heartbeat, `latched?` what it has said of the emergency stop so far, `urgent` how
+  many heartbeats hurry yet.
+  """
   @type t :: %__MODULE__{
           config: Config.t(),
           board: Board.t(),
           transport: Config.call(),
-          stamps: Freshness.t(),
+          boot: integer(),
           latched?: boolean(),
+          sequence: non_neg_integer(),
           ticks: non_neg_integer(),
           beat_ms: integer() | nil,
           urgent: non_neg_integer(),
@@ -37,7 +40,7 @@ defmodule Swarm.Comms.Sender do
       config: config,
       board: board,
       transport: transport,
-      stamps: Freshness.new(boot),
+      boot: boot,
       latched?: EStop.written(board).latched?
     }
 
@@ -78,22 +81,13 @@ defmodule Swarm.Comms.Sender do
     end
   end
 
-  @doc "A stamp for somebody who asks."
-  @spec stamp(t()) :: {Freshness.stamp(), t()}
-  def stamp(%__MODULE__{} = sender) do
-    {stamp, stamps} = Freshness.issue(sender.stamps, Config.now(sender.config))
-    {stamp, %{sender | stamps: stamps}}
-  end
-
   defp beat(sender, receiver, at_ms) do
-    sequence = Freshness.last(sender.stamps) + 1
-    from = {sender.stamps.boot, sequence}
+    sequence = sender.sequence + 1
+    from = {sender.boot, sequence}
 
     case OwnHeartbeat.message(sender.config, sender.board, receiver, from, at_ms) do
       {:ok, message} ->
-        stamps = Freshness.sent(sender.stamps, sequence, at_ms)
-        sender = %{sender | stamps: stamps, beat_ms: at_ms}
-        speak(sender, :all, message)
+        speak(%{sender | sequence: sequence, beat_ms: at_ms}, :all, message)
 
       :error ->
         sender

@@ -11,10 +11,11 @@ defmodule Swarm.EStop.Actions do
   alias Swarm.EStop.Broadcaster
 
   # Whoever asks has half a second (`Swarm.Commands.Client`): a robot that nobody was told of stays held.
-  @release_ms 400
+  @release_us 400_000
 
   @typedoc """
-  `pressed` stands for the last time that somebody stopped it, `reset_ms` is when a person reset it last (monotonic).
+  `pressed` stands for the last time that somebody stopped it, at `pressed_us`; `reset_us` is when the last reset that was
+  carried out was given (both monotonic, microseconds).
   """
   @type t :: %{
           :config => Config.t(),
@@ -22,7 +23,8 @@ defmodule Swarm.EStop.Actions do
           :board => Board.t(),
           :stop => EStop.State.t(),
           :pressed => reference(),
-          :reset_ms => integer() | nil,
+          :pressed_us => integer() | nil,
+          :reset_us => integer() | nil,
           optional(atom()) => term()
         }
 
@@ -38,47 +40,47 @@ defmodule Swarm.EStop.Actions do
   @doc """
   Obeys a request, and answers it. Nobody is waited for here: a mission that is slow to end delays no emergency stop.
   """
-  @spec obey(t(), request :: term(), reference()) :: t()
-  def obey(s, request, ref)
+  @spec obey(t(), request :: term(), {reference(), given_us :: integer()}) :: t()
+  def obey(s, request, about)
 
-  def obey(s, :stop, ref) do
+  def obey(s, :stop, {ref, _given_us}) do
     halt(s, {EStop.Answer, :stood, [s.id, ref]})
     s
   end
 
   # The drive first says that its wheels are disarmed.
-  def obey(s, :disarm, ref) do
+  def obey(s, :disarm, {ref, _given_us}) do
     halt(s, nil)
     stopped = {Pilot, :halt, [s.id, {EStop.Answer, :stood, [s.id, ref]}]}
     :ok = Device.disarm_later(Names.via(s.id, :drive), stopped)
     s
   end
 
-  def obey(%{stop: %{latched?: true}} = s, :reset, ref) do
-    halt(s, {EStop.Answer, :release, [s.id, s.pressed, now() + @release_ms, ref]})
+  def obey(%{stop: %{latched?: true}} = s, :reset, about) do
+    halt(s, {EStop.Answer, :release, [s.id, s.pressed, about]})
     s
   end
 
   # Whoever is not held drives on. A button of the gate's own may have been pressed since this was asked.
-  def obey(s, :reset, ref) do
+  def obey(s, :reset, {ref, given_us}) do
     if Board.latched?(s.board) do
       Nonblocking.answer(ref, {:error, "#{s.id} was stopped meanwhile; reset it again"})
       follow(s)
     else
-      s = released(s)
+      s = released(s, given_us)
       Nonblocking.answer(ref, :ok)
       s
     end
   end
 
-  def obey(s, request, ref) do
+  def obey(s, request, {ref, _given_us}) do
     {answer, s} = answer(request, s)
     Nonblocking.answer(ref, answer)
     s
   end
 
   defp answer(:estop, s) do
-    s = become(%{s | pressed: make_ref()}, EStop.State.press(s.stop))
+    s = press(s, EStop.State.press(s.stop))
     {EStop.Answer.stopped(s.id, s.board), s}
   end
 
@@ -103,7 +105,7 @@ defmodule Swarm.EStop.Actions do
       if over?(s, age_ms) do
         write(%{s | stop: EStop.State.late(s.stop, call)})
       else
-        s = become(%{s | pressed: make_ref()}, stop)
+        s = become(pressed(s), stop)
         Broadcaster.pass_on(call, age_ms)
         s
       end
@@ -112,30 +114,43 @@ defmodule Swarm.EStop.Actions do
     end
   end
 
-  @doc "The gate is free again."
-  @spec released(t()) :: t()
-  def released(s) do
-    :ok = Gate.reset(s.id)
-    Broadcaster.quiet(s.stop.calls)
-    become(%{s | reset_ms: now()}, EStop.State.reset(s.stop))
+  defp pressed(s), do: %{s | pressed: make_ref(), pressed_us: now_us()}
+
+  # Robots hear of a stop by their neighbours' heartbeats, too; but only a call says when it was made, which a robot
+  # that is being reset at this moment must know.
+  defp press(s, stop) do
+    s = become(pressed(s), stop)
+    call = Broadcaster.sound()
+    write(%{s | stop: EStop.State.late(s.stop, call)})
   end
+
+  @doc "The gate is free again, by a reset that was given then."
+  @spec released(t(), given_us :: integer()) :: t()
+  def released(s, given_us) do
+    :ok = Gate.reset(s.id, tell: false)
+    Broadcaster.quiet(s.stop.calls)
+    become(%{s | reset_us: given_us}, EStop.State.reset(s.stop))
+  end
+
+  @doc "Whether who gave a reset then still waits for its answer."
+  @spec waits?(given_us :: integer()) :: boolean()
+  def waits?(given_us), do: now_us() - given_us < @release_us
 
   # The gate stands at once. The goal goes also where the pilot is stuck in its mission, and again
   # when the mission is out of command: it may have set another meanwhile.
   defp halt(%{id: id} = s, then) do
-    # What was asked before this begins nothing after it (`Swarm.Commands.Freshness.local/3`, `Robot.Control.Pilot`).
-    now = System.monotonic_time(:microsecond)
-    Board.put(s.board, :estop, :stopped, now, Config.now(s.config))
+    # What was asked before this begins nothing after it (`Swarm.Commands.Freshness`, `Robot.Control.Pilot`).
+    Board.put(s.board, :estop, :stopped, now_us(), Config.now(s.config))
     :ok = Gate.forget(id)
     :ok = Executive.stand(id)
     :ok = Pilot.halt(id, then)
   end
 
   # Made before a person reset this robot: somebody far away has only now been heard.
-  defp over?(%{reset_ms: nil}, _age_ms), do: false
-  defp over?(%{reset_ms: reset_ms}, age_ms), do: age_ms > now() - reset_ms
+  defp over?(%{reset_us: nil}, _age_ms), do: false
+  defp over?(%{reset_us: reset_us}, age_ms), do: 1_000 * age_ms > now_us() - reset_us
 
-  defp now, do: System.monotonic_time(:millisecond)
+  defp now_us, do: System.monotonic_time(:microsecond)
 
   @doc "How the stop stands from now on: written down, carried out and spread, if it is another."
   @spec become(t(), EStop.State.t()) :: t()
@@ -156,17 +171,19 @@ defmodule Swarm.EStop.Actions do
   @doc "Has the gate latched if the stop stands so, and it is not."
   @spec hold(t()) :: t()
   def hold(s) do
-    if s.stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id)
+    if s.stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id, tell: false)
     s
   end
 
-  @doc "The gate's latch is as it is: a button of its own may have set or cleared it."
+  @doc """
+  A button of the gate's own has set or cleared its latch, which counts as it is now. It may have been set again
+  although it was set: a reset that is being carried out was given before that.
+  """
   @spec follow(t()) :: t()
   def follow(s) do
     latched? = Board.latched?(s.board)
-    # A reset that is being carried out was asked before this.
-    s = if latched?, do: %{s | pressed: make_ref()}, else: s
-    become(s, EStop.State.follow(s.stop, latched?))
+    stop = EStop.State.follow(s.stop, latched?)
+    if latched?, do: press(s, stop), else: become(s, stop)
   end
 
   @doc "Writes down how the stop stands."

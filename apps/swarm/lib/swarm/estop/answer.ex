@@ -5,13 +5,13 @@ defmodule Swarm.EStop.Answer do
   alias Mesh.Nonblocking
 
   @doc """
-  What the robot was at has ended, says its gate: it may be released, before that time (monotonic, ms; who asked for
-  it hears nothing later), and if nobody has stopped it since it was
-  in the state that `pressed` stands for.
+  What the robot was at has ended, says its gate: it may be released by the reset that was given at `given_us`, if
+  whoever gave it still waits for `ref`, and if nobody has stopped the robot since it was in the state that `pressed`
+  stands for.
   """
-  @spec release(atom(), pressed :: reference(), until_ms :: integer(), reference()) :: :ok
-  def release(robot, pressed, until_ms, ref),
-    do: GenServer.cast(Names.via(robot, :estop), {:release, pressed, until_ms, ref})
+  @spec release(atom(), pressed :: reference(), {reference(), given_us :: integer()}) :: :ok
+  def release(robot, pressed, {ref, given_us}),
+    do: GenServer.cast(Names.via(robot, :estop), {:release, pressed, ref, given_us})
 
   @doc "What the robot was at has ended, says its gate, which stands: answers whether its wheels do."
   @spec stood(atom(), reference()) :: :ok

@@ -16,11 +16,12 @@ defmodule Swarm.EStop.Server do
       id: id,
       board: board,
       stop: EStop.Actions.written(board),
-      stamps: Freshness.new(System.system_time(:nanosecond)),
+      life: System.system_time(:nanosecond),
       group: nil,
       name: nil,
       pressed: make_ref(),
-      reset_ms: nil
+      pressed_us: nil,
+      reset_us: nil
     }
 
     {:ok, EStop.Actions.write(s), {:continue, :enter}}
@@ -30,7 +31,8 @@ defmodule Swarm.EStop.Server do
   def handle_continue(:enter, s) do
     # A stop that was written down by the e-stop process before this one may not have reached the gate; and what was
     # pressed on the gate since then has reached nobody.
-    s = s |> EStop.Actions.hold() |> EStop.Actions.follow()
+    s = EStop.Actions.hold(s)
+    s = if Board.latched?(s.board) == s.stop.latched?, do: s, else: EStop.Actions.follow(s)
 
     {:noreply,
      %{
@@ -59,17 +61,23 @@ defmodule Swarm.EStop.Server do
   def handle_cast({:command, request, ref}, s) when is_reference(ref),
     do: {:noreply, command(s, request, ref, nil)}
 
-  def handle_cast({:command, request, ref, stamp}, s) when is_reference(ref),
-    do: {:noreply, command(s, request, ref, stamp)}
+  def handle_cast({:command, request, ref, order}, s) when is_reference(ref),
+    do: {:noreply, command(s, request, ref, order)}
 
-  def handle_cast({:in_time, request, ref}, s) when is_reference(ref),
-    do: {:noreply, EStop.Actions.obey(s, request, ref)}
+  # From the robot's comms process, which has determined when it was given.
+  def handle_cast({:in_time, request, ref, given_us}, s)
+      when is_reference(ref) and is_integer(given_us) do
+    now_us = System.monotonic_time(:microsecond)
+    order = {:asked, given_us}
+    judged = Freshness.judge(s.life, request, order, true, now_us, s.pressed_us)
+    {:noreply, obey(s, request, ref, judged)}
+  end
 
   # Nobody else knows this reference.
-  def handle_cast({:release, pressed, until_ms, ref}, %{pressed: pressed} = s)
-      when is_integer(until_ms) and is_reference(ref) do
-    if System.monotonic_time(:millisecond) < until_ms do
-      s = EStop.Actions.released(s)
+  def handle_cast({:release, pressed, ref, given_us}, %{pressed: pressed} = s)
+      when is_reference(ref) and is_integer(given_us) do
+    if EStop.Actions.waits?(given_us) do
+      s = EStop.Actions.released(s, given_us)
       Nonblocking.answer(ref, :ok)
       {:noreply, s}
     else
@@ -77,16 +85,15 @@ defmodule Swarm.EStop.Server do
     end
   end
 
-  def handle_cast({:release, pressed, _until_ms, ref}, s)
+  def handle_cast({:release, pressed, ref, _given_us}, s)
       when is_reference(pressed) and is_reference(ref) do
     Nonblocking.answer(ref, {:error, "#{s.id} was stopped again meanwhile; reset it again"})
     {:noreply, s}
   end
 
   def handle_cast({:stamp, ref}, s) when is_reference(ref) do
-    {stamp, stamps} = Freshness.issue(s.stamps, Config.now(s.config))
-    Nonblocking.answer(ref, stamp)
-    {:noreply, %{s | stamps: stamps}}
+    Nonblocking.answer(ref, Freshness.stamp(s.life, System.monotonic_time(:microsecond)))
+    {:noreply, s}
   end
 
   def handle_cast({:present, true}, %{name: %{left?: true}} = s),
@@ -107,20 +114,20 @@ defmodule Swarm.EStop.Server do
     end
   end
 
-  defp fresh(_s, _request, ref, {:asked, asked}) when is_integer(asked) and node(ref) == node(),
-    do: Freshness.local(asked, System.monotonic_time(:microsecond), nil)
+  defp command(s, request, ref, order) do
+    now_us = System.monotonic_time(:microsecond)
+    judged = Freshness.judge(s.life, request, order, node(ref) == node(), now_us, s.pressed_us)
+    obey(s, request, ref, judged)
+  end
 
-  defp fresh(s, request, ref, stamp),
-    do: Freshness.judge(s.stamps, request, ref, stamp, Config.now(s.config))
+  defp obey(s, request, ref, judged) do
+    case judged do
+      {:ok, given_us} ->
+        EStop.Actions.obey(s, request, {ref, given_us})
 
-  defp command(s, request, ref, stamp) do
-    case fresh(s, request, ref, stamp) do
-      :ok ->
-        EStop.Actions.obey(s, request, ref)
-
-      {:error, age} ->
+      {:error, why} ->
         GenServer.cast(Names.via(s.id, :comms), {:rejected, :too_old})
-        Nonblocking.answer(ref, Freshness.refusal(s.id, age))
+        Nonblocking.answer(ref, Freshness.refusal(s.id, why))
         s
     end
   end

@@ -117,6 +117,43 @@ defmodule Swarm.EStop.OwnerTest do
     assert latched?(id)
   end
 
+  test "a button that is pressed on one robot stops another that is being reset" do
+    [here, there] = for id <- [:owner_here, :owner_there], do: robot(id)
+    assert Swarm.estop() == :ok
+    pilot = Names.whereis(here, :pilot)
+    :ok = :sys.suspend(pilot)
+    asked = Task.async(fn -> Swarm.ask(here, :reset) end)
+    eventually(fn -> Process.info(pilot, :message_queue_len) != {:message_queue_len, 0} end)
+    # While that one waits for its pilot, somebody presses the button of the other.
+    :ok = Gate.estop(there)
+    settled(there, [:estop])
+    settled(here, [:estop])
+    :ok = :sys.resume(pilot)
+    assert {:error, line} = Task.await(asked)
+    assert line =~ "stopped again meanwhile"
+    assert latched?(here) and latched?(there)
+    assert Swarm.reset() == :ok
+  end
+
+  test "a call that was made after a reset was given stops the robot that carried the reset out late" do
+    id = robot(:owner_late_reset)
+    assert Swarm.ask(id, :estop) == :ok
+    pilot = Names.whereis(id, :pilot)
+    :ok = :sys.suspend(pilot)
+    asked = Task.async(fn -> Swarm.ask(id, :reset) end)
+    eventually(fn -> Process.info(pilot, :message_queue_len) != {:message_queue_len, 0} end)
+    made = System.monotonic_time(:millisecond)
+    # It is on its way for as long as the pilot waits.
+    eventually(fn -> System.monotonic_time(:millisecond) - made > 20 end)
+    :ok = :sys.resume(pilot)
+    assert Task.await(asked) == :ok
+    call = {:base@hall, System.system_time(:millisecond), 1}
+    EStop.hear(:base@hall, {:estop, call, System.monotonic_time(:millisecond) - made})
+    settled(id, [:estop])
+    assert latched?(id)
+    assert Swarm.reset() == :ok
+  end
+
   test "it keeps up with neighbours that tell of one stop after the other, and a reset holds" do
     id = robot(:owner_flooded)
     link = Names.whereis(id, :comms)
