@@ -2,9 +2,9 @@ defmodule HalTest do
   use ExUnit.Case, async: true
   doctest Hal.Pose
   doctest Hal.Twist
-  doctest Hal.Wheels
+  doctest Hal.Drive.Wheels
   doctest Hal.Frame
   doctest Hal.Profile
-  doctest Hal.Suggest
-  doctest Hal.Build
+  doctest Hal.Options.Suggest
+  doctest Hal.Options.ModuleLookup
 end

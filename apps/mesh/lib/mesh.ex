@@ -9,7 +9,8 @@ defmodule Mesh do
   Without a mesh (`config :swarm, mesh: false`) a node's robots have only each other, and whom
   somebody has connected by hand. `docs/networking.md` tells how to set it up.
   """
-  alias Mesh.{CommandRelay, NodeTable, Nonblocking, Packet, Routing, Table}
+  alias Mesh.{CommandRelay, Nonblocking, Table}
+  alias Mesh.Protocol.{NodeTable, Packet, Routing}
 
   @typedoc """
   How a node sees the others: `number` grows with each change of who is there; for each node its

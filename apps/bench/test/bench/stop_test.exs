@@ -2,7 +2,7 @@ defmodule Bench.StopTest do
   use ExUnit.Case, async: false
   alias Bench.Stop
   alias Bench.Stop.Reader
-  alias Hal.RFlex.Command
+  alias Hal.RFlex.Protocol.Command
   @moduletag :slow
   doctest Bench.Stop
   doctest Bench.Stop.Reader

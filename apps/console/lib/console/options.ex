@@ -5,7 +5,7 @@ defmodule Console.Options do
   """
   alias Console.{Cli, Fleet}
   alias Console.Cli.Parse
-  alias Hal.Suggest
+  alias Hal.Options.Suggest
 
   defstruct robots: nil,
             seed: 1,

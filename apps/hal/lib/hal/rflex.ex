@@ -6,14 +6,14 @@ defmodule Hal.RFlex do
 
   | module | subject |
   |---|---|
-  | `Hal.RFlex.Packet` | a frame: port, id, opcode, data, checksum |
-  | `Hal.RFlex.Decoder` | frames out of a stream of bytes, however cut or damaged |
-  | `Hal.RFlex.Command` | what we may say |
-  | `Hal.RFlex.Report` | what the controller says |
+  | `Hal.RFlex.Protocol.Packet` | a frame: port, id, opcode, data, checksum |
+  | `Hal.RFlex.Protocol.Decoder` | frames out of a stream of bytes, however cut or damaged |
+  | `Hal.RFlex.Protocol.Command` | what we may say |
+  | `Hal.RFlex.Protocol.Report` | what the controller says |
   | `Hal.RFlex.Conversions` | units per metre and radian; which are missing |
-  | `Hal.RFlex.Odometry` | pose and speed from two counters |
-  | `Hal.RFlex.Sonar`, `.Infrared`, `.Bumpers`, `.Home` | the other senses |
-  | `Hal.RFlex.Queue` | which command goes next, and when |
+  | `Hal.RFlex.Sensors.Odometry` | pose and speed from two counters |
+  | `Hal.RFlex.Sensors.Sonar`, `.Infrared`, `.Bumpers`, `.IndexSwitch` | the other senses |
+  | `Hal.RFlex.Protocol.Queue` | which command goes next, and when |
   | `Hal.RFlex.Options` | a robot's configuration, checked |
   | `Hal.RFlex.PowerSwitch` | the phrase after which the controller cuts the power |
 

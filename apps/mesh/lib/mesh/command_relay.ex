@@ -7,7 +7,8 @@ defmodule Mesh.CommandRelay do
   waits for anything: what finds no way on is lost, and whoever asked gives up by itself.
   """
   use GenServer
-  alias Mesh.{Nonblocking, WireTerm}
+  alias Mesh.Nonblocking
+  alias Mesh.Protocol.WireTerm
   alias Mesh.Distribution.Topology
 
   # Answers later than this are asked for by nobody.

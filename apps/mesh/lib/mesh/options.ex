@@ -17,7 +17,8 @@ defmodule Mesh.Options do
   | `degree` | above that, to about so many others, 2 to 30; default 8 |
   """
   alias Hal.Options
-  alias Mesh.{Roster, Secret, Strategy}
+  alias Mesh.{Secret, Strategy}
+  alias Mesh.Protocol.Roster
 
   @gossip {{239, 255, 67, 86}, 4371}
   # Addresses are for the strategies to check.

@@ -13,8 +13,8 @@ defmodule Mesh.Protocol do
   | `{:learn, name, ip, port}` | where a node's distribution listens |
   | `{:event, name, metadata}` | for whoever logs |
   """
-  alias Mesh.{Beacon, NodeTable, Packet, Roster}
-  alias Mesh.Packet.ReplayProtection
+  alias Mesh.Protocol.{Beacon, NodeTable, Packet, Roster}
+  alias Mesh.Protocol.Packet.ReplayProtection
 
   # Without a heartbeat of a robot of its own a node shows as often by beacons that it is there.
   @beat_ms 200

@@ -8,7 +8,8 @@ defmodule Mesh.Server do
   """
   use GenServer
   alias Hal.Event
-  alias Mesh.{Backoff, Nonblocking, Options, Protocol, Roster, Sockets, Table, WireTerm}
+  alias Mesh.{Backoff, Nonblocking, Options, Protocol, Sockets, Table}
+  alias Mesh.Protocol.{Roster, WireTerm}
   alias Mesh.Distribution.{Dialer, Epmd}
 
   @tick_ms 200

@@ -14,7 +14,7 @@ defmodule Mesh.Table do
   The table ends with the server that owns it. Until the next one starts, it reads as empty.
   """
   alias Mesh.SafeTable
-  alias Mesh.{NodeTable, Roster, Routing}
+  alias Mesh.Protocol.{NodeTable, Roster, Routing}
 
   @table __MODULE__
 

@@ -1,7 +1,7 @@
 defmodule Mesh.ProtocolTest do
   use ExUnit.Case, async: true
   alias Mesh.Air
-  alias Mesh.{NodeTable, Packet}
+  alias Mesh.Protocol.{NodeTable, Packet}
 
   defp beat(id, sequence), do: {:beat, id, 1, sequence}
 

@@ -1,20 +1,21 @@
 defmodule Mesh.PureTest do
   use ExUnit.Case, async: true
-  alias Mesh.{Beacon, NodeTable, Options, Routing}
+  alias Mesh.Options
+  alias Mesh.Protocol.{Beacon, NodeTable, Routing}
   alias Mesh.Distribution.Topology
 
   doctest Mesh.Backoff
-  doctest Mesh.Beacon
+  doctest Mesh.Protocol.Beacon
   doctest Mesh.Distribution.Certs
-  doctest Mesh.Packet.ReplayProtection
+  doctest Mesh.Protocol.Packet.ReplayProtection
   doctest Mesh.Log
-  doctest Mesh.NodeTable
-  doctest Mesh.Packet
+  doctest Mesh.Protocol.NodeTable
+  doctest Mesh.Protocol.Packet
   doctest Mesh.Distribution.Topology
-  doctest Mesh.Roster
-  doctest Mesh.Routing
+  doctest Mesh.Protocol.Roster
+  doctest Mesh.Protocol.Routing
   doctest Mesh.Strategy.Static
-  doctest Mesh.WireTerm
+  doctest Mesh.Protocol.WireTerm
 
   test "up to 30 nodes everybody is connected to everybody, above that to few, and all hang together" do
     for count <- [2, 30, 31, 60, 100] do

@@ -1,7 +1,8 @@
 defmodule Mesh.ServerTest do
   # The mesh of this VM has names; the node that it hears is the protocol on a socket of the test's.
   use ExUnit.Case, async: false
-  alias Mesh.{Air, FakeConsumer, Options, Protocol, Roster}
+  alias Mesh.{Air, FakeConsumer, Options, Protocol}
+  alias Mesh.Protocol.Roster
 
   @loopback {127, 0, 0, 1}
 

@@ -2,7 +2,8 @@ defmodule Mesh.TableTest do
   # The table has a name: there is one a VM.
   use ExUnit.Case, async: false
 
-  alias Mesh.{Beacon, NodeTable, Roster, Table}
+  alias Mesh.Table
+  alias Mesh.Protocol.{Beacon, NodeTable, Roster}
 
   @address {{10, 0, 0, 7}, 4370}
 

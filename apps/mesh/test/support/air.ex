@@ -3,7 +3,8 @@ defmodule Mesh.Air do
   Stations of several nodes without sockets: datagrams take 1 ms, unless they are lost or the
   link is cut; ticks come every 200 ms. Pure but for `:rand`, which ExUnit seeds.
   """
-  alias Mesh.{Protocol, Roster, Secret, Strategy}
+  alias Mesh.{Protocol, Secret, Strategy}
+  alias Mesh.Protocol.Roster
 
   @group {{239, 255, 67, 86}, 4371}
 

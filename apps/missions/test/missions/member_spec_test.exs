@@ -2,7 +2,8 @@ defmodule Swarm.MemberSpecTest do
   use ExUnit.Case, async: true
   alias Robot.File.Schema
   alias Swarm.{Comms, Formation, MemberSpec}
-  alias Mesh.{Options, Roster}
+  alias Mesh.Options
+  alias Mesh.Protocol.Roster
   alias Missions.Landmark
 
   @robots Path.expand("../../../../config/robots", __DIR__)

@@ -35,8 +35,8 @@ defmodule Missions.WireTest do
     place = Swarm.Message.new(one.name, :place, %{anchor | landmark: {0, 0}, still: true})
 
     for message <- [place | letters] do
-      payload = Mesh.Packet.pack({:all, message})
-      assert {:ok, _} = Cluster.call(one, Mesh.Packet, :unpack, [payload])
+      payload = Mesh.Protocol.Packet.pack({:all, message})
+      assert {:ok, _} = Cluster.call(one, Mesh.Protocol.Packet, :unpack, [payload])
     end
   end
 end

@@ -4,7 +4,7 @@ defmodule Player.RFlexOptions do
   `Player.Senses`'s. Pure; names, units and defaults of both generations of that driver are those
   of its documentation.
   """
-  alias Hal.Suggest
+  alias Hal.Options.Suggest
   alias Player.{Senses, Units}
 
   @doc """

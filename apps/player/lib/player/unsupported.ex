@@ -1,6 +1,6 @@
 defmodule Player.Unsupported do
   @moduledoc "Explains why a robot file leaves out some of Player's drivers and sections. Pure."
-  alias Hal.Suggest
+  alias Hal.Options.Suggest
 
   @reasons [
     {~w(cameracompress camerauncompress), "pictures for viewers are made here on demand"},

@@ -16,7 +16,8 @@ defmodule Robot.Command do
   | `lead`, `start`, `ping` | `:lead`, `:start`, `:ping` |
   | `arm`, `disarm`, `acknowledge` | `:arm`, `:disarm`, `:acknowledge`: whether the wheels may turn (`Hal.Device.Arming`) |
   """
-  alias Hal.{Pose, Suggest}
+  alias Hal.Pose
+  alias Hal.Options.Suggest
   alias Robot.Command
 
   @type t ::

@@ -11,8 +11,7 @@ defmodule Sim.Calibration do
   alias Robot.Percept
   alias Robot.Control.Controller
   alias Robot.Safety.Reflex
-  alias Robot.Behaviour.DriveCourse
-  alias Robot.Calibration.{Drive, Model}
+  alias Robot.Calibration.{Drive, DriveCourse, Model}
   alias Sim.{Noise, World}
 
   @id :mag1

@@ -1,7 +1,8 @@
 defmodule Swarm.Commands do
   @moduledoc false
   # What `Swarm` needs: who is meant, is it allowed, and what do they answer.
-  alias Hal.{Options, Suggest}
+  alias Hal.Options
+  alias Hal.Options.Suggest
   alias Swarm.{Formation, Missions}
   alias Swarm.Comms.Transport
   alias Swarm.Commands

@@ -77,7 +77,7 @@ defmodule Console.Calibrate.StdinPrompt do
 
   defp allowed(text, words) do
     names = Enum.map(words, &if(&1 == "", do: "Enter alone", else: &1))
-    "#{Console.Cli.Parse.either(names)}#{Hal.Suggest.hint(text, words)}"
+    "#{Console.Cli.Parse.either(names)}#{Hal.Options.Suggest.hint(text, words)}"
   end
 
   @doc "What was typed meanwhile is no answer to the next question."

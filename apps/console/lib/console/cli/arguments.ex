@@ -7,7 +7,7 @@ defmodule Console.Cli.Arguments do
   is how its value is shown in the help, or `nil` for a switch; `check` turns the text into the value.
   """
   alias Hal.Options.Wording
-  alias Hal.Suggest
+  alias Hal.Options.Suggest
 
   @typedoc "What is allowed, and what may have been meant."
   @type allowed :: String.t() | {String.t(), hint :: String.t()}

@@ -67,7 +67,7 @@ defmodule Console.Cli.Parse do
         {:ok, value}
 
       nil ->
-        {:error, {either(names), Hal.Suggest.hint(text, names)}}
+        {:error, {either(names), Hal.Options.Suggest.hint(text, names)}}
     end
   end
 
@@ -131,8 +131,11 @@ defmodule Console.Cli.Parse do
          {:ok, spacing} <- number(spacing, 0.8, 5.0) do
       {:ok, {known, spacing}}
     else
-      {:kind, false} -> {:error, {either(formations()), Hal.Suggest.hint(kind, formations())}}
-      {:error, _} -> {:error, "KIND:SPACING with a spacing from 0.8 to 5 metres"}
+      {:kind, false} ->
+        {:error, {either(formations()), Hal.Options.Suggest.hint(kind, formations())}}
+
+      {:error, _} ->
+        {:error, "KIND:SPACING with a spacing from 0.8 to 5 metres"}
     end
   end
 

@@ -7,7 +7,7 @@ defmodule Console.Terminal.Prompt do
   alias Console.Fleet
   alias Console.Cli
   alias Console.Cli.Parse
-  alias Hal.Suggest
+  alias Hal.Options.Suggest
   alias Robot.Command
 
   @words ~w(kill formation landmark move goto follow stop estop reset start status nodes tell help quit)

@@ -12,6 +12,7 @@ defmodule Mix.Tasks.Calibrate do
   """
   use Mix.Task
   alias Console.Cli.Build
+  alias Hal.Options.Suggest
 
   @words ["odometry", "colour"]
 
@@ -42,7 +43,7 @@ defmodule Mix.Tasks.Calibrate do
 
       [word | _rest] ->
         refuse(
-          "#{inspect(word)} cannot be calibrated: odometry or colour#{Hal.Suggest.hint(word, @words)}"
+          "#{inspect(word)} cannot be calibrated: odometry or colour#{Suggest.hint(word, @words)}"
         )
 
       [] ->

@@ -24,7 +24,7 @@ defmodule Hal.Options.Type do
   A `:check` that knows better than `what` gives the whole sentence, `{:error, text}`, or `{:error, problems}`.
   """
   alias Hal.Options.Wording
-  alias Hal.Suggest
+  alias Hal.Options.Suggest
 
   @most 64
 

@@ -1,6 +1,6 @@
 defmodule Hal.Options.Wording do
   @moduledoc "How it is said that an option is wrong, and what is allowed. Pure."
-  alias Hal.Suggest
+  alias Hal.Options.Suggest
 
   @longest 80
 

@@ -4,7 +4,8 @@ defmodule Hal.RFlex.Commands do
   words. Pure.
   """
   alias Hal.Twist
-  alias Hal.RFlex.{Command, Options, Queue}
+  alias Hal.RFlex.Options
+  alias Hal.RFlex.Protocol.{Command, Queue}
 
   # Of a base whose conversion is not known. It stands, and is to brake whatever the units are.
   @some_acceleration 100_000

@@ -9,8 +9,8 @@ defmodule Hal.RFlex.Conversions do
   | `distance` | per metre driven |
   | `angle` | per radian turned |
   | `range` | per metre of a sonar's range |
-  | `wheel_ratio` | way of the right wheel for the left one's, where the controller counts the same (`Hal.Wheels`); 1.0 unless given |
-  | `ir_a`, `ir_b` | of each infrared's law, a number for all or a list (see `Hal.RFlex.Infrared`) |
+  | `wheel_ratio` | way of the right wheel for the left one's, where the controller counts the same (`Hal.Drive.Wheels`); 1.0 unless given |
+  | `ir_a`, `ir_b` | of each infrared's law, a number for all or a list (see `Hal.RFlex.Sensors.Infrared`) |
 
   Other drivers' files of old give distances per millimetre: times 1000.
   """

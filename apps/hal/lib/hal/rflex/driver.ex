@@ -10,7 +10,7 @@ defmodule Hal.RFlex.Driver do
   | `:profile` | `:magellan`, `:atrv_mini` or a `Hal.Profile` | `:magellan` |
   | `:conversions` | `distance:` units per metre, `angle:` per radian, `wheel_ratio:` 0.8 to 1.25, `range:` per metre of sonar, `ir_a:`, `ir_b:` (`Hal.RFlex.Conversions`) | none: does not arm |
   | `:limits` | `max_linear:` m/s, `max_turn:` rad/s, `max_acceleration:` m/s2, `max_turn_acceleration:` rad/s2, none above the profile's; `max_braking:`, `max_turn_braking:` up to 10 | the profile's; braking twice the acceleration |
-  | `:bumpers` | `style:` `:bit` or `:address`, `base:` 0 to 255, `count:` 0 to 64, `segments:` list of 0 to 15 | `:bit`, `0x40`, the profile's, see `Hal.RFlex.Bumpers` |
+  | `:bumpers` | `style:` `:bit` or `:address`, `base:` 0 to 255, `count:` 0 to 64, `segments:` list of 0 to 15 | `:bit`, `0x40`, the profile's, see `Hal.RFlex.Sensors.Bumpers` |
   | `:sonar_banks` | how many are fitted on each board, 0 to 16 | boards of 8 |
   | `:sonar_stride` | ids of a board, 1 to 16 | `16` |
   | `:sonar_age` | a range is the least of so many readings, 1 to 20 | `1` |
@@ -27,10 +27,10 @@ defmodule Hal.RFlex.Driver do
 
   ## Driving
 
-  A speed goes through `Hal.SlewLimiter`, last before the wire, every 50 ms, and is repeated every 100 ms, zero
+  A speed goes through `Hal.Drive.SlewLimiter`, last before the wire, every 50 ms, and is repeated every 100 ms, zero
   too: a frame may be lost, and the controller stops by itself when it hears nothing for some time (how long
   is not known). A stop is not ramped: it is the next thing on the wire, and the controller brakes with
-  `max_braking`. What is not a speed (`Hal.SlewLimiter.check/1`) is a stop, and counted. That a speed is
+  `max_braking`. What is not a speed (`Hal.Drive.SlewLimiter.check/1`) is a stop, and counted. That a speed is
   renewed is the affair of `Hal.Device`. The brake is released before the first speed, and again when the controller
   says that it is set; `init` sets it. A driver that was held up until the line said its last words begins
   again like that: from standing, with the brake.
@@ -44,15 +44,17 @@ defmodule Hal.RFlex.Driver do
   Those of `Hal.Drive`. Ranges come with each report of some sonars. Bumpers, of which the base tells changes only,
   are repeated every 100 ms as long as they hold. The joystick is only read: driving by it is for whoever may drive.
   Odometry goes on where it was when a line was lost and is open again in the same process; in another one
-  it begins at zero, in another frame (`Hal.Odometry`). Where a counter jumped (`Hal.RFlex.Odometry`) it stays
+  it begins at zero, in another frame (`Hal.Odometry`). Where a counter jumped (`Hal.RFlex.Sensors.Odometry`) it stays
   where it is and goes on in another frame, for nobody knows how far the robot went meanwhile.
 
   A controller that sends no wheels for 0.5 s is told again what to send, every second, as it may have been
   switched off and on; one that sends nothing at all for 2 s is the error `:silent`.
   """
   @behaviour Hal.Drive
-  alias Hal.{Event, Serial, SlewLimiter, Twist}
-  alias Hal.RFlex.{Command, Commands, Decoder, Options, Outlook, Queue, Readings}
+  alias Hal.{Event, Serial, Twist}
+  alias Hal.Drive.SlewLimiter
+  alias Hal.RFlex.{Commands, Options, Outlook, Readings}
+  alias Hal.RFlex.Protocol.{Command, Decoder, Queue}
 
   @tick_ms 50
   @repeat_ms 100

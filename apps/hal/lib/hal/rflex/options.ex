@@ -1,10 +1,12 @@
 defmodule Hal.RFlex.Options do
   @moduledoc """
   The options of `Hal.RFlex.Driver`, which lists them: their table, and all defaults that follow from the
-  body (`Hal.RFlex.Layout`). Pure.
+  body (`Hal.RFlex.Sensors.Layout`). Pure.
   """
-  alias Hal.{Options, Profile, Serial, SlewLimiter}
-  alias Hal.RFlex.{Conversions, Layout}
+  alias Hal.{Options, Profile, Serial}
+  alias Hal.Drive.SlewLimiter
+  alias Hal.RFlex.Conversions
+  alias Hal.RFlex.Sensors.Layout
 
   @per_metre {:number, 1.0e-3, 1.0e7, "units per metre"}
   @conversions [

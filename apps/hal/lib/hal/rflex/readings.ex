@@ -3,7 +3,9 @@ defmodule Hal.RFlex.Readings do
   Converts packets to readings: everything that a robot's controller reports, in our units. Pure;
   the time of arrival comes in, as integer milliseconds.
   """
-  alias Hal.RFlex.{Bumpers, IndexSwitch, Infrared, Odometry, Options, Packet, Report, Sonar}
+  alias Hal.RFlex.Options
+  alias Hal.RFlex.Protocol.{Packet, Report}
+  alias Hal.RFlex.Sensors.{Bumpers, IndexSwitch, Infrared, Odometry, Sonar}
 
   @most_volts 60.0
 

@@ -1,14 +1,15 @@
 defmodule Hal.RFlex.PartsTest do
   use ExUnit.Case, async: true
-  alias Hal.RFlex.{Bumpers, Infrared, Queue, Sonar}
-  doctest Hal.RFlex.Bumpers
+  alias Hal.RFlex.Protocol.Queue
+  alias Hal.RFlex.Sensors.{Bumpers, Infrared, Sonar}
+  doctest Hal.RFlex.Sensors.Bumpers
   doctest Hal.RFlex.Conversions
   doctest Hal.RFlex.PowerSwitch
-  doctest Hal.RFlex.IndexSwitch
+  doctest Hal.RFlex.Sensors.IndexSwitch
   doctest Hal.RFlex.Outlook
-  doctest Hal.RFlex.Infrared
-  doctest Hal.RFlex.Queue
-  doctest Hal.RFlex.Sonar
+  doctest Hal.RFlex.Sensors.Infrared
+  doctest Hal.RFlex.Protocol.Queue
+  doctest Hal.RFlex.Sensors.Sonar
 
   describe "sonar" do
     test "banks, a missing echo, what is nearer than it can be, ids of nobody" do

@@ -4,11 +4,12 @@ defmodule Mesh.Distribution.Dialer do
   back-off. A connection attempt blocks for seconds where packets vanish, so each has a process of
   its own, and no more than four run at once.
 
-  Whether a node is alive is not decided here: that is told by datagrams (`Mesh.NodeTable`).
+  Whether a node is alive is not decided here: that is told by datagrams (`Mesh.Protocol.NodeTable`).
   """
   use GenServer
   alias Hal.Event
-  alias Mesh.{Backoff, Options, Roster}
+  alias Mesh.{Backoff, Options}
+  alias Mesh.Protocol.Roster
   alias Mesh.Distribution.Topology
 
   @tick_ms 200

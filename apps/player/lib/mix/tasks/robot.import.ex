@@ -22,7 +22,7 @@ defmodule Mix.Tasks.Robot.Import do
     * `--help` - this text
   """
   use Mix.Task
-  alias Hal.Suggest
+  alias Hal.Options.Suggest
   alias Robot.File.{Odd, Schema}
 
   @switches [

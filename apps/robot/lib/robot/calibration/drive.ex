@@ -1,13 +1,13 @@
 defmodule Robot.Calibration.Drive do
   @moduledoc """
-  The mission of a robot under calibration: it drives one course (`Robot.Behaviour.DriveCourse`)
+  The mission of a robot under calibration: it drives one course (`Robot.Calibration.DriveCourse`)
   and stands. Options: those of the course. Its phase is `:driving`, then `:done` or `:blocked`.
   Pure.
 
   Legs for what is measured: `legs/1`.
   """
   @behaviour Robot.Mission
-  alias Robot.Behaviour.DriveCourse
+  alias Robot.Calibration.DriveCourse
 
   @doc """
   The legs of a distance (metres), of an angle (radians), and of a square, which ends as it began.

@@ -4,7 +4,7 @@ defmodule Robot.Calibration.Keys do
 
   With units per metre and radian, a base that goes further than it tells has fewer units a metre, and
   one whose wheels stand wider apart has more of them a radian:
-  `distance / d`, `angle * base / d`. The ratio is put behind both (`Hal.Wheels`), and so for the wheel
+  `distance / d`, `angle * base / d`. The ratio is put behind both (`Hal.Drive.Wheels`), and so for the wheel
   base that odometry reckons with.
   """
   alias Hal.RFlex.Conversions

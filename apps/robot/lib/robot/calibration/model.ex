@@ -13,7 +13,8 @@ defmodule Robot.Calibration.Model do
   A **run** is what a square gave: the way round, and by how much its true end was off the end that
   odometry told, in the frame of its start (x forward, y left, metres).
   """
-  alias Hal.{Pose, Wheels}
+  alias Hal.Pose
+  alias Hal.Drive.Wheels
 
   @type direction :: :cw | :ccw
   @type run :: {direction(), {x :: float(), y :: float()}}

@@ -1,6 +1,6 @@
 defmodule Robot.File.CrossChecks do
   @moduledoc "Checks of a robot file that involve several keys. Pure."
-  alias Hal.Suggest
+  alias Hal.Options.Suggest
   alias Robot.File.{Device, Schema}
 
   @doc "All that does not fit: the keys it is about, and what is wrong; `file` is the file's path."

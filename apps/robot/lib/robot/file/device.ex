@@ -8,7 +8,7 @@ defmodule Robot.File.Device do
   `profile:` is given the body of the file, with its limits.
   """
   alias Hal.Options.{Type, Wording}
-  alias Hal.Suggest
+  alias Hal.Options.Suggest
   alias Robot.File.Terms
   alias Robot.File.Terms.Name
 

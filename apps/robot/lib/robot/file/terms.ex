@@ -3,7 +3,7 @@ defmodule Robot.File.Terms do
   What `Robot.File.Reader` read as plain values for `Hal.Options`, and the lines that their keys stand in. Names
   become the atoms and modules that there are; of others none is made, they stay `Robot.File.Terms.Name`.
   """
-  alias Hal.Build
+  alias Hal.Options.ModuleLookup
   alias Hal.Options.Type
   alias Robot.File.Reader
 
@@ -66,7 +66,7 @@ defmodule Robot.File.Terms do
 
   # A driver's options follow its name: what they may be named are atoms once its table is there.
   def term({_line, {:module, name}}) do
-    with {:ok, module} <- Build.module(name) do
+    with {:ok, module} <- ModuleLookup.module(name) do
       if function_exported?(module, :option_table, 0), do: module.option_table()
       module
     else

@@ -24,7 +24,8 @@ defmodule Robot.Safety.Reflex do
   `:estop`, `:disarmed`, `:dead_man`, `:refused` and `:bumper` set the speed to zero at once: how hard the wheels
   then brake is the base's own affair. Everything else is continuous.
   """
-  alias Hal.{Odometry, Pose, Profile, SlewLimiter, Twist}
+  alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Hal.Drive.SlewLimiter
   alias Robot.Safety.Reflex.{Body, Fence}
 
   @dead_man_ms 200

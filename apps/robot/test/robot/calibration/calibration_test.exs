@@ -76,7 +76,7 @@ defmodule Robot.CalibrationTest do
 
   test "the mission drives its course and stands" do
     assert {:driving, state, effects} = Drive.init(:mag1, legs: [go: 1.0])
-    assert {:goal, :course, {Robot.Behaviour.DriveCourse, legs: [go: 1.0]}} in effects
+    assert {:goal, :course, {Robot.Calibration.DriveCourse, legs: [go: 1.0]}} in effects
 
     assert {:done, _state, [{:goal, :idle, nil} | _]} =
              Drive.handle({:outcome, :course, 1}, state)

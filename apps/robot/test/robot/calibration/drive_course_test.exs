@@ -2,7 +2,7 @@ defmodule Robot.Behaviour.DriveCourseTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.{Behaviour, Percept}
-  alias Robot.Behaviour.DriveCourse
+  alias Robot.Calibration.DriveCourse
 
   # Wheels that do what is wished, 100 ms later.
   defp drive(legs, options \\ []) do

@@ -1,7 +1,7 @@
 defmodule Swarm.Directory.Search do
   @moduledoc false
   # Which robots are as wanted (`Swarm.find/1`): templates over `Swarm.Directory.RobotInfo`.
-  alias Hal.Suggest
+  alias Hal.Options.Suggest
   alias Swarm.Comms.Transport
   alias Swarm.Directory.RobotInfo
 

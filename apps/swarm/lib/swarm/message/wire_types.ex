@@ -2,7 +2,7 @@ defmodule Swarm.Message.WireTypes do
   @moduledoc """
   Validates terms from outside, without trusting them in any way. Pure.
   """
-  alias Mesh.WireTerm
+  alias Mesh.Protocol.WireTerm
 
   # Of everything more than a thousand kilometres, or than a thousand robots, is nonsense.
   @far 1_000_000_000

@@ -3,7 +3,7 @@ defmodule Swarm.Mesh.FloodTest do
   use ExUnit.Case, async: false
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes
-  alias Mesh.Packet
+  alias Mesh.Protocol.Packet
   @moduletag :slow
 
   @datagrams 100_000

@@ -1,7 +1,7 @@
 defmodule Vision.Blobs.Options do
   @moduledoc "The command line of `mix blobs`: words in, a checked map or one clear line out."
 
-  alias Hal.Suggest
+  alias Hal.Options.Suggest
 
   @type t :: %{
           source: String.t(),
@@ -146,7 +146,7 @@ defmodule Vision.Blobs.Options do
 
   # Whether it is a backend is for the colours to say.
   defp backend(name) do
-    with :error <- Hal.Build.module(name),
+    with :error <- Hal.Options.ModuleLookup.module(name),
          do: {:error, "--backend cannot be #{inspect(name)}: a module of this build is allowed"}
   end
 

@@ -1,0 +1,39 @@
+defmodule Hal.Options.ModuleLookup do
+  @moduledoc """
+  Finds modules of this build by names that people write: the driver in a robot file, the option
+  of a command.
+  """
+
+  @doc """
+  The module of this name, loaded, if it is part of this build. A name that no module has makes no atom.
+
+      iex> Hal.Options.ModuleLookup.module("Hal.Pose")
+      {:ok, Hal.Pose}
+      iex> Hal.Options.ModuleLookup.module("Hal.NoSuchThing")
+      :error
+  """
+  @spec module(String.t()) :: {:ok, module()} | :error
+  def module(name) do
+    with true <- name =~ ~r/\A[A-Z]\w*(\.[A-Z]\w*)*\z/,
+         {:ok, module} <- known(name),
+         true <- Code.ensure_loaded?(module),
+         do: {:ok, module},
+         else: (_unknown -> :error)
+  end
+
+  # A module that nobody has used yet is known by its file only, which has its name.
+  defp known(name) do
+    with :error <- existing("Elixir." <> name) do
+      case :code.where_is_file(to_charlist("Elixir.#{name}.beam")) do
+        :non_existing -> :error
+        path -> Keyword.fetch(:beam_lib.info(path), :module)
+      end
+    end
+  end
+
+  defp existing(name) do
+    {:ok, String.to_existing_atom(name)}
+  rescue
+    ArgumentError -> :error
+  end
+end

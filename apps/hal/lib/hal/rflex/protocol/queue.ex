@@ -1,0 +1,61 @@
+defmodule Hal.RFlex.Protocol.Queue do
+  @moduledoc """
+  Which command to send next, and when: the controller loses commands that are less than 10 ms
+  apart. Pure; the caller waits and writes.
+
+  Every command has a key, and a newer one takes the place of an older one with the same key that still
+  waits, in its place: so nothing is starved, a speed is never an old one, and there are never more
+  commands than there are keys. A stop throws away the speeds that wait and goes before everything.
+  """
+
+  @enforce_keys [:pace_ms]
+  defstruct [:pace_ms, waiting: [], free_ms: nil]
+
+  @type key :: atom() | {:speed | :prepare, 0 | 1}
+  @type t :: %__MODULE__{
+          pace_ms: pos_integer(),
+          waiting: [{key(), binary()}],
+          free_ms: integer() | nil
+        }
+
+  @doc "An empty queue; commands are `pace_ms` apart."
+  @spec new(pos_integer()) :: t()
+  def new(pace_ms), do: %__MODULE__{pace_ms: pace_ms}
+
+  @doc """
+  A command, in the place of the one with its key, or last.
+
+      iex> alias Hal.RFlex.Protocol.Queue
+      iex> queue = Queue.new(12) |> Queue.put(:a, "1") |> Queue.put(:b, "2")
+      iex> Queue.put(queue, :a, "3").waiting
+      [a: "3", b: "2"]
+  """
+  @spec put(t(), key(), binary()) :: t()
+  def put(%__MODULE__{waiting: waiting} = queue, key, bytes) do
+    %{queue | waiting: List.keystore(waiting, key, 0, {key, bytes})}
+  end
+
+  @doc """
+  A stop: no speed that waits is sent any more, and these commands are the next.
+
+      iex> alias Hal.RFlex.Protocol.Queue
+      iex> queue = Queue.new(12) |> Queue.put(:a, "1") |> Queue.put({:speed, 0}, "2")
+      iex> Queue.stop(queue, [{{:speed, 0}, "0"}]).waiting
+      [{{:speed, 0}, "0"}, {:a, "1"}]
+  """
+  @spec stop(t(), [{key(), binary()}]) :: t()
+  def stop(%__MODULE__{waiting: waiting} = queue, commands) do
+    others = Enum.reject(waiting, fn {key, _bytes} -> match?({:speed, _}, key) end)
+    %{queue | waiting: commands ++ others}
+  end
+
+  @doc "The command to write now; or how long to wait for it; or none."
+  @spec take(t(), integer()) :: {:send, binary(), t()} | {:wait, pos_integer()} | :empty
+  def take(%__MODULE__{waiting: []}, _at_ms), do: :empty
+
+  def take(%__MODULE__{free_ms: free_ms}, at_ms) when free_ms != nil and at_ms < free_ms,
+    do: {:wait, free_ms - at_ms}
+
+  def take(%__MODULE__{waiting: [{_key, bytes} | waiting]} = queue, at_ms),
+    do: {:send, bytes, %{queue | waiting: waiting, free_ms: at_ms + queue.pace_ms}}
+end

@@ -1,0 +1,96 @@
+defmodule Mesh.Protocol.Packet.Filter do
+  @moduledoc """
+  What a node makes of a datagram before it changes anything by it: whether it is new, signed, of the fleet and
+  of sense. Pure. Whether it was made now is for `Mesh.Protocol.Packet.ReplayProtection`.
+  """
+  alias Mesh.Consumer
+  alias Mesh.Protocol.{Beacon, NodeTable, Packet, Roster, WireTerm}
+  alias Mesh.Protocol.Packet.ReplayProtection
+
+  # So many datagrams of unknown origin are looked into a second.
+  @strange_per_second 2_000
+
+  @type body ::
+          Beacon.t()
+          | {:all | [atom()], message :: term(), Consumer.about()}
+          | {service :: atom(), term()}
+  @type refusal ::
+          Packet.refusal()
+          | Packet.kind()
+          | :own
+          | :doubled
+          | :throttled
+          | :unknown_robot
+          | {:unknown_node, String.t()}
+
+  @doc """
+  Reads a datagram from there: the packet, the node that made it and what it says. `:own` is this node's
+  own, heard by multicast.
+  """
+  @spec read(Mesh.Protocol.t(), binary(), Mesh.Strategy.address()) ::
+          {:ok, Packet.t(), node(), body()} | {:error, refusal()}
+  def read(protocol, datagram, address) do
+    with :ok <- original(Packet.peek(datagram), protocol.guard),
+         :ok <- patience(protocol, address),
+         {:ok, packet} <- Packet.open(datagram, protocol.secret.key),
+         :ok <- foreign(packet, protocol),
+         {:ok, node} <- known(packet.sender, protocol.roster),
+         {:ok, term} <- Packet.unpack(packet.payload),
+         {:ok, body} <- body(packet.kind, term, protocol) do
+      {:ok, packet, node, body}
+    end
+  end
+
+  # Garbage costs a signature each; beyond a measure only those who are known are listened to.
+  defp patience(protocol, address) do
+    if protocol.strange < @strange_per_second or
+         address in NodeTable.addresses(protocol.node_table),
+       do: :ok,
+       else: {:error, :throttled}
+  end
+
+  defp foreign(%{sender: name, session: session}, %{name: name, session: session}),
+    do: {:error, :own}
+
+  defp foreign(_packet, _station), do: :ok
+
+  defp known(name, roster) do
+    case Roster.node(roster, name) do
+      {:ok, node} -> {:ok, node}
+      :error -> {:error, {:unknown_node, name}}
+    end
+  end
+
+  # Half of all datagrams are copies, one by multicast and one by name: those cost no signature.
+  defp original({:ok, {name, session, sequence}}, guard) do
+    if ReplayProtection.copy?(guard, name, session, sequence), do: {:error, :doubled}, else: :ok
+  end
+
+  defp original(:error, _guard), do: :ok
+
+  defp body(:beacon, term, protocol) do
+    case Beacon.check(term) do
+      {:ok, beacon} -> {:ok, Beacon.known(beacon, protocol.roster.nodes)}
+      :error -> {:error, :beacon}
+    end
+  end
+
+  defp body(:message, {to, term}, protocol) do
+    with true <- to == :all or WireTerm.names?(to),
+         {:ok, message, about} <- protocol.consumer.read(term) do
+      if Enum.all?(about.robots, &Roster.robot?(protocol.roster, &1)),
+        do: {:ok, {to, message, about}},
+        else: {:error, :unknown_robot}
+    else
+      _malformed -> {:error, :message}
+    end
+  end
+
+  defp body(:service, {service, term}, protocol) do
+    if service in protocol.services,
+      do: {:ok, {service, term}},
+      else: {:error, :service}
+  end
+
+  defp body(kind, _other, _protocol), do: {:error, kind}
+end

@@ -1,0 +1,61 @@
+defmodule Mesh.Protocol.Roster do
+  @moduledoc """
+  The names that a node may meet: its fleet's robots and the nodes without a robot, each at this
+  node's own host part. They come from the configuration and are made into atoms once, at the
+  start; what arrives by radio is compared with them as text and never becomes an atom. Pure.
+
+  All nodes of a fleet share the host part of their names, which need not be a machine's name
+  (`mag1@lab`): where a node is, is told by its beacons.
+  """
+
+  @enforce_keys [:me, :nodes, :robots]
+  defstruct @enforce_keys
+
+  @type t :: %__MODULE__{
+          me: node(),
+          nodes: %{String.t() => node()},
+          robots: MapSet.t(atom())
+        }
+
+  # Nodes that hold a world, a person's shell, a demo.
+  @others [:world, :base, :demo]
+  @most 1_000
+
+  @doc """
+  The roster of a node, from the names of its fleet.
+
+      iex> roster = Mesh.Protocol.Roster.new(:mag1@lab, [:mag1, :min1])
+      iex> {roster.nodes["min1@lab"], roster.nodes["spy@lab"]}
+      {:min1@lab, nil}
+  """
+  @spec new(node(), [atom()]) :: t()
+  def new(me, fleet) do
+    [_name, host] = me |> Atom.to_string() |> String.split("@", parts: 2)
+
+    # From the configuration, and no more than a thousand.
+    nodes = for name <- fleet ++ @others, into: %{}, do: entry("#{name}@#{host}")
+    own = Atom.to_string(me)
+    %__MODULE__{me: me, nodes: Map.put(nodes, own, me), robots: MapSet.new(fleet)}
+  end
+
+  @doc "The fleet unless told otherwise: `mag1` to `mag100` and `min1` to `min100`."
+  @spec fleet() :: [atom(), ...]
+  def fleet, do: for(kind <- ~w(mag min), n <- 1..100, do: :"#{kind}#{n}")
+
+  @doc "The type of a configured fleet, for a table of `Hal.Options`: a list of names."
+  @spec type() :: Hal.Options.Type.t()
+  def type, do: {:list, {:check, &__MODULE__.name?/1, "a robot's name such as :mag1"}, @most}
+
+  @doc false
+  def name?(name), do: is_atom(name) and Regex.match?(~r/\A[a-z][a-z0-9_]{0,30}\z/, "#{name}")
+
+  @doc "The node of that name, if it is known."
+  @spec node(t(), String.t()) :: {:ok, node()} | :error
+  def node(roster, text), do: Map.fetch(roster.nodes, text)
+
+  @doc "Whether a robot belongs to the fleet."
+  @spec robot?(t(), term()) :: boolean()
+  def robot?(roster, id), do: is_atom(id) and MapSet.member?(roster.robots, id)
+
+  defp entry(text), do: {text, String.to_atom(text)}
+end

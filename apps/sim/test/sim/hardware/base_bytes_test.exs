@@ -1,0 +1,41 @@
+defmodule Sim.Hardware.BaseBytesTest do
+  @moduledoc "The driver of real bases: its pauses between commands, escaped bytes, and counters at their ends."
+  use Sim.BaseCase, async: true
+  @moduletag :slow
+
+  # On a machine that is busy the bytes of a moment's sleep come to the emulator all at once, however well they were
+  # spaced. Of commands that are not spaced, at least every other would be lost, all the time.
+  @tag base: [pace: {10, 1}]
+  test "commands are so far apart that a controller takes them that takes one in 10 ms",
+       context do
+    drive(context, Twist.new(0.3, 0.2), &(&1.pose.x > -3.5))
+    stop(context)
+    %{frames: frames, lost: lost} = Emulator.core(context.emulator).counts
+    assert frames > 100
+    assert lost < frames / 5
+  end
+
+  @tag base: [ghost: :all]
+  test "ghost bytes wherever there is an 1B", context do
+    drive(context, Twist.new(0.3, 0.2), &(&1.pose.x > -3.5))
+    stop(context)
+    agree(context)
+  end
+
+  @tag base: [counters: {0x7FFFFFFF - 1000, -0x80000000 + 500}]
+  test "counters that wrap move nothing", context do
+    drive(context, Twist.new(0.3, 0.0), &(&1.pose.x > -3.5))
+    stop(context)
+    drive(context, Twist.new(0.0, -0.5), &(&1.pose.heading < -0.5))
+    stop(context)
+
+    {way, _} =
+      Sim.Emulator.RFlexController.Motors.counts(Emulator.core(context.emulator).motors, 0)
+
+    {turn, _} =
+      Sim.Emulator.RFlexController.Motors.counts(Emulator.core(context.emulator).motors, 1)
+
+    assert way < 0 and turn > 0
+    agree(context)
+  end
+end

@@ -1,0 +1,20 @@
+defmodule Sim.Hardware.BaseFaultsTest do
+  @moduledoc "The driver of real bases on a line that loses, doubles and changes bytes."
+  use Sim.BaseCase, async: true
+  @moduletag :slow
+
+  for seed <- 1..3 do
+    @tag wire: [drop: 0.01, double: 0.005, flip: 0.005, seed: seed]
+    test "with 2 % of faulty bytes it drives, and never faster than its limit (#{seed})",
+         context do
+      {fastest, fastest_turn} = drive(context, Twist.new(0.4, 0.0), &(&1.pose.x > -2.0), 40_000)
+      assert fastest <= 0.501
+      assert fastest_turn <= 1.001
+      {_, fastest_turn} = drive(context, Twist.new(0.0, 0.5), &(&1.pose.heading > 1.2), 40_000)
+      assert fastest_turn <= 1.001
+      stop(context)
+      assert Emulator.core(context.emulator).counts.bad > 0
+      agree_but_for_shape(context)
+    end
+  end
+end
