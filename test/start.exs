@@ -5,6 +5,7 @@ Code.require_file("skipped.exs", __DIR__)
 # for `bin/test long`, those tagged `:slow` are left out by `bin/test quick`.
 ExUnit.start(
   assert_receive_timeout: 3_000,
+  timeout: 180_000,
   exclude: [:long],
   formatters: [ExUnit.CLIFormatter, Convoy.Skipped]
 )
