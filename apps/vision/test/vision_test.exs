@@ -1,6 +1,7 @@
 defmodule VisionTest do
   use ExUnit.Case, async: true
   doctest Vision
+  doctest Vision.Detections
   doctest Vision.Rgb
   doctest Vision.Pixels
   alias Hal.Frame

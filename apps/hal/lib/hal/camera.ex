@@ -5,16 +5,8 @@ defmodule Hal.Camera do
   calls that once it has passed the last one on.
   """
 
-  @typedoc "A picture; or, of a camera that finds them by itself, its blobs, as `Vision.BlobDetector` gives them."
-  @type reading ::
-          {:frame, Hal.Frame.t()}
-          | {:blobs, [struct()],
-             %{
-               required(:at_ms) => integer(),
-               required(:pan) => float(),
-               required(:tilt) => float(),
-               optional(:field_of_view) => float() | nil
-             }}
+  @typedoc "A picture; or, of a camera that detects by itself, what it found in one: a `Vision.Detections`."
+  @type reading :: {:frame, Hal.Frame.t()} | {:detections, struct()}
 
   @doc "Opens the source."
   @callback init(keyword()) :: {:ok, state :: term()} | {:error, reason :: term()}

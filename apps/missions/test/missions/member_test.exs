@@ -242,7 +242,7 @@ defmodule Swarm.MemberTest do
 
     @impl Robot.Mission
     def handle({:tick, percept}, _mission),
-      do: {:watching, :watcher, [{:stage, :seen, Map.take(percept, [:blobs_pan, :blobs_view])}]}
+      do: {:watching, :watcher, [{:stage, :seen, Map.take(percept, [:detections])}]}
 
     def handle(_event, mission), do: {:watching, mission, []}
   end
@@ -256,11 +256,11 @@ defmodule Swarm.MemberTest do
     ]
 
     zoomed = {:reading, {:ptz, %{pan: 0.3, tilt: 0.0, field_of_view: 0.4}}, 50}
-    picture = {:blobs, [], %{at_ms: 0, pan: 0.2, tilt: 0.0, field_of_view: 0.5}}
-    {member, []} = Member.step(Member.new(options), picture)
+    seen = %Vision.Detections{at_ms: 0, blobs: [], pan: 0.2, field_of_view: 0.5}
+    {member, []} = Member.step(Member.new(options), {:detections, seen})
     {member, []} = Member.step(member, zoomed)
     {_member, effects} = Member.step(member, {:tick, 100})
-    assert {:stage, :seen, %{blobs_pan: 0.2, blobs_view: 0.5}} in effects
+    assert {:stage, :seen, %{detections: seen}} in effects
   end
 
   test "what people asked of the group's mission outlives a stop" do

@@ -148,9 +148,11 @@ defmodule Missions.Landmark.Group do
       },
       odometry: %Odometry{pose: robot.pose, twist: Twist.zero()},
       peers: Peers.percepts(robot.peers, group.now),
-      blobs: blobs(robot.share),
-      blobs_at_ms: group.now,
-      blobs_pose: robot.pose
+      detections: %Vision.Detections{
+        at_ms: group.now,
+        blobs: blobs(robot.share),
+        pose: robot.pose
+      }
     }
   end
 

@@ -10,7 +10,7 @@ defmodule Robot.Board do
   | `:odometry` `:sonar` `:ir` `:bumpers` `:power` `:brake` `:joystick` `:home` | `:drive` | as in `Hal.Drive` |
   | `:arming` | `:drive` | `%{state: state, why: line or nil}` (`Hal.Device.Arming`) |
   | `:ptz` | `:ptz` | as in `Hal.Ptz` |
-  | `:blobs` | `:blob_detector` | `%{blobs: [blob], pan: radians, field_of_view: radians or nil}`, at the time of the picture |
+  | `:detections` | `:blob_detector` | `Vision.Detections`, at the time of its picture |
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, since when |
   | `{:peer, id}` | `:comms` | as in `Robot.Percept` |
   | `:estop` | `:estop` | how the emergency stop stands, as its one owner publishes it: the last number known, the last one cleared here, the calls heard |
@@ -35,6 +35,7 @@ defmodule Robot.Board do
   """
   use GenServer
   alias Robot.{Config, Names}
+  alias Vision.Detections
 
   @enforce_keys [:robot, :table, :latch, :clock, :file, :since_ms]
   defstruct @enforce_keys
@@ -72,7 +73,7 @@ defmodule Robot.Board do
     home: :drive,
     arming: :drive,
     ptz: :ptz,
-    blobs: :blob_detector,
+    detections: :blob_detector,
     driving: :gate,
     frame: :gate,
     doing: :executive,
@@ -120,14 +121,14 @@ defmodule Robot.Board do
     :ok
   end
 
-  @doc "A sink for `Hal.Device` and `Vision.BlobDetector`: writes a reading, now, or blobs at the time of their picture; leaves alone what it does not know."
+  @doc "A sink for `Hal.Device` and `Vision.BlobDetector`: writes a reading, now, or detections at the time of their picture; leaves alone what it does not know."
   @spec sense(t(), writer(), reading :: tuple()) :: :ok
   def sense(board, device, {:health, device, {condition, since_ms}}),
     do: put(board, device, {:health, device}, condition, since_ms)
 
-  def sense(board, :blob_detector, {:blobs, blobs, %{at_ms: at_ms, pan: pan} = meta}) do
-    view = Map.get(meta, :field_of_view)
-    put(board, :blob_detector, :blobs, %{blobs: blobs, pan: pan, field_of_view: view}, at_ms)
+  def sense(board, :blob_detector, {:detections, detections}) do
+    %Detections{at_ms: at_ms} = detections
+    put(board, :blob_detector, :detections, detections, at_ms)
   end
 
   # What only a driver of its own knows is nobody's here, and no reason for it to fall.

@@ -53,13 +53,13 @@ defmodule Robot.Devices do
   end
 
   @doc """
-  A sink for the camera: its frames are for the blob detector, its health for the board, and so are the blobs of
-  a camera that finds them by itself.
+  A sink for the camera: its frames are for the blob detector, its health for the board, and so are the detections of
+  a camera that detects by itself.
   """
   @spec health(Board.t(), tuple()) :: :ok
   def health(board, {:health, device, _status} = reading), do: Board.sense(board, device, reading)
 
-  def health(board, {:blobs, _blobs, _when} = reading),
+  def health(board, {:detections, _detections} = reading),
     do: Board.sense(board, :blob_detector, reading)
 
   def health(_board, _frame), do: :ok

@@ -112,12 +112,12 @@ defmodule Robot.Localiser do
     do: {a + position, b + heading}
 
   @doc """
-  Moves the estimate by the percept's odometry, corrects it by the percept's blobs, and fills in the percept's
-  `pose`, `uncertainty` and `blobs_pose`. Without odometry there is no pose.
+  Moves the estimate by the percept's odometry, corrects it by the percept's detections, and fills in the percept's
+  `pose` and `uncertainty`, and the pose of its detections. Without odometry there is no pose.
   """
   @spec update(t(), Percept.t()) :: {Percept.t(), t()}
   def update(localiser, %Percept{odometry: nil} = percept),
-    do: {%{percept | pose: nil, uncertainty: nil, blobs_pose: nil}, localiser}
+    do: {%{exposed(percept, nil) | pose: nil, uncertainty: nil}, localiser}
 
   def update(localiser, %Percept{odometry: %Odometry{} = odometry} = percept) do
     localiser =
@@ -128,14 +128,8 @@ defmodule Robot.Localiser do
       |> remember(percept.at_ms)
       |> see(percept)
 
-    percept = %{
-      percept
-      | pose: localiser.belief.pose,
-        uncertainty: uncertainty(localiser),
-        blobs_pose: percept.blobs_at_ms && pose_at(localiser, percept.blobs_at_ms)
-    }
-
-    {percept, localiser}
+    percept = exposed(percept, localiser)
+    {%{percept | pose: localiser.belief.pose, uncertainty: uncertainty(localiser)}, localiser}
   end
 
   defp uncertainty(%{belief: belief, frame: frame, frame_no: number}) do
@@ -188,10 +182,10 @@ defmodule Robot.Localiser do
   end
 
   # Every picture counts once. It was taken a moment ago, and the body may have turned since.
-  defp see(localiser, %Percept{blobs: nil}), do: localiser
-  defp see(%{seen_ms: at_ms} = localiser, %Percept{blobs_at_ms: at_ms}), do: localiser
+  defp see(localiser, %Percept{detections: nil}), do: localiser
+  defp see(%{seen_ms: at_ms} = localiser, %Percept{detections: %{at_ms: at_ms}}), do: localiser
 
-  defp see(localiser, %Percept{blobs_at_ms: at_ms} = percept) do
+  defp see(localiser, %Percept{detections: %{at_ms: at_ms}} = percept) do
     case History.back(localiser.history, localiser.odometry, at_ms) do
       nil ->
         localiser
@@ -204,6 +198,12 @@ defmodule Robot.Localiser do
 
   defp remember(localiser, at_ms),
     do: %{localiser | history: History.note(localiser.history, at_ms, localiser.odometry)}
+
+  # Where the robot stood when the picture was taken.
+  defp exposed(%Percept{detections: nil} = percept, _localiser), do: percept
+
+  defp exposed(%Percept{detections: %{at_ms: at_ms} = picture} = percept, localiser),
+    do: %{percept | detections: %{picture | pose: localiser && pose_at(localiser, at_ms)}}
 
   defp pose_at(%{belief: belief} = localiser, at_ms) do
     back = History.back(localiser.history, localiser.odometry, at_ms)

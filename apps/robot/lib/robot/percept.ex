@@ -3,8 +3,8 @@ defmodule Robot.Percept do
   All that a robot knows at one tick, frozen: behaviours and missions read nothing else.
 
   Whatever was older than its limit when the percept was taken is `nil` (or `[]` for bumpers):
-  a behaviour never sees a stale reading. `blobs: nil` means that there is no fresh picture,
-  `blobs: []` that the picture shows nothing. `pose` is the robot's estimate in the `map` frame.
+  a behaviour never sees a stale reading. `detections: nil` means that there is no fresh
+  picture, `detections.blobs: []` that the picture shows nothing. `pose` is the robot's estimate in the `map` frame.
   """
   alias Hal.{Odometry, Pose, Profile, Twist}
 
@@ -19,11 +19,7 @@ defmodule Robot.Percept do
                 bumpers: [],
                 power: nil,
                 ptz: nil,
-                blobs: nil,
-                blobs_at_ms: nil,
-                blobs_pan: 0.0,
-                blobs_view: nil,
-                blobs_pose: nil,
+                detections: nil,
                 peers: %{},
                 driving: nil
               ]
@@ -64,8 +60,7 @@ defmodule Robot.Percept do
         }
 
   @typedoc """
-  `blobs_pan`, `blobs_view` and `blobs_pose` are where the camera looked, how wide (radians, `nil`:
-  as the unit says now) and where the robot stood (map frame) when the picture was taken. `driving` is what the gate last let through, and why it limited it.
+  `detections` is what was found in the newest picture. `driving` is what the gate last let through, and why it limited it.
   """
   @type t :: %__MODULE__{
           robot: atom(),
@@ -79,11 +74,7 @@ defmodule Robot.Percept do
           bumpers: [0..15],
           power: float() | nil,
           ptz: %{pan: float(), tilt: float(), field_of_view: float()} | nil,
-          blobs: [Vision.Blob.t()] | nil,
-          blobs_at_ms: integer() | nil,
-          blobs_pan: float(),
-          blobs_view: float() | nil,
-          blobs_pose: Pose.t() | nil,
+          detections: Vision.Detections.t() | nil,
           peers: %{atom() => peer()},
           driving: %{twist: Twist.t(), limits: [atom()]} | nil
         }

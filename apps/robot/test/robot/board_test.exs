@@ -95,16 +95,16 @@ defmodule Robot.BoardTest do
     Board.put(board, :drive, :sonar, [1.0], 1_000)
     Board.put(board, :drive, :bumpers, [3], 900)
     Board.put(board, :drive, :power, 24.0, 0)
-    Board.put(board, :blob_detector, :blobs, %{blobs: [], pan: 0.5}, 800)
+    seen = %Vision.Detections{at_ms: 800, blobs: [], pan: 0.5}
+    Board.sense(board, :blob_detector, {:detections, seen})
     Board.put(board, :comms, {:peer, :mag2}, %{mode: :dead}, 0)
 
-    assert %Percept{sonar: [1.0], bumpers: [3], power: 24.0, blobs: [], blobs_at_ms: 800} =
+    assert %Percept{sonar: [1.0], bumpers: [3], power: 24.0, detections: ^seen} =
              percept = Percept.Snapshot.take(board, profile, 1_200)
 
-    assert percept.blobs_pan == 0.5
     assert percept.peers == %{mag2: %{mode: :dead}}
 
-    assert %Percept{sonar: nil, bumpers: [], power: 24.0, blobs: nil, blobs_at_ms: nil} =
+    assert %Percept{sonar: nil, bumpers: [], power: 24.0, detections: nil} =
              Percept.Snapshot.take(board, profile, 1_301)
   end
 end

@@ -41,8 +41,8 @@ defmodule Robot.CameraTest do
     at_ms = show(id)
 
     receive do
-      {:mission, {:tick, %{blobs: [%{colour: "Yellow"}], blobs_at_ms: ^at_ms} = percept}} ->
-        assert percept.blobs_pan == 0.5
+      {:mission, {:tick, %{detections: %{at_ms: ^at_ms, blobs: [%{colour: "Yellow"}]} = seen}}} ->
+        assert seen.pan == 0.5
     after
       300 ->
         assert pictures > 1, "no picture of ten came into the percept"
@@ -51,7 +51,7 @@ defmodule Robot.CameraTest do
   end
 
   # The first percept without a picture, after one with.
-  defp blind, do: assert_receive({:mission, {:tick, %{blobs: nil, blobs_at_ms: nil}}}, 1_000)
+  defp blind, do: assert_receive({:mission, {:tick, %{detections: nil}}}, 1_000)
 
   defp forget_ticks do
     receive do
@@ -79,8 +79,8 @@ defmodule Robot.CameraTest do
     at_ms = System.monotonic_time(:millisecond)
     {:ok, frame} = Hal.Frame.new(:yuyv, 2, 1, <<200, 70, 200, 140>>, at_ms)
     send(Names.whereis(id, :camera), {:readings, [{:frame, frame}]})
-    assert_receive {:mission, {:tick, %{blobs_at_ms: ^at_ms} = percept}}, 300
-    assert {percept.blobs_pan, percept.blobs_view} == {0.3, 0.7}
+    assert_receive {:mission, {:tick, %{detections: %{at_ms: ^at_ms}} = percept}}, 300
+    assert {percept.detections.pan, percept.detections.field_of_view} == {0.3, 0.7}
     assert Robot.Percept.Sighting.field_of_view(percept) == 0.7
   end
 

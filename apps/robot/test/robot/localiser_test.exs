@@ -5,7 +5,7 @@ defmodule Robot.LocaliserTest do
   alias Robot.{Localiser, Percept}
   alias Robot.Percept.Sighting
   alias Robot.Localiser.{Anchors, Belief}
-  alias Vision.Blob
+  alias Vision.{Blob, Detections}
 
   @view :math.pi() / 3
   @focal 160 / :math.tan(:math.pi() / 6)
@@ -17,8 +17,7 @@ defmodule Robot.LocaliserTest do
       profile: Profile.magellan(),
       odometry: %Odometry{pose: odometry, twist: Twist.zero()},
       ptz: %{pan: 0.0, tilt: 0.0, field_of_view: @view},
-      blobs: blobs,
-      blobs_at_ms: blobs && at_ms
+      detections: blobs && %Detections{at_ms: at_ms, blobs: blobs}
     }
   end
 
@@ -93,10 +92,11 @@ defmodule Robot.LocaliserTest do
     assert before.pose == Pose.new(4, 2)
 
     # Its blobs are of a time that only poses of the old frame could tell of.
-    again = %{framed.(Pose.new(0, 0), other, 900) | blobs: [], blobs_at_ms: 100}
+    old = %Detections{at_ms: 100, blobs: []}
+    again = %{framed.(Pose.new(0, 0), other, 900) | detections: old}
     {percept, sure} = Localiser.update(localiser, again)
     assert percept.pose == before.pose
-    assert percept.blobs_pose == nil
+    assert percept.detections.pose == nil
     assert Belief.radius(sure.belief) > Belief.radius(localiser.belief) + 0.3
 
     {percept, _} = Localiser.update(sure, framed.(Pose.new(0.5, 0), other, 1_000))
@@ -163,10 +163,10 @@ defmodule Robot.LocaliserTest do
     {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0, 0.0), 0))
     {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0, 0.2), 100))
     blobs = [blob("Y", Pose.new(0, 0), {4.0, 0.0}, 0.15)]
-    old = %{percept(Pose.new(0, 0, 0.4), 200, blobs) | blobs_at_ms: 0}
+    old = put_in(percept(Pose.new(0, 0, 0.4), 200, blobs).detections.at_ms, 0)
     {percept, localiser} = Localiser.update(localiser, old)
     assert_in_delta percept.pose.heading, 0.4, 1.0e-6
-    assert_in_delta percept.blobs_pose.heading, 0.0, 1.0e-6
+    assert_in_delta percept.detections.pose.heading, 0.0, 1.0e-6
     belief = localiser.belief
     {_, localiser} = Localiser.update(localiser, %{old | at_ms: 201})
     assert localiser.belief == belief
@@ -176,9 +176,9 @@ defmodule Robot.LocaliserTest do
     localiser = told(Localiser.new(Pose.new(0, 0)), [@landmark])
     {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0), 0))
     blobs = [blob("Y", Pose.new(0, 0, 0.1), {4.0, 0.0}, 0.15)]
-    now = %{percept(Pose.new(0, 0, 0.2), 100, blobs) | blobs_at_ms: 50}
+    now = put_in(percept(Pose.new(0, 0, 0.2), 100, blobs).detections.at_ms, 50)
     {percept, _} = Localiser.update(localiser, now)
-    assert_in_delta percept.blobs_pose.heading, 0.1, 1.0e-3
+    assert_in_delta percept.detections.pose.heading, 0.1, 1.0e-3
     assert_in_delta percept.pose.heading, 0.2, 1.0e-3
   end
 
@@ -186,11 +186,10 @@ defmodule Robot.LocaliserTest do
     localiser = told(Localiser.new(Pose.new(0, 0)), [@landmark])
     {_, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0), 1_000))
     blobs = [blob("Y", Pose.new(0, 0, 0.05), {4.0, 0.0}, 0.15)]
+    old = put_in(percept(Pose.new(0, 0), 1_100, blobs).detections.at_ms, 900)
+    {percept, corrected} = Localiser.update(localiser, old)
 
-    {percept, corrected} =
-      Localiser.update(localiser, %{percept(Pose.new(0, 0), 1_100, blobs) | blobs_at_ms: 900})
-
-    assert percept.blobs_pose == nil
+    assert percept.detections.pose == nil
     assert corrected.belief == localiser.belief
   end
 

@@ -42,8 +42,7 @@ defmodule Robot.Body do
       odometry: %Odometry{pose: body.pose, twist: body.twist},
       sonar: silence(body.profile),
       driving: %{twist: body.twist, limits: []},
-      ptz: body.pan && %{pan: body.pan, tilt: 0.0, field_of_view: :math.pi() / 3},
-      blobs_pan: body.pan || 0.0
+      ptz: body.pan && %{pan: body.pan, tilt: 0.0, field_of_view: :math.pi() / 3}
     }
   end
 
@@ -105,9 +104,25 @@ defmodule Robot.Body do
 
   @doc "A percept changer that shows a thing at this place."
   def see(percept, place, wobble \\ 0.0) do
-    eye = %{percept.pose | heading: percept.pose.heading + percept.blobs_pan}
+    eye = %{percept.pose | heading: percept.pose.heading + pan(percept)}
     blob = blob(%{pose: eye}, place)
-    blobs = if blob, do: [%{blob | x: blob.x + wobble}], else: []
-    %{percept | blobs: blobs, blobs_at_ms: percept.at_ms, blobs_pose: percept.pose}
+    show(percept, if(blob, do: [%{blob | x: blob.x + wobble}], else: []))
   end
+
+  @doc "A percept changer that shows nothing."
+  def see_nothing(percept), do: show(percept, [])
+
+  defp show(percept, blobs) do
+    picture = %Vision.Detections{
+      at_ms: percept.at_ms,
+      blobs: blobs,
+      pan: pan(percept),
+      pose: percept.pose
+    }
+
+    %{percept | detections: picture}
+  end
+
+  defp pan(%{ptz: nil}), do: 0.0
+  defp pan(%{ptz: %{pan: pan}}), do: pan
 end

@@ -11,6 +11,7 @@ defmodule Sim.Trial do
   alias Sim.{Radio, Scene, World}
   alias Sim.Trial.{Cuts, Evaluation, RunLog, Scenario, Setup, Termination}
   alias Swarm.Member
+  alias Vision.Detections
 
   @half_ms 50
 
@@ -191,8 +192,7 @@ defmodule Sim.Trial do
 
   defp look(%{options: %{blobs: :direct}} = trial) do
     each(trial, fn id, trial ->
-      {:ptz, aim} = trial.world |> World.readings(id) |> List.keyfind(:ptz, 0)
-      see(trial, id, World.blobs(trial.world, id), aim)
+      input(trial, id, {:detections, World.detections(trial.world, id)})
     end)
   end
 
@@ -200,12 +200,9 @@ defmodule Sim.Trial do
     each(trial, fn id, trial ->
       frame = World.frame(trial.world, id)
       {:ok, blobs} = Vision.blobs(frame, trial.colours)
-      see(trial, id, blobs, Map.take(frame, [:pan, :tilt, :field_of_view]))
+      input(trial, id, {:detections, Detections.new(frame, blobs)})
     end)
   end
-
-  defp see(trial, id, blobs, aim),
-    do: input(trial, id, {:blobs, blobs, Map.put(aim, :at_ms, trial.at_ms)})
 
   defp inputs(trial, make),
     do: each(trial, fn id, trial -> input(trial, id, make.(trial.at_ms)) end)

@@ -173,6 +173,20 @@ defmodule Sim.World do
     World.Blobs.see(world.map, CameraFrustum.of(body), poles(world, id), noise)
   end
 
+  @doc "The same with where the camera looks now, as a detector would give it."
+  @spec detections(t(), id()) :: Vision.Detections.t()
+  def detections(%__MODULE__{} = world, id) do
+    %Body{pan: pan, tilt: tilt, field_of_view: angle} = Elixir.Map.fetch!(world.robots, id)
+
+    %Vision.Detections{
+      at_ms: world.at_ms,
+      blobs: blobs(world, id),
+      pan: pan,
+      tilt: tilt,
+      field_of_view: angle
+    }
+  end
+
   @doc "The picture of a robot's camera, where it looks now."
   @spec frame(t(), id()) :: Hal.Frame.t()
   def frame(%__MODULE__{} = world, id) do

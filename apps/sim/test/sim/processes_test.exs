@@ -157,20 +157,14 @@ defmodule Sim.ProcessesTest do
   end
 
   defp see(run) do
-    for {id, {blobs, meta}} <- run.pictures, reduce: run do
-      run -> input(run, id, {:blobs, blobs, meta})
+    for {id, detections} <- run.pictures, reduce: run do
+      run -> input(run, id, {:detections, detections})
     end
   end
 
   # What `see/1` hands on 50 ms later, when the camera may have zoomed further.
   defp expose(run) do
-    pictures =
-      for id <- @ids do
-        {:ptz, aim} = run.world |> World.readings(id) |> List.keyfind(:ptz, 0)
-        {id, {World.blobs(run.world, id), Map.put(aim, :at_ms, run.at_ms)}}
-      end
-
-    %{run | pictures: pictures}
+    %{run | pictures: for(id <- @ids, do: {id, World.detections(run.world, id)})}
   end
 
   defp each(run, make),
@@ -207,7 +201,7 @@ defmodule Sim.ProcessesTest do
     case input do
       {:reading, {:ptz, _} = reading, _} -> send(pids.ptz, {:readings, [reading]})
       {:reading, reading, _} -> send(pids.drive, {:readings, [reading]})
-      {:blobs, _, _} -> Board.sense(Board.find!(@me), :blob_detector, input)
+      {:detections, _} -> Board.sense(Board.find!(@me), :blob_detector, input)
       {:message, message, _} -> Comms.hear(@me, message)
       {:command, command, _} -> :ok = Swarm.ask(@me, command)
       {:tick, _} -> send(pids.executive, :tick)

@@ -7,7 +7,7 @@ defmodule Swarm.Member do
   | input | from |
   |---|---|
   | `{:reading, reading, at_ms}` | the drive, the pan-tilt unit |
-  | `{:blobs, blobs, meta}` | the blob detector (`t:Vision.BlobDetector.meta/0`) |
+  | `{:detections, detections}` | the blob detector (`Vision.Detections`) |
   | `{:message, term, at_ms}` | another robot |
   | `{:command, command, at_ms}` | a person |
   | `{:tick, at_ms}` | the clock, 10 Hz: controller, then mission, then (5 Hz) the heartbeat |
@@ -49,7 +49,7 @@ defmodule Swarm.Member do
 
   @type input ::
           {:reading, Hal.Drive.reading() | Hal.Ptz.reading(), integer()}
-          | {:blobs, [Vision.Blob.t()], Vision.BlobDetector.meta()}
+          | {:detections, Vision.Detections.t()}
           | {:message, term(), integer()}
           | {:command, term(), integer()}
           | {:tick, integer()}
@@ -90,8 +90,8 @@ defmodule Swarm.Member do
     react(%{put(member, key, value, at_ms) | reflex: reflex}, urgency, at_ms)
   end
 
-  def step(member, {:blobs, blobs, %{at_ms: at_ms, pan: pan, field_of_view: view}}),
-    do: {put(member, :blobs, %{blobs: blobs, pan: pan, field_of_view: view}, at_ms), []}
+  def step(member, {:detections, detections}),
+    do: {put(member, :detections, detections, detections.at_ms), []}
 
   def step(member, {:message, term, at_ms}) do
     {heard, receiver} = Receiver.hear(member.receiver, term, at_ms)

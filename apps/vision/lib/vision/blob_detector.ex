@@ -7,7 +7,7 @@ defmodule Vision.BlobDetector do
 
     * `:colours` - the `Vision.Colours` to look for
     * `:sink` - `{m, f, a}`; each frame that was read gives
-      `apply(m, f, a ++ [{:blobs, blobs, %{at_ms: …, pan: …, tilt: …, field_of_view: …}}])`, also without blobs
+      `apply(m, f, a ++ [{:detections, detections}])` with its `Vision.Detections`, also without blobs
     * `:backend` - a `Vision.Backend`; by default the first of `Vision.blobs/2` that reads the frame
     * `:ptz` - `true`: the camera sits on a pan-tilt unit, whose readings come to `aim/2`
     * `:clock` - `{m, f, a}` giving integer milliseconds, that of the frames
@@ -26,14 +26,8 @@ defmodule Vision.BlobDetector do
   """
   use GenServer
   alias Hal.{Frame, Ptz}
-  alias Vision.Colours
+  alias Vision.{Colours, Detections}
 
-  @type meta :: %{
-          at_ms: integer(),
-          pan: float(),
-          tilt: float(),
-          field_of_view: float() | nil
-        }
   @type status :: %{
           read: non_neg_integer(),
           dropped: non_neg_integer(),
@@ -78,8 +72,7 @@ defmodule Vision.BlobDetector do
 
     with {:ok, frame} <- direct(frame, state), {:ok, blobs} <- read(frame, state) do
       {m, f, a} = state.sink
-      meta = Map.take(frame, [:at_ms, :pan, :tilt, :field_of_view])
-      apply(m, f, a ++ [{:blobs, blobs, meta}])
+      apply(m, f, a ++ [{:detections, Detections.new(frame, blobs)}])
       {:noreply, count(state, :read, 1)}
     else
       {:error, reason} ->
@@ -118,8 +111,6 @@ defmodule Vision.BlobDetector do
     end
   end
 
-  defp direct(%Frame{pan: nil} = frame, _state), do: {:ok, %{frame | pan: 0.0, tilt: 0.0}}
-  defp direct(%Frame{tilt: nil} = frame, _state), do: {:ok, %{frame | tilt: 0.0}}
   defp direct(frame, _state), do: {:ok, frame}
 
   defp read(%Frame{} = frame, state), do: Vision.blobs(frame, state.colours, state.backend)

@@ -1,7 +1,7 @@
 defmodule Vision.BlobDetectorTest do
   use ExUnit.Case, async: true
   alias Hal.Frame
-  alias Vision.{BlobDetector, Colours}
+  alias Vision.{BlobDetector, Colours, Detections}
   @moduletag :slow
 
   setup do
@@ -21,17 +21,18 @@ defmodule Vision.BlobDetectorTest do
 
   test "blobs go to the sink with the time and direction of the frame", %{detector: detector} do
     :ok = BlobDetector.frame(detector, {:frame, frame(7)})
-    assert_receive {:blobs, [%{colour: "Yellow", area: 2}], %{at_ms: 7, pan: 0.5, tilt: tilt}}
-    assert tilt == 0.0
+    assert_receive {:detections, %Detections{at_ms: 7, pan: 0.5} = seen}
+    assert [%{colour: "Yellow", area: 2}] = seen.blobs
+    assert {seen.tilt, seen.field_of_view, seen.pose} == {0.0, nil, nil}
   end
 
   test "only the newest frame of those that wait is read", %{detector: detector} do
     :sys.suspend(detector)
     for at_ms <- 1..20, do: BlobDetector.frame(detector, frame(at_ms))
     :sys.resume(detector)
-    assert_receive {:blobs, _, %{at_ms: 20}}
+    assert_receive {:detections, %{at_ms: 20}}
     assert %{read: 1, dropped: 19} = BlobDetector.status(detector)
-    refute_received {:blobs, _, _}
+    refute_received {:detections, _}
   end
 
   test "wrong frames are counted and give nothing", %{detector: detector} do
@@ -40,7 +41,7 @@ defmodule Vision.BlobDetectorTest do
     BlobDetector.frame(detector, {:frame, :nonsense})
     assert %{wrong: 2, read: 0, last_error: :no_frame} = BlobDetector.status(detector)
     BlobDetector.frame(detector, {:health, :camera, {:online, 0}})
-    refute_received {:blobs, _, _}
+    refute_received {:detections, _}
   end
 
   @tag if(System.find_executable("ffmpeg"), do: [], else: [skip: "ffmpeg is missing"])
@@ -54,7 +55,7 @@ defmodule Vision.BlobDetectorTest do
        sinks: [{BlobDetector, :frame, [detector]}, {Kernel, :send, [self()]}]}
     )
 
-    assert_receive {:blobs, [%{colour: "Yellow", share: 1.0}], _meta}, 10_000
+    assert_receive {:detections, %{blobs: [%{colour: "Yellow", share: 1.0}]}}, 10_000
     assert_receive {:health, :camera, {{:offline, :eof}, _since_ms}}, 10_000
     assert BlobDetector.status(detector).wrong == 0
   end
@@ -83,13 +84,13 @@ defmodule Vision.BlobDetectorTest do
       looks(detector, clock, 1_000, 0.0)
       looks(detector, clock, 1_100, 0.4)
       BlobDetector.frame(detector, %{frame(1_050) | pan: nil})
-      assert_receive {:blobs, [_], %{at_ms: 1_050} = meta}
-      assert_in_delta meta.pan, 0.2, 1.0e-9
-      assert_in_delta meta.tilt, 0.1, 1.0e-9
-      assert_in_delta meta.field_of_view, 0.8, 1.0e-9
+      assert_receive {:detections, %{at_ms: 1_050, blobs: [_]} = seen}
+      assert_in_delta seen.pan, 0.2, 1.0e-9
+      assert_in_delta seen.tilt, 0.1, 1.0e-9
+      assert_in_delta seen.field_of_view, 0.8, 1.0e-9
       # One that knows is taken at its word.
       BlobDetector.frame(detector, frame(1_060))
-      assert_receive {:blobs, [_], %{at_ms: 1_060, pan: 0.5, field_of_view: nil}}
+      assert_receive {:detections, %{at_ms: 1_060, blobs: [_], pan: 0.5, field_of_view: nil}}
     end
 
     test "nobody knows where it looked: no blobs, which is not the same as none seen", context do
@@ -99,10 +100,10 @@ defmodule Vision.BlobDetectorTest do
       looks(detector, clock, 1_000, 0.3)
       BlobDetector.aim(detector, {:health, :ptz, {:online, 0}})
       BlobDetector.frame(detector, %{frame(1_900) | pan: nil})
-      assert_receive {:blobs, [_], %{at_ms: 1_900, pan: 0.3}}
+      assert_receive {:detections, %{at_ms: 1_900, blobs: [_], pan: 0.3}}
       BlobDetector.frame(detector, %{frame(2_001) | pan: nil})
       assert %{wrong: 2} = BlobDetector.status(detector)
-      refute_received {:blobs, _, _}
+      refute_received {:detections, _}
     end
 
     test "readings that wait behind a frame are heard before it is looked at", context do
@@ -113,7 +114,7 @@ defmodule Vision.BlobDetectorTest do
       BlobDetector.frame(detector, %{frame(1_050) | pan: nil})
       BlobDetector.aim(detector, {:ptz, %{pan: 0.4, tilt: 0.1, field_of_view: 0.8}})
       :sys.resume(detector)
-      assert_receive {:blobs, [_], %{pan: pan}}
+      assert_receive {:detections, %{blobs: [_], pan: pan}}
       assert_in_delta pan, 0.2, 1.0e-9
     end
   end
@@ -145,18 +146,18 @@ defmodule Vision.BlobDetectorTest do
        sinks: [{BlobDetector, :frame, [detector]}]}
     )
 
-    metas =
+    seen =
       for _ <- 1..10 do
-        assert_receive {:blobs, [_], meta}, 10_000
-        meta
+        assert_receive {:detections, %{blobs: [_]} = detections}, 10_000
+        detections
       end
 
     :timer.cancel(timer)
-    assert List.last(metas).pan > List.first(metas).pan + 0.1
+    assert List.last(seen).pan > List.first(seen).pan + 0.1
 
-    for meta <- metas do
-      assert_in_delta meta.pan, pan.(meta.at_ms), 0.01
-      assert_in_delta meta.field_of_view, 0.8, 1.0e-9
+    for detections <- seen do
+      assert_in_delta detections.pan, pan.(detections.at_ms), 0.01
+      assert_in_delta detections.field_of_view, 0.8, 1.0e-9
     end
   end
 

@@ -35,30 +35,31 @@ defmodule Missions.Landmark.LandmarkTrack do
 
   @doc "The sight after one more percept; an old one stays when the landmark is not in the picture."
   @spec update(t() | nil, Percept.t(), String.t()) :: t() | nil
-  def update(old, %Percept{blobs_pose: nil}, _colour), do: old
-  def update(%{at_ms: at_ms} = old, %Percept{blobs_at_ms: at_ms}, _colour), do: old
+  def update(old, %Percept{detections: nil}, _colour), do: old
+  def update(old, %Percept{detections: %{pose: nil}}, _colour), do: old
+  def update(%{at_ms: at_ms} = old, %Percept{detections: %{at_ms: at_ms}}, _colour), do: old
 
-  def update(old, percept, colour) do
+  def update(old, %Percept{detections: picture} = percept, colour) do
     case Sighting.largest(percept, colour) do
       nil ->
         old
 
       blob ->
         view = Sighting.field_of_view(percept)
-        bearing = Sighting.bearing(blob, percept.blobs_pan, view)
+        bearing = Sighting.bearing(blob, picture.pan, view)
 
-        distance = distance(blob, percept.blobs, view)
-        seen = distance && Sighting.place(percept.blobs_pose, bearing, distance)
+        distance = distance(blob, picture.blobs, view)
+        seen = distance && Sighting.place(picture.pose, bearing, distance)
 
         place = smooth(old && old.place, seen)
 
         %__MODULE__{
-          at_ms: percept.blobs_at_ms,
+          at_ms: picture.at_ms,
           size_ppm: max(round(blob.share * 1_000_000), 1),
-          bearing: Pose.bearing(percept.pose, Sighting.place(percept.blobs_pose, bearing, 5.0)),
+          bearing: Pose.bearing(percept.pose, Sighting.place(picture.pose, bearing, 5.0)),
           distance: distance,
           place: place,
-          place_ms: if(seen, do: percept.blobs_at_ms, else: old && old.place_ms),
+          place_ms: if(seen, do: picture.at_ms, else: old && old.place_ms),
           moving?: seen != nil and place != nil and Pose.distance(seen, place) > @moving
         }
     end

@@ -281,8 +281,7 @@ defmodule Missions.Landmark.PhasesTest do
       Group.percept(leading, :mag2)
       | pose: nil,
         odometry: nil,
-        blobs: nil,
-        blobs_pose: nil
+        detections: nil
     }
 
     {:lead, _mission, effects} = Landmark.handle({:tick, lost}, mission(leading))
@@ -332,27 +331,27 @@ defmodule Missions.Landmark.PhasesTest do
     refute sight.moving?
     assert LandmarkTrack.update(sight, percept, "YellowLandmark") == sight
 
-    far = %{
-      percept
-      | blobs_at_ms: percept.at_ms + 100,
-        blobs: Enum.map(percept.blobs, &%{&1 | distance: 2.0})
-    }
+    later = put_in(percept.detections.at_ms, percept.at_ms + 100)
+    [blob] = later.detections.blobs
+    far = put_in(later.detections.blobs, [%{blob | distance: 2.0}])
 
     assert LandmarkTrack.update(sight, far, "YellowLandmark").moving?
-    jump = %{far | blobs: Enum.map(far.blobs, &%{&1 | distance: 4.0})}
+    jump = put_in(later.detections.blobs, [%{blob | distance: 4.0}])
     moved = LandmarkTrack.update(sight, jump, "YellowLandmark")
     assert_in_delta elem(moved.place, 0), 4.0, 0.01
-    assert LandmarkTrack.update(sight, %{far | blobs: []}, "YellowLandmark") == sight
+    gone = put_in(later.detections.blobs, [])
+    assert LandmarkTrack.update(sight, gone, "YellowLandmark") == sight
   end
 
   test "a landmark whose foot is out of the picture is as far off as it is wide" do
     group = alone(0.02)
-    %{blobs: [blob]} = percept = Group.percept(group, :mag2)
+    %{detections: %{blobs: [blob]}} = percept = Group.percept(group, :mag2)
     # 48 of 320 pixels over 60 degrees: 0.15 m of radius, 1.74 m off.
     near = %{blob | clipped?: true, left: 136, right: 183, top: 40, bottom: 239, distance: 9.0}
 
     place = fn blobs ->
-      LandmarkTrack.update(nil, %{percept | blobs: blobs}, "YellowLandmark").place
+      percept = put_in(percept.detections.blobs, blobs)
+      LandmarkTrack.update(nil, percept, "YellowLandmark").place
     end
 
     assert_in_delta elem(place.([near]), 0), 1.74, 0.05

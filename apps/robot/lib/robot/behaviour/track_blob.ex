@@ -113,10 +113,11 @@ defmodule Robot.Behaviour.TrackBlob do
   defp heading(_percept), do: nil
 
   # One picture counts once, however many ticks it is fresh.
-  defp look(%{picture_ms: at_ms} = state, %{blobs_at_ms: at_ms}) when at_ms != nil, do: state
+  defp look(state, %{detections: nil}), do: state
+  defp look(%{picture_ms: at_ms} = state, %{detections: %{at_ms: at_ms}}), do: state
 
   defp look(state, percept) do
-    state = %{state | picture_ms: percept.blobs_at_ms}
+    state = %{state | picture_ms: percept.detections.at_ms}
 
     case Sighting.of(percept, state.colour, state.min_share) do
       nil ->

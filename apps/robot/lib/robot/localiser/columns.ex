@@ -20,13 +20,14 @@ defmodule Robot.Localiser.Columns do
   @doc """
   The columns that a disc fills, which is seen in a direction (radians, from where the robot heads) under twice `half` radians.
 
-      iex> percept = %Robot.Percept{profile: Hal.Profile.magellan(), at_ms: 0, blobs_pan: 0.0}
+      iex> picture = %Vision.Detections{at_ms: 0, blobs: []}
+      iex> percept = %Robot.Percept{profile: Hal.Profile.magellan(), at_ms: 0, detections: picture}
       iex> Robot.Localiser.Columns.count(Robot.Localiser.Columns.span(0.0, 0.1, percept))
       11
   """
   @spec span(bearing :: float(), half :: float(), Percept.t()) :: t()
   def span(bearing, half, percept) do
-    bearing = Pose.wrap(bearing - percept.blobs_pan)
+    bearing = Pose.wrap(bearing - percept.detections.pan)
 
     if abs(bearing) - half > @aside,
       do: 0,

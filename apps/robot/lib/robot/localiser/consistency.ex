@@ -30,7 +30,10 @@ defmodule Robot.Localiser.Consistency do
 
   def judge(belief, robots, %Percept{} = percept, %Pose{} = back) do
     exposed = Pose.compose(belief.pose, back)
-    {hiding, showing} = Enum.split_with(percept.blobs, &(&1.colour not in colours(robots)))
+
+    {hiding, showing} =
+      Enum.split_with(percept.detections.blobs, &(&1.colour not in colours(robots)))
+
     seen = Columns.seen(showing, colours(robots))
     covered = Columns.union(seen, Columns.seen(hiding, Enum.map(hiding, & &1.colour)))
     spans = Enum.map(robots, &spans(&1, belief, exposed, percept))

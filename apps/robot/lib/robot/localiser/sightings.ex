@@ -43,14 +43,15 @@ defmodule Robot.Localiser.Sightings do
   # There is one landmark: whatever has its colour is it.
   defp see_landmarks(belief, landmarks, {percept, _back} = picture) do
     Enum.reduce(landmarks, belief, fn mark, belief ->
-      whole = Enum.filter(percept.blobs, &(&1.colour == mark.colour and not &1.clipped?))
+      whole =
+        Enum.filter(percept.detections.blobs, &(&1.colour == mark.colour and not &1.clipped?))
 
       case Enum.max_by(whole, & &1.area, fn -> nil end) do
         nil ->
           belief
 
         blob ->
-          see(belief, picture, mark, blob, 0.0, Sighting.distance(blob, percept.blobs))
+          see(belief, picture, mark, blob, 0.0, Sighting.distance(blob, percept.detections.blobs))
       end
     end)
   end
@@ -59,7 +60,13 @@ defmodule Robot.Localiser.Sightings do
     view = Sighting.field_of_view(percept)
 
     robots
-    |> Matching.pairs(percept.blobs, belief, exposed(belief, back), percept.blobs_pan, view)
+    |> Matching.pairs(
+      percept.detections.blobs,
+      belief,
+      exposed(belief, back),
+      percept.detections.pan,
+      view
+    )
     |> Enum.reduce(belief, fn %{mark: mark, blob: blob, slack: slack} = pair, belief ->
       distance = if pair.whole?, do: Sighting.distance_by_width(blob, mark.radius, view)
       see(belief, picture, mark, blob, slack, distance)
@@ -68,7 +75,7 @@ defmodule Robot.Localiser.Sightings do
 
   defp see(belief, {percept, back} = picture, mark, blob, slack, distance) do
     far = Pose.distance(exposed(belief, back), mark.at)
-    bearing = Sighting.bearing(blob, percept.blobs_pan, Sighting.field_of_view(percept))
+    bearing = Sighting.bearing(blob, percept.detections.pan, Sighting.field_of_view(percept))
 
     cond do
       far < @near ->

@@ -39,7 +39,7 @@ defmodule Robot.Localiser.Silhouettes do
   @spec align(Belief.t(), [Anchors.mark()], Percept.t(), back :: Pose.t()) :: Belief.t()
   def align(belief, robots, %Percept{} = percept, %Pose{} = back) do
     {worst, _least, direction} = Belief.spread(belief)
-    seen = Columns.seen(percept.blobs, Enum.map(robots, & &1.colour))
+    seen = Columns.seen(percept.detections.blobs, Enum.map(robots, & &1.colour))
 
     if worst > @sure and not Columns.empty?(seen),
       do: fit(belief, robots, percept, back, seen, {worst, direction}),

@@ -31,8 +31,9 @@ defmodule Robot.Percept.Sighting do
   @spec of(Percept.t(), String.t() | nil, float()) :: t() | nil
   def of(percept, colour, min_share \\ 0.0) do
     with %Blob{} = blob <- largest(percept, colour, min_share) do
-      seen = bearing(blob, percept.blobs_pan, field_of_view(percept))
-      exposed = percept.blobs_pose || percept.pose
+      picture = percept.detections
+      seen = bearing(blob, picture.pan, field_of_view(percept))
+      exposed = picture.pose || percept.pose
       direction = exposed && Pose.wrap(exposed.heading + seen)
 
       %{
@@ -45,7 +46,7 @@ defmodule Robot.Percept.Sighting do
         distance:
           if(blob.clipped? and blob.share > @too_near_share, do: nil, else: blob.distance),
         share: blob.share,
-        at_ms: percept.blobs_at_ms
+        at_ms: picture.at_ms
       }
     end
   end
@@ -127,7 +128,7 @@ defmodule Robot.Percept.Sighting do
   the profile's.
   """
   @spec field_of_view(Percept.t()) :: float()
-  def field_of_view(%Percept{blobs_view: angle}) when angle != nil, do: angle
+  def field_of_view(%Percept{detections: %{field_of_view: angle}}) when angle != nil, do: angle
   def field_of_view(%Percept{ptz: %{field_of_view: angle}}), do: angle
   def field_of_view(%Percept{profile: profile}), do: profile.camera.field_of_view
 
@@ -137,9 +138,9 @@ defmodule Robot.Percept.Sighting do
   """
   @spec largest(Percept.t(), String.t() | nil, float()) :: Blob.t() | nil
   def largest(percept, colour, min_share \\ 0.0)
-  def largest(%Percept{blobs: nil}, _colour, _min_share), do: nil
+  def largest(%Percept{detections: nil}, _colour, _min_share), do: nil
 
-  def largest(%Percept{blobs: blobs}, colour, min_share) do
+  def largest(%Percept{detections: %{blobs: blobs}}, colour, min_share) do
     blobs
     |> Enum.filter(&(&1.share >= min_share and colour in [nil, &1.colour]))
     |> Enum.max_by(&{&1.area, -&1.top, -&1.left}, fn -> nil end)

@@ -6,7 +6,7 @@ defmodule Robot.Percept.Snapshot do
   | reading | too old after |
   |---|---|
   | odometry, sonar, infrared, bumpers, what the gate did | 300 ms |
-  | pan-tilt, blobs | 500 ms |
+  | pan-tilt, detections (by the time of their picture) | 500 ms |
   | battery | 5 s |
 
   Peers have no limit here: whoever writes them says what became of them. The pose is not on it:
@@ -21,9 +21,9 @@ defmodule Robot.Percept.Snapshot do
     bumpers: 300,
     driving: 300,
     ptz: 500,
+    detections: 500,
     power: 5_000
   ]
-  @blobs_ms 500
 
   @typedoc "Looks up a key that may be so many milliseconds old."
   @type fetch ::
@@ -42,20 +42,11 @@ defmodule Robot.Percept.Snapshot do
   @doc "Fills an empty percept from wherever the readings are kept. Pure where `fetch` is."
   @spec build(Percept.t(), fetch()) :: Percept.t()
   def build(%Percept{} = percept, fetch) do
-    @limits
-    |> Enum.reduce(percept, fn {key, limit_ms}, percept ->
+    Enum.reduce(@limits, percept, fn {key, limit_ms}, percept ->
       case fetch.(key, limit_ms) do
         {:ok, value, _at_ms} -> Map.replace!(percept, key, value)
         :error -> percept
       end
     end)
-    |> see(fetch.(:blobs, @blobs_ms))
   end
-
-  defp see(percept, {:ok, %{blobs: blobs, pan: pan} = seen, at_ms}) do
-    view = Map.get(seen, :field_of_view)
-    %{percept | blobs: blobs, blobs_at_ms: at_ms, blobs_pan: pan, blobs_view: view}
-  end
-
-  defp see(percept, :error), do: percept
 end

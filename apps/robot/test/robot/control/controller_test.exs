@@ -103,14 +103,14 @@ defmodule Robot.Control.ControllerTest do
 
   test "finds nothing in one full turn" do
     body = Pose.new(0, 0) |> Body.new() |> with_goal(:find, {FindBlob, colour: "Yellow"})
-    assert {{:find, 0}, body} = Body.run(body, 150, &%{&1 | blobs: []})
+    assert {{:find, 0}, body} = Body.run(body, 150, &Body.see_nothing/1)
     assert body.at_ms in 8000..11_000
     # Another colour is nothing either; wheels that are held end by the time-out.
     other = fn p -> %{Body.see(p, {2.0, 0.0}) | pose: nil} end
     red = Pose.new(0, 0) |> Body.new() |> with_goal(:find, {FindBlob, colour: "Red"})
     assert {{:find, 0}, _} = Body.run(red, 200, other)
     held = Pose.new(0, 0) |> Body.new() |> with_goal(:find, {FindBlob, []})
-    assert {{:find, 0}, _} = Body.run(held, 200, &%{&1 | blobs: [], odometry: nil})
+    assert {{:find, 0}, _} = Body.run(held, 200, &%{Body.see_nothing(&1) | odometry: nil})
   end
 
   test "keeps a blob centred and at its distance without hunting" do
@@ -155,7 +155,7 @@ defmodule Robot.Control.ControllerTest do
     for place <- [{1.0, 1.6}, {-1.5, -0.4}] do
       goal = {TrackBlob, near: 1.5, far: 2.5, place: place}
       body = Pose.new(0, 0) |> Body.new() |> with_goal(:lead, goal)
-      assert Body.see(Body.percept(body), place).blobs == []
+      assert Body.see(Body.percept(body), place).detections.blobs == []
       {nil, body} = Body.run(body, 90, &Body.see(&1, place))
       assert abs(Pose.bearing(body.pose, place)) < 0.05
     end

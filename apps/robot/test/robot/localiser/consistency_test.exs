@@ -4,7 +4,7 @@ defmodule Robot.Localiser.ConsistencyTest do
   alias Robot.Localiser.{Belief, Consistency, Frame}
   alias Robot.Percept
   alias Robot.Percept.Sighting
-  alias Vision.Blob
+  alias Vision.{Blob, Detections}
 
   @view :math.pi() / 3
   @here Pose.new(0, 0)
@@ -50,10 +50,7 @@ defmodule Robot.Localiser.ConsistencyTest do
         robot: :mag1,
         at_ms: 0,
         profile: Profile.magellan(),
-        blobs: blobs,
-        blobs_at_ms: 0,
-        blobs_pan: 0.0,
-        blobs_view: @view
+        detections: %Detections{at_ms: 0, blobs: blobs, field_of_view: @view}
       },
       back
     )

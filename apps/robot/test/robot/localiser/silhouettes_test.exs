@@ -3,7 +3,7 @@ defmodule Robot.Localiser.SilhouettesTest do
   alias Hal.{Pose, Profile}
   alias Robot.Localiser.{Belief, Frame, Silhouettes}
   alias Robot.Percept
-  alias Vision.Blob
+  alias Vision.{Blob, Detections}
 
   @view :math.pi() / 3
   @focal 160 / :math.tan(@view / 2)
@@ -60,10 +60,7 @@ defmodule Robot.Localiser.SilhouettesTest do
       robot: :mag1,
       at_ms: 0,
       profile: Profile.magellan(),
-      blobs: blobs,
-      blobs_at_ms: 0,
-      blobs_pan: pan,
-      blobs_view: @view
+      detections: %Detections{at_ms: 0, blobs: blobs, pan: pan, field_of_view: @view}
     }
   end
 
@@ -100,7 +97,8 @@ defmodule Robot.Localiser.SilhouettesTest do
     sure = unsure(0.05)
     assert Silhouettes.align(sure, @column, picture, @here) == sure
     unsure = unsure(0.1)
-    assert Silhouettes.align(unsure, @column, %{picture | blobs: []}, @here) == unsure
+    empty = put_in(picture.detections.blobs, [])
+    assert Silhouettes.align(unsure, @column, empty, @here) == unsure
     assert Silhouettes.align(unsure, [], picture, @here) == unsure
   end
 

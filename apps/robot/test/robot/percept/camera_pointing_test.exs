@@ -104,7 +104,7 @@ defmodule Robot.Percept.CameraPointingTest do
 
   test "lost: the camera looks where it was, and the body searches as ever" do
     body = run(tracker(), 30, at(20))
-    {nil, body} = Body.run(body, 10, &%{&1 | blobs: [], blobs_at_ms: &1.at_ms})
+    {nil, body} = Body.run(body, 10, &Body.see_nothing/1)
     {nil, found} = Body.run(body, 250, &Body.see(&1, at(-150)))
     assert off(found, at(-150)) < 2.0
     assert Twist.zero?(found.twist)

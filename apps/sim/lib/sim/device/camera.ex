@@ -64,8 +64,7 @@ defmodule Sim.Device.Camera do
         {:frame, %{World.frame(world, robot) | at_ms: at_ms}}
 
       :direct ->
-        aim = world.robots |> Map.fetch!(robot) |> Map.take([:pan, :tilt, :field_of_view])
-        {:blobs, World.blobs(world, robot), Map.put(aim, :at_ms, at_ms)}
+        {:detections, %{World.detections(world, robot) | at_ms: at_ms}}
     end
   end
 end

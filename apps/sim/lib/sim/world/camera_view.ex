@@ -10,7 +10,7 @@ defmodule Sim.World.CameraView do
   alias Sim.World
   alias Sim.World.Body
 
-  @typedoc "A world without what only others need; `World.frame/2` and `World.blobs/2` of its robot work."
+  @typedoc "A world without what only others need; `World.frame/2` and `World.detections/2` of its robot work."
   @type ground :: World.t()
 
   @typedoc "Step, time, landmark, poses in the order of the fleet; pan, tilt and field of view of the robot's camera."

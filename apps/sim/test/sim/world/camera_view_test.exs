@@ -35,7 +35,7 @@ defmodule Sim.World.CameraViewTest do
       moving = CameraView.moving(later, CameraView.poses(later), id)
       seen = begun |> CameraView.ground(id) |> CameraView.world(moving, id)
       assert World.frame(seen, id) == World.frame(later, id)
-      assert World.blobs(seen, id) == World.blobs(later, id)
+      assert World.detections(seen, id) == World.detections(later, id)
     end
   end
 

@@ -105,13 +105,13 @@ defmodule Sim.World.ServerTest do
     device(:camera, Sim.Device.Camera, world: name, robot: :mag1, blobs: :direct)
 
     assert_receive {:camera,
-                    {:blobs, [%{colour: "YellowLandmark"} = direct], %{at_ms: _, pan: pan}}},
+                    {:detections, %{blobs: [%{colour: "YellowLandmark"} = direct]} = seen}},
                    500
 
     assert_in_delta painted.x, direct.x, 3
-    assert pan == 0.0
+    assert seen.pan == 0.0
 
-    for _ <- 1..3, do: assert_receive({:camera, {:blobs, _, _}}, 2_000)
+    for _ <- 1..3, do: assert_receive({:camera, {:detections, _}}, 2_000)
   end
 
   test "a pan-tilt unit turns and tells where it looks", %{world: world, name: name} do

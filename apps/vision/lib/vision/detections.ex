@@ -1,0 +1,50 @@
+defmodule Vision.Detections do
+  @moduledoc """
+  What a detector found in one frame of a camera, and how that frame was taken. This one struct travels from
+  the detector (`Vision.BlobDetector`, or a camera that detects by itself) over the robot's board into the
+  percept of its behaviours and its mission.
+
+    * `at_ms` - when the frame was exposed, in milliseconds by the robot's clock; it tells one frame from the next
+    * `blobs` - the `Vision.Blob`s in the order of `Vision.blobs/3`; `[]` says that nothing was seen. Each of them has
+      the size of the frame
+    * `pan`, `tilt` - where the camera looked then, seen from the robot's body: radians, left and up positive
+    * `field_of_view` - how wide it looked then, horizontally, in radians; `nil` if the camera does not know
+    * `pose` - where the robot stood then, in the `map` frame; `nil` until somebody knows. Detectors do not:
+      `Robot.Localiser` fills it in
+
+  A frame that could not be read, or is too old, gives no `Vision.Detections` at all.
+  """
+  alias Hal.{Frame, Pose}
+
+  @enforce_keys [:at_ms, :blobs]
+  defstruct @enforce_keys ++ [pan: 0.0, tilt: 0.0, field_of_view: nil, pose: nil]
+
+  @type t :: %__MODULE__{
+          at_ms: integer(),
+          blobs: [Vision.Blob.t()],
+          pan: float(),
+          tilt: float(),
+          field_of_view: float() | nil,
+          pose: Pose.t() | nil
+        }
+
+  @doc """
+  The detections of a frame in which these blobs were found. A camera of which nobody says where it looked, looked
+  straight ahead.
+
+      iex> {:ok, frame} = Hal.Frame.new(:yuyv, 2, 1, <<0, 0, 0, 0>>, 40)
+      iex> detections = Vision.Detections.new(%{frame | pan: 0.5}, [])
+      iex> {detections.at_ms, detections.pan, detections.tilt, detections.field_of_view}
+      {40, 0.5, 0.0, nil}
+  """
+  @spec new(Frame.t(), [Vision.Blob.t()]) :: t()
+  def new(%Frame{} = frame, blobs) do
+    %__MODULE__{
+      at_ms: frame.at_ms,
+      blobs: blobs,
+      pan: frame.pan || 0.0,
+      tilt: frame.tilt || 0.0,
+      field_of_view: frame.field_of_view
+    }
+  end
+end
