@@ -155,6 +155,87 @@ defmodule System.ReleaseTest do
     end
   end
 
+  test "a robot file may name the missions and formations of its build", %{folder: folder} do
+    release = extended(folder)
+    file = Path.join(folder, "mag1.exs")
+
+    environment = [
+      {"ROBOT", "mag1"},
+      {"CONVOY_RELEASE", release},
+      {"CONVOY_ROBOT_FILE", file},
+      {"CONVOY_SECRET_FILE", Path.join(folder, "secret")}
+    ]
+
+    check = fn policies ->
+      robot_file(file, "/dev/ttyS1", ", policies: [#{policies}]")
+      robot(["check"], environment)
+    end
+
+    assert {said, 0} = check.("mission: :landmark, formation: {:echelon, 1.2}")
+    assert said =~ ~r/mission +landmark, in echelon of 1.20 m$/m
+    assert {said, 0} = check.("mission: :patrol")
+    assert said =~ ~r/mission +patrol$/m
+    assert {said, 1} = check.("mission: :landmark, formation: {:echeln, 1.2}")
+
+    assert said =~
+             ~r/mag1.exs:\d+: policies.formation: .*or :echelon is allowed; did you mean :echelon\?/
+
+    assert {said, 1} = check.("mission: :patorl")
+
+    assert said =~
+             ~r/mag1.exs:\d+: policies.mission: .*or :patrol is allowed; did you mean :patrol\?/
+  end
+
+  # The same release as a build has made it whose configuration names a mission and a formation of its own.
+  defp extended(folder) do
+    root = Path.join(folder, "release")
+    File.mkdir_p!(Path.join(root, "lib"))
+
+    for part <- ~w(bin releases),
+        do: File.cp_r!(Path.join(release(), part), Path.join(root, part))
+
+    [erts] = Path.wildcard(Path.join(release(), "erts-*"))
+    File.ln_s!(erts, Path.join(root, Path.basename(erts)))
+
+    for app <- File.ls!(Path.join(release(), "lib")) do
+      copy = if app =~ ~r/^missions-/, do: &File.cp_r!/2, else: &File.ln_s!/2
+      copy.(Path.join([release(), "lib", app]), Path.join([root, "lib", app]))
+    end
+
+    [ebin] = Path.wildcard(Path.join(root, "lib/missions-*/ebin"))
+
+    for {module, beam} <-
+          Code.compile_string("""
+          defmodule Mine.Echelon do
+            @behaviour Swarm.Formation.Kind
+            def slot(rank, _robots), do: {-0.8 * rank, 0.8 * rank}
+          end
+
+          defmodule Mine.Patrol do
+            @behaviour Robot.Mission
+            def init(_robot, _options), do: {:idle, :idle, []}
+            def handle(_event, mission), do: {:idle, mission, []}
+          end
+          """),
+        do: File.write!(Path.join(ebin, "#{module}.beam"), beam)
+
+    [path] = Path.wildcard(Path.join(root, "releases/*/sys.config"))
+    {:ok, [settings]} = :file.consult(path)
+
+    words = [
+      missions: &(&1 ++ [patrol: Mine.Patrol]),
+      formations: fn _ -> [echelon: Mine.Echelon] end
+    ]
+
+    settings =
+      for {key, change} <- words, reduce: settings do
+        settings -> Keyword.update!(settings, :swarm, &Keyword.put(&1, key, change.(&1[key])))
+      end
+
+    File.write!(path, :io_lib.format("~tp.~n", [settings]))
+    root
+  end
+
   @tag skip: unless(System.find_executable("systemd-analyze"), do: "systemd-analyze is not here")
   test "the unit for systemd is one", %{folder: folder} do
     # Its program is on robots only.

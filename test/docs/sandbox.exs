@@ -285,7 +285,7 @@ defmodule Docs.Sandbox do
     path = "config/robots/mag2.exs"
     text = String.replace(File.read!(path), ~r/# (distance: |angle: |ir_a: )/, "\\\\1")
     File.write!(path, String.replace(text, "/dev/ttyUSB0", link))
-    {:ok, file} = Robot.File.load(path)
+    {:ok, file} = Swarm.MemberSpec.load(path)
     {:ok, config} = Swarm.MemberSpec.config(file)
     {:ok, _} = Robot.Fleet.start_robot(Robot.Fleet, config, :permanent)
     """

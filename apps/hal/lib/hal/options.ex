@@ -77,5 +77,5 @@ defmodule Hal.Options do
     "#{subject} option " <> Enum.map_join(told, "; ", &text/1) <> more
   end
 
-  defp text({path, text}), do: "#{Enum.join(path, ".")} #{text}"
+  defp text({path, text}), do: "#{Wording.path(path)} #{text}"
 end

@@ -89,6 +89,16 @@ defmodule Hal.OptionsTest do
     end
   end
 
+  test "keys and values of any length make a short line" do
+    long = String.duplicate("a", 1_000_000)
+
+    for options <- [[{long, 1}], [{"a\n" <> long, 1}], [{<<0xFF>> <> long, 1}], [port: [long]]] do
+      assert {:error, line} = Options.check(options, @table, "test")
+      assert String.length(line) < 400
+      refute line =~ "\n"
+    end
+  end
+
   test "no atom is made of a key" do
     count = :erlang.system_info(:atom_count)
     for n <- 1..100, do: Type.read({:keys, @table}, [{"no such key #{n}", n}])

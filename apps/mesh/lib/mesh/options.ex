@@ -40,6 +40,15 @@ defmodule Mesh.Options do
     topologies: [{:check, &__MODULE__.topologies/1, "libcluster's"}, default: []]
   ]
 
+  @written [
+    multicast:
+      {:or, false, {:tuple, [:ipv4, {:integer, 1, 65_535}], ~s({"239.255.67.86", 4371})}},
+    peers:
+      {:list, {:check, &__MODULE__.peer?/1, ~s(address and port, such as "10.0.0.7:4370",)},
+       1_000}
+  ]
+  @in_file [:secret_file, :interface, :port, :multicast, :peers, :dist_port, :full_mesh, :degree]
+
   defstruct Keyword.keys(@table) ++ [started: []]
 
   @typedoc "Checked: `started` are the strategies with their states, and nothing that is needed is `nil` any more."
@@ -58,6 +67,10 @@ defmodule Mesh.Options do
           degree: pos_integer(),
           started: [{module(), state :: term()}]
         }
+
+  @doc "What a robot file may say of these (`network:`): addresses are text, and nothing is a default."
+  @spec file_table() :: Options.table()
+  def file_table, do: for(key <- @in_file, do: {key, @written[key] || hd(@table[key])})
 
   @doc "Checks options; an error is one line that names the option and what is allowed."
   @spec new(keyword()) :: {:ok, t()} | {:error, String.t()}
@@ -105,6 +118,9 @@ defmodule Mesh.Options do
         0
     end
   end
+
+  @doc false
+  def peer?(text), do: is_binary(text) and match?({:ok, _address}, Strategy.Static.address(text))
 
   # `nil` is not left out.
   @doc false

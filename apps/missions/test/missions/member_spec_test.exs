@@ -10,12 +10,18 @@ defmodule Swarm.MemberSpecTest do
 
   defp parse(more) do
     drive = ~s(drive: {Hal.RFlex.Driver, port: "/dev/ttyS1"})
-    Robot.File.parse("[id: :mag1, profile: :magellan, #{drive}, #{more}]")
+    text = "[id: :mag1, profile: :magellan, #{drive},\n#{more}]"
+    Robot.File.parse(text, file: "mag1.exs", tables: MemberSpec.tables())
+  end
+
+  defp lines(more) do
+    assert {:error, lines} = parse(more)
+    lines
   end
 
   test "the robots that come along are members of a fleet" do
     for id <- [:mag1, :min1] do
-      {:ok, file} = Robot.File.load(Path.join(@robots, "#{id}.exs"))
+      {:ok, file} = MemberSpec.load(Path.join(@robots, "#{id}.exs"))
       assert {:ok, config} = MemberSpec.config(file)
       assert config.id == id
       assert config.arm == :manual
@@ -53,6 +59,59 @@ defmodule Swarm.MemberSpecTest do
 
     assert {:ok, file} = parse("policies: [formation: {:wedge, 1.0}]")
     assert {:ok, %{mission: nil}} = MemberSpec.config(file)
+
+    for none <- ["", "mission: nil"] do
+      assert {:ok, %{policies: policies} = file} = parse("policies: [#{none}]")
+      assert policies[:mission] == nil
+      assert {:ok, %{mission: nil}} = MemberSpec.config(file)
+    end
+  end
+
+  test "what is wrong with policies and network is said with line, key, what is allowed and a suggestion" do
+    text = """
+    policies: [mission: :landmark, formation: {:colum, 1.0},
+      of: 0, leader_chagne: true],
+    network: [port: -1, zzz: 1,
+      peers: ["10.0.0.7"], multicast: {"239.255.67.86", 0}]
+    """
+
+    assert lines(text) == [
+             "mag1.exs:2: policies.formation: cannot be :colum: :column, :line, :wedge, :triangle, :diamond or :circle is allowed; did you mean :column?",
+             "mag1.exs:3: policies.leader_chagne: is not known: allowed are mission, formation, assign, leader_change, colour, policy, of, lost_link; did you mean leader_change?",
+             "mag1.exs:3: policies.of: cannot be 0: a whole number from 1 to 1000 robots of the fleet is allowed",
+             "mag1.exs:4: network.zzz: is not known: allowed are secret_file, interface, port, multicast, peers, dist_port, full_mesh, degree",
+             "mag1.exs:4: network.port: cannot be -1: a whole number from 0 to 65535 is allowed",
+             "mag1.exs:5: network.multicast: cannot be 0: a whole number from 1 to 65535 is allowed",
+             "mag1.exs:5: network.peers.1: cannot be \"10.0.0.7\": address and port, such as \"10.0.0.7:4370\", is allowed"
+           ]
+
+    assert lines("policies: [mission: :landmrk, formation: 3]") == [
+             "mag1.exs:2: policies.mission: cannot be :landmrk: nil or :landmark is allowed; did you mean :landmark?"
+           ]
+
+    assert [line] = lines("policies: [policy: :majority]")
+    assert line =~ "mag1.exs:2: policies: landmark option of is missing: policy :majority needs"
+
+    for more <- ["policies: 5", "policies: [5]", "policies: [{:assign, :luck}]", "network: [5]"] do
+      assert ["mag1.exs:2: " <> _] = lines(more)
+    end
+  end
+
+  test "what a file says of network and policies arrives" do
+    assert {:ok, robot} =
+             parse("""
+             network: [secret_file: "/etc/convoy/secret", interface: "10.0.0.7",
+               peers: ["10.0.0.8:4370"], multicast: {"239.255.67.86", 4371}],
+             policies: [mission: :landmark, formation: {:wedge, 1}, policy: :majority, of: 6,
+               lost_link: :hold, colour: "YellowLandmark"]
+             """)
+
+    assert robot.network[:interface] == {10, 0, 0, 7}
+    assert robot.network[:multicast] == {{239, 255, 67, 86}, 4371}
+    assert robot.network[:peers] == ["10.0.0.8:4370"]
+    assert robot.policies[:formation] == {:wedge, 1.0}
+    assert {:ok, %{mission: {Landmark, options}}} = MemberSpec.config(robot)
+    assert options[:of] == 6 and options[:colour] == "YellowLandmark"
   end
 
   test "all that a file's network may say, the mesh takes" do
@@ -74,4 +133,48 @@ defmodule Swarm.MemberSpecTest do
   test "a file knows the same robots as the mesh" do
     assert Schema.fleet() == Roster.fleet()
   end
+
+  test "template and guide tell of every key" do
+    template = File.read!(Path.join(@robots, "template.exs"))
+    guide = File.read!(Path.expand("../../../../docs/robots.md", __DIR__))
+
+    context = %{fleet: Schema.fleet(), colours: nil, tables: MemberSpec.tables()}
+    missions = [:mission | Keyword.keys(Landmark.option_table())]
+
+    for key <- all_keys(Schema.table(context)) ++ missions do
+      assert template =~ ~r/\b#{key}:\s/, "template.exs does not tell of #{key}:"
+      assert guide =~ ~r/`#{key}:[` ]/, "robots.md does not tell of #{key}:"
+    end
+  end
+
+  # What stands behind # with a key is an example: one that is taken, when it is no longer a remark.
+  test "the examples in the template are well" do
+    text = File.read!(Path.join(@robots, "template.exs"))
+
+    examples =
+      for [line, indent, example] <- Regex.scan(~r/^( +)# (\w+: .*)$/m, text),
+          not String.contains?(line, ["…", "camera: ["]),
+          do:
+            {line,
+             indent <>
+               (example |> String.replace(~r/ +#.*$/, "") |> String.trim_trailing(",")) <> ","}
+
+    assert length(examples) > 25
+    {:ok, colours} = Vision.Colours.read(Path.join(@robots, "landmark.txt"))
+    read = fn "landmark.txt", _options -> {:ok, colours} end
+
+    for {line, example} <- examples do
+      changed = String.replace(text, line, example)
+      options = [colours: read, tables: MemberSpec.tables()]
+      assert {:ok, _robot} = Robot.File.parse(changed, options), example
+    end
+  end
+
+  defp all_keys({:keys, table}),
+    do: Enum.flat_map(table, fn {key, check} -> [key | all_keys(check)] end)
+
+  defp all_keys({:or, _value, check}), do: all_keys(check)
+  defp all_keys({:list, check, _most}), do: all_keys(check)
+  defp all_keys([check | _settings]), do: all_keys(check)
+  defp all_keys(_check), do: []
 end

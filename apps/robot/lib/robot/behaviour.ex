@@ -36,6 +36,9 @@ defmodule Robot.Behaviour do
       {:error, "Robot.Behaviour.Goto: goto option x cannot be :far: a number from -1.0e6 to 1.0e6 m is allowed"}
       iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: 1.0, y: 2.0, discs: :junk})
       {:error, "option discs cannot be :junk: [{x, y, radius}] in metres is allowed"}
+      iex> {:error, line} = Robot.Behaviour.check({Robot.Behaviour.Follow, target: %Hal.Pose{x: :far, y: 0.0, heading: 0.0}})
+      iex> line =~ "option target cannot be %Hal.Pose{" and line =~ ": a %Hal.Pose{} in metres and radians is allowed"
+      true
   """
   @spec check(term()) :: :ok | {:error, line :: String.t()}
   def check(nil), do: :ok

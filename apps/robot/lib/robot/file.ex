@@ -14,6 +14,7 @@ defmodule Robot.File do
 
   A real robot arms by hand: `arm: :manual` is the default here, not in `Robot.Config`.
   """
+  alias Hal.Options.Wording
   alias Hal.{Pose, Profile}
   alias Robot.Config
   alias Robot.File.{CrossChecks, Device, Reader, Schema, Terms}
@@ -75,7 +76,9 @@ defmodule Robot.File do
 
   @doc """
   The robot of the file at `path`, or all that is wrong with it. A colour file is looked for beside
-  it. `fleet:` are the names that there may be (default `Robot.File.Schema.fleet/0`).
+  it. `fleet:` are the names that there may be (default `Robot.File.Schema.fleet/0`). `tables:` are the types
+  (`Hal.Options.Type`) of the keys whose words are those of an app above this one (`network:` and `policies:`: see
+  `Swarm.MemberSpec.load/1`); such a key without a type may have any keys and values.
 
       iex> Robot.File.load("no/such.exs")
       {:error, ["no/such.exs: no such file or directory"]}
@@ -105,7 +108,7 @@ defmodule Robot.File do
   end
 
   @doc """
-  The robot that a text describes. Options: `file:`, its name for errors; `fleet:` as in `load/2`;
+  The robot that a text describes. Options: `file:`, its name for errors; `fleet:` and `tables:` as in `load/2`;
   `colours:`, a function of path and options that reads a colour file (`t:Robot.File.Colours.reader/0`).
 
       iex> Robot.File.parse("[id: :mag1, profile: :magellan, drive: {Hal.RFlex.Driver, port: \\"/dev/ttyR0\\"}, arm: :manaul]", file: "mag1.exs")
@@ -118,6 +121,7 @@ defmodule Robot.File do
 
     context = %{
       fleet: Keyword.get_lazy(options, :fleet, &Schema.fleet/0),
+      tables: Keyword.get(options, :tables, []),
       colours: Keyword.get(options, :colours, fn _path, _options -> {:error, "no files here"} end)
     }
 
@@ -168,5 +172,5 @@ defmodule Robot.File do
     if more > 0, do: lines ++ ["#{file}: and #{more} problems more"], else: lines
   end
 
-  defp line(file, {line, path, text}), do: "#{file}:#{line}: #{Enum.join(path, ".")}: #{text}"
+  defp line(file, {line, path, text}), do: "#{file}:#{line}: #{Wording.path(path)}: #{text}"
 end

@@ -59,5 +59,11 @@ defmodule Robot.Mission do
   @callback options(keyword(), robots :: pos_integer() | nil) ::
               {:ok, keyword()} | {:error, line :: String.t()}
 
-  @optional_callbacks halted: 1, options: 2
+  @doc """
+  What options a robot file may give it (`policies:`), as a table: `mix robot.check` and the robot's start name
+  the line and the key of what is wrong. Of a mission without this callback only `c:options/2` is asked.
+  """
+  @callback option_table() :: Hal.Options.table()
+
+  @optional_callbacks halted: 1, options: 2, option_table: 0
 end

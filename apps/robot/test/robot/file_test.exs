@@ -70,10 +70,8 @@ defmodule Robot.FileTest do
     fence: [{-2, -2}, {2, -2}, {0, 2.5}],
     dry_run: true,
     estop_file: "/tmp/estop",
-    network: [secret_file: "/etc/convoy/secret", interface: "10.0.0.7", peers: ["10.0.0.8:4370"],
-      multicast: {"239.255.67.86", 4371}],
-    policies: [mission: :landmark, formation: {:wedge, 1}, policy: :majority, of: 6, lost_link: :hold,
-      colour: "YellowLandmark"]
+    network: [interface: "10.0.0.7"],
+    policies: [formation: {:wedge, 1}, colour: "YellowLandmark"]
     """
 
     assert {:ok, robot} = parse(text, colours: colours())
@@ -84,9 +82,8 @@ defmodule Robot.FileTest do
     assert robot.ptz == {Robot.FilePtz, port: "/dev/ttyS2", speed: 9600}
     assert robot.camera == {Hal.Camera.FFmpeg, source: "testsrc", size: {320, 240}}
     assert robot.start == Pose.new(1, -2.5, -:math.pi() / 2)
-    assert robot.network[:interface] == {10, 0, 0, 7}
-    assert robot.network[:multicast] == {{239, 255, 67, 86}, 4371}
-    assert robot.policies[:formation] == {:wedge, 1.0}
+    assert robot.network == [interface: "10.0.0.7"]
+    assert robot.policies == [formation: {:wedge, 1}, colour: "YellowLandmark"]
 
     assert {:ok, config} = Robot.File.config(robot)
     assert config.profile.max_linear == 0.3
@@ -138,11 +135,10 @@ defmodule Robot.FileTest do
     strat: {0, 0, 0},
     arm: :maual,
     start: {0, 0},
-    body: [radius: 90],
-    policies: [formation: {:colum, 1.0}, of: 0]
+    body: [radius: 90]
     """
 
-    {:keys, table} = Schema.table(%{fleet: Schema.fleet(), colours: nil})
+    {:keys, table} = Schema.table(%{fleet: Schema.fleet(), colours: nil, tables: []})
     keys = table |> Keyword.keys() |> Enum.join(", ")
 
     assert lines(text) == [
@@ -151,15 +147,36 @@ defmodule Robot.FileTest do
              "mag1.exs:3: strat: is not known: allowed are #{keys}; did you mean start?",
              "mag1.exs:4: arm: cannot be :maual: :manual or :auto is allowed; did you mean :manual?",
              "mag1.exs:5: start: cannot be {0, 0}: {x, y, heading}, metres up to 10000 and radians, such as {1.0, 0.5, deg(90)}, is allowed",
-             "mag1.exs:6: body.radius: cannot be 90: a number from 0.05 to 1.5 m is allowed",
-             "mag1.exs:7: policies.formation: cannot be :colum: :column, :line, :wedge, :triangle, :diamond or :circle is allowed; did you mean :column?",
-             "mag1.exs:7: policies.of: cannot be 0: a whole number from 1 to 1000 is allowed"
+             "mag1.exs:6: body.radius: cannot be 90: a number from 0.05 to 1.5 m is allowed"
            ]
   end
 
+  test "whose words are those of an app above says what they are" do
+    tables = [
+      network: {:keys, interface: :ipv4},
+      policies: {:keys, mission: {:one_of, [nil, :patrol]}}
+    ]
+
+    text = &"network: [interface: \"10.0.0.7\"],\npolicies: [mission: #{&1}]"
+    assert {:ok, robot} = parse(text.(":patrol"), tables: tables)
+    assert {robot.network, robot.policies} == {[interface: {10, 0, 0, 7}], [mission: :patrol]}
+
+    assert lines(text.(":patorl"), tables: tables) == [
+             "mag1.exs:3: policies.mission: cannot be :patorl: nil or :patrol is allowed; did you mean :patrol?"
+           ]
+
+    # Where nobody says so, what is no list of keys is refused at least.
+    assert {:ok, _robot} = parse(text.(":patorl"))
+
+    for more <- ["network: 5", "network: [5]", "policies: :landmark"] do
+      assert [line] = lines(more)
+      assert line =~ ~r/mag1.exs:2: \w+: cannot be .*: \[key: value, …\] is allowed/
+    end
+  end
+
   test "a key that is like none gets the list of those that there are" do
-    assert [line] = lines("network: [zzz: 1]")
-    assert line =~ "network.zzz: is not known: allowed are secret_file, interface"
+    assert [line] = lines("limits: [zzz: 1]")
+    assert line =~ "limits.zzz: is not known: allowed are max_linear, max_turn"
   end
 
   test "a key twice is refused" do
@@ -220,9 +237,6 @@ defmodule Robot.FileTest do
     assert lines("limits: [max_linear: 0.9]") == [
              "mag1.exs:2: limits.max_linear: cannot be 0.9: a magellan can do 0.5 at most"
            ]
-
-    assert [line] = lines("policies: [policy: :majority]")
-    assert line =~ "policies: policy: :majority needs of:"
 
     assert [line] =
              lines("colours: \"landmark.txt\", policies: [colour: \"YelowLandmark\"]",
@@ -330,9 +344,7 @@ defmodule Robot.FileTest do
           "camera: {Hal.Camera.FFmpeg, [%{}]}",
           "console: []",
           "save_pictures: []",
-          "limits: [{:max_linear, 99}]",
-          "network: [{:port, -1}]",
-          "policies: [{:assign, :luck}]"
+          "limits: [{:max_linear, 99}]"
         ] do
       assert {:error, [_ | _] = lines} = parse(more)
       assert Enum.all?(lines, &(&1 =~ ~r/^mag1.exs:\d+: /)), inspect(lines)
@@ -394,36 +406,6 @@ defmodule Robot.FileTest do
     end
   end
 
-  test "template and guide tell of every key" do
-    template = File.read!(Path.join(@robots, "template.exs"))
-    guide = File.read!(Path.expand("../../../../docs/robots.md", __DIR__))
-
-    for key <- all_keys(Schema.table(%{fleet: Schema.fleet(), colours: nil})) do
-      assert template =~ ~r/\b#{key}:\s/, "template.exs does not tell of #{key}:"
-      assert guide =~ ~r/`#{key}:[` ]/, "robots.md does not tell of #{key}:"
-    end
-  end
-
-  # What stands behind # with a key is an example: one that is taken, when it is no longer a remark.
-  test "the examples in the template are well" do
-    text = File.read!(Path.join(@robots, "template.exs"))
-
-    examples =
-      for [line, indent, example] <- Regex.scan(~r/^( +)# (\w+: .*)$/m, text),
-          not String.contains?(line, ["…", "camera: ["]),
-          do:
-            {line,
-             indent <>
-               (example |> String.replace(~r/ +#.*$/, "") |> String.trim_trailing(",")) <> ","}
-
-    assert length(examples) > 25
-
-    for {line, example} <- examples do
-      changed = String.replace(text, line, example)
-      assert {:ok, _robot} = Robot.File.parse(changed, colours: colours()), example
-    end
-  end
-
   test "a file that cannot be read says why" do
     folder = Path.join(System.tmp_dir!(), "robot_file_#{System.unique_integer([:positive])}")
     File.mkdir_p!(folder)
@@ -449,12 +431,4 @@ defmodule Robot.FileTest do
       assert inspect(Terms.term(node)) == text
     end
   end
-
-  defp all_keys({:keys, table}),
-    do: Enum.flat_map(table, fn {key, check} -> [key | all_keys(check)] end)
-
-  defp all_keys({:or, _value, check}), do: all_keys(check)
-  defp all_keys({:list, check, _most}), do: all_keys(check)
-  defp all_keys([check | _settings]), do: all_keys(check)
-  defp all_keys(_check), do: []
 end

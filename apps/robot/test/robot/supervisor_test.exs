@@ -183,6 +183,9 @@ defmodule Robot.SupervisorTest do
     assert {:error, "Robot.Behaviour.Goto: [1] are not options" <> _} =
              goal.({Behaviour.Goto, [1]})
 
+    assert {:error, "Robot.Behaviour.Follow: follow option target cannot be %Hal.Pose{" <> _} =
+             goal.({Behaviour.Follow, target: %Hal.Pose{x: :far, y: 0.0, heading: nil}})
+
     assert {:error, ":roll is not a goal" <> _} = goal.(:roll)
     roll = {Acts.Roll, twist: Twist.zero()}
     assert Executive.goal(:fall_nobody, :t, roll) |> elem(1) =~ "no robot :fall_nobody runs"

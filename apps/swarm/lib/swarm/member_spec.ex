@@ -1,14 +1,70 @@
 defmodule Swarm.MemberSpec do
   @moduledoc """
-  Makes a robot from its file a member of a fleet: `Robot.File` describes the robot, this adds its
-  mission and its comms. Pure.
+  Makes a robot from its file a member of a fleet: `Robot.File` describes the robot, this says what the fleet's
+  keys may hold, and adds mission and comms.
 
-      {:ok, file} = Robot.File.load("config/robots/mag1.exs")
+      {:ok, file} = Swarm.MemberSpec.load("config/robots/mag1.exs")
       {:ok, config} = Swarm.MemberSpec.config(file)
       {:ok, _pid} = Robot.Fleet.start_robot(Robot.Fleet, config, :permanent)
   """
+  alias Hal.Options.{Type, Wording}
   alias Robot.Config
+  alias Robot.File.Terms
   alias Swarm.{Comms, Missions}
+
+  @doc """
+  The robot of the file at `path`, or all that is wrong with it, a line each: `Robot.File.load/2`, with the missions,
+  formations and networks that this build knows.
+  """
+  @spec load(Path.t()) :: {:ok, Robot.File.t()} | {:error, [line :: String.t(), ...]}
+  def load(path), do: Robot.File.load(path, tables: tables())
+
+  @doc """
+  The types of the keys of a robot file whose words are the fleet's, for `Robot.File`: `network:`
+  (`Mesh.Options.file_table/0`), and `policies:`, a mission (`Swarm.Missions`) with its options.
+  """
+  @spec tables() :: [{:network | :policies, Type.t()}]
+  def tables do
+    mission = Missions.type()
+
+    [
+      network: {:keys, Mesh.Options.file_table()},
+      policies:
+        {:check, &policies(&1, mission), "[mission: name, …] with options of that mission"}
+    ]
+  end
+
+  defp policies(given, mission) do
+    with true <- Type.keys?(given),
+         {named, options} =
+           Enum.split_with(given, fn {key, _} -> to_string(key) == "mission" end),
+         {:ok, named} <- Type.read({:keys, mission: mission}, named),
+         do: policies(named, options, mission)
+  end
+
+  defp policies(named, [], _mission) when named in [[], [mission: nil]], do: {:ok, named}
+
+  defp policies(named, options, mission) do
+    with {:ok, module} <- module(named[:mission]),
+         {:ok, values} <- options(Missions.option_table(module), named, options, mission),
+         {:ok, _all} <- Missions.options(module, Keyword.delete(values, :mission), nil),
+         do: {:ok, values}
+  end
+
+  # Options without a mission are those of the first.
+  defp module(nil), do: Missions.default()
+  defp module(name), do: Missions.fetch(name)
+
+  defp options(nil, named, options, _mission) do
+    case {Keyword.keyword?(options), Terms.strange(options)} do
+      {true, nil} -> {:ok, named ++ options}
+      {false, nil} -> false
+      {_, name} -> Wording.refuse("a name that this build knows", name)
+    end
+  end
+
+  defp options(table, named, options, mission),
+    do: Type.read({:keys, [{:mission, mission} | table]}, named ++ options)
 
   @doc "What the robot is started with; an error is one line."
   @spec config(Robot.File.t()) :: {:ok, Config.t()} | {:error, line :: String.t()}

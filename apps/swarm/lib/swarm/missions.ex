@@ -5,7 +5,8 @@ defmodule Swarm.Missions do
 
       config :swarm, missions: [landmark: Missions.Landmark]
 
-  A robot whose file names no mission starts the first of them.
+  A robot whose file names no mission starts the first of them. What options a robot file may give a mission says its
+  `c:Robot.Mission.option_table/0`.
   """
 
   @doc "The mission of this name; an error is one line."
@@ -17,6 +18,27 @@ defmodule Swarm.Missions do
       {:ok, module} -> loaded(module)
       :error -> {:error, "mission #{inspect(name)} is not known; #{allowed(known)}"}
     end
+  end
+
+  @doc """
+  The type of a mission's name, or `nil`, in a table of `Hal.Options`. It asks all missions for their options, so that
+  the names of these are atoms also for whoever makes none.
+  """
+  @spec type() :: Hal.Options.Type.t()
+  def type do
+    known = known()
+    Enum.each(known, fn {_name, module} -> option_table(module) || options(module, [], nil) end)
+
+    if known == [],
+      do: {:check, &(&1 == nil), "nil (#{allowed([])})"},
+      else: {:one_of, [nil | Keyword.keys(known)]}
+  end
+
+  @doc "What options a robot file may give a mission (`c:Robot.Mission.option_table/0`); `nil` of one that does not tell."
+  @spec option_table(module()) :: Hal.Options.table() | nil
+  def option_table(module) do
+    if Code.ensure_loaded?(module) and function_exported?(module, :option_table, 0),
+      do: module.option_table()
   end
 
   @doc "The mission of a robot whose file names none."

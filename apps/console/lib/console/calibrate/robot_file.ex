@@ -5,11 +5,12 @@ defmodule Console.Calibrate.RobotFile do
   """
   alias Console.Calibrate.StdinPrompt
   alias Console.Cli.Diff
+  alias Swarm.MemberSpec
 
   @doc "The file, and the conversions of its drive, `nil` for a drive that has none."
   @spec load(Path.t()) :: {:ok, Robot.File.t(), keyword() | nil} | {:error, [String.t()]}
   def load(path) do
-    with {:ok, file} <- Robot.File.load(path) do
+    with {:ok, file} <- MemberSpec.load(path) do
       {_driver, options} = file.drive
       conversions = if known?(file.drive), do: options[:conversions] || []
       {:ok, file, conversions}
@@ -71,7 +72,7 @@ defmodule Console.Calibrate.RobotFile do
   defp parse(path, text) do
     folder = Path.dirname(path)
     colours = fn file, options -> Vision.Colours.read(Path.expand(file, folder), options) end
-    Robot.File.parse(text, file: path, colours: colours)
+    Robot.File.parse(text, file: path, colours: colours, tables: MemberSpec.tables())
   end
 
   defp decide(path, _new, true, _wanted), do: IO.puts("#{path} says so already")

@@ -2,6 +2,8 @@ defmodule Hal.Options.Suggest do
   @moduledoc "Did-you-mean suggestions for unknown words. Pure."
 
   @near_enough 0.77
+  # No word that anybody means is longer, in bytes; comparing takes time.
+  @longest 255
 
   @doc """
   The known word most like `word`, or `nil` when none is like it.
@@ -16,7 +18,8 @@ defmodule Hal.Options.Suggest do
   @spec nearest(String.t(), [String.t()]) :: String.t() | nil
   def nearest(word, known) do
     # Newer Elixirs do not compare what is not text, such as the words of a damaged file.
-    if String.valid?(word), do: likest(String.downcase(word), known)
+    if byte_size(word) <= @longest and String.valid?(word),
+      do: likest(String.downcase(word), known)
   end
 
   defp likest(word, known) do

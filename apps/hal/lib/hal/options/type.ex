@@ -36,6 +36,13 @@ defmodule Hal.Options.Type do
   @spec list?(term()) :: boolean()
   def list?(value), do: is_list(value) and not List.improper?(value)
 
+  @doc "Whether a value is `[key: value, …]`; a key may be text."
+  @spec keys?(term()) :: boolean()
+  def keys?(value) do
+    list?(value) and
+      Enum.all?(value, &match?({key, _value} when is_atom(key) or is_binary(key), &1))
+  end
+
   @doc """
   A value by its type, or all its problems, each with the keys that lead to it. Fills in no defaults.
 
@@ -128,11 +135,6 @@ defmodule Hal.Options.Type do
   defp takes?({:number, l, h}, value), do: is_number(value) and value >= l and value <= h
   defp takes?({:number, l, h, _unit}, value), do: takes?({:number, l, h}, value)
   defp takes?(_type, _value), do: false
-
-  defp keys?(list) do
-    is_list(list) and not List.improper?(list) and
-      Enum.all?(list, &match?({key, _value} when is_atom(key) or is_binary(key), &1))
-  end
 
   defp keys(table, given) do
     given = for {key, value} <- given, do: {to_string(key), value}

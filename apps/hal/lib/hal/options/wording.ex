@@ -45,11 +45,35 @@ defmodule Hal.Options.Wording do
 
   defp list(words), do: Enum.join(words, ", ")
 
+  @doc """
+  The keys that lead to a problem, on one line, however long they are.
+
+      iex> Hal.Options.Wording.path(["limits", "max_turn"])
+      "limits.max_turn"
+      iex> Hal.Options.Wording.path([String.duplicate("a", 1_000_000)]) |> String.length()
+      80
+  """
+  @spec path([String.t()]) :: String.t()
+  def path(keys), do: Enum.map_join(keys, ".", &key/1)
+
+  defp key(key) do
+    if String.printable?(key) and not String.match?(key, ~r/[[:cntrl:]]/),
+      do: cut(key),
+      else: show(key)
+  end
+
   @doc "A value on one line, however large it is."
   @spec show(term()) :: String.t()
   def show(value) do
-    text = inspect(value, limit: 20, printable_limit: 60, width: :infinity, charlists: :as_lists)
-
-    if String.length(text) > @longest, do: String.slice(text, 0, @longest - 1) <> "…", else: text
+    value
+    |> inspect(limit: 20, printable_limit: 60, width: :infinity, charlists: :as_lists)
+    |> cut()
   end
+
+  defp cut(text),
+    do:
+      if(String.length(text) > @longest,
+        do: String.slice(text, 0, @longest - 1) <> "…",
+        else: text
+      )
 end

@@ -23,7 +23,7 @@ defmodule Robot.Behaviour.Follow do
   @impl Robot.Behaviour
   def new(options) do
     table = [
-      target: [{:struct, Pose}, required: true],
+      target: [{:check, &target?/1, "a %Hal.Pose{} in metres and radians"}, required: true],
       velocity: [{:check, &velocity?/1, "{vx, vy} in m/s"}, default: {0.0, 0.0}],
       tolerance: [{:number, 0.005, 10.0, "m"}, default: 0.06],
       leave: [{:number, 0.005, 10.0, "m"}, default: 0.12],
@@ -34,6 +34,12 @@ defmodule Robot.Behaviour.Follow do
     state = %{mode: :going, turning?: true, backing?: false, distance: nil}
     {__MODULE__, Enum.into(Options.check!(options, table, "follow"), state)}
   end
+
+  # A struct may hold anything.
+  defp target?(%Pose{x: x, y: y, heading: heading}),
+    do: Enum.all?([x, y, heading], &(is_number(&1) and abs(&1) <= 1.0e6))
+
+  defp target?(_), do: false
 
   defp velocity?({vx, vy}), do: is_number(vx) and is_number(vy) and abs(vx) + abs(vy) < 100
   defp velocity?(_), do: false

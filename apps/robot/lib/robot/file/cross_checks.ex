@@ -11,7 +11,6 @@ defmodule Robot.File.CrossChecks do
         named(robot, file),
         seen(robot),
         kept(robot),
-        majority(robot.policies),
         colour(robot) | limits(robot) ++ driven(robot)
       ],
       &(&1 == nil)
@@ -37,11 +36,6 @@ defmodule Robot.File.CrossChecks do
     do: {["save_pictures"], "is for a robot with a camera, and it has none"}
 
   defp kept(_robot), do: nil
-
-  defp majority(policies) do
-    if policies[:policy] == :majority and policies[:of] == nil,
-      do: {["policies"], "policy: :majority needs of:, the number of robots of the fleet"}
-  end
 
   defp colour(%{colours: nil}), do: nil
 

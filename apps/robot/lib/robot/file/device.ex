@@ -26,7 +26,7 @@ defmodule Robot.File.Device do
     do: {:check, &check(kind, &1), "{driver, options}, such as {#{inspect(@ours[kind])}, […]},"}
 
   defp check(kind, {name, options}) when is_list(options) do
-    with true <- name?(name) and pairs?(options),
+    with true <- name?(name) and Type.keys?(options),
          {:ok, module} <- module(kind, name),
          {:ok, options} <- options(module, options),
          do: {:ok, {module, options}}
@@ -34,19 +34,19 @@ defmodule Robot.File.Device do
 
   defp check(kind, name), do: not is_tuple(name) and name?(name) and check(kind, {name, []})
 
-  defp pairs?(options),
-    do:
-      Type.list?(options) and
-        Enum.all?(options, &match?({key, _value} when is_atom(key) or is_binary(key), &1))
-
   defp name?(%Name{text: text}), do: not String.starts_with?(text, ":")
   defp name?(name), do: is_atom(name) and match?("Elixir." <> _, Atom.to_string(name))
 
   defp options(module, given) do
     case {table(module), Terms.strange(Enum.map(given, &elem(&1, 1)))} do
-      {nil, nil} -> existing(given)
-      {nil, name} -> {:error, [{[key(given, name)], refused("a name that there is", name)}]}
-      {table, _name} -> Type.read({:keys, table}, given)
+      {nil, nil} ->
+        existing(given)
+
+      {nil, name} ->
+        {:error, [{[key(given, name)], refused("a name that this build knows", name)}]}
+
+      {table, _name} ->
+        Type.read({:keys, table}, given)
     end
     |> judged(module)
   end

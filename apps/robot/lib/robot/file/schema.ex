@@ -10,12 +10,15 @@ defmodule Robot.File.Schema do
   alias Robot.Safety.Reflex.Fence
 
   @farthest 10_000
-  @formations [:column, :line, :wedge, :triangle, :diamond, :circle]
   @fleet for kind <- ~w(mag min), n <- 1..100, do: :"#{kind}#{n}"
 
-  @typedoc "What the world has to say: names of the fleet, and how a colour file is read."
+  @typedoc """
+  What the world has to say: names of the fleet, how a colour file is read, and the types of the keys whose words are
+  those of an app above this one.
+  """
   @type context :: %{
           fleet: [atom(), ...],
+          tables: [{:network | :policies, Type.t()}],
           colours: (Path.t(), keyword() -> {:ok, struct()} | {:error, String.t()})
         }
 
@@ -42,8 +45,8 @@ defmodule Robot.File.Schema do
      dry_run: :boolean,
      estop_file: {:or, nil, {:path, "the path of a file"}},
      console: {:or, nil, {:keys, Keyword.take(PowerSwitch.table(), [:port, :speed, :phrase])}},
-     network: network(),
-     policies: policies()}
+     network: extension(:network, context.tables),
+     policies: extension(:policies, context.tables)}
   end
 
   @doc "What of the profile a file may change."
@@ -83,32 +86,9 @@ defmodule Robot.File.Schema do
      max_turn_acceleration: {:number, 0.01, 10.0, "rad/s2"}}
   end
 
-  defp network do
-    {:keys,
-     secret_file: {:path, "the path of the fleet's secret"},
-     interface: :ipv4,
-     port: {:integer, 0, 65_535},
-     multicast:
-       {:or, false, {:tuple, [:ipv4, {:integer, 1, 65_535}], ~s({"239.255.67.86", 4371})}},
-     peers: {:list, {:check, &peer?/1, ~s(address and port, such as "10.0.0.7:4370",)}, 1_000},
-     dist_port: {:integer, 0, 65_535},
-     full_mesh: {:integer, 2, 1_000},
-     degree: {:integer, 2, 30}}
-  end
-
-  defp policies do
-    {:keys,
-     mission: {:or, nil, {:one_of, [:landmark]}},
-     formation:
-       {:tuple, [{:one_of, @formations}, {:number, 0.8, 5.0, "m"}],
-        "a kind and a spacing in metres, such as {:column, 1.0},"},
-     assign: {:one_of, [:chain, :cost]},
-     leader_change: :boolean,
-     colour: {:text, "the name of a colour"},
-     policy: {:one_of, [:available, :majority]},
-     of: {:integer, 1, 1_000},
-     lost_link: {:one_of, [:stop, :hold, :continue]}}
-  end
+  # Their words are those of an app above this one.
+  defp extension(key, tables),
+    do: Keyword.get(tables, key, {:check, &Type.keys?/1, "[key: value, …]"})
 
   defp id(id, fleet), do: id in fleet
 
@@ -128,15 +108,6 @@ defmodule Robot.File.Schema do
        do: {:ok, Pose.new(x, y, heading)}
 
   defp place(_other, _most), do: false
-
-  defp peer?(text) do
-    with true <- is_binary(text),
-         [ip, port] <- String.split(text, ":"),
-         {:ok, _ip} <- Type.read(:ipv4, ip),
-         {port, ""} <- Integer.parse(port),
-         do: port in 1..65_535,
-         else: (_no -> false)
-  end
 
   @doc "The profile of a kind with what the file changes of it."
   @spec profile(:magellan | :atrv_mini, keyword()) :: Profile.t()

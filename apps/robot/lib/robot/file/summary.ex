@@ -204,11 +204,14 @@ defmodule Robot.File.Summary do
     end
   end
 
-  defp formation(nil), do: ""
-  defp formation({kind, spacing}), do: ", in #{kind} of #{metres(spacing)}"
+  # Of what missions of other builds have by these names nothing is known.
+  defp formation({kind, spacing}) when is_atom(kind) and is_number(spacing),
+    do: ", in #{kind} of #{metres(spacing)}"
 
-  defp lost(nil), do: ""
-  defp lost(policy), do: ", without link: #{policy}"
+  defp formation(_other), do: ""
+
+  defp lost(policy) when is_atom(policy) and policy != nil, do: ", without link: #{policy}"
+  defp lost(_other), do: ""
 
   defp metres(length), do: "#{:erlang.float_to_binary(length * 1.0, decimals: 2)} m"
   defp rate(value, unit), do: "#{:erlang.float_to_binary(value * 1.0, decimals: 2)} #{unit}"

@@ -54,7 +54,7 @@ defmodule Swarm.Host.ReleaseBoot do
           {:ok, {Robot.File.t(), Robot.Config.t()} | nil} | {:error, [line :: String.t(), ...]}
   def robot(environment) do
     with {:ok, path} when path != nil <- place(environment),
-         {:ok, file} <- Robot.File.load(path),
+         {:ok, file} <- MemberSpec.load(path),
          :ok <- named(file, path, value(environment, "ROBOT")),
          {:ok, config} <- MemberSpec.config(file) do
       {:ok, {file, config}}
@@ -133,20 +133,21 @@ defmodule Swarm.Host.ReleaseBoot do
   @spec main() :: :ok
   def main do
     environment = System.get_env()
-    missions(environment)
+    configure(environment)
     {status, output, errors} = answer(Map.get(environment, "RELEASE_COMMAND", ""), environment)
     Enum.each(errors, &IO.puts(:stderr, &1))
     Enum.each(output, &IO.puts/1)
     if status != 0, do: System.halt(status), else: :ok
   end
 
-  # This VM is asked without the release's settings, as those of the start would come along. The missions that a
-  # robot file may name are settings of the build.
-  defp missions(environment) do
+  # This VM is asked without the release's settings, as those of the start would come along. The missions and
+  # formations that a robot file may name are settings of the build.
+  defp configure(environment) do
     with %{"RELEASE_ROOT" => root, "RELEASE_VSN" => version} <- environment,
-         {:ok, [settings]} <- :file.consult(Path.join([root, "releases", version, "sys.config"])),
-         {:ok, missions} <- Keyword.fetch(Keyword.get(settings, :swarm, []), :missions),
-         do: Application.put_env(:swarm, :missions, missions)
+         {:ok, [settings]} <- :file.consult(Path.join([root, "releases", version, "sys.config"])) do
+      words = settings |> Keyword.get(:swarm, []) |> Keyword.take([:missions, :formations])
+      Application.put_all_env(swarm: words)
+    end
   end
 
   defp halt(environment, file) do

@@ -16,6 +16,7 @@ defmodule Mix.Tasks.Robot.Check do
   """
   use Mix.Task
   alias Robot.File.Summary
+  alias Swarm.MemberSpec
 
   @impl Mix.Task
   def run(words) do
@@ -42,8 +43,8 @@ defmodule Mix.Tasks.Robot.Check do
   end
 
   defp check(file) do
-    with {:ok, robot} <- Robot.File.load(file),
-         {:ok, _config} <- Robot.File.config(robot) do
+    with {:ok, robot} <- MemberSpec.load(file),
+         {:ok, _config} <- MemberSpec.config(robot) do
       [title | lines] = Summary.report(file, robot)
       Enum.each([title | Enum.map(lines, &"  #{&1}")], fn line -> Mix.shell().info(line) end)
 

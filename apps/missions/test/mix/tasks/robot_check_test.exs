@@ -1,7 +1,8 @@
-defmodule Mix.Tasks.RobotTest do
+defmodule Mix.Tasks.Robot.CheckTest do
   use ExUnit.Case, async: false
   alias Mix.Tasks.Robot.Check
   alias Robot.File.Schema
+  alias Swarm.Host.ReleaseBoot
 
   @moduletag :tmp_dir
   @robots Path.expand("../../../../../config/robots", __DIR__)
@@ -132,7 +133,7 @@ defmodule Mix.Tasks.RobotTest do
     bad = Path.join(folder, "bad.exs")
     File.write!(bad, "[id: :mag1, profile: :magelan,\n dirve: 1]")
     lines = refused(Check, [Path.join(@robots, "mag1.exs"), bad, "none.exs"])
-    {:keys, table} = Schema.table(%{fleet: Schema.fleet(), colours: nil})
+    {:keys, table} = Schema.table(%{fleet: Schema.fleet(), colours: nil, tables: []})
     keys = table |> Keyword.keys() |> Enum.join(", ")
 
     assert lines == [
@@ -145,5 +146,119 @@ defmodule Mix.Tasks.RobotTest do
     assert refused(Check, ["--colour"]) == ["--colour is not an option; --help lists them"]
     Check.run(["--help"])
     assert [_well | _lines] = said()
+  end
+
+  defmodule Echelon do
+    @moduledoc "A formation that a build adds."
+    @behaviour Swarm.Formation.Kind
+
+    @impl Swarm.Formation.Kind
+    def slot(rank, _robots), do: {-0.8 * rank, 0.8 * rank}
+  end
+
+  defmodule Patrol do
+    @moduledoc "A mission that a build adds."
+    @behaviour Robot.Mission
+
+    @impl Robot.Mission
+    def init(_robot, options), do: {:idle, options, []}
+
+    @impl Robot.Mission
+    def handle(_event, mission), do: {:idle, mission, []}
+
+    @impl Robot.Mission
+    def option_table, do: [rounds_of_patrol: {:integer, 1, 99}]
+
+    @impl Robot.Mission
+    def options(options, _robots), do: {:ok, options}
+  end
+
+  defmodule Guard do
+    @moduledoc "A mission that a build adds, which checks its options without a table."
+    @behaviour Robot.Mission
+
+    @impl Robot.Mission
+    defdelegate init(robot, options), to: Patrol
+
+    @impl Robot.Mission
+    defdelegate handle(event, mission), to: Patrol
+
+    @impl Robot.Mission
+    def options([gate_of_guard: :north] = options, _robots), do: {:ok, options}
+    def options([], _robots), do: {:ok, []}
+    def options(_other, _robots), do: {:error, "only gate_of_guard: :north is allowed"}
+  end
+
+  describe "a mission and a formation of this build" do
+    setup %{tmp_dir: folder} do
+      missions = Application.fetch_env!(:swarm, :missions)
+      Application.put_env(:swarm, :missions, missions ++ [patrol: Patrol, guard: Guard])
+      Application.put_env(:swarm, :formations, echelon: Echelon)
+
+      on_exit(fn ->
+        Application.put_env(:swarm, :missions, missions)
+        Application.delete_env(:swarm, :formations)
+      end)
+
+      path = Path.join(folder, "mag1.exs")
+      secret = Path.join(folder, "secret")
+      {:ok, _secret} = Mesh.Secret.create(secret, true)
+
+      machine = %{
+        "ROBOT" => "mag1",
+        "CONVOY_ROBOT_FILE" => path,
+        "CONVOY_SECRET_FILE" => secret
+      }
+
+      %{path: path, machine: machine}
+    end
+
+    defp write(path, policies) do
+      drive = ~s(drive: {Hal.RFlex.Driver, port: "/dev/null"})
+      File.write!(path, "[id: :mag1, profile: :magellan, #{drive},\npolicies: [#{policies}]]")
+    end
+
+    test "may stand in a robot file", %{path: path, machine: machine} do
+      for {policies, told} <- [
+            {"mission: :landmark, formation: {:echelon, 1.2}", "landmark, in echelon of 1.20 m"},
+            {"formation: {:echelon, 1.2}", "none until it is told one"},
+            {"mission: :patrol, rounds_of_patrol: 3", "patrol"},
+            {"mission: :patrol", "patrol"},
+            {"mission: :guard, gate_of_guard: :north", "guard"}
+          ] do
+        write(path, policies)
+        Check.run([path])
+        lines = said()
+        assert hd(lines) =~ "#{path}: well"
+        assert Enum.any?(lines, &(&1 =~ ~r/mission +#{told}$/))
+        assert {0, answer, []} = ReleaseBoot.answer("check", machine)
+        assert Enum.map(answer, &String.trim/1) == Enum.map(lines, &String.trim/1)
+      end
+
+      write(path, "mission: :patrol, rounds_of_patrol: 3")
+      assert {:ok, {_file, config}} = ReleaseBoot.robot(machine)
+      assert config.mission == {Patrol, rounds_of_patrol: 3}
+    end
+
+    test "are suggested for a typo", %{path: path, machine: machine} do
+      for {policies, line} <- [
+            {"mission: :landmark, formation: {:echeln, 1.2}",
+             "policies.formation: cannot be :echeln: :column, :line, :wedge, :triangle, :diamond, :circle or :echelon is allowed; did you mean :echelon?"},
+            {"mission: :patorl, rounds_of_patrol: 3",
+             "policies.mission: cannot be :patorl: nil, :landmark, :patrol or :guard is allowed; did you mean :patrol?"},
+            {"mission: :patrol, rounds_of_patorl: 3",
+             "policies.rounds_of_patorl: is not known: allowed are mission, rounds_of_patrol; did you mean rounds_of_patrol?"},
+            {"mission: :patrol, formation: {:echelon, 1.2}",
+             "policies.formation: is not known: allowed are mission, rounds_of_patrol"},
+            {"mission: :guard, gate_of_guard: :patrol",
+             "policies: only gate_of_guard: :north is allowed"},
+            {"mission: :guard, gate_of_guard: :no_name_of_any_gate",
+             "policies: cannot be :no_name_of_any_gate: a name that this build knows is allowed"}
+          ] do
+        write(path, policies)
+        assert refused(Check, [path]) == ["#{path}:2: #{line}"]
+        assert {1, [], ["#{path}:2: #{line}"]} == ReleaseBoot.answer("check", machine)
+      end
+    end
   end
 end
