@@ -161,6 +161,8 @@ defmodule Swarm.CommsTest do
     for id <- ids, do: rolls_of(id)
     assert Swarm.ask(:link7, :estop) == :ok
     for id <- ids, do: until(id, &Board.latched?/1)
+    # Else it would be repeated to the robots of the next test.
+    assert Swarm.reset() == :ok
   end
 
   test "the directory falls: robots drive on, and enter the new one by themselves" do
