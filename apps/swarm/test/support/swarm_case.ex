@@ -22,6 +22,7 @@ defmodule Swarm.Case do
 
   setup do
     unless Process.whereis(Robot.Names), do: start_supervised!(Swarm.Supervisor)
+
     # A stop that the test before did not reset is repeated for a second, to those that are switched on then, too.
     Swarm.EStop.Broadcaster.quiet(:all)
     :sys.get_state(Swarm.EStop.Broadcaster)

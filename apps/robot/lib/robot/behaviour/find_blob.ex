@@ -56,7 +56,7 @@ defmodule Robot.Behaviour.FindBlob do
         if forget?, do: %{state | seen: nil, steady: 0}, else: state
 
       sighting ->
-        %{state | seen: %{sighting | at_ms: sighting.at_ms || percept.at_ms}}
+        %{state | seen: sighting}
     end
   end
 

@@ -19,7 +19,7 @@ defmodule Robot.Percept.Sighting do
           direction: float() | nil,
           distance: float() | nil,
           share: float(),
-          at_ms: integer() | nil
+          at_ms: integer()
         }
 
   # Boxes this many pixels apart still touch: a border between two colours belongs to neither.
