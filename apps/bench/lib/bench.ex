@@ -72,7 +72,8 @@ defmodule Bench do
   def choose(text), do: Parse.named(text, cases())
 
   @doc """
-  The time within which a case should be formed (again): the hospital gives a fresh fleet longer.
+  The time within which the fleet should be in formation (again). In the hospital a fresh fleet
+  has longer.
 
       iex> {:ok, [six]} = Bench.choose("six")
       iex> {Bench.limit_s(six, "hall"), Bench.limit_s(six, "hospital")}
@@ -82,11 +83,11 @@ defmodule Bench do
   def limit_s(%{deed: nil, limit_s: 120}, "hospital"), do: 180
   def limit_s(%{limit_s: limit_s}, _map), do: limit_s
 
-  @doc "What `Sim.Trial.new/1` takes for a case, a map and a seed."
+  @doc "The options of `Sim.Trial.new/1` for a case, a map and a seed."
   @spec options(case(), String.t(), integer(), :painted | :direct) :: map()
   def options(case, map, seed, blobs) do
     limit_s = limit_s(case, map)
-    # Before something is done to it, a fleet has 180 s to form at all.
+    # Before something is done to the fleet, it has 180 s to get into formation at all.
     duration_s = if case.deed, do: 180.0 + limit_s + 10, else: limit_s * 1.0
     robots = Console.Fleet.of(Map.get(case.options, :robots, 6))
 

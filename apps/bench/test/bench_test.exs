@@ -11,7 +11,7 @@ defmodule BenchTest do
     measured
   end
 
-  test "a plain run counts from the start, one with a deed from the deed" do
+  test "a plain run counts from the start, one with an intervention from the intervention" do
     plain = run("six")
     assert plain.within? and plain.formed_s > 5
     assert {mean, max} = plain.error
@@ -28,7 +28,7 @@ defmodule BenchTest do
     assert %{formed_s: nil, within?: false, error: nil} = run("none")
   end
 
-  test "claims are counted by case, and pooled, with the case that did worst" do
+  test "claims are counted by case, and pooled, with the worst case" do
     claim = fn then, later -> %{at_s: 1.0, robot: :mag1, worst_m: then, worst_5s_m: later} end
     run = fn claims -> %{run("six") | claims: claims} end
 

@@ -18,7 +18,7 @@ defmodule Bench.Mesh do
   @s 1_000_000
   @mb 1_048_576
 
-  @doc "All cases. `bare` is the case of bare OTP to compare with; `nil` if it has no such thing."
+  @doc "All cases. `bare` is the case of bare OTP to compare with, or `nil` if there is none."
   @spec cases() :: [case()]
   def cases do
     [
@@ -82,7 +82,7 @@ defmodule Bench.Mesh do
   def goal(:rate, _size), do: {10, nil}
   def goal(_case, _size), do: {nil, nil}
 
-  @doc "What JADE 4.3 took, on such a machine, on another day; `nil` if not measured."
+  @doc "The time that JADE 4.3 took on such a machine on another day; `nil` if not measured."
   @spec jade(atom(), size()) :: String.t() | nil
   def jade(name, 3) when name in [:ping, :gather], do: "755 us / 8.2 ms"
   def jade(name, :one) when name in [:ping, :gather], do: "2.1 / 11 ms"
@@ -97,7 +97,7 @@ defmodule Bench.Mesh do
   def jade(:start, 3), do: "0.58 s"
   def jade(_case, _size), do: nil
 
-  @doc "How often a case is done: `{batches, times a batch}`; `share` makes it fewer."
+  @doc "How often a case is repeated: `{batches, times per batch}`; `share` reduces both."
   @spec times(atom(), size(), share :: float()) :: {pos_integer(), pos_integer()}
   def times(case, size, share) do
     {batches, times} = times(case, size)

@@ -8,9 +8,9 @@ defmodule Bench.Run do
   @push_m 3.0
 
   @typedoc """
-  `formed_s` is `nil` when the fleet did not form (again) before its time was up. `claims` are all of the
-  run, those before the deed too; `stuck` counts
-  robots that stood short of their places without a word (`Sim.Trial.Stuck`).
+  `formed_s` is `nil` if the fleet did not form (again) before its time was up. `claims` are all
+  claims of the run, including those before the intervention; `stuck` counts robots that stood
+  short of their places without reporting it (`Sim.Trial.Stuck`).
   """
   @type measured :: %{
           formed_s: float() | nil,
@@ -66,7 +66,7 @@ defmodule Bench.Run do
       state.case.deed != nil and state.deed_ms == nil and calm_ms >= @calm_ms ->
         changes = state.module.result(trial).leader_changes
         trial = act(state.case.deed, trial, state.module)
-        # Until the fleet has noticed, it still counts itself as formed.
+        # Until the fleet notices, it still considers itself formed.
         play(trial, %{
           state
           | deed_ms: at_ms,
@@ -101,7 +101,7 @@ defmodule Bench.Run do
     module.kill(trial, middle.name)
   end
 
-  # Away from where it is, in the first direction that is open, turning from the leader's left.
+  # Away from where it is, in the first open direction, beginning at the leader's left.
   defp act(:move, trial, module) do
     scene = module.scene(trial)
     leader = Enum.find(scene.robots, & &1.leader?)

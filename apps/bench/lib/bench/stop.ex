@@ -3,8 +3,8 @@ defmodule Bench.Stop do
   What `mix bench stop` measures: the time from a fault on a robot that drives at full speed until
   the stop arrives at the other end of its serial line. Pure.
 
-  The stop is there when both axes of the base were told a speed of zero. What the base does then is its own
-  affair: it brakes.
+  The stop has arrived when both axes of the base were told a speed of zero. What the base does
+  then (it brakes) is not measured.
   """
   alias Console.Cli.Parse
 
@@ -14,7 +14,7 @@ defmodule Bench.Stop do
   @goal_ms 300
   @urgent_ms 50
 
-  @doc "All cases; a line that is pulled has no goal, as nothing can be said on it."
+  @doc "All cases. A line that is pulled has no goal, because nothing can be sent on it."
   @spec cases() :: [case()]
   def cases do
     [

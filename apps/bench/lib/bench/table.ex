@@ -65,9 +65,10 @@ defmodule Bench.Table do
   end
 
   @doc """
-  What the words of all runs were worth, in lines: how many claims of `formed` were true, all cases and maps
-  pooled, and the case that did worst; how many robots were stuck and did not say so (`Sim.Trial.Stuck`). A claim is true when the worst robot was at most half a metre off at the claim
-  and 5 s later (`Sim.Trial.Claims`).
+  How reliable the reports of the fleets were, as lines of text: how many claims of `formed` were
+  true, all cases and maps pooled, and the worst case; how many robots were stuck and did not
+  report it (`Sim.Trial.Stuck`). A claim is true when the worst robot was at most half a metre off
+  at the claim and 5 s later (`Sim.Trial.Claims`).
   """
   @spec pooled([{String.t(), String.t(), number(), [Bench.Run.measured()]}]) :: String.t()
   def pooled(rows) do

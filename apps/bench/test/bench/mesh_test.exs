@@ -55,7 +55,7 @@ defmodule Bench.MeshTest do
     assert Hal.Json.encode!(term) =~ ~s("case":"ping","nodes":3)
   end
 
-  test "wrong options are lines that say what is allowed" do
+  test "errors about wrong options say what is allowed" do
     assert {:error, [nodes, only]} = Main.run(~w(--nodes 0 --only pong))
     assert nodes =~ "whole numbers from 2 to 100"
     assert only =~ "ping, gather"

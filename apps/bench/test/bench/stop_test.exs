@@ -10,7 +10,7 @@ defmodule Bench.StopTest do
 
   @moduletag :tmp_dir
 
-  # Cut anywhere, a stream says the same.
+  # Wherever a stream is cut, it says the same.
   defp feed(bytes, size) do
     whole = div(byte_size(bytes), size)
     chunks = for n <- 0..(whole - 1)//1, do: binary_part(bytes, n * size, size)
@@ -44,7 +44,7 @@ defmodule Bench.StopTest do
     for size <- 1..40, do: assert(feed(stream, size) == expected)
   end
 
-  test "no bytes make the reader fall, or keep more than a frame" do
+  test "no bytes make the reader crash, or keep more than a frame" do
     :rand.seed(:exsss, {1, 2, 3})
 
     Enum.reduce(1..5_000, Reader.new(), fn _, reader ->
@@ -74,8 +74,8 @@ defmodule Bench.StopTest do
     assert text =~ "after 0.6 ms"
   end
 
-  # How fast is for the bench to say, on a machine with nothing else to do.
-  test "a robot on a real line is stopped by what stops it", %{tmp_dir: folder} do
+  # How fast it stops is for the benchmark to measure, on a machine with nothing else to do.
+  test "a robot on a real line is stopped in every case", %{tmp_dir: folder} do
     {:ok, cases} = Stop.choose("crash,frozen,kill,freeze,estop,bumper,pull")
 
     for result <- Stop.Runner.run(cases, 1, folder, fn _note -> :ok end) do

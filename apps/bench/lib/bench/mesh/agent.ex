@@ -27,7 +27,7 @@ defmodule Bench.Mesh.Agent do
   def handle(%{content: :word}, s), do: complete(%{s | heard: s.heard + 1})
   def handle(_other, s), do: {:noreply, s}
 
-  # The words of others may be here before the question.
+  # Messages of other agents may arrive before the question.
   defp complete(%{asked: {asked, all}, heard: all} = s) do
     Conversation.post(asked.reply_to, Envelope.reply(asked, :inform, s.robot, :done))
     {:noreply, %{s | heard: 0, asked: nil}}

@@ -1,7 +1,7 @@
 defmodule Bench.Mesh.Bare do
   @moduledoc """
-  The same on bare OTP: processes, `:pg`, `send`. Written in Erlang's style, so that its nodes
-  load little of Elixir.
+  The same measurements on bare OTP: processes, `:pg`, `send`. Written in Erlang's style, so that
+  its nodes load little of Elixir.
   """
   alias Bench.Mesh.Watch
 
@@ -21,7 +21,7 @@ defmodule Bench.Mesh.Bare do
     :lists.foreach(&:net_kernel.connect_node/1, nodes)
   end
 
-  @doc "The same, for a node that was away: what is left of old connections goes first."
+  @doc "The same for a node that was away: first removes what is left of old connections."
   @spec again([node()]) :: :ok
   def again(nodes) do
     nodes = :lists.delete(:erlang.node(), nodes)
@@ -54,7 +54,9 @@ defmodule Bench.Mesh.Bare do
 
   defp complete(heard, asked), do: agent(heard, asked)
 
-  @doc "Waits until this node is connected to all and knows all agents; says when."
+  @doc """
+  Waits until this node is connected to all nodes and knows all agents; returns when that was.
+  """
   @spec full(pos_integer(), [atom()]) :: at_ns :: integer()
   def full(nodes, names) do
     if length(:erlang.nodes()) >= nodes - 1 and length(pids(names)) == length(names) do
@@ -67,7 +69,9 @@ defmodule Bench.Mesh.Bare do
     end
   end
 
-  @doc "Sends to all and waits for all answers, `count` times; us each."
+  @doc """
+  Sends to all agents and waits for all answers, `count` times; returns the microseconds of each.
+  """
   @spec pings([atom()], pos_integer()) :: [float()]
   def pings(names, count) do
     pids = pids(names)
@@ -79,7 +83,7 @@ defmodule Bench.Mesh.Bare do
     end)
   end
 
-  @doc "Everybody to everybody; us each."
+  @doc "Lets everybody write to everybody; returns the microseconds of each round."
   @spec rounds([atom()], pos_integer()) :: [float()]
   def rounds(names, count) do
     pids = pids(names)
@@ -91,7 +95,9 @@ defmodule Bench.Mesh.Bare do
     end)
   end
 
-  @doc "How long a process that joins on that node takes to be told of here; us each."
+  @doc """
+  How long it takes until a process that joins on that node is reported here; microseconds each.
+  """
   @spec joins(node(), atom(), pos_integer()) :: [float()]
   def joins(node, name, count) do
     {monitor, []} = :pg.monitor(@scope, {:robot, name})
@@ -116,7 +122,7 @@ defmodule Bench.Mesh.Bare do
     receive do: (:never -> :ok)
   end
 
-  @doc "Writes down when this agent is there and when not: `:join`, `:leave`."
+  @doc "Records when this agent joins and leaves: `:join`, `:leave`."
   @spec watch(atom(), node()) :: :ok
   def watch(name, _node) do
     Watch.start(

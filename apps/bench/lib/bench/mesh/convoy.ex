@@ -10,7 +10,7 @@ defmodule Bench.Mesh.Convoy do
   @patience_ms 2_000
   @look_ms 5
 
-  @doc "Makes this node a robot's, or that of several, or of none."
+  @doc "Makes this the node of one robot, of several, or of none."
   @spec main(keyword() | false, [atom()]) :: :ok
   def main(mesh, robots) do
     Application.put_env(:logger, :level, :error)
@@ -35,7 +35,10 @@ defmodule Bench.Mesh.Convoy do
     {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, Swarm.Comms.join(config))
   end
 
-  @doc "Waits until this node sees and is connected to all, and knows all robots; says when."
+  @doc """
+  Waits until this node sees and is connected to all nodes, and knows all robots; returns when
+  that was.
+  """
   @spec full(nodes :: pos_integer(), robots :: [atom()]) :: at_ns :: integer()
   def full(nodes, robots) do
     if length(Node.list()) >= nodes - 1 and alive() >= nodes - 1 and
@@ -51,18 +54,18 @@ defmodule Bench.Mesh.Convoy do
 
   defp alive, do: Enum.count(Mesh.view().nodes, fn {_node, about} -> about.status == :alive end)
 
-  @doc "Commands: asks all robots by the door, `count` times; us each."
+  @doc "Commands: asks all robots through the public interface, `count` times; microseconds each."
   @spec pings([atom()], pos_integer()) :: [float()]
   def pings(robots, count) do
     all = length(robots)
     repeat(count, fn -> ^all = map_size(Commands.Client.ask(robots, :ping)) end)
   end
 
-  @doc "Envelopes: asks all agents and gathers their answers; us each."
+  @doc "Envelopes: asks all agents and gathers their answers; microseconds each."
   @spec gathers([atom()], pos_integer()) :: [float()]
   def gathers(robots, count), do: asks(robots, :ping, count)
 
-  @doc "Everybody to everybody, until all have heard all; us each."
+  @doc "Lets everybody write to everybody until all have heard all; microseconds each."
   @spec rounds([atom()], pos_integer()) :: [float()]
   def rounds(robots, count), do: asks(robots, {:round, robots}, count)
 
@@ -75,7 +78,9 @@ defmodule Bench.Mesh.Convoy do
     end)
   end
 
-  @doc "How long a robot that joins on that node takes to be told of here; us each."
+  @doc """
+  How long it takes until a robot that joins on that node is reported here; microseconds each.
+  """
   @spec joins(node(), atom(), pos_integer()) :: [float()]
   def joins(node, robot, count) do
     {:ok, _there} = Swarm.subscribe()
@@ -101,8 +106,8 @@ defmodule Bench.Mesh.Convoy do
   end
 
   @doc """
-  Writes down when this robot is there and when not: `:join` and `:leave` as subscribers are told,
-  `:suspect` and `:gone` of its node by the datagrams.
+  Records when this robot comes and goes: `:join` and `:leave` as subscribers are notified,
+  `:suspect` and `:gone` of its node as the datagrams show.
   """
   @spec watch(atom(), node()) :: :ok
   def watch(robot, node) do
@@ -131,7 +136,7 @@ defmodule Bench.Mesh.Convoy do
   def note([:mesh, change], _measurements, %{node: node}, pid),
     do: send(pid, {:mesh, change, node})
 
-  @doc "Lets this node say nothing by datagram any more, or again; says when."
+  @doc "Stops this node from sending datagrams, or lets it send again; returns when that was."
   @spec silence(boolean()) :: at_ns :: integer()
   def silence(true), do: apply_then_now(:suspend)
   def silence(false), do: apply_then_now(:resume)
@@ -141,7 +146,7 @@ defmodule Bench.Mesh.Convoy do
     Watch.now_ns()
   end
 
-  @doc "How many ticks a second each robot of this node does, over so many seconds."
+  @doc "The ticks per second of each robot of this node, measured over so many seconds."
   @spec rates([atom()], pos_integer()) :: [float()]
   def rates(robots, seconds) do
     before = ticks(robots)

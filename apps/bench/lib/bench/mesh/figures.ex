@@ -6,13 +6,13 @@ defmodule Bench.Mesh.Figures do
   """
   alias Bench.Table
 
-  # Below that a percentile of 99 is nothing but the largest.
+  # With fewer values the 99th percentile is simply the largest.
   @enough 100
 
   @type t :: %{p50: number(), p99: number(), max: number(), count: pos_integer()}
 
   @doc """
-  The figures of some batches; of fewer than a hundred values `p99` is the largest.
+  The figures of some batches. With fewer than a hundred values, `p99` is the largest.
 
       iex> Bench.Mesh.Figures.of([[1, 2, 3], [2, 3, 4], [7, 8, 9]])
       %{count: 9, max: 9, p50: 3, p99: 9}
@@ -34,7 +34,7 @@ defmodule Bench.Mesh.Figures do
   end
 
   @doc """
-  How many times as long ours takes.
+  How many times as long our system takes.
 
       iex> Bench.Mesh.Figures.ratio(300, 200)
       1.5

@@ -6,7 +6,7 @@ defmodule Bench.Mesh.Main do
 
   alias Bench.Vm
 
-  @doc "Runs it; errors are lines."
+  @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
   def run(arguments) do
     with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
@@ -41,7 +41,7 @@ defmodule Bench.Mesh.Main do
     [
       {"nodes", "N,N", &sizes/1, "how many nodes (3,10,30)"},
       {"robots-in-one-node", "N", &Parse.whole(&1, 0..200),
-       "and so many robots in one node; 0 for none (100)"},
+       "and this many robots in one node; 0 for none (100)"},
       {"only", "NAME,NAME", &Mesh.choose/1, "which cases (all)"},
       {"share", "PERCENT", &Parse.whole(&1, 1..1_000), "how much of the usual repetitions (100)"},
       {"json", "FILE", &{:ok, &1}, "write the figures there too"},

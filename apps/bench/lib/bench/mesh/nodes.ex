@@ -10,9 +10,11 @@ defmodule Bench.Mesh.Nodes do
   @enforce_keys [:name, :node, :peer, :pid, :began_ns]
   defstruct @enforce_keys
 
-  @typedoc "`began_ns` is when its start was asked for; `pid` its process of the operating system."
+  @typedoc """
+  `began_ns` is when its start was requested; `pid` is its process of the operating system.
+  """
   @type t :: %__MODULE__{}
-  @typedoc "All that nodes of one fleet have in common; `kind` is whose code runs there."
+  @typedoc "What the nodes of one fleet have in common; `kind` says whose code runs there."
   @type fleet :: %{
           kind: :ours | :bare,
           mesh: keyword() | false,
@@ -26,7 +28,7 @@ defmodule Bench.Mesh.Nodes do
              -kernel dist_auto_connect never -kernel inet_dist_use_interface {127,0,0,1})
   @boot_ms 60_000
 
-  @doc "A fleet that knows `count` names and a base; nothing is started yet."
+  @doc "A fleet with `count` names and a base; nothing is started yet."
   @spec fleet(:ours | :bare, pos_integer()) :: fleet()
   def fleet(kind, count) do
     {_, 0} = System.cmd("epmd", ["-daemon"], env: [{"ERL_EPMD_ADDRESS", @host}])
@@ -35,7 +37,7 @@ defmodule Bench.Mesh.Nodes do
     %{kind: kind, mesh: mesh, prefix: prefix, flags: flags(kind)}
   end
 
-  # Else a freeze is noticed after a minute and more.
+  # Otherwise a freeze is noticed only after more than a minute.
   defp flags(:bare), do: ~w(-kernel net_ticktime 4 -kernel logger_level none)
   defp flags(:ours), do: []
 
@@ -56,7 +58,7 @@ defmodule Bench.Mesh.Nodes do
       fleet: for(n <- 0..(count + 1), do: :"#{prefix}_#{n}"),
       interface: {127, 0, 0, 1},
       port: 0,
-      # The base is one more.
+      # The base is one node more.
       full_mesh: max(count + 1, 2),
       multicast: {{239, 255, 67, 86}, 20_000 + :rand.uniform(20_000)}
     ]
@@ -92,7 +94,7 @@ defmodule Bench.Mesh.Nodes do
   @spec call(t(), module(), atom(), list(), timeout()) :: term()
   def call(node, m, f, a, timeout \\ 300_000), do: :peer.call(node.peer, m, f, a, timeout)
 
-  @doc "Sends a signal to its process: KILL, STOP, CONT; says when."
+  @doc "Sends a signal to its process (KILL, STOP, CONT); returns when that was."
   @spec signal(t(), String.t()) :: at_ns :: integer()
   def signal(node, signal) do
     at_ns = Watch.now_ns()
@@ -100,7 +102,7 @@ defmodule Bench.Mesh.Nodes do
     at_ns
   end
 
-  @doc "Its memory: what is resident, and its share of what is resident, in bytes."
+  @doc "Its memory in bytes: the resident set, and its proportional share of it."
   @spec memory(t()) :: %{rss: pos_integer() | nil, pss: pos_integer() | nil}
   def memory(node) do
     %{
@@ -120,7 +122,7 @@ defmodule Bench.Mesh.Nodes do
     end
   end
 
-  @doc "Ends nodes, frozen or not."
+  @doc "Ends nodes, even frozen ones."
   @spec stop([t()]) :: :ok
   def stop([]), do: :ok
 

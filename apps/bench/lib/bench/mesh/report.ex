@@ -4,7 +4,7 @@ defmodule Bench.Mesh.Report do
   alias Bench.Mesh.Figures
   alias Console.Cli.Format
 
-  @typedoc "One line: ours, and bare OTP beside it in the same run."
+  @typedoc "One line: our figures, and those of bare OTP in the same run."
   @type row :: %{
           case: Mesh.case(),
           size: Mesh.size(),
@@ -84,7 +84,7 @@ defmodule Bench.Mesh.Report do
 
   defp reached(nil, _goal, _unit), do: "–"
   defp reached(_ours, {nil, nil}, _unit), do: "–"
-  # A tick more or less at the ends of the time that was looked at.
+  # Allow for a tick more or less at the ends of the measured time.
   defp reached(ours, {hz, nil}, :rate), do: yes(ours.p50 >= hz - 0.2)
   defp reached(ours, {p50, nil}, _unit), do: yes(ours.p50 <= p50)
   defp reached(ours, {p50, p99}, _unit), do: yes(ours.p50 <= p50 and ours.p99 <= p99)

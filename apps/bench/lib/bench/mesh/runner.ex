@@ -3,8 +3,8 @@ defmodule Bench.Mesh.Runner do
   Measures one fleet: N nodes with a robot each and a base that asks, or one node with many. Bare
   OTP runs first and ends before ours starts, so that neither disturbs the other.
 
-  What is fast is done in the nodes, many times over; what is slow (a start, a death) is done a few times
-  from here.
+  Fast cases are repeated many times inside the nodes; slow ones (a start, a death) are done a few
+  times from here.
   """
   alias Bench.Mesh
   alias Bench.Mesh.{Bare, Figures, Nodes}
@@ -13,14 +13,16 @@ defmodule Bench.Mesh.Runner do
   @patience_ms 10_000
   @rate_s 5
 
-  @typedoc "`share` of the usual times; `note` is told what is going on."
+  @typedoc """
+  `share` is the share of the usual repetitions; `note` is called with what is going on.
+  """
   @type plan :: %{
           cases: [Mesh.case()],
           share: float(),
           note: (String.t() -> term())
         }
 
-  @doc "The rows of a fleet of so many nodes, or of so many robots in one."
+  @doc "The rows of a fleet of so many nodes, or of so many robots in one node."
   @spec rows(Mesh.size(), robots :: pos_integer(), plan()) :: [Mesh.Report.row()]
   def rows(size, robots, plan) do
     bare = measure(:bare, size, robots, plan)
@@ -83,7 +85,7 @@ defmodule Bench.Mesh.Runner do
     %{fleet: fleet, plan: plan, size: size, nodes: nodes, base: base, names: names, code: code}
   end
 
-  # A case's own name, and those for which bare OTP is wanted for the sake of it.
+  # A case's own name, and the names of cases that need it as their bare OTP counterpart.
   defp wanted?(%{fleet: %{kind: :ours}} = s, name),
     do: Enum.any?(s.plan.cases, &(&1.name == name))
 
@@ -172,7 +174,7 @@ defmodule Bench.Mesh.Runner do
     try do
       meet(s, [again], [s.base])
       came_ns = seen(s, :join)
-      # Killed again before its first datagram came, it would not be missed by anybody.
+      # If it were killed again before its first datagram came, nobody would miss it.
       if s.code == Mesh.Convoy, do: seen(s, :up)
       s = %{s | nodes: List.replace_at(s.nodes, -1, again)}
       {{(left_ns - killed_ns) / 1_000, (came_ns - again.began_ns) / 1_000}, s}
@@ -183,8 +185,8 @@ defmodule Bench.Mesh.Runner do
     end
   end
 
-  # Bare OTP notices a freeze only because its nodes are started with a short tick, and only for three
-  # of them: it takes seconds.
+  # Bare OTP notices a freeze only because its nodes are started with a short tick. That takes
+  # seconds, so only three of them are measured.
   defp slow(%{code: Bare, size: size}, figures) when size > 3, do: figures
 
   defp slow(s, figures) do
@@ -201,7 +203,7 @@ defmodule Bench.Mesh.Runner do
 
   defp silence(node, quiet?), do: Nodes.call(node, Mesh.Convoy, :silence, [quiet?])
 
-  # Bare OTP cuts a connection that was silent too long, and somebody has to make it anew.
+  # Bare OTP cuts a connection that was silent too long, and somebody has to connect again.
   defp fall_silent(%{code: Bare} = s, name, time, quiet, wake) do
     s.plan.note.("bare: #{s.size} nodes, #{name} #{time}")
     victim = List.last(s.nodes)
@@ -224,7 +226,7 @@ defmodule Bench.Mesh.Runner do
     seen(s, :gone)
     wake.(victim)
     seen(s, :up)
-    # What happens to a robot before it is known again is told to nobody.
+    # Nobody is notified of what happens to a robot before it is known again.
     seen(s, :join)
     (noticed_ns - began_ns) / 1_000
   end

@@ -5,7 +5,10 @@ defmodule Bench.Mesh.Watch do
   is measured.
   """
 
-  @doc "Starts it and calls `begin`, without an argument, in it; it knows what `see` makes of a message: a name of what happened, or `nil`."
+  @doc """
+  Starts the process and calls `begin`, without an argument, in it. `see` turns a message into the
+  name of what happened, or `nil`.
+  """
   @spec start((... -> term()), (term() -> term() | nil)) :: :ok
   def start(begin, see) do
     stop()
@@ -35,7 +38,7 @@ defmodule Bench.Mesh.Watch do
     :ok
   end
 
-  @doc "When it was first told of that, in ns; `nil` if not within the time."
+  @doc "When it was first notified of that, in ns; `nil` if that did not happen within the time."
   @spec seen(term(), timeout_ms :: pos_integer()) :: integer() | nil
   def seen(what, timeout_ms) do
     ref = make_ref()
@@ -48,7 +51,7 @@ defmodule Bench.Mesh.Watch do
     end
   end
 
-  @doc "Now, in ns: the same on all processes of a machine."
+  @doc "Now, in ns, by the clock that all processes of a machine share."
   @spec now_ns() :: integer()
   def now_ns, do: :os.system_time(:nanosecond)
 

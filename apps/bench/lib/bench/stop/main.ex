@@ -4,7 +4,7 @@ defmodule Bench.Stop.Main do
   alias Console.Cli.{Output, Parse}
   alias Bench.{Stop, Vm}
 
-  @doc "Runs it; errors are lines."
+  @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
   def run(arguments) do
     with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do

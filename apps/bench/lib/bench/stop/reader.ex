@@ -15,7 +15,7 @@ defmodule Bench.Stop.Reader do
   def new, do: <<>>
 
   @doc """
-  Takes bytes, as they come, and gives what whole frames in them say.
+  Takes bytes as they come, and returns what the whole frames in them say.
 
       iex> frame = <<0x1B, 2, 2, 0, 7, 14, 0, 0, 0, 0x10, 0, 0::32, 0x7530::32, 1>>
       iex> sum = frame |> binary_part(2, 18) |> :binary.bin_to_list() |> Enum.reduce(&Bitwise.bxor/2)
@@ -42,7 +42,7 @@ defmodule Bench.Stop.Reader do
       else: {Enum.reverse(events), bytes}
   end
 
-  # The beginning of a frame, perhaps.
+  # Perhaps the beginning of a frame.
   defp read(<<0x1B, 2, _few::binary>> = bytes, events), do: {Enum.reverse(events), bytes}
   defp read(<<0x1B>>, events), do: {Enum.reverse(events), <<0x1B>>}
   defp read(<<_byte, rest::binary>>, events), do: read(rest, events)

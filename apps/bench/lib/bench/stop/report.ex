@@ -6,7 +6,7 @@ defmodule Bench.Stop.Report do
 
   @heads ["cause", "median", "longest", "goal", "reached", "times", "rolled again by itself"]
 
-  @doc "The table, and a line on what cannot be measured."
+  @doc "The table, and a line about what cannot be measured."
   @spec draw([Stop.Runner.result()]) :: String.t()
   def draw(results) do
     lines = [@heads, Enum.map(@heads, fn _ -> "---" end)] ++ Enum.map(results, &line/1)
@@ -33,7 +33,7 @@ defmodule Bench.Stop.Report do
   end
 
   @doc """
-  Whether all times are within the goal, and there were no others.
+  Whether all stops came, and within the goal.
 
       iex> Bench.Stop.Report.reached?([200_000, 299_000], 300)
       true

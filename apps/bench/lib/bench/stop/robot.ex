@@ -14,7 +14,7 @@ defmodule Bench.Stop.Robot do
   @deadline_ms 10_000
   @look_ms 10
 
-  @doc "Starts the robot on this line. It is online and armed when this returns."
+  @doc "Starts the robot on this line. Returns when it is online and armed."
   @spec main(Path.t()) :: :ok
   def main(link) do
     Application.put_env(:logger, :level, :none)
@@ -44,11 +44,13 @@ defmodule Bench.Stop.Robot do
     arm()
   end
 
-  @doc "Arms it, once there is something to arm."
+  @doc "Arms it as soon as the drive can be armed."
   @spec arm() :: :ok
   def arm, do: until(fn -> Device.arm(Names.via(@id, :drive)) == :ok end)
 
-  @doc "Arms it again after its VM was frozen: with reports that are old by then it may have been disarmed."
+  @doc """
+  Arms it again after its VM was frozen: the reports are old by then, which may have disarmed it.
+  """
   @spec thawed() :: :ok
   def thawed do
     board = Board.find!(@id)
@@ -61,16 +63,16 @@ defmodule Bench.Stop.Robot do
     arm()
   end
 
-  @doc "Lets it roll, this fast."
+  @doc "Lets it drive at this speed."
   @spec roll(float()) :: :ok
   def roll(speed) do
     :persistent_term.put({__MODULE__, :raise?}, false)
-    # It may have fallen just now.
+    # It may have crashed just now.
     until(fn -> Names.whereis(@id, :pilot) != nil end)
     :ok = Pilot.start(@id, __MODULE__.Mission, speed: speed)
   end
 
-  @doc "The next tick of its behaviour raises; says when it did."
+  @doc "Makes the next tick of its behaviour raise; returns when it did."
   @spec crash() :: at_us :: integer()
   def crash do
     :persistent_term.put({__MODULE__, :raise?}, true)
@@ -83,18 +85,20 @@ defmodule Bench.Stop.Robot do
   def freeze(true), do: :sys.suspend(Names.via(@id, :executive))
   def freeze(false), do: :sys.resume(Names.via(@id, :executive))
 
-  @doc "When the drive was offline last, in us; waits for it, if it was not since `since_us`."
+  @doc """
+  When the drive was last offline, in us; waits for that if it was not offline since `since_us`.
+  """
   @spec offline(since_us :: integer()) :: at_us :: integer()
   def offline(since_us) do
     until(fn -> :persistent_term.get({__MODULE__, :offline}, 0) >= since_us end)
     :persistent_term.get({__MODULE__, :offline})
   end
 
-  @doc "How the wheels are armed."
+  @doc "The arming state of the wheels."
   @spec arming() :: Hal.Device.Arming.state()
   def arming, do: Device.arming(Names.via(@id, :drive)).state
 
-  @doc "Acknowledges that the line was lost, once it is back."
+  @doc "Acknowledges the loss of the line once it is back."
   @spec acknowledge() :: :ok
   def acknowledge, do: Device.acknowledge(Names.via(@id, :drive))
 

@@ -10,7 +10,7 @@ defmodule Bench.Stop.Runner do
   alias Sim.Emulator
 
   @full 0.5
-  # What the base is told then, by its conversion.
+  # The speed that the base is told then, in its own units.
   @fast 15_000
   @patience_ms 5_000
   @look_ms 300
@@ -18,8 +18,8 @@ defmodule Bench.Stop.Runner do
   @call_ms 30_000
 
   @typedoc """
-  Of one case: times to the stop (`nil`: none came), how often it rolled again by itself within 0.3 s, and for
-  a pulled line after what time the driver knew of it.
+  The results of one case: times to the stop (`nil` if none came), how often the robot rolled
+  again by itself within 0.3 s, and, for a pulled line, after what time the driver knew of it.
   """
   @type result :: %{
           case: Stop.case(),
@@ -28,7 +28,7 @@ defmodule Bench.Stop.Runner do
           known: [number()]
         }
 
-  @doc "Measures each case so many times; `note` is told how far it is."
+  @doc "Measures each case so many times; `note` is called with the progress."
   @spec run([Stop.case()], pos_integer(), Path.t(), (String.t() -> term())) :: [result()]
   def run(cases, count, folder, note) do
     link = Path.join(folder, "base")
@@ -78,7 +78,7 @@ defmodule Bench.Stop.Runner do
 
   defp call(s, m, f, a), do: :peer.call(s.vm.peer, m, f, a, @call_ms)
 
-  # At full speed; and the causes do not keep step with the ticks.
+  # Waits for full speed, and for a time that is not in step with the ticks.
   defp rolling(s) do
     :ok = call(s, Robot, :roll, [@full])
     speed(&(&1 >= @fast), @call_ms) || exit(:does_not_roll)
@@ -91,7 +91,7 @@ defmodule Bench.Stop.Runner do
 
   defp trial(:crash, s) do
     stop = stop(fn -> call(s, Robot, :crash, []) end)
-    # A robot whose parts fall four times in 5 s is given up.
+    # A robot whose processes crash four times in 5 s is given up.
     speed(fn _any -> false end, @rest_ms)
     {stop, s}
   end
@@ -122,7 +122,7 @@ defmodule Bench.Stop.Runner do
     {stop, s}
   end
 
-  # What is touched moves away: that it rolls backwards then is as it should be.
+  # A robot that is touched moves away, so it is right that it rolls backwards then.
   defp trial(:bumper, s) do
     stop =
       stop(fn ->
@@ -140,14 +140,15 @@ defmodule Bench.Stop.Runner do
     :ok = Emulator.unplug(s.emulator)
     known_us = call(s, Robot, :offline, [pulled_us]) - pulled_us
     stop = stop(fn -> timed(fn -> Emulator.plug(s.emulator) end) end)
-    # Its wheels were turning when the line went: nothing but a person makes them turn again.
+    # Its wheels were turning when the line was lost: only a person makes them turn again.
     {:error, _reason} = call(s, Robot, :arming, [])
     :ok = call(s, Robot, :acknowledge, [])
     :ok = call(s, Robot, :arm, [])
     {Map.put(stop, :known_us, known_us), s}
   end
 
-  # A shell that waits with the signal: to start one takes long on a busy machine, and is not a part of a stop.
+  # A shell that waits before it sends the signal: starting one takes long on a busy machine, and
+  # is not part of a stop.
   defp signaller(pid, signal) do
     script = "echo ready; read go; kill -#{signal} #{pid}"
     options = [:binary, :exit_status, args: ["-c", script]]
@@ -179,7 +180,7 @@ defmodule Bench.Stop.Runner do
     at_us
   end
 
-  # The cause says since when the time runs.
+  # The cause says when the time starts.
   defp stop(cause) do
     forget()
     since_us = cause.()
@@ -190,7 +191,7 @@ defmodule Bench.Stop.Runner do
     end
   end
 
-  # Both axes were told to stand, the one after the other.
+  # Both axes were told to stop, one after the other.
   defp zero(_since_us, %{0 => 0, 1 => 0, :at => at_us}), do: at_us
 
   defp zero(since_us, told) do
@@ -205,7 +206,7 @@ defmodule Bench.Stop.Runner do
     end
   end
 
-  # When the wheels were told such a speed, within this time.
+  # When the wheels were told such a speed, if within this time.
   defp speed(such?, ms), do: speed_until(such?, System.monotonic_time(:millisecond) + ms)
 
   defp speed_until(such?, until_ms) do

@@ -1,8 +1,8 @@
 defmodule Bench.Stop.WireTap do
   @moduledoc """
-  The emulated base with a tap at its end of the line (`Bench.Stop.Reader`): each speed that it is
-  told, and each input that it tells, goes at once to the process of the option `:to`, as `{:wire,
-  event, at_us}`.
+  The emulated base with a tap at its end of the line (`Bench.Stop.Reader`): each speed that it
+  receives, and each input that it reports, is sent at once to the process of the option `:to`, as
+  `{:wire, event, at_us}`.
   """
   @behaviour Sim.Emulator.Core
   alias Bench.Stop.Reader
@@ -45,7 +45,7 @@ defmodule Bench.Stop.WireTap do
   @impl Sim.Emulator.Core
   def restart(tap, at_ms), do: %{tap | base: RFlexController.restart(tap.base, at_ms)}
 
-  @doc "Now, in us: the same in all processes of a machine."
+  @doc "Now, in us, by the clock that all processes of a machine share."
   @spec now_us() :: integer()
   def now_us, do: :os.system_time(:microsecond)
 

@@ -4,14 +4,14 @@ defmodule Mix.Tasks.Bench do
   `mix bench demo` runs the cases of the landmark mission over many seeds and prints a table in
   Markdown.
 
-  Two runs go at a time; the figures but for the speed are the same on every machine.
+  Two runs go at a time. All figures except the speed are the same on every machine.
 
   `mix bench swarm` measures robots that are nodes of their own on this machine, beside bare OTP:
   how long it takes to ask all, to find each other, to notice a death.
 
-  `mix bench stop` measures how long it takes from a crash, a freeze, a bumper or an emergency stop to the
-  stop on the serial line of a base. All have `--help`. Exit status: 0 all was measured, 1 something was wrong with the
-  input, or a run could not be made.
+  `mix bench stop` measures how long it takes from a crash, a freeze, a bumper or an emergency
+  stop to the stop on the serial line of a base. All have `--help`. Exit status: 0 if all was
+  measured, 1 if the input was wrong or a run could not be made.
   """
   use Mix.Task
   alias Console.Cli
@@ -44,7 +44,7 @@ defmodule Mix.Tasks.Bench do
   def run(_other),
     do:
       refuse([
-        "bench what? There are: mix bench demo [options], mix bench swarm [options], mix bench stop [options]"
+        "mix bench needs a command: mix bench demo [options], mix bench swarm [options], mix bench stop [options]"
       ])
 
   defp measure(%{"help" => true}), do: help()
@@ -78,7 +78,7 @@ defmodule Mix.Tasks.Bench do
     text = Bench.Table.draw(rows) <> "\n" <> Bench.Table.pooled(rows)
     IO.write(text)
     write(given["markdown"], text)
-    # What is in the table is not all that was asked for.
+    # The table does not hold all that was asked for.
     if failed != [], do: refuse(failed)
   end
 
