@@ -18,7 +18,7 @@ defmodule Agents.MixProject do
 
   def application, do: [extra_applications: [:logger, :crypto]]
 
-  # Adapters for what Hex has; with MIX_TARGET=robot. Nothing here needs them.
+  # Adapters for packages from Hex, with MIX_TARGET=robot. Nothing here needs them.
   defp packages(:host), do: []
   defp packages(_target), do: [{:phoenix_pubsub, "~> 2.1"}]
 

@@ -34,8 +34,8 @@ defmodule Agents.ContractNet do
   alias Swarm.Message.WireTypes
 
   @doc """
-  What a task would cost this robot; `:infinite` if it cannot do it, or does not know it. Short: the
-  robot answers nobody meanwhile.
+  What a task would cost this robot; `:infinite` if it cannot do it, or does not know it. It must
+  be quick, because the robot answers nobody meanwhile.
   """
   @callback cost(task :: term(), robot :: atom(), argument :: term()) :: Cost.t()
 
@@ -51,20 +51,21 @@ defmodule Agents.ContractNet do
             ) :: result :: term()
 
   @doc """
-  Announces a task to peers (`t:Agents.Conversation.peer/0`), awards it, and waits until it is done: in the
-  calling process, so use a task to do something else meanwhile. If the caller ends, the work goes on,
-  and nobody hears of it.
+  Announces a task to peers (`t:Agents.Conversation.peer/0`), awards it, and waits in the calling
+  process until it is done; use a `Task` to do something else meanwhile. If the caller ends, the
+  work goes on, and nobody receives the result.
 
-  Options: `:from` (who asks, needed), and those of `Agents.ContractNet.Manager`. Errors: `:nobody` (no peer
-  is there, or left), `:no_bids` (none can or will), `:given_up` (every try failed).
+  Options: `:from` (who asks; required), and those of `Agents.ContractNet.Manager`. Errors:
+  `:nobody` (no peer is there, or left), `:no_bids` (none can or will), `:given_up` (every try
+  failed).
   """
   @spec auction(task :: term(), [Conversation.peer()], keyword()) :: Manager.outcome()
   def auction(task, peers, options) do
-    # All is looked at before anything is begun that would have to be ended.
+    # Check everything before anything is started that would have to be ended.
     {letter, options} = begin(options)
     pids = for peer <- Conversation.peers!(peers), pid = Conversation.find(peer), do: {peer, pid}
 
-    # An alias for each peer: what comes by it is that peer's, whatever name it gives.
+    # One alias per peer: what arrives by it is from that peer, whatever name it gives.
     found = for {peer, pid} <- pids, into: %{}, do: {peer, {pid, :erlang.alias()}}
     refs = for {peer, {_pid, ref}} <- found, into: %{}, do: {ref, peer}
     watch = RemoteMonitor.start(for {_peer, {pid, ref}} <- found, into: %{}, do: {ref, pid})
@@ -86,7 +87,7 @@ defmodule Agents.ContractNet do
     end
 
     {from, options} = Keyword.pop!(options, :from)
-    # The same conversation in all rounds.
+    # All rounds are in the same conversation.
     {Envelope.new(:cfp, from, nil), Manager.options!(options)}
   end
 
@@ -117,7 +118,7 @@ defmodule Agents.ContractNet do
     letter = %{letter | performative: performative, content: content, reply_to: ref}
 
     case Conversation.post(pid, letter) do
-      # What follows from that comes after the letters that were decided before.
+      # The letters that follow from it are sent after those that were decided before.
       {:error, :not_connected} ->
         {manager, letters} = Manager.gone(manager, peer, now())
         send_all({manager, rest ++ letters}, found, letter)
@@ -127,7 +128,7 @@ defmodule Agents.ContractNet do
     end
   end
 
-  # Nothing comes by it from here on, and what has come goes.
+  # From here on nothing arrives by it, and what has arrived is removed.
   defp close(ref) do
     :erlang.unalias(ref)
     flush(ref)

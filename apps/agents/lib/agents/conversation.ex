@@ -10,17 +10,17 @@ defmodule Agents.Conversation do
 
   A peer is a process, or `{robot, service}`, which the directory knows (`Agents.Responder`).
 
-  Nothing here waits for a node that is dead or silent: what cannot be sent at once is not sent, and
-  that peer is missing. Each peer answers to an alias of its own that takes one message: a second
-  answer, and one that comes after the deadline, find no mailbox.
+  Nothing here waits for a node that is dead or silent: what cannot be sent at once is not sent,
+  and that peer counts as missing. Each peer answers to an alias of its own that takes one
+  message, so that a second answer, or one after the deadline, reaches no mailbox.
   """
   alias Agents.Envelope
   alias Swarm.Directory
   alias Swarm.Directory.RemoteMonitor
   alias Swarm.Message.WireTypes
 
-  # Most answers are here long before: only then is it worth asking the runtime whether the others
-  # are alive. Between nodes that costs more than the question.
+  # Most answers arrive long before this. Only then is it worth asking the runtime whether the
+  # others are alive: between nodes that costs more than the question.
   @patience_ms 20
 
   @type peer :: pid() | {robot :: atom(), service :: atom()}
@@ -39,11 +39,13 @@ defmodule Agents.Conversation do
     end
   end
 
-  @doc "The same to an address: a process, or what an envelope has as `reply_to` (`nil` is nobody)."
+  @doc """
+  Sends an envelope to an address: a process, or the `reply_to` of an envelope (`nil` is nobody).
+  """
   @spec post(Envelope.address() | nil, Envelope.t()) :: :ok | {:error, :not_connected | :busy}
   def post(nil, _envelope), do: :ok
 
-  # Without these options a send waits for a full buffer, or dials a robot that is gone.
+  # Without these options, a send waits while the buffer is full, or dials a robot that is gone.
   def post(address, envelope) do
     case :erlang.send(address, envelope, [:nosuspend, :noconnect]) do
       :ok -> :ok
@@ -53,8 +55,9 @@ defmodule Agents.Conversation do
   end
 
   @doc """
-  Asks one, and waits for its answer: an envelope of any kind, a `:refuse` or `:failure` among them.
-  Errors, besides those of `tell/2`: `:gone` (it ended), `:no_answer` (within the time, in ms).
+  Asks one peer, and waits for its answer: an envelope of any kind, including `:refuse` and
+  `:failure`. Errors, besides those of `tell/2`: `:gone` (it ended), `:no_answer` (within the
+  time, in ms).
   """
   @spec request(peer(), Envelope.t(), timeout_ms :: non_neg_integer()) ::
           {:ok, Envelope.t()} | {:error, reason()}
@@ -68,11 +71,12 @@ defmodule Agents.Conversation do
   end
 
   @doc """
-  Asks many at once, and gives what they answer, and who is missing. It ends when the quorum has
-  answered, when all that are still there have, or at the deadline (ms from now).
+  Asks many peers at once, and returns their answers, and who is missing. It ends when the quorum
+  has answered, when all that are still there have answered, or at the deadline (ms from now).
 
-  Who is missing is told in the order of the peers. The quorum is `:all` (the default), `:majority` of the peers asked, or a number. `:complete` says that
-  it was reached. A peer that cannot be reached, or that leaves meanwhile, is not waited for.
+  Missing peers are listed in the order of the peers. The quorum is `:all` (the default),
+  `:majority` of the peers asked, or a number. `:complete` says that the quorum was reached.
+  Nobody waits for a peer that cannot be reached, or that leaves meanwhile.
   """
   @spec gather([peer()], Envelope.t(), deadline_ms :: non_neg_integer(), quorum()) ::
           {:complete | :partial, answers :: %{peer() => Envelope.t()}, missing :: [peer()]}
@@ -85,7 +89,7 @@ defmodule Agents.Conversation do
     {state, answers, in_order(peers, missing)}
   end
 
-  # As they were asked, and not as they fell out.
+  # In the order in which they were asked, not in which they dropped out.
   defp in_order(_peers, []), do: []
 
   defp in_order(peers, missing) do
@@ -103,12 +107,12 @@ defmodule Agents.Conversation do
   end
 
   @doc false
-  # What is wrong here is the program's own, and raises; what is wrong with others is answered.
+  # A mistake here is the calling program's own, and raises; the mistakes of others are returned.
   @spec patience!(term()) :: :ok
   def patience!(ms) do
     if WireTypes.ms?(ms),
       do: :ok,
-      else: raise(ArgumentError, "nobody can wait #{brief(ms)}: whole ms, up to a day")
+      else: raise(ArgumentError, "the timeout cannot be #{brief(ms)}: whole ms, up to a day")
   end
 
   @doc false
@@ -131,7 +135,7 @@ defmodule Agents.Conversation do
     if pending == %{} or map_size(answers) >= enough or patience == deadline do
       close(answers, pending, missing)
     else
-      # Of an answer and this news only the first gets through an alias.
+      # Of an answer and this `:DOWN`, only the first gets through an alias.
       watch = RemoteMonitor.start(Map.new(pending, fn {ref, {_peer, pid}} -> {ref, pid} end))
       {answers, pending, missing} = collect(answers, pending, missing, enough, deadline)
       RemoteMonitor.stop(watch)
@@ -181,7 +185,7 @@ defmodule Agents.Conversation do
     end
   end
 
-  # From here on an answer finds no mailbox; one that has come until now counts.
+  # From here on no answer reaches the mailbox; one that has already arrived counts.
   defp close(answers, pending, missing) do
     for {ref, {peer, _pid}} <- pending, reduce: {answers, missing} do
       {answers, missing} ->
@@ -202,7 +206,7 @@ defmodule Agents.Conversation do
     end
   end
 
-  @doc "The process that a peer is now, one of this node first; `nil` if there is none."
+  @doc "The process of a peer now, preferably one on this node; `nil` if there is none."
   @spec find(peer()) :: pid() | nil
   def find(pid) when is_pid(pid), do: pid
 

@@ -1,23 +1,23 @@
 defmodule Agents.Envelope do
   @moduledoc """
-  A message between programs on robots: its intention, its sender and its conversation. Pure,
-  except for the reference of a new conversation.
+  A message between programs on robots, with its intention, sender and conversation. Pure, except
+  for the reference of a new conversation.
 
   Robots' own talk (heartbeats, rounds) is `Swarm.Message`. An envelope is for everything else: a
-  service asks another, a mission hands out tasks, a topic tells its news. `check/1` is the one door
-  for what arrives: behind it nobody doubts an envelope, but its content is the sender's, and to be
-  looked at by whoever reads it. Nothing becomes an atom here.
+  service asks another, a mission assigns tasks, a topic publishes news. `check/1` checks whatever
+  arrives; after it, nobody needs to check an envelope again, but its content is the sender's, and
+  whoever reads it must check that. Nothing becomes an atom here.
 
   | field | meaning |
   |---|---|
-  | `performative` | what is meant: `:inform` tells, `:request` and `:query` ask, `:agree`, `:refuse` and `:failure` answer, `:cfp`, `:propose`, `:accept` and `:reject` trade a task, `:cancel` ends, `:subscribe` asks for news |
+  | `performative` | what is meant: `:inform` reports, `:request` and `:query` ask, `:agree`, `:refuse` and `:failure` answer, `:cfp`, `:propose`, `:accept` and `:reject` trade a task, `:cancel` ends, `:subscribe` asks for news |
   | `from` | the sender's name, a robot's or another program's |
   | `conversation` | a reference, or `{name, counter}`; the same in all envelopes of one exchange |
   | `reply_to` | where answers go: a process, or an alias of one; `nil` if none is wanted |
-  | `in_reply_to` | the `reply_to` of the envelope that is answered; `nil` in an opening one |
+  | `in_reply_to` | the `reply_to` of the envelope that this answers; `nil` in an opening one |
   | `epoch` | the leadership it belongs to, or `nil` |
   | `topic` | the topic it was published under, or `nil` |
-  | `class` | `:telemetry` is the first to be dropped, then `:data`; `:urgent` goes first (`Agents.Mailbox`) |
+  | `class` | `:telemetry` is dropped first, then `:data`; `:urgent` is handled first (`Agents.Mailbox`) |
   | `content` | any term |
   """
   alias Swarm.Message.WireTypes
@@ -39,7 +39,7 @@ defmodule Agents.Envelope do
   @classes [:telemetry, :data, :urgent]
   @options [:conversation, :reply_to, :in_reply_to, :epoch, :topic, :class]
   @longest_topic 255
-  # The same as `Swarm.Message.WireTypes.count?/1`, which is no guard.
+  # The same as `Swarm.Message.WireTypes.count?/1`, which is not a guard.
   @highest 500_000_000
 
   @enforce_keys [:performative, :from, :conversation]
@@ -94,13 +94,14 @@ defmodule Agents.Envelope do
           | :topic
           | :class
 
-  @doc "What can be meant."
+  @doc "The performatives: what an envelope can mean."
   @spec performatives() :: [performative(), ...]
   def performatives, do: @performatives
 
   @doc """
-  An envelope, in a conversation of its own unless one is given. Options: `:conversation`, `:reply_to`,
-  `:in_reply_to`, `:epoch`, `:topic`, `:class` (default `:data`). What no envelope can hold raises.
+  An envelope, in a conversation of its own unless one is given. Options: `:conversation`,
+  `:reply_to`, `:in_reply_to`, `:epoch`, `:topic`, `:class` (default `:data`). A value that an
+  envelope cannot hold raises `ArgumentError`.
 
       iex> e = Agents.Envelope.new(:request, :mag1, :battery, class: :urgent)
       iex> {e.performative, e.from, e.content, e.class, is_reference(e.conversation)}
@@ -123,8 +124,8 @@ defmodule Agents.Envelope do
   end
 
   @doc """
-  The answer to an envelope: in its conversation, epoch and class, `in_reply_to` what it asked for
-  answers to. Options as in `new/4`.
+  The answer to an envelope: it has the same conversation, epoch and class, and its `in_reply_to`
+  is the envelope's `reply_to`. Options as in `new/4`.
 
       iex> asked = Agents.Envelope.new(:request, :mag1, :battery, reply_to: self())
       iex> answer = Agents.Envelope.reply(asked, :inform, :min1, 11.8)
@@ -134,7 +135,7 @@ defmodule Agents.Envelope do
   @spec reply(t(), performative(), atom(), term(), keyword()) :: t()
   def reply(envelope, performative, from, content, options \\ [])
 
-  # The usual answer, without a detour: a hundred robots write ten thousand at once.
+  # A fast path for the usual answer: a hundred robots write ten thousand at once.
   def reply(%__MODULE__{} = envelope, performative, from, content, [])
       when performative in @performatives and is_atom(from) and from not in [nil, true, false] do
     %{
@@ -160,7 +161,7 @@ defmodule Agents.Envelope do
   end
 
   @doc """
-  Whether a term is an envelope; the error names the field that no envelope can have so.
+  Checks whether a term is an envelope; the error names the field that is wrong.
 
       iex> Agents.Envelope.check(%{junk: 1})
       {:error, :not_an_envelope}
@@ -191,7 +192,7 @@ defmodule Agents.Envelope do
              class in @classes,
       do: {:ok, envelope}
 
-  # What is rarer, and what is wrong.
+  # The rarer cases, and the wrong ones.
   def check(term) do
     if WireTypes.whole?(term, __MODULE__) do
       case Enum.find(Map.keys(term), &(not valid?(&1, Map.fetch!(term, &1)))) do
@@ -204,7 +205,7 @@ defmodule Agents.Envelope do
   end
 
   @doc """
-  Whether it can name a topic: an atom of the program, or text of 1 to 255 bytes.
+  Whether a term can name a topic: an atom of the program, or text of 1 to 255 bytes.
 
       iex> for term <- [:poses, "poses", "", nil, 5], do: Agents.Envelope.topic?(term)
       [true, true, false, false, false]
@@ -246,11 +247,11 @@ defmodule Agents.Envelope do
 
   defp put(other, _envelope) do
     raise ArgumentError,
-          "#{inspect(other)} is not an option of an envelope; there are #{inspect(@options)}"
+          "#{inspect(other)} is not an option of an envelope; allowed are #{inspect(@options)}"
   end
 
   defp checked!({:ok, envelope}), do: envelope
 
   defp checked!({:error, field}),
-    do: raise(ArgumentError, "no envelope can have this #{field}; see Agents.Envelope")
+    do: raise(ArgumentError, "this #{field} is not valid in an envelope; see Agents.Envelope")
 end

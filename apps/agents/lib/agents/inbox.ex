@@ -3,9 +3,10 @@ defmodule Agents.Inbox do
   Lets a process read its envelopes by the rules of `Agents.Mailbox`, since the VM's own mailbox
   has neither a limit nor classes.
 
-  Whatever arrives is first moved into the mailbox, which costs a microsecond, and only then is one
-  envelope handled: the process sends itself a *turn*, which stands in line behind all that has come
-  so far. So an urgent envelope is handled right after the one at hand, and what waits is bounded.
+  Whatever arrives is first moved into the mailbox, which costs a microsecond, and only then is
+  one envelope handled: the process sends itself a *turn*, a message that queues behind all that
+  has arrived so far. So an urgent envelope is handled right after the current one, and the queue
+  is bounded.
 
       def handle_info(message, s) do
         case Agents.Inbox.arrived(s.inbox, message) do
@@ -14,8 +15,8 @@ defmodule Agents.Inbox do
         end
       end
 
-  What is not an envelope, or a malformed one, is dropped and counted (`rejected`); what the template does
-  not want is dropped (`unwanted`).
+  A message that is not an envelope, or a malformed one, is dropped and counted (`rejected`), and
+  so is an envelope that the template does not match (`unwanted`).
   """
   alias Agents.{Envelope, Mailbox, Template}
 
@@ -47,7 +48,10 @@ defmodule Agents.Inbox do
     end
   end
 
-  @doc "A message has arrived: whether there is an envelope to handle now. Only for its own process."
+  @doc """
+  Takes in a message that has arrived, and returns whether there is an envelope to handle now.
+  Only for the process that owns the inbox.
+  """
   @spec arrived(t(), message :: term()) :: {:handle, Envelope.t(), t()} | {:wait, t()}
   def arrived(%{turn: turn} = inbox, {__MODULE__, turn}), do: take(%{inbox | due?: false})
 
@@ -61,7 +65,7 @@ defmodule Agents.Inbox do
     end
   end
 
-  @doc "What was dropped so far, by reason."
+  @doc "How many messages were dropped so far, by reason."
   @spec counts(t()) :: %{atom() => non_neg_integer()}
   def counts(inbox) do
     inbox.mailbox.dropped
@@ -69,7 +73,7 @@ defmodule Agents.Inbox do
     |> Map.put(:waiting, Mailbox.size(inbox.mailbox))
   end
 
-  # Nothing else waits, here or before the door: then there is nothing to put in order.
+  # Nothing else waits, here or in the VM's mailbox, so there is nothing to put in order.
   defp put(%{due?: false} = inbox, envelope) do
     case Process.info(self(), :message_queue_len) do
       {:message_queue_len, 0} -> {:handle, envelope, inbox}
@@ -87,7 +91,7 @@ defmodule Agents.Inbox do
     end
   end
 
-  # Without anything left to take there is no turn.
+  # If nothing is left to take, no turn is needed.
   defp turn(%{mailbox: %{size: 0, urgent_size: 0}} = inbox), do: inbox
 
   defp turn(inbox) do

@@ -4,13 +4,13 @@ defmodule Agents.Mailbox do
 
     * Urgent envelopes are taken first, and are never dropped to make room.
     * All others are taken in the order they came.
-    * When it is full, the oldest telemetry is dropped; if there is none, the oldest data. An envelope
-      of telemetry that finds nothing but data is dropped itself.
-    * Urgent envelopes do not count towards the limit. No honest fleet has as many of them waiting as
-      the limit allows of all others: from there on it is a flood, and the newest is refused, so that
-      the first to come, which is the one that stopped something, stays.
+    * When it is full, the oldest telemetry is dropped; if there is none, the oldest data. If
+      there is only data, a new envelope of telemetry is dropped itself.
+    * Urgent envelopes do not count towards the limit. No honest fleet has more of them waiting
+      than the limit allows of all others: beyond that it is a flood, and the newest is refused,
+      so that the first to arrive, which is the one that stopped something, stays.
 
-  `Agents.Inbox` is how a process uses it.
+  A process uses it through `Agents.Inbox`.
   """
   alias Agents.Envelope
 
@@ -26,7 +26,7 @@ defmodule Agents.Mailbox do
                 dropped: %{telemetry: 0, data: 0, urgent: 0}
               ]
 
-  @typedoc "`size` counts all but the urgent ones; `dropped` counts for ever."
+  @typedoc "`size` counts all but the urgent envelopes; `dropped` is never reset."
   @type t :: %__MODULE__{
           limit: pos_integer(),
           urgent: :queue.queue(Envelope.t()),
@@ -43,7 +43,7 @@ defmodule Agents.Mailbox do
   def new(limit) when is_integer(limit) and limit > 0, do: %__MODULE__{limit: limit}
 
   @doc """
-  Whether it can be a mailbox's limit, or one line.
+  Checks the limit of a mailbox.
 
       iex> Agents.Mailbox.limit(0)
       {:error, "limit cannot be 0: a whole number above 0"}
@@ -54,12 +54,12 @@ defmodule Agents.Mailbox do
   def limit(other),
     do: {:error, "limit cannot be #{inspect(other, limit: 5)}: a whole number above 0"}
 
-  @doc "How many wait."
+  @doc "How many envelopes wait."
   @spec size(t()) :: non_neg_integer()
   def size(mailbox), do: mailbox.size + mailbox.urgent_size
 
   @doc """
-  Puts one in, and drops what there is no room for.
+  Puts one envelope in, and drops what there is no room for.
 
       iex> mailbox = Agents.Mailbox.new(1)
       iex> [old, new] = for n <- 1..2, do: Agents.Envelope.new(:inform, :mag1, n)
@@ -109,14 +109,15 @@ defmodule Agents.Mailbox do
   defp drop(mailbox, class),
     do: %{mailbox | dropped: Map.update!(mailbox.dropped, class, &(&1 + 1))}
 
-  @doc "Takes the next one out; `nil` if there is none."
+  @doc "Takes the next envelope out; `nil` if there is none."
   @spec take(t()) :: {Envelope.t() | nil, t()}
   def take(%{urgent_size: 0, size: 0} = mailbox), do: {nil, mailbox}
 
   def take(%{urgent_size: 0} = mailbox) do
     mailbox = %{mailbox | size: mailbox.size - 1}
 
-    # The smaller number came first; an atom, for none, is larger than any.
+    # The smaller number came first; an atom, which stands for none, compares larger than any
+    # number.
     if first(mailbox.data) < first(mailbox.telemetry) do
       {{:value, {_number, envelope}}, data} = :queue.out(mailbox.data)
       {envelope, %{mailbox | data: data}}

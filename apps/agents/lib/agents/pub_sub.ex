@@ -10,9 +10,9 @@ defmodule Agents.PubSub do
       :ok = Agents.PubSub.subscribe(bus, "blobs:mag1")
       :ok = Agents.PubSub.broadcast(bus, "blobs:mag1", {:blobs, []})
 
-  Whoever starts a bus supervises it, and hands `{module, name}` to those who are to use it. Topics
-  are text. Messages arrive as they are; who subscribes twice gets them twice. A subscription ends with
-  its process, or with the bus.
+  Whoever starts a bus supervises it, and passes `{module, name}` to its users. Topics are text.
+  Messages arrive unchanged; a process that subscribes twice gets them twice. A subscription ends
+  with its process, or with the bus.
   """
 
   @type name :: atom()
@@ -22,16 +22,16 @@ defmodule Agents.PubSub do
   @doc "The bus as a child. Option: `:name`."
   @callback child_spec(keyword()) :: Supervisor.child_spec()
 
-  @doc "The calling process gets what is told under this topic."
+  @doc "Subscribes the calling process to this topic."
   @callback subscribe(name(), topic()) :: :ok | {:error, :down}
 
-  @doc "No longer, however often it has subscribed."
+  @doc "Ends all subscriptions of the calling process to this topic."
   @callback unsubscribe(name(), topic()) :: :ok | {:error, :down}
 
-  @doc "Tells all subscribers on this node."
+  @doc "Sends a message to all subscribers on this node."
   @callback broadcast(name(), topic(), message :: term()) :: :ok | {:error, :down}
 
-  @doc "Subscribes the calling process. `{:error, :down}`: there is no such bus now."
+  @doc "Subscribes the calling process. `{:error, :down}` if there is no such bus now."
   @spec subscribe(bus(), topic()) :: :ok | {:error, :down}
   def subscribe({module, name}, topic) when is_binary(topic), do: module.subscribe(name, topic)
 
@@ -40,7 +40,7 @@ defmodule Agents.PubSub do
   def unsubscribe({module, name}, topic) when is_binary(topic),
     do: module.unsubscribe(name, topic)
 
-  @doc "Tells all subscribers of a topic on this node."
+  @doc "Sends a message to all subscribers of a topic on this node."
   @spec broadcast(bus(), topic(), term()) :: :ok | {:error, :down}
   def broadcast({module, name}, topic, message) when is_binary(topic),
     do: module.broadcast(name, topic, message)

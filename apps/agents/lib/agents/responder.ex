@@ -1,7 +1,7 @@
 defmodule Agents.Responder do
   @moduledoc """
   A program on a robot that answers envelopes: a service that others find by its name. It is a
-  companion of the robot's pilot, so that it starts and crashes with the robot.
+  companion of the robot's pilot, so it starts and crashes with the robot.
 
       defmodule Battery do
         @behaviour Agents.Responder
@@ -15,13 +15,14 @@ defmodule Agents.Responder do
 
       companions: [{Agents.Responder, service: :power, module: Battery, argument: 11.8}]
 
-  It is in the groups `{:service, name}`, all who offer it, and `{:service, name, robot}`, this one.
-  Options: `:service` and `:module`; `:argument` for the module's `init/2`; `:topics`, whose news are
-  handled too; `:limit` and `:template` of its inbox (`Agents.Inbox`).
+  It is in the groups `{:service, name}`, of all that offer the service, and
+  `{:service, name, robot}`, of this one. Options: `:service` and `:module`; `:argument` for the
+  module's `init/2`; `:topics`, envelopes of which are handled too; `:limit` and `:template` of
+  its inbox (`Agents.Inbox`).
 
-  The module's code is run with what comes from outside. If it raises, that envelope is answered by a
-  `:failure`, the event `[:swarm, :responder, :failure]` tells it, and the state stays: four bad envelopes
-  in five seconds would otherwise end the robot.
+  The module's code handles input from outside. If it raises, that envelope is answered by a
+  `:failure`, the event `[:swarm, :responder, :failure]` reports it, and the state is kept:
+  otherwise four bad envelopes within five seconds would end the robot.
   """
   use GenServer
   alias Hal.Event
@@ -36,13 +37,19 @@ defmodule Agents.Responder do
           {Envelope.performative(), content :: term()}
           | {Envelope.performative(), content :: term(), options :: keyword()}
 
-  @doc "The first state."
+  @doc "Returns the first state."
   @callback init(robot :: atom(), argument :: term()) :: state :: term()
 
-  @doc "An envelope, checked but for its content: what to answer, and the next state."
+  @doc """
+  Handles an envelope, of which all but the content is checked: returns what to answer, and the
+  next state.
+  """
   @callback handle(Envelope.t(), state :: term()) :: {answer() | :noreply, state :: term()}
 
-  @doc "A message that is not an envelope, from anywhere; without this callback it is counted as rejected."
+  @doc """
+  Handles a message that is not an envelope, from anywhere. Without this callback such messages
+  count as rejected.
+  """
   @callback info(message :: term(), state :: term()) :: state :: term()
 
   @optional_callbacks info: 2
@@ -53,7 +60,10 @@ defmodule Agents.Responder do
   def child_spec({name, options}) when is_atom(name),
     do: %{id: {__MODULE__, options[:service]}, start: {__MODULE__, :start_link, [name, options]}}
 
-  @doc "Starts one for a robot, or for any other program with a name. `Robot.Names` must be running."
+  @doc """
+  Starts a responder for a robot, or for any other program with a name. `Robot.Names` must be
+  running.
+  """
   @spec start_link(name :: atom(), keyword()) :: GenServer.on_start()
   def start_link(name, options) do
     allowed = [:service, :module, argument: nil, topics: [], limit: 1_000, template: []]
@@ -77,19 +87,19 @@ defmodule Agents.Responder do
 
     unless responder?(options[:module]),
       do:
-        raise(ArgumentError, "module cannot be #{inspect(options[:module])}: a Agents.Responder")
+        raise(ArgumentError, "module cannot be #{inspect(options[:module])}: an Agents.Responder")
 
     via = Names.via(name, {:service, options[:service]})
     GenServer.start_link(__MODULE__, {name, options}, name: via)
   end
 
-  # Only of a module that is loaded it is known what it exports.
+  # The exports of a module are known only once it is loaded.
   defp responder?(module) do
     is_atom(module) and Code.ensure_loaded?(module) and function_exported?(module, :init, 2) and
       function_exported?(module, :handle, 2)
   end
 
-  @doc "What it has dropped, by reason, and how many envelopes wait."
+  @doc "How many messages it has dropped, by reason, and how many envelopes wait."
   @spec counts(GenServer.server()) :: %{atom() => non_neg_integer()}
   def counts(responder), do: GenServer.call(responder, :counts)
 
@@ -126,8 +136,8 @@ defmodule Agents.Responder do
     end
   end
 
-  # Envelopes are many, news of the directory and others are rare: so the inbox looks first, and
-  # what it has counted as rejected may be such.
+  # Envelopes are frequent, notifications of the directory and others are rare. So the inbox looks
+  # first, and what it counted as rejected may be a notification.
   defp enter(%{__struct__: Envelope}, s, inbox), do: %{s | inbox: inbox}
   defp enter({Inbox, _turn}, s, inbox), do: %{s | inbox: inbox}
 
@@ -144,7 +154,7 @@ defmodule Agents.Responder do
     kind, reason -> failed(kind, reason, s)
   end
 
-  # Somebody else's code with content from outside: whatever it does must not end the robot.
+  # Somebody else's code runs with content from outside: whatever it does must not end the robot.
   defp handle(envelope, s) do
     case s.module.handle(envelope, s.state) do
       {:noreply, state} -> %{s | state: state}

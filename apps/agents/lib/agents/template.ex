@@ -10,8 +10,8 @@ defmodule Agents.Template do
       {:all, [[from: :mag1], {:not, [content: :battery]}]}  and, not
       []                                                    every envelope
 
-  A function gets content as it came from outside, so it answers `false` to what it does not know. It
-  is the owner's code: where it raises, its owner does.
+  A function gets the content as it came from outside, so it should return `false` for what it
+  does not know. It is the owner's code: if it raises, its owner crashes.
   """
   alias Agents.Envelope
 
@@ -31,13 +31,13 @@ defmodule Agents.Template do
   @type t :: [field()] | {:all, [t()]} | {:any, [t()]} | {:not, t()}
 
   @doc """
-  Whether it is a template, or one line that says what is wrong with it. For the place where one is
-  handed over; `match?/2` takes it as checked.
+  Checks a template; the error says what is wrong with it. To be called where a template is passed
+  in, because `match?/2` does not check it again.
 
       iex> Agents.Template.check([from: :mag1])
       {:ok, [from: :mag1]}
       iex> Agents.Template.check([speed: 1])
-      {:error, "no envelope has a :speed; there are performative, from, conversation, reply_to, in_reply_to, epoch, topic, class, content"}
+      {:error, "an envelope has no field :speed; allowed are performative, from, conversation, reply_to, in_reply_to, epoch, topic, class, content"}
   """
   @spec check(term()) :: {:ok, t()} | {:error, line :: String.t()}
   def check(template) do
@@ -48,7 +48,7 @@ defmodule Agents.Template do
   end
 
   @doc """
-  Whether an envelope is one of these.
+  Whether an envelope matches a template.
 
       iex> envelope = Agents.Envelope.new(:inform, :mag1, {:battery, 11.8})
       iex> Agents.Template.match?([performative: :inform, from: [:mag1, :mag2]], envelope)
@@ -80,7 +80,7 @@ defmodule Agents.Template do
   defp fault([{field, _wanted} | rest]) when field in @fields, do: fault(rest)
 
   defp fault([{field, _wanted} | _rest]),
-    do: "no envelope has a #{inspect(field)}; there are #{Enum.join(@fields, ", ")}"
+    do: "an envelope has no field #{inspect(field)}; allowed are #{Enum.join(@fields, ", ")}"
 
   defp fault({:not, template}), do: fault(template)
 

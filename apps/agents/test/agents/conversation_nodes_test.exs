@@ -12,21 +12,21 @@ defmodule Swarm.ConversationNodesTest do
     for {node, n} <- Enum.with_index(nodes) do
       name = Enum.at([:talk_n0, :talk_n1, :talk_n2, :talk_n3], n)
       [pid] = :erpc.call(node, Answerers, :start, [[name], :far])
-      # By the second it is found; they come one after the other.
+      # The second one can be found: they come one after the other.
       eventually(fn -> pid in Directory.members({:service, :far}) end)
       eventually(fn -> pid in Directory.members({:service, :far, name}) end)
       {{name, :far}, pid}
     end
   end
 
-  test "a killed node is dropped at once, a frozen one at the deadline, nobody waits longer" do
+  test "a killed node is dropped at once, a frozen one at the deadline; nobody waits longer" do
     [killed, frozen, well] = nodes = Cluster.start_nodes(3)
     peers = for {peer, _pid} <- echoes(nodes), do: peer
     pids = for peer <- peers, do: elem(peer, 0)
     assert pids == [:talk_n0, :talk_n1, :talk_n2]
     assert {:complete, %{}, []} = Conversation.gather(peers, question(1), 5_000)
 
-    # It dies while it is asked: it answers no more, and everybody else has.
+    # It dies while it is asked: it no longer answers, and everybody else has answered.
     test = self()
 
     asked =
@@ -45,7 +45,7 @@ defmodule Swarm.ConversationNodesTest do
     assert Map.keys(answers) == [{:talk_n2, :far}]
     assert Enum.sort(missing) == [{:talk_n0, :far}, {:talk_n1, :far}]
 
-    # A quorum of those who answer is there at once.
+    # A quorum of those who answer is reached at once.
     assert {:complete, _, _} = Conversation.gather(peers, question(2), 60_000, 1)
 
     Cluster.thaw(frozen)
@@ -54,7 +54,7 @@ defmodule Swarm.ConversationNodesTest do
     refute_received %Envelope{}
   end
 
-  test "a process of a node that is not connected is neither dialled nor waited for" do
+  test "a node that is not connected is neither dialled nor waited for" do
     [near, far] = Cluster.start_nodes(2, connect: false)
     [_, {_peer, pid}] = echoes([near, far])
 
@@ -66,7 +66,7 @@ defmodule Swarm.ConversationNodesTest do
   end
 
   # The connection's buffer is full because its node is frozen: a plain send would wait for ever.
-  test "a full connection is not waited for" do
+  test "nobody waits for a full connection" do
     [node] = Cluster.start_nodes(1)
     [{peer, _pid}] = echoes([node])
     Cluster.freeze(node)

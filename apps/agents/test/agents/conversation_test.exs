@@ -6,7 +6,7 @@ defmodule Agents.ConversationTest do
   defp service(name, service \\ :echo) do
     options = [service: service, module: Answerers.Echo]
     pid = start_supervised!({Responder, {name, options}}, id: {name, service})
-    # The test before may have ended the directory.
+    # The previous test may have ended the directory.
     eventually(fn -> pid in Directory.members({:service, service, name}) end)
     {name, service}
   end
@@ -15,7 +15,7 @@ defmodule Agents.ConversationTest do
 
   defp nothing_left, do: assert(Process.info(self(), :messages) == {:messages, []})
 
-  test "one is asked and answers, is silent, is unknown, refuses, or ends" do
+  test "a peer that is asked answers, is silent, is unknown, refuses, or ends" do
     peer = service(:talk1)
     asked = question(:battery)
     assert {:ok, answer} = Conversation.request(peer, asked)
@@ -31,7 +31,7 @@ defmodule Agents.ConversationTest do
     nothing_left()
   end
 
-  test "code that raises is answered by a failure, an event, and goes on" do
+  test "code that raises causes a failure as answer and an event, and goes on" do
     listener = self()
 
     :ok =
@@ -56,7 +56,7 @@ defmodule Agents.ConversationTest do
     assert %{rejected: 3, waiting: 0} = Responder.counts(pid)
   end
 
-  test "many are asked: complete, partial, and by a quorum" do
+  test "many are asked, completely, partially and with a quorum" do
     peers = for n <- 1..5, do: service(:"talk_many#{n}")
     all = Conversation.gather(peers, question(7), 5_000)
     assert {:complete, answers, []} = all
@@ -89,7 +89,7 @@ defmodule Agents.ConversationTest do
     nothing_left()
   end
 
-  test "peers that leave meanwhile are not waited for" do
+  test "nobody waits for peers that leave meanwhile" do
     [quick, silent, dying] = for n <- 1..3, do: service(:"talk_leave#{n}")
     {:ok, idle} = Agent.start(fn -> nil end)
     asker = self()
@@ -110,7 +110,7 @@ defmodule Agents.ConversationTest do
     assert {:ok, _} = Conversation.request(quick, question(1))
   end
 
-  test "a late answer, and a second one, find no mailbox" do
+  test "a late answer, or a second one, reaches no mailbox" do
     peer = service(:talk_late)
     assert {:error, :no_answer} = Conversation.request(peer, question({:tell, self()}), 10)
     assert_receive {:told, :talk_late, asked}
@@ -130,7 +130,7 @@ defmodule Agents.ConversationTest do
     nothing_left()
   end
 
-  test "an answer that is none counts as missing" do
+  test "an answer that is not an envelope counts as missing" do
     liar =
       spawn(fn ->
         receive do
@@ -144,7 +144,7 @@ defmodule Agents.ConversationTest do
     nothing_left()
   end
 
-  test "a service lives in its robot, and is found by it" do
+  test "a service lives in its robot, and is found by the robot's name" do
     options = [service: :power, module: Answerers.Echo, argument: 12]
     id = robot(:talk_robot, companions: [{Responder, options}])
     assert {:ok, %{from: ^id}} = Conversation.request({id, :power}, question(1))
@@ -153,7 +153,7 @@ defmodule Agents.ConversationTest do
     eventually(fn -> match?({:ok, _}, Conversation.request({id, :power}, question(1), 50)) end)
   end
 
-  test "a service enters the next directory by itself" do
+  test "a service joins a restarted directory by itself" do
     peer = service(:talk_again)
     Process.exit(Process.whereis(Directory), :kill)
     eventually(fn -> match?({:ok, _}, Conversation.request(peer, question(1), 50)) end)
@@ -174,7 +174,7 @@ defmodule Agents.ConversationTest do
         do: assert_raise(ArgumentError, fn -> Responder.start_link(:talk_bad, options) end)
   end
 
-  test "who asks in a wrong way is told so in one line" do
+  test "a wrong question raises with an error that says what is wrong" do
     alias Agents.Topic
 
     for {module, function, arguments} <- [

@@ -5,7 +5,7 @@ defmodule Agents.EnvelopeTest do
 
   defp good, do: Envelope.new(:request, :mag1, %{any: "thing"}, conversation: {:mag1, 1})
 
-  test "what an envelope can hold passes" do
+  test "valid envelopes pass" do
     for change <- [
           %{conversation: {:mag1, 7}},
           %{reply_to: self(), in_reply_to: make_ref()},
@@ -25,7 +25,7 @@ defmodule Agents.EnvelopeTest do
         do: assert({:ok, _} = Envelope.check(%{good() | performative: performative}))
   end
 
-  test "what it cannot hold is named" do
+  test "an invalid field is named" do
     for {field, bad} <- [
           performative: [nil, :shout, "inform", 1],
           from: [nil, true, false, "mag1", self()],
@@ -41,7 +41,7 @@ defmodule Agents.EnvelopeTest do
     end
   end
 
-  test "what is no envelope at all is told" do
+  test "a term that is not an envelope is an error" do
     for term <- [
           nil,
           [],
@@ -55,7 +55,7 @@ defmodule Agents.EnvelopeTest do
         do: assert(Envelope.check(term) == {:error, :not_an_envelope})
   end
 
-  test "an answer stays in the conversation, whichever way it is built" do
+  test "an answer stays in the conversation, however it is built" do
     for options <- [[], [reply_to: self()]] do
       alias = make_ref()
 
@@ -73,13 +73,13 @@ defmodule Agents.EnvelopeTest do
     end
   end
 
-  test "an envelope that nobody would take is not written" do
+  test "an envelope that nobody would accept is not built" do
     assert_raise ArgumentError, ~r/performative/, fn -> Envelope.new(:shout, :mag1, 1) end
     assert_raise ArgumentError, ~r/from/, fn -> Envelope.new(:inform, nil, 1) end
     assert_raise ArgumentError, ~r/from/, fn -> Envelope.reply(good(), :inform, nil, 1) end
     assert_raise ArgumentError, ~r/epoch/, fn -> Envelope.new(:inform, :mag1, 1, epoch: -1) end
 
-    # By apply/3, as compilers that infer types see the mistake themselves.
+    # By apply/3, because compilers that infer types see the mistake themselves.
     assert_raise ArgumentError, ~r/options/, fn ->
       apply(Envelope, :new, [:inform, :mag1, 1, :urgent])
     end
@@ -91,7 +91,7 @@ defmodule Agents.EnvelopeTest do
     assert_raise ArgumentError, ~r/:speed/, fn -> Envelope.new(:inform, :mag1, 1, speed: 1) end
   end
 
-  # Random damage to good envelopes: never a crash, and what passes is whole.
+  # Random damage to good envelopes never causes a crash, and what passes is valid.
   test "damaged envelopes never crash the check" do
     junk = [nil, true, 0, -1, 1.5, "text", <<0xFF>>, :atom, {}, [], [1 | 2], %{}, self()]
     keys = Map.keys(good())

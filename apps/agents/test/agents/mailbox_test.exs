@@ -16,7 +16,7 @@ defmodule Agents.MailboxTest do
     end
   end
 
-  test "what is dropped, and what comes first" do
+  test "telemetry is dropped first, urgent envelopes are taken first" do
     for {limit, list, out, dropped} <- [
           {3, [data: 1, telemetry: 2, data: 3], [1, 2, 3], {0, 0, 0}},
           {3, [data: 1, telemetry: 2, urgent: 3], [3, 1, 2], {0, 0, 0}},
@@ -35,8 +35,8 @@ defmodule Agents.MailboxTest do
     end
   end
 
-  # Against the obvious: a list that is searched.
-  test "it does what a list would do" do
+  # Compared with the obvious implementation: a list that is searched.
+  test "it behaves as a list would" do
     for _ <- 1..300 do
       limit = :rand.uniform(6)
 
@@ -79,7 +79,7 @@ defmodule Agents.MailboxTest do
   end
 
   describe "the inbox of a process" do
-    # What this process was sent goes through the inbox until nothing comes any more.
+    # Passes what this process was sent through the inbox until nothing more comes.
     defp handled(inbox, handled \\ []) do
       receive do
         message ->

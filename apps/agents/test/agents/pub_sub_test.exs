@@ -2,7 +2,7 @@ defmodule Agents.PubSubTest do
   use ExUnit.Case, async: true
   alias Agents.PubSub
 
-  # The same for every carrier; one that is not installed is skipped, and says why.
+  # The same tests for each adapter; one that is not installed is skipped, and says why.
   for carrier <- [Agents.PubSub.Local, Agents.PubSub.Phoenix] do
     describe inspect(carrier) do
       unless Code.ensure_loaded?(carrier) do
@@ -15,7 +15,7 @@ defmodule Agents.PubSubTest do
         %{bus: {unquote(carrier), name}}
       end
 
-      test "subscribers get what is told, as it is", %{bus: bus} do
+      test "subscribers get messages unchanged", %{bus: bus} do
         assert PubSub.broadcast(bus, "poses", :nobody) == :ok
         assert PubSub.subscribe(bus, "poses") == :ok
         assert PubSub.broadcast(bus, "poses", {:pose, 1}) == :ok
@@ -28,7 +28,7 @@ defmodule Agents.PubSubTest do
         assert_received :from_another
       end
 
-      test "twice is twice, and none is none", %{bus: bus} do
+      test "two subscriptions get a message twice, none gets nothing", %{bus: bus} do
         for _ <- 1..2, do: assert(PubSub.subscribe(bus, "twice") == :ok)
         PubSub.broadcast(bus, "twice", :a)
         assert_received :a
@@ -40,7 +40,7 @@ defmodule Agents.PubSubTest do
         refute_received :b
       end
 
-      test "many hear one, and the dead are forgotten", %{bus: bus} do
+      test "many hear one message, and dead subscribers are forgotten", %{bus: bus} do
         parent = self()
 
         pids =
@@ -59,7 +59,7 @@ defmodule Agents.PubSubTest do
         assert PubSub.broadcast(bus, "many", :hello) == :ok
       end
 
-      test "without a bus it says so" do
+      test "without a bus there is an error" do
         bus = {unquote(carrier), __MODULE__.None}
         assert PubSub.subscribe(bus, "x") == {:error, :down}
         assert PubSub.unsubscribe(bus, "x") == {:error, :down}

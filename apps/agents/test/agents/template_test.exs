@@ -36,7 +36,7 @@ defmodule Agents.TemplateTest do
     end
   end
 
-  test "what is no template is told in one line" do
+  test "a term that is not a template is an error of one line" do
     for bad <- [
           :inform,
           nil,
@@ -57,7 +57,7 @@ defmodule Agents.TemplateTest do
     end
   end
 
-  test "not, and, or are those of logic, whatever they are made of" do
+  test "not, and, or follow logic, whatever they combine" do
     leaf = fn -> Enum.random([[], [from: :mag1], [from: :mag2], [epoch: [1, 2]], [topic: :x]]) end
     it = envelope()
 

@@ -25,7 +25,7 @@ defmodule Agents.TopicTest do
     assert Topic.next(other, 0) == :none
     assert %{telemetry: 3, unwanted: 1, waiting: 0} = Topic.counts(some)
 
-    # Who has given up waiting is not sent anything.
+    # A reader that has given up waiting is not sent anything.
     Topic.publish(:topic_poses, :mag1, 7)
     assert %{waiting: 1} = Topic.counts(some)
     refute_received {:topic, _, _}
@@ -37,20 +37,20 @@ defmodule Agents.TopicTest do
     assert Topic.next(some, 0) == :none
   end
 
-  test "urgent news go first; junk in the group is counted" do
+  test "urgent news goes first; junk in the group is counted" do
     {:ok, sub} = Topic.subscribe(:topic_urgent)
     members(:topic_urgent, 1)
     for n <- 1..3, do: Topic.publish(:topic_urgent, :mag1, n)
     Topic.publish(:topic_urgent, :mag1, :stop, class: :urgent)
     for junk <- [:junk, %{__struct__: Envelope}, {:more, 1}], do: send(sub, junk)
-    # Only its owner asks.
+    # Only its owner may ask.
     Task.await(Task.async(fn -> Topic.more(sub) end))
     assert %{rejected: 3, waiting: 4} = Topic.counts(sub)
     assert {:ok, %{content: :stop}} = Topic.next(sub, 1_000)
     assert {:ok, %{content: 1}} = Topic.next(sub, 1_000)
   end
 
-  test "a subscription ends with its owner, and enters the next directory" do
+  test "a subscription ends with its owner, and joins a restarted directory" do
     parent = self()
 
     owner =
@@ -81,7 +81,7 @@ defmodule Agents.TopicTest do
              Conversation.request({:topic_robot, :topic_ear}, Envelope.new(:query, :me, 1))
   end
 
-  test "wrong options are one line" do
+  test "wrong options are an error of one line" do
     for {topic, options} <- [
           {nil, []},
           {"", []},
@@ -101,7 +101,7 @@ defmodule Agents.TopicTest do
   end
 
   @tag :cluster
-  test "news cross nodes, and a node that is gone is not waited for" do
+  test "news crosses nodes, and nobody waits for a node that is gone" do
     [node, dead] = Cluster.start_nodes(2)
     {:ok, sub} = Topic.subscribe("topic nodes")
 

@@ -2,7 +2,9 @@ defmodule Agents.Answerers do
   @moduledoc "Services for tests; compiled, so that they run on other nodes too."
 
   defmodule Echo do
-    @moduledoc "Answers what it is asked; `:silent` is not answered, `:raise` raises, `:die` ends it."
+    @moduledoc """
+    Answers questions; it does not answer `:silent`, raises at `:raise`, and ends at `:die`.
+    """
     @behaviour Agents.Responder
 
     @impl Agents.Responder
@@ -23,7 +25,7 @@ defmodule Agents.Answerers do
     def handle(%{content: content}, s), do: {{:inform, content}, %{s | heard: s.heard + 1}}
   end
 
-  @doc "Some echoes that live on after the process that started them: for other nodes."
+  @doc "Starts some echoes that outlive the process that started them: for other nodes."
   @spec start([atom()], atom()) :: [pid()]
   def start(names, service) do
     for name <- names do
@@ -33,7 +35,7 @@ defmodule Agents.Answerers do
     end
   end
 
-  @doc "One that bids so much for tasks, for another node."
+  @doc "Starts a bidder that bids this much for tasks, for another node."
   @spec start_bidder(atom(), Agents.ContractNet.Cost.t()) :: pid()
   def start_bidder(name, cost) do
     options = [
@@ -47,7 +49,7 @@ defmodule Agents.Answerers do
     pid
   end
 
-  @doc "One that hears a topic."
+  @doc "Starts a responder that hears a topic."
   @spec start_topic(Agents.Envelope.topic()) :: pid()
   def start_topic(topic) do
     options = [service: :topic_far, module: Echo, topics: [topic]]

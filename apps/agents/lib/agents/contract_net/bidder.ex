@@ -7,14 +7,14 @@ defmodule Agents.ContractNet.Bidder do
         '-- rejected, --'
             or nothing heard in time
 
-  A bid binds: until it is decided, or until 0.5 s after the bids were to be in, other managers are
-  refused; so two of them cannot count on the same robot. A key says which announcement is meant,
-  by conversation and round.
+  A bid binds: until it is decided, or until 0.5 s after the bids were due, other managers are
+  refused, so two of them cannot count on the same robot. A key identifies an announcement by
+  conversation and round.
   """
   alias Agents.ContractNet.Cost
 
   @grace_ms 500
-  # No announcement binds for longer, whatever it says.
+  # No announcement binds for longer than this, whatever it says.
   @longest_ms 10_000
 
   defstruct lock: nil, job: nil
@@ -25,7 +25,7 @@ defmodule Agents.ContractNet.Bidder do
           job: %{key: key(), task: term()} | nil
         }
 
-  @doc "A task is announced, bids are to be in after `left_ms`: what to answer."
+  @doc "A task is announced, and bids are due after `left_ms`: returns what to answer."
   @spec announced(t(), key(), term(), Cost.t(), left_ms :: integer(), now_ms :: integer()) ::
           {t(), {:propose, number()} | {:refuse, :busy | :locked | :infeasible}}
   def announced(bidder, key, task, cost, left_ms, now_ms) do
@@ -52,8 +52,8 @@ defmodule Agents.ContractNet.Bidder do
   end
 
   @doc """
-  The bid was accepted: `{:start, task}`, or `:working` if it was told before. `:refuse` if it is not bound
-  by that bid any more.
+  The bid was accepted: `{:start, task}`, or `:working` if it has already started. `:refuse` if
+  that bid does not bind it any more.
   """
   @spec accepted(t(), key(), integer()) :: {t(), {:start, term()} | :working | :refuse}
   def accepted(%{job: %{key: key}} = bidder, key, _now_ms), do: {bidder, :working}
@@ -73,12 +73,12 @@ defmodule Agents.ContractNet.Bidder do
   def rejected(%{lock: %{key: key}} = bidder, key), do: %{bidder | lock: nil}
   def rejected(bidder, _key), do: bidder
 
-  @doc "The manager wants no more of it: whether work has to stop."
+  @doc "The manager cancels: returns whether work has to stop."
   @spec cancelled(t(), key()) :: {t(), :stop | :nothing}
   def cancelled(%{job: %{key: key}} = bidder, key), do: {%{bidder | job: nil}, :stop}
   def cancelled(bidder, key), do: {rejected(bidder, key), :nothing}
 
-  @doc "The work has ended, well or not."
+  @doc "The work has ended, successfully or not."
   @spec finished(t()) :: t()
   def finished(bidder), do: %{bidder | job: nil}
 

@@ -11,7 +11,7 @@ defmodule Agents.ContractNet.Bidding do
 
   @impl Agents.Responder
   def init(robot, {module, argument}) when is_atom(module) do
-    # The end of the work comes as a message; the end of this process ends the work.
+    # The end of the work arrives as a message; the end of this process ends the work.
     Process.flag(:trap_exit, true)
     %{robot: robot, module: module, argument: argument, bidder: %Bidder{}, work: nil}
   end

@@ -32,7 +32,7 @@ defmodule Agents.ContractNet.Cost do
   defp seconds(path, speed) when is_number(path) and is_number(speed) and speed > 0,
     do: path / speed
 
-  # A task that needs no way needs no speed.
+  # A task without a path needs no speed.
   defp seconds(path, _speed) when path == 0, do: 0
   defp seconds(_path, _speed), do: :infinite
 end

@@ -7,14 +7,15 @@ defmodule Agents.ContractNet.Manager do
          '--- nobody bid, winner gone, ------'
               failed, or silent for 5 s
 
-  The smallest `{cost, peer}` wins, so that nothing depends on who was first to answer. Each
-  announcement is a *round* with a number, which all its letters carry. A winner that failed is not
-  asked again. One that was given up and reports after all is told to stop; if it has done the task,
-  the task is done, and whoever does it now is told to stop. A task may be done twice, never not at all
-  while somebody can: what must happen once at most is not a task for an auction.
+  The smallest `{cost, peer}` wins, so that nothing depends on who answered first. Each
+  announcement is a *round* with a number, which all its letters carry. A winner that failed is
+  not asked again. If a winner that was given up reports after all, it is told to stop; if it has
+  done the task, the task is done, and whoever is doing it now is told to stop. A task may be done
+  twice, but never not at all while somebody can do it: do not auction what must happen at most
+  once.
 
-  `start/4` takes `:bid_ms` (500), `:silence_ms` (5000) and `:rounds` (3), how often it is announced.
-  Functions return the letters to send, `{peer, performative, content}`.
+  `start/4` takes `:bid_ms` (500), `:silence_ms` (5000) and `:rounds` (3), the number of
+  announcements. Functions return the letters to send, `{peer, performative, content}`.
   """
   alias Swarm.Message.WireTypes
 
@@ -34,7 +35,10 @@ defmodule Agents.ContractNet.Manager do
   @type letter :: {peer(), Agents.Envelope.performative(), content :: term()}
   @type outcome ::
           {:ok, winner :: peer(), result :: term()} | {:error, :nobody | :no_bids | :given_up}
-  @typedoc "`due_ms` is when time alone changes something; `bids` holds a cost, or `:refused`; `awarded` who ever won."
+  @typedoc """
+  `due_ms` is when time alone changes something; `bids` holds a cost or `:refused` for each peer;
+  `awarded` lists all who ever won.
+  """
   @type t :: %__MODULE__{
           task: term(),
           peers: [peer()],
@@ -57,7 +61,7 @@ defmodule Agents.ContractNet.Manager do
     announce(struct!(__MODULE__, fields ++ options!(options)), :nobody, now_ms)
   end
 
-  @doc "The options of a manager, whole; wrong ones raise with one line."
+  @doc "Fills in the options of a manager; wrong ones raise `ArgumentError`."
   @spec options!(keyword()) :: keyword()
   def options!(options) do
     options = Keyword.validate!(options, bid_ms: 500, silence_ms: 5_000, rounds: 3)
@@ -70,13 +74,13 @@ defmodule Agents.ContractNet.Manager do
     options
   end
 
-  @doc "A letter came from one of the peers. What makes no sense changes nothing."
+  @doc "A letter came from one of the peers. A letter that makes no sense changes nothing."
   @spec hear(t(), peer(), Agents.Envelope.performative(), term(), integer()) :: {t(), [letter()]}
   def hear(%{phase: :bidding, round: round} = m, peer, :propose, {round, cost}, now_ms)
       when is_number(cost),
       do: bid(m, peer, cost, now_ms)
 
-  # It has an answer to wait for, and its bid would bind it in vain.
+  # The peer waits for an answer, and without one its bid would bind it for nothing.
   def hear(m, peer, :propose, {round, _cost}, _now_ms), do: {m, [{peer, :reject, round}]}
 
   def hear(%{phase: :bidding, round: round} = m, peer, :refuse, {round, _why}, now_ms),
@@ -110,7 +114,7 @@ defmodule Agents.ContractNet.Manager do
       {:inform, {^round, :progress, _note}} -> {%{m | due_ms: now_ms + m.silence_ms}, []}
       {:refuse, {^round, _why}} -> announce(m, :given_up, now_ms)
       {:failure, {^round, _why}} -> m |> without(peer) |> announce(:given_up, now_ms)
-      # It could not even read what it was told.
+      # The peer could not even read the letter.
       {:failure, :error} -> m |> without(peer) |> announce(:given_up, now_ms)
       _other -> {m, []}
     end
@@ -121,7 +125,7 @@ defmodule Agents.ContractNet.Manager do
 
   def hear(m, _peer, _performative, _content, _now_ms), do: {m, []}
 
-  @doc "A peer is gone, or cannot be reached."
+  @doc "A peer has gone, or cannot be reached."
   @spec gone(t(), peer(), integer()) :: {t(), [letter()]}
   def gone(%{phase: :over} = m, _peer, _now_ms), do: {m, []}
 
@@ -154,8 +158,8 @@ defmodule Agents.ContractNet.Manager do
       else: {m, []}
   end
 
-  # Before the deadline only when nobody is left to wait for, and somebody bids: those that are busy
-  # may be free in the next round.
+  # Bidding closes before the deadline only if all have answered and somebody bids: peers that are
+  # busy now may be free in the next round.
   defp decide(%{phase: :bidding} = m, now_ms) do
     winner = best(m)
 
@@ -197,7 +201,7 @@ defmodule Agents.ContractNet.Manager do
   defp without(m, peer),
     do: %{m | peers: List.delete(m.peers, peer), bids: Map.delete(m.bids, peer)}
 
-  # Who is bound to this manager now.
+  # Who is bound to this manager now, and what to send to release them.
   defp bound(%{phase: :working} = m), do: [{m.winner, :cancel}]
   defp bound(m), do: for({peer, cost} <- m.bids, is_number(cost), do: {peer, :reject})
 end

@@ -5,7 +5,7 @@ defmodule Agents.PubSub.Local do
   @impl Agents.PubSub
   def child_spec(options) do
     [name: name] = Keyword.validate!(options, name: __MODULE__)
-    # By topic, each topic's subscribers lie together.
+    # Partitioned by topic, so that each topic's subscribers are stored together.
     Registry.child_spec(keys: :duplicate, name: name, partitions: 1)
   end
 
@@ -27,7 +27,7 @@ defmodule Agents.PubSub.Local do
     :ok
   end
 
-  # A registry raises when it is not there; one that ends in between does so still.
+  # A call raises if the registry does not run, also if it ends after this check.
   defp if_up(name, function),
     do: if(Process.whereis(name), do: function.(), else: {:error, :down})
 end

@@ -1,6 +1,6 @@
 defmodule Agents.Topic.Subscription do
   @moduledoc false
-  # Stands in the topic's group for its owner, who is given one envelope for each that is asked for.
+  # Joins the topic's group for its owner, who gets one envelope for each that it asks for.
   use GenServer
   alias Agents.{Envelope, Mailbox, Template}
   alias Swarm.Directory
@@ -11,7 +11,7 @@ defmodule Agents.Topic.Subscription do
 
   @impl GenServer
   def init({owner, topic, limit, template}) do
-    # A link alone would not end it with an owner that ends well.
+    # A link alone would not end it when its owner ends normally.
     Process.monitor(owner)
 
     {:ok,

@@ -16,10 +16,10 @@ defmodule Agents.ContractNet.AuctionTest do
   defp auction(task, peers, options \\ []),
     do: ContractNet.auction(task, peers, [from: :base] ++ options)
 
-  test "the cheapest does it; without anybody who can, an error says why" do
+  test "the cheapest does the task; if nobody can, an error says why" do
     peers = [bidder(:bid_a, 5), bidder(:bid_b, 2), bidder(:bid_c, :infinite)]
     assert auction({:carry, 1}, peers) == {:ok, {:bid_b, :tasks}, {:carried_by, :bid_b}}
-    # Free again at once, all of them.
+    # All of them are free again at once.
     assert {:ok, {:bid_b, :tasks}, _} = auction({:carry, 1}, peers)
     assert auction({:carry, 1}, []) == {:error, :nobody}
     assert auction({:carry, 1}, [{:bid_nobody, :tasks}]) == {:error, :nobody}
@@ -50,7 +50,7 @@ defmodule Agents.ContractNet.AuctionTest do
       refute line =~ "\n"
     end
 
-    # Nothing was begun that is still there.
+    # Nothing is left of what was started.
     assert Process.info(self(), [:messages, :monitored_by]) == idle
   end
 
@@ -65,7 +65,7 @@ defmodule Agents.ContractNet.AuctionTest do
     assert {:ok, ^peer, _} = auction({:carry, 1}, [peer])
   end
 
-  test "a winner that dies, and one that is silent, lose the task to the next" do
+  test "a winner that dies or falls silent loses the task to the next" do
     [dying, silent, last] = peers = for n <- 1..3, do: bidder(:"bid_lose#{n}", n)
     test = self()
 
@@ -75,12 +75,12 @@ defmodule Agents.ContractNet.AuctionTest do
     assert_receive {:working, :bid_lose1, first}
     monitor = Process.monitor(first)
     Process.exit(Names.whereis(elem(dying, 0), {:service, :tasks}), :kill)
-    # Its work ends with it.
+    # Its work ends with the auction.
     assert_receive {:DOWN, ^monitor, _, _, _}
 
     assert_receive {:working, :bid_lose2, second}
     monitor = Process.monitor(second)
-    # Nothing is heard of it for too long: told to stop.
+    # It was silent for too long, so it is told to stop.
     assert_receive {:DOWN, ^monitor, _, _, :killed}
     assert_receive {:working, :bid_lose3, third}
     send(third, :go_on)
@@ -88,7 +88,7 @@ defmodule Agents.ContractNet.AuctionTest do
     assert {:ok, ^silent, _} = auction({:carry, 1}, [silent])
   end
 
-  test "junk for a bidder is refused, and changes nothing" do
+  test "a bidder refuses junk, which changes nothing" do
     peer = bidder(:bid_junk, 1)
 
     for {performative, content} <- [

@@ -12,7 +12,7 @@ defmodule Agents.ContractNet.MachinesTest do
     end)
   end
 
-  test "costs" do
+  test "a cost is the weighted sum of time, energy and the rest" do
     assert Cost.of(path: 6, speed: 0.5) == 12.0
     assert Cost.of([path: 6, speed: 0.5, energy: 10, other: 3], energy: 0.5, other: 2) == 23.0
     assert Cost.of([path: 0, speed: 0, other: 1], other: 1) == 1
@@ -23,7 +23,7 @@ defmodule Agents.ContractNet.MachinesTest do
     assert_raise ArgumentError, fn -> Cost.of(way: 1) end
   end
 
-  test "all are asked; the least cost wins, of equals the first name, and the others are told" do
+  test "all are asked; the lowest cost wins, among equals the first name; the others are told" do
     {m, letters} = start([:b, :a, :c])
     assert letters == for(p <- [:a, :b, :c], do: {p, :cfp, {1, :task, 500}})
 
@@ -37,7 +37,7 @@ defmodule Agents.ContractNet.MachinesTest do
     assert {^m, []} = Manager.tick(m, 99_999)
   end
 
-  test "the silent are not waited for; a late bid, and one of another round, are rejected" do
+  test "nobody waits for silent peers; a late bid, or one of another round, is rejected" do
     {m, _} = start([:a, :b])
     {m, []} = Manager.hear(m, :b, :propose, {1, 9}, 10)
     assert {^m, []} = Manager.tick(m, 499)
@@ -45,11 +45,11 @@ defmodule Agents.ContractNet.MachinesTest do
     assert {^m, [{:a, :reject, 1}]} = Manager.hear(m, :a, :propose, {1, 1}, 510)
     {m, [{:b, :cancel, 1}, {:a, :cfp, {2, :task, 500}}]} = Manager.tick(m, 5_500)
     assert {^m, [{:a, :reject, 1}]} = Manager.hear(m, :a, :propose, {1, 1}, 5_510)
-    # A cost that is no number is no bid.
+    # A cost that is not a number is not a bid.
     assert {^m, [{:a, :reject, 2}]} = Manager.hear(m, :a, :propose, {2, :cheap}, 5_510)
   end
 
-  test "nobody bids: announced again, and given up at last; nobody there: over at once" do
+  test "a task without bids is announced again, then given up; without peers it is over at once" do
     {m, _} = start([:a], rounds: 2)
     {m, []} = Manager.hear(m, :a, :refuse, {1, :busy}, 10)
     {m, [{:a, :cfp, {2, :task, 500}}]} = Manager.tick(m, 500)
@@ -63,7 +63,7 @@ defmodule Agents.ContractNet.MachinesTest do
     assert_raise ArgumentError, fn -> start([:a], speed: 1) end
   end
 
-  test "a winner that is gone, fails, or is no longer bound: the others are asked again" do
+  test "if the winner is gone, fails, or is no longer bound, the others are asked again" do
     {m, _} = start([:a, :b])
     {m, _} = heard(m, [{:a, :propose, {1, 1}, 1}, {:b, :propose, {1, 2}, 1}])
     again = [{:b, :cfp, {2, :task, 500}}]
@@ -74,13 +74,13 @@ defmodule Agents.ContractNet.MachinesTest do
     assert {_, [{:a, :cfp, {2, _, _}}, {:b, :cfp, {2, _, _}}]} =
              Manager.hear(m, :a, :refuse, {1, :not_bound}, 2)
 
-    # One that loses its winner while it waits for others decides among those left.
+    # A manager that loses its winner while it waits for others decides among those left.
     {m, _} = start([:a, :b])
     {m, []} = Manager.hear(m, :b, :propose, {1, 2}, 1)
     assert {_, [{:b, :accept, 1}]} = Manager.gone(m, :a, 2)
   end
 
-  test "one that was given up: told to stop, unless it has done the task" do
+  test "a winner that was given up is told to stop, unless it has done the task" do
     {m, _} = start([:a, :b])
     {m, _} = heard(m, [{:a, :propose, {1, 1}, 1}, {:b, :propose, {1, 2}, 1}])
     {m, _} = Manager.tick(m, 5_001)
@@ -91,7 +91,7 @@ defmodule Agents.ContractNet.MachinesTest do
     assert {^m, [{:b, :cancel, 2}]} = Manager.hear(m, :b, :inform, {2, :progress, 1}, 5_040)
   end
 
-  test "who never won cannot have done it" do
+  test "a peer that never won cannot have done the task" do
     {m, _} = start([:a, :b])
     assert {^m, []} = Manager.hear(m, :a, :inform, {1, :done, :lie}, 5)
   end
@@ -116,7 +116,7 @@ defmodule Agents.ContractNet.MachinesTest do
     assert {^free, :stop} = Bidder.cancelled(working, :k1)
     assert Bidder.finished(working) == free
 
-    # However long a manager says that it will take.
+    # This holds however long a manager says that it will take.
     {locked, _} = Bidder.announced(free, :k1, :task, 3, 9_999_999, 0)
     assert {_, {:propose, 1}} = Bidder.announced(locked, :k2, :task, 1, 500, 10_501)
   end

@@ -17,7 +17,7 @@ defmodule Agents.ContractNet.NodesTest do
   defp auction(how, peers, options),
     do: Task.async(fn -> ContractNet.auction({:carry, how}, peers, [from: :base] ++ options) end)
 
-  test "a winner that is killed, and one that freezes, lose the task to the next, and to nobody at last" do
+  test "a winner that is killed or frozen loses the task to the next, and at last to nobody" do
     [killed, frozen, well] = nodes = Cluster.start_nodes(3)
     peers = [_, _, last] = bidders(nodes, net_n0: 1, net_n1: 2, net_n2: 3)
     started = System.monotonic_time(:millisecond)
@@ -25,7 +25,7 @@ defmodule Agents.ContractNet.NodesTest do
 
     assert_receive {:working, :net_n0, _worker}, 1_000
     Cluster.kill(killed)
-    # Nobody waits until its silence is long enough.
+    # Nobody waits until it has been silent for long enough.
     assert_receive {:working, :net_n1, _worker}, 400
     Cluster.freeze(frozen)
     assert_receive {:working, :net_n2, worker}, 2_000
@@ -33,11 +33,11 @@ defmodule Agents.ContractNet.NodesTest do
     assert Task.await(auction) == {:ok, last, {:carried_by, :net_n2}}
     assert System.monotonic_time(:millisecond) - started < 3_000
 
-    # The frozen one does not bid; it is not waited for any longer than that.
+    # The frozen one does not bid; nobody waits for it any longer than that.
     assert {:ok, ^last, _} = Task.await(auction(1, peers, bid_ms: 200))
 
     Cluster.thaw(frozen)
-    # What it was told while it was frozen: that nobody wants its work any more.
+    # While it was frozen it was told that nobody wants its work any more.
     eventually(fn ->
       match?({:ok, {:net_n1, :tasks}, _}, Task.await(auction(1, peers, bid_ms: 200)))
     end)
@@ -47,7 +47,7 @@ defmodule Agents.ContractNet.NodesTest do
     assert Task.await(auction(1, peers, [])) == {:error, :nobody}
   end
 
-  test "absurd bids are numbers like others, or none" do
+  test "an absurd bid counts as any other number, or is not a bid" do
     huge = Bitwise.bsl(1, 80_000)
     nodes = Cluster.start_nodes(2)
     bids = [net_a: huge, net_b: 1.0e308, net_c: :cheap, net_d: nil, net_e: [1], net_f: "0"]
