@@ -117,7 +117,7 @@ defmodule System.DocsTest do
     "Now 3.00 m straight on.",
     "distance     1.0240",
     "sample   784 pixels",
-    "Assumed; look whether",
+    "Assumed; check whether",
     "config/robots/mag1.exs:7: limits.max_liner",
     "refused mag3 at",
     "mag1  pid 3308",

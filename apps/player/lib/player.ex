@@ -10,12 +10,12 @@ defmodule Player do
   | `camerav4l` and its kin | `camera` | |
   | `cmvision` | `colours` | |
 
-  What follows from several options, and from Player's own defaults, is `Player.Defaults`'s and
-  `Player.Boards`'s.
+  `Player.Defaults` and `Player.Boards` derive what follows from several options, and from
+  Player's own defaults.
 
-  All else is left out, and told: each option and section with its line and why. Units are those of
-  `Player.Units`; where a file says something else than it seems to mean, what was assumed is
-  told as well.
+  Everything else is left out and reported: each option and section with its line and the reason.
+  Units are those of `Player.Units`. If a file says something else than it seems to mean, the
+  assumption is reported as well.
   """
   alias Player.{Boards, CameraOptions, Parts, RFlexOptions, Sections, Units, Unsupported}
 
@@ -31,7 +31,7 @@ defmodule Player do
   @modules %{drive: Hal.RFlex.Driver, ptz: Hal.Visca.Driver, camera: Hal.Camera.FFmpeg}
   @said ~w(name driver provides requires alwayson plugin key)
 
-  @typedoc "A line of the file, what stands there, and what is to be said of it."
+  @typedoc "A line of the file, the option or section there, and a remark about it."
   @type remark :: {line :: pos_integer(), what :: String.t(), why :: String.t()}
 
   @type result :: %{
@@ -48,12 +48,14 @@ defmodule Player do
     * `:file` - its name, for errors and the head of the new file
     * `:id` - the robot's name; default `mag1` or `min1`
     * `:profile` - `:magellan` or `:atrv_mini`; by default guessed
-    * `:version` - 1 or 2 (and later) for Player's; by default told by the names of its options
-    * `:colours` - `function.(name)` gives `{path, {:ok, colours} | {:error, line}}`: how the colour
-      file is named in the robot file, and what is in it
+    * `:version` - 1 or 2 (and later) for Player's; by default found out from the names of its
+      options
+    * `:colours` - `function.(name)` gives `{path, {:ok, colours} | {:error, line}}`: the path of
+      the colour file for the robot file, and what is in it
 
-  The error is one line: it names what keeps the file from being read, or says that no rFLEX is in it, or
-  which line of it leaves open what the robot's sensors are (`Player.Boards.sure/1`).
+  The error is one line. It names what keeps the file from being read, or says that it has no
+  rFLEX driver, or which of its lines leaves open where the robot's sensors are
+  (`Player.Boards.sure/1`).
   """
   @spec import(String.t(), keyword()) :: {:ok, result()} | {:error, String.t()}
   def import(text, options \\ []) do
@@ -64,7 +66,7 @@ defmodule Player do
          units = Units.context(parsed.options, sections, options[:version]),
          state = Enum.reduce(sections, start(parsed), &section(&1, &2, units)),
          :ok <- based(state),
-         # What a line itself lacks comes before what lacks because of it.
+         # The fault of a line itself is reported before the faults that follow from it.
          :ok <- Boards.sure(state),
          {profile, state} = finish(state, options),
          :ok <- Boards.sure(state) do
@@ -78,7 +80,8 @@ defmodule Player do
   defp start(parsed) do
     left =
       for({line, name} <- parsed.includes) do
-        {line, "include \"#{name}\"", "other files are not read: import that one, or copy it in"}
+        {line, "include \"#{name}\"",
+         "other files are not read: import that file, or copy its text"}
       end ++
         for {name, line, _value} <- parsed.options, name not in ~w(unit_length unit_angle) do
           {line, name, "says nothing about the robot"}
@@ -105,7 +108,7 @@ defmodule Player do
     end
   end
 
-  # The plain ones first: of two that are as near, these are meant.
+  # The plain names first: of two that are equally near, these are suggested.
   defp names, do: @drivers |> Map.keys() |> Enum.sort()
 
   defp text_of(section, name) do
@@ -120,19 +123,18 @@ defmodule Player do
 
   defp first(kind, name, section, state, units) do
     if kind in state.seen do
-      leave(state, section, "driver #{name}", "a robot has one #{kind}; the first was taken")
+      leave(state, section, "driver #{name}", "a robot has one #{kind}; the first is taken")
     else
       state = %{state | seen: [kind | state.seen]}
 
       inner =
-        for inner <- section.sections, do: {inner.line, inner.type, "nothing nests in a driver"}
+        for inner <- section.sections, do: {inner.line, inner.type, "a driver has no sections"}
 
       options = Enum.reject(section.options, fn {name, _line, _value} -> name in @said end)
 
       {options, again} = once(options)
 
-      left =
-        for {name, line, _value} <- again, do: {line, name, "is given twice; the first counts"}
+      left = for {name, line, _value} <- again, do: {line, name, "occurs twice; the first counts"}
 
       Enum.reduce(options, %{state | left: left ++ inner ++ state.left}, fn {name, line, value},
                                                                             state ->
@@ -154,7 +156,7 @@ defmodule Player do
     end
   end
 
-  # Marks that turn the direction of writing make a file look other than it is.
+  # Characters that change the direction of writing make a file look different from what it is.
   defp plain?(text),
     do: String.printable?(text) and not (text =~ ~r/[\x{202A}-\x{202E}\x{2066}-\x{2069}]/u)
 
@@ -176,11 +178,11 @@ defmodule Player do
         :ok
 
       state.left == [] ->
-        {:error, "no driver is in it"}
+        {:error, "it has no driver"}
 
       true ->
         {:error,
-         "no driver \"rflex\" is in it, so it is neither a Magellan Pro's nor an ATRV mini's"}
+         "it has no driver \"rflex\", so it is neither for a Magellan Pro nor for an ATRV mini"}
     end
   end
 
@@ -203,7 +205,7 @@ defmodule Player do
     }
   end
 
-  # Without colours our camera has nothing to look for.
+  # Without colours there is nothing for our camera to look for.
   defp coloured(state, read) do
     file = Player.Defaults.value(state, [:colours, :file])
 
@@ -244,7 +246,7 @@ defmodule Player do
       {:error, why} ->
         %{
           state
-          | left: [{line, option, "the colour file is to be put right: #{why}"} | state.left]
+          | left: [{line, option, "the colour file must be corrected: #{why}"} | state.left]
         }
     end
   end

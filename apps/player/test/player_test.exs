@@ -16,7 +16,8 @@ defmodule PlayerTest do
 
   alias Player.Sections
 
-  # An ATRV mini as Player 1.6 was told of it: millimetres, degrees, angles of sonars in radians and first.
+  # A configuration of an ATRV mini for Player 1.6: millimetres, degrees, angles of sonars in
+  # radians and first.
   @old """
   # A robot of old.
   define eyes driver ( name "cmvision" requires ["camera:0"] )
@@ -47,7 +48,8 @@ defmodule PlayerTest do
   include "more.inc"
   """
 
-  # A Magellan as Player 2 was told of it, with the millimetres that are in public files of that kind.
+  # A configuration of a Magellan for Player 2, with the millimetres that public files of that
+  # kind have.
   @new """
   unit_angle "degrees"
   driver (
@@ -75,7 +77,7 @@ defmodule PlayerTest do
     "[Colors]\n(255,0,0) 0.5 10 Ball\n\n[Thresholds]\n(170:240,60:90,130:145)\n"
   end
 
-  # What was written is read again.
+  # What was written can be read again.
   defp again(text) do
     read = fn "color.cfg", _options -> Vision.Colours.parse(colour_text()) end
     assert {:ok, robot} = Robot.File.parse(text, colours: read)
@@ -85,7 +87,7 @@ defmodule PlayerTest do
 
   defp options(%{drive: {_module, options}}), do: options
 
-  test "a robot of Player 1.x comes over in metres, and what does not is told with line and reason" do
+  test "a robot of Player 1.x is imported in metres, and the rest is reported with line and reason" do
     assert {:ok, result} = Player.import(@old, file: "old.cfg", colours: &colours/1)
     assert %{id: :min1, profile: :atrv_mini} = result
     robot = again(result.text)
@@ -126,9 +128,9 @@ defmodule PlayerTest do
              {20, "rflex_joy_pos_ratio", "the joystick is read, but drives nothing by itself"},
              {21, "odo_distence_conversion",
               "is not an option of rflex; did you mean odo_distance_conversion?"},
-             {26, "driver festival", "no speech"},
+             {26, "driver festival", "speech is not supported"},
              {27, "include \"more.inc\"",
-              "other files are not read: import that one, or copy it in"}
+              "other files are not read: import that file, or copy its text"}
            ]
 
     assert Enum.map(result.assumed, &elem(&1, 1)) == [
@@ -138,7 +140,7 @@ defmodule PlayerTest do
            ]
   end
 
-  test "numbers that cannot be what they say are taken for what they are, and told" do
+  test "numbers in an impossible unit are taken for the likely unit, and reported" do
     assert {:ok, result} = Player.import(@new, file: "new.cfg")
     robot = again(result.text)
     assert result.profile == :magellan
@@ -162,11 +164,11 @@ defmodule PlayerTest do
              {15, "poses"}
            ]
 
-    # The assumptions stand at the head of the file, too.
+    # The assumptions are at the head of the file, too.
     assert result.text =~ "#   line 8, range_distance_conversion: taken for units per millimetre"
   end
 
-  test "the old law of infrared becomes the new one: the same volts, the same metres" do
+  test "the old formula of infrareds becomes the new one: the same volts, the same metres" do
     text = """
     driver ( name "rflex" mm_length 500 mm_width 500 poses [200 0 0]
       rflex_ir_calib [0.0005456 -2.086] )
@@ -181,7 +183,7 @@ defmodule PlayerTest do
     end
   end
 
-  test "sonars whose angle comes last are found out by angles that cannot be" do
+  test "sonars whose angle comes last are recognised by impossible angles" do
     text = """
     driver ( name "rflex" mm_length 630 mm_width 540
       mmrad_sonar_poses [0258.170 0114.700 0.0 -0258.170 -0114.700 -3.141592] )
@@ -196,8 +198,8 @@ defmodule PlayerTest do
              List.keyfind(result.assumed, 2, 0)
   end
 
-  # A base larger than ours: two rings of 24 sonars on fourteen boards, 24 infrareds and 14 bumpers round it. Its
-  # angles go on counting beyond a turn, and poses are left over.
+  # A base larger than ours: two rings of 24 sonars on fourteen boards, 24 infrareds and 14
+  # bumpers around it. Its angles count on beyond a turn, and there are more poses than sensors.
   defp ring(count, radius, from, form) do
     for k <- 0..(count - 1) do
       angle = from - 2 * :math.pi() * k / count
@@ -247,7 +249,7 @@ defmodule PlayerTest do
     """
   end
 
-  test "where sensors are decides what their angles mean: radians that go on beyond a turn" do
+  test "the positions of sensors decide what their angles mean: radians that count on beyond a turn" do
     assert {:ok, result} = Player.import(large(), file: "large.cfg")
     robot = again(result.text)
     assert length(robot.profile.sonars) == 48
@@ -268,7 +270,7 @@ defmodule PlayerTest do
     assert [7, 5, 4 | _] = options(robot)[:bumpers][:segments]
     assert length(options(robot)[:bumpers][:segments]) == 14
 
-    # With it a turn at full speed would be a minute off.
+    # With it, reaching full turn speed would take a minute.
     assert robot.limits == [max_acceleration: 0.5]
 
     assert [{6, "default_rot_acceleration", why}] = result.left
@@ -285,19 +287,19 @@ defmodule PlayerTest do
              "the first 48 of 50 poses are taken, as many sonars as num_sonars_in_bank says"
   end
 
-  test "degrees are found out by positions, too, whatever a file says" do
+  test "degrees are recognised by positions, too, whatever a file says" do
     degrees = words(ring(8, 0.2, 6.0, fn angle, x, y -> [x, y, angle * 180 / :math.pi()] end))
     small = words(ring(8, 0.2, 6.0, fn angle, x, y -> [x, y, angle] end))
     text = &~s|#{&2} driver ( name "rflex" m_length 0.4 rflex_banks [8] poses [#{&1}] )|
 
     for {poses, unit, assumed} <- [
-          {degrees, "", "angles taken for degrees: so they look away from the middle"},
+          {degrees, "", "angles taken for degrees: so they point away from the middle"},
           {degrees, ~s(unit_angle "degrees"), nil},
           {degrees, ~s(unit_angle "radians"),
-           "angles taken for degrees, not for radians: so they look away from the middle"},
+           "angles taken for degrees, not for radians: so they point away from the middle"},
           {small, "", nil},
           {small, ~s(unit_angle "degrees"),
-           "angles taken for radians, not for degrees: so they look away from the middle"}
+           "angles taken for radians, not for degrees: so they point away from the middle"}
         ] do
       assert {:ok, result} = Player.import(text.(poses, unit))
 
@@ -312,14 +314,14 @@ defmodule PlayerTest do
     end
   end
 
-  test "what a file leaves open of its sensors is refused with the line, not guessed" do
+  test "a file that leaves its sensors open is refused with the line, and nothing is guessed" do
     inwards = words(ring(24, 0.25, 7.33, fn angle, x, y -> [-x, -y, angle] end))
     few = words(ring(40, 0.25, 1.0, fn angle, x, y -> [angle, x, y] end))
     askew = words(ring(48, 0.25, 1.0, fn angle, x, y -> [angle + 1.6, x, y] end))
 
     for {more, line} <- [
           {%{irs: inwards},
-           "12: poses: neither in radians nor in degrees do they look away from the middle"},
+           "12: poses: neither in radians nor in degrees do they point away from the middle"},
           {%{sonars: few},
            "10: mrad_sonar_poses: there are poses for 40 sonars, and num_sonars_in_bank says 48"},
           {%{sonars: askew}, "10: mrad_sonar_poses: neither as theta, x, y nor as x, y, theta"},
@@ -331,13 +333,13 @@ defmodule PlayerTest do
           {%{boards: "24"},
            "11: rflex_banks: a board has 0 to 8 infrareds, and there are 8 boards"},
           {%{banks: "48"}, "9: num_sonars_in_bank: a bank has 0 to 16 sonars"},
-          {%{more: "mrad_sonar_poses [0 1 1]"}, "15: mrad_sonar_poses: is given twice"}
+          {%{more: "mrad_sonar_poses [0 1 1]"}, "15: mrad_sonar_poses: occurs twice"}
         ] do
       assert {:error, told} = Player.import(large(more), file: "large.cfg")
       assert String.starts_with?(told, "large.cfg:" <> line), told
     end
 
-    # Without poses, a kind's own are taken, if it has as many.
+    # Without poses, those of the kind of robot are taken, if it has as many.
     text =
       &~s|driver ( name "rflex" m_length 0.4 num_sonars_in_bank [#{&1}] rflex_banks [#{&2}] )|
 
@@ -347,12 +349,12 @@ defmodule PlayerTest do
     assert told =~ "x.cfg:1: rflex_banks: adds up to 8 infrareds, and there are no poses"
     assert {:ok, result} = Player.import(text.("8 8", "8 8"), profile: :magellan)
     assert length(again(result.text).profile.irs) == 16
-    why = "no poses are given: those of a magellan are taken"
+    why = "there are no poses: those of a magellan are taken"
     assert {1, "num_sonars_in_bank", why} in result.assumed
     assert {1, "rflex_banks", why} in result.assumed
   end
 
-  test "what is asked for wins over what is guessed" do
+  test "what a person asks for wins over a guess" do
     assert {:ok, %{id: :min4, profile: :atrv_mini}} =
              Player.import(@new, id: :min4, profile: :atrv_mini)
 
@@ -363,7 +365,7 @@ defmodule PlayerTest do
     assert options(again(new.text))[:conversions][:distance] == 4000.0
   end
 
-  test "old devices by interface, limits no body has, values no option can have, options twice" do
+  test "old devices by interface, impossible limits and values, and repeated options" do
     text = """
     position:0 (
       driver "rflex"
@@ -392,7 +394,8 @@ defmodule PlayerTest do
            ]
   end
 
-  # A section for each interface, as Player had it first; a line on sonars, and one on what else is there.
+  # A section for each interface, as in the first versions of Player; `given` adds lines on sonars
+  # and others.
   defp pieces(sonars, more \\ "") do
     """
     position:0 ( driver "rflex_position"
@@ -408,7 +411,7 @@ defmodule PlayerTest do
     """
   end
 
-  test "a base in pieces, a driver for each of its interfaces, is one base" do
+  test "a base split into one driver for each of its interfaces is one base" do
     poses = words(ring(6, 200.0, 3.0, fn angle, x, y -> [angle, x, y] end))
     text = pieces(~s|num_sonars "6" num_sonars_in_bank "3 3" mmrad_sonar_poses "#{poses}"|)
     assert {:ok, result} = Player.import(text, profile: :magellan)
@@ -419,16 +422,16 @@ defmodule PlayerTest do
     assert length(robot.profile.sonars) == 6
     assert [{9, "laser:0", _why}] = result.left
 
-    # What is not clear of the sensors in any piece is refused, as in one.
+    # If any of the sections leaves sensors open, the file is refused, as with one section.
     assert {:error, line} = Player.import(pieces(~s|num_sonars_in_bank "3 many"|), file: "x.cfg")
     assert line =~ "x.cfg:7: num_sonars_in_bank: "
     more = ~s|sonar:1 ( driver "rflex_sonar" num_sonars_in_bank [8] )|
     text = pieces("num_sonars_in_bank [8 8]", more)
     assert {:error, line} = Player.import(text, file: "x.cfg", profile: :magellan)
-    assert line =~ "x.cfg:10: num_sonars_in_bank: is given twice"
+    assert line =~ "x.cfg:10: num_sonars_in_bank: occurs twice"
   end
 
-  test "infrareds without their law are told not to be read, sensors beyond the body to be odd" do
+  test "infrareds without a formula are reported as not read, sensors beyond the body as odd" do
     ring = words(ring(8, 0.23, 1.0, fn angle, x, y -> [x, y, angle] end))
     text = ~s|driver ( name "rflex" m_length 0.4 m_width 0.4 rflex_banks [8] poses [#{ring}] )|
     assert {:ok, result} = Player.import(text, profile: :magellan)
@@ -469,7 +472,7 @@ defmodule PlayerTest do
     assert for({_, what, _why} <- result.left, do: what) |> Enum.sort() == ["norm", "source"]
   end
 
-  test "definitions carry over, and what a section says itself wins" do
+  test "definitions are expanded, and a section's own options win" do
     text = """
     define base driver ( name "rflex" port 1 size [1 2] )
     define small base ( size [3] )
@@ -494,24 +497,24 @@ defmodule PlayerTest do
     assert plain.options == [{"pose[0]", 7, {:tuple, [1, 2]}}]
   end
 
-  test "malformed files are told by file and line" do
+  test "malformed files are reported by file and line" do
     for {text, line} <- [
           {"driver\n(\n name \"rflex\n)", "x.cfg:3: the text that begins here has no closing \""},
           {"driver\n(\n name \"rflex\"", "x.cfg:2: the ( here is never closed"},
           {"driver ( a [ 1\n 2", "x.cfg:1: the [ here is never closed"},
           {"driver ( a )", "x.cfg:1: a has no value"},
           {"driver (\n a\n b 1 )", "x.cfg:2: a has no value"},
-          {"\n)", "x.cfg:2: ) stands where an option or a section should"},
-          {"driver (\n 5 )", "x.cfg:2: 5 stands where the name of an option should"},
+          {"\n)", "x.cfg:2: ) is not an option or a section"},
+          {"driver (\n 5 )", "x.cfg:2: 5 is not the name of an option"},
           {"define x ( a 1 )", "x.cfg:1: define is written: define new_name old_name ( … )"},
           {"a 1.2.3", "x.cfg:1: 1.2.3 is not a number"},
           {"a 1e999", "x.cfg:1: 1e999 is not a number"},
-          {"a\n  b" <> <<200>>, "x.cfg:2: byte 200 is not a part of a configuration file"},
-          {"", "x.cfg: no driver is in it"},
+          {"a\n  b" <> <<200>>, "x.cfg:2: byte 200 is not allowed in a configuration file"},
+          {"", "x.cfg: it has no driver"},
           {"driver ( name \"p2os\" )",
-           "x.cfg: no driver \"rflex\" is in it, so it is neither a Magellan Pro's nor an ATRV mini's"},
-          {String.duplicate("a ( ", 30), "x.cfg:1: nothing is nested more than 20 deep"},
-          {"a " <> String.duplicate("[ ", 30), "x.cfg:1: nothing is nested more than 20 deep"}
+           "x.cfg: it has no driver \"rflex\", so it is neither for a Magellan Pro nor for an ATRV mini"},
+          {String.duplicate("a ( ", 30), "x.cfg:1: nested more than 20 levels deep"},
+          {"a " <> String.duplicate("[ ", 30), "x.cfg:1: nested more than 20 levels deep"}
         ] do
       assert Player.import(text, file: "x.cfg") == {:error, line}
     end
@@ -537,13 +540,13 @@ defmodule PlayerTest do
     assert options(again(result.text))[:port] == "a\#{1}\\\\b"
   end
 
-  test "a number of sonars that is not a number is told, beside poses" do
+  test "a number of sonars that is not a number is reported, even with poses" do
     text = ~s|driver ( name "rflex" num_sonars "+" mrad_sonar_poses [0 200 0 1.5708 0 200] )|
     assert {:error, line} = Player.import(text)
-    assert line =~ "num_sonars: has a value that it cannot have"
+    assert line =~ "num_sonars: has an impossible value"
   end
 
-  test "random damage never raises, and what comes over is always a robot" do
+  test "random damage never raises, and what is imported is always a robot" do
     bytes = ~c"[](),\"#.-+ \n\t0159azAZ_:" ++ [0, 200, 255]
 
     for text <- [@old, @new], _ <- 1..500 do
@@ -570,7 +573,7 @@ defmodule PlayerTest do
     assert_raise ArgumentError, fn -> String.to_existing_atom(strange) end
   end
 
-  test "all values that are written are read again as they were" do
+  test "all values that are written are read back unchanged" do
     values = [id: :mag1, start: {1.0e-7, -12.5, {:deg, -22.5}}, arm: :auto, limits: []]
 
     assert {:ok, {_, {:keys, keys}}} =

@@ -5,13 +5,15 @@ defmodule Player.Boards do
   """
   alias Hal.Profile
 
-  # What cannot be guessed: which sensor is where. A robot drives by them.
+  # Options that must not be guessed: they say where each sensor is, and a robot drives by its
+  # sensors.
   @sensors ~w(mmrad_sonar_poses mrad_sonar_poses num_sonars num_sonars_in_bank
               num_sonars_possible_per_bank poses rflex_banks rflex_base_bank)
 
   @doc """
-  Whether all that the file says of sonars and infrareds came over. If not, which line did not, and why: a robot
-  whose sensors are elsewhere than it thinks is worse than none.
+  Checks that all that the file says about sonars and infrareds was carried over. If not, the
+  error says which line was not, and why: a robot whose sensors are elsewhere than it thinks is
+  worse than none.
   """
   @spec sure(Player.Defaults.t()) :: :ok | {:error, {line :: pos_integer(), why :: String.t()}}
   def sure(state) do
@@ -21,14 +23,14 @@ defmodule Player.Boards do
     end
   end
 
-  @doc "Boards and poses that go together, for a body of that kind."
+  @doc "Makes boards and poses consistent, for a body of that kind."
   @spec complete(Player.Defaults.t(), :magellan | :atrv_mini) :: Player.Defaults.t()
   def complete(state, kind) do
     body = apply(Profile, kind, [])
     state |> banked(body) |> ringed(body)
   end
 
-  # Our profile's sonars are there when the file has no poses.
+  # If the file has no poses, the sonars of our profile are used.
   defp banked(state, body) do
     banks = Player.Defaults.value(state, [:drive, :sonar_banks])
     sonars = Player.Defaults.value(state, [:body, :sonars])
@@ -51,7 +53,7 @@ defmodule Player.Boards do
           state,
           line,
           option,
-          "no poses are given: those of a #{body.name} are taken"
+          "there are no poses: those of a #{body.name} are taken"
         )
 
       true ->
@@ -62,7 +64,7 @@ defmodule Player.Boards do
     end
   end
 
-  # Player's poses are in the order of the reports, unlike those of our profile.
+  # Player lists poses in the order of the reports, unlike our profile.
   defp ringed(state, body) do
     case Player.Defaults.value(state, [:body, :irs]) do
       nil ->
@@ -88,7 +90,7 @@ defmodule Player.Boards do
         state,
         line,
         option,
-        "no poses are given: those of a #{body.name} are taken"
+        "there are no poses: those of a #{body.name} are taken"
       )
     else
       why = "adds up to #{Enum.sum(banks)} infrareds, and there are no poses of them"

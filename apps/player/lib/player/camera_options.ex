@@ -1,11 +1,11 @@
 defmodule Player.CameraOptions do
   @moduledoc """
-  The options of Player's camera drivers in ours: the head (`sonyevid30`), the picture (`camerav4l`
-  and its kin) and the colours (`cmvision`). Pure.
+  Translates the options of Player's camera drivers to ours: the head (`sonyevid30`), the picture
+  (`camerav4l` and its kin) and the colours (`cmvision`). Pure.
   """
   alias Player.Units
 
-  @doc "What becomes of one option of a head, a camera or a blob finder."
+  @doc "Translates one option of a head, a camera or a blob finder."
   @spec option(:ptz | :camera | :colours, String.t(), term(), Units.context()) :: Units.carried()
   def option(:ptz, "port", port, _context) when is_binary(port),
     do: {:ok, [{[:ptz, :port], port}]}
@@ -17,10 +17,10 @@ defmodule Player.CameraOptions do
 
     if tele > 0 and wide > tele,
       do: {:ok, [{[:ptz, :lens], List.to_tuple(ends)}]},
-      else: {:left, "is not a pair of angles that grow"}
+      else: {:left, "is not a pair of increasing angles"}
   end
 
-  def option(:ptz, _name, _value, _context), do: {:left, "our driver decides that by itself"}
+  def option(:ptz, _name, _value, _context), do: {:left, "our driver decides this"}
 
   def option(:camera, "port", port, _context) when is_binary(port),
     do: {:ok, [{[:camera, :source], port}]}
@@ -28,11 +28,11 @@ defmodule Player.CameraOptions do
   def option(:camera, "size", {:tuple, [width, height]}, _context) do
     if even?(width) and even?(height),
       do: {:ok, [{[:camera, :size], {width, height}}]},
-      else: {:left, "a picture has even numbers of columns and rows"}
+      else: {:left, "numbers of columns and rows must be even"}
   end
 
   def option(:camera, "save", 0, _context), do: :used
-  def option(:camera, "save", _on, _context), do: {:left, "say save_pictures: with a folder"}
+  def option(:camera, "save", _on, _context), do: {:left, "use save_pictures: with a folder"}
   def option(:camera, "mode", _value, _context), do: {:left, "frames are always YUV here"}
 
   def option(:camera, "source", input, _context) when input in 0..31,
@@ -46,7 +46,7 @@ defmodule Player.CameraOptions do
     end
   end
 
-  def option(:camera, _name, _value, _context), do: {:left, "our driver decides that by itself"}
+  def option(:camera, _name, _value, _context), do: {:left, "our driver decides this"}
 
   def option(:colours, "colorfile", file, _context) when is_binary(file),
     do: {:ok, [{[:colours, :file], file}]}

@@ -17,10 +17,10 @@ defmodule Player.Defaults do
         }
 
   @echo_us 30_000
-  # As Robot.File.Odd has it.
+  # The same as in Robot.File.Odd.
   @slow_s 5.0
 
-  @doc "The value at a path, or nil."
+  @doc "The value at a path, or `nil`."
   @spec value(t(), [atom()]) :: term()
   def value(state, path) do
     case List.keyfind(state.values, path, 0) do
@@ -29,7 +29,7 @@ defmodule Player.Defaults do
     end
   end
 
-  @doc "The kind of robot: as asked for, or guessed by its sensors and shape."
+  @doc "The kind of robot: the one asked for, or a guess from its sensors and shape."
   @spec profile(t(), :magellan | :atrv_mini | nil) :: {:magellan | :atrv_mini, t()}
   def profile(state, nil) do
     touches? = value(state, [:body, :irs]) != nil or (value(state, [:body, :bumpers]) || 0) > 0
@@ -49,7 +49,7 @@ defmodule Player.Defaults do
 
   def profile(state, profile), do: {profile, state}
 
-  @doc "All that fits a body of that kind."
+  @doc "Keeps and completes what fits a body of that kind."
   @spec complete(t(), :magellan | :atrv_mini) :: t()
   def complete(state, kind) do
     body = apply(Profile, kind, [])
@@ -64,18 +64,18 @@ defmodule Player.Defaults do
     |> limited(body)
   end
 
-  @doc "A remark on what was taken for granted."
+  @doc "Adds a remark on something that was assumed."
   @spec assume(t(), pos_integer(), String.t(), String.t()) :: t()
   def assume(state, line, what, why), do: %{state | assumed: [{line, what, why} | state.assumed]}
 
-  @doc "Further values that come of an option in a line."
+  @doc "Adds further values that follow from an option in a line."
   @spec keep(t(), pos_integer(), String.t(), [{[atom()], term()}]) :: t()
   def keep(state, line, name, values) do
     new = for {path, value} <- values, do: {path, value, line, name}
     %{state | values: state.values ++ new}
   end
 
-  @doc "Leaves out what came of some paths, and says why."
+  @doc "Leaves out the values at some paths, and says why."
   @spec leave(t(), (entry() -> boolean()), String.t()) :: t()
   def leave(state, which, why) do
     {gone, values} = Enum.split_with(state.values, which)
@@ -98,7 +98,8 @@ defmodule Player.Defaults do
     end
   end
 
-  # Player's own wait for an echo, 3000 us, hears half a metre; it is a slip of its documentation.
+  # Player's own wait for an echo, 3000 us, covers only half a metre; this is an error in its
+  # documentation.
   defp timed(state) do
     case for {[:drive, :sonar_times, name], us, _, _} <- state.values, do: {name, us} do
       [] ->
@@ -132,7 +133,7 @@ defmodule Player.Defaults do
     end
   end
 
-  # Which bumper is where, when nothing says it, is the driver's guess.
+  # If nothing says where each bumper is, the driver guesses.
   defp placed(state) do
     count = value(state, [:drive, :bumpers, :count])
     address? = value(state, [:drive, :bumpers, :style]) == :address
@@ -143,12 +144,12 @@ defmodule Player.Defaults do
           state,
           1,
           "bumpers",
-          "which is where is not known: the first is taken for the front's, then to the left"
+          "their positions are not known: the first is taken to be in front, the others to follow to the left"
         ),
       else: state
   end
 
-  # An ATRV mini has no bumpers, a Magellan has 16, whether Player was told or not.
+  # An ATRV mini has no bumpers, a Magellan has 16, whether the file says so or not.
   defp touchless(state, :atrv_mini) do
     if value(state, [:body, :bumpers]),
       do: state,
@@ -157,7 +158,7 @@ defmodule Player.Defaults do
 
   defp touchless(state, :magellan), do: state
 
-  # The circle round a body of another size.
+  # The circle around a body of another size.
   defp circled(state, body) do
     length = value(state, [:body, :length]) || body.length
     width = value(state, [:body, :width]) || body.width
@@ -175,28 +176,28 @@ defmodule Player.Defaults do
     end
   end
 
-  # A limit may only be lower than what the body can do; how it brakes, a person should know.
+  # A limit may only be lower than what the body can do; a person should know how it brakes.
   defp limited(state, body) do
     with a when is_number(a) and a >= 0.01 and a < 0.2 <-
            value(state, [:limits, :max_acceleration]) do
       {_, _, line, option} = List.keyfind(state.values, [:limits, :max_acceleration], 0)
       way = Float.round(body.max_linear * body.max_linear / (2 * a), 1)
-      why = "taken as it is, but at full speed it then needs #{way} m to stand"
+      why = "taken as it is, but at full speed the robot then needs #{way} m to stop"
       state |> assume(line, option, why) |> turned(body) |> lowered(body)
     else
       _well -> state |> turned(body) |> lowered(body)
     end
   end
 
-  # Player's driver turns with an acceleration of its own, whatever the file says.
+  # Player's driver uses an acceleration of its own for turns, whatever the file says.
   defp turned(state, body) do
     case value(state, [:limits, :max_turn_acceleration]) do
       a when is_number(a) and a > 0 and body.max_turn / a > @slow_s ->
         seconds = round(body.max_turn / a)
 
         why =
-          "with #{a} rad/s2 it would take #{seconds} s to turn at full speed; " <>
-            "Player does not drive by it, and #{body.max_turn_acceleration} is usual"
+          "with #{a} rad/s2 it would take #{seconds} s to reach full turn speed; " <>
+            "Player does not use it, and #{body.max_turn_acceleration} is usual"
 
         leave(state, &match?({[:limits, :max_turn_acceleration], _, _, _}, &1), why)
 
@@ -214,7 +215,7 @@ defmodule Player.Defaults do
         leave(
           state,
           &(elem(&1, 0) == path),
-          "#{value} is not between 0.01 and #{most}, what a #{body.name} can do"
+          "#{value} is not between 0.01 and #{most}, the range of a #{body.name}"
         )
     end
   end

@@ -2,21 +2,22 @@ defmodule Player.Parts do
   @moduledoc """
   Joins a base that a configuration file splits over several drivers. Pure.
 
-  Before Player had one driver `rflex`, it had one for each interface (`rflex_position`, `rflex_sonar`, `rflex_ir`,
-  `rflex_bumper`, `rflex_power`), each in a section of its own, with the same options. They are one base with
-  one line, so they become one section, where the first of them stood. The oldest files write numbers in quotes.
+  Before Player had one driver `rflex`, it had one for each interface (`rflex_position`,
+  `rflex_sonar`, `rflex_ir`, `rflex_bumper`, `rflex_power`), each in a section of its own, with
+  the same options. They are one base with one serial line, so they become one section, in the
+  place of the first of them. The oldest files write numbers in quotes.
   """
   alias Player.{Sections, Tokens}
 
   @parts ~w(rflex_position rflex_sonar rflex_ir rflex_bumper rflex_power rflex_dio rflex_aio)
   @texts ~w(name driver provides requires rflex_serial_port rflex_bumper_style)
 
-  @doc "The names of Player's drivers that are parts of one base."
+  @doc "The names of those drivers of Player that are parts of one base."
   @spec names() :: [String.t()]
   def names, do: @parts
 
   @doc """
-  The sections, those of one base joined.
+  Joins the sections that are parts of one base.
 
       iex> {:ok, file} = Player.Sections.parse(~s|position:0 ( driver "rflex_position" mm_width "540.0" )
       ...>   sonar:0 ( driver "rflex_sonar" num_sonars_in_bank "6 6" )|)

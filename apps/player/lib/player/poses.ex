@@ -6,17 +6,17 @@ defmodule Player.Poses do
   alias Hal.Pose
   alias Player.Units
 
-  # Nearer to the middle a position is no direction.
+  # Nearer to the middle, a position gives no direction.
   @middle 1.0e-6
-  # Some sensors of a bumper's corner look aside; of all of them, on the average, few do.
+  # Some sensors at a corner look aside; on average over all sensors, few do.
   @least 0.5
-  # Some files go on counting beyond a turn, none beyond two.
+  # In some files angles count on beyond one turn, in none beyond two.
   @turns 4 * :math.pi() + 0.01
 
   @type reading :: {name :: atom(), [{number(), number(), Units.angle()}]}
 
   @doc """
-  The readings that the positions allow, in the order given.
+  The interpretations that the positions allow, in the order given.
 
       iex> Player.Poses.fit(radians: [{0, 1, 7.854}], degrees: [{0, 1, {:deg, 7.854}}])
       [:radians]
@@ -47,7 +47,7 @@ defmodule Player.Poses do
   end
 
   @doc """
-  An angle as it is written in a robot file: within a turn.
+  An angle as it is written in a robot file: within one turn.
 
       iex> Player.Poses.angle(7.853982)
       1.570797

@@ -4,7 +4,10 @@ defmodule Player.Render do
 
   @order [:id, :profile, :body, :drive, :ptz, :camera, :colours, :limits, :start, :policies]
 
-  @doc "The text: where it is from and what was assumed, as remarks, and all keys; `modules` are the drivers."
+  @doc """
+  The text of the robot file: comments on its source and on what was assumed, then all keys;
+  `modules` are the drivers.
+  """
   @spec write(Player.Defaults.t(), Path.t(), atom(), atom(), %{atom() => module()}) :: String.t()
   def write(state, file, id, profile, modules) do
     nested =
@@ -33,11 +36,11 @@ defmodule Player.Render do
         "mix robot.check shows what it says; template.exs explains all keys."
       ] ++ if(assumed == [], do: [], else: ["", "Assumed:" | assumed])
 
-    # Into a remark, nothing may go that ends it.
+    # A comment must not contain what would end it.
     Enum.map(lines, &String.replace(&1, ~r/[^\x20-\x7E]/, "?"))
   end
 
-  # In the order of Player's file.
+  # In the order of the lines of Player's file.
   defp nest(all, [key], value), do: all ++ [{key, value}]
 
   defp nest(all, [key | path], value) do

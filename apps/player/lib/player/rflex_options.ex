@@ -1,14 +1,14 @@
 defmodule Player.RFlexOptions do
   @moduledoc """
-  The options of Player's `rflex` driver in ours, one by one; those of its sensors are
-  `Player.Senses`'s. Pure; names, units and defaults of both generations of that driver are those
-  of its documentation.
+  Translates the options of Player's `rflex` driver to ours, one by one; `Player.Senses`
+  translates those of its sensors. Pure. Names, units and defaults of both generations of that
+  driver are taken from its documentation.
   """
   alias Hal.Options.Suggest
   alias Player.{Senses, Units}
 
   @doc """
-  What becomes of one option; `others` are all of that driver.
+  Translates one option; `others` are all options of that driver.
 
       iex> units = %{version: 1, unit_length: 1.0, unit_angle: nil}
       iex> Player.RFlexOptions.option("odo_distance_conversion", 190, units, [])
@@ -39,7 +39,7 @@ defmodule Player.RFlexOptions do
       when is_number(units) and units > 0,
       do: per_metre([:drive, :conversions, :range], units, context, 20)
 
-  # m/s2 or mm/s2; nobody accelerates a robot by more than 10 m/s2.
+  # In m/s2 or mm/s2: no robot accelerates by more than 10 m/s2.
   def option("default_trans_acceleration", value, context, _others)
       when is_number(value) and value > 0 do
     Units.told(Units.length_m(value, context), &[{[:limits, :max_acceleration], &1}])
@@ -49,7 +49,7 @@ defmodule Player.RFlexOptions do
       when is_number(value) and value > 0,
       do: {:ok, [{[:limits, :max_turn_acceleration], value * 1.0}]}
 
-  # Tenths of a volt in the older files, volts in the newer ones.
+  # In tenths of a volt in the older files, in volts in the newer ones.
   def option("rflex_power_offset", offset, context, _others) when is_number(offset) do
     cond do
       context.version == 1 ->
@@ -92,7 +92,7 @@ defmodule Player.RFlexOptions do
             rflex_power_offset rflex_joystick rflex_heading_home_address)
 
   defp reason(name) when is_map_key(@reasons, name), do: @reasons[name]
-  defp reason(name) when name in @known, do: "has a value that it cannot have"
+  defp reason(name) when name in @known, do: "has an impossible value"
   defp reason(name), do: "is not an option of rflex#{Suggest.hint(name, @known)}"
 
   defp per_metre(path, units, context, least) do

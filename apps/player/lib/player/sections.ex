@@ -6,8 +6,8 @@ defmodule Player.Sections do
 
   is `%{type: "driver", line: 1, options: [{"name", 1, "rflex"}, …], sections: []}`. A value is a
   number, a text or `{:tuple, values}`. Sections may hold sections; a section that was named with
-  `define NEW OLD ( … )` stands for the old one with these options. `include` is not followed: it is
-  told with its line.
+  `define NEW OLD ( … )` stands for the old one with these options. `include` is not followed, but
+  reported with its line.
   """
   alias Player.Tokens
 
@@ -30,7 +30,7 @@ defmodule Player.Sections do
         }
 
   @doc """
-  The sections of a file, or its first fault and the line of it.
+  The sections of a file, or its first fault with its line.
 
       iex> {:ok, file} = Player.Sections.parse("driver\\n(\\n  name \\"rflex\\"\\n)")
       iex> file.sections
@@ -40,7 +40,7 @@ defmodule Player.Sections do
   """
   @spec parse(String.t()) :: {:ok, file()} | {:error, {pos_integer(), String.t()}}
   def parse(text) when byte_size(text) > @largest,
-    do: {:error, {1, "no configuration file is larger than #{div(@largest, 1024)} kB"}}
+    do: {:error, {1, "the file is larger than #{div(@largest, 1024)} kB"}}
 
   def parse(text) do
     empty = %{options: [], sections: [], includes: [], defines: %{}, size: 0}
@@ -57,7 +57,7 @@ defmodule Player.Sections do
   end
 
   defp top(_tokens, %{size: size}) when size > @most,
-    do: {:error, {1, "more than #{@most} options, with what define repeats"}}
+    do: {:error, {1, "more than #{@most} options, including those that define repeats"}}
 
   defp top([{:end, _line, nil}], file), do: {:ok, file}
 
@@ -92,9 +92,9 @@ defmodule Player.Sections do
   end
 
   defp top([{_kind, line, value} | _rest], _file),
-    do: {:error, {line, "#{shown(value)} stands where an option or a section should"}}
+    do: {:error, {line, "#{shown(value)} is not an option or a section"}}
 
-  # How much a section holds is counted, so that definitions of definitions end; nobody else needs it.
+  # The size of a section is counted only to limit definitions of definitions.
   defp plain(section),
     do: %{Map.delete(section, :size) | sections: Enum.map(section.sections, &plain/1)}
 
@@ -103,10 +103,10 @@ defmodule Player.Sections do
   defp body(tokens, at, defines, depth, done \\ %{options: [], sections: [], size: 1})
 
   defp body(_tokens, at, _defines, depth, _done) when depth > @deepest,
-    do: {:error, {at, "nothing is nested more than #{@deepest} deep"}}
+    do: {:error, {at, "nested more than #{@deepest} levels deep"}}
 
   defp body(_tokens, at, _defines, _depth, %{size: size}) when size > @most,
-    do: {:error, {at, "more than #{@most} options, with what define repeats"}}
+    do: {:error, {at, "more than #{@most} options, including those that define repeats"}}
 
   defp body([{:mark, _line, ")"} | rest], _at, _defines, _depth, done),
     do:
@@ -132,9 +132,9 @@ defmodule Player.Sections do
   end
 
   defp body([{_kind, line, value} | _rest], _at, _defines, _depth, _done),
-    do: {:error, {line, "#{shown(value)} stands where the name of an option should"}}
+    do: {:error, {line, "#{shown(value)} is not the name of an option"}}
 
-  # What a section gives itself wins over what its definition gave.
+  # A section's own options win over those of its definition.
   defp expand(type, line, body, defines) do
     case defines do
       %{^type => old} ->
@@ -157,7 +157,7 @@ defmodule Player.Sections do
   defp value([{kind, _line, value} | rest], _name, _at, _depth) when kind in [:number, :text],
     do: {:ok, value, rest}
 
-  # Some write words without quotes; on the next line it is the next option.
+  # Some files have words without quotes; a word on the next line is the next option.
   defp value([{:word, line, word} | rest], _name, line, _depth), do: {:ok, word, rest}
 
   defp value([{:mark, at, "["} | rest], _name, _line, depth), do: tuple(rest, at, depth + 1, [])
@@ -165,7 +165,7 @@ defmodule Player.Sections do
   defp value(_other, name, line, _depth), do: {:error, {line, "#{shown(name)} has no value"}}
 
   defp tuple(_tokens, at, depth, _done) when depth > @deepest,
-    do: {:error, {at, "nothing is nested more than #{@deepest} deep"}}
+    do: {:error, {at, "nested more than #{@deepest} levels deep"}}
 
   defp tuple([{:mark, _line, "]"} | rest], _at, _depth, done),
     do: {:ok, {:tuple, Enum.reverse(done)}, rest}

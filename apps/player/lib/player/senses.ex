@@ -5,14 +5,14 @@ defmodule Player.Senses do
   alias Player.{Poses, Units}
 
   @doc """
-  What becomes of one option, `others` being all of that driver; nil of an option that is not a sensor's, or
-  has a value that it cannot have.
+  Translates one option; `others` are all options of that driver. Returns `nil` for an option that
+  is not a sensor's, or has an impossible value.
   """
   @spec option(String.t(), Player.Sections.value(), Units.context(), [tuple()]) ::
           Units.carried() | nil
   def option(name, value, context, others)
 
-  # Theta first, in radians, says the driver; some files have it last.
+  # The driver expects theta first, in radians; some files have it last.
   def option(name, {:tuple, numbers}, context, others)
       when name in ~w(mmrad_sonar_poses mrad_sonar_poses) do
     with {:ok, triples} <- triples(numbers),
@@ -24,12 +24,12 @@ defmodule Player.Senses do
           sensors(first, :sonars, context, fewer)
 
         [:last] ->
-          why = "read as x, y, theta: so they look away from the middle"
+          why = "read as x, y, theta: so they point away from the middle"
           sensors(triples, :sonars, context, join(why, fewer))
 
         [] ->
           {:left,
-           "neither as theta, x, y nor as x, y, theta, in radians, do they look away from the middle"}
+           "neither as theta, x, y nor as x, y, theta, in radians, do they point away from the middle"}
       end
     end
   end
@@ -42,9 +42,14 @@ defmodule Player.Senses do
       boards = if List.keymember?(others, "rflex_banks", 0), do: nil, else: boards(triples)
 
       case looked(fit, said(context), triples) do
-        {:degrees, why} -> sensors(degrees, :irs, context, why |> join(fewer) |> join(boards))
-        {:radians, why} -> sensors(triples, :irs, context, why |> join(fewer) |> join(boards))
-        :neither -> {:left, "neither in radians nor in degrees do they look away from the middle"}
+        {:degrees, why} ->
+          sensors(degrees, :irs, context, why |> join(fewer) |> join(boards))
+
+        {:radians, why} ->
+          sensors(triples, :irs, context, why |> join(fewer) |> join(boards))
+
+        :neither ->
+          {:left, "neither in radians nor in degrees do they point away from the middle"}
       end
     end
   end
@@ -64,7 +69,7 @@ defmodule Player.Senses do
     end
   end
 
-  # That there are as many poses is said of the poses.
+  # The check of the poses reports a number of poses that differs.
   def option("num_sonars_in_bank", {:tuple, banks}, _context, others) do
     count = value("num_sonars", others)
 
@@ -86,7 +91,7 @@ defmodule Player.Senses do
       else: {:left, "0 to 16 bumpers are possible"}
   end
 
-  # Where a bumper is tells which part of the round it guards, in whatever units.
+  # The position of a bumper tells which part of the circumference it guards, in whatever units.
   def option("bumper_def", {:tuple, numbers}, _context, others) do
     bumpers = Enum.chunk_every(numbers, 5)
 
@@ -114,12 +119,12 @@ defmodule Player.Senses do
   def option("num_sonars", count, _context, _others) when is_integer(count) and count > 0,
     do: :used
 
-  # Its driver goes by the boards.
+  # Player's driver uses the boards.
   def option("pose_count", count, _context, others) when is_integer(count) do
     case infrareds(others) do
       {^count, _name} -> :used
       nil -> :used
-      {boards, name} -> {:left, "#{name} adds up to #{boards}, which counts"}
+      {boards, name} -> {:left, "#{name} adds up to #{boards}, and that counts"}
     end
   end
 
@@ -129,7 +134,7 @@ defmodule Player.Senses do
   def option("sonar_age", age, _context, _others) when age in 1..20,
     do: {:ok, [{[:drive, :sonar_age], age}]}
 
-  # Three options of theirs are one of ours; Player puts them together.
+  # Three options of Player's are one of ours; Player combines them.
   def option("sonar_" <> delay, us, _context, _others)
       when delay in ~w(echo_delay ping_delay set_delay) and us in 0..1_000_000,
       do: {:ok, [{[:drive, :sonar_times, time(delay)], us}]}
@@ -173,7 +178,7 @@ defmodule Player.Senses do
     Units.told({places, join(assumed, more)}, &[{[:body, key], &1}])
   end
 
-  # Its driver reads as many as there are sensors, from the first on.
+  # Player's driver reads as many as there are sensors, beginning with the first.
   defp as_many(triples, nil, _sensors), do: {:ok, triples, nil}
 
   defp as_many(triples, {count, name}, sensors) do
@@ -211,7 +216,7 @@ defmodule Player.Senses do
     with {_name, _line, value} <- List.keyfind(others, name, 0), do: value
   end
 
-  # The older driver has degrees; the newer one says degrees and reads radians.
+  # The older driver uses degrees; the newer one documents degrees but reads radians.
   defp said(%{version: 1}), do: :degrees
   defp said(%{unit_angle: unit}), do: unit
 
@@ -231,7 +236,7 @@ defmodule Player.Senses do
         {:degrees, "angles taken for degrees: #{so()}"}
 
       {_both, true} ->
-        {:degrees, "angles taken for degrees: they are above a turn in radians"}
+        {:degrees, "angles taken for degrees: in radians they would be more than a turn"}
 
       {_both, false} ->
         {:radians, nil}
@@ -244,7 +249,7 @@ defmodule Player.Senses do
       else: {hd(fit), "angles taken for #{hd(fit)}, not for #{said}: #{so()}"}
   end
 
-  defp so, do: "so they look away from the middle"
+  defp so, do: "so they point away from the middle"
 
   defp boards(triples) do
     count = length(triples)

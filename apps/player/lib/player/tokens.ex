@@ -3,7 +3,7 @@ defmodule Player.Tokens do
   Splits a configuration file of the Player device server into tokens. Pure.
 
   A token is `{kind, line, value}`: `:word` (also `position:0`), `:number`, `:text` (in `"`),
-  `:mark` (`(`, `)`, `[`, `]`), `:end`. `#` begins a remark; commas count as blanks.
+  `:mark` (`(`, `)`, `[`, `]`), `:end`. `#` begins a comment; commas count as blanks.
   """
 
   @type token :: {:word | :number | :text | :mark | :end, line :: pos_integer(), term()}
@@ -14,7 +14,7 @@ defmodule Player.Tokens do
   @largest 1.0e12
 
   @doc """
-  The tokens of a file, or what cannot be one and its line.
+  The tokens of a file, or what cannot be a token, with its line.
 
       iex> Player.Tokens.cut("fov [ 3 30 ] # degrees")
       {:ok, [{:word, 1, "fov"}, {:mark, 1, "["}, {:number, 1, 3}, {:number, 1, 30}, {:mark, 1, "]"}, {:end, 1, nil}]}
@@ -48,14 +48,14 @@ defmodule Player.Tokens do
     {word, rest} = :erlang.split_binary(text, length)
 
     cond do
-      length > @longest -> {:error, {line, "no word is as long as #{binary_part(word, 0, 40)}…"}}
+      length > @longest -> {:error, {line, "#{binary_part(word, 0, 40)}… is too long a word"}}
       number_like?(word) -> number(word, rest, line, done)
       true -> indexed(word, rest, line, done)
     end
   end
 
   defp cut(<<c, _::binary>>, line, _done),
-    do: {:error, {line, "byte #{c} is not a part of a configuration file"}}
+    do: {:error, {line, "byte #{c} is not allowed in a configuration file"}}
 
   defp unclosed(line), do: {:error, {line, "the text that begins here has no closing \""}}
 
@@ -72,7 +72,7 @@ defmodule Player.Tokens do
 
   defp word_length(_rest, n), do: n
 
-  # An element of an array has its number behind its name, as in pose[0].
+  # An element of an array has its index behind its name, as in pose[0].
   defp indexed(word, rest, line, done) do
     index =
       case Regex.run(~r/^(?:\[\d{1,6}\][\w.]*)+/, rest) do
@@ -104,7 +104,7 @@ defmodule Player.Tokens do
   defp parse("0x" <> digits), do: whole(Integer.parse(digits, 16))
   defp parse("0X" <> digits), do: whole(Integer.parse(digits, 16))
 
-  # As C reads numbers: a sign, zeros in front, a point without digits on one side.
+  # Numbers as C reads them: with a sign, leading zeros, and a point without digits on one side.
   defp parse(word) do
     case Regex.run(~r/^([-+]?)(\d*)(?:\.(\d*))?(?:[eE]([-+]?\d{1,2}))?$/, word) do
       [_, _sign, ""] ->

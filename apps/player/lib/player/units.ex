@@ -2,12 +2,12 @@ defmodule Player.Units do
   @moduledoc """
   Converts lengths and angles of Player's configuration files to metres and radians. Pure.
 
-  Player 1.x writes millimetres and degrees, Player 2 and 3 metres (or the file's `unit_length`) and
-  degrees or radians (`unit_angle`). Files that were taken over from the older to the newer kept
-  their old numbers at times, so that a length above 10 m is taken for millimetres; what was
-  assumed is told.
+  Player 1.x writes millimetres and degrees, Player 2 and 3 metres (or the file's `unit_length`)
+  and degrees or radians (`unit_angle`). Files that were converted from the older to the newer
+  sometimes kept their old numbers, so a length above 10 m is taken for millimetres; what was
+  assumed is reported.
 
-  Angles stay as they are written: `{:deg, 247.5}` is degrees, a number is radians.
+  Angles stay as they are written: `{:deg, 247.5}` is in degrees, a number is in radians.
   """
 
   @typedoc "Player 1.x or later; and what the file says its units are."
@@ -19,8 +19,8 @@ defmodule Player.Units do
   @type angle :: float() | {:deg, float()}
 
   @typedoc """
-  What becomes of an option: values for keys of the robot file, perhaps with what was assumed;
-  nothing, as it says nothing of its own; or why it is left out.
+  The result for an option: values for keys of the robot file, perhaps with what was assumed;
+  nothing, if it has no meaning of its own; or why it is left out.
   """
   @type carried ::
           {:ok, [{path :: [atom()], term()}]}
@@ -28,14 +28,14 @@ defmodule Player.Units do
           | :used
           | {:left, String.t()}
 
-  # No robot is as long, no sensor as far from its middle.
+  # No robot is this long, and no sensor this far from its middle.
   @longest_m 10
   # Angles are written from -180 to 180 or from 0 to 360 degrees.
   @turn 2 * :math.pi() + 0.01
 
   @doc """
-  The units of a file, from its global options and the names that its drivers use; `asked` is a
-  person's word for it, or nil.
+  The units of a file, from its global options and the names that its drivers use; `asked` is what
+  a person asked for, or `nil`.
   """
   @spec context([Player.Sections.option()], [Player.Sections.section()], 1 | 2 | nil) ::
           context()
@@ -50,7 +50,8 @@ defmodule Player.Units do
   end
 
   @doc """
-  A length of a driver's option: `{metres, assumed}`, `assumed` is nil or what was taken for granted.
+  The length in a driver's option: `{metres, assumed}`, where `assumed` is `nil` or what was
+  assumed.
 
       iex> Player.Units.length_m(630, %{version: 1, unit_length: 1.0, unit_angle: nil})
       {0.63, nil}
@@ -66,8 +67,8 @@ defmodule Player.Units do
   def length_m(value, %{version: 2}), do: {metres(value * 1.0), nil}
 
   @doc """
-  Places: `[{x, y, angle}]` in metres. All of them are in the same unit, so one that is too far says
-  it for all.
+  Places: `[{x, y, angle}]` in metres. All of them are in the same unit, so one that is too far
+  decides for all.
   """
   @spec places([{number(), number(), angle()}], context()) ::
           {[{float(), float(), angle()}], String.t() | nil}
@@ -88,10 +89,10 @@ defmodule Player.Units do
   end
 
   @doc """
-  Angles of an option whose unit the name does not tell.
+  The angles of an option whose name does not tell the unit.
 
       iex> Player.Units.angles([0, 247.5], %{version: 2, unit_length: 1.0, unit_angle: nil})
-      {[{:deg, 0.0}, {:deg, 247.5}], "angles taken for degrees: they are above a turn in radians"}
+      {[{:deg, 0.0}, {:deg, 247.5}], "angles taken for degrees: in radians they would be more than a turn"}
   """
   @spec angles([number()], context()) :: {[angle()], String.t() | nil}
   def angles(angles, context) do
@@ -101,14 +102,14 @@ defmodule Player.Units do
 
       context.unit_angle == nil and Enum.any?(angles, &(abs(&1) > @turn)) ->
         {Enum.map(angles, &{:deg, &1 * 1.0}),
-         "angles taken for degrees: they are above a turn in radians"}
+         "angles taken for degrees: in radians they would be more than a turn"}
 
       true ->
         {Enum.map(angles, &radians/1), nil}
     end
   end
 
-  @doc "A value that may have been assumed, carried to the keys that the function makes of it."
+  @doc "Applies a function that turns a value, which may have been assumed, into keys."
   @spec told({value, String.t() | nil}, (value -> [{[atom()], term()}])) :: carried()
         when value: term()
   def told({value, nil}, pairs), do: {:ok, pairs.(value)}
@@ -118,18 +119,18 @@ defmodule Player.Units do
   @spec radians?(number()) :: boolean()
   def radians?(number), do: abs(number) <= @turn
 
-  @doc "A rounded angle in radians, as `Robot.File` has it."
+  @doc "A rounded angle in radians, as in `Robot.File`."
   @spec radians(number()) :: float()
   def radians(angle), do: Float.round(angle * 1.0, 6)
 
-  @doc "A length, rounded to a micrometre: what more is written comes of a division."
+  @doc "A length, rounded to a micrometre: further digits come from a division."
   @spec metres(number()) :: float()
   def metres(length), do: Float.round(length * 1.0, 6)
 
   defp scale(places, factor),
     do: for({x, y, angle} <- places, do: {metres(x * factor), metres(y * factor), angle})
 
-  # The names of options tell: those of the newer ones lost their millimetres, or have metres.
+  # The names of the options decide: those of later versions have no "mm" any more, or say metres.
   defp version(sections) do
     names = for section <- sections, {name, _line, _value} <- section.options, do: name
     newer? = Enum.any?(names, &(&1 in ~w(m_length m_width mrad_sonar_poses sonar_max_range)))

@@ -8,7 +8,7 @@ defmodule Player.Validate do
 
   @least %{drive: [port: "/dev/null"], ptz: [port: "/dev/null"], camera: [source: "/dev/video0"]}
 
-  @doc "The state with only such values as are allowed one by one; `modules` are the drivers by kind."
+  @doc "Keeps only values that are allowed one by one; `modules` are the drivers by kind."
   @spec allowed(Player.Defaults.t(), %{atom() => module()}) :: Player.Defaults.t()
   def allowed(state, modules) do
     for {path, value, _line, _option} = entry <- state.values,
@@ -27,7 +27,7 @@ defmodule Player.Validate do
     end
   end
 
-  # By itself, and so without what only others of its kind make right.
+  # Checked alone, so without conditions that only other values of its kind fulfil.
   defp refused([kind | path], value, modules) when is_map_key(@least, kind) do
     options = Keyword.merge(@least[kind], nest(path, plain(value)))
 
@@ -36,7 +36,8 @@ defmodule Player.Validate do
 
   defp refused(_path, _value, _modules), do: nil
 
-  # The ends of a time that is put together later are not options; segments go with their count.
+  # The bounds of a time that is assembled later are not options; segments are checked with their
+  # count.
   defp nest([:sonar_times, _name], _us), do: []
   defp nest([:bumpers, :segments], _segments), do: []
   defp nest([key], value), do: [{key, value}]

@@ -1,24 +1,26 @@
 defmodule Mix.Tasks.Robot.Import do
-  @shortdoc "Makes a robot file of a Player configuration"
+  @shortdoc "Makes a robot file from a Player configuration"
   @moduledoc """
   Converts a configuration of the Player device server, 1.x or later, into a robot file.
 
       mix robot.import FILE [-o OUT] [options]
 
-  What Player calls `rflex`, `sonyevid30`, `camerav4l` and `cmvision` is carried over, in metres and
-  radians. What was assumed, and what could not be carried over, is listed with its line and why; a file that
-  leaves open where sensors are, or on which board, is refused with the line.
-  Without OUT the robot file goes to standard output, and all else to standard error. A file with which
-  no robot starts is written too, for you to put right; then what is wrong is told, and the status is 1.
+  What Player calls `rflex`, `sonyevid30`, `camerav4l` and `cmvision` is carried over, in metres
+  and radians. What was assumed, and what could not be carried over, is listed with its line and
+  the reason. A file that leaves open where sensors are, or on which board, is refused with the
+  line. Without OUT the robot file goes to standard output, and everything else to standard error.
+  A robot file that cannot start a robot is written too, for you to correct; then the errors are
+  listed, and the exit status is 1.
 
   Options:
 
-    * `-o OUT`, `--out OUT` - where to write it, as `config/robots/mag2.exs`; never over a file
-    * `--force` - also over a file
+    * `-o OUT`, `--out OUT` - where to write it, such as `config/robots/mag2.exs`; never
+      overwrites a file
+    * `--force` - overwrites a file that exists
     * `--name NAME` - the robot's name; by default that of OUT, else `mag1` or `min1`
     * `--profile KIND` - `magellan` or `atrv_mini`; by default guessed
-    * `--player N` - 1 for Player 1.x (millimetres, degrees), 2 for later ones (metres); by default
-      told by the names of the options
+    * `--player N` - 1 for Player 1.x (millimetres, degrees), 2 for later ones (metres); by
+      default found out from the names of the options
     * `--help` - this text
   """
   use Mix.Task
@@ -42,7 +44,7 @@ defmodule Mix.Tasks.Robot.Import do
         refuse("#{word} is not an option; --help lists them")
 
       {_options, _files, [{word, value} | _]} ->
-        refuse("#{word} cannot be #{value}; --help tells")
+        refuse("#{word} cannot be #{value}; --help explains")
 
       {options, files, []} ->
         run(options, files)
@@ -71,17 +73,17 @@ defmodule Mix.Tasks.Robot.Import do
     end
   end
 
-  # It is there for a person to put right, but nobody shall take it for well.
+  # It is written for a person to correct, but nobody should think that it is right.
   defp judge(text, file, out) do
     with {:ok, robot} <- made(text, file, out),
          {:ok, _config} <- Robot.File.config(robot) do
-      # Whether its devices are here is of no interest yet.
+      # It does not matter yet whether its devices exist here.
       odd = Odd.lines(robot, fn _device -> true end)
-      if odd != [], do: say("Odd; look whether it is meant:")
+      if odd != [], do: say("Odd; check whether this is meant:")
       Enum.each(odd, &say("  #{&1}"))
     else
       {:error, lines} ->
-        say("To be put right; no robot starts with this:")
+        say("To be corrected; no robot starts with this:")
         for line <- List.wrap(lines), do: say("  #{line}")
         exit({:shutdown, 1})
     end
@@ -96,10 +98,10 @@ defmodule Mix.Tasks.Robot.Import do
   end
 
   defp one([file]), do: {:ok, file}
-  defp one([]), do: {:error, "which file? mix robot.import FILE"}
+  defp one([]), do: {:error, "FILE is missing: mix robot.import FILE"}
   defp one(files), do: {:error, "one file at a time, not #{length(files)}"}
 
-  # OUT names the robot unless somebody does, and if it is a robot's name at all.
+  # OUT names the robot unless `--name` does, if OUT is a robot's name at all.
   defp name(options) do
     named = if out = options[:out], do: find(Path.basename(out, ".exs"))
     asked = if name = options[:name], do: find(name)
@@ -113,7 +115,7 @@ defmodule Mix.Tasks.Robot.Import do
         {:error, "--name #{options[:name]} is not a robot: mag1 to mag100, min1 to min100#{hint}"}
 
       named not in [nil, asked] ->
-        {:error, "--name #{asked} does not go with a file named #{named}.exs"}
+        {:error, "--name #{asked} does not match a file named #{named}.exs"}
 
       true ->
         {:ok, asked}
@@ -140,7 +142,7 @@ defmodule Mix.Tasks.Robot.Import do
   defp free(out, _force),
     do:
       if(File.exists?(out),
-        do: {:error, "#{out} is there already; --force writes over it"},
+        do: {:error, "#{out} exists already; --force overwrites it"},
         else: :ok
       )
 
@@ -150,12 +152,12 @@ defmodule Mix.Tasks.Robot.Import do
       {:ok, text}
     else
       {:ok, %File.Stat{type: :regular}} -> {:error, "#{file}: larger than 1 MB"}
-      {:ok, %File.Stat{type: type}} -> {:error, "#{file}: is a #{type}, where a file is needed"}
+      {:ok, %File.Stat{type: type}} -> {:error, "#{file}: is a #{type}, not a file"}
       {:error, reason} -> {:error, "#{file}: #{:file.format_error(reason)}"}
     end
   end
 
-  # A robot file names its colour file from where it is itself.
+  # The path of the colour file in a robot file is relative to the robot file.
   defp colours(file, out) do
     folder = file |> Path.expand() |> Path.dirname()
     target = if out, do: out |> Path.expand() |> Path.dirname(), else: folder
@@ -174,7 +176,7 @@ defmodule Mix.Tasks.Robot.Import do
   end
 
   defp tell(result, file, out) do
-    list("Assumed; look whether it is so:", result.assumed, file)
+    list("Assumed; check whether this is right:", result.assumed, file)
     list("Not carried over:", result.left, file)
     where = if out, do: "#{out} written", else: "#{result.id}"
     next = if out, do: "; mix robot.check #{out} shows what it says", else: ""
@@ -191,7 +193,7 @@ defmodule Mix.Tasks.Robot.Import do
     for {line, what, why} <- remarks, do: say("  #{file}:#{line}: #{what}: #{why}")
   end
 
-  # Standard output may be the robot file.
+  # Standard output may hold the robot file.
   defp say(line), do: IO.puts(:stderr, line)
 
   defp refuse(line) do

@@ -41,11 +41,11 @@ defmodule Mix.Tasks.Robot.ImportTest do
     end
   end
 
-  test "a Player file becomes a robot file that is well", %{tmp_dir: folder, player: file} do
+  test "a Player file becomes a valid robot file", %{tmp_dir: folder, player: file} do
     out = Path.join(folder, "min7.exs")
     told = capture_io(:stderr, fn -> Import.run([file, "-o", out]) end)
     assert told =~ "#{file}:2: sonar_2nd_bank_start: all sonars are one list here"
-    assert told =~ "Assumed; look whether it is so:"
+    assert told =~ "Assumed; check whether this is right:"
     assert told =~ "#{out} written: 1 assumed, 1 not carried over"
 
     assert {:ok, %{id: :min7} = robot} = Robot.File.load(out)
@@ -53,7 +53,7 @@ defmodule Mix.Tasks.Robot.ImportTest do
     assert [%{name: "YellowLandmark"}] = robot.colours.classes
 
     assert refused(Import, [file, "-o", out]) == [
-             "#{out} is there already; --force writes over it"
+             "#{out} exists already; --force overwrites it"
            ]
 
     capture_io(:stderr, fn ->
@@ -63,13 +63,16 @@ defmodule Mix.Tasks.Robot.ImportTest do
     assert {:ok, %{id: :min7, profile: %{name: :magellan}}} = Robot.File.load(out)
   end
 
-  test "what came over and is odd is told at once", %{tmp_dir: folder, player: file} do
+  test "a value that was carried over and is odd is reported at once", %{
+    tmp_dir: folder,
+    player: file
+  } do
     File.write!(file, String.replace(@player, "conversion 190", "conversion 19"))
     out = Path.join(folder, "min7.exs")
     told = capture_io(:stderr, fn -> Import.run([file, "-o", out]) end)
 
     assert told =~
-             "Odd; look whether it is meant:\n  drive: conversions.distance: 19000.0 units a metre"
+             "Odd; check whether this is meant:\n  drive: conversions.distance: 19000.0 units a metre"
 
     File.write!(
       file,
@@ -84,7 +87,7 @@ defmodule Mix.Tasks.Robot.ImportTest do
     assert line =~ "mmrad_sonar_poses: there are poses for 1 sonars, and num_sonars says 3"
   end
 
-  test "elsewhere, the colour file is named by its whole path", %{tmp_dir: folder, player: file} do
+  test "a colour file elsewhere is named by its whole path", %{tmp_dir: folder, player: file} do
     out = Path.join([folder, "robots", "min1.exs"])
     File.mkdir_p!(Path.dirname(out))
     capture_io(:stderr, fn -> Import.run([file, "-o", out]) end)
@@ -105,23 +108,23 @@ defmodule Mix.Tasks.Robot.ImportTest do
              )
   end
 
-  test "a colour file that is not there is told, and the rest is written", %{
+  test "a missing colour file is reported, and the rest is written", %{
     player: file,
     tmp_dir: folder
   } do
     File.rm!(Path.join(folder, "color.cfg"))
     out = Path.join(folder, "min1.exs")
     told = capture_io(:stderr, fn -> assert refused(Import, [file, "-o", out]) == [] end)
-    assert told =~ "colorfile: the colour file is to be put right: "
+    assert told =~ "colorfile: the colour file must be corrected: "
     assert {:error, [line]} = Robot.File.load(out)
     assert line =~ "color.cfg: no such file or directory"
-    assert told =~ "To be put right; no robot starts with this:\n  #{line}\n"
+    assert told =~ "To be corrected; no robot starts with this:\n  #{line}\n"
 
     told = capture_io(:stderr, fn -> capture_io(fn -> refused(Import, [file]) end) end)
     assert told =~ ~r/^  robot file:\d+: colours: .*color.cfg: no such file or directory$/m
   end
 
-  test "a driver that is not known is told with the one that may be meant", context do
+  test "an unknown driver is reported with the one that may be meant", context do
     camera = ~s|driver ( name "camerav41" port "/dev/video1" )\n|
     File.write!(context.player, @player <> camera)
     out = Path.join(context.tmp_dir, "min1.exs")
@@ -131,20 +134,20 @@ defmodule Mix.Tasks.Robot.ImportTest do
              ":4: driver camerav41: none of our drivers does what it does; did you mean camerav4l?"
   end
 
-  test "wrong words are one line", %{tmp_dir: folder, player: file} do
+  test "wrong arguments are an error of one line", %{tmp_dir: folder, player: file} do
     for {words, line} <- [
-          {[], "which file? mix robot.import FILE"},
+          {[], "FILE is missing: mix robot.import FILE"},
           {[file, file], "one file at a time, not 2"},
           {[file, "--outt", "x"], "--outt is not an option; --help lists them"},
           {[file, "--player", "3"], "--player cannot be 3: 1 for 1.x, 2 for later ones"},
-          {[file, "--player", "x"], "--player cannot be x; --help tells"},
+          {[file, "--player", "x"], "--player cannot be x; --help explains"},
           {[file, "--profile", "magelan"],
            "--profile cannot be magelan: magellan or atrv_mini; did you mean magellan?"},
           {[file, "--name", "rover"],
            "--name rover is not a robot: mag1 to mag100, min1 to min100"},
           {[file, "--name", "mag1", "-o", "mag2.exs"],
-           "--name mag1 does not go with a file named mag2.exs"},
-          {[folder], "#{folder}: is a directory, where a file is needed"},
+           "--name mag1 does not match a file named mag2.exs"},
+          {[folder], "#{folder}: is a directory, not a file"},
           {["none.cfg"], "none.cfg: no such file or directory"},
           {[file, "-o", Path.join(folder, "no/x.exs")],
            "#{Path.join(folder, "no/x.exs")} cannot be written: no such file or directory"}
