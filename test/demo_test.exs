@@ -45,7 +45,7 @@ defmodule System.DemoTest do
         {"--kill mag9@3", ~s("mag9")},
         {"--headles", "did you mean --headless?"},
         {"--hardwear 1", "did you mean --hardware?"},
-        {"--robots 2 --hardware min:2", "--hardware min2 is more than there is"},
+        {"--robots 2 --hardware min:2", "--hardware min2 is more than there are"},
         {"--picture /no/such/place/a.svg", "a folder that exists"}
       ] do
     test "refuses #{line} in clear words" do
@@ -164,7 +164,7 @@ defmodule System.DemoTest do
     script = """
     #{demo} --robots 2 --duration 60 >#{file} 2>&1 </dev/null &
     p=$!; n=0
-    until grep -q 'looks round' #{file}; do sleep 0.1; n=$((n + 1)); [ $n -lt 200 ] || exit 1; done
+    until grep -q 'looks around' #{file}; do sleep 0.1; n=$((n + 1)); [ $n -lt 200 ] || exit 1; done
     demo=$(cat /proc/$p/task/$p/children)
     kill -TERM $p; wait $p; echo $?
     for d in $demo; do kill -0 $d 2>/dev/null && echo "$d is left"; done

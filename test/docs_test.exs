@@ -114,7 +114,7 @@ defmodule System.DocsTest do
     "-pa _build/dev/lib/mesh/ebin",
     # What programs print that are not run here.
     "Active: active (running)",
-    "Now 3.00 m straight on.",
+    "Now 3.00 m straight ahead.",
     "distance     1.0240",
     "sample   784 pixels",
     "Assumed; check whether",

@@ -18,7 +18,7 @@ defmodule Console.MixProject do
 
   def application, do: [extra_applications: [:logger, :crypto | for_tests(Mix.env())]]
 
-  # Mix hides applications of OTP that nothing names. The tests read the pictures' XML.
+  # Mix hides applications of OTP that are not listed. The tests read the pictures' XML.
   defp for_tests(:test), do: [:xmerl]
   defp for_tests(_env), do: []
 

@@ -9,9 +9,9 @@ defmodule Console.Demo do
   @progress_ms 100
 
   @doc """
-  Runs `options` with a trial module (`Sim.Trial`) and returns the exit status: 0 when the fleet
-  ended in formation, 2 when it did not, 1 when the run cannot be made. Of the `hooks`, `lines`
-  makes what is to be said of the trial before it runs, and `stop` ends what it leaves behind.
+  Runs `options` with a trial module (`Sim.Trial`) and returns the exit status: 0 if the fleet
+  ended in formation, 2 if it did not, 1 if the run cannot be made. Among the `hooks`, `lines`
+  returns lines to print about the trial before it runs, and `stop` ends what it leaves behind.
   """
   @spec run(Options.t(), module(), lines: (term() -> [String.t()]), stop: (term() -> :ok)) ::
           0 | 1 | 2
@@ -19,7 +19,7 @@ defmodule Console.Demo do
     lines = Keyword.get(hooks, :lines, fn _trial -> [] end)
     stop = Keyword.get(hooks, :stop, fn _trial -> :ok end)
 
-    # With `--json -` the standard output belongs to the report alone.
+    # With `--json -` only the report is written to standard output.
     output = Output.to(if(options.json == "-", do: :stderr, else: :stdio))
 
     case trial_module.new(Options.trial(options)) do
@@ -53,7 +53,7 @@ defmodule Console.Demo do
     end
   end
 
-  @doc "The first line of a run: who, where, and from which seed."
+  @doc "The first line of a run: the robots, the map, the seed and the formation."
   @spec heading(Options.t()) :: String.t()
   def heading(options) do
     {kind, spacing} = options.formation
@@ -62,7 +62,7 @@ defmodule Console.Demo do
       "#{options.map}, seed #{options.seed}, #{kind} with #{Format.decimals(spacing, 1)} m spacing"
   end
 
-  # Paths are kept only for a picture.
+  # Paths are kept only if a picture is wanted.
   defp track(%Options{picture: nil}, _scene), do: nil
   defp track(_options, scene), do: RunTrack.new(scene)
 

@@ -18,12 +18,12 @@ defmodule Console.Fleet do
   end
 
   @doc """
-  A fleet from its text.
+  Parses a fleet.
 
       iex> Console.Fleet.parse("mag:2,min:1")
       {:ok, [:mag1, :mag2, :min1]}
       iex> Console.Fleet.parse("dog:2")
-      {:error, "like mag:4,min:2 (kinds mag and min), 1 to 100 robots together"}
+      {:error, "such as mag:4,min:2 (kinds mag and min), 1 to 100 robots together"}
   """
   @spec parse(String.t()) :: {:ok, [atom()]} | {:error, String.t()}
   def parse(text) do
@@ -37,12 +37,12 @@ defmodule Console.Fleet do
          Enum.sum(counts) in 1..@most do
       {:ok, kinds |> Enum.zip(counts) |> Enum.sort() |> Enum.flat_map(&names/1)}
     else
-      {:error, "like mag:4,min:2 (kinds mag and min), 1 to #{@most} robots together"}
+      {:error, "such as mag:4,min:2 (kinds mag and min), 1 to #{@most} robots together"}
     end
   end
 
   @doc """
-  How people write a fleet's names in one line.
+  A fleet's names in one line, as people write them.
 
       iex> Console.Fleet.describe([:mag1, :mag2, :mag3, :min1])
       "mag1 to mag3, min1"

@@ -2,7 +2,7 @@ defmodule Console.Live do
   @moduledoc """
   The behaviour of a fleet that can be watched and commanded while it runs.
 
-  A view asks for the `scene/1` whenever it wants to draw, and hands on what people type as a
+  A view asks for the `scene/1` whenever it wants to draw, and passes on what people type as a
   command that `Console.Terminal.Prompt` has checked.
   """
   alias Hal.Pose
@@ -19,15 +19,15 @@ defmodule Console.Live do
   @doc "The fleet as it is now."
   @callback scene(live :: term()) :: Sim.Scene.t()
 
-  @doc "Carries a command out, or says in one line why not."
+  @doc "Carries a command out; the error says in one line why not."
   @callback command(live :: term(), command()) :: {:ok, String.t()} | {:error, String.t()}
 
-  @doc "Where its processes of the operating system are, and how to reach them, a line each."
+  @doc "Its processes of the operating system, and how to reach them, one line each."
   @callback lines(live :: term()) :: [String.t()]
 
-  @doc "The result for the report, as `Sim.Trial.result/1` gives it."
+  @doc "The result for the report, as `Sim.Trial.result/1` returns it."
   @callback result(live :: term()) :: map()
 
-  @doc "Ends it, and returns when nothing of it is left."
+  @doc "Ends the fleet, and returns when nothing of it is left."
   @callback stop(live :: term()) :: :ok
 end

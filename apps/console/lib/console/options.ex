@@ -1,7 +1,7 @@
 defmodule Console.Options do
   @moduledoc """
-  What `mix demo` is told, checked once at the door. Pure; the options are one table, from which
-  the help is made too.
+  The options of `mix demo`, checked once when it starts. Pure. One table describes the options
+  and makes the help text.
   """
   alias Console.{Cli, Fleet}
   alias Console.Cli.Parse
@@ -33,8 +33,8 @@ defmodule Console.Options do
   @maps ~w(hall hospital arena)
 
   @doc """
-  Options from a command's arguments, or one line for each thing that is wrong with them.
-  Names of files are meant from `folder`.
+  Options from a command's arguments, or one line for each error in them. Names of files are
+  relative to `folder`.
 
       iex> {:ok, options} = Console.Options.parse(~w(--robots 3 --landmark -2,1))
       iex> {options.robots, options.landmark}
@@ -80,7 +80,7 @@ defmodule Console.Options do
     """
   end
 
-  @doc "What `Sim.Trial.new/1` and `Sim.Fleet.start_link/1` take."
+  @doc "The options for `Sim.Trial.new/1` and `Sim.Fleet.start_link/1`."
   @spec trial(t()) :: map()
   def trial(%__MODULE__{} = options) do
     options
@@ -91,7 +91,10 @@ defmodule Console.Options do
     |> Map.merge(if options.nodes, do: %{nodes: true}, else: %{})
   end
 
-  @doc "Whether the run takes the time that it shows: lockstep has no serial lines and no other processes."
+  @doc """
+  Whether the run must be in real time, because lockstep has no serial lines and no other
+  processes.
+  """
   @spec real_time?(t()) :: boolean()
   def real_time?(%__MODULE__{nodes: nodes?, hardware: hardware}), do: nodes? or hardware != []
 
@@ -111,7 +114,7 @@ defmodule Console.Options do
       {"robots", "N", &Parse.whole(&1, 1..100), "how many robots, 1 to 100 (6)"},
       {"fleet", "mag:N,min:N", &Fleet.parse/1, "or how many of each kind"},
       {"seed", "S", &Parse.whole(&1, 0..4_294_967_295),
-       "chance starts here; same seed, same run (1)"},
+       "of all randomness; the same seed gives the same run (1)"},
       {"map", "NAME", &map(&1, folder),
        "hall, hospital, arena, or FILE.png:WIDTHxHEIGHT in metres (hall)"},
       {"start", "HOW", &Parse.choice(&1, spread: :spread, same: :same),
@@ -130,7 +133,7 @@ defmodule Console.Options do
       {"assign", "HOW", &Parse.choice(&1, chain: :chain, cost: :cost),
        "who takes which place: chain by distance, or least cost (cost)"},
       {"leader-change", "on|off", &Parse.choice(&1, on: true, off: false),
-       "may another robot take over when it sees better? (on)"},
+       "whether another robot takes over when it sees better (on)"},
       {"duration", "S", &Parse.number(&1, 1, 3600),
        "simulated seconds at most (120, hospital 180;\nlive on a terminal: until you quit)"},
       {"headless", nil, nil,
@@ -138,7 +141,7 @@ defmodule Console.Options do
       {"nodes", nil, nil,
        "each robot and the world in a process of its own, a node\nto attach to, to kill -9 and to kill -STOP"},
       {"hardware", "N|mag:N,min:N", &hardware/1,
-       "so many robots, or so many of each kind, have the drivers of real ones,\nand devices emulated on serial lines (0)"},
+       "this many robots, or this many of each kind, use the drivers of real ones\nand devices emulated on serial lines (0)"},
       {"json", "FILE|-", &file(&1, "", folder), "write the report (- is standard output)"},
       {"picture", "FILE.svg", &file(&1, ".svg", folder),
        "draw the paths and the formation error"},
@@ -185,7 +188,7 @@ defmodule Console.Options do
         hint = Suggest.hint(name, ["leader" | Enum.map(robots, &Atom.to_string/1)])
 
         {:error,
-         "--kill names no robot: #{inspect(name)}; there are leader, #{Fleet.describe(robots)}#{hint}"}
+         "--kill names no robot: #{inspect(name)}; allowed are leader, #{Fleet.describe(robots)}#{hint}"}
 
       robot ->
         {:ok, {robot, at_s}}
@@ -209,17 +212,17 @@ defmodule Console.Options do
 
   defp too_much_hardware(asked, robots) do
     {:error,
-     ["--hardware #{asked} is more than there is: the fleet is #{Fleet.describe(robots)}"]}
+     ["--hardware #{asked} is more than there are: the fleet is #{Fleet.describe(robots)}"]}
   end
 
   defp hardware(text) do
     with {:error, _allowed} <- Parse.whole(text, 0..100),
          {:error, _allowed} <- Fleet.parse(text) do
-      {:error, {"a whole number, or like mag:1,min:1 (kinds mag and min),", kind_hint(text)}}
+      {:error, {"a whole number, or such as mag:1,min:1 (kinds mag and min),", kind_hint(text)}}
     end
   end
 
-  # As people type it: a kind without a number, a robot's name.
+  # What people may type instead: a kind without a number, or a robot's name.
   defp kind_hint(text) do
     case Regex.run(~r/^(mag|min)(\d*)$/, text) do
       [_all, kind, _number] -> "; did you mean #{kind}:1?"
@@ -264,7 +267,7 @@ defmodule Console.Options do
 
     cond do
       not String.ends_with?(path, extension) -> {:error, "a file whose name ends in #{extension}"}
-      File.dir?(path) -> {:error, "a file, which a folder is not"}
+      File.dir?(path) -> {:error, "a file, not a folder"}
       not File.dir?(Path.dirname(path)) -> {:error, "a file in a folder that exists"}
       true -> {:ok, path}
     end

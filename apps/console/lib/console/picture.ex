@@ -15,7 +15,7 @@ defmodule Console.Picture do
   @plot_height 190
   @ink "#22262B"
 
-  @doc "The drawing of a track, under a title."
+  @doc "The drawing of a track, with a title."
   @spec draw(RunTrack.t(), String.t()) :: iodata()
   def draw(%RunTrack{} = track, title) do
     ground = Console.Picture.Floorplan.of(track.first.map)
@@ -62,7 +62,7 @@ defmodule Console.Picture do
   end
 
   @doc """
-  A title from what was asked for.
+  A title from the options of the run.
 
       iex> Console.Picture.title(6, "hall", 7)
       "6 robots in hall, seed 7"

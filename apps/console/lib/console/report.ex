@@ -38,7 +38,7 @@ defmodule Console.Report do
     |> object(@keys)
   end
 
-  @doc "The report as JSON, one line with its line end."
+  @doc "The report as JSON: one line with a newline at its end."
   @spec json(map(), float()) :: iodata()
   def json(result, wall_s), do: [Hal.Json.encode!(term(result, wall_s)), "\n"]
 
@@ -56,8 +56,8 @@ defmodule Console.Report do
   end
 
   @doc """
-  Writes the report and the picture where the options say. `drawing` takes no argument and is called
-  only if a picture is wanted.
+  Writes the report and the picture to the files that the options name. `drawing` takes no
+  argument and is called only if a picture is wanted.
   """
   @spec write(Console.Options.t(), iodata(), (... -> iodata()) | nil, Output.t()) ::
           :ok | {:error, String.t()}
@@ -92,7 +92,7 @@ defmodule Console.Report do
   defp value(list) when is_list(list), do: Enum.map(list, &value/1)
   defp value(other), do: other
 
-  # -0.0 and 0.0 are one number and must be one text.
+  # -0.0 and 0.0 are the same number and must be the same text.
   defp tidy(zero) when zero == 0.0, do: 0.0
   defp tidy(float), do: float
 
@@ -112,7 +112,7 @@ defmodule Console.Report do
   defp error(%{error_mean_m: nil}), do: ""
 
   defp error(formation) do
-    ", off their places by #{Format.decimals(formation.error_mean_m, 2)} m in the mean" <>
+    ", off their places by #{Format.decimals(formation.error_mean_m, 2)} m on average" <>
       " and #{Format.decimals(formation.error_max_m, 2)} m at most"
   end
 
@@ -161,7 +161,7 @@ defmodule Console.Report do
         "#{collisions}."
 
       metres ->
-        "#{collisions}; nobody came nearer to another than #{Format.decimals(metres, 2)} m."
+        "#{collisions}; no two robots came closer than #{Format.decimals(metres, 2)} m."
     end
   end
 

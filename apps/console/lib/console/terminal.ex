@@ -1,9 +1,10 @@
 defmodule Console.Terminal do
   @moduledoc """
-  The full-screen view of a fleet as a function: a scene and a screen size give the text to write. Pure.
+  The full-screen view of a fleet as a function of a scene and a screen size: returns the text to
+  write. Pure.
 
-  From the top: what is going on, the map beside the robots' table, what happened last, answers
-  to commands, three things to try, the prompt.
+  From the top: the state of the fleet, the map beside the table of robots, the last stages,
+  answers to commands, three things to try, the prompt.
   """
   alias Console.Cli.Format
   alias Console.Picture.Floorplan
@@ -14,7 +15,7 @@ defmodule Console.Terminal do
 
   defstruct columns: 80, rows: 24, editor: %Editor{}, messages: [], overlay: nil, floor: nil
 
-  @typedoc "What the view knows beside the scene; `messages` are answers, the newest first."
+  @typedoc "What the view keeps besides the scene; `messages` are answers, the newest first."
   @type t :: %__MODULE__{
           columns: pos_integer(),
           rows: pos_integer(),
@@ -24,11 +25,11 @@ defmodule Console.Terminal do
           floor: Canvas.floor() | nil
         }
 
-  @doc "What switches the terminal to a screen of our own."
+  @doc "The escape sequence that switches the terminal to a screen of our own."
   @spec enter() :: String.t()
   def enter, do: "\e[?1049h\e[?7l\e[2J"
 
-  @doc "What gives the terminal back as it was."
+  @doc "The escape sequence that restores the terminal."
   @spec leave() :: String.t()
   def leave, do: "\e[0m\e[?7h\e[?25h\e[?1049l"
 
@@ -36,7 +37,7 @@ defmodule Console.Terminal do
   @spec hint() :: String.t()
   def hint, do: @try
 
-  @doc "The whole screen, and the view to go on with."
+  @doc "The whole screen, and the next state of the view."
   @spec frame(Scene.t(), t()) :: {iodata(), t()}
   def frame(%Scene{} = scene, %__MODULE__{} = view) do
     {rows, view} = rows(scene, view)
@@ -134,13 +135,14 @@ defmodule Console.Terminal do
     List.duplicate([], count - length(lines)) ++ lines
   end
 
-  # Its rows with the last first; of one too long for all rows the beginning says most.
+  # The rows with the last message first; of a message too long for all rows, the beginning says
+  # most.
   defp answer({text, style}, columns, count) do
     for row <- text |> Format.rows(max(columns - 2, 20)) |> Enum.take(count) |> Enum.reverse(),
         do: [{" " <> row, style}]
   end
 
-  # A line longer than the screen scrolls, so that the cursor stays in sight.
+  # A line longer than the screen scrolls, so that the cursor stays visible.
   defp prompt(view),
     do: [{"> ", :prompt}, {String.slice(Editor.text(view.editor), shift(view)..-1//1), :plain}]
 

@@ -18,11 +18,13 @@ defmodule Console.CalibrateColourTest do
     {result, text}
   end
 
-  test "the simulated landmark becomes a colour that finds it, and only it", %{tmp_dir: folder} do
+  test "the simulated landmark becomes a colour that finds it and nothing else", %{
+    tmp_dir: folder
+  } do
     {file, picture} = {Path.join(folder, "c.txt"), Path.join(folder, "look.png")}
     words = @sim ++ ["--metres", "2", "--colours", file, "--write", "--picture", picture]
     assert {:ok, text} = run(words)
-    assert text =~ "inside   1200 of 1200 pixels are taken for YellowLandmark (100.0 %)"
+    assert text =~ "inside   1200 of 1200 pixels count as YellowLandmark (100.0 %)"
     assert text =~ "all of them next to your places"
     refute text =~ "WARNING"
     assert text =~ ~r/distance: %\{"YellowLandmark" => 0\.3\d+\}/
@@ -34,12 +36,12 @@ defmodule Console.CalibrateColourTest do
     assert blob.colour == "YellowLandmark"
     assert abs(blob.x - 133) < 3
 
-    # The thesis's own limits are inside of what was found.
+    # The thesis's own limits are within those that were found.
     [%{y: {y, _}, u: {u0, u1}, v: {v0, v1}}] = colours.classes
     assert y <= 170 and u0 <= 60 and u1 >= 90 and v0 <= 130 and v1 >= 145
   end
 
-  test "it is put among others, once a person says so", %{tmp_dir: folder} do
+  test "it is added to a colour file once a person agrees", %{tmp_dir: folder} do
     file = Path.join(folder, "c.txt")
     before = "# Ours.\n[Colors]\n(255,0,0) 0.5 4 Red\n\n[Thresholds]\n( 40:160, 81:125,165:255)\n"
     File.write!(file, before)
@@ -55,14 +57,14 @@ defmodule Console.CalibrateColourTest do
     assert {:ok, %{classes: [%{name: "Red"}, %{name: "YellowLandmark"}]}} =
              Vision.Colours.read(file)
 
-    # Nobody there is no yes.
+    # No answer is not a yes.
     written = File.read!(file)
     assert {:ok, text} = run(@sim ++ ["--light", "5", "--colours", file], "")
     assert text =~ "not written; --write writes it"
     assert File.read!(file) == written
   end
 
-  test "background that matches, boxes of two colours, and nothing there are told", %{
+  test "matching background, boxes of two colours, and missing blobs are reported", %{
     tmp_dir: folder
   } do
     two = Path.join(folder, "two.ppm")
@@ -80,10 +82,10 @@ defmodule Console.CalibrateColourTest do
     assert {:ok, text} = run([two | ~w(--box 14,24,12,12 --name Y)])
 
     assert text =~
-             ~r/WARNING: background is taken for Y: (360|38\d|400) pixels, the largest blob \(\d+\) at (59|60),30/
+             ~r/WARNING: background counts as Y: (360|38\d|400) pixels, the largest blob \(\d+\) at (59|60),30/
 
     assert {:ok, text} = run(~w(sim --box 90,80,70,60 --name Mixed))
-    assert text =~ "of the sample are of another colour and were left out"
+    assert text =~ "of the sample have another colour and were left out"
 
     assert {:ok, text} = run(~w(sim --point 133,100 --name Y --min-area 100000))
     assert text =~ "no blob of at least 100000 pixels is left where you pointed"
@@ -94,7 +96,7 @@ defmodule Console.CalibrateColourTest do
     assert text =~ ~r/\[Colors\]\n.* YellowLandmark\n\n\[Thresholds\]\n\(/
   end
 
-  test "wrong words and sources are told in a line", %{tmp_dir: folder} do
+  test "wrong arguments and sources are an error of one line", %{tmp_dir: folder} do
     broken = Path.join(folder, "broken.txt")
     File.write!(broken, "[Colors]\n(255,0,0) 0.5 4 Red\n[Thresholds]\n(1:2,3:4,5:6)\n")
     assert {{:error, line}, _} = run(@sim ++ ["--colours", broken, "--write"])
@@ -106,9 +108,9 @@ defmodule Console.CalibrateColourTest do
 
     for {words, line} <- [
           {~w(--box 1,1,5,5 --name A),
-           "which picture? a picture, video, stream, /dev/video0 or sim"},
-          {~w(sim --name A), "where is it? --box X,Y,WIDTH,HEIGHT or --point X,Y"},
-          {~w(sim --point 1,1), "what is it called? --name NAME"},
+           "SOURCE is missing: a picture, video, stream, /dev/video0 or sim"},
+          {~w(sim --name A), "--box X,Y,WIDTH,HEIGHT or --point X,Y is missing"},
+          {~w(sim --point 1,1), "--name NAME is missing"},
           {~w(sim --point 1,-1 --name A),
            ~s(--point cannot be "1,-1": X,Y in pixels from the top left is allowed)},
           {~w(sim a.png --point 1,1 --name A), "2 sources (sim, a.png): one is allowed"},

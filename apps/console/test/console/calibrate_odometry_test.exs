@@ -1,5 +1,8 @@
 defmodule Console.CalibrateOdometryTest do
-  @moduledoc "The whole way of a real robot, from its file to its file: real driver, emulated base, a person who types."
+  @moduledoc """
+  The whole calibration of a real robot, from its file to its file: real driver, emulated base, a
+  person who types.
+  """
   use ExUnit.Case, async: false
   import ExUnit.CaptureIO
   alias Console.Calibrate.{Odometry, Options, Report}
@@ -17,7 +20,8 @@ defmodule Console.CalibrateOdometryTest do
   doctest Robot.Calibration.Keys
 
   @moduletag :tmp_dir
-  # What the file says; the emulated base has these units, but for what is wrong with its wheels.
+  # The values of the file; the emulated base has these units, except for the errors of its
+  # wheels.
   @conversions "distance: 31387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0"
 
   defp base(folder, wheels) do
@@ -48,7 +52,7 @@ defmodule Console.CalibrateOdometryTest do
     file = Path.join(folder, "mag1.exs")
 
     File.write!(file, """
-    # Ours.
+    # Our message.
     [
       id: :mag1,
       profile: :magellan,
@@ -71,7 +75,7 @@ defmodule Console.CalibrateOdometryTest do
     |> Task.await(120_000)
   end
 
-  # He measures from where the robot stood when he said go.
+  # The person measures from where the robot stood at "go".
   defp measure(server, answers) do
     Person.start(fn text ->
       truth = fn -> World.truth(World.Server.world(server), :mag1) end
@@ -98,7 +102,7 @@ defmodule Console.CalibrateOdometryTest do
     end)
   end
 
-  test "a robot is driven, measured, and its file put right", %{tmp_dir: folder} do
+  test "a robot is driven and measured, and its file is corrected", %{tmp_dir: folder} do
     {server, file} = base(folder, distance: 1.04, base: 1.05)
     before = File.read!(file)
     person = measure(server, %{})
@@ -106,23 +110,23 @@ defmodule Console.CalibrateOdometryTest do
 
     assert run(words, person) == :ok
     heard = Person.heard(person)
-    assert heard =~ "Now 0.80 m straight on."
+    assert heard =~ "Now 0.80 m straight ahead."
     assert heard =~ ~r/distance     1\.0[34]\d+ \(\+/
     assert heard =~ ~r/5 - +drive: .*distance: 31387.0, angle: 4654.2/
 
     {:ok, robot} = Robot.File.load(file)
     {_driver, options} = robot.drive
     conversions = options[:conversions]
-    # A course of 0.8 m and of a quarter turn tells no more than this.
+    # A course of 0.8 m and a quarter turn is not more precise than this.
     assert_in_delta conversions[:distance] / (31_387.0 / 1.04), 1.0, 0.005
     assert_in_delta conversions[:angle] / (4654.2 * 1.05 / 1.04), 1.0, 0.01
     assert conversions[:range] == 1474.0
-    # All else is as it was, remarks too.
+    # Everything else is unchanged, comments too.
     assert length(Diff.lines(before, File.read!(file))) == 2
     assert Robot.Names.whereis(:mag1, :robot) == nil
   end
 
-  test "whatever is typed while it drives stops it, and holds it until reset", %{tmp_dir: folder} do
+  test "any input while it drives stops it, and holds it until reset", %{tmp_dir: folder} do
     {server, file} = base(folder, [])
     before = File.read!(file)
     me = self()
@@ -165,12 +169,12 @@ defmodule Console.CalibrateOdometryTest do
       end)
 
     stop.()
-    assert {:error, "ended by hand; nothing is written"} = Task.await(task, 60_000)
+    assert {:error, "ended by the user; nothing is written"} = Task.await(task, 60_000)
     assert_received {:stopped, pose, true}
     assert pose.x < 1.0
     assert World.truth(World.Server.world(server), :mag1).x - pose.x < 0.15
     assert Person.heard(person) =~ "EMERGENCY STOP: mag1 is held"
-    assert Person.heard(person) =~ "stopped by hand"
+    assert Person.heard(person) =~ "stopped by the user"
     assert File.read!(file) == before
   end
 
@@ -181,7 +185,7 @@ defmodule Console.CalibrateOdometryTest do
     end
   end
 
-  test "an emergency stop of before holds it until a person resets it", %{tmp_dir: folder} do
+  test "an earlier emergency stop holds it until a person resets it", %{tmp_dir: folder} do
     {server, file} = base(folder, [])
     latch = Path.join(folder, "estop")
     File.write!(latch, "")
@@ -198,24 +202,24 @@ defmodule Console.CalibrateOdometryTest do
       end)
 
     words = [file, "--distance", "1", "--angle", "0", "--squares", "0"]
-    assert {:error, "ended by hand; nothing is written"} = run(words, person)
+    assert {:error, "ended by the user; nothing is written"} = run(words, person)
     assert Person.heard(person) =~ "reset releases an emergency stop"
     refute File.exists?(latch)
     assert World.truth(World.Server.world(server), :mag1) == Pose.new(0, 0)
   end
 
-  test "nobody there: no wheel turns", %{tmp_dir: folder} do
+  test "without a person no wheel turns", %{tmp_dir: folder} do
     {server, file} = base(folder, [])
 
     capture_io("", fn ->
       {:ok, options} = Options.parse([file])
-      assert Odometry.run(options) == {:error, "ended by hand; nothing is written"}
+      assert Odometry.run(options) == {:error, "ended by the user; nothing is written"}
     end)
 
     assert World.truth(World.Server.world(server), :mag1) == Pose.new(0, 0)
   end
 
-  test "a dry run tells, and needs no robot", %{tmp_dir: folder} do
+  test "a dry run prints the plan, and needs no robot", %{tmp_dir: folder} do
     file = Path.join(folder, "mag2.exs")
 
     File.write!(
@@ -252,7 +256,7 @@ defmodule Console.CalibrateOdometryTest do
     assert File.read!(file) =~ "# from the old file: distance: 5"
   end
 
-  test "wrong words are told", %{tmp_dir: folder} do
+  test "wrong arguments are reported", %{tmp_dir: folder} do
     for {words, line} <- [
           {~w(mag1.exs --side 0.1), ~s(--side cannot be "0.1": a number from 1 to 20 is allowed)},
           {~w(mag1.exs --distance 0.1),
@@ -261,7 +265,7 @@ defmodule Console.CalibrateOdometryTest do
            ~s(--squares cannot be "1e9": a whole number from 0 to 50 is allowed)},
           {~w(mag1.exs --cw 1),
            ~s(--cw cannot be "1": X,Y in metres, each from -1000 to 1000 is allowed)},
-          {~w(mag1.exs --seed 3), "--seed is for a simulated robot: with --simulate"},
+          {~w(mag1.exs --seed 3), "--seed is for a simulated robot: add --simulate"},
           {~w(mag1.exs --simulate), "a simulated robot has no file: mag1.exs or --simulate"},
           {~w(mag1.exs mag2.exs), "one robot file at a time, not 2: mag1.exs, mag2.exs"},
           {~w(mag1.exs --dry-rum), ~s(unknown option --dry-rum; did you mean --dry-run?)}
@@ -281,21 +285,21 @@ defmodule Console.CalibrateOdometryTest do
     {:ok, options} = Options.parse([dry])
 
     capture_io(fn ->
-      assert Odometry.run(options) == {:error, "#{dry}: dry_run: is true: nothing would move"}
+      assert Odometry.run(options) == {:error, "#{dry}: dry_run is true, so nothing would move"}
     end)
 
     {:ok, options} = Options.parse(~w(--cw 0.1,0.1))
     assert {:error, "no square was driven counter-clockwise" <> _} = Odometry.run(options)
   end
 
-  test "slip leaves the wheel ratio alone, and is told" do
+  test "slip leaves the wheel ratio unchanged, and is reported" do
     runs = for d <- [:cw, :ccw], k <- [-1, 1], do: {d, {0.1 + k * 0.3, 0.1}}
     measured = %{distances: [], angles: [{6.28, 6.6}, {-6.28, -6.0}], runs: runs, side: 4.0}
     {:ok, _wheels, squares} = Robot.Calibration.estimate(measured, 0.3)
     assert Report.found(measured) == [:base]
     assert [slip, unsure | _] = Report.remarks(squares, measured)
     assert slip =~ "its wheels slip"
-    assert unsure =~ ~r/the squares scatter: .* \d+ squares each way would do/
+    assert unsure =~ ~r/the squares scatter: .* \d+ squares in each direction would suffice/
   end
 
   test "seeds are run and judged" do

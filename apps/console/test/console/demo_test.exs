@@ -8,7 +8,7 @@ defmodule Console.DemoTest do
     {status, text}
   end
 
-  test "tells each stage once, then the outcome" do
+  test "prints each stage once, then the outcome" do
     {status, text} = demo("--kill mag2@40")
     assert status == 0
     lines = String.split(text, "\n", trim: true)
@@ -24,7 +24,7 @@ defmodule Console.DemoTest do
     assert text =~ "No formation"
   end
 
-  test "refuses in one line what the trial refuses" do
+  test "refuses in one line the options that the trial refuses" do
     options = %{Runs.options("") | map: "nowhere"}
 
     assert capture_io(:stderr, fn -> assert Demo.run(options, FakeTrial) == 1 end) ==
@@ -41,7 +41,7 @@ defmodule Console.DemoTest do
     assert File.read!(svg) =~ "<svg"
   end
 
-  test "with --json - the standard output is the report alone" do
+  test "with --json - only the report goes to standard output" do
     told = capture_io(:stderr, fn -> send(self(), demo("--json -")) end)
     assert_received {0, text}
     assert [json] = String.split(text, "\n", trim: true)

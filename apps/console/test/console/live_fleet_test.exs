@@ -3,7 +3,7 @@ defmodule Console.LiveFleetTest do
   alias Console.{Live, Options}
   @moduletag :capture_log
 
-  test "people command whole robots, and are told what is wrong" do
+  test "people command whole robots, and errors say what is wrong" do
     options = Options.trial(%Options{robots: [:mag61, :min61], blobs: :direct})
     {:ok, live} = Live.Fleet.start_link(options)
     assert [%{id: :mag61}, %{id: :min61}] = Live.Fleet.scene(live).robots
@@ -30,7 +30,7 @@ defmodule Console.LiveFleetTest do
 
     assert {:ok, "done"} = Live.Fleet.command(live, {:kill, :mag61})
 
-    # What a robot's parts log when they are cut off belongs to this test.
+    # What a robot's processes log when they are cut off belongs to this test.
     for monitor <- monitors, do: assert_receive({:DOWN, ^monitor, _, _, _}, 2_000)
     Swarm.Case.eventually(fn -> Swarm.Directory.robots() == [:min61] end)
 

@@ -11,7 +11,7 @@ defmodule Console.LiveTest do
     live = start("--robots 3")
     assert length(Live.Trial.scene(live).robots) == 3
     assert {:ok, _} = Live.Trial.command(live, {:kill, :mag2})
-    assert {:error, "mag2 is dead already"} = Live.Trial.command(live, {:kill, :mag2})
+    assert {:error, "mag2 is already dead"} = Live.Trial.command(live, {:kill, :mag2})
     assert {:error, "there is no leader" <> _} = Live.Trial.command(live, {:kill, :leader})
     assert {:ok, _} = Live.Trial.command(live, {:formation, {:wedge, nil}})
     assert Live.Trial.scene(live).formation == {:wedge, 1.0}

@@ -14,7 +14,7 @@ defmodule Console.OptionsTest do
     Enum.join(lines, "\n")
   end
 
-  test "everything that can be said is understood" do
+  test "every option is understood" do
     {:ok, options} =
       parse(
         "--fleet mag:4,min:2 --seed 7 --map hospital --start same --landmark=-2,1 --move -3,2@40 " <>
@@ -47,7 +47,7 @@ defmodule Console.OptionsTest do
            }
   end
 
-  test "hardware are the first robots, or the first of a kind, and take real time" do
+  test "hardware is the first robots, or the first of a kind, and runs in real time" do
     {:ok, options} = parse("--robots 4 --hardware 3")
     assert options.hardware == [:mag1, :mag2, :min1]
     {:ok, options} = parse("--hardware mag:1,min:1")
@@ -63,7 +63,7 @@ defmodule Console.OptionsTest do
 
     for wrong <- ~w(-1 1.5 dog:1 mag:x 101 nan) do
       assert error("--hardware #{wrong}") ==
-               "--hardware cannot be #{inspect(wrong)}: a whole number, or like mag:1,min:1 (kinds mag and min), is allowed"
+               "--hardware cannot be #{inspect(wrong)}: a whole number, or such as mag:1,min:1 (kinds mag and min), is allowed"
     end
 
     for {line, asked} <- [
@@ -72,11 +72,11 @@ defmodule Console.OptionsTest do
           {"--fleet mag:3 --hardware min:1", "min1"},
           {"--robots 3 --hardware mag:3", "mag3"}
         ] do
-      assert error(line) =~ "--hardware #{asked} is more than there is: the fleet is mag1"
+      assert error(line) =~ "--hardware #{asked} is more than there are: the fleet is mag1"
     end
   end
 
-  test "without options six robots in the hall" do
+  test "without options there are six robots in the hall" do
     {:ok, options} = parse("")
     assert length(options.robots) == 6
     assert Options.trial(options).duration_s == 120.0
@@ -112,7 +112,7 @@ defmodule Console.OptionsTest do
   end
 
   test "a robot that does not exist is refused" do
-    assert error("--kill mag9@3") =~ ~s("mag9"; there are leader, mag1 to mag3, min1 to min3)
+    assert error("--kill mag9@3") =~ ~s("mag9"; allowed are leader, mag1 to mag3, min1 to min3)
   end
 
   test "typing errors get a suggestion, and a missing value its form" do

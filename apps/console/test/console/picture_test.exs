@@ -8,7 +8,7 @@ defmodule Console.PictureTest do
   doctest Console.Picture
   doctest Console.Picture.Colours
 
-  # Raises on anything that is no well-formed XML.
+  # Raises on anything that is not well-formed XML.
   defp parse(drawing) do
     {document, []} =
       drawing |> IO.iodata_to_binary() |> :binary.bin_to_list() |> :xmerl_scan.string(quiet: true)
@@ -18,7 +18,7 @@ defmodule Console.PictureTest do
 
   defp count(document, path), do: length(:xmerl_xpath.string(to_charlist(path), document))
 
-  test "everybody has a way, the landmark too, and stages are marked on floor and plot" do
+  test "every robot and the landmark have a path, and stages are marked on floor and plot" do
     document =
       "--move 3,2@30 --kill mag2@60"
       |> Runs.track()
@@ -26,7 +26,7 @@ defmodule Console.PictureTest do
       |> parse()
 
     assert count(document, "/svg") == 1
-    # Six ways, the landmark's, and the two curves of the error.
+    # Six paths, the landmark's, and the two curves of the error.
     assert count(document, "//polyline") >= 9
     assert count(document, "//text[.='killed: mag2']") == 1
     assert count(document, "//text[.='formation error (m)']") == 1
@@ -42,7 +42,7 @@ defmodule Console.PictureTest do
     end
   end
 
-  test "long waits add no points to a way" do
+  test "long waits add no points to a path" do
     short = Runs.track("--landmark none --duration 10")
     assert Enum.all?(Map.values(short.ways), &(length(&1) < 5))
   end

@@ -67,7 +67,7 @@ defmodule Console.ReportTest do
     assert first =~ "No formation: 6 robots"
   end
 
-  test "report and summary say what each claim of formed was worth" do
+  test "report and summary say how true each claim of formed was" do
     result = result("")
     [claim] = fetch(Report.term(result, 1.0), :claims)
     assert {fetch(claim, :worst_m), fetch(claim, :worst_5s_m)} == {0.211, 0.622}
@@ -75,7 +75,7 @@ defmodule Console.ReportTest do
     assert line =~ "Formed was wrongly claimed 1 time: a robot was 0.62 m off."
   end
 
-  test "the summary names who is blocked, and by what" do
+  test "the summary names the robots that are blocked, and by what" do
     result = result("")
     [first | rest] = result.fleet
     blocked = %{result | fleet: [%{first | blocked_by: "the landmark"} | rest]}
@@ -83,7 +83,7 @@ defmodule Console.ReportTest do
     refute hd(Report.summary(result, false, 2.0)) =~ "Blocked"
   end
 
-  test "the report says how sure each robot is, the summary who is not sure enough to be in place" do
+  test "the report says how sure each robot is, the summary which are not sure enough to be in place" do
     result = result("")
     [first, second | rest] = result.fleet
     doubt = fn robot -> %{robot | state: :unsure, uncertainty_m: 0.6184} end
@@ -102,18 +102,18 @@ defmodule Console.ReportTest do
     assert IO.iodata_to_binary(Report.json(unknown, 1.0)) =~ ~s("uncertainty_m":null)
   end
 
-  test "a robot in a line says how sure it is of its pose" do
+  test "a robot's line says how sure it is of its pose" do
     scene = Runs.scene("", 12)
     [first | rest] = scene.robots
     line = fn robot -> hd(Console.Cli.Format.one(%{scene | robots: [robot | rest]}, robot.id)) end
 
     assert line.(%{first | leader?: false, state: :unsure, uncertainty: 0.618}) =~
-             ~r/^mag1: in its slot, but not sure of its place, at .* degrees, ±0\.62 m by its own word/
+             ~r/^mag1: in its slot, but not sure of its place, at .* degrees, ±0\.62 m by its own estimate/
 
     refute line.(%{first | uncertainty: nil}) =~ "±"
   end
 
-  test "the summary tells a formation from none" do
+  test "the summary says whether there is a formation" do
     result = result("")
     assert hd(Report.summary(result, true, 2.0)) =~ "In formation: column of 6 led by"
     assert hd(Report.summary(result, false, 2.0)) =~ "Not in formation"

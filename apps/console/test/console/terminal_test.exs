@@ -52,13 +52,13 @@ defmodule Console.TerminalTest do
     assert text =~ "Try:  kill leader"
   end
 
-  test "the dead are shown where they lie" do
+  test "dead robots are shown where they lie" do
     text = "--kill mag2@3" |> Runs.scene(12) |> screen(80, 24) |> Enum.join("\n")
     assert text =~ "✗"
     assert text =~ ~r/mag2\s+dead/
   end
 
-  test "each robot shows how sure it is, and one that is not sure of its place says so" do
+  test "each robot shows how sure it is, and an unsure one is shown as not sure" do
     scene = Runs.scene("", 12)
 
     for columns <- [80, 120] do
@@ -67,7 +67,7 @@ defmodule Console.TerminalTest do
       assert text =~ ~r/mag2 +follow +\d+\.\d\d ±0\.04 ◆ 0\.9/
 
       rows = scene |> doubt(:mag3, 0.6184) |> screen(columns, 24)
-      # Below the leader, since it needs attention.
+      # It comes right after the leader, because it needs attention.
       at = fn name -> Enum.find_index(rows, &(&1 =~ ~r/ #{name} +(lead|not sure|follow) /)) end
       assert at.("mag1") < at.("mag3") and at.("mag3") < at.("mag2")
       assert Enum.at(rows, at.("mag3")) =~ ~r/mag3 +not sure +\d+\.\d\d ±0\.62 ◆/
@@ -94,12 +94,12 @@ defmodule Console.TerminalTest do
     %{scene | robots: robots}
   end
 
-  test "of a hundred robots those without a row are counted" do
+  test "of a hundred robots, those without a row are counted" do
     text = "--robots 100" |> Runs.scene(12) |> screen(80, 24) |> Enum.join("\n")
     assert text =~ ~r/… and \d+: \d+ follow/
   end
 
-  test "the last line is what is typed, its end in sight" do
+  test "the last line is what is typed, with its end visible" do
     editor =
       Enum.reduce(String.graphemes("goto mag1 1,2"), Editor.new([]), &elem(Editor.key(&2, &1), 1))
 
@@ -111,7 +111,7 @@ defmodule Console.TerminalTest do
     assert String.length(List.last(screen(Runs.scene("", 1), 40, 24, editor: long))) < 40
   end
 
-  test "the walls are shown all round, whatever the screen" do
+  test "the walls are shown all around, whatever the screen size" do
     scene = Runs.scene("", 1)
     room = MapView.room("hall", 18.0, 18.0)
 

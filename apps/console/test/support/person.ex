@@ -1,10 +1,12 @@
 defmodule Console.Person do
   @moduledoc """
-  Somebody at a terminal: hears what is written and types what `answer` makes of it, a line for each text
-  that it knows. Use as the group leader of whoever is to talk with him.
+  A person at a terminal: hears what is written and types what `answer` returns for it, a line for
+  each text that it knows. Use it as the group leader of the process that asks.
   """
 
-  @doc "Starts him; `answer` is called with each text written and gives a line, or `nil`."
+  @doc """
+  Starts the person; `answer` is called with each text written and returns a line, or `nil`.
+  """
   @spec start((String.t() -> String.t() | nil)) :: pid()
   def start(answer), do: spawn_link(fn -> loop(answer, [], nil, []) end)
 
@@ -18,7 +20,7 @@ defmodule Console.Person do
     end
   end
 
-  @doc "Types a line unasked."
+  @doc "Types a line without being asked."
   @spec type(pid(), String.t()) :: :ok
   def type(person, line) do
     send(person, {:type, line})

@@ -3,7 +3,7 @@ defmodule Console.Runs do
   alias Console.{FakeTrial, Options}
   alias Console.Picture.RunTrack
 
-  @doc "Options from one line as typed."
+  @doc "Options from one command line."
   @spec options(String.t()) :: Options.t()
   def options(line) do
     {:ok, options} = line |> OptionParser.split() |> Options.parse()

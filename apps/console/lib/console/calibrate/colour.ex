@@ -9,11 +9,12 @@ defmodule Console.Calibrate.Colour do
   alias Vision.Calibration.Sample
   alias Vision.{Colours, Picture}
 
-  # Of the places that a person gave, so much is not taken for the colour: he should know.
+  # If more than this share of the given places does not count as the colour, the person should
+  # know.
   @few 0.7
   @alike 0.6
 
-  @doc "Does what the options say. An error is one line."
+  @doc "Runs the command. An error is one line."
   @spec run(ColourOptions.t()) :: :ok | {:error, String.t()}
   def run(options) do
     with {:ok, frames} <- Frames.take(options.source, options.frames),
@@ -32,7 +33,7 @@ defmodule Console.Calibrate.Colour do
     end
   end
 
-  @doc "What was found, in lines."
+  @doc "The result, as lines of text."
   @spec lines(Calibration.found(), ColourOptions.t()) :: [String.t()]
   def lines(%{class: class, match: match} = found, options) do
     {y, u, v} = found.middle
@@ -40,13 +41,13 @@ defmodule Console.Calibrate.Colour do
     [
       "sample   #{found.pixels} pixels, #{percent(found.share)} of them alike: about Y #{y} U #{u} V #{v}",
       "limits   Y #{range(class.y)}  U #{range(class.u)}  V #{range(class.v)}  #{Colours.Edit.limits(class)}",
-      "light    #{percent(found.tolerance)} more or less is put up with",
-      "inside   #{match.hit} of #{match.inside} pixels are taken for #{class.name} (#{share(match.hit, match.inside)})",
+      "light    #{percent(found.tolerance)} more or less is tolerated",
+      "inside   #{match.hit} of #{match.inside} pixels count as #{class.name} (#{share(match.hit, match.inside)})",
       "outside  #{match.outside} pixels#{elsewhere(match)}"
     ] ++ distance(options.metres, match.blobs, class.name)
   end
 
-  defp elsewhere(%{others: []}), do: ", all of them next to your places or too few for a blob"
+  defp elsewhere(%{others: []}), do: ", all of them next to your places or too small for a blob"
 
   defp elsewhere(match),
     do: ", #{match.background} of them in #{Format.count(length(match.others), "blob")} elsewhere"
@@ -58,7 +59,7 @@ defmodule Console.Calibrate.Colour do
     largest = Enum.max_by(blobs, & &1.area)
 
     if largest.share > 0.5 do
-      ["distance it fills more than half of the picture: too near to tell a constant"]
+      ["distance it fills more than half of the picture: too near to find a constant"]
     else
       constant = Format.decimals(largest.share * metres * metres, 4)
 
@@ -68,15 +69,15 @@ defmodule Console.Calibrate.Colour do
     end
   end
 
-  @doc "What a person should look at again, in lines."
+  @doc "The warnings about what a person should check, as lines of text."
   @spec warnings(Calibration.found(), ColourOptions.t()) :: [String.t()]
   def warnings(%{match: match} = found, options) do
     [
       found.share < @alike &&
-        "WARNING: #{percent(1 - found.share)} of the sample are of another colour and were left out: " <>
+        "WARNING: #{percent(1 - found.share)} of the sample have another colour and were left out: " <>
           "give a smaller box, or points",
       match.hit < @few * match.inside && found.share >= @alike &&
-        "WARNING: only #{share(match.hit, match.inside)} of your places are taken for #{options.name}",
+        "WARNING: only #{share(match.hit, match.inside)} of your places count as #{options.name}",
       match.blobs == [] &&
         "WARNING: no blob of at least #{options.min_area} pixels is left where you pointed",
       background(match, options)
@@ -92,8 +93,8 @@ defmodule Console.Calibrate.Colour do
         do: "a smaller box, points on the colour alone, or another colour may help",
         else: "less --light may help"
 
-    "WARNING: background is taken for #{options.name}: #{match.background} pixels, the largest blob (#{largest.area}) at " <>
-      "#{round(largest.x)},#{round(largest.y)}; if that is not the same thing, #{less}"
+    "WARNING: background counts as #{options.name}: #{match.background} pixels, the largest blob (#{largest.area}) at " <>
+      "#{round(largest.x)},#{round(largest.y)}; if that is a different thing, #{less}"
   end
 
   defp draw(%{picture: nil}, _frame, _found), do: :ok
@@ -104,7 +105,7 @@ defmodule Console.Calibrate.Colour do
     blobs = found.match.blobs ++ found.match.others
 
     with :ok <- Picture.write(path, frame, blobs, colours, classified: true, boxes: boxes),
-         do: IO.puts("#{path} written: look at it")
+         do: IO.puts("#{path} written: please check it")
   end
 
   defp put(%{colours: nil}, class) do
@@ -141,7 +142,7 @@ defmodule Console.Calibrate.Colour do
     end
   end
 
-  defp decide(path, _new, true, _write?), do: IO.puts("#{path} says so already")
+  defp decide(path, _new, true, _write?), do: IO.puts("#{path} is already up to date")
   defp decide(path, new, _same?, true), do: replace(path, new)
 
   defp decide(path, new, _same?, false) do

@@ -1,5 +1,8 @@
 defmodule Console.Calibrate.ColourOptions do
-  @moduledoc "The command line of `mix calibrate colour`: words in, a checked map or lines out. Pure."
+  @moduledoc """
+  The command line of `mix calibrate colour`: turns its arguments into a checked map or error
+  lines. Pure.
+  """
   alias Console.Cli
   alias Console.Cli.Parse
 
@@ -16,7 +19,7 @@ defmodule Console.Calibrate.ColourOptions do
           metres: float() | nil
         }
 
-  @doc "The options, as `Console.Cli.Arguments` has them."
+  @doc "The table of the options, as `Console.Cli.Arguments` takes it."
   @spec table() :: [Cli.Arguments.option()]
   def table do
     [
@@ -26,23 +29,23 @@ defmodule Console.Calibrate.ColourOptions do
        "a point that shows it (5 by 5 pixels); may be repeated. With points and\nboxes the points say what colour, the boxes how it varies"},
       {"name", "NAME", &name/1, "of the colour, one word"},
       {"colours", "FILE", &file/1,
-       "the colour file that it is put into; one that is not there is made"},
-      {"write", nil, nil, "writes it without asking; what changes is told"},
+       "the colour file to write it to; created if it does not exist"},
+      {"write", nil, nil, "writes it without asking; prints the changes"},
       {"picture", "FILE", &picture/1,
-       "a preview, .png or .jpg: what is taken for the colour shines, all else is\ndark and grey; its blobs and your boxes are outlined"},
+       "a preview, .png or .jpg: what matches the colour is bright, everything else\ndark and grey; its blobs and your boxes are outlined"},
       {"frames", "N", &Parse.whole(&1, 1..100),
-       "looks at so many frames together (1 of files, 10 of cameras)"},
+       "looks at this many frames together (1 of files, 10 of cameras)"},
       {"light", "PERCENT", &light/1,
-       "so much more or less light is put up with (auto: the most, up to 40,\nwith which nothing else in the picture is found)"},
-      {"min-area", "PIXELS", &Parse.whole(&1, 1..1_000_000), "smaller blobs do not count (20)"},
+       "how much more or less light is tolerated (auto: the most, up to 40,\nwith which nothing else in the picture is found)"},
+      {"min-area", "PIXELS", &Parse.whole(&1, 1..1_000_000), "smaller blobs are ignored (20)"},
       {"metres", "METRES", &Parse.number(&1, 0.1, 20),
-       "the thing is so far away: tells the robot file's distance constant"},
+       "the distance of the thing: gives the constant for the robot file"},
       {"help", nil, nil, "this text"}
     ]
   end
 
   @doc """
-  Reads the words after `colour`.
+  Reads the arguments after `colour`.
 
       iex> {:ok, options} = Console.Calibrate.ColourOptions.parse(~w(a.png --box 10,20,60,80 --name Red))
       iex> {options.source, options.places, options.tolerance}
@@ -67,11 +70,11 @@ defmodule Console.Calibrate.ColourOptions do
 
     problems =
       [
-        sources == [] && "which picture? a picture, video, stream, /dev/video0 or sim",
+        sources == [] && "SOURCE is missing: a picture, video, stream, /dev/video0 or sim",
         length(sources) > 1 &&
           "#{length(sources)} sources (#{Enum.join(sources, ", ")}): one is allowed",
-        places == [] && "where is it? --box X,Y,WIDTH,HEIGHT or --point X,Y",
-        map["name"] == nil && "what is it called? --name NAME",
+        places == [] && "--box X,Y,WIDTH,HEIGHT or --point X,Y is missing",
+        map["name"] == nil && "--name NAME is missing",
         map["write"] == true && map["colours"] == nil && "--write needs --colours FILE"
       ]
       |> Enum.filter(& &1)
@@ -116,7 +119,7 @@ defmodule Console.Calibrate.ColourOptions do
   defp file(text) do
     cond do
       text == "" or File.dir?(text) -> {:error, "the path of a file"}
-      not File.dir?(Path.dirname(text)) -> {:error, "in a folder that is there"}
+      not File.dir?(Path.dirname(text)) -> {:error, "in a folder that exists"}
       true -> {:ok, text}
     end
   end

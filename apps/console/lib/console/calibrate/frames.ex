@@ -10,20 +10,22 @@ defmodule Console.Calibrate.Frames do
 
   @of_cameras 10
 
-  @doc "The frames, at least one; `count` or `nil` for as many as the kind of source needs."
+  @doc """
+  Reads frames, at least one: `count` of them, or with `nil` as many as the kind of source needs.
+  """
   @spec take(String.t(), pos_integer() | nil) :: {:ok, [Frame.t(), ...]} | {:error, String.t()}
   def take("sim", count), do: {:ok, simulated(count || 1)}
 
   def take(source, count) do
     count = count || if(Source.kind(source) in [:file, :generator], do: 1, else: @of_cameras)
-    # Nothing is looked for yet.
+    # No blobs are wanted yet.
     {:ok, colours} = Colours.new([%{name: "None", y: {0, 0}, u: {0, 0}, v: {0, 0}}])
     me = self()
     ref = make_ref()
 
     with {:ok, _summary} <- Blobs.run(source, colours, &send(me, {ref, &1.frame}), frames: count) do
       case received(ref) do
-        [] -> {:error, "#{source}: no frame in it"}
+        [] -> {:error, "#{source}: it has no frame"}
         frames -> {:ok, frames}
       end
     end

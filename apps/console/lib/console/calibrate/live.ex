@@ -15,13 +15,13 @@ defmodule Console.Calibrate.Live do
 
   @look_ms 100
   @ready_ms 5_000
-  # From a wheel that is told to stand to odometry that says so.
+  # The time from the command to stop until odometry shows it.
   @fresh_ms 500
 
   @type driven :: %{told: Pose.t(), told_turn: float()}
 
   @doc """
-  Waits until the robot's drive is there and lacks nothing; or what it says that is missing.
+  Waits until the robot's drive is online and ready. The error says what is missing.
   """
   @spec ready(atom(), non_neg_integer()) :: :ok | {:error, String.t()}
   def ready(robot, patience_ms \\ @ready_ms) do
@@ -37,12 +37,13 @@ defmodule Console.Calibrate.Live do
   defp why(robot) do
     case Swarm.status(robot) do
       %{offline: %{drive: line}} -> "its drive is offline (#{line})"
-      _online_or_unknown -> lacks(robot) || "its base tells no odometry"
+      _online_or_unknown -> lacks(robot) || "its base reports no odometry"
     end
   end
 
   @doc """
-  One course. `{:error, line}` where it was not driven to its end; then the wheels are disarmed.
+  Drives one course. `{:error, line}` if it was not driven to its end; then the wheels are
+  disarmed.
   """
   @spec drive(atom(), keyword(), StdinPrompt.t(), Output.t()) ::
           {:ok, driven()} | {:error, String.t()}
@@ -50,7 +51,7 @@ defmodule Console.Calibrate.Live do
     StdinPrompt.forget(talk)
 
     with :ok <- Swarm.arm(robot),
-         %{pose: start} <- odometry(robot) || {:error, "#{robot} tells no odometry"},
+         %{pose: start} <- odometry(robot) || {:error, "#{robot} reports no odometry"},
          :ok <- Pilot.start(robot, Drive, course) do
       s = %{
         robot: robot,
@@ -67,7 +68,7 @@ defmodule Console.Calibrate.Live do
       disarm(robot, result)
     else
       {:error, line} when is_binary(line) -> {:error, line}
-      {:error, reason} -> {:error, "#{robot} does not drive: #{inspect(reason)}"}
+      {:error, reason} -> {:error, "#{robot} cannot drive: #{inspect(reason)}"}
     end
   end
 
@@ -94,10 +95,10 @@ defmodule Console.Calibrate.Live do
     IO.puts("EMERGENCY STOP: #{s.robot} is held")
 
     with {:ok, "reset"} <-
-           StdinPrompt.choose(s.talk, "type reset when it may drive again: ", ["reset"]),
+           StdinPrompt.choose(s.talk, "type reset to let it drive again: ", ["reset"]),
          do: Gate.reset(s.robot)
 
-    {:error, "stopped by hand"}
+    {:error, "stopped by the user"}
   end
 
   defp look(s) do
@@ -137,7 +138,7 @@ defmodule Console.Calibrate.Live do
         arrived(s)
 
       %{state: {Drive, :blocked}} ->
-        {:error, "it touched something or came no further#{limits(s)}"}
+        {:error, "it touched something or could not go on#{limits(s)}"}
 
       _idle_or_gone ->
         {:error, "the drive was ended by a stop, an emergency stop or a fault"}
@@ -152,10 +153,10 @@ defmodule Console.Calibrate.Live do
     end
   end
 
-  # The course ends with wheels that stand.
+  # The course ends when the wheels stand still.
   defp arrived(s) do
     case odometry(s.robot) do
-      nil -> {:error, "it told no odometry at its end"}
+      nil -> {:error, "it reported no odometry at its end"}
       %{pose: pose} -> {:ok, %{told: Pose.relative(s.start, pose), told_turn: look(s).turned}}
     end
   end

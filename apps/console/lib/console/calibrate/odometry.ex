@@ -20,7 +20,7 @@ defmodule Console.Calibrate.Odometry do
 
   @degree :math.pi() / 180
 
-  @doc "Does what the options say. An error is one line, or several."
+  @doc "Runs the command. An error is one line, or several."
   @spec run(Options.t()) :: :ok | {:error, String.t() | [String.t()]}
   def run(%{mode: :simulate} = options), do: Simulated.run(options, Output.to(:stdio))
   def run(%{mode: :typed} = options), do: typed(options)
@@ -32,19 +32,20 @@ defmodule Console.Calibrate.Odometry do
 
       cond do
         options.mode == :dry_run -> :ok
-        file.dry_run -> {:error, "#{path}: dry_run: is true: nothing would move"}
+        file.dry_run -> {:error, "#{path}: dry_run is true, so nothing would move"}
         true -> live(options, file, conversions)
       end
     end
   end
 
-  # Without conversions a base neither arms nor tells odometry; with those of another it is off by some percent.
+  # Without conversions a base neither arms nor reports odometry; with those of another base it is
+  # off by some percent.
   defp begin(%{drive: {driver, drive}} = file, conversions) when is_list(conversions) do
     published = Keys.published(file.profile.name)
     missing = for {key, _value} <- published, conversions[key] == nil, do: key
 
     if missing != [],
-      do: IO.puts("#{Enum.join(missing, " and ")} not known yet: begins with the published ones")
+      do: IO.puts("#{Enum.join(missing, " and ")} not known yet: using the published ones")
 
     conversions = Keyword.merge(published, Enum.reject(conversions, fn {_key, v} -> v == nil end))
     drive = Keyword.put(drive, :conversions, conversions)
@@ -55,7 +56,7 @@ defmodule Console.Calibrate.Odometry do
 
   defp live(options, file, conversions) do
     with {:ok, _apps} <- start_apps(),
-         # It is carried to its mark by hand: where a fence is, it does not know.
+         # The robot is carried to its mark by hand, so it does not know where a fence is.
          {:ok, config} <- Swarm.MemberSpec.config(%{file | camera: nil, ptz: nil, fence: nil}),
          {:ok, _pid} <- start(config) do
       talk = StdinPrompt.start()
@@ -84,9 +85,9 @@ defmodule Console.Calibrate.Odometry do
          do: {:error, "#{config.id} does not start: #{inspect(reason, limit: 5)}"}
   end
 
-  # Drives until it went well or is left out.
+  # Repeats the course until it went well or is skipped.
   defp course(task, file, options, talk) do
-    IO.puts("\nNow #{Plan.name(task)}. Put #{file.id} on its mark, and mark where it points.")
+    IO.puts("\nNow #{Plan.name(task)}. Put #{file.id} on its mark, and mark its direction.")
 
     words = ["go", "skip", "quit", "reset", "acknowledge"]
 
@@ -106,7 +107,7 @@ defmodule Console.Calibrate.Odometry do
         course(task, file, options, talk)
 
       _quit_or_end ->
-        throw({:quit, "ended by hand; nothing is written"})
+        throw({:quit, "ended by the user; nothing is written"})
     end
   end
 
@@ -119,7 +120,11 @@ defmodule Console.Calibrate.Odometry do
 
       {:error, line} ->
         IO.puts("  " <> line)
-        IO.puts("  (reset releases an emergency stop, acknowledge a line that was lost)")
+
+        IO.puts(
+          "  (reset releases an emergency stop; acknowledge accepts that the line was lost)"
+        )
+
         course(task, file, options, talk)
     end
   end
@@ -130,7 +135,7 @@ defmodule Console.Calibrate.Odometry do
     case StdinPrompt.ask(talk, question, &answer(&1, check)) do
       {:ok, :again} -> course(task, file, options, talk)
       {:ok, value} -> [{task, Map.merge(driven, Question.measured(task, value))}]
-      :eof -> throw({:quit, "nobody answers; nothing is written"})
+      :eof -> throw({:quit, "there was no answer; nothing is written"})
     end
   end
 
@@ -168,7 +173,7 @@ defmodule Console.Calibrate.Odometry do
     end
   end
 
-  defp finish([], _options, _file, _conversions, _talk), do: {:error, "nothing was driven"}
+  defp finish([], _options, _file, _conversions, _talk), do: {:error, "no course was driven"}
 
   defp finish(driven, options, file, conversions, talk) do
     measured = Simulated.measured(driven, options.side)
@@ -183,7 +188,7 @@ defmodule Console.Calibrate.Odometry do
 
       cond do
         options.file == nil -> :ok
-        conversions == nil -> IO.puts("its drive has no conversions that could be put right")
+        conversions == nil -> IO.puts("its drive has no conversions to correct")
         true -> put(Keys.new(conversions, wheels, found), options, talk)
       end
     end

@@ -1,5 +1,8 @@
 defmodule Console.Calibrate.Options do
-  @moduledoc "The command line of `mix calibrate odometry`: words in, a checked map or lines out. Pure."
+  @moduledoc """
+  The command line of `mix calibrate odometry`: turns its arguments into a checked map or error
+  lines. Pure.
+  """
   alias Console.Cli
   alias Console.Cli.Parse
 
@@ -23,46 +26,46 @@ defmodule Console.Calibrate.Options do
           wheels: keyword(float())
         }
 
-  @doc "The options, as `Console.Cli.Arguments` has them."
+  @doc "The table of the options, as `Console.Cli.Arguments` takes it."
   @spec table() :: [Cli.Arguments.option()]
   def table do
     [
       {"distance", "METRES", &zero_or(&1, 0.5, 50),
-       "straight on, by odometry (3); 0: not at all"},
+       "straight ahead, by odometry (3); 0: not at all"},
       {"angle", "DEGREES", &zero_or(&1, 90, 3600),
-       "to the left, and as much to the right (720); 0: not at all"},
-      {"squares", "N", &Parse.whole(&1, 0..50), "squares each way round (5); 0: none"},
+       "to the left, and the same to the right (720); 0: not at all"},
+      {"squares", "N", &Parse.whole(&1, 0..50), "squares in each direction (5); 0: none"},
       {"side", "METRES", &Parse.number(&1, 1, 20), "of the squares (4)"},
       {"speed", "M/S", &Parse.number(&1, 0.05, 0.5), "at most (0.2)"},
       {"measured", "METRES", &Parse.number(&1, 0.1, 100),
        "typed in, drives nothing: how far it truly went in a straight line\ninstead of --distance; may be repeated"},
       {"turned", "DEGREES", &Parse.number(&1, -4000, 4000),
-       "typed in: how far it truly turned instead of --angle, to the right\nnegative; may be repeated"},
+       "typed in: how far it truly turned instead of --angle (negative: to the\nright); may be repeated"},
       {"cw", "X,Y", &Parse.point/1,
-       "typed in: by how much the true end of a clockwise square was off the\nend that odometry told, metres ahead and to the left; once for each"},
-      {"ccw", "X,Y", &Parse.point/1, "the same of a counter-clockwise one"},
-      {"write", nil, nil, "writes the robot file without asking; what changes is told"},
-      {"dry-run", nil, nil, "tells what would be driven, and drives nothing"},
+       "typed in: how far the true end of a clockwise square was from the end\nby odometry, in metres ahead and to the left; once for each"},
+      {"ccw", "X,Y", &Parse.point/1, "the same for a counter-clockwise one"},
+      {"write", nil, nil, "writes the robot file without asking; prints the changes"},
+      {"dry-run", nil, nil, "prints what would be driven, and drives nothing"},
       {"simulate", nil, nil, "a simulated robot, measured by its true pose"},
       {"seed", "N", &Parse.whole(&1, 0..1_000_000), "of its noise (1)"},
       {"seeds", "N", &Parse.whole(&1, 1..1000),
-       "so many robots, one after the other, and how well they do (1)"},
+       "this many robots, one after the other, and how exact the results are (1)"},
       {"profile", "KIND", &Parse.choice(&1, magellan: :magellan, atrv_mini: :atrv_mini),
        "magellan or atrv_mini (magellan)"},
       {"noise", "KIND", &Parse.choice(&1, off: :off, default: :default, slip: :slip),
        "off, default or slip (default)"},
       {"true-distance", "FACTOR", &Parse.number(&1, 0.8, 1.25),
-       "what is wrong with it: metres for each one of odometry (1)"},
+       "its error: true metres per metre of odometry (1)"},
       {"true-base", "FACTOR", &Parse.number(&1, 0.8, 1.25),
-       "its wheel base for each metre of the known one (1.02)"},
+       "its wheel base, relative to the known one (1.02)"},
       {"true-ratio", "FACTOR", &Parse.number(&1, 0.9, 1.1),
-       "way of its right wheel for its left one's (1.01)"},
+       "its right wheel's distance, relative to its left one's (1.01)"},
       {"help", nil, nil, "this text"}
     ]
   end
 
   @doc """
-  Reads the words after `odometry`.
+  Reads the arguments after `odometry`.
 
       iex> {:ok, options} = Console.Calibrate.Options.parse(~w(config/robots/mag1.exs --squares 3))
       iex> {options.file, options.mode, options.squares, options.side}
@@ -70,7 +73,7 @@ defmodule Console.Calibrate.Options do
       iex> Console.Calibrate.Options.parse(~w(mag1.exs --sqares 3))
       {:error, ["unknown option --sqares; did you mean --squares?"]}
       iex> Console.Calibrate.Options.parse(~w(--squares 3))
-      {:error, ["which robot? mix calibrate odometry config/robots/NAME.exs, or --simulate"]}
+      {:error, ["the robot file is missing: mix calibrate odometry config/robots/NAME.exs, or --simulate"]}
   """
   @spec parse([String.t()]) :: {:ok, t()} | :help | {:error, [String.t()]}
   def parse(words) do
@@ -140,14 +143,14 @@ defmodule Console.Calibrate.Options do
         length(files) > 1 &&
           "one robot file at a time, not #{length(files)}: #{Enum.join(files, ", ")}",
         options.mode in [:drive, :dry_run] && files == [] &&
-          "which robot? mix calibrate odometry config/robots/NAME.exs, or --simulate",
+          "the robot file is missing: mix calibrate odometry config/robots/NAME.exs, or --simulate",
         options.mode != :simulate && strange != [] &&
-          "--#{hd(strange)} is for a simulated robot: with --simulate",
+          "--#{hd(strange)} is for a simulated robot: add --simulate",
         options.mode == :simulate && files != [] &&
           "a simulated robot has no file: #{hd(files)} or --simulate",
         options.distance == 0 && options.measured != [] && "--measured needs a --distance",
         options.angle == 0 && options.turned != [] && "--turned needs an --angle",
-        nothing?(options) && "nothing is left to drive: --distance, --angle and --squares are 0"
+        nothing?(options) && "nothing to drive: --distance, --angle and --squares are 0"
       ]
       |> Enum.filter(& &1)
 

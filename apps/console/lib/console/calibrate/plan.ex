@@ -7,7 +7,7 @@ defmodule Console.Calibrate.Plan do
 
   @degree :math.pi() / 180
 
-  @doc "What will be driven, in lines."
+  @doc "What will be driven, as lines of text."
   @spec lines(Options.t(), Robot.File.t()) :: [String.t()]
   def lines(options, file) do
     tasks = Simulated.tasks(options)
@@ -19,7 +19,7 @@ defmodule Console.Calibrate.Plan do
     ] ++
       [
         "It needs #{Format.decimals(room + 1, 1)} by #{Format.decimals(room + 1, 1)} m of flat floor, and someone " <>
-          "beside it. Clockwise squares lie to the right of its mark, others to the left.",
+          "beside it. Clockwise squares lie to the right of its mark, the others to the left.",
         "Its wheels turn only when you say go, each time; Enter stops it at once."
       ]
   end
@@ -32,19 +32,19 @@ defmodule Console.Calibrate.Plan do
     |> Enum.map(&if(&1 =~ "square", do: &1 <> " (#{squares} times)", else: &1))
   end
 
-  @doc "The speed of it, m/s: never above what the robot's file allows."
+  @doc "The speed of the courses, in m/s: never above what the robot's file allows."
   @spec speed(Options.t(), Robot.File.t()) :: float()
   def speed(options, file),
     do: min(options.speed, file.limits[:max_linear] || file.profile.max_linear)
 
   @doc """
-  One course.
+  One course as text.
 
       iex> Console.Calibrate.Plan.name({:angle, -2 * :math.pi()})
       "360 degrees to the right"
   """
   @spec name(Sim.Calibration.task()) :: String.t()
-  def name({:distance, way}), do: "#{Format.decimals(way, 2)} m straight on"
+  def name({:distance, way}), do: "#{Format.decimals(way, 2)} m straight ahead"
   def name({:angle, turn}) when turn > 0, do: "#{degrees(turn)} degrees to the left"
   def name({:angle, turn}), do: "#{degrees(-turn)} degrees to the right"
 

@@ -25,7 +25,7 @@ defmodule Console.Calibrate.Question do
       {"Where does it stand, seen from its mark: X,Y in metres, ahead and to the left? ",
        &Parse.point/1}
 
-  @doc "What was measured: the pose at the end and the turn, as far as this course tells of them."
+  @doc "The measurement: the pose at the end and the turn, as far as this course shows them."
   @spec measured(Sim.Calibration.task(), float() | Pose.point()) :: %{
           measured: Pose.t(),
           turn: float()

@@ -4,24 +4,25 @@ defmodule Console.Calibrate.Report do
   alias Robot.Calibration
   alias Robot.Calibration.{Model, Squares}
 
-  # Of what is found; half of the errors that are wanted, 0.5 % and 0.2 %.
+  # The accepted standard deviations of the result: half of the errors that are allowed, 0.5 % and
+  # 0.2 %.
   @sure %{base: 0.0025, ratio: 0.001}
   @slip 0.015
-  # What squares leave that wheels explain.
+  # The error of squares that may remain after the correction.
   @left_m 0.15
 
-  @doc "What was found, and of what."
+  @doc "The result, and the measurements that it is based on, as lines of text."
   @spec lines(Model.t(), Squares.t() | nil, Calibration.measured()) :: [String.t()]
   def lines(%Model{} = wheels, squares, measured) do
     found = found(measured)
 
     Enum.concat([
       if(:distance in found,
-        do: ["distance     #{factor(wheels.distance)} of what it tells"],
+        do: ["distance     #{factor(wheels.distance)} of what odometry says"],
         else: []
       ),
       if(:base in found,
-        do: ["wheel base   #{factor(wheels.base)} of what it reckons with"],
+        do: ["wheel base   #{factor(wheels.base)} of the known value"],
         else: []
       ),
       if(:ratio in found, do: ["wheel ratio  #{factor(wheels.ratio)} right to left"], else: []),
@@ -31,7 +32,7 @@ defmodule Console.Calibrate.Report do
   end
 
   @doc """
-  What these measurements tell of.
+  The properties of the wheels that these measurements determine.
 
       iex> Console.Calibrate.Report.found(%{distances: [{3.0, 3.1}], angles: [], runs: [], side: 4.0})
       [:distance]
@@ -49,7 +50,7 @@ defmodule Console.Calibrate.Report do
     |> Keyword.keys()
   end
 
-  # What a base slips in turns looks to squares like unequal wheels.
+  # In squares, slip in turns looks like unequal wheels.
   defp ratio?(squares, measured), do: squares and not slips?(measured)
 
   defp slips?(measured) do
@@ -57,7 +58,9 @@ defmodule Console.Calibrate.Report do
     slip != nil and abs(slip) > @slip
   end
 
-  @doc "What is left to be said: slip, too few squares, an error that no wheels explain."
+  @doc """
+  Warnings as lines of text: slip, too few squares, or an error that the wheels do not explain.
+  """
   @spec remarks(Squares.t() | nil, Calibration.measured()) :: [String.t()]
   def remarks(squares, measured) do
     slip = Calibration.slip(measured.angles)
@@ -65,7 +68,7 @@ defmodule Console.Calibrate.Report do
     [
       slips?(measured) &&
         "turns to the left go #{percent(slip)} further than turns to the right: its wheels slip. Squares " <>
-          "cannot tell that from unequal wheels, so the wheel ratio stays as it is",
+          "cannot distinguish that from unequal wheels, so the wheel ratio stays as it is",
       unsure(squares, length(measured.runs)),
       squares != nil && squares.after_m > @left_m &&
         "#{Format.decimals(squares.after_m, 2)} m of the error are not explained by base and ratio: was one " <>
@@ -79,8 +82,8 @@ defmodule Console.Calibrate.Report do
 
     if worst > 1,
       do:
-        "the squares scatter: the wheel base is sure to #{percent(2 * sd.base)}, the ratio to " <>
-          "#{percent(2 * sd.ratio)} only; #{ceil(runs / 2 * worst * worst)} squares each way would do"
+        "the squares scatter: the wheel base is certain to #{percent(2 * sd.base)}, the ratio to " <>
+          "#{percent(2 * sd.ratio)} only; #{ceil(runs / 2 * worst * worst)} squares in each direction would suffice"
   end
 
   defp unsure(_squares, _runs), do: false
@@ -90,7 +93,7 @@ defmodule Console.Calibrate.Report do
   defp squares(%{formulas: formulas} = squares) do
     sure =
       if squares.sd,
-        do: " (sure to #{percent(2 * squares.sd.base)} and #{percent(2 * squares.sd.ratio)})",
+        do: " (certain to #{percent(2 * squares.sd.base)} and #{percent(2 * squares.sd.ratio)})",
         else: ""
 
     [

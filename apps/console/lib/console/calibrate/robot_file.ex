@@ -7,7 +7,7 @@ defmodule Console.Calibrate.RobotFile do
   alias Console.Cli.Diff
   alias Swarm.MemberSpec
 
-  @doc "The file, and the conversions of its drive, `nil` for a drive that has none."
+  @doc "Reads the file, and the conversions of its drive, `nil` for a drive that has none."
   @spec load(Path.t()) :: {:ok, Robot.File.t(), keyword() | nil} | {:error, [String.t()]}
   def load(path) do
     with {:ok, file} <- MemberSpec.load(path) do
@@ -21,8 +21,8 @@ defmodule Console.Calibrate.RobotFile do
     do: driver == Hal.RFlex.Driver or is_list(options[:conversions])
 
   @doc """
-  Shows the change, and writes it when it is wanted: `:always`, or asked for by `talk`, or `:never`. The new
-  file takes the place of the old one at once.
+  Shows the change, and writes it `:always`, `:never`, or if the person who is asked by `talk`
+  agrees. The new file replaces the old one atomically.
   """
   @spec write(Path.t(), keyword(float()), :always | :never | StdinPrompt.t()) ::
           :ok | {:error, String.t()}
@@ -34,12 +34,13 @@ defmodule Console.Calibrate.RobotFile do
       Enum.each(Diff.lines(old, new), &IO.puts("  " <> &1))
       decide(path, new, old == new, wanted)
     else
-      {:error, line} -> {:error, "#{path}: #{line}; write by hand: conversions: [#{text(keys)}]"}
+      {:error, line} ->
+        {:error, "#{path}: #{line}; write it yourself: conversions: [#{text(keys)}]"}
     end
   end
 
   @doc """
-  The keys as they stand in a robot file.
+  The keys as they are written in a robot file.
 
       iex> Console.Calibrate.RobotFile.text(distance: 31000.5, angle: 4700.25)
       "distance: 31000.5, angle: 4700.25"
@@ -51,7 +52,7 @@ defmodule Console.Calibrate.RobotFile do
     with {:error, reason} <- File.read(path), do: {:error, "#{:file.format_error(reason)}"}
   end
 
-  # Both are read as a robot would read them.
+  # Both files are read as a robot would read them.
   defp same?(path, old, new, keys) do
     with {:ok, before} <- parse(path, old), {:ok, now} <- parse(path, new) do
       {driver, options} = now.drive
@@ -63,7 +64,7 @@ defmodule Console.Calibrate.RobotFile do
            %{now | drive: {driver, Keyword.delete(options, :conversions)}} ==
              %{before | drive: {driver, Keyword.delete(was, :conversions)}},
          do: :ok,
-         else: {:error, "the numbers cannot be put into it"}
+         else: {:error, "the numbers cannot be written into it"}
     else
       {:error, [line | _]} -> {:error, line}
     end
@@ -75,7 +76,7 @@ defmodule Console.Calibrate.RobotFile do
     Robot.File.parse(text, file: path, colours: colours, tables: MemberSpec.tables())
   end
 
-  defp decide(path, _new, true, _wanted), do: IO.puts("#{path} says so already")
+  defp decide(path, _new, true, _wanted), do: IO.puts("#{path} is already up to date")
   defp decide(path, _new, _same?, :never), do: IO.puts("#{path} not written; --write writes it")
   defp decide(path, new, _same?, :always), do: replace(path, new)
 

@@ -9,7 +9,7 @@ defmodule Console.Calibrate.Simulated do
 
   @goals %{distance: 0.005, base: 0.005, ratio: 0.002}
 
-  @doc "Runs all seeds. `:ok` when all came within 0.5 % (distance, base) and 0.2 % (ratio)."
+  @doc "Runs all seeds. `:ok` if all results are within 0.5 % (distance, base) and 0.2 % (ratio)."
   @spec run(Console.Calibrate.Options.t(), Output.t()) :: :ok | {:error, String.t()}
   def run(options, output) do
     seeds = Enum.to_list(options.seed..(options.seed + options.seeds - 1))
@@ -36,7 +36,7 @@ defmodule Console.Calibrate.Simulated do
   end
 
   @doc """
-  What was driven, as `Robot.Calibration.estimate/2` takes it.
+  The measurements of the drive, as `Robot.Calibration.estimate/2` takes them.
   """
   @spec measured([{Simulated.task(), Simulated.driven()}], float()) :: Calibration.measured()
   def measured(driven, side) do
@@ -125,6 +125,6 @@ defmodule Console.Calibrate.Simulated do
       within == length(errors)
     end
     |> Enum.all?()
-    |> if(do: :ok, else: {:error, "not all were found as exactly as wanted"})
+    |> if(do: :ok, else: {:error, "not all results were exact enough"})
   end
 end

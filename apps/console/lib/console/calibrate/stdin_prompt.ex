@@ -10,7 +10,7 @@ defmodule Console.Calibrate.StdinPrompt do
   @type t :: %__MODULE__{reader: pid(), ref: reference()}
   @longest 200
 
-  @doc "Begins to listen; lines come to the calling process."
+  @doc "Begins to listen; lines are sent to the calling process."
   @spec start() :: t()
   def start do
     {owner, ref} = {self(), make_ref()}
@@ -18,7 +18,7 @@ defmodule Console.Calibrate.StdinPrompt do
     %__MODULE__{reader: reader, ref: ref}
   end
 
-  @doc "Listens no more."
+  @doc "Stops listening."
   @spec stop(t()) :: :ok
   def stop(%__MODULE__{reader: reader}) do
     Process.unlink(reader)
@@ -38,8 +38,8 @@ defmodule Console.Calibrate.StdinPrompt do
   end
 
   @doc """
-  Asks until the answer is well: `check` gives `{:ok, value}`, or `{:error, line}`, which is shown. `:eof`
-  where nobody can answer any more.
+  Asks until the answer is valid: `check` returns `{:ok, value}`, or `{:error, line}`, which is
+  shown. Returns `:eof` if nobody can answer any more.
   """
   @spec ask(t(), String.t(), (String.t() -> {:ok, value} | {:error, String.t()})) ::
           {:ok, value} | :eof
@@ -49,7 +49,7 @@ defmodule Console.Calibrate.StdinPrompt do
 
     receive do
       {^ref, :eof} ->
-        # Whoever asks next is to hear it too.
+        # The next question should get this, too.
         send(self(), {ref, :eof})
         IO.puts("")
         :eof
@@ -66,7 +66,7 @@ defmodule Console.Calibrate.StdinPrompt do
     end
   end
 
-  @doc "Asks for one of some words; `{:ok, word}`."
+  @doc "Asks for one of some words; returns `{:ok, word}`."
   @spec choose(t(), String.t(), [String.t(), ...]) :: {:ok, String.t()} | :eof
   def choose(talk, question, words) do
     ask(talk, question, fn text ->
@@ -80,7 +80,7 @@ defmodule Console.Calibrate.StdinPrompt do
     "#{Console.Cli.Parse.either(names)}#{Hal.Options.Suggest.hint(text, words)}"
   end
 
-  @doc "What was typed meanwhile is no answer to the next question."
+  @doc "Drops what was typed meanwhile, because it is not an answer to the next question."
   @spec forget(t()) :: :ok
   def forget(%__MODULE__{ref: ref} = talk) do
     receive do

@@ -9,14 +9,14 @@ defmodule Console.Cli.Arguments do
   alias Hal.Options.Wording
   alias Hal.Options.Suggest
 
-  @typedoc "What is allowed, and what may have been meant."
+  @typedoc "What is allowed, and a hint about what may have been meant."
   @type allowed :: String.t() | {String.t(), hint :: String.t()}
   @type check :: (String.t() -> {:ok, term()} | {:error, allowed()})
   @type option ::
           {name :: String.t(), hint :: String.t() | nil, check() | nil, help :: String.t()}
 
   @doc """
-  The values in the order in which they were given, or one line for each thing that is wrong.
+  The values in the order in which they were given, or one line for each error.
 
       iex> count = {"count", "N", &Console.Cli.Parse.whole(&1, 1..9), "how many"}
       iex> Console.Cli.Arguments.parse(~w(--count 3), [count])
@@ -114,7 +114,7 @@ defmodule Console.Cli.Arguments do
 
   def refuse(name, text, allowed), do: refuse(name, text, {allowed, ""})
 
-  # The value of an unknown option is skipped too: one mistake, one line.
+  # The value of an unknown option is skipped too, so that one mistake gives one line.
   defp unknown(name, inline, rest, options) do
     names = Enum.map(options, &("--" <> elem(&1, 0)))
     error = {:error, "unknown option --#{name}#{Suggest.hint("--" <> name, names)}"}

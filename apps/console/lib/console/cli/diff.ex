@@ -2,7 +2,7 @@ defmodule Console.Cli.Diff do
   @moduledoc "Shows the change of a text file, for people. Pure."
 
   @doc """
-  The lines that go (`-`) and come (`+`), with their numbers in the old and the new text.
+  The removed (`-`) and added (`+`) lines, with their numbers in the old and the new text.
 
       iex> Console.Cli.Diff.lines("a\\nb\\nc\\n", "a\\nB\\nc\\n")
       ["  2 - b", "  2 + B"]
@@ -23,7 +23,7 @@ defmodule Console.Cli.Diff do
     lines
   end
 
-  # The end of the last line begins no line.
+  # No line begins after the end of the last line.
   defp split(text), do: text |> String.replace_suffix("\n", "") |> String.split("\n")
 
   defp mark(lines, from, sign) do

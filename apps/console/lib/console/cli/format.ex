@@ -2,12 +2,12 @@ defmodule Console.Cli.Format do
   @moduledoc "Formats events and figures of a fleet for people. Pure."
 
   @doc """
-  One stage as a line.
+  One stage as a line of text.
 
       iex> Console.Cli.Format.stage(%{stage: :elected, at_s: 12.34, robot: :mag2, epoch: 3, size_ppm: 41_000})
       "   12.3 s  elected         mag2 leads (epoch 3, landmark 4.1 % of its picture)"
       iex> Console.Cli.Format.stage(%{stage: :search, at_s: 0.0})
-      "    0.0 s  search          every robot looks round for the landmark"
+      "    0.0 s  search          every robot looks around for the landmark"
   """
   @spec stage(Sim.Scene.stage()) :: String.t()
   def stage(%{stage: name, at_s: at_s} = stage) do
@@ -16,18 +16,21 @@ defmodule Console.Cli.Format do
   end
 
   @doc """
-  A stage's meaning alone.
+  The meaning of a stage, without its time and name.
 
       iex> Console.Cli.Format.meaning(%{stage: :killed, at_s: 40, robot: :mag1})
       "mag1 is dead"
   """
   @spec meaning(Sim.Scene.stage()) :: String.t()
-  def meaning(%{stage: :search}), do: "every robot looks round for the landmark"
+  def meaning(%{stage: :search}), do: "every robot looks around for the landmark"
   def meaning(%{stage: :elected} = stage), do: "#{stage.robot} leads" <> why(stage)
   def meaning(%{stage: :formed}), do: "every robot says that it stands in its place"
-  def meaning(%{stage: :landmark_moved}), do: "the landmark sets off"
+  def meaning(%{stage: :landmark_moved}), do: "the landmark starts to move"
   def meaning(%{stage: :killed, robot: robot}), do: "#{robot} is dead"
-  def meaning(%{stage: :world_lost}), do: "the world has ended; robots stand, it is started again"
+
+  def meaning(%{stage: :world_lost}),
+    do: "the world has ended; robots stand still, it is started again"
+
   def meaning(%{stage: :world_back}), do: "the world goes on where it was"
   def meaning(%{stage: :lost} = stage), do: "#{subject(stage)} has lost the landmark"
   def meaning(%{stage: name}), do: name |> to_string() |> String.replace("_", " ")
@@ -57,7 +60,7 @@ defmodule Console.Cli.Format do
   def count(1, noun), do: "1 #{noun}"
   def count(n, noun), do: "#{n} #{noun}s"
 
-  @doc "The fleet at this instant in one line."
+  @doc "The fleet at this moment in one line."
   @spec status(Sim.Scene.t()) :: String.t()
   def status(scene) do
     living = Enum.count(scene.robots, & &1.alive)
@@ -67,11 +70,11 @@ defmodule Console.Cli.Format do
       " s  #{count(living, "robot")}, #{sight} with the landmark in sight, #{leader(scene)}"
   end
 
-  @doc "Every robot in a line of its own."
+  @doc "All robots, each in a line of its own."
   @spec everybody(Sim.Scene.t()) :: [String.t()]
   def everybody(scene), do: Enum.map(scene.robots, &robot/1)
 
-  @doc "One robot in a line."
+  @doc "One robot in one line."
   @spec one(Sim.Scene.t(), atom()) :: [String.t()]
   def one(scene, name), do: for(robot <- scene.robots, robot.id == name, do: robot(robot))
 
@@ -90,7 +93,9 @@ defmodule Console.Cli.Format do
         ppm -> ", the landmark fills #{decimals(ppm / 10_000, 1)} % of its picture"
       end
 
-    doubt = if robot.uncertainty, do: ", #{within(robot.uncertainty)} by its own word", else: ""
+    doubt =
+      if robot.uncertainty, do: ", #{within(robot.uncertainty)} by its own estimate", else: ""
+
     role = if robot.leader?, do: " (leader)", else: ""
     "#{robot.id}: #{state(robot)}#{role} at #{pose(robot.pose)}#{doubt}#{slot}#{sight}"
   end
@@ -99,7 +104,7 @@ defmodule Console.Cli.Format do
   defp state(%{state: state}), do: state
 
   @doc """
-  How sure a robot is of its pose, in metres.
+  The uncertainty of a robot's position, in metres.
 
       iex> Console.Cli.Format.within(0.618)
       "±0.62 m"
@@ -108,7 +113,8 @@ defmodule Console.Cli.Format do
   def within(metres), do: "±#{decimals(metres, 2)} m"
 
   @doc """
-  A line in rows of at most `width` characters, broken between words; the further rows are indented.
+  Breaks a line between words into rows of at most `width` characters; all rows but the first are
+  indented.
 
       iex> Console.Cli.Format.rows("mag1: lead at 1,2, sees it", 14)
       ["mag1: lead at", "    1,2, sees", "    it"]

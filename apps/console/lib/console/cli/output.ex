@@ -11,7 +11,7 @@ defmodule Console.Cli.Output do
 
   @type t :: %__MODULE__{device: IO.device(), columns: pos_integer() | nil}
 
-  @doc "Output to a device; `columns` is `nil` when it is not a terminal."
+  @doc "The output to a device; `columns` is `nil` if it is not a terminal."
   @spec to(:stdio | :stderr) :: t()
   def to(device), do: %__MODULE__{device: device, columns: columns(device)}
 
@@ -24,21 +24,21 @@ defmodule Console.Cli.Output do
     end
   end
 
-  @doc "A line that stays."
+  @doc "Prints a line that stays."
   @spec line(t(), String.t()) :: :ok
   def line(%__MODULE__{columns: nil} = output, text), do: IO.puts(output.device, text)
   def line(%__MODULE__{} = output, text), do: IO.puts(output.device, @clear <> text)
 
-  @doc "The line that is replaced by the next one; nothing where there is no terminal."
+  @doc "Prints a line that the next one replaces; prints nothing if there is no terminal."
   @spec progress(t(), String.t()) :: :ok
   def progress(%__MODULE__{columns: nil}, _text), do: :ok
   def progress(%__MODULE__{} = output, text), do: IO.write(output.device, @clear <> text)
 
-  @doc "Takes the progress line away."
+  @doc "Removes the progress line."
   @spec finish(t()) :: :ok
   def finish(output), do: progress(output, "")
 
-  @doc "Writes a term to the file that `--json` names, if it names one; the error is for people."
+  @doc "Writes a term to the file that `--json` names, if any; the error is for people."
   @spec json(Path.t() | nil, term()) :: :ok | {:error, [String.t()]}
   def json(nil, _term), do: :ok
 

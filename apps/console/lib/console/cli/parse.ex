@@ -2,8 +2,9 @@ defmodule Console.Cli.Parse do
   @moduledoc """
   Parses text into checked values: numbers, points, choices, fleets. Pure.
 
-  Each answers `{:ok, value}` or `{:error, what_is_allowed}`, with a hint where there is one. Numbers
-  are plain decimals with few digits, so "nan", "inf" and "1e999" are not even numbers.
+  Each function returns `{:ok, value}` or `{:error, what_is_allowed}`, with a hint if there is
+  one. Numbers are plain decimals with few digits, so "nan", "inf" and "1e999" are not even
+  numbers.
   """
 
   alias Swarm.Formation
@@ -91,7 +92,7 @@ defmodule Console.Cli.Parse do
   end
 
   @doc """
-  Something at a simulated second, `WHAT@T`, `what` being checked by `check`.
+  Something at a simulated second, `WHAT@T`; `check` checks `WHAT`.
 
       iex> Console.Cli.Parse.at("3,2@40", &Console.Cli.Parse.point/1, "X,Y@T")
       {:ok, {{3.0, 2.0}, 40.0}}
@@ -155,7 +156,7 @@ defmodule Console.Cli.Parse do
   end
 
   @doc """
-  What people name of a table, in its order; each entry has a `:name`.
+  The entries of a table that people name, in its order; each entry has a `:name`.
 
       iex> Console.Cli.Parse.named("b,a", [%{name: :a}, %{name: :b}, %{name: :c}])
       {:ok, [%{name: :a}, %{name: :b}]}
@@ -174,7 +175,7 @@ defmodule Console.Cli.Parse do
   end
 
   @doc """
-  Words as people write a choice.
+  Lists words as people write a choice.
 
       iex> Console.Cli.Parse.either(~w(hall hospital arena))
       "hall, hospital or arena"

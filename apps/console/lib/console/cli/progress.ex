@@ -5,7 +5,7 @@ defmodule Console.Cli.Progress do
   @width 24
 
   @doc """
-  The line for `done` of `all` seconds.
+  The progress line for `done` of `all` seconds.
 
       iex> Console.Cli.Progress.line(30.0, 120.0, "searching", 40)
       "[######..................]  30 of 120 s "

@@ -8,7 +8,7 @@ defmodule Console.Live.Fleet do
   alias Robot.Command
   alias Sim.Fleet
 
-  @doc "Starts a fleet, or says in one line what is wrong with its options."
+  @doc "Starts a fleet; the error says in one line what is wrong with its options."
   @spec start_link(map()) :: {:ok, pid()} | {:error, String.t()}
   def start_link(options), do: Fleet.start_link(options)
 
@@ -33,7 +33,7 @@ defmodule Console.Live.Fleet do
     end
   end
 
-  # Robots have accepted it then; whether they reach what they were sent to is another thing.
+  # `:ok` means that robots have accepted the command, not that they reach their goals.
   defp told({:kill, _who}), do: "done"
   defp told(_order), do: "accepted"
 
@@ -48,13 +48,13 @@ defmodule Console.Live.Fleet do
   defp carry_out(:estop, _live), do: Swarm.estop()
   defp carry_out(:reset, _live), do: Swarm.reset()
 
-  # Another shape keeps the distance that the robots have now.
+  # Another shape keeps the current spacing of the robots.
   defp carry_out({:formation, {kind, spacing}}, live) do
     {_kind, present} = Fleet.scene(live).formation
     Swarm.formation(kind, spacing: spacing || present)
   end
 
-  # Robots have no map: what lies in a wall can only be seen here.
+  # Robots have no map, so only here can one see that a place is in a wall.
   defp on_floor(text, map) do
     with {:ok, {:goto, x, y, _heading}} <- Command.parse(text, []),
          true <- Sim.Floorplan.wall?(map, {x, y}) do

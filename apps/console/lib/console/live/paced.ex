@@ -7,11 +7,13 @@ defmodule Console.Live.Paced do
 
   @step_ms 100
 
-  @doc "Starts the fleet; with `nodes: true` each robot in a process of the operating system of its own."
+  @doc """
+  Starts the fleet; with `nodes: true` each robot runs in an operating system process of its own.
+  """
   @spec new(map()) :: {:ok, pid()} | {:error, String.t()}
   defdelegate new(options), to: Fleet, as: :start_link
 
-  @doc "A tenth of a second later; when the fleet has fallen, this process ends with it."
+  @doc "Waits a tenth of a second; if the fleet has crashed, this process ends with it."
   @spec step(pid()) :: pid()
   def step(fleet) do
     receive do
@@ -24,7 +26,7 @@ defmodule Console.Live.Paced do
   @spec done?(pid()) :: boolean()
   defdelegate done?(fleet), to: Fleet
 
-  @doc "The fleet as it is now."
+  @doc "The current scene of the fleet."
   @spec scene(pid()) :: Sim.Scene.t()
   defdelegate scene(fleet), to: Fleet
 
@@ -32,11 +34,11 @@ defmodule Console.Live.Paced do
   @spec result(pid()) :: map()
   defdelegate result(fleet), to: Fleet
 
-  @doc "How to reach its processes."
+  @doc "How to reach its processes, as lines of text."
   @spec lines(pid()) :: [String.t()]
   defdelegate lines(fleet), to: Fleet
 
-  @doc "Ends them, and returns when they are gone."
+  @doc "Ends its processes, and returns when they are gone."
   @spec stop(pid()) :: :ok
   defdelegate stop(fleet), to: Fleet
 end

@@ -2,8 +2,8 @@ defmodule Console.Live.Trial do
   @moduledoc """
   A trial in real time: the lockstep run, one step of 100 ms each 100 ms.
 
-  It never hurries to make up for lost time: on a machine too slow for its fleet the run is slow,
-  and so an answer may take as long as a step.
+  It never runs faster to make up for lost time: on a machine too slow for its fleet the run is
+  slow, and an answer may take as long as a step.
   """
   use GenServer
   alias Hal.Ticker
@@ -11,7 +11,7 @@ defmodule Console.Live.Trial do
 
   @step_ms 100
 
-  @doc "Starts the run of a new trial, or says in one line what is wrong with its options."
+  @doc "Starts the run of a new trial; the error says in one line what is wrong with its options."
   @spec start_link(module(), map()) :: {:ok, pid()} | {:error, String.t()}
   def start_link(module, options) do
     with {:ok, trial} <- module.new(options) do
@@ -66,11 +66,11 @@ defmodule Console.Live.Trial do
   defp carry_out({:kill, robot}, %{module: module, trial: trial}) do
     if robot in module.living(trial),
       do: {:ok, module.kill(trial, robot)},
-      else: {:error, "#{robot} is dead already"}
+      else: {:error, "#{robot} is already dead"}
   end
 
   defp carry_out({:landmark, :none}, _state),
-    do: {:error, "here the landmark can be moved, but not taken away"}
+    do: {:error, "in lockstep the landmark can be moved, but not removed"}
 
   defp carry_out({:landmark, place}, %{module: module, trial: trial}),
     do: module.move(trial, place)
@@ -85,7 +85,7 @@ defmodule Console.Live.Trial do
   defp carry_out(latch, state) when latch in [:estop, :reset], do: tell(:all, latch, state)
 
   defp carry_out({:tell, _target, text}, _state),
-    do: {:error, "robots on this mission take stop and start, not #{text}"}
+    do: {:error, "in lockstep robots accept stop and start, not #{text}"}
 
   defp tell(:all, command, %{module: module, trial: trial}),
     do: {:ok, module.command(trial, :all, command)}

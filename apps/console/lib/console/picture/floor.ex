@@ -12,8 +12,8 @@ defmodule Console.Picture.Floor do
   @landmark "#F2C200"
 
   @doc """
-  The part of the map worth showing: all of it, or what lies round the ways when they fill
-  less than most of it.
+  The part of the map worth showing: all of it, or the surroundings of the paths if they fill much
+  less of it.
   """
   @spec box(MapView.t(), RunTrack.t()) :: MapView.box()
   def box(ground, track) do
@@ -22,7 +22,7 @@ defmodule Console.Picture.Floor do
     around = &MapView.around(ground, places ++ slots, 1.0, &1)
     {left, bottom, right, top} = around.({5.0, 5.0})
     {wide, high} = {right - left, top - bottom}
-    # As wide in proportion as the place it is drawn in, where the map has the room.
+    # It gets the proportions of the area that it is drawn in, if the map has the room.
     {left, bottom, right, top} =
       box = around.({max(wide, @aspect * high), max(high, wide / @aspect)})
 
@@ -31,7 +31,7 @@ defmodule Console.Picture.Floor do
       else: box
   end
 
-  @doc "The drawing, `scale` pixels to the metre, its upper left corner at 0,0."
+  @doc "The drawing, with `scale` pixels per metre and its upper left corner at 0,0."
   @spec draw(MapView.t(), RunTrack.t(), MapView.box(), float()) :: iodata()
   def draw(ground, track, {left, bottom, right, top} = box, scale) do
     at = fn {x, y} -> {(x - left) * scale, (top - y) * scale} end
@@ -64,7 +64,7 @@ defmodule Console.Picture.Floor do
     ]
   end
 
-  @doc "Colour and dash of every robot by name."
+  @doc "The colour and dash pattern of each robot by name."
   @spec colours(RunTrack.t()) :: %{atom() => {String.t(), String.t() | nil}}
   def colours(track) do
     track.first.robots
@@ -72,7 +72,7 @@ defmodule Console.Picture.Floor do
     |> Map.new(fn {robot, index} -> {robot.id, Colours.at(index)} end)
   end
 
-  @doc "The landmark as it is drawn on the floor, for the legend."
+  @doc "The symbol of the landmark, for the legend."
   @spec diamond(float(), float(), float()) :: iodata()
   def diamond(x, y, r) do
     Svg.element(:polygon,
@@ -213,7 +213,7 @@ defmodule Console.Picture.Floor do
     [crown, body(robot, at, scale, fill: colour, stroke: "#FFFFFF", stroke_width: 1.2)]
   end
 
-  # A disc to scale with a stroke from its middle to its front.
+  # A disc to scale, with a stroke from its centre to its front.
   defp body(robot, at, scale, look) do
     {x, y} = at.(Pose.point(robot.pose))
     r = Colours.size(robot, scale)

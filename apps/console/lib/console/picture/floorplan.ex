@@ -3,7 +3,7 @@ defmodule Console.Picture.Floorplan do
   alias Console.Picture.MapView
 
   @doc """
-  The ground of a map; a ground is its own.
+  The view of a map; a map view is returned unchanged.
 
       iex> {:ok, map} = Sim.Floorplan.open("hall", 6)
       iex> ground = Console.Picture.Floorplan.of(map)

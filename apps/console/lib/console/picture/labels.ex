@@ -33,7 +33,7 @@ defmodule Console.Picture.Labels do
     ]
   end
 
-  # Stages at one place would hide each other: each next one stands beside the last.
+  # Stages at one place would hide each other, so each stands beside the previous one.
   defp marks(track, at, scale) do
     track.marks
     |> Enum.reverse()
@@ -54,7 +54,7 @@ defmodule Console.Picture.Labels do
   end
 
   defp names(scene, at, scale, width, taken) do
-    # In a crowd the legend and the colours must do.
+    # In a crowd the legend and the colours must suffice.
     if length(scene.robots) > 24 do
       []
     else
@@ -67,7 +67,7 @@ defmodule Console.Picture.Labels do
     end
   end
 
-  # Where a name may stand: right, left, above or below its robot; each as a box.
+  # The boxes where a name may stand: right, left, above or below its robot.
   defp spots(robot, at, scale, width) do
     {x, y} = at.(Pose.point(robot.pose))
     r = Colours.size(robot, scale) + 7

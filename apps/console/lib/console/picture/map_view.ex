@@ -1,6 +1,6 @@
 defmodule Console.Picture.MapView do
   @moduledoc """
-  A map as the views see it: its sides in metres, the origin in the middle, and its walls. Pure.
+  A map for the views: its sides in metres, with the origin in the middle, and its walls. Pure.
   """
 
   @enforce_keys [:name, :width, :height, :wall?]
@@ -38,7 +38,8 @@ defmodule Console.Picture.MapView do
     do: {-width / 2, -height / 2, width / 2, height / 2}
 
   @doc """
-  The box round some places with a margin, grown to a least width and height, kept within the map.
+  The box around some places with a margin, of at least the given width and height, kept within
+  the map.
 
       iex> room = Console.Picture.MapView.room("hall", 16.0, 12.0)
       iex> Console.Picture.MapView.around(room, [{7.0, 0.0}], 1.0, {4.0, 4.0})
@@ -59,7 +60,8 @@ defmodule Console.Picture.MapView do
     grow = max(0.0, least - (high - low)) / 2
     {low, high} = {low - grow, high + grow}
 
-    # Shifted before it is cut, so that a fleet at a wall is still shown with its surroundings.
+    # The box is shifted before it is cut, so that a fleet at a wall is still shown with its
+    # surroundings.
     shift = max(0.0, -edge - low) - max(0.0, high - edge)
     {max(-edge, low + shift), min(edge, high + shift)}
   end

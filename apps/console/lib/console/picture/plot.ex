@@ -10,13 +10,15 @@ defmodule Console.Picture.Plot do
   @mean "#0072B2"
   @limit 0.25
 
-  @doc "The plot in a field of this size, its upper left corner at 0,0; axis labels stand outside."
+  @doc """
+  The plot in a field of this size, with its upper left corner at 0,0; axis labels are outside.
+  """
   @spec draw(RunTrack.t(), float(), float()) :: iodata()
   def draw(track, width, height) do
     end_s = max(track.last.at_ms / 1000, 1.0)
     top = top(track.errors)
     x = fn at_s -> at_s / end_s * width end
-    # A square-root scale: the first metres of the way and the last centimetres both show.
+    # A square-root scale shows both the first metres of the error and the last centimetres.
     y = fn metres -> height - :math.sqrt(min(metres, top) / top) * height end
 
     [
@@ -112,7 +114,7 @@ defmodule Console.Picture.Plot do
     |> Enum.with_index(1)
     |> Enum.map_reduce(-100.0, fn {{stage, _place}, number}, last ->
       at = x.(stage.at_s)
-      # Badges of stages that follow each other closely stand side by side.
+      # Badges of stages in quick succession stand side by side.
       spot = max(at, last + 17)
 
       {[
@@ -131,7 +133,7 @@ defmodule Console.Picture.Plot do
     |> elem(0)
   end
 
-  # Without a leader there is no error: the curve is broken there, not bridged.
+  # Without a leader there is no error, so the curve has a gap there.
   defp curve(track, x, y, index, colour) do
     track.errors
     |> Enum.reverse()

@@ -2,15 +2,16 @@ defmodule Console.Terminal.Canvas do
   @moduledoc """
   The map in characters: walls in half blocks, robots as arrows with their names. Pure.
 
-  A character is taken to be twice as high as wide, so a circle on the floor is one on the screen.
-  Rows are lists of `{text, style}`; `Console.Terminal.Style` turns styles into colours.
+  A character is assumed to be twice as high as wide, so that a circle on the floor is a circle on
+  the screen. Rows are lists of `{text, style}`; `Console.Terminal.Style` turns styles into
+  colours.
   """
   alias Console.Picture.MapView
   alias Hal.Pose
 
   @arrows {"→", "↗", "↑", "↖", "←", "↙", "↓", "↘"}
 
-  # Outside of the map all is wall: this much of it is shown.
+  # Outside the map everything is wall; this much of it is shown.
   @edge 0.3
 
   @type cell :: {String.t(), atom()}
@@ -33,8 +34,8 @@ defmodule Console.Terminal.Canvas do
   def arrow(heading), do: elem(@arrows, Integer.mod(round(heading / (:math.pi() / 4)), 8))
 
   @doc """
-  The floor for this many characters, made anew only when size, map or part shown have changed:
-  looking for walls costs more than all the rest.
+  The floor for this many characters. It is made again only if the size, the map or the visible
+  part has changed, because looking for walls costs more than all the rest.
   """
   @spec floor(floor() | nil, MapView.t(), Sim.Scene.t(), pos_integer(), pos_integer()) :: floor()
   def floor(old, ground, scene, columns, rows) do
@@ -67,8 +68,8 @@ defmodule Console.Terminal.Canvas do
           )
   end
 
-  # The whole map, as long as a robot's length still moves it by about one character; else the
-  # part where the living robots and the landmark are, in whole steps of 2 m so that it rests.
+  # The whole map, if a robot's length is at least about one character there; else the part with
+  # the living robots and the landmark, which moves in steps of 2 m so that it is calm.
   defp part(ground, scene, columns, rows) do
     {left, bottom, right, top} = MapView.box(ground)
     whole = {left - @edge, bottom - @edge, right + @edge, top + @edge}
@@ -113,7 +114,7 @@ defmodule Console.Terminal.Canvas do
     %{key: key, origin: origin, scale: scale, columns: columns, rows: rows, walls: walls}
   end
 
-  # A thin wall must not fall between two samples, nor the map's edge between two characters.
+  # A thin wall must not get lost between two samples, nor the map's edge between two characters.
   defp wall?(ground, x, y, scale) do
     edge = max(@edge, 2 / 3 * scale)
 
@@ -151,7 +152,8 @@ defmodule Console.Terminal.Canvas do
     put(cells, floor, cell(floor, Pose.point(robot.pose)), {text, style(robot)})
   end
 
-  # Beside its robot if there is room, without the letters of its kind if that is all there is.
+  # Beside its robot if there is room; without the letters of its kind if there is only room for
+  # that.
   defp put_name(cells, floor, robot) do
     {column, row} = cell(floor, Pose.point(robot.pose))
     name = Atom.to_string(robot.id)

@@ -10,8 +10,8 @@ defmodule Console.Terminal.Editor do
   @type t :: %__MODULE__{}
 
   @doc """
-  One character. A finished line, the wish to leave, or what the word at the cursor may become comes
-  back beside the editor.
+  Handles one character. Besides the editor it returns a finished line, the wish to leave, or the
+  possible completions of the word at the cursor.
 
       iex> editor = Console.Terminal.Editor.new(["kill"])
       iex> {nil, editor} = Console.Terminal.Editor.key(editor, "k")
@@ -67,7 +67,10 @@ defmodule Console.Terminal.Editor do
       else: {nil, editor}
   end
 
-  @doc "An editor that completes these words, or those that a function gives for the words before."
+  @doc """
+  An editor that completes these words, or those that a function returns for the words before the
+  cursor.
+  """
   @spec new([String.t()] | ([String.t()] -> [String.t()])) :: t()
   def new(words) when is_list(words), do: new(fn _before -> words end)
   def new(words), do: %__MODULE__{words: words}
@@ -76,7 +79,7 @@ defmodule Console.Terminal.Editor do
   @spec text(t()) :: String.t()
   def text(editor), do: editor.before <> editor.behind
 
-  @doc "How many characters stand before the cursor."
+  @doc "The number of characters before the cursor."
   @spec cursor(t()) :: non_neg_integer()
   def cursor(editor), do: String.length(editor.before)
 
@@ -120,7 +123,7 @@ defmodule Console.Terminal.Editor do
     end
   end
 
-  # As far as they agree; only then which there are.
+  # Completes as far as all candidates agree; lists them only after that.
   defp several(editor, stem, words) do
     case String.slice(hd(words), 0, :binary.longest_common_prefix(words)) do
       ^stem -> {{:choices, words}, editor}

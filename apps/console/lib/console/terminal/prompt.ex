@@ -34,7 +34,7 @@ defmodule Console.Terminal.Prompt do
   end
 
   @doc """
-  The words that may come after those before.
+  The words that may follow the given words.
 
       iex> Console.Terminal.Prompt.completions(["kill"], [:mag1])
       ["leader", "mag1"]
@@ -64,16 +64,16 @@ defmodule Console.Terminal.Prompt do
       "kill leader, kill mag2        that robot dies",
       "formation wedge 1.2           column, line, wedge, triangle, diamond or",
       "                              circle, and a spacing of 0.8 to 5 m",
-      "landmark 3,2, landmark none   the landmark glides there, or is taken away",
+      "landmark 3,2, landmark none   the landmark glides there, or is removed",
       "goto mag2 1,2                 one robot drives to a place",
       "follow min1 mag2              one robot follows another",
       "stop, stop mag2               the fleet or one robot stops and stands",
-      "start, start mag2             the mission again, from the search",
-      "estop, reset                  emergency stop of all; held until the reset",
+      "start, start mag2             starts the mission again, from the search",
+      "estop, reset                  emergency stop of all, until the reset",
       "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all",
-      "status, status mag2           what everybody does",
-      "nodes                         their processes, and how to attach to one",
-      "quit                          the end (so is Ctrl-C); Tab completes"
+      "status, status mag2           what all robots do",
+      "nodes                         the processes, and how to attach to one",
+      "quit                          ends the demo, as Ctrl-C does; Tab completes"
     ]
   end
 
@@ -146,7 +146,7 @@ defmodule Console.Terminal.Prompt do
     cond do
       String.contains?(word, ":") and rest == [] -> tell("all", [word], robots)
       word in ["all" | Enum.map(robots, &to_string/1)] and rest != [] -> tell(word, rest, robots)
-      word in @words -> {:error, "#{word} is used otherwise; see help"}
+      word in @words -> {:error, "#{word} is used in another way; see help"}
       true -> unknown(word, robots)
     end
   end
@@ -166,7 +166,7 @@ defmodule Console.Terminal.Prompt do
     known = @words ++ ["all"] ++ Enum.map(robots, &to_string/1)
 
     case Suggest.hint(word, known) do
-      "" -> {:error, "unknown command #{inspect(word)}; help lists them"}
+      "" -> {:error, "unknown command #{inspect(word)}; help lists all commands"}
       hint -> {:error, "unknown command #{inspect(word)}#{hint}"}
     end
   end
@@ -186,7 +186,7 @@ defmodule Console.Terminal.Prompt do
     end
   end
 
-  # "3,2", "3, 2" and "3 2" are all places.
+  # "3,2", "3, 2" and "3 2" are all valid places.
   defp with_point(words, form, build) do
     text = words |> Enum.map(&String.trim(&1, ",")) |> Enum.join(",")
 

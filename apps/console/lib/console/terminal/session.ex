@@ -2,8 +2,9 @@ defmodule Console.Terminal.Session do
   @moduledoc """
   Shows a live fleet to a person: full screen on a terminal, plain lines elsewhere.
 
-  One process that waits for keys or lines and for the time to draw; the fleet runs beside it.
-  It decides nothing: `Console.Terminal` draws, `Console.Terminal.Prompt` checks, `Console.Live` acts.
+  One process waits for keys or lines and for the time to draw; the fleet runs beside it. It
+  decides nothing: `Console.Terminal` draws, `Console.Terminal.Prompt` checks, `Console.Live`
+  acts.
   """
   alias Console.{Demo, Options, Picture, Report, Terminal}
   alias Console.Cli.{Format, Output}
@@ -18,7 +19,7 @@ defmodule Console.Terminal.Session do
   defstruct @enforce_keys ++
               [view: nil, scene: nil, told: 0, status_s: 0, track: nil, started_ms: 0]
 
-  @doc "Runs until the time is up or somebody quits; answers with the exit status."
+  @doc "Runs until the time is up or somebody quits; returns the exit status."
   @spec run(Options.t(), module(), (map() -> {:ok, pid()} | {:error, String.t()})) :: 0 | 1 | 2
   def run(%Options{} = options, module, start) do
     tty = Tty.open()
@@ -160,7 +161,7 @@ defmodule Console.Terminal.Session do
   end
 
   defp redraw({:quit, session}), do: {:quit, session}
-  # With the scene at hand: typing must not wait for the fleet.
+  # Draws the scene at hand, because typing must not wait for the fleet.
   defp redraw(session), do: draw(session, session.scene)
 
   defp draw(%{mode: :lines} = session, _scene), do: session
@@ -239,9 +240,9 @@ defmodule Console.Terminal.Session do
   end
 
   defp show(session, lines),
-    do: put_in(session.view.overlay, lines ++ ["", "(Enter brings the map back)"])
+    do: put_in(session.view.overlay, lines ++ ["", "(press Enter to return to the map)"])
 
-  # After the terminal is itself again.
+  # Printed after the terminal is restored.
   defp finish({:refused, line}, _options) do
     IO.puts(:stderr, "demo: #{line}")
     1

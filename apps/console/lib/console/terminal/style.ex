@@ -22,7 +22,7 @@ defmodule Console.Terminal.Style do
   }
 
   @doc """
-  One row of exactly `columns` characters: cut, or filled up with blanks.
+  One row of exactly `columns` characters: cut, or padded with blanks.
 
       iex> [{"ab", :plain}, {"cd", :plain}] |> Console.Terminal.Style.row(3) |> IO.iodata_to_binary()
       "\\e[0mabc"
@@ -42,7 +42,7 @@ defmodule Console.Terminal.Style do
     ["\e[0m", text]
   end
 
-  @doc "The row's characters alone."
+  @doc "The characters of a row without styles."
   @spec plain([{String.t(), atom()}]) :: String.t()
   def plain(parts), do: Enum.map_join(parts, fn {text, _style} -> text end)
 

@@ -9,7 +9,7 @@ defmodule Console.Terminal.Table do
   @spec width() :: pos_integer()
   def width, do: @width
 
-  @doc "Exactly `rows` styled rows; whoever finds no room is counted in the last one."
+  @doc "Exactly `rows` styled rows; the last one counts the robots that have no row."
   @spec draw(Scene.t(), pos_integer()) :: [[{String.t(), atom()}]]
   def draw(scene, rows) do
     robots = Enum.sort_by(scene.robots, &rank/1)
@@ -26,7 +26,7 @@ defmodule Console.Terminal.Table do
     Enum.take([heading() | shown] ++ List.duplicate([], rows), rows)
   end
 
-  # The leader, then those who need attention, then by name as given.
+  # The leader, then the robots that need attention, then the rest in the given order.
   defp rank(%{leader?: true}), do: 0
   defp rank(%{state: :blocked}), do: 1
   defp rank(%{state: :unsure}), do: 2
@@ -71,7 +71,7 @@ defmodule Console.Terminal.Table do
     end
   end
 
-  # By its own word, where it has any.
+  # The robot's own estimate, if it has one.
   defp within(%{alive: false}), do: ""
   defp within(%{uncertainty: nil}), do: ""
   defp within(%{uncertainty: metres}), do: "±" <> figure(metres)

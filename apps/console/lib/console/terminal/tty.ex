@@ -12,7 +12,7 @@ defmodule Console.Terminal.Tty do
   @doc "Switches to single keys; `:error` if standard input and output are not a terminal."
   @spec open() :: {:ok, saved()} | :error
   def open do
-    # Not by asking for the columns: a terminal may not know its size.
+    # Asking for the columns would not tell, because a terminal may not know its size.
     with {:ok, device} <- terminal("/proc/self/fd/0"),
          {:ok, _device} <- terminal("/proc/self/fd/1"),
          {:ok, settings} <- stty(device, ["-g"]),
@@ -23,7 +23,7 @@ defmodule Console.Terminal.Tty do
     end
   end
 
-  @doc "Puts the terminal back."
+  @doc "Restores the terminal."
   @spec close(saved()) :: :ok
   def close({device, settings}) do
     _ = stty(device, [settings])
@@ -47,7 +47,7 @@ defmodule Console.Terminal.Tty do
     end
   end
 
-  # Programs that the VM starts have no terminal of their own, so ours is given by name.
+  # Programs that the VM starts have no terminal of their own, so they get ours by name.
   defp stty(device, arguments) do
     case System.cmd("stty", ["-F", device | arguments], stderr_to_stdout: true) do
       {text, 0} -> {:ok, String.trim(text)}

@@ -8,7 +8,7 @@ defmodule Mix.Tasks.Calibrate do
 
   `mix calibrate odometry --help` and `mix calibrate colour --help` list the options, with examples.
 
-  Exit status: 0 all went well, 1 something was wrong with the input, or with what was measured.
+  Exit status: 0 if all went well, 1 if the input or a measurement was wrong.
   """
   use Mix.Task
   alias Console.Cli.Build
@@ -16,7 +16,7 @@ defmodule Mix.Tasks.Calibrate do
 
   @words ["odometry", "colour"]
 
-  # As the shell says it of programs that nobody reads any more.
+  # The status that a shell reports for a program whose output nobody reads any more.
   @unread 141
 
   @impl Mix.Task
@@ -47,7 +47,7 @@ defmodule Mix.Tasks.Calibrate do
         )
 
       [] ->
-        refuse("what? mix calibrate odometry or mix calibrate colour")
+        refuse("mix calibrate needs a command: mix calibrate odometry or mix calibrate colour")
     end
   end
 

@@ -3,30 +3,31 @@ defmodule Mix.Tasks.Demo do
   @moduledoc """
   Runs the demo; `mix demo --help` lists its options.
 
-  Live, every robot is a tree of processes of its own, in real time; a fleet too large for the
-  machine's processors is run in lockstep instead, as slowly as it takes, unless there are nodes or hardware.
+  Live, every robot is a tree of processes of its own, in real time. A fleet too large for the
+  machine's processors runs in lockstep instead, as slowly as necessary, unless there are nodes or
+  hardware.
 
-  Exit status: 0 the fleet ended in formation, or a person at a terminal has quit; 2 it did not; 1 something was
-  wrong with the input.
+  Exit status: 0 if the fleet ended in formation, or a person at a terminal has quit; 2 if it did
+  not; 1 if the input was wrong.
   """
   use Mix.Task
   alias Console.{Demo, Live, Options}
   alias Console.Cli.Build
   alias Console.Terminal.Session
 
-  # Twenty robots take a third of a processor, fifty a whole one: all hear all.
+  # Twenty robots take a third of a processor, fifty a whole one, because all hear all.
   @robots_a_processor 20
 
-  # What a node needs is a thirtieth of a processor, and more with every other node.
+  # A node needs a thirtieth of a processor, and more with every other node.
   @nodes_a_processor 15
 
-  # As the shell says it of programs that nobody reads any more.
+  # The status that a shell reports for a program whose output nobody reads any more.
   @unread 141
 
   @impl Mix.Task
   def run(arguments) do
     Build.update()
-    # Robots are killed here on purpose: what their supervisors say of it would spoil the picture.
+    # Robots are killed here on purpose, and reports of their supervisors would spoil the screen.
     Logger.configure(level: :none)
 
     status =
@@ -39,7 +40,7 @@ defmodule Mix.Tasks.Demo do
     if is_integer(status) and status > 0, do: exit({:shutdown, status})
   end
 
-  # Who reads us may have seen enough, as `head` does; then we end without a word.
+  # The reader of our output may stop reading, as `head` does; then we end silently.
   defp play(options) do
     warn(options)
 
@@ -69,7 +70,7 @@ defmodule Mix.Tasks.Demo do
     if count > most do
       IO.puts(
         :stderr,
-        "demo: #{count} #{what} are much for this machine; up to #{most} keep real time"
+        "demo: #{count} #{what} may be too many for this machine; up to #{most} keep real time"
       )
     end
   end

@@ -14,7 +14,7 @@ defmodule Console.Terminal.PromptTest do
     line
   end
 
-  test "everything that can be typed" do
+  test "every command is understood" do
     assert ok("") == :nothing
     assert ok("kill leader") == {:kill, :leader}
     assert ok("  KILL mag2 ") == {:kill, :mag2}
@@ -42,7 +42,7 @@ defmodule Console.Terminal.PromptTest do
     assert ok("quit") == :quit
   end
 
-  test "what is wrong is named, with what is allowed" do
+  test "errors name what is wrong and what is allowed" do
     assert error("kil leader") =~ "did you mean kill?"
     assert error("kill mag9") =~ "there are mag1 to mag2, min1"
     assert error("kill") =~ "kill leader"
