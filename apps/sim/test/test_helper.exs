@@ -1,4 +1,4 @@
-# One for all tests, which run side by side.
+# One directory for all tests, which run side by side.
 {:ok, _worlds} = Supervisor.start_link([Sim.World.Directory], strategy: :one_for_one)
 
 Code.require_file("../../../test/start.exs", __DIR__)

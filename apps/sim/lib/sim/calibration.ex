@@ -3,9 +3,9 @@ defmodule Sim.Calibration do
   A calibration of odometry in a simulated hall, in lockstep: one robot drives the courses that a real one
   would, by the same controller and reflexes, and its true pose is what a person would have measured. Pure.
 
-  Options of `new/1`: `profile` (`:magellan`), `seed` (0), `noise` (`:default`), `wheels` (what odometry is
-  wrong about, as in `Sim.World.Body`), `speed` (m/s, 0.3), `tape_m` (standard deviation of what is read
-  off a tape, 0.003) and `tape_rad` (the same of an angle, 0.009, half a degree).
+  Options of `new/1`: `profile` (`:magellan`), `seed` (0), `noise` (`:default`), `wheels` (errors
+  of the odometry, as in `Sim.World.Body`), `speed` (m/s, 0.3), `tape_m` (standard deviation of a
+  reading of the tape, 0.003) and `tape_rad` (the same for an angle, 0.009, half a degree).
   """
   alias Hal.{Pose, Profile}
   alias Robot.Percept
@@ -23,7 +23,10 @@ defmodule Sim.Calibration do
 
   @type t :: %__MODULE__{}
   @type task :: {:distance, float()} | {:angle, float()} | {:square, :cw | :ccw, float()}
-  @typedoc "What odometry told, and what was measured, each from the pose before the course; radians are unwrapped."
+  @typedoc """
+  The reading of odometry, and the measurement, each from the pose before the course; radians are
+  unwrapped.
+  """
   @type driven :: %{told: Pose.t(), measured: Pose.t(), told_turn: float(), turn: float()}
 
   @doc "A robot in a hall. Options as above."
@@ -50,8 +53,8 @@ defmodule Sim.Calibration do
   end
 
   @doc """
-  What the robot's odometry is truly wrong about, the draws of the noise with it: what calibration
-  is to find.
+  The true errors of the robot's odometry, including the draws of the noise: what calibration
+  should find.
   """
   @spec truth(t()) :: Model.t()
   def truth(%__MODULE__{world: world}) do
@@ -87,7 +90,7 @@ defmodule Sim.Calibration do
     end
   end
 
-  # With room for a square to either side.
+  # With room for a square on either side.
   defp mark({:square, :cw, side}), do: Pose.new(-side / 2, side / 2)
   defp mark({:square, :ccw, side}), do: Pose.new(-side / 2, -side / 2)
   defp mark({:distance, way}), do: Pose.new(-way / 2, 0)
@@ -95,7 +98,7 @@ defmodule Sim.Calibration do
 
   defp told(world), do: world.robots[@id].odometry
 
-  # As `Sim.Trial` has it: controller and reflex, act, reflex again 50 ms later.
+  # As in `Sim.Trial`: controller and reflex, act, reflex again 50 ms later.
   defp go(%{world: %{at_ms: at_ms}, until_ms: until_ms} = s) when at_ms > until_ms, do: {2, s}
 
   defp go(s) do

@@ -1,8 +1,8 @@
 defmodule Sim.Compute do
   @moduledoc """
-  The heavy work of a world: distance fields, sonar rays, camera pictures. In C if the library was
-  built, otherwise in Elixir; both give the same bits, because every operation is an addition,
-  multiplication, division or square root of doubles in the same order.
+  The heavy work of a world: distance fields, sonar rays, camera pictures. It runs in C if the
+  library was built, otherwise in Elixir; both give the same bits, because every operation is an
+  addition, multiplication, division or square root of doubles in the same order.
   """
   alias Sim.Compute
   alias Sim.Compute.Reference
@@ -15,7 +15,7 @@ defmodule Sim.Compute do
   @type disc :: {float(), float(), float()}
 
   @typedoc """
-  One robot's sonars: which of the discs it is itself, its place, cosine and sine of its heading, limits
+  One robot's sonars: the index of its own disc, its place, cosine and sine of its heading, limits
   of range, and for each sensor 12 doubles: place and the five directions of its cone.
   """
   @type ring ::
@@ -29,20 +29,20 @@ defmodule Sim.Compute do
           {column :: non_neg_integer(), Palette.kind(), first :: non_neg_integer(),
            last :: non_neg_integer(), luma :: byte()}
 
-  # More robots than this may take longer than a normal scheduler should be held.
+  # More robots than this may block a normal scheduler for too long.
   @few 32
 
   @table 4096
   @widest 4096
 
-  @doc "The field of a plan, one byte a cell, 0 free: see `Sim.Floorplan`."
+  @doc "The field of a plan, one byte per cell, 0 free: see `Sim.Floorplan`."
   @spec field(binary(), pos_integer(), pos_integer()) :: binary()
   def field(walls, width, height) when byte_size(walls) == width * height,
     do: module().field(walls, width, height)
 
   @doc """
-  The sonar ranges of all rings. Noise is N(0, 0.01 + 0.01 r), for robot and sensor; its robot
-  is each ring's own.
+  The sonar ranges of all rings. Noise is N(0, 0.01 + 0.01 r), drawn by robot and sensor; the
+  robot is each ring's own.
   """
   @spec sonar(Sim.Floorplan.t(), [disc()], [ring()], noise()) :: [[float()]]
   def sonar(map, discs, rings, noise) do
@@ -62,7 +62,7 @@ defmodule Sim.Compute do
 
   defp sonar(module, map, discs, rings, noise), do: module.sonar_few(map, discs, rings, noise)
 
-  @doc "The pieces of poles that a camera sees, by columns from the left, the nearest first."
+  @doc "The parts of poles that a camera sees, by columns from the left, the nearest first."
   @spec look(Sim.Floorplan.t(), CameraFrustum.t(), [CameraFrustum.pole()]) :: [piece()]
   def look(map, %CameraFrustum{} = sight, poles) do
     pieces = module().look(pack(map), pack(sight), pack(poles))
@@ -84,11 +84,11 @@ defmodule Sim.Compute do
              <<round(sd * Sim.Noise.gauss(Sim.Noise.hash(0, 0x9A17, use, rem(k, @table))))::8-signed>>
            end)
 
-  @doc "The draws that pictures are blurred with, as `paint` takes them."
+  @doc "The noise draws for pictures, as `paint` takes them."
   @spec tables() :: binary()
   def tables, do: @tables
 
-  @doc "The arguments of the kernels as they take them."
+  @doc "The arguments in the form that the kernels take."
   @spec pack(Sim.Floorplan.t() | CameraFrustum.t() | [CameraFrustum.pole()]) :: tuple() | binary()
   def pack(%{field: field, width: width, height: height, cell: cell}),
     do: {field, width, height, cell}

@@ -1,23 +1,23 @@
 defmodule Sim.Emulator do
   @moduledoc """
   An emulated device (`Sim.Emulator.Core`) on a pseudo-terminal, with a body: the body does what
-  the device wants, and the device knows what the body feels. At the other end, the link, a driver
-  finds it like a real device.
+  the device commands, and the device gets what the body senses. At the other end, the symbolic
+  link, a driver finds it like a real device.
 
   | option | meaning |
   |---|---|
   | `:core` | `{module, options}`, `Sim.Emulator.RFlexController` or `Sim.Emulator.ViscaCamera` |
-  | `:link` | path of the link that is made to the pseudo-terminal |
-  | `:body` | `{driver, options}`, a `Hal.Drive` or `Hal.Ptz` as `Sim.Device.Drive`, or `nil` for none |
-  | `:wire` | faults of the line, both ways, as of `Sim.Emulator.Wire` |
+  | `:link` | path of the symbolic link to the pseudo-terminal |
+  | `:body` | `{driver, options}`, a `Hal.Drive` or `Hal.Ptz` such as `Sim.Device.Drive`, or `nil` for none |
+  | `:wire` | faults of the line in both directions, as in `Sim.Emulator.Wire` |
   | `:name` | as in `GenServer` |
 
-  A body that is not there yet, or a line that cannot be opened, is tried again and again. A line that fails is told
-  by the event `[:sim, :emulator, :line]`.
+  If the body does not exist yet, or the line cannot be opened, it tries again until that works.
+  The event `[:sim, :emulator, :line]` reports a line that fails.
 
-  What may happen to hardware: `unplug/1` takes the line away, so that the driver's end has nothing behind it, and
-  `plug/1` brings it back; `freeze/1` leaves it deaf and dumb, with wheels that the body itself stops, until
-  `thaw/1`; `restart/1` is its power switch.
+  Faults of hardware: `unplug/1` removes the line, so that the driver's end is connected to
+  nothing, and `plug/1` restores it; `freeze/1` makes the device neither hear nor send anything,
+  with wheels that the body itself stops, until `thaw/1`; `restart/1` is its power switch.
   """
   use GenServer
   alias Hal.{Event, Serial}
@@ -29,7 +29,7 @@ defmodule Sim.Emulator do
   defstruct @enforce_keys ++
               [line: nil, body: nil, plugged?: true, frozen?: false, timer: nil, reason: nil]
 
-  @doc "Starts it; or says in one line what is wrong with its options."
+  @doc "Starts the device; the error says in one line what is wrong with its options."
   @spec start_link(keyword()) :: GenServer.on_start() | {:error, line :: String.t()}
   def start_link(options) do
     {name, options} = Keyword.split(options, [:name])
@@ -54,42 +54,45 @@ defmodule Sim.Emulator do
     end
   end
 
-  @doc "Takes the line away."
+  @doc "Removes the line."
   @spec unplug(GenServer.server()) :: :ok
   def unplug(emulator), do: GenServer.call(emulator, :unplug)
 
-  @doc "Brings it back, under the same link."
+  @doc "Restores the line, under the same link."
   @spec plug(GenServer.server()) :: :ok
   def plug(emulator), do: GenServer.call(emulator, :plug)
 
-  @doc "The device stands still: it hears nothing, says nothing, and tells its body nothing."
+  @doc "Freezes the device: it hears nothing, sends nothing, and commands nothing of its body."
   @spec freeze(GenServer.server()) :: :ok
   def freeze(emulator), do: GenServer.call(emulator, {:freeze, true})
 
-  @doc "It goes on where it was."
+  @doc "Lets the device go on where it was."
   @spec thaw(GenServer.server()) :: :ok
   def thaw(emulator), do: GenServer.call(emulator, {:freeze, false})
 
-  @doc "Switches it off and on."
+  @doc "Switches the device off and on."
   @spec restart(GenServer.server()) :: :ok
   def restart(emulator), do: GenServer.call(emulator, {:change, :restart, []})
 
-  @doc "Does `function` of the core's module with the core and these arguments, as `:stick` of a controller."
+  @doc """
+  Calls `function` of the core's module with the core and these arguments, such as `:stick` of a
+  controller.
+  """
   @spec change(GenServer.server(), atom(), list()) :: :ok
   def change(emulator, function, arguments),
     do: GenServer.call(emulator, {:apply, function, arguments})
 
-  @doc "Faults of the line from now on, as of `Sim.Emulator.Wire`."
+  @doc "Sets the faults of the line from now on, as in `Sim.Emulator.Wire`."
   @spec spoil(GenServer.server(), keyword()) :: :ok | {:error, line :: String.t()}
   def spoil(emulator, options), do: GenServer.call(emulator, {:spoil, options})
 
-  @doc "The device as it is."
+  @doc "The current state of the device."
   @spec core(GenServer.server()) :: term()
   def core(emulator), do: GenServer.call(emulator, :core)
 
   @impl GenServer
   def init(s) do
-    # So that `terminate/2` runs, and a port program that falls is seen.
+    # So that `terminate/2` runs, and the crash of a port program is noticed.
     Process.flag(:trap_exit, true)
     {:ok, s |> open() |> attach() |> pump()}
   end
@@ -202,7 +205,7 @@ defmodule Sim.Emulator do
     end
   end
 
-  # Everything that is due: bytes in, bytes out, the body, and the next time.
+  # Does everything that is due: bytes in, bytes out, the body, and the next timer.
   defp pump(%{frozen?: true} = s) do
     {_unheard, to_core} = Wire.take(s.to_core, now())
     schedule(%{s | to_core: to_core}, [Wire.next_ms(to_core)])
@@ -213,7 +216,7 @@ defmodule Sim.Emulator do
     {heard, to_core} = Wire.take(s.to_core, at_ms)
     {said, wishes, core} = s.core |> s.module.hear(heard, at_ms) |> s.module.run(at_ms)
     {sent, from_core} = s.from_core |> Wire.put(said, at_ms) |> Wire.take(at_ms)
-    # Of a line that cannot take it, it is lost.
+    # If the line cannot take it, it is lost.
     if s.line && sent != <<>>, do: Serial.write(s.line, sent)
     s = Enum.reduce(wishes, %{s | core: core, to_core: to_core, from_core: from_core}, &wish/2)
 

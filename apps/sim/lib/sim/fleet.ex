@@ -4,8 +4,8 @@ defmodule Sim.Fleet do
   them may be killed: on this node (`Sim.Fleet.Local`), or each in a process of the operating system of
   its own (`Sim.Fleet.Nodes`).
 
-  This process plays the script, keeps the run log, and answers what viewers ask; where world and
-  robots run is its backend's business (`Sim.Fleet.Backend`).
+  This process plays the script, keeps the run log, and answers viewers; its backend decides where
+  world and robots run (`Sim.Fleet.Backend`).
   """
   use GenServer
   alias Hal.{Pose, Ticker}
@@ -16,12 +16,12 @@ defmodule Sim.Fleet do
   @period_ms 100
 
   @doc """
-  Starts a fleet. All options have defaults: `robots`, `seed`, `map`, `landmark`, `formation`, `noise`,
-  `loss` and the others of `Sim.Trial.Setup.new/1` (there is no time limit here); `mission: false` for
-  robots that wait for commands instead of starting their mission at once, or `mission: {module, options}` for
-  another `Robot.Mission` than the search for the landmark; `nodes: true` for robots and
-  world in processes of the operating system of their own; `trace` as of `Robot.Config`, called
-  with the robot's id first (on one node).
+  Starts a fleet. All options have defaults: `robots`, `seed`, `map`, `landmark`, `formation`,
+  `noise`, `loss` and the others of `Sim.Trial.Setup.new/1` (there is no time limit here);
+  `mission: false` for robots that wait for commands instead of starting their mission at once, or
+  `mission: {module, options}` for another `Robot.Mission` than the search for the landmark;
+  `nodes: true` for robots and world in processes of the operating system of their own; `trace` as
+  in `Robot.Config`, called with the robot's id first (on one node).
 
       {:ok, fleet} = Sim.Fleet.start_link()
       {:ok, fleet} = Sim.Fleet.start_link(robots: [:mag1, :mag2, :min1], map: "hospital", mission: false)
@@ -42,7 +42,7 @@ defmodule Sim.Fleet do
       answer = make_ref()
       start = {setup, backend, Map.put(own, :mission, begin?), {self(), answer}}
 
-      # What could not start has ended well, and said why.
+      # A fleet that could not start ends normally, and has said why.
       with :ignore <- GenServer.start_link(__MODULE__, start) do
         receive do
           {^answer, line} -> {:error, line}
@@ -51,19 +51,19 @@ defmodule Sim.Fleet do
     end
   end
 
-  @doc "What a viewer sees now."
+  @doc "The current scene for viewers."
   @spec scene(GenServer.server()) :: Scene.t()
   def scene(fleet), do: GenServer.call(fleet, :scene, :infinity)
 
-  @doc "What the report says of the run so far, but for its wall time."
+  @doc "The report of the run so far, without its wall time."
   @spec result(GenServer.server()) :: map()
   def result(fleet), do: GenServer.call(fleet, :result, :infinity)
 
-  @doc "Kills a robot, or whoever leads: all its processes at once, as a broken wire would."
+  @doc "Kills a robot, or the leader: all its processes at once, as if its power failed."
   @spec kill(GenServer.server(), atom() | :leader) :: :ok | {:error, line :: String.t()}
   def kill(fleet, who), do: GenServer.call(fleet, {:kill, who})
 
-  @doc "Lets the landmark glide to a place; `nil` takes it away."
+  @doc "Lets the landmark glide to a place; `nil` removes it."
   @spec move_landmark(GenServer.server(), Pose.point() | nil) ::
           :ok | {:error, line :: String.t()}
   def move_landmark(fleet, place), do: GenServer.call(fleet, {:move, place})
@@ -72,25 +72,25 @@ defmodule Sim.Fleet do
   @spec living(GenServer.server()) :: [atom()]
   def living(fleet), do: GenServer.call(fleet, :living)
 
-  @doc "The server of its world; `nil` while that is being started again."
+  @doc "The server of its world; `nil` while it is being started again."
   @spec server(GenServer.server()) :: pid() | nil
   def server(fleet), do: GenServer.call(fleet, :server)
 
-  @doc "Whether the run is over, as `Sim.Trial.Termination` has it."
+  @doc "Whether the run is over, as defined by `Sim.Trial.Termination`."
   @spec done?(GenServer.server()) :: boolean()
   def done?(fleet), do: GenServer.call(fleet, :done?, :infinity)
 
-  @doc "How to reach the fleet's processes of the operating system, a line each."
+  @doc "How to reach the fleet's processes of the operating system, one line each."
   @spec lines(GenServer.server()) :: [String.t()]
   def lines(fleet), do: GenServer.call(fleet, :lines, :infinity)
 
-  @doc "Ends all of it."
+  @doc "Ends the whole fleet."
   @spec stop(GenServer.server()) :: :ok
   def stop(fleet), do: GenServer.stop(fleet)
 
   @impl GenServer
   def init({setup, module, own, {caller, answer}}) do
-    # So that `terminate/2` runs, and a fall of the parts is seen.
+    # So that `terminate/2` runs, and a crash of the parts is noticed.
     Process.flag(:trap_exit, true)
 
     case module.start(setup, Keyword.take(Map.to_list(own), [:trace])) do
@@ -209,7 +209,7 @@ defmodule Sim.Fleet do
       else: %{s | run_log: RunLog.stage(s.run_log, now(s.epoch_ms), stage, id, facts)}
   end
 
-  # At the same instant as the claims that show them.
+  # At the same time as the claims that show them.
   defp tell(run_log, at_ms, stages) do
     Enum.reduce(stages, run_log, fn {stage, id, facts}, run_log ->
       RunLog.stage(run_log, at_ms, stage, id, facts)

@@ -3,9 +3,9 @@ defmodule Sim.Floorplan do
   A floor plan of square cells, wall or free. The origin is at the centre, x right, y up, in
   metres; everything outside the plan is wall. Pure.
 
-  `field` has one byte a cell, rows from the lowest y: the distance to the nearest wall in cells,
-  counted as a king moves in chess and at most 255; 0 is wall. Rays and bodies jump by it.
-  `room` is the rectangle round the origin where a fleet starts.
+  `field` has one byte per cell, rows from the lowest y: the distance to the nearest wall in
+  cells, counted as a king moves in chess and at most 255; 0 is wall. Rays and bodies use it to
+  jump over free space. `room` is the rectangle around the origin where a fleet starts.
   """
   alias Sim.Floorplan.{Clearance, Drawing, Image, Starts}
 
@@ -46,7 +46,7 @@ defmodule Sim.Floorplan do
     do: {Float.round(map.width * map.cell, 6), Float.round(map.height * map.cell, 6)}
 
   @doc """
-  Whether there is wall at this point.
+  Whether there is a wall at this point.
 
       iex> {:ok, map} = Sim.Floorplan.open("hall", 6)
       iex> {Sim.Floorplan.wall?(map, {0.0, 0.0}), Sim.Floorplan.wall?(map, {99.0, 0.0})}
@@ -66,7 +66,7 @@ defmodule Sim.Floorplan do
   def free?(%__MODULE__{} = map, point, radius), do: clearance(map, point, radius) >= radius
 
   @doc """
-  Distance from a point to the nearest wall, exact where it is less than `limit`, else at least
+  Distance from a point to the nearest wall, exact if it is less than `limit`, else at least
   `limit`; 0 inside a wall.
 
       iex> {:ok, map} = Sim.Floorplan.open("hall", 6)
@@ -81,8 +81,8 @@ defmodule Sim.Floorplan do
   defdelegate near(map, point, limit), to: Clearance
 
   @doc """
-  Poses to start from: in the room, at least 1.0 m between centres, 0.7 m from walls, 1.2 m from
-  the landmark, headings at random. One for each `{id, radius}`, all from the seed.
+  Start poses: in the room, at least 1.0 m between centres, 0.7 m from walls, 1.2 m from the
+  landmark, with random headings. One for each `{id, radius}`, all determined by the seed.
 
       iex> {:ok, map} = Sim.Floorplan.open("hall", 2)
       iex> {:ok, [a, b]} = Sim.Floorplan.starts(map, [mag1: 0.2, mag2: 0.2], 1, {0.0, 0.0})
@@ -108,7 +108,7 @@ defmodule Sim.Floorplan do
     cond do
       abs(x) > right / 2 or abs(y) > high / 2 ->
         {:error,
-         "the landmark cannot stand at #{x},#{y}: map #{map.name} is #{right} x #{high} m round its centre"}
+         "the landmark cannot stand at #{x},#{y}: map #{map.name} is #{right} x #{high} m around its centre"}
 
       free?(map, {x * 1.0, y * 1.0}, 0.15) ->
         :ok

@@ -3,19 +3,20 @@ defmodule Sim.Lateness do
   Estimates the delay of messages between two unsynchronised clocks, relative to the fastest
   message so far. Pure; times in milliseconds.
 
-  What was held up on its way, as for a process that was frozen, comes all at once, and is old by
-  then. The quickest way is forgotten slowly, 1 ms in 20 messages, so that clocks may drift.
+  Messages that were held up on their way, for example because the process was frozen, arrive all
+  at once, and are old by then. The shortest delay is forgotten slowly, by 1 ms in 20 messages, so
+  that clocks may drift.
   """
 
   @late_ms 300
   @leak_ms 0.05
 
-  @typedoc "The least difference of the two clocks so far, or `nil` before any message."
+  @typedoc "The smallest difference of the two clocks so far, or `nil` before the first message."
   @type t :: float() | nil
 
   @doc """
-  Whether a message that was sent at `sent_ms` by the sender's clock and is read at `now_ms` by ours is
-  too old.
+  Whether a message is too old that was sent at `sent_ms` by the sender's clock and is read at
+  `now_ms` by ours.
 
       iex> {false, least} = Sim.Lateness.late?(nil, 1_000, 5_000)
       iex> {false, least} = Sim.Lateness.late?(least, 1_050, 5_060)

@@ -3,22 +3,23 @@ defmodule Sim.Node do
   The main program of an operating-system process that runs one robot, or the world, of a
   `Sim.Fleet.Nodes`.
 
-  Its first line of standard input is its whole configuration (`Sim.Node.Config`), so that nothing of it is
-  on a command line. It becomes a node by that, starts its part, and tells the launcher, a process on
-  another node. It ends when standard input closes: nobody needs it any more then.
+  The first line of its standard input is its whole configuration (`Sim.Node.Config`), so that
+  nothing of it is on a command line. With it the process becomes a node, starts its part, and
+  tells the launcher, a process on another node. It ends when standard input closes, because then
+  nobody needs it any more.
 
-  What it tells the launcher goes by `Sim.Node.Reporter`.
+  Its messages to the launcher go through `Sim.Node.Reporter`.
   """
   alias Sim.Node.{Config, Reporter}
 
-  @doc "What a part of a fleet is, in a node of its own."
+  @doc "A part of a fleet in a node of its own: a robot or the world."
   @callback start(options :: map()) ::
               {:ok, supervisor :: pid(), facts :: map(), report :: {module(), atom(), list()}}
 
-  @doc "Called when the launcher says that all are there."
+  @doc "Called when the launcher says that all nodes are up."
   @callback begin(options :: map()) :: :ok
 
-  @doc "Starts what standard input says; for `erl -s`."
+  @doc "Starts what standard input specifies; for `erl -s`."
   @spec main() :: pid()
   def main, do: spawn(&run/0)
 
@@ -35,7 +36,7 @@ defmodule Sim.Node do
     end
   end
 
-  # Nothing more comes, until the end.
+  # Nothing more arrives until the end.
   defp watch do
     case IO.gets("") do
       line when is_binary(line) -> watch()

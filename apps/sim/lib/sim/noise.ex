@@ -10,7 +10,7 @@ defmodule Sim.Noise do
   @mask 0xFFFFFFFF
 
   @doc """
-  32 bits for these four numbers.
+  A hash of these four numbers: 32 bits.
 
       iex> Sim.Noise.hash(1, 2, 3, 4) == Sim.Noise.hash(1, 2, 3, 4)
       true
@@ -39,7 +39,8 @@ defmodule Sim.Noise do
   def unit(hash), do: hash / 4_294_967_296
 
   @doc """
-  A hash as a draw with mean 0 and variance 1, nearly normal and never beyond 3.5: the sum of its four bytes.
+  A hash as a draw with mean 0 and variance 1, nearly normal and never beyond 3.5, from the sum of
+  its four bytes.
 
       iex> Sim.Noise.gauss(0x7F807F80)
       0.0

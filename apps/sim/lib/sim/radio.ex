@@ -3,9 +3,9 @@ defmodule Sim.Radio do
   A radio that delays, loses and duplicates messages, and can be partitioned, all from a seed.
   Pure.
 
-  What becomes of a message depends on its number alone, so the same sends give the same
-  deliveries, in the order of their time and then of their number. Every copy is its own draw:
-  one message to five robots can reach three of them. A message may overtake an earlier one.
+  The fate of a message depends on its number alone, so the same sends give the same deliveries,
+  in the order of their time and then of their number. Every copy has its own draw: one message to
+  five robots can reach three of them. A message may overtake an earlier one.
   """
   alias Hal.Options
   alias Sim.Noise
@@ -48,18 +48,18 @@ defmodule Sim.Radio do
     cut(struct!(__MODULE__, options), cut)
   end
 
-  @doc "From now on these pairs cannot hear each other, and all others can."
+  @doc "Cuts exactly these pairs from now on: they cannot hear each other, and all others can."
   @spec cut(t(), [{id(), id()}]) :: t()
   def cut(%__MODULE__{} = radio, pairs),
     do: cut_ways(radio, for({a, b} <- pairs, pair <- [{a, b}, {b, a}], do: pair))
 
-  @doc "The same one way: of each `{from, to}` the second cannot hear the first."
+  @doc "The same in one direction: of each `{from, to}`, the second cannot hear the first."
   @spec cut_ways(t(), [{from :: id(), to :: id()}]) :: t()
   def cut_ways(%__MODULE__{} = radio, ways), do: %{radio | cut: MapSet.new(ways)}
 
   @doc """
-  The parts into which the cuts divide these robots, loss left out: in a part everybody can reach
-  everybody, if need be by way of others.
+  The parts into which the cuts divide these robots, ignoring loss: within a part all can reach
+  each other, if necessary by way of others.
 
       iex> radio = Sim.Radio.new(seed: 1, cut: [{:mag1, :mag2}, {:mag1, :mag3}])
       iex> Sim.Radio.parts(radio, [:mag1, :mag2, :mag3])
@@ -93,7 +93,9 @@ defmodule Sim.Radio do
   def send(%__MODULE__{} = radio, at_ms, from, to_ids, message),
     do: Enum.reduce(to_ids, radio, &send_one(&2, at_ms, from, &1, message))
 
-  @doc "What has arrived by now as `{to, from, message}`, and the radio without it."
+  @doc """
+  The messages that have arrived by now as `{to, from, message}`, and the radio without them.
+  """
   @spec receive(t(), integer()) :: {[{id(), id(), term()}], t()}
   def receive(%__MODULE__{} = radio, at_ms), do: take(radio, at_ms, [])
 

@@ -2,9 +2,9 @@ defmodule Sim.Scene do
   @moduledoc """
   A snapshot of a whole fleet, seen from outside, which viewers get ten times a second.
 
-  The lockstep run and the live fleet both give it, so the terminal, the page and the picture
-  draw either. Poses are true ones, in metres and radians, in the frame `map`; `at_ms` counts
-  simulated milliseconds from the start.
+  The lockstep run and the live fleet both produce it, so the terminal, the page and the picture
+  can draw either. Poses are the true ones, in metres and radians, in the frame `map`; `at_ms`
+  counts simulated milliseconds from the start.
   """
   alias Hal.Pose
 
@@ -21,10 +21,10 @@ defmodule Sim.Scene do
               ]
 
   @typedoc """
-  One robot. `slot` is its place in the formation counted from the leader's true pose;
-  `size_ppm` is the share of its picture that the landmark fills, in parts per million, and
-  `nil` while it does not see it. By its own word the robot is within `uncertainty` metres of where it believes
-  to be in 95 of 100 cases, `nil` where it does not know.
+  One robot. `slot` is its place in the formation relative to the leader's true pose; `size_ppm`
+  is the share of its picture that the landmark fills, in parts per million, and `nil` while it
+  does not see it. By its own estimate the robot is within `uncertainty` metres of where it
+  believes to be in 95 of 100 cases, `nil` if it does not know.
   """
   @type robot :: %{
           id: atom(),
@@ -61,7 +61,7 @@ defmodule Sim.Scene do
         }
 
   @doc """
-  How far a robot is from its slot, in metres; `nil` for one that has none.
+  How far a robot is from its slot, in metres; `nil` for a robot without a slot.
 
       iex> Sim.Scene.slot_error(%{pose: Hal.Pose.new(1, 0), slot: {1.0, 2.0}})
       2.0
@@ -74,7 +74,7 @@ defmodule Sim.Scene do
   def slot_error(%{pose: pose, slot: slot}), do: Pose.distance(pose, slot)
 
   @doc """
-  The last thing that happened, or `nil` before anything did.
+  The last stage, or `nil` before the first.
 
       iex> Sim.Scene.stage(%Sim.Scene{at_ms: 0, map: nil, robots: []})
       nil

@@ -4,8 +4,8 @@ defmodule Sim.Trial do
   identical to the byte for the same seed. No process, no clock.
 
   Every 50 ms, in this order: radio, sense, think (every 100 ms, with a new picture), reflex, act.
-  `step/1` is 100 ms. What happens on purpose (landmark moved, robots killed) is `Sim.Trial.Scenario`;
-  what is written down of a run is `Sim.Trial.RunLog`.
+  `step/1` is 100 ms. `Sim.Trial.Scenario` schedules interventions (landmark moved, robots
+  killed); `Sim.Trial.RunLog` records a run.
   """
   alias Hal.Pose
   alias Sim.{Radio, Scene, World}
@@ -21,7 +21,7 @@ defmodule Sim.Trial do
   @type t :: %__MODULE__{at_ms: non_neg_integer()}
 
   @doc """
-  A trial; its options are those of `Sim.Trial.Setup`. Errors are one line.
+  A trial with the options of `Sim.Trial.Setup`. Errors are one line.
   """
   @spec new(map()) :: {:ok, t()} | {:error, String.t()}
   def new(options) do
@@ -35,7 +35,7 @@ defmodule Sim.Trial do
      "no run in lockstep can have #{Enum.join(ids, ", ")} as hardware: serial lines have a time of their own"}
   end
 
-  @doc "100 ms further."
+  @doc "Advances the trial by 100 ms."
   @spec step(t()) :: t()
   def step(%__MODULE__{} = trial) do
     trial
@@ -55,7 +55,7 @@ defmodule Sim.Trial do
   end
 
   @doc """
-  Whether the run is over: its time is up, or nothing is to come and the fleet has been in
+  Whether the run is over: its time is up, or no interventions are left and the fleet has been in
   formation, or at rest without a landmark, for 5 s.
   """
   @spec done?(t()) :: boolean()
@@ -65,26 +65,26 @@ defmodule Sim.Trial do
   @spec formed?(t()) :: boolean()
   def formed?(trial), do: Enum.any?(claims(trial), fn {_id, claim} -> claim[:formed] == true end)
 
-  @doc "What a viewer sees now."
+  @doc "The current scene for viewers."
   @spec scene(t()) :: Scene.t()
   def scene(trial), do: trial |> run() |> Evaluation.scene()
 
-  @doc "All that the report says of the run, but for its wall time."
+  @doc "The report of the run, without its wall time."
   @spec result(t()) :: map()
   def result(trial), do: trial |> run() |> Evaluation.result()
 
-  @doc "Moves the landmark there, as a person would push it, from now on."
+  @doc "Moves the landmark there from now on, as if a person pushed it."
   @spec move(t(), Pose.point()) :: {:ok, t()} | {:error, String.t()}
   def move(trial, place) do
     with :ok <- Setup.check_landmarks(trial.map, [place]),
          do: {:ok, %{trial | script: Scenario.add_move(trial.script, place, trial.at_ms)}}
   end
 
-  @doc "Kills a robot, or whoever leads, now."
+  @doc "Kills a robot, or the leader, now."
   @spec kill(t(), :leader | atom()) :: t()
   def kill(trial, who), do: %{trial | script: Scenario.add_kill(trial.script, who, trial.at_ms)}
 
-  @doc "Gives a command to one living robot or to all."
+  @doc "Sends a command to one living robot or to all."
   @spec command(t(), atom() | :all, term()) :: t()
   def command(trial, to, command) do
     Enum.reduce(living(trial), trial, fn id, trial ->
@@ -96,7 +96,10 @@ defmodule Sim.Trial do
   @spec living(t()) :: [atom()]
   def living(trial), do: Enum.filter(trial.options.robots, &is_map_key(trial.members, &1))
 
-  @doc "What each living robot claims of itself, and, whatever its mission is, how sure its pose is."
+  @doc """
+  What each living robot claims about itself, and, whatever its mission is, how certain its pose
+  is.
+  """
   @spec claims(t()) :: [{atom(), map()}]
   def claims(trial), do: for(id <- living(trial), do: {id, claim(trial.members[id])})
 

@@ -2,14 +2,14 @@ defmodule Sim.World do
   @moduledoc """
   A world of robots, walls and one landmark, as a value. Pure: the same calls give the same world.
 
-  `step/2` acts, moves and senses. Every sensor is fresh after every step: the sonars fire all at
-  once and do not disturb each other. A body is a disc of the profile's radius; it stops at
-  contact and is never inside a wall or another body. The landmark is a yellow pole, 0.15 m in
-  radius and 1 m high, and as solid.
+  `step/2` acts, moves and senses. Every sensor is fresh after every step: all sonars fire at once
+  and do not disturb each other. A body is a disc of the profile's radius; it stops at contact and
+  is never inside a wall or another body. The landmark is a yellow pole, 0.15 m in radius and 1 m
+  high, and solid, too.
 
-  `collisions` counts new contacts of a robot with a robot or a wall, dead ones too; a contact lasts until the two
-  are more than 1 cm apart. `min_separation` is the least gap between two robots so far, edge to
-  edge, `nil` with fewer than two.
+  `collisions` counts new contacts of a robot with a robot (even a dead one) or a wall; a contact
+  lasts until the two are more than 1 cm apart. `min_separation` is the least gap between two
+  robots so far, edge to edge, `nil` with fewer than two.
   """
   alias Hal.{Options, Pose, Twist}
   alias Sim.{Compute, Floorplan, World}
@@ -55,9 +55,8 @@ defmodule Sim.World do
 
   @doc """
   A world. `:robots` are `%{id:, profile:, pose:}` with the true pose, and `odometry:`, the first
-  reading of the wheels (0, 0, 0 unless given), `infrared: true` for one that has such sensors, `wheels:` for
-  one whose odometry is wrong about them (`Sim.World.Body`). Wrong options
-  raise `ArgumentError`.
+  reading of the wheels (0, 0, 0 unless given), `infrared: true` for a robot with such sensors,
+  `wheels:` for errors of its odometry (`Sim.World.Body`). Wrong options raise `ArgumentError`.
   """
   @spec new!(keyword()) :: t()
   def new!(options) do
@@ -86,17 +85,17 @@ defmodule Sim.World do
     |> sense()
   end
 
-  @doc "The speed a robot wants until it wants another; a dead one wants nothing."
+  @doc "Sets the wanted speed of a robot until the next one; a dead robot ignores it."
   @spec drive(t(), id(), Twist.t()) :: t()
   def drive(%__MODULE__{} = world, id, %Twist{} = twist),
     do: update(world, id, &if(&1.alive, do: %{&1 | wanted: twist}, else: &1))
 
-  @doc "Where a robot wants its camera to look: pan to the left, tilt upwards, in radians."
+  @doc "Sets where a robot's camera should look: pan to the left, tilt upwards, in radians."
   @spec look(t(), id(), number(), number()) :: t()
   def look(%__MODULE__{} = world, id, pan, tilt),
     do: update(world, id, &if(&1.alive, do: %{&1 | look: {pan * 1.0, tilt * 1.0}}, else: &1))
 
-  @doc "The horizontal field of view of a robot's camera, 0.05 to 3 radians, from now on."
+  @doc "Sets the horizontal field of view of a robot's camera, 0.05 to 3 radians, from now on."
   @spec zoom(t(), id(), number()) :: t()
   def zoom(%__MODULE__{} = world, id, angle),
     do: update(world, id, &%{&1 | field_of_view: angle |> max(0.05) |> min(3.0)})
@@ -115,7 +114,7 @@ defmodule Sim.World do
     update(world, id, &struct!(&1, still))
   end
 
-  @doc "Lifts a robot to another pose; its odometry does not notice. There must be no wall."
+  @doc "Lifts a robot to another pose, which must not be in a wall; its odometry does not notice."
   @spec displace(t(), id(), Pose.t()) :: t()
   def displace(%__MODULE__{} = world, id, %Pose{} = pose) do
     body = Elixir.Map.fetch!(world.robots, id)
@@ -130,14 +129,14 @@ defmodule Sim.World do
   end
 
   @doc """
-  Lets the landmark glide there at 0.3 m/s, in a straight line. It waits before a robot in its way,
-  0.5 m from edge to edge, and stops before a wall.
+  Lets the landmark glide there at 0.3 m/s, in a straight line. It waits in front of a robot in
+  its way, 0.5 m from edge to edge, and stops in front of a wall.
   """
   @spec move_landmark(t(), {number(), number()}) :: t()
   def move_landmark(%__MODULE__{landmark: nil} = world, place), do: place_landmark(world, place)
   def move_landmark(%__MODULE__{} = world, {x, y}), do: %{world | goal: {x * 1.0, y * 1.0}}
 
-  @doc "Puts the landmark there at once, or takes it away."
+  @doc "Puts the landmark there at once, or removes it."
   @spec place_landmark(t(), {number(), number()} | nil) :: t()
   def place_landmark(%__MODULE__{} = world, nil), do: %{world | landmark: nil, goal: nil}
 
@@ -156,7 +155,7 @@ defmodule Sim.World do
     |> sense()
   end
 
-  @doc "What a robot's devices say now; nothing when it is dead."
+  @doc "What a robot's devices report now; nothing if it is dead."
   @spec readings(t(), id()) :: [Hal.Drive.reading() | Hal.Ptz.reading()]
   def readings(%__MODULE__{} = world, id) do
     case Elixir.Map.fetch!(world.robots, id) do
@@ -173,7 +172,7 @@ defmodule Sim.World do
     World.Blobs.see(world.map, CameraFrustum.of(body), poles(world, id), noise)
   end
 
-  @doc "The same with where the camera looks now, as a detector would give it."
+  @doc "The same with the camera's current direction, as a detector would return it."
   @spec detections(t(), id()) :: Vision.Detections.t()
   def detections(%__MODULE__{} = world, id) do
     %Body{pan: pan, tilt: tilt, field_of_view: angle} = Elixir.Map.fetch!(world.robots, id)
@@ -187,7 +186,7 @@ defmodule Sim.World do
     }
   end
 
-  @doc "The picture of a robot's camera, where it looks now."
+  @doc "The picture of a robot's camera, in its current direction."
   @spec frame(t(), id()) :: Hal.Frame.t()
   def frame(%__MODULE__{} = world, id) do
     body = Elixir.Map.fetch!(world.robots, id)
@@ -210,11 +209,11 @@ defmodule Sim.World do
   @spec colours() :: Vision.Colours.t()
   defdelegate colours, to: Sim.World.Palette
 
-  @doc "Where a robot really is."
+  @doc "The true pose of a robot."
   @spec truth(t(), id()) :: Pose.t()
   def truth(%__MODULE__{} = world, id), do: Elixir.Map.fetch!(world.robots, id).pose
 
-  @doc "Whether a robot lives."
+  @doc "Whether a robot is alive."
   @spec alive?(t(), id()) :: boolean()
   def alive?(%__MODULE__{} = world, id), do: Elixir.Map.fetch!(world.robots, id).alive
 
@@ -252,7 +251,7 @@ defmodule Sim.World do
     )
   end
 
-  # Draws of one kind of sensor are not those of the other.
+  # Different kinds of sensors have different draws.
   defp put_ranges(world, _sense, [], _discs, _draw, _limits), do: world
 
   defp put_ranges(world, sense, bodies, discs, draw, limits) do

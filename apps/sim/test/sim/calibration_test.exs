@@ -1,5 +1,7 @@
 defmodule Sim.CalibrationTest do
-  @moduledoc "Errors that are put into simulated wheels are found again, by what a person would do and measure."
+  @moduledoc """
+  Errors that are put into simulated wheels are found again by what a person would do and measure.
+  """
   use ExUnit.Case, async: true
   alias Robot.Calibration
   alias Sim.Calibration, as: Simulated
@@ -44,7 +46,7 @@ defmodule Sim.CalibrationTest do
         {:atrv_mini, 22..24, [long: true]}
       ] do
     @tag tags
-    test "5 squares each way find base and wheel ratio of the #{profile} for seeds #{inspect(seeds)}" do
+    test "5 squares in each direction find base and wheel ratio of the #{profile} for seeds #{inspect(seeds)}" do
       for seed <- unquote(Macro.escape(seeds)) do
         {truth, found, squares, _measured} =
           run([seed: seed, wheels: @errors, profile: unquote(profile)], 5)
@@ -52,20 +54,20 @@ defmodule Sim.CalibrationTest do
         assert off(found.base, truth.base) < 0.005
         assert off(found.ratio, truth.ratio) < 0.002
         assert off(found.distance, truth.distance) < 0.003
-        # UMBmark's own measure of success is a factor of ten and more.
+        # UMBmark's own measure of success is a factor of ten or more.
         assert squares.before_m > 5 * squares.after_m
       end
     end
   end
 
-  test "wheels that are right are left alone" do
+  test "wheels without errors are left alone" do
     {_truth, found, _squares, _measured} = run([noise: :off, tape_m: 0.0, tape_rad: 0.0], 1)
     assert_in_delta found.base, 1.0, 3.0e-4
     assert_in_delta found.ratio, 1.0, 3.0e-5
     assert_in_delta found.distance, 1.0, 3.0e-5
   end
 
-  test "slip in turns is told from wrong wheels" do
+  test "slip in turns is distinguished from wrong wheels" do
     {_truth, _found, _squares, measured} = run([noise: :slip, profile: :atrv_mini, seed: 3], 1)
     assert Calibration.slip(measured.angles) > 0.05
     {_truth, _found, _squares, measured} = run([wheels: @errors, seed: 3], 1)

@@ -20,7 +20,7 @@ defmodule Sim.ComputeTest do
   defp map({walls, width, height}),
     do: {Reference.field(walls, width, height), width, height, 0.05 + :rand.uniform() * 0.2}
 
-  # Somewhere in the plan or just outside of it.
+  # Somewhere in the plan or just outside it.
   defp place({_field, width, height, cell}),
     do:
       {(:rand.uniform() - 0.5) * 1.1 * width * cell,
@@ -83,7 +83,7 @@ defmodule Sim.ComputeTest do
       <<x::float-native, y::float-native, 0.05 + :rand.uniform() / 2::float-native,
         0.2 + :rand.uniform()::float-native, :rand.uniform(2) - 1, 205, 75, 137>>
     end
-    # All of a kind are painted alike.
+    # All objects of a kind are painted alike.
     |> repaint()
   end
 
@@ -94,11 +94,11 @@ defmodule Sim.ComputeTest do
     end
   end
 
-  test "the library is there" do
+  test "the library is loaded" do
     assert Compute.Native.loaded?()
   end
 
-  test "both find the same distance fields, and they are the king's distances" do
+  test "both compute the same distance fields, in moves of a chess king" do
     for _ <- 1..60 do
       {walls, width, height} = plan()
       field = Compute.Native.field(walls, width, height)
@@ -122,7 +122,7 @@ defmodule Sim.ComputeTest do
     end
   end
 
-  test "sonars: native and reference agree to the bit" do
+  test "for sonars, native and reference agree to the bit" do
     for _ <- 1..150 do
       map = map(plan())
       count = :rand.uniform(6) - 1
@@ -148,14 +148,15 @@ defmodule Sim.ComputeTest do
           :binary.at(elem(map, 0), j * width + i) == 0
       end
 
-      # Just behind the hit is wall; before it there is none, but for corners cut by less than a step.
+      # There is wall just behind the hit, and none before it, except for corners cut by less than
+      # a step.
       assert t == 0.0 or Enum.any?([1.0e-9, 1.0e-6], &wall?.(t + &1))
       crept = Enum.count(1..trunc(t / 0.01)//1, &wall?.(&1 * 0.01 - 0.005))
       assert crept == 0
     end
   end
 
-  test "looking: native and reference agree" do
+  test "for looking, native and reference agree" do
     for _ <- 1..150 do
       map = map(plan())
       {sight, poles} = {sight(map), poles(map, :rand.uniform(9) - 1)}
@@ -163,7 +164,7 @@ defmodule Sim.ComputeTest do
     end
   end
 
-  test "painting: native and reference agree to the byte" do
+  test "for painting, native and reference agree to the byte" do
     for _ <- 1..60 do
       map = map(plan())
       {sight, poles, noise} = {sight(map), poles(map, :rand.uniform(9) - 1), noise()}
@@ -205,7 +206,7 @@ defmodule Sim.ComputeTest do
     assert Compute.Native.look(map, sight, <<>>) == <<>>
   end
 
-  test "draws are even, normal, and apart from each other" do
+  test "draws are uniform, normal, and independent of each other" do
     draws = for k <- 1..20_000, do: Sim.Noise.gauss(Sim.Noise.hash(1, 2, 3, k))
     mean = Enum.sum(draws) / 20_000
     assert_in_delta mean, 0.0, 0.03
@@ -216,7 +217,7 @@ defmodule Sim.ComputeTest do
     assert_in_delta Enum.sum(steps) / 20_000, 0.5, 0.01
   end
 
-  test "a camera's sight" do
+  test "a camera sees what is in front of it" do
     body =
       Sim.World.Body.new(
         %{id: :mag1, profile: Hal.Profile.magellan(), pose: Hal.Pose.new(1, 2)},

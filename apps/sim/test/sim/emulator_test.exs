@@ -81,7 +81,7 @@ defmodule Sim.EmulatorTest do
   defp truth(server), do: World.truth(World.Server.world(server), :mag1)
   defp speed(server), do: World.Server.world(server).robots.mag1.speed
 
-  test "the base drives by bytes, and its counters are the body's way", context do
+  test "the base drives by bytes, and its counters match the body's motion", context do
     base(context)
     line = line(context)
     say(line, [@on, @inputs, @sonar, @forward])
@@ -99,7 +99,7 @@ defmodule Sim.EmulatorTest do
     Serial.close(line)
   end
 
-  test "it turns to the left, tells its battery, and stops when nobody speaks any more",
+  test "it turns left, reports its battery, and stops when no commands come any more",
        context do
     base(context, timeout_ms: 300)
     line = line(context)
@@ -110,9 +110,9 @@ defmodule Sim.EmulatorTest do
     assert truth(context.server).heading < 0.2
   end
 
-  # 0.35 m from the right wall to the front sensor, which is 0.2 m before the centre.
+  # 0.35 m from the right wall to the front sensor, which is 0.2 m in front of the centre.
   @tag place: {7.45, 0}
-  test "what is near is felt by infrared, in the controller's order", context do
+  test "infrared senses what is near, in the controller's order", context do
     base(context, ghost: :off)
     line = line(context)
     say(line, @infrared)
@@ -132,7 +132,8 @@ defmodule Sim.EmulatorTest do
     end)
   end
 
-  test "pulled, the driver's end has nothing behind it; plugged, the link is back", context do
+  test "unplugged, the driver's end is connected to nothing; plugged in, the link is back",
+       context do
     emulator = base(context)
     line = line(context)
     say(line, @status)
@@ -160,7 +161,7 @@ defmodule Sim.EmulatorTest do
     end
   end
 
-  test "frozen it is deaf and dumb, and the body stands; restarted it has forgotten all",
+  test "frozen, it neither hears nor sends, and the body stands; restarted, it has forgotten all",
        context do
     emulator = base(context, timeout_ms: :off)
     line = line(context)
@@ -171,7 +172,7 @@ defmodule Sim.EmulatorTest do
     say(line, @status)
     :ok = Emulator.thaw(emulator)
     eventually(fn -> elem(speed(context.server), 0) > 0.1 end)
-    # The question was not heard; reports go on.
+    # It did not hear the question; reports go on.
     assert report(line, &counter/1)
     :ok = Emulator.restart(emulator)
     eventually(fn -> speed(context.server) == {0.0, 0.0} end)
@@ -180,7 +181,7 @@ defmodule Sim.EmulatorTest do
     assert report(line, &volts/1) > 20
   end
 
-  test "with faults on the wire some frames come, and none that was not sent", context do
+  test "with faults on the wire some frames arrive, and none that was not sent", context do
     base(context, [], drop: 0.01, double: 0.005, flip: 0.005, seed: 4)
     line = line(context)
 
@@ -192,7 +193,7 @@ defmodule Sim.EmulatorTest do
     for _ <- 1..20, do: assert(report(line, &counter/1) in -5..5)
   end
 
-  test "it waits for its world, and a line that is taken", context do
+  test "it waits for its world, and for a line that is in use", context do
     File.write!(context.link <> "2", "somebody's")
     test = self()
     handler = fn _event, _measurements, about, _config -> send(test, about) end
@@ -233,7 +234,7 @@ defmodule Sim.EmulatorTest do
     eventually(fn -> more(line) =~ <<0x90, 0x51, 0xFF>> end)
   end
 
-  test "wrong options are one line, and the link goes with it", context do
+  test "wrong options are an error of one line, and the link is removed at the end", context do
     for options <- [
           [core: {Sim.Emulator.RFlexController, [ghost: 1]}],
           [core: {Sim.Emulator.ViscaCamera, [power: 1]}],

@@ -23,7 +23,7 @@ defmodule Sim.FleetTest do
   defp stages(fleet), do: Enum.map(Fleet.scene(fleet).stages, & &1.stage)
   defp stop(fleet), do: Fleet.stop(fleet)
 
-  test "a robot that is sent somewhere gets there, and its fleet is gone afterwards" do
+  test "a robot that is sent somewhere gets there, and its fleet leaves nothing behind" do
     fleet = fleet(%{robots: [:mag71], landmark: :none, mission: false})
     eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(:mag71)) end, 6_000)
     start = truth(fleet, :mag71)
@@ -32,7 +32,7 @@ defmodule Sim.FleetTest do
     eventually(fn -> Swarm.status(:mag71).state == :done end, 20_000)
     assert Pose.distance(truth(fleet, :mag71), place) < 0.15
     assert [%{state: :idle, alive: true, uncertainty: metres}] = Fleet.scene(fleet).robots
-    # Without a mission of its own it knows how sure it is, too; by now it has driven.
+    # Also without a mission it knows how certain its pose is; by now it has driven.
     assert is_float(metres) and metres > 0.0
     assert [%{uncertainty_m: told}] = Fleet.result(fleet).fleet
     assert is_float(told)
@@ -53,7 +53,7 @@ defmodule Sim.FleetTest do
     assert Enum.find(scene.robots, & &1.leader?).id == leader
     eventually(fn -> Enum.any?(Fleet.scene(fleet).robots, & &1.slot) end, 6_000)
 
-    # All stop, and stay so, until a person clears it.
+    # All stop, and stay stopped until a person resets them.
     assert Swarm.estop() == :ok
     for id <- ids, do: assert(Board.latched?(Board.find!(id)))
     still = fn -> for id <- ids, do: truth(fleet, id) end
@@ -74,7 +74,7 @@ defmodule Sim.FleetTest do
     assert still.() == before
     assert Swarm.reset() == :ok
 
-    # What they were at ended with the stop; they begin anew.
+    # Their missions ended with the stop; they start again.
     eventually(fn -> Fleet.scene(fleet).leader == nil end, 6_000)
     assert Swarm.start() == :ok
     eventually(fn -> Fleet.scene(fleet).leader end, 15_000)
@@ -99,12 +99,12 @@ defmodule Sim.FleetTest do
     stop(fleet)
   end
 
-  test "a robot whose parts fall too often is a wreck, and the others live on" do
+  test "a robot whose processes crash too often is a wreck, and the others live on" do
     fleet = fleet(%{robots: [:mag91, :mag92], mission: false})
 
     eventually(fn -> Enum.all?([:mag91, :mag92], &(&1 in Swarm.Directory.robots())) end, 2_000)
 
-    # One failure is none.
+    # A single failure does not count.
     kill(:mag91, :executive)
 
     eventually(
@@ -138,7 +138,7 @@ defmodule Sim.FleetTest do
     assert_receive {:DOWN, ^monitor, _, _, _}
   end
 
-  test "the radio loses what it is told to, and the script is played" do
+  test "the radio loses the given share, and the script is played" do
     fleet =
       fleet(%{
         robots: [:mag95, :mag96, :min95],
@@ -160,7 +160,7 @@ defmodule Sim.FleetTest do
   end
 
   defmodule Turn do
-    @moduledoc "Another mission: turns on the spot from its start on."
+    @moduledoc "Another mission, which turns on the spot from its start on."
     @behaviour Robot.Mission
 
     @impl Robot.Mission
@@ -175,7 +175,7 @@ defmodule Sim.FleetTest do
     def handle(_event, rate), do: {:turning, rate, []}
   end
 
-  test "a fleet is at the mission that it is given, or says why not" do
+  test "a fleet runs the mission that it is given, or says why not" do
     fleet = fleet(%{robots: [:mag75], landmark: :none, mission: {Turn, rate: 0.3}})
     heading = truth(fleet, :mag75).heading
     eventually(fn -> Swarm.status(:mag75).state == :turning end, 6_000)
@@ -197,7 +197,7 @@ defmodule Sim.FleetTest do
   end
 
   defmodule Formed do
-    @moduledoc "Another mission: leads, formed, from its start on."
+    @moduledoc "Another mission, which leads and is formed from its start on."
     @behaviour Robot.Mission
 
     @impl Robot.Mission
@@ -212,12 +212,12 @@ defmodule Sim.FleetTest do
     def handle(_event, options), do: {:lead, options, []}
   end
 
-  test "whoever sees that the fleet has elected a leader, or is formed, finds it so" do
+  test "when the fleet announces a leader or a formation, its claims show it" do
     fleet = fleet(%{robots: [:mag77], landmark: :none, mission: false})
     :ok = Robot.Control.Pilot.start(:mag77, Formed, [])
     :ok = Robot.Control.Pilot.command(:mag77, :start)
 
-    # At once, and from then on.
+    # It holds at once, and from then on.
     eventually(
       fn ->
         scene = Fleet.scene(fleet)
@@ -233,7 +233,7 @@ defmodule Sim.FleetTest do
     stop(fleet)
   end
 
-  test "what is wrong with a fleet is said before anything starts" do
+  test "errors in a fleet's options are returned before anything starts" do
     assert {:error, line} = Fleet.start_link(%{map: "mars"})
     assert line =~ "mars"
     assert {:error, line} = Fleet.start_link(%{landmark: {50, 50}})

@@ -47,7 +47,7 @@ defmodule Sim.FloorplanTest do
 
   defp write(dir, name, bytes), do: Path.join(dir, name) |> tap(&File.write!(&1, bytes))
 
-  test "every drawing holds its fleet: room round the centre, starts apart, free and seeded" do
+  test "every drawing has room for its fleet: around the centre, starts apart, free and seeded" do
     for name <- ["hall", "hospital", "arena"], count <- [1, 6, 20, 100] do
       {:ok, map} = Floorplan.open(name, count)
       {width, height} = Floorplan.size(map)
@@ -72,7 +72,7 @@ defmodule Sim.FloorplanTest do
     end
   end
 
-  test "a fleet that does not fit is told so in one line", %{tmp_dir: dir} do
+  test "a fleet that does not fit is an error of one line", %{tmp_dir: dir} do
     white = :binary.copy(<<0, 255, 255>>, 2)
     file = write(dir, "small.png", @signature <> png({2, 2, 8, 0}, white))
     {:ok, map} = Floorplan.open("#{file}:4x4", 30)
@@ -83,7 +83,7 @@ defmodule Sim.FloorplanTest do
   end
 
   test "nobody starts behind a wall that the fleet cannot pass", %{tmp_dir: dir} do
-    # A wall all across, one metre right of the centre.
+    # A wall across the whole map, one metre right of the centre.
     rows =
       for _ <- 1..20,
           into: <<>>,
@@ -179,8 +179,8 @@ defmodule Sim.FloorplanTest do
     binary_part(walls, 0, width)
   end
 
-  test "a bitmap lies with its centre at the origin, x right, y up", %{tmp_dir: dir} do
-    # The upper left of four quarters is wall.
+  test "a bitmap has its centre at the origin, x right, y up", %{tmp_dir: dir} do
+    # The upper left quarter is wall.
     file = write(dir, "quarter.png", @signature <> png({2, 2, 8, 0}, <<0, 0, 255, 0, 255, 255>>))
     {:ok, map} = Floorplan.open("#{file}:4x2", 1)
     assert Floorplan.size(map) == {4.0, 2.0}
@@ -204,7 +204,7 @@ defmodule Sim.FloorplanTest do
     assert_in_delta t, 0.9 + 0.2, 0.06
   end
 
-  test "what cannot be read is named in one line", %{tmp_dir: dir} do
+  test "a file that cannot be read is an error of one line", %{tmp_dir: dir} do
     good = @signature <> png({2, 2, 8, 0}, <<0, 0, 255, 0, 255, 255>>)
     good_file = write(dir, "good.png", good)
     says = fn name, bytes -> Floorplan.open("#{write(dir, name, bytes)}:4x4", 1) end
@@ -227,7 +227,7 @@ defmodule Sim.FloorplanTest do
       {says.("cut.png", binary_part(good, 0, byte_size(good) - 20)), ~r/damaged/},
       {says.("flipped.png", String.replace(good, "IDAT", "IDAX")), ~r/damaged/},
       {says.("laced.png", @signature <> png({2, 2, 8, 0}, <<>>, interlace: 1)),
-       ~r/interlaced PNGs are not read/},
+       ~r/interlaced PNGs are not supported/},
       {says.("deep.png", @signature <> png({2, 2, 16, 0}, <<>>)), ~r/16 bits/},
       {says.("huge.png", @signature <> png({100_000, 100_000, 8, 0}, <<>>)), ~r/too many/},
       {says.("short.png", @signature <> png({2, 2, 8, 0}, <<0, 0>>)), ~r/damaged/},
@@ -261,7 +261,7 @@ defmodule Sim.FloorplanTest do
   test "a landmark stands neither in a wall nor outside" do
     {:ok, map} = Floorplan.open("hospital", 6)
     assert {:error, line} = Floorplan.check_landmark(map, {500.0, 0.0})
-    assert line =~ "is 39.4 x 32.4 m round its centre"
+    assert line =~ "is 39.4 x 32.4 m around its centre"
     assert {:error, line} = Floorplan.check_landmark(map, {9.1, 3.0})
     assert line =~ "there is a wall"
   end

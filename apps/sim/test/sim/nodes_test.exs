@@ -6,7 +6,7 @@ defmodule Sim.NodesTest do
   doctest Sim.Fleet.Nodes.Command
   doctest Sim.Node.Config
 
-  test "a node listens on loopback only, dials nobody by itself, and is told no secret" do
+  test "a node listens on loopback only, dials nobody by itself, and has no secret on its command line" do
     arguments = Command.arguments(["x/ebin"])
     line = Enum.join(arguments, " ")
     assert line =~ "inet_dist_use_interface {127,0,0,1}"
@@ -15,7 +15,7 @@ defmodule Sim.NodesTest do
     refute line =~ "cookie"
   end
 
-  test "people are told of each process, and of those that are gone" do
+  test "people are told about each process, and about those that are gone" do
     nodes = [{:mag1, :"mag1@127.0.0.1", nil}, {:min1, :"min1@127.0.0.1", 12}]
     [gone, there, attach, kill] = Command.lines(nodes, "/tmp/x")
     assert gone =~ "mag1"
@@ -29,7 +29,7 @@ defmodule Sim.NodesTest do
     assert gone =~ "gone"
   end
 
-  test "a config is one line, whatever is in it, and nothing else is taken for one" do
+  test "a config is one line, whatever is in it, and nothing else is accepted as one" do
     {:ok, setup} = Sim.Trial.Setup.new(robots: [:mag1], map: "hall")
     part = {Sim.Node.World, %{name: :w, world: setup.world}}
     config = %Config{node: :"world@127.0.0.1", launcher: self(), mesh: [], part: part}
@@ -43,7 +43,7 @@ defmodule Sim.NodesTest do
     end
   end
 
-  test "of what a node prints the end is kept, and its last line told" do
+  test "the end of a node's output is kept, and its last line reported" do
     child = %Child{node: :n, port: nil, pid: 1}
     assert Child.last_line(child) == "it printed nothing"
 

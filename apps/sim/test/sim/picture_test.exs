@@ -35,20 +35,20 @@ defmodule Sim.PictureTest do
                Enum.filter(painted(world, :mag1), &(&1.area > 100))
 
       assert_in_delta :math.atan((159.5 - blob.x) / @focal), bearing, 0.01
-      # A pinhole camera shows what is off its axis larger.
+      # A pinhole camera shows objects off its axis larger.
       assert_in_delta blob.distance / :math.pow(:math.cos(bearing), 1.5),
                       distance,
                       0.06 * distance
     end
   end
 
-  test "twice as far is a quarter of the area" do
+  test "twice the distance gives a quarter of the area" do
     [near] = painted(alone({2.0, 0.0}, noise: :off), :mag1)
     [far] = painted(alone({4.0, 0.0}, noise: :off), :mag1)
     assert_in_delta near.area / far.area, 4.0, 0.4
   end
 
-  test "an empty hall shows nothing, and a landmark behind the camera neither" do
+  test "neither an empty hall nor a landmark behind the camera shows anything" do
     for step <- 1..20, do: assert(painted(%{alone(nil) | step: step}, :mag1) == [])
     assert painted(alone({-3.0, 0.0}), :mag1) == []
   end
@@ -61,7 +61,7 @@ defmodule Sim.PictureTest do
     assert_in_delta frame.tilt, 0.2, 1.0e-6
     [blob] = painted(world, :mag1)
     assert_in_delta blob.x, 159.5, 2.0
-    # Looking up moves things down.
+    # Looking up moves objects down.
     [level] = painted(alone({3.0, 0.0}), :mag1)
     assert_in_delta blob.y - level.y, @focal * :math.tan(0.2), 5.0
   end

@@ -1,8 +1,8 @@
 defmodule Sim.ProcessesTest do
   @moduledoc """
-  The processes of a robot and `Swarm.Member.step/2` get the same input, a whole mission long, and
-  do the same: every speed, every message, every look, every stage. On the way the camera zooms, its
-  pictures are 50 ms old, and the bumper is hit between two steps of the gate.
+  The processes of a robot and `Swarm.Member.step/2` get the same input for a whole mission, and
+  do the same: every speed, message, camera direction and stage is equal. Meanwhile the camera
+  zooms, its pictures are 50 ms old, and the bumper is hit between two steps of the gate.
   """
   use Robot.Case, async: false
   alias Hal.Profile
@@ -81,16 +81,16 @@ defmodule Sim.ProcessesTest do
   @doc false
   def carry(test, _from, ids, message), do: send(test, {:carried, ids, message})
 
-  # With the one seed it follows, with the other it leads.
+  # With one seed it follows, with the other it leads.
   for seed <- [3, 7] do
     @tag seed: seed
-    test "one input, two clocks, the same effects: seed #{seed}", %{run: run} do
+    test "the same input has the same effects by two clocks: seed #{seed}", %{run: run} do
       play(run)
     end
   end
 
   defp play(run) do
-    # The gate told the wheels to stop, at its start.
+    # The gate told the wheels to stop when it started.
     run = sync(run)
     flush([])
     run = Enum.reduce(@ids, run, &input(&2, &1, {:command, :start, 0}))
@@ -126,7 +126,7 @@ defmodule Sim.ProcessesTest do
 
   defp script(run, _n), do: run
 
-  # As in `Sim.Trial.step/1`.
+  # The same as in `Sim.Trial.step/1`.
   defp tenth(run, n) do
     run
     |> hear()
@@ -162,7 +162,7 @@ defmodule Sim.ProcessesTest do
     end
   end
 
-  # What `see/1` hands on 50 ms later, when the camera may have zoomed further.
+  # What `see/1` passes on 50 ms later, when the camera may have zoomed further.
   defp expose(run) do
     %{run | pictures: for(id <- @ids, do: {id, World.detections(run.world, id)})}
   end
@@ -217,7 +217,8 @@ defmodule Sim.ProcessesTest do
     end
   end
 
-  # In the order in which one hands on to the next; any answer says that what came before is done.
+  # In the order in which one passes data to the next; any answer says that everything before is
+  # done.
   defp sync(%{pids: pids} = run) do
     for role <- [
           :drive,
@@ -279,7 +280,7 @@ defmodule Sim.ProcessesTest do
       assert {run.at_ms, input, told} == {run.at_ms, input, expected}
     end
 
-    # To look where one looks already is no news: what counts is where the camera is sent to.
+    # A command to look where the camera already looks changes nothing: only its target counts.
     {live_look, my_look} = run.looks
     looks = {last_look(live, live_look), last_look(mine, my_look)}
     assert elem(looks, 0) == elem(looks, 1)

@@ -1,5 +1,5 @@
 defmodule Sim.TrialTest do
-  @moduledoc "Whole missions in lockstep: every layer but the processes."
+  @moduledoc "Whole missions in lockstep: every layer except the processes."
   use ExUnit.Case, async: true
   import Sim.TrialRuns
   alias Sim.Trial
@@ -23,7 +23,7 @@ defmodule Sim.TrialTest do
     assert Trial.result(trial).formation.error_mean_m < 0.15
   end
 
-  test "the leader is the one that saw the landmark largest, of those in the record" do
+  test "the leader is the robot in the record that saw the landmark largest" do
     for seed <- 1..4 do
       {:ok, trial} = Trial.new(%{seed: seed, blobs: :direct})
       trial = until(trial, &(Sim.Trial.RunLog.leader(&1.run_log) != nil))
@@ -43,7 +43,7 @@ defmodule Sim.TrialTest do
     end
   end
 
-  test "one seed, one run; another seed, another" do
+  test "one seed gives one run; another seed gives another" do
     digest = fn seed ->
       trial = run(%{seed: seed, blobs: :painted, loss: 0.1, duration_s: 15})
       :crypto.hash(:sha256, inspect(Trial.result(trial), limit: :infinity))
@@ -101,7 +101,7 @@ defmodule Sim.TrialTest do
     assert Trial.result(trial).leader == leader
   end
 
-  test "the shape follows a landmark that is moved; in the thesis's way the leader stays" do
+  test "the shape follows a landmark that is moved; with the thesis's options the leader stays" do
     options = %{seed: 1, assign: :chain, leader_change: false, moves: [{{0.0, 3.0}, 35}]}
     trial = assert_formed(run(options))
     result = Trial.result(trial)
@@ -111,7 +111,7 @@ defmodule Sim.TrialTest do
     assert result.landmark_distance_m < 2.5
   end
 
-  test "a landmark that passes the leader too near to be measured leads nobody's pose astray" do
+  test "a landmark that passes the leader too near to be measured misleads nobody's pose" do
     options = %{seed: 1, formation: {:line, 1.0}, moves: [{{-5.0, 3.0}, 40}]}
     result = run(options) |> assert_formed() |> Trial.result()
     assert result.formation.error_max_m < 0.35
@@ -131,7 +131,7 @@ defmodule Sim.TrialTest do
     refute Trial.formed?(trial)
   end
 
-  test "where a wall stands in the shape, it closes up and follows the leader's trail" do
+  test "if a wall is in the way of the shape, it closes up and follows the leader's trail" do
     # Another leader stands elsewhere, and may have room.
     options = %{seed: 2, formation: {:line, 1.0}, landmark: {6.8, 0.0}, leader_change: false}
     result = run(options) |> assert_formed() |> Trial.result()
@@ -139,7 +139,7 @@ defmodule Sim.TrialTest do
     assert result.collisions == 0
   end
 
-  test "all switched on at one place form as well" do
+  test "robots that are all switched on at one place form as well" do
     assert_formed(run(%{seed: 1, start: :same}))
   end
 
@@ -162,7 +162,7 @@ defmodule Sim.TrialTest do
   defp poses(trial),
     do: for(id <- trial.options.robots, do: Sim.World.truth(trial.world, id))
 
-  test "what cannot be is refused in one line" do
+  test "invalid options are refused in one line" do
     assert {:error, line} = Trial.new(%{map: "moon"})
     assert line =~ "moon" and line =~ "hall"
     assert {:error, line} = Trial.new(%{landmark: {1.0e6, 0.0}})

@@ -18,7 +18,7 @@ defmodule Sim.WorldTest do
   defp steps(world, n), do: Enum.reduce(1..n//1, world, fn _, world -> World.step(world) end)
   defp reading(world, id, key), do: world |> World.readings(id) |> Keyword.fetch!(key)
 
-  # Every step, every body is outside of every wall and of every other body.
+  # At every step, every body is outside every wall and every other body.
   defp outside!(world) do
     bodies = Enum.map(world.order, &world.robots[&1])
 
@@ -48,25 +48,25 @@ defmodule Sim.WorldTest do
     end)
   end
 
-  test "drives as fast as its limits let it, and its wheels know where it is" do
+  test "a robot drives as fast as its limits allow, and its wheels know where it is" do
     world = world([robot(:mag1, 0, 0)]) |> World.drive(:mag1, Twist.new(2.0, 0.0)) |> steps(40)
     truth = World.truth(world, :mag1)
     odometry = reading(world, :mag1, :odometry)
     assert odometry.pose == truth
     assert_in_delta odometry.twist.linear, 0.5, 0.001
-    # 2 s at 0.5 m/s, less the second of speeding up and the lag.
+    # 2 s at 0.5 m/s, minus the second of acceleration and the lag.
     assert_in_delta truth.x, 0.70, 0.03
     world = world |> World.drive(:mag1, Twist.zero()) |> steps(60)
     assert World.truth(world, :mag1) == World.truth(steps(world, 20), :mag1)
   end
 
-  test "turns on the spot to the left" do
+  test "a robot turns left on the spot" do
     world = world([robot(:mag1, 0, 0)]) |> World.drive(:mag1, Twist.new(0.0, 1.0)) |> steps(20)
     assert World.truth(world, :mag1).heading > 0.3
     assert Pose.point(World.truth(world, :mag1)) == {0.0, 0.0}
   end
 
-  test "stops at a wall, presses the bumper in front, counts one collision" do
+  test "a robot stops at a wall, presses the bumper in front, and counts one collision" do
     world = world([robot(:mag1, 8, 0)]) |> World.drive(:mag1, Twist.new(0.5, 0.0)) |> steps(100)
     assert_in_delta World.truth(world, :mag1).x, 8.8, 0.001
     assert reading(world, :mag1, :bumpers) == [0]
@@ -78,7 +78,7 @@ defmodule Sim.WorldTest do
     assert again.collisions == 2
   end
 
-  test "stops at another robot, dead or alive; the gap is kept in controller" do
+  test "a robot stops at another one, dead or alive; the least gap is recorded" do
     world =
       world([robot(:mag1, 0, 0), robot(:mag2, 1, 0)])
       |> World.kill(:mag2)
@@ -109,7 +109,7 @@ defmodule Sim.WorldTest do
     world = world([robot(:mag1, 5, 0), robot(:mag2, 5, 2)], landmark: {3.0, 0.0})
     sonar = reading(world, :mag1, :sonar)
     assert length(sonar) == 16
-    # 11 looks ahead, 7 to the left, 3 back; sensors sit on the edge of the body.
+    # Sensor 11 looks ahead, 7 to the left, 3 back; sensors are on the edge of the body.
     assert_in_delta Enum.at(sonar, 11), 3.8, 0.001
     assert_in_delta Enum.at(sonar, 7), 1.6, 0.001
     assert_in_delta Enum.at(sonar, 3), 1.65, 0.001
@@ -140,7 +140,7 @@ defmodule Sim.WorldTest do
     assert behind.top == blob.top and behind.bottom < blob.bottom
   end
 
-  test "the landmark glides, waits before a robot, and goes on" do
+  test "the landmark glides, waits in front of a robot, and goes on" do
     world = world([robot(:mag1, 0, 0)], landmark: {-2.0, 0.0}) |> World.move_landmark({2.0, 0.0})
     assert_in_delta elem(steps(world, 20).landmark, 0), -1.7, 1.0e-6
     world = steps(world, 200)
@@ -149,7 +149,7 @@ defmodule Sim.WorldTest do
     assert world.landmark == {2.0, 0.0}
   end
 
-  test "noise: 0.3 % by default, a frame turned by R74 when it slips" do
+  test "noise is 0.3 % by default, and with slip a turn goes wrong as in R74" do
     far = fn noise ->
       world([robot(:mag1, 0, 0)], noise: noise)
       |> World.drive(:mag1, Twist.new(0.5, 0.0))
@@ -184,7 +184,7 @@ defmodule Sim.WorldTest do
       else: world |> World.drive(:mag1, Twist.new(0.0, left)) |> World.step() |> turn(goal)
   end
 
-  test "nobody is ever inside a wall or another body, however wildly they drive" do
+  test "robots are never inside a wall or another body, however wildly they drive" do
     for seed <- 1..3 do
       landmark = {0.0, 0.0}
       robots = for k <- 1..6, do: {:"mag#{k}", 0.2}
@@ -208,7 +208,7 @@ defmodule Sim.WorldTest do
     end
   end
 
-  test "nobody is ever inside the walls of a hospital, nor jumps through them" do
+  test "robots are never inside the walls of a hospital, nor jump through them" do
     {:ok, map} = Floorplan.open("hospital", 1)
     # In the corridors and doors, where walls are near.
     poses = for k <- 0..5, do: Pose.new(9.5, k * 2.0 - 5.0, k)
@@ -227,7 +227,7 @@ defmodule Sim.WorldTest do
     assert world.collisions > 5
   end
 
-  test "a thin wall is not jumped, however fast" do
+  test "no robot jumps through a thin wall, however fast it is" do
     {:ok, map} = Floorplan.open("hospital", 1)
 
     fast = %{

@@ -65,12 +65,15 @@ defmodule Sim.BaseCase do
   @doc "Sends a reading to the test."
   def tell(test, reading), do: send(test, reading)
 
-  @doc "The robot's body, in the world as it is now."
+  @doc "The robot's body in the current world."
   def body(server), do: World.Server.world(server).robots.mag1
   @doc "Whether the body stands."
   def still?(server), do: body(server).speed == {0.0, 0.0}
 
-  @doc "Tells it the speed as a gate does, until the body is so far; the fastest that it went meanwhile."
+  @doc """
+  Sends the speed as a gate does, until the body has come this far; returns its greatest speed
+  meanwhile.
+  """
   def drive(%{device: device, server: server}, twist, done?, ms \\ 20_000),
     do: drive(device, server, twist, done?, System.monotonic_time(:millisecond) + ms, {0.0, 0.0})
 
@@ -93,7 +96,10 @@ defmodule Sim.BaseCase do
     end
   end
 
-  @doc "Stops it, and waits until it stands; what it was told and what its wheels do, if it does not in time."
+  @doc """
+  Stops it, and waits until it stands; if it does not in time, the failure shows the commands and
+  the wheels.
+  """
   def stop(%{device: device, server: server} = context) do
     Device.drive(device, Twist.zero())
     deadline = System.monotonic_time(:millisecond) + 5_000
@@ -116,7 +122,7 @@ defmodule Sim.BaseCase do
     end
   end
 
-  @doc "The newest of these readings; `last` without one."
+  @doc "The newest of these readings; `last` if there is none."
   def newest(kind, last \\ nil) do
     receive do
       {^kind, reading} -> newest(kind, reading)
@@ -126,8 +132,8 @@ defmodule Sim.BaseCase do
   end
 
   @doc """
-  Waits until the driver believes the body to be where it is, both from the start; in metres. What both say, if they
-  do not agree in time.
+  Waits until the driver's pose agrees with the body's, both relative to the start, in metres. If
+  they do not agree in time, the failure shows both.
   """
   def agree(context, start \\ {-4, 0, 0}, tolerance \\ 0.005),
     do: agree(context, start, tolerance, System.monotonic_time(:millisecond) + 10_000, nil)
@@ -151,13 +157,15 @@ defmodule Sim.BaseCase do
   end
 
   @doc """
-  Waits until the driver believes the body to be where it is, as nearly as that can be known from what came over a
-  line that loses reports; of odometry that nothing but this has taken out of the mailbox.
+  Waits until the driver's pose agrees with the body's, as nearly as that can be known from a line
+  that loses reports. Only this function may take odometry out of the mailbox.
 
-  A piece of the way of which only the ends were heard is driven at one heading, where the body had others: those
-  of this piece, and of the piece before, as the way may have been heard later than the turn. So the driver may be
-  wrong by each piece's length times the turns that it may have missed, and by nothing else, its heading by nothing.
-  Where the frame is another one, the driver has told that a counter jumped, and knows no place.
+  For a section of the path of which only the ends were heard, the driver assumes one heading,
+  while the body had others: those of this section, and of the one before, because the distance
+  may have been heard later than the turn. So the driver's position may be wrong by each section's
+  length times the turns that it may have missed, and by nothing else; its heading must be right.
+  If the frame is another one, the driver has reported that a counter jumped, and does not know
+  its place.
   """
   def agree_but_for_shape(context) do
     path = %{frame: context.first.frame, pose: context.first.pose, turned: 0.0, shape: 0.0}

@@ -1,7 +1,7 @@
 defmodule Sim.MuteController do
   @moduledoc """
-  An emulated base that hears and obeys, and says only what a test lets it: reports of the ports in `silent`
-  are not sent (`:all`: none). Ports are those of the fact sheet: 2 wheels, 4 sonars.
+  An emulated base that hears and obeys, but sends only what a test lets it: reports of the ports
+  in `silent` are not sent (`:all`: none). Ports are those of the fact sheet: 2 wheels, 4 sonars.
   """
   @behaviour Sim.Emulator.Core
   alias Sim.Emulator.RFlexController
@@ -10,10 +10,10 @@ defmodule Sim.MuteController do
   @enforce_keys [:base, :silent]
   defstruct @enforce_keys ++ [pressed: []]
 
-  @doc "From now on silent of these ports."
+  @doc "From now on sends nothing from these ports."
   def silence(core, silent), do: %{core | silent: silent}
 
-  @doc "From now on these bumpers are pressed, whatever the body feels."
+  @doc "From now on these bumpers are pressed, whatever the body senses."
   def hold(core, pressed), do: %{core | pressed: pressed}
 
   @impl Sim.Emulator.Core

@@ -1,25 +1,28 @@
 defmodule Sim.TrialRuns do
   @moduledoc """
-  Plays whole missions in lockstep for tests. In all of them a robot that does not get on says so.
+  Runs whole missions in lockstep for tests. In all of them a robot that makes no progress must
+  say so.
   """
   import ExUnit.Assertions
   alias Sim.Trial
 
-  @doc "A run to its end; blobs are seen directly unless told otherwise."
+  @doc "Runs a trial to its end; blobs are computed directly unless the options say otherwise."
   def run(options) do
     {:ok, trial} = Trial.new(Map.merge(%{blobs: :direct}, options))
     to_the_end(trial)
   end
 
-  @doc "Plays on to the end."
+  @doc "Continues a trial to its end."
   def to_the_end(trial), do: until(trial, &Trial.done?/1)
 
-  @doc "Plays on until a condition holds."
+  @doc "Continues a trial until a condition holds."
   def until(trial, condition),
     do: if(condition.(trial), do: spoken(trial), else: until(Trial.step(trial), condition))
 
   defp spoken(trial) do
-    assert Trial.result(trial).stuck == [], "robots stood short of their places without a word"
+    assert Trial.result(trial).stuck == [],
+           "robots stood short of their places without reporting it"
+
     trial
   end
 end

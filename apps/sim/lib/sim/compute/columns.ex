@@ -7,7 +7,7 @@ defmodule Sim.Compute.Columns do
   @nearest 0.01
   @farthest 1.0e6
   @wall_height 2.5
-  # The lamp rides beside the camera, 8 degrees to its left.
+  # The lamp is mounted beside the camera, 8 degrees to its left.
   @lamp_cosine 0.9902680687415704
   @lamp_sine 0.13917310096006544
 
@@ -16,7 +16,10 @@ defmodule Sim.Compute.Columns do
   @type piece :: {top :: non_neg_integer(), bottom :: non_neg_integer(), paint(), luma :: byte()}
   @type room :: {wall_top :: integer(), wall_bottom :: integer(), wall_luma :: byte()}
 
-  @doc "The poles of a packed binary that this camera may see, each with the columns it can cover, rather too many than too few."
+  @doc """
+  The poles of a packed binary that this camera may see, each with the columns it can cover;
+  possibly too many, never too few.
+  """
   @spec poles(tuple(), binary()) :: [{Range.t(), pole()}]
   def poles(sight, packed) do
     for <<x::float-native, y::float-native, r::float-native, height::float-native, kind, luma, u,
@@ -50,7 +53,8 @@ defmodule Sim.Compute.Columns do
   end
 
   @doc """
-  A column: its wall (`nil` when only the poles are asked for) and the visible pieces, the nearest first.
+  A column: its wall (`nil` if only the poles are wanted) and the visible parts of poles, the
+  nearest first.
   """
   @spec column(tuple(), tuple(), [{Range.t(), pole()}], non_neg_integer(), :poles | :walls) ::
           {room() | nil, [piece()]}
@@ -99,7 +103,7 @@ defmodule Sim.Compute.Columns do
     if b > 0.0 and under >= 0.0, do: max((b - :math.sqrt(under)) / a, @nearest)
   end
 
-  # All stand on the floor, so what is nearer hides everything below its upper edge.
+  # All poles stand on the floor, so a nearer one hides everything below its upper edge.
   defp cut([{depth, pole} | rest], sight, rx, ry, wall, covered)
        when covered > 0 and depth <= wall do
     {_, _, _, _, eye, focal, horizon, _, _} = sight

@@ -1,6 +1,7 @@
 defmodule Sim.Compute.Native do
   @moduledoc false
-  # The kernels in C; `Sim.Compute` documents them. Every size is checked over there: wrong terms raise ArgumentError.
+  # The kernels in C; `Sim.Compute` documents them. The C code checks every size: wrong terms
+  # raise ArgumentError.
   @on_load :load
 
   @doc false
@@ -11,7 +12,8 @@ defmodule Sim.Compute.Native do
   end
 
   @spec loaded?() :: boolean()
-  # The library replaces this. A plain `false` would tell compilers that infer types that it never is.
+  # The library replaces this. From a plain `false`, compilers that infer types would conclude
+  # that it is never loaded.
   def loaded?, do: not function_exported?(__MODULE__, :loaded?, 0)
 
   @spec field(binary(), pos_integer(), pos_integer()) :: binary()

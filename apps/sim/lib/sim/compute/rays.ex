@@ -1,7 +1,10 @@
 defmodule Sim.Compute.Rays do
   @moduledoc "Rays among walls and discs, in plain Elixir: the reference for `rays.c`. Pure."
 
-  @doc "The range of one sonar before noise: the nearest of the five rays of its cone, at most the ring's greatest."
+  @doc """
+  The range of one sonar before noise: the nearest of the five rays of its cone, at most the
+  ring's greatest range.
+  """
   @spec sensor(tuple(), [Sim.Compute.disc()], Sim.Compute.ring(), binary()) :: float()
   def sensor(map, others, {_index, x, y, c, s, _least, most, _geometry}, sensor) do
     <<sx::float-native, sy::float-native, rays::binary>> = sensor
@@ -47,10 +50,11 @@ defmodule Sim.Compute.Rays do
 
   @doc """
   How far a ray goes before it meets a wall, as a multiple of its direction, at most `most`; and
-  whether it met a side that looks along x (0) or y (1), or none (2).
+  whether it met a side that faces along x (0) or y (1), or none (2).
 
-  In a cell whose nearest wall is d steps away, the square of d - 1 cells round it is free: the
-  ray goes on to the edge of that square. Each jump crosses at least one cell along one axis and never goes back.
+  In a cell whose nearest wall is d steps away, the square of d - 1 cells around it is free, so
+  the ray jumps to the edge of that square. Each jump crosses at least one cell along one axis and
+  never goes back.
   """
   @spec wall(tuple(), float(), float(), float(), float(), float()) :: {float(), 0..2}
   def wall({field, width, height, cell}, x, y, rx, ry, most) do

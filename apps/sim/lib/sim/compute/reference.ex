@@ -17,7 +17,7 @@ defmodule Sim.Compute.Reference do
 
     edge = List.duplicate(0, width)
     down = rows |> sweep(edge) |> Enum.map(&Enum.reverse/1)
-    # The second sweep runs over the plan turned by half a turn.
+    # The second sweep runs over the plan rotated by 180 degrees.
     down
     |> Enum.reverse()
     |> sweep(edge)
@@ -67,7 +67,7 @@ defmodule Sim.Compute.Reference do
 
   defp blur(range, _noise, _index, _k, least, most), do: range |> max(least) |> min(most)
 
-  @doc "See `Sim.Compute.look/3`: pieces of 8 bytes."
+  @doc "See `Sim.Compute.look/3`: parts of 8 bytes each."
   @spec look(tuple(), tuple(), binary()) :: binary()
   def look(map, sight, poles) do
     poles = Columns.poles(sight, poles)
@@ -115,7 +115,7 @@ defmodule Sim.Compute.Reference do
     end
   end
 
-  # One pixel in a thousand is white or black; the last word on a pixel counts.
+  # One pixel in a thousand is white or black; the last value of a pixel counts.
   defp salt(rows, _size, nil), do: rows
 
   defp salt(rows, size, {seed, step, robot}) do

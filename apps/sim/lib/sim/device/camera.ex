@@ -1,9 +1,10 @@
 defmodule Sim.Device.Camera do
   @moduledoc """
-  The camera of a robot in a simulated world: it paints its pictures in its own process, from what
-  the server sends: the ground once, and then what moves (`Sim.World.CameraView`). Options: `world`, `robot` as for `Sim.Device.Drive`; `clock`, the robot's, by
-  which pictures are dated; `blobs: :direct` for a camera that finds blobs by itself, by geometry,
-  and never paints: for many robots on few processors.
+  The camera of a robot in a simulated world. It paints its pictures in its own process, from what
+  the server sends: the static ground once, and then what moves (`Sim.World.CameraView`). Options:
+  `world`, `robot` as for `Sim.Device.Drive`; `clock`, the robot's clock, which gives pictures
+  their time; `blobs: :direct` for a camera that computes blobs by geometry and never paints: for
+  many robots on few processors.
   """
   @behaviour Hal.Camera
   alias Sim.World
@@ -35,7 +36,7 @@ defmodule Sim.Device.Camera do
   def handle_message({:world, server, {:ground, ground}}, %{line: {server, _}} = camera),
     do: {:ok, [], %{camera | ground: ground}}
 
-  # It was lost on its way: the next attachment brings it.
+  # The ground was lost on its way: the next attachment brings it.
   def handle_message(
         {:world, server, {:view, _moving}},
         %{line: {server, _}, ground: nil} = camera

@@ -4,8 +4,8 @@ defmodule Sim.Emulator.RFlexController do
   alone. Pure: bytes and time in, bytes and the wheels' speed out; `Sim.Emulator` runs it on a pseudo-terminal with
   a body in a simulated world. Its options are those of `Sim.Emulator.RFlexController.Options`.
 
-  It tells nothing unless it was asked to; what is wrong on the line it passes over without a word. The text
-  `:phrase` on the line, wherever it comes, switches it off until it is switched on again.
+  It reports nothing unless it was asked to, and silently skips errors on the line. The text
+  `:phrase`, anywhere on the line, switches it off until it is switched on again.
   """
   @behaviour Sim.Emulator.Core
   alias Hal.{Odometry, Twist}
@@ -13,9 +13,9 @@ defmodule Sim.Emulator.RFlexController do
   alias Sim.Emulator.RFlexController
   alias Sim.Emulator.RFlexController.{CommandHandler, Frame, Motors, Options, Senses, Sonars}
 
-  # How often the body is told again what it knows.
+  # How often a command to the body is repeated.
   @repeat_ms 100
-  # The longest that may lie about unread; more is noise.
+  # The most bytes that may wait unread; more is noise.
   @most_waiting 64
 
   @type t :: RFlexController.State.t()
@@ -26,7 +26,7 @@ defmodule Sim.Emulator.RFlexController do
          do: {:ok, RFlexController.State.boot(options, at_ms)}
   end
 
-  @doc "Switched off and on: as it was at first, but that the body is where it is."
+  @doc "Switched off and on: as at the start, except that the body stays where it is."
   @impl Sim.Emulator.Core
   def restart(%RFlexController.State{} = core, at_ms) do
     %{
@@ -74,7 +74,7 @@ defmodule Sim.Emulator.RFlexController do
   defp receive_order(%{options: %{pace: :off}} = core, frame, at_ms),
     do: CommandHandler.obey(core, frame, at_ms)
 
-  # A small buffer: what finds it full is lost.
+  # A small buffer: what arrives when it is full is lost.
   defp receive_order(%{options: %{pace: {_ms, room}}} = core, frame, at_ms) do
     if :queue.len(core.waiting) < min(room, @most_waiting) do
       %{
@@ -109,7 +109,7 @@ defmodule Sim.Emulator.RFlexController do
 
   def feel(%RFlexController.State{} = core, _other, _at_ms), do: core
 
-  @doc "The joystick is held there: its counts and its buttons' bits."
+  @doc "Holds the joystick there: its counts and the bits of its buttons."
   @spec stick(t(), integer(), integer(), byte()) :: t()
   def stick(%RFlexController.State{} = core, x, y, buttons), do: %{core | stick: {x, y, buttons}}
 
@@ -215,7 +215,7 @@ defmodule Sim.Emulator.RFlexController do
     end)
   end
 
-  # Held up, it does not make up for what it missed.
+  # After a delay it does not make up for the reports it missed.
   defp periodic(core, what, at_ms, report) do
     case Map.fetch!(core, what) do
       {due_ms, period_ms, argument} when due_ms <= at_ms ->

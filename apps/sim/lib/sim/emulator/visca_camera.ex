@@ -1,21 +1,22 @@
 defmodule Sim.Emulator.ViscaCamera do
   @moduledoc """
-  A Sony EVI-D30 at the other end of the serial line, written from the fact sheet alone. Pure: bytes and time in, bytes
-  and where it looks out; `Sim.Emulator` runs it on a pseudo-terminal, and the camera of a body in a simulated world
-  looks where it looks. Its options are those of `Sim.Emulator.ViscaCamera.Options`.
+  A Sony EVI-D30 at the other end of the serial line, written from the fact sheet alone. Pure:
+  bytes and time in, bytes and direction of view out; `Sim.Emulator` runs it on a pseudo-terminal,
+  and the camera of a body in a simulated world looks where it looks. Its options are those of
+  `Sim.Emulator.ViscaCamera.Options`.
 
-  Two commands are carried out at a time. What the sheet leaves open: an answer that tells what cannot be done now
-  names the socket that the command would have had; a second way replaces the first, and both are completed where it
-  ends; a broadcast clear stops the head.
+  Two commands are carried out at a time. Where the sheet leaves it open: the answer that a
+  command cannot be executed names the socket that the command would have had; a second move
+  replaces the first, and both are completed when it ends; a broadcast clear stops the head.
   """
   @behaviour Sim.Emulator.Core
   import Sim.Emulator.ViscaCamera.State, only: [answer: 3, settle: 2]
   alias Sim.Emulator.ViscaCamera
   alias Sim.Emulator.ViscaCamera.{Commands, Head, Inquiries, Options, Packet}
 
-  # How often the body is told again what it knows.
+  # How often a command to the body is repeated.
   @repeat_ms 100
-  # While it turns, the body follows in steps of this.
+  # While it turns, the body follows in steps of this size.
   @step_ms 50
 
   @type t :: ViscaCamera.State.t()
@@ -26,7 +27,7 @@ defmodule Sim.Emulator.ViscaCamera do
          do: {:ok, ViscaCamera.State.boot(options, at_ms)}
   end
 
-  @doc "It lost its current and has it again: it looks straight ahead, and tells the chain."
+  @doc "Its power went off and on: it looks straight ahead, and announces itself to the chain."
   @impl Sim.Emulator.Core
   def restart(%ViscaCamera.State{} = camera, at_ms) do
     fresh = %{ViscaCamera.State.boot(camera.options, at_ms) | answered: camera.answered}
@@ -72,7 +73,7 @@ defmodule Sim.Emulator.ViscaCamera do
 
   defp understand(camera, {:to_me, _nonsense}, at_ms), do: answer(camera, <<0x60, 0x02>>, at_ms)
 
-  @doc "It feels nothing but the commands."
+  @doc "It gets no input but the commands."
   @impl Sim.Emulator.Core
   def feel(%ViscaCamera.State{} = camera, _reading, _at_ms), do: camera
 

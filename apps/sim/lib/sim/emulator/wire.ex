@@ -6,10 +6,10 @@ defmodule Sim.Emulator.Wire do
 
   | option | allowed | default |
   |---|---|---|
-  | `:drop`, `:double`, `:flip` | share of bytes, 0 to 1, together 1 at most | 0 |
-  | `:delay_ms` | `{least, most}`, whole milliseconds, for what is sent at one time | `{0, 0}` |
+  | `:drop`, `:double`, `:flip` | share of bytes, 0 to 1, together at most 1 | 0 |
+  | `:delay_ms` | `{least, most}`, whole milliseconds, for bytes that are sent together | `{0, 0}` |
   | `:seed` | whole number | 0 |
-  | `:way` | whole number that tells directions of one seed apart | 0 |
+  | `:way` | whole number that distinguishes directions with one seed | 0 |
 
   Bytes never overtake each other.
   """
@@ -33,7 +33,7 @@ defmodule Sim.Emulator.Wire do
   ]
 
   @doc """
-  A wire, or one line that names what is wrong with its options.
+  A wire; the error is one line that names what is wrong with its options.
 
       iex> {:ok, wire} = Sim.Emulator.Wire.new(drop: 0.02)
       iex> wire.flip
@@ -45,13 +45,13 @@ defmodule Sim.Emulator.Wire do
   def new(options \\ []) do
     with {:ok, options} <- Options.check(options, @table, "wire") do
       if options[:drop] + options[:double] + options[:flip] > 1,
-        do: {:error, "wire options drop, double and flip are 1 at most together"},
+        do: {:error, "wire options drop, double and flip cannot be more than 1 together"},
         else: {:ok, struct!(__MODULE__, options)}
     end
   end
 
   @doc """
-  Sends bytes into the wire; a pulled one takes none.
+  Sends bytes into the wire; a pulled one loses them.
 
       iex> {:ok, wire} = Sim.Emulator.Wire.new(delay_ms: {5, 5})
       iex> {early, wire} = wire |> Sim.Emulator.Wire.put("ab", 100) |> Sim.Emulator.Wire.take(104)
@@ -105,7 +105,7 @@ defmodule Sim.Emulator.Wire do
 
   defp spoil_one(_wire, byte, _draw, _k), do: <<byte>>
 
-  @doc "What has come out at the other end by now."
+  @doc "The bytes that have arrived at the other end by now."
   @spec take(t(), integer()) :: {binary(), t()}
   def take(%__MODULE__{} = wire, at_ms), do: take(wire, at_ms, [])
 
@@ -119,7 +119,7 @@ defmodule Sim.Emulator.Wire do
     end
   end
 
-  @doc "When something comes out next; `nil` when nothing is on its way."
+  @doc "When the next byte arrives; `nil` if nothing is on its way."
   @spec next_ms(t()) :: integer() | nil
   def next_ms(%__MODULE__{queue: queue}) do
     case :queue.peek(queue) do
@@ -128,11 +128,13 @@ defmodule Sim.Emulator.Wire do
     end
   end
 
-  @doc "Pulls the wire: what is on its way is lost, and all that is put into it until it is plugged."
+  @doc """
+  Pulls the wire: what is on its way is lost, and so is all that is sent until it is plugged in.
+  """
   @spec pull(t()) :: t()
   def pull(%__MODULE__{} = wire), do: %{wire | plugged?: false, queue: :queue.new(), last_ms: nil}
 
-  @doc "Plugs it again."
+  @doc "Plugs the wire in again."
   @spec plug(t()) :: t()
   def plug(%__MODULE__{} = wire), do: %{wire | plugged?: true}
 end

@@ -3,28 +3,28 @@ defmodule Sim.Fleet.Backend do
   Where the robots and the world of a `Sim.Fleet` run: in this process of the operating system
   (`Sim.Fleet.Local`), or each in one of its own (`Sim.Fleet.Nodes`).
 
-  All is called in the fleet's process. What a backend makes of a message are events for the fleet's
-  run_log.
+  All callbacks run in the fleet's process. A backend turns messages into events for the fleet's
+  run log.
   """
   alias Sim.World
   alias Sim.Trial.Setup
 
   @type backend :: term()
 
-  @typedoc "A robot died, and nobody of us killed it; or something is to be written down."
+  @typedoc "A robot died, and the fleet did not kill it; or something for the run log."
   @type event :: {:killed, atom()} | {:stage, atom(), atom() | nil, map()}
 
   @doc "Starts world and robots, all idle."
   @callback start(Setup.t(), keyword()) ::
               {:ok, backend()} | {:error, line :: String.t()}
 
-  @doc "Begins the mission on all of them."
+  @doc "Starts the mission on all of them."
   @callback begin(backend()) :: :ok
 
   @doc "The robots that live, in the order of the fleet."
   @callback living(backend()) :: [atom()]
 
-  @doc "What each of them claims of itself."
+  @doc "What each of them claims about itself."
   @callback claims(backend()) :: [{atom(), map()}]
 
   @doc "Kills a living robot at once."
@@ -33,22 +33,22 @@ defmodule Sim.Fleet.Backend do
   @doc "Changes the world."
   @callback change(backend(), World.Server.change()) :: backend()
 
-  @doc "The world as it is."
+  @doc "The current world."
   @callback world(backend()) :: World.t()
 
-  @doc "Its server; `nil` while there is none."
+  @doc "The world's server; `nil` while there is none."
   @callback server(backend()) :: pid() | nil
 
-  @doc "Messages between robots so far."
+  @doc "The number of messages between robots so far."
   @callback messages(backend()) :: %{sent: non_neg_integer(), lost: non_neg_integer()}
 
-  @doc "How to reach the processes of the operating system, a line each."
+  @doc "How to reach the processes of the operating system, one line each."
   @callback lines(backend()) :: [String.t()]
 
-  @doc "Any message to the fleet that it does not know itself."
+  @doc "Handles any message to the fleet that the fleet itself does not know."
   @callback hear(backend(), message :: term()) ::
               {:ok, [event()], backend()} | {:stop, reason :: term()}
 
-  @doc "Ends all of it."
+  @doc "Ends world and robots."
   @callback stop(backend()) :: term()
 end

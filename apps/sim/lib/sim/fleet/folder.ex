@@ -4,7 +4,7 @@ defmodule Sim.Fleet.Folder do
   next run removes what killed runs left behind.
   """
 
-  @doc "Makes one."
+  @doc "Creates a folder."
   @spec make() :: {:ok, Path.t()} | {:error, line :: String.t()}
   def make do
     sweep(System.tmp_dir!())
@@ -19,14 +19,14 @@ defmodule Sim.Fleet.Folder do
     end
   end
 
-  @doc "Takes it away, with all that is in it."
+  @doc "Removes it with all its contents."
   @spec remove(Path.t()) :: :ok
   def remove(folder) do
     _ = File.rm_rf(folder)
     :ok
   end
 
-  # The number of their process is in the name.
+  # The name contains the number of the process.
   defp sweep(folder) do
     with true <- File.dir?("/proc/self"), {:ok, names} <- File.ls(folder) do
       for name <- names,

@@ -1,20 +1,22 @@
 defmodule Sim.Fleet.Hardware do
   @moduledoc """
-  Robots of a simulated fleet with the drivers of real ones: a base and a camera for each, emulated on
-  pseudo-terminals whose links lie in the run's folder (`mag1.base`, `mag1.camera`), with the robot's body in
-  the world behind them.
+  Robots of a simulated fleet with the drivers of real ones: each has a base and a camera,
+  emulated on pseudo-terminals whose links are in the run's folder (`mag1.base`, `mag1.camera`),
+  with the robot's body in the world behind them.
 
-      supervisor (one_for_one: a device that falls is one that was switched off and on)
+      supervisor (one_for_one: a device that crashes was, in effect, switched off and on)
       `-- Sim.Emulator   two for each such robot
   """
   alias Sim.{Device, Emulator}
   alias Sim.Emulator.{RFlexController, ViscaCamera}
   alias Sim.Trial.Setup
 
-  # A device falls by a fault of ours alone; the others go on.
+  # Only our own bugs crash a device; the others go on.
   @restarts 100
 
-  @doc "The part of a fleet's tree, for those of the robots that are hardware; none where none is."
+  @doc """
+  The part of a fleet's supervision tree for the robots with real drivers; none if there are none.
+  """
   @spec parts([Setup.robot()], world :: term(), Path.t()) :: [Supervisor.child_spec()]
   def parts(robots, world, folder) do
     case for(
@@ -56,7 +58,7 @@ defmodule Sim.Fleet.Hardware do
     %{id: id, start: {Emulator, :start_link, [[core: core, link: link, body: body]]}}
   end
 
-  @doc "What such a robot is configured with in place of simulated devices: drive and camera's head."
+  @doc "The devices of such a robot in place of simulated ones: drive and camera head."
   @spec drivers(Setup.robot(), Path.t()) :: keyword()
   def drivers(%{profile: profile} = robot, folder) do
     [
@@ -67,7 +69,7 @@ defmodule Sim.Fleet.Hardware do
     ]
   end
 
-  @doc "Where their lines are, for people, one a robot."
+  @doc "Where their serial lines are, for people, one line per robot."
   @spec lines([Setup.robot()], Path.t()) :: [String.t()]
   def lines(robots, folder) do
     for %{hardware?: true} = robot <- robots do
@@ -76,7 +78,7 @@ defmodule Sim.Fleet.Hardware do
     end
   end
 
-  # By the fact sheet, as a file of such a robot has them.
+  # From the fact sheet, as in the file of such a robot.
   defp base(:magellan),
     do: [
       conversions: [distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0]
@@ -90,7 +92,7 @@ defmodule Sim.Fleet.Hardware do
     ]
   end
 
-  # The pictures' field of view is the profile's as long as nobody zooms.
+  # The field of view of the pictures is that of the profile as long as nobody zooms.
   defp lens(%{camera: %{field_of_view: wide}}), do: {wide / 11, wide}
 
   defp base_link(folder, %{id: id}), do: Path.join(folder, "#{id}.base")

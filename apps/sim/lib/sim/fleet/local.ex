@@ -25,7 +25,7 @@ defmodule Sim.Fleet.Local do
     with {:ok, folder} <- folder(setup.options), do: {:ok, start(setup, options, folder)}
   end
 
-  # Only serial lines need one.
+  # Only serial lines need a folder.
   defp folder(%{hardware: []}), do: {:ok, nil}
   defp folder(_hardware), do: Folder.make()
 
@@ -66,8 +66,9 @@ defmodule Sim.Fleet.Local do
     }
   end
 
-  # Drives arm by themselves once they have reported. Until then a robot refuses what would move it, also
-  # the first order of a person who has just started the fleet. One that cannot arm holds nobody up for long.
+  # Drives arm by themselves once they have reported. Until then a robot refuses what would move
+  # it, also the first order of a person who has just started the fleet. A robot that cannot arm
+  # does not delay the others for long.
   defp await_armed(ids, until_ms) do
     late = Enum.reject(ids, &Robot.armed?/1)
 
@@ -83,7 +84,8 @@ defmodule Sim.Fleet.Local do
 
   @impl Sim.Fleet.Backend
   def begin(backend) do
-    # All at once: on a busy machine a hundred pilots one after the other take long to answer.
+    # All at once: on a busy machine, a hundred pilots asked one after the other take long to
+    # answer.
     options = [max_concurrency: 100, ordered: false, timeout: :infinity]
     backend |> living() |> Task.async_stream(&Robot.begin/1, options) |> Stream.run()
   end
@@ -131,7 +133,7 @@ defmodule Sim.Fleet.Local do
     {:ok, if(id in living(backend), do: [{:stage, stage, id, facts}], else: []), backend}
   end
 
-  # However it ended: killed, or with its restarts used up.
+  # Whether it was killed, or has used up its restarts.
   def hear(%{pids: pids} = backend, {:DOWN, _monitor, :process, pid, _reason})
       when is_map_key(pids, pid),
       do: {:ok, [{:killed, pids[pid]}], wreck(backend, pid)}

@@ -5,11 +5,11 @@ defmodule Sim.Fleet.Mission do
   """
   alias Sim.Trial.Setup
 
-  # What a process of its own has on board.
+  # The apps that are available in a robot's own process of the operating system.
   @apps [:hal, :vision, :robot, :mesh, :swarm, :missions, :sim]
 
   @doc """
-  The setup with that mission, and whether it is to begin; or one line.
+  The setup with that mission, and whether the mission should start; the error is one line.
 
       iex> Sim.Fleet.Mission.choose(%{mission: nil}, {NoSuchModule, []}, false)
       {:error, "mission cannot be {NoSuchModule, []}: NoSuchModule is not a Robot.Mission (init/2 and handle/2)"}

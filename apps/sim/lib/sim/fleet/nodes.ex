@@ -1,11 +1,11 @@
 defmodule Sim.Fleet.Nodes do
   @moduledoc """
-  World and robots each in a process of the operating system of their own (`Sim.Node`), on loopback; this
-  one, the launcher, starts them and listens.
+  World and robots, each in a process of the operating system of its own (`Sim.Node`), on
+  loopback; this one, the launcher, starts them and listens to them.
 
-  A robot whose process ends, whoever killed it, is dead. One that says nothing, frozen perhaps, is
-  `:silent` until it speaks again. When the world's process ends, it is started again from the last
-  snapshot that came from it, and the robots, which stood meanwhile, go on.
+  A robot whose process ends, whoever killed it, is dead. One that sends nothing, perhaps because
+  it is frozen, is `:silent` until it sends again. When the world's process ends, it is started
+  again from its last snapshot, and the robots, which stood meanwhile, go on.
   """
   @behaviour Sim.Fleet.Backend
   alias Sim.Fleet.Hardware
@@ -14,7 +14,7 @@ defmodule Sim.Fleet.Nodes do
   alias Sim.World.Snapshot
   alias Sim.Node.{Config, Reporter}
 
-  # On a machine that is busy with much else a start takes several seconds.
+  # On a busy machine a start takes several seconds.
   @up_ms 20_000
   @silent_ms 1_000
   @world_starts 5
@@ -22,7 +22,9 @@ defmodule Sim.Fleet.Nodes do
   @enforce_keys [:setup, :host, :name, :world]
   defstruct @enforce_keys ++ [children: %{}, reports: %{}, world_starts: 0]
 
-  @typedoc "`children` by robot id and `:world`; `reports` hold claim, counts, and when they came."
+  @typedoc """
+  `children` by robot id and `:world`; `reports` hold claim, counts, and the time of arrival.
+  """
   @type t :: %__MODULE__{}
 
   @impl Sim.Fleet.Backend
@@ -52,7 +54,7 @@ defmodule Sim.Fleet.Nodes do
     end)
   end
 
-  # As long as one after the other comes, the machine is only slow.
+  # As long as nodes come up one after the other, the machine is only slow.
   defp await_all(backend, ids, deadline \\ now() + @up_ms) do
     case Enum.filter(ids, &(backend.children[&1].up == nil)) do
       [] ->
@@ -121,7 +123,7 @@ defmodule Sim.Fleet.Nodes do
     change(%{backend | children: children}, {:kill, id})
   end
 
-  # Also to our own copy: a server that is down or about to fall begins again with that.
+  # Also to our own copy, from which a server that is down or about to crash starts again.
   @impl Sim.Fleet.Backend
   def change(backend, change) do
     if pid = server(backend), do: World.Server.change(pid, change)
@@ -212,7 +214,7 @@ defmodule Sim.Fleet.Nodes do
 
   defp heard(backend, _id, _unknown), do: {:ok, [], backend}
 
-  # Its next report will say so; until then the run log must not take the search for over.
+  # Its next report will say so; until then the run log must not consider the search finished.
   defp begun(backend, id, :search) do
     {claim, counts, _at_ms} = Map.get(backend.reports, id, {%{}, %{}, 0})
     put_in(backend.reports[id], {Map.put(claim, :phase, :search), counts, now()})

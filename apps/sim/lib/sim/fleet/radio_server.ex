@@ -11,17 +11,22 @@ defmodule Sim.Fleet.RadioServer do
 
   @poll_ms 5
 
-  @typedoc "What was sent, for the radio that never loses."
+  @typedoc "The counter of sent messages, for the radio that never loses any."
   @type counter :: :counters.counters_ref()
 
-  @doc "The part of a fleet's tree that loses `loss` of all messages; none where none is lost."
+  @doc """
+  The part of a fleet's supervision tree that loses `loss` of all messages; none if none is lost.
+  """
   @spec parts(number(), integer()) :: [Supervisor.child_spec()]
   def parts(loss, seed) when loss > 0,
     do: [%{id: __MODULE__, start: {__MODULE__, :start_link, [[seed: seed, loss: loss]]}}]
 
   def parts(_no_loss, _seed), do: []
 
-  @doc "The transport of that part, or of none, and what counts its messages."
+  @doc """
+  The transport of that part, or without it the one that loses nothing, and the counter of its
+  messages.
+  """
   @spec radio(pid() | nil) :: {{module(), atom(), list()}, pid() | counter()}
   def radio(nil), do: clear()
   def radio(air), do: {transport(air), air}
@@ -40,11 +45,11 @@ defmodule Sim.Fleet.RadioServer do
     Transport.transmit(from, to, message)
   end
 
-  @doc "Starts a radio that loses and delays; options as of `Sim.Radio.new/1`."
+  @doc "Starts a radio that loses and delays messages; options as in `Sim.Radio.new/1`."
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options), do: GenServer.start_link(__MODULE__, Radio.new(options))
 
-  @doc "Its transport."
+  @doc "The transport of a radio."
   @spec transport(pid()) :: {module(), atom(), list()}
   def transport(air), do: {__MODULE__, :transmit, [air]}
 
@@ -53,11 +58,11 @@ defmodule Sim.Fleet.RadioServer do
   def transmit(air, from, to, message),
     do: GenServer.cast(air, {:transmit, from, addressed(from, to), message})
 
-  # Each counts by itself, and is lost by itself.
+  # Each copy is counted, and lost, separately.
   defp addressed(from, :all), do: List.delete(Transport.robots(), from)
   defp addressed(_from, ids), do: ids
 
-  @doc "What was sent and lost so far, by either radio."
+  @doc "How many messages were sent and lost so far, by either radio."
   @spec counts(pid() | counter()) :: %{sent: non_neg_integer(), lost: non_neg_integer()}
   def counts(air) when is_pid(air), do: GenServer.call(air, :counts)
   def counts(counter), do: %{sent: :counters.get(counter, 1), lost: 0}
@@ -90,8 +95,8 @@ defmodule Sim.Fleet.RadioServer do
     end
   end
 
-  # One by one: what one robot misses, another may hear. Where a robot is, its first heartbeats tell,
-  # and until then those of others go to everybody.
+  # One by one: what one robot misses, another may hear. Its first heartbeats tell where a robot
+  # is; until then messages to it go to everybody.
   defp deliver(to, %{kind: kind} = message) do
     cond do
       Names.whereis(to, :comms) -> Comms.hear(to, message)

@@ -1,18 +1,18 @@
 defmodule Sim.Fleet.Robot do
-  @moduledoc "One robot of a simulated fleet on this node: its config, its start, what it claims."
+  @moduledoc "One robot of a simulated fleet on this node: its config, its start, its claims."
   alias Robot.{Board, Config}
   alias Robot.Control.Pilot
   alias Sim.Fleet.Hardware
   alias Sim.World
   alias Robot.Mission.Manual
 
-  # Of a command for one robot alone.
+  # The timeout of a command to a single robot.
   @over [:ready, :done, :found, :not_found]
 
   @typedoc """
-  What all robots of a fleet have in common: the name of their world, their clock and radio, how they
-  see, what they are at, who is told what goes in and out (`{m, f, a}`, called with the id first), and the run's
-  folder, where the serial lines of those that are hardware are.
+  What all robots of a fleet have in common: the name of their world, their clock and radio, the
+  kind of blobs, their mission, the trace of inputs and outputs (`{m, f, a}`, called with the id
+  first), and the run's folder, which holds the serial lines of robots with real drivers.
   """
   @type common :: %{
           world: term(),
@@ -31,22 +31,22 @@ defmodule Sim.Fleet.Robot do
     {:ok, _pid} = Robot.Fleet.start_robot(fleet, config)
   end
 
-  @doc "A clock of robots: milliseconds since now."
+  @doc "A clock for robots: milliseconds since this call."
   @spec clock() :: Config.call()
   def clock, do: {__MODULE__, :now, [System.monotonic_time(:millisecond)]}
 
-  @doc "The time by such a clock."
+  @doc "The time of such a clock."
   @spec now(integer()) :: non_neg_integer()
   def now(epoch_ms), do: System.monotonic_time(:millisecond) - epoch_ms
 
-  @doc "Begins its mission."
+  @doc "Starts its mission."
   @spec begin(atom()) :: :ok
   def begin(id) do
     :ok = Pilot.start(id)
     :ok = Pilot.command(id, :start)
   end
 
-  @doc "Whether its wheels may turn: its drive is there, has reported, and is armed."
+  @doc "Whether its wheels may turn: its drive is online, has reported, and is armed."
   @spec armed?(atom()) :: boolean()
   def armed?(id) do
     with {:ok, board} <- Board.find(id),
@@ -55,7 +55,7 @@ defmodule Sim.Fleet.Robot do
          else: (_not_yet -> false)
   end
 
-  @doc "What it claims of itself, as in lockstep, but read off its board."
+  @doc "What it claims about itself, as in lockstep, but read from its board."
   @spec claim(atom()) :: map()
   def claim(id) do
     with {:ok, board} <- Board.find(id),
@@ -67,7 +67,7 @@ defmodule Sim.Fleet.Robot do
         _group_or_idle -> claim
       end
     else
-      # Between the fall of a board and the next one.
+      # Between the crash of a board and the next one.
       :error -> %{}
     end
   end

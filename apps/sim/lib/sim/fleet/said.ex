@@ -3,27 +3,31 @@ defmodule Sim.Fleet.Said do
   Holds back announcements of a live fleet (one leads, its fleet is formed) until the robots'
   claims show them. Pure.
 
-  A robot tells a stage by an event, and claims the same on its board, which the fleet looks at ten times a second. Told
-  at once, the stage would be on the screen while the run log still says the opposite. So it waits for the claim. One that no claim
-  shows within 5 looks, 0.5 s, was withdrawn at once, and is told all the same: it was said.
+  A robot reports a stage by an event, and claims the same on its board, which the fleet reads ten
+  times a second. If the stage were announced at once, it would be on the screen while the run log
+  still says the opposite. So it waits for the claim. If no claim shows it within 5 readings (0.5
+  s), it was withdrawn at once, and is announced all the same, because it was reported.
   """
 
   @looks 5
 
-  @typedoc "What was said, the oldest first, and in how many looks at claims it has not been shown."
+  @typedoc """
+  The reported stages, the oldest first, each with the number of readings in which no claim has
+  shown it.
+  """
   @type t :: [{looks :: non_neg_integer(), stage()}]
   @type stage :: {name :: atom(), robot :: atom(), facts :: map()}
 
-  @doc "Whether a stage is one that waits for the robot's claim."
+  @doc "Whether a stage has to wait for the robot's claim."
   @spec waits?(stage :: atom()) :: boolean()
   def waits?(stage), do: stage in [:elected, :formed]
 
-  @doc "Takes in what a robot said."
+  @doc "Adds a stage that a robot reported."
   @spec hear(t(), stage()) :: t()
   def hear(said, stage), do: said ++ [{0, stage}]
 
   @doc """
-  One look at the claims: what can be told now, and what still waits.
+  One reading of the claims: returns what can be announced now, and what still waits.
 
       iex> formed = {:formed, :mag1, %{epoch: 2}}
       iex> said = Sim.Fleet.Said.hear([], formed)

@@ -53,7 +53,7 @@ defmodule Sim.Floorplan.Clearance do
     end
   end
 
-  @doc "The byte of the field at a point: 0 in a wall, and outside."
+  @doc "The byte of the field at a point: 0 in a wall and outside."
   @spec steps(Sim.Floorplan.t(), Sim.Floorplan.point()) :: byte()
   def steps(map, point) do
     {px, py} = local(map, point)

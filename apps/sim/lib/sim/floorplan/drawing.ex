@@ -2,8 +2,8 @@ defmodule Sim.Floorplan.Drawing do
   @moduledoc """
   The built-in maps, drawn with cells of 5 cm for a fleet of a certain size. Pure.
 
-  Each has free space round its centre for a column of the whole fleet at 1 m spacing in any direction,
-  and 3 m to drive round its end.
+  Each has free space around its centre for a column of the whole fleet at 1 m spacing in any
+  direction, and 3 m to drive around its end.
   """
   alias Sim.{Compute, Trig}
 
@@ -22,7 +22,8 @@ defmodule Sim.Floorplan.Drawing do
   def draw("hall", fleet) do
     {x, y} = half(fleet)
     {w, h} = {round(2 * x / @cell), round(2 * y / @cell)}
-    # Without walls the field needs no sweep: rows deeper inside than a byte can count are alike.
+    # Without inner walls the field needs no sweep: rows farther inside than a byte can count are
+    # alike.
     rows = Map.new(1..255, fn most -> {most, open_row(w, most)} end)
     field = for j <- 0..(h - 1), into: <<>>, do: rows[Enum.min([j + 1, h - j, 255])]
 
@@ -32,7 +33,8 @@ defmodule Sim.Floorplan.Drawing do
   def draw("hospital", fleet) do
     {x, y} = half(fleet)
 
-    # The large room in the middle, a corridor round it, rooms along the outer side of the corridor.
+    # A large room in the middle, a corridor around it, rooms along the outer side of the
+    # corridor.
     {cx, cy} = {x + @wall + @corridor, y + @wall + @corridor}
     {ox, oy} = {cx + 8.0, cy + 4.5}
 
@@ -92,7 +94,8 @@ defmodule Sim.Floorplan.Drawing do
     ]
   end
 
-  # Rooms about 5 m wide side by side, from -half to half, `low` to `high`; `turn` puts them at their side.
+  # Rooms about 5 m wide side by side, from -half to half, `low` to `high`; `turn` places them on
+  # their side.
   defp ward(half, low, high, turn) do
     count = max(round(2 * half / 5), 1)
     width = 2 * half / count
@@ -118,7 +121,7 @@ defmodule Sim.Floorplan.Drawing do
     {:pillar, distance * c, distance * s, radius}
   end
 
-  # Later shapes lie over earlier ones; a cell is what its centre is.
+  # Later shapes cover earlier ones; the centre of a cell decides what it is.
   defp plan(name, {width, height}, room, shapes) do
     {w, h} = {round(width / @cell), round(height / @cell)}
 
@@ -126,7 +129,7 @@ defmodule Sim.Floorplan.Drawing do
       Enum.map_reduce(0..(h - 1), %{}, fn j, drawn ->
         y = (j + 0.5 - h / 2) * @cell
         spans = for shape <- shapes, span = span(shape, y), do: span
-        # Rows that the same shapes cross in the same way are drawn once.
+        # Rows that are crossed by the same shapes in the same way are drawn once.
         drawn = Map.put_new_lazy(drawn, spans, fn -> row(spans, w) end)
         {drawn[spans], drawn}
       end)

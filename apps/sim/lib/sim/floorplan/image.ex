@@ -1,8 +1,8 @@
 defmodule Sim.Floorplan.Image do
   @moduledoc """
-  Maps from bitmaps: `FILE:WIDTHxHEIGHT` with a PNG or PGM file and its size in metres. What is
-  darker than half is wall. The picture is laid over cells of 5 cm; a cell is wall if any of
-  its pixels is, so that thin walls stay whole.
+  Maps from bitmaps: `FILE:WIDTHxHEIGHT` with a PNG or PGM file and its size in metres. Pixels
+  darker than half are wall. The picture is divided into cells of 5 cm; a cell is wall if any of
+  its pixels is, so that thin walls have no gaps.
   """
   alias Sim.Compute
   alias Sim.Floorplan.{Pgm, Png}
@@ -42,13 +42,13 @@ defmodule Sim.Floorplan.Image do
     end
   end
 
-  # A device or a pipe would never end.
+  # Reading a device or a pipe would never end.
   defp read(file) do
     with {:ok, %File.Stat{type: :regular}} <- File.stat(file),
          {:ok, bytes} <- File.read(file) do
       {:ok, bytes}
     else
-      {:ok, %File.Stat{type: type}} -> {:error, "map file #{file}: a #{type}, not a file"}
+      {:ok, %File.Stat{type: type}} -> {:error, "map file #{file}: is a #{type}, not a file"}
       {:error, reason} -> {:error, "map file #{file}: #{:file.format_error(reason)}"}
     end
   end
@@ -58,7 +58,7 @@ defmodule Sim.Floorplan.Image do
       case bytes do
         <<0x89, "PNG\r\n", 0x1A, "\n", chunks::binary>> -> Png.decode(chunks, @most_cells)
         <<"P", kind, rest::binary>> when kind in [?2, ?5] -> Pgm.decode(kind, rest, @most_cells)
-        _ -> {:error, "neither a PNG nor a PGM (P2, P5) picture"}
+        _ -> {:error, "is neither a PNG nor a PGM (P2, P5) picture"}
       end
 
     with {:error, reason} <- result, do: {:error, "map file #{file}: #{reason}"}
@@ -82,7 +82,7 @@ defmodule Sim.Floorplan.Image do
     %{name: name, width: w, height: h, cell: @cell, field: field, room: {-x, -y, x, y}}
   end
 
-  # The pixels under cell `i` of `cells`: the first, and how many.
+  # The pixels in cell `i` of `cells`: the first, and their number.
   defp part(i, cells, pixels) do
     first = div(i * pixels, cells)
     {first, max(div((i + 1) * pixels + cells - 1, cells) - first, 1)}

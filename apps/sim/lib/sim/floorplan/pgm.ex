@@ -1,12 +1,12 @@
 defmodule Sim.Floorplan.Pgm do
   @moduledoc "Reads PGM pictures as walls, plain (P2) and raw (P5), of up to 255 greys. Pure."
-  @typedoc "Rows from the top, one byte a pixel, 1 is wall."
+  @typedoc "Rows from the top, one byte per pixel, 1 is wall."
   @type picture :: {width :: pos_integer(), height :: pos_integer(), rows :: [binary()]}
 
   @damaged {:error, "the picture is damaged"}
 
   @doc """
-  The picture after the two letters of its kind, of at most so many pixels.
+  Reads the picture after the two letters of its kind; it may have at most so many pixels.
 
       iex> Sim.Floorplan.Pgm.decode(?2, "\\n# a comment\\n3 2\\n255\\n0 255 255\\n255 255 100\\n", 99)
       {:ok, {3, 2, [<<1, 0, 0>>, <<0, 0, 1>>]}}
@@ -26,7 +26,7 @@ defmodule Sim.Floorplan.Pgm do
           {:error, "#{width} x #{height} pixels are too many"}
 
         most > 255 ->
-          {:error, "more than 255 greys are not read, save it with 8 bits"}
+          {:error, "more than 255 greys are not supported; save it with 8 bits"}
 
         true ->
           pixels(kind, bytes, width, height, most)
@@ -81,7 +81,7 @@ defmodule Sim.Floorplan.Pgm do
   defp number(<<digit, _::binary>> = bytes) when digit in ?0..?9, do: digits(bytes, 0)
   defp number(_other), do: :error
 
-  # No number of ours has more than nine digits.
+  # No valid number has more than nine digits.
   defp digits(<<digit, rest::binary>>, number) when digit in ?0..?9 and number < 100_000_000,
     do: digits(rest, 10 * number + digit - ?0)
 

@@ -3,12 +3,12 @@ defmodule Sim.Floorplan.Png do
   Reads PNG pictures as walls: grey of 1, 2, 4 or 8 bits, grey with alpha, RGB, RGBA of 8 bits a channel, and
   palettes; not interlaced. What is transparent is white. Pure.
   """
-  @typedoc "Rows from the top, one byte a pixel, 1 is wall."
+  @typedoc "Rows from the top, one byte per pixel, 1 is wall."
   @type picture :: {width :: pos_integer(), height :: pos_integer(), rows :: [binary()]}
 
   @damaged {:error, "the picture is damaged"}
 
-  @doc "The picture in the chunks that follow the signature, of at most `most` pixels."
+  @doc "Reads the picture in the chunks after the signature; it may have at most `most` pixels."
   @spec decode(binary(), pos_integer()) :: {:ok, picture()} | {:error, String.t()}
   def decode(chunks, most) do
     with {:ok, [{"IHDR", header} | chunks]} <- chunks(chunks, []),
@@ -39,14 +39,14 @@ defmodule Sim.Floorplan.Png do
 
   defp chunks(_cut_short, _seen), do: @damaged
 
-  # Channels of each colour type.
+  # The number of channels of each colour type.
   @channels %{0 => 1, 2 => 3, 3 => 1, 4 => 2, 6 => 4}
 
   defp header(<<width::32, height::32, depth, type, 0, 0, interlace>>, most)
        when is_map_key(@channels, type) and width > 0 and height > 0 do
     cond do
-      interlace != 0 -> {:error, "interlaced PNGs are not read, save it without interlacing"}
-      depth == 16 -> {:error, "16 bits a channel are not read, save it with 8"}
+      interlace != 0 -> {:error, "interlaced PNGs are not supported; save it without interlacing"}
+      depth == 16 -> {:error, "16 bits per channel are not supported; save it with 8"}
       depth not in [1, 2, 4, 8] or (depth < 8 and type not in [0, 3]) -> @damaged
       width * height > most -> {:error, "#{width} x #{height} pixels are too many"}
       true -> {:ok, {width, height, depth, type}}
@@ -58,7 +58,7 @@ defmodule Sim.Floorplan.Png do
   defp stride({width, _height, depth, type}), do: div(width * depth * @channels[type] + 7, 8)
   defp size({_, height, _, _} = header), do: height * (stride(header) + 1)
 
-  # Never more than the header says, whatever the data would unpack to.
+  # Never more than the header says, however much the data would unpack to.
   defp inflate(data, size) do
     z = :zlib.open()
     :ok = :zlib.inflateInit(z)
@@ -79,7 +79,7 @@ defmodule Sim.Floorplan.Png do
     cond do
       left <= 0 -> {:ok, done |> IO.iodata_to_binary()}
       state == :finished -> @damaged
-      # Data that ends too early gives nothing more, for ever.
+      # Data that ends too early would return nothing for ever.
       output == [] -> @damaged
       true -> inflate(z, :zlib.safeInflate(z, []), done, left)
     end
@@ -116,7 +116,7 @@ defmodule Sim.Floorplan.Png do
   defp unfilter(2, row, above, _pixel),
     do: Enum.zip_with(row, above, fn x, b -> rem(x + b, 256) end)
 
-  # What is left of a byte is what was done `pixel` bytes before it; before the row there is 0.
+  # The byte to the left is the one decoded `pixel` bytes before; before the row there is 0.
   defp unfilter(filter, row, above, pixel) do
     before = List.duplicate(0, pixel)
     done = filter(filter, row, above, before ++ above, before, pixel)
@@ -149,7 +149,7 @@ defmodule Sim.Floorplan.Png do
     end
   end
 
-  # An unknown filter is left as it is; the picture will look wrong, not crash.
+  # An unknown filter is ignored: the picture will look wrong, but nothing crashes.
   defp guess(_unknown, _a, _b, _c), do: 0
 
   for depth <- [1, 2, 4, 8, 16] do
@@ -177,14 +177,14 @@ defmodule Sim.Floorplan.Png do
       6 ->
         for <<rgb::binary-size(3), alpha <- bytes>>, into: <<>>, do: wall(dark(rgb, alpha))
     end
-    # The last byte of a row may hold more pixels than there are.
+    # The last byte of a row may hold more pixels than the row has.
     |> binary_part(0, width)
   end
 
   defp wall(true), do: <<1>>
   defp wall(false), do: <<0>>
 
-  # Darker than half over white.
+  # Darker than half on a white background.
   defp dark(<<r, g, b>>, alpha),
     do: 255 * 1000 * 255 - alpha * (255_000 - (299 * r + 587 * g + 114 * b)) < 128_000 * 255
 end

@@ -2,8 +2,9 @@ defmodule Sim.Floorplan.Starts do
   @moduledoc """
   The start poses of a fleet: spread over the free area of a map, from a seed. Pure.
 
-  Each robot has a straight free way to the landmark or to one placed before it, so that nobody is shut
-  in another room of a strange map. The middle of the room is tried first, then all of it.
+  Each robot has a straight free way to the landmark or to a robot placed before it, so that no
+  robot starts in a closed room of an unknown map. The middle of the room is tried first, then all
+  of it.
   """
   alias Hal.Pose
   alias Sim.Floorplan.Clearance
@@ -12,7 +13,7 @@ defmodule Sim.Floorplan.Starts do
   @between 1.0
   @from_wall 0.7
   @from_landmark 1.2
-  # Half the width of a free way, and how far apart its points are tested.
+  # Half the width of a free way, and the distance between tested points.
   @way 0.4
   @stride 0.2
   @tries 2_000
@@ -55,7 +56,7 @@ defmodule Sim.Floorplan.Starts do
     do: Enum.find_value(1..@tries, &pose(&1, area, index, map, seed, landmark, poses))
 
   defp pose(attempt, {left, low, right, high}, index, map, seed, landmark, poses) do
-    # One seed, but other places in a map of another shape.
+    # The same seed gives other places in a map of another shape.
     shape = 16 * (map.width - map.height)
     draw = fn use -> Noise.unit(Noise.hash(seed, 0x57A27 + index, attempt - 1, shape + use)) end
     place = {left + draw.(0) * (right - left), low + draw.(1) * (high - low)}
@@ -82,6 +83,6 @@ defmodule Sim.Floorplan.Starts do
     end)
   end
 
-  # A landmark may stand closer to a wall than a robot.
+  # A landmark may stand closer to a wall than a robot may.
   defp wide(map, b), do: min(@way, Clearance.of(map, b, @way))
 end

@@ -5,9 +5,8 @@ defmodule Sim.Node.Config do
   defstruct @enforce_keys
 
   @typedoc """
-  `launcher` is the process that hears of everything, `mesh` are the options of
-  `Mesh.Options`, `part` is a
-  `Sim.Node` with its options.
+  `launcher` is the process that gets all reports, `mesh` are the options of `Mesh.Options`,
+  `part` is a `Sim.Node` with its options.
   """
   @type t :: %__MODULE__{
           node: node(),
@@ -17,29 +16,30 @@ defmodule Sim.Node.Config do
         }
 
   @doc """
-  A config as one line.
+  Encodes a config as one line.
 
       iex> config = %Sim.Node.Config{node: :a@b, launcher: self(), mesh: [], part: {Some.Part, %{}}}
       iex> config |> Sim.Node.Config.line() |> Sim.Node.Config.read()
       {:ok, config}
       iex> Sim.Node.Config.read("junk")
-      {:error, "this is started by a fleet of nodes, which tells it what to be"}
+      {:error, "only a fleet of nodes starts this process, and it sends the configuration"}
   """
   @spec line(t()) :: String.t()
   def line(%__MODULE__{} = config),
     do: (config |> :erlang.term_to_binary([:compressed]) |> Base.encode64()) <> "\n"
 
-  @doc "Back; what comes here is from the process that started this one, and trusted."
+  @doc "Decodes a config. The line comes from the process that started this one, and is trusted."
   @spec read(String.t() | term()) :: {:ok, t()} | {:error, line :: String.t()}
   def read(line) do
     with true <- is_binary(line),
          {:ok, bytes} <- Base.decode64(String.trim(line)),
-         # A version, and not another byte: so is every term.
+         # Every encoded term begins with the version byte.
          <<131, _rest::binary>> <- bytes,
          %__MODULE__{} = config <- :erlang.binary_to_term(bytes) do
       {:ok, config}
     else
-      _no_config -> {:error, "this is started by a fleet of nodes, which tells it what to be"}
+      _no_config ->
+        {:error, "only a fleet of nodes starts this process, and it sends the configuration"}
     end
   end
 end

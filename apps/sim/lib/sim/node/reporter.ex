@@ -4,19 +4,19 @@ defmodule Sim.Node.Reporter do
   robot of this node. If the launcher cannot be reached at once, the report is dropped: the next
   one is newer.
 
-  What it sends are messages `{Sim.Node.Reporter, pid, what}`, with the number of this process of the
-  operating system: `{:up, facts}`, `{:report, term}`, `{:stage, about}`.
+  It sends messages `{Sim.Node.Reporter, pid, what}` with the number of this process of the
+  operating system, where `what` is `{:up, facts}`, `{:report, term}` or `{:stage, about}`.
   """
   use GenServer
   alias Hal.{Event, Ticker}
 
   @period_ms 100
 
-  @doc "Starts it; `report` is `{m, f, a}`, called each time."
+  @doc "Starts the reporter; `report` is `{m, f, a}`, called for each report."
   @spec start_link(pid(), {module(), atom(), list()}) :: GenServer.on_start()
   def start_link(launcher, report), do: GenServer.start_link(__MODULE__, {launcher, report})
 
-  @doc "Tells the launcher something once; again and again until there is a way to it."
+  @doc "Sends the launcher something once, and retries until the launcher can be reached."
   @spec tell(pid(), term()) :: :ok
   def tell(reporter, what), do: GenServer.cast(reporter, {:tell, what})
 
@@ -42,13 +42,13 @@ defmodule Sim.Node.Reporter do
     {:noreply, schedule(s)}
   end
 
-  # In their order: a stage before the one that follows it.
+  # In order: a stage before the one that follows it.
   defp deliver(%{waiting: []} = s), do: s
 
   defp deliver(%{waiting: [first | rest]} = s) do
     case post(s, first) do
       :ok -> deliver(%{s | waiting: rest})
-      # A run has a dozen stages; more than so many is a launcher that is gone.
+      # A run has a dozen stages; if more than this wait, the launcher is gone.
       _not_now -> %{s | waiting: Enum.take(s.waiting, -100)}
     end
   end

@@ -8,8 +8,8 @@ defmodule Sim.Node.Robot do
       |-- Sim.Fleet.Hardware  emulated devices, if it has the real drivers
       `-- Robot.Fleet    the robot
 
-  Options: `robot` as of `Sim.Trial.Setup`, `world`, `blobs`, `mission`, `folder` as of `Sim.Fleet.Robot`, `loss`
-  and `seed` of the radio.
+  Options: `robot` as in `Sim.Trial.Setup`, `world`, `blobs`, `mission`, `folder` as in
+  `Sim.Fleet.Robot`, `loss` and `seed` of the radio.
   """
   @behaviour Sim.Node
   alias Sim.Fleet.{Hardware, RadioServer, Robot}
@@ -44,7 +44,7 @@ defmodule Sim.Node.Robot do
   @impl Sim.Node
   def begin(options), do: Robot.begin(options.robot.id)
 
-  @doc "What the robot claims of itself, and how many messages it sent."
+  @doc "What the robot claims about itself, and how many messages it sent."
   @spec report(atom(), pid() | RadioServer.counter()) :: {map(), map()}
   def report(id, air), do: {Robot.claim(id), RadioServer.counts(air)}
 end

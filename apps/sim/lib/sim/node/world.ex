@@ -1,7 +1,8 @@
 defmodule Sim.Node.World do
   @moduledoc """
-  The world as the part of a node: `Sim.World.Server`, found by its name on all nodes (`Sim.World.Directory`). What it
-  reports is a snapshot, from which it can be started again. Options: `name`, `world`.
+  The world as the part of a node: `Sim.World.Server`, found by its name on all nodes
+  (`Sim.World.Directory`). It reports snapshots, from which it can be started again. Options:
+  `name`, `world`.
   """
   @behaviour Sim.Node
   alias Sim.World
@@ -27,7 +28,7 @@ defmodule Sim.Node.World do
   @impl Sim.Node
   def begin(_options), do: :ok
 
-  @doc "The world as it is, without what never changes."
+  @doc "The current world without the parts that never change."
   @spec report(pid()) :: Snapshot.t()
   def report(server), do: server |> World.Server.world() |> Snapshot.of()
 end

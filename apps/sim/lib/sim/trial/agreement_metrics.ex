@@ -1,18 +1,20 @@
 defmodule Sim.Trial.AgreementMetrics do
   @moduledoc """
   Measures from outside how well a fleet agrees, for each part of a partitioned radio: how long a
-  part has two leaders; after a partition heals, when one robot leads all, when they are in
+  part has two leaders; after a partition heals, when one robot leads all, when the fleet is in
   formation, and how long robots stood still for that. Pure; fed every 100 ms.
 
-  A part is where everybody can reach everybody, if need be by way of others (`Sim.Radio.parts/2`).
+  A part is a set of robots that can reach each other, if necessary by way of others
+  (`Sim.Radio.parts/2`).
   """
 
   defstruct rivals_ms: nil, rivals_worst_ms: 0, parts: nil, heals: []
 
   @typedoc """
-  One time that parts became fewer: when, how many robots led then, in milliseconds from there until
-  one led all and until the fleet was in formation, and for how long somebody stood still, from the
-  first that stood to the last that went on; `nil` where that has not come yet.
+  One reduction of the number of parts: when it happened, how many robots led then, the
+  milliseconds from then until one led all and until the fleet was in formation, and how long any
+  robot stood still, from the first that stopped to the last that went on; `nil` for what has not
+  happened yet.
   """
   @type heal :: %{
           at_ms: integer(),
@@ -23,7 +25,9 @@ defmodule Sim.Trial.AgreementMetrics do
           stands_ms: integer() | nil
         }
 
-  @typedoc "Since `rivals_ms` some part has more than one leader; `heals` has the newest first."
+  @typedoc """
+  Some part has had more than one leader since `rivals_ms`; `heals` has the newest first.
+  """
   @type t :: %__MODULE__{
           rivals_ms: integer() | nil,
           rivals_worst_ms: non_neg_integer(),
@@ -32,7 +36,8 @@ defmodule Sim.Trial.AgreementMetrics do
         }
 
   @doc """
-  One tick: what the living claim, the parts they are in, and who stands because the mission says so.
+  One tick: the claims of the living robots, the parts they are in, and the robots that stand
+  because the mission says so.
   """
   @spec note(t(), integer(), [{atom(), map()}], [[atom()]], [atom()]) :: t()
   def note(accord, at_ms, claims, parts, standing) do
@@ -102,7 +107,7 @@ defmodule Sim.Trial.AgreementMetrics do
     %{accord | heals: [stand(heal, at_ms, standing) | older]}
   end
 
-  # The first time that somebody stands after the mending, until nobody does.
+  # From the first time that a robot stands after the parts were joined until none does.
   defp stand(%{stood_ms: nil, stands_ms: nil} = heal, _at_ms, []), do: heal
   defp stand(%{stood_ms: nil, stands_ms: nil} = heal, at_ms, _), do: %{heal | stands_ms: at_ms}
   defp stand(%{stood_ms: nil} = heal, at_ms, []), do: %{heal | stood_ms: at_ms - heal.stands_ms}

@@ -3,20 +3,21 @@ defmodule Sim.Trial.Claims do
   Judges each claim of `formed` from outside, by true poses: how far the worst robot was from its
   slot when the leader claimed it, and 5 s later. Pure; fed every 100 ms.
 
-  A claim is one leader's, from when it says `formed` until it says so no more. One that was withdrawn
-  within the 5 s, as when the landmark moves, is judged by its beginning alone; so is one that a run
-  ends in. A leader whom nobody follows claims nothing about others: there is no error to judge.
+  A claim belongs to one leader, and lasts from when it says `formed` until it no longer does. A
+  claim that is withdrawn within the 5 s, for example because the landmark moves, is judged by its
+  beginning alone; so is one during which the run ends. A leader that nobody follows claims
+  nothing about others, so there is no error to judge.
   """
 
   @later_ms 5_000
-  # Half a metre is about one robot's width beside the place.
+  # Half a metre is about the width of a robot.
   @right_m 0.5
 
   defstruct standing: %{}, told: []
 
   @typedoc """
-  One claim: when, whose, the worst true error in metres then and 5 s later; `nil` where there was none to
-  judge.
+  One claim: when, of which leader, the worst true error in metres then and 5 s later; `nil` if
+  there was none to judge.
   """
   @type claim :: %{
           at_s: float(),
@@ -26,21 +27,21 @@ defmodule Sim.Trial.Claims do
         }
 
   @typedoc """
-  `standing` are the claims that may still be judged 5 s on, by leader; `:judged` once that is done.
-  `told` are the others, in no order.
+  `standing` are the claims that may still be judged after 5 s, by leader; `:judged` once that is
+  done. `told` are the others, unordered.
   """
   @type t :: %__MODULE__{
           standing: %{atom() => {since_ms :: integer() | :judged, claim()}},
           told: [claim()]
         }
 
-  @doc "How far off the worst robot may be where `formed` is true, in metres."
+  @doc "The greatest error of the worst robot, in metres, with which `formed` is true."
   @spec right_m() :: float()
   def right_m, do: @right_m
 
   @doc """
-  One tick: the leaders that claim `formed` now, and the worst true error of a leader's shape, in metres,
-  by a function of the leader, which is asked only when a claim is to be judged.
+  One tick: the leaders that claim `formed` now, and a function from a leader to the worst true
+  error of its shape, in metres, which is called only when a claim has to be judged.
   """
   @spec note(t(), integer(), [atom()], (atom() -> float() | nil)) :: t()
   def note(claims, at_ms, leaders, worst) do
@@ -58,8 +59,8 @@ defmodule Sim.Trial.Claims do
   end
 
   @doc """
-  All claims up to now, the oldest first. A run ends 5 s after its last claim, between two ticks: what is
-  due then is judged here.
+  All claims up to now, the oldest first. A run ends 5 s after its last claim, between two ticks,
+  so claims that are due then are judged here.
   """
   @spec report(t(), integer(), (atom() -> float() | nil)) :: [claim()]
   def report(claims, at_ms, worst) do
@@ -72,8 +73,8 @@ defmodule Sim.Trial.Claims do
   end
 
   @doc """
-  Whether a claim was true: at most half a metre off when it was made, and 5 s later. `nil` where nobody
-  followed.
+  Whether a claim was true: the error was at most half a metre when it was made, and 5 s later.
+  `nil` if nobody followed.
 
       iex> Sim.Trial.Claims.right?(%{worst_m: 0.2, worst_5s_m: 0.6})
       false
@@ -90,7 +91,7 @@ defmodule Sim.Trial.Claims do
   def right?(%{worst_m: then, worst_5s_m: later}),
     do: Enum.all?([then, later], &(&1 == nil or &1 <= @right_m))
 
-  # The first time that 5 s have passed.
+  # The first tick after 5 s have passed.
   defp later({since, claim}, at_ms, id, worst)
        when is_integer(since) and at_ms - since >= @later_ms,
        do: {:judged, %{claim | worst_5s_m: worst.(id)}}

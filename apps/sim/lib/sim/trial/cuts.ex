@@ -4,18 +4,18 @@ defmodule Sim.Trial.Cuts do
 
   | what | cuts |
   |---|---|
-  | `[[:mag1, :mag2], [:mag3]]` | all links between robots of different groups; who is in none is alone |
+  | `[[:mag1, :mag2], [:mag3]]` | all links between robots of different groups; a robot in no group is alone |
   | `{:link, :mag1, :mag2}` | one link |
-  | `{:way, :mag1, :mag2}` | one way of a link: the second does not hear the first |
+  | `{:way, :mag1, :mag2}` | one direction of a link: the second does not hear the first |
 
-  `to_s` may be `:end`. Several may hold at once.
+  `to_s` may be `:end`. Several cuts may apply at once.
   """
 
   @type what :: [[atom()]] | {:link | :way, atom(), atom()}
   @type cut :: {from_s :: number(), to_s :: number() | :end, what()}
 
   @doc """
-  Whether it is a list of cuts among these robots.
+  Whether a term is a list of cuts among these robots.
 
       iex> Sim.Trial.Cuts.valid?([{5, 9.5, {:link, :mag1, :mag2}}], [:mag1, :mag2])
       true
@@ -42,7 +42,7 @@ defmodule Sim.Trial.Cuts do
   defp what?(_other, _robots), do: false
 
   @doc """
-  The ways that are cut at a time, as `{from, to}`.
+  The directions that are cut at a time, as `{from, to}`.
 
       iex> Sim.Trial.Cuts.ways([{1, 2, [[:mag1], [:mag2]]}], [:mag1, :mag2], 1_500)
       [mag1: :mag2, mag2: :mag1]

@@ -9,7 +9,7 @@ defmodule Sim.Trial.Evaluation do
   alias Swarm.Formation
   alias Swarm.Formation.Reference
 
-  @typedoc "A run at one instant; `claims` are those of the living."
+  @typedoc "A run at one moment; `claims` are those of the living robots."
   @type run :: %{
           at_ms: non_neg_integer(),
           options: map(),
@@ -19,7 +19,7 @@ defmodule Sim.Trial.Evaluation do
           messages: %{sent: non_neg_integer(), lost: non_neg_integer()}
         }
 
-  @doc "What a viewer sees."
+  @doc "The scene for viewers."
   @spec scene(run()) :: Scene.t()
   def scene(run) do
     leader = RunLog.leader(run.run_log)
@@ -57,7 +57,7 @@ defmodule Sim.Trial.Evaluation do
     }
   end
 
-  @doc "The report of a run, but for its wall time; keys as in the report."
+  @doc "The report of a run, without its wall time; keys as in the report."
   @spec result(run()) :: map()
   def result(run) do
     scene = scene(run)
@@ -95,7 +95,10 @@ defmodule Sim.Trial.Evaluation do
     }
   end
 
-  @doc "How far the worst living robot of a leader's shape is from its slot, in metres; `nil` where it leads nobody."
+  @doc """
+  How far the worst living robot of a leader's shape is from its slot, in metres; `nil` if it
+  leads nobody.
+  """
   @spec worst(run(), leader :: atom()) :: float() | nil
   def worst(run, leader) do
     errors =
@@ -106,7 +109,7 @@ defmodule Sim.Trial.Evaluation do
     Enum.max(errors, fn -> nil end)
   end
 
-  @doc "The living followers of whom `Sim.Trial.Stuck` judges whether they get on."
+  @doc "The living followers whose progress `Sim.Trial.Stuck` judges."
   @spec followers(run()) :: [Stuck.row()]
   def followers(run) do
     leader = RunLog.leader(run.run_log)
@@ -154,7 +157,7 @@ defmodule Sim.Trial.Evaluation do
     end
   end
 
-  # The slots as the leader means them, hung from where it really stands.
+  # The slots as the leader intends them, relative to its true pose.
   defp true_slots(%Reference{trail: nil} = anchor, pose, distance) do
     slots = anchor.formation |> Formation.slots(anchor.size, distance) |> List.to_tuple()
     for place <- anchor.places, do: {place, Pose.compose(pose, elem(slots, place - 1))}

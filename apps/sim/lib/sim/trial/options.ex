@@ -1,5 +1,5 @@
 defmodule Sim.Trial.Options do
-  @moduledoc "What a run may be asked for, with its defaults, checked. Pure."
+  @moduledoc "The checked options of a run, with their defaults. Pure."
   alias Hal.Options
   alias Hal.Options.Type
   alias Missions.Landmark
@@ -34,12 +34,13 @@ defmodule Sim.Trial.Options do
       default: []
     ]
   ]
-  # Those of the mission, less what the robots know themselves.
+  # The options of the mission, without those that the robots know themselves.
   @mission [formation: {:column, 1.0}, assign: :cost, leader_change: true, policy: :available] ++
              [of: nil, lost_link: nil]
 
   @doc """
-  All options, with the defaults where nothing was asked for; or one line that names what is wrong.
+  All options, with defaults for those that are not given; the error is one line that names what
+  is wrong.
 
       iex> {:ok, options} = Sim.Trial.Options.check(robots: [:mag1], formation: :wedge)
       iex> {options.robots, options.formation, options.map}

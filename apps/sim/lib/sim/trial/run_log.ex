@@ -29,8 +29,9 @@ defmodule Sim.Trial.RunLog do
         }
 
   @typedoc """
-  `stages` has the newest first; `leaders_at_once_max` counts those of one part of the radio; `formed_ms` and `rest_ms` say since when the fleet is in formation, or
-  at rest without a landmark, `ticks` and `formed_ticks` count those since the first election.
+  `stages` has the newest first; `leaders_at_once_max` counts leaders in the same part of the
+  radio; `formed_ms` and `rest_ms` say since when the fleet has been in formation, or at rest
+  without a landmark; `ticks` and `formed_ticks` count from the first election.
   """
   @type t :: %__MODULE__{
           stages: [stage()],
@@ -52,7 +53,7 @@ defmodule Sim.Trial.RunLog do
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
-  @doc "Writes a stage; a search that others have begun already is not a new one."
+  @doc "Records a stage; a search that others have already begun is not a new one."
   @spec stage(t(), integer(), atom(), atom() | nil, map()) :: t()
   def stage(%{searching?: true} = run_log, _at_ms, :search, _robot, _facts), do: run_log
 
@@ -69,8 +70,8 @@ defmodule Sim.Trial.RunLog do
   end
 
   @doc """
-  One tick of claims, in a radio that is divided into these parts (`nil` for one that is whole), and who
-  stands still.
+  One tick of claims, the parts that the radio is divided into (`nil` if it is whole), and which
+  robots stand still.
   """
   @spec note(t(), integer(), [{atom(), map()}], [[atom()]] | nil, [atom()]) :: t()
   def note(run_log, at_ms, claims, parts \\ nil, standing \\ []) do
@@ -97,8 +98,8 @@ defmodule Sim.Trial.RunLog do
   end
 
   @doc """
-  The same tick judged by true poses (`Sim.Trial.Claims`): `worst` says of a leader how far the worst robot
-  of its shape is from its slot, in metres.
+  The same tick judged by true poses (`Sim.Trial.Claims`): `worst` returns for a leader how far
+  the worst robot of its shape is from its slot, in metres.
   """
   @spec judge(t(), integer(), [{atom(), map()}], (atom() -> float() | nil)) :: t()
   def judge(run_log, at_ms, claims, worst) do
@@ -106,11 +107,11 @@ defmodule Sim.Trial.RunLog do
     %{run_log | claims: Claims.note(run_log.claims, at_ms, leaders, worst)}
   end
 
-  @doc "The same tick of the invariant of `Sim.Trial.Stuck`; `rows` is asked once a second."
+  @doc "The same tick for the invariant of `Sim.Trial.Stuck`; `rows` is called once a second."
   @spec watch(t(), integer(), (... -> [Stuck.row()])) :: t()
   def watch(run_log, at_ms, rows), do: %{run_log | stuck: Stuck.note(run_log.stuck, at_ms, rows)}
 
-  @doc "Who leads now: of several the one of the highest epoch."
+  @doc "The leader now; among several, the one of the highest epoch."
   @spec leader(t()) :: atom() | nil
   def leader(run_log), do: run_log.leader
 
@@ -131,7 +132,7 @@ defmodule Sim.Trial.RunLog do
   def share_formed(%{ticks: 0}), do: 0.0
   def share_formed(run_log), do: run_log.formed_ticks / run_log.ticks
 
-  # In one part: parts that cannot reach each other each have their own.
+  # Within one part: parts that cannot reach each other each have their own leader.
   defp at_once(leaders, parts) do
     parts
     |> Enum.map(fn part -> Enum.count(leaders, fn {id, _claim} -> id in part end) end)

@@ -20,17 +20,17 @@ defmodule Sim.Trial.Scenario do
     %__MODULE__{pending: Enum.sort(events)}
   end
 
-  @doc "The same with one more move."
+  @doc "Adds a move."
   @spec add_move(t(), Hal.Pose.point(), integer()) :: t()
   def add_move(script, place, at_ms), do: add(script, {at_ms, {:move, place}})
 
-  @doc "The same with one more kill."
+  @doc "Adds a kill."
   @spec add_kill(t(), atom(), integer()) :: t()
   def add_kill(script, who, at_ms), do: add(script, {at_ms, {:kill, who}})
 
   defp add(script, event), do: %{script | pending: Enum.sort([event | script.pending])}
 
-  @doc "What is due. Killing the leader waits until there is one."
+  @doc "The interventions that are due. Killing the leader waits until there is one."
   @spec due(t(), integer(), leader :: atom() | nil) ::
           {[{:move, Hal.Pose.point()} | {:kill, atom()}], t()}
   def due(script, now_ms, leader) do
@@ -44,11 +44,11 @@ defmodule Sim.Trial.Scenario do
     {events, %{script | pending: pending, last_ms: last_ms}}
   end
 
-  @doc "Whether nothing more is to come, and the landmark stands."
+  @doc "Whether no interventions are left, and the landmark stands still."
   @spec over?(t(), Sim.World.t()) :: boolean()
   def over?(script, world), do: script.pending == [] and world.goal == nil
 
-  @doc "When the last thing was done."
+  @doc "When the last intervention happened."
   @spec last_ms(t()) :: integer()
   def last_ms(script), do: script.last_ms
 

@@ -10,7 +10,10 @@ defmodule Sim.Trial.Setup do
   @enforce_keys [:options, :map, :world, :robots, :mission]
   defstruct @enforce_keys
 
-  @typedoc "`start` is where a robot's wheels begin to count; `hardware?`, whether it is to have the real drivers."
+  @typedoc """
+  `start` is the pose where a robot's wheels begin to count; `hardware?` says whether it uses the
+  real drivers.
+  """
   @type robot :: %{id: atom(), profile: Profile.t(), start: Pose.t(), hardware?: boolean()}
   @type t :: %__MODULE__{
           options: map(),
@@ -46,7 +49,7 @@ defmodule Sim.Trial.Setup do
     end
   end
 
-  @doc "Whether the landmark can stand at all these places (`nil`: nowhere)."
+  @doc "Checks that the landmark can stand at all these places (`nil`: no landmark)."
   @spec check_landmarks(Sim.Floorplan.t(), [Pose.point() | nil]) :: :ok | {:error, String.t()}
   def check_landmarks(map, places) do
     Enum.find_value(places, :ok, fn place ->
@@ -57,7 +60,10 @@ defmodule Sim.Trial.Setup do
     end)
   end
 
-  @doc "The profile of a robot by its name, as in the thesis: `mag1` is a Magellan Pro, `min1` an ATRV mini."
+  @doc """
+  The profile of a robot from its name, as in the thesis: `mag1` is a Magellan Pro, `min1` an ATRV
+  mini.
+  """
   @spec profile(atom()) :: Profile.t()
   def profile(id) do
     case Atom.to_string(id) do
@@ -102,8 +108,8 @@ defmodule Sim.Trial.Setup do
     %__MODULE__{options: options, map: map, world: world, robots: robots, mission: mission}
   end
 
-  # R66: all are switched on at the first one's place, and then driven to theirs by hand; their
-  # wheels count that way too, with their errors.
+  # R66: all robots are switched on at the first one's place, and then driven by hand to their
+  # own; their wheels count that distance too, with their errors.
   defp common_start(%{start: :same}, [{_id, pose} | _rest]), do: pose
   defp common_start(_options, _robots), do: nil
 

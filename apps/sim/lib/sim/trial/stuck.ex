@@ -1,10 +1,11 @@
 defmodule Sim.Trial.Stuck do
   @moduledoc """
-  Checks the invariant of every run that a follower that makes no progress says so, from outside,
-  by true poses. Pure; fed once a second.
+  Checks an invariant of every run from outside, by true poses: a follower that makes no progress
+  says so. Pure; fed once a second.
 
-  A follower that neither claims to be in place, nor says that it is blocked, nor that it stands in its slot as far as
-  it knows and is not sure of it, must have come nearer to its slot within 20 s. The time begins again when its slot is another one, or the shape is.
+  A follower that claims neither to be in place, nor to be blocked, nor to be unsure of its place
+  must have come nearer to its slot within 20 s. The time starts again when the slot or the shape
+  changes.
   """
 
   @silent_ms 20_000
@@ -22,11 +23,14 @@ defmodule Sim.Trial.Stuck do
           slot: Hal.Pose.t(),
           shape: term()
         }
-  @typedoc "A robot that stood short of its slot without a word: since when, whose, how far off in metres."
+  @typedoc """
+  A robot that stood short of its slot without reporting it: since when, which robot, how far off
+  in metres.
+  """
   @type silence :: %{at_s: float(), robot: atom(), error_m: float()}
   @type t :: %__MODULE__{next_ms: integer(), open: map(), told: [silence()]}
 
-  @doc "One tick; `rows` is asked only when a second has passed."
+  @doc "One tick; `rows` is called only if a second has passed."
   @spec note(t(), integer(), (... -> [row()])) :: t()
   def note(%{next_ms: next_ms} = stuck, at_ms, _rows) when at_ms < next_ms, do: stuck
 
@@ -42,7 +46,7 @@ defmodule Sim.Trial.Stuck do
     %{stuck | next_ms: at_ms + @every_ms, open: open, told: told}
   end
 
-  @doc "All silences up to now, the oldest first; a good run has none."
+  @doc "All violations up to now, the oldest first; a good run has none."
   @spec report(t()) :: [silence()]
   def report(stuck), do: Enum.reverse(stuck.told)
 

@@ -5,8 +5,8 @@ defmodule Sim.Trial.Termination do
   @calm_ms 5_000
 
   @doc """
-  Whether its time is up, or nothing is to come and the fleet has been in formation, or at rest without
-  a landmark, for 5 s.
+  Whether the time of a run is up, or no interventions are left and the fleet has been in
+  formation, or at rest without a landmark, for 5 s.
   """
   @spec reached?(%{
           :at_ms => non_neg_integer(),

@@ -10,7 +10,8 @@ defmodule Sim.World.Blobs do
   @least_area 20
 
   @doc """
-  The blobs a camera sees of these poles, in the order of the blob finder. `noise` is `{seed, robot, step}`, or `nil` for none.
+  The blobs of these poles in a camera's picture, in the order of the blob finder. `noise` is
+  `{seed, robot, step}`, or `nil` for none.
   """
   @spec see(
           Sim.Floorplan.t(),
@@ -31,7 +32,7 @@ defmodule Sim.World.Blobs do
     |> Enum.sort_by(&{&1.colour != "YellowLandmark", -&1.area, &1.left, &1.top})
   end
 
-  # Pieces that touch from column to column, or in one column, are one region.
+  # Parts that touch from column to column, or in one column, are one region.
   defp regions(columns) do
     {open, closed, _last} =
       Enum.reduce(columns, {[], [], nil}, fn [{column, _, _, _, _} | _] = pieces,

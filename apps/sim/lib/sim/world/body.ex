@@ -6,15 +6,16 @@ defmodule Sim.World.Body do
   0.1 s; poses are integrated with the mean heading of a step. A body that is stopped by a wall
   or another body stalls its wheels: they do not slip.
 
-  Odometry errs as told by `noise`: `:default` draws for each robot a scale error and a turn
-  error of 0.3 %, of either sign, and adds 1e-6 m2 of variance a metre to each wheel; `:slip` adds
-  what skid-steered bases do (R74): a turn to the left goes 5.5 % further than the wheels say, a
-  turn to the right 5.5 % less far, and each turn by a further 1.7 % of its own (1.5 degrees in 90).
+  Odometry has errors according to `noise`: `:default` draws for each robot a scale error and a
+  turn error of 0.3 %, of either sign, and adds 1e-6 m2 of variance per metre to each wheel;
+  `:slip` adds the behaviour of skid-steered bases (R74): a turn to the left goes 5.5 % further
+  than the wheels say, a turn to the right 5.5 % less far, and each turn has a random error of 1.7
+  % more (1.5 degrees in 90).
 
-  Besides, a body may have wheels that its odometry is wrong about, whatever the noise: `wheels` with
-  `distance` (true metres for each one counted), `base` (how much wider the wheels stand than the profile
-  says) and `ratio` (true way of the right wheel for one of the left one, where odometry counts the same);
-  each 1.0 unless given. That is what calibration finds.
+  In addition a body may have wheels that differ from what its odometry assumes, whatever the
+  noise: `wheels` with `distance` (true metres per counted metre), `base` (true wheel base
+  relative to the profile's) and `ratio` (true distance of the right wheel relative to the left
+  one's when odometry counts the same); each 1.0 unless given. Calibration finds these.
   """
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Sim.{Noise, Trig}
@@ -75,7 +76,7 @@ defmodule Sim.World.Body do
           pressed: %{(0..15) => integer()}
         }
 
-  @doc "A body at rest; with `infrared: true` it feels what is near by infrared too."
+  @doc "A body at rest; with `infrared: true` it has infrared sensors, too."
   @spec new(map(), non_neg_integer(), integer(), noise()) :: t()
   def new(
         %{id: id, profile: %Profile{} = profile, pose: %Pose{} = pose} = robot,
@@ -106,7 +107,7 @@ defmodule Sim.World.Body do
     {scale, turn}
   end
 
-  # Each sensor as its place and five directions across its cone.
+  # Each sensor has its place and five directions across its cone.
   defp geometry(poses, cone) do
     for %Pose{x: x, y: y, heading: heading} <- poses, into: <<>> do
       rays =
@@ -119,7 +120,7 @@ defmodule Sim.World.Body do
     end
   end
 
-  @doc "The speed of the next `dt_ms`, before anything stops the body."
+  @doc "The speed for the next `dt_ms`, before anything stops the body."
   @spec accelerate(t(), pos_integer()) :: t()
   def accelerate(%__MODULE__{profile: profile, wanted: wanted} = body, dt_ms) do
     s = dt_ms / 1000
@@ -139,8 +140,8 @@ defmodule Sim.World.Body do
   end
 
   @doc """
-  Where the body would go in `dt_ms`: the way of its centre `{dx, dy}`, the way along its heading
-  and the true turn.
+  The motion of the body in `dt_ms` if nothing stops it: the displacement of its centre
+  `{dx, dy}`, the distance along its heading and the true turn.
   """
   @spec intend(t(), pos_integer(), integer(), noise()) ::
           {t(), {float(), float()}, way :: float(), turn :: float()}
@@ -165,7 +166,8 @@ defmodule Sim.World.Body do
   defp slip(_body, _w, _seed, _noise), do: 1.0
 
   @doc """
-  The body after it went `share` (0 to 1) of its way to `place`. Its odometry sees the wheels.
+  The body after it moved by `share` (0 to 1) of its displacement to `place`. Its odometry
+  measures the wheels.
   """
   @spec arrive(
           t(),
@@ -199,8 +201,8 @@ defmodule Sim.World.Body do
 
   defp measure(%{wheels: @wheels}, way, turn, _key, :off), do: {way, turn}
 
-  # Each wheel goes its true way; what odometry counts is that by the wheel's own factor, and it
-  # reckons with the wheel base that it knows. The factors of unequal wheels have the mean 1.
+  # Each wheel moves its true distance; odometry counts that divided by the wheel's factor, and
+  # assumes the wheel base that it knows. The factors of unequal wheels have the mean 1.
   defp measure(body, way, turn, key, noise) do
     %{distance: distance, base: wider, ratio: ratio} = body.wheels
     base = body.profile.wheel_base * wider
@@ -235,8 +237,8 @@ defmodule Sim.World.Body do
   end
 
   @doc """
-  Presses the bumpers towards these points of contact; a segment stays pressed for 200 ms. One at the
-  border of two segments presses both.
+  Presses the bumpers towards these points of contact; a segment stays pressed for 200 ms. A point
+  at the border of two segments presses both.
   """
   @spec press(t(), [Pose.point()], integer()) :: t()
   def press(%__MODULE__{pressed: pressed} = body, [], _at_ms) when pressed == %{}, do: body
@@ -258,14 +260,14 @@ defmodule Sim.World.Body do
     %{body | pressed: now}
   end
 
-  @doc "What the robot's devices say now."
+  @doc "What the robot's devices report now."
   @spec readings(t(), integer()) :: [Hal.Drive.reading() | Hal.Ptz.reading()]
   def readings(%__MODULE__{} = body, at_ms) do
     [
       {:odometry, %Odometry{pose: body.odometry, twist: body.measured}},
       {:sonar, body.sonar},
       {:bumpers, body.pressed |> Map.keys() |> Enum.sort()},
-      # Two lead batteries that last for three hours.
+      # Two lead-acid batteries that last for three hours.
       {:power, max(22.0, 25.6 - at_ms * 3.0e-7)},
       {:ptz, %{pan: body.pan, tilt: body.tilt, field_of_view: body.field_of_view}}
       | if(body.ir == [], do: [], else: [{:ir, body.ir}])

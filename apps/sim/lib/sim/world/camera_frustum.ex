@@ -1,9 +1,9 @@
 defmodule Sim.World.CameraFrustum do
   @moduledoc """
-  Where a robot's camera is and what its picture can hold. Pure.
+  The place of a robot's camera and what its picture can contain. Pure.
 
-  A pinhole camera over the robot's centre; the horizon moves with the tilt as with a camera whose
-  film is shifted, so that upright edges stay columns. Pixel centres lie at whole numbers.
+  A pinhole camera above the robot's centre. Tilt moves the horizon as if the film were shifted,
+  so that vertical edges stay columns. Pixel centres lie at whole numbers.
   """
   alias Sim.Trig
 

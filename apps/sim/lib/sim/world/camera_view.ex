@@ -10,7 +10,10 @@ defmodule Sim.World.CameraView do
   alias Sim.World
   alias Sim.World.Body
 
-  @typedoc "A world without what only others need; `World.frame/2` and `World.detections/2` of its robot work."
+  @typedoc """
+  A world without what this camera does not need; `World.frame/2` and `World.detections/2` work
+  for its robot.
+  """
   @type ground :: World.t()
 
   @typedoc "Step, time, landmark, poses in the order of the fleet; pan, tilt and field of view of the robot's camera."
@@ -19,14 +22,14 @@ defmodule Sim.World.CameraView do
            [{float(), float(), float()}],
            {pan :: float(), tilt :: float(), field_of_view :: float()}}
 
-  @doc "The ground that the camera of robot `id` stands on."
+  @doc "The static part of the world for the camera of robot `id`."
   @spec ground(World.t(), World.id()) :: ground()
   def ground(%World{} = world, id) do
     robots = Map.new(world.robots, fn {other, body} -> {other, slim(body, other == id)} end)
     %{world | robots: robots, together: MapSet.new()}
   end
 
-  @doc "What moves, for one camera after the other: the poses are those of all."
+  @doc "The poses of all robots, to be reused for each camera."
   @spec poses(World.t()) :: [{float(), float(), float()}]
   def poses(%World{} = world) do
     for id <- world.order, %Pose{x: x, y: y, heading: heading} = World.truth(world, id) do
@@ -34,7 +37,7 @@ defmodule Sim.World.CameraView do
     end
   end
 
-  @doc "What moves, for the camera of robot `id`, with the `poses/1` of all."
+  @doc "The moving part for the camera of robot `id`, with the `poses/1` of all."
   @spec moving(World.t(), [{float(), float(), float()}], World.id()) :: moving()
   def moving(%World{} = world, poses, id) do
     %Body{pan: pan, tilt: tilt, field_of_view: angle} = Map.fetch!(world.robots, id)
@@ -53,7 +56,7 @@ defmodule Sim.World.CameraView do
     %{ground | step: step, at_ms: at_ms, landmark: landmark, robots: robots}
   end
 
-  # Of the others a camera sees the outline only.
+  # A camera sees only the outline of the others.
   defp slim(body, true), do: %{body | sonar: [], geometry: <<>>, ir: [], infrared: <<>>}
 
   defp slim(%{profile: %{radius: radius, height: height}} = body, false),

@@ -1,11 +1,13 @@
 defmodule Sim.World.Contact do
   @moduledoc """
-  Bodies are discs: how far one may go before it touches a wall or another, and who touches whom. Pure.
+  Contacts between bodies, which are discs: how far one may go before it touches a wall or
+  another, and which ones touch. Pure.
   """
   alias Hal.Pose
   alias Sim.Floorplan
 
-  # A move is tested at points no further apart than this, so that nothing thin is jumped.
+  # A move is tested at points no further apart than this, so that it cannot jump over thin
+  # things.
   @stride 0.05
   @halvings 12
   @touch 0.001
@@ -14,8 +16,8 @@ defmodule Sim.World.Contact do
   @type disc :: {x :: float(), y :: float(), radius :: float()}
 
   @doc """
-  The last place on the straight way `{dx, dy}` where the disc still touches nothing, and the share
-  of the way to it. A disc that already overlaps something may only move away from it.
+  The last place on the straight way `{dx, dy}` where the disc still touches nothing, and the
+  share of the way up to there. A disc that already overlaps something may only move away from it.
   """
   @spec move(Floorplan.t(), disc(), {float(), float()}, [disc()]) ::
           {Pose.point(), share :: float()}
@@ -55,7 +57,7 @@ defmodule Sim.World.Contact do
       else: halve(fits?, good, middle, n - 1)
   end
 
-  @doc "The gap between the edges of two discs; negative where they overlap."
+  @doc "The gap between the edges of two discs; negative if they overlap."
   @spec gap(disc(), disc()) :: float()
   def gap({ax, ay, ar}, {bx, by, br}) do
     dx = bx - ax
@@ -69,8 +71,8 @@ defmodule Sim.World.Contact do
   @type pair :: {non_neg_integer(), non_neg_integer() | :wall}
 
   @doc """
-  All pairs whose gap is at most `reach`, the lower number first. Sweeps from left to right, so that bodies
-  far apart along x never meet.
+  All pairs whose gap is at most `reach`, the lower number first. Sweeps from left to right, so
+  that bodies far apart along x are never compared.
 
       iex> Sim.World.Contact.close([{0, {0.0, 0.0, 0.2}}, {1, {1.0, 0.0, 0.3}}, {2, {9.0, 0.0, 0.2}}], 1.0)
       [{0, 1, 0.5}]
@@ -97,13 +99,13 @@ defmodule Sim.World.Contact do
   defp ahead(_rest, _i, _disc, _last, _reach, found), do: found
 
   @doc """
-  Which pairs touch (gap at most 1 mm), which are still together (at most 1 cm), and the least
-  gap of any two of the first `count` discs, or `least` where none is less.
+  Which pairs touch (gap at most 1 mm), which are still in contact (at most 1 cm), and the least
+  gap of any two of the first `count` discs, or `least` if none is less.
   """
   @spec pairs([{non_neg_integer(), disc()}], non_neg_integer(), float() | nil) ::
           {touching :: [pair()], together :: [pair()], least :: float() | nil}
   def pairs(discs, count, least) do
-    # `nil` is greater than any number; all pairs matter until there is a least gap.
+    # `nil` compares greater than any number: all pairs matter until there is a least gap.
     near = close(discs, if(least == nil, do: 1.0e9, else: max(least, @apart)))
 
     Enum.reduce(near, {[], [], least}, fn {i, j, gap}, {touching, together, least} ->

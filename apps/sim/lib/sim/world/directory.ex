@@ -1,23 +1,23 @@
 defmodule Sim.World.Directory do
   @moduledoc """
   The directory of worlds: a `:pg` scope of its own, beside the robots' directory, so that
-  simulated devices find their world by name on any connected node, and a robot need not know what
-  simulates it.
+  simulated devices find their world by name on any connected node, and a robot need not know its
+  simulation.
   """
 
   @doc "The scope as a child."
   @spec child_spec(term()) :: Supervisor.child_spec()
   def child_spec(_options), do: %{id: __MODULE__, start: {:pg, :start_link, [__MODULE__]}}
 
-  @doc "Whether the scope is up on this node."
+  @doc "Whether the scope runs on this node."
   @spec running?() :: boolean()
   def running?, do: Process.whereis(__MODULE__) != nil
 
-  @doc "Enters a world by its name."
+  @doc "Registers a world under its name."
   @spec enter(name :: term(), pid()) :: :ok
   def enter(name, server), do: :pg.join(__MODULE__, name, server)
 
-  @doc "The server of a world, or `nil`; a scope that is down knows none."
+  @doc "The server of a world, or `nil`; always `nil` if the scope is down."
   @spec find(name :: term()) :: pid() | nil
   def find(name), do: __MODULE__ |> :pg.get_members(name) |> List.first()
 end

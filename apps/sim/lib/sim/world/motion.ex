@@ -8,7 +8,8 @@ defmodule Sim.World.Motion do
   @polite 0.5
 
   @doc """
-  The landmark on its way for `dt_ms`, at 0.3 m/s; it waits 0.5 m before a robot, and stops before a wall.
+  Moves the landmark for `dt_ms`, at 0.3 m/s; it waits 0.5 m in front of a robot, and stops in
+  front of a wall.
   """
   @spec glide(Sim.World.t(), pos_integer()) :: Sim.World.t()
   def glide(%{goal: nil} = world, _dt_ms), do: world
@@ -35,8 +36,8 @@ defmodule Sim.World.Motion do
   defp landmark({x, y}), do: {x, y, Bodies.landmark_radius()}
 
   @doc """
-  All robots on their way for `dt_ms`, one after the other: each goes as far as those before it,
-  already moved, and those after it, not yet, let it.
+  Moves all robots for `dt_ms`, one after the other: each goes as far as the others let it, of
+  which those before it have already moved and those after it have not.
   """
   @spec move(Sim.World.t(), pos_integer()) :: Sim.World.t()
   def move(world, dt_ms) do
@@ -68,7 +69,7 @@ defmodule Sim.World.Motion do
     Bodies.put(world, bodies)
   end
 
-  # Whom each can meet in this step, should both drive as fast as they can.
+  # The robots that each can meet in this step if both drive as fast as they can.
   defp neighbours(bodies, discs, dt_ms) do
     fastest = bodies |> Enum.map(& &1.profile.max_linear) |> Enum.max(fn -> 0.0 end)
 

@@ -1,7 +1,7 @@
 defmodule Sim.World.Palette do
   @moduledoc """
-  The colours of simulated objects: how they are painted, which colour class they match, and how
-  their blobs relate to distance. Pure.
+  The colours of simulated objects: their paint, the colour class they match, and the relation of
+  their blobs to distance. Pure.
   """
 
   @enforce_keys [:name, :paint, :rgb, :thresholds, :constant]
@@ -16,7 +16,7 @@ defmodule Sim.World.Palette do
           constant: float()
         }
 
-  # A pole of 0.3 x 1 m at 1 m would fill 0.3 of the picture; its dark edges are lost (R43).
+  # A pole of 0.3 x 1 m at 1 m would fill 0.3 of the picture, but its dark edges are lost (R43).
   @landmark_constant 0.25
   @robot_constant 0.2
 
@@ -50,7 +50,7 @@ defmodule Sim.World.Palette do
   @kinds [:landmark, :robot]
 
   @doc """
-  The number of a kind in packed arguments, and back.
+  The number of a kind in packed arguments, and the kind of a number.
 
       iex> Sim.World.Palette.kind(Sim.World.Palette.index(:robot))
       :robot
@@ -64,7 +64,7 @@ defmodule Sim.World.Palette do
   def kind(0), do: :landmark
   def kind(1), do: :robot
 
-  @doc "The least brightness at which a kind is still found."
+  @doc "The lowest brightness at which a kind is still found."
   @spec least_luma(kind()) :: byte()
   def least_luma(kind), do: of(kind).thresholds |> elem(0) |> elem(0)
 
@@ -87,7 +87,8 @@ defmodule Sim.World.Palette do
   end
 
   @doc """
-  Distance from the share of the picture that a blob fills; `nil` where it fills more than half.
+  The distance, computed from the share of the picture that a blob fills; `nil` if it fills more
+  than half.
 
       iex> Sim.World.Palette.distance(:landmark, 0.6)
       nil

@@ -3,19 +3,21 @@ defmodule Sim.World.Server do
   A world in real time, in steps of 50 ms. Simulated devices attach to it; it sends them their
   readings, and carries out their requests. It does not know processes of robots, only devices.
 
-  After each step a drive gets its readings and a pan-tilt unit its own; after each second one a
-  camera that has asked gets what moves, and paints its picture itself on the ground that it was
-  given when it attached (`Sim.World.CameraView`). A message to a device is `{:world, server, what}` with
-  `{:readings, sent_ms, list}`, `{:ground, ground}`, `{:view, moving}` or `{:error, :unknown_robot}`.
+  After each step a drive and a pan-tilt unit get their readings; after every second step a camera
+  that has asked gets what moves, and paints its picture itself on the static ground that it got
+  when it attached (`Sim.World.CameraView`). A message to a device is `{:world, server, what}`
+  with `{:readings, sent_ms, list}`, `{:ground, ground}`, `{:view, moving}` or
+  `{:error, :unknown_robot}`.
 
-  Devices may be on other nodes. Nothing here waits for one of them once it is attached: what cannot be
-  sent at once is lost, and what comes late is old (`Sim.Lateness`).
+  Devices may be on other nodes. The server never waits for a device once it is attached: what
+  cannot be sent at once is lost, and what arrives late counts as old (`Sim.Lateness`).
 
-  Wheels stand when the process of their drive ends, and also when no speed has come for 500 ms: that is
-  the body's own watchdog, for a robot that is frozen and can tell nothing any more.
+  Wheels stop when the process of their drive ends, and also when no speed has come for 500 ms:
+  that is the body's own watchdog, for a robot that is frozen and can send nothing any more.
 
-  Steps are set by absolute times, so the pace does not drift. A step that came late is not made up
-  for: then the world is slow, and says so by the event `[:sim, :server, :late]` with `late_ms`.
+  Steps are scheduled at absolute times, so the pace does not drift. A late step is not made up
+  for: then the world is slow, and reports it by the event `[:sim, :server, :late]` with
+  `late_ms`.
   """
   use GenServer
   alias Hal.{Event, Pose, Ticker, Twist}
@@ -51,8 +53,9 @@ defmodule Sim.World.Server do
   end
 
   @doc """
-  Attaches the calling process to a robot's body in a world, as its drive, pan-tilt unit or camera, in
-  place of the one before. Whoever attaches watches the server; the reference is of that monitor.
+  Attaches the calling process to a robot's body in a world, as its drive, pan-tilt unit or
+  camera, in place of the previous one. The calling process monitors the server; returns the
+  reference of that monitor.
   """
   @spec attach(name :: term(), robot :: atom(), kind()) ::
           {:ok, {pid(), reference()}} | {:error, :no_world}
@@ -74,37 +77,40 @@ defmodule Sim.World.Server do
     post(server, {:detach, robot, kind, self()})
   end
 
-  @doc "The speed that a robot's wheels shall have."
+  @doc "Sets the wanted speed of a robot's wheels."
   @spec drive(pid(), robot :: atom(), Twist.t()) :: :ok
   def drive(server, robot, twist), do: post(server, {:drive, robot, twist})
 
-  @doc "Where a robot's camera shall look."
+  @doc "Sets where a robot's camera should look."
   @spec look(pid(), robot :: atom(), float(), float()) :: :ok
   def look(server, robot, pan, tilt), do: post(server, {:look, robot, pan, tilt})
 
-  @doc "What field of view a robot's camera shall have, in radians."
+  @doc "Sets the field of view of a robot's camera, in radians."
   @spec zoom(pid(), robot :: atom(), float()) :: :ok
   def zoom(server, robot, angle), do: post(server, {:zoom, robot, angle})
 
-  @doc "Asks for the next view, for the camera attached."
+  @doc "Asks for the next view for the attached camera."
   @spec next(pid(), robot :: atom()) :: :ok
   def next(server, robot), do: post(server, {:next, robot})
 
-  @doc "The world as it is."
+  @doc "The current world."
   @spec world(GenServer.server()) :: World.t()
   def world(server), do: GenServer.call(server, :world)
 
-  @doc "How punctual it was, and how busy, since the last time that somebody asked."
+  @doc "How punctual and how busy the server was since the last call of this function."
   @spec stats(GenServer.server()) :: stats()
   def stats(server), do: GenServer.call(server, :stats)
 
-  @doc "Does one of these to a world, without waiting for a server that may be on another node."
+  @doc """
+  Applies an intervention to a world, without waiting for its server, which may be on another
+  node.
+  """
   @spec change(pid(), change()) :: :ok
   def change(server, change), do: post(server, {:change, change})
 
   @doc """
-  The same to a world as a value: a robot's body stops for ever, or is lifted to another pose; the landmark
-  glides there, or is taken away by `nil`.
+  Applies an intervention to a world as a value: a robot's body stops for ever, or is lifted to
+  another pose; the landmark glides to a place, or `nil` removes it.
   """
   @spec changed(World.t(), change()) :: World.t()
   def changed(world, {:kill, robot}), do: World.kill(world, robot)
@@ -114,7 +120,7 @@ defmodule Sim.World.Server do
 
   @impl GenServer
   def init({name, %World{} = world}) do
-    # Time does not wait for those who live in it.
+    # Time does not wait for the devices.
     Process.flag(:priority, :high)
     :ok = World.Directory.enter(name, self())
     ticker = Ticker.start(:step, @step_ms, @step_ms)
@@ -176,7 +182,7 @@ defmodule Sim.World.Server do
     end
   end
 
-  # By steps of the world: on a busy machine all are slow together.
+  # Counted in steps of the world: on a busy machine everything is slow together.
   defp watch(%{world: %{step: step}} = s) do
     silent = for {id, at} <- s.driven, step - at >= @watchdog_steps, do: id
     world = Enum.reduce(silent, s.world, &stand(&2, &1))
@@ -185,7 +191,7 @@ defmodule Sim.World.Server do
 
   defp stand(world, id), do: World.drive(world, id, Twist.zero())
 
-  # A device that fails attaches again and again in one process.
+  # A device that fails attaches again and again from the same process.
   defp disown(s, owner) do
     monitors = for {monitor, ^owner} <- s.owners, do: monitor
     Enum.each(monitors, &Process.demonitor(&1, [:flush]))
@@ -236,7 +242,7 @@ defmodule Sim.World.Server do
     %{s | asked: MapSet.difference(s.asked, MapSet.new(told))}
   end
 
-  # Without these options a send waits for a full buffer, or dials a node that is gone.
+  # Without these options, a send waits while the buffer is full, or dials a node that is gone.
   defp hand(pid, what) do
     :erlang.send(pid, {:world, self(), what}, [:nosuspend, :noconnect])
   end

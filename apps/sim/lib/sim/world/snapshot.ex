@@ -3,8 +3,8 @@ defmodule Sim.World.Snapshot do
   The changes of a world since its start, small enough to send ten times a second; together with
   the initial world they restore the whole world. Pure.
 
-  A world that is started again from it goes on where it was: only the sonars are fired anew by its
-  first step.
+  A world that is started from a snapshot goes on where it was; only the sonars are fired again by
+  its first step.
   """
   alias Sim.World
   alias Sim.World.Body
@@ -20,7 +20,7 @@ defmodule Sim.World.Snapshot do
     {values(world, @moving), for(id <- world.order, do: values(world.robots[id], @body))}
   end
 
-  @doc "The world that began as `begun`, as it was at the snapshot."
+  @doc "The world that started as `begun`, in its state at the snapshot."
   @spec onto(World.t(), t()) :: World.t()
   def onto(%World{} = begun, {world, bodies}) do
     robots =

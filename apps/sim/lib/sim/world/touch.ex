@@ -3,7 +3,9 @@ defmodule Sim.World.Touch do
   alias Sim.World.{Body, Contact}
   alias Sim.World.Bodies
 
-  @doc "The world with its contacts, the count of new ones, the least gap, and the bumpers pressed."
+  @doc """
+  Updates the world's contacts, the count of new ones, the least gap, and the pressed bumpers.
+  """
   @spec touch(Sim.World.t()) :: Sim.World.t()
   def touch(world) do
     bodies = Bodies.all(world)
@@ -36,7 +38,8 @@ defmodule Sim.World.Touch do
     }
   end
 
-  # Where the others are that a body touches: discs touch on the line between their centres.
+  # The directions of the others that a body touches: discs touch on the line between their
+  # centres.
   defp touched(index, touching, places) do
     for {i, j} <- touching, index in [i, j] do
       {x, y, _radius} = places[if(i == index, do: j, else: i)]

@@ -1,5 +1,5 @@
 defmodule Sim.Emulator.RFlexControllerTest do
-  @moduledoc "The emulated controller against the fact sheet, and against noise."
+  @moduledoc "Tests the emulated controller against the fact sheet, and with noise."
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Twist}
   alias Sim.Emulator.RFlexController, as: Controller
@@ -30,7 +30,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
 
   defp hear(core, text, at_ms), do: Controller.hear(core, hex(text), at_ms)
 
-  # The frames sent by then, without their ids and time stamps.
+  # The frames that were sent by then, without their ids and time stamps.
   defp told(core, at_ms) do
     {bytes, _wishes, core} = Controller.run(core, at_ms)
     {frames(IO.iodata_to_binary(bytes)), core}
@@ -46,7 +46,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
     [{port, opcode, data} | frames(rest)]
   end
 
-  # With a ghost byte behind the length.
+  # With a ghost byte after the length.
   defp frames(
          <<0x1B, 0x02, 6, id, 1, 0x1B, 0x1B, data::binary-size(27), sum, 0x1B, 0x03,
            rest::binary>>
@@ -109,7 +109,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
                )
     end
 
-    test "orders, and what comes of them" do
+    test "orders, and their effects" do
       core = controller() |> hear(@release, 0) |> hear(@forward, 0) |> hear(@left, 0)
       {twist, core} = wanted(core, 500)
       # 15693 counts/s2 from rest would be past 6277 counts/s after 0.4 s.
@@ -130,7 +130,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
       assert core.counts == %{frames: 6, bad: 0, unknown: 0, lost: 0, escaped: 0}
     end
 
-    test "an ATRV mini's" do
+    test "frames of an ATRV mini" do
       core =
         controller(kind: :atrv_mini)
         |> hear(@release, 0)
@@ -212,11 +212,11 @@ defmodule Sim.Emulator.RFlexControllerTest do
       assert List.last(echoes) == {23, trunc(2.5 * 1474)}
     end
 
-    test "what is not heard in time is missed" do
+    test "an echo that is not heard in time is missed" do
       ranges = [5.1, 0.2 | List.duplicate(3.0, 14)]
       assert [{0, 0x7FFF}, {1, 294} | _] = sweep([], ranges)
       assert [{0, 0xFFFF} | _] = sweep([missed_echo: 0xFFFF], ranges)
-      # 3 ms of listening are half a metre.
+      # 3 ms of listening is half a metre.
       short =
         Frame.encode({4, 4, 0, <<3000::32, 28_250::32, 0::32, 2>>}, :off)
         |> Base.encode16(case: :lower)
@@ -227,7 +227,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
       assert Enum.at(echoes, 2) == {2, 0x7FFF}
     end
 
-    test "who was held up does not make up for it, and delays of nothing come to an end" do
+    test "a delayed controller does not make up for lost sweeps, and delays of 0 come to an end" do
       all = Frame.encode({4, 4, 0, <<0::32, 0::32, 0::32, 2>>}, :off)
 
       core =
@@ -244,7 +244,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
   describe "infrared" do
     test "is wired as the sheet says, and its bytes are those of its formula" do
       {:ok, options} = Sim.Emulator.RFlexController.Options.check([])
-      # One wall each: 0.1 m at the profile's number 15, right; 0.793 m at 11, in front.
+      # One wall each: 0.1 m at the profile's number 15, on the right; 0.793 m at 11, in front.
       ranges = List.duplicate(2.0, 16) |> List.replace_at(15, 0.1) |> List.replace_at(11, 0.793)
       [rear, front] = Senses.infrared(ranges, options)
       assert Enum.uniq(rear) == [58]
@@ -263,7 +263,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
       assert <<0x1B, 0x02, 6, 0, 1, 0x1B, 0x1B, 2, _::binary>> = IO.iodata_to_binary(with_it)
     end
 
-    test "or a ghost byte wherever there is an 1B" do
+    test "or a ghost byte wherever there is a 1B" do
       core = controller(ghost: :all, id: 0x1B) |> hear(@status, 0)
       {bytes, _, _} = Controller.run(core, 0)
       assert <<0x1B, 0x02, 1, 0x1B, 0x1B, 1, 9, _::binary>> = IO.iodata_to_binary(bytes)
@@ -271,7 +271,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
   end
 
   describe "bumpers" do
-    test "are told when they change, if anybody wants to know" do
+    test "are reported when they change, if anybody wants to know" do
       assert {[], _} = controller() |> Controller.feel({:bumpers, [0]}, 0) |> told(0)
       {_, core} = controller() |> hear(@inputs, 0) |> told(0)
 
@@ -284,7 +284,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
                core |> Controller.feel({:bumpers, [4]}, 30) |> told(30)
     end
 
-    test "have an address each in the other style" do
+    test "each have an address in the other style" do
       {:ok, options} =
         Sim.Emulator.RFlexController.Options.check(bumper_style: :address, bumpers: 14)
 
@@ -295,7 +295,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
   end
 
   describe "counters" do
-    test "count ways and turns, and wrap at 32 bits" do
+    test "count distances and turns, and wrap at 32 bits" do
       core = controller(counters: {0x7FFFFFFF - 100, -0x80000000 + 100})
       core = core |> hear(@on, 0) |> Controller.feel(odometry(Pose.new(0, 0, 3.0)), 0)
       core = Controller.feel(core, odometry(Pose.new(0, 0, -3.0), 0.1, -0.2), 50)
@@ -308,7 +308,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
       assert position == 0x7FFFFFFF - 100 + 31_387 - 0x100000000
       <<_::72, bearing::signed-32, _::binary>> = turn
       assert bearing == -0x80000000 + 100 + round((2 * :math.pi() - 6) * 4654.2)
-      # The other way round the end.
+      # Across the end in the other direction.
       core =
         controller(counters: {0, -0x80000000 + 100})
         |> hear(@on, 0)
@@ -329,7 +329,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
   end
 
   describe "the wheels" do
-    test "stand while the brake is set, and take nothing meanwhile" do
+    test "stand while the brake is set, and accept nothing meanwhile" do
       core = controller() |> hear(@forward, 0)
       {twist, core} = wanted(core, 1000)
       assert twist == Twist.zero()
@@ -357,13 +357,13 @@ defmodule Sim.Emulator.RFlexControllerTest do
       {twist, core} = wanted(%{core | motors: motors.(core)}, 100)
       assert_in_delta twist.linear, 2.5, 1.0e-6
 
-      # The next command, 0.1 s later, is right again: 1 m/s2.
+      # The next command, 0.1 s later, is correct again: 1 m/s2.
       stop = Sim.Emulator.RFlexController.Motors.command(core.motors, 0, 0, 31_387, 30_000, 100)
       {twist, _core} = wanted(%{core | motors: stop}, 2_650)
       assert twist == Twist.zero()
     end
 
-    test "stop by themselves when no command comes" do
+    test "stop by themselves if no command comes" do
       core = controller(timeout_ms: 700, brake: :released) |> hear(@forward, 0)
       {twist, core} = wanted(core, 699)
       assert twist.linear > 0.19
@@ -379,7 +379,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
       assert twist.linear > 0.19
     end
 
-    test "go on as they are after an acceleration of nothing, which only the first commands have" do
+    test "keep their acceleration after an acceleration of 0, which only the first commands have" do
       # The sheet's first two commands: no speed, torque 0, direction 0.
       core =
         controller(brake: :released)
@@ -391,7 +391,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
       assert core.counts.frames == 2
     end
 
-    test "do not take a turn with an 1B in its top or third byte" do
+    test "do not accept a turn with a 1B in its top or third byte" do
       for {speed, escaped} <- [
             {0x1B00, 1},
             {0x1B000000, 1},
@@ -407,7 +407,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
       end
     end
 
-    test "are told to the body when they change, and now and then" do
+    test "are sent to the body when they change, and from time to time" do
       core = controller(brake: :released)
       {_, [{:drive, _}], core} = Controller.run(core, 0)
       {_, [], core} = Controller.run(core, 50)
@@ -418,7 +418,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
   end
 
   describe "the line" do
-    test "orders come in any pieces, and after any noise" do
+    test "orders may arrive in any pieces, and after any noise" do
       noise =
         for _ <- 1..200, into: <<>>, do: <<Enum.random([0x1B, 0x02, 0x03, Enum.random(0..255)])>>
 
@@ -430,13 +430,14 @@ defmodule Sim.Emulator.RFlexControllerTest do
         assert core.counts.frames == 2
       end
 
-      # Noise may end in a beginning, which then holds up the first good one, until it is given up.
+      # Noise may end with a beginning, which then delays the first good frame until it is given
+      # up.
       core = controller() |> Controller.hear(noise <> good <> good, 0)
       {_, _, core} = Controller.run(core, 50)
       assert core.counts.frames >= 2
     end
 
-    test "the rest of a beginning is waited for, but not for ever" do
+    test "the controller waits for the rest of a frame, but not for ever" do
       beginning = <<0x1B, 0x02, 2, 0, 7, 14, 0>>
       core = controller() |> Controller.hear(beginning, 0)
       assert Controller.next_ms(core) == 50
@@ -447,7 +448,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
       assert core.counts.frames == 1
     end
 
-    test "of ten thousand random buffers nothing stays, and nothing falls" do
+    test "ten thousand random buffers leave nothing behind, and crash nothing" do
       :rand.seed(:exsss, {1, 2, 3})
 
       core =
@@ -471,7 +472,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
       assert core.counts.bad > 100
     end
 
-    test "orders too close together find no room" do
+    test "orders too close together are lost" do
       core = controller(pace: {10, 4})
       core = for _ <- 1..6, reduce: core, do: (core -> hear(core, @status, 0))
       assert core.counts.lost == 2
@@ -490,7 +491,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
       assert core.counts.lost == 2
     end
 
-    test "the phrase switches it off, in whatever pieces it comes" do
+    test "the phrase switches it off, in whatever pieces it arrives" do
       for {a, b} <- [{"The system is halted", ""}, {"xxThe sys", "tem is haltedyy"}] do
         core = controller(brake: :released) |> hear(@on, 0) |> hear(@forward, 0)
         {_, core} = wanted(core, 100)
@@ -540,7 +541,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
     assert [{5, 1}, {11, 0}, {68, 1}] = events
   end
 
-  test "the screen is blank, and the joystick where it is held" do
+  test "the screen is blank, and the joystick is where it is held" do
     {rows, core} = controller() |> hear("1b 02 01 00 00 00 01 1b 03", 0) |> told(0)
     assert length(rows) == 240
     assert {1, 0, <<_::32, 239, 40, 0::320>>} = List.last(rows)
@@ -548,7 +549,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
     assert {[{3, 0, <<10::32, -12::signed-32, 40::32, 1>>}], _} = told(core, 10)
   end
 
-  test "options that cannot be are named" do
+  test "invalid options are named" do
     for {option, value} <- [
           kind: :b21r,
           conversions: [distance: 0],

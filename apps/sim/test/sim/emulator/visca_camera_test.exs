@@ -1,5 +1,5 @@
 defmodule Sim.Emulator.ViscaCameraTest do
-  @moduledoc "The emulated camera against the fact sheet, and against noise."
+  @moduledoc "Tests the emulated camera against the fact sheet, and with noise."
   use ExUnit.Case, async: true
   alias Sim.Emulator.ViscaCamera, as: Camera
   doctest Sim.Emulator.ViscaCamera.Commands
@@ -64,7 +64,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
     {"81 09 99 99 ff", "90 60 02 ff"},
     {"81 42 ff", "90 60 02 ff"},
     {"81 01 02 03 04 05 06 07 08 09 0a 0b 0c 0d 0e 0f ff", "90 60 01 ff"},
-    # For another camera, from another one, and rubbish.
+    # To another camera, from another camera, and rubbish.
     {"82 09 04 00 ff", ""},
     {"90 41 ff", ""},
     {"ff ff 01 06 04 ff", ""}
@@ -117,7 +117,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
     assert_in_delta tilt, -10 * :math.pi() / 180, 1.0e-6
   end
 
-  test "two commands at a time, each with its socket; a third finds none" do
+  test "two commands run at a time, each with its socket; a third finds none" do
     camera =
       camera()
       |> hear("81 01 06 02 18 14 0f 0e 0f 08 0f 0f 09 04 ff", 0)
@@ -125,7 +125,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
       |> hear("81 01 04 38 03 ff", 0)
 
     assert {"90 41 ff 90 42 ff 90 60 03 ff", camera} = told(camera, 16)
-    # Inquiries are answered all the while.
+    # Inquiries are answered all the time.
     assert {"90 50 02 ff", camera} = camera |> hear("81 09 04 00 ff", 20) |> told(36)
     {answers, camera} = until_quiet(camera, 40)
     assert [{_, "90 51 ff"}, {zoomed_ms, "90 52 ff"}] = answers
@@ -133,7 +133,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
     assert {"90 50 00 02 03 08 ff", _} = camera |> hear("81 09 04 47 ff", 5000) |> told(5016)
   end
 
-  test "a second way replaces the first, and both are completed where it ends" do
+  test "a second move replaces the first, and both are completed when it ends" do
     camera =
       camera()
       |> hear("81 01 06 02 18 14 0f 0c 09 00 00 00 00 00 ff", 0)
@@ -144,7 +144,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
     assert place(camera, 9000) == {16, 0}
   end
 
-  test "a drive goes on until it is stopped, or at its end, and not during a way" do
+  test "a drive goes on until it is stopped or at its end, and does not interrupt a move" do
     camera = hear(camera(), "81 01 06 01 06 00 01 03 ff", 0)
     assert {"90 41 ff 90 51 ff", camera} = told(camera, 16)
     camera = hear(camera, "81 01 06 01 00 00 03 03 ff", 1000)
@@ -153,7 +153,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
     camera = hear(camera, "81 01 06 01 18 14 01 01 ff", 2000)
     assert place(camera, 9000) == {-880, 300}
     camera = hear(camera, "81 01 06 01 00 00 03 03 ff", 9_100)
-    # Home, and a drive meanwhile.
+    # A move home, and a drive meanwhile.
     {_, camera} = told(camera, 9_200)
     camera = camera |> hear("81 01 06 04 ff", 9_200) |> hear("81 01 06 01 18 14 02 03 ff", 9_300)
     assert {"90 41 ff 90 62 41 ff", camera} = told(camera, 9_320)
@@ -162,7 +162,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
     assert place(camera, 20_000) == {0, 0}
   end
 
-  test "a cancelled way stops where it is, and is never completed" do
+  test "a cancelled move stops where it is, and is never completed" do
     camera =
       camera()
       |> hear("81 01 06 02 18 14 0f 0c 09 00 00 00 00 00 ff", 0)
@@ -176,7 +176,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
     assert {"90 41 ff 90 51 ff", _} = told(camera, 6016)
   end
 
-  test "a relative way, and one with limits" do
+  test "a relative move, and one with limits" do
     camera = hear(camera(), "81 01 06 03 18 14 00 00 06 04 0f 0f 0f 0c ff", 0)
     assert place(camera, 5000) == {100, -4}
     camera = hear(camera, "81 01 06 03 18 14 00 00 06 04 0f 0f 0f 0c ff", 6000)
@@ -210,7 +210,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
     assert {"90 60 02 ff", _} = camera() |> hear("81 01 04 3f 01 06 ff", 0) |> told(16)
   end
 
-  test "zoom by hand, and what is no zoom" do
+  test "zoom by hand, and invalid zoom commands" do
     camera = hear(camera(zoom_ms: 1000), "81 01 04 07 27 ff", 0) |> hear("81 01 04 07 00 ff", 500)
     {answer, camera} = camera |> hear("81 09 04 47 ff", 600) |> told(616)
     <<_::binary-size(2), rest::binary-size(4), 0xFF>> = answer |> hex() |> last_packet()
@@ -227,7 +227,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
              camera |> hear("81 01 06 02 19 14 00 00 00 00 00 00 00 00 ff", 900) |> told(916)
   end
 
-  test "switched off it says so, and starts in its own time" do
+  test "if it is switched off it says so, and it takes its time to start" do
     camera = hear(camera(power_on_ms: 700), "81 01 04 00 03 ff", 0)
     assert {"90 41 ff 90 51 ff", camera} = told(camera, 16)
     assert {"90 50 03 ff", camera} = camera |> hear("81 09 04 00 ff", 100) |> told(116)
@@ -238,7 +238,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
     assert {"90 50 02 ff", _} = camera |> hear("81 09 04 00 ff", 2000) |> told(2016)
   end
 
-  test "current that comes back is told, and finds it looking ahead" do
+  test "when power comes back it announces itself, and looks ahead" do
     camera =
       camera() |> hear("81 01 06 02 18 14 0f 0c 09 00 00 00 00 00 ff", 0) |> Camera.restart(1000)
 
@@ -248,7 +248,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
     assert camera(announce: false) |> Camera.restart(0) |> Camera.next_ms() == nil
   end
 
-  test "clearing frees both sockets, and what they were at is never completed" do
+  test "clearing frees both sockets, and their jobs are never completed" do
     camera = camera() |> hear("81 01 06 02 18 14 0f 0c 09 00 00 00 00 00 ff", 0)
     {_, camera} = told(camera, 16)
     {answers, _} = camera |> hear("88 01 00 01 ff", 100) |> until_quiet(100)
@@ -265,7 +265,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
     assert_in_delta IO.iodata_length(bytes) / 4, 900, 40
   end
 
-  test "packets come in any pieces; of ten thousand random buffers nothing stays, and nothing falls" do
+  test "packets may arrive in any pieces; ten thousand random buffers leave nothing behind, and crash nothing" do
     packet = hex("81 01 06 02 18 14 0f 0e 0f 08 0f 0f 08 08 ff")
 
     for split <- 0..byte_size(packet) do
@@ -291,7 +291,7 @@ defmodule Sim.Emulator.ViscaCameraTest do
     end
   end
 
-  test "options that cannot be are named" do
+  test "invalid options are named" do
     for {option, value} <- [latency_ms: -1, power: 5, drop: 2, zoom_ms: 0, nonsense: 1] do
       assert {:error, line} = Camera.new([{option, value}], 0)
       assert line =~ "option #{option} "

@@ -8,7 +8,7 @@ defmodule Sim.Emulator.WireTest do
     wire
   end
 
-  # All that comes out of what is put in byte by byte.
+  # All that comes out if bytes are put in one by one.
   defp through(wire, bytes) do
     {taken, _wire} =
       for <<byte <- bytes>>, reduce: {<<>>, wire} do
@@ -25,7 +25,7 @@ defmodule Sim.Emulator.WireTest do
     assert through(wire([]), bytes) == bytes
   end
 
-  test "faults come at their rates, one seed the same ones, however the bytes are parted" do
+  test "faults come at their rates; one seed gives the same ones, however the bytes are split" do
     bytes = :binary.copy(<<0>>, 100_000)
 
     for {fault, expected} <- [
@@ -64,7 +64,7 @@ defmodule Sim.Emulator.WireTest do
     assert {"c", _} = wire |> Wire.plug() |> Wire.put("c", 100) |> Wire.take(200)
   end
 
-  test "what cannot be is named" do
+  test "invalid options are named" do
     for {options, name} <- [
           {[drop: -0.1], "option drop "},
           {[flip: :nan], "option flip "},

@@ -3,10 +3,10 @@ defmodule Sim.Hardware.BaseBytesTest do
   use Sim.BaseCase, async: true
   @moduletag :slow
 
-  # On a machine that is busy the bytes of a moment's sleep come to the emulator all at once, however well they were
-  # spaced. Of commands that are not spaced, at least every other would be lost, all the time.
+  # On a busy machine the emulator may get the bytes of a pause all at once, however well they
+  # were spaced. If commands are not spaced, at least every second one is lost, all the time.
   @tag base: [pace: {10, 1}]
-  test "commands are so far apart that a controller takes them that takes one in 10 ms",
+  test "commands are far enough apart for a controller that accepts one in 10 ms",
        context do
     drive(context, Twist.new(0.3, 0.2), &(&1.pose.x > -3.5))
     stop(context)
@@ -16,7 +16,7 @@ defmodule Sim.Hardware.BaseBytesTest do
   end
 
   @tag base: [ghost: :all]
-  test "ghost bytes wherever there is an 1B", context do
+  test "ghost bytes wherever there is a 1B", context do
     drive(context, Twist.new(0.3, 0.2), &(&1.pose.x > -3.5))
     stop(context)
     agree(context)

@@ -1,5 +1,5 @@
 defmodule Sim.Hardware.BaseFaultsTest do
-  @moduledoc "The driver of real bases on a line that loses, doubles and changes bytes."
+  @moduledoc "The driver of real bases on a line that loses, duplicates and changes bytes."
   use Sim.BaseCase, async: true
   @moduletag :slow
 

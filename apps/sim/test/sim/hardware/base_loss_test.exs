@@ -3,7 +3,8 @@ defmodule Sim.Hardware.BaseLossTest do
   use Sim.BaseCase, async: true
   @moduletag :slow
 
-  test "unplugged in motion the body stops; plugged it goes on, and knows where it is", context do
+  test "unplugged in motion, the body stops; plugged in, it goes on, and knows where it is",
+       context do
     drive(context, Twist.new(0.3, 0.0), &(&1.pose.x > -3.7))
     :ok = Emulator.unplug(context.emulator)
     assert_receive {:health, :drive, {{:offline, _reason}, _}}, 3_000
@@ -29,13 +30,13 @@ defmodule Sim.Hardware.BaseLossTest do
     agree(context)
   end
 
-  test "a controller that was switched off and on is told all again, and the pose does not jump",
+  test "a controller that was switched off and on is configured again, and the pose does not jump",
        context do
     drive(context, Twist.new(0.3, 0.0), &(&1.pose.x > -3.4))
     :ok = Emulator.restart(context.emulator)
     drive(context, Twist.new(0.3, 0.0), &(&1.pose.x > -2.8))
     stop(context)
-    # What it went while nobody counted is not known: 0.3 m/s for a second or so, braking.
+    # How far it went while nobody counted is unknown: 0.3 m/s for a second or so, braking.
     agree(context, {-4, 0, 0}, 0.35)
   end
 end

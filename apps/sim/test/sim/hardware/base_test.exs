@@ -1,9 +1,11 @@
 defmodule Sim.Hardware.BaseTest do
-  @moduledoc "The driver of real bases: what it tells the controller, and what it hears of it."
+  @moduledoc """
+  The driver of real bases: its commands to the controller, and the reports that it gets.
+  """
   use Sim.BaseCase, async: true
   @moduletag :slow
 
-  test "it drives, turns and stops, and its odometry is the body's way", context do
+  test "it drives, turns and stops, and its odometry matches the body's motion", context do
     {fastest, _} = drive(context, Twist.new(0.3, 0.0), &(&1.pose.x > -3.0))
     assert fastest <= 0.3001
     stop(context)
@@ -33,17 +35,17 @@ defmodule Sim.Hardware.BaseTest do
   end
 
   @tag profile: Profile.atrv_mini()
-  test "an ATRV mini's, whose turns have an 1B in them", context do
-    # 6960 to 7167 counts of 60000 a radian have it.
+  test "it drives an ATRV mini, whose turns contain a 1B", context do
+    # 6960 to 7167 counts contain it, at 60000 per radian.
     drive(context, Twist.new(0.1, 0.117), &(&1.pose.heading > 0.6))
     stop(context)
     agree(context)
     assert Emulator.core(context.emulator).counts.escaped == 0
   end
 
-  # Half a metre before the right wall, which is 0.5 m from its front.
+  # In front of the right wall, which is 0.5 m from its front.
   @tag place: {7.3, 0.0, 0.0}
-  test "sonar, infrared, battery and bumpers say what the body feels", context do
+  test "sonar, infrared, battery and bumpers report what the body senses", context do
     eventually(
       fn ->
         felt = body(context.server)

@@ -54,7 +54,7 @@ defmodule Sim.Hardware.FleetTest do
     refute File.exists?(folder)
   end
 
-  test "lockstep has no serial lines, and a fleet no hardware but its robots" do
+  test "lockstep has no serial lines, and only a fleet's robots can be hardware" do
     assert {:error, line} = Trial.new(%{robots: [:mag1], hardware: [:mag1]})
     assert line =~ "mag1"
     assert line =~ "lockstep"

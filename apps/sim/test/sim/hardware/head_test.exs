@@ -1,5 +1,8 @@
 defmodule Sim.Hardware.HeadTest do
-  @moduledoc "The driver of real cameras' heads against the emulated one, which was written from the fact sheet alone."
+  @moduledoc """
+  Tests the driver of real camera heads with the emulated one, which was written from the fact
+  sheet alone.
+  """
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 2]
   alias Hal.{Device, Pose, Profile}
@@ -43,7 +46,7 @@ defmodule Sim.Hardware.HeadTest do
 
   defp looks?(server, pan, tilt) do
     %{pan: p, tilt: t} = body(server)
-    # A unit of the camera is 0.002 rad.
+    # One unit of the camera is 0.002 rad.
     abs(p - pan) < 0.003 and abs(t - tilt) < 0.003
   end
 
@@ -68,7 +71,7 @@ defmodule Sim.Hardware.HeadTest do
     assert_receive {:ptz, _}, 10_000
   end
 
-  test "the painted picture looks where the driver was told to look, and the driver knows", %{
+  test "the painted picture shows where the driver was told to look, and the driver knows", %{
     server: server,
     device: device
   } do
@@ -81,7 +84,7 @@ defmodule Sim.Hardware.HeadTest do
     end
   end
 
-  test "a target that moves is followed without waiting for its ways", %{
+  test "the head follows a moving target without waiting for its moves to end", %{
     server: server,
     device: device
   } do
@@ -106,7 +109,7 @@ defmodule Sim.Hardware.HeadTest do
     end
   end
 
-  test "unplugged while it turns, and plugged again", %{
+  test "unplugged while it turns, and plugged in again, it gets there", %{
     server: server,
     emulator: emulator,
     device: device
@@ -123,7 +126,7 @@ defmodule Sim.Hardware.HeadTest do
     eventually(fn -> told?(-0.4, 0.1) end, 5_000)
   end
 
-  test "frozen it is offline, and thawed it is back", %{
+  test "frozen, it is offline; thawed, it is back", %{
     server: server,
     emulator: emulator,
     device: device
@@ -137,7 +140,7 @@ defmodule Sim.Hardware.HeadTest do
     eventually(fn -> looks?(server, 0.4, 0.1) end, 10_000)
   end
 
-  test "after a power cycle it looks where it was told to, though nobody says it again", %{
+  test "after a power cycle it looks where it was told to, without another command", %{
     server: server,
     emulator: emulator,
     device: device
@@ -158,7 +161,7 @@ defmodule Sim.Hardware.HeadTest do
   end
 
   @tag camera: [drop: 0.2, seed: 1]
-  test "a fifth of the answers lost", %{server: server, device: device} do
+  test "with a fifth of the answers lost it gets there", %{server: server, device: device} do
     online()
 
     for pan <- [0.3, -0.3, 0.6] do

@@ -1,5 +1,5 @@
 defmodule Sim.Hardware.LineTest do
-  @moduledoc "A whole robot at the end of a line whose other end is silent, mute, or falls silent."
+  @moduledoc "A whole robot on a line whose other end is silent, mute, or falls silent."
   use Swarm.Case, async: true
   import ExUnit.CaptureLog
   alias Hal.Profile
@@ -25,7 +25,7 @@ defmodule Sim.Hardware.LineTest do
     start_supervised!({Emulator, core: core, link: context.link, body: body})
   end
 
-  # The robot as its file would make it; armed by hand.
+  # The robot as from its file; armed by hand.
   defp real(context, id) do
     driver = {Hal.RFlex.Driver, port: context.link, conversions: @conversions}
     robot(id, drive: driver, arm: :manual, profile: Profile.magellan())
@@ -40,7 +40,7 @@ defmodule Sim.Hardware.LineTest do
   defp place(context), do: World.Server.world(context.server).robots.body.pose
   defp still?(context), do: World.Server.world(context.server).robots.body.speed == {0.0, 0.0}
 
-  # Looks for so long whether it ever is so.
+  # Checks for this long whether it ever happens.
   defp never(ms, condition) do
     until_ms = System.monotonic_time(:millisecond) + ms
     refute Enum.find(looks(until_ms), fn _ -> condition.() end)
@@ -73,7 +73,8 @@ defmodule Sim.Hardware.LineTest do
     assert line =~ "line_mute: " and line =~ "wheels"
   end
 
-  test "wheels that are no longer reported stop within a second, and are disarmed", context do
+  test "if the wheels are no longer reported, they stop within a second, and are disarmed",
+       context do
     emulator = base(context, [])
     id = real(context, :line_wheels)
     rolls(context, id)
@@ -83,12 +84,12 @@ defmodule Sim.Hardware.LineTest do
     assert Hal.Device.arming(Names.whereis(id, :drive)).state == :disarmed
     :ok = Emulator.change(emulator, :silence, [[]])
     eventually(fn -> health(id) == :online end)
-    # Nobody has armed it.
+    # Nobody has armed it again.
     never(500, fn -> not still?(context) end)
     rolls(context, id)
   end
 
-  test "sonars that are no longer reported: slow after 0.5 s, stopped and disarmed after 2 s",
+  test "if sonars are no longer reported, the robot is slow after 0.5 s, stopped and disarmed after 2 s",
        context do
     emulator = base(context, [])
     id = real(context, :line_sonar)
@@ -108,7 +109,7 @@ defmodule Sim.Hardware.LineTest do
 
   defp line(id), do: inspect(Swarm.status(id))
 
-  test "log and status say in words what is the matter with the line, once a change", context do
+  test "log and status say in words what is wrong with the line, once per change", context do
     Logger.put_module_level(Robot.Devices.Log, :info)
     on_exit(fn -> Logger.delete_module_level(Robot.Devices.Log) end)
     link = context.link
@@ -125,7 +126,7 @@ defmodule Sim.Hardware.LineTest do
         )
 
         assert line(id) =~ "DISARMED (its base has not reported its wheels yet)"
-        # Over several of the driver's attempts.
+        # During several of the driver's attempts.
         never(4_000, fn -> health(id) != {:offline, :silent} end)
         :ok = Emulator.change(emulator, :silence, [[]])
         eventually(fn -> not (line(id) =~ "offline") end, 10_000)
@@ -161,7 +162,7 @@ defmodule Sim.Hardware.LineTest do
     for {words, begin} <- Enum.zip(said, wanted), do: assert(String.starts_with?(words, begin))
   end
 
-  test "a bumper that is held down on an armed, idle robot: it backs off once, stands, and says so",
+  test "an armed, idle robot whose bumper is held down backs off once, stands, and says so",
        context do
     emulator = base(context, [])
     id = real(context, :line_held)
@@ -174,14 +175,14 @@ defmodule Sim.Hardware.LineTest do
     stood = place(context)
     assert Pose.distance(start, stood) < 0.25
     assert_in_delta stood.heading, start.heading, 0.1
-    # Neither by itself nor by an order, until somebody has looked.
+    # It moves neither by itself nor by an order, until somebody has checked it.
     _refused_or_not = Swarm.tell(id, "move:-0.1:0")
     never(3_000, fn -> Pose.distance(stood, place(context)) > 0.01 end)
 
     assert Swarm.disarm(id) == :ok
     assert_receive {[:robot, :fault], %{line: nil}}, 2_000
     assert Swarm.arm(id) == :ok
-    # To be armed is no reason to move.
+    # Arming is not a reason to move.
     never(1_000, fn -> Pose.distance(stood, place(context)) > 0.01 end)
     refute line(id) =~ "FAULT"
     assert Swarm.tell(id, "move:-0.1:0") == :ok

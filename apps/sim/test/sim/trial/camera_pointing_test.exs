@@ -1,5 +1,5 @@
 defmodule Sim.Trial.CameraPointingTest do
-  @moduledoc "What becomes of a formation when the landmark moves a little: nothing but the cameras' directions."
+  @moduledoc "When the landmark moves a little, only the cameras of a formation turn."
   use ExUnit.Case, async: true
   alias Hal.Pose
   alias Sim.Trial

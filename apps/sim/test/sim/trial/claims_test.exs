@@ -22,19 +22,19 @@ defmodule Sim.Trial.ClaimsTest do
     assert report(Claims.note(claims, 9000, [], fn _ -> 4.0 end), 9100, 4.0) == expected
   end
 
-  test "what is withdrawn before is judged by its beginning, and what comes again is another claim" do
+  test "a claim that is withdrawn earlier is judged by its beginning, and the next is another claim" do
     claims = play([{0, [:a], 0.1}, {4900, [], 2.0}, {5200, [:a], 0.6}, {5300, [:a, :b], 0.2}])
 
     assert [{0.1, nil}, {0.6, nil}, {0.2, nil}] =
              for(c <- report(claims, 6000, 1.0), do: {c.worst_m, c.worst_5s_m})
   end
 
-  test "a run that ends 5 s after its claim judges it at its end" do
+  test "a run that ends 5 s after a claim judges it at its end" do
     claims = play([{0, [:a], 0.1}, {4900, [:a], 0.2}])
     assert [%{worst_5s_m: 0.3}] = report(claims, 5000, 0.3)
   end
 
-  test "a leader without followers has nothing to be judged by" do
+  test "a leader without followers has no error to judge" do
     assert [claim] = report(play([{0, [:a], nil}]), 6000, nil)
     assert Claims.right?(claim) == nil
   end

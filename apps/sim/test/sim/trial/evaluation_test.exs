@@ -1,5 +1,5 @@
 defmodule Sim.Trial.EvaluationTest do
-  @moduledoc "What a scene and a report say of a robot's own word."
+  @moduledoc "What a scene and a report say about a robot's own estimates."
   use ExUnit.Case, async: true
   alias Sim.Trial
   alias Sim.Trial.Evaluation
@@ -18,7 +18,7 @@ defmodule Sim.Trial.EvaluationTest do
     |> Map.merge(%{claims: claims, messages: %{sent: 0, lost: 0}})
   end
 
-  test "each robot's uncertainty is its own word, in the scene and in the report" do
+  test "each robot's uncertainty is its own estimate, in the scene and in the report" do
     {trial, claims} = run(3)
     scene = Trial.scene(trial)
     assert Enum.all?(scene.robots, &(is_float(&1.uncertainty) and &1.uncertainty >= 0.0))
@@ -28,7 +28,7 @@ defmodule Sim.Trial.EvaluationTest do
         do: assert({row.name, row.uncertainty_m} == {robot.id, robot.uncertainty})
   end
 
-  test "out of its mission it has one, and not after its death" do
+  test "it has an uncertainty without a mission, but not after its death" do
     {trial, _claims} = run(1)
     {trial, _claims} = {trial |> Trial.command(:mag1, {:move, 0.1, 0.0}) |> Trial.step(), nil}
     trial = trial |> Trial.command(:mag1, :stop) |> Trial.kill(:mag2) |> Trial.step()
@@ -38,7 +38,7 @@ defmodule Sim.Trial.EvaluationTest do
     assert %{alive: false, uncertainty: nil} = by_name.mag2
   end
 
-  test "one that stands in its slot and is not sure of it is unsure, one that is blocked is that" do
+  test "a robot in its slot that is not sure of it is unsure; a blocked one is blocked" do
     {trial, claims} = run(1)
 
     state = fn word ->

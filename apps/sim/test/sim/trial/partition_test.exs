@@ -11,7 +11,7 @@ defmodule Sim.Trial.PartitionTest do
 
   defp elections(result), do: Enum.count(result.stages, &(&1.stage == :elected))
 
-  test "cut in two and mended: one leader a part, then one for all, and a short stand" do
+  test "cut into two and mended, there is one leader a part, then one for all, and a short stand" do
     for {seed, loss} <- [{1, 0.0}, {3, 0.1}] do
       result = run(%{seed: seed, loss: loss, cuts: [{40, 55, [@left, @right]}]}) |> Trial.result()
       assert %{rivals_max_s: rivals, heals: [heal]} = result.agreement
@@ -22,7 +22,7 @@ defmodule Sim.Trial.PartitionTest do
     end
   end
 
-  test "one link cut for good, the leader's to its child: the formation holds, with the same leader" do
+  test "with the link from the leader to its child cut for good, formation and leader stay" do
     {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct})
     trial = until(trial, &Trial.formed?/1)
     {leader, %{anchor: anchor}} = Enum.find(Trial.claims(trial), &(elem(&1, 1).phase == :lead))
@@ -55,7 +55,7 @@ defmodule Sim.Trial.PartitionTest do
     assert List.last(result.stages).stage == :formed
   end
 
-  test "who is cut off alone stands, and takes its place again" do
+  test "a robot that is cut off alone stands, and takes its place again later" do
     {:ok, trial} =
       Trial.new(%{
         seed: 1,
@@ -74,7 +74,7 @@ defmodule Sim.Trial.PartitionTest do
     assert one_s <= 2.0 and formed_s <= 10.0
   end
 
-  test "what is no cut is refused in one line" do
+  test "an invalid cut is refused in one line" do
     for cuts <- [
           :all,
           [{1, 2}],
@@ -90,7 +90,7 @@ defmodule Sim.Trial.PartitionTest do
     end
   end
 
-  test "cuts that overlap add up, one way is one way" do
+  test "cuts that overlap add up, and one direction stays one direction" do
     cuts = [{0, 4, {:link, :a, :b}}, {2, :end, {:way, :c, :a}}]
     assert Cuts.ways(cuts, [:a, :b, :c], 1_000) == [a: :b, b: :a]
     assert Cuts.ways(cuts, [:a, :b, :c], 3_000) == [a: :b, b: :a, c: :a]

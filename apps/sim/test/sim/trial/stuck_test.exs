@@ -19,19 +19,19 @@ defmodule Sim.Trial.StuckTest do
     |> Stuck.report()
   end
 
-  test "a robot that stands short of its place for 20 s without a word is told of, once" do
+  test "a robot that stands short of its place for 20 s without reporting it is recorded once" do
     assert play(19, fn _ -> %{} end) == []
     assert play(60, fn _ -> %{} end) == [%{at_s: 0.0, robot: :a, error_m: 3.0}]
   end
 
-  test "one that comes nearer, stands in place, is not sure of it, is blocked or leads is not" do
+  test "a robot that comes nearer, stands in place, is unsure, is blocked or leads is not recorded" do
     assert play(60, &%{error_m: 9.0 - &1 * 0.1}) == []
 
     for claim <- [%{in_place: true}, %{unsure: true}, %{blocked: true}, %{phase: :lead}],
         do: assert(play(60, fn _ -> %{claim: Map.merge(@claim, claim)} end) == [])
   end
 
-  test "another slot or another shape begins the time again, a trembling slot does not" do
+  test "another slot or another shape starts the time again, a trembling slot does not" do
     assert play(30, &%{slot: Pose.new(&1, 0)}) == []
     assert play(30, &%{shape: div(&1, 15)}) == []
     assert [_] = play(30, &%{slot: Pose.new(rem(&1, 2) * 0.5, 0)})
@@ -46,8 +46,9 @@ defmodule Sim.Trial.StuckTest do
     refute_received _more
   end
 
-  # A wall stands where the line should; one robot used to stand 2.4 m off for two minutes, `follow`.
-  test "where one finds no way from afar it says so, and the shape closes up for it" do
+  # A wall stands where the line should be; one robot used to stand 2.4 m off for two minutes in
+  # `follow`.
+  test "a robot that finds no way from afar says so, and the shape closes up for it" do
     options = %{seed: 2, formation: {:line, 1.2}, landmark: {6.8, 0.0}, duration_s: 180}
     trial = run(options)
     assert Trial.result(trial).stuck == []

@@ -1,5 +1,8 @@
 defmodule Sim.World.CameraViewTest do
-  @moduledoc "What is sent of a world gives the same pictures, and the same world, as the world itself."
+  @moduledoc """
+  The parts of a world that are sent give the same pictures, and the same world, as the world
+  itself.
+  """
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile, Twist}
   alias Sim.World
@@ -39,7 +42,7 @@ defmodule Sim.World.CameraViewTest do
     end
   end
 
-  test "what moves is small, however large the map", %{later: later} do
+  test "the moving part is small, however large the map", %{later: later} do
     moving = CameraView.moving(later, CameraView.poses(later), :mag1)
     assert byte_size(:erlang.term_to_binary(moving)) < 300
     assert byte_size(:erlang.term_to_binary(Snapshot.of(later))) < 3_000

@@ -50,7 +50,7 @@ defmodule Sim.World.ServerTest do
     assert Process.alive?(drive)
   end
 
-  test "a device that attaches again and again is watched once, and not after it has left", %{
+  test "a device that attaches again and again is monitored once, and not after it has left", %{
     world: world,
     name: name
   } do
@@ -62,7 +62,7 @@ defmodule Sim.World.ServerTest do
 
     for _ <- 1..3 do
       {:ok, line} = World.Server.attach(name, :mag1, :drive)
-      # The call comes after the cast, so it has been carried out.
+      # The call comes after the cast, so the cast has been carried out.
       %World{} = World.Server.world(server)
       assert watched.() == 1
       World.Server.detach(line, :mag1, :drive)
@@ -77,7 +77,7 @@ defmodule Sim.World.ServerTest do
     assert watched.() == 0
   end
 
-  test "wheels do as asked, and stand when whoever drives them is gone", %{
+  test "wheels do as asked, and stand when their driver is gone", %{
     world: world,
     name: name
   } do
@@ -114,7 +114,7 @@ defmodule Sim.World.ServerTest do
     for _ <- 1..3, do: assert_receive({:camera, {:detections, _}}, 2_000)
   end
 
-  test "a pan-tilt unit turns and tells where it looks", %{world: world, name: name} do
+  test "a pan-tilt unit turns and reports where it looks", %{world: world, name: name} do
     serve(name, world)
     ptz = device(:ptz, Sim.Device.Ptz, world: name, robot: :mag1)
     assert_receive {:ptz, {:ptz, %{pan: pan}}}, 3_000
@@ -123,7 +123,7 @@ defmodule Sim.World.ServerTest do
     assert_receive {:ptz, {:ptz, %{pan: pan}}} when pan > 0.45, 5_000
   end
 
-  test "who is not in the world is told so", %{world: world, name: name} do
+  test "a robot that is not in the world gets an error", %{world: world, name: name} do
     serve(name, world)
     device(:drive, Sim.Device.Drive, world: name, robot: :mag9)
     assert_receive {:drive, {:health, :drive, {{:offline, :unknown_robot}, _}}}, 3_000

@@ -3,8 +3,9 @@ defmodule Sim.Emulator.RFlexController.CommandHandler do
   Carries out the frames that a controller receives (fact sheet rFLEX, sections 3 to 9). Pure.
   Unknown orders are only counted.
 
-  What the sheet leaves open: setting the defaults stops both axes by their accelerations; periods of reports of
-  motion and inputs are microseconds, the infrared's milliseconds; 10 ms is the shortest.
+  Where the sheet leaves it open: setting the defaults stops both axes with their accelerations;
+  periods of reports of motion and inputs are in microseconds, those of infrared in milliseconds;
+  the shortest is 10 ms.
   """
   import Sim.Emulator.RFlexController.State, only: [count: 3, stamp: 2, tell: 2]
   alias Sim.Emulator.RFlexController
@@ -13,7 +14,7 @@ defmodule Sim.Emulator.RFlexController.CommandHandler do
   @least_ms 10
   @screen_rows 0..239
 
-  @doc "The controller, after it did what the frame says."
+  @doc "The controller after it has carried out the frame."
   @spec obey(RFlexController.State.t(), Frame.t(), integer()) :: RFlexController.State.t()
   def obey(core, {port, _id, opcode, data}, at_ms), do: order(core, {port, opcode}, data, at_ms)
 
@@ -77,7 +78,7 @@ defmodule Sim.Emulator.RFlexController.CommandHandler do
 
   defp order(core, _port_and_opcode, _data, _at_ms), do: count(core, :unknown, 1)
 
-  # Section 13: turns with this byte in them go wrong, and the driver is to go round them.
+  # Section 13: turns that contain this byte go wrong, and the driver must avoid them.
   defp escape?(speed) do
     <<top, _second, third, _low>> = <<speed::32>>
     top == 0x1B or third == 0x1B

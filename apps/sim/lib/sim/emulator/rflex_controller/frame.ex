@@ -9,20 +9,21 @@ defmodule Sim.Emulator.RFlexController.Frame do
 
   @start <<0x1B, 0x02>>
 
-  # The longest command has 21 bytes. What claims to have more is not a command, and not waited for.
+  # The longest command has 21 bytes. A frame that claims to have more is not a command, and not
+  # awaited.
   @longest 32
 
   @typedoc "Port, id, opcode, data."
   @type t :: {byte(), byte(), byte(), binary()}
 
   @typedoc """
-  Where an 0x1B inside a frame comes with one more byte: nowhere, behind an infrared report's length as seen of
-  Magellans, or wherever it is in id, length or data.
+  Where a 0x1B inside a frame is followed by one more byte: nowhere, after the length of an
+  infrared report (as seen on Magellans), or anywhere in id, length or data.
   """
   @type ghost :: :off | :infrared | :all
 
   @doc """
-  A frame's bytes.
+  The bytes of a frame.
 
       iex> Sim.Emulator.RFlexController.Frame.encode({1, 0, 1, <<>>}, :off)
       <<0x1B, 0x02, 0x01, 0x00, 0x01, 0x00, 0x00, 0x1B, 0x03>>
@@ -45,8 +46,8 @@ defmodule Sim.Emulator.RFlexController.Frame do
   defp double(bytes), do: :binary.replace(bytes, <<0x1B>>, <<0x1B, 0x1B>>, [:global])
 
   @doc """
-  Cuts a stream into frames, the unfinished rest, and how many beginnings were none: after such a one the search
-  goes on with the next byte.
+  Splits a stream into frames, the unfinished rest, and the number of false beginnings: after each
+  of these the search goes on with the next byte.
 
       iex> frame = Sim.Emulator.RFlexController.Frame.encode({2, 0, 12, <<>>}, :off)
       iex> Sim.Emulator.RFlexController.Frame.cut("noise" <> frame <> <<0x1B, 0x02>>)
@@ -83,14 +84,14 @@ defmodule Sim.Emulator.RFlexController.Frame do
 
   defp read(unfinished, frames, bad), do: {Enum.reverse(frames), unfinished, bad}
 
-  @doc "The same, when the rest of a beginning does not come: the search goes on behind it."
+  @doc "The same, if the rest of a frame does not arrive: the search goes on after its beginning."
   @spec give_up(binary()) :: {[t()], rest :: binary(), bad :: non_neg_integer()}
   def give_up(<<@start, _::binary>> = bytes), do: skip(bytes, [], 0)
   def give_up(_half_a_start), do: {[], <<>>, 0}
 
   defp skip(<<_first, bytes::binary>>, frames, bad), do: cut(bytes, frames, bad + 1)
 
-  # Half a start may be the last byte.
+  # The last byte may be half of a start.
   defp half(bytes) do
     if bytes != <<>> and :binary.last(bytes) == 0x1B, do: <<0x1B>>, else: <<>>
   end

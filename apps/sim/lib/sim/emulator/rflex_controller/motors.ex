@@ -1,18 +1,18 @@
 defmodule Sim.Emulator.RFlexController.Motors do
   @moduledoc """
   Both axes of the controller, forward and turn: commanded speeds with their accelerations, the
-  brake, the stop when commands are missing, and the counters. Pure; counts are the controller's,
-  times milliseconds.
+  brake, the stop when commands are missing, and the counters. Pure; counts are in the
+  controller's units, times in milliseconds.
 
-  What the sheet leaves open: an acceleration of 0 leaves the axis with the one before; a set brake stops the
-  wheels at once, and takes no speed while it is set; an axis gets no faster than a base of that size can, 2.5 m/s and
-  5 rad/s, whatever it is told. (A command damaged on its way, whose checksum fits all the same, may ask for 20 m/s
-  at 100 m/s2; an axis that took that as it stands would brake from it for 20 s.)
+  Where the sheet leaves it open: an acceleration of 0 keeps the previous one; a set brake stops
+  the wheels at once, and no speed is accepted while it is set; an axis gets no faster than a base
+  of that size can, 2.5 m/s and 5 rad/s, whatever the command. (A damaged command whose checksum
+  happens to fit may ask for 20 m/s at 100 m/s2; an axis that obeyed would then brake for 20 s.)
   """
   import Bitwise
   alias Hal.{Odometry, Pose, Twist}
 
-  # The fastest that an axis goes, m/s and rad/s.
+  # The maximum speed of an axis, in m/s and rad/s.
   @top_linear 2.5
   @top_turn 5.0
 
@@ -66,7 +66,7 @@ defmodule Sim.Emulator.RFlexController.Motors do
     if set?, do: %{still(motors) | brake?: true}, else: %{motors | brake?: false}
   end
 
-  @doc "Stops both axes, by their accelerations."
+  @doc "Stops both axes with their accelerations."
   @spec halt(t(), integer()) :: t()
   def halt(%__MODULE__{} = motors, at_ms), do: motors |> advance(at_ms) |> aim_at_rest()
 
@@ -88,7 +88,7 @@ defmodule Sim.Emulator.RFlexController.Motors do
 
   def advance(motors, _same_ms), do: motors
 
-  @doc "When they stop because no command came; `nil` when none is awaited."
+  @doc "When the motors stop because no command came; `nil` if no command is awaited."
   @spec end_ms(t()) :: integer() | nil
   def end_ms(%__MODULE__{timeout_ms: :off}), do: nil
   def end_ms(%__MODULE__{commanded_ms: nil}), do: nil
@@ -114,14 +114,14 @@ defmodule Sim.Emulator.RFlexController.Motors do
 
   defp towards(from, to, most), do: from + ((to - from) |> max(-most) |> min(most))
 
-  @doc "The speed that the wheels are to have now."
+  @doc "The speed that the wheels should have now."
   @spec wanted(t()) :: Twist.t()
   def wanted(%__MODULE__{axes: {way, turn}, conversions: {distance, angle}}),
     do: Twist.new(way.ramp / distance, turn.ramp / angle)
 
   @doc """
-  The counters, after the wheels went on to this reading. What they went is taken from the poses, so that a
-  reading which is lost on its way loses no count.
+  The counters after the wheels moved on to this reading. The distance is computed from the poses,
+  so that a lost reading does not lose counts.
   """
   @spec roll(t(), Odometry.t()) :: t()
   def roll(%__MODULE__{} = motors, %Odometry{pose: pose, twist: twist}) do
@@ -142,7 +142,7 @@ defmodule Sim.Emulator.RFlexController.Motors do
     {(to.x - from.x) * :math.cos(middle) + (to.y - from.y) * :math.sin(middle), turn}
   end
 
-  @doc "Where an axis is and how fast it goes: counter and counts/s, signed 32 bits."
+  @doc "The position and speed of an axis: counter and counts/s, signed 32 bits."
   @spec counts(t(), axis()) :: {position :: integer(), velocity :: integer()}
   def counts(%__MODULE__{} = motors, axis) do
     conversion = elem(motors.conversions, axis)
@@ -150,7 +150,7 @@ defmodule Sim.Emulator.RFlexController.Motors do
     {wrap(elem(motors.start, axis) + gone), wrap(round(elem(motors.measured, axis) * conversion))}
   end
 
-  @doc "What an axis was told last: acceleration and torque."
+  @doc "The last command to an axis: acceleration and torque."
   @spec told(t(), axis()) :: {non_neg_integer(), non_neg_integer()}
   def told(%__MODULE__{axes: axes}, axis) do
     %{acceleration: acceleration, torque: torque} = elem(axes, axis)

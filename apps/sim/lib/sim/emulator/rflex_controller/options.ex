@@ -1,6 +1,7 @@
 defmodule Sim.Emulator.RFlexController.Options do
   @moduledoc """
-  What an emulated controller is like, checked. Pure. All options have defaults, those of the `:kind`.
+  The checked options of an emulated controller. Pure. All options have defaults, which depend on
+  the `:kind`.
 
   | option | allowed | meaning |
   |---|---|---|
@@ -8,20 +9,20 @@ defmodule Sim.Emulator.RFlexController.Options do
   | `:conversions` | keywords `distance`, `angle`, `range`, `ir_a`, `ir_b`; numbers, not 0 | counts a metre, counts a radian, raw sonar a metre; infrared range = a V^b metres |
   | `:sonar_banks`, `:ir_banks` | lists of 0 to 16, 0 to 8 | sensors fitted on each board |
   | `:ir_wiring` | list of whole numbers | the profile's infrared on each input, bank after bank |
-  | `:sonar_per_report` | 1 to 64 | after how many echoes they are told (4) |
+  | `:sonar_per_report` | 1 to 64 | number of echoes in a report (4) |
   | `:missed_echo` | 0 to 0xFFFF | raw range when no echo comes (0x7FFF) |
-  | `:sonar_max`, `:ir_max` | metres | from where on the body's ranges mean nothing was there (5.1, 0.8) |
-  | `:bumper_style` | `:bit`, `:address` | one bit or one address a bumper (`:bit`) |
-  | `:bumper_base`, `:bumpers` | byte, 0 to 16 | first address, how many there are |
-  | `:counters` | `{distance, bearing}` | what they count from, signed 32 bits (`{0, 0}`) |
-  | `:timeout_ms` | whole number or `:off` | motors stop when no motion command came for so long (1000) |
-  | `:brake` | `:set`, `:released` | when it is switched on (`:set`); a set brake holds the wheels |
+  | `:sonar_max`, `:ir_max` | metres | ranges of the body from this on mean that nothing was there (5.1, 0.8) |
+  | `:bumper_style` | `:bit`, `:address` | one bit or one address per bumper (`:bit`) |
+  | `:bumper_base`, `:bumpers` | byte, 0 to 16 | first address, number of bumpers |
+  | `:counters` | `{distance, bearing}` | where they start to count, signed 32 bits (`{0, 0}`) |
+  | `:timeout_ms` | whole number or `:off` | motors stop if no motion command came for this long (1000) |
+  | `:brake` | `:set`, `:released` | state when it is switched on (`:set`); a set brake holds the wheels |
   | `:ghost` | `:off`, `:infrared`, `:all` | see `Sim.Emulator.RFlexController.Frame` |
   | `:escape` | `:drop`, `:take` | turn commands with 1B in their top or third byte are lost, or not (`:drop`) |
-  | `:pace` | `{ms, room}` or `:off` | a command each so many ms, and no more than room may wait (`:off`) |
-  | `:give_up_ms` | 1 to 10000 | how long the rest of a command is waited for (50) |
+  | `:pace` | `{ms, room}` or `:off` | takes one command every `ms`, and at most `room` may wait (`:off`) |
+  | `:give_up_ms` | 1 to 10000 | how long it waits for the rest of a command (50) |
   | `:phrase` | bytes or `nil` | text on the line that switches it off ("The system is halted", R95) |
-  | `:power_offset` | volts | what the true voltage is above the reported one (0.0; mini 1.2) |
+  | `:power_offset` | volts | true voltage minus reported voltage (0.0; mini 1.2) |
   | `:home` | `{address, from, to}` or `nil` | switch that is closed between two bearings, radians |
   | `:id` | byte | of the first report (0) |
   """
@@ -81,7 +82,7 @@ defmodule Sim.Emulator.RFlexController.Options do
   ]
 
   @doc """
-  All options of a controller, or one line that names what is wrong.
+  All options of a controller; the error is one line that names what is wrong.
 
       iex> {:ok, options} = Sim.Emulator.RFlexController.Options.check(kind: :atrv_mini, timeout_ms: :off)
       iex> {options.conversions[:angle], options.timeout_ms}

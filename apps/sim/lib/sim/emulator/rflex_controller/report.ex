@@ -6,7 +6,7 @@ defmodule Sim.Emulator.RFlexController.Report do
 
   @type data :: {port :: byte(), opcode :: byte(), binary()}
 
-  @doc "One axis: counter, counts/s, and what it was told last."
+  @doc "One axis: counter, counts/s, and the last command."
   @spec motor(non_neg_integer(), 0 | 1, {integer(), integer()}, {integer(), integer()}) :: data()
   def motor(at, axis, {position, velocity}, {acceleration, torque}) do
     {2, 33, <<0::32, at::32, axis, position::32, velocity::32, acceleration::32, torque::32>>}
@@ -34,7 +34,7 @@ defmodule Sim.Emulator.RFlexController.Report do
   @spec input(non_neg_integer(), byte(), 0..0xFFFF) :: data()
   def input(at, address, state), do: {5, 1, <<at::32, address, state::16>>}
 
-  @doc "The answer to a wish for digital inputs, of which nobody knows what it is good for."
+  @doc "The answer to a request for digital inputs; its purpose is unknown."
   @spec inputs_wanted(non_neg_integer()) :: data()
   def inputs_wanted(at), do: {5, 0, <<0::32, at::32>>}
 

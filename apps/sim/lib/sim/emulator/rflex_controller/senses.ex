@@ -1,13 +1,15 @@
 defmodule Sim.Emulator.RFlexController.Senses do
   @moduledoc """
-  Converts what the body feels to the numbers of a controller's boards: bumpers as digital inputs,
-  infrared as bytes of a converter (fact sheet rFLEX, sections 6, 7 and 12). Pure.
+  Converts what the body senses to the numbers of a controller's boards: bumpers as digital
+  inputs, infrared as bytes of a converter (fact sheet rFLEX, sections 6, 7 and 12). Pure.
   """
 
   @doc """
-  The digital inputs' states by address, for pressed segments counted counter-clockwise from the front.
+  The states of the digital inputs by address, for pressed segments counted counter-clockwise from
+  the front.
 
-  The sheet knows no places of bumpers and proposes those of the sonars: number 11 in front, clockwise.
+  The sheet does not give the places of bumpers and proposes those of the sonars: number 11 in
+  front, clockwise.
 
       iex> {:ok, options} = Sim.Emulator.RFlexController.Options.check([])
       iex> Sim.Emulator.RFlexController.Senses.inputs([0, 9], options)
@@ -35,7 +37,8 @@ defmodule Sim.Emulator.RFlexController.Senses do
   def inputs(_pressed, _no_bumpers), do: %{}
 
   @doc """
-  The infrared boards' bytes, for the body's ranges in metres: the nearest byte to the V of range = a V^b.
+  The bytes of the infrared boards, for the body's ranges in metres: the byte nearest to the V of
+  range = a V^b.
 
       iex> {:ok, options} = Sim.Emulator.RFlexController.Options.check([])
       iex> [first, _second] = Sim.Emulator.RFlexController.Senses.infrared(List.duplicate(0.4, 16), options)
@@ -55,7 +58,7 @@ defmodule Sim.Emulator.RFlexController.Senses do
     boards
   end
 
-  # With nothing near it gives what something half as far again would.
+  # If nothing is near, it returns the value for something at 1.5 times the maximum range.
   defp volts(range, %{conversions: conversions, ir_max: ir_max}) do
     range = if range >= ir_max, do: 1.5 * ir_max, else: max(range, 0.01)
     round(:math.pow(range / conversions[:ir_a], 1 / conversions[:ir_b])) |> max(0) |> min(255)

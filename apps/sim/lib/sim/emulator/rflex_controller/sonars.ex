@@ -1,15 +1,16 @@
 defmodule Sim.Emulator.RFlexController.Sonars do
   @moduledoc """
-  The sonars fire one after the other: each listens for the echo delay and rests for the ping delay, and each sweep is
-  followed by the set delay (fact sheet rFLEX, section 5). Pure; times in microseconds.
+  Fires the sonars one after the other: each listens for the echo delay and rests for the ping
+  delay, and each sweep is followed by the set delay (fact sheet rFLEX, section 5). Pure; times in
+  microseconds.
 
-  The echo of a sonar is what the body felt last when its listening ends.
+  The echo of a sonar is what the body sensed last when its listening ends.
   """
 
-  # Sound goes 343 m/s, there and back.
+  # Sound travels at 343 m/s, there and back.
   @metre_per_us 343 / 2 / 1.0e6
 
-  # A controller told to wait for nothing would never come to an end.
+  # With delays of 0 the loop would never end.
   @least_us 1_000
 
   @enforce_keys [:echo_us, :each_us, :set_us, :next_us]
@@ -17,7 +18,7 @@ defmodule Sim.Emulator.RFlexController.Sonars do
 
   @type t :: %__MODULE__{}
 
-  @doc "Sonars that begin to fire now, with the delays of the command."
+  @doc "Sonars that start to fire now, with the delays of the command."
   @spec start({non_neg_integer(), non_neg_integer(), non_neg_integer()}, integer()) :: t()
   def start({echo_us, ping_us, set_us}, at_us) do
     each_us = max(echo_us + ping_us, @least_us)
@@ -36,14 +37,14 @@ defmodule Sim.Emulator.RFlexController.Sonars do
   end
 
   @doc """
-  What is told by now: lists of `{id, raw}`, one a report. `ranges` are the body's, in metres; without them nothing
-  fires.
+  The reports that are due: lists of `{id, raw}`, one per report. `ranges` are the body's, in
+  metres; without them no sonar fires.
   """
   @spec run(t(), [float()], map(), integer()) :: {[[{byte(), 0..0xFFFF}]], t()}
   def run(%__MODULE__{} = sonars, ranges, options, at_us) do
     ids = ids(options.sonar_banks)
     count = min(length(ids), length(ranges))
-    # Held up for longer than a sweep, it does not make up for it.
+    # After a delay of more than a sweep it does not make up for it.
     late_us = at_us - sonars.next_us - count * sonars.each_us - sonars.set_us
     sonars = if late_us > 0, do: %{sonars | next_us: sonars.next_us + late_us}, else: sonars
 

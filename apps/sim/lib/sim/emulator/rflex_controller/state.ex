@@ -31,7 +31,10 @@ defmodule Sim.Emulator.RFlexController.State do
                 counts: %{frames: 0, bad: 0, unknown: 0, lost: 0, escaped: 0}
               ]
 
-  @typedoc "`motion`, `inputs_wanted` and `infrared` are `{next_ms, period_ms, argument}` while they are told."
+  @typedoc """
+  `motion`, `inputs_wanted` and `infrared` are `{next_ms, period_ms, argument}` while they are
+  reported.
+  """
   @type t :: %__MODULE__{}
 
   @doc "A controller with these checked options, just switched on."
@@ -47,7 +50,7 @@ defmodule Sim.Emulator.RFlexController.State do
     }
   end
 
-  @doc "Puts a report into what is to be sent."
+  @doc "Adds a report to what will be sent."
   @spec tell(t(), RFlexController.Report.data()) :: t()
   def tell(%__MODULE__{} = core, {port, opcode, data}) do
     frame = Frame.encode({port, core.id, opcode, data}, core.options.ghost)

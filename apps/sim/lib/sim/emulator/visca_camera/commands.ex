@@ -9,7 +9,7 @@ defmodule Sim.Emulator.ViscaCamera.Commands do
   @fastest {24, 20}
   @presets 0..5
 
-  @typedoc "A command that made sense: what it does to the camera, and what its socket waits for."
+  @typedoc "A valid command: what it does to the camera, and what its socket waits for."
   @type order ::
           {:power, :on | :off}
           | {:zoom, integer()}
@@ -22,7 +22,7 @@ defmodule Sim.Emulator.ViscaCamera.Commands do
           | {:focus, :auto | :manual}
           | {:screen, :on | :off | :toggle}
 
-  @doc "The camera after a command (without its first byte, 01), with its answers on their way."
+  @doc "The camera after a command (without its first byte, 01), with its pending answers."
   @spec command(ViscaCamera.State.t(), binary(), integer()) :: ViscaCamera.State.t()
   def command(%ViscaCamera.State{} = camera, bytes, at_ms) do
     order = read(bytes)
@@ -64,7 +64,7 @@ defmodule Sim.Emulator.ViscaCamera.Commands do
   defp act({:zoom, place}, camera, _at_ms),
     do: {head(camera, &Head.zoom(&1, place, camera.options.zoom_ms)), :zoom}
 
-  # Of seven speeds the last is the fastest.
+  # The last of seven speeds is the fastest.
   defp act({:zoom_on, way, speed}, camera, at_ms) do
     all_ms = div(camera.options.zoom_ms * 7, speed)
     {head(camera, &Head.zoom_on(&1, way, all_ms)), {:until, at_ms}}

@@ -1,10 +1,11 @@
 defmodule Sim.Emulator.ViscaCamera.Head do
   @moduledoc """
-  What moves in the camera: pan and tilt with the rates of their speed numbers, and zoom (fact sheet VISCA, section
-  5). Pure; positions in the camera's units (pan to the right, tilt up, zoom to tele positive), times in milliseconds.
+  The moving parts of the camera: pan and tilt with the rates of their speed numbers, and zoom
+  (fact sheet VISCA, section 5). Pure; positions in the camera's units (pan to the right, tilt up,
+  zoom to tele positive), times in milliseconds.
 
-  An axis goes to a place or drives until it is stopped or at its end. Pan and tilt move each by itself; a way may
-  have several corners.
+  An axis goes to a position or drives until it is stopped or at its end. Pan and tilt move
+  independently; a path may have several corners.
   """
 
   @ends {880, 300}
@@ -20,14 +21,17 @@ defmodule Sim.Emulator.ViscaCamera.Head do
             motion: :still,
             zooming: :still
 
-  @typedoc "`motion` is `:still`, `{:to, [{pan, tilt}], rates}` or `{:drive, units_per_s}`; `zooming` alike, in one number."
+  @typedoc """
+  `motion` is `:still`, `{:to, [{pan, tilt}], rates}` or `{:drive, units_per_s}`; `zooming` is
+  alike, with one number.
+  """
   @type t :: %__MODULE__{}
 
-  @doc "Whether it is on its way to a place, which a drive may not disturb."
+  @doc "Whether it is on its way to a position, which a drive may not interrupt."
   @spec going?(t()) :: boolean()
   def going?(%__MODULE__{motion: motion}), do: match?({:to, _, _}, motion)
 
-  @doc "Goes to these places, one after the other, with these speed numbers."
+  @doc "Goes to these positions, one after the other, with these speed numbers."
   @spec go(t(), [{number(), number()}, ...], {1..24, 1..20}) :: t()
   def go(%__MODULE__{} = head, places, {pan_speed, tilt_speed}) do
     {pan_rate, tilt_rate} = @rates
@@ -39,7 +43,7 @@ defmodule Sim.Emulator.ViscaCamera.Head do
     end
   end
 
-  @doc "Drives: signed speed numbers, 0 for an axis that stands."
+  @doc "Drives with signed speed numbers, 0 for an axis that stands."
   @spec drive(t(), {-24..24, -20..20}) :: t()
   def drive(%__MODULE__{} = head, {0, 0}), do: %{head | motion: :still}
 
@@ -48,7 +52,7 @@ defmodule Sim.Emulator.ViscaCamera.Head do
     %{head | motion: {:drive, {pan * pan_rate, tilt * tilt_rate}}}
   end
 
-  @doc "Zooms to a place, from wide to tele in so many milliseconds."
+  @doc "Zooms to a position; the whole way from wide to tele takes so many milliseconds."
   @spec zoom(t(), number(), pos_integer()) :: t()
   def zoom(%__MODULE__{} = head, place, all_ms) do
     place = place |> max(0) |> min(@tele)
@@ -66,7 +70,10 @@ defmodule Sim.Emulator.ViscaCamera.Head do
   @spec stop(t()) :: t()
   def stop(%__MODULE__{} = head), do: %{head | motion: :still}
 
-  @doc "Sets a corner of where it may look: 1 up and right, 0 down and left; or both free again by `nil`."
+  @doc """
+  Limits where it may look by a corner: 1 up and right, 0 down and left; `nil` removes both
+  limits.
+  """
   @spec limit(t(), 0 | 1, {integer(), integer()} | nil) :: t()
   def limit(%__MODULE__{limits: {{left, _}, {down, _}}} = head, 1, place) do
     {right, up} = place || @ends
@@ -125,7 +132,7 @@ defmodule Sim.Emulator.ViscaCamera.Head do
   defp needs_ms(head, {pan, tilt}, {pan_rate, tilt_rate}),
     do: 1000 * max(abs(pan - head.pan) / pan_rate, abs(tilt - head.tilt) / tilt_rate)
 
-  @doc "When pan and tilt will be where they go to; `nil` when they go nowhere."
+  @doc "When pan and tilt will be at their target; `nil` if they have none."
   @spec there_ms(t()) :: integer() | nil
   def there_ms(%__MODULE__{motion: {:to, places, rates}} = head) do
     {ms, _head} =
@@ -138,7 +145,7 @@ defmodule Sim.Emulator.ViscaCamera.Head do
 
   def there_ms(_nowhere), do: nil
 
-  @doc "The same of the zoom."
+  @doc "The same for the zoom."
   @spec zoomed_ms(t()) :: integer() | nil
   def zoomed_ms(%__MODULE__{zooming: {:to, place, rate}} = head),
     do: head.at_ms + ceil(1000 * abs(place - head.zoom) / rate)
@@ -149,11 +156,13 @@ defmodule Sim.Emulator.ViscaCamera.Head do
   defp towards(from, to, most) when to < from - most, do: from - most
   defp towards(_from, to, _most), do: to * 1.0
 
-  @doc "The field of view through a lens, in radians; linear, as the sheet's, though no lens is."
+  @doc """
+  The field of view of a lens, in radians; linear as in the sheet, although real lenses are not.
+  """
   @spec field_of_view(t(), {tele :: number(), wide :: number()}) :: float()
   def field_of_view(%__MODULE__{zoom: zoom}, {tele, wide}), do: wide + zoom * (tele - wide) / 1024
 
-  @doc "Where it looks, in radians: left and up positive."
+  @doc "Its direction of view in radians, left and up positive."
   @spec angles(t()) :: {pan :: float(), tilt :: float()}
   def angles(%__MODULE__{pan: pan, tilt: tilt}),
     do: {-pan / 8.8 * :math.pi() / 180, tilt / 12.0 * :math.pi() / 180}

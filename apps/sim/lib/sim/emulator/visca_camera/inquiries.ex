@@ -3,9 +3,12 @@ defmodule Sim.Emulator.ViscaCamera.Inquiries do
   alias Sim.Emulator.ViscaCamera
   alias Sim.Emulator.ViscaCamera.{Head, Packet}
 
-  @doc "The data of an answer, or the code of an error: 2 for what nobody asks, 0x41 while it is switched off."
+  @doc """
+  The data of an answer, or the code of an error: 2 for an unknown inquiry, 0x41 while it is
+  switched off.
+  """
   @spec ask(ViscaCamera.State.t(), binary()) :: {:ok, binary()} | {:error, 0x02 | 0x41}
-  # Vendor, model, release of its program, sockets.
+  # Vendor, model, release of the firmware, sockets.
   def ask(_camera, <<0x00, 0x02>>), do: {:ok, <<0x00, 0x20, 0x04, 0x02, 0x01, 0x00, 0x02>>}
   def ask(camera, <<0x04, 0x00>>), do: {:ok, flag(camera.power == :on)}
   def ask(%{power: :on, head: head} = camera, what), do: asked(what, head, camera)
@@ -22,7 +25,7 @@ defmodule Sim.Emulator.ViscaCamera.Inquiries do
 
   defp asked(<<0x06, 0x11>>, _head, _camera), do: {:ok, <<0x18, 0x14>>}
 
-  # Nobody knows the meaning of the bits; one tells whether it goes somewhere.
+  # The meaning of the bits is unknown; one tells whether the head is moving to a position.
   defp asked(<<0x06, 0x10>>, head, _camera),
     do: {:ok, if(Head.going?(head), do: <<0x04, 0x00>>, else: <<0x00, 0x00>>)}
 

@@ -1,18 +1,18 @@
 defmodule Sim.Emulator.ViscaCamera.Options do
   @moduledoc """
-  What an emulated camera is like, checked. Pure.
+  The checked options of an emulated camera. Pure.
 
   | option | allowed | default |
   |---|---|---|
-  | `:latency_ms` | 0 to 1000: how long it thinks before it answers | 16 |
-  | `:power` | `:on`, `:off`, when it gets current | `:on` |
+  | `:latency_ms` | 0 to 1000: how long it takes to answer | 16 |
+  | `:power` | `:on`, `:off`: state when it gets power | `:on` |
   | `:power_on_ms` | 0 to 60000: from the power command to its completion | 2000 |
-  | `:drive_done` | `:at_once`, `:at_stop`: when a drive is said to be completed | `:at_once` |
+  | `:drive_done` | `:at_once`, `:at_stop`: when a drive is reported as completed | `:at_once` |
   | `:zoom_ms` | 1 to 60000: from wide to tele | 2000 |
-  | `:lens` | `{tele, wide}`, fields of view in radians; between them they go by the zoom's number | 4.4 and 48.8 degrees |
-  | `:drop` | share of answers never given, 0 to 1 | 0 |
-  | `:seed` | whole number, of what is dropped | 0 |
-  | `:announce` | whether it tells the chain when it gets current again | true |
+  | `:lens` | `{tele, wide}`, fields of view in radians; interpolated between them by the zoom position | 4.4 and 48.8 degrees |
+  | `:drop` | share of answers that are lost, 0 to 1 | 0 |
+  | `:seed` | whole number, seed of the dropped answers | 0 |
+  | `:announce` | whether it announces itself to the chain when it gets power again | true |
   """
 
   alias Hal.Options
@@ -34,7 +34,7 @@ defmodule Sim.Emulator.ViscaCamera.Options do
   ]
 
   @doc """
-  All options, or one line that names what is wrong.
+  All options; the error is one line that names what is wrong.
 
       iex> {:ok, options} = Sim.Emulator.ViscaCamera.Options.check(latency_ms: 5)
       iex> {options.latency_ms, options.power}

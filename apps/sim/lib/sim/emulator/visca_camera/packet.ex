@@ -5,14 +5,15 @@ defmodule Sim.Emulator.ViscaCamera.Packet do
   Numbers of 16 bits travel as four bytes of four bits each. The camera is the first of its chain.
   """
 
-  # Header, 14 bytes and the end.
+  # Header, 14 bytes and terminator.
   @longest 16
 
-  @typedoc "What was said to the camera; `:long` and `:other` have no readable content."
+  @typedoc "What was sent to the camera; `:long` and `:other` have no readable content."
   @type t :: {:to_me, binary()} | {:to_all, binary()} | :long | :other
 
   @doc """
-  Cuts a stream into packets and the unfinished rest, of which no more is kept than shows that it is too long.
+  Splits a stream into packets and the unfinished rest; only as much of the rest is kept as shows
+  that it is too long.
 
       iex> Sim.Emulator.ViscaCamera.Packet.cut(<<0x81, 0x09, 0x04, 0x00, 0xFF, 0x88, 0x30>>)
       {[{:to_me, <<0x09, 0x04, 0x00>>}], <<0x88, 0x30>>}
@@ -44,7 +45,7 @@ defmodule Sim.Emulator.ViscaCamera.Packet do
   end
 
   @doc """
-  And back; `:error` if one of the bytes has more than four bits.
+  The number in four bytes; `:error` if one of the bytes has more than four bits.
 
       iex> Sim.Emulator.ViscaCamera.Packet.number(<<0x0F, 0x0E, 0x0F, 0x08>>)
       {:ok, -264}

@@ -24,7 +24,7 @@ defmodule Sim.Emulator.ViscaCamera.State do
   @type t :: %__MODULE__{}
   @type job :: :way | :zoom | :drive | {:until, integer()}
 
-  @doc "A camera that has just got current."
+  @doc "A camera that was just switched on."
   @spec boot(map(), integer()) :: t()
   def boot(options, at_ms) do
     %__MODULE__{
@@ -35,11 +35,11 @@ defmodule Sim.Emulator.ViscaCamera.State do
     }
   end
 
-  @doc "Answers, after it has thought."
+  @doc "Adds an answer, which is sent after the latency."
   @spec answer(t(), binary(), integer()) :: t()
   def answer(camera, bytes, at_ms), do: say(camera, Packet.answer(bytes), at_ms)
 
-  @doc "The same with the whole packet."
+  @doc "The same with the whole packet given."
   @spec say(t(), binary(), integer()) :: t()
   def say(%__MODULE__{options: options, answered: n} = camera, packet, at_ms) do
     camera = %{camera | answered: n + 1}
@@ -50,14 +50,14 @@ defmodule Sim.Emulator.ViscaCamera.State do
       else: %{camera | out: camera.out ++ [{at_ms + options.latency_ms, packet}]}
   end
 
-  @doc "What has been answered by now."
+  @doc "The answers that are due by now."
   @spec due(t(), integer()) :: {iodata(), t()}
   def due(%__MODULE__{out: out} = camera, at_ms) do
     {now, later} = Enum.split_while(out, fn {due_ms, _packet} -> due_ms <= at_ms end)
     {for({_due_ms, packet} <- now, do: packet), %{camera | out: later}}
   end
 
-  @doc "When it answers next, or a job that only waits is done."
+  @doc "When the next answer is due, or a job that only waits is done."
   @spec next_ms(t()) :: integer() | nil
   def next_ms(%__MODULE__{out: out, sockets: sockets}) do
     answers = for {due_ms, _packet} <- Enum.take(out, 1), do: due_ms
@@ -97,7 +97,7 @@ defmodule Sim.Emulator.ViscaCamera.State do
   defp done?(:drive, camera), do: camera.head.motion == :still
   defp done?({:until, until_ms}, camera), do: camera.at_ms >= until_ms
 
-  @doc "Gives up what a socket is at; what moves for it stands."
+  @doc "Cancels the job of a socket; what moves for it stops."
   @spec cancel(t(), integer(), integer()) :: t()
   def cancel(%__MODULE__{sockets: sockets} = camera, socket, at_ms) do
     case sockets do
@@ -114,7 +114,7 @@ defmodule Sim.Emulator.ViscaCamera.State do
   defp stop(head, job) when job in [:way, :drive], do: Head.stop(head)
   defp stop(head, _waits), do: head
 
-  @doc "Forgets both sockets, and what was to be answered."
+  @doc "Clears both sockets and the pending answers."
   @spec clear(t()) :: t()
   def clear(%__MODULE__{} = camera),
     do: %{camera | sockets: %{1 => nil, 2 => nil}, out: [], head: Head.stop(camera.head)}

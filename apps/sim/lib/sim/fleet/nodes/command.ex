@@ -7,12 +7,14 @@ defmodule Sim.Fleet.Nodes.Command do
   # and few threads.
   @emulator ~w(+S 1:1 +SDcpu 1:1 +SDio 1 +A 1 +sbwt none +sbwtdcpu none +sbwtdio none)
 
-  # A cut link must not make healthy nodes leave each other, and nobody dials by the way.
+  # A cut link must not make healthy nodes disconnect from each other, and sending must not open
+  # connections.
   @kernel ~w(-kernel prevent_overlapping_partitions false -kernel connect_all false
              -kernel dist_auto_connect never -kernel inet_dist_use_interface {127,0,0,1})
 
   @doc """
-  The arguments of `erl` for a node, with the code of these folders, and the formations that this build adds.
+  The arguments of `erl` for a node with the code in these folders and the formations that this
+  build adds.
 
       iex> Sim.Fleet.Nodes.Command.arguments(["a/ebin"]) |> Enum.take(-5)
       ["-pa", "a/ebin", "-s", "Elixir.Sim.Node", "main"]
@@ -31,7 +33,7 @@ defmodule Sim.Fleet.Nodes.Command do
   defp formations(added), do: ["-swarm", "formations", to_string(:io_lib.format("~0p", [added]))]
 
   @doc """
-  A node's name.
+  The name of a node.
 
       iex> Sim.Fleet.Nodes.Command.node_name(:mag1, "127.0.0.1")
       :"mag1@127.0.0.1"
@@ -40,7 +42,7 @@ defmodule Sim.Fleet.Nodes.Command do
   def node_name(id, host), do: :"#{id}@#{host}"
 
   @doc """
-  The lines that tell people of a fleet's processes.
+  The lines that tell people how to reach a fleet's processes.
 
       iex> [first, _world, attach | _] =
       ...>   Sim.Fleet.Nodes.Command.lines([{:mag1, :"mag1@127.0.0.1", 71}, {:world, :"world@127.0.0.1", 70}], "/tmp/x")

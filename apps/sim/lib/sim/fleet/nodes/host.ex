@@ -1,11 +1,11 @@
 defmodule Sim.Fleet.Nodes.Host do
   @moduledoc """
-  Makes this process of the operating system the node that starts others, on the loopback interface,
-  with a mesh of its own to hear them by.
+  Makes this process of the operating system the node that starts others, on the loopback
+  interface, with a mesh of its own through which it hears them.
 
-  The secret of a run is drawn at random. Nodes are told it on their standard input, and for the
-  people who want to attach its cookie lies in a folder that only this user can read; so it is in no
-  command line and no environment.
+  The secret of a run is random. Nodes get it on their standard input, and for people who want to
+  attach, its cookie is in a folder that only this user can read; so it is neither on a command
+  line nor in an environment.
   """
   alias Sim.Fleet.Folder
   alias Sim.Fleet.Nodes.PortMapper
@@ -31,7 +31,7 @@ defmodule Sim.Fleet.Nodes.Host do
   @spec host() :: String.t()
   def host, do: @host
 
-  @doc "Becomes a node with a mesh, for a fleet of these robots in those nodes."
+  @doc "Makes this process a node with a mesh, for a fleet of these robots in those nodes."
   @spec start([atom()], [node()]) :: {:ok, t()} | {:error, line :: String.t()}
   def start(fleet, nodes) do
     with :ok <- alone(),
@@ -61,8 +61,8 @@ defmodule Sim.Fleet.Nodes.Host do
   end
 
   @doc """
-  The options of a node's mesh. The ports are known, so nobody needs multicast, which not every
-  machine has on loopback; and all are connected to all, since the world is one of them.
+  The options of a node's mesh. The ports are known, so multicast, which not every machine has on
+  loopback, is not needed. All nodes are connected to all, because the world is one of them.
   """
   @spec mesh(t(), node()) :: keyword()
   def mesh(host, node) do
@@ -79,7 +79,9 @@ defmodule Sim.Fleet.Nodes.Host do
     ]
   end
 
-  @doc "Takes the mesh and the run's folder away, and the node's name, if it got that here."
+  @doc """
+  Ends the mesh, removes the run's folder, and gives up the node's name if it got that here.
+  """
   @spec stop(t()) :: :ok
   def stop(%__MODULE__{home: home, mesh: mesh, named: named}) do
     if Process.alive?(mesh), do: Supervisor.stop(mesh)
@@ -90,7 +92,8 @@ defmodule Sim.Fleet.Nodes.Host do
   defp alone do
     if Mesh.running?(),
       do:
-        {:error, "this node belongs to a mesh already; robots in nodes of their own need another"},
+        {:error,
+         "this node already belongs to a mesh; robots in nodes of their own need another one"},
       else: :ok
   end
 
@@ -122,7 +125,7 @@ defmodule Sim.Fleet.Nodes.Host do
     PortMapper.stop(mapper)
   end
 
-  # The kernel tells all about a failure; one line is enough.
+  # The kernel logs all details of a failure; one line is enough.
   defp quietly(function) do
     level = :logger.get_primary_config().level
     :logger.set_primary_config(:level, :none)
@@ -131,7 +134,7 @@ defmodule Sim.Fleet.Nodes.Host do
     result
   end
 
-  # All open at once, so that no two are the same.
+  # All are open at the same time, so that no two are equal.
   defp ports(nodes) do
     opened = for node <- nodes, do: {node, :gen_udp.open(0, ip: @address)}
 

@@ -9,8 +9,9 @@ defmodule Sim.Fleet.Nodes.PortMapper do
   @address {127, 0, 0, 1}
   @up_ms 2_000
   @down_ms 3_000
-  # It reads until it is told, or until the VM has ended, however. An epmd with names does not end: those of
-  # our own nodes go in a moment, those of others stay, and with them the epmd.
+  # It reads until it is told to end, or until the VM has ended in any way. An epmd with
+  # registered names does not end: the names of our own nodes disappear in a moment; if others
+  # remain, so does the epmd.
   @keeper """
   trap '' INT TERM HUP
   read -r _told
@@ -23,16 +24,19 @@ defmodule Sim.Fleet.Nodes.PortMapper do
   done
   """
 
-  @typedoc "What ends the epmd that we started; `nil` where it is not ours."
+  @typedoc "The port that ends the epmd that we started; `nil` if it is not ours."
   @type t :: port() | nil
 
-  @doc "Sees to it that one answers, if that can be; its keeper belongs to the calling process."
+  @doc """
+  Makes sure that an epmd answers, if possible; the port that ends it belongs to the calling
+  process.
+  """
   @spec start() :: t()
   def start do
     program = System.find_executable("epmd") || Path.join(erts(), "epmd")
 
     if not there?() and File.exists?(program) do
-      # A daemon, which does not hold our terminal. It returns before it listens.
+      # A daemon does not hold our terminal. It returns before it listens.
       System.cmd(program, ["-daemon"], env: [{"ERL_EPMD_ADDRESS", @host}])
       await(now() + @up_ms)
       sh = System.find_executable("sh")
@@ -41,7 +45,9 @@ defmodule Sim.Fleet.Nodes.PortMapper do
     end
   end
 
-  @doc "Ends it, where it is ours and nobody else uses it. Our own node must have left it before."
+  @doc """
+  Ends the epmd if it is ours and nobody else uses it. Our own node must have left it before.
+  """
   @spec stop(t()) :: :ok
   def stop(nil), do: :ok
 
