@@ -275,7 +275,7 @@ defmodule System.ReleaseAgainTest do
     for command <- ["start", "daemon"] do
       assert {said, 1} = robot([command], environment)
       assert [line] = String.split(said, "\n", trim: true)
-      assert line =~ ~r/^mag1 does not start: its TCP port \d+ is taken/
+      assert line =~ ~r/^mag1 does not start: its TCP port \d+ is in use/
       assert line =~ "it runs here already (robot status tells how it is, robot stop ends it)"
     end
 

@@ -17,13 +17,15 @@ defmodule Swarm do
       iex> Swarm.estop()
       :ok
 
-  Every command answers within half a second: `:ok`, which means accepted by the part of the robot that
-  carries it out, not done, or `{:error, line}` that names what was wrong and what is allowed, or who did not
-  answer. Of what stops, arms or resets a robot, `:ok` means that it is so. Nothing raises, whatever it is given. A
-  command to several robots is `:ok` when all have accepted it; where some refuse, they are named, and the others obey.
+  Every command answers within half a second: `:ok`, which means that the responsible process of
+  the robot has accepted it, not that it is done, or `{:error, line}`, which names what was wrong
+  and what is allowed, or who did not answer. For commands that stop, arm or reset a robot, `:ok`
+  means that this has happened. Nothing raises, whatever the arguments. A command to several
+  robots is `:ok` when all have accepted it; if some refuse, the error names them, and the others
+  obey.
 
-  Robots are atoms (`:mag1`), or their names as text. A robot does what it was told last: one that is
-  sent somewhere leaves the group's mission, which goes on without it until the next start.
+  Robots are atoms (`:mag1`), or their names as text. A robot obeys its last command: a robot that
+  is sent somewhere leaves the group's mission, which goes on without it until the next start.
   """
   alias Robot.Command
   alias Swarm.{Commands, Formation, Status}
@@ -38,7 +40,8 @@ defmodule Swarm do
   @type answer :: :ok | {:error, line :: String.t()}
 
   @doc """
-  Drives a robot to a place in the map (metres), and turns it there if a heading (radians) is given.
+  Drives a robot to a place in the map (metres), and turns it there to a heading (radians) if one
+  is given.
 
       Swarm.goto(:mag1, {2.0, 1.0})
       Swarm.goto(:mag1, {2.0, 1.0, 1.57})
@@ -55,7 +58,7 @@ defmodule Swarm do
        "#{inspect(place)} is not a place; write {x, y} or {x, y, heading} in metres and radians"}
 
   @doc """
-  Lets a robot follow another, one metre behind it, until told otherwise.
+  Lets a robot follow another, one metre behind it, until the next command.
 
       Swarm.follow(:min1, :mag1)
   """
@@ -67,11 +70,12 @@ defmodule Swarm do
 
   @doc """
   Starts the group's mission: find the landmark, elect who leads, follow in formation. Options:
-  `formation` (`:wedge` or `{:wedge, 1.2}`), `assign` (`:chain` or `:cost`), `leader_change` (whether
-  another robot may take over), `robots` (who takes part, default `:all`), `policy` (`:available`, the
-  default: each part of a divided fleet leads itself, or `:majority`: only more than half of the
-  fleet, whose size is the number of `robots` unless `of` says another), `lost_link` (`:stop`, `:hold` or `:continue`: what a robot does
-  that hears nobody any more; `Missions.Landmark.Policy`).
+  `formation` (`:wedge` or `{:wedge, 1.2}`), `assign` (`:chain` or `:cost`), `leader_change`
+  (whether another robot may take over), `robots` (who takes part, default `:all`), `policy`
+  (`:available`, the default: each part of a divided fleet leads itself, or `:majority`: only more
+  than half of the fleet, whose size is the number of `robots` unless `of` says another),
+  `lost_link` (`:stop`, `:hold` or `:continue`: what a robot does when it no longer hears anybody;
+  `Missions.Landmark.Policy`).
 
       Swarm.start()
       Swarm.start(formation: {:diamond, 1.0}, robots: [:mag1, :mag2, :min1])
@@ -83,9 +87,10 @@ defmodule Swarm do
   end
 
   @doc """
-  Changes the formation of the running mission: `:ok` when all that are on one have it. One that does not answer, or
-  refuses, is named, as it may be the one that leads; the others keep the new shape. Options: `spacing` (0.8 to 5 m, default 1), `length`
-  of a line, `side` of a triangle.
+  Changes the formation of the running mission: `:ok` when all robots on a mission have it. The
+  error names robots that do not answer or refuse, because one of them may be the leader; the
+  others keep the new shape. Options: `spacing` (0.8 to 5 m, default 1), `length` of a line,
+  `side` of a triangle.
 
       Swarm.formation(:wedge)
       Swarm.formation(:column, spacing: 1.5)
@@ -106,13 +111,14 @@ defmodule Swarm do
       Swarm.tell([:mag1, :mag2], "move:0.2:0.1")
       Swarm.tell(:all, "stop")
 
-  `"ping"` is a question: who answers says who it is, since when it is up, and in what state it is since when.
+  `"ping"` is a question: a robot answers with its name, how long it has been up, and its state
+  and for how long it has been in it.
 
       Swarm.tell(:mag1, "ping")
       {:ok, "mag1 on mag1@convoy, up for 12 min 3 s, follow for 34 s"}
 
-  `subscribe`, `unsubscribe`, `position` and `blob` are words of robots among themselves, and refused: what
-  they would bring comes with every heartbeat.
+  `subscribe`, `unsubscribe`, `position` and `blob` are commands between robots, and are refused:
+  every heartbeat carries what they would bring.
   """
   @spec tell(robot() | [robot()] | :all, String.t()) :: answer() | {:ok, line :: String.t()}
   def tell(to, text) when is_binary(text) do
@@ -124,14 +130,15 @@ defmodule Swarm do
       {:error, "#{inspect(other)} is not a command; write one as text, such as \"goto:2.0:1.0\""}
 
   @doc """
-  How all robots are, one line each in `iex`; those that do not answer by their rows. Each has its numbered
-  view, who is there, and whom it hears (`Swarm.Status`).
+  The status of all robots, one line each in `iex`; for those that do not answer, from their rows
+  on the blackboard. Each has its numbered view of the robots present, and the robots that it
+  hears (`Swarm.Status`).
   """
   @spec status() :: [Status.t()]
   def status, do: Report.all()
 
   @doc """
-  How one robot is; one that does not answer as its row on the blackboard says, however old.
+  The status of one robot; if it does not answer, from its row on the blackboard, however old.
 
       Swarm.status(:mag1)
       Swarm.status(:mag1).rejected
@@ -139,15 +146,15 @@ defmodule Swarm do
   @spec status(robot()) :: Status.t() | {:error, String.t()}
   def status(robot), do: Report.one(robot)
 
-  @doc "Who hears whom, as a table in `iex`."
+  @doc "Which robot hears which, as a table in `iex`."
   @spec matrix() :: Matrix.t()
   def matrix, do: Matrix.new(status())
 
   @doc """
-  The robots that are as wanted, sorted; all, without options. Options: `service`, `profile`, `state`,
-  `mission`, `robot`, `node` (a name, or a list of names), `battery` (volts, `{24.0, 28.0}` or
-  `24..28`), `calibrated` (`true`), each also a function of one argument; `max_age_ms` of what is
-  known of them (10,000).
+  The robots that match the options, sorted; without options, all. Options: `service`, `profile`,
+  `state`, `mission`, `robot`, `node` (a name, or a list of names), `battery` (volts,
+  `{24.0, 28.0}` or `24..28`), `calibrated` (`true`), each also a function of one argument;
+  `max_age_ms` of their rows (10,000).
 
       Swarm.find(service: :camera)
       Swarm.find(profile: :atrv_mini, battery: {24.0, 28.0})
@@ -157,23 +164,24 @@ defmodule Swarm do
   def find(template \\ []), do: Search.robots(template)
 
   @doc """
-  Lets this process, or that one, know of robots that join and leave, by messages `{:swarm, {:join,
-  robot, about}}` (`Swarm.Directory.RobotInfo`) and `{:swarm, {:leave, robot, reason}}` (`:left`, `:nodedown`, or
-  `:silent` for 2 s). Returns the robots that are there now.
+  Notifies the calling process, or the given one, of robots that join and leave, by messages
+  `{:swarm, {:join, robot, about}}` (`Swarm.Directory.RobotInfo`) and
+  `{:swarm, {:leave, robot, reason}}` (`:left`, `:nodedown`, or `:silent` for 2 s). Returns the
+  robots that are present now.
 
       {:ok, robots} = Swarm.subscribe()
   """
   @spec subscribe(pid()) :: {:ok, [atom()]} | {:error, line :: String.t()}
   def subscribe(pid \\ self()), do: Presence.subscribe(pid)
 
-  @doc "Ends that."
+  @doc "Ends the subscription."
   @spec unsubscribe(pid()) :: :ok | {:error, line :: String.t()}
   def unsubscribe(pid \\ self()), do: Presence.unsubscribe(pid)
 
   @doc """
-  Stops all robots, one, or a list of them, whatever they are at: no mission is asked. `:ok` when each one's
-  wheels have been told to stand and what it was at has ended; it stands until it is told something new. The next
-  `start/1` takes up the formation that was asked for last.
+  Stops all robots, one, or a list of them, whatever they are doing: no mission is asked. `:ok`
+  when the wheels of each have been told to stand and its mission or order has ended; it stands
+  until the next command. The next `start/1` uses the formation that was last requested.
 
       Swarm.stop()
       Swarm.stop(:mag1)
@@ -182,10 +190,11 @@ defmodule Swarm do
   def stop(robots \\ :all), do: command(robots, :stop)
 
   @doc """
-  Emergency stop: all robots stop and are held until `reset/0`. It goes out at once by every way
-  there is, and again for a second; each robot that hears of it tells the others, so that it also
-  reaches those that this node does not. `:ok` when all robots that are known here have answered
-  that they are held. The hardware's own emergency stop stays the last resort: this one is software.
+  Emergency stop: all robots stop and are held until `reset/0`. It is sent at once by all
+  available ways, and repeated for a second; each robot that hears of it tells the others, so that
+  it also reaches those that this node does not reach. `:ok` when all robots that are known here
+  have answered that they are held. The hardware's own emergency stop stays the last resort: this
+  one is software.
   """
   @spec estop() :: answer()
   def estop do
@@ -194,9 +203,10 @@ defmodule Swarm do
   end
 
   @doc """
-  Releases the emergency stop. What the robots were at ended with the stop: they stand until they
-  are told something new, for instance `start/0`. `:ok` when that has ended, and none is held any more; a robot
-  whose mission or executive hangs does not answer, and stays held. Does nothing to robots that are not.
+  Releases the emergency stop. The stop ended the missions and orders of the robots: they stand
+  until the next command, for instance `start/0`. `:ok` when these have ended, and no robot is
+  held any more; a robot whose mission or executive hangs does not answer, and stays held. Does
+  nothing to robots that are not held.
   """
   @spec reset() :: answer()
   def reset do
@@ -205,10 +215,10 @@ defmodule Swarm do
   end
 
   @doc """
-  Lets the wheels of a robot turn (of a list, of `:all`). Real robots come up disarmed: whoever arms one stands
-  beside it and looks where it would go. Refused, with what is missing, by a base whose conversions are
-  not set, by one whose line was lost while its wheels turned (`acknowledge/1`), and while the emergency
-  stop holds it.
+  Lets the wheels of a robot turn (of a list, of `:all`). Real robots come up disarmed: whoever
+  arms one should stand beside it and check where it would go. Refused, with what is missing, by a
+  base whose conversions are not set, by one whose line was lost while its wheels turned
+  (`acknowledge/1`), and while the emergency stop holds the robot.
 
       Swarm.arm(:mag1)
   """
@@ -216,8 +226,9 @@ defmodule Swarm do
   def arm(robots), do: command(robots, :arm)
 
   @doc """
-  Stops all robots, one, or a list of them, and their wheels turn for nobody until `arm/1`. What they
-  were at has ended; `:ok` when both are so. As every stop it is obeyed however late it comes.
+  Stops all robots, one, or a list of them, ends their missions and orders, and keeps their wheels
+  from turning until `arm/1`. `:ok` when all of this has happened. As every stop it is obeyed
+  however late it arrives.
 
       Swarm.disarm(:mag1)
   """
@@ -225,8 +236,8 @@ defmodule Swarm do
   def disarm(robots \\ :all), do: command(robots, :disarm)
 
   @doc """
-  A robot's line was lost while its wheels turned, and a person has looked why: it is disarmed then,
-  and may be armed. Does nothing to others.
+  Confirms that a person has checked why a robot's line was lost while its wheels turned: it is
+  disarmed then, and may be armed. Does nothing to other robots.
 
       Swarm.acknowledge(:mag1)
   """
@@ -237,7 +248,7 @@ defmodule Swarm do
   @spec ask(atom(), term()) :: term()
   def ask(robot, request), do: Commands.Client.ask([robot], request)[robot]
 
-  # For the robot itself, not for its mission.
+  # Commands for the robot itself, not for its mission.
   defp command(to, request) when request in [:reset, :arm, :disarm, :acknowledge] do
     with {:ok, robots} <- Commands.robots(to), do: Commands.tell(robots, request)
   end

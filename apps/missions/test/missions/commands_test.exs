@@ -17,7 +17,7 @@ defmodule Swarm.CommandsTest do
     mission
   end
 
-  # A camera that shows nothing, and what it looks for.
+  # A camera that shows nothing, and the colours that it looks for.
   defp eyes do
     box = %{y: {80, 240}, u: {60, 90}, v: {130, 145}}
     classes = for name <- ["Yellow", "Red"], do: Map.put(box, :name, name)
@@ -25,12 +25,12 @@ defmodule Swarm.CommandsTest do
     [camera: {Hal.FakeCamera, test: self(), device: :camera}, colours: colours]
   end
 
-  # The behaviour that drives it now.
+  # The behaviour that drives the robot now.
   defp doing(id) do
     with {:ok, %{by: behaviour}, _age} <- Board.fetch(Board.find!(id), :doing, 300), do: behaviour
   end
 
-  # Wheels that say, ten times a second, that it turns to the left: once round in 1.3 s.
+  # Wheels that report, ten times a second, that the robot turns left: one turn in 1.3 s.
   defp turning(id) do
     turn = fn n -> stand(id, Pose.new(0, 0, Pose.wrap(0.5 * n))) end
     start_supervised!({Task, fn -> Enum.each(Stream.interval(100), turn) end}, id: {:turning, id})
@@ -58,17 +58,17 @@ defmodule Swarm.CommandsTest do
     assert Swarm.goto(id, Pose.new(1, 2)) == :ok
   end
 
-  test "a colour that a robot does not know is refused, with those that it looks for" do
-    id = robot(:door_sees, eyes())
-    blind = robot(:door_blind)
+  test "an unknown colour is refused with the colours that the robot looks for" do
+    id = robot(:command_sees, eyes())
+    blind = robot(:command_blind)
     standing([id, blind])
 
     assert Swarm.tell(id, "findblob:Blue") ==
-             {:error, ~s(door_sees knows no colour "Blue"; it looks for Yellow, Red)}
+             {:error, ~s(command_sees does not know the colour "Blue"; it looks for Yellow, Red)}
 
     assert state(id) == :idle
     assert Swarm.tell(id, "findblob") == :ok
-    assert Swarm.tell(blind, "findblob") == {:error, "door_blind has no camera to look with"}
+    assert Swarm.tell(blind, "findblob") == {:error, "command_blind has no camera to look with"}
     assert Swarm.tell(id, "findblob:Red") == :ok
     assert state(id) == {Robot.Mission.Manual, :find_blob}
     # A full turn shows nothing.
@@ -77,8 +77,8 @@ defmodule Swarm.CommandsTest do
     eventually(fn -> Swarm.status(id).state == :not_found end, 20_000)
   end
 
-  test "robots follow each other, but in no circle" do
-    [a, b, c] = for k <- 1..3, do: robot(:"door_follow#{k}")
+  test "robots follow each other, but not in a circle" do
+    [a, b, c] = for k <- 1..3, do: robot(:"command_follow#{k}")
     standing([a, b, c])
     assert line(Swarm.follow(a, a)) =~ "itself"
     assert Swarm.follow(a, b) == :ok
@@ -89,15 +89,15 @@ defmodule Swarm.CommandsTest do
     end
 
     eventually(fn -> leader.(a, b) and leader.(b, c) end)
-    assert line(Swarm.follow(c, a)) =~ "door_follow1 -> door_follow2 -> door_follow3"
+    assert line(Swarm.follow(c, a)) =~ "command_follow1 -> command_follow2 -> command_follow3"
     assert line(Swarm.tell(c, "followtheleader:nobody")) =~ "nobody"
     assert Swarm.stop([a, b]) == :ok
     eventually(fn -> leader.(a, nil) end)
     assert Swarm.follow(c, a) == :ok
   end
 
-  test "the mission starts, takes a formation, stops, and is left by whoever is sent elsewhere" do
-    id = robot(:door_group)
+  test "the mission starts, takes a formation, stops, and a robot that is sent elsewhere leaves it" do
+    id = robot(:command_group)
     assert line(Swarm.formation(:wedge)) =~ "start it first"
     assert Swarm.start(robots: [id], formation: :line) == :ok
     assert {Missions.Landmark, _} = state(id)
@@ -110,7 +110,7 @@ defmodule Swarm.CommandsTest do
     assert Swarm.start() == :ok
     assert {Missions.Landmark, _} = state(id)
     eventually(fn -> state(id) != {Missions.Landmark, :idle} end)
-    # The shape that was asked for last.
+    # The last requested shape.
     assert {:column, 1.0} = mission(id).formation
     assert Swarm.goto(id, {1, 1}) == :ok
     assert state(id) == {Robot.Mission.Manual, :goto}
@@ -118,17 +118,17 @@ defmodule Swarm.CommandsTest do
     assert {Missions.Landmark, _} = state(id)
   end
 
-  test "a formation is :ok only when all on the mission have it; who does not answer is named" do
+  test "a formation is :ok only when all on the mission have it; a robot that does not answer is named" do
     for id <- [:shape1, :shape2, :shape3], do: robot(id)
     standing([:shape1, :shape2, :shape3])
     assert Swarm.start(robots: [:shape1, :shape2]) == :ok
-    # The third is on none.
+    # The third is not on a mission.
     assert Swarm.formation(:wedge) == :ok
-    link = Names.whereis(:shape2, :comms)
-    :ok = :sys.suspend(link)
-    told = "shape2 does not answer; the others took it"
+    comms = Names.whereis(:shape2, :comms)
+    :ok = :sys.suspend(comms)
+    told = "shape2 does not answer; the others accepted it"
     assert Swarm.formation(:column) == {:error, told}
-    :ok = :sys.resume(link)
+    :ok = :sys.resume(comms)
     assert Swarm.estop() == :ok
     assert {:error, line} = Swarm.formation(:wedge)
     assert line =~ "shape1 is held by the emergency stop; reset it first; shape2 is held by"
@@ -136,8 +136,8 @@ defmodule Swarm.CommandsTest do
   end
 
   test "wrong input is one line that says what is allowed, and never raises" do
-    id = robot(:door_wrong)
-    assert line(Swarm.goto(:door_wrnog, {1, 1})) =~ "did you mean door_wrong?"
+    id = robot(:command_wrong)
+    assert line(Swarm.goto(:command_wrnog, {1, 1})) =~ "did you mean command_wrong?"
     assert line(Swarm.goto(id, {:nan, 1})) =~ "number"
     assert line(Swarm.formation(:wegde)) =~ "did you mean :wedge?"
 
@@ -186,16 +186,16 @@ defmodule Swarm.CommandsTest do
   end
 
   test "a robot that does not answer is named within half a second" do
-    id = robot(:door_deaf)
+    id = robot(:command_deaf)
     :ok = :sys.suspend(Names.whereis(id, :comms))
     {took, answer} = :timer.tc(fn -> Swarm.goto(id, {1, 1}) end)
-    assert line(answer) == "door_deaf does not answer"
+    assert line(answer) == "command_deaf does not answer"
     assert took in 450_000..700_000
-    assert Enum.any?(Swarm.status(), &match?(%{robot: :door_deaf, state: :no_answer}, &1))
-    # What stops it does not pass its link.
+    assert Enum.any?(Swarm.status(), &match?(%{robot: :command_deaf, state: :no_answer}, &1))
+    # A stop does not go through the comms process.
     assert Swarm.stop(id) == :ok
     :ok = :sys.resume(Names.whereis(id, :comms))
     assert %Swarm.Status{} = Swarm.status(id)
-    refute_received {_alias, :door_deaf, _answer}
+    refute_received {_alias, :command_deaf, _answer}
   end
 end

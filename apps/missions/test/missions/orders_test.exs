@@ -1,5 +1,5 @@
 defmodule Swarm.OrdersTest do
-  @moduledoc "What is answered to an order is what became of it."
+  @moduledoc "The answer to an order says what became of it."
   use Swarm.Case, async: false
   @moduletag :slow
   @moduletag :capture_log
@@ -19,7 +19,7 @@ defmodule Swarm.OrdersTest do
     assert_receive {:drive, {:drive, %Twist{linear: v}}, ^drive} when v > 0, 2_000
   end
 
-  # From now on, for so long, its wheels are told nothing but to stand.
+  # From now on, for this long, its wheels get no command but to stand.
   defp stands(id, ms \\ 300) do
     drive = Names.whereis(id, :drive)
     :sys.get_state(drive)
@@ -45,7 +45,7 @@ defmodule Swarm.OrdersTest do
     messages
   end
 
-  # A mission that ignores whatever it is told, and sets its goal again at every tick.
+  # A mission that ignores all commands, and sets its goal again at every tick.
   defmodule Deaf do
     @behaviour Robot.Mission
 
@@ -62,8 +62,8 @@ defmodule Swarm.OrdersTest do
     def handle(_event, goal), do: {:rolling, goal, [{:goal, :roll, goal[:goal]}]}
   end
 
-  describe "what is for robots only" do
-    test "is refused in a line, and nobody leaves a mission for it" do
+  describe "a message that is only for robots" do
+    test "is refused with an error, and nobody leaves a mission for it" do
       [id, other] = for id <- [:orders_talk, :orders_other], do: robot(id)
       standing([id, other])
       assert Swarm.start(robots: [id, other]) == :ok
@@ -73,7 +73,7 @@ defmodule Swarm.OrdersTest do
                      blob:1:2:3:0.1:1) do
         assert {:error, line} = Swarm.tell(id, text)
         assert line =~ "#{hd(String.split(text, ":"))} is for"
-        # Whatever is sent to it past the door.
+        # Even if it is sent past the public interface.
         {:ok, command} = Robot.Command.parse(text, [:orders_other])
         assert {:error, ^line} = Swarm.ask(id, command)
         assert {Missions.Landmark, _phase} = state(id)
@@ -82,7 +82,7 @@ defmodule Swarm.OrdersTest do
       assert elem(before, 0) == elem(state(id), 0)
     end
 
-    test "but ping is a question, and answered: who, since when, in what state" do
+    test "but ping is a question, and is answered: who, since when, in what state" do
       [id, other] = for id <- [:orders_ping, :orders_pong], do: robot(id)
       standing([id, other])
       assert {:ok, line} = Swarm.tell(id, "ping")
@@ -105,7 +105,7 @@ defmodule Swarm.OrdersTest do
     end
   end
 
-  test "a reset releases a robot once what it was at has ended, and not against a new stop" do
+  test "a reset releases a robot once its mission has ended, but not against a new stop" do
     id = robot(:orders_reset)
     standing([id])
     :ok = Pilot.start(id, Deaf, goal: @roll)
@@ -117,7 +117,7 @@ defmodule Swarm.OrdersTest do
     assert Swarm.ask(id, :reset) == nil
     :ok = :sys.resume(pilot)
     eventually(fn -> state(id) == :idle end)
-    # Who reset it was told nothing, so it is held still.
+    # The reset was not answered, so the robot is still held.
     :sys.get_state(Names.whereis(id, :gate))
     :sys.get_state(Names.whereis(id, :estop))
     assert Board.latched?(Board.find!(id))
@@ -136,7 +136,7 @@ defmodule Swarm.OrdersTest do
     stands(id)
   end
 
-  test "a reset of those who are not held stops nobody" do
+  test "a reset of robots that are not held stops nobody" do
     id = robot(:orders_free)
     standing([id])
     assert Swarm.tell(id, "move:0.2:0") == :ok
@@ -145,14 +145,14 @@ defmodule Swarm.OrdersTest do
     assert state(id) == {Robot.Mission.Manual, :move}
   end
 
-  test "a start right after a stop that is still on its way begins the mission anew" do
+  test "a start right after a stop that is still on its way starts the mission again" do
     id = robot(:orders_late)
     standing([id])
     assert Swarm.start(robots: [id], formation: :wedge) == :ok
     pilot = Names.whereis(id, :pilot)
     :ok = :sys.suspend(pilot)
     Pilot.halt(id)
-    # The board shows the mission still.
+    # The board still shows the mission.
     answer = Task.async(fn -> Swarm.ask(id, :start) end)
 
     asked? = &match?({_call, _from, {:command, :start}}, &1)
@@ -165,7 +165,7 @@ defmodule Swarm.OrdersTest do
     assert {:wedge, _spacing} = mission.formation
   end
 
-  test "an order is :ok when the robot's executive has it; one that hangs is told, and recovers" do
+  test "an order is :ok when the robot's executive has it; one that hangs is reported, and recovers" do
     id = robot(:orders_mind)
     standing([id])
     :ok = listen(id, [:robot, :executive, :hung])
@@ -187,12 +187,12 @@ defmodule Swarm.OrdersTest do
     assert %{state: :idle, hung: {:hung, "Robot.Acts.Hang", ago_ms}} = status
     assert ago_ms < 60_000
     assert inspect(status) =~ ~r/, HUNG in Robot\.Acts\.Hang \d+ s ago, started again,/
-    # Nothing of the order that was not answered is left.
+    # Nothing is left of the order that was not answered.
     stands(id)
     assert Swarm.goto(id, {1, 1}) == :ok
   end
 
-  test "a mission that hangs is told in status, row and log; orders are refused with it, and it recovers" do
+  test "a mission that hangs is reported in status, row and log; orders are refused with it, and it recovers" do
     id = robot(:orders_hung, mission: {Acts.Mission, test: self()})
     standing([id])
     :ok = listen(id, [:robot, :pilot, :hung])
@@ -205,9 +205,9 @@ defmodule Swarm.OrdersTest do
         Pilot.hear(id, {:command, :hang})
         assert_receive {:mission, {:hangs, ^before}}
         eventually(fn -> inspect(Swarm.status(id)) =~ ", HANGS in #{where}," end)
-        line = "orders_hung hangs in #{where}; it is started again by itself"
+        line = "orders_hung hangs in #{where}; it restarts by itself"
         assert Swarm.goto(id, {1, 1}) == {:error, line}
-        # Its gate stands, but that nothing of before follows nobody can say.
+        # Its gate stands, but nobody can say that no older order follows.
         assert Swarm.stop(id) == {:error, "orders_hung does not answer"}
 
         told = fn ->
@@ -233,7 +233,7 @@ defmodule Swarm.OrdersTest do
   end
 
   describe "stop" do
-    test "ends a mission that ignores it, by every way of saying it" do
+    test "ends a mission that ignores it, however it is sent" do
       id = robot(:orders_deaf)
       standing([id])
 
@@ -253,7 +253,7 @@ defmodule Swarm.OrdersTest do
       end
     end
 
-    test "ends a goal that no mission has set" do
+    test "ends a goal that was not set by a mission" do
       id = robot(:orders_goal)
       standing([id])
       Executive.goal(id, :roll, @roll)
@@ -262,7 +262,7 @@ defmodule Swarm.OrdersTest do
       stands(id)
     end
 
-    test "is not :ok where the mission hangs; the robot stands all the same" do
+    test "is not :ok if the mission hangs; the robot stands all the same" do
       id = robot(:orders_hangs)
       standing([id])
       :ok = Pilot.start(id, Deaf, goal: @roll)
@@ -272,7 +272,7 @@ defmodule Swarm.OrdersTest do
       stands(id)
     end
 
-    test "is not :ok where the drive does not hear that it is disarmed" do
+    test "is not :ok if the drive does not hear that it is disarmed" do
       id = robot(:orders_drive)
       drive = Names.whereis(id, :drive)
       :ok = :sys.suspend(drive)
@@ -280,7 +280,7 @@ defmodule Swarm.OrdersTest do
       :ok = :sys.resume(drive)
     end
 
-    test "leaves of the group's mission what people had asked of it" do
+    test "keeps what people asked of the group's mission" do
       id = robot(:orders_shape)
       standing([id])
       assert Swarm.start(robots: [id], formation: :line) == :ok

@@ -7,7 +7,8 @@ defmodule Swarm.Application do
   alias Swarm.MemberSpec
   alias Swarm.Host.{ReleaseBoot, Systemd}
 
-  # With `config :swarm, boot: true`, as in a release, the node is the robot that its environment says.
+  # With `config :swarm, boot: true`, as in a release, the node is the robot that its environment
+  # names.
   @impl Application
   def start(_type, _arguments) do
     environment = System.get_env()

@@ -1,30 +1,31 @@
 defmodule Swarm.Blackboard do
   @moduledoc """
-  What the robots of the fleet tell of themselves, and leave for each other (`Swarm.Blackboard.Hints`), on every
-  node: `Swarm.Blackboard.State` in one process a node, readable by all without asking it.
+  What the robots of the fleet publish about themselves, and leave for each other
+  (`Swarm.Blackboard.Hints`), on every node: `Swarm.Blackboard.State` in one process per node,
+  which all processes can read without asking it.
 
       Swarm.Blackboard.put(:mag1, :door, %{open: true})        # on the node of mag1
       Swarm.Blackboard.get(:mag1, :door, 2_000)                # on any node
       {:ok, %{open: true}, 140}                                # 140 ms old
 
-  What a robot puts is pushed to all other nodes at once. What was lost on the way is repaired: once
-  a second each node sends a digest of all it has to two others, which answer with what they have of
-  the robots that differ, and both send what the other lacks, of third parties too. So a row comes
-  to nodes that the robot's own never reaches.
+  What a robot puts is pushed to all other nodes at once. Losses are repaired: once a second each
+  node sends a digest of all it has to two others, which answer with what they have for the robots
+  that differ, and both send what the other lacks, including rows of third parties. So a row
+  reaches nodes that the robot's own node never reaches.
 
-  A robot's rows are written on its node only, after it entered (`enter/2`; its link does that).
-  Its life's number is in them. An event `[:swarm, :blackboard, :rival]` reports another robot of
-  the same name; what that one says is not taken over.
+  A robot's rows are written only on its node, after it entered (`enter/2`; its comms process does
+  that). They contain the number of its life. An event `[:swarm, :blackboard, :rival]` reports
+  another robot of the same name; its rows are not accepted.
 
   Options of `start_link/1`, with their defaults:
 
     * `:name` - of the process and its table (`#{inspect(__MODULE__)}`)
     * `:transport` - `{m, f, a}`, called with `a ++ [:rows, term]` for all other nodes and `a ++
       [:rows, node, term]` for one (`{Mesh, :cast, []}`)
-    * `:nodes` - `{m, f, a}` that gives the nodes that are alive (of the mesh's view)
-    * `:repair_ms` - between two digests (1,000; `:never` for tests that call `repair/1`)
-    * `:limits` - as of `Swarm.Blackboard.State.new/1`
-    * `:seed` - of the choice of nodes (a new one each time)
+    * `:nodes` - `{m, f, a}` that returns the nodes that are alive (in the mesh's view)
+    * `:repair_ms` - time between two digests (1,000; `:never` for tests that call `repair/1`)
+    * `:limits` - as in `Swarm.Blackboard.State.new/1`
+    * `:seed` - of the random choice of nodes (by default a new one each time)
   """
   alias Swarm.Blackboard
   alias Mesh.{Nonblocking, SafeTable}
@@ -52,14 +53,14 @@ defmodule Swarm.Blackboard do
   end
 
   @doc """
-  A robot of this node begins to write, in the life numbered `boot`; it ends when the calling
-  process does.
+  A robot of this node begins to write, in the life numbered `boot`, until the calling process
+  ends.
   """
   @spec enter(GenServer.server(), atom(), non_neg_integer()) :: :ok | {:error, line :: String.t()}
   def enter(board \\ __MODULE__, robot, boot) when is_atom(robot) and is_integer(boot),
     do: call(board, {:enter, robot, boot, self()})
 
-  @doc "A robot of this node writes no more; its rows stay, and grow old."
+  @doc "A robot of this node stops writing; its rows stay, and grow old."
   @spec leave(GenServer.server(), atom()) :: :ok
   def leave(board \\ __MODULE__, robot), do: GenServer.cast(board, {:leave, robot})
 
@@ -77,20 +78,23 @@ defmodule Swarm.Blackboard do
   end
 
   @doc false
-  # What a robot's link tells ten times a second at most: enters, writes, and waits for nothing.
+  # The writes of a robot's comms process, at most ten times a second: enters, writes, and waits
+  # for nothing.
   @spec note(atom(), atom(), non_neg_integer(), [{Blackboard.Codec.key(), term()}]) :: :ok
   def note(board \\ __MODULE__, robot, boot, pairs) do
     pairs = for {key, value} <- pairs, do: {key, Blackboard.Codec.encode(key, value)}
     GenServer.cast(board, {:note, self(), robot, boot, pairs})
   end
 
-  @doc "What a robot wrote last under this key, with its age in ms, unless that is over `max_age_ms`."
+  @doc """
+  The last value of a robot under this key, with its age in ms, unless that is over `max_age_ms`.
+  """
   @spec get(atom(), atom(), Blackboard.Codec.key(), age() | :infinity) ::
           {:ok, term(), age()} | :error
   def get(board \\ __MODULE__, robot, key, max_age_ms) do
     with [{_, payload, at_ms, _}] <- SafeTable.lookup(board, {robot, Blackboard.Codec.id(key)}),
          age when age <= max_age_ms <- age(at_ms),
-         # Two keys may have one number.
+         # Two keys may have the same number.
          {:ok, ^key, value} <- Blackboard.Codec.decode(payload) do
       {:ok, value, age}
     else
@@ -108,7 +112,7 @@ defmodule Swarm.Blackboard do
         do: {key, {value, age(at_ms)}}
   end
 
-  @doc "The names of all robots of which there is a row, sorted."
+  @doc "The names of all robots that have a row, sorted."
   @spec robots(atom()) :: [atom()]
   def robots(board \\ __MODULE__),
     do:
@@ -117,11 +121,11 @@ defmodule Swarm.Blackboard do
       |> Enum.uniq()
       |> Enum.sort()
 
-  @doc "Something arrived from another node."
+  @doc "Passes on a term that arrived from another node."
   @spec hear(GenServer.server(), node(), term()) :: :ok
   def hear(board \\ __MODULE__, node, term), do: GenServer.cast(board, {:hear, node, term})
 
-  @doc "Sends a digest to two others now."
+  @doc "Sends a digest to two other nodes now."
   @spec repair(GenServer.server()) :: :ok
   def repair(board \\ __MODULE__), do: GenServer.cast(board, :repair)
 

@@ -5,23 +5,24 @@ defmodule Swarm.Camera do
       {:ok, jpeg} = Swarm.Camera.snapshot(:mag1)
       File.write!("mag1.jpg", jpeg)
 
-  and as a stream of pictures to this process, which asks for each one after the first, so that it never
-  gets more than it can take:
+  and as a stream of pictures to this process, which asks for each one after the first, so that it
+  never gets more than it can handle:
 
       {:ok, ref} = Swarm.Camera.subscribe(:mag1, rate: 5)
       receive do {:picture, ^ref, %Vision.View.Picture{jpeg: jpeg}} -> File.write!("mag1.jpg", jpeg) end
       Swarm.Camera.next(:mag1, ref)
       Swarm.Camera.unsubscribe(:mag1, ref)
 
-  Pictures are made only while somebody looks, and do not leave the robot's node: they would crowd out
-  what the robots have to say to each other. On another node each of these is refused in a line; a shell
-  on the robot's own node (`bin/robot remote`) has them. Nothing raises, whatever it is given.
+  Pictures are made only while somebody looks, and do not leave the robot's node: they would delay
+  the robots' messages to each other. On another node each of these functions returns an error;
+  use a shell on the robot's own node (`bin/robot remote`). Nothing raises, whatever the
+  arguments.
   """
   alias Robot.Names
   alias Swarm.{Commands, Directory}
   alias Vision.View
 
-  @doc "One picture of now as JPEG, or a line that says why there is none. Waits 5 s at most."
+  @doc "The current picture as JPEG, or an error that says why there is none. Waits at most 5 s."
   @spec snapshot(Swarm.robot()) :: {:ok, jpeg :: binary()} | {:error, line :: String.t()}
   def snapshot(robot) do
     with {:ok, view} <- view(robot),
@@ -30,8 +31,8 @@ defmodule Swarm.Camera do
   end
 
   @doc """
-  Lets this process look, at most `rate:` pictures a second (0.001 to 30, default 5). `ref` is also a
-  monitor: `{:DOWN, ref, …}` says that the view has ended.
+  Subscribes the calling process to at most `rate:` pictures a second (0.001 to 30, default 5).
+  `ref` is also a monitor: `{:DOWN, ref, …}` says that the view has ended.
   """
   @spec subscribe(Swarm.robot(), keyword()) :: {:ok, reference()} | {:error, line :: String.t()}
   def subscribe(robot, options \\ []) do
@@ -42,13 +43,14 @@ defmodule Swarm.Camera do
   @spec next(Swarm.robot(), reference()) :: :ok | {:error, line :: String.t()}
   def next(robot, ref), do: tell(robot, ref, &View.next/2)
 
-  @doc "Ends looking."
+  @doc "Ends the subscription."
   @spec unsubscribe(Swarm.robot(), reference()) :: :ok | {:error, line :: String.t()}
   def unsubscribe(robot, ref), do: tell(robot, ref, &View.unsubscribe/2)
 
   @doc """
-  How many look, how many pictures were made, how often their making failed, and why it last did. Of a
-  robot that keeps pictures, `saver` says how many there are, and why none are saved at present.
+  The number of viewers, the number of pictures made, how often making one failed, and why it last
+  did. For a robot that saves pictures, `saver` says how many there are, and why none are saved at
+  present.
   """
   @spec status(Swarm.robot()) :: map() | {:error, line :: String.t()}
   def status(robot) do
@@ -64,12 +66,12 @@ defmodule Swarm.Camera do
     with {:ok, view} <- view(robot) do
       if View.looks?(view, ref),
         do: order.(view, ref),
-        else: {:error, "this process does not look by #{inspect(ref)}; subscribe first"}
+        else: {:error, "this process has no subscription #{inspect(ref)}; subscribe first"}
     end
   end
 
   defp tell(_robot, other, _order),
-    do: {:error, "#{inspect(other, limit: 5)} is not what subscribe gave"}
+    do: {:error, "#{inspect(other, limit: 5)} is not a reference from subscribe"}
 
   defp view(robot) do
     with {:ok, [id]} <- one(robot) do
@@ -82,12 +84,12 @@ defmodule Swarm.Camera do
   end
 
   defp one(robots) when is_list(robots) or robots == :all,
-    do: {:error, "one robot is looked through, not #{inspect(robots, limit: 5)}"}
+    do: {:error, "one robot is needed, not #{inspect(robots, limit: 5)}"}
 
   defp one(robot), do: Commands.robots(robot)
 
-  defp elsewhere(id, link) do
-    where = if is_pid(link), do: "on #{node(link)}", else: "on another node"
+  defp elsewhere(id, comms) do
+    where = if is_pid(comms), do: "on #{node(comms)}", else: "on another node"
     "#{id} is #{where}, and pictures do not leave their node: look from there"
   end
 end

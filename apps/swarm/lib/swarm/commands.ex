@@ -1,6 +1,6 @@
 defmodule Swarm.Commands do
   @moduledoc false
-  # What `Swarm` needs: who is meant, is it allowed, and what do they answer.
+  # The helpers of `Swarm`: which robots are meant, what is allowed, and what they answer.
   alias Hal.Options
   alias Hal.Options.Suggest
   alias Swarm.{Formation, Missions}
@@ -8,7 +8,7 @@ defmodule Swarm.Commands do
   alias Swarm.Commands
   alias Swarm.Comms.CommandHandler
 
-  @doc "The ids of the robots meant, which all exist, or one line."
+  @doc "The ids of the given robots if all exist; the error is one line."
   @spec robots(term()) :: {:ok, [atom(), ...]} | {:error, String.t()}
   def robots(:all) do
     case Transport.robots() do
@@ -17,7 +17,7 @@ defmodule Swarm.Commands do
     end
   end
 
-  def robots([]), do: {:error, "[] names no robot; write a name, a list of names or :all"}
+  def robots([]), do: {:error, "[] does not name a robot; write a name, a list of names or :all"}
 
   def robots(names) when is_list(names) do
     known = Transport.robots()
@@ -50,7 +50,7 @@ defmodule Swarm.Commands do
       Suggest.hint(word, Enum.map(known, &Atom.to_string/1))
   end
 
-  @doc "Checks the options of a start: who takes part, and the mission's own."
+  @doc "Checks the options of a start: which robots take part, and the options of the mission."
   @spec start(term()) :: {:ok, [atom()], keyword()} | {:error, String.t()}
   def start(options) do
     with {:ok, options} <- keyword(options),
@@ -81,8 +81,8 @@ defmodule Swarm.Commands do
   end
 
   @doc """
-  Tells the robots; `:ok` when all accept, or `{:ok, line}` with what they say to it, else one line about
-  those that do not, and what the others say.
+  Sends a command to the robots; `:ok` when all accept, or `{:ok, line}` with their answers, else
+  one line about those that do not accept, with the answers of the others.
   """
   @spec tell([atom()], term()) :: Swarm.answer() | {:ok, line :: String.t()}
   def tell(robots, request) do
@@ -99,8 +99,9 @@ defmodule Swarm.Commands do
   end
 
   @doc """
-  The same of what only robots on a mission can take: that others have none is not a refusal, if one has. A robot
-  that does not answer may be the one that leads, so it is named.
+  The same for a command that only robots on a mission can accept: a robot without a mission does
+  not count as refusing if another has one. A robot that does not answer may be the leader, so it
+  is named.
   """
   @spec any([atom()], term()) :: Swarm.answer()
   def any(robots, request) do
@@ -113,7 +114,7 @@ defmodule Swarm.Commands do
       {[_ | _], []} -> :ok
       {[], []} -> {:error, "no robot is on a mission that has a formation; start it first"}
       {[], lines} -> {:error, Enum.join(lines, "; ")}
-      {_taken, lines} -> {:error, Enum.join(lines ++ ["the others took it"], "; ")}
+      {_taken, lines} -> {:error, Enum.join(lines ++ ["the others accepted it"], "; ")}
     end
   end
 
@@ -121,7 +122,7 @@ defmodule Swarm.Commands do
   defp refusal(_id, {:error, line}) when is_binary(line), do: line
   defp refusal(id, {:error, reason}), do: "#{id} refuses: #{inspect(reason)}"
 
-  # Only a whole length or side needs to know how many there are.
+  # The number of robots matters only for a whole length or side.
   defp fleet(options, robots) do
     if Keyword.keyword?(options) and (options[:length] || options[:side]) != nil,
       do: options ++ [robots: robots],

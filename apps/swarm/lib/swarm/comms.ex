@@ -1,21 +1,22 @@
 defmodule Swarm.Comms do
   @moduledoc """
-  A robot's end of all messages, a companion of its pilot (`Robot.Companion`).
+  Sends and receives all messages of a robot; a companion of its pilot (`Robot.Companion`).
 
-  In: `Swarm.Message.check/1` checks every message; malformed ones are dropped and counted. Heartbeats become
-  peers on the robot's board, everything else goes to the pilot. Out: what the mission says and, five times a
-  second, a heartbeat with what the board says of the robot.
+  In: `Swarm.Message.check/1` checks every message; malformed ones are dropped and counted.
+  Heartbeats become peers on the robot's board, everything else goes to the pilot. Out: the
+  mission's messages and, five times a second, a heartbeat with the robot's state from the board.
 
-  An e-stop spreads with the heartbeats. How it stands is `Swarm.EStop`'s to say, which is started beside the comms
-  process and hears of each heartbeat that says otherwise. Of two robots of one name the
-  later one (`Swarm.Comms.NameClaim`) stops and falls silent, with the event `[:swarm, :comms, :duplicate_id]`.
+  An e-stop spreads with the heartbeats. `Swarm.EStop`, which is started beside the comms process,
+  owns the state of the stop and is told of each heartbeat that differs from it. Of two robots
+  with the same name, the later one (`Swarm.Comms.NameClaim`) stops and falls silent, with the
+  event `[:swarm, :comms, :duplicate_id]`.
 
   | part | what it does |
   |---|---|
-  | `Swarm.Message.Receiver` | judges what is heard |
-  | `Swarm.Comms.PeerWriter` | writes the peers on the board |
-  | `Swarm.Comms.Sender` | speaks, sends the heartbeats |
-  | `Swarm.Comms.CommandHandler` | answers people, if what they ask is not too old (`Swarm.Commands.Freshness`), or hands on what they ask |
+  | `Swarm.Message.Receiver` | checks and sorts incoming messages |
+  | `Swarm.Comms.PeerWriter` | writes the peers to the board |
+  | `Swarm.Comms.Sender` | sends messages and heartbeats |
+  | `Swarm.Comms.CommandHandler` | answers people's commands that are not too old (`Swarm.Commands.Freshness`), or passes them on |
   | `Swarm.Comms.LoadShedder` | keeps the mailbox short |
 
   `join/2` makes a config with a comms process. Its options:
@@ -23,7 +24,7 @@ defmodule Swarm.Comms do
     * `:transport` - `{m, f, a}`; a message goes to `apply(m, f, a ++ [from, to, message])`, with `to` a list of
       robots or, for heartbeats, `:all`, and
       arrives by `hear/2`. Default: `Swarm.Comms.Transport.transmit/3`
-    * `:boot` - a number that grows with every start; default the time of day
+    * `:boot` - a number that grows with every start; by default the time of day
   """
   use GenServer
   alias Hal.{Event, Ticker}
@@ -41,17 +42,18 @@ defmodule Swarm.Comms do
 
   @tick_ms 100
   @rivals_every 10
-  # So many messages are handled between two looks at how many wait.
+  # The number of messages that are handled between two checks of the mailbox's length.
   @look_every 64
 
   @doc """
-  The config of a robot that talks: with a comms process, which its mission speaks through, and an e-stop process, which
-  its gate tells of its latch.
+  Adds to the config of a robot a comms process, through which its mission sends messages, and an
+  e-stop process, which its gate notifies of its latch.
   """
   @spec join(Config.t(), keyword()) :: Config.t()
   def join(%Config{} = config, options \\ []) do
     options = Keyword.validate!(options, [:boot, transport: {Transport, :transmit, []}])
-    # The brake first: whoever is listed later falls with those before, never takes them along.
+    # The e-stop process first: a companion that is listed later restarts with those before it,
+    # but never restarts them.
     companions = config.companions ++ [{EStop, []}, {__MODULE__, options}]
 
     %{
@@ -76,8 +78,9 @@ defmodule Swarm.Comms do
   end
 
   @doc """
-  Says something to one robot, to several, or to all others, and returns who is addressed: of `:all`
-  those that are known here (`Swarm.Comms.Transport.robots/0`). Nobody is waited for, and nobody says whether it was heard.
+  Sends a message to one robot, to several, or to all others, and returns the addressees: for
+  `:all` those that are known here (`Swarm.Comms.Transport.robots/0`). It waits for nobody, and
+  nobody confirms the message.
   """
   @spec say(robot :: atom(), to :: atom() | [atom()] | :all, Message.t()) :: [atom()]
   def say(robot, to, message) do
@@ -86,11 +89,13 @@ defmodule Swarm.Comms do
     ids
   end
 
-  @doc "Something arrived for a robot of this node, by whatever transport."
+  @doc "Passes on a message that arrived for a robot of this node, by any transport."
   @spec hear(robot :: atom(), term()) :: :ok
   def hear(robot, term), do: GenServer.cast(Names.via(robot, :comms), {:hear, term})
 
-  @doc "A heartbeat of a robot of this one's name came from another node, from that life of it."
+  @doc """
+  Reports a heartbeat from another node of a robot with the same name, and the number of its life.
+  """
   @spec rival(robot :: atom(), NameClaim.identity()) :: :ok
   def rival(robot, {_boot, _node} = other),
     do: GenServer.cast(Names.via(robot, :comms), {:rival, other, nil})
@@ -121,8 +126,8 @@ defmodule Swarm.Comms do
   @impl GenServer
   def handle_continue(:enter, s), do: {:noreply, %{s | name: NameClaim.enter(s.name)}}
 
-  # Links are found in the directory, so anything may come here from anywhere: what would make this
-  # process fall is counted instead.
+  # Comms processes are found in the directory, so anything may arrive from anywhere: what would
+  # crash this process is counted instead.
   @impl GenServer
   def handle_call(_unknown, _from, s), do: {:noreply, reject(s)}
 
@@ -155,9 +160,9 @@ defmodule Swarm.Comms do
   def handle_cast({:rejected, why}, s) when is_atom(why),
     do: {:noreply, %{s | receiver: Receiver.reject(s.receiver, why)}}
 
-  def handle_cast({:rival, {boot, node} = other, link}, s)
-      when is_integer(boot) and is_atom(node) and (is_pid(link) or link == nil) do
-    case NameClaim.rival(s.name, other, link) do
+  def handle_cast({:rival, {boot, node} = other, comms}, s)
+      when is_integer(boot) and is_atom(node) and (is_pid(comms) or comms == nil) do
+    case NameClaim.rival(s.name, other, comms) do
       {false, name} -> {:noreply, %{s | name: name}}
       {true, name} -> {:noreply, give_way(%{s | name: name}, node)}
     end
@@ -168,7 +173,7 @@ defmodule Swarm.Comms do
   @impl GenServer
   def handle_info(:tick, s), do: {:noreply, s |> tick(Config.now(s.config)) |> schedule()}
 
-  # The drive had its time.
+  # The time for the drive's answer is over.
   def handle_info({:unanswered, ref, answer}, s) when is_reference(ref) do
     Nonblocking.answer(ref, answer)
     {:noreply, s}
@@ -212,7 +217,7 @@ defmodule Swarm.Comms do
     %{s | noted: noted}
   end
 
-  # Who knows no better way than the comms process finds the e-stop process through it.
+  # A sender that knows only the comms process reaches the e-stop process through it.
   defp command(s, request, ref, order) do
     here? = node(ref) == node()
     stopped = EStop.stopped(s.board)

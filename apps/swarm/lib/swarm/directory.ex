@@ -4,17 +4,17 @@ defmodule Swarm.Directory do
   (their comms processes), not nodes, so that a hundred robots look alike on one node or on a
   hundred.
 
-  | group | holds |
+  | group | members |
   |---|---|
   | `{:robot, :mag1}` | the comms process of that robot |
   | `{:estop, :mag1}` | its e-stop process |
   | `:robots`, `:estops` | the comms processes of all robots, their e-stop processes |
-  | `{:team, :blue}` | whoever entered |
-  | `{:service, :camera}`, `{:service, :camera, :mag1}` | who offers it (`Agents.Responder`); that of one robot |
-  | `{:topic, :poses}` | who wants to be told (`Agents.Topic`) |
+  | `{:team, :blue}` | the processes that entered it |
+  | `{:service, :camera}`, `{:service, :camera, :mag1}` | the processes that offer it (`Agents.Responder`); that of one robot |
+  | `{:topic, :poses}` | the subscribers (`Agents.Topic`) |
 
-  A directory that restarts is empty, and one that is down cannot be entered: who entered watches
-  it (`monitor/0`), and enters again.
+  A directory that restarts is empty, and one that is down cannot be entered: a process that
+  entered monitors it (`monitor/0`), and enters again.
   """
 
   @type group ::
@@ -31,7 +31,7 @@ defmodule Swarm.Directory do
   @spec child_spec(term()) :: Supervisor.child_spec()
   def child_spec(_options), do: %{id: __MODULE__, start: {:pg, :start_link, [__MODULE__]}}
 
-  @doc "Enters a local process into groups."
+  @doc "Adds a local process to groups."
   @spec enter(pid(), [group()]) :: :ok | {:error, :down}
   def enter(pid, groups) do
     Enum.each(groups, &(:ok = :pg.join(__MODULE__, &1, pid)))
@@ -39,7 +39,7 @@ defmodule Swarm.Directory do
     :exit, {:noproc, _call} -> {:error, :down}
   end
 
-  @doc "Takes a local process out of groups."
+  @doc "Removes a local process from groups."
   @spec leave(pid(), [group()]) :: :ok | {:error, :down}
   def leave(pid, groups) do
     Enum.each(groups, &:pg.leave(__MODULE__, &1, pid))
@@ -47,11 +47,14 @@ defmodule Swarm.Directory do
     :exit, {:noproc, _call} -> {:error, :down}
   end
 
-  @doc "Watches the directory of this node: a `:DOWN` message comes when it ends, at once if there is none."
+  @doc """
+  Monitors the directory of this node: a `:DOWN` message arrives when it ends, or at once if there
+  is none.
+  """
   @spec monitor() :: reference()
   def monitor, do: Process.monitor(__MODULE__)
 
-  @doc "The link of a robot, or `nil`. One on this node is preferred."
+  @doc "The comms process of a robot, or `nil`. One on this node is preferred."
   @spec whereis(robot :: atom()) :: pid() | nil
   def whereis(robot) do
     case sorted({:robot, robot}) do
@@ -72,7 +75,7 @@ defmodule Swarm.Directory do
       else: []
   end
 
-  # The groups are read from a table that is gone with the scope.
+  # The groups are read from a table that disappears with the scope.
   defp sorted(group),
     do: if(running?(), do: Enum.sort(:pg.get_members(__MODULE__, group)), else: [])
 

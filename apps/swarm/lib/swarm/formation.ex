@@ -1,9 +1,9 @@
 defmodule Swarm.Formation do
   @moduledoc """
-  Where each robot stands, seen from its leader. Pure; metres and radians.
+  The places of robots in a formation, relative to the leader. Pure; metres and radians.
 
-  A slot is a pose in the leader's frame (+x ahead, +y left); the leader has slot 0 and is not
-  in the list. Slot headings are the leader's, but for `:circle`, where all look at the landmark.
+  A slot is a pose in the leader's frame (+x ahead, +y left); the leader has slot 0 and is not in
+  the list. Slots have the leader's heading, except in a `:circle`, where all face the landmark.
 
   | kind | slots |
   |---|---|
@@ -12,7 +12,7 @@ defmodule Swarm.Formation do
   | `:wedge` | a V of 90 degrees, the leader at its tip |
   | `:triangle` | filled rows of 1, 2, 3, … |
   | `:diamond` | rows of 1, 2, …, m, …, 2, 1 |
-  | `:circle` | a ring of all round the landmark, the leader at its own bearing |
+  | `:circle` | a ring of all robots around the landmark, the leader at its own bearing |
 
   A build may add kinds of its own, each a `Swarm.Formation.Kind`, which its configuration names. All robots of a fleet
   must have the same ones.
@@ -26,14 +26,14 @@ defmodule Swarm.Formation do
   @least_spacing 0.8
   @spacing {:number, @least_spacing, 5.0, "m"}
   @metres {:number, 0.0, 1_000.0, "m"}
-  # The nearest that a ring comes to the landmark: robots there still see all of it.
+  # The minimum radius of a ring: robots at that distance still see all of the landmark.
   @least_ring 1.6
 
   @typedoc "One of the built-in kinds, or one that the build adds."
   @type kind :: :column | :line | :wedge | :triangle | :diamond | :circle | atom()
   @type t :: {kind(), spacing :: float()}
 
-  @doc "All kinds: the built-in ones, then those that the build adds, as far as their modules are there."
+  @doc "All kinds: the built-in ones, then those that the build adds, if their modules exist."
   @spec kinds() :: [kind(), ...]
   def kinds, do: Enum.uniq(@built_in ++ for({kind, _module} <- added(), kind?(kind), do: kind))
 
@@ -62,7 +62,7 @@ defmodule Swarm.Formation do
   def valid?(_other), do: false
 
   @doc """
-  A checked formation. `length:` is the whole length of a line, `side:` the side of the triangle;
+  Checks a formation. `length:` is the whole length of a line, `side:` the side of the triangle;
   both need the number of robots.
 
       iex> Swarm.Formation.new(:wedge, spacing: 1.2)
@@ -123,7 +123,7 @@ defmodule Swarm.Formation do
     end
   end
 
-  @doc "The least spacing, to which a shape closes up where there is little room."
+  @doc "The smallest spacing, to which a shape closes up if there is little room."
   @spec least_spacing() :: float()
   def least_spacing, do: @least_spacing
 
@@ -160,7 +160,7 @@ defmodule Swarm.Formation do
     do: for(k <- 1..(robots - 1)//1, do: slot(kind, k, robots) |> scale(d))
 
   @doc """
-  The radius of the ring of `robots` round the landmark, the leader included.
+  The radius of the ring of `robots` around the landmark, the leader included.
 
       iex> Swarm.Formation.ring({:circle, 1.0}, 12) |> Float.round(3)
       1.932

@@ -29,8 +29,9 @@ defmodule Swarm.Member do
   defstruct @enforce_keys ++ [stop: %EStop.State{}, entries: %{}, sequence: 0, beat_ms: nil]
 
   @typedoc """
-  `mission` is the one that a start begins, `runner` how it stands; `entries` is what was sensed last, by name,
-  and when; `receiver` is what was heard: peers, rejected messages; `stop` is how the emergency stop stands.
+  `mission` is the mission that a start begins, `runner` its state; `entries` holds the last
+  readings by name, with their times; `receiver` holds what was heard: peers, rejected messages;
+  `stop` is the state of the emergency stop.
   """
   @type t :: %__MODULE__{
           id: atom(),
@@ -62,8 +63,8 @@ defmodule Swarm.Member do
           | {:stage, atom(), map()}
 
   @doc """
-  A member. Options: `id`, `profile`, `start` (`Hal.Pose`, where the odometry says zero), `mission`
-  (`{module, options}`), `boot` (a number that grows with every start, default 1).
+  A member. Options: `id`, `profile`, `start` (`Hal.Pose`, where the odometry reads zero),
+  `mission` (`{module, options}`), `boot` (a number that grows with every start, default 1).
   """
   @spec new(keyword()) :: t()
   def new(options) do
@@ -83,7 +84,7 @@ defmodule Swarm.Member do
     }
   end
 
-  @doc "What a member does about one input."
+  @doc "Handles one input, and returns the effects."
   @spec step(t(), input()) :: {t(), [effect()]}
   def step(member, {:reading, {key, value} = reading, at_ms}) do
     {reflex, urgency} = Reflex.sense(member.reflex, reading, at_ms)
@@ -106,12 +107,12 @@ defmodule Swarm.Member do
     {%{member | reflex: Reflex.reset(member.reflex), stop: stop}, []}
   end
 
-  # What is asked for while all stand would otherwise begin with the reset.
+  # A command that is accepted while all robots are stopped would begin with the reset.
   def step(%{stop: %{latched?: true}} = member, {:command, command, _at_ms})
       when command != :stop,
       do: {member, []}
 
-  # Nothing that the mission could interpret, as in `Robot.Control.Pilot`.
+  # The mission does not get to interpret it, as in `Robot.Control.Pilot`.
   def step(member, {:command, :stop, at_ms}), do: halt(member, at_ms)
 
   def step(%{runner: %{module: nil}} = member, {:command, :start, _at_ms}) do
@@ -142,14 +143,17 @@ defmodule Swarm.Member do
 
   def step(member, {:reflex, at_ms}), do: react(member, :now, at_ms)
 
-  @doc "The pose that the robot believes to have, or `nil`."
+  @doc "The robot's estimate of its pose, or `nil`."
   @spec pose(t()) :: Pose.t() | nil
   def pose(member) do
     percept = Controller.percept(member.controller)
     percept && percept.pose
   end
 
-  @doc "Within how many metres of that pose the robot is in 95 of 100 cases (`Robot.Percept`), or `nil`."
+  @doc """
+  The distance in metres from that pose within which the robot is in 95 of 100 cases
+  (`Robot.Percept`), or `nil`.
+  """
   @spec uncertainty(t()) :: float() | nil
   def uncertainty(member) do
     with %Percept{uncertainty: %{radius: radius}} <- Controller.percept(member.controller),
@@ -157,7 +161,9 @@ defmodule Swarm.Member do
          else: (_no_pose -> nil)
   end
 
-  @doc "What the robot's mission says of it: its phase and the fields of `Swarm.Membership.Heartbeat`."
+  @doc """
+  What the robot's mission claims: its phase and the fields of `Swarm.Membership.Heartbeat`.
+  """
   @spec claim(t()) :: map()
   def claim(member), do: member.runner.claim
 
@@ -199,8 +205,8 @@ defmodule Swarm.Member do
     )
   end
 
-  # An e-stop spreads with every heartbeat.
-  # The mission ends with it: after the reset nothing moves until somebody says so.
+  # An e-stop spreads with every heartbeat. The mission ends with it: after the reset nothing
+  # moves until somebody gives a command.
   defp latch(
          %{stop: %{latched?: false}} = member,
          %{latched?: true} = stop,
@@ -221,7 +227,8 @@ defmodule Swarm.Member do
     react(%{member | controller: controller, reflex: reflex, runner: runner}, urgency, at_ms)
   end
 
-  # The outcome first: the mission knows what came of its goal when it sees the next percept.
+  # The outcome first, so that the mission knows the result of its goal when it sees the next
+  # percept.
   defp ended(member, nil), do: {member, []}
   defp ended(member, {tag, result}), do: handle(member, {:outcome, tag, result})
 

@@ -1,7 +1,7 @@
 defmodule Swarm.MemberSpec do
   @moduledoc """
-  Makes a robot from its file a member of a fleet: `Robot.File` describes the robot, this says what the fleet's
-  keys may hold, and adds mission and comms.
+  Turns a robot from its file into a member of a fleet: `Robot.File` describes the robot; this
+  module defines the values of the fleet's keys, and adds mission and comms.
 
       {:ok, file} = Swarm.MemberSpec.load("config/robots/mag1.exs")
       {:ok, config} = Swarm.MemberSpec.config(file)
@@ -13,14 +13,14 @@ defmodule Swarm.MemberSpec do
   alias Swarm.{Comms, Missions}
 
   @doc """
-  The robot of the file at `path`, or all that is wrong with it, a line each: `Robot.File.load/2`, with the missions,
-  formations and networks that this build knows.
+  The robot of the file at `path`, or all its errors, one line each: `Robot.File.load/2`, with the
+  missions, formations and networks that this build knows.
   """
   @spec load(Path.t()) :: {:ok, Robot.File.t()} | {:error, [line :: String.t(), ...]}
   def load(path), do: Robot.File.load(path, tables: tables())
 
   @doc """
-  The types of the keys of a robot file whose words are the fleet's, for `Robot.File`: `network:`
+  The types of those keys of a robot file that belong to the fleet, for `Robot.File`: `network:`
   (`Mesh.Options.file_table/0`), and `policies:`, a mission (`Swarm.Missions`) with its options.
   """
   @spec tables() :: [{:network | :policies, Type.t()}]
@@ -51,7 +51,7 @@ defmodule Swarm.MemberSpec do
          do: {:ok, values}
   end
 
-  # Options without a mission are those of the first.
+  # Options without a mission are those of the first mission.
   defp module(nil), do: Missions.default()
   defp module(name), do: Missions.fetch(name)
 
@@ -66,7 +66,7 @@ defmodule Swarm.MemberSpec do
   defp options(table, named, options, mission),
     do: Type.read({:keys, [{:mission, mission} | table]}, named ++ options)
 
-  @doc "What the robot is started with; an error is one line."
+  @doc "The configuration that the robot is started with; an error is one line."
   @spec config(Robot.File.t()) :: {:ok, Config.t()} | {:error, line :: String.t()}
   def config(%Robot.File{} = file) do
     with {:ok, mission} <- mission(file.policies),

@@ -1,16 +1,16 @@
 defmodule Swarm.MeshConsumer do
   @moduledoc """
-  Receives what the mesh hears for the robots of this node: messages and commands go to their comms
-  processes, the terms of services to the blackboard and the emergency stop.
+  Receives what the mesh hears for the robots of this node: messages and commands go to their
+  comms processes, the terms of services go to the blackboard and the emergency stop.
   """
   alias Robot.Names
   alias Swarm.{Blackboard, Comms, EStop, Message, Missions}
 
   @behaviour Mesh.Consumer
 
-  # Words that come as atoms are known once the modules that say them are loaded, which without a
-  # release is when they are first called: a robot that has just been switched on would not understand
-  # what a leader says.
+  # Atoms in messages are known once the modules that contain them are loaded, which without a
+  # release happens at their first call: a robot that has just been switched on would not
+  # understand what a leader sends.
   @impl Mesh.Consumer
   def services do
     for app <- [:hal, :mesh, :swarm | Missions.apps()],
@@ -37,12 +37,12 @@ defmodule Swarm.MeshConsumer do
   @impl Mesh.Consumer
   def deliver(:all, node, message) do
     rival(message, node)
-    for link <- Names.all(:comms), do: GenServer.cast(link, {:hear, message})
+    for comms <- Names.all(:comms), do: GenServer.cast(comms, {:hear, message})
     :ok
   end
 
   def deliver(ids, _node, message) do
-    for id <- ids, link = Names.whereis(id, :comms), do: GenServer.cast(link, {:hear, message})
+    for id <- ids, comms = Names.whereis(id, :comms), do: GenServer.cast(comms, {:hear, message})
     :ok
   end
 
@@ -56,7 +56,7 @@ defmodule Swarm.MeshConsumer do
   def command(robot, request) do
     case Names.whereis(robot, :comms) do
       nil -> :error
-      link -> GenServer.cast(link, request)
+      comms -> GenServer.cast(comms, request)
     end
   end
 end

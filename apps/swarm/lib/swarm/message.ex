@@ -1,11 +1,11 @@
 defmodule Swarm.Message do
   @moduledoc """
-  What robots say to each other: who, what kind, and a body whose shape the kind fixes.
+  A message between robots: its sender, its kind, and a body whose shape depends on the kind.
 
-  Whatever comes from outside passes `check/1` once, at the receiver: a malformed message is an error
-  with a reason, to be dropped and counted, and nothing behind the receiver has to doubt a message.
-  Nothing becomes an atom here. Commands are a person's, and come by another way (`Swarm`): no
-  robot can start another by a message.
+  Whatever comes from outside passes `check/1` once, at the receiver: a malformed message is an
+  error with a reason, to be dropped and counted, and nothing behind the receiver needs to check a
+  message again. Nothing becomes an atom here. Commands come from people, by another way
+  (`Swarm`): no robot can start another by a message.
 
   | kind | body |
   |---|---|
@@ -14,7 +14,7 @@ defmodule Swarm.Message do
   | `:place` | `Swarm.Formation.Reference`: a parent tells its child where the leader is supposed to be |
   | `:relay` | a whole heartbeat or letter of another robot, for one that does not hear it (`Swarm.Comms.Forwarder`) |
 
-  `hops` counts the robots that have passed a message on, three at most.
+  `hops` counts the robots that have passed a message on, at most three.
   """
   alias Swarm.Agreement.Round
   alias Swarm.Formation.Reference
@@ -35,7 +35,7 @@ defmodule Swarm.Message do
         }
 
   @doc """
-  A message.
+  Builds a message.
 
       iex> beat = %Swarm.Membership.Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
       iex> Swarm.Message.new(:mag1, :heartbeat, beat).kind
@@ -45,7 +45,8 @@ defmodule Swarm.Message do
   def new(from, kind, body), do: %__MODULE__{from: from, kind: kind, body: body}
 
   @doc """
-  Another robot's message as this robot passes it on; `:error` when it has come far enough.
+  Another robot's message as this robot passes it on; `:error` if it has been passed on often
+  enough.
 
       iex> letter = %Swarm.Agreement.Round.Letter{id: {1, 1, :mag1}, view: [:mag1], remaining_ms: 9, purpose: :search}
       iex> {:ok, relay} = Swarm.Message.pass_on(Swarm.Message.new(:mag1, :round, letter), :mag2)
@@ -90,7 +91,7 @@ defmodule Swarm.Message do
   defp valid?(:round, body), do: Round.Letter.valid?(body)
   defp valid?(:place, body), do: Reference.valid?(body)
 
-  # Nothing else is passed on, and nothing twice wrapped.
+  # Nothing else is passed on, and nothing is wrapped twice.
   defp valid?(:relay, %__MODULE__{kind: kind} = inner) when kind in [:heartbeat, :round],
     do: inner.hops != 0 and match?({:ok, _}, check(inner))
 

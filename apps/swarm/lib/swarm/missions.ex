@@ -5,8 +5,8 @@ defmodule Swarm.Missions do
 
       config :swarm, missions: [landmark: Missions.Landmark]
 
-  A robot whose file names no mission starts the first of them. What options a robot file may give a mission says its
-  `c:Robot.Mission.option_table/0`.
+  A robot whose file names no mission starts the first of them. `c:Robot.Mission.option_table/0`
+  of a mission defines the options that a robot file may give it.
   """
 
   @doc "The mission of this name; an error is one line."
@@ -21,8 +21,9 @@ defmodule Swarm.Missions do
   end
 
   @doc """
-  The type of a mission's name, or `nil`, in a table of `Hal.Options`. It asks all missions for their options, so that
-  the names of these are atoms also for whoever makes none.
+  The type of a mission's name, or `nil`, in a table of `Hal.Options`. It asks all missions for
+  their options, so that the names of the options exist as atoms even for a reader that creates
+  none.
   """
   @spec type() :: Hal.Options.Type.t()
   def type do
@@ -34,7 +35,10 @@ defmodule Swarm.Missions do
       else: {:one_of, [nil | Keyword.keys(known)]}
   end
 
-  @doc "What options a robot file may give a mission (`c:Robot.Mission.option_table/0`); `nil` of one that does not tell."
+  @doc """
+  The options that a robot file may give a mission (`c:Robot.Mission.option_table/0`); `nil` if
+  the mission does not define them.
+  """
   @spec option_table(module()) :: Hal.Options.table() | nil
   def option_table(module) do
     if Code.ensure_loaded?(module) and function_exported?(module, :option_table, 0),
@@ -51,8 +55,8 @@ defmodule Swarm.Missions do
   end
 
   @doc """
-  The options of a start as the mission understands them (`c:Robot.Mission.options/2`). `robots` is how many
-  start together, `nil` where that is not known. A mission without that callback takes no options.
+  Checks the options of a start by the mission (`c:Robot.Mission.options/2`). `robots` is how many
+  start together, `nil` if that is not known. A mission without that callback takes no options.
   """
   @spec options(module(), keyword(), pos_integer() | nil) ::
           {:ok, keyword()} | {:error, line :: String.t()}
@@ -71,11 +75,11 @@ defmodule Swarm.Missions do
     with {:ok, options} <- answer, true <- Keyword.keyword?(options) do
       {:ok, options}
     else
-      _other -> {:error, "#{inspect(module)}.options/2 answers neither options nor one line"}
+      _other -> {:error, "#{inspect(module)}.options/2 returned neither options nor an error"}
     end
   end
 
-  @doc "The applications that hold these missions."
+  @doc "The applications that contain these missions."
   @spec apps() :: [atom()]
   def apps do
     for {_name, module} <- known(), {:ok, module} <- [loaded(module)], uniq: true do
@@ -88,7 +92,7 @@ defmodule Swarm.Missions do
   defp loaded(module) do
     if Code.ensure_loaded?(module),
       do: {:ok, module},
-      else: {:error, "mission #{inspect(module)} is configured, and not part of this release"}
+      else: {:error, "mission #{inspect(module)} is configured, but not part of this release"}
   end
 
   defp allowed([]), do: "no mission is configured (config :swarm, missions: …)"

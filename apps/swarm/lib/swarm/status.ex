@@ -4,29 +4,32 @@ defmodule Swarm.Status do
 
       #mag1 follow (1.20, -0.35, 90 deg) ±0.12 m, 0.31 m/s by follow, view 7, hears 4 but not min2, age 40 ms
 
-  Behind its pose stands how sure that is: in 95 of 100 cases the robot is no farther from it (`uncertainty`,
-  metres; `Robot.Percept`). A follower's is in its leader's frame, any other robot's in its own. One that stands in its
-  slot as far as it knows, and does not know that well enough to say so, is `in its slot, but NOT SURE of its place
-  (±0.62 m)` (`unsure`).
+  The number after the pose is its uncertainty: in 95 of 100 cases the robot is no farther from it
+  (`uncertainty`, metres; `Robot.Percept`). A follower's pose is in its leader's frame, any other
+  robot's in its own. A robot that stands in its slot by its own estimate, but is not certain
+  enough to say so, is `in its slot, but NOT SURE of its place (±0.62 m)` (`unsure`).
 
-  Of wheels that may not turn it says `DISARMED`, with what is missing, or `LINE LOST` until a person
-  acknowledges (`Hal.Device.Arming`; `arming` and `why`). Of a device that is not there it says why: `drive offline
-  (/dev/ttyR0: no such device)` (`offline`: words by device). A robot that is slow for want of sonar is
-  `BLIND`. One that stands though nobody told it to says `FAULT`, and why (`fault`).
+  If the wheels may not turn, it says `DISARMED`, with what is missing, or `LINE LOST` until a
+  person acknowledges (`Hal.Device.Arming`; `arming` and `why`). For a device that is offline it
+  says why: `drive offline (/dev/ttyR0: no such device)` (`offline`: texts by device). A robot
+  that is slow because it has no sonar is `BLIND`. A robot that stands without being told to says
+  `FAULT`, and why (`fault`).
 
-  Of a robot whose gate, behaviour or mission hangs it says so, and for a minute after it was started again for that
-  (`Robot.Safety.LivenessMonitor`; `hung`: `:silent` or `:hung`, in what, and how long ago, ms).
+  If a robot's gate, behaviour or mission hangs, it says so, also for a minute after the restart
+  that follows (`Robot.Safety.LivenessMonitor`; `hung`: `:silent` or `:hung`, in what, and how
+  long ago, ms).
 
   A follower that does not get to its place is `BLOCKED by the landmark`, by another robot, by something
   unknown or by `no way` (`Missions.Landmark.Blocker`).
 
-  `age_ms` is how old its newest reading is; `rejected` counts malformed messages by kind. `hears` are
-  the robots it hears itself, `view` those that it takes for there (itself too), with the view's number,
-  which grows with each that comes or goes (`Swarm.Membership.Peers`). Of whom it knows by way of others only, the line
-  says that it does not hear them. `Swarm.matrix/0` shows the same of all robots as a table.
+  `age_ms` is the age of its newest reading; `rejected` counts malformed messages by kind. `hears`
+  are the robots that it hears itself, `view` those that it considers present (including itself),
+  with the view's number, which grows with each robot that comes or goes
+  (`Swarm.Membership.Peers`). The line names the robots that it knows only by way of others as not
+  heard. `Swarm.matrix/0` shows the same for all robots as a table.
 
-  A robot that does not answer is shown as its row on the blackboard says (`from: :row`), with that
-  age: `…, age 1240 ms by its row`.
+  The status of a robot that does not answer comes from its row on the blackboard (`from: :row`),
+  with that age: `…, age 1240 ms by its row`.
   """
   alias Hal.Device.Words
   alias Hal.Pose
@@ -143,7 +146,9 @@ defmodule Swarm.Status do
   defp words(config, device, reason),
     do: config |> Map.fetch!(device) |> Words.offline(reason)
 
-  @doc "Why its wheels may not turn, as people read it; `nil` where they may, or nobody knows."
+  @doc """
+  Why its wheels may not turn, as text for people; `nil` if they may, or if that is unknown.
+  """
   @spec arming(t()) :: String.t() | nil
   def arming(%__MODULE__{arming: :disarmed, why: nil}), do: "DISARMED"
   def arming(%__MODULE__{arming: :disarmed, why: why}), do: "DISARMED (#{why})"
@@ -179,7 +184,7 @@ defmodule Swarm.Status do
   defp age(_no_wheels), do: nil
 
   defimpl Inspect do
-    # So many that it does not hear are named.
+    # At most so many robots that it does not hear are named.
     @named 3
 
     def inspect(status, _options) do
@@ -243,7 +248,7 @@ defmodule Swarm.Status do
     defp hung({:hung, where, ago_ms}),
       do: "HUNG in #{where} #{div(ago_ms, 1_000)} s ago, started again"
 
-    # Those of the view that are known by way of others only; nearly always none.
+    # The robots of the view that are known only by way of others; nearly always none.
     defp deaf(%{view: {_number, members}} = status) do
       case Enum.split(members -- [status.robot | status.hears], @named) do
         {[], []} -> ""

@@ -3,20 +3,20 @@ defmodule Swarm.Supervisor do
   The processes of which a node has one each, however many robots run on it.
 
       Swarm.Supervisor (no restarts to give)
-      |-- Robot.Names                   who is who on this node
+      |-- Robot.Names                   the processes of this node's robots
       |-- Swarm.Supervisor.Parts (one_for_one), each in the care of a Swarm.Supervisor.BackoffSupervisor
-      |   |-- Swarm.Directory           who is where in the fleet
-      |   |-- Swarm.Blackboard          what the robots tell of themselves, and leave for each other
-      |   |-- Swarm.Directory.Presence  tells who joins and leaves
+      |   |-- Swarm.Directory           finds robots on all nodes
+      |   |-- Swarm.Blackboard          what robots publish about themselves, and for each other
+      |   |-- Swarm.Directory.Presence  notifies of robots that join and leave
       |   |-- Swarm.EStop.Broadcaster   calls all robots to stop
       |   |-- Mesh.Supervisor           the other nodes, where there is a mesh; Swarm.MeshConsumer hears it
       |   `-- Swarm.Host.Systemd        tells systemd, where there is one
       `-- Robot.Fleet                   the robots
 
-  Robots do without these parts: they drive on, and enter a new directory by themselves. However
-  often a part falls, it is started again, and no robot ends for it. A fleet that
-  ended, and names that are gone, cannot be replaced by empty ones, under which the node would look
-  well without its robots: then the application ends, and the machine's supervisor starts it afresh.
+  Robots can do without these parts: they drive on, and enter a new directory by themselves.
+  However often a part crashes, it is started again, and no robot ends because of it. If the fleet
+  or the names end, they cannot be replaced by empty ones, with which the node would look well
+  without its robots: then the application ends, and the machine's supervisor starts it again.
   """
   use Supervisor
 
@@ -48,8 +48,8 @@ defmodule Swarm.Supervisor do
   end
 
   @doc """
-  Starts the node's parts, without a robot; `mesh` as prepared by `Mesh.Options.prepare/1`, `machine` the
-  options of `Swarm.Host.Systemd`.
+  Starts the parts of the node, without a robot; `mesh` comes from `Mesh.Options.prepare/1`,
+  `machine` are the options of `Swarm.Host.Systemd`.
   """
   @spec start_link(keyword()) :: Supervisor.on_start()
   def start_link(options), do: Supervisor.start_link(__MODULE__, options)

@@ -1,7 +1,7 @@
 defmodule Swarm.MeshNodes.Absurd do
   @moduledoc """
   What a robot with a bug would sign and send: each of the mesh's messages with each of its fields
-  replaced by each term of no sense. Run on a test's node.
+  replaced by each senseless term. Run on a test's node.
   """
   alias Swarm.Message
   alias Swarm.Agreement.Round
@@ -9,7 +9,8 @@ defmodule Swarm.MeshNodes.Absurd do
   alias Swarm.Membership.Heartbeat
 
   @doc """
-  Sends each `every`-th of them to the others, slowly enough for their sockets, and says how many it was.
+  Sends each `every`-th of them to the others, slowly enough for their sockets, and returns how
+  many it sent.
   """
   @spec send_all(robot :: atom(), pos_integer()) :: non_neg_integer()
   def send_all(me, every) do
@@ -33,7 +34,7 @@ defmodule Swarm.MeshNodes.Absurd do
     length(messages) + length(services)
   end
 
-  # Nobody is listened to who sends more than 2,000 a second.
+  # A sender of more than 2,000 a second is not heard.
   defp pause(n) when rem(n, 100) != 0, do: :ok
 
   defp pause(_n) do

@@ -1,6 +1,7 @@
 defmodule Swarm.MeshNodes.Junk do
   @moduledoc """
-  Terms of no sense, and the processes of a node that other nodes can send them to. Run on that node:
+  Senseless terms, and the processes of a node that other nodes can send them to. Run on that
+  node:
 
       [] = Swarm.MeshNodes.call(node, Swarm.MeshNodes.Junk, :pour, [node.name])
   """
@@ -19,8 +20,8 @@ defmodule Swarm.MeshNodes.Junk do
            udp udp_passive udp_error nodeup nodedown DOWN EXIT forget again info status)a
 
   @doc """
-  Sends it all to each in every way, waits until they have looked at it, and returns those that fell
-  over it.
+  Sends all terms to each process in every way, waits until they have handled them, and returns
+  the processes that crashed.
   """
   @spec pour(robot :: atom()) :: [atom() | {atom(), atom()}]
   def pour(robot) do
@@ -47,7 +48,7 @@ defmodule Swarm.MeshNodes.Junk do
     :exit, _fell -> false
   end
 
-  @doc "Terms of all types, alone and in all that these processes say to each other."
+  @doc "Terms of all types, alone and inside all messages between these processes."
   @spec terms() :: [term()]
   def terms do
     plain() ++

@@ -1,17 +1,17 @@
 defmodule Swarm.MeshNodes.Listener do
   @moduledoc """
-  Hears on a test's node who joins and leaves.
+  Records on a test's node which robots join and leave.
   """
   use GenServer
 
-  @doc "Starts it on this node, subscribed."
+  @doc "Starts a subscribed listener on this node."
   @spec start() :: :ok
   def start do
     {:ok, _} = GenServer.start(__MODULE__, [], name: __MODULE__)
     :ok
   end
 
-  @doc "What it heard so far, newest first."
+  @doc "What the listener heard so far, newest first."
   @spec news() :: [tuple()]
   def news, do: GenServer.call(__MODULE__, :news)
 

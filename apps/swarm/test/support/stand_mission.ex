@@ -1,5 +1,7 @@
 defmodule Swarm.StandMission do
-  @moduledoc "A mission that only stands once it is started: the fleet's own tests need one, and not what it does."
+  @moduledoc """
+  A mission that only stands once it is started, for tests of the fleet that need any mission.
+  """
   @behaviour Robot.Mission
 
   @impl Robot.Mission

@@ -1,7 +1,7 @@
 defmodule Swarm.Case do
   @moduledoc """
-  Robots with fake drives and links. Names and directory are shared by all tests of a VM, so
-  robots get names of their own; the test tells the drive's readings.
+  Robots with fake drives and comms processes. Names and directory are shared by all tests of a
+  VM, so robots get names of their own; the test sends the drive's readings.
   """
   use ExUnit.CaseTemplate
   alias Hal.{Odometry, Pose, Twist}
@@ -29,10 +29,13 @@ defmodule Swarm.Case do
     :ok
   end
 
-  @doc "A robot with a link; link options under `:link`, the others as in `Robot.Config`."
+  @doc """
+  Starts a robot with a comms process; its options are under `:comms`, the others as in
+  `Robot.Config`.
+  """
   def robot(id, options \\ []) do
-    {link, options} = Keyword.pop(options, :link, [])
-    config = id |> Robot.Case.config(options) |> Swarm.Comms.join(link)
+    {comms, options} = Keyword.pop(options, :comms, [])
+    config = id |> Robot.Case.config(options) |> Swarm.Comms.join(comms)
     start_supervised!({Robot.Supervisor, config}, id: id, restart: :temporary)
     stand(id, Pose.new(0, 0))
     if options[:drive] == nil, do: Robot.Case.online(id)
@@ -42,16 +45,16 @@ defmodule Swarm.Case do
 
   @doc "The same on another node (`Swarm.Cluster`), which the robot ends with; no drive tells the test."
   def robot_on(node, id, options \\ []) do
-    {link, options} = Keyword.pop(options, :link, [])
+    {comms, options} = Keyword.pop(options, :comms, [])
     options = Keyword.put_new(options, :drive, {Hal.FakeDrive, test: self(), device: id})
-    config = id |> Robot.Case.config(options) |> Swarm.Comms.join(link)
+    config = id |> Robot.Case.config(options) |> Swarm.Comms.join(comms)
     {:ok, _robot} = :erpc.call(node, Robot.Fleet, :start_robot, [Robot.Fleet, config])
     :erpc.call(node, __MODULE__, :stand, [id, Pose.new(0, 0)])
     eventually(fn -> node(Swarm.Directory.whereis(id) || self()) == node end)
     id
   end
 
-  @doc "What the latest of a robot's board entries is, on whatever node; `nil` without it."
+  @doc "The value of a robot's board entry, on any node; `nil` if there is none."
   def entry(node, id, key) do
     {:ok, board} = :erpc.call(node, Robot.Board, :find, [id])
 
@@ -61,7 +64,7 @@ defmodule Swarm.Case do
     end
   end
 
-  @doc "The wheels say that the robot stands there."
+  @doc "Lets the wheels report that the robot stands there."
   def stand(id, pose) do
     free = List.duplicate(5.0, 16)
     odometry = {:odometry, %Odometry{pose: pose, twist: Twist.zero()}}
@@ -69,7 +72,7 @@ defmodule Swarm.Case do
     id
   end
 
-  @doc "Lets the wheels say so all the time, ten times a second, as real ones do."
+  @doc "Lets the wheels report that all the time, ten times a second, as real ones do."
   def standing(ids) do
     start_supervised!(
       {Task,
@@ -85,7 +88,7 @@ defmodule Swarm.Case do
     ids
   end
 
-  @doc "Waits until a function gives something, and returns it."
+  @doc "Waits until a function returns something, and returns it."
   def eventually(function, ms \\ 5_000) do
     deadline = System.monotonic_time(:millisecond) + ms
     wait(function, deadline)

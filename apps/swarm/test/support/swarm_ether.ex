@@ -1,7 +1,8 @@
 defmodule Swarm.Ether do
   @moduledoc """
-  A network between processes of one VM that stand for the nodes of several: it loses, doubles and is
-  cut. A transport of it is `{Swarm.Ether, :cast, [air, me, module]}`; `module` hears.
+  A network between processes of one VM that stand for several nodes: it loses and duplicates
+  messages, and can be cut. Its transport is `{Swarm.Ether, :cast, [air, me, module]}`; `module`
+  receives.
   """
   use Agent
 

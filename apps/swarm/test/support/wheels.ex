@@ -1,7 +1,7 @@
 defmodule Swarm.MeshNodes.Wheels do
   @moduledoc """
-  A robot on a test's node: the whole tree with a fake drive, whose wheels say ten times a second
-  that they stand.
+  A robot on a test's node: the whole tree with a fake drive, whose wheels report ten times a
+  second that they stand.
   """
   use GenServer
   alias Hal.Pose
@@ -10,13 +10,13 @@ defmodule Swarm.MeshNodes.Wheels do
 
   @doc "Starts a robot on this node, under its fleet."
   @spec robot(atom(), keyword()) :: :ok
-  def robot(id, link \\ []) do
-    {:ok, _wheels} = GenServer.start(__MODULE__, {id, link})
+  def robot(id, comms \\ []) do
+    {:ok, _wheels} = GenServer.start(__MODULE__, {id, comms})
     :ok
   end
 
   @impl GenServer
-  def init({id, link}) do
+  def init({id, comms}) do
     config =
       Robot.Config.new!(
         id: id,
@@ -24,7 +24,7 @@ defmodule Swarm.MeshNodes.Wheels do
         drive: {Hal.FakeDrive, test: self(), device: :drive}
       )
 
-    {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, Swarm.Comms.join(config, link))
+    {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, Swarm.Comms.join(config, comms))
     {:ok, _timer} = :timer.send_interval(@period_ms, :stand)
     {:ok, %{id: id, n: 0}}
   end

@@ -7,14 +7,14 @@ defmodule Swarm.ArmingTest do
   defp line(id), do: inspect(Swarm.status(id))
   defp shows(id, text), do: eventually(fn -> line(id) =~ text end)
 
-  # What the robot's own wheels are told, until it is this.
+  # Waits until the robot's own wheels are told this.
   defp told(id, wanted?) do
     pid = Names.whereis(id, :drive)
     assert_receive {:drive, {:drive, %Twist{linear: v}}, ^pid} when is_float(v), 1_000
     wanted?.(v) || told(id, wanted?)
   end
 
-  # It may be told to stand at any time, but not to roll, while this goes by.
+  # Meanwhile it may be told to stand at any time, but not to roll.
   defp stands_while(id, function) do
     pid = Names.whereis(id, :drive)
     forget(pid)
@@ -42,7 +42,7 @@ defmodule Swarm.ArmingTest do
 
     refusal = {:error, "arm_hand: its wheels are disarmed; arm it first"}
 
-    # An order is for now: none waits until somebody arms the robot.
+    # An order is for now: none waits until the robot is armed.
     stands_while(id, fn ->
       for text <- ~w(move:0.2:0 goto:1:1 follow:1:1:0 lead start),
           do: assert({text, Swarm.tell(id, text)} == {text, refusal})
@@ -60,14 +60,14 @@ defmodule Swarm.ArmingTest do
     assert Swarm.disarm(id) == :ok
     shows(id, "DISARMED")
 
-    # What it was at has ended: armed again it stands.
+    # Its order has ended: armed again, it stands.
     assert Swarm.tell("arm_hand", "Arm") == :ok
     eventually(fn -> match?(%Status{arming: :armed, state: :idle}, Swarm.status(id)) end)
     assert Swarm.tell(id, "disarm") == :ok
     eventually(fn -> match?(%Status{arming: :disarmed}, Swarm.status(id)) end)
   end
 
-  test "disarming takes wheels in motion to a stop" do
+  test "disarming stops wheels in motion" do
     id = robot(:arm_stop)
     standing([id])
     assert Swarm.tell(id, "move:0.2:0") == :ok
@@ -78,7 +78,7 @@ defmodule Swarm.ArmingTest do
     stands_while(id, fn -> eventually(fn -> Swarm.status(id).limits == [:disarmed] end) end)
   end
 
-  test "a base that lacks something says what when it is to be armed, and in its status" do
+  test "a base that lacks something says what, in the answer to arm and in its status" do
     missing = fn -> {:error, "conversion distance is missing"} end
     drive = {Hal.FakeDrive, test: self(), device: :drive, ready: missing}
     id = robot(:arm_lacks, drive: drive)
@@ -86,7 +86,7 @@ defmodule Swarm.ArmingTest do
     shows(id, "DISARMED (conversion distance is missing)")
   end
 
-  test "a line lost in motion stays an error, over a new line, until a person acknowledges" do
+  test "a line lost in motion stays an error, even on a new line, until a person acknowledges" do
     id = robot(:arm_lost, arm: :manual)
     standing([id])
     assert Swarm.arm(id) == :ok
@@ -104,7 +104,7 @@ defmodule Swarm.ArmingTest do
       shows(id, "DISARMED")
     end)
 
-    # What it was at had ended with the line.
+    # Its order had ended with the line.
     stands_while(id, fn ->
       assert Swarm.arm(id) == :ok
       assert %Status{state: :idle} = Swarm.status(id)
@@ -115,7 +115,7 @@ defmodule Swarm.ArmingTest do
     told(id, &(&1 > 0))
   end
 
-  test "a stop that does not reach the wheels says so, whichever it is" do
+  test "any stop that does not reach the wheels says so" do
     {:ok, line} = Agent.start_link(fn -> :ok end)
     drive = [test: self(), device: :drive, open: fn -> Agent.get(line, & &1) end]
     id = robot(:arm_unheard, arm: :manual, drive: {Hal.FakeDrive, drive})
@@ -138,7 +138,7 @@ defmodule Swarm.ArmingTest do
 
     assert Board.latched?(Board.find!(id))
     assert Swarm.reset() == :ok
-    # A line that is opened again begins with a stop.
+    # A line that is opened again starts with a stop.
     Agent.update(line, fn _ -> :ok end)
     eventually(fn -> Swarm.status(id).health[:drive] == :online end)
     shows(id, "LINE LOST (acknowledge it)")
@@ -152,13 +152,13 @@ defmodule Swarm.ArmingTest do
     id = robot(:arm_away, arm: :manual, drive: {Hal.FakeDrive, drive})
     standing([id])
     assert Swarm.arm(id) == :ok
-    # It stands: nobody needs to acknowledge.
+    # It stands, so nobody needs to acknowledge.
     Agent.update(line, fn _ -> {:error, :enoent} end)
     send(Names.whereis(id, :drive), {:fail, :unplugged})
     eventually(fn -> match?({:offline, _}, Swarm.status(id).health[:drive]) end)
     assert {:error, "arm_away: its drive is offline (:" <> _} = Swarm.goto(id, {1, 1})
     assert {:error, "arm_away: its drive is offline (:" <> _} = Swarm.start(robots: [id])
-    # What stops it, and questions, are always taken.
+    # Stops and questions are always accepted.
     assert Swarm.stop(id) == :ok
     assert Swarm.disarm(id) == :ok
     assert {:ok, _said} = Swarm.tell(id, "ping")
@@ -174,7 +174,7 @@ defmodule Swarm.ArmingTest do
     assert {:error, "arm_away: its line was lost (:unplugged)" <> _} = Swarm.goto(id, {1, 1})
   end
 
-  test "of a group those who are ready start, and the others are named" do
+  test "of a group, the robots that are ready start, and the others are named" do
     ready = robot(:arm_ready)
     held = robot(:arm_held, arm: :manual)
     standing([ready, held])
@@ -184,7 +184,7 @@ defmodule Swarm.ArmingTest do
     assert %Status{state: :idle} = Swarm.status(held)
   end
 
-  test "wheels that are disarmed past the brake take the mission along, and a goal of nobody's" do
+  test "wheels that are disarmed past the e-stop process end the mission, or a goal without a mission" do
     id = robot(:arm_past, arm: :manual)
     standing([id])
     drive = Names.whereis(id, :drive)
@@ -206,14 +206,14 @@ defmodule Swarm.ArmingTest do
     end)
   end
 
-  test "in a dry run every order is taken: nothing moves" do
+  test "in a dry run every order is accepted: nothing moves" do
     id = robot(:arm_dry, arm: :manual, dry_run: true)
     standing([id])
     assert Swarm.tell(id, "move:0.2:0") == :ok
     eventually(fn -> Swarm.status(id).by == :move end)
   end
 
-  test "the emergency stop is stronger: it refuses to be armed, and arming does not release it" do
+  test "the emergency stop is stronger: the robot refuses to be armed, and arming does not release it" do
     id = robot(:arm_estop, arm: :manual)
     assert Swarm.arm(id) == :ok
     assert Swarm.estop() == :ok
@@ -222,12 +222,12 @@ defmodule Swarm.ArmingTest do
     assert Swarm.acknowledge(id) == :ok
     assert Swarm.disarm(id) == :ok
     assert Swarm.reset() == :ok
-    # The reset arms nothing.
+    # The reset does not arm.
     shows(id, "DISARMED")
     assert Swarm.arm(id) == :ok
   end
 
-  test "a robot is disarmed though its link hangs, and by an order of any age; armed only in time" do
+  test "a robot is disarmed even if its comms process hangs, and by an order of any age; armed only in time" do
     id = robot(:arm_age)
     old = {1, 1}
 
@@ -241,14 +241,14 @@ defmodule Swarm.ArmingTest do
 
     shows(id, "DISARMED")
     assert Swarm.arm(id) == :ok
-    link = Names.whereis(id, :comms)
-    :ok = :sys.suspend(link)
+    comms = Names.whereis(id, :comms)
+    :ok = :sys.suspend(comms)
     assert Swarm.disarm(id) == :ok
     eventually(fn -> Hal.Device.arming(Names.whereis(id, :drive)).state == :disarmed end)
-    :ok = :sys.resume(link)
+    :ok = :sys.resume(comms)
   end
 
-  test "who arms a robot whose drive hangs is told so in time" do
+  test "arming a robot whose drive hangs is answered in time" do
     id = robot(:arm_hangs, arm: :manual)
     drive = Names.whereis(id, :drive)
     :ok = :sys.suspend(drive)
@@ -257,7 +257,7 @@ defmodule Swarm.ArmingTest do
     :ok = :sys.resume(drive)
   end
 
-  test "robots and orders of no sense are told in a line" do
+  test "senseless robots and orders are an error of one line" do
     assert {:error, "no robot :nobody" <> _} = Swarm.arm(:nobody)
     assert {:error, _} = Swarm.disarm([:nobody])
     assert {:error, _} = Swarm.acknowledge({1, 2})

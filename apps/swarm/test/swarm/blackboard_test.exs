@@ -27,7 +27,7 @@ defmodule Swarm.BlackboardTest do
     name
   end
 
-  test "what a robot puts is there at once, and on the other nodes, with its age" do
+  test "a robot's row is there at once, also on the other nodes, with its age" do
     {[a, b, c], air} = boards(3)
     assert Blackboard.put(a, a, :door, %{open: true}) == :ok
     assert {:ok, %{open: true}, age} = Blackboard.get(a, a, :door, :infinity)
@@ -45,7 +45,7 @@ defmodule Swarm.BlackboardTest do
     assert Ether.get(air).largest <= 1_200
   end
 
-  test "who is no robot at all cannot write either, and is told so at once" do
+  test "a writer that is not a robot is refused at once" do
     {[a], _air} = boards(1)
     assert {:error, line} = Blackboard.put(a, "mag1", :door, 1)
 
@@ -53,7 +53,7 @@ defmodule Swarm.BlackboardTest do
              ~s("mag1" is not a robot of this node; each robot writes its own rows, on its node)
   end
 
-  test "what was lost is repaired, by way of third parties too" do
+  test "losses are repaired, also through third parties" do
     {[a, b, c], air} = boards(3)
     Ether.change(air, cut: [{a, c}], loss: 0.4, doubled: 0.3)
     for n <- 1..20, do: :ok = Blackboard.put(a, a, {:item, n}, n)
@@ -67,7 +67,7 @@ defmodule Swarm.BlackboardTest do
     assert Ether.get(air).largest <= 1_200
   end
 
-  test "thirty robots: a digest is one datagram, many rows are few, and a large one goes alone" do
+  test "for thirty robots a digest is one datagram, many rows are few, and a large row is sent alone" do
     {[a, b], air} = boards(2)
 
     for n <- 1..30,
@@ -108,7 +108,7 @@ defmodule Swarm.BlackboardTest do
     assert line =~ "32"
   end
 
-  test "a robot ends with who entered it, and its rows grow old" do
+  test "a robot's entry ends with the process that entered it, and its rows grow old" do
     {[a, b], _air} = boards(2)
     parent = self()
 
@@ -123,13 +123,13 @@ defmodule Swarm.BlackboardTest do
     assert Blackboard.put(a, :bbended, :x, 1) == :ok
     send(owner, :end)
     eventually(fn -> match?({:error, _}, Blackboard.put(a, :bbended, :x, 2)) end)
-    # Another node may have it now.
+    # Another node may have the robot now.
     :ok = Blackboard.enter(b, :bbended, 2)
     assert Blackboard.put(b, :bbended, :x, 3) == :ok
     eventually(fn -> match?({:ok, 3, _}, Blackboard.get(a, :bbended, :x, :infinity)) end)
   end
 
-  test "another robot of the same name is told of once, and what it says is not taken" do
+  test "another robot of the same name is reported once, and its rows are not accepted" do
     {[a, b], _air} = boards(2)
     me = self()
 
@@ -156,7 +156,7 @@ defmodule Swarm.BlackboardTest do
     eventually(fn -> match?({:ok, :second, _}, Blackboard.get(a, :bbtwin, :x, :infinity)) end)
   end
 
-  test "a board that fell has all again from the others, its own robots' words too" do
+  test "a board that crashed gets everything back from the others, including its own robots' rows" do
     {[a, b], air} = boards(2)
     for n <- 1..5, do: :ok = Blackboard.put(a, a, {:k, n}, n)
     :ok = Blackboard.put(b, b, :x, 1)
@@ -178,7 +178,7 @@ defmodule Swarm.BlackboardTest do
     assert {:ok, 1, _} = Blackboard.get(a, b, :x, :infinity)
   end
 
-  test "whatever arrives: nothing falls, nothing grows, and it is counted" do
+  test "whatever arrives, nothing crashes, nothing grows, and it is counted" do
     {[a], _air} = boards(1, limits: [robots: 3])
     deep = Enum.reduce(1..10_000, [], fn _, deep -> {deep} end)
 
@@ -206,11 +206,11 @@ defmodule Swarm.BlackboardTest do
     send(Process.whereis(a), :junk)
     assert %{robots: 3, rows: 3, dropped: dropped} = Blackboard.info(a)
     assert dropped >= 11 + 197
-    # Bytes that mean nothing are held and passed on, but shown to nobody.
+    # Bytes without meaning are stored and passed on, but not shown to anybody.
     assert Blackboard.rows(a, :bbflood1) == %{}
   end
 
-  test "by itself it repairs once in a while" do
+  test "a board repairs by itself from time to time" do
     {[a, b], air} = boards(2, repair_ms: 20)
     Ether.change(air, loss: 1.0)
     :ok = Blackboard.put(a, a, :x, 1)

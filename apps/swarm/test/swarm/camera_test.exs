@@ -14,7 +14,7 @@ defmodule Swarm.CameraTest do
     colours
   end
 
-  test "what the camera of a robot of this node sees, once and as a stream" do
+  test "pictures from the camera of a robot of this node, once and as a stream" do
     id = robot(:seeing1, camera: @camera, colours: colours())
     assert {:ok, <<0xFF, 0xD8, _::binary>>} = Camera.snapshot(id)
     assert {:ok, <<0xFF, 0xD8, _::binary>>} = Camera.snapshot("seeing1")
@@ -28,14 +28,14 @@ defmodule Swarm.CameraTest do
 
     assert %{viewers: 1, failed: 0} = Camera.status(id)
 
-    # Of what nobody looks by, nothing comes.
+    # An unknown subscription returns an error.
     unknown = make_ref()
-    assert {:error, "this process does not look by #Ref" <> _} = Camera.next(id, unknown)
-    assert {:error, "this process does not look by" <> _} = Camera.unsubscribe(id, unknown)
+    assert {:error, "this process has no subscription #Ref" <> _} = Camera.next(id, unknown)
+    assert {:error, "this process has no subscription" <> _} = Camera.unsubscribe(id, unknown)
     theirs = Task.await(Task.async(fn -> Camera.next(id, ref) end))
-    assert {:error, "this process does not look by" <> _} = theirs
+    assert {:error, "this process has no subscription" <> _} = theirs
 
-    # The view falls alone, and the viewer hears of it.
+    # Only the view crashes, and the viewer is notified.
     kill(id, :view)
     assert_receive {:DOWN, ^ref, :process, _, :killed}
     eventually(fn -> match?({:ok, _}, Camera.snapshot(id)) end)
@@ -43,7 +43,7 @@ defmodule Swarm.CameraTest do
   end
 
   @tag :tmp_dir
-  test "a robot that is told to keeps pictures", %{tmp_dir: folder} do
+  test "a robot with the option saves pictures", %{tmp_dir: folder} do
     keep = [folder: folder, rate: 20, files: 3]
     id = robot(:seeing5, camera: @camera, colours: colours(), save_pictures: keep)
     eventually(fn -> match?(%{saver: %{saved: n, files: 3}} when n > 3, Camera.status(id)) end)
@@ -52,7 +52,7 @@ defmodule Swarm.CameraTest do
     eventually(fn -> match?(%{saver: %{saved: n, files: 3}} when n > 0, Camera.status(id)) end)
   end
 
-  test "what cannot be looked at is refused in a line" do
+  test "a missing camera is an error of one line" do
     id = robot(:seeing2)
     assert Camera.snapshot(id) == {:error, "seeing2 has no camera"}
 
@@ -63,7 +63,7 @@ defmodule Swarm.CameraTest do
       refute line =~ "\n"
     end
 
-    assert {:error, ":x is not what subscribe gave"} = Camera.next(id, :x)
+    assert {:error, ":x is not a reference from subscribe"} = Camera.next(id, :x)
     robot(:seeing3, camera: {Hal.Camera.FFmpeg, source: "/dev/video77"}, colours: colours())
     assert {:error, "rate cannot be 0: " <> _} = Camera.subscribe(:seeing3, rate: 0)
     assert {:error, "the camera is offline (:enoent)"} = Camera.snapshot(:seeing3)
@@ -78,7 +78,7 @@ defmodule Swarm.CameraTest do
     assert line == "seeing4 is on #{node}, and pictures do not leave their node: look from there"
     assert Camera.subscribe(:seeing4) == {:error, line}
 
-    # And who has the view itself.
+    # The same for a process that has the view itself.
     view = :erpc.call(node, Names, :whereis, [:seeing4, :view])
     assert {:error, line} = Vision.View.snapshot(view)
     assert line =~ "the camera is on #{node}, the viewer on #{node()}"

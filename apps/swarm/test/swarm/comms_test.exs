@@ -6,12 +6,12 @@ defmodule Swarm.CommsTest do
   alias Swarm.{Comms, Directory, Message}
   alias Swarm.Membership.Heartbeat
 
-  # A robot that talks, and knows where it is.
+  # A robot with a comms process that knows where it is.
   defp talking(id, options \\ []) do
-    {link, options} = Keyword.pop(options, :link, [])
+    {comms, options} = Keyword.pop(options, :comms, [])
     drive = {Hal.FakeDrive, test: self(), device: id}
     config = config(id, Keyword.put(options, :drive, drive))
-    start_supervised!({Robot.Supervisor, Comms.join(config, link)}, id: id, restart: :temporary)
+    start_supervised!({Robot.Supervisor, Comms.join(config, comms)}, id: id, restart: :temporary)
     place(id)
     until(id, fn _ -> Directory.whereis(id) != nil end)
     id
@@ -31,7 +31,7 @@ defmodule Swarm.CommsTest do
     end
   end
 
-  # Odometry comes again and again, as from wheels: a place that is 300 ms old is none.
+  # Odometry is repeated, as from wheels, because a pose that is 300 ms old does not count.
   defp rolls_of(id, tries \\ 10) do
     place(id)
 
@@ -52,25 +52,25 @@ defmodule Swarm.CommsTest do
     end
   end
 
-  test "robots hear each other, and see each other grow old" do
-    for id <- [:link1, :link2], do: talking(id, start: Pose.new(1, 2))
+  test "robots hear each other, and see silent ones grow old" do
+    for id <- [:comms1, :comms2], do: talking(id, start: Pose.new(1, 2))
 
-    until(:link1, &match?(%{link2: %{mode: :holding}}, Board.peers(&1)))
-    assert %{link2: %{pose: pose, beat: %Heartbeat{}}} = Board.peers(Board.find!(:link1))
+    until(:comms1, &match?(%{comms2: %{mode: :holding}}, Board.peers(&1)))
+    assert %{comms2: %{pose: pose, beat: %Heartbeat{}}} = Board.peers(Board.find!(:comms1))
     assert Pose.distance(pose, {1.0, 2.0}) < 0.01
-    until(:link2, &is_map_key(Board.peers(&1), :link1))
-    stop_supervised!(:link2)
-    until(:link1, &match?(%{link2: %{mode: :dead}}, Board.peers(&1)), 200)
+    until(:comms2, &is_map_key(Board.peers(&1), :comms1))
+    stop_supervised!(:comms2)
+    until(:comms1, &match?(%{comms2: %{mode: :dead}}, Board.peers(&1)), 200)
   end
 
-  test "what is malformed is dropped, counted and shown, and crashes nobody" do
-    id = talking(:link3)
-    link = Names.whereis(id, :comms)
+  test "malformed messages are dropped, counted and shown, and crash nobody" do
+    id = talking(:comms3)
+    comms = Names.whereis(id, :comms)
     for junk <- [:junk, %{a: 1}, nil, "text", {:robot, 1}], do: Comms.hear(id, junk)
-    Comms.hear(id, Message.new(:link4, :heartbeat, %{boot: "x"}))
-    Comms.hear(id, Message.new(:link4, :round, :nonsense))
-    send(link, :what)
-    GenServer.cast(link, {:unknown, 1})
+    Comms.hear(id, Message.new(:comms4, :heartbeat, %{boot: "x"}))
+    Comms.hear(id, Message.new(:comms4, :round, :nonsense))
+    send(comms, :what)
+    GenServer.cast(comms, {:unknown, 1})
 
     until(id, fn board ->
       match?(
@@ -81,13 +81,13 @@ defmodule Swarm.CommsTest do
 
     assert %{rejected: %{heartbeat: 1}} = Swarm.status(id)
     assert inspect(Swarm.status(id)) =~ "dropped 9 messages"
-    assert Names.whereis(id, :comms) == link
+    assert Names.whereis(id, :comms) == comms
   end
 
-  test "whatever is sent to a link in whatever envelope: nothing of the robot falls" do
+  test "whatever is sent to a comms process, by cast, call or plain message, crashes nothing of the robot" do
     id = talking(:linkattacked)
     parts = parts(id, [:comms, :pilot, :executive, :gate])
-    [link, pilot | _] = parts
+    [comms, pilot | _] = parts
     ref = :erlang.alias([:reply])
     deep = Enum.reduce(1..10_000, [], fn _, deep -> {deep} end)
 
@@ -105,26 +105,26 @@ defmodule Swarm.CommsTest do
     ]
 
     for junk <- junk do
-      send(link, junk)
+      send(comms, junk)
 
       for {tag, junk} <- [{:"$gen_cast", junk}, {:"$gen_call", junk}, {:rival, junk}],
-          do: send(link, {tag, junk})
+          do: send(comms, {tag, junk})
 
-      send(link, {:"$gen_call", {self(), make_ref()}, junk})
-      for word <- [:say, :command, :rival, :hear], do: GenServer.cast(link, {word, junk})
-      for word <- [:say, :command, :rival], do: GenServer.cast(link, {word, junk, junk})
-      GenServer.cast(link, {:say, [:mag1], junk})
-      GenServer.cast(link, {:rival, {junk, node()}, self()})
-      GenServer.cast(link, {:command, junk, self()})
-      GenServer.cast(link, {:command, junk, ref})
+      send(comms, {:"$gen_call", {self(), make_ref()}, junk})
+      for word <- [:say, :command, :rival, :hear], do: GenServer.cast(comms, {word, junk})
+      for word <- [:say, :command, :rival], do: GenServer.cast(comms, {word, junk, junk})
+      GenServer.cast(comms, {:say, [:mag1], junk})
+      GenServer.cast(comms, {:rival, {junk, node()}, self()})
+      GenServer.cast(comms, {:command, junk, self()})
+      GenServer.cast(comms, {:command, junk, ref})
 
       for word <- [:start, :goto, :move, :follow_the_leader, :find_blob, :position, :subscribe],
-          do: GenServer.cast(link, {:command, {word, junk}, ref})
+          do: GenServer.cast(comms, {:command, {word, junk}, ref})
 
-      GenServer.cast(link, {:command, {:start, [formation: junk]}, ref})
-      GenServer.cast(link, {:command, {:start, [{:assign, junk}]}, ref})
-      GenServer.cast(link, {:command, {:goto, junk, 1.0, nil}, ref})
-      GenServer.cast(link, {:command, {:formation, junk, junk}, ref})
+      GenServer.cast(comms, {:command, {:start, [formation: junk]}, ref})
+      GenServer.cast(comms, {:command, {:start, [{:assign, junk}]}, ref})
+      GenServer.cast(comms, {:command, {:goto, junk, 1.0, nil}, ref})
+      GenServer.cast(comms, {:command, {:formation, junk, junk}, ref})
       GenServer.cast(pilot, junk)
       Comms.hear(id, Message.new(:linkother, :command, junk))
     end
@@ -138,63 +138,63 @@ defmodule Swarm.CommsTest do
     assert parts(id, [:comms, :pilot, :executive, :gate]) == parts
   end
 
-  test "an e-stop spreads, survives the link, and is not caught again after a reset" do
-    ids = for id <- [:link5, :link6, :link7], do: talking(id)
+  test "an e-stop spreads, survives the comms process, and does not stop a robot again after a reset" do
+    ids = for id <- [:comms5, :comms6, :comms7], do: talking(id)
     for id <- ids, do: assert(Swarm.ask(id, {:move, 0.1, 0.0}) == :ok)
     for id <- ids, do: rolls_of(id)
 
-    # One is told; the others hear of it.
-    assert Swarm.ask(:link5, :estop) == :ok
+    # One robot is told; the others hear of it.
+    assert Swarm.ask(:comms5, :estop) == :ok
     for id <- ids, do: until(id, &Board.latched?/1)
-    kill(:link6, :comms)
-    until(:link6, fn _ -> Names.whereis(:link6, :comms) != nil end)
-    assert Board.latched?(Board.find!(:link6))
+    kill(:comms6, :comms)
+    until(:comms6, fn _ -> Names.whereis(:comms6, :comms) != nil end)
+    assert Board.latched?(Board.find!(:comms6))
 
-    # One after the other is reset, and stays so though the others still tell of the stop.
+    # They are reset one by one, and stay released although the others still report the stop.
     for id <- ids, do: assert(Swarm.ask(id, :reset) == :ok)
     for id <- ids, do: refute(Board.latched?(Board.find!(id)))
 
-    # What was wished before the stop is forgotten: only a new command moves a robot.
+    # Wishes from before the stop are forgotten: only a new command moves a robot.
     for id <- ids, do: until(id, &match?({:ok, %{by: :rest}, _}, Board.fetch(&1, :doing, 500)))
     for id <- ids, do: forget(id)
     for id <- ids, do: assert(Swarm.ask(id, {:move, 0.1, 0.0}) == :ok)
     for id <- ids, do: rolls_of(id)
-    assert Swarm.ask(:link7, :estop) == :ok
+    assert Swarm.ask(:comms7, :estop) == :ok
     for id <- ids, do: until(id, &Board.latched?/1)
     # Else it would be repeated to the robots of the next test.
     assert Swarm.reset() == :ok
   end
 
-  test "the directory falls: robots drive on, and enter the new one by themselves" do
-    id = talking(:link8)
+  test "when the directory crashes, robots drive on, and enter the new one by themselves" do
+    id = talking(:comms8)
     assert Swarm.ask(id, {:move, 0.1, 0.0}) == :ok
     rolls_of(id)
-    [link, gate, executive] = parts(id, [:comms, :gate, :executive])
+    [comms, gate, executive] = parts(id, [:comms, :gate, :executive])
     scope = Process.whereis(Directory)
     monitor = Process.monitor(scope)
     Process.exit(scope, :kill)
     assert_receive {:DOWN, ^monitor, _, _, :killed}
     forget(id)
-    until(id, fn _ -> Directory.whereis(id) == link end)
+    until(id, fn _ -> Directory.whereis(id) == comms end)
     rolls_of(id)
-    assert parts(id, [:comms, :gate, :executive]) == [link, gate, executive]
+    assert parts(id, [:comms, :gate, :executive]) == [comms, gate, executive]
   end
 
-  test "of two robots of one name the later one gives way" do
-    id = talking(:link9, link: [boot: 1_000])
-    :ok = Hal.Event.attach(:link9, [:swarm, :comms, :duplicate_id], &__MODULE__.tell/4, self())
-    on_exit(fn -> Hal.Event.detach(:link9) end)
-    link = Names.whereis(id, :comms)
-    until(id, fn _ -> Directory.whereis(id) == link end)
+  test "of two robots with the same name the later one gives way" do
+    id = talking(:comms9, comms: [boot: 1_000])
+    :ok = Hal.Event.attach(:comms9, [:swarm, :comms, :duplicate_id], &__MODULE__.tell/4, self())
+    on_exit(fn -> Hal.Event.detach(:comms9) end)
+    comms = Names.whereis(id, :comms)
+    until(id, fn _ -> Directory.whereis(id) == comms end)
 
-    # A later one is told so, and nothing changes.
-    GenServer.cast(link, {:rival, {2_000, node()}, self()})
-    assert_receive {:"$gen_cast", {:rival, {1_000, _}, ^link}}
-    assert Directory.members({:robot, id}) == [link]
+    # A later robot is told who this one is, and nothing changes.
+    GenServer.cast(comms, {:rival, {2_000, node()}, self()})
+    assert_receive {:"$gen_cast", {:rival, {1_000, _}, ^comms}}
+    assert Directory.members({:robot, id}) == [comms]
 
-    # In the presence of an earlier one this one stops, and falls silent.
+    # If there is an earlier one, this one stops, and falls silent.
     :ok = Directory.enter(self(), [{:robot, id}])
-    GenServer.cast(link, {:rival, {500, node()}, self()})
+    GenServer.cast(comms, {:rival, {500, node()}, self()})
     assert_receive {:event, %{robot: ^id}}
     assert Directory.members({:robot, id}) == [self()]
     {:ok, %{state: :idle}, _} = Board.fetch(Board.find!(id), :mission, :infinity)
@@ -204,17 +204,17 @@ defmodule Swarm.CommsTest do
   @doc false
   def tell(_event, _measurements, metadata, test), do: send(test, {:event, metadata})
 
-  test "a link that falls takes nothing of the robot along" do
-    id = talking(:link10)
+  test "a comms process that crashes takes no other process of the robot along" do
+    id = talking(:comms10)
     parts = parts(id, [:gate, :executive, :pilot])
     kill(id, :comms)
     until(id, fn _ -> Directory.whereis(id) != nil and Names.whereis(id, :comms) != nil end)
     assert parts(id, [:gate, :executive, :pilot]) == parts
   end
 
-  test "a transport of one's own" do
-    id = talking(:link11, link: [transport: {__MODULE__, :carry, [self()]}])
-    Comms.say(id, [:mag7, :link11], Message.new(id, :place, :start))
+  test "messages go by a transport from the options" do
+    id = talking(:comms11, comms: [transport: {__MODULE__, :carry, [self()]}])
+    Comms.say(id, [:mag7, :comms11], Message.new(id, :place, :start))
     assert_receive {:carried, ^id, [:mag7], %Message{body: :start}}
     assert_receive {:carried, ^id, _all, %Message{kind: :heartbeat}}, 500
   end
@@ -222,28 +222,28 @@ defmodule Swarm.CommsTest do
   @doc false
   def carry(test, from, ids, message), do: send(test, {:carried, from, ids, message})
 
-  test "says who is addressed" do
-    ids = for id <- [:link12, :link13, :link14], do: talking(id)
-    message = Message.new(:link12, :place, :start)
-    all = Comms.say(:link12, :all, message)
-    assert all -- ids == all -- [:link13, :link14]
-    assert Comms.say(:link12, :link13, message) == [:link13]
-    assert Comms.say(:link12, [:link12, :link14], message) == [:link14]
+  test "say returns the addressees" do
+    ids = for id <- [:comms12, :comms13, :comms14], do: talking(id)
+    message = Message.new(:comms12, :place, :start)
+    all = Comms.say(:comms12, :all, message)
+    assert all -- ids == all -- [:comms13, :comms14]
+    assert Comms.say(:comms12, :comms13, message) == [:comms13]
+    assert Comms.say(:comms12, [:comms12, :comms14], message) == [:comms14]
   end
 
   test "a stop pressed on a robot's own gate spreads, and a newcomer is not stopped by a cleared one" do
-    ids = for id <- [:link15, :link16], do: talking(id)
-    until(:link16, &is_map_key(Board.peers(&1), :link15))
-    :ok = Gate.estop(:link15)
+    ids = for id <- [:comms15, :comms16], do: talking(id)
+    until(:comms16, &is_map_key(Board.peers(&1), :comms15))
+    :ok = Gate.estop(:comms15)
     for id <- ids, do: until(id, &Board.latched?/1)
     assert Swarm.reset() == :ok
-    talking(:link17)
-    until(:link17, &match?(%{link15: %{beat: %{estop: n}}} when n > 0, Board.peers(&1)))
-    refute Board.latched?(Board.find!(:link17))
+    talking(:comms17)
+    until(:comms17, &match?(%{comms15: %{beat: %{estop: n}}} when n > 0, Board.peers(&1)))
+    refute Board.latched?(Board.find!(:comms17))
 
-    # It has the same number as the others, so that its own stop is news to them.
-    assert Swarm.ask(:link17, :estop) == :ok
-    assert Board.latched?(Board.find!(:link17))
+    # It has the same number as the others, so that its own stop is new to them.
+    assert Swarm.ask(:comms17, :estop) == :ok
+    assert Board.latched?(Board.find!(:comms17))
     for id <- ids, do: until(id, &Board.latched?/1)
     assert Swarm.reset() == :ok
   end

@@ -12,7 +12,7 @@ defmodule Swarm.EStopTest do
     stop
   end
 
-  # Another one in each test: a node remembers what it heard.
+  # A different call in each test, because a node remembers what it heard.
   defp call(counter),
     do: {:base@hall, 1_700_000_000_000, 10 * Process.get(:ten) + counter}
 
@@ -21,28 +21,28 @@ defmodule Swarm.EStopTest do
     :ok
   end
 
-  test "an e-stop does not wait for a link that hangs, nor does a stop or the reset" do
-    id = robot(:brake_hangs)
-    link = Names.whereis(id, :comms)
+  test "an e-stop does not wait for a comms process that hangs, nor does a stop or the reset" do
+    id = robot(:estop_hangs)
+    comms = Names.whereis(id, :comms)
     assert Swarm.goto(id, {1, 1}) == :ok
-    :ok = :sys.suspend(link)
+    :ok = :sys.suspend(comms)
     assert Swarm.stop(id) == :ok
     assert Swarm.estop() == :ok
     assert latched?(id)
     assert Swarm.reset() == :ok
     refute latched?(id)
-    :ok = :sys.resume(link)
+    :ok = :sys.resume(comms)
 
     # The mission ended with the stop, before the reset.
     assert {:ok, %{state: :idle}, _} = Board.fetch(Board.find!(id), :mission, :infinity)
   end
 
-  test "an e-stop reaches a robot whose link is dead, and is spread by the link that follows" do
-    [a, b] = standing(for id <- [:brake_dead, :brake_beside], do: robot(id))
+  test "an e-stop reaches a robot whose comms process is dead, and the next comms process spreads it" do
+    [a, b] = standing(for id <- [:estop_dead, :estop_beside], do: robot(id))
     eventually(fn -> is_map_key(Board.peers(Board.find!(b)), a) end)
-    link = Names.whereis(a, :comms)
-    :ok = :sys.suspend(link)
-    # Only this one is called.
+    comms = Names.whereis(a, :comms)
+    :ok = :sys.suspend(comms)
+    # Only this robot is called.
     assert Swarm.ask(a, {:estop, call(1)}) == :ok
     assert latched?(a)
     kill(a, :comms)
@@ -50,8 +50,8 @@ defmodule Swarm.EStopTest do
     assert Swarm.reset() == :ok
   end
 
-  test "all robots of a node hear a call that comes by datagram; junk does nothing" do
-    [a, b] = for id <- [:brake_air1, :brake_air2], do: robot(id)
+  test "all robots of a node hear a call that arrives by datagram; junk does nothing" do
+    [a, b] = for id <- [:estop_air1, :estop_air2], do: robot(id)
 
     for junk <- [
           :x,
@@ -72,7 +72,7 @@ defmodule Swarm.EStopTest do
     assert EStop.hear(:base@hall, {:estop, call(7), 0}) == :ok
     for id <- [a, b], do: eventually(fn -> latched?(id) end)
 
-    # Repeats, late ones too, do not undo what a person has done.
+    # Repeats, even late ones, do not undo what a person has done.
     assert Swarm.reset() == :ok
     for counter <- [7, 6, 7], do: EStop.hear(:base@hall, {:estop, call(counter), 0})
     for id <- [a, b], do: assert({{:ok, _}, false} = {Swarm.ask(id, :ping), latched?(id)})
@@ -80,7 +80,8 @@ defmodule Swarm.EStopTest do
     for id <- [a, b],
         do: assert(%EStop.State{latched?: false, known: n, cleared: n} = stop_of(id))
 
-    # Nor does one that is heard for the first time now, and was made before; on a node that was cut off, say.
+    # Nor does an older call that is heard for the first time now, for example from a node that
+    # was cut off.
     far = {:far@hall, 1, 1}
     assert EStop.hear(:base@hall, {:estop, far, 60_000}) == :ok
     for id <- [a, b], do: assert({{:ok, _}, false} = {Swarm.ask(id, :ping), latched?(id)})
@@ -90,13 +91,13 @@ defmodule Swarm.EStopTest do
     assert Swarm.reset() == :ok
   end
 
-  test "what was heard survives the brake, and the latch is carried out by the next one" do
-    id = robot(:brake_falls)
+  test "heard calls survive the e-stop process, and the next one carries out the latch" do
+    id = robot(:estop_falls)
     assert Swarm.ask(id, {:estop, call(1)}) == :ok
     assert Swarm.reset() == :ok
     [gate, pilot] = [Names.whereis(id, :gate), Names.whereis(id, :pilot)]
-    brake = kill(id, :estop)
-    eventually(fn -> (now = Names.whereis(id, :estop)) && now != brake end)
+    estop = kill(id, :estop)
+    eventually(fn -> (now = Names.whereis(id, :estop)) && now != estop end)
     eventually(fn -> Directory.members({:estop, id}) == [Names.whereis(id, :estop)] end)
     EStop.hear(:base@hall, {:estop, call(1), 0})
     assert Swarm.ask(id, :stop) == :ok
@@ -104,15 +105,15 @@ defmodule Swarm.EStopTest do
     assert [gate, pilot] == [Names.whereis(id, :gate), Names.whereis(id, :pilot)]
   end
 
-  test "the call is repeated, whatever becomes of the caller, and passed on once" do
-    id = robot(:brake_repeat)
+  test "the call is repeated even if the caller ends, and passed on once" do
+    id = robot(:estop_repeat)
     :ok = Directory.enter(self(), [:estops])
     {caller, monitor} = spawn_monitor(fn -> exit({:called, Broadcaster.sound()}) end)
     assert_receive {:DOWN, ^monitor, :process, ^caller, {:called, call}}
     for _ <- 1..10, do: assert_receive({:"$gen_cast", {:estop, ^call, _age}})
     assert latched?(id)
 
-    # A person ends it.
+    # A person ends the repeats.
     call = Broadcaster.sound()
     assert_receive {:"$gen_cast", {:estop, ^call, _age}}
     assert Swarm.ask(id, {:estop, call}) == :ok
@@ -120,7 +121,7 @@ defmodule Swarm.EStopTest do
     :sys.get_state(Broadcaster)
     refute_receive {:"$gen_cast", {:estop, ^call, _age}}, 150
 
-    # Of another node's call each hears from each that heard it, three times.
+    # Each node hears another's call from each node that heard it, three times.
     EStop.hear(:base@hall, {:estop, call(1), 0})
     far = call(1)
     for _ <- 1..3, do: assert_receive({:"$gen_cast", {:estop, ^far, _age}})
@@ -129,10 +130,10 @@ defmodule Swarm.EStopTest do
     assert Swarm.reset() == :ok
   end
 
-  test "a stop spreads by heartbeats that are sent at once and ten times more" do
+  test "a stop spreads by heartbeats that are sent at once and then ten more times" do
     [a, b] =
-      for id <- [:brake_beats1, :brake_beats2],
-          do: robot(id, link: [transport: {__MODULE__, :carry, [self()]}])
+      for id <- [:estop_beats1, :estop_beats2],
+          do: robot(id, comms: [transport: {__MODULE__, :carry, [self()]}])
 
     standing([a, b])
     assert_receive {:carried, ^a, %Message{body: %Heartbeat{latched: false, sequence: before}}}
@@ -151,9 +152,9 @@ defmodule Swarm.EStopTest do
   def carry(test, from, _ids, message), do: send(test, {:carried, from, message})
 
   test "an e-stop, and its reset, get through to a flooded robot, whose mailbox stays short" do
-    id = robot(:brake_flooded)
-    link = Names.whereis(id, :comms)
-    flood = start_supervised!({Task, fn -> pour(link, id) end})
+    id = robot(:estop_flooded)
+    comms = Names.whereis(id, :comms)
+    flood = start_supervised!({Task, fn -> pour(comms, id) end})
     eventually(fn -> flooded(id) > 0 end)
     assert Swarm.estop() == :ok
     assert latched?(id)
@@ -162,18 +163,18 @@ defmodule Swarm.EStopTest do
     refute latched?(id)
     stop_supervised!(Task)
     refute Process.alive?(flood)
-    {:message_queue_len, queued} = Process.info(link, :message_queue_len)
+    {:message_queue_len, queued} = Process.info(comms, :message_queue_len)
     assert queued < 100_000
   end
 
-  defp pour(link, id) do
+  defp pour(comms, id) do
     beat = %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
-    message = Message.new(:brake_pouring, :heartbeat, beat)
+    message = Message.new(:estop_pouring, :heartbeat, beat)
 
-    for _ <- 1..1_000, do: GenServer.cast(link, {:hear, message})
-    for _ <- 1..100, do: GenServer.cast(link, :junk)
-    for _ <- 1..100, do: send(link, {:junk, id})
-    pour(link, id)
+    for _ <- 1..1_000, do: GenServer.cast(comms, {:hear, message})
+    for _ <- 1..100, do: GenServer.cast(comms, :junk)
+    for _ <- 1..100, do: send(comms, {:junk, id})
+    pour(comms, id)
   end
 
   defp flooded(id) do

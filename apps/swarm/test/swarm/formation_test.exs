@@ -23,13 +23,13 @@ defmodule Swarm.FormationTest do
     assert_in_delta Pose.distance(b, {0.0, 0.0}), 2.0, 1.0e-9
   end
 
-  test "a line of a given length is as long" do
+  test "a line of a given length has that length" do
     {:ok, formation} = Formation.new(:line, length: 6.0, robots: 5)
     ys = formation |> Formation.slots(5) |> Enum.map(& &1.y)
     assert Enum.max(ys) - Enum.min(ys) == 6.0
   end
 
-  test "in a circle all look at the landmark, none stands on it" do
+  test "in a circle all face the landmark, and none stands on it" do
     formation = {:circle, 1.0}
     ring = Formation.ring(formation, 6)
 

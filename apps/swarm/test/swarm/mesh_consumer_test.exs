@@ -8,19 +8,19 @@ defmodule Swarm.MeshConsumerTest do
     Message.new(id, :heartbeat, beat)
   end
 
-  test "a message is told by its authors, a heartbeat by its number" do
+  test "a message is identified by its authors, a heartbeat by its number" do
     assert MeshConsumer.read(beat(:mag1)) == {:ok, beat(:mag1), %{robots: [:mag1], beat: {7, 9}}}
     letter = %Letter{id: {1, 1, :mag1}, view: [:mag1], remaining_ms: 9, purpose: :search}
     letter = Message.new(:mag1, :round, letter)
     assert {:ok, ^letter, %{robots: [:mag1], beat: nil}} = MeshConsumer.read(letter)
 
-    # One that is passed on is no heartbeat of who passes it on.
+    # A relayed heartbeat is not a heartbeat of the robot that relays it.
     {:ok, relay} = Message.pass_on(beat(:mag2), :mag1)
     assert {:ok, ^relay, %{robots: [:mag1, :mag2], beat: nil}} = MeshConsumer.read(relay)
     for junk <- [nil, :junk, %{relay | body: 1}], do: assert(MeshConsumer.read(junk) == :error)
   end
 
-  test "each service has somebody who hears it" do
+  test "each service has a process that receives it" do
     services = MeshConsumer.services()
     assert Enum.sort(Map.keys(services)) == [:rows, :stop]
 
@@ -28,7 +28,7 @@ defmodule Swarm.MeshConsumerTest do
         do: assert(function_exported?(m, f, length(a) + 2))
   end
 
-  test "messages and commands reach the comms process of a robot, and of nobody else" do
+  test "messages and commands reach the comms process of a robot, and no other" do
     {:ok, _} = Registry.register(Names, {:consumer1, :comms}, nil)
     assert MeshConsumer.deliver([:consumer1, :consumer_away], :b@lab, beat(:mag1)) == :ok
     assert_received {:"$gen_cast", {:hear, %Message{from: :mag1}}}

@@ -1,5 +1,5 @@
 defmodule Swarm.MessageTest do
-  @moduledoc "Whatever comes from outside, the receiver survives it."
+  @moduledoc "The receiver survives whatever arrives from outside."
   use ExUnit.Case, async: true
   alias Swarm.Message
   alias Swarm.Agreement.Round
@@ -66,7 +66,7 @@ defmodule Swarm.MessageTest do
     ])
   end
 
-  test "no spoilt message raises, or is taken for a good one with a number out of range" do
+  test "no damaged message raises, or passes as valid with a number out of range" do
     for _ <- 1..20_000 do
       {kind, whole} =
         Enum.random(
@@ -112,7 +112,7 @@ defmodule Swarm.MessageTest do
     end
   end
 
-  test "sizes are bounded, and names are names" do
+  test "sizes are bounded, and names must be names" do
     many = List.duplicate(1, 1_000_000)
     names = List.duplicate(:mag1, 1_001)
     large = :binary.copy("x", 1_000_000)
@@ -144,7 +144,7 @@ defmodule Swarm.MessageTest do
     assert {:ok, _} = Message.check(Message.new(:mag1, :round, %{@letter | report: report}))
   end
 
-  test "a number that is far too high leaves room for the ones to come" do
+  test "a number that is far too high leaves room for later ones" do
     round = Round.open(Round.new(:mag1), 1, [:mag1, :mag2], :search, 100, 0)
 
     for id <- [{999_999_999, 1, :mag2}, {1, 999_999_999, :mag2}] do
@@ -158,7 +158,7 @@ defmodule Swarm.MessageTest do
     assert Swarm.EStop.State.hear(Swarm.EStop.State.new(), 1_000_000, true) ==
              Swarm.EStop.State.new()
 
-    # A false sequence number of a robot is forgotten with it.
+    # A wrong sequence number of a robot is forgotten with the robot.
     peers =
       Swarm.Membership.Peers.hear(
         Swarm.Membership.Peers.new(:mag2),
@@ -171,7 +171,7 @@ defmodule Swarm.MessageTest do
     assert Swarm.Membership.Peers.hear(peers, :mag1, @beat, 2_000).rows.mag1.beat == @beat
   end
 
-  test "repeats of calls from two lives of a node do not take each other for new" do
+  test "repeated calls from two lives of a node do not count as new in turn" do
     alias Swarm.EStop
     calls = for boot <- [7, 5], counter <- [1, 2], do: {:base@hall, boot, counter}
 

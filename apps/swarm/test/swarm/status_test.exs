@@ -2,7 +2,7 @@ defmodule Swarm.StatusTest do
   use Swarm.Case, async: false
   alias Swarm.Status
 
-  test "the line shows the view's number, and names whom the robot does not hear" do
+  test "the line shows the view's number, and names robots that it does not hear" do
     line = fn fields -> inspect(struct!(%Status{robot: :mag1, age_ms: 5}, fields)) end
     members = [:mag1, :mag2, :min1, :min2, :min3, :min4, :min5]
 
@@ -17,7 +17,7 @@ defmodule Swarm.StatusTest do
              ", BLOCKED by the landmark, leader min1,"
   end
 
-  test "what a robot is blocked by travels in its row, as text of a sane length" do
+  test "a robot's row says what blocks it, as text of limited length" do
     status = %Status{robot: :mag1, node: node(), by: :follow, blocked_by: "mag2", age_ms: 5}
     row = Status.Row.encode(status)
     assert {:ok, %{blocked_by: "mag2"}} = Status.Row.decode(:mag1, row, 10)
@@ -27,7 +27,7 @@ defmodule Swarm.StatusTest do
         do: assert(Status.Row.decode(:mag1, %{row | blocked_by: junk}, 10) == :error)
   end
 
-  test "what a robot hangs in travels in its row" do
+  test "a robot's row says what it hangs in" do
     hung = {:silent, "its mission Patrol", 150}
     status = %Status{robot: :mag1, node: node(), by: :follow, hung: hung, age_ms: 5}
     row = Status.Row.encode(status)
@@ -43,7 +43,7 @@ defmodule Swarm.StatusTest do
         do: assert(Status.Row.decode(:mag1, %{row | hung: junk}, 10) == :error)
   end
 
-  test "the line says how sure the pose is, where anybody knows" do
+  test "the line says how sure the pose is, if that is known" do
     line = fn fields -> inspect(struct!(%Status{robot: :mag1, age_ms: 5}, fields)) end
     pose = Hal.Pose.new(1.2, 3.4, 1.5708)
 
@@ -60,14 +60,14 @@ defmodule Swarm.StatusTest do
     assert line.(unsure: true) =~ " m/s, in its slot, but NOT SURE of its place, hears"
   end
 
-  test "how sure a pose is travels in its row, in whole mm" do
+  test "a robot's row says how sure its pose is, in whole mm" do
     status = %Status{robot: :mag1, node: node(), by: :follow, age_ms: 5}
     sure = %{status | uncertainty: 0.12345, unsure: true}
     row = Status.Row.encode(sure)
     assert row.uncertainty == 123
     assert {:ok, %{uncertainty: 0.123, unsure: true}} = Status.Row.decode(:mag1, row, 10)
 
-    # Who does not know says nothing, as robots of before.
+    # A robot that does not know says nothing, as older versions do.
     none = Status.Row.encode(status)
     refute is_map_key(none, :uncertainty) or is_map_key(none, :unsure)
     assert {:ok, %{uncertainty: nil, unsure: false}} = Status.Row.decode(:mag1, none, 10)
@@ -75,7 +75,7 @@ defmodule Swarm.StatusTest do
     for zero <- [0, 0.0],
         do: assert(%{uncertainty: 0} = Status.Row.encode(%{sure | uncertainty: zero}))
 
-    # However lost, it can say so.
+    # However uncertain it is, it can say so.
     lost = Status.Row.encode(%{sure | uncertainty: 1.0e12})
     assert {:ok, %{uncertainty: 1.0e5}} = Status.Row.decode(:mag1, lost, 10)
 
@@ -94,7 +94,7 @@ defmodule Swarm.StatusTest do
     assert inspect(status) =~ ~r/ deg\) ±\d+\.\d\d m, 0\.00 m\/s/
   end
 
-  test "robots of one node are in each other's view and hear each other, and it says so" do
+  test "robots of one node are in each other's view and hear each other, and the status says so" do
     for id <- [:st1, :st2], do: robot(id)
     assert eventually(fn -> :st2 in Swarm.status(:st1).hears end)
 
@@ -105,7 +105,7 @@ defmodule Swarm.StatusTest do
     assert Swarm.Membership.Matrix.hears?(Swarm.matrix(), :st1, :st2)
   end
 
-  test "the line says why a device is offline, and that a robot is slow for want of sonar" do
+  test "the line says why a device is offline, and that a robot without sonar is slow" do
     status = %Status{
       robot: :mag1,
       node: :mag1@lab,
@@ -117,18 +117,18 @@ defmodule Swarm.StatusTest do
 
     assert inspect(status) =~ ", BLIND (no sonar; slow), "
     assert inspect(status) =~ ", drive offline (/dev/ttyR0: permission denied)"
-    # So does its row, to those that it cannot answer.
+    # So does its row, for nodes that cannot reach it.
     {:ok, told} = Status.Row.decode(:mag1, Status.Row.encode(status), 7)
     assert inspect(told) =~ ", FAULT (bumper 0 stays pressed), BLIND (no sonar; slow), "
     assert inspect(told) =~ ", drive offline (/dev/ttyR0: permission denied)"
-    # A row of before knows no words.
+    # A row of an older version has no text.
     row = status |> Status.Row.encode() |> Map.delete(:words)
     assert {:ok, %Status{offline: none} = told} = Status.Row.decode(:mag1, row, 7)
     assert none == %{} and inspect(told) =~ ", drive offline"
   end
 
   @tag :capture_log
-  test "why a drive is offline is in its driver's words" do
+  test "the driver explains why a drive is offline" do
     port = "/dev/convoy_no_such_line"
     id = robot(:st_line, drive: {Hal.RFlex.Driver, port: port}, arm: :manual)
     words = "drive offline (#{port}: no such device)"

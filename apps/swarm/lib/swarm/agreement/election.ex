@@ -3,17 +3,17 @@ defmodule Swarm.Agreement.Election do
   Elects the leader: a pure function of the committed record, so that all robots get the same
   answer.
 
-  Of those that found the landmark it is the one that sees it largest (R48); ties go to the first
-  name. Where two or more leaders report, parts of a fleet have met, and the one with the highest
-  {robots led, size, name} leads all: the fewest have to turn to another.
+  Among those that found the landmark, the one that sees it largest wins (R48); ties go to the
+  first name. If two or more leaders report, parts of a fleet have met, and the one with the
+  highest {robots led, size, name} leads all: the fewest have to turn to another.
 
   Under the policy `:majority` (`of` is the fleet's size) nobody leads a view that is not more than
   half of the fleet.
   """
 
   @typedoc """
-  What a robot reported in a round; `nil` where it was silent until the deadline. `led` is how many
-  robots it leads, itself too, 0 for one that leads nobody; `of` is the size of the fleet of which
+  What a robot reported in a round; `nil` if it was silent until the deadline. `led` is how many
+  robots it leads including itself, 0 if it leads nobody; `of` is the size of the fleet of which
   only a majority may lead, 0 under the policy `:available`.
   """
   @type report ::
@@ -27,7 +27,7 @@ defmodule Swarm.Agreement.Election do
           | nil
 
   @doc """
-  The leader; `:nobody` where none found the landmark, `:minority` where the view may not lead.
+  The leader; `:nobody` if none found the landmark, `:minority` if the view may not lead.
 
       iex> one = %{found: true, size_ppm: 900, pose: {0, 0, 0}, led: 0, of: 0}
       iex> Swarm.Agreement.Election.leader(%{mag1: one, mag2: one, min1: %{one | found: false}, min2: nil})
@@ -51,7 +51,8 @@ defmodule Swarm.Agreement.Election do
   end
 
   @doc """
-  The size of the fleet of which a majority is asked for, 0 for no such rule: the strictest report counts.
+  The size of the fleet of which a majority is required, 0 if none is; the strictest report
+  counts.
 
       iex> Swarm.Agreement.Election.fleet(%{mag1: nil})
       0
@@ -64,7 +65,7 @@ defmodule Swarm.Agreement.Election do
   end
 
   @doc """
-  Whether so many robots of a fleet of `of` may lead themselves; 0 asks for no majority.
+  Whether so many robots of a fleet of `of` may lead themselves; 0 requires no majority.
 
       iex> for robots <- 1..3, do: Swarm.Agreement.Election.enough?(robots, 4)
       [false, false, true]

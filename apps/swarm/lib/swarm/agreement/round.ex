@@ -1,15 +1,16 @@
 defmodule Swarm.Agreement.Round do
   @moduledoc """
-  Agreement on shared inputs: in the end every member of a view holds the same record, and knows
+  Agreement on shared inputs: at the end every member of a view holds the same record, and knows
   that the others do. Pure; time is passed in, in milliseconds.
 
       collect --all reports-------------------------> digest --all digests equal--> committed
               --the deadline--> echo --200 ms---------^
 
-  No process can know what the last message did, so time-outs give progress and digests give
-  safety: each member freezes what it holds, signs it with a digest that is final for the round's
-  id, and commits only when it has the same digest of the whole view. A different digest, or a
-  member that is gone, opens a new round with a higher id; the highest id heard wins everywhere.
+  No process can know whether its last message arrived, so time-outs give progress and digests
+  give safety: each member freezes what it holds, signs it with a digest that is final for the
+  round's id, and commits only when it has the same digest from the whole view. A different
+  digest, or a member that is gone, opens a new round with a higher id; the highest id heard wins
+  everywhere.
 
   Ids are `{epoch, counter, initiator}`: the epoch is that of the leadership which the round will
   found, the counter grows with each new try.
@@ -17,15 +18,16 @@ defmodule Swarm.Agreement.Round do
   alias Swarm.Agreement.Round.{Letter, Record}
 
   @leap 1_000_000
-  # Letters are repeated every 100 ms, more rarely in a large group: all to all grows with its square.
+  # Letters are repeated every 100 ms, less often in a large group, because all-to-all traffic
+  # grows with its square.
   @repeat_ms 100
   @repeat_ms_per_robot 8
-  # For so long reports are told on: before the digest when some are missing, else along with it.
+  # How long reports are echoed: before the digest if some are missing, else along with it.
   @echo_ms 200
-  # Counted in repeats: when a missing digest is asked for, and when a round is given up.
+  # Counted in repeats: when to ask for a missing digest, and when to give up a round.
   @ask_after 4
   @give_up_after 25
-  # After its commit a member goes on answering, for those that missed the last digest.
+  # After its commit a member continues to answer, for those that missed the last digest.
   @linger_ms 2_000
 
   @enforce_keys [:me]
@@ -48,8 +50,9 @@ defmodule Swarm.Agreement.Round do
 
   @type phase :: :none | :collect | :echo | :digest | :committed
   @typedoc """
-  `report` is the own one, `reports` and `digests` are what was heard of all, `said_ms` is when this
-  robot spoke last, `since_ms` when the phase began, `highest` the highest epoch and counter known.
+  `report` is this robot's own report, `reports` and `digests` are those heard from all, `said_ms`
+  is when this robot last sent a letter, `since_ms` when the phase began, `highest` the highest
+  epoch and counter known.
   """
   @type t :: %__MODULE__{
           me: atom(),
@@ -73,8 +76,8 @@ defmodule Swarm.Agreement.Round do
   def new(me), do: %__MODULE__{me: me}
 
   @doc """
-  Opens a round among `view` (which holds the opener), for the leadership of `epoch`. Its counter
-  is above any that was heard of.
+  Opens a round among `view` (which includes the opener), for the leadership of `epoch`. Its
+  counter is above any known one.
   """
   @spec open(t(), pos_integer(), [atom()], :search | :change, pos_integer(), integer()) :: t()
   def open(round, epoch, view, purpose, length_ms, now_ms) do
@@ -84,7 +87,10 @@ defmodule Swarm.Agreement.Round do
     enter(round, {epoch, counter + 1, round.me}, view, purpose, length_ms, now_ms)
   end
 
-  @doc "Sets the own report: `:busy` while the scan goes on, then the result, which is final for this id."
+  @doc """
+  Sets this robot's report: `:busy` while the scan goes on, then the result, which is final for
+  this id.
+  """
   @spec report(t(), :busy | Swarm.Agreement.Election.report()) :: t()
   def report(%{phase: :collect, report: :busy} = round, report) when is_map(report),
     do: %{round | report: report, reports: Map.put(round.reports, round.me, report), said_ms: nil}
@@ -95,7 +101,10 @@ defmodule Swarm.Agreement.Round do
   @spec open?(t()) :: boolean()
   def open?(round), do: round.phase in [:collect, :echo, :digest]
 
-  @doc "Hears a letter. A higher id takes this robot along if it is in the view; a lower one is dropped."
+  @doc """
+  Hears a letter. This robot joins a round with a higher id if it is in the view; a lower one is
+  dropped.
+  """
   @spec hear(t(), atom(), Letter.t(), integer()) :: t()
   def hear(%{me: me} = round, from, %Letter{} = letter, now_ms) when from != me do
     if leap?(letter.id, round.highest),
@@ -105,7 +114,7 @@ defmodule Swarm.Agreement.Round do
 
   def hear(round, _from, _letter, _now_ms), do: round
 
-  # No fleet gets that far at once; taken over, such an id would leave no room for the next ones.
+  # No fleet gets this far at once; accepting such an id would leave no room for the next ones.
   defp leap?({epoch, counter, _initiator}, {epoch, highest}), do: counter > highest + @leap
 
   defp leap?({epoch, counter, _initiator}, {highest, _counter}),
@@ -125,9 +134,9 @@ defmodule Swarm.Agreement.Round do
   end
 
   @doc """
-  One tick: the letters to send to all of the view, and whether something came of it.
+  One tick: returns the letters to send to all of the view, and the outcome, if any.
 
-  `{:commit, record}` comes once. `{:failed, :mismatch | :timeout}` asks for a new round.
+  `{:commit, record}` is returned once. `{:failed, :mismatch | :timeout}` asks for a new round.
   """
   @spec tick(t(), integer()) ::
           {t(), [Letter.t()], nil | {:commit, Record.t()} | {:failed, :mismatch | :timeout}}
@@ -152,7 +161,7 @@ defmodule Swarm.Agreement.Round do
     end
   end
 
-  @doc "Leaves a round; what this robot said in it stands."
+  @doc "Leaves a round; what this robot said in it remains valid."
   @spec leave(t()) :: t()
   def leave(round), do: %{fenced(round) | phase: :none}
 
@@ -219,7 +228,7 @@ defmodule Swarm.Agreement.Round do
 
   defp advance(%{phase: :collect} = round, now_ms) do
     cond do
-      # Not at the tick of its opening: whoever opened it has to stand first.
+      # Not at the tick of its opening: the robot that opened it has to stop first.
       whole?(round) and now_ms > round.since_ms -> freeze(round, now_ms)
       now_ms < round.deadline_ms -> round
       true -> %{round | phase: :echo, since_ms: now_ms, said_ms: nil, echo?: true}
@@ -287,7 +296,8 @@ defmodule Swarm.Agreement.Round do
 
   defp differing?(round), do: Enum.any?(round.digests, fn {_id, d} -> d != round.digest end)
 
-  # A round whose digest is out may have been committed by others: what follows it is a new epoch.
+  # If this robot's digest is out, others may have committed the round, so the next round is for a
+  # new epoch.
   defp fenced(%{phase: phase, id: {epoch, _counter, initiator}} = round)
        when phase in [:digest, :committed],
        do: note(round, {epoch + 1, 0, initiator})
@@ -297,8 +307,8 @@ defmodule Swarm.Agreement.Round do
   defp note(round, {epoch, counter, _initiator}),
     do: %{round | highest: max(round.highest, {epoch, counter})}
 
-  # Whoever has sent its digest goes on to another round of the same epoch only with one who has
-  # not sent any: else two rounds could found the same epoch.
+  # A robot that has sent its digest joins another round of the same epoch only if the sender has
+  # not sent any digest; otherwise two rounds could found the same epoch.
   defp supersedes?(_id, %{id: nil}), do: true
 
   defp supersedes?({epoch, _counter, initiator} = id, %{id: {own, _, _}} = round) do

@@ -1,18 +1,18 @@
 defmodule Swarm.Blackboard.AntiEntropy do
   @moduledoc """
-  Finds missing rows in three messages: a digest; the stamps that the other has where it differs;
-  the rows that this one has newer, and a wish for those that it has not. Pure.
+  Finds missing rows in three messages: a digest; the other's stamps where it differs; the rows
+  that are newer here, and a request for those that are missing here. Pure.
   """
   alias Swarm.Blackboard.{Codec, Rows, State}
 
   @hashes 4_294_967_296
 
-  @typedoc "Of each owner a number that says which rows one has."
+  @typedoc "For each owner a number that identifies the rows one has."
   @type digest :: [{Rows.owner(), non_neg_integer()}]
   @type stamps :: [{Rows.owner(), [{Rows.key(), Rows.stamp()}]}]
 
   @doc """
-  A digest of all rows, sorted by name: one number an owner, equal where all stamps are.
+  A digest of all rows, sorted by name: one number per owner, equal if all stamps are.
 
       iex> Swarm.Blackboard.AntiEntropy.digest(Swarm.Blackboard.State.new())
       []
@@ -24,8 +24,8 @@ defmodule Swarm.Blackboard.AntiEntropy do
   end
 
   @doc """
-  The owners of which another, by its digest, has other rows than this one. The digest may be a part,
-  of the names from `first` up to but without `until` (`nil`: to the end).
+  The owners for which another node, by its digest, has other rows than this one. The digest may
+  be partial, for the names from `first` up to, but not including, `until` (`nil`: to the end).
   """
   @spec differing(State.t(), digest(), first :: String.t(), until :: String.t() | nil) ::
           [Rows.owner()]
@@ -38,11 +38,14 @@ defmodule Swarm.Blackboard.AntiEntropy do
       for {owner, hash} <- mine, within?.(Codec.name(owner)), theirs[owner] != hash, do: owner
   end
 
-  @doc "Which rows of these owners one has."
+  @doc "The stamps of the rows of these owners."
   @spec stamps(State.t(), [Rows.owner()]) :: stamps()
   def stamps(state, owners), do: for(owner <- owners, do: {owner, of(Rows.of(state, owner))})
 
-  @doc "The rows that another lacks who has these; and `{owner, key}` of those that are newer there."
+  @doc """
+  The rows that another node with these stamps lacks, and `{owner, key}` of those that are newer
+  there.
+  """
   @spec diff(State.t(), stamps(), integer()) ::
           {[Rows.row()], wanted :: [{Rows.owner(), Rows.key()}]}
   def diff(state, theirs, now_ms) do
@@ -65,7 +68,7 @@ defmodule Swarm.Blackboard.AntiEntropy do
 
   defp newer?(stamp, other), do: other == nil or stamp > other
 
-  # The same number on every machine and release.
+  # The same number on every machine and in every release.
   defp hash(all), do: :erlang.phash2(of(all), @hashes)
   defp of(all), do: Enum.sort(for {key, {stamp, _value, _at_ms}} <- all, do: {key, stamp})
 end

@@ -6,36 +6,36 @@ defmodule Swarm.Blackboard.Codec do
   | term | means |
   |---|---|
   | `{:rows, [{name, id, incarnation, sequence, age_ms, payload}]}` | rows |
-  | `{:digest, first, until, [{name, hash}]}` | of those named so, this is what I have |
-  | `{:have, [{name, [{id, incarnation, sequence}]}]}` | of these I have these rows: send what I lack |
+  | `{:digest, first, until, [{name, hash}]}` | my rows of the robots in this range of names |
+  | `{:have, [{name, [{id, incarnation, sequence}]}]}` | my rows of these robots: send what I lack |
   | `{:want, [{name, id}]}` | send these |
 
-  Names of robots travel as text, keys as a number, and keys with their values as bytes, so that
-  a node relays what it has no words for; nothing that arrives becomes an atom. Of a hint, the name is the
-  byte of its bucket, `incarnation` its count and `sequence` `{writer, check}`; one that is deleted has an
-  empty payload.
+  Names of robots travel as text, keys as a number, and keys with their values as bytes, so that a
+  node can relay rows whose atoms it does not know; nothing that arrives becomes an atom. For a
+  hint, the name is the byte of its bucket, `incarnation` its count and `sequence`
+  `{writer, check}`; a deleted hint has an empty payload.
   """
   alias Swarm.Blackboard.{AntiEntropy, Rows}
   alias Swarm.Message.WireTypes
 
-  # Of the payload of a datagram; larger terms go alone.
+  # The size of a datagram's payload; larger terms are sent alone.
   @datagram 1_200
-  # Terms that are compressed may be far larger than their bytes.
+  # Compressed terms may be far larger than their bytes.
   @compressed 80
   @ids 4_294_967_296
-  # Times of day in ms, or, on clocks that count finer, in ns: until the year 2160. Who is outbid by such a
-  # number, however wrong, has one left that is higher.
+  # Times of day in ms, or, on finer clocks, in ns, until the year 2160. Even if a wrong number is
+  # as high as this, there is still a higher one to outbid it.
   @latest 6_000_000_000_000_000_000
-  # No robot writes as often in one life.
+  # No robot writes this often in one life.
   @most 1_000_000_000_000_000
-  # What is older than this travels as no older.
+  # Older rows travel with this age.
   @oldest_ms 1_000_000_000
 
   @type key :: atom() | {atom(), atom() | integer()}
   @type id :: non_neg_integer()
 
   @doc """
-  Whether it can be the key of a row: a name, or a name with one of what.
+  Whether a term can be the key of a row: a name, or a pair of a name and an identifier.
 
       iex> for key <- [:about, {:task, 3}, nil, "about", {:a, :b, :c}], do: Swarm.Blackboard.Codec.key?(key)
       [true, true, false, false, false]
@@ -51,7 +51,7 @@ defmodule Swarm.Blackboard.Codec do
   def id(key), do: :erlang.phash2(key, @ids)
 
   @doc """
-  A key and its value as bytes, and back.
+  Encodes a key and its value as bytes; `decode/1` decodes them.
 
       iex> Swarm.Blackboard.Codec.decode(Swarm.Blackboard.Codec.encode(:about, %{battery: 12.1}))
       {:ok, :about, %{battery: 12.1}}
@@ -61,7 +61,7 @@ defmodule Swarm.Blackboard.Codec do
   @spec encode(key(), term()) :: binary()
   def encode(key, value), do: :erlang.term_to_binary({key, value}, minor_version: 2)
 
-  @doc "Back; `:error` also where a name in it is not known on this node."
+  @doc "Decodes a key and its value; `:error` also if this node does not know a name in it."
   @spec decode(binary()) :: {:ok, key(), term()} | :error
   def decode(<<131, @compressed, _rest::binary>>), do: :error
 
@@ -84,7 +84,7 @@ defmodule Swarm.Blackboard.Codec do
     |> Enum.map(&{:rows, &1})
   end
 
-  @doc "A digest as terms for datagrams, each of which says of which names it is."
+  @doc "A digest as terms for datagrams, each of which gives its range of names."
   @spec digest(AntiEntropy.digest()) :: [term()]
   def digest(digest) do
     parts = pack(for {owner, hash} <- digest, do: {name(owner), hash})
@@ -105,18 +105,19 @@ defmodule Swarm.Blackboard.Codec do
     for part <- pack(stamps), do: {:have, part}
   end
 
-  @doc "Wishes as terms for datagrams."
+  @doc "Requests for rows as terms for datagrams."
   @spec want([{Rows.owner(), id()}]) :: [term()]
   def want(wanted),
     do: for(part <- pack(for {owner, id} <- wanted, do: {name(owner), id}), do: {:want, part})
 
-  @doc "What rows of an owner are named by: a robot's name as text, a bucket's one byte."
+  @doc "The name of an owner in datagrams: a robot's name as text, a bucket's single byte."
   @spec name(Rows.owner()) :: binary()
   def name(robot) when is_atom(robot), do: Atom.to_string(robot)
   def name(bucket), do: <<bucket>>
 
   @doc """
-  Lists of terms, each list small enough for a datagram; what is too large for that goes alone.
+  Splits terms into lists, each small enough for a datagram; a term that is too large for that is
+  alone.
 
       iex> Swarm.Blackboard.Codec.pack([])
       []
@@ -125,7 +126,7 @@ defmodule Swarm.Blackboard.Codec do
   """
   @spec pack([term()]) :: [[term(), ...]]
   def pack(terms) do
-    # What stands round the list, and the name of what it is a list of, with two bounds.
+    # The terms around the list: the tag of the list, and two bounds.
     room = @datagram - 100
 
     terms
@@ -151,8 +152,8 @@ defmodule Swarm.Blackboard.Codec do
           | {:want, [{Rows.owner(), id()}]}
 
   @doc """
-  What a term from outside says, and how much of it was dropped: entries of no sense, and those
-  of robots whose names are not known here.
+  Decodes a term from outside, and counts what was dropped: senseless entries, and those of robots
+  whose names are not known here.
 
       iex> Swarm.Blackboard.Codec.read({:want, [{"mag1", 5}, :junk]})
       {{:want, [mag1: 5]}, 1}
@@ -195,7 +196,7 @@ defmodule Swarm.Blackboard.Codec do
 
   defp row(_other), do: :error
 
-  # A hash, or a wish.
+  # A hash, or a request.
   defp number({name, number}) when id?(number) do
     with {:ok, owner} <- owner(name), do: {:ok, {owner, number}}
   end
@@ -247,10 +248,10 @@ defmodule Swarm.Blackboard.Codec do
 
   def robot(_other), do: :error
 
-  @typedoc "A name that travelled as text, where there is no such atom."
+  @typedoc "A name that travelled as text, if this node has no such atom."
   @type word :: atom() | String.t()
 
-  @doc "A name that travelled as text: its atom, or the text where this node has none."
+  @doc "A name that travelled as text: its atom, or the text if this node has no such atom."
   @spec word(String.t()) :: word()
   def word(text) do
     case robot(text) do

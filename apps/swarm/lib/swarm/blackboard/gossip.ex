@@ -1,11 +1,13 @@
 defmodule Swarm.Blackboard.Gossip do
-  @moduledoc "How a blackboard reaches other nodes: by a transport, `{m, f, a}`, that may be a test's."
+  @moduledoc """
+  Sends from a blackboard to other nodes by a transport `{m, f, a}`, which a test may replace.
+  """
 
   @type call :: {module(), atom(), list()}
 
   @doc """
-  Terms to some nodes, one after the other, or to all. What does not go out, or gets lost, is repaired
-  later.
+  Sends terms to some nodes, one after the other, or to all. What cannot be sent, or gets lost, is
+  repaired later.
   """
   @spec cast(call(), [node()] | :all, [term()]) :: :ok
   def cast({m, f, a}, nodes, terms) do
@@ -14,7 +16,7 @@ defmodule Swarm.Blackboard.Gossip do
     :ok
   end
 
-  @doc "Some of the nodes, chosen at random."
+  @doc "Chooses some of the nodes at random."
   @spec some(call(), pos_integer(), :rand.state()) :: {[node()], :rand.state()}
   def some({m, f, a}, count, rand) do
     {drawn, rand} =

@@ -8,9 +8,9 @@ defmodule Swarm.Blackboard.Hints do
       {:ok, %{x: 2.0, y: 1.0}, :mag1}
       Swarm.Blackboard.Hints.delete(:mag2, {:searched, 7})
 
-  Whoever writes last wins, by a count and not by a clock. A hint is small, 1,000 bytes, and there are
-  256 of them, deleted ones of the last ten minutes too; the newest stay. They spread as rows do, and
-  live as long as a node is there that has them.
+  The last writer wins, decided by a count and not by a clock. A hint has at most 1,000 bytes, and
+  there are at most 256 of them, including those deleted in the last ten minutes; the newest stay.
+  They spread as rows do, and live as long as there is a node that has them.
   """
   alias Mesh.{Nonblocking, SafeTable}
   alias Swarm.Blackboard.{Codec, Rows}
@@ -23,14 +23,14 @@ defmodule Swarm.Blackboard.Hints do
   def put(board \\ @board, robot, key, value),
     do: write(board, robot, key, fn -> Codec.encode(key, value) end)
 
-  @doc "A robot takes a hint away, whoever wrote it."
+  @doc "A robot deletes a hint, whoever wrote it."
   @spec delete(atom(), atom(), Codec.key()) :: :ok | {:error, line :: String.t()}
   def delete(board \\ @board, robot, key), do: write(board, robot, key, fn -> "" end)
 
   defp write(board, robot, key, payload) do
     cond do
       not WireTypes.name?(robot) ->
-        {:error, "#{inspect(robot)} is not a robot that could write a hint"}
+        {:error, "#{inspect(robot)} is not a robot, which could write a hint"}
 
       not Codec.key?(key) ->
         {:error, "#{inspect(key)} is not a key of a hint; write a name or {:searched, 7}"}
@@ -41,17 +41,17 @@ defmodule Swarm.Blackboard.Hints do
     end
   end
 
-  @doc "A hint, and who wrote it."
+  @doc "A hint, and its writer."
   @spec get(atom(), Codec.key()) :: {:ok, term(), Codec.word()} | :error
   def get(board \\ @board, key) do
     with [row] <- SafeTable.lookup(board, {Rows.shown_as(), Codec.id(key)}),
-         # Two keys may have one number.
+         # Two keys may have the same number.
          [{^key, {value, writer}}] <- read(row),
          do: {:ok, value, writer},
          else: (_none -> :error)
   end
 
-  @doc "All hints, by key, with who wrote each."
+  @doc "All hints by key, each with its writer."
   @spec all(atom()) :: %{Codec.key() => {term(), Codec.word()}}
   def all(board \\ @board) do
     board
@@ -60,7 +60,7 @@ defmodule Swarm.Blackboard.Hints do
     |> Map.new()
   end
 
-  # Nothing of a deleted one, nor of what this node has no words for.
+  # Skips deleted hints, and those with atoms that this node does not know.
   defp read({_id, payload, _at_ms, {_count, {writer, _check}}}) do
     for {:ok, key, value} <- [Codec.decode(payload)], do: {key, {value, Codec.word(writer)}}
   end

@@ -1,16 +1,17 @@
 defmodule Swarm.Blackboard.Rows do
   @moduledoc """
-  The rows that a node holds, `owner -> key -> {stamp, value, since when}`: of two the higher stamp wins,
-  whatever order they come in. Pure.
+  The rows that a node holds, `owner -> key -> {stamp, value, since when}`: of two rows the higher
+  stamp wins, in whatever order they arrive. Pure.
 
-  An owner is a robot, whose rows have one writer and stamps `{incarnation, sequence}`, or a bucket of
-  hints, which anybody writes. A hint's stamp is `{count, {writer, check}}`: a count above all that
-  its writer had seen, its name, and a number of the value. There are 16 buckets, by the key's
-  number, so that two nodes need not tell each other of all hints where one differs.
+  An owner is a robot, whose rows have one writer and stamps `{incarnation, sequence}`, or a
+  bucket of hints, which any robot writes. A hint's stamp is `{count, {writer, check}}`: a count
+  above all that its writer had seen, the writer's name, and a hash of the value. There are 16
+  buckets, chosen by the key's number, so that two nodes need not exchange all hints if one
+  differs.
 
-  A row has an age and no time of day: it travels with its age at sending, and each who holds it adds
-  for how long. What the way took is not in it, so of two ages of one row the higher is nearer to the
-  truth.
+  A row has an age instead of a time of day: it travels with its age at sending, and each node
+  adds how long it has held the row. The time of transport is not included, so of two ages of one
+  row the higher is nearer to the truth.
   """
   alias Swarm.Blackboard.State
 
@@ -29,32 +30,32 @@ defmodule Swarm.Blackboard.Rows do
   @spec bucket(non_neg_integer()) :: owner()
   def bucket(id), do: rem(id, @buckets)
 
-  @doc "What hints have in a board's table where a robot's rows have its name."
+  @doc "The owner of hints in a board's table, where a robot's rows have its name."
   @spec shown_as() :: String.t()
   def shown_as, do: "hints"
 
-  @doc "The stamp of a hint; an empty value is that of one that was deleted."
+  @doc "The stamp of a hint; an empty value is that of a deleted hint."
   @spec hint_stamp(pos_integer(), String.t(), binary()) :: stamp()
   def hint_stamp(count, writer, value), do: {count, {writer, :erlang.phash2(value, @hashes)}}
 
-  @doc "All owners with what is held of them."
+  @doc "All owners with their rows."
   @spec owners(State.t()) :: [{owner(), %{key() => held()}}]
   def owners(state) do
     hints = Enum.group_by(state.hints, fn {id, _held} -> bucket(id) end)
     Map.to_list(state.robots) ++ for {bucket, list} <- hints, do: {bucket, Map.new(list)}
   end
 
-  @doc "What is held of an owner."
+  @doc "The rows of an owner."
   @spec of(State.t(), owner()) :: %{key() => held()}
   def of(state, robot) when is_atom(robot), do: Map.get(state.robots, robot, %{})
   def of(state, bucket), do: :maps.filter(fn id, _held -> bucket(id) == bucket end, state.hints)
 
-  @doc "How a row is held here: its stamp, its value, and since when by this node's clock."
+  @doc "A row as it is held here: its stamp, its value, and since when by this node's clock."
   @spec held(State.t(), owner(), key()) :: {:ok, held()} | :error
   def held(state, robot, key) when is_atom(robot), do: Map.fetch(of(state, robot), key)
   def held(state, _bucket, id), do: Map.fetch(state.hints, id)
 
-  @doc "One row as it travels now, or none."
+  @doc "One row as it is sent now, or none."
   @spec rows(State.t(), owner(), key(), integer()) :: [row()]
   def rows(state, owner, key, now_ms) do
     case held(state, owner, key) do
@@ -63,14 +64,17 @@ defmodule Swarm.Blackboard.Rows do
     end
   end
 
-  @doc "All rows of an owner as they travel now."
+  @doc "All rows of an owner as they are sent now."
   @spec rows(State.t(), owner(), integer()) :: [row()]
   def rows(state, owner, now_ms) do
     for {key, {stamp, value, at_ms}} <- Enum.sort(of(state, owner)),
         do: {owner, key, stamp, max(now_ms - at_ms, 0), value}
   end
 
-  @doc "Holds a row if it is newer than what is held, or older in age; says whether it was taken."
+  @doc """
+  Stores a row if it is newer than the stored one, or has a higher age; returns whether it was
+  stored.
+  """
   @spec take(State.t(), owner(), key(), held()) :: {State.t(), taken? :: boolean()}
   def take(state, owner, key, {stamp, _value, at_ms} = new) do
     case held(state, owner, key) do
@@ -82,12 +86,12 @@ defmodule Swarm.Blackboard.Rows do
 
       _older_or_none ->
         state = hold(state, owner, key, new)
-        # The oldest row of too many goes, which may be this one.
+        # If there are too many, the oldest row is removed, which may be this one.
         {state, match?({:ok, {^stamp, _, _}}, held(state, owner, key))}
     end
   end
 
-  @doc "Holds a row in any case. The newest stay: of a robot's, and of all hints."
+  @doc "Stores a row in any case. Of a robot's rows, and of all hints, the newest stay."
   @spec hold(State.t(), owner(), key(), held()) :: State.t()
   def hold(state, robot, key, held) when is_atom(robot) do
     all = state |> of(robot) |> Map.put(key, held) |> newest(state.limits.keys)
@@ -97,7 +101,7 @@ defmodule Swarm.Blackboard.Rows do
   def hold(state, _bucket, id, held),
     do: %{state | hints: state.hints |> Map.put(id, held) |> newest(state.limits.hints)}
 
-  # The newest of the whole: so that it does not matter in which order they came.
+  # The newest of all, so that the order of arrival does not matter.
   defp newest(all, most) when map_size(all) <= most, do: all
 
   defp newest(all, _most),

@@ -1,7 +1,7 @@
 defmodule Swarm.Blackboard.Server do
   @moduledoc """
-  The process of `Swarm.Blackboard`: keeps the rows, and a table that shows them to readers; pushes what is
-  written here, takes what arrives, and repairs what was lost.
+  The process of `Swarm.Blackboard`: keeps the rows, and a table for readers; pushes what is
+  written here, stores what arrives, and repairs what was lost.
   """
   use GenServer
   alias Hal.Event
@@ -9,7 +9,7 @@ defmodule Swarm.Blackboard.Server do
   alias Swarm.Blackboard.{AntiEntropy, Rows}
   alias Swarm.Message.WireTypes
 
-  # Nodes that get each digest.
+  # The number of nodes that get each digest.
   @peers 2
   @firsts 1_000_000
 
@@ -33,12 +33,12 @@ defmodule Swarm.Blackboard.Server do
       dropped: 0
     }
 
-    # One that starts anew among others asks at once for what it has lost.
+    # A board that starts again among others asks at once for what it has lost.
     unless s.repair_ms == :never, do: send(self(), :repair)
     {:ok, s}
   end
 
-  # It has a name that connected nodes can send to, so anything may come here.
+  # It has a name that connected nodes can send to, so anything may arrive here.
   defguardp is_owner(pid, robot, boot)
             when is_pid(pid) and node(pid) == node() and is_atom(robot) and is_integer(boot) and
                    boot >= 0
@@ -163,7 +163,7 @@ defmodule Swarm.Blackboard.Server do
     do: large("hint", key, payload, s.rows.limits.hint_bytes)
 
   defp line(:keys, robot, _key, _payload, s),
-    do: "#{robot} cannot have more rows; it has #{s.rows.limits.keys} already"
+    do: "#{robot} cannot have more rows; it already has #{s.rows.limits.keys}"
 
   defp large(what, key, payload, most),
     do: "the #{what} #{inspect(key)} cannot have #{byte_size(payload)} bytes; it may have #{most}"
@@ -233,7 +233,7 @@ defmodule Swarm.Blackboard.Server do
     end)
   end
 
-  # Told once of each life of it.
+  # Reported once for each of its lives.
   defp rival(%{rivals: rivals} = s, robot, incarnation, from) do
     if rivals[robot] == incarnation do
       s
@@ -244,7 +244,7 @@ defmodule Swarm.Blackboard.Server do
     end
   end
 
-  # The table follows the rows; who reads never finds it empty between.
+  # The table follows the rows; a reader never finds it empty in between.
   defp show(s, owners) do
     for {name, held} <- owners |> Enum.map(&held(s, &1)) |> Enum.uniq() do
       shown = for {id, {stamp, payload, at_ms}} <- held, do: {{name, id}, payload, at_ms, stamp}
@@ -259,7 +259,7 @@ defmodule Swarm.Blackboard.Server do
   end
 
   defp held(s, robot) when is_atom(robot), do: {robot, Rows.of(s.rows, robot)}
-  # One more in a bucket may be one less in another.
+  # One more in a bucket may mean one less in another.
   defp held(s, _bucket), do: {Rows.shown_as(), s.rows.hints}
 
   defp drop(s, count), do: %{s | dropped: s.dropped + count}
@@ -270,7 +270,7 @@ defmodule Swarm.Blackboard.Server do
 
   defp schedule(%{repair_ms: :never} = s), do: s
 
-  # Not all nodes at one moment.
+  # So that not all nodes send at the same time.
   defp schedule(s) do
     {part, rand} = :rand.uniform_s(s.rand)
     Process.send_after(self(), :repair, round(s.repair_ms * (0.75 + 0.5 * part)))

@@ -1,20 +1,20 @@
 defmodule Swarm.Blackboard.State do
   @moduledoc """
-  What all robots publish about themselves, as one node knows it: `{robot, key} -> {incarnation,
-  sequence, value}`. Each row has one writer, the robot itself, and the newest `{incarnation,
-  sequence}` wins, so that rows may arrive late, twice, in any order and through third parties.
-  Beside them there are hints, which all robots write (`put_hint/5`). Pure; times are this node's
-  own, in milliseconds. `Swarm.Blackboard.Rows` holds the rows.
+  What all robots publish about themselves, as one node knows it:
+  `{robot, key} -> {incarnation, sequence, value}`. Each row has one writer, the robot itself, and
+  the newest `{incarnation, sequence}` wins, so that rows may arrive late, twice, in any order and
+  through third parties. Besides rows there are hints, which all robots write (`put_hint/5`).
+  Pure; times are this node's own, in milliseconds. `Swarm.Blackboard.Rows` holds the rows.
 
-  *Own* robots are those of this node (`enter/4`). What others say of them:
+  *Own* robots are those of this node (`enter/4`). Rows of them that come from outside:
 
-  | row from outside | what becomes of it |
+  | row from outside | what happens |
   |---|---|
-  | of a former life, or of this one before the board was lost | taken, but never in place of a newer word |
-  | of a higher incarnation, and young | a rival of the same name: told (`{:rival, robot, incarnation}`), not taken |
+  | of a former life, or of this one before the board was lost | accepted, but never in place of a newer row |
+  | of a higher incarnation, and young | a rival of the same name: reported (`{:rival, robot, incarnation}`), not accepted |
   | of a higher incarnation, and over 5 s old | a former life, before the clock was set back: outbid |
 
-  A hint that is deleted stays as one with the value `""`, so that it does not come back, for ten minutes.
+  A deleted hint stays for ten minutes with the value `""`, so that it does not come back.
 
   Memory is bounded (`limits`): other robots, keys of a robot and hints (the newest stay), bytes of
   a value.
@@ -23,8 +23,8 @@ defmodule Swarm.Blackboard.State do
 
   @limits %{robots: 256, keys: 32, bytes: 59_000, hints: 256, hint_bytes: 1_000}
   @rival_ms 5_000
-  # Nobody writes as often in one life, and no fleet as often unheard: a hint's count taken over from there
-  # would leave no room for what is written later.
+  # Nobody writes this often in one life, and no fleet this often unheard: accepting such a count
+  # of a hint would leave no room for later writes.
   @leap 1_000_000_000_000
   @forget_ms 600_000
 
@@ -42,8 +42,8 @@ defmodule Swarm.Blackboard.State do
         }
 
   @typedoc """
-    * `{:changed, owner, key}` - there is a newer value, or a better age
-    * `{:again, robot}` - the rows of this own robot have new stamps, and must be told again
+    * `{:changed, owner, key}` - there is a newer value, or a more accurate age
+    * `{:again, robot}` - the rows of this own robot have new stamps, and must be sent again
     * `{:rival, robot, incarnation}` - another robot has this own one's name
     * `{:refused, :robots | :bytes | :count}` - over a limit
   """
@@ -54,8 +54,8 @@ defmodule Swarm.Blackboard.State do
           | {:refused, :robots | :bytes | :count}
 
   @doc """
-  Nothing known yet. Options are the limits, and `first`, after which sequences count: a board
-  that was lost takes another one, so that no stamp is used twice within a robot's life.
+  An empty state. Options are the limits, and `first`, after which sequences count: a board that
+  was lost starts with another one, so that no stamp is used twice within a robot's life.
 
       iex> Swarm.Blackboard.State.new(keys: 4).limits
       %{robots: 256, keys: 4, bytes: 59_000, hints: 256, hint_bytes: 1_000}
@@ -68,7 +68,7 @@ defmodule Swarm.Blackboard.State do
   end
 
   @doc """
-  A robot of this node begins to write, in the life numbered `boot`. To enter again with the same
+  A robot of this node begins to write, in the life numbered `boot`. Entering again with the same
   number changes nothing.
   """
   @spec enter(t(), atom(), boot :: non_neg_integer(), integer()) :: {t(), [note()]}
@@ -82,7 +82,7 @@ defmodule Swarm.Blackboard.State do
   defp begin(rows, robot, boot, {{known, _sequence}, _value, at_ms}, now_ms) when known > boot do
     if now_ms - at_ms >= @rival_ms,
       do: {own(rows, robot, boot, {known + 1, rows.first}), []},
-      # Those are another's rows.
+      # These are the rows of another robot.
       else:
         {own(%{rows | robots: Map.delete(rows.robots, robot)}, robot, boot, {boot, rows.first}),
          [{:rival, robot, known}]}
@@ -100,12 +100,12 @@ defmodule Swarm.Blackboard.State do
     rows |> Rows.of(robot) |> Map.values() |> Enum.max_by(&elem(&1, 0), fn -> nil end)
   end
 
-  @doc "A robot of this node writes no more. Its rows stay, and grow old."
+  @doc "A robot of this node stops writing. Its rows stay, and grow old."
   @spec leave(t(), atom()) :: t()
   def leave(rows, robot), do: %{rows | own: Map.delete(rows.own, robot)}
 
   @doc """
-  An own robot writes a row.
+  A robot of this node writes a row.
 
       iex> {rows, []} = Swarm.Blackboard.State.enter(Swarm.Blackboard.State.new(), :mag1, 7, 0)
       iex> {:ok, rows} = Swarm.Blackboard.State.put(rows, :mag1, :battery, 12.1, 100)
@@ -140,7 +140,7 @@ defmodule Swarm.Blackboard.State do
     end
   end
 
-  # Words of a former life give way.
+  # Rows of a former life give way.
   defp full?(rows, mine, key, incarnation) do
     not is_map_key(mine, key) and map_size(mine) >= rows.limits.keys and
       Enum.count(mine, &match?({_key, {{^incarnation, _}, _, _}}, &1)) >= rows.limits.keys
@@ -163,7 +163,7 @@ defmodule Swarm.Blackboard.State do
     {:ok, Rows.hold(%{rows | clock: clock + 1}, Rows.bucket(id), id, held)}
   end
 
-  @doc "Takes what is new of rows from outside, unless `forget/2` would drop it at once."
+  @doc "Accepts new rows from outside, unless `forget/2` would drop them at once."
   @spec merge(t(), [Rows.row()], integer()) :: {t(), [note()]}
   def merge(rows, incoming, now_ms) do
     {rows, notes} =
@@ -172,7 +172,8 @@ defmodule Swarm.Blackboard.State do
         {rows, more ++ notes}
       end)
 
-    # Two that hand each other in turn what the other has just forgotten would never be rid of it.
+    # Two nodes that send each other in turn what the other has just forgotten would never get rid
+    # of it.
     {rows, _gone} =
       forget(rows, now_ms, for({owner, _, _, _, _} <- incoming, uniq: true, do: owner))
 
@@ -227,10 +228,12 @@ defmodule Swarm.Blackboard.State do
       incarnation > life ->
         again(rows, robot, boot, {incarnation + 1, 0})
 
-      # This robot's own words, which the board has lost since: never newer than what it says now.
+      # This robot's own rows, which the board has lost since: never newer than what it writes
+      # now.
       stamp > {life, count} ->
         known? = is_map_key(Rows.of(rows, robot), key)
-        # Nothing counts as far by itself: then another life, with numbers that will last.
+        # Nothing counts this far by itself, so this is treated as another life, with numbers that
+        # will last.
         on = if sequence > count + @leap, do: {life + 1, 0}, else: {life, sequence}
         {rows, notes} = again(rows, robot, boot, on)
         {rows, more} = if known?, do: {rows, []}, else: take(rows, robot, key, new)
@@ -241,7 +244,7 @@ defmodule Swarm.Blackboard.State do
     end
   end
 
-  # Old words keep their order and their ages, and get stamps that win.
+  # Old rows keep their order and their ages, and get stamps that win.
   defp again(rows, robot, boot, stamp) do
     {_boot, {life, _count}} = rows.own[robot]
 
@@ -262,8 +265,8 @@ defmodule Swarm.Blackboard.State do
   end
 
   @doc """
-  Forgets robots whose newest row is over ten minutes old, and words of former lives and deleted hints
-  that are; words of this life of this node's own never.
+  Forgets robots whose newest row is over ten minutes old, and rows of former lives and deleted
+  hints of that age; never rows of this node's own robots in their present life.
   """
   @spec forget(t(), integer()) :: {t(), gone :: [{Rows.owner(), key()}]}
   def forget(rows, now_ms),

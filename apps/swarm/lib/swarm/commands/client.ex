@@ -1,8 +1,8 @@
 defmodule Swarm.Commands.Client do
   @moduledoc false
-  # Asks robots, wherever they are, and gathers what they answer. What stops a robot goes to its
-  # e-stop process, all else to its comms. For an order to another node, the robot is first asked for a stamp
-  # (`Swarm.Commands.Freshness`).
+  # Sends requests to robots, wherever they are, and gathers their answers. Commands that stop a
+  # robot go to its e-stop process, all others to its comms process. Before an order to another
+  # node, the robot is asked for a stamp (`Swarm.Commands.Freshness`).
   alias Mesh.Nonblocking
   alias Swarm.{Directory, EStop}
   alias Swarm.Commands.Freshness
@@ -10,8 +10,8 @@ defmodule Swarm.Commands.Client do
   @answer_ms 500
 
   @doc """
-  What the robots answer within half a second; who does not is not in the map. All are asked at once,
-  so that a silent robot holds up nobody else's answer.
+  The answers of the robots within half a second; a robot that does not answer is not in the map.
+  All are asked at once, so that a silent robot does not delay another's answer.
   """
   @spec ask([atom()], term()) :: %{atom() => term()}
   def ask(robots, request) do
@@ -51,7 +51,7 @@ defmodule Swarm.Commands.Client do
     end
   end
 
-  # An answer may have come just before its alias was gone.
+  # An answer may have arrived just before its alias was removed.
   defp give_up(waiting, answers) do
     for {ref, about} <- waiting, reduce: answers do
       answers ->
@@ -68,8 +68,9 @@ defmodule Swarm.Commands.Client do
   defp late({:command, id}, answer, answers), do: Map.put(answers, id, answer)
   defp late({:stamp, _id, _to}, _stamp, answers), do: answers
 
-  # The nearest process that takes the request. Where its node is not connected, or not heard, the way by
-  # others comes first, `{:relay, process or nil}`; `nil` where nobody knows the robot.
+  # The nearest process that takes the request. If its node is not connected, or not heard, the
+  # way through other nodes comes first, `{:relay, process or nil}`; `nil` if nobody knows the
+  # robot.
   defp whereabouts(id, request) do
     pid = if(EStop.takes?(request), do: nearest({:estop, id})) || Directory.whereis(id)
 
@@ -109,7 +110,7 @@ defmodule Swarm.Commands.Client do
   defp post(id, to, request, order),
     do: cast(id, to, {:command, request, order}, {:command, id})
 
-  # By an alias: an answer that comes too late finds no mailbox. `nil` where no way leads there.
+  # By an alias, so that a late answer reaches no mailbox. `nil` if there is no way to the robot.
   defp cast(id, to, order, about) do
     ref = :erlang.alias([:reply])
     order = with_ref(order, ref)
@@ -124,7 +125,7 @@ defmodule Swarm.Commands.Client do
     end
   end
 
-  # Where there is no way round, the silent connection may yet be one.
+  # If there is no other way, the silent connection may still work.
   defp hand({:relay, pid}, id, order, ref) do
     with {:error, _no_way} = error <- Mesh.relay(id, order, ref),
          do: if(pid, do: Nonblocking.cast(pid, order), else: error)

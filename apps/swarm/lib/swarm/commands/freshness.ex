@@ -1,12 +1,13 @@
 defmodule Swarm.Commands.Freshness do
   @moduledoc """
-  Determines when an order was given, without a shared clock, and whether a robot is still to obey it. Pure; times are
-  `System.monotonic_time/1` of the robot's node, in microseconds.
+  Determines when an order was given, without a shared clock, and whether a robot should still
+  obey it. Pure; times are `System.monotonic_time/1` of the robot's node, in microseconds.
 
-  Whoever orders on another node first asks the robot for a stamp, which holds the robot's time. The order then carries
-  that time, minus how long the stamp took (`given/2`). So it was given at that time or later. The robot refuses an
-  order that is older than half a second, because whoever gave it no longer waits for an answer; one of another life of
-  the process that made the stamp; and one that was given before the robot was last stopped.
+  A sender on another node first asks the robot for a stamp, which holds the robot's time. The
+  order then carries that time, minus how long the stamp took (`given/2`), so it was given at that
+  time or later. The robot refuses an order that is older than half a second, because its sender
+  no longer waits for an answer; one with a stamp of another life of the process; and one that was
+  given before the robot was last stopped.
 
       iex> alias Swarm.Commands.Freshness
       iex> stamp = Freshness.stamp(7, 1_000_000)
@@ -23,23 +24,29 @@ defmodule Swarm.Commands.Freshness do
       {:error, :unknown}
   """
 
-  # How long whoever orders waits for an answer (`Swarm.Commands.Client`).
+  # How long the sender of an order waits for an answer (`Swarm.Commands.Client`).
   @longest_us 500_000
-  # The way back of a stamp. Who stops a robot and then starts it shall not be refused because that way was slow once;
-  # and nobody can tell the order of two things that people do on two machines within this time.
+  # Allowed for the way back of a stamp. A person who stops a robot and then starts it must not be
+  # refused because that way was slow once; and nobody can tell the order of two actions of people
+  # on two machines within this time.
   @way_back_us 50_000
 
   @typedoc "The number of a process's life, and a time."
   @type stamp :: {life :: integer(), at_us :: integer()}
 
-  @typedoc "Why an order is not obeyed: its age, which may be unknown, or a stop since it was given."
+  @typedoc """
+  Why an order is not obeyed: its age, which may be unknown, or a stop after it was given.
+  """
   @type refusal :: age_ms :: pos_integer() | :unknown | :stopped
 
-  @doc "A stamp for somebody who asks now."
+  @doc "A stamp for a request now."
   @spec stamp(life :: integer(), now_us :: integer()) :: stamp()
   def stamp(life, now_us), do: {life, now_us}
 
-  @doc "What an order carries whose stamp came so long after the order was given; `:error` where the stamp is none."
+  @doc """
+  What an order carries if its stamp arrived so long after the order was given; `:error` if the
+  stamp is invalid.
+  """
   @spec given(term(), waited_us :: non_neg_integer()) :: {:ok, stamp()} | :error
   def given({life, at_us}, waited_us) when is_integer(life) and is_integer(at_us),
     do: {:ok, {life, at_us - max(waited_us - @way_back_us, 0)}}
@@ -47,7 +54,7 @@ defmodule Swarm.Commands.Freshness do
   def given(_other, _waited_us), do: :error
 
   @doc """
-  Whether a request needs a stamp. A stop is obeyed at any age, and questions do no harm.
+  Whether a request needs a stamp. A stop is obeyed at any age, and questions are harmless.
 
       iex> for request <- [:reset, :arm, :stop, :disarm], do: Swarm.Commands.Freshness.needed?(request)
       [true, true, false, false]
@@ -57,9 +64,10 @@ defmodule Swarm.Commands.Freshness do
   def needed?(request), do: request not in [:stop, :disarm, :estop, :status, :ping]
 
   @doc """
-  Whether a process of this life obeys a request now, and when the request was given, as far as that is known here; else
-  now. `stopped_us` is when the robot was last stopped, `nil` if it never was. An order is given on this node where
-  `here?` says so, and then carries `{:asked, at_us}`, or nothing where it was not queued on the way.
+  Whether a process of this life obeys a request now, and when the request was given, if that is
+  known here, else now. `stopped_us` is when the robot was last stopped, `nil` if never. `here?`
+  says whether the order was given on this node; then it carries `{:asked, at_us}`, or nothing if
+  it was not queued on the way.
 
       iex> alias Swarm.Commands.Freshness
       iex> Freshness.judge(7, :start, {:asked, 1_000_000}, true, 1_200_000, 900_000)
@@ -91,7 +99,9 @@ defmodule Swarm.Commands.Freshness do
     end
   end
 
-  @doc "Whether an order that carries this is obeyed now by a process of this life, and when it was given."
+  @doc """
+  Whether a process of this life obeys an order with this stamp now, and when the order was given.
+  """
   @spec check(integer(), term(), integer(), integer() | nil) ::
           {:ok, given_us :: integer()} | {:error, refusal()}
   def check(life, {life, given_us}, now_us, stopped_us)
@@ -105,18 +115,18 @@ defmodule Swarm.Commands.Freshness do
 
   def check(_life, _order, _now_us, _stopped_us), do: {:error, :unknown}
 
-  @doc "What a robot answers to an order that it does not obey."
+  @doc "The answer of a robot to an order that it does not obey."
   @spec refusal(robot :: atom(), refusal()) :: {:error, String.t()}
   def refusal(robot, :stopped),
-    do: {:error, "#{robot} was stopped after this was asked; say it again"}
+    do: {:error, "#{robot} was stopped after this command was sent; repeat it"}
 
   def refusal(robot, :unknown),
-    do: {:error, "#{robot} got this too late to know how old it is; say it again"}
+    do: {:error, "#{robot} got this command too late to know how old it is; repeat it"}
 
   def refusal(robot, age_ms) do
     seconds = :erlang.float_to_binary(age_ms / 1000, decimals: 1)
 
     {:error,
-     "#{robot} got this too late, #{seconds} s old; at most 0.5 s are allowed, say it again"}
+     "#{robot} got this command too late, #{seconds} s old; at most 0.5 s are allowed; repeat it"}
   end
 end

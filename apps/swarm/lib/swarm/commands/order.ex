@@ -8,7 +8,7 @@ defmodule Swarm.Commands.Order do
   alias Swarm.Formation
   alias Swarm.Message.WireTypes
 
-  # Farther than any floor, and faster than any robot: a slip of the finger.
+  # Farther than any floor, and faster than any robot: larger numbers are typing errors.
   @farthest 10_000
   @fastest 10
 
@@ -17,7 +17,8 @@ defmodule Swarm.Commands.Order do
           Command.t() | {:start, keyword()} | {:formation, Formation.kind(), spacing :: float()}
 
   @doc """
-  A command that a person gave, with numbers that make sense, or one line that says which does not.
+  Checks that the numbers of a person's command make sense; the error is one line that names the
+  one that does not.
 
       iex> Swarm.Commands.Order.check({:goto, 1, 2.0, nil})
       {:ok, {:goto, 1.0, 2.0, nil}}
@@ -37,21 +38,21 @@ defmodule Swarm.Commands.Order do
   def check({:follow, %Pose{x: x, y: y, heading: h}}),
     do: numbers(:follow, [x, y, h], @farthest, &{:follow, Pose.new(&1, &2, &3)})
 
-  # What robots tell each other travels in their heartbeats and rounds. A person who says it would be believed by
-  # nobody, and the robot shall not leave its mission for nothing.
+  # Robots tell each other this in their heartbeats and rounds. Nobody would believe a person who
+  # says it, and the robot must not leave its mission for nothing.
   def check({word, _robot}) when word in [:subscribe, :unsubscribe],
     do:
       {:error,
-       "#{word} is for no robot: each tells its pose to all, five times a second; " <>
+       "#{word} is for robots only, and each sends its pose to all, five times a second; " <>
          "followtheleader:NAME follows one"}
 
   def check({:position, _pose}),
     do:
       {:error,
-       "position is for robots only, which tell their own; goto:X:Y:THETA sends one there"}
+       "position is for robots only, which report their own; goto:X:Y:THETA sends one there"}
 
   def check({:blob, _pose, _size, _found?}),
-    do: {:error, "blob is for robots only, which report what they see; findblob lets one look"}
+    do: {:error, "blob is for robots only, which report what they see; findblob lets one search"}
 
   def check(command) do
     if known?(command),
@@ -70,7 +71,7 @@ defmodule Swarm.Commands.Order do
 
   defp turn(heading), do: Pose.wrap(heading)
 
-  # NaN and the infinities are not numbers of this language, so they cannot come.
+  # Elixir has neither NaN nor infinities, so they cannot occur.
   defp numbers(word, list, most, build) do
     case Enum.reject(list, &(is_number(&1) and abs(&1) <= most)) do
       [] ->
@@ -83,8 +84,8 @@ defmodule Swarm.Commands.Order do
   end
 
   @doc """
-  Whether a robot may follow another: not itself, and nobody who follows it, over however many.
-  `leaders` says whom each robot follows.
+  Whether a robot may follow another: not itself, and none that follows it, directly or through
+  others. `leaders` says whom each robot follows.
 
       iex> Swarm.Commands.Order.follow(:min1, :mag1, %{mag1: nil})
       :ok

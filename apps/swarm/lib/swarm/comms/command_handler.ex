@@ -1,23 +1,24 @@
 defmodule Swarm.Comms.CommandHandler do
   @moduledoc """
-  Takes the commands of people (`Swarm`). It runs in the robot's comms process, which people on any node find by the
-  directory, and waits for nobody: it answers what the board can tell, refuses what cannot be, in one line, and hands on
-  the rest, with whom to answer, to the process that carries it out. That one answers: the drive's device, or the pilot,
-  which refuses, and the executive, which says that it has what became of the order. `Swarm.EStop` handles what
-  stops a robot, and the reset.
+  Handles the commands of people (`Swarm`). It runs in the robot's comms process, which people on
+  any node find in the directory, and waits for nobody: it answers from the board, refuses what is
+  not possible with an error of one line, and passes the rest, with the address for the answer, to
+  the process that carries it out. That process answers: the drive's device; or the pilot, if it
+  refuses, and the executive, when it has received the order. `Swarm.EStop` handles stops and the
+  reset.
 
   | request | answer |
   |---|---|
   | `:status` | `Swarm.Status` |
-  | `:ping` | `{:ok, line}`: who it is, since when, in what state (`Swarm.Comms.PingReply`) |
-  | `:start`, `{:start, options}` | the group mission begins; anew where there are options |
+  | `:ping` | `{:ok, line}`: name, uptime and state (`Swarm.Comms.PingReply`) |
+  | `:start`, `{:start, options}` | the group's mission starts; with options it starts again |
   | `{:formation, kind, spacing}` | for the running mission |
   | a `Robot.Command` | for this robot alone, which leaves the group's mission for it |
-  | `:arm`, `:acknowledge` | of the wheels (`Hal.Device`): done, or why not |
+  | `:arm`, `:acknowledge` | for the wheels (`Hal.Device`): done, or why not |
 
-  While the emergency stop holds a robot, it refuses all that would move it, and to be armed. What would
-  move it is also refused, with the reason, while its drive is offline or not armed (`Robot.Safety.Readiness`): else
-  the motion would begin later, when somebody arms it.
+  While the emergency stop holds a robot, it refuses to be armed and all commands that would move
+  it. The latter are also refused, with the reason, while its drive is offline or not armed
+  (`Robot.Safety.Readiness`); otherwise the motion would begin later, when somebody arms it.
   """
   alias Hal.Device
   alias Robot.{Board, Config, Names}
@@ -30,14 +31,14 @@ defmodule Swarm.Comms.CommandHandler do
   alias Swarm.Comms.PingReply
   alias Swarm.Message.Receiver
 
-  # Whoever asks has half a second (`Swarm.Commands.Client`): later nothing is begun.
+  # The caller waits for half a second (`Swarm.Commands.Client`); after that nothing may begin.
   @carry_out_ms 400
-  # The drive may begin at the last moment, and takes a while.
+  # The drive may begin at the last moment, and takes some time.
   @drive_ms 50
 
   @doc """
-  Takes a request that was asked at `asked` (`System.monotonic_time/1`, microseconds). The process behind `ref` is
-  told the outcome (`Mesh.Nonblocking.answer/2`).
+  Handles a request that was made at `asked` (`System.monotonic_time/1`, microseconds). The
+  process behind `ref` gets the outcome (`Mesh.Nonblocking.answer/2`).
   """
   @spec take(term(), {reference(), asked :: integer()}, Config.t(), Board.t(), Receiver.t()) ::
           :ok
@@ -56,7 +57,7 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp judge(:acknowledge, _config, _board, _receiver), do: {:drive, :acknowledge}
 
-  # What is asked for while all stand would otherwise begin with the reset.
+  # A command that is accepted while all robots are stopped would begin with the reset.
   defp judge(request, config, board, receiver) do
     if Board.latched?(board), do: held(config.id), else: free(request, config, board, receiver)
   end
@@ -72,7 +73,8 @@ defmodule Swarm.Comms.CommandHandler do
          do: {:mission, ways, command(request)}
   end
 
-  # A drive that hangs answers nobody, so that somebody else has to; of two answers only the first arrives.
+  # A drive that hangs does not answer, so this process has to; of two answers only the first
+  # arrives.
   defp drive(order, id, ref, asked) do
     until_ms = div(asked, 1_000) + @carry_out_ms
     Device.order_later(Names.via(id, :drive), order, until_ms, {__MODULE__, :ordered, [id, ref]})
@@ -93,12 +95,16 @@ defmodule Swarm.Comms.CommandHandler do
     })
   end
 
-  @doc "What became of an order for the wheels, says the drive's device; answers it to whoever asked."
+  @doc """
+  Called by the drive's device with the outcome of an order for the wheels; answers the caller.
+  """
   @spec ordered(atom(), reference(), :ok | {:error, line :: String.t()}) :: :ok
   def ordered(_id, ref, :ok), do: Nonblocking.answer(ref, :ok)
   def ordered(id, ref, {:error, line}), do: Nonblocking.answer(ref, {:error, "#{id}: #{line}"})
 
-  @doc "What became of an order for the mission, says pilot or executive; answers it to whoever asked."
+  @doc """
+  Called by pilot or executive with the outcome of an order for the mission; answers the caller.
+  """
   @spec delivered(atom(), command :: term(), reference(), :ok | Delivery.refusal()) :: :ok
   def delivered(id, command, ref, outcome),
     do: Nonblocking.answer(ref, answer(outcome, id, command))
@@ -107,17 +113,20 @@ defmodule Swarm.Comms.CommandHandler do
   defp answer({:error, :held}, id, _command), do: held(id)
   defp answer({:error, :idle}, id, _formation), do: shapeless(id)
   defp answer({:error, :no_mission}, id, _start), do: {:error, "#{id} has no such mission"}
-  defp answer({:error, :late}, id, _command), do: {:error, "#{id} answers too late; say it again"}
+
+  defp answer({:error, :late}, id, _command),
+    do: {:error, "#{id} answers too late; repeat the command"}
 
   defp answer({:error, :stopped}, id, _command), do: Freshness.refusal(id, :stopped)
 
   defp held(id), do: {:error, "#{id} is held by the emergency stop; reset it first"}
 
-  @doc "What a robot says to a formation that it has no mission for."
+  @doc "The answer of a robot to a formation if its mission has none."
   @spec shapeless(atom()) :: {:error, line :: String.t()}
-  def shapeless(id), do: {:error, "#{id} is on no mission that has a formation; start it first"}
+  def shapeless(id),
+    do: {:error, "#{id} is not on a mission that has a formation; start it first"}
 
-  # People come by `Swarm`, which has checked it all; but anybody may send something here.
+  # People use `Swarm`, which has checked everything; but anybody may send something here.
   defp checked({:start, options}, config) do
     with {:ok, {:start, options}} <- Order.check({:start, options}),
          {:ok, {module, _defaults}} <- mission(config),
@@ -127,8 +136,8 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp checked(request, _config), do: Order.check(request)
 
-  # A pilot that hangs would not answer, and whoever asked would not know why. A gate that hangs is ended, and with it
-  # what was begun.
+  # A pilot that hangs would not answer, and the caller would not know why. A gate that hangs is
+  # killed, and with it ends what was begun.
   defp well(%{id: id}, board) do
     hangs =
       for part <- [:gate, :pilot],
@@ -137,11 +146,11 @@ defmodule Swarm.Comms.CommandHandler do
 
     case hangs do
       [] -> :ok
-      [where | _] -> {:error, "#{id} hangs in #{where}; it is started again by itself"}
+      [where | _] -> {:error, "#{id} hangs in #{where}; it restarts by itself"}
     end
   end
 
-  # A shape moves nobody who is on no mission, and whoever is on one is ready.
+  # A formation moves only robots that are on a mission, and those are ready.
   defp ready({:formation, _kind, _spacing}, _config, _board), do: :ok
 
   defp ready(_request, config, board) do
@@ -162,13 +171,14 @@ defmodule Swarm.Comms.CommandHandler do
 
     if colour in names,
       do: :ok,
-      else: {:error, "#{id} knows no colour #{inspect(colour)}; it looks for #{list(names)}"}
+      else:
+        {:error, "#{id} does not know the colour #{inspect(colour)}; it looks for #{list(names)}"}
   end
 
   defp list([name]), do: name
   defp list(names), do: Enum.join(names, ", ")
 
-  # What people had asked of a mission outlives a stop of it.
+  # What people asked of a mission survives a stop of it.
   defp ways(:start, config), do: ways({:start, []}, config)
 
   defp ways({:start, []}, config) do

@@ -3,18 +3,18 @@ defmodule Swarm.Comms.Forwarder do
   Forwards messages between robots that do not hear each other, so that robots that are connected only through
   others act as one group. Pure.
 
-  Everybody's heartbeat lists whom it hears. Where one robot's list lacks another for a while, one
-  that both are in touch with passes on the one's heartbeats, its round letters as well, straight to
-  the other. Of several that could, the first two by name do. Letters go over three relays
-  at most, heartbeats stop where they are known. What came by a relay counts as a sign of life, but not as heard, so that the relay goes on
-  for as long as it is needed.
+  The heartbeat of each robot lists the robots that it hears. If one robot's list lacks another
+  for a while, a robot in contact with both forwards the heartbeats and round letters of the
+  latter directly to the former. If several could, the first two by name do. Letters go through
+  three relays at most; heartbeats stop where they are known. A relayed message counts as a sign
+  of life, but not as heard, so that the forwarding goes on as long as it is needed.
   """
   alias Swarm.Message
   alias Swarm.Membership.{Heartbeat, NameSet}
 
-  # A robot that has just come is not in anybody's list yet.
+  # A robot that has just joined is not in anybody's list yet.
   @patience_ms 300
-  # Letters are repeated every 100 ms; by several ways the same comes more often.
+  # Letters are repeated every 100 ms; the same letter arrives more often by several ways.
   @repeat_ms 90
   @alive_ms 1_000
   @relays 2
@@ -22,8 +22,8 @@ defmodule Swarm.Comms.Forwarder do
   defstruct missing: %{}, beats: %{}, letters: %{}
 
   @typedoc """
-  `missing` says since when a robot (the second of the pair) has not heard another; `beats` and `letters`
-  what was passed on last from whom to whom.
+  `missing` says since when a robot (the second of the pair) has not heard another; `beats` and
+  `letters` say what was last forwarded from which robot to which.
   """
   @type t :: %__MODULE__{
           missing: %{{atom(), atom()} => integer()},
@@ -34,11 +34,11 @@ defmodule Swarm.Comms.Forwarder do
   @typedoc "The peers of a percept."
   @type peers :: %{atom() => Robot.Percept.peer()}
 
-  @doc "Nothing passed on yet."
+  @doc "The state before anything is forwarded."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
-  @doc "The heartbeats to pass on now, as `{:send, [to], message}`."
+  @doc "The heartbeats to forward now, as `{:send, [to], message}`."
   @spec beats(t(), atom(), peers(), integer()) :: {t(), [{:send, [atom()], Message.t()}]}
   def beats(relay, me, peers, now_ms) do
     alive = for {id, %{beat: %Heartbeat{}} = peer} <- peers, alive?(peer, now_ms), do: {id, peer}
@@ -75,7 +75,8 @@ defmodule Swarm.Comms.Forwarder do
 
   defp beat(relay, me, {from, to} = pair, %{beat: beat} = peer, sent) do
     number = {beat.boot, beat.sequence}
-    # How far it has come is not known here: what is not heard itself has come over one at least.
+    # The number of relays is not known here: a robot that is not heard itself was relayed at
+    # least once.
     hops = if peer.direct_ms == peer.at_ms, do: 0, else: 2
     message = %{Message.new(from, :heartbeat, beat) | hops: hops}
 
@@ -87,7 +88,10 @@ defmodule Swarm.Comms.Forwarder do
     end
   end
 
-  @doc "The same for a letter that was heard just now, to those of its view that lack its sender."
+  @doc """
+  The same for a letter that was heard just now, for those robots of its view that do not hear its
+  sender.
+  """
   @spec letter(t(), atom(), peers(), Message.t(), integer()) ::
           {t(), [{:send, [atom()], Message.t()}]}
   def letter(%{missing: missing} = relay, _me, _peers, _message, _now_ms) when missing == %{},
@@ -111,8 +115,8 @@ defmodule Swarm.Comms.Forwarder do
   defp fresh?({content, at_ms}, content, now_ms), do: now_ms - at_ms >= @repeat_ms
   defp fresh?(_other, _content, _now_ms), do: true
 
-  # Of those that hear the one and are heard by the other the first do it; where there are none,
-  # everybody who has it by a relay.
+  # The first robots that hear the sender and are heard by the receiver forward; if there are
+  # none, all robots that have the message by a relay do.
   defp mine?(me, from, to, peers, now_ms) do
     ways =
       for {id, peer} <- peers,

@@ -3,9 +3,9 @@ defmodule Swarm.Comms.LoadShedder do
   Keeps the mailbox of a robot's comms process small under a flood. A process cannot refuse messages, but it can
   drop them faster than others send them: looking at a message costs far less than handling it.
 
-  What goes first is telemetry (what is heard by radio) and junk, the oldest of it; then, if what is left
-  is still too much, commands, the mission's own letters and forged messages of the system, if
-  anybody sends so many. Timers stay. The order of what stays is kept.
+  Telemetry (messages from other robots) and junk are dropped first, the oldest before newer;
+  then, if there is still too much, commands, the mission's own letters and forged system
+  messages, if anybody sends so many. Timers stay. The rest keeps its order.
   """
 
   @most 2_000
@@ -14,8 +14,8 @@ defmodule Swarm.Comms.LoadShedder do
   @orders [:command, :say, :rival, :stamp]
 
   @doc """
-  Throws away the oldest of the calling process's mailbox if it is too long; returns how many. `timers`
-  are the messages that stay in any case.
+  Drops the oldest messages of the calling process's mailbox if it is too long; returns how many.
+  `timers` are the messages that stay in any case.
   """
   @spec relieve(timers :: [term()]) :: non_neg_integer()
   def relieve(timers) do
@@ -25,8 +25,8 @@ defmodule Swarm.Comms.LoadShedder do
     end
   end
 
-  # Each message is taken out once, and what stays is sent again: to leave it where it is, and look for the
-  # others behind it again and again, would take longer than they need to come.
+  # Each message is taken out once, and what stays is sent again: searching past the messages that
+  # stay, again and again, would take longer than new ones need to arrive.
   defp sweep(queued, timers) do
     {kept, left} = take(queued, queued - @keep, [], timers)
     kept = Enum.reverse(kept)
@@ -35,7 +35,7 @@ defmodule Swarm.Comms.LoadShedder do
     queued - length(kept)
   end
 
-  # `left` is how many are still to go.
+  # `left` is how many must still be dropped.
   defp take(0, left, kept, _timers), do: {kept, left}
 
   defp take(number, left, kept, timers) do
@@ -56,7 +56,8 @@ defmodule Swarm.Comms.LoadShedder do
       else: drop_oldest(kept, left - 1, timers)
   end
 
-  # Nobody calls a comms process, and no answer to a call of its own comes when nobody waits for it.
+  # Nobody calls a comms process, and answers to its own calls arrive only while it waits for
+  # them.
   defp telemetry?({:"$gen_cast", cast}),
     do: not (is_tuple(cast) and tuple_size(cast) > 1 and elem(cast, 0) in @orders)
 

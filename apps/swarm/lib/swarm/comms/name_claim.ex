@@ -1,10 +1,11 @@
 defmodule Swarm.Comms.NameClaim do
   @moduledoc """
-  A robot's claim to its name. Of two robots of one name, on whatever nodes, the one with the lower
-  `{boot, node}` stays. The other leaves the directory and gives way for good.
+  A robot's claim to its name. Of two robots with the same name, on any nodes, the one with the
+  lower `{boot, node}` stays. The other leaves the directory and gives way for good.
 
-  They find each other in the directory, where both comms processes are in one group and tell each other who
-  they are, once a second; or by radio, where each hears heartbeats that are not its own.
+  They find each other in the directory, where both comms processes are in the same group and tell
+  each other who they are once a second, or through the mesh, where each hears heartbeats that are
+  not its own.
   """
   alias Mesh.Nonblocking
   alias Swarm.Directory
@@ -12,27 +13,30 @@ defmodule Swarm.Comms.NameClaim do
   @enforce_keys [:robot, :me]
   defstruct @enforce_keys ++ [entry: nil]
 
-  @typedoc "Who a robot is besides its name: the number of its life, and its node."
+  @typedoc "The identity of a robot besides its name: the number of its life, and its node."
   @type identity :: {boot :: integer(), node()}
   @type t :: %__MODULE__{robot: atom(), me: identity(), entry: Directory.Membership.t() | nil}
 
-  @doc "The name of a robot, not entered yet."
+  @doc "The claim of a robot that is not in the directory yet."
   @spec new(atom(), identity()) :: t()
   def new(robot, me), do: %__MODULE__{robot: robot, me: me}
 
-  @doc "Enters the calling process, the robot's comms process, into the directory, now or when there is one."
+  @doc """
+  Enters the calling process, which is the robot's comms process, into the directory, now or when
+  there is one.
+  """
   @spec enter(t()) :: t()
   def enter(%__MODULE__{robot: robot} = name),
     do: entered(name, Directory.Membership.enter([:robots, {:robot, robot}]))
 
-  @doc "Whether a message was about the entry: it enters again when the directory has ended."
+  @doc "Handles a message if it was about the entry: enters again when the directory has ended."
   @spec arrived(t(), message :: term()) :: {:ok, t()} | :other
   def arrived(%__MODULE__{} = name, message) do
     with {:ok, entry} <- Directory.Membership.arrived(name.entry, message),
          do: {:ok, entered(name, entry)}
   end
 
-  @doc "The messages that it waits for and that must not get lost."
+  @doc "The messages that it waits for, and that must not be dropped."
   @spec timers(t()) :: [term()]
   def timers(%__MODULE__{entry: entry}),
     do: for(one <- List.wrap(entry), do: Directory.Membership.timer(one))
@@ -47,39 +51,39 @@ defmodule Swarm.Comms.NameClaim do
     name
   end
 
-  @doc "Whether it has given way to another of its name."
+  @doc "Whether the robot has given way to another of its name."
   @spec left?(t()) :: boolean()
   def left?(%__MODULE__{entry: entry}), do: entry != nil and entry.left?
 
-  @doc "Tells all others of this name who this one is."
+  @doc "Tells all others of the same name the identity of this robot."
   @spec challenge(t()) :: :ok
   def challenge(%__MODULE__{entry: %{left?: true}}), do: :ok
 
   def challenge(name) do
-    for link <- Directory.members({:robot, name.robot}),
-        link != self(),
-        do: tell(name, link)
+    for comms <- Directory.members({:robot, name.robot}),
+        comms != self(),
+        do: tell(name, comms)
 
     :ok
   end
 
   @doc """
-  Another of this name is there: its comms process, or `nil` where it was heard by radio. Says whether this one
-  gives way by that; it has left the directory then.
+  There is another robot of the same name: `comms` is its comms process, or `nil` if it was heard
+  through the mesh. Returns whether this robot gives way; it has left the directory then.
   """
   @spec rival(t(), identity(), pid() | nil) :: {gives_way? :: boolean(), t()}
-  def rival(%__MODULE__{entry: %{left?: true}} = name, _other, _link), do: {false, name}
+  def rival(%__MODULE__{entry: %{left?: true}} = name, _other, _comms), do: {false, name}
 
-  # By radio a robot may hear itself, and its former life; two on one node cannot be.
+  # Through the mesh a robot may hear itself and its former life; one node cannot have two.
   def rival(name, {_boot, node}, nil) when node == node(), do: {false, name}
 
-  def rival(name, other, link) do
+  def rival(name, other, comms) do
     case judge(name.me, other) do
       :give_way ->
         {true, %{name | entry: Directory.Membership.leave(name.entry)}}
 
       :stay ->
-        if link, do: tell(name, link)
+        if comms, do: tell(name, comms)
         {false, name}
 
       :same ->
@@ -88,7 +92,7 @@ defmodule Swarm.Comms.NameClaim do
   end
 
   @doc """
-  Which of two robots of one name is to go on.
+  Which of two robots with the same name goes on.
 
       iex> Swarm.Comms.NameClaim.judge({5, :mag1@a}, {7, :mag1@b})
       :stay
@@ -101,5 +105,5 @@ defmodule Swarm.Comms.NameClaim do
   def judge(same, same), do: :same
   def judge(mine, other), do: if(mine < other, do: :stay, else: :give_way)
 
-  defp tell(name, link), do: Nonblocking.cast(link, {:rival, name.me, self()})
+  defp tell(name, comms), do: Nonblocking.cast(comms, {:rival, name.me, self()})
 end

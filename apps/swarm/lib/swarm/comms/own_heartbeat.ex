@@ -10,8 +10,8 @@ defmodule Swarm.Comms.OwnHeartbeat do
   @odometry_ms 300
 
   @doc """
-  The message with the heartbeat of this number, `{boot, sequence}`. A robot that has no pose yet has
-  nothing to say; one whose executive fell stands where it was.
+  The message with the heartbeat of this number, `{boot, sequence}`. A robot without a pose yet
+  has no heartbeat; one whose executive crashed stands where it was.
   """
   @spec message(Config.t(), Board.t(), Receiver.t(), {integer(), non_neg_integer()}, integer()) ::
           {:ok, Message.t()} | :error

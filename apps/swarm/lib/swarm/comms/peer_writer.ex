@@ -1,7 +1,7 @@
 defmodule Swarm.Comms.PeerWriter do
   @moduledoc """
-  Writes the other robots to a robot's board: a row `{:peer, id}` for each, when it is heard and once more when
-  it is gone.
+  Writes the other robots to a robot's board: a row `{:peer, id}` for each, whenever it is heard
+  and once more when it is gone.
   """
   alias Robot.Board
   alias Swarm.Membership.Peers
@@ -11,18 +11,21 @@ defmodule Swarm.Comms.PeerWriter do
 
   @type t :: %__MODULE__{board: Board.t(), gone: MapSet.t(atom())}
 
-  @doc "Nobody yet."
+  @doc "The state before any robot is heard."
   @spec new(Board.t()) :: t()
   def new(board), do: %__MODULE__{board: board}
 
-  @doc "One was heard. A hundred robots tell each other fifty thousand times a second, so only its row is written."
+  @doc """
+  Notes that a robot was heard. A hundred robots send each other fifty thousand heartbeats a
+  second, so only its row is written.
+  """
   @spec heard(t(), Peers.t(), atom(), integer()) :: t()
   def heard(%__MODULE__{} = chart, peers, id, at_ms) do
     show(chart, peers, id, at_ms)
     %{chart | gone: MapSet.delete(chart.gone, id)}
   end
 
-  @doc "Of a robot that is gone nothing arrives, so somebody has to write down that it is."
+  @doc "Writes which robots are gone, because nothing arrives from them that would."
   @spec grow_old(t(), Peers.t(), integer()) :: t()
   def grow_old(%__MODULE__{} = chart, peers, at_ms) do
     for id <- Peers.gone(peers, at_ms), id not in chart.gone, reduce: chart do

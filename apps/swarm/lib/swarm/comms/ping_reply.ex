@@ -1,14 +1,14 @@
 defmodule Swarm.Comms.PingReply do
   @moduledoc """
-  What a robot answers to `ping` (R16): who it is, since when it is up, and in what state since when. Pure,
-  but for `line/3`, which looks at the robot's board.
+  A robot's answer to `ping` (R16): its name, how long it has been up, and its state and for how
+  long. Pure, except for `line/3`, which reads the robot's board.
   """
   alias Robot.{Board, Config}
   alias Swarm.Status
 
   @minute_ms 60_000
 
-  @doc "The answer of a robot of this node, whose status this is."
+  @doc "The answer of a robot of this node with this status."
   @spec line(Config.t(), Board.t(), Status.t()) :: String.t()
   def line(config, board, %Status{} = status) do
     now_ms = Config.now(config)
@@ -17,7 +17,7 @@ defmodule Swarm.Comms.PingReply do
   end
 
   @doc """
-  The same of a robot that is up for so long, and in its state for so long (ms).
+  The same for a robot that has been up for so long, and in its state for so long (ms).
 
       iex> status = %Swarm.Status{robot: :mag1, node: :mag1@convoy, state: :follow}
       iex> Swarm.Comms.PingReply.words(status, 723_400, 34_000)

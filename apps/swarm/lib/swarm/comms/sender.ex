@@ -1,7 +1,8 @@
 defmodule Swarm.Comms.Sender do
   @moduledoc """
-  Sends a robot's messages and heartbeats. Five heartbeats a second; when the emergency stop changes, one at once and
-  then ten a second for a second, so that it spreads within 200 ms.
+  Sends a robot's messages and heartbeats. It sends five heartbeats a second; when the emergency
+  stop changes, one at once and then ten a second for a second, so that the change spreads within
+  200 ms.
   """
   alias Robot.{Board, Config}
   alias Swarm.{EStop, Message}
@@ -16,8 +17,8 @@ defmodule Swarm.Comms.Sender do
               [sequence: 0, ticks: 0, beat_ms: nil, urgent: 0, sent: 0, silent?: false]
 
   @typedoc """
-  `sequence` is the number of its last heartbeat, `latched?` what it has said of the emergency stop so far, `urgent` how
-  many heartbeats hurry yet.
+  `sequence` is the number of its last heartbeat, `latched?` what it last sent about the emergency
+  stop, `urgent` how many faster heartbeats are left.
   """
   @type t :: %__MODULE__{
           config: Config.t(),
@@ -33,7 +34,7 @@ defmodule Swarm.Comms.Sender do
           silent?: boolean()
         }
 
-  @doc "A robot that has said nothing yet, in its life of this number."
+  @doc "The state before anything is sent, in the life of this number."
   @spec new(Config.t(), Board.t(), Config.call(), boot :: integer()) :: t()
   def new(config, board, transport, boot),
     do: %__MODULE__{
@@ -44,7 +45,7 @@ defmodule Swarm.Comms.Sender do
       latched?: EStop.written(board).latched?
     }
 
-  @doc "Says something to these robots, or to all; one that has fallen silent does not."
+  @doc "Sends a message to these robots, or to all; a robot that has fallen silent does not."
   @spec speak(t(), :all | [atom()], Message.t()) :: t()
   def speak(%__MODULE__{silent?: true} = sender, _to, _message), do: sender
 
@@ -53,7 +54,7 @@ defmodule Swarm.Comms.Sender do
     %{sender | sent: sender.sent + 1}
   end
 
-  @doc "A tenth of a second has passed: time for a heartbeat, or not."
+  @doc "Called every tenth of a second: sends a heartbeat if one is due."
   @spec tick(t(), Receiver.t(), integer()) :: t()
   def tick(%__MODULE__{} = sender, receiver, at_ms) do
     sender = notice(%{sender | ticks: sender.ticks + 1})
@@ -62,7 +63,7 @@ defmodule Swarm.Comms.Sender do
     %{sender | urgent: max(sender.urgent - 1, 0)}
   end
 
-  @doc "The emergency stop may have changed, which must be known everywhere soon."
+  @doc "Called when the emergency stop may have changed: others must know soon."
   @spec urge(t(), Receiver.t()) :: t()
   def urge(%__MODULE__{} = sender, receiver) do
     case notice(sender) do
@@ -71,7 +72,7 @@ defmodule Swarm.Comms.Sender do
     end
   end
 
-  # Where a test or a trial decides when a robot acts, the next heartbeat tells it.
+  # If a test or a trial decides when a robot acts, the next heartbeat carries it.
   defp notice(%{config: %{pace: :manual}} = sender), do: sender
 
   defp notice(sender) do

@@ -1,16 +1,16 @@
 defmodule Swarm.Comms.Transport do
   @moduledoc """
-  How a robot's messages reach others: those of this node get them straight into their comms processes, those
-  of other nodes by the mesh's datagrams. A node without a mesh speaks to those that somebody has
-  connected by hand, over Erlang's distribution.
+  Delivers a robot's messages to others: directly to the comms processes of robots on this node,
+  and by the mesh's datagrams to those on other nodes. A node without a mesh reaches nodes that
+  somebody has connected by hand, through Erlang's distribution.
   """
   alias Robot.Names
   alias Mesh.Nonblocking
   alias Swarm.{Directory, Message}
 
   @doc """
-  All robots that can be spoken to, sorted: in the directory, heard by radio from nodes that this one
-  is not connected to, or heard by others that are.
+  All robots that can be reached, sorted: those in the directory, those heard through the mesh
+  from nodes that this one is not connected to, and those heard by connected nodes.
   """
   @spec robots() :: [atom()]
   def robots do
@@ -21,8 +21,8 @@ defmodule Swarm.Comms.Transport do
   end
 
   @doc """
-  The transport of links (`Swarm.Comms`): to these robots, or to all others that can be reached without asking who
-  that is. Nobody is waited for.
+  The transport of `Swarm.Comms`: sends to these robots, or to all others that can be reached
+  without asking which these are. Waits for nobody.
   """
   @spec transmit(from :: atom(), :all | [atom()], Message.t()) :: :ok
   def transmit(from, to, %Message{} = message) do
@@ -33,7 +33,7 @@ defmodule Swarm.Comms.Transport do
 
   defp by_mesh(from, :all, message) do
     own = Names.whereis(from, :comms)
-    for link <- Names.all(:comms), link != own, do: GenServer.cast(link, {:hear, message})
+    for comms <- Names.all(:comms), comms != own, do: GenServer.cast(comms, {:hear, message})
     Mesh.speak(:all, message)
   end
 
@@ -48,8 +48,8 @@ defmodule Swarm.Comms.Transport do
 
   defp by_distribution(_from, ids, message) do
     for id <- ids,
-        link <- Directory.members({:robot, id}),
-        do: Nonblocking.cast(link, {:hear, message})
+        comms <- Directory.members({:robot, id}),
+        do: Nonblocking.cast(comms, {:hear, message})
 
     :ok
   end

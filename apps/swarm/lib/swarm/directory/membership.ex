@@ -1,9 +1,9 @@
 defmodule Swarm.Directory.Membership do
   @moduledoc """
-  Keeps a process in groups of the directory, which is empty after it has restarted: the process
-  enters, watches the directory, and enters the next one, with back-off while there is none. Keep
-  the entry in the process's state, and show it every message that may be about it. A process may
-  have several: each knows its own messages.
+  Keeps a process in groups of the directory, which is empty after a restart: the process enters,
+  monitors the directory, and enters the next one, with back-off while there is none. Keep the
+  entry in the process's state, and pass it every message that may be about it. A process may have
+  several entries: each knows its own messages.
 
       def init(options), do: {:ok, %{entry: Swarm.Directory.Membership.enter([{:service, :battery}])}}
 
@@ -30,7 +30,7 @@ defmodule Swarm.Directory.Membership do
           left?: boolean()
         }
 
-  @doc "Enters the calling process into these groups, now or as soon as there is a directory."
+  @doc "Adds the calling process to these groups, now or as soon as there is a directory."
   @spec enter([Directory.group()]) :: t()
   def enter(groups), do: try_to(%__MODULE__{groups: groups, token: make_ref()})
 
@@ -48,7 +48,7 @@ defmodule Swarm.Directory.Membership do
     %{entry | scope: nil, left?: true}
   end
 
-  @doc "Whether a message was about the entry."
+  @doc "Handles a message if it was about the entry."
   @spec arrived(t(), message :: term()) :: {:ok, t()} | :other
   def arrived(%{scope: scope} = entry, {:DOWN, scope, :process, _pid, _reason})
       when scope != nil,
@@ -71,7 +71,7 @@ defmodule Swarm.Directory.Membership do
     end
   end
 
-  @doc "The message by which it tries again, which must not get lost."
+  @doc "The message that triggers the next try, which must not be dropped."
   @spec timer(t()) :: term()
   def timer(entry), do: {__MODULE__, entry.token}
 

@@ -2,10 +2,11 @@ defmodule Swarm.Directory.Presence do
   @moduledoc """
   Notifies subscribers when robots join or leave (`Swarm.subscribe/0`).
 
-  A robot joins with the first word of it, by the directory or by radio. It leaves when its link
-  leaves the directory, which a node that is killed does at once; or, where it was heard by radio,
-  when it has been silent for 2 s, however many connections to it seem to stand. A robot whose
-  connection ended, and that is heard on, joins again as soon as that is certain.
+  A robot joins with the first sign of it, in the directory or through the mesh. It leaves when
+  its comms process leaves the directory, which happens at once if its node is killed; or, if it
+  was heard through the mesh, when it has been silent for 2 s, even if connections to it seem to
+  exist. A robot whose connection ended, but that is still heard, joins again as soon as that is
+  certain.
   """
   use GenServer
   alias Mesh.Nonblocking
@@ -15,23 +16,26 @@ defmodule Swarm.Directory.Presence do
   @look_ms 100
   # A killed robot's last heartbeat counts for 2 s.
   @certain_ms 2_500
-  # Links enter a new scope by themselves, a node's at once and others' when they connect.
+  # Comms processes enter a new scope by themselves: those of this node at once, others when they
+  # connect.
   @settle_ms 1_000
 
   @type reason :: :left | :nodedown | :silent
 
-  @doc "Starts the watch of this node."
+  @doc "Starts the process of this node."
   @spec start_link(term()) :: GenServer.on_start()
   def start_link(_options), do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
 
-  @doc "The process will be told from now on; the robots that are there now are returned."
+  @doc "Notifies the process from now on; returns the robots that are present now."
   @spec subscribe(pid()) :: {:ok, [atom()]} | {:error, line :: String.t()}
   def subscribe(pid) when is_pid(pid), do: call({:subscribe, pid})
 
   def subscribe(other),
-    do: {:error, "#{inspect(other)} cannot be told of robots; a process of this node can"}
+    do:
+      {:error,
+       "#{inspect(other)} cannot be notified of robots; it must be a process of this node"}
 
-  @doc "It will not be told any more."
+  @doc "Ends the notifications of a process."
   @spec unsubscribe(pid()) :: :ok | {:error, line :: String.t()}
   def unsubscribe(pid), do: call({:unsubscribe, pid})
 
@@ -65,7 +69,7 @@ defmodule Swarm.Directory.Presence do
 
   def handle_call({:unsubscribe, pid}, _from, s), do: {:reply, :ok, forget(s, pid)}
 
-  # It has a name that connected nodes can send to, so anything may come here.
+  # It has a name that connected nodes can send to, so anything may arrive here.
   def handle_call(_unknown, _from, s), do: {:noreply, s}
 
   @impl GenServer
@@ -99,7 +103,7 @@ defmodule Swarm.Directory.Presence do
   def handle_info(:enter, s), do: {:noreply, enter(s)}
   def handle_info(:settled, s), do: {:noreply, all(s, :left)}
 
-  # The robots are not gone because the directory is.
+  # That the directory is gone does not mean that the robots are.
   def handle_info({:DOWN, scope, :process, _pid, _reason}, %{scope: scope} = s) do
     Process.send_after(self(), :enter, @look_ms)
     {:noreply, %{s | ref: nil, scope: nil}}
@@ -114,7 +118,7 @@ defmodule Swarm.Directory.Presence do
     pids = for {{:robot, robot}, [_ | _] = pids} <- groups, into: %{}, do: {robot, pids}
     s = %{s | ref: ref, scope: scope, pids: pids}
     joined = Enum.reduce(Map.keys(pids), s, &judge(&2, &1, :left))
-    # Whoever is missing may only not have entered again yet.
+    # A robot that is missing may just not have entered again yet.
     Process.send_after(self(), :settled, @settle_ms)
     joined
   catch
@@ -128,7 +132,7 @@ defmodule Swarm.Directory.Presence do
     heard = Mesh.robots()
     certain = now() - @certain_ms
     doubt = Map.filter(s.doubt, fn {_robot, since_ms} -> since_ms > certain end)
-    # Of those heard once, the radio says whether they are there.
+    # For robots that were heard before, the mesh knows whether they are present.
     known =
       Map.merge(
         Map.new(s.heard, fn {robot, _} -> {robot, false} end),
@@ -140,7 +144,7 @@ defmodule Swarm.Directory.Presence do
     Enum.reduce(changed, %{s | heard: known, doubt: doubt}, &judge(&2, &1, :silent)) |> tidy()
   end
 
-  # Who is neither in the directory nor heard needs no memory.
+  # A robot that is neither in the directory nor heard need not be remembered.
   defp tidy(s) do
     heard = Map.filter(s.heard, fn {robot, there?} -> there? or is_map_key(s.pids, robot) end)
     %{s | heard: heard}

@@ -5,7 +5,7 @@ defmodule Swarm.Directory.RemoteMonitor do
   """
 
   @doc """
-  Watches `%{alias => pid}` for the calling process. When one ends, or its node does, the message
+  Monitors `%{alias => pid}` for the calling process. When a process or its node ends, the message
   `{Swarm.Directory.RemoteMonitor, alias, :gone}` is sent to that alias of the caller.
   """
   @spec start(%{reference() => pid()}) :: watch :: pid()
@@ -18,7 +18,10 @@ defmodule Swarm.Directory.RemoteMonitor do
     end)
   end
 
-  @doc "Ends it. What it has told already may still be on its way to an alias that is open."
+  @doc """
+  Ends the monitoring. Messages that it has already sent may still be on their way to an open
+  alias.
+  """
   @spec stop(watch :: pid()) :: :ok
   def stop(watch) do
     Process.exit(watch, :kill)

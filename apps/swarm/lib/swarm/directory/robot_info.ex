@@ -1,21 +1,21 @@
 defmodule Swarm.Directory.RobotInfo do
   @moduledoc """
-  What a robot is, for those who look for one (`Swarm.find/1`): the row `{robot, :about}` of the
-  blackboard, written by the robot's comms process once a second, and at once when its mission
+  Describes a robot for those who search for one (`Swarm.find/1`): the row `{robot, :about}` of
+  the blackboard, written by the robot's comms process once a second, and at once when its mission
   changes.
 
-  | field | is |
+  | field | value |
   |---|---|
   | `profile` | `:magellan`, `:atrv_mini` |
-  | `battery` | volts, `nil` where it is not measured |
-  | `calibrated` | `true` unless said otherwise |
-  | `mission`, `state` | what it is at: `:landmark` and `:follow`; `nil` and `:idle` |
-  | `services` | what it has: `:drive`, `:camera`, `:ptz`, and what was said |
-  | `node`, `age_ms` | where it is; how long ago it said so |
+  | `battery` | volts, `nil` if it is not measured |
+  | `calibrated` | `true` unless `say/2` says otherwise |
+  | `mission`, `state` | what it is doing, such as `:landmark` and `:follow`, or `nil` and `:idle` |
+  | `services` | what it has: `:drive`, `:camera`, `:ptz`, and those from `say/2` |
+  | `node`, `age_ms` | its node; the age of the row |
 
-  What only somebody else knows of a robot is said by `say/2`, on its node.
+  `say/2`, on the robot's node, adds what only others know about a robot.
 
-  Names travel as text, and are text here too where this node has no such atom.
+  Names travel as text, and stay text if this node has no such atom.
   """
   alias Robot.{Board, Config}
   alias Robot.Safety.LivenessMonitor
@@ -23,7 +23,7 @@ defmodule Swarm.Directory.RobotInfo do
   alias Swarm.Message.WireTypes
   alias Swarm.Message.Receiver
 
-  # A link ticks ten times a second.
+  # A comms process ticks ten times a second.
   @every 10
   @sayable [:calibrated, :services]
 
@@ -52,12 +52,12 @@ defmodule Swarm.Directory.RobotInfo do
           age_ms: non_neg_integer() | nil
         }
 
-  @typedoc "What was told last, and in how many ticks it is told again."
+  @typedoc "What was last written, and in how many ticks it is written again."
   @type noted :: nil | {non_neg_integer(), term()}
 
   @doc """
-  Writes a robot's rows `:about` and `:status`, if it is time or something changed; called at each tick of
-  its link. Waits for nothing.
+  Writes a robot's rows `:about` and `:status` if it is time or something changed; called at each
+  tick of its comms process. Waits for nothing.
   """
   @spec note(noted(), Config.t(), Board.t(), boot :: non_neg_integer(), Receiver.t()) :: noted()
   def note(noted, config, board, boot, receiver) do
@@ -77,7 +77,10 @@ defmodule Swarm.Directory.RobotInfo do
     end
   end
 
-  @doc "A robot that has given way to another of its name writes no more, and hears of that one."
+  @doc """
+  Ends the writing of a robot that has given way to another of its name; it then receives that
+  one's rows.
+  """
   @spec leave(noted(), atom()) :: nil
   def leave(nil, _robot), do: nil
 
@@ -134,7 +137,7 @@ defmodule Swarm.Directory.RobotInfo do
   end
 
   @doc """
-  Says something of a robot of this node that only others know; it is in its next row.
+  Adds to a robot of this node what only others know about it; its next row contains it.
 
       Swarm.Directory.RobotInfo.say(:mag1, calibrated: false)
       Swarm.Directory.RobotInfo.say(:mag1, services: [:gripper])
@@ -147,7 +150,8 @@ defmodule Swarm.Directory.RobotInfo do
         Blackboard.put(robot, :said, Keyword.merge(said(robot), facts))
 
       false ->
-        {:error, "#{inspect(facts)} are not facts; allowed are #{Enum.join(@sayable, ", ")}"}
+        {:error,
+         "#{inspect(facts)} is not a list of facts; allowed are #{Enum.join(@sayable, ", ")}"}
 
       {key, value} ->
         {:error,
@@ -159,7 +163,7 @@ defmodule Swarm.Directory.RobotInfo do
   defp sayable?({:services, names}), do: WireTypes.names?(names)
   defp sayable?(_other), do: false
 
-  @doc "What is known of a robot, unless that is older than this in ms."
+  @doc "What is known about a robot, unless it is older than this in ms."
   @spec of(atom(), non_neg_integer() | :infinity) :: {:ok, t()} | :error
   def of(robot, max_age_ms) do
     with {:ok, row, age_ms} <- Blackboard.get(robot, :about, max_age_ms),
@@ -167,7 +171,7 @@ defmodule Swarm.Directory.RobotInfo do
   end
 
   @doc """
-  Reads a row, whatever is in it.
+  Reads a row, whatever it contains.
 
       iex> Swarm.Directory.RobotInfo.read(:mag1, %{junk: 1}, 5)
       :error

@@ -1,6 +1,6 @@
 defmodule Swarm.Directory.Search do
   @moduledoc false
-  # Which robots are as wanted (`Swarm.find/1`): templates over `Swarm.Directory.RobotInfo`.
+  # Finds the robots that match (`Swarm.find/1`): templates over `Swarm.Directory.RobotInfo`.
   alias Hal.Options.Suggest
   alias Swarm.Comms.Transport
   alias Swarm.Directory.RobotInfo
@@ -8,7 +8,7 @@ defmodule Swarm.Directory.Search do
   @max_age_ms 10_000
   @keys [:robot, :node, :profile, :battery, :calibrated, :mission, :state, :service, :max_age_ms]
 
-  @doc "The robots that are there and match, sorted, or one line about a bad option."
+  @doc "The robots that are present and match, sorted, or one line about a bad option."
   @spec robots(term()) :: [atom()] | {:error, line :: String.t()}
   def robots(template) do
     with :ok <- keyword(template),
@@ -24,7 +24,7 @@ defmodule Swarm.Directory.Search do
   end
 
   @doc """
-  Whether a robot is as wanted.
+  Whether a robot matches.
 
       iex> about = %Swarm.Directory.RobotInfo{robot: :mag1, profile: :magellan, battery: 12.1, services: [:camera]}
       iex> Swarm.Directory.Search.like?({:ok, about}, service: :camera, battery: {11.5, 14})
@@ -39,26 +39,26 @@ defmodule Swarm.Directory.Search do
   defp as_wanted?(about, {:service, wanted}), do: Enum.any?(about.services, &fits?(&1, wanted))
   defp as_wanted?(about, {key, wanted}), do: about |> Map.fetch!(key) |> fits?(wanted)
 
-  # Nothing is known: then it is not as wanted, unless just that is.
+  # A robot of which nothing is known does not match, unless that is what is wanted.
   defp fits?(nil, wanted), do: wanted == nil
   defp fits?(value, wanted) when is_function(wanted), do: !!wanted.(value)
   defp fits?(value, %Range{} = range), do: fits?(value, Enum.min_max(range))
   defp fits?(value, {low, high}), do: is_number(value) and value >= low and value <= high
   defp fits?(value, wanted) when is_list(wanted), do: Enum.any?(wanted, &fits?(value, &1))
   defp fits?(value, wanted) when is_number(wanted), do: value == wanted
-  # What travelled as text is text where this node has no such atom.
+  # What travelled as text stays text if this node has no such atom.
   defp fits?(value, wanted), do: to_string(value) == to_string(wanted)
 
   defp keyword(template) do
     if Keyword.keyword?(template),
       do: :ok,
-      else: "#{inspect(template)} says nothing of a robot; write such as service: :camera"
+      else: "#{inspect(template)} does not describe a robot; write for example service: :camera"
   end
 
   defp wrong({key, _wanted}) when key not in @keys do
     names = Enum.map(@keys, &Atom.to_string/1)
     hint = Suggest.hint(Atom.to_string(key), names)
-    "robots are not found by #{inspect(key)}: #{Enum.join(names, ", ")}#{hint}"
+    "robots cannot be found by #{inspect(key)}: allowed are #{Enum.join(names, ", ")}#{hint}"
   end
 
   defp wrong({key, wanted}) do

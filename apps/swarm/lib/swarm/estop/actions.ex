@@ -1,6 +1,7 @@
 defmodule Swarm.EStop.Actions do
   @moduledoc """
-  What a robot's e-stop process does (`Swarm.EStop`): stops, releases, records how the stop stands, and spreads it.
+  The actions of a robot's e-stop process (`Swarm.EStop`): stops, releases, records the state of
+  the stop, and spreads it.
   """
   alias Hal.Device
   alias Robot.{Board, Config, Names}
@@ -10,12 +11,13 @@ defmodule Swarm.EStop.Actions do
   alias Swarm.EStop
   alias Swarm.EStop.Broadcaster
 
-  # Whoever asks has half a second (`Swarm.Commands.Client`): a robot that nobody was told of stays held.
+  # The caller waits for half a second (`Swarm.Commands.Client`): a robot whose release nobody
+  # would hear of stays held.
   @release_us 400_000
 
   @typedoc """
-  `pressed` stands for the last time that somebody stopped it, at `pressed_us`; `reset_us` is when the last reset that was
-  carried out was given (both monotonic, microseconds).
+  `pressed` identifies the last time that somebody stopped it, at `pressed_us`; `reset_us` is when
+  the last reset that was carried out was given (both monotonic, microseconds).
   """
   @type t :: %{
           :config => Config.t(),
@@ -28,7 +30,10 @@ defmodule Swarm.EStop.Actions do
           optional(atom()) => term()
         }
 
-  @doc "How the stop stands as the e-stop process published it; before the first did, by the gate's latch."
+  @doc """
+  The state of the stop that the e-stop process published; before the first did, from the gate's
+  latch.
+  """
   @spec written(Board.t()) :: EStop.State.t()
   def written(board) do
     case Board.fetch(board, :estop, :infinity) do
@@ -38,7 +43,8 @@ defmodule Swarm.EStop.Actions do
   end
 
   @doc """
-  Obeys a request, and answers it. Nobody is waited for here: a mission that is slow to end delays no emergency stop.
+  Carries out a request, and answers it. This waits for nobody: a mission that is slow to end does
+  not delay an emergency stop.
   """
   @spec obey(t(), request :: term(), {reference(), given_us :: integer()}) :: t()
   def obey(s, request, about)
@@ -48,7 +54,7 @@ defmodule Swarm.EStop.Actions do
     s
   end
 
-  # The drive first says that its wheels are disarmed.
+  # The drive first confirms that its wheels are disarmed.
   def obey(s, :disarm, {ref, _given_us}) do
     halt(s, nil)
     stopped = {Pilot, :halt, [s.id, {EStop.Answer, :stood, [s.id, ref]}]}
@@ -61,7 +67,8 @@ defmodule Swarm.EStop.Actions do
     s
   end
 
-  # Whoever is not held drives on. A button of the gate's own may have been pressed since this was asked.
+  # A robot that is not held drives on. A button on the gate itself may have been pressed since
+  # the request.
   def obey(s, :reset, {ref, given_us}) do
     if Board.latched?(s.board) do
       Nonblocking.answer(ref, {:error, "#{s.id} was stopped meanwhile; reset it again"})
@@ -97,7 +104,7 @@ defmodule Swarm.EStop.Actions do
       {{:error, "#{inspect(other, limit: 5)} does not stop #{s.id}; stop, disarm and estop do"},
        s}
 
-  @doc "A call to stop was heard, from wherever."
+  @doc "Handles a call to stop, from any source."
   @spec called(t(), call :: term(), age_ms :: term()) :: t()
   def called(s, call, age_ms) do
     with true <- EStop.Calls.call?(call) and EStop.Calls.age?(age_ms),
@@ -116,15 +123,15 @@ defmodule Swarm.EStop.Actions do
 
   defp pressed(s), do: %{s | pressed: make_ref(), pressed_us: now_us()}
 
-  # Robots hear of a stop by their neighbours' heartbeats, too; but only a call says when it was made, which a robot
-  # that is being reset at this moment must know.
+  # Robots hear of a stop from their neighbours' heartbeats, too; but only a call says when it was
+  # made, and a robot that is being reset at this moment must know that.
   defp press(s, stop) do
     s = become(pressed(s), stop)
     call = Broadcaster.sound()
     write(%{s | stop: EStop.State.late(s.stop, call)})
   end
 
-  @doc "The gate is free again, by a reset that was given then."
+  @doc "Handles the report that the gate is released, by a reset that was given then."
   @spec released(t(), given_us :: integer()) :: t()
   def released(s, given_us) do
     :ok = Gate.reset(s.id, tell: false)
@@ -132,43 +139,44 @@ defmodule Swarm.EStop.Actions do
     become(%{s | reset_us: given_us}, EStop.State.reset(s.stop))
   end
 
-  @doc "Whether who gave a reset then still waits for its answer."
+  @doc "Whether the sender of a reset that was given then still waits for the answer."
   @spec waits?(given_us :: integer()) :: boolean()
   def waits?(given_us), do: now_us() - given_us < @release_us
 
-  # The gate stands at once. The goal goes also where the pilot is stuck in its mission, and again
-  # when the mission is out of command: it may have set another meanwhile.
+  # The gate stops at once. The goal is dropped even if the pilot is stuck in its mission, and
+  # again when the mission has ended, because it may have set another one meanwhile.
   defp halt(%{id: id} = s, then) do
-    # What was asked before this begins nothing after it (`Swarm.Commands.Freshness`, `Robot.Control.Pilot`).
+    # Requests from before this stop begin nothing after it (`Swarm.Commands.Freshness`,
+    # `Robot.Control.Pilot`).
     Board.put(s.board, :estop, :stopped, now_us(), Config.now(s.config))
     :ok = Gate.forget(id)
     :ok = Executive.stand(id)
     :ok = Pilot.halt(id, then)
   end
 
-  # Made before a person reset this robot: somebody far away has only now been heard.
+  # The call was made before a person reset this robot: somebody far away was heard only now.
   defp over?(%{reset_us: nil}, _age_ms), do: false
   defp over?(%{reset_us: reset_us}, age_ms), do: 1_000 * age_ms > now_us() - reset_us
 
   defp now_us, do: System.monotonic_time(:microsecond)
 
-  @doc "How the stop stands from now on: written down, carried out and spread, if it is another."
+  @doc "Sets the state of the stop: if it differs, it is recorded, carried out and spread."
   @spec become(t(), EStop.State.t()) :: t()
   def become(%{stop: stop} = s, stop), do: s
 
-  # Written down before the gate is told: an e-stop process that restarts in between knows that there is a
-  # stop to carry out and to spread.
+  # Recorded before the gate is told: an e-stop process that restarts in between knows that there
+  # is a stop to carry out and to spread.
   def become(%{stop: before} = s, stop) do
     s = hold(write(%{s | stop: stop}))
 
-    # The mission ends with it: after the reset nothing moves until somebody says so.
+    # The mission ends with it: after the reset nothing moves until somebody gives a command.
     if stop.latched? and not before.latched?, do: halt(s, nil)
 
     GenServer.cast(Names.via(s.id, :comms), :stop)
     s
   end
 
-  @doc "Has the gate latched if the stop stands so, and it is not."
+  @doc "Latches the gate if the stop is set and the gate is not latched."
   @spec hold(t()) :: t()
   def hold(s) do
     if s.stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id, tell: false)
@@ -176,8 +184,9 @@ defmodule Swarm.EStop.Actions do
   end
 
   @doc """
-  A button of the gate's own has set or cleared its latch, which counts as it is now. It may have been set again
-  although it was set: a reset that is being carried out was given before that.
+  Follows a button on the gate itself, which has set or cleared the latch; the latch counts as it
+  is now. It may have been set again although it was set: a reset that is being carried out was
+  given before that.
   """
   @spec follow(t()) :: t()
   def follow(s) do
@@ -186,7 +195,7 @@ defmodule Swarm.EStop.Actions do
     if latched?, do: press(s, stop), else: become(s, stop)
   end
 
-  @doc "Writes down how the stop stands."
+  @doc "Records the state of the stop."
   @spec write(t()) :: t()
   def write(s) do
     Board.put(s.board, :estop, :estop, s.stop, Config.now(s.config))

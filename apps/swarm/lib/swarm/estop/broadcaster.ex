@@ -2,13 +2,14 @@ defmodule Swarm.EStop.Broadcaster do
   @moduledoc """
   Broadcasts the emergency stop; one process on each node, also on a node without a robot.
 
-  `sound/0` sends a call to stop to every robot's e-stop process in the directory and, by signed datagrams, to every
-  node. That happens at once, in the caller; this process then repeats it, ten times in all, one
-  each 100 ms, whatever has become of the caller. Every call has an identity (`t:Swarm.EStop.Calls.call/0`),
-  so that a robot obeys it once, and an age, counted by
-  those who have it: what is older than a person's reset does not stop the robot again. Whoever hears a call for the first time passes it on, so that it also
-  reaches those that hear him but not its sender. A reset ends the repeats, so that a robot that is
-  switched on afterwards is not stopped by one.
+  `sound/0` sends a call to stop to every robot's e-stop process in the directory and, by signed
+  datagrams, to every node. That happens at once, in the caller; this process then repeats it, ten
+  times in all, every 100 ms, even if the caller has ended. Every call has an identity
+  (`t:Swarm.EStop.Calls.call/0`), so that a robot obeys it once, and an age, which each holder
+  counts: a call older than a person's reset does not stop the robot again. A node that hears a
+  call for the first time passes it on, so that it also reaches those that hear this node but not
+  the sender. A reset ends the repeats, so that they do not stop a robot that is switched on
+  afterwards.
   """
   use GenServer
   alias Mesh.Nonblocking
@@ -18,10 +19,10 @@ defmodule Swarm.EStop.Broadcaster do
   @times 10
   @passed_on 3
   @every_ms 100
-  # More calls at a time are not different any more, and not passed on.
+  # More calls than this at a time are not distinguished any more, and not passed on.
   @most 16
 
-  @doc "Starts it, as a node's supervisor does."
+  @doc "Starts the process, as a node's supervisor does."
   @spec start_link(term()) :: GenServer.on_start()
   def start_link(_options), do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
 
@@ -34,12 +35,12 @@ defmodule Swarm.EStop.Broadcaster do
     call
   end
 
-  @doc "Passes on a call that was heard; one of this node's own is being repeated anyway."
+  @doc "Passes on a call that was heard; a call of this node is being repeated anyway."
   @spec pass_on(Calls.call(), age_ms :: non_neg_integer()) :: :ok
   def pass_on({node, _boot, _counter}, _age_ms) when node == node(), do: :ok
   def pass_on(call, age_ms), do: GenServer.cast(__MODULE__, {:pass_on, call, age_ms})
 
-  @doc "A person has reset what these calls stopped: they are repeated no more."
+  @doc "Ends the repeats of these calls, because a person has reset what they stopped."
   @spec quiet(:all | Calls.t()) :: :ok
   def quiet(calls), do: GenServer.cast(__MODULE__, {:quiet, calls})
 
@@ -49,7 +50,7 @@ defmodule Swarm.EStop.Broadcaster do
     {:ok, %{left: %{}, heard: []}}
   end
 
-  # It has a name that connected nodes can send to, so anything may come here.
+  # It has a name that connected nodes can send to, so anything may arrive here.
   @impl GenServer
   def handle_cast({:repeat, call, times}, s) when times in 1..@times,
     do: {:noreply, if(Calls.call?(call), do: repeat(s, call, times, now()), else: s)}
@@ -115,7 +116,7 @@ defmodule Swarm.EStop.Broadcaster do
 
   defp now, do: System.monotonic_time(:millisecond)
 
-  # When this VM was started, by the time of day.
+  # The time of day at which this VM was started.
   defp boot do
     started = :erlang.system_info(:start_time) + :erlang.time_offset()
     System.convert_time_unit(started, :native, :millisecond)

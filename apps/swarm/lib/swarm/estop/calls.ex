@@ -1,14 +1,14 @@
 defmodule Swarm.EStop.Calls do
   @moduledoc """
-  Which calls to stop were heard (`Swarm.EStop.Broadcaster`). A call is sent many times and comes by several ways; it
-  counts once. Pure.
+  Remembers which calls to stop were heard (`Swarm.EStop.Broadcaster`). A call is sent many times
+  and arrives by several ways; it counts once. Pure.
 
-  Of each life of a node the last call is remembered, of 64 lives at most.
+  For each life of a node the last call is remembered, for at most 64 lives.
   """
   alias Swarm.Message.WireTypes
 
   @callers 64
-  # Boots are times in ms, or, on clocks that count finer, in ns.
+  # Boot numbers are times in ms, or, on finer clocks, in ns.
   @latest 0xFFFFFFFFFFFFFFFF
 
   @typedoc "The identity of a call: the node that calls, that node's life, and a counter of its calls."
@@ -17,7 +17,7 @@ defmodule Swarm.EStop.Calls do
   @type t :: [{node(), {boot :: integer(), counter :: integer()}}]
 
   @doc """
-  Hears a call, and says whether it is a new one.
+  Hears a call, and returns whether it is a new one.
 
       iex> {true, calls} = Swarm.EStop.Calls.hear([], {:base@hall, 1_700_000_000_000, 2})
       iex> Swarm.EStop.Calls.hear(calls, {:base@hall, 1_700_000_000_000, 1})
@@ -25,8 +25,8 @@ defmodule Swarm.EStop.Calls do
   """
   @spec hear(t(), call()) :: {new? :: boolean(), t()}
   def hear(calls, {node, boot, counter}) do
-    # Of each life of a node on its own: repeats of its calls in two lives would else take each
-    # other for new, and robots would pass them on to each other for ever.
+    # Separately for each life of a node: otherwise repeated calls of two lives would each seem
+    # new after the other, and robots would pass them on to each other for ever.
     case Enum.split_with(calls, &match?({^node, {^boot, _last}}, &1)) do
       {[{_node, {_boot, last}} | _], _others} when counter <= last -> {false, calls}
       {_before, others} -> {true, Enum.take([{node, {boot, counter}} | others], @callers)}
@@ -45,7 +45,7 @@ defmodule Swarm.EStop.Calls do
 
   def call?(_other), do: false
 
-  @doc "Whether a term from outside can be the age of a call, in ms: a day at most."
+  @doc "Whether a term from outside can be the age of a call, in ms: at most a day."
   @spec age?(term()) :: boolean()
   def age?(term), do: is_integer(term) and term in 0..86_400_000
 

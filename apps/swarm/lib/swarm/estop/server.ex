@@ -1,5 +1,7 @@
 defmodule Swarm.EStop.Server do
-  @moduledoc "The process of `Swarm.EStop`: what comes in. `Swarm.EStop.Actions` carries it out."
+  @moduledoc """
+  The process of `Swarm.EStop`: receives messages, which `Swarm.EStop.Actions` carries out.
+  """
   use GenServer
   alias Robot.{Board, Config, Names}
   alias Swarm.EStop
@@ -29,7 +31,7 @@ defmodule Swarm.EStop.Server do
 
   @impl GenServer
   def handle_continue(:enter, s) do
-    # A stop that was written down by the e-stop process before this one may not have reached the gate; and what was
+    # A stop that the previous e-stop process recorded may not have reached the gate; and what was
     # pressed on the gate since then has reached nobody.
     s = EStop.Actions.hold(s)
     s = if Board.latched?(s.board) == s.stop.latched?, do: s, else: EStop.Actions.follow(s)
@@ -43,8 +45,8 @@ defmodule Swarm.EStop.Server do
   end
 
   @impl GenServer
-  # E-stop processes are found in the directory, so anything may come here from anywhere, and counts as
-  # nothing.
+  # E-stop processes are found in the directory, so anything may arrive from anywhere; the rest is
+  # ignored.
   def handle_call(_unknown, _from, s), do: {:noreply, s}
 
   @impl GenServer
@@ -52,7 +54,8 @@ defmodule Swarm.EStop.Server do
       when is_integer(number) and number >= 0 and is_boolean(latched?),
       do: {:noreply, EStop.Actions.become(s, EStop.State.hear(s.stop, number, latched?))}
 
-  # As the latch is now, not as it was when the gate said so: this process may have set it again since.
+  # The latch as it is now, not when the gate reported it: this process may have set it again
+  # since.
   def handle_cast(:latch, s), do: {:noreply, EStop.Actions.follow(s)}
 
   def handle_cast({:estop, call, age_ms}, s),

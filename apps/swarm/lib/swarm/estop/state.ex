@@ -1,11 +1,12 @@
 defmodule Swarm.EStop.State do
   @moduledoc """
-  How an emergency stop spreads and is cleared, as a function. Pure.
+  The spreading and clearing of an emergency stop, as a function. Pure.
 
-  Stops are numbered. Every heartbeat tells the highest number that its robot knows, and whether
+  Stops are numbered. Every heartbeat carries the highest number that its robot knows, and whether
   its own latch is set; a robot latches when it hears of a set latch with a number that no person
-  has cleared here. So one that a person has reset is not caught again by a neighbour that nobody
-  has reset yet, and one that joins a fleet whose stop is long cleared is not stopped by it.
+  has cleared here. So a robot that a person has reset is not stopped again by a neighbour that
+  nobody has reset yet, and a robot that joins a fleet whose stop was cleared long ago is not
+  stopped by it.
 
   `calls` remembers which calls to stop were heard (`Swarm.EStop.Calls`), so that a late repeat does not latch again
   what a person has reset.
@@ -23,7 +24,9 @@ defmodule Swarm.EStop.State do
           calls: Calls.t()
         }
 
-  @doc "No stop known; `latched?` when the robot's own latch has survived a restart."
+  @doc """
+  The state without a known stop; `latched?` if the robot's own latch has survived a restart.
+  """
   @spec new(boolean()) :: t()
   def new(latched? \\ false), do: if(latched?, do: press(%__MODULE__{}), else: %__MODULE__{})
 
@@ -37,8 +40,8 @@ defmodule Swarm.EStop.State do
   def press(%__MODULE__{known: known} = stop), do: %{stop | known: known + 1, latched?: true}
 
   @doc """
-  Hears a call to stop; one that was heard before changes nothing. A robot that stands by a stop
-  already gives it no new number: its own and its neighbours' numbers could otherwise run past each
+  Hears a call to stop; one that was heard before changes nothing. A robot that is already stopped
+  does not give it a new number; otherwise its own and its neighbours' numbers could overtake each
   other while a person resets them.
 
       iex> call = {:base@hall, 1_700_000_000_000, 1}
@@ -58,8 +61,8 @@ defmodule Swarm.EStop.State do
   end
 
   @doc """
-  Remembers a call that was made before a person reset this robot, and is heard for the first time only
-  now: it stops nothing any more.
+  Remembers a call that was made before a person reset this robot, but is heard for the first time
+  only now: it no longer stops anything.
 
       iex> call = {:base@hall, 1_700_000_000_000, 1}
       iex> stop = Swarm.EStop.State.late(Swarm.EStop.State.new(), call)
@@ -70,7 +73,7 @@ defmodule Swarm.EStop.State do
   def late(%__MODULE__{} = stop, call), do: %{stop | calls: elem(Calls.hear(stop.calls, call), 1)}
 
   @doc """
-  Follows the latch of the robot, which its gate's own buttons set and clear too: a stop pressed
+  Follows the latch of the robot, which the buttons on its gate also set and clear: a stop pressed
   on the robot itself spreads like any other.
 
       iex> Swarm.EStop.State.follow(Swarm.EStop.State.new(), true).known
@@ -82,7 +85,7 @@ defmodule Swarm.EStop.State do
   def follow(stop, false), do: reset(stop)
 
   @doc """
-  Hears what a neighbour's heartbeat says: its number, and whether its latch is set.
+  Hears the number and the latch of a neighbour's heartbeat.
 
       iex> stop = Swarm.EStop.State.hear(Swarm.EStop.State.new(), 3, true)
       iex> stop.latched?
@@ -95,15 +98,16 @@ defmodule Swarm.EStop.State do
   @spec hear(t(), non_neg_integer(), boolean()) :: t()
   def hear(%__MODULE__{} = stop, number, latched?) do
     cond do
-      # No fleet counts that far at once; taken over, it would leave no room for numbers to come.
+      # No fleet counts this far at once; accepting such a number would leave no room for later
+      # ones.
       number > stop.known + @leap ->
         stop
 
       latched? and number > stop.cleared ->
         %{stop | known: max(stop.known, number), latched?: true}
 
-      # A stop pressed here before this robot knew how far the fleet had counted: others take
-      # it for one that is cleared, so it gets a number that nobody has cleared.
+      # A stop was pressed here before this robot knew how far the fleet had counted. Others
+      # consider that number cleared, so it gets a number that nobody has cleared.
       stop.latched? and number > stop.known ->
         %{stop | known: number + 1}
 

@@ -1,11 +1,12 @@
 defmodule Swarm.Formation.Assignment do
   @moduledoc """
-  Who takes which slot. Pure and exact: costs are whole numbers (mm squared), so that every robot
-  that computes from the same record gets the same answer.
+  Assigns slots to robots. Pure and exact: costs are whole numbers (mm squared), so that every
+  robot that computes from the same record gets the same answer.
 
-  `:chain` is the thesis's order by distance to the leader, `O(n log n)`. `:cost` has the least
-  sum of squared ways, which keeps straight paths apart when all start together (Turpin, Michael,
-  Kumar 2014); it is the shortest augmenting path algorithm of Jonker and Volgenant, `O(n^3)`.
+  `:chain` is the thesis's order by distance to the leader, `O(n log n)`. `:cost` minimises the
+  sum of squared distances, which keeps straight paths apart if all start together (Turpin,
+  Michael, Kumar 2014); it is the shortest augmenting path algorithm of Jonker and Volgenant,
+  `O(n^3)`.
   """
 
   @type millimetres :: {integer(), integer()}
@@ -60,7 +61,7 @@ defmodule Swarm.Formation.Assignment do
     owner |> Enum.sort() |> Enum.map(&elem(&1, 1))
   end
 
-  # Rows and columns count from 1; column 0 is where the path starts.
+  # Rows and columns count from 1; the path starts at column 0.
   defp augment(row, {owner, u, v}, costs, n) do
     least = Map.new(1..n, &{&1, {nil, 0}})
 

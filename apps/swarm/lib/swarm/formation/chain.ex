@@ -1,8 +1,8 @@
 defmodule Swarm.Formation.Chain do
   @moduledoc """
-  The thesis's chain: everyone's child is the robot with the next greater distance to the leader
-  (R52), which each robot finds from the same poses. Equal distances are ordered by id, so that
-  any poses give one path. Pure; places in mm, as reported.
+  The thesis's chain: the child of each robot is the one with the next greater distance to the
+  leader (R52), which each robot computes from the same poses. Equal distances are ordered by id,
+  so that any poses give a unique chain. Pure; places in mm, as reported.
   """
 
   @type millimetres :: {integer(), integer()}
@@ -21,7 +21,7 @@ defmodule Swarm.Formation.Chain do
   end
 
   @doc """
-  Whose parent a robot is, along `[leader | order]`; `nil` for the last one and for strangers.
+  The child of a robot along `[leader | order]`; `nil` for the last one and for strangers.
 
       iex> Swarm.Formation.Chain.child([:mag1, :mag2, :min1], :mag2)
       :min1

@@ -1,22 +1,22 @@
 defmodule Swarm.Formation.FreeSlots do
   @moduledoc """
-  Finds the slots of a shape that are free: a dead robot's body leaves no room for another. The
-  shape grows by as many slots as are lost. Pure; metres.
+  Finds the free slots of a shape: a dead robot's body leaves no room for another robot. The shape
+  grows by as many slots as are lost. Pure; metres.
   """
   alias Hal.Pose
   alias Swarm.Formation
 
-  # From skin to skin between a standing robot and a dead one.
+  # The gap from edge to edge between a standing robot and a dead one.
   @gap 0.2
-  # A shape may lose this many slots before it is taken as it is.
+  # If a shape loses more slots than this, it is used as it is.
   @most 20
 
-  @typedoc "The size of the whole shape, the leader included, and the numbers of the slots that are used."
+  @typedoc "The size of the whole shape, the leader included, and the numbers of the used slots."
   @type t :: {size :: pos_integer(), places :: [pos_integer()]}
 
   @doc """
-  The slots for so many followers round a leader at `pose`, without those that `bodies`
-  (`{x, y, radius}`) take away. `radius` is that of the largest follower.
+  The slots for so many followers around a leader at `pose`, without those that `bodies`
+  (`{x, y, radius}`) occupy. `radius` is that of the largest follower.
 
       iex> Swarm.Formation.FreeSlots.places({:column, 1.0}, 3, Hal.Pose.new(0, 0), 1.6, [], 0.2)
       {4, [1, 2, 3]}

@@ -1,21 +1,23 @@
 defmodule Swarm.Formation.Reference do
   @moduledoc """
   Where the leader is supposed to be, and the shape relative to it: everything that a follower
-  needs to compute its slot. The leader makes a new one each tick; it travels in the leader's
-  heartbeats and, from parent to child, along the chain (R28, R53: n - 1 messages), so that a
-  follower that does not hear the leader still knows its place. The newest sequence number wins;
-  the epoch fences off leaders of the past.
+  needs to compute its slot. The leader makes a new reference each tick; it travels in the
+  leader's heartbeats and, from parent to child, along the chain (R28, R53: n - 1 messages), so
+  that a follower that does not hear the leader still knows its place. The newest sequence number
+  wins; the epoch excludes former leaders.
 
-  Poses are `{x_mm, y_mm, mrad}` in the leader's map frame. Its own uncertainty (standard deviations in mm and mrad)
-  is `sd` in the frame `base` that it was in before, and `start_sd` in that of the start poses; `frame` is the number of its own.
-  `drift` is by how much its odometry has drifted since it was started (variances in mm2 and millionths of rad2, all angles
-  turned in mrad), `slip` how well it knows by what share of an angle it slips (a standard deviation, in thousandths). `landmark` is `{x_mm, y_mm}` or `nil`,
-  `still` says that it does not move. `order` names the followers by slot, which is also
-  the order in which each passes the anchor on to its child. `formation` is
-  the shape as there is room for it, `asked` the one that was asked for, the `asked_no`-th that was; `size` and `places` say which
-  slots of it are used (`Swarm.Formation.FreeSlots`), `trail` gives them pose by pose where the shape is a column
-  along the leader's trail. `of` is the size of the fleet of which a majority must be together for anybody
-  to lead, 0 for no such rule (`Missions.Landmark.Policy`).
+  Poses are `{x_mm, y_mm, mrad}` in the leader's map frame. Its own uncertainty (standard
+  deviations in mm and mrad) is `sd` in the frame `base` that it was in before, and `start_sd` in
+  that of the start poses; `frame` is the number of its own frame. `drift` is how much its
+  odometry has drifted since it was started (variances in mm2 and millionths of rad2, sum of all
+  turned angles in mrad), `slip` the uncertainty of the share of an angle by which it slips (a
+  standard deviation, in thousandths). `landmark` is `{x_mm, y_mm}` or `nil`, `still` says that it
+  does not move. `order` names the followers by slot, which is also the order in which each passes
+  the anchor on to its child. `formation` is the shape that there is room for, `asked` the
+  requested one, which was the `asked_no`-th request; `size` and `places` say which slots of it
+  are used (`Swarm.Formation.FreeSlots`), `trail` gives them pose by pose if the shape is a column
+  along the leader's trail. `of` is the size of the fleet of which a majority must be together for
+  anybody to lead, 0 if none is required (`Missions.Landmark.Policy`).
   """
   alias Swarm.Formation
   alias Swarm.Message.WireTypes
@@ -37,7 +39,9 @@ defmodule Swarm.Formation.Reference do
                 of: 0
               ]
 
-  @typedoc "Whose frame it is, the number of that robot's life, and of the frame among those of this life."
+  @typedoc """
+  The robot that owns the frame, the number of its life, and the number of the frame in that life.
+  """
   @type frame :: {atom(), boot :: non_neg_integer() | nil, non_neg_integer()}
   @type t :: %__MODULE__{
           leader: atom(),

@@ -2,8 +2,8 @@ defmodule Swarm.Formation.Trail do
   @moduledoc """
   The path that a robot has driven, and places along it. Pure; metres, newest point first.
 
-  A column along the leader's trail goes where the leader went: through the door that it came
-  through, not through the wall beside it.
+  A column along the leader's trail goes where the leader went: through the doorway that it used,
+  not through the wall beside it.
   """
   alias Hal.Pose
 
@@ -13,7 +13,7 @@ defmodule Swarm.Formation.Trail do
   @type t :: [Pose.point()]
 
   @doc """
-  The trail with one more pose; steps under 0.1 m are not written down.
+  The trail with one more pose; steps under 0.1 m are not recorded.
 
       iex> [] |> Swarm.Formation.Trail.note(Hal.Pose.new(0, 0)) |> Swarm.Formation.Trail.note(Hal.Pose.new(0.05, 0)) |> length()
       1
@@ -28,8 +28,8 @@ defmodule Swarm.Formation.Trail do
   end
 
   @doc """
-  The place `way` metres behind `pose` along the trail, looking forward along it. Where the trail is
-  too short it is carried on straight.
+  The place `way` metres behind `pose` along the trail, looking forward along it. If the trail is
+  too short, it is extended in a straight line.
 
       iex> trail = [{2.0, 0.0}, {1.0, 0.0}, {1.0, -1.0}]
       iex> Swarm.Formation.Trail.behind(trail, Hal.Pose.new(2, 0), 1.5) |> Hal.Pose.distance({1.0, -0.5})

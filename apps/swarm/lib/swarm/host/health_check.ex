@@ -1,17 +1,17 @@
 defmodule Swarm.Host.HealthCheck do
   @moduledoc """
-  Judges whether a robot of this node is alive, by what its parts did rather than by what they
-  say: the gate writes to the board twenty times a second, the executive ten times, and what the
-  gate sends to the drive is taken. Asks no process, so nothing that hangs can hold it up.
+  Judges whether a robot of this node is alive by what its processes did, not by what they say:
+  the gate writes to the board twenty times a second, the executive ten times, and the drive
+  handles what the gate sends. It asks no process, so nothing that hangs can block it.
   """
   alias Robot.{Board, Names}
 
   @silent_ms 1_000
-  # The gate sends 20 messages a second: this is what a drive leaves lying that hangs for 10 s. One that opens
-  # its line may hang for 5 s.
+  # The gate sends 20 messages a second: this many wait if a drive hangs for 10 s. A drive that
+  # opens its line may block for 5 s.
   @backlog 200
 
-  @typedoc "The words are one line for people."
+  @typedoc "The text is one line for people."
   @type t :: {well? :: boolean(), words :: String.t()}
 
   @doc "The pulse of a robot of this node."
@@ -24,8 +24,9 @@ defmodule Swarm.Host.HealthCheck do
   end
 
   @doc """
-  The same, judged from how old (ms) the last work of gate and executive is, `nil` for none, how many
-  messages wait for the drive, and how the drive is armed, or that it is offline.
+  The same, judged from the age (ms) of the last work of gate and executive, `nil` for none, the
+  number of messages that wait for the drive, and the arming state of the drive, or that it is
+  offline.
 
       iex> Swarm.Host.HealthCheck.judge(:mag1, [gate: 12, executive: 80], 0, %{state: :disarmed, why: nil})
       {true, "mag1 is disarmed"}
@@ -80,7 +81,7 @@ defmodule Swarm.Host.HealthCheck do
     end
   end
 
-  # What was lost in motion is told first.
+  # A line that was lost in motion is reported first.
   defp offline(board) do
     case {Board.health(board, :drive), arming(board)} do
       {_health, %{state: {:error, _reason}}} -> nil

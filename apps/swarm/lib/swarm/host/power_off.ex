@@ -1,26 +1,29 @@
 defmodule Swarm.Host.PowerOff do
   @moduledoc """
-  Makes the controller of this machine's robot cut the power of both (`Hal.RFlex.PowerSwitch`), by
-  the `console:` of the robot's file. Without that key, it sends nothing.
+  Makes the controller of this machine's robot cut the power of robot and machine
+  (`Hal.RFlex.PowerSwitch`), by the `console:` of the robot's file. Without that key, it sends
+  nothing.
 
-  While a robot runs here, it has the line of its base, and the power stays on: a machine that still drives
-  has not halted. So it does where the line cannot be looked at, for instance without permission. A base on another line
-  than its own file says is not found out. Whether a controller listens to the console nobody can know: what is answered
-  is that it was told.
+  While a robot runs here, it holds the line of its base, and the power stays on: a machine that
+  still drives has not halted. The power also stays on if the line cannot be checked, for instance
+  without permission. A base on another line than its own file says is not noticed. Nobody can
+  know whether a controller listens to the console, so the answer says only that the phrase was
+  sent.
   """
   alias Hal.RFlex.PowerSwitch
   alias Hal.Serial
 
-  @doc "Says the phrase; or why not, in a line. `nil` is a node without a robot."
+  @doc "Sends the phrase; the error says in one line why not. `nil` is a node without a robot."
   @spec say(Robot.File.t() | nil) :: {:ok, line :: String.t()} | {:error, line :: String.t()}
-  def say(nil), do: {:error, "has no robot that could be switched off"}
+  def say(nil), do: {:error, "has no robot to switch off"}
 
   def say(%Robot.File{console: nil}),
     do: {:error, "has no console: in its file; the power stays on"}
 
   def say(%Robot.File{console: console, drive: {_driver, options}}) do
     with :ok <- idle(options[:port]), :ok <- PowerSwitch.halt(console) do
-      {:ok, "#{console[:port]} was told; a controller that listens there cuts the power now"}
+      {:ok,
+       "#{console[:port]} got the phrase; a controller that listens there cuts the power now"}
     end
   end
 
@@ -34,7 +37,7 @@ defmodule Swarm.Host.PowerOff do
       {:error, :ebusy} ->
         {:error, "a robot runs here: #{Serial.explain(:ebusy, port)}; the power stays on"}
 
-      # A base that is not there drives nobody.
+      # A base that does not exist cannot drive.
       {:error, not_there} when not_there in [:enoent, :enodev, :enxio, :eio] ->
         :ok
 

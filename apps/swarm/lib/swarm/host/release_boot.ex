@@ -1,16 +1,16 @@
 defmodule Swarm.Host.ReleaseBoot do
   @moduledoc """
-  Determines at the start of a release which robot this machine is, by which file and with which
-  network. `rel/env.sh.eex` asks before Erlang starts, `Swarm.Application` when it does.
+  Determines at the start of a release which robot this machine is, from which file and with which
+  network. `rel/env.sh.eex` asks before Erlang starts, `Swarm.Application` when it starts.
 
-  The robot file is the first of these that is there:
+  The robot file is the first of these that exists:
 
     1. the one that `CONVOY_ROBOT_FILE` names;
     2. `/etc/convoy/robots/NAME.exs`, the machine's own;
     3. `robots/NAME.exs` of the release, as it was built or deployed.
 
-  NAME is `ROBOT` of the environment. The release `robot` does not start without one; in `fleet` a name
-  without a file is a base protocol, a node without a robot.
+  NAME is `ROBOT` of the environment. The release `robot` does not start without one; in `fleet` a
+  name without a file is a base station, a node without a robot.
   """
   alias Robot.File.Summary
   alias Swarm.Host.PowerOff
@@ -25,7 +25,7 @@ defmodule Swarm.Host.ReleaseBoot do
   @type environment :: %{optional(String.t()) => String.t()}
 
   @doc """
-  The place of the robot file; `nil` where none is needed.
+  The path of the robot file; `nil` if none is needed.
 
       iex> there? = &(&1 == "/opt/convoy/robots/mag1.exs")
       iex> Swarm.Host.ReleaseBoot.place(%{"ROBOT" => "mag1", "RELEASE_ROOT" => "/opt/convoy"}, there?)
@@ -49,7 +49,7 @@ defmodule Swarm.Host.ReleaseBoot do
     end
   end
 
-  @doc "The robot of this machine, whole and well; or all that is wrong, a line each."
+  @doc "The checked robot of this machine; the error lists all that is wrong, one line each."
   @spec robot(environment()) ::
           {:ok, {Robot.File.t(), Robot.Config.t()} | nil} | {:error, [line :: String.t(), ...]}
   def robot(environment) do
@@ -65,9 +65,9 @@ defmodule Swarm.Host.ReleaseBoot do
   end
 
   @doc """
-  What a shell must know to start the robot or to reach it: the place of the secret, the cookie made of
-  it, the port of distribution, and the address that it listens on, `nil` for all. What a robot file says
-  stands above the environment.
+  What a shell must know to start the robot or to reach it: the path of the secret, the cookie
+  derived from it, the port of distribution, and the address that it listens on, `nil` for all.
+  The robot file takes precedence over the environment.
   """
   @spec settings(environment(), Robot.File.t() | nil) ::
           {:ok,
@@ -93,20 +93,24 @@ defmodule Swarm.Host.ReleaseBoot do
     end
   end
 
-  # That the environment's was not even looked at must be said.
+  # The error must say that the environment's value was not even read.
   defp secret(path, network, told) do
     with {:error, line} <- Secret.from_env(%{"CONVOY_SECRET_FILE" => path || ""}) do
       if network[:secret_file] && told not in [nil, path],
-        do: {:error, "#{line} (network.secret_file of the robot file stands above #{told})"},
+        do:
+          {:error,
+           "#{line} (network.secret_file of the robot file takes precedence over #{told})"},
         else: {:error, line}
     end
   end
 
   @doc """
-  The answer to `rel/env.sh.eex`: status and lines of standard output and standard error. For `check` they say
-  what the robot is, for `halt` that its controller was told to cut the power (`Swarm.Host.PowerOff`), else they are the settings. Who only wants to reach a running robot, to stop it
-  say, gets there also when its file has become wrong since. Nothing starts where the port of its distribution is taken for
-  longer than `patience_ms`; one that was told to stop may need a second.
+  The answer to `rel/env.sh.eex`: status and lines of standard output and standard error. For
+  `check` they say what the robot is, for `halt` that its controller was told to cut the power
+  (`Swarm.Host.PowerOff`), else they are the settings. Commands that only reach a running robot,
+  for example to stop it, work even if its file has become wrong since. Nothing starts if the port
+  of its distribution is taken for longer than `patience_ms`; a robot that was told to stop may
+  need a second.
   """
   @spec answer(command :: String.t(), environment(), patience_ms :: non_neg_integer()) ::
           {status :: 0 | 1, output :: [String.t()], errors :: [String.t()]}
@@ -129,7 +133,7 @@ defmodule Swarm.Host.ReleaseBoot do
     end
   end
 
-  @doc "Gives that answer, and ends the VM unless all is well."
+  @doc "Prints that answer, and ends the VM unless all is well."
   @spec main() :: :ok
   def main do
     environment = System.get_env()
@@ -140,8 +144,8 @@ defmodule Swarm.Host.ReleaseBoot do
     if status != 0, do: System.halt(status), else: :ok
   end
 
-  # This VM is asked without the release's settings, as those of the start would come along. The missions and
-  # formations that a robot file may name are settings of the build.
+  # This VM runs without the release's settings, because they would include those of the start.
+  # The missions and formations that a robot file may name are settings of the build.
   defp configure(environment) do
     with %{"RELEASE_ROOT" => root, "RELEASE_VSN" => version} <- environment,
          {:ok, [settings]} <- :file.consult(Path.join([root, "releases", version, "sys.config"])) do
@@ -181,12 +185,12 @@ defmodule Swarm.Host.ReleaseBoot do
       do: shell(settings, file),
       else:
         {:error,
-         "#{environment["ROBOT"]} does not start: its TCP port #{port} is taken. Either it runs here already " <>
+         "#{environment["ROBOT"]} does not start: its TCP port #{port} is in use. Either it runs here already " <>
            "(robot status tells how it is, robot stop ends it), or another program has the port (ss -ltnp), " <>
            "and dist_port: of its file, or CONVOY_DIST_PORT, names another"}
   end
 
-  # As Erlang's distribution will listen.
+  # In the same way as Erlang's distribution will listen.
   defp free?(port, interface, left_ms) do
     ip =
       with {:ok, ip} <- :inet.parse_address(to_charlist(interface || "")),
@@ -200,7 +204,7 @@ defmodule Swarm.Host.ReleaseBoot do
       {:error, :eaddrinuse} ->
         false
 
-      # What else may be wrong with it Erlang says better.
+      # Erlang reports other errors of it better.
       {:error, _other} ->
         true
 

@@ -1,29 +1,31 @@
 defmodule Swarm.Host.Systemd do
   @moduledoc """
-  Tells the machine's supervisor (systemd, by its protocol `sd_notify`) that the robot is up, how it is,
-  and, as long as that is so, that it is alive.
+  Tells the machine's supervisor (systemd, by its protocol `sd_notify`) that the robot is up, its
+  status, and, as long as that is true, that it is alive.
 
-  The sign of life is given only while the robot is well (`Swarm.Host.HealthCheck`): its gate and its executive did their
-  work within the last second, and the drive's process takes its messages. It is not a timer's that
-  ticks beside a robot that hangs. What a supervisor of the VM mends is mended before systemd's
-  patience ends; what none can mend (a part that hangs, a VM that stands still) ends in a fresh start
-  of everything. The wheels have stopped long before, by the port program's last words.
+  The sign of life is sent only while the robot is well (`Swarm.Host.HealthCheck`): its gate and
+  its executive did their work within the last second, and the drive's process handles its
+  messages. It does not come from a timer that goes on beside a robot that hangs. What a
+  supervisor in the VM can repair is repaired before systemd's time-out; what none can repair (a
+  process that hangs, a VM that is frozen) ends in a new start of everything. The wheels have
+  stopped long before, by the port program's last words.
 
-  Options: `:socket`, the path that systemd gave, `@name` for an abstract one; `:robot`, whose life it is, `nil` for a
-  node without; `:period_ms`, how often it looks; `:pulse`, a function in place of `Pulse.of/1`.
+  Options: `:socket`, the path that systemd gave, `@name` for an abstract one; `:robot`, the
+  robot's id, `nil` for a node without one; `:period_ms`, how often it checks; `:pulse`, a
+  function in place of `Swarm.Host.HealthCheck.of/1`.
   """
   use GenServer
   alias Swarm.Host.HealthCheck
 
   @period_ms 1_000
 
-  @doc "Starts it; `from_env/3` makes the options."
+  @doc "Starts the process; `from_env/3` makes the options."
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options), do: GenServer.start_link(__MODULE__, options)
 
   @doc """
-  The options for a robot, from what systemd has put into the environment of the process `os_pid`; `nil` where
-  nobody wants to be told.
+  The options for a robot, from what systemd has put into the environment of the process `os_pid`;
+  `nil` if systemd does not want to be notified.
 
       iex> Swarm.Host.Systemd.from_env(%{"NOTIFY_SOCKET" => "/run/n", "WATCHDOG_USEC" => "2000000"}, :mag1, "7")
       [socket: "/run/n", robot: :mag1, period_ms: 500]
@@ -41,7 +43,7 @@ defmodule Swarm.Host.Systemd do
 
   @impl GenServer
   def init(options) do
-    # Before all else that has to be done: who is late here is taken for dead.
+    # Before everything else: a late sign of life counts as death.
     Process.flag(:priority, :high)
     {:ok, socket} = :gen_udp.open(0, [:local, active: false])
 
@@ -71,7 +73,7 @@ defmodule Swarm.Host.Systemd do
     %{s | ready?: s.ready? or well?}
   end
 
-  # A supervisor that does not listen now will, or starts us again.
+  # If the supervisor does not listen now, it will later, or it starts us again.
   defp tell(s, words, well?) do
     ready = if well? and not s.ready?, do: ["READY=1\n"], else: []
     alive = if well?, do: ["WATCHDOG=1\n"], else: []
@@ -80,7 +82,7 @@ defmodule Swarm.Host.Systemd do
 
   defp one_line(words), do: String.replace(words, ~r/\s+/, " ")
 
-  # Four looks within the time that systemd waits, and at least one a second.
+  # Four checks within systemd's time-out, and at least one per second.
   defp period(environment, os_pid) do
     with ^os_pid <- Map.get(environment, "WATCHDOG_PID", os_pid),
          {usec, ""} when usec > 0 <- Integer.parse(Map.get(environment, "WATCHDOG_USEC", "")) do

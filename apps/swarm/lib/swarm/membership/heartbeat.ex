@@ -1,14 +1,15 @@
 defmodule Swarm.Membership.Heartbeat do
   @moduledoc """
-  What a robot tells all others five times a second: its pose, its state, whom it hears, whom it
-  follows. Whole numbers only: mm, mrad, mm/s, mrad/s, millionths of a picture.
+  What a robot tells all others five times a second: its pose, its state, the robots that it
+  hears, and the one that it follows. Whole numbers only: mm, mrad, mm/s, mrad/s, millionths of a
+  picture.
 
   `estop` is the number of the last emergency stop that it knows, 0 for none, and `latched` says
-  whether its own latch is set (`Swarm.EStop.State`). `sight` is its newest view of the landmark: relative
-  size and estimated distance, `nil` where it does not see it. `anchor` is there in the leader's
-  heartbeats only. `in_place` says that a follower is in its slot, `unsure` that it believes so and is not sure
-  enough. `sd` is how well it knows its place in its leader's frame, `nil` outside of
-  it. `boot` is its life's number, which grows with every start.
+  whether its own latch is set (`Swarm.EStop.State`). `sight` is its newest view of the landmark:
+  relative size and estimated distance, `nil` if it does not see it. Only the leader's heartbeats
+  contain `anchor`. `in_place` says that a follower is in its slot, `unsure` that it believes so
+  but is not sure enough. `sd` is the uncertainty of its place in its leader's frame, `nil`
+  outside it. `boot` is the number of its life, which grows with every start.
   """
   alias Swarm.Membership.NameSet
   alias Swarm.Message.WireTypes
@@ -58,16 +59,16 @@ defmodule Swarm.Membership.Heartbeat do
           anchor: Swarm.Formation.Reference.t() | nil
         }
 
-  # Boot numbers may be times in ms, or, on clocks that count finer, in ns. Numbers of stops cannot be made
-  # to run so far, for nobody follows a leap (`Swarm.EStop.State`).
+  # Boot numbers may be times in ms, or, on finer clocks, in ns. Nobody can make the numbers of
+  # stops run so far, because no robot follows a leap (`Swarm.EStop.State`).
   @latest 0xFFFFFFFFFFFFFFFF
 
-  # Five a second. Ticks come every 100 ms, and some of them a little early.
+  # Five a second. Ticks come every 100 ms, some of them a little early.
   @period_ms 200
   @early_ms 50
 
   @doc """
-  Whether a heartbeat is due, when the last was sent at `last_ms`; `nil` before the first.
+  Whether a heartbeat is due if the last was sent at `last_ms`; `nil` before the first.
 
       iex> for at_ms <- [100, 199, 300], do: Swarm.Membership.Heartbeat.due?(0, at_ms)
       [false, true, true]
@@ -85,8 +86,8 @@ defmodule Swarm.Membership.Heartbeat do
         }
 
   @doc """
-  The heartbeat of a robot: how its body moves, what its mission claims (`:idle`: it is on none, and stands),
-  whom it hears. A body without odometry stands still.
+  The heartbeat of a robot: how its body moves, what its mission claims (`:idle`: it has none, and
+  stands), and the robots that it hears. A body without odometry counts as standing.
   """
   @spec new(
           {integer(), non_neg_integer()},
@@ -111,8 +112,8 @@ defmodule Swarm.Membership.Heartbeat do
       latched: stop.latched?
     }
 
-    # These are for people, who ask the robot itself.
-    # So is what a mission of one's own may claim besides.
+    # These fields are for people, who ask the robot itself. So are any others that a user's
+    # mission claims.
     struct(beat, Map.drop(claim, [:blocked_by, :uncertainty]))
   end
 

@@ -1,7 +1,7 @@
 defmodule Swarm.Membership.Matrix do
   @moduledoc """
-  Who hears whom. In `iex` it prints as a table, with a line for each robot and a column for each
-  robot that it may hear:
+  Which robot hears which. In `iex` it prints as a table, with a line for each robot and a column
+  for each robot that it may hear:
 
       #Swarm.Membership.Matrix, 3 robots
               mag1  mag2  min1  view
@@ -9,7 +9,8 @@ defmodule Swarm.Membership.Matrix do
         mag2     x     .     x  7: mag1 mag2 min1
         min1     -     x     .  3: mag2 min1, 800 ms ago
 
-  `x` is heard, `-` is not, `?` is not known: that robot neither answers nor did its row come.
+  `x` means heard, `-` not heard, `?` unknown: that robot does not answer, and its row has not
+  arrived.
   """
   alias Swarm.Status
 
@@ -38,7 +39,7 @@ defmodule Swarm.Membership.Matrix do
     %__MODULE__{robots: robots |> Enum.uniq() |> Enum.sort(), lines: lines}
   end
 
-  @doc "Whether one hears another; `:unknown` of one that says nothing."
+  @doc "Whether one robot hears another; `:unknown` if it says nothing."
   @spec hears?(t(), atom(), atom()) :: boolean() | :unknown
   def hears?(matrix, from, to) do
     case matrix.lines do

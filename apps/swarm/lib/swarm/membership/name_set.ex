@@ -1,8 +1,8 @@
 defmodule Swarm.Membership.NameSet do
   @moduledoc """
-  A set of names in one binary, for heartbeats that list whom a robot hears. A hundred robots
-  exchange fifty thousand heartbeats a second; a list of a hundred names would be copied at every
-  send, every write to a board and every read of one, while a binary is shared. Pure.
+  A set of names in one binary, for heartbeats that list the robots that a robot hears. A hundred
+  robots exchange fifty thousand heartbeats a second; a list of a hundred names would be copied at
+  every send, every write to a board and every read of one, while a binary is shared. Pure.
   """
 
   @typedoc "The names, sorted, each with a zero before and behind it."
@@ -12,7 +12,7 @@ defmodule Swarm.Membership.NameSet do
   @most 32_000
 
   @doc """
-  A roll of these robots.
+  The set of these names.
 
       iex> roll = Swarm.Membership.NameSet.new([:mag2, :mag1])
       iex> {Swarm.Membership.NameSet.names(roll), Swarm.Membership.NameSet.member?(roll, :mag1), Swarm.Membership.NameSet.member?(roll, :mag)}
@@ -24,11 +24,11 @@ defmodule Swarm.Membership.NameSet do
   def new(ids),
     do: IO.iodata_to_binary([0 | for(id <- Enum.sort(ids), do: [Atom.to_string(id), 0])])
 
-  @doc "Whether a robot is on it."
+  @doc "Whether a robot is in the set."
   @spec member?(t(), atom()) :: boolean()
   def member?(roll, id), do: :binary.match(roll, entry(id)) != :nomatch
 
-  @doc "Whose names are on it; names that nobody here has are left out."
+  @doc "The names in the set; names that are not atoms on this node are left out."
   @spec names(t()) :: [atom()]
   def names(roll) do
     for name <- :binary.split(roll, <<0>>, [:global, :trim_all]), id = known(name), do: id
@@ -42,7 +42,7 @@ defmodule Swarm.Membership.NameSet do
   end
 
   @doc """
-  Whether it is this roll without that robot; compares bytes, since the answer is mostly yes.
+  Whether it equals this set without that robot; compares bytes, because the answer is mostly yes.
 
       iex> all = Swarm.Membership.NameSet.new([:mag1, :mag2, :mag3])
       iex> for ids <- [[:mag1, :mag3], [:mag1]], do: Swarm.Membership.NameSet.all_but?(Swarm.Membership.NameSet.new(ids), all, :mag2)
@@ -65,7 +65,7 @@ defmodule Swarm.Membership.NameSet do
   end
 
   @doc """
-  Whether a term from outside can be one.
+  Whether a term from outside can be a set of names.
 
       iex> for term <- [Swarm.Membership.NameSet.new([:mag1]), <<>>, [:mag1], "mag1"], do: Swarm.Membership.NameSet.valid?(term)
       [true, true, false, false]

@@ -2,12 +2,12 @@ defmodule Swarm.Membership.Neighbours do
   @moduledoc "The robots in range of one, to compute with: `near/3`, then `map/2` or `reduce/3`. Pure."
   alias Hal.Pose
 
-  @typedoc "A robot in range: where it is, how far (m), and in what direction from here (radians)."
+  @typedoc "A robot in range: its place, its distance (m), and its direction from here (radians)."
   @type neighbour :: %{pose: Pose.t(), distance: float(), bearing: float()}
 
   @doc """
-  The robots within range, sorted by name: from their poses, one's own, and a range in metres. Without
-  a pose of one's own nobody is near.
+  The robots within range, sorted by name, from their poses, the robot's own pose, and a range in
+  metres. Without an own pose there are none.
 
       iex> poses = %{mag2: Hal.Pose.new(2, 0), min1: Hal.Pose.new(9, 0)}
       iex> [{:mag2, %{distance: 2.0}}] = Swarm.Membership.Neighbours.near(poses, Hal.Pose.new(0, 0), 3.0)
@@ -24,7 +24,7 @@ defmodule Swarm.Membership.Neighbours do
   end
 
   @doc """
-  What a function of robot and neighbour gives for each.
+  Applies a function of robot and neighbour to each.
 
       iex> near = Swarm.Membership.Neighbours.near(%{mag2: Hal.Pose.new(2, 0)}, Hal.Pose.new(0, 0), 3.0)
       iex> Swarm.Membership.Neighbours.map(near, fn _robot, neighbour -> neighbour.distance end)
@@ -35,7 +35,7 @@ defmodule Swarm.Membership.Neighbours do
   def map(near, function), do: for({robot, one} <- near, do: {robot, function.(robot, one)})
 
   @doc """
-  All neighbours to one value, in the order of their names.
+  Reduces all neighbours to one value, in the order of their names.
 
       iex> near = Swarm.Membership.Neighbours.near(%{a: Hal.Pose.new(2, 0), b: Hal.Pose.new(1, 0)}, Hal.Pose.new(0, 0), 3.0)
       iex> Swarm.Membership.Neighbours.reduce(near, 0, fn _robot, neighbour, sum -> sum + neighbour.distance end)

@@ -3,15 +3,16 @@ defmodule Swarm.Membership.Peers do
   Tracks which robots are present, by the newest heartbeat of each and its age. Pure; times are
   the listener's own, in milliseconds.
 
-  A peer is suspect after 1 s of silence and gone after 2 s. A gone robot's last pose stays known,
-  as an obstacle, until it is heard from elsewhere. A robot that comes back with a higher boot
-  number starts anew; within one boot only newer sequence numbers count, so that late and doubled
-  heartbeats do no harm, those of a robot's former life included. Boot numbers may be times of day,
-  and clocks are set back: from a robot that is gone any number is believed.
+  A peer is suspect after 1 s of silence and gone after 2 s. The last pose of a robot that is gone
+  stays known, as an obstacle, until the robot is heard elsewhere. A robot that comes back with a
+  higher boot number starts again; within one boot only newer sequence numbers count, so that late
+  and duplicate heartbeats, including those of a robot's former life, do no harm. Boot numbers may
+  be times of day, and clocks may be set back, so any number is accepted from a robot that is
+  gone.
 
-  A heartbeat may come by way of a third robot (`Swarm.Comms.Forwarder`): it counts as a sign of life, but not
-  as heard. Who is there has a number (`members/2`) that grows whenever a robot comes, goes, or comes
-  back as another life.
+  A heartbeat may come by way of a third robot (`Swarm.Comms.Forwarder`): it counts as a sign of
+  life, but not as heard. The view of the robots present has a number (`members/2`) that grows
+  whenever a robot comes, goes, or comes back in another life.
   """
   alias Hal.{Pose, Twist}
   alias Swarm.Membership.Heartbeat
@@ -22,7 +23,10 @@ defmodule Swarm.Membership.Peers do
   @enforce_keys [:me]
   defstruct @enforce_keys ++ [rows: %{}, changes: 0]
 
-  @typedoc "`at_ms` is when the robot was last heard of, `direct_ms` when it was heard itself, `nil` for never."
+  @typedoc """
+  `at_ms` is when the robot was last heard of, `direct_ms` when it was last heard itself, `nil`
+  for never.
+  """
   @type row :: %{beat: Heartbeat.t(), at_ms: integer(), direct_ms: integer() | nil}
   @typedoc "`changes` counts those who came, came back or restarted, up to the last heartbeat."
   @type t :: %__MODULE__{
@@ -32,13 +36,13 @@ defmodule Swarm.Membership.Peers do
         }
   @type status :: :alive | :suspect | :gone
 
-  @doc "Nobody heard yet."
+  @doc "The state before any robot is heard."
   @spec new(atom()) :: t()
   def new(me), do: %__MODULE__{me: me}
 
   @doc """
-  Hears a heartbeat, itself or (`direct?` false) by way of another robot; an old one, or one of the
-  robot's own name, changes nothing.
+  Hears a heartbeat, directly or (`direct?` false) by way of another robot; an old one, or one
+  with the robot's own name, changes nothing.
   """
   @spec hear(t(), atom(), Heartbeat.t(), integer(), direct? :: boolean()) :: t()
   def hear(peers, from, beat, now_ms, direct? \\ true)
@@ -54,7 +58,7 @@ defmodule Swarm.Membership.Peers do
         changes = peers.changes + change(old, beat, now_ms)
         %{peers | rows: Map.put(peers.rows, from, row), changes: changes}
 
-      # The same by the straight way, which was overtaken.
+      # The same heartbeat by the direct way, which was overtaken.
       direct? and same?(old.beat, beat) and old.direct_ms != old.at_ms ->
         %{peers | rows: Map.put(peers.rows, from, %{old | direct_ms: old.at_ms})}
 
@@ -63,7 +67,7 @@ defmodule Swarm.Membership.Peers do
     end
   end
 
-  # Who comes counts one; who was away, one for its going and one for its return.
+  # A robot that comes counts one; one that was away counts one for leaving and one for returning.
   defp change(nil, _beat, _now_ms), do: 1
   defp change(%{at_ms: at_ms}, _beat, now_ms) when now_ms - at_ms >= @gone_ms, do: 2
   defp change(%{beat: %{boot: boot}}, %{boot: boot}, _now_ms), do: 0
@@ -74,7 +78,7 @@ defmodule Swarm.Membership.Peers do
 
   defp news?(nil, _beat, _now_ms), do: true
 
-  # So that a number that was wrong does no lasting harm.
+  # So that a wrong number does no lasting harm.
   defp news?(%{at_ms: at_ms}, _beat, now_ms) when now_ms - at_ms >= @gone_ms, do: true
 
   defp news?(%{beat: %{boot: boot, sequence: sequence}}, %{boot: boot} = beat, _now_ms),
@@ -82,7 +86,7 @@ defmodule Swarm.Membership.Peers do
 
   defp news?(%{beat: %{boot: boot}}, beat, _now_ms), do: beat.boot > boot
 
-  @doc "How a robot is, judged by its silence; an unknown one is gone."
+  @doc "The state of a robot, judged by its silence; an unknown one is gone."
   @spec status(t(), atom(), integer()) :: status()
   def status(%{me: me}, me, _now_ms), do: :alive
 
@@ -94,7 +98,7 @@ defmodule Swarm.Membership.Peers do
     end
   end
 
-  @doc "The names of all that are not gone, this robot too, sorted."
+  @doc "The names of all robots that are not gone, including this one, sorted."
   @spec view(t(), integer()) :: [atom()]
   def view(peers, now_ms) do
     others = for {id, %{at_ms: at_ms}} <- peers.rows, now_ms - at_ms < @gone_ms, do: id
@@ -102,14 +106,14 @@ defmodule Swarm.Membership.Peers do
     Enum.sort([peers.me | others])
   end
 
-  @doc "The names of those that are gone."
+  @doc "The names of the robots that are gone."
   @spec gone(t(), integer()) :: [atom()]
   def gone(peers, now_ms),
     do: for({id, %{at_ms: at_ms}} <- peers.rows, now_ms - at_ms >= @gone_ms, do: id)
 
   @doc """
-  The names of those heard within the last second, not by way of another, sorted; this is what a
-  heartbeat lists as heard.
+  The names of the robots heard directly within the last second, sorted; a heartbeat lists these
+  as heard.
   """
   @spec heard(t(), integer()) :: [atom()]
   def heard(peers, now_ms) do
@@ -121,8 +125,8 @@ defmodule Swarm.Membership.Peers do
   end
 
   @doc """
-  All other robots that are not gone, each with the number of its life, sorted, and the number of this
-  view: it grows with every robot that comes, goes, or comes back as another life.
+  All other robots that are not gone, each with the number of its life, sorted, and the number of
+  this view: it grows with every robot that comes, goes, or comes back in another life.
 
       iex> beat = %Swarm.Membership.Heartbeat{boot: 7, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
       iex> peers = Swarm.Membership.Peers.hear(Swarm.Membership.Peers.new(:mag1), :mag2, beat, 0)
@@ -156,7 +160,7 @@ defmodule Swarm.Membership.Peers do
   def percepts(peers, now_ms),
     do: Map.new(peers.rows, fn {id, row} -> {id, percept(row, now_ms)} end)
 
-  @doc "One of them; of a robot that was heard once."
+  @doc "One of these peers; the robot must have been heard before."
   @spec percept(t(), atom(), integer()) :: Robot.Percept.peer()
   def percept(peers, id, now_ms), do: percept(Map.fetch!(peers.rows, id), now_ms)
 

@@ -1,7 +1,7 @@
 defmodule Swarm.Message.Receiver do
   @moduledoc """
-  What a robot makes of the messages that it receives, as a function: who is there, and what was dropped. Pure;
-  `Swarm.Comms` uses it live and `Swarm.Member` in lockstep.
+  Handles the messages that a robot receives, as a function: tracks which robots are present, and
+  counts what was dropped. Pure; `Swarm.Comms` uses it live and `Swarm.Member` in lockstep.
   """
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message
@@ -17,13 +17,14 @@ defmodule Swarm.Message.Receiver do
         }
 
   @typedoc """
-    * `{:heartbeat, id, beat}` - of a peer, which is noted; what it says of the emergency stop is for the caller
+    * `{:heartbeat, id, beat}` - of a peer, which is noted; the caller handles what it says about
+      the emergency stop
     * `{:message, message}` - for the mission
     * `:nothing` - dropped
   """
   @type heard :: {:heartbeat, atom(), Heartbeat.t()} | {:message, Message.t()} | :nothing
 
-  @doc "Nothing heard yet."
+  @doc "The state before anything is heard."
   @spec new(atom()) :: t()
   def new(me), do: %__MODULE__{me: me, peers: Peers.new(me)}
 
@@ -40,7 +41,7 @@ defmodule Swarm.Message.Receiver do
 
   defp take(%{me: me} = receiver, checked, now_ms) do
     case checked do
-      # From another robot of this name: which of the two gives way is settled elsewhere.
+      # From another robot of this name: another module decides which of the two gives way.
       {:ok, %Message{from: ^me}} ->
         {:nothing, receiver}
 
@@ -59,12 +60,12 @@ defmodule Swarm.Message.Receiver do
     end
   end
 
-  @doc "Counts what was dropped, and why; several of a kind at once."
+  @doc "Counts what was dropped, and why; possibly several of a kind at once."
   @spec reject(t(), atom(), pos_integer()) :: t()
   def reject(receiver, reason, number \\ 1),
     do: %{receiver | rejected: Map.update(receiver.rejected, reason, number, &(&1 + number))}
 
-  @doc "Whom each robot that is not gone follows, or says that it leads it."
+  @doc "The leader that each robot that is not gone follows or names."
   @spec leaders(t(), integer()) :: %{atom() => atom() | nil}
   def leaders(receiver, now_ms) do
     for {id, beat} <- Peers.beats(receiver.peers, now_ms), into: %{} do

@@ -4,14 +4,15 @@ defmodule Swarm.Message.WireTypes do
   """
   alias Mesh.Protocol.WireTerm
 
-  # Of everything more than a thousand kilometres, or than a thousand robots, is nonsense.
+  # More than a thousand kilometres, or a thousand robots, is nonsense.
   @far 1_000_000_000
   @count 500_000_000
   @day_ms 86_400_000
   @latest 0xFFFFFFFFFFFFFFFF
 
   @doc """
-  Whether a struct has all the fields of its kind and no others: over the wire anything can come.
+  Whether a struct has all fields of its kind and no others, because anything can arrive from the
+  network.
 
       iex> Swarm.Message.WireTypes.whole?(Hal.Pose.new(1, 2), Hal.Pose)
       true
@@ -25,7 +26,7 @@ defmodule Swarm.Message.WireTypes do
   def whole?(_other, _module), do: false
 
   @doc """
-  Whether it can be a robot's name.
+  Whether a term can be a robot's name.
 
       iex> for term <- [:mag1, nil, true, "mag1"], do: Swarm.Message.WireTypes.name?(term)
       [true, false, false, false]
@@ -34,7 +35,7 @@ defmodule Swarm.Message.WireTypes do
   defdelegate name?(term), to: WireTerm
 
   @doc """
-  Whether it is a list of names, no more than the largest fleet has.
+  Whether a term is a list of names, no longer than the largest fleet.
 
       iex> for term <- [[:mag1], [:mag1 | :mag2], [1]], do: Swarm.Message.WireTypes.names?(term)
       [true, false, false]
@@ -43,7 +44,7 @@ defmodule Swarm.Message.WireTypes do
   defdelegate names?(term), to: WireTerm
 
   @doc """
-  Whether nothing is twice in a list.
+  Whether the elements of a list are all different.
 
       iex> for list <- [[:mag1, :mag2], [:mag1, :mag1]], do: Swarm.Message.WireTypes.distinct?(list)
       [true, false]
@@ -52,7 +53,7 @@ defmodule Swarm.Message.WireTypes do
   def distinct?(list), do: Enum.uniq(list) == list
 
   @doc """
-  Whether it is a list of such terms, no longer than the largest fleet is.
+  Whether a term is a list of such terms, no longer than the largest fleet.
 
       iex> for term <- [[1, 2], [1, :a], [1 | 2], 1], do: Swarm.Message.WireTypes.list?(term, &is_integer/1)
       [true, false, false, false]
@@ -61,7 +62,7 @@ defmodule Swarm.Message.WireTypes do
   defdelegate list?(term, check), to: WireTerm
 
   @doc """
-  Whether it is a whole number that a length in mm, an angle in mrad or a number of anything can be.
+  Whether a term is a whole number in the range of lengths in mm, angles in mrad and counts.
 
       iex> for term <- [-5, 1.0, 1_000_000_000], do: Swarm.Message.WireTypes.number?(term)
       [true, false, false]
@@ -70,8 +71,9 @@ defmodule Swarm.Message.WireTypes do
   def number?(term), do: is_integer(term) and abs(term) < @far
 
   @doc """
-  Whether it is a number that counts up: of a leadership, a round, an anchor, a stop. What comes from
-  outside stays far below where a robot that counts on would itself be refused by the others.
+  Whether a term is a number that counts up: of a leadership, a round, an anchor, a stop. Numbers
+  from outside must stay far below the limit at which the others would refuse a robot that counts
+  on.
 
       iex> for term <- [0, 7, -1, 900_000_000], do: Swarm.Message.WireTypes.count?(term)
       [true, true, false, false]
@@ -80,7 +82,7 @@ defmodule Swarm.Message.WireTypes do
   def count?(term), do: is_integer(term) and term in 0..@count
 
   @doc """
-  Whether it is the number of a robot's life: the time of day at which it began, in ms.
+  Whether a term is the number of a robot's life: the time of day at which it began, in ms.
 
       iex> for term <- [1, 1_700_000_000_000, -1, 1.0e12], do: Swarm.Message.WireTypes.boot?(term)
       [true, true, false, false]
@@ -89,7 +91,7 @@ defmodule Swarm.Message.WireTypes do
   def boot?(term), do: is_integer(term) and term in 0..@latest
 
   @doc """
-  Whether it is a time in ms that somebody may wait: up to a day.
+  Whether a term is a waiting time in ms: up to a day.
 
       iex> for term <- [0, 500, -1, 1.5, :infinity], do: Swarm.Message.WireTypes.ms?(term)
       [true, true, false, false, false]
@@ -98,7 +100,7 @@ defmodule Swarm.Message.WireTypes do
   def ms?(term), do: is_integer(term) and term in 0..@day_ms
 
   @doc """
-  Whether it is a pose as robots tell it, `{x_mm, y_mm, mrad}`.
+  Whether a term is a pose as robots report it, `{x_mm, y_mm, mrad}`.
 
       iex> for term <- [{1, 2, 3}, {1.0, 2, 3}, {1, 2}], do: Swarm.Message.WireTypes.pose?(term)
       [true, false, false]

@@ -1,13 +1,13 @@
 defmodule Swarm.Status.Report do
   @moduledoc false
-  # How robots are (`Swarm.status`): what they answer, else what their rows say.
+  # The status of robots (`Swarm.status`): from their answers, else from their rows.
   alias Swarm.{Blackboard, Commands, Status}
   alias Swarm.Comms.Transport
 
-  # Heard of by way of others, and as lately as one that is not gone.
+  # Robots known by way of others, heard of as recently as one that is not gone.
   @there_ms 2_000
 
-  @doc "All robots: those of the directory, and those whose rows come by way of others."
+  @doc "All robots: those in the directory, and those whose rows arrive by way of others."
   @spec all() :: [Status.t()]
   def all do
     robots = Transport.robots()
@@ -35,7 +35,7 @@ defmodule Swarm.Status.Report do
     end
   end
 
-  # One that is gone, but not forgotten.
+  # A robot that is gone, but not forgotten.
   defp known(robot) do
     with id when id != nil <- Enum.find(Blackboard.robots(), &(&1 == robot or "#{&1}" == robot)),
          {:ok, status} <- row(id) do

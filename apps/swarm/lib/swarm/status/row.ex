@@ -1,6 +1,6 @@
 defmodule Swarm.Status.Row do
   @moduledoc """
-  A robot's status as a row of the blackboard, for nodes that it cannot answer: small, in whole
+  A robot's status as a row of the blackboard, for nodes that cannot reach it: small, in whole
   numbers (mm, mrad, mm/s) and text. Pure. It omits the normal case: wheels that may turn, devices
   that are present, parts that do not hang. `uncertainty` is that of the pose in mm, if known.
   """
@@ -9,12 +9,12 @@ defmodule Swarm.Status.Row do
   alias Swarm.Message.WireTypes
   alias Swarm.Blackboard
 
-  # Longer than any name; what comes from outside is not printed at any length.
+  # Longer than any name: text from outside is not printed at any length.
   @words 80
-  # In mm: whoever is less sure than 100 km tells that.
+  # In mm: a robot that is less certain than 100 km reports this.
   @unsure_mm 100_000_000
 
-  @doc "A status as it travels."
+  @doc "A status as it is sent."
   @spec encode(Status.t()) :: map()
   def encode(%Status{} = status) do
     {number, members} = status.view || {0, []}
@@ -31,7 +31,7 @@ defmodule Swarm.Status.Row do
       power: status.power,
       offline: texts(for {device, {:offline, _reason}} <- status.health, do: device),
       view: {number, texts(members)},
-      # Nearly always nobody, while whom it hears may be many.
+      # Nearly always nobody, while it may hear many.
       deaf_to: texts(members -- [status.robot | status.hears]),
       rejected: status.rejected |> Map.values() |> Enum.sum(),
       age_ms: status.age_ms
@@ -81,7 +81,7 @@ defmodule Swarm.Status.Row do
   defp mm(number), do: round(number * 1000)
   defp texts(names), do: Enum.map(names, &Atom.to_string/1)
 
-  @doc "The status in a row that is so old; `:error` for anything else."
+  @doc "The status in a row of this age; `:error` for anything else."
   @spec decode(atom(), term(), age_ms :: non_neg_integer()) :: {:ok, Status.t()} | :error
   def decode(robot, row, age_ms) do
     with %{state: state, by: by, pose: pose, speed: speed, limits: limits, estop: estop} <- row,

@@ -2,21 +2,21 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
   @moduledoc """
   Keeps one part of a node running, for ever: it restarts the part at once when it crashes, and
   with back-off when it crashes repeatedly. So a message that crashes a part each time costs the
-  node that part for a while, but not its robots, which do without it.
+  node that part for a while, but not its robots, which can do without it.
 
-  Each fall is an event, `[:swarm, :part, :fell]`, with the part's `id` and the `reason`. A part that
-  cannot be started with the node is the node's failure, as under any supervisor.
+  Each crash is an event, `[:swarm, :part, :fell]`, with the part's `id` and the `reason`. If a
+  part cannot be started with the node, the start of the node fails, as under any supervisor.
   """
   use GenServer
   alias Hal.Event
   alias Mesh.Backoff
 
-  # So many falls within that time are not the rule yet.
+  # Up to this many crashes within this time, restarts are immediate.
   @falls 5
   @within_ms 5_000
   @patience_ms 5_000
 
-  @doc "A part's child spec, in the care of such a process."
+  @doc "The child spec of a part under such a process."
   @spec child_spec(Supervisor.child_spec() | {module(), term()} | module()) ::
           Supervisor.child_spec()
   def child_spec(part) do
@@ -24,7 +24,7 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
     %{id: id, start: {__MODULE__, :start_link, [spec]}, shutdown: 2 * @patience_ms}
   end
 
-  @doc "Starts the part, and keeps it."
+  @doc "Starts the part, and keeps it running."
   @spec start_link(Supervisor.child_spec()) :: GenServer.on_start()
   def start_link(spec), do: GenServer.start_link(__MODULE__, spec)
 
@@ -75,7 +75,7 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
     end
   end
 
-  # A part of a former life of this process may be about to end with that.
+  # A part that a previous instance of this process started may be about to end with it.
   defp begin({m, f, a} = start) do
     case apply(m, f, a) do
       {:error, {:already_started, former}} ->

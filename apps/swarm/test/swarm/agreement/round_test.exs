@@ -5,9 +5,9 @@ defmodule Swarm.Agreement.RoundTest do
   @tick 50
   @length 3_000
 
-  # A round among `robots` over a radio that loses, doubles and reorders, all from `:rand` (seeded
-  # by ExUnit). Robots in `crashes` (`{id, at_ms}`) stop for ever; the others notice 2 s later and
-  # open anew, as the mission does.
+  # A round among `robots` over a radio that loses, duplicates and reorders, all from `:rand`
+  # (seeded by ExUnit). Robots in `crashes` (`{id, at_ms}`) stop for ever; the others notice 2 s
+  # later and open a new round, as the mission does.
   defp run(robots, options) do
     members = Map.new(robots, &{&1, Round.new(&1)})
     first = hd(robots)
@@ -127,7 +127,7 @@ defmodule Swarm.Agreement.RoundTest do
     assert_agreed(run([:mag1], []), [:mag1])
   end
 
-  test "a slow scan is waited for, up to the deadline" do
+  test "the round waits for a slow scan, up to the deadline" do
     state = run(@robots, report_at: %{min2: 2_000})
     assert_agreed(state, @robots)
     assert Enum.all?(state.commits, fn {_who, record} -> record.reports.min2 != nil end)
@@ -137,7 +137,7 @@ defmodule Swarm.Agreement.RoundTest do
     assert Enum.all?(state.commits, fn {_who, record} -> record.reports.min2 == nil end)
   end
 
-  test "under loss, doubles and disorder all commit one digest" do
+  test "under loss, duplicates and disorder all commit one digest" do
     for _ <- 1..60 do
       state = run(@robots, loss: :rand.uniform() * 0.3, doubled: 0.2)
       assert_agreed(state, @robots)
@@ -174,7 +174,7 @@ defmodule Swarm.Agreement.RoundTest do
     assert other.id == round.id
   end
 
-  test "what follows a round whose digest was out is a new epoch" do
+  test "a round after one whose digest was out has a new epoch" do
     round = Round.open(Round.new(:mag1), 1, [:mag1, :mag2], :search, 10, 0)
     round = Enum.reduce(0..1000//50, round, fn now, round -> elem(Round.tick(round, now), 0) end)
     assert round.phase == :digest

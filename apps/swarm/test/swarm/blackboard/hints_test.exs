@@ -3,7 +3,7 @@ defmodule Swarm.Blackboard.HintsTest do
   alias Swarm.{Blackboard, Ether}
   alias Swarm.Blackboard.{AntiEntropy, Codec, Hints, Rows, State}
 
-  # As another node tells it.
+  # As another node sends it.
   defp entry(id, count, writer, payload, age_ms \\ 0),
     do: {Rows.bucket(id), id, Rows.hint_stamp(count, writer, payload), age_ms, payload}
 
@@ -18,7 +18,7 @@ defmodule Swarm.Blackboard.HintsTest do
     end
   end
 
-  # By way of datagrams.
+  # Encoded in datagrams.
   defp merge(state, entries, now_ms \\ 0) do
     Enum.reduce(Codec.tell(entries), state, fn term, state ->
       {{:rows, rows}, _dropped} = Codec.read(term)
@@ -41,7 +41,7 @@ defmodule Swarm.Blackboard.HintsTest do
     end
   end
 
-  test "in any order, doubled and in halves: all come to the same map, full ones too" do
+  test "in any order, with duplicates and in halves, all get the same map, even full ones" do
     for n <- 1..300 do
       new = State.new(hints: if(rem(n, 2) == 0, do: 256, else: 5))
       entries = entries(40, 12)
@@ -55,7 +55,7 @@ defmodule Swarm.Blackboard.HintsTest do
     end
   end
 
-  test "after three messages two have the same" do
+  test "after three messages two nodes have the same hints" do
     for _ <- 1..100 do
       [a, b] = for _ <- 1..2, do: merge(State.new(), entries(30, 40))
       [digest] = Codec.digest(AntiEntropy.digest(a))
@@ -70,7 +70,7 @@ defmodule Swarm.Blackboard.HintsTest do
     end
   end
 
-  test "who writes later wins, by what it has seen; a deleted hint does not come back" do
+  test "a later writer wins, by what it has seen; a deleted hint does not come back" do
     a = State.new() |> put("mag1", 1, "first")
     b = State.new() |> merge(all(a)) |> put("mag0", 1, "second")
     assert {:ok, "second", "mag0"} = a |> merge(all(b)) |> get(1)
@@ -81,19 +81,19 @@ defmodule Swarm.Blackboard.HintsTest do
     assert none == %{}
   end
 
-  test "of two that could not know of each other the higher name wins, on both nodes" do
+  test "of two concurrent writers the higher name wins, on both nodes" do
     [a, b] = for writer <- ["mag2", "mag1"], do: put(State.new(), writer, 1, "by " <> writer)
     assert {:ok, "by mag2", "mag2"} = a |> merge(all(b)) |> get(1)
     assert {:ok, "by mag2", "mag2"} = b |> merge(all(a)) |> get(1)
   end
 
-  test "hints have no end, but what deleted one has: also where nodes hand it round" do
+  test "hints never expire, but deletions do, even if nodes pass them round" do
     month = 30 * 24 * 3_600_000
     state = State.new() |> put("mag1", 1, "kept")
     assert {^state, []} = State.forget(state, month)
     assert {:ok, "kept", "mag1"} = State.new() |> merge(all(state, month), month) |> get(1)
 
-    # Each forgets, and hears the other before that one forgets too.
+    # Each forgets, and hears the other before the other forgets, too.
     gone = State.new() |> put("mag1", 1, "")
 
     {a, b} =
@@ -107,7 +107,7 @@ defmodule Swarm.Blackboard.HintsTest do
     assert a.hints == %{} and b.hints == %{}
   end
 
-  test "no count that somebody invents keeps others from writing" do
+  test "no invented count keeps others from writing" do
     powers = for n <- [20, 31, 32, 41, 53, 62, 63, 64, 40_000], do: Bitwise.bsl(1, n)
 
     for n <- [500_000_000 | powers], d <- [-1, 0, 1], id <- [1, 2] do
@@ -139,7 +139,7 @@ defmodule Swarm.Blackboard.HintsTest do
     {names, air}
   end
 
-  test "hints are everywhere at once, and after losses, by way of others" do
+  test "hints are everywhere at once, or, after losses, by way of others" do
     {[a, b, c], air} = boards(3)
     assert Hints.put(a, :mag1, :door, {:open, 1.5}) == :ok
     eventually(fn -> Hints.get(c, :door) == {:ok, {:open, 1.5}, :mag1} end)
@@ -157,7 +157,7 @@ defmodule Swarm.Blackboard.HintsTest do
     assert Ether.get(air).largest <= 1_200
   end
 
-  test "hints and rows do not get in each other's way" do
+  test "hints and rows do not displace each other" do
     {[a, b], _air} = boards(2)
     :ok = Blackboard.enter(a, a, 1)
     for n <- 1..32, do: :ok = Blackboard.put(a, a, {:k, n}, n)
@@ -169,14 +169,14 @@ defmodule Swarm.Blackboard.HintsTest do
     assert %{robots: 1, rows: 32, hints: 40} = Blackboard.info(b)
   end
 
-  test "whatever arrives or is written: nothing falls, nothing grows" do
+  test "whatever arrives or is written, nothing crashes, nothing grows" do
     {[a], _air} = boards(1)
     {bucket, id, {n, {writer, check}}, age_ms, payload} = entry(1, 1, "mag1", "x")
     good = {<<bucket>>, id, n, {writer, check}, age_ms, payload}
     big = :binary.copy("x", 1_001)
     {_, _, {_, check_of_big}, _, _} = entry(1, 1, "mag1", big)
 
-    # Each is one thing of no sense.
+    # Each entry is a single piece of nonsense.
     wrong = [
       {0, <<2>>},
       {0, <<16>>},

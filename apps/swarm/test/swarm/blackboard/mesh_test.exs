@@ -19,7 +19,7 @@ defmodule Swarm.Blackboard.MeshTest do
     end)
   end
 
-  test "rows and hints cross, robots are found by what they are, and the matrix is full" do
+  test "rows and hints cross nodes, robots are found by their properties, and the matrix is full" do
     nodes = [one, two, three] = Cluster.start(3, robots: true)
     names = Enum.sort(Enum.map(nodes, & &1.name))
     assert eventually(fn -> Cluster.call(one, Swarm, :find, [[service: :drive]]) == names end)
@@ -44,7 +44,7 @@ defmodule Swarm.Blackboard.MeshTest do
              Cluster.call(three, Hints, :get, [{:searched, 7}]) == {:ok, 1.5, two.name}
            end)
 
-    # One that comes later has all of it.
+    # A node that comes later gets all of it.
     late =
       Cluster.join(
         nodes,
@@ -69,14 +69,14 @@ defmodule Swarm.Blackboard.MeshTest do
     assert number >= 2 and members == names
   end
 
-  test "a robot that nothing connects is shown as its row says" do
+  test "a robot without a connection is shown from its row" do
     [one, two] = Cluster.start(2, robots: true)
 
     assert eventually(fn ->
              match?(%Status{from: :robot}, Cluster.call(one, Swarm, :status, [two.name]))
            end)
 
-    # A cookie that only this one has for the other: neither can connect again.
+    # A cookie that only this node has for the other, so that neither can connect again.
     Cluster.call(one, :erlang, :set_cookie, [two.node, :wrong])
     true = Cluster.call(one, Node, :disconnect, [two.node])
 
@@ -96,7 +96,7 @@ defmodule Swarm.Blackboard.MeshTest do
            end)
   end
 
-  test "who subscribes hears of a join, of a kill at once, and of a robot that froze" do
+  test "subscribers are notified of a join, of a kill at once, and of a robot that froze" do
     nodes = [one, two, three] = Cluster.start(3, robots: true)
     :ok = Cluster.call(one, Listener, :start, [])
     # Both planes know of both before anything happens.
@@ -111,7 +111,7 @@ defmodule Swarm.Blackboard.MeshTest do
     end
 
     Cluster.signal(two, "KILL")
-    # By its connection, that is, and not only by its silence.
+    # From its connection, not only from its silence.
     assert {:leave, _, :nodedown} = eventually(fn -> news(one, :leave, two.name) end)
     Cluster.signal(three, "STOP")
     assert {:leave, _, :silent} = eventually(fn -> news(one, :leave, three.name) end)

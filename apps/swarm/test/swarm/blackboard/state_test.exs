@@ -36,14 +36,14 @@ defmodule Swarm.Blackboard.StateTest do
          do: {:ok, value, now_ms - at_ms}
   end
 
-  # Rows as writers made them, each with the age it had when it was sent.
+  # Rows as their writers made them, each with its age when it was sent.
   defp history do
     for n <- 1..40, robot = Enum.random(@robots), uniq: true do
       {robot, Enum.random([:a, :b, :c]), {Enum.random(1..3), n}, Enum.random(0..50), n}
     end
   end
 
-  test "whatever is lost once, doubled and shuffled, all come to the same rows" do
+  test "whatever is lost once, duplicated and shuffled, all get the same rows" do
     for _ <- 1..300 do
       history = history()
       once = merge(Blackboard.State.new(), history, 1_000)
@@ -57,7 +57,7 @@ defmodule Swarm.Blackboard.StateTest do
 
       assert twice == once
 
-      # Halves that met others first.
+      # Halves that met other halves first.
       {left, right} = Enum.split(Enum.shuffle(history), 20)
       a = merge(Blackboard.State.new(), left, 1_000)
       b = merge(Blackboard.State.new(), right, 1_000)
@@ -68,7 +68,7 @@ defmodule Swarm.Blackboard.StateTest do
     end
   end
 
-  # What a board takes of rows that another sends it.
+  # What a board accepts of the rows that another sends it.
   defp heard(rows, sent, now_ms) do
     Enum.reduce(Blackboard.Codec.tell(sent), rows, fn term, rows ->
       {{:rows, incoming}, _dropped} = Blackboard.Codec.read(term)
@@ -76,7 +76,7 @@ defmodule Swarm.Blackboard.StateTest do
     end)
   end
 
-  test "no number that somebody invents keeps a robot from being read for longer than some seconds" do
+  test "no invented number keeps a robot from being read for longer than some seconds" do
     numbers =
       for n <- [10, 31, 32, 41, 52, 53, 61, 62, 63, 64, 40_000],
           d <- [-1, 0, 1],
@@ -86,7 +86,7 @@ defmodule Swarm.Blackboard.StateTest do
       absurd = [{:mag1, 7, {incarnation, sequence}, 0, "absurd"}]
       owner = [:mag1] |> entered() |> put!(:mag1, 7, "mine", 0)
       other = Blackboard.State.new() |> heard(all(owner, 0), 0) |> heard(absurd, 0)
-      # It comes back to its robot by the other, which repairs once a second.
+      # Its robot gets it back through the other board, which repairs once a second.
       {owner, other} =
         Enum.reduce(1..8, {owner, other}, fn second, {owner, other} ->
           now_ms = 1_000 * second
@@ -100,7 +100,7 @@ defmodule Swarm.Blackboard.StateTest do
 
       assert {:ok, "later", _} = other |> heard(all(owner, 9_000), 9_000) |> get(:mag1, 7, 9_000)
 
-      # So it does to one that comes later.
+      # So does a board that comes later.
       assert {:ok, "later", _} =
                Blackboard.State.new()
                |> heard(all(owner, 9_000), 9_000)
@@ -117,13 +117,14 @@ defmodule Swarm.Blackboard.StateTest do
     end
   end
 
-  test "the age is what it had, and how long each held it" do
+  test "the age of a row is its age at sending plus the time that each board held it" do
     a = entered([:mag1]) |> put!(:mag1, :x, 1, 100)
     b = merge(Blackboard.State.new(), all(a, 150), 5_000)
     c = merge(Blackboard.State.new(), all(b, 5_030), 90)
     assert get(c, :mag1, :x, 100) == {:ok, 1, 50 + 30 + 10}
 
-    # The same row comes by a way on which it was held for longer: that age is nearer to the truth.
+    # The same row arrives by a way on which it was held for longer: that age is nearer to the
+    # truth.
     assert {:ok, 1, 200} =
              c
              |> merge([{:mag1, :x, {1, 1}, 200, 1}], 100)
@@ -143,7 +144,7 @@ defmodule Swarm.Blackboard.StateTest do
     end
   end
 
-  test "a store of several, over a network that loses, doubles and is cut: all come to the same" do
+  test "several boards over a network that loses, duplicates and is cut all get the same rows" do
     for _ <- 1..20 do
       stores = for robot <- [:r1, :r2, :r3, :r4, :r5], into: %{}, do: {robot, entered([robot])}
       # r1 and r5 never hear each other: r3 is between them.
@@ -199,7 +200,7 @@ defmodule Swarm.Blackboard.StateTest do
     end
   end
 
-  test "a digest of thirty robots fits a datagram; that of a hundred goes in parts that leave nobody out" do
+  test "a digest of thirty robots fits a datagram; that of a hundred is split into parts that omit nobody" do
     rows = fn count ->
       merge(Blackboard.State.new(), for(n <- 1..count, do: {:"mag#{n}", :a, {1, n}, 0, n}), 0)
     end
@@ -219,14 +220,14 @@ defmodule Swarm.Blackboard.StateTest do
 
     assert differing.(rows.(100)) == []
     assert Enum.sort(differing.(Blackboard.State.new())) == Enum.sort(Map.keys(rows.(100).robots))
-    # What only the other has is found out too, wherever in the alphabet.
+    # Rows that only the other has are found, too, wherever in the alphabet.
     more =
       merge(rows.(100), for(robot <- [:aaa1, :mag1x, :zzz1], do: {robot, :a, {1, 1}, 0, 1}), 0)
 
     assert Enum.sort(differing.(more)) == [:aaa1, :mag1x, :zzz1]
   end
 
-  test "what is over a limit is refused, and said so" do
+  test "rows over a limit are refused, and an event says so" do
     rows = entered([:mag1], 1, robots: 2, keys: 2, bytes: 100)
     assert {:error, :bytes} = Blackboard.State.put(rows, :mag1, :a, :binary.copy("x", 101), 0)
     rows = rows |> put!(:mag1, :a, 1, 0) |> put!(:mag1, :b, 1, 0) |> put!(:mag1, :a, 2, 0)
@@ -246,7 +247,7 @@ defmodule Swarm.Blackboard.StateTest do
     assert Map.keys(rows.robots.mag1) == [:c, :d]
   end
 
-  test "a rival is told of and not believed; a former life with a higher number is outbid" do
+  test "a rival is reported and not accepted; a former life with a higher number is outbid" do
     rows = entered([:mag1], 5) |> put!(:mag1, :a, :mine, 0)
 
     assert {^rows, [{:rival, :mag1, 9}]} =
@@ -281,7 +282,7 @@ defmodule Swarm.Blackboard.StateTest do
     assert AntiEntropy.digest(other) == AntiEntropy.digest(rows)
   end
 
-  test "robots long gone are forgotten, and old words of a former life" do
+  test "robots long gone are forgotten, and so are old rows of a former life" do
     ten = 600_000
 
     rows =
@@ -296,14 +297,14 @@ defmodule Swarm.Blackboard.StateTest do
     assert Enum.sort(Map.keys(rows.robots)) == [:mag1, :mag3]
     {rows, _} = Blackboard.State.forget(rows, ten + 5)
     assert Enum.sort(Map.keys(rows.robots)) == [:mag1]
-    # Of one that lives, an old row stays.
+    # An old row of a living robot stays.
     fresh =
       merge(Blackboard.State.new(), [{:mag2, :a, {1, 1}, ten, 1}, {:mag2, :b, {1, 2}, 0, 1}], 0)
 
     assert {^fresh, []} = Blackboard.State.forget(fresh, 0)
   end
 
-  test "two that forget in turn do not hand each other the rows of one long gone for ever" do
+  test "two boards that forget in turn do not pass each other old rows for ever" do
     gone =
       merge(Blackboard.State.new(), [{:mag1, :a, {1, 1}, 0, 1}, {:mag1, :b, {1, 2}, 0, 1}], 0)
 
@@ -318,7 +319,7 @@ defmodule Swarm.Blackboard.StateTest do
     assert a.robots == %{} and b.robots == %{}
   end
 
-  test "nothing that arrives makes an atom or falls" do
+  test "nothing that arrives creates an atom or crashes" do
     junk = [
       nil,
       :x,

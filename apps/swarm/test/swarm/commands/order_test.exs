@@ -3,7 +3,7 @@ defmodule Swarm.Commands.OrderTest do
   alias Robot.Command
   alias Swarm.Commands.Order
 
-  test "what a person may say passes as it is" do
+  test "valid commands of people pass unchanged" do
     for text <- ~w(goto:1:2 goto:1:2:3 move:0.1:0 findblob findblob:Red lead follow:1:2:0
                    followtheleader:mag2 start ping) do
       {:ok, command} = Command.parse(text, [:mag2])
@@ -11,7 +11,7 @@ defmodule Swarm.Commands.OrderTest do
     end
   end
 
-  test "what only robots tell each other is refused by its name" do
+  test "commands that are only between robots are refused by name" do
     for text <- ~w(subscribe:mag2 unsubscribe:mag2 position:1:2:3 blob:1:2:3:0.1:1) do
       {:ok, command} = Command.parse(text, [:mag2])
       assert {:error, line} = Order.check(command)

@@ -5,7 +5,7 @@ defmodule Swarm.Comms.ForwarderTest do
   alias Swarm.Comms.Forwarder
   alias Swarm.Membership.{Heartbeat, Peers}
 
-  # What mag2 hears of mag1 and mag3, who list these as heard; numbered by time.
+  # What mag2 hears from mag1 and mag3, which list these robots as heard; numbered by time.
   defp peers(heard, now_ms) do
     beats =
       for {id, list} <- heard do
@@ -25,7 +25,8 @@ defmodule Swarm.Comms.ForwarderTest do
     |> Peers.percepts(now_ms)
   end
 
-  # So many ticks of 100 ms, with new heartbeats at each; what was sent in the last one.
+  # Runs so many ticks of 100 ms, with new heartbeats at each; returns what was sent in the last
+  # one.
   defp run(heard, ticks, me \\ :mag2) do
     Enum.reduce(1..ticks, {Forwarder.new(), []}, fn n, {relay, _sent} ->
       Forwarder.beats(relay, me, peers(heard, n * 100), n * 100)
@@ -34,7 +35,7 @@ defmodule Swarm.Comms.ForwarderTest do
 
   @apart [mag1: [:mag2], mag3: [:mag2]]
 
-  test "passes on the heartbeats of two that do not hear each other, each once" do
+  test "forwards the heartbeats of two robots that do not hear each other, each once" do
     assert {_relay, []} = run(@apart, 3)
     {relay, sent} = run(@apart, 4)
     assert [{[:mag1], :mag3, 1}, {[:mag3], :mag1, 1}] = summary(sent)
@@ -50,24 +51,24 @@ defmodule Swarm.Comms.ForwarderTest do
     )
   end
 
-  test "nothing where all hear each other, nor for one that does not hear this robot" do
+  test "forwards nothing if all hear each other, nor for a robot that does not hear this one" do
     assert {%{missing: missing}, []} = run([mag1: [:mag2, :mag3], mag3: [:mag1, :mag2]], 10)
     assert missing == %{}
     assert {_relay, []} = run([mag1: [], mag3: [:mag1, :mag2]], 10)
   end
 
-  test "of several that could, the first two do" do
+  test "of several robots that could forward, the first two do" do
     all = [:aaa, :bbb, :mag1, :mag2, :mag3]
     others = [aaa: all -- [:aaa], bbb: all -- [:bbb]]
     apart = [mag1: [:aaa, :bbb, :mag2], mag3: [:aaa, :bbb, :mag2]] ++ others
     assert {_relay, []} = run(apart, 10)
     one = [mag1: [:aaa, :mag2], mag3: [:aaa, :bbb, :mag2]] ++ others
-    # Of what mag1 lacks, aaa is one way and this robot the other.
+    # For what mag1 lacks, aaa is one way and this robot the other.
     {_relay, sent} = run(one, 10)
     assert summary(sent) == [{[:mag1], :bbb, 1}, {[:mag1], :mag3, 1}]
   end
 
-  test "letters too, but the same not more often than they are repeated" do
+  test "forwards letters too, but the same one not more often than it is repeated" do
     {relay, _sent} = run(@apart, 4)
     peers = peers(@apart, 400)
     view = [:mag1, :mag2, :mag3]
@@ -84,7 +85,7 @@ defmodule Swarm.Comms.ForwarderTest do
     assert {_, []} = Forwarder.letter(relay, :mag2, peers, far, 900)
   end
 
-  test "only whole heartbeats and letters are relayed, and once wrapped" do
+  test "relays only whole heartbeats and letters, wrapped once" do
     beat = %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
     {:ok, relay} = Message.pass_on(Message.new(:mag1, :heartbeat, beat), :mag2)
     assert {:ok, ^relay} = Message.check(relay)

@@ -1,12 +1,15 @@
 defmodule Swarm.Comms.WaitingTest do
-  @moduledoc "Whoever is slow or dead, the robot's heartbeats go on, and people are told in one line."
+  @moduledoc """
+  Whichever process is slow or dead, the robot's heartbeats go on, and people get an error of one
+  line.
+  """
   use Swarm.Case, async: false
   @moduletag :capture_log
 
   @doc false
   def carry(test, from, _ids, message), do: send(test, {:carried, from, message})
 
-  # Heartbeats of a comms process that waits for somebody come later, or never.
+  # If a comms process waits for another process, its heartbeats come later, or never.
   defp beats(id, number) do
     forget(id)
 
@@ -23,7 +26,7 @@ defmodule Swarm.Comms.WaitingTest do
   end
 
   defp talking(id, options \\ []) do
-    robot(id, [link: [transport: {__MODULE__, :carry, [self()]}]] ++ options)
+    robot(id, [comms: [transport: {__MODULE__, :carry, [self()]}]] ++ options)
     standing([id])
     id
   end
@@ -33,10 +36,10 @@ defmodule Swarm.Comms.WaitingTest do
     state
   end
 
-  test "a pilot that hangs for seconds holds up no heartbeat, and orders of then move nobody" do
+  test "a pilot that hangs for seconds delays no heartbeat, and later no order from that time moves the robot" do
     id = talking(:waiting_pilot)
     pilot = Names.whereis(id, :pilot)
-    link = Names.whereis(id, :comms)
+    comms = Names.whereis(id, :comms)
     :ok = :sys.suspend(pilot)
     {:ok, many} = Task.Supervisor.start_link()
 
@@ -49,21 +52,21 @@ defmodule Swarm.Comms.WaitingTest do
     assert Swarm.goto(id, {1, 1}) == {:error, "waiting_pilot does not answer"}
     assert {:ok, line} = Swarm.tell(id, "ping")
     assert line =~ "idle"
-    assert [link, pilot] == [Names.whereis(id, :comms), Names.whereis(id, :pilot)]
+    assert [comms, pilot] == [Names.whereis(id, :comms), Names.whereis(id, :pilot)]
     :ok = :sys.resume(pilot)
     assert :sys.get_state(pilot) |> elem(0) == :idle
     assert Swarm.goto(id, {1, 1}) == :ok
     assert state(id) == {Robot.Mission.Manual, :goto}
   end
 
-  test "a drive that hangs holds up no heartbeat, and is not armed when it goes on" do
+  test "a drive that hangs delays no heartbeat, and is not armed when it goes on" do
     id = talking(:waiting_drive, arm: :manual)
     drive = Names.whereis(id, :drive)
     :ok = :sys.suspend(drive)
 
     for order <- [:arm, :acknowledge] do
       asked = Task.async(fn -> Swarm.ask(id, order) end)
-      # The drive tells nothing of the wheels either; how fresh its reports are is another matter.
+      # The drive does not report its wheels either; the age of its reports is not tested here.
       beats(id, 2)
       assert Task.await(asked) == {:error, "waiting_drive: the drive does not answer"}
     end
@@ -73,9 +76,9 @@ defmodule Swarm.Comms.WaitingTest do
     eventually(fn -> Swarm.arm(id) == :ok end)
   end
 
-  test "a pilot that is dead holds up no heartbeat" do
+  test "a dead pilot delays no heartbeat" do
     id = talking(:waiting_dead)
-    # Nobody is there to start another one.
+    # No supervisor starts another one.
     supervisor = Names.whereis(id, :robot)
     :ok = :sys.suspend(supervisor)
     kill(id, :pilot)
@@ -87,7 +90,7 @@ defmodule Swarm.Comms.WaitingTest do
     eventually(fn -> Swarm.goto(id, {1, 1}) == :ok end)
   end
 
-  test "an order that waited in front of a held-up comms process begins nothing after a stop, or once nobody waits" do
+  test "an order that waited for a delayed comms process begins nothing after a stop, or once nobody waits" do
     id = talking(:waiting_comms)
     comms = Names.whereis(id, :comms)
     :ok = :sys.suspend(comms)
@@ -96,7 +99,7 @@ defmodule Swarm.Comms.WaitingTest do
     assert Swarm.stop(id) == :ok
     :ok = :sys.resume(comms)
     assert {:error, line} = Task.await(asked)
-    assert line =~ "was stopped after this was asked"
+    assert line =~ "was stopped after this command was sent"
     assert state(id) == :idle
 
     :ok = :sys.suspend(comms)
@@ -108,7 +111,7 @@ defmodule Swarm.Comms.WaitingTest do
     assert Swarm.tell(id, "move:0.2:0") == :ok
   end
 
-  test "a held-up order to arm does not undo a disarm" do
+  test "a delayed order to arm does not undo a disarm" do
     id = talking(:waiting_arm, arm: :manual)
     comms = Names.whereis(id, :comms)
     drive = Names.whereis(id, :drive)
@@ -121,7 +124,7 @@ defmodule Swarm.Comms.WaitingTest do
     assert %{state: :disarmed} = Hal.Device.arming(drive)
   end
 
-  test "an order that comes to the pilot after an emergency stop is refused there" do
+  test "an order that arrives at the pilot after an emergency stop is refused there" do
     id = talking(:waiting_held)
     pilot = Names.whereis(id, :pilot)
     :ok = :sys.suspend(pilot)
@@ -143,10 +146,10 @@ defmodule Swarm.Comms.WaitingTest do
     assert Swarm.goto(id, {1, 1}) == :ok
   end
 
-  test "a robot that is to start a mission which is not there says so, and nothing falls" do
+  test "starting a mission that does not exist is an error, and nothing crashes" do
     id = talking(:waiting_none, mission: {No.Such.Mission, []})
-    link = Names.whereis(id, :comms)
+    comms = Names.whereis(id, :comms)
     assert Swarm.ask(id, :start) == {:error, "waiting_none has no such mission"}
-    assert Names.whereis(id, :comms) == link
+    assert Names.whereis(id, :comms) == comms
   end
 end

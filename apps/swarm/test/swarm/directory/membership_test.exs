@@ -4,7 +4,7 @@ defmodule Swarm.Directory.MembershipTest do
 
   defp group, do: {:team, :"entry_#{System.unique_integer([:positive])}"}
 
-  # As after the directory has ended: the message that it sends, and what a timer says later.
+  # As after the end of the directory: the message that it sends, and that of a timer later.
   defp down(entry), do: {:DOWN, entry.scope, :process, {Directory, node()}, :killed}
 
   test "enters, enters again when the directory has ended, and leaves for good" do
@@ -24,7 +24,7 @@ defmodule Swarm.Directory.MembershipTest do
     assert Directory.members(group) -- [self()] == []
     refute Directory.Membership.in?(left)
     assert Directory.Membership.leave(left) == left
-    # A timer that was under way brings nobody back.
+    # A timer that was under way does not enter it again.
     assert Directory.Membership.arrived(left, timer) == {:ok, left}
     refute Directory.Membership.in?(left)
   end
@@ -34,7 +34,8 @@ defmodule Swarm.Directory.MembershipTest do
     assert Directory.Membership.arrived(one, down(two)) == :other
     {:ok, out} = Directory.Membership.arrived(one, down(one))
     assert Directory.Membership.arrived(two, Directory.Membership.timer(out)) == :other
-    # Not the end of anything that is watched, though it looks so to one that watches nothing.
+    # This is not the end of anything monitored, although it looks so to an entry without a
+    # monitor.
     assert Directory.Membership.arrived(out, {:DOWN, nil, :process, self(), :killed}) == :other
     assert Directory.Membership.arrived(out, :junk) == :other
   end

@@ -33,7 +33,7 @@ defmodule Swarm.Directory.RobotInfoTest do
     Status.Row.encode(struct!(status, changes))
   end
 
-  test "a robot is found by what it is, and by what was said of it" do
+  test "a robot is found by its properties, and by those that say/2 added" do
     profile = Hal.Profile.atrv_mini()
     for {id, options} <- [ab1: [], ab2: [profile: profile]], do: robot(id, options)
     eventually(fn -> Swarm.find(robot: [:ab1, :ab2]) == [:ab1, :ab2] end)
@@ -50,7 +50,7 @@ defmodule Swarm.Directory.RobotInfoTest do
     assert RobotInfo.say(:ab1, calibrated: false) == :ok
     eventually(fn -> Swarm.find(service: :gripper, calibrated: false) == [:ab1] end)
 
-    # On change, not only once a second.
+    # It is written on each change, not only once a second.
     :ok = Swarm.start(robots: [:ab2])
     eventually(fn -> Swarm.find(robot: :ab2, mission: :stand_mission) == [:ab2] end, 500)
     send(Names.whereis(:ab1, :drive), {:readings, [{:power, 12.5}]})
@@ -64,7 +64,7 @@ defmodule Swarm.Directory.RobotInfoTest do
     assert :gripper in services and :drive in services
   end
 
-  test "bad wishes are one line that says what is allowed" do
+  test "bad options are an error of one line that says what is allowed" do
     for bad <- [
           :camera,
           [1],
@@ -88,7 +88,7 @@ defmodule Swarm.Directory.RobotInfoTest do
     assert {:error, _} = RobotInfo.say(:ab1, 5)
   end
 
-  test "who asks is told of those that join and leave, until it asks no more" do
+  test "a subscriber is notified of robots that join and leave, until it unsubscribes" do
     assert {:ok, there} = Swarm.subscribe()
     refute :ab5 in there
     robot(:ab5)
@@ -108,11 +108,11 @@ defmodule Swarm.Directory.RobotInfoTest do
     assert line =~ "process"
   end
 
-  test "a directory that starts anew makes nobody leave" do
+  test "a directory that restarts makes nobody leave" do
     robot(:ab7)
     {:ok, _} = Swarm.subscribe()
     fell(Directory, Process.whereis(Directory))
-    # Those that are back after it are not told as joined either.
+    # Those that are back after it are not reported as joined either.
     eventually(fn -> Directory.whereis(:ab7) end)
     send(Presence, :settled)
     {:ok, there} = Swarm.subscribe()
@@ -129,7 +129,7 @@ defmodule Swarm.Directory.RobotInfoTest do
     eventually(fn -> Process.whereis(name) end)
   end
 
-  test "a robot that does not answer is shown as its row says, with its age" do
+  test "a robot that does not answer is shown from its row, with its age" do
     told(:ab9, :status, status_row(:ab9, pose: Pose.new(1, 2), speed: 0.31), 1_000)
 
     assert %Status{from: :row, state: :follow, hears: [:ab2], view: {3, [:ab9, :ab2, :ab3]}} =
@@ -143,14 +143,14 @@ defmodule Swarm.Directory.RobotInfoTest do
     assert Enum.any?(Swarm.status(), &match?(%Status{robot: :ab9, from: :row}, &1))
     assert inspect(Swarm.matrix()) =~ ~r/ab9.*x.* 3: ab9 ab2 ab3, 1\d\d\d ms ago/
 
-    # One long silent is not there, but still known by name.
+    # A robot long silent is not present, but still known by name.
     told(:ab10, :status, status_row(:ab10), 60_000)
     refute Enum.any?(Swarm.status(), &(&1.robot == :ab10))
     assert %Status{from: :row} = Swarm.status("ab10")
     assert {:error, _} = Swarm.status(:ab_never)
   end
 
-  test "rows of no sense are shown to nobody, and fall nobody" do
+  test "senseless rows are not shown to anybody, and crash nobody" do
     good = status_row(:ab11)
     assert {:ok, _} = Status.Row.decode(:ab11, good, 0)
 

@@ -12,7 +12,7 @@ defmodule Swarm.EStop.DatagramsTest do
     MeshNodes.call(node, Board, :latched?, [board])
   end
 
-  test "a stop that comes by datagram alone holds the robots of all other nodes" do
+  test "a stop that arrives only by datagram holds the robots of all other nodes" do
     [base | robots] = nodes = MeshNodes.start(3, robots: true)
     others = for node <- robots, do: node.name
     hears? = fn node -> map_size(MeshNodes.call(node, Mesh, :robots, [])) == 2 end
@@ -22,7 +22,7 @@ defmodule Swarm.EStop.DatagramsTest do
     call = {:estop, {base.node, 1, 1}, 0}
     assert MeshNodes.call(base, Mesh, :broadcast, [:stop, call]) == :ok
     for node <- robots, do: eventually(fn -> latched?(node) end)
-    # Their heartbeats tell the sender's own robot, which no datagram of its own reaches.
+    # Their heartbeats inform the sender's own robot, which the sender's datagrams do not reach.
     eventually(fn -> latched?(base) end)
   end
 end

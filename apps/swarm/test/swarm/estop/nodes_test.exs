@@ -9,36 +9,36 @@ defmodule Swarm.EStop.NodesTest do
 
   defp latched?(node, id), do: match?(%{latched?: true}, entry(node, id, :estop))
 
-  test "a stop from a node without a robot reaches all, outlives its sender, and awaits the newcomer" do
+  test "a stop from a node without a robot reaches all, outlives its sender, and stops newcomers" do
     [base, one, two] = Cluster.start_nodes(3)
-    robot_on(one, :brake_n1)
-    robot_on(two, :brake_n2)
+    robot_on(one, :estop_n1)
+    robot_on(two, :estop_n2)
     eventually(fn -> length(:erpc.call(base, Directory, :members, [:estops])) == 2 end)
     # It has heard no heartbeat, so it asks how old its command may be.
-    assert :erpc.call(base, Swarm, :goto, [:brake_n1, {1, 1}]) == :ok
-    assert entry(one, :brake_n1, :mission).state == {Manual, :goto}
+    assert :erpc.call(base, Swarm, :goto, [:estop_n1, {1, 1}]) == :ok
+    assert entry(one, :estop_n1, :mission).state == {Manual, :goto}
 
     assert :erpc.call(base, Swarm, :estop, []) == :ok
-    assert latched?(one, :brake_n1) and latched?(two, :brake_n2)
-    refused = :erpc.call(base, Swarm, :goto, [:brake_n1, {1, 1}])
-    assert {:error, "brake_n1 is held by the emergency stop; reset it first"} = refused
+    assert latched?(one, :estop_n1) and latched?(two, :estop_n2)
+    refused = :erpc.call(base, Swarm, :goto, [:estop_n1, {1, 1}])
+    assert {:error, "estop_n1 is held by the emergency stop; reset it first"} = refused
 
     Cluster.kill(base)
     Cluster.kill(one)
-    # The one that is left tells the one that comes.
-    stands = spawn_link(fn -> stand_for_ever(two, :brake_n2) end)
-    here = robot(:brake_new)
+    # The remaining robot informs the one that comes.
+    stands = spawn_link(fn -> stand_for_ever(two, :estop_n2) end)
+    here = robot(:estop_new)
     eventually(fn -> Board.latched?(Board.find!(here)) end)
     assert Swarm.reset() == :ok
-    refute latched?(two, :brake_n2) or Board.latched?(Board.find!(here))
+    refute latched?(two, :estop_n2) or Board.latched?(Board.find!(here))
     Process.unlink(stands)
     Process.exit(stands, :kill)
   end
 
-  test "what was queued for a frozen robot is not obeyed when it goes on, but for the stop" do
+  test "commands that were queued for a frozen robot are not obeyed when it goes on, except the stop" do
     [far] = Cluster.start_nodes(1)
-    id = robot_on(far, :brake_frozen)
-    here = robot(:brake_awake)
+    id = robot_on(far, :estop_frozen)
+    here = robot(:estop_awake)
     stands = spawn_link(fn -> stand_for_ever(far, id) end)
     mode = fn -> Map.get(Board.peers(Board.find!(here)), id) end
     eventually(fn -> match?(%{mode: mode} when mode != :dead, mode.()) end)
@@ -47,15 +47,15 @@ defmodule Swarm.EStop.NodesTest do
     Process.unlink(stands)
     Process.exit(stands, :kill)
 
-    link = Directory.whereis(id)
-    Nonblocking.cast(link, {:stamp, ref = :erlang.alias([:reply])})
+    comms = Directory.whereis(id)
+    Nonblocking.cast(comms, {:stamp, ref = :erlang.alias([:reply])})
     assert_receive {^ref, stamp}
     Cluster.freeze(far)
-    Nonblocking.cast(link, {:command, {:goto, 5.0, 5.0, nil}, :erlang.alias([:reply]), stamp})
-    assert Swarm.goto(id, {5, 5}) == {:error, "brake_frozen does not answer"}
-    # Silent for longer than a command may be old.
+    Nonblocking.cast(comms, {:command, {:goto, 5.0, 5.0, nil}, :erlang.alias([:reply]), stamp})
+    assert Swarm.goto(id, {5, 5}) == {:error, "estop_frozen does not answer"}
+    # It is silent for longer than a command may be old.
     eventually(fn -> match?(%{mode: :dead}, mode.()) end)
-    assert Swarm.stop(id) == {:error, "brake_frozen does not answer"}
+    assert Swarm.stop(id) == {:error, "estop_frozen does not answer"}
     Cluster.thaw(far)
 
     # The stop was obeyed, and nothing else.
@@ -64,7 +64,7 @@ defmodule Swarm.EStop.NodesTest do
     assert Swarm.goto(id, {5, 5}) == :ok
   end
 
-  # A robot without odometry is silent.
+  # A robot without odometry sends no heartbeats.
   defp stand_for_ever(node, id) do
     :erpc.cast(node, Swarm.Case, :stand, [id, Pose.new(0, 0)])
 

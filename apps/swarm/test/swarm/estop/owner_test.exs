@@ -1,5 +1,7 @@
 defmodule Swarm.EStop.OwnerTest do
-  @moduledoc "One process says how the emergency stop stands: what reaches it, and who does not wait for it."
+  @moduledoc """
+  One process owns the state of the emergency stop: what reaches it, and who does not wait for it.
+  """
   use Swarm.Case, async: false
   @moduletag :capture_log
   alias Swarm.EStop
@@ -24,23 +26,23 @@ defmodule Swarm.EStop.OwnerTest do
   @doc false
   def carry(test, from, _ids, message), do: send(test, {:carried, from, message})
 
-  test "a button of the gate's own reaches it though the comms process hangs" do
+  test "a button on the gate itself reaches it even if the comms process hangs" do
     id = robot(:owner_button)
-    link = Names.whereis(id, :comms)
-    :ok = :sys.suspend(link)
+    comms = Names.whereis(id, :comms)
+    :ok = :sys.suspend(comms)
     :ok = Gate.estop(id)
     eventually(fn -> match?(%EStop.State{latched?: true, known: 1}, stop_of(id)) end)
     :ok = Gate.reset(id)
     eventually(fn -> match?(%EStop.State{latched?: false, cleared: 1}, stop_of(id)) end)
-    :ok = :sys.resume(link)
+    :ok = :sys.resume(comms)
   end
 
-  test "of a latch that changed often while it was held up it follows the last" do
+  test "if a latch changed often during a delay, it follows the last change" do
     id = robot(:owner_late)
-    brake = Names.whereis(id, :estop)
-    :ok = :sys.suspend(brake)
+    estop = Names.whereis(id, :estop)
+    :ok = :sys.suspend(estop)
     for press <- [:estop, :reset, :estop], do: :ok = apply(Gate, press, [id])
-    :ok = :sys.resume(brake)
+    :ok = :sys.resume(estop)
     settled(id, [:estop])
     assert %EStop.State{latched?: true, known: 1} = stop_of(id)
     assert latched?(id)
@@ -48,39 +50,39 @@ defmodule Swarm.EStop.OwnerTest do
     refute latched?(id) or stop_of(id).latched?
   end
 
-  test "what was pressed on the gate while there was none is followed by the next one" do
+  test "what was pressed on the gate while there was no e-stop process is followed by the next one" do
     id = robot(:owner_gone)
-    brake = Names.whereis(id, :estop)
-    :ok = :sys.suspend(brake)
+    estop = Names.whereis(id, :estop)
+    :ok = :sys.suspend(estop)
     :ok = Gate.estop(id)
-    ^brake = kill(id, :estop)
+    ^estop = kill(id, :estop)
     eventually(fn -> match?(%EStop.State{latched?: true, known: 1}, stop_of(id)) end)
     assert latched?(id)
   end
 
-  test "the comms process waits for none that hangs, and hands on only what is news" do
-    id = robot(:owner_hangs, link: [transport: {__MODULE__, :carry, [self()]}])
+  test "the comms process does not wait for an e-stop process that hangs, and passes on only changes" do
+    id = robot(:owner_hangs, comms: [transport: {__MODULE__, :carry, [self()]}])
     standing([id])
-    brake = Names.whereis(id, :estop)
-    # How the stop stands already is not handed on.
+    estop = Names.whereis(id, :estop)
+    # What the board already says is not passed on.
     Comms.hear(id, beat(0, false))
     settled(id, [:comms])
-    :ok = :sys.suspend(brake)
+    :ok = :sys.suspend(estop)
     Comms.hear(id, beat(0, false))
     Comms.hear(id, beat(3, true))
     for _ <- 1..8, do: assert_receive({:carried, ^id, %Message{kind: :heartbeat}}, 1_000)
     assert {:ok, _line} = Swarm.ask(id, :ping)
     refute latched?(id)
 
-    {:messages, queued} = Process.info(brake, :messages)
+    {:messages, queued} = Process.info(estop, :messages)
     beats = for {:"$gen_cast", cast} <- queued, elem(cast, 0) == :beat, do: cast
     assert beats == [{:beat, 3, true}]
 
-    :ok = :sys.resume(brake)
+    :ok = :sys.resume(estop)
     eventually(fn -> latched?(id) end)
     assert stop_of(id).known == 3
     assert_receive {:carried, ^id, %Message{body: %Heartbeat{latched: true, estop: 3}}}
-    # A neighbour that nobody has reset yet does not bring it back.
+    # A neighbour that nobody has reset yet does not set the stop again.
     assert Swarm.ask(id, :reset) == :ok
     Comms.hear(id, put_in(beat(3, true).body.sequence, 2))
     settled(id, [:comms, :estop])
@@ -104,7 +106,7 @@ defmodule Swarm.EStop.OwnerTest do
     refute latched?(id)
   end
 
-  test "a reset that was asked before the gate's button was pressed does not clear it" do
+  test "a reset from before the gate's button was pressed does not clear it" do
     id = robot(:owner_before)
     estop = Names.whereis(id, :estop)
     :ok = :sys.suspend(estop)
@@ -124,7 +126,7 @@ defmodule Swarm.EStop.OwnerTest do
     :ok = :sys.suspend(pilot)
     asked = Task.async(fn -> Swarm.ask(here, :reset) end)
     eventually(fn -> Process.info(pilot, :message_queue_len) != {:message_queue_len, 0} end)
-    # While that one waits for its pilot, somebody presses the button of the other.
+    # While the first waits for its pilot, somebody presses the button of the other.
     :ok = Gate.estop(there)
     settled(there, [:estop])
     settled(here, [:estop])
@@ -135,7 +137,7 @@ defmodule Swarm.EStop.OwnerTest do
     assert Swarm.reset() == :ok
   end
 
-  test "a call that was made after a reset was given stops the robot that carried the reset out late" do
+  test "a call from after a reset stops a robot that carries out the reset late" do
     id = robot(:owner_late_reset)
     assert Swarm.ask(id, :estop) == :ok
     pilot = Names.whereis(id, :pilot)
@@ -143,7 +145,7 @@ defmodule Swarm.EStop.OwnerTest do
     asked = Task.async(fn -> Swarm.ask(id, :reset) end)
     eventually(fn -> Process.info(pilot, :message_queue_len) != {:message_queue_len, 0} end)
     made = System.monotonic_time(:millisecond)
-    # It is on its way for as long as the pilot waits.
+    # The call is on its way for as long as the pilot waits.
     eventually(fn -> System.monotonic_time(:millisecond) - made > 20 end)
     :ok = :sys.resume(pilot)
     assert Task.await(asked) == :ok
@@ -154,11 +156,11 @@ defmodule Swarm.EStop.OwnerTest do
     assert Swarm.reset() == :ok
   end
 
-  test "it keeps up with neighbours that tell of one stop after the other, and a reset holds" do
+  test "it keeps up with neighbours that report one stop after the other, and a reset holds" do
     id = robot(:owner_flooded)
-    link = Names.whereis(id, :comms)
-    for number <- 1..20_000, do: GenServer.cast(link, {:hear, beat(number, true)})
-    eventually(fn -> Process.info(link, :message_queue_len) == {:message_queue_len, 0} end)
+    comms = Names.whereis(id, :comms)
+    for number <- 1..20_000, do: GenServer.cast(comms, {:hear, beat(number, true)})
+    eventually(fn -> Process.info(comms, :message_queue_len) == {:message_queue_len, 0} end)
     settled(id, [:comms, :estop])
     assert latched?(id)
     assert stop_of(id).known > 0

@@ -8,7 +8,7 @@ defmodule Swarm.Formation.AssignmentTest do
   defp cost(rows, columns),
     do: rows |> Enum.zip(columns) |> Enum.map(fn {row, j} -> Enum.at(row, j) end) |> Enum.sum()
 
-  test "the matching is as cheap as the best of all" do
+  test "the matching is as cheap as the best of all matchings" do
     for _ <- 1..150 do
       n = :rand.uniform(6)
       rows = for _ <- 1..n, do: for(_ <- 1..n, do: :rand.uniform(50) - 10)
@@ -37,7 +37,7 @@ defmodule Swarm.Formation.AssignmentTest do
     end
   end
 
-  test "the chain is one path for any poses, equal ones too" do
+  test "the chain is a single path for any poses, even equal ones" do
     for _ <- 1..200 do
       n = :rand.uniform(12)
       robots = for i <- 1..n, do: {:"min#{i}", {:rand.uniform(4), :rand.uniform(4)}}

@@ -4,7 +4,7 @@ defmodule Swarm.Formation.FreeSlotsTest do
   alias Swarm.Formation
   alias Swarm.Formation.{FreeSlots, Trail}
 
-  test "no slot in use is near a body, each is used once, and all have one" do
+  test "no used slot is near a body, each is used once, and all robots have one" do
     for _ <- 1..100 do
       formation = {Enum.random(Formation.kinds()), 1.0}
       followers = :rand.uniform(8) - 1
@@ -20,7 +20,7 @@ defmodule Swarm.Formation.FreeSlotsTest do
     end
   end
 
-  test "where there is no room at all the shape is taken as it is" do
+  test "if there is no room at all, the shape is used as it is" do
     wall = for x <- -40..40, do: {x * 0.5, 0.0, 5.0}
 
     assert FreeSlots.places({:column, 1.0}, 2, Pose.new(0, 0), 1.6, wall, 0.2) ==
@@ -39,7 +39,7 @@ defmodule Swarm.Formation.FreeSlotsTest do
     end
   end
 
-  test "a trail ends somewhere, and is carried on straight" do
+  test "a trail is extended straight beyond its end" do
     trail = Enum.reduce(0..999, [], &Trail.note(&2, Pose.new(&1 * 0.2, 0)))
     assert length(trail) == 400
     assert Pose.distance(Trail.behind(trail, Pose.new(199.8, 0), 150.0), {49.8, 0.0}) < 1.0e-6

@@ -17,7 +17,7 @@ defmodule Swarm.Formation.KindTest do
     on_exit(fn -> Application.delete_env(:swarm, :formations) end)
   end
 
-  test "a kind that the build adds is one like the others" do
+  test "a kind that the build adds works like the others" do
     assert List.last(Formation.kinds()) == :ladder
     assert {:ok, {:ladder, 1.5} = formation} = Formation.new(:ladder, spacing: 1.5)
     assert Formation.valid?(formation)
@@ -26,7 +26,7 @@ defmodule Swarm.Formation.KindTest do
     assert line =~ "ladder" and line =~ "length"
   end
 
-  test "one whose module is not in this build is not known, nor is any other" do
+  test "a kind whose module is not in this build is not known, nor is any other" do
     refute :gone in Formation.kinds()
     refute Formation.valid?({:gone, 1.0})
     assert {:error, line} = Formation.new(:gone)

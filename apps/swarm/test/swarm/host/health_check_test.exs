@@ -12,16 +12,16 @@ defmodule Swarm.Host.HealthCheckTest do
     end)
   end
 
-  test "a robot that works is well, and its pulse says how it is armed" do
+  test "a robot that works is well, and the check says how it is armed" do
     id = robot(:pulse_well)
     assert words(id, true) =~ "pulse_well is "
   end
 
-  test "no robot, no pulse" do
+  test "a robot that does not exist is not well" do
     assert HealthCheck.of(:pulse_none) == {false, "pulse_none is not there"}
   end
 
-  test "a drive that is not there is said, and no ill of the robot" do
+  test "a drive that is offline is reported, but the robot is well" do
     drive = {Hal.FakeDrive, test: self(), device: :drive, open: fn -> {:error, :enoent} end}
     id = robot(:pulse_away, drive: drive)
     assert words(id, true) == "pulse_away is there, and its drive is offline"
@@ -31,7 +31,7 @@ defmodule Swarm.Host.HealthCheckTest do
     for {id, part} <- [pulse_gate: :gate, pulse_mind: :executive] do
       id = robot(id)
       assert words(id, true)
-      # Which would start the executive again before a second is over.
+      # It would start the executive again before a second is over.
       :ok = :sys.suspend(Names.whereis(id, :watch))
       :ok = :sys.suspend(Names.whereis(id, part))
       assert words(id, false) =~ "its #{part} has done nothing for 1."
@@ -40,7 +40,7 @@ defmodule Swarm.Host.HealthCheckTest do
     end
   end
 
-  test "a drive that takes no messages is named, and may be busy for a while" do
+  test "a drive that handles no messages is named, but it may be busy for a while" do
     id = robot(:pulse_drive)
     assert words(id, true)
     drive = Names.whereis(id, :drive)

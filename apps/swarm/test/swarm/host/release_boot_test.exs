@@ -25,7 +25,7 @@ defmodule Swarm.Host.ReleaseBootTest do
     "[id: :mag1, profile: :magellan, #{drive}#{more}]"
   end
 
-  test "the release of real robots needs a file, and says where it looked; a base protocol needs none" do
+  test "the release of real robots needs a file, and says where it looked; a base station needs none" do
     real = %{"RELEASE_NAME" => "robot", "ROBOT" => "mag9", "RELEASE_ROOT" => "/nowhere"}
 
     assert ReleaseBoot.robot(real) ==
@@ -37,14 +37,14 @@ defmodule Swarm.Host.ReleaseBootTest do
     assert ReleaseBoot.robot(%{real | "RELEASE_NAME" => "fleet", "ROBOT" => "base"}) == {:ok, nil}
   end
 
-  test "the machine's own file stands above that of the release" do
+  test "the machine's own file takes precedence over that of the release" do
     environment = %{"ROBOT" => "mag1", "RELEASE_ROOT" => "/opt/convoy/current"}
 
     assert ReleaseBoot.place(environment, fn _ -> true end) ==
              {:ok, "/etc/convoy/robots/mag1.exs"}
   end
 
-  test "a robot comes with its mission and its link, disarmed", %{tmp_dir: folder} do
+  test "a robot has its mission and its comms process, and is disarmed", %{tmp_dir: folder} do
     environment = machine(folder, file(", policies: [mission: :landmark]"))
     assert {:ok, {%Robot.File{id: :mag1}, config}} = ReleaseBoot.robot(environment)
     assert config.arm == :manual
@@ -52,7 +52,7 @@ defmodule Swarm.Host.ReleaseBootTest do
     assert {Swarm.Comms, _options} = List.last(config.companions)
   end
 
-  test "a file of another robot, and a wrong one, are refused in lines", %{tmp_dir: folder} do
+  test "a file of another robot, or a wrong one, is refused with errors", %{tmp_dir: folder} do
     environment = machine(folder, file(), %{"ROBOT" => "mag2"})
     assert {:error, [line]} = ReleaseBoot.robot(environment)
     assert line =~ "mag1.exs is that of mag1, and this machine is ROBOT=mag2"
@@ -66,7 +66,7 @@ defmodule Swarm.Host.ReleaseBootTest do
     assert {1, [], ^lines} = ReleaseBoot.answer("check", environment)
   end
 
-  test "who wants to reach a running robot gets there though its file is wrong by now", context do
+  test "a running robot can be reached even if its file is wrong by now", context do
     environment = machine(context.tmp_dir, "[", %{"CONVOY_DIST_PORT" => "9400"})
     secret = environment["CONVOY_SECRET_FILE"]
 
@@ -78,7 +78,7 @@ defmodule Swarm.Host.ReleaseBootTest do
     end
   end
 
-  test "what the file says of the network stands above the environment", %{tmp_dir: folder} do
+  test "the network keys of the file take precedence over the environment", %{tmp_dir: folder} do
     more = %{"CONVOY_DIST_PORT" => "9400", "CONVOY_INTERFACE" => "10.0.0.1"}
     environment = machine(folder, file(), more)
     {:ok, secret} = Secret.load(environment["CONVOY_SECRET_FILE"])
@@ -114,7 +114,7 @@ defmodule Swarm.Host.ReleaseBootTest do
               }}
   end
 
-  test "the robots that come along take the secret of the environment", %{tmp_dir: folder} do
+  test "the robots of the release use the secret of the environment", %{tmp_dir: folder} do
     environment = machine(folder, file())
 
     for id <- ~w(mag1 min1) do
@@ -130,10 +130,12 @@ defmodule Swarm.Host.ReleaseBootTest do
     assert {1, [], [line]} = ReleaseBoot.answer("check", environment)
     assert line =~ "/nowhere/secret does not exist"
     secret = environment["CONVOY_SECRET_FILE"]
-    assert line =~ "(network.secret_file of the robot file stands above #{secret})"
+    assert line =~ "(network.secret_file of the robot file takes precedence over #{secret})"
   end
 
-  test "nothing starts where its port is taken, but for one that is ending", %{tmp_dir: folder} do
+  test "nothing starts if its port is in use, unless the other program is ending", %{
+    tmp_dir: folder
+  } do
     {:ok, socket} = :gen_tcp.listen(0, ip: {127, 0, 0, 1})
     {:ok, port} = :inet.port(socket)
     more = %{"CONVOY_DIST_PORT" => "#{port}", "CONVOY_INTERFACE" => "127.0.0.1"}
@@ -141,10 +143,10 @@ defmodule Swarm.Host.ReleaseBootTest do
 
     for command <- ~w(start start_iex daemon daemon_iex) do
       assert {1, [], [line]} = ReleaseBoot.answer(command, environment, 0)
-      assert line =~ "mag1 does not start: its TCP port #{port} is taken"
+      assert line =~ "mag1 does not start: its TCP port #{port} is in use"
     end
 
-    # Others reach the one that has it.
+    # Other commands reach the robot that has it.
     assert {0, [_cookie | _], []} = ReleaseBoot.answer("rpc", environment, 0)
 
     test = self()
@@ -161,7 +163,7 @@ defmodule Swarm.Host.ReleaseBootTest do
     assert_receive {:answer, {0, [_cookie | _], []}}, 5_000
   end
 
-  test "without a secret nothing is told but how to make one", %{tmp_dir: folder} do
+  test "without a secret the answer only says how to make one", %{tmp_dir: folder} do
     environment = machine(folder, file())
     File.rm!(environment["CONVOY_SECRET_FILE"])
 
@@ -193,17 +195,20 @@ defmodule Swarm.Host.ReleaseBootTest do
       end
     end
 
-    test "says the phrase of the file on its console, and only that", %{tmp_dir: folder} do
+    test "sends the phrase of the file to its console, and nothing else", %{tmp_dir: folder} do
       {_base, base_end, console, console_end, file} = wired(folder)
       options = ~s(port: "#{console}", phrase: "System halted")
       environment = machine(folder, file <> ", console: [#{options}]]")
       assert {0, [line], []} = ReleaseBoot.answer("halt", environment)
-      assert line == "#{console} was told; a controller that listens there cuts the power now"
+
+      assert line ==
+               "#{console} got the phrase; a controller that listens there cuts the power now"
+
       assert heard(console_end, "", "halted\r\n") == "\r\nSystem halted\r\n"
       for line <- [base_end, console_end], do: Hal.Serial.close(line)
     end
 
-    test "says nothing while a robot has its base, nor where no console is configured", %{
+    test "sends nothing while a robot has its base, nor if no console is configured", %{
       tmp_dir: folder
     } do
       {base, base_end, console, console_end, file} = wired(folder)
@@ -218,13 +223,13 @@ defmodule Swarm.Host.ReleaseBootTest do
 
       Hal.Serial.close(robot)
       assert {0, [_], []} = ReleaseBoot.answer("halt", environment)
-      # The first that the console hears is of the last call.
+      # The first thing that the console hears is from the last call.
       halted = "\r\nThe system is halted\r\n"
       assert heard(console_end, "", halted) == halted
       for line <- [base_end, console_end], do: Hal.Serial.close(line)
     end
 
-    test "says nothing where nobody can tell whether a robot runs", %{tmp_dir: folder} do
+    test "sends nothing if it is unknown whether a robot runs", %{tmp_dir: folder} do
       {_base, base_end, console, console_end, _file} = wired(folder)
       odd = Path.join(folder, "odd")
       File.write!(odd, "")
@@ -232,7 +237,7 @@ defmodule Swarm.Host.ReleaseBootTest do
       file = ~s([id: :mag1, profile: :magellan, #{drive}, console: [port: "#{console}"]])
       assert {1, [], [line]} = ReleaseBoot.answer("halt", machine(folder, file))
       assert line == "mag1: a robot may run here: #{odd}: not a serial device; the power stays on"
-      # A base that is not there at all drives nobody.
+      # A base that does not exist cannot drive.
       File.rm!(odd)
       assert {0, [_told], []} = ReleaseBoot.answer("halt", machine(folder, file))
       halted = "\r\nThe system is halted\r\n"
@@ -240,7 +245,7 @@ defmodule Swarm.Host.ReleaseBootTest do
       for line <- [base_end, console_end], do: Hal.Serial.close(line)
     end
 
-    test "does not say it for a file that is wrong", %{tmp_dir: folder} do
+    test "sends nothing for a file that is wrong", %{tmp_dir: folder} do
       environment = machine(folder, file(~s(, console: [port: "/dev/ttyS0", phrase: "häh"])))
       assert {1, [], [line]} = ReleaseBoot.answer("halt", environment)
       assert line =~ "console.phrase: cannot be"

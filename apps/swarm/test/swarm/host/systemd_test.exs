@@ -4,7 +4,7 @@ defmodule Swarm.Host.SystemdTest do
 
   doctest Systemd
 
-  # What systemd has: a socket of datagrams. Its path must be short.
+  # The same as systemd's: a datagram socket. Its path must be short.
   setup do
     path = Path.join(System.tmp_dir!(), "n#{System.pid()}-#{System.unique_integer([:positive])}")
     {:ok, socket} = :gen_udp.open(0, [:local, :binary, ifaddr: {:local, path}])
@@ -33,28 +33,28 @@ defmodule Swarm.Host.SystemdTest do
 
   defp await(socket, lines), do: if(said(socket) != lines, do: await(socket, lines), else: :ok)
 
-  test "ready once, then alive as long as the robot is well", %{path: path, socket: socket} do
+  test "it is ready once, then alive as long as the robot is well", %{path: path, socket: socket} do
     pulses = start(path, {true, "mag1 is disarmed"})
     assert said(socket) == ["READY=1", "WATCHDOG=1", "STATUS=mag1 is disarmed"]
     assert said(socket) == ["WATCHDOG=1", "STATUS=mag1 is disarmed"]
 
     Agent.update(pulses, fn _ -> {false, "mag1: its gate\nis gone"} end)
     await(socket, ["STATUS=mag1: its gate is gone"])
-    # And no sign of life from then on.
+    # There is no sign of life from then on.
     for _ <- 1..5, do: assert(said(socket) == ["STATUS=mag1: its gate is gone"])
 
     Agent.update(pulses, fn _ -> {true, "mag1 is armed"} end)
     await(socket, ["WATCHDOG=1", "STATUS=mag1 is armed"])
   end
 
-  test "a robot that is not there yet is not ready", %{path: path, socket: socket} do
+  test "a robot that does not exist yet is not ready", %{path: path, socket: socket} do
     pulses = start(path, {false, "mag1 is not there"})
     assert said(socket) == ["STATUS=mag1 is not there"]
     Agent.update(pulses, fn _ -> {true, "mag1 is disarmed"} end)
     await(socket, ["READY=1", "WATCHDOG=1", "STATUS=mag1 is disarmed"])
   end
 
-  test "a supervisor that is gone for a while is told again", %{path: path, socket: socket} do
+  test "a supervisor that is gone for a while is notified again", %{path: path, socket: socket} do
     start(path, {true, "mag1 is disarmed"})
     assert ["READY=1" | _] = said(socket)
     :gen_udp.close(socket)
@@ -63,7 +63,7 @@ defmodule Swarm.Host.SystemdTest do
     assert said(socket) == ["WATCHDOG=1", "STATUS=mag1 is disarmed"]
   end
 
-  test "an abstract socket is one, too" do
+  test "an abstract socket works, too" do
     name = "convoy-#{System.unique_integer([:positive])}-#{System.pid()}"
     {:ok, socket} = :gen_udp.open(0, [:local, :binary, ifaddr: {:local, <<0>> <> name}])
     start("@" <> name, {true, "mag1 is disarmed"})

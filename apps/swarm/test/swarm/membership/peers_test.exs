@@ -11,7 +11,7 @@ defmodule Swarm.Membership.PeersTest do
 
   defp newest(peers), do: elem(peers.rows.mag2.beat.pose, 0)
 
-  test "alive, suspect after 1 s, gone after 2 s, and a body for ever" do
+  test "a peer is suspect after 1 s, gone after 2 s, and stays an obstacle" do
     peers = hear(Peers.new(:mag1), 1, 1, 0)
 
     for {at_ms, status, mode, heard, view} <- [
@@ -33,13 +33,13 @@ defmodule Swarm.Membership.PeersTest do
     assert Peers.status(peers, :mag9, 0) == :gone
   end
 
-  test "late and doubled heartbeats change nothing, not even the age" do
+  test "late and duplicate heartbeats change nothing, not even the age" do
     peers = Peers.new(:mag1) |> hear(1, 5, 0) |> hear(1, 5, 900) |> hear(1, 4, 900)
     assert newest(peers) == 105
     assert Peers.status(peers, :mag2, 1_000) == :suspect
   end
 
-  test "a restarted robot is another, and its former life is over" do
+  test "a restarted robot counts as another, and its former life is over" do
     peers = Peers.new(:mag1) |> hear(1, 900, 0) |> hear(2, 1, 100) |> hear(1, 901, 200)
     assert newest(peers) == 201
   end
@@ -63,7 +63,7 @@ defmodule Swarm.Membership.PeersTest do
     end
   end
 
-  test "who is there has a number that grows with everyone that comes, goes, returns or restarts" do
+  test "the number of the view grows with each robot that comes, goes, returns or restarts" do
     peers = Peers.new(:mag1)
     assert Peers.members(peers, 0) == {0, []}
     peers = hear(peers, 1, 1, 0)
@@ -75,15 +75,15 @@ defmodule Swarm.Membership.PeersTest do
     assert Peers.members(peers, 3_000) == {3, [mag2: 1]}
     peers = hear(peers, 2, 1, 3_100)
     assert Peers.members(peers, 3_100) == {4, [mag2: 2]}
-    # Gone, and back as another life: two changes.
+    # Gone, and back in another life: two changes.
     assert peers |> hear(3, 1, 9_000) |> Peers.members(9_000) == {6, [mag2: 3]}
   end
 
-  test "what comes by way of another is a sign of life, but not heard" do
+  test "a relayed heartbeat is a sign of life, but does not count as heard" do
     peers = Peers.hear(Peers.new(:mag1), :mag2, beat(1, 1), 0, false)
     assert Peers.view(peers, 0) == [:mag1, :mag2]
     assert Peers.heard(peers, 0) == []
-    # The straight one was overtaken.
+    # The direct one was overtaken.
     peers = Peers.hear(peers, :mag2, beat(1, 1), 40, true)
     assert Peers.heard(peers, 900) == [:mag2]
     peers = Peers.hear(peers, :mag2, beat(1, 2), 990, false)

@@ -1,6 +1,6 @@
 defmodule Swarm.Mesh.AbsurdTest do
-  # A robot of the fleet with a bug: what it says is signed, and makes no sense.
-  # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
+  # A robot of the fleet with a bug: what it sends is signed, but makes no sense. Its nodes are
+  # VMs of their own, with names and ports of their own: nothing of this VM is shared.
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes
@@ -23,18 +23,18 @@ defmodule Swarm.Mesh.AbsurdTest do
   defp hears?(one, two),
     do: match?(%{status: :alive}, MeshNodes.call(one, Mesh, :view, []).nodes[two.node])
 
-  test "it fells nothing and moves nobody, and is understood when it makes sense again" do
+  test "it crashes nothing and moves nobody, and is understood when it makes sense again" do
     [one, two] = MeshNodes.start(2, robots: true)
     assert eventually(fn -> hears?(one, two) and hears?(two, one) end)
     assert eventually(fn -> MeshNodes.call(two, Swarm, :stop, [one.name]) == :ok end)
-    # A first time loads all modules that are needed for it.
+    # The first time loads all modules that are needed.
     MeshNodes.call(two, Swarm.MeshNodes.Absurd, :send_all, [two.name, 7], 60_000)
     before = parts(one)
     atoms = MeshNodes.call(one, :erlang, :system_info, [:atom_count])
     heard = MeshNodes.call(one, Mesh, :counts, []).heard
 
     sent = MeshNodes.call(two, Swarm.MeshNodes.Absurd, :send_all, [two.name, 2], 60_000)
-    # What is larger than a datagram does not even go out.
+    # Terms larger than a datagram are not even sent.
     assert eventually(fn ->
              MeshNodes.call(one, Mesh, :counts, []).heard - heard > sent / 2
            end)
@@ -55,7 +55,7 @@ defmodule Swarm.Mesh.AbsurdTest do
 
     assert eventually(fn -> hears?(one, two) and hears?(two, one) end)
 
-    # Some of it was a stop, of which nothing comes back.
+    # Some of it was a stop, which is not answered.
     assert MeshNodes.call(one, Swarm, :status, [one.name]).estop
     assert eventually(fn -> MeshNodes.call(two, Swarm, :reset, []) == :ok end)
     assert :ok = MeshNodes.call(two, Swarm.Blackboard, :put, [two.name, :door, 1])

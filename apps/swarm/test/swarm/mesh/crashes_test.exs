@@ -1,6 +1,6 @@
 defmodule Swarm.Mesh.CrashesTest do
-  # Parts of a node fall, each more often than any supervisor would forgive.
-  # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
+  # Parts of a node crash, each more often than any supervisor would tolerate. Its nodes are VMs
+  # of their own, with names and ports of their own: nothing of this VM is shared.
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes
@@ -35,11 +35,11 @@ defmodule Swarm.Mesh.CrashesTest do
         do: MeshNodes.call(node, Robot.Names, :whereis, [name, role])
   end
 
-  test "the robot goes on, the emergency stop holds, and all is as before" do
+  test "the robot goes on, the emergency stop holds, and everything is as before" do
     [one, two] = MeshNodes.start(2, robots: true)
     assert eventually(fn -> whole?(one, two.node) and whole?(two, one.node) end)
     assert eventually(fn -> MeshNodes.call(two, Swarm, :estop, []) == :ok end)
-    # Its link enters it there with its next note.
+    # Its comms process enters it there with its next row.
     assert eventually(fn ->
              MeshNodes.call(one, Swarm.Blackboard, :put, [one.name, :door, 0]) == :ok
            end)

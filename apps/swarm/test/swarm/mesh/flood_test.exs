@@ -32,7 +32,7 @@ defmodule Swarm.Mesh.FloodTest do
     }
   end
 
-  test "garbage, packets of another fleet and replayed ones: nothing falls, nothing grows, the robot ticks on",
+  test "with garbage, replayed and foreign packets nothing crashes, nothing grows, the robot ticks on",
        %{one: one, two: two, send: send} do
     foreign =
       Packet.seal(
@@ -55,7 +55,7 @@ defmodule Swarm.Mesh.FloodTest do
         end
       end
 
-      # Within the flood the robot's controller goes on, and people are answered.
+      # During the flood the robot's controller goes on, and people are answered.
       tick_ms = state(one).tick_ms
       assert eventually(fn -> state(one).tick_ms > tick_ms + 500 end)
       assert :ok = MeshNodes.call(one, Swarm, :stop, [one.name])

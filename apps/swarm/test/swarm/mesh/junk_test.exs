@@ -1,17 +1,17 @@
 defmodule Swarm.Mesh.JunkTest do
-  # Whoever is connected can send anything to whatever has a name or is in the directory.
-  # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
+  # A connected node can send anything to any process that has a name or is in the directory. Its
+  # nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes
   alias Swarm.MeshNodes.Junk
   @moduletag :slow
 
-  test "nothing that a node can be sent fells or fattens anything" do
+  test "nothing that is sent to a node crashes anything or makes it grow" do
     [one, two] = MeshNodes.start(2, robots: true)
     assert eventually(fn -> hears?(one, two) end)
 
-    # A first time loads all modules that are needed for it.
+    # The first time loads all modules that are needed.
     assert MeshNodes.call(one, Junk, :pour, [one.name], 40_000) == []
     before = grown(one)
     assert MeshNodes.call(one, Junk, :pour, [one.name], 40_000) == []

@@ -1,6 +1,6 @@
 defmodule Swarm.MeshSizeTest do
-  # Fleets that are larger than a handful: real nodes on loopback.
-  # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
+  # Larger fleets: real nodes on loopback. Its nodes are VMs of their own, with names and ports of
+  # their own: nothing of this VM is shared.
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1, eventually: 2]
   alias Swarm.MeshNodes, as: Cluster
@@ -17,8 +17,9 @@ defmodule Swarm.MeshSizeTest do
     Enum.sort(alive) == others(node, nodes)
   end
 
-  test "where not all are connected, commands and their answers travel over those between" do
-    # The second and the fifth are no neighbours, however many are there; were they the first two, they would be.
+  test "if not all nodes are connected, commands and their answers travel through the nodes in between" do
+    # The second and the fifth are never neighbours, however many there are; the first two would
+    # be.
     nodes = Cluster.start(7, robots: true, mesh: [full_mesh: 3, degree: 2], one_by_one: true)
     [_, one, _, _, far | _] = nodes
     assert eventually(fn -> Enum.all?(nodes, &met?(&1, nodes)) end)
@@ -28,7 +29,8 @@ defmodule Swarm.MeshSizeTest do
              match?(%{state: :idle}, Cluster.call(one, Swarm, :status, [far.name]))
            end)
 
-    # Seven nodes on a busy machine may take longer for an answer than the 500 ms that are waited for.
+    # On a busy machine seven nodes may need longer for an answer than the 500 ms that the caller
+    # waits.
     assert eventually(fn -> Cluster.call(one, Swarm, :stop, [far.name]) == :ok end)
     assert far.node not in linked(one)
   end

@@ -35,7 +35,7 @@ defmodule Swarm.MeshTest do
            end)
   end
 
-  test "a killed node is gone, and comes back as if it had never been away" do
+  test "a killed node is gone, and works as before when it comes back" do
     nodes = [one, two, three] = Cluster.start(3, robots: true)
     assert eventually(fn -> full?(nodes) end)
     Cluster.signal(three, "KILL")
@@ -45,7 +45,7 @@ defmodule Swarm.MeshTest do
     assert eventually(fn -> Cluster.call(one, Swarm, :stop, [three.name]) == :ok end)
   end
 
-  test "a frozen node is gone for the others though its connections stand, and comes back" do
+  test "a frozen node is gone for the others although its connections exist, and comes back" do
     nodes = [one, two, three] = Cluster.start(3, robots: true)
     assert eventually(fn -> full?(nodes) end)
     Cluster.signal(two, "STOP")
@@ -55,10 +55,10 @@ defmodule Swarm.MeshTest do
     assert eventually(fn -> full?(nodes) end)
   end
 
-  test "one connection cut for good changes no other, and no view" do
+  test "one connection cut for good changes neither the others nor any view" do
     nodes = [one, two, three] = Cluster.start(3, robots: true)
     assert eventually(fn -> full?(nodes) end)
-    # A cookie that only these two have for each other: neither can connect again.
+    # A cookie that only these two have for each other, so that neither can connect again.
     Cluster.call(one, :erlang, :set_cookie, [two.node, :wrong])
     true = Cluster.call(one, Node, :disconnect, [two.node])
     number = Cluster.call(three, Mesh, :view, []).number
@@ -67,11 +67,11 @@ defmodule Swarm.MeshTest do
     assert met?(one, nodes) and met?(two, nodes)
     assert Cluster.call(three, Mesh, :view, []).number == number
 
-    # The command goes by way of the third.
+    # The command goes through the third node.
     assert eventually(fn -> Cluster.call(one, Swarm, :stop, [two.name]) == :ok end)
   end
 
-  test "where multicast is blocked a list of addresses does" do
+  test "if multicast is blocked, a list of addresses suffices" do
     [one] = Cluster.start(1, mesh: [multicast: false])
     %{port: port} = Cluster.call(one, Mesh, :counts, [])
     mesh = Cluster.call(one, Application, :get_env, [:swarm, :mesh])

@@ -17,7 +17,7 @@ defmodule Swarm.Supervisor.BackoffSupervisorTest do
     eventually(fn -> Process.whereis(name) not in [nil, pid] end)
   end
 
-  test "a part that falls is started again, more often than a supervisor would" do
+  test "a part that crashes is started again, more often than a supervisor would" do
     {name, keeper} = keep()
     me = self()
 
@@ -35,7 +35,7 @@ defmodule Swarm.Supervisor.BackoffSupervisorTest do
     for _ <- 1..8, do: assert_receive(%{id: ^name, reason: :killed})
   end
 
-  test "the part ends with it, and is there again with the next" do
+  test "the part ends with its supervisor, and runs again with the next one" do
     {name, keeper} = keep()
     part = Process.whereis(name)
     Process.exit(keeper, :kill)
@@ -45,7 +45,7 @@ defmodule Swarm.Supervisor.BackoffSupervisorTest do
     refute Process.alive?(part)
   end
 
-  test "one that cannot start is an error at once" do
+  test "a part that cannot start is an error at once" do
     part = %{id: :part, start: {Agent, :start_link, [fn -> exit(:broken) end]}}
     assert {:error, {:broken, _}} = start_supervised({BackoffSupervisor, part})
   end

@@ -1,9 +1,9 @@
 defmodule Swarm.Agreement.Round.Letter do
   @moduledoc """
-  A message of a round. Every letter carries the round's id, its view and the time that is left
-  (no shared clock is needed), the sender's own report, and, once it is final, its digest. `known`
-  is the map of all reports that the sender holds, sent as an echo when the reports are in, or
-  when somebody asked. `purpose` says why the round is held.
+  A message of a round. Every letter carries the round's id, its view and the remaining time (so
+  no shared clock is needed), the sender's own report, and, once it is final, its digest. `known`
+  is the map of all reports that the sender holds, sent as an echo when all reports have arrived,
+  or when somebody asks. `purpose` says why the round is held.
   """
   alias Swarm.Message.WireTypes
 
@@ -22,7 +22,7 @@ defmodule Swarm.Agreement.Round.Letter do
           ask: boolean()
         }
 
-  # More than any round lasts, and more robots than any fleet has.
+  # Longer than any round lasts, and more robots than any fleet has.
   @longest_ms 120_000
   @most 1_000
 

@@ -6,7 +6,7 @@ defmodule Swarm.Agreement.Round.Record do
   alias Swarm.Agreement.Election
   alias Swarm.Agreement.Round.Letter
 
-  # The version of this layout and of what is computed from a record: robots of different versions
+  # The version of this layout and of the computations on a record: robots of different versions
   # must not believe that they agree.
   @version 2
 
@@ -22,7 +22,7 @@ defmodule Swarm.Agreement.Round.Record do
         }
 
   @doc """
-  The reports of a whole view: who was silent until the deadline is there as `nil`.
+  The reports of a whole view, with `nil` for a robot that was silent until the deadline.
 
       iex> report = %{found: false, size_ppm: 0, pose: {0, 0, 0}, led: 0, of: 0}
       iex> Swarm.Agreement.Round.Record.freeze([:mag1, :mag2], %{mag2: report}) == %{mag1: nil, mag2: report}
@@ -32,8 +32,8 @@ defmodule Swarm.Agreement.Round.Record do
   def freeze(view, reports), do: Map.new(view, &{&1, Map.get(reports, &1)})
 
   @doc """
-  The digest of frozen reports: over a fixed layout of whole numbers and names, sorted by name, never
-  over a term's own bytes.
+  The digest of frozen reports, computed over a fixed layout of whole numbers and names, sorted by
+  name, never over the external format of a term.
 
       iex> report = %{found: true, size_ppm: 900, pose: {1, 2, 3}, led: 0, of: 0}
       iex> a = Swarm.Agreement.Round.Record.digest({1, 1, :mag1}, %{mag1: report, mag2: nil})
