@@ -33,9 +33,9 @@ defmodule Missions.Landmark do
 
   @roam_ms 6_000
   @tries 3
-  # Where nobody says where things are, nobody corrects itself by where they were.
+  # Without reports of where things are, a robot must not correct its pose by where they were.
   @unled [anchors: %Anchors{}]
-  # Without a sign of life for so long a leader is lost.
+  # A leader without a sign of life for this long is lost.
   @led_ms 2_000
 
   @doc """
@@ -116,10 +116,10 @@ defmodule Missions.Landmark do
   end
 
   @impl Robot.Mission
-  # The formation, and how far the group had counted its rounds and epochs.
+  # The formation, and the numbers of the group's last round and epoch.
   def halted(mission), do: %{enter(mission, :idle) | started?: false}
 
-  # A robot that is not on the mission leaves that to those that are.
+  # Only robots that take part in the mission handle this.
   defp relay_beats(%{phase: :idle} = mission), do: {mission, []}
 
   defp relay_beats(%{percept: percept} = mission) do
@@ -140,7 +140,7 @@ defmodule Missions.Landmark do
 
   defp still(mission), do: {mission.phase, mission, []}
 
-  # From phase to phase along the table; a row that leads on at once is followed at once.
+  # Goes from phase to phase along the table; if the next phase ends at once, it goes on at once.
   defp step(mission, stages \\ []) do
     case Transitions.next(mission.phase, &holds?(&1, mission)) do
       phase when phase == mission.phase -> {mission, stages}
@@ -170,7 +170,7 @@ defmodule Missions.Landmark do
   defp holds?(:lost_hold, m), do: Policy.lost?(m) and Policy.lost_link(m) == :hold
   defp holds?(:company, m), do: Policy.company?(m)
 
-  # Who has a leader leaves it to that one to judge.
+  # A robot that has a leader leaves the decision to the leader.
   defp holds?(:short, %{phase: :follow} = m) when m.now_ms - m.since_ms < @led_ms, do: false
 
   defp holds?(:short, %{phase: :follow, anchor_ms: at_ms, now_ms: now})
@@ -240,7 +240,7 @@ defmodule Missions.Landmark do
   defp role(phase) when phase in [:idle, :search, :wander, :rest], do: :searcher
   defp role(_between), do: nil
 
-  # The anchor that it gave as a leader is nothing to join.
+  # A robot cannot join by the anchor that it published itself as a leader.
   defp forget(%{anchor: %{leader: me}, me: me} = mission), do: %{mission | anchor: nil}
   defp forget(mission), do: mission
 
@@ -283,7 +283,7 @@ defmodule Missions.Landmark do
   defp act(:lead, mission), do: Leader.act(mission)
   defp act(:follow, mission), do: Follower.act(mission)
 
-  # What the heartbeat tells of the mission.
+  # What the heartbeat reports about the mission.
   defp claim(mission) do
     leading? = mission.phase == :lead
 

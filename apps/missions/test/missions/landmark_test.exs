@@ -1,5 +1,5 @@
 defmodule Missions.LandmarkTest do
-  @moduledoc "Groups of missions over a bad radio: who leads, for how long, and who follows."
+  @moduledoc "Groups of missions over a lossy radio: who leads, for how long, and who follows."
   use ExUnit.Case, async: true
   alias Hal.Pose
   alias Missions.Landmark.Group
@@ -21,7 +21,7 @@ defmodule Missions.LandmarkTest do
     group
   end
 
-  # Never two leaders of one epoch among robots that were connected all the time.
+  # There are never two leaders of one epoch among robots that were connected all the time.
   defp assert_lawful(group) do
     assert group.worst_both_ms <= 1_500
     epochs = for {epoch, _id} <- group.elected, do: epoch
@@ -29,7 +29,7 @@ defmodule Missions.LandmarkTest do
     group
   end
 
-  test "the one that sees the landmark largest leads, in one round, and all follow" do
+  test "the robot that sees the landmark largest leads after one round, and all follow" do
     group = three() |> led(@three, 5) |> assert_lawful()
     assert [{1, :mag2}] = group.elected
     assert group.worst_both_ms == 0
@@ -68,7 +68,7 @@ defmodule Missions.LandmarkTest do
     end
   end
 
-  test "under loss, doubles, late and overtaking messages the law holds, cut and mended" do
+  test "the invariants hold under loss, duplicates, late and reordered messages, cut and mended" do
     for _ <- 1..25 do
       group =
         three(loss: :rand.uniform() * 0.25, doubled: 0.2, delay_ms: {5, 400})
@@ -96,7 +96,7 @@ defmodule Missions.LandmarkTest do
     group = three() |> led(@three, 5) |> Group.run(3) |> Group.kill(:mag2)
     group = Enum.reduce([:mag1, :mag3], group, &Group.show(&2, &1, nil))
     group = Group.run(group, 1.2)
-    # By what the leader told; it stood at {1, 0}, and saw it 1.7 m ahead.
+    # According to the leader, which stood at {1, 0} and saw it 1.7 m ahead.
     percept = Group.percept(group, :mag3)
     {:follow, _mission, effects} = Landmark.handle({:tick, percept}, group.robots.mag3.mission)
     assert [bearing] = for({:look, bearing} <- effects, do: bearing)
@@ -104,7 +104,7 @@ defmodule Missions.LandmarkTest do
     assert bearing != 0.0
   end
 
-  test "a new leader deals the slots that a dead robot has left free" do
+  test "a new leader assigns the slots that a dead robot has left free" do
     abreast = [
       mag1: {0, 0.05},
       mag2: {1, 0.04},
@@ -123,7 +123,8 @@ defmodule Missions.LandmarkTest do
     group = group |> led(Keyword.keys(abreast), 5) |> Group.run(3) |> Group.kill(:mag1)
     group = led(group, [:mag2, :mag3, :mag4, :mag5], 5)
 
-    # At 2, 3 and -1 m to the left; at 0 lies mag1. The least squares of their ways are 9, 1 and 1.
+    # They stand 2, 3 and -1 m to the left; mag1 is at 0. The least squares of their ways are 9, 1
+    # and 1.
     assert group.robots.mag2.mission.anchor.places == [1, 3, 4]
     assert group.robots.mag2.mission.order == [:mag3, :mag4, :mag5]
   end
@@ -136,7 +137,7 @@ defmodule Missions.LandmarkTest do
     assert group.robots.mag2.mission.order == order ++ [:aaa]
   end
 
-  test "a leader that has long been alone is joined, without an election" do
+  test "a robot joins a leader that has long been alone, without an election" do
     group = Group.new() |> Group.join(:mag2, {0, 0}, 0.02) |> led([:mag2]) |> Group.run(10)
     group = group |> Group.join(:mag1, {3, 0}, nil) |> led([:mag1, :mag2]) |> Group.run(5)
     assert [{1, :mag2}] = group.elected
@@ -146,13 +147,13 @@ defmodule Missions.LandmarkTest do
     group = three([], lost_link: :continue) |> led(@three) |> Group.run(1)
     away = Enum.random([:mag1, :mag3])
     [stays] = @three -- [:mag2, away]
-    # It sees nothing, so it elects nobody by itself meanwhile.
+    # It sees nothing, so it elects nobody alone meanwhile.
     group = group |> Group.show(away, nil) |> Group.cut([[away], [:mag2, stays]])
     group = group |> Group.kill(:mag2) |> led([stays])
     group |> Group.cut([]) |> led([away, stays])
   end
 
-  test "a robot that restarts is not taken for its old self" do
+  test "a robot that restarts is not mistaken for its former self" do
     for restarted <- @three do
       group = three() |> led(@three) |> Group.run(3)
       other = hd(@three -- [restarted])

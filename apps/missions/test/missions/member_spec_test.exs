@@ -19,7 +19,7 @@ defmodule Swarm.MemberSpecTest do
     lines
   end
 
-  test "the robots that come along are members of a fleet" do
+  test "the robots of config are members of a fleet" do
     for id <- [:mag1, :min1] do
       {:ok, file} = MemberSpec.load(Path.join(@robots, "#{id}.exs"))
       assert {:ok, config} = MemberSpec.config(file)
@@ -32,7 +32,7 @@ defmodule Swarm.MemberSpecTest do
     end
   end
 
-  test "all that a file's policies may say, the mission takes" do
+  test "the mission accepts all that the policies of a file may say" do
     for kind <- Formation.kinds(), spacing <- [0.8, 5.0] do
       assert {:ok, file} =
                parse("policies: [mission: :landmark, formation: {#{inspect(kind)}, #{spacing}}]")
@@ -67,7 +67,7 @@ defmodule Swarm.MemberSpecTest do
     end
   end
 
-  test "what is wrong with policies and network is said with line, key, what is allowed and a suggestion" do
+  test "errors in policies and network have line, key, what is allowed and a suggestion" do
     text = """
     policies: [mission: :landmark, formation: {:colum, 1.0},
       of: 0, leader_chagne: true],
@@ -97,7 +97,7 @@ defmodule Swarm.MemberSpecTest do
     end
   end
 
-  test "what a file says of network and policies arrives" do
+  test "the network and policies of a file reach mesh and mission" do
     assert {:ok, robot} =
              parse("""
              network: [secret_file: "/etc/convoy/secret", interface: "10.0.0.7",
@@ -114,7 +114,7 @@ defmodule Swarm.MemberSpecTest do
     assert options[:of] == 6 and options[:colour] == "YellowLandmark"
   end
 
-  test "all that a file's network may say, the mesh takes" do
+  test "the mesh accepts all that the network of a file may say" do
     secret = Path.join(System.tmp_dir!(), "start_#{System.unique_integer([:positive])}")
     {:ok, _secret} = Mesh.Secret.create(secret, false)
     on_exit(fn -> File.rm(secret) end)
@@ -134,7 +134,7 @@ defmodule Swarm.MemberSpecTest do
     assert Schema.fleet() == Roster.fleet()
   end
 
-  test "template and guide tell of every key" do
+  test "template and guide describe every key" do
     template = File.read!(Path.join(@robots, "template.exs"))
     guide = File.read!(Path.expand("../../../../docs/robots.md", __DIR__))
 
@@ -147,8 +147,8 @@ defmodule Swarm.MemberSpecTest do
     end
   end
 
-  # What stands behind # with a key is an example: one that is taken, when it is no longer a remark.
-  test "the examples in the template are well" do
+  # A comment with a key is an example, which must be valid when it is no longer a comment.
+  test "the examples in the template are valid" do
     text = File.read!(Path.join(@robots, "template.exs"))
 
     examples =

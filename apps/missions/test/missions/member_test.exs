@@ -1,5 +1,5 @@
 defmodule Swarm.MemberTest do
-  @moduledoc "Nothing that is said to a member crashes it; an emergency stop finds everybody."
+  @moduledoc "No message crashes a member; an emergency stop reaches everybody."
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Swarm.{Member, Message}
@@ -97,7 +97,7 @@ defmodule Swarm.MemberTest do
     end
   end
 
-  # Spoils something inside of a field.
+  # Damages something inside a field.
   defp nest(tuple) when is_tuple(tuple) and tuple != {},
     do: put_elem(tuple, :rand.uniform(tuple_size(tuple)) - 1, junk())
 
@@ -108,7 +108,7 @@ defmodule Swarm.MemberTest do
 
   defp nest(_plain), do: junk()
 
-  test "2,000 spoilt messages are counted or make sense, and nobody crashes" do
+  test "2,000 damaged messages are counted or make sense, and nobody crashes" do
     {member, heard} =
       Enum.reduce(1..2_000, {member(), 0}, fn n, {member, heard} ->
         {kind, body} =
@@ -129,11 +129,11 @@ defmodule Swarm.MemberTest do
 
     assert rejected(member) + heard == 2_000
     assert rejected(member) > 1_000
-    # It still thinks.
+    # It still works.
     assert {%Member{}, [_ | _]} = Member.step(member, {:tick, 50_000})
   end
 
-  test "what is no message is counted by what it claims to be" do
+  test "a term that is not a message is counted by what it claims to be" do
     for {term, reason} <- [
           {:junk, :not_a_message},
           {deep(100), :not_a_message},
@@ -157,7 +157,7 @@ defmodule Swarm.MemberTest do
     end
   end
 
-  test "whole messages are heard" do
+  test "valid messages are heard" do
     for {kind, body} <- [heartbeat: @beat, place: @anchor, round: @letter],
         do: assert(hear(member(), Message.new(:mag2, kind, body)).receiver.rejected == %{})
   end
@@ -174,7 +174,7 @@ defmodule Swarm.MemberTest do
     {_, [{:drive, twist}]} = Member.step(two, {:reflex, 100})
     assert Twist.zero?(twist)
 
-    # Reset by a person; the neighbour, not reset yet, repeats the old number.
+    # A person resets it; the neighbour, not reset yet, repeats the old number.
     {two, _} = Member.step(two, {:command, :reset, 200})
     two = hear(two, put_in(pressed.body.sequence, 2), 300)
     refute two.stop.latched?
@@ -185,7 +185,7 @@ defmodule Swarm.MemberTest do
   end
 
   defmodule Deaf do
-    @moduledoc "A mission that goes on whatever it is told."
+    @moduledoc "A mission that goes on whatever it receives."
     @behaviour Robot.Mission
 
     @impl Robot.Mission
@@ -196,7 +196,7 @@ defmodule Swarm.MemberTest do
       do: {:rolling, mission, [{:goal, :roll, {Robot.Behaviour.Move, linear: 0.2, turn: 0.0}}]}
   end
 
-  test "a stop ends any mission, at once, and nothing of before moves it again until the next start" do
+  test "a stop ends any mission at once, and no older order moves the robot until the next start" do
     options = [id: :mag1, profile: Profile.magellan(), start: Pose.new(0, 0), mission: {Deaf, []}]
     {member, []} = Member.step(Member.new(options), {:command, :start, 0})
     rolling = member |> sense(100) |> sense(200)
@@ -234,7 +234,7 @@ defmodule Swarm.MemberTest do
   end
 
   defmodule Watcher do
-    @moduledoc "A mission that tells how wide the camera saw."
+    @moduledoc "A mission that reports the camera's field of view."
     @behaviour Robot.Mission
 
     @impl Robot.Mission
@@ -263,7 +263,7 @@ defmodule Swarm.MemberTest do
     assert {:stage, :seen, %{detections: seen}} in effects
   end
 
-  test "what people asked of the group's mission outlives a stop" do
+  test "what people asked of the group's mission survives a stop" do
     {member, []} = Member.step(member(), {:command, {:formation, :wedge, 1.2}, 0})
     {stopped, []} = Member.step(member, {:command, :stop, 100})
     {started, []} = Member.step(stopped, {:command, :start, 200})
@@ -271,7 +271,7 @@ defmodule Swarm.MemberTest do
     assert sense(started, 300).runner.phase == :search
   end
 
-  test "while it is stopped no command but stop is taken" do
+  test "while it is stopped, it accepts no command but stop" do
     {member, _} = Member.step(member(), {:command, :estop, 0})
     assert {^member, []} = Member.step(member, {:command, :start, 100})
   end

@@ -19,7 +19,7 @@ defmodule Missions.PureTest do
     places: [1]
   }
 
-  test "an anchor of an epoch that cannot be is not a leader's" do
+  test "an anchor of an impossible epoch is not accepted as a leader's" do
     {_phase, mission, []} = Landmark.init(:mag2, [])
     far = Message.new(:mag3, :place, %{@anchor | epoch: 999_999_999})
     {_phase, same, _effects} = Landmark.handle({:message, far}, mission)
@@ -28,14 +28,14 @@ defmodule Missions.PureTest do
     assert led.anchor == @anchor
   end
 
-  test "what was checked once passes unchanged" do
+  test "options that were already checked pass unchanged" do
     given = [formation: {:wedge, 1.5}, assign: :cost, policy: :majority, of: 3, lost_link: :hold]
     assert {:ok, checked} = Landmark.Options.check(given, nil)
     assert Enum.sort(checked) == Enum.sort(given)
     assert Landmark.Options.check(checked, nil) == {:ok, checked}
   end
 
-  test "a majority of a number that nobody knows is refused" do
+  test "a majority of an unknown number is refused" do
     assert {:error, line} = Landmark.Options.check([policy: :majority], nil)
     assert line =~ "option of is missing"
     assert {:ok, options} = Landmark.Options.check([policy: :majority], 5)

@@ -3,7 +3,7 @@ defmodule Missions.WireTest do
   use ExUnit.Case, async: true
   alias Swarm.MeshNodes, as: Cluster
 
-  test "a node that has just started understands all that a fleet on its way says" do
+  test "a node that has just started understands all messages of a moving fleet" do
     [one] = Cluster.start(1, robots: true)
 
     anchor = %Swarm.Formation.Reference{

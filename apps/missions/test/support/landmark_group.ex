@@ -1,8 +1,8 @@
 defmodule Missions.Landmark.Group do
   @moduledoc """
   A handful of landmark missions on one floor, without a world: bodies go straight to their slots,
-  a scan takes half a second, and messages go over a small radio that delays, loses, doubles,
-  reorders and is cut in two. Pure but for `:rand`, which ExUnit seeds.
+  a scan takes half a second, and messages go over a small radio that delays, loses, duplicates
+  and reorders messages, and can be cut into two. Pure except for `:rand`, which ExUnit seeds.
   """
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.{Behaviour, Percept}
@@ -35,7 +35,10 @@ defmodule Missions.Landmark.Group do
   @spec new(keyword()) :: t()
   def new(options \\ []), do: struct!(__MODULE__, options)
 
-  @doc "Puts a robot there and starts it. `share` of the picture that the landmark fills, `nil` for unseen."
+  @doc """
+  Puts a robot there and starts it. `share` is the share of the picture that the landmark fills,
+  `nil` if unseen.
+  """
   @spec join(t(), atom(), {number(), number()}, float() | nil, keyword()) :: t()
   def join(group, id, {x, y}, share, options \\ []) do
     {boot, options} = Keyword.pop(options, :boot, 1)
@@ -60,22 +63,22 @@ defmodule Missions.Landmark.Group do
     event(group, id, {:command, :start})
   end
 
-  @doc "A robot that is switched off, with all that it knew."
+  @doc "Switches a robot off, with all that it knew."
   @spec kill(t(), atom()) :: t()
   def kill(group, id), do: %{group | robots: Map.delete(group.robots, id)}
 
-  @doc "How much of a robot's picture the landmark fills from now on."
+  @doc "Sets how much of a robot's picture the landmark fills from now on."
   @spec show(t(), atom(), float() | nil) :: t()
   def show(group, id, share), do: put_in(group.robots[id].share, share)
 
   @doc """
-  Cuts the radio between the members of different sets, or single links `{:link, a, b}` and ways
-  `{:way, from, to}`; `[]` mends it.
+  Cuts the radio between the members of different sets, or single links `{:link, a, b}` and
+  directions `{:way, from, to}`; `[]` mends it.
   """
   @spec cut(t(), [[atom()] | {:link | :way, atom(), atom()}]) :: t()
   def cut(group, sets), do: %{group | cut: sets}
 
-  @doc "The robots that can reach each other, if need be by way of others: the parts of the radio."
+  @doc "The groups of robots that can reach each other, directly or by way of others."
   @spec parts(t()) :: [[atom()]]
   def parts(group), do: parts(group, ids(group))
 
@@ -93,11 +96,11 @@ defmodule Missions.Landmark.Group do
     if more == [], do: found, else: reach(ids, found ++ more, way?)
   end
 
-  @doc "So many seconds on."
+  @doc "Runs for so many seconds."
   @spec run(t(), number()) :: t()
   def run(group, seconds), do: Enum.reduce(1..round(seconds * 10), group, fn _, g -> tick(g) end)
 
-  @doc "On until it holds, at most so many seconds; says whether it did."
+  @doc "Runs until a condition holds, at most so many seconds; returns whether it held."
   @spec until(t(), number(), (t() -> boolean())) :: {boolean(), t()}
   def until(group, seconds, holds?) do
     Enum.reduce_while(1..round(seconds * 10), {false, group}, fn _, {_, group} ->
@@ -106,7 +109,7 @@ defmodule Missions.Landmark.Group do
     end)
   end
 
-  @doc "One event for one robot, as if it happened now."
+  @doc "Gives one robot one event, as if it happened now."
   @spec event(t(), atom(), term()) :: t()
   def event(group, id, event) do
     robot = group.robots[id]
@@ -125,7 +128,7 @@ defmodule Missions.Landmark.Group do
 
   defp note_digest(group, _round), do: group
 
-  @doc "The percept that a robot has now."
+  @doc "The current percept of a robot."
   @spec percept(t(), atom()) :: Percept.t()
   def percept(group, id) do
     robot = group.robots[id]
@@ -177,11 +180,11 @@ defmodule Missions.Landmark.Group do
     ]
   end
 
-  @doc "What all robots are at, by name."
+  @doc "The phases of all robots, by name."
   @spec phases(t()) :: %{atom() => atom()}
   def phases(group), do: Map.new(group.robots, fn {id, robot} -> {id, robot.mission.phase} end)
 
-  @doc "Whom each robot takes for its leader."
+  @doc "The leader of each robot, as it believes."
   @spec leaders(t()) :: %{atom() => atom() | nil}
   def leaders(group), do: Map.new(group.robots, fn {id, robot} -> {id, robot.mission.leader} end)
 
@@ -200,7 +203,8 @@ defmodule Missions.Landmark.Group do
     group |> ids() |> Enum.shuffle() |> Enum.reduce(group, &think/2) |> watch()
   end
 
-  # Sorted: a map's own order changes from one start of the VM to the next, and draws with it.
+  # Sorted, because a map's order changes from one start of the VM to the next, and the random
+  # draws with it.
   defp ids(group), do: group.robots |> Map.keys() |> Enum.sort()
 
   defp think(id, group) do
@@ -208,7 +212,7 @@ defmodule Missions.Landmark.Group do
     if rem(group.now, @beat_ms) == 0, do: beat(group, id), else: group
   end
 
-  # Bodies and scans: what behaviours would do.
+  # Moves bodies and ends scans, as behaviours would do.
   defp finish(group, id) do
     case group.robots[id] do
       %{goal: {{:search, _} = tag, _}, goal_ms: since} = robot
@@ -324,7 +328,7 @@ defmodule Missions.Landmark.Group do
 
   defp take(group, to, message), do: event(group, to, {:message, message})
 
-  # For how long two robots lead in one part of the radio.
+  # How long two robots lead in one connected group.
   defp watch(group) do
     leading = for {id, %{mission: %{phase: :lead}}} <- group.robots, do: id
 

@@ -6,25 +6,26 @@ defmodule Missions.Landmark.Blocker do
   |---|---|
   | `:landmark` | the landmark, in the slot or on the way to it |
   | `{:robot, id}` | a robot, dead, standing or passing, in the slot or on the way |
-  | `:unknown` | something that the sonars see and nobody has told of |
-  | `:no_way` | nothing of these: what is known leaves no way, or the robot finds none |
-  | `:no_anchor` | the leader has not told where its place is |
+  | `:unknown` | something that the sonars see and nobody has reported |
+  | `:no_way` | none of these: known obstacles leave no way, or the robot finds none |
+  | `:no_anchor` | the leader has not said where its place is |
   """
   alias Hal.Pose
   alias Robot.Behaviour.Avoid.Neighbours
   alias Robot.Percept
   alias Missions.Landmark.LandmarkTrack
 
-  # Room that a robot wants beside its body, and how much of its way it looks at, in metres.
+  # The room that a robot needs beside its body, and the length of its way that is checked, in
+  # metres.
   @clear 0.1
   @ahead 1.5
 
   @type t :: :landmark | {:robot, atom()} | :unknown | :no_way | :no_anchor
 
   @doc """
-  The blocker between a percept's pose and a slot, both in the map frame in metres; the landmark's place,
-  `nil` where nobody knows it. What is in the slot comes first, then the nearest thing on the first 1.5 m
-  of the straight way.
+  The blocker between a percept's pose and a slot, both in the map frame in metres; `nil` as the
+  landmark's place means that nobody knows it. A blocker in the slot comes first, then the nearest
+  one on the first 1.5 m of the straight way.
   """
   @spec find(Percept.t(), Pose.t(), Pose.point() | nil) :: t()
   def find(%Percept{pose: pose, profile: profile} = percept, slot, landmark) do
@@ -75,7 +76,7 @@ defmodule Missions.Landmark.Blocker do
     {pose.x + (slot.x - pose.x) * share, pose.y + (slot.y - pose.y) * share}
   end
 
-  # From a point to the stretch between two others.
+  # The distance of a point from the segment between two others.
   defp aside({x, y} = point, {ax, ay}, {bx, by}) do
     {dx, dy} = {bx - ax, by - ay}
     square = dx * dx + dy * dy

@@ -3,8 +3,8 @@ defmodule Missions.Landmark.Challenge do
   Decides when a follower asks for a new leader (R76): it sees the landmark nearer than the leader
   does, by 0.5 m or a fifth of the distance, for 2 s; or the leader has not seen it for 3 s while
   this robot does. No leader is challenged in its first 10 s, so that leadership cannot oscillate;
-  and as long as the landmark has not moved, a robot that passes it on the way to its slot is no
-  challenger. Pure.
+  and as long as the landmark has not moved, a robot that passes it on the way to its slot does
+  not challenge the leader. Pure.
   """
   alias Swarm.Membership.Peers
   alias Missions.Landmark
@@ -64,7 +64,7 @@ defmodule Missions.Landmark.Challenge do
 
   defp moved?(_mission), do: false
 
-  # Of several that could, the nearest asks.
+  # If several could ask, the nearest does.
   defp nearest?(mine, me, peers) do
     Enum.all?(peers, fn {id, beat} ->
       beat.phase != :follow or beat.sight == nil or beat.sight.distance == nil or

@@ -3,11 +3,11 @@ defmodule Missions.Landmark.Follower do
   What a follower does: it drives to its slot, watches what it can correct its pose by, and passes
   the reference on to its child. Pure.
 
-  Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard). Meanwhile
-  it looks at the landmark, since the next it may be asked for is how large it sees it.
+  Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard).
+  Meanwhile it looks at the landmark, because a round may ask next how large it sees it.
 
-  One that stands in its slot by its own estimate, and does not know its place well enough to say so
-  (`Missions.Landmark.Marks.sure?/2`), is `unsure?`: neither in place nor blocked.
+  A follower that stands in its slot by its own estimate, but does not know its place well enough
+  to say so (`Missions.Landmark.Marks.sure?/2`), is `unsure?`: neither in place nor blocked.
   """
   alias Hal.Pose
   alias Robot.Behaviour
@@ -25,13 +25,15 @@ defmodule Missions.Landmark.Follower do
   # The camera looks at the landmark and at the robot ahead in turn.
   @gaze_ms 1_500
 
-  # A slot is blocked when something unknown stands in it for so long, or no way leads nearer.
+  # A slot is blocked if something unknown has stood in it for this long, or if no way leads
+  # nearer.
   @obstacle_ms 2_000
   @stuck_ms 8_000
   @progress 0.1
   @reach 2.0
   @clear 0.1
-  # Wherever it is: who has come no nearer for so long, to one place of one shape, does not get on.
+  # Wherever it is, a robot that has come no nearer to one slot of one shape for this long makes
+  # no progress.
   @late_ms 15_000
   @elsewhere 1.0
 
@@ -49,11 +51,11 @@ defmodule Missions.Landmark.Follower do
             obstacle_ms: nil
 
   @typedoc """
-  `told` is the epoch and sequence number of the anchor that was last passed on, `landmark` where the
-  landmark stood when this robot was last in place. `best` is the least distance to `slot` so far, and
-  `best_ms` when it was reached; since `obstacle_ms` something unknown stands in the slot. `late` is the same over
-  all small moves of the slot: shape, slot, least distance, and when that was reached. `blocker` is what a blocked
-  robot is blocked by.
+  `told` is the epoch and sequence number of the anchor that was last passed on, `landmark` is
+  where the landmark stood when this robot was last in place. `best` is the least distance to
+  `slot` so far, and `best_ms` when it was reached; something unknown has stood in the slot since
+  `obstacle_ms`. `late` is the same, ignoring small moves of the slot: shape, slot, least
+  distance, and when that was reached. `blocker` is what blocks a blocked robot.
   """
   @type t :: %__MODULE__{
           in_place?: boolean(),
@@ -70,11 +72,11 @@ defmodule Missions.Landmark.Follower do
           obstacle_ms: integer() | nil
         }
 
-  @doc "Not attending anybody yet."
+  @doc "The state of a robot that does not follow anybody yet."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
-  @doc "Begins to follow."
+  @doc "The state at the beginning of following."
   @spec begin(Landmark.State.t()) :: Landmark.State.t()
   def begin(mission), do: %{mission | attend: new(), scan: nil}
 
@@ -92,7 +94,7 @@ defmodule Missions.Landmark.Follower do
     end
   end
 
-  # A leader that is silent for longer than a lease leaves its followers where they are.
+  # If a leader is silent for longer than a lease, its followers stay where they are.
   defp wait(attend, age_ms) do
     silent? = age_ms >= @late_ms
     blocker = if silent?, do: :no_anchor
@@ -126,7 +128,8 @@ defmodule Missions.Landmark.Follower do
             unsure?: there? and not sure?,
             holding?: resting? and error <= @near,
             told: told,
-            # Where the landmark stood when this robot was last in place, or began to follow.
+            # Remembers where the landmark stood when this robot was last in place, or began to
+            # follow.
             landmark: landmark(mission, there?)
         }
     }
@@ -138,7 +141,7 @@ defmodule Missions.Landmark.Follower do
     {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, Marks.anchors(mission)}]}
   end
 
-  # Nothing blocks a robot that stands where it wants to be, as far as it knows.
+  # A robot that stands where it should, as far as it knows, is not blocked.
   defp block(%{attend: %{in_place?: in_place?, unsure?: unsure?} = attend} = mission, slot, error)
        when in_place? or unsure?,
        do: fresh(attend, slot, error, mission.now_ms)
@@ -159,7 +162,7 @@ defmodule Missions.Landmark.Follower do
     end
   end
 
-  # Farther off, or where the slot trembles, time alone tells that a robot does not get on.
+  # Farther away, or if the slot trembles, only time shows that a robot makes no progress.
   defp late(%{in_place?: in_place?, unsure?: unsure?} = attend, _mission, _slot, _error)
        when in_place? or unsure?,
        do: %{attend | late: nil, blocker: nil}
@@ -182,7 +185,8 @@ defmodule Missions.Landmark.Follower do
 
   defp patience(_none_or_other, shape, slot, error, now), do: {shape, slot, error, now}
 
-  # Named once, when the robot gives up: while it stands and waits, what passes by is not to blame.
+  # The blocker is determined once, when the robot gives up: what passes by while it waits is not
+  # the cause.
   defp blocker(_attend, _mission, _slot, false), do: nil
 
   defp blocker(%{blocker: nil}, mission, slot, true),
@@ -200,7 +204,7 @@ defmodule Missions.Landmark.Follower do
       else: %{attend | obstacle_ms: nil}
   end
 
-  # Something that the sonars see where this robot should stand, and that nobody has told of.
+  # Something that the sonars see where this robot should stand, and that nobody has reported.
   defp obstacle?(%{percept: percept, anchor: anchor}, slot) do
     robots = for {_id, peer} <- percept.peers, do: {peer.pose.x, peer.pose.y, peer.radius}
 
@@ -230,7 +234,7 @@ defmodule Missions.Landmark.Follower do
     end
   end
 
-  # Pan towards the landmark or towards the robot ahead, whichever's turn it is and can be seen.
+  # Pans towards the landmark and the robot ahead in turn, as far as they can be seen.
   defp look(%{anchor: anchor, percept: percept} = mission, age_ms) do
     {leader, _twist} = SlotPoses.leader(anchor, age_ms)
     targets = [SlotPoses.landmark(anchor) || Pose.point(leader), ahead(mission, leader)]
@@ -243,7 +247,7 @@ defmodule Missions.Landmark.Follower do
     end)
   end
 
-  # Where the landmark was when somebody last knew.
+  # The last known place of the landmark.
   defp look_out(%{percept: %{pose: nil}}), do: 0.0
 
   defp look_out(%{anchor: anchor, sight: sight, percept: percept}) do

@@ -20,8 +20,8 @@ defmodule Missions.Landmark.LandmarkTrack do
           moving?: boolean()
         }
 
-  # The share that one picture has in the estimate of the place (pictures come at 10 Hz), and
-  # how far off it must be to start a new estimate.
+  # The weight of one picture in the estimate of the place (pictures come at 10 Hz), and the
+  # deviation at which a new estimate starts.
   @gain 0.2
   @jump 0.6
   @moving 0.1
@@ -33,7 +33,9 @@ defmodule Missions.Landmark.LandmarkTrack do
   @spec radius() :: float()
   def radius, do: @radius
 
-  @doc "The sight after one more percept; an old one stays when the landmark is not in the picture."
+  @doc """
+  The sight after one more percept; the old one stays if the landmark is not in the picture.
+  """
   @spec update(t() | nil, Percept.t(), String.t()) :: t() | nil
   def update(old, %Percept{detections: nil}, _colour), do: old
   def update(old, %Percept{detections: %{pose: nil}}, _colour), do: old
@@ -65,7 +67,7 @@ defmodule Missions.Landmark.LandmarkTrack do
     end
   end
 
-  # A pole whose foot or top is out of the picture is as wide as before.
+  # The width of a pole stays right if its foot or top is out of the picture.
   defp distance(%{clipped?: true, left: left, right: right, width: width} = blob, blobs, view)
        when left > 0 and right < width - 1 do
     unless Sighting.hidden?(blob, blobs),
@@ -75,8 +77,8 @@ defmodule Missions.Landmark.LandmarkTrack do
   defp distance(blob, blobs, _view), do: Sighting.distance(blob, blobs)
 
   @doc """
-  Whether the place is known for sure: seen within the last `ms`, in all its width, and standing. Where a landmark
-  goes that is clipped at the side nobody sees.
+  Whether the place is certain: the landmark was seen within the last `ms`, in its full width, and
+  stands still. The motion of a landmark that is clipped at the side cannot be seen.
   """
   @spec still?(t() | nil, integer(), pos_integer()) :: boolean()
   def still?(%{place_ms: place_ms, moving?: false}, now_ms, ms) when place_ms != nil,

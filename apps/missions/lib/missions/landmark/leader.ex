@@ -12,25 +12,26 @@ defmodule Missions.Landmark.Leader do
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Merge, Rounds, Shape}
 
-  # The landmark's foot leaves the picture below 1.4 m, and its size with it.
+  # Nearer than 1.4 m the landmark's foot leaves the picture, and then its size is unknown.
   @near 1.5
   @far 1.9
-  # How far off its ring round the landmark a leader may stand.
+  # How far from its ring around the landmark a leader may stand.
   @ring_slack 0.15
-  # A landmark measured this long ago is where it was told to be.
+  # A landmark that was measured at most this long ago is where it was reported.
   @still_ms 400
-  # A shape is formed when it has been right for so long, and no more when it was wrong for so long.
+  # A shape is formed when it has been right for this long, and no longer when it was wrong for
+  # this long.
   @formed_ms 1_000
   @unformed_ms 500
-  # The landmark is lost when it was not seen for so long; a little later the leader looks round.
+  # The landmark is lost if it was not seen for this long; a little later the leader looks around.
   @lost_ms 3_000
   @scan_ms 5_000
   @unheard_ms 1_500
-  # By then all that took part in the round have told that they follow; who comes now is new.
+  # By then all that took part in the round have reported that they follow; later ones are new.
   @settled_ms 1_000
-  # Farther than this nobody is lost, in whatever unit.
+  # No robot is farther away than this, in any unit.
   @lost 999_999_999
-  # For so long a new leader tells its place to all, not to its child alone.
+  # For this long a new leader sends its place to all, not only to its child.
   @fresh_ms 500
 
   defstruct sequence: 0,
@@ -42,8 +43,8 @@ defmodule Missions.Landmark.Leader do
             shape: %Shape{}
 
   @typedoc """
-  `sequence` numbers the anchors; since `good_ms` the shape has been as it should be, since `bad_ms` it
-  has not; `heard_ms` is when somebody was last known to hear this leader.
+  `sequence` numbers the anchors; the shape has been right since `good_ms`, or wrong since
+  `bad_ms`; `heard_ms` is when somebody was last known to hear this leader.
   """
   @type t :: %__MODULE__{
           sequence: non_neg_integer(),
@@ -55,11 +56,11 @@ defmodule Missions.Landmark.Leader do
           shape: Shape.t()
         }
 
-  @doc "Nothing led yet."
+  @doc "The state of a robot that does not lead yet."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
-  @doc "Takes the lead with the order that the round's record gave."
+  @doc "Takes the lead with the order of the round's record."
   @spec begin(Landmark.State.t()) :: Landmark.State.t()
   def begin(mission) do
     %{
@@ -70,7 +71,9 @@ defmodule Missions.Landmark.Leader do
     }
   end
 
-  @doc "Takes up a new shape, which everyone learns from the anchor; `:cost` deals the slots anew."
+  @doc """
+  Takes a new shape, which everyone learns from the anchor; `:cost` assigns the slots again.
+  """
   @spec reshape(Landmark.State.t()) :: Landmark.State.t()
   def reshape(mission) do
     lead = %{mission.lead | formed?: false, good_ms: nil, bad_ms: nil, shape: Shape.new()}
@@ -78,7 +81,7 @@ defmodule Missions.Landmark.Leader do
   end
 
   @doc """
-  Whether a leader is one no more: it gives way to a later one, or nobody has heard it for 1.5 s
+  Whether a leader stops leading: it gives way to a later one, or nobody has heard it for 1.5 s
   though it is not alone. Under the policy `:majority` more than half of the fleet must hear it.
   """
   @spec deposed?(Landmark.State.t()) :: boolean()
@@ -95,7 +98,7 @@ defmodule Missions.Landmark.Leader do
     if mission.percept.pose, do: lead(mission), else: blind(mission)
   end
 
-  # Who does not know where it is cannot tell others where to stand; they soon stand still.
+  # A leader that does not know where it is cannot tell others where to stand; they soon stop.
   defp blind(mission),
     do: {%{mission | anchor: nil}, [{:goal, :stand, {Behaviour.Stop, []}}, {:look, 0.0}]}
 
@@ -113,7 +116,7 @@ defmodule Missions.Landmark.Leader do
     {mission, formed ++ lost ++ place ++ [goal(mission), {:look, 0.0}, {:anchors, %Anchors{}}]}
   end
 
-  # By when so many followers as a majority needs have told that they hear this leader.
+  # When enough followers for a majority last reported that they hear this leader.
   defp hear(%{of: of} = mission) when of > 0 do
     told =
       for {_id, %{at_ms: at_ms, beat: %{leader: leader, heard: heard}}} <- mission.percept.peers,
@@ -129,7 +132,7 @@ defmodule Missions.Landmark.Leader do
     put_in(mission.lead.heard_ms, max(heard_ms, mission.lead.heard_ms))
   end
 
-  # Who is alone has nobody to be heard by, and who comes needs time to hear it.
+  # If it is alone, nobody can hear it, and a robot that comes needs time to hear it.
   defp hear(mission) do
     heard? =
       mission.percept.peers
@@ -141,14 +144,15 @@ defmodule Missions.Landmark.Leader do
       else: mission
   end
 
-  # The child passes it on; but at first all stand and wait for it.
+  # The child passes it on; but at first all robots stand and wait for it.
   defp told(mission) do
     if mission.now_ms - mission.since_ms < @fresh_ms,
       do: mission.order,
       else: Enum.take(mission.order, 1)
   end
 
-  # The gone leave their slots and those behind move up (R53 with healing); who comes joins the tail.
+  # Robots that are gone leave their slots and those behind move up (R53 with healing); new ones
+  # join the tail.
   defp muster(mission) do
     view = List.delete(Rounds.view(mission), mission.me)
     kept = Chain.heal(mission.order, view)
@@ -161,7 +165,7 @@ defmodule Missions.Landmark.Leader do
     %{mission | order: kept ++ came}
   end
 
-  # Where the shape has changed, `:cost` deals its slots anew.
+  # If the shape has changed, `:cost` assigns its slots again.
   defp shape(%{lead: lead} = mission) do
     shape = Shape.update(lead.shape, mission, landmark_distance(mission))
     new? = {shape.formation, shape.room} != {lead.shape.formation, lead.shape.room}
@@ -170,7 +174,7 @@ defmodule Missions.Landmark.Leader do
     if new? and not dealt? and mission.assign == :cost, do: deal(mission), else: mission
   end
 
-  # Then the round's record has dealt them; it does not know where there is no room.
+  # Then the round's record has assigned them; it does not know where there is no room.
   defp all_free?(%{order: order, lead: %{shape: %{room: {size, places}}}}) do
     count = length(order)
     size == count + 1 and Enum.sort(places) == Enum.to_list(1..count//1)
@@ -181,7 +185,7 @@ defmodule Missions.Landmark.Leader do
 
   defp landmark_distance(_mission), do: @near
 
-  # Deals the slots by squared cost from where the robots say they are.
+  # Assigns the slots by squared distance from where the robots say they are.
   defp deal(mission) do
     beats = Peers.taking_part(mission.percept.peers, mission.now_ms)
     followers = for id <- mission.order, {x, y, _heading} = beats[id].pose, do: {id, {x, y}}
@@ -242,7 +246,7 @@ defmodule Missions.Landmark.Leader do
 
   defp millionths(variance), do: min(round(variance * 1.0e6), @lost)
 
-  # A crawl is told as standing still, so that no slot trembles.
+  # A crawl is reported as standing still, so that no slot trembles.
   defp twist(%{odometry: %{twist: %{linear: linear, turn: turn}}}) do
     if abs(linear) < 0.02 and abs(turn) < 0.02,
       do: {0, 0},
@@ -251,7 +255,7 @@ defmodule Missions.Landmark.Leader do
 
   defp point({x, y}), do: {round(x * 1000), round(y * 1000)}
 
-  # All followers in place, and the leader still in front of the landmark, for a second.
+  # All followers are in place, and the leader is still in front of the landmark, for a second.
   defp judge(mission) do
     good? =
       Landmark.State.sees?(mission) and Landmark.State.slow?(mission.percept, 0.05) and
@@ -300,8 +304,9 @@ defmodule Missions.Landmark.Leader do
     {put_in(mission.lead.lost?, lost?), stage}
   end
 
-  # A leader that has not seen the landmark for long looks all round for it. A new one may have seen it
-  # with its camera turned aside, and looks ahead now: it turns to where that was.
+  # A leader that has not seen the landmark for long looks all around for it. A new leader may
+  # have seen it with its camera turned aside, and look ahead now: it turns to where the landmark
+  # was.
   defp goal(mission) do
     if LandmarkTrack.fresh?(mission.sight, mission.now_ms, @scan_ms) or
          mission.now_ms - mission.since_ms < @scan_ms do

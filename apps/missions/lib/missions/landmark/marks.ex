@@ -4,8 +4,8 @@ defmodule Missions.Landmark.Marks do
   leader reports, and the robots ahead of it in the order at their reported places, each with its
   reported uncertainty. Also decides when the pose is sure enough to claim a slot. Pure.
 
-  Only those ahead in the order, so that corrections run one way, from the leader down. All others may be seen, too,
-  and must not be taken for one of these.
+  Only robots ahead in the order count, so that corrections run one way, from the leader down. All
+  others may be seen, too, and must not be mistaken for one of these.
   """
   alias Hal.Pose
   alias Robot.Localiser.Anchors
@@ -13,26 +13,27 @@ defmodule Missions.Landmark.Marks do
   alias Missions.Landmark.{LandmarkTrack, SlotPoses}
 
   @robot_colour "RedRobot"
-  # How far a robot may have gone since it was heard, and how well is known where one is that is in another frame, in metres.
+  # How far a robot may have moved since it was heard, and the uncertainty of the place of a robot
+  # in another frame, in metres.
   @moved_sd 0.15
   @strange_sd 1.0
-  # How well the leader knows where it is itself, in its own frame, and how well the landmark's place there: of its
-  # distance so much (in metres, and per metre), and across.
+  # The leader's uncertainty of its own place in its own frame, and of the landmark's place there:
+  # along the distance (in metres, and per metre), and across.
   @leader_sd 0.01
   @landmark_along {0.02, 0.1}
   @landmark_across {0.005, 0.005}
-  # Slower than this a robot stands, in m/s and rad/s.
+  # A robot slower than this stands still, in m/s and rad/s.
   @slow 0.05
-  # A robot in its place is no farther from it than this, in 95 of 100 cases, in metres.
+  # A robot in place is at most this far from its slot in 95 of 100 cases, in metres.
   @tolerance 0.5
 
-  @doc "The anchors of a follower that has a pose and an anchor of its leader."
+  @doc "The marks of a follower that has a pose and an anchor of its leader."
   @spec anchors(Landmark.State.t()) :: Anchors.t()
   def anchors(%{anchor: anchor, percept: percept} = mission) do
     {leader, _twist} = SlotPoses.leader(anchor, mission.now_ms - mission.anchor_ms)
     ahead = [anchor.leader | Enum.take_while(anchor.order, &(&1 != mission.me))]
 
-    # In an order that no virtual machine chooses: each correction changes the next.
+    # In an order that does not depend on the VM, because each correction changes the next.
     robots =
       for {id, peer} <- Enum.sort(percept.peers) do
         %{
@@ -49,7 +50,7 @@ defmodule Missions.Landmark.Marks do
     %Anchors{frame: frame(mission, leader), marks: landmark(mission) ++ robots}
   end
 
-  # A landmark that moves is somewhere else by now.
+  # A moving landmark is somewhere else by now.
   defp landmark(%{anchor: %{still: true, landmark: place} = anchor} = mission)
        when place != nil do
     [
@@ -74,7 +75,7 @@ defmodule Missions.Landmark.Marks do
     {grown.(@landmark_along), grown.(@landmark_across), :math.atan2(dy, dx)}
   end
 
-  # What a moving robot told is where it was, and where a dead one came to rest nobody knows.
+  # A moving robot reported where it was, and nobody knows where a dead one came to rest.
   defp standing?(%{mode: :dead}), do: false
 
   defp standing?(%{mode: :moving, twist: twist}),
@@ -82,7 +83,7 @@ defmodule Missions.Landmark.Marks do
 
   defp standing?(_holding), do: true
 
-  # Who is not in the leader's frame yet cannot tell where it is there.
+  # A robot that is not in the leader's frame yet cannot say where it is there.
   defp told?(leader, _peer, %{leader: leader}), do: true
 
   defp told?(_id, %{beat: %{sd: sd, leader: leader, epoch: epoch}}, anchor),
@@ -119,7 +120,7 @@ defmodule Missions.Landmark.Marks do
 
   defp variances({mm, mrad}), do: {mm * mm / 1.0e6, mrad * mrad / 1.0e6}
 
-  # A leader that was started anew numbers its frames anew.
+  # A leader that was started again numbers its frames from the beginning.
   defp key(%{anchor: %{leader: leader, frame: number}, percept: percept}) do
     case percept.peers do
       %{^leader => %{beat: %{boot: boot}}} -> {leader, boot, number}
@@ -128,9 +129,9 @@ defmodule Missions.Landmark.Marks do
   end
 
   @doc """
-  How well a robot knows its place in its leader's frame, as heartbeats tell it: the standard deviation of its
-  position along the worst direction and across it (mm), and that direction (mrad); `nil` where it has not come into
-  that frame yet, or has none.
+  How well a robot knows its place in its leader's frame, as heartbeats report it: the standard
+  deviation of its position along the worst direction and across it (mm), and that direction
+  (mrad); `nil` if it is not in that frame yet, or has none.
   """
   @spec told(Landmark.State.t()) :: Swarm.Membership.Heartbeat.spread() | nil
   def told(%{anchor: %{}, percept: %{uncertainty: %{frame: frame, spread: spread}}} = mission) do

@@ -14,9 +14,9 @@ defmodule Missions.Landmark.Merge do
   # Heartbeats come at 5 Hz: after this time all of the other part have been heard.
   @settle_ms 300
   @late_ms 700
-  # A later epoch that no leader stands for: the own one is over all the same.
+  # A later epoch without a known leader still ends this robot's own epoch.
   @higher_ms 1_500
-  # Until then followers may not have told yet that they follow.
+  # Until then followers may not have reported yet that they follow.
   @young_ms 1_000
 
   @doc "Notes once a tick how many robots this one leads, and since when there is another leader."
@@ -36,7 +36,7 @@ defmodule Missions.Landmark.Merge do
 
   def update(mission), do: %{mission | rival_ms: nil, higher_ms: nil}
 
-  @doc "Whether this leader is to open the round in which two parts become one."
+  @doc "Whether this leader should open the round that joins two parts of the fleet."
   @spec due?(Landmark.State.t()) :: boolean()
   def due?(%{phase: :lead, rival_ms: since} = mission) when since != nil do
     peers = peers(mission)
@@ -69,8 +69,8 @@ defmodule Missions.Landmark.Merge do
     do: epoch > mission.epoch and following(peers, id) > 0
 
   @doc """
-  Of these robots, those that another leader leads now. When parts meet, a follower may be heard before
-  its leader is: who follows somebody that is not heard is not free either.
+  Those of the given robots that another leader leads now. When parts meet, a follower may be
+  heard before its leader is, so a robot that follows somebody unheard is not free either.
   """
   @spec theirs([atom()], Landmark.State.t()) :: [atom()]
   def theirs(ids, mission) do

@@ -2,7 +2,7 @@ defmodule Missions.Landmark.Options do
   @moduledoc """
   The options of the landmark mission, checked and completed. Pure.
 
-  | option | is | default |
+  | option | meaning | default |
   |---|---|---|
   | `formation:` | `{kind, spacing}` or a kind (`Swarm.Formation`) | `{:column, 1.0}` |
   | `assign:` | `:chain` or `:cost` | `:chain` |
@@ -13,7 +13,7 @@ defmodule Missions.Landmark.Options do
   alias Hal.Options
   alias Swarm.Formation
 
-  @doc "What is allowed."
+  @doc "The table of the options: what is allowed."
   @spec table() :: Options.table()
   def table do
     [
@@ -28,8 +28,8 @@ defmodule Missions.Landmark.Options do
   end
 
   @doc """
-  Options as people write them, of a start of so many robots (`nil` where that is not known). What was checked
-  once passes unchanged.
+  Checks and completes options as people write them, for a start of so many robots (`nil` if that
+  is not known). Options that were already checked pass unchanged.
 
       iex> Missions.Landmark.Options.check([formation: :wedge, policy: :majority], 4)
       {:ok, [of: 4, formation: {:wedge, 1.0}, policy: :majority]}

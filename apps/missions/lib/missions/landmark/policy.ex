@@ -3,38 +3,39 @@ defmodule Missions.Landmark.Policy do
   What a robot may do with the robots that it can reach. Pure.
 
   **Who may lead.** `policy: :available` (the default): every part of a fleet leads itself.
-  `policy: :majority, of: n`: only a part with more than half of `n` robots may lead; the others stand
-  still until they are enough again, and their leader abdicates within its lease. Of 4 robots, 2 are
-  not enough. A robot that a leader may still count on reports in no round without this leader until that
-  lease is over, so that no other one leads before. The number travels in every report and in the anchor, and the greatest that is heard
-  counts, so that all of a part judge alike.
+  `policy: :majority, of: n`: only a part with more than half of `n` robots may lead; the others
+  stand still until they are a majority again, and their leader abdicates within its lease. Of 4
+  robots, 2 are not enough. A robot that a leader may still count on does not report in a round
+  without this leader until that lease is over, so that no other robot leads before then. The
+  number `n` travels in every report and in the anchor, and the greatest that is heard counts, so
+  that all of a part decide alike.
 
   **Lost link.** A robot that was with others in this mission, and has heard nobody for 2 s, does
   what `lost_link` says until it hears somebody:
 
   | `lost_link` | what it does |
   |---|---|
-  | `:stop` | stands at once, where it is |
-  | `:hold` | goes to the place that it was given last, and stands there |
-  | `:continue` | goes on by itself: searches, and leads itself where it may |
+  | `:stop` | stops at once, where it is |
+  | `:hold` | goes to the place that it was last given, and stands there |
+  | `:continue` | goes on by itself: searches, and leads itself if it may |
 
-  Without the option followers stop, leaders and searchers continue; one that is given holds for all.
-  A robot that never met anybody has lost nobody.
+  Without the option, followers stop, leaders and searchers continue; if it is given, it applies
+  to all. A robot that never met anybody cannot lose anybody.
   """
   alias Swarm.Agreement.Election
   alias Swarm.Membership.Peers
   alias Missions.Landmark
 
-  # A heartbeat lists who was heard in the last second.
+  # A heartbeat lists the robots that were heard in the last second.
   @heard_ms 1_000
-  # A leader's lease, and the time that a heartbeat may be under way.
+  # A leader's lease, plus the time that a heartbeat may be under way.
   @vow_ms 1_800
-  # Who has only just been started has heard nobody yet.
+  # A robot that has only just been started has heard nobody yet.
   @gather_ms 2_000
 
   @doc """
-  Of the options of a mission (`Missions.Landmark.Options`) the fleet's size of which a majority is asked for, 0
-  for no such rule, and what to do without a link.
+  From the options of a mission (`Missions.Landmark.Options`): the size of the fleet of which a
+  majority is required (0 if none is), and what to do when the link is lost.
 
       iex> Missions.Landmark.Policy.of([policy: :majority, of: 4])
       {4, nil}
@@ -79,31 +80,33 @@ defmodule Missions.Landmark.Policy do
   def bound?(%{vow: {leader, at_ms}} = mission, view),
     do: leader not in view and mission.now_ms - at_ms < @vow_ms
 
-  @doc "Whether it was with others, and hears nobody any more."
+  @doc "Whether this robot was with others, and no longer hears anybody."
   @spec lost?(Landmark.State.t()) :: boolean()
   def lost?(mission), do: mission.met? and not company?(mission)
 
-  @doc "Whether anybody is heard."
+  @doc "Whether this robot hears anybody."
   @spec company?(Landmark.State.t()) :: boolean()
   def company?(mission),
     do: Peers.taking_part(mission.percept.peers, mission.now_ms) != %{}
 
-  @doc "What this robot does without a link, by what it was last."
+  @doc "What this robot does when the link is lost, depending on its last role."
   @spec lost_link(Landmark.State.t()) :: :stop | :hold | :continue
   def lost_link(%{lost_link: nil, role: :follower}), do: :stop
   def lost_link(%{lost_link: nil}), do: :continue
   def lost_link(%{lost_link: link}), do: link
 
-  @doc "Whether so many robots may have a leader."
+  @doc "Whether this many robots may have a leader."
   @spec enough?(Landmark.State.t(), non_neg_integer()) :: boolean()
   def enough?(mission, robots), do: Election.enough?(robots, mission.of)
 
-  @doc "Whether this robot may open a round among so many."
+  @doc "Whether this robot may open a round among this many robots."
   @spec may_open?(Landmark.State.t(), non_neg_integer()) :: boolean()
   def may_open?(mission, robots),
     do: enough?(mission, robots) and not (lost?(mission) and lost_link(mission) != :continue)
 
-  @doc "Whether there are too few to have a leader; right after the start they are given time."
+  @doc """
+  Whether there are too few robots to have a leader; right after the start they are given time.
+  """
   @spec short?(Landmark.State.t(), non_neg_integer()) :: boolean()
   def short?(mission, robots),
     do: not enough?(mission, robots) and mission.now_ms >= mission.gather_ms

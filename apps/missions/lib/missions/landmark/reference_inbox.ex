@@ -6,13 +6,15 @@ defmodule Missions.Landmark.ReferenceInbox do
   alias Swarm.Formation.Reference
   alias Missions.Landmark
 
-  # No fleet elects that often unheard; taken over, it would leave no room for epochs to come.
+  # No fleet elects this often unheard; accepting such an epoch would leave no room for later
+  # ones.
   @leap 1_000_000
-  # An anchor this old is not joined any more.
+  # A robot does not join by an anchor older than this.
   @news_ms 500
 
   @doc """
-  The leader's heartbeats carry the anchor too; the last one of a leader that fell silent is no news.
+  Hears the anchor in the leader's heartbeats; the last one of a leader that fell silent counts
+  only once.
   """
   @spec beats(Landmark.State.t()) :: Landmark.State.t()
   def beats(%{now_ms: now} = mission) do
@@ -27,8 +29,9 @@ defmodule Missions.Landmark.ReferenceInbox do
   end
 
   @doc """
-  Hears an anchor. Only one of the own leader, or one of a later epoch that names this robot, counts,
-  and only one that is news. Of other leaders one learns what people have asked for meanwhile.
+  Hears an anchor. It counts only if it is new, and from this robot's leader or of a later epoch
+  that names this robot. From other leaders a robot learns only what people have asked for
+  meanwhile.
   """
   @spec anchor(Landmark.State.t(), Reference.t()) :: Landmark.State.t()
   def anchor(%{me: me} = mission, %Reference{leader: leader} = anchor) when leader != me do
@@ -62,8 +65,8 @@ defmodule Missions.Landmark.ReferenceInbox do
   defp take_up(mission, _older), do: mission
 
   @doc """
-  Whether a leader names this robot now, which has come late or back, or has missed the end of a
-  round, so that it joins without one.
+  Whether a leader names this robot now. If the robot came late or back, or missed the end of a
+  round, it then joins without a round.
   """
   @spec joined?(Landmark.State.t()) :: boolean()
   def joined?(%{anchor: nil}), do: false

@@ -18,15 +18,15 @@ defmodule Missions.Landmark.Rounds do
   # Heartbeats come at 5 Hz: after this time the view has settled.
   @settle_ms 600
   @late_ms 1_500
-  # How long reports are waited for: more than a scan takes, and than a letter under way.
+  # How long a round waits for reports: longer than a scan takes, and than a letter is under way.
   @search_ms 30_000
   @change_ms 2_000
   # A sighting this old still counts in a report.
   @fresh_ms 1_000
-  # Without a sign of life for so long a leader is lost.
+  # A leader without a sign of life for this long is lost.
   @lost_ms 2_000
 
-  @doc "Hears a letter. A robot that is not started takes no part."
+  @doc "Hears a letter. A robot that is not started does not take part."
   @spec hear(Landmark.State.t(), atom(), Round.Letter.t()) :: Landmark.State.t()
   def hear(%{started?: false} = mission, _from, _letter), do: mission
 
@@ -39,7 +39,10 @@ defmodule Missions.Landmark.Rounds do
     do:
       rescan? or (round.phase == :collect and round.purpose == :search and round.report == :busy)
 
-  @doc "One tick: the letters to send, as effects, and the verdict of a round that has committed."
+  @doc """
+  One tick: returns the letters to send, as effects, and the verdict of a round that has
+  committed.
+  """
   @spec tick(Landmark.State.t()) :: {Landmark.State.t(), [tuple()]}
   def tick(%{phase: :idle} = mission), do: {mission, []}
 
@@ -55,7 +58,7 @@ defmodule Missions.Landmark.Rounds do
     {mission, effects}
   end
 
-  @doc "All that take part in the mission and are not gone, this robot too, sorted."
+  @doc "All robots that take part in the mission and are not gone, including this one, sorted."
   @spec view(Landmark.State.t()) :: [atom()]
   def view(mission) do
     others = for {id, beat} <- beats(mission), beat.phase != :idle, do: id
@@ -63,7 +66,7 @@ defmodule Missions.Landmark.Rounds do
     Enum.sort([mission.me | others])
   end
 
-  @doc "Whether another robot leads, as far as this one hears."
+  @doc "Whether this robot hears another one that leads."
   @spec led?(Landmark.State.t()) :: boolean()
   def led?(mission), do: leading_epoch(mission) >= 0
 
@@ -101,15 +104,16 @@ defmodule Missions.Landmark.Rounds do
     end
   end
 
-  # The first of the view opens; were it deaf or frozen, another one does a little later.
+  # The first robot of the view opens; if it is deaf or frozen, another one does so a little
+  # later.
   defp turn?(mission, view, since),
     do: (since >= @settle_ms and hd(view) == mission.me) or since >= @late_ms
 
   defp purpose(%{scan: nil}), do: :change
   defp purpose(_scanned), do: :search
 
-  # While this robot waited, others have elected a leader: it comes along with their anchor. Once
-  # its digest is out the round has to end by itself, for the others may wait for it.
+  # While this robot waited, others have elected a leader, and it joins by their anchor. Once its
+  # digest is out, the round has to end by itself, because the others may wait for it.
   defp overtaken?(%{round: %{phase: :digest}}), do: false
 
   defp overtaken?(%{round: %{id: {epoch, _counter, _initiator}}} = mission),
@@ -123,8 +127,8 @@ defmodule Missions.Landmark.Rounds do
 
   defp beats(mission), do: Peers.taking_part(mission.percept.peers, mission.now_ms)
 
-  # A member that is gone would be waited for in vain, and one that came would be left out. Who has
-  # only just been switched on has heard nobody yet, but nobody is gone.
+  # A round would wait in vain for a member that is gone, and leave out one that came. A robot
+  # that has only just been switched on has heard nobody yet, but then nobody is gone.
   defp reopen(%{round: round} = mission, view, since) do
     gone? = since >= @settle_ms and Enum.any?(round.view, &(&1 not in view))
     came? = round.phase == :collect and hd(view) == mission.me and view -- round.view != []
@@ -155,8 +159,8 @@ defmodule Missions.Landmark.Rounds do
     %{mission | round: round, challenge: nil}
   end
 
-  # The anchor is the leader's sign of life, by whatever way it comes; a leader whom others still
-  # hear is not gone, and its anchor will come along the chain.
+  # The anchor is the leader's sign of life, however it arrives; a leader that others still hear
+  # is not gone, and its anchor will arrive along the chain.
   defp leader_lost?(%{anchor_ms: at_ms, now_ms: now} = mission) do
     now - max(at_ms || mission.since_ms, mission.since_ms) >= @lost_ms and
       not heard_by_others?(mission)
@@ -171,7 +175,7 @@ defmodule Missions.Landmark.Rounds do
     end
   end
 
-  # Whoever has all digests leads, with those who sent them.
+  # The robot that has all digests leads, with those that sent them.
   defp promise({:commit, record}, mission, _phase) do
     case Election.leader(record.reports) do
       {:ok, leader} -> Policy.vow(mission, leader)
@@ -179,7 +183,7 @@ defmodule Missions.Landmark.Rounds do
     end
   end
 
-  # Somebody may have them all, and this robot not.
+  # Another robot may have them all when this one does not.
   defp promise({:failed, _reason}, mission, :digest), do: Policy.vow(mission, nil)
   defp promise(_event, mission, _phase), do: mission
 
@@ -256,7 +260,7 @@ defmodule Missions.Landmark.Rounds do
 
   defp conclude(nil, mission), do: mission
 
-  # All compute the same order from the same record.
+  # All robots compute the same order from the same record.
   defp plan(mission, reports, leader) do
     present = for {id, report} <- Enum.sort(reports), report != nil, do: {id, report.pose}
     {x, y, heading} = reports[leader].pose
@@ -273,7 +277,7 @@ defmodule Missions.Landmark.Rounds do
     end
   end
 
-  @doc "The slots round a leader's pose, in whole millimetres."
+  @doc "The slots around a leader's pose, in whole millimetres."
   @spec slots(Formation.t(), Hal.Pose.t(), pos_integer(), float()) :: [{integer(), integer()}]
   def slots(formation, pose, robots, landmark_distance \\ 1.6) do
     for slot <- Formation.slots(formation, robots, landmark_distance) do

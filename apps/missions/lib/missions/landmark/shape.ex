@@ -2,11 +2,11 @@ defmodule Missions.Landmark.Shape do
   @moduledoc """
   The leader's choice of a shape that fits the free space. Pure.
 
-  The shape is the one asked for as long as that goes. Slots that a dead robot's body takes away
-  are left out. When followers say that their slots are blocked, and all others stand in theirs, the
-  shape closes up step by step:
-  spacing down to 0.8 m, then a column along the leader's trail. Once the leader has moved on, or a
-  person asks for a shape, the one asked for is tried again.
+  The shape is the requested one as long as that is possible. Slots that a dead robot's body
+  occupies are left out. When followers report that their slots are blocked, and all others stand
+  in theirs, the shape closes up step by step: spacing down to 0.8 m, then a column along the
+  leader's trail. Once the leader has moved on, or a person asks for a shape, the requested shape
+  is tried again.
   """
   alias Hal.Pose
   alias Swarm.Formation
@@ -28,11 +28,13 @@ defmodule Missions.Landmark.Shape do
           squeeze: non_neg_integer()
         }
 
-  @doc "No shape yet: the next update makes the one asked for."
+  @doc "No shape yet: the next update chooses the requested one."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
-  @doc "The shape for this tick. A standing leader looks for room; a moving one keeps its choice."
+  @doc """
+  The shape for this tick. A leader that stands looks for room; one that moves keeps its choice.
+  """
   @spec update(t(), Landmark.State.t(), distance :: float()) :: t()
   def update(shape, mission, distance) do
     shape = shape |> relax(mission) |> squeeze(mission)
@@ -50,7 +52,7 @@ defmodule Missions.Landmark.Shape do
       else: shape
   end
 
-  # A choice that still has room for all is kept, so that nobody is sent about for nothing.
+  # A choice that still has room for all is kept, so that no robot moves for nothing.
   defp room(shape, mission, followers, distance, changed?) do
     bodies = bodies(mission)
     pose = mission.percept.pose
@@ -67,7 +69,7 @@ defmodule Missions.Landmark.Shape do
     Enum.all?(places, &FreeSlots.free?(Pose.compose(pose, elem(slots, &1 - 1)), bodies, radius))
   end
 
-  @doc "The poses along the leader's trail, where the shape is that; else `nil`."
+  @doc "The poses along the leader's trail if that is the shape, else `nil`."
   @spec trail(t(), Landmark.State.t()) :: [{integer(), integer(), integer()}] | nil
   def trail(%{trail?: false}, _mission), do: nil
 
@@ -115,8 +117,9 @@ defmodule Missions.Landmark.Shape do
       else: shape
   end
 
-  # Somebody says that it is blocked, and all others have come to rest in their places: as long as
-  # some are under way, what stands in the way may be one of them. One that is not sure of its place stands, too.
+  # A robot reports that it is blocked, and all others have come to rest in their places: as long
+  # as some are under way, one of them may be the blocker. A robot that is not sure of its place
+  # counts as at rest, too.
   defp blocked?(mission) do
     beats = Peers.taking_part(mission.percept.peers, mission.now_ms)
     followers = for id <- mission.order, beat = beats[id], do: beat
@@ -135,7 +138,7 @@ defmodule Missions.Landmark.Shape do
       else: {{:column, min(spacing, 1.0)}, true}
   end
 
-  # What stays where it is: dead robots, and the landmark.
+  # Obstacles that stay where they are: dead robots, and the landmark.
   defp bodies(mission) do
     dead =
       for {_id, %{mode: :dead, pose: pose, radius: radius}} <- Enum.sort(mission.percept.peers),

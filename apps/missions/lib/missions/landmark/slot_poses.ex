@@ -3,7 +3,7 @@ defmodule Missions.Landmark.SlotPoses do
   Computes one robot's slot from the leader's reference: its pose in the map frame, and its
   velocity. Pure.
 
-  A robot follows where the leader is supposed to be (R53): the anchor's pose carried on by its
+  A robot follows where the leader is supposed to be (R53): the anchor's pose, extrapolated by its
   speed for as long as it has been under way, half a second at most.
   """
   alias Hal.{Pose, Twist}
@@ -13,7 +13,7 @@ defmodule Missions.Landmark.SlotPoses do
   @ahead_ms 500
   @default_distance 1.2
 
-  @doc "The leader's pose and speed out of an anchor that is `age_ms` old."
+  @doc "The leader's pose and speed from an anchor that is `age_ms` old."
   @spec leader(Reference.t(), non_neg_integer()) :: {Pose.t(), Twist.t()}
   def leader(%Reference{pose: {x, y, heading}, twist: {linear, turn}}, age_ms) do
     pose = Pose.new(x / 1000, y / 1000, heading / 1000)
@@ -40,7 +40,7 @@ defmodule Missions.Landmark.SlotPoses do
   def landmark(%Reference{landmark: nil}), do: nil
   def landmark(%Reference{landmark: {x, y}}), do: {x / 1000, y / 1000}
 
-  @doc "The slot of a robot and its velocity; `nil` where the anchor does not name it."
+  @doc "The slot of a robot and its velocity; `nil` if the anchor does not name the robot."
   @spec slot(Reference.t(), atom(), non_neg_integer()) :: {Pose.t(), {float(), float()}} | nil
   def slot(%Reference{order: order} = anchor, robot, age_ms) do
     case Enum.find_index(order, &(&1 == robot)) do
@@ -49,7 +49,7 @@ defmodule Missions.Landmark.SlotPoses do
     end
   end
 
-  # A trail lies still, whatever the leader does on it.
+  # A trail does not move, whatever the leader does on it.
   defp slot_at(%Reference{trail: [_ | _] = trail}, index, _age_ms) do
     {x, y, heading} = Enum.at(trail, index)
     {Pose.new(x / 1000, y / 1000, heading / 1000), {0.0, 0.0}}

@@ -50,14 +50,17 @@ defmodule Missions.Landmark.State do
 
   @typedoc """
   `asked_no` counts the shapes that people asked for, so that an older anchor does not undo the
-  newest. `since_ms` is when the phase began, `scan` how the last turn ended, `rescan?` that the next round
-  needs a new one, `tries` how many searches found nothing, `verdict` what the last round said until a
-  phase has acted on it, `order` the followers by slot. `epoch` and `leader` are those that the robot
-  belongs to, `size_ppm` is the size that elected the leader, `anchor_ms` when the anchor came.
+  newest. `since_ms` is when the phase began, `scan` how the last turn ended, `rescan?` whether
+  the next round needs a new one, `tries` how many searches found nothing, `verdict` the result of
+  the last round until a phase has acted on it, `order` the followers by slot. `epoch` and
+  `leader` are those that the robot belongs to, `size_ppm` is the size that elected the leader,
+  `anchor_ms` when the anchor came.
 
-  `of` is the size of the fleet of which a majority is needed, 0 for none; `role` what it was last,
-  `met?` whether it has had company, `vow` which leader may count on it, and when it last could, `place` where it was told to stand last. `led` is how many robots
-  it leads, or led when the round began; since `rival_ms` it hears another leader, since `higher_ms` a later epoch.
+  `of` is the size of the fleet of which a majority is needed, 0 for none; `role` is the robot's
+  last role, `met?` whether it has been with others, `vow` which leader may count on it, and when
+  it last could, `place` where it was last told to stand. `led` is how many robots it leads, or
+  led when the round began; it has heard another leader since `rival_ms`, and a later epoch since
+  `higher_ms`.
   """
   @type t :: %__MODULE__{
           me: atom(),
@@ -100,7 +103,7 @@ defmodule Missions.Landmark.State do
           relay: Swarm.Comms.Forwarder.t()
         }
 
-  @doc "The colour of the landmark unless told otherwise."
+  @doc "The default colour of the landmark."
   @spec colour() :: String.t()
   def colour, do: @colour
 
@@ -108,12 +111,12 @@ defmodule Missions.Landmark.State do
   @spec sees?(t()) :: boolean()
   def sees?(mission), do: LandmarkTrack.fresh?(mission.sight, mission.now_ms, @sight_ms)
 
-  @doc "Whether a robot moves slower than `limit` m/s, as far as its wheels say."
+  @doc "Whether a robot moves slower than `limit` m/s according to its wheels."
   @spec slow?(Robot.Percept.t(), float()) :: boolean()
   def slow?(%{odometry: %{twist: %Twist{linear: linear}}}, limit), do: abs(linear) < limit
   def slow?(_percept, _limit), do: true
 
-  @doc "A pose in whole millimetres and milliradians, as robots tell it."
+  @doc "A pose in whole millimetres and milliradians, as robots report it."
   @spec millimetres(Pose.t()) :: {integer(), integer(), integer()}
   def millimetres(%Pose{x: x, y: y, heading: heading}),
     do: {round(x * 1000), round(y * 1000), round(heading * 1000)}

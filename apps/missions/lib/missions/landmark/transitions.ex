@@ -8,20 +8,20 @@ defmodule Missions.Landmark.Transitions do
   | phase | does | |
   |---|---|---|
   | `:idle` | stands | until it is started |
-  | `:search` | turns once round, looking for the landmark, and listens | the thesis's parallel state |
-  | `:agree` | stands, report in, until the round commits | report and collect |
+  | `:search` | turns around once, looking for the landmark, and listens | the thesis's parallel state |
+  | `:agree` | stands, having reported, until the round commits | report and collect |
   | `:wander` | roams a little | after a round in which nobody had found it |
   | `:rest` | stands | the landmark is nowhere; starts again when it sees one |
-  | `:lead` | tracks the landmark, tells the others where it is | |
-  | `:follow` | drives to its slot, tells its child | |
+  | `:lead` | tracks the landmark, tells the others where the robot is | |
+  | `:follow` | drives to its slot, passes the reference on to its child | |
   | `:wait` | stands | too few robots to have a leader |
   | `:halt` | stands | has lost everybody, `lost_link: :stop` |
-  | `:hold` | goes to the place it was given last | has lost everybody, `lost_link: :hold` |
+  | `:hold` | goes to the place it was last given | has lost everybody, `lost_link: :hold` |
 
   | condition | holds when |
   |---|---|
-  | `:started` | a person has said so |
-  | `:elected`, `:led` | a round has made this robot the leader, or another, or one names it in its order |
+  | `:started` | a person has started it |
+  | `:elected`, `:led` | a round has made this robot the leader, or another one, or a leader names it in its order |
   | `:nobody`, `:nobody_again` | a round in which nobody had found the landmark; the third in a row |
   | `:scanned` | the turn is over, whatever it showed |
   | `:scan_wanted` | a round waits for a scan that this robot has not made |
@@ -30,8 +30,8 @@ defmodule Missions.Landmark.Transitions do
   | `:deposed` | others follow a later leader, or nobody hears this one |
   | `:superseded` | a leader of a later epoch names this robot in its order |
   | `:round_open` | a round is under way |
-  | `:lost_stop`, `:lost_hold` | it has lost everybody, and is to do that then (`Policy`) |
-  | `:company` | somebody is heard |
+  | `:lost_stop`, `:lost_hold` | it has lost everybody, and this is what it does then (`Policy`) |
+  | `:company` | it hears somebody |
   | `:short`, `:enough` | there are too few robots to have a leader; not too few |
   """
 

@@ -1,5 +1,7 @@
 defmodule Missions.Landmark.BlockerTest do
-  @moduledoc "What is named when a follower does not get to its slot, and when it says so."
+  @moduledoc """
+  Which blocker a follower names when it does not get to its slot, and when it says so.
+  """
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.Percept
@@ -19,13 +21,13 @@ defmodule Missions.Landmark.BlockerTest do
     struct!(%{plain | pose: Pose.new(0, 0), odometry: odometry}, fields)
   end
 
-  # Something in front of all sonars that look ahead, this far from them.
+  # Something this far in front of all sonars that look ahead.
   defp wall(metres) do
     for %Pose{heading: heading} <- Profile.magellan().sonars,
         do: if(abs(Pose.wrap(heading)) < 0.3, do: metres, else: 5.0)
   end
 
-  test "what is in the slot is named before what is on the way, and far things are not named" do
+  test "a blocker in the slot is named before one on the way, and distant things are not named" do
     slot = Pose.new(3.0, 0.0)
     robots = %{mag1: peer(1.0, 0.1), mag3: peer(3.1, 0.0), min1: peer(1.0, 2.0)}
     find = fn peers, landmark -> Blocker.find(percept(peers: peers), slot, landmark) end
@@ -34,11 +36,11 @@ defmodule Missions.Landmark.BlockerTest do
     assert find.(Map.delete(robots, :mag3), {-0.5, 0.0}) == {:robot, :mag1}
     assert find.(Map.take(robots, [:min1]), {3.0, 0.4}) == :landmark
     assert find.(%{}, nil) == :no_way
-    # The way is looked at for 1.5 m only.
+    # Only the first 1.5 m of the way are checked.
     assert find.(%{mag1: peer(2.2, 0.0)}, nil) == :no_way
   end
 
-  test "what only the sonars see is something unknown, and nothing that is known" do
+  test "what only the sonars see is unknown, unless it is known" do
     slot = Pose.new(2.0, 0.0)
     assert Blocker.find(percept(sonar: wall(0.5)), slot, nil) == :unknown
     known = %{mag1: peer(0.87, 0.0)}
@@ -85,13 +87,13 @@ defmodule Missions.Landmark.BlockerTest do
     end)
   end
 
-  test "a follower that gets no nearer for 15 s is blocked, wherever it is, and says by what" do
+  test "a follower that gets no nearer for 15 s is blocked, wherever it is, and names the blocker" do
     refute stand(3.0, 14, nil).attend.blocked?
     assert %{blocked?: true, blocker: :no_way} = stand(3.0, 16, nil).attend
     assert %{blocked?: true, blocker: :landmark} = stand(3.0, 16, {500, 0}).attend
   end
 
-  test "a slot that trembles by decimetres does not hide it" do
+  test "a slot that trembles by decimetres does not hide the block" do
     assert %{blocked?: true, blocker: :landmark} = stand(3.0, 16, {500, 0}, 150).attend
   end
 
@@ -99,7 +101,7 @@ defmodule Missions.Landmark.BlockerTest do
     assert %{blocked?: false, blocker: nil, in_place?: true} = stand(0.1, 30, nil).attend
   end
 
-  test "heartbeats carry that a robot is blocked, and not by what" do
+  test "heartbeats say that a robot is blocked, but not by what" do
     claim = %{phase: :follow, blocked: true, blocked_by: :landmark}
     beat = Heartbeat.new({1, 1}, percept([]), claim, [], EStop.State.new())
     assert beat.blocked and Heartbeat.valid?(beat)

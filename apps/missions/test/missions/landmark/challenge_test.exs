@@ -30,7 +30,7 @@ defmodule Missions.Landmark.ChallengeTest do
     }
   end
 
-  # When it asks, seeing the same all the time; nil for not within 30 s.
+  # When it asks, seeing the same all the time; nil if not within 30 s.
   defp asks_after(mission, from_ms) do
     Enum.reduce_while(0..30_000//100, mission, fn past, mission ->
       now = from_ms + past
@@ -42,7 +42,7 @@ defmodule Missions.Landmark.ChallengeTest do
     |> then(&if(is_integer(&1), do: &1))
   end
 
-  test "who is nearer asks after 2 s" do
+  test "a nearer follower asks after 2 s" do
     assert asks_after(follower(2.0, 0), 20_000) == 2_000
   end
 
@@ -50,12 +50,12 @@ defmodule Missions.Landmark.ChallengeTest do
     assert asks_after(follower(2.0, 20_000), 20_000) == 10_000
   end
 
-  test "a little nearer is not enough, nor is as near" do
+  test "a little nearer is not enough, nor is equally near" do
     assert asks_after(follower(2.6, 0), 20_000) == nil
     assert asks_after(follower(3.0, 0), 20_000) == nil
   end
 
-  test "who sees what the leader has lost asks after 3 s" do
+  test "a follower that sees what the leader has lost asks after 3 s" do
     assert asks_after(follower(4.0, 0, nil), 20_000) == 3_000
   end
 
@@ -63,7 +63,7 @@ defmodule Missions.Landmark.ChallengeTest do
     assert asks_after(%{follower(2.0, 0) | leader_change?: false}, 20_000) == nil
   end
 
-  test "what is seen for a moment only starts anew" do
+  test "a short sight only starts the time again" do
     mission = Challenge.update(%{follower(2.0, 0) | now_ms: 500, since_ms: -20_000})
     assert mission.challenge == {:nearer, 500}
     assert Challenge.update(put_in(mission.sight.distance, 3.0)).challenge == nil

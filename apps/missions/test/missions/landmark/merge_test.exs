@@ -1,5 +1,5 @@
 defmodule Missions.Landmark.MergeTest do
-  @moduledoc "Whom a leader leaves to another one, when two parts of a fleet meet."
+  @moduledoc "Which robots a leader leaves to another one when two parts of a fleet meet."
   use ExUnit.Case, async: true
   alias Swarm.Membership.Heartbeat
   alias Missions.Landmark
@@ -34,15 +34,15 @@ defmodule Missions.Landmark.MergeTest do
     beats |> Keyword.keys() |> Merge.theirs(mission)
   end
 
-  test "another leader and its followers are left to it" do
+  test "another leader keeps its followers" do
     assert theirs(mag2: beat(:lead, :mag2), mag3: beat(:follow, :mag2)) == [:mag2, :mag3]
   end
 
-  test "a follower that is heard before its leader is, too" do
+  test "a follower that is heard before its leader stays with it, too" do
     assert theirs(mag3: beat(:follow, :mag2)) == [:mag3]
   end
 
-  test "who is alone, is the own follower, or follows one that leads no more is free" do
+  test "a robot is free if it is alone, this leader's follower, or its leader no longer leads" do
     assert theirs(
              mag2: beat(:follow, :mag1),
              mag3: beat(:agree, nil),

@@ -1,12 +1,12 @@
 defmodule Missions.Landmark.PartitionTest do
   @moduledoc """
-  Groups whose radio is cut at any moment and mended: who leads, for how long two do, what is
-  committed.
+  Groups whose radio is cut at any moment and mended: who leads, how long two robots lead, and
+  what is committed.
 
-  The law: of one round no two robots commit different digests; no two robots lead in one part of
-  the radio (connected, if need be by way of others) for longer than a lease of 1.5 s, where no more
-  than a fifth of the messages is lost; with more loss a heartbeat can be missed several times in a
-  row, and then it is 2 s more (`gone`).
+  The invariants: no two robots commit different digests of one round; no two robots lead in one
+  part of the radio (connected, if necessary by way of others) for longer than a lease of 1.5 s,
+  if no more than a fifth of the messages is lost; with more loss heartbeats can be missed several
+  times in a row, and then it is 2 s more (`gone`).
   """
   use ExUnit.Case, async: true
   alias Missions.Landmark.Group
@@ -43,7 +43,7 @@ defmodule Missions.Landmark.PartitionTest do
     group
   end
 
-  # A random cut: in two, in three, one link, or one way of one.
+  # A random cut: into two parts, into three, of one link, or of one direction of a link.
   defp any_cut(ids) do
     [a, b | _] = shuffled = Enum.shuffle(ids)
     {left, right} = Enum.split(shuffled, :rand.uniform(length(ids) - 1))
@@ -57,11 +57,11 @@ defmodule Missions.Landmark.PartitionTest do
     ])
   end
 
-  test "cut at any moment, under loss, doubles and disorder: one digest a round, one leader a part",
+  test "cut at any moment, under loss, duplicates and disorder: one digest a round, one leader a part",
     do: any_cuts(10)
 
   @tag :long
-  test "cut at any moment, under loss, doubles and disorder: one digest a round, one leader a part, 40 times",
+  test "cut at any moment, under loss, duplicates and disorder: one digest a round, one leader a part, 40 times",
     do: any_cuts(40)
 
   defp any_cuts(times) do
@@ -95,7 +95,7 @@ defmodule Missions.Landmark.PartitionTest do
       group = group(@five, loss: 0.1, doubled: 0.1) |> Group.run(:rand.uniform() * 6 + 0.1)
       # From the first second on, so in every phase of the first round and of leading.
       dead = Enum.random([Enum.random(@five) | leading(group)])
-      # 2 s until it is known to be gone, and 5 s for the round.
+      # 2 s until the others know that it is gone, and 5 s for the round.
       group |> Group.kill(dead) |> led(@five -- [dead], 7) |> assert_lawful()
     end
   end
@@ -113,8 +113,8 @@ defmodule Missions.Landmark.PartitionTest do
     end
   end
 
-  # Where several messages in a row are lost, a round waits for its deadline: 1 meeting in a hundred.
-  test "where a tenth of the messages is lost, parts that meet stand still for a second at most in 95 % of meetings" do
+  # If several messages in a row are lost, a round waits for its deadline: in 1 of 100 meetings.
+  test "at 10 % loss, parts that meet stand still for at most a second in 95 % of meetings" do
     times =
       for seed <- 1..20, meeting <- @meetings do
         :rand.seed(:exsss, {seed, 0, 0})
@@ -125,7 +125,7 @@ defmodule Missions.Landmark.PartitionTest do
     assert late <= 0.05 * length(times), inspect(times)
   end
 
-  # Cuts and mends; for how long somebody stood, and when all were one again, in milliseconds.
+  # Cuts and mends; returns how long any robot stood, and when all were one group again, in ms.
   defp meet({parts, winner}, loss) do
     ids = Enum.concat(parts)
     group = Group.cut(group(ids, loss: loss), parts)
@@ -143,7 +143,7 @@ defmodule Missions.Landmark.PartitionTest do
     {stood, group.now - healed_ms}
   end
 
-  # On until one leads all; for how long somebody stood, from the first to the last.
+  # Runs until one leads all; returns how long any robot stood, from the first to the last.
   defp stand_still(group, ids) do
     standing = fn group ->
       Enum.any?(group.robots, fn {_id, robot} -> match?({:stand, _}, robot.goal) end)
@@ -166,7 +166,7 @@ defmodule Missions.Landmark.PartitionTest do
     assert group.elected == elected
   end
 
-  test "one link of a triangle cut for good: no second leader, and the anchor comes by the third" do
+  test "if one link of a triangle is cut for good, there is no second leader, and the anchor comes by the third robot" do
     for link <- [{:link, :mag2, :mag1}, {:link, :mag2, :mag3}, {:link, :mag1, :mag3}],
         loss <- [0.0, 0.2] do
       ids = [:mag1, :mag2, :mag3]
@@ -174,12 +174,12 @@ defmodule Missions.Landmark.PartitionTest do
       [{epoch, :mag2}] = group.elected
       group = Group.cut(group, [link]) |> Group.run(10)
 
-      # Nobody stands for want of an anchor any more, for 20 s.
+      # For 20 s no robot stands because it lacks an anchor.
       Enum.reduce(1..200, group, fn _, group ->
         group = Group.run(group, 0.1)
         assert Group.one?(group, ids)
 
-        # Under loss several in a row may be missed.
+        # Under loss a robot may miss several in a row.
         limit_ms = if loss == 0.0, do: 1_000, else: 2_000
         for id <- [:mag1, :mag3], do: assert(anchor_age(group, id) <= limit_ms)
         group
@@ -205,7 +205,7 @@ defmodule Missions.Landmark.PartitionTest do
     end
   end
 
-  test "robots in a row, each hearing its neighbours only, are one group" do
+  test "robots in a row that hear only their neighbours are one group" do
     ids = [:mag1, :mag2, :mag3, :min1]
 
     far =
@@ -226,13 +226,13 @@ defmodule Missions.Landmark.PartitionTest do
     @majority [policy: :majority, of: 4]
     @four [:mag1, :mag2, :mag3, :min1]
 
-    test "of four, two have no leader and stand; together they go on" do
+    test "two of four have no leader and stand; together they go on" do
       group = group(@four, [], @majority) |> led(@four, 10) |> Group.run(3)
       group = Group.cut(group, [[:mag1, :mag2], [:mag3, :min1]])
       cut_ms = group.now
       {none?, group} = Group.until(group, 5, &(leading(&1) == []))
       assert none?
-      # The last heartbeats were under way when it was cut.
+      # The last heartbeats were under way when the link was cut.
       assert group.now - cut_ms <= @lease_ms + 300
       group = Group.run(group, 5)
       assert Enum.uniq(Map.values(Group.phases(group))) == [:wait]
@@ -240,7 +240,7 @@ defmodule Missions.Landmark.PartitionTest do
       group |> Group.cut([]) |> led(@four, 5) |> assert_lawful()
     end
 
-    test "three of four lead on; the fourth stands and joins again" do
+    test "three of four go on with a leader; the fourth stands and joins again" do
       group = group(@four, [], @majority) |> led(@four, 10) |> Group.run(3)
       [leader] = leading(group)
       group = Group.cut(group, [[leader], List.delete(@four, leader)])
@@ -251,7 +251,7 @@ defmodule Missions.Landmark.PartitionTest do
       group |> Group.cut([]) |> led(@four, 5) |> assert_lawful()
     end
 
-    test "at no time do two lead, whatever is cut" do
+    test "two robots never lead at the same time, whatever is cut" do
       for _ <- 1..20 do
         group = group(@five, [loss: 0.1], policy: :majority, of: 5)
 
@@ -276,7 +276,7 @@ defmodule Missions.Landmark.PartitionTest do
       end
     end
 
-    test "who is asked for no majority learns it from the others" do
+    test "a robot without the option learns of the majority from the others" do
       group = group([:mag1, :mag2, :mag3], [], policy: :majority, of: 3)
       group = group |> Group.join(:min1, {5, 0}, 0.01) |> led([:min1, :mag1, :mag2, :mag3], 20)
       assert group.robots.min1.mission.of == 3
@@ -290,20 +290,20 @@ defmodule Missions.Landmark.PartitionTest do
       Group.cut(group, Enum.map(ids, &[&1])) |> Group.run(5)
     end
 
-    test "followers stop, a leader continues, and all go on when they hear each other" do
+    test "by default followers stop, a leader continues, and all go on when they hear each other again" do
       group = lost([])
       assert Group.phases(group) == %{mag1: :halt, mag2: :lead, mag3: :halt}
       group |> Group.cut([]) |> led(ids(group), 5) |> assert_lawful()
     end
 
-    test "a given one holds for all: stop, continue" do
+    test "an option that is given applies to all: stop, continue" do
       group = lost(lost_link: :stop)
       assert Enum.uniq(Map.values(Group.phases(group))) == [:halt]
       group |> Group.cut([]) |> led(ids(group), 10) |> assert_lawful()
       assert Enum.uniq(Map.values(Group.phases(lost(lost_link: :continue)))) == [:lead]
     end
 
-    test "hold goes to the place that was given last" do
+    test "hold goes to the last given place" do
       ids = [:mag1, :mag2, :mag3]
       group = group(ids, [], lost_link: :hold) |> led(ids, 10) |> Group.run(0.5)
       group = Group.cut(group, Enum.map(ids, &[&1])) |> Group.run(3)
@@ -318,7 +318,7 @@ defmodule Missions.Landmark.PartitionTest do
       group |> Group.cut([]) |> led(ids, 10) |> assert_lawful()
     end
 
-    test "one that was never with others has lost nobody" do
+    test "a robot that was never with others cannot lose anybody" do
       group = Group.new() |> Group.join(:mag1, {0, 0}, 0.02, lost_link: :stop) |> Group.run(5)
       assert phase(group, :mag1) == :lead
     end

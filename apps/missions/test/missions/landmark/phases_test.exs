@@ -11,12 +11,12 @@ defmodule Missions.Landmark.PhasesTest do
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Transitions}
 
-  # One robot that is fed by hand; peers say `beat` for as long as they are told to.
+  # One robot that is fed by hand; peers send `beat` as long as the test says so.
   defp alone(share), do: Group.new() |> Group.join(:mag2, {0, 0}, share) |> Group.run(0.1)
   defp phase(group), do: group.robots.mag2.mission.phase
   defp mission(group), do: group.robots.mag2.mission
 
-  # What became of it, phase by phase, newest first, without those of before.
+  # The phases that it went through, newest first, without those before.
   defp entered(group, before),
     do:
       Enum.take(
@@ -30,7 +30,7 @@ defmodule Missions.Landmark.PhasesTest do
     Group.hear(group, :mag2, id, Message.new(id, :heartbeat, struct!(Heartbeat, plain ++ fields)))
   end
 
-  # Time passes while another robot says so five times a second.
+  # Time passes while another robot sends this heartbeat five times a second.
   defp beside(group, id, fields, seconds) do
     Enum.reduce(1..round(seconds * 10), group, fn _, group ->
       group |> beat(id, fields) |> Group.run(0.1)
@@ -71,7 +71,7 @@ defmodule Missions.Landmark.PhasesTest do
     group
   end
 
-  # A landmark seen by nobody, until it rests.
+  # Nobody sees the landmark, until the robot rests.
   defp to(wanted, share \\ nil) do
     {there?, group} = Group.until(alone(share), 60, &(phase(&1) == wanted))
     assert there?
@@ -80,7 +80,7 @@ defmodule Missions.Landmark.PhasesTest do
 
   defp stopped(group), do: update_in(group.robots.mag2.mission, &Landmark.halted/1)
 
-  test "started, and from everywhere stopped: what is left is idle, and starts anew" do
+  test "a mission can be stopped in every phase: it is idle then, and starts again" do
     assert {:idle, mission, []} = Landmark.init(:mag2, [])
     assert mission.phase == :idle
     assert phase(alone(nil)) == :search
@@ -114,13 +114,13 @@ defmodule Missions.Landmark.PhasesTest do
       group = to(from) |> place(7) |> Group.run(0.1)
       assert [:follow, ^from | _] = group.robots.mag2.phases
       assert %{leader: :mag1, epoch: 7} = mission(group)
-      # Not when the anchor is old, or names somebody else.
+      # But not if the anchor is old, or names somebody else.
       assert phase(to(from) |> place(7, [:mag3]) |> Group.run(0.1)) != :follow
     end
   end
 
-  test "search -> wander, rest, lead or follow where a round ends during the scan" do
-    # Too long for the scan: the round's deadline falls into it.
+  test "search -> wander, rest, lead or follow if a round ends during the scan" do
+    # The scan takes too long: the round's deadline is reached during it.
     for {verdict, tries, next} <- [
           {:nobody, 0, :wander},
           {:nobody, 2, :rest},
@@ -134,14 +134,14 @@ defmodule Missions.Landmark.PhasesTest do
     end
   end
 
-  test "agree -> search where a round wants a scan that was not made" do
+  test "agree -> search if a round wants a scan that was not made" do
     before = alone(0.02) |> place(1) |> Group.run(0.1) |> letter({2, 1, :mag1}, :search)
     group = before |> beat(:mag1, []) |> Group.run(0.1)
-    # Through :agree within the tick.
+    # It passes through :agree within the tick.
     assert [:search] = entered(group, before)
   end
 
-  test "wander -> search when the landmark comes in sight, when a round asks, and when it has roamed" do
+  test "wander -> search when the landmark comes into sight, when a round asks, and when it has roamed" do
     wandering = to(:wander)
     seen = wandering |> Group.show(:mag2, 0.02) |> Group.run(0.1)
     assert [:search] = entered(seen, wandering)
@@ -152,7 +152,7 @@ defmodule Missions.Landmark.PhasesTest do
     assert [:search] = wandering |> Group.run(6) |> entered(wandering)
   end
 
-  test "rest -> search when the landmark comes in sight; a round that asks gets the old answer" do
+  test "rest -> search when the landmark comes into sight; a round that asks gets the old answer" do
     resting = to(:rest)
     assert [] = resting |> Group.run(30) |> entered(resting)
     seen = resting |> Group.show(:mag2, 0.02) |> Group.run(0.1)
@@ -177,7 +177,7 @@ defmodule Missions.Landmark.PhasesTest do
 
     assert [] = entered(same, leading)
     assert mission(same).order == [:mag1]
-    # It hears the follower, which hears it no more.
+    # It hears the follower, which no longer hears it.
     assert [] = same |> beside(:mag1, [phase: :follow, epoch: 1], 1.3) |> entered(same)
 
     assert [:agree | _] =
@@ -200,7 +200,7 @@ defmodule Missions.Landmark.PhasesTest do
         0.3
       )
 
-    # It waits a little, to hear of all of the other's robots too.
+    # It waits a little to hear of all of the other's robots too.
     assert [] = entered(rival, leading)
 
     rival =
@@ -240,7 +240,7 @@ defmodule Missions.Landmark.PhasesTest do
     assert [:agree | _] = group |> Group.run(1.2) |> entered(group) |> Enum.reverse()
   end
 
-  test "a leader that is silent for it but heard by others is not replaced" do
+  test "a leader that a follower does not hear, but others do, is not replaced" do
     group =
       following()
       |> beside(
@@ -251,7 +251,7 @@ defmodule Missions.Landmark.PhasesTest do
 
     assert phase(group) == :follow
     assert mission(group).round.phase == :none
-    # Until the others do not hear it either.
+    # Only when the others do not hear it either.
     assert [:agree | _] =
              group
              |> beside(:mag3, [phase: :follow, epoch: 1], 1)
@@ -259,7 +259,7 @@ defmodule Missions.Landmark.PhasesTest do
              |> Enum.reverse()
   end
 
-  test "anchors of a former epoch, and of a rival of the same, are not believed" do
+  test "anchors of an earlier epoch, or of a rival in the same epoch, are not accepted" do
     group = following(3)
     known = mission(group).anchor
     assert mission(place(group, 2)).anchor == known
@@ -268,7 +268,7 @@ defmodule Missions.Landmark.PhasesTest do
     assert mission(Group.event(group, :mag2, {:message, message})).anchor == known
   end
 
-  test "a leader that does not know where it is stands, and tells no place" do
+  test "a leader that does not know where it is stands still, and sends no place" do
     leading =
       to(:lead, 0.02)
       |> beside(
@@ -293,7 +293,7 @@ defmodule Missions.Landmark.PhasesTest do
     for {distance, opens?} <- [{2_400, true}, {2_100, false}] do
       leader = [phase: :lead, epoch: 1, leader: :mag1, sight: %{size_ppm: 9, distance: distance}]
       group = following() |> Group.show(:mag2, 0.02)
-      # In place, and 1.7 m before the landmark.
+      # In place, and 1.7 m in front of the landmark.
       steps = fn group, seconds ->
         Enum.reduce(1..round(seconds * 10), group, fn _, group ->
           group |> beat(:mag1, leader) |> place(1) |> Group.run(0.1)
@@ -314,7 +314,7 @@ defmodule Missions.Landmark.PhasesTest do
     end
   end
 
-  test "who neither leads nor follows corrects itself by nothing that it was told before" do
+  test "a robot that neither leads nor follows corrects its pose by nothing it heard before" do
     group = alone(0.02)
 
     {:search, _mission, effects} =
@@ -343,7 +343,7 @@ defmodule Missions.Landmark.PhasesTest do
     assert LandmarkTrack.update(sight, gone, "YellowLandmark") == sight
   end
 
-  test "a landmark whose foot is out of the picture is as far off as it is wide" do
+  test "if the landmark's foot is out of the picture, its width gives the distance" do
     group = alone(0.02)
     %{detections: %{blobs: [blob]}} = percept = Group.percept(group, :mag2)
     # 48 of 320 pixels over 60 degrees: 0.15 m of radius, 1.74 m off.
@@ -356,7 +356,7 @@ defmodule Missions.Landmark.PhasesTest do
 
     assert_in_delta elem(place.([near]), 0), 1.74, 0.05
     assert place.([%{near | left: 0}]) == nil
-    # Somebody stands before it.
+    # Somebody stands in front of it.
     assert place.([near, %{near | colour: "RedRobot", right: 150}]) == nil
   end
 end

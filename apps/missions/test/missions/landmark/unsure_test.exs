@@ -1,5 +1,7 @@
 defmodule Missions.Landmark.UnsureTest do
-  @moduledoc "A follower that stands in its slot by its own estimate, and is not sure enough to say so."
+  @moduledoc """
+  A follower that stands in its slot by its own estimate, but is not sure enough to say so.
+  """
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.Percept
@@ -59,18 +61,18 @@ defmodule Missions.Landmark.UnsureTest do
     end).attend
   end
 
-  test "it says that, and neither that it is in place nor that it is blocked" do
+  test "it reports unsure, and neither in place nor blocked" do
     assert %{unsure?: true, in_place?: false} = stand(0.1, 0.62, 1)
     assert %{unsure?: true, blocked?: false, blocker: nil, late: nil} = stand(0.1, 0.62, 30)
     assert %{unsure?: false, in_place?: true} = stand(0.1, 0.3, 1)
   end
 
-  test "nobody asks how sure one is that is still on its way, or does not get there" do
+  test "a robot that is still on its way, or does not get there, is not unsure" do
     assert %{unsure?: false} = stand(0.6, 0.62, 1)
     assert %{unsure?: false, blocked?: true} = stand(0.6, 0.62, 16)
   end
 
-  test "heartbeats carry the word, and nothing else in its place" do
+  test "heartbeats carry the word unsure, and no other value in its place" do
     beat =
       Heartbeat.new({1, 1}, percept([]), %{phase: :follow, unsure: true}, [], EStop.State.new())
 
@@ -78,7 +80,7 @@ defmodule Missions.Landmark.UnsureTest do
     for junk <- [nil, 1, "true"], do: refute(Heartbeat.valid?(%{beat | unsure: junk}))
   end
 
-  # What the leader makes of its followers' words, long after it began.
+  # What the leader concludes from its followers' reports, long after it began to lead.
   defp squeeze(words) do
     peers =
       for {id, word} <- words, into: %{} do
@@ -100,7 +102,7 @@ defmodule Missions.Landmark.UnsureTest do
     Shape.update(Shape.new(), mission, 1.6).squeeze
   end
 
-  test "the shape is not closed up for it, and it does not hold that up for one that is blocked" do
+  test "the shape does not close up for an unsure robot, and closes up for a blocked one in spite of it" do
     assert squeeze(%{mag2: %{in_place: true}, mag3: %{unsure: true}}) == 0
     assert squeeze(%{mag2: %{blocked: true}, mag3: %{in_place: true}}) == 1
     assert squeeze(%{mag2: %{blocked: true}, mag3: %{unsure: true}}) == 1

@@ -35,7 +35,7 @@ defmodule Mix.Tasks.Robot.CheckTest do
     end
   end
 
-  test "a file that is well is told in words: limits, way to stop, what is missing, how it arms" do
+  test "a valid file is summarised: limits, stopping distance, what is missing, how it arms" do
     path = Path.join(@robots, "mag1.exs")
     Check.run([path])
     lines = said()
@@ -62,7 +62,7 @@ defmodule Mix.Tasks.Robot.CheckTest do
     {String.replace_prefix(title, path, ""), String.replace(Enum.join(lines, " "), ~r/\s+/, " ")}
   end
 
-  test "what check says of arming is what the driver says", %{tmp_dir: folder} do
+  test "the check says the same about arming as the driver", %{tmp_dir: folder} do
     laws = [[], [ir_a: 4000.0], [ir_a: 4000.0, ir_b: -2.0]]
     ranges = [[], [range: 1474.0]]
     wheels = [[], [distance: 31_387.0], [distance: 31_387.0, angle: 4654.2]]
@@ -89,7 +89,7 @@ defmodule Mix.Tasks.Robot.CheckTest do
     end
   end
 
-  test "what is odd is a warning, with what would be usual", %{tmp_dir: folder} do
+  test "an odd value is a warning, with the usual value", %{tmp_dir: folder} do
     well = "distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0"
 
     file = fn conversions, more ->
@@ -129,7 +129,9 @@ defmodule Mix.Tasks.Robot.CheckTest do
     end
   end
 
-  test "of several files, what is wrong in each is said, and the status is 1", %{tmp_dir: folder} do
+  test "for several files, the errors of each are reported, and the status is 1", %{
+    tmp_dir: folder
+  } do
     bad = Path.join(folder, "bad.exs")
     File.write!(bad, "[id: :mag1, profile: :magelan,\n dirve: 1]")
     lines = refused(Check, [Path.join(@robots, "mag1.exs"), bad, "none.exs"])
