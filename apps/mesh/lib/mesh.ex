@@ -1,21 +1,22 @@
 defmodule Mesh do
   @moduledoc """
-  A node among others: who is there, and how to reach them.
+  The mesh of a node: which other nodes there are, and how to reach them.
 
-  Two planes. Datagrams carry what must be new or is worth nothing, and they alone decide who is
-  alive: after a cut the next one arrives at once. Erlang's distribution carries what needs an
-  answer. A connection that has gone silent holds up nobody, and one that is lost changes no view.
+  There are two planes. Datagrams carry data that is worthless unless it is new, and they alone
+  decide which nodes are alive: after a cut the next one arrives at once. Erlang's distribution
+  carries what needs an answer. A connection that has gone silent delays nobody, and one that is
+  lost does not change any view.
 
-  Without a mesh (`config :swarm, mesh: false`) a node's robots have only each other, and whom
-  somebody has connected by hand. `docs/networking.md` tells how to set it up.
+  Without a mesh (`config :swarm, mesh: false`) a node's robots reach only each other, and nodes
+  that somebody has connected by hand. `docs/networking.md` explains how to set it up.
   """
   alias Mesh.{CommandRelay, Nonblocking, Table}
   alias Mesh.Protocol.{NodeTable, Packet, Routing}
 
   @typedoc """
-  How a node sees the others: `number` grows with each change of who is there; for each node its
-  `status`, whether the distribution is `connected`, whom it `hears`, which `robots` it holds, and how
-  long ago it was heard.
+  How a node sees the others: `number` grows with each change of the nodes present; for each node
+  its `status`, whether the distribution is `connected`, the nodes that it `hears`, the `robots`
+  that it holds, and how long ago it was heard.
   """
   @type view :: %{
           number: non_neg_integer(),
@@ -30,7 +31,7 @@ defmodule Mesh do
           }
         }
 
-  # A robot whose heartbeat is older is gone.
+  # A robot whose heartbeat is older than this is gone.
   @gone_ms 2_000
 
   @doc "Whether this node has a mesh."
@@ -45,9 +46,9 @@ defmodule Mesh do
   def speak(to, message), do: tell({:speak, to, message})
 
   @doc """
-  Sends a service's term to all other nodes, by datagram: it may be lost, doubled or come out of
-  order. One of more than 60,000 bytes is refused. Without a mesh nothing is sent. The node's consumer defines the
-  services (`c:Mesh.Consumer.services/0`).
+  Sends a service's term to all other nodes, by datagram: it may be lost, duplicated or arrive out
+  of order. A term of more than 60,000 bytes is refused. Without a mesh nothing is sent. The
+  node's consumer defines the services (`c:Mesh.Consumer.services/0`).
   """
   @spec cast(service :: atom(), term()) :: :ok | {:error, :too_big}
   def cast(service, term), do: serve(service, :all, term)
@@ -68,7 +69,7 @@ defmodule Mesh do
       else: tell({:serve, service, to, term})
   end
 
-  @doc "Tells a connected node where this one is to be heard, and so gets to hear it."
+  @doc "Tells a connected node the address of this one, so that both hear each other."
   @spec introduce(node()) :: :ok
   def introduce(node), do: tell({:introduce, node})
 
@@ -81,8 +82,8 @@ defmodule Mesh do
   def heard?(robot), do: match?({_boot, _sequence, age} when age < @gone_ms, beat(robot))
 
   @doc """
-  The robots on nodes that this node does not hear but that others hear, sorted: commands reach them over those
-  others. At most 200 ms old.
+  The robots on nodes that this node does not hear but that others hear, sorted: commands reach
+  them through those others. At most 200 ms old.
   """
   @spec beyond() :: [atom()]
   def beyond, do: Table.value(:beyond, [])
@@ -98,7 +99,10 @@ defmodule Mesh do
   @spec alive() :: [node()]
   def alive, do: Table.nodes(NodeTable.alive_since(now()))
 
-  @doc "All nodes as seen from here. Copies everything that is known, so it is for people and tests."
+  @doc """
+  All nodes as seen from this node. It copies everything that is known, so it is for people and
+  tests.
+  """
   @spec view() :: view()
   def view do
     now_ms = now()
@@ -120,11 +124,14 @@ defmodule Mesh do
     %{number: Table.value(:number, 0), nodes: nodes}
   end
 
-  @doc "What was dropped, by reason, since the start; at most 200 ms old."
+  @doc "How much was dropped since the start, by reason; at most 200 ms old."
   @spec rejected() :: %{atom() => pos_integer()}
   def rejected, do: Table.value(:rejected, %{})
 
-  @doc "How many datagrams the radio has sent, heard and rejected, and its UDP port; `nil` without a network."
+  @doc """
+  How many datagrams this node has sent, heard and rejected, and its UDP port; `nil` without a
+  network.
+  """
   @spec counts() ::
           %{
             sent: non_neg_integer(),
@@ -136,7 +143,7 @@ defmodule Mesh do
   def counts do
     case Table.value(:server, nil) do
       nil -> {:error, "this node has no mesh"}
-      pid -> Nonblocking.call(pid, :counts, "the radio of this node")
+      pid -> Nonblocking.call(pid, :counts, "the mesh of this node")
     end
   end
 
@@ -148,8 +155,8 @@ defmodule Mesh do
   end
 
   @doc """
-  Sends a request to a robot that this node has no connection to, or a silent one, over others that
-  have (`Mesh.CommandRelay`). `ref` is the alias in it that is to be answered.
+  Sends a request to a robot that this node has no working connection to, through other nodes that
+  have one (`Mesh.CommandRelay`). `ref` is the alias in it for the answer.
   """
   @spec relay(atom(), tuple(), reference()) :: :ok | {:error, :unknown | :no_way}
   def relay(robot, request, ref) do
@@ -163,7 +170,7 @@ defmodule Mesh do
     end
   end
 
-  # Between two servers there is no table, and nobody to tell.
+  # Between two servers there is no table, and no process to tell.
   defp tell(request) do
     with pid when pid != nil <- Table.value(:server, nil), do: GenServer.cast(pid, request)
     :ok

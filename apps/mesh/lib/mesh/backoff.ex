@@ -1,7 +1,8 @@
 defmodule Mesh.Backoff do
   @moduledoc """
-  When to try again: at growing intervals, for ever, each a little different, so that a fleet that
-  was cut apart does not knock in step. Pure: chance is handed in.
+  When to try again: for ever, at growing intervals, each a little random, so that the nodes of a
+  fleet that was cut apart do not all retry at the same time. Pure: the random number is passed
+  in.
   """
 
   @first_ms 200
@@ -12,17 +13,17 @@ defmodule Mesh.Backoff do
 
   @type t :: %__MODULE__{due_ms: integer(), delay_ms: pos_integer()}
 
-  @doc "Due at once."
+  @doc "The state in which a try is due at once."
   @spec new(integer()) :: t()
   def new(now_ms), do: %__MODULE__{due_ms: now_ms}
 
-  @doc "Whether it is time."
+  @doc "Whether a try is due."
   @spec due?(t(), integer()) :: boolean()
   def due?(%__MODULE__{due_ms: due_ms}, now_ms), do: now_ms >= due_ms
 
   @doc """
-  After a try: the next one is twice as far off, 5 s at most, give or take a quarter. `chance` is
-  from 0.0 to 1.0.
+  The state after a try: the next interval is twice as long, at most 5 s, give or take a quarter.
+  `chance` is from 0.0 to 1.0.
 
       iex> backoff = Mesh.Backoff.new(0) |> Mesh.Backoff.tried(0, 0.5)
       iex> {backoff.due_ms, Mesh.Backoff.tried(backoff, 200, 1.0).due_ms}

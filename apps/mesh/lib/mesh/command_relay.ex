@@ -1,17 +1,18 @@
 defmodule Mesh.CommandRelay do
   @moduledoc """
-  Carries commands to robots whose node this one is not connected to, over nodes that are.
+  Carries commands to robots on nodes that this node is not connected to, through nodes that are.
 
-  The way is computed where it begins, from what beacons tell of connections; every node on it hands
-  on, and the last one asks the robot in its own name (`c:Mesh.Consumer.command/2`). The answer comes back the same way. Nobody
-  waits for anything: what finds no way on is lost, and whoever asked gives up by itself.
+  The first node computes the route from the connections that beacons report; every node on it
+  passes the request on, and the last one asks the robot in its own name
+  (`c:Mesh.Consumer.command/2`). The answer returns the same way. No process waits: a request that
+  cannot be passed on is lost, and the caller gives up by itself.
   """
   use GenServer
   alias Mesh.Nonblocking
   alias Mesh.Protocol.WireTerm
   alias Mesh.Distribution.Topology
 
-  # Answers later than this are asked for by nobody.
+  # Nobody waits for answers later than this.
   @forget_ms 2_000
   @longest 16
   @most 1_000
@@ -21,8 +22,8 @@ defmodule Mesh.CommandRelay do
   def start_link(consumer), do: GenServer.start_link(__MODULE__, consumer, name: __MODULE__)
 
   @doc """
-  Sends a request to a robot on `node`. `ref` is the alias in it that the answer goes to.
-  `{:error, :no_way}` where no connections lead there.
+  Sends a request to a robot on `node`. `ref` is the alias in it for the answer.
+  `{:error, :no_way}` if no connections lead there.
   """
   @spec send(node(), %{node() => [node()]}, atom(), tuple(), reference()) ::
           :ok | {:error, :no_way}
@@ -36,7 +37,7 @@ defmodule Mesh.CommandRelay do
   @impl GenServer
   def init(consumer), do: {:ok, %{consumer: consumer, asked: %{}}}
 
-  # It has a name that connected nodes can send to, so anything may come here.
+  # It has a name that connected nodes can send to, so anything may arrive here.
   @impl GenServer
   def handle_call(_unknown, _from, s), do: {:noreply, s}
 

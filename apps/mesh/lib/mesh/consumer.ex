@@ -2,15 +2,15 @@ defmodule Mesh.Consumer do
   @moduledoc """
   Receives what the mesh hears. `Mesh.Supervisor` is given a module with this behaviour at its start.
 
-  The mesh itself knows neither messages nor services. It asks the consumer whether a term from outside
-  is a message, and hands on those that are. All callbacks run in processes of the mesh, which
-  must not wait, so they only cast.
+  The mesh itself knows neither messages nor services. It asks the consumer whether a term from
+  outside is a message, and passes on those that are. All callbacks run in processes of the mesh,
+  which must not wait, so they only cast.
   """
 
   @typedoc """
-  What the mesh has to know of a message. `robots` are those it claims to be from: its author first, then
-  those whose message the author forwards. All must belong to the fleet. `beat` is the number of a heartbeat,
-  and `nil` for all other messages.
+  What the mesh has to know about a message. `robots` are those that it claims to be from: its
+  author first, then those whose message the author forwards. All must belong to the fleet. `beat`
+  is the number of a heartbeat, and `nil` for all other messages.
   """
   @type about :: %{
           robots: [atom(), ...],
@@ -31,8 +31,8 @@ defmodule Mesh.Consumer do
   @callback deliver(:all | [atom()], node(), message :: term()) :: :ok
 
   @doc """
-  Hands a request that arrived over other nodes to a robot of this node. The request contains an alias to answer
-  to. `:error` if the robot is not on this node.
+  Passes a request that arrived through other nodes to a robot of this node. The request contains
+  an alias for the answer. `:error` if the robot is not on this node.
   """
   @callback command(robot :: atom(), request :: tuple()) :: :ok | :error
 end

@@ -1,7 +1,7 @@
 defmodule Mesh.Log do
   @moduledoc """
-  What the log says of the mesh: one line for what a person may want to know. Everything else
-  of the mesh tells by events only.
+  Logs events of the mesh: one line for what a person may want to know. Everything else in the
+  mesh emits only events.
   """
   require Logger
   alias Hal.Event
@@ -17,7 +17,7 @@ defmodule Mesh.Log do
     :libcluster
   ]
 
-  @doc "Attaches the log to the mesh's events; once a node."
+  @doc "Attaches the log to the mesh's events; once per node."
   @spec attach() :: :ok
   def attach do
     for event <- @events do
@@ -35,7 +35,7 @@ defmodule Mesh.Log do
   end
 
   @doc """
-  The line.
+  The log line of an event.
 
       iex> Mesh.Log.line(:gone, %{node: :mag1@lab})
       {:info, "mesh: mag1@lab is gone"}

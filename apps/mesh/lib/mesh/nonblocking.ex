@@ -1,8 +1,8 @@
 defmodule Mesh.Nonblocking do
   @moduledoc """
   Sends to processes that may be on another node, without ever waiting for a node that has gone
-  silent. Without these options a send waits for a full buffer, or dials a node that is gone. What
-  cannot be sent now is lost.
+  silent. Without these options, a send waits while the buffer is full, or dials a node that is
+  gone. What cannot be sent now is lost.
   """
 
   @doc "Casts to a `GenServer`, wherever it is."
@@ -13,8 +13,8 @@ defmodule Mesh.Nonblocking do
   end
 
   @doc """
-  Calls a process of this node for a person: where it has ended, or does not answer within 5 s, one line
-  says whose it was.
+  Calls a process of this node for a person: if it has ended, or does not answer within 5 s, the
+  error is one line that names it by `whose`.
   """
   @spec call(GenServer.server(), term(), whose :: String.t()) ::
           term() | {:error, line :: String.t()}
@@ -24,7 +24,7 @@ defmodule Mesh.Nonblocking do
     :exit, {_reason, {GenServer, :call, _arguments}} -> {:error, "#{whose} does not answer"}
   end
 
-  @doc "Answers to who asked with this reference, an alias."
+  @doc "Sends an answer to the caller with this reference, an alias."
   @spec answer(reference(), term()) :: :ok
   def answer(ref, answer) do
     :erlang.send(ref, {ref, answer}, [:nosuspend, :noconnect])

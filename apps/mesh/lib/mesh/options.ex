@@ -1,27 +1,27 @@
 defmodule Mesh.Options do
   @moduledoc """
-  What a node's mesh is started with, checked once.
+  The options of a node's mesh, checked once.
 
   | option | |
   |---|---|
   | `secret_file` | the fleet's secret (`mix fleet.secret` makes one), or `secret`, as loaded; default: where `Mesh.Secret` looks |
-  | `fleet` | the names of all robots that there may be; default `mag1` to `mag100`, `min1` to `min100` |
+  | `fleet` | the names of all possible robots; default `mag1` to `mag100`, `min1` to `min100` |
   | `interface` | the address to listen on and to send from; default all |
   | `port` | the UDP port; default 4370, 0 takes any |
   | `multicast` | group and port of the gossip, default `{{239, 255, 67, 86}, 4371}`; `false` for none |
-  | `peers` | addresses to try, `["10.0.0.7:4370"]`, where multicast is blocked |
-  | `strategies` | further ways to meet, `[{Module, options}]` (`Mesh.Strategy`) |
-  | `topologies` | those of `libcluster`, where it is (`MIX_TARGET`): any of its strategies then connects nodes |
-  | `dist_port` | the port that this node's distribution listens on; default: that of `Mesh.Distribution.Epmd`, or 0 where there is an epmd to ask |
-  | `full_mesh` | up to so many nodes each is connected to each; default 30 |
-  | `degree` | above that, to about so many others, 2 to 30; default 8 |
+  | `peers` | addresses to try, `["10.0.0.7:4370"]`, if multicast is blocked |
+  | `strategies` | further ways to find nodes, `[{Module, options}]` (`Mesh.Strategy`) |
+  | `topologies` | those of `libcluster`, if it is installed (`MIX_TARGET`): any of its strategies then connects nodes |
+  | `dist_port` | the port that this node's distribution listens on; default: that of `Mesh.Distribution.Epmd`, or 0 if there is an epmd to ask |
+  | `full_mesh` | up to this number of nodes each is connected to each; default 30 |
+  | `degree` | above that, each is connected to about this many others, 2 to 30; default 8 |
   """
   alias Hal.Options
   alias Mesh.{Secret, Strategy}
   alias Mesh.Protocol.Roster
 
   @gossip {{239, 255, 67, 86}, 4371}
-  # Addresses are for the strategies to check.
+  # The strategies check addresses.
   @table [
     secret_file: [{:path, "the path of the fleet's secret"}, default: nil],
     interface: [:ipv4, default: {0, 0, 0, 0}],
@@ -51,7 +51,10 @@ defmodule Mesh.Options do
 
   defstruct Keyword.keys(@table) ++ [started: []]
 
-  @typedoc "Checked: `started` are the strategies with their states, and nothing that is needed is `nil` any more."
+  @typedoc """
+  Checked options: `started` are the strategies with their states, and required options are not
+  `nil` any more.
+  """
   @type t :: %__MODULE__{
           secret: Secret.t(),
           secret_file: Path.t() | nil,
@@ -68,7 +71,10 @@ defmodule Mesh.Options do
           started: [{module(), state :: term()}]
         }
 
-  @doc "What a robot file may say of these (`network:`): addresses are text, and nothing is a default."
+  @doc """
+  The options that a robot file may set (`network:`): addresses are text, and there are no
+  defaults.
+  """
   @spec file_table() :: Options.table()
   def file_table, do: for(key <- @in_file, do: {key, @written[key] || hd(@table[key])})
 
@@ -86,8 +92,8 @@ defmodule Mesh.Options do
   end
 
   @doc """
-  Checks what the configuration says, and gives this node the fleet's cookie. A node without a name
-  or a secret has no mesh, and the line says which is missing.
+  Checks the configuration, and gives this node the fleet's cookie. A node without a name or a
+  secret has no mesh, and the error says which is missing.
   """
   @spec prepare(keyword()) :: {:ok, t()} | {:error, String.t()}
   def prepare(options) do
@@ -104,7 +110,7 @@ defmodule Mesh.Options do
   defp secret(%{secret_file: nil}), do: Secret.from_env()
   defp secret(%{secret_file: file}), do: Secret.load(file)
 
-  # Without an epmd others are told in beacons.
+  # Without an epmd, beacons tell the port to others.
   defp own_port do
     case :init.get_argument(:epmd_module) do
       {:ok, _without_epmd} ->

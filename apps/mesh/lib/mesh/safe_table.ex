@@ -17,7 +17,7 @@ defmodule Mesh.SafeTable do
     ArgumentError -> []
   end
 
-  @doc "What a match specification, which is a constant of its caller, finds."
+  @doc "The results of a match specification, which is a constant of its caller."
   @spec select(atom(), :ets.match_spec()) :: [term()]
   def select(table, match) do
     :ets.select(table, match)

@@ -1,20 +1,21 @@
 defmodule Mesh.Secret do
   @moduledoc """
-  The one secret of a fleet. Every robot has the same small file; who has it belongs to the fleet.
+  The single secret of a fleet. Every robot has the same small file; whoever has it belongs to the
+  fleet.
 
-  Two things are derived from it, so that neither tells the other or the secret: the key that signs
-  datagrams, and the cookie of Erlang's distribution. There is no default: a node without a good
-  secret does not start its mesh, and says in one line what to do.
+  Two things are derived from it, neither of which reveals the other or the secret: the key that
+  signs datagrams, and the cookie of Erlang's distribution. There is no default: a node without a
+  good secret does not start its mesh, and says in one line what to do.
 
   The file is text, base64 or hex, of at least 32 random bytes, for its owner alone (mode 0600):
 
       mix fleet.secret                                                  # where the project is
       (umask 077; head -c 32 /dev/urandom | base64 > /etc/convoy/secret)   # on a robot
 
-  Its place is `CONVOY_SECRET_FILE`, else `convoy.secret` in the current folder; a release looks in
-  `/etc/convoy/secret`. The struct shows neither key nor cookie when inspected: keep it whole in the
-  state of processes, and take the key out only where it is used. The fingerprint may be shown:
-  robots with the same one have the same secret.
+  Its path is `CONVOY_SECRET_FILE`, else `convoy.secret` in the current folder; a release looks in
+  `/etc/convoy/secret`. The struct shows neither key nor cookie when inspected: keep it whole in
+  the state of processes, and take the key out only where it is used. The fingerprint may be
+  shown: robots with the same one have the same secret.
   """
   alias Mesh.Secret
 
@@ -31,7 +32,7 @@ defmodule Mesh.Secret do
 
   @default "convoy.secret"
 
-  @doc "Where the secret is looked for when nothing says otherwise."
+  @doc "The default path of the secret."
   @spec default_path() :: Path.t()
   def default_path, do: @default
 
@@ -64,8 +65,8 @@ defmodule Mesh.Secret do
   end
 
   @doc """
-  Makes a secret file of 32 random bytes, and folders above it where there are none. A file that is
-  there stays, unless forced.
+  Makes a secret file of 32 random bytes, and missing folders above it. An existing file stays,
+  unless forced.
   """
   @spec create(Path.t(), force? :: boolean()) :: {:ok, t()} | {:error, line :: String.t()}
   def create(path, force? \\ false) do
@@ -78,8 +79,8 @@ defmodule Mesh.Secret do
   end
 
   @doc """
-  Gives this node the fleet's cookie, whatever cookie it was started with. When it was another one,
-  all nodes that are connected by it are cut off: they got in by a cookie that is not one of ours.
+  Gives this node the fleet's cookie, whatever cookie it was started with. If it was another one,
+  all connected nodes are disconnected, because they connected with a cookie that is not ours.
   """
   @spec apply_cookie(t()) :: :ok | {:error, line :: String.t()}
   def apply_cookie(%Secret{cookie: cookie}) do
@@ -97,8 +98,8 @@ defmodule Mesh.Secret do
   end
 
   @doc """
-  The command that makes a good secret there. Where there is no Mix, as in a release, it is made of
-  what every system has.
+  The command that makes a good secret there. Without Mix, as in a release, it uses programs that
+  every system has.
 
       iex> Mesh.Secret.command("/etc/secret", false, false)
       "(umask 077; head -c 32 /dev/urandom | base64 > /etc/secret)"
@@ -118,7 +119,7 @@ defmodule Mesh.Secret do
   defp line(path, "may be read by others" <> _rest = problem),
     do: "the fleet's secret #{shown(path)} #{problem}; close it: chmod 600 #{shell(path)}"
 
-  # Who may not read it shall not replace it.
+  # A user who may not read it should not replace it.
   defp line(path, "cannot be read (permission denied)" = problem),
     do: "the fleet's secret #{shown(path)} #{problem}; do this as root, or as its owner"
 
@@ -127,13 +128,13 @@ defmodule Mesh.Secret do
     "the fleet's secret #{shown(path)} #{problem}; make one: #{command}"
   end
 
-  # A random one may look weak, about once in a hundred thousand.
+  # A random one may look weak, about one in a hundred thousand.
   defp text do
     text = Base.encode64(:crypto.strong_rand_bytes(32))
     if match?({:ok, _bytes}, Secret.Text.decode(text)), do: text, else: text()
   end
 
-  # The one atom that is made from text: by this node's owner, from a file of theirs.
+  # The only atom that is made from text, from a file of this node's owner.
   defp derive(path, bytes) do
     cookie = bytes |> hmac("convoy cookie 1") |> Base.encode32(case: :lower, padding: false)
 
@@ -147,14 +148,14 @@ defmodule Mesh.Secret do
 
   defp hmac(bytes, label), do: :crypto.mac(:hmac, :sha256, bytes, label)
 
-  # What a shell takes as one word.
+  # Quoted so that a shell takes it as one word.
   defp shell(path) do
     if String.match?(path, ~r/\A[\w.,\/:@%+=-]+\z/),
       do: path,
       else: "'" <> String.replace(shown(path), "'", "'\\''") <> "'"
   end
 
-  # One line, whatever is in the name.
+  # One line, whatever the name contains.
   defp shown(path),
     do:
       if(String.printable?(path) and not (path =~ ~r/[[:cntrl:]]/), do: path, else: inspect(path))

@@ -1,8 +1,8 @@
 defmodule Mesh.Server do
   @moduledoc """
-  The process round `Mesh.Protocol`: it owns the sockets, keeps the time and carries effects
-  out. What others ask often is in a table that anybody reads (`Mesh.Table`). What it hears goes
-  to the consumer that it is given at its start (`Mesh.Consumer`).
+  The process around `Mesh.Protocol`: it owns the sockets, keeps the time and carries out effects.
+  What others ask often is in a table that all processes can read (`Mesh.Table`). What it hears
+  goes to the consumer that it gets at its start (`Mesh.Consumer`).
 
   Sockets that cannot be opened are tried again with back-off; a robot without a network drives on.
   """
@@ -15,7 +15,7 @@ defmodule Mesh.Server do
   @tick_ms 200
   @rejoin_every 50
 
-  @doc "Starts the radio of this node, with the module that takes what it hears."
+  @doc "Starts the server of this node, with the module that receives what it hears."
   @spec start_link({Options.t(), consumer :: module()}) :: GenServer.on_start()
   def start_link({%Options{}, _consumer} = start),
     do: GenServer.start_link(__MODULE__, start, name: __MODULE__)
@@ -58,8 +58,9 @@ defmodule Mesh.Server do
     {:ok, s |> open() |> publish() |> schedule()}
   end
 
-  # Heartbeats go to all by name, and by multicast besides, since either way may be blocked; on the
-  # loopback nothing is, and what thirty nodes of one machine send each other twice takes half of it.
+  # Heartbeats go to each node by its address, and also by multicast, because either way may be
+  # blocked. On the loopback neither is, and sending everything twice between thirty nodes takes
+  # half of the machine.
   defp group(%{multicast: false}), do: nil
   defp group(%{interface: {127, _, _, _}}), do: nil
   defp group(%{multicast: group}), do: group
@@ -75,7 +76,7 @@ defmodule Mesh.Server do
       when is_map_key(services, service) and is_atom(to),
       do: {:noreply, run(s, Protocol.serve(s.protocol, service, to, term))}
 
-  # To a node that the distribution is connected to, however that came about.
+  # To a node that the distribution is connected to, for whatever reason.
   def handle_cast({:introduce, node}, s) when is_atom(node) do
     if s.sockets, do: Nonblocking.cast({__MODULE__, node}, {:knock, node(), s.sockets.port})
     {:noreply, s}
@@ -152,7 +153,7 @@ defmodule Mesh.Server do
   defp carry_out({:send, _address, _datagram}, %{sockets: nil} = s), do: s
 
   defp carry_out({:send, address, datagram}, s) do
-    # What the network does not take now is lost, as any datagram may be.
+    # What the network does not accept now is lost, as any datagram may be.
     _ = Sockets.send(s.sockets, address, datagram)
     %{s | sent: s.sent + 1}
   end
@@ -189,7 +190,7 @@ defmodule Mesh.Server do
     s
   end
 
-  # For those who read it without asking.
+  # For processes that read it without asking.
   defp publish(%{protocol: %{node_table: node_table, roster: roster, rejected: rejected}} = s),
     do: %{s | written: Table.write(s.written, node_table, roster, rejected, now())}
 

@@ -1,10 +1,11 @@
 defmodule Mesh.Sockets do
   @moduledoc """
-  A node's two UDP sockets: one to send from and to be reached at, one that listens to the
+  A node's two UDP sockets: one for sending and for its own address, and one that listens to the
   multicast group, which all nodes of a machine share.
 
-  They belong to the process that opens them, and close with it. Both hand over a limited number of datagrams before they ask again, so that a flood waits, and is
-  lost, in the kernel and not in a process's mailbox.
+  They belong to the process that opens them, and close with it. Both deliver a limited number of
+  datagrams before they must be asked again, so that a flood waits, and is lost, in the kernel and
+  not in a process's mailbox.
   """
   alias Mesh.Options
 
@@ -21,7 +22,10 @@ defmodule Mesh.Sockets do
           membership: {:inet.ip4_address(), :inet.ip4_address()} | nil
         }
 
-  @doc "Opens them. `{:error, reason}` with reasons of `:inet`, such as `:eaddrinuse`, `:eaddrnotavail`."
+  @doc """
+  Opens both sockets. `{:error, reason}` with reasons of `:inet`, such as `:eaddrinuse`,
+  `:eaddrnotavail`.
+  """
   @spec open(Options.t()) :: {:ok, t()} | {:error, term()}
   def open(%Options{} = options) do
     with {:ok, own} <- :gen_udp.open(options.port, [{:ip, options.interface} | sending(options)]),
@@ -30,7 +34,7 @@ defmodule Mesh.Sockets do
     end
   end
 
-  @doc "Sends; whatever hinders it is the network's, and passes or does not."
+  @doc "Sends a datagram; errors are ignored, because they are those of the network."
   @spec send(t(), Mesh.Strategy.address(), binary()) :: :ok | {:error, term()}
   def send(%__MODULE__{own: own}, address, datagram), do: :gen_udp.send(own, address, datagram)
 
@@ -38,7 +42,7 @@ defmodule Mesh.Sockets do
   @spec again(:gen_udp.socket()) :: :ok | {:error, term()}
   def again(socket), do: :inet.setopts(socket, active: @burst)
 
-  @doc "Joins the group anew: an interface that was down has forgotten it."
+  @doc "Joins the group again, because an interface that was down has forgotten it."
   @spec rejoin(t()) :: t()
   def rejoin(%__MODULE__{group: nil} = sockets), do: sockets
 

@@ -1,7 +1,7 @@
 defmodule Mesh.Strategy do
   @moduledoc """
-  How nodes that do not know each other yet meet. A strategy names places to send a beacon to;
-  whoever hears one answers, and from then on both know each other's address, for ever.
+  How nodes find each other. A strategy names addresses to send a beacon to; a node that hears one
+  answers, and from then on both know each other's address, for ever.
 
   A strategy is a pair of pure functions, asked five times a second; `Mesh.Strategy.Gossip` and
   `Mesh.Strategy.Static` come with the mesh and may run together; others are given as
@@ -20,12 +20,12 @@ defmodule Mesh.Strategy do
 
   @type address :: {:inet.ip4_address(), :inet.port_number()}
 
-  @doc "Checks the options once, at the start; an error is one line."
+  @doc "Checks the options once, at the start; the error is one line."
   @callback init(options :: term()) :: {:ok, state :: term()} | {:error, String.t()}
 
   @doc """
-  Where to send a beacon now. `known` are the addresses of the nodes that are heard, which need
-  none; `chance` is a number from 0.0 to 1.0, new with each call.
+  The addresses to send a beacon to now. `known` are the addresses of the nodes that are heard,
+  which need none; `chance` is a number from 0.0 to 1.0, new with each call.
   """
   @callback targets(state :: term(), known :: [address()], now_ms :: integer(), chance :: float()) ::
               {[address()], state :: term()}

@@ -8,15 +8,16 @@ defmodule Mesh.Supervisor do
       |-- Mesh.CommandRelay              commands to nodes that this one is not connected to
       `-- Mesh.Distribution.Libcluster   where its topologies are configured
 
-  A radio that starts anew has a new session: for the others it is a node that was away for a moment.
+  A server that restarts has a new session: for the others it is a node that was away for a
+  moment.
   """
   use Supervisor
   alias Mesh.{CommandRelay, Options}
   alias Mesh.Distribution.{Dialer, Libcluster}
 
   @doc """
-  Starts the mesh of this node, with options from `Mesh.Options.prepare/1` and the module that takes what
-  it hears (`Mesh.Consumer`).
+  Starts the mesh of this node, with options from `Mesh.Options.prepare/1` and the module that
+  receives what it hears (`Mesh.Consumer`).
   """
   @spec start_link({Options.t(), consumer :: module()}) :: Supervisor.on_start()
   def start_link({%Options{}, _consumer} = start), do: Supervisor.start_link(__MODULE__, start)

@@ -74,7 +74,7 @@ defmodule Mesh.SecretTest do
     assert {:ok, secret} = Secret.create(path)
     assert {:ok, %File.Stat{mode: 0o100600}} = File.stat(path)
     assert {:error, line} = Secret.create(path)
-    assert line =~ "is there already; --force writes over it"
+    assert line =~ "exists already; --force overwrites it"
     assert {:ok, ^secret} = Secret.load(path)
     assert {:ok, other} = Secret.create(path, true)
     assert other.key != secret.key

@@ -1,20 +1,20 @@
 defmodule Mesh.Distribution.Certs do
   @moduledoc """
   A fleet's own certificates, for distribution by TLS: a CA, and a key and a certificate for each
-  robot, made by the program `openssl` on the machine of whoever owns the fleet.
+  robot, made by the program `openssl` on the machine of the fleet's owner.
 
       certs/ca.pem  certs/ca-key.pem            the CA; its key (mode 0600) goes to no robot
       certs/mag1/{ca,cert,key}.pem              goes to mag1
       certs/mag1/ssl_dist.conf                  -ssl_dist_optfile of mag1
 
-  Keys are EC P-256. The CA is good for ten years, a robot's certificate for five; both from the
-  moment they are made, so a robot's clock must not be before it. CN and SAN are the robot's name.
+  Keys are EC P-256. The CA is valid for ten years, a robot's certificate for five, both from the
+  moment they are made, so a robot's clock must not be earlier. CN and SAN are the robot's name.
   """
 
   @ca_days 3_650
   @robot_days 1_825
 
-  @doc "Makes the CA in a folder, unless it is there."
+  @doc "Makes the CA in a folder, unless it exists."
   @spec ca(Path.t()) :: {:ok, :made | :kept} | {:error, String.t()}
   def ca(folder) do
     [certificate, key] = for file <- ["ca.pem", "ca-key.pem"], do: Path.join(folder, file)
@@ -27,7 +27,9 @@ defmodule Mesh.Distribution.Certs do
     end
   end
 
-  @doc "Makes key, certificate and options of one robot, unless they are there or it is forced."
+  @doc """
+  Makes key, certificate and options of one robot, unless they exist; `force` replaces them.
+  """
   @spec robot(Path.t(), name :: String.t(), force? :: boolean()) ::
           {:ok, :made | :kept} | {:error, String.t()}
   def robot(folder, name, force?) do
@@ -41,7 +43,7 @@ defmodule Mesh.Distribution.Certs do
   end
 
   @doc """
-  Whether a word can be a robot's name: it becomes the name of a folder and of a certificate.
+  Whether a text can be a robot's name: it becomes the name of a folder and of a certificate.
 
       iex> Enum.map(["mag1", "../mag1", ""], &Mesh.Distribution.Certs.name?/1)
       [true, false, false]
@@ -104,8 +106,8 @@ defmodule Mesh.Distribution.Certs do
     """
   end
 
-  # An Erlang expression. Both sides show a certificate and check the other's. The names in them are
-  # not compared with names of hosts: robots have the addresses of the day. The folder may be copied
+  # An Erlang expression. Both sides show a certificate and check the other's. The names in them
+  # are not compared with host names, because addresses of robots change. The folder may be copied
   # elsewhere; `CONVOY_CERTS_DIR` then says where it is.
   defp options(own) do
     common = """

@@ -1,15 +1,16 @@
 defmodule Mesh.Distribution.ConnectionLog do
   @moduledoc """
-  Says in one line who was not let in, from where, and why. Erlang reports such things in several
-  ways, some over many lines, none with an address; this filter of the logger makes them
+  Logs in one line which connection was refused, from where, and why. Erlang reports this in
+  several ways, some over many lines, none with an address; this filter of the logger turns them
+  into
 
       refused mag3 at 10.0.0.13:53312: its certificate is of another fleet (unknown CA)
 
-  and the event `[:mesh, :refused]`. The filter runs in the process that reports, which
-  holds the connection: there the address is known. At most five lines a second are said, so that
-  nobody fills a disk by knocking; the events of the others are dropped with them.
+  and the event `[:mesh, :refused]`. The filter runs in the process that reports, which holds the
+  connection, so the address is known there. At most five lines a second are logged, so that
+  connection attempts cannot fill a disk; the events of the others are dropped with them.
 
-  A node without TLS that is called by one with it hangs up without a word; the caller says it.
+  A node without TLS that is called by one with TLS hangs up silently; the caller logs it.
   """
   alias Hal.Event
   alias Mesh.Distribution.ConnectionLog
@@ -18,7 +19,7 @@ defmodule Mesh.Distribution.ConnectionLog do
   @per_second 5
   @hops 3
 
-  @doc "Puts the filter before all handlers of the logger. More than once is as once."
+  @doc "Puts the filter before all handlers of the logger. Repeated calls change nothing."
   @spec install() :: :ok
   def install do
     state = :atomics.new(2, [])
@@ -52,15 +53,15 @@ defmodule Mesh.Distribution.ConnectionLog do
     }
   end
 
-  # The second that is being counted, and how many were said in it.
+  # The current second, and how many lines were logged in it.
   defp room?(state) do
     second = System.monotonic_time(:second)
     if :atomics.exchange(state, 1, second) != second, do: :atomics.put(state, 2, 0)
     :atomics.add_get(state, 2, 1) <= @per_second
   end
 
-  # The socket belongs to this process, or with TLS to one that is linked to it over a few others of
-  # the same connection. What has a name belongs to all connections and is not entered.
+  # The socket belongs to this process, or with TLS to one that is linked to it through a few
+  # others of the same connection. Named processes belong to all connections and are skipped.
   defp address do
     case self() |> ports([], @hops) |> Enum.uniq() do
       [address] -> address

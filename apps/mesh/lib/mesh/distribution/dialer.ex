@@ -1,10 +1,10 @@
 defmodule Mesh.Distribution.Dialer do
   @moduledoc """
-  Connects this node's distribution to those that the plan names, again and again, for ever, with
-  back-off. A connection attempt blocks for seconds where packets vanish, so each has a process of
-  its own, and no more than four run at once.
+  Connects this node's distribution to the nodes that the topology names, and retries for ever,
+  with back-off. A connection attempt blocks for seconds if packets get lost, so each has a
+  process of its own, and at most four run at once.
 
-  Whether a node is alive is not decided here: that is told by datagrams (`Mesh.Protocol.NodeTable`).
+  This does not decide whether a node is alive: datagrams do (`Mesh.Protocol.NodeTable`).
   """
   use GenServer
   alias Hal.Event
@@ -13,10 +13,10 @@ defmodule Mesh.Distribution.Dialer do
   alias Mesh.Distribution.Topology
 
   @tick_ms 200
-  # So long the one whose part it is has to connect before the other tries.
+  # How long the node that should dial has time to connect before the other tries.
   @grace_ms 3_000
   @at_once 4
-  # In ticks: how often a node that is connected, but not heard, is told this one's address.
+  # In ticks: how often this node's address is sent to a node that is connected, but not heard.
   @introduce_every 25
 
   @doc "Starts the dialer of this node."
@@ -24,7 +24,7 @@ defmodule Mesh.Distribution.Dialer do
   def start_link(%Options{} = options),
     do: GenServer.start_link(__MODULE__, options, name: __MODULE__)
 
-  @doc "Tells it of a node."
+  @doc "Tells the dialer about a node."
   @spec note(:up | :suspect | :gone, node()) :: :ok
   def note(change, node), do: GenServer.cast(__MODULE__, {:note, change, node})
 
@@ -38,7 +38,7 @@ defmodule Mesh.Distribution.Dialer do
     now = now()
     chance = :rand.seed_s(:exsss, :erlang.phash2(node()))
 
-    # A dialer before this one may have been told of nodes already.
+    # A previous dialer may already have been told about nodes.
     known = for node <- Map.keys(Mesh.view().nodes), into: %{}, do: {node, row(now)}
     fleet = MapSet.new(Map.values(Roster.new(node(), options.fleet).nodes))
 
@@ -53,7 +53,7 @@ defmodule Mesh.Distribution.Dialer do
      })}
   end
 
-  # It has a name that connected nodes can send to, so anything may come here.
+  # It has a name that connected nodes can send to, so anything may arrive here.
   @impl GenServer
   def handle_call(_unknown, _from, s), do: {:noreply, s}
 
@@ -98,7 +98,7 @@ defmodule Mesh.Distribution.Dialer do
 
   defp row(now), do: %{since_ms: now, backoff: Backoff.new(now)}
 
-  # Whoever is connected, by whatever means, shall be heard too.
+  # A node that is connected, by any means, should be heard, too.
   defp introduce do
     for node <- links() -- Mesh.alive(), do: Mesh.introduce(node)
   end

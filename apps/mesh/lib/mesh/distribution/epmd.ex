@@ -1,8 +1,8 @@
 defmodule Mesh.Distribution.Epmd do
   @moduledoc """
-  Erlang's port mapper, without a port mapper: a node is told where others are by what the radio
-  has heard (signed beacons), and by a list. Neither epmd nor a name server is needed, and node names
-  need not be names of hosts: `mag1@convoy` stays itself whatever address it is given today.
+  Replaces Erlang's port mapper: a node learns where others are from signed beacons that the mesh
+  has heard, and from a list. Neither epmd nor a name server is needed, and node names need not be
+  host names: `mag1@convoy` keeps its name whatever address it has.
 
       -start_epmd false -epmd_module Elixir.Mesh.Distribution.Epmd
 
@@ -13,19 +13,19 @@ defmodule Mesh.Distribution.Epmd do
   | nodes of the same host part | 127.0.0.1 and their default port: `iex --remsh` on the robot itself |
   | hosts that are addresses | `mag1@10.0.0.11`: that address and the default port |
 
-  Names are never asked of a name server: it is `:net_kernel` that asks here, and one that gets no
-  answer stands still, with all connections of the node.
+  A name server is never asked, because `:net_kernel` calls this module, and while it waits for an
+  answer, all connections of the node wait.
 
-  Erlang calls this module before any application runs, and gives it its one process, which owns the
-  table. Without that process (a node with the usual epmd) `learn/3` does nothing. A table that is
-  full takes no more names. No text becomes an atom here.
+  Erlang calls this module before any application runs, and starts its only process, which owns
+  the table. Without that process (a node with the usual epmd) `learn/3` does nothing. A full
+  table accepts no more names. No text becomes an atom here.
   """
   use GenServer
   alias Mesh.Distribution.Epmd.Peers
 
   @table __MODULE__
   @most 1_024
-  # What epmd answers as the version of the distribution protocol.
+  # The version of the distribution protocol, as epmd answers it.
   @version 5
 
   @type text :: String.t() | charlist() | atom()
@@ -41,7 +41,7 @@ defmodule Mesh.Distribution.Epmd do
     end
   end
 
-  @doc "Forgets a node; one of the list is found by the list again after a restart only."
+  @doc "Forgets a node; a node of the list is found again only after a restart."
   @spec forget(String.t()) :: :ok
   def forget(node) do
     if :ets.whereis(@table) != :undefined, do: :ets.delete(@table, node)
@@ -49,7 +49,7 @@ defmodule Mesh.Distribution.Epmd do
   end
 
   @doc """
-  The port of a robot that was told none.
+  The port of a robot without a configured one.
 
       iex> Enum.map(["mag1", "mag100", "min1", "world"], &Mesh.Distribution.Epmd.default_port/1)
       [9101, 9200, 9201, 9301]
@@ -57,7 +57,8 @@ defmodule Mesh.Distribution.Epmd do
   @spec default_port(text()) :: 9_101..9_999
   def default_port(name), do: Peers.default_port(to_string(name))
 
-  # A distribution whose port mapper falls ends the node, so nothing that comes here may fell it.
+  # If the port mapper of a distribution crashes, the node ends, so nothing that arrives here may
+  # crash it.
   @impl GenServer
   def handle_call(_unknown, _from, s), do: {:noreply, s}
 
@@ -67,7 +68,7 @@ defmodule Mesh.Distribution.Epmd do
   @impl GenServer
   def handle_info(_unknown, s), do: {:noreply, s}
 
-  # What Erlang asks of an epmd module.
+  # The callbacks that Erlang expects of an epmd module.
 
   @doc false
   @spec start_link() :: GenServer.on_start()
@@ -75,7 +76,7 @@ defmodule Mesh.Distribution.Epmd do
 
   @impl GenServer
   def init([]) do
-    # One of a restarted distribution may still be there, until its owner has ended.
+    # The table of a previous distribution may still exist until its owner has ended.
     :ets.new(@table, [:named_table, :public, read_concurrency: true])
     list = to_string(:os.getenv(~c"CONVOY_PEERS", ~c""))
     for {node, ip, port} <- Enum.take(Peers.parse(list), @most), do: insert({node, ip, port})
@@ -95,7 +96,8 @@ defmodule Mesh.Distribution.Epmd do
           {:ok, creation :: pos_integer()}
   def register_node(name, port, _family) do
     if :ets.whereis(@table) != :undefined, do: insert({{:own, to_string(name)}, nil, port})
-    # Tells one life of a node from the next, as epmd would; 0 to 3 have a meaning of their own.
+    # Distinguishes one life of a node from the next, as epmd would; 0 to 3 have a special
+    # meaning.
     {:ok, 3 + :rand.uniform(0xFFFFFFFF - 4)}
   end
 
@@ -168,7 +170,7 @@ defmodule Mesh.Distribution.Epmd do
     end
   end
 
-  # While the node is only about to get its name it has none yet.
+  # While the node is about to get its name, it has none yet.
   defp own_host, do: node() |> Atom.to_string() |> String.split("@") |> List.last()
 
   defp environment do

@@ -1,14 +1,14 @@
 defmodule Mesh.Distribution.Libcluster do
   @moduledoc """
-  Runs libcluster's topologies, where libcluster is: any of its strategies then connects nodes, and
-  connected nodes introduce themselves to each other's radio. What falls in there does not take the
-  mesh along; it is started again with back-off.
+  Runs libcluster's topologies if libcluster is installed: any of its strategies then connects
+  nodes, and connected nodes introduce themselves to each other's mesh. If it crashes, the mesh
+  goes on, and it is started again with back-off.
   """
   use GenServer
   alias Hal.Event
   alias Mesh.Backoff
 
-  @doc "Starts it; `topologies` as libcluster takes them."
+  @doc "Starts libcluster; `topologies` are in its format."
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(topologies), do: GenServer.start_link(__MODULE__, topologies)
 
@@ -26,8 +26,8 @@ defmodule Mesh.Distribution.Libcluster do
   def handle_info({:EXIT, _supervisor, reason}, s), do: {:noreply, later(s, reason)}
   def handle_info(_other, s), do: {:noreply, s}
 
-  # Not a dependency: the module is there or it is not, as `Mesh.Options` has found out. Of a
-  # failed start its `:EXIT` tells too.
+  # Not a dependency: `Mesh.Options` has found out whether the module exists. A failed start also
+  # sends an `:EXIT`.
   defp start(s) do
     arguments = [s.topologies, [name: Mesh.Distribution.Libcluster.Topologies]]
     _ = apply(Cluster.Supervisor, :start_link, [arguments])

@@ -1,17 +1,18 @@
 defmodule Mesh.Distribution.Topology do
   @moduledoc """
-  Whom a node connects its distribution to. Pure: all compute alike, from who is known.
+  The nodes that a node connects its distribution to. Pure: all nodes compute the same from the
+  known nodes.
 
-  Up to `full_mesh` nodes: everybody to everybody. Above that a ring of all names in order, with
-  chords: each node to those 1, n^(1/4), n^(1/2) and n^(3/4) places further on, and so to as many before
-  it; with a hundred nodes no two are more than seven steps apart, and each has at most eight
-  connections.
+  Up to `full_mesh` nodes, every node connects to every other. Above that, the names in order form
+  a ring with chords: each node connects to those 1, n^(1/4), n^(1/2) and n^(3/4) places further
+  on, and so to as many before it; with a hundred nodes no two are more than seven steps apart,
+  and each has at most eight connections.
 
-  Of each pair the one whose name comes first dials; the other does it when that has not come about.
+  Of each pair the node whose name comes first dials; the other does so if that has not happened.
   """
 
   @doc """
-  The nodes that `me` is to be connected to, sorted.
+  The nodes that `me` should be connected to, sorted.
 
       iex> Mesh.Distribution.Topology.peers("a", ["b", "c"], 30, 8)
       ["b", "c"]
@@ -26,12 +27,13 @@ defmodule Mesh.Distribution.Topology do
     if count <= full_mesh, do: List.delete(all, me), else: chords(me, all, count, degree)
   end
 
-  @doc "Whether it is `me` who dials of the two."
+  @doc "Whether `me` is the one of the two that dials."
   @spec dials?(String.t(), String.t()) :: boolean()
   def dials?(me, other), do: me < other
 
   @doc """
-  A shortest way over connections from `me` to `target`, without `me`; `nil` where there is none.
+  A shortest route through connections from `me` to `target`, without `me`; `nil` if there is
+  none.
 
       iex> Mesh.Distribution.Topology.route("a", "c", %{"a" => ["b"], "b" => ["a", "c"]})
       ["b", "c"]

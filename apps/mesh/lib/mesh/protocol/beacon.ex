@@ -1,8 +1,8 @@
 defmodule Mesh.Protocol.Beacon do
   @moduledoc """
-  What a node says of itself: the sessions that it knows (so that those who listen can tell that it
-  speaks now), whom it hears and from where, to whom its distribution is connected, and on which port that
-  listens (0: ask epmd). Names are text. Pure.
+  What a node says about itself: the sessions that it knows (so that listeners can tell that it
+  speaks now), the nodes that it hears and their addresses, the nodes that its distribution is
+  connected to, and the port that the distribution listens on (0: ask epmd). Names are text. Pure.
   """
 
   alias Mesh.Strategy.Static
@@ -21,7 +21,7 @@ defmodule Mesh.Protocol.Beacon do
   @most 1_100
   @latest 0xFFFFFFFFFFFFFFFF
 
-  @doc "As a plain term for the wire."
+  @doc "A beacon as a plain term for the wire."
   @spec term(t()) :: tuple()
   def term(%__MODULE__{} = beacon),
     do: {beacon.sessions, beacon.hears, beacon.links, beacon.port}
@@ -47,7 +47,8 @@ defmodule Mesh.Protocol.Beacon do
   def check(_other), do: :error
 
   @doc """
-  Without names that this node does not know: what it tells others again must stay true and short.
+  The beacon without names that this node does not know, because what it passes on must stay true
+  and short.
 
       iex> alias Mesh.Protocol.Beacon
       iex> beacon = %Beacon{sessions: [{"mag1@lab", 7}, {"x@y", 8}], hears: [], links: ["x@y"], port: 0}

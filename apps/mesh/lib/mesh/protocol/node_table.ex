@@ -1,21 +1,22 @@
 defmodule Mesh.Protocol.NodeTable do
   @moduledoc """
-  What a node knows of the others: where they are, when they were heard, whom they hear, whose
-  distribution they are connected to, and which robots they hold. Pure; times are this node's own, in ms.
+  What a node knows about the others: their addresses, when they were heard, the nodes that they
+  hear and are connected to, and the robots that they hold. Pure; times are this node's own, in
+  ms.
 
-  Of nodes that others hear, and this one does not, the address is a lead: they get beacons too.
+  The address of a node that others hear, but this one does not, is a lead: it gets beacons, too.
 
-  A node is suspect after 1 s of silence and gone after 2 s; what decides is datagrams, never a
-  connection. One that is gone stays in the table and is sent beacons for ever. The view's number
-  grows with each node that comes or goes.
+  A node is suspect after 1 s of silence and gone after 2 s; only datagrams decide that, never a
+  connection. A node that is gone stays in the table and is sent beacons for ever. The view's
+  number grows with each node that comes or goes.
   """
   alias Mesh.Backoff
 
   @suspect_ms 1_000
   @gone_ms 2_000
-  # More names than any fleet has: what is told beyond that is not kept.
+  # More names than any fleet has: further ones are not stored.
   @most 1_100
-  # A beacon to those that are there, though there may be heartbeats too.
+  # The interval of beacons to nodes that are heard, although there may be heartbeats, too.
   @beacon_ms 1_000
 
   @enforce_keys [:me]
@@ -46,7 +47,7 @@ defmodule Mesh.Protocol.NodeTable do
   @spec new(name()) :: t()
   def new(me), do: %__MODULE__{me: me}
 
-  @doc "A node was heard from there. Tells what has changed by that."
+  @doc "Notes that a node was heard from this address. Returns what has changed."
   @spec hear(t(), name(), Mesh.Strategy.address(), integer()) :: {t(), [{:up, name()}]}
   def hear(%{me: me} = node_table, me, _address, _now_ms), do: {node_table, []}
 
@@ -75,12 +76,14 @@ defmodule Mesh.Protocol.NodeTable do
     end
   end
 
-  @doc "Somebody signed as this name says that this is its session; it may be an old recording."
+  @doc """
+  Notes the session that a signed packet of this name claims; the packet may be an old recording.
+  """
   @spec claim(t(), name(), non_neg_integer()) :: t()
   def claim(node_table, name, session),
     do: %{node_table | claims: Map.put(node_table.claims, name, session)}
 
-  @doc "A beacon of a node that is let in: whom it hears, what it is connected to."
+  @doc "Takes in a beacon of an admitted node: the nodes that it hears and is connected to."
   @spec beacon(t(), name(), Mesh.Protocol.Beacon.t(), integer()) :: t()
   def beacon(node_table, name, beacon, now_ms) do
     told = Map.delete(Map.new(beacon.sessions), node_table.me)
@@ -99,8 +102,8 @@ defmodule Mesh.Protocol.NodeTable do
     end
   end
 
-  # One that was heard here has an entry with an address of its own, which is the newer lead when it
-  # has moved.
+  # A node that was heard here has an entry with its own address; if it has moved, the other
+  # address is the newer lead.
   defp lead(%{me: me} = node_table, {me, _address}, _now_ms), do: node_table
 
   defp lead(node_table, {name, address}, now_ms) do
@@ -120,7 +123,7 @@ defmodule Mesh.Protocol.NodeTable do
     end
   end
 
-  @doc "A heartbeat of a robot on that node."
+  @doc "Notes a heartbeat of a robot on that node."
   @spec robot(t(), name(), atom(), {boot :: integer(), sequence :: integer()}, integer()) :: t()
   def robot(node_table, name, id, {boot, sequence}, now_ms) do
     case node_table.nodes do
@@ -134,8 +137,8 @@ defmodule Mesh.Protocol.NodeTable do
   end
 
   @doc """
-  The sessions to tell in a beacon: of those that are let in, of those that ask for it, and, of those that
-  are not heard here, what others tell.
+  The sessions for a beacon: those of admitted nodes, of nodes that ask for it, and, for nodes
+  that are not heard here, those that others report.
   """
   @spec sessions(t(), let_in :: %{name() => non_neg_integer()}, integer()) ::
           [{name(), non_neg_integer()}]
@@ -149,7 +152,7 @@ defmodule Mesh.Protocol.NodeTable do
     |> Enum.sort()
   end
 
-  @doc "How a node is, by its silence."
+  @doc "The state of a node, judged by its silence."
   @spec status(t(), name(), integer()) :: status()
   def status(node_table, name, now_ms) do
     case node_table.nodes do
@@ -159,7 +162,7 @@ defmodule Mesh.Protocol.NodeTable do
   end
 
   @doc """
-  The same, of a node that was last heard then.
+  The same for a node that was last heard then.
 
       iex> for now_ms <- [999, 1_000, 2_000], do: Mesh.Protocol.NodeTable.status(0, now_ms)
       [:alive, :suspect, :gone]
@@ -169,11 +172,11 @@ defmodule Mesh.Protocol.NodeTable do
   def status(heard_ms, now_ms) when now_ms - heard_ms < @gone_ms, do: :suspect
   def status(_heard_ms, _now_ms), do: :gone
 
-  @doc "From when on a node must have been heard to count as alive now."
+  @doc "The time since when a node must have been heard to count as alive now."
   @spec alive_since(now_ms :: integer()) :: integer()
   def alive_since(now_ms), do: now_ms - @suspect_ms + 1
 
-  @doc "Whom this node hears, and from where, sorted."
+  @doc "The nodes that this node hears, and their addresses, sorted."
   @spec hears(t(), integer()) :: [{name(), Mesh.Strategy.address()}]
   def hears(node_table, now_ms) do
     Enum.sort(
@@ -183,7 +186,7 @@ defmodule Mesh.Protocol.NodeTable do
     )
   end
 
-  @doc "What time has changed: who has become suspect, who is gone."
+  @doc "The changes by time: the nodes that have become suspect, or are gone."
   @spec age(t(), integer()) :: {t(), [{:suspect | :gone, name()}]}
   def age(node_table, now_ms) do
     for {name, entry} <- Enum.sort(node_table.nodes),
@@ -202,8 +205,8 @@ defmodule Mesh.Protocol.NodeTable do
   end
 
   @doc """
-  The addresses that get a beacon now: those that are there once a second, or each time when `often?`;
-  those that are not, and leads, at growing intervals.
+  The addresses that get a beacon now: nodes that are heard once a second, or each time if
+  `often?`; nodes that are not heard, and leads, at growing intervals.
   """
   @spec due(t(), boolean(), integer(), float()) :: {[Mesh.Strategy.address()], t()}
   def due(node_table, often?, now_ms, chance) do
@@ -236,12 +239,12 @@ defmodule Mesh.Protocol.NodeTable do
     end
   end
 
-  @doc "The addresses of all that are not gone."
+  @doc "The addresses of all nodes that are not gone."
   @spec addresses(t()) :: [Mesh.Strategy.address()]
   def addresses(node_table),
     do: for({_name, %{status: status, address: a}} <- node_table.nodes, status != :gone, do: a)
 
-  @doc "The names of the nodes that hold these robots, as far as they were heard."
+  @doc "The names of the nodes that hold these robots, as far as known from heartbeats."
   @spec holders(t(), [atom()]) :: [name()]
   def holders(node_table, ids),
     do:
@@ -251,7 +254,7 @@ defmodule Mesh.Protocol.NodeTable do
         do: name
       )
 
-  # One that was only suspect was in the view all the time.
+  # A node that was only suspect was in the view all the time.
   defp up(node_table, name, entry, news) do
     node_table = %{
       node_table

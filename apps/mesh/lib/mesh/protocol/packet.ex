@@ -5,12 +5,14 @@ defmodule Mesh.Protocol.Packet do
       "CVY" | version | kind | length of name | name | session | sequence | payload | signature
         3        1       1          1                     8         8                    16      bytes
 
-  The name is that of the sending node, the session a random number that it draws at its start, the
-  sequence grows with every datagram. The signature is the first half of HMAC-SHA256 with the
-  fleet's key, over all before it: a datagram that is not signed is looked at no further.
+  The name is that of the sending node, the session a random number that it draws at its start,
+  the sequence grows with every datagram. The signature is the first half of HMAC-SHA256 with the
+  fleet's key, over everything before it: a datagram without a valid signature is not processed
+  further.
 
-  Kinds: `:beacon` (who I am, whom I know), `:message` (of a robot, read by the node's `Mesh.Consumer`), `:service`
-  (`Mesh.cast/2`). Payloads are terms in the external format, read without making atoms.
+  Kinds: `:beacon` (who I am, whom I know), `:message` (of a robot, read by the node's
+  `Mesh.Consumer`), `:service` (`Mesh.cast/2`). Payloads are terms in the external format, decoded
+  without creating atoms.
   """
 
   @enforce_keys [:sender, :session, :sequence, :kind, :payload]
@@ -30,12 +32,12 @@ defmodule Mesh.Protocol.Packet do
   @mac 16
   @kinds [beacon: 1, message: 2, service: 3]
 
-  # More than any payload unpacks to; a small datagram could else unpack to gigabytes.
+  # More than any payload unpacks to; otherwise a small datagram could unpack to gigabytes.
   @most 262_144
   @largest 60_000
   @frame 1_200
 
-  @doc "The largest payload in bytes: what one datagram takes."
+  @doc "The largest payload of a datagram, in bytes."
   @spec largest() :: pos_integer()
   def largest, do: @largest
 
@@ -74,7 +76,7 @@ defmodule Mesh.Protocol.Packet do
          :ok <- signed(datagram, key) do
       payload = binary_part(rest, 0, byte_size(rest) - @mac)
 
-      # Copied, so that no small part of it keeps the whole datagram in memory.
+      # Copied, so that a small part of it does not keep the whole datagram in memory.
       {:ok,
        %__MODULE__{
          sender: :binary.copy(sender),
@@ -92,7 +94,8 @@ defmodule Mesh.Protocol.Packet do
   def open(_datagram, _key), do: {:error, :not_ours}
 
   @doc """
-  Who sent a datagram and as which, by its own unproven word: only to drop it unread.
+  The claimed sender, session and sequence of a datagram, not verified: only for dropping it
+  unread.
 
       iex> Mesh.Protocol.Packet.peek("garbage")
       :error
@@ -109,7 +112,8 @@ defmodule Mesh.Protocol.Packet do
   def peek(_datagram), do: :error
 
   @doc """
-  A term as a payload, and back. What would make an atom, or unpack to more than 256 KiB, is refused.
+  Encodes a term as a payload; `unpack/1` is the reverse. What would create an atom, or unpack to
+  more than 256 KiB, is refused.
 
       iex> {:mag1, [1, 2.5]} |> Mesh.Protocol.Packet.pack() |> Mesh.Protocol.Packet.unpack()
       {:ok, {:mag1, [1, 2.5]}}
@@ -118,7 +122,7 @@ defmodule Mesh.Protocol.Packet do
   """
   @spec pack(term()) :: binary()
   def pack(term) do
-    # What fits a frame of the network is not worth the time that it takes to press it.
+    # Compressing what fits a frame of the network is not worth the time.
     case :erlang.term_to_binary(term, minor_version: 2) do
       payload when byte_size(payload) <= @frame -> payload
       _large -> :erlang.term_to_binary(term, compressed: 1, minor_version: 2)

@@ -1,11 +1,11 @@
 defmodule Mesh.Protocol.Routing do
   @moduledoc """
-  How commands get to robots whose node this one does not hear: over nodes that hear both. Pure, from
-  what is in the node table.
+  Routes commands to robots on nodes that this one does not hear, through nodes that hear both.
+  Pure, computed from the node table.
   """
   alias Mesh.Protocol.NodeTable
 
-  @doc "The robots of nodes that are not heard here, but by others that are, sorted."
+  @doc "The robots on nodes that are not heard here, but are heard by others that are, sorted."
   @spec beyond(NodeTable.t(), integer()) :: [atom()]
   def beyond(node_table, now_ms) do
     {alive, silent} =
@@ -13,7 +13,7 @@ defmodule Mesh.Protocol.Routing do
         NodeTable.status(entry.heard_ms, now_ms) == :alive
       end)
 
-    # Mostly nobody is silent, and then nothing has to be gone through.
+    # Usually no node is silent, and then nothing has to be searched.
     case for({name, %{robots: robots}} when robots != %{} <- silent, do: {name, robots}) do
       [] ->
         []
@@ -25,8 +25,8 @@ defmodule Mesh.Protocol.Routing do
   end
 
   @doc """
-  The connections of a node over which something gets on. One to a node that its own end does not hear
-  is silent, though TCP may take a minute to say so.
+  The working connections of a node. A connection to a node that it does not hear is silent,
+  although TCP may take a minute to report that.
 
       iex> Mesh.Protocol.Routing.onward(%{links: ["b", "c"], hears: ["c", "d"]})
       ["c"]
@@ -39,7 +39,7 @@ defmodule Mesh.Protocol.Routing do
   def onward(%{links: links, hears: hears}), do: Enum.filter(links, &(&1 in hears))
 
   @doc """
-  The connections over which something gets on now: those of the nodes that `me` hears, as `onward/1` gives them,
+  The connections that work now: those of the nodes that `me` hears, as `onward/1` returns them,
   and its own (`links`) to these.
 
       iex> Mesh.Protocol.Routing.ways(:a, [:b, :c], %{b: [:a, :c]})

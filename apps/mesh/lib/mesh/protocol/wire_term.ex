@@ -1,12 +1,12 @@
 defmodule Mesh.Protocol.WireTerm do
   @moduledoc """
-  Checks terms from other nodes without trusting them: names and lists of bounded length. Pure.
+  Checks terms from other nodes without trusting them: names, and lists of bounded length. Pure.
   """
 
   @most 1_000
 
   @doc """
-  Whether it is a list of such terms, no longer than the largest fleet is.
+  Whether a term is a list of such terms, no longer than the largest fleet.
 
       iex> for term <- [[1, 2], [1, :a], [1 | 2], 1], do: Mesh.Protocol.WireTerm.list?(term, &is_integer/1)
       [true, false, false, false]
@@ -18,7 +18,7 @@ defmodule Mesh.Protocol.WireTerm do
   end
 
   @doc """
-  Whether it can be the name of a robot.
+  Whether a term can be the name of a robot.
 
       iex> for term <- [:mag1, nil, true, "mag1"], do: Mesh.Protocol.WireTerm.name?(term)
       [true, false, false, false]
@@ -27,7 +27,7 @@ defmodule Mesh.Protocol.WireTerm do
   def name?(term), do: is_atom(term) and term not in [nil, true, false]
 
   @doc """
-  Whether it is a list of names, no more than the largest fleet has.
+  Whether a term is a list of names, no longer than the largest fleet.
 
       iex> for term <- [[:mag1], [:mag1 | :mag2], [1]], do: Mesh.Protocol.WireTerm.names?(term)
       [true, false, false]

@@ -1,15 +1,15 @@
 defmodule Mesh.Secret.File do
   @moduledoc """
-  The file that holds a fleet's secret: read with care, written for its owner alone.
+  The file of a fleet's secret: read only if it is safe, and written for its owner alone.
   """
   import Bitwise
 
-  # The longest text that can be a good secret, with its line ends, is far shorter.
+  # The longest text that can be a good secret, including line ends, is far shorter.
   @most 8_192
 
   @doc """
   The text of a secret file, or what is wrong with the file, as the end of a sentence. A file that
-  others than its owner may read or write is refused, and so is all that is not a file.
+  others than its owner may read or write is refused, and so is anything that is not a file.
   """
   @spec read(Path.t()) :: {:ok, String.t()} | {:error, String.t()}
   def read(path) do
@@ -41,8 +41,8 @@ defmodule Mesh.Secret.File do
   end
 
   @doc """
-  Writes a text, mode 0600. Never writes over anything unless forced, and then the old text is there
-  until the new one is there whole.
+  Writes a text, mode 0600. Never overwrites anything unless forced, and then the old text stays
+  until the new one is complete.
   """
   @spec write(Path.t(), String.t(), force? :: boolean()) :: :ok | {:error, String.t()}
   def write(path, text, force?) do
@@ -50,7 +50,7 @@ defmodule Mesh.Secret.File do
     if force?, do: File.rm(target)
 
     with :ok <- folder(path),
-         # Made anew and empty, closed to others, and only then filled.
+         # Created empty, closed to others, and only then filled.
          {:ok, file} <- :file.open(target, [:write, :exclusive, :raw, :binary]),
          :ok <- File.chmod(target, 0o600),
          :ok <- :file.write(file, text),
@@ -59,7 +59,7 @@ defmodule Mesh.Secret.File do
          :ok <- if(force?, do: File.rename(target, path), else: :ok) do
       :ok
     else
-      {:error, :eexist} -> {:error, "is there already; --force writes over it"}
+      {:error, :eexist} -> {:error, "exists already; --force overwrites it"}
       {:error, reason} -> {:error, "cannot be written (#{:file.format_error(reason)})"}
     end
   end

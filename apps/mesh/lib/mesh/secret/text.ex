@@ -1,9 +1,9 @@
 defmodule Mesh.Secret.Text do
   @moduledoc """
-  Is the text of a secret file good enough to lock a fleet with? Pure.
+  Judges whether the text of a secret file is good enough to protect a fleet. Pure.
 
-  A good one is base64 or hex text of at least 32 random bytes. Nobody can prove of bytes that they
-  are random; this finds those that plainly are not: words, rows of keys, patterns, fillings.
+  A good one is base64 or hex text of at least 32 random bytes. Nobody can prove that bytes are
+  random; this finds those that clearly are not: words, rows of keys, patterns, padding.
   """
   import Bitwise
 
@@ -57,7 +57,7 @@ defmodule Mesh.Secret.Text do
 
   defp sized(_bytes), do: :ok
 
-  # None of these meets a random secret of 32 bytes more often than once in a hundred thousand.
+  # None of these matches a random secret of 32 bytes more often than once in a hundred thousand.
   defp weakness(plain, bytes) do
     cond do
       word = Enum.find(@words, &String.contains?(String.downcase(plain), &1)) -> "it says #{word}"
@@ -69,13 +69,13 @@ defmodule Mesh.Secret.Text do
     end
   end
 
-  # Of the groups of three letters in random text hardly any is there twice.
+  # In random text hardly any group of three letters occurs twice.
   defp repeats?(bytes) do
     groups = for at <- 0..(byte_size(bytes) - 3)//1, do: binary_part(bytes, at, 3)
     length(Enum.uniq(groups)) < 0.7 * length(groups)
   end
 
-  # From byte to byte it is always the same way, as in `abcd…`.
+  # The difference from byte to byte is always the same, as in `abcd…`.
   defp counts?(bytes) do
     list = :binary.bin_to_list(bytes)
     steps = Enum.zip_with(tl(list), list, fn next, byte -> next - byte &&& 0xFF end)

@@ -1,7 +1,7 @@
 defmodule Mesh.Strategy.Gossip do
   @moduledoc """
-  Beacons to a multicast group, once a second: for networks that carry multicast. Nothing needs to
-  be configured; many Wi-Fi networks block it (`Mesh.Strategy.Static`). Its option is the
+  Sends beacons to a multicast group once a second, for networks that carry multicast. Nothing
+  needs to be configured; many Wi-Fi networks block it (`Mesh.Strategy.Static`). Its option is the
   group's address and port.
   """
   @behaviour Mesh.Strategy

@@ -1,8 +1,9 @@
 defmodule Mesh.Strategy.Static do
   @moduledoc """
-  Beacons to a list of addresses, for networks that block multicast. Whoever is not heard is tried
-  again and again, for ever, at intervals that grow to 5 s. One address that is up is enough: its
-  beacons tell of the others. Its option is the list, of `{{10, 0, 0, 7}, 4370}` or `"10.0.0.7:4370"`.
+  Sends beacons to a list of addresses, for networks that block multicast. Addresses that are not
+  heard are retried for ever, at intervals that grow to 5 s. One address that is up is enough: its
+  beacons report the others. Its option is the list, of `{{10, 0, 0, 7}, 4370}` or
+  `"10.0.0.7:4370"`.
   """
   @behaviour Mesh.Strategy
   alias Hal.Options.Wording
@@ -35,7 +36,7 @@ defmodule Mesh.Strategy.Static do
   end
 
   @doc """
-  An address from what people write.
+  Parses an address as people write it.
 
       iex> Mesh.Strategy.Static.address("10.0.0.7:4370")
       {:ok, {{10, 0, 0, 7}, 4370}}
@@ -65,7 +66,7 @@ defmodule Mesh.Strategy.Static do
       else: {[], {address, backoff}}
   end
 
-  # One chance for all, another part of it for each.
+  # One random number for all, a different part of it for each.
   defp spread(chance, turn), do: :math.fmod(chance + turn * 0.618, 1.0)
 
   defp line(wrong) do

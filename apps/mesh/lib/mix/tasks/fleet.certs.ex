@@ -8,12 +8,12 @@ defmodule Mix.Tasks.Fleet.Certs do
       mix fleet.certs mag1 mag2 min1 [--out DIR]
       mix fleet.certs --fleet FILE
 
-  What is there is kept: to add a robot later, run it again with its name. Needs `openssl`.
+  Existing files are kept: to add a robot later, run it again with its name. Needs `openssl`.
 
   Options:
 
-    * `--fleet FILE` - the names of robots, one a line; `#` begins a remark
-    * `--out DIR` - the folder (`certs`, which git does not see); copy `DIR/mag1` to mag1, and keep
+    * `--fleet FILE` - the names of robots, one per line; `#` begins a comment
+    * `--out DIR` - the folder (`certs`, which git ignores); copy `DIR/mag1` to mag1, and keep
       `DIR/ca-key.pem` to yourself
     * `--force` - make new keys and certificates for these robots; never a new CA
     * `--help` - this text
@@ -75,7 +75,7 @@ defmodule Mix.Tasks.Fleet.Certs do
     end
   end
 
-  defp check([]), do: {:error, "which robots? Give their names, or --fleet FILE"}
+  defp check([]), do: {:error, "robots are missing: give their names, or --fleet FILE"}
 
   defp check(names) do
     case Enum.reject(names, &Certs.name?/1) do

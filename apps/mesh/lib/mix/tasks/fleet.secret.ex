@@ -1,16 +1,16 @@
 defmodule Mix.Tasks.Fleet.Secret do
-  @shortdoc "Makes the one secret of a fleet"
+  @shortdoc "Makes the secret of a fleet"
   @moduledoc """
   Creates the secret of a fleet: a small text file of 32 random bytes, readable by its owner only
   (mode 0600). Copy it to every robot, and nowhere else; `docs/security.md` says how.
 
       mix fleet.secret [FILE] [--force]
 
-  FILE is `convoy.secret` in the current folder unless given, and git does not see that one.
+  FILE is `convoy.secret` in the current folder by default, which git ignores.
 
   Options:
 
-    * `--force` - write over a file that is there; every robot then needs the new one
+    * `--force` - overwrite an existing file; every robot then needs the new one
     * `--help` - this text
   """
   use Mix.Task

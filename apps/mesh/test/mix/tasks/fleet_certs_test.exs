@@ -30,7 +30,10 @@ defmodule Mix.Tasks.Fleet.CertsTest do
 
   test "wrong words are one line, and nothing is made", %{tmp_dir: tmp} do
     out = Path.join(tmp, "certs")
-    assert refused(Task, ["--out", out]) == "which robots? Give their names, or --fleet FILE"
+
+    assert refused(Task, ["--out", out]) ==
+             "robots are missing: give their names, or --fleet FILE"
+
     assert refused(Task, ["--colour"]) == "--colour is not an option; --help lists them"
     assert refused(Task, ["../mag1", "--out", out]) =~ ~s("../mag1" is not a robot's name)
     assert refused(Task, ["--fleet", "/nowhere"]) =~ "cannot be read: no such file"

@@ -9,7 +9,7 @@ defmodule Mix.Tasks.Fleet.SecretTest do
     {:ok, secret} = Mesh.Secret.load(path)
     assert line == "#{path} made, fingerprint #{secret.fingerprint}; copy it to every robot"
 
-    assert refused(Task, [path]) =~ "is there already; --force writes over it"
+    assert refused(Task, [path]) =~ "exists already; --force overwrites it"
     Task.run([path, "--force"])
     assert {:ok, other} = Mesh.Secret.load(path)
     assert other.fingerprint != secret.fingerprint

@@ -1,12 +1,16 @@
 defmodule Mesh.Distribution.ConnectionLog.Peer do
   @moduledoc """
-  Who is at the other end of a TLS handshake: the name in its certificate, for the log. Erlang calls
+  Finds the peer of a TLS handshake: the name in its certificate, for the log. Erlang calls
   `verify/3` in the process of the connection, which keeps the name until it ends.
   """
 
-  @doc "The `verify_fun` of `ssl_dist.conf`: decides as OTP does but for host names, and remembers whom it was about."
+  @doc """
+  The `verify_fun` of `ssl_dist.conf`: decides as OTP does, except for host names, and remembers
+  the peer.
+  """
   @spec verify(tuple(), term(), term()) :: {:valid | :unknown | :fail, term()}
-  # OTP compares the host part of the node's name with the names in the certificate. Ours is not a host's.
+  # OTP compares the host part of the node's name with the names in the certificate. Our host part
+  # is not a host name.
   def verify(_certificate, {:bad_cert, :hostname_check_failed}, state), do: {:valid, state}
 
   def verify(certificate, {:bad_cert, _reason} = problem, _state) do

@@ -1,6 +1,6 @@
 defmodule Mesh.Distribution.ConnectionLog.Reasons do
   @moduledoc """
-  What Erlang's reports of refused connections mean. Pure.
+  Interprets Erlang's reports of refused connections. Pure.
   """
 
   @fatal 2
@@ -24,8 +24,8 @@ defmodule Mesh.Distribution.ConnectionLog.Reasons do
   @type message :: {:report, term()} | {:string, term()} | {:io.format(), [term()]}
 
   @doc """
-  Who was refused, they or us, whom it is about, if known, and why; `:known` for what was reported before in other words;
-  `:ignore` for all that is not a refusal.
+  Which side was refused, they or us, the peer, if known, and the reason; `:known` for what was
+  already reported in another form; `:ignore` for everything that is not a refusal.
 
       iex> Mesh.Distribution.ConnectionLog.Reasons.read({~c"** Connection attempt from node ~w rejected. Invalid challenge reply. **~n", [:spy@lab]}, {nil, nil})
       {:them, "spy@lab", "wrong cookie: another secret"}
@@ -60,7 +60,7 @@ defmodule Mesh.Distribution.ConnectionLog.Reasons do
   defp own(why, {:bad_cert, problem}, _reason), do: "#{why} (#{inspect(problem, limit: 5)})"
   defp own(why, _other, _reason), do: why
 
-  # What it says of us.
+  # The reason seen from our side.
   defp ours("its" <> rest), do: "our" <> rest
   defp ours("it has" <> rest), do: "we have" <> rest
   defp ours("it does" <> rest), do: "we do" <> rest

@@ -1,16 +1,17 @@
 defmodule Mesh.Distribution.Epmd.Peers do
   @moduledoc """
-  Which port a name has, and where the nodes of a list are. Pure.
+  The port of a name, and the addresses of the nodes of a list. Pure.
 
-  The robots of the usual names have a port each, so that those of one machine do not meet: `mag1`
-  to `mag100` 9101 to 9200, `min1` to `min100` 9201 to 9300, `world` 9301, `base` 9302, `demo`
+  Robots with the usual names have a port each, so that those on one machine do not collide:
+  `mag1` to `mag100` 9101 to 9200, `min1` to `min100` 9201 to 9300, `world` 9301, `base` 9302,
+  `demo`
   9303. Other names share 9400 to 9999.
   """
 
   @type peer :: {node :: String.t(), :inet.ip_address(), :inet.port_number()}
 
   @doc """
-  Reads a list of nodes; a node without a port has its default one. What cannot be read is left out.
+  Reads a list of nodes; a node without a port has its default one. Invalid entries are left out.
 
       iex> Mesh.Distribution.Epmd.Peers.parse("mag2@convoy=10.0.0.12:9400, min1@convoy=[fe80::1], nonsense")
       [{"mag2@convoy", {10, 0, 0, 12}, 9400}, {"min1@convoy", {65152, 0, 0, 0, 0, 0, 0, 1}, 9201}]
@@ -24,7 +25,7 @@ defmodule Mesh.Distribution.Epmd.Peers do
         do: {node, ip, port}
   end
 
-  @doc "The port of a robot that was told none."
+  @doc "The port of a robot without a configured one."
   @spec default_port(String.t()) :: 9_101..9_999
   def default_port("world"), do: 9_301
   def default_port("base"), do: 9_302
@@ -34,8 +35,8 @@ defmodule Mesh.Distribution.Epmd.Peers do
   def default_port(name), do: shared(name)
 
   @doc """
-  The port that a node of this name listens on; 0 is any, for shells (`rem-…`, `rpc-…`), which
-  nobody dials, and beside a robot whose environment they share.
+  The port that a node of this name listens on; 0 means any, for shells (`rem-…`, `rpc-…`), which
+  nobody dials and which share the environment of a robot.
 
       iex> Mesh.Distribution.Epmd.Peers.own_port("mag1", %{"CONVOY_DIST_PORT" => "9400", "ROBOT" => "mag1"})
       9400
@@ -53,7 +54,7 @@ defmodule Mesh.Distribution.Epmd.Peers do
     end
   end
 
-  @doc "Where a node probably is, of which nothing was heard, or `nil`."
+  @doc "The probable address of a node that was not heard, or `nil`."
   @spec guess(name :: String.t(), host :: String.t(), own_host :: String.t()) ::
           {:inet.ip_address(), :inet.port_number()} | nil
   def guess(name, host, host), do: {{127, 0, 0, 1}, default_port(name)}

@@ -1,13 +1,13 @@
 defmodule Mesh.Protocol.Packet.Filter do
   @moduledoc """
-  What a node makes of a datagram before it changes anything by it: whether it is new, signed, of the fleet and
-  of sense. Pure. Whether it was made now is for `Mesh.Protocol.Packet.ReplayProtection`.
+  Checks a datagram before it changes anything: whether it is new, signed, of the fleet and makes
+  sense. Pure. `Mesh.Protocol.Packet.ReplayProtection` checks whether it was made now.
   """
   alias Mesh.Consumer
   alias Mesh.Protocol.{Beacon, NodeTable, Packet, Roster, WireTerm}
   alias Mesh.Protocol.Packet.ReplayProtection
 
-  # So many datagrams of unknown origin are looked into a second.
+  # The number of datagrams of unknown origin that are checked per second.
   @strange_per_second 2_000
 
   @type body ::
@@ -24,8 +24,8 @@ defmodule Mesh.Protocol.Packet.Filter do
           | {:unknown_node, String.t()}
 
   @doc """
-  Reads a datagram from there: the packet, the node that made it and what it says. `:own` is this node's
-  own, heard by multicast.
+  Reads a datagram from this address: the packet, the node that made it and its content. `:own` is
+  this node's own datagram, heard by multicast.
   """
   @spec read(Mesh.Protocol.t(), binary(), Mesh.Strategy.address()) ::
           {:ok, Packet.t(), node(), body()} | {:error, refusal()}
@@ -41,7 +41,7 @@ defmodule Mesh.Protocol.Packet.Filter do
     end
   end
 
-  # Garbage costs a signature each; beyond a measure only those who are known are listened to.
+  # Each piece of garbage costs a signature check; beyond a limit only known senders are heard.
   defp patience(protocol, address) do
     if protocol.strange < @strange_per_second or
          address in NodeTable.addresses(protocol.node_table),
@@ -61,7 +61,8 @@ defmodule Mesh.Protocol.Packet.Filter do
     end
   end
 
-  # Half of all datagrams are copies, one by multicast and one by name: those cost no signature.
+  # Half of all datagrams are copies, one by multicast and one by address: these cost no signature
+  # check.
   defp original({:ok, {name, session, sequence}}, guard) do
     if ReplayProtection.copy?(guard, name, session, sequence), do: {:error, :doubled}, else: :ok
   end

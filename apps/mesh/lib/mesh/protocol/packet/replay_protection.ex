@@ -1,15 +1,15 @@
 defmodule Mesh.Protocol.Packet.ReplayProtection do
   @moduledoc """
-  Who is let in: a signature says that a datagram was made by the fleet, the guard that it was made
-  now. Pure.
+  Decides which nodes are admitted: a signature proves that a datagram was made by the fleet, this
+  module that it was made now. Pure.
 
-  Every node draws a random session number at its start. Nobody believes a session until it has
-  told, in a beacon, the session of whoever listens: what somebody recorded before cannot hold it. Within a
-  session a window of sequence numbers keeps out what was heard before: a datagram counts once, and
-  one that is 1,024 behind the newest not at all.
+  Every node draws a random session number at its start. A listener accepts a session only when a
+  beacon of it contains the listener's own session, which an old recording cannot contain. Within
+  a session a window of sequence numbers keeps out what was heard before: a datagram counts once,
+  and one that is 1,024 behind the newest not at all.
 
-  A session that was followed by another is never believed again. While a node is heard, no other
-  session of its name is let in: two nodes of one name do not take turns.
+  A session that was followed by another is never accepted again. While a node is heard, no other
+  session of its name is admitted, so two nodes of the same name do not take turns.
   """
   import Bitwise
 
@@ -34,13 +34,13 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   @type t :: %__MODULE__{session: non_neg_integer(), senders: %{String.t() => sender()}}
   @type refusal :: :stranger | :doubled | :replayed | :too_fast
 
-  @doc "The guard of a node with this session; nobody is in yet."
+  @doc "The state of a node with this session; no node is admitted yet."
   @spec new(session :: non_neg_integer()) :: t()
   def new(session), do: %__MODULE__{session: session}
 
   @doc """
-  Judges a datagram of a known name. `told` is the session that a beacon says this node has, `nil`
-  where it says none, and for all that are no beacons.
+  Judges a datagram of a known name. `told` is the session of this node according to a beacon,
+  `nil` if the beacon has none, and for all datagrams that are not beacons.
 
       iex> alias Mesh.Protocol.Packet.ReplayProtection
       iex> guard = ReplayProtection.new(7)
@@ -70,8 +70,8 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   end
 
   @doc """
-  Whether a datagram is a copy of one that was let in, as far as can be told without reading it. Most
-  are: what comes by multicast comes by name too.
+  Whether a datagram is a copy of one that was admitted, as far as that is known without reading
+  it. Most are, because what arrives by multicast arrives by address, too.
   """
   @spec copy?(t(), String.t(), non_neg_integer(), non_neg_integer()) :: boolean()
   def copy?(guard, name, session, sequence) do
@@ -81,7 +81,7 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
     end
   end
 
-  @doc "The session believed of this name now, or `nil`."
+  @doc "The accepted session of this name now, or `nil`."
   @spec session(t(), String.t()) :: non_neg_integer() | nil
   def session(guard, name) do
     case guard.senders do
@@ -90,7 +90,7 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
     end
   end
 
-  @doc "The sessions believed now, by name."
+  @doc "The accepted sessions now, by name."
   @spec sessions(t()) :: %{String.t() => non_neg_integer()}
   def sessions(guard), do: for({name, %{session: s}} <- guard.senders, into: %{}, do: {name, s})
 
@@ -109,8 +109,8 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   defp alive?(%{session: nil}, _now_ms), do: false
   defp alive?(%{heard_ms: heard_ms}, now_ms), do: now_ms - heard_ms < @alive_ms
 
-  # All before the first that is let in counts as heard, for some of it was turned away and may
-  # have been recorded.
+  # Everything before the first admitted datagram counts as heard, because some of it was rejected
+  # and may have been recorded.
   defp begin(sender, session, sequence, now_ms) do
     retired = Enum.take(List.wrap(sender.session) ++ sender.retired, @most_retired)
 
@@ -130,7 +130,7 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
     end
   end
 
-  # Bit k of `seen` is the number `top - k`.
+  # Bit k of `seen` stands for the number `top - k`.
   defp window(%{top: top} = sender, sequence) when sequence > top do
     shift = sequence - top
     seen = if shift >= @width, do: 0, else: sender.seen <<< shift &&& @full
