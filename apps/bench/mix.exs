@@ -12,7 +12,11 @@ defmodule Bench.MixProject do
       elixir: "~> 1.14",
       elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
-      deps: [{:agents, in_umbrella: true}, {:console, in_umbrella: true}]
+      deps: [
+        {:agents, in_umbrella: true},
+        {:console, in_umbrella: true},
+        {:vm, in_umbrella: true}
+      ]
     ]
   end
 

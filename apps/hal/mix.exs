@@ -21,7 +21,7 @@ defmodule Hal.MixProject do
       ],
       elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
-      deps: packages(Mix.target())
+      deps: [{:vm, in_umbrella: true, only: :test} | packages(Mix.target())]
     ]
   end
 

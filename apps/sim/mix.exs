@@ -14,12 +14,11 @@ defmodule Sim.MixProject do
       elixir: "~> 1.14",
       compilers: [:native | Mix.compilers()],
       native: [
-        nifs: [kernel: ["rays.c", "paint.c", "kernel_nif.c"]],
-        programs: [leash: ["leash.c"]]
+        nifs: [kernel: ["rays.c", "paint.c", "kernel_nif.c"]]
       ],
       elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
-      deps: [{:missions, in_umbrella: true}]
+      deps: [{:missions, in_umbrella: true}, {:vm, in_umbrella: true}]
     ]
   end
 

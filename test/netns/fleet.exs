@@ -1,7 +1,6 @@
 defmodule Netns.Fleet do
   @moduledoc """
-  Robots on nodes of their own, each in a network namespace of its own. They are controlled over standard
-  input and output, which no cut of the network touches. A process that holds what the test knows of
+  Robots on nodes of their own (`Vm`), each in a network namespace of its own. A process that holds what the test knows of
   them: their nodes, and what their logs say.
   """
   use Agent
@@ -9,10 +8,7 @@ defmodule Netns.Fleet do
   alias Mesh.Secret
   alias Mesh.Distribution.Epmd
 
-  @flags ~w(-kernel prevent_overlapping_partitions false -kernel connect_all false
-            -kernel dist_auto_connect never -start_epmd false -epmd_module Elixir.Mesh.Distribution.Epmd
-            -kernel logger_level none
-            +S 1:1 +SDio 1 +sbwt none +sbwtdcpu none +sbwtdio none)
+  @flags ~w(-start_epmd false -epmd_module Elixir.Mesh.Distribution.Epmd -kernel logger_level none)
   # How often the logs are read while something is awaited.
   @look_ms 200
   @boot_ms 30_000
@@ -27,10 +23,7 @@ defmodule Netns.Fleet do
     s = %{net: net, folder: folder, shipped: shipped, nodes: %{}, offsets: %{}, lines: [parts]}
     {:ok, fleet} = Agent.start_link(fn -> s end)
 
-    poses
-    |> Task.async_stream(&switch_on(s, &1, poses), timeout: @boot_ms)
-    |> Enum.each(fn {:ok, {robot, node}} -> keep(fleet, robot, node) end)
-
+    switch_on(fleet, net.robots, poses)
     {:ok, fleet}
   end
 
@@ -42,15 +35,14 @@ defmodule Netns.Fleet do
 
   @doc "Calls a function on a robot's node."
   def call(fleet, robot, m, f, a, timeout \\ 10_000) do
-    %{peer: peer} = Agent.get(fleet, & &1.nodes[robot])
-    :peer.call(peer, m, f, a, timeout)
+    Vm.call(Agent.get(fleet, & &1.nodes[robot]), m, f, a, timeout)
   end
 
   @doc "Ends a robot's node, as `kill -9` does. Says when."
   def kill(fleet, robot) do
-    %{pid: pid} = Agent.get(fleet, & &1.nodes[robot])
+    node = Agent.get(fleet, & &1.nodes[robot])
     us = Log.now()
-    {_text, 0} = System.cmd("kill", ["-KILL", pid])
+    Vm.signal(node, "KILL")
     note(fleet, us, :killed, robot)
     us
   end
@@ -62,8 +54,7 @@ defmodule Netns.Fleet do
     poses =
       for id <- robots(fleet), {x, y, heading} = bodies[id], do: {id, Hal.Pose.new(x, y, heading)}
 
-    {^robot, node} = switch_on(Agent.get(fleet, & &1), {robot, poses[robot]}, poses)
-    keep(fleet, robot, node)
+    switch_on(fleet, [robot], poses)
   end
 
   @doc "Changes the network; `parts` is who reaches whom from then on. Says when it began."
@@ -111,8 +102,6 @@ defmodule Netns.Fleet do
   defp note(fleet, us, kind, value),
     do: Agent.update(fleet, &%{&1 | lines: [{us, :net, kind, value} | &1.lines]})
 
-  defp keep(fleet, robot, node), do: Agent.update(fleet, &put_in(&1.nodes[robot], node))
-
   defp read(s) do
     {news, offsets} =
       Enum.flat_map_reduce(s.net.robots, s.offsets, fn robot, offsets ->
@@ -143,39 +132,34 @@ defmodule Netns.Fleet do
     term
   end
 
-  defp switch_on(s, {robot, _pose}, poses) do
-    address = Net.address(s.net, robot)
-    ip = "{#{address |> Tuple.to_list() |> Enum.join(",")}}"
-    own = ["-setcookie", s.net.prefix, "-kernel", "inet_dist_use_interface", ip]
-    program = ["netns", "exec", Net.space(s.net, robot), System.find_executable("erl")]
+  defp switch_on(fleet, robots, poses) do
+    s = Agent.get(fleet, & &1)
+    nodes = Vm.start(for robot <- robots, do: node(s.net, robot))
 
-    {:ok, peer, node} =
-      :peer.start(%{
-        name: robot,
-        host: ~c"convoy",
-        longnames: false,
-        connection: :standard_io,
-        exec: {~c"#{System.find_executable("ip")}", Enum.map(program, &to_charlist/1)},
-        args:
-          Enum.map(@flags ++ own, &to_charlist/1) ++
-            Enum.flat_map(:code.get_path(), &[~c"-pa", &1]),
-        wait_boot: @boot_ms
-      })
+    robots
+    |> Enum.zip(nodes)
+    |> Enum.map(fn {robot, node} -> Task.async(fn -> start_robot(s, robot, node, poses) end) end)
+    |> Task.await_many(@boot_ms)
 
-    call = &:peer.call(peer, &1, &2, &3, @boot_ms)
-    {:ok, _} = call.(Application, :ensure_all_started, [:logger])
-    :ok = call.(Logger, :configure, [[level: :none]])
+    Agent.update(fleet, &%{&1 | nodes: Enum.into(Enum.zip(robots, nodes), &1.nodes)})
+  end
 
+  defp node(net, robot) do
+    flags = Vm.fleet_flags(Net.address(net, robot)) ++ @flags ++ ["-setcookie", net.prefix]
+    through = ["ip", "netns", "exec", Net.space(net, robot)]
+    [name: robot, host: "convoy", flags: flags, through: through]
+  end
+
+  defp start_robot(s, robot, node, poses) do
     for {module, code} <- s.shipped,
-        do: {:module, _} = call.(:code, :load_binary, [module, ~c"test", code])
+        do: {:module, _} = Vm.call(node, :code, :load_binary, [module, ~c"test", code])
 
     missions = Application.fetch_env!(:swarm, :missions)
-    :ok = call.(Application, :put_env, [:swarm, :missions, missions])
-    :ok = call.(Application, :put_env, [:swarm, :mesh, mesh(s.net, robot, address)])
+    mesh = mesh(s.net, robot, Net.address(s.net, robot))
     # Together, so that the missions are there when the mesh begins: it must know their atoms.
-    {:ok, _} = call.(Application, :ensure_all_started, [:sim])
-    :ok = call.(Netns.Robot, :start, [robot, poses, s.folder])
-    {robot, %{peer: peer, node: node, pid: "#{call.(:os, :getpid, [])}"}}
+    config = [logger: [level: :none], swarm: [missions: missions, mesh: mesh]]
+    :ok = Vm.start_apps(node, [:sim], config)
+    :ok = Vm.call(node, Netns.Robot, :start, [robot, poses, s.folder], @boot_ms)
   end
 
   defp mesh(net, robot, address) do

@@ -4,13 +4,12 @@ defmodule Hal.LineHolder do
   """
   alias Hal.Serial
 
-  @doc "Starts the VM, which opens the line; gives it and its process id. It ends with the caller."
-  @spec start(keyword()) :: {peer :: pid(), os_pid :: pos_integer()}
+  @doc "Starts the VM, which opens the line. It ends with the caller."
+  @spec start(keyword()) :: Vm.t()
   def start(options) do
-    paths = Enum.flat_map(:code.get_path(), &[~c"-pa", &1])
-    {:ok, peer, _node} = :peer.start_link(%{connection: :standard_io, args: paths})
-    :ok = :peer.call(peer, __MODULE__, :hold, [options])
-    {peer, List.to_integer(:peer.call(peer, :os, :getpid, []))}
+    vm = Vm.start_one()
+    :ok = Vm.call(vm, __MODULE__, :hold, [options])
+    vm
   end
 
   @doc "In that VM: opens the line in a process that says that it is well every 20 ms, and answers `?` by `!`."

@@ -101,11 +101,8 @@ defmodule Mesh.SecretTest do
     {:ok, secret} = Secret.load(file(folder, random()))
 
     # One of its own: other tests give theirs a name.
-    code = for path <- :code.get_path(), argument <- [~c"-pa", path], do: argument
-    {:ok, peer, _nonode} = :peer.start_link(%{connection: :standard_io, args: code})
-    refused = :peer.call(peer, Secret, :apply_cookie, [secret])
+    refused = Vm.call(Vm.start_one(), Secret, :apply_cookie, [secret])
     assert {:error, "this node has no name" <> _rest} = refused
-    :peer.stop(peer)
   end
 
   defp make(command, path) do

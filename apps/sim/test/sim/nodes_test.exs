@@ -7,7 +7,7 @@ defmodule Sim.NodesTest do
   doctest Sim.Node.Config
 
   test "a node listens on loopback only, dials nobody by itself, and has no secret on its command line" do
-    arguments = Command.arguments(["x/ebin"])
+    arguments = Command.arguments([])
     line = Enum.join(arguments, " ")
     assert line =~ "inet_dist_use_interface {127,0,0,1}"
     assert line =~ "prevent_overlapping_partitions false"

@@ -1,6 +1,6 @@
 defmodule Swarm.Cluster do
   @moduledoc """
-  Further nodes for tests, by `:peer`, with the application `:swarm` running on each.
+  Further nodes for tests (`Vm`), with the application `:swarm` running on each.
 
       @tag :cluster
       test "…" do
@@ -25,14 +25,19 @@ defmodule Swarm.Cluster do
     options = Keyword.validate!(options, connect: true, apps: [:swarm], env: [], flags: [])
     be_a_node()
 
-    # Started at once: nine of ten parts of a start are waiting.
+    flags = @flags ++ options[:flags] ++ ["-setcookie", Atom.to_string(Node.get_cookie())]
+    config = Keyword.merge([logger: [level: :critical]], options[:env])
+    vms = Vm.start(for _ <- 1..count, do: [name: :peer.random_name(), flags: flags])
+
+    on_exit(fn -> Vm.stop(vms) end)
+
     nodes =
-      for(_ <- 1..count, do: Task.async(fn -> start_one(options) end))
-      |> Task.await_many(30_000)
-      |> Enum.map(fn {peer, node} ->
-        on_exit(fn -> stop(peer) end)
-        node
-      end)
+      for vm <- vms do
+        :ok = Vm.start_apps(vm, options[:apps], config)
+        true = Node.connect(vm.node)
+        :persistent_term.put({__MODULE__, vm.node}, vm.pid)
+        vm.node
+      end
 
     if options[:connect], do: connect(nodes)
     nodes
@@ -51,56 +56,17 @@ defmodule Swarm.Cluster do
 
   @doc "Freezes a node: it is there, and silent. `thaw/1` lets it go on."
   @spec freeze(node()) :: :ok
-  def freeze(node) do
-    signal(node, "STOP", fn ->
-      # It may have been killed by then.
-      on_exit(fn -> send_signal(node, "CONT") end)
-      await_stopped(process(node))
-    end)
-  end
+  def freeze(node), do: signal(node, "STOP", fn -> await_stopped(process(node)) end)
 
   @doc "Lets a frozen node go on."
   @spec thaw(node()) :: :ok
-  def thaw(node), do: signal(node, "CONT", fn -> :ok end)
-
-  defp start_one(options) do
-    paths = Enum.flat_map(:code.get_path(), &[~c"-pa", &1])
-
-    flags =
-      Enum.map(@flags ++ options[:flags], &to_charlist/1) ++
-        [~c"-setcookie", Atom.to_charlist(Node.get_cookie())]
-
-    # Not linked: the task that starts it ends.
-    {:ok, peer, node} =
-      :peer.start(%{
-        name: :peer.random_name(),
-        args: flags ++ paths,
-        wait_boot: 20_000
-      })
-
-    for {app, values} <- [logger: [level: :critical]] ++ options[:env], {key, value} <- values do
-      :ok = :erpc.call(node, Application, :put_env, [app, key, value, [persistent: true]])
-    end
-
-    for app <- options[:apps],
-        do: {:ok, _} = :erpc.call(node, Application, :ensure_all_started, [app])
-
-    remember(node)
-    {peer, node}
-  end
-
-  # A frozen node cannot be asked for its process of the operating system.
-  defp remember(node),
-    do: :persistent_term.put({__MODULE__, node}, :erpc.call(node, System, :pid, []))
+  def thaw(node), do: Vm.signal(process(node), "CONT")
 
   defp signal(node, name, afterwards) do
-    {_text, 0} = send_signal(node, name)
+    Vm.signal(process(node), name)
     afterwards.()
     :ok
   end
-
-  defp send_signal(node, name),
-    do: System.cmd("kill", ["-#{name}", process(node)], stderr_to_stdout: true)
 
   defp process(node), do: :persistent_term.get({__MODULE__, node})
 
@@ -127,13 +93,6 @@ defmodule Swarm.Cluster do
     after
       10_000 -> raise "#{node} is still there"
     end
-  end
-
-  defp stop(peer) do
-    :peer.stop(peer)
-  catch
-    # Killed by the test.
-    :exit, _gone -> :ok
   end
 
   # The node of the tests has a name only when a test needs it.

@@ -1,8 +1,8 @@
 defmodule Swarm.MeshNodes do
   @moduledoc """
-  Real nodes, each a VM of its own, controlled over standard input and output, so that whatever
-  happens to their network the test still reaches them. Names and ports are new for each test: the tests of
-  several checkouts may run at once.
+  Real nodes, each a `Vm` of its own: whatever happens to their network the test still reaches them. They end with
+  the process that starts them, a test or a module's `setup_all`. Names and ports are new for each fleet: the tests
+  of several checkouts may run at once.
 
       nodes = Swarm.MeshNodes.start(3)
       Swarm.MeshNodes.call(hd(nodes), Mesh, :view, [])
@@ -12,30 +12,20 @@ defmodule Swarm.MeshNodes do
   arguments of the VM under `args:`, `robots: true` for a robot with fake wheels on each node, of the node's name,
   `one_by_one: true` for nodes that join the fleet in their order, not all at once.
   """
-  import ExUnit.Callbacks, only: [on_exit: 1]
   alias Mesh.Secret
 
-  @enforce_keys [:peer, :node, :name, :pid]
+  @enforce_keys [:vm, :node, :name]
   defstruct @enforce_keys
 
-  @type t :: %__MODULE__{peer: pid(), node: node(), name: atom(), pid: String.t()}
+  @type t :: %__MODULE__{vm: Vm.t(), node: node(), name: atom()}
 
-  @flags ~w(-kernel prevent_overlapping_partitions false -kernel connect_all false
-            -kernel dist_auto_connect never -kernel inet_dist_use_interface {127,0,0,1}
-            +S 1:1 +SDio 1 +sbwt none +sbwtdcpu none +sbwtdio none)
-
-  @doc "Starts nodes; they end with the test."
+  @doc "Starts nodes."
   @spec start(pos_integer(), keyword()) :: [t()]
   def start(count, options \\ []) do
-    {_, 0} = System.cmd("epmd", ["-daemon"])
     run = run()
     names = for n <- 1..count, do: :"t#{run}_#{n}"
     mesh = mesh(names, run, Keyword.get(options, :mesh, []))
-
-    names
-    |> Enum.map(&Task.async(fn -> boot(&1, options) end))
-    |> Enum.map(&(&1 |> Task.await(20_000) |> end_with_test()))
-    |> join_all(mesh, options)
+    names |> boot(options) |> join_all(mesh, options)
   end
 
   defp join_all(nodes, mesh, options) do
@@ -52,19 +42,16 @@ defmodule Swarm.MeshNodes do
   @spec join([t()], atom(), keyword()) :: t()
   def join([one | _], name, options \\ []) do
     mesh = call(one, Application, :get_env, [:swarm, :mesh])
-    name |> boot(options) |> end_with_test() |> prepare(mesh, options)
+    [name] |> boot(options) |> hd() |> prepare(mesh, options)
   end
 
   @doc "Calls a function there, over standard input and output."
   @spec call(t(), module(), atom(), list(), timeout()) :: term()
-  def call(node, m, f, a, timeout \\ 10_000), do: :peer.call(node.peer, m, f, a, timeout)
+  def call(node, m, f, a, timeout \\ 10_000), do: Vm.call(node.vm, m, f, a, timeout)
 
   @doc "Sends a signal to its process of the operating system: KILL, STOP, CONT."
   @spec signal(t(), String.t()) :: :ok
-  def signal(%{pid: pid}, signal) do
-    {_, 0} = System.cmd("kill", ["-#{signal}", pid])
-    :ok
-  end
+  def signal(node, signal), do: Vm.signal(node.vm, signal)
 
   # Half a million runs an hour apart share no name.
   defp run,
@@ -87,36 +74,19 @@ defmodule Swarm.MeshNodes do
     |> Keyword.merge(options)
   end
 
-  defp boot(name, options) do
-    args = Enum.map(@flags ++ Keyword.get(options, :args, []), &String.to_charlist/1)
+  defp boot(names, options) do
+    flags = Vm.fleet_flags() ++ Keyword.get(options, :args, [])
 
-    {:ok, peer, node} =
-      :peer.start(%{name: name, connection: :standard_io, args: args, wait_boot: 20_000})
-
-    %__MODULE__{peer: peer, node: node, name: name, pid: ""}
-  end
-
-  defp end_with_test(node) do
-    node = %{node | pid: "#{call(node, :os, :getpid, [])}"}
-    on_exit(fn -> stop(node) end)
-    node
+    for {name, vm} <-
+          Enum.zip(names, Vm.start(for name <- names, do: [name: name, flags: flags])),
+        do: %__MODULE__{vm: vm, node: vm.node, name: name}
   end
 
   defp prepare(node, mesh, options) do
-    call(node, :code, :add_paths, [:code.get_path()])
-    {:ok, _} = call(node, Application, :ensure_all_started, [:logger])
-    call(node, Logger, :configure, [[level: :none]])
-    call(node, Application, :put_env, [:swarm, :mesh, mesh])
     missions = Application.get_env(:swarm, :missions, [])
-    call(node, Application, :put_env, [:swarm, :missions, missions])
-    {:ok, _} = call(node, Application, :ensure_all_started, [:swarm])
+    config = [logger: [level: :none], swarm: [mesh: mesh, missions: missions]]
+    :ok = Vm.start_apps(node.vm, [:logger, :swarm], config)
     if options[:robots], do: :ok = call(node, Swarm.MeshNodes.Wheels, :robot, [node.name])
     node
-  end
-
-  # A frozen node does not hear that it shall end.
-  defp stop(node) do
-    _ = System.cmd("kill", ["-KILL", node.pid], stderr_to_stdout: true)
-    if Process.alive?(node.peer), do: Process.exit(node.peer, :kill)
   end
 end

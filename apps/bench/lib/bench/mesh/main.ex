@@ -2,9 +2,7 @@ defmodule Bench.Mesh.Main do
   @moduledoc "The command `mix bench swarm`: reads its options, measures, prints the table."
   alias Console.Cli
   alias Console.Cli.{Output, Parse}
-  alias Bench.Mesh
-
-  alias Bench.Vm
+  alias Bench.{Load, Mesh}
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
@@ -22,10 +20,10 @@ defmodule Bench.Mesh.Main do
     note = &Output.progress(output, "bench: " <> &1)
     cases = Map.get(given, "only", Mesh.cases())
     plan = %{cases: cases, share: Map.get(given, "share", 100) / 100, note: note}
-    before = Vm.load()
+    before = Load.now()
     rows = Enum.flat_map(sizes, &Mesh.Runner.rows(&1, if(&1 == :one, do: many, else: &1), plan))
     Output.finish(output)
-    about = %{load_before: before, load_after: Vm.load(), schedulers: System.schedulers_online()}
+    about = %{load_before: before, load_after: Load.now(), schedulers: System.schedulers_online()}
     IO.write(Mesh.Report.draw(rows))
     IO.puts("\n" <> words(about))
     Output.json(given["json"], Mesh.Report.term(rows, about))

@@ -1,18 +1,14 @@
 defmodule Bench.Mesh.Nodes do
   @moduledoc """
-  Nodes to measure, each a VM of its own. They are controlled over standard input and output, so
-  that this process is not part of the measurement, and end when it does.
+  Nodes to measure, each a `Vm` of its own: this process is not part of the measurement.
   """
   alias Bench.Mesh.{Bare, Convoy, Watch}
-  alias Bench.Vm
   alias Mesh.Secret
 
-  @enforce_keys [:name, :node, :peer, :pid, :began_ns]
+  @enforce_keys [:name, :node, :vm, :began_ns]
   defstruct @enforce_keys
 
-  @typedoc """
-  `began_ns` is when its start was requested; `pid` is its process of the operating system.
-  """
+  @typedoc "`began_ns` is when its start was requested."
   @type t :: %__MODULE__{}
   @typedoc "What the nodes of one fleet have in common; `kind` says whose code runs there."
   @type fleet :: %{
@@ -23,9 +19,6 @@ defmodule Bench.Mesh.Nodes do
         }
 
   @host "127.0.0.1"
-  @emulator ~w(+SDcpu 1:1 +SDio 1 +A 1 +sbwt none +sbwtdcpu none +sbwtdio none)
-  @kernel ~w(-kernel prevent_overlapping_partitions false -kernel connect_all false
-             -kernel dist_auto_connect never -kernel inet_dist_use_interface {127,0,0,1})
   @boot_ms 60_000
 
   @doc "A fleet with `count` names and a base; nothing is started yet."
@@ -66,39 +59,37 @@ defmodule Bench.Mesh.Nodes do
 
   @doc "Starts a node with these robots. It is up when this returns."
   @spec start(fleet(), non_neg_integer(), [atom()], schedulers :: pos_integer()) :: t()
-  def start(fleet, n, robots, schedulers \\ 1) do
-    name = name(fleet, n)
-    began_ns = Watch.now_ns()
-
-    {peer, node} =
-      Vm.boot(
-        %{name: name, host: to_charlist(@host), longnames: true},
-        ["+S", "#{schedulers}:#{schedulers}"] ++ @emulator ++ @kernel ++ fleet.flags
-      )
-
-    code = if fleet.kind == :ours, do: Convoy, else: Bare
-    :ok = :peer.call(peer, code, :main, [fleet.mesh, robots], @boot_ms)
-    pid = to_string(:peer.call(peer, :os, :getpid, []))
-    %__MODULE__{name: name, node: node, peer: peer, pid: pid, began_ns: began_ns}
-  end
+  def start(fleet, n, robots, schedulers \\ 1),
+    do: hd(start_all(fleet, [{n, robots}], schedulers))
 
   @doc "Starts several at once."
-  @spec start_all(fleet(), [{non_neg_integer(), [atom()]}]) :: [t()]
-  def start_all(fleet, nodes) do
+  @spec start_all(fleet(), [{non_neg_integer(), [atom()]}], schedulers :: pos_integer()) :: [t()]
+  def start_all(fleet, nodes, schedulers \\ 1) do
+    began_ns = Watch.now_ns()
+    flags = Vm.fleet_flags() ++ ["+S", "#{schedulers}:#{schedulers}"] ++ fleet.flags
+    same = [host: @host, longnames: true, flags: flags]
+    code = if fleet.kind == :ours, do: Convoy, else: Bare
+
     nodes
-    |> Enum.map(fn {n, robots} -> Task.async(fn -> start(fleet, n, robots) end) end)
+    |> Enum.zip(Vm.start(for({n, _robots} <- nodes, do: [name: name(fleet, n)] ++ same)))
+    |> Enum.map(fn {{n, robots}, vm} ->
+      Task.async(fn ->
+        :ok = Vm.call(vm, code, :main, [fleet.mesh, robots], @boot_ms)
+        %__MODULE__{name: name(fleet, n), node: vm.node, vm: vm, began_ns: began_ns}
+      end)
+    end)
     |> Task.await_many(@boot_ms)
   end
 
   @doc "Calls a function there."
   @spec call(t(), module(), atom(), list(), timeout()) :: term()
-  def call(node, m, f, a, timeout \\ 300_000), do: :peer.call(node.peer, m, f, a, timeout)
+  def call(node, m, f, a, timeout \\ 300_000), do: Vm.call(node.vm, m, f, a, timeout)
 
   @doc "Sends a signal to its process (KILL, STOP, CONT); returns when that was."
   @spec signal(t(), String.t()) :: at_ns :: integer()
   def signal(node, signal) do
     at_ns = Watch.now_ns()
-    :ok = Vm.signal(node.pid, signal)
+    :ok = Vm.signal(node.vm, signal)
     at_ns
   end
 
@@ -106,8 +97,8 @@ defmodule Bench.Mesh.Nodes do
   @spec memory(t()) :: %{rss: pos_integer() | nil, pss: pos_integer() | nil}
   def memory(node) do
     %{
-      rss: kilobytes("/proc/#{node.pid}/status", "VmRSS:"),
-      pss: kilobytes("/proc/#{node.pid}/smaps_rollup", "Pss:")
+      rss: kilobytes("/proc/#{node.vm.pid}/status", "VmRSS:"),
+      pss: kilobytes("/proc/#{node.vm.pid}/smaps_rollup", "Pss:")
     }
   end
 
@@ -124,11 +115,5 @@ defmodule Bench.Mesh.Nodes do
 
   @doc "Ends nodes, even frozen ones."
   @spec stop([t()]) :: :ok
-  def stop([]), do: :ok
-
-  def stop(nodes) do
-    _ = System.cmd("kill", ["-KILL" | Enum.map(nodes, & &1.pid)], stderr_to_stdout: true)
-    for %{peer: peer} <- nodes, Process.alive?(peer), do: Process.exit(peer, :kill)
-    :ok
-  end
+  def stop(nodes), do: Vm.stop(Enum.map(nodes, & &1.vm))
 end

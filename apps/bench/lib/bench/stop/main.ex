@@ -2,7 +2,7 @@ defmodule Bench.Stop.Main do
   @moduledoc "The command `mix bench stop`: reads its options, measures, prints the table."
   alias Console.Cli
   alias Console.Cli.{Output, Parse}
-  alias Bench.{Stop, Vm}
+  alias Bench.{Load, Stop}
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
@@ -21,13 +21,13 @@ defmodule Bench.Stop.Main do
     note = &Output.progress(output, "bench: " <> &1)
 
     try do
-      before = Vm.load()
+      before = Load.now()
       results = Stop.Runner.run(cases, Map.get(given, "times", 20), folder, note)
       Output.finish(output)
 
       about = %{
         load_before: before,
-        load_after: Vm.load(),
+        load_after: Load.now(),
         schedulers: System.schedulers_online()
       }
 

@@ -5,7 +5,7 @@ defmodule Bench.Stop.Runner do
   cause is triggered, so that they include the path to it; for a crash they count from the crash
   itself, and for a bumper from the base's report of it.
   """
-  alias Bench.{Stop, Vm}
+  alias Bench.Stop
   alias Bench.Stop.{Robot, WireTap}
   alias Sim.Emulator
 
@@ -59,9 +59,7 @@ defmodule Bench.Stop.Runner do
   end
 
   defp robot(%{vm: nil} = s) do
-    {peer, _node} = Vm.boot(%{}, ["+S", "1:1", "+sbwt", "none"])
-    vm = %{peer: peer, pid: to_string(:peer.call(peer, :os, :getpid, []))}
-    s = %{s | vm: vm}
+    s = %{s | vm: Vm.start_one(flags: ["+S", "1:1", "+sbwt", "none"])}
     :ok = call(s, Robot, :main, [s.link])
     s
   end
@@ -71,12 +69,11 @@ defmodule Bench.Stop.Runner do
   defp halt(%{vm: nil} = s), do: s
 
   defp halt(%{vm: vm} = s) do
-    Vm.signal(vm.pid, "KILL")
-    monitor = Process.monitor(vm.peer)
-    receive do: ({:DOWN, ^monitor, _, _, _} -> %{s | vm: nil})
+    :ok = Vm.stop(vm)
+    %{s | vm: nil}
   end
 
-  defp call(s, m, f, a), do: :peer.call(s.vm.peer, m, f, a, @call_ms)
+  defp call(s, m, f, a), do: Vm.call(s.vm, m, f, a, @call_ms)
 
   # Waits for full speed, and for a time that is not in step with the ticks.
   defp rolling(s) do
@@ -111,7 +108,7 @@ defmodule Bench.Stop.Runner do
   defp trial(:freeze, s) do
     fire = signaller(s.vm.pid, "STOP")
     stop = stop(fn -> timed(fire) end)
-    Vm.signal(s.vm.pid, "CONT")
+    Vm.signal(s.vm, "CONT")
     :ok = call(s, Robot, :thawed, [])
     {stop, s}
   end

@@ -98,17 +98,16 @@ defmodule Hal.Camera.FFmpegTest do
     {:ok, _} = Hal.Camera.FFmpeg.next(camera)
     receive do {_port, {:data, _frame}} -> :ok end
     {:os_pid, program} = Port.info(camera.port, :os_pid)
-    IO.puts("\#{System.pid()} \#{program}")
-    receive do :never -> :ok end
+    program
     """
 
-    arguments = ["-pa", Application.app_dir(:hal, "ebin"), "-e", code]
-    elixir = System.find_executable("elixir")
-    vm = Port.open({:spawn_executable, elixir}, [:binary, line: 100, args: arguments])
-    assert_receive {^vm, {:data, {:eol, line}}}, 20_000
-    [node, program] = String.split(line)
+    vm = Vm.start_one()
+    :ok = Vm.start_apps(vm, [:elixir])
+    # An agent keeps the camera.
+    {:ok, agent} = Vm.call(vm, Agent, :start, [Code, :eval_string, [code]], 20_000)
+    {program, _names} = Vm.call(vm, :sys, :get_state, [agent])
     [ffmpeg] = children(program)
-    {_, 0} = System.cmd("kill", ["-9", node])
+    Vm.signal(vm, "KILL")
     assert gone?(program) and gone?(ffmpeg)
   end
 

@@ -20,14 +20,14 @@ defmodule Mesh.Distribution.ConnectionLogTest do
 
     door = node("door", 9761, conf(ours, "door"))
     log = Path.join(tmp, "log")
-    :ok = :peer.call(door, ConnectionLog, :install, [])
+    :ok = Vm.call(door, ConnectionLog, :install, [])
     handler = %{config: %{file: String.to_charlist(log)}}
-    :ok = :peer.call(door, :logger, :add_handler, [:file, :logger_std_h, handler])
+    :ok = Vm.call(door, :logger, :add_handler, [:file, :logger_std_h, handler])
 
     guest = node("guest", 9762, conf(ours, "guest"))
-    assert :peer.call(guest, Node, :connect, [:door@tls])
-    assert :peer.call(door, Node, :list, []) == [:guest@tls]
-    :peer.stop(guest)
+    assert Vm.call(guest, Node, :connect, [:door@tls])
+    assert Vm.call(door, Node, :list, []) == [:guest@tls]
+    Vm.stop(guest)
 
     for {name, papers, cookie, line} <- [
           {"spy", conf(other, "spy"), "right", "refused us: our certificate is of another fleet"},
@@ -36,9 +36,9 @@ defmodule Mesh.Distribution.ConnectionLogTest do
           {"guest", conf(ours, "guest"), "wrong",
            "refused guest@tls at 127.0.0.1:N: wrong cookie"}
         ] do
-      peer = node(name, 9762, papers, cookie)
-      refute :peer.call(peer, Node, :connect, [:door@tls])
-      :peer.stop(peer)
+      vm = node(name, 9762, papers, cookie)
+      refute Vm.call(vm, Node, :connect, [:door@tls])
+      Vm.stop(vm)
       logged(log, line)
     end
 
@@ -52,7 +52,7 @@ defmodule Mesh.Distribution.ConnectionLogTest do
     client = Port.open(openssl, [:binary, :stderr_to_stdout, args: knock ++ papers])
     logged(log, "refused spy at 127.0.0.1:N: its certificate is of another fleet (unknown CA)")
     if Port.info(client), do: Port.close(client)
-    assert :peer.call(door, Node, :list, []) == []
+    assert Vm.call(door, Node, :list, []) == []
     refute File.read!(log) =~ "ALERT"
   end
 
@@ -77,28 +77,23 @@ defmodule Mesh.Distribution.ConnectionLogTest do
   defp conf(folder, name), do: Path.expand(Path.join([folder, name, "ssl_dist.conf"]))
 
   defp node(name, port, papers, cookie \\ "right") do
-    paths = Enum.flat_map([:elixir, :hal, :mesh], &[~c"-pa", :code.lib_dir(&1) ++ ~c"/ebin"])
     tls = if papers, do: ["-proto_dist", "inet_tls", "-ssl_dist_optfile", papers], else: []
 
-    words =
+    flags =
       ~w(-start_epmd false -epmd_module Elixir.Mesh.Distribution.Epmd -kernel dist_auto_connect never) ++
         ["-kernel", "logger_level", "notice", "-setcookie", cookie, "-sname", "#{name}@tls"] ++
         tls
 
-    env =
-      for {key, value} <- [
-            {"CONVOY_DIST_PORT", "#{port}"},
-            {"ROBOT", name},
-            {"CONVOY_PEERS", "door@tls=127.0.0.1:9761"}
-          ],
-          do: {String.to_charlist(key), String.to_charlist(value)}
+    env = [
+      {"CONVOY_DIST_PORT", "#{port}"},
+      {"ROBOT", name},
+      {"CONVOY_PEERS", "door@tls=127.0.0.1:9761"}
+    ]
 
-    arguments = paths ++ Enum.map(words, &String.to_charlist/1)
-    # It ends with the test, if not before.
-    {:ok, peer, _node} = :peer.start_link(%{connection: :standard_io, args: arguments, env: env})
+    vm = Vm.start_one(flags: flags, env: env)
     # What it says is read from a file.
-    :ok = :peer.call(peer, :logger, :remove_handler, [:default])
-    peer
+    :ok = Vm.call(vm, :logger, :remove_handler, [:default])
+    vm
   end
 
   defp logged(log, line) do

@@ -8,40 +8,31 @@ defmodule Mesh.Distribution.EpmdTest do
   @host "no-such-host"
 
   defp start(name, port, variables \\ []) do
-    paths = Enum.flat_map([:elixir, :mesh], &[~c"-pa", :code.lib_dir(&1) ++ ~c"/ebin"])
-    variables = [{~c"CONVOY_DIST_PORT", ~c"#{port}"}, {~c"ROBOT", ~c"#{name}"} | variables]
+    variables = [{"CONVOY_DIST_PORT", "#{port}"}, {"ROBOT", name} | variables]
 
-    arguments =
-      ~w(-start_epmd false -epmd_module Elixir.Mesh.Distribution.Epmd -kernel dist_auto_connect never)c ++
-        ~w(-setcookie epmdless -sname #{name}@#{@host})c
+    flags =
+      ~w(-start_epmd false -epmd_module Elixir.Mesh.Distribution.Epmd -kernel dist_auto_connect never) ++
+        ~w(-setcookie epmdless -sname #{name}@#{@host})
 
-    # It ends with the test.
-    {:ok, peer, _node} =
-      :peer.start_link(%{
-        connection: :standard_io,
-        args: paths ++ arguments,
-        env: variables
-      })
-
-    peer
+    Vm.start_one(flags: flags, env: variables)
   end
 
   test "two nodes connect without epmd, by what was learnt and by the list" do
-    list = ~c"green1@#{@host}=127.0.0.1:9751"
+    list = "green1@#{@host}=127.0.0.1:9751"
     green = start("green1", 9751)
-    blue = start("blue1", 9752, [{~c"CONVOY_PEERS", list}])
+    blue = start("blue1", 9752, [{"CONVOY_PEERS", list}])
 
     # Nobody has told green about blue: the port of its name is not where blue is.
-    refute :peer.call(green, Node, :connect, [:"blue1@no-such-host"])
-    :ok = :peer.call(green, Epmd, :learn, ["blue1@no-such-host", {127, 0, 0, 1}, 9752])
-    assert :peer.call(green, Node, :connect, [:"blue1@no-such-host"])
-    assert :peer.call(blue, Node, :list, []) == [:"green1@no-such-host"]
+    refute Vm.call(green, Node, :connect, [:"blue1@no-such-host"])
+    :ok = Vm.call(green, Epmd, :learn, ["blue1@no-such-host", {127, 0, 0, 1}, 9752])
+    assert Vm.call(green, Node, :connect, [:"blue1@no-such-host"])
+    assert Vm.call(blue, Node, :list, []) == [:"green1@no-such-host"]
 
-    assert :peer.call(blue, Node, :disconnect, [:"green1@no-such-host"])
-    assert :peer.call(blue, Node, :connect, [:"green1@no-such-host"])
+    assert Vm.call(blue, Node, :disconnect, [:"green1@no-such-host"])
+    assert Vm.call(blue, Node, :connect, [:"green1@no-such-host"])
 
     assert {:ok, [{~c"blue1", 9752}, {~c"green1", 9751}]} =
-             :peer.call(blue, :net_adm, :names, [~c"no-such-host"])
+             Vm.call(blue, :net_adm, :names, [~c"no-such-host"])
   end
 
   test "without its process it does nothing, and fells nobody" do

@@ -1,15 +1,11 @@
 defmodule Sim.Fleet.Nodes.Child do
   @moduledoc """
-  A node that we started: its process of the operating system behind a port. It lives no longer than
-  we do: its standard input closes with us, and the leash (`c_src/leash.c`) ends it even when it is
-  frozen.
+  A node that we started: its process of the operating system behind a port (`Vm.open/2`). It lives no longer
+  than we do, even frozen.
   """
   alias Sim.Fleet.Nodes.Command
   alias Sim.Node.Config
 
-  # With the shell, for those who attach.
-  @apps [:elixir, :iex, :logger, :hal, :vision, :robot, :mesh, :swarm, :missions, :sim]
-  @own_flags ~w(ERL_FLAGS ERL_AFLAGS ERL_ZFLAGS ELIXIR_ERL_OPTIONS)
   @kept_bytes 4_000
   @end_ms 2_000
 
@@ -28,25 +24,15 @@ defmodule Sim.Fleet.Nodes.Child do
   @doc "Starts a node, in the calling process; `home` holds its cookie."
   @spec start(Config.t(), Path.t()) :: {:ok, t()} | {:error, line :: String.t()}
   def start(%Config{} = config, home) do
-    leash = Application.app_dir(:sim, "priv/leash")
-    erl = System.find_executable("erl") || Path.join([:code.root_dir(), "bin", "erl"])
+    arguments = Command.arguments(Application.get_env(:swarm, :formations, []))
 
-    environment =
-      [{~c"HOME", to_charlist(home)}, {~c"ERL_CRASH_DUMP_BYTES", ~c"0"}] ++
-        for(v <- @own_flags, do: {to_charlist(v), false})
-
-    formations = Application.get_env(:swarm, :formations, [])
-    arguments = [erl | Command.arguments(folders(formations), formations)]
-    options = [:binary, :exit_status, :stderr_to_stdout, args: arguments, env: environment]
-    port = Port.open({:spawn_executable, leash}, options)
-
-    case Port.info(port, :os_pid) do
-      {:os_pid, pid} ->
+    case Vm.open(arguments, [{"HOME", home}, {"ERL_CRASH_DUMP_BYTES", "0"}]) do
+      {:ok, port, pid} ->
         true = Port.command(port, Config.line(config))
         {:ok, %__MODULE__{node: config.node, port: port, pid: pid}}
 
-      nil ->
-        {:error, "#{config.node} cannot be started: #{leash} #{erl} does not run"}
+      :error ->
+        {:error, "#{config.node} cannot be started: erl does not run"}
     end
   end
 
@@ -73,10 +59,7 @@ defmodule Sim.Fleet.Nodes.Child do
 
   @doc "Kills it, frozen or not, and without asking it."
   @spec kill(t()) :: :ok
-  def kill(child) do
-    _ = System.cmd("kill", ["-KILL", Integer.to_string(child.pid)], stderr_to_stdout: true)
-    :ok
-  end
+  def kill(child), do: Vm.signal("#{child.pid}", "KILL")
 
   @doc """
   Waits until these, which were killed, are gone, 2 s at most: whoever looks for them after we have
@@ -95,18 +78,5 @@ defmodule Sim.Fleet.Nodes.Child do
     after
       max(deadline - System.monotonic_time(:millisecond), 0) -> await(ports, deadline)
     end
-  end
-
-  # Those of this build: what runs here runs there.
-  defp folders(formations) do
-    consolidated =
-      for path <- :code.get_path(), List.to_string(path) =~ ~r"consolidated$", do: path
-
-    apps = for app <- @apps, do: Path.join(to_string(:code.lib_dir(app)), "ebin")
-    # Formations of a build's own are in apps of its own.
-    added = for {_kind, module} <- formations, path = :code.which(module), is_list(path), do: path
-
-    Enum.map(consolidated, &List.to_string/1) ++
-      apps ++ Enum.uniq(Enum.map(added, &Path.dirname/1))
   end
 end

@@ -3,31 +3,19 @@ defmodule Sim.Fleet.Nodes.Command do
   The commands that start a node, and those by which a person reaches it, as text. Pure.
   """
 
-  # A robot has little to do: one scheduler, no busy waiting (there are more nodes than processors),
-  # and few threads.
-  @emulator ~w(+S 1:1 +SDcpu 1:1 +SDio 1 +A 1 +sbwt none +sbwtdcpu none +sbwtdio none)
-
-  # A cut link must not make healthy nodes disconnect from each other, and sending must not open
-  # connections.
-  @kernel ~w(-kernel prevent_overlapping_partitions false -kernel connect_all false
-             -kernel dist_auto_connect never -kernel inet_dist_use_interface {127,0,0,1})
-
   @doc """
-  The arguments of `erl` for a node with the code in these folders and the formations that this
-  build adds.
+  The arguments of `erl` for a node, with the formations that this build adds.
 
-      iex> Sim.Fleet.Nodes.Command.arguments(["a/ebin"]) |> Enum.take(-5)
-      ["-pa", "a/ebin", "-s", "Elixir.Sim.Node", "main"]
-      iex> Sim.Fleet.Nodes.Command.arguments([], echelon: Mine.Echelon) |> Enum.take(-6)
+      iex> Sim.Fleet.Nodes.Command.arguments([]) |> Enum.take(-3)
+      ["-s", "Elixir.Sim.Node", "main"]
+      iex> Sim.Fleet.Nodes.Command.arguments(echelon: Mine.Echelon) |> Enum.take(-6)
       ["-swarm", "formations", "[{echelon,'Elixir.Mine.Echelon'}]", "-s", "Elixir.Sim.Node", "main"]
   """
-  @spec arguments([Path.t()], [{atom(), module()}]) :: [String.t()]
-  def arguments(folders, formations \\ []) do
-    ["-noshell"] ++
-      @emulator ++
-      @kernel ++
-      ["-pa" | folders] ++ formations(formations) ++ ["-s", "Elixir.Sim.Node", "main"]
-  end
+  @spec arguments([{atom(), module()}]) :: [String.t()]
+  def arguments(formations),
+    do:
+      ["-noshell" | Vm.fleet_flags()] ++
+        formations(formations) ++ ["-s", "Elixir.Sim.Node", "main"]
 
   defp formations([]), do: []
   defp formations(added), do: ["-swarm", "formations", to_string(:io_lib.format("~0p", [added]))]

@@ -1,0 +1,12 @@
+defmodule Bench.Load do
+  @moduledoc "How busy this machine is: figures are worth less on one that does other things, too."
+
+  @doc "The load in the last minute; `nil` where nobody knows."
+  @spec now() :: float() | nil
+  def now do
+    with {:ok, text} <- File.read("/proc/loadavg"),
+         {load, _rest} <- Float.parse(text),
+         do: load,
+         else: (_unknown -> nil)
+  end
+end
