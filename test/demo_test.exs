@@ -1,12 +1,19 @@
-defmodule System.DemoTest do
+defmodule Demo.Case do
   @moduledoc "The demo as a command: what people type, what they get, and how it ends."
-  use ExUnit.Case, async: true
+  use ExUnit.CaseTemplate
 
-  @moduletag timeout: 300_000
   @root Path.expand("..", __DIR__)
 
-  # Everything on standard output, everything on standard error, and the exit status.
-  defp run(command, arguments, options) do
+  using do
+    quote do
+      import Demo.Case
+      @moduletag timeout: 300_000
+      @root unquote(@root)
+    end
+  end
+
+  @doc "Everything on standard output, everything on standard error, and the exit status."
+  def run(command, arguments, options) do
     folder = Keyword.get(options, :cd, @root)
     errors = Path.join(System.tmp_dir!(), "convoy-#{System.unique_integer([:positive])}.err")
     input = Keyword.get(options, :input, "")
@@ -23,61 +30,12 @@ defmodule System.DemoTest do
     {output, told, status}
   end
 
-  defp demo(line, options \\ []), do: run("mix", ["demo" | OptionParser.split(line)], options)
+  @doc "The same of `mix demo`, with the arguments of a line."
+  def demo(line, options \\ []), do: run("mix", ["demo" | OptionParser.split(line)], options)
+end
 
-  defp without_wall_time(json), do: String.replace(json, ~r/"wall_s":[^,]+,/, "")
-
-  test "the help names the options and ends well" do
-    assert {help, "", 0} = demo("--help")
-    assert help =~ "--leader-change"
-    assert help =~ "Exit status"
-  end
-
-  for {line, complaint} <- [
-        {"--robots 0", ~s(--robots cannot be "0": a whole number from 1 to 100 is allowed)},
-        {"--robots -3", ~s(--robots cannot be "-3": a whole number)},
-        {"--robots 1e9", ~s(--robots cannot be "1e9": a whole number)},
-        {"--map moon",
-         ~s(--map cannot be "moon": hall, hospital, arena or FILE.png:WIDTHxHEIGHT is allowed)},
-        {"--headless --map mix.exs.png:10x10", "mix.exs.png"},
-        {"--headless --landmark 500,0", "landmark"},
-        {"--loss nan", ~s(--loss cannot be "nan": a number from 0 to 1 is allowed)},
-        {"--kill mag9@3", ~s("mag9")},
-        {"--headles", "did you mean --headless?"},
-        {"--hardwear 1", "did you mean --hardware?"},
-        {"--robots 2 --hardware min:2", "--hardware min2 is more than there are"},
-        {"--picture /no/such/place/a.svg", "a folder that exists"}
-      ] do
-    test "refuses #{line} in clear words" do
-      assert {"", told, 1} = demo(unquote(line))
-      assert told =~ unquote(complaint)
-      assert told =~ ~r/^demo: /
-      refute told =~ "** ("
-      refute told =~ ".ex:"
-    end
-  end
-
-  @tag :tmp_dir
-  test "a PNG that is no PNG is refused", %{tmp_dir: folder} do
-    File.write!(Path.join(folder, "floor.png"), "not a picture")
-    path = Path.join(folder, "floor.png")
-    assert {"", told, 1} = demo("--headless --map #{path}:10x10")
-    assert told =~ "floor.png"
-    refute told =~ "** ("
-  end
-
-  test "one seed, run twice: the same report to the byte, but for the wall time" do
-    line = "--headless --robots 3 --seed 4 --duration 20 --json -"
-    {first, told, status} = demo(line)
-    {second, _told, ^status} = demo(line)
-    assert status in [0, 2]
-    assert [_one_line] = String.split(first, "\n", trim: true)
-    assert without_wall_time(first) == without_wall_time(second)
-    assert told =~ "search"
-
-    keys = Regex.scan(~r/"(\w+)":/, first) |> Enum.map(&List.last/1)
-    assert Enum.take(keys, 6) == ~w(version seed map robots simulated_s wall_s)
-  end
+defmodule System.DemoHardwareTest do
+  use Demo.Case, async: true
 
   test "robots with real drivers find their place among the others, in real time" do
     line = "--headless --robots 2 --hardware mag:1,min:1 --blobs direct --seed 1"
@@ -93,45 +51,10 @@ defmodule System.DemoTest do
     assert output =~ "(1.0 times real time)"
     refute File.exists?(folder)
   end
+end
 
-  test "another seed is another run" do
-    {first, _told, _status} = demo("--headless --robots 2 --seed 1 --duration 5 --json -")
-    {second, _told, _status} = demo("--headless --robots 2 --seed 2 --duration 5 --json -")
-
-    assert without_wall_time(first) !=
-             without_wall_time(String.replace(second, ~s("seed":2), ~s("seed":1)))
-  end
-
-  @tag :tmp_dir
-  test "bin/demo writes report and picture where it was called", %{tmp_dir: folder} do
-    line = "--headless --robots 1 --duration 60 --json run.json --picture run.svg"
-
-    {output, _told, status} =
-      run(Path.join(@root, "bin/demo"), OptionParser.split(line), cd: folder)
-
-    assert status in [0, 2]
-    assert output =~ "1 robot (mag1) in hall"
-    assert File.read!(Path.join(folder, "run.json")) =~ ~s("robots":1,)
-    {svg, []} = :xmerl_scan.file(to_charlist(Path.join(folder, "run.svg")), quiet: true)
-    assert elem(svg, 1) == :svg
-  end
-
-  test "without a landmark the fleet says so and the status is 2" do
-    assert {output, "", 2} = demo("--headless --robots 2 --landmark none --duration 60")
-    assert output =~ "search"
-    assert output =~ "No formation"
-  end
-
-  test "live without a terminal: plain lines, commands from standard input" do
-    {output, _told, _status} =
-      demo("--robots 2 --blobs direct --duration 30", input: "staus\nstatus\nkill mag1\nquit\n")
-
-    assert output =~ "did you mean status?"
-    assert output =~ ~r/mag1: (idle|search) at /
-    assert output =~ "Try:  kill leader"
-    assert output =~ "kill mag1: done"
-    refute output =~ "\e["
-  end
+defmodule System.DemoEndsTest do
+  use Demo.Case, async: true
 
   test "who reads no further is told nothing more" do
     for line <- ["--headless --robots 2 --duration 20", "--robots 2 --duration 20"] do
@@ -146,14 +69,6 @@ defmodule System.DemoTest do
 
       assert told == ""
     end
-  end
-
-  test "bin/demo says what it cannot read, needs no home, and keeps standard input" do
-    demo = Path.join(@root, "bin/demo")
-    assert {"", told, 1} = run(demo, ["--map", <<0xFF>>], [])
-    assert told == "demo: the options must be text in UTF-8\n"
-    {output, _told, 2} = run("env", ["-u", "HOME", demo, "--robots", "2"], input: "help\nquit\n")
-    assert output =~ "formation"
   end
 
   @tag :tmp_dir
@@ -218,5 +133,114 @@ defmodule System.DemoTest do
         60_000 -> flunk("the demo goes on: " <> output)
       end
     end
+  end
+end
+
+defmodule System.DemoTest do
+  use Demo.Case, async: true
+
+  defp without_wall_time(json), do: String.replace(json, ~r/"wall_s":[^,]+,/, "")
+
+  test "the help names the options and ends well" do
+    assert {help, "", 0} = demo("--help")
+    assert help =~ "--leader-change"
+    assert help =~ "Exit status"
+  end
+
+  # As many as one run complains of at once.
+  for {line, complaints} <- [
+        {"--robots 0 --robots -3 --robots 1e9 --map moon --loss nan --headles --hardwear 1 " <>
+           "--picture /no/such/place/a.svg",
+         [
+           ~s(--robots cannot be "0": a whole number from 1 to 100 is allowed),
+           ~s(--robots cannot be "-3": a whole number),
+           ~s(--robots cannot be "1e9": a whole number),
+           ~s(--map cannot be "moon": hall, hospital, arena or FILE.png:WIDTHxHEIGHT is allowed),
+           ~s(--loss cannot be "nan": a number from 0 to 1 is allowed),
+           "did you mean --headless?",
+           "did you mean --hardware?",
+           "a folder that exists"
+         ]},
+        {"--headless --map mix.exs.png:10x10", ["mix.exs.png"]},
+        {"--headless --landmark 500,0", ["landmark"]},
+        {"--kill mag9@3", [~s("mag9")]},
+        {"--robots 2 --hardware min:2", ["--hardware min2 is more than there are"]}
+      ] do
+    test "refuses #{line} in clear words" do
+      assert {"", told, 1} = demo(unquote(line))
+      for complaint <- unquote(complaints), do: assert(told =~ complaint)
+      for line <- String.split(told, "\n", trim: true), do: assert(line =~ ~r/^demo: /)
+      refute told =~ "** ("
+      refute told =~ ".ex:"
+    end
+  end
+
+  @tag :tmp_dir
+  test "a PNG that is no PNG is refused", %{tmp_dir: folder} do
+    File.write!(Path.join(folder, "floor.png"), "not a picture")
+    path = Path.join(folder, "floor.png")
+    assert {"", told, 1} = demo("--headless --map #{path}:10x10")
+    assert told =~ "floor.png"
+    refute told =~ "** ("
+  end
+
+  test "one seed, run twice: the same report to the byte, but for the wall time" do
+    line = "--headless --robots 3 --seed 4 --duration 20 --json -"
+    {first, told, status} = demo(line)
+    {second, _told, ^status} = demo(line)
+    assert status in [0, 2]
+    assert [_one_line] = String.split(first, "\n", trim: true)
+    assert without_wall_time(first) == without_wall_time(second)
+    assert told =~ "search"
+
+    keys = Regex.scan(~r/"(\w+)":/, first) |> Enum.map(&List.last/1)
+    assert Enum.take(keys, 6) == ~w(version seed map robots simulated_s wall_s)
+  end
+
+  test "another seed is another run" do
+    {first, _told, _status} = demo("--headless --robots 2 --seed 1 --duration 5 --json -")
+    {second, _told, _status} = demo("--headless --robots 2 --seed 2 --duration 5 --json -")
+
+    assert without_wall_time(first) !=
+             without_wall_time(String.replace(second, ~s("seed":2), ~s("seed":1)))
+  end
+
+  @tag :tmp_dir
+  test "bin/demo writes report and picture where it was called", %{tmp_dir: folder} do
+    line = "--headless --robots 1 --duration 60 --json run.json --picture run.svg"
+
+    {output, _told, status} =
+      run(Path.join(@root, "bin/demo"), OptionParser.split(line), cd: folder)
+
+    assert status in [0, 2]
+    assert output =~ "1 robot (mag1) in hall"
+    assert File.read!(Path.join(folder, "run.json")) =~ ~s("robots":1,)
+    {svg, []} = :xmerl_scan.file(to_charlist(Path.join(folder, "run.svg")), quiet: true)
+    assert elem(svg, 1) == :svg
+  end
+
+  test "without a landmark the fleet says so and the status is 2" do
+    assert {output, "", 2} = demo("--headless --robots 2 --landmark none --duration 60")
+    assert output =~ "search"
+    assert output =~ "No formation"
+  end
+
+  test "live without a terminal: plain lines, commands from standard input" do
+    {output, _told, _status} =
+      demo("--robots 2 --blobs direct --duration 30", input: "staus\nstatus\nkill mag1\nquit\n")
+
+    assert output =~ "did you mean status?"
+    assert output =~ ~r/mag1: (idle|search) at /
+    assert output =~ "Try:  kill leader"
+    assert output =~ "kill mag1: done"
+    refute output =~ "\e["
+  end
+
+  test "bin/demo says what it cannot read, needs no home, and keeps standard input" do
+    demo = Path.join(@root, "bin/demo")
+    assert {"", told, 1} = run(demo, ["--map", <<0xFF>>], [])
+    assert told == "demo: the options must be text in UTF-8\n"
+    {output, _told, 2} = run("env", ["-u", "HOME", demo, "--robots", "2"], input: "help\nquit\n")
+    assert output =~ "formation"
   end
 end

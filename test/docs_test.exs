@@ -1,152 +1,78 @@
-for file <- ~w(reader.exs shown.exs sandbox.exs looked_at.exs),
-    do: Code.require_file("docs/" <> file, __DIR__)
+for file <- ~w(reader shown sandbox looked_at checks),
+    do: Code.require_file("docs/#{file}.exs", __DIR__)
 
-defmodule System.DocsTest do
+defmodule Docs.Case do
   @moduledoc """
   What README and docs/ tell people to type is typed, and what they show for an answer must come.
-  `Docs.Reader` has the conventions.
+  `Docs.Reader` has the conventions, `Docs.Checks` what is not typed, and why not.
 
   Each document has a copy of the project to itself, where its commands run in their order, and then one VM for
-  its `iex>` lines. A command that needs what is not here, or takes long, is listed below with the reason; of such a one
-  only words and options are compared with what its program knows. A new line is thus run unless somebody says why not.
-  Nothing that a reader types may change a file that came along.
+  its `iex>` lines. Nothing that a reader types may change a file that came along. The modules that use this run side by
+  side, each in a place of its own; the documents of one run one after the other.
   """
-  use ExUnit.Case, async: true
+  use ExUnit.CaseTemplate
+  alias Docs.{Checks, Reader, Sandbox}
 
-  alias Docs.{LookedAt, Reader, Sandbox, Shown}
-
-  @moduletag timeout: 180_000
   @root Path.expand("..", __DIR__)
-  @documents ["README.md" | @root |> Path.join("docs/*.md") |> Path.wildcard()]
-             |> Enum.map(&Path.relative_to(&1, @root))
 
-  @live "it goes on until somebody ends it"
-  @tests "it is the tests"
-  @long "it takes longer than 10 s"
-  @robot "it needs a robot"
-  @release "it needs a release, which test/release_test.exs builds, and runs"
-  @device "it needs a camera"
-  @ssh "it needs another machine"
-  @system "it changes this system"
-  @node "its iex> lines run in such a node"
+  using options do
+    quote do
+      alias Docs.{Checks, LookedAt, Reader, Sandbox, Shown}
+      @moduletag timeout: 180_000
 
-  # Commands that are not run, and why not.
-  @not_run %{
-    "bin/demo" => @live,
-    "bin/test" => @tests,
-    "bin/test-on bookworm --fresh" => @tests,
-    "bin/test-on trixie --fresh" => @tests,
-    "bin/setup" => @system,
-    "bin/demo --nodes" => @live,
-    "bin/demo --nodes --robots 4" => @live,
-    "bin/demo --map floor.png:16x12 --landmark 2,1" => @live,
-    "bin/demo --hardware 1" => @live,
-    "bin/demo --hardware mag:1,min:1" => @live,
-    "bin/node mag1" => @node,
-    "bin/node mag2" => @node,
-    "mix demo --headless --hardware mag:1,min:1 --seed 1" => @long,
-    "mix bench demo --seeds 1-10 --maps hall --cases six,move,kill-leader" => @long,
-    "mix bench demo --seeds 1-40 --maps hall,hospital --markdown table.md" => @long,
-    "mix bench demo --seeds 1-40 --maps hall --cases six,exact,move,kill-leader,kill-middle,loss,slip,one,two,three,twelve" =>
-      @long,
-    "mix bench demo --seeds 1-20 --maps hall --cases slip,same,chain,twelve-chain,line,wedge,triangle,diamond,circle" =>
-      @long,
-    "mix bench swarm --nodes 3,10 --robots-in-one-node 100" => @long,
-    "mix bench swarm --nodes 30 --robots-in-one-node 0" => @long,
-    "mix blobs /dev/video0 --colours landmark.txt --picture out.png" => @device,
-    "mix calibrate colour /dev/video0 --box 140,90,40,60 --name YellowLandmark --picture look.png" =>
-      @device,
-    "mix calibrate colour /dev/video0 --box 140,90,40,60 --name YellowLandmark --colours config/robots/landmark.txt" =>
-      @device,
-    "mix calibrate odometry config/robots/mag1.exs" => @robot,
-    "MIX_ENV=prod mix release robot" => @release,
-    "MIX_ENV=prod mix release fleet" => @release,
-    "MIX_TARGET=robot mix deps.get" => "it needs Hex",
-    "MIX_TARGET=robot MIX_ENV=prod mix release robot" => "it needs Hex",
-    "ROBOT=base CONVOY_SECRET_FILE=$PWD/convoy.secret _build/prod/rel/fleet/bin/fleet start_iex" =>
-      @release,
-    "ROBOT=mag1 bin/robot check" => @release,
-    "ROBOT=mag1 CONVOY_ROBOT_FILE=config/robots/mag1.exs bin/robot daemon" => @release,
-    "ROBOT=mag1 CONVOY_ROBOT_FILE=config/robots/mag1.exs bin/robot rpc 'Swarm.arm(:mag1)'" =>
-      @release,
-    "ROBOT=mag1 bin/robot start" => @release,
-    "ROBOT=mag1 bin/robot rpc 'Swarm.status()'" => @release,
-    "ROBOT=mag1 bin/robot remote" => @release,
-    "rel/deploy root@10.0.0.11 mag1" => @ssh,
-    "rel/deploy --dry-run root@10.0.0.11 mag2" => @release,
-    "rel/deploy root@10.0.0.11 mag2" => @ssh,
-    "rel/deploy --back root@10.0.0.11" => @ssh,
-    "rel/deploy --release _build/robot_prod/rel/robot root@10.0.0.11 mag1" => @ssh,
-    "ssh -t root@10.0.0.11 robot remote" => @ssh,
-    "scp -p convoy.secret root@mag1:/etc/convoy/secret" => @ssh,
-    "scp -pr certs/mag1 root@mag1:/etc/convoy/certs/" => @ssh,
-    "apt-get install --no-install-recommends openssh-server ffmpeg" => @system,
-    "(umask 077; mkdir -p /etc/convoy; head -c 32 /dev/urandom | base64 > /etc/convoy/secret)" =>
-      @system,
-    "nft add rule inet filter input ip saddr != 10.0.0.0/24 tcp dport 9101-9303 drop" => @system,
-    "nft add rule inet filter input ip saddr != 10.0.0.0/24 udp dport 4370-4371 drop" => @system,
-    "erl … -proto_dist inet_tls -ssl_dist_optfile certs/mag1/ssl_dist.conf" =>
-      "it is a part of a command; apps/mesh/test/mesh/distribution/connection_log_test.exs runs such nodes",
-    ~S(iex --sname rem-1@lab --hidden --cookie "$COOKIE" --remsh mag1@lab --erl "-start_epmd false -kernel net_ticktime 8 -epmd_module Elixir.Mesh.Distribution.Epmd -pa _build/dev/lib/mesh/ebin") =>
-      @robot
-  }
-
-  # And what others need.
-  @programs [{"mix fleet.certs", "openssl"}]
-
-  # How blocks begin that nobody types.
-  @shown [
-    "console -> sim -> missions -> swarm",
-    "console --> sim --> missions --> swarm",
-    "Swarm.Supervisor (rest_for_one",
-    "camera -> Hal.Device",
-    "idle -> search -> agree",
-    "Comms --Transport",
-    "camera          Hal.Device      BlobDetector",
-    "caller             Comms of mag1",
-    "caller                EStop of each robot",
-    # One line of a status.
-    "#min1 follow (1.20",
-    "#mag1 follow (-4.69",
-    # Flags and settings.
-    "-kernel prevent_overlapping_partitions",
-    "config :swarm, mesh: [multicast",
-    "-pa _build/dev/lib/mesh/ebin",
-    # What programs print that are not run here.
-    "Active: active (running)",
-    "Now 3.00 m straight ahead.",
-    "distance     1.0240",
-    "sample   784 pixels",
-    "Assumed; check whether",
-    "config/robots/mag1.exs:7: limits.max_liner",
-    "refused mag3 at",
-    "mag1  pid 3308",
-    "mag1 has real drivers",
-    # Files.
-    "#!/bin/sh",
-    "[Colors]"
-  ]
-
-  setup_all do
-    Sandbox.remove()
-    on_exit(&Sandbox.remove/0)
-    Sandbox.prepare(@root)
-    :ok
-  end
-
-  for document <- @documents do
-    @document document
-    test "#{document} tells no lie" do
-      items = Reader.items(File.read!(Path.join(@root, @document)))
-      assert unknown(items) == []
-      folder = Sandbox.create(@root, @document)
-      wrong = commands(items, folder) ++ mentions(items, folder)
-      assert wrong ++ Sandbox.session(@document, items, folder) == []
-      assert Sandbox.changed(@root, folder) == []
+      for document <- unquote(options[:documents]) do
+        @document document
+        test("#{document} tells no lie", %{place: place}, do: Docs.Case.check(@document, place))
+      end
     end
   end
 
-  test "a lie is seen" do
+  setup_all context do
+    place = inspect(context.module)
+    on_exit(fn -> Sandbox.remove(place) end)
+    Sandbox.prepare(@root, place)
+    %{place: place}
+  end
+
+  @doc "All documents."
+  def documents,
+    do: [
+      "README.md"
+      | @root
+        |> Path.join("docs/*.md")
+        |> Path.wildcard()
+        |> Enum.map(&Path.relative_to(&1, @root))
+    ]
+
+  @doc "All is as the document says."
+  def check(document, place) do
+    items = Reader.items(File.read!(Path.join(@root, document)))
+    assert Checks.unknown(items) == []
+    folder = Sandbox.create(@root, place, document)
+    wrong = Checks.commands(items, folder) ++ Checks.mentions(items, folder)
+    assert wrong ++ Sandbox.session(document, items, folder) == []
+    assert Sandbox.changed(@root, folder) == []
+  end
+end
+
+# Those with the most to type are on their own.
+defmodule System.DocsReadmeTest do
+  use Docs.Case, async: true, documents: ["README.md"]
+end
+
+defmodule System.DocsExtendingTest do
+  use Docs.Case, async: true, documents: ["docs/extending.md"]
+end
+
+defmodule System.DocsTest do
+  use Docs.Case,
+    async: true,
+    documents: Docs.Case.documents() -- ["README.md", "docs/extending.md"]
+
+  @root Path.expand("..", __DIR__)
+  @documents Docs.Case.documents()
+
+  test "a lie is seen", %{place: place} do
     lies = """
     Say `mix robot.chek`, `bin/demo --nods`, `Swarm.stopp()`, `Swarm.Mash` or `robot stat`.
 
@@ -180,13 +106,13 @@ defmodule System.DocsTest do
     """
 
     items = Reader.items(lies)
-    folder = Sandbox.create(@root, "none")
-    commands = commands(items, folder)
+    folder = Sandbox.create(@root, place, "none")
+    commands = Checks.commands(items, folder)
     assert [nowhere, ill, prompt] = commands
     assert nowhere =~ "line 3: mix robot.check config/robots/mag9.exs: status 1"
     assert ill =~ "line 4: mix robot.check config/robots/min1.exs: printed instead"
     assert prompt =~ "did you mean kill?"
-    assert [task, option, function, module, word] = mentions(items, folder)
+    assert [task, option, function, module, word] = Checks.mentions(items, folder)
     assert task =~ "there is no mix robot.chek"
     assert option =~ "did you mean --nodes?"
     assert function =~ "Swarm.stopp(): there is no such function"
@@ -202,10 +128,10 @@ defmodule System.DocsTest do
 
     assert Sandbox.changed(@root, folder) == []
     copy = Reader.items("    cp config/robots/template.exs config/robots/mag1.exs")
-    assert commands(copy, folder) == []
+    assert Checks.commands(copy, folder) == []
     assert Sandbox.changed(@root, folder) == ["config/robots/mag1.exs"]
 
-    assert [strange] = unknown(Reader.items("    mixx robot.check"))
+    assert [strange] = Checks.unknown(Reader.items("    mixx robot.check"))
     assert strange =~ "mixx robot.check: is this typed?"
   end
 
@@ -271,63 +197,14 @@ defmodule System.DocsTest do
           item <- Reader.items(File.read!(Path.join(@root, document))),
           do: item
 
-    commands = for {:shell, _n, text, _answer} <- items, do: command(text)
+    commands = for {:shell, _n, text, _answer} <- items, do: Checks.command(text)
     shown = for {:shown, _n, text, _answer} <- items, do: text
-    assert Map.keys(@not_run) -- commands == []
+    assert Checks.not_run() -- commands == []
 
-    assert Enum.reject(@shown, fn begin -> Enum.any?(shown, &String.starts_with?(&1, begin)) end) ==
+    assert Enum.reject(Checks.shown(), fn begin ->
+             Enum.any?(shown, &String.starts_with?(&1, begin))
+           end) ==
              []
-  end
-
-  # As it is typed, without the remark.
-  defp command(text) do
-    text
-    |> String.replace(~r/\\\n\s*/, "")
-    |> String.replace(~r/\s+# .*$/, "")
-  end
-
-  defp unknown(items) do
-    for {kind, n, text, answer} <- items, strange?(kind, text, answer) do
-      "line #{n}: #{text}: is this typed? Docs.Reader does not see it; what is only shown is listed in this test"
-    end
-  end
-
-  defp strange?(:shown, text, _answer), do: not Enum.any?(@shown, &String.starts_with?(text, &1))
-  defp strange?(:shell, text, answer), do: answer != "" and is_map_key(@not_run, command(text))
-  defp strange?(_kind, _text, _answer), do: false
-
-  defp commands(items, folder) do
-    for {kind, n, text, answer} <- items,
-        kind in [:shell, :prompt, :file],
-        wrong = wrong(kind, text, answer, folder),
-        do: "line #{n}: #{text}: #{wrong}"
-  end
-
-  defp wrong(:prompt, text, _answer, _folder), do: LookedAt.prompt(text)
-  defp wrong(:file, path, text, folder), do: Sandbox.write(path, text, folder)
-
-  defp wrong(:shell, text, answer, folder) do
-    if is_map_key(@not_run, command(text)) or lacking(text) != nil,
-      do: LookedAt.command(Reader.words(text), folder),
-      else: Sandbox.run(text, answer, folder)
-  end
-
-  # Programs that a machine may do without (bin/setup).
-  defp lacking(text) do
-    with {_command, program} <- Enum.find(@programs, &String.starts_with?(text, elem(&1, 0))),
-         nil <- System.find_executable(program) do
-      IO.puts("not run, as #{program} is not here: #{text}")
-      program
-    else
-      _there_or_not_needed -> nil
-    end
-  end
-
-  # A sentence may say anything; but a command or a function that it names must be there.
-  defp mentions(items, folder) do
-    for {:mention, n, text, _answer} <- items,
-        wrong = LookedAt.mention(text, folder),
-        do: "line #{n}: #{text}: #{wrong}"
   end
 
   describe "the tables of the user guide" do

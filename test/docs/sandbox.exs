@@ -2,7 +2,7 @@ defmodule Docs.Sandbox do
   @moduledoc """
   A copy of the project for the commands of one document, and the shells in which its `iex>` lines are typed.
 
-  All copies are made in one place, one after the other, with what was built, which is copied and brought up to date
+  The copies of a place are made one after the other, with what was built, which is copied and brought up to date
   once, before the first document: what the project itself goes on with stays as it is.
   """
   alias Docs.Reader
@@ -12,13 +12,13 @@ defmodule Docs.Sandbox do
   @environment [{"CONVOY_INTERFACE", "127.0.0.1"}]
 
   @doc "Makes the folder, with what was built in it. Where Mix builds all again, this takes as long as that."
-  @spec prepare(Path.t()) :: Path.t()
-  def prepare(root), do: create(root, "none")
+  @spec prepare(Path.t(), String.t()) :: Path.t()
+  def prepare(root, place), do: create(root, place, "none")
 
   @doc "The folder, with what the document takes for granted."
-  @spec create(Path.t(), String.t()) :: Path.t()
-  def create(root, document) do
-    folder = folder()
+  @spec create(Path.t(), String.t(), String.t()) :: Path.t()
+  def create(root, place, document) do
+    folder = folder(place)
     File.mkdir_p!(folder)
 
     for name <- File.ls!(folder), name != "_build", do: File.rm_rf!(Path.join(folder, name))
@@ -30,13 +30,13 @@ defmodule Docs.Sandbox do
   end
 
   @doc "Takes the folder away, and what was built."
-  @spec remove() :: :ok
-  def remove do
-    File.rm_rf!(folder())
+  @spec remove(String.t()) :: :ok
+  def remove(place) do
+    File.rm_rf!(folder(place))
     :ok
   end
 
-  defp folder, do: Path.join(System.tmp_dir!(), "convoy-docs-#{System.pid()}")
+  defp folder(place), do: Path.join(System.tmp_dir!(), "convoy-docs-#{System.pid()}-#{place}")
 
   # That of these tests; what else was built is not changed by a document.
   defp built(root, folder) do

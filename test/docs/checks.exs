@@ -1,0 +1,180 @@
+defmodule Docs.Checks do
+  @moduledoc """
+  What is wrong with a document. A command that needs what is not here, or takes long, is listed here with the reason;
+  of such a one only words and options are compared with what its program knows. A new line is thus run unless somebody
+  says why not.
+  """
+  alias Docs.{LookedAt, Reader, Sandbox}
+
+  @live "it goes on until somebody ends it"
+  @tests "it is the tests"
+  @long "it takes longer than 10 s"
+  @robot "it needs a robot"
+  @release "it needs a release, which test/release_test.exs builds, and runs"
+  @device "it needs a camera"
+  @ssh "it needs another machine"
+  @system "it changes this system"
+  @node "its iex> lines run in such a node"
+
+  # Commands that are not run, and why not.
+  @not_run %{
+    "bin/demo" => @live,
+    "bin/test" => @tests,
+    "bin/test-on bookworm --fresh" => @tests,
+    "bin/test-on trixie --fresh" => @tests,
+    "bin/setup" => @system,
+    "bin/demo --nodes" => @live,
+    "bin/demo --nodes --robots 4" => @live,
+    "bin/demo --map floor.png:16x12 --landmark 2,1" => @live,
+    "bin/demo --hardware 1" => @live,
+    "bin/demo --hardware mag:1,min:1" => @live,
+    "bin/node mag1" => @node,
+    "bin/node mag2" => @node,
+    "mix demo --headless --hardware mag:1,min:1 --seed 1" => @long,
+    "mix bench demo --seeds 1-10 --maps hall --cases six,move,kill-leader" => @long,
+    "mix bench demo --seeds 1-40 --maps hall,hospital --markdown table.md" => @long,
+    "mix bench demo --seeds 1-40 --maps hall --cases six,exact,move,kill-leader,kill-middle,loss,slip,one,two,three,twelve" =>
+      @long,
+    "mix bench demo --seeds 1-20 --maps hall --cases slip,same,chain,twelve-chain,line,wedge,triangle,diamond,circle" =>
+      @long,
+    "mix bench swarm --nodes 3,10 --robots-in-one-node 100" => @long,
+    "mix bench swarm --nodes 30 --robots-in-one-node 0" => @long,
+    "mix blobs /dev/video0 --colours landmark.txt --picture out.png" => @device,
+    "mix calibrate colour /dev/video0 --box 140,90,40,60 --name YellowLandmark --picture look.png" =>
+      @device,
+    "mix calibrate colour /dev/video0 --box 140,90,40,60 --name YellowLandmark --colours config/robots/landmark.txt" =>
+      @device,
+    "mix calibrate odometry config/robots/mag1.exs" => @robot,
+    "MIX_ENV=prod mix release robot" => @release,
+    "MIX_ENV=prod mix release fleet" => @release,
+    "MIX_TARGET=robot mix deps.get" => "it needs Hex",
+    "MIX_TARGET=robot MIX_ENV=prod mix release robot" => "it needs Hex",
+    "ROBOT=base CONVOY_SECRET_FILE=$PWD/convoy.secret _build/prod/rel/fleet/bin/fleet start_iex" =>
+      @release,
+    "ROBOT=mag1 bin/robot check" => @release,
+    "ROBOT=mag1 CONVOY_ROBOT_FILE=config/robots/mag1.exs bin/robot daemon" => @release,
+    "ROBOT=mag1 CONVOY_ROBOT_FILE=config/robots/mag1.exs bin/robot rpc 'Swarm.arm(:mag1)'" =>
+      @release,
+    "ROBOT=mag1 bin/robot start" => @release,
+    "ROBOT=mag1 bin/robot rpc 'Swarm.status()'" => @release,
+    "ROBOT=mag1 bin/robot remote" => @release,
+    "rel/deploy root@10.0.0.11 mag1" => @ssh,
+    "rel/deploy --dry-run root@10.0.0.11 mag2" => @release,
+    "rel/deploy root@10.0.0.11 mag2" => @ssh,
+    "rel/deploy --back root@10.0.0.11" => @ssh,
+    "rel/deploy --release _build/robot_prod/rel/robot root@10.0.0.11 mag1" => @ssh,
+    "ssh -t root@10.0.0.11 robot remote" => @ssh,
+    "scp -p convoy.secret root@mag1:/etc/convoy/secret" => @ssh,
+    "scp -pr certs/mag1 root@mag1:/etc/convoy/certs/" => @ssh,
+    "apt-get install --no-install-recommends openssh-server ffmpeg" => @system,
+    "(umask 077; mkdir -p /etc/convoy; head -c 32 /dev/urandom | base64 > /etc/convoy/secret)" =>
+      @system,
+    "nft add rule inet filter input ip saddr != 10.0.0.0/24 tcp dport 9101-9303 drop" => @system,
+    "nft add rule inet filter input ip saddr != 10.0.0.0/24 udp dport 4370-4371 drop" => @system,
+    "erl … -proto_dist inet_tls -ssl_dist_optfile certs/mag1/ssl_dist.conf" =>
+      "it is a part of a command; apps/mesh/test/mesh/distribution/connection_log_test.exs runs such nodes",
+    ~S(iex --sname rem-1@lab --hidden --cookie "$COOKIE" --remsh mag1@lab --erl "-start_epmd false -kernel net_ticktime 8 -epmd_module Elixir.Mesh.Distribution.Epmd -pa _build/dev/lib/mesh/ebin") =>
+      @robot
+  }
+
+  # And what others need.
+  @programs [{"mix fleet.certs", "openssl"}]
+
+  # How blocks begin that nobody types.
+  @shown [
+    "console -> sim -> missions -> swarm",
+    "console --> sim --> missions --> swarm",
+    "Swarm.Supervisor (rest_for_one",
+    "camera -> Hal.Device",
+    "idle -> search -> agree",
+    "Comms --Transport",
+    "camera          Hal.Device      BlobDetector",
+    "caller             Comms of mag1",
+    "caller                EStop of each robot",
+    # One line of a status.
+    "#min1 follow (1.20",
+    "#mag1 follow (-4.69",
+    # Flags and settings.
+    "-kernel prevent_overlapping_partitions",
+    "config :swarm, mesh: [multicast",
+    "-pa _build/dev/lib/mesh/ebin",
+    # What programs print that are not run here.
+    "Active: active (running)",
+    "Now 3.00 m straight ahead.",
+    "distance     1.0240",
+    "sample   784 pixels",
+    "Assumed; check whether",
+    "config/robots/mag1.exs:7: limits.max_liner",
+    "refused mag3 at",
+    "mag1  pid 3308",
+    "mag1 has real drivers",
+    # Files.
+    "#!/bin/sh",
+    "[Colors]"
+  ]
+
+  @doc "The commands that are not run, as they are typed."
+  @spec not_run() :: [String.t()]
+  def not_run, do: Map.keys(@not_run)
+
+  @doc "How the blocks begin that are only shown."
+  @spec shown() :: [String.t()]
+  def shown, do: @shown
+
+  @doc "A command as it is typed, without the remark."
+  @spec command(String.t()) :: String.t()
+  def command(text) do
+    text
+    |> String.replace(~r/\\\n\s*/, "")
+    |> String.replace(~r/\s+# .*$/, "")
+  end
+
+  @doc "Blocks that look as if somebody typed them, and nobody knows whether."
+  @spec unknown([Reader.item()]) :: [String.t()]
+  def unknown(items) do
+    for {kind, n, text, answer} <- items, strange?(kind, text, answer) do
+      "line #{n}: #{text}: is this typed? Docs.Reader does not see it; what is only shown is listed in test/docs/checks.exs"
+    end
+  end
+
+  defp strange?(:shown, text, _answer), do: not Enum.any?(@shown, &String.starts_with?(text, &1))
+  defp strange?(:shell, text, answer), do: answer != "" and is_map_key(@not_run, command(text))
+  defp strange?(_kind, _text, _answer), do: false
+
+  @doc "What is wrong with the commands, which are typed in the folder unless they are listed above."
+  @spec commands([Reader.item()], Path.t()) :: [String.t()]
+  def commands(items, folder) do
+    for {kind, n, text, answer} <- items,
+        kind in [:shell, :prompt, :file],
+        wrong = wrong(kind, text, answer, folder),
+        do: "line #{n}: #{text}: #{wrong}"
+  end
+
+  defp wrong(:prompt, text, _answer, _folder), do: LookedAt.prompt(text)
+  defp wrong(:file, path, text, folder), do: Sandbox.write(path, text, folder)
+
+  defp wrong(:shell, text, answer, folder) do
+    if is_map_key(@not_run, command(text)) or lacking(text) != nil,
+      do: LookedAt.command(Reader.words(text), folder),
+      else: Sandbox.run(text, answer, folder)
+  end
+
+  # Programs that a machine may do without (bin/setup).
+  defp lacking(text) do
+    with {_command, program} <- Enum.find(@programs, &String.starts_with?(text, elem(&1, 0))),
+         nil <- System.find_executable(program) do
+      IO.puts("not run, as #{program} is not here: #{text}")
+      program
+    else
+      _there_or_not_needed -> nil
+    end
+  end
+
+  @doc "A sentence may say anything; but a command or a function that it names must be there."
+  @spec mentions([Reader.item()], Path.t()) :: [String.t()]
+  def mentions(items, folder) do
+    for {:mention, n, text, _answer} <- items,
+        wrong = LookedAt.mention(text, folder),
+        do: "line #{n}: #{text}: #{wrong}"
+  end
+end
