@@ -5,7 +5,7 @@ defmodule Docs.LookedAt do
   """
   alias Docs.Sandbox
 
-  @ours ~w(Hal Vision Robot Mesh Swarm Missions Sim Console Mix)
+  @ours ~w(Hal Vision Robot Mesh Swarm Missions Sim Console Vm Mix)
 
   @doc "Of a command's words."
   @spec command([String.t()], Path.t()) :: String.t() | nil
@@ -128,7 +128,7 @@ defmodule Docs.LookedAt do
   defp loaded,
     do:
       Enum.flat_map(
-        [:hal, :vision, :robot, :mesh, :swarm, :missions, :agents, :player, :sim],
+        [:hal, :vision, :robot, :mesh, :swarm, :missions, :agents, :player, :sim, :vm],
         &Application.spec(&1, :modules)
       )
 
