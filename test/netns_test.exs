@@ -143,9 +143,13 @@ defmodule System.NetnsTest do
        %{fleet: fleet} do
     begun = start(fleet)
     start = formed(fleet, begun)
+    across = [mag1: :mag3, mag5: :mag2]
+    under_way = for {from, to} <- across, do: Fleet.call(fleet, from, Netns.Order, :prepare, [to])
     cut = Fleet.cut(fleet, @parts, &Net.split(&1, @parts))
-    # Nobody has noticed yet: TCP keeps these for later.
-    for {from, to} <- [mag1: :mag3, mag5: :mag2] do
+
+    # Nobody has noticed yet: TCP keeps these for later, those whose robot has told its time before, and the others.
+    for {{from, to}, order} <- Enum.zip(across, under_way) do
+      :ok = Fleet.call(fleet, from, Netns.Order, :give, [order, {:goto, -5.0, 3.0, nil}])
       answer = Fleet.call(fleet, from, Swarm, :goto, [to, {-5.0, 3.0}])
       assert answer == {:error, "#{to} does not answer"}
     end

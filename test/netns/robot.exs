@@ -213,3 +213,31 @@ defmodule Netns.Robot do
     |> Swarm.Comms.join()
   end
 end
+
+defmodule Netns.Order do
+  @moduledoc "An order in two steps, as `Swarm.Commands.Client` gives it, so that the network may be cut between them."
+  alias Mesh.Nonblocking
+  alias Swarm.Commands.Freshness
+  alias Swarm.Directory
+
+  @answer_ms 5_000
+
+  @doc "Asks a robot for its time."
+  def prepare(robot) do
+    comms = Directory.whereis(robot)
+    ref = :erlang.alias([:reply])
+    Nonblocking.cast(comms, {:stamp, ref})
+
+    receive do
+      {^ref, stamp} -> {comms, stamp}
+    after
+      @answer_ms -> exit({:no_stamp, robot})
+    end
+  end
+
+  @doc "Gives the order; nobody waits for its answer."
+  def give({comms, stamp}, request) do
+    {:ok, order} = Freshness.given(stamp, 0)
+    Nonblocking.cast(comms, {:command, request, :erlang.alias([:reply]), order})
+  end
+end
