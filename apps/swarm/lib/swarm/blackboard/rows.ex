@@ -17,6 +17,8 @@ defmodule Swarm.Blackboard.Rows do
 
   @buckets 16
   @hashes 4_294_967_296
+  # Nobody writes this often in one life, and no fleet this often unheard.
+  @leap 1_000_000_000_000
 
   @type owner :: atom() | (bucket :: 0..15)
   @type key :: term()
@@ -49,6 +51,18 @@ defmodule Swarm.Blackboard.Rows do
   @spec of(State.t(), owner()) :: %{key() => held()}
   def of(state, robot) when is_atom(robot), do: Map.get(state.robots, robot, %{})
   def of(state, bucket), do: :maps.filter(fn id, _held -> bucket(id) == bucket end, state.hints)
+
+  @doc """
+  Whether a count is farther ahead of the known one than anybody gets: accepting it would leave no
+  room for later writes.
+  """
+  @spec leap?(count :: integer(), known :: integer()) :: boolean()
+  def leap?(count, known), do: count > known + @leap
+
+  @doc "What a robot wrote last, as far as is known."
+  @spec latest(State.t(), atom()) :: held() | nil
+  def latest(state, robot),
+    do: state |> of(robot) |> Map.values() |> Enum.max_by(&elem(&1, 0), fn -> nil end)
 
   @doc "A row as it is held here: its stamp, its value, and since when by this node's clock."
   @spec held(State.t(), owner(), key()) :: {:ok, held()} | :error

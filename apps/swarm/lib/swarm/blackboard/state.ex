@@ -6,27 +6,17 @@ defmodule Swarm.Blackboard.State do
   through third parties. Besides rows there are hints, which all robots write (`put_hint/5`).
   Pure; times are this node's own, in milliseconds. `Swarm.Blackboard.Rows` holds the rows.
 
-  *Own* robots are those of this node (`enter/4`). Rows of them that come from outside:
-
-  | row from outside | what happens |
-  |---|---|
-  | of a former life, or of this one before the board was lost | accepted, but never in place of a newer row |
-  | of a higher incarnation, and young | a rival of the same name: reported (`{:rival, robot, incarnation}`), not accepted |
-  | of a higher incarnation, and over 5 s old | a former life, before the clock was set back: outbid |
+  *Own* robots are those of this node (`enter/4`); `Swarm.Blackboard.Incarnation` says what becomes of what
+  others say of them.
 
   A deleted hint stays for ten minutes with the value `""`, so that it does not come back.
 
   Memory is bounded (`limits`): other robots, keys of a robot and hints (the newest stay), bytes of
   a value.
   """
-  alias Swarm.Blackboard.Rows
+  alias Swarm.Blackboard.{Expiry, Incarnation, Rows}
 
   @limits %{robots: 256, keys: 32, bytes: 59_000, hints: 256, hint_bytes: 1_000}
-  @rival_ms 5_000
-  # Nobody writes this often in one life, and no fleet this often unheard: accepting such a count
-  # of a hint would leave no room for later writes.
-  @leap 1_000_000_000_000
-  @forget_ms 600_000
 
   @enforce_keys [:limits]
   defstruct @enforce_keys ++ [first: 0, robots: %{}, own: %{}, hints: %{}, clock: 0]
@@ -72,33 +62,7 @@ defmodule Swarm.Blackboard.State do
   number changes nothing.
   """
   @spec enter(t(), atom(), boot :: non_neg_integer(), integer()) :: {t(), [note()]}
-  def enter(rows, robot, boot, now_ms) do
-    case rows.own do
-      %{^robot => {^boot, _stamp}} -> {rows, []}
-      _new -> begin(rows, robot, boot, newest(rows, robot), now_ms)
-    end
-  end
-
-  defp begin(rows, robot, boot, {{known, _sequence}, _value, at_ms}, now_ms) when known > boot do
-    if now_ms - at_ms >= @rival_ms,
-      do: {own(rows, robot, boot, {known + 1, rows.first}), []},
-      # These are the rows of another robot.
-      else:
-        {own(%{rows | robots: Map.delete(rows.robots, robot)}, robot, boot, {boot, rows.first}),
-         [{:rival, robot, known}]}
-  end
-
-  defp begin(rows, robot, boot, {{boot, _} = stamp, _value, _at_ms}, _now_ms),
-    do: {own(rows, robot, boot, stamp), []}
-
-  defp begin(rows, robot, boot, _older, _now_ms),
-    do: {own(rows, robot, boot, {boot, rows.first}), []}
-
-  defp own(rows, robot, boot, stamp), do: %{rows | own: Map.put(rows.own, robot, {boot, stamp})}
-
-  defp newest(rows, robot) do
-    rows |> Rows.of(robot) |> Map.values() |> Enum.max_by(&elem(&1, 0), fn -> nil end)
-  end
+  defdelegate enter(rows, robot, boot, now_ms), to: Incarnation
 
   @doc "A robot of this node stops writing. Its rows stay, and grow old."
   @spec leave(t(), atom()) :: t()
@@ -132,7 +96,9 @@ defmodule Swarm.Blackboard.State do
 
           true ->
             {:ok,
-             rows |> own(robot, boot, stamp) |> Rows.hold(robot, key, {stamp, value, now_ms})}
+             rows
+             |> Incarnation.write(robot, boot, stamp)
+             |> Rows.hold(robot, key, {stamp, value, now_ms})}
         end
 
       _not_mine ->
@@ -174,8 +140,8 @@ defmodule Swarm.Blackboard.State do
 
     # Two nodes that send each other in turn what the other has just forgotten would never get rid
     # of it.
-    {rows, _gone} =
-      forget(rows, now_ms, for({owner, _, _, _, _} <- incoming, uniq: true, do: owner))
+    owners = for {owner, _, _, _, _} <- incoming, uniq: true, do: owner
+    {rows, _gone} = Expiry.forget(rows, now_ms, owners)
 
     {rows, notes |> Enum.reverse() |> Enum.uniq()}
   end
@@ -186,7 +152,7 @@ defmodule Swarm.Blackboard.State do
       bytes(value) > rows.limits.hint_bytes ->
         {rows, [{:refused, :bytes}]}
 
-      count > rows.clock + @leap ->
+      Rows.leap?(count, rows.clock) ->
         {rows, [{:refused, :count}]}
 
       true ->
@@ -200,7 +166,7 @@ defmodule Swarm.Blackboard.State do
         {rows, [{:refused, :bytes}]}
 
       is_map_key(rows.own, robot) ->
-        mine(rows, robot, key, {stamp, value, now_ms - age_ms}, now_ms)
+        own(rows, robot, key, {stamp, value, now_ms - age_ms}, now_ms)
 
       is_map_key(rows.robots, robot) or others(rows) < rows.limits.robots ->
         take(rows, robot, key, {stamp, value, now_ms - age_ms})
@@ -218,50 +184,10 @@ defmodule Swarm.Blackboard.State do
     {rows, if(taken?, do: [{:changed, owner, key}], else: [])}
   end
 
-  defp mine(rows, robot, key, {{incarnation, sequence} = stamp, _value, at_ms} = new, now_ms) do
-    {boot, {life, count}} = rows.own[robot]
-
-    cond do
-      incarnation > life and now_ms - at_ms < @rival_ms ->
-        {rows, [{:rival, robot, incarnation}]}
-
-      incarnation > life ->
-        again(rows, robot, boot, {incarnation + 1, 0})
-
-      # This robot's own rows, which the board has lost since: never newer than what it writes
-      # now.
-      stamp > {life, count} ->
-        known? = is_map_key(Rows.of(rows, robot), key)
-        # Nothing counts this far by itself, so this is treated as another life, with numbers that
-        # will last.
-        on = if sequence > count + @leap, do: {life + 1, 0}, else: {life, sequence}
-        {rows, notes} = again(rows, robot, boot, on)
-        {rows, more} = if known?, do: {rows, []}, else: take(rows, robot, key, new)
-        {rows, notes ++ more}
-
-      true ->
-        take(rows, robot, key, new)
-    end
-  end
-
-  # Old rows keep their order and their ages, and get stamps that win.
-  defp again(rows, robot, boot, stamp) do
-    {_boot, {life, _count}} = rows.own[robot]
-
-    {said, former} =
-      rows |> Rows.of(robot) |> Enum.split_with(&match?({_, {{^life, _}, _, _}}, &1))
-
-    {said, stamp} =
-      said
-      |> Enum.sort_by(fn {_key, {stamp, _, _}} -> stamp end)
-      |> Enum.map_reduce(stamp, fn {key, {_, value, at_ms}}, {incarnation, sequence} ->
-        stamp = {incarnation, sequence + 1}
-        {{key, {stamp, value, at_ms}}, stamp}
-      end)
-
-    rows = %{rows | robots: Map.put(rows.robots, robot, Map.new(said ++ former))}
-    notes = for {key, _held} <- said, do: {:changed, robot, key}
-    {own(rows, robot, boot, stamp), notes ++ [{:again, robot}]}
+  defp own(rows, robot, key, held, now_ms) do
+    {rows, notes, take?} = Incarnation.hear(rows, robot, key, held, now_ms)
+    {rows, more} = if take?, do: take(rows, robot, key, held), else: {rows, []}
+    {rows, notes ++ more}
   end
 
   @doc """
@@ -270,36 +196,7 @@ defmodule Swarm.Blackboard.State do
   """
   @spec forget(t(), integer()) :: {t(), gone :: [{Rows.owner(), key()}]}
   def forget(rows, now_ms),
-    do: forget(rows, now_ms, for({owner, _} <- Rows.owners(rows), do: owner))
-
-  defp forget(rows, now_ms, owners) do
-    gone =
-      for owner <- owners,
-          all = Rows.of(rows, owner),
-          old = for({_, {_, _, at_ms}} = row <- all, now_ms - at_ms >= @forget_ms, do: row),
-          {key, {stamp, value, _}} <- old,
-          past?(rows, owner, stamp, value, length(old) == map_size(all)),
-          do: {owner, key}
-
-    {Enum.reduce(gone, rows, &drop/2), gone}
-  end
-
-  defp past?(_rows, bucket, _stamp, value, _all?) when is_integer(bucket), do: value == ""
-
-  defp past?(rows, robot, {incarnation, _}, _value, all?) do
-    {{life, _}, _, _} = newest(rows, robot)
-    incarnation < life or (all? and not is_map_key(rows.own, robot))
-  end
-
-  defp drop({bucket, id}, rows) when is_integer(bucket),
-    do: %{rows | hints: Map.delete(rows.hints, id)}
-
-  defp drop({robot, key}, rows) do
-    case Map.delete(Rows.of(rows, robot), key) do
-      none when none == %{} -> %{rows | robots: Map.delete(rows.robots, robot)}
-      left -> %{rows | robots: Map.put(rows.robots, robot, left)}
-    end
-  end
+    do: Expiry.forget(rows, now_ms, for({owner, _} <- Rows.owners(rows), do: owner))
 
   defp bytes(value) when is_binary(value), do: byte_size(value)
   defp bytes(value), do: :erlang.external_size(value)
