@@ -7,6 +7,7 @@ defmodule SwarmPureTest do
   doctest Swarm.Formation.Trail
   doctest Swarm.Formation.FreeSlots
   doctest Swarm.Agreement.Round.Record
+  doctest Swarm.Agreement.Round.Precedence
   doctest Swarm.Message
   doctest Swarm.Membership.Heartbeat
   doctest Swarm.Formation.Reference

@@ -15,9 +15,8 @@ defmodule Swarm.Agreement.Round do
   Ids are `{epoch, counter, initiator}`: the epoch is that of the leadership which the round will
   found, the counter grows with each new try.
   """
-  alias Swarm.Agreement.Round.{Letter, Record}
+  alias Swarm.Agreement.Round.{Letter, Precedence, Record, Tally}
 
-  @leap 1_000_000
   # Letters are repeated every 100 ms, less often in a large group, because all-to-all traffic
   # grows with its square.
   @repeat_ms 100
@@ -81,7 +80,7 @@ defmodule Swarm.Agreement.Round do
   """
   @spec open(t(), pos_integer(), [atom()], :search | :change, pos_integer(), integer()) :: t()
   def open(round, epoch, view, purpose, length_ms, now_ms) do
-    {top, counter} = fenced(round).highest
+    {top, counter} = Precedence.fenced(round).highest
     counter = if epoch >= top, do: counter, else: 0
     epoch = max(epoch, top)
     enter(round, {epoch, counter + 1, round.me}, view, purpose, length_ms, now_ms)
@@ -107,25 +106,19 @@ defmodule Swarm.Agreement.Round do
   """
   @spec hear(t(), atom(), Letter.t(), integer()) :: t()
   def hear(%{me: me} = round, from, %Letter{} = letter, now_ms) when from != me do
-    if leap?(letter.id, round.highest),
+    if Precedence.leap?(letter.id, round.highest),
       do: round,
-      else: round |> note(letter.id) |> heed(from, letter, now_ms)
+      else: round |> Precedence.note(letter.id) |> heed(from, letter, now_ms)
   end
 
   def hear(round, _from, _letter, _now_ms), do: round
-
-  # No fleet gets this far at once; accepting such an id would leave no room for the next ones.
-  defp leap?({epoch, counter, _initiator}, {epoch, highest}), do: counter > highest + @leap
-
-  defp leap?({epoch, counter, _initiator}, {highest, _counter}),
-    do: epoch > highest + @leap or counter > @leap
 
   defp heed(round, from, letter, now_ms) do
     cond do
       letter.id == round.id ->
         take(round, from, letter)
 
-      supersedes?(letter.id, round) and round.me in letter.view ->
+      Precedence.supersedes?(letter.id, round) and round.me in letter.view ->
         join(round, from, letter, now_ms)
 
       true ->
@@ -147,10 +140,10 @@ defmodule Swarm.Agreement.Round do
     {round, letters} = speak(round, now_ms)
 
     cond do
-      round.phase == :digest and agreed?(round) ->
-        {%{round | phase: :committed, since_ms: now_ms}, letters, {:commit, record(round)}}
+      round.phase == :digest and Tally.agreed?(round) ->
+        {%{round | phase: :committed, since_ms: now_ms}, letters, {:commit, Tally.record(round)}}
 
-      round.phase == :digest and differing?(round) ->
+      round.phase == :digest and Tally.differing?(round) ->
         {leave(round), letters, {:failed, :mismatch}}
 
       round.phase == :digest and now_ms - round.since_ms > @give_up_after * repeat_ms(round) ->
@@ -163,19 +156,11 @@ defmodule Swarm.Agreement.Round do
 
   @doc "Leaves a round; what this robot said in it remains valid."
   @spec leave(t()) :: t()
-  def leave(round), do: %{fenced(round) | phase: :none}
-
-  defp record(round),
-    do: %Record{
-      id: round.id,
-      view: round.view,
-      reports: Record.freeze(round.view, round.reports),
-      digest: round.digest
-    }
+  def leave(round), do: %{Precedence.fenced(round) | phase: :none}
 
   defp enter(round, id, view, purpose, length_ms, now_ms) do
     round
-    |> note(id)
+    |> Precedence.note(id)
     |> Map.merge(%{
       id: id,
       view: Enum.sort(view),
@@ -198,38 +183,20 @@ defmodule Swarm.Agreement.Round do
     |> take(from, letter)
   end
 
-  # The first report of a robot in a round is final; reports are frozen once the digest is out.
+  # Reports are frozen once the digest is out.
   defp take(round, from, letter) do
-    round = if letter.digest, do: put_digest(round, from, letter.digest), else: round
+    round = if letter.digest, do: Tally.digest(round, from, letter.digest), else: round
     round = if letter.ask, do: %{round | said_ms: nil, echo?: true}, else: round
 
     if round.phase in [:collect, :echo],
-      do: round |> keep(%{from => letter.report}) |> keep(letter.known || %{}),
-      else: round
-  end
-
-  defp keep(round, reports) do
-    news =
-      for {id, report} <- reports,
-          is_map(report),
-          not is_map_key(round.reports, id),
-          id in round.view,
-          into: %{},
-          do: {id, report}
-
-    if news == %{}, do: round, else: %{round | reports: Map.merge(round.reports, news)}
-  end
-
-  defp put_digest(round, from, digest) do
-    if from in round.view,
-      do: %{round | digests: Map.put_new(round.digests, from, digest)},
+      do: round |> Tally.reports(%{from => letter.report}) |> Tally.reports(letter.known || %{}),
       else: round
   end
 
   defp advance(%{phase: :collect} = round, now_ms) do
     cond do
       # Not at the tick of its opening: the robot that opened it has to stop first.
-      whole?(round) and now_ms > round.since_ms -> freeze(round, now_ms)
+      Tally.whole?(round) and now_ms > round.since_ms -> freeze(round, now_ms)
       now_ms < round.deadline_ms -> round
       true -> %{round | phase: :echo, since_ms: now_ms, said_ms: nil, echo?: true}
     end
@@ -242,11 +209,9 @@ defmodule Swarm.Agreement.Round do
   end
 
   defp advance(%{phase: :digest} = round, now_ms) when now_ms - round.since_ms < @echo_ms,
-    do: %{round | echo?: round.echo? or whole?(round)}
+    do: %{round | echo?: round.echo? or Tally.whole?(round)}
 
   defp advance(round, _now_ms), do: round
-
-  defp whole?(round), do: Enum.all?(round.view, &is_map_key(round.reports, &1))
 
   defp freeze(round, now_ms) do
     digest = Record.digest(round.id, Record.freeze(round.view, round.reports))
@@ -257,9 +222,9 @@ defmodule Swarm.Agreement.Round do
         since_ms: now_ms,
         said_ms: nil,
         digest: digest,
-        echo?: whole?(round)
+        echo?: Tally.whole?(round)
     }
-    |> put_digest(round.me, digest)
+    |> Tally.digest(round.me, digest)
   end
 
   defp speak(%{phase: :committed} = round, now_ms) do
@@ -290,34 +255,4 @@ defmodule Swarm.Agreement.Round do
   end
 
   defp repeat_ms(round), do: max(@repeat_ms, @repeat_ms_per_robot * length(round.view))
-
-  defp agreed?(round),
-    do: Enum.all?(round.view, &(Map.get(round.digests, &1) == round.digest))
-
-  defp differing?(round), do: Enum.any?(round.digests, fn {_id, d} -> d != round.digest end)
-
-  # If this robot's digest is out, others may have committed the round, so the next round is for a
-  # new epoch.
-  defp fenced(%{phase: phase, id: {epoch, _counter, initiator}} = round)
-       when phase in [:digest, :committed],
-       do: note(round, {epoch + 1, 0, initiator})
-
-  defp fenced(round), do: round
-
-  defp note(round, {epoch, counter, _initiator}),
-    do: %{round | highest: max(round.highest, {epoch, counter})}
-
-  # A robot that has sent its digest joins another round of the same epoch only if the sender has
-  # not sent any digest; otherwise two rounds could found the same epoch.
-  defp supersedes?(_id, %{id: nil}), do: true
-
-  defp supersedes?({epoch, _counter, initiator} = id, %{id: {own, _, _}} = round) do
-    case round.phase do
-      :committed -> epoch > own
-      :digest -> epoch > own or (id > round.id and unsigned?(round, initiator))
-      _open_or_left -> id > round.id
-    end
-  end
-
-  defp unsigned?(round, id), do: id in round.view and not is_map_key(round.digests, id)
 end
