@@ -1,0 +1,108 @@
+defmodule Robot.Safety.Reflex.Limits do
+  @moduledoc """
+  What the robot's speeds, its surroundings and its fence leave of a wish that may be carried out:
+  the limits from `:speed` to `:acceleration` of the table in `Robot.Safety.Reflex`, one after the
+  other. Pure.
+  """
+  alias Hal.Drive.SlewLimiter
+  alias Hal.Twist
+  alias Robot.Safety.Reflex
+  alias Robot.Safety.Reflex.{Body, Fence}
+
+  @blind_ms 500
+  @blind_speed 0.1
+  # A place that odometry has told this long ago is not known any more.
+  @lost_ms 500
+  # The step that accelerations are counted with is never longer than this, whatever the clock did.
+  @longest_step_ms 200
+
+  @doc """
+  The speed (m/s) and turn rate (rad/s) that are left of those wished, at this time in
+  milliseconds, and the limits that have made them less, in the order in which they were asked.
+  """
+  @spec limit(Reflex.t(), float(), float(), integer()) :: {Twist.t(), [Reflex.limit()]}
+  def limit(reflex, linear, turn, at_ms) do
+    %{profile: profile, twist: last} = reflex
+    {linear, turn, limits} = speed(linear, turn, profile, [])
+    {safe_linear, limits} = linear |> near(reflex, at_ms, limits)
+    {safe_turn, limits} = corner(turn, reflex, limits)
+    {safe_linear, limits} = fence(safe_linear, safe_turn, reflex, at_ms, limits)
+    seconds = step_s(reflex.at_ms, at_ms)
+
+    {ramped, limits} = ramp(last.linear, safe_linear, profile.max_acceleration * seconds, limits)
+
+    {turned, limits} = ramp(last.turn, safe_turn, profile.max_turn_acceleration * seconds, limits)
+
+    # A touched side is no matter of ramps.
+    {ramped, limits} = bumper(ramped, reflex, limits)
+    {Twist.new(ramped, turned), Enum.reverse(limits)}
+  end
+
+  defp speed(linear, turn, profile, limits) do
+    safe_linear = clamp(linear, profile.max_linear)
+    safe_turn = clamp(turn, profile.max_turn)
+    changed? = safe_linear != linear or safe_turn != turn
+    {safe_linear, safe_turn, if(changed?, do: [:speed | limits], else: limits)}
+  end
+
+  defp near(linear, reflex, at_ms, limits) do
+    if blind?(reflex, at_ms),
+      do: lower(linear, @blind_speed, :blind, limits),
+      else: lower(linear, Body.free_speed(reflex.profile, reflex.sonar, linear), :near, limits)
+  end
+
+  defp blind?(%{profile: %{sonars: []}}, _at_ms), do: false
+  defp blind?(%{sonar_at_ms: nil}, _at_ms), do: true
+  defp blind?(%{sonar_at_ms: sonar_at_ms}, at_ms), do: at_ms - sonar_at_ms > @blind_ms
+
+  defp corner(turn, reflex, limits),
+    do: lower(turn, Body.free_turn(reflex.profile, reflex.sonar, turn), :corner, limits)
+
+  defp fence(linear, _turn, %{fence: nil}, _at_ms, limits), do: {linear, limits}
+
+  defp fence(linear, turn, %{place: {pose, then_ms}} = reflex, at_ms, limits)
+       when at_ms - then_ms <= @lost_ms do
+    # It turns as it did, and will as it may: on its way from the one to the other.
+    turns = Enum.uniq([reflex.twist.turn, turn])
+    age_s = max(at_ms - then_ms, 0) / 1000
+    free = Fence.free_speed(reflex.fence, reflex.profile, pose, linear, turns, age_s)
+    lower(linear, free, :fence, limits)
+  end
+
+  defp fence(linear, _turn, _lost, _at_ms, limits), do: lower(linear, 0.0, :fence, limits)
+
+  defp bumper(linear, %{bumpers: []}, limits), do: {linear, limits}
+
+  defp bumper(linear, reflex, limits) do
+    count = max(reflex.profile.bumpers, 1)
+
+    toward? =
+      Enum.any?(reflex.bumpers, fn segment ->
+        is_integer(segment) and
+          :math.cos(2 * :math.pi() * segment / count) * linear > 0.05 * abs(linear)
+      end)
+
+    if toward? and linear != 0.0, do: {0.0, [:bumper | limits]}, else: {linear, limits}
+  end
+
+  defp lower(value, limit, name, limits) do
+    if abs(value) > limit, do: {clamp(value, limit), [name | limits]}, else: {value, limits}
+  end
+
+  # Braking may be twice as hard as speeding up: what comes near is noticed late by as much.
+  defp ramp(from, to, most, limits) do
+    case SlewLimiter.approach(from, to, most, 2 * most) do
+      ramped when ramped == to -> {to, limits}
+      ramped -> {ramped, [:acceleration | limits]}
+    end
+  end
+
+  defp step_s(nil, _at_ms), do: 0.05
+
+  defp step_s(last_ms, at_ms),
+    do: (at_ms - last_ms) |> max(0) |> min(@longest_step_ms) |> Kernel./(1000)
+
+  defp clamp(value, limit) when value > limit, do: limit * 1.0
+  defp clamp(value, limit) when value < -limit, do: -limit * 1.0
+  defp clamp(value, _limit), do: value
+end
