@@ -2,11 +2,11 @@ defmodule Robot.Behaviour.Avoid do
   @moduledoc """
   Runs another behaviour, and bends or slows its wishes so that the robot touches nothing (R85).
 
-  A wish with a velocity is bent: round standing robots and discs on the shortest way (`.Way`),
-  past moving ones by `Robot.Navigation.Orca`, a little to the right of those who come, and away
-  from what only the sonars see. A wish without one is only slowed down (`.Brake`). Who gets no
+  A wish with a velocity is bent: round standing robots and discs on the shortest way (`.Route`),
+  past moving ones by `Robot.Navigation.Orca` (`.Clearance`), a little to the right of those who come,
+  and away from what only the sonars see (`.Preference`). A wish without one is only slowed down (`.Brake`). Who gets no
   nearer for some seconds goes another way for a while (`.Progress`), and who stands in another's
-  way makes room (`.Yield`). Where a body that will not move stands in the goal, it stands as near
+  way makes room (`.GiveWay`). Where a body that will not move stands in the goal, it stands as near
   as possible, and its wish says `by: :blocked`. A robot with nobody about gets its wish
   unchanged.
 
@@ -18,22 +18,12 @@ defmodule Robot.Behaviour.Avoid do
   alias Robot.{Behaviour, Percept, Wish}
   alias Robot.Navigation.{Orca, Steering}
   alias Robot.Behaviour.Avoid
-  alias Robot.Behaviour.Avoid.{Brake, GiveWay, Neighbours, Progress}
+  alias Robot.Behaviour.Avoid.{Brake, Clearance, GiveWay, Neighbours, Preference, Progress}
 
-  # Metres kept to others by reaction; to standing ones less when there is no more room.
-  @standing_margin 0.12
-  @moving_margin 0.15
-  @closest 0.04
   # Metres from the nearest place to a taken goal that count as there.
   @beside 0.08
   # m/s of one who makes way.
   @aside 0.2
-  # m/s away from what is close, at contact; and how close that is.
-  @drift 0.25
-  @close 0.16
-  @horizon_s 2.5
-  @standing_horizon_s 1.2
-  @to_the_right :math.pi() / 12
 
   @impl Behaviour
   def new(options) do
@@ -144,7 +134,7 @@ defmodule Robot.Behaviour.Avoid do
     robots = Neighbours.near(all)
     bodies = Enum.map(all, fn %{at: {x, y}, radius: radius} -> {x, y, radius} end)
     things = Neighbours.unknown(percept, bodies ++ state.discs)
-    fixed = things ++ standing(state.discs, percept)
+    fixed = things ++ Clearance.standing(state.discs, percept)
     way = wish.goal && Avoid.Route.round(state.way, wish.goal, percept, all, state.discs)
     corners = way && way.corners
 
@@ -158,14 +148,13 @@ defmodule Robot.Behaviour.Avoid do
 
     preferred =
       wish.velocity
-      |> toward(corners, wish, speed, percept)
-      |> keep_right(aside, corners, robots, percept)
-      |> spread(robots ++ fixed, wish.goal, percept)
-
-    planes = planes(percept, robots, fixed)
+      |> Preference.toward(corners, speed, percept)
+      |> Preference.keep_right(aside, corners, robots, percept)
+      |> Preference.spread(robots ++ fixed, wish.goal, percept)
 
     velocity =
-      planes
+      percept
+      |> Clearance.planes(robots, fixed)
       |> Orca.solve(preferred, percept.profile.max_linear)
       |> calm(preferred, state.velocity)
 
@@ -184,100 +173,6 @@ defmodule Robot.Behaviour.Avoid do
 
     {braked, state}
   end
-
-  defp toward(velocity, [_goal], _wish, _speed, _percept), do: velocity
-  defp toward(velocity, nil, _wish, _speed, _percept), do: velocity
-
-  # Round a corner the wished velocity points to the wrong side; its size remains.
-  defp toward(_velocity, [{x, y} | _], _wish, speed, percept) do
-    angle = :math.atan2(y - percept.pose.y, x - percept.pose.x)
-    {speed * :math.cos(angle), speed * :math.sin(angle)}
-  end
-
-  defp keep_right(velocity, aside, _way, _robots, _percept) when aside != nil,
-    do: turn(velocity, aside)
-
-  defp keep_right(velocity, nil, way, robots, percept) do
-    far? = way != nil and Pose.distance(percept.pose, hd(way)) > 1.0
-
-    if far? and Enum.any?(robots, &coming?(&1, velocity, percept)),
-      do: turn(velocity, -@to_the_right),
-      else: velocity
-  end
-
-  # Somebody who moves, is ahead, and gets nearer.
-  defp coming?(%{standing?: true}, _velocity, _percept), do: false
-
-  defp coming?(%{at: {x, y}, velocity: {ox, oy}, gap: gap}, {vx, vy}, percept) do
-    dx = x - percept.pose.x
-    dy = y - percept.pose.y
-
-    gap < 3.0 and dx * vx + dy * vy > 0 and dx * (vx - ox) + dy * (vy - oy) > 0 and
-      ox * vx + oy * vy < 0
-  end
-
-  # Close along something it gets on only slowly, so it drifts off it, into the middle of a narrow
-  # place; but not from what stands by its goal.
-  defp spread(velocity, others, goal, percept) do
-    Enum.reduce(others, velocity, fn %{at: {x, y}} = other, {vx, vy} = velocity ->
-      if other.standing? and other.gap < @close and not by_goal?(other, goal, percept) do
-        push = @drift * (1 - max(other.gap, 0.0) / @close)
-        distance = max(Pose.distance(percept.pose, {x, y}), 0.01)
-        {vx + push * (percept.pose.x - x) / distance, vy + push * (percept.pose.y - y) / distance}
-      else
-        velocity
-      end
-    end)
-  end
-
-  defp by_goal?(_other, nil, _percept), do: true
-
-  defp by_goal?(%{at: at, radius: radius}, goal, percept) do
-    Pose.distance(percept.pose, goal) < 0.8 and
-      Pose.distance(at, goal) < percept.profile.radius + radius + 0.25
-  end
-
-  defp turn({vx, vy}, angle) do
-    c = :math.cos(angle)
-    s = :math.sin(angle)
-    {c * vx - s * vy, s * vx + c * vy}
-  end
-
-  defp standing(discs, percept) do
-    for {x, y, radius} <- discs do
-      gap = Pose.distance(percept.pose, {x, y}) - radius - percept.profile.radius
-
-      %{
-        id: nil,
-        at: {x, y},
-        velocity: {0.0, 0.0},
-        radius: radius,
-        share: 1.0,
-        standing?: true,
-        gap: gap
-      }
-    end
-  end
-
-  defp planes(percept, robots, things) do
-    at = Pose.point(percept.pose)
-    own = own_velocity(percept)
-    nearest = things |> Enum.filter(&(&1.gap < 1.5)) |> Enum.sort_by(& &1.gap) |> Enum.take(8)
-
-    for %{gap: gap} = other <- nearest ++ robots do
-      margin = if other.standing?, do: @standing_margin, else: @moving_margin
-      horizon_s = if other.standing?, do: @standing_horizon_s, else: @horizon_s
-      # The margin is a wish; only what is nearer than the tightest is pushed away from.
-      margin = max(@closest, min(margin, gap - 0.01))
-      radius = percept.profile.radius + other.radius + margin
-      Orca.half_plane(at, own, other.at, other.velocity, radius, horizon_s, other.share)
-    end
-  end
-
-  defp own_velocity(%{odometry: %{twist: twist}, pose: pose}),
-    do: {twist.linear * :math.cos(pose.heading), twist.linear * :math.sin(pose.heading)}
-
-  defp own_velocity(_percept), do: {0.0, 0.0}
 
   defp twist(wish, velocity, preferred, percept, backing?) do
     cond do
