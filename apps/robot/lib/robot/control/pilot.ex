@@ -1,8 +1,8 @@
 defmodule Robot.Control.Pilot do
   @moduledoc """
   Runs one robot's mission. A `gen_statem` whose state is `:idle` or `{mission, phase}`, so that
-  `:sys.get_state/1` shows what the robot is up to. It carries the mission's effects out and
-  decides nothing.
+  `:sys.get_state/1` shows what the robot is up to. It carries the mission's effects out
+  (`Robot.Control.Pilot.Effects`) and decides nothing.
 
   It starts idle, and tells the executive so: after a failure in the mission the robot stands
   until a person starts it again.
@@ -16,21 +16,12 @@ defmodule Robot.Control.Pilot do
 
   Where a person arms the wheels (`arm: :manual`), every change of that ends what the robot is at: when they
   are disarmed or lost, and when they are armed again, which is never the start of a motion.
-
-  | effect | goes to |
-  |---|---|
-  | orders: `{:goal, tag, goal}`, `{:anchors, anchors}`, `{:look, pan}` | the executive |
-  | `{:send, to, message}` | the config's `:send`; lost without one |
-  | `{:claim, map}` | the board, under `:mission`, for the heartbeat to carry |
-  | `{:stage, name, map}` | the event `[:robot, :stage]` |
   """
   @behaviour :gen_statem
-  alias Hal.Event
   alias Robot.{Board, Config, Names}
-  alias Robot.Control.{Delivery, Executive, Trace}
-  alias Robot.Localiser.Anchors
+  alias Robot.Control.{Delivery, Executive}
+  alias Robot.Control.Pilot.{Effects, Journal}
   alias Robot.Mission.Runner
-  import Robot.Mission, only: [is_order: 1]
 
   # On a busy machine a pilot is slow, not gone.
   @call_ms 5_000
@@ -117,9 +108,9 @@ defmodule Robot.Control.Pilot do
     }
 
     # The pilot before this one may have ended within its mission, and the executive may still follow a goal of it.
-    Board.delete(data.board, :pilot, :asking)
-    rest(data)
-    {:ok, :idle, told(:idle, %{}, data)}
+    Journal.answered(data.board)
+    Effects.rest(config)
+    {:ok, :idle, Journal.told(:idle, %{}, data)}
   end
 
   @impl :gen_statem
@@ -222,9 +213,9 @@ defmodule Robot.Control.Pilot do
 
   defp begin(module, options, state, data) do
     if Code.ensure_loaded?(module) and function_exported?(module, :init, 2) do
-      heard({:start, module, options}, data)
-      rest(data)
-      result = asking(module, data, fn -> Runner.start(data.runner, module, options) end)
+      Journal.heard({:start, module, options}, data)
+      Effects.rest(data.config)
+      result = Journal.asking(module, data, fn -> Runner.start(data.runner, module, options) end)
       follow(result, state, data)
     else
       {:error, :no_mission}
@@ -233,10 +224,10 @@ defmodule Robot.Control.Pilot do
 
   # Whoever is answered finds the robot idle. The mission is asked last: it has no say in this.
   defp halt(state, then, data) do
-    heard(:stop, data)
-    data = changed(state, :idle, %{}, data)
+    Journal.heard(:stop, data)
+    data = Journal.changed(state, :idle, %{}, data)
     Executive.stand(data.config.id, then)
-    halted = asking(data.runner.module, data, fn -> Runner.halt(data.runner) end)
+    halted = Journal.asking(data.runner.module, data, fn -> Runner.halt(data.runner) end)
     {:next_state, :idle, %{data | runner: halted}}
   end
 
@@ -252,73 +243,14 @@ defmodule Robot.Control.Pilot do
   defp newest(event), do: event
 
   defp handle(event, data) do
-    heard(event, data)
-    asking(data.runner.module, data, fn -> Runner.handle(data.runner, event) end)
-  end
-
-  # No two calls are noted alike.
-  defp asking(nil, _data, function), do: function.()
-
-  defp asking(module, %{board: board, config: config}, function) do
-    call = {module, System.unique_integer()}
-    Board.put(board, :pilot, :asking, call, Config.now(config))
-    result = function.()
-    Board.delete(board, :pilot, :asking)
-    result
+    Journal.heard(event, data)
+    Journal.asking(data.runner.module, data, fn -> Runner.handle(data.runner, event) end)
   end
 
   defp follow({runner, effects}, before, data) do
     data = %{data | runner: runner}
-    Enum.each(effects, &carry_out(&1, data))
+    Enum.each(effects, &Effects.carry_out(&1, data.config))
     state = Runner.state(runner)
-    {:ok, state, changed(before, state, runner.claim, data)}
-  end
-
-  defp carry_out(effect, %{config: config}) do
-    at_ms = Config.now(config)
-    Trace.effect(config, :pilot, effect, at_ms)
-    carry_out(effect, config, at_ms)
-  end
-
-  defp carry_out(order, config, _at_ms) when is_order(order), do: Executive.obey(config.id, order)
-
-  defp carry_out({:send, _to, _message}, %{send: nil}, _at_ms), do: :ok
-
-  defp carry_out({:send, to, message}, %{send: {m, f, a}}, _at_ms),
-    do: apply(m, f, a ++ [to, message])
-
-  # The runner has it.
-  defp carry_out({:claim, _claim}, _config, _at_ms), do: :ok
-
-  defp carry_out({:stage, stage, about}, config, at_ms) do
-    about = Map.merge(%{robot: config.id, stage: stage}, about)
-    Event.execute([:robot, :stage], %{at_ms: at_ms}, about)
-  end
-
-  defp rest(%{config: %{id: id}}) do
-    for order <- [{:goal, :idle, nil}, {:anchors, %Anchors{}}, {:look, nil}],
-        do: Executive.obey(id, order)
-  end
-
-  defp heard(input, data), do: Trace.input(data.config, :pilot, input, Config.now(data.config))
-
-  defp changed(state, state, claim, data), do: written(state, claim, data)
-
-  defp changed(_before, state, claim, data),
-    do: told(state, claim, %{data | since_ms: Config.now(data.config)})
-
-  defp told(state, claim, data) do
-    data = written(state, claim, data)
-    at_ms = data.since_ms
-    Trace.effect(data.config, :pilot, {:phase, state}, at_ms)
-    about = %{robot: data.config.id, state: state}
-    Event.execute([:robot, :pilot, :phase], %{at_ms: at_ms}, about)
-    data
-  end
-
-  defp written(state, claim, data) do
-    entry = %{state: state, claim: claim, since_ms: data.since_ms}
-    Board.put(data.board, :pilot, :mission, entry, Config.now(data.config))
-    data
+    {:ok, state, Journal.changed(before, state, runner.claim, data)}
   end
 end
