@@ -53,6 +53,12 @@ defmodule Mesh.Protocol.Roster do
   @spec node(t(), String.t()) :: {:ok, node()} | :error
   def node(roster, text), do: Map.fetch(roster.nodes, text)
 
+  @doc "What changes of the node table are for the nodes of this roster."
+  @spec changes(t(), [{change, String.t()}]) :: [{:node, change, node()}] when change: atom()
+  def changes(roster, changes) do
+    for {change, name} <- changes, {:ok, node} = node(roster, name), do: {:node, change, node}
+  end
+
   @doc "Whether a robot belongs to the fleet."
   @spec robot?(t(), term()) :: boolean()
   def robot?(roster, id), do: is_atom(id) and MapSet.member?(roster.robots, id)
