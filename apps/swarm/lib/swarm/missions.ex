@@ -79,13 +79,24 @@ defmodule Swarm.Missions do
     end
   end
 
-  @doc "The applications that contain these missions."
+  @doc "The applications that contain these missions, loaded."
   @spec apps() :: [atom()]
   def apps do
     for {_name, module} <- known(), {:ok, module} <- [loaded(module)], uniq: true do
-      Application.get_application(module) || :swarm
+      Application.get_application(module) || load_app(:code.which(module)) || :swarm
     end
   end
+
+  # A node that was not started as a release loads no application that nobody starts.
+  defp load_app(beam) when is_list(beam) do
+    with [file] <- beam |> Path.dirname() |> Path.join("*.app") |> Path.wildcard(),
+         {:ok, [{:application, app, _keys} = spec]} <- :file.consult(file),
+         :ok <- :application.load(spec),
+         do: app,
+         else: (_none -> nil)
+  end
+
+  defp load_app(_defined_without_file), do: nil
 
   defp known, do: Application.get_env(:swarm, :missions, [])
 
