@@ -1,24 +1,21 @@
 defmodule Missions.Landmark.Leader do
   @moduledoc """
-  What the leader does besides tracking the landmark: it announces where it is supposed to be (the
-  reference), maintains the order of the slots when robots leave and join, and judges whether the
-  shape is formed. Pure.
+  What the leader does besides tracking the landmark: it announces where it is supposed to be
+  (`.Announcement`), maintains the order of the slots when robots leave and join (`.Slots`), and
+  judges whether the shape is formed. Pure.
   """
   alias Robot.Behaviour
   alias Robot.Localiser.Anchors
   alias Swarm.{Formation, Message}
-  alias Swarm.Formation.{Assignment, Chain, Reference}
   alias Swarm.Membership.{NameSet, Peers}
   alias Missions.Landmark
-  alias Missions.Landmark.{LandmarkTrack, Merge, Rounds, Shape}
+  alias Missions.Landmark.{LandmarkTrack, Merge, Shape}
+  alias Missions.Landmark.Leader.{Announcement, Slots}
 
-  # Nearer than 1.4 m the landmark's foot leaves the picture, and then its size is unknown.
-  @near 1.5
+  # A landmark farther off than this is driven after, to `Slots.near/0`.
   @far 1.9
   # How far from its ring around the landmark a leader may stand.
   @ring_slack 0.15
-  # A landmark that was measured at most this long ago is where it was reported.
-  @still_ms 400
   # A shape is formed when it has been right for this long, and no longer when it was wrong for
   # this long.
   @formed_ms 1_000
@@ -27,10 +24,6 @@ defmodule Missions.Landmark.Leader do
   @lost_ms 3_000
   @scan_ms 5_000
   @unheard_ms 1_500
-  # By then all that took part in the round have reported that they follow; later ones are new.
-  @settled_ms 1_000
-  # No robot is farther away than this, in any unit.
-  @lost 999_999_999
   # For this long a new leader sends its place to all, not only to its child.
   @fresh_ms 500
 
@@ -103,7 +96,7 @@ defmodule Missions.Landmark.Leader do
     do: {%{mission | anchor: nil}, [{:goal, :stand, {Behaviour.Stop, []}}, {:look, 0.0}]}
 
   defp lead(mission) do
-    mission = mission |> muster() |> shape() |> tell()
+    mission = mission |> Slots.update() |> Announcement.update()
     {mission, formed} = judge(mission)
     {mission, lost} = miss(mission)
     told = told(mission)
@@ -150,110 +143,6 @@ defmodule Missions.Landmark.Leader do
       do: mission.order,
       else: Enum.take(mission.order, 1)
   end
-
-  # Robots that are gone leave their slots and those behind move up (R53 with healing); new ones
-  # join the tail.
-  defp muster(mission) do
-    view = List.delete(Rounds.view(mission), mission.me)
-    kept = Chain.heal(mission.order, view)
-
-    came =
-      if mission.now_ms - mission.since_ms >= @settled_ms,
-        do: (view -- kept) -- Merge.theirs(view, mission),
-        else: []
-
-    %{mission | order: kept ++ came}
-  end
-
-  # If the shape has changed, `:cost` assigns its slots again.
-  defp shape(%{lead: lead} = mission) do
-    shape = Shape.update(lead.shape, mission, landmark_distance(mission))
-    new? = {shape.formation, shape.room} != {lead.shape.formation, lead.shape.room}
-    mission = %{mission | lead: %{lead | shape: shape}}
-    dealt? = lead.shape.room == nil and mission.now_ms == mission.since_ms and all_free?(mission)
-    if new? and not dealt? and mission.assign == :cost, do: deal(mission), else: mission
-  end
-
-  # Then the round's record has assigned them; it does not know where there is no room.
-  defp all_free?(%{order: order, lead: %{shape: %{room: {size, places}}}}) do
-    count = length(order)
-    size == count + 1 and Enum.sort(places) == Enum.to_list(1..count//1)
-  end
-
-  defp landmark_distance(%{sight: %{place: place}, percept: percept}) when place != nil,
-    do: Hal.Pose.distance(percept.pose, place)
-
-  defp landmark_distance(_mission), do: @near
-
-  # Assigns the slots by squared distance from where the robots say they are.
-  defp deal(mission) do
-    beats = Peers.taking_part(mission.percept.peers, mission.now_ms)
-    followers = for id <- mission.order, {x, y, _heading} = beats[id].pose, do: {id, {x, y}}
-    {x, y, _heading} = Landmark.State.millimetres(mission.percept.pose)
-    {size, places} = mission.lead.shape.room
-
-    slots =
-      Rounds.slots(
-        mission.lead.shape.formation,
-        mission.percept.pose,
-        size,
-        landmark_distance(mission)
-      )
-
-    used = for place <- places, do: Enum.at(slots, place - 1)
-    %{mission | order: Assignment.order(:cost, followers, {x, y}, used)}
-  end
-
-  defp tell(%{percept: percept, lead: lead} = mission) do
-    sequence = lead.sequence + 1
-    place = mission.sight && mission.sight.place
-
-    anchor = %Reference{
-      leader: mission.me,
-      epoch: mission.epoch,
-      sequence: sequence,
-      pose: Landmark.State.millimetres(percept.pose),
-      twist: twist(percept),
-      sd: sd(percept.uncertainty),
-      start_sd: start_sd(percept.uncertainty),
-      drift: drift(percept.uncertainty),
-      slip: min(ceil(percept.uncertainty.slip * 1000), @lost),
-      frame: percept.uncertainty.frame_no,
-      base: percept.uncertainty.frame,
-      formation: lead.shape.formation,
-      asked: mission.formation,
-      asked_no: mission.asked_no,
-      order: mission.order,
-      size: elem(lead.shape.room, 0),
-      places: elem(lead.shape.room, 1),
-      trail: Shape.trail(lead.shape, mission),
-      of: mission.of,
-      landmark: place && point(place),
-      still: LandmarkTrack.still?(mission.sight, mission.now_ms, @still_ms)
-    }
-
-    %{mission | anchor: anchor, lead: %{lead | sequence: sequence}}
-  end
-
-  defp sd(%{position: position, heading: heading}),
-    do: {min(round(position * 1000), @lost), min(round(heading * 1000), @lost)}
-
-  defp start_sd(%{start: {position, heading}}),
-    do: sd(%{position: :math.sqrt(position), heading: :math.sqrt(heading)})
-
-  defp drift(%{drift: {way, turn, turned}}),
-    do: {millionths(way), millionths(turn), min(round(turned * 1000), @lost)}
-
-  defp millionths(variance), do: min(round(variance * 1.0e6), @lost)
-
-  # A crawl is reported as standing still, so that no slot trembles.
-  defp twist(%{odometry: %{twist: %{linear: linear, turn: turn}}}) do
-    if abs(linear) < 0.02 and abs(turn) < 0.02,
-      do: {0, 0},
-      else: {round(linear * 1000), round(turn * 1000)}
-  end
-
-  defp point({x, y}), do: {round(x * 1000), round(y * 1000)}
 
   # All followers are in place, and the leader is still in front of the landmark, for a second.
   defp judge(mission) do
@@ -325,5 +214,5 @@ defmodule Missions.Landmark.Leader do
     {ring - @ring_slack, ring + @ring_slack}
   end
 
-  defp range(_mission), do: {@near, @far}
+  defp range(_mission), do: {Slots.near(), @far}
 end

@@ -1,0 +1,43 @@
+defmodule Missions.Landmark.Claim do
+  @moduledoc """
+  What a robot's heartbeat reports about its landmark mission (`Swarm.Membership.Heartbeat`). Pure.
+  """
+  alias Missions.Landmark
+  alias Missions.Landmark.{Blocker, Marks}
+
+  @doc "The claim of this tick."
+  @spec claim(Landmark.State.t()) :: map()
+  def claim(mission) do
+    leading? = mission.phase == :lead
+
+    %{
+      phase: mission.phase,
+      epoch: mission.epoch,
+      leader: mission.leader,
+      sight:
+        if(Landmark.State.sees?(mission),
+          do: %{
+            size_ppm: mission.sight.size_ppm,
+            distance: mission.sight.distance && round(mission.sight.distance * 1000)
+          }
+        ),
+      standing: standing?(mission),
+      sd: Marks.told(mission),
+      uncertainty: uncertainty(mission.percept),
+      in_place: mission.phase == :follow and mission.attend.in_place?,
+      unsure: mission.phase == :follow and mission.attend.unsure?,
+      blocked: mission.phase == :follow and mission.attend.blocked?,
+      blocked_by: if(mission.phase == :follow, do: Blocker.words(mission.attend.blocker)),
+      formed: leading? and mission.lead.formed?,
+      anchor: if(leading?, do: mission.anchor)
+    }
+  end
+
+  defp uncertainty(%{uncertainty: %{radius: radius}}), do: radius
+  defp uncertainty(_no_pose), do: nil
+
+  defp standing?(%{phase: :lead, percept: percept}), do: Landmark.State.slow?(percept, 0.05)
+  defp standing?(%{phase: :follow} = mission), do: mission.attend.holding?
+  defp standing?(%{phase: :hold, percept: percept}), do: Landmark.State.slow?(percept, 0.05)
+  defp standing?(%{phase: phase}), do: phase in [:idle, :search, :agree, :rest, :wait, :halt]
+end

@@ -1,0 +1,68 @@
+defmodule Missions.Landmark.Leader.Announcement do
+  @moduledoc """
+  What a leader announces each tick (`Swarm.Formation.Reference`, the anchor): where it is
+  supposed to be and how sure of that it is, the shape and who stands where. Pure; millimetres and
+  milliradians.
+  """
+  alias Missions.Landmark
+  alias Missions.Landmark.{LandmarkTrack, Shape}
+  alias Swarm.Formation.Reference
+
+  # A landmark that was measured at most this long ago is where it was reported.
+  @still_ms 400
+  # No robot is farther away than this, in any unit.
+  @lost 999_999_999
+
+  @doc "The anchor of this tick, in `anchor`."
+  @spec update(Landmark.State.t()) :: Landmark.State.t()
+  def update(%{percept: percept, lead: lead} = mission) do
+    sequence = lead.sequence + 1
+    place = mission.sight && mission.sight.place
+
+    anchor = %Reference{
+      leader: mission.me,
+      epoch: mission.epoch,
+      sequence: sequence,
+      pose: Landmark.State.millimetres(percept.pose),
+      twist: twist(percept),
+      sd: sd(percept.uncertainty),
+      start_sd: start_sd(percept.uncertainty),
+      drift: drift(percept.uncertainty),
+      slip: min(ceil(percept.uncertainty.slip * 1000), @lost),
+      frame: percept.uncertainty.frame_no,
+      base: percept.uncertainty.frame,
+      formation: lead.shape.formation,
+      asked: mission.formation,
+      asked_no: mission.asked_no,
+      order: mission.order,
+      size: elem(lead.shape.room, 0),
+      places: elem(lead.shape.room, 1),
+      trail: Shape.trail(lead.shape, mission),
+      of: mission.of,
+      landmark: place && point(place),
+      still: LandmarkTrack.still?(mission.sight, mission.now_ms, @still_ms)
+    }
+
+    %{mission | anchor: anchor, lead: %{lead | sequence: sequence}}
+  end
+
+  defp sd(%{position: position, heading: heading}),
+    do: {min(round(position * 1000), @lost), min(round(heading * 1000), @lost)}
+
+  defp start_sd(%{start: {position, heading}}),
+    do: sd(%{position: :math.sqrt(position), heading: :math.sqrt(heading)})
+
+  defp drift(%{drift: {way, turn, turned}}),
+    do: {millionths(way), millionths(turn), min(round(turned * 1000), @lost)}
+
+  defp millionths(variance), do: min(round(variance * 1.0e6), @lost)
+
+  # A crawl is reported as standing still, so that no slot trembles.
+  defp twist(%{odometry: %{twist: %{linear: linear, turn: turn}}}) do
+    if abs(linear) < 0.02 and abs(turn) < 0.02,
+      do: {0, 0},
+      else: {round(linear * 1000), round(turn * 1000)}
+  end
+
+  defp point({x, y}), do: {round(x * 1000), round(y * 1000)}
+end

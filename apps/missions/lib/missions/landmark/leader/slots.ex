@@ -1,0 +1,75 @@
+defmodule Missions.Landmark.Leader.Slots do
+  @moduledoc """
+  The order of a leader's followers, and the shape in whose slots they stand. Pure.
+  """
+  alias Missions.Landmark
+  alias Missions.Landmark.{Merge, Rounds, Shape}
+  alias Swarm.Formation.{Assignment, Chain}
+  alias Swarm.Membership.Peers
+
+  # Metres: nearer than 1.4 m the landmark's foot leaves the picture, and then its size is unknown.
+  @near 1.5
+  # By then all that took part in the round have reported that they follow; later ones are new.
+  @settled_ms 1_000
+
+  @doc "How near to the landmark a leader drives, in metres."
+  @spec near() :: float()
+  def near, do: @near
+
+  @doc "One tick: who has left and who has come, and a shape that there is room for."
+  @spec update(Landmark.State.t()) :: Landmark.State.t()
+  def update(mission), do: mission |> muster() |> shape()
+
+  # Robots that are gone leave their slots and those behind move up (R53 with healing); new ones
+  # join the tail.
+  defp muster(mission) do
+    view = List.delete(Rounds.view(mission), mission.me)
+    kept = Chain.heal(mission.order, view)
+
+    came =
+      if mission.now_ms - mission.since_ms >= @settled_ms,
+        do: (view -- kept) -- Merge.theirs(view, mission),
+        else: []
+
+    %{mission | order: kept ++ came}
+  end
+
+  # If the shape has changed, `:cost` assigns its slots again.
+  defp shape(%{lead: lead} = mission) do
+    shape = Shape.update(lead.shape, mission, landmark_distance(mission))
+    new? = {shape.formation, shape.room} != {lead.shape.formation, lead.shape.room}
+    mission = %{mission | lead: %{lead | shape: shape}}
+    dealt? = lead.shape.room == nil and mission.now_ms == mission.since_ms and all_free?(mission)
+    if new? and not dealt? and mission.assign == :cost, do: deal(mission), else: mission
+  end
+
+  # Then the round's record has assigned them; it does not know where there is no room.
+  defp all_free?(%{order: order, lead: %{shape: %{room: {size, places}}}}) do
+    count = length(order)
+    size == count + 1 and Enum.sort(places) == Enum.to_list(1..count//1)
+  end
+
+  defp landmark_distance(%{sight: %{place: place}, percept: percept}) when place != nil,
+    do: Hal.Pose.distance(percept.pose, place)
+
+  defp landmark_distance(_mission), do: @near
+
+  # Assigns the slots by squared distance from where the robots say they are.
+  defp deal(mission) do
+    beats = Peers.taking_part(mission.percept.peers, mission.now_ms)
+    followers = for id <- mission.order, {x, y, _heading} = beats[id].pose, do: {id, {x, y}}
+    {x, y, _heading} = Landmark.State.millimetres(mission.percept.pose)
+    {size, places} = mission.lead.shape.room
+
+    slots =
+      Rounds.slots(
+        mission.lead.shape.formation,
+        mission.percept.pose,
+        size,
+        landmark_distance(mission)
+      )
+
+    used = for place <- places, do: Enum.at(slots, place - 1)
+    %{mission | order: Assignment.order(:cost, followers, {x, y}, used)}
+  end
+end
