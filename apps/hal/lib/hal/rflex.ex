@@ -15,6 +15,7 @@ defmodule Hal.RFlex do
   | `Hal.RFlex.Sensors.Sonar`, `.Infrared`, `.Bumpers`, `.IndexSwitch` | the other senses |
   | `Hal.RFlex.Protocol.Queue` | which command goes next, and when |
   | `Hal.RFlex.Options` | a robot's configuration, checked |
+  | `Hal.RFlex.Speeds`, `.Reception`, `.Counters`, `.Schedule` | the driver's parts: what it tells the wheels, what it hears, what it counts, and when |
   | `Hal.RFlex.PowerSwitch` | the phrase after which the controller cuts the power |
 
   There is no vendor document: the facts are what public drivers do. Where those are unsure the

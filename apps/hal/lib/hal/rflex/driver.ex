@@ -51,19 +51,16 @@ defmodule Hal.RFlex.Driver do
   switched off and on; one that sends nothing at all for 2 s is the error `:silent`.
   """
   @behaviour Hal.Drive
-  alias Hal.{Event, Serial, Twist}
-  alias Hal.Drive.SlewLimiter
-  alias Hal.RFlex.{Commands, Options, Outlook, Readings}
+  alias Hal.{Serial, Twist}
+  alias Hal.RFlex.{Commands, Counters, Options, Outlook, Readings, Reception, Schedule, Speeds}
   alias Hal.RFlex.Protocol.{Command, Decoder, Queue}
 
   @tick_ms 50
   @repeat_ms 100
   @status_ms 500
-  @idle_ms 30
   @no_wheels_ms 500
   @again_ms 1_000
   @silent_ms 2_000
-  @tell_ms 10_000
 
   @enforce_keys [:options, :line, :ref, :queue, :ramp, :senses, :heard_ms, :bytes_ms, :stepped_ms]
   defstruct @enforce_keys ++
@@ -124,23 +121,16 @@ defmodule Hal.RFlex.Driver do
   """
   @impl Hal.Drive
   def explain(:silent, options) do
-    "#{name(options)}: the base does not report its wheels (is it on, its cable right, its speed " <>
+    "#{Options.line_name(options)}: the base does not report its wheels (is it on, its cable right, its speed " <>
       "#{options[:speed] || 115_200} baud?)"
   end
 
-  def explain(reason, options), do: Serial.explain(reason, name(options))
+  def explain(reason, options), do: Serial.explain(reason, Options.line_name(options))
 
   @impl Hal.Drive
   def drive(twist, s) do
     at_ms = now(s)
-
-    s =
-      case SlewLimiter.check(twist) do
-        :ok -> %{s | wanted: twist}
-        {:error, _line} -> refuse(s)
-      end
-
-    s |> step(at_ms) |> say(at_ms) |> pump(at_ms)
+    s |> Speeds.want(twist) |> Speeds.say(at_ms) |> pump(at_ms)
   end
 
   @impl Hal.Drive
@@ -152,7 +142,7 @@ defmodule Hal.RFlex.Driver do
 
   def handle_message(message, s) do
     case Serial.handle(s.line, message) do
-      {:data, bytes} -> hear(s, bytes, now(s))
+      {:data, bytes} -> hear(Reception.bytes(s, bytes, now(s)))
       {:error, reason} -> {:error, reason, s}
       :unknown -> {:ok, [], s}
     end
@@ -161,7 +151,7 @@ defmodule Hal.RFlex.Driver do
   @impl Hal.Drive
   def terminate(s) do
     # Kept where the device's next opening finds it: odometry that begins again would be a leap.
-    Process.put({__MODULE__, name(s.options)}, {s.senses.odometry, s.senses.frame})
+    Process.put({__MODULE__, Options.line_name(s.options)}, {s.senses.odometry, s.senses.frame})
     Serial.last_words(s.line, Commands.farewell(s.options))
     Serial.close(s.line)
   end
@@ -171,12 +161,7 @@ defmodule Hal.RFlex.Driver do
   `ghosts`, packets `unknown` or `malformed`, wheel reports `dropped`, counter `jumps`, speeds `refused`, …
   """
   @spec counts(t()) :: %{atom() => non_neg_integer()}
-  def counts(%__MODULE__{} = s) do
-    s.decoder
-    |> Map.take([:packets, :skipped, :given_up, :ghosts])
-    |> Map.merge(Readings.counts(s.senses))
-    |> Map.merge(%{refused: s.refused, overruns: s.overruns})
-  end
+  defdelegate counts(driver), to: Counters
 
   defp start(options, line) do
     {m, f, a} = options.clock
@@ -185,7 +170,9 @@ defmodule Hal.RFlex.Driver do
     Process.send_after(self(), {__MODULE__, ref, :tick}, 0)
 
     # A process that begins knows of no way before: what it counts from now on is a frame of its own.
-    {before, frame} = Process.delete({__MODULE__, name(options)}) || {nil, make_ref()}
+    {before, frame} =
+      Process.delete({__MODULE__, Options.line_name(options)}) || {nil, make_ref()}
+
     queue = Enum.reduce(Commands.first_words(options), Queue.new(options.pace_ms), &put/2)
     queue = Queue.stop(put({:brake, Command.brake()}, queue), Commands.stop(options))
 
@@ -199,63 +186,20 @@ defmodule Hal.RFlex.Driver do
       heard_ms: at_ms,
       bytes_ms: at_ms,
       stepped_ms: at_ms,
-      due: %{speed: at_ms + @repeat_ms, setup: at_ms + @again_ms, tell: at_ms + @tell_ms}
+      due: %{
+        speed: at_ms + Speeds.repeat_ms(),
+        setup: at_ms + @again_ms,
+        tell: at_ms + Counters.tell_ms()
+      }
     }
   end
 
-  defp name(%Options{} = options), do: options.port || options.serial[:pty]
-  defp name(options), do: options[:port] || options[:serial][:pty]
-
   defp put({key, bytes}, queue), do: Queue.put(queue, key, bytes)
-
-  defp refuse(s), do: %{s | wanted: Twist.zero(), refused: s.refused + 1}
-
-  # What the wheels are to do now.
-  defp step(s, at_ms) do
-    s = if at_ms - s.stepped_ms >= pause_ms(s), do: stood(s), else: s
-    wanted = if known?(s), do: s.wanted, else: Twist.zero()
-    {_twist, ramp} = SlewLimiter.step(s.ramp, wanted, (at_ms - s.stepped_ms) / 1000)
-    %{s | ramp: ramp, stepped_ms: at_ms}
-  end
-
-  # Whoever was away for so long comes back to a line that has said its last words.
-  defp pause_ms(s), do: s.options.serial[:keep_alive_ms] || 200
-
-  defp stood(s), do: %{s | ramp: SlewLimiter.standing(s.ramp), said: nil, released?: false}
-
-  defp known?(%{options: %{conversions: conversions}}),
-    do: conversions.distance != nil and conversions.angle != nil
-
-  defp say(%{ramp: %{twist: twist}, said: twist} = s, at_ms) do
-    if due?(s, :speed, at_ms), do: say_speed(s, at_ms), else: s
-  end
-
-  defp say(s, at_ms), do: say_speed(s, at_ms)
-
-  defp say_speed(%{ramp: %{twist: twist}} = s, at_ms) do
-    queue =
-      if Twist.zero?(twist) do
-        Queue.stop(s.queue, Commands.stop(s.options))
-      else
-        before = s.said || Twist.zero()
-        Enum.reduce(Commands.speed(s.options, twist, before), release(s), &put/2)
-      end
-
-    again(
-      %{s | queue: queue, said: twist, released?: not Twist.zero?(twist) or s.released?},
-      :speed,
-      at_ms,
-      @repeat_ms
-    )
-  end
-
-  defp release(%{released?: true, senses: %{brake: brake}} = s) when brake != true, do: s.queue
-  defp release(s), do: Queue.put(s.queue, :brake, Command.release())
 
   defp tick(s, at_ms) do
     Process.send_after(self(), {__MODULE__, s.ref, :tick}, @tick_ms)
-    {readings, s} = idle(s, at_ms)
-    s = s |> step(at_ms) |> say(at_ms) |> ask(at_ms) |> set_up(at_ms) |> tell(at_ms)
+    {readings, s} = Reception.idle(s, at_ms)
+    s = s |> Speeds.say(at_ms) |> ask(at_ms) |> set_up(at_ms) |> Counters.tell(at_ms)
     {standing, s} = standing(s, at_ms)
 
     with :ok <- alive(s, at_ms),
@@ -264,22 +208,13 @@ defmodule Hal.RFlex.Driver do
          do: {:ok, readings ++ standing, s}
   end
 
-  defp idle(s, at_ms) do
-    if Decoder.waiting?(s.decoder) and at_ms - s.bytes_ms >= @idle_ms do
-      {packets, decoder} = Decoder.idle(s.decoder)
-      take(packets, %{s | decoder: decoder}, at_ms)
-    else
-      {[], s}
-    end
-  end
-
   defp ask(s, at_ms) do
     s =
-      if due?(s, :status, at_ms),
+      if Schedule.due?(s, :status, at_ms),
         do: put_again(s, :status, Command.status(), at_ms, @status_ms),
         else: s
 
-    if s.options.joystick and due?(s, :joystick, at_ms),
+    if s.options.joystick and Schedule.due?(s, :joystick, at_ms),
       do: put_again(s, :joystick, Command.joystick(), at_ms, @repeat_ms),
       else: s
   end
@@ -287,35 +222,18 @@ defmodule Hal.RFlex.Driver do
   defp set_up(s, at_ms) do
     wheels? = s.senses.motor_ms != nil and at_ms - s.senses.motor_ms < @no_wheels_ms
 
-    if not wheels? and due?(s, :setup, at_ms) do
+    if not wheels? and Schedule.due?(s, :setup, at_ms) do
       queue = Enum.reduce(Commands.first_words(s.options), s.queue, &put/2)
-      again(%{s | queue: queue}, :setup, at_ms, @again_ms)
+      Schedule.again(%{s | queue: queue}, :setup, at_ms, @again_ms)
     else
       s
     end
   end
 
   defp standing(s, at_ms) do
-    if at_ms - s.heard_ms < @no_wheels_ms and due?(s, :standing, at_ms),
-      do: {Readings.standing(s.senses), again(s, :standing, at_ms, @repeat_ms)},
+    if at_ms - s.heard_ms < @no_wheels_ms and Schedule.due?(s, :standing, at_ms),
+      do: {Readings.standing(s.senses), Schedule.again(s, :standing, at_ms, @repeat_ms)},
       else: {[], s}
-  end
-
-  defp tell(s, at_ms) do
-    if due?(s, :tell, at_ms) do
-      counts = counts(s)
-      lost = Map.drop(counts, [:packets])
-
-      if lost != s.told,
-        do:
-          Event.execute([:hal, :rflex, :lost], Map.put(counts, :at_ms, at_ms), %{
-            port: name(s.options)
-          })
-
-      again(%{s | told: lost}, :tell, at_ms, @tell_ms)
-    else
-      s
-    end
   end
 
   defp alive(s, at_ms),
@@ -332,28 +250,7 @@ defmodule Hal.RFlex.Driver do
   defp lost(_s, :overrun), do: :ok
   defp lost(s, reason), do: {:error, reason, s}
 
-  defp hear(s, bytes, at_ms) do
-    {packets, decoder} = Decoder.feed(s.decoder, bytes)
-    {readings, s} = take(packets, %{s | decoder: decoder, bytes_ms: at_ms}, at_ms)
-    {:ok, readings, s}
-  end
-
-  # Noise is no sign of a controller.
-  defp take([], s, _at_ms), do: {[], s}
-
-  defp take(packets, s, at_ms) do
-    {readings, senses} = Enum.flat_map_reduce(packets, s.senses, &packet(&2, &1, at_ms))
-
-    {readings, %{s | senses: senses, heard_ms: at_ms}}
-  end
-
-  defp packet(senses, packet, at_ms) do
-    {readings, heard} = Readings.packet(senses, packet, at_ms)
-
-    if Readings.jumps(heard) > Readings.jumps(senses),
-      do: Readings.reframe(readings, heard, make_ref()),
-      else: {readings, heard}
-  end
+  defp hear({readings, s}), do: {:ok, readings, s}
 
   defp pump(s, at_ms) do
     case Queue.take(s.queue, at_ms) do
@@ -376,12 +273,8 @@ defmodule Hal.RFlex.Driver do
 
   defp wait(s, _ms), do: s
 
-  defp due?(s, what, at_ms), do: at_ms >= Map.get(s.due, what, at_ms)
-
-  defp again(s, what, at_ms, ms), do: %{s | due: Map.put(s.due, what, at_ms + ms)}
-
   defp put_again(s, key, bytes, at_ms, ms),
-    do: again(%{s | queue: Queue.put(s.queue, key, bytes)}, key, at_ms, ms)
+    do: Schedule.again(%{s | queue: Queue.put(s.queue, key, bytes)}, key, at_ms, ms)
 
   defp now(%{options: %{clock: {m, f, a}}}), do: apply(m, f, a)
 end

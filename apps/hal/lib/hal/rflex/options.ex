@@ -110,6 +110,11 @@ defmodule Hal.RFlex.Options do
     port ++ [speed: options[:speed]] ++ options[:serial]
   end
 
+  @doc "What people know the line by: its device, or the link of its pseudo-terminal."
+  @spec line_name(t() | keyword()) :: String.t() | nil
+  def line_name(%__MODULE__{} = options), do: options.port || options.serial[:pty]
+  def line_name(options), do: options[:port] || options[:serial][:pty]
+
   @doc false
   def profile(kind) when kind in [:magellan, :atrv_mini], do: {:ok, apply(Profile, kind, [])}
   def profile(other), do: is_struct(other, Profile)

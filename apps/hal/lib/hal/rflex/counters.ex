@@ -1,0 +1,41 @@
+defmodule Hal.RFlex.Counters do
+  @moduledoc """
+  What went wrong on a driver's line since it was opened, counted and told.
+  """
+  alias Hal.Event
+  alias Hal.RFlex.{Driver, Options, Readings, Schedule}
+
+  @tell_ms 10_000
+
+  @doc "How often it is told, in milliseconds."
+  @spec tell_ms() :: pos_integer()
+  def tell_ms, do: @tell_ms
+
+  @doc "The counts (`Hal.RFlex.Driver.counts/1`)."
+  @spec counts(Driver.t()) :: %{atom() => non_neg_integer()}
+  def counts(s) do
+    s.decoder
+    |> Map.take([:packets, :skipped, :given_up, :ghosts])
+    |> Map.merge(Readings.counts(s.senses))
+    |> Map.merge(%{refused: s.refused, overruns: s.overruns})
+  end
+
+  @doc "Tells by an event, every 10 s, what has been lost or refused since."
+  @spec tell(Driver.t(), integer()) :: Driver.t()
+  def tell(s, at_ms) do
+    if Schedule.due?(s, :tell, at_ms) do
+      counts = counts(s)
+      lost = Map.drop(counts, [:packets])
+
+      if lost != s.told,
+        do:
+          Event.execute([:hal, :rflex, :lost], Map.put(counts, :at_ms, at_ms), %{
+            port: Options.line_name(s.options)
+          })
+
+      Schedule.again(%{s | told: lost}, :tell, at_ms, @tell_ms)
+    else
+      s
+    end
+  end
+end
