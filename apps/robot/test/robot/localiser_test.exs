@@ -50,6 +50,7 @@ defmodule Robot.LocaliserTest do
     colour: "Y",
     at: {4.0, 0.0},
     sd: {0.05, 0.05, 0.0},
+    common: {0.0, 0.0},
     reference?: true,
     radius: 0.15
   }
@@ -59,6 +60,7 @@ defmodule Robot.LocaliserTest do
     colour: "R",
     at: {2.5, 0.8},
     sd: {0.05, 0.05, 0.0},
+    common: {0.0, 0.0},
     reference?: true,
     radius: 0.2
   }

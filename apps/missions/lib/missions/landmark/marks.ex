@@ -36,12 +36,16 @@ defmodule Missions.Landmark.Marks do
     # In an order that does not depend on the VM, because each correction changes the next.
     robots =
       for {id, peer} <- Enum.sort(percept.peers) do
+        at = Pose.point(if id == anchor.leader, do: leader, else: peer.pose)
+        spread = spread(id, peer, anchor)
+
         %{
           key: {:robot, id},
           kind: :robot,
           colour: @robot_colour,
-          at: Pose.point(if id == anchor.leader, do: leader, else: peer.pose),
-          sd: spread(id, peer, anchor),
+          at: at,
+          sd: spread,
+          common: Anchors.common(spread, at, Pose.point(leader)),
           reference?: id in ahead and standing?(peer) and told?(id, peer, anchor),
           radius: peer.radius
         }
@@ -60,6 +64,7 @@ defmodule Missions.Landmark.Marks do
         colour: mission.colour,
         at: SlotPoses.landmark(anchor),
         sd: landmark_spread(anchor),
+        common: {0.0, 0.0},
         reference?: true,
         radius: LandmarkTrack.radius()
       }

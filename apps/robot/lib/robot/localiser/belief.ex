@@ -10,6 +10,7 @@ defmodule Robot.Localiser.Belief do
   | slip | by which share the robot turns farther to the left than its wheels say, and less far to the right (R74) |
   | two scales | by which share distances come out too long: by the size of the landmark, by the width of a robot |
   | slip of the leader | the same of the robot in whose frame the pose is, as far as nobody knows it there |
+  | common error | what is wrong with the places of all robots ahead alike, in standard deviations; never estimated |
   | x, y of each mark | how far a thing that was told is from where it was told to be |
 
   `drift` is by what it has come away from its own former self by odometry alone, which is what matters to those whose
@@ -17,16 +18,20 @@ defmodule Robot.Localiser.Belief do
   what slips in each of them alike.
 
   With the last state, a mark that is seen a thousand times makes nobody surer than its own place is: Smith, Self
-  and Cheeseman 1990. Odometry: Siegwart and Nourbakhsh 2004. What is farther off than three standard
-  deviations is not believed (Bar-Shalom, Li and Kirubarajan 2001).
+  and Cheeseman 1990. Robots ahead that found their places by each other are no independent witnesses: their common error
+  is a state that no measurement corrects and nobody becomes surer of (consider filter: Schmidt 1966, Jazwinski 1970), so
+  that however many of them are seen, the pose is as unsure as what they have in common. Odometry: Siegwart and
+  Nourbakhsh 2004. What is farther off than three standard deviations is not believed (Bar-Shalom, Li and Kirubarajan
+  2001).
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Consistency, Covariance}
 
-  # x, y, heading, slip, the scales of the landmark and of robots, the leader's slip.
+  # x, y, heading, slip, the scales of the landmark and of robots, the leader's slip, the common error.
   @slip_sd 0.055
-  @start_sd [0.03, 0.03, 0.02, @slip_sd, 0.06, 0.08, 0.0]
+  @start_sd [0.03, 0.03, 0.02, @slip_sd, 0.06, 0.08, 0.0, 1.0]
   @own length(@start_sd)
+  @common @own - 1
   # Variances of odometry: of a metre driven, along it (m2) and in angle (rad2), and of a radian turned. They
   # grow with the way, however many steps it is told in.
   @way_variance 1.0e-5
@@ -45,6 +50,8 @@ defmodule Robot.Localiser.Belief do
   @marks 6
   # A thing that was told to be so far from before is another one, in metres.
   @elsewhere 1.0
+  # What does not change with the position has no direction.
+  @no_way 1.0e-9
   # A thing whose place is known better than by this share of what was known, says something new.
   @surer 0.75
 
@@ -199,7 +206,7 @@ defmodule Robot.Localiser.Belief do
   def shifted(belief, {x, y}, way, sd) do
     {v, variance} = Covariance.project(belief.covariance, [x, y])
     s = variance + sd * sd
-    believe(belief, v, way / s, Covariance.reduce(belief.covariance, v, s))
+    believe(belief, v, way / s, reduce(belief.covariance, v, s))
   end
 
   @doc "The variance of what is measured of the pose alone, whose value changes so with x, y and heading."
@@ -210,24 +217,37 @@ defmodule Robot.Localiser.Belief do
   end
 
   @doc """
-  Where a thing is that was told to be at `at`, known by `spread`: there, as long as nobody has seen it, and then
-  where it was seen to be.
+  The variance of what is measured between the pose and a mark, as it was told: what both have in common does not
+  count. The value changes so with x, y and heading, and as much the other way with the mark's place.
   """
-  @spec meet(t(), key :: term(), Pose.point(), Anchors.spread()) :: {t(), Pose.point()}
-  def meet(belief, key, {x, y} = at, spread) do
+  @spec variance(t(), {float(), float(), float()}, Anchors.mark()) :: float()
+  def variance(belief, {a, b, c}, %{sd: spread, common: {x, y}}) do
+    {v, own} = Covariance.project(belief.covariance, [a, b, c])
+    way = max(:math.sqrt(a * a + b * b), @no_way)
+    told = way * way * Anchors.variance(spread, {a / way, b / way})
+    max(own + told - 2 * (a * x + b * y) * Enum.at(v, @common), 0.0)
+  end
+
+  @doc """
+  Where a thing is that was told to be at `at`, known by `spread`, of which it has `common` in common with all robots
+  (`Robot.Localiser.Anchors.common/3`): there, as long as nobody has seen it, and then where it was seen to be.
+  """
+  @spec meet(t(), key :: term(), Pose.point(), Anchors.spread(), common :: Pose.point()) ::
+          {t(), Pose.point()}
+  def meet(belief, key, {x, y} = at, spread, common \\ {0.0, 0.0}) do
     {worst, least, _direction} = spread
     sd = :math.sqrt((worst * worst + least * least) / 2)
 
     case Enum.find_index(belief.marks, &(&1.key == key)) do
       nil ->
-        {add(belief, key, at, spread, sd), at}
+        {add(belief, key, at, spread, sd, common), at}
 
       index ->
         mark = Enum.at(belief.marks, index)
         moved = Pose.distance(mark.told, at)
 
         if moved > @elsewhere or sd < @surer * mark.sd do
-          {belief |> drop(index) |> add(key, at, spread, sd), at}
+          {belief |> drop(index) |> add(key, at, spread, sd, common), at}
         else
           {tell(belief, index, mark, at, sd, moved * moved), shift({x, y}, mark.off)}
         end
@@ -249,18 +269,20 @@ defmodule Robot.Localiser.Belief do
     }
   end
 
-  defp add(%{marks: marks} = belief, key, at, spread, sd) when length(marks) >= @marks do
+  defp add(%{marks: marks} = belief, key, at, spread, sd, common)
+       when length(marks) >= @marks do
     {_mark, index} = marks |> Enum.with_index() |> Enum.min_by(fn {mark, _} -> mark.used end)
-    belief |> drop(index) |> add(key, at, spread, sd)
+    belief |> drop(index) |> add(key, at, spread, sd, common)
   end
 
-  defp add(belief, key, at, spread, sd) do
+  defp add(belief, key, at, spread, sd, {common_x, common_y}) do
     {xx, xy, yy} = Anchors.covariance(spread)
     mark = %{key: key, told: at, sd: sd, off: {0.0, 0.0}, used: belief.uses}
 
     %{
       belief
-      | covariance: Covariance.append(belief.covariance, [[xx, xy], [xy, yy]]),
+      | covariance:
+          Covariance.append(belief.covariance, [[xx, xy], [xy, yy]], @common, [common_x, common_y]),
         marks: belief.marks ++ [mark],
         uses: belief.uses + 1
     }
@@ -274,9 +296,11 @@ defmodule Robot.Localiser.Belief do
     }
   end
 
-  @doc "Without marks: what they were in is over."
+  @doc "Without marks, and nothing in common with any: what they were in is over."
   @spec forget(t()) :: t()
-  def forget(%__MODULE__{marks: []} = belief), do: belief
+  def forget(%__MODULE__{marks: []} = belief),
+    do: %{belief | covariance: Covariance.replace(belief.covariance, @common, 1.0)}
+
   def forget(belief), do: belief |> drop(length(belief.marks) - 1) |> forget()
 
   @doc """
@@ -286,16 +310,23 @@ defmodule Robot.Localiser.Belief do
   @spec correct(t(), key :: term(), float(), slope(), noise :: float()) :: t()
   def correct(belief, key, error, {{a, b, c}, {k, l}}, noise) do
     index = Enum.find_index(belief.marks, &(&1.key == key))
-    slope = [a, b, c, 0.0, k, l, 0.0] ++ List.duplicate(0.0, 2 * index) ++ [-a, -b]
+    slope = [a, b, c, 0.0, k, l, 0.0, 0.0] ++ List.duplicate(0.0, 2 * index) ++ [-a, -b]
     {v, variance} = Covariance.project(belief.covariance, slope)
     s = variance + noise
 
     if s <= 0.0 or error * error > @gate * s,
       do: refuse(belief),
-      else: believe(belief, v, error / s, Covariance.reduce(belief.covariance, v, s))
+      else: believe(belief, v, error / s, reduce(belief.covariance, v, s))
   end
 
-  defp believe(belief, [x, y, heading, slip, k, l, leader | marks], share, covariance) do
+  # The gain of the common error is left at nothing: covariances with it fall, its variance does not.
+  defp reduce(covariance, v, s) do
+    covariance
+    |> Covariance.reduce(v, s)
+    |> List.update_at(@common, &List.replace_at(&1, @common, 1.0))
+  end
+
+  defp believe(belief, [x, y, heading, slip, k, l, leader, _common | marks], share, covariance) do
     %{pose: pose, scales: {landmark, robot}} = belief
 
     %{

@@ -73,12 +73,10 @@ defmodule Robot.Localiser.Consistency do
   end
 
   # The direction of a thing is as unsure as the places of both, across the line between them.
-  defp bearing_sd(belief, exposed, %{at: {x, y}, sd: sd}) do
+  defp bearing_sd(belief, exposed, %{at: {x, y}} = mark) do
     {dx, dy} = {x - exposed.x, y - exposed.y}
     square = max(dx * dx + dy * dy, 0.09)
-    length = :math.sqrt(square)
-    own = Belief.variance(belief, {dy / square, -dx / square, -1.0})
-    other = Anchors.variance(sd, {-dy / length, dx / length}) / square
-    :math.atan(:math.sqrt(max(own + other, 0.0)))
+    variance = Belief.variance(belief, {dy / square, -dx / square, -1.0}, mark)
+    :math.atan(:math.sqrt(variance))
   end
 end

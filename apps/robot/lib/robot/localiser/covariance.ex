@@ -3,7 +3,7 @@ defmodule Robot.Localiser.Covariance do
   A covariance matrix as a list of its rows, and the operations of an extended Kalman filter on
   it. Pure.
 
-  Sizes stay below 20, so that lists are as fast as anything.
+  No matrix has more than 20 rows, so that lists are as fast as anything.
   """
 
   @type t :: [[float()]]
@@ -51,16 +51,20 @@ defmodule Robot.Localiser.Covariance do
   end
 
   @doc """
-  With new states of this covariance behind the others, correlated with none of them.
+  With new states of this covariance behind the others. Each of them changes by its share of `shares` with the state
+  `index`, and is correlated with the others by that only.
 
-      iex> Robot.Localiser.Covariance.append([[1.0]], [[0.25]])
+      iex> Robot.Localiser.Covariance.append([[1.0]], [[0.25]], 0, [0.0])
       [[1.0, 0.0], [0.0, 0.25]]
+      iex> Robot.Localiser.Covariance.append([[4.0, 1.0], [1.0, 1.0]], [[0.25]], 1, [0.5])
+      [[4.0, 1.0, 0.5], [1.0, 1.0, 0.5], [0.5, 0.5, 0.25]]
   """
-  @spec append(t(), new :: t()) :: t()
-  def append(p, new) do
-    beside = List.duplicate(0.0, length(new))
-    above = List.duplicate(0.0, length(p))
-    Enum.map(p, &(&1 ++ beside)) ++ Enum.map(new, &(above ++ &1))
+  @spec append(t(), new :: t(), index :: non_neg_integer(), shares :: [float()]) :: t()
+  def append(p, new, index, shares) do
+    with_it = Enum.at(p, index)
+    above = for {row, x} <- Enum.zip(p, with_it), do: row ++ Enum.map(shares, &(&1 * x))
+    below = for {row, k} <- Enum.zip(new, shares), do: Enum.map(with_it, &(k * &1)) ++ row
+    above ++ below
   end
 
   @doc """

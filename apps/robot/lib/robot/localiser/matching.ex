@@ -111,17 +111,17 @@ defmodule Robot.Localiser.Matching do
   end
 
   # How far off, in direction and distance, it may be seen.
-  defp sds(%{at: {x, y}, sd: sd}, distance, belief, exposed) do
+  defp sds(%{at: {x, y}} = mark, distance, belief, exposed) do
     {dx, dy} = {x - exposed.x, y - exposed.y}
     square = max(distance * distance, 0.09)
     length = max(distance, 0.01)
     {x, y} = {dx / length, dy / length}
-    across = Belief.variance(belief, {dy / square, -dx / square, -1.0})
-    along = Belief.variance(belief, {-x, -y, 0.0})
-    bearing = across + Anchors.variance(sd, {-y, x}) / square + @bearing_sd * @bearing_sd / 4
+    across = Belief.variance(belief, {dy / square, -dx / square, -1.0}, mark)
+    along = Belief.variance(belief, {-x, -y, 0.0}, mark)
+    bearing = across + @bearing_sd * @bearing_sd / 4
 
     # However unsure it is of its place, a thing in front of it is not seen behind it.
-    {:math.atan(root(bearing)), root(along + Anchors.variance(sd, {x, y}))}
+    {:math.atan(root(bearing)), root(along)}
   end
 
   # Rounding takes a variance of nothing below it.

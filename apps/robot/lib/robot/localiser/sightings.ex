@@ -120,17 +120,15 @@ defmodule Robot.Localiser.Sightings do
 
   # The variances of where it is, towards the thing and across. What is measured of a thing is not a straight line over
   # where the robot may be: what it bends by there counts as noise (second-order filter, Bar-Shalom, Li and Kirubarajan 2001).
-  defp spread(belief, %{sd: sd}, {dx, dy, distance}) do
+  defp spread(belief, mark, {dx, dy, distance}) do
     {x, y} = {dx / distance, dy / distance}
-
-    {Belief.variance(belief, {x, y, 0.0}) + Anchors.variance(sd, {x, y}),
-     Belief.variance(belief, {-y, x, 0.0}) + Anchors.variance(sd, {-y, x})}
+    {Belief.variance(belief, {x, y, 0.0}, mark), Belief.variance(belief, {-y, x, 0.0}, mark)}
   end
 
   # The way from where the picture was taken to where the thing is by now believed to be.
   defp meet(belief, {_percept, back}, mark, far) do
     exposed = exposed(belief, back)
-    {belief, {x, y}} = Belief.meet(belief, mark.key, mark.at, place_sd(mark, far))
+    {belief, {x, y}} = Belief.meet(belief, mark.key, mark.at, place_sd(mark, far), mark.common)
     {dx, dy} = {x - exposed.x, y - exposed.y}
     {belief, exposed, {dx, dy, max(:math.sqrt(dx * dx + dy * dy), 0.1)}}
   end

@@ -95,10 +95,43 @@ defmodule Robot.Localiser.BeliefTest do
       end)
 
     assert Enum.map(belief.marks, & &1.key) |> Enum.sort() == [16, 17, 18, 19, 20, :first]
-    assert length(belief.covariance) == 7 + 2 * 6
-    assert Enum.all?(belief.covariance, &(length(&1) == 19))
+    assert length(belief.covariance) == 8 + 2 * 6
+    assert Enum.all?(belief.covariance, &(length(&1) == 20))
     assert Belief.forget(belief).marks == []
-    assert length(Belief.forget(belief).covariance) == 7
+    assert length(Belief.forget(belief).covariance) == 8
+  end
+
+  test "robots that are wrong alike are no independent witnesses, however many are seen" do
+    start =
+      Enum.reduce(1..9, Belief.new(Pose.new(0, 0)), fn _, belief -> Belief.doubt(belief) end)
+
+    # Twenty robots, so that each is forgotten and told anew many times, seen ten times each.
+    see = fn common ->
+      Enum.reduce(1..200, start, fn k, belief ->
+        {belief, _} = Belief.meet(belief, rem(k, 20), {2.0, 0.0}, all_round(0.1), common)
+        Belief.correct(belief, rem(k, 20), 0.0, {{0.0, 1.0, 0.0}, {0.0, 0.0}}, 1.0e-4)
+      end)
+    end
+
+    sd = fn belief -> :math.sqrt(Belief.variance(belief, {0.0, 1.0, 0.0})) end
+    assert sd.(see.({0.0, 0.0})) < 0.03
+    assert sd.(see.({0.0, 0.08})) > 0.08
+    assert sd.(see.({0.0, 0.08})) < 0.1
+    # Along x they may be wrong alike as they like: across, they are independent.
+    assert sd.(see.({0.08, 0.0})) < 0.03
+
+    # Where it stands beside them is known as well as if they were right.
+    mark = %{sd: all_round(0.1), common: {0.0, 0.08}}
+    between = Belief.variance(see.({0.0, 0.08}), {0.0, 1.0, 0.0}, mark)
+    assert :math.sqrt(between) < 0.08
+    # A heading alone is as unsure as it is.
+    assert_in_delta Belief.variance(start, {0.0, 0.0, 1.0}, mark),
+                    Belief.variance(start, {0.0, 0.0, 1.0}),
+                    1.0e-9
+
+    # In another frame it has nothing in common with anybody.
+    apart = Belief.variance(Belief.forget(see.({0.0, 0.08})), {0.0, 1.0, 0.0}, mark)
+    assert :math.sqrt(apart) > 0.12
   end
 
   test "what turns about somebody moves on an arc: that is unsure towards it, too" do

@@ -17,6 +17,7 @@ defmodule Robot.Localiser.ConsistencyTest do
       colour: "R",
       at: at,
       sd: {sd, sd, 0.0},
+      common: {0.0, 0.0},
       reference?: true,
       radius: radius
     }

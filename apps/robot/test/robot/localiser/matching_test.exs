@@ -17,6 +17,7 @@ defmodule Robot.Localiser.MatchingTest do
           colour: "R",
           at: at,
           sd: {0.05, 0.05, 0.0},
+          common: {0.0, 0.0},
           reference?: true,
           radius: 0.2
         },

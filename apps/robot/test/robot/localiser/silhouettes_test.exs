@@ -18,6 +18,7 @@ defmodule Robot.Localiser.SilhouettesTest do
                 colour: "R",
                 at: {1.0 * n, 0.0},
                 sd: {0.05, 0.05, 0.0},
+                common: {0.0, 0.0},
                 reference?: true,
                 radius: @radius
               }
