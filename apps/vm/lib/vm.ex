@@ -8,9 +8,9 @@ defmodule Vm do
       Vm.signal(one, "STOP")
 
   `start/1` controls them by `:peer`, over standard input and output, which nothing that happens to a network
-  touches. They end when the process that started them ends, and with this VM, however that ends: a small program
-  (`c_src/leash.c`) asks the kernel to kill them then, frozen or not. `open/2` starts a VM that its caller controls
-  itself, behind a port.
+  touches. Once they have started, they end when the process that started them ends, and with this VM, however that
+  ends: a small program (`c_src/leash.c`) asks the kernel to kill them then, frozen or not. `open/2` starts a VM that
+  its caller controls itself, behind a port.
   """
 
   @boot_ms 60_000

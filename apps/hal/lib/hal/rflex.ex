@@ -1,8 +1,8 @@
 defmodule Hal.RFlex do
   @moduledoc """
   The byte protocol of the rFLEX motion controller (Magellan Pro, ATRV mini, B21r): frames,
-  commands, reports, and what they mean in metres and radians. All of it is pure; the process and
-  the line belong to `Hal.RFlex.Driver`.
+  commands, reports, and what they mean in metres and radians. All of it is pure but the driver's
+  parts; the process and the line belong to `Hal.RFlex.Driver`.
 
   | module | subject |
   |---|---|

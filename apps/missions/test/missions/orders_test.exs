@@ -125,7 +125,8 @@ defmodule Swarm.OrdersTest do
     # A person presses again while the reset is under way.
     :ok = :sys.suspend(pilot)
     ref = :erlang.alias([:reply])
-    GenServer.cast(Names.whereis(id, :estop), {:command, :reset, ref})
+    asked = {:asked, System.monotonic_time(:microsecond)}
+    GenServer.cast(Names.whereis(id, :estop), {:command, :reset, ref, asked})
     assert Swarm.ask(id, :estop) == :ok
     :ok = :sys.resume(pilot)
     assert_receive {^ref, {:error, "orders_reset was stopped again meanwhile" <> _}}

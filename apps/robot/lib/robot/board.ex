@@ -17,6 +17,7 @@ defmodule Robot.Board do
   | `:stopped` | `:estop` | when it was stopped last, by whatever stop: `System.monotonic_time/1`, microseconds |
   | `:radio` | `:comms` | how many messages were sent, heard, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
+  | `:presses` | `:gate` | how often its own button was pressed |
   | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Safety.Reflex.frame/1` |
   | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil, tick: count}` |
   | `:goal` | `:executive` | the module of its goal's behaviour, or `nil` |
@@ -76,6 +77,7 @@ defmodule Robot.Board do
     detections: :blob_detector,
     driving: :gate,
     frame: :gate,
+    presses: :gate,
     doing: :executive,
     goal: :executive,
     pose: :executive,
@@ -126,12 +128,12 @@ defmodule Robot.Board do
   def sense(board, device, {:health, device, {condition, since_ms}}),
     do: put(board, device, {:health, device}, condition, since_ms)
 
-  def sense(board, :blob_detector, {:detections, detections}) do
-    %Detections{at_ms: at_ms} = detections
-    put(board, :blob_detector, :detections, detections, at_ms)
-  end
+  def sense(board, :blob_detector, {:detections, %Detections{at_ms: at_ms} = detections}),
+    do: put(board, :blob_detector, :detections, detections, at_ms)
 
-  # What only a driver of its own knows is nobody's here, and no reason for it to fall.
+  def sense(_board, _device, {:detections, _malformed}), do: :ok
+
+  # What only a driver of its own knows is nobody's here, and no reason for it to crash.
   def sense(board, device, {key, value}) do
     if writer(key), do: put(board, device, key, value, now(board)), else: :ok
   end

@@ -16,7 +16,8 @@ defmodule Robot.Config do
     * `:companions` - `[{module, options}]`, each a `Robot.Companion`
     * `:send` - `{m, f, a}`; what the mission says goes to `apply(m, f, a ++ [to, message])`; or
       `nil`: nobody hears it
-    * `:on_latch` - `{m, f, a}`, applied by the gate whenever it has set or cleared its e-stop latch, or `nil`
+    * `:on_latch` - `{m, f, a}`, applied by the gate whenever it has set or cleared its e-stop latch by
+      a button of its own, or `nil`
     * `:clock` - `{m, f, a}` giving integer milliseconds, default the monotonic time
     * `:pace` - `:clock`, or `:manual`: gate and executive act when they are sent `:step` and `:tick`
       and not by themselves, so that a test decides the order of everything

@@ -220,7 +220,8 @@ defmodule Swarm.Comms do
   # A sender that knows only the comms process reaches the e-stop process through it.
   defp command(s, request, ref, order) do
     here? = node(ref) == node()
-    stopped = EStop.stopped(s.board)
+    # The e-stop process itself knows what a reset is meant for.
+    stopped = if EStop.takes?(request), do: nil, else: EStop.stopped(s.board)
 
     case Freshness.judge(s.sender.boot, request, order, here?, now_us(), stopped) do
       {:ok, asked} ->

@@ -4,6 +4,7 @@ defmodule Swarm.MeshConsumer do
   comms processes, the terms of services go to the blackboard and the emergency stop.
   """
   alias Robot.Names
+  alias Swarm.Commands.Freshness
   alias Swarm.{Blackboard, Comms, EStop, Message, Missions}
 
   @behaviour Mesh.Consumer
@@ -54,9 +55,18 @@ defmodule Swarm.MeshConsumer do
 
   @impl Mesh.Consumer
   def command(robot, request) do
-    case Names.whereis(robot, :comms) do
-      nil -> :error
-      comms -> GenServer.cast(comms, request)
-    end
+    comms = Names.whereis(robot, :comms)
+    if comms != nil and relayed?(request), do: GenServer.cast(comms, request), else: :error
   end
+
+  # The reference is one of this node, so that only the stamp tells when an order was given.
+  defp relayed?({:stamp, ref}), do: is_reference(ref)
+
+  defp relayed?({:command, request, ref}),
+    do: is_reference(ref) and not Freshness.needed?(request)
+
+  defp relayed?({:command, _request, ref, stamp}),
+    do: is_reference(ref) and Freshness.stamp?(stamp)
+
+  defp relayed?(_other), do: false
 end

@@ -32,9 +32,26 @@ defmodule Swarm.MeshConsumerTest do
     {:ok, _} = Registry.register(Names, {:consumer1, :comms}, nil)
     assert MeshConsumer.deliver([:consumer1, :consumer_away], :b@lab, beat(:mag1)) == :ok
     assert_received {:"$gen_cast", {:hear, %Message{from: :mag1}}}
-    assert MeshConsumer.command(:consumer1, {:stamp, :ref}) == :ok
-    assert_received {:"$gen_cast", {:stamp, :ref}}
-    assert MeshConsumer.command(:consumer_away, {:stamp, :ref}) == :error
+    ref = make_ref()
+
+    for request <- [{:stamp, ref}, {:command, :stop, ref}, {:command, :start, ref, {7, 5}}] do
+      assert MeshConsumer.command(:consumer1, request) == :ok
+      assert_received {:"$gen_cast", ^request}
+      assert MeshConsumer.command(:consumer_away, request) == :error
+    end
+
+    # What only this node may say, or has no stamp: nobody knows when it was given.
+    for request <- [
+          {:stamp, :ref},
+          {:command, :start, ref},
+          {:command, :start, ref, {:asked, 5}},
+          {:command, :start, ref, nil},
+          {:in_time, :reset, ref, 5},
+          {:say, [], nil}
+        ] do
+      assert MeshConsumer.command(:consumer1, request) == :error
+      refute_received {:"$gen_cast", _any}
+    end
 
     # Another robot of this name is a rival, if it speaks for itself.
     assert MeshConsumer.deliver(:all, :b@lab, beat(:consumer1)) == :ok

@@ -67,8 +67,8 @@ defmodule Vision.View do
   def frame(view, _demand, {:health, _device, {condition, _since}}),
     do: GenServer.cast(view, {:camera, condition})
 
-  # A camera that finds blobs by itself.
-  def frame(view, demand, {:blobs, _blobs, _when}) do
+  # A camera that detects by itself.
+  def frame(view, demand, {:detections, _detections}) do
     if :atomics.get(demand, 1) == 1 and :atomics.exchange(demand, 1, 0) == 1,
       do: GenServer.cast(view, :no_frames),
       else: :ok

@@ -48,7 +48,7 @@ defmodule Mesh.Strategy.Static do
 
   def address(text) when is_binary(text) do
     with [ip, port] <- String.split(text, ":"),
-         {:ok, ip} <- :inet.parse_ipv4strict_address(String.to_charlist(ip)),
+         {:ok, ip} <- :inet.parse_ipv4strict_address(:binary.bin_to_list(ip)),
          {port, ""} when port in 1..65_535 <- Integer.parse(port) do
       {:ok, {ip, port}}
     else

@@ -20,9 +20,9 @@ defmodule Robot.Localiser.Belief do
   With the last state, a mark that is seen a thousand times makes nobody surer than its own place is: Smith, Self
   and Cheeseman 1990. Robots ahead that found their places by each other are no independent witnesses: their common error
   is a state that no measurement corrects and nobody becomes surer of (consider filter: Schmidt 1966, Jazwinski 1970), so
-  that however many of them are seen, the pose is as unsure as what they have in common. Odometry: Siegwart and
-  Nourbakhsh 2004. What is farther off than three standard deviations is not believed (Bar-Shalom, Li and Kirubarajan
-  2001).
+  that however many of them are seen as blobs, the pose is as unsure as what they have in common. A pose that was found
+  by their silhouettes counts as independent of it. Odometry: Siegwart and Nourbakhsh 2004. What is farther off than
+  three standard deviations is not believed (Bar-Shalom, Li and Kirubarajan 2001).
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Consistency, Covariance}

@@ -9,7 +9,8 @@ defmodule Robot.Safety.Gate do
 
   The e-stop latch is read at the start, so that a gate that restarts is as latched as it was.
   Only `reset/1`, a person's doing, clears it. Whenever the latch was set or cleared, by whomever, the gate applies the
-  config's `:on_latch`, so that whoever spreads the stop need not look for it.
+  config's `:on_latch`, so that whoever spreads the stop need not look for it; not where that one did it itself
+  (`tell: false`).
 
   While the drive is not armed (`Hal.Device.Arming`) the gate asks it for nothing but to stand, so that a
   robot that a person arms begins from standing, and says why it stands. In a dry run
@@ -56,10 +57,25 @@ defmodule Robot.Safety.Gate do
   def estop(robot, options \\ []),
     do: GenServer.call(Names.via(robot, :gate), {:estop, Keyword.get(options, :tell, true)})
 
-  @doc "Clears the e-stop: wishes count again. Whoever resets has looked where the robot would go. `:tell` as above."
-  @spec reset(robot :: atom(), tell: boolean()) :: :ok
-  def reset(robot, options \\ []),
-    do: GenServer.call(Names.via(robot, :gate), {:reset, Keyword.get(options, :tell, true)})
+  @doc """
+  Clears the e-stop: wishes count again. Whoever resets has looked where the robot would go. `:tell` as above. With
+  `presses:` the reset is meant for stops up to that press of the button (`:presses` on the board), and is refused if
+  there was another one.
+  """
+  @spec reset(robot :: atom(), tell: boolean(), presses: non_neg_integer()) ::
+          :ok | {:error, :pressed}
+  def reset(robot, options \\ []) do
+    {tell?, presses} = {Keyword.get(options, :tell, true), options[:presses]}
+    GenServer.call(Names.via(robot, :gate), {:reset, tell?, presses})
+  end
+
+  @doc "How often the gate's own button was pressed, which is what `estop/1` tells; 0 before the first time."
+  @spec presses(Board.t()) :: non_neg_integer()
+  def presses(board) do
+    with {:ok, presses, _at_ms} <- Board.fetch(board, :presses, :infinity),
+         do: presses,
+         else: (:error -> 0)
+  end
 
   @impl GenServer
   def init(%Config{id: id} = config) do
@@ -121,6 +137,7 @@ defmodule Robot.Safety.Gate do
     at_ms = heard(s, :estop)
     # The wheels first: the latch has a file, too, and a disk may take its time.
     Board.hold(s.board)
+    if tell?, do: Board.put(s.board, :gate, :presses, presses(s.board) + 1, at_ms)
     s = step(%{s | reflex: Reflex.estop(s.reflex)}, at_ms)
     if tell?, do: tell_latch(s)
     Board.latch(s.board)
@@ -128,12 +145,18 @@ defmodule Robot.Safety.Gate do
     {:reply, :ok, s}
   end
 
-  def handle_call({:reset, tell?}, _from, s) do
+  def handle_call({:reset, tell?, presses}, _from, s) do
+    if presses != nil and presses(s.board) > presses,
+      do: {:reply, {:error, :pressed}, s},
+      else: {:reply, :ok, cleared(s, tell?)}
+  end
+
+  defp cleared(s, tell?) do
     at_ms = heard(s, :reset)
     Board.unlatch(s.board)
     if tell?, do: tell_latch(s)
     Event.execute([:robot, :gate, :reset], %{at_ms: at_ms}, %{robot: s.config.id})
-    {:reply, :ok, %{s | reflex: Reflex.reset(s.reflex)}}
+    %{s | reflex: Reflex.reset(s.reflex)}
   end
 
   @impl GenServer

@@ -104,7 +104,7 @@ defmodule Swarm.Commands.Client do
          else: (:error -> nil)
   end
 
-  defp post(id, to, :stamp), do: cast(id, to, {:stamp}, {:stamp, id, to})
+  defp post(id, to, :stamp), do: cast(id, to, {:stamp}, {:stamp, id})
   defp post(id, to, request, nil), do: cast(id, to, {:command, request}, {:command, id})
 
   defp post(id, to, request, order),
@@ -116,8 +116,8 @@ defmodule Swarm.Commands.Client do
     order = with_ref(order, ref)
 
     case hand(to, id, order, ref) do
-      :ok ->
-        {ref, about}
+      {:ok, way} ->
+        {ref, about(about, way)}
 
       {:error, _no_way} ->
         :erlang.unalias(ref)
@@ -125,13 +125,20 @@ defmodule Swarm.Commands.Client do
     end
   end
 
+  # An order goes the way of its stamp, because only the process that made the stamp knows it.
+  defp about({:stamp, id}, way), do: {:stamp, id, way}
+  defp about(about, _way), do: about
+
   # If there is no other way, the silent connection may still work.
   defp hand({:relay, pid}, id, order, ref) do
-    with {:error, _no_way} = error <- Mesh.relay(id, order, ref),
-         do: if(pid, do: Nonblocking.cast(pid, order), else: error)
+    case Mesh.relay(id, order, ref) do
+      :ok -> {:ok, {:relay, nil}}
+      {:error, _no_way} when pid != nil -> hand(pid, id, order, ref)
+      error -> error
+    end
   end
 
-  defp hand(pid, _id, order, _ref), do: Nonblocking.cast(pid, order)
+  defp hand(pid, _id, order, _ref), do: with(:ok <- Nonblocking.cast(pid, order), do: {:ok, pid})
 
   defp with_ref({:stamp}, ref), do: {:stamp, ref}
   defp with_ref({:command, request}, ref), do: {:command, request, ref}

@@ -4,10 +4,13 @@ defmodule Swarm.Commands.Freshness do
   obey it. Pure; times are `System.monotonic_time/1` of the robot's node, in microseconds.
 
   A sender on another node first asks the robot for a stamp, which holds the robot's time. The
-  order then carries that time, minus how long the stamp took (`given/2`), so it was given at that
-  time or later. The robot refuses an order that is older than half a second, because its sender
-  no longer waits for an answer; one with a stamp of another life of the process; and one that was
-  given before the robot was last stopped.
+  order then carries that time, minus how long the stamp took beyond 50 ms (`given/2`), so it was
+  given at most 50 ms before that time. The robot refuses an order that is older than half a
+  second, because its sender no longer waits for an answer; one with a stamp of another life of the
+  process; and one that may have been given more than 50 ms before the robot was last stopped.
+
+  An order needs two round trips within that half second: over a link whose round trip takes longer
+  than some 220 ms robots can be stopped, and ordered nothing else.
 
       iex> alias Swarm.Commands.Freshness
       iex> stamp = Freshness.stamp(7, 1_000_000)
@@ -48,10 +51,12 @@ defmodule Swarm.Commands.Freshness do
   stamp is invalid.
   """
   @spec given(term(), waited_us :: non_neg_integer()) :: {:ok, stamp()} | :error
-  def given({life, at_us}, waited_us) when is_integer(life) and is_integer(at_us),
-    do: {:ok, {life, at_us - max(waited_us - @way_back_us, 0)}}
-
-  def given(_other, _waited_us), do: :error
+  def given(stamp, waited_us) do
+    with true <- stamp?(stamp),
+         {life, at_us} = stamp,
+         do: {:ok, {life, at_us - max(waited_us - @way_back_us, 0)}},
+         else: (false -> :error)
+  end
 
   @doc """
   Whether a request needs a stamp. A stop is obeyed at any age, and questions are harmless.
@@ -63,11 +68,15 @@ defmodule Swarm.Commands.Freshness do
   def needed?({:estop, _call}), do: false
   def needed?(request), do: request not in [:stop, :disarm, :estop, :status, :ping]
 
+  @doc "Whether a term from outside can be a stamp."
+  @spec stamp?(term()) :: boolean()
+  def stamp?({life, at_us}), do: is_integer(life) and is_integer(at_us)
+  def stamp?(_other), do: false
+
   @doc """
-  Whether a process of this life obeys a request now, and when the request was given, if that is
-  known here, else now. `stopped_us` is when the robot was last stopped, `nil` if never. `here?`
-  says whether the order was given on this node; then it carries `{:asked, at_us}`, or nothing if
-  it was not queued on the way.
+  Whether a process of this life obeys a request now, and when the request was given; now, if it
+  needs no stamp. `stopped_us` is when the robot was last stopped, `nil` if never. `here?` says
+  whether the order was given on this node; then it carries `{:asked, at_us}`.
 
       iex> alias Swarm.Commands.Freshness
       iex> Freshness.judge(7, :start, {:asked, 1_000_000}, true, 1_200_000, 900_000)
@@ -94,7 +103,6 @@ defmodule Swarm.Commands.Freshness do
   defp judge(life, order, here?, now_us, stopped_us) do
     case order do
       {:asked, at_us} when here? -> check(life, {life, at_us}, now_us, stopped_us)
-      nil when here? -> {:ok, now_us}
       order -> check(life, order, now_us, stopped_us)
     end
   end

@@ -14,6 +14,8 @@ defmodule Swarm.EStop.Actions do
   # The caller waits for half a second (`Swarm.Commands.Client`): a robot whose release nobody
   # would hear of stays held.
   @release_us 400_000
+  # For so long a button that is pressed while the robot is stopped makes no further call.
+  @anew_us 1_000_000
 
   @typedoc """
   `pressed` identifies the last time that somebody stopped it, at `pressed_us`; `reset_us` is when
@@ -27,6 +29,8 @@ defmodule Swarm.EStop.Actions do
           :pressed => reference(),
           :pressed_us => integer() | nil,
           :reset_us => integer() | nil,
+          :presses => non_neg_integer(),
+          :sounded_us => integer() | nil,
           optional(atom()) => term()
         }
 
@@ -74,9 +78,7 @@ defmodule Swarm.EStop.Actions do
       Nonblocking.answer(ref, {:error, "#{s.id} was stopped meanwhile; reset it again"})
       follow(s)
     else
-      s = released(s, given_us)
-      Nonblocking.answer(ref, :ok)
-      s
+      release(s, {ref, given_us})
     end
   end
 
@@ -125,16 +127,44 @@ defmodule Swarm.EStop.Actions do
 
   # Robots hear of a stop from their neighbours' heartbeats, too; but only a call says when it was
   # made, and a robot that is being reset at this moment must know that.
-  defp press(s, stop) do
+  defp press(%{stop: before} = s, stop) do
     s = become(pressed(s), stop)
-    call = Broadcaster.sound()
-    write(%{s | stop: EStop.State.late(s.stop, call)})
+
+    # A button that is pressed again and again is one stop to the others.
+    if before.latched? and s.sounded_us != nil and now_us() - s.sounded_us < @anew_us do
+      s
+    else
+      call = Broadcaster.sound()
+      write(%{s | stop: EStop.State.late(s.stop, call), sounded_us: now_us()})
+    end
   end
 
-  @doc "Handles the report that the gate is released, by a reset that was given then."
-  @spec released(t(), given_us :: integer()) :: t()
-  def released(s, given_us) do
-    :ok = Gate.reset(s.id, tell: false)
+  @doc "A neighbour's heartbeat carries the number of its stop, and whether it is latched."
+  @spec heard(t(), non_neg_integer(), boolean()) :: t()
+  def heard(%{stop: before} = s, number, latched?) do
+    stop = EStop.State.hear(before, number, latched?)
+    # A reset that was given before this is not meant for it.
+    s = if stop.latched? and not before.latched?, do: pressed(s), else: s
+    become(s, stop)
+  end
+
+  @doc "Releases the gate, by a reset that was given then, and answers it."
+  @spec release(t(), {reference(), given_us :: integer()}) :: t()
+  def release(s, {ref, given_us}) do
+    case Gate.reset(s.id, tell: false, presses: s.presses) do
+      :ok ->
+        s = reset(s, given_us)
+        Nonblocking.answer(ref, :ok)
+        s
+
+      # The gate's report of its button is on the way.
+      {:error, :pressed} ->
+        EStop.Answer.stopped_again(s.id, ref)
+        s
+    end
+  end
+
+  defp reset(s, given_us) do
     Broadcaster.quiet(s.stop.calls)
     become(%{s | reset_us: given_us}, EStop.State.reset(s.stop))
   end
@@ -190,9 +220,11 @@ defmodule Swarm.EStop.Actions do
   """
   @spec follow(t()) :: t()
   def follow(s) do
-    latched? = Board.latched?(s.board)
-    stop = EStop.State.follow(s.stop, latched?)
-    if latched?, do: press(s, stop), else: become(s, stop)
+    s = %{s | presses: Gate.presses(s.board)}
+
+    if Board.latched?(s.board),
+      do: press(s, EStop.State.follow(s.stop, true)),
+      else: reset(s, now_us())
   end
 
   @doc "Records the state of the stop."

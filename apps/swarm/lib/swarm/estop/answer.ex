@@ -22,6 +22,11 @@ defmodule Swarm.EStop.Answer do
   @spec stood(atom(), reference()) :: :ok
   def stood(robot, ref), do: Nonblocking.answer(ref, stopped(robot, Board.find!(robot)))
 
+  @doc "Answers that a reset was not carried out, because the robot was stopped again after it was given."
+  @spec stopped_again(atom(), reference()) :: :ok
+  def stopped_again(robot, ref),
+    do: Nonblocking.answer(ref, {:error, "#{robot} was stopped again meanwhile; reset it again"})
+
   @doc "Whether a stop of the gate also stops the wheels."
   @spec stopped(atom(), Board.t()) :: :ok | {:error, line :: String.t()}
   def stopped(robot, board),

@@ -4,6 +4,7 @@ defmodule Swarm.EStop.Server do
   """
   use GenServer
   alias Robot.{Board, Config, Names}
+  alias Robot.Safety.Gate
   alias Swarm.EStop
   alias Mesh.Nonblocking
   alias Swarm.Directory
@@ -23,6 +24,8 @@ defmodule Swarm.EStop.Server do
       name: nil,
       pressed: make_ref(),
       pressed_us: nil,
+      presses: Gate.presses(board),
+      sounded_us: nil,
       reset_us: nil
     }
 
@@ -52,7 +55,7 @@ defmodule Swarm.EStop.Server do
   @impl GenServer
   def handle_cast({:beat, number, latched?}, s)
       when is_integer(number) and number >= 0 and is_boolean(latched?),
-      do: {:noreply, EStop.Actions.become(s, EStop.State.hear(s.stop, number, latched?))}
+      do: {:noreply, EStop.Actions.heard(s, number, latched?)}
 
   # The latch as it is now, not when the gate reported it: this process may have set it again
   # since.
@@ -79,18 +82,14 @@ defmodule Swarm.EStop.Server do
   # Nobody else knows this reference.
   def handle_cast({:release, pressed, ref, given_us}, %{pressed: pressed} = s)
       when is_reference(ref) and is_integer(given_us) do
-    if EStop.Actions.waits?(given_us) do
-      s = EStop.Actions.released(s, given_us)
-      Nonblocking.answer(ref, :ok)
-      {:noreply, s}
-    else
-      {:noreply, s}
-    end
+    if EStop.Actions.waits?(given_us),
+      do: {:noreply, EStop.Actions.release(s, {ref, given_us})},
+      else: {:noreply, s}
   end
 
   def handle_cast({:release, pressed, ref, _given_us}, s)
       when is_reference(pressed) and is_reference(ref) do
-    Nonblocking.answer(ref, {:error, "#{s.id} was stopped again meanwhile; reset it again"})
+    EStop.Answer.stopped_again(s.id, ref)
     {:noreply, s}
   end
 

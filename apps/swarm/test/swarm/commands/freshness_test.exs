@@ -94,7 +94,8 @@ defmodule Swarm.Commands.FreshnessTest do
   end
 
   test "only an order from another node, or one that says when it was given, can be too old" do
-    assert Freshness.judge(1, :start, nil, true, 5, nil) == {:ok, 5}
+    assert Freshness.judge(1, :start, nil, true, 5, nil) == {:error, :unknown}
+    assert Freshness.judge(1, :start, {:asked, 4}, true, 5, nil) == {:ok, 4}
     assert Freshness.judge(1, :start, nil, false, 5, nil) == {:error, :unknown}
     assert Freshness.judge(1, :start, {:asked, 4}, false, 5, nil) == {:error, :unknown}
     assert Freshness.judge(1, :start, {1, 4}, true, 5, nil) == {:ok, 4}

@@ -156,6 +156,41 @@ defmodule Swarm.EStop.OwnerTest do
     assert Swarm.reset() == :ok
   end
 
+  test "the gate's button pressed when the gate is about to be released is stronger" do
+    id = robot(:owner_about)
+    [pilot, estop] = for role <- [:pilot, :estop], do: Names.whereis(id, role)
+    assert Swarm.ask(id, :estop) == :ok
+    :ok = :sys.suspend(pilot)
+    asked = Task.async(fn -> Swarm.ask(id, :reset) end)
+    eventually(fn -> Process.info(pilot, :message_queue_len) != {:message_queue_len, 0} end)
+    :ok = :sys.suspend(estop)
+    :ok = :sys.resume(pilot)
+    # The gate has said that the robot may be released, and nobody has heard it yet.
+    eventually(fn -> Process.info(estop, :message_queue_len) != {:message_queue_len, 0} end)
+    :ok = Gate.estop(id)
+    :ok = :sys.resume(estop)
+    assert {:error, line} = Task.await(asked)
+    assert line =~ "stopped again meanwhile"
+    settled(id, [:estop])
+    assert latched?(id) and stop_of(id).latched?
+    assert Swarm.ask(id, :reset) == :ok
+  end
+
+  test "a reset that was given before a neighbour's stop was heard does not clear it" do
+    id = robot(:owner_neighbour)
+    estop = Names.whereis(id, :estop)
+    GenServer.cast(estop, {:stamp, ref = :erlang.alias([:reply])})
+    assert_receive {^ref, stamp}
+    Comms.hear(id, beat(3, true))
+    eventually(fn -> latched?(id) end)
+    GenServer.cast(estop, {:command, :reset, ref = :erlang.alias([:reply]), stamp})
+    assert_receive {^ref, {:error, line}}
+    assert line =~ "was stopped after"
+    assert latched?(id)
+    assert Swarm.ask(id, :reset) == :ok
+    refute latched?(id)
+  end
+
   test "it keeps up with neighbours that report one stop after the other, and a reset holds" do
     id = robot(:owner_flooded)
     comms = Names.whereis(id, :comms)
