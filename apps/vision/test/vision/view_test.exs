@@ -264,7 +264,13 @@ defmodule Vision.ViewTest do
     View.unsubscribe(view, ref)
     assert %{viewers: 0} = View.status(view)
     task = Task.async(fn -> View.snapshot(view) end)
-    feed(view, demand, {:detections, %Vision.Detections{at_ms: 1, pan: 0.0, tilt: 0.0}})
+
+    feed(
+      view,
+      demand,
+      {:detections, %Vision.Detections{blobs: [], at_ms: 1, pan: 0.0, tilt: 0.0}}
+    )
+
     assert {:error, "this camera gives coloured blobs, and no pictures"} = Task.await(task)
 
     for bad <- [[rate: 0], [rate: 1.0e300], [rate: "5"], [speed: 1], :fast] do

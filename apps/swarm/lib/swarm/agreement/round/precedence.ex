@@ -26,19 +26,20 @@ defmodule Swarm.Agreement.Round.Precedence do
 
   @doc "Notes that there is a round of this id."
   @spec note(Round.t(), Letter.id()) :: Round.t()
-  def note(round, {epoch, counter, _initiator}),
-    do: %{round | highest: max(round.highest, {epoch, counter})}
+  def note(round, {epoch, counter, _initiator}), do: raised(round, {epoch, counter})
 
   @doc """
   If this robot's digest is out, others may have committed the round, so the next round is for a
   new epoch.
   """
   @spec fenced(Round.t()) :: Round.t()
-  def fenced(%{phase: phase, id: {epoch, _counter, initiator}} = round)
+  def fenced(%{phase: phase, id: {epoch, _counter, _initiator}} = round)
       when phase in [:digest, :committed],
-      do: note(round, {epoch + 1, 0, initiator})
+      do: raised(round, {epoch + 1, 0})
 
   def fenced(round), do: round
+
+  defp raised(round, numbers), do: %{round | highest: max(round.highest, numbers)}
 
   @doc """
   Whether a round of this id takes the place of the one that the robot is in.
