@@ -30,7 +30,7 @@ defmodule Robot.Control.Pilot.Journal do
   Calls a callback of a mission, `nil` for none, with a note of it on the board. No two calls are
   noted alike.
   """
-  @spec asking(module() | nil, data(), (() -> result)) :: result when result: term()
+  @spec asking(module() | nil, data(), asked :: function()) :: term()
   def asking(nil, _data, function), do: function.()
 
   def asking(module, %{board: board, config: config}, function) do
