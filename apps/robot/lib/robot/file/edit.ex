@@ -70,7 +70,7 @@ defmodule Robot.File.Edit do
 
   defp change({{line, from, to}, new}, text) do
     {before, [old | behind]} = text |> String.split("\n") |> Enum.split(line - 1)
-    new = String.slice(old, 0, from - 1) <> new <> String.slice(old, (to - 1)..-1)
+    new = String.slice(old, 0, from - 1) <> new <> String.slice(old, (to - 1)..-1//1)
     Enum.join(before ++ [new | behind], "\n")
   end
 end
