@@ -1,5 +1,5 @@
 defmodule Mix.Tasks.Fleet.CertsTest do
-  use Mesh.TaskCase, async: false
+  use Hal.TaskCase, async: false
   alias Mix.Tasks.Fleet.Certs, as: Task
 
   unless System.find_executable("openssl"), do: @moduletag(skip: "openssl is missing")
@@ -31,16 +31,16 @@ defmodule Mix.Tasks.Fleet.CertsTest do
   test "wrong words are one line, and nothing is made", %{tmp_dir: tmp} do
     out = Path.join(tmp, "certs")
 
-    assert refused(Task, ["--out", out]) ==
+    assert refusal(Task, ["--out", out]) ==
              "robots are missing: give their names, or --fleet FILE"
 
-    assert refused(Task, ["--colour"]) == "--colour is not an option; --help lists them"
-    assert refused(Task, ["../mag1", "--out", out]) =~ ~s("../mag1" is not a robot's name)
-    assert refused(Task, ["--fleet", "/nowhere"]) =~ "cannot be read: no such file"
-    assert refused(Task, ["--fleet", tmp]) =~ "is not a file of names"
+    assert refusal(Task, ["--colour"]) == "--colour is not an option; --help lists them"
+    assert refusal(Task, ["../mag1", "--out", out]) =~ ~s("../mag1" is not a robot's name)
+    assert refusal(Task, ["--fleet", "/nowhere"]) =~ "cannot be read: no such file"
+    assert refusal(Task, ["--fleet", tmp]) =~ "is not a file of names"
     refute File.exists?(out)
     File.mkdir_p!(out)
     File.write!(Path.join(out, "ca.pem"), "")
-    assert refused(Task, ["mag1", "--out", out]) =~ "has a ca.pem, but not its key"
+    assert refusal(Task, ["mag1", "--out", out]) =~ "has a ca.pem, but not its key"
   end
 end

@@ -1,5 +1,5 @@
 defmodule Mix.Tasks.Fleet.SecretTest do
-  use Mesh.TaskCase, async: false
+  use Hal.TaskCase, async: false
   alias Mix.Tasks.Fleet.Secret, as: Task
 
   test "makes one, says its fingerprint, and keeps what is there", %{tmp_dir: folder} do
@@ -9,15 +9,15 @@ defmodule Mix.Tasks.Fleet.SecretTest do
     {:ok, secret} = Mesh.Secret.load(path)
     assert line == "#{path} made, fingerprint #{secret.fingerprint}; copy it to every robot"
 
-    assert refused(Task, [path]) =~ "exists already; --force overwrites it"
+    assert refusal(Task, [path]) =~ "exists already; --force overwrites it"
     Task.run([path, "--force"])
     assert {:ok, other} = Mesh.Secret.load(path)
     assert other.fingerprint != secret.fingerprint
   end
 
   test "wrong words are one line" do
-    assert refused(Task, ["--colour"]) == "--colour is not an option; --help lists them"
-    assert refused(Task, ["one", "two"]) == "one file, not 2: one two"
+    assert refusal(Task, ["--colour"]) == "--colour is not an option; --help lists them"
+    assert refusal(Task, ["one", "two"]) == "one file, not 2: one two"
     Task.run(["--help"])
     assert_received {:mix_shell, :info, ["Creates the secret of a fleet" <> _rest]}
   end

@@ -1,38 +1,14 @@
 defmodule Mix.Tasks.Robot.CheckTest do
-  use ExUnit.Case, async: false
+  use Hal.TaskCase, async: false
   alias Mix.Tasks.Robot.Check
   alias Robot.File.Schema
   alias Swarm.Host.ReleaseBoot
 
-  @moduletag :tmp_dir
   @robots Path.expand("../../../../../config/robots", __DIR__)
 
   setup %{tmp_dir: folder} do
-    Mix.shell(Mix.Shell.Process)
-    on_exit(fn -> Mix.shell(Mix.Shell.IO) end)
     File.cp!(Path.join(@robots, "landmark.txt"), Path.join(folder, "color.cfg"))
     :ok
-  end
-
-  defp said do
-    receive do
-      {:mix_shell, :info, [line]} -> [line | said()]
-    after
-      0 -> []
-    end
-  end
-
-  defp refused(task, words) do
-    assert catch_exit(task.run(words)) == {:shutdown, 1}
-    errors()
-  end
-
-  defp errors do
-    receive do
-      {:mix_shell, :error, [line]} -> [line | errors()]
-    after
-      0 -> []
-    end
   end
 
   test "a valid file is summarised: limits, stopping distance, what is missing, how it arms" do

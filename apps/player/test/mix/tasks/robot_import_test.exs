@@ -1,9 +1,8 @@
 defmodule Mix.Tasks.Robot.ImportTest do
-  use ExUnit.Case, async: false
+  use Hal.TaskCase, async: false
   import ExUnit.CaptureIO
   alias Mix.Tasks.Robot.Import
 
-  @moduletag :tmp_dir
   @robots Path.expand("../../../../../config/robots", __DIR__)
   @player """
   driver ( name "rflex" rflex_serial_port "/dev/ttyS1" mm_length 500 mm_width 300
@@ -12,33 +11,10 @@ defmodule Mix.Tasks.Robot.ImportTest do
   """
 
   setup %{tmp_dir: folder} do
-    Mix.shell(Mix.Shell.Process)
-    on_exit(fn -> Mix.shell(Mix.Shell.IO) end)
     File.cp!(Path.join(@robots, "landmark.txt"), Path.join(folder, "color.cfg"))
     file = Path.join(folder, "old.cfg")
     File.write!(file, @player)
     {:ok, player: file}
-  end
-
-  defp said do
-    receive do
-      {:mix_shell, :info, [line]} -> [line | said()]
-    after
-      0 -> []
-    end
-  end
-
-  defp refused(task, words) do
-    assert catch_exit(task.run(words)) == {:shutdown, 1}
-    errors()
-  end
-
-  defp errors do
-    receive do
-      {:mix_shell, :error, [line]} -> [line | errors()]
-    after
-      0 -> []
-    end
   end
 
   test "a Player file becomes a valid robot file", %{tmp_dir: folder, player: file} do

@@ -1,4 +1,4 @@
-defmodule Mesh.TaskCase do
+defmodule Hal.TaskCase do
   @moduledoc """
   Mix tasks that talk to the test instead of a terminal.
   """
@@ -6,7 +6,7 @@ defmodule Mesh.TaskCase do
 
   using do
     quote do
-      import Mesh.TaskCase
+      import Hal.TaskCase
       @moduletag :tmp_dir
     end
   end
@@ -25,10 +25,24 @@ defmodule Mesh.TaskCase do
     end
   end
 
-  @doc "The one line with which a task refuses these words; it ends with status 1."
+  @doc "The lines with which a task refuses these words; it ends with status 1."
   def refused(task, words) do
     assert catch_exit(task.run(words)) == {:shutdown, 1}
-    assert_received {:mix_shell, :error, [line]}
+    errors()
+  end
+
+  @doc "The same, where it is one line."
+  def refusal(task, words) do
+    assert [line] = refused(task, words)
     line
+  end
+
+  @doc "The errors that a task has told the test so far, line by line."
+  def errors do
+    receive do
+      {:mix_shell, :error, [line]} -> [line | errors()]
+    after
+      0 -> []
+    end
   end
 end
