@@ -42,7 +42,7 @@ defmodule System.ReleaseTest do
 
   defp speed(server), do: elem(World.Server.world(server).robots.mag1.speed, 0)
 
-  defp wait(true?, ms \\ 15_000) do
+  defp wait(true?, ms \\ 60_000) do
     cond do
       true?.() -> :ok
       ms < 0 -> flunk("it never came")
@@ -103,7 +103,7 @@ defmodule System.ReleaseTest do
     wait(fn -> speed(server) > 0.1 end)
 
     {_, 0} = System.cmd("kill", ["-KILL", pid])
-    wait(fn -> speed(server) == 0.0 end, 1_000)
+    wait(fn -> speed(server) == 0.0 end)
     refute there?(pid)
 
     assert {"", 0} = robot(["daemon"], environment)

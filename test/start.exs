@@ -4,7 +4,7 @@ Code.require_file("skipped.exs", __DIR__)
 # On a busy machine a message may take its time; nothing waits longer than it must. Tests tagged `:long` are
 # for `bin/test long`, those tagged `:slow` are left out by `bin/test quick`.
 ExUnit.start(
-  assert_receive_timeout: 3_000,
+  assert_receive_timeout: 10_000,
   timeout: 180_000,
   exclude: [:long],
   formatters: [ExUnit.CLIFormatter, Convoy.Skipped]

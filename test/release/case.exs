@@ -70,7 +70,7 @@ defmodule Release.Case do
   end
 
   @doc "Asks until the answer is such."
-  def until(pattern, ask, left_ms \\ 20_000) do
+  def until(pattern, ask, left_ms \\ 60_000) do
     began = System.monotonic_time(:millisecond)
     {said, _status} = ask.()
 

@@ -36,7 +36,7 @@ defmodule VmTest do
     me = self()
     {owner, monitor} = spawn_monitor(fn -> send(me, {:vms, Vm.start([[], []])}) end)
     assert_receive {:vms, [_one, _two] = vms}, 60_000
-    assert_receive {:DOWN, ^monitor, :process, ^owner, :normal}, 1_000
+    assert_receive {:DOWN, ^monitor, :process, ^owner, :normal}
     for vm <- vms, do: await(vm.pid, ["gone"])
   end
 

@@ -31,7 +31,7 @@ defmodule Console.LiveFleetTest do
     assert {:ok, "done"} = Live.Fleet.command(live, {:kill, :mag61})
 
     # What a robot's processes log when they are cut off belongs to this test.
-    for monitor <- monitors, do: assert_receive({:DOWN, ^monitor, _, _, _}, 2_000)
+    for monitor <- monitors, do: assert_receive({:DOWN, ^monitor, _, _, _})
     Swarm.Case.eventually(fn -> Swarm.Directory.robots() == [:min61] end)
 
     for command <- [

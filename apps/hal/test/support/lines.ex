@@ -39,7 +39,7 @@ defmodule Hal.Lines do
         {^port, _} = message -> message
         {:EXIT, ^port, _} = message -> message
       after
-        5_000 -> flunk("nothing came on #{line.name}")
+        20_000 -> flunk("nothing came on #{line.name}")
       end
 
     with :unknown <- Serial.handle(line, message), do: next(line)
@@ -61,7 +61,7 @@ defmodule Hal.Lines do
   def kill(signal, pid), do: [] = :os.cmd(~c"kill -#{signal} #{pid}")
 
   @doc "Looks again until it is so. For what ends without telling: programs, links."
-  def eventually(condition, left \\ 500) do
+  def eventually(condition, left \\ 2_000) do
     cond do
       condition.() -> :ok
       left == 0 -> flunk("it did not come to pass")

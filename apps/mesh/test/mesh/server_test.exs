@@ -47,7 +47,7 @@ defmodule Mesh.ServerTest do
   defp now, do: System.monotonic_time(:millisecond)
 
   # Lets the other node live until it is so.
-  defp until(peer, done?, turns \\ 100) do
+  defp until(peer, done?, turns \\ 400) do
     cond do
       done?.(peer) ->
         peer

@@ -74,7 +74,7 @@ defmodule Swarm.CommandsTest do
     # A full turn shows nothing.
     :ok = stop_supervised({:wheels, [id, blind]})
     turning(id)
-    eventually(fn -> Swarm.status(id).state == :not_found end, 20_000)
+    eventually(fn -> Swarm.status(id).state == :not_found end)
   end
 
   test "robots follow each other, but not in a circle" do

@@ -16,7 +16,7 @@ defmodule Swarm.OrdersTest do
 
   defp rolls(id) do
     drive = Names.whereis(id, :drive)
-    assert_receive {:drive, {:drive, %Twist{linear: v}}, ^drive} when v > 0, 2_000
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, ^drive} when v > 0
   end
 
   # From now on, for this long, its wheels get no command but to stand.

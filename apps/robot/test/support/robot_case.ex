@@ -45,7 +45,7 @@ defmodule Robot.Case do
   def online(id), do: health(id, :online)
 
   @doc "Waits until the drive of a robot is in this health."
-  def health(id, wanted, left \\ 500) do
+  def health(id, wanted, left \\ 2_000) do
     case Robot.Board.fetch(Robot.Board.find!(id), {:health, :drive}, :infinity) do
       {:ok, ^wanted, _at_ms} -> id
       other when left == 0 -> flunk("the drive of #{id}: #{inspect(other)}")
@@ -88,8 +88,8 @@ defmodule Robot.Case do
   end
 
   @doc "Waits until the wheels roll."
-  def rolls(ms \\ 3_000) do
-    assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v > 0, ms
+  def rolls do
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v > 0
     forget_drives()
   end
 

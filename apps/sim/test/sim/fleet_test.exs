@@ -1,7 +1,7 @@
 defmodule Sim.FleetTest do
   @moduledoc "Fleets of whole robots in real time."
   use ExUnit.Case, async: false
-  import Swarm.Case, only: [eventually: 2]
+  import Swarm.Case, only: [eventually: 1]
   alias Hal.Pose
   alias Robot.{Board, Names}
   alias Sim.{Fleet, World}
@@ -25,11 +25,11 @@ defmodule Sim.FleetTest do
 
   test "a robot that is sent somewhere gets there, and its fleet leaves nothing behind" do
     fleet = fleet(%{robots: [:mag71], landmark: :none, mission: false})
-    eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(:mag71)) end, 6_000)
+    eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(:mag71)) end)
     start = truth(fleet, :mag71)
     place = Pose.place(start, {0.7, 0.2})
     assert Swarm.goto(:mag71, place) == :ok
-    eventually(fn -> Swarm.status(:mag71).state == :done end, 20_000)
+    eventually(fn -> Swarm.status(:mag71).state == :done end)
     assert Pose.distance(truth(fleet, :mag71), place) < 0.15
     assert [%{state: :idle, alive: true, uncertainty: metres}] = Fleet.scene(fleet).robots
     # Also without a mission it knows how certain its pose is; by now it has driven.
@@ -40,32 +40,29 @@ defmodule Sim.FleetTest do
     stop(fleet)
     assert Names.whereis(:mag71, :robot) == nil
     # The directory hears of its end after that.
-    eventually(fn -> Swarm.tell(:mag71, "ping") |> elem(1) =~ "no robot" end, 5_000)
+    eventually(fn -> Swarm.tell(:mag71, "ping") |> elem(1) =~ "no robot" end)
   end
 
   test "three robots search, agree on a leader, and heal when it dies; stops reach all" do
     ids = [:mag81, :mag82, :min81]
     fleet = fleet(%{robots: ids})
-    eventually(fn -> Fleet.scene(fleet).leader end, 15_000)
+    eventually(fn -> Fleet.scene(fleet).leader end)
     scene = Fleet.scene(fleet)
     assert [:search, :elected] = stages(fleet)
     leader = scene.leader
     assert Enum.find(scene.robots, & &1.leader?).id == leader
-    eventually(fn -> Enum.any?(Fleet.scene(fleet).robots, & &1.slot) end, 6_000)
+    eventually(fn -> Enum.any?(Fleet.scene(fleet).robots, & &1.slot) end)
 
     # All stop, and stay stopped until a person resets them.
     assert Swarm.estop() == :ok
     for id <- ids, do: assert(Board.latched?(Board.find!(id)))
     still = fn -> for id <- ids, do: truth(fleet, id) end
 
-    eventually(
-      fn ->
-        Enum.all?(World.Server.world(Fleet.server(fleet)).robots, fn {_, body} ->
-          body.speed == {0.0, 0.0}
-        end)
-      end,
-      2_000
-    )
+    eventually(fn ->
+      Enum.all?(World.Server.world(Fleet.server(fleet)).robots, fn {_, body} ->
+        body.speed == {0.0, 0.0}
+      end)
+    end)
 
     before = still.()
     assert Swarm.stop(hd(ids)) == :ok
@@ -75,9 +72,9 @@ defmodule Sim.FleetTest do
     assert Swarm.reset() == :ok
 
     # Their missions ended with the stop; they start again.
-    eventually(fn -> Fleet.scene(fleet).leader == nil end, 6_000)
+    eventually(fn -> Fleet.scene(fleet).leader == nil end)
     assert Swarm.start() == :ok
-    eventually(fn -> Fleet.scene(fleet).leader end, 15_000)
+    eventually(fn -> Fleet.scene(fleet).leader end)
     leader = Fleet.scene(fleet).leader
 
     # The leader dies: its body stays, the others know, and one of them takes over.
@@ -88,8 +85,8 @@ defmodule Sim.FleetTest do
     assert Fleet.kill(fleet, leader) |> elem(1) =~ "no robot"
     assert :killed in stages(fleet)
     [other | _] = ids -- [leader]
-    eventually(fn -> Board.peers(Board.find!(other))[leader].mode == :dead end, 8_000)
-    eventually(fn -> Fleet.scene(fleet).leader not in [nil, leader] end, 20_000)
+    eventually(fn -> Board.peers(Board.find!(other))[leader].mode == :dead end)
+    eventually(fn -> Fleet.scene(fleet).leader not in [nil, leader] end)
     assert truth(fleet, leader) == body
 
     assert %{alive: false, state: :dead} =
@@ -102,30 +99,26 @@ defmodule Sim.FleetTest do
   test "a robot whose processes crash too often is a wreck, and the others live on" do
     fleet = fleet(%{robots: [:mag91, :mag92], mission: false})
 
-    eventually(fn -> Enum.all?([:mag91, :mag92], &(&1 in Swarm.Directory.robots())) end, 2_000)
+    eventually(fn -> Enum.all?([:mag91, :mag92], &(&1 in Swarm.Directory.robots())) end)
 
     # A single failure does not count.
     kill(:mag91, :executive)
 
-    eventually(
-      fn -> Names.whereis(:mag91, :comms) && match?({:ok, _}, Swarm.tell(:mag91, "ping")) end,
-      6_000
-    )
+    eventually(fn ->
+      Names.whereis(:mag91, :comms) && match?({:ok, _}, Swarm.tell(:mag91, "ping"))
+    end)
 
     assert Fleet.living(fleet) == [:mag91, :mag92]
 
     Enum.find(1..8, fn _ ->
       kill(:mag91, :gate)
 
-      eventually(
-        fn -> Names.whereis(:mag91, :gate) || Names.whereis(:mag91, :robot) == nil end,
-        2_000
-      )
+      eventually(fn -> Names.whereis(:mag91, :gate) || Names.whereis(:mag91, :robot) == nil end)
 
       Names.whereis(:mag91, :robot) == nil
     end)
 
-    eventually(fn -> Fleet.living(fleet) == [:mag92] end, 6_000)
+    eventually(fn -> Fleet.living(fleet) == [:mag92] end)
     assert :killed in stages(fleet)
     assert {:ok, "mag92 on " <> _} = Swarm.tell(:mag92, "ping")
     stop(fleet)
@@ -149,8 +142,8 @@ defmodule Sim.FleetTest do
         kills: [{:mag96, 0.3}]
       })
 
-    eventually(fn -> stages(fleet) == [:killed, :landmark_moved] end, 6_000)
-    eventually(fn -> elem(Fleet.scene(fleet).landmark, 0) > 0.05 end, 6_000)
+    eventually(fn -> stages(fleet) == [:killed, :landmark_moved] end)
+    eventually(fn -> elem(Fleet.scene(fleet).landmark, 0) > 0.05 end)
     %{messages: %{sent: sent, lost: lost}} = Fleet.result(fleet)
     assert lost > 0 and lost < sent
     assert Fleet.move_landmark(fleet, {99.0, 0.0}) |> elem(1) =~ "99"
@@ -178,8 +171,8 @@ defmodule Sim.FleetTest do
   test "a fleet runs the mission that it is given, or says why not" do
     fleet = fleet(%{robots: [:mag75], landmark: :none, mission: {Turn, rate: 0.3}})
     heading = truth(fleet, :mag75).heading
-    eventually(fn -> Swarm.status(:mag75).state == :turning end, 6_000)
-    eventually(fn -> abs(Pose.wrap(truth(fleet, :mag75).heading - heading)) > 0.3 end, 6_000)
+    eventually(fn -> Swarm.status(:mag75).state == :turning end)
+    eventually(fn -> abs(Pose.wrap(truth(fleet, :mag75).heading - heading)) > 0.3 end)
     assert [%{state: :lead}] = Fleet.scene(fleet).robots
     assert Swarm.stop(:mag75) == :ok
     stop(fleet)
@@ -218,16 +211,13 @@ defmodule Sim.FleetTest do
     :ok = Robot.Control.Pilot.command(:mag77, :start)
 
     # It holds at once, and from then on.
-    eventually(
-      fn ->
-        scene = Fleet.scene(fleet)
-        told = Enum.map(scene.stages, & &1.stage)
-        assert :elected not in told or scene.leader == :mag77
-        assert :formed not in told or scene.formed?
-        told == [:elected, :formed]
-      end,
-      2_000
-    )
+    eventually(fn ->
+      scene = Fleet.scene(fleet)
+      told = Enum.map(scene.stages, & &1.stage)
+      assert :elected not in told or scene.leader == :mag77
+      assert :formed not in told or scene.formed?
+      told == [:elected, :formed]
+    end)
 
     assert %{leader: :mag77} = Fleet.result(fleet)
     stop(fleet)

@@ -6,7 +6,7 @@ defmodule Sim.BaseCase do
   Tags: `profile`, `place` (of the body), `base` (options of the controller), `wire` (faults of the line).
   """
   use ExUnit.CaseTemplate
-  import Swarm.Case, only: [eventually: 2]
+  import Swarm.Case, only: [eventually: 1]
   alias Hal.{Device, Pose, Profile, Twist}
   alias Sim.{Emulator, World}
 
@@ -18,7 +18,7 @@ defmodule Sim.BaseCase do
   using do
     quote do
       import Sim.BaseCase
-      import Swarm.Case, only: [eventually: 2]
+      import Swarm.Case, only: [eventually: 1]
       alias Hal.{Profile, Twist}
       alias Sim.Emulator
       @moduletag :tmp_dir
@@ -102,16 +102,13 @@ defmodule Sim.BaseCase do
   """
   def stop(%{device: device, server: server} = context) do
     Device.drive(device, Twist.zero())
-    deadline = System.monotonic_time(:millisecond) + 5_000
+    deadline = System.monotonic_time(:millisecond) + 20_000
 
-    eventually(
-      fn ->
-        still?(server) ||
-          (System.monotonic_time(:millisecond) > deadline and
-             flunk("it does not stand: #{inspect(body(server).speed)}, " <> said(context)))
-      end,
-      6_000
-    )
+    eventually(fn ->
+      still?(server) ||
+        (System.monotonic_time(:millisecond) > deadline and
+           flunk("it does not stand: #{inspect(body(server).speed)}, " <> said(context)))
+    end)
   end
 
   defp newest_health(last \\ nil) do
@@ -136,7 +133,7 @@ defmodule Sim.BaseCase do
   they do not agree in time, the failure shows both.
   """
   def agree(context, start \\ {-4, 0, 0}, tolerance \\ 0.005),
-    do: agree(context, start, tolerance, System.monotonic_time(:millisecond) + 10_000, nil)
+    do: agree(context, start, tolerance, System.monotonic_time(:millisecond) + 20_000, nil)
 
   defp agree(%{server: server} = context, {x, y, heading} = start, tolerance, until_ms, last) do
     odometry = newest(:odometry)
@@ -169,7 +166,7 @@ defmodule Sim.BaseCase do
   """
   def agree_but_for_shape(context) do
     path = %{frame: context.first.frame, pose: context.first.pose, turned: 0.0, shape: 0.0}
-    agree_but_for_shape(context, path, System.monotonic_time(:millisecond) + 10_000)
+    agree_but_for_shape(context, path, System.monotonic_time(:millisecond) + 20_000)
   end
 
   defp agree_but_for_shape(%{first: %{frame: frame}} = context, path, until_ms) do

@@ -89,7 +89,7 @@ defmodule Swarm.Case do
   end
 
   @doc "Waits until a function returns something, and returns it."
-  def eventually(function, ms \\ 5_000) do
+  def eventually(function, ms \\ 30_000) do
     deadline = System.monotonic_time(:millisecond) + ms
     wait(function, deadline)
   end

@@ -10,7 +10,7 @@ defmodule Swarm.ArmingTest do
   # Waits until the robot's own wheels are told this.
   defp told(id, wanted?) do
     pid = Names.whereis(id, :drive)
-    assert_receive {:drive, {:drive, %Twist{linear: v}}, ^pid} when is_float(v), 1_000
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, ^pid} when is_float(v)
     wanted?.(v) || told(id, wanted?)
   end
 

@@ -23,7 +23,7 @@ defmodule Swarm.CommsTest do
   end
 
   # Reads the board again at each heartbeat, instead of sleeping.
-  defp until(id, check, tries \\ 100) do
+  defp until(id, check, tries \\ 1_000) do
     cond do
       check.(Board.find!(id)) -> :ok
       tries == 0 -> flunk("#{id} did not come to it: #{inspect(Swarm.status(id))}")
@@ -32,7 +32,7 @@ defmodule Swarm.CommsTest do
   end
 
   # Odometry is repeated, as from wheels, because a pose that is 300 ms old does not count.
-  defp rolls_of(id, tries \\ 10) do
+  defp rolls_of(id, tries \\ 1_000) do
     place(id)
 
     receive do
@@ -60,7 +60,7 @@ defmodule Swarm.CommsTest do
     assert Pose.distance(pose, {1.0, 2.0}) < 0.01
     until(:comms2, &is_map_key(Board.peers(&1), :comms1))
     stop_supervised!(:comms2)
-    until(:comms1, &match?(%{comms2: %{mode: :dead}}, Board.peers(&1)), 200)
+    until(:comms1, &match?(%{comms2: %{mode: :dead}}, Board.peers(&1)))
   end
 
   test "malformed messages are dropped, counted and shown, and crash nobody" do
@@ -216,7 +216,7 @@ defmodule Swarm.CommsTest do
     id = talking(:comms11, comms: [transport: {__MODULE__, :carry, [self()]}])
     Comms.say(id, [:mag7, :comms11], Message.new(id, :place, :start))
     assert_receive {:carried, ^id, [:mag7], %Message{body: :start}}
-    assert_receive {:carried, ^id, _all, %Message{kind: :heartbeat}}, 500
+    assert_receive {:carried, ^id, _all, %Message{kind: :heartbeat}}
   end
 
   @doc false

@@ -58,7 +58,7 @@ defmodule Vision.SaverTest do
 
   def tell(_event, _measured, _another, _config), do: :ok
 
-  defp eventually(saver, done?, left_ms \\ 10_000) do
+  defp eventually(saver, done?, left_ms \\ 20_000) do
     status = Saver.status(saver)
 
     cond do

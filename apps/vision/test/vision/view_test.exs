@@ -328,7 +328,7 @@ defmodule Vision.ViewTest do
         do: "#{pid}"
   end
 
-  defp gone?(pid, left_ms \\ 5_000)
+  defp gone?(pid, left_ms \\ 20_000)
   defp gone?(_pid, left_ms) when left_ms <= 0, do: false
 
   defp gone?(pid, left_ms) do

@@ -233,7 +233,7 @@ defmodule Hal.Camera.FFmpegTest do
   end
 
   # Waits until the process is no more, or only its entry in the table.
-  defp gone?(pid, left_ms \\ 5_000)
+  defp gone?(pid, left_ms \\ 20_000)
   defp gone?(_pid, left_ms) when left_ms <= 0, do: false
 
   defp gone?(pid, left_ms) do

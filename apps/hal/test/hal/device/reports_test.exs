@@ -66,7 +66,7 @@ defmodule Hal.Device.ReportsTest do
       assert_receive {:drive, :init, ^pid}
       assert {:error, "its base has not reported its wheels yet"} = Device.arm(pid)
       Device.drive(pid, @ahead)
-      assert_receive {:health, :drive, {{:offline, :silent}, _}}, 2_000
+      assert_receive {:health, :drive, {{:offline, :silent}, _}}
       assert {:error, "its base has not reported its wheels yet"} = Device.arm(pid)
       Device.drive(pid, @ahead)
       assert Device.arming(pid).state == :disarmed
@@ -78,34 +78,34 @@ defmodule Hal.Device.ReportsTest do
 
   test "it is online after the first report of its wheels, and arms by itself or by hand" do
     {pid, says} = base(reports: [:sonar], arm: :auto)
-    assert_receive {:health, :drive, {{:offline, :silent}, _}}, 2_000
+    assert_receive {:health, :drive, {{:offline, :silent}, _}}
     says.([:wheels])
-    assert_receive {:health, :drive, {:online, _}}, 2_000
-    assert_receive {:arming, %{state: :armed}}, 2_000
+    assert_receive {:health, :drive, {:online, _}}
+    assert_receive {:arming, %{state: :armed}}
     Device.drive(pid, @ahead)
     assert_receive {:drive, {:drive, %Twist{linear: 0.3}}, ^pid}
   end
 
   test "wheels of which nothing is heard for 500 ms are stopped and disarmed; only a person arms them again" do
     {pid, says} = base(reports: [:wheels], arm: :manual)
-    assert_receive {:health, :drive, {:online, _}}, 2_000
+    assert_receive {:health, :drive, {:online, _}}
     assert Device.arm(pid) == :ok
     Device.drive(pid, @ahead)
     assert_receive {:drive, {:drive, %Twist{linear: 0.3}}, ^pid}
     says.([])
     renew(pid, fn -> Device.arming(pid).state != :armed end)
     assert_receive {:arming, %{state: :disarmed, why: "its base reports nothing of its wheels"}}
-    assert_receive {:health, :drive, {{:offline, :silent}, _}}, 2_000
+    assert_receive {:health, :drive, {{:offline, :silent}, _}}
     assert {:error, "its base reports nothing of its wheels"} = Device.arm(pid)
     says.([:wheels])
-    assert_receive {:health, :drive, {:online, _}}, 2_000
+    assert_receive {:health, :drive, {:online, _}}
     assert Device.arming(pid).state == :disarmed
     assert Device.arm(pid) == :ok
   end
 
   test "without sonar it stops and is disarmed after 2 s, and stays online" do
     {pid, says} = base(reports: [:wheels], arm: :manual, sonar: true)
-    assert_receive {:health, :drive, {:online, _}}, 2_000
+    assert_receive {:health, :drive, {:online, _}}
     assert {:error, "its base has not reported its sonars yet"} = Device.arm(pid)
     says.([:wheels, :sonar])
     Hal.Lines.eventually(fn -> Device.arm(pid) == :ok end)
@@ -118,7 +118,7 @@ defmodule Hal.Device.ReportsTest do
   end
 
   # Drives as a gate does, until it is so; the last that the driver heard is a stop.
-  defp renew(pid, done?, left \\ 200) do
+  defp renew(pid, done?, left \\ 1_000) do
     Device.drive(pid, @ahead)
 
     cond do

@@ -27,7 +27,7 @@ defmodule Hal.Serial.DeviceTest do
   end
 
   # What is said before the line is opened, nobody hears.
-  defp reports(far, left \\ 500) do
+  defp reports(far, left \\ 1_000) do
     :ok = Serial.write(far, <<12>>)
 
     receive do

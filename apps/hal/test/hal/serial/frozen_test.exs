@@ -15,7 +15,7 @@ defmodule Hal.Serial.FrozenTest do
   end
 
   # As an owner that lives, every 20 ms, until somebody says that nobody listens.
-  defp until_frozen(near, left \\ 250) do
+  defp until_frozen(near, left \\ 1_000) do
     case Serial.keep_alive(near) do
       {:error, :frozen} ->
         :ok

@@ -26,7 +26,7 @@ defmodule Hal.Visca.DriverTest do
   end
 
   # Plays the camera until a message for the test comes that the function wants.
-  defp play(camera, wanted, left_ms \\ 5_000) do
+  defp play(camera, wanted, left_ms \\ 20_000) do
     receive do
       message ->
         cond do

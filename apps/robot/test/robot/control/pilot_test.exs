@@ -126,6 +126,6 @@ defmodule Robot.Control.PilotTest do
     :ok = Pilot.command(id, {:do, :ready, [goal]})
     rolls()
     :ok = Pilot.start(id)
-    assert_receive {:drive, {:drive, stop}, _} when stop == %Twist{linear: 0.0, turn: 0.0}, 400
+    assert_receive {:drive, {:drive, stop}, _} when stop == %Twist{linear: 0.0, turn: 0.0}
   end
 end

@@ -8,7 +8,7 @@ defmodule Robot.Safety.DryRunTest do
   @moduletag :capture_log
 
   defp until_line(id, text) do
-    assert_receive {[:robot, :dry_run], %{robot: ^id, line: line}}, 1_000
+    assert_receive {[:robot, :dry_run], %{robot: ^id, line: line}}
     if line =~ text, do: line, else: until_line(id, text)
   end
 

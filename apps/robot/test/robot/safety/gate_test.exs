@@ -6,38 +6,45 @@ defmodule Robot.Safety.GateTest do
   @zero Twist.zero()
 
   # What the gate did next, in the order of its own trace.
-  defp after_sense(ranges) do
+  defp after_sense(reading) do
     receive do
-      {:gate, :input, {:sense, {:sonar, ^ranges}}, at_ms} ->
+      {:gate, :input, {:sense, ^reading}, at_ms} ->
         assert_receive {:gate, kind1, what1, ^at_ms}
         assert_receive {:gate, kind2, what2, ^at_ms}
         [{kind1, what1, at_ms}, {kind2, what2, at_ms}]
 
       {:gate, _kind, _what, _at_ms} ->
-        after_sense(ranges)
+        after_sense(reading)
     after
-      500 -> flunk("the gate did not hear the sonar")
+      10_000 -> flunk("the gate did not hear #{inspect(reading)}")
     end
   end
 
-  test "a touched bumper stops the wheels within 50 ms" do
-    id = rolling(:gate1)
+  # A speed is decided when a reading arrives, and not at the next step.
+  defp decided(id, reading) do
     rolls()
-    send(Names.whereis(id, :drive), {:readings, [{:bumpers, [0]}]})
-    assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v == 0.0, 50
-    {:ok, %{limits: limits}, _} = Board.fetch(Board.find!(id), :driving, 100)
-    assert :bumper in limits
+    send(Names.whereis(id, :drive), {:readings, [reading]})
+
+    assert [{:input, :step, at_ms}, {:effect, {:drive, twist, limits}, at_ms}] =
+             after_sense(reading)
+
+    {twist.linear, limits}
   end
 
-  test "a near sonar stops the wheels when it arrives, not at the next step" do
-    test = self()
-    id = rolling(:gate2, trace: {Kernel, :send, [test]})
-    rolls()
+  test "a touched bumper stops the wheels when it arrives" do
+    id = rolling(:gate1, trace: {Kernel, :send, [self()]})
+    assert {stop, limits} = decided(id, {:bumpers, [0]})
+    assert stop == 0.0
+    assert :bumper in limits
+    assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v == 0.0
+  end
+
+  test "a near sonar slows the wheels when it arrives" do
+    id = rolling(:gate2, trace: {Kernel, :send, [self()]})
     near = List.duplicate(5.1, 16) |> List.replace_at(11, 0.1)
-    send(Names.whereis(id, :drive), {:readings, [{:sonar, near}]})
-    assert [{:input, :step, at_ms}, {:effect, {:drive, twist, limits}, at_ms}] = after_sense(near)
+    assert {slow, limits} = decided(id, {:sonar, near})
     assert :near in limits
-    assert twist.linear < 0.1
+    assert slow < 0.1
   end
 
   test "e-stop is latched, survives the gate and the executive, and only a reset clears it" do
@@ -56,7 +63,7 @@ defmodule Robot.Safety.GateTest do
     stands(250)
 
     assert {:ok, %{twist: twist, limits: [:estop]}, _} =
-             Board.fetch(Board.find!(id), :driving, 100)
+             Board.fetch(Board.find!(id), :driving, :infinity)
 
     assert Twist.zero?(twist)
 
@@ -67,7 +74,7 @@ defmodule Robot.Safety.GateTest do
 
   def wait(_event, _measured, %{robot: :gate8}, test) do
     send(test, {:writing, self()})
-    receive(do: (:written -> :ok), after: (1_000 -> :ok))
+    receive(do: (:written -> :ok), after: (20_000 -> :ok))
   end
 
   def wait(_event, _measured, _others, _test), do: :ok
@@ -82,7 +89,7 @@ defmodule Robot.Safety.GateTest do
     rolls()
     answer = Task.async(fn -> Gate.estop(id) end)
     assert_receive {:writing, gate}
-    assert_receive {:drive, {:drive, twist}, _} when twist == @zero, 300
+    assert_receive {:drive, {:drive, twist}, _} when twist == @zero
     assert Board.latched?(Board.find!(id))
     assert Task.yield(answer, 0) == nil
     send(gate, :written)
@@ -150,10 +157,22 @@ defmodule Robot.Safety.GateTest do
     for wish <- [%{linear: :nan, turn: 0.0}, %{linear: 1.0e308, turn: 0.0}, :nonsense] do
       Gate.wish(id, wish)
       forget_drives()
-      assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v == 0.0, 200
+      assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v == 0.0
     end
 
-    Gate.wish(id, Twist.new(50.0, 0.0))
-    assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v > 0 and v <= 0.1, 200
+    assert_in_delta first_step(id, Twist.new(50.0, 0.0)), 0.05, 0.0501
+  end
+
+  # The wheels' first speed. On a busy machine a wish may be too old at the next step.
+  defp first_step(id, wish, wishes \\ 50) do
+    Gate.wish(id, wish)
+
+    receive do
+      {:drive, {:drive, %Twist{linear: v}}, _} when v > 0 -> v
+    after
+      300 ->
+        assert wishes > 1, "no wish of 50 moved the wheels"
+        first_step(id, wish, wishes - 1)
+    end
   end
 end

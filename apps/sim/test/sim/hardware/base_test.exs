@@ -30,7 +30,7 @@ defmodule Sim.Hardware.BaseTest do
   end
 
   defp last_odometry do
-    assert_receive {:odometry, odometry}, 2_000
+    assert_receive {:odometry, odometry}
     odometry
   end
 
@@ -46,38 +46,32 @@ defmodule Sim.Hardware.BaseTest do
   # In front of the right wall, which is 0.5 m from its front.
   @tag place: {7.3, 0.0, 0.0}
   test "sonar, infrared, battery and bumpers report what the body senses", context do
-    eventually(
-      fn ->
-        felt = body(context.server)
-        sonar = newest(:sonar)
+    eventually(fn ->
+      felt = body(context.server)
+      sonar = newest(:sonar)
 
-        sonar != nil and
-          Enum.zip(sonar, felt.sonar) |> Enum.all?(fn {a, b} -> abs(a - b) < 0.002 end)
-      end,
-      5_000
-    )
+      sonar != nil and
+        Enum.zip(sonar, felt.sonar) |> Enum.all?(fn {a, b} -> abs(a - b) < 0.002 end)
+    end)
 
-    eventually(
-      fn ->
-        felt = body(context.server)
-        near = newest(:ir)
-        # A step of the converter is 8 % of a metre at the end of its range.
-        near != nil and Enum.zip(near, felt.ir) |> Enum.all?(fn {a, b} -> abs(a - b) < 0.06 end)
-      end,
-      5_000
-    )
+    eventually(fn ->
+      felt = body(context.server)
+      near = newest(:ir)
+      # A step of the converter is 8 % of a metre at the end of its range.
+      near != nil and Enum.zip(near, felt.ir) |> Enum.all?(fn {a, b} -> abs(a - b) < 0.06 end)
+    end)
 
     felt = body(context.server)
     assert Enum.at(felt.ir, 11) < 0.6
     assert Enum.at(felt.ir, 3) == 0.8
-    assert_receive {:power, volts}, 3_000
+    assert_receive {:power, volts}
     assert_in_delta volts, 25.6, 0.02
 
     # Into the wall, with the front bumper.
     drive(context, Twist.new(0.3, 0.0), &(Map.keys(&1.pressed) == [0]))
-    assert_receive {:bumpers, [0]}, 2_000
+    assert_receive {:bumpers, [0]}
     drive(context, Twist.new(-0.3, 0.0), &(&1.pressed == %{}))
-    assert_receive {:bumpers, []}, 2_000
+    assert_receive {:bumpers, []}
     stop(context)
   end
 end

@@ -1,7 +1,7 @@
 defmodule Sim.Hardware.FleetTest do
   @moduledoc "Fleets in which some robots have the real drivers."
   use ExUnit.Case, async: false
-  import Swarm.Case, only: [eventually: 2]
+  import Swarm.Case, only: [eventually: 1]
   alias Hal.Pose
   alias Robot.Board
   alias Sim.{Fleet, Trial, World}
@@ -26,18 +26,15 @@ defmodule Sim.Hardware.FleetTest do
     assert Enum.at(lines, 2) =~ "min61 has real drivers"
 
     for id <- [:mag61, :min61] do
-      eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(id)) end, 10_000)
+      eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(id)) end)
       start = World.truth(World.Server.world(Fleet.server(fleet)), id)
       place = Pose.place(start, {0.7, 0.2})
       assert Swarm.goto(id, place) == :ok
-      eventually(fn -> Swarm.status(id).state == :done end, 30_000)
+      eventually(fn -> Swarm.status(id).state == :done end)
 
-      eventually(
-        fn ->
-          Pose.distance(World.truth(World.Server.world(Fleet.server(fleet)), id), place) < 0.15
-        end,
-        3_000
-      )
+      eventually(fn ->
+        Pose.distance(World.truth(World.Server.world(Fleet.server(fleet)), id), place) < 0.15
+      end)
 
       {:ok, board} = Board.find(id)
       assert {:ok, ranges, _at_ms} = Board.fetch(board, :sonar, 1_000)

@@ -4,7 +4,7 @@ defmodule Sim.Hardware.HeadTest do
   sheet alone.
   """
   use ExUnit.Case, async: true
-  import Swarm.Case, only: [eventually: 2]
+  import Swarm.Case, only: [eventually: 1]
   alias Hal.{Device, Pose, Profile}
   alias Sim.{Emulator, World}
   @moduletag :slow
@@ -79,8 +79,8 @@ defmodule Sim.Hardware.HeadTest do
 
     for {pan, tilt} <- [{0.5, 0.1}, {-1.2, -0.3}, {0.0, 0.0}] do
       Device.look(device, pan, tilt)
-      eventually(fn -> looks?(server, pan, tilt) end, 5_000)
-      eventually(fn -> told?(pan, tilt) end, 5_000)
+      eventually(fn -> looks?(server, pan, tilt) end)
+      eventually(fn -> told?(pan, tilt) end)
     end
   end
 
@@ -92,10 +92,10 @@ defmodule Sim.Hardware.HeadTest do
 
     for k <- 1..40 do
       Device.look(device, 0.02 * k, 0.0)
-      assert_receive {:ptz, _}, 2_000
+      assert_receive {:ptz, _}
     end
 
-    eventually(fn -> looks?(server, 0.8, 0.0) end, 3_000)
+    eventually(fn -> looks?(server, 0.8, 0.0) end)
   end
 
   @tag wire: [drop: 0.01, double: 0.005, flip: 0.005, seed: 9]
@@ -104,8 +104,8 @@ defmodule Sim.Hardware.HeadTest do
 
     for {pan, tilt} <- [{0.5, 0.1}, {-0.7, -0.2}, {0.3, 0.2}, {0.0, 0.0}] do
       Device.look(device, pan, tilt)
-      eventually(fn -> looks?(server, pan, tilt) end, 20_000)
-      eventually(fn -> told?(pan, tilt) end, 10_000)
+      eventually(fn -> looks?(server, pan, tilt) end)
+      eventually(fn -> told?(pan, tilt) end)
     end
   end
 
@@ -116,14 +116,14 @@ defmodule Sim.Hardware.HeadTest do
   } do
     online()
     Device.look(device, 1.5, 0.0)
-    eventually(fn -> body(server).pan > 0.3 end, 5_000)
+    eventually(fn -> body(server).pan > 0.3 end)
     :ok = Emulator.unplug(emulator)
     assert_receive {:health, :ptz, {{:offline, _reason}, _}}, 10_000
     :ok = Emulator.plug(emulator)
     assert_receive {:health, :ptz, {:online, _}}, 20_000
     Device.look(device, -0.4, 0.1)
-    eventually(fn -> looks?(server, -0.4, 0.1) end, 10_000)
-    eventually(fn -> told?(-0.4, 0.1) end, 5_000)
+    eventually(fn -> looks?(server, -0.4, 0.1) end)
+    eventually(fn -> told?(-0.4, 0.1) end)
   end
 
   test "frozen, it is offline; thawed, it is back", %{
@@ -137,7 +137,7 @@ defmodule Sim.Hardware.HeadTest do
     :ok = Emulator.thaw(emulator)
     assert_receive {:health, :ptz, {:online, _}}, 20_000
     Device.look(device, 0.4, 0.1)
-    eventually(fn -> looks?(server, 0.4, 0.1) end, 10_000)
+    eventually(fn -> looks?(server, 0.4, 0.1) end)
   end
 
   test "after a power cycle it looks where it was told to, without another command", %{
@@ -147,17 +147,17 @@ defmodule Sim.Hardware.HeadTest do
   } do
     online()
     Device.look(device, 0.4, 0.1)
-    eventually(fn -> looks?(server, 0.4, 0.1) end, 10_000)
+    eventually(fn -> looks?(server, 0.4, 0.1) end)
     :ok = Emulator.restart(emulator)
-    eventually(fn -> body(server).pan < 0.35 end, 5_000)
-    eventually(fn -> looks?(server, 0.4, 0.1) end, 20_000)
+    eventually(fn -> body(server).pan < 0.35 end)
+    eventually(fn -> looks?(server, 0.4, 0.1) end)
   end
 
   @tag camera: [power: :off, power_on_ms: 500]
   test "a camera that is switched off is switched on", %{server: server, device: device} do
     online()
     Device.look(device, -0.4, 0.1)
-    eventually(fn -> looks?(server, -0.4, 0.1) end, 20_000)
+    eventually(fn -> looks?(server, -0.4, 0.1) end)
   end
 
   @tag camera: [drop: 0.2, seed: 1]
@@ -166,7 +166,7 @@ defmodule Sim.Hardware.HeadTest do
 
     for pan <- [0.3, -0.3, 0.6] do
       Device.look(device, pan, 0.0)
-      eventually(fn -> looks?(server, pan, 0.0) end, 20_000)
+      eventually(fn -> looks?(server, pan, 0.0) end)
     end
   end
 end

@@ -73,13 +73,13 @@ defmodule Sim.Hardware.LineTest do
     assert line =~ "line_mute: " and line =~ "wheels"
   end
 
-  test "if the wheels are no longer reported, they stop within a second, and are disarmed",
+  test "if the wheels are no longer reported, they stop, and are disarmed",
        context do
     emulator = base(context, [])
     id = real(context, :line_wheels)
     rolls(context, id)
     :ok = Emulator.change(emulator, :silence, [[2]])
-    eventually(fn -> still?(context) end, 2_000)
+    eventually(fn -> still?(context) end)
     eventually(fn -> health(id) == {:offline, :silent} end)
     assert Hal.Device.arming(Names.whereis(id, :drive)).state == :disarmed
     :ok = Emulator.change(emulator, :silence, [[]])
@@ -96,9 +96,9 @@ defmodule Sim.Hardware.LineTest do
     rolls(context, id)
     :ok = Emulator.change(emulator, :silence, [[4]])
     since_ms = System.monotonic_time(:millisecond)
-    eventually(fn -> :blind in limits(id) end, 1_500)
+    eventually(fn -> :blind in limits(id) end)
     assert Hal.Device.arming(Names.whereis(id, :drive)).state == :armed
-    eventually(fn -> :disarmed in limits(id) and still?(context) end, 4_000)
+    eventually(fn -> :disarmed in limits(id) and still?(context) end)
     assert System.monotonic_time(:millisecond) - since_ms >= 1_900
     assert health(id) == :online
     {:error, line} = Swarm.arm(id)
@@ -120,26 +120,23 @@ defmodule Sim.Hardware.LineTest do
         eventually(fn -> line(id) =~ "drive offline (#{link}: no such device)" end)
         emulator = base(context, :all)
 
-        eventually(
-          fn -> line(id) =~ "drive offline (#{link}: the base does not report" end,
-          10_000
-        )
+        eventually(fn -> line(id) =~ "drive offline (#{link}: the base does not report" end)
 
         assert line(id) =~ "DISARMED (its base has not reported its wheels yet)"
         # During several of the driver's attempts.
         never(4_000, fn -> health(id) != {:offline, :silent} end)
         :ok = Emulator.change(emulator, :silence, [[]])
-        eventually(fn -> not (line(id) =~ "offline") end, 10_000)
+        eventually(fn -> not (line(id) =~ "offline") end)
         rolls(context, id)
         :ok = Emulator.change(emulator, :silence, [[4]])
-        eventually(fn -> line(id) =~ "BLIND (no sonar; slow)" end, 1_500)
+        eventually(fn -> line(id) =~ "BLIND (no sonar; slow)" end)
         :ok = Emulator.change(emulator, :silence, [[]])
         rolls(context, id)
         :ok = Emulator.unplug(emulator)
         eventually(fn -> line(id) =~ "LINE LOST (acknowledge it)" end)
         eventually(fn -> line(id) =~ "drive offline (#{link}: no such device)" end)
         :ok = Emulator.plug(emulator)
-        eventually(fn -> not (line(id) =~ "offline") end, 10_000)
+        eventually(fn -> not (line(id) =~ "offline") end)
         assert line(id) =~ "LINE LOST (acknowledge it)"
       end)
 
@@ -180,7 +177,7 @@ defmodule Sim.Hardware.LineTest do
     never(3_000, fn -> Pose.distance(stood, place(context)) > 0.01 end)
 
     assert Swarm.disarm(id) == :ok
-    assert_receive {[:robot, :fault], %{line: nil}}, 2_000
+    assert_receive {[:robot, :fault], %{line: nil}}
     assert Swarm.arm(id) == :ok
     # Arming is not a reason to move.
     never(1_000, fn -> Pose.distance(stood, place(context)) > 0.01 end)

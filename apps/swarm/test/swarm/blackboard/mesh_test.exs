@@ -2,7 +2,7 @@ defmodule Swarm.Blackboard.MeshTest do
   # Real nodes on loopback.
   # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
   use ExUnit.Case, async: true
-  import Swarm.Case, only: [eventually: 1, eventually: 2]
+  import Swarm.Case, only: [eventually: 1]
   alias Swarm.{Blackboard, Status}
   alias Swarm.Blackboard.Hints
   alias Swarm.Directory.RobotInfo
@@ -51,7 +51,7 @@ defmodule Swarm.Blackboard.MeshTest do
         :"#{hd(names)}" |> to_string() |> String.replace(~r/_.*/, "_90") |> String.to_atom()
       )
 
-    assert eventually(fn -> match?({:ok, ^big, _}, get(late, one.name, :map)) end, 10_000)
+    assert eventually(fn -> match?({:ok, ^big, _}, get(late, one.name, :map)) end)
 
     assert eventually(fn ->
              Cluster.call(late, Hints, :get, [{:searched, 7}]) == {:ok, 1.5, two.name}

@@ -14,7 +14,7 @@ defmodule Swarm.Comms.WaitingTest do
     forget(id)
 
     for _ <- 1..number,
-        do: assert_receive({:carried, ^id, %Message{kind: :heartbeat}}, 1_000)
+        do: assert_receive({:carried, ^id, %Message{kind: :heartbeat}})
   end
 
   defp forget(id) do

@@ -52,7 +52,7 @@ defmodule Swarm.Directory.RobotInfoTest do
 
     # It is written on each change, not only once a second.
     :ok = Swarm.start(robots: [:ab2])
-    eventually(fn -> Swarm.find(robot: :ab2, mission: :stand_mission) == [:ab2] end, 500)
+    eventually(fn -> Swarm.find(robot: :ab2, mission: :stand_mission) == [:ab2] end, 900)
     send(Names.whereis(:ab1, :drive), {:readings, [{:power, 12.5}]})
     eventually(fn -> Swarm.find(robot: :ab1, battery: {11.5, 14.0}) == [:ab1] end)
     assert Swarm.find(robot: :ab1, battery: &(&1 > 13)) == []

@@ -70,7 +70,7 @@ defmodule Swarm.EStop.OwnerTest do
     :ok = :sys.suspend(estop)
     Comms.hear(id, beat(0, false))
     Comms.hear(id, beat(3, true))
-    for _ <- 1..8, do: assert_receive({:carried, ^id, %Message{kind: :heartbeat}}, 1_000)
+    for _ <- 1..8, do: assert_receive({:carried, ^id, %Message{kind: :heartbeat}})
     assert {:ok, _line} = Swarm.ask(id, :ping)
     refute latched?(id)
 

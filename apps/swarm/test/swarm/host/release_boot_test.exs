@@ -186,7 +186,7 @@ defmodule Swarm.Host.ReleaseBootTest do
       if String.ends_with?(text, until) do
         text
       else
-        assert_receive message, 2_000
+        assert_receive message
 
         case Hal.Serial.handle(line, message) do
           {:data, bytes} -> heard(line, text <> bytes, until)

@@ -27,7 +27,7 @@ defmodule Swarm.Host.SystemdTest do
   end
 
   defp said(socket) do
-    assert_receive {:udp, ^socket, _address, _port, text}, 1_000
+    assert_receive {:udp, ^socket, _address, _port, text}
     String.split(text, "\n", trim: true)
   end
 

@@ -2,7 +2,7 @@ defmodule Swarm.MeshSizeTest do
   # Larger fleets: real nodes on loopback. Its nodes are VMs of their own, with names and ports of
   # their own: nothing of this VM is shared.
   use ExUnit.Case, async: true
-  import Swarm.Case, only: [eventually: 1, eventually: 2]
+  import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes, as: Cluster
   @moduletag :slow
 
@@ -37,6 +37,6 @@ defmodule Swarm.MeshSizeTest do
 
   test "ten nodes form" do
     nodes = Cluster.start(10, robots: true)
-    assert eventually(fn -> full?(nodes) end, 15_000)
+    assert eventually(fn -> full?(nodes) end)
   end
 end

@@ -2,7 +2,7 @@ defmodule Swarm.MeshTest do
   # Real nodes on loopback.
   # Its nodes are VMs of their own, with names and ports of their own: nothing of this VM is shared.
   use ExUnit.Case, async: true
-  import Swarm.Case, only: [eventually: 1, eventually: 2]
+  import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes, as: Cluster
   @moduletag :slow
 
@@ -46,7 +46,7 @@ defmodule Swarm.MeshTest do
     Cluster.signal(three, "KILL")
     assert eventually(fn -> alive(one) == [two.node] end)
     back = Cluster.join(nodes, three.name, robots: true)
-    assert eventually(fn -> full?([one, two, back]) end, 10_000)
+    assert eventually(fn -> full?([one, two, back]) end)
     assert eventually(fn -> Cluster.call(one, Swarm, :stop, [three.name]) == :ok end)
   end
 
@@ -78,7 +78,7 @@ defmodule Swarm.MeshTest do
     # The command goes through the third node.
     assert eventually(fn -> Cluster.call(one, Swarm, :stop, [two.name]) == :ok end)
     Cluster.call(one, :erlang, :set_cookie, [two.node, cookie])
-    assert eventually(fn -> full?(nodes) end, 10_000)
+    assert eventually(fn -> full?(nodes) end)
   end
 
   test "if multicast is blocked, a list of addresses suffices" do
