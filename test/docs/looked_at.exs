@@ -3,6 +3,7 @@ defmodule Docs.LookedAt do
   What can be said of a command without running it: that its program is there, and knows its words and
   options. `nil`, or what is wrong.
   """
+  import ExUnit.CaptureIO, only: [capture_io: 1]
   alias Docs.Sandbox
 
   @ours ~w(Hal Vision Robot Mesh Swarm Missions Sim Console Vm Mix)
@@ -180,10 +181,20 @@ defmodule Docs.LookedAt do
   defp help("mix", [task] = words, folder) do
     if task in ~w(release deps.get compile run),
       do: Mix.Task.moduledoc(Mix.Task.get(task)),
-      else: help_of("mix", words, folder)
+      else: help_of_task(words, folder)
   end
 
+  defp help("mix", words, folder), do: help_of_task(words, folder)
+
   defp help(program, words, folder), do: help_of(program, words, folder)
+
+  # Without a VM of its own.
+  defp help_of_task([task | words], folder) do
+    case Mix.Task.get(task) do
+      nil -> help_of("mix", [task | words], folder)
+      module -> capture_io(fn -> module.run(words ++ ["--help"]) end)
+    end
+  end
 
   # It says the same in every copy: asked once.
   defp help_of(program, words, folder) do
