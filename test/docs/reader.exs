@@ -145,7 +145,7 @@ defmodule Docs.Reader do
   """
   @spec plain(String.t(), String.t()) :: {String.t(), String.t()}
   def plain(shown, printed) do
-    numbers? = shown =~ ~r/(^|\s|\[)#(\w+\d |Swarm\.Matrix)/
+    numbers? = shown =~ ~r/(^|\s|\[)#(\w+\d |Swarm\.Membership\.Matrix)/
     {plain_text(shown, numbers?), plain_text(printed, numbers?)}
   end
 
