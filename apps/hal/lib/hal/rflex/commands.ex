@@ -7,12 +7,15 @@ defmodule Hal.RFlex.Commands do
   alias Hal.RFlex.Options
   alias Hal.RFlex.Protocol.{Command, Queue}
 
-  # Of a base whose conversion is not known. It stands, and is to brake whatever the units are.
+  # For a base whose conversion is not known. It stands, and should brake whatever its units are.
   @some_acceleration 100_000
 
   @type commands :: [{Queue.key(), binary()}]
 
-  @doc "A speed, from the one `before`: faster with the acceleration, slower with the braking."
+  @doc """
+  A speed; `before` is the last one. Axis 0 uses the acceleration if it gets faster, and the
+  braking otherwise.
+  """
   @spec speed(Options.t(), Twist.t(), Twist.t()) :: commands()
   def speed(%Options{} = options, %Twist{} = twist, %Twist{} = before) do
     %{conversions: %{distance: distance, angle: angle}, limits: limits} = options
@@ -27,14 +30,14 @@ defmodule Hal.RFlex.Commands do
     [{{:speed, 0}, move}, {{:speed, 1}, turn}]
   end
 
-  @doc "Standing still, as soon as the limits of braking allow."
+  @doc "A stop of both axes; axis 0 brakes with `max_braking`."
   @spec stop(Options.t()) :: commands()
   def stop(%Options{limits: limits} = options) do
     braking = acceleration(options.conversions.distance, limits.max_braking)
     [{{:speed, 0}, Command.move(0, braking)}, {{:speed, 1}, Command.turn(0)}]
   end
 
-  @doc "What a controller is told once it is there, or there again."
+  @doc "The commands that set up a controller, at the opening or after a silence."
   @spec first_words(Options.t()) :: commands()
   def first_words(%Options{conversions: conversions, limits: limits} = options) do
     move = acceleration(conversions.distance, limits.max_acceleration)
@@ -51,8 +54,8 @@ defmodule Hal.RFlex.Commands do
   end
 
   @doc """
-  What the line hears when nobody is there to drive: both axes stop, the brake is set. All of it
-  twice, for nobody will be there either to see that a frame was lost.
+  The line's last words when nothing can drive any more: they stop both axes and set the brake.
+  All of it is sent twice, because nothing will notice the loss of a frame.
   """
   @spec last_words(Options.t()) :: binary()
   def last_words(%Options{} = options) do
@@ -60,7 +63,7 @@ defmodule Hal.RFlex.Commands do
     :binary.copy(stop <> Command.brake(), 2)
   end
 
-  @doc "The last words of a driver that ends in order: the controller is told to be silent too."
+  @doc "The last words of a driver that ends in order: they end the controller's reports too."
   @spec farewell(Options.t()) :: binary()
   def farewell(%Options{} = options) do
     last_words(options) <>
@@ -69,7 +72,7 @@ defmodule Hal.RFlex.Commands do
       Command.system_reports(0, 0) <> Command.input_reports(0)
   end
 
-  @doc "Which senses a robot has, for its conversions."
+  @doc "Which range sensors are read, by the options."
   @spec senses(Options.t()) :: [:sonar | :infrared]
   def senses(%Options{} = options) do
     for {sense, true} <- [sonar: sonar?(options), infrared: infrared?(options)], do: sense
@@ -77,7 +80,7 @@ defmodule Hal.RFlex.Commands do
 
   defp sonar?(options), do: Enum.sum(options.sonar_banks) > 0
 
-  # Infrareds without their law are of no use; a robot drives without them.
+  # Infrareds are of no use without their law; a robot can drive without them.
   defp infrared?(%{conversions: conversions} = options) do
     Enum.sum(options.ir_banks) > 0 and (conversions.ir_a != nil or conversions.ir_b != nil)
   end
@@ -85,6 +88,6 @@ defmodule Hal.RFlex.Commands do
   defp sonar_on(%{sonar_times: {echo, ping, set}}), do: Command.sonar_on(echo, ping, set)
 
   defp acceleration(nil, _rate), do: @some_acceleration
-  # Never 0: a base that is to stand with no braking at all would roll on.
+  # Never 0: a base that should stop, but with no braking at all, would roll on.
   defp acceleration(units, rate), do: max(trunc(units * rate), 2)
 end

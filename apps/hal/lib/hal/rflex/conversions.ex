@@ -1,18 +1,18 @@
 defmodule Hal.RFlex.Conversions do
   @moduledoc """
   A robot's conversions between the controller's units and ours. They differ between robots of one
-  model by 7 % and more, so only the wheels' ratio has a default, and a robot without the others
-  does not arm. Pure.
+  model by 7 % and more, so only the wheels' ratio has a default, and a robot that lacks one that
+  it needs does not arm. Pure.
 
   | name | units |
   |---|---|
   | `distance` | per metre driven |
   | `angle` | per radian turned |
   | `range` | per metre of a sonar's range |
-  | `wheel_ratio` | way of the right wheel for the left one's, where the controller counts the same (`Hal.Drive.Wheels`); 1.0 unless given |
-  | `ir_a`, `ir_b` | of each infrared's law, a number for all or a list (see `Hal.RFlex.Sensors.Infrared`) |
+  | `wheel_ratio` | distance of the right wheel divided by that of the left one when the controller counts the same (`Hal.Drive.Wheels`); 1.0 unless given |
+  | `ir_a`, `ir_b` | constants of each infrared's law, one number for all or a list (see `Hal.RFlex.Sensors.Infrared`) |
 
-  Other drivers' files of old give distances per millimetre: times 1000.
+  Older drivers' files give distances per millimetre; multiply them by 1000.
   """
 
   defstruct distance: nil, angle: nil, wheel_ratio: 1.0, range: nil, ir_a: nil, ir_b: nil
@@ -34,7 +34,7 @@ defmodule Hal.RFlex.Conversions do
     ir_b: "ir_b (infrared)"
   ]
 
-  # What public configurations have; a robot's own differ by 7 % and more.
+  # From public configurations; a single robot's differ by 7 % and more.
   @published %{
     magellan: [distance: 31_387.0, angle: 4654.2],
     atrv_mini: [distance: 190_000.0, angle: 60_000.0]
@@ -42,7 +42,7 @@ defmodule Hal.RFlex.Conversions do
   @range 1474.0
 
   @doc """
-  The published conversions of a kind's wheels, to begin with.
+  The published conversions of a model's wheels, to begin with.
 
       iex> Hal.RFlex.Conversions.published(:magellan)
       [distance: 31387.0, angle: 4654.2]
@@ -50,12 +50,13 @@ defmodule Hal.RFlex.Conversions do
   @spec published(:magellan | :atrv_mini) :: [distance: float(), angle: float()]
   def published(kind), do: Map.fetch!(@published, kind)
 
-  @doc "The published conversion of the sonars, units a metre."
+  @doc "The published conversion of the sonars, in units per metre."
   @spec range() :: float()
   def range, do: @range
 
   @doc """
-  Whether all that a robot with these senses needs is there; or which conversions are missing.
+  Whether all conversions are present that a robot with these sensors needs; the error names the
+  missing ones.
 
       iex> Hal.RFlex.Conversions.ready(%Hal.RFlex.Conversions{range: 1474.0}, [:sonar])
       {:error, "conversions are missing: distance (units per metre), angle (units per radian)"}

@@ -1,13 +1,13 @@
 defmodule Hal.RFlex.Counters do
   @moduledoc """
-  What went wrong on a driver's line since it was opened, counted and told.
+  Counts what went wrong on a driver's line since it was opened, and reports it.
   """
   alias Hal.Event
   alias Hal.RFlex.{Driver, Options, Readings, Schedule}
 
   @tell_ms 10_000
 
-  @doc "How often it is told, in milliseconds."
+  @doc "How often the counts are reported, in milliseconds."
   @spec tell_ms() :: pos_integer()
   def tell_ms, do: @tell_ms
 
@@ -20,7 +20,7 @@ defmodule Hal.RFlex.Counters do
     |> Map.merge(%{refused: s.refused, overruns: s.overruns})
   end
 
-  @doc "Tells by an event, every 10 s, what has been lost or refused since."
+  @doc "Emits an event, at most every 10 s, if more has been lost or refused since the last one."
   @spec tell(Driver.t(), integer()) :: Driver.t()
   def tell(s, at_ms) do
     if Schedule.due?(s, :tell, at_ms) do

@@ -1,54 +1,60 @@
 defmodule Hal.RFlex.Driver do
   @moduledoc """
-  A base with an rFLEX controller on a serial line. `Hal.Device` runs it.
+  The driver of a base with an rFLEX controller on a serial line. `Hal.Device` runs it.
 
   | option | allowed | default |
   |---|---|---|
-  | `:port` | the line's device | must be given, or `serial: [pty: LINK]` |
+  | `:port` | the line's device | required, unless `serial: [pty: LINK]` is given |
   | `:speed` | baud | `115_200` |
   | `:serial` | `pty:`, `module:` of `Hal.Serial`; `keep_alive_ms:`, 100 to 300 | `[]` |
   | `:profile` | `:magellan`, `:atrv_mini` or a `Hal.Profile` | `:magellan` |
-  | `:conversions` | `distance:` units per metre, `angle:` per radian, `wheel_ratio:` 0.8 to 1.25, `range:` per metre of sonar, `ir_a:`, `ir_b:` (`Hal.RFlex.Conversions`) | none: does not arm |
+  | `:conversions` | `distance:` units per metre, `angle:` per radian, `wheel_ratio:` 0.8 to 1.25, `range:` per metre of sonar, `ir_a:`, `ir_b:` (`Hal.RFlex.Conversions`) | none: the drive does not arm |
   | `:limits` | `max_linear:` m/s, `max_turn:` rad/s, `max_acceleration:` m/s2, `max_turn_acceleration:` rad/s2, none above the profile's; `max_braking:`, `max_turn_braking:` up to 10 | the profile's; braking twice the acceleration |
   | `:bumpers` | `style:` `:bit` or `:address`, `base:` 0 to 255, `count:` 0 to 64, `segments:` list of 0 to 15 | `:bit`, `0x40`, the profile's, see `Hal.RFlex.Sensors.Bumpers` |
-  | `:sonar_banks` | how many are fitted on each board, 0 to 16 | boards of 8 |
-  | `:sonar_stride` | ids of a board, 1 to 16 | `16` |
-  | `:sonar_age` | a range is the least of so many readings, 1 to 20 | `1` |
-  | `:sonar_times` | `{echo, ping, set}`, microseconds | `{30_000, 1250, 0}`; an ATRV mini's ping 0 |
-  | `:ir_banks`, `:ir_base_bank` | infrareds of each board, 0 to 8; the first board | boards of 8; `0` |
-  | `:ir_order` | for each pose of the profile its place in the reports | a Magellan's; else as they come |
+  | `:sonar_banks` | how many sonars are fitted on each board, 0 to 16 | boards of 8 |
+  | `:sonar_stride` | ids per board, 1 to 16 | `16` |
+  | `:sonar_age` | a range is the least of this many readings, 1 to 20 | `1` |
+  | `:sonar_times` | `{echo, ping, set}`, microseconds | `{30_000, 1250, 0}`; ping is 0 for an ATRV mini |
+  | `:ir_banks`, `:ir_base_bank` | infrareds on each board, 0 to 8; the first board | boards of 8; `0` |
+  | `:ir_order` | for each pose of the profile, its place in the reports | a Magellan's; otherwise as they come |
   | `:ir_law`, `:ir_min` | `:metres` or `:millimetres`; metres | `:metres`; `0.1` |
-  | `:power_offset` | volts that the controller reads too low | `0.0` |
-  | `:joystick` | whether to ask for it | `false` |
-  | `:home` | address of the heading switch | `nil`: there is none |
-  | `:report_period` | of wheels and bumpers, microseconds | `100_000` |
+  | `:power_offset` | volts by which the controller reads too low | `0.0` |
+  | `:joystick` | whether to poll it | `false` |
+  | `:home` | address of the heading switch | `nil`: none |
+  | `:report_period` | between reports of wheels and bumpers, microseconds | `100_000` |
   | `:pace_ms` | between two commands, 1 to 50 | `12` |
-  | `:clock` | `{m, f, a}` giving integer milliseconds | monotonic time |
+  | `:clock` | `{m, f, a}` that returns integer milliseconds | monotonic time |
 
   ## Driving
 
-  A speed goes through `Hal.Drive.SlewLimiter`, last before the wire, every 50 ms, and is repeated every 100 ms, zero
-  too: a frame may be lost, and the controller stops by itself when it hears nothing for some time (how long
-  is not known). A stop is not ramped: it is the next thing on the wire, and the controller brakes with
-  `max_braking`. What is not a speed (`Hal.Drive.SlewLimiter.check/1`) is a stop, and counted. That a speed is
-  renewed is the affair of `Hal.Device`. The brake is released before the first speed, and again when the controller
-  says that it is set; `init` sets it. A driver that was held up until the line said its last words begins
-  again like that: from standing, with the brake.
+  Every speed passes `Hal.Drive.SlewLimiter`, the last step before the wire, every 50 ms. It is
+  repeated every 100 ms, zero too, because a frame may be lost, and because the controller stops
+  by itself when it hears nothing for some time (how long is not known). A stop is not ramped: it
+  is the next command on the wire, and the controller brakes with `max_braking`. A value that is
+  not a speed (`Hal.Drive.SlewLimiter.check/1`) counts as a stop, and is counted. `Hal.Device`
+  sees to it that speeds are renewed.
 
-  Without `distance` or `angle` there is no odometry, and every speed is a stop.
+  The brake is released before the first speed, and again when the controller reports that it is
+  set; `init` sets it. A driver that was held up until the line sent its last words starts again
+  in the same way: from rest, with the brake set.
 
-  The line's last words are a stop of both axes and the brake, twice (`Hal.RFlex.Commands`).
+  Without `distance` or `angle` there is no odometry, and every speed becomes a stop.
+
+  The line's last words stop both axes and set the brake, twice (`Hal.RFlex.Commands`).
 
   ## Readings
 
-  Those of `Hal.Drive`. Ranges come with each report of some sonars. Bumpers, of which the base tells changes only,
-  are repeated every 100 ms as long as they hold. The joystick is only read: driving by it is for whoever may drive.
-  Odometry goes on where it was when a line was lost and is open again in the same process; in another one
-  it begins at zero, in another frame (`Hal.Odometry`). Where a counter jumped (`Hal.RFlex.Sensors.Odometry`) it stays
-  where it is and goes on in another frame, for nobody knows how far the robot went meanwhile.
+  They are those of `Hal.Drive`. Ranges come with each sonar report, once every sonar was heard.
+  The base reports only changes of bumpers, so their state is repeated every 100 ms while the base
+  reports anything. The joystick is only read; this driver does not drive by it.
 
-  A controller that sends no wheels for 0.5 s is told again what to send, every second, as it may have been
-  switched off and on; one that sends nothing at all for 2 s is the error `:silent`.
+  Odometry continues where it was when a lost line is opened again in the same process; a new
+  process starts at zero, in a new frame (`Hal.Odometry`). When a counter jumps
+  (`Hal.RFlex.Sensors.Odometry`), the pose stays where it is and continues in a new frame, because
+  nobody knows how far the robot went meanwhile.
+
+  A controller that sends no wheel report for 0.5 s is set up again, every second, because it may
+  have been switched off and on; one that sends no packet at all for 2 s is the error `:silent`.
   """
   @behaviour Hal.Drive
   alias Hal.{Serial, Twist}
@@ -78,14 +84,17 @@ defmodule Hal.RFlex.Driver do
 
   @type t :: %__MODULE__{}
 
-  @doc "Checks options; or says in one line what is wrong."
+  @doc "Checks the options; the error is one line that says what is wrong."
   @spec options(keyword()) :: {:ok, Options.t()} | {:error, String.t()}
   def options(options), do: Options.new(options)
 
   @impl Hal.Drive
   defdelegate option_table, to: Options, as: :table
 
-  @doc "Opens the line, stops the wheels and sets the brake. Wrong options raise `ArgumentError`."
+  @doc """
+  Opens the line, and queues the set-up, a stop of the wheels and the brake. Wrong options raise
+  `ArgumentError`.
+  """
   @impl Hal.Drive
   def init(options) do
     options =
@@ -98,12 +107,12 @@ defmodule Hal.RFlex.Driver do
     with {:ok, line} <- Serial.open(serial), do: {:ok, start(options, line)}
   end
 
-  @doc "Whether it may be armed; the line names the conversions that are missing."
+  @doc "Whether the drive may be armed; the error names the missing conversions."
   @impl Hal.Drive
   def ready(%__MODULE__{options: options}),
     do: Outlook.ready(options)
 
-  @doc "What its options alone say; `Hal.RFlex.Outlook` judges both this and `ready/1`."
+  @doc "What the options alone say; `Hal.RFlex.Outlook` judges both this and `ready/1`."
   @impl Hal.Drive
   def judge(given) do
     with {:ok, options} <- Options.new(given) do
@@ -114,7 +123,7 @@ defmodule Hal.RFlex.Driver do
   end
 
   @doc """
-  An error in words.
+  Describes an error in words.
 
       iex> Hal.RFlex.Driver.explain(:silent, port: "/dev/ttyR0", speed: 9600)
       "/dev/ttyR0: the base does not report its wheels (is it on, its cable right, its speed 9600 baud?)"
@@ -150,15 +159,16 @@ defmodule Hal.RFlex.Driver do
 
   @impl Hal.Drive
   def terminate(s) do
-    # Kept where the device's next opening finds it: odometry that begins again would be a leap.
+    # Kept for the device's next opening: odometry that starts again at zero would be a jump.
     Process.put({__MODULE__, Options.line_name(s.options)}, {s.senses.odometry, s.senses.frame})
     Serial.last_words(s.line, Commands.farewell(s.options))
     Serial.close(s.line)
   end
 
   @doc """
-  What went wrong on the line since it was opened: bytes `skipped`, beginnings `given_up`, frames with
-  `ghosts`, packets `unknown` or `malformed`, wheel reports `dropped`, counter `jumps`, speeds `refused`, …
+  What went wrong on the line since it was opened: bytes `skipped`, beginnings of frames
+  `given_up`, frames with `ghosts`, packets `unknown` or `malformed`, wheel reports `dropped`,
+  counter `jumps`, speeds `refused`, …
   """
   @spec counts(t()) :: %{atom() => non_neg_integer()}
   defdelegate counts(driver), to: Counters
@@ -169,7 +179,8 @@ defmodule Hal.RFlex.Driver do
     ref = make_ref()
     Process.send_after(self(), {__MODULE__, ref, :tick}, 0)
 
-    # A process that begins knows of no way before: what it counts from now on is a frame of its own.
+    # A new process does not know of earlier movement: what it counts from now on is in a frame of
+    # its own.
     {before, frame} =
       Process.delete({__MODULE__, Options.line_name(options)}) || {nil, make_ref()}
 
@@ -246,7 +257,7 @@ defmodule Hal.RFlex.Driver do
     end
   end
 
-  # The line is behind, and has not lost anything.
+  # The line is behind, but has not lost anything.
   defp lost(_s, :overrun), do: :ok
   defp lost(s, reason), do: {:error, reason, s}
 

@@ -1,7 +1,7 @@
 defmodule Hal.RFlex.Options do
   @moduledoc """
-  The options of `Hal.RFlex.Driver`, which lists them: their table, and all defaults that follow from the
-  body (`Hal.RFlex.Sensors.Layout`). Pure.
+  The options of `Hal.RFlex.Driver`, where they are listed: their table, and the defaults that
+  follow from the body (`Hal.RFlex.Sensors.Layout`). Pure.
   """
   alias Hal.{Options, Profile, Serial}
   alias Hal.Drive.SlewLimiter
@@ -12,7 +12,7 @@ defmodule Hal.RFlex.Options do
   @conversions [
     distance: [@per_metre, default: nil],
     angle: [{:number, 1.0e-3, 1.0e7, "units per radian"}, default: nil],
-    # The two wheels of a base differ by some thousandths; what differs by more is not a pair.
+    # The two wheels of a base differ by some thousandths; far more than that is not a pair.
     wheel_ratio: {:number, 0.8, 1.25},
     range: [@per_metre, default: nil],
     ir_a: [
@@ -38,7 +38,8 @@ defmodule Hal.RFlex.Options do
     count: {:integer, 0, 64},
     segments: {:list, {:integer, 0, 15}}
   ]
-  # Wheels of a VM that is frozen turn on for that long; and the driver gives a sign of life each 50 ms.
+  # If the VM freezes, the wheels turn on for this long; the driver gives a sign of life every
+  # 50 ms.
   @serial Serial.table()
           |> Keyword.take([:pty, :module])
           |> Keyword.put(:keep_alive_ms, {:integer, 100, 300, "ms"})
@@ -77,12 +78,12 @@ defmodule Hal.RFlex.Options do
 
   @type t :: %__MODULE__{}
 
-  @doc "What is allowed."
+  @doc "The table of the options."
   @spec table() :: Options.table()
   def table, do: @table
 
   @doc """
-  Checks options; or says in one line what is wrong.
+  Checks the options; the error is one line that says what is wrong.
 
       iex> Hal.RFlex.Options.new(port: "/dev/ttyR0", conversions: [distance: -1])
       {:error, "rflex option conversions.distance cannot be -1: a number from 0.001 to 1.0e7 units per metre is allowed"}
@@ -94,7 +95,7 @@ defmodule Hal.RFlex.Options do
          {:ok, limits} <- limits(given[:limits], given[:profile]),
          {:ok, bumpers} <- Layout.bumpers(given[:bumpers], given[:profile]),
          conversions = struct!(Conversions, given[:conversions]),
-         # Without a profile of its own a robot file checks this itself.
+         # Without the option `profile`, the robot file checks this itself.
          {:ok, given} <- Layout.sensors(given, conversions, options[:profile] != nil) do
       new = [conversions: conversions, limits: limits, bumpers: bumpers]
       {:ok, struct!(__MODULE__, Keyword.merge(given, new))}
@@ -110,7 +111,7 @@ defmodule Hal.RFlex.Options do
     port ++ [speed: options[:speed]] ++ options[:serial]
   end
 
-  @doc "What people know the line by: its device, or the link of its pseudo-terminal."
+  @doc "The name by which people know the line: its device, or the link of its pseudo-terminal."
   @spec line_name(t() | keyword()) :: String.t() | nil
   def line_name(%__MODULE__{} = options), do: options.port || options.serial[:pty]
   def line_name(options), do: options[:port] || options[:serial][:pty]
@@ -132,7 +133,7 @@ defmodule Hal.RFlex.Options do
     with {:error, _problems} <- Options.Type.read(type, value), do: false
   end
 
-  # What the body can do is the most that may be asked of it.
+  # Limits may not exceed what the body can do.
   defp limits(limits, profile) do
     case Enum.find(limits, fn {key, value} -> value > Map.get(profile, key, 10.0) end) do
       nil ->

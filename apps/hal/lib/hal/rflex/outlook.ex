@@ -1,17 +1,17 @@
 defmodule Hal.RFlex.Outlook do
   @moduledoc """
-  Judges a base by its options alone, before its line is open: whether it may be armed, what it
+  Judges a base by its options alone, before its line is opened: whether it may be armed, what it
   reads, and which allowed values are unusual. The driver and `mix robot.check` use it. Pure.
   """
   alias Hal.RFlex.{Commands, Conversions, Options}
 
   @baud 115_200
-  # Robots of one kind differ by some percent; by so much no two that were public.
+  # Robots of one kind differ by some percent; no two public ones differ by this factor.
   @factor 1.5
 
   @doc """
-  Whether it may be armed; or which conversions are missing. Infrareds without their law are not read,
-  and hinder nothing.
+  Whether the drive may be armed; the error names the missing conversions. Infrareds without their
+  law are not read, and do not prevent it.
 
       iex> {:ok, options} = Hal.RFlex.Options.new(port: "/dev/ttyR0", conversions: [range: 1474.0])
       iex> Hal.RFlex.Outlook.ready(options)
@@ -22,8 +22,8 @@ defmodule Hal.RFlex.Outlook do
     do: Conversions.ready(options.conversions, Commands.senses(options))
 
   @doc """
-  What is allowed and odd, a line each, with the number that would be usual; `given` are the options as they
-  were written.
+  Options that are allowed but unusual, one line each, with the usual number; `given` holds the
+  options as they were written.
 
       iex> given = [port: "/dev/ttyR0", conversions: [distance: 31.387]]
       iex> {:ok, options} = Hal.RFlex.Options.new(given)
@@ -38,7 +38,7 @@ defmodule Hal.RFlex.Outlook do
   defp baud(@baud), do: nil
   defp baud(speed), do: "speed: #{speed} baud is odd; #{@baud} is usual"
 
-  # Without a word of it, boards are taken for full.
+  # Boards are taken for full unless the options say otherwise.
   defp boards(options, given) do
     for key <- [:sonar_banks, :ir_banks], given[key] == nil do
       banks = Map.fetch!(options, key)
@@ -62,6 +62,6 @@ defmodule Hal.RFlex.Outlook do
     end
   end
 
-  # 190000.0, not 1.9e5.
+  # Writes 190000.0, not 1.9e5.
   defp number(value), do: :erlang.float_to_binary(value, [:compact, decimals: 6])
 end

@@ -1,18 +1,20 @@
 defmodule Hal.RFlex.PowerSwitch do
   @moduledoc """
-  The shut-down of the whole robot: the controller listens on the computer's serial console, and
-  cuts the power once it reads there that the system has halted. An operating system that uses
-  other words leaves the power on, so Convoy prints a configurable phrase as the last thing.
+  Switches the power of the whole robot off: the controller listens on the computer's serial
+  console, and cuts the power once it reads there that the system has halted. An operating system
+  that uses other words leaves the power on, so Convoy prints a configurable phrase as its last
+  output.
 
   | option | allowed | default |
   |---|---|---|
-  | `:port` | the console's device | must be given |
+  | `:port` | the console's device | required |
   | `:speed` | baud | `9600` |
   | `:phrase` | 1 to 80 printable ASCII characters | `"The system is halted"` |
   | `:serial` | further options for `Hal.Serial` | `[]` |
 
-  The command is `robot halt` (`Swarm.Host.PowerOff`), off unless the robot's file has a `console:`.
-  Whoever calls this is about to lose power: file systems are to be unmounted or read-only.
+  The command is `robot halt` (`Swarm.Host.PowerOff`), which is off unless the robot's file has a
+  `console:`. The caller is about to lose power: it should have unmounted the file systems, or
+  made them read-only.
   """
   alias Hal.{Options, Serial}
 
@@ -30,7 +32,7 @@ defmodule Hal.RFlex.PowerSwitch do
   ]
 
   @doc """
-  The bytes of a phrase: on a line of its own.
+  The bytes that print a phrase on a line of its own.
 
       iex> Hal.RFlex.PowerSwitch.bytes("System halted")
       "\\r\\nSystem halted\\r\\n"
@@ -38,14 +40,14 @@ defmodule Hal.RFlex.PowerSwitch do
   @spec bytes(String.t()) :: binary()
   def bytes(phrase), do: "\r\n" <> phrase <> "\r\n"
 
-  @doc "Says it. Errors are one line."
+  @doc "Prints the phrase. The error is one line for people."
   @spec halt(keyword()) :: :ok | {:error, String.t()}
   def halt(options) do
     with {:ok, options} <- options(options) do
       words = bytes(options[:phrase])
       serial = [port: options[:port], speed: options[:speed], last_words: words]
 
-      # As last words they are on the line before closing comes back, whatever else waits.
+      # As last words they are written before `close/1` returns, whatever else waits.
       case Serial.open(serial ++ options[:serial]) do
         {:ok, line} -> Serial.close(line)
         {:error, reason} -> {:error, Serial.explain(reason, options[:port])}
@@ -54,7 +56,7 @@ defmodule Hal.RFlex.PowerSwitch do
   end
 
   @doc """
-  Checks options and fills in what is missing.
+  Checks the options and adds the defaults.
 
       iex> Hal.RFlex.PowerSwitch.options(port: "/dev/ttyS0", phrase: "")
       {:error, "console option phrase cannot be \\"\\": text of 1 to 80 printable ASCII characters is allowed"}
@@ -62,7 +64,7 @@ defmodule Hal.RFlex.PowerSwitch do
   @spec options(keyword()) :: {:ok, keyword()} | {:error, String.t()}
   def options(options), do: Options.check(options, @table, "console")
 
-  @doc "What is allowed."
+  @doc "The table of the options."
   @spec table() :: Options.table()
   def table, do: @table
 

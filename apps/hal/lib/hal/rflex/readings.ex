@@ -1,7 +1,7 @@
 defmodule Hal.RFlex.Readings do
   @moduledoc """
-  Converts packets to readings: everything that a robot's controller reports, in our units. Pure;
-  the time of arrival comes in, as integer milliseconds.
+  Converts the controller's packets to readings in our units. Pure; the time of arrival is passed
+  in, as integer milliseconds.
   """
   alias Hal.RFlex.Options
   alias Hal.RFlex.Protocol.{Packet, Report}
@@ -20,10 +20,16 @@ defmodule Hal.RFlex.Readings do
                 counts: %{}
               ]
 
-  @typedoc "`frame` of the odometry; `paired?`: both wheels' counters were heard; `counts`: packets that were `unknown`, `malformed`, or `implausible`."
+  @typedoc """
+  `frame` is that of the odometry; `paired?` says whether both wheel counters have been heard;
+  `counts` counts packets that were `unknown`, `malformed`, or `implausible`.
+  """
   @type t :: %__MODULE__{}
 
-  @doc "Senses of these options; `before` is the odometry of the same base in the same `frame`, if it goes on."
+  @doc """
+  The state for these options; `before` is the odometry of the same base in the same `frame`, if
+  it continues.
+  """
   @spec new(Options.t(), Odometry.t() | nil, frame :: reference() | nil) :: t()
   def new(%Options{} = options, before \\ nil, frame \\ nil) do
     %__MODULE__{
@@ -37,7 +43,7 @@ defmodule Hal.RFlex.Readings do
     }
   end
 
-  @doc "Takes a packet; gives the readings it makes."
+  @doc "Takes a packet, and returns the readings that it gives."
   @spec packet(t(), Packet.t(), integer()) :: {[Hal.Drive.reading()], t()}
   def packet(%__MODULE__{} = senses, %Packet{} = packet, at_ms) do
     case Report.decode(packet) do
@@ -52,12 +58,12 @@ defmodule Hal.RFlex.Readings do
     end
   end
 
-  @doc "How often a counter of the wheels has jumped, so that nobody knows how far the robot went."
+  @doc "How often a wheel counter has jumped, so that it is unknown how far the robot went."
   @spec jumps(t()) :: non_neg_integer()
   def jumps(%__MODULE__{odometry: nil}), do: 0
   def jumps(%__MODULE__{odometry: %Odometry{jumps: jumps}}), do: jumps
 
-  @doc "Readings and senses whose odometry is in another frame."
+  @doc "Puts odometry into another frame, both in the readings and in the state."
   @spec reframe([Hal.Drive.reading()], t(), reference()) :: {[Hal.Drive.reading()], t()}
   def reframe(readings, %__MODULE__{} = senses, frame) do
     readings =
@@ -69,11 +75,14 @@ defmodule Hal.RFlex.Readings do
     {readings, %{senses | frame: frame}}
   end
 
-  @doc "What still holds and should not grow old on the board: bumpers, which tell of changes only."
+  @doc """
+  Readings that still apply and should not become stale: those of bumpers, which are reported only
+  when they change.
+  """
   @spec standing(t()) :: [Hal.Drive.reading()]
   def standing(%__MODULE__{} = senses), do: pressed(senses)
 
-  @doc "What was counted since the start, by what it is."
+  @doc "What was counted since the start, by kind."
   @spec counts(t()) :: map()
   def counts(%__MODULE__{} = senses) do
     odometry = if senses.odometry, do: Map.take(senses.odometry, [:dropped, :jumps]), else: %{}
@@ -95,7 +104,8 @@ defmodule Hal.RFlex.Readings do
     end
   end
 
-  # Of a pair of which the other half may come or be lost: once a pair was heard, the base is there.
+  # Half of a pair, whose other half may come or be lost: once a pair was heard, half of one is a
+  # sign of the base.
   defp half(true), do: [{:report, :wheels}]
   defp half(false), do: []
 
@@ -141,7 +151,7 @@ defmodule Hal.RFlex.Readings do
   end
 
   defp pressed(%{bumpers: %{count: 0}}), do: []
-  # Not before a controller has said so.
+  # Not before the controller's first report.
   defp pressed(%{bumpers: %{states: states}}) when states == %{}, do: []
   defp pressed(%{bumpers: bumpers}), do: [{:bumpers, Bumpers.pressed(bumpers)}]
 

@@ -1,20 +1,21 @@
 defmodule Hal.RFlex.Reception do
   @moduledoc """
-  What a driver hears: bytes from the line to readings. Time is passed in, in milliseconds.
+  The reception of a driver: turns bytes from the line into readings. Time is passed in, in
+  milliseconds.
   """
   alias Hal.RFlex.{Driver, Readings}
   alias Hal.RFlex.Protocol.Decoder
 
   @idle_ms 30
 
-  @doc "Takes bytes as they come."
+  @doc "Takes bytes as they arrive."
   @spec bytes(Driver.t(), binary(), integer()) :: {[Hal.Drive.reading()], Driver.t()}
   def bytes(s, bytes, at_ms) do
     {packets, decoder} = Decoder.feed(s.decoder, bytes)
     take(packets, %{s | decoder: decoder, bytes_ms: at_ms}, at_ms)
   end
 
-  @doc "Gives up waiting for the rest of a frame when nothing has come for a while."
+  @doc "Gives up an unfinished frame when nothing has arrived for 30 ms."
   @spec idle(Driver.t(), integer()) :: {[Hal.Drive.reading()], Driver.t()}
   def idle(s, at_ms) do
     if Decoder.waiting?(s.decoder) and at_ms - s.bytes_ms >= @idle_ms do
@@ -25,7 +26,7 @@ defmodule Hal.RFlex.Reception do
     end
   end
 
-  # Noise is no sign of a controller.
+  # Noise is not a sign of a controller.
   defp take([], s, _at_ms), do: {[], s}
 
   defp take(packets, s, at_ms) do

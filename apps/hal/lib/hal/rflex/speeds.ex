@@ -1,7 +1,8 @@
 defmodule Hal.RFlex.Speeds do
   @moduledoc """
-  What a driver tells the wheels: the speed that is wanted, limited (`Hal.Drive.SlewLimiter`),
-  repeated, and with the brake released before it. Pure; time is passed in, in milliseconds.
+  The speeds that a driver sends to the wheels: the requested speed, limited
+  (`Hal.Drive.SlewLimiter`), repeated, and after a release of the brake. Pure; time is passed in,
+  in milliseconds.
   """
   alias Hal.Drive.SlewLimiter
   alias Hal.RFlex.{Commands, Driver, Schedule}
@@ -14,7 +15,7 @@ defmodule Hal.RFlex.Speeds do
   @spec repeat_ms() :: pos_integer()
   def repeat_ms, do: @repeat_ms
 
-  @doc "What is wanted from now on; what is not a speed is a stop, and counted."
+  @doc "Sets the requested speed; a value that is not a speed counts as a stop, and is counted."
   @spec want(Driver.t(), Twist.t() | term()) :: Driver.t()
   def want(s, twist) do
     case SlewLimiter.check(twist) do
@@ -23,11 +24,11 @@ defmodule Hal.RFlex.Speeds do
     end
   end
 
-  @doc "Puts the speed of now into the queue, where it is another one or due again."
+  @doc "Queues the speed for now, if it has changed or is due again."
   @spec say(Driver.t(), integer()) :: Driver.t()
   def say(s, at_ms), do: s |> step(at_ms) |> changed(at_ms)
 
-  # What the wheels are to do now.
+  # Computes the speed for now.
   defp step(s, at_ms) do
     s = if at_ms - s.stepped_ms >= pause_ms(s), do: stood(s), else: s
     wanted = if known?(s), do: s.wanted, else: Twist.zero()
@@ -35,7 +36,7 @@ defmodule Hal.RFlex.Speeds do
     %{s | ramp: ramp, stepped_ms: at_ms}
   end
 
-  # Whoever was away for so long comes back to a line that has said its last words.
+  # After a pause of this length the line has sent its last words.
   defp pause_ms(s), do: s.options.serial[:keep_alive_ms] || 200
 
   defp stood(s), do: %{s | ramp: SlewLimiter.standing(s.ramp), said: nil, released?: false}

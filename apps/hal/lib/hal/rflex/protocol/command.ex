@@ -1,8 +1,8 @@
 defmodule Hal.RFlex.Protocol.Command do
   @moduledoc """
-  All commands to the controller, as bytes ready for the line. Pure; raw units.
+  All commands to the controller, as bytes to write to the line. Pure; raw units.
 
-  Axis 0 moves, axis 1 turns. A speed is always two frames, one an axis. Torques and the
+  Axis 0 moves, axis 1 turns. A speed is always two frames, one for each axis. Torques and the
   acceleration of axis 1 are the constants that public drivers send.
   """
   import Bitwise
@@ -14,16 +14,21 @@ defmodule Hal.RFlex.Protocol.Command do
 
   @type axis :: 0 | 1
 
-  @doc "Asks for motor reports every `period` (taken for microseconds) of the axes in `mask`; 0, 0 ends them."
+  @doc """
+  Requests motor reports of the axes in `mask` every `period` (assumed to be microseconds); 0, 0
+  ends them.
+  """
   @spec system_reports(non_neg_integer(), non_neg_integer()) :: binary()
   def system_reports(period, mask), do: frame(2, 34, <<period::32, mask::32>>)
 
-  @doc "Asks for reports of the digital inputs every `period` (taken for microseconds); 0 ends them."
+  @doc """
+  Requests reports of the digital inputs every `period` (assumed to be microseconds); 0 ends them.
+  """
   @spec input_reports(non_neg_integer()) :: binary()
   def input_reports(0), do: frame(5, 0, <<0::32>>, 4)
   def input_reports(period), do: frame(5, 0, <<period::32>>)
 
-  @doc "Sets the controller's own settings to their defaults."
+  @doc "Resets the controller's own settings to their defaults."
   @spec defaults() :: binary()
   def defaults, do: frame(2, 10, <<>>)
 
@@ -41,8 +46,8 @@ defmodule Hal.RFlex.Protocol.Command do
   def release, do: frame(2, 12, <<>>)
 
   @doc """
-  The first frame of an axis after opening: standing, with this acceleration. Neither its bytes nor the
-  checksum are `1B`: see `turn/2`.
+  The first frame of an axis after the opening: at rest, with this acceleration. Neither a byte of
+  the acceleration nor, unless that is 0, the checksum is `1B`: see `turn/2`.
   """
   @spec prepare(axis(), non_neg_integer()) :: binary()
   def prepare(axis, acceleration) do
@@ -54,27 +59,28 @@ defmodule Hal.RFlex.Protocol.Command do
   end
 
   @doc """
-  The speed of axis 0, signed, and the acceleration with which the controller gets there.
-  Neither the bytes of the acceleration nor the checksum are `1B`: see `turn/2`.
+  The signed speed of axis 0, and the acceleration with which the controller gets there. Neither a
+  byte of these two nor, unless the acceleration is 0, the checksum is `1B`: see `turn/2`.
   """
   @spec move(integer(), non_neg_integer()) :: binary()
   def move(speed, acceleration) when abs(speed) <= @largest,
     do: axis(0, plain(abs(speed)) * sign(speed), acceleration)
 
   @doc """
-  The speed of axis 1, signed, at most `greatest`.
+  The signed speed of axis 1, whose magnitude should not exceed `greatest`.
 
-  The controller misunderstands a speed that has a byte `1B`. Public drivers avoid it in the second
-  byte by going to `1AFF` or `1C00`, whichever is nearer, and so does this. What they leave alone is
-  avoided here too: a last byte `1B`, the same in axis 0 (both towards zero), in the acceleration, and
-  a checksum `1B` (the acceleration is lowered by a unit or two). Nothing is ever above `greatest`.
+  The controller misunderstands a speed that has a byte `1B`. Public drivers avoid it in the
+  second byte by going to `1AFF` or `1C00`, whichever is nearer, and so does this function. It
+  also avoids what they leave alone: a last byte `1B`, the same in axis 0 (both towards zero), in
+  the acceleration, and a checksum `1B` (the acceleration is lowered by a unit or two). None of
+  this raises a speed above `greatest`.
   """
   @spec turn(integer(), non_neg_integer()) :: binary()
   def turn(speed, greatest \\ @largest) when abs(speed) <= @largest,
     do: axis(1, avoid(abs(speed), greatest) * sign(speed), @turn_acceleration)
 
   @doc """
-  The magnitude of a turning speed without `1B` in its upper bytes, after the public drivers.
+  The magnitude of a turning speed without any byte `1B`, after the public drivers.
 
       iex> Hal.RFlex.Protocol.Command.avoid(0x1B80, 0xFFFF)
       0x1C00
@@ -89,38 +95,40 @@ defmodule Hal.RFlex.Protocol.Command do
     plain(speed)
   end
 
-  @doc "Drives an axis to a position. Defined by the protocol, used by nobody we know of."
+  @doc "Drives an axis to a position. Defined by the protocol, but no known driver uses it."
   @spec position(axis(), non_neg_integer(), non_neg_integer(), integer()) :: binary()
   def position(axis, speed, acceleration, position) do
     torque = elem(@torque, axis)
     frame(2, 8, <<axis, speed::32, acceleration::32, torque::32, position::signed-32>>)
   end
 
-  @doc "Runs the sonars: listening time per ping, pause after it, pause after a sweep; microseconds."
+  @doc """
+  Starts the sonars: listening time per ping, pause after it, pause after a sweep; microseconds.
+  """
   @spec sonar_on(non_neg_integer(), non_neg_integer(), non_neg_integer()) :: binary()
   def sonar_on(echo, ping, set), do: frame(4, 0, <<echo::32, ping::32, set::32, 2>>, 4)
 
-  @doc "Ends the sonars' pinging."
+  @doc "Stops the sonars."
   @spec sonar_off() :: binary()
   def sonar_off, do: frame(4, 0, <<0::104>>, 4)
 
-  @doc "Runs the infrareds, with the five times that public drivers send."
+  @doc "Starts the infrareds, with the five times that public drivers send."
   @spec infrared_on() :: binary()
   def infrared_on, do: frame(6, 0, <<0::32, 70::32, 10::32, 20::32, 150::32, 2>>)
 
-  @doc "Ends the infrareds."
+  @doc "Stops the infrareds."
   @spec infrared_off() :: binary()
   def infrared_off, do: frame(6, 0, <<0::168>>)
 
-  @doc "Asks for battery and brake."
+  @doc "Requests the state of battery and brake."
   @spec status() :: binary()
   def status, do: frame(1, 1, <<>>)
 
-  @doc "Asks for the joystick."
+  @doc "Requests the state of the joystick."
   @spec joystick() :: binary()
   def joystick, do: frame(3, 0, <<>>)
 
-  @doc "Asks for the screen, row by row. Defined by the protocol, used by nobody we know of."
+  @doc "Requests the screen, row by row. Defined by the protocol, but no known driver uses it."
   @spec screen() :: binary()
   def screen, do: frame(1, 0, <<>>)
 
@@ -135,7 +143,7 @@ defmodule Hal.RFlex.Protocol.Command do
       else: bytes
   end
 
-  # The last but two is the checksum. Another acceleration has another one.
+  # The checksum is the third byte from the end. Another acceleration changes it.
   defp summed?(bytes), do: :binary.at(bytes, byte_size(bytes) - 3) == 0x1B
 
   defp frame(port, opcode, data, id \\ 0),

@@ -3,38 +3,42 @@ defmodule Hal.RFlex.Protocol.Decoder do
   Extracts frames from a stream of bytes; the same bytes give the same packets however they are
   split. Pure.
 
-  What begins like a frame but is not one is given up, and the search goes on **one byte after** its
-  beginning, so that a damaged frame takes no sound one along.
+  A beginning that does not lead to a valid frame is given up, and the search continues **one byte
+  after** it, so that a damaged frame does not take a valid one with it.
 
   ## Ghost bytes
 
   The controller seems to treat `1B` specially: infrared reports of two banks (N = 27 = `1B`) come
-  with one byte more right after N, which neither N nor the checksum counts. So where a frame does
-  not fit as it is and has a `1B` between its port and its checksum, these are tried, in this order:
+  with one extra byte right after N, which neither N nor the checksum counts. So if a frame does
+  not fit as it is and has a `1B` between its port and its checksum, these readings of it are
+  tried, in this order:
 
-    * every `1B` is followed by a ghost; those in N and data only; those and in the checksum; all
-      but the one in the checksum
-    * the report is of two infrared banks, and N is followed by a ghost of whatever value
-    * a single ghost somewhere
+    * every `1B` is followed by a ghost; only those in N and data; only those in N, data and
+      checksum; all but the one in the checksum
+    * the report is one of two infrared banks, and N is followed by a ghost of any value
+    * a single `1B` somewhere is followed by a ghost
 
-  A ghost is `1B` again, until two frames in a row had another one after N: then it is that.
+  A ghost is another `1B`, until two such frames in a row had the same other byte after N: from
+  then on it is that byte.
 
   ## Bounds
 
-  At most #{2 * 255 + 20} bytes are kept. Reports whose length is roughly known are given up at
-  once if N is far from it, so that a damaged N does not hold up what comes after; and
-  `idle/1` gives up what is unfinished, for a line that has been silent.
+  At most #{2 * 255 + 20} bytes are kept. A report whose greatest length is roughly known is given
+  up as soon as its N is above it, so that a damaged N does not hold up what follows; and `idle/1`
+  gives up what is unfinished, for a line that has been silent.
   """
   alias Hal.RFlex.Protocol.Packet
 
-  # Header and N, data and checksum, each with or without ghosts.
+  # Whether the header, N and data, and the checksum have ghosts.
   @ways [{true, true, true}, {false, true, false}, {false, true, true}, {true, true, false}]
-  # The longest N of reports that are known, with room to spare: {port, opcode}.
+  # The greatest N of the known reports, with some room, by {port, opcode}.
   @longest %{{1, 1} => 64, {2, 33} => 64, {3, 0} => 64, {5, 1} => 64, {6, 1} => 105}
 
   defstruct rest: <<>>, ghost: 0x1B, seen: nil, packets: 0, given_up: 0, ghosts: 0, skipped: 0
 
-  @typedoc "Counters: `packets` found, `given_up` beginnings, frames with `ghosts`, bytes `skipped`."
+  @typedoc """
+  Counters: `packets` found, beginnings `given_up`, frames with `ghosts`, bytes `skipped`.
+  """
   @type t :: %__MODULE__{
           rest: binary(),
           ghost: byte(),
@@ -45,12 +49,12 @@ defmodule Hal.RFlex.Protocol.Decoder do
           skipped: non_neg_integer()
         }
 
-  @doc "A decoder that has seen nothing yet."
+  @doc "A decoder that has received nothing yet."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
   @doc """
-  The packets that are complete with these bytes, in their order.
+  The packets that these bytes complete, in their order.
 
       iex> alias Hal.RFlex.Protocol.Decoder
       iex> {[], decoder} = Decoder.feed(Decoder.new(), <<7, 0x1B, 2, 2, 0, 12>>)
@@ -62,11 +66,11 @@ defmodule Hal.RFlex.Protocol.Decoder do
   def feed(%__MODULE__{} = decoder, bytes) when is_binary(bytes),
     do: run(%{decoder | rest: <<>>}, decoder.rest <> bytes, false, [])
 
-  @doc "Gives up what is unfinished; what is complete within it comes out."
+  @doc "Gives up an unfinished frame; returns the packets that are complete within it."
   @spec idle(t()) :: {[Packet.t()], t()}
   def idle(%__MODULE__{} = decoder), do: run(%{decoder | rest: <<>>}, decoder.rest, true, [])
 
-  @doc "Whether something is unfinished."
+  @doc "Whether a frame is unfinished."
   @spec waiting?(t()) :: boolean()
   def waiting?(%__MODULE__{rest: rest}), do: rest != <<>>
 
@@ -85,7 +89,7 @@ defmodule Hal.RFlex.Protocol.Decoder do
         run(%{decoder | packets: decoder.packets + 1}, rest, idle?, [packet | packets])
 
       :more ->
-        # A copy, so that a long binary is not kept for its end.
+        # A copy, so that a long binary is not kept for the sake of its end.
         rest = :binary.copy(<<0x1B, 0x02, body::binary>>)
         done(%{decoder | rest: rest}, packets)
 
@@ -96,7 +100,7 @@ defmodule Hal.RFlex.Protocol.Decoder do
     end
   end
 
-  # The last byte may be the first half of a beginning.
+  # The last byte may be the first half of a frame's beginning.
   defp skip(decoder, bytes, false) when bytes != <<>> do
     if :binary.last(bytes) == 0x1B,
       do: %{decoder | rest: <<0x1B>>, skipped: decoder.skipped + byte_size(bytes) - 1},
@@ -165,7 +169,7 @@ defmodule Hal.RFlex.Protocol.Decoder do
     :binary.match(part, <<0x1B>>) != :nomatch
   end
 
-  # A frame that is too short to have an N is only here when the line is idle.
+  # A frame that is too short to have an N gets here only when the line is idle.
   defp ghostly?(_short), do: false
 
   defp ghosts([], _body, _ghost, _idle?), do: :no
@@ -188,7 +192,8 @@ defmodule Hal.RFlex.Protocol.Decoder do
   defp where(true, ghost), do: ghost
   defp where(false, _ghost), do: nil
 
-  # `count` bytes without the ghosts after each 1B. What has no ghost where one belongs is no such frame.
+  # Takes `count` bytes without the ghosts after each 1B. Without a ghost where one belongs, it is
+  # not such a frame.
   defp take(rest, 0, _ghost, taken), do: {:ok, taken, rest}
 
   defp take(<<0x1B, ghost, rest::binary>>, count, ghost, taken),
@@ -202,8 +207,8 @@ defmodule Hal.RFlex.Protocol.Decoder do
 
   defp take(<<>>, _count, _ghost, _taken), do: :more
 
-  # Only infrared reports, whose first byte says that there are two banks: a ghost of any value
-  # anywhere would take every byte that came twice for one.
+  # Only for infrared reports whose first byte says that there are two banks: if a ghost of any
+  # value could be anywhere, every byte that came twice would count as one.
   defp after_length(<<6, id, 1, 0x1B, rest::binary>>) do
     case rest do
       <<ghost, 2, _::binary>> ->
@@ -222,7 +227,7 @@ defmodule Hal.RFlex.Protocol.Decoder do
 
   defp after_length(_other), do: :no
 
-  # One ghost after any 1B of N, data or checksum: its place does not change the checksum.
+  # One ghost after any 1B of N, data or checksum: its position does not change the checksum.
   defp single(
          <<port, id, opcode, n, data::binary-size(n), extra, sum, 0x1B, 0x03, rest::binary>>,
          ghost

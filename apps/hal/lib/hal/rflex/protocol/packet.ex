@@ -4,9 +4,9 @@ defmodule Hal.RFlex.Protocol.Packet do
 
       1B 02 | port | id | opcode | N | N bytes of data | checksum | 1B 03
 
-  The checksum is the exclusive or of everything from the port to the last data byte. It finds
-  every damage to one byte, and all damage to several bytes but 1 in 256; it cannot find bytes
-  that changed places, nor the same bit flipped in two bytes.
+  The checksum is the exclusive or of everything from the port to the last data byte. It detects
+  any damage to one byte, and 255 of 256 cases of random damage to several bytes; it does not
+  detect bytes that changed places, or the same bit flipped in two bytes.
   """
   import Bitwise
 
@@ -16,7 +16,7 @@ defmodule Hal.RFlex.Protocol.Packet do
   @type t :: %__MODULE__{port: byte(), id: byte(), opcode: byte(), data: binary()}
 
   @doc """
-  The bytes of a frame. Data are at most 255 bytes.
+  The bytes of a frame. Its data has at most 255 bytes.
 
       iex> Hal.RFlex.Protocol.Packet.encode(%Hal.RFlex.Protocol.Packet{port: 2, opcode: 10})
       <<0x1B, 0x02, 0x02, 0x00, 0x0A, 0x00, 0x08, 0x1B, 0x03>>

@@ -1,11 +1,11 @@
 defmodule Hal.RFlex.Protocol.Queue do
   @moduledoc """
-  Which command to send next, and when: the controller loses commands that are less than 10 ms
-  apart. Pure; the caller waits and writes.
+  Decides which command to send next, and when: the controller loses commands that are less than
+  10 ms apart. Pure; the caller waits and writes.
 
-  Every command has a key, and a newer one takes the place of an older one with the same key that still
-  waits, in its place: so nothing is starved, a speed is never an old one, and there are never more
-  commands than there are keys. A stop throws away the speeds that wait and goes before everything.
+  Every command has a key. A newer command replaces a waiting one with the same key, and keeps its
+  place: so a key that is written often does not lose its turn, no outdated speed is sent, and
+  there are never more commands than keys. A stop discards the waiting speeds and goes first.
   """
 
   @enforce_keys [:pace_ms]
@@ -18,12 +18,12 @@ defmodule Hal.RFlex.Protocol.Queue do
           free_ms: integer() | nil
         }
 
-  @doc "An empty queue; commands are `pace_ms` apart."
+  @doc "An empty queue; commands are sent `pace_ms` apart."
   @spec new(pos_integer()) :: t()
   def new(pace_ms), do: %__MODULE__{pace_ms: pace_ms}
 
   @doc """
-  A command, in the place of the one with its key, or last.
+  Adds a command, in the place of the waiting one with its key, or last.
 
       iex> alias Hal.RFlex.Protocol.Queue
       iex> queue = Queue.new(12) |> Queue.put(:a, "1") |> Queue.put(:b, "2")
@@ -36,7 +36,7 @@ defmodule Hal.RFlex.Protocol.Queue do
   end
 
   @doc """
-  A stop: no speed that waits is sent any more, and these commands are the next.
+  Adds a stop: the waiting speeds are discarded, and these commands go first.
 
       iex> alias Hal.RFlex.Protocol.Queue
       iex> queue = Queue.new(12) |> Queue.put(:a, "1") |> Queue.put({:speed, 0}, "2")
@@ -49,7 +49,7 @@ defmodule Hal.RFlex.Protocol.Queue do
     %{queue | waiting: commands ++ others}
   end
 
-  @doc "The command to write now; or how long to wait for it; or none."
+  @doc "The command to write now, or how long to wait for the next one (ms), or `:empty`."
   @spec take(t(), integer()) :: {:send, binary(), t()} | {:wait, pos_integer()} | :empty
   def take(%__MODULE__{waiting: []}, _at_ms), do: :empty
 

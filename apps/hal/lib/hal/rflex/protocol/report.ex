@@ -1,8 +1,8 @@
 defmodule Hal.RFlex.Protocol.Report do
   @moduledoc """
-  Reports of the controller, in raw units. Pure. Reports that are longer than documented are read
-  as far as documented; shorter ones are `:malformed`; undocumented ports and opcodes are
-  `:unknown`.
+  Decodes the controller's reports, in raw units. Pure. Of a report that is longer than
+  documented, the documented part is read; shorter ones are `:malformed`; undocumented ports and
+  opcodes are `:unknown`.
   """
   alias Hal.RFlex.Protocol.Packet
 
@@ -22,7 +22,7 @@ defmodule Hal.RFlex.Protocol.Report do
           | {:screen, row :: byte(), binary()}
 
   @doc """
-  What a packet says.
+  Decodes a packet.
 
       iex> alias Hal.RFlex.Protocol.{Packet, Report}
       iex> Report.decode(%Packet{port: 5, opcode: 1, data: <<5000::32, 0x41, 0x0080::16>>})

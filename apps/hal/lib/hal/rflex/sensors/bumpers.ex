@@ -2,12 +2,14 @@ defmodule Hal.RFlex.Sensors.Bumpers do
   @moduledoc """
   Which segments of the body are pressed, from the digital inputs. Pure.
 
-    * style `:bit` - each bit of an address is a bumper: the Magellan Pro's 16 at 0x40 and 0x41
-    * style `:address` - each address is a panel, whose lower four bits are its switches: the B21r
+    * style `:bit` - each bit of an address is a bumper, such as the Magellan Pro's 16 at 0x40 and
+      0x41
+    * style `:address` - each address is a panel, whose lower four bits are its switches, as on
+      the B21r
 
-  `segments` says for each bumper which of the 16 segments it is, counted counter-clockwise from the front.
-  No source tells where a Magellan's bumpers are; by default they are taken to lie as its sonars do, the first
-  behind on the right and then clockwise.
+  `segments` says for each bumper which of the 16 segments it is, counted counter-clockwise from
+  the front. No source says where a Magellan's bumpers are; by default they are assumed to lie
+  like its sonars: the first at the rear right, the others clockwise from it.
   """
   import Bitwise
 
@@ -23,7 +25,7 @@ defmodule Hal.RFlex.Sensors.Bumpers do
         }
 
   @doc """
-  Where the bumpers are, unless configured.
+  The segments of the bumpers, unless configured.
 
       iex> Enum.take(Hal.RFlex.Sensors.Bumpers.default_segments(:bit, 16), 3)
       [11, 10, 9]
@@ -37,7 +39,7 @@ defmodule Hal.RFlex.Sensors.Bumpers do
   def default_segments(:address, count),
     do: for(k <- 0..(count - 1)//1, do: div(16 * k, count))
 
-  @doc "Takes an input; `:other` if it does not belong to a bumper."
+  @doc "Takes an input report; `:other` if the address is not that of a bumper."
   @spec report(t(), byte(), byte()) :: {:ok, t()} | :other
   def report(%__MODULE__{base: base} = bumpers, address, state) do
     if address >= base and address < base + addresses(bumpers),
@@ -46,7 +48,7 @@ defmodule Hal.RFlex.Sensors.Bumpers do
   end
 
   @doc """
-  The pressed segments, in their order.
+  The pressed segments, in ascending order.
 
       iex> alias Hal.RFlex.Sensors.Bumpers
       iex> bumpers = %Bumpers{style: :bit, base: 0x40, count: 16, segments: Enum.to_list(0..15)}

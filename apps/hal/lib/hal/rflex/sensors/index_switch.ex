@@ -1,10 +1,11 @@
 defmodule Hal.RFlex.Sensors.IndexSwitch do
   @moduledoc """
-  The switch that some bases (B21r) close at one absolute heading, seen as a digital input. Pure.
+  The switch that some bases (B21r) close at one absolute heading, read as a digital input. Pure.
 
-  It closes over a small angle: its first event keeps the heading, and a later one more than 0.01 rad away
-  makes the larger of the two the home. Old drivers then count all headings from there; here odometry
-  never jumps, and the home is a reading of its own. Nothing turns the robot to look for it.
+  It closes over a small angle: its first event records the heading, and a later one more than
+  0.01 rad away makes the larger of the two the home heading. Older drivers then count all
+  headings from there; here odometry does not jump, and the home heading is a reading of its own.
+  The robot does not turn to look for it.
   """
   alias Hal.Pose
 
@@ -15,7 +16,7 @@ defmodule Hal.RFlex.Sensors.IndexSwitch do
   @type t :: %__MODULE__{first: float() | nil, heading: float() | nil}
 
   @doc """
-  An event of the switch at this heading of the odometry, in radians.
+  Takes an event of the switch at this heading of the odometry, in radians.
 
       iex> alias Hal.RFlex.Sensors.IndexSwitch
       iex> home = %IndexSwitch{} |> IndexSwitch.event(1.0) |> IndexSwitch.event(1.005)

@@ -1,17 +1,18 @@
 defmodule Hal.RFlex.Sensors.Infrared do
   @moduledoc """
-  The infrareds' ranges from their voltages (a byte each). Pure.
+  The ranges of the infrareds from their voltages (a byte each). Pure.
 
   Two laws are in use, with constants that differ from sensor to sensor:
 
     * `:metres` - range = a · V^b, in metres; a = 4000, b = -2 is an example
     * `:millimetres` - range = (a · V)^b, in millimetres; a = 0.0005456, b = -2.086 is an example
 
-  Below the least range the sensor says nothing of how near it is: that is 0. Above the greatest, and
-  without any voltage, it is the greatest.
+  Below the least range the sensor does not show how near something is: the range is 0. Above the
+  greatest, and at a voltage of 0, it is the greatest.
 
-  The sensors of a report are in the order of their boards, ours in that of the profile's poses: `order`
-  says for each pose the place in the report. A Magellan Pro's boards go round differently from its sonars'.
+  A report has the sensors in the order of their boards, a profile in that of its poses: `order`
+  gives for each pose the place in the report. The boards of a Magellan Pro's infrareds follow
+  another order than those of its sonars.
   """
 
   @enforce_keys [:banks, :base, :order, :laws, :law, :least, :greatest]
@@ -27,7 +28,7 @@ defmodule Hal.RFlex.Sensors.Infrared do
           greatest: float()
         }
 
-  @doc "The order of a Magellan Pro's 16."
+  @doc "The order of a Magellan Pro's 16 infrareds."
   @spec magellan_order() :: [0..15]
   def magellan_order, do: Enum.to_list(0..7) ++ Enum.to_list(12..15) ++ Enum.to_list(8..11)
 

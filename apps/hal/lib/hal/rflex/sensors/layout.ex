@@ -1,13 +1,13 @@
 defmodule Hal.RFlex.Sensors.Layout do
   @moduledoc """
-  Which sensors a base has on which boards: what options say of it, and for the rest what is usual of its
-  body. Pure; options are those of `Hal.RFlex.Options`.
+  Which sensors a base has on which boards: from the options and, for what they leave out, from
+  what is usual for its body. Pure; the options are those of `Hal.RFlex.Options`.
   """
   alias Hal.{Options, Profile}
   alias Hal.RFlex.Conversions
   alias Hal.RFlex.Sensors.{Bumpers, Infrared}
 
-  @doc "The bumpers; or what is wrong with them."
+  @doc "The bumpers; the error says what is wrong with the options."
   @spec bumpers(keyword(), Profile.t()) :: {:ok, Bumpers.t()} | {:error, String.t()}
   def bumpers(options, profile) do
     style = options[:style] || :bit
@@ -20,7 +20,9 @@ defmodule Hal.RFlex.Sensors.Layout do
       else: refuse([:bumpers, :segments], segments, "a segment for each of the #{count} bumpers")
   end
 
-  @doc "The options with their boards, times and order; `own?` says that the profile is the robot's own."
+  @doc """
+  The options with boards, times and order filled in; `own?` says that the options have a profile.
+  """
   @spec sensors(keyword(), Conversions.t(), own? :: boolean()) ::
           {:ok, keyword()} | {:error, String.t()}
   def sensors(given, conversions, own?) do
@@ -39,7 +41,7 @@ defmodule Hal.RFlex.Sensors.Layout do
     profile = given[:profile]
     irs = given[:ir_banks] || eights(length(profile.irs))
     count = Enum.sum(irs)
-    # The pause after each ping that is public for a Magellan; the ATRV mini's has none.
+    # The pause after each ping that is published for a Magellan; an ATRV mini has none.
     ping = if profile.name == :magellan, do: 1250, else: 0
 
     order =

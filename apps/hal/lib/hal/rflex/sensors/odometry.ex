@@ -1,30 +1,32 @@
 defmodule Hal.RFlex.Sensors.Odometry do
   @moduledoc """
-  Pose and speed from the controller's two counters: distance driven (axis 0) and angle turned
-  (axis 1). Pure; the time of arrival comes in, as integer milliseconds.
+  Computes pose and speed from the controller's two counters: distance driven (axis 0) and angle
+  turned (axis 1). Pure; the time of arrival is passed in, as integer milliseconds.
 
-  The two come in frames of their own. A pose is made of two of one period: at axis 1 if there is a new
-  axis 0, or at axis 0 if the one of axis 1 bears the same time. Where one is lost, the next pair bridges
-  it, for the counters go on: nothing is lost but the shape of that piece of the way. It is driven at
-  the heading halfway of its turn.
+  The two counters come in separate frames. A pose is computed from two reports of one period: at
+  axis 1 if there is a new report of axis 0, or at axis 0 if the last report of axis 1 has the
+  same timestamp. If one is lost, the next pair bridges the gap, because the counters go on: only
+  the shape of that piece of the path is lost. Each step is taken at the heading halfway through
+  its turn.
 
-  ## What is not believed
+  ## Implausible reports
 
-  A counter is 32 bits, and wraps. What cannot be a movement is **dropped** and counted:
+  A counter has 32 bits, and wraps. A report that cannot be a movement is **dropped** and counted:
 
-    * a step longer than 1.5 times the limit speed allows for in the time since, and 0.3 s more (for
-      reports that were held up and come at once; after 2 s the time counts no more)
+    * a step longer than 1.5 times what the speed limit allows in the time since the last report
+      and 0.3 s more (for reports that were held up and come together; no more than 2 s count)
     * a speed of more than 4 times the limit
-    * a counter that is suddenly near zero, with its time going back, or, where times stand still, after
-      a silence of 0.25 s: a controller that was switched off and on
+    * a counter that is suddenly near zero while its timestamp goes back or, where timestamps
+      stand still, after a silence of 0.25 s: a controller that was switched off and on
 
-  When the next report continues a dropped one, the counter has truly jumped: it is followed from there on,
-  the pose stays where it is, and the `jumps` are counted: how far the robot went meanwhile, nobody knows.
+  When the next report continues a dropped one, the counter has really jumped: it is followed from
+  there on, the pose stays where it is, and `jumps` counts it. How far the robot went meanwhile is
+  unknown.
 
-  A checksum lets through 1 in 256 of heavily damaged frames, and each one that lost a zero and has another one
-  twice; such a number may be within the limits. The next sound report puts that right, but for the direction of
-  at most the wrong pieces: where it does not continue the last report, and does continue the one before, the
-  last was the wrong one, and no way is lost.
+  A checksum lets through 1 in 256 heavily damaged frames, and every frame that lost one zero byte
+  and has another one twice; the number in it may be within the limits. If the next report does
+  not continue the last one, but does continue the one before, the last one was wrong. The next
+  report thus corrects it: no distance is lost, only the direction of the wrong pieces.
   """
   import Hal.RFlex, only: [difference: 2]
   alias Hal.{Pose, Twist}
@@ -35,14 +37,16 @@ defmodule Hal.RFlex.Sensors.Odometry do
   @longest_s 2.0
   @speed_margin 4
   @gap_ms 250
-  # A new count is no older than this many seconds at the limit.
+  # A counter that started again is within this many seconds at the limit.
   @young_s 0.5
   @still_s 0.05
 
   @enforce_keys [:distance, :angle, :axes]
   defstruct @enforce_keys ++ [wheels: {1.0, 1.0}, pose: Pose.new(0, 0), dropped: 0, jumps: 0]
 
-  @typedoc "`dropped` reports, and `jumps` of a counter that were followed without moving."
+  @typedoc """
+  `dropped` counts reports, `jumps` the jumps of a counter that were followed without moving.
+  """
   @type t :: %__MODULE__{
           distance: float(),
           angle: float(),
@@ -54,8 +58,8 @@ defmodule Hal.RFlex.Sensors.Odometry do
         }
 
   @doc """
-  At the origin. Conversions in units per metre and radian, limits in m/s and rad/s, wheels as their
-  base (metres) and ratio (`Hal.Drive.Wheels`).
+  The odometry at the origin. Conversions are in units per metre and radian, limits in m/s and
+  rad/s; `wheels` are their base (metres) and ratio (`Hal.Drive.Wheels`).
   """
   @spec new(float(), float(), float(), float(), {float(), float()}) :: t()
   def new(distance, angle, max_linear, max_turn, wheels \\ {1.0, 1.0}) do
@@ -63,7 +67,7 @@ defmodule Hal.RFlex.Sensors.Odometry do
     %__MODULE__{distance: distance, angle: angle, axes: axes, wheels: wheels}
   end
 
-  @doc "Takes a report; a pair gives the odometry."
+  @doc "Takes a report; a pair of reports gives the odometry."
   @spec report(t(), Hal.RFlex.Protocol.Report.axis(), integer()) ::
           {Hal.Odometry.t() | nil, t()}
   def report(%__MODULE__{axes: axes} = t, %{axis: n} = report, at_ms) when is_map_key(axes, n) do
@@ -101,7 +105,7 @@ defmodule Hal.RFlex.Sensors.Odometry do
       continues?(axis, axis.last, seen) ->
         {:ok, follow(axis, report, seen, {axis.last, since(axis.last, position)})}
 
-      # The last was damaged. What it added is taken back with it.
+      # The last report was damaged. What it added is taken back.
       axis.before != nil and continues?(axis, axis.before, seen) ->
         {:ok, follow(axis, report, seen, {axis.before, since(axis.last, position)})}
 
@@ -152,7 +156,7 @@ defmodule Hal.RFlex.Sensors.Odometry do
       else: {nil, t}
   end
 
-  # Who always says zero has no clock.
+  # A timestamp of zero means that there is no clock.
   defp same_time?({_, time, _}, {_, time, _}), do: time != 0
   defp same_time?(_one, _other), do: false
 

@@ -1,16 +1,17 @@
 defmodule Hal.RFlex.Sensors.Sonar do
   @moduledoc """
-  Collects the sonars' ranges from reports that may each contain only some of them. Pure.
+  Collects the ranges of the sonars from reports that may each contain only some of them. Pure.
 
-  Every board (bank) numbers its inputs from a multiple of `stride` on, whether fitted or not; the
-  sonars are counted bank after bank, in the order of the profile's poses. Ids that no bank has are counted
-  and ignored. A range is within the profile's least and greatest; no echo is a greatest number of
-  the controller, and so the greatest range. With an `age` above 1 a range is the least of that many
-  readings.
+  Every board (bank) numbers its inputs from a multiple of `stride`, whether fitted or not; the
+  sonars are counted bank after bank, in the order of the profile's poses. Ids that no bank has
+  are counted and ignored. A range is within the profile's least and greatest; without an echo the
+  controller reports a very large number, which gives the greatest range. With an `age` above 1 a
+  range is the least of that many readings.
 
-  There are ranges once every sonar was heard, and as long as none is older than 2 s and the newest no older
-  than 1 s, some four rounds: a sonar that fell silent is not a free way, and boards that all did are sooner
-  told from a few damaged reports.
+  There are ranges once every sonar has been heard, and while none is older than 2 s and the
+  newest is not older than 1 s, some four rounds. A sonar that has gone silent does not mean a
+  free path; and the shorter limit for the newest one shows sooner that all boards are silent, and
+  not just that a few reports were damaged.
   """
 
   @oldest_ms 2_000
@@ -30,7 +31,10 @@ defmodule Hal.RFlex.Sensors.Sonar do
           unknown: non_neg_integer()
         }
 
-  @doc "`banks`: how many are fitted on each; `units` per metre; `least` and `greatest` in metres."
+  @doc """
+  `banks` says how many are fitted on each board; `units` are per metre; `least` and `greatest`
+  are in metres.
+  """
   @spec new([non_neg_integer()], pos_integer(), pos_integer(), float(), float(), float()) :: t()
   def new(banks, stride, age, units, least, greatest) do
     ids = for {n, bank} <- Enum.with_index(banks), slot <- 0..(n - 1)//1, do: bank * stride + slot
