@@ -7,7 +7,7 @@ defmodule Hal.Ptz do
   """
 
   @typedoc """
-  Where it looks. `age_ms`: how long ago that was when the reading was handed on, where the driver
+  The direction of view. `age_ms` is how old it was when the reading was passed on, if the driver
   knows.
   """
   @type reading ::
@@ -22,11 +22,11 @@ defmodule Hal.Ptz do
   @doc "Opens the line."
   @callback init(keyword()) :: {:ok, state :: term()} | {:error, reason :: term()}
 
-  @doc "Looks there, as fast as the unit can."
+  @doc "Turns to this direction, as fast as the unit can."
   @callback look(pan :: float(), tilt :: float(), state :: term()) ::
               {:ok, term()} | {:error, term(), term()}
 
-  @doc "Zooms to a horizontal field of view (radians), or as near as the unit can."
+  @doc "Zooms to a horizontal field of view (radians), or as near to it as the unit can."
   @callback zoom(field_of_view :: float(), state :: term()) ::
               {:ok, term()} | {:error, term(), term()}
 
@@ -34,13 +34,13 @@ defmodule Hal.Ptz do
   @callback handle_message(term(), state :: term()) ::
               {:ok, [reading()], term()} | {:error, term(), term()}
 
-  @doc "An error that it gave with these options, in one line for people."
+  @doc "Describes an error of this driver, opened with these options, in one line for people."
   @callback explain(reason :: term(), options :: keyword()) :: String.t()
 
   @doc "Closes the line."
   @callback terminate(state :: term()) :: :ok
 
-  @doc "What options it takes; `mix robot.check` holds robot files against it."
+  @doc "The options that the driver takes; `mix robot.check` checks robot files against them."
   @callback option_table() :: Hal.Options.table()
 
   @optional_callbacks explain: 2, zoom: 2, option_table: 0

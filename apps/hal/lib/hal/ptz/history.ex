@@ -1,32 +1,32 @@
 defmodule Hal.Ptz.History do
   @moduledoc """
-  Where a pan-tilt unit looked at a given time, for cameras that do not know it. Pure.
+  Estimates where a pan-tilt unit looked at a given time, for cameras that do not know it. Pure.
 
-  A unit tells where it looks about ten times a second, a picture is taken some time in between, and
-  both arrive late. So the last readings are kept with their times, and `at/2` gives the direction
-  at the time of a picture: between two readings on the straight line through them, after the last one
-  on by the speed of the last two for 100 ms, and as it is then for at most a second. At 80
-  degrees/s a picture that is 50 ms off is 4 degrees off.
+  A unit reports its direction about ten times a second, a picture is taken some time in between,
+  and both arrive late. So the last readings are kept with their times, and `at/2` gives the
+  direction at the time of a picture: between two readings, by linear interpolation; after the
+  last one, by the speed of the last two for up to 100 ms, then constant, for a second at most. At
+  80 degrees/s an error of 50 ms is an error of 4 degrees.
   """
 
   # Two seconds at 10 Hz.
   @most 20
   @ahead_ms 100
   @good_ms 1_000
-  # Two readings of one instant tell no speed.
+  # Two readings that are nearer in time give no speed.
   @least_ms 10
 
   @typedoc "Newest first."
   @opaque t :: [{at_ms :: integer(), direction()}]
   @type direction :: %{pan: float(), tilt: float(), field_of_view: float()}
 
-  @doc "Nothing known."
+  @doc "An empty history."
   @spec new() :: t()
   def new, do: []
 
   @doc """
-  Takes a reading that came at `now_ms`; its own `age_ms` says how much earlier it held. One that
-  is not newer than the last is passed over.
+  Adds a reading that arrived at `now_ms`; its own `age_ms` says how much older it is. A reading
+  that is not newer than the last one is ignored.
   """
   @spec note(t(), map(), integer()) :: t()
   def note(aim, %{pan: pan, tilt: tilt, field_of_view: view} = reading, now_ms) do
@@ -42,8 +42,8 @@ defmodule Hal.Ptz.History do
   end
 
   @doc """
-  Where the unit looked at that time; `nil` where that is not known: before the first reading, or more than
-  a second after the last.
+  Where the unit looked at that time; `nil` before the oldest reading, and more than a second
+  after the last one.
 
       iex> looks = fn pan -> %{pan: pan, tilt: 0.0, field_of_view: 0.8} end
       iex> aim = Hal.Ptz.History.new() |> Hal.Ptz.History.note(looks.(0.0), 100) |> Hal.Ptz.History.note(looks.(0.5), 200)
@@ -73,7 +73,7 @@ defmodule Hal.Ptz.History do
 
   defp between({from_ms, from}, {to_ms, to}, at_ms) do
     share = (at_ms - from_ms) / (to_ms - from_ms)
-    # A lens does not go on by itself: its range is short.
+    # The zoom is not extrapolated: its range is short.
     within = share |> max(0.0) |> min(1.0)
 
     %{

@@ -5,19 +5,19 @@ defmodule Hal.Visca.Command do
 
   | command | meaning |
   |---|---|
-  | `:address_set` | to all: take your numbers, 1 to 7 in the order of the cable |
+  | `:address_set` | to all: take the numbers 1 to 7 in the order of the cable |
   | `:if_clear` / `:if_clear_one` | to all / to one: forget commands and sockets |
-  | `{:cancel, socket}` | end what that socket does |
+  | `{:cancel, socket}` | end the command in that socket |
   | `{:power, on?}` | |
   | `{:look, pan, tilt, pan_speed, tilt_speed}` | absolute; speeds 1 to 24 and 1 to 20 |
   | `{:step, pan, tilt, pan_speed, tilt_speed}` | relative |
-  | `{:drive, {:left, n}, {:up, n}}` | until told otherwise; also `:right`, `:down`, `{:stop, 0}` |
-  | `:home`, `:reset` | to 0, 0; measure the stops again, then 0, 0 |
+  | `{:drive, {:left, n}, {:up, n}}` | until the next command; also `:right`, `:down`, `{:stop, 0}` |
+  | `:home`, `:reset` | to 0, 0; find the mechanical stops again, then 0, 0 |
   | `{:zoom, :tele}` | also `:wide`, `:stop`; `{:zoom, :tele, 2..7}` with a speed |
   | `{:zoom_to, 0..1023}` | |
   | `{:focus, :auto}`, `:manual` | |
   | `{:limit, :up_right, pan, tilt}` | also `:down_left`; `{:limit_clear, corner}` |
-  | `{:screen, :on}` | the camera's own writing in the picture; `:off`, `:toggle` |
+  | `{:screen, :on}` | the camera's own text in the picture; `:off`, `:toggle` |
   | `{:memory, :set, 0..5}` | also `:reset`, `:recall` |
   | `{:ask, inquiry}` | see `t:inquiry/0`; `Hal.Visca.Reply.value/2` reads the answer |
   """
@@ -71,7 +71,7 @@ defmodule Hal.Visca.Command do
   def encode(command, camera) when camera in 1..7,
     do: <<0x80 + camera, payload(command)::binary, 0xFF>>
 
-  @doc "Whether a command is answered at once, without taking a socket."
+  @doc "Whether a command is answered directly, without taking a socket."
   @spec immediate?(t()) :: boolean()
   def immediate?({kind, _}) when kind in [:ask, :cancel], do: true
   def immediate?(command), do: command in [:address_set, :if_clear, :if_clear_one]
@@ -134,7 +134,7 @@ defmodule Hal.Visca.Command do
   defp payload({:ask, :video}), do: <<0x09, 0x06, 0x23>>
   defp payload(other), do: refuse!(other)
 
-  # 16 bits as four bytes of one nibble, so that no payload ever holds an 0xFF.
+  # 16 bits as four bytes of one nibble each, so that no payload contains an 0xFF.
   defp nibbles(n) do
     <<a::4, b::4, c::4, d::4>> = <<n::16>>
     <<a, b, c, d>>

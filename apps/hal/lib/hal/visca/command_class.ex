@@ -2,16 +2,17 @@ defmodule Hal.Visca.CommandClass do
   @moduledoc """
   Classes of commands to a camera that replace each other: at most one of each class waits. Pure.
 
-  A newer target for the head makes an older one pointless, and so it is with zoom, power and each
-  inquiry. So what waits is bounded by the number of lanes, however fast commands come and however
-  slow the camera is. Relative steps have a lane of their own, in which they add up.
+  A newer target for the head makes an older one pointless; the same holds for zoom, power and
+  each inquiry. The number of waiting commands is therefore bounded by the number of classes,
+  however fast commands come and however slow the camera is. Relative steps have a class of their
+  own, in which they add up.
   """
   alias Hal.Visca.Command
 
   @type t :: atom() | {atom(), term()}
 
   @doc """
-  The lane of a command.
+  The class of a command.
 
       iex> Hal.Visca.CommandClass.of({:look, 1, 2, 24, 20}) == Hal.Visca.CommandClass.of(:home)
       true
@@ -33,7 +34,7 @@ defmodule Hal.Visca.CommandClass do
   def of(command) when is_atom(command), do: command
 
   @doc """
-  Whether the first command, being newer, makes the second one pointless.
+  Whether the first command, which is newer, makes the second one pointless.
 
       iex> Hal.Visca.CommandClass.overrides?(:home, {:step, 9, 0, 24, 20})
       true
@@ -50,7 +51,7 @@ defmodule Hal.Visca.CommandClass do
   end
 
   @doc """
-  Puts a command among those that wait: at the place of the one that it overrides, or at the end.
+  Adds a command to those that wait: in the place of the one that it overrides, or at the end.
 
       iex> Hal.Visca.CommandClass.put([{:zoom_to, 5}, {:ask, :position}], {:zoom_to, 9})
       [{:zoom_to, 9}, {:ask, :position}]
@@ -82,7 +83,7 @@ defmodule Hal.Visca.CommandClass do
   end
 
   @doc """
-  Whether a command may be said twice where it is not known whether it was heard once.
+  Whether a command may be sent again when it is not known whether the camera has received it.
 
       iex> Hal.Visca.CommandClass.repeatable?({:step, 9, 0, 24, 20})
       false

@@ -2,11 +2,11 @@ defmodule Hal.Visca.Decoder do
   @moduledoc """
   Splits the bytes of the line into replies, however they arrive (fact sheet, section 2). Pure.
 
-  A message ends with 0xFF, which is nowhere inside one; so after anything that went wrong the
-  next message is whole again. What stands before the first header from which the rest is a reply
-  is garbage: noise, or the beginning of a message that lost its end. All bytes are accounted for: in a reply, in
+  A message ends with 0xFF, which does not occur inside one; so after any damage the next message
+  is whole again. Bytes before the first header from which the rest is a reply are garbage: noise,
+  or the beginning of a message that lost its end. All bytes are accounted for: in a reply, in
   `garbage`, in a reply of another camera of the chain (`others` counts these), or kept because
-  their 0xFF has not come. Never more than 15 are kept: no message is longer than 16.
+  their 0xFF has not come. At most 15 bytes are kept, because no message is longer than 16.
   """
   alias Hal.Visca.Reply
 
@@ -15,7 +15,7 @@ defmodule Hal.Visca.Decoder do
   @enforce_keys [:camera]
   defstruct [:camera, rest: <<>>, garbage: 0, others: 0]
 
-  @typedoc "`garbage` in bytes, `others` in messages."
+  @typedoc "`garbage` counts bytes, `others` messages."
   @type t :: %__MODULE__{
           camera: 1..7,
           rest: binary(),
@@ -23,12 +23,12 @@ defmodule Hal.Visca.Decoder do
           others: non_neg_integer()
         }
 
-  @doc "A decoder of what this camera says, and of what is said to all."
+  @doc "A decoder of this camera's replies, and of broadcasts."
   @spec new(camera :: 1..7) :: t()
   def new(camera) when camera in 1..7, do: %__MODULE__{camera: camera}
 
   @doc """
-  Takes the next bytes.
+  Takes the next bytes; returns the replies that they complete.
 
       iex> {[], decoder} = Hal.Visca.Decoder.feed(Hal.Visca.Decoder.new(1), <<7, 0x90, 0x4>>)
       iex> {replies, decoder} = Hal.Visca.Decoder.feed(decoder, <<0xFF, 0x90, 0x41, 0xFF, 0x90>>)
@@ -60,8 +60,8 @@ defmodule Hal.Visca.Decoder do
     end
   end
 
-  # The same bytes are dropped whether they come at once or one by one.
-  # A copy, or 15 bytes would keep the whole buffer that they are a part of.
+  # The same bytes are dropped whether they come together or one by one. Without the copy,
+  # 15 bytes would keep the whole buffer that they are a part of.
   defp keep(decoder, bytes) when byte_size(bytes) <= @longest,
     do: %{decoder | rest: :binary.copy(bytes)}
 

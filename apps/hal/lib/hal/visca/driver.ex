@@ -1,11 +1,12 @@
 defmodule Hal.Visca.Driver do
   @moduledoc """
-  The pan-tilt-zoom unit of a Sony EVI-D30 or D31 on a serial line, run by `Hal.Device`.
+  The driver of the pan-tilt-zoom unit of a Sony EVI-D30 or D31 on a serial line, run by
+  `Hal.Device`.
 
       {Hal.Device, kind: :ptz, driver: {Hal.Visca.Driver, port: "/dev/ttyS2"}, sinks: [...]}
 
-  Options: `Hal.Visca.Options`. What it does and when is `Hal.Visca.Session`, a function; this
-  only owns the line and the clock.
+  Options: `Hal.Visca.Options`. `Hal.Visca.Session`, which is pure, decides what to do and when;
+  this module only owns the line and the clock.
 
   ## What the line allows
 
@@ -19,8 +20,9 @@ defmodule Hal.Visca.Driver do
   | completion | 3 | 3.1 ms | |
 
   So ten times a second a target (35 ms), a position (33 ms) and the completion (3 ms) take 71 of
-  100 ms; the zoom each half second adds 6 of 100 on the average, and 29 once. 10 Hz is what
-  the line allows while the camera tracks; a slower camera makes less of both, and nothing queues.
+  100 ms; the zoom inquiry every half second adds 6 of 100 on average, and 29 at one time. 10 Hz
+  is what the line allows while the camera tracks; with a slower camera both become fewer, and
+  nothing queues.
 
   ## Readings
 
@@ -28,8 +30,9 @@ defmodule Hal.Visca.Driver do
 
   ## Errors
 
-  Those of `Hal.Serial` at the opening and later, and those of `Hal.Visca.Session`: `:no_answer`,
-  `{:cameras, n}`, `{:model, code}`. After each the device closes the line and opens it again.
+  Those of `Hal.Serial`, at the opening and later, and those of `Hal.Visca.Session`: `:no_answer`,
+  `{:cameras, n}`, `{:model, code}`. After each of them the device closes the line and opens it
+  again.
   """
   @behaviour Hal.Ptz
   alias Hal.Serial
@@ -45,7 +48,7 @@ defmodule Hal.Visca.Driver do
             wake: reference() | nil
           }
 
-  @doc "Checks options; see `Hal.Visca.Options.check/1`."
+  @doc "Checks the options; see `Hal.Visca.Options.check/1`."
   @spec options(keyword()) :: {:ok, keyword()} | {:error, String.t()}
   defdelegate options(options), to: Options, as: :check
 
@@ -63,7 +66,7 @@ defmodule Hal.Visca.Driver do
     end
   end
 
-  @doc "An error in words."
+  @doc "Describes an error in words."
   @impl Hal.Ptz
   def explain(reason, options) when reason in [:no_answer, :mute],
     do: "#{options[:port]}: no camera answers"
@@ -117,7 +120,7 @@ defmodule Hal.Visca.Driver do
     end
   end
 
-  # A wish brings no readings.
+  # A request gives no readings.
   defp outward(result, state) do
     with {:ok, [], state} <- carry_out(result, state), do: {:ok, state}
   end
@@ -135,7 +138,7 @@ defmodule Hal.Visca.Driver do
   defp effect({:write, bytes}, {readings, nil}, line) do
     case Serial.write(line, bytes) do
       :ok -> {readings, nil}
-      # It was not said, and will be said again when no answer comes.
+      # It was not written; the session notices that no answer comes.
       {:error, :overrun} -> {readings, nil}
       {:error, reason} -> {readings, reason}
     end

@@ -1,16 +1,16 @@
 defmodule Hal.Visca.Options do
   @moduledoc """
-  What `Hal.Visca.Driver` may be told, checked. Pure.
+  Checks the options of `Hal.Visca.Driver`. Pure.
 
   | option | | default |
   |---|---|---|
-  | `:port` | path of the serial device | must be given |
-  | `:speed` | baud, 1 to 20,000,000 | `9600`, what the camera speaks |
+  | `:port` | path of the serial device | required |
+  | `:speed` | baud, 1 to 20,000,000 | `9600`, that of the camera |
   | `:serial` | `:module` and `:keep_alive_ms` of `Hal.Serial.open/1` | `[]` |
   | `:camera` | 1 to 7: its place on the cable | `1` |
   | `:lens` | `{tele, wide}`: horizontal fields of view in radians, above 0, ascending, below pi | 4.4 and 48.8 degrees |
-  | `:field_of_view` | radians to zoom to at the opening, above 0 and below pi; `nil`: leave it | `nil` |
-  | `:poll_ms` | 50 to 400: how often the position is asked for | `100` |
+  | `:field_of_view` | radians to zoom to at the opening, above 0 and below pi; `nil`: leave it unchanged | `nil` |
+  | `:poll_ms` | 50 to 400: interval between inquiries of the position | `100` |
   """
   alias Hal.{Options, Serial}
 
@@ -32,12 +32,12 @@ defmodule Hal.Visca.Options do
     poll_ms: [{:integer, 50, 400, "ms"}, default: 100]
   ]
 
-  @doc "What is allowed."
+  @doc "The table of the options."
   @spec table() :: Options.table()
   def table, do: @table
 
   @doc """
-  All options, with the defaults; or one line that names what is wrong.
+  Checks the options and adds the defaults; the error is one line that says what is wrong.
 
       iex> {:ok, options} = Hal.Visca.Options.check(port: "/dev/ttyS2")
       iex> {options[:speed], options[:poll_ms]}
@@ -48,7 +48,7 @@ defmodule Hal.Visca.Options do
   @spec check(keyword()) :: {:ok, keyword()} | {:error, String.t()}
   def check(options), do: Options.check(options, @table, "visca")
 
-  @doc "The options of the serial line among these (as `check/1` gives them)."
+  @doc "The options of the serial line, from those that `check/1` returns."
   @spec serial(keyword()) :: keyword()
   def serial(options), do: Keyword.merge(options[:serial], Keyword.take(options, [:port, :speed]))
 

@@ -1,33 +1,35 @@
 defmodule Hal.Visca.Queue do
   @moduledoc """
-  Which command to send to one VISCA camera, and when: a state machine of its two sockets. Pure;
-  time comes in as integer milliseconds.
+  Decides which command to send to one VISCA camera, and when: a state machine of its two sockets.
+  Pure; time is passed in, as integer milliseconds.
 
-  A camera accepts a command (ACK, with the socket that it took), works on it, and says when it is
-  done; meanwhile it accepts one more, and answers inquiries. Its answers do not say to what they
-  answer, so there is **one message at a time** on the line without its first answer.
+  A camera accepts a command (ACK, with the socket that it took), carries it out, and reports when
+  it is done; meanwhile it accepts one more, and answers inquiries. Its answers do not say what
+  they are answers to, so there is at most **one message at a time** on the line without its first
+  answer.
 
-  | what happens | what this does |
+  | event | reaction |
   |---|---|
-  | no answer for 120 ms | says it again: an inquiry never (whoever asks, asks again), others up to 5 times, a relative step never; not if a newer command took its place |
-  | nothing at all heard for 1 s, though something was said | `:no_answer` |
-  | both sockets work, and a command waits | cancels the older one that is pointless by now, or waits |
-  | a drive, while an absolute move works | cancels the move first: the D30 refuses it otherwise |
-  | `:full` | the command waits again, 50 ms at least; what is not known to work there is cancelled |
+  | no answer for 120 ms | sends the command again, 5 times in all; a cancel, `:address_set` and `:if_clear` 2 times; an inquiry (whoever asks, asks again), a relative step and a toggle only once; not if a newer command overrides it |
+  | nothing at all heard for 1 s, though something was sent | `:no_answer` |
+  | both sockets are busy, and a command waits | cancels the older one if it has become pointless, or an unknown one, or waits |
+  | a drive during another move | cancels the move first: the D30 refuses the drive otherwise |
+  | `:full` | the command waits again, 50 ms at least (a relative step or a toggle is dropped); an unknown command in a socket is cancelled |
   | `:cancelled`, `:no_socket` | the socket is free |
-  | no completion for 10 s | the socket is taken for free: `:no_completion` |
+  | no completion for 10 s | the socket counts as free: `:no_completion` |
   | other errors | `{:failed, command, reason}` |
 
-  What waits is bounded (`Hal.Visca.CommandClass`): a newer target takes the place of one that waits.
+  The number of waiting commands is bounded (`Hal.Visca.CommandClass`): a newer target replaces a
+  waiting one.
 
   ## Effects
 
   | effect | meaning |
   |---|---|
-  | `{:say, command}` | to be written |
+  | `{:say, command}` | to be sent |
   | `{:accepted, command}`, `{:done, command}` | by the camera |
   | `{:failed, command, reason}` | see `t:failure/0` |
-  | `{:result, inquiry, value, took_ms}` | as in `Hal.Visca.Reply.value/2`; how long the answer took |
+  | `{:result, inquiry, value, took_ms}` | as in `Hal.Visca.Reply.value/2`; how long the answer took (ms) |
   | `{:cameras, n}`, `:cleared` | answers to `:address_set` and the clears |
   | `:network_change` | a camera of the chain was switched on; its sockets are empty |
   | `:no_answer` | the camera is silent |
@@ -35,7 +37,7 @@ defmodule Hal.Visca.Queue do
   alias Hal.Visca.{Command, CommandClass, Reply}
   alias Hal.Visca.Queue.Sockets
 
-  # About 16 ms and what 32 bytes take; a USB adapter may keep bytes for 16 ms more.
+  # About 16 ms, and the time of 32 bytes; a USB adapter may hold bytes back for 16 ms more.
   @answer_ms 120
   @silent_ms 1_000
   @full_ms 50
@@ -44,8 +46,8 @@ defmodule Hal.Visca.Queue do
   defstruct waiting: [], asked: nil, sockets: Sockets.new(), silent_ms: nil, full_ms: nil
 
   @typedoc """
-  `waiting` in the order in which they will be said, `asked` what has no answer yet, `silent_ms`
-  since when the camera owes one, `full_ms` when it said that it is full.
+  `waiting` holds the commands in the order of sending, `asked` the one that has no answer yet;
+  `silent_ms` is since when the camera owes one, `full_ms` when it reported that it is full.
   """
   @type t :: %__MODULE__{
           waiting: [Command.t()],
@@ -64,12 +66,12 @@ defmodule Hal.Visca.Queue do
           | :network_change
           | :no_answer
 
-  @doc "Nothing said, nothing to say."
+  @doc "A queue with nothing sent and nothing to send."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
   @doc """
-  Something to say.
+  Adds a command to send.
 
       iex> {effects, queue} = Hal.Visca.Queue.push(Hal.Visca.Queue.new(), :home, 0)
       iex> effects
@@ -84,14 +86,14 @@ defmodule Hal.Visca.Queue do
   def push(%__MODULE__{} = queue, command, now_ms),
     do: say([], %{queue | waiting: CommandClass.put(queue.waiting, command)}, now_ms)
 
-  @doc "A reply of the camera."
+  @doc "Takes a reply of the camera."
   @spec heard(t(), Reply.t(), integer()) :: {[effect()], t()}
   def heard(%__MODULE__{} = queue, reply, now_ms) do
     {effects, queue} = answer(reply, %{queue | silent_ms: nil}, now_ms)
     say(effects, queue, now_ms)
   end
 
-  @doc "Time has passed; wanted at `wake_ms/1`, allowed at any time."
+  @doc "Takes the time; needed at `wake_ms/1`, allowed at any time."
   @spec tick(t(), integer()) :: {[effect()], t()}
   def tick(%__MODULE__{} = queue, now_ms) do
     {late, sockets} = Sockets.expire(queue.sockets, now_ms)
@@ -101,7 +103,7 @@ defmodule Hal.Visca.Queue do
     {effects ++ said ++ silence(queue, now_ms), queue}
   end
 
-  @doc "When `tick/2` is wanted; `nil`: not before something else happens."
+  @doc "When `tick/2` is needed; `nil`: not before something else happens."
   @spec wake_ms(t()) :: integer() | nil
   def wake_ms(%__MODULE__{} = queue) do
     [
@@ -114,14 +116,14 @@ defmodule Hal.Visca.Queue do
     |> Enum.min(fn -> nil end)
   end
 
-  @doc "Whether a command of this lane waits, or was said and has no answer."
+  @doc "Whether a command of this class waits, or was sent and has no answer yet."
   @spec pending?(t(), CommandClass.t()) :: boolean()
   def pending?(%__MODULE__{asked: {command, _, _}} = queue, lane),
     do: CommandClass.of(command) == lane or pending?(%{queue | asked: nil}, lane)
 
   def pending?(queue, lane), do: Enum.any?(queue.waiting, &(CommandClass.of(&1) == lane))
 
-  # The answer to what was asked
+  # Answers
 
   defp answer({:ack, socket}, %{asked: {command, _, _}} = queue, now_ms) do
     if Command.immediate?(command),
@@ -129,7 +131,7 @@ defmodule Hal.Visca.Queue do
       else: {[{:accepted, command}], queue |> free() |> occupy(socket, command, now_ms)}
   end
 
-  # It comes late, to something that was given up: whatever it was, that socket works.
+  # A late one, to a command that was given up: whatever it was, that socket is busy.
   defp answer({:ack, socket}, queue, now_ms), do: {[], occupy(queue, socket, :unknown, now_ms)}
 
   defp answer({:done, socket}, queue, _now_ms) do
@@ -143,7 +145,7 @@ defmodule Hal.Visca.Queue do
   defp answer({:result, bytes}, %{asked: {{:ask, inquiry}, at_ms, _}} = queue, now_ms) do
     case Reply.value(inquiry, bytes) do
       {:ok, value} -> {[{:result, inquiry, value, now_ms - at_ms}], free(queue)}
-      # An answer to an earlier question, or a damaged one: ours may still come.
+      # The answer to an earlier inquiry, or a damaged one: the right one may still come.
       :error -> {[], queue}
     end
   end
@@ -165,7 +167,7 @@ defmodule Hal.Visca.Queue do
     {if(command, do: [{:failed, command, :cancelled}], else: []), queue}
   end
 
-  # The camera itself gave it up, for a newer one.
+  # The camera itself gave the command up, for a newer one.
   defp answer({:error, socket, :cancelled}, queue, _now_ms) do
     {command, queue} = vacate(queue, socket)
     {if(command, do: [{:failed, command, :cancelled}], else: []), queue}
@@ -177,7 +179,7 @@ defmodule Hal.Visca.Queue do
       else: {[], %{again(queue) | sockets: Sockets.full(queue.sockets, now_ms), full_ms: now_ms}}
   end
 
-  # A damaged command is a syntax error too: it is said again, as if it had not been heard.
+  # A damaged command gives a syntax error too: it is sent again, as if it had not been heard.
   defp answer({:error, _socket, reason}, %{asked: {_, _, _}} = queue, _now_ms)
        when reason in [:syntax, :length],
        do: retry(queue, reason)
@@ -208,7 +210,7 @@ defmodule Hal.Visca.Queue do
         {[], %{queue | asked: {command, nil, tries}}}
 
       match?({:cancel, _}, command) ->
-        # It never answers to this: then nothing works there.
+        # The camera does not answer this: then nothing runs in that socket.
         {_command, queue} = queue |> free() |> vacate(elem(command, 1))
         {[], queue}
 
@@ -219,7 +221,7 @@ defmodule Hal.Visca.Queue do
 
   defp tries({:ask, _}), do: 1
   defp tries({:cancel, _}), do: 2
-  # Some cameras that are alone on their cable say nothing to these.
+  # Some cameras that are alone on their cable do not answer these.
   defp tries(command) when command in [:address_set, :if_clear], do: 2
   defp tries(command), do: if(CommandClass.repeatable?(command), do: @tries, else: 1)
 
@@ -228,7 +230,7 @@ defmodule Hal.Visca.Queue do
 
   defp silence(_queue, _now_ms), do: []
 
-  # What to say next
+  # The next command
 
   defp say(effects, %{asked: {command, nil, tries}} = queue, now_ms),
     do: {effects ++ [{:say, command}], asked(queue, command, tries + 1, now_ms)}
@@ -248,7 +250,7 @@ defmodule Hal.Visca.Queue do
 
   defp say(effects, queue, _now_ms), do: {effects, queue}
 
-  # The command itself, or the cancel that has to come before it.
+  # The command itself, or the cancel that must come before it.
   defp sayable(command, queue) do
     cond do
       Command.immediate?(command) -> command
@@ -268,7 +270,7 @@ defmodule Hal.Visca.Queue do
 
   defp free(queue), do: %{queue | asked: nil}
 
-  # Back to the front, unless a newer one is there.
+  # Back to the front, unless a newer one waits.
   defp again(%{asked: nil} = queue), do: queue
 
   defp again(%{asked: {command, _, _}} = queue) do

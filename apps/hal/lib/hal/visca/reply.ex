@@ -5,18 +5,18 @@ defmodule Hal.Visca.Reply do
   | reply | when |
   |---|---|
   | `{:ack, socket}` | a command was accepted |
-  | `{:done, socket}` | it is finished: for moves, when the movement ends |
-  | `{:result, bytes}` | the answer to an inquiry; no bytes: to "clear one" |
-  | `{:error, socket, reason}` | see `t:reason/0`; socket 0 where the command never had one |
+  | `{:done, socket}` | the command is done: for moves, when the movement ends |
+  | `{:result, bytes}` | the answer to an inquiry; without bytes, to `:if_clear_one` |
+  | `{:error, socket, reason}` | see `t:reason/0`; socket 0 if the command never had one |
   | `:network_change` | a camera of the chain was switched on |
-  | `{:cameras, n}` | answer to "take your numbers" |
-  | `:cleared` | answer to "clear all" |
+  | `{:cameras, n}` | the answer to `:address_set` |
+  | `:cleared` | the answer to `:if_clear` |
   """
   alias Hal.Visca.Command
 
   @typedoc """
-  `:full`: both sockets are busy. `:not_executable`: not now; it is switched off, or does
-  something that does not go with it. `:no_socket`: nothing to cancel there.
+  `:full`: both sockets are busy. `:not_executable`: not now; the camera is switched off, or does
+  something that excludes it. `:no_socket`: nothing to cancel there.
   """
   @type reason ::
           :length | :syntax | :full | :cancelled | :no_socket | :not_executable | {:code, byte()}
@@ -30,7 +30,7 @@ defmodule Hal.Visca.Reply do
           | :cleared
 
   @doc """
-  A reply and the number of the camera that gave it (0: said to all).
+  A reply, and the number of the camera that sent it (0: a broadcast).
 
       iex> Hal.Visca.Reply.decode(<<0x90, 0x41>>)
       {:ok, 1, {:ack, 1}}
@@ -71,13 +71,13 @@ defmodule Hal.Visca.Reply do
   defp reason(code), do: {:code, code}
 
   @doc """
-  What the bytes of a result mean as the answer to an inquiry; `:error` where they cannot be one.
+  Reads the bytes of a result as the answer to an inquiry; `:error` if they cannot be one.
 
   | inquiry | value |
   |---|---|
   | `:version` | `%{vendor:, model:, rom:, sockets:}`; the D30 and D31 are model 0x0402 |
   | `:power` | `true` or `false` |
-  | `:zoom` | 0 to 1023, as far as the camera says so |
+  | `:zoom` | as the camera reports it, which should be 0 to 1023 |
   | `:position` | `{pan, tilt}`, signed |
   | `:max_speed` | `{pan, tilt}` |
   | `:status` | 16 bits |

@@ -1,24 +1,25 @@
 defmodule Hal.Visca.Session do
   @moduledoc """
   A Sony EVI-D30 or D31 on its line, as a function of bytes, requests and time: what to write, and
-  what it reports. Pure; `Hal.Visca.Driver` runs it.
+  what the unit reports. Pure; `Hal.Visca.Driver` runs it.
 
-  **Opening**: take your numbers, clear, who are you, are you on (if not: be on), where are you.
-  A camera that was switched off and on says so in a chain, or shows it by standing elsewhere than
-  it was told; then it is opened again and gets its last target again.
+  **Opening**: number the cameras, clear, ask for the version, ask whether it is on (if not:
+  switch it on), ask for the position. A camera that was switched off and on reports it in a
+  chain, and is opened again; one that cannot execute a command is asked again whether it is on.
+  After an opening the camera gets its last target again.
 
-  **Ready**: it asks for the position every `poll_ms`, and for the zoom at each fifth time.
+  **Ready**: the session asks for the position every `poll_ms`, and for the zoom every fifth time.
 
-  **Positions** that the head cannot have come to are doubted (`Hal.Visca.Session.OutlierFilter`).
+  **Positions** that the head cannot have reached are doubted (`Hal.Visca.Session.OutlierFilter`).
 
-  **The target**: only a change is said. A head that stands still for half a second elsewhere than
-  at its target, by more than a degree, is told again, once a second at most: a damaged command
-  that the camera took for another one, or a hand, turned it away.
+  **The target** is sent only when it changes. If the head stands still for half a second more
+  than a degree away from it, it is sent again, once a second at most: a damaged command that the
+  camera took for another one, or a hand, may have turned the head away.
 
-  Effects: `{:write, bytes}`, `{:reading, reading}` (`Hal.Ptz`), `{:error, reason}` after which it
-  is closed. Reasons: `:no_answer` (nothing for 1 s, or no position for 2 s), `{:cameras, n}` (the
-  chain has fewer cameras than the number asked for), `{:model, code}` (a D70 or D100, whose units
-  are others).
+  Effects: `{:write, bytes}`, `{:reading, reading}` (`Hal.Ptz`), and `{:error, reason}`, after
+  which the session must be closed. Reasons: `:no_answer` (nothing for 1 s, or no position for
+  2 s), `{:cameras, n}` (the chain has fewer cameras than the requested number), `{:model, code}`
+  (a D70 or D100, which have other units).
   """
   alias Hal.Visca.{Command, Decoder, Queue, Units}
   alias Hal.Visca.Session.{OutlierFilter, Target}
@@ -28,9 +29,9 @@ defmodule Hal.Visca.Session do
   @lost_ms 2_000
   @zoom_each 5
   @on_ms 3_000
-  # Other members of the family, with other units.
+  # Other models of the family, with other units.
   @foreign [0x040D, 0x040E]
-  # At 9600 baud a position's answer takes 11.5 ms, and its question 5.2 ms.
+  # At 9600 baud the answer with a position takes 11.5 ms, and its inquiry 5.2 ms.
   @answer_ms 11.5
   @question_ms 5.2
 
@@ -48,15 +49,16 @@ defmodule Hal.Visca.Session do
                 polls: 0
               ]
 
-  @typedoc "Where the opening is."
+  @typedoc "The step of the opening."
   @type step :: :address | :clear | :version | :power | :switch_on | :look_round | :ready
   @opaque t :: %__MODULE__{}
   @type effect :: {:write, binary()} | {:reading, Hal.Ptz.reading()} | {:error, reason()}
   @type reason :: :no_answer | {:cameras, 0..7} | {:model, non_neg_integer()}
 
   @doc """
-  Begins the opening. Options: `camera` (1 to 7, default 1), `lens` (`t:Hal.Visca.Units.lens/0`),
-  `poll_ms` (default 100), `field_of_view` (radians to zoom to once; default: leave it).
+  Starts the opening. Options: `camera` (1 to 7, default 1), `lens` (`t:Hal.Visca.Units.lens/0`),
+  `poll_ms` (default 100), `field_of_view` (radians to zoom to at the opening; default: leave it
+  unchanged).
 
       iex> {effects, _head} = Hal.Visca.Session.open([], 0)
       iex> effects
@@ -78,14 +80,17 @@ defmodule Hal.Visca.Session do
     done(begin(head, :address, now_ms))
   end
 
-  @doc "Looks there (radians, left and up positive), as fast as it can; at once or once it is open."
+  @doc """
+  Requests a direction (radians, left and up positive), at full speed; sent once the camera is
+  open.
+  """
   @spec look(t(), float(), float(), integer()) :: {[effect()], t()}
   def look(%__MODULE__{} = head, pan, tilt, now_ms) do
     target = Target.want(head.target, {Units.pan(pan), Units.tilt(tilt)})
     done(aim({[], %{head | target: target}}, now_ms))
   end
 
-  @doc "Zooms to a horizontal field of view, in radians."
+  @doc "Requests a horizontal field of view, in radians."
   @spec zoom(t(), float(), integer()) :: {[effect()], t()}
   def zoom(%__MODULE__{} = head, angle, now_ms) do
     zoom = Units.zoom(angle, head.lens)
@@ -97,7 +102,7 @@ defmodule Hal.Visca.Session do
     end
   end
 
-  @doc "Bytes from the line."
+  @doc "Takes bytes from the line."
   @spec bytes(t(), binary(), integer()) :: {[effect()], t()}
   def bytes(%__MODULE__{} = head, bytes, now_ms) do
     {replies, decoder} = Decoder.feed(head.decoder, bytes)
@@ -110,14 +115,14 @@ defmodule Hal.Visca.Session do
     )
   end
 
-  @doc "Time has passed; wanted at `wake_ms/1`, allowed at any time."
+  @doc "Takes the time; needed at `wake_ms/1`, allowed at any time."
   @spec tick(t(), integer()) :: {[effect()], t()}
   def tick(%__MODULE__{} = head, now_ms) do
     {more, queue} = Queue.tick(head.queue, now_ms)
     {[], %{head | queue: queue}} |> react(more, now_ms) |> poll(now_ms) |> done()
   end
 
-  @doc "When `tick/2` is wanted."
+  @doc "When `tick/2` is needed."
   @spec wake_ms(t()) :: integer() | nil
   def wake_ms(%__MODULE__{} = head) do
     [Queue.wake_ms(head.queue), head.poll_at_ms]
@@ -125,7 +130,10 @@ defmodule Hal.Visca.Session do
     |> Enum.min(fn -> nil end)
   end
 
-  @doc "Bytes that were no message, messages of other cameras, and positions that were doubted, since the opening."
+  @doc """
+  Counts since the opening: bytes that did not belong to a message, messages of other cameras, and
+  positions that were doubted.
+  """
   @spec counts(t()) :: %{
           garbage: non_neg_integer(),
           others: non_neg_integer(),
@@ -141,7 +149,7 @@ defmodule Hal.Visca.Session do
   defp enter({effects, head}, :ready, now_ms),
     do: ask({effects, %{head | step: :ready}}, :ready, now_ms)
 
-  # Nothing is polled but where a step says so.
+  # Polls only where a step starts it.
   defp enter({effects, head}, step, now_ms),
     do: ask({effects, %{head | step: step, poll_at_ms: nil}}, step, now_ms)
 
@@ -150,7 +158,7 @@ defmodule Hal.Visca.Session do
   defp ask(state, :version, now_ms), do: push(state, {:ask, :version}, now_ms)
   defp ask(state, :power, now_ms), do: push(state, {:ask, :power}, now_ms)
 
-  # Should its word that it is on get lost, it is asked.
+  # If the completion gets lost, the session asks whether the camera is on.
   defp ask({effects, head}, :switch_on, now_ms),
     do: push({effects, %{head | poll_at_ms: now_ms + @on_ms}}, {:power, true}, now_ms)
 
@@ -173,7 +181,7 @@ defmodule Hal.Visca.Session do
   defp take({:cameras, n}, {effects, %{camera: camera} = head}, _now_ms) when n < camera,
     do: {[{:error, {:cameras, n}} | effects], head}
 
-  # Not every camera answers these; what is wrong shows further on.
+  # Not every camera answers these; if something is wrong, a later step shows it.
   defp take({:cameras, _n}, {_, %{step: :address}} = state, now_ms),
     do: enter(state, :clear, now_ms)
 
@@ -201,12 +209,12 @@ defmodule Hal.Visca.Session do
   defp take({:failed, {:power, true}, _reason}, {_, %{step: :switch_on}} = state, now_ms),
     do: enter(state, :power, now_ms)
 
-  # Refused, not unheard: switched off, perhaps.
+  # Refused, but heard: the camera may be switched off.
   defp take({:failed, {:ask, :version}, reason}, {_, %{step: :version}} = state, now_ms)
        when reason != :no_answer,
        do: enter(state, :power, now_ms)
 
-  # Said again until it answers, or is silent for a second.
+  # Sent again until the camera answers, or is silent for a second.
   defp take({:failed, {:ask, inquiry}, _}, {_, %{step: inquiry}} = state, now_ms),
     do: enter(state, inquiry, now_ms)
 
@@ -230,7 +238,7 @@ defmodule Hal.Visca.Session do
   defp take(:network_change, {effects, head}, now_ms),
     do: enter({effects, %{head | zoom: nil}}, :address, now_ms)
 
-  # It is switched off, perhaps: the opening finds out.
+  # The camera may be switched off: the opening finds out.
   defp take({:failed, _command, :not_executable}, {_, %{step: step}} = state, now_ms)
        when step in [:look_round, :ready],
        do: enter(state, :power, now_ms)
@@ -244,7 +252,8 @@ defmodule Hal.Visca.Session do
 
   defp reading(effects, %{zoom: nil}, _at, _took_ms), do: effects
 
-  # The camera looked where it is between the question's last byte and the answer's first.
+  # The camera measures its direction between the last byte of the inquiry and the first of the
+  # answer.
   defp reading(effects, head, {pan, tilt}, took_ms) do
     {pan, tilt} = Units.angles(pan, tilt)
     angle = Units.field_of_view(head.zoom, head.lens)
@@ -274,7 +283,7 @@ defmodule Hal.Visca.Session do
     if now_ms - seen_ms >= @lost_ms do
       {[{:error, :no_answer} | effects], head}
     else
-      # At absolute times; what was missed is not made up for.
+      # At absolute times; missed polls are not made up for.
       head = %{head | poll_at_ms: max(at_ms + head.poll_ms, now_ms + 1), polls: head.polls + 1}
       state = push({effects, head}, {:ask, :position}, now_ms)
 

@@ -10,9 +10,9 @@ defmodule Hal.Visca.Units do
   | tilt speed | rad/s, up to 50 degrees/s | 1 to 20, 2.5 degrees/s each |
   | zoom | horizontal field of view, radians | 0 (wide) to 1023 (tele) |
 
-  What is asked for beyond a range becomes the end of the range: a head that is told to look
-  behind itself looks as far as it can. The field of view is taken as linear in the zoom, as
-  Player does; the truth is not (the sheet says so, and has no better source).
+  A request beyond a range becomes the end of the range: a head that should look behind itself
+  looks as far as it can. The field of view is taken as linear in the zoom, as Player does, which
+  it is not (the sheet says so, and has no better source).
   """
 
   @degree :math.pi() / 180
@@ -24,7 +24,7 @@ defmodule Hal.Visca.Units do
   @type lens :: {tele :: float(), wide :: float()}
 
   @doc """
-  The camera's pan for radians.
+  The camera's pan for an angle in radians.
 
       iex> Hal.Visca.Units.pan(:math.pi() / 6)
       -264
@@ -35,7 +35,7 @@ defmodule Hal.Visca.Units do
   def pan(radians) when is_number(radians), do: steps(-radians, 8.8, @pan_max)
 
   @doc """
-  The camera's tilt for radians.
+  The camera's tilt for an angle in radians.
 
       iex> Hal.Visca.Units.tilt(-:math.pi() / 18)
       -120
@@ -44,19 +44,19 @@ defmodule Hal.Visca.Units do
   def tilt(radians) when is_number(radians), do: steps(radians, 12, @tilt_max)
 
   @doc """
-  Radians of a pan and tilt of the camera.
+  A pan and a tilt of the camera in radians.
 
       iex> {pan, tilt} = Hal.Visca.Units.angles(-264, 120)
       iex> {Float.round(pan, 4), Float.round(tilt, 4)}
       {0.5236, 0.1745}
   """
   @spec angles(pan :: integer(), tilt :: integer()) :: {float(), float()}
-  # Zero less, not minus: there is no use for a zero with a sign.
+  # Subtracted from zero, not negated: a zero with a sign is of no use.
   def angles(pan, tilt) when is_integer(pan) and is_integer(tilt),
     do: {(0 - pan) / 8.8 * @degree, tilt / 12 * @degree}
 
   @doc """
-  Whether a position is one that the camera can have, with a degree to spare.
+  Whether the camera can have this position, with a degree to spare.
 
       iex> Hal.Visca.Units.position?(-880, 300)
       true
@@ -67,7 +67,7 @@ defmodule Hal.Visca.Units do
   def position?(pan, tilt), do: abs(pan) <= @pan_max + 9 and abs(tilt) <= @tilt_max + 12
 
   @doc """
-  The camera's pan speed that is nearest to so many rad/s, at least 1 (there is no slower one).
+  The camera's pan speed nearest to this rate in rad/s, at least 1 (the slowest).
 
       iex> Hal.Visca.Units.pan_speed(20 * :math.pi() / 180)
       6
@@ -76,7 +76,7 @@ defmodule Hal.Visca.Units do
   def pan_speed(rate) when is_number(rate), do: speed(rate, 10 / 3, 24)
 
   @doc """
-  The camera's tilt speed that is nearest to so many rad/s, at least 1.
+  The camera's tilt speed nearest to this rate in rad/s, at least 1.
 
       iex> Hal.Visca.Units.tilt_speed(9.0)
       20
@@ -85,8 +85,8 @@ defmodule Hal.Visca.Units do
   def tilt_speed(rate) when is_number(rate), do: speed(rate, 2.5, 20)
 
   @doc """
-  Rates of turn as a drive command: `{direction, speed}` for each axis, pan positive to the left,
-  tilt positive upwards, in rad/s. Less than half the slowest speed is a stop.
+  A drive command for these rates in rad/s: `{direction, speed}` for each axis, pan positive to
+  the left, tilt positive upwards. A rate below half the slowest speed is a stop.
 
       iex> Hal.Visca.Units.drive(20 * :math.pi() / 180, 0.0)
       {:drive, {:left, 6}, {:stop, 0}}
@@ -98,7 +98,7 @@ defmodule Hal.Visca.Units do
   end
 
   @doc """
-  The zoom for a field of view.
+  The zoom for a horizontal field of view, in radians.
 
       iex> degree = :math.pi() / 180
       iex> Hal.Visca.Units.zoom(15 * degree, {3 * degree, 30 * degree})
@@ -126,7 +126,7 @@ defmodule Hal.Visca.Units do
     wide - zoom / 1024 * (wide - tele)
   end
 
-  # Cut before the number is made an integer: a huge float would make a huge integer.
+  # Limited before the conversion to an integer: a huge float would make a huge integer.
   defp steps(radians, per_degree, most) do
     limit = most / per_degree * @degree
     round((radians |> max(-limit) |> min(limit)) / @degree * per_degree)

@@ -2,27 +2,28 @@ defmodule Hal.Visca.Queue.Sockets do
   @moduledoc """
   Tracks which commands occupy a camera's two sockets, as far as it has reported. Pure.
 
-  Answers get lost on a line, so the books may be wrong both ways. `:unknown` stands for something
-  that works and is not known: it is the first to be cancelled when its socket is needed.
+  Answers get lost on a line, so this record may be wrong either way. `:unknown` stands for a
+  command that runs but is not known: when its socket is needed, it is cancelled unless a known
+  command is pointless.
   """
   alias Hal.Visca.{Command, CommandClass}
 
   # The longest move at full speed takes 2.5 s, zoom about as much; switching on takes longer.
   @work_ms 10_000
 
-  @typedoc "By socket: what works there, and since when."
+  @typedoc "By socket: the command that runs there, and since when."
   @type t :: %{optional(1..2) => {Command.t() | :unknown, since_ms :: integer()}}
 
-  @doc "Both free."
+  @doc "Both sockets are free."
   @spec new() :: t()
   def new, do: %{}
 
-  @doc "Something begins to work in a socket; whatever was there before is over."
+  @doc "A command starts in a socket; whatever ran there before is over."
   @spec occupy(t(), 1..2, Command.t() | :unknown, integer()) :: t()
   def occupy(sockets, socket, command, now_ms) when socket in 1..2,
     do: Map.put(sockets, socket, {command, now_ms})
 
-  @doc "A socket is free: what worked in it, `nil` if that is not known."
+  @doc "Frees a socket; returns the command that ran in it, or `nil` if that is not known."
   @spec vacate(t(), 0..2) :: {Command.t() | nil, t()}
   def vacate(sockets, socket) do
     case Map.pop(sockets, socket) do
@@ -31,19 +32,23 @@ defmodule Hal.Visca.Queue.Sockets do
     end
   end
 
-  @doc "The camera says that both work: what is not in the books is unknown."
+  @doc """
+  The camera reports that both sockets are busy: a socket without a record holds an unknown
+  command.
+  """
   @spec full(t(), integer()) :: t()
   def full(sockets, now_ms),
     do: Map.merge(%{1 => {:unknown, now_ms}, 2 => {:unknown, now_ms}}, sockets)
 
-  @doc "Whether one is free."
+  @doc "Whether a socket is free."
   @spec free?(t()) :: boolean()
   def free?(sockets), do: map_size(sockets) < 2
 
   @doc """
-  The socket that has to be cancelled before a command can go out, if there is one: with both
-  busy the oldest whose work the command overrides, or a newer one has overridden; or else an unknown one. For a
-  drive any move, since the D30 does not drive during one.
+  The socket that must be cancelled before a command can be sent, if there is one. With both busy
+  it is the oldest whose command is overridden by this one, or by a newer one in a socket;
+  otherwise that of an unknown command. For a drive it is that of any move, because the D30 does
+  not drive during one.
 
       iex> alias Hal.Visca.Queue.Sockets
       iex> sockets = Sockets.occupy(Sockets.new(), 1, {:look, 9, 0, 24, 20}, 0)
@@ -59,7 +64,7 @@ defmodule Hal.Visca.Queue.Sockets do
   def in_the_way(sockets, {:drive, _, _} = command) do
     oldest(sockets, fn
       :unknown, _since_ms -> map_size(sockets) == 2
-      # A drive is done at once, and is no move that refuses another.
+      # A drive is done at once, and is not a move that makes the camera refuse another.
       {:drive, _, _}, _since_ms -> map_size(sockets) == 2
       other, _since_ms -> CommandClass.overrides?(command, other)
     end)
@@ -77,14 +82,14 @@ defmodule Hal.Visca.Queue.Sockets do
     end) || oldest(sockets, fn work, _since_ms -> work == :unknown end)
   end
 
-  @doc "Frees what has worked for more than 10 s; gives those that are known."
+  @doc "Frees the sockets that have been busy for 10 s; returns their commands, if known."
   @spec expire(t(), integer()) :: {[Command.t()], t()}
   def expire(sockets, now_ms) do
     {late, rest} = Enum.split_with(sockets, fn {_, {_, since}} -> now_ms - since >= @work_ms end)
     {for({_socket, {command, _}} <- late, command != :unknown, do: command), Map.new(rest)}
   end
 
-  @doc "When the next one expires."
+  @doc "When the next socket expires."
   @spec wake_ms(t()) :: integer() | nil
   def wake_ms(sockets),
     do: sockets |> Enum.map(fn {_, {_, since}} -> since + @work_ms end) |> Enum.min(fn -> nil end)

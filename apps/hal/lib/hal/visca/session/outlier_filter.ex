@@ -2,12 +2,12 @@ defmodule Hal.Visca.Session.OutlierFilter do
   @moduledoc """
   Rejects positions that a camera's head cannot have reached. Pure; the camera's units.
 
-  A line without checksums turns one position into another by a single bit. The head turns at most
-  by 80 degrees/s (tilt: 50), so a position beyond what it can have reached since the last one is
-  doubted until the next one says about the same.
+  On a line without checksums a single wrong bit turns one position into another. The head turns
+  at 80 degrees/s at most (tilt: 50), so a position further away than it can have moved since the
+  last one is doubted, until the next one is about the same.
   """
 
-  # Units a millisecond, with a fifth to spare, and two degrees.
+  # Units per millisecond, with a fifth to spare, and two degrees.
   @pan_rate 80 * 8.8 * 1.2 / 1000
   @tilt_rate 50 * 12 * 1.2 / 1000
   @pan_slack 18
@@ -16,19 +16,19 @@ defmodule Hal.Visca.Session.OutlierFilter do
   defstruct believed: nil, doubted: nil, doubts: 0
 
   @type seen :: {pan :: integer(), tilt :: integer(), at_ms :: integer()}
-  @typedoc "`doubts`: how many positions were not believed when they came."
+  @typedoc "`doubts` counts the positions that were doubted when they came."
   @type t :: %__MODULE__{
           believed: seen() | nil,
           doubted: seen() | nil,
           doubts: non_neg_integer()
         }
 
-  @doc "Has seen nothing."
+  @doc "A filter that has seen no position."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
   @doc """
-  Whether a position is believed.
+  Takes a position; returns whether it is believed.
 
       iex> alias Hal.Visca.Session.OutlierFilter
       iex> {true, outliers} = OutlierFilter.hear(OutlierFilter.new(), {0, 0}, 0)

@@ -3,8 +3,8 @@ defmodule Hal.Visca.Session.Target do
   Where a camera's head should look, and whether to send the command (again). Pure; the camera's
   units.
 
-  A new target is due at once. One that was said is due again when the head stands still elsewhere
-  for 0.5 s, by more than a degree, and 1 s after it was said last.
+  A new target is due at once. A target that was sent is due again when the head has stood still
+  for 0.5 s, more than a degree away from it, and 1 s has passed since it was last sent.
   """
   # A degree each.
   @pan_off 9
@@ -15,7 +15,10 @@ defmodule Hal.Visca.Session.Target do
   defstruct wanted: nil, said: nil, said_ms: nil, at: nil, since_ms: nil, now_ms: nil
 
   @type position :: {pan :: integer(), tilt :: integer()}
-  @typedoc "`at`: where it was seen, there `since_ms`, seen last at `now_ms`."
+  @typedoc """
+  `at` is the position of the head, which has been there since `since_ms` and was last seen at
+  `now_ms`.
+  """
   @type t :: %__MODULE__{
           wanted: position() | nil,
           said: position() | nil,
@@ -25,19 +28,19 @@ defmodule Hal.Visca.Session.Target do
           now_ms: integer() | nil
         }
 
-  @doc "No wish yet."
+  @doc "No target yet."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
-  @doc "Look there."
+  @doc "Sets the target."
   @spec want(t(), position()) :: t()
   def want(%__MODULE__{} = target, position), do: %{target | wanted: position}
 
-  @doc "The camera knows nothing of what it was told."
+  @doc "The camera has lost the target that was sent."
   @spec forget(t()) :: t()
   def forget(%__MODULE__{} = target), do: %{target | said: nil, said_ms: nil}
 
-  @doc "It was seen there."
+  @doc "Takes the position of the head."
   @spec seen(t(), position(), integer()) :: t()
   def seen(%__MODULE__{at: {pan, tilt}, since_ms: since_ms} = target, {p, t} = at, now_ms)
       when abs(p - pan) <= 1 and abs(t - tilt) <= 1,
@@ -47,7 +50,7 @@ defmodule Hal.Visca.Session.Target do
     do: %{target | at: at, since_ms: now_ms, now_ms: now_ms}
 
   @doc """
-  The target to say now; `nil` if there is nothing to say.
+  The target to send now; `nil` if there is nothing to send.
 
       iex> alias Hal.Visca.Session.Target
       iex> {{-264, 0}, target} = Target.due(Target.want(Target.new(), {-264, 0}), 0)
