@@ -1,41 +1,46 @@
-/* One serial line of the Erlang VM, and what is said on it when the VM no longer can. Started as
+/* One serial line of the Erlang VM, and the last words on it when the VM can no longer write.
+   Started as
 
        serial --port DEVICE --speed BAUD | --pty LINK   [--last-words HEX] [--keep-alive MS]
 
-   it opens DEVICE raw, 8 data bits, no parity, one stop bit, no flow control, for itself alone; or
-   makes a new pseudo-terminal, and the symbolic link LINK to its other end. Packets on both sides have
-   a length of two bytes, most significant first, and begin with a letter. In come
+   it opens DEVICE raw, 8 data bits, no parity, one stop bit, no flow control, exclusively; or it
+   makes a new pseudo-terminal, and the symbolic link LINK to its other end. Packets in both
+   directions have a length of two bytes, most significant first, and begin with a letter.
+   Incoming:
 
        'W' at:64 bytes to write
        'K' at:64       a sign of life; 'W' and 'L' are signs of life too
        'L' at:64 bytes the last words from now on
-       'T' count:32    so many bytes of 'D' were taken
-       'C'             close: what waits is written, then the last words, then 'C' is answered
+       'T' count:32    this many bytes of 'D' were taken
+       'C'             close: writes what waits and then the last words, and answers 'C'
 
-   and out go
+   Outgoing:
 
-       'O' now:64      open; always the first, unless it is 'E'
-       'K'             'K' was read; not more often than every ANSWER_MS
-       'D' bytes       read
-       'T' count:32    so many bytes of 'W' are off to the line, or dropped
-       'E' reason      the line cannot be had, or is lost; only 'C' follows
+       'O' now:64      open; always the first packet, unless that is 'E'
+       'K'             'K' was read; sent at most every ANSWER_MS
+       'D' bytes       bytes read from the line
+       'T' count:32    this many bytes of 'W' were taken by the line, or dropped
+       'E' reason      the line cannot be opened, or is lost; only 'C' follows
        'C'             closed, or as good as closed; nothing follows
 
-   The last words are written when our input ends, on SIGTERM and SIGHUP, on 'C', and when no sign of
-   life came for MS milliseconds: then once, until there is a sign of life again. They do not wait
-   behind what would take longer than PATIENCE_MS to leave; that is thrown away, half a packet maybe,
-   so they should be such that whoever listens finds their beginning.
+   The last words are written when the input ends, on SIGTERM and SIGHUP, on 'C', and after MS
+   milliseconds without a sign of life: then once, until the next sign of life. They do not wait
+   for earlier bytes that would take longer than PATIENCE_MS to leave. Those are discarded, maybe
+   amid a packet, so the receiver must be able to find the beginning of the last words.
 
-   Every sign of life says when it was given, `at` in milliseconds of CLOCK_MONOTONIC, which the VM reads too. We may
-   be frozen (SIGSTOP) while the VM is not; what it says meanwhile waits in the pipe, and on the line nothing can be
-   said. When we go on, what is older than the keep-alive time is not written, and a sign of life counts for when it was given:
-   so no old speed comes, and the last words do. The VM notices that 'K' is not answered.
+   Every sign of life has the time when it was given, `at`, in milliseconds of CLOCK_MONOTONIC,
+   which the VM reads too. This program may be frozen (SIGSTOP) while the VM is not; what the VM
+   sends meanwhile waits in the pipe, and nothing can be written on the line. When the program
+   resumes, packets older than the keep-alive time are not written, and a sign of life counts from
+   when it was given: so no outdated speed is written, but the last words are. The VM notices that
+   'K' is not answered.
 
-   After 'E' and 'C' we wait for our input to end: were we gone, a write of the VM's could fail, and it
-   would take this for the news and not our packet.
+   After 'E' and 'C' the program waits for its input to end: if it had ended itself, a write of
+   the VM could fail, and the VM would see that failure instead of the packet.
 
-   Nothing here blocks but that waiting, and nothing grows: what the line does not take is kept up to
-   SERIAL_OUT_MOST bytes, and while the VM does not read, we do not either. */
+   Only the closing and the last words wait, for the times below, and no buffer grows: up to
+   SERIAL_OUT_MOST bytes that the line does not take are kept, and while the VM does not read, the
+   line is not read either. */
 #define _GNU_SOURCE
 #include "serial.h"
 
@@ -57,30 +62,30 @@
 #include <time.h>
 #include <unistd.h>
 
-#define PATIENCE_MS 20      /* what leaves in this time may go before the last words */
-#define WORDS_MS 200        /* the longest try to have the last words taken */
-#define CLOSE_MS 500        /* the longest that 'C' waits for what was written before, and for the end */
-#define FAREWELL_MS 1000    /* the longest that we stay after SIGTERM for the VM to hear of it */
+#define PATIENCE_MS 20      /* bytes that leave within this time may precede the last words */
+#define WORDS_MS 200        /* how long the last words are tried to be written */
+#define CLOSE_MS 500        /* how long 'C' waits for earlier bytes and the end */
+#define FAREWELL_MS 1000    /* how long to stay after SIGTERM, so that the VM hears of it */
 
 #define ANSWER_MS 100       /* between two answers to 'K' */
-#define ABSENT_MS 10        /* how often a pty is asked whether somebody has opened its other end */
+#define ABSENT_MS 10        /* how often to check whether a pty's other end was opened */
 #define SLAVE_MAJOR_FIRST 136
 #define SLAVE_MAJOR_LAST 143
 
 static struct {
     const char *device, *link;
-    char slave[64];                     /* what the link leads to; empty when we have made none */
+    char slave[64];                     /* what the link leads to; empty if none was made */
     unsigned speed;
     int64_t keep_alive_ms;
     int fd;                             /* of the line; -1 when it is closed or lost */
-    int absent;                         /* nobody has the other end of our pty open */
-    int done;                           /* 'E' or 'C' was said */
+    int absent;                         /* the other end of the pty is not open */
+    int done;                           /* 'E' or 'C' was sent */
     uint8_t words[SERIAL_WORDS_MOST];
     size_t words_length;
     int64_t life_ms;
     int64_t answer_ms;                  /* when 'K' was answered last */
-    int64_t out_ms;                     /* when the newest of `out` was said */
-    int spoken;                         /* since the last sign of life */
+    int64_t out_ms;                     /* when the VM sent the newest of `out` */
+    int spoken;                         /* the last words were, since the last sign of life */
     uint8_t in[2 + 65535];              /* packets of the VM */
     size_t in_have;
     uint8_t out[SERIAL_OUT_MOST];       /* for the line */
@@ -116,7 +121,7 @@ static int leads_to(const char *link, const char *to)
     return n == (ssize_t)strlen(to) && memcmp(found, to, (size_t)n) == 0;
 }
 
-/* The link goes first: once the pty is closed, its number may be another one's, and so the link. */
+/* The link goes first: once the pty is closed, another may get its number, and so the link. */
 static void let_go(void)
 {
     if (s.slave[0] && leads_to(s.link, s.slave))
@@ -146,12 +151,12 @@ static void flush_up(void)
         } else if (errno == EAGAIN) {
             return;
         } else if (errno != EINTR) {
-            s.up_have = 0;      /* the VM is gone, which our input will tell */
+            s.up_have = 0;      /* the VM is gone; the end of our input will show it */
         }
     }
 }
 
-/* The caller sees to the room. */
+/* The caller makes sure that there is room. */
 static void send_up(char letter, const void *body, size_t size)
 {
     uint8_t *at = s.up + s.up_have;
@@ -169,7 +174,7 @@ static int room_up(size_t size)
     return s.up_have + 3 + size <= sizeof s.up;
 }
 
-/* Says once what has become of the line, and lets go of it. */
+/* Reports once why the line failed, and closes it. */
 static void fail(const char *reason)
 {
     if (s.done)
@@ -212,7 +217,7 @@ static void note_taken(size_t size)
     uint8_t count[4];
 
     s.taken += (uint32_t)size;
-    /* With room left for a last packet. */
+    /* Leaves room for a last packet. */
     if (s.taken >= SERIAL_TAKEN_STEP && !s.done && room_up(sizeof count + 128)) {
         for (int k = 0; k < 4; k++)
             count[k] = (uint8_t)(s.taken >> (24 - 8 * k));
@@ -236,7 +241,7 @@ static void drop_out(void)
     note_taken(size);
 }
 
-/* What waited for the line while we were stopped is old too. */
+/* Bytes that waited for the line while this program was stopped are old too. */
 static void drop_stale(void)
 {
     sigset_t pending;
@@ -247,13 +252,13 @@ static void drop_stale(void)
         drop_out();
 }
 
-/* Of a pty, what has arrived in the other end's buffer of 4 kB stays, as with any line. */
+/* Of a pty, bytes that are already in the other end's buffer of 4 kB stay, as with any line. */
 static void flush_line(void)
 {
     ioctl(s.fd, TCFLSH, TCOFLUSH);
 }
 
-/* A pty whose user went away keeps what that one did not read; the next one shall not get it. */
+/* When its user has gone, a pty keeps what was not read; the next user must not get it. */
 static void look_for_user(void)
 {
     int absent = !other_end_is_open();
@@ -271,7 +276,7 @@ static void look_for_user(void)
     s.absent = absent;
 }
 
-/* Writes what the line takes now. With nobody at the other end, a pty is a cable that hangs in the air. */
+/* Writes what the line takes now. What is written to a pty with no user is dropped. */
 static void write_line(void)
 {
     drop_stale();
@@ -294,7 +299,7 @@ static void write_line(void)
     }
 }
 
-/* How long the line needs for what the kernel holds. A pty says that it holds nothing. */
+/* How long the line needs for the bytes in the kernel. A pty reports that there are none. */
 static int64_t held_ms(void)
 {
     int bytes = 0;
@@ -331,7 +336,7 @@ static void speak(void)
         } else if (n < 0 && errno == EAGAIN && !flushed) {
             flush_line();
             flushed = 1;
-            said = 0;           /* their beginning may have been thrown away too */
+            said = 0;           /* their beginning may have been discarded too */
         } else if (n < 0 && errno == EAGAIN) {
             struct pollfd line = { .fd = s.fd, .events = POLLOUT };
             int64_t left = until - now_ms();
@@ -380,7 +385,7 @@ static int make_raw(int fd)
     t.c_cc[VMIN] = 1;
     if (ioctl(fd, TCSETS2, &t) != 0 || ioctl(fd, TCGETS2, &t) != 0)
         return -1;
-    /* Bytes are misread above some 4 %, of which the other side has its part. */
+    /* Bytes are misread from an error of some 4 %, and the other side has an error too. */
     if ((t.c_cflag & CSIZE) != CS8 ||
         llabs((long long)t.c_ospeed - (long long)s.speed) * 100 > 3LL * s.speed) {
         errno = EINVAL;
@@ -403,14 +408,14 @@ static const char *open_device(void)
     if (flock(s.fd, LOCK_EX | LOCK_NB) != 0)
         return reason_of(errno);
 
-    /* A pty would stay so after us, for as long as its master lives, and refuse us too the next time. */
+    /* A pty would stay exclusive for as long as its master lives, and refuse us the next time. */
     unsigned number = major(about.st_rdev);
 
     if ((number < SLAVE_MAJOR_FIRST || number > SLAVE_MAJOR_LAST) && ioctl(s.fd, TIOCEXCL) != 0)
         return reason_of(errno);
     if (make_raw(s.fd) != 0)
         return errno == EINVAL ? "speed" : reason_of(errno);
-    /* Not what is on its way out: it may be the last words of who was here before. */
+    /* But not the output: it may be the last words of the previous program. */
     ioctl(s.fd, TCFLSH, TCIFLUSH);
     return NULL;
 }
@@ -422,8 +427,8 @@ static int leads_nowhere(const char *link)
     return lstat(link, &about) == 0 && S_ISLNK(about.st_mode) && stat(link, &about) != 0 && errno == ENOENT;
 }
 
-/* Only a link that leads nowhere, left by one of us who was killed, is replaced. When its number was
-   free, we have it now, and the link leads to us. */
+/* Replaces only a link that leads nowhere, left by a program of this kind that was killed. If its
+   number was free, this pty may have it now, and the link already leads to it. */
 static const char *make_link(const char *to)
 {
     int made = symlink(to, s.link) == 0;
@@ -449,7 +454,7 @@ static const char *open_pty(void)
         ptsname_r(s.fd, slave, sizeof slave) != 0)
         return reason_of(errno);
 
-    /* Opened once, so that the other end counts as closed until somebody comes. */
+    /* Opened once, so that the other end counts as closed until somebody opens it. */
     int other = open(slave, O_RDWR | O_NOCTTY | O_CLOEXEC);
 
     if (other < 0 || make_raw(other) != 0)
@@ -470,7 +475,7 @@ static int64_t number_64(const uint8_t *bytes)
     return number > INT64_MAX ? INT64_MAX : (int64_t)number;
 }
 
-/* Who is alive at `at`; how old that is now. A time to come is as good as now. */
+/* Takes a sign of life given at `at`; returns its age. A time in the future counts as now. */
 static int64_t alive(int64_t at)
 {
     int64_t now = now_ms();
@@ -530,7 +535,7 @@ static void take_packet(const uint8_t *packet, size_t size)
     switch (packet[0]) {
     case 'W':
         if (age > s.keep_alive_ms || size > sizeof s.out - s.out_have) {
-            note_taken(size);   /* too late, or more than the VM knows there is room for */
+            note_taken(size);   /* too late, or more than the VM may send */
         } else {
             memcpy(s.out + s.out_have, body, size);
             s.out_have += size;
@@ -564,7 +569,7 @@ static void take_packet(const uint8_t *packet, size_t size)
     }
 }
 
-/* 0 when the input has ended. */
+/* 0 if the input has ended. */
 static int read_vm(void)
 {
     ssize_t n = read(STDIN_FILENO, s.in + s.in_have, sizeof s.in - s.in_have);
@@ -676,7 +681,7 @@ static void listen_to_signals(sigset_t *while_waiting)
     signal(SIGINT, SIG_IGN);    /* a key pressed in the VM's terminal is meant for the VM */
 }
 
-/* Until when we may wait; none: INT64_MAX. */
+/* Until when to wait at most; INT64_MAX: no limit. */
 static int64_t next_ms(void)
 {
     int64_t at = INT64_MAX;
@@ -695,7 +700,7 @@ static int input_waits(void)
     return poll(&input, 1, 0) > 0;
 }
 
-/* Waits for what comes next, and carries it out. 0 when the VM is gone. */
+/* Waits for the next events, and handles them. 0 if the VM is gone. */
 static int turn(const sigset_t *while_waiting)
 {
     int64_t at = next_ms(), left = at - now_ms();
@@ -728,7 +733,7 @@ static int turn(const sigset_t *while_waiting)
     if (s.fd >= 0 && s.absent) {
         look_for_user();
         if (reading && s.up_have == 0)
-            read_line();        /* what the last one said before it went */
+            read_line();        /* what the last user wrote before it closed */
     }
     if (s.fd >= 0 && (fds[1].revents & POLLOUT))
         write_line();
@@ -738,8 +743,8 @@ static int turn(const sigset_t *while_waiting)
         else if (fds[1].revents & (POLLHUP | POLLERR))
             s.link ? look_for_user() : lost();
     }
-    /* Last, and after another look, so that a sign of life that waits for us counts: on a busy machine
-       it is we who are late. */
+    /* Last, and after another look, so that a sign of life that waits in the input counts: on a
+       busy machine this program may be late, not the VM. */
     if (s.words_length > 0 && !s.spoken && now_ms() >= s.life_ms + s.keep_alive_ms && !input_waits()) {
         s.spoken = 1;
         speak();
@@ -759,7 +764,7 @@ int serial_run(int argc, char **argv)
         return 2;
     }
     listen_to_signals(&while_waiting);
-    /* Little to do, but at once, however busy the machine. Only root may, and who is let (LimitNICE). */
+    /* Little to do, but without delay on a busy machine. Needs root, or LimitNICE. */
     (void)setpriority(PRIO_PROCESS, 0, -10);
     fcntl(STDOUT_FILENO, F_SETFL, fcntl(STDOUT_FILENO, F_GETFL) | O_NONBLOCK);
     reason = s.link ? open_pty() : open_device();

@@ -1,7 +1,7 @@
 defmodule Hal.Serial do
   @moduledoc """
   A serial line: raw bytes, 8 data bits, no parity, one stop bit, no flow control. Packet
-  boundaries are the caller's business.
+  boundaries are left to the caller.
 
       {:ok, line} = Hal.Serial.open(port: "/dev/ttyS0", speed: 115_200, last_words: stop)
       :ok = Hal.Serial.write(line, bytes)
@@ -10,22 +10,23 @@ defmodule Hal.Serial do
         message ->
           case Hal.Serial.handle(line, message) do
             {:data, bytes} -> ...
-            {:error, reason} -> ...   # the line is of no more use: close it
-            :unknown -> ...           # not for us
+            {:error, reason} -> ...   # the line cannot be used any more: close it
+            :unknown -> ...           # not a message of this line
           end
       end
 
       :ok = Hal.Serial.close(line)
 
-  A line belongs to the process that opened it, which gets its messages, and ends with it. That process
-  traps exits, as `Hal.Device` does, to see a line that is killed as an error.
+  A line belongs to the process that opened it, which receives its messages, and it ends with that
+  process. The process must trap exits, as `Hal.Device` does, to see the killing of a line as an
+  error.
 
   ## Options
 
   | option | allowed | default |
   |---|---|---|
-  | `:port` | path of a device | this or `:pty` must be given |
-  | `:pty` | path of a link that is made, to the other end of a new pseudo-terminal | |
+  | `:port` | path of a device | this or `:pty` is required |
+  | `:pty` | path of a link to create, to the other end of a new pseudo-terminal | |
   | `:speed` | baud, 1 to 20,000,000 | `115_200` |
   | `:last_words` | binary of at most 1024 bytes | `<<>>`: none |
   | `:keep_alive_ms` | 10 to 60,000 | `200` |
@@ -33,29 +34,30 @@ defmodule Hal.Serial do
 
   ## Last words
 
-  The last words are what the line receives when nobody is left to send it: a stop. They are
-  written when the line is closed, when its process or the whole VM ends in any way, and when
-  there was no sign of life for `:keep_alive_ms`: then once, until there is one. Signs of life are
+  The last words are what the line sends when its owner cannot: a stop. The port program writes
+  them when the line is closed, when its process or the whole VM ends in any way, and after
+  `:keep_alive_ms` without a sign of life: then once, until the next one. Signs of life are
   `write/2`, `last_words/2` and `keep_alive/1`. Earlier bytes that would delay them by more than
   20 ms are discarded, so half a packet may precede the last words. `Hal.Serial.Circuits` explains
-  what they are worth without our port program.
+  what they are worth without the port program.
 
   If only the port program is frozen, nothing can be sent on the line. `keep_alive/1`, called
-  often, returns `{:error, :frozen}` after half a second. When the program resumes, it writes
-  nothing that is older than `keep_alive_ms`, and then the last words.
+  often, returns `{:error, :frozen}` after half a second. When the program resumes, it discards
+  what is older than `keep_alive_ms`, and writes the last words.
 
-  ## Much at once
+  ## Overload
 
   At most 4096 bytes that the line has not taken are kept. A write that does not fit is rejected
-  with `{:error, :overrun}`: a late command is worthless, and nobody waits. The line remains
+  with `{:error, :overrun}`: a late command is worthless, and no caller waits. The line remains
   usable. An owner that does not take incoming bytes delays the line, which then loses bytes like
-  any serial line; nothing grows. Taking a message means passing it to `handle/2`.
+  any serial line; no buffer grows (with `Hal.Serial.Circuits` the mailbox does). Taking a message
+  means passing it to `handle/2`.
 
   ## A pseudo-terminal
 
   With `:pty`, any program may open the link, which is the other end, and close it again; what is
-  written meanwhile is lost. The link is removed at the end. It replaces one that leads nowhere,
-  and nothing else.
+  written meanwhile is lost. The link is removed at the end. It replaces a link that leads
+  nowhere, and nothing else.
   """
   alias Hal.{Options, Serial}
   alias Hal.Serial.Line
@@ -84,8 +86,8 @@ defmodule Hal.Serial do
   @type reason :: Line.reason()
 
   @doc """
-  Opens a line; its messages come to the calling process. Wrong options raise `ArgumentError`;
-  `options/1` tells beforehand. For the errors see `explain/2`.
+  Opens a line; its messages go to the calling process. Wrong options raise `ArgumentError`;
+  `options/1` checks them beforehand. For the errors see `explain/2`.
   """
   @spec open(keyword()) :: {:ok, t()} | {:error, reason()}
   def open(options) do
@@ -101,11 +103,16 @@ defmodule Hal.Serial do
     end
   end
 
-  @doc "Writes bytes, without waiting. `{:error, :overrun}`: nothing was written, the line is behind."
+  @doc """
+  Writes bytes, without waiting. `{:error, :overrun}`: nothing was written, because the line is
+  behind.
+  """
   @spec write(t(), iodata()) :: :ok | {:error, reason()}
   def write(%__MODULE__{} = t, bytes), do: t.module.write(t.line, bytes)
 
-  @doc "Changes the last words; `<<>>` for none. `{:error, :einval}`: they are longer than 1024 bytes."
+  @doc """
+  Changes the last words; `<<>>` for none. `{:error, :einval}`: they are longer than 1024 bytes.
+  """
   @spec last_words(t(), binary()) :: :ok | {:error, reason()}
   def last_words(%__MODULE__{} = t, words) when byte_size(words) <= @most_words,
     do: t.module.last_words(t.line, words)
@@ -113,25 +120,29 @@ defmodule Hal.Serial do
   def last_words(%__MODULE__{}, words) when is_binary(words), do: {:error, :einval}
 
   @doc """
-  Says that whoever drives is well, though it has nothing to write. `{:error, :frozen}`: for 500 ms nobody has
-  taken notice; the line is to be closed.
+  Gives a sign of life when there is nothing to write. `{:error, :frozen}`: the port program has
+  not reacted for 500 ms; the line should be closed.
   """
   @spec keep_alive(t()) :: :ok | {:error, reason()}
   def keep_alive(%__MODULE__{} = t), do: t.module.keep_alive(t.line)
 
   @doc """
-  Writes what still waits and the last words, sees that they get out, at most a second or so, and closes.
-  Messages of the line that were not taken are gone. A line that is closed or lost may be closed again.
+  Writes what still waits and the last words, waits until they are out, about a second at most,
+  and closes. Messages of the line that were not taken are discarded. A line that is closed or
+  lost may be closed again.
   """
   @spec close(t()) :: :ok
   def close(%__MODULE__{} = t), do: t.module.close(t.line)
 
-  @doc "What a message of the mailbox says. After an error the line is of no more use, and is to be closed."
+  @doc """
+  Interprets a message of the mailbox. After an error the line cannot be used any more, and should
+  be closed.
+  """
   @spec handle(t(), message :: term()) :: {:data, binary()} | {:error, reason()} | :unknown
   def handle(%__MODULE__{} = t, message), do: t.module.handle(t.line, message)
 
   @doc """
-  Checks options and fills in what is missing; or says in a line what is wrong.
+  Checks the options and adds the defaults; the error is one line that says what is wrong.
 
       iex> Hal.Serial.options(port: "/dev/ttyS0", speed: 0)
       {:error, "serial option speed cannot be 0: a whole number from 1 to 20000000 baud is allowed"}
@@ -153,7 +164,7 @@ defmodule Hal.Serial do
 
   defp refuse(key, value, allowed), do: Options.refuse("serial", [key], value, allowed)
 
-  @doc "What is allowed."
+  @doc "The table of the options."
   @spec table() :: Options.table()
   def table, do: @table
 
@@ -165,7 +176,7 @@ defmodule Hal.Serial do
     do: is_atom(module) and Code.ensure_loaded?(module) and function_exported?(module, :open, 1)
 
   @doc """
-  An error in one line for people.
+  Describes an error in one line for people.
 
       iex> Hal.Serial.explain(:enoent, "/dev/ttyR0")
       "/dev/ttyR0: no such device"

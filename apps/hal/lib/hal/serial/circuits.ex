@@ -1,20 +1,21 @@
 if Code.ensure_loaded?(Circuits.UART) do
   defmodule Hal.Serial.Circuits do
     @moduledoc """
-    A serial line (`Hal.Serial`) by `circuits_uart`, for programs that use it anyway (`MIX_TARGET`
-    other than `host`). `Hal.Serial.Native` is the one for robots with wheels, because here **the
-    last words are said by this VM**:
+    A serial line (`Hal.Serial`) through `circuits_uart`, for programs that use it anyway
+    (`MIX_TARGET` other than `host`). Robots with wheels should use `Hal.Serial.Native`, because
+    here **this VM writes the last words**:
 
-      * at closing, when the line's process ends, and in its silence they are written as promised
-      * when the VM itself is killed, frozen or has crashed they are **not**: the robot goes on until its
-        controller, or somebody at the emergency stop, ends that
+      * when the line is closed, its owner ends or is silent, they are written
+      * when the VM itself is killed, frozen or has crashed, they are **not**: the robot goes on
+        until its controller, or somebody at the emergency stop, ends that
 
-    A process stands between the line and its owner (`Hal.Serial.Circuits.Server`), so that nobody waits
-    for a write. What comes in piles up in the mailbox of an owner who does not look. There is no `:pty`.
+    A process between the line and its owner (`Hal.Serial.Circuits.Server`) writes, so that the
+    owner does not wait. Incoming bytes pile up in the mailbox of an owner that does not take
+    them. There is no `:pty`.
 
-    Errors of `open/1`: `:enoent`, `:eacces`, `:ebusy`, `:eio`, `:enotty`, `:einval`, `{:os, text}`,
-    `{:exit, reason}`. Later ones: `:unplugged`, `{:exit, reason}`; of `write/2` and its like `:overrun`,
-    `:closed`.
+    Errors of `open/1`: `:enoent`, `:eacces`, `:ebusy`, `:eio`, `:enotty`, `:einval`,
+    `{:os, text}`, `{:exit, reason}`. Later ones: `:unplugged`, `{:exit, reason}`; of `write/2`
+    and similar functions `:overrun`, `:closed`.
     """
     @behaviour Hal.Serial.Line
     alias Hal.Serial.Circuits
@@ -68,7 +69,7 @@ if Code.ensure_loaded?(Circuits.UART) do
 
     @impl Line
     def close(%__MODULE__{keeper: keeper, monitor: monitor}) do
-      # Another one, as the line may have told of its end already.
+      # A new one, because the line may have reported its end already.
       Process.demonitor(monitor, [:flush])
       closing = Process.monitor(keeper)
       GenServer.cast(keeper, :close)

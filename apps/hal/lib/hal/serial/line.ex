@@ -30,7 +30,7 @@ defmodule Hal.Serial.Line do
   @doc "Opens a line with options that `Hal.Serial.options/1` has checked."
   @callback open(keyword()) :: {:ok, t()} | {:error, reason()}
 
-  @doc "Hands over what to write; a sign of life."
+  @doc "Takes bytes to write; a sign of life."
   @callback write(t(), iodata()) :: :ok | {:error, reason()}
 
   @doc "Sets the last words; a sign of life."
@@ -42,6 +42,6 @@ defmodule Hal.Serial.Line do
   @doc "Writes the last words and closes."
   @callback close(t()) :: :ok
 
-  @doc "What a message says."
+  @doc "Interprets a message."
   @callback handle(t(), message :: term()) :: {:data, binary()} | {:error, reason()} | :unknown
 end

@@ -1,26 +1,29 @@
 defmodule Hal.Serial.Native do
   @moduledoc """
-  A serial line by our own port program (`c_src/serial.c`), which outlives us long enough to write the
-  last words. See `Hal.Serial`.
+  A serial line through our own port program (`c_src/serial.c`), which outlives this VM long
+  enough to write the last words. See `Hal.Serial`.
 
-  The program keeps the clock of the signs of life. It may be killed itself, by the kernel's
-  hand or an administrator's `kill -9`: then there are no last words, and this side sees `{:exit, 137}`.
+  The program keeps the timer of the signs of life. If it is killed itself, by the kernel or by an
+  administrator's `kill -9`, there are no last words, and this side sees `{:exit, 137}`.
 
-  It may also be frozen alone (`kill -STOP`): then nothing can be said on the line, the last words neither. It does
-  not answer the signs of life any more, and `keep_alive/1` says `:frozen` when 500 ms and five of them went by. All
-  that is said to it bears the time of the machine's monotonic clock, so that, when it goes on, it writes
-  nothing that is older than `keep_alive_ms` (200 ms): after a freeze the line hears the last words, or what is said now.
+  If only the program is frozen (`kill -STOP`), nothing can be sent on the line, not even the last
+  words. The program no longer answers the signs of life, and `keep_alive/1` returns
+  `{:error, :frozen}` once five of them, and 500 ms, have passed without an answer. Every message
+  to the program has the time of the machine's monotonic clock, so when the program resumes, it
+  writes nothing that is older than `keep_alive_ms` (200 ms): after a freeze the line receives the
+  last words, or what is sent now.
 
-  Errors of `open/1`: `:enoent`, `:eacces`, `:ebusy` (another program has locked it), `:eio`, `:enodev`,
-  `:enxio` (nothing behind it), `:enotty` (not a serial device), `:speed` (the hardware cannot), `:einval`,
-  `:eexist` (`:pty` would replace something), `:timeout`, `:clock` (the VM reads another clock than the program), `{:os, text}`, `{:exit, status}`.
-  Later ones: `:unplugged`, `:terminated` (by SIGTERM or SIGHUP, after the last words), `{:exit, reason}`,
-  and of `write/2` and its like `:overrun`, `:closed`, of `keep_alive/1` also `:frozen`.
+  Errors of `open/1`: `:enoent`, `:eacces`, `:ebusy` (another program has locked it), `:eio`,
+  `:enodev`, `:enxio` (nothing behind it), `:enotty` (not a serial device), `:speed` (the hardware
+  cannot), `:einval`, `:eexist` (`:pty` would replace something), `:timeout`, `:clock` (the VM
+  reads another clock than the program), `{:os, text}`, `{:exit, status}`. Later ones:
+  `:unplugged`, `:terminated` (by SIGTERM or SIGHUP, after the last words), `{:exit, reason}`; of
+  `write/2` and similar functions `:overrun`, `:closed`; of `keep_alive/1` also `:frozen`.
   """
   @behaviour Hal.Serial.Line
   alias Hal.Serial.Line
 
-  # c_src/serial.h has the same limits on its side, or greater.
+  # The limits in c_src/serial.h are the same, or greater.
   @out_most 4096
   @take_step 16_384
 
@@ -28,7 +31,7 @@ defmodule Hal.Serial.Native do
   @close_ms 2_000
   @frozen_ms 500
   @frozen_signs 5
-  # From the program's look at the clock to ours, on a busy machine.
+  # For the time between the program's reading of the clock and ours, on a busy machine.
   @clocks_ms 5_000
 
   @reasons Map.new(
@@ -36,8 +39,9 @@ defmodule Hal.Serial.Native do
              &{Atom.to_string(&1), &1}
            )
 
-  # The counters: bytes written that the line has not taken, bytes taken of which the program was not told; signs of
-  # life since the program's last answer, and when the first of these was given.
+  # The counters: bytes written that the line has not taken; bytes taken that the program does not
+  # know of yet; signs of life since the program's last answer, and when the first of these was
+  # given.
   @under_way 1
   @untold 2
   @unanswered 3
@@ -95,7 +99,7 @@ defmodule Hal.Serial.Native do
     end
   end
 
-  # Who was frozen himself has given few signs meanwhile.
+  # A VM that was frozen itself has given few signs meanwhile.
   defp frozen?(%{counters: counters}, at_ms) do
     :counters.get(counters, @unanswered) >= @frozen_signs and
       at_ms - :counters.get(counters, @unanswered_ms) >= @frozen_ms
@@ -103,7 +107,7 @@ defmodule Hal.Serial.Native do
 
   @impl Line
   def close(%__MODULE__{port: port} = line) do
-    # Who is frozen does not answer this either.
+    # A frozen program would not answer this either.
     if command(line, "C") == :ok and not frozen?(line, now_ms()), do: wait_closed(port)
     shut(port)
   end
@@ -152,7 +156,7 @@ defmodule Hal.Serial.Native do
 
   defp fits?(line, size), do: :counters.get(line.counters, @under_way) + size <= @out_most
 
-  # The owner may write much without a look at its mailbox.
+  # The owner may write much without reading its mailbox.
   defp hear_taken(%{port: port} = line) do
     receive do
       {^port, {:data, <<?T, size::32>>}} ->
@@ -183,7 +187,8 @@ defmodule Hal.Serial.Native do
     :erlang.convert_time_unit(source[:time], :native, :millisecond)
   end
 
-  # A program that falls silent for want of this goes on once the owner has taken what it has.
+  # A program that has stopped reading for lack of this resumes once the owner has taken what it
+  # has.
   defp take(%{counters: counters} = line, size) do
     :counters.add(counters, @untold, size)
     taken = :counters.get(counters, @untold)
@@ -192,11 +197,11 @@ defmodule Hal.Serial.Native do
       do: :counters.sub(counters, @untold, taken)
   end
 
-  # Without `:nosuspend` a frozen program would freeze its owner.
+  # Without `:nosuspend` a frozen program would suspend its owner.
   defp command(%{port: port}, packet) do
     if :erlang.port_command(port, packet, [:nosuspend]), do: :ok, else: {:error, :overrun}
   rescue
-    # The port has ended; why, a message says.
+    # The port has ended; a message says why.
     ArgumentError -> {:error, :closed}
   end
 
@@ -216,7 +221,7 @@ defmodule Hal.Serial.Native do
     {:error, reason}
   end
 
-  # Then no message of it is left.
+  # Afterwards no message of the port is left.
   defp shut(port) do
     monitor = Port.monitor(port)
     Process.unlink(port)

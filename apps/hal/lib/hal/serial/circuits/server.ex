@@ -1,14 +1,15 @@
 if Code.ensure_loaded?(Circuits.UART) do
   defmodule Hal.Serial.Circuits.Server do
     @moduledoc """
-    The process that holds a line of `Hal.Serial.Circuits`: it writes for the owner, tells it what comes
-    as `{pid, {:data, bytes} | {:error, reason}}`, keeps the clock of its signs of life, and says the last
-    words when it ends. After an error it only waits to be closed.
+    The process that holds a line of `Hal.Serial.Circuits`: it writes for the owner, sends it what
+    arrives as `{pid, {:data, bytes} | {:error, reason}}`, keeps the timer of its signs of life,
+    and writes the last words when the owner is silent or ends. After an error it only waits to be
+    closed.
     """
     use GenServer
     alias Circuits.UART
 
-    # Longer than this the line is stuck.
+    # If a write takes longer than this, the line is stuck.
     @write_ms 100
 
     @enforce_keys [:uart, :owner, :under_way, :words, :keep_alive_ms]
@@ -59,7 +60,7 @@ if Code.ensure_loaded?(Circuits.UART) do
     def handle_cast(:keep_alive, s), do: {:noreply, alive(s)}
 
     def handle_cast(:close, s) do
-      # What was written before is to get out too.
+      # What was written before must get out too.
       if s.open?, do: UART.drain(s.uart)
       if speaks?(s), do: UART.write(s.uart, s.words, @write_ms)
       shut(s)
@@ -87,7 +88,7 @@ if Code.ensure_loaded?(Circuits.UART) do
     def handle_info({:EXIT, uart, reason}, %{uart: uart} = s), do: {:stop, {:shutdown, reason}, s}
     def handle_info(_other, s), do: {:noreply, s}
 
-    # Ahead of what waits: that is late already.
+    # Ahead of the bytes that wait: those are late already.
     defp speak(s) do
       if speaks?(s) do
         UART.flush(s.uart, :transmit)
@@ -97,7 +98,7 @@ if Code.ensure_loaded?(Circuits.UART) do
       end
     end
 
-    # A line that is open when its program ends is flushed, and the last words with it.
+    # A line that is still open when its program ends is flushed, and would lose the last words.
     defp shut(s) do
       if s.open? do
         UART.drain(s.uart)
