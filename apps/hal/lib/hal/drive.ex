@@ -1,21 +1,25 @@
 defmodule Hal.Drive do
   @moduledoc """
-  What a drive base can do, whoever built it. One wire carries the wheels and, with most bases,
-  the ranges, bumpers and the battery too, so a drive brings them all as readings.
+  What a drive base can do, whoever built it. With most bases one wire carries not only the
+  wheels, but also the ranges, the bumpers and the battery, so a drive reports all of them as
+  readings.
 
-  `Hal.Device` runs an implementation: every callback is called in its process. A missing or
-  failing device is an error, which is retried with back-off; it is never a crash.
+  `Hal.Device` runs an implementation, and calls every callback in its process. A callback returns
+  a missing or failing device as an error, which `Hal.Device` retries with back-off; it does not
+  raise.
   """
 
   @typedoc """
-  A reading. Ranges are metres, in the order of the profile's sensor poses; no echo is the
-  profile's greatest range. Bumpers are the pressed segments, counted counter-clockwise from
-  the front. Power is in volts. Not every base has a brake, a joystick, or a switch at one absolute
-  heading (given as odometry's heading there); who does not know a reading leaves it alone.
+  A reading. Ranges are in metres, in the order of the profile's sensor poses; without an echo a
+  range is the profile's greatest. Bumpers are the pressed segments, counted counter-clockwise
+  from the front. Power is in volts. `:home` reports a switch at one absolute heading, as the
+  heading of odometry there. Not every base has a brake, a joystick or such a switch; a receiver
+  ignores readings that it does not know.
 
-  Odometry and sonar come with a report of the base and are not repeated without one: a base that tells
-  neither is taken for silent (`Hal.Device.Reports`). A driver that hears a report and cannot make such a reading of it,
-  for want of a conversion or of its other half, says `{:report, :wheels}` or `{:report, :sonar}`.
+  Odometry and sonar readings come with a report of the base and are not repeated without one,
+  because `Hal.Device.Reports` takes them for signs of life. A driver that receives a report but
+  cannot make such a reading of it, because a conversion or the other half of the report is
+  missing, gives `{:report, :wheels}` or `{:report, :sonar}`.
   """
   @type reading ::
           {:odometry, Hal.Odometry.t()}
@@ -38,15 +42,15 @@ defmodule Hal.Drive do
   @callback handle_message(term(), state :: term()) ::
               {:ok, [reading()], term()} | {:error, term(), term()}
 
-  @doc "Whether it may be armed: the line says what is missing, such as a conversion."
+  @doc "Whether the drive may be armed; the error says what is missing, such as a conversion."
   @callback ready(state :: term()) :: :ok | {:error, line :: String.t()}
 
-  @doc "An error that it gave with these options, in one line for people."
+  @doc "Describes an error of this driver, opened with these options, in one line for people."
   @callback explain(reason :: term(), options :: keyword()) :: String.t()
 
   @typedoc """
-  What options alone say of a drive: whether it may be armed once it is there, which senses it reads, and
-  what is allowed and odd all the same, a line each with what would be usual.
+  What the options alone say about a drive: whether it may be armed once it is open, which range
+  sensors it reads, and which allowed settings are unusual, one line each with the usual value.
   """
   @type judgement :: %{
           ready: :ok | {:error, line :: String.t()},
@@ -54,13 +58,13 @@ defmodule Hal.Drive do
           odd: [line :: String.t()]
         }
 
-  @doc "Judges options before anything is opened, by what `ready/1` goes by later."
+  @doc "Judges options before anything is opened, by the rules that `ready/1` applies later."
   @callback judge(keyword()) :: {:ok, judgement()} | {:error, line :: String.t()}
 
   @doc "Stops the motors and closes the line."
   @callback terminate(state :: term()) :: :ok
 
-  @doc "What options it takes; `mix robot.check` holds robot files against it."
+  @doc "The options that the driver takes; `mix robot.check` checks robot files against them."
   @callback option_table() :: Hal.Options.table()
 
   @optional_callbacks explain: 2, ready: 1, judge: 1, option_table: 0

@@ -1,23 +1,24 @@
 defmodule Hal.Device.Arming do
   @moduledoc """
-  Whether wheels may turn, as a function. Pure; `Hal.Device` asks it, as it owns the hardware.
+  Decides whether the wheels may turn. Pure; `Hal.Device` calls it, because it owns the hardware.
 
   | state | the wheels | until |
   |---|---|---|
-  | `:disarmed` | stand | a person arms, or, with `:auto`, the drive is ready |
-  | `:armed` | may turn | a person disarms, the drive is not ready any more, or the line is lost |
-  | `{:error, reason}` | stand | a person acknowledges that the line was lost while they turned |
+  | `:disarmed` | receive only stops | a person arms, or, with `:auto`, the drive is ready |
+  | `:armed` | may turn | a person disarms, the drive is no longer ready, or the line is lost |
+  | `{:error, reason}` | receive only stops | a person acknowledges that the line was lost while they turned |
 
-  With the policy `:manual` (real robots) nothing arms but a person, after each start and each loss
-  of the line. With `:auto` (simulated ones) it arms by itself, and a loss is not an error; but where a
-  person has disarmed, only a person arms. With `:never` nobody arms: a dry run.
+  With the policy `:manual` (real robots) only a person arms: after each start, each loss of the
+  line, and each time that the drive was not ready. With `:auto` (simulated robots) the drive arms
+  by itself, and a loss of the line is not an error; after a person has disarmed it, only a person
+  arms it again. With `:never` nobody can arm it: a dry run.
 
-  A drive is ready while its line is open, its driver lacks nothing (`c:Hal.Drive.ready/1`) and its base's
-  reports are fresh (`Hal.Device.Reports`). `why` is the line that says what is missing, or `nil`.
+  A drive is ready while its line is open, its driver says so (`c:Hal.Drive.ready/1`) and its
+  base's reports are fresh (`Hal.Device.Reports`). `why` says what is missing, or is `nil`.
   """
   alias Hal.{Odometry, Twist}
 
-  # Below these the wheels stand as far as odometry can tell.
+  # Below these speeds (m/s, rad/s) odometry counts as standing.
   @standing_linear 0.01
   @standing_turn 0.02
 
@@ -31,13 +32,14 @@ defmodule Hal.Device.Arming do
 
   @type policy :: :auto | :manual | :never
   @type state :: :disarmed | :armed | {:error, reason :: term()}
-  @typedoc "Whether the drive is ready: its line open, its driver without a lack, its base's reports fresh."
+  @typedoc "Whether the drive is ready; the error says what is missing."
   @type readiness :: :ok | {:error, line :: String.t()}
   @type order :: :arm | :disarm | :acknowledge
 
   @typedoc """
-  `told` is the speed that the driver was told last, `measured` what odometry said last; `refused`
-  counts speeds that came while it was not armed; `held?`: a person has disarmed.
+  `told` is the last speed that was given to the driver, `measured` the last one that odometry
+  reported; `refused` counts the speeds other than zero that came while the drive was not armed;
+  `held?` is true after a person has disarmed it.
   """
   @type t :: %__MODULE__{
           policy: policy(),
@@ -51,13 +53,14 @@ defmodule Hal.Device.Arming do
 
   @dry_run "this is a dry run: the wheels stand"
 
-  @doc "Disarmed, as every start begins."
+  @doc "A disarmed drive, as after every start."
   @spec new(policy()) :: t()
   def new(:never), do: %__MODULE__{policy: :never, why: @dry_run}
   def new(policy) when policy in [:auto, :manual], do: %__MODULE__{policy: policy}
 
   @doc """
-  Whether the drive is ready now. One that is not any more is disarmed.
+  Takes whether the drive is ready now. An armed drive that is not ready is disarmed; a ready one
+  with `:auto` is armed, unless a person has disarmed it.
 
       iex> Hal.Device.Arming.new(:auto) |> Hal.Device.Arming.ready(:ok) |> Map.fetch!(:state)
       :armed
@@ -84,8 +87,8 @@ defmodule Hal.Device.Arming do
   def ready(%__MODULE__{} = arming, _readiness), do: arming
 
   @doc """
-  What a person orders, and the answer. `readiness` is the driver's now. An order that changes nothing is
-  `:ok`; nothing but `:acknowledge` leaves an error.
+  Carries out a person's order, and gives the answer to it. `readiness` is that of the drive now.
+  An order that has nothing to change is `:ok`; only `:acknowledge` leaves the error state.
 
       iex> fresh = Hal.Device.Arming.new(:manual)
       iex> {:ok, armed} = Hal.Device.Arming.order(fresh, :arm, :ok)
@@ -125,7 +128,10 @@ defmodule Hal.Device.Arming do
   defp disarmed(%{state: :armed} = arming), do: %{arming | state: :disarmed}
   defp disarmed(arming), do: arming
 
-  @doc "What the driver may be told when this speed is asked for: nothing but a stop, where it is not armed."
+  @doc """
+  The speed that the driver may be given when this one is requested: only a stop, unless the drive
+  is armed.
+  """
   @spec drive(t(), Twist.t()) :: {Twist.t(), t()}
   def drive(%__MODULE__{state: :armed} = arming, twist), do: {twist, arming}
 
@@ -134,7 +140,10 @@ defmodule Hal.Device.Arming do
     {Twist.zero(), %{arming | refused: refused}}
   end
 
-  @doc "The driver has taken this speed; what is not a speed it takes for a stop."
+  @doc """
+  Records that the driver has accepted this speed. A value that is not a speed counts as a stop,
+  as it does in the driver.
+  """
   @spec told(t(), Twist.t()) :: t()
   def told(%__MODULE__{} = arming, %Twist{linear: linear, turn: turn} = twist)
       when is_float(linear) and is_float(turn),
@@ -142,7 +151,7 @@ defmodule Hal.Device.Arming do
 
   def told(arming, _no_speed), do: %{arming | told: Twist.zero()}
 
-  @doc "A reading of the driver's, of which odometry counts."
+  @doc "Takes a reading of the driver; only odometry matters."
   @spec measured(t(), Hal.Drive.reading() | term()) :: t()
   def measured(%__MODULE__{} = arming, {:odometry, %Odometry{twist: %Twist{} = twist}}),
     do: %{arming | measured: twist}
@@ -150,7 +159,8 @@ defmodule Hal.Device.Arming do
   def measured(arming, _reading), do: arming
 
   @doc """
-  The line is lost. Wheels that were told to turn, or still did, may turn on where nobody can stop them.
+  Records that the line was lost. Wheels that had been given a speed other than zero, or were
+  still moving, may go on turning with no way to stop them; with `:manual` that is an error.
 
       iex> armed = Hal.Device.Arming.new(:auto) |> Hal.Device.Arming.ready(:ok) |> Hal.Device.Arming.told(Hal.Twist.new(0.2, 0))
       iex> Hal.Device.Arming.lost(armed, :eio).state

@@ -1,7 +1,7 @@
 defmodule Hal.Device.Lifecycle do
   @moduledoc """
   What a device does with its driver: opens it, reopens it after a failure, judges its signs of
-  life, arms and drives the wheels. Called in the device's process.
+  life, arms and drives the wheels. Runs in the device's process.
   """
   alias Hal.Twist
   alias Hal.Device.Arming
@@ -10,7 +10,9 @@ defmodule Hal.Device.Lifecycle do
   @retry_ms 100
   @longest_retry_ms 5_000
 
-  @doc "Opens the driver; what fails is tried again later, by a message `{:open, ref}`."
+  @doc """
+  Opens the driver; after an error it schedules another attempt, by a message `{:open, ref}`.
+  """
   @spec open(State.t()) :: State.t()
   def open(s) do
     case s.driver.init(s.options) do
@@ -23,7 +25,7 @@ defmodule Hal.Device.Lifecycle do
     end
   end
 
-  @doc "Closes a driver that failed, and says so."
+  @doc "Closes a driver that failed, reports the failure, and schedules the reopening."
   @spec fail(State.t(), reason :: term(), inner :: term()) :: State.t()
   def fail(s, reason, inner) do
     s.driver.terminate(inner)
@@ -38,12 +40,15 @@ defmodule Hal.Device.Lifecycle do
     %{s | retry: ref, retry_ms: min(2 * wait_ms, @longest_retry_ms)}
   end
 
-  @doc "What became of a call of the driver."
+  @doc "Takes the result of a call to the driver: its new state, or an error."
   @spec done(State.t(), {:ok, term()} | {:error, term(), term()}) :: State.t()
   def done(s, {:ok, inner}), do: %{s | inner: {:open, inner}}
   def done(s, {:error, reason, inner}), do: fail(s, reason, inner)
 
-  @doc "Readings came: what they say of the device, which waits no longer than at first after its next failure."
+  @doc """
+  Takes readings: updates the signs of life and the measured speed, and resets the wait after the
+  next failure to the shortest one.
+  """
   @spec measured(State.t(), [term(), ...]) :: State.t()
   def measured(s, readings) do
     arming = s.arming && Enum.reduce(readings, s.arming, &Arming.measured(&2, &1))
@@ -52,8 +57,8 @@ defmodule Hal.Device.Lifecycle do
   end
 
   @doc """
-  Whether anything is there, and a drive's wheels may turn. Those that may no longer are stopped before
-  anybody is told.
+  Judges whether the device is online, and whether a drive's wheels may turn. Wheels that may no
+  longer turn are stopped before anything is published.
   """
   @spec judge(State.t()) :: State.t()
   def judge(%{inner: {:open, inner}} = s) do
@@ -67,15 +72,17 @@ defmodule Hal.Device.Lifecycle do
 
   def judge(s), do: s
 
-  # Its last stop may have failed.
+  # The stop may have failed, and closed the driver.
   defp silent(%{inner: {:open, _}} = s), do: Publisher.health(s, {:offline, :silent})
   defp silent(s), do: s
 
-  # A driver may become ready while it is open, or tell another thing that is missing.
+  # A driver may become ready while it is open, or report that something else is missing.
   defp ready(%{kind: :drive} = s), do: become(s, Arming.ready(s.arming, readiness(s)))
   defp ready(s), do: s
 
-  @doc "Looks again in time: silence sends no message but `{:listen, ref}`."
+  @doc """
+  Schedules the next judgement by a message `{:listen, ref}`, because silence causes no message.
+  """
   @spec listen(State.t()) :: State.t()
   def listen(%{inner: {:open, _}} = s) do
     ref = make_ref()
@@ -86,7 +93,7 @@ defmodule Hal.Device.Lifecycle do
 
   def listen(s), do: s
 
-  @doc "Carries out what a person orders of the wheels, and answers."
+  @doc "Carries out a person's order for the wheels, and answers it."
   @spec order(State.t(), Arming.order()) :: {:ok | {:error, line :: String.t()}, State.t()}
   def order(s, order) do
     {answer, arming} = Arming.order(s.arming, order, readiness(s))
@@ -94,13 +101,13 @@ defmodule Hal.Device.Lifecycle do
     {carried_out(order, answer, s), s}
   end
 
-  # The stop that a disarming begins with may itself be what finds the line lost.
+  # The stop that is part of disarming may itself find that the line is lost.
   defp carried_out(:disarm, :ok, %{inner: :closed, arming: %{state: {:error, reason}}} = s),
     do: {:error, "the line was lost (#{Publisher.words(s, reason)}) while the wheels turned"}
 
   defp carried_out(_order, answer, _s), do: answer
 
-  # What a person can mend comes before what may come by itself.
+  # What a person can repair is reported before what may resolve itself.
   defp readiness(%{inner: {:open, inner}} = s) do
     driver = if function_exported?(s.driver, :ready, 1), do: s.driver.ready(inner), else: :ok
     with :ok <- driver, do: Liveness.ready(s.signs, State.now(s))
@@ -111,14 +118,16 @@ defmodule Hal.Device.Lifecycle do
 
   defp readiness(_not_opened_yet), do: {:error, "the drive is not open yet"}
 
-  # Wheels that may no longer turn stop before anybody is told.
+  # Wheels that may no longer turn are stopped before anything is published.
   defp become(%{arming: before} = s, arming) do
     s = %{s | arming: arming}
     stop? = before.state == :armed and arming.state != :armed and s.inner != :closed
     Publisher.arming(if stop?, do: drive_on(s, Twist.zero()), else: s)
   end
 
-  @doc "A speed is asked for: what the driver is told is what it may be told."
+  @doc """
+  Takes a requested speed, and gives the driver that speed or, unless the drive is armed, a stop.
+  """
   @spec drive(State.t(), Twist.t()) :: State.t()
   def drive(s, twist) do
     {allowed, arming} = Arming.drive(s.arming, twist)
@@ -126,7 +135,7 @@ defmodule Hal.Device.Lifecycle do
     drive_on(%{s | arming: arming}, allowed)
   end
 
-  @doc "Tells the driver a speed."
+  @doc "Gives the driver a speed, and restarts the watchdog."
   @spec drive_on(State.t(), Twist.t()) :: State.t()
   def drive_on(%{inner: {:open, inner}} = s, twist) do
     s = Watchdog.guard(s, twist)

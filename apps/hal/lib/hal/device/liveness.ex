@@ -1,14 +1,14 @@
 defmodule Hal.Device.Liveness do
   @moduledoc """
-  Whether a device gives signs of life, as a function of what it reported and of time. Pure,
-  integer milliseconds; `Hal.Device` asks it. An open line or program proves nothing about the
+  Decides from a device's readings and the time whether it shows signs of life. Pure, integer
+  milliseconds; `Hal.Device` calls it. An open line or a running program proves nothing about the
   device at the other end.
 
-  | device | is online | is no longer |
+  | device | is online | goes offline |
   |---|---|---|
-  | drive | once its base has reported its wheels since the opening, and as long as it does | by `Hal.Device.Reports`: `:silent`; it goes on being asked |
-  | camera | once it has given a picture, or blobs, since the opening | without one for 10 s: `:mute`; it is opened again |
-  | pan-tilt unit | once it has said where it looks since the opening | by its driver's word; without a first one for 10 s: `:mute`; it is opened again |
+  | drive | once its base has reported its wheels since the opening, and while it keeps reporting them | by `Hal.Device.Reports`: `:silent`; the driver stays open |
+  | camera | once it has given a picture, or blobs, since the opening | after 10 s without one: `:mute`; it is reopened |
+  | pan-tilt unit | once it has reported where it looks since the opening | when its driver returns an error; after 10 s without a first reading: `:mute`; it is reopened |
   """
   alias Hal.Device.Reports
 
@@ -17,7 +17,10 @@ defmodule Hal.Device.Liveness do
   @enforce_keys [:kind, :since_ms]
   defstruct @enforce_keys ++ [heard?: false, reports: nil]
 
-  @typedoc "`since_ms`: of the opening, or of the last reading; `reports`: of a drive."
+  @typedoc """
+  `since_ms` is the time of the opening or, except for a drive, of the last reading; `reports` is
+  that of a drive.
+  """
   @type t :: %__MODULE__{
           kind: :drive | :ptz | :camera,
           since_ms: integer(),
@@ -25,7 +28,7 @@ defmodule Hal.Device.Liveness do
           reports: Reports.t() | nil
         }
 
-  @doc "A device that was opened now; of a drive, whether its base has sonars."
+  @doc "A device that has just been opened; `sonar?` says whether a drive's base has sonars."
   @spec new(:drive | :ptz | :camera, sonar? :: boolean(), at_ms :: integer()) :: t()
   def new(:drive, sonar?, at_ms),
     do: %__MODULE__{kind: :drive, since_ms: at_ms, reports: Reports.new(sonar?, at_ms)}
@@ -33,7 +36,7 @@ defmodule Hal.Device.Liveness do
   def new(kind, _sonar?, at_ms) when kind in [:ptz, :camera],
     do: %__MODULE__{kind: kind, since_ms: at_ms}
 
-  @doc "Takes readings that came at this time; an empty list is not a sign of life."
+  @doc "Takes readings that arrived at this time; an empty list is not a sign of life."
   @spec heard(t(), [term()], at_ms :: integer()) :: t()
   def heard(%__MODULE__{} = signs, [], _at_ms), do: signs
 
@@ -44,7 +47,7 @@ defmodule Hal.Device.Liveness do
     do: %{signs | heard?: true, since_ms: at_ms}
 
   @doc """
-  How the device is now; `:waiting` while it was opened just now, and nothing has come yet.
+  The condition of the device now; `:waiting` if it was opened recently and nothing has come yet.
 
       iex> camera = Hal.Device.Liveness.new(:camera, false, 0)
       iex> for at_ms <- [0, 9_999, 10_000], do: Hal.Device.Liveness.judge(camera, at_ms)
@@ -73,12 +76,15 @@ defmodule Hal.Device.Liveness do
   def judge(%__MODULE__{heard?: true}, _at_ms), do: :online
   def judge(%__MODULE__{}, _at_ms), do: :waiting
 
-  @doc "Whether a drive's wheels may be armed, as far as its base's reports go (`Hal.Device.Reports.ready/2`)."
+  @doc """
+  Whether a drive's wheels may be armed, judged only by its base's reports
+  (`Hal.Device.Reports.ready/2`).
+  """
   @spec ready(t(), at_ms :: integer()) :: :ok | {:error, line :: String.t()}
   def ready(%__MODULE__{kind: :drive, reports: reports}, at_ms), do: Reports.ready(reports, at_ms)
 
   @doc """
-  When to look again, if nothing is heard until then.
+  When to judge again (ms), if nothing is heard until then.
 
       iex> Hal.Device.Liveness.next_ms(Hal.Device.Liveness.new(:camera, false, 70), 100)
       10_070

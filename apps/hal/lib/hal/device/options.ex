@@ -1,5 +1,5 @@
 defmodule Hal.Device.Options do
-  @moduledoc "The options of `Hal.Device`, which lists them, checked once. Pure."
+  @moduledoc "Checks the options of `Hal.Device`, where they are listed. Pure."
   alias Hal.Device.Arming
   alias Hal.Options
 
@@ -15,7 +15,10 @@ defmodule Hal.Device.Options do
     clock: [:mfa, default: {System, :monotonic_time, [:millisecond]}]
   ]
 
-  @doc "The fields of a device; `ArgumentError` names an option, its value and what is allowed."
+  @doc """
+  The fields of a device's state; an `ArgumentError` names the option, its value and what is
+  allowed.
+  """
   @spec check!(keyword()) :: keyword()
   def check!(options) do
     options = Options.check!(options, @table, "device")

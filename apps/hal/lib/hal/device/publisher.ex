@@ -1,19 +1,19 @@
 defmodule Hal.Device.Publisher do
   @moduledoc """
-  Publishes what a device reports: readings to its sinks, and each change of its health and
+  Publishes what a device reports: its readings to its sinks, and each change of its health and
   arming, once, to sinks and events. Makes no decisions.
   """
   alias Hal.Event
   alias Hal.Device.Arming
   alias Hal.Device.{State, Words}
 
-  @doc "Hands a reading to all sinks."
+  @doc "Passes a reading to all sinks."
   @spec hand_on(State.t(), tuple()) :: :ok
   def hand_on(s, reading) do
     Enum.each(s.sinks, fn {m, f, a} -> apply(m, f, a ++ [reading]) end)
   end
 
-  @doc "Tells how the device is, if that has changed."
+  @doc "Publishes the health of the device, if it has changed."
   @spec health(State.t(), :online | {:offline, reason :: term()}) :: State.t()
   def health(%{health: {condition, _since}} = s, condition), do: s
 
@@ -32,11 +32,11 @@ defmodule Hal.Device.Publisher do
   defp change(s, {:offline, reason}),
     do: {:offline, %{reason: reason, line: words(s, reason)}}
 
-  # Another reason to be offline is not a new beginning.
+  # A new reason to be offline does not restart the time.
   defp since({{:offline, _}, since_ms}, {:offline, _}, _at_ms), do: since_ms
   defp since(_before, _condition, at_ms), do: at_ms
 
-  @doc "Tells how a drive is armed, if that has changed."
+  @doc "Publishes the arming of a drive, if it has changed."
   @spec arming(State.t()) :: State.t()
   def arming(%{arming: %{state: state, why: why}, armed_as: {state, why}} = s), do: s
   def arming(%{kind: kind} = s) when kind != :drive, do: s
@@ -52,7 +52,10 @@ defmodule Hal.Device.Publisher do
   defp lost(s, {:error, reason}), do: words(s, reason)
   defp lost(_s, _not_lost), do: nil
 
-  @doc "Of a device that fell: its wheels were stopped, by the driver's last act or by the end of its line."
+  @doc """
+  Publishes that the device crashed: it is offline (`:fell`), and a drive is disarmed. Its driver
+  has been closed, or its line has ended with the process.
+  """
   @spec fallen(State.t()) :: State.t()
   def fallen(s) do
     s = health(s, {:offline, :fell})
@@ -60,18 +63,18 @@ defmodule Hal.Device.Publisher do
     if s.arming, do: arming(%{s | arming: Arming.ready(s.arming, {:error, line})}), else: s
   end
 
-  @doc "A speed came for wheels that are not armed."
+  @doc "Emits an event: a speed came for wheels that are not armed."
   @spec refused(State.t(), Arming.t()) :: :ok
   def refused(s, %{refused: refused}) do
     measured = %{at_ms: State.now(s), refused: refused}
     Event.execute([:hal, :device, :refused], measured, about(s))
   end
 
-  @doc "The watchdog stops the wheels."
+  @doc "Emits an event: the watchdog stops the wheels."
   @spec watchdog(State.t()) :: :ok
   def watchdog(s), do: event(s, :watchdog, State.now(s), %{})
 
-  @doc "A reason to be offline, in its driver's words."
+  @doc "A reason to be offline, in the words of the driver."
   @spec words(State.t(), reason :: term()) :: String.t()
   def words(s, reason), do: Words.offline({s.driver, s.options}, reason)
 

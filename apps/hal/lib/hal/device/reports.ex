@@ -1,8 +1,8 @@
 defmodule Hal.Device.Reports do
   @moduledoc """
-  Whether a base reports what a robot needs to drive, as a function of time. Pure, integer
-  milliseconds; `Hal.Device` asks it. An open line proves nothing: a base is present once it has
-  reported its wheels.
+  Decides from a base's reports and the time whether a robot has what it needs to drive. Pure,
+  integer milliseconds; `Hal.Device` calls it. An open line proves nothing: a base is present once
+  it has reported its wheels.
 
   | no report | for | then |
   |---|---|---|
@@ -11,10 +11,12 @@ defmodule Hal.Device.Reports do
   | of the sonars, where the base has any | since the line was opened | not armed |
   | of the sonars, where the base has any | 2 s | stopped and disarmed |
 
-  Between 500 ms and 2 s without sonar the robot is slow (`:blind` of `Robot.Safety.Reflex`).
+  Between 500 ms and 2 s without sonar reports the robot drives slowly (`:blind` of
+  `Robot.Safety.Reflex`).
 
-  Odometry is a report of the wheels, ranges are one of the sonars. `{:report, :wheels}` and `{:report, :sonar}`
-  count too: of a driver that hears its base but cannot say yet what it heard.
+  Odometry counts as a report of the wheels, ranges as one of the sonars. So do
+  `{:report, :wheels}` and `{:report, :sonar}`, from a driver that receives a report but cannot
+  make a reading of it yet.
   """
 
   @wheels_ms 500
@@ -23,7 +25,7 @@ defmodule Hal.Device.Reports do
   @enforce_keys [:sonar?, :opened_ms]
   defstruct @enforce_keys ++ [wheels_ms: nil, sonar_ms: nil]
 
-  @typedoc "When the line was opened, and when wheels and sonars were last reported since."
+  @typedoc "When the line was opened, and when wheels and sonars last reported since then."
   @type t :: %__MODULE__{
           sonar?: boolean(),
           opened_ms: integer(),
@@ -31,12 +33,14 @@ defmodule Hal.Device.Reports do
           sonar_ms: integer() | nil
         }
 
-  @doc "A line that is open; whether its base has sonars."
+  @doc """
+  The state for a line that has just been opened; `sonar?` says whether its base has sonars.
+  """
   @spec new(sonar? :: boolean(), at_ms :: integer()) :: t()
   def new(sonar?, at_ms) when is_boolean(sonar?),
     do: %__MODULE__{sonar?: sonar?, opened_ms: at_ms}
 
-  @doc "Takes readings that came at this time."
+  @doc "Takes readings that arrived at this time."
   @spec heard(t(), [Hal.Drive.reading() | term()], at_ms :: integer()) :: t()
   def heard(%__MODULE__{} = reports, readings, at_ms),
     do: Enum.reduce(readings, reports, &note(&2, &1, at_ms))
@@ -48,7 +52,8 @@ defmodule Hal.Device.Reports do
   defp note(reports, _other, _at_ms), do: reports
 
   @doc """
-  Whether the base reports its wheels: `:fresh`; `:waiting`, while the line was opened just now; `:silent`.
+  Whether the base reports its wheels: `:fresh`; `:waiting`, if the line was opened recently;
+  `:silent`.
 
       iex> reports = Hal.Device.Reports.new(false, 0)
       iex> for at_ms <- [0, 499, 500], do: Hal.Device.Reports.wheels(reports, at_ms)
@@ -65,7 +70,7 @@ defmodule Hal.Device.Reports do
     do: if(at_ms - wheels_ms < @wheels_ms, do: :fresh, else: :silent)
 
   @doc """
-  Whether the wheels may be armed, as far as reports go; or one line that says what is missing.
+  Whether the wheels may be armed, judged only by the reports; the error says what is missing.
 
       iex> reports = Hal.Device.Reports.new(true, 0)
       iex> Hal.Device.Reports.ready(reports, 100)
@@ -97,7 +102,8 @@ defmodule Hal.Device.Reports do
   defp missing(what), do: {:error, "its base #{what}"}
 
   @doc """
-  When to look again, if nothing is heard until then: what is fresh now may be no more by then.
+  When to judge again (ms), if nothing is heard until then: what is fresh now may be stale by
+  then.
 
       iex> reports = Hal.Device.Reports.new(true, 0) |> Hal.Device.Reports.heard([report: :wheels, report: :sonar], 100)
       iex> for at_ms <- [100, 600, 2100], do: Hal.Device.Reports.next_ms(reports, at_ms)

@@ -1,7 +1,7 @@
 defmodule Hal.Device.Server do
   @moduledoc """
-  The process of a device (`Hal.Device`): it receives messages and decides their order.
-  `Hal.Device.Lifecycle` and `Hal.Device.Wishes` carry them out.
+  The process of a device (`Hal.Device`): it receives messages and decides the order of the work,
+  which `Hal.Device.Lifecycle` and `Hal.Device.Wishes` do.
   """
   use GenServer
   alias Hal.Device.{Lifecycle, Publisher, State, Wishes}
@@ -11,12 +11,12 @@ defmodule Hal.Device.Server do
 
   @impl GenServer
   def init(%State{} = s) do
-    # So that `terminate/2` runs, and stops the wheels, when the supervisor ends us.
+    # So that `terminate/2` runs, and stops the wheels, when the supervisor stops this process.
     Process.flag(:trap_exit, true)
     {:ok, succeed(s), {:continue, :open}}
   end
 
-  # What the sinks know of the process before us, which may have been killed.
+  # The last status that the sinks know of the previous process, which may have been killed.
   defp succeed(%{was: nil} = s), do: s
 
   defp succeed(%{was: {m, f, a}} = s) do
@@ -99,10 +99,11 @@ defmodule Hal.Device.Server do
     end
   end
 
-  # What a driver that is closed by now had asked for.
+  # For a driver that is closed by now.
   def handle_info(_late, s), do: {:noreply, s}
 
-  # Whoever asked has been told by now that nothing came of it, and may stand before the robot.
+  # Whoever asked has been told by then that nothing was done, and may stand in front of the
+  # robot.
   defp order(s, order, until_ms) do
     if System.monotonic_time(:millisecond) < until_ms,
       do: order(s, order),
@@ -126,7 +127,7 @@ defmodule Hal.Device.Server do
   defp asked?({:shutdown, _why}), do: true
   defp asked?(_crash), do: false
 
-  # A shutdown asked for meanwhile is not kept waiting.
+  # A shutdown requested meanwhile is not delayed.
   defp rest do
     receive do
       {:EXIT, _parent, :shutdown} -> :ok

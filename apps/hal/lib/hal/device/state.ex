@@ -1,16 +1,16 @@
 defmodule Hal.Device.State do
   @moduledoc """
-  The state of a device's process: its options, what it has opened, and what it has published. Its
-  parts work on it:
+  The state of a device's process: its options, the open driver, and what was last published.
+  These modules work on it:
 
   | module | what it does |
   |---|---|
-  | `Hal.Device.Server` | the process: what comes in, in which order |
+  | `Hal.Device.Server` | the process: receives messages and decides the order of the work |
   | `Hal.Device.Lifecycle` | opens and closes the driver, judges it, drives the wheels |
-  | `Hal.Device.Wishes` | what is wished of a camera, or of a pan-tilt unit |
-  | `Hal.Device.Watchdog` | stops wheels that nobody asks anything of |
-  | `Hal.Device.Publisher` | tells sinks and events of changes |
-  | `Hal.Device.Liveness`, `Hal.Device.Arming` | pure: whether it gives signs of life; whether wheels may turn |
+  | `Hal.Device.Wishes` | requests to a camera or a pan-tilt unit |
+  | `Hal.Device.Watchdog` | stops wheels that receive no further speed |
+  | `Hal.Device.Publisher` | reports changes to sinks and events |
+  | `Hal.Device.Liveness`, `Hal.Device.Arming` | pure: whether it shows signs of life; whether wheels may turn |
   """
   alias Hal.Device.Arming
   alias Hal.Device.{Liveness, Options}
@@ -34,8 +34,9 @@ defmodule Hal.Device.State do
               ]
 
   @typedoc """
-  `inner` is the driver's own state; `health` and `armed_as` what was told last; `retry_ms` how long to wait after the
-  next failure, and `retry`, `watchdog`, `listening` the timers that still count.
+  `inner` is the driver's own state; `health` and `armed_as` are what was last published;
+  `retry_ms` is the wait after the next failure; `retry`, `watchdog` and `listening` identify the
+  timers that still count.
   """
   @type t :: %__MODULE__{
           kind: Hal.Device.kind(),
@@ -59,11 +60,14 @@ defmodule Hal.Device.State do
           listening: reference() | nil
         }
 
-  @doc "Of a device that is not open yet, by its options (`Hal.Device`); `ArgumentError` for wrong ones."
+  @doc """
+  The state of a device that is not open yet, from its options (`Hal.Device`). Wrong options raise
+  `ArgumentError`.
+  """
   @spec new!(keyword()) :: t()
   def new!(options), do: struct!(__MODULE__, Options.check!(options))
 
-  @doc "The time by its clock, in milliseconds."
+  @doc "The time by the device's clock, in milliseconds."
   @spec now(t()) :: integer()
   def now(%__MODULE__{clock: {m, f, a}}), do: apply(m, f, a)
 end

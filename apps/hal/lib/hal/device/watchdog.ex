@@ -1,14 +1,14 @@
 defmodule Hal.Device.Watchdog do
   @moduledoc """
-  The second line of defence behind the gate: it stops wheels that have received no speed for 500
-  ms. Its message is `{:watchdog, ref}`, and counts while `ref` is the one in the state.
+  The second line of defence behind the gate: it stops wheels that have received no further speed
+  for 500 ms. Its message `{:watchdog, ref}` counts only while `ref` is the one in the state.
   """
   alias Hal.Device.State
   alias Hal.Twist
 
   @watchdog_ms 500
 
-  @doc "A speed was asked for now: waits for the next one, unless it is a stop."
+  @doc "Restarts the watchdog for a speed that is given now; a stop only ends it."
   @spec guard(State.t(), Twist.t()) :: State.t()
   def guard(s, twist) do
     s = unguard(s)
@@ -21,7 +21,7 @@ defmodule Hal.Device.Watchdog do
     end
   end
 
-  @doc "Waits no more."
+  @doc "Ends the watchdog."
   @spec unguard(State.t()) :: State.t()
   def unguard(%{watchdog: nil} = s), do: s
 

@@ -1,20 +1,20 @@
 defmodule Hal.Device.Wishes do
   @moduledoc """
-  Requests to a device other than speeds: where a pan-tilt unit should look, and a camera's next
-  picture. The last requests are kept, and repeated to a reopened driver.
+  Requests to a device other than speeds: the direction and zoom of a pan-tilt unit, and a
+  camera's next picture. The last direction and zoom are kept, and repeated to a reopened driver.
   """
   alias Hal.Device.{Lifecycle, State}
 
-  @doc "Takes a wish, and says it if somebody is there who knows it."
+  @doc "Keeps a request, and passes it to the driver if that is open and has this callback."
   @spec wish(State.t(), callback :: atom(), arguments :: list()) :: State.t()
   def wish(s, callback, arguments),
     do: carry_out(%{s | wishes: Map.put(s.wishes, callback, arguments)}, callback)
 
-  @doc "Where a pan-tilt unit was to look before it failed, or while nobody was there."
+  @doc "Repeats the kept requests to a driver that has just been opened."
   @spec remind(State.t()) :: State.t()
   def remind(s), do: s.wishes |> Map.keys() |> Enum.reduce(s, &carry_out(&2, &1))
 
-  @doc "A camera gives its next picture only once the last one was handed on."
+  @doc "Asks a camera for its next picture; called once the last one has been passed on."
   @spec ask(State.t()) :: State.t()
   def ask(%{kind: :camera, inner: {:open, inner}} = s),
     do: Lifecycle.done(s, s.driver.next(inner))

@@ -1,11 +1,11 @@
 defmodule Hal.Device.Words do
-  @moduledoc "What is wrong with a device, in one line for people. Pure."
+  @moduledoc "Describes what is wrong with a device, in one line for people. Pure."
 
   @longest 240
 
   @doc """
-  Why it is offline: what its driver makes of the reason (`c:Hal.Drive.explain/2`), or the reason itself; `nil` is a
-  driver that nobody knows.
+  Why the device is offline: the driver's explanation of the reason (`c:Hal.Drive.explain/2`), or
+  the reason itself; `nil` stands for an unknown driver.
 
       iex> Hal.Device.Words.offline({Hal.RFlex.Driver, port: "/dev/ttyR0"}, :enoent)
       "/dev/ttyR0: no such device"

@@ -1,18 +1,18 @@
 defmodule Hal.Drive.SlewLimiter do
   @moduledoc """
-  The last limit before the wire: limits speeds and their changes, whatever was requested. Pure. Its ramp,
-  `approach/4`, is also that of `Robot.Safety.Reflex`.
+  The last limit before the wire: limits every requested speed and its change. Pure.
+  `Robot.Safety.Reflex` uses the same ramp, `approach/4`.
 
-  Each of the two speeds is kept within its limit, grows at most by its acceleration, and shrinks at
-  most by its braking, which may be more. **A speed that is to be zero is zero at once**: a stop does
-  not wait for anybody's ramp; the base then brakes by itself, as hard as it was told it may. After a
-  stop a speed grows from zero again, and so it does towards the other direction.
+  Each of the two speeds is kept within its limit, grows at most by its acceleration, and shrinks
+  at most by its braking, which may be larger. **A requested speed of zero applies at once**: a
+  stop does not wait for any ramp; the base then brakes by itself, as hard as it was configured
+  to. After a stop, and when the direction changes, a speed grows from zero.
   """
   alias Hal.Twist
 
-  # A pause of the whole machine is no reason to leap.
+  # A pause of the whole machine must not let the speed jump.
   @longest_step 0.2
-  # Numbers beyond that are no speeds, but somebody's mistake: no reason to drive at all.
+  # Larger numbers are not speeds but mistakes, and no reason to drive at all.
   @senseless 1.0e6
 
   @keys [
@@ -37,7 +37,10 @@ defmodule Hal.Drive.SlewLimiter do
           twist: Twist.t()
         }
 
-  @doc "Standing. All limits are positive numbers; braking is by default twice the acceleration."
+  @doc """
+  A limiter at rest. All limits are positive numbers; braking is by default twice the
+  acceleration.
+  """
   @spec new(keyword()) :: t()
   def new(limits) do
     limits =
@@ -49,7 +52,7 @@ defmodule Hal.Drive.SlewLimiter do
   end
 
   @doc """
-  Whether this is a speed at all.
+  Checks that a value is a speed: two floats of at most a million either way.
 
       iex> Hal.Drive.SlewLimiter.check(Hal.Twist.new(99, 0))
       :ok
@@ -68,8 +71,8 @@ defmodule Hal.Drive.SlewLimiter do
   def check(other), do: {:error, "#{show(other)} is not a speed"}
 
   @doc """
-  The speed now, when `wanted` is asked for and `seconds` have gone by since the last step; steps
-  longer than 0.2 s count as that. What is not a speed (`check/1`) is taken for a stop.
+  The speed now, when `wanted` is requested and the last step was `seconds` ago; more than 0.2 s
+  count as 0.2 s. A value that is not a speed (`check/1`) counts as a stop.
 
       iex> alias Hal.Drive.SlewLimiter
       iex> ramp = SlewLimiter.new(max_linear: 0.5, max_turn: 1, max_acceleration: 0.5, max_turn_acceleration: 1)
@@ -104,7 +107,7 @@ defmodule Hal.Drive.SlewLimiter do
     {twist, %{ramp | twist: twist}}
   end
 
-  @doc "The same limits, standing."
+  @doc "The same limits, at rest."
   @spec standing(t()) :: t()
   def standing(%__MODULE__{} = ramp), do: %{ramp | twist: Twist.zero()}
 
@@ -116,8 +119,8 @@ defmodule Hal.Drive.SlewLimiter do
   defp axis(now, wanted, faster, slower), do: approach(now, wanted, faster, slower)
 
   @doc """
-  One step from a speed towards another: it grows by at most `faster` and shrinks by at most `slower`. Where it
-  passes zero within the step, it comes no further than it would from standing.
+  One step from a speed towards another: it grows by at most `faster` and shrinks by at most
+  `slower`. If it passes zero within the step, it gets no further than it would from rest.
 
       iex> alias Hal.Drive.SlewLimiter
       iex> for to <- [0.5, 0.31, 0.1, -0.5], do: SlewLimiter.approach(0.3, to, 0.03125, 0.0625)

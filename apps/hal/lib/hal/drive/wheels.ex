@@ -1,20 +1,20 @@
 defmodule Hal.Drive.Wheels do
   @moduledoc """
-  The two wheels behind a distance and a turn, and their errors. Pure.
+  Corrects a distance and a turn for the errors of the two wheels. Pure.
 
-  A base that reports its way and its turn has made both from its wheels: `way = (right + left) / 2`,
-  `turn = (right - left) / base` (Siegwart and Nourbakhsh 2004, section 5.2.4). `ratio` is how much
-  further the right wheel truly goes than the left one while the base takes both for equal, the
-  `E_d` of Borenstein and Feng 1996; each wheel is corrected by their factors `2 / (E_d + 1)` (left) and
-  `2 / (1 / E_d + 1)` (right), whose mean is 1.
+  A base that reports its distance and its turn has computed both from its wheels:
+  `way = (right + left) / 2`, `turn = (right - left) / base` (Siegwart and Nourbakhsh 2004,
+  section 5.2.4). `ratio` is the distance of the right wheel divided by that of the left one when
+  the base takes both for equal, the `E_d` of Borenstein and Feng 1996; each wheel is corrected by
+  their factors `2 / (E_d + 1)` (left) and `2 / (1 / E_d + 1)` (right), whose mean is 1.
   """
 
-  @typedoc "The way in metres and the turn in radians, of one piece of the way."
+  @typedoc "The distance in metres and the turn in radians of one step."
   @type step :: {way :: float(), turn :: float()}
 
   @doc """
-  What a base did that says it did `step`: its wheels stand `base` metres apart in its own
-  arithmetic, and have this ratio.
+  Corrects a `step` that the base reports; in the base's own arithmetic its wheels are `base`
+  metres apart, and `ratio` is as above.
 
       iex> Hal.Drive.Wheels.correct({1.0, 0.5}, 0.4, 1.0)
       {1.0, 0.5}
