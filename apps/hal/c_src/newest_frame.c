@@ -3,17 +3,18 @@
 
        newest_frame newest|every PROGRAM ARGUMENT...
 
-   it runs PROGRAM, reads its yuv4mpeg stream, and keeps one finished picture: the newest, or with
-   `every` each in turn, while PROGRAM waits. Packets on both sides have a length of four bytes,
-   most significant first. Each packet that comes in, whatever its content, is the credit for one
-   picture. Out go pictures,
+   it runs PROGRAM, reads its yuv4mpeg stream, and keeps one finished picture: the newest or, with
+   `every`, each one in turn, while PROGRAM waits. Packets in both directions have a length of
+   four bytes, most significant first. Each incoming packet, whatever its content, is the credit
+   for one picture. Outgoing packets are pictures,
 
        'F' chroma:8 width:32 height:32 rate:32 per:32 number:64 age_us:64 bytes
 
-   (chroma 0: i420, 1: yuyv; the number counts from 0 all pictures, also those dropped) and, once,
-   the end: 'E' status:8 pictures:64 and the last that PROGRAM had to say.
+   (chroma 0: i420, 1: yuyv; the number counts all pictures from 0, dropped ones too) and, once,
+   the end: 'E' status:8 pictures:64 and the end of what PROGRAM wrote to its standard error.
 
-   PROGRAM ends with us, and we end with our standard input, so nothing outlives the VM. */
+   PROGRAM ends with this program, and this program with its standard input, so nothing outlives
+   the VM. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -29,7 +30,7 @@
 #include "y4m.h"
 
 #define LONGEST_LINE 256
-#define STATUS_NOT_RUN 127      /* as shells say it */
+#define STATUS_NOT_RUN 127      /* as in shells */
 #define STATUS_NOT_UNDERSTOOD 255
 
 enum phase { HEADER, FRAME, PLANES, ENDED };
@@ -43,17 +44,17 @@ struct picture {
 static struct {
     int every;
     pid_t child;
-    int pictures_fd, words_fd;  /* what PROGRAM writes; -1 when closed */
+    int pictures_fd, words_fd;  /* PROGRAM's output and errors; -1 when closed */
     enum phase phase;
     struct y4m header;
     char line[LONGEST_LINE];
     size_t line_length;
-    struct picture back, front; /* being filled, and finished */
+    struct picture back, front; /* being filled; finished */
     size_t size, filled;
     int fresh;                  /* front was not sent yet */
     uint8_t *yuyv;
     uint64_t count, credit;
-    uint8_t credit_head[4];     /* of the packet that is coming in */
+    uint8_t credit_head[4];     /* of the incoming packet */
     uint32_t credit_have, credit_skip;
     char words[512];
     size_t words_length;
@@ -201,7 +202,7 @@ static void end_of_line(void)
     s.line_length = s.filled = 0;
 }
 
-/* Reads what is there: of a line one byte, so as not to run into the planes behind it. */
+/* Reads what is there: one byte at a time in a line, so as not to read into the planes. */
 static void read_pictures(void)
 {
     char letter;
@@ -239,7 +240,7 @@ static void turn_over(void)
     s.phase = FRAME;
 }
 
-/* Keeps the end of what PROGRAM says. */
+/* Keeps the end of what PROGRAM writes to its standard error. */
 static void read_words(void)
 {
     char words[256];
@@ -334,8 +335,8 @@ int main(int argc, char **argv)
             break;
     }
     send_end(child_status());
-    /* A credit may be under way. Were we gone, the VM would take its failed write for the news,
-       and could miss our last words. It closes our input when it has read them. */
+    /* A credit may be on its way. If this program had ended, the VM's write of it would fail,
+       and the VM could miss the packet 'E'. It closes our input when it has read that. */
     for (;;)
         read_credit();
 }

@@ -6,7 +6,7 @@
 #define MOST_PIXELS (64u << 20)
 #define MAGIC "YUV4MPEG2 "
 
-/* A number of at most nine digits; moves *at behind it. -1 where there is none. */
+/* Reads a number of at most nine digits, and moves *at behind it. -1 if there is none. */
 static int number(const char **at, const char *end, uint32_t *value)
 {
     const char *start = *at;

@@ -2,7 +2,7 @@ defmodule Hal.Application do
   @moduledoc false
   use Application
 
-  # A supervisor without children never falls, so it is the one that owns the table of handlers.
+  # A supervisor without children does not crash, so it owns the table of handlers.
   defmodule Root do
     @moduledoc false
     use Supervisor

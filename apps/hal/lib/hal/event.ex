@@ -1,53 +1,53 @@
 defmodule Hal.Event do
   @moduledoc """
-  Events in telemetry's shape: what happened, numbers, and about whom. Libraries never log; they
-  emit events, and listeners attach functions. If `:telemetry` is loaded, it receives every event
-  too.
+  Events in telemetry's shape: what happened, numbers, and what it concerns. Libraries emit events
+  instead of logging them, and listeners attach functions. If `:telemetry` is loaded, it receives
+  every event too.
 
-  Before the `:hal` application is started an event is simply lost.
+  An event that is emitted before the `:hal` application has started is lost.
 
-  Devices of a robot say its `robot` too.
+  The events of a robot's devices have its `robot` in their metadata too.
 
   | event | measurements | metadata |
   |---|---|---|
   | `[:hal, :device, :online]` | `at_ms` | `device`, `driver`, `again?`: whether it was offline before |
-  | `[:hal, :device, :offline]` | `at_ms` | `device`, `driver`, `reason`, `line`: the reason in words; once a reason, not once a try |
-  | `[:hal, :device, :watchdog]` | `at_ms` | `device`, `driver`: no speed came in time, the wheels were stopped |
-  | `[:hal, :rflex, :lost]` | `at_ms`, and counters (`Hal.RFlex.Driver.counts/1`) | `port`: on this line more was lost or refused, told every 10 s |
-  | `[:hal, :device, :arming]` | `at_ms` | `device`, `driver`, `state`, `why`, `was` (the state before), `line` (how the line was lost, in words, or `nil`): whether wheels may turn has changed (`Hal.Device.Arming`) |
-  | `[:hal, :device, :refused]` | `at_ms`, `refused` | `device`, `driver`: a speed came for wheels that are not armed, so many by now |
-  | `[:hal, :event, :failure]` | | `handler`, `event`, `kind`, `reason`: a handler failed and is detached |
-  | `[:vision, :view, :failed]` | `at_ms` | `view`, `reason`, `line`: what makes pictures for viewers failed, and is started again |
-  | `[:vision, :view, :healed]` | `at_ms` | `view`: it makes pictures again |
+  | `[:hal, :device, :offline]` | `at_ms` | `device`, `driver`, `reason`, `line`: the reason in words; once for each reason, not for each attempt |
+  | `[:hal, :device, :watchdog]` | `at_ms` | `device`, `driver`: no speed came in time, and the wheels are stopped |
+  | `[:hal, :rflex, :lost]` | `at_ms`, and counters (`Hal.RFlex.Driver.counts/1`) | `port`: more was lost or refused on this line; checked every 10 s |
+  | `[:hal, :device, :arming]` | `at_ms` | `device`, `driver`, `state`, `why`, `was` (the state before), `line` (how the line was lost, in words, or `nil`): the drive's arming, or the reason for it, has changed (`Hal.Device.Arming`) |
+  | `[:hal, :device, :refused]` | `at_ms`, `refused` (how many so far) | `device`, `driver`: a speed came for wheels that are not armed |
+  | `[:hal, :event, :failure]` | | `handler`, `event`, `kind`, `reason`: a handler failed and was detached |
+  | `[:vision, :view, :failed]` | `at_ms` | `view`, `reason`, `line`: the encoder of the pictures failed, and is restarted |
+  | `[:vision, :view, :healed]` | `at_ms` | `view`: the encoder makes pictures again |
   | `[:vision, :saver, :failed]` | `at_ms` | `folder`, `reason`, `line`: no picture can be saved; tried again |
   | `[:vision, :saver, :healed]` | `at_ms` | `folder`: pictures are saved again |
-  | `[:robot, :dry_run]` | `at_ms` | `robot`, `command`, `line`: what would be done, if this were no dry run |
+  | `[:robot, :dry_run]` | `at_ms` | `robot`, `command`, `line`: what would be done if this were not a dry run |
   | `[:robot, :gate, :start]` | `at_ms` | `robot`, `latched?` |
-  | `[:robot, :gate, :limits]` | `at_ms` | `robot`, `limits`: why the speed is limited has changed |
+  | `[:robot, :gate, :limits]` | `at_ms` | `robot`, `limits`: the reasons to limit the speed have changed |
   | `[:robot, :gate, :estop]`, `[:robot, :gate, :reset]` | `at_ms` | `robot` |
-  | `[:robot, :estop_file, :error]` | | `robot`, `file`, `reason`: the latch is as it was told, but would not outlive a restart of the board so |
+  | `[:robot, :estop_file, :error]` | | `robot`, `file`, `reason`: the latch is set as ordered, but would not survive a restart of the board |
   | `[:robot, :executive, :start]` | `at_ms` | `robot`: the robot is idle |
   | `[:robot, :executive, :slow]` | `at_ms`, `duration_ms` | `robot`: a tick took over 50 ms |
-  | `[:robot, :fault]` | `at_ms` | `robot`, `line`: why it stands though nobody told it to, such as a bumper that stays pressed; `nil` when that is over |
+  | `[:robot, :fault]` | `at_ms` | `robot`, `line`: why it stands although nobody stopped it, such as a bumper that stays pressed; `nil` when that is over |
   | `[:robot, :executive, :silent]` | `at_ms` | `robot`, `behaviour` (a module, or `nil`), `line` (where, in words): it misses its ticks |
-  | `[:robot, :executive, :hung]` | `at_ms` | the same: it has missed them for 2 s, and is started again |
-  | `[:robot, :executive, :again]` | `at_ms` | the same: it ticks again by itself |
-  | `[:robot, :pilot, :silent]`, `[:robot, :pilot, :hung]`, `[:robot, :pilot, :again]` | `at_ms` | `robot`, `mission`, `line`: the same of a mission that does not return |
-  | `[:robot, :gate, :silent]`, `[:robot, :gate, :hung]`, `[:robot, :gate, :again]` | `at_ms` | `robot`, `line`: the same of a gate that does not step |
+  | `[:robot, :executive, :hung]` | `at_ms` | the same: it has missed them for 2 s, and is restarted |
+  | `[:robot, :executive, :again]` | `at_ms` | the same: it ticks again without a restart |
+  | `[:robot, :pilot, :silent]`, `[:robot, :pilot, :hung]`, `[:robot, :pilot, :again]` | `at_ms` | `robot`, `mission`, `line`: the same for a mission that does not return |
+  | `[:robot, :gate, :silent]`, `[:robot, :gate, :hung]`, `[:robot, :gate, :again]` | `at_ms` | `robot`, `line`: the same for a gate that does not step |
   | `[:robot, :pilot, :phase]` | `at_ms` | `robot`, `state`: `:idle` or `{mission, phase}` |
-  | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and what the mission adds |
-  | `[:mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): a node was not let in, or would not have us |
-  | `[:swarm, :part, :fell]` | `at_ms` | `id`, `reason`: a part of the node; it starts again |
-  | `[:swarm, :comms, :duplicate_id]` | | `robot`, `other`: a robot of this name was there before; this one is silent |
-  | `[:mesh, :up]`, `[:mesh, :suspect]`, `[:mesh, :gone]` | `at_ms` | `node`: by datagrams |
-  | `[:mesh, :connected]`, `[:mesh, :disconnected]` | `at_ms` | `node`: by Erlang's distribution |
-  | `[:mesh, :unknown_node]` | `at_ms` | `name`, `address`: has the secret, but is not in the roster |
-  | `[:mesh, :duplicate_node]` | `at_ms` | `node`: another one calls itself like this one |
+  | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and fields that the mission adds |
+  | `[:mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): this node refused another one, or was refused by it |
+  | `[:swarm, :part, :fell]` | `at_ms` | `id`, `reason`: a part of the node crashed; it is restarted |
+  | `[:swarm, :comms, :duplicate_id]` | | `robot`, `other`: another robot of this name was there first; this one stays silent |
+  | `[:mesh, :up]`, `[:mesh, :suspect]`, `[:mesh, :gone]` | `at_ms` | `node`, judged by its datagrams |
+  | `[:mesh, :connected]`, `[:mesh, :disconnected]` | `at_ms` | `node`, by Erlang's distribution |
+  | `[:mesh, :unknown_node]` | `at_ms` | `name`, `address`: a node has the secret, but is not in the roster |
+  | `[:mesh, :duplicate_node]` | `at_ms` | `node`: another node uses this node's name |
   | `[:mesh, :no_network]` | | `reason`, `interface`, `port`: no socket; tried again |
-  | `[:mesh, :libcluster]` | `at_ms` | `reason`: it ended, and starts again |
-  | `[:swarm, :responder, :failure]` | | `robot`, `service`, `kind`, `reason`: a service's code raised |
-  | `[:swarm, :blackboard, :rival]` | | `robot`, `incarnation`, `node`: rows of another robot of this name came from there |
-  | `[:sim, :emulator, :line]` | `at_ms` | `link`, `reason`: an emulated device has no line; tried again |
+  | `[:mesh, :libcluster]` | `at_ms` | `reason`: libcluster ended, and is restarted |
+  | `[:swarm, :responder, :failure]` | | `robot`, `service`, `kind`, `reason`: the code of a service failed |
+  | `[:swarm, :blackboard, :rival]` | | `robot`, `incarnation`, `node`: rows of another robot of this name came from that node |
+  | `[:sim, :emulator, :line]` | `at_ms` | `link`, `reason`: an emulated device could not open its serial line; tried again |
   | `[:sim, :server, :late]` | `late_ms` | `world`: a step of the simulated world came late |
   """
   require Logger
@@ -58,7 +58,7 @@ defmodule Hal.Event do
   @type handler :: (name(), measurements :: map(), metadata :: map(), config :: term() -> term())
 
   @doc """
-  Tells all handlers of this event, in the calling process.
+  Calls all handlers of this event, in the calling process.
 
       iex> Hal.Event.execute([:nobody, :listens], %{at_ms: 5}, %{robot: :mag1})
       :ok
@@ -70,7 +70,7 @@ defmodule Hal.Event do
       run(id, function, event, measurements, metadata, config)
     end
 
-    # Not a dependency: a project that has telemetry gets our events there.
+    # Telemetry is not a dependency, but a project that has it receives our events there.
     if :erlang.function_exported(:telemetry, :execute, 3),
       do: apply(:telemetry, :execute, [event, measurements, metadata])
 
@@ -78,8 +78,8 @@ defmodule Hal.Event do
   end
 
   @doc """
-  Calls `function.(event, measurements, metadata, config)` at each such event, until detached.
-  A function that raises, throws or exits is detached.
+  Attaches a handler: at each such event `function.(event, measurements, metadata, config)` is
+  called. A function that raises, throws or exits is detached.
 
       iex> Hal.Event.attach(:doc, [:doc, :event], fn _, %{n: n}, _, to -> send(to, n) end, self())
       :ok
@@ -104,14 +104,14 @@ defmodule Hal.Event do
   end
 
   @doc """
-  Ends a handler.
+  Detaches a handler.
 
       iex> Hal.Event.detach(:never_attached)
       {:error, :not_found}
   """
   @spec detach(id :: term()) :: :ok | {:error, :not_found}
   def detach(id) do
-    # At the end of a node the table may be gone before those who listened.
+    # When a node shuts down, the table may be gone before its listeners.
     case :ets.whereis(@table) != :undefined and :ets.take(@table, {:id, id}) do
       [{_key, event}] ->
         :ets.match_delete(@table, {{:event, event}, id, :_, :_})
@@ -135,8 +135,8 @@ defmodule Hal.Event do
     end
   end
 
-  # The handler is somebody else's code running in, say, the gate: whatever it does must not stop
-  # a robot. This is the one place that catches everything.
+  # The handler is foreign code that runs in, for example, the gate: its failure must not stop a
+  # robot. That is why everything is caught here.
   defp run(id, function, event, measurements, metadata, config) do
     function.(event, measurements, metadata, config)
   catch

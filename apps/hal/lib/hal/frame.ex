@@ -10,10 +10,10 @@ defmodule Hal.Frame do
   | `:yuv444` | planes Y, U, V, all of full size |
   | `:rgb24` | R G B for each pixel |
 
-  `at_ms` is the time of exposure by the clock of the robot (monotonic, or the simulator's).
-  `pan` and `tilt` (radians, left and up positive) are where the camera looked at that moment, and
-  `field_of_view` how wide; `nil` where the camera does not know: who knows is its pan-tilt unit
-  (`Hal.Ptz.History`).
+  `at_ms` is when the picture was taken, as near as its source knows, by the clock of the robot
+  (monotonic, or the simulator's). `pan` and `tilt` (radians, left and up positive) say where the
+  camera looked then, and `field_of_view` how wide. They are `nil` if the camera does not know
+  them; its pan-tilt unit does (`Hal.Ptz.History`).
   """
 
   @enforce_keys [:format, :width, :height, :bytes, :at_ms]
@@ -38,7 +38,8 @@ defmodule Hal.Frame do
   def formats, do: @formats
 
   @doc """
-  How many bytes a frame of this format and size has; an error where the format cannot have the size.
+  The number of bytes of a frame of this format and size; an error if the format does not allow
+  the size.
 
       iex> Hal.Frame.byte_size(:yuyv, 320, 240)
       {:ok, 153_600}
@@ -59,7 +60,7 @@ defmodule Hal.Frame do
   def byte_size(_format, w, h), do: {:error, {:size, {w, h}}}
 
   @doc """
-  A checked frame.
+  A frame, if its size and its number of bytes fit the format.
 
       iex> {:error, {:bytes, 5, :expected, 12}} = Hal.Frame.new(:rgb24, 2, 2, <<1, 2, 3, 4, 5>>, 0)
       iex> {:ok, frame} = Hal.Frame.new(:yuyv, 2, 1, <<1, 2, 3, 4>>, 7)

@@ -1,7 +1,7 @@
 defmodule Hal.Json do
   @moduledoc """
-  Writes JSON. It is deliberately small: the reports of this project need no more, and a robot
-  needs no further library for it.
+  A JSON encoder, small on purpose: the reports of this project need no more, and robots need no
+  further library.
 
   | Elixir | JSON |
   |---|---|
@@ -25,8 +25,8 @@ defmodule Hal.Json do
           | {:object, [{atom() | String.t(), value()}]}
 
   @doc """
-  One line of JSON. Raises `ArgumentError` for what has no JSON form: other tuples, pids,
-  structs, text that is not UTF-8.
+  A value as one line of JSON. Raises `ArgumentError` for what has no JSON form: other tuples,
+  pids, structs, text that is not UTF-8.
 
       iex> Hal.Json.encode!(%{b: [1, 2.5, nil], a: "x\\ny"})
       ~S({"a":"x\\ny","b":[1,2.5,null]})

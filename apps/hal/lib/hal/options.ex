@@ -1,20 +1,22 @@
 defmodule Hal.Options do
   @moduledoc """
-  The one checker of options: a table says what is allowed, and all that is wrong is said in the same words,
-  with key, value and what is allowed. Pure; makes no atom.
+  The one checker of options: a table says what is allowed, and every error names the key, the
+  value and what is allowed, in the same words. Pure; creates no atoms.
 
-  A table is a keyword list of types (`Hal.Options.Type`): `key: type`, `key: [type, required: true]` or
-  `key: [type, default: value]`. An option whose default is `nil` may be given as `nil`.
+  A table is a keyword list of types (`Hal.Options.Type`): `key: type`,
+  `key: [type, required: true]` or `key: [type, default: value]`. An option whose default is `nil`
+  may be given as `nil`.
   """
   alias Hal.Options.{Type, Wording}
 
-  # So many problems are told at once.
+  # At most this many problems are reported at once.
   @told 10
 
   @type table :: [{atom(), Type.t() | [Type.t() | {:required | :default, term()}]}]
 
   @doc """
-  The options with their defaults, or one line with all that is wrong; `subject` says whose options they are.
+  Checks options and adds the defaults; the error is one line with the problems. `subject` says
+  whose options they are.
 
       iex> table = [port: [:path, required: true], baud: [{:integer, 1, 9600}, default: 300]]
       iex> Hal.Options.check([port: "/dev/ttyS0"], table, "serial")
@@ -33,7 +35,7 @@ defmodule Hal.Options do
     end
   end
 
-  @doc "The same; raises that line as `ArgumentError`."
+  @doc "The same, but raises that line as an `ArgumentError`."
   @spec check!(term(), table(), subject :: String.t()) :: keyword()
   def check!(options, table, subject) do
     case check(options, table, subject) do
@@ -51,7 +53,7 @@ defmodule Hal.Options do
   end
 
   @doc """
-  An error for what no table can say, such as how two options go together.
+  An error that a table cannot express, such as two options that do not fit together.
 
       iex> Hal.Options.refuse("rflex", [:limits, :max_turn], 2.0, "what the body can do, 0.9,")
       {:error, "rflex option limits.max_turn cannot be 2.0: what the body can do, 0.9, is allowed"}

@@ -1,9 +1,10 @@
 defmodule Hal.Pose do
   @moduledoc """
-  A place and a heading in the plane: metres, and radians counter-clockwise from +x, in (-pi, pi].
+  A position in metres and a heading in the plane: radians counter-clockwise from +x, in
+  `(-pi, pi]`.
 
-  Frames after REP-105: `map` (shared by the fleet), `odom` (one robot's wheels), `base_link`
-  (a robot's body: x forward, y left). Pure.
+  Frames as in REP-105: `map` (shared by the fleet), `odom` (one robot's wheels), `base_link` (a
+  robot's body: x forward, y left). Pure.
   """
 
   @enforce_keys [:x, :y, :heading]
@@ -47,7 +48,7 @@ defmodule Hal.Pose do
   end
 
   @doc """
-  The place of a pose.
+  The position of a pose.
 
       iex> Hal.Pose.point(Hal.Pose.new(1, 2, 3))
       {1.0, 2.0}
@@ -56,7 +57,7 @@ defmodule Hal.Pose do
   def point(%__MODULE__{x: x, y: y}), do: {x, y}
 
   @doc """
-  Distance between two places, in metres.
+  The distance between two positions, in metres.
 
       iex> Hal.Pose.distance({0.0, 0.0}, Hal.Pose.new(3, 4))
       5.0
@@ -69,7 +70,7 @@ defmodule Hal.Pose do
   end
 
   @doc """
-  Direction of a place seen from a pose, relative to its heading: 0 is ahead, positive is left.
+  The direction to a position, relative to the heading of a pose: 0 is ahead, positive is left.
 
       iex> Hal.Pose.bearing(Hal.Pose.new(0, 0, :math.pi() / 2), {0.0, 2.0})
       0.0
@@ -81,7 +82,7 @@ defmodule Hal.Pose do
   end
 
   @doc """
-  A pose given in the frame of `base`, in the frame that `base` is given in.
+  Converts a pose from the frame of `base` to the frame that `base` is given in.
 
       iex> Hal.Pose.compose(Hal.Pose.new(1, 2), Hal.Pose.new(2, 0, 0.5))
       Hal.Pose.new(3, 2, 0.5)
@@ -93,7 +94,7 @@ defmodule Hal.Pose do
   end
 
   @doc """
-  A point given in the frame of `base`, in the frame that `base` is given in.
+  Converts a point from the frame of `base` to the frame that `base` is given in.
 
       iex> Hal.Pose.place(Hal.Pose.new(1, 1), {2.0, 0.5})
       {3.0, 1.5}
@@ -106,7 +107,7 @@ defmodule Hal.Pose do
   end
 
   @doc """
-  `pose` seen from `base`: the inverse of `compose/2`.
+  `pose` in the frame of `base`: the inverse of `compose/2`.
 
       iex> Hal.Pose.relative(Hal.Pose.new(1, 1), Hal.Pose.new(3, 1, 0.5))
       Hal.Pose.new(2, 0, 0.5)

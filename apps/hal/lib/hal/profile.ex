@@ -1,9 +1,10 @@
 defmodule Hal.Profile do
   @moduledoc """
-  The body of a kind of robot: geometry, sensors, limits. SI units; sensor poses in `base_link`.
+  The body of a kind of robot: geometry, sensors, limits. SI units; sensor poses are in
+  `base_link`.
 
-  Sources: the thesis (R69 to R72) and the public rFLEX sample configurations. Accelerations are
-  ours: both bases brake at 0.5 m/s2 and 1 rad/s2 unless configured.
+  Sources: the thesis (R69 to R72) and the public rFLEX sample configurations. The accelerations
+  are our choice: 0.5 m/s2 and 1 rad/s2 for both bases, unless configured.
   """
   alias Hal.Pose
 
@@ -77,7 +78,7 @@ defmodule Hal.Profile do
 
   @doc """
   ATRV mini: four driven wheels, 0.5 by 0.3 m; 16 sonars, dense in front and at the sides, two
-  behind and none diagonally behind (R71). `radius` is the circle round its corners.
+  behind and none diagonally behind (R71). `radius` is that of the circle around its corners.
 
       iex> Hal.Profile.atrv_mini().max_turn
       0.8
@@ -110,7 +111,7 @@ defmodule Hal.Profile do
   end
 
   @doc """
-  The profile of a robot by the first letters of its name, as in the thesis: `mag1`, `min3`.
+  The profile of a robot, by the first three letters of its name as in the thesis: `mag1`, `min3`.
 
       iex> Hal.Profile.of_kind(:mag).name
       :magellan
@@ -119,7 +120,7 @@ defmodule Hal.Profile do
   def of_kind(:mag), do: magellan()
   def of_kind(:min), do: atrv_mini()
 
-  # Index 11 looks straight ahead, indices grow clockwise (public sample configuration).
+  # Index 11 points straight ahead, and indices grow clockwise (public sample configuration).
   defp ring_pose(steps, radius) do
     angle = steps * :math.pi() / 8
     Pose.new(radius * :math.cos(angle), radius * :math.sin(angle), angle)

@@ -1,12 +1,13 @@
 defmodule Hal.Ticker do
   @moduledoc """
-  Sends its owner the same message again and again, at absolute times, so that the pace does not drift. Ticks that
-  were missed are not made up for. The owner asks for each next one when it has handled the last.
+  Sends its owner the same message again and again, at absolute times, so that the pace does not
+  drift. Missed ticks are not made up for. The owner requests each tick after it has handled the
+  last one.
   """
   @enforce_keys [:message, :period_ms, :due_ms]
   defstruct @enforce_keys
 
-  @typedoc "`due_ms` is when the next message comes, or the last one was to come, in monotonic time."
+  @typedoc "`due_ms` is when the next message is due, or the last one was due, in monotonic time."
   @type t :: %__MODULE__{message: term(), period_ms: pos_integer(), due_ms: integer()}
 
   @doc "Sends the caller the first `message`, `first_ms` from now."
@@ -14,7 +15,9 @@ defmodule Hal.Ticker do
   def start(message, period_ms, first_ms),
     do: arm(%__MODULE__{message: message, period_ms: period_ms, due_ms: now() + first_ms})
 
-  @doc "Sends the caller the next message; `nil`, where somebody else sets the pace, sends nothing."
+  @doc """
+  Sends the caller the next message; for `nil`, when something else sets the pace, sends nothing.
+  """
   @spec next(t()) :: t()
   @spec next(nil) :: nil
   def next(nil), do: nil
@@ -28,7 +31,7 @@ defmodule Hal.Ticker do
   end
 
   @doc """
-  When the tick after the one of `last_ms` is due: a period later, or at once, if that is over.
+  When the tick after that of `last_ms` is due: a period later, or now, if that has passed.
 
       iex> {Hal.Ticker.due(1_000, 50, 1_020), Hal.Ticker.due(1_000, 50, 1_170)}
       {1_050, 1_170}

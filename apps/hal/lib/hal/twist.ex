@@ -1,6 +1,7 @@
 defmodule Hal.Twist do
   @moduledoc """
-  A speed of a body in the plane: `linear` in m/s, forward positive; `turn` in rad/s, left positive. Pure.
+  The speed of a body in the plane: `linear` in m/s, forward positive; `turn` in rad/s, left
+  positive. Pure.
   """
 
   @enforce_keys [:linear, :turn]
@@ -17,7 +18,7 @@ defmodule Hal.Twist do
   @spec new(number(), number()) :: t()
   def new(linear, turn), do: %__MODULE__{linear: linear * 1.0, turn: turn * 1.0}
 
-  @doc "Standing still."
+  @doc "A speed of zero."
   @spec zero() :: t()
   def zero, do: %__MODULE__{linear: 0.0, turn: 0.0}
 

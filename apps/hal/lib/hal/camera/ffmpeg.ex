@@ -3,38 +3,39 @@ defmodule Hal.Camera.FFmpeg do
   alias Hal.Frame
 
   @moduledoc """
-  A camera from any source that ffmpeg reads: a V4L2 device, a stream, a video file, a picture, a
-  test picture (`Hal.Camera.Source`).
+  A camera that reads any source that ffmpeg can read: a V4L2 device, a stream, a video file, a
+  picture, a test picture (`Hal.Camera.Source`).
 
   Options:
 
     * `:source` - what to read
     * `:format` - `:yuyv` (default) or `:i420`; always full range, BT.601
-    * `:size` - `{width, height}`, even; by default the source's own, less an odd last column
-      (and for `:i420` an odd last row)
-    * `:every` - `false`: the newest frame wins, files run in real time. `true`: each frame in
-      turn, as fast as it is asked for, and timed by its place in the file
-    * `:loop` - `true`: start a file again at its end
+    * `:size` - `{width, height}`, even; by default the size of the source, without an odd last
+      column (and, for `:i420`, an odd last row)
+    * `:every` - `false` (default): the newest frame wins, and files run in real time. `true`:
+      every frame in turn, as fast as frames are requested, with its time taken from its place in
+      the file
+    * `:loop` - `true`: starts a file again at its end
 
-  and of a V4L2 device only:
+  and, for a V4L2 device only:
 
-    * `:rate` - frames a second to ask of it, 0.1 to 1000
-    * `:norm` - of an analog camera: `:pal`, `:ntsc` or `:secam`
-    * `:input` - the number of the socket of a frame grabber that the camera is plugged into, from 0
-    * `:pixel_format` - what the device is to send, where it can send several:
-      #{Enum.map_join(Source.pixel_formats(), ", ", &"`#{inspect(&1)}`")}. The compressed ones take
-      less of a USB line, and time to unpack
+    * `:rate` - frames per second to request, 0.1 to 1000
+    * `:norm` - for an analog camera: `:pal`, `:ntsc` or `:secam`
+    * `:input` - the number of the frame grabber's socket that the camera is plugged into, from 0
+    * `:pixel_format` - the format to request from a device that can send several:
+      #{Enum.map_join(Source.pixel_formats(), ", ", &"`#{inspect(&1)}`")}. The compressed ones
+      need less USB bandwidth, but time to decompress
 
-  What of these is left out is as the device was left by whoever used it last.
+  A V4L2 option that is left out keeps the setting of whoever used the device last.
 
-  ffmpeg runs behind the port program `newest_frame`, which keeps one frame and gives it out when
-  `next/1` asks; nothing queues, and ffmpeg ends with this process or its VM, however they end.
+  ffmpeg runs behind the port program `newest_frame`, which keeps one frame and sends it when
+  `next/1` asks, so nothing queues. ffmpeg ends with this process or its VM, however they end.
 
-  The process that calls `init/1` gets the messages and is linked to the port program. To see the
-  end of a killed one as an error, it traps exits, as `Hal.Device` does.
+  The process that calls `init/1` receives the messages and is linked to the port program. It must
+  trap exits, as `Hal.Device` does, to see the killing of the port program as an error.
 
-  Errors: `:no_ffmpeg`, `:enoent` (no such file or device), `:eacces`, `:eisdir`, `:eof` (the source ended
-  after at least one frame), `{:unreadable, what ffmpeg says}`, `{:exit, status}`.
+  Errors: `:no_ffmpeg`, `:enoent` (no such file or device), `:eacces`, `:eisdir`, `:eof` (the
+  source ended after at least one frame), `{:unreadable, what ffmpeg says}`, `{:exit, status}`.
   """
   @behaviour Hal.Camera
 
@@ -44,7 +45,7 @@ defmodule Hal.Camera.FFmpeg do
   @opaque t :: %__MODULE__{port: port(), format: Frame.format(), every: boolean()}
 
   @doc """
-  The options with their defaults, or one line that says what is wrong.
+  Checks the options and adds the defaults; the error is one line that says what is wrong.
 
       iex> Hal.Camera.FFmpeg.options(source: "testsrc", loop: 1)
       {:error, "camera option loop cannot be 1: true or false is allowed"}
@@ -75,7 +76,8 @@ defmodule Hal.Camera.FFmpeg do
 
   @impl Hal.Camera
   def next(%__MODULE__{port: port} = state) do
-    # The program may have ended by itself; its last message is then under way to us.
+    # Unlike `Port.command/2`, this does not raise if the program has ended by itself; the
+    # program's last message is then still on its way.
     send(port, {self(), {:command, "n"}})
     {:ok, state}
   end
@@ -105,7 +107,7 @@ defmodule Hal.Camera.FFmpeg do
   end
 
   @doc """
-  An error in a person's words, for one line.
+  Describes an error in a few words, for one line.
 
       iex> Hal.Camera.FFmpeg.explain(:enoent)
       "no such file or device"
@@ -121,7 +123,7 @@ defmodule Hal.Camera.FFmpeg do
   def explain({:exit, reason}), do: "the reader ended (#{inspect(reason)})"
   def explain(other), do: inspect(other, limit: 5, printable_limit: 40)
 
-  @doc "The same with the name of its source."
+  @doc "The same, with the name of the source in front."
   @impl Hal.Camera
   def explain(reason, options), do: "#{options[:source]}: #{explain(reason)}"
 
@@ -141,7 +143,7 @@ defmodule Hal.Camera.FFmpeg do
   defp end_reason(0, count, _words) when count > 0, do: :eof
   defp end_reason(127, 0, ""), do: :no_ffmpeg
 
-  # The port program could not make sense of the stream: see y4m.c for its limits.
+  # The port program could not parse the stream; y4m.c has its limits.
   defp end_reason(255, _count, ""),
     do: {:unreadable, "no frames, or above 64 million pixels or 32768 a side"}
 
@@ -154,7 +156,7 @@ defmodule Hal.Camera.FFmpeg do
 
   defp hint?(line), do: String.starts_with?(line, "To ignore this")
 
-  # The last line is the reason, but ffmpeg 7 goes on to say of which file and option it was.
+  # The last line is the reason, except that ffmpeg 7 then adds which file and option it concerns.
   @echoes [
     "Error opening input file",
     "Error opening output file",
@@ -164,11 +166,11 @@ defmodule Hal.Camera.FFmpeg do
 
   defp reason(lines) do
     reason = lines |> Enum.reverse() |> Enum.find(&(not String.starts_with?(&1, @echoes)))
-    # Which part of ffmpeg says it, at which address, as in "[in#0 @ 0x5575da885000] ".
+    # Strips which part of ffmpeg reports it, such as "[in#0 @ 0x5575da885000] ".
     Regex.replace(~r/^\[[^\]]* @ 0x[^\]]*\] /, reason || List.last(lines), "")
   end
 
-  # Names of files come in any encoding.
+  # File names may be in any encoding.
   defp printable(words),
     do: for(<<byte <- words>>, byte in 32..126 or byte == ?\n, into: "", do: <<byte>>)
 

@@ -1,6 +1,6 @@
 defmodule Hal.Camera.Options do
   @moduledoc """
-  The options of `Hal.Camera.FFmpeg`, which lists them. Pure.
+  The options of `Hal.Camera.FFmpeg`, where they are listed. Pure.
   """
   alias Hal.Camera.Source
   alias Hal.Options
@@ -21,15 +21,15 @@ defmodule Hal.Camera.Options do
     every: [:boolean, default: false],
     loop: [:boolean, default: false]
   ]
-  # Those that only a V4L2 device understands. Elsewhere they would be silently without effect.
+  # Options that only a V4L2 device understands; any other source would silently ignore them.
   @of_devices [:rate, :norm, :input, :pixel_format]
 
-  @doc "What is allowed."
+  @doc "The table of the options."
   @spec table() :: Options.table()
   def table, do: @table
 
   @doc """
-  The options with their defaults, or one line that says what is wrong.
+  Checks the options and adds the defaults; the error is one line that says what is wrong.
 
       iex> Hal.Camera.Options.check(source: "/dev/video0", norm: :palm)
       {:error, "camera option norm cannot be :palm: :pal, :ntsc or :secam is allowed; did you mean :pal?"}

@@ -1,14 +1,14 @@
 defmodule Hal.Camera.Source do
   @moduledoc """
-  The sources that a camera can read, and ffmpeg's arguments for them. Pure, except that it checks
-  whether a file exists.
+  The sources that a camera can read, and ffmpeg's arguments for them. Pure, except that `check/1`
+  looks at the file system.
 
   | source | is |
   |---|---|
   | `"/dev/video0"` | a V4L2 camera |
   | `"rtsp://…"`, any `scheme://` | a stream |
-  | `"testsrc"` | ffmpeg's test picture, 320 by 240, 10 a second |
-  | `"lavfi:GRAPH"` | any other of ffmpeg's generators |
+  | `"testsrc"` | ffmpeg's test picture, 320 by 240, 10 frames per second |
+  | `"lavfi:GRAPH"` | any other generator of ffmpeg |
   | anything else | a video file or a picture |
   """
 
@@ -16,7 +16,7 @@ defmodule Hal.Camera.Source do
 
   @pictures ~w(.png .jpg .jpeg .bmp .ppm .pgm .tif .tiff .webp)
 
-  # Our names, after `Hal.Frame`, and ffmpeg's, of what cameras send.
+  # Our names, as in `Hal.Frame`, and ffmpeg's, for the formats that cameras send.
   @pixel_formats [
     yuyv: "yuyv422",
     uyvy: "uyvy422",
@@ -30,7 +30,7 @@ defmodule Hal.Camera.Source do
   ]
   @norms [pal: "PAL", ntsc: "NTSC", secam: "SECAM"]
 
-  @doc "What a V4L2 device can be asked to send."
+  @doc "The formats that can be requested from a V4L2 device."
   @spec pixel_formats() :: [atom(), ...]
   def pixel_formats, do: Keyword.keys(@pixel_formats)
 
@@ -52,7 +52,8 @@ defmodule Hal.Camera.Source do
   def kind(source), do: if(source =~ ~r/^[A-Za-z][A-Za-z0-9+.-]*:\/\//, do: :stream, else: :file)
 
   @doc """
-  Whether the source can be opened as far as one sees from outside.
+  Whether the source can be opened, as far as its file status shows. Streams and generators are
+  not checked.
 
       iex> Hal.Camera.Source.check("no/such.png")
       {:error, :enoent}
@@ -70,7 +71,7 @@ defmodule Hal.Camera.Source do
   defp readable({:error, _reason}), do: {:error, :enoent}
 
   @doc """
-  The arguments of ffmpeg for a yuv4mpeg stream of that source on its output; options as in
+  ffmpeg's arguments to write that source to its output as a yuv4mpeg stream; options as in
   `Hal.Camera.FFmpeg`.
 
       iex> "/dev/video0"
@@ -120,7 +121,7 @@ defmodule Hal.Camera.Source do
 
   defp input(:generator, "lavfi:" <> graph, _options), do: ["-f", "lavfi", "-i", graph]
   defp input(:stream, source, _options), do: ["-i", source]
-  # Otherwise a colon in a file's name would make it a protocol.
+  # Without `file:`, ffmpeg would read a colon in a file name as the end of a protocol's name.
   defp input(:file, source, _options), do: literal(source) ++ ["-i", "file:" <> source]
 
   defp asked(:size, {width, height}), do: "#{width}x#{height}"
@@ -128,14 +129,14 @@ defmodule Hal.Camera.Source do
   defp asked(:pixel_format, format), do: @pixel_formats[format]
   defp asked(option, number) when option in [:rate, :input], do: to_string(number)
 
-  # A per cent sign in a picture's name would make it a pattern for numbered pictures.
+  # ffmpeg would take a per cent sign in a picture's name for a pattern of numbered pictures.
   defp literal(source) do
     if String.contains?(source, "%") and String.downcase(Path.extname(source)) in @pictures,
       do: ~w(-f image2 -pattern_type none),
       else: []
   end
 
-  # Full range and BT.601 is what colour files are made for; ffmpeg would give 16 to 235.
+  # Colour files are made for full range and BT.601; ffmpeg would give 16 to 235.
   defp filters(options) do
     size =
       case options[:size] do
@@ -146,7 +147,8 @@ defmodule Hal.Camera.Source do
     "#{size},scale=out_color_matrix=bt601:out_range=full,format=#{pixel_format(options[:format])}"
   end
 
-  # Chroma is shared by pairs, so an odd last column (and with i420, row) falls away.
+  # Pairs of pixels share chroma, so an odd last column (with i420, an odd last row too) is
+  # dropped.
   defp crop(:yuyv), do: "crop=trunc(iw/2)*2:ih:0:0"
   defp crop(:i420), do: "crop=trunc(iw/2)*2:trunc(ih/2)*2:0:0"
 

@@ -1,11 +1,11 @@
 defmodule Hal.Options.ModuleLookup do
   @moduledoc """
-  Finds modules of this build by names that people write: the driver in a robot file, the option
-  of a command.
+  Finds modules of this build by names that people write: the driver in a robot file, an option of
+  a command.
   """
 
   @doc """
-  The module of this name, loaded, if it is part of this build. A name that no module has makes no atom.
+  The module of this name, loaded, if it is part of this build. Unknown names create no atoms.
 
       iex> Hal.Options.ModuleLookup.module("Hal.Pose")
       {:ok, Hal.Pose}
@@ -21,7 +21,7 @@ defmodule Hal.Options.ModuleLookup do
          else: (_unknown -> :error)
   end
 
-  # A module that nobody has used yet is known by its file only, which has its name.
+  # A module that has not been used yet is known only by its file, which contains its name.
   defp known(name) do
     with :error <- existing("Elixir." <> name) do
       case :code.where_is_file(to_charlist("Elixir.#{name}.beam")) do

@@ -2,11 +2,11 @@ defmodule Hal.Options.Suggest do
   @moduledoc "Did-you-mean suggestions for unknown words. Pure."
 
   @near_enough 0.77
-  # No word that anybody means is longer, in bytes; comparing takes time.
+  # Longer words (in bytes) are not compared: nobody means them, and comparing takes time.
   @longest 255
 
   @doc """
-  The known word most like `word`, or `nil` when none is like it.
+  The known word that is most like `word`, or `nil` if none is like it.
 
       iex> Hal.Options.Suggest.nearest("fromation", ["formation", "landmark"])
       "formation"
@@ -17,7 +17,8 @@ defmodule Hal.Options.Suggest do
   """
   @spec nearest(String.t(), [String.t()]) :: String.t() | nil
   def nearest(word, known) do
-    # Newer Elixirs do not compare what is not text, such as the words of a damaged file.
+    # Newer Elixirs do not compare binaries that are not text, such as the words of a damaged
+    # file.
     if byte_size(word) <= @longest and String.valid?(word),
       do: likest(String.downcase(word), known)
   end
@@ -31,8 +32,8 @@ defmodule Hal.Options.Suggest do
   end
 
   @doc """
-  The half-sentence to put behind an error, empty when there is nothing to suggest. Known are words, or values
-  that `word` was to be one of.
+  The hint to append to an error; empty if there is nothing to suggest. `known` holds words, or
+  the values that `word` should have been one of.
 
       iex> Hal.Options.Suggest.hint("hal", ["hall", "arena"])
       "; did you mean hall?"
@@ -51,6 +52,6 @@ defmodule Hal.Options.Suggest do
     end
   end
 
-  # A name and a text are compared by their letters.
+  # An atom and a text are compared by their letters.
   defp bare(word), do: word |> String.trim("\"") |> String.trim_leading(":")
 end

@@ -1,27 +1,28 @@
 defmodule Hal.Options.Type do
   @moduledoc """
-  The types of an option, in a table of `Hal.Options`: what they take, and how that is said. Pure.
+  The types of an option in a table of `Hal.Options`: what they accept and return. Pure.
 
-  | type | takes | gives |
+  | type | accepts | returns |
   |---|---|---|
   | `{:number, low, high}`, `{:number, low, high, unit}` | a number | a float |
   | `{:integer, low, high}`, `{:integer, low, high, unit}` | a whole number | the number |
   | `{:span, low, high, unit}` | `{least, most}`, ascending whole numbers of this range | the same |
   | `:integer` | any whole number, such as a seed | the same |
   | `:boolean` | `true`, `false` | the same |
-  | `:path`, `{:path, what}` | text of 1 to 4095 bytes without a zero | the same |
+  | `:path`, `{:path, what}` | text of 1 to 4095 bytes without a zero byte | the same |
   | `:ipv4` | an address, as text or `{a, b, c, d}` | the tuple |
   | `{:text, what}` | text of 1 to 255 bytes on one line, without control characters | the same |
-  | `{:one_of, values}` | one of these | the same |
-  | `{:list, type}`, `{:list, type, most}` | up to so many values (64) | a list |
+  | `{:one_of, values}` | one of these values | the same |
+  | `{:list, type}`, `{:list, type, most}` | up to `most` values (64) | a list |
   | `{:tuple, types, what}` | a tuple of these | a tuple |
   | `{:keys, table}` | `[key: value, …]`; a key may be text | a keyword list in the order of the table |
-  | `{:or, value, type}` | that value, or what the type takes | |
+  | `{:or, value, type}` | that value, or what the type accepts | |
   | `{:struct, module}` | such a struct | the same |
   | `:mfa`, `:driver` | `{module, function, arguments}`; `{module, options}` | the same |
-  | `{:check, function, what}` | that for which `function.(value)` is `true` or `{:ok, value}` | the value |
+  | `{:check, function, what}` | a value for which `function.(value)` is `true` or `{:ok, value}` | the value |
 
-  A `:check` that knows better than `what` gives the whole sentence, `{:error, text}`, or `{:error, problems}`.
+  A `:check` function that has a better explanation than `what` returns the whole sentence,
+  `{:error, text}`, or `{:error, problems}`.
   """
   alias Hal.Options.Wording
   alias Hal.Options.Suggest
@@ -32,7 +33,7 @@ defmodule Hal.Options.Type do
   @type problem :: Wording.problem()
   @type result :: {:ok, term()} | {:error, [problem(), ...]}
 
-  @doc "Whether a value is a list with an end."
+  @doc "Whether a value is a proper list."
   @spec list?(term()) :: boolean()
   def list?(value), do: is_list(value) and not List.improper?(value)
 
@@ -44,7 +45,8 @@ defmodule Hal.Options.Type do
   end
 
   @doc """
-  A value by its type, or all its problems, each with the keys that lead to it. Fills in no defaults.
+  Reads a value by its type; the error has all its problems, each with the keys that lead to it.
+  Adds no defaults.
 
       iex> Hal.Options.Type.read({:keys, size: {:number, 0, 2, "m"}}, size: 1)
       {:ok, [size: 1.0]}

@@ -1,12 +1,12 @@
 defmodule Hal.Options.Wording do
-  @moduledoc "How it is said that an option is wrong, and what is allowed. Pure."
+  @moduledoc "The wording of errors in options: what is wrong, and what is allowed. Pure."
   alias Hal.Options.Suggest
 
   @longest 80
 
   @type problem :: {path :: [String.t()], text :: String.t()}
 
-  @doc "The problem of a value that is not of a type, or not what a text says."
+  @doc "The problem of a value that does not have this type, or does not fit this description."
   @spec refuse(Hal.Options.Type.t() | String.t(), term()) :: {:error, [problem(), ...]}
   def refuse(type, value) do
     hint = with({:one_of, values} <- type, do: Suggest.hint(show(value), values), else: (_ -> ""))
@@ -14,7 +14,7 @@ defmodule Hal.Options.Wording do
   end
 
   @doc """
-  What a type takes, for people.
+  What a type accepts, in words.
 
       iex> Hal.Options.Wording.allowed({:or, :off, {:list, {:integer, 0, 16, "sonars"}}})
       ":off or a list of up to 64, each a whole number from 0 to 16 sonars,"
@@ -46,7 +46,7 @@ defmodule Hal.Options.Wording do
   defp list(words), do: Enum.join(words, ", ")
 
   @doc """
-  The keys that lead to a problem, on one line, however long they are.
+  The keys that lead to a problem, on one line; each is cut to 80 characters.
 
       iex> Hal.Options.Wording.path(["limits", "max_turn"])
       "limits.max_turn"
@@ -62,7 +62,7 @@ defmodule Hal.Options.Wording do
       else: show(key)
   end
 
-  @doc "A value on one line, however large it is."
+  @doc "A value on one line of at most 80 characters."
   @spec show(term()) :: String.t()
   def show(value) do
     value
