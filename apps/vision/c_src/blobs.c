@@ -5,7 +5,7 @@
 #include <string.h>
 
 #define NONE SIZE_MAX
-#define LARGEST 32768u          /* pixels a side, so that areas fit into 32 bits */
+#define LARGEST 32768u          /* pixels per side, so that areas fit into 32 bits */
 
 struct run {
     uint32_t start, end, mask;  /* end is exclusive */
@@ -45,7 +45,7 @@ int blobs_lay(int format, uint32_t width, uint32_t height, const uint8_t *bytes,
     return 0;
 }
 
-/* The classes that the chroma of each pair of pixels allows; returns those of the whole row. */
+/* Finds the classes that the chroma of each pair of pixels allows; returns those of the row. */
 static uint32_t allow_chroma(const struct blobs_picture *picture, uint32_t row,
                              const uint32_t *tables, uint32_t *restrict pairs)
 {
@@ -59,7 +59,7 @@ static uint32_t allow_chroma(const struct blobs_picture *picture, uint32_t row,
     return any;
 }
 
-/* The runs of one row, from its pairs and its luma. There are at most `width` of them. */
+/* Finds the runs of one row, from its pairs and its luma. There are at most `width` of them. */
 static inline __attribute__((always_inline)) size_t find_runs_by(size_t step, const uint8_t *luma,
                                                                   uint32_t width,
                                                                   const uint32_t *y_table,
@@ -73,7 +73,7 @@ static inline __attribute__((always_inline)) size_t find_runs_by(size_t step, co
         const uint32_t *pair = pairs + x / 2;
 
         if (open == 0) {
-            /* Most of a picture is background: pass over 8 pixels at a time. */
+            /* Most of a picture is background: skips 8 pixels at a time. */
             while (width - x >= 8 && (pair[0] | pair[1] | pair[2] | pair[3]) == 0) {
                 x += 8;
                 pair += 4;
@@ -112,7 +112,7 @@ static size_t find_runs(const struct blobs_picture *picture, uint32_t row, const
                                 : find_runs_by(2, luma, picture->width, y_table, pairs, runs);
 }
 
-/* The root of a label; every second step of the way is cut short for the next time. */
+/* The root of a label; halves the path for the next time. */
 static size_t root(struct blobs_region *regions, size_t label)
 {
     while (regions[label].parent != label)
@@ -177,7 +177,7 @@ static size_t new_region(struct blobs_regions *regions, const struct run *run, u
     return regions->count++;
 }
 
-/* Gives each run of a row its region: that of the runs it touches above, or a new one. */
+/* Gives each run of a row its region: that of the runs that it touches above, or a new one. */
 static int join_rows(const struct run *above, size_t above_count, struct run *here, size_t here_count,
                      uint32_t row, struct blobs_regions *regions)
 {

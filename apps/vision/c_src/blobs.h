@@ -17,9 +17,9 @@ struct blobs_picture {
 
 struct blobs_region {
     uint32_t mask, area;
-    uint32_t left, top, right, bottom; /* right and bottom: the last inside */
+    uint32_t left, top, right, bottom; /* right and bottom: the last ones inside */
     uint64_t sum_x, sum_y;
-    size_t parent;              /* itself in a root; afterwards the order of discovery */
+    size_t parent;              /* a root has itself; in the result: the order of discovery */
 };
 
 struct blobs_regions {
@@ -27,12 +27,13 @@ struct blobs_regions {
     size_t count, room;
 };
 
-/* Lays a picture over bytes; 0, or -1 where format, sizes and byte count do not fit together. */
+/* Lays a picture over bytes; 0, or -1 if format, sizes and byte count do not fit together. */
 int blobs_lay(int format, uint32_t width, uint32_t height, const uint8_t *bytes, size_t size,
               struct blobs_picture *picture);
 
-/* Finds the regions, in the backends' order; tables are 256 masks each for Y, U and V.
-   max_area 0 is no limit. 0, or -1 when memory ran out. The caller frees found->at in both cases. */
+/* Finds the regions, in the order of the backends; tables are 256 masks each for Y, U and V.
+   max_area 0 means no limit. Returns 0, or -1 if memory ran out; the caller frees found->at in
+   both cases. */
 int blobs_find(const struct blobs_picture *picture, const uint32_t tables[768], uint32_t min_area,
                uint32_t max_area, struct blobs_regions *found);
 

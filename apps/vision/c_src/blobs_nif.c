@@ -1,4 +1,4 @@
-/* Checks the terms of Vision.Backend.Native and makes a list of what blobs.c finds. */
+/* Checks the arguments of Vision.Backend.Native, and makes a list of the regions of blobs.c. */
 #include <erl_nif.h>
 #include <stdlib.h>
 

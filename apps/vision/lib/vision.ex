@@ -7,10 +7,12 @@ defmodule Vision do
   alias Vision.{Backend, Blob, Colours}
 
   @doc """
-  The blobs of a frame: by colour in the order of the colour file, largest first.
+  The blobs of a frame: by colour, in the order of the colour file, and largest first, unless a
+  backend of your own orders them otherwise.
 
-  The backend is the one given, or that of the colours, or the fastest that reads the format. The error is the frame's
-  (`{:bytes, got, :expected, n}`, `{:size, {w, h}}`), `{:format, format}` where the backend does not
+  The backend is the one given, or that of the colours, or else `Vision.Backend.Native` if it
+  reads the format, and `Vision.Backend.Reference` if not. The error is that of the frame
+  (`{:bytes, got, :expected, n}`, `{:size, {w, h}}`), `{:format, format}` if the backend does not
   read it, or `:memory`.
 
       iex> yellow = %{name: "Yellow", y: {170, 240}, u: {60, 90}, v: {130, 145}}
@@ -31,10 +33,11 @@ defmodule Vision do
   end
 
   @doc """
-  Distance in metres of a blob that fills this share of the frame, by the constant of its colour.
+  The distance in metres of a blob that fills this share of the frame, by the constant of its
+  colour.
 
-  The share falls with the square of the distance. Above one half the blob is larger than the
-  picture and tells nothing but "near".
+  The share decreases with the square of the distance. A share above one half only shows that the
+  blob is near, and gives `nil`.
 
       iex> Vision.distance(0.0651, 0.0651)
       1.0

@@ -3,10 +3,11 @@ defmodule Vision.Blob do
   One coloured region of a frame, after CMVision and Player's blobfinder.
 
   Pixels are counted from the top left; `left` and `top` are the first pixel inside, `right` and
-  `bottom` the last one **inside**. `x`, `y` are the centroid with pixel centres at whole
-  numbers. `width` and `height` are those of the picture. `share` is the area as a part of the frame's (R41). `clipped?` says that the box
-  touches the border of the frame, so that area and distance mean little. `distance` (metres, R43)
-  is `nil` where the colour has no distance constant, or where the blob fills more than half of the frame.
+  `bottom` the last one **inside**. `x`, `y` are the centroid, with pixel centres at whole
+  numbers. `width` and `height` are those of the frame, and `share` is the area as a part of the
+  frame's (R41). `clipped?` says that the box touches the border of the frame, so that area and
+  distance mean little. `distance` (metres, R43) is `nil` if the colour has no distance constant,
+  or if the blob fills more than half of the frame.
   """
 
   @enforce_keys [:colour, :area, :share, :x, :y, :left, :top, :right, :bottom, :width, :height]

@@ -1,28 +1,29 @@
 defmodule Vision.BlobDetector do
   @moduledoc """
-  The process that finds blobs in frames. It works on the newest frame only: older ones in its
-  mailbox are dropped, so it never lags behind its camera.
+  The process that finds blobs in frames. It works on the newest frame only: it drops older ones
+  that wait in its mailbox, so it does not lag behind its camera.
 
   Options:
 
     * `:colours` - the `Vision.Colours` to look for
-    * `:sink` - `{m, f, a}`; each frame that was read gives
-      `apply(m, f, a ++ [{:detections, detections}])` with its `Vision.Detections`, also without blobs
-    * `:backend` - a `Vision.Backend`; by default the first of `Vision.blobs/2` that reads the frame
-    * `:ptz` - `true`: the camera sits on a pan-tilt unit, whose readings come to `aim/2`
-    * `:clock` - `{m, f, a}` giving integer milliseconds, that of the frames
+    * `:sink` - `{m, f, a}`; for each frame that was read it calls
+      `apply(m, f, a ++ [{:detections, detections}])` with the frame's `Vision.Detections`, even
+      if there are no blobs
+    * `:backend` - a `Vision.Backend`; by default the one that `Vision.blobs/3` selects
+    * `:ptz` - `true`: the camera is on a pan-tilt unit, whose readings are passed to `aim/2`
+    * `:clock` - `{m, f, a}` that returns integer milliseconds, by the clock of the frames
     * `:name` - as in `GenServer`
 
-  A frame of a camera that knows where it looked is taken at its word. Another gets its direction
-  and field of view from the pan-tilt unit, as they were when it was taken (`Hal.Ptz.History`); without
-  a unit the camera looks ahead, and how wide is not said. With a unit that has said nothing for a
-  second nobody knows where the camera looks: such a frame counts as wrong (`:no_aim`).
+  A frame that has a direction is taken as it is. With a pan-tilt unit, any other frame gets the
+  direction and field of view that the unit had when the frame was taken (`Hal.Ptz.History`); if
+  they are not known, as when the unit has reported nothing for a second, the frame counts as
+  wrong (`:no_aim`). Without a unit the camera is taken to look straight ahead.
 
-  A frame that cannot be read gives nothing, so that its blobs grow old at the sink: "seen
-  nothing" and "did not see" are not the same. `status/1` counts them.
+  A frame that cannot be read gives no detections, so that the last ones become stale at the sink:
+  to see nothing, and not to see, are different. `status/1` counts such frames.
 
-  A camera's device feeds it with the sink `{Vision.BlobDetector, :frame, [detector]}`, a pan-tilt unit's with
-  `{Vision.BlobDetector, :aim, [detector]}`.
+  A camera's device passes its frames on by the sink `{Vision.BlobDetector, :frame, [detector]}`,
+  a pan-tilt unit's device its readings by `{Vision.BlobDetector, :aim, [detector]}`.
   """
   use GenServer
   alias Hal.{Frame, Ptz}
@@ -42,18 +43,24 @@ defmodule Vision.BlobDetector do
     GenServer.start_link(__MODULE__, check!(options), name)
   end
 
-  @doc "Hands a frame, or a camera's reading, to the blob detector. Other readings (a device's health) are passed over."
+  @doc """
+  Passes a frame, or a camera's reading, to the blob detector. Other readings (such as a device's
+  health) are ignored.
+  """
   @spec frame(GenServer.server(), Frame.t() | Hal.Camera.reading() | tuple()) :: :ok
   def frame(detector, %Frame{} = frame), do: GenServer.cast(detector, {:frame, frame})
   def frame(detector, {:frame, frame}), do: GenServer.cast(detector, {:frame, frame})
   def frame(_eye, _other_reading), do: :ok
 
-  @doc "Hands a pan-tilt unit's reading to the blob detector. Its health is passed over."
+  @doc "Passes a pan-tilt unit's reading to the blob detector. Its health is ignored."
   @spec aim(GenServer.server(), Hal.Ptz.reading() | tuple()) :: :ok
   def aim(detector, {:ptz, reading}), do: GenServer.cast(detector, {:aim, reading})
   def aim(_eye, _other_reading), do: :ok
 
-  @doc "How many frames were read, dropped for a newer one, and wrong, and what was wrong with the last of these."
+  @doc """
+  How many frames were read, how many were dropped for a newer one, how many were wrong, and the
+  last error.
+  """
   @spec status(GenServer.server()) :: status()
   def status(detector), do: GenServer.call(detector, :status)
 
@@ -83,7 +90,7 @@ defmodule Vision.BlobDetector do
   @impl GenServer
   def handle_call(:status, _from, state), do: {:reply, state.counts, state}
 
-  # The frames that came in the meantime are further down in our own mailbox.
+  # Frames that have come in the meantime are further down in the mailbox.
   defp newest(frame, dropped) do
     receive do
       {:"$gen_cast", {:frame, newer}} -> newest(newer, dropped + 1)
@@ -92,7 +99,8 @@ defmodule Vision.BlobDetector do
     end
   end
 
-  # What the pan-tilt unit said in the meantime: some of it before this frame was taken.
+  # Readings that the pan-tilt unit has sent in the meantime: some are from before this frame was
+  # taken.
   defp newest_aim(state) do
     receive do
       {:"$gen_cast", {:aim, reading}} -> newest_aim(note(reading, state))

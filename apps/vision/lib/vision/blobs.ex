@@ -1,12 +1,12 @@
 defmodule Vision.Blobs do
   @moduledoc """
-  Finds the blobs in each frame of a picture, video, stream or camera: what `mix blobs` does.
+  Finds the blobs in each frame of a picture, video, stream or camera, for `mix blobs`.
   """
   alias Hal.Camera.{FFmpeg, Source}
   alias Hal.Frame
   alias Vision.{Blob, Colours}
 
-  @typedoc "One frame that was looked at; `at_s` counts from the first frame."
+  @typedoc "One frame that was searched; `at_s` is its time in seconds since the first frame."
   @type seen :: %{
           number: non_neg_integer(),
           at_s: float(),
@@ -18,14 +18,15 @@ defmodule Vision.Blobs do
   @patience_ms 10_000
 
   @doc """
-  Looks at the frames of `source` and calls `report` with each `t:seen/0`; when that returns
-  `:halt`, the answer is `:halted`.
+  Searches the frames of `source` and calls `report` with each `t:seen/0`; if that returns
+  `:halt`, the result is `:halted`.
 
-  Options: `:every` (1) looks at each n-th frame only; `:frames` (no limit) ends after so many
-  looked at; `:patience_ms` (10,000) is the longest wait for a frame.
+  Options: `:every` (1) searches only every n-th frame; `:frames` (no limit) ends after this many
+  searched frames; `:patience_ms` (10,000) is the longest wait for a frame.
 
-  A file gives each of its frames, as fast as they are looked at; a device or stream the newest.
-  The error is one line. A source that ends after at least one frame is not an error.
+  Of a file or a generator all frames are read, as fast as they are searched; of a device or
+  stream, the newest. The error is one line. A source that ends after at least one frame is not an
+  error.
   """
   @spec run(String.t(), Colours.t(), (seen() -> :halt | term()), keyword()) ::
           {:ok, summary()} | :halted | {:error, String.t()}
@@ -33,12 +34,12 @@ defmodule Vision.Blobs do
     options = Keyword.validate!(options, every: 1, frames: nil, patience_ms: @patience_ms)
     job = Map.merge(Map.new(options), %{source: source, colours: colours, report: report})
 
-    # A process of its own has a mailbox of its own, and its end closes the camera.
+    # A separate process has its own mailbox, and its end closes the camera.
     fn -> look(job) end |> Task.async() |> Task.await(:infinity)
   end
 
   defp look(job) do
-    # A killed port program is then an error to report, not our end.
+    # A killed port program is then an error to report, and does not end this process.
     Process.flag(:trap_exit, true)
     every_frame? = Source.kind(job.source) in [:file, :generator]
 

@@ -2,17 +2,20 @@ defmodule Vision.Calibration do
   @moduledoc """
   Derives the limits of a colour from places in a picture that show it. Pure.
 
-  A box that a person draws has other things in it: background in its corners, glare, a shadowed edge. So:
+  A box that a person draws contains other things too: background in its corners, glare, a shaded
+  edge. Therefore:
 
-  1. The **middle** is the commonest chroma of the sample: the 3 by 3 cells with the most pixels of a grid
-     of 8 by 8 values of U and V. Points count for it alone where there are any.
-  2. Pixels farther from it than 4 standard deviations (by the median of the distances, which no outlier
-     moves) or 6 values, whichever is more, are **outliers**.
-  3. Of what is left, the limits are the 1st and 99th **percentile** of U and V, the 2nd and 98th of Y.
-  4. **Margins**: 3 values of U and V, 6 of Y, and what a change of light does. With so much more or less
-     light, red, green and blue grow or shrink alike, and so do Y, and the distances of U and V from 128.
-     The tolerance is the widest of `tolerances/0` with which nothing else in the picture is taken for
-     the colour (`Vision.Calibration.Match`), or the one that is wanted.
+  1. The **middle** is the most common chroma of the sample: the median of the 3 by 3 cells with
+     the most pixels, in a grid with cells of 8 by 8 values of U and V. If there are points, only
+     they count here.
+  2. Pixels farther from it than 4 standard deviations (by the median of the distances, which a
+     few outliers hardly change) or 6 values, whichever is more, are **outliers**.
+  3. The limits are the 1st and 99th **percentile** of U and V, and the 2nd and 98th of Y, of the
+     remaining pixels.
+  4. **Margins** are added: 3 values for U and V, 6 for Y, and the effect of a change of light,
+     which makes red, green and blue grow or shrink alike, and with them Y, and the distances of U
+     and V from 128. The tolerance of light is the requested one, or the widest of `tolerances/0`
+     with which the picture shows the same blobs as without (`Vision.Calibration.Match.same?/2`).
   """
   alias Hal.Frame
   alias Vision.Calibration.{Match, Sample}
@@ -24,7 +27,7 @@ defmodule Vision.Calibration do
   @nearest 6
   @fewest 9
 
-  @typedoc "`share` is how much of the sample was no outlier."
+  @typedoc "`share` is the part of the sample that was not an outlier."
   @type found :: %{
           class: map(),
           middle: Rgb.yuv(),
@@ -39,8 +42,9 @@ defmodule Vision.Calibration do
   def tolerances, do: @tolerances
 
   @doc """
-  The class `name` from these places (`Vision.Calibration.Sample`) of frames of one size; the last is
-  the one it is judged by. Options: `tolerance` (`:auto`, or 0.0 to 0.9), `min_area` (20, of blobs).
+  The class `name` from these places (`Vision.Calibration.Sample`) of frames of one size; it is
+  judged by the last one. Options: `tolerance` (`:auto`, or 0.0 to 0.9), `min_area` (20, of
+  blobs).
   """
   @spec find([Frame.t(), ...], [Sample.place(), ...], String.t(), keyword()) ::
           {:ok, found()} | {:error, String.t()}
@@ -77,7 +81,7 @@ defmodule Vision.Calibration do
   defp tolerance(wanted, _blobs), do: wanted * 1.0
 
   @doc """
-  A class with the margins of a tolerance of light, from limits without any.
+  A class with the margins for a tolerance of light, from limits without margins.
 
       iex> class = Vision.Calibration.class("Grey", %{y: {100, 120}, u: {128, 128}, v: {128, 148}}, 0.1)
       iex> {class.y, class.u, class.v}
@@ -112,7 +116,7 @@ defmodule Vision.Calibration do
 
   defp bounded(low, high), do: {max(floor(low), 0), min(ceil(high), 255)}
 
-  # The pixels of the best cell and its neighbours.
+  # The median of the pixels in the best cell and its neighbours.
   defp middle(pixels) do
     cells = Enum.frequencies_by(pixels, fn {_y, u, v} -> {div(u, 8), div(v, 8)} end)
     around = fn {a, b} -> for i <- -1..1, j <- -1..1, do: {a + i, b + j} end
@@ -138,7 +142,7 @@ defmodule Vision.Calibration do
       else: {:error, "only #{length(kept)} pixels of the sample are alike: #{@fewest} are needed"}
   end
 
-  # The median of the distances of a normal distribution is 0.6745 of its deviation.
+  # In a normal distribution the median of the distances is 0.6745 of the standard deviation.
   defp spread([]), do: @nearest
   defp spread(distances), do: max(4 * median(distances) / 0.6745, @nearest)
 

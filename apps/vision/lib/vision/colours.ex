@@ -9,22 +9,22 @@ defmodule Vision.Colours do
       (170:240, 60: 90,130:145)
 
   Line k below `[Colors]` and line k below `[Thresholds]` are one class. The colour is only for
-  showing; `merge` and `expected` are kept but have no effect, as in Player's driver. Limits are
-  inclusive. YUV is the full-range kind of `Vision.Rgb`.
+  display; `merge` and `expected` are kept but have no effect, as in Player's driver. Limits are
+  inclusive. YUV is full range, as in `Vision.Rgb`.
 
   A file is read as CMVision reads it: a line of another form (blank, comment) ends its section
-  and is used up, so a **blank line between the sections is compulsory**, and a comment amid a
+  and is consumed, so a **blank line between the sections is required**, and a comment within a
   section cuts it short. Unknown sections are skipped. Where CMVision would go on with classes
-  that can never be seen, this reader says what is wrong instead: thresholds missing or left
-  over, limits outside 0 to 255 (CMVision clamps them, which hides a slip of the pen) or the
-  wrong way round, broken numbers, lines above 255 bytes.
+  that can never be seen, this reader reports an error instead: thresholds that are missing or
+  surplus, limits outside 0 to 255 (CMVision clamps them, which hides typing errors) or the wrong
+  way round, broken numbers, lines above 255 bytes.
 
   Options of `parse/2`, `read/2` and `new/2`:
 
     * `:distance` - `%{name => k}`: a blob of that colour that fills the share s of the frame is
-      `sqrt(k / s)` metres away, so `k` is the share seen from 1 m;
+      `sqrt(k / s)` metres away, so `k` is its share at 1 m;
     * `:min_area` - smallest blob in pixels (20); `:max_area` - largest (0: no limit);
-    * `:backend` - the `Vision.Backend` that finds them (`nil`: the fastest that reads the frame).
+    * `:backend` - the `Vision.Backend` to use (`nil`: the fastest that reads the frame).
   """
   alias Vision.Colours.Text
 
@@ -57,7 +57,8 @@ defmodule Vision.Colours do
   @largest_area 0xFFFFFFFF
 
   @doc """
-  The colours in the file at `path`; the error is one line that names file, line and remedy.
+  The colours in the file at `path`; the error is one line that names the file and, if it is in a
+  line of the text, that line.
 
       iex> Vision.Colours.read("no/such/file")
       {:error, "no/such/file: no such file or directory"}
@@ -85,7 +86,7 @@ defmodule Vision.Colours do
   end
 
   @doc """
-  The colours in the text of a colour file. Option `:file` is its name for errors.
+  The colours in the text of a colour file. The option `:file` is its name in errors.
 
       iex> text = "[Colors]\\n(255,255,0) 0.5 10 Yellow\\n\\n[Thresholds]\\n(170:240, 60: 90,130:145)\\n"
       iex> {:ok, colours} = Vision.Colours.parse(text, distance: %{"Yellow" => 0.0651})
@@ -107,7 +108,7 @@ defmodule Vision.Colours do
   end
 
   @doc """
-  Colours from classes that need no file; `rgb`, `merge` and `expected` may be left out.
+  Colours from classes, without a file; `rgb`, `merge` and `expected` may be left out.
 
       iex> {:ok, colours} = Vision.Colours.new([%{name: "Red", y: {20, 170}, u: {80, 120}, v: {150, 240}}])
       iex> Vision.Colours.mask(colours, {100, 100, 200})
@@ -138,7 +139,7 @@ defmodule Vision.Colours do
     end
   end
 
-  @doc "The mask of a YUV pixel by the tables: bit k is set where class k allows it."
+  @doc "The mask of a YUV pixel by the tables: bit k is set if class k allows the pixel."
   @spec mask(t(), {0..255, 0..255, 0..255}) :: 0..0xFFFFFFFF
   def mask(%__MODULE__{tables: tables}, {y, u, v}) do
     import Bitwise

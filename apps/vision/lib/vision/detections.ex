@@ -1,18 +1,20 @@
 defmodule Vision.Detections do
   @moduledoc """
-  What a detector found in one frame of a camera, and how that frame was taken. This one struct travels from
-  the detector (`Vision.BlobDetector`, or a camera that detects by itself) over the robot's board into the
-  percept of its behaviours and its mission.
+  What a detector found in one frame of a camera, and how that frame was taken. This one struct
+  goes from the detector (`Vision.BlobDetector`, or a camera that detects by itself) through the
+  robot's blackboard into the percept of its behaviours and its mission.
 
-    * `at_ms` - when the frame was exposed, in milliseconds by the robot's clock; it tells one frame from the next
-    * `blobs` - the `Vision.Blob`s in the order of `Vision.blobs/3`; `[]` says that nothing was seen. Each of them has
-      the size of the frame
-    * `pan`, `tilt` - where the camera looked then, seen from the robot's body: radians, left and up positive
-    * `field_of_view` - how wide it looked then, horizontally, in radians; `nil` if the camera does not know
-    * `pose` - where the robot stood then, in the `map` frame; `nil` until somebody knows. Detectors do not:
+    * `at_ms` - when the frame was taken, in milliseconds by the robot's clock; it distinguishes
+      the frames
+    * `blobs` - the `Vision.Blob`s in the order of `Vision.blobs/3`; `[]` means that nothing was
+      seen. Each of them has the size of the frame
+    * `pan`, `tilt` - where the camera looked then, relative to the robot's body: radians, left
+      and up positive
+    * `field_of_view` - the horizontal field of view then, in radians; `nil` if it is not known
+    * `pose` - where the robot stood then, in the `map` frame. Detectors leave it `nil`, and
       `Robot.Localiser` fills it in
 
-  A frame that could not be read, or is too old, gives no `Vision.Detections` at all.
+  A frame that was not read gives no `Vision.Detections` at all.
   """
   alias Hal.{Frame, Pose}
 
@@ -29,8 +31,8 @@ defmodule Vision.Detections do
         }
 
   @doc """
-  The detections of a frame in which these blobs were found. A camera of which nobody says where it looked, looked
-  straight ahead.
+  The detections of a frame in which these blobs were found. A camera whose direction is not known
+  is taken to look straight ahead.
 
       iex> {:ok, frame} = Hal.Frame.new(:yuyv, 2, 1, <<0, 0, 0, 0>>, 40)
       iex> detections = Vision.Detections.new(%{frame | pan: 0.5}, [])

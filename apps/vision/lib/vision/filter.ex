@@ -1,6 +1,7 @@
 defmodule Vision.Filter do
   @moduledoc """
-  Chooses among blobs: lists in, lists out, so that filters are chained with `|>`.
+  Selects blobs. The filters take a list and return a list, so that they can be chained with `|>`;
+  `largest/1` ends the chain.
 
       blobs
       |> Vision.Filter.real({320, 240})
@@ -11,9 +12,9 @@ defmodule Vision.Filter do
   alias Vision.Blob
 
   @doc """
-  Drops phantoms (R38): blobs whose frame has another size than the camera's, that are larger
-  than their frame, or whose box lies outside it. An old simulator reports one of 22648 by 5
-  pixels whenever it sees nothing.
+  Drops phantoms (R38): blobs whose frame has another size than the camera's, blobs that are
+  larger than their frame, and blobs whose box lies outside it. An old simulator reports one of
+  22648 by 5 pixels whenever it sees nothing.
 
       iex> blob = %Vision.Blob{colour: "Red", area: 30, share: 0.1, x: 4.0, y: 2.0, left: 2, top: 0,
       ...>                     right: 6, bottom: 4, width: 20, height: 15}
@@ -33,7 +34,7 @@ defmodule Vision.Filter do
   end
 
   @doc """
-  Keeps one colour (R39): a camera sees the other robots too.
+  Keeps the blobs of one colour (R39): a camera sees the other robots too.
 
       iex> Vision.Filter.colour([], "YellowLandmark")
       []
@@ -41,16 +42,19 @@ defmodule Vision.Filter do
   @spec colour([Blob.t()], String.t()) :: [Blob.t()]
   def colour(blobs, name), do: Enum.filter(blobs, &(&1.colour == name))
 
-  @doc "Drops blobs of fewer pixels (R40): the noise of the camera."
+  @doc "Drops blobs with fewer pixels (R40): camera noise."
   @spec least_area([Blob.t()], non_neg_integer()) :: [Blob.t()]
   def least_area(blobs, area), do: Enum.filter(blobs, &(&1.area >= area))
 
-  @doc "Drops blobs of a smaller share of their frame (R41), which means the same for cameras of any size."
+  @doc """
+  Drops blobs with a smaller share of their frame (R41), which means the same for pictures of any
+  size.
+  """
   @spec least_share([Blob.t()], float()) :: [Blob.t()]
   def least_share(blobs, share), do: Enum.filter(blobs, &(&1.share >= share))
 
   @doc """
-  The largest blob by its share (R40); the first of equals, `nil` of none.
+  The blob with the largest share (R40); the first of equals, and `nil` for an empty list.
 
       iex> Vision.Filter.largest([])
       nil

@@ -1,10 +1,10 @@
 defmodule Vision.Jpeg do
   @moduledoc """
-  The arguments with which ffmpeg encodes raw frames on its input as JPEG, one for one, and the
-  parser of its output: a stream of parts, each with its length. Pure; `Vision.Jpeg.Encoder` runs
-  it.
+  The arguments with which ffmpeg encodes raw frames from its input as JPEG, one picture for each,
+  and the parser of its output: a stream of parts, each with its length. Pure;
+  `Vision.Jpeg.Encoder` runs it.
 
-  The chroma is kept as fine as the frame has it, and so is the full range: it is what JPEG is made for.
+  A picture keeps the chroma resolution of its frame, and the full range, which JPEG is made for.
   """
   alias Hal.Frame
 
@@ -17,16 +17,17 @@ defmodule Vision.Jpeg do
   }
   @longest_head 256
 
-  @typedoc "What an encoder is made for."
+  @typedoc "What an encoder is opened for: the format and size of its frames."
   @type shape :: {Frame.format(), width :: pos_integer(), height :: pos_integer()}
 
-  @doc "The arguments of ffmpeg. Quality is ffmpeg's, 2 (best) to 31."
+  @doc "ffmpeg's arguments. `quality` is ffmpeg's, 2 (best) to 31."
   @spec arguments(shape(), quality :: 2..31) :: [String.t()]
   def arguments({format, width, height}, quality) do
     {raw, jpeg} = Map.fetch!(@formats, format)
     matrix = "scale=in_range=full:out_range=full:in_color_matrix=bt601:out_color_matrix=bt601"
 
-    # Without threads and without looking ahead, a picture comes out before the next frame goes in.
+    # With one thread and without looking ahead, a picture comes out before the next frame goes
+    # in.
     ~w(-nostdin -hide_banner -loglevel quiet -threads 1 -probesize 32 -analyzeduration 0) ++
       ~w(-f rawvideo -pixel_format #{raw} -color_range pc -video_size #{width}x#{height}) ++
       ~w(-i pipe:0 -vf #{matrix},format=#{jpeg} -fps_mode passthrough -c:v mjpeg -threads 1) ++
@@ -34,7 +35,7 @@ defmodule Vision.Jpeg do
   end
 
   @doc """
-  The longest JPEG that such a frame can become; what is longer is not a picture.
+  The greatest length of a JPEG that is accepted for such a frame.
 
       iex> Vision.Jpeg.longest({:yuyv, 320, 240})
       372_736
@@ -46,7 +47,7 @@ defmodule Vision.Jpeg do
   end
 
   @doc """
-  Takes the first whole picture from what ffmpeg wrote; the rest is for the next time.
+  Takes the first whole picture from the output of ffmpeg; the rest is for the next time.
 
       iex> head = "--ffmpeg\\r\\nContent-type: image/jpeg\\r\\nContent-length: 4\\r\\n\\r\\n"
       iex> Vision.Jpeg.take(head <> <<0xFF, 0xD8, 0xFF>>, 100)
@@ -82,7 +83,7 @@ defmodule Vision.Jpeg do
     case body do
       <<0xFF, 0xD8, _::binary>> when byte_size(body) >= length ->
         {jpeg, rest} = :erlang.split_binary(body, length)
-        # So that a small picture does not hold the whole buffer.
+        # So that a small picture does not keep the whole buffer.
         {:ok, :binary.copy(jpeg), :binary.copy(rest)}
 
       <<first, _::binary>> when first != 0xFF ->

@@ -1,7 +1,7 @@
 defmodule Vision.Picture do
   @moduledoc """
-  Draws blobs into their frame, for people: a box in the colour's own colour with a dark edge, a
-  cross at the centroid, and a label. The picture is written by ffmpeg.
+  Draws blobs into their frame, for people: a box in the display colour of the class with a dark
+  edge, a cross at the centroid, and a label. ffmpeg writes the picture.
   """
   alias Hal.Frame
   alias Vision.{Blob, Colours, Pixels, Rgb}
@@ -11,9 +11,9 @@ defmodule Vision.Picture do
   @white {255, 255, 255}
 
   @doc """
-  The frame as RGB bytes with the blobs drawn in. Options: `classified: true` leaves colour to the pixels
-  that are taken for one of the colours, which shine in it, and makes all others dark and grey; `boxes`, white
-  boxes `{left, top, right, bottom}`.
+  The frame as RGB bytes with the blobs drawn in. Options: `classified: true` shows the pixels
+  that have one of the colours in its display colour, and makes all others dark and grey; `boxes`
+  draws white boxes `{left, top, right, bottom}`.
   """
   @spec draw(Frame.t(), [Blob.t()], Colours.t(), keyword()) :: binary()
   def draw(
@@ -29,7 +29,7 @@ defmodule Vision.Picture do
 
     paint = if options[:classified], do: &classified(&1, colours), else: &Rgb.from_yuv/1
     shown = Map.new(classes, &{&1.name, &1.rgb})
-    # Largest last, so that its label stays readable.
+    # In reverse, so that the label of a larger blob stays readable.
     ink =
       (List.flatten(boxes) ++
          (blobs |> Enum.reverse() |> Enum.flat_map(&strokes(&1, shown[&1.colour], width))))
@@ -42,7 +42,7 @@ defmodule Vision.Picture do
     end
   end
 
-  # The least bit of a mask is the first class; its colour is made for showing.
+  # The lowest bit of a mask is the first class; its `rgb` is for display.
   defp classified({y, _u, _v} = yuv, %Colours{classes: classes} = colours) do
     mask = Colours.mask(colours, yuv)
 
@@ -56,7 +56,8 @@ defmodule Vision.Picture do
   end
 
   @doc """
-  Writes the picture as PNG or JPEG by the ending of `path`; options as of `draw/4`. The error is one line.
+  Writes the picture as PNG or JPEG, by the ending of `path`; options as in `draw/4`. The error is
+  one line.
   """
   @spec write(Path.t(), Frame.t(), [Blob.t()], Colours.t(), keyword()) ::
           :ok | {:error, String.t()}

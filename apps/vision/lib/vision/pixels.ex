@@ -1,5 +1,5 @@
 defmodule Vision.Pixels do
-  @moduledoc "The YUV pixels of a frame of any format, one by one. Plain and slow."
+  @moduledoc "Lists the YUV pixels of a frame of any format. Simple and slow."
   alias Hal.Frame
 
   @doc """
@@ -47,7 +47,7 @@ defmodule Vision.Pixels do
     |> Enum.flat_map(&Vision.Rgb.row/1)
   end
 
-  # One pair of chroma for each two by two pixels.
+  # Two by two pixels share one pair of chroma values.
   defp shared(w, h, bytes, chroma) do
     for row <- 0..(h - 1), x <- 0..(w - 1) do
       {u, v} = chroma.(div(row, 2) * div(w, 2) + div(x, 2))

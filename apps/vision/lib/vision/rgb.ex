@@ -2,7 +2,7 @@ defmodule Vision.Rgb do
   @moduledoc """
   RGB to YUV as CMVision's driver does it: full range, whole numbers, rounded down.
 
-  Two neighbours in a row, the even pixel and the odd one right of it, share their chroma. So an
+  Two neighbours in a row, the even pixel and the odd one to its right, share their chroma. So an
   edge between them mixes it, and a thin object may lose a column of pixels.
   """
   import Bitwise
@@ -11,7 +11,7 @@ defmodule Vision.Rgb do
   @type yuv :: {0..255, 0..255, 0..255}
 
   @doc """
-  One pixel.
+  Converts one pixel.
 
       iex> Vision.Rgb.to_yuv({220, 205, 90})
       {196, 67, 144}
@@ -26,7 +26,8 @@ defmodule Vision.Rgb do
   end
 
   @doc """
-  One pixel back, for pictures that people look at (the usual full-range factors, rounded).
+  Converts one pixel back, for pictures that people look at (the usual full-range factors,
+  rounded).
 
       iex> Vision.Rgb.from_yuv({128, 128, 128})
       {128, 128, 128}
@@ -39,7 +40,7 @@ defmodule Vision.Rgb do
   end
 
   @doc """
-  A row of pixels, with chroma shared by pairs; the last pixel of an odd row keeps its own.
+  Converts a row of pixels. Pairs share their chroma; the last pixel of an odd row keeps its own.
 
       iex> Vision.Rgb.row([{220, 205, 90}, {0, 0, 0}])
       [{196, 97, 136}, {0, 97, 136}]

@@ -1,23 +1,26 @@
 defmodule Vision.Saver do
   @moduledoc """
-  Keeps pictures of a camera in a folder (R103): a viewer of `Vision.View` that writes what it
-  receives. The newest are kept, the oldest deleted (`Vision.Saver.Retention`); other files in the
-  folder are left alone.
+  Saves pictures of a camera in a folder (R103): a viewer of `Vision.View` that writes what it
+  receives. The newest are kept and the oldest deleted (`Vision.Saver.Retention`); other files in
+  the folder are left alone.
 
   Options:
 
-    * `:folder` - where; it must be there, so that pictures for a disk that is not mounted do not fill another
-    * `:rate` - how many a second, 0.001 to 30, default 1
+    * `:folder` - where; it must exist, so that pictures for a disk that is not mounted do not
+      fill another one
+    * `:rate` - how many per second, 0.001 to 30, default 1
     * `:files` - how many are kept, 1 to 100,000, default 1000
     * `:megabytes` - how many MB (10^6 bytes) are kept, 1 to 1,000,000, default 100
-    * `:prefix` - what their names begin with, the robot's
-    * `:view` - the `Vision.View`
+    * `:prefix` - what the file names begin with: the name of the robot
+    * `:view` - the `Vision.View` to watch
     * `:name` - as in `GenServer`
 
-  A picture is written beside its place and moved there, so that nobody finds half of one. What goes wrong (a full
-  disk, a folder that is gone) is told once by `[:vision, :saver, :failed]`, stands in `status/1`, and is tried again
-  after 1 s, 2 s, … up to 30 s; then `[:vision, :saver, :healed]`. A slow disk delays only this process: it asks
-  for the next picture when the last one is written. A full disk makes it remove no more than its limits say.
+  A picture is written under another name and then renamed, so that nobody finds half of one. A
+  failure (a full disk, a folder that is gone) is reported once by `[:vision, :saver, :failed]`
+  and shown by `status/1`. The saver tries again after 1 s, 2 s, … up to 30 s; when it succeeds,
+  `[:vision, :saver, :healed]` follows. A slow disk delays only this process: it requests the next
+  picture when the last one is written. A full disk does not make it delete more than its limits
+  require.
   """
   use GenServer
   alias Hal.Event
@@ -26,7 +29,7 @@ defmodule Vision.Saver do
 
   @rest_ms 1_000
   @longest_rest_ms 30_000
-  # What was being written when the power went.
+  # The ending of a file that is being written, or was when the power failed.
   @part ".part"
 
   @type status :: %{
@@ -36,7 +39,7 @@ defmodule Vision.Saver do
           why: String.t() | nil
         }
 
-  @doc "The options that people give, with their defaults, or what is wrong with them."
+  @doc "Checks the options that people give, and adds the defaults; the error says what is wrong."
   @spec options(term()) :: {:ok, keyword()} | {:error, line :: String.t()}
   defdelegate options(options), to: Options, as: :check
 
@@ -51,7 +54,10 @@ defmodule Vision.Saver do
     end
   end
 
-  @doc "How much is kept, how many were saved since the start, and why none are at present (`nil`: they are)."
+  @doc """
+  How much is kept, how many pictures were saved since the start, and why none are at present
+  (`nil`: they are).
+  """
   @spec status(GenServer.server()) :: status()
   def status(saver), do: GenServer.call(saver, :status)
 
@@ -78,14 +84,14 @@ defmodule Vision.Saver do
         {:noreply, healed(%{s | saved: s.saved + 1})}
 
       {:error, reason} ->
-        # What lies there is looked at anew: a person may have made room, or changed the disk.
+        # The folder is read again: a person may have made room, or changed the disk.
         {:noreply, failed(%{s | retention: nil}, reason)}
     end
   end
 
   def handle_info(:again, s), do: {:noreply, again(s)}
 
-  # The view fell, and is up again in no time.
+  # The view crashed, and is restarted soon.
   def handle_info({:DOWN, ref, :process, _pid, _reason}, %{ref: ref} = s) do
     Process.send_after(self(), :again, @rest_ms)
     {:noreply, %{s | ref: nil}}
@@ -141,7 +147,7 @@ defmodule Vision.Saver do
     end
   end
 
-  # One that somebody else has removed is what was wanted.
+  # If the file is gone already, there is nothing to do.
   defp remove(names, folder) do
     Enum.find_value(names, :ok, fn name ->
       case File.rm(Path.join(folder, name)) do

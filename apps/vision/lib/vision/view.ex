@@ -1,35 +1,36 @@
 defmodule Vision.View do
   @moduledoc """
-  Pictures for people (R103): the frames of a camera as JPEG, made only while somebody looks.
+  Pictures for people (R103): the frames of a camera as JPEG, made only while there is a viewer.
 
       {:ok, ref} = Vision.View.subscribe(view, rate: 5)
       receive do {:picture, ^ref, %Vision.View.Picture{jpeg: jpeg}} -> jpeg end
       :ok = Vision.View.next(view, ref)
 
-  A viewer asks for each picture after the first, so that at most one lies in its mailbox: one that is
-  slow or hangs slows nobody. The view in turn asks the camera's device for a frame, through a
-  `t:demand/0` of one credit, when a picture is due: who does not look costs one read of a counter a
-  frame. Newest wins: a frame that nobody has asked for is never copied, sent or kept.
+  A viewer requests each picture after the first, so that at most one is in its mailbox: a viewer
+  that is slow or hangs does not slow others down. The view in turn requests a frame from the
+  camera's device, through a `t:demand/0` of one credit, when a picture is due. Without a request
+  a frame costs one read of a counter. The newest frame wins: a frame that was not requested is
+  not copied, sent or kept.
 
-  The pictures are made by an ffmpeg outside the VM (`Vision.Jpeg.Encoder`), which is there only while it is
-  needed, and started again if it ends or hangs (`Vision.View.EncoderControl`).
+  An ffmpeg outside the VM makes the pictures (`Vision.Jpeg.Encoder`). It runs only while it is
+  needed, and is restarted if it ends or hangs (`Vision.View.EncoderControl`).
 
   Options:
 
-    * `:demand` - as the camera's sink has it: `{Vision.View, :frame, [view, demand]}`
-    * `:viewers` - how many may look at a time, default 16
-    * `:ffmpeg` - its path; looked for, by default
+    * `:demand` - the one in the camera's sink, `{Vision.View, :frame, [view, demand]}`
+    * `:viewers` - how many viewers there may be at a time, default 16
+    * `:ffmpeg` - its path; by default the view looks for it
     * `:snapshot_ms` - how long a snapshot waits for the camera, default 5000
     * `:name` - as in `GenServer`
 
-  Pictures do not leave their node: a viewer of another one is refused.
+  Pictures do not leave their node: a viewer on another one is refused.
   """
   alias Hal.Frame
   alias Vision.View.{Picture, Server}
 
   @rates {0.001, 30}
 
-  @typedoc "Holds 1 while the view wants a frame."
+  @typedoc "Holds 1 while the view requests a frame."
   @type demand :: :atomics.atomics_ref()
 
   @type status :: %{
@@ -40,11 +41,11 @@ defmodule Vision.View do
           encoder: :open | :closed
         }
 
-  @doc "A demand for a view and its camera's sink."
+  @doc "A demand, to share between a view and its camera's sink."
   @spec demand() :: demand()
   def demand, do: :atomics.new(1, [])
 
-  @doc "A child of a supervisor."
+  @doc "The child specification of a view."
   @spec child_spec(keyword()) :: Supervisor.child_spec()
   def child_spec(options), do: %{id: __MODULE__, start: {__MODULE__, :start_link, [options]}}
 
@@ -56,7 +57,10 @@ defmodule Vision.View do
     GenServer.start_link(Server, Map.new(options), name)
   end
 
-  @doc "A sink for a camera's device: hands a reading on if the view has asked for one."
+  @doc """
+  A sink for a camera's device: passes a frame on if the view has requested one, and each change
+  of the camera's health.
+  """
   @spec frame(GenServer.server(), demand(), tuple()) :: :ok
   def frame(view, demand, {:frame, %Frame{} = frame}) do
     if :atomics.get(demand, 1) == 1 and :atomics.exchange(demand, 1, 0) == 1,
@@ -67,7 +71,7 @@ defmodule Vision.View do
   def frame(view, _demand, {:health, _device, {condition, _since}}),
     do: GenServer.cast(view, {:camera, condition})
 
-  # A camera that detects by itself.
+  # From a camera that detects blobs by itself.
   def frame(view, demand, {:detections, _detections}) do
     if :atomics.get(demand, 1) == 1 and :atomics.exchange(demand, 1, 0) == 1,
       do: GenServer.cast(view, :no_frames),
@@ -77,9 +81,9 @@ defmodule Vision.View do
   def frame(_view, _demand, _other_reading), do: :ok
 
   @doc """
-  Lets this process look. It gets `{:picture, ref, %Vision.View.Picture{}}`, a first one as soon as there is
-  one and each further one when it asks (`next/2`), at most `rate:` a second (0.001 to 30, default 5).
-  `ref` is also a monitor of the view.
+  Subscribes the calling process. It receives `{:picture, ref, %Vision.View.Picture{}}`, the first
+  one as soon as it is made and each further one after a request (`next/2`), at most `rate:` per
+  second (0.001 to 30, default 5). `ref` is also a monitor of the view.
   """
   @spec subscribe(GenServer.server(), keyword()) ::
           {:ok, reference()} | {:error, line :: String.t()}
@@ -98,30 +102,36 @@ defmodule Vision.View do
     end
   end
 
-  @doc "Whether the calling process looks by this `ref`."
+  @doc "Whether the calling process is subscribed with this `ref`."
   @spec looks?(GenServer.server(), reference()) :: boolean()
   def looks?(view, ref) when is_reference(ref) do
     with {:ok, pid} <- here(view), do: ask(pid, {:looks, ref}) == true, else: (_error -> false)
   end
 
-  @doc "Asks for the next picture."
+  @doc "Requests the next picture."
   @spec next(GenServer.server(), reference()) :: :ok
   def next(view, ref) when is_reference(ref), do: GenServer.cast(view, {:next, ref})
 
-  @doc "Ends looking. A picture that was under way may still be in the mailbox."
+  @doc "Ends the subscription. A picture that was on its way may still be in the mailbox."
   @spec unsubscribe(GenServer.server(), reference()) :: :ok
   def unsubscribe(view, ref) when is_reference(ref) do
     Process.demonitor(ref, [:flush])
     GenServer.cast(view, {:unsubscribe, ref})
   end
 
-  @doc "One picture of now, or a line that says why there is none. Waits 5 s at most, unless the view says otherwise."
+  @doc """
+  One new picture, or a line that says why there is none. Waits for the view's `:snapshot_ms` at
+  most, by default 5 s.
+  """
   @spec snapshot(GenServer.server()) :: {:ok, Picture.t()} | {:error, line :: String.t()}
   def snapshot(view) do
     with {:ok, pid} <- here(view), do: ask(pid, :snapshot)
   end
 
-  @doc "How many look, how many pictures were made, how often ffmpeg failed, and why it last did."
+  @doc """
+  The number of viewers, how many pictures were made, how often ffmpeg failed, and why it failed
+  last.
+  """
   @spec status(GenServer.server()) :: status()
   def status(view), do: GenServer.call(view, :status)
 
@@ -134,7 +144,7 @@ defmodule Vision.View do
     end
   end
 
-  # The server has its own clock for all that it waits for.
+  # The server itself limits how long it waits for anything.
   defp ask(pid, request) do
     GenServer.call(pid, request, :infinity)
   catch

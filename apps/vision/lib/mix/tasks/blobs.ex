@@ -6,24 +6,25 @@ defmodule Mix.Tasks.Blobs do
       mix blobs SOURCE --colours FILE [options]
 
   SOURCE is a picture or video file, a stream (`rtsp://…`), a camera (`/dev/video0`), `testsrc`
-  (ffmpeg's test picture, 50 frames of it) or `lavfi:GRAPH` (any other of ffmpeg's generators).
+  (ffmpeg's test picture, 50 frames of it) or `lavfi:GRAPH` (any other generator of ffmpeg).
 
   Options:
 
     * `--colours FILE` - CMVision colour file
-    * `--every N` - look at each N-th frame (1)
-    * `--frames N` - end after N frames looked at; cameras and streams go on without it
-    * `--json FILE` - one JSON object a frame, each on its own line; `-` is standard output, and
-      then nothing else goes there
+    * `--every N` - search every N-th frame (1)
+    * `--frames N` - end after N frames that were searched; without it, cameras and streams go on
+    * `--json FILE` - one JSON object per frame, each on its own line; `-` is standard output, and
+      then nothing else is written there
     * `--picture FILE` - the last frame with its blobs drawn in, `.png` or `.jpg`
     * `--min-area N` - smallest blob in pixels (20)
-    * `--distance NAME=K` - metres for the blobs of a colour, `sqrt(K / share of the frame)`;
-      may be given for each colour
-    * `--backend MODULE` - the `Vision.Backend` that finds them; by default the fastest that reads the frames
+    * `--distance NAME=K` - gives the blobs of a colour a distance in metres,
+      `sqrt(K / share of the frame)`; may be given once for each colour
+    * `--backend MODULE` - the `Vision.Backend` to use; by default the fastest that reads the
+      frames
     * `--help` - this text
 
-  Pixels count from the top left; `right` and `bottom` are the last inside. An odd last column
-  of a picture falls away. The exit status is 1, with one line, for wrong options or input.
+  Pixels count from the top left; `right` and `bottom` are the last ones inside. An odd last
+  column of a picture is dropped. For wrong options or input the exit status is 1, with one line.
 
   Examples:
 
@@ -108,7 +109,8 @@ defmodule Mix.Tasks.Blobs do
     end
   end
 
-  # Who reads us may have seen enough, as `head` does; then we end without a word.
+  # The reader of our output may have seen enough, as `head` has; then the task ends without a
+  # message.
   defp print(text) do
     IO.write(text)
   rescue
@@ -116,8 +118,8 @@ defmodule Mix.Tasks.Blobs do
       if error.original == :terminated, do: :halt, else: reraise(error, __STACKTRACE__)
   end
 
-  # What was held back is written at the latest here, so here a full disk is known. Of a source
-  # that cannot be read no empty report stays.
+  # Delayed data is written here at the latest, so a full disk shows here. An empty report on a
+  # source that cannot be read is removed.
   defp close(result, {:file, file}, path) do
     case {result, File.close(file)} do
       {{:ok, _summary}, {:error, reason}} ->

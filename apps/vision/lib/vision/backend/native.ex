@@ -1,7 +1,7 @@
 defmodule Vision.Backend.Native do
   @moduledoc """
-  The blob finder in C, for yuyv, i420 and nv12. It makes no label image: runs of equal masks are
-  joined to those of the row above, and only runs and regions take memory. Runs on a dirty
+  The blob finder in C, for yuyv, i420 and nv12. It makes no label image: it joins runs of equal
+  masks to those of the row above, so that only runs and regions take memory. It runs on a dirty
   scheduler, because a large or noisy frame may take more than a millisecond.
   """
   @behaviour Vision.Backend
@@ -9,21 +9,22 @@ defmodule Vision.Backend.Native do
   alias Hal.Frame
   alias Vision.Colours
 
-  # As in blobs.c: areas fit into 32 bits.
+  # As in blobs.c: areas then fit into 32 bits.
   @largest 32_768
   @formats %{yuyv: 0, i420: 1, nv12: 2}
 
   @doc false
   @spec load() :: :ok
   def load do
-    # Without the library the stubs remain, and the reference does the work.
+    # Without the library the stubs remain, and `Vision.blobs/3` uses the reference.
     _ = :erlang.load_nif(to_charlist(Application.app_dir(:vision, "priv/blobs")), 0)
     :ok
   end
 
   @doc "Whether the C library was built and loaded."
   @spec loaded?() :: boolean()
-  # The library replaces this. A plain `false` would tell compilers that infer types that it never is.
+  # The library replaces this function. From a plain `false`, a compiler that infers types would
+  # conclude that it is always false.
   def loaded?, do: not function_exported?(__MODULE__, :loaded?, 0)
 
   @impl Vision.Backend

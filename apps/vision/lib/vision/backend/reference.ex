@@ -2,7 +2,7 @@ defmodule Vision.Backend.Reference do
   @moduledoc """
   The definition of a region in plain Elixir: a map of all coloured pixels, and a flood fill over
   it. It reads every format. It compares pixels with the limits of the classes, not with the
-  tables, so that it also checks the tables of the faster backends.
+  tables, so that a comparison also checks the tables of the faster backends.
   """
   @behaviour Vision.Backend
   import Bitwise
@@ -44,7 +44,7 @@ defmodule Vision.Backend.Reference do
 
   defp inside?(value, {lowest, highest}), do: value >= lowest and value <= highest
 
-  # From the first pixel on, as one reads: so regions come in the order of their first pixels.
+  # In reading order, so that regions come in the order of their first pixels.
   defp flood_all(masks) do
     {regions, _rest} =
       masks

@@ -1,5 +1,7 @@
 defmodule Vision.Blobs.Options do
-  @moduledoc "The command line of `mix blobs`: words in, a checked map or one clear line out."
+  @moduledoc """
+  Parses the command line of `mix blobs` into a checked map, or one line that says what is wrong.
+  """
 
   alias Hal.Options.Suggest
 
@@ -27,11 +29,11 @@ defmodule Vision.Blobs.Options do
     help: :boolean
   ]
   @most 1_000_000_000
-  # Frames of the endless test picture, unless told otherwise.
+  # Frames of the endless test picture, unless the options give another number.
   @test_frames 50
 
   @doc """
-  Reads the words of the command line.
+  Parses the words of the command line.
 
       iex> {:ok, options} = Vision.Blobs.Options.parse(~w(a.png --colours c.txt --distance Red=0.02))
       iex> {options.source, options.every, options.distance}
@@ -144,7 +146,7 @@ defmodule Vision.Blobs.Options do
 
   defp backend(nil), do: {:ok, nil}
 
-  # Whether it is a backend is for the colours to say.
+  # The colours check whether it is a backend.
   defp backend(name) do
     with :error <- Hal.Options.ModuleLookup.module(name),
          do: {:error, "--backend cannot be #{inspect(name)}: a module of this build is allowed"}

@@ -1,10 +1,10 @@
 defmodule Vision.Blobs.Report do
-  @moduledoc "Formats what was seen in a frame, as a line of JSON and as a table for people."
+  @moduledoc "Formats what was found in a frame, as a line of JSON and as a table for people."
   alias Vision.{Blob, Blobs}
 
   @doc """
   One JSON object, without a line end. `right` and `bottom` are the last pixels inside;
-  `distance_m` is `null` where the colour has no constant or the blob is too near.
+  `distance_m` is `null` if the colour has no constant or the blob is too near.
 
       iex> {:ok, frame} = Hal.Frame.new(:yuyv, 2, 1, <<0, 0, 0, 0>>, 0)
       iex> Vision.Blobs.Report.json(%{number: 3, at_s: 0.1, frame: frame, blobs: []})
@@ -32,7 +32,7 @@ defmodule Vision.Blobs.Report do
   end
 
   @doc """
-  A number of things.
+  A count with its noun.
 
       iex> {Vision.Blobs.Report.count(1, "blob"), Vision.Blobs.Report.count(0, "frame")}
       {"1 blob", "0 frames"}

@@ -2,7 +2,7 @@ defmodule Vision.Calibration.Match do
   @moduledoc """
   Measures how well a colour's limits separate an object from the rest of a picture. Pure.
 
-  What is found and touches a place that was shown is the thing itself; every other blob is background.
+  A blob that touches one of the places is part of the object; every other blob is background.
   """
   alias Hal.Frame
   alias Vision.{Blob, Colours, Pixels}
@@ -11,9 +11,9 @@ defmodule Vision.Calibration.Match do
   @growth 2
 
   @typedoc """
-  Pixels: `inside` is the size of the places, `hit` how many of them are taken for the colour, `outside` how
-  many are elsewhere; `background` those of blobs that touch no place. `blobs` are the thing's own, `others`
-  the background's, largest first.
+  In pixels: `inside` is the size of the places, `hit` how many of them have the colour, `outside`
+  how many other pixels have it; `background` is the area of the blobs that touch no place.
+  `blobs` are those of the object, `others` those of the background, largest first.
   """
   @type t :: %{
           inside: non_neg_integer(),
@@ -24,7 +24,10 @@ defmodule Vision.Calibration.Match do
           others: [Blob.t()]
         }
 
-  @doc "Judges a class (`Vision.Calibration.class/3`) by a frame; blobs below `min_area` pixels do not count."
+  @doc """
+  Judges a class (`Vision.Calibration.class/3`) by a frame; blobs below `min_area` pixels do not
+  count.
+  """
   @spec judge(Frame.t(), map(), [Sample.place(), ...], pos_integer()) :: t()
   def judge(%Frame{width: width, height: height} = frame, class, places, min_area) do
     {own, others} = blobs(frame, class, places, min_area)
@@ -43,7 +46,7 @@ defmodule Vision.Calibration.Match do
     }
   end
 
-  @doc "The thing's own blobs, and the others."
+  @doc "The object's blobs, and the others."
   @spec blobs(Frame.t(), map(), [Sample.place(), ...], pos_integer()) :: {[Blob.t()], [Blob.t()]}
   def blobs(%Frame{width: width, height: height} = frame, class, places, min_area) do
     {:ok, colours} = Colours.new([class], min_area: min_area)
@@ -53,8 +56,8 @@ defmodule Vision.Calibration.Match do
   end
 
   @doc """
-  Whether wider limits find the same things as strict ones: no blob besides, and none more than twice as
-  large, for a thing that runs into its background is none.
+  Whether wider limits find the same things as strict ones: no additional blob, and none that is
+  more than twice as large, because an object that merges with its background is not found.
   """
   @spec same?({[Blob.t()], [Blob.t()]}, {[Blob.t()], [Blob.t()]}) :: boolean()
   def same?({own, others}, {strict_own, strict_others}) do

@@ -2,8 +2,8 @@ defmodule Vision.Calibration.Sample do
   @moduledoc """
   Places in a picture, and their pixels. Pure.
 
-  A place is `{:point, {x, y}}`, which stands for 5 by 5 pixels round it, or `{:box, {x, y, width, height}}`;
-  pixels count from the top left.
+  A place is `{:point, {x, y}}`, which stands for the 5 by 5 pixels around it, or
+  `{:box, {x, y, width, height}}`; pixels count from the top left.
   """
   alias Hal.Frame
   alias Vision.{Pixels, Rgb}
@@ -15,7 +15,7 @@ defmodule Vision.Calibration.Sample do
   @type bounds :: {left :: integer(), top :: integer(), right :: integer(), bottom :: integer()}
 
   @doc """
-  The pixels of points and those of boxes, of all frames.
+  The pixels of the points and those of the boxes, in all frames.
 
       iex> {:ok, frame} = Hal.Frame.new(:yuyv, 2, 1, <<10, 60, 20, 130>>, 0)
       iex> Vision.Calibration.Sample.take([frame], [{:box, {0, 0, 1, 1}}])
@@ -50,12 +50,13 @@ defmodule Vision.Calibration.Sample do
   defp inside?({:box, {x, y, w, h}}, width, height),
     do: x >= 0 and y >= 0 and w >= 1 and h >= 1 and x + w <= width and y + h <= height
 
-  @doc "A place as a person wrote it."
+  @doc "A place as a person writes it."
   @spec words(place()) :: String.t()
   def words({kind, numbers}), do: "#{kind} #{numbers |> Tuple.to_list() |> Enum.join(",")}"
 
   @doc """
-  The pixels that a place stands for, the last inside, within a picture of this size.
+  The first and last pixels that a place covers; those of a point are limited to a picture of this
+  size.
 
       iex> Vision.Calibration.Sample.bounds({:point, {1, 10}}, 320, 240)
       {0, 8, 3, 12}

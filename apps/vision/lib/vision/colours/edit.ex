@@ -1,13 +1,13 @@
 defmodule Vision.Colours.Edit do
   @moduledoc """
-  Writes a colour into the text of a CMVision colour file; comments and the other colours stay.
-  Pure.
+  Writes a colour into the text of a CMVision colour file; comments and the other colours are
+  kept. Pure.
   """
   alias Vision.Colours
 
   @doc """
-  The text with this class: of one that is there already, the limits are changed; a new one becomes the
-  last. An empty text becomes a file of its own. The error is one line.
+  The text with this class: if the text has it already, its limits are changed; if not, it becomes
+  the last one. An empty text becomes a complete colour file. The error is one line.
 
       iex> class = %{name: "Red", rgb: {255, 0, 0}, merge: 0.5, expected: 10, y: {30, 160}, u: {80, 122}, v: {165, 240}}
       iex> {:ok, text} = Vision.Colours.Edit.put("", class)
@@ -44,7 +44,7 @@ defmodule Vision.Colours.Edit do
     end
   end
 
-  # The k-th line behind a header is that of the k-th class: `parse/1` took the same ones.
+  # The k-th line after a header belongs to the k-th class: `parse/1` took the same lines.
   defp change(lines, classes, class) do
     thresholds = header(lines, "[thresholds]") + 1
 
@@ -57,7 +57,7 @@ defmodule Vision.Colours.Edit do
           {thresholds + count, limits(class)}
         ]
 
-        # The later one first: it moves no other.
+        # The later one first, so that it does not move the other.
         places
         |> Enum.sort(:desc)
         |> Enum.reduce(lines, fn {at, line}, lines -> insert(lines, at, line) end)
@@ -67,7 +67,7 @@ defmodule Vision.Colours.Edit do
     end
   end
 
-  # At the end of a text without a last line end there would be no line before it.
+  # This works at the end of a text without a final line end too.
   defp insert(lines, at, line), do: List.insert_at(lines, at, line)
 
   defp header(lines, name),

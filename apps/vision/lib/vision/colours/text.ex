@@ -84,7 +84,8 @@ defmodule Vision.Colours.Text do
 
   defp again(section), do: {:error, "a second #{title(section)} section: one is allowed"}
 
-  # A line in brackets was meant for the section: a broken one must not pass for its end.
+  # A line that begins with a bracket was meant for the section: a broken one must not count as
+  # its end.
   defp leave(_scan, "(" <> _ = line, _number, form),
     do: {:error, "#{inspect(line)} is not of the form #{form}"}
 
@@ -108,7 +109,7 @@ defmodule Vision.Colours.Text do
     rgb = {String.to_integer(r), String.to_integer(g), String.to_integer(b)}
 
     with true <- Enum.all?(Tuple.to_list(rgb), &(&1 in 0..255)),
-         # As C reads them: "5." and ".5" too.
+         # As C reads them: also "5." and ".5".
          {merge, rest} when rest in ["", "."] <- Float.parse("0" <> merge) do
       colour = %{name: name, rgb: rgb, merge: merge, expected: String.to_integer(expected)}
       %{scan | colours: [colour | scan.colours]}

@@ -1,11 +1,12 @@
 defmodule Vision.Jpeg.Encoder do
   @moduledoc """
   A running ffmpeg that encodes frames of one shape as JPEG, one at a time. It runs outside the
-  VM, with one thread and, if `nice` exists, with lower priority than everything that drives the
-  robot. It ends with the process that opened it, or with the VM, because its input ends.
+  VM, with one thread and, if `nice` exists, with a lower priority. When the process that opened
+  it or the VM ends, its input ends, and ffmpeg with it, unless it hangs.
 
-  The process that opens it gets its messages, must trap exits, and gives them to `handle/2`. Nothing here
-  waits, not even for an ffmpeg that hangs: whoever has waited long enough calls `close/1`.
+  The process that opens it receives its messages, must trap exits, and passes the messages to
+  `handle/2`. No function waits for ffmpeg, even if it hangs: a caller that has waited long enough
+  calls `close/1`.
   """
   alias Hal.Frame
   alias Vision.Jpeg
@@ -19,11 +20,11 @@ defmodule Vision.Jpeg.Encoder do
   @quality 4
   @behind 10
 
-  @doc "What an encoder must be made for, to make pictures of this frame."
+  @doc "The shape of an encoder for this frame."
   @spec shape(Frame.t()) :: Jpeg.shape()
   def shape(%Frame{format: format, width: width, height: height}), do: {format, width, height}
 
-  @doc "Starts ffmpeg; `ffmpeg` is its path, `nil` looks for it."
+  @doc "Starts ffmpeg; `ffmpeg` is its path, and `nil` looks for it."
   @spec open(Jpeg.shape(), ffmpeg :: Path.t() | nil) :: {:ok, t()} | {:error, :no_ffmpeg}
   def open(shape, ffmpeg \\ nil) do
     case ffmpeg || find() do
@@ -48,12 +49,15 @@ defmodule Vision.Jpeg.Encoder do
     Port.open({:spawn_executable, program}, [:binary, :exit_status, args: arguments])
   end
 
-  @doc "Gives it a frame of its shape. The picture arrives as messages; until then it takes no other frame."
+  @doc """
+  Gives the encoder a frame of its shape. The picture arrives in messages; until then the caller
+  must not give it another frame.
+  """
   @spec encode(t(), Frame.t()) :: :ok | {:error, :busy | :no_frame | {:exit, term()}}
   def encode(%__MODULE__{port: port} = encoder, %Frame{bytes: bytes} = frame) do
     {format, width, height} = encoder.shape
 
-    # A byte too many or too few, and all pictures behind it would be shifted.
+    # With a byte too many or too few, all further pictures would be shifted.
     if Frame.byte_size(format, width, height) == {:ok, byte_size(bytes)} and
          shape(frame) == encoder.shape do
       if :erlang.port_command(port, bytes, [:nosuspend]), do: :ok, else: {:error, :busy}
@@ -61,11 +65,11 @@ defmodule Vision.Jpeg.Encoder do
       {:error, :no_frame}
     end
   rescue
-    # The port is closed: ffmpeg has ended, and its last message is under way.
+    # The port is closed: ffmpeg has ended, and its last message is on its way.
     ArgumentError -> {:error, {:exit, :closed}}
   end
 
-  @doc "What a message of this encoder means; `:unknown` if it is not from it."
+  @doc "Handles a message; `:unknown` if it is not from this encoder."
   @spec handle(term(), t()) ::
           {:picture, jpeg :: binary(), t()} | {:more, t()} | {:error, reason()} | :unknown
   def handle({port, {:data, bytes}}, %__MODULE__{port: port} = encoder) do
@@ -84,10 +88,10 @@ defmodule Vision.Jpeg.Encoder do
   def handle({:EXIT, port, reason}, %__MODULE__{port: port}), do: {:error, {:exit, reason}}
   def handle(_other, _encoder), do: :unknown
 
-  @doc "Ends ffmpeg, also one that hangs and would not notice that its input ends."
+  @doc "Ends ffmpeg, even one that hangs and would not notice the end of its input."
   @spec close(t()) :: :ok
   def close(%__MODULE__{port: port}) do
-    # As long as the port is open nobody else can have this number.
+    # As long as the port is open, no other process can have this number.
     with {:os_pid, pid} <- Port.info(port, :os_pid),
          path when path != nil <- System.find_executable("kill"),
          do: System.cmd(path, ["-9", "#{pid}"], stderr_to_stdout: true)
@@ -97,7 +101,7 @@ defmodule Vision.Jpeg.Encoder do
   end
 
   @doc """
-  A reason in a person's words.
+  Describes a reason in words.
 
       iex> Vision.Jpeg.Encoder.explain(:no_ffmpeg)
       "the program ffmpeg is missing (on Debian: apt install ffmpeg)"

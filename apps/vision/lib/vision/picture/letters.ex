@@ -1,6 +1,6 @@
 defmodule Vision.Picture.Letters do
   @moduledoc false
-  # Letters of 3 by 5 dots. Each digit is a row, its bits the dots from left to right.
+  # Letters of 3 by 5 dots. Each digit is a row; its bits are the dots from left to right.
 
   @type place :: {integer(), integer()}
 
@@ -11,7 +11,7 @@ defmodule Vision.Picture.Letters do
              .00002 -00700 _00007 :02020 =07070 %51245),
           fn <<letter, rows::binary>> -> {letter, for(<<row <- rows>>, do: row - ?0)} end
         )
-  # For letters it has not.
+  # For characters that are not in it.
   @unknown [7, 5, 5, 5, 7]
 
   @doc "The dots of a text on a dark ground, as `{place, colour}`; the ground comes first."

@@ -1,5 +1,5 @@
 defmodule Vision.Saver.Options do
-  @moduledoc "The options of `Vision.Saver` that people give, which lists them. Pure."
+  @moduledoc "The options that people give to `Vision.Saver`, where they are listed. Pure."
   alias Hal.Options
 
   @table [
@@ -9,12 +9,12 @@ defmodule Vision.Saver.Options do
     megabytes: [{:integer, 1, 1_000_000}, default: 100]
   ]
 
-  @doc "What is allowed."
+  @doc "The table of the options."
   @spec table() :: Options.table()
   def table, do: @table
 
   @doc """
-  The options with their defaults, or what is wrong with them.
+  Checks the options and adds the defaults; the error says what is wrong.
 
       iex> Vision.Saver.Options.check(folder: "/tmp")
       {:ok, [rate: 1.0, files: 1_000, megabytes: 100, folder: "/tmp"]}

@@ -1,8 +1,8 @@
 defmodule Vision.Saver.Retention do
   @moduledoc """
-  Decides which pictures of one robot a folder keeps: the name of the next one, and which are
+  Decides which pictures of one robot a folder keeps: the name of the next one, and which ones are
   deleted to make room. Pure. Names are `mag1-20260102T030405.678Z.jpg`, in UTC, so that they sort
-  by time. If the clock is set back, the order stays: the next name is then a millisecond after
+  by time. If the clock is set back, the order is kept: the next name is then a millisecond after
   the last one.
   """
 
@@ -19,7 +19,10 @@ defmodule Vision.Saver.Retention do
             last_ms: integer()
           }
 
-  @doc "A retention for the pictures of this name, at most so many files and bytes; `there` is what lies in the folder, `{name, bytes}` each."
+  @doc """
+  The retention of pictures with this prefix, at most so many files and bytes; `there` is what the
+  folder contains, as `{name, bytes}`.
+  """
   @spec new(String.t(), pos_integer(), pos_integer(), [{String.t(), non_neg_integer()}]) :: t()
   def new(prefix, files, bytes, there) do
     retention = %__MODULE__{prefix: prefix, files: files, bytes: bytes}
@@ -29,7 +32,9 @@ defmodule Vision.Saver.Retention do
     |> Enum.reduce(retention, fn {name, size}, retention -> put(retention, name, size) end)
   end
 
-  @doc "What the next picture is called; the time is the wall clock's, milliseconds since 1970."
+  @doc """
+  The name of the next picture; `now_ms` is the wall clock's time, in milliseconds since 1970.
+  """
   @spec name(t(), now_ms :: integer()) :: String.t()
   def name(%__MODULE__{prefix: prefix, last_ms: last_ms}, now_ms) do
     {:ok, time} = DateTime.from_unix(max(now_ms, last_ms + 1), :millisecond)
@@ -37,7 +42,8 @@ defmodule Vision.Saver.Retention do
   end
 
   @doc """
-  The names that must go, oldest first, before a picture of this size finds room; an error where it never does.
+  The names that must be deleted, oldest first, to make room for a picture of this size; an error
+  if the picture alone is too large.
 
       iex> alias Vision.Saver.Retention
       iex> retention = Retention.new("mag1", 2, 1_000, [])
@@ -68,7 +74,7 @@ defmodule Vision.Saver.Retention do
     end
   end
 
-  @doc "A picture of this name and size was put there; it is the newest."
+  @doc "Records that a picture of this name and size was saved; it is the newest."
   @spec put(t(), String.t(), size :: non_neg_integer()) :: t()
   def put(%__MODULE__{} = retention, name, size) do
     %{
@@ -81,7 +87,8 @@ defmodule Vision.Saver.Retention do
   end
 
   @doc """
-  When the picture of this name was saved; `nil` if it is not one of ours, which nobody may remove.
+  When the picture of this name was saved; `nil` for a name that is not one of ours, which must
+  not be deleted.
 
       iex> Vision.Saver.Retention.time_ms("mag1", "mag1-20260102T030405.678Z.jpg")
       1_767_323_045_678

@@ -1,11 +1,12 @@
 defmodule Vision.View.EncoderControl do
   @moduledoc """
-  Encodes frames as pictures, one at a time, with an encoder that runs only while it is needed:
-  started for the first frame, for frames of another shape, and after a failure; closed after 5 s
-  without a picture.
+  Encodes frames as pictures, one at a time, with an encoder that runs only while it is needed: it
+  is started for the first frame, for frames of another shape, and after a failure; it is closed
+  after 5 s without a picture.
 
-  An encoder that ends, or needs more than 5 s for a picture, is followed by a rest of 100 ms, 200 ms, … up
-  to 5 s. The owner traps exits and hands all messages to `handle/3`. Times are integer milliseconds.
+  After an encoder has ended, or has needed more than 5 s for a picture, there is a pause of
+  100 ms, 200 ms, … up to 5 s. The owner must trap exits and pass all messages to `handle/3`.
+  Times are integer milliseconds.
   """
   alias Hal.{Event, Frame}
   alias Vision.Jpeg.Encoder
@@ -13,7 +14,7 @@ defmodule Vision.View.EncoderControl do
 
   @rest_ms 100
   @longest_rest_ms 5_000
-  # On a machine with more to do than it can, the encoder, which comes last, is slow and not stuck.
+  # On an overloaded machine the encoder, which has a lower priority, is slow and not stuck.
   @late_ms 5_000
   @idle_ms 5_000
 
@@ -40,22 +41,22 @@ defmodule Vision.View.EncoderControl do
           why: String.t() | nil
         }
 
-  @doc "One that has made nothing yet. `ffmpeg` is its path, `nil` looks for it."
+  @doc "The state before the first picture. `ffmpeg` is its path, and `nil` looks for it."
   @spec new(Path.t() | nil) :: t()
   def new(ffmpeg), do: %__MODULE__{ffmpeg: ffmpeg}
 
-  @doc "Whether there is anything to make pictures with."
+  @doc "Whether ffmpeg is available."
   @spec able(t()) :: :ok | {:error, line :: String.t()}
   def able(%__MODULE__{ffmpeg: ffmpeg}),
     do: if(ffmpeg || Encoder.find(), do: :ok, else: {:error, Encoder.explain(:no_ffmpeg)})
 
-  @doc "For how many milliseconds it rests; `:busy` while a picture is being made."
+  @doc "How long the pause still lasts, in milliseconds; `:busy` while a picture is being made."
   @spec rests(t(), now_ms :: integer()) :: non_neg_integer() | :busy
   def rests(%__MODULE__{job: job}, _now_ms) when job != nil, do: :busy
   def rests(%__MODULE__{rests_until: nil}, _now_ms), do: 0
   def rests(%__MODULE__{rests_until: until}, now_ms), do: max(0, until - now_ms)
 
-  @doc "Begins a picture of a frame. Only when it does not rest."
+  @doc "Starts to make a picture of a frame. Only when there is no pause."
   @spec begin(t(), Frame.t(), now_ms :: integer()) :: {:ok, t()} | {:error, String.t(), t()}
   def begin(%__MODULE__{job: nil} = maker, frame, now_ms) do
     with {:ok, encoder} <- fit(maker, Encoder.shape(frame)),
@@ -63,7 +64,7 @@ defmodule Vision.View.EncoderControl do
          :ok <- Encoder.encode(encoder, frame) do
       ref = make_ref()
       Process.send_after(self(), {__MODULE__, :late, ref}, @late_ms)
-      # Without its bytes, which nobody needs any more.
+      # Without the frame's bytes, which are not needed any more.
       {:ok, %{maker | job: {ref, %{frame | bytes: <<>>}}}}
     else
       {:error, reason} -> fail(maker, reason, now_ms)
@@ -77,7 +78,7 @@ defmodule Vision.View.EncoderControl do
     Encoder.open(shape, maker.ffmpeg)
   end
 
-  @doc "What a message means for it; `:unknown` if it is for somebody else."
+  @doc "Handles a message; `:unknown` if it is not for this module."
   @spec handle(t(), term(), now_ms :: integer()) ::
           {:picture, Picture.t(), t()} | {:ok, t()} | {:error, String.t(), t()} | :unknown
   def handle(%__MODULE__{job: {ref, _frame}} = maker, {__MODULE__, :late, ref}, now_ms),
@@ -98,7 +99,7 @@ defmodule Vision.View.EncoderControl do
     end
   end
 
-  # A picture that nobody asked for: this ffmpeg is not what it should be.
+  # A picture without a frame: this ffmpeg does not do what it should.
   defp made(%{job: nil} = maker, _jpeg, now_ms), do: fail(maker, :unreadable, now_ms)
 
   defp made(%{job: {_ref, frame}} = maker, jpeg, now_ms) do

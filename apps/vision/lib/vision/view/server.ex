@@ -1,21 +1,21 @@
 defmodule Vision.View.Server do
   @moduledoc """
-  The process of `Vision.View`: it connects `Vision.View.Subscribers`, who is watching, with
-  `Vision.View.EncoderControl`, which encodes the pictures. It never waits for a viewer, the
-  camera or ffmpeg.
+  The process of `Vision.View`: it connects `Vision.View.Subscribers`, which knows the viewers,
+  with `Vision.View.EncoderControl`, which encodes the pictures. It does not wait for a viewer,
+  the camera or ffmpeg.
   """
   use GenServer
   alias Hal.Device.Words
   alias Vision.View.{EncoderControl, Subscribers}
 
-  @doc "The line for a viewer on another node than the camera's."
+  @doc "The error for a viewer on another node than the camera's."
   @spec elsewhere(camera :: node(), viewer :: node()) :: String.t()
   def elsewhere(camera, viewer),
     do: "pictures do not leave their node: the camera is on #{camera}, the viewer on #{viewer}"
 
   @impl GenServer
   def init(options) do
-    # The end of an ffmpeg is a message.
+    # So that the end of an ffmpeg is a message.
     Process.flag(:trap_exit, true)
     :atomics.put(options.demand, 1, 0)
 
@@ -74,7 +74,7 @@ defmodule Vision.View.Server do
   def handle_cast({:next, ref}, s),
     do: {:noreply, look(%{s | subscribers: Subscribers.ask(s.subscribers, ref)})}
 
-  # Looked for again when somebody asks again.
+  # Tried again at the next request.
   def handle_cast(:no_frames, s),
     do: {:noreply, refuse(s, "this camera gives coloured blobs, and no pictures")}
 
@@ -98,7 +98,7 @@ defmodule Vision.View.Server do
       {:picture, picture, maker} -> {:noreply, %{s | maker: maker} |> show(picture) |> look()}
       {:ok, maker} -> {:noreply, %{s | maker: maker}}
       {:error, line, maker} -> {:noreply, %{s | maker: maker} |> refuse(line) |> look()}
-      # What an encoder that is closed by now had to say.
+      # From an encoder that is closed by now.
       :unknown -> {:noreply, s}
     end
   end
@@ -127,7 +127,7 @@ defmodule Vision.View.Server do
     end
   end
 
-  # Asks the camera for a frame if a picture is due, and else sets the clock.
+  # Requests a frame from the camera if a picture is due, and sets a timer if not.
   defp look(s) do
     if s.timer, do: Process.cancel_timer(s.timer)
 
@@ -150,7 +150,8 @@ defmodule Vision.View.Server do
     end
   end
 
-  # A frame that was still under way when its last viewer went, or the encoder failed, is dropped.
+  # A frame that was still on its way when its last viewer left, or the encoder failed, is
+  # dropped.
   defp begin(s, frame) do
     now = now()
 
@@ -175,7 +176,7 @@ defmodule Vision.View.Server do
     send(pid, {:picture, ref, picture})
   end
 
-  # Whoever wants one picture now hears why there is none; those who look go on waiting.
+  # Requests for one picture are answered with the error; subscribers go on waiting.
   defp refuse(s, line) do
     Enum.reduce(Subscribers.ids(s.subscribers), s, fn
       {:once, from} = id, s ->
@@ -192,6 +193,6 @@ defmodule Vision.View.Server do
 
   defp why_none(s), do: "the camera gave no frame within #{s.snapshot_ms} ms"
 
-  # Not the robot's clock, which may be a simulator's: pictures are made for people.
+  # Not the robot's clock, which may be that of a simulator: pictures are made for people.
   defp now, do: System.monotonic_time(:millisecond)
 end

@@ -1,10 +1,11 @@
 defmodule Vision.View.Subscribers do
   @moduledoc """
-  Who is watching a camera, who of them waits for a picture, and when the next one is due. Pure;
-  times are integer milliseconds.
+  Keeps the viewers of a camera: which of them wait for a picture, and when the next one is due.
+  Pure; times are integer milliseconds.
 
-  A viewer gets a picture for each time it asks, and not faster than its rate. One that does not ask, because it
-  is slow, or hangs, gets nothing, costs nothing, and gets the newest picture when it asks again.
+  A viewer gets one picture for each request, and not faster than its rate. One that does not ask,
+  because it is slow or hangs, gets nothing, costs nothing, and gets the newest picture when it
+  asks again.
   """
 
   @enforce_keys [:most]
@@ -13,12 +14,13 @@ defmodule Vision.View.Subscribers do
   @type id :: term()
   @opaque t :: %__MODULE__{most: pos_integer(), viewers: %{id() => map()}}
 
-  @doc "Nobody looks, and at most so many can."
+  @doc "No viewers, and at most `most` later."
   @spec new(most :: pos_integer()) :: t()
   def new(most), do: %__MODULE__{most: most}
 
   @doc """
-  Somebody looks, and waits for a first picture: for one at most every so many milliseconds, or `:once`.
+  Adds a viewer, which waits for its first picture: it gets one every `every_ms` milliseconds at
+  most, or one `:once`.
 
       iex> alias Vision.View.Subscribers
       iex> {:ok, subscribers} = Subscribers.join(Subscribers.new(1), :me, 200, 1_000)
@@ -43,7 +45,9 @@ defmodule Vision.View.Subscribers do
     {:ok, put_in(subscribers.viewers[id], viewer)}
   end
 
-  @doc "Somebody asks for a next picture. Asking twice is asking once."
+  @doc """
+  Takes a viewer's request for its next picture. Another one before that picture changes nothing.
+  """
   @spec ask(t(), id()) :: t()
   def ask(%__MODULE__{viewers: viewers} = subscribers, id) do
     case viewers do
@@ -52,24 +56,24 @@ defmodule Vision.View.Subscribers do
     end
   end
 
-  @doc "Somebody looks no more."
+  @doc "Removes a viewer."
   @spec leave(t(), id()) :: t()
   def leave(%__MODULE__{viewers: viewers} = subscribers, id),
     do: %{subscribers | viewers: Map.delete(viewers, id)}
 
-  @doc "Whether this one looks."
+  @doc "Whether this is a viewer."
   @spec member?(t(), id()) :: boolean()
   def member?(%__MODULE__{viewers: viewers}, id), do: is_map_key(viewers, id)
 
-  @doc "Who looks, in no order."
+  @doc "The viewers, in no particular order."
   @spec ids(t()) :: [id()]
   def ids(%__MODULE__{viewers: viewers}), do: Map.keys(viewers)
 
-  @doc "How many look."
+  @doc "The number of viewers."
   @spec size(t()) :: non_neg_integer()
   def size(%__MODULE__{viewers: viewers}), do: map_size(viewers)
 
-  @doc "In how many milliseconds a picture is wanted; `:never` while nobody waits for one."
+  @doc "In how many milliseconds a picture is due; `:never` while nobody waits for one."
   @spec due(t(), now_ms :: integer()) :: non_neg_integer() | :never
   def due(%__MODULE__{viewers: viewers}, now_ms) do
     case for {_id, %{waits?: true, next_ms: next_ms}} <- viewers, do: next_ms do
@@ -79,8 +83,9 @@ defmodule Vision.View.Subscribers do
   end
 
   @doc """
-  A picture is there: whom it goes to. A viewer's next one is counted from when this one was due, so that a
-  camera that gives its frames somewhat late does not slow the viewer down.
+  Takes a picture; returns the viewers that get it. A viewer's next picture is counted from when
+  this one was due, so that a camera that gives its frames somewhat late does not slow the viewer
+  down.
   """
   @spec serve(t(), now_ms :: integer()) :: {[id()], t()}
   def serve(%__MODULE__{viewers: viewers} = subscribers, now_ms) do
