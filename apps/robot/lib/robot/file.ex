@@ -1,18 +1,20 @@
 defmodule Robot.File do
   @moduledoc """
-  One file describes one robot: `config/robots/mag1.exs`. It is Elixir data, one list of keys, and
-  is read, never run (`Robot.File.Reader`); `config/robots/template.exs` shows all keys;
-  `Robot.File.Schema` is their table.
+  Reads robot files. One file describes one robot, for example `config/robots/mag1.exs`. It is
+  Elixir data, one list of keys, and is parsed, never executed (`Robot.File.Reader`).
+  `config/robots/template.exs` shows all keys; `Robot.File.Schema` is their table.
 
       {:ok, file} = Robot.File.load("config/robots/mag1.exs")
       {:ok, config} = Robot.File.config(file)
 
-  All that is wrong with a file is said at once, each problem on a line that names file, line, key
-  and what is allowed:
+  A file that does not parse gives the first problem. Otherwise up to 40 problems are reported
+  together, each as one line of text with the file, the line, the key and what is wrong. Checks
+  that involve several keys come last, once each key by itself is right.
 
       config/robots/mag1.exs:7: limits.max_liner: is not known: allowed are max_linear, …; did you mean max_linear?
 
-  A real robot arms by hand: `arm: :manual` is the default here, not in `Robot.Config`.
+  A person arms a real robot by hand: `arm: :manual` is the default here, but not in
+  `Robot.Config`.
   """
   alias Hal.Options.Wording
   alias Hal.{Pose, Profile}
@@ -75,17 +77,18 @@ defmodule Robot.File do
   ]
 
   @doc """
-  The robot of the file at `path`, or all that is wrong with it. A colour file is looked for beside
-  it. `fleet:` are the names that there may be (default `Robot.File.Schema.fleet/0`). `tables:` are the types
-  (`Hal.Options.Type`) of the keys whose words are those of an app above this one (`network:` and `policies:`: see
-  `Swarm.MemberSpec.load/1`); such a key without a type may have any keys and values.
+  The robot of the file at `path`, or the problems with it. The path of a colour file is relative
+  to the robot file's folder. `fleet:` are the allowed names (default
+  `Robot.File.Schema.fleet/0`). `tables:` are the types (`Hal.Options.Type`) of the keys that an
+  app above this one defines (`network:` and `policies:`, see `Swarm.MemberSpec.load/1`); such a
+  key without a type may have any keys and values.
 
       iex> Robot.File.load("no/such.exs")
       {:error, ["no/such.exs: no such file or directory"]}
   """
   @spec load(Path.t(), keyword()) :: {:ok, t()} | {:error, [String.t(), ...]}
   def load(path, options \\ []) do
-    # A pipe or a device may never end.
+    # Reading a pipe or a device might never end.
     with {:ok, %File.Stat{type: :regular, size: size}} when size <= @largest <- File.stat(path),
          {:ok, text} <- File.read(path) do
       folder = Path.dirname(path)
@@ -108,8 +111,9 @@ defmodule Robot.File do
   end
 
   @doc """
-  The robot that a text describes. Options: `file:`, its name for errors; `fleet:` and `tables:` as in `load/2`;
-  `colours:`, a function of path and options that reads a colour file (`t:Robot.File.Colours.reader/0`).
+  The robot that a text describes. Options: `file:`, its name in error messages; `fleet:` and
+  `tables:` as in `load/2`; `colours:`, a function of path and options that reads a colour file
+  (`t:Robot.File.Colours.reader/0`).
 
       iex> Robot.File.parse("[id: :mag1, profile: :magellan, drive: {Hal.RFlex.Driver, port: \\"/dev/ttyR0\\"}, arm: :manaul]", file: "mag1.exs")
       {:error, [
@@ -139,10 +143,11 @@ defmodule Robot.File do
   end
 
   @doc """
-  What the robot is started with, as far as it is its own: `Swarm.MemberSpec` adds mission and
-  link. The drive is given the body, with the limits of this robot, if it asks for one (`profile:`).
+  The config of the robot, without the parts that concern the fleet: `Swarm.MemberSpec` adds
+  mission and link. A drive with an option `profile:` gets the body, with the limits of this
+  robot.
 
-  An error is a line of `Robot.Config.new/1`.
+  An error is the line of `Robot.Config.new/1`, or of a drive that does not fit the body.
   """
   @spec config(t()) :: {:ok, Config.t()} | {:error, String.t()}
   def config(%__MODULE__{} = robot) do
@@ -165,7 +170,7 @@ defmodule Robot.File do
     )
   end
 
-  # Whoever has so many problems solves the first ones first.
+  # A person works through the first problems first; a count of the others is enough.
   defp lines(file, problems) do
     more = length(problems) - @most_lines
     lines = problems |> Enum.take(@most_lines) |> Enum.map(&line(file, &1))

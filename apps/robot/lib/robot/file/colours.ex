@@ -1,13 +1,13 @@
 defmodule Robot.File.Colours do
   @moduledoc """
-  The colours of a robot file: the path of a CMVision colour file, or a list of keys with that path
-  and the options of `Vision.Colours`.
+  The colours of a robot file: the path of a CMVision colour file, or a list of keys with that
+  path and the options of `Vision.Colours`.
   """
   alias Hal.Options.Type
 
   @keys {
     :keys,
-    # Whether it is a backend is for the colours to say.
+    # `Vision.Colours` checks whether the module is a backend.
     file: [{:text, "the path of a colour file"}, required: true],
     distance: {:check, &__MODULE__.distances/1, "%{\"Colour\" => share seen from 1 m}"},
     min_area: {:integer, 1, 16_777_216},
@@ -15,10 +15,10 @@ defmodule Robot.File.Colours do
     backend: {:check, &is_atom/1, "a Vision.Backend of this build"}
   }
 
-  @typedoc "Reads a colour file; its errors are one line."
+  @typedoc "Reads a colour file with the options of `Vision.Colours`; an error is one line."
   @type reader :: (Path.t(), keyword() -> {:ok, struct()} | {:error, String.t()})
 
-  @doc "The type of colours, for a table."
+  @doc "The option type of colours, for a table of `Hal.Options`."
   @spec type(reader()) :: Type.t()
   def type(read), do: {:check, &check(&1, read), "the path of a colour file"}
 

@@ -3,7 +3,7 @@ defmodule Robot.File.CrossChecks do
   alias Hal.Options.Suggest
   alias Robot.File.{Device, Schema}
 
-  @doc "All that does not fit: the keys it is about, and what is wrong; `file` is the file's path."
+  @doc "All problems, each as the path of its key and a text; `file` is the robot file's path."
   @spec problems(Robot.File.t(), Path.t()) :: [{[String.t(), ...], String.t()}]
   def problems(robot, file) do
     Enum.reject(
@@ -17,7 +17,8 @@ defmodule Robot.File.CrossChecks do
     )
   end
 
-  # A file that was copied for another robot and not changed would make two of one name.
+  # If a file is copied for another robot and its id is not changed, two robots have the same
+  # name.
   defp named(robot, file) do
     name = Path.basename(file, ".exs")
 
@@ -50,7 +51,7 @@ defmodule Robot.File.CrossChecks do
            Suggest.hint(colour, names)}
   end
 
-  # A drive knows what it can do with a body: how many sensors it reads, how fast it may go.
+  # Some drives check their options against the body, such as how many sensors they read.
   defp driven(%{drive: drive, profile: profile}) do
     case Device.fit(drive, profile) do
       {:ok, _drive} -> []

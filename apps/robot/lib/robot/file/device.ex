@@ -1,11 +1,11 @@
 defmodule Robot.File.Device do
   @moduledoc """
-  The drivers that a robot file names, as `{Hal.RFlex.Driver, port: "/dev/ttyR0"}`.
+  The drivers that a robot file names, such as `{Hal.RFlex.Driver, port: "/dev/ttyR0"}`.
 
-  A driver is a module of this build with the callbacks of its kind. What options it takes it says
-  itself, if it exports `option_table/0`; what no table can say, `options/1`: `{:ok, all options} | {:error, line}`.
-  Names in options are compared with the atoms that there are; a file makes none. A drive that has an option
-  `profile:` is given the body of the file, with its limits.
+  A driver is a module of this build that exports the main callback of its kind. It may describe
+  its options with `option_table/0`, and check what a table cannot express with `options/1`, which
+  returns `{:ok, all options} | {:error, line}`. Names in options are compared with existing
+  atoms; a file never creates atoms. A drive with an option `profile:` gets the body of the file.
   """
   alias Hal.Options.{Type, Wording}
   alias Hal.Options.Suggest
@@ -17,10 +17,10 @@ defmodule Robot.File.Device do
     ptz: {:look, 3, "Hal.Ptz"},
     camera: {:next, 1, "Hal.Camera"}
   }
-  # Named here, so that their names are known before any of them is loaded.
+  # Listed here, so that their names are existing atoms before any of these modules is loaded.
   @ours %{drive: Hal.RFlex.Driver, ptz: Hal.Visca.Driver, camera: Hal.Camera.FFmpeg}
 
-  @doc "The type of a driver with its options, for a table."
+  @doc "The option type of a driver with its options, for a table of `Hal.Options`."
   @spec type(:drive | :ptz | :camera) :: Type.t()
   def type(kind),
     do: {:check, &check(kind, &1), "{driver, options}, such as {#{inspect(@ours[kind])}, […]},"}
@@ -69,8 +69,8 @@ defmodule Robot.File.Device do
   end
 
   @doc """
-  The options of a drive with the body that they are for, if it has a place for it; or one line that says what
-  does not fit the body.
+  Adds the body to the options of a drive, if the drive has an option `profile:`; or one line that
+  says what does not fit the body.
   """
   @spec fit({module(), keyword()}, Hal.Profile.t()) ::
           {:ok, {module(), keyword()}} | {:error, String.t()}
@@ -85,8 +85,8 @@ defmodule Robot.File.Device do
   end
 
   @doc """
-  What a drive says of its options, with the body that they are for (`c:Hal.Drive.judge/1`); `nil` of one that
-  does not tell.
+  A drive's judgement of its options with this body (`c:Hal.Drive.judge/1`); `nil` if the drive
+  does not export `judge/1`, or if the options do not pass.
   """
   @spec judge({module(), keyword()}, Hal.Profile.t()) :: Hal.Drive.judgement() | nil
   def judge({module, _options} = drive, profile) do
@@ -128,10 +128,13 @@ defmodule Robot.File.Device do
     text
   end
 
-  @doc "What a driver has against these options, in one line; `nil` for nothing, or if it does not tell."
+  @doc """
+  Why a driver refuses these options, in one line; `nil` if it accepts them or does not export
+  `options/1`.
+  """
   @spec refused_by(module(), keyword()) :: String.t() | nil
   def refused_by(module, options) do
-    # Looked for at run time: a driver may have no such function.
+    # Checked at run time: `options/1` is optional for a driver.
     case function_exported?(module, :options, 1) && module.options(options) do
       {:error, line} -> line
       _well -> nil

@@ -1,13 +1,13 @@
 defmodule Robot.File.Edit do
   @moduledoc """
-  Changes numbers in the text of a robot file and nothing else: comments, order and layout stay.
-  Pure.
+  Changes or adds numbers in the text of a robot file and nothing else: comments, order and layout
+  stay as they are. Pure.
   """
   alias Robot.File.Reader
 
   @doc """
-  The text with these numbers under `conversions:`; those that are not there are put in. Whoever writes the
-  result compares what the two files say.
+  The text with these numbers in its first list `conversions:`; keys that the list lacks are
+  added. The caller should compare the parsed values of both texts before it writes the result.
 
       iex> Robot.File.Edit.conversions("[drive: {D, [conversions: [angle: 1.0, range: 2]]}]", angle: 3.5)
       {:ok, "[drive: {D, [conversions: [angle: 3.5, range: 2]]}]"}
@@ -24,7 +24,7 @@ defmodule Robot.File.Edit do
 
       {old, new} = Enum.split_with(numbers, fn {key, _} -> places["#{key}"] != nil end)
       changes = for {key, number} <- old, do: {places["#{key}"], "#{number}"}
-      # Those behind first, so that places stay right.
+      # Changes are applied from the end of the text, so that earlier places stay valid.
       changes = Enum.sort(changes ++ added(list, text, new), :desc)
       {:ok, Enum.reduce(changes, text, &change/2)}
     else
@@ -40,7 +40,7 @@ defmodule Robot.File.Edit do
   defp find(list) when is_list(list), do: Enum.find_value(list, &find/1)
   defp find(_other), do: nil
 
-  # A number's line, its column, and the column behind it.
+  # The line of a number, its first column, and the column after it.
   defp place({:literal, meta, number}) when is_number(number),
     do: {meta[:line], meta[:column], meta[:column] + String.length(meta[:token])}
 
@@ -50,7 +50,7 @@ defmodule Robot.File.Edit do
 
   defp place(_other), do: nil
 
-  # On lines of their own where the list has lines.
+  # If the list begins on a new line, each added number gets a line of its own.
   defp added(_list, _text, []), do: []
 
   defp added({meta, items}, text, numbers) do

@@ -1,21 +1,22 @@
 defmodule Robot.File.Odd do
   @moduledoc """
-  Warns of values in a robot file that are allowed but seldom intended: each warning names the key
-  and the usual value. A person should look before 40 kg move. Pure.
+  Warns of values in a robot file that are allowed but seldom intended. Most warnings name the
+  key, and what is usual where there is such a value. A person should look at them before a robot
+  of up to 40 kg moves. Pure.
   """
   alias Hal.{Pose, Profile}
   alias Robot.File.Device
 
-  # The robots of the thesis get to full speed within 1 s.
+  # The robots of the thesis reach full speed within 1 s.
   @slow_s 5.0
   @inwards :math.pi() / 2 + 0.1
-  # Nearer to the middle than this a sensor has no direction of its own.
+  # A sensor nearer to the middle of the body than this may look in any direction.
   @middle_m 0.02
-  # What a sensor may stand out of the body without a word.
+  # How far a sensor may be outside the body's radius without a warning.
   @beyond_m 0.005
 
   @doc """
-  All of it; `there?` says whether a device is on this machine.
+  All warnings, one line each; `there?` reports whether a device exists on this machine.
 
       iex> robot = %Robot.File{id: :mag1, profile: Hal.Profile.magellan(), start: Hal.Pose.new(0, 0),
       ...>   drive: {Some.Drive, [port: "/dev/ttyS9"]}, limits: [max_turn_acceleration: 0.017]}
@@ -71,7 +72,7 @@ defmodule Robot.File.Odd do
     end
   end
 
-  # What a robot keeps clear of others by is its radius.
+  # Avoidance treats the body as a disc of this radius.
   defp beyond(poses, radius) do
     far_m = poses |> Enum.map(&Pose.distance({0.0, 0.0}, &1)) |> Enum.max(fn -> 0.0 end)
 

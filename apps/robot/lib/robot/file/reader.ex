@@ -13,14 +13,14 @@ defmodule Robot.File.Reader do
   | `[key: …]`, also as the last of a tuple | `{:keys, [{"key", line, node}]}` |
   | `%{… => …}` | `{:map, [{node, node}]}` |
 
-  A node is `{line, value}`. Names stay text here: whoever knows what is allowed at a place compares
-  with that, so that no file makes an atom.
+  A node is `{line, value}`. Names remain text here and are compared later with the values that
+  are allowed, so that a file never creates atoms.
   """
 
   @largest 65_536
   @deepest 32
   @largest_angle 36_000
-  # For all names, where the parser makes errors of them.
+  # Stands for all names while the parser only looks for errors.
   @name :"…"
   @mixed "a list has keys for all its values or for none"
   @behind "nothing can stand behind the end of the list"
@@ -29,11 +29,14 @@ defmodule Robot.File.Reader do
 
   @type tree :: {line :: pos_integer(), value :: term()}
   @type problem :: {line :: pos_integer(), text :: String.t()}
-  @typedoc "As of `Code.string_to_quoted/2`, with literals as `{:literal, meta, value}` and names as `{:name, text}`."
+  @typedoc """
+  As from `Code.string_to_quoted/2`, with literals as `{:literal, meta, value}` and names as
+  `{:name, text}`.
+  """
   @type quoted :: term()
 
   @doc """
-  The tree of a text, or the line where it stops being one.
+  The tree of a text, or the first problem with its line.
 
       iex> Robot.File.Reader.read("[start: {1.0, -2, deg(180)}]")
       {:ok, {1, {:keys, [{"start", 1, {1, {:tuple, [{1, 1.0}, {1, -2}, {1, :math.pi()}]}}}]}}}
@@ -56,7 +59,8 @@ defmodule Robot.File.Reader do
   end
 
   @doc """
-  What Elixir's parser makes of a text, with lines and columns; nothing is judged yet but that it is Elixir.
+  The result of Elixir's parser for a text, with lines and columns. Checks the size, the encoding
+  and the syntax of the text, not whether its values are allowed.
   """
   @spec quoted(String.t()) :: {:ok, quoted()} | {:error, problem()}
   def quoted(text) do
@@ -68,8 +72,8 @@ defmodule Robot.File.Reader do
         {:error, {1, "is not text in UTF-8"}}
 
       true ->
-        # The parser puts names into its messages, and raises over one that is not an atom. So errors are
-        # found with one atom for all names.
+        # The parser puts names into its messages, and raises if one is not an atom. So the first
+        # pass, which finds errors, uses one atom for all names.
         with {:ok, _quoted} <- parse(text, fn _name -> @name end), do: parse(text, &{:name, &1})
     end
   end
@@ -78,7 +82,7 @@ defmodule Robot.File.Reader do
     options = [
       columns: true,
       token_metadata: true,
-      # The first is of Elixir 1.16 and later.
+      # `emit_warnings` is for Elixir 1.16 and later.
       emit_warnings: false,
       warnings: false,
       static_atoms_encoder: fn text, _meta -> {:ok, name.(text)} end,
@@ -89,7 +93,7 @@ defmodule Robot.File.Reader do
          do: {:error, {meta[:line], syntax(message, token, text, meta)}}
   end
 
-  # The parser's token may be the name that all have; the text has the right one.
+  # The parser's token may be the substitute for all names, so the word is read from the text.
   defp syntax("syntax error before: ", _token, text, meta) do
     case word(text, meta) do
       nil -> "a value is missing at the end"
@@ -97,17 +101,17 @@ defmodule Robot.File.Reader do
     end
   end
 
-  # The place is that of the comma.
+  # The parser gives the place of the comma.
   defp syntax("unexpected expression after keyword list" <> _, _token, _text, _meta),
     do: "what follows this comma has no key: #{@mixed}"
 
   defp syntax({before, behind}, token, _text, _meta), do: shorten(before <> token <> behind)
 
-  # What follows the first sentence is advice for programs.
+  # The message's further sentences are advice for programs.
   defp syntax(message, token, text, meta) do
     word = String.trim_trailing(word(text, meta) || "", ":")
     message = message <> String.replace(token, "#{@name}", word)
-    # Newer parsers name the line of the opening bracket, and this one beside it.
+    # Newer parsers give the line of the opening bracket, and the line of the error as `end_line`.
     end_line = if line = meta[:end_line], do: " in line #{line}", else: ""
     (message |> String.split([". ", "\n"]) |> hd() |> shorten()) <> end_line
   end
@@ -189,7 +193,7 @@ defmodule Robot.File.Reader do
   defp node({word, _, _} = quoted, _depth) when is_atom(word), do: refuse(quoted, "#{word}")
   defp node(quoted, _depth), do: refuse(quoted, "a call")
 
-  # The keys that are the last of a tuple have no brackets.
+  # Keys at the end of a tuple need no brackets.
   defp tuple(items, depth) do
     {:tuple,
      Enum.map(items, fn
@@ -208,7 +212,7 @@ defmodule Robot.File.Reader do
   defp pair?(quoted), do: is_tuple(quoted) and tuple_size(quoted) == 2
   defp key?({{_, meta, _}, _value}), do: meta[:format] == :keyword
 
-  # Of a list of keys without brackets the first, else nothing has no line.
+  # A list of keys without brackets has the line of its first key.
   defp line([{key, _value} | _]), do: line(key)
   defp line({_, meta, _}), do: Keyword.get(meta, :line, 1)
   defp line(_other), do: 1

@@ -1,7 +1,7 @@
 defmodule Robot.File.Schema do
   @moduledoc """
-  All that a robot file may say, as one table of `Hal.Options`. Pure; `docs/robots.md` and
-  `config/robots/template.exs` tell the same to people, and tests compare them.
+  All keys of a robot file and their types, as one table of `Hal.Options`. Pure; `docs/robots.md`
+  and `config/robots/template.exs` describe the same keys for people, and tests compare them.
   """
   alias Hal.{Pose, Profile}
   alias Hal.Options.Type
@@ -13,8 +13,8 @@ defmodule Robot.File.Schema do
   @fleet for kind <- ~w(mag min), n <- 1..100, do: :"#{kind}#{n}"
 
   @typedoc """
-  What the world has to say: names of the fleet, how a colour file is read, and the types of the keys whose words are
-  those of an app above this one.
+  What the table needs from its caller: the names of the fleet, a function that reads a colour
+  file, and the types of the keys that an app above this one defines.
   """
   @type context :: %{
           fleet: [atom(), ...],
@@ -22,7 +22,7 @@ defmodule Robot.File.Schema do
           colours: (Path.t(), keyword() -> {:ok, struct()} | {:error, String.t()})
         }
 
-  @doc "The names that a robot can have unless told otherwise: `mag1` to `mag100`, `min1` to `min100`."
+  @doc "The names that a robot can have by default: `mag1` to `mag100`, `min1` to `min100`."
   @spec fleet() :: [atom(), ...]
   def fleet, do: @fleet
 
@@ -49,7 +49,7 @@ defmodule Robot.File.Schema do
      policies: extension(:policies, context.tables)}
   end
 
-  @doc "What of the profile a file may change."
+  @doc "The option type of `body:`: the parts of the profile that a file may change."
   @spec body() :: Type.t()
   def body do
     {:keys,
@@ -77,7 +77,7 @@ defmodule Robot.File.Schema do
         tilt_rate: {:number, 0.01, 10.0, "rad/s"}}}
   end
 
-  # That they are not above what the body can do is checked with the profile.
+  # `Robot.File.CrossChecks` compares them with the profile.
   defp limits do
     {:keys,
      max_linear: {:number, 0.01, 10.0, "m/s"},
@@ -86,7 +86,7 @@ defmodule Robot.File.Schema do
      max_turn_acceleration: {:number, 0.01, 10.0, "rad/s2"}}
   end
 
-  # Their words are those of an app above this one.
+  # Keys that an app above this one defines.
   defp extension(key, tables),
     do: Keyword.get(tables, key, {:check, &Type.keys?/1, "[key: value, …]"})
 
@@ -109,7 +109,7 @@ defmodule Robot.File.Schema do
 
   defp place(_other, _most), do: false
 
-  @doc "The profile of a kind with what the file changes of it."
+  @doc "The profile of a kind, with the changes that the file makes to it."
   @spec profile(:magellan | :atrv_mini, keyword()) :: Profile.t()
   def profile(kind, body) do
     {camera, body} = Keyword.pop(body, :camera, [])

@@ -1,6 +1,7 @@
 defmodule Robot.File.Summary do
   @moduledoc """
-  Summarises a robot file for a person, before 40 kg move. Pure.
+  Summarises a robot file for a person, to be read before the robot moves. Pure, except that
+  `report/3` looks for device files unless told how.
   """
   alias Hal.{Pose, Profile}
   alias Robot.File.{Device, Odd}
@@ -11,8 +12,8 @@ defmodule Robot.File.Summary do
   @wide 88
 
   @doc """
-  What is said of a file that no robot is refused: that it is well, or how much in it is odd
-  (`Robot.File.Odd`), then the lines of `lines/1`, then what is odd. `there?` says whether a device is on this machine.
+  The report on a file without errors: a title with the number of warnings (`Robot.File.Odd`), the
+  lines of `lines/1`, and the warnings. `there?` reports whether a device exists on this machine.
   """
   @spec report(Path.t(), Robot.File.t(), (Path.t() -> boolean())) :: [String.t(), ...]
   def report(path, %Robot.File{} = robot, there? \\ &File.exists?/1) do
@@ -78,7 +79,7 @@ defmodule Robot.File.Summary do
       for(line <- more, do: String.duplicate(" ", 12) <> line)
   end
 
-  # A word that is longer than a line, such as a path, is cut.
+  # A word that is longer than a line, such as a path, is shortened.
   defp wrap(words) do
     words
     |> String.split(" ")
@@ -110,7 +111,7 @@ defmodule Robot.File.Summary do
     if place, do: "#{inspect(module)} on #{place}", else: inspect(module)
   end
 
-  # What keeps it from arming the driver says, by what it will go by itself.
+  # The driver reports why it will not arm: `judge/1` applies the checks of `ready/1`.
   defp conversions(_drive, %{ready: {:error, line}}),
     do: "#{line}: it will not arm (mix calibrate odometry)"
 
@@ -126,7 +127,7 @@ defmodule Robot.File.Summary do
       "gathers speed with #{rate(profile.max_acceleration, "m/s2")}"
   end
 
-  # v t + v^2 / 2a, with the time that a stop may take to the wheels.
+  # v t + v^2 / 2a, where t is the time that a stop may take to reach the wheels.
   defp stops(%Profile{max_linear: v, max_acceleration: a}) do
     way = v * @delay_s + v * v / (2 * a)
 
@@ -145,7 +146,7 @@ defmodule Robot.File.Summary do
 
   defp unread(_profile, _judgement), do: ""
 
-  # The widest angle that no sonar looks into.
+  # The widest angle that no sonar covers.
   defp blind(%Profile{sonars: []}), do: ""
 
   defp blind(%Profile{sonars: sonars, sonar_cone: cone}) do
@@ -204,7 +205,7 @@ defmodule Robot.File.Summary do
     end
   end
 
-  # Of what missions of other builds have by these names nothing is known.
+  # Other missions may use these names for options of another shape.
   defp formation({kind, spacing}) when is_atom(kind) and is_number(spacing),
     do: ", in #{kind} of #{metres(spacing)}"
 

@@ -1,14 +1,15 @@
 defmodule Robot.File.Terms do
   @moduledoc """
-  What `Robot.File.Reader` read as plain values for `Hal.Options`, and the lines that their keys stand in. Names
-  become the atoms and modules that there are; of others none is made, they stay `Robot.File.Terms.Name`.
+  Converts the tree of `Robot.File.Reader` to plain values for `Hal.Options`, and finds the lines
+  of their keys. Names become existing atoms and modules; a name without one becomes a
+  `Robot.File.Terms.Name`, and no atom is created for it.
   """
   alias Hal.Options.ModuleLookup
   alias Hal.Options.Type
   alias Robot.File.Reader
 
   defmodule Name do
-    @moduledoc "A name in a robot file that is no atom, shown as it was written."
+    @moduledoc "A name in a robot file that is not an existing atom, shown as it was written."
     @enforce_keys [:text]
     defstruct @enforce_keys
     @type t :: %__MODULE__{text: String.t()}
@@ -21,7 +22,7 @@ defmodule Robot.File.Terms do
   @type problem :: {line :: pos_integer(), path :: [String.t()], text :: String.t()}
 
   @doc """
-  The value of a tree by its type, or all problems, in the order of their lines.
+  The value of a tree checked against a type, or all problems, in the order of their lines.
 
       iex> {:ok, tree} = Robot.File.Reader.read("[lenght: 0.4,\\n width: 900, width: 9]")
       iex> sizes = {:keys, length: {:number, 0.1, 2.0, "m"}, width: {:number, 0.1, 2.0, "m"}}
@@ -45,12 +46,12 @@ defmodule Robot.File.Terms do
     end
   end
 
-  @doc "Problems with the lines of their keys, or of what they would be in."
+  @doc "Adds to each problem the line of its key, or of what would contain a missing key."
   @spec at([Type.problem()], Reader.tree()) :: [problem()]
   def at(problems, tree), do: for({path, text} <- problems, do: {line(tree, path), path, text})
 
   @doc """
-  A tree as a value; of keys that are given twice, the first.
+  The value of a tree; if a key is given twice, the first one counts.
 
       iex> {:ok, tree} = Robot.File.Reader.read("[arm: :manual, id: :no_robot_of_ours]")
       iex> inspect(Robot.File.Terms.term(tree))
@@ -64,7 +65,8 @@ defmodule Robot.File.Terms do
   def term({_line, {:name, name}}),
     do: with(:error <- existing(name), do: %Name{text: ":" <> name})
 
-  # A driver's options follow its name: what they may be named are atoms once its table is there.
+  # The options of a driver follow its name. Calling its table loads the names of these options as
+  # atoms before they are looked up.
   def term({_line, {:module, name}}) do
     with {:ok, module} <- ModuleLookup.module(name) do
       if function_exported?(module, :option_table, 0), do: module.option_table()
@@ -80,7 +82,7 @@ defmodule Robot.File.Terms do
 
   def term({_line, value}), do: value
 
-  @doc "Whether a name that is no atom is anywhere in a value; and which."
+  @doc "The first name in a value that is not an existing atom, however deep; `nil` without one."
   @spec strange(term()) :: Name.t() | nil
   def strange(%Name{} = name), do: name
   def strange([_ | _] = list), do: Enum.find_value(list, &strange/1)
@@ -124,13 +126,13 @@ defmodule Robot.File.Terms do
     Enum.find_value(keys, fn {name, line, node} -> name == key && {line, elem(node, 1)} end)
   end
 
-  # The options of a driver stand behind its name.
+  # The options of a driver follow its name in the tuple.
   defp below({:tuple, nodes}, key), do: nodes |> List.last() |> elem(1) |> below(key)
 
   defp below({:map, pairs}, key),
     do: Enum.find_value(pairs, &(elem(elem(&1, 0), 1) == key && elem(&1, 1)))
 
-  # A list of keys without any is read as an empty list.
+  # The reader gives `[]` as a plain list, so the key may not be an index.
   defp below({:list, nodes}, n) do
     with {place, ""} when place > 0 <- Integer.parse(n),
          do: Enum.at(nodes, place - 1),

@@ -4,8 +4,8 @@ defmodule Robot.File.Writer do
   """
 
   @doc """
-  The text of a file: remarks for its head, and its keys. In values, `{:deg, x}` is x degrees and a
-  driver is `{module, options}`.
+  The text of a file: remarks as comments at its head, and its keys. In values, `{:deg, x}` means
+  x degrees, and a driver is `{module, options}`.
 
       iex> Robot.File.Writer.text(["mag1"], id: :mag1, start: {0.0, 0.0, {:deg, 90.0}})
       "# mag1\\n[\\n  id: :mag1,\\n  start: {0.0, 0.0, deg(90)}\\n]\\n"
