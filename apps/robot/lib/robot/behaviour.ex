@@ -1,11 +1,11 @@
 defmodule Robot.Behaviour do
   @moduledoc """
-  A behaviour turns what a robot perceives into a wish, one tick (100 ms) at a time. Pure: no
-  clock, no process, no random numbers; time is `percept.at_ms`.
+  A behaviour turns what a robot perceives into a wish, one tick (100 ms) at a time. It is pure:
+  no clock, no process, no random numbers; the time is `percept.at_ms`.
 
   A running behaviour is a pair `{module, state}`, so that behaviours can hold, start and combine
-  others (`Robot.Behaviour.Sequence`, `.Parallel`, `.Fsm`, …). It goes on until it reports an
-  outcome, an integer as in the thesis (R12), which combinators use to choose what comes next.
+  others (`Robot.Behaviour.Sequence`, `.Parallel`, `.Fsm`, …). It runs until it reports an
+  outcome, an integer as in the thesis (R12), by which combinators choose what comes next.
   """
   alias Hal.Options.Type
   alias Robot.{Percept, Wish}
@@ -14,19 +14,20 @@ defmodule Robot.Behaviour do
   @type outcome :: integer()
   @type result :: {:running, Wish.t() | nil, t()} | {:done, outcome(), Wish.t() | nil}
 
-  @doc "A behaviour with these options; wrong ones raise `ArgumentError`."
+  @doc "Starts a behaviour with these options; wrong options raise `ArgumentError`."
   @callback new(keyword()) :: t()
 
   @doc "One tick."
   @callback tick(Percept.t(), state :: term()) :: result()
 
-  @doc "The same running behaviour with some options changed, as a target that moves every tick."
+  @doc "The running behaviour with some options changed, such as a target that moves every tick."
   @callback update(keyword(), state :: term()) :: t()
 
   @optional_callbacks update: 2
 
   @doc """
-  Whether a goal, `{module, options}` or `nil` for none, is one that a robot can have.
+  Checks a goal, `{module, options}` or `nil` for none: whether the module is a behaviour that
+  accepts these options.
 
       iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: 1.0, y: 2.0})
       :ok
@@ -61,7 +62,7 @@ defmodule Robot.Behaviour do
   def check(other),
     do: {:error, "#{brief(other)} is not a goal: {module, options} or nil is allowed"}
 
-  # What every goal may have besides (`Robot.Behaviour.Avoid`).
+  # Every goal accepts this option in addition to its own (`Robot.Behaviour.Avoid`).
   defp discs(options) do
     discs = Keyword.get(options, :discs, [])
 
@@ -71,7 +72,7 @@ defmodule Robot.Behaviour do
         {:error, "option discs cannot be #{brief(discs)}: [{x, y, radius}] in metres is allowed"}
   end
 
-  @doc "Whether these are discs to go round: `[{x, y, radius}]` in the map frame, metres."
+  @doc "Whether a term is a list of discs to avoid: `[{x, y, radius}]` in the map frame, metres."
   @spec discs?(term()) :: boolean()
   def discs?(discs),
     do:
@@ -81,7 +82,7 @@ defmodule Robot.Behaviour do
           &match?({x, y, r} when is_number(x) and is_number(y) and is_number(r) and r > 0, &1)
         )
 
-  # Wrong options raise, by contract.
+  # `new/1` raises `ArgumentError` for wrong options.
   defp made(module, options) do
     {_module, _state} = module.new(options)
     :ok
@@ -91,14 +92,14 @@ defmodule Robot.Behaviour do
 
   defp brief(term), do: inspect(term, limit: 5, printable_limit: 40)
 
-  @doc "One tick of a running behaviour."
+  @doc "Runs one tick of a behaviour."
   @spec tick(t(), Percept.t()) :: result()
   def tick({module, state}, %Percept{} = percept), do: module.tick(percept, state)
 
-  @doc "Changes options of a running behaviour; one that has nothing to change stays as it is."
+  @doc "Changes options of a running behaviour; one without `c:update/2` stays as it is."
   @spec update(t(), keyword()) :: t()
   def update({module, state} = behaviour, options) do
-    # Loaded already: the pair was made by its `new/1`.
+    # The module is loaded: its `new/1` returned the pair.
     if function_exported?(module, :update, 2), do: module.update(options, state), else: behaviour
   end
 end

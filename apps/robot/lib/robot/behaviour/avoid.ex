@@ -1,17 +1,18 @@
 defmodule Robot.Behaviour.Avoid do
   @moduledoc """
-  Runs another behaviour, and bends or slows its wishes so that the robot touches nothing (R85).
+  Runs another behaviour, and changes or slows its wishes so that the robot avoids contact (R85).
 
-  A wish with a velocity is bent: round standing robots and discs on the shortest way (`.Route`),
-  past moving ones by `Robot.Navigation.Orca` (`.Clearance`), a little to the right of those who come,
-  and away from what only the sonars see (`.Preference`). A wish without one is only slowed down (`.Brake`). Who gets no
-  nearer for some seconds goes another way for a while (`.Progress`), and who stands in another's
-  way makes room (`.GiveWay`). Where a body that will not move stands in the goal, it stands as near
-  as possible, and its wish says `by: :blocked`. A robot with nobody about gets its wish
-  unchanged.
+  The velocity of a wish is changed: the robot drives round standing robots and discs on a short
+  route (`.Route`), past moving robots by `Robot.Navigation.Orca` (`.Clearance`), a little to the
+  right of oncoming ones, and away from bodies that are very close (`.Preference`). All wishes are
+  slowed down near other robots (`.Brake`); one without a velocity is changed in no other way. A
+  robot that makes no progress for some seconds leaves its route for a while (`.Progress`), and a
+  robot that stands in another's way makes room (`.GiveWay`). If a body that will not move is in
+  the goal, the robot goes to the nearest place beside it, stands there, and names its wish
+  `:blocked`. If nothing is near, a wish within the profile's speed passes unchanged.
 
-  Options: `inner`, the behaviour (required); `discs`, `[{x, y, radius}]` in the map frame, metres:
-  further standing things.
+  Options: `inner`, the behaviour (required); `discs`, further standing obstacles,
+  `[{x, y, radius}]` in the map frame, metres.
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
@@ -20,9 +21,9 @@ defmodule Robot.Behaviour.Avoid do
   alias Robot.Behaviour.Avoid
   alias Robot.Behaviour.Avoid.{Brake, Clearance, GiveWay, Neighbours, Preference, Progress}
 
-  # Metres from the nearest place to a taken goal that count as there.
+  # A robot this near (metres) to the place beside an occupied goal has arrived.
   @beside 0.08
-  # m/s of one who makes way.
+  # The speed (m/s) of a robot that makes way.
   @aside 0.2
 
   @impl Behaviour
@@ -79,7 +80,7 @@ defmodule Robot.Behaviour.Avoid do
       else: bend(wish, speed, percept, state)
   end
 
-  # In its place it stands, unless somebody cannot get by.
+  # A robot that wants to stand does so, unless another cannot get past it.
   defp stay(wish, percept, state) do
     robots = percept |> Neighbours.robots() |> Neighbours.near()
 
@@ -111,7 +112,7 @@ defmodule Robot.Behaviour.Avoid do
     end
   end
 
-  # Something stands where the goal is: as near as may be is the goal then.
+  # The goal is occupied, so the nearest place beside it becomes the goal.
   defp beside(wish, near, speed, percept, state) do
     distance = Pose.distance(percept.pose, near)
     leave = if state.blocked?, do: 2 * @beside, else: @beside
@@ -180,7 +181,7 @@ defmodule Robot.Behaviour.Avoid do
         wish.twist
 
       size(velocity) < 0.05 ->
-        # No way now: look already where it will go on.
+        # It cannot move now, so it turns toward where it will drive next.
         {px, py} = preferred
         error = Steering.turn_error(:math.atan2(py, px) - percept.pose.heading)
         Twist.new(0, Steering.turn_rate(error, percept.profile))
@@ -196,7 +197,9 @@ defmodule Robot.Behaviour.Avoid do
   defp far?({ax, ay}, {bx, by}), do: abs(ax - bx) + abs(ay - by) > 0.05
   defp stopped?(%{driving: %{limits: limits}}), do: :near in limits or :bumper in limits
   defp stopped?(_percept), do: false
-  # What is bent is smoothed: what others tell of themselves wobbles, and wheels turn slowly.
+
+  # A changed velocity is smoothed, because the reported poses of others fluctuate and the wheels
+  # react slowly.
   defp calm(velocity, _preferred, nil), do: velocity
 
   defp calm({vx, vy} = velocity, preferred, {lx, ly}) do

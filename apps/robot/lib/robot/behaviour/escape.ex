@@ -1,18 +1,20 @@
 defmodule Robot.Behaviour.Escape do
   @moduledoc """
-  What to do after touching something (R50): back off 0.15 m, away from the touched side, then
-  turn away from it. Wishes nothing while nothing is touched; it never ends.
+  Escapes after a bumper was touched (R50): backs off 0.15 m, away from the touched side, and then
+  turns away from it. It wishes nothing while nothing is touched, and never ends.
 
-  What makes it move is a touch, not a bumper that is pressed: one that stays pressed is escaped from once. If it
-  is still pressed after the backing off, and the sonars see nothing there either, or after the turn, that is a
-  **fault** (`fault/1`): a switch that hangs, or a thing that comes along. The robot stands until
+  A new touch makes it move, not a bumper that stays pressed: it escapes from each touch once. If
+  the bumper is still pressed after backing off and the sonars see nothing near on that side, or
+  after the turn, or after 4 s, that is a **fault** (`fault/1`): the switch may be stuck, or the
+  robot may push a thing along. The robot stands until
 
     * the bumper is released, or
     * another bumper is touched, from which it escapes, or
-    * a person has looked: whoever disarms the wheels or stops them by the emergency stop knows what is pressed
-      then. It is no reason to move when they are armed again, until it was released once.
+    * the wheels are disarmed or the emergency stop is latched: a person is assumed to have seen
+      what is pressed then. Those bumpers do not make the robot move when it is armed again, until
+      they have been released once.
 
-  All the while the gate lets the robot not drive toward a side that is pressed (`Robot.Safety.Reflex`).
+  Meanwhile the gate does not let the robot drive toward a pressed side (`Robot.Safety.Reflex`).
 
   Options: `distance` (metres, default 0.15), `turn` (radians, default 0.8).
   """
@@ -21,12 +23,13 @@ defmodule Robot.Behaviour.Escape do
   alias Robot.Wish
   alias Robot.Navigation.Steering
 
-  # A robot that is held in front and behind gives up, rather than push for ever.
+  # A robot that is blocked in front and behind gives up instead of pushing for ever.
   @give_up_ms 4000
-  # What the sonars see so near on the touched side, and so far aside, may be what touches it.
+  # An echo within this range (metres) and this angle (radians) of the touched side may come from
+  # the thing that touches the robot.
   @near 0.4
   @aside 0.6
-  # The wheels stand by a person's word.
+  # Limits that are taken for a person's action.
   @by_hand [:disarmed, :estop]
 
   @impl Robot.Behaviour
@@ -41,7 +44,7 @@ defmodule Robot.Behaviour.Escape do
   end
 
   @doc """
-  Why it stands, in one line; `nil` where it does not.
+  Why the robot stands because of a fault, in one line; `nil` without a fault.
 
       iex> {Robot.Behaviour.Escape, state} = Robot.Behaviour.Escape.new()
       iex> Robot.Behaviour.Escape.fault(%{state | phase: :fault, held: [0, 3]})
@@ -59,7 +62,8 @@ defmodule Robot.Behaviour.Escape do
     if by_hand?(percept) do
       idle(%{state | held: [], known: pressed})
     else
-      # Pressed ever since it was touched; pressed ever since a person knew of it.
+      # `held` are bumpers pressed ever since they were touched, `known` those pressed ever since
+      # a person is assumed to have seen them.
       state = %{state | held: common(state.held, pressed), known: common(state.known, pressed)}
       act(percept, pressed -- (state.held ++ state.known), state)
     end
@@ -99,7 +103,7 @@ defmodule Robot.Behaviour.Escape do
         running(Twist.new(speed, 0), state)
 
       state.held == [] or near?(percept, angle) ->
-        # Away from a contact on the left is to the right; straight ahead counts as left.
+        # After a contact on the left it turns right; straight ahead counts as left.
         side = if angle >= 0, do: -1, else: 1
         goal = Pose.wrap(percept.odometry.pose.heading + side * state.turn)
         turn(percept, %{state | phase: {:turn, angle, goal, since_ms}})
@@ -132,7 +136,7 @@ defmodule Robot.Behaviour.Escape do
 
   defp idle(state), do: {:running, nil, {__MODULE__, %{state | phase: :idle}}}
 
-  # Nothing that a mission wants is more than that.
+  # No wish of a mission's goal has a greater weight.
   defp stand(state) do
     wish = Wish.new(:escape, Twist.zero(), 1.0)
     {:running, wish, {__MODULE__, %{state | phase: :fault}}}
@@ -140,7 +144,7 @@ defmodule Robot.Behaviour.Escape do
 
   defp running(twist, state), do: {:running, Wish.new(:escape, twist, 0.9), {__MODULE__, state}}
 
-  # The middle of all touched segments, counter-clockwise from the front.
+  # The mean direction of all touched segments, counter-clockwise from the front.
   defp contact_angle(bumpers, count) do
     angles = Enum.map(bumpers, &(&1 * 2 * :math.pi() / max(count, 1)))
     x = angles |> Enum.map(&:math.cos/1) |> Enum.sum()

@@ -1,11 +1,12 @@
 defmodule Robot.Behaviour.FindBlob do
   @moduledoc """
   Looks for a colour (R36): turns left on the spot until the camera shows it, then turns to it.
-  Outcome 1: found, and the body points at it. Outcome 0: a full turn showed nothing.
+  Outcome 1: found, and the body points at it. Outcome 0: not in view after a full turn, or after
+  a time-out.
 
-  The full turn is counted by the wheels; a time-out stands behind it, for wheels that slip or
-  are held. Options: `colour` (default any), `min_share` of the picture (default 0.0003),
-  `speed` (rad/s, default 0.8 of the profile's), `centred` (radians, default 0.04).
+  The full turn is measured by odometry; the time-out ends the search if the wheels do not turn.
+  Options: `colour` (default any), `min_share` of the picture (default 0.0003), `speed` (rad/s,
+  default 0.8 of the profile's), `centred` (radians, default 0.04).
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
@@ -13,7 +14,7 @@ defmodule Robot.Behaviour.FindBlob do
   alias Robot.Navigation.Steering
   alias Robot.Percept.Sighting
 
-  # How long a sighting is believed after the last picture that showed it.
+  # How long a sighting is valid after the last picture that showed it.
   @memory_ms 600
 
   @impl Robot.Behaviour
@@ -65,7 +66,7 @@ defmodule Robot.Behaviour.FindBlob do
     steady = if abs(bearing) < state.centred, do: state.steady + 1, else: 0
 
     cond do
-      # Two ticks in a row: a single one may be the moment of swinging past.
+      # Two ticks in a row, because a single one may be part of an overshoot.
       steady >= 2 ->
         {:done, 1, wish(0.0)}
 
@@ -85,7 +86,7 @@ defmodule Robot.Behaviour.FindBlob do
 
   defp scan(percept, state) do
     speed = speed(percept, state)
-    # A tenth more than the turn needs, and the time to get up to speed.
+    # A tenth more than the time that the turn needs, plus time to accelerate.
     limit_ms = 1000 * (1.1 * 2 * :math.pi() / speed + 2 * speed)
 
     if state.turned >= 2 * :math.pi() or percept.at_ms - state.since_ms > limit_ms,

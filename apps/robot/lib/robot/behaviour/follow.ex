@@ -1,21 +1,22 @@
 defmodule Robot.Behaviour.Follow do
   @moduledoc """
-  Drives to a place that may move, such as a slot of a formation, and keeps to it (R34, R49): it
-  matches the place's velocity and adds a correction that closes the gap. In place, it turns to
-  the target's heading and stands; it moves again only when it is clearly off, so that it never
-  chatters. It has no outcome: following ends when it is told something else.
+  Drives to a place that may move, such as a slot of a formation, and stays with it (R34, R49): it
+  matches the velocity of the place and adds a correction that closes the gap. Once it has reached
+  a target that stands, it turns to the target's heading and stands. It drives again only when the
+  target moves or is farther away than a second, larger threshold, to prevent chattering. Never
+  ends by itself.
 
   Options: `target` (`Hal.Pose`, required), `velocity` of the target (`{vx, vy}`, map frame, m/s,
-  default still), `tolerance` (metres, default 0.06), `leave` (metres off before it moves again,
-  default 0.12), `heading_tolerance` (radians, default 0.05), `speed` (m/s, default the profile's).
-  All may be changed by `update/2` at any tick.
+  default zero), `tolerance` (metres, default 0.06), `leave` (the distance in metres at which it
+  drives again, default 0.12), `heading_tolerance` (radians, default 0.05), `speed` (m/s, default
+  the profile's). All of them can be changed by `update/2` at any tick.
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
   alias Robot.Wish
   alias Robot.Navigation.Steering
 
-  # Nearer than this it backs up rather than turn round.
+  # Nearer than this (metres) it may drive backwards instead of turning round.
   @back_up 0.6
   # A target slower than this counts as standing.
   @still 0.03
@@ -35,7 +36,7 @@ defmodule Robot.Behaviour.Follow do
     {__MODULE__, Enum.into(Options.check!(options, table, "follow"), state)}
   end
 
-  # A struct may hold anything.
+  # The fields of a struct may hold anything.
   defp target?(%Pose{x: x, y: y, heading: heading}),
     do: Enum.all?([x, y, heading], &(is_number(&1) and abs(&1) <= 1.0e6))
 
@@ -72,7 +73,7 @@ defmodule Robot.Behaviour.Follow do
   defp mode(%{mode: :in_place} = state, distance, true),
     do: if(distance > state.leave, do: :going, else: :in_place)
 
-  # Half the tolerance is the aim; inside it, the moment the gap grows again is as good as it gets.
+  # It aims for half the tolerance; within the whole tolerance it also stops when the gap grows.
   defp mode(%{mode: :going} = state, distance, true) do
     receding? = state.distance != nil and distance > state.distance + 0.001
 
@@ -118,7 +119,8 @@ defmodule Robot.Behaviour.Follow do
     {:running, wish, {__MODULE__, %{state | turning?: still?, backing?: backing?(twist, state)}}}
   end
 
-  # Who backs up goes on with it, or it would turn to and fro where both are equally good.
+  # Once it drives backwards it continues to, so that it does not alternate between two equally
+  # good directions.
   defp reverse_from(false, _backing?), do: :infinity
   defp reverse_from(true, backing?), do: if(backing?, do: 1.2, else: 2.0)
 

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Fsm do
   @moduledoc """
-  A finite state machine of behaviours, whose outcomes pick the transition (R11, R12).
+  A finite state machine of behaviours, whose outcomes select the transitions (R11, R12).
 
       Fsm.new(
         start: :search,
@@ -8,14 +8,15 @@ defmodule Robot.Behaviour.Fsm do
         next: %{{:search, 1} => :go, {:search, 0} => :rest}
       )
 
-  A state is entered afresh each time. An outcome without a row in `next` ends the machine with
-  that outcome; `{state, :any}` is the row for outcomes without one of their own.
+  Entering a state starts its behaviour afresh. `{state, :any}` in `next` matches outcomes that
+  have no entry of their own. An outcome without an entry ends the machine with that outcome.
   """
   @behaviour Robot.Behaviour
   alias Robot.Behaviour
   alias Hal.Options
 
-  # Transitions within one tick; more is a machine that turns in circles and takes the next tick.
+  # The most transitions in one tick. A machine that wants more, such as one that cycles,
+  # continues at the next tick.
   @most 8
 
   @impl Behaviour

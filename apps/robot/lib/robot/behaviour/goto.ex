@@ -1,12 +1,12 @@
 defmodule Robot.Behaviour.Goto do
   @moduledoc """
-  Goes to a place and, when asked to, turns to a heading there (R33). It turns until it points at
-  the place, drives, and turns again only when it points clearly away: two thresholds prevent
-  chattering between the two.
+  Goes to a place and optionally turns to a heading there (R33). It turns until it points at the
+  place, drives, and turns on the spot again only when it points clearly away. The two thresholds
+  prevent chattering between turning and driving.
 
   Options: `x`, `y` (map frame, metres, required), `heading` (radians, default none), `tolerance`
   (metres, default 0.1), `heading_tolerance` (radians, default 0.05), `speed` (m/s, default the
-  profile's). Outcome 1: there. Without a pose it stands and waits.
+  profile's). Outcome 1: arrived. Without a pose it stands and waits.
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
@@ -42,7 +42,7 @@ defmodule Robot.Behaviour.Goto do
 
   def tick(%{pose: pose, profile: profile}, state) do
     distance = Pose.distance(pose, {state.x, state.y})
-    # Once there, a robot that only turns may not be sent off again by a wobble of its pose.
+    # A robot that has arrived and only turns must not drive again because its pose fluctuates.
     near = if state.mode == :aligning, do: 2 * state.tolerance, else: state.tolerance
 
     if distance < near,

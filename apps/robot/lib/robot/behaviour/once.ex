@@ -1,7 +1,8 @@
 defmodule Robot.Behaviour.Once do
   @moduledoc """
-  Runs a function of the percept once and ends with the outcome it gives (R11): for checks and for
-  choosing between behaviours. Options: `run`, `(Robot.Percept.t() -> integer)` (required).
+  Calls a function with the percept once and ends with the outcome that it returns (R11). It
+  serves for checks and for choosing between behaviours. Options: `run`,
+  `(Robot.Percept.t() -> integer)` (required).
   """
   @behaviour Robot.Behaviour
   alias Hal.Options

@@ -1,9 +1,11 @@
 defmodule Robot.Behaviour.Parallel do
   @moduledoc """
-  Runs behaviours side by side (R11); the heaviest of their wishes counts. It ends when all have
-  ended, or with `ends: :any` when the first has. Outcome: the last, or first, one's.
+  Runs behaviours side by side (R11); the wish with the greatest weight counts. It ends when all
+  have ended, with the outcome of the last, or, with `ends: :any`, when one has ended, with its
+  outcome. If several end in the same tick, the last, or the first, in the list counts.
 
-  Options: `parts`, a list of behaviours (required, at least one); `ends`, `:all` (default) or `:any`.
+  Options: `parts`, a list of behaviours (required, at least one); `ends`, `:all` (default) or
+  `:any`.
   """
   @behaviour Robot.Behaviour
   alias Robot.Behaviour

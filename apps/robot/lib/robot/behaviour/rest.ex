@@ -1,5 +1,5 @@
 defmodule Robot.Behaviour.Rest do
-  @moduledoc "Stands still while no other behaviour has a wish: the lightest wish there is."
+  @moduledoc "Stands still while no other behaviour has a wish: its wish has a very small weight."
   @behaviour Robot.Behaviour
   alias Hal.Twist
   alias Robot.Wish

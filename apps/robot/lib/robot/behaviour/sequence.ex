@@ -1,9 +1,10 @@
 defmodule Robot.Behaviour.Sequence do
   @moduledoc """
-  Runs behaviours one after another (R11). Its outcome is the last one's. With `while` (default
-  none), an outcome, it ends as soon as one ends otherwise, with that one's outcome.
+  Runs behaviours one after another (R11). Its outcome is that of the last one. If `while` is set
+  to an outcome, the sequence ends as soon as a step ends with another one, and has that outcome.
 
-  Options: `steps`, a list of behaviours (required, at least one), `while`.
+  Options: `steps`, a list of behaviours (required, at least one); `while`, an outcome (default
+  none).
   """
   @behaviour Robot.Behaviour
   alias Robot.Behaviour
@@ -24,7 +25,7 @@ defmodule Robot.Behaviour.Sequence do
     end
   end
 
-  # The next one takes over within the same tick, so that no tick is lost between them.
+  # The next step runs within the same tick, so that no tick is lost between two steps.
   defp next(outcome, wish, [], _percept, _state), do: {:done, outcome, wish}
 
   defp next(outcome, wish, _rest, _percept, %{while: while})

@@ -3,20 +3,21 @@ defmodule Robot.Behaviour.TrackBlob do
   Keeps a coloured object in view and at a distance (R36, R37, R82), as the leader does with the
   landmark. Never ends.
 
-  The camera follows the thing. The body turns only when the camera is more than 30 degrees off
-  its middle, and then until the thing is ahead, gently as soon as the camera is within these; or
-  when it has to drive, which it does facing the thing. A robot without a pan-tilt unit keeps the
-  thing in front of its body.
+  The camera follows the object. The body begins to turn when the object is more than 30 degrees
+  off its front, and turns until the object is ahead, more slowly once it is within these 30
+  degrees. It also turns when it has to drive, because it faces the object while driving. A robot
+  without a pan-tilt unit keeps the object in front of its body.
 
-  Pictures wobble (R44), so direction and distance are filtered, and both have two thresholds: the
-  robot starts to turn when clearly off and stops when well centred, and likewise for the distance;
-  in between it stands really still. When the thing is lost it turns to where it was last seen, then
-  on to that side for one full turn, and then waits.
+  Measurements from pictures fluctuate (R44), so direction and distance are filtered, and each has
+  two thresholds: the robot starts to turn when it is clearly off and stops when it is well
+  centred, and likewise for the distance. In between it stands still. When the object is lost, the
+  robot turns to where it was last seen and then on to that side, a little more than a full turn
+  in total, and then waits.
 
   Options: `colour` (default any), `min_share` (default 0.0003), `near` and `far` (metres, default
-  1.0 and 1.5), `max_turn` (rad/s, default 0.4, so that followers keep up), `speed` (m/s, default 0.3),
-  `place` (`{x, y}` in the map frame, or `nil`, the default): where the thing stands as far as is known, which
-  is where it turns to as long as it has not seen it itself.
+  1.0 and 1.5), `max_turn` (rad/s, default 0.4, so that followers can keep up), `speed` (m/s,
+  default 0.3), `place` (`{x, y}` in the map frame, default `nil`): the presumed place of the
+  object, to which the robot turns if it has not seen the object yet.
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
@@ -24,19 +25,20 @@ defmodule Robot.Behaviour.TrackBlob do
   alias Robot.Navigation.Steering
   alias Robot.Percept.{CameraPointing, Sighting}
 
-  # Radians: where turning begins with a camera that turns by itself, and without; where it is good enough.
+  # Radians off the front at which the body begins to turn, with a pan-tilt unit and without one,
+  # and at which it stops.
   @aside :math.pi() / 6
   @off_centre 0.04
   @centred 0.012
   # rad/s.
   @gently 0.2
-  # Only drive while the thing is about ahead.
+  # It drives only while the object is this near to straight ahead (radians).
   @ahead 0.3
-  # Share of a new picture in the filtered value, while standing and while moving.
+  # The weight of a new picture in the filtered value, while standing and while moving.
   @calm 0.3
   @lively 0.7
   @lost_ms 700
-  # A thing that fills the picture is too near to be measured.
+  # An object that covers more of the picture than this is too near to be measured.
   @too_near_share 0.3
 
   @impl Robot.Behaviour
@@ -94,8 +96,8 @@ defmodule Robot.Behaviour.TrackBlob do
     end
   end
 
-  # The remembered direction is relative to the body, so it moves when the body turns. Wheels
-  # tell this better than the pose, which may jump when it is corrected.
+  # The remembered direction is relative to the body, so it changes when the body turns. Odometry
+  # measures this better than the pose, which may jump when it is corrected.
   defp carry(state, percept) do
     heading = heading(percept)
 
@@ -112,7 +114,7 @@ defmodule Robot.Behaviour.TrackBlob do
   defp heading(%{pose: %Pose{heading: heading}}), do: heading
   defp heading(_percept), do: nil
 
-  # One picture counts once, however many ticks it is fresh.
+  # A picture counts once, however many ticks it stays fresh.
   defp look(state, %{detections: nil}), do: state
   defp look(%{picture_ms: at_ms} = state, %{detections: %{at_ms: at_ms}}), do: state
 
@@ -141,7 +143,7 @@ defmodule Robot.Behaviour.TrackBlob do
     end
   end
 
-  # Never seen by this robot's camera as it points now, but it is known where to look.
+  # This robot has not seen the object yet, but was given its place.
   defp recall(%{error: nil, place: {_x, _y} = place} = state, %{pose: %Pose{} = pose} = percept) do
     error = Pose.bearing(pose, place)
     %{state | error: error, side: if(error < 0, do: -1, else: 1), seen_ms: percept.at_ms}
@@ -170,7 +172,7 @@ defmodule Robot.Behaviour.TrackBlob do
   defp limit(false, 0, %{ptz: ptz}) when ptz != nil, do: @aside
   defp limit(false, _driving, _percept), do: @off_centre
 
-  # The camera has it in view: the body takes its time, so that those who stand behind it keep up.
+  # The camera can see the object already, so the body turns slowly and followers can keep up.
   defp gently(%{error: error} = state, %{ptz: ptz}) when ptz != nil and abs(error) < @aside,
     do: %{state | max_turn: min(state.max_turn, @gently)}
 
@@ -179,7 +181,7 @@ defmodule Robot.Behaviour.TrackBlob do
   defp gaze(_error, %{ptz: nil}), do: 0.0
   defp gaze(error, percept), do: CameraPointing.pan(error, percept)
 
-  # Which way it drives: it starts outside the range and stops a little inside it.
+  # The direction of driving: it starts outside the range and stops a little inside it.
   defp driving(_driving, nil, _state), do: 0
 
   defp driving(driving, distance, %{near: near, far: far}) do
@@ -204,10 +206,10 @@ defmodule Robot.Behaviour.TrackBlob do
   end
 
   defp search(percept, %{searched: searched} = state) when searched < 7.0 do
-    # First to where it was; from there on to the side where it went, and never back.
+    # First to where the object was last seen, and from there on to the same side.
     there? = state.there? or abs(state.error) < 0.1
     error = if there?, do: state.side * 3.0, else: state.error
-    # The eyes are there before the body; for the turn they look ahead.
+    # The camera gets there before the body; after that it looks straight ahead.
     gaze = if there?, do: 0.0, else: gaze(state.error, percept)
     state = %{state | driving: 0, turning?: true, there?: there?}
     running(Twist.new(0, turn(error, percept, state)), gaze, state)

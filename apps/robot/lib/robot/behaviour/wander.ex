@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.Wander do
   @moduledoc """
-  Wanders without a goal: straight on, and away from what comes near. In open space, the direction
-  of its turns follows from its name and the time, so that it is repeatable. Never ends.
+  Wanders without a goal, and turns away from what the sonars see ahead. In open space its turn
+  rate follows from the robot's name and the time, so that runs are repeatable. Never ends.
 
   Options: `speed` (m/s, default 0.3).
   """
@@ -10,7 +10,8 @@ defmodule Robot.Behaviour.Wander do
   alias Robot.Wish
   alias Robot.Safety.Reflex
 
-  # Metres at which something ahead makes it turn, and seconds between turns in the open.
+  # The distance (metres) at which something ahead makes it turn, and the time between changes of
+  # direction in open space.
   @near 0.7
   @leg_ms 6000
 
@@ -31,7 +32,7 @@ defmodule Robot.Behaviour.Wander do
         running(Twist.new(state.speed, (leg - 50) / 250), %{state | side: nil})
 
       near ->
-        # It keeps to the side it chose first, or it would shake its head in a corner.
+        # It keeps turning to the side that it chose first, or it would oscillate in a corner.
         {_, y} = Enum.min_by(near, fn {x, y} -> x * x + y * y end)
         side = state.side || if(y > 0, do: -1, else: 1)
         running(Twist.new(0, side * 0.6 * percept.profile.max_turn), %{state | side: side})

@@ -1,24 +1,26 @@
 defmodule Robot.Behaviour.Avoid.Brake do
   @moduledoc """
   The last check of a speed: if the robot drove on for a moment and then braked, would it come too
-  near to another that does the same? If so, it drives slower, or not at all. Turning is
-  unrestricted. Pure.
+  near to another robot that does the same? If so, it drives more slowly, or not at all. The turn
+  rate is not limited. Pure.
 
-  Steering cannot follow a wished velocity at once; this is what makes the difference harmless.
+  The wheels cannot follow a wished velocity immediately, so the real path differs from the
+  planned one; this check takes that into account.
   """
   alias Hal.{Pose, Profile, Twist}
   alias Robot.Behaviour.Avoid.Neighbours
 
-  # How long a decision holds: a tick, the age of what was heard, the lag of wheels.
+  # How long a decision holds: a tick, the age of the others' reports, the lag of the wheels.
   @delay_s 0.35
   @samples [0.2, 0.4, 0.6, 0.8, 1.0, 1.3]
-  # Metres between bodies; one who stands is where he said, and tight places must be passed.
+  # Metres between bodies. The margin to standing robots is smaller, because their places are
+  # known better and the robot must get through narrow gaps.
   @margin 0.08
   @standing_margin 0.03
   @parting 0.02
   @parts [1.0, 0.7, 0.45, 0.2]
 
-  @doc "The same speed, or as much of its linear part as is safe."
+  @doc "The same speed, with the linear part reduced as far as this check requires."
   @spec twist(Twist.t(), Pose.t(), Profile.t(), [Neighbours.t()]) :: Twist.t()
   def twist(%Twist{linear: linear} = twist, _pose, _profile, _neighbours) when linear == 0.0,
     do: twist
@@ -35,7 +37,7 @@ defmodule Robot.Behaviour.Avoid.Brake do
     end
   end
 
-  # Where the other will be, relative to this body, at each sample; it brakes too.
+  # The places of the other, relative to this body, at each sample, if it brakes too.
   defp path(%{at: {x, y}, velocity: {vx, vy}, radius: radius} = other, pose, profile) do
     dx = x - pose.x
     dy = y - pose.y
@@ -65,7 +67,7 @@ defmodule Robot.Behaviour.Avoid.Brake do
       for t <- @samples do
         s = travelled(abs(linear), t, profile.max_acceleration)
         s = if linear < 0, do: -s, else: s
-        # Half of the turn made by then: the chord of the arc.
+        # The chord of the arc points along half of the angle turned by then.
         angle = turn * min(t, 0.6) / 2
         {s * :math.cos(angle), s * :math.sin(angle)}
       end
@@ -75,7 +77,8 @@ defmodule Robot.Behaviour.Avoid.Brake do
     end)
   end
 
-  # Never nearer than the limit; those who already are, no nearer than now, and in the end apart.
+  # No sample may be nearer than the limit. Robots that already are may not come nearer, and must
+  # be farther apart at the last sample.
   defp clear?([{ax, ay}], [{bx, by}], _limit, last), do: apart?(ax - bx, ay - by, last)
 
   defp clear?([{ax, ay} | own], [{bx, by} | other], limit, last),
@@ -83,7 +86,7 @@ defmodule Robot.Behaviour.Avoid.Brake do
 
   defp apart?(dx, dy, limit), do: dx * dx + dy * dy >= limit * limit
 
-  # Metres after t seconds: on for the delay, then braking to a stand.
+  # Metres driven after t seconds: at constant speed for the delay, then braking.
   defp travelled(speed, t, _braking) when t <= @delay_s, do: speed * t
 
   defp travelled(speed, t, braking) do

@@ -1,20 +1,21 @@
 defmodule Robot.Behaviour.Avoid.Clearance do
   @moduledoc """
-  What a robot keeps clear of, and how far, as half-planes of velocities for
+  The distances that a robot keeps from robots and obstacles, as half-planes of velocities for
   `Robot.Navigation.Orca`. Pure.
   """
   alias Hal.Pose
   alias Robot.Navigation.Orca
   alias Robot.Percept
 
-  # Metres kept to others by reaction; to standing ones less when there is no more room.
+  # Desired distances (metres) to standing and to moving bodies; the least one applies when there
+  # is no more room.
   @standing_margin 0.12
   @moving_margin 0.15
   @closest 0.04
   @horizon_s 2.5
   @standing_horizon_s 1.2
 
-  @typedoc "A neighbour (`Robot.Behaviour.Avoid.Neighbours.t/0`), or a thing that stands."
+  @typedoc "A neighbour (`Robot.Behaviour.Avoid.Neighbours.t/0`), or a standing obstacle."
   @type body :: %{
           required(:at) => Pose.point(),
           required(:velocity) => {float(), float()},
@@ -25,7 +26,7 @@ defmodule Robot.Behaviour.Avoid.Clearance do
           optional(atom()) => term()
         }
 
-  @doc "Discs `{x, y, radius}` as bodies that stand."
+  @doc "Converts discs `{x, y, radius}` to standing bodies."
   @spec standing([{float(), float(), float()}], Percept.t()) :: [body()]
   def standing(discs, percept) do
     for {x, y, radius} <- discs do
@@ -44,7 +45,8 @@ defmodule Robot.Behaviour.Avoid.Clearance do
   end
 
   @doc """
-  The half-planes of velocities that keep clear of the robots, and of the eight nearest things.
+  The half-planes of velocities that keep clear of the robots, and of the nearest standing
+  obstacles, at most eight, within 1.5 m.
   """
   @spec planes(Percept.t(), [body()], [body()]) :: [Orca.half_plane()]
   def planes(percept, robots, things) do
@@ -55,7 +57,8 @@ defmodule Robot.Behaviour.Avoid.Clearance do
     for %{gap: gap} = other <- nearest ++ robots do
       margin = if other.standing?, do: @standing_margin, else: @moving_margin
       horizon_s = if other.standing?, do: @standing_horizon_s, else: @horizon_s
-      # The margin is a wish; only what is nearer than the tightest is pushed away from.
+      # The desired margin shrinks with the room there is; the robot moves away only from what is
+      # nearer than the least margin.
       margin = max(@closest, min(margin, gap - 0.01))
       radius = percept.profile.radius + other.radius + margin
       Orca.half_plane(at, own, other.at, other.velocity, radius, horizon_s, other.share)

@@ -1,9 +1,10 @@
 defmodule Robot.Behaviour.Avoid.GiveWay do
   @moduledoc """
-  Gives way: a robot that stands in its place may block another's path. If another moving robot
-  stays close for some seconds, this one steps aside for a moment, and then returns. Pure.
+  Gives way: a robot that stands may block another's path. If another robot that does not hold its
+  place stays close for some seconds, this one steps aside for a moment. Pure.
 
-  Neighbours in a formation stand farther apart than that, so those never drive each other off.
+  The threshold is meant to be below the spacing of a formation, so that neighbours in a formation
+  do not make each other step aside.
   """
   alias Hal.Pose
   alias Robot.Behaviour.Avoid.Neighbours
@@ -18,14 +19,14 @@ defmodule Robot.Behaviour.Avoid.GiveWay do
           direction: {float(), float()} | nil
         }
 
-  # Metres between the bodies that are too close for a neighbour in a formation.
+  # Bodies with a smaller gap (metres) are too close to be neighbours in a formation.
   @close 0.2
   @patience_ms 4000
   @step_ms 2500
-  # Nobody steps aside twice within this time.
+  # For this long after stepping aside, a robot does not step aside again.
   @again_ms 9000
 
-  @doc "The unit vector in which to step aside now, if at all."
+  @doc "The direction (a unit vector) in which to step aside now, or `nil`, and the next state."
   @spec note(t() | nil, [Neighbours.t()], Pose.t(), integer()) ::
           {{float(), float()} | nil, t() | nil}
   def note(%{until_ms: until_ms} = yield, _robots, _pose, at_ms)
@@ -51,7 +52,7 @@ defmodule Robot.Behaviour.Avoid.GiveWay do
     end
   end
 
-  @doc "Whether it is stepping aside at this time."
+  @doc "Whether the robot is stepping aside at this time."
   @spec now?(t() | nil, integer()) :: boolean()
   def now?(%{until_ms: until_ms}, at_ms) when until_ms != nil, do: at_ms < until_ms
   def now?(_yield, _at_ms), do: false

@@ -1,13 +1,16 @@
 defmodule Robot.Behaviour.Avoid.Neighbours do
   @moduledoc """
-  What is around a robot, as discs in the map frame: other robots by their own reports, and
-  obstacles that the sonars see and no robot reported. Pure.
+  The surroundings of a robot as discs in the map frame: other robots by their own reports, and
+  obstacles that the sonars see and that are not known robots or discs. Pure.
   """
   alias Hal.{Pose, Twist}
   alias Robot.Percept
   alias Robot.Safety.Reflex
 
-  @typedoc "`share`: the part of the evasion that is ours."
+  @typedoc """
+  `share` is this robot's part of the evasion, `standing?` whether the body moves slower than 0.05
+  m/s, `fixed?` whether it will not make way, `gap` the distance between the bodies in metres.
+  """
   @type t :: %{
           id: atom(),
           at: Pose.point(),
@@ -19,21 +22,22 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
           gap: float()
         }
 
-  # Farther ones do not matter yet, and more than this many nearest ones change nothing.
+  # Robots with a larger gap (metres) are not considered yet, and only this many of the nearest.
   @range 4.0
   @most 10
   @standing 0.05
-  # Share of the latest in the mean place of one that stands, and how far off (metres) it has moved after all.
+  # The weight of the latest report in the mean place of a standing robot, and the distance
+  # (metres) from the mean at which it counts as having moved.
   @recent 0.15
   @moved 0.25
-  # A pose that was not renewed for this long (seconds) is no longer carried on.
+  # A reported pose is extrapolated for at most this long (seconds).
   @carry_s 0.5
   @sonar_range 1.5
   @sonar_radius 0.05
-  # How far beside a known body an echo may lie and still be its echo.
+  # How far (metres) outside a known body an echo may be and still count as its echo.
   @explained 0.15
 
-  @doc "The other robots, nearest first, carried on to now; all of them, however far."
+  @doc "All other robots, nearest first, extrapolated to the present time."
   @spec robots(Percept.t()) :: [t()]
   def robots(%Percept{pose: pose} = percept) do
     percept.peers
@@ -42,8 +46,9 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   end
 
   @doc """
-  The same, where those that stand are taken to stand at the mean of what they lately told:
-  what they tell wobbles, they do not. Gives the means to hand in again at the next tick.
+  Replaces the place of each standing robot by the mean of its recent reports, because reported
+  places of standing robots fluctuate. Also returns the means, which the next tick takes as
+  argument.
   """
   @spec steady([t()], %{atom() => Pose.point()}) :: {[t()], %{atom() => Pose.point()}}
   def steady(robots, means) do
@@ -65,7 +70,7 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
       else: {mx + @recent * (x - mx), my + @recent * (y - my)}
   end
 
-  @doc "The nearest of them, as many as matter for the next seconds."
+  @doc "The nearest of these robots, at most ten, within 4 m."
   @spec near([t()]) :: [t()]
   def near(robots), do: robots |> Enum.take_while(&(&1.gap < @range)) |> Enum.take(@most)
 
@@ -78,7 +83,7 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
     vy = linear * :math.sin(at.heading)
     carry_s = min(age_s, @carry_s)
     place = {at.x + carry_s * vx, at.y + carry_s * vy}
-    # Where an old one went meanwhile nobody knows: it grows by what it may have driven.
+    # It is unknown where a robot with an old report has driven since; its disc grows by that way.
     grown = abs(linear) * min(max(age_s - @carry_s, 0.0), 1.0)
 
     %{
@@ -93,7 +98,7 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
     }
   end
 
-  @doc "What the sonars see that none of these discs explains."
+  @doc "The obstacles that the sonars see outside all of these discs."
   @spec unknown(Percept.t(), [{float(), float(), float()}]) :: [t()]
   def unknown(%Percept{sonar: nil}, _known), do: []
 

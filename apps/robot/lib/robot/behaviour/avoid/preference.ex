@@ -1,14 +1,14 @@
 defmodule Robot.Behaviour.Avoid.Preference do
   @moduledoc """
-  Which velocity a robot prefers among others, before it is asked what they leave free: along its
-  way, to the right of those who come, and away from what is close. Pure; velocities in m/s,
-  points in metres, in the frame of the percept's pose.
+  The velocity that a robot prefers, before `Robot.Navigation.Orca` limits it by the other bodies:
+  along its route, to the right of oncoming robots, and away from what is close. Pure; velocities
+  in m/s, points in metres, in the frame of the percept's pose.
   """
   alias Hal.Pose
   alias Robot.Behaviour.Avoid.Clearance
   alias Robot.Percept
 
-  # m/s away from what is close, at contact; and how close that is.
+  # The speed (m/s) away from a close body at contact, and the gap (metres) that counts as close.
   @drift 0.25
   @close 0.16
   @to_the_right :math.pi() / 12
@@ -16,8 +16,8 @@ defmodule Robot.Behaviour.Avoid.Preference do
   @type velocity :: {float(), float()}
 
   @doc """
-  Toward the first corner of the way round, at `speed`: the wished velocity points to the wrong
-  side of it.
+  The velocity toward the first corner of the route, at `speed`. The wished velocity remains if
+  the route has no corner before the goal.
   """
   @spec toward(velocity(), [Pose.point()] | nil, speed :: float(), Percept.t()) :: velocity()
   def toward(velocity, [_goal], _speed, _percept), do: velocity
@@ -29,8 +29,9 @@ defmodule Robot.Behaviour.Avoid.Preference do
   end
 
   @doc """
-  A little to the right of those who come, far from the next corner; by the angle `aside` where
-  the robot has got no nearer for a while (`Robot.Behaviour.Avoid.Progress`).
+  The velocity turned a little to the right if another robot comes toward this one and the next
+  corner is more than 1 m away; or turned by the angle `aside` if the robot has made no progress
+  for a while (`Robot.Behaviour.Avoid.Progress`).
   """
   @spec keep_right(
           velocity(),
@@ -50,7 +51,7 @@ defmodule Robot.Behaviour.Avoid.Preference do
       else: velocity
   end
 
-  # Somebody who moves, is ahead, and gets nearer.
+  # A robot that moves, is ahead, comes nearer, and drives roughly in the opposite direction.
   defp coming?(%{standing?: true}, _velocity, _percept), do: false
 
   defp coming?(%{at: {x, y}, velocity: {ox, oy}, gap: gap}, {vx, vy}, percept) do
@@ -62,8 +63,8 @@ defmodule Robot.Behaviour.Avoid.Preference do
   end
 
   @doc """
-  Off what is close: along it a robot gets on only slowly, so it drifts into the middle of a
-  narrow place; but not off what stands by its goal.
+  The velocity with a component away from standing bodies that are close, so that the robot drifts
+  into the middle of a narrow passage; a body near the robot's goal adds none.
   """
   @spec spread(velocity(), [Clearance.body()], Pose.point() | nil, Percept.t()) :: velocity()
   def spread(velocity, others, goal, percept) do

@@ -1,8 +1,8 @@
 defmodule Robot.Behaviour.Avoid.Progress do
   @moduledoc """
-  Notices that a robot makes no progress to its goal, and then sends it aside for a while. The
-  side and the duration follow from its name and the number of attempts, so that two robots that
-  block each other do not mirror each other for ever. Pure.
+  Detects that a robot makes no progress to its goal, and then turns it off its route for a while.
+  The angle and the duration follow from its name and the number of attempts, so that two robots
+  that block each other are unlikely to mirror each other for long. Pure.
   """
 
   @enforce_keys [:best, :since_ms]
@@ -20,19 +20,21 @@ defmodule Robot.Behaviour.Avoid.Progress do
 
   @patience_ms 4000
   @gain 0.2
-  # A way that suddenly got this much longer is another one: the goal moved, or somebody stopped in it.
+  # A route that is suddenly this much longer is another route: the goal moved, or a robot stopped
+  # in the way.
   @other 1.0
   @angles [-1.6, 1.6, -2.4, 2.4, 3.1, -0.9, 0.9]
 
   @doc """
-  Takes the length of the way that is left (metres) of a robot that wants to go on; `nil`
-  when it does not want to. Gives the angle (radians) by which to leave the way now, if any.
+  Takes the length of the remaining route (metres), `nil` without a route. Returns the angle
+  (radians) by which to leave the route now, or `nil`, and the next state.
   """
   @spec note(t() | nil, float() | nil, atom(), integer()) :: {float() | nil, t() | nil}
   def note(_progress, nil, _robot, _at_ms), do: {nil, nil}
   def note(nil, left, _robot, at_ms), do: {nil, %__MODULE__{best: left, since_ms: at_ms}}
 
-  # Time in which nobody was in the way is no time without progress: it turned, or its goal runs.
+  # Time in which nothing hindered the robot does not count as time without progress: it was
+  # turning, or its goal moves away.
   def note(%{hindered?: false, until_ms: nil} = progress, left, _robot, at_ms) do
     waited_ms = max(progress.seen_ms - progress.since_ms, 0)
 
@@ -70,7 +72,7 @@ defmodule Robot.Behaviour.Avoid.Progress do
     end
   end
 
-  @doc "Notes whether somebody was in the way at this tick."
+  @doc "Records whether something hindered the robot at this tick."
   @spec hindered(t() | nil, boolean()) :: t() | nil
   def hindered(nil, _hindered?), do: nil
   def hindered(progress, hindered?), do: %{progress | hindered?: hindered?}

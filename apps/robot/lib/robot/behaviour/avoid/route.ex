@@ -1,8 +1,8 @@
 defmodule Robot.Behaviour.Avoid.Route do
   @moduledoc """
-  Chooses a route to a goal around standing obstacles, and keeps to it: a wide route is preferred
-  unless it is much longer, and so is the previous route unless another is clearly shorter.
-  Without that, a robot between two equally good routes would oscillate. Pure.
+  Chooses a route to a goal around standing obstacles, and keeps to it: a route with wide
+  clearance is preferred unless it is much longer, and the previous route is kept unless another
+  is clearly shorter. Otherwise a robot between two equally good routes would oscillate. Pure.
   """
   alias Hal.Pose
   alias Robot.Percept
@@ -14,21 +14,22 @@ defmodule Robot.Behaviour.Avoid.Route do
 
   @type t :: %__MODULE__{corners: [Pose.point(), ...], goal: Pose.point(), at_ms: integer()}
 
-  # Metres kept between the bodies: if possible, if need be, at least.
+  # Clearance between the bodies (metres): the preferred one, the fallback, and the least one.
   @roomy 0.2
   @tight 0.1
   @tightest 0.06
-  # A roomy way may be this much longer (metres) than a tight one.
+  # A route with wide clearance may be this much longer (metres) than a tight one.
   @detour 2.0
-  # A new way must be this much shorter than the old one, and is looked for this often.
+  # A new route must be this much shorter (metres) than the old one; one is searched this often.
   @better 0.5
   @again_ms 800
-  # A goal that moved farther than this is another one.
+  # A goal that moved farther than this (metres) needs a new route.
   @same_goal 0.4
 
   @doc """
-  Where to stand instead of a goal in which something stands that will not move (a dead or
-  holding robot, a disc): the place nearest to us beside it. `nil` where the goal is free.
+  The place at which to stand if a body that will not move occupies the goal (a dead or holding
+  robot, a disc): beside that body, on the side where the goal is, or on this robot's side if the
+  goal is near the body's middle. `nil` if the goal is free.
   """
   @spec taken(Pose.point() | nil, Percept.t(), [Neighbours.t()], [PathPlanner.disc()]) ::
           Pose.point() | nil
@@ -43,7 +44,7 @@ defmodule Robot.Behaviour.Avoid.Route do
       distance = Pose.distance(goal, {x, y})
 
       if distance < limit - 0.02 do
-        # On the side of the goal where it is off the body's middle, else on ours.
+        # On the goal's side if the goal is off the body's middle, else on this robot's side.
         side = if distance > 0.15, do: goal, else: Pose.point(percept.pose)
         angle = :math.atan2(elem(side, 1) - y, elem(side, 0) - x)
         {x + (limit + 0.04) * :math.cos(angle), y + (limit + 0.04) * :math.sin(angle)}
@@ -51,7 +52,7 @@ defmodule Robot.Behaviour.Avoid.Route do
     end)
   end
 
-  @doc "The corners still ahead, the goal last; where there is no way, the straight one."
+  @doc "The remaining corners of the route, the goal last; only the goal if none is found."
   @spec round(t() | nil, Pose.point(), Percept.t(), [Neighbours.t()], [PathPlanner.disc()]) :: t()
   def round(old, goal, percept, robots, discs) do
     from = Pose.point(percept.pose)
@@ -83,11 +84,11 @@ defmodule Robot.Behaviour.Avoid.Route do
     if left(kept, from) > left(new, from) + @better, do: new, else: %{kept | at_ms: new.at_ms}
   end
 
-  @doc "How far it is along the way (metres)."
+  @doc "The length of the route from a place (metres)."
   @spec left(t(), Pose.point()) :: float()
   def left(%__MODULE__{corners: corners}, from), do: length_of(corners, from)
 
-  # The old way from here, as far as it is still free: a corner is behind when the next one is in view.
+  # The old route from here, if it is still free: a corner is passed when the next one is in view.
   defp keep(nil, _goal, _from, _discs), do: nil
 
   defp keep(old, goal, from, discs) do
@@ -109,7 +110,7 @@ defmodule Robot.Behaviour.Avoid.Route do
   defp free?([place | rest], from, discs),
     do: PathPlanner.blocker(from, place, discs) == nil and free?(rest, place, discs)
 
-  # A body by its margin larger, unless we or our goal are nearer than that: then as large as may be.
+  # The body grown by the margin; less if this robot or its goal is nearer than that.
   defp grow({x, y, radius}, own, margin, from, goal) do
     tight = own + radius + min(margin, @tightest)
     room = min(Pose.distance(from, {x, y}), Pose.distance(goal, {x, y})) - 0.01

@@ -1,9 +1,9 @@
 defmodule Robot.Behaviour.Decorator.Every do
   @moduledoc """
-  Runs another behaviour repeatedly (R11): a new one each `period_ms`, or as soon as the last one
-  has ended, whichever is later. Never ends by itself.
+  Runs another behaviour repeatedly (R11): starts it again `period_ms` after its last start, or at
+  the tick after it has ended, whichever is later. Never ends by itself.
 
-  Options: `start`, `{module, options}` of the behaviour (required); `period_ms` (default 0: at once).
+  Options: `start`, `{module, options}` of the behaviour (required); `period_ms` (default 0).
   """
   @behaviour Robot.Behaviour
   alias Robot.Behaviour

@@ -1,10 +1,10 @@
 defmodule Robot.Behaviour.Decorator.Until do
   @moduledoc """
-  Runs another behaviour until a condition holds (R11). Outcome: the inner one's when it ends
-  first; when the condition does, `outcome` (default 2).
+  Runs another behaviour until a condition holds (R11). Outcome: that of the inner behaviour if it
+  ends first, else `outcome` (default 2).
 
-  Options: `inner`, a behaviour (required); `stop?`, a function of the percept, or `after_ms`,
-  a time: one of them at least.
+  Options: `inner`, a behaviour (required); the condition, at least one of `stop?`, a function of
+  the percept, and `after_ms`, a time since the first tick; `outcome`.
   """
   @behaviour Robot.Behaviour
   alias Robot.Behaviour
