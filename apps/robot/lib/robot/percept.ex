@@ -1,10 +1,12 @@
 defmodule Robot.Percept do
   @moduledoc """
-  All that a robot knows at one tick, frozen: behaviours and missions read nothing else.
+  Everything that a robot perceives and estimates at one tick. Behaviours and missions read
+  nothing else.
 
-  Whatever was older than its limit when the percept was taken is `nil` (or `[]` for bumpers):
-  a behaviour never sees a stale reading. `detections: nil` means that there is no fresh
-  picture, `detections.blobs: []` that the picture shows nothing. `pose` is the robot's estimate in the `map` frame.
+  A reading that was older than its limit when the percept was taken is `nil` (`[]` for bumpers),
+  so that no behaviour uses stale readings (`Robot.Percept.Snapshot`); `peers` have no such limit.
+  `detections: nil` means that there is no fresh picture, `detections.blobs: []` that nothing was
+  detected in it. `pose` is the robot's estimate of its pose in the `map` frame.
   """
   alias Hal.{Odometry, Pose, Profile, Twist}
 
@@ -25,10 +27,11 @@ defmodule Robot.Percept do
               ]
 
   @typedoc """
-  What another robot told: its pose and speed in the `map` frame, when it was heard, and its
-  body's radius (metres). `mode`: `:moving` avoids others too, `:holding` stands and gives no way,
-  `:dead` is a body that stayed where it was last heard of. `beat` is all that it told last, and
-  `direct_ms` when it was heard itself, not by way of another robot.
+  What another robot reported: its pose and speed in the `map` frame, when it was heard, and the
+  radius of its body (metres). `mode` is `:moving` for a robot that avoids others too, `:holding`
+  for one that stands and does not give way, and `:dead` for one that is assumed to stand where it
+  was last heard. `beat` is its last heartbeat, and `direct_ms` the time at which the robot itself
+  was last heard, not another that passed on its report.
   """
   @type peer :: %{
           required(:pose) => Pose.t(),
@@ -41,11 +44,14 @@ defmodule Robot.Percept do
         }
 
   @typedoc """
-  How sure the pose is: within `radius` metres in 95 of 100 cases; `position` (along the worst direction, metres; `spread` says more) and
-  `heading` (radians) are standard deviations. `frame` is the key of the frame that the pose is in (`Robot.Localiser.Anchors`): `nil`
-  for that of the start poses, in which `start` are its variances (m2, rad2); `frame_no` is the number of the frame that it makes for
-  others. `drift` is what odometry has added since the start: variances in m2 and rad2, and all angles turned; `slip` (a standard
-  deviation) how well is known what slips in each of them.
+  The uncertainty of the pose. By the filter's estimate, the error is within `radius` metres in 95
+  of 100 cases. `position` (along the direction of greatest uncertainty, metres; see also
+  `spread`) and `heading` (radians) are standard deviations. `frame` is the key of the frame of
+  the pose (`Robot.Localiser.Anchors`), `nil` for the frame of the start poses; `start` are the
+  pose's variances (m2, rad2) in the frame of the start poses. `frame_no` is the number of the
+  frame that the robot's own poses define for others. `drift` is what dead reckoning has added
+  since the start: variances of way and turn (m2, rad2), and the sum of all angles turned
+  (radians); `slip` is the standard deviation of the wheel slip per radian turned.
   """
   @type uncertainty :: %{
           radius: float(),
@@ -60,7 +66,8 @@ defmodule Robot.Percept do
         }
 
   @typedoc """
-  `detections` is what was found in the newest picture. `driving` is what the gate last let through, and why it limited it.
+  `detections` are the blobs of the newest picture. `driving` is the speed that the gate last let
+  through, and the limits that it applied.
   """
   @type t :: %__MODULE__{
           robot: atom(),

@@ -4,18 +4,20 @@ defmodule Robot.Navigation.Orca do
   velocities avoid contact for some time if the others do their share, and which of them is
   nearest to the desired one. Pure; metres, seconds, map frame.
 
-  A half plane `{{nx, ny}, offset}` allows the velocities with `n . v >= offset`.
+  A half-plane `{{nx, ny}, offset}` allows the velocities with `n . v >= offset`.
   """
 
   @type vector :: {x :: float(), y :: float()}
   @type half_plane :: {normal :: vector(), offset :: float()}
 
-  # Two that overlap already part within this time: softly, since wheels cannot do it in a tick.
+  # Two discs that already overlap separate within this time, because wheels cannot do it in a
+  # tick.
   @parting_s 0.5
 
   @doc """
-  The velocities that avoid another disc. `from` and `to` are the places, `radius` the sum of both
-  radii, `share` the part of the evasion that is ours: a half of one who evades too, all of one who does not.
+  The half-plane of velocities that avoid another disc for `horizon_s` seconds. The arguments are
+  this disc's place and velocity, the other's place and velocity, `radius`, the sum of both radii,
+  and `share`, this disc's part of the evasion: one half if the other evades too, else 1.
 
       iex> {{nx, _ny}, offset} = Robot.Navigation.Orca.half_plane({0.0, 0.0}, {0.0, 0.0}, {2.0, 0.0}, {0.0, 0.0}, 0.5, 3.0, 1.0)
       iex> {Float.round(nx, 6), Float.round(offset, 6)}
@@ -38,7 +40,7 @@ defmodule Robot.Navigation.Orca do
     {{nx, ny}, nx * avx + ny * avy + share * size}
   end
 
-  # Nearest border of the cone of bad velocities: its round cap, or one of its legs.
+  # The nearest border of the velocity obstacle: its round cap, or one of its legs.
   defp apart(px, py, vx, vy, distance, radius, horizon_s) do
     ux = px / distance
     uy = py / distance
@@ -74,8 +76,8 @@ defmodule Robot.Navigation.Orca do
   end
 
   @doc """
-  The velocity nearest to the wished one that all half planes allow, no faster than `top`.
-  Where none is allowed by all, the one whose worst violation is least.
+  The velocity nearest to the wished one that all half-planes allow, no faster than `top`. If no
+  velocity satisfies all of them, the one whose worst violation is least.
 
       iex> Robot.Navigation.Orca.solve([], {0.3, 0.0}, 0.5)
       {0.3, 0.0}
@@ -103,7 +105,7 @@ defmodule Robot.Navigation.Orca do
     end
   end
 
-  # The best point on the border of `plane` within the disc and all the planes before it.
+  # The best point on the border of `plane` within the disc of speeds and all planes before it.
   defp along({{nx, ny}, offset}, before, {wx, wy}, top) do
     square = top * top - offset * offset
 
@@ -156,7 +158,7 @@ defmodule Robot.Navigation.Orca do
     velocity
   end
 
-  # As far along the normal as the earlier planes' violations stay below this plane's.
+  # As far along the normal as no earlier plane is violated more than this one.
   defp relax({{nx, ny}, offset}, before, velocity, top) do
     bounds =
       for {{mx, my}, other} <- Enum.reverse(before),

@@ -1,10 +1,10 @@
 defmodule Robot.Navigation.PathPlanner do
   @moduledoc """
-  The shortest path around standing discs. Pure; metres.
+  Plans a short path around standing discs. Pure; metres.
 
-  A lazy visibility search: it looks straight at the goal, and only where a disc is in the way
-  does it think about that disc, whose rim it takes as a polygon. So an open way costs one
-  look, and a crowded one as many as there are discs in between.
+  A lazy visibility search: it first tries the straight line to the goal, and considers a disc
+  only if that disc blocks a line. The rim of a disc is approximated by a polygon. So a free path
+  costs one test, and further tests are needed only for the discs in between.
   """
 
   @type point :: {x :: float(), y :: float()}
@@ -13,7 +13,7 @@ defmodule Robot.Navigation.PathPlanner do
   @sides 10
   @rim 1.0 / :math.cos(:math.pi() / @sides)
   @slack 1.0e-3
-  # A search that has looked at this many places gives the best it has.
+  # A search that has expanded this many places ends without a path.
   @most 120
 
   @corners for k <- 0..(@sides - 1),
@@ -23,7 +23,7 @@ defmodule Robot.Navigation.PathPlanner do
                }
 
   @doc """
-  The corners of the way and the goal itself, or `nil` where there is no way.
+  The corners of the path and the goal itself, or `nil` if no path is found.
 
       iex> Robot.Navigation.PathPlanner.way({0.0, 0.0}, {4.0, 0.0}, [])
       [{4.0, 0.0}]
@@ -66,8 +66,8 @@ defmodule Robot.Navigation.PathPlanner do
     end
   end
 
-  # From a place whose view of the goal is taken by `disc`, go to what can be seen of its rim;
-  # where another disc hides the rim, to the rim of that one.
+  # From a place where `disc` blocks the line to the goal, the path leads to the visible corners
+  # of its rim; where another disc hides them, to the rim of that one.
   defp expand(open, seen, place, trail, cost, nil, goal, _discs) do
     total = cost + distance(place, goal)
     {:gb_sets.add({total, total, goal, [goal | trail], nil}, open), seen}
@@ -106,7 +106,7 @@ defmodule Robot.Navigation.PathPlanner do
     visible(place, Enum.uniq(hidden_by) -- done, done, seen, discs, depth - 1)
   end
 
-  # The outermost corners to both sides, and for a place on the rim the next ones along it.
+  # The outermost corner on each side; for a place on the rim, the nearest corners along it.
   defp rim({cx, cy, radius}, {px, py} = place) do
     corners = for {x, y} <- @corners, do: {cx + radius * x, cy + radius * y}
     near = radius * @rim * 1.02
@@ -126,7 +126,7 @@ defmodule Robot.Navigation.PathPlanner do
   end
 
   @doc """
-  The first disc that a straight way runs into, or `nil`.
+  The first disc that blocks a straight line, or `nil`.
 
       iex> Robot.Navigation.PathPlanner.blocker({0.0, 0.0}, {4.0, 0.0}, [{3.0, 0.0, 0.5}, {2.0, 0.2, 0.5}])
       {2.0, 0.2, 0.5}

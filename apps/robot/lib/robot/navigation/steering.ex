@@ -3,19 +3,21 @@ defmodule Robot.Navigation.Steering do
   Converts a planar velocity to the two speeds of a differential drive, and limits the speed of
   approach. Pure.
 
-  Turning comes before driving: beyond 60 degrees of error the robot turns on the spot, nearer to
-  the wanted direction it drives the faster the better it points there. Both speeds are chosen so
-  that the profile's accelerations can still stop them in time, which is what keeps a robot from
-  swinging past its heading and from running over its place.
+  Turning comes before driving: with a heading error above 60 degrees the robot turns on the spot;
+  the smaller the error, the faster it drives. The turn rate and the speed of approach are chosen
+  so that the profile's accelerations can stop the robot in time, so that it does not overshoot
+  its heading or its place.
   """
   alias Hal.{Pose, Profile, Twist}
 
-  # A part of the true braking power: the rest is for the lag of wheels and of a tick.
+  # The part of the profile's acceleration that is used for braking: the rest is a reserve for the
+  # lag of the wheels and of a tick.
   @braking 0.6
 
   @doc """
-  The speed of a robot with this heading that wants the velocity. With `reverse_from:` it
-  drives backwards instead of turning round when it would have to turn by more than that (radians).
+  The linear speed and turn rate of a robot with this heading that wants this planar velocity.
+  With `reverse_from:` it drives backwards instead of turning round if it would have to turn by
+  more than that angle (radians).
 
       iex> profile = Hal.Profile.magellan()
       iex> Robot.Navigation.Steering.twist({0.3, 0.0}, 0.0, profile)
@@ -47,8 +49,8 @@ defmodule Robot.Navigation.Steering do
     do: Twist.new(speed * alignment(error), turn_rate(error, profile))
 
   @doc """
-  An angle to turn by. What lies straight behind is always reached by turning left, so that noise
-  about half a turn cannot make a robot change its controller.
+  The angle to turn by. A direction straight behind is reached by turning left, so that noise near
+  half a turn does not make the robot change its direction of turning.
 
       iex> Robot.Navigation.Steering.turn_error(-3.14) > 0
       true
@@ -60,8 +62,8 @@ defmodule Robot.Navigation.Steering do
   end
 
   @doc """
-  How much of its speed a robot may drive while it points this much aside (radians): all when it
-  points there, nothing beyond 60 degrees.
+  The share of its speed that a robot may drive with this heading error (radians): 1 without an
+  error, 0 beyond 60 degrees.
 
       iex> {Robot.Navigation.Steering.alignment(0.0), Robot.Navigation.Steering.alignment(1.2)}
       {1.0, 0.0}
@@ -70,7 +72,7 @@ defmodule Robot.Navigation.Steering do
   def alignment(error), do: max(0.0, 2 * :math.cos(error) - 1)
 
   @doc """
-  The turn rate (rad/s) that takes an error of heading to zero without swinging past.
+  The turn rate (rad/s) that reduces a heading error to zero without overshoot.
 
       iex> profile = Hal.Profile.atrv_mini()
       iex> {Robot.Navigation.Steering.turn_rate(3.0, profile), Robot.Navigation.Steering.turn_rate(-3.0, profile)}
@@ -85,7 +87,7 @@ defmodule Robot.Navigation.Steering do
   end
 
   @doc """
-  The speed (m/s) at which to approach a place that is still `distance` metres away.
+  The speed (m/s) at which to approach a place that is `distance` metres away.
 
       iex> profile = Hal.Profile.magellan()
       iex> Robot.Navigation.Steering.approach(5.0, profile)

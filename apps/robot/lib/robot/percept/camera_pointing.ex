@@ -1,10 +1,10 @@
 defmodule Robot.Percept.CameraPointing do
   @moduledoc """
-  Where to turn the camera so that it looks at something while the body turns under it. Pure.
+  Computes where to point the camera so that it looks at an object while the body turns. Pure.
 
-  A command is for the tick that follows; by its end a body that turns by 0.4 rad/s has taken the
-  camera along by more than 2 degrees. So the turn is fed forward: the camera is told to look where
-  the thing will be then.
+  A command takes effect during the next tick; in that time a body that turns at 0.4 rad/s moves
+  the camera by more than 2 degrees. So the turn is fed forward: the camera points to where the
+  object will be, relative to the body, at the end of the tick.
   """
   alias Hal.Odometry
   alias Robot.Percept
@@ -13,8 +13,8 @@ defmodule Robot.Percept.CameraPointing do
   @ahead_s 0.1
 
   @doc """
-  The pan (radians, left positive) for a thing that now is in direction `bearing` from the body,
-  within what the camera can.
+  The pan (radians, left positive) for an object that is now in direction `bearing` from the body,
+  limited to the camera's pan range.
 
       iex> percept = %Robot.Percept{robot: :mag1, at_ms: 0, profile: Hal.Profile.magellan(),
       ...>   odometry: %Hal.Odometry{pose: Hal.Pose.new(0, 0), twist: Hal.Twist.new(0.0, 0.5)}}
@@ -29,7 +29,7 @@ defmodule Robot.Percept.CameraPointing do
     (bearing - @ahead_s * turn(percept)) |> max(-limit) |> min(limit)
   end
 
-  @doc "Whether the camera can look in this direction from the body."
+  @doc "Whether this direction from the body is within the camera's pan range."
   @spec within?(bearing :: float(), Percept.t()) :: boolean()
   def within?(bearing, %Percept{profile: profile}), do: abs(bearing) <= profile.camera.max_pan
 

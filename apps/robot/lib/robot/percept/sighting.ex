@@ -3,16 +3,18 @@ defmodule Robot.Percept.Sighting do
   Computes a direction and a place from a blob in a picture: pinhole camera, upright landmarks.
   Pure.
 
-  A picture is old when it is looked at: the robot has turned meanwhile. So `of/3` first takes the
-  direction to the map by the pose at exposure, and then looks at it from the present pose.
+  By the time a picture is evaluated, the robot may have turned. So `of/3` first converts the
+  direction to the map frame with the pose at exposure, and then to the body frame with the
+  present pose.
   """
   alias Hal.Pose
   alias Robot.Percept
   alias Vision.Blob
 
   @typedoc """
-  What the camera says about one coloured thing. `bearing` is relative to the body now, left
-  positive; `direction` is in the map frame, `nil` without a pose.
+  What the camera shows of one coloured object. `bearing` is relative to the body now, left
+  positive; `direction` is in the map frame, `nil` without a pose. Both are in radians; `distance`
+  is in metres, `nil` if it is unknown.
   """
   @type t :: %{
           bearing: float(),
@@ -22,7 +24,8 @@ defmodule Robot.Percept.Sighting do
           at_ms: integer()
         }
 
-  # Boxes this many pixels apart still touch: a border between two colours belongs to neither.
+  # Boxes up to this many pixels apart count as touching, because the border between two colours
+  # belongs to neither.
   @touch 3
   # A clipped blob that covers more of the picture than this is too near to be measured.
   @too_near_share 0.2
@@ -52,8 +55,8 @@ defmodule Robot.Percept.Sighting do
   end
 
   @doc """
-  Direction of a blob's centre seen from the robot's body, in radians, left positive: where the
-  camera looked, and the angle within the picture.
+  The direction of a blob's centre seen from the robot's body, in radians, left positive: the sum
+  of the camera's pan and the angle within the picture.
 
       iex> blob = %Vision.Blob{colour: "Y", area: 100, share: 0.01, x: 159.5, y: 1.0, left: 0, top: 0,
       ...>   right: 1, bottom: 1, width: 320, height: 240}
@@ -67,7 +70,7 @@ defmodule Robot.Percept.Sighting do
   end
 
   @doc """
-  Where a blob at `distance` (metres) in direction `bearing` stands, seen from `pose`.
+  The place of a blob at `distance` (metres) in direction `bearing`, seen from `pose`.
 
       iex> {x, y} = Robot.Percept.Sighting.place(Hal.Pose.new(1, 0, 0), 0.0, 2.0)
       iex> {x, y}
@@ -82,16 +85,16 @@ defmodule Robot.Percept.Sighting do
       })
 
   @doc """
-  The distance of a blob, or `nil` where nothing can be said: no constant for the colour, the blob
-  clipped by the picture's border, or something of another colour in front of it (boxes that
-  touch), which hides a part of its area.
+  The distance of a blob, or `nil` if it cannot be estimated: the colour has no constant, the
+  picture's border clips the blob, or something of another colour may hide a part of it (boxes
+  that touch).
   """
   @spec distance(Blob.t(), [Blob.t()]) :: float() | nil
   def distance(%Blob{clipped?: true}, _blobs), do: nil
 
   def distance(%Blob{} = blob, blobs), do: if(hidden?(blob, blobs), do: nil, else: blob.distance)
 
-  @doc "Whether something of another colour may hide a part of it: boxes that touch."
+  @doc "Whether something of another colour may hide a part of the blob: their boxes touch."
   @spec hidden?(Blob.t(), [Blob.t()]) :: boolean()
   def hidden?(%Blob{} = blob, blobs),
     do: Enum.any?(blobs, &(&1.colour != blob.colour and touch?(&1, blob)))
@@ -102,8 +105,9 @@ defmodule Robot.Percept.Sighting do
   end
 
   @doc """
-  How wide (in pixels) an upright cylinder of this radius at this distance (metres, of its axis) is in a picture of this width
-  and field of view (radians); `nil` from within.
+  The width (in pixels) of an upright cylinder of this radius, whose axis is at this distance
+  (metres), in a picture of this width and field of view (radians); `nil` from inside the
+  cylinder.
 
       iex> round(Robot.Percept.Sighting.width(0.2, 1.0, 320, :math.pi() / 3))
       113
@@ -116,7 +120,7 @@ defmodule Robot.Percept.Sighting do
 
   def width(_radius, _distance, _picture, _field_of_view), do: nil
 
-  @doc "The distance of an upright cylinder of this radius (metres) that a blob shows in all its width."
+  @doc "The distance of an upright cylinder of this radius (metres) with the width of this blob."
   @spec distance_by_width(Blob.t(), radius :: float(), field_of_view :: float()) :: float()
   def distance_by_width(%Blob{} = blob, radius, field_of_view) do
     focal = blob.width / 2 / :math.tan(field_of_view / 2)
@@ -124,8 +128,8 @@ defmodule Robot.Percept.Sighting do
   end
 
   @doc """
-  The horizontal field of view of the percept's picture: as it was taken, or what the unit says, or
-  the profile's.
+  The horizontal field of view of the percept's picture: as recorded with the picture, else as the
+  pan-tilt unit reports it, else as in the profile.
   """
   @spec field_of_view(Percept.t()) :: float()
   def field_of_view(%Percept{detections: %{field_of_view: angle}}) when angle != nil, do: angle
@@ -134,7 +138,8 @@ defmodule Robot.Percept.Sighting do
 
   @doc """
   The largest blob of a colour (`nil`: of any) with at least this share of the picture; `nil`
-  without one, or without a fresh picture. Of equally large ones the topmost, then the leftmost.
+  without one, or without a fresh picture. Among equally large blobs the topmost counts, then the
+  leftmost.
   """
   @spec largest(Percept.t(), String.t() | nil, float()) :: Blob.t() | nil
   def largest(percept, colour, min_share \\ 0.0)

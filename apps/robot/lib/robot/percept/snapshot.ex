@@ -1,16 +1,15 @@
 defmodule Robot.Percept.Snapshot do
   @moduledoc """
-  Takes a percept from the board: the newest value of each part of the robot, unless it is too
-  old.
+  Takes a percept from the board: the newest value of each reading, unless it is stale.
 
-  | reading | too old after |
+  | reading | stale after |
   |---|---|
   | odometry, sonar, infrared, bumpers, what the gate did | 300 ms |
   | pan-tilt, detections (by the time of their picture) | 500 ms |
   | battery | 5 s |
 
-  Peers have no limit here: whoever writes them says what became of them. The pose is not on it:
-  it is estimated from this percept.
+  Peers have no limit here: their writer keeps them up to date. The percept has no pose yet:
+  `Robot.Localiser` estimates it from this percept.
   """
   alias Robot.{Board, Percept}
 
@@ -25,12 +24,12 @@ defmodule Robot.Percept.Snapshot do
     power: 5_000
   ]
 
-  @typedoc "Looks up a key that may be so many milliseconds old."
+  @typedoc "Looks up a key whose value may be up to so many milliseconds old."
   @type fetch ::
           (key :: atom(), max_age_ms :: pos_integer() ->
              {:ok, term(), at_ms :: integer()} | :error)
 
-  @doc "The percept of this moment, from the board."
+  @doc "The percept at this time, from the board."
   @spec take(Board.t(), Hal.Profile.t(), at_ms :: integer()) :: Percept.t()
   def take(%Board{} = board, profile, at_ms) do
     build(
@@ -39,7 +38,7 @@ defmodule Robot.Percept.Snapshot do
     )
   end
 
-  @doc "Fills an empty percept from wherever the readings are kept. Pure where `fetch` is."
+  @doc "Fills an empty percept with the readings that `fetch` returns. Pure if `fetch` is."
   @spec build(Percept.t(), fetch()) :: Percept.t()
   def build(%Percept{} = percept, fetch) do
     Enum.reduce(@limits, percept, fn {key, limit_ms}, percept ->
