@@ -1,19 +1,21 @@
 defmodule Robot.Localiser do
   @moduledoc """
-  Where a robot is, and how sure that is: odometry from its start pose, corrected by sightings of
-  objects whose places it was told (`Robot.Localiser.Anchors`). Pure; the filter is
+  Estimates a robot's pose and its uncertainty: odometry from its start pose, corrected by
+  sightings of objects whose places it was given (`Robot.Localiser.Anchors`). Pure; the filter is
   `Robot.Localiser.Belief`, and `Robot.Localiser.Sightings` turns pictures into corrections.
 
-  Corrections run one way, from the leader down, so that no robot ever corrects itself by its own echo.
+  The anchors should come only from the leader and from robots nearer to it in the order, so that
+  no robot corrects itself with data that derives from its own pose.
 
-  Odometry that begins again in another frame (`Hal.Odometry`) moves the robot nowhere: it goes on from
-  where it was believed to be. The few decimetres of its stop that nobody counted are doubted.
+  When odometry begins again in another frame (`Hal.Odometry`), the estimate continues from the
+  last estimated pose. The uncertainty grows, because the last decimetres before the stop may not
+  have been counted.
   """
   alias Hal.{Odometry, Pose}
   alias Robot.Localiser.{Anchors, Belief, Frame, History, Sightings}
   alias Robot.Percept
 
-  # Odometry that begins farther from zero than this (metres, radians) has counted before.
+  # Odometry that begins farther from zero than this (metres, radians) was counting before.
   @put_down 0.1
 
   @enforce_keys [:start]
@@ -29,13 +31,13 @@ defmodule Robot.Localiser do
                 frame_no: nil
               ]
 
-  # Numbers of frames are told to others, who take none above half a billion.
+  # Frame numbers are sent to other robots, which accept none above half a billion.
   @numbers 400_000_000
 
   @typedoc """
-  `frame` is the one that the belief is in: `nil` for that of the start poses. `frame_no` numbers the frames that this robot's
-  own poses make for others: another one each time that it was started, that it came into another's frame, or began to be
-  corrected anew.
+  `frame` is the frame of the belief, `nil` for that of the start poses. `frame_no` numbers the
+  frames that this robot's own poses define for others: it changes when the robot is started, when
+  it comes into another frame, and when it gets marks after it had none.
   """
   @type t :: %__MODULE__{
           start: Pose.t(),
@@ -49,13 +51,13 @@ defmodule Robot.Localiser do
           frame_no: non_neg_integer() | nil
         }
 
-  @doc "A robot that was switched on at `start`, where its odometry said zero."
+  @doc "The localiser of a robot whose odometry reads zero at the pose `start`."
   @spec new(Pose.t()) :: t()
   def new(%Pose{} = start), do: %__MODULE__{start: start}
 
   @doc """
-  What to find the pose by from now on. In a frame that is new to it the robot is as much less sure as that
-  frame's robot is unsure of its own pose, and then by what that robot's odometry drifts.
+  Sets the references from now on. In a new frame, the pose's uncertainty grows by that of the
+  leader's own pose, and later by the drift of the leader's odometry.
   """
   @spec anchors(t(), Anchors.t()) :: t()
   def anchors(%{anchors: %{marks: before}} = localiser, %Anchors{frame: frame} = anchors) do
@@ -63,11 +65,12 @@ defmodule Robot.Localiser do
     if before == [] and anchors.marks != [], do: renumber(localiser), else: localiser
   end
 
-  # The first tick's time tells one start of a robot from another.
+  # The number begins with the time of the first tick, so that it differs between starts of a
+  # robot.
   defp renumber(%{frame_no: nil} = localiser), do: localiser
   defp renumber(%{frame_no: number} = localiser), do: %{localiser | frame_no: number + 1}
 
-  # Where a leader is believed to be stays true when nobody leads any more.
+  # The frame of the last leader remains valid when nobody leads any more.
   defp join(localiser, nil), do: localiser
   defp join(%{belief: nil} = localiser, _frame), do: localiser
 
@@ -75,7 +78,7 @@ defmodule Robot.Localiser do
     {way, turn, turned} = known.drift
     {now_way, now_turn, now_turned} = frame.drift
 
-    # Less drift than before has only a robot that was started anew.
+    # The drift decreases only if the leader was started again.
     if now_way >= way and now_turn >= turn and now_turned >= turned do
       belief =
         localiser.belief
@@ -90,7 +93,7 @@ defmodule Robot.Localiser do
 
   defp join(localiser, frame), do: change(localiser, frame)
 
-  # Where things are in the other frame has still to be seen.
+  # The marks of the former frame mean nothing in the new one.
   defp change(localiser, frame) do
     {position, heading} = between(localiser.frame, frame)
 
@@ -103,7 +106,8 @@ defmodule Robot.Localiser do
     renumber(%{localiser | frame: frame, belief: belief})
   end
 
-  # What nobody knows of one frame in another: one may have begun in the other, or both in the start poses.
+  # The uncertainty between two frames: one may be the base of the other, or both derive from the
+  # start poses.
   defp between(nil, frame), do: frame.start
   defp between(%{key: key}, %{base: key} = frame), do: {frame.position, frame.heading}
   defp between(%{base: key} = known, %{key: key}), do: {known.position, known.heading}
@@ -112,8 +116,9 @@ defmodule Robot.Localiser do
     do: {a + position, b + heading}
 
   @doc """
-  Moves the estimate by the percept's odometry, corrects it by the percept's detections, and fills in the percept's
-  `pose` and `uncertainty`, and the pose of its detections. Without odometry there is no pose.
+  Moves the estimate by the percept's odometry, corrects it by the percept's detections, and fills
+  in the percept's `pose` and `uncertainty`, and the pose of its detections. Without odometry
+  there is no pose.
   """
   @spec update(t(), Percept.t()) :: {Percept.t(), t()}
   def update(localiser, %Percept{odometry: nil} = percept),
@@ -157,7 +162,7 @@ defmodule Robot.Localiser do
   defp framed(%{odometry_frame: frame} = localiser, frame), do: localiser
   defp framed(%{belief: nil} = localiser, frame), do: %{localiser | odometry_frame: frame}
 
-  # Poses of the frame before mean nothing any more.
+  # Odometry poses of the former frame are no longer valid.
   defp framed(localiser, frame),
     do: %{
       localiser
@@ -181,7 +186,7 @@ defmodule Robot.Localiser do
     %{localiser | odometry: odometry, belief: Belief.move(localiser.belief, step)}
   end
 
-  # Every picture counts once. It was taken a moment ago, and the body may have turned since.
+  # Every picture counts once. It was taken a moment ago, and the body may have turned since then.
   defp see(localiser, %Percept{detections: nil}), do: localiser
   defp see(%{seen_ms: at_ms} = localiser, %Percept{detections: %{at_ms: at_ms}}), do: localiser
 
@@ -199,7 +204,7 @@ defmodule Robot.Localiser do
   defp remember(localiser, at_ms),
     do: %{localiser | history: History.note(localiser.history, at_ms, localiser.odometry)}
 
-  # Where the robot stood when the picture was taken.
+  # Adds the robot's pose at the time of the picture to the detections.
   defp exposed(%Percept{detections: nil} = percept, _localiser), do: percept
 
   defp exposed(%Percept{detections: %{at_ms: at_ms} = picture} = percept, localiser),
@@ -210,6 +215,6 @@ defmodule Robot.Localiser do
     back && Pose.compose(belief.pose, back)
   end
 
-  # It was started anew in the middle of its way: how it came there, and what corrected it, nobody knows any more.
+  # Whether the robot was started again on its way: its way there and its corrections are lost.
   defp driven?(%Pose{heading: heading}, way), do: way > @put_down or abs(heading) > @put_down
 end

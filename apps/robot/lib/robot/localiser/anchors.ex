@@ -1,25 +1,29 @@
 defmodule Robot.Localiser.Anchors do
   @moduledoc """
-  What a mission tells the localiser to correct the pose by: the frame, and the places of known
-  objects. Pure data.
+  The references by which the localiser corrects the pose, as a mission gives them: the frame, and
+  the places of known objects. Pure data and functions on it.
 
-  The frame is that of a robot that nobody corrects, the leader: what it believes of its own pose is so by definition,
-  and what it is unsure of, all others are unsure of: when they come into its frame, of its pose in the one that it was in
-  before it led (`base`), and from then on, of what its odometry adds.
+  The frame is that of the leader, whose pose nobody corrects: its own estimate defines the frame.
+  Its uncertainty is therefore part of the uncertainty of every robot in its frame. A robot that
+  joins the frame takes over the uncertainty of the leader's pose in the frame that the leader was
+  in before (`base`), and from then on what the leader's odometry adds.
   """
   alias Hal.Pose
 
   defstruct frame: nil, marks: []
 
-  # Nothing is known better than to a millimetre, and nothing nearer than a centimetre is beside another; in metres.
+  # Standard deviations count as at least this much, and places nearer to each other than this as
+  # the same; in metres.
   @least_sd 0.001
   @same_place 0.01
 
   @typedoc """
-  `key` tells one frame from another, `base` is the key of the one that its variances (`position`, `heading`: m2, rad2) are in,
-  `nil` for that of the start poses; `start` are the variances in the latter. `at` is where its robot believes itself to be. `drift` is
-  by what its odometry has drifted since it was started: variances of way and turn, and all angles turned (radians); `slip`
-  (a standard deviation) how well it knows what slips in each of them alike.
+  The frame of a leader. `key` identifies it. `position` and `heading` are the variances (m2,
+  rad2) of the leader's pose in the frame whose key is `base` (`nil`: the frame of the start
+  poses), `start` those in the frame of the start poses. `at` is the leader's estimate of its own
+  place. `drift` is what its odometry has added since its start: the variances of way and turn
+  (m2, rad2), and the sum of all angles turned (radians). `slip` is the standard deviation of the
+  leader's slip, which is the same in each radian turned.
   """
   @type frame :: %{
           key: term(),
@@ -33,16 +37,17 @@ defmodule Robot.Localiser.Anchors do
         }
 
   @typedoc """
-  Standard deviations of a place, in metres: in the direction (radians, in the frame) in which it is known worst, and
-  across.
+  Standard deviations of a place, in metres: along the direction (radians, in the frame) of its
+  greatest uncertainty, and across it.
   """
   @type spread :: {worst :: float(), least :: float(), direction :: float()}
 
   @typedoc """
-  Something of a colour at a place (metres, in the frame), and how well that is known. One that is no `reference?` may be
-  seen and taken for another, but nothing is measured by it. A `:landmark` is the only thing of
-  its colour; of robots there are many, and only a blob as wide as a cylinder of the `radius` (metres) is one.
-  `common` is the part of its error that all robots have alike (`common/3`).
+  An object of a colour at a place (metres, in the frame), and the uncertainty of that place. A
+  mark that is not a `reference?` may be seen and mistaken for another one, but is not used for
+  measurements. A `:landmark` is taken to be the only object of its colour. There may be many
+  robots; a blob can be one of them if it is about as wide as a cylinder of this `radius`
+  (metres). `common` is the part of the place's error that all robots share (`common/3`).
   """
   @type mark :: %{
           key: term(),
@@ -69,7 +74,7 @@ defmodule Robot.Localiser.Anchors do
   end
 
   @doc """
-  Its covariance: variances of x and y, and between them that of both.
+  The covariance of a place: the variance of x, the covariance of x and y, the variance of y.
 
       iex> Robot.Localiser.Anchors.covariance({0.5, 0.25, 0.0})
       {0.25, 0.0, 0.0625}
@@ -81,13 +86,15 @@ defmodule Robot.Localiser.Anchors do
     {w * c * c + l * s * s, (w - l) * c * s, w * s * s + l * c * c}
   end
 
-  # The coefficient of correlation of two robots' errors across is the square of it.
+  # The square of this is the coefficient of correlation between the errors of two robots across
+  # the line from the leader.
   @common_share 0.8
 
   @doc """
-  The part of a robot's error that the robots ahead have in common with it, one standard deviation of it as a vector
-  (metres). All of them hang from the leader at `leader`: where one is turned about it, those that found their places by
-  it are turned with it. So it points across the line from the leader; what is at the leader's place has none.
+  The part of a robot's position error that the robots ahead share, as a vector of one standard
+  deviation (metres). The poses of all of them derive from the leader at `leader`: if one is
+  rotated about the leader, those that found their places by it are rotated too. So the vector
+  points across the line from the leader; a robot at the leader's place has none.
 
       iex> Robot.Localiser.Anchors.common({0.1, 0.1, 0.0}, {-5.0, 0.0}, {0.0, 0.0})
       {0.0, -0.08}
@@ -107,7 +114,8 @@ defmodule Robot.Localiser.Anchors do
     along = (ux * :math.cos(direction) + uy * :math.sin(direction)) / max(worst, @least_sd)
     across = (uy * :math.cos(direction) - ux * :math.sin(direction)) / max(least, @least_sd)
 
-    # The longest vector in this direction that the ellipse holds: what is left of it is a covariance, too.
+    # A share of the longest vector in this direction within the ellipse, so that the remainder is
+    # still a covariance.
     size = @common_share / :math.sqrt(along * along + across * across)
     {ux * size, uy * size}
   end

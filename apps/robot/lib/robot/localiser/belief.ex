@@ -3,56 +3,62 @@ defmodule Robot.Localiser.Belief do
   A pose and its uncertainty: an extended Kalman filter, moved by odometry and corrected by one
   scalar measurement after another. Pure.
 
-  Its states are x, y and heading, and what makes them wrong again and again:
+  Its states are x, y and heading, and the systematic errors behind them:
 
-  | state | is |
+  | state | meaning |
   |---|---|
-  | slip | by which share the robot turns farther to the left than its wheels say, and less far to the right (R74) |
-  | two scales | by which share distances come out too long: by the size of the landmark, by the width of a robot |
-  | slip of the leader | the same of the robot in whose frame the pose is, as far as nobody knows it there |
-  | common error | what is wrong with the places of all robots ahead alike, in standard deviations; never estimated |
-  | x, y of each mark | how far a thing that was told is from where it was told to be |
+  | slip | the share by which it turns farther left, and less far right, than by odometry (R74) |
+  | two scales | the shares by which distances are measured too long: to the landmark, to robots |
+  | slip of the leader | the same for the leader of the frame, as far as unknown to the leader |
+  | common error | the error shared by the places of all robots ahead (sd 1), never estimated |
+  | x, y of each mark | the offset of an object from its reported place |
 
-  `drift` is by what it has come away from its own former self by odometry alone, which is what matters to those whose
-  poses hang from its own: variances of its way and of its turns (m2, rad2), and all angles turned so far (radians), for
-  what slips in each of them alike.
+  `drift` is the uncertainty that dead reckoning alone has added, which matters to robots whose
+  poses derive from this one: the variances of its way and of its turns (m2, rad2), and the sum of
+  all angles turned so far (radians), because the slip is the same in each of them.
 
-  With the last state, a mark that is seen a thousand times makes nobody surer than its own place is: Smith, Self
-  and Cheeseman 1990. Robots ahead that found their places by each other are no independent witnesses: their common error
-  is a state that no measurement corrects and nobody becomes surer of (consider filter: Schmidt 1966, Jazwinski 1970), so
-  that however many of them are seen as blobs, the pose is as unsure as what they have in common. A pose that was found
-  by their silhouettes counts as independent of it. Odometry: Siegwart and Nourbakhsh 2004. What is farther off than
-  three standard deviations is not believed (Bar-Shalom, Li and Kirubarajan 2001).
+  Because the offsets of marks are states, even a thousand sightings of a mark do not make the
+  pose more certain than the place of the mark (Smith, Self and Cheeseman 1990). Robots ahead that
+  found their places by each other are not independent: their common error is a state that no
+  measurement corrects and whose variance never shrinks (consider filter: Schmidt 1966, Jazwinski
+  1970), so that however many of them are seen as blobs, the pose stays at least as uncertain as
+  their common error. A pose that was found by their silhouettes counts as independent of it.
+  Odometry model: Siegwart and Nourbakhsh 2004. A gate rejects measurements whose innovation is
+  larger than three standard deviations (Bar-Shalom, Li and Kirubarajan 2001).
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Consistency, Covariance}
 
-  # x, y, heading, slip, the scales of the landmark and of robots, the leader's slip, the common error.
+  # Initial standard deviations of x, y, heading, slip, the scales of the landmark and of robots,
+  # the leader's slip, and the common error.
   @slip_sd 0.055
   @start_sd [0.03, 0.03, 0.02, @slip_sd, 0.06, 0.08, 0.0, 1.0]
   @own length(@start_sd)
   @common @own - 1
-  # Variances of odometry: of a metre driven, along it (m2) and in angle (rad2), and of a radian turned. They
-  # grow with the way, however many steps it is told in.
+  # Variances of odometry: per metre driven, of the position (m2, in x and in y) and of the
+  # heading (rad2), and per radian turned, of the heading. The sum does not depend on the number
+  # of steps in which a way is reported.
   @way_variance 1.0e-5
   @bend_variance 1.0e-5
   @turn_variance 2.5e-4
-  # How much slip changes, in a radian turned.
+  # The standard deviation of the change of slip in a radian turned.
   @slip_change 0.005
   @gate 9.0
-  # Where measurements go on contradicting the estimate, it is the estimate that is doubted: a
-  # refusal counts two, one that is believed takes one back.
+  # If measurements keep contradicting the estimate, the estimate is doubted: a rejected
+  # measurement adds two to a counter, an accepted one subtracts one.
   @doubt 16
   @doubt_sd 0.3
-  # So many more pictures that contradict the pose as a whole than such that do not make it doubtful.
+  # The pose is doubted when a counter reaches this: a picture that contradicts the pose as a
+  # whole adds one, a consistent one subtracts one.
   @contradictions 6
-  # Marks beyond these take the place of the one that was seen least lately.
+  # With this many marks, a new one replaces the one that was used least recently.
   @marks 6
-  # A thing that was told to be so far from before is another one, in metres.
+  # A mark whose reported place moves by more than this (metres) counts as another object.
   @elsewhere 1.0
-  # What does not change with the position has no direction.
+  # Prevents division by zero for a measurement that does not depend on the position.
   @no_way 1.0e-9
-  # A thing whose place is known better than by this share of what was known, says something new.
+  # A mark starts anew if its reported standard deviation falls below this share of the former
+  # one.
   @surer 0.75
 
   @enforce_keys [:pose, :covariance]
@@ -68,7 +74,10 @@ defmodule Robot.Localiser.Belief do
                 drift: {0.0, 0.0, 0.0}
               ]
 
-  @typedoc "`told` is where it was told to be, `sd` how well that was known on average, `off` how far it is from there."
+  @typedoc """
+  `told` is the reported place, `sd` its standard deviation averaged over all directions, `off`
+  the estimated offset of the object from it, `used` the number of its last use.
+  """
   @type mark :: %{
           key: term(),
           told: Pose.point(),
@@ -88,17 +97,17 @@ defmodule Robot.Localiser.Belief do
           contradicted: non_neg_integer(),
           drift: {way :: float(), turn :: float(), turned :: float()}
         }
-  @typedoc "How a measurement changes with x, y and heading, and with the scales."
+  @typedoc "The derivatives of a measurement with respect to x, y and heading, and to the scales."
   @type slope :: {{float(), float(), float()}, {float(), float()}}
 
-  @doc "A robot that was put down at a pose by hand."
+  @doc "The belief of a robot that was put down at a pose by hand."
   @spec new(Pose.t()) :: t()
   def new(%Pose{} = pose),
     do: %__MODULE__{pose: pose, covariance: Covariance.diagonal(@start_sd)}
 
   @doc """
-  Standard deviations: of the position along its worst direction and across it, in metres; of the heading, in
-  radians.
+  Standard deviations: of the position, along the direction of its greatest uncertainty and across
+  it, in metres; of the heading, in radians.
 
       iex> Robot.Localiser.Belief.sd(Robot.Localiser.Belief.new(Hal.Pose.new(1, 0)))
       {0.03, 0.03, 0.02}
@@ -109,7 +118,10 @@ defmodule Robot.Localiser.Belief do
     {worst, least, root(hh)}
   end
 
-  @doc "Standard deviations of the position: along its worst direction and across it, and that direction (radians, in the frame)."
+  @doc """
+  Standard deviations of the position, along the direction of its greatest uncertainty and across
+  it, in metres, and that direction (radians, in the frame).
+  """
   @spec spread(t()) :: Anchors.spread()
   def spread(%__MODULE__{covariance: [[xx, xy | _], [_, yy | _] | _]}) do
     half = (xx + yy) / 2
@@ -120,7 +132,7 @@ defmodule Robot.Localiser.Belief do
   defp root(square), do: :math.sqrt(max(square, 0.0))
 
   @doc """
-  The standard deviation of its slip.
+  The standard deviation of the slip.
 
       iex> Robot.Localiser.Belief.slip_sd(Robot.Localiser.Belief.new(Hal.Pose.new(1, 0)))
       0.055
@@ -130,8 +142,9 @@ defmodule Robot.Localiser.Belief do
     do: root(variance)
 
   @doc """
-  The radius round the estimate that holds the robot in 95 of 100 cases, in metres: 1.96 standard deviations of
-  an error along a line, 2.45 of one in all directions, and between them by a fit to the table of circular errors.
+  The radius (metres) round the estimate within which the robot is in 95 of 100 cases, by the
+  filter's covariance: 1.96 standard deviations if the error has one direction only, 2.45 if it is
+  equal in all directions, and in between a fit to the table of circular errors.
 
       iex> Float.round(Robot.Localiser.Belief.radius(Robot.Localiser.Belief.new(Hal.Pose.new(1, 0))), 3)
       0.073
@@ -144,7 +157,7 @@ defmodule Robot.Localiser.Belief do
   end
 
   @doc """
-  Moved by a step of odometry, given in the robot's own frame.
+  The belief moved by a step of odometry, given in the robot's own frame.
 
       iex> belief = Robot.Localiser.Belief.new(Hal.Pose.new(1, 0))
       iex> Robot.Localiser.Belief.move(belief, Hal.Pose.new(0.5, 0)).pose
@@ -178,7 +191,8 @@ defmodule Robot.Localiser.Belief do
     %{belief | pose: pose, covariance: covariance, drift: drift}
   end
 
-  # F = [1 0 a au/2; 0 1 b bu/2; 0 0 1 u; 0 0 0 1]: the way turns with the heading, half of the slip with it.
+  # F = [1 0 a au/2; 0 1 b bu/2; 0 0 1 u; 0 0 0 1]: the way turns with the heading and with half
+  # of the slip.
   defp motion([x, y, heading, slip | rest], a, b, u) do
     [
       mix(x, a, heading, a * u / 2, slip),
@@ -192,8 +206,8 @@ defmodule Robot.Localiser.Belief do
   defp mix([a | as], p, [b | bs], q, [c | cs]), do: [a + p * b + q * c | mix(as, p, bs, q, cs)]
 
   @doc """
-  By how much (radians) the heading goes along with each metre of the position in the direction of a unit vector, as far as
-  both are unsure together.
+  The expected error of the heading (radians) for each metre of error of the position in the
+  direction of a unit vector, by their covariance.
   """
   @spec turn_along(t(), {float(), float()}) :: float()
   def turn_along(belief, {x, y}) do
@@ -201,7 +215,10 @@ defmodule Robot.Localiser.Belief do
     if variance > 0.0, do: turn / variance, else: 0.0
   end
 
-  @doc "Measured to be `way` metres farther in the direction of a unit vector, by this standard deviation."
+  @doc """
+  The belief after a measurement, with this standard deviation, that the position is `way` metres
+  farther in the direction of a unit vector.
+  """
   @spec shifted(t(), {float(), float()}, way :: float(), sd :: float()) :: t()
   def shifted(belief, {x, y}, way, sd) do
     {v, variance} = Covariance.project(belief.covariance, [x, y])
@@ -209,7 +226,7 @@ defmodule Robot.Localiser.Belief do
     believe(belief, v, way / s, reduce(belief.covariance, v, s))
   end
 
-  @doc "The variance of what is measured of the pose alone, whose value changes so with x, y and heading."
+  @doc "The variance of a quantity of the pose with these derivatives by x, y and heading."
   @spec variance(t(), {float(), float(), float()}) :: float()
   def variance(belief, {a, b, c}) do
     {_v, variance} = Covariance.project(belief.covariance, [a, b, c])
@@ -217,8 +234,9 @@ defmodule Robot.Localiser.Belief do
   end
 
   @doc """
-  The variance of what is measured between the pose and a mark, as it was told: what both have in common does not
-  count. The value changes so with x, y and heading, and as much the other way with the mark's place.
+  The variance of a quantity between the pose and the reported place of a mark, without the error
+  that both share. It has these derivatives by x, y and heading, and the negative ones of x and y
+  by the mark's place.
   """
   @spec variance(t(), {float(), float(), float()}, Anchors.mark()) :: float()
   def variance(belief, {a, b, c}, %{sd: spread, common: {x, y}}) do
@@ -229,8 +247,9 @@ defmodule Robot.Localiser.Belief do
   end
 
   @doc """
-  Where a thing is that was told to be at `at`, known by `spread`, of which it has `common` in common with all robots
-  (`Robot.Localiser.Anchors.common/3`): there, as long as nobody has seen it, and then where it was seen to be.
+  The estimated place of a mark that was reported at `at`, with the uncertainty `spread`, of which
+  all robots share `common` (`Robot.Localiser.Anchors.common/3`): the reported place at first, and
+  then that place corrected by its sightings. Adds the mark to the states if it is new.
   """
   @spec meet(t(), key :: term(), Pose.point(), Anchors.spread(), common :: Pose.point()) ::
           {t(), Pose.point()}
@@ -254,7 +273,7 @@ defmodule Robot.Localiser.Belief do
     end
   end
 
-  # Told to be elsewhere, or with less certainty, it may be off by that much more.
+  # If the reported place moved or became less certain, the offset may be larger by that much.
   defp tell(belief, index, mark, at, sd, moved) do
     less_sure = sd * sd > 2 * mark.sd * mark.sd
     more = if less_sure, do: sd * sd - mark.sd * mark.sd, else: 0.0
@@ -296,7 +315,7 @@ defmodule Robot.Localiser.Belief do
     }
   end
 
-  @doc "Without marks, and nothing in common with any: what they were in is over."
+  @doc "The belief without marks, and without correlation with their common error."
   @spec forget(t()) :: t()
   def forget(%__MODULE__{marks: []} = belief),
     do: %{belief | covariance: Covariance.replace(belief.covariance, @common, 1.0)}
@@ -304,8 +323,9 @@ defmodule Robot.Localiser.Belief do
   def forget(belief), do: belief |> drop(length(belief.marks) - 1) |> forget()
 
   @doc """
-  Corrected by one measurement of a mark (`meet/4`): its `error` (measured minus expected), how the expected value
-  changes, and the variance of its noise. K = P H' / S, x + K e, P - K S K'.
+  The belief corrected by one measurement of a mark (`meet/5`): the innovation `error` (measured
+  minus expected value), the derivatives of the expected value, and the variance of the noise.
+  K = P H' / S, x + K e, P - K S K'.
   """
   @spec correct(t(), key :: term(), float(), slope(), noise :: float()) :: t()
   def correct(belief, key, error, {{a, b, c}, {k, l}}, noise) do
@@ -319,7 +339,7 @@ defmodule Robot.Localiser.Belief do
       else: believe(belief, v, error / s, reduce(belief.covariance, v, s))
   end
 
-  # The gain of the common error is left at nothing: covariances with it fall, its variance does not.
+  # The gain of the common error is zero: its covariances shrink, its variance does not.
   defp reduce(covariance, v, s) do
     covariance
     |> Covariance.reduce(v, s)
@@ -348,14 +368,16 @@ defmodule Robot.Localiser.Belief do
 
   defp shift({x, y}, {dx, dy}), do: {x + dx, y + dy}
 
-  # Wheels that slip take the estimate farther than odometry admits; then it has to be found again.
+  # Slipping wheels may cause a larger error than the odometry model allows; then the position
+  # must be found again.
   defp refuse(%{refused: refused} = belief) when refused < @doubt,
     do: %{belief | refused: refused + 2}
 
   defp refuse(belief), do: doubt(belief)
 
   @doc """
-  Held against a whole picture (`Robot.Localiser.Consistency`): pictures that go on contradicting the pose make it doubtful.
+  The belief after the verdict on a whole picture (`Robot.Localiser.Consistency`): if pictures
+  keep contradicting the pose, it is doubted.
 
       iex> belief = Robot.Localiser.Belief.new(Hal.Pose.new(1, 0))
       iex> weigh = fn belief, times, verdict ->
@@ -379,7 +401,10 @@ defmodule Robot.Localiser.Belief do
 
   def weigh(belief, :contradicted), do: %{belief | contradicted: belief.contradicted + 1}
 
-  @doc "The same pose, of which one is less sure by decimetres: something happened that nobody measured."
+  @doc """
+  The same pose with more uncertainty, by a standard deviation of 0.3 m and 0.3 rad: something
+  happened that was not measured.
+  """
   @spec doubt(t()) :: t()
   def doubt(%__MODULE__{} = belief) do
     variance = @doubt_sd * @doubt_sd

@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Columns do
   @moduledoc """
-  Sets of columns of a camera picture, which is divided into 59 of equal width. Pure.
+  Sets of columns of a camera picture, which is divided into 59 columns of equal width. Pure.
 
   A set is an integer, one bit for each column; bit 0 is the leftmost.
   """
@@ -10,15 +10,16 @@ defmodule Robot.Localiser.Columns do
   alias Robot.Percept.Sighting
   alias Vision.Blob
 
-  # One bit less than a small integer of the virtual machine has.
+  # A non-negative small integer of a 64-bit virtual machine has this many bits.
   @columns 59
-  # Farther aside than this of where the camera points nothing is in a picture, in radians.
+  # Directions farther than this (radians) from the camera's axis count as outside the picture.
   @aside 1.3
 
   @type t :: non_neg_integer()
 
   @doc """
-  The columns that a disc fills, which is seen in a direction (radians, from where the robot heads) under twice `half` radians.
+  The columns that a disc fills whose middle is in direction `bearing` (radians, from the robot's
+  heading) and whose apparent width is twice `half` (radians).
 
       iex> picture = %Vision.Detections{at_ms: 0, blobs: []}
       iex> percept = %Robot.Percept{profile: Hal.Profile.magellan(), at_ms: 0, detections: picture}
@@ -34,14 +35,14 @@ defmodule Robot.Localiser.Columns do
       else: project(bearing + half, bearing - half, Sighting.field_of_view(percept))
   end
 
-  # Left is where bearings are greater.
+  # The left border has the greater bearing.
   defp project(left, right, view) do
     focal = @columns / 2 / :math.tan(view / 2)
     column = fn bearing -> round(@columns / 2 - focal * :math.tan(bearing)) end
     between(column.(min(left, @aside)), column.(max(right, -@aside)) - 1)
   end
 
-  @doc "The columns that blobs of some colours fill."
+  @doc "The columns that the blobs of these colours fill."
   @spec seen([Blob.t()], colours :: [String.t()]) :: t()
   def seen(blobs, colours) do
     for blob <- blobs, blob.colour in colours, reduce: 0 do
@@ -65,7 +66,7 @@ defmodule Robot.Localiser.Columns do
   @spec without(t(), t()) :: t()
   def without(a, b), do: a &&& bnot(b)
 
-  @doc "The columns that are in one of the two sets only."
+  @doc "The columns that are in exactly one of the two sets."
   @spec difference(t(), t()) :: t()
   def difference(a, b), do: bxor(a, b)
 

@@ -2,28 +2,31 @@ defmodule Robot.Localiser.Consistency do
   @moduledoc """
   Tests whether a whole picture is consistent with the estimated pose. Pure.
 
-  A filter that took one robot for another is wrong and sure of itself: from then on it matches what happens to fit and has no
-  use for the rest. But the rest is in the picture: robots where none can be, or none where one must be.
-  Where both the robot and the others may be is a matter of their standard deviations; beyond 2.5 of them a picture
-  contradicts the estimate. `Robot.Localiser.Belief.weigh/2` counts such pictures.
+  A filter that has mistaken one robot for another is wrong and overconfident: from then on it
+  uses the blobs that happen to match and ignores the others. But the picture shows the
+  contradiction: robots where there can be none, or no robot where there must be one. The possible
+  places of this robot and of the others follow from their standard deviations; a picture
+  contradicts the estimate if enough columns do not fit within 2.5 of them.
+  `Robot.Localiser.Belief.weigh/2` counts such pictures.
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief, Columns}
   alias Robot.Percept
 
   @sds 2.5
-  # What blobs' borders are off by, in radians.
+  # The standard deviation of a blob's border, in radians.
   @border_sd 0.01
-  # So many columns (of `Robot.Localiser.Columns`) contradict.
+  # The least number of columns (`Robot.Localiser.Columns`) that is a contradiction.
   @columns 3
-  # A robot that is farther away may stand behind a wall, in metres.
+  # A robot that is farther away than this (metres) may be hidden by a wall.
   @in_sight 3.0
 
   @type verdict :: :consistent | :contradicted | :unknown
 
   @doc """
-  What a percept's picture, taken `back` of where the robot is now, says of the belief: `:unknown` where it shows no robot and
-  none must be seen.
+  Compares the percept's picture with the belief; `back` is the pose at exposure, relative to the
+  robot's present pose. `:unknown` if the picture shows no robot and need not show one, or if no
+  robots are given.
   """
   @spec judge(Belief.t(), [Anchors.mark()], Percept.t(), back :: Pose.t()) :: verdict()
   def judge(_belief, [], _percept, _back), do: :unknown
@@ -58,7 +61,7 @@ defmodule Robot.Localiser.Consistency do
     end)
   end
 
-  # The columns that a robot may fill, and those that it must.
+  # The columns that a robot may fill, and those that it must fill.
   defp spans(mark, belief, exposed, percept) do
     distance = max(Pose.distance(exposed, mark.at), mark.radius)
     half = :math.asin(mark.radius / distance)
@@ -72,7 +75,7 @@ defmodule Robot.Localiser.Consistency do
     {Columns.span(bearing, half + doubt, percept), must}
   end
 
-  # The direction of a thing is as unsure as the places of both, across the line between them.
+  # The uncertainty of a direction is that of both places across the line between them.
   defp bearing_sd(belief, exposed, %{at: {x, y}} = mark) do
     {dx, dy} = {x - exposed.x, y - exposed.y}
     square = max(dx * dx + dy * dy, 0.09)

@@ -3,7 +3,7 @@ defmodule Robot.Localiser.Covariance do
   A covariance matrix as a list of its rows, and the operations of an extended Kalman filter on
   it. Pure.
 
-  No matrix has more than 20 rows, so that lists are as fast as anything.
+  A belief has at most 20 states, for which lists are fast enough.
   """
 
   @type t :: [[float()]]
@@ -21,7 +21,7 @@ defmodule Robot.Localiser.Covariance do
   end
 
   @doc """
-  F P F', where `rows` computes F A of the rows of any matrix A.
+  F P F', where `rows` computes F A from the rows of any matrix A.
 
       iex> Robot.Localiser.Covariance.carry([[1.0, 0.0], [0.0, 4.0]], fn [a, b] -> [b, a] end)
       [[4.0, 0.0], [0.0, 1.0]]
@@ -32,7 +32,7 @@ defmodule Robot.Localiser.Covariance do
   defp transpose(rows), do: Enum.zip_with(rows, & &1)
 
   @doc """
-  With more variance in the first states, one for each of the list.
+  The matrix with these variances added to its first states.
 
       iex> Robot.Localiser.Covariance.add([[1.0, 0.5], [0.5, 1.0]], [2.0])
       [[3.0, 0.5], [0.5, 1.0]]
@@ -40,7 +40,7 @@ defmodule Robot.Localiser.Covariance do
   @spec add(t(), [float()]) :: t()
   def add(p, variances), do: add(p, variances, 0)
 
-  @doc "The same from the state `index` on."
+  @doc "The matrix with these variances added to its states from `index` on."
   @spec add(t(), [float()], index :: non_neg_integer()) :: t()
   def add(p, variances, index) do
     variances
@@ -51,8 +51,8 @@ defmodule Robot.Localiser.Covariance do
   end
 
   @doc """
-  With new states of this covariance behind the others. Each of them changes by its share of `shares` with the state
-  `index`, and is correlated with the others by that only.
+  The matrix with new states of this covariance after the others. Each new state depends on the
+  state `index` by its share of `shares`, and is correlated with the others only through it.
 
       iex> Robot.Localiser.Covariance.append([[1.0]], [[0.25]], 0, [0.0])
       [[1.0, 0.0], [0.0, 0.25]]
@@ -68,7 +68,7 @@ defmodule Robot.Localiser.Covariance do
   end
 
   @doc """
-  With this standard deviation of one state, correlated with nothing, in place of what was known of it.
+  The matrix with one state replaced: with this standard deviation and no correlation.
 
       iex> Robot.Localiser.Covariance.replace([[1.0, 0.5], [0.5, 1.0]], 1, 2.0)
       [[1.0, 0.0], [0.0, 4.0]]
@@ -87,7 +87,7 @@ defmodule Robot.Localiser.Covariance do
   end
 
   @doc """
-  Without these states.
+  The matrix without the `count` states from `index` on.
 
       iex> Robot.Localiser.Covariance.drop([[1.0, 2.0, 3.0], [2.0, 5.0, 6.0], [3.0, 6.0, 9.0]], 1, 2)
       [[1.0]]
@@ -99,8 +99,8 @@ defmodule Robot.Localiser.Covariance do
   end
 
   @doc """
-  P H' and H P H' of a measurement whose expected value changes by `slope` (H) with the states; states that
-  are not in it do not change it.
+  P H' and H P H' for a measurement whose expected value has the derivatives `slope` (H) by the
+  states; if H is shorter than the state, its other derivatives are zero.
 
       iex> Robot.Localiser.Covariance.project([[2.0, 1.0], [1.0, 3.0]], [1.0])
       {[2.0, 1.0], 2.0}
@@ -111,7 +111,7 @@ defmodule Robot.Localiser.Covariance do
     {v, dot(v, slope)}
   end
 
-  @doc "P - v v' / s: what is left of it after a measurement (`project/2`) of the variance `s`."
+  @doc "P - v v' / s: the covariance after a measurement (`project/2`) of innovation variance s."
   @spec reduce(t(), [float()], float()) :: t()
   def reduce(p, v, s), do: for({row, x} <- Enum.zip(p, v), do: less(row, v, x / s))
 

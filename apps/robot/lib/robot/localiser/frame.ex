@@ -6,23 +6,28 @@ defmodule Robot.Localiser.Frame do
   alias Hal.Pose
   alias Robot.Localiser.{Belief, Covariance}
 
-  # Beyond these nobody knows anything, and linear algebra less: metres, radians.
+  # Greater standard deviations mean that the pose is unknown, and the linear model would not
+  # hold: metres, radians. Distances from the leader are limited to the last value (metres).
   @lost_position 5.0
   @lost_heading 1.0
   @far 100.0
-  # Where one is that nobody saw go, in metres and per metre, and how it is turned: by what slips in a whole turn.
+  # The uncertainty of a robot that was started again on its way: of its position, in metres and
+  # per metre from its start, and of its heading, in radians, to allow for the slip of whole
+  # turns.
   @lost_sd 0.5
   @lost_share 0.4
   @lost_turn 0.6
-  # A leader that is said to have turned by more since it was last heard, in radians.
+  # The greatest turn of a leader between two of its reports that is taken into account, in
+  # radians.
   @turned_at_once 100.0
-  # The state of a belief that is its leader's slip, and how much that changes in a radian turned.
+  # The index of the leader's slip among the states of a belief, and the standard deviation of its
+  # change in a radian turned.
   @leader_slip 6
   @slip_change 0.005
 
   @doc """
-  The same pose in the frame of somebody at `at` who is sure of its own pose by these variances only (m2, rad2):
-  its frame may have moved, and turned about it.
+  The same pose in the frame of a leader at `at` whose own pose has these variances (m2, rad2):
+  its frame may have moved, and turned about the leader.
   """
   @spec reframe(
           Belief.t(),
@@ -42,15 +47,15 @@ defmodule Robot.Localiser.Frame do
         for({p, k} <- Enum.zip(own, turn), do: p + heading * g * k) ++ others
       end
 
-    # An arc is no line: by how much it bends is unsure, too (second order of the turn; a mean that is left
-    # where it was counts as variance).
+    # The second-order term of the turn, because an arc is not a line; the mean is not moved, so
+    # its error counts as variance.
     {dx, dy, 1.0} = List.to_tuple(turn)
     bend = 0.75 * heading * heading * (dx * dx + dy * dy)
     more = position + bend
     %{belief | covariance: Covariance.add(rows ++ rest, [more, more])}
   end
 
-  @doc "In the frame of another leader, whose slip is known by this standard deviation."
+  @doc "The belief in the frame of another leader, whose slip has this standard deviation."
   @spec led(Belief.t(), slip_sd :: float()) :: Belief.t()
   def led(belief, sd),
     do: %{
@@ -60,8 +65,9 @@ defmodule Robot.Localiser.Frame do
     }
 
   @doc """
-  After the leader, at `at`, has turned by so many radians, to whichever side: where it slips in each of them alike, all
-  that it tells is turned about it by as much the other way.
+  The belief after the leader, at `at`, has turned by this sum of angles (radians), left and right
+  alike: if the leader's slip is the same in each radian, all places that it reports are rotated
+  about it by the same angle in the opposite direction.
   """
   @spec slipped(Belief.t(), at :: Pose.point(), turned :: float()) :: Belief.t()
   def slipped(belief, _at, turned) when turned <= 0.0, do: belief
@@ -90,13 +96,13 @@ defmodule Robot.Localiser.Frame do
   defp plus([], _k, []), do: []
   defp plus([a | as], k, [b | bs]), do: [a + k * b | plus(as, k, bs)]
 
-  # How x, y and heading change with an angle about somebody there.
+  # The derivatives of x, y and heading by an angle of rotation about a place.
   defp swing(pose, at) do
     {x, y} = near(pose, at)
     [y - pose.y, pose.x - x, 1.0]
   end
 
-  # What turns about somebody so far away is lost anyway.
+  # A greater distance would give no more information: the robot is lost anyway.
   defp near(pose, {x, y} = at) do
     distance = Pose.distance(pose, at)
     share = if distance > @far, do: @far / distance, else: 1.0
@@ -104,8 +110,8 @@ defmodule Robot.Localiser.Frame do
   end
 
   @doc """
-  The same pose, of a robot that was started when its odometry had counted already: so many metres as the crow flies, in
-  how many turns nobody knows.
+  The same pose with the uncertainty of a robot that was started when its odometry had already
+  counted `way` metres, in a straight line from its zero; the turns on this way are unknown.
   """
   @spec lost(Belief.t(), way :: float()) :: Belief.t()
   def lost(%Belief{} = belief, way) do

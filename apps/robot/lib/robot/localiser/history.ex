@@ -1,25 +1,25 @@
 defmodule Robot.Localiser.History do
   @moduledoc """
-  Where odometry was at the last ticks, for pictures that are older than now. Pure.
+  The poses of odometry at the last ticks, for pictures that were taken a moment ago. Pure.
   """
   alias Hal.Pose
 
   @most 12
 
-  @typedoc "The newest first; times in milliseconds."
+  @typedoc "The newest entry first; times in milliseconds."
   @type t :: [{at_ms :: integer(), odometry :: Pose.t()}]
 
-  @doc "Nothing remembered."
+  @doc "An empty history."
   @spec new() :: t()
   def new, do: []
 
-  @doc "With one tick more, and the oldest forgotten."
+  @doc "The history with one more tick; it keeps the last 12."
   @spec note(t(), integer(), Pose.t()) :: t()
   def note(history, at_ms, odometry), do: Enum.take([{at_ms, odometry} | history], @most)
 
   @doc """
-  Where the robot was at a time, seen from where odometry has it now. Between two ticks the way is taken in
-  proportion; of what is before all that is remembered nobody knows: `nil`.
+  The robot's pose at a time, relative to its present pose by odometry. Between two ticks the pose
+  is interpolated; `nil` for a time before the oldest entry.
 
       iex> history = [{100, Hal.Pose.new(1, 0)}, {0, Hal.Pose.new(0, 0)}]
       iex> Robot.Localiser.History.back(history, Hal.Pose.new(1.5, 0), 50)

@@ -1,34 +1,37 @@
 defmodule Robot.Localiser.Matching do
   @moduledoc """
-  Data association: decides which blob is which robot, though all look the same. Pure.
+  Data association: decides which blob is which robot, although all robots look the same. Pure.
 
-  A blob can be a robot where it is seen about there and about as wide as that robot would be. Where a
-  blob could well be several robots, or a robot several blobs, nothing is said. A blob that is wider is that of
-  several in line, one that is narrower is half hidden: then the robot's direction is less sure (`slack`).
+  A blob can be a robot if its direction and its width are about those expected of the robot. If a
+  blob could well be several robots, or a robot several blobs, neither is paired. A wider blob may
+  show several robots, and a narrower one a robot that is partly hidden: then the robot's
+  direction is less certain (`slack`).
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief}
   alias Robot.Percept.Sighting
   alias Vision.Blob
 
-  # Within this angle (radians) a robot is always looked for; one whose distance is less sure than by this share
-  # is not measured by.
+  # A blob within this angle (radians) of the expected direction is always a candidate. A robot
+  # whose distance is less certain than this share is not used for measurements.
   @narrow 0.12
   @doubt 1.6
-  # A doubt of a distance that changes nothing, in metres.
+  # An uncertainty of a distance up to this (metres) does not count.
   @surely 0.3
-  # Standard deviations of a direction (radians), and of a width, as a logarithm: others beside it make a blob wider,
-  # others before it narrower.
+  # Standard deviations of a direction (radians) and of the logarithm of a width: robots beside
+  # the robot make its blob wider, those in front of it narrower.
   @bearing_sd 0.04
   @wider_sd 0.2
   @narrower_sd 0.5
-  # So many standard deviations, squared, off it is not the robot, or so much worse than another.
+  # A candidate with a greater cost (in squares of standard deviations) is rejected, and a rival
+  # does not count if its cost is greater by this much.
   @unlike 9.0
   @worse 4.0
-  # A blob that is measured by is not farther off in width than this, as a logarithm; and if within that one, it is whole.
+  # The greatest difference in width, as a logarithm, of a blob that is used for measurements, and
+  # of a blob that counts as the whole robot.
   @fits 0.45
   @whole 0.15
-  # What stands so far behind another, in metres, is hidden by it.
+  # A robot can hide another one that is at least this much farther away, in metres.
   @behind 0.5
 
   @type pair :: %{
@@ -38,7 +41,10 @@ defmodule Robot.Localiser.Matching do
           whole?: boolean()
         }
 
-  @doc "The robots among the marks that are seen for sure, each with its blob, in the order of the marks."
+  @doc """
+  The reference robots among the marks that match a blob without a rival, each with its blob, in
+  the order of the marks.
+  """
   @spec pairs([Anchors.mark()], [Blob.t()], Belief.t(), Pose.t(), pan :: float(), view :: float()) ::
           [pair()]
   def pairs(robots, blobs, belief, exposed, pan, view) do
@@ -55,7 +61,8 @@ defmodule Robot.Localiser.Matching do
     end
   end
 
-  # The same robot another blob, or the same blob another robot, which this one does not hide.
+  # The same robot with another blob, or the same blob with another robot that this one does not
+  # hide.
   defp rivals?(%{mark: mark, blob: blob}, %{mark: mark, blob: other}), do: blob != other
   defp rivals?(%{blob: blob} = one, %{blob: blob} = other), do: not hides?(one, other)
   defp rivals?(_one, _other), do: false
@@ -65,7 +72,7 @@ defmodule Robot.Localiser.Matching do
       abs(Pose.wrap(far.expected - near.expected)) < near.half
   end
 
-  # At the left or right border; above and below a robot may be cut off.
+  # Whether a blob touches the left or right border; it may be cut off above and below.
   defp cut?(blob), do: blob.left == 0 or blob.right == blob.width - 1
 
   defp candidate(%{colour: colour} = mark, %{colour: colour} = blob, belief, exposed, pan, view) do
@@ -78,7 +85,7 @@ defmodule Robot.Localiser.Matching do
       expected = Pose.bearing(exposed, mark.at)
       seen = Sighting.bearing(blob, pan, view)
       {bearing_sd, distance_sd} = sds(mark, distance, belief, exposed)
-      # What nobody knows of the distance makes the blob wider or narrower.
+      # If the distance is uncertain, so is the expected width of the blob.
       doubt = 2 * max(distance_sd - @surely, 0.0) / distance
       slack = abs(share - 1) * half
       off = max(abs(Pose.wrap(seen - expected)) - slack, 0.0)
@@ -102,7 +109,7 @@ defmodule Robot.Localiser.Matching do
 
   defp candidate(_mark, _blob_of_another_colour, _belief, _exposed, _pan, _view), do: nil
 
-  # Squares of standard deviations in direction and width.
+  # The sum of the squared deviations in direction and width, each in standard deviations.
   defp cost(off, bearing_sd, width, doubt) do
     sd = if width > 0, do: @wider_sd, else: @narrower_sd
     width = max(abs(width) - doubt, 0.0) / sd
@@ -110,7 +117,7 @@ defmodule Robot.Localiser.Matching do
     bearing * bearing + width * width
   end
 
-  # How far off, in direction and distance, it may be seen.
+  # The standard deviations of the direction and the distance in which the robot is seen.
   defp sds(%{at: {x, y}} = mark, distance, belief, exposed) do
     {dx, dy} = {x - exposed.x, y - exposed.y}
     square = max(distance * distance, 0.09)
@@ -120,10 +127,10 @@ defmodule Robot.Localiser.Matching do
     along = Belief.variance(belief, {-x, -y, 0.0}, mark)
     bearing = across + @bearing_sd * @bearing_sd / 4
 
-    # However unsure it is of its place, a thing in front of it is not seen behind it.
+    # However uncertain the place is, the direction stays within half a turn.
     {:math.atan(root(bearing)), root(along)}
   end
 
-  # Rounding takes a variance of nothing below it.
+  # Rounding may make a variance of zero negative.
   defp root(square), do: :math.sqrt(max(square, 0.0))
 end

@@ -1,30 +1,36 @@
 defmodule Robot.Localiser.Sightings do
   @moduledoc """
-  Derives corrections of a robot's belief from one picture, by the visible objects whose places it
-  was told. Pure.
+  Corrects a robot's belief with one picture, by the visible objects whose places it was given.
+  Pure.
 
-  Things are seen in a direction and, where nothing hides a part of them, at a distance: the landmark by its size, a
-  robot by its width. The landmark comes first: turned right by it, a robot knows better which robot is which
-  (`Robot.Localiser.Matching`). At last the whole picture is held against what came of that (`Robot.Localiser.Consistency`).
+  Each object gives a direction and, if nothing seems to hide a part of it, a distance: the
+  landmark by its size, a robot by its width. The landmark comes first, because a corrected
+  heading helps to decide which robot is which (`Robot.Localiser.Matching`). Finally the whole
+  picture is compared with the result (`Robot.Localiser.Consistency`).
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief, Consistency, Matching, Silhouettes}
   alias Robot.Percept
   alias Robot.Percept.Sighting
 
-  # A single sighting: bearing in radians, range as a share and in metres.
+  # Standard deviations of a single sighting: of the bearing in radians, of the range as a share
+  # and in metres.
   @bearing_sd 0.015
   @range_share 0.05
   @range_sd 0.05
-  # What is wrong with every sighting of a thing alike: so much of its place, in metres, and per metre of distance.
+  # The error that all sightings of an object share, as a standard deviation of its place: of the
+  # landmark per metre of distance, of a robot in metres plus the same per metre of distance.
   @landmark_bias 0.003
   @robot_bias 0.006
-  # Pictures of a second or two show the same slack, and the same size; so many count as one.
+  # Consecutive pictures share the errors of slack and size, so this many of them count as one.
   @repeated 6
-  # Too near for a camera that looks over it, in metres.
+  # An object nearer than this (metres) is not used, because the camera may look over it.
   @near 0.3
 
-  @doc "The belief after a percept's picture, which was taken `back` of where the robot is now, in its own frame."
+  @doc """
+  The belief corrected by the percept's picture; `back` is the pose at exposure, relative to the
+  robot's present pose.
+  """
   @spec correct(Belief.t(), [Anchors.mark()], Percept.t(), back :: Pose.t()) :: Belief.t()
   def correct(belief, marks, %Percept{} = percept, %Pose{} = back) do
     {landmarks, robots} = Enum.split_with(marks, &(&1.kind == :landmark))
@@ -40,7 +46,7 @@ defmodule Robot.Localiser.Sightings do
   defp weigh(belief, robots, {percept, back}),
     do: Belief.weigh(belief, Consistency.judge(belief, robots, percept, back))
 
-  # There is one landmark: whatever has its colour is it.
+  # There is only one landmark: the largest unclipped blob of its colour is taken for it.
   defp see_landmarks(belief, landmarks, {percept, _back} = picture) do
     Enum.reduce(landmarks, belief, fn mark, belief ->
       whole =
@@ -118,14 +124,15 @@ defmodule Robot.Localiser.Sightings do
     Belief.correct(belief, mark.key, seen - distance * (1 + scale), slope, noise)
   end
 
-  # The variances of where it is, towards the thing and across. What is measured of a thing is not a straight line over
-  # where the robot may be: what it bends by there counts as noise (second-order filter, Bar-Shalom, Li and Kirubarajan 2001).
+  # The variances of the position relative to the object, along the line to it and across. A
+  # measurement is not a linear function of the position; its second-order term counts as noise
+  # (second-order filter, Bar-Shalom, Li and Kirubarajan 2001).
   defp spread(belief, mark, {dx, dy, distance}) do
     {x, y} = {dx / distance, dy / distance}
     {Belief.variance(belief, {x, y, 0.0}, mark), Belief.variance(belief, {-y, x, 0.0}, mark)}
   end
 
-  # The way from where the picture was taken to where the thing is by now believed to be.
+  # The vector from the place at which the picture was taken to the estimated place of the object.
   defp meet(belief, {_percept, back}, mark, far) do
     exposed = exposed(belief, back)
     {belief, {x, y}} = Belief.meet(belief, mark.key, mark.at, place_sd(mark, far), mark.common)

@@ -1,40 +1,45 @@
 defmodule Robot.Localiser.Silhouettes do
   @moduledoc """
-  Searches along a robot's line of greatest uncertainty for the place where the silhouettes of all
-  robots together fit its picture. Pure.
+  Searches along the direction of a robot's greatest uncertainty for the place from which the
+  silhouettes of all robots together fit its picture. Pure.
 
-  Who comes into another's frame may be off by a metre across its line of sight, and turned with it. Seen from there,
-  the robots ahead of it are one wide blob, perhaps cut by the picture's border, and none of them can be told
-  (`Robot.Localiser.Matching`). So places along that line are tried one after another. From each, it is computed
-  which columns of the picture robots would fill, and counted where that is not so. A place where little is wrong, and than which
-  no other is nearly as good, is taken.
+  A robot that joins another robot's frame may be off by a metre across its line of sight, and its
+  heading with it. It may see the robots ahead as one wide blob, perhaps clipped by the picture's
+  border, in which none can be identified (`Robot.Localiser.Matching`). So places along the
+  direction of greatest uncertainty are tried: for each, the columns of the picture that robots
+  would fill are computed, and the wrong ones are counted. A place is accepted if few columns are
+  wrong and no place elsewhere is nearly as good.
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief, Columns}
   alias Robot.Percept
 
-  # Surer than this there is nothing to try; metres.
+  # With a standard deviation below this (metres) no search is needed.
   @sure 0.25
-  # So many standard deviations to either side, in steps of metres, but no more than so many.
+  # The search covers this many standard deviations to each side, in steps of about this many
+  # metres, but at most this many steps.
   @reach 2.5
   @step 0.05
   @steps 40
-  # A wrong column counts so much, in squares of standard deviations; a place so much worse is none, one as near is
-  # the same (metres); and so many columns may be wrong, and so many more of those that are seen.
+  # A wrong column adds this much to the cost, in squares of standard deviations. A place is a
+  # rival of the best one if its cost is not greater by `@worse` and it is farther away than
+  # `@same` metres. `@most` columns may be wrong, plus this share of those that are seen.
   @wrong 0.8
   @worse 4.0
   @same 0.25
   @most 3
   @share 0.15
-  # Beyond this nobody knows where a robot is, and it may fill any column within so many standard deviations; metres.
+  # The place of a robot with a greater standard deviation (metres) counts as unknown: the robot
+  # may fill any column within `@wide` standard deviations.
   @strange 0.5
   @wide 2.0
-  # How well a place is known by that, in metres, but for what is known of the nearest robot.
+  # The standard deviation of a place that was found (metres), without that of the nearest robot.
   @found_sd 0.15
 
   @doc """
-  The belief moved to where the percept's picture fits, which was taken `back` of where the robot is now; the same belief where
-  it is sure enough, or where nothing fits, or several places do.
+  The belief moved to where the percept's picture fits; `back` is the pose at exposure, relative
+  to the robot's present pose. The belief is unchanged if it is certain enough, if no place fits,
+  or if several do.
   """
   @spec align(Belief.t(), [Anchors.mark()], Percept.t(), back :: Pose.t()) :: Belief.t()
   def align(belief, robots, %Percept{} = percept, %Pose{} = back) do
@@ -82,7 +87,7 @@ defmodule Robot.Localiser.Silhouettes do
     :math.sqrt(@found_sd * @found_sd + sd * sd)
   end
 
-  # The columns that robots would fill, and those that one may fill of which nobody knows where it is.
+  # The columns that robots would fill, and those that a robot at an unknown place may fill.
   defp filled(robots, pose, percept) do
     Enum.reduce(robots, {0, 0}, fn %{sd: {sd, _, _}} = mark, {known, unknown} ->
       distance = Pose.distance(pose, mark.at)
