@@ -1,11 +1,11 @@
 defmodule Robot.Safety.DryRun do
   @moduledoc """
-  A run in which nothing moves (R44): with `dry_run: true` in `Robot.Config` everything thinks, looks and
-  talks as ever, and what the wheels and the camera's head would be told is printed, for a person to
-  compare with what they expect before the wheels are let loose.
+  A run in which nothing moves (R44): with `dry_run: true` in `Robot.Config` the robot perceives,
+  decides and communicates as usual, but commands for the wheels and the camera's head are printed
+  instead of sent. A person can compare them with what they expect before the wheels may turn.
 
-  The gate tells the wheels to stand all the time, and their device, which owns the hardware, never arms
-  (`Hal.Device.Arming`). The events are `[:robot, :dry_run]`; the log prints them.
+  The gate keeps commanding the wheels to stand, and their device, which owns the hardware, never
+  arms (`Hal.Device.Arming`). The events are `[:robot, :dry_run]`; the log prints them.
   """
   require Logger
   alias Hal.{Event, Twist}
@@ -14,14 +14,17 @@ defmodule Robot.Safety.DryRun do
 
   @type command :: {:drive, Twist.t(), limits :: [atom()]} | {:look, pan :: float()}
 
-  @doc "Attaches the log to the events; once a node, however often it is called."
+  @doc "Attaches the log to the events: once on a node, however often this is called."
   @spec attach() :: :ok
   def attach do
     _once = Event.attach(__MODULE__, @event, &__MODULE__.write/4, nil)
     :ok
   end
 
-  @doc "Tells what a robot would do now, unless it says the same as `before`, the last thing told; returns it."
+  @doc """
+  Reports what a robot would do now, unless the line equals `before`, the last one reported.
+  Returns the line.
+  """
   @spec tell(atom(), command(), before :: String.t() | nil, integer()) :: String.t()
   def tell(robot, command, before, at_ms) do
     case line(robot, command) do
@@ -40,7 +43,7 @@ defmodule Robot.Safety.DryRun do
   def write(@event, _measurements, %{line: line}, _config), do: Logger.info(line)
 
   @doc """
-  The line: hundredths of metres and whole degrees are enough for a person.
+  The line for a command, rounded to hundredths of metres and whole degrees.
 
       iex> Robot.Safety.DryRun.line(:mag1, {:drive, Hal.Twist.new(0.3, -0.5), [:near]})
       "dry run: mag1 would drive at 0.30 m/s and turn by -29 deg/s (limited: near)"

@@ -1,20 +1,21 @@
 defmodule Robot.Safety.Gate do
   @moduledoc """
-  The only one who drives the wheels. Wishes come in, and 20 times a second what `Robot.Safety.Reflex`
-  makes of the last one goes out; it waits for nobody. No wish for 200 ms, for whatever reason,
-  and it stops the robot.
+  The only process that drives the wheels. It receives wishes, and 20 times a second sends the
+  drive what `Robot.Safety.Reflex` allows of the newest one. If no wish comes for 200 ms, for
+  whatever reason, it stops the robot.
 
-  Where `Robot.Safety.Reflex` says `:now`, as of a touched bumper or a sonar while the robot moves, the gate does
-  not wait for the next step.
+  If `Robot.Safety.Reflex` answers `:now`, for example after a touched bumper or a sonar reading
+  while the robot moves, the gate does not wait for the next step.
 
-  The e-stop latch is read at the start, so that a gate that restarts is as latched as it was.
-  Only `reset/1`, a person's doing, clears it. Whenever the latch was set or cleared, by whomever, the gate applies the
-  config's `:on_latch`, so that whoever spreads the stop need not look for it; not where that one did it itself
-  (`tell: false`).
+  The gate reads the e-stop latch at its start, so that a restart does not release it. Only
+  `reset/1` clears it. When the latch is set or cleared, the gate applies the config's
+  `:on_latch`, so that the process that spreads the stop is notified; with `tell: false`, which
+  that process itself uses, it does not.
 
-  While the drive is not armed (`Hal.Device.Arming`) the gate asks it for nothing but to stand, so that a
-  robot that a person arms begins from standing, and says why it stands. In a dry run
-  (`Robot.Safety.DryRun`) it asks for nothing else either, and tells what it would have asked for.
+  While the drive is not armed (`Hal.Device.Arming`), the gate commands it only to stand, so that
+  a robot starts from standing when a person arms it, and reports why it stands. In a dry run
+  (`Robot.Safety.DryRun`) it also commands it only to stand, and reports what it would have
+  commanded.
   """
   use GenServer
   alias Hal.{Device, Event, Ticker, Twist}
@@ -24,25 +25,25 @@ defmodule Robot.Safety.Gate do
 
   @period_ms 50
 
-  @doc "Starts the gate of a robot; the wheels are told to stop before anything else."
+  @doc "Starts the gate of a robot; it first commands the wheels to stop."
   @spec start_link(Config.t()) :: GenServer.on_start()
   def start_link(%Config{} = config),
     do: GenServer.start_link(__MODULE__, config, name: Names.via(config.id, :gate))
 
-  @doc "Wishes a speed; the newest wish counts, for 200 ms."
+  @doc "Wishes a speed; the newest wish is valid for 200 ms."
   @spec wish(robot :: atom(), Twist.t()) :: :ok
   def wish(robot, twist), do: GenServer.cast(Names.via(robot, :gate), {:wish, twist})
 
   @doc """
-  What was wished so far counts no more, and the robot stops at once: a stop was ordered, or the one who
-  wished has fallen, and the one who takes its place says so. Then `then` is applied, if there is one: whoever
-  waits for the stop hears of it from the gate.
+  Drops the wish and stops the robot without waiting for the next step, because a stop was ordered
+  or the executive was restarted. Then applies `then`, if given, to notify the process that waits
+  for the stop.
   """
   @spec forget(robot :: atom(), then :: Config.call() | nil) :: :ok
   def forget(robot, then \\ nil),
     do: GenServer.cast(Names.via(robot, :gate), {:forget, then})
 
-  @doc "A sink for the drive: what reflexes need goes to the gate at once."
+  @doc "A sink for the drive: passes on the readings that the reflexes need."
   @spec sense(robot :: atom(), tuple()) :: :ok
   def sense(robot, {kind, _value} = reading) when kind in [:odometry, :sonar, :bumpers, :arming],
     do: GenServer.cast(Names.via(robot, :gate), {:sense, reading})
@@ -50,17 +51,18 @@ defmodule Robot.Safety.Gate do
   def sense(_robot, _reading), do: :ok
 
   @doc """
-  Stops the robot until `reset/1`. When this returns, the latch is set and the stop sent. Whoever owns the state of the
-  e-stop, and sets the latch by it, does so with `tell: false`: the config's `:on_latch` is not applied then.
+  Stops the robot until `reset/1`. When this returns, the latch is set and the stop has been sent
+  to the drive's device. The process that owns the state of the e-stop sets the latch with
+  `tell: false`: then the config's `:on_latch` is not applied.
   """
   @spec estop(robot :: atom(), tell: boolean()) :: :ok
   def estop(robot, options \\ []),
     do: GenServer.call(Names.via(robot, :gate), {:estop, Keyword.get(options, :tell, true)})
 
   @doc """
-  Clears the e-stop: wishes count again. Whoever resets has looked where the robot would go. `:tell` as above. With
-  `presses:` the reset is meant for stops up to that press of the button (`:presses` on the board), and is refused if
-  there was another one.
+  Clears the e-stop: wishes count again. The person who resets must have looked where the robot
+  would go. `:tell` is as in `estop/2`. With `presses:` the reset applies to stops up to that
+  press of the button (`:presses` on the board), and is refused if there was another one since.
   """
   @spec reset(robot :: atom(), tell: boolean(), presses: non_neg_integer()) ::
           :ok | {:error, :pressed}
@@ -69,7 +71,7 @@ defmodule Robot.Safety.Gate do
     GenServer.call(Names.via(robot, :gate), {:reset, tell?, presses})
   end
 
-  @doc "How often the gate's own button was pressed, which is what `estop/1` tells; 0 before the first time."
+  @doc "How often the gate's own button was pressed, as counted by `estop/1`; 0 if never."
   @spec presses(Board.t()) :: non_neg_integer()
   def presses(board) do
     with {:ok, presses, _at_ms} <- Board.fetch(board, :presses, :infinity),
@@ -79,7 +81,7 @@ defmodule Robot.Safety.Gate do
 
   @impl GenServer
   def init(%Config{id: id} = config) do
-    # A stop must not wait for those who talk; the gate itself never has much to do.
+    # A stop must not wait for the processes that communicate; the gate's own work is short.
     Process.flag(:priority, :high)
     drive = Names.via(id, :drive)
     Device.drive(drive, Twist.zero())
@@ -135,7 +137,7 @@ defmodule Robot.Safety.Gate do
   @impl GenServer
   def handle_call({:estop, tell?}, _from, s) do
     at_ms = heard(s, :estop)
-    # The wheels first: the latch has a file, too, and a disk may take its time.
+    # The wheels come first: the latch may also be written to a file, and a disk may be slow.
     Board.hold(s.board)
     if tell?, do: Board.put(s.board, :gate, :presses, presses(s.board) + 1, at_ms)
     s = step(%{s | reflex: Reflex.estop(s.reflex)}, at_ms)
@@ -163,10 +165,10 @@ defmodule Robot.Safety.Gate do
   def handle_info(:step, s), do: {:noreply, s |> step(Config.now(s.config)) |> schedule()}
   def handle_info(_other, s), do: {:noreply, s}
 
-  # In a dry run no drive is armed, and what would be driven if it were is the question.
+  # In a dry run the drive is never armed, but the report shows what an armed robot would do.
   defp armed?(_board, %{dry_run: true}), do: true
 
-  # Before the drive has said anything: as it comes up.
+  # Before the drive has reported its state, the config decides.
   defp armed?(board, config) do
     case Board.fetch(board, :arming, :infinity) do
       {:ok, %{state: state}, _at_ms} -> state == :armed
@@ -174,7 +176,7 @@ defmodule Robot.Safety.Gate do
     end
   end
 
-  # A gate that falls must not take another frame for the one that its fence is laid in.
+  # After a crash, the new gate must not take another frame for the frame of its fence.
   defp frame(s, reflex, at_ms) do
     frame = Reflex.frame(reflex)
     if frame != Reflex.frame(s.reflex), do: Board.put(s.board, :gate, :frame, frame, at_ms)

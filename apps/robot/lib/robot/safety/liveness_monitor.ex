@@ -1,17 +1,21 @@
 defmodule Robot.Safety.LivenessMonitor do
   @moduledoc """
-  Sees that gate and executive tick and that the pilot comes back from its mission. What hangs cannot say so, nor can a
-  supervisor see it, and the robot would be well by its status for ever: with a gate that hangs it stands, by the
-  watchdog of the drive's device; with an executive that hangs, by the gate's dead man; with a mission that hangs it goes on
-  with its last goal and hears no order.
+  Monitors that gate and executive tick and that the pilot's mission callbacks return. A process
+  that hangs cannot report it, a supervisor does not detect it, and the robot's status would stay
+  normal. If the gate hangs, the watchdog of the drive's device stops the robot; if the executive
+  hangs, the gate's dead man's switch does; if a mission hangs, the robot continues with its last
+  goal and takes no orders.
 
-  The watch asks nobody. It looks at the board, where gate and executive write at each tick and the pilot notes each call of
-  its mission. When that is the same for 8 looks of its own, 0.4 s, it says so, on the board under `{:hung, part}`
-  and by the event `[:robot, part, :silent]`, with the name of the behaviour or the mission. On a busy machine a tick may
-  take that long, for instance where code is loaded (then `[:robot, part, :again]` follows); after 40 looks, 2 s, it is
-  taken for one that never ends: the watch ends that part (`[:robot, part, :hung]`), and the one that follows is idle.
+  The monitor sends no requests. It looks at the board, where gate and executive write at each
+  tick and the pilot notes each call of its mission. If an entry stays the same for 8 looks, 0.4
+  s, the monitor reports the part as silent, on the board under `{:hung, part}` and by the event
+  `[:robot, part, :silent]`, with the name of the behaviour or the mission. On a busy machine a
+  tick may take that long, for instance while code is loaded; then `[:robot, part, :again]`
+  follows. After 40 looks, 2 s, the part is taken to hang: the monitor kills it
+  (`[:robot, part, :hung]`), and its successor starts idle.
 
-  It counts looks and not time, so that a machine that was asleep, or is slow, is not taken for a robot that hangs.
+  It counts looks instead of measuring time, so that a machine that was suspended, or whose
+  processes all run slowly, is not taken for a robot that hangs.
   """
   use GenServer
   alias Hal.Event
@@ -22,17 +26,17 @@ defmodule Robot.Safety.LivenessMonitor do
   @hung 40
   @parts [:gate, :executive, :pilot]
 
-  @typedoc "What a part was at by the last look, and how many looks it has been the same."
+  @typedoc "The mark of a part at the last look, and for how many looks it has been the same."
   @type t :: {mark :: term(), same :: non_neg_integer()}
 
   @type part :: :gate | :executive | :pilot
 
-  @doc "The parts of a robot that are watched."
+  @doc "The parts of a robot that are monitored."
   @spec parts() :: [part()]
   def parts, do: @parts
 
   @doc """
-  One more look.
+  The verdict of one more look at a part's mark, and the next state.
 
       iex> {:well, watch} = Robot.Safety.LivenessMonitor.look({7, 5}, 8)
       iex> watch
@@ -53,7 +57,7 @@ defmodule Robot.Safety.LivenessMonitor do
   def look({_before, _same}, mark), do: {:well, {mark, 0}}
 
   @doc """
-  Where a part of a robot hangs, in words.
+  Names, in words, where a part of a robot hangs.
 
       iex> Robot.Safety.LivenessMonitor.words(:executive, Robot.Behaviour.Goto)
       "Robot.Behaviour.Goto"
@@ -68,7 +72,7 @@ defmodule Robot.Safety.LivenessMonitor do
   def words(:executive, behaviour), do: inspect(behaviour)
   def words(:pilot, mission), do: "its mission #{inspect(mission)}"
 
-  @doc "Starts the watch of a robot whose board is running."
+  @doc "Starts the monitor of a robot whose board is running."
   @spec start_link(Config.t()) :: GenServer.on_start()
   def start_link(%Config{} = config),
     do: GenServer.start_link(__MODULE__, config, name: Names.via(config.id, :watch))
@@ -80,7 +84,7 @@ defmodule Robot.Safety.LivenessMonitor do
     {:ok, schedule(%{config: config, board: board, parts: Map.new(@parts, &{&1, {nil, 0}})})}
   end
 
-  # With the watch before this one fell the part that hung.
+  # A note that an earlier monitor left about a silent part no longer holds.
   defp forget(board, part) do
     with {:ok, {:silent, _module}} <- noted(board, {:hung, part}, & &1),
          do: Board.delete(board, :watch, {:hung, part})
@@ -100,7 +104,8 @@ defmodule Robot.Safety.LivenessMonitor do
 
   def handle_info(_other, s), do: {:noreply, s}
 
-  # Of each process on its own; one that is being started has done nothing wrong yet, nor has a pilot that waits.
+  # The mark contains the pid, so that a restarted process counts anew. A part that is being
+  # started or has no entry on the board, as a pilot that waits, gets a new mark at each look.
   defp mark(board, robot, part) do
     with pid when is_pid(pid) <- Names.whereis(robot, part),
          {:ok, at} <- at(part, board),
@@ -159,7 +164,7 @@ defmodule Robot.Safety.LivenessMonitor do
   defp named({:ok, module}), do: module
   defp named(:error), do: nil
 
-  # Where a test decides when the executive acts, nobody misses its ticks.
+  # If a test decides when the executive acts, its ticks are not monitored.
   defp schedule(%{config: %{pace: :manual}} = s), do: s
 
   defp schedule(s) do

@@ -1,20 +1,20 @@
 defmodule Robot.Safety.Readiness do
   @moduledoc """
-  Whether an order that can move a robot would be carried out now, and whether one that stops it reaches its wheels,
-  by what its board says of the drive: an order is for now, and shall not begin to move the robot later, when somebody
-  arms it.
+  Decides whether an order that can move a robot would be carried out now, and whether a stop
+  reaches its wheels, by the drive's entries on the board. An order is for now: it must not begin
+  to move the robot later, when somebody arms it.
 
-  A drive that arms by itself (`arm: :auto`) and has not said anything yet is just coming up, and counts as
-  ready. In a dry run nothing moves, and what would is the question: every order is taken.
+  A drive that arms by itself (`arm: :auto`) and has not reported anything yet is assumed to be
+  starting, and counts as ready. In a dry run nothing moves, and every order is accepted.
   """
   alias Hal.Device.Words
   alias Robot.{Board, Config}
 
-  @typedoc "What the board says under `:arming` and under `{:health, :drive}`; `nil` for nothing yet."
+  @typedoc "The board's entries `:arming` and `{:health, :drive}`; `nil` if there is none yet."
   @type arming :: %{state: Hal.Device.Arming.state(), why: String.t() | nil} | nil
   @type health :: :online | {:offline, reason :: term()} | nil
 
-  @doc "The same of a robot of this node."
+  @doc "Judges a robot of this node by its config and its board (`judge/3`)."
   @spec of(Config.t(), Board.t()) :: :ok | {:error, line :: String.t()}
   def of(%Config{dry_run: true}, _board), do: :ok
 
@@ -29,7 +29,8 @@ defmodule Robot.Safety.Readiness do
   end
 
   @doc """
-  `:ok`, or the reason, which names no robot. A text for why the drive is offline is taken as it is.
+  `:ok`, or the reason as a line that does not name the robot. If the reason why the drive is
+  offline is a text, it is used unchanged.
 
       iex> Robot.Safety.Readiness.judge(:manual, %{state: :armed, why: nil}, :online)
       :ok
@@ -65,15 +66,15 @@ defmodule Robot.Safety.Readiness do
   def judge(:manual, nil, _health), do: {:error, "its drive is not open yet"}
 
   @doc """
-  Whether a stop that the gate has carried out is one of the wheels, too. Not where the line was lost while
-  they turned, and is not back: then nobody can say anything to them, and the line says so. A line that is opened again
-  begins with a stop.
+  Whether a stop that the gate has carried out can have reached the wheels. It cannot if the
+  connection to them was lost while they turned and is not back; the error says so. When the
+  connection is opened again, it begins with a stop.
   """
   @spec stopped(Board.t()) :: :ok | {:error, line :: String.t()}
   def stopped(board), do: reached(entry(board, :arming), entry(board, {:health, :drive}))
 
   @doc """
-  The same by what the board says.
+  The same, from the entries of the board.
 
       iex> Robot.Safety.Readiness.reached(%{state: {:error, :unplugged}, why: nil}, {:offline, :unplugged})
       {:error,

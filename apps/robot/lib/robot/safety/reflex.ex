@@ -1,36 +1,38 @@
 defmodule Robot.Safety.Reflex do
   @moduledoc """
-  The gate before the wheels as a function: whatever is wished, what comes out is safe. It is no
-  part of the market of wishes; it limits whoever won there. Pure: `wish/3` and `sense/3` tell it
-  what happened, `step/2` (every 50 ms) says what the wheels may do now, and why it is less than wished.
-  A reading that must not wait for the next step makes `sense/3` say `:now`; so does `forget/1`.
+  The safety limits between a wish and the wheels, as a function. It does not compete with the
+  behaviours' wishes; it limits the wish that won. Pure: `wish/3` and `sense/3` take what
+  happened; `step/2` (every 50 ms) decides what the wheels may do now, and reports why it is less
+  than wished. For a reading that must not wait for the next step `sense/3` returns `:now`; so
+  does `forget/1` while the robot moves.
 
-  In this order, each with its name in `limits`:
+  The limits, each by its name in `limits`; each of the first four excludes all others:
 
   | limit | what it does |
   |---|---|
-  | `:estop` | latched: stands until `reset/1`; wishes from before are forgotten |
+  | `:estop` | latched: stands until `reset/1`; earlier wishes are forgotten |
   | `:disarmed` | the drive is not armed: stands (`Hal.Device.Arming`) |
   | `:dead_man` | no wish for 200 ms: stands |
-  | `:refused` | the wish was no number, or absurdly large: stands |
+  | `:refused` | the wish was not a pair of numbers, or was absurdly large: stands |
   | `:speed` | the profile's greatest speeds |
-  | `:bumper` | no driving toward a touched side; away and turning are free |
+  | `:bumper` | no driving toward a touched side; driving away and turning are allowed |
   | `:near` | slow enough to stop 0.15 m before what the sonars see in the direction of motion |
-  | `:corner` | a robot longer than wide turns its corners into nothing |
-  | `:fence` | stops before the line of its fence (`Robot.Safety.Reflex.Fence`); not knowing where it is, it stands |
-  | `:blind` | no sonar reading for 500 ms, though it has sonars: at most 0.1 m/s |
-  | `:acceleration` | the profile's accelerations; braking before a near thing may be twice as hard |
+  | `:corner` | a robot longer than wide does not turn a corner into what the sonars see |
+  | `:fence` | stops before its fence (`Robot.Safety.Reflex.Fence`); no driving without a place |
+  | `:blind` | no sonar reading for 500 ms, although it has sonars: at most 0.1 m/s |
+  | `:acceleration` | the profile's accelerations; braking may be twice as hard |
 
-  `:estop`, `:disarmed`, `:dead_man`, `:refused` and `:bumper` set the speed to zero at once: how hard the wheels
-  then brake is the base's own affair. Everything else is continuous.
+  `:estop`, `:disarmed`, `:dead_man`, `:refused` and `:bumper` set the speed to zero immediately:
+  how hard the wheels then brake depends on the base. All other limits pass through the ramp of
+  `:acceleration`.
   """
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.Safety.Reflex.{Body, Fence, Limits}
 
   @dead_man_ms 200
-  # No base drives or turns this fast: such a number is a fault of the one who wished.
+  # No base drives or turns this fast: a wish with such a number is an error.
   @absurd 100.0
-  # These set a speed to zero at once.
+  # These set a speed to zero without a ramp.
   @stops [:estop, :disarmed, :dead_man, :refused, :bumper]
 
   @enforce_keys [:profile]
@@ -70,7 +72,7 @@ defmodule Robot.Safety.Reflex do
           before: {Twist.t(), integer() | nil}
         }
 
-  @typedoc "Whether the next `step/2` is due at once, or with the next period."
+  @typedoc "Whether the next `step/2` is due now, or with the next period."
   @type urgency :: :now | :later
 
   @type limit ::
@@ -87,14 +89,14 @@ defmodule Robot.Safety.Reflex do
           | :acceleration
 
   @doc """
-  A gate that stands. Options: `latched?` (default false), for a latch that survived a restart;
-  `armed?` (default true), until a reading `{:arming, …}` says otherwise; `fence` (`Robot.Safety.Reflex.Fence`,
-  default none), with `start`, the pose at which the odometry says zero (default the origin), and `frame`, what
-  `frame/1` said of the gate before it.
+  The state of a robot that stands. Options: `latched?` (default false), for a latch that survived
+  a restart; `armed?` (default true), until a reading `{:arming, …}` says otherwise; `fence`
+  (`Robot.Safety.Reflex.Fence`, default none), with `start`, the pose at which the odometry reads
+  zero (default the origin), and `frame`, the result of `frame/1` before a restart.
 
-  A fence believes odometry of one frame only, the first (`Hal.Odometry`). In another one zero is not the
-  start any more but wherever the robot was: that place is not known, and the robot stands until it is started
-  again at its start.
+  A fence uses odometry of one frame only, the first (`Hal.Odometry`). In another frame, zero is
+  no longer the start but wherever the robot was when that frame began: its place is unknown, and
+  the robot does not drive until it is started again at its start.
   """
   @spec new(Profile.t(), keyword()) :: t()
   def new(%Profile{} = profile, options \\ []) do
@@ -117,11 +119,11 @@ defmodule Robot.Safety.Reflex do
     }
   end
 
-  @doc "The frame of odometry that the fence is laid in; `nil` before the first reading, and without a fence."
+  @doc "The odometry frame of the fence; `nil` before the first reading, and without a fence."
   @spec frame(t()) :: {:is, reference() | nil} | nil
   def frame(%__MODULE__{frame: frame}), do: frame
 
-  @doc "Takes a wish. Anything at all may come: what is not a sensible number counts as a wish to stop."
+  @doc "Takes a wish, any term; one without sensible numbers counts as a wish to stop."
   @spec wish(t(), Twist.t() | term(), integer()) :: t()
   def wish(%__MODULE__{latched?: true} = reflex, _twist, _at_ms), do: reflex
 
@@ -136,15 +138,16 @@ defmodule Robot.Safety.Reflex do
   defp sane?(number), do: is_number(number) and number > -@absurd and number < @absurd
 
   @doc """
-  Drops the wish: its author is gone, or a stop was ordered. A robot that moves stops `:now`, without a ramp.
+  Drops the wish, because the process behind it is gone or a stop was ordered. A robot that moves
+  stops `:now`, without a ramp.
   """
   @spec forget(t()) :: {t(), urgency()}
   def forget(%__MODULE__{} = reflex),
     do: {%{reflex | wish: nil, wish_at_ms: nil}, if(moving?(reflex), do: :now, else: :later)}
 
   @doc """
-  Takes a reading; those that no limit needs are ignored. While the robot moves, a touched bumper, whatever a
-  sonar sees and a change of arming ask for a step `:now`.
+  Takes a reading; readings that no limit needs are ignored. While the robot moves, a touched
+  bumper, a sonar reading and a reading of arming ask for a step `:now`.
   """
   @spec sense(t(), Hal.Drive.reading() | term(), integer()) :: {t(), urgency()}
   def sense(%__MODULE__{} = reflex, reading, at_ms) do
@@ -176,7 +179,7 @@ defmodule Robot.Safety.Reflex do
     end
   end
 
-  # What was wished before it was armed, or disarmed, counts no more.
+  # A wish from before a change of arming is dropped.
   defp note(%{armed?: before?} = reflex, {:arming, %{state: state}}, _at_ms) do
     case state == :armed do
       ^before? -> reflex
@@ -186,7 +189,7 @@ defmodule Robot.Safety.Reflex do
 
   defp note(reflex, _reading, _at_ms), do: reflex
 
-  @doc "Latches the emergency stop."
+  @doc "Latches the emergency stop and drops the wish."
   @spec estop(t()) :: t()
   def estop(%__MODULE__{} = reflex),
     do: %{reflex | latched?: true, wish: nil, wish_at_ms: nil}
@@ -196,10 +199,11 @@ defmodule Robot.Safety.Reflex do
   def reset(%__MODULE__{} = reflex), do: %{reflex | latched?: false}
 
   @doc """
-  What the wheels may do from now until the next step, and which limits made it less than wished.
+  The speeds of the wheels from now until the next step, and the limits that reduced them.
 
-  Of several steps at one time the last counts: the speed of the one before was in force for no time, so
-  that nothing is ramped from it. Only a stop holds for the rest of that millisecond.
+  If there are several steps at the same time, the last one counts: the speed of the one before
+  was never in force, so the ramp does not start from it. After a stop, however, it starts from
+  zero, even within the same millisecond.
   """
   @spec step(t(), integer()) :: {Twist.t(), [limit()], t()}
   def step(%__MODULE__{at_ms: at_ms, before: {twist, then_ms}} = reflex, at_ms),

@@ -1,24 +1,25 @@
 defmodule Robot.Safety.Reflex.Body do
   @moduledoc """
-  How fast a body may move beside what its sonars see. Pure; points in `base_link`.
+  Computes how fast a body may move near what its sonars see. Pure; points in `base_link`.
 
-  For driving every body counts as the circle round its corners; for turning, one longer than wide
-  is a box whose corners may swing into something.
+  For driving, every body counts as the circle round its corners; for turning, a body longer than
+  wide counts as a box, whose corners may swing into something.
   """
   alias Hal.Profile
 
   @type point :: {x :: float(), y :: float()}
 
   @clearance 0.15
-  # A step of the gate and the lag of wheels.
+  # Seconds: a step of the gate and the lag of the wheels.
   @reaction_s 0.15
-  # Things that would only be grazed keep this much to the side.
+  # The clearance (metres) to the side of an obstacle that the body would otherwise graze.
   @side 0.03
-  # Metres: where a thing is taken to be that is too near to be measured.
+  # The range (metres) that is assumed for an obstacle too near to be measured.
   @touching 0.05
 
   @doc """
-  The places that a sonar ring sees: no echo, and what is no range at all, gives none.
+  The points that a sonar ring sees. A sonar without an echo, or with a reading that is not a
+  range, gives none.
 
       iex> profile = Hal.Profile.magellan()
       iex> silent = List.duplicate(profile.sonar_max, 16)
@@ -33,7 +34,7 @@ defmodule Robot.Safety.Reflex.Body do
 
   defp points([pose | poses], [range | ranges], profile)
        when is_number(range) and range >= 0 and range < profile.sonar_max do
-    # The least a sonar can say means "somewhere between there and me".
+    # At the sonar's minimum range, the obstacle may be anywhere nearer.
     range = if range <= profile.sonar_min + 0.005, do: min(range, @touching), else: range
     x = pose.x + range * :math.cos(pose.heading)
     y = pose.y + range * :math.sin(pose.heading)
@@ -44,8 +45,9 @@ defmodule Robot.Safety.Reflex.Body do
   defp points(_, _, _profile), do: []
 
   @doc """
-  The greatest speed (m/s) in the direction of `linear` from which the body can stop before
-  what is in its way. Straight ahead it keeps 0.15 m; what it would only graze, less.
+  The greatest speed (m/s) in the direction of `linear` from which the body can stop before the
+  points in its way. It keeps 0.15 m from a point straight ahead, and less from one that it would
+  only graze.
 
       iex> profile = Hal.Profile.magellan()
       iex> Robot.Safety.Reflex.Body.free_speed(profile, [{0.35, 0.0}], 0.5)
@@ -59,13 +61,13 @@ defmodule Robot.Safety.Reflex.Body do
   def free_speed(%Profile{max_acceleration: braking} = profile, points, linear) do
     sign = if linear < 0, do: -1.0, else: 1.0
     free = Enum.reduce(points, 1.0e6, fn {x, y}, free -> min(free, gap(profile, sign * x, y)) end)
-    # What it still drives before it brakes, v * reaction, counts as well: solved for v.
+    # The way before it brakes, v * reaction, counts as well; solved for v.
     lost = braking * @reaction_s
     :math.sqrt(2 * braking * max(free, 0.0) + lost * lost) - lost
   end
 
-  # How far it may go until it stands before the point. The circle round its corners stands for
-  # every body: a longer one is a little narrower, but it may turn on its way.
+  # How far the body may go before it must stand. Every body counts as the circle round its
+  # corners: a longer one is a little narrower, but may turn on its way.
   defp gap(%Profile{radius: radius}, x, y) do
     half = radius + @side
 
@@ -78,7 +80,8 @@ defmodule Robot.Safety.Reflex.Body do
   end
 
   @doc """
-  The greatest turn rate (rad/s) in the direction of `turn` at which no corner swings into a point.
+  The greatest turn rate (rad/s) in the direction of `turn` from which the body can stop before a
+  corner swings into a point.
 
       iex> Robot.Safety.Reflex.Body.free_turn(Hal.Profile.magellan(), [{0.0, 0.21}], 1.0) > 10
       true
@@ -108,7 +111,7 @@ defmodule Robot.Safety.Reflex.Body do
     :math.sqrt(2 * profile.max_turn_acceleration * max(free - 0.1, 0.0))
   end
 
-  # How far (radians) a corner may turn this way before it meets the angle.
+  # How far (radians) a corner may turn in this direction before it reaches the angle.
   defp swing(corner, angle, turn) do
     ahead = if turn > 0, do: angle - corner, else: corner - angle
     :math.fmod(ahead + 4 * :math.pi(), 2 * :math.pi())

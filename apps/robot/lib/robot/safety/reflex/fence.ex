@@ -1,16 +1,16 @@
 defmodule Robot.Safety.Reflex.Fence do
   @moduledoc """
-  A line on the floor that a robot does not cross, as a function: real robots that run together with
-  simulated ones follow leaders who know nothing of real walls. Pure.
+  A fence that a robot must not cross, as a function: real robots that run together with simulated
+  ones follow leaders that do not know the real walls. Pure.
 
-  Corners are metres in the frame of the robot's own odometry, with zero where the `map` has it: its pose there
-  is its start, moved by what its wheels say. What others tell, and corrections that come of it, move no
-  fence; wheels that slip do, so a fence keeps its distance from what must not be touched.
+  Corners are metres in the frame of the robot's own odometry, whose pose begins at the robot's
+  start in the `map` frame and is moved only by odometry. Reports of other robots, and corrections
+  by them, do not move the fence; slipping wheels do, so it should be laid at some distance from
+  what must not be touched.
 
-  The whole body, as the circle round its corners, stays 5 cm within the line. For a speed that is
-  wished the way is laid out that the robot would go until it stands, and the speed lowered until that way
-  stays inside. A body that is over the line, or was set down there, may go where that brings it nearer
-  to the inside, slowly, and turn; nothing else.
+  By odometry, the whole body, as the circle round its corners, is kept 5 cm inside the fence. For
+  a wished speed, the stopping path is computed, and the speed is lowered until that path stays
+  inside. A body outside may turn, and may drive slowly where that does not take it farther out.
   """
   alias Hal.{Pose, Profile}
 
@@ -18,7 +18,7 @@ defmodule Robot.Safety.Reflex.Fence do
   @most 64
   @margin 0.05
   @outside_speed 0.2
-  # A step of the gate and the lag of wheels, as for what sonars see.
+  # Seconds: a step of the gate and the lag of the wheels, as in `Robot.Safety.Reflex.Body`.
   @reaction_s 0.15
   @step_s 0.1
   @halvings 6
@@ -31,8 +31,8 @@ defmodule Robot.Safety.Reflex.Fence do
   @type t :: %__MODULE__{corners: [point(), ...]}
 
   @doc """
-  A fence: two opposite corners of a rectangle, `{{x, y}, {x, y}}`, or a list of 3 to 64 corners of
-  a polygon, in order, whichever way round; its sides may not cross.
+  A fence: two opposite corners of a rectangle, `{{x, y}, {x, y}}`, or a list of 3 to 64 corners
+  of a polygon, in order, whichever way round; its sides may not cross.
 
       iex> {:ok, fence} = Robot.Safety.Reflex.Fence.new({{-1, -1}, {3, 2}})
       iex> fence.corners
@@ -63,7 +63,7 @@ defmodule Robot.Safety.Reflex.Fence do
       {:error,
        "a polygon of 3 to #{@most} corners, or two corners {{x, y}, {x, y}} of a rectangle"}
 
-  @doc "The type of a fence, for a table of `Hal.Options`: a fence, or what `new/1` makes one of."
+  @doc "The type of a fence, for a table of `Hal.Options`: a fence, or an argument of `new/1`."
   @spec type() :: Hal.Options.Type.t()
   def type, do: {:check, &read/1, "a fence"}
 
@@ -94,7 +94,8 @@ defmodule Robot.Safety.Reflex.Fence do
 
   @doc """
   The greatest speed (m/s) up to `linear`, in its direction, from which the body can stop inside.
-  `turns` are the turn rates (rad/s) that it has and may have on the way; `age_s` says how old the pose is.
+  `turns` are the turn rates (rad/s) that it has and may have on the way; `age_s` is the age of
+  the pose.
 
       iex> {:ok, fence} = Robot.Safety.Reflex.Fence.new({{-1, -1}, {3, 2}})
       iex> profile = Hal.Profile.magellan()
@@ -132,14 +133,14 @@ defmodule Robot.Safety.Reflex.Fence do
     end
 
     cond do
-      # Whatever way it goes, it stands before the line.
+      # Whatever its direction, it can stop inside.
       clear - need > most * reaction_s + most * most / (2 * profile.max_acceleration) -> most
       free?.(most) -> most
       true -> halve(free?, 0.0, most, @halvings)
     end
   end
 
-  # Standing is always free.
+  # Standing is always allowed.
   defp halve(_free?, low, _high, 0), do: low
 
   defp halve(free?, low, high, left) do
@@ -150,7 +151,7 @@ defmodule Robot.Safety.Reflex.Fence do
       else: halve(free?, low, middle, left - 1)
   end
 
-  # At no step of the way is it less clear than it was and than it must be.
+  # Whether, at each step of the stopping path, the clearance is either enough or not decreasing.
   defp stays?(fence, need, clear, pose, {linear, _turn} = twist, reaction_s, profile) do
     seconds = reaction_s + abs(linear) / profile.max_acceleration
     steps = ceil(seconds / @step_s)
@@ -187,7 +188,7 @@ defmodule Robot.Safety.Reflex.Fence do
     :math.sqrt(ex * ex + ey * ey)
   end
 
-  # A ray to the right crosses the sides an odd number of times.
+  # A place is inside if a ray to the right crosses the sides an odd number of times.
   defp inside?(sides, {x, y}) do
     Enum.count(sides, fn {{ax, ay}, {bx, by}} ->
       ay > y != by > y and x < ax + (y - ay) * (bx - ax) / (by - ay)
@@ -195,7 +196,7 @@ defmodule Robot.Safety.Reflex.Fence do
     |> rem(2) == 1
   end
 
-  # Sides that follow each other share a corner, and may not lie on each other.
+  # Neighbouring sides share a corner, but must not overlap.
   defp crossed?(sides) do
     numbered = Enum.with_index(sides)
     last = length(sides) - 1

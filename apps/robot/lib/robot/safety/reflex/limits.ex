@@ -1,8 +1,8 @@
 defmodule Robot.Safety.Reflex.Limits do
   @moduledoc """
-  What the robot's speeds, its surroundings and its fence leave of a wish that may be carried out:
-  the limits from `:speed` to `:acceleration` of the table in `Robot.Safety.Reflex`, one after the
-  other. Pure.
+  Applies the limits of the robot's speeds, its surroundings and its fence to a wish that may be
+  carried out: those from `:speed` to `:acceleration` in the table of `Robot.Safety.Reflex`, one
+  after the other. Pure.
   """
   alias Hal.Drive.SlewLimiter
   alias Hal.Twist
@@ -11,14 +11,14 @@ defmodule Robot.Safety.Reflex.Limits do
 
   @blind_ms 500
   @blind_speed 0.1
-  # A place that odometry has told this long ago is not known any more.
+  # A place that is older than this counts as unknown.
   @lost_ms 500
-  # The step that accelerations are counted with is never longer than this, whatever the clock did.
+  # The time step of the ramp is never longer than this, even if the clock jumped.
   @longest_step_ms 200
 
   @doc """
-  The speed (m/s) and turn rate (rad/s) that are left of those wished, at this time in
-  milliseconds, and the limits that have made them less, in the order in which they were asked.
+  The speed (m/s) and turn rate (rad/s) that remain of those wished, at this time in milliseconds,
+  and the limits that reduced them, in the order in which they were applied.
   """
   @spec limit(Reflex.t(), float(), float(), integer()) :: {Twist.t(), [Reflex.limit()]}
   def limit(reflex, linear, turn, at_ms) do
@@ -33,7 +33,7 @@ defmodule Robot.Safety.Reflex.Limits do
 
     {turned, limits} = ramp(last.turn, safe_turn, profile.max_turn_acceleration * seconds, limits)
 
-    # A touched side is no matter of ramps.
+    # The bumper limit comes after the ramp, because it stops without one.
     {ramped, limits} = bumper(ramped, reflex, limits)
     {Twist.new(ramped, turned), Enum.reverse(limits)}
   end
@@ -62,7 +62,7 @@ defmodule Robot.Safety.Reflex.Limits do
 
   defp fence(linear, turn, %{place: {pose, then_ms}} = reflex, at_ms, limits)
        when at_ms - then_ms <= @lost_ms do
-    # It turns as it did, and will as it may: on its way from the one to the other.
+    # The turn rate changes from the present one to the new one, so both are checked.
     turns = Enum.uniq([reflex.twist.turn, turn])
     age_s = max(at_ms - then_ms, 0) / 1000
     free = Fence.free_speed(reflex.fence, reflex.profile, pose, linear, turns, age_s)
@@ -89,7 +89,7 @@ defmodule Robot.Safety.Reflex.Limits do
     if abs(value) > limit, do: {clamp(value, limit), [name | limits]}, else: {value, limits}
   end
 
-  # Braking may be twice as hard as speeding up: what comes near is noticed late by as much.
+  # Braking may be twice as hard as speeding up, because obstacles are detected with a delay.
   defp ramp(from, to, most, limits) do
     case SlewLimiter.approach(from, to, most, 2 * most) do
       ramped when ramped == to -> {to, limits}
