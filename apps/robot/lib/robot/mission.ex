@@ -1,11 +1,11 @@
 defmodule Robot.Mission do
   @moduledoc """
-  What a robot does over minutes: a pure state machine, run (`Robot.Mission.Runner`) by
-  `Robot.Control.Pilot` in real time and by simulations in lockstep. It sends nothing, keeps no
-  timers and reads no clock: deadlines are integers, compared with `percept.at_ms` at each tick.
+  What a robot does over minutes: a pure state machine, run by `Robot.Control.Pilot` in real time
+  and by simulations in lockstep (`Robot.Mission.Runner`). It sends nothing, keeps no timers and
+  reads no clock: deadlines are integers, compared with `percept.at_ms` at each tick.
 
-  A stop is not for the mission: the pilot ends it, and hands it nothing more. What is left of it for the
-  next start, if anything, is what `c:halted/1` says.
+  A mission does not handle stops: the pilot ends it and passes it no more events. `c:halted/1`
+  returns what remains of it for the next start, if anything.
   """
 
   @type event ::
@@ -15,13 +15,14 @@ defmodule Robot.Mission do
           | {:command, command :: term()}
 
   @typedoc """
-    * `{:goal, tag, {module, options} | nil}` - what to do from now on. The same tag again changes
-      the options of the running behaviour, another one starts afresh; `nil` is idling
-    * `{:anchors, anchors}` - what to find the pose by (`Robot.Localiser.Anchors`)
-    * `{:look, pan}` - where the camera looks, radians, left positive, unless the behaviour cares
-    * `{:send, to, message}` - say something to one robot, to several, or to `:all`
-    * `{:claim, map}` - what the robot says of itself until further notice
-    * `{:stage, name, map}` - something worth telling people happened
+    * `{:goal, tag, {module, options} | nil}` - the goal from now on. The same tag and module
+      again change the options of the running behaviour, others start afresh; `nil` drops the goal
+    * `{:anchors, anchors}` - the references for the pose (`Robot.Localiser.Anchors`)
+    * `{:look, pan}` - where the camera looks, radians, left positive, unless the behaviour
+      decides
+    * `{:send, to, message}` - sends a message to one robot, to several, or to `:all`
+    * `{:claim, map}` - what the robot reports about itself until the next claim
+    * `{:stage, name, map}` - reports an event to people
   """
   @type effect ::
           order()
@@ -40,28 +41,31 @@ defmodule Robot.Mission do
 
   @type result :: {phase :: atom(), mission :: term(), [effect()]}
 
-  @doc "Starts the mission of this robot with options that `c:options/2` has checked."
+  @doc "Starts the mission of this robot with options as `c:options/2` returns them."
   @callback init(robot :: atom(), keyword()) :: result()
 
-  @doc "What happens next."
+  @doc "Handles an event."
   @callback handle(event(), mission :: term()) :: result()
 
   @doc """
-  What outlives a stop: the mission as it waits for its next `{:command, :start}`, with what people have
-  asked of it so far. Asked once it is out of command; with `nil`, and without this callback, the next start begins from nothing.
+  What remains after a stop: the mission as it waits for its next `{:command, :start}`, with the
+  commands that it keeps. Called when the stop has ended the mission. If it returns `nil`, or
+  without this callback, the mission cannot be resumed.
   """
   @callback halted(mission :: term()) :: (mission :: term()) | nil
 
   @doc """
-  The options of a start as people write them, checked and completed. `robots` is how many start together, `nil` where that is
-  not known. What was checked once passes unchanged. A mission without this callback takes no options.
+  Checks and completes the options of a start as people write them. `robots` is how many robots
+  start together, `nil` if that is not known. Options that were checked before must pass
+  unchanged. A mission without this callback takes no options.
   """
   @callback options(keyword(), robots :: pos_integer() | nil) ::
               {:ok, keyword()} | {:error, line :: String.t()}
 
   @doc """
-  What options a robot file may give it (`policies:`), as a table: `mix robot.check` and the robot's start name
-  the line and the key of what is wrong. Of a mission without this callback only `c:options/2` is asked.
+  The options that a robot file may give the mission (`policies:`), as a table, so that
+  `mix robot.check` and the robot's start can name the line and the key of an error. For a mission
+  without this callback only `c:options/2` is called.
   """
   @callback option_table() :: Hal.Options.table()
 

@@ -1,15 +1,15 @@
 defmodule Robot.Control.Arbiter do
   @moduledoc """
-  Chooses among wishes (R88): the heaviest wins. The behaviour that won last has a tenth more
-  weight, so that two of nearly equal weight do not alternate; among equals the first in the list
-  wins. Pure.
+  Chooses among wishes (R88): the one with the greatest weight wins. The weight of the behaviour
+  that won last counts a tenth more, so that two behaviours of nearly equal weight do not
+  alternate; among equal weights the first in the list wins. Pure.
   """
   alias Robot.Wish
 
   @stubbornness 1.1
 
   @doc """
-  The winning wish, or `nil` where nobody wishes anything.
+  The winning wish, or `nil` without wishes.
 
       iex> wish = fn by, weight -> Robot.Wish.new(by, Hal.Twist.zero(), weight) end
       iex> Robot.Control.Arbiter.choose([wish.(:rest, 0.1), wish.(:goto, 0.5), nil], nil).by

@@ -1,18 +1,18 @@
 defmodule Robot.Control.Controller do
   @moduledoc """
-  One whole tick of a robot's thinking as a function: the present goal, wrapped in
-  `Robot.Behaviour.Avoid`, the escape from whatever was touched, and rest all wish; the arbiter
-  chooses. Pure.
+  One tick of a robot's decisions as a function: the present goal, wrapped in
+  `Robot.Behaviour.Avoid`, the escape from a touched bumper, and rest make wishes; the arbiter
+  chooses one. Pure.
 
-  A goal carries a tag. Setting a goal with the tag it already has changes the options of the
-  running behaviour (a target that moves); another tag starts afresh. A goal that has ended
-  stays ended until another tag comes.
+  A goal has a tag. Setting a goal with the same tag and module changes the options of the running
+  behaviour (for example a target that moves); another tag or module starts afresh. A goal that
+  has ended stays ended until another one comes.
 
-  The camera looks where the chosen behaviour wants it, or else the one with the goal; where neither cares,
-  where the mission said last.
+  The camera looks where the chosen behaviour wants it, else where the goal's behaviour wants it,
+  else where the mission last ordered it.
 
-  Besides its behaviour's own options a goal takes `discs: [{x, y, radius}]`: standing things to go
-  round, in the map frame, metres.
+  In addition to its behaviour's own options a goal takes `discs: [{x, y, radius}]`: standing
+  obstacles to avoid, in the map frame, metres.
   """
   alias Hal.Profile
   alias Robot.{Behaviour, Localiser, Mission, Percept, Wish}
@@ -47,8 +47,9 @@ defmodule Robot.Control.Controller do
         }
 
   @doc """
-  A controller without a goal. Options: `profile` (required), and `start`, the pose in the map frame at
-  which the odometry says zero; with it the controller keeps the percept's pose by `Robot.Localiser`.
+  A controller without a goal. Options: `profile` (required), and `start`, the pose in the map
+  frame at which the odometry reads zero; with it the controller estimates the percept's pose by
+  `Robot.Localiser`.
   """
   @spec new(keyword()) :: t()
   def new(options) do
@@ -90,7 +91,7 @@ defmodule Robot.Control.Controller do
     %{controller | tag: tag, module: module, goal: goal}
   end
 
-  @doc "References for the estimate of the pose, from now on."
+  @doc "Sets the references for the estimate of the pose."
   @spec anchors(t(), Localiser.Anchors.t()) :: t()
   def anchors(%__MODULE__{localiser: nil} = controller, _anchors), do: controller
 
@@ -98,8 +99,9 @@ defmodule Robot.Control.Controller do
     do: %{controller | localiser: Localiser.anchors(controller.localiser, anchors)}
 
   @doc """
-  Carries out what the mission orders. With it comes where the camera is to look at once, if anywhere: the
-  mission looks by the percept of this tick, and its word is not for the next one.
+  Carries out an order of the mission. Also returns the pan to which the camera should turn now,
+  if any: the mission computed it from the percept of this tick, so it should not wait for the
+  next one.
   """
   @spec obey(t(), Mission.order()) :: {t(), pan :: float() | nil}
   def obey(%__MODULE__{} = controller, {:goal, tag, goal}),
@@ -115,22 +117,22 @@ defmodule Robot.Control.Controller do
     {%{controller | look: pan}, now}
   end
 
-  @doc "Drops the goal and all else that the mission ordered."
+  @doc "Drops the goal and all other orders of the mission."
   @spec stand(t()) :: t()
   def stand(%__MODULE__{} = controller),
     do: %{(controller |> goal(:idle, nil) |> anchors(%Localiser.Anchors{})) | look: nil}
 
-  @doc "The percept of the last tick, with the pose that the controller made of it."
+  @doc "The percept of the last tick, with the pose that the controller estimated."
   @spec percept(t()) :: Percept.t() | nil
   def percept(%__MODULE__{percept: percept}), do: percept
 
-  @doc "Why the robot stands though nobody told it to, in one line for people; `nil` where it does not."
+  @doc "The fault for which the robot stands, in one line for people; `nil` without one."
   @spec fault(t()) :: String.t() | nil
   def fault(%__MODULE__{escape: {Escape, state}}), do: Escape.fault(state)
 
   @doc """
-  One tick: the chosen wish (its `by` says whose, its `look` where the camera looks now), and the goal's
-  outcome at the tick it ends.
+  Runs one tick. Returns the chosen wish (`by` names its behaviour, `look` is where the camera
+  should look now), and the goal's outcome at the tick at which it ends.
   """
   @spec tick(t(), Percept.t()) :: {Wish.t(), {tag :: term(), integer()} | nil, t()}
   def tick(%__MODULE__{} = controller, %Percept{} = percept) do

@@ -1,15 +1,15 @@
 defmodule Robot.Control.Delivery do
   @moduledoc """
-  How a command of a person reaches a robot's mission, whichever that is by then, and who is told what became of it.
-  The asker decides on the ways; the pilot, which alone knows what the robot is at, takes the first that is open
-  (`Robot.Control.Pilot.deliver/3`). Pure.
+  How a person's command reaches the mission that a robot runs by then, and where the reply goes.
+  The requester lists the ways; the pilot, which alone knows the state of the robot, takes the
+  first one that is open (`Robot.Control.Pilot.deliver/3`). Pure.
 
-  | way | is open | then |
+  | way | open | effect |
   |---|---|---|
   | `{:hand, {:only, module}}` | while this mission runs | it gets the command |
-  | `{:hand, {:except, module}}` | while another than this runs | it gets the command |
-  | `:resume` | while none runs, and the last stop left one | it is taken up, and gets the command |
-  | `{:start, module, options}` | always | this mission takes the place of a running one, and gets the command |
+  | `{:hand, {:except, module}}` | while another mission runs | that mission gets the command |
+  | `:resume` | while none runs and the last stop left one | it is resumed and gets the command |
+  | `{:start, module, options}` | always | it replaces a running mission and gets the command |
   """
 
   @enforce_keys [:ways, :until_ms, :reply]
@@ -20,19 +20,20 @@ defmodule Robot.Control.Delivery do
           | :resume
           | {:start, module(), options :: keyword()}
 
-  @typedoc "A way that is open, with the module that it leads to."
+  @typedoc "An open way; `:hand` comes with the module of the running mission."
   @type open :: {:hand, module()} | :resume | {:start, module(), options :: keyword()}
 
   @typedoc """
-  Why a command reached no mission: no way was open; there is no such mission; the emergency stop holds the robot; it
-  was stopped since this was asked; it is later than `until_ms`.
+  Why a command reached no mission: no way was open; there is no such mission; the emergency stop
+  holds the robot; it was stopped after the request; it is later than `until_ms`.
   """
   @type refusal :: {:error, :idle | :no_mission | :held | :stopped | :late}
 
   @typedoc """
-  `until_ms` is when whoever asked stops waiting (`System.monotonic_time/1`, ms): later nothing is begun. `asked` is when that was
-  (`System.monotonic_time/1`, microseconds; `nil` where nobody knows): what was asked before a stop ended with it. `reply`
-  is applied with `:ok` or a refusal as its last argument.
+  `until_ms` is when the requester stops waiting (`System.monotonic_time/1`, ms): a later command
+  is refused. `asked` is the time of the request (`System.monotonic_time/1`, microseconds; `nil`
+  if unknown): a request from before a stop is refused. `reply` is applied with `:ok` or a refusal
+  as its last argument.
   """
   @type t :: %__MODULE__{
           ways: [way()],
@@ -42,7 +43,7 @@ defmodule Robot.Control.Delivery do
         }
 
   @doc """
-  The first way that is open, for a pilot in this state, after a stop that left this.
+  The first way that is open for a pilot in this state; `halted` is what the last stop left.
 
       iex> reply = {Kernel, :send, [self()]}
       iex> ways = [{:hand, {:except, Some.Errand}}, :resume, {:start, Some.Mission, []}]

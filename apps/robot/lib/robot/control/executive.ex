@@ -1,13 +1,15 @@
 defmodule Robot.Control.Executive do
   @moduledoc """
-  Ten times a second: reads the board once, lets `Robot.Control.Controller` think, hands its wish to the gate
-  and the percept to the pilot. It never calls anyone, so nobody can hold it up; whatever takes
-  long (vision, planning) is a process of its own that writes to the board.
+  Ten times a second: takes a percept from the board, runs a tick of `Robot.Control.Controller`,
+  and sends its wish to the gate and the percept to the pilot. It only casts to other parts of the
+  robot, so none of them can block it; what takes long, such as vision, is a process of its own
+  that writes to the board.
 
-  A behaviour that hangs holds up all of it. `Robot.Safety.LivenessMonitor` sees that, and ends it.
+  A behaviour that hangs blocks the executive. `Robot.Safety.LivenessMonitor` detects that and
+  kills it.
 
-  It starts idle: goals live here, and are gone when it falls. The first that it does is to have the gate
-  forget what the one before it wished.
+  It starts idle: its state contains the goal, which a crash loses. At its start it makes the gate
+  drop the wish of its predecessor.
   """
   use GenServer
   alias Hal.{Device, Event, Ticker}
@@ -19,16 +21,17 @@ defmodule Robot.Control.Executive do
   @slow_us 50_000
 
   @doc """
-  Starts the executive of a robot. It knows nobody above: what it perceived goes, as `{:tick, percept}`,
-  and what came of a goal, as `{:outcome, tag, integer}`, to the sink: `apply(m, f, a ++ [event])`.
+  Starts the executive of a robot. It passes each percept, as `{:tick, percept}`, and each outcome
+  of a goal, as `{:outcome, tag, integer}`, to the sink: `apply(m, f, a ++ [event])`.
   """
   @spec start_link({Config.t(), sink :: Config.call()}) :: GenServer.on_start()
   def start_link({%Config{} = config, {_m, _f, _a} = sink}),
     do: GenServer.start_link(__MODULE__, {config, sink}, name: Names.via(config.id, :executive))
 
   @doc """
-  Sets, changes or (`nil`) drops the goal, as in `Robot.Control.Controller.goal/3`. Refused, in a line, where no such robot
-  runs on this node, and a goal that is not a behaviour, or none with these options.
+  Sets, changes or (`nil`) drops the goal, as in `Robot.Control.Controller.goal/3`. The error is a
+  line: no such robot runs on this node, the goal is not a behaviour, or it does not accept these
+  options.
   """
   @spec goal(robot :: atom(), tag :: term(), {module(), keyword()} | nil) ::
           :ok | {:error, line :: String.t()}
@@ -40,20 +43,20 @@ defmodule Robot.Control.Executive do
     end
   end
 
-  @doc "What the mission orders. Its goals have been checked (`Robot.Mission.Runner`)."
+  @doc "Sends an order of the mission; its goals have been checked (`Robot.Mission.Runner`)."
   @spec obey(robot :: atom(), Mission.order()) :: :ok
   def obey(robot, order), do: cast(robot, {:obey, order})
 
   @doc """
-  Applies `then` as soon as all that was said to the executive before is taken in: whoever waits for that
-  hears nothing from one that hangs.
+  Applies `then` in the executive, once it has handled all that this process sent before. An
+  executive that hangs never does.
   """
   @spec confirm(robot :: atom(), then :: Config.call()) :: :ok
   def confirm(robot, {_m, _f, _a} = then), do: cast(robot, {:confirm, then})
 
   @doc """
-  Drops the goal and all else that the mission said, and has the gate forget the wish behind them, after
-  every wish from before; then the gate applies `then`.
+  Drops the goal and all other orders of the mission, and makes the gate drop the wish, after all
+  earlier wishes of the executive; then the gate applies `then`.
   """
   @spec stand(robot :: atom(), then :: Config.call() | nil) :: :ok
   def stand(robot, then \\ nil), do: cast(robot, {:stand, then})
@@ -118,7 +121,7 @@ defmodule Robot.Control.Executive do
 
   def handle_info(_other, s), do: {:noreply, s}
 
-  # Written down before its first tick, which may be its last.
+  # The goal is on the board before its first tick, so that a hang in that tick can be attributed.
   defp pursue(%{controller: %{module: module}} = s, %{module: module} = controller),
     do: %{s | controller: controller}
 
@@ -142,7 +145,7 @@ defmodule Robot.Control.Executive do
     Board.put(board, :executive, :doing, doing, at_ms)
     if percept.pose, do: place(board, percept, at_ms)
 
-    # The outcome first: the mission knows what came of its goal when it sees the next percept.
+    # The outcome comes first, so that the mission knows it when it handles the percept.
     with {tag, outcome} <- outcome, do: tell(s, {:outcome, tag, outcome}, at_ms)
     tell(s, {:tick, percept}, at_ms)
     %{s | controller: controller, tick: doing.tick}
@@ -153,7 +156,7 @@ defmodule Robot.Control.Executive do
     Board.put(board, :executive, :uncertainty, uncertainty, at_ms)
   end
 
-  # Told when it changes.
+  # Reports a fault when it changes.
   defp fault(s, line, at_ms) do
     if line != Controller.fault(s.controller),
       do: Event.execute([:robot, :fault], %{at_ms: at_ms}, %{robot: s.config.id, line: line})

@@ -1,21 +1,22 @@
 defmodule Robot.Control.Pilot do
   @moduledoc """
   Runs one robot's mission. A `gen_statem` whose state is `:idle` or `{mission, phase}`, so that
-  `:sys.get_state/1` shows what the robot is up to. It carries the mission's effects out
-  (`Robot.Control.Pilot.Effects`) and decides nothing.
+  `:sys.get_state/1` shows what the robot is doing. It carries out the mission's effects
+  (`Robot.Control.Pilot.Effects`).
 
-  It starts idle, and tells the executive so: after a failure in the mission the robot stands
-  until a person starts it again.
+  It starts idle, and resets the executive: after a crash of the mission the robot stands until
+  somebody starts a mission again.
 
-  A stop is not the mission's to interpret. The pilot takes the mission out of command, whatever it is
-  at, and the stop goes on to the executive, which drops its goal, and from there to the gate, after
-  every older wish. Only the gate says that it is done.
+  A mission does not handle stops. The pilot ends the mission, whatever its phase, and passes the
+  stop to the executive, which drops its goal, and from there to the gate, after every older wish.
+  Only the gate confirms the stop.
 
-  The mission's callbacks are somebody else's code. While one is called, the board says so under `:asking`, so that
-  `Robot.Safety.LivenessMonitor` sees one that never returns, and ends the pilot.
+  The mission's callbacks may be foreign code. While one runs, the board has an entry `:asking`,
+  so that `Robot.Safety.LivenessMonitor` detects one that does not return, and kills the pilot.
 
-  Where a person arms the wheels (`arm: :manual`), every change of that ends what the robot is at: when they
-  are disarmed or lost, and when they are armed again, which is never the start of a motion.
+  If a person arms the wheels (`arm: :manual`), every change of arming ends the mission: when the
+  wheels are disarmed or their connection is lost, and when they are armed again, so that arming
+  does not start a motion.
   """
   @behaviour :gen_statem
   alias Robot.{Board, Config, Names}
@@ -23,7 +24,7 @@ defmodule Robot.Control.Pilot do
   alias Robot.Control.Pilot.{Effects, Journal}
   alias Robot.Mission.Runner
 
-  # On a busy machine a pilot is slow, not gone.
+  # Generous, because a pilot may be slow on a busy machine.
   @call_ms 5_000
 
   @doc "A child of the robot's supervisor."
@@ -35,41 +36,42 @@ defmodule Robot.Control.Pilot do
   def start_link(%Config{} = config),
     do: :gen_statem.start_link(Names.via(config.id, :pilot), __MODULE__, config, [])
 
-  @doc "Starts the mission of the robot's config, in place of a running one."
+  @doc "Starts the mission of the robot's config; it replaces a running one."
   @spec start(robot :: atom()) :: :ok | {:error, :no_mission}
   def start(robot), do: call(robot, :start)
 
-  @doc "Starts a mission, in place of a running one."
+  @doc "Starts a mission; it replaces a running one."
   @spec start(robot :: atom(), module(), keyword()) :: :ok | {:error, :no_mission}
   def start(robot, module, options), do: call(robot, {:start, module, options})
 
-  @doc "Ends the mission. When this returns, the gate has been told to stand, and no older wish follows."
+  @doc "Ends the mission. When this returns, the gate has dropped the wish; no older one follows."
   @spec stop(robot :: atom()) :: :ok
   def stop(robot), do: call(robot, :stop)
 
   @doc """
-  The same for those who must not wait. Once it is done, `then` is applied; never, where the pilot, the
-  executive or the gate hangs or falls meanwhile.
+  The same for callers that must not wait. `then` is applied once it is done, and not at all if
+  the pilot, the executive or the gate hangs or crashes meanwhile.
   """
   @spec halt(robot :: atom(), then :: Config.call() | nil) :: :ok
   def halt(robot, then \\ nil),
     do: :gen_statem.cast(Names.via(robot, :pilot), {:halt, then})
 
   @doc """
-  Takes up the mission that the last stop has ended, from its beginning, with what people had asked of it
-  (`c:Robot.Mission.halted/1`). `{:error, :idle}` where there is nothing to take up.
+  Resumes the mission that the last stop ended, from its beginning, with the commands that it had
+  kept (`c:Robot.Mission.halted/1`). `{:error, :idle}` if there is none, or if a mission runs.
   """
   @spec resume(robot :: atom()) :: :ok | {:error, :idle}
   def resume(robot), do: call(robot, :resume)
 
-  @doc "Hands a command to the mission. `:ok` means that it has it, not that it is done."
+  @doc "Hands a command to the mission. `:ok` means that the mission got it, not that it is done."
   @spec command(robot :: atom(), command :: term()) :: :ok | {:error, :idle}
   def command(robot, command), do: call(robot, {:command, command})
 
   @doc """
-  Hands a command to the mission for somebody else, who is told what became of it; the caller does not wait. The
-  executive replies `:ok`, once it has what the mission made of the command, and the pilot a refusal; nobody, where one of them
-  hangs or falls meanwhile.
+  Hands a command to the mission; the caller does not wait, and the reply goes where the delivery
+  says. The executive replies `:ok` once it has the mission's orders for the command, or the pilot
+  replies with a refusal. There is no reply if one of them hangs or crashes meanwhile, or if the
+  robot has no pilot on this node.
   """
   @spec deliver(robot :: atom(), command :: term(), Delivery.t()) :: :ok
   def deliver(robot, command, %Delivery{} = delivery) do
@@ -80,13 +82,14 @@ defmodule Robot.Control.Pilot do
   end
 
   @doc """
-  An event of `Robot.Mission`: a tick or an outcome from the executive, a message from another robot,
-  checked by whoever heard it. Of several ticks that wait, only the newest is handled.
+  Passes an event of `Robot.Mission` to the mission: a tick or an outcome from the executive, or a
+  message from another robot, which the sender of this event has checked. Of several waiting ticks
+  only the newest is handled.
   """
   @spec hear(robot :: atom(), Robot.Mission.event()) :: :ok
   def hear(robot, event), do: :gen_statem.cast(Names.via(robot, :pilot), event)
 
-  @doc "A sink for the drive: that the wheels may turn, or may no longer, is the pilot's affair, too."
+  @doc "A sink for the drive: passes on whether the wheels may turn."
   @spec sense(robot :: atom(), reading :: tuple()) :: :ok
   def sense(robot, {:arming, %{state: state}}),
     do: :gen_statem.cast(Names.via(robot, :pilot), {:arming, state})
@@ -107,7 +110,8 @@ defmodule Robot.Control.Pilot do
       since_ms: Config.now(config)
     }
 
-    # The pilot before this one may have ended within its mission, and the executive may still follow a goal of it.
+    # The former pilot may have crashed within a callback, and the executive may still have its
+    # goal.
     Journal.answered(data.board)
     Effects.rest(config)
     {:ok, :idle, Journal.told(:idle, %{}, data)}
@@ -166,7 +170,7 @@ defmodule Robot.Control.Pilot do
     with :ok <- timely(delivery, data),
          {:ok, way} <- Delivery.way(delivery, state, data.runner.halted),
          {:ok, state, data} <- go(way, event, state, data) do
-      # The pilot has it; that the executive has it, too, only that one can say.
+      # Only the executive can confirm that it has received the orders.
       Executive.confirm(data.config.id, {m, f, a ++ [:ok]})
       {:next_state, state, data}
     else
@@ -178,7 +182,8 @@ defmodule Robot.Control.Pilot do
 
   def handle_event(:info, _unknown, _state, _data), do: :keep_state_and_data
 
-  # Whoever asked has been told by now that nothing came of it, or somebody has stopped the robot meanwhile.
+  # A command is refused if its requester no longer waits, or if the robot is stopped or was
+  # stopped after the request.
   defp timely(delivery, data) do
     cond do
       System.monotonic_time(:millisecond) >= delivery.until_ms -> {:error, :late}
@@ -197,7 +202,7 @@ defmodule Robot.Control.Pilot do
     end
   end
 
-  # An event on its way to a mission.
+  # Passes an event to a mission by the way that was chosen.
   defp go({:hand, _module}, event, state, data),
     do: event |> handle(data) |> follow(state, data)
 
@@ -222,7 +227,8 @@ defmodule Robot.Control.Pilot do
     end
   end
 
-  # Whoever is answered finds the robot idle. The mission is asked last: it has no say in this.
+  # The board says idle before the answer. The mission is called last, because it cannot prevent
+  # this.
   defp halt(state, then, data) do
     Journal.heard(:stop, data)
     data = Journal.changed(state, :idle, %{}, data)
@@ -231,7 +237,7 @@ defmodule Robot.Control.Pilot do
     {:next_state, :idle, %{data | runner: halted}}
   end
 
-  # Percepts that came in meanwhile are further down in our own mailbox.
+  # Newer percepts may wait in this process's mailbox.
   defp newest({:tick, _percept} = tick) do
     receive do
       {:"$gen_cast", {:tick, _newer} = newer} -> newest(newer)

@@ -1,17 +1,18 @@
 defmodule Robot.Mission.Manual do
   @moduledoc """
-  One robot does what a person tells it (`Robot.Command`), one command at a time (R16, R31 to R36):
-  a robot leaves the group's mission for it, and comes back with the next start. Pure. `stop` is not a
-  mission's to carry out: the pilot ends this one like any other.
+  Runs a person's commands on one robot (`Robot.Command`), one command at a time (R16, R31 to
+  R36). The robot leaves the group's mission for it, and returns to that with the next start.
+  Pure. A mission does not carry out `stop`: the pilot ends this mission like any other.
 
-  In its heartbeats the robot stays `:idle`, so that no group waits for it, and names whom it
-  follows, so that nobody can close a circle of followers.
+  In its heartbeats the robot stays `:idle`, so that no group waits for it, and names the robot
+  that it follows, so that a command that would close a circle of followers can be refused.
 
-  Its phase is the command's name, then `:done`; of `find_blob`, `:found` or `:not_found`.
+  Its phase is the command's name, then `:done`; for `find_blob`, `:found` or `:not_found`.
 
-  Whoever is followed need not do anything: its heartbeats are the position updates that a
-  subscription asked for (R27, R35), so a person who asks for one is told so, and nothing changes. A follower keeps 1 m behind its leader, stands when it has
-  not heard it for a second, and goes on when it hears it again (R34).
+  A robot that is followed need not do anything: its heartbeats are the position updates that a
+  subscription asks for (R27, R35), so robots refuse a subscription. A follower keeps 1 m behind
+  its leader, stands when it has not heard it for a second, and continues when it hears it again
+  (R34).
   """
   alias Hal.{Pose, Twist}
   alias Robot.{Behaviour, Command, Percept}
@@ -42,11 +43,11 @@ defmodule Robot.Mission.Manual do
     result(mission, [goal, {:look, 0.0}, {:claim, claim(mission)}])
   end
 
-  # How a command ended, by its outcome (R12), is known to whoever asks for the robot's status.
+  # The robot's status reports the outcome of a command (R12) by its phase.
   def handle({:outcome, {:command, count}, outcome}, %{count: count} = mission),
     do: result(%{mission | result: outcome}, [{:claim, %{phase: :idle, standing: true}}])
 
-  # The one followed moves, and may fall silent.
+  # The followed robot moves, and its heartbeats may end.
   def handle({:tick, percept}, %{command: {:follow_the_leader, _leader} = command} = mission),
     do: result(mission, [{:goal, {:command, mission.count}, goal(command, percept)}])
 
@@ -74,7 +75,7 @@ defmodule Robot.Mission.Manual do
   defp goal({:follow, %Pose{} = place}, _percept), do: {Behaviour.Follow, target: place}
   defp goal({:find_blob, colour}, _percept), do: {Behaviour.FindBlob, colour: colour}
 
-  # Until the next percept shows where that one is.
+  # Stands until the next percept contains the followed robot.
   defp goal({:follow_the_leader, _leader}, nil), do: {Behaviour.Stop, []}
 
   defp goal({:follow_the_leader, leader}, %Percept{peers: peers, at_ms: now_ms}) do
@@ -84,7 +85,7 @@ defmodule Robot.Mission.Manual do
     end
   end
 
-  # Whatever is carried before its camera leads it, and others follow (R35).
+  # A coloured object that is carried before its camera leads it, and others follow (R35).
   defp goal(:lead, _percept), do: {Behaviour.TrackBlob, []}
 
   defp behind(%{pose: pose, twist: %Twist{linear: linear}}) do

@@ -1,10 +1,10 @@
 defmodule Robot.Mission.Runner do
   @moduledoc """
-  The life of a robot's mission as a function: started, in command, halted by a stop, resumed. Pure, as far as
-  the mission is; `Robot.Control.Pilot` runs it in a process, `Swarm.Member` in lockstep.
+  The life cycle of a robot's mission as a function: start, events, halt by a stop, resume. Pure
+  if the mission is; `Robot.Control.Pilot` runs it in a process, `Swarm.Member` in lockstep.
 
-  An idle robot's mission hears nothing. The caller carries out the effects, in their order, except
-  `{:claim, map}`: what the mission claims is kept here, until it is halted.
+  Events for an idle robot are dropped. The caller carries out the effects, in their order, except
+  `{:claim, map}`: the mission's claim is kept here until the mission is halted.
   """
   alias Robot.{Behaviour, Mission}
 
@@ -12,7 +12,10 @@ defmodule Robot.Mission.Runner do
   defstruct @enforce_keys ++
               [module: nil, mission: nil, phase: :idle, claim: %{}, halted: nil]
 
-  @typedoc "`module` is `nil` while the robot is idle; `halted` is what the last stop left for `resume/1`."
+  @typedoc """
+  `module` is `nil` while the robot is idle; `halted` is the mission that the last stop left for
+  `resume/1`.
+  """
   @type t :: %__MODULE__{
           robot: atom(),
           module: module() | nil,
@@ -24,11 +27,11 @@ defmodule Robot.Mission.Runner do
 
   @type state :: :idle | {module(), phase :: atom()}
 
-  @doc "An idle robot's."
+  @doc "The runner of an idle robot."
   @spec new(robot :: atom()) :: t()
   def new(robot), do: %__MODULE__{robot: robot}
 
-  @doc "Starts a mission, in place of any other, and of what a stop has left of one."
+  @doc "Starts a mission; it replaces any other, and the mission that a stop has left."
   @spec start(t(), module(), keyword()) :: {t(), [Mission.effect()]}
   def start(%__MODULE__{} = runner, module, options) do
     runner = %{runner | module: module, claim: %{}, halted: nil}
@@ -36,8 +39,8 @@ defmodule Robot.Mission.Runner do
   end
 
   @doc """
-  Puts what the last stop has left of a mission in command again; the command that it waits for comes next.
-  `{:error, :idle}` where there is nothing to take up.
+  Resumes the mission that the last stop has left; the caller then hands it the command that it
+  waits for. `{:error, :idle}` if a mission runs or none was left.
   """
   @spec resume(t()) :: {:ok, t()} | {:error, :idle}
   def resume(%__MODULE__{module: nil, halted: {module, mission}} = runner),
@@ -45,14 +48,17 @@ defmodule Robot.Mission.Runner do
 
   def resume(%__MODULE__{}), do: {:error, :idle}
 
-  @doc "Hands an event to the mission; an idle robot's is lost. A goal that is not one raises `ArgumentError`."
+  @doc """
+  Hands an event to the mission; an idle robot drops it. An invalid goal among the effects raises
+  `ArgumentError`.
+  """
   @spec handle(t(), Mission.event()) :: {t(), [Mission.effect()]}
   def handle(%__MODULE__{module: nil} = runner, _event), do: {runner, []}
 
   def handle(%__MODULE__{module: module, mission: mission} = runner, event),
     do: follow(runner, module.handle(event, mission))
 
-  @doc "Takes the mission out of command; it only says what it leaves (`c:Robot.Mission.halted/1`)."
+  @doc "Ends the mission and keeps what it leaves for `resume/1` (`c:Robot.Mission.halted/1`)."
   @spec halt(t()) :: t()
   def halt(%__MODULE__{module: nil} = runner), do: runner
 
@@ -61,7 +67,7 @@ defmodule Robot.Mission.Runner do
     %{new(runner.robot) | halted: left && {module, left}}
   end
 
-  @doc "What the robot is up to."
+  @doc "The mission and its phase, or `:idle`."
   @spec state(t()) :: state()
   def state(%__MODULE__{module: nil}), do: :idle
   def state(%__MODULE__{module: module, phase: phase}), do: {module, phase}
@@ -73,7 +79,7 @@ defmodule Robot.Mission.Runner do
 
   defp note({:claim, claim}, runner) when is_map(claim), do: %{runner | claim: claim}
 
-  # A wrong one is the mission's fault, which crashes with it, and not the controller.
+  # An invalid goal is an error of the mission, so the mission crashes, not the controller.
   defp note({:goal, _tag, goal}, runner) do
     with {:error, line} <- Behaviour.check(goal), do: raise(ArgumentError, line)
     runner

@@ -1,12 +1,12 @@
 defmodule Robot.Control.Pilot.Effects do
   @moduledoc """
-  Carries out what a mission asks for.
+  Carries out the effects of a mission.
 
   | effect | goes to |
   |---|---|
   | orders: `{:goal, tag, goal}`, `{:anchors, anchors}`, `{:look, pan}` | the executive |
-  | `{:send, to, message}` | the config's `:send`; lost without one |
-  | `{:claim, map}` | the board, under `:mission`, for the heartbeat to carry (`Robot.Control.Pilot.Journal`) |
+  | `{:send, to, message}` | the config's `:send`; dropped without one |
+  | `{:claim, map}` | the board's entry `:mission` (`Robot.Control.Pilot.Journal`) |
   | `{:stage, name, map}` | the event `[:robot, :stage]` |
   """
   alias Hal.Event
@@ -15,7 +15,7 @@ defmodule Robot.Control.Pilot.Effects do
   alias Robot.Localiser.Anchors
   import Robot.Mission, only: [is_order: 1]
 
-  @doc "Carries out one effect, and leaves it in the trace."
+  @doc "Carries out one effect, and records it in the trace."
   @spec carry_out(Robot.Mission.effect(), Config.t()) :: :ok
   def carry_out(effect, config) do
     at_ms = Config.now(config)
@@ -31,7 +31,7 @@ defmodule Robot.Control.Pilot.Effects do
   defp carry_out({:send, to, message}, %{send: {m, f, a}}, _at_ms),
     do: apply(m, f, a ++ [to, message])
 
-  # The runner has it.
+  # The runner keeps the claim.
   defp carry_out({:claim, _claim}, _config, _at_ms), do: :ok
 
   defp carry_out({:stage, stage, about}, config, at_ms) do
@@ -39,7 +39,7 @@ defmodule Robot.Control.Pilot.Effects do
     Event.execute([:robot, :stage], %{at_ms: at_ms}, about)
   end
 
-  @doc "Makes the executive forget what it was told for a mission that is over."
+  @doc "Makes the executive drop the orders of a mission that has ended."
   @spec rest(Config.t()) :: :ok
   def rest(%Config{id: id}) do
     for order <- [{:goal, :idle, nil}, {:anchors, %Anchors{}}, {:look, nil}],

@@ -1,16 +1,16 @@
 defmodule Robot.Control.Pilot.Journal do
   @moduledoc """
-  What a pilot tells of itself: on the board, in events and in the trace.
+  What a pilot publishes about itself: on the board, in events and in the trace.
 
-  Under `:mission` the board has the mission, its phase and its claim; under `:asking` the
-  callback of the mission that runs, so that `Robot.Safety.LivenessMonitor` sees one that never
-  returns.
+  The board's entry `:mission` contains the mission, its phase and its claim. The entry `:asking`
+  exists while a callback of the mission runs, so that `Robot.Safety.LivenessMonitor` detects one
+  that does not return.
   """
   alias Hal.Event
   alias Robot.{Board, Config}
   alias Robot.Control.Trace
 
-  @typedoc "Of a pilot's data: the config, the board, and since when it has been in its state."
+  @typedoc "The part of a pilot's data that is needed here; `since_ms` is when its state began."
   @type data :: %{
           required(:config) => Config.t(),
           required(:board) => Board.t(),
@@ -19,7 +19,7 @@ defmodule Robot.Control.Pilot.Journal do
         }
   @type state :: :idle | {mission :: module(), phase :: atom()}
 
-  @doc "Leaves an input in the trace."
+  @doc "Records an input in the trace."
   @spec heard(term(), data()) :: :ok
   def heard(input, %{config: config}) do
     _ = Trace.input(config, :pilot, input, Config.now(config))
@@ -27,8 +27,8 @@ defmodule Robot.Control.Pilot.Journal do
   end
 
   @doc """
-  Calls a callback of a mission, `nil` for none, with a note of it on the board. No two calls are
-  noted alike.
+  Calls a callback of a mission, with an entry on the board while it runs; `nil` for no mission,
+  with no entry. Each call has another entry.
   """
   @spec asking(module() | nil, data(), asked :: function()) :: term()
   def asking(nil, _data, function), do: function.()
@@ -41,21 +41,21 @@ defmodule Robot.Control.Pilot.Journal do
     result
   end
 
-  @doc "No callback runs."
+  @doc "Removes the board's entry of a running callback."
   @spec answered(Board.t()) :: :ok
   def answered(board) do
     _ = Board.delete(board, :pilot, :asking)
     :ok
   end
 
-  @doc "The pilot's state is this now; gives its data back, with since when."
+  @doc "Publishes the pilot's state after an event; returns its data, with when that state began."
   @spec changed(state(), state(), claim :: map(), data()) :: data()
   def changed(state, state, claim, data), do: written(state, claim, data)
 
   def changed(_before, state, claim, data),
     do: told(state, claim, %{data | since_ms: Config.now(data.config)})
 
-  @doc "Tells of a state that is new, or the first."
+  @doc "Publishes a state that is new, or the first one, also as an event and in the trace."
   @spec told(state(), claim :: map(), data()) :: data()
   def told(state, claim, data) do
     data = written(state, claim, data)
