@@ -1,21 +1,24 @@
 defmodule Robot.Calibration do
   @moduledoc """
-  Estimates the errors of a robot's odometry from what its wheels reported and what a person
+  Estimates the errors of a robot's odometry from what odometry reported and what a person
   measured. Pure.
 
-  What is wrong are the three numbers of `Robot.Calibration.Model`: the distance is found by driving straight
-  (`distance/1`), the base by turning (`angle/2`) and finer by squares, the ratio of the wheels by squares.
+  The errors are the three numbers of `Robot.Calibration.Model`: the distance follows from driving
+  straight (`distance/1`), the base from turning (`angle/2`) and more exactly from squares, the
+  ratio of the wheels from squares.
 
-  Squares are those of UMBmark (Borenstein and Feng 1996, `Robot.Calibration.Umbmark`): their
-  formulas first; then, since these are of first order (for a base that is off by 2 % they err by up to
-  1 %, unless the robot drives all squares again with what they say), least squares with the whole model of
-  the wheels (`Robot.Calibration.Squares`), which begins at the formulas' answer.
+  Squares are those of UMBmark (Borenstein and Feng 1996, `Robot.Calibration.Umbmark`). Its
+  formulas come first. They are of first order: for a base that is off by 2 % they err by up to 1
+  %, unless the robot drives all squares again with the corrected values. So a least-squares fit
+  of the whole model of the wheels follows (`Robot.Calibration.Squares`), which begins at the
+  result of the formulas.
   """
   alias Robot.Calibration.{Model, Squares}
 
   @typedoc """
-  What was driven and measured: `distances` and `angles` as `{by odometry, measured}`, metres (in a straight
-  line from start to end) and radians; `runs` are squares with sides of `side` metres by odometry.
+  What was driven and measured: `distances` and `angles` as `{by odometry, measured}`, in metres
+  (in a straight line from start to end) and radians; `runs` are squares with sides of `side`
+  metres by odometry.
   """
   @type measured :: %{
           distances: [{float(), float()}],
@@ -27,11 +30,11 @@ defmodule Robot.Calibration do
   @small 1.0e-6
 
   @doc """
-  All of it. What was not measured stays 1.0; squares are more exact than angles, where there are both.
-  The second value is what the squares say besides, or `nil`.
+  Estimates the whole model. A number that was not measured stays 1.0; if there are squares, they
+  determine the base instead of the angles. The last value is the result of the squares, or `nil`.
 
-  Unequal wheels bend the straight way, so that its ends are nearer to each other than it is long: a
-  second round, with the ratio that the first one found, makes up for that.
+  Unequal wheels bend a straight leg, so that its ends are nearer to each other than it is long: a
+  second round, with the ratio from the first one, corrects that.
 
       iex> measured = %{distances: [{3.0, 3.03}], angles: [], runs: [], side: 4.0}
       iex> {:ok, wheels, nil} = Robot.Calibration.estimate(measured, 0.36)
@@ -76,7 +79,7 @@ defmodule Robot.Calibration do
   end
 
   @doc """
-  The distance factor from straight runs, `{by odometry, measured}` in metres, weighed by their
+  The distance factor from straight runs, `{by odometry, measured}` in metres, weighted by their
   length.
 
       iex> Robot.Calibration.distance([{3.0, 3.06}, {3.0, 3.04}]) |> Float.round(4)
@@ -86,8 +89,9 @@ defmodule Robot.Calibration do
   def distance(runs), do: factor(runs)
 
   @doc """
-  The base factor from turns on the spot, `{by odometry, measured}` in radians, with the distance factor:
-  a base turns by as much more as its wheels go further, and by as much less as they stand further apart.
+  The base factor from turns on the spot, `{by odometry, measured}` in radians, and the distance
+  factor: the true turn grows in proportion to the way of the wheels, and shrinks in proportion to
+  their distance from each other.
 
       iex> Robot.Calibration.angle([{6.283, 6.283 / 1.02}, {-6.283, -6.283 / 1.02}], 1.0) |> Float.round(4)
       1.02
@@ -96,9 +100,10 @@ defmodule Robot.Calibration do
   def angle(turns, distance), do: distance / factor(turns)
 
   @doc """
-  By how much turns to the left go further than turns to the right, each as measured for what odometry told;
-  `nil` without both. Wrong wheels turn both ways alike: what differs is slip, as skid-steered
-  bases have it, and then squares cannot tell the ratio of the wheels from it.
+  By which share turns to the left are larger than turns to the right, each measured relative to
+  odometry; `nil` unless there are both. Wheel errors affect both directions alike: a difference
+  means slip, as skid-steered bases have it, and then squares cannot distinguish the ratio of the
+  wheels from it.
 
       iex> Robot.Calibration.slip([{6.0, 6.3}, {-6.0, -6.0}]) |> Float.round(3)
       0.05

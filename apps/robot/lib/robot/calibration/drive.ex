@@ -1,16 +1,15 @@
 defmodule Robot.Calibration.Drive do
   @moduledoc """
   The mission of a robot under calibration: it drives one course (`Robot.Calibration.DriveCourse`)
-  and stands. Options: those of the course. Its phase is `:driving`, then `:done` or `:blocked`.
-  Pure.
-
-  Legs for what is measured: `legs/1`.
+  and stands. Options: those of the course, whose legs `legs/1` gives. Its phase is `:driving`,
+  then `:done` or `:blocked`. Pure.
   """
   @behaviour Robot.Mission
   alias Robot.Calibration.DriveCourse
 
   @doc """
-  The legs of a distance (metres), of an angle (radians), and of a square, which ends as it began.
+  The legs of a distance (metres), of an angle (radians), or of a square with sides in metres,
+  which ends with the heading of its start.
 
       iex> Robot.Calibration.Drive.legs({:distance, 3.0})
       [go: 3.0]

@@ -1,15 +1,15 @@
 defmodule Robot.Calibration.DriveCourse do
   @moduledoc """
-  Drives a course of straight legs and turns on the spot, by odometry alone, as calibration needs it.
-  The course is laid out once, from where the robot stands at the first tick; after each leg the
-  robot stands still before it begins the next, so that wheels do not slip.
+  Drives a course of straight legs and turns on the spot, by odometry alone, for calibration. The
+  course is laid out once, from the robot's pose at the first tick; after each leg the robot
+  stands still before it begins the next, so that the wheels slip less.
 
-  Options: `legs`, a list of `{:go, metres}` (0.05 to 100) and `{:turn, radians}` (left is positive;
-  more than a whole turn is allowed); `speed` (m/s) and `turn` (rad/s), at most the profile's,
-  which are the defaults.
+  Options: `legs`, a list of `{:go, metres}` (0.05 to 100) and `{:turn, radians}` (left is
+  positive; more than a whole turn is allowed); `speed` (m/s) and `turn` (rad/s), at most the
+  profile's, which are the defaults.
 
-  Outcome 1: the course is driven. Outcome 2: something was touched, or the robot came no further for
-  5 s; it stands.
+  Outcome 1: the course is driven. Outcome 2: a bumper was touched, or the robot made no progress,
+  or had no odometry before the start, for 5 s; it stands.
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
@@ -18,12 +18,12 @@ defmodule Robot.Calibration.DriveCourse do
 
   @close_m 0.004
   @close_rad 0.008
-  # Below these odometry says that it stands.
+  # Below these speeds of odometry (m/s, rad/s) the robot counts as standing.
   @still_linear 0.006
   @still_turn 0.01
   @stuck_ms 5_000
   @progress 0.01
-  # A heading that leads back to the line over this many metres.
+  # The robot heads for a point on the line this many metres ahead.
   @ahead_m 0.6
   @slowest 0.02
   @slowest_turn 0.04
@@ -73,7 +73,7 @@ defmodule Robot.Calibration.DriveCourse do
       else: {:running, stand(), {__MODULE__, state}}
   end
 
-  # The mark is where the plan says that the leg begins, with the heading of the plan.
+  # The mark is the planned pose at which the leg begins.
   defp next(%{legs: [leg | legs]} = state, pose, at_ms),
     do:
       begin(%{state | legs: legs, mark: after_leg(leg, state.mark), heading: pose.heading}, at_ms)
@@ -84,7 +84,7 @@ defmodule Robot.Calibration.DriveCourse do
   defp begin(%{legs: [{:go, way} | _]} = state, at_ms),
     do: %{state | left: way * 1.0, best: way * 1.0, best_ms: at_ms}
 
-  # Whatever heading the leg before ended with, the turn ends with that of the plan.
+  # Whatever the heading at the end of the last leg, the turn ends with the planned heading.
   defp begin(%{legs: [{:turn, turn} | _]} = state, at_ms) do
     left = turn + Pose.wrap(state.mark.heading - state.heading)
     %{state | left: left, best: abs(left), best_ms: at_ms}

@@ -2,16 +2,16 @@ defmodule Robot.Calibration.Keys do
   @moduledoc """
   Applies a calibration to the conversions of a robot file. Pure.
 
-  With units per metre and radian, a base that goes further than it tells has fewer units a metre, and
-  one whose wheels stand wider apart has more of them a radian:
-  `distance / d`, `angle * base / d`. The ratio is put behind both (`Hal.Drive.Wheels`), and so for the wheel
-  base that odometry reckons with.
+  The conversions are units per metre and per radian. A base that drives farther than it reports
+  has fewer units per metre, and one whose wheels are farther apart has more units per radian:
+  `distance / d`, `angle * base / d`. The wheel ratio is applied after both (`Hal.Drive.Wheels`),
+  and therefore refers to the wheel base with which odometry calculates.
   """
   alias Hal.RFlex.Conversions
   alias Robot.Calibration.Model
 
   @doc """
-  The published conversions of a kind, to begin with.
+  The published conversions of a kind, as a starting point.
 
       iex> Robot.Calibration.Keys.published(:magellan)
       [distance: 31387.0, angle: 4654.2]
@@ -20,8 +20,8 @@ defmodule Robot.Calibration.Keys do
   def published(kind), do: Conversions.published(kind)
 
   @doc """
-  The conversions that a base is to have which was calibrated with these. What was not measured (`found`)
-  is left out.
+  The new conversions of a base that was calibrated with these. `found` lists what was measured;
+  keys that do not depend on it are left out.
 
       iex> wheels = %Robot.Calibration.Model{distance: 0.5, base: 1.02, ratio: 1.01}
       iex> Robot.Calibration.Keys.new([distance: 1000.0, angle: 500.0], wheels, [:distance, :base])
@@ -38,8 +38,8 @@ defmodule Robot.Calibration.Keys do
       if(:ratio in found, do: [wheel_ratio: Float.round(ratio, 5)], else: [])
   end
 
-  # The drift of unequal wheels is (c_right - c_left) / b: for a b that is not corrected they are corrected by
-  # as much less.
+  # The drift of unequal wheels is (c_right - c_left) / b. Because b is not corrected here, the
+  # difference of the wheels is reduced by the same factor.
   defp effective(%Model{ratio: ratio, base: base}) do
     part = (ratio - 1) / ((ratio + 1) * base)
     (1 + part) / (1 - part)

@@ -2,16 +2,16 @@ defmodule Robot.Calibration.Model do
   @moduledoc """
   A model of a base whose odometry has errors in its wheels. Pure.
 
-  Three numbers, each 1.0 for wheels that are what the robot takes them for:
+  Three numbers, each 1.0 for wheels without error:
 
   | number | meaning |
   |---|---|
   | `distance` | metres truly driven for each metre of odometry |
-  | `base` | the true wheel base for each metre of the one that odometry reckons with, all else right |
-  | `ratio` | way of the right wheel for each metre of the left one |
+  | `base` | the true wheel base divided by that of odometry, if all else is right |
+  | `ratio` | the way of the right wheel for each metre of the left one |
 
-  A **run** is what a square gave: the way round, and by how much its true end was off the end that
-  odometry told, in the frame of its start (x forward, y left, metres).
+  A **run** is the result of one square: its direction, and the offset of its true end from its
+  end by odometry, in the frame of its start (x forward, y left, metres).
   """
   alias Hal.Pose
   alias Hal.Drive.Wheels
@@ -22,16 +22,17 @@ defmodule Robot.Calibration.Model do
 
   defstruct distance: 1.0, base: 1.0, ratio: 1.0
 
-  # Pieces of a leg: the way of unequal wheels is an arc.
+  # A leg is divided into this many pieces, because unequal wheels drive an arc.
   @steps 12
 
-  @doc "The way round in words."
+  @doc "The direction of a square in words."
   @spec words(direction()) :: String.t()
   def words(:cw), do: "clockwise"
   def words(:ccw), do: "counter-clockwise"
 
   @doc """
-  By how much the true end of a square would be off the one that odometry tells, with these wheels.
+  The offset of the true end of a square from its end by odometry, for these wheels, sides of
+  `side` metres, and a wheel base of `b` metres.
 
       iex> Robot.Calibration.Model.predict(%Robot.Calibration.Model{}, :cw, 4.0, 0.4)
       {0.0, 0.0}
@@ -54,7 +55,7 @@ defmodule Robot.Calibration.Model do
   defp piece({:go, way}), do: {way / @steps, 0.0}
   defp piece({:turn, turn}), do: {0.0, turn / @steps}
 
-  @doc "What a base with these wheels truly did that says it did `step`."
+  @doc "The true step of a base with these wheels that reports `step`; `b` is its wheel base."
   @spec true_step(Wheels.step(), t(), float()) :: Wheels.step()
   def true_step(step, %__MODULE__{} = wheels, b) do
     {way, turn} = Wheels.correct(step, b, wheels.ratio)

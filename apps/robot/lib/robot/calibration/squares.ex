@@ -3,14 +3,17 @@ defmodule Robot.Calibration.Squares do
   Estimates wheel errors from driven squares: starts with the formulas of UMBmark, then fits the
   whole model of the wheels by least squares. Pure.
 
-  The unknowns are the factor of the base and the wheel ratio; what is compared are the centres of gravity of
-  the return errors of both directions, with where `Robot.Calibration.Model.predict/4` has them.
+  The unknowns are the factor of the base and the wheel ratio. The residuals are the differences
+  between the centres of gravity of the return errors, in both directions, and those predicted by
+  `Robot.Calibration.Model.predict/4`.
   """
   alias Robot.Calibration.{Model, Umbmark}
 
   @typedoc """
-  Of squares: what `Umbmark` says, the fit, the greatest mean error before and what is left of it with the
-  fit (metres), and the standard deviations of `base` and `ratio` as the spread of the runs has it.
+  The result of squares: the answer of the formulas (`Robot.Calibration.Umbmark`), the fit, the
+  greater mean error of the two directions without correction and with the fit (metres), and the
+  standard deviations of `base` and `ratio` by the spread of the runs; `nil` with fewer than two
+  runs in a direction.
   """
   @type t :: %{
           formulas: Model.t(),
@@ -23,9 +26,9 @@ defmodule Robot.Calibration.Squares do
   @small 1.0e-6
 
   @doc """
-  What squares with sides of `side` metres (by odometry) say, for a base whose wheels stand `wheel_base`
-  metres apart in its own arithmetic, and whose distance factor is known. There must be runs of both
-  directions.
+  The estimate from squares with sides of `side` metres (by odometry). Options: `wheel_base`, the
+  wheel base with which the base calculates (metres), and `distance`, its known distance factor
+  (default 1.0). There must be runs in both directions.
   """
   @spec estimate([Model.run()], float(), keyword()) :: {:ok, t()} | {:error, String.t()}
   def estimate(runs, side, options) do
@@ -34,7 +37,7 @@ defmodule Robot.Calibration.Squares do
 
     with {:ok, cw} <- centre(runs, :cw), {:ok, ccw} <- centre(runs, :ccw) do
       {base, ratio} = Umbmark.estimate(cw, ccw, side * distance, b)
-      # Theirs is the base of wheels whose common size is right already.
+      # The formulas assume that the mean size of the wheels is already right.
       formulas = %Model{distance: distance, base: base * distance, ratio: ratio}
       {fit, design} = fit(formulas, cw, ccw, side, b)
 
@@ -60,7 +63,7 @@ defmodule Robot.Calibration.Squares do
     end
   end
 
-  # Gauss and Newton: two unknowns, four numbers, and a start that is near.
+  # Gauss-Newton: two unknowns, four residuals, and a starting point near the solution.
   defp fit(start, cw, ccw, side, b) do
     Enum.reduce(1..6, {start, nil}, fn _round, {wheels, _design} ->
       rest = residuals(wheels, cw, ccw, side, b)
@@ -80,7 +83,8 @@ defmodule Robot.Calibration.Squares do
     end)
   end
 
-  # No base is off by more; a step too far must not lead to where nothing can be reckoned.
+  # Real bases have smaller errors; the bounds keep a step that is too large from leaving the
+  # range in which the model can be computed.
   defp bounded(factor), do: factor |> max(0.5) |> min(2.0)
 
   defp column(wheels, key, rest, cw, ccw, side, b) do
@@ -99,7 +103,8 @@ defmodule Robot.Calibration.Squares do
     max(:math.sqrt(a * a + c * c), :math.sqrt(d * d + e * e))
   end
 
-  # The variance of a mean of n runs is that of one by n; base and ratio are linear in the means.
+  # The variance of the mean of n runs is that of one run divided by n; base and ratio are taken
+  # to be linear in the means.
   defp deviations(runs, {by_ratio, by_base}) do
     groups = runs |> Enum.group_by(&elem(&1, 0), &elem(&1, 1)) |> Map.values()
 

@@ -2,24 +2,26 @@ defmodule Robot.Calibration.Umbmark do
   @moduledoc """
   The formulas of UMBmark. Pure.
 
-  Source: J. Borenstein, L. Feng, "Measurement and Correction of Systematic Odometry Errors in Mobile
-  Robots", IEEE Transactions on Robotics and Automation 12(6), 1996. A robot drives a square with sides of
-  L metres several times clockwise and as often counter-clockwise, from one mark. Of each run its
-  return error is kept, true end less end by odometry; of each direction the centre of gravity of these.
+  Source: J. Borenstein, L. Feng, "Measurement and Correction of Systematic Odometry Errors in
+  Mobile Robots", IEEE Transactions on Robotics and Automation 12(6), 1996. A robot drives a
+  square with sides of L metres several times clockwise and as often counter-clockwise, from the
+  same mark. The return error of each run is its true end minus its end by odometry; the formulas
+  use the centre of gravity of these errors for each direction.
 
       alpha = (x_cw + x_ccw) / (-4 L)  or  (y_cw - y_ccw) / (-4 L)     radians; the wheel base
       beta  = (x_cw - x_ccw) / (-4 L)  or  (y_cw + y_ccw) / (-4 L)     radians; unequal wheels
       b_new = b (pi / 2) / (pi / 2 - alpha)
       R = (L / 2) / sin(beta / 2),   E_d = (R + b / 2) / (R - b / 2)
 
-  The two of each are averaged: each alone is off by the square of what the other error is, with
-  opposite signs.
+  The two formulas of each angle are averaged: each alone has an error of the order of the square
+  of the other angle, and the two errors have opposite signs.
   """
 
   @type centre :: {x :: float(), y :: float()}
 
   @doc """
-  The factor of the wheel base and the wheel ratio E_d, from the centres of gravity of both directions.
+  The factor of the wheel base and the wheel ratio E_d, from the centres of gravity of both
+  directions.
 
       iex> Robot.Calibration.Umbmark.estimate({0.0, 0.0}, {0.0, 0.0}, 4.0, 0.4)
       {1.0, 1.0}
@@ -36,7 +38,7 @@ defmodule Robot.Calibration.Umbmark do
     {quarter / (quarter - alpha), ratio(beta, side, b)}
   end
 
-  # E_d with both sides multiplied by what may be zero.
+  # E_d with numerator and denominator multiplied by 2 sin(beta / 2), which may be zero.
   defp ratio(beta, side, b) do
     bend = b * :math.sin(beta / 2)
     (side + bend) / (side - bend)
