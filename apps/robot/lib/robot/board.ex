@@ -1,38 +1,49 @@
 defmodule Robot.Board do
   @moduledoc """
-  The newest readings of one robot, for anyone on its node to read without asking a process.
+  The newest readings of one robot, which any process on its node can read without a message.
 
-  One ETS table of entries `{key, value, at_ms}`. Readers say how old is too old. Each key has one
-  writer, and `put/5` refuses any other:
+  One ETS table of entries `{key, value, at_ms}`. Readers give the greatest age that they accept.
+  Each key has one writer, and `put/5` raises for any other:
 
   | key | writer | value |
   |---|---|---|
-  | `:odometry` `:sonar` `:ir` `:bumpers` `:power` `:brake` `:joystick` `:home` | `:drive` | as in `Hal.Drive` |
+  | `:odometry` `:sonar` `:ir` `:bumpers` `:power` | `:drive` | as in `Hal.Drive` |
+  | `:brake` `:joystick` `:home` | `:drive` | as in `Hal.Drive` |
   | `:arming` | `:drive` | `%{state: state, why: line or nil}` (`Hal.Device.Arming`) |
   | `:ptz` | `:ptz` | as in `Hal.Ptz` |
   | `:detections` | `:blob_detector` | `Vision.Detections`, at the time of its picture |
-  | `{:health, device}` | the device | `:online` or `{:offline, reason}`, since when |
+  | `{:health, device}` | the device | `:online` or `{:offline, reason}`, at the time it began |
   | `{:peer, id}` | `:comms` | as in `Robot.Percept` |
-  | `:estop` | `:estop` | how the emergency stop stands, as its one owner publishes it: the last number known, the last one cleared here, the calls heard |
-  | `:stopped` | `:estop` | when it was stopped last, by whatever stop: `System.monotonic_time/1`, microseconds |
-  | `:radio` | `:comms` | how many messages were sent, heard, and refused as malformed |
+  | `:estop` | `:estop` | the state of the emergency stop (1) |
+  | `:stopped` | `:estop` | when it was last stopped (2) |
+  | `:radio` | `:comms` | counts of messages sent, received, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
   | `:presses` | `:gate` | how often its own button was pressed |
-  | `:frame` | `:gate` | of odometry, that the fence is laid in: `Robot.Safety.Reflex.frame/1` |
-  | `:doing` | `:executive` | `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil, tick: count}` |
+  | `:frame` | `:gate` | the odometry frame of the fence: `Robot.Safety.Reflex.frame/1` |
+  | `:doing` | `:executive` | the chosen wish and the outcome of the goal (3) |
   | `:goal` | `:executive` | the module of its goal's behaviour, or `nil` |
-  | `{:hung, part}` | `:watch` | of `:gate`, `:executive` or `:pilot`: `{:silent, module}` of the behaviour or the mission in which it hangs (`nil` of the gate), `{:hung, module}` once it was ended for it |
+  | `{:hung, part}` | `:watch` | where `:gate`, `:executive` or `:pilot` hangs (4) |
   | `:pose` | `:executive` | the estimate in the `map` frame |
-  | `:asking` | `:pilot` | `{module, integer}` while a callback of the mission runs, each with another number |
-  | `:uncertainty` | `:executive` | how sure that pose is: `t:Robot.Percept.uncertainty/0` |
-  | `:mission` | `:pilot` | `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state}` |
+  | `:asking` | `:pilot` | while a callback of the mission runs (5) |
+  | `:uncertainty` | `:executive` | that of the pose: `t:Robot.Percept.uncertainty/0` |
+  | `:mission` | `:pilot` | the state of the mission and its claim (6) |
 
-  This process owns the tables and does nothing else, so that they outlive whoever writes them.
-  Nothing outlives the board, on purpose, with one exception.
+    1. As its one owner publishes it: the last number known, the last one cleared here, whether it
+       is latched, and the calls heard.
+    2. By any kind of stop: `System.monotonic_time/1`, microseconds.
+    3. `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil,
+       tick: count}`
+    4. `{:silent, module}`, with the behaviour or the mission in which it hangs (`nil` for the
+       gate); `{:hung, module}` once it was killed for that.
+    5. `{module, integer}`, with another number for each call.
+    6. `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state}`
+
+  This process owns the tables and does nothing else, so that they survive a crash of their
+  writers. All of it is lost with the board, on purpose, with one exception.
 
   The **e-stop latch** is a table of its own, written by the gate only, so that a gate that
-  restarts is still latched. With a file (real robots) it also outlives the board and the machine:
-  the file is there while the latch is set.
+  restarts is still latched. With a file (real robots) it also survives a restart of the board and
+  of the machine: the file exists while the latch is set.
   """
   use GenServer
   alias Robot.{Config, Names}
@@ -41,7 +52,7 @@ defmodule Robot.Board do
   @enforce_keys [:robot, :table, :latch, :clock, :file, :since_ms]
   defstruct @enforce_keys
 
-  @typedoc "What readers and writers hold: the tables and the clock; `since_ms`, when the robot was started."
+  @typedoc "The tables and the clock, for readers and writers; the board started at `since_ms`."
   @type t :: %__MODULE__{
           robot: atom(),
           table: :ets.tid(),
@@ -102,7 +113,7 @@ defmodule Robot.Board do
     end
   end
 
-  @doc "The same for a robot that must have one: its own parts start after it."
+  @doc "The board of a robot that must have one, for the parts that start after it."
   @spec find!(robot :: atom()) :: t()
   def find!(robot) do
     {:ok, board} = find(robot)
@@ -113,7 +124,7 @@ defmodule Robot.Board do
   @spec now(t()) :: integer()
   def now(%__MODULE__{clock: {m, f, a}}), do: apply(m, f, a)
 
-  @doc "Writes an entry; `ArgumentError` for a key that is another's."
+  @doc "Writes an entry; raises `ArgumentError` for a key that has another writer."
   @spec put(t(), writer(), key :: term(), value :: term(), at_ms :: integer()) :: :ok
   def put(%__MODULE__{table: table}, writer, key, value, at_ms) when is_integer(at_ms) do
     unless writer(key) == writer,
@@ -123,7 +134,10 @@ defmodule Robot.Board do
     :ok
   end
 
-  @doc "A sink for `Hal.Device` and `Vision.BlobDetector`: writes a reading, now, or detections at the time of their picture; leaves alone what it does not know."
+  @doc """
+  A sink for `Hal.Device` and `Vision.BlobDetector`: writes a reading with the present time, or
+  detections with the time of their picture; ignores readings that it does not know.
+  """
   @spec sense(t(), writer(), reading :: tuple()) :: :ok
   def sense(board, device, {:health, device, {condition, since_ms}}),
     do: put(board, device, {:health, device}, condition, since_ms)
@@ -133,12 +147,12 @@ defmodule Robot.Board do
 
   def sense(_board, _device, {:detections, _malformed}), do: :ok
 
-  # What only a driver of its own knows is nobody's here, and no reason for it to crash.
+  # A user's driver may send readings that have no key here; they must not crash its device.
   def sense(board, device, {key, value}) do
     if writer(key), do: put(board, device, key, value, now(board)), else: :ok
   end
 
-  @doc "Takes an entry off, for instance of a peer whose place was seen to be empty."
+  @doc "Deletes an entry, for example that of a peer whose place was seen to be empty."
   @spec delete(t(), writer(), key :: term()) :: :ok
   def delete(%__MODULE__{table: table}, writer, key) do
     ^writer = writer(key)
@@ -162,12 +176,12 @@ defmodule Robot.Board do
     end
   end
 
-  @doc "The same with the time of now."
+  @doc "The same with the present time."
   @spec fetch(t(), key :: term(), max_age_ms :: non_neg_integer() | :infinity) ::
           {:ok, term(), at_ms :: integer()} | :error
   def fetch(board, key, max_age_ms), do: fetch(board, key, max_age_ms, now(board))
 
-  @doc "How a device is, and since when, as its process said last; `nil` if none has said anything yet."
+  @doc "The condition of a device and when it began, as its process last reported, or `nil`."
   @spec health(t(), device :: atom()) :: Hal.Device.status() | nil
   def health(board, device) do
     case fetch(board, {:health, device}, :infinity) do
@@ -176,7 +190,7 @@ defmodule Robot.Board do
     end
   end
 
-  @doc "What other robots told, by their ids."
+  @doc "The peers on the board, by their ids."
   @spec peers(t()) :: %{atom() => Robot.Percept.peer()}
   def peers(%__MODULE__{table: table}),
     do: Map.new(:ets.select(table, [{{{:peer, :"$1"}, :"$2", :_}, [], [{{:"$1", :"$2"}}]}]))
@@ -192,14 +206,14 @@ defmodule Robot.Board do
   @spec latched?(t()) :: boolean()
   def latched?(%__MODULE__{latch: latch}), do: :ets.member(latch, :estop)
 
-  @doc "Latches the e-stop in the table alone, which waits for no disk; `latch/1` is to follow."
+  @doc "Latches the e-stop in the table only, without a disk; `latch/1` should follow."
   @spec hold(t()) :: :ok
   def hold(%__MODULE__{latch: latch}) do
     :ets.insert(latch, {:estop, true})
     :ok
   end
 
-  @doc "Latches the e-stop. The table holds it even where the file cannot be written."
+  @doc "Latches the e-stop, in the table even if the file cannot be written."
   @spec latch(t()) :: :ok
   def latch(%__MODULE__{} = board) do
     :ok = hold(board)

@@ -1,7 +1,8 @@
 defmodule Robot.Command do
   @moduledoc """
-  Text commands from a person to a robot, in the thesis's colon notation (R24, R25): keyword and
-  arguments, case-insensitive. Pure; never creates atoms from its input, and never raises.
+  Text commands from a person to a robot, in the colon notation of the thesis (R24, R25): a
+  case-insensitive keyword and its arguments. Pure; parsing never creates atoms from its input and
+  does not raise.
 
   | text | command |
   |---|---|
@@ -10,11 +11,13 @@ defmodule Robot.Command do
   | `goto:X:Y` or `goto:X:Y:THETA` | `{:goto, x, y, theta or nil}`, metres, radians |
   | `followtheleader:NAME` | `{:follow_the_leader, id}` |
   | `findblob` or `findblob:COLOUR` | `{:find_blob, colour or nil}` |
-  | `subscribe:NAME`, `unsubscribe:NAME` | `{:subscribe, id}`, `{:unsubscribe, id}`; robots refuse it, for all tell their poses to all |
+  | `subscribe:NAME`, `unsubscribe:NAME` | `{:subscribe, id}`, `{:unsubscribe, id}`; see below |
   | `position:X:Y:THETA`, `follow:X:Y:THETA` | `{:position, pose}`, `{:follow, pose}` |
   | `blob:X:Y:THETA:SIZE:FOUND` | `{:blob, pose, size, found?}`; FOUND is 0 or 1 |
   | `lead`, `start`, `ping` | `:lead`, `:start`, `:ping` |
-  | `arm`, `disarm`, `acknowledge` | `:arm`, `:disarm`, `:acknowledge`: whether the wheels may turn (`Hal.Device.Arming`) |
+  | `arm`, `disarm`, `acknowledge` | `:arm`, `:disarm`, `:acknowledge` (`Hal.Device.Arming`) |
+
+  Robots refuse subscriptions, because all robots report their poses to all others anyway.
   """
   alias Hal.Pose
   alias Hal.Options.Suggest
@@ -38,7 +41,7 @@ defmodule Robot.Command do
           | {:follow, Pose.t()}
           | {:blob, Pose.t(), float(), boolean()}
 
-  # Keyword, the arguments it must have, those it may have besides.
+  # Keyword, required arguments, optional arguments.
   @grammar [
     {"stop", [], []},
     {"move", [:v, :w], []},
@@ -60,7 +63,7 @@ defmodule Robot.Command do
 
   @bare [:stop, :lead, :start, :ping, :arm, :disarm, :acknowledge]
   @keywords Enum.map(@grammar, &elem(&1, 0))
-  # No text that means something is longer.
+  # No valid command is longer.
   @longest 500
 
   @doc "All keywords."
@@ -68,8 +71,8 @@ defmodule Robot.Command do
   def keywords, do: @keywords
 
   @doc """
-  The command that a text means, or one line that says what is wrong with it and what is allowed.
-  Robots are named as in `known`.
+  The command of a text, or one line that says what is wrong with it and what is allowed. `known`
+  are the names that robots may have.
 
       iex> Robot.Command.parse("GoTo:2.0:-1", [:mag1])
       {:ok, {:goto, 2.0, -1.0, nil}}
@@ -170,7 +173,7 @@ defmodule Robot.Command do
     do: {:blob, Pose.new(x, y, theta), size, found}
 
   @doc """
-  The text of a command; `parse/2` of it gives the command again.
+  The text of a command; `parse/2` turns it into the command again.
 
       iex> Robot.Command.to_text({:goto, 2.0, 1.0, nil})
       "goto:2.0:1.0"

@@ -1,32 +1,35 @@
 defmodule Robot.Config do
   @moduledoc """
-  What one robot is started with, checked once.
+  The options of one robot, checked once.
 
-    * `:id` - an atom, as `:mag1`
+    * `:id` - an atom, such as `:mag1`
     * `:profile` - its body, `%Hal.Profile{}`
     * `:drive` - `{driver, options}`, an implementation of `Hal.Drive`
-    * `:ptz`, `:camera` - the same of `Hal.Ptz` and `Hal.Camera`, or `nil` for none (the default)
-    * `:start` - where it is switched on, in the `map` frame; `%Hal.Pose{}`, default the origin
+    * `:ptz`, `:camera` - the same for `Hal.Ptz` and `Hal.Camera`, or `nil` for none (the default)
+    * `:start` - its pose when it is switched on, in the `map` frame; `%Hal.Pose{}`, default the
+      origin
     * `:colours` - what the camera looks for, `%Vision.Colours{}`; needed with a camera
-    * `:save_pictures` - where and how the camera's pictures are kept, options of `Vision.Saver`; or `nil`,
-      the default
-    * `:limits` - what to lower in the profile, as `[max_linear: 0.3]`: `:max_linear` (m/s), `:max_turn`
-      (rad/s), `:max_acceleration` (m/s2), `:max_turn_acceleration` (rad/s2)
+    * `:save_pictures` - where and how the camera's pictures are saved, options of `Vision.Saver`,
+      or `nil` (the default)
+    * `:limits` - values that replace those of the profile and may not exceed them, such as
+      `[max_linear: 0.3]`: `:max_linear` (m/s), `:max_turn` (rad/s), `:max_acceleration` (m/s2),
+      `:max_turn_acceleration` (rad/s2)
     * `:mission` - `{module, options}` that `Robot.Control.Pilot.start/1` starts, or `nil`
     * `:companions` - `[{module, options}]`, each a `Robot.Companion`
-    * `:send` - `{m, f, a}`; what the mission says goes to `apply(m, f, a ++ [to, message])`; or
-      `nil`: nobody hears it
-    * `:on_latch` - `{m, f, a}`, applied by the gate whenever it has set or cleared its e-stop latch by
-      a button of its own, or `nil`
-    * `:clock` - `{m, f, a}` giving integer milliseconds, default the monotonic time
-    * `:pace` - `:clock`, or `:manual`: gate and executive act when they are sent `:step` and `:tick`
-      and not by themselves, so that a test decides the order of everything
+    * `:send` - `{m, f, a}`; messages of the mission go to `apply(m, f, a ++ [to, message])`;
+      `nil` drops them
+    * `:on_latch` - `{m, f, a}`, applied by the gate when it has set or cleared its e-stop latch
+      by a button of its own, or `nil`
+    * `:clock` - `{m, f, a}` that returns integer milliseconds, default the monotonic time
+    * `:pace` - `:clock`, or `:manual`: gate and executive do not tick by themselves, but when
+      they are sent `:step` and `:tick`, so that a test determines the order
     * `:arm` - `:auto` (the default), or `:manual`: the wheels stand until a person arms them
-    * `:fence` - a line that the robot does not cross, `{{x, y}, {x, y}}` or `[{x, y}, …]`, see
-      `Robot.Safety.Reflex.Fence`; or `nil`
-    * `:dry_run` - whether nothing moves, and what would is printed (`Robot.Safety.DryRun`), default `false`
-    * `:estop_file` - where the e-stop latch outlives the machine, or `nil`
-    * `:trace` - `{m, f, a}` that is told all that goes in and out, see `Robot.Control.Trace`, or `nil`
+    * `:fence` - a fence that the robot must not cross, `{{x, y}, {x, y}}` or `[{x, y}, …]`, see
+      `Robot.Safety.Reflex.Fence`, or `nil`
+    * `:dry_run` - whether the robot only prints what it would do (`Robot.Safety.DryRun`), default
+      `false`
+    * `:estop_file` - a file in which the e-stop latch survives a restart of the machine, or `nil`
+    * `:trace` - `{m, f, a}` that gets all inputs and effects, see `Robot.Control.Trace`, or `nil`
   """
   alias Hal.{Options, Pose, Profile}
   alias Robot.Safety.Reflex.Fence
@@ -83,7 +86,7 @@ defmodule Robot.Config do
         }
 
   @doc """
-  A checked config.
+  Checks options and builds a config; an error is one line.
 
       iex> {:ok, config} =
       ...>   Robot.Config.new(id: :mag1, profile: Hal.Profile.magellan(), drive: {Some.Drive, []})
@@ -104,7 +107,7 @@ defmodule Robot.Config do
          do: check(struct!(__MODULE__, options))
   end
 
-  @doc "The same, or `ArgumentError` with that line."
+  @doc "The same, but raises `ArgumentError` with that line."
   @spec new!(keyword()) :: t()
   def new!(options) do
     case new(options) do
@@ -117,7 +120,7 @@ defmodule Robot.Config do
   @spec now(t()) :: integer()
   def now(%__MODULE__{clock: {m, f, a}}), do: apply(m, f, a)
 
-  @doc "A ticker for a part of this robot; `nil` where it acts when it is sent `message` (`pace: :manual`)."
+  @doc "A ticker for a part of this robot; `nil` with `pace: :manual`."
   @spec ticker(t(), message :: term(), period_ms :: pos_integer()) :: Hal.Ticker.t() | nil
   def ticker(%__MODULE__{pace: :manual}, _message, _period_ms), do: nil
 
@@ -157,7 +160,7 @@ defmodule Robot.Config do
   defp check(%{colours: nil, camera: {_driver, _options}}),
     do: {:error, "robot option colours cannot be nil: a robot with a camera must have colours"}
 
-  # A limit may be lower than what the body can do, never higher.
+  # A limit may not be higher than what the body can do.
   defp check(%{profile: profile, limits: limits} = config) do
     case Enum.find(limits, fn {name, value} -> value > Map.fetch!(profile, name) end) do
       nil ->

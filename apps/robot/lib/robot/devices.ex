@@ -1,23 +1,24 @@
 defmodule Robot.Devices do
   @moduledoc """
-  The supervisor of a robot's sensors and actuators, side by side, so that each crashes alone:
+  The supervisor of a robot's sensors and actuators, each of which is restarted alone:
 
       Robot.Devices (one_for_one)
       |-- Vision.BlobDetector  the newest frame to blobs (only with a camera)
-      |-- Vision.View          frames to pictures for people, while somebody looks (only with a camera)
+      |-- Vision.View          frames to pictures while somebody looks (only with a camera)
       |-- Vision.Saver         keeps such pictures in a folder (only if told to)
-      |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and at once to the gate;
-      |                        whether they may turn --> the pilot, too
+      |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and what reflexes need
+      |                        --> gate; whether the wheels may turn --> pilot
       |-- Hal.Device :ptz      --> board, and where the camera looked --> blob detector
       `-- Hal.Device :camera   --> blob detector --> board, and --> view
 
-  The blob detector is here, and not above the gate, because a picture that crashes it must not restart the
-  executive: the blobs on the board grow old, and the robot drives on.
+  The blob detector is here, and not a direct child of the robot's supervisor, because a picture
+  that crashes it must not restart the executive: the blobs on the board become stale, and the
+  robot drives on.
 
-  The budget, 200 restarts in 5 s, is above what bad input can cause: a camera gives at most 30
-  pictures a second that could crash the blob detector, and a device waits half a second before it
-  exits. A child that crashes more often has a fault that no restart cures, and the robot goes
-  down with it.
+  The restart budget, 200 restarts in 5 s, is above what bad input should cause: a camera gives at
+  most 30 pictures a second that could crash the blob detector, and a device waits half a second
+  before it exits. A child that crashes more often is taken to have a fault that restarts do not
+  cure, and the robot's supervisor handles the failure.
   """
   use Supervisor
   alias Robot.{Board, Config, Names}
@@ -53,8 +54,8 @@ defmodule Robot.Devices do
   end
 
   @doc """
-  A sink for the camera: its frames are for the blob detector, its health for the board, and so are the detections of
-  a camera that detects by itself.
+  A sink for the camera: puts its health on the board, and the detections of a camera that detects
+  blobs itself. Frames are left to the blob detector.
   """
   @spec health(Board.t(), tuple()) :: :ok
   def health(board, {:health, device, _status} = reading), do: Board.sense(board, device, reading)

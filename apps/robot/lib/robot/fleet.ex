@@ -2,9 +2,10 @@ defmodule Robot.Fleet do
   @moduledoc """
   The robots of this node: one on a real machine, any number in a simulation.
 
-  A simulated robot that ends for good is a wreck, and the others live on (`:temporary`). A real
-  one is `:permanent`: the fleet has no restarts to give, ends with it, and so does the
-  application, so that whatever started the machine's software starts all of it afresh.
+  A simulated robot whose supervisor ends is not restarted, and the others continue
+  (`:temporary`). A real robot is `:permanent`: the fleet has a restart budget of zero, so it ends
+  with the robot, and so does the application; the machine's supervisor is expected to start
+  everything afresh.
   """
   use DynamicSupervisor
   alias Robot.{Config, Names}
@@ -14,7 +15,7 @@ defmodule Robot.Fleet do
   def start_link(options),
     do: DynamicSupervisor.start_link(__MODULE__, [], Keyword.take(options, [:name]))
 
-  @doc "Starts a robot. `restart` says whether its end is the fleet's, see above."
+  @doc "Starts a robot. `restart` determines whether its end also ends the fleet, see above."
   @spec start_robot(Supervisor.supervisor(), Config.t(), :temporary | :permanent) ::
           {:ok, pid()} | {:error, {:already_started, pid()} | term()}
   def start_robot(fleet, %Config{} = config, restart \\ :temporary)
@@ -23,7 +24,7 @@ defmodule Robot.Fleet do
     DynamicSupervisor.start_child(fleet, child)
   end
 
-  @doc "Ends a robot; its wheels are stopped."
+  @doc "Ends a robot; the drive's device stops the wheels."
   @spec stop_robot(Supervisor.supervisor(), robot :: atom()) :: :ok | {:error, :unknown}
   def stop_robot(fleet, robot) do
     with pid when is_pid(pid) <- Names.whereis(robot, :robot),

@@ -1,22 +1,22 @@
 defmodule Robot.Supervisor do
   @moduledoc """
-  One robot.
+  The supervisor of one robot.
 
       Robot.Supervisor (rest_for_one)
-      |-- Robot.Board        the newest readings, the e-stop latch
-      |-- Robot.Devices      one_for_one: blob detector, drive, ptz, camera; each crashes alone
-      |-- Robot.Safety.Gate         the only one who drives the wheels
-      |-- Robot.Safety.LivenessMonitor        sees that gate, executive and mission go on, and ends one that hangs
-      |-- Robot.Control.Executive    percept to wish, ten times a second
-      |-- Robot.Control.Pilot        runs the mission
-      `-- companions         the radio, and what else the config names
+      |-- Robot.Board                   the newest readings, the e-stop latch
+      |-- Robot.Devices                 one_for_one: blob detector, drive, ptz, camera
+      |-- Robot.Safety.Gate             the only process that drives the wheels
+      |-- Robot.Safety.LivenessMonitor  kills gate, executive or pilot if one hangs
+      |-- Robot.Control.Executive       percept to wish, ten times a second
+      |-- Robot.Control.Pilot           runs the mission
+      `-- companions                    such as the comms; the config lists them
 
-  Whoever falls takes those below along, never those above. Without an executive the gate is
-  still there, and stops the robot when no wish has come for 200 ms; without a gate the drive's
-  device stops the wheels. Whatever starts again starts idle.
+  If a child crashes, it and those below it are restarted, but not those above. Without an
+  executive the gate remains, and stops the robot when no wish has come for 200 ms; without a gate
+  the drive's device stops the wheels. Executive and pilot restart idle.
 
-  The fourth failure within 5 s ends the robot: something is wrong that a restart does not
-  cure. What then happens is the fleet's to say (`Robot.Fleet`).
+  The fourth crash of a child within 5 s ends the robot: such a fault is not cured by restarts.
+  `Robot.Fleet` determines what happens then.
   """
   use Supervisor
   alias Robot.{Board, Config, Devices, Names}
@@ -28,7 +28,7 @@ defmodule Robot.Supervisor do
   def start_link(%Config{} = config),
     do: Supervisor.start_link(__MODULE__, config, name: Names.via(config.id, :robot))
 
-  @doc "A robot as a child, called by its id."
+  @doc "The child specification of a robot, with the robot's id as part of the child's id."
   @spec child_spec(Config.t()) :: Supervisor.child_spec()
   def child_spec(%Config{} = config) do
     %{

@@ -1,14 +1,14 @@
 defmodule Robot.Wish do
   @moduledoc """
-  What a behaviour proposes for the next tick: a speed, how much it matters (0 to 1), and,
-  if it cares, where the camera should look (`look`, pan in radians, left positive).
+  What a behaviour proposes for the next tick: a speed, its weight (0 to 1), and optionally where
+  the camera should look (`look`, pan in radians, left positive).
 
-  A behaviour that wants to get somewhere also says the planar `velocity` it would like (map
-  frame, m/s) and the place it wants to reach (`goal`), so that `Robot.Behaviour.Avoid` can bend
-  the way round others before it becomes a speed of the wheels. Without a velocity the wish is
-  never bent, only slowed down. `reverse?` allows driving backwards.
+  A behaviour that wants to reach a place also gives the desired planar `velocity` (map frame,
+  m/s) and the place (`goal`), so that `Robot.Behaviour.Avoid` can change the velocity to avoid
+  others before it is converted to a speed of the wheels. Without a velocity the wish is only
+  slowed down. `reverse?` allows driving backwards.
 
-  `by` names the behaviour, so that a person can ask why a robot did what it did.
+  `by` names the behaviour, so that the robot's status can report the reason for its motion.
   """
   alias Hal.Twist
 
@@ -26,7 +26,7 @@ defmodule Robot.Wish do
         }
 
   @doc """
-  A wish; the optional fields by name.
+  A wish; the optional fields are given by name.
 
       iex> Robot.Wish.new(:stop, Hal.Twist.zero(), 0.1).weight
       0.1

@@ -1,9 +1,10 @@
 defmodule Robot.Command.Arguments do
   @moduledoc """
-  The words a command is made of: numbers, names of robots and colours. Pure; nothing read ever becomes an atom.
+  Parses the arguments of commands: numbers, names of robots and colours. Pure; never creates
+  atoms from its input.
   """
 
-  # Farther than this is not a place, speed or size of ours.
+  # No place, speed or size of a robot is greater than this.
   @greatest 1.0e6
 
   @doc """
@@ -48,10 +49,10 @@ defmodule Robot.Command.Arguments do
       else: {:error, "a number is allowed, as in 2, -0.5 or 1.0e-3"}
   end
 
-  # A point whatever the locale; no sign of infinity, no words.
+  # A decimal point in every locale; no infinity and no words.
   defp pattern, do: ~r/\A[+-]?(\d{1,20}(\.\d{0,20})?|\.\d{1,20})([eE][+-]?\d{1,3})?\z/
 
-  # Erlang wants digits on both sides of the point, and refuses what overflows by raising.
+  # Erlang needs digits on both sides of the point, and raises if the number overflows.
   defp float(text) do
     {mantissa, exponent} =
       case String.split(String.downcase(text), "e") do
@@ -70,7 +71,8 @@ defmodule Robot.Command.Arguments do
     whole = if whole == "", do: "0", else: whole
     part = if part in [[], [""]], do: "0", else: hd(part)
 
-    # Beyond these exponents the number is out of range, or nothing, whatever its digits.
+    # With a greater exponent the number is out of range, with a lower one it is zero, whatever
+    # its digits.
     cond do
       exponent > 40 -> if String.match?(digits, ~r/[1-9]/), do: :too_large, else: 0.0
       exponent < -60 -> 0.0

@@ -1,10 +1,10 @@
 defmodule Robot.Devices.Log do
   @moduledoc """
-  Writes a robot's log: a line when a device is offline, with the reason in words, when it is
-  back, when wheels are disarmed without a person's doing, when a bumper stays pressed, when a
-  behaviour or a mission hangs, when pictures cannot be saved, when the emergency stop would not
-  outlive the machine, and when another robot has the name. Once a change: a device that is tried
-  again and again says nothing new.
+  Writes a robot's log: a line when a device goes offline, with the reason in words, and when it
+  is back, when armed wheels are disarmed for a reason, when a bumper stays pressed, when the
+  gate, a behaviour or a mission hangs, when pictures cannot be saved, when the emergency stop
+  would not survive a restart of the machine, and when another robot has the same name. The events
+  report changes, so retries of a device are not logged.
   """
   require Logger
   alias Hal.Event
@@ -21,7 +21,7 @@ defmodule Robot.Devices.Log do
     [:swarm, :comms, :duplicate_id]
   ]
 
-  @doc "Attaches the log to the devices' events; once a node."
+  @doc "Attaches the log to its events, once on a node."
   @spec attach() :: :ok
   def attach do
     for event <- events() do
@@ -31,7 +31,7 @@ defmodule Robot.Devices.Log do
     :ok
   end
 
-  @doc "The events that may be worth a line."
+  @doc "The events that may be logged."
   @spec events() :: [Event.name()]
   def events do
     @events ++
@@ -48,7 +48,7 @@ defmodule Robot.Devices.Log do
   end
 
   @doc """
-  The line; `nil` where there is nothing to say.
+  The level and the line for an event; `nil` if it is not logged.
 
       iex> about = %{robot: :mag1, device: :drive, line: "/dev/ttyR0: no such device"}
       iex> Robot.Devices.Log.line(:offline, about)

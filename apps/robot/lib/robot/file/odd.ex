@@ -1,7 +1,7 @@
 defmodule Robot.File.Odd do
   @moduledoc """
   Warns of values in a robot file that are allowed but seldom intended. Most warnings name the
-  key, and what is usual where there is such a value. A person should look at them before a robot
+  key, and the usual value if there is one. A person should look at them before a robot
   of up to 40 kg moves. Pure.
   """
   alias Hal.{Pose, Profile}
