@@ -8,8 +8,8 @@ defmodule Robot.Calibration do
   ratio of the wheels from squares.
 
   Squares are those of UMBmark (Borenstein and Feng 1996, `Robot.Calibration.Umbmark`). Its
-  formulas come first. They are of first order: for a base that is off by 2 % they err by up to 1
-  %, unless the robot drives all squares again with the corrected values. So a least-squares fit
+  formulas come first. They are of first order: for a base that is off by 2 % they err by up to
+  1 %, unless the robot drives all squares again with the corrected values. So a least-squares fit
   of the whole model of the wheels follows (`Robot.Calibration.Squares`), which begins at the
   result of the formulas.
   """

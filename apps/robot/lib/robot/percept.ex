@@ -30,8 +30,8 @@ defmodule Robot.Percept do
   What another robot reported: its pose and speed in the `map` frame, when it was heard, and the
   radius of its body (metres). `mode` is `:moving` for a robot that avoids others too, `:holding`
   for one that stands and does not give way, and `:dead` for one that is assumed to stand where it
-  was last heard. `beat` is its last heartbeat, and `direct_ms` the time at which the robot itself
-  was last heard, not another that passed on its report.
+  was last heard. `beat` is its last heartbeat, and `direct_ms` the time at which it was last
+  heard directly, not through another robot.
   """
   @type peer :: %{
           required(:pose) => Pose.t(),

@@ -8,8 +8,8 @@ defmodule Robot.Behaviour.Avoid do
   slowed down near other robots (`.Brake`); one without a velocity is changed in no other way. A
   robot that makes no progress for some seconds leaves its route for a while (`.Progress`), and a
   robot that stands in another's way makes room (`.GiveWay`). If a body that will not move is in
-  the goal, the robot goes to the nearest place beside it, stands there, and names its wish
-  `:blocked`. If nothing is near, a wish within the profile's speed passes unchanged.
+  the goal, the robot goes to the nearest place beside it, stands there, and its wish has
+  `by: :blocked`. If nothing is near, a wish within the profile's speed passes unchanged.
 
   Options: `inner`, the behaviour (required); `discs`, further standing obstacles,
   `[{x, y, radius}]` in the map frame, metres.

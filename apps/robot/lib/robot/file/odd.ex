@@ -1,8 +1,8 @@
 defmodule Robot.File.Odd do
   @moduledoc """
   Warns of values in a robot file that are allowed but seldom intended. Most warnings name the
-  key, and the usual value if there is one. A person should look at them before a robot
-  of up to 40 kg moves. Pure.
+  key, and the usual value if there is one. A person should look at them before a robot of up to
+  40 kg moves. Pure.
   """
   alias Hal.{Pose, Profile}
   alias Robot.File.Device

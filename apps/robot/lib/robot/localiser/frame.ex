@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Frame do
   @moduledoc """
-  Transforms a belief into another robot's frame, whose own pose may be uncertain or drifting.
+  Transforms a belief into the frame of another robot, whose own pose may be uncertain or drift.
   Pure.
   """
   alias Hal.Pose

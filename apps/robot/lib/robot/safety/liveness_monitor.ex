@@ -7,12 +7,12 @@ defmodule Robot.Safety.LivenessMonitor do
   goal and takes no orders.
 
   The monitor sends no requests. It looks at the board, where gate and executive write at each
-  tick and the pilot notes each call of its mission. If an entry stays the same for 8 looks, 0.4
-  s, the monitor reports the part as silent, on the board under `{:hung, part}` and by the event
-  `[:robot, part, :silent]`, with the name of the behaviour or the mission. On a busy machine a
-  tick may take that long, for instance while code is loaded; then `[:robot, part, :again]`
-  follows. After 40 looks, 2 s, the part is taken to hang: the monitor kills it
-  (`[:robot, part, :hung]`), and its successor starts idle.
+  tick and the pilot notes each call of its mission. If an entry stays the same for 8 looks
+  (0.4 s), the monitor reports the part as silent, on the board under `{:hung, part}` and by the
+  event `[:robot, part, :silent]`, with the name of the behaviour or the mission. On a busy
+  machine a tick may take that long, for instance while code is loaded; then
+  `[:robot, part, :again]` follows. After 40 looks (2 s), the part is taken to hang: the monitor
+  kills it (`[:robot, part, :hung]`), and its successor starts idle.
 
   It counts looks instead of measuring time, so that a machine that was suspended, or whose
   processes all run slowly, is not taken for a robot that hangs.

@@ -8,8 +8,9 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   alias Robot.Safety.Reflex
 
   @typedoc """
-  `share` is this robot's part of the evasion, `standing?` whether the body moves slower than 0.05
-  m/s, `fixed?` whether it will not make way, `gap` the distance between the bodies in metres.
+  `share` is this robot's part of the evasion, `standing?` whether the body is slower than
+  0.05 m/s, `fixed?` whether it will not make way, `gap` the distance between the bodies in
+  metres.
   """
   @type t :: %{
           id: atom(),

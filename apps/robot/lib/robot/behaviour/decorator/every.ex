@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.Decorator.Every do
   @moduledoc """
   Runs another behaviour repeatedly (R11): starts it again `period_ms` after its last start, or at
-  the tick after it has ended, whichever is later. Never ends by itself.
+  the tick after its end, whichever is later. Never ends by itself.
 
   Options: `start`, `{module, options}` of the behaviour (required); `period_ms` (default 0).
   """
