@@ -26,7 +26,8 @@ defmodule Console.LiveFleetTest do
           :estop,
           :reset
         ],
-        do: assert({command, {:ok, "accepted"}} == {command, Live.Fleet.command(live, command)})
+        answer = Swarm.Case.order(fn -> Live.Fleet.command(live, command) end),
+        do: assert({command, {:ok, "accepted"}} == {command, answer})
 
     assert {:ok, "done"} = Live.Fleet.command(live, {:kill, :mag61})
 

@@ -1,7 +1,7 @@
 defmodule Sim.FleetTest do
   @moduledoc "Fleets of whole robots in real time."
   use ExUnit.Case, async: false
-  import Swarm.Case, only: [eventually: 1]
+  import Swarm.Case, only: [eventually: 1, order: 1]
   alias Hal.Pose
   alias Robot.{Board, Names}
   alias Sim.{Fleet, World}
@@ -28,7 +28,7 @@ defmodule Sim.FleetTest do
     eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(:mag71)) end)
     start = truth(fleet, :mag71)
     place = Pose.place(start, {0.7, 0.2})
-    assert Swarm.goto(:mag71, place) == :ok
+    assert order(fn -> Swarm.goto(:mag71, place) end) == :ok
     eventually(fn -> Swarm.status(:mag71).state == :done end)
     assert Pose.distance(truth(fleet, :mag71), place) < 0.15
     assert [%{state: :idle, alive: true, uncertainty: metres}] = Fleet.scene(fleet).robots
@@ -54,7 +54,7 @@ defmodule Sim.FleetTest do
     eventually(fn -> Enum.any?(Fleet.scene(fleet).robots, & &1.slot) end)
 
     # All stop, and stay stopped until a person resets them.
-    assert Swarm.estop() == :ok
+    assert order(fn -> Swarm.estop() end) == :ok
     for id <- ids, do: assert(Board.latched?(Board.find!(id)))
     still = fn -> for id <- ids, do: truth(fleet, id) end
 
@@ -65,15 +65,15 @@ defmodule Sim.FleetTest do
     end)
 
     before = still.()
-    assert Swarm.stop(hd(ids)) == :ok
+    assert order(fn -> Swarm.stop(hd(ids)) end) == :ok
     assert {:error, line} = Swarm.start(robots: [hd(ids)])
     assert line =~ "emergency stop"
     assert still.() == before
-    assert Swarm.reset() == :ok
+    assert order(fn -> Swarm.reset() end) == :ok
 
     # Their missions ended with the stop; they start again.
     eventually(fn -> Fleet.scene(fleet).leader == nil end)
-    assert Swarm.start() == :ok
+    assert order(fn -> Swarm.start() end) == :ok
     eventually(fn -> Fleet.scene(fleet).leader end)
     leader = Fleet.scene(fleet).leader
 
@@ -174,7 +174,7 @@ defmodule Sim.FleetTest do
     eventually(fn -> Swarm.status(:mag75).state == :turning end)
     eventually(fn -> abs(Pose.wrap(truth(fleet, :mag75).heading - heading)) > 0.3 end)
     assert [%{state: :lead}] = Fleet.scene(fleet).robots
-    assert Swarm.stop(:mag75) == :ok
+    assert order(fn -> Swarm.stop(:mag75) end) == :ok
     stop(fleet)
 
     for {mission, nodes?, word} <- [

@@ -18,7 +18,7 @@ defmodule Sim.BaseCase do
   using do
     quote do
       import Sim.BaseCase
-      import Swarm.Case, only: [eventually: 1]
+      import Swarm.Case, only: [eventually: 1, order: 1]
       alias Hal.{Profile, Twist}
       alias Sim.Emulator
       @moduletag :tmp_dir

@@ -88,6 +88,23 @@ defmodule Swarm.Case do
     ids
   end
 
+  @doc """
+  The answer to an order. On a busy machine a live robot may be silent for 0.4 s, and its order is
+  refused for that; a person then gives it again. Any other refusal is the answer.
+  """
+  def order(give) do
+    {:answer, answer} =
+      eventually(fn ->
+        answer = give.()
+        unless busy?(answer), do: {:answer, answer}
+      end)
+
+    answer
+  end
+
+  defp busy?({:error, line}), do: line =~ " hangs in " or line =~ " does not answer"
+  defp busy?(_answer), do: false
+
   @doc "Waits until a function returns something, and returns it."
   def eventually(function, ms \\ 30_000) do
     deadline = System.monotonic_time(:millisecond) + ms

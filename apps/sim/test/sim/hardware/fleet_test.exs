@@ -1,7 +1,7 @@
 defmodule Sim.Hardware.FleetTest do
   @moduledoc "Fleets in which some robots have the real drivers."
   use ExUnit.Case, async: false
-  import Swarm.Case, only: [eventually: 1]
+  import Swarm.Case, only: [eventually: 1, order: 1]
   alias Hal.Pose
   alias Robot.Board
   alias Sim.{Fleet, Trial, World}
@@ -29,7 +29,7 @@ defmodule Sim.Hardware.FleetTest do
       eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(id)) end)
       start = World.truth(World.Server.world(Fleet.server(fleet)), id)
       place = Pose.place(start, {0.7, 0.2})
-      assert Swarm.goto(id, place) == :ok
+      assert order(fn -> Swarm.goto(id, place) end) == :ok
       eventually(fn -> Swarm.status(id).state == :done end)
 
       eventually(fn ->

@@ -53,7 +53,7 @@ defmodule Sim.Hardware.LineTest do
 
   defp rolls(context, id) do
     eventually(fn -> Swarm.arm(id) == :ok end)
-    assert Swarm.tell(id, "move:0.2:0") == :ok
+    assert order(fn -> Swarm.tell(id, "move:0.2:0") end) == :ok
     x = place(context).x
     eventually(fn -> place(context).x > x + 0.1 end)
   end
@@ -176,13 +176,13 @@ defmodule Sim.Hardware.LineTest do
     _refused_or_not = Swarm.tell(id, "move:-0.1:0")
     never(3_000, fn -> Pose.distance(stood, place(context)) > 0.01 end)
 
-    assert Swarm.disarm(id) == :ok
+    assert order(fn -> Swarm.disarm(id) end) == :ok
     assert_receive {[:robot, :fault], %{line: nil}}
-    assert Swarm.arm(id) == :ok
+    assert order(fn -> Swarm.arm(id) end) == :ok
     # Arming is not a reason to move.
     never(1_000, fn -> Pose.distance(stood, place(context)) > 0.01 end)
     refute line(id) =~ "FAULT"
-    assert Swarm.tell(id, "move:-0.1:0") == :ok
+    assert order(fn -> Swarm.tell(id, "move:-0.1:0") end) == :ok
     eventually(fn -> Pose.distance(stood, place(context)) > 0.1 end)
   end
 end
