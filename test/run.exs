@@ -11,7 +11,7 @@ Code.require_file("start.exs", __DIR__)
 if options[:long], do: ExUnit.configure(include: [:long], exclude: [:test])
 
 # Most of these tests wait for programs that they have started.
-ExUnit.configure(max_cases: 3 * System.schedulers_online())
+ExUnit.configure(max_cases: 2 * System.schedulers_online())
 
 # Everything is built by now. Newer Mix tells commands that run side by side to wait for each other's
 # look at the build, and what they print is compared.

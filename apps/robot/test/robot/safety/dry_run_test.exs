@@ -12,6 +12,14 @@ defmodule Robot.Safety.DryRunTest do
     if line =~ text, do: line, else: until_line(id, text)
   end
 
+  defp lines(ms) do
+    receive do
+      {[:robot, :dry_run], %{line: line}} -> [line | lines(ms)]
+    after
+      ms -> []
+    end
+  end
+
   test "everything thinks, nothing moves, what would move is told once and printed" do
     listen(:dry1, [:robot, :dry_run])
     Logger.put_module_level(DryRun, :info)
@@ -21,17 +29,19 @@ defmodule Robot.Safety.DryRunTest do
       capture_log(fn ->
         id = rolling(:dry1, dry_run: true)
         # At full speed, which is reached by steps of acceleration: the last one may round to it.
-        assert until_line(id, ~r"0.10 m/s$") == "dry run: dry1 would drive at 0.10 m/s"
+        full = "dry run: dry1 would drive at 0.10 m/s"
+        assert until_line(id, ~r"0.10 m/s$") == full
         # The mission runs and the gate is as busy as ever.
-        assert {:ok, %{by: :roll}, _} = Board.fetch(Board.find!(id), :doing, 500)
+        assert {:ok, %{by: :roll}, _} = Board.fetch(Board.find!(id), :doing, :infinity)
 
         assert {:ok, %{twist: twist, limits: limits}, _} =
-                 Board.fetch(Board.find!(id), :driving, 500)
+                 Board.fetch(Board.find!(id), :driving, :infinity)
 
         assert twist == Twist.zero() and :dry_run in limits
         stands(200)
-        # The same again is no news.
-        refute_receive {[:robot, :dry_run], _}, 200
+        # The same again is no news. (On a busy machine wishes come too late, and that is news.)
+        lines = [full | lines(200)]
+        assert lines == Enum.dedup(lines)
         # Nobody can let the wheels loose by another way.
         drive = Names.whereis(id, :drive)
         assert Hal.Device.arm(drive) == {:error, "this is a dry run: the wheels stand"}
