@@ -17,6 +17,9 @@ defmodule Console.Calibrate.Live do
   @ready_ms 5_000
   # The time from the command to stop until odometry shows it.
   @fresh_ms 500
+  # Below these speeds of odometry (m/s, rad/s) the robot counts as standing.
+  @still_linear 0.006
+  @still_turn 0.01
 
   @type driven :: %{told: Pose.t(), told_turn: float()}
 
@@ -51,7 +54,7 @@ defmodule Console.Calibrate.Live do
     StdinPrompt.forget(talk)
 
     with :ok <- Swarm.arm(robot),
-         %{pose: start} <- odometry(robot) || {:error, "#{robot} reports no odometry"},
+         {:ok, start} <- standing(robot),
          :ok <- Pilot.start(robot, Drive, course) do
       s = %{
         robot: robot,
@@ -161,10 +164,39 @@ defmodule Console.Calibrate.Live do
     end
   end
 
-  defp odometry(robot) do
+  # The pose from which the course is measured, by a reading that is newer than the question: after a
+  # course that was ended early the robot may still roll.
+  defp standing(robot) do
+    case Board.find(robot) do
+      {:ok, board} -> standing(robot, Board.now(board), @ready_ms)
+      :error -> {:error, "#{robot} does not run"}
+    end
+  end
+
+  defp standing(robot, asked_ms, patience_ms) do
+    case reading(robot) do
+      {%{pose: pose, twist: twist}, at_ms} when at_ms > asked_ms ->
+        if abs(twist.linear) < @still_linear and abs(twist.turn) < @still_turn,
+          do: {:ok, pose},
+          else: stand_longer(robot, asked_ms, patience_ms, "does not stand still")
+
+      _old_or_none ->
+        stand_longer(robot, asked_ms, patience_ms, "reports no odometry")
+    end
+  end
+
+  defp stand_longer(robot, _asked_ms, patience_ms, why) when patience_ms <= 0,
+    do: {:error, "#{robot} #{why}"}
+
+  defp stand_longer(robot, asked_ms, patience_ms, _why),
+    do: wait(fn -> standing(robot, asked_ms, patience_ms - @look_ms) end)
+
+  defp odometry(robot), do: with({odometry, _at_ms} <- reading(robot), do: odometry)
+
+  defp reading(robot) do
     with {:ok, board} <- Board.find(robot),
-         {:ok, odometry, _at_ms} <- Board.fetch(board, :odometry, @fresh_ms),
-         do: odometry,
+         {:ok, odometry, at_ms} <- Board.fetch(board, :odometry, @fresh_ms),
+         do: {odometry, at_ms},
          else: (:error -> nil)
   end
 
