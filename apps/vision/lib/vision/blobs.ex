@@ -22,7 +22,8 @@ defmodule Vision.Blobs do
   `:halt`, the result is `:halted`.
 
   Options: `:every` (1) searches only every n-th frame; `:frames` (no limit) ends after this many
-  searched frames; `:patience_ms` (10,000) is the longest wait for a frame.
+  searched frames; `:patience_ms` (10,000) is the longest wait for a frame; `:unsafe` (`false`) also
+  opens what `Hal.Camera.Source.refused/1` refuses.
 
   Of a file or a generator all frames are read, as fast as they are searched; of a device or
   stream, the newest. The error is one line. A source that ends after at least one frame is not an
@@ -31,11 +32,16 @@ defmodule Vision.Blobs do
   @spec run(String.t(), Colours.t(), (seen() -> :halt | term()), keyword()) ::
           {:ok, summary()} | :halted | {:error, String.t()}
   def run(source, %Colours{} = colours, report, options \\ []) do
-    options = Keyword.validate!(options, every: 1, frames: nil, patience_ms: @patience_ms)
+    options =
+      Keyword.validate!(options, every: 1, frames: nil, patience_ms: @patience_ms, unsafe: false)
+
     job = Map.merge(Map.new(options), %{source: source, colours: colours, report: report})
 
     # A separate process has its own mailbox, and its end closes the camera.
-    fn -> look(job) end |> Task.async() |> Task.await(:infinity)
+    case unless(job.unsafe, do: Source.refused(source)) do
+      nil -> fn -> look(job) end |> Task.async() |> Task.await(:infinity)
+      why -> {:error, "#{source}: #{why}"}
+    end
   end
 
   defp look(job) do
@@ -43,7 +49,7 @@ defmodule Vision.Blobs do
     Process.flag(:trap_exit, true)
     every_frame? = Source.kind(job.source) in [:file, :generator]
 
-    case FFmpeg.init(source: job.source, every: every_frame?) do
+    case FFmpeg.init(source: job.source, every: every_frame?, unsafe: job.unsafe) do
       {:ok, camera} ->
         next(camera, job, %{number: 0, start_ms: nil, summary: %{frames: 0, blobs: 0, last: nil}})
 

@@ -16,6 +16,8 @@ defmodule Hal.Camera.FFmpeg do
       every frame in turn, as fast as frames are requested, with its time taken from its place in
       the file
     * `:loop` - `true`: starts a file again at its end
+    * `:unsafe` - `true`: open also what `Hal.Camera.Source.refused/1` refuses: filter graphs, which can
+      write files, and unknown schemes
 
   and, for a V4L2 device only:
 

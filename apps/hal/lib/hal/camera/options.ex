@@ -19,7 +19,8 @@ defmodule Hal.Camera.Options do
     ffmpeg: [:path, default: nil],
     format: [{:one_of, [:yuyv, :i420]}, default: :yuyv],
     every: [:boolean, default: false],
-    loop: [:boolean, default: false]
+    loop: [:boolean, default: false],
+    unsafe: [:boolean, default: false]
   ]
   # Options that only a V4L2 device understands; any other source would silently ignore them.
   @of_devices [:rate, :norm, :input, :pixel_format]
@@ -35,11 +36,13 @@ defmodule Hal.Camera.Options do
       {:error, "camera option norm cannot be :palm: :pal, :ntsc or :secam is allowed; did you mean :pal?"}
       iex> Hal.Camera.Options.check(source: "a.mp4", norm: :pal)
       {:error, ~s(camera option norm is for a V4L2 device such as /dev/video0, not for "a.mp4")}
+      iex> Hal.Camera.Options.check(source: "gopher://camera/1") |> elem(1) |> String.slice(0, 68)
+      "camera option source cannot be \\"gopher://camera/1\\": gopher:// is not"
   """
   @spec check(keyword()) :: {:ok, keyword()} | {:error, line :: String.t()}
   def check(options) do
     with {:ok, options} <- Options.check(options, @table, "camera") do
-      case misplaced(options) do
+      case misplaced(options) ++ refused(options) do
         [] -> {:ok, options}
         problems -> {:error, Options.line(problems, "camera")}
       end
@@ -54,6 +57,12 @@ defmodule Hal.Camera.Options do
       text = "is for a V4L2 device such as /dev/video0, not for #{source}"
       for key <- @of_devices, options[key] != nil, do: {[Atom.to_string(key)], text}
     end
+  end
+
+  defp refused(options) do
+    why = unless options[:unsafe], do: Source.refused(options[:source])
+    source = Options.Wording.show(options[:source])
+    if why, do: [{["source"], "cannot be #{source}: #{why}, or unsafe: true"}], else: []
   end
 
   @doc false

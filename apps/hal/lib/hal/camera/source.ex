@@ -10,6 +10,10 @@ defmodule Hal.Camera.Source do
   | `"testsrc"` | ffmpeg's test picture, 320 by 240, 10 frames per second |
   | `"lavfi:GRAPH"` | any other generator of ffmpeg |
   | anything else | a video file or a picture |
+
+  A filter graph can read and write files with the rights of whoever runs it, and so can some of
+  ffmpeg's protocols. A source may come from somebody else, so `refused/1` lets pass what can only
+  be read: known schemes, and single generators that have no option for a file.
   """
 
   @type kind :: :device | :stream | :generator | :file
@@ -29,6 +33,12 @@ defmodule Hal.Camera.Source do
     h264: "h264"
   ]
   @norms [pal: "PAL", ntsc: "NTSC", secam: "SECAM"]
+
+  @schemes ~w(rtsp rtsps rtmp rtmps rtp srt udp tcp http https)
+  @generators ~w(allrgb allyuv color colorspectrum gradients mandelbrot pal75bars pal100bars rgbtestsrc
+    smptebars smptehdbars testsrc testsrc2 yuvtestsrc)
+  # One generator with its numbers and words: no other filter, no label, no quote, no escape.
+  @generator ~r/\A([a-z0-9]+)(?:=[A-Za-z0-9_.:=\/#@+-]*)?\z/
 
   @doc "The formats that can be requested from a V4L2 device."
   @spec pixel_formats() :: [atom(), ...]
@@ -50,6 +60,39 @@ defmodule Hal.Camera.Source do
   def kind("lavfi:" <> _graph), do: :generator
 
   def kind(source), do: if(source =~ ~r/^[A-Za-z][A-Za-z0-9+.-]*:\/\//, do: :stream, else: :file)
+
+  @doc """
+  Why a source is not opened unless its user says that it is safe; `nil` for the others.
+
+      iex> Hal.Camera.Source.refused("lavfi:color=color=white:size=64x48")
+      nil
+      iex> Hal.Camera.Source.refused("rtsp://camera/1")
+      nil
+      iex> Hal.Camera.Source.refused("lavfi:testsrc,metadata=print:file=out.txt")
+      "a filter graph can write files; one generator such as testsrc2=size=64x48 is allowed"
+      iex> Hal.Camera.Source.refused("gopher://camera/1")
+      "gopher:// is not a scheme of streams; rtsp, rtsps, rtmp, rtmps, rtp, srt, udp, tcp, http, https are allowed"
+  """
+  @spec refused(String.t()) :: nil | (why :: String.t())
+  def refused("lavfi:" <> graph) do
+    case Regex.run(@generator, graph, capture: :all_but_first) do
+      [name] when name in @generators ->
+        nil
+
+      _other ->
+        "a filter graph can write files; one generator such as testsrc2=size=64x48 is allowed"
+    end
+  end
+
+  def refused(source) do
+    with :stream <- kind(source),
+         [scheme, _rest] = String.split(source, ":", parts: 2),
+         false <- String.downcase(scheme) in @schemes do
+      "#{scheme}:// is not a scheme of streams; #{Enum.join(@schemes, ", ")} are allowed"
+    else
+      _known -> nil
+    end
+  end
 
   @doc """
   Whether the source can be opened, as far as its file status shows. Streams and generators are

@@ -130,7 +130,7 @@ defmodule Hal.Camera.FFmpegTest do
     assert FFmpeg.init(source: "lib") == {:error, :eisdir}
     assert {:unreadable, words} = take(open(source: "mix.exs"))
     assert words =~ ~r/^[^\[].*: Invalid data/
-    assert {:unreadable, "Stream map" <> _} = take(open(source: "lavfi:anullsrc"))
+    assert {:unreadable, "Stream map" <> _} = take(open(source: "lavfi:anullsrc", unsafe: true))
     assert take(open(source: "testsrc", ffmpeg: "/no/such/ffmpeg")) == :no_ffmpeg
     assert take(open(source: "testsrc", ffmpeg: "/bin/echo")) |> elem(0) == :unreadable
   end
@@ -249,5 +249,32 @@ defmodule Hal.Camera.FFmpegTest do
             20 -> gone?(pid, left_ms - 20)
           end
     end
+  end
+
+  test "of ffmpeg's generators those pass that cannot touch a file, and nothing beside them" do
+    for good <- [
+          "testsrc",
+          "lavfi:testsrc",
+          "lavfi:testsrc2=size=64x48:rate=30000/1001",
+          "a,b.png"
+        ],
+        do: assert(Source.refused(good) == nil, good)
+
+    for bad <- [
+          "lavfi:",
+          "lavfi:movie=/etc/passwd",
+          "lavfi:life=filename=a",
+          "lavfi:testsrc,metadata=print:file=a",
+          "lavfi:testsrc;color",
+          "lavfi:testsrc[a]",
+          "lavfi:testsrc=size='4x4'",
+          "lavfi:testsrc=size=4\\\\x4",
+          "lavfi:testsrc\n,metadata=print:file=a",
+          "lavfi:testsrc\n",
+          "FILE:///etc/passwd",
+          "concat://a",
+          "ftp://a/b.png"
+        ],
+        do: assert(is_binary(Source.refused(bad)), bad)
   end
 end

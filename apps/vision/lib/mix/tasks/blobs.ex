@@ -6,7 +6,8 @@ defmodule Mix.Tasks.Blobs do
       mix blobs SOURCE --colours FILE [options]
 
   SOURCE is a picture or video file, a stream (`rtsp://…`), a camera (`/dev/video0`), `testsrc`
-  (ffmpeg's test picture, 50 frames of it) or `lavfi:GRAPH` (any other generator of ffmpeg).
+  (ffmpeg's test picture, 50 frames of it) or `lavfi:GENERATOR` (another generator of ffmpeg, such
+  as `lavfi:testsrc2=size=64x48`).
 
   Options:
 
@@ -21,6 +22,8 @@ defmodule Mix.Tasks.Blobs do
       `sqrt(K / share of the frame)`; may be given once for each colour
     * `--backend MODULE` - the `Vision.Backend` to use; by default the fastest that reads the
       frames
+    * `--unsafe` - opens any source that ffmpeg knows: also filter graphs (`lavfi:`), which can
+      write files, and streams of unknown schemes
     * `--help` - this text
 
   Pixels count from the top left; `right` and `bottom` are the last ones inside. An odd last
@@ -79,7 +82,7 @@ defmodule Mix.Tasks.Blobs do
         options.source,
         colours,
         report,
-        Map.to_list(Map.take(options, [:every, :frames]))
+        Map.to_list(Map.take(options, [:every, :frames, :unsafe]))
       )
 
     if terminal?, do: IO.write(:stderr, "\r\e[K")

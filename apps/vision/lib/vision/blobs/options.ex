@@ -3,6 +3,7 @@ defmodule Vision.Blobs.Options do
   Parses the command line of `mix blobs` into a checked map, or one line that says what is wrong.
   """
 
+  alias Hal.Camera.Source
   alias Hal.Options.Suggest
 
   @type t :: %{
@@ -14,6 +15,7 @@ defmodule Vision.Blobs.Options do
           picture: Path.t() | nil,
           min_area: pos_integer(),
           backend: module() | nil,
+          unsafe: boolean(),
           distance: %{String.t() => float()}
         }
 
@@ -26,6 +28,7 @@ defmodule Vision.Blobs.Options do
     min_area: :integer,
     backend: :string,
     distance: :keep,
+    unsafe: :boolean,
     help: :boolean
   ]
   @most 1_000_000_000
@@ -56,6 +59,7 @@ defmodule Vision.Blobs.Options do
 
   defp check(given, sources) do
     with {:ok, source} <- one_source(sources),
+         :ok <- safe(source, given[:unsafe]),
          :ok <- needed(given[:colours]),
          :ok <- positive("--every", given[:every]),
          :ok <- positive("--frames", given[:frames]),
@@ -75,6 +79,7 @@ defmodule Vision.Blobs.Options do
          picture: given[:picture],
          min_area: given[:min_area] || 20,
          backend: backend,
+         unsafe: given[:unsafe] || false,
          distance: distance
        }}
     end
@@ -106,6 +111,15 @@ defmodule Vision.Blobs.Options do
 
   defp one_source(many),
     do: {:error, "#{length(many)} sources (#{Enum.join(many, ", ")}): one is allowed"}
+
+  defp safe(_source, true), do: :ok
+
+  defp safe(source, _not_said) do
+    case Source.refused(source) do
+      nil -> :ok
+      why -> {:error, "#{source}: #{why}; --unsafe opens it all the same"}
+    end
+  end
 
   defp needed(""), do: needed(nil)
   defp needed(nil), do: {:error, "--colours FILE is missing: a CMVision colour file"}

@@ -80,6 +80,24 @@ defmodule Mix.Tasks.BlobsTest do
     end
   end
 
+  test "a source that could write files is opened only with --unsafe", context do
+    %{colours: colours, tmp_dir: folder} = context
+    out = Path.join(folder, "out.txt")
+    graph = @source <> ",signalstats,metadata=print:file=" <> out
+    words = [graph, "--colours", colours]
+    assert refused(words) =~ "a filter graph can write files"
+    refute File.exists?(out)
+    assert refused(["gopher://x/1", "--colours", colours]) =~ "gopher:// is not a scheme"
+    assert capture_io(fn -> Blobs.run(words ++ ["--unsafe"]) end) =~ "10 blobs"
+    assert File.exists?(out)
+  end
+
+  defp refused(words) do
+    line = capture_io(:stderr, fn -> assert catch_exit(Blobs.run(words)) == {:shutdown, 1} end)
+    assert String.split(line, "\n", trim: true) |> length() == 1
+    line
+  end
+
   test "--help shows examples" do
     assert capture_io(fn -> Blobs.run(["--help"]) end) =~ "mix blobs photo.jpg --colours"
   end
