@@ -8,15 +8,15 @@ defmodule Sim.Floorplan.Png do
 
   @damaged {:error, "the picture is damaged"}
 
-  @doc "Reads the picture in the chunks after the signature; it may have at most `most` pixels."
+  @doc """
+  Reads the picture in the chunks after the signature; it may have at most `most` pixels. Beside
+  the answer it holds no more than a few rows at a time.
+  """
   @spec decode(binary(), pos_integer()) :: {:ok, picture()} | {:error, String.t()}
   def decode(chunks, most) do
     with {:ok, [{"IHDR", header} | chunks]} <- chunks(chunks, []),
          {:ok, {width, height, _, _} = header} <- header(header, most),
-         {:ok, bytes} <- inflate(for({"IDAT", data} <- chunks, do: data), size(header)) do
-      palette = palette(chunks)
-      rows = bytes |> rows(header) |> Enum.map(&walls(&1, header, palette))
-
+         {:ok, rows} <- inflate(for({"IDAT", data} <- chunks, do: data), header, palette(chunks)) do
       if Enum.all?(rows, &(byte_size(&1) == width)),
         do: {:ok, {width, height, rows}},
         else: @damaged
@@ -56,15 +56,26 @@ defmodule Sim.Floorplan.Png do
   defp header(_other, _most), do: @damaged
 
   defp stride({width, _height, depth, type}), do: div(width * depth * @channels[type] + 7, 8)
-  defp size({_, height, _, _} = header), do: height * (stride(header) + 1)
 
-  # Never more than the header says, however much the data would unpack to.
-  defp inflate(data, size) do
+  # Row by row as they come out, and never more than the header says, however much the data would
+  # unpack to.
+  defp inflate(data, {_, height, depth, type} = header, palette) do
     z = :zlib.open()
     :ok = :zlib.inflateInit(z)
+    stride = stride(header)
+
+    scan = %{
+      stride: stride,
+      pixel: max(div(depth * @channels[type], 8), 1),
+      header: header,
+      palette: palette,
+      above: List.duplicate(0, stride),
+      left: height,
+      rows: []
+    }
 
     try do
-      inflate(z, :zlib.safeInflate(z, data), [], size)
+      inflate(z, :zlib.safeInflate(z, data), <<>>, scan)
     rescue
       _damaged in [ErlangError, ArgumentError] -> @damaged
     after
@@ -72,16 +83,15 @@ defmodule Sim.Floorplan.Png do
     end
   end
 
-  defp inflate(z, {state, output}, done, left) do
-    left = left - IO.iodata_length(output)
-    done = [done | output]
+  defp inflate(z, {state, output}, rest, scan) do
+    {rest, scan} = rows(IO.iodata_to_binary([rest | output]), scan)
 
     cond do
-      left <= 0 -> {:ok, done |> IO.iodata_to_binary()}
+      scan.left == 0 -> {:ok, Enum.reverse(scan.rows)}
       state == :finished -> @damaged
       # Data that ends too early would return nothing for ever.
       output == [] -> @damaged
-      true -> inflate(z, :zlib.safeInflate(z, []), done, left)
+      true -> inflate(z, :zlib.safeInflate(z, []), rest, scan)
     end
   end
 
@@ -96,20 +106,16 @@ defmodule Sim.Floorplan.Png do
         do: {k, dark(rgb, Enum.at(alphas, k, 255))}
   end
 
-  defp rows(bytes, {_, height, depth, type} = header) do
-    stride = stride(header)
-    pixel = max(div(depth * @channels[type], 8), 1)
-    zero = List.duplicate(0, stride)
-
-    {rows, _} =
-      Enum.map_reduce(0..(height - 1), zero, fn j, above ->
-        <<filter, row::binary>> = binary_part(bytes, j * (stride + 1), stride + 1)
-        row = unfilter(filter, :binary.bin_to_list(row), above, pixel)
-        {row, row}
-      end)
-
-    rows
+  # Takes the whole rows; returns the bytes of the one that has only begun.
+  defp rows(bytes, %{stride: stride, left: left} = scan)
+       when left > 0 and byte_size(bytes) > stride do
+    <<filter, row::binary-size(stride), rest::binary>> = bytes
+    row = unfilter(filter, :binary.bin_to_list(row), scan.above, scan.pixel)
+    walls = walls(row, scan.header, scan.palette)
+    rows(rest, %{scan | above: row, left: left - 1, rows: [walls | scan.rows]})
   end
+
+  defp rows(bytes, scan), do: {bytes, scan}
 
   defp unfilter(0, row, _above, _pixel), do: row
 
