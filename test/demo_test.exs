@@ -71,6 +71,12 @@ defmodule System.DemoEndsTest do
     end
   end
 
+  test "a full disk is an error of one line" do
+    command = "mix demo --headless --robots 2 --duration 20 2>&1 >/dev/full; echo $?"
+    {told, 0} = System.cmd("sh", ["-c", command], cd: @root)
+    assert told == "demo: the output cannot be written: no space left on device\n1\n"
+  end
+
   @tag :tmp_dir
   test "bin/demo takes the demo along when it is ended", %{tmp_dir: folder} do
     demo = Path.join(@root, "bin/demo")

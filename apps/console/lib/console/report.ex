@@ -5,7 +5,7 @@ defmodule Console.Report do
   Lengths, angles and times are rounded to three decimals. Two runs from one seed give the same
   bytes, except for `wall_s`, the only key that depends on the machine.
   """
-  alias Console.Cli.{Format, Output}
+  alias Console.Cli.{Format, OutFile, Output}
   alias Sim.Trial.Claims
 
   @version Mix.Project.config()[:version]
@@ -55,6 +55,13 @@ defmodule Console.Report do
     ]
   end
 
+  @doc "Whether the files that the options name can be written: known before a run, not after it."
+  @spec check(Console.Options.t()) :: :ok | {:error, String.t()}
+  def check(options) do
+    with :ok <- OutFile.check("--json", options.json),
+         do: OutFile.check("--picture", options.picture)
+  end
+
   @doc """
   Writes the report and the picture to the files that the options name. `drawing` takes no
   argument and is called only if a picture is wanted.
@@ -70,13 +77,7 @@ defmodule Console.Report do
   defp put("--json", "-", content, _output), do: IO.write(content.())
 
   defp put(option, path, content, output) do
-    case File.write(path, content.()) do
-      :ok ->
-        Output.line(output, "Wrote #{path}")
-
-      {:error, reason} ->
-        {:error, "#{option} #{path} cannot be written: #{:file.format_error(reason)}"}
-    end
+    with :ok <- OutFile.write(option, path, content.()), do: Output.line(output, "Wrote #{path}")
   end
 
   defp stage(stage) do

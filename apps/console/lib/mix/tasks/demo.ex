@@ -11,8 +11,8 @@ defmodule Mix.Tasks.Demo do
   not; 1 if the input was wrong.
   """
   use Mix.Task
-  alias Console.{Demo, Live, Options}
-  alias Console.Cli.Build
+  alias Console.{Demo, Live, Options, Report}
+  alias Console.Cli.{Build, Output}
   alias Console.Terminal.Session
 
   # Twenty robots take a third of a processor, fifty a whole one, because all hear all.
@@ -33,14 +33,22 @@ defmodule Mix.Tasks.Demo do
     status =
       case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
         {:ok, %Options{help: true}} -> IO.write(Options.help())
-        {:ok, options} -> play(options)
-        {:error, lines} -> refuse(lines)
+        {:ok, options} -> with :ok <- Report.check(options), do: play(options)
+        {:error, lines} -> {:error, lines}
+      end
+
+    status =
+      with {:error, lines} <- status do
+        lines |> List.wrap() |> Enum.each(&IO.puts(:stderr, "demo: #{&1}"))
+        IO.puts(:stderr, "demo: --help lists all options")
+        1
       end
 
     if is_integer(status) and status > 0, do: exit({:shutdown, status})
   end
 
-  # The reader of our output may stop reading, as `head` does; then we end silently.
+  # The reader of our output may stop reading, as `head` does; then we end silently. A full disk
+  # is an error.
   defp play(options) do
     warn(options)
 
@@ -51,7 +59,18 @@ defmodule Mix.Tasks.Demo do
     end
   rescue
     error in ErlangError ->
-      if error.original == :terminated, do: @unread, else: reraise(error, __STACKTRACE__)
+      if error.original == :terminated, do: unread(), else: reraise(error, __STACKTRACE__)
+  end
+
+  defp unread do
+    case Output.lost() do
+      :unread ->
+        @unread
+
+      {:error, reason} ->
+        IO.puts(:stderr, "demo: the output cannot be written: #{:file.format_error(reason)}")
+        1
+    end
   end
 
   defp paced, do: [lines: &Live.Paced.lines/1, stop: &Live.Paced.stop/1]
@@ -80,11 +99,5 @@ defmodule Mix.Tasks.Demo do
          length(options.robots) <= @robots_a_processor * System.schedulers_online(),
        do: Session.run(options, Live.Fleet, &Live.Fleet.start_link/1),
        else: Session.run(options, Live.Trial, &Live.Trial.start_link(Sim.Trial, &1))
-  end
-
-  defp refuse(lines) do
-    Enum.each(lines, &IO.puts(:stderr, "demo: #{&1}"))
-    IO.puts(:stderr, "demo: --help lists all options")
-    1
   end
 end
