@@ -2,10 +2,18 @@ defmodule Console.Terminal.Editor do
   @moduledoc """
   A line editor, key by key: moving, deleting, history, completion. Pure.
 
-  The view draws it, so the terminal itself must not echo.
+  The view draws it, so the terminal itself must not echo. A line ends at `:most` bytes and a
+  character beyond them, so that whoever reads it sees that it was longer; the rest is dropped.
   """
 
-  defstruct before: "", behind: "", history: [], older: [], newer: [], escape: nil, words: nil
+  defstruct before: "",
+            behind: "",
+            history: [],
+            older: [],
+            newer: [],
+            escape: nil,
+            words: nil,
+            most: 500
 
   @type t :: %__MODULE__{}
 
@@ -62,9 +70,10 @@ defmodule Console.Terminal.Editor do
   def key(editor, "\t"), do: complete(editor)
 
   def key(editor, char) do
-    if String.printable?(char),
-      do: {nil, %{editor | before: editor.before <> char}},
-      else: {nil, editor}
+    if String.printable?(char) and
+         byte_size(editor.before) + byte_size(editor.behind) <= editor.most,
+       do: {nil, %{editor | before: editor.before <> char}},
+       else: {nil, editor}
   end
 
   @doc """
@@ -86,7 +95,7 @@ defmodule Console.Terminal.Editor do
   defp finish(editor) do
     line = text(editor)
     history = if String.trim(line) == "", do: editor.history, else: [line | editor.history]
-    {{:line, line}, %{new(editor.words) | history: history, older: history}}
+    {{:line, line}, %{new(editor.words) | history: history, older: history, most: editor.most}}
   end
 
   defp move(%{older: [line | older]} = editor, "A"),

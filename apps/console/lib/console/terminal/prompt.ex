@@ -12,6 +12,9 @@ defmodule Console.Terminal.Prompt do
 
   @words ~w(kill formation landmark move goto follow stop estop reset start status nodes tell help quit)
 
+  # Far more than any command needs.
+  @most_bytes 500
+
   @type parsed ::
           Console.Live.command() | :help | :nodes | :status | {:status, atom()} | :quit | :nothing
 
@@ -26,12 +29,19 @@ defmodule Console.Terminal.Prompt do
       {:error, ~s(unknown command "fromation"; did you mean formation?)}
   """
   @spec parse(String.t(), [atom()]) :: {:ok, parsed()} | {:error, String.t()}
+  def parse(text, _robots) when byte_size(text) > @most_bytes,
+    do: {:error, "this line is too long: at most #{@most_bytes} bytes are allowed"}
+
   def parse(text, robots) do
     case String.split(text) do
       [] -> {:ok, :nothing}
       [word | rest] -> command(String.downcase(word), rest, robots)
     end
   end
+
+  @doc "The longest line that is read, in bytes."
+  @spec most_bytes() :: pos_integer()
+  def most_bytes, do: @most_bytes
 
   @doc """
   The words that may follow the given words.

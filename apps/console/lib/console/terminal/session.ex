@@ -13,11 +13,21 @@ defmodule Console.Terminal.Session do
   alias Console.Terminal.Editor
 
   @draw_ms 100
+  # A key is shown after this time, together with all that came meanwhile: pasted text comes fast.
+  @key_ms 20
   @status_s 5
 
   @enforce_keys [:module, :live, :robots, :until_s, :mode, :output]
   defstruct @enforce_keys ++
-              [view: nil, scene: nil, told: 0, status_s: 0, track: nil, started_ms: 0]
+              [
+                view: nil,
+                scene: nil,
+                told: 0,
+                status_s: 0,
+                track: nil,
+                started_ms: 0,
+                redraw?: false
+              ]
 
   @doc "Runs until the time is up or somebody quits; returns the exit status."
   @spec run(Options.t(), module(), (map() -> {:ok, pid()} | {:error, String.t()})) :: 0 | 1 | 2
@@ -60,7 +70,7 @@ defmodule Console.Terminal.Session do
       output: Output.to(if(options.json == "-", do: :stderr, else: :stdio)),
       track: options.picture && RunTrack.new(scene),
       view: %Terminal{
-        editor: Editor.new(&Prompt.completions(&1, options.robots))
+        editor: %{Editor.new(&Prompt.completions(&1, options.robots)) | most: Prompt.most_bytes()}
       },
       started_ms: System.monotonic_time(:millisecond)
     }
@@ -128,6 +138,10 @@ defmodule Console.Terminal.Session do
       {:key, key} ->
         session |> key(key) |> continue()
 
+      # Draws the scene at hand, because typing must not wait for the fleet.
+      :redraw ->
+        loop(draw(%{session | redraw?: false}, session.scene))
+
       {:line, line} ->
         session |> obey(line) |> continue()
 
@@ -161,8 +175,12 @@ defmodule Console.Terminal.Session do
   end
 
   defp redraw({:quit, session}), do: {:quit, session}
-  # Draws the scene at hand, because typing must not wait for the fleet.
-  defp redraw(session), do: draw(session, session.scene)
+  defp redraw(%{redraw?: true} = session), do: session
+
+  defp redraw(session) do
+    Process.send_after(self(), :redraw, @key_ms)
+    %{session | redraw?: true}
+  end
 
   defp draw(%{mode: :lines} = session, _scene), do: session
 

@@ -1,6 +1,6 @@
 defmodule Console.Terminal.PromptTest do
   use ExUnit.Case, async: true
-  alias Console.Terminal.Prompt
+  alias Console.Terminal.{Editor, Prompt}
 
   @robots [:mag1, :mag2, :min1]
 
@@ -59,5 +59,21 @@ defmodule Console.Terminal.PromptTest do
     assert error("all fly:1") =~ "unknown command"
     assert error("mag1 followtheleader:mag9") =~ "mag9"
     assert error("xyzzy") =~ "help"
+  end
+
+  test "a line of ten thousand letters is refused, not repeated" do
+    assert error(String.duplicate("a", 10_000)) ==
+             "this line is too long: at most 500 bytes are allowed"
+
+    # What the editor keeps of it is refused as well, and never taken for a shorter command.
+    typed =
+      for _ <- 1..10_000, reduce: %{Editor.new([]) | most: Prompt.most_bytes()} do
+        editor -> editor |> Editor.key("é") |> elem(1)
+      end
+
+    assert byte_size(Editor.text(typed)) in 501..502
+    assert {{:line, line}, after_it} = Editor.key(typed, "\r")
+    assert error(line) =~ "too long"
+    assert after_it.most == Prompt.most_bytes()
   end
 end
