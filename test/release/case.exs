@@ -15,11 +15,15 @@ defmodule Release.Case do
   end
 
   setup_all do
-    # Whoever comes first builds it, and the others wait.
-    :global.trans({__MODULE__, self()}, fn ->
-      unless :persistent_term.get(__MODULE__, false), do: build()
-      :persistent_term.put(__MODULE__, true)
-    end)
+    # Whoever comes first builds it; the others find the name taken, and wait for the answer.
+    built =
+      case Agent.start(&build/0, name: __MODULE__, timeout: :infinity) do
+        {:ok, built} -> built
+        {:error, {:already_started, built}} -> built
+      end
+
+    {said, status} = Agent.get(built, & &1, :infinity)
+    assert status == 0, said
 
     {:ok, _started} = Application.ensure_all_started(:hal)
     :ok
@@ -29,8 +33,7 @@ defmodule Release.Case do
     environment = [{"MIX_ENV", "prod"}, {"MIX_TARGET", nil}]
     arguments = ["release", "robot", "--overwrite", "--quiet"]
     options = [cd: @root, env: environment, stderr_to_stdout: true]
-    {said, status} = System.cmd("mix", arguments, options)
-    assert status == 0, said
+    System.cmd("mix", arguments, options)
   end
 
   setup do
