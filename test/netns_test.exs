@@ -19,6 +19,7 @@ defmodule System.NetnsTest do
   is measured is how they agree, and not how far they drive. With `FIGURES=1` each test prints what it has measured.
   """
   use ExUnit.Case, async: false
+  import Swarm.Case, only: [order: 1]
   alias Hal.Pose
   alias Netns.{Fleet, Log, Net, Story}
 
@@ -73,7 +74,7 @@ defmodule System.NetnsTest do
   end
 
   defp start(fleet, options \\ []) do
-    :ok = Fleet.call(fleet, :mag1, Swarm, :start, [@mission ++ options])
+    :ok = order(fn -> Fleet.call(fleet, :mag1, Swarm, :start, [@mission ++ options]) end)
     Log.now()
   end
 
@@ -261,7 +262,7 @@ defmodule System.NetnsTest do
     # The stop needs the radio only; who answers for a reset, is connected.
     met(fleet)
     assert told(fleet, :reset, pressed) == []
-    assert Fleet.call(fleet, :mag5, Swarm, :reset, []) == :ok
+    assert order(fn -> Fleet.call(fleet, :mag5, Swarm, :reset, []) end) == :ok
     again = start(fleet)
 
     Fleet.await(fleet, "they drive", @patience_ms, fn _lines ->

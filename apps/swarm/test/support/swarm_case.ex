@@ -89,8 +89,9 @@ defmodule Swarm.Case do
   end
 
   @doc """
-  The answer to an order. On a busy machine a live robot may be silent for 0.4 s, and its order is
-  refused for that; a person then gives it again. Any other refusal is the answer.
+  The answer to an order. On a busy machine a live robot may be silent for 0.4 s, or an order may
+  reach it too late, and the order is refused for that; a person then gives it again. Any other
+  refusal is the answer.
   """
   def order(give) do
     {:answer, answer} =
@@ -102,7 +103,9 @@ defmodule Swarm.Case do
     answer
   end
 
-  defp busy?({:error, line}), do: line =~ " hangs in " or line =~ " does not answer"
+  defp busy?({:error, line}),
+    do: Enum.any?([" hangs in ", " does not answer", "; repeat it"], &String.contains?(line, &1))
+
   defp busy?(_answer), do: false
 
   @doc "Waits until a function returns something, and returns it."
