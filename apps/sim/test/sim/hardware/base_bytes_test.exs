@@ -12,7 +12,7 @@ defmodule Sim.Hardware.BaseBytesTest do
     stop(context)
     %{frames: frames, lost: lost} = Emulator.core(context.emulator).counts
     assert frames > 100
-    assert lost < frames / 5
+    assert lost < frames / 3
   end
 
   @tag base: [ghost: :all]
