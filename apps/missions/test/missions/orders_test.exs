@@ -59,6 +59,12 @@ defmodule Swarm.OrdersTest do
       end
     end
 
+    def handle({:command, {:late, test}}, goal) do
+      send(test, {:late, self()})
+      receive(do: (:go_on -> :ok))
+      handle(:late, goal)
+    end
+
     def handle(_event, goal), do: {:rolling, goal, [{:goal, :roll, goal[:goal]}]}
   end
 
@@ -271,6 +277,22 @@ defmodule Swarm.OrdersTest do
       :gen_statem.cast(Names.via(id, :pilot), {:command, :hang})
       assert Swarm.stop(id) == {:error, "orders_hangs does not answer"}
       stands(id)
+    end
+
+    test "is not undone by a mission that was late, and then hangs" do
+      id = robot(:orders_late)
+      standing([id])
+      :ok = Pilot.start(id, Deaf, goal: @roll)
+      rolls(id)
+      for order <- [{:late, self()}, :hang], do: Pilot.hear(id, {:command, order})
+      assert_receive {:late, pilot}
+      assert Swarm.stop(id) == {:error, "orders_late does not answer"}
+      send(pilot, :go_on)
+      stands(id, 500)
+      # The pilot that takes its place lets the robot drive again.
+      eventually(fn -> Names.whereis(id, :pilot) not in [nil, pilot] end)
+      eventually(fn -> Pilot.start(id, Deaf, goal: @roll) == :ok end)
+      rolls(id)
     end
 
     test "is not :ok if the drive does not hear that it is disarmed" do

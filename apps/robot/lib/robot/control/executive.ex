@@ -55,8 +55,16 @@ defmodule Robot.Control.Executive do
   def confirm(robot, {_m, _f, _a} = then), do: cast(robot, {:confirm, then})
 
   @doc """
+  Drops the goal at once, and every goal that comes until the pilot, which is told to end the
+  mission at the same time, says `stand/2`. A mission that runs late, or hangs, could otherwise
+  set a goal after the stop. Until then nothing is confirmed.
+  """
+  @spec hold(robot :: atom()) :: :ok
+  def hold(robot), do: cast(robot, :hold)
+
+  @doc """
   Drops the goal and all other orders of the mission, and makes the gate drop the wish, after all
-  earlier wishes of the executive; then the gate applies `then`.
+  earlier wishes of the executive; then the gate applies `then`. Ends `hold/1`.
   """
   @spec stand(robot :: atom(), then :: Config.call() | nil) :: :ok
   def stand(robot, then \\ nil), do: cast(robot, {:stand, then})
@@ -79,6 +87,7 @@ defmodule Robot.Control.Executive do
       sink: sink,
       controller: Controller.new(profile: config.profile, start: config.start),
       told: nil,
+      held?: false,
       tick: 0,
       ticker: Config.ticker(config, :tick, @period_ms)
     }
@@ -87,6 +96,12 @@ defmodule Robot.Control.Executive do
   end
 
   @impl GenServer
+  # From a mission that has not ended yet, although a stop has ended it.
+  def handle_cast({:obey, {:goal, _tag, {_module, _options}}}, %{held?: true} = s),
+    do: {:noreply, s}
+
+  def handle_cast({:confirm, _then}, %{held?: true} = s), do: {:noreply, s}
+
   def handle_cast({:obey, order}, s) do
     at_ms = Config.now(s.config)
     Trace.input(s.config, :executive, order, at_ms)
@@ -99,11 +114,8 @@ defmodule Robot.Control.Executive do
     {:noreply, s}
   end
 
-  def handle_cast({:stand, then}, s) do
-    Trace.input(s.config, :executive, :stand, Config.now(s.config))
-    Gate.forget(s.config.id, then)
-    {:noreply, pursue(s, Controller.stand(s.controller))}
-  end
+  def handle_cast(:hold, s), do: {:noreply, %{drop(s, nil) | held?: true}}
+  def handle_cast({:stand, then}, s), do: {:noreply, %{drop(s, then) | held?: false}}
 
   @impl GenServer
   def handle_info(:tick, s) do
@@ -120,6 +132,12 @@ defmodule Robot.Control.Executive do
   end
 
   def handle_info(_other, s), do: {:noreply, s}
+
+  defp drop(s, then) do
+    Trace.input(s.config, :executive, :stand, Config.now(s.config))
+    Gate.forget(s.config.id, then)
+    pursue(s, Controller.stand(s.controller))
+  end
 
   # The goal is on the board before its first tick, so that a hang in that tick can be attributed.
   defp pursue(%{controller: %{module: module}} = s, %{module: module} = controller),

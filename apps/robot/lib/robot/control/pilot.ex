@@ -111,9 +111,10 @@ defmodule Robot.Control.Pilot do
     }
 
     # The former pilot may have crashed within a callback, and the executive may still have its
-    # goal.
+    # goal, or wait for the end of a mission that has ended so.
     Journal.answered(data.board)
     Effects.rest(config)
+    Executive.stand(config.id)
     {:ok, :idle, Journal.told(:idle, %{}, data)}
   end
 

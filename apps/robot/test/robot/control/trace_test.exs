@@ -94,6 +94,8 @@ defmodule Robot.Control.TraceTest do
     {[{:wish, wish}] ++ looks(wish.look) ++ said, controller}
   end
 
+  defp executive(:stand, _at_ms, controller), do: {[], Controller.stand(controller)}
+
   defp executive(order, _at_ms, controller) do
     {controller, pan} = Controller.obey(controller, order)
     {looks(pan), controller}

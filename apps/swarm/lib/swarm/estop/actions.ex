@@ -180,7 +180,7 @@ defmodule Swarm.EStop.Actions do
     # `Robot.Control.Pilot`).
     Board.put(s.board, :estop, :stopped, now_us(), Config.now(s.config))
     :ok = Gate.forget(id)
-    :ok = Executive.stand(id)
+    :ok = Executive.hold(id)
     :ok = Pilot.halt(id, then)
   end
 
