@@ -34,11 +34,14 @@ defmodule Console.Cli.OutFile do
   # A link to a file stays one: what it points to is replaced.
   defp place(path) do
     case File.stat(path) do
-      {:ok, %File.Stat{type: :regular}} -> {:new, target(path) <> ".part"}
-      {:error, _none} -> {:new, path <> ".part"}
+      {:ok, %File.Stat{type: :regular}} -> {:new, part(target(path))}
+      {:error, _none} -> {:new, part(path)}
       {:ok, %File.Stat{type: type}} -> {:direct, type}
     end
   end
+
+  # A name of this program's own: a file of the user's must not be taken for it.
+  defp part(path), do: "#{path}.#{System.pid()}.part"
 
   defp target(path) do
     case File.read_link(path) do

@@ -15,6 +15,14 @@ defmodule Console.Cli.OutFileTest do
     assert File.ls!(tmp) == ["report.json"]
   end
 
+  test "a file of the user's beside it is left alone", %{tmp_dir: tmp} do
+    path = Path.join(tmp, "report.json")
+    File.write!(path <> ".part", "mine")
+    assert OutFile.check("--json", path) == :ok
+    assert OutFile.write("--json", path, "new") == :ok
+    assert File.read!(path <> ".part") == "mine"
+  end
+
   test "a link stays one, and its file is replaced", %{tmp_dir: tmp} do
     [path, link] = for name <- ["file", "link"], do: Path.join(tmp, name)
     File.write!(path, "old")

@@ -31,7 +31,8 @@ defmodule Robot.Control.Executive do
   @doc """
   Sets, changes or (`nil`) drops the goal, as in `Robot.Control.Controller.goal/3`. The error is a
   line: no such robot runs on this node, the goal is not a behaviour, or it does not accept these
-  options.
+  options. `:ok` means that the goal was sent: one that comes while the executive is held (`hold/1`)
+  is dropped.
   """
   @spec goal(robot :: atom(), tag :: term(), {module(), keyword()} | nil) ::
           :ok | {:error, line :: String.t()}
