@@ -106,6 +106,7 @@
     # port: 4370,                          # UDP
     # multicast: {"239.255.67.86", 4371},  # false where it is blocked; then name some:
     # peers: ["10.0.0.12:4370"],
+    # addresses: ["203.0.113.5:4370"],     # how others see it, where a router changes addresses
     # dist_port: 9101,                     # TCP
     # full_mesh: 30,                       # up to so many robots each is connected to each,
     # degree: 8                            # above that to so many

@@ -24,6 +24,12 @@ defmodule Mesh.Consumer do
   """
   @callback services() :: %{atom() => {module(), atom(), list()}}
 
+  @doc """
+  The services whose terms are taken however old they are, and whoever forwards them: what stops
+  robots. All other terms, and all messages, must have been made within the last 2 s.
+  """
+  @callback late() :: [atom()]
+
   @doc "Checks a term that claims to be a message. Pure."
   @callback read(term()) :: {:ok, message :: term(), about()} | :error
 

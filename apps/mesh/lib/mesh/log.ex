@@ -13,6 +13,7 @@ defmodule Mesh.Log do
     :disconnected,
     :no_network,
     :unknown_node,
+    :foreign,
     :duplicate_node,
     :libcluster
   ]
@@ -55,6 +56,12 @@ defmodule Mesh.Log do
     {:warning,
      "mesh: #{inspect(name)} at #{:inet.ntoa(ip)} has the fleet's secret, but is not in this node's " <>
        "fleet or has another host part; see the option fleet"}
+  end
+
+  def line(:foreign, %{name: name, address: {ip, port}}) do
+    {:warning,
+     "mesh: a datagram of #{name} came from #{:inet.ntoa(ip)}:#{port}, which is not an address of that node: " <>
+       "somebody forwards it, or a router changes addresses; see the option addresses"}
   end
 
   def line(:libcluster, %{reason: reason}),

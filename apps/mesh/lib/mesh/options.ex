@@ -10,6 +10,7 @@ defmodule Mesh.Options do
   | `port` | the UDP port; default 4370, 0 takes any |
   | `multicast` | group and port of the gossip, default `{{239, 255, 67, 86}, 4371}`; `false` for none |
   | `peers` | addresses to try, `["10.0.0.7:4370"]`, if multicast is blocked |
+  | `addresses` | further addresses that others hear this node from, if a router on the way changes them (NAT), up to 8 |
   | `strategies` | further ways to find nodes, `[{Module, options}]` (`Mesh.Strategy`) |
   | `topologies` | those of `libcluster`, if it is installed (`MIX_TARGET`): any of its strategies then connects nodes |
   | `dist_port` | the port that this node's distribution listens on; default: that of `Mesh.Distribution.Epmd`, or 0 if there is an epmd to ask |
@@ -36,6 +37,10 @@ defmodule Mesh.Options do
       {:check, &Hal.Options.Type.list?/1, ~s(a list of addresses such as "10.0.0.7:4370")},
       default: []
     ],
+    addresses: [
+      {:list, {:check, &__MODULE__.peer?/1, ~s(address and port, such as "10.0.0.7:4370",)}, 8},
+      default: []
+    ],
     strategies: [{:check, &Hal.Options.Type.list?/1, "a list of {Module, options}"}, default: []],
     topologies: [{:check, &__MODULE__.topologies/1, "libcluster's"}, default: []]
   ]
@@ -47,7 +52,17 @@ defmodule Mesh.Options do
       {:list, {:check, &__MODULE__.peer?/1, ~s(address and port, such as "10.0.0.7:4370",)},
        1_000}
   ]
-  @in_file [:secret_file, :interface, :port, :multicast, :peers, :dist_port, :full_mesh, :degree]
+  @in_file [
+    :secret_file,
+    :interface,
+    :port,
+    :multicast,
+    :peers,
+    :addresses,
+    :dist_port,
+    :full_mesh,
+    :degree
+  ]
 
   defstruct Keyword.keys(@table) ++ [started: []]
 
@@ -63,6 +78,7 @@ defmodule Mesh.Options do
           port: :inet.port_number(),
           multicast: Strategy.address() | false,
           peers: [Strategy.address() | String.t()],
+          addresses: [Strategy.address()],
           strategies: [{module(), term()}],
           topologies: keyword(),
           dist_port: :inet.port_number(),
@@ -87,7 +103,8 @@ defmodule Mesh.Options do
          {:ok, secret} <- secret(options),
          {:ok, started} <- start(options) do
       dist_port = options.dist_port || own_port()
-      {:ok, %{options | dist_port: dist_port, secret: secret, fleet: fleet, started: started}}
+      options = %{options | dist_port: dist_port, addresses: parsed(options.addresses)}
+      {:ok, %{options | secret: secret, fleet: fleet, started: started}}
     end
   end
 
@@ -123,6 +140,10 @@ defmodule Mesh.Options do
       :error ->
         0
     end
+  end
+
+  defp parsed(texts) do
+    for text <- texts, {:ok, address} = Strategy.Static.address(text), do: address
   end
 
   @doc false

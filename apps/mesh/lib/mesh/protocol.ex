@@ -25,9 +25,11 @@ defmodule Mesh.Protocol do
               [
                 group: nil,
                 sequence: 0,
+                addresses: [],
+                late: [],
                 links: [],
                 spoke_ms: nil,
-                answered: %{},
+                challenged: %{},
                 second: 0,
                 strange: 0,
                 rejected: %{}
@@ -43,10 +45,11 @@ defmodule Mesh.Protocol do
           | {:learn, String.t(), :inet.ip4_address(), :inet.port_number()}
           | {:event, atom(), map()}
   @typedoc """
-  `consumer` reads messages (`Mesh.Consumer`), `services` are those whose terms are let in;
-  `group` is the multicast address that heartbeats go to besides, `links` to whom the distribution is connected,
-  `spoke_ms` when a robot of this node was last heard by all, `answered` when a stranger last got an answer;
-  `second` is the one in which `strange` counts what nobody of the fleet has signed.
+  `consumer` reads messages (`Mesh.Consumer`), `services` are those whose terms are let in, those in `late` at any age;
+  `group` is the multicast address that heartbeats go to besides, `addresses` are this node's own, `links` to whom the
+  distribution is connected, `spoke_ms` when a robot of this node was last heard by all, `challenged` when who cannot
+  be believed was last challenged;
+  `second` is the one in which `strange` counts what nobody of the fleet has sent.
   """
   @type t :: %__MODULE__{
           secret: Mesh.Secret.t(),
@@ -60,10 +63,12 @@ defmodule Mesh.Protocol do
           consumer: module(),
           services: [atom()],
           group: address() | nil,
+          addresses: [address()],
+          late: [atom()],
           sequence: non_neg_integer(),
           links: [String.t()],
           spoke_ms: integer() | nil,
-          answered: %{String.t() => integer()},
+          challenged: %{{asked? :: boolean(), String.t(), address()} => integer()},
           second: integer(),
           strange: non_neg_integer(),
           rejected: %{atom() => pos_integer()}
@@ -71,8 +76,9 @@ defmodule Mesh.Protocol do
 
   @doc """
   A node's side of the protocol; `session` is random and new with each start, `strategies` are `{module, state}`, `group`
-  is the multicast address that heartbeats go to besides, `port` that of the distribution, `consumer` who reads
-  messages, and `services` whose terms are let in.
+  is the multicast address that heartbeats go to besides, `addresses` are those that others hear this node from, `port`
+  is that of the distribution, `consumer` who reads messages, `services` are those whose terms are let in, and `late`
+  those that are at any age.
   """
   @spec new(keyword()) :: t()
   def new(options) do
@@ -82,6 +88,11 @@ defmodule Mesh.Protocol do
     own = [name: name, guard: ReplayProtection.new(session), node_table: NodeTable.new(name)]
     struct!(__MODULE__, options ++ own)
   end
+
+  @doc "This node has these addresses from now on: its datagrams name them, and are refused from any other."
+  @spec locate(t(), [address()]) :: t()
+  def locate(protocol, addresses),
+    do: %{protocol | addresses: Enum.take(addresses, Packet.most_addresses())}
 
   @doc "A datagram came from there."
   @spec hear(t(), binary(), address(), integer()) :: {t(), [effect()]}
@@ -108,18 +119,29 @@ defmodule Mesh.Protocol do
 
     protocol = %{protocol | node_table: node_table, strategies: strategies}
     {protocol, sent} = Outbox.beacon(protocol, now_ms, due ++ targets)
-    {protocol, sent ++ Roster.changes(protocol.roster, changes)}
+    {protocol, challenges} = renew(Admission.tick(protocol, now_ms), now_ms)
+    {protocol, sent ++ challenges ++ Roster.changes(protocol.roster, changes)}
+  end
+
+  # The clocks of others drift.
+  defp renew(protocol, now_ms) do
+    old =
+      for {name, %{status: status, address: address}} <- protocol.node_table.nodes,
+          status != :gone and ReplayProtection.due?(protocol.guard, name, now_ms),
+          do: address
+
+    Outbox.clock(protocol, :challenge, nil, old, now_ms)
   end
 
   @doc "A message of a robot of this node, to all nodes or to those that hold these robots."
   @spec speak(t(), :all | [atom()], message :: term(), integer()) :: {t(), [effect()]}
   def speak(protocol, :all, message, now_ms) do
     to = NodeTable.addresses(protocol.node_table) ++ List.wrap(protocol.group)
-    {protocol, sent} = Outbox.seal(protocol, :message, {:all, message}, to)
+    {protocol, sent} = Outbox.seal(protocol, :message, {:all, message}, to, now_ms)
     {%{protocol | spoke_ms: now_ms}, sent}
   end
 
-  def speak(protocol, ids, message, _now_ms) do
+  def speak(protocol, ids, message, now_ms) do
     holders = NodeTable.holders(protocol.node_table, ids)
 
     to =
@@ -128,7 +150,7 @@ defmodule Mesh.Protocol do
           entry.status != :gone,
           do: entry.address
 
-    Outbox.seal(protocol, :message, {ids, message}, to)
+    Outbox.seal(protocol, :message, {ids, message}, to, now_ms)
   end
 
   @doc "Somebody who may not know this node is there: a beacon introduces it."
@@ -140,19 +162,19 @@ defmodule Mesh.Protocol do
   A service's term, to one node, to all, or `:everywhere`: also to those that have just been silent, and by
   multicast besides.
   """
-  @spec serve(t(), atom(), :all | :everywhere | node(), term()) :: {t(), [effect()]}
-  def serve(protocol, service, :everywhere, term) do
-    to = for {_name, %{address: address}} <- protocol.node_table.nodes, do: address
-    Outbox.seal(protocol, :service, {service, term}, to ++ List.wrap(protocol.group))
-  end
+  @spec serve(t(), atom(), :all | :everywhere | node(), term(), integer()) :: {t(), [effect()]}
+  def serve(protocol, service, to, term, now_ms),
+    do: Outbox.seal(protocol, :service, {service, term}, places(protocol, to), now_ms)
 
-  def serve(protocol, service, :all, term),
-    do: Outbox.seal(protocol, :service, {service, term}, NodeTable.addresses(protocol.node_table))
+  defp places(%{node_table: node_table, group: group}, :everywhere),
+    do: for({_name, %{address: address}} <- node_table.nodes, do: address) ++ List.wrap(group)
 
-  def serve(protocol, service, node, term) do
+  defp places(protocol, :all), do: NodeTable.addresses(protocol.node_table)
+
+  defp places(protocol, node) do
     case protocol.node_table.nodes[Atom.to_string(node)] do
-      nil -> {protocol, []}
-      entry -> Outbox.seal(protocol, :service, {service, term}, [entry.address])
+      nil -> []
+      entry -> [entry.address]
     end
   end
 

@@ -37,7 +37,8 @@ defmodule Mesh.Server do
         port: options.dist_port,
         group: group(options),
         consumer: consumer,
-        services: Map.keys(services)
+        services: Map.keys(services),
+        late: consumer.late()
       )
 
     s = %{
@@ -55,7 +56,7 @@ defmodule Mesh.Server do
       next: now()
     }
 
-    {:ok, s |> open() |> publish() |> schedule()}
+    {:ok, s |> open() |> locate() |> publish() |> schedule()}
   end
 
   # Heartbeats go to each node by its address, and also by multicast, because either way may be
@@ -74,7 +75,7 @@ defmodule Mesh.Server do
 
   def handle_cast({:serve, service, to, term}, %{services: services} = s)
       when is_map_key(services, service) and is_atom(to),
-      do: {:noreply, run(s, Protocol.serve(s.protocol, service, to, term))}
+      do: {:noreply, run(s, Protocol.serve(s.protocol, service, to, term, now()))}
 
   # To a node that the distribution is connected to, for whatever reason.
   def handle_cast({:introduce, node}, s) when is_atom(node) do
@@ -115,7 +116,7 @@ defmodule Mesh.Server do
 
   def handle_info(:tick, s) do
     {chance, state} = :rand.uniform_s(s.chance)
-    s = open(%{s | chance: state, ticks: s.ticks + 1})
+    s = locate(open(%{s | chance: state, ticks: s.ticks + 1}))
     if s.sockets && rem(s.ticks, @rejoin_every) == 0, do: Sockets.rejoin(s.sockets)
     s = run(s, Protocol.tick(s.protocol, Dialer.links(), now(), chance))
     {:noreply, s |> publish() |> schedule()}
@@ -141,6 +142,16 @@ defmodule Mesh.Server do
         Event.execute([:mesh, :no_network], %{}, about)
         {chance, state} = :rand.uniform_s(s.chance)
         %{s | chance: state, backoff: Backoff.tried(s.backoff, now(), chance)}
+    end
+  end
+
+  # The addresses of this machine may change at any time.
+  defp locate(%{sockets: nil} = s), do: s
+
+  defp locate(s) do
+    case Sockets.addresses(s.sockets, s.options) do
+      {:ok, addresses} -> %{s | protocol: Protocol.locate(s.protocol, addresses)}
+      {:error, _reason} -> s
     end
   end
 

@@ -34,6 +34,30 @@ defmodule Mesh.Sockets do
     end
   end
 
+  @doc """
+  The addresses that others hear this node from: that of the interface that it sends from, or all
+  that the machine has now, those of the loopback last; before them those of the option
+  `addresses`. `{:error, reason}` if the system does not tell.
+  """
+  @spec addresses(t(), Options.t()) :: {:ok, [Mesh.Strategy.address()]} | {:error, term()}
+  def addresses(%__MODULE__{port: port}, %{interface: {0, 0, 0, 0}, addresses: further}) do
+    with {:ok, interfaces} <- :inet.getifaddrs() do
+      {loopback, others} =
+        Enum.split_with(interfaces, fn {_name, about} -> :loopback in about[:flags] end)
+
+      own =
+        for {_name, about} <- others ++ loopback,
+            {:addr, ip} <- about,
+            tuple_size(ip) == 4,
+            do: {ip, port}
+
+      {:ok, further ++ own}
+    end
+  end
+
+  def addresses(%__MODULE__{port: port}, %{interface: ip, addresses: further}),
+    do: {:ok, further ++ [{ip, port}]}
+
   @doc "Sends a datagram; errors are ignored, because they are those of the network."
   @spec send(t(), Mesh.Strategy.address(), binary()) :: :ok | {:error, term()}
   def send(%__MODULE__{own: own}, address, datagram), do: :gen_udp.send(own, address, datagram)

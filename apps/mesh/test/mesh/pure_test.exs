@@ -6,6 +6,8 @@ defmodule Mesh.PureTest do
 
   doctest Mesh.Backoff
   doctest Mesh.Protocol.Beacon
+  doctest Mesh.Protocol.Challenge
+  doctest Mesh.Protocol.ClockOffset
   doctest Mesh.Distribution.Certs
   doctest Mesh.Protocol.Packet.ReplayProtection
   doctest Mesh.Log
@@ -62,7 +64,7 @@ defmodule Mesh.PureTest do
     NodeTable.beacon(
       node_table,
       "b",
-      %Beacon{sessions: [], hears: hears, links: ["a", "c"], port: 0},
+      %Beacon{hears: hears, links: ["a", "c"], port: 0},
       5_000
     )
   end
@@ -101,6 +103,8 @@ defmodule Mesh.PureTest do
           {[multicast: "239.0.0.1:1"], "mesh option multicast cannot be"},
           {[peers: ["10.0.0.1"]],
            ~s(mesh option peers cannot be "10.0.0.1": an address such as "10.0.0.7:4370")},
+          {[addresses: ["10.0.0.1"]], "mesh option addresses.1 cannot be"},
+          {[addresses: List.duplicate("10.0.0.1:1", 9)], "mesh option addresses cannot be"},
           {[peers: :all], "mesh option peers cannot be :all: a list of addresses such as"},
           {[interface: "eth0"], ~s(mesh option interface cannot be "eth0": an IPv4 address)},
           {[multicast: nil], "mesh option multicast cannot be nil"},
@@ -121,6 +125,8 @@ defmodule Mesh.PureTest do
       refute line =~ "\n"
     end
 
-    assert {:ok, %Options{port: 4370}} = Options.new(secret: secret)
+    assert {:ok, %Options{port: 4370, addresses: []}} = Options.new(secret: secret)
+    assert {:ok, options} = Options.new(secret: secret, addresses: ["10.0.0.7:4370"])
+    assert options.addresses == [{{10, 0, 0, 7}, 4370}]
   end
 end

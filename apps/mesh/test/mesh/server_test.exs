@@ -1,8 +1,8 @@
 defmodule Mesh.ServerTest do
   # The mesh of this VM has names; the node that it hears is the protocol on a socket of the test's.
   use ExUnit.Case, async: false
-  alias Mesh.{Air, FakeConsumer, Options, Protocol}
-  alias Mesh.Protocol.Roster
+  import Mesh.SocketPeer, only: [until: 2, act: 2, now: 0]
+  alias Mesh.{Air, FakeConsumer, Options, Protocol, SocketPeer}
 
   @loopback {127, 0, 0, 1}
 
@@ -13,8 +13,7 @@ defmodule Mesh.ServerTest do
 
   setup do
     Process.register(self(), FakeConsumer)
-    {:ok, socket} = :gen_udp.open(0, [:binary, active: true, ip: @loopback])
-    {:ok, port} = :inet.port(socket)
+    {_socket, address} = place = SocketPeer.open()
 
     {:ok, options} =
       Options.new(
@@ -23,60 +22,15 @@ defmodule Mesh.ServerTest do
         interface: @loopback,
         port: 0,
         multicast: false,
-        peers: [{@loopback, port}],
+        peers: [address],
         dist_port: 0
       )
 
     start_supervised!({Mesh.Supervisor, {options, FakeConsumer}})
-
-    protocol =
-      Protocol.new(
-        secret: Air.secret(),
-        roster: Roster.new(other(), fleet()),
-        session: :rand.uniform(1_000_000_000),
-        strategies: [],
-        port: 0,
-        consumer: FakeConsumer,
-        services: [:rows, :stop]
-      )
-
-    %{peer: until(%{socket: socket, protocol: protocol, told: []}, fn _ -> met?() end)}
+    %{peer: until(SocketPeer.new(other(), fleet(), place), fn _ -> met?() end)}
   end
 
   defp met?, do: Mesh.alive() == [other()]
-  defp now, do: System.monotonic_time(:millisecond)
-
-  # Lets the other node live until it is so.
-  defp until(peer, done?, turns \\ 400) do
-    cond do
-      done?.(peer) ->
-        peer
-
-      turns == 0 ->
-        flunk("it did not come to pass")
-
-      true ->
-        peer
-        |> act(Protocol.tick(peer.protocol, [], now(), 0.5))
-        |> listen()
-        |> until(done?, turns - 1)
-    end
-  end
-
-  defp listen(peer) do
-    receive do
-      {:udp, _socket, ip, port, datagram} ->
-        peer |> act(Protocol.hear(peer.protocol, datagram, {ip, port}, now())) |> listen()
-    after
-      50 -> peer
-    end
-  end
-
-  defp act(peer, {protocol, effects}) do
-    for {:send, address, datagram} <- effects, do: :gen_udp.send(peer.socket, address, datagram)
-    told = for effect <- effects, elem(effect, 0) in [:deliver, :serve], do: effect
-    %{peer | protocol: protocol, told: told ++ peer.told}
-  end
 
   test "what it hears goes to the consumer that it was given, and into the table", %{peer: peer} do
     {node, other} = {node(), other()}
@@ -88,13 +42,13 @@ defmodule Mesh.ServerTest do
 
     letter = {:letter, :b, "to a"}
     until(peer, fn peer -> peer.protocol.node_table.nodes["#{node}"] != nil end)
-    peer = act(peer, Protocol.serve(peer.protocol, :rows, node, [1, 2]))
+    peer = act(peer, Protocol.serve(peer.protocol, :rows, node, [1, 2], now()))
     assert_receive {:rows, ^other, [1, 2]}
     peer = act(peer, Protocol.speak(peer.protocol, :all, letter, now()))
     assert_receive {:delivered, :all, ^other, ^letter}
 
     # A service that nobody takes, and a message that is of no sense.
-    peer = act(peer, Protocol.serve(peer.protocol, :hints, node, :x))
+    peer = act(peer, Protocol.serve(peer.protocol, :hints, node, :x, now()))
     peer = act(peer, Protocol.speak(peer.protocol, :all, :junk, now()))
     until(peer, fn _ -> match?(%{service: 1, message: 1}, Mesh.rejected()) end)
   end

@@ -15,7 +15,7 @@ defmodule Mesh.TableTest do
     table = NodeTable.robot(table, "c@lab", :c, {1, 1}, now_ms - 3_000)
     {table, _up} = NodeTable.hear(table, "b@lab", @address, now_ms)
     hears = for name <- ["a@lab", "c@lab"], do: {name, @address}
-    beacon = %Beacon{sessions: [], hears: hears, links: ["c@lab", "d@lab"], port: 0}
+    beacon = %Beacon{hears: hears, links: ["c@lab", "d@lab"], port: 0}
     NodeTable.beacon(table, "b@lab", beacon, now_ms)
   end
 
@@ -66,7 +66,7 @@ defmodule Mesh.TableTest do
         roster = Roster.new(:a@lab, names)
         texts = for name <- names, do: "#{name}@lab"
         hears = for text <- texts, do: {text, @address}
-        beacon = %Beacon{sessions: [], hears: hears, links: [], port: 0}
+        beacon = %Beacon{hears: hears, links: [], port: 0}
 
         node_table =
           Enum.reduce(texts, NodeTable.new("a@lab"), fn text, node_table ->

@@ -1,14 +1,23 @@
 defmodule Mesh.Air do
   @moduledoc """
   Stations of several nodes without sockets: datagrams take 1 ms, unless they are lost or the
-  link is cut; ticks come every 200 ms. Pure but for `:rand`, which ExUnit seeds.
+  link is cut; ticks come every 200 ms. Each station has a clock of its own, which began at another
+  time. Pure but for `:rand`, which ExUnit seeds.
   """
   alias Mesh.{Protocol, Secret, Strategy}
   alias Mesh.Protocol.Roster
 
   @group {{239, 255, 67, 86}, 4371}
 
-  defstruct now: 0, stations: %{}, addresses: %{}, air: [], cut: [], loss: 0.0, out: [], tap: []
+  defstruct now: 0,
+            clocks: %{},
+            stations: %{},
+            addresses: %{},
+            air: [],
+            cut: [],
+            loss: 0.0,
+            out: [],
+            tap: []
 
   def secret(key \\ "k") do
     %Secret{path: "", key: String.duplicate(key, 32), cookie: :none, fingerprint: ""}
@@ -16,7 +25,10 @@ defmodule Mesh.Air do
 
   def new(options \\ []), do: struct!(__MODULE__, options)
 
-  @doc "Switches a node on; `multicast: false` and `peers: [names]` for a network without multicast."
+  @doc """
+  Switches a node on; `multicast: false` and `peers: [names]` for a network without multicast, `rate: 1.01` for a clock
+  that is fast by 1 %.
+  """
   def join(air, name, options \\ []) do
     number = Enum.count(air.addresses) + 1
     address = Map.get(air.addresses, name, {{10, 0, 0, number}, 4370})
@@ -35,12 +47,26 @@ defmodule Mesh.Air do
         session: options[:session] || :rand.uniform(1_000_000_000),
         strategies: gossip ++ static,
         port: 0,
+        addresses: [address],
         group: group,
         consumer: Mesh.FakeConsumer,
-        services: [:rows]
+        services: [:rows, :stop],
+        late: [:stop]
       )
 
-    put_in(air.stations[name], protocol)
+    clock = {:rand.uniform(2_000_000_000) - 1_000_000_000, options[:rate] || 1.0}
+    put_in(air.stations[name], protocol) |> Map.update!(:clocks, &Map.put(&1, name, clock))
+  end
+
+  @doc "A station's own time."
+  def time(air, name) do
+    {start_ms, rate} = air.clocks[name]
+    start_ms + trunc(air.now * rate)
+  end
+
+  @doc "A station's clock stood still for so long, as in a suspended computer."
+  def suspend(air, name, ms) do
+    update_in(air.clocks[name], fn {start_ms, rate} -> {start_ms - ms, rate} end)
   end
 
   defp begin(module, options) do
@@ -65,20 +91,20 @@ defmodule Mesh.Air do
   end
 
   defp tick(name, air) do
-    act(air, name, Protocol.tick(air.stations[name], [], air.now, :rand.uniform()))
+    act(air, name, Protocol.tick(air.stations[name], [], time(air, name), :rand.uniform()))
   end
 
   def speak(air, name, to, message),
-    do: act(air, name, Protocol.speak(air.stations[name], to, message, air.now))
+    do: act(air, name, Protocol.speak(air.stations[name], to, message, time(air, name)))
 
   @doc "A datagram from outside."
   def inject(air, name, datagram, address \\ {{10, 9, 9, 9}, 1}),
-    do: act(air, name, Protocol.hear(air.stations[name], datagram, address, air.now))
+    do: act(air, name, Protocol.hear(air.stations[name], datagram, address, time(air, name)))
 
   defp arrive({_at, from, to, datagram}, air) do
     case air.stations do
       %{^to => protocol} ->
-        act(air, to, Protocol.hear(protocol, datagram, air.addresses[from], air.now))
+        act(air, to, Protocol.hear(protocol, datagram, air.addresses[from], time(air, to)))
 
       _off ->
         air

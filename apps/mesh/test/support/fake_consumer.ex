@@ -9,6 +9,9 @@ defmodule Mesh.FakeConsumer do
   @impl Mesh.Consumer
   def services, do: %{rows: {__MODULE__, :serve, [:rows]}, stop: {__MODULE__, :serve, [:stop]}}
 
+  @impl Mesh.Consumer
+  def late, do: [:stop]
+
   @doc "Takes a service's term."
   def serve(service, node, term), do: tell({service, node, term})
 

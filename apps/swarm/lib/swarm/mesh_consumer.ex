@@ -22,6 +22,9 @@ defmodule Swarm.MeshConsumer do
   end
 
   @impl Mesh.Consumer
+  def late, do: [:stop]
+
+  @impl Mesh.Consumer
   def read(term) do
     case Message.check(term) do
       {:ok, message} -> {:ok, message, %{robots: authors(message), beat: beat(message)}}

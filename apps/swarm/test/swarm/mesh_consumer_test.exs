@@ -26,6 +26,9 @@ defmodule Swarm.MeshConsumerTest do
 
     for {_service, {m, f, a}} <- services,
         do: assert(function_exported?(m, f, length(a) + 2))
+
+    # Nothing else may be old.
+    assert MeshConsumer.late() == [:stop]
   end
 
   test "messages and commands reach the comms process of a robot, and no other" do

@@ -3,15 +3,19 @@ defmodule Mesh.Protocol.Admission do
   What becomes of a packet that is signed, of the fleet and of sense: taken, answered or refused.
   Pure.
 
-  A stranger, whose session this node does not know, gets a beacon that tells it its session, and
-  so asks for its word (`Mesh.Protocol.Packet.ReplayProtection`).
+  It is refused if it comes from an address that its sender does not name as its own: somebody has
+  forwarded it. A sender whose session or clock this node does not know is challenged
+  (`Mesh.Protocol.Challenge`). Terms of the services that the consumer accepts late, such as a
+  stop, are taken in both cases, if the session was once accepted.
   """
   alias Mesh.Protocol
   alias Mesh.Protocol.{Beacon, NodeTable, Outbox, Packet, Rejections, Roster}
   alias Mesh.Protocol.Packet.ReplayProtection
 
-  # An answer to a stranger, no more often than this for each.
-  @answer_ms 20
+  # A challenge to an address of a node, no more often than this, once because it is heard and once
+  # because it asks, and to so many of them: whoever replays datagrams of strangers gains nothing.
+  @challenge_ms 20
+  @most_challenged 1_000
 
   @doc "Takes a packet that the filter has read, if it was made now; or counts why not."
   @spec admit(
@@ -23,23 +27,20 @@ defmodule Mesh.Protocol.Admission do
           integer()
         ) :: {Protocol.t(), [Protocol.effect()]}
   def admit(protocol, packet, node, body, address, now_ms) do
-    told =
-      with %Beacon{sessions: sessions} <- body,
-           {_name, session} <- List.keyfind(sessions, protocol.name, 0),
-           do: session,
-           else: (_none -> nil)
+    if address in packet.addresses,
+      do: judge(protocol, packet, node, body, address, now_ms),
+      else: take_late(protocol, packet, node, body, {:foreign, packet.sender}, address, now_ms)
+  end
 
-    admitted =
-      ReplayProtection.admit(
-        protocol.guard,
-        packet.sender,
-        packet.session,
-        packet.sequence,
-        told,
-        now_ms
-      )
+  @doc "Time: forgets whom it challenged a while ago."
+  @spec tick(Protocol.t(), integer()) :: Protocol.t()
+  def tick(protocol, now_ms) do
+    lately = fn {_whom, at_ms} -> now_ms - at_ms < @challenge_ms end
+    %{protocol | challenged: Map.filter(protocol.challenged, lately)}
+  end
 
-    case admitted do
+  defp judge(protocol, packet, node, body, address, now_ms) do
+    case ReplayProtection.admit(protocol.guard, packet, echo(body), now_ms) do
       {:ok, guard} ->
         new? = ReplayProtection.session(protocol.guard, packet.sender) != packet.session
 
@@ -51,15 +52,37 @@ defmodule Mesh.Protocol.Admission do
 
         # Those who have just been let in need this node's word as soon.
         {protocol, sent} =
-          if new?, do: answer(protocol, packet, address, now_ms), else: {protocol, []}
+          if new?, do: Outbox.beacon(protocol, now_ms, [address]), else: {protocol, []}
 
         {protocol, Roster.changes(protocol.roster, changes) ++ taken ++ sent}
 
       {:error, :stranger, guard} ->
-        answer(%{protocol | guard: guard}, packet, address, now_ms)
+        challenge(%{protocol | guard: guard}, packet, body, address, now_ms)
+
+      {:error, :stale, guard} ->
+        {protocol, taken} =
+          take_late(%{protocol | guard: guard}, packet, node, body, :stale, address, now_ms)
+
+        {protocol, sent} = challenge(protocol, packet, body, address, now_ms)
+        {protocol, taken ++ sent}
 
       {:error, reason, guard} ->
         Rejections.reject(%{protocol | guard: guard}, reason, address)
+    end
+  end
+
+  defp echo({kind, echo}) when kind in [:challenge, :answer], do: echo
+  defp echo(_other), do: nil
+
+  # What is taken at any age, and from anywhere; all else is rejected for that reason.
+  defp take_late(protocol, packet, node, body, why, address, now_ms) do
+    with {:service, service, _term} <- body,
+         true <- service in protocol.late,
+         {:ok, guard} <- ReplayProtection.admit_late(protocol.guard, packet, now_ms) do
+      take(%{protocol | guard: guard}, packet, node, body, address, now_ms)
+    else
+      {:error, reason, guard} -> Rejections.reject(%{protocol | guard: guard}, reason, address)
+      _not_late -> Rejections.reject(protocol, why, address)
     end
   end
 
@@ -91,20 +114,27 @@ defmodule Mesh.Protocol.Admission do
      [{:beat, from, node, beat}, {:deliver, :all, node, message}]}
   end
 
+  defp take(protocol, _packet, node, {:service, service, term}, _address, _now_ms),
+    do: {protocol, [{:serve, service, node, term}]}
+
+  defp take(protocol, packet, _node, {:challenge, _echo}, address, now_ms),
+    do: Outbox.clock(protocol, :answer, {packet.session, packet.time_ms}, [address], now_ms)
+
+  defp take(protocol, _packet, _node, {:answer, _echo}, _address, _now_ms), do: {protocol, []}
+
   defp take(protocol, _packet, node, {to, message, _about}, _address, _now_ms),
     do: {protocol, [{:deliver, to, node, message}]}
 
-  defp take(protocol, _packet, node, {service, term}, _address, _now_ms),
-    do: {protocol, [{:serve, service, node, term}]}
+  # Who cannot be believed yet may challenge this node, too, and then gets both in one.
+  defp challenge(protocol, packet, body, address, now_ms) do
+    asks? = match?({:challenge, _echo}, body)
+    echo = if asks?, do: {packet.session, packet.time_ms}
+    whom = {asks?, packet.sender, address}
+    last_ms = Map.get(protocol.challenged, whom, now_ms - @challenge_ms)
 
-  # A beacon that tells the stranger its session, and so asks for its word.
-  defp answer(protocol, packet, address, now_ms) do
-    node_table = NodeTable.claim(protocol.node_table, packet.sender, packet.session)
-    protocol = %{protocol | node_table: node_table}
-
-    if now_ms - Map.get(protocol.answered, packet.sender, now_ms - @answer_ms) >= @answer_ms do
-      protocol = put_in(protocol.answered[packet.sender], now_ms)
-      Outbox.beacon(protocol, now_ms, [address])
+    if now_ms - last_ms >= @challenge_ms and map_size(protocol.challenged) < @most_challenged do
+      protocol = put_in(protocol.challenged[whom], now_ms)
+      Outbox.clock(protocol, :challenge, echo, [address], now_ms)
     else
       {protocol, []}
     end

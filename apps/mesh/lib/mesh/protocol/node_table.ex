@@ -20,7 +20,7 @@ defmodule Mesh.Protocol.NodeTable do
   @beacon_ms 1_000
 
   @enforce_keys [:me]
-  defstruct @enforce_keys ++ [nodes: %{}, leads: %{}, claims: %{}, told: %{}, number: 0]
+  defstruct @enforce_keys ++ [nodes: %{}, leads: %{}, number: 0]
 
   @type name :: String.t()
   @type status :: :alive | :suspect | :gone
@@ -38,8 +38,6 @@ defmodule Mesh.Protocol.NodeTable do
           me: name(),
           nodes: %{name() => entry()},
           leads: %{name() => {Mesh.Strategy.address(), Backoff.t()}},
-          claims: %{name() => non_neg_integer()},
-          told: %{name() => non_neg_integer()},
           number: non_neg_integer()
         }
 
@@ -47,7 +45,10 @@ defmodule Mesh.Protocol.NodeTable do
   @spec new(name()) :: t()
   def new(me), do: %__MODULE__{me: me}
 
-  @doc "Notes that a node was heard from this address. Returns what has changed."
+  @doc """
+  Notes that a fresh datagram of a node was heard from this address, which that datagram names as
+  one of the node's own. Returns what has changed.
+  """
   @spec hear(t(), name(), Mesh.Strategy.address(), integer()) :: {t(), [{:up, name()}]}
   def hear(%{me: me} = node_table, me, _address, _now_ms), do: {node_table, []}
 
@@ -76,25 +77,14 @@ defmodule Mesh.Protocol.NodeTable do
     end
   end
 
-  @doc """
-  Notes the session that a signed packet of this name claims; the packet may be an old recording.
-  """
-  @spec claim(t(), name(), non_neg_integer()) :: t()
-  def claim(node_table, name, session),
-    do: %{node_table | claims: Map.put(node_table.claims, name, session)}
-
   @doc "Takes in a beacon of an admitted node: the nodes that it hears and is connected to."
   @spec beacon(t(), name(), Mesh.Protocol.Beacon.t(), integer()) :: t()
   def beacon(node_table, name, beacon, now_ms) do
-    told = Map.delete(Map.new(beacon.sessions), node_table.me)
-
     case node_table.nodes do
       %{^name => entry} ->
         hears = for {name, _address} <- beacon.hears, do: name
         entry = %{entry | hears: hears, links: beacon.links, port: beacon.port}
-        told = Map.merge(node_table.told, told)
         node_table = put(node_table, name, entry)
-        node_table = if map_size(told) <= @most, do: %{node_table | told: told}, else: node_table
         Enum.reduce(beacon.hears, node_table, &lead(&2, &1, now_ms))
 
       _rival_of_this_name ->
@@ -134,22 +124,6 @@ defmodule Mesh.Protocol.NodeTable do
       _rival ->
         node_table
     end
-  end
-
-  @doc """
-  The sessions for a beacon: those of admitted nodes, of nodes that ask for it, and, for nodes
-  that are not heard here, those that others report.
-  """
-  @spec sessions(t(), let_in :: %{name() => non_neg_integer()}, integer()) ::
-          [{name(), non_neg_integer()}]
-  def sessions(node_table, let_in, now_ms) do
-    alive = Map.filter(let_in, fn {name, _} -> status(node_table, name, now_ms) == :alive end)
-
-    node_table.told
-    |> Map.merge(let_in)
-    |> Map.merge(node_table.claims)
-    |> Map.merge(alive)
-    |> Enum.sort()
   end
 
   @doc "The state of a node, judged by its silence."
@@ -239,7 +213,10 @@ defmodule Mesh.Protocol.NodeTable do
     end
   end
 
-  @doc "The addresses of all nodes that are not gone."
+  @doc """
+  The addresses of all nodes that are not gone: each was shown to be the node's own by a signed and
+  fresh datagram.
+  """
   @spec addresses(t()) :: [Mesh.Strategy.address()]
   def addresses(node_table),
     do: for({_name, %{status: status, address: a}} <- node_table.nodes, status != :gone, do: a)

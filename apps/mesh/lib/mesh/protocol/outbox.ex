@@ -1,58 +1,74 @@
 defmodule Mesh.Protocol.Outbox do
   @moduledoc """
-  What a node sends: terms as signed datagrams, each with the next number of its session. Pure.
+  What a node sends: signed datagrams, each with the next number of its session, the time and its
+  own addresses. Pure.
   """
   alias Mesh.Protocol
-  alias Mesh.Protocol.{Beacon, NodeTable, Packet, Rejections}
-  alias Mesh.Protocol.Packet.ReplayProtection
+  alias Mesh.Protocol.{Beacon, Challenge, NodeTable, Packet, Rejections}
 
-  @doc "A beacon for these addresses: who is heard here, in which session, and who is connected."
+  @doc "A beacon for these addresses: who is heard here, and who is connected."
   @spec beacon(Protocol.t(), integer(), [Protocol.address()]) ::
           {Protocol.t(), [Protocol.effect()]}
   def beacon(protocol, _now_ms, []), do: {protocol, []}
 
   def beacon(protocol, now_ms, addresses) do
     beacon = %Beacon{
-      sessions:
-        NodeTable.sessions(protocol.node_table, ReplayProtection.sessions(protocol.guard), now_ms),
       hears: NodeTable.hears(protocol.node_table, now_ms),
       links: protocol.links,
       port: protocol.port
     }
 
-    seal(protocol, :beacon, Beacon.term(beacon), addresses)
+    seal(protocol, :beacon, Beacon.term(beacon), addresses, now_ms)
+  end
+
+  @doc """
+  A challenge, or only an answer, for these addresses; `echo` is the challenge that it answers.
+  """
+  @spec clock(
+          Protocol.t(),
+          :challenge | :answer,
+          Challenge.echo() | nil,
+          [Protocol.address()],
+          integer()
+        ) :: {Protocol.t(), [Protocol.effect()]}
+  def clock(protocol, _kind, _echo, [], _now_ms), do: {protocol, []}
+
+  def clock(protocol, kind, echo, addresses, now_ms) do
+    packet = packet(protocol, kind, Challenge.payload(echo), now_ms)
+    sign(protocol, %{packet | payload: packet.payload <> Packet.padding(packet)}, addresses)
   end
 
   @doc """
   A term for these addresses. It is sealed once: who hears it twice, by multicast and by name,
   counts it once. What is too large for a datagram is counted as rejected.
   """
-  @spec seal(Protocol.t(), Packet.kind(), term(), [Protocol.address()]) ::
+  @spec seal(Protocol.t(), :beacon | :message | :service, term(), [Protocol.address()], integer()) ::
           {Protocol.t(), [Protocol.effect()]}
-  def seal(protocol, _kind, _term, []), do: {protocol, []}
+  def seal(protocol, _kind, _term, [], _now_ms), do: {protocol, []}
 
-  def seal(protocol, kind, term, addresses) do
+  def seal(protocol, kind, term, addresses, now_ms) do
     payload = Packet.pack(term)
 
-    if byte_size(payload) > Packet.largest() do
-      Rejections.reject(protocol, :too_big, nil)
-    else
-      sequence = protocol.sequence + 1
+    if byte_size(payload) > Packet.largest(),
+      do: Rejections.reject(protocol, :too_big, nil),
+      else: sign(protocol, packet(protocol, kind, payload, now_ms), addresses)
+  end
 
-      datagram =
-        Packet.seal(
-          %Packet{
-            sender: protocol.name,
-            session: protocol.session,
-            sequence: sequence,
-            kind: kind,
-            payload: payload
-          },
-          protocol.secret.key
-        )
+  defp packet(protocol, kind, payload, now_ms) do
+    %Packet{
+      sender: protocol.name,
+      session: protocol.session,
+      sequence: protocol.sequence + 1,
+      time_ms: now_ms,
+      addresses: protocol.addresses,
+      kind: kind,
+      payload: payload
+    }
+  end
 
-      sends = for address <- Enum.uniq(addresses), do: {:send, address, datagram}
-      {%{protocol | sequence: sequence}, sends}
-    end
+  defp sign(protocol, packet, addresses) do
+    datagram = Packet.seal(packet, protocol.secret.key)
+    sends = for address <- Enum.uniq(addresses), do: {:send, address, datagram}
+    {%{protocol | sequence: packet.sequence}, sends}
   end
 end

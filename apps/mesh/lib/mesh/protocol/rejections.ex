@@ -1,13 +1,16 @@
 defmodule Mesh.Protocol.Rejections do
   @moduledoc """
-  Counts what a node refuses, by reason, and in each second what nobody of the fleet has signed,
-  by which `Mesh.Protocol.Packet.Filter` knows a flood. Pure.
+  Counts what a node refuses, by reason, and in each second what nobody of the fleet has sent, by
+  which `Mesh.Protocol.Packet.Filter` knows a flood. Pure.
   """
   alias Mesh.Protocol
   alias Mesh.Protocol.Packet
   alias Mesh.Protocol.Packet.ReplayProtection
 
-  @doc "Time: each second begins to count anew what nobody of the fleet has signed."
+  # What anybody may send, and not only nodes of the fleet from their own addresses.
+  @strange [:unsigned, :not_ours, :version, :foreign]
+
+  @doc "Time: each second begins to count anew what nobody of the fleet has sent."
   @spec tick(Protocol.t(), integer()) :: Protocol.t()
   def tick(protocol, now_ms), do: count(protocol, div(now_ms, 1_000))
 
@@ -16,24 +19,33 @@ defmodule Mesh.Protocol.Rejections do
 
   @doc """
   Counts a datagram that was refused. One of an unknown node is signed, so that is one of ours
-  that somebody forgot to write down: it is told, once for each count of a hundred.
+  that somebody forgot to write down: it is told, once for each count of a hundred. One that comes
+  from a foreign address may have been changed by a router on the way: it is told at the first, the
+  tenth, the hundredth, so that an attacker does not fill the log.
   """
   @spec reject(
           Protocol.t(),
-          Packet.Filter.refusal() | ReplayProtection.refusal() | :unknown_node | :too_big,
+          Packet.Filter.refusal()
+          | ReplayProtection.refusal()
+          | {:foreign, String.t()}
+          | :too_big,
           Protocol.address() | nil
         ) :: {Protocol.t(), [Protocol.effect()]}
-  def reject(protocol, {:unknown_node, name}, address) do
-    {protocol, effects} = reject(protocol, :unknown_node, address)
+  def reject(protocol, {reason, name}, address) do
+    {protocol, effects} = reject(protocol, reason, address)
 
-    if rem(protocol.rejected.unknown_node, 100) == 1,
-      do: {protocol, [{:event, :unknown_node, %{name: name, address: address}} | effects]},
+    if told?(reason, protocol.rejected[reason]),
+      do: {protocol, [{:event, reason, %{name: name, address: address}} | effects]},
       else: {protocol, effects}
   end
 
   def reject(protocol, reason, _address) do
-    strange = if reason in [:unsigned, :not_ours, :version], do: 1, else: 0
+    strange = if reason in @strange, do: 1, else: 0
     rejected = Map.update(protocol.rejected, reason, 1, &(&1 + 1))
     {%{protocol | rejected: rejected, strange: protocol.strange + strange}, []}
   end
+
+  defp told?(:unknown_node, count), do: rem(count, 100) == 1
+  defp told?(:foreign, 1), do: true
+  defp told?(:foreign, count), do: rem(count, 10) == 0 and told?(:foreign, div(count, 10))
 end

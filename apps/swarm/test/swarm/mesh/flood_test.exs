@@ -40,8 +40,10 @@ defmodule Swarm.Mesh.FloodTest do
           sender: "#{two.node}",
           session: 7,
           sequence: 7,
+          time_ms: 7,
+          addresses: [{{127, 0, 0, 1}, 4370}],
           kind: :beacon,
-          payload: Packet.pack({[], [], [], 0})
+          payload: Packet.pack({[], [], 0})
         },
         "not this fleet's key"
       )
@@ -50,7 +52,7 @@ defmodule Swarm.Mesh.FloodTest do
       for n <- 1..datagrams do
         case rem(n, 4) do
           0 -> send.(foreign)
-          1 -> send.(<<"CVY", 1, 1, 5, "abcde", n::64, n::64, 0::128, n::128>>)
+          1 -> send.(<<"CVY", 2, 1, 5, "abcde", n::64, n::64, n::64, 0, 0::128, n::128>>)
           _ -> send.(:rand.bytes(1 + rem(n, 700)))
         end
       end

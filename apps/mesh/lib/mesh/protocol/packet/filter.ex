@@ -1,10 +1,10 @@
 defmodule Mesh.Protocol.Packet.Filter do
   @moduledoc """
   Checks a datagram before it changes anything: whether it is new, signed, of the fleet and makes
-  sense. Pure. `Mesh.Protocol.Packet.ReplayProtection` checks whether it was made now.
+  sense. Pure. Whether it was made now, and by whom it was sent, `Mesh.Protocol.Admission` checks.
   """
   alias Mesh.Consumer
-  alias Mesh.Protocol.{Beacon, NodeTable, Packet, Roster, WireTerm}
+  alias Mesh.Protocol.{Beacon, Challenge, NodeTable, Packet, Roster, WireTerm}
   alias Mesh.Protocol.Packet.ReplayProtection
 
   # The number of datagrams of unknown origin that are checked per second.
@@ -13,7 +13,8 @@ defmodule Mesh.Protocol.Packet.Filter do
   @type body ::
           Beacon.t()
           | {:all | [atom()], message :: term(), Consumer.about()}
-          | {service :: atom(), term()}
+          | {:challenge | :answer, Challenge.echo() | nil}
+          | {:service, service :: atom(), term()}
   @type refusal ::
           Packet.refusal()
           | Packet.kind()
@@ -35,8 +36,7 @@ defmodule Mesh.Protocol.Packet.Filter do
          {:ok, packet} <- Packet.open(datagram, protocol.secret.key),
          :ok <- foreign(packet, protocol),
          {:ok, node} <- known(packet.sender, protocol.roster),
-         {:ok, term} <- Packet.unpack(packet.payload),
-         {:ok, body} <- body(packet.kind, term, protocol) do
+         {:ok, body} <- content(packet, protocol) do
       {:ok, packet, node, body}
     end
   end
@@ -69,6 +69,17 @@ defmodule Mesh.Protocol.Packet.Filter do
 
   defp original(:error, _guard), do: :ok
 
+  defp content(%{kind: kind, payload: payload}, _protocol) when kind in [:challenge, :answer] do
+    case Challenge.read(payload) do
+      {:ok, echo} -> {:ok, {kind, echo}}
+      :error -> {:error, kind}
+    end
+  end
+
+  defp content(packet, protocol) do
+    with {:ok, term} <- Packet.unpack(packet.payload), do: body(packet.kind, term, protocol)
+  end
+
   defp body(:beacon, term, protocol) do
     case Beacon.check(term) do
       {:ok, beacon} -> {:ok, Beacon.known(beacon, protocol.roster.nodes)}
@@ -89,7 +100,7 @@ defmodule Mesh.Protocol.Packet.Filter do
 
   defp body(:service, {service, term}, protocol) do
     if service in protocol.services,
-      do: {:ok, {service, term}},
+      do: {:ok, {:service, service, term}},
       else: {:error, :service}
   end
 

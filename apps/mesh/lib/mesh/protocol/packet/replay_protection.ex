@@ -1,17 +1,20 @@
 defmodule Mesh.Protocol.Packet.ReplayProtection do
   @moduledoc """
-  Decides which nodes are admitted: a signature proves that a datagram was made by the fleet, this
-  module that it was made now. Pure.
+  Decides which datagrams are believed: a signature proves that a datagram was made by the fleet,
+  this module that it was made now, and is heard for the first time. Pure.
 
-  Every node draws a random session number at its start. A listener accepts a session only when a
-  beacon of it contains the listener's own session, which an old recording cannot contain. Within
-  a session a window of sequence numbers keeps out what was heard before: a datagram counts once,
-  and one that is 1,024 behind the newest not at all.
+  Every node draws a random session number at its start. A listener accepts a session only by an
+  answer to a challenge of its own (`Mesh.Protocol.Challenge`), which no recording can contain,
+  and which tells it how the clock of that session stands. From then on each datagram of the
+  session must be fresh by that clock (`Mesh.Protocol.ClockOffset`): one that was recorded and
+  never received is worthless 2 s later. A window of sequence numbers keeps out what was heard
+  before: a datagram counts once, and one that is 1,024 behind the newest not at all.
 
   A session that was followed by another is never accepted again. While a node is heard, no other
   session of its name is admitted, so two nodes of the same name do not take turns.
   """
   import Bitwise
+  alias Mesh.Protocol.{Challenge, ClockOffset}
 
   @width 1_024
   @full (1 <<< @width) - 1
@@ -24,6 +27,7 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
 
   @typep sender :: %{
            session: non_neg_integer() | nil,
+           clock: ClockOffset.t() | nil,
            top: non_neg_integer(),
            seen: non_neg_integer(),
            heard_ms: integer(),
@@ -32,40 +36,63 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
            count: non_neg_integer()
          }
   @type t :: %__MODULE__{session: non_neg_integer(), senders: %{String.t() => sender()}}
-  @type refusal :: :stranger | :doubled | :replayed | :too_fast
+  @typedoc "What is looked at of a datagram (`Mesh.Protocol.Packet`)."
+  @type stamp :: %{
+          required(:sender) => String.t(),
+          required(:session) => non_neg_integer(),
+          required(:sequence) => non_neg_integer(),
+          required(:time_ms) => integer(),
+          optional(atom()) => term()
+        }
+  @type refusal :: :stranger | :stale | :doubled | :replayed | :too_fast
 
   @doc "The state of a node with this session; no node is admitted yet."
   @spec new(session :: non_neg_integer()) :: t()
   def new(session), do: %__MODULE__{session: session}
 
   @doc """
-  Judges a datagram of a known name. `told` is the session of this node according to a beacon,
-  `nil` if the beacon has none, and for all datagrams that are not beacons.
+  Judges a datagram of a known name. `echo` is the challenge that it answers, if it answers one.
+  A `:stranger`, and who sends what is `:stale`, should be challenged: of the first the session is
+  not known, of the second perhaps the clock has changed.
 
       iex> alias Mesh.Protocol.Packet.ReplayProtection
+      iex> stamp = fn sequence, time_ms -> %{sender: "min1@lab", session: 99, sequence: sequence, time_ms: time_ms} end
       iex> guard = ReplayProtection.new(7)
-      iex> {:error, :stranger, guard} = ReplayProtection.admit(guard, "min1@lab", 99, 1, nil, 0)
-      iex> {:ok, guard} = ReplayProtection.admit(guard, "min1@lab", 99, 2, 7, 10)
-      iex> {:ok, guard} = ReplayProtection.admit(guard, "min1@lab", 99, 3, nil, 20)
-      iex> {:error, :doubled, _guard} = ReplayProtection.admit(guard, "min1@lab", 99, 3, nil, 30)
+      iex> {:error, :stranger, guard} = ReplayProtection.admit(guard, stamp.(1, 5_000), nil, 0)
+      iex> {:ok, guard} = ReplayProtection.admit(guard, stamp.(2, 5_010), {7, 0}, 20)
+      iex> {:ok, guard} = ReplayProtection.admit(guard, stamp.(3, 5_020), nil, 30)
+      iex> {:error, :doubled, guard} = ReplayProtection.admit(guard, stamp.(3, 5_020), nil, 40)
+      iex> {:error, :stale, _guard} = ReplayProtection.admit(guard, stamp.(4, 5_040), nil, 3_000)
   """
-  @spec admit(
-          t(),
-          String.t(),
-          non_neg_integer(),
-          non_neg_integer(),
-          non_neg_integer() | nil,
-          integer()
-        ) :: {:ok, t()} | {:error, refusal(), t()}
-  def admit(%__MODULE__{} = guard, name, session, sequence, told, now_ms) do
+  @spec admit(t(), stamp(), Challenge.echo() | nil, integer()) ::
+          {:ok, t()} | {:error, refusal(), t()}
+  def admit(%__MODULE__{} = guard, stamp, echo, now_ms) do
+    %{sender: name, session: session} = stamp
     sender = Map.get(guard.senders, name) || stranger(now_ms)
+    measured = measure(guard, stamp, echo, now_ms)
 
     cond do
-      sender.session == session -> counted(guard, name, sender, sequence, now_ms)
-      told != guard.session -> {:error, :stranger, guard}
+      sender.session == session -> known(guard, stamp, sender, measured, now_ms)
       session in sender.retired -> {:error, :replayed, guard}
+      measured == :error -> {:error, :stranger, guard}
       alive?(sender, now_ms) -> {:error, :stranger, guard}
-      true -> counted(guard, name, begin(sender, session, sequence, now_ms), sequence, now_ms)
+      true -> known(guard, stamp, begin(sender, stamp, now_ms), measured, now_ms)
+    end
+  end
+
+  @doc """
+  Judges a datagram that is taken however old it is: of an accepted session, for the first time. It
+  does not show that its sender is there.
+  """
+  @spec admit_late(t(), stamp(), integer()) :: {:ok, t()} | {:error, refusal(), t()}
+  def admit_late(guard, %{sender: name, session: session} = stamp, now_ms) do
+    case guard.senders do
+      %{^name => %{session: ^session, heard_ms: heard_ms} = sender} ->
+        with {:ok, guard} <- counted(guard, stamp, sender, now_ms),
+             do: {:ok, put_in(guard.senders[name].heard_ms, heard_ms)}
+
+      _unknown ->
+        {:error, :stranger, guard}
     end
   end
 
@@ -90,13 +117,19 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
     end
   end
 
-  @doc "The accepted sessions now, by name."
-  @spec sessions(t()) :: %{String.t() => non_neg_integer()}
-  def sessions(guard), do: for({name, %{session: s}} <- guard.senders, into: %{}, do: {name, s})
+  @doc "Whether it is time to challenge this node again: what is known of its clock has grown old."
+  @spec due?(t(), String.t(), integer()) :: boolean()
+  def due?(guard, name, now_ms) do
+    case guard.senders do
+      %{^name => %{clock: clock}} -> ClockOffset.due?(clock, now_ms)
+      _unknown -> false
+    end
+  end
 
   defp stranger(now_ms) do
     %{
       session: nil,
+      clock: nil,
       top: 0,
       seen: 0,
       heard_ms: now_ms - @alive_ms,
@@ -106,18 +139,35 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
     }
   end
 
+  # Only an answer to this life of this node counts.
+  defp measure(%{session: own}, stamp, {own, asked_ms}, now_ms),
+    do: ClockOffset.measure(asked_ms, stamp.time_ms, now_ms)
+
+  defp measure(_guard, _stamp, _none, _now_ms), do: :error
+
   defp alive?(%{session: nil}, _now_ms), do: false
   defp alive?(%{heard_ms: heard_ms}, now_ms), do: now_ms - heard_ms < @alive_ms
 
   # Everything before the first admitted datagram counts as heard, because some of it was rejected
   # and may have been recorded.
-  defp begin(sender, session, sequence, now_ms) do
+  defp begin(sender, %{session: session, sequence: sequence}, now_ms) do
     retired = Enum.take(List.wrap(sender.session) ++ sender.retired, @most_retired)
 
     %{stranger(now_ms) | session: session, retired: retired, top: sequence - 1, seen: @full}
   end
 
-  defp counted(guard, name, sender, sequence, now_ms) do
+  # An answer is fresh by itself. The newest measurement is the right one: after a computer was
+  # suspended, older ones are wrong.
+  defp known(guard, stamp, sender, {:ok, clock}, now_ms),
+    do: counted(guard, stamp, %{sender | clock: clock}, now_ms)
+
+  defp known(guard, stamp, sender, :error, now_ms) do
+    if ClockOffset.fresh?(sender.clock, stamp.time_ms, now_ms),
+      do: counted(guard, stamp, sender, now_ms),
+      else: {:error, :stale, guard}
+  end
+
+  defp counted(guard, %{sender: name, sequence: sequence}, sender, now_ms) do
     second = div(now_ms, 1_000)
     count = if second == sender.second, do: sender.count + 1, else: 1
 
