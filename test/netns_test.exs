@@ -236,6 +236,34 @@ defmodule System.NetnsTest do
     lawful(fleet, "20 % loss", begun, start_led: led, start_formed: formed)
   end
 
+  test "a robot that gets another address goes on where it is, and is commanded there", %{
+    fleet: fleet
+  } do
+    begun = start(fleet)
+    formed(fleet, begun)
+    [moved | _] = @all -- [leader(fleet)]
+    at = Fleet.cut(fleet, [@all], &Net.move(&1, moved))
+    others = @all -- [moved]
+    address = Net.moved(Fleet.net(fleet), moved)
+
+    # Its connections are dead, as a release finds out after 8 s (net_ticktime); then come new ones.
+    for robot <- others do
+      Fleet.call(fleet, robot, :erlang, :disconnect_node, [:"#{moved}@convoy"])
+      Fleet.call(fleet, moved, :erlang, :disconnect_node, [:"#{robot}@convoy"])
+    end
+
+    Fleet.await(fleet, "it is connected by its new address", @patience_ms, fn _lines ->
+      Enum.all?(others, &(Fleet.call(fleet, &1, Netns.Connection, :address, [moved]) == address))
+    end)
+
+    for from <- others,
+        do: assert(%{from: :robot} = Fleet.call(fleet, from, Swarm, :status, [moved]))
+
+    assert told(fleet, :view, at) == []
+    assert changes(fleet, at) == []
+    lawful(fleet, "another address", begun, [])
+  end
+
   test "an e-stop in a cut reaches all that are reachable, and the others once healed", %{
     fleet: fleet
   } do

@@ -145,7 +145,8 @@ defmodule Netns.Fleet do
   end
 
   defp node(net, robot) do
-    flags = Vm.fleet_flags(Net.address(net, robot)) ++ @flags ++ ["-setcookie", net.prefix]
+    # On all addresses, for they may change.
+    flags = Vm.fleet_flags({0, 0, 0, 0}) ++ @flags ++ ["-setcookie", net.prefix]
     through = ["ip", "netns", "exec", Net.space(net, robot)]
     [name: robot, host: "convoy", flags: flags, through: through]
   end
@@ -155,14 +156,14 @@ defmodule Netns.Fleet do
         do: {:module, _} = Vm.call(node, :code, :load_binary, [module, ~c"test", code])
 
     missions = Application.fetch_env!(:swarm, :missions)
-    mesh = mesh(s.net, robot, Net.address(s.net, robot))
+    mesh = mesh(s.net, robot)
     # Together, so that the missions are there when the mesh begins: it must know their atoms.
     config = [logger: [level: :none], swarm: [missions: missions, mesh: mesh]]
     :ok = Vm.start_apps(node, [:sim], config)
     :ok = Vm.call(node, Netns.Robot, :start, [robot, poses, s.folder], @boot_ms)
   end
 
-  defp mesh(net, robot, address) do
+  defp mesh(net, robot) do
     secret = %Secret{
       path: "",
       key: :crypto.hash(:sha256, net.prefix),
@@ -171,6 +172,6 @@ defmodule Netns.Fleet do
     }
 
     port = Epmd.default_port(Atom.to_string(robot))
-    [secret: secret, fleet: net.robots, interface: address, dist_port: port]
+    [secret: secret, fleet: net.robots, dist_port: port]
   end
 end

@@ -132,6 +132,19 @@ defmodule Netns.Net do
     :ok
   end
 
+  @doc "Gives a robot another address, as a server of addresses might, and takes the one that it has."
+  @spec move(t(), atom()) :: :ok
+  def move(net, robot) do
+    there = space(net, robot)
+    ip(~w(-n #{there} addr flush dev eth0))
+    ip(~w(-n #{there} addr add #{text(moved(net, robot))}/24 dev eth0))
+    ip(~w(-n #{there} route replace 224.0.0.0/4 dev eth0))
+  end
+
+  @doc "The address of a robot that has moved."
+  @spec moved(t(), atom()) :: :inet.ip4_address()
+  def moved(net, robot), do: {10, 77, 0, 100 + number(net, robot)}
+
   @doc "Loses this share of all packets."
   @spec lose(t(), float()) :: :ok
   def lose(net, share) do

@@ -214,6 +214,23 @@ defmodule Netns.Robot do
   end
 end
 
+defmodule Netns.Connection do
+  @moduledoc "What Erlang says of a connection between nodes."
+
+  @doc "The address that a robot's node is connected from, or at; `nil` if it is not."
+  def address(robot) do
+    node = :"#{robot}@convoy"
+
+    with true <- node in Node.list(),
+         {:ok, info} <- :net_kernel.node_info(node),
+         {:net_address, {ip, _port}, _host, _protocol, _family} <- info[:address] do
+      ip
+    else
+      _not_connected -> nil
+    end
+  end
+end
+
 defmodule Netns.Order do
   @moduledoc "An order in two steps, as `Swarm.Commands.Client` gives it, so that the network may be cut between them."
   alias Mesh.Nonblocking
