@@ -57,7 +57,8 @@ defmodule Mesh.Protocol.Admission do
         {protocol, Roster.changes(protocol.roster, changes) ++ taken ++ sent}
 
       {:error, :stranger, guard} ->
-        challenge(%{protocol | guard: guard}, packet, body, address, now_ms)
+        protocol = Rejections.strange(%{protocol | guard: guard})
+        challenge(protocol, packet, body, address, now_ms)
 
       {:error, :stale, guard} ->
         {protocol, taken} =

@@ -45,6 +45,10 @@ defmodule Mesh.Protocol.Rejections do
     {%{protocol | rejected: rejected, strange: protocol.strange + strange}, []}
   end
 
+  @doc "Counts a datagram of a session that is not known: anybody may have recorded it."
+  @spec strange(Protocol.t()) :: Protocol.t()
+  def strange(protocol), do: %{protocol | strange: protocol.strange + 1}
+
   defp told?(:unknown_node, count), do: rem(count, 100) == 1
   defp told?(:foreign, 1), do: true
   defp told?(:foreign, count), do: rem(count, 10) == 0 and told?(:foreign, div(count, 10))

@@ -13,7 +13,9 @@ defmodule Swarm.Mesh.FloodTest do
     %{port: port} = MeshNodes.call(one, Mesh, :counts, [])
     {:ok, socket} = :gen_udp.open(0, [:binary, active: false, ip: {127, 0, 0, 1}])
     assert eventually(fn -> hears?(one, two) end)
-    %{one: one, two: two, send: &:gen_udp.send(socket, {127, 0, 0, 1}, port, &1)}
+    {:ok, own_port} = :inet.port(socket)
+    send = &:gen_udp.send(socket, {127, 0, 0, 1}, port, &1)
+    %{one: one, two: two, send: send, socket: socket, address: {{127, 0, 0, 1}, own_port}}
   end
 
   defp hears?(one, two) do
@@ -32,26 +34,39 @@ defmodule Swarm.Mesh.FloodTest do
     }
   end
 
+  # How many came back, and the size of the largest.
+  defp answers(socket, counted \\ {0, 0}) do
+    case :gen_udp.recv(socket, 0, 0) do
+      {:ok, {_ip, _port, datagram}} ->
+        {count, size} = counted
+        answers(socket, {count + 1, max(size, byte_size(datagram))})
+
+      {:error, :timeout} ->
+        counted
+    end
+  end
+
   test "with garbage, replayed and foreign packets nothing crashes, nothing grows, the robot ticks on",
-       %{one: one, two: two, send: send} do
-    foreign =
-      Packet.seal(
-        %Packet{
-          sender: "#{two.node}",
-          session: 7,
-          sequence: 7,
-          time_ms: 7,
-          addresses: [{{127, 0, 0, 1}, 4370}],
-          kind: :beacon,
-          payload: Packet.pack({[], [], 0})
-        },
-        "not this fleet's key"
-      )
+       %{one: one, two: two, send: send, socket: socket, address: address} do
+    recorded = %Packet{
+      sender: "#{two.node}",
+      session: 7,
+      sequence: 7,
+      time_ms: 7,
+      addresses: [address],
+      kind: :beacon,
+      payload: Packet.pack({[], [], 0})
+    }
+
+    foreign = Packet.seal(recorded, "not this fleet's key")
+    # Of an old life of the other node, which had this address then.
+    key = MeshNodes.call(one, Application, :get_env, [:swarm, :mesh])[:secret].key
+    recorded = Packet.seal(recorded, key)
 
     flood = fn datagrams ->
       for n <- 1..datagrams do
         case rem(n, 4) do
-          0 -> send.(foreign)
+          0 -> send.(if rem(n, 8) == 0, do: foreign, else: recorded)
           1 -> send.(<<"CVY", 2, 1, 5, "abcde", n::64, n::64, n::64, 0, 0::128, n::128>>)
           _ -> send.(:rand.bytes(1 + rem(n, 700)))
         end
@@ -72,7 +87,11 @@ defmodule Swarm.Mesh.FloodTest do
     end
 
     before = flood.(10_000)
-    then = flood.(@datagrams)
+    _few = answers(socket)
+    {us, then} = :timer.tc(fn -> flood.(@datagrams) end)
+    # Who replays what a node has said gets one small datagram each 20 ms, at most.
+    assert {count, 256} = answers(socket)
+    assert count in 1..(div(us, 20_000) + 1)
     assert then.radio == before.radio
     assert then.memory - before.memory < 20_000_000
     assert then.atoms - before.atoms < 10
