@@ -260,7 +260,7 @@ defmodule Mesh.ProtocolTest do
   end
 
   test "a flood of garbage from one address does not keep known nodes out" do
-    air = Air.new() |> Air.join("a") |> Air.join("b") |> Air.run(1_000) |> Map.put(:out, [])
+    air = Air.new() |> Air.join("a") |> Air.join("b") |> Air.run(2_000) |> Map.put(:out, [])
     junk = :crypto.strong_rand_bytes(100)
     flooded = Enum.reduce(1..10_000, air, fn _, air -> Air.inject(air, "a", junk) end)
     assert flooded.stations["a"].rejected.throttled == 8_000
