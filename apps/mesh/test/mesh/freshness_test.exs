@@ -60,6 +60,16 @@ defmodule Mesh.FreshnessTest do
       assert {delivered(played), hears(played, "a")} == {[], []}
       reason = if address == @foreign, do: :foreign, else: :stale
       assert played.stations["a"].rejected[reason] >= 300
+      # Who may be behind a router is told of it, but not 300 times.
+      told =
+        for {_at, "a", {:event, :foreign, about}} <- played.out,
+            do: Mesh.Log.line(:foreign, about)
+
+      assert length(told) in if(address == @foreign, do: 3..4, else: [0])
+
+      for {:warning, line} <- told,
+          do: assert(line =~ "a datagram of b@lab came from 10.9.9.9:4370")
+
       # Distribution is dialled nowhere else than before.
       refute Enum.any?(played.out, &match?({_, _, {:learn, _, _, _}}, &1))
     end

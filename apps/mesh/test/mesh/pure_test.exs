@@ -10,6 +10,7 @@ defmodule Mesh.PureTest do
   doctest Mesh.Protocol.ClockOffset
   doctest Mesh.Distribution.Certs
   doctest Mesh.Protocol.Packet.ReplayProtection
+  doctest Mesh.Protocol.Packet.SequenceWindow
   doctest Mesh.Log
   doctest Mesh.Protocol.NodeTable
   doctest Mesh.Protocol.Packet

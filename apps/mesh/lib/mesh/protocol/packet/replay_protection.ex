@@ -7,17 +7,15 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   answer to a challenge of its own (`Mesh.Protocol.Challenge`), which no recording can contain,
   and which tells it how the clock of that session stands. From then on each datagram of the
   session must be fresh by that clock (`Mesh.Protocol.ClockOffset`): one that was recorded and
-  never received is worthless 2 s later. A window of sequence numbers keeps out what was heard
-  before: a datagram counts once, and one that is 1,024 behind the newest not at all.
+  never received is worthless 2 s later. And each counts once
+  (`Mesh.Protocol.Packet.SequenceWindow`).
 
   A session that was followed by another is never accepted again. While a node is heard, no other
   session of its name is admitted, so two nodes of the same name do not take turns.
   """
-  import Bitwise
   alias Mesh.Protocol.{Challenge, ClockOffset}
+  alias Mesh.Protocol.Packet.SequenceWindow
 
-  @width 1_024
-  @full (1 <<< @width) - 1
   @alive_ms 2_000
   @most_retired 64
   @per_second 2_000
@@ -28,8 +26,7 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   @typep sender :: %{
            session: non_neg_integer() | nil,
            clock: ClockOffset.t() | nil,
-           top: non_neg_integer(),
-           seen: non_neg_integer(),
+           window: SequenceWindow.t() | nil,
            heard_ms: integer(),
            retired: [non_neg_integer()],
            second: integer(),
@@ -103,7 +100,7 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   @spec copy?(t(), String.t(), non_neg_integer(), non_neg_integer()) :: boolean()
   def copy?(guard, name, session, sequence) do
     case guard.senders do
-      %{^name => %{session: ^session} = sender} -> window(sender, sequence) == :doubled
+      %{^name => %{session: ^session, window: window}} -> SequenceWindow.seen?(window, sequence)
       _other -> false
     end
   end
@@ -130,8 +127,7 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
     %{
       session: nil,
       clock: nil,
-      top: 0,
-      seen: 0,
+      window: nil,
       heard_ms: now_ms - @alive_ms,
       retired: [],
       second: 0,
@@ -148,12 +144,11 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   defp alive?(%{session: nil}, _now_ms), do: false
   defp alive?(%{heard_ms: heard_ms}, now_ms), do: now_ms - heard_ms < @alive_ms
 
-  # Everything before the first admitted datagram counts as heard, because some of it was rejected
-  # and may have been recorded.
   defp begin(sender, %{session: session, sequence: sequence}, now_ms) do
     retired = Enum.take(List.wrap(sender.session) ++ sender.retired, @most_retired)
 
-    %{stranger(now_ms) | session: session, retired: retired, top: sequence - 1, seen: @full}
+    window = SequenceWindow.new(sequence)
+    %{stranger(now_ms) | session: session, retired: retired, window: window}
   end
 
   # An answer is fresh by itself. The newest measurement is the right one: after a computer was
@@ -172,25 +167,11 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
     count = if second == sender.second, do: sender.count + 1, else: 1
 
     with true <- count <= @per_second || :too_fast,
-         {:ok, sender} <- window(sender, sequence) do
-      sender = %{sender | heard_ms: now_ms, second: second, count: count}
+         {:ok, window} <- SequenceWindow.take(sender.window, sequence) do
+      sender = %{sender | window: window, heard_ms: now_ms, second: second, count: count}
       {:ok, %{guard | senders: Map.put(guard.senders, name, sender)}}
     else
       reason -> {:error, reason, guard}
     end
-  end
-
-  # Bit k of `seen` stands for the number `top - k`.
-  defp window(%{top: top} = sender, sequence) when sequence > top do
-    shift = sequence - top
-    seen = if shift >= @width, do: 0, else: sender.seen <<< shift &&& @full
-    {:ok, %{sender | top: sequence, seen: seen ||| 1}}
-  end
-
-  defp window(%{top: top}, sequence) when top - sequence >= @width, do: :doubled
-
-  defp window(%{top: top, seen: seen} = sender, sequence) do
-    bit = 1 <<< (top - sequence)
-    if (seen &&& bit) == 0, do: {:ok, %{sender | seen: seen ||| bit}}, else: :doubled
   end
 end
