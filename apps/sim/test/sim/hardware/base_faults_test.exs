@@ -3,7 +3,8 @@ defmodule Sim.Hardware.BaseFaultsTest do
   use Sim.BaseCase, async: true
   @moduletag :slow
 
-  for seed <- 1..3 do
+  for {seed, tags} <- [{1, []}, {2, [long: true]}, {3, [long: true]}] do
+    @tag tags
     @tag wire: [drop: 0.01, double: 0.005, flip: 0.005, seed: seed]
     test "with 2 % of faulty bytes it drives, and never faster than its limit (#{seed})",
          context do
