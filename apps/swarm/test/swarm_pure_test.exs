@@ -7,7 +7,9 @@ defmodule SwarmPureTest do
   doctest Swarm.Formation.Trail
   doctest Swarm.Formation.FreeSlots
   doctest Swarm.Agreement.Round.Record
+  doctest Swarm.Agreement.Round.Epochs
   doctest Swarm.Agreement.Round.Precedence
+  doctest Swarm.Message.CounterGuard
   doctest Swarm.Message
   doctest Swarm.Membership.Heartbeat
   doctest Swarm.Formation.Reference

@@ -39,8 +39,8 @@ defmodule Agents.Envelope do
   @classes [:telemetry, :data, :urgent]
   @options [:conversation, :reply_to, :in_reply_to, :epoch, :topic, :class]
   @longest_topic 255
-  # The same as `Swarm.Message.WireTypes.count?/1`, which is not a guard.
-  @highest 500_000_000
+  # The same as `Swarm.Message.WireTypes.counter?/1`, which is not a guard.
+  @highest 0xFFFFFFFFFFFFFFFF
 
   @enforce_keys [:performative, :from, :conversation]
   defstruct @enforce_keys ++
@@ -227,7 +227,7 @@ defmodule Agents.Envelope do
   defp valid?(field, address) when field in [:reply_to, :in_reply_to],
     do: address == nil or is_pid(address) or is_reference(address)
 
-  defp valid?(:epoch, epoch), do: epoch == nil or WireTypes.count?(epoch)
+  defp valid?(:epoch, epoch), do: epoch == nil or WireTypes.counter?(epoch)
   defp valid?(:topic, topic), do: topic == nil or topic?(topic)
   defp valid?(:class, class), do: class in @classes
   defp valid?(field, _anything) when field in [:__struct__, :content], do: true

@@ -12,6 +12,7 @@ defmodule Agents.EnvelopeTest do
           %{reply_to: make_ref(), in_reply_to: self()},
           %{epoch: 0},
           %{epoch: 500_000_000},
+          %{epoch: 18_446_744_073_709_551_615},
           %{topic: :poses},
           %{topic: "poses of all"},
           %{class: :urgent},
@@ -32,7 +33,7 @@ defmodule Agents.EnvelopeTest do
           conversation: [nil, 1, {:mag1, -1}, {"mag1", 1}, {:mag1, 1, 1}, {nil, 1}, self()],
           reply_to: [:mag1, "x", {:a, :b}],
           in_reply_to: [:mag1, 5],
-          epoch: [-1, 1.0, :one, 900_000_000],
+          epoch: [-1, 1.0, :one, 18_446_744_073_709_551_616],
           topic: ["", String.duplicate("x", 256), <<255>>, true, false, 5, [:a]],
           class: [nil, :slow, 1]
         ],

@@ -16,6 +16,7 @@ defmodule Missions.Landmark do
   | `Marks` | what it finds its pose by, and whether it is sure of its place |
   | `Blocker` | what keeps it from its slot |
   | `Merge` | what becomes of two leaders that meet |
+  | `EpochFilter` | who is left out, because it claims an epoch that nobody can have reached |
   | `ReferenceInbox` | whose anchor it believes, and when it joins a leader who names it |
   | `Policy` | who may lead, and what a robot does that has lost everybody |
 
@@ -28,8 +29,8 @@ defmodule Missions.Landmark do
   alias Swarm.Comms.Forwarder
   alias Swarm.Formation.Trail
   alias Missions.Landmark
-  alias Missions.Landmark.{Claim, Follower, LandmarkTrack, Leader, Policy, ReferenceInbox}
-  alias Missions.Landmark.{Rounds, Transitions}
+  alias Missions.Landmark.{Claim, EpochFilter, Follower, LandmarkTrack, Leader, Policy}
+  alias Missions.Landmark.{ReferenceInbox, Rounds, Transitions}
   alias Missions.Landmark.Transitions.{Conditions, Entry}
 
   @behaviour Robot.Mission
@@ -105,12 +106,15 @@ defmodule Missions.Landmark do
         trail: if(percept.pose, do: Trail.note(mission.trail, percept.pose), else: mission.trail)
     }
 
-    {mission, letters} = mission |> Policy.update() |> ReferenceInbox.beats() |> Rounds.tick()
+    mission = mission |> EpochFilter.update() |> Policy.update() |> ReferenceInbox.beats()
+    {mission, letters} = Rounds.tick(mission)
     {mission, stages} = step(mission)
     {mission, effects} = act(Transitions.activity(mission.phase), mission)
     effects = if :lists.keymember(:anchors, 1, effects), do: effects, else: effects ++ @unled
-    {mission, beats} = relay_beats(mission)
-    effects = letters ++ beats ++ stages ++ effects
+    # What is passed on are others' own words, not what this robot makes of them.
+    {mission, beats} = relay_beats(mission, percept)
+    {mission, refused} = EpochFilter.tell(mission)
+    effects = letters ++ beats ++ stages ++ refused ++ effects
     {mission.phase, mission, effects ++ [{:claim, Claim.claim(mission)}]}
   end
 
@@ -119,9 +123,9 @@ defmodule Missions.Landmark do
   def halted(mission), do: %{Entry.enter(mission, :idle) | started?: false}
 
   # Only robots that take part in the mission handle this.
-  defp relay_beats(%{phase: :idle} = mission), do: {mission, []}
+  defp relay_beats(%{phase: :idle} = mission, _percept), do: {mission, []}
 
-  defp relay_beats(%{percept: percept} = mission) do
+  defp relay_beats(mission, percept) do
     {relay, beats} = Forwarder.beats(mission.relay, mission.me, percept.peers, mission.now_ms)
     {%{mission | relay: relay}, beats}
   end

@@ -33,6 +33,10 @@ defmodule Console.Cli.Format do
 
   def meaning(%{stage: :world_back}), do: "the world goes on where it was"
   def meaning(%{stage: :lost} = stage), do: "#{subject(stage)} has lost the landmark"
+
+  def meaning(%{stage: :refused, robot: robot, from: from, epoch: epoch}),
+    do: "#{robot} does not believe #{from}, which says epoch #{epoch}"
+
   def meaning(%{stage: name}), do: name |> to_string() |> String.replace("_", " ")
 
   @doc """

@@ -221,7 +221,7 @@ defmodule Missions.Landmark.Follower do
     news = {anchor.epoch, anchor.sequence}
     child = Chain.child([anchor.leader | anchor.order], mission.me)
 
-    if news > attend.told and child != nil,
+    if news != attend.told and child != nil,
       do: {news, [{:send, [child], Message.new(mission.me, :place, anchor)}]},
       else: {attend.told, []}
   end

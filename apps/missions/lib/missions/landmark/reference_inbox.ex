@@ -5,12 +5,15 @@ defmodule Missions.Landmark.ReferenceInbox do
   alias Swarm.Agreement.Round
   alias Swarm.Formation.Reference
   alias Missions.Landmark
+  alias Missions.Landmark.EpochFilter
 
-  # No fleet elects this often unheard; accepting such an epoch would leave no room for later
-  # ones.
-  @leap 1_000_000
+  # No people ask this often for another shape unheard; accepting such a number would leave no
+  # room for later ones.
+  @leap 1_000
   # A robot does not join by an anchor older than this.
   @news_ms 500
+  # After so long without news the newest anchor counts, whatever its number.
+  @lease_ms 1_000
 
   @doc """
   Hears the anchor in the leader's heartbeats; the last one of a leader that fell silent counts
@@ -32,17 +35,29 @@ defmodule Missions.Landmark.ReferenceInbox do
   Hears an anchor. It counts only if it is new, and from this robot's leader or of a later epoch
   that names this robot. From other leaders a robot learns only what people have asked for
   meanwhile.
+
+  Anchors are numbered. If the newest one has been silent for a lease, its number may have been
+  wrong, so the next one counts in any case.
   """
   @spec anchor(Landmark.State.t(), Reference.t()) :: Landmark.State.t()
   def anchor(%{me: me} = mission, %Reference{leader: leader} = anchor) when leader != me do
-    ours? = anchor.epoch == mission.epoch and mission.leader in [nil, leader]
-    later? = anchor.epoch > mission.epoch and anchor.epoch <= mission.epoch + @leap
+    case EpochFilter.admit(mission, leader, anchor.epoch) do
+      {:ok, mission} -> admitted(mission, anchor)
+      {:refused, mission} -> mission
+    end
+  end
+
+  def anchor(mission, _own), do: mission
+
+  defp admitted(mission, anchor) do
+    ours? = anchor.epoch == mission.epoch and mission.leader in [nil, anchor.leader]
+    later? = anchor.epoch > mission.epoch and mission.me in anchor.order
 
     cond do
-      not (ours? or (later? and me in anchor.order)) ->
+      not (ours? or later?) ->
         if anchor.asked_no > mission.asked_no, do: take_up(mission, anchor), else: mission
 
-      Reference.newest(mission.anchor, anchor) != mission.anchor ->
+      news?(mission, anchor) ->
         take_up(%{mission | anchor: anchor, anchor_ms: mission.now_ms}, anchor)
 
       true ->
@@ -50,7 +65,13 @@ defmodule Missions.Landmark.ReferenceInbox do
     end
   end
 
-  def anchor(mission, _own), do: mission
+  defp news?(%{anchor: same}, same), do: false
+
+  defp news?(%{anchor: %{epoch: epoch}, anchor_ms: at_ms, now_ms: now}, %{epoch: epoch})
+       when now - at_ms >= @lease_ms,
+       do: true
+
+  defp news?(mission, anchor), do: Reference.newest(mission.anchor, anchor) != mission.anchor
 
   # A person may have asked for another shape while this anchor was under way.
   defp take_up(%{asked_no: known} = mission, %Reference{asked_no: number} = anchor)
@@ -58,7 +79,7 @@ defmodule Missions.Landmark.ReferenceInbox do
        do: %{
          mission
          | formation: anchor.asked || anchor.formation,
-           asked_no: number,
+           asked_no: min(number, known + @leap),
            of: max(mission.of, anchor.of)
        }
 

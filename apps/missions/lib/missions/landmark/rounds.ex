@@ -12,15 +12,20 @@ defmodule Missions.Landmark.Rounds do
   alias Swarm.Agreement.{Election, Round}
   alias Swarm.Formation.{Assignment, Chain}
   alias Missions.Landmark
-  alias Missions.Landmark.{Merge, Policy}
+  alias Missions.Landmark.{EpochFilter, Merge, Policy}
   alias Missions.Landmark.Rounds.{Challenge, Opening, Report, View}
 
   @doc "Hears a letter. A robot that is not started does not take part."
   @spec hear(Landmark.State.t(), atom(), Round.Letter.t()) :: Landmark.State.t()
   def hear(%{started?: false} = mission, _from, _letter), do: mission
 
-  def hear(mission, from, letter),
-    do: %{mission | round: Round.hear(mission.round, from, letter, mission.now_ms)}
+  def hear(mission, from, letter) do
+    {epoch, _counter, _initiator} = letter.id
+
+    with {:ok, mission} <- EpochFilter.admit(mission, from, epoch),
+         do: %{mission | round: Round.hear(mission.round, from, letter, mission.now_ms)},
+         else: ({:refused, mission} -> mission)
+  end
 
   @doc "Whether a round waits for this robot's scan."
   @spec search?(Landmark.State.t()) :: boolean()

@@ -4,7 +4,7 @@ defmodule Missions.Landmark.State do
   ask of it. Pure. The parts' own states are under `lead`, `attend`, `round`, `sight`.
   """
   alias Hal.{Pose, Twist}
-  alias Missions.Landmark.LandmarkTrack
+  alias Missions.Landmark.{EpochFilter, LandmarkTrack}
 
   @colour "YellowLandmark"
   @sight_ms 700
@@ -45,7 +45,8 @@ defmodule Missions.Landmark.State do
                 led: 0,
                 rival_ms: nil,
                 higher_ms: nil,
-                relay: %Swarm.Comms.Forwarder{}
+                relay: %Swarm.Comms.Forwarder{},
+                refused: %EpochFilter{}
               ]
 
   @typedoc """
@@ -100,7 +101,8 @@ defmodule Missions.Landmark.State do
           led: non_neg_integer(),
           rival_ms: integer() | nil,
           higher_ms: integer() | nil,
-          relay: Swarm.Comms.Forwarder.t()
+          relay: Swarm.Comms.Forwarder.t(),
+          refused: EpochFilter.t()
         }
 
   @doc "The default colour of the landmark."

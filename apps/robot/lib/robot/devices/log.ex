@@ -3,8 +3,8 @@ defmodule Robot.Devices.Log do
   Writes a robot's log: a line when a device goes offline, with the reason in words, and when it
   is back, when armed wheels are disarmed for a reason, when a bumper stays pressed, when the
   gate, a behaviour or a mission hangs, when pictures cannot be saved, when the emergency stop
-  would not survive a restart of the machine, and when another robot has the same name. The events
-  report changes, so retries of a device are not logged.
+  would not survive a restart of the machine, when another robot has the same name, and when one
+  is not believed because its numbers are impossible. The events report changes, so retries of a device are not logged.
   """
   require Logger
   alias Hal.Event
@@ -15,6 +15,7 @@ defmodule Robot.Devices.Log do
     [:hal, :device, :offline],
     [:hal, :device, :arming],
     [:robot, :fault],
+    [:robot, :stage],
     [:robot, :estop_file, :error],
     [:vision, :saver, :failed],
     [:vision, :saver, :healed],
@@ -96,6 +97,14 @@ defmodule Robot.Devices.Log do
     {:error,
      "#{robot}: a robot of this name was on #{other} before; this one stands, is silent and takes no orders"}
   end
+
+  def line(:stage, %{stage: :refused, robot: robot, from: from, epoch: epoch, allowed: allowed}) do
+    {:warning,
+     "#{robot}: #{from} says epoch #{epoch}, which no leadership can have reached; at most #{allowed} is " <>
+       "allowed now; #{from} is left out of the mission"}
+  end
+
+  def line(:stage, _told_by_others), do: nil
 
   defp name(%{robot: robot, device: device}), do: "#{robot}: #{device}"
   defp name(%{device: device}), do: "#{device}"

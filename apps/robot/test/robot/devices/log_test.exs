@@ -60,4 +60,14 @@ defmodule Robot.Devices.LogTest do
     assert {:error, "mag1: a robot of this name was on mag1@lab" <> _} =
              Log.line(:duplicate_id, twice)
   end
+
+  test "a robot whose numbers are impossible is named, with what is allowed; other stages are not logged" do
+    assert [:robot, :stage] in Log.events()
+
+    about = %{robot: :mag1, stage: :refused, from: :mag9, epoch: 500_000_000, allowed: 1_000_007}
+
+    assert {:warning, "mag1: mag9 says epoch 500000000, " <> line} = Log.line(:stage, about)
+    assert line =~ "at most 1000007 is allowed"
+    assert Log.line(:stage, %{robot: :mag1, stage: :elected, epoch: 1, size_ppm: 9}) == nil
+  end
 end

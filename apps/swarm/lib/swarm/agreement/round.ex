@@ -15,7 +15,8 @@ defmodule Swarm.Agreement.Round do
   Ids are `{epoch, counter, initiator}`: the epoch is that of the leadership which the round will
   found, the counter grows with each new try.
   """
-  alias Swarm.Agreement.Round.{Letter, Precedence, Record, Tally}
+  alias Swarm.Agreement.Round.{Epochs, Letter, Precedence, Record, Tally}
+  alias Swarm.Message.CounterGuard
 
   # Letters are repeated every 100 ms, less often in a large group, because all-to-all traffic
   # grows with its square.
@@ -44,14 +45,15 @@ defmodule Swarm.Agreement.Round do
                 digests: %{},
                 digest: nil,
                 echo?: false,
-                highest: {0, 0}
+                highest: {0, 0},
+                guard: %CounterGuard{}
               ]
 
   @type phase :: :none | :collect | :echo | :digest | :committed
   @typedoc """
   `report` is this robot's own report, `reports` and `digests` are those heard from all, `said_ms`
   is when this robot last sent a letter, `since_ms` when the phase began, `highest` the highest
-  epoch and counter known.
+  epoch and counter known, `guard` bounds how far others may raise the epoch.
   """
   @type t :: %__MODULE__{
           me: atom(),
@@ -67,7 +69,8 @@ defmodule Swarm.Agreement.Round do
           digests: %{atom() => binary()},
           digest: binary() | nil,
           echo?: boolean(),
-          highest: {epoch :: non_neg_integer(), counter :: non_neg_integer()}
+          highest: {epoch :: non_neg_integer(), counter :: non_neg_integer()},
+          guard: CounterGuard.t()
         }
 
   @doc "No round yet."
@@ -80,10 +83,8 @@ defmodule Swarm.Agreement.Round do
   """
   @spec open(t(), pos_integer(), [atom()], :search | :change, pos_integer(), integer()) :: t()
   def open(round, epoch, view, purpose, length_ms, now_ms) do
-    {top, counter} = Precedence.fenced(round).highest
-    counter = if epoch >= top, do: counter, else: 0
-    epoch = max(epoch, top)
-    enter(round, {epoch, counter + 1, round.me}, view, purpose, length_ms, now_ms)
+    {epoch, counter} = Precedence.next(epoch, Precedence.fenced(round).highest)
+    enter(round, {epoch, counter, round.me}, view, purpose, length_ms, now_ms)
   end
 
   @doc """
@@ -102,13 +103,14 @@ defmodule Swarm.Agreement.Round do
 
   @doc """
   Hears a letter. This robot joins a round with a higher id if it is in the view; a lower one is
-  dropped.
+  dropped, and so is one whose epoch is not admitted (`.Epochs`).
   """
   @spec hear(t(), atom(), Letter.t(), integer()) :: t()
   def hear(%{me: me} = round, from, %Letter{} = letter, now_ms) when from != me do
-    if Precedence.leap?(letter.id, round.highest),
-      do: round,
-      else: round |> Precedence.note(letter.id) |> heed(from, letter, now_ms)
+    case Epochs.admit_round(round, letter.id, now_ms) do
+      {:ok, round} -> round |> Precedence.note(letter.id) |> heed(from, letter, now_ms)
+      {:error, _allowed} -> round
+    end
   end
 
   def hear(round, _from, _letter, _now_ms), do: round

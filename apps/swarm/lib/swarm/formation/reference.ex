@@ -90,11 +90,11 @@ defmodule Swarm.Formation.Reference do
   @spec valid?(term()) :: boolean()
   def valid?(%__MODULE__{twist: {v, w}, order: order, places: places} = anchor) do
     WireTypes.whole?(anchor, __MODULE__) and WireTypes.pose?(anchor.pose) and WireTypes.number?(v) and
-      WireTypes.number?(w) and WireTypes.name?(anchor.leader) and WireTypes.count?(anchor.epoch) and
-      anchor.epoch > 0 and WireTypes.count?(anchor.sequence) and
+      WireTypes.number?(w) and WireTypes.name?(anchor.leader) and WireTypes.counter?(anchor.epoch) and
+      anchor.epoch > 0 and WireTypes.counter?(anchor.sequence) and
       Formation.valid?(anchor.formation) and
       (anchor.asked == nil or Formation.valid?(anchor.asked)) and
-      WireTypes.count?(anchor.asked_no) and
+      WireTypes.counter?(anchor.asked_no) and
       WireTypes.names?(order) and WireTypes.distinct?(order) and anchor.leader not in order and
       anchor.size in 1..@most and
       WireTypes.list?(places, &(&1 in 1..@most and &1 < anchor.size)) and

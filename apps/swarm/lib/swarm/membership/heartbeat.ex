@@ -130,9 +130,9 @@ defmodule Swarm.Membership.Heartbeat do
     WireTypes.whole?(beat, __MODULE__) and WireTypes.pose?(beat.pose) and
       WireTypes.number?(linear) and
       WireTypes.number?(turn) and WireTypes.boot?(beat.boot) and
-      WireTypes.count?(beat.sequence) and beat.radius in 50..2000 and
+      WireTypes.counter?(beat.sequence) and beat.radius in 50..2000 and
       sd?(beat.sd) and WireTypes.name?(beat.phase) and
-      WireTypes.count?(beat.epoch) and (beat.leader == nil or WireTypes.name?(beat.leader)) and
+      WireTypes.counter?(beat.epoch) and (beat.leader == nil or WireTypes.name?(beat.leader)) and
       NameSet.valid?(beat.heard) and sight?(beat.sight) and
       Enum.all?(
         [beat.standing, beat.in_place, beat.unsure, beat.blocked, beat.formed, beat.latched],

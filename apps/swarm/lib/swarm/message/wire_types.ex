@@ -9,6 +9,7 @@ defmodule Swarm.Message.WireTypes do
   @count 500_000_000
   @day_ms 86_400_000
   @latest 0xFFFFFFFFFFFFFFFF
+  @counter 0xFFFFFFFFFFFFFFFF
 
   @doc """
   Whether a struct has all fields of its kind and no others, because anything can arrive from the
@@ -71,15 +72,24 @@ defmodule Swarm.Message.WireTypes do
   def number?(term), do: is_integer(term) and abs(term) < @far
 
   @doc """
-  Whether a term is a number that counts up: of a leadership, a round, an anchor, a stop. Numbers
-  from outside must stay far below the limit at which the others would refuse a robot that counts
-  on.
+  Whether a term is a number of things that are counted, none of which anybody counts on from.
 
       iex> for term <- [0, 7, -1, 900_000_000], do: Swarm.Message.WireTypes.count?(term)
       [true, true, false, false]
   """
   @spec count?(term()) :: boolean()
   def count?(term), do: is_integer(term) and term in 0..@count
+
+  @doc """
+  Whether a term is a number that counts up for ever: of a leadership, a heartbeat, an anchor, a
+  request. Nothing counts as far as 2^64 by itself; that nobody is pushed there is the matter of
+  those who count on from what they hear (`Swarm.Message.CounterGuard`).
+
+      iex> for term <- [0, 500_000_001, -1, 1.0, 18_446_744_073_709_551_616], do: Swarm.Message.WireTypes.counter?(term)
+      [true, true, false, false, false]
+  """
+  @spec counter?(term()) :: boolean()
+  def counter?(term), do: is_integer(term) and term in 0..@counter
 
   @doc """
   Whether a term is the number of a robot's life: the time of day at which it began, in ms.

@@ -28,7 +28,7 @@ defmodule Missions.Landmark.Transitions.Entry do
             leader: nil,
             anchor: nil,
             place: nil,
-            round: Round.new(mission.me) |> Map.put(:highest, mission.round.highest)
+            round: Map.merge(Round.new(mission.me), Map.take(mission.round, [:highest, :guard]))
         }
 
       :search ->

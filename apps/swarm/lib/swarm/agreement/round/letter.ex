@@ -22,15 +22,21 @@ defmodule Swarm.Agreement.Round.Letter do
           ask: boolean()
         }
 
-  # Longer than any round lasts, and more robots than any fleet has.
+  # Longer than any round lasts, more robots than any fleet has, and the tries of one epoch, after
+  # which the next epoch begins.
   @longest_ms 120_000
   @most 1_000
+  @tries 1_000_000
+
+  @doc "The highest counter of an epoch's rounds."
+  @spec tries() :: pos_integer()
+  def tries, do: @tries
 
   @doc "Whether a term from outside is a letter."
   @spec valid?(term()) :: boolean()
   def valid?(%__MODULE__{id: {epoch, counter, initiator}} = letter) do
-    WireTypes.whole?(letter, __MODULE__) and WireTypes.count?(epoch) and epoch > 0 and
-      WireTypes.count?(counter) and counter > 0 and WireTypes.name?(initiator) and
+    WireTypes.whole?(letter, __MODULE__) and WireTypes.counter?(epoch) and epoch > 0 and
+      is_integer(counter) and counter in 1..@tries and WireTypes.name?(initiator) and
       WireTypes.number?(letter.remaining_ms) and letter.remaining_ms <= @longest_ms and
       letter.purpose in [:search, :change] and WireTypes.names?(letter.view) and
       WireTypes.distinct?(letter.view) and

@@ -6,23 +6,20 @@ defmodule Swarm.Agreement.Round.Precedence do
   alias Swarm.Agreement.Round
   alias Swarm.Agreement.Round.{Letter, Tally}
 
-  @leap 1_000_000
-
   @doc """
-  Whether an id is further ahead of the highest known than any fleet gets at once; accepting it
-  would leave no room for the next ones.
+  The epoch and the counter of the next round for this epoch. If the counter has reached its end,
+  a new epoch begins.
 
       iex> alias Swarm.Agreement.Round.Precedence
-      iex> ids = [{1, 3, :mag1}, {1, 2_000_000, :mag1}, {2, 9, :mag1}]
-      iex> for id <- ids, do: Precedence.leap?(id, {1, 2})
-      [false, true, false]
+      iex> for highest <- [{2, 1}, {3, 4}, {5, 1}, {3, 1_000_000}], do: Precedence.next(3, highest)
+      [{3, 2}, {3, 5}, {5, 1}, {4, 1}]
   """
-  @spec leap?(Letter.id(), {epoch :: non_neg_integer(), counter :: non_neg_integer()}) ::
-          boolean()
-  def leap?({epoch, counter, _initiator}, {epoch, highest}), do: counter > highest + @leap
+  @spec next(pos_integer(), {non_neg_integer(), non_neg_integer()}) ::
+          {pos_integer(), pos_integer()}
+  def next(epoch, {top, _counter}) when epoch < top, do: {top, 1}
 
-  def leap?({epoch, counter, _initiator}, {highest, _counter}),
-    do: epoch > highest + @leap or counter > @leap
+  def next(epoch, {_top, counter}),
+    do: if(counter < Letter.tries(), do: {epoch, counter + 1}, else: {epoch + 1, 1})
 
   @doc "Notes that there is a round of this id."
   @spec note(Round.t(), Letter.id()) :: Round.t()
