@@ -23,9 +23,11 @@ defmodule Swarm.Blackboard.Codec do
   # Compressed terms may be far larger than their bytes.
   @compressed 80
   @ids 4_294_967_296
-  # Times of day in ms, or, on finer clocks, in ns, until the year 2160. Even if a wrong number is
-  # as high as this, there is still a higher one to outbid it.
-  @latest 6_000_000_000_000_000_000
+  # No count of hints gets as far (`Swarm.Message.CounterGuard`).
+  @counts 6_000_000_000_000_000_000
+  # Higher than any time of day: even if a wrong number is as high as one can be, there is a higher
+  # one to outbid it (`Swarm.Blackboard.Rows.possible?/2`).
+  @latest 9_000_000_000_000_000_000
   # No robot writes this often in one life.
   @most 1_000_000_000_000_000
   # Older rows travel with this age.
@@ -33,6 +35,10 @@ defmodule Swarm.Blackboard.Codec do
 
   @type key :: atom() | {atom(), atom() | integer()}
   @type id :: non_neg_integer()
+
+  @doc "The highest incarnation that other boards read."
+  @spec latest() :: pos_integer()
+  def latest, do: @latest
 
   @doc """
   Whether a term can be the key of a row: a name, or a pair of a name and an identifier.
@@ -221,7 +227,7 @@ defmodule Swarm.Blackboard.Codec do
     do: incarnation in 0..@latest and sequence in 0..@most
 
   defp stamp?(bucket, id, count, {writer, check}) when id?(check),
-    do: Rows.bucket(id) == bucket and count in 1..@latest and text?(writer)
+    do: Rows.bucket(id) == bucket and count in 1..@counts and text?(writer)
 
   defp stamp?(_bucket, _id, _count, _other), do: false
 

@@ -8,8 +8,9 @@ defmodule Swarm.Blackboard.Incarnation do
   | of a former life, or of this one before the board was lost | accepted, but never in place of a newer row |
   | of a higher incarnation, and young | a rival of the same name: reported (`{:rival, robot, incarnation}`), not accepted |
   | of a higher incarnation, and over 5 s old | a former life, before the clock was set back: outbid |
+  | of an incarnation that no life can have (`Swarm.Blackboard.Rows.possible?/2`) | refused |
   """
-  alias Swarm.Blackboard.{Rows, State}
+  alias Swarm.Blackboard.{Codec, Rows, State}
 
   @rival_ms 5_000
 
@@ -27,16 +28,13 @@ defmodule Swarm.Blackboard.Incarnation do
   end
 
   defp begin(state, robot, boot, {{known, _sequence}, _value, at_ms}, now_ms) when known > boot do
-    if now_ms - at_ms >= @rival_ms,
-      do: {write(state, robot, boot, {known + 1, state.first}), []},
+    cond do
       # These are the rows of another robot.
-      else:
-        {write(
-           %{state | robots: Map.delete(state.robots, robot)},
-           robot,
-           boot,
-           {boot, state.first}
-         ), [{:rival, robot, known}]}
+      now_ms - at_ms < @rival_ms -> {alone(state, robot, boot), [{:rival, robot, known}]}
+      known < Codec.latest() -> {write(state, robot, boot, {known + 1, state.first}), []}
+      # Nothing outbids this number. Other boards forget it, too, when it is old.
+      true -> {alone(state, robot, boot), []}
+    end
   end
 
   defp begin(state, robot, boot, {{boot, _} = stamp, _value, _at_ms}, _now_ms),
@@ -44,6 +42,10 @@ defmodule Swarm.Blackboard.Incarnation do
 
   defp begin(state, robot, boot, _older, _now_ms),
     do: {write(state, robot, boot, {boot, state.first}), []}
+
+  defp alone(state, robot, boot),
+    do:
+      write(%{state | robots: Map.delete(state.robots, robot)}, robot, boot, {boot, state.first})
 
   @doc "Notes the stamp of an own robot's last row."
   @spec write(State.t(), atom(), boot :: non_neg_integer(), Rows.stamp()) :: State.t()

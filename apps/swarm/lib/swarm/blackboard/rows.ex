@@ -17,8 +17,12 @@ defmodule Swarm.Blackboard.Rows do
 
   @buckets 16
   @hashes 4_294_967_296
-  # Nobody writes this often in one life, and no fleet this often unheard.
+  # Nobody writes this often in one life.
   @leap 1_000_000_000_000
+  @most 100_000_000_000_000
+  # Times of day in ms, or, on finer clocks, in ns, until the year 2160.
+  @latest 6_000_000_000_000_000_000
+  @step 1_000
 
   @type owner :: atom() | (bucket :: 0..15)
   @type key :: term()
@@ -53,11 +57,25 @@ defmodule Swarm.Blackboard.Rows do
   def of(state, bucket), do: :maps.filter(fn id, _held -> bucket(id) == bucket end, state.hints)
 
   @doc """
-  Whether a count is farther ahead of the known one than anybody gets: accepting it would leave no
-  room for later writes.
+  Whether a sequence is farther ahead of the known one than anybody gets, or near the end of its
+  range: accepting it would leave no room for later writes.
   """
-  @spec leap?(count :: integer(), known :: integer()) :: boolean()
-  def leap?(count, known), do: count > known + @leap
+  @spec leap?(sequence :: integer(), known :: integer()) :: boolean()
+  def leap?(sequence, known), do: sequence > known + @leap or sequence > @most
+
+  @doc """
+  Whether an incarnation can be that of a robot whose last known one is this (`nil`: none is
+  known). Above all times of day there is a range for those that outbid wrong numbers, in which
+  they count by ones, so nobody can bring them to its end.
+
+      iex> latest = 6_000_000_000_000_000_000
+      iex> for {n, known} <- [{latest, 1}, {latest + 1, latest}, {latest + 1, nil}, {latest + 1, 1}],
+      ...>   do: Swarm.Blackboard.Rows.possible?(n, known)
+      [true, true, true, false]
+  """
+  @spec possible?(incarnation :: non_neg_integer(), known :: non_neg_integer() | nil) :: boolean()
+  def possible?(incarnation, known),
+    do: incarnation <= @latest or known == nil or incarnation <= known + @step
 
   @doc "What a robot wrote last, as far as is known."
   @spec latest(State.t(), atom()) :: held() | nil

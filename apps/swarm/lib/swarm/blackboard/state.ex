@@ -15,11 +15,13 @@ defmodule Swarm.Blackboard.State do
   a value.
   """
   alias Swarm.Blackboard.{Expiry, Incarnation, Rows}
+  alias Swarm.Message.CounterGuard
 
   @limits %{robots: 256, keys: 32, bytes: 59_000, hints: 256, hint_bytes: 1_000}
 
   @enforce_keys [:limits]
-  defstruct @enforce_keys ++ [first: 0, robots: %{}, own: %{}, hints: %{}, clock: 0]
+  defstruct @enforce_keys ++
+              [first: 0, robots: %{}, own: %{}, hints: %{}, clock: 0, guard: %CounterGuard{}]
 
   @type key :: Rows.key()
   @type t :: %__MODULE__{
@@ -28,7 +30,8 @@ defmodule Swarm.Blackboard.State do
           robots: %{atom() => %{key() => Rows.held()}},
           own: %{atom() => {boot :: non_neg_integer(), Rows.stamp()}},
           hints: %{key() => Rows.held()},
-          clock: non_neg_integer()
+          clock: non_neg_integer(),
+          guard: CounterGuard.t()
         }
 
   @typedoc """
@@ -148,15 +151,13 @@ defmodule Swarm.Blackboard.State do
 
   defp merge_one(rows, {bucket, id, {count, _} = stamp, age_ms, value}, now_ms)
        when is_integer(bucket) do
-    cond do
-      bytes(value) > rows.limits.hint_bytes ->
-        {rows, [{:refused, :bytes}]}
-
-      Rows.leap?(count, rows.clock) ->
-        {rows, [{:refused, :count}]}
-
-      true ->
-        take(%{rows | clock: max(rows.clock, count)}, bucket, id, {stamp, value, now_ms - age_ms})
+    if bytes(value) > rows.limits.hint_bytes do
+      {rows, [{:refused, :bytes}]}
+    else
+      case count_on(rows, count, now_ms) do
+        {:ok, rows} -> take(rows, bucket, id, {stamp, value, now_ms - age_ms})
+        {:refused, rows} -> {rows, [{:refused, :count}]}
+      end
     end
   end
 
@@ -164,6 +165,9 @@ defmodule Swarm.Blackboard.State do
     cond do
       bytes(value) > rows.limits.bytes ->
         {rows, [{:refused, :bytes}]}
+
+      not Rows.possible?(elem(stamp, 0), known(rows, robot)) ->
+        {rows, [{:refused, :count}]}
 
       is_map_key(rows.own, robot) ->
         own(rows, robot, key, {stamp, value, now_ms - age_ms}, now_ms)
@@ -173,6 +177,27 @@ defmodule Swarm.Blackboard.State do
 
       true ->
         {rows, [{:refused, :robots}]}
+    end
+  end
+
+  # A count that nobody can have reached would leave no room for later ones.
+  defp count_on(%{clock: clock} = rows, count, _now_ms) when count <= clock, do: {:ok, rows}
+
+  defp count_on(%{clock: clock, guard: guard} = rows, count, now_ms) do
+    case CounterGuard.admit(guard, count, clock, now_ms) do
+      {:ok, guard} ->
+        {:ok, %{rows | clock: count, guard: guard}}
+
+      {:error, _allowed} ->
+        {:refused, %{rows | guard: CounterGuard.approach(guard, count, clock, now_ms)}}
+    end
+  end
+
+  # The life that an own robot writes in, the newest of another's.
+  defp known(rows, robot) do
+    case rows do
+      %{own: %{^robot => {_boot, {life, _sequence}}}} -> life
+      _not_own -> with {{life, _sequence}, _value, _at_ms} <- Rows.latest(rows, robot), do: life
     end
   end
 

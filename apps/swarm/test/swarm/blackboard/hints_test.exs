@@ -120,6 +120,42 @@ defmodule Swarm.Blackboard.HintsTest do
     end
   end
 
+  test "invented counts, one after the other, do not reach the end of the range" do
+    {state, refused} =
+      Enum.reduce(1..20_000, {State.new(), 0}, fn n, {state, refused} ->
+        now_ms = div(n, 2)
+        count = state.clock + 1_000_000_000_000
+        row = entry(1, min(count, 6_000_000_000_000_000_000), "zz", "absurd")
+        {state, notes} = State.merge(state, [row], now_ms)
+        {state, refused + length(notes)}
+      end)
+
+    assert refused == 20_000
+    assert state.clock == 0
+
+    # At most a million a second.
+    pushed =
+      Enum.reduce(
+        1..5_000,
+        State.new(),
+        &merge(&2, [entry(1, &2.clock + 900_000, "zz", "x")], &1)
+      )
+
+    assert pushed.clock in 1_000_000..6_000_000
+    assert {:ok, "mine", "mag1"} = pushed |> put("mag1", 1, "mine") |> get(1)
+  end
+
+  test "a board that comes to a fleet with many millions of hints gets them step by step" do
+    rows = [entry(1, 10_500_000, "mag1", "old"), entry(2, 10_500_001, "mag1", "new")]
+
+    state =
+      Enum.reduce(0..11, State.new(), fn second, state -> merge(state, rows, 1_000 * second) end)
+
+    assert {:ok, "old", "mag1"} = get(state, 1)
+    assert {:ok, "new", "mag1"} = get(state, 2)
+    assert state.clock == 10_500_001
+  end
+
   defp boards(count) do
     names = for n <- 1..count, do: :"hints#{System.unique_integer([:positive])}_#{n}"
     air = start_supervised!({Ether, names}, id: names)

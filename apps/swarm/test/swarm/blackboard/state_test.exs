@@ -2,6 +2,7 @@ defmodule Swarm.Blackboard.StateTest do
   use ExUnit.Case, async: true
   alias Swarm.Blackboard
   alias Swarm.Blackboard.AntiEntropy
+  doctest Swarm.Blackboard.Rows
   doctest Swarm.Blackboard.State
   doctest Swarm.Blackboard.AntiEntropy
   doctest Swarm.Blackboard.Codec
@@ -82,7 +83,13 @@ defmodule Swarm.Blackboard.StateTest do
           d <- [-1, 0, 1],
           do: Bitwise.bsl(1, n) + d
 
-    for incarnation <- [1 | numbers], sequence <- [1 | numbers] do
+    # The ends of the ranges on the wire.
+    incarnations =
+      for n <- [6_000_000_000_000_000_000, 9_000_000_000_000_000_000], d <- [-1, 0, 1], do: n + d
+
+    numbers = [999_999_999_999_999, 1_000_000_000_000_000 | numbers]
+
+    for incarnation <- [1 | incarnations] ++ numbers, sequence <- [1 | numbers] do
       absurd = [{:mag1, 7, {incarnation, sequence}, 0, "absurd"}]
       owner = [:mag1] |> entered() |> put!(:mag1, 7, "mine", 0)
       other = Blackboard.State.new() |> heard(all(owner, 0), 0) |> heard(absurd, 0)
@@ -106,6 +113,38 @@ defmodule Swarm.Blackboard.StateTest do
                |> heard(all(owner, 9_000), 9_000)
                |> get(:mag1, 7, 9_000)
     end
+  end
+
+  test "no thousand invented sequences, one after the other, end a robot's rows" do
+    owner = [:mag1] |> entered() |> put!(:mag1, 7, "mine", 0)
+
+    {owner, other} =
+      Enum.reduce(1..1_200, {owner, Blackboard.State.new()}, fn n, {owner, other} ->
+        {_incarnation, count} = owner.own.mag1 |> elem(1)
+        sequence = min(count + 1_000_000_000_000, 1_000_000_000_000_000)
+        {{life, _}, _, _} = Blackboard.Rows.latest(owner, :mag1)
+        absurd = [{:mag1, 7, {life, sequence}, 0, "absurd"}]
+        now_ms = 100 * n
+        owner = owner |> heard(absurd, now_ms) |> put!(:mag1, 7, n, now_ms)
+        {owner, other |> heard(absurd, now_ms) |> heard(all(owner, now_ms), now_ms)}
+      end)
+
+    owner = put!(owner, :mag1, 7, "later", 130_000)
+    other = heard(other, all(owner, 130_000), 130_000)
+    assert {:ok, "later", _} = get(other, :mag1, 7, 130_000)
+  end
+
+  test "an incarnation that nobody can outbid lasts only as long as nobody knows the robot" do
+    last = 9_000_000_000_000_000_000
+    absurd = [{:mag1, 7, {last, 1}, 0, "absurd"}]
+    other = heard(Blackboard.State.new(), absurd, 0)
+    # Its robot comes later, to this board or to another one.
+    {own, [_rival]} = Blackboard.State.enter(other, :mag1, 5, 1_000)
+    assert [{:mag1, 7, {5, 1}, 0, "mine"}] = own |> put!(:mag1, 7, "mine", 0) |> all(0)
+    {own, []} = Blackboard.State.enter(other, :mag1, 5, 6_000)
+    own = put!(own, :mag1, 7, "mine", 6_000)
+    {other, _gone} = Blackboard.State.forget(other, 600_000)
+    assert {:ok, "mine", _} = other |> heard(all(own, 600_000), 600_000) |> get(:mag1, 7, 600_000)
   end
 
   test "with more keys than a robot may have, all keep the same ones: the newest" do
