@@ -3,15 +3,23 @@ defmodule Swarm.EStop.Calls do
   Remembers which calls to stop were heard (`Swarm.EStop.Broadcaster`). A call is sent many times
   and arrives by several ways; it counts once. Pure.
 
-  For each life of a node the last call is remembered, for at most 64 lives.
+  Of each life of a node the last call is remembered, with the 64 counters up to its own: a call
+  that was overtaken by a later one does not stop anything again. A call that is farther from it
+  is remembered beside it, so that a wrong counter, however high, hides no later call: at worst a
+  robot stops once more. At most 64 are remembered in all.
   """
   alias Swarm.Message.WireTypes
 
-  @callers 64
+  @most 64
+  @window 64
+  @near 32
   # Boot numbers are times in ms, or, on finer clocks, in ns.
   @latest 0xFFFFFFFFFFFFFFFF
 
-  @typedoc "The identity of a call: the node that calls, that node's life, and a counter of its calls."
+  @typedoc """
+  The identity of a call: the node that calls, that node's life, and a counter that grows with its
+  calls.
+  """
   @type call :: {node(), boot :: integer(), counter :: integer()}
 
   @type t :: [{node(), {boot :: integer(), counter :: integer()}}]
@@ -26,10 +34,17 @@ defmodule Swarm.EStop.Calls do
   @spec hear(t(), call()) :: {new? :: boolean(), t()}
   def hear(calls, {node, boot, counter}) do
     # Separately for each life of a node: otherwise repeated calls of two lives would each seem
-    # new after the other, and robots would pass them on to each other for ever.
-    case Enum.split_with(calls, &match?({^node, {^boot, _last}}, &1)) do
-      {[{_node, {_boot, last}} | _], _others} when counter <= last -> {false, calls}
-      {_before, others} -> {true, Enum.take([{node, {boot, counter}} | others], @callers)}
+    # new after the other, and robots would pass them on to each other for ever. For the same
+    # reason a call takes the place only of those that it still covers.
+    ahead = for {^node, {^boot, last}} <- calls, do: last - counter
+
+    if Enum.any?(ahead, &(&1 in 0..(@window - 1))) do
+      {false, calls}
+    else
+      others =
+        Enum.reject(calls, &match?({^node, {^boot, last}} when (counter - last) in 0..@near, &1))
+
+      {true, Enum.take([{node, {boot, counter}} | others], @most)}
     end
   end
 

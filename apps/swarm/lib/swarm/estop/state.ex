@@ -8,11 +8,17 @@ defmodule Swarm.EStop.State do
   nobody has reset yet, and a robot that joins a fleet whose stop was cleared long ago is not
   stopped by it.
 
+  No stop is refused because of its number, but a number is taken only so far as it is at most
+  100,000 above the known one: from one heartbeat to the next, nobody can bring it near its end,
+  and a robot that is far behind has caught up after a few.
+
   `calls` remembers which calls to stop were heard (`Swarm.EStop.Calls`), so that a late repeat does not latch again
   what a person has reset.
   """
   alias Swarm.EStop.Calls
 
+  # No fleet counts this far between two heartbeats; taking any number would leave no room for
+  # later ones.
   @leap 100_000
 
   defstruct known: 0, cleared: 0, latched?: false, calls: []
@@ -97,12 +103,9 @@ defmodule Swarm.EStop.State do
   """
   @spec hear(t(), non_neg_integer(), boolean()) :: t()
   def hear(%__MODULE__{} = stop, number, latched?) do
-    cond do
-      # No fleet counts this far at once; accepting such a number would leave no room for later
-      # ones.
-      number > stop.known + @leap ->
-        stop
+    number = min(number, stop.known + @leap)
 
+    cond do
       latched? and number > stop.cleared ->
         %{stop | known: max(stop.known, number), latched?: true}
 

@@ -60,7 +60,7 @@ defmodule Swarm.Membership.Heartbeat do
         }
 
   # Boot numbers may be times in ms, or, on finer clocks, in ns. Nobody can make the numbers of
-  # stops run so far, because no robot follows a leap (`Swarm.EStop.State`).
+  # stops run so far, because they are taken in steps (`Swarm.EStop.State`).
   @latest 0xFFFFFFFFFFFFFFFF
 
   # Five a second. Ticks come every 100 ms, some of them a little early.
