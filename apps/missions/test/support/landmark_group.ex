@@ -27,7 +27,8 @@ defmodule Missions.Landmark.Group do
             stages: [],
             digests: %{},
             both_ms: 0,
-            worst_both_ms: 0
+            worst_both_ms: 0,
+            rival_words: []
 
   @type t :: %__MODULE__{}
 
@@ -56,7 +57,9 @@ defmodule Missions.Landmark.Group do
       goal: nil,
       goal_ms: 0,
       frame: nil,
-      phases: [:idle]
+      phases: [:idle],
+      frozen_ms: nil,
+      inbox: []
     }
 
     group = put_in(group.robots[id], robot)
@@ -66,6 +69,40 @@ defmodule Missions.Landmark.Group do
   @doc "Switches a robot off, with all that it knew."
   @spec kill(t(), atom()) :: t()
   def kill(group, id), do: %{group | robots: Map.delete(group.robots, id)}
+
+  @doc """
+  Freezes a robot for so long, as SIGSTOP does: it does nothing, and what others send waits for it.
+  Then it hears all that in any order with what it does itself: its heartbeats may come before its
+  mission's first tick. `rival_words` collects who said that it leads while another did.
+  """
+  @spec freeze(t(), atom(), pos_integer()) :: t()
+  def freeze(group, id, ms), do: put_in(group.robots[id].frozen_ms, group.now + ms)
+
+  defp frozen?(group, id) do
+    case group.robots[id] do
+      %{frozen_ms: until_ms} when until_ms != nil -> until_ms > group.now
+      _awake -> false
+    end
+  end
+
+  defp thaw(id, group) do
+    case group.robots[id] do
+      %{frozen_ms: until_ms, inbox: inbox} when until_ms != nil and until_ms <= group.now ->
+        group = put_in(group.robots[id].frozen_ms, nil)
+        group = put_in(group.robots[id].inbox, [])
+
+        {before, later} =
+          inbox |> Enum.reverse() |> Enum.split(:rand.uniform(length(inbox) + 1) - 1)
+
+        hear = fn {from, message}, group -> hear(group, id, from, message) end
+        group = Enum.reduce(before, group, hear)
+        group = if :rand.uniform(2) == 1, do: beat(group, id), else: group
+        Enum.reduce(later, group, hear)
+
+      _awake ->
+        group
+    end
+  end
 
   @doc "Sets how much of a robot's picture the landmark fills from now on."
   @spec show(t(), atom(), float() | nil) :: t()
@@ -200,6 +237,7 @@ defmodule Missions.Landmark.Group do
 
   defp tick(group) do
     group = deliver(%{group | now: group.now + @tick_ms})
+    group = group |> ids() |> Enum.reduce(group, &thaw/2)
     group |> ids() |> Enum.shuffle() |> Enum.reduce(group, &think/2) |> watch()
   end
 
@@ -207,7 +245,9 @@ defmodule Missions.Landmark.Group do
   # draws with it.
   defp ids(group), do: group.robots |> Map.keys() |> Enum.sort()
 
-  defp think(id, group) do
+  defp think(id, group), do: if(frozen?(group, id), do: group, else: awake(id, group))
+
+  defp awake(id, group) do
     group = group |> finish(id) |> event(id, {:tick, percept(group, id)})
     if rem(group.now, @beat_ms) == 0, do: beat(group, id), else: group
   end
@@ -239,9 +279,24 @@ defmodule Missions.Landmark.Group do
     robot = group.robots[id]
     sender = {robot.boot, robot.sequence + 1}
     heard = Peers.heard(robot.peers, group.now)
-    beat = Heartbeat.new(sender, percept(group, id), robot.claim, heard, EStop.State.new())
+    # As `Swarm.Comms.OwnHeartbeat` does.
+    claim = Heartbeat.timely(robot.claim, group.now - robot.mission.now_ms)
+    beat = Heartbeat.new(sender, percept(group, id), claim, heard, EStop.State.new())
     group = put_in(group.robots[id].sequence, robot.sequence + 1)
+    group = if beat.phase == :lead, do: note_rivals(group, id), else: group
     carry_out({:send, :all, Message.new(id, :heartbeat, beat)}, id, group)
+  end
+
+  defp note_rivals(group, id) do
+    rivals =
+      for {other, %{claim: claim, mission: %{now_ms: ticked_ms}}} <- group.robots,
+          other != id,
+          not frozen?(group, other),
+          match?(%{phase: :lead}, Heartbeat.timely(claim, group.now - ticked_ms)),
+          Enum.any?(parts(group), &(id in &1 and other in &1)),
+          do: {group.now, id, other}
+
+    %{group | rival_words: rivals ++ group.rival_words}
   end
 
   defp carry_out({:send, to, message}, id, group) do
@@ -303,9 +358,16 @@ defmodule Missions.Landmark.Group do
     due
     |> Enum.sort_by(fn {at, _, _, _} -> at end)
     |> Enum.reduce(%{group | air: air}, fn {_at, to, from, message}, group ->
-      if is_map_key(group.robots, to) and is_map_key(group.robots, from),
-        do: hear(group, to, from, message),
-        else: group
+      cond do
+        not (is_map_key(group.robots, to) and is_map_key(group.robots, from)) ->
+          group
+
+        frozen?(group, to) ->
+          update_in(group.robots[to].inbox, &[{from, message} | &1])
+
+        true ->
+          hear(group, to, from, message)
+      end
     end)
   end
 
@@ -330,7 +392,8 @@ defmodule Missions.Landmark.Group do
 
   # How long two robots lead in one connected group.
   defp watch(group) do
-    leading = for {id, %{mission: %{phase: :lead}}} <- group.robots, do: id
+    leading =
+      for {id, %{mission: %{phase: :lead}}} <- group.robots, not frozen?(group, id), do: id
 
     both? =
       length(leading) > 1 and

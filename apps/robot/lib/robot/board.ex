@@ -36,7 +36,8 @@ defmodule Robot.Board do
     4. `{:silent, module}`, with the behaviour or the mission in which it hangs (`nil` for the
        gate); `{:hung, module}` once it was killed for that.
     5. `{module, integer}`, with another number for each call.
-    6. `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state}`
+    6. `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state,
+       ticked_ms: the time of the last percept that the mission handled}`
 
   This process owns the tables and does nothing else, so that they survive a crash of their
   writers. All of it is lost with the board, on purpose, with one exception.

@@ -26,6 +26,8 @@ defmodule Robot.Control.Pilot do
 
   # Generous, because a pilot may be slow on a busy machine.
   @call_ms 5_000
+  # A percept that has waited longer than this is dropped; the next one is on its way.
+  @old_ms 1_000
 
   @doc "A child of the robot's supervisor."
   @spec child_spec(Config.t()) :: Supervisor.child_spec()
@@ -161,8 +163,14 @@ defmodule Robot.Control.Pilot do
   def handle_event(:cast, _event, :idle, _data), do: :keep_state_and_data
 
   def handle_event(:cast, event, {module, _phase} = state, data) do
-    {:ok, state, data} = go({:hand, module}, newest(event), state, data)
-    {:next_state, state, data}
+    event = newest(event)
+
+    if old?(event, data.config) do
+      :keep_state_and_data
+    else
+      {:ok, state, data} = go({:hand, module}, event, state, data)
+      {:next_state, state, data}
+    end
   end
 
   def handle_event(:info, {:deliver, %Delivery{} = delivery, {:command, _} = event}, state, data) do
@@ -248,6 +256,11 @@ defmodule Robot.Control.Pilot do
   end
 
   defp newest(event), do: event
+
+  # A robot that was frozen decides by what it perceives now: by its old percept a leader would
+  # believe that its lease lasts.
+  defp old?({:tick, %{at_ms: at_ms}}, config), do: Config.now(config) - at_ms > @old_ms
+  defp old?(_event, _config), do: false
 
   defp handle(event, data) do
     Journal.heard(event, data)

@@ -10,11 +10,12 @@ defmodule Robot.Mission.Runner do
 
   @enforce_keys [:robot]
   defstruct @enforce_keys ++
-              [module: nil, mission: nil, phase: :idle, claim: %{}, halted: nil]
+              [module: nil, mission: nil, phase: :idle, claim: %{}, ticked_ms: nil, halted: nil]
 
   @typedoc """
   `module` is `nil` while the robot is idle; `halted` is the mission that the last stop left for
-  `resume/1`.
+  `resume/1`. `ticked_ms` is the time of the last percept that the mission handled: its claim is
+  as old as that, whatever else it has heard since.
   """
   @type t :: %__MODULE__{
           robot: atom(),
@@ -22,6 +23,7 @@ defmodule Robot.Mission.Runner do
           mission: term(),
           phase: atom(),
           claim: map(),
+          ticked_ms: integer() | nil,
           halted: {module(), mission :: term()} | nil
         }
 
@@ -34,7 +36,7 @@ defmodule Robot.Mission.Runner do
   @doc "Starts a mission; it replaces any other, and the mission that a stop has left."
   @spec start(t(), module(), keyword()) :: {t(), [Mission.effect()]}
   def start(%__MODULE__{} = runner, module, options) do
-    runner = %{runner | module: module, claim: %{}, halted: nil}
+    runner = %{runner | module: module, claim: %{}, ticked_ms: nil, halted: nil}
     follow(runner, module.init(runner.robot, options))
   end
 
@@ -56,7 +58,10 @@ defmodule Robot.Mission.Runner do
   def handle(%__MODULE__{module: nil} = runner, _event), do: {runner, []}
 
   def handle(%__MODULE__{module: module, mission: mission} = runner, event),
-    do: follow(runner, module.handle(event, mission))
+    do: runner |> note_tick(event) |> follow(module.handle(event, mission))
+
+  defp note_tick(runner, {:tick, %{at_ms: at_ms}}), do: %{runner | ticked_ms: at_ms}
+  defp note_tick(runner, _event), do: runner
 
   @doc "Ends the mission and keeps what it leaves for `resume/1` (`c:Robot.Mission.halted/1`)."
   @spec halt(t()) :: t()

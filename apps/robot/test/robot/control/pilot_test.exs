@@ -35,6 +35,24 @@ defmodule Robot.Control.PilotTest do
     assert_receive {:mission, {:tick, _}}
   end
 
+  test "a percept that has waited for more than a second, as in a frozen robot, is not handled" do
+    id = flown(:pilot20, pace: :manual)
+    now = System.monotonic_time(:millisecond)
+
+    for at_ms <- [now - 2_000, now - 1_050, now],
+        do: Pilot.hear(id, {:tick, %Robot.Percept{robot: id, at_ms: at_ms, profile: nil}})
+
+    # One after the other, so that the last one does not replace the others.
+    assert_receive {:mission, {:tick, %{at_ms: ^now}}}
+    old = %Robot.Percept{robot: id, at_ms: now - 1_050, profile: nil}
+    Pilot.hear(id, {:tick, old})
+    Pilot.hear(id, {:message, %{after: :tick}})
+    assert_receive {:mission, {:message, %{after: :tick}}}
+    refute_received {:mission, {:tick, _}}
+    board = Board.find!(id)
+    assert {:ok, %{ticked_ms: ^now}, _at_ms} = Board.fetch(board, :mission, :infinity)
+  end
+
   test "carries out every kind of effect" do
     ptz = {Hal.FakePtz, test: self(), device: :ptz}
 

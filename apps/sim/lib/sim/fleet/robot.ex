@@ -5,6 +5,7 @@ defmodule Sim.Fleet.Robot do
   alias Sim.Fleet.Hardware
   alias Sim.World
   alias Robot.Mission.Manual
+  alias Swarm.Membership.Heartbeat
 
   # The timeout of a command to a single robot.
   @over [:ready, :done, :found, :not_found]
@@ -55,11 +56,16 @@ defmodule Sim.Fleet.Robot do
          else: (_not_yet -> false)
   end
 
-  @doc "What it claims about itself, as in lockstep, but read from its board."
+  @doc """
+  What it claims about itself, as in lockstep, but read from its board, and, as in its heartbeats,
+  without a leadership whose time is over.
+  """
   @spec claim(atom()) :: map()
   def claim(id) do
     with {:ok, board} <- Board.find(id),
-         {:ok, %{state: state, claim: claim}, _at_ms} <- Board.fetch(board, :mission, :infinity) do
+         {:ok, %{state: state, claim: claim, ticked_ms: ticked_ms}, at_ms} <-
+           Board.fetch(board, :mission, :infinity) do
+      claim = Heartbeat.timely(claim, Board.now(board) - (ticked_ms || at_ms))
       claim = Map.put_new_lazy(claim, :uncertainty, fn -> uncertainty(board) end)
 
       case state do

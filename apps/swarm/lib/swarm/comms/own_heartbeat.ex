@@ -11,7 +11,8 @@ defmodule Swarm.Comms.OwnHeartbeat do
 
   @doc """
   The message with the heartbeat of this number, `{boot, sequence}`. A robot without a pose yet
-  has no heartbeat; one whose executive crashed stands where it was.
+  has no heartbeat; one whose executive crashed stands where it was. One whose mission has decided
+  nothing for a second, for example because it was frozen, does not claim to lead.
   """
   @spec message(Config.t(), Board.t(), Receiver.t(), {integer(), non_neg_integer()}, integer()) ::
           {:ok, Message.t()} | :error
@@ -19,7 +20,7 @@ defmodule Swarm.Comms.OwnHeartbeat do
     with {:ok, pose, _then} <- Board.fetch(board, :pose, :infinity, at_ms) do
       body = %{profile: config.profile, pose: pose, odometry: odometry(board, at_ms)}
       heard = Peers.heard(receiver.peers, at_ms)
-      beat = Heartbeat.new(sender, body, claim(board), heard, EStop.written(board))
+      beat = Heartbeat.new(sender, body, claim(board, at_ms), heard, EStop.written(board))
       {:ok, Message.new(config.id, :heartbeat, beat)}
     end
   end
@@ -31,11 +32,16 @@ defmodule Swarm.Comms.OwnHeartbeat do
     end
   end
 
-  defp claim(board) do
+  defp claim(board, at_ms) do
     case Board.fetch(board, :mission, :infinity) do
-      {:ok, %{state: :idle}, _at_ms} -> :idle
-      {:ok, %{claim: claim}, _at_ms} -> claim
-      :error -> %{}
+      {:ok, %{state: :idle}, _at_ms} ->
+        :idle
+
+      {:ok, %{claim: claim, ticked_ms: ticked_ms}, written_ms} ->
+        Heartbeat.timely(claim, at_ms - (ticked_ms || written_ms))
+
+      :error ->
+        %{}
     end
   end
 end

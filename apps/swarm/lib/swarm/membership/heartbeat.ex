@@ -77,6 +77,28 @@ defmodule Swarm.Membership.Heartbeat do
   def due?(nil, _at_ms), do: true
   def due?(last_ms, at_ms), do: at_ms - last_ms >= @period_ms - @early_ms
 
+  # An anchor is good for as long, so nobody follows a leader that has decided nothing since.
+  @claim_ms 1_000
+
+  @doc """
+  What a robot may claim that made this claim so long ago. A leadership lapses after a second:
+  the robot may have been frozen or hung, and others may have elected another leader. What it says
+  before its mission has looked at the clock must not contradict them.
+
+      iex> claim = %{phase: :lead, leader: :mag1, epoch: 3, formed: true, anchor: nil}
+      iex> Swarm.Membership.Heartbeat.timely(claim, 100) == claim
+      true
+      iex> Swarm.Membership.Heartbeat.timely(claim, 1_900)
+      %{phase: :agree, leader: nil, epoch: 3, formed: false, anchor: nil}
+      iex> Swarm.Membership.Heartbeat.timely(%{phase: :follow, leader: :mag2}, 1_900)
+      %{phase: :follow, leader: :mag2}
+  """
+  @spec timely(claim :: map(), age_ms :: integer()) :: map()
+  def timely(%{phase: :lead} = claim, age_ms) when age_ms > @claim_ms,
+    do: Map.merge(claim, %{phase: :agree, leader: nil, formed: false, anchor: nil})
+
+  def timely(claim, _age_ms), do: claim
+
   @typedoc "What a heartbeat says about the body; `Robot.Percept` is one."
   @type body :: %{
           :pose => Hal.Pose.t(),

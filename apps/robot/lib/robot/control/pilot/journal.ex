@@ -2,7 +2,8 @@ defmodule Robot.Control.Pilot.Journal do
   @moduledoc """
   What a pilot publishes about itself: on the board, in events and in the trace.
 
-  The board's entry `:mission` contains the mission, its phase and its claim. The entry `:asking`
+  The board's entry `:mission` contains the mission, its phase and its claim, and the time of the
+  percept from which the mission made that claim. The entry `:asking`
   exists while a callback of the mission runs, so that `Robot.Safety.LivenessMonitor` detects one
   that does not return.
   """
@@ -15,6 +16,7 @@ defmodule Robot.Control.Pilot.Journal do
           required(:config) => Config.t(),
           required(:board) => Board.t(),
           required(:since_ms) => integer(),
+          required(:runner) => Robot.Mission.Runner.t(),
           optional(atom()) => term()
         }
   @type state :: :idle | {mission :: module(), phase :: atom()}
@@ -67,7 +69,13 @@ defmodule Robot.Control.Pilot.Journal do
   end
 
   defp written(state, claim, data) do
-    entry = %{state: state, claim: claim, since_ms: data.since_ms}
+    entry = %{
+      state: state,
+      claim: claim,
+      since_ms: data.since_ms,
+      ticked_ms: data.runner.ticked_ms
+    }
+
     Board.put(data.board, :pilot, :mission, entry, Config.now(data.config))
     data
   end
