@@ -35,10 +35,11 @@ defmodule Hal.Event do
   | `[:robot, :pilot, :silent]`, `[:robot, :pilot, :hung]`, `[:robot, :pilot, :again]` | `at_ms` | `robot`, `mission`, `line`: the same for a mission that does not return |
   | `[:robot, :gate, :silent]`, `[:robot, :gate, :hung]`, `[:robot, :gate, :again]` | `at_ms` | `robot`, `line`: the same for a gate that does not step |
   | `[:robot, :pilot, :phase]` | `at_ms` | `robot`, `state`: `:idle` or `{mission, phase}` |
-  | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and fields that the mission adds |
+  | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and fields that the mission adds; `:refused`: `from`, `epoch`, `allowed`: that robot claims an epoch that no fleet can have reached, and is left out |
   | `[:mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): this node refused another one, or was refused by it |
   | `[:swarm, :part, :fell]` | `at_ms` | `id`, `reason`: a part of the node crashed; it is restarted |
   | `[:swarm, :comms, :duplicate_id]` | | `robot`, `other`: another robot of this name was there first; this one stays silent |
+  | `[:swarm, :comms, :unique_id]` | | `robot`: the other one has not been heard for 10 s; this one speaks again |
   | `[:mesh, :up]`, `[:mesh, :suspect]`, `[:mesh, :gone]` | `at_ms` | `node`, judged by its datagrams |
   | `[:mesh, :connected]`, `[:mesh, :disconnected]` | `at_ms` | `node`, by Erlang's distribution |
   | `[:mesh, :unknown_node]` | `at_ms` | `name`, `address`: a node has the secret, but is not in the roster |

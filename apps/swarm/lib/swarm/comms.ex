@@ -9,7 +9,7 @@ defmodule Swarm.Comms do
   An e-stop spreads with the heartbeats. `Swarm.EStop`, which is started beside the comms process,
   owns the state of the stop and is told of each heartbeat that differs from it. Of two robots
   with the same name, the later one (`Swarm.Comms.NameClaim`) stops and falls silent, with the
-  event `[:swarm, :comms, :duplicate_id]`.
+  event `[:swarm, :comms, :duplicate_id]`, as long as there is the other.
 
   | part | what it does |
   |---|---|
@@ -162,7 +162,7 @@ defmodule Swarm.Comms do
 
   def handle_cast({:rival, {boot, node} = other, comms}, s)
       when is_integer(boot) and is_atom(node) and (is_pid(comms) or comms == nil) do
-    case NameClaim.rival(s.name, other, comms) do
+    case NameClaim.rival(s.name, other, comms, Config.now(s.config)) do
       {false, name} -> {:noreply, %{s | name: name}}
       {true, name} -> {:noreply, give_way(%{s | name: name}, node)}
     end
@@ -204,8 +204,16 @@ defmodule Swarm.Comms do
     counts = %{sent: s.sender.sent, heard: s.receiver.heard, rejected: s.receiver.rejected}
     Board.put(s.board, :comms, :radio, counts, at_ms)
     s = %{s | sender: Sender.tick(s.sender, s.receiver, at_ms)}
-    if rem(s.sender.ticks, @rivals_every) == 0, do: NameClaim.challenge(s.name)
-    s
+    if rem(s.sender.ticks, @rivals_every) == 0, do: rivals(s, at_ms), else: s
+  end
+
+  defp rivals(s, at_ms) do
+    NameClaim.challenge(s.name)
+
+    case NameClaim.take_back(s.name, at_ms) do
+      {true, name} -> take_back(%{s | name: name})
+      {false, name} -> %{s | name: name}
+    end
   end
 
   defp note(s) do
@@ -244,6 +252,13 @@ defmodule Swarm.Comms do
     Pilot.halt(s.id)
     Event.execute([:swarm, :comms, :duplicate_id], %{}, %{robot: s.id, other: other})
     %{s | sender: %{s.sender | silent?: true}}
+  end
+
+  # It stands until somebody gives it an order.
+  defp take_back(s) do
+    EStop.present(s.id, true)
+    Event.execute([:swarm, :comms, :unique_id], %{}, %{robot: s.id})
+    %{s | sender: %{s.sender | silent?: false}}
   end
 
   defp addressed(:all), do: Transport.robots()

@@ -4,6 +4,7 @@ defmodule Swarm.CommsTest do
   @moduletag :capture_log
   alias Hal.{Odometry, Pose}
   alias Swarm.{Comms, Directory, Message}
+  alias Swarm.Comms.NameClaim
   alias Swarm.Membership.Heartbeat
 
   # A robot with a comms process that knows where it is.
@@ -199,6 +200,47 @@ defmodule Swarm.CommsTest do
     assert Directory.members({:robot, id}) == [self()]
     {:ok, %{state: :idle}, _} = Board.fetch(Board.find!(id), :mission, :infinity)
     :ok = Directory.leave(self(), [{:robot, id}])
+  end
+
+  test "a name is taken back when the other robot has not been heard for ten seconds" do
+    id = :"comms20_#{System.unique_integer([:positive])}"
+    name = NameClaim.enter(NameClaim.new(id, {1_000, node()}))
+    # One heartbeat from another node in its name, with the lowest number of a life.
+    assert {true, name} = NameClaim.rival(name, {0, :twin@far}, nil, 0)
+    assert Directory.members({:robot, id}) == []
+    assert {false, name} = NameClaim.take_back(name, 9_999)
+    # Later lives, and itself, do not count; as long as the first is heard, it stays away.
+    assert {false, name} = NameClaim.rival(name, {2_000, :twin@far}, nil, 9_999)
+    assert {false, name} = NameClaim.rival(name, {0, :twin@far}, nil, 9_000)
+    assert {false, name} = NameClaim.take_back(name, 18_999)
+
+    # One that is known by the directory alone is there, too.
+    other = spawn_link(fn -> receive(do: (:never -> :ok)) end)
+    :ok = Directory.enter(other, [{:robot, id}])
+    assert {false, name} = NameClaim.take_back(name, 19_000)
+    :ok = Directory.leave(other, [{:robot, id}])
+    assert {false, name} = NameClaim.take_back(name, 28_999)
+    assert {true, name} = NameClaim.take_back(name, 29_000)
+    assert Directory.members({:robot, id}) == [self()]
+    refute NameClaim.left?(name)
+    assert {false, ^name} = NameClaim.take_back(name, 99_000)
+    # And the same again.
+    assert {true, _name} = NameClaim.rival(name, {0, :twin@far}, nil, 100_000)
+  end
+
+  @tag :long
+  test "a robot of which a forged heartbeat said that it was there before speaks again after ten seconds" do
+    id = talking(:comms21, comms: [boot: 1_000])
+    comms = Names.whereis(id, :comms)
+    for event <- [:duplicate_id, :unique_id], do: :ok = listen(id, [:swarm, :comms, event])
+    :ok = Comms.rival(id, {0, :twin@far})
+    assert_receive {[:swarm, :comms, :duplicate_id], %{robot: ^id}}
+    assert Directory.members({:robot, id}) == []
+    assert_receive {[:swarm, :comms, :unique_id], %{robot: ^id}}, 15_000
+    assert Directory.members({:robot, id}) == [comms]
+    until(id, fn _ -> match?({:ok, _}, Swarm.ask(id, :ping)) end)
+    assert Swarm.ask(id, {:move, 0.1, 0.0}) == :ok
+    rolls_of(id)
   end
 
   @doc false

@@ -19,7 +19,8 @@ defmodule Robot.Devices.Log do
     [:robot, :estop_file, :error],
     [:vision, :saver, :failed],
     [:vision, :saver, :healed],
-    [:swarm, :comms, :duplicate_id]
+    [:swarm, :comms, :duplicate_id],
+    [:swarm, :comms, :unique_id]
   ]
 
   @doc "Attaches the log to its events, once on a node."
@@ -96,6 +97,11 @@ defmodule Robot.Devices.Log do
   def line(:duplicate_id, %{robot: robot, other: other}) do
     {:error,
      "#{robot}: a robot of this name was on #{other} before; this one stands, is silent and takes no orders"}
+  end
+
+  def line(:unique_id, %{robot: robot}) do
+    {:warning,
+     "#{robot}: no other robot of this name has been heard for 10 s; this one speaks and takes orders again"}
   end
 
   def line(:stage, %{stage: :refused, robot: robot, from: from, epoch: epoch, allowed: allowed}) do

@@ -46,7 +46,8 @@ defmodule Robot.Devices.LogTest do
     for event <- [
           [:robot, :estop_file, :error],
           [:vision, :saver, :failed],
-          [:swarm, :comms, :duplicate_id]
+          [:swarm, :comms, :duplicate_id],
+          [:swarm, :comms, :unique_id]
         ],
         do: assert(event in Log.events())
 
@@ -59,6 +60,9 @@ defmodule Robot.Devices.LogTest do
 
     assert {:error, "mag1: a robot of this name was on mag1@lab" <> _} =
              Log.line(:duplicate_id, twice)
+
+    assert {:warning, "mag1: no other robot of this name" <> _} =
+             Log.line(:unique_id, %{robot: :mag1})
   end
 
   test "a robot whose numbers are impossible is named, with what is allowed; other stages are not logged" do

@@ -1,7 +1,9 @@
 defmodule Swarm.Comms.NameClaim do
   @moduledoc """
   A robot's claim to its name. Of two robots with the same name, on any nodes, the one with the
-  lower `{boot, node}` stays. The other leaves the directory and gives way for good.
+  lower `{boot, node}` stays. The other leaves the directory and gives way, until the first has
+  been neither heard nor found in the directory for 10 s: perhaps it never existed, and somebody
+  only said so.
 
   They find each other in the directory, where both comms processes are in the same group and tell
   each other who they are once a second, or through the mesh, where each hears heartbeats that are
@@ -11,11 +13,19 @@ defmodule Swarm.Comms.NameClaim do
   alias Swarm.Directory
 
   @enforce_keys [:robot, :me]
-  defstruct @enforce_keys ++ [entry: nil]
+  defstruct @enforce_keys ++ [entry: nil, rival_ms: nil]
+
+  @absent_ms 10_000
 
   @typedoc "The identity of a robot besides its name: the number of its life, and its node."
   @type identity :: {boot :: integer(), node()}
-  @type t :: %__MODULE__{robot: atom(), me: identity(), entry: Directory.Membership.t() | nil}
+  @typedoc "It gave way to a robot that was last heard at `rival_ms`, by the robot's own clock."
+  @type t :: %__MODULE__{
+          robot: atom(),
+          me: identity(),
+          entry: Directory.Membership.t() | nil,
+          rival_ms: integer() | nil
+        }
 
   @doc "The claim of a robot that is not in the directory yet."
   @spec new(atom(), identity()) :: t()
@@ -71,25 +81,42 @@ defmodule Swarm.Comms.NameClaim do
   There is another robot of the same name: `comms` is its comms process, or `nil` if it was heard
   through the mesh. Returns whether this robot gives way; it has left the directory then.
   """
-  @spec rival(t(), identity(), pid() | nil) :: {gives_way? :: boolean(), t()}
-  def rival(%__MODULE__{entry: %{left?: true}} = name, _other, _comms), do: {false, name}
-
+  @spec rival(t(), identity(), pid() | nil, now_ms :: integer()) ::
+          {gives_way? :: boolean(), t()}
   # Through the mesh a robot may hear itself and its former life; one node cannot have two.
-  def rival(name, {_boot, node}, nil) when node == node(), do: {false, name}
+  def rival(name, {_boot, node}, nil, _now_ms) when node == node(), do: {false, name}
 
-  def rival(name, other, comms) do
-    case judge(name.me, other) do
-      :give_way ->
-        {true, %{name | entry: Directory.Membership.leave(name.entry)}}
+  def rival(name, other, comms, now_ms) do
+    case {judge(name.me, other), left?(name)} do
+      {:give_way, true} ->
+        {false, %{name | rival_ms: now_ms}}
 
-      :stay ->
-        if comms, do: tell(name, comms)
+      {:give_way, false} ->
+        {true, %{name | entry: Directory.Membership.leave(name.entry), rival_ms: now_ms}}
+
+      {:stay, false} when comms != nil ->
+        tell(name, comms)
         {false, name}
 
-      :same ->
+      _stays_or_same ->
         {false, name}
     end
   end
+
+  @doc """
+  Takes the name back if nobody else has it any more; returns whether it did. Called now and then.
+  """
+  @spec take_back(t(), now_ms :: integer()) :: {back? :: boolean(), t()}
+  def take_back(%__MODULE__{entry: %{left?: true}, rival_ms: rival_ms} = name, now_ms)
+      when now_ms - rival_ms >= @absent_ms do
+    case Directory.members({:robot, name.robot}) do
+      [] -> {true, enter(%{name | entry: nil, rival_ms: nil})}
+      # Known by the directory alone.
+      [_other | _] -> {false, %{name | rival_ms: now_ms}}
+    end
+  end
+
+  def take_back(name, _now_ms), do: {false, name}
 
   @doc """
   Which of two robots with the same name goes on.
