@@ -7,8 +7,10 @@ defmodule Missions.Landmark.Policy do
   stand still until they are a majority again, and their leader abdicates within its lease. Of 4
   robots, 2 are not enough. A robot that a leader may still count on does not report in a round
   without this leader until that lease is over, so that no other robot leads before then. The
-  number `n` travels in every report and in the anchor, and the greatest that is heard counts, so
-  that all of a part decide alike.
+  number `n` travels in every report, of which the greatest counts, so that all of a part decide
+  alike; and in the anchor, for a robot that joins without a round. It believes a greater number
+  only once its leader has said it in five anchors, because one wrong anchor must not keep a fleet
+  from electing.
 
   **Lost link.** A robot that was with others in this mission, and has heard nobody for 2 s, does
   what `lost_link` says until it hears somebody:
@@ -23,6 +25,7 @@ defmodule Missions.Landmark.Policy do
   to all. A robot that never met anybody cannot lose anybody.
   """
   alias Swarm.Agreement.Election
+  alias Swarm.Formation.Reference
   alias Swarm.Membership.Peers
   alias Missions.Landmark
 
@@ -30,6 +33,8 @@ defmodule Missions.Landmark.Policy do
   @heard_ms 1_000
   # A leader's lease, plus the time that a heartbeat may be under way.
   @vow_ms 1_800
+  # How many anchors, ten a second, must say the same of the size of the fleet.
+  @anchors 5
   # A robot that has only just been started has heard nobody yet.
   @gather_ms 2_000
 
@@ -72,6 +77,19 @@ defmodule Missions.Landmark.Policy do
   @doc "Notes that this leader, or `nil` for one that is not known, may count on this robot from now on."
   @spec vow(Landmark.State.t(), atom()) :: Landmark.State.t()
   def vow(mission, leader), do: %{mission | vow: {leader, mission.now_ms}}
+
+  @doc "Notes how large the fleet is, of which a majority is needed, by an anchor of its leader."
+  @spec told(Landmark.State.t(), Reference.t()) :: Landmark.State.t()
+  def told(%{of: of} = mission, %Reference{of: less}) when less <= of,
+    do: %{mission | of_told: nil}
+
+  def told(mission, %Reference{leader: leader, epoch: epoch, of: more}) do
+    case mission.of_told do
+      {{^leader, ^epoch, ^more}, @anchors} -> %{mission | of: more, of_told: nil}
+      {{^leader, ^epoch, ^more} = said, n} -> %{mission | of_told: {said, n + 1}}
+      _another -> %{mission | of_told: {{leader, epoch, more}, 2}}
+    end
+  end
 
   @doc "Whether a leader who is not among these may still count on this robot."
   @spec bound?(Landmark.State.t(), [atom()]) :: boolean()

@@ -5,7 +5,7 @@ defmodule Missions.Landmark.ReferenceInbox do
   alias Swarm.Agreement.Round
   alias Swarm.Formation.Reference
   alias Missions.Landmark
-  alias Missions.Landmark.EpochFilter
+  alias Missions.Landmark.{EpochFilter, Policy}
 
   # No people ask this often for another shape unheard; accepting such a number would leave no
   # room for later ones.
@@ -58,7 +58,9 @@ defmodule Missions.Landmark.ReferenceInbox do
         if anchor.asked_no > mission.asked_no, do: take_up(mission, anchor), else: mission
 
       news?(mission, anchor) ->
-        take_up(%{mission | anchor: anchor, anchor_ms: mission.now_ms}, anchor)
+        %{mission | anchor: anchor, anchor_ms: mission.now_ms}
+        |> take_up(anchor)
+        |> Policy.told(anchor)
 
       true ->
         mission
@@ -79,8 +81,7 @@ defmodule Missions.Landmark.ReferenceInbox do
        do: %{
          mission
          | formation: anchor.asked || anchor.formation,
-           asked_no: min(number, known + @leap),
-           of: max(mission.of, anchor.of)
+           asked_no: min(number, known + @leap)
        }
 
   defp take_up(mission, _older), do: mission

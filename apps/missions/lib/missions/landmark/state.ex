@@ -36,6 +36,7 @@ defmodule Missions.Landmark.State do
                 attend: nil,
                 challenge: nil,
                 of: 0,
+                of_told: nil,
                 lost_link: nil,
                 role: :searcher,
                 met?: false,
@@ -57,8 +58,9 @@ defmodule Missions.Landmark.State do
   `leader` are those that the robot belongs to, `size_ppm` is the size that elected the leader,
   `anchor_ms` when the anchor came.
 
-  `of` is the size of the fleet of which a majority is needed, 0 for none; `role` is the robot's
-  last role, `met?` whether it has been with others, `vow` which leader may count on it, and when
+  `of` is the size of the fleet of which a majority is needed, 0 for none; `of_told` a greater one
+  that the leader says, and the number of its next anchor that says it. `role` is the robot's last
+  role, `met?` whether it has been with others, `vow` which leader may count on it, and when
   it last could, `place` where it was last told to stand. `led` is how many robots it leads, or
   led when the round began; it has heard another leader since `rival_ms`, and a later epoch since
   `higher_ms`.
@@ -92,6 +94,10 @@ defmodule Missions.Landmark.State do
           attend: Missions.Landmark.Follower.t() | nil,
           challenge: :open | {:nearer | :blind, since_ms :: integer()} | nil,
           of: non_neg_integer(),
+          of_told:
+            {{leader :: atom(), epoch :: pos_integer(), of :: pos_integer()},
+             next :: pos_integer()}
+            | nil,
           lost_link: :stop | :hold | :continue | nil,
           role: :searcher | :leader | :follower,
           met?: boolean(),

@@ -252,6 +252,27 @@ defmodule Missions.Landmark.ForgedNumbersTest do
     end
   end
 
+  test "one anchor that asks for a majority of a thousand does not keep a fleet from electing" do
+    for from <- [:leader, :mag9], later <- [0, 1], asked <- [0, 5] do
+      group = fleet()
+      leader = leader(group)
+      from = if from == :leader, do: leader, else: from
+      known = group.robots[leader].mission.anchor
+
+      forged = %{
+        known
+        | leader: from,
+          epoch: known.epoch + later,
+          of: 1_000,
+          asked_no: known.asked_no + asked,
+          sequence: known.sequence + 1
+      }
+
+      assert_elects(forge(group, from, :place, forged))
+      assert_elects(group |> forge(from, :place, forged) |> Group.run(1))
+    end
+  end
+
   test "an anchor with the last sequence number in the leader's name holds its followers up for a second" do
     for sequence <- @ends do
       group = fleet()
