@@ -103,6 +103,16 @@ defmodule Swarm.Commands.FreshnessTest do
     assert Freshness.judge(1, {:estop, {:a, 1, 1}}, nil, false, 5, nil) == {:ok, 5}
   end
 
+  test "no number in an order changes what becomes of the next one" do
+    last = 0xFFFFFFFFFFFFFFFF
+
+    for life <- [1, 0, last], at_us <- [6, last, -last, 10_000_000_000] do
+      assert Freshness.judge(1, :start, {life, at_us}, false, 5, nil) != {:ok, at_us}
+      assert Freshness.judge(1, :stop, {life, at_us}, false, 5, nil) == {:ok, 5}
+      assert Freshness.judge(1, :start, {1, 4}, false, 5, nil) == {:ok, 4}
+    end
+  end
+
   test "of two robots with one name that hear each other, the later gives way, and can still be stopped" do
     id = robot(:stamp_twin, comms: [boot: 1_000])
     :ok = listen(id, [:swarm, :comms, :duplicate_id])
