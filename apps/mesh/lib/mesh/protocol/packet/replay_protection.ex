@@ -8,7 +8,10 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   and which tells it how the clock of that session stands. From then on each datagram of the
   session must be fresh by that clock (`Mesh.Protocol.ClockOffset`): one that was recorded and
   never received is worthless 2 s later. And each counts once
-  (`Mesh.Protocol.Packet.SequenceWindow`).
+  (`Mesh.Protocol.Packet.SequenceWindow`). If nothing of a session was believed for longer than
+  datagrams are fresh, its window begins anew: whatever it keeps out is stale by now, and a number
+  far too high, which somebody with the fleet's key invented, does not shut the session out for
+  good.
 
   A session that was followed by another is never accepted again. While a node is heard, no other
   session of its name is admitted, so two nodes of the same name do not take turns.
@@ -100,8 +103,12 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   @spec copy?(t(), String.t(), non_neg_integer(), non_neg_integer()) :: boolean()
   def copy?(guard, name, session, sequence) do
     case guard.senders do
-      %{^name => %{session: ^session, window: window}} -> SequenceWindow.seen?(window, sequence)
-      _other -> false
+      # What is behind the window is judged by its time.
+      %{^name => %{session: ^session, window: window}} ->
+        SequenceWindow.seen?(window, sequence) and not SequenceWindow.behind?(window, sequence)
+
+      _other ->
+        false
     end
   end
 
@@ -154,13 +161,19 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   # An answer is fresh by itself. The newest measurement is the right one: after a computer was
   # suspended, older ones are wrong.
   defp known(guard, stamp, sender, {:ok, clock}, now_ms),
-    do: counted(guard, stamp, %{sender | clock: clock}, now_ms)
+    do: counted(guard, stamp, anew(%{sender | clock: clock}, stamp, now_ms), now_ms)
 
   defp known(guard, stamp, sender, :error, now_ms) do
     if ClockOffset.fresh?(sender.clock, stamp.time_ms, now_ms),
-      do: counted(guard, stamp, sender, now_ms),
+      do: counted(guard, stamp, anew(sender, stamp, now_ms), now_ms),
       else: {:error, :stale, guard}
   end
+
+  defp anew(%{heard_ms: heard_ms} = sender, %{sequence: sequence}, now_ms)
+       when now_ms - heard_ms > @alive_ms,
+       do: %{sender | window: SequenceWindow.new(sequence)}
+
+  defp anew(sender, _stamp, _now_ms), do: sender
 
   defp counted(guard, %{sender: name, sequence: sequence}, sender, now_ms) do
     second = div(now_ms, 1_000)

@@ -32,6 +32,10 @@ defmodule Mesh.Protocol.Packet.SequenceWindow do
   def seen?(%__MODULE__{top: top}, sequence) when top - sequence >= @width, do: true
   def seen?(window, sequence), do: (window.seen &&& 1 <<< (window.top - sequence)) != 0
 
+  @doc "Whether this number is too far behind to tell whether it was heard."
+  @spec behind?(t(), non_neg_integer()) :: boolean()
+  def behind?(%__MODULE__{top: top}, sequence), do: top - sequence >= @width
+
   @doc "The window after this number was heard; `:doubled` if it was before."
   @spec take(t(), non_neg_integer()) :: {:ok, t()} | :doubled
   def take(%__MODULE__{top: top} = window, sequence) when sequence > top do
