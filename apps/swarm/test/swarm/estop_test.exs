@@ -24,12 +24,12 @@ defmodule Swarm.EStopTest do
   test "an e-stop does not wait for a comms process that hangs, nor does a stop or the reset" do
     id = robot(:estop_hangs)
     comms = Names.whereis(id, :comms)
-    assert Swarm.goto(id, {1, 1}) == :ok
+    assert order(fn -> Swarm.goto(id, {1, 1}) end) == :ok
     :ok = :sys.suspend(comms)
-    assert Swarm.stop(id) == :ok
-    assert Swarm.estop() == :ok
+    assert order(fn -> Swarm.stop(id) end) == :ok
+    assert order(&Swarm.estop/0) == :ok
     assert latched?(id)
-    assert Swarm.reset() == :ok
+    assert order(&Swarm.reset/0) == :ok
     refute latched?(id)
     :ok = :sys.resume(comms)
 
@@ -47,7 +47,7 @@ defmodule Swarm.EStopTest do
     assert latched?(a)
     kill(a, :comms)
     eventually(fn -> latched?(b) end)
-    assert Swarm.reset() == :ok
+    assert order(&Swarm.reset/0) == :ok
   end
 
   test "all robots of a node hear a call that arrives by datagram; junk does nothing" do
@@ -73,7 +73,7 @@ defmodule Swarm.EStopTest do
     for id <- [a, b], do: eventually(fn -> latched?(id) end)
 
     # Repeats, even late ones, do not undo what a person has done.
-    assert Swarm.reset() == :ok
+    assert order(&Swarm.reset/0) == :ok
     for counter <- [7, 6, 7], do: EStop.hear(:base@hall, {:estop, call(counter), 0})
     for id <- [a, b], do: assert({{:ok, _}, false} = {Swarm.ask(id, :ping), latched?(id)})
 
@@ -88,13 +88,13 @@ defmodule Swarm.EStopTest do
     # The next call does.
     assert EStop.hear(:base@hall, {:estop, call(8), 0}) == :ok
     for id <- [a, b], do: eventually(fn -> latched?(id) end)
-    assert Swarm.reset() == :ok
+    assert order(&Swarm.reset/0) == :ok
   end
 
   test "heard calls survive the e-stop process, and the next one carries out the latch" do
     id = robot(:estop_falls)
     assert Swarm.ask(id, {:estop, call(1)}) == :ok
-    assert Swarm.reset() == :ok
+    assert order(&Swarm.reset/0) == :ok
     [gate, pilot] = [Names.whereis(id, :gate), Names.whereis(id, :pilot)]
     estop = kill(id, :estop)
     eventually(fn -> (now = Names.whereis(id, :estop)) && now != estop end)
@@ -117,7 +117,7 @@ defmodule Swarm.EStopTest do
     call = Broadcaster.sound()
     assert_receive {:"$gen_cast", {:estop, ^call, _age}}
     assert Swarm.ask(id, {:estop, call}) == :ok
-    assert Swarm.reset() == :ok
+    assert order(&Swarm.reset/0) == :ok
     :sys.get_state(Broadcaster)
     refute_receive {:"$gen_cast", {:estop, ^call, _age}}, 150
 
@@ -127,7 +127,7 @@ defmodule Swarm.EStopTest do
     for _ <- 1..3, do: assert_receive({:"$gen_cast", {:estop, ^far, _age}})
     refute_received {:"$gen_cast", {:estop, _more, _age}}
     :ok = Directory.leave(self(), [:estops])
-    assert Swarm.reset() == :ok
+    assert order(&Swarm.reset/0) == :ok
   end
 
   test "a stop spreads by heartbeats that are sent at once and then ten more times" do
@@ -145,7 +145,7 @@ defmodule Swarm.EStopTest do
     assert_receive {:carried, ^b, %Message{body: %Heartbeat{latched: true, estop: 1}}}
     eventually(fn -> latched?(b) end)
     for _ <- 1..10, do: assert_receive({:carried, ^b, %Message{kind: :heartbeat}})
-    assert Swarm.reset() == :ok
+    assert order(&Swarm.reset/0) == :ok
   end
 
   @doc false
@@ -156,10 +156,10 @@ defmodule Swarm.EStopTest do
     comms = Names.whereis(id, :comms)
     flood = start_supervised!({Task, fn -> pour(comms, id) end})
     eventually(fn -> flooded(id) > 0 end)
-    assert Swarm.estop() == :ok
+    assert order(&Swarm.estop/0) == :ok
     assert latched?(id)
-    assert {:ok, _} = Swarm.ask(id, :ping)
-    assert Swarm.reset() == :ok
+    assert {:ok, _} = order(fn -> Swarm.ask(id, :ping) end)
+    assert order(&Swarm.reset/0) == :ok
     refute latched?(id)
     stop_supervised!(Task)
     refute Process.alive?(flood)
