@@ -108,6 +108,8 @@
     # peers: ["10.0.0.12:4370"],
     # addresses: ["203.0.113.5:4370"],     # how others see it, where a router changes addresses
     # dist_port: 9101,                     # TCP
+    # allow: ["10.0.0.20"],                # who may connect by TCP besides robots that it hears: addresses
+    #                                      # and networks, such as a laptop that is not of the fleet
     # full_mesh: 30,                       # up to so many robots each is connected to each,
     # degree: 8                            # above that to so many
   ],

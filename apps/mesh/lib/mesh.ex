@@ -11,6 +11,7 @@ defmodule Mesh do
   that somebody has connected by hand. `docs/networking.md` explains how to set it up.
   """
   alias Mesh.{CommandRelay, Nonblocking, Table}
+  alias Mesh.Distribution.Access
   alias Mesh.Protocol.{NodeTable, Packet, Routing}
 
   @typedoc """
@@ -127,6 +128,14 @@ defmodule Mesh do
   @doc "How much was dropped since the start, by reason; at most 200 ms old."
   @spec rejected() :: %{atom() => pos_integer()}
   def rejected, do: Table.value(:rejected, %{})
+
+  @doc """
+  How many distribution connections were refused since the start, by reason: `stranger`, an address that is not the
+  fleet's, and `too_often`. Empty on a node that was started without a carrier of the mesh
+  (`Mesh.Distribution.Access`).
+  """
+  @spec refused() :: %{Access.refusal() => non_neg_integer()}
+  def refused, do: Access.Refusals.counts()
 
   @doc """
   How many datagrams this node has sent, heard and rejected, and its UDP port; `nil` without a

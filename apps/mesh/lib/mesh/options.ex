@@ -14,11 +14,13 @@ defmodule Mesh.Options do
   | `strategies` | further ways to find nodes, `[{Module, options}]` (`Mesh.Strategy`) |
   | `topologies` | those of `libcluster`, if it is installed (`MIX_TARGET`): any of its strategies then connects nodes |
   | `dist_port` | the port that this node's distribution listens on; default: that of `Mesh.Distribution.Epmd`, or 0 if there is an epmd to ask |
+  | `allow` | who may open a distribution connection besides the fleet's nodes that are heard: addresses and networks, `["10.0.0.20", "10.0.1.0/24"]`; for nodes that were started with a carrier of the mesh (`Mesh.Distribution.Access`) |
   | `full_mesh` | up to this number of nodes each is connected to each; default 30 |
   | `degree` | above that, each is connected to about this many others, 2 to 30; default 8 |
   """
   alias Hal.Options
   alias Mesh.{Secret, Strategy}
+  alias Mesh.Distribution.Access.Networks
   alias Mesh.Protocol.Roster
 
   @gossip {{239, 255, 67, 86}, 4371}
@@ -28,6 +30,12 @@ defmodule Mesh.Options do
     interface: [:ipv4, default: {0, 0, 0, 0}],
     port: [{:integer, 0, 65_535}, default: 4370],
     dist_port: [{:integer, 0, 65_535}, default: nil],
+    allow: [
+      {:list,
+       {:check, &__MODULE__.network?/1,
+        ~s(an address or a network, "10.0.0.20" or "10.0.1.0/24",)}, 1_000},
+      default: []
+    ],
     full_mesh: [{:integer, 2, 1_000, "nodes"}, default: 30],
     degree: [{:integer, 2, 30, "nodes"}, default: 8],
     fleet: [Roster.type(), default: nil],
@@ -60,6 +68,7 @@ defmodule Mesh.Options do
     :peers,
     :addresses,
     :dist_port,
+    :allow,
     :full_mesh,
     :degree
   ]
@@ -82,6 +91,7 @@ defmodule Mesh.Options do
           strategies: [{module(), term()}],
           topologies: keyword(),
           dist_port: :inet.port_number(),
+          allow: [String.t()],
           full_mesh: pos_integer(),
           degree: pos_integer(),
           started: [{module(), state :: term()}]
@@ -119,6 +129,13 @@ defmodule Mesh.Options do
          do: {:ok, options}
   end
 
+  @doc "The networks that may open a distribution connection by these options: those of `allow` and `peers`."
+  @spec networks(t()) :: [Networks.t()]
+  def networks(%__MODULE__{allow: allow, peers: peers}) do
+    peers = for peer <- peers, {:ok, {ip, _port}} <- [Strategy.Static.address(peer)], do: ip
+    for place <- allow ++ peers, {:ok, network} <- [Networks.read(place)], do: network
+  end
+
   defp fleet(nil), do: {:ok, Roster.fleet()}
   defp fleet([_ | _] = names), do: {:ok, names}
   defp fleet([]), do: Hal.Options.refuse("mesh", [:fleet], [], "one robot's name at least")
@@ -148,6 +165,9 @@ defmodule Mesh.Options do
 
   @doc false
   def peer?(text), do: is_binary(text) and match?({:ok, _address}, Strategy.Static.address(text))
+
+  @doc false
+  def network?(text), do: is_binary(text) and Networks.read(text) != :error
 
   # `nil` is not left out.
   @doc false

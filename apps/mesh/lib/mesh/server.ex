@@ -9,8 +9,8 @@ defmodule Mesh.Server do
   use GenServer
   alias Hal.Event
   alias Mesh.{Backoff, Nonblocking, Options, Protocol, Sockets, Table}
-  alias Mesh.Protocol.{Roster, WireTerm}
-  alias Mesh.Distribution.{Dialer, Epmd}
+  alias Mesh.Protocol.{NodeTable, Roster, WireTerm}
+  alias Mesh.Distribution.{Access, Dialer, Epmd}
 
   @tick_ms 200
   @rejoin_every 50
@@ -25,6 +25,7 @@ defmodule Mesh.Server do
     # Heartbeats must not wait behind a busy robot.
     Process.flag(:priority, :high)
     written = Table.new()
+    :ok = Access.configure(Options.networks(options))
     <<session::64>> = :crypto.strong_rand_bytes(8)
     services = consumer.services()
 
@@ -202,8 +203,10 @@ defmodule Mesh.Server do
   end
 
   # For processes that read it without asking.
-  defp publish(%{protocol: %{node_table: node_table, roster: roster, rejected: rejected}} = s),
-    do: %{s | written: Table.write(s.written, node_table, roster, rejected, now())}
+  defp publish(%{protocol: %{node_table: node_table, roster: roster, rejected: rejected}} = s) do
+    :ok = Access.heard(for({ip, _port} <- NodeTable.addresses(node_table), do: ip), now())
+    %{s | written: Table.write(s.written, node_table, roster, rejected, now())}
+  end
 
   # The address that the connection to a node goes to.
   defp ip(node) do

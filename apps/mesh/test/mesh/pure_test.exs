@@ -2,6 +2,7 @@ defmodule Mesh.PureTest do
   use ExUnit.Case, async: true
   alias Mesh.Options
   alias Mesh.Protocol.{Beacon, NodeTable, Routing}
+  alias Mesh.Distribution.Access.Networks
   alias Mesh.Distribution.Topology
 
   doctest Mesh.Backoff
@@ -107,6 +108,8 @@ defmodule Mesh.PureTest do
           {[addresses: ["10.0.0.1"]], "mesh option addresses.1 cannot be"},
           {[addresses: List.duplicate("10.0.0.1:1", 9)], "mesh option addresses cannot be"},
           {[peers: :all], "mesh option peers cannot be :all: a list of addresses such as"},
+          {[allow: ["10.0.1.7/24"]],
+           ~s(mesh option allow.1 cannot be "10.0.1.7/24": an address or a network)},
           {[interface: "eth0"], ~s(mesh option interface cannot be "eth0": an IPv4 address)},
           {[multicast: nil], "mesh option multicast cannot be nil"},
           {[fleet: []], "mesh option fleet cannot be []"},
@@ -129,5 +132,15 @@ defmodule Mesh.PureTest do
     assert {:ok, %Options{port: 4370, addresses: []}} = Options.new(secret: secret)
     assert {:ok, options} = Options.new(secret: secret, addresses: ["10.0.0.7:4370"])
     assert options.addresses == [{{10, 0, 0, 7}, 4370}]
+  end
+
+  test "allowed networks and the addresses of peers may connect" do
+    secret = Mesh.Air.secret()
+    options = [secret: secret, peers: ["10.0.0.7:4370"], allow: ["10.0.1.0/24", "10.0.0.20"]]
+    assert {:ok, options} = Options.new(options)
+    networks = Options.networks(options)
+
+    for {ip, in?} <- [{{10, 0, 0, 7}, true}, {{10, 0, 1, 99}, true}, {{10, 0, 0, 21}, false}],
+        do: assert(Networks.find(networks, ip) != nil == in?)
   end
 end

@@ -79,7 +79,7 @@ defmodule Swarm.MemberSpecTest do
              "mag1.exs:2: policies.formation: cannot be :colum: :column, :line, :wedge, :triangle, :diamond or :circle is allowed; did you mean :column?",
              "mag1.exs:3: policies.leader_chagne: is not known: allowed are mission, formation, assign, leader_change, colour, policy, of, lost_link; did you mean leader_change?",
              "mag1.exs:3: policies.of: cannot be 0: a whole number from 1 to 1000 robots of the fleet is allowed",
-             "mag1.exs:4: network.zzz: is not known: allowed are secret_file, interface, port, multicast, peers, addresses, dist_port, full_mesh, degree",
+             "mag1.exs:4: network.zzz: is not known: allowed are secret_file, interface, port, multicast, peers, addresses, dist_port, allow, full_mesh, degree",
              "mag1.exs:4: network.port: cannot be -1: a whole number from 0 to 65535 is allowed",
              "mag1.exs:5: network.multicast: cannot be 0: a whole number from 1 to 65535 is allowed",
              "mag1.exs:5: network.peers.1: cannot be \"10.0.0.7\": address and port, such as \"10.0.0.7:4370\", is allowed"

@@ -18,7 +18,7 @@ defmodule Mesh.Distribution.ConnectionLogTest do
     lines = Enum.reject(String.split(text, "\n"), &(&1 =~ ~r/\{(certfile|keyfile)/))
     File.write!(none, Enum.join(lines, "\n"))
 
-    door = node("door", 9761, conf(ours, "door"))
+    door = node("door", 9761, conf(ours, "door"), "right", "Elixir.Mesh.Distribution.Tls")
     log = Path.join(tmp, "log")
     :ok = Vm.call(door, ConnectionLog, :install, [])
     handler = %{config: %{file: String.to_charlist(log)}}
@@ -76,8 +76,8 @@ defmodule Mesh.Distribution.ConnectionLogTest do
 
   defp conf(folder, name), do: Path.expand(Path.join([folder, name, "ssl_dist.conf"]))
 
-  defp node(name, port, papers, cookie \\ "right") do
-    tls = if papers, do: ["-proto_dist", "inet_tls", "-ssl_dist_optfile", papers], else: []
+  defp node(name, port, papers, cookie \\ "right", carrier \\ "inet_tls") do
+    tls = if papers, do: ["-proto_dist", carrier, "-ssl_dist_optfile", papers], else: []
 
     flags =
       ~w(-start_epmd false -epmd_module Elixir.Mesh.Distribution.Epmd -kernel dist_auto_connect never) ++
