@@ -1,7 +1,5 @@
-# Its helpers; what of them runs on the robots' nodes is shipped there.
-modules =
-  for file <- ~w(net robot story fleet), do: Code.require_file("netns/#{file}.exs", __DIR__)
-
+Code.require_file("netns/load.exs", __DIR__)
+modules = :persistent_term.get(:netns_modules)
 why_not = Netns.Net.why_not()
 if why_not, do: IO.puts("the tests in network namespaces are skipped: #{why_not}")
 
@@ -46,7 +44,7 @@ defmodule System.NetnsTest do
   @place_m 0.35
   # Till then what is judged by the logs' times has happened on the busiest machine.
   @patience_ms 30_000
-  @modules List.flatten(modules)
+  @modules modules
 
   setup do
     folder =
@@ -56,7 +54,7 @@ defmodule System.NetnsTest do
 
     poses = for {robot, y} <- @places, do: {robot, Pose.new(-1.7, y, :math.atan2(-y, 1.7))}
 
-    {:ok, fleet} = Fleet.start_link({poses, folder, @modules})
+    {:ok, fleet} = Fleet.start_link({poses, folder, @modules, []})
     net = Fleet.net(fleet)
     on_exit(fn -> Net.delete(net) end)
     met(fleet)

@@ -71,7 +71,7 @@ defmodule Docs.Checks do
       @system,
     "nft add rule inet filter input ip saddr != 10.0.0.0/24 tcp dport 9101-9303 drop" => @system,
     "nft add rule inet filter input ip saddr != 10.0.0.0/24 udp dport 4370-4371 drop" => @system,
-    "erl … -proto_dist inet_tls -ssl_dist_optfile certs/mag1/ssl_dist.conf" =>
+    "erl … -proto_dist Elixir.Mesh.Distribution.Tls -ssl_dist_optfile certs/mag1/ssl_dist.conf" =>
       "it is a part of a command; apps/mesh/test/mesh/distribution/connection_log_test.exs runs such nodes",
     ~S(iex --sname rem-1@lab --hidden --cookie "$COOKIE" --remsh mag1@lab --erl "-start_epmd false -kernel net_ticktime 8 -epmd_module Elixir.Mesh.Distribution.Epmd -pa _build/dev/lib/mesh/ebin") =>
       @robot

@@ -8,19 +8,34 @@ defmodule Netns.Fleet do
   alias Mesh.Secret
   alias Mesh.Distribution.Epmd
 
-  @flags ~w(-start_epmd false -epmd_module Elixir.Mesh.Distribution.Epmd -kernel logger_level none)
+  @flags ~w(-start_epmd false -epmd_module Elixir.Mesh.Distribution.Epmd
+            -kernel logger_level none)
+  @tcp ~w(-proto_dist Elixir.Mesh.Distribution.Tcp)
   # How often the logs are read while something is awaited.
   @look_ms 200
   @boot_ms 30_000
 
   @doc """
   Makes the network and the robots, from `{name, pose}`; `folder` is for their logs, `shipped` are the
-  modules that run there besides the project's, as `{module, code}`.
+  modules that run there besides the project's, as `{module, code}`. Options: `guests`, who
+  are in the network only, and `carrier`, a function from a robot's name to those arguments of its Erlang that choose
+  the distribution's carrier (TCP).
   """
-  def start_link({poses, folder, shipped}) do
-    net = Net.create(Keyword.keys(poses), folder)
+  def start_link({poses, folder, shipped, options}) do
+    options = Keyword.validate!(options, guests: [], carrier: fn _robot -> @tcp end)
+    net = Net.create(Keyword.keys(poses), folder, options[:guests])
     parts = {Log.now(), :net, :parts, [net.robots]}
-    s = %{net: net, folder: folder, shipped: shipped, nodes: %{}, offsets: %{}, lines: [parts]}
+
+    s = %{
+      net: net,
+      folder: folder,
+      shipped: shipped,
+      carrier: options[:carrier],
+      nodes: %{},
+      offsets: %{},
+      lines: [parts]
+    }
+
     {:ok, fleet} = Agent.start_link(fn -> s end)
 
     switch_on(fleet, net.robots, poses)
@@ -35,12 +50,15 @@ defmodule Netns.Fleet do
 
   @doc "Calls a function on a robot's node."
   def call(fleet, robot, m, f, a, timeout \\ 10_000) do
-    Vm.call(Agent.get(fleet, & &1.nodes[robot]), m, f, a, timeout)
+    Vm.call(node(fleet, robot), m, f, a, timeout)
   end
+
+  @doc "A robot's node."
+  def node(fleet, robot), do: Agent.get(fleet, & &1.nodes[robot])
 
   @doc "Ends a robot's node, as `kill -9` does. Says when."
   def kill(fleet, robot) do
-    node = Agent.get(fleet, & &1.nodes[robot])
+    node = node(fleet, robot)
     us = Log.now()
     Vm.signal(node, "KILL")
     note(fleet, us, :killed, robot)
@@ -134,7 +152,7 @@ defmodule Netns.Fleet do
 
   defp switch_on(fleet, robots, poses) do
     s = Agent.get(fleet, & &1)
-    nodes = Vm.start(for robot <- robots, do: node(s.net, robot))
+    nodes = Vm.start(for robot <- robots, do: options(s, robot))
 
     robots
     |> Enum.zip(nodes)
@@ -144,9 +162,10 @@ defmodule Netns.Fleet do
     Agent.update(fleet, &%{&1 | nodes: Enum.into(Enum.zip(robots, nodes), &1.nodes)})
   end
 
-  defp node(net, robot) do
+  defp options(%{net: net, carrier: carrier}, robot) do
     # On all addresses, for they may change.
-    flags = Vm.fleet_flags({0, 0, 0, 0}) ++ @flags ++ ["-setcookie", net.prefix]
+    flags = Vm.fleet_flags({0, 0, 0, 0}) ++ @flags ++ carrier.(robot)
+    flags = flags ++ ["-setcookie", net.prefix]
     through = ["ip", "netns", "exec", Net.space(net, robot)]
     [name: robot, host: "convoy", flags: flags, through: through]
   end

@@ -2,7 +2,7 @@ defmodule Netns.Net do
   @moduledoc """
   A network of our own on this machine: a namespace with two bridges (the switch), and one for
   each robot, with a cable to the switch. Nothing of it is seen outside, and it goes with whoever
-  made it, however that ends.
+  made it, however that ends. Guests have namespaces and cables as robots do, and belong to nobody's fleet.
 
       net = Netns.Net.create([:mag1, :mag2, :mag3], folder)
       Netns.Net.split(net, [[:mag1, :mag2], [:mag3]])
@@ -12,9 +12,14 @@ defmodule Netns.Net do
   """
 
   @enforce_keys [:prefix, :robots, :guard]
-  defstruct @enforce_keys
+  defstruct @enforce_keys ++ [guests: []]
 
-  @type t :: %__MODULE__{prefix: String.t(), robots: [atom()], guard: port()}
+  @type t :: %__MODULE__{
+          prefix: String.t(),
+          robots: [atom()],
+          guard: port(),
+          guests: [atom()]
+        }
 
   # Reads until its input ends, which is when the VM that opened it does. A veth goes at once and takes its
   # other end along; a namespace goes when the kernel has time.
@@ -64,12 +69,13 @@ defmodule Netns.Net do
     end
   end
 
-  @doc "Makes a network of these robots, all of whom reach all. The folder goes with it."
-  @spec create([atom(), ...], Path.t()) :: t()
-  def create(robots, folder) do
+  @doc "Makes a network of these robots and guests, all of whom reach all. The folder goes with it."
+  @spec create([atom(), ...], Path.t(), [atom()]) :: t()
+  def create(robots, folder, guests \\ []) do
     prefix = "convoy#{random()}"
-    names = for who <- [:switch | robots], do: "#{prefix}-#{who}"
-    net = %__MODULE__{prefix: prefix, robots: robots, guard: guard(folder, names)}
+    names = for who <- [:switch | robots ++ guests], do: "#{prefix}-#{who}"
+    guard = guard(folder, names)
+    net = %__MODULE__{prefix: prefix, robots: robots, guard: guard, guests: guests}
     Enum.each(names, &ip(~w(netns add #{&1})))
 
     for bridge <- ~w(br0 br1) do
@@ -77,7 +83,7 @@ defmodule Netns.Net do
       ip(~w(-n #{hd(names)} link set #{bridge} up))
     end
 
-    for robot <- robots, do: plug_in(net, robot)
+    for who <- robots ++ guests, do: plug_in(net, who)
     net
   end
 
@@ -108,11 +114,11 @@ defmodule Netns.Net do
     end
   end
 
-  @doc "The namespace of a robot."
+  @doc "The namespace of a robot or guest."
   @spec space(t(), atom()) :: String.t()
   def space(net, robot), do: "#{net.prefix}-#{robot}"
 
-  @doc "The address of a robot."
+  @doc "The address of a robot or guest."
   @spec address(t(), atom()) :: :inet.ip4_address()
   def address(net, robot), do: {10, 77, 0, number(net, robot)}
 
@@ -180,7 +186,7 @@ defmodule Netns.Net do
   end
 
   defp port(net, robot), do: "p#{number(net, robot)}"
-  defp number(net, robot), do: Enum.find_index(net.robots, &(&1 == robot)) + 1
+  defp number(net, who), do: Enum.find_index(net.robots ++ net.guests, &(&1 == who)) + 1
   defp text(address), do: address |> :inet.ntoa() |> List.to_string()
   defp random, do: 4 |> :crypto.strong_rand_bytes() |> Base.encode16(case: :lower)
 end
