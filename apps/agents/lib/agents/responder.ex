@@ -25,7 +25,7 @@ defmodule Agents.Responder do
   otherwise four bad envelopes within five seconds would end the robot.
   """
   use GenServer
-  alias Hal.Event
+  alias Hal.{Event, HardenedServer}
   alias Robot.{Config, Names}
   alias Agents.{Conversation, Envelope, Inbox}
   alias Swarm.Directory
@@ -90,7 +90,7 @@ defmodule Agents.Responder do
         raise(ArgumentError, "module cannot be #{inspect(options[:module])}: an Agents.Responder")
 
     via = Names.via(name, {:service, options[:service]})
-    GenServer.start_link(__MODULE__, {name, options}, name: via)
+    HardenedServer.start_link(__MODULE__, {name, options}, name: via)
   end
 
   # The exports of a module are known only once it is loaded.
@@ -123,10 +123,10 @@ defmodule Agents.Responder do
 
   @impl GenServer
   def handle_call(:counts, _from, s), do: {:reply, Inbox.counts(s.inbox), s}
-  def handle_call(_unknown, _from, s), do: {:noreply, s}
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
-  def handle_cast(_unknown, s), do: {:noreply, s}
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info(message, s) do

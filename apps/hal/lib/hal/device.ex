@@ -60,7 +60,7 @@ defmodule Hal.Device do
   `acknowledge/1` is needed first. The reading `{:arming, %{state: state, why: line or nil}}`
   reports the state.
   """
-  alias Hal.Twist
+  alias Hal.{HardenedServer, Twist}
   alias Hal.Device.Arming
   alias Hal.Device.{Server, State}
 
@@ -74,7 +74,7 @@ defmodule Hal.Device do
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options) do
     {name, options} = Keyword.split(options, [:name])
-    GenServer.start_link(Server, State.new!(options), name)
+    HardenedServer.start_link(Server, State.new!(options), name)
   end
 
   @doc "A child specification; a supervisor may have several devices if their names differ."

@@ -2,13 +2,19 @@ defmodule Hal.Ticker do
   @moduledoc """
   Sends its owner the same message again and again, at absolute times, so that the pace does not
   drift. Missed ticks are not made up for. The owner requests each tick after it has handled the
-  last one.
+  last one. A request replaces the one before, so that a tick that somebody else sent does not
+  double the pace for ever.
   """
   @enforce_keys [:message, :period_ms, :due_ms]
-  defstruct @enforce_keys
+  defstruct @enforce_keys ++ [timer: nil]
 
   @typedoc "`due_ms` is when the next message is due, or the last one was due, in monotonic time."
-  @type t :: %__MODULE__{message: term(), period_ms: pos_integer(), due_ms: integer()}
+  @type t :: %__MODULE__{
+          message: term(),
+          period_ms: pos_integer(),
+          due_ms: integer(),
+          timer: reference() | nil
+        }
 
   @doc "Sends the caller the first `message`, `first_ms` from now."
   @spec start(message :: term(), period_ms :: pos_integer(), first_ms :: non_neg_integer()) :: t()
@@ -26,8 +32,8 @@ defmodule Hal.Ticker do
     do: arm(%{ticker | due_ms: due(ticker.due_ms, ticker.period_ms, now())})
 
   defp arm(ticker) do
-    Process.send_after(self(), ticker.message, ticker.due_ms, abs: true)
-    ticker
+    if ticker.timer, do: Process.cancel_timer(ticker.timer)
+    %{ticker | timer: Process.send_after(self(), ticker.message, ticker.due_ms, abs: true)}
   end
 
   @doc """

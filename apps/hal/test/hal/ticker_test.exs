@@ -21,6 +21,14 @@ defmodule Hal.TickerTest do
     refute_received :tick
   end
 
+  test "a tick that somebody else sent does not double the pace" do
+    ticker = Ticker.start(:tick, 50, 50)
+    ticker = Enum.reduce(1..10, ticker, fn _forged, ticker -> Ticker.next(ticker) end)
+    {:messages, []} = Process.info(self(), :messages)
+    assert is_integer(Process.cancel_timer(ticker.timer))
+    refute_receive :tick, 100
+  end
+
   test "where somebody else sets the pace, nothing comes" do
     assert Ticker.next(nil) == nil
   end

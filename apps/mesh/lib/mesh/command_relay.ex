@@ -8,6 +8,7 @@ defmodule Mesh.CommandRelay do
   cannot be passed on is lost, and the caller gives up by itself.
   """
   use GenServer
+  alias Hal.HardenedServer
   alias Mesh.Nonblocking
   alias Mesh.Protocol.WireTerm
   alias Mesh.Distribution.Topology
@@ -19,7 +20,7 @@ defmodule Mesh.CommandRelay do
 
   @doc "Starts the relay of this node, with the module that takes commands (`Mesh.Consumer`)."
   @spec start_link(module()) :: GenServer.on_start()
-  def start_link(consumer), do: GenServer.start_link(__MODULE__, consumer, name: __MODULE__)
+  def start_link(consumer), do: HardenedServer.start_link(__MODULE__, consumer, name: __MODULE__)
 
   @doc """
   Sends a request to a robot on `node`. `ref` is the alias in it for the answer.
@@ -39,7 +40,7 @@ defmodule Mesh.CommandRelay do
 
   # It has a name that connected nodes can send to, so anything may arrive here.
   @impl GenServer
-  def handle_call(_unknown, _from, s), do: {:noreply, s}
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_cast({:there, [], [_ | _] = back, robot, request, ref}, s) when is_tuple(request) do
@@ -65,7 +66,7 @@ defmodule Mesh.CommandRelay do
     {:noreply, s}
   end
 
-  def handle_cast(_unknown, s), do: {:noreply, s}
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info({:forget, own}, s) when is_map_key(s.asked, own) do
@@ -80,7 +81,7 @@ defmodule Mesh.CommandRelay do
     {:noreply, %{s | asked: asked}}
   end
 
-  def handle_info(_other, s), do: {:noreply, s}
+  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   # The robot answers this process, which knows the way back.
   defp ask(s, robot, request, ref, back) do

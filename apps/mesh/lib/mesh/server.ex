@@ -7,7 +7,7 @@ defmodule Mesh.Server do
   Sockets that cannot be opened are tried again with back-off; a robot without a network drives on.
   """
   use GenServer
-  alias Hal.Event
+  alias Hal.{Event, HardenedServer}
   alias Mesh.{Backoff, Nonblocking, Options, Protocol, Sockets, Table}
   alias Mesh.Protocol.{NodeTable, Roster, WireTerm}
   alias Mesh.Distribution.{Access, Dialer, Epmd}
@@ -18,7 +18,7 @@ defmodule Mesh.Server do
   @doc "Starts the server of this node, with the module that receives what it hears."
   @spec start_link({Options.t(), consumer :: module()}) :: GenServer.on_start()
   def start_link({%Options{}, _consumer} = start),
-    do: GenServer.start_link(__MODULE__, start, name: __MODULE__)
+    do: HardenedServer.start_link(__MODULE__, start, name: __MODULE__)
 
   @impl GenServer
   def init({%Options{} = options, consumer}) do
@@ -92,7 +92,7 @@ defmodule Mesh.Server do
   end
 
   # Connected nodes may send anything.
-  def handle_cast(_unknown, s), do: {:noreply, s}
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_call(:counts, _from, s) do
@@ -100,7 +100,7 @@ defmodule Mesh.Server do
     {:reply, Map.put(counts, :port, s.sockets && s.sockets.port), s}
   end
 
-  def handle_call(_unknown, _from, s), do: {:noreply, s}
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info({:udp, socket, ip, port, datagram}, %{sockets: %Sockets{} = sockets} = s)
@@ -125,7 +125,7 @@ defmodule Mesh.Server do
 
   # A reset of the network shows as an error on the socket.
   def handle_info({:udp_error, _socket, _reason}, s), do: {:noreply, s}
-  def handle_info(_other, s), do: {:noreply, s}
+  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   defp open(%{sockets: nil} = s) do
     if Backoff.due?(s.backoff, now()), do: try_open(s), else: s

@@ -274,7 +274,7 @@ defmodule Swarm.OrdersTest do
       standing([id])
       :ok = Pilot.start(id, Deaf, goal: @roll)
       rolls(id)
-      :gen_statem.cast(Names.via(id, :pilot), {:command, :hang})
+      GenServer.cast(Names.via(id, :pilot), {:command, :hang})
       assert Swarm.stop(id) == {:error, "orders_hangs does not answer"}
       stands(id)
     end

@@ -47,6 +47,7 @@ defmodule Robot.Board do
   of the machine: the file exists while the latch is set.
   """
   use GenServer
+  alias Hal.HardenedServer
   alias Robot.{Config, Names}
   alias Vision.Detections
 
@@ -103,14 +104,14 @@ defmodule Robot.Board do
 
   @doc "Starts the board of a robot."
   @spec start_link(Config.t()) :: GenServer.on_start()
-  def start_link(%Config{} = config), do: GenServer.start_link(__MODULE__, config)
+  def start_link(%Config{} = config), do: HardenedServer.start_link(__MODULE__, config)
 
   @doc "The board of a robot on this node."
   @spec find(robot :: atom()) :: {:ok, t()} | :error
   def find(robot) do
-    case Registry.lookup(Names, {robot, :board}) do
-      [{_pid, board}] -> {:ok, board}
-      [] -> :error
+    case Names.lookup(robot, :board) do
+      {_pid, board} -> {:ok, board}
+      nil -> :error
     end
   end
 
@@ -243,11 +244,20 @@ defmodule Robot.Board do
 
     if board.file && File.exists?(board.file), do: :ets.insert(board.latch, {:estop, true})
 
-    case Registry.register(Names, {config.id, :board}, board) do
-      {:ok, _} -> {:ok, board}
+    case Names.register(config.id, :board, board) do
+      :ok -> {:ok, board}
       {:error, {:already_registered, pid}} -> {:stop, {:already_started, pid}}
     end
   end
+
+  @impl GenServer
+  def handle_call(_unknown, _from, board), do: HardenedServer.drop(board)
+
+  @impl GenServer
+  def handle_cast(_unknown, board), do: HardenedServer.drop(board)
+
+  @impl GenServer
+  def handle_info(_unknown, board), do: HardenedServer.drop(board)
 
   defp writer({:peer, _id}), do: :comms
   defp writer({:health, device}), do: device

@@ -21,13 +21,14 @@ defmodule Robot.Devices do
   cure, and the robot's supervisor handles the failure.
   """
   use Supervisor
+  alias Hal.HardenedSupervisor
   alias Robot.{Board, Config, Names}
   alias Robot.Control.Pilot
   alias Robot.Safety.Gate
 
   @doc "Starts the devices of a robot whose board is running."
   @spec start_link(Config.t()) :: Supervisor.on_start()
-  def start_link(%Config{} = config), do: Supervisor.start_link(__MODULE__, config)
+  def start_link(%Config{} = config), do: HardenedSupervisor.start_link(__MODULE__, config)
 
   @impl Supervisor
   def init(%Config{id: id} = config) do

@@ -19,6 +19,7 @@ defmodule Robot.Supervisor do
   `Robot.Fleet` determines what happens then.
   """
   use Supervisor
+  alias Hal.HardenedSupervisor
   alias Robot.{Board, Config, Devices, Names}
   alias Robot.Control.{Executive, Pilot}
   alias Robot.Safety.{Gate, LivenessMonitor}
@@ -26,7 +27,7 @@ defmodule Robot.Supervisor do
   @doc "Starts a robot. `Robot.Names` must be running."
   @spec start_link(Config.t()) :: Supervisor.on_start()
   def start_link(%Config{} = config),
-    do: Supervisor.start_link(__MODULE__, config, name: Names.via(config.id, :robot))
+    do: HardenedSupervisor.start_link(__MODULE__, config, name: Names.via(config.id, :robot))
 
   @doc "The child specification of a robot, with the robot's id as part of the child's id."
   @spec child_spec(Config.t()) :: Supervisor.child_spec()

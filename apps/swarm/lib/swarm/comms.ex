@@ -27,7 +27,7 @@ defmodule Swarm.Comms do
     * `:boot` - a number that grows with every start; by default the time of day
   """
   use GenServer
-  alias Hal.{Event, Ticker}
+  alias Hal.{Event, HardenedServer, Ticker}
   alias Robot.{Board, Config, Names}
   alias Robot.Control.Pilot
   alias Mesh.Nonblocking
@@ -71,7 +71,7 @@ defmodule Swarm.Comms do
   @doc "Starts the comms process of a robot, as its supervisor does."
   @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
   def start_link(%Config{} = config, options) do
-    GenServer.start_link(__MODULE__, {config, options},
+    HardenedServer.start_link(__MODULE__, {config, options},
       name: Names.via(config.id, :comms),
       spawn_opt: [message_queue_data: :off_heap]
     )

@@ -29,6 +29,7 @@ defmodule Swarm.EStop do
   This module is the interface; the process is `Swarm.EStop.Server`, its actions are in
   `Swarm.EStop.Actions`.
   """
+  alias Hal.HardenedServer
   alias Robot.{Board, Config, Names}
   alias Swarm.EStop
   alias Swarm.Membership.Heartbeat
@@ -42,7 +43,7 @@ defmodule Swarm.EStop do
   @doc "Starts the e-stop process of a robot, as its supervisor does."
   @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
   def start_link(%Config{} = config, _options) do
-    GenServer.start_link(EStop.Server, config,
+    HardenedServer.start_link(EStop.Server, config,
       name: Names.via(config.id, :estop),
       spawn_opt: [priority: :high, message_queue_data: :off_heap]
     )

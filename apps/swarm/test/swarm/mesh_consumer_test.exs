@@ -32,7 +32,7 @@ defmodule Swarm.MeshConsumerTest do
   end
 
   test "messages and commands reach the comms process of a robot, and no other" do
-    {:ok, _} = Registry.register(Names, {:consumer1, :comms}, nil)
+    :ok = Names.register(:consumer1, :comms, nil)
     assert MeshConsumer.deliver([:consumer1, :consumer_away], :b@lab, beat(:mag1)) == :ok
     assert_received {:"$gen_cast", {:hear, %Message{from: :mag1}}}
     ref = make_ref()

@@ -26,8 +26,12 @@ defmodule Vision.BlobDetector do
   a pan-tilt unit's device its readings by `{Vision.BlobDetector, :aim, [detector]}`.
   """
   use GenServer
-  alias Hal.{Frame, Ptz}
+  alias Hal.{Frame, HardenedServer, Ptz}
   alias Vision.{Colours, Detections}
+
+  defguardp is_aim(reading)
+            when is_map(reading) and is_number(reading.pan) and is_number(reading.tilt) and
+                   is_number(reading.field_of_view)
 
   @type status :: %{
           read: non_neg_integer(),
@@ -40,7 +44,7 @@ defmodule Vision.BlobDetector do
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options) do
     {name, options} = Keyword.split(options, [:name])
-    GenServer.start_link(__MODULE__, check!(options), name)
+    HardenedServer.start_link(__MODULE__, check!(options), name)
   end
 
   @doc """
@@ -71,7 +75,8 @@ defmodule Vision.BlobDetector do
   end
 
   @impl GenServer
-  def handle_cast({:aim, reading}, state), do: {:noreply, note(reading, state)}
+  def handle_cast({:aim, reading}, state) when is_aim(reading),
+    do: {:noreply, note(reading, state)}
 
   def handle_cast({:frame, frame}, state) do
     {frame, dropped} = newest(frame, 0)
@@ -87,8 +92,14 @@ defmodule Vision.BlobDetector do
     end
   end
 
+  def handle_cast(_unknown, state), do: HardenedServer.drop(state)
+
   @impl GenServer
   def handle_call(:status, _from, state), do: {:reply, state.counts, state}
+  def handle_call(_unknown, _from, state), do: HardenedServer.drop(state)
+
+  @impl GenServer
+  def handle_info(_unknown, state), do: HardenedServer.drop(state)
 
   # Frames that have come in the meantime are further down in the mailbox.
   defp newest(frame, dropped) do
@@ -103,7 +114,7 @@ defmodule Vision.BlobDetector do
   # taken.
   defp newest_aim(state) do
     receive do
-      {:"$gen_cast", {:aim, reading}} -> newest_aim(note(reading, state))
+      {:"$gen_cast", {:aim, reading}} when is_aim(reading) -> newest_aim(note(reading, state))
     after
       0 -> state
     end

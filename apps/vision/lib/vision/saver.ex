@@ -23,7 +23,7 @@ defmodule Vision.Saver do
   require.
   """
   use GenServer
-  alias Hal.Event
+  alias Hal.{Event, HardenedServer}
   alias Vision.Saver.{Options, Retention}
   alias Vision.View
 
@@ -49,8 +49,11 @@ defmodule Vision.Saver do
     {ours, given} = Keyword.split(options, [:prefix, :view, :name])
 
     case options(given) do
-      {:ok, given} -> GenServer.start_link(__MODULE__, given ++ ours, Keyword.take(ours, [:name]))
-      {:error, line} -> raise ArgumentError, line
+      {:ok, given} ->
+        HardenedServer.start_link(__MODULE__, given ++ ours, Keyword.take(ours, [:name]))
+
+      {:error, line} ->
+        raise ArgumentError, line
     end
   end
 
@@ -75,6 +78,11 @@ defmodule Vision.Saver do
     {files, bytes} = if s.retention, do: Retention.size(s.retention), else: {0, 0}
     {:reply, %{files: files, bytes: bytes, saved: s.saved, why: s.why}, s}
   end
+
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
+
+  @impl GenServer
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info({:picture, ref, picture}, %{ref: ref} = s) do

@@ -4,8 +4,9 @@ defmodule Hal.Device.Server do
   which `Hal.Device.Lifecycle` and `Hal.Device.Wishes` do.
   """
   use GenServer
+  import Hal.HardenedServer, only: [is_mfa: 1]
   alias Hal.Device.{Lifecycle, Publisher, State, Wishes}
-  alias Hal.Twist
+  alias Hal.{HardenedServer, Twist}
 
   @rest_ms 500
 
@@ -34,7 +35,7 @@ defmodule Hal.Device.Server do
   @impl GenServer
   def handle_call(:arming, _from, s), do: {:reply, s.arming, s}
 
-  def handle_call({:arm, until_ms}, _from, s) do
+  def handle_call({:arm, until_ms}, _from, s) when is_integer(until_ms) do
     {answer, s} = order(s, :arm, until_ms)
     {:reply, answer, s}
   end
@@ -44,29 +45,35 @@ defmodule Hal.Device.Server do
     {:reply, answer, s}
   end
 
-  @impl GenServer
-  def handle_cast({:drive, twist}, %{kind: :drive, inner: {:open, _}} = s),
-    do: {:noreply, Lifecycle.drive(s, twist)}
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
-  def handle_cast({:disarm, then}, %{kind: :drive} = s) do
+  @impl GenServer
+  def handle_cast({:drive, %Twist{linear: linear, turn: turn} = twist}, %{kind: :drive} = s)
+      when is_number(linear) and is_number(turn) do
+    # A speed is valid only now.
+    if s.inner == :closed, do: {:noreply, s}, else: {:noreply, Lifecycle.drive(s, twist)}
+  end
+
+  def handle_cast({:disarm, then}, %{kind: :drive} = s) when then == nil or is_mfa(then) do
     {_answer, s} = Lifecycle.order(s, :disarm)
     with {m, f, a} <- then, do: apply(m, f, a)
     {:noreply, s}
   end
 
-  def handle_cast({:order, order, until_ms, {m, f, a}}, s) do
+  def handle_cast({:order, order, until_ms, {m, f, a} = reply}, s)
+      when order in [:arm, :disarm, :acknowledge] and is_integer(until_ms) and is_mfa(reply) do
     {answer, s} = order(s, order, until_ms)
     apply(m, f, a ++ [answer])
     {:noreply, s}
   end
 
-  def handle_cast({:look, pan, tilt}, %{kind: :ptz} = s),
+  def handle_cast({:look, pan, tilt}, %{kind: :ptz} = s) when is_float(pan) and is_float(tilt),
     do: {:noreply, Wishes.wish(s, :look, [pan, tilt])}
 
-  def handle_cast({:zoom, angle}, %{kind: :ptz} = s),
+  def handle_cast({:zoom, angle}, %{kind: :ptz} = s) when is_float(angle),
     do: {:noreply, Wishes.wish(s, :zoom, [angle])}
 
-  def handle_cast(_command, s), do: {:noreply, s}
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info({:open, ref}, %{retry: ref} = s), do: {:noreply, open(%{s | retry: nil})}

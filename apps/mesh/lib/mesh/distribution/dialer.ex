@@ -7,7 +7,7 @@ defmodule Mesh.Distribution.Dialer do
   This does not decide whether a node is alive: datagrams do (`Mesh.Protocol.NodeTable`).
   """
   use GenServer
-  alias Hal.Event
+  alias Hal.{Event, HardenedServer}
   alias Mesh.{Backoff, Options}
   alias Mesh.Protocol.Roster
   alias Mesh.Distribution.Topology
@@ -22,7 +22,7 @@ defmodule Mesh.Distribution.Dialer do
   @doc "Starts the dialer of this node."
   @spec start_link(Options.t()) :: GenServer.on_start()
   def start_link(%Options{} = options),
-    do: GenServer.start_link(__MODULE__, options, name: __MODULE__)
+    do: HardenedServer.start_link(__MODULE__, options, name: __MODULE__)
 
   @doc "Tells the dialer about a node."
   @spec note(:up | :suspect | :gone, node()) :: :ok
@@ -55,7 +55,7 @@ defmodule Mesh.Distribution.Dialer do
 
   # It has a name that connected nodes can send to, so anything may arrive here.
   @impl GenServer
-  def handle_call(_unknown, _from, s), do: {:noreply, s}
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_cast({:note, :up, node}, s) do
@@ -94,7 +94,7 @@ defmodule Mesh.Distribution.Dialer do
   def handle_info({:DOWN, monitor, :process, _pid, _reason}, s),
     do: {:noreply, %{s | dialling: Map.delete(s.dialling, monitor)}}
 
-  def handle_info(_other, s), do: {:noreply, s}
+  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   defp row(now), do: %{since_ms: now, backoff: Backoff.new(now)}
 

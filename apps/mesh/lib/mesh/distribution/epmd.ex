@@ -20,7 +20,6 @@ defmodule Mesh.Distribution.Epmd do
   the table. Without that process (a node with the usual epmd) `learn/3` does nothing. A full
   table accepts no more names. No text becomes an atom here.
   """
-  use GenServer
   alias Mesh.Distribution.Epmd.Peers
 
   @table __MODULE__
@@ -57,30 +56,31 @@ defmodule Mesh.Distribution.Epmd do
   @spec default_port(text()) :: 9_101..9_999
   def default_port(name), do: Peers.default_port(to_string(name))
 
-  # If the port mapper of a distribution crashes, the node ends, so nothing that arrives here may
-  # crash it.
-  @impl GenServer
-  def handle_call(_unknown, _from, s), do: {:noreply, s}
-
-  @impl GenServer
-  def handle_cast(_unknown, s), do: {:noreply, s}
-
-  @impl GenServer
-  def handle_info(_unknown, s), do: {:noreply, s}
-
   # The callbacks that Erlang expects of an epmd module.
 
   @doc false
   @spec start_link() :: GenServer.on_start()
-  def start_link, do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
+  def start_link, do: :proc_lib.start_link(__MODULE__, :init, [self()])
 
-  @impl GenServer
-  def init([]) do
+  @doc false
+  @spec init(pid()) :: no_return()
+  def init(starter) do
+    Process.register(self(), __MODULE__)
     # The table of a previous distribution may still exist until its owner has ended.
     :ets.new(@table, [:named_table, :public, read_concurrency: true])
     list = to_string(:os.getenv(~c"CONVOY_PEERS", ~c""))
     for {node, ip, port} <- Enum.take(Peers.parse(list), @most), do: insert({node, ip, port})
-    {:ok, nil}
+    :proc_lib.init_ack(starter, {:ok, self()})
+    own()
+  end
+
+  # If the port mapper of a distribution crashes, the node ends. So this process only owns the
+  # table, and drops whatever arrives: not even OTP's system messages are read here. No other
+  # application need be loaded for it: the distribution starts before them.
+  defp own do
+    receive do
+      _anything -> own()
+    end
   end
 
   @doc false

@@ -5,12 +5,12 @@ defmodule Mesh.Distribution.Libcluster do
   goes on, and it is started again with back-off.
   """
   use GenServer
-  alias Hal.Event
+  alias Hal.{Event, HardenedServer}
   alias Mesh.Backoff
 
   @doc "Starts libcluster; `topologies` are in its format."
   @spec start_link(keyword()) :: GenServer.on_start()
-  def start_link(topologies), do: GenServer.start_link(__MODULE__, topologies)
+  def start_link(topologies), do: HardenedServer.start_link(__MODULE__, topologies)
 
   @impl GenServer
   def init(topologies) do
@@ -22,9 +22,15 @@ defmodule Mesh.Distribution.Libcluster do
   def handle_continue(:start, s), do: {:noreply, start(s)}
 
   @impl GenServer
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
+
+  @impl GenServer
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
+
+  @impl GenServer
   def handle_info(:start, s), do: {:noreply, start(s)}
   def handle_info({:EXIT, _supervisor, reason}, s), do: {:noreply, later(s, reason)}
-  def handle_info(_other, s), do: {:noreply, s}
+  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   # Not a dependency: `Mesh.Options` has found out whether the module exists. A failed start also
   # sends an `:EXIT`.

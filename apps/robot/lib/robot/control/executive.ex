@@ -12,9 +12,11 @@ defmodule Robot.Control.Executive do
   drop the wish of its predecessor.
   """
   use GenServer
-  alias Hal.{Device, Event, Ticker}
+  import Hal.HardenedServer, only: [is_mfa: 1]
+  alias Hal.{Device, Event, HardenedServer, Ticker}
   alias Robot.{Behaviour, Board, Config, Mission, Names, Percept}
   alias Robot.Control.{Controller, Trace}
+  alias Robot.Localiser.Anchors
   alias Robot.Safety.{DryRun, Gate}
 
   @period_ms 100
@@ -26,7 +28,8 @@ defmodule Robot.Control.Executive do
   """
   @spec start_link({Config.t(), sink :: Config.call()}) :: GenServer.on_start()
   def start_link({%Config{} = config, {_m, _f, _a} = sink}),
-    do: GenServer.start_link(__MODULE__, {config, sink}, name: Names.via(config.id, :executive))
+    do:
+      HardenedServer.start_link(__MODULE__, {config, sink}, name: Names.via(config.id, :executive))
 
   @doc """
   Sets, changes or (`nil`) drops the goal, as in `Robot.Control.Controller.goal/3`. The error is a
@@ -97,6 +100,9 @@ defmodule Robot.Control.Executive do
   end
 
   @impl GenServer
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
+
+  @impl GenServer
   # From a mission that has not ended yet, although a stop has ended it.
   def handle_cast({:obey, {:goal, _tag, {_module, _options}}}, %{held?: true} = s),
     do: {:noreply, s}
@@ -104,19 +110,33 @@ defmodule Robot.Control.Executive do
   def handle_cast({:confirm, _then}, %{held?: true} = s), do: {:noreply, s}
 
   def handle_cast({:obey, order}, s) do
-    at_ms = Config.now(s.config)
-    Trace.input(s.config, :executive, order, at_ms)
-    {controller, pan} = Controller.obey(s.controller, order)
-    {:noreply, s |> pursue(controller) |> look(pan, at_ms)}
+    if order?(order), do: {:noreply, obeyed(s, order)}, else: HardenedServer.drop(s)
   end
 
-  def handle_cast({:confirm, {m, f, a}}, s) do
+  def handle_cast({:confirm, {m, f, a} = then}, s) when is_mfa(then) do
     apply(m, f, a)
     {:noreply, s}
   end
 
   def handle_cast(:hold, s), do: {:noreply, %{drop(s, nil) | held?: true}}
-  def handle_cast({:stand, then}, s), do: {:noreply, %{drop(s, then) | held?: false}}
+
+  def handle_cast({:stand, then}, s) when then == nil or is_mfa(then),
+    do: {:noreply, %{drop(s, then) | held?: false}}
+
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
+
+  defp order?({:goal, _tag, nil}), do: true
+  defp order?({:goal, _tag, {module, options}}), do: is_atom(module) and is_list(options)
+  defp order?({:anchors, %Anchors{}}), do: true
+  defp order?({:look, pan}), do: pan == nil or is_number(pan)
+  defp order?(_unknown), do: false
+
+  defp obeyed(s, order) do
+    at_ms = Config.now(s.config)
+    Trace.input(s.config, :executive, order, at_ms)
+    {controller, pan} = Controller.obey(s.controller, order)
+    s |> pursue(controller) |> look(pan, at_ms)
+  end
 
   @impl GenServer
   def handle_info(:tick, s) do
@@ -132,7 +152,7 @@ defmodule Robot.Control.Executive do
     {:noreply, schedule(s)}
   end
 
-  def handle_info(_other, s), do: {:noreply, s}
+  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   defp drop(s, then) do
     Trace.input(s.config, :executive, :stand, Config.now(s.config))

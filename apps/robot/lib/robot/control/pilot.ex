@@ -1,6 +1,6 @@
 defmodule Robot.Control.Pilot do
   @moduledoc """
-  Runs one robot's mission. A `gen_statem` whose state is `:idle` or `{mission, phase}`, so that
+  Runs one robot's mission. Its state is `{:idle or {mission, phase}, data}`, so that
   `:sys.get_state/1` shows what the robot is doing. It carries out the mission's effects
   (`Robot.Control.Pilot.Effects`).
 
@@ -18,8 +18,10 @@ defmodule Robot.Control.Pilot do
   wheels are disarmed or their connection is lost, and when they are armed again, so that arming
   does not start a motion.
   """
-  @behaviour :gen_statem
-  alias Robot.{Board, Config, Names}
+  use GenServer
+  import Hal.HardenedServer, only: [is_mfa: 1]
+  alias Hal.HardenedServer
+  alias Robot.{Board, Config, Names, Percept}
   alias Robot.Control.{Delivery, Executive}
   alias Robot.Control.Pilot.{Effects, Journal}
   alias Robot.Mission.Runner
@@ -29,14 +31,10 @@ defmodule Robot.Control.Pilot do
   # A percept that has waited longer than this is dropped; the next one is on its way.
   @old_ms 1_000
 
-  @doc "A child of the robot's supervisor."
-  @spec child_spec(Config.t()) :: Supervisor.child_spec()
-  def child_spec(config), do: %{id: __MODULE__, start: {__MODULE__, :start_link, [config]}}
-
   @doc "Starts the pilot of a robot."
-  @spec start_link(Config.t()) :: :gen_statem.start_ret()
+  @spec start_link(Config.t()) :: GenServer.on_start()
   def start_link(%Config{} = config),
-    do: :gen_statem.start_link(Names.via(config.id, :pilot), __MODULE__, config, [])
+    do: HardenedServer.start_link(__MODULE__, config, name: Names.via(config.id, :pilot))
 
   @doc "Starts the mission of the robot's config; it replaces a running one."
   @spec start(robot :: atom()) :: :ok | {:error, :no_mission}
@@ -56,7 +54,7 @@ defmodule Robot.Control.Pilot do
   """
   @spec halt(robot :: atom(), then :: Config.call() | nil) :: :ok
   def halt(robot, then \\ nil),
-    do: :gen_statem.cast(Names.via(robot, :pilot), {:halt, then})
+    do: GenServer.cast(Names.via(robot, :pilot), {:halt, then})
 
   @doc """
   Resumes the mission that the last stop ended, from its beginning, with the commands that it had
@@ -89,21 +87,18 @@ defmodule Robot.Control.Pilot do
   only the newest is handled.
   """
   @spec hear(robot :: atom(), Robot.Mission.event()) :: :ok
-  def hear(robot, event), do: :gen_statem.cast(Names.via(robot, :pilot), event)
+  def hear(robot, event), do: GenServer.cast(Names.via(robot, :pilot), event)
 
   @doc "A sink for the drive: passes on whether the wheels may turn."
   @spec sense(robot :: atom(), reading :: tuple()) :: :ok
   def sense(robot, {:arming, %{state: state}}),
-    do: :gen_statem.cast(Names.via(robot, :pilot), {:arming, state})
+    do: GenServer.cast(Names.via(robot, :pilot), {:arming, state})
 
   def sense(_robot, _reading), do: :ok
 
-  defp call(robot, request), do: :gen_statem.call(Names.via(robot, :pilot), request, @call_ms)
+  defp call(robot, request), do: GenServer.call(Names.via(robot, :pilot), request, @call_ms)
 
-  @impl :gen_statem
-  def callback_mode, do: :handle_event_function
-
-  @impl :gen_statem
+  @impl GenServer
   def init(%Config{} = config) do
     data = %{
       config: config,
@@ -117,63 +112,71 @@ defmodule Robot.Control.Pilot do
     Journal.answered(data.board)
     Effects.rest(config)
     Executive.stand(config.id)
-    {:ok, :idle, Journal.told(:idle, %{}, data)}
+    {:ok, {:idle, Journal.told(:idle, %{}, data)}}
   end
 
-  @impl :gen_statem
-  def handle_event({:call, from}, :start, _state, %{config: %{mission: nil}}),
-    do: {:keep_state_and_data, [{:reply, from, {:error, :no_mission}}]}
+  @impl GenServer
+  def handle_call(:start, _from, {_state, %{config: %{mission: nil}}} = s),
+    do: {:reply, {:error, :no_mission}, s}
 
-  def handle_event({:call, from}, :start, state, %{config: %{mission: {module, options}}} = data),
-    do: handle_event({:call, from}, {:start, module, options}, state, data)
+  def handle_call(:start, from, {_state, %{config: %{mission: {module, options}}}} = s),
+    do: handle_call({:start, module, options}, from, s)
 
-  def handle_event({:call, from}, {:start, module, options}, state, data) do
-    case begin(module, options, state, data) do
-      {:ok, state, data} -> {:next_state, state, data, [{:reply, from, :ok}]}
-      error -> {:keep_state_and_data, [{:reply, from, error}]}
-    end
-  end
+  def handle_call({:start, module, options}, _from, {state, data} = s)
+      when is_atom(module) and is_list(options),
+      do: answer(begin(module, options, state, data), s)
 
-  def handle_event({:call, from}, :stop, state, data),
-    do: halt(state, {:gen_statem, :reply, [from, :ok]}, data)
+  def handle_call(:stop, from, s), do: {:noreply, idle(s, {GenServer, :reply, [from, :ok]})}
 
-  def handle_event(:cast, {:halt, then}, state, data), do: halt(state, then, data)
+  def handle_call(:resume, _from, {state, data} = s),
+    do: answer(go(:resume, {:command, :start}, state, data), s)
 
-  def handle_event(:cast, {:arming, _state}, state, %{config: config} = data) do
+  def handle_call({:command, _command}, _from, {:idle, _data} = s),
+    do: {:reply, {:error, :idle}, s}
+
+  def handle_call({:command, _command} = event, _from, {{module, _phase} = state, data} = s),
+    do: answer(go({:hand, module}, event, state, data), s)
+
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
+
+  defp answer({:ok, state, data}, _s), do: {:reply, :ok, {state, data}}
+  defp answer(error, s), do: {:reply, error, s}
+
+  @impl GenServer
+  def handle_cast({:halt, then}, s) when then == nil or is_mfa(then),
+    do: {:noreply, idle(s, then)}
+
+  def handle_cast({:arming, _state}, {_, %{config: config}} = s) do
     if config.arm == :manual and not config.dry_run,
-      do: halt(state, nil, data),
-      else: :keep_state_and_data
+      do: {:noreply, idle(s, nil)},
+      else: {:noreply, s}
   end
 
-  def handle_event({:call, from}, :resume, state, data) do
-    case go(:resume, {:command, :start}, state, data) do
-      {:ok, state, data} -> {:next_state, state, data, [{:reply, from, :ok}]}
-      error -> {:keep_state_and_data, [{:reply, from, error}]}
-    end
-  end
-
-  def handle_event({:call, from}, {:command, _command}, :idle, _data),
-    do: {:keep_state_and_data, [{:reply, from, {:error, :idle}}]}
-
-  def handle_event({:call, from}, {:command, _command} = event, {module, _} = state, data) do
-    {:ok, state, data} = go({:hand, module}, event, state, data)
-    {:next_state, state, data, [{:reply, from, :ok}]}
-  end
-
-  def handle_event(:cast, _event, :idle, _data), do: :keep_state_and_data
-
-  def handle_event(:cast, event, {module, _phase} = state, data) do
+  # A mission is told only what `Robot.Mission` promises it.
+  def handle_cast({:tick, %Percept{at_ms: at_ms}} = event, {_state, data} = s)
+      when is_integer(at_ms) do
     event = newest(event)
-
-    if old?(event, data.config) do
-      :keep_state_and_data
-    else
-      {:ok, state, data} = go({:hand, module}, event, state, data)
-      {:next_state, state, data}
-    end
+    if old?(event, data.config), do: {:noreply, s}, else: {:noreply, hand(event, s)}
   end
 
-  def handle_event(:info, {:deliver, %Delivery{} = delivery, {:command, _} = event}, state, data) do
+  def handle_cast({:message, message} = event, s) when is_map(message),
+    do: {:noreply, hand(event, s)}
+
+  def handle_cast({:outcome, _tag, outcome} = event, s) when is_integer(outcome),
+    do: {:noreply, hand(event, s)}
+
+  def handle_cast({:command, _command} = event, s), do: {:noreply, hand(event, s)}
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
+
+  defp hand(_event, {:idle, _data} = s), do: s
+
+  defp hand(event, {{module, _phase} = state, data}) do
+    {:ok, state, data} = go({:hand, module}, event, state, data)
+    {state, data}
+  end
+
+  @impl GenServer
+  def handle_info({:deliver, %Delivery{} = delivery, {:command, _} = event}, {state, data} = s) do
     {m, f, a} = delivery.reply
 
     with :ok <- timely(delivery, data),
@@ -181,15 +184,15 @@ defmodule Robot.Control.Pilot do
          {:ok, state, data} <- go(way, event, state, data) do
       # Only the executive can confirm that it has received the orders.
       Executive.confirm(data.config.id, {m, f, a ++ [:ok]})
-      {:next_state, state, data}
+      {:noreply, {state, data}}
     else
       refusal ->
         apply(m, f, a ++ [refusal])
-        :keep_state_and_data
+        {:noreply, s}
     end
   end
 
-  def handle_event(:info, _unknown, _state, _data), do: :keep_state_and_data
+  def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
   # A command is refused if its requester no longer waits, or if the robot is stopped or was
   # stopped after the request.
@@ -238,29 +241,27 @@ defmodule Robot.Control.Pilot do
 
   # The board says idle before the answer. The mission is called last, because it cannot prevent
   # this.
-  defp halt(state, then, data) do
+  defp idle({state, data}, then) do
     Journal.heard(:stop, data)
     data = Journal.changed(state, :idle, %{}, data)
     Executive.stand(data.config.id, then)
     halted = Journal.asking(data.runner.module, data, fn -> Runner.halt(data.runner) end)
-    {:next_state, :idle, %{data | runner: halted}}
+    {:idle, %{data | runner: halted}}
   end
 
   # Newer percepts may wait in this process's mailbox.
   defp newest({:tick, _percept} = tick) do
     receive do
-      {:"$gen_cast", {:tick, _newer} = newer} -> newest(newer)
+      {:"$gen_cast", {:tick, %Percept{at_ms: at_ms}} = newer} when is_integer(at_ms) ->
+        newest(newer)
     after
       0 -> tick
     end
   end
 
-  defp newest(event), do: event
-
   # A robot that was frozen decides by what it perceives now: by its old percept a leader would
   # believe that its lease lasts.
   defp old?({:tick, %{at_ms: at_ms}}, config), do: Config.now(config) - at_ms > @old_ms
-  defp old?(_event, _config), do: false
 
   defp handle(event, data) do
     Journal.heard(event, data)

@@ -14,6 +14,7 @@ defmodule Robot.Devices.Log do
     [:hal, :device, :online],
     [:hal, :device, :offline],
     [:hal, :device, :arming],
+    [:hal, :server, :dropped],
     [:robot, :fault],
     [:robot, :stage],
     [:robot, :estop_file, :error],
@@ -44,7 +45,8 @@ defmodule Robot.Devices.Log do
 
   @doc false
   @spec write(Event.name(), map(), map(), term()) :: :ok
-  def write(event, _measurements, about, _config) do
+  def write(event, measurements, about, _config) do
+    about = Map.merge(measurements, about)
     with {level, line} <- event |> List.last() |> line(about), do: Logger.log(level, line)
     :ok
   end
@@ -91,6 +93,11 @@ defmodule Robot.Devices.Log do
        "it was told, but would not outlive a restart of the machine so"}
   end
 
+  def line(:dropped, %{name: name, count: count}) do
+    {:warning,
+     "#{process(name)} was sent what it does not know; so far it has dropped #{count} messages"}
+  end
+
   def line(:failed, %{line: line}), do: {:warning, line}
   def line(:healed, %{folder: folder}), do: {:info, "pictures are saved in #{folder} again"}
 
@@ -111,6 +118,9 @@ defmodule Robot.Devices.Log do
   end
 
   def line(:stage, _told_by_others), do: nil
+
+  defp process({robot, role}), do: "#{robot}: #{role}"
+  defp process(name), do: inspect(name)
 
   defp name(%{robot: robot, device: device}), do: "#{robot}: #{device}"
   defp name(%{device: device}), do: "#{device}"

@@ -18,7 +18,8 @@ defmodule Robot.Safety.Gate do
   commanded.
   """
   use GenServer
-  alias Hal.{Device, Event, Ticker, Twist}
+  import Hal.HardenedServer, only: [is_mfa: 1]
+  alias Hal.{Device, Event, HardenedServer, Ticker, Twist}
   alias Robot.{Board, Config, Names}
   alias Robot.Control.Trace
   alias Robot.Safety.{DryRun, Reflex}
@@ -28,7 +29,7 @@ defmodule Robot.Safety.Gate do
   @doc "Starts the gate of a robot; it first commands the wheels to stop."
   @spec start_link(Config.t()) :: GenServer.on_start()
   def start_link(%Config{} = config),
-    do: GenServer.start_link(__MODULE__, config, name: Names.via(config.id, :gate))
+    do: HardenedServer.start_link(__MODULE__, config, name: Names.via(config.id, :gate))
 
   @doc "Wishes a speed; the newest wish is valid for 200 ms."
   @spec wish(robot :: atom(), Twist.t()) :: :ok
@@ -117,7 +118,7 @@ defmodule Robot.Safety.Gate do
     {:noreply, %{s | reflex: Reflex.wish(s.reflex, twist, at_ms)}}
   end
 
-  def handle_cast({:forget, then}, s) do
+  def handle_cast({:forget, then}, s) when then == nil or is_mfa(then) do
     at_ms = heard(s, :forget)
     {reflex, urgency} = Reflex.forget(s.reflex)
     s = react(%{s | reflex: reflex}, urgency, at_ms)
@@ -134,8 +135,10 @@ defmodule Robot.Safety.Gate do
     {:noreply, s |> frame(reflex, at_ms) |> react(urgency, at_ms)}
   end
 
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
+
   @impl GenServer
-  def handle_call({:estop, tell?}, _from, s) do
+  def handle_call({:estop, tell?}, _from, s) when is_boolean(tell?) do
     at_ms = heard(s, :estop)
     # The wheels come first: the latch may also be written to a file, and a disk may be slow.
     Board.hold(s.board)
@@ -147,11 +150,14 @@ defmodule Robot.Safety.Gate do
     {:reply, :ok, s}
   end
 
-  def handle_call({:reset, tell?, presses}, _from, s) do
+  def handle_call({:reset, tell?, presses}, _from, s)
+      when is_boolean(tell?) and (presses == nil or is_integer(presses)) do
     if presses != nil and presses(s.board) > presses,
       do: {:reply, {:error, :pressed}, s},
       else: {:reply, :ok, cleared(s, tell?)}
   end
+
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   defp cleared(s, tell?) do
     at_ms = heard(s, :reset)
@@ -163,7 +169,7 @@ defmodule Robot.Safety.Gate do
 
   @impl GenServer
   def handle_info(:step, s), do: {:noreply, s |> step(Config.now(s.config)) |> schedule()}
-  def handle_info(_other, s), do: {:noreply, s}
+  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   # In a dry run the drive is never armed, but the report shows what an armed robot would do.
   defp armed?(_board, %{dry_run: true}), do: true

@@ -18,7 +18,7 @@ defmodule Robot.Safety.LivenessMonitor do
   processes all run slowly, is not taken for a robot that hangs.
   """
   use GenServer
-  alias Hal.Event
+  alias Hal.{Event, HardenedServer}
   alias Robot.{Board, Config, Names}
 
   @look_ms 50
@@ -75,13 +75,15 @@ defmodule Robot.Safety.LivenessMonitor do
   @doc "Starts the monitor of a robot whose board is running."
   @spec start_link(Config.t()) :: GenServer.on_start()
   def start_link(%Config{} = config),
-    do: GenServer.start_link(__MODULE__, config, name: Names.via(config.id, :watch))
+    do: HardenedServer.start_link(__MODULE__, config, name: Names.via(config.id, :watch))
 
   @impl GenServer
   def init(%Config{id: id} = config) do
     board = Board.find!(id)
     for part <- @parts, do: forget(board, part)
-    {:ok, schedule(%{config: config, board: board, parts: Map.new(@parts, &{&1, {nil, 0}})})}
+
+    {:ok,
+     schedule(%{config: config, board: board, parts: Map.new(@parts, &{&1, {nil, 0}}), look: nil})}
   end
 
   # A note that an earlier monitor left about a silent part no longer holds.
@@ -91,7 +93,13 @@ defmodule Robot.Safety.LivenessMonitor do
   end
 
   @impl GenServer
-  def handle_info(:look, s) do
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
+
+  @impl GenServer
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
+
+  @impl GenServer
+  def handle_info({:look, ref}, %{look: ref} = s) do
     parts =
       for part <- @parts, into: %{} do
         {judged, watch} = look(s.parts[part], mark(s.board, s.config.id, part))
@@ -102,7 +110,7 @@ defmodule Robot.Safety.LivenessMonitor do
     {:noreply, schedule(%{s | parts: parts})}
   end
 
-  def handle_info(_other, s), do: {:noreply, s}
+  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   # The mark contains the pid, so that a restarted process counts anew. A part that is being
   # started or has no entry on the board, as a pilot that waits, gets a new mark at each look.
@@ -168,7 +176,9 @@ defmodule Robot.Safety.LivenessMonitor do
   defp schedule(%{config: %{pace: :manual}} = s), do: s
 
   defp schedule(s) do
-    Process.send_after(self(), :look, @look_ms)
-    s
+    # Nobody else knows the reference: looks that others sent would count as missed ticks.
+    ref = make_ref()
+    Process.send_after(self(), {:look, ref}, @look_ms)
+    %{s | look: ref}
   end
 end

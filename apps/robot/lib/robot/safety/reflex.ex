@@ -32,6 +32,8 @@ defmodule Robot.Safety.Reflex do
   @dead_man_ms 200
   # No base drives or turns this fast: a wish with such a number is an error.
   @absurd 100.0
+  # No sonar and no pose reaches so far (m).
+  @far 1.0e9
   # These set a speed to zero without a ramp.
   @stops [:estop, :disarmed, :dead_man, :refused, :bumper]
 
@@ -147,13 +149,34 @@ defmodule Robot.Safety.Reflex do
 
   @doc """
   Takes a reading; readings that no limit needs are ignored. While the robot moves, a touched
-  bumper, a sonar reading and a reading of arming ask for a step `:now`.
+  bumper, a sonar reading and a reading of arming ask for a step `:now`. A reading that is not
+  whole counts as none: the last whole one grows old.
   """
   @spec sense(t(), Hal.Drive.reading() | term(), integer()) :: {t(), urgency()}
   def sense(%__MODULE__{} = reflex, reading, at_ms) do
-    urgency = if moving?(reflex) and urgent?(reading), do: :now, else: :later
-    {note(reflex, reading, at_ms), urgency}
+    if whole?(reading) do
+      urgency = if moving?(reflex) and urgent?(reading), do: :now, else: :later
+      {note(reflex, reading, at_ms), urgency}
+    else
+      {reflex, :later}
+    end
   end
+
+  defp whole?({:sonar, ranges}), do: list?(ranges, &finite?/1)
+  defp whole?({:bumpers, pressed}), do: list?(pressed, &is_integer/1)
+
+  defp whole?({:odometry, %Odometry{pose: %Pose{x: x, y: y, heading: heading}}}),
+    do: finite?(x) and finite?(y) and finite?(heading)
+
+  defp whole?({:odometry, _other}), do: false
+  defp whole?(_reading), do: true
+
+  # With which one can calculate: there are integers too large for it.
+  defp finite?(number), do: is_number(number) and number > -@far and number < @far
+
+  # Not `Enum.all?/2`, which raises for an improper list.
+  defp list?([first | rest], fits?), do: fits?.(first) and list?(rest, fits?)
+  defp list?(rest, _fits?), do: rest == []
 
   defp moving?(reflex), do: not Twist.zero?(reflex.twist)
 
@@ -162,11 +185,10 @@ defmodule Robot.Safety.Reflex do
   defp urgent?({:sonar, _ranges}), do: true
   defp urgent?(_reading), do: false
 
-  defp note(reflex, {:sonar, ranges}, at_ms) when is_list(ranges),
+  defp note(reflex, {:sonar, ranges}, at_ms),
     do: %{reflex | sonar: Body.points(reflex.profile, ranges), sonar_at_ms: at_ms}
 
-  defp note(reflex, {:bumpers, pressed}, _at_ms) when is_list(pressed),
-    do: %{reflex | bumpers: pressed}
+  defp note(reflex, {:bumpers, pressed}, _at_ms), do: %{reflex | bumpers: pressed}
 
   defp note(%{fence: %Fence{}} = reflex, {:odometry, %Odometry{} = odometry}, at_ms) do
     case reflex.frame || {:is, odometry.frame} do

@@ -9,6 +9,7 @@ defmodule Swarm.Directory.Presence do
   certain.
   """
   use GenServer
+  alias Hal.HardenedServer
   alias Mesh.Nonblocking
   alias Swarm.Directory
   alias Swarm.Directory.RobotInfo
@@ -24,7 +25,7 @@ defmodule Swarm.Directory.Presence do
 
   @doc "Starts the process of this node."
   @spec start_link(term()) :: GenServer.on_start()
-  def start_link(_options), do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
+  def start_link(_options), do: HardenedServer.start_link(__MODULE__, [], name: __MODULE__)
 
   @doc "Notifies the process from now on; returns the robots that are present now."
   @spec subscribe(pid()) :: {:ok, [atom()]} | {:error, line :: String.t()}
@@ -70,10 +71,10 @@ defmodule Swarm.Directory.Presence do
   def handle_call({:unsubscribe, pid}, _from, s), do: {:reply, :ok, forget(s, pid)}
 
   # It has a name that connected nodes can send to, so anything may arrive here.
-  def handle_call(_unknown, _from, s), do: {:noreply, s}
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
-  def handle_cast(_unknown, s), do: {:noreply, s}
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info({ref, :join, {:robot, robot}, pids}, %{ref: ref} = s) do
@@ -110,7 +111,7 @@ defmodule Swarm.Directory.Presence do
   end
 
   def handle_info({:DOWN, _ref, :process, pid, _reason}, s), do: {:noreply, forget(s, pid)}
-  def handle_info(_unknown, s), do: {:noreply, s}
+  def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
   defp enter(s) do
     scope = Directory.monitor()

@@ -12,6 +12,7 @@ defmodule Swarm.EStop.Broadcaster do
   afterwards.
   """
   use GenServer
+  alias Hal.HardenedServer
   alias Mesh.Nonblocking
   alias Swarm.Directory
   alias Swarm.EStop.Calls
@@ -24,7 +25,7 @@ defmodule Swarm.EStop.Broadcaster do
 
   @doc "Starts the process, as a node's supervisor does."
   @spec start_link(term()) :: GenServer.on_start()
-  def start_link(_options), do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
+  def start_link(_options), do: HardenedServer.start_link(__MODULE__, [], name: __MODULE__)
 
   @doc "Calls all robots to stop, and returns the call's identity."
   @spec sound() :: Calls.call()
@@ -68,10 +69,10 @@ defmodule Swarm.EStop.Broadcaster do
     {:noreply, %{s | left: Map.drop(s.left, over)}}
   end
 
-  def handle_cast(_unknown, s), do: {:noreply, s}
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
-  def handle_call(_unknown, _from, s), do: {:noreply, s}
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info({:again, call}, s) do
@@ -85,7 +86,7 @@ defmodule Swarm.EStop.Broadcaster do
     end
   end
 
-  def handle_info(_unknown, s), do: {:noreply, s}
+  def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
   defp pass_on(%{left: left} = s, _call, _age_ms) when map_size(left) >= @most, do: s
 

@@ -3,6 +3,7 @@ defmodule Swarm.EStop.Server do
   The process of `Swarm.EStop`: receives messages, which `Swarm.EStop.Actions` carries out.
   """
   use GenServer
+  alias Hal.HardenedServer
   alias Robot.{Board, Config, Names}
   alias Robot.Safety.Gate
   alias Swarm.EStop
@@ -50,7 +51,7 @@ defmodule Swarm.EStop.Server do
   @impl GenServer
   # E-stop processes are found in the directory, so anything may arrive from anywhere; the rest is
   # ignored.
-  def handle_call(_unknown, _from, s), do: {:noreply, s}
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_cast({:beat, number, latched?}, s)
@@ -104,7 +105,9 @@ defmodule Swarm.EStop.Server do
   def handle_cast({:present, false}, s),
     do: {:noreply, %{s | name: Directory.Membership.leave(s.name)}}
 
-  def handle_cast(_unknown, s), do: {:noreply, s}
+  def handle_cast({:present, true}, s), do: {:noreply, s}
+
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info(message, s) do

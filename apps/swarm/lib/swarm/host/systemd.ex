@@ -15,13 +15,14 @@ defmodule Swarm.Host.Systemd do
   function in place of `Swarm.Host.HealthCheck.of/1`.
   """
   use GenServer
+  alias Hal.HardenedServer
   alias Swarm.Host.HealthCheck
 
   @period_ms 1_000
 
   @doc "Starts the process; `from_env/3` makes the options."
   @spec start_link(keyword()) :: GenServer.on_start()
-  def start_link(options), do: GenServer.start_link(__MODULE__, options)
+  def start_link(options), do: HardenedServer.start_link(__MODULE__, options)
 
   @doc """
   The options for a robot, from what systemd has put into the environment of the process `os_pid`;
@@ -63,8 +64,14 @@ defmodule Swarm.Host.Systemd do
   def handle_continue(:look, s), do: {:noreply, look(s)}
 
   @impl GenServer
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
+
+  @impl GenServer
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
+
+  @impl GenServer
   def handle_info(:look, s), do: {:noreply, look(s)}
-  def handle_info(_other, s), do: {:noreply, s}
+  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   defp look(s) do
     Process.send_after(self(), :look, s.period_ms)

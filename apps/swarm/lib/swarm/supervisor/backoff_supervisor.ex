@@ -8,7 +8,7 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
   part cannot be started with the node, the start of the node fails, as under any supervisor.
   """
   use GenServer
-  alias Hal.Event
+  alias Hal.{Event, HardenedServer}
   alias Mesh.Backoff
 
   # Up to this many crashes within this time, restarts are immediate.
@@ -26,7 +26,7 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
 
   @doc "Starts the part, and keeps it running."
   @spec start_link(Supervisor.child_spec()) :: GenServer.on_start()
-  def start_link(spec), do: GenServer.start_link(__MODULE__, spec)
+  def start_link(spec), do: HardenedServer.start_link(__MODULE__, spec)
 
   @impl GenServer
   def init(%{id: id, start: start}) do
@@ -40,10 +40,10 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
   end
 
   @impl GenServer
-  def handle_call(_unknown, _from, s), do: {:noreply, s}
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
-  def handle_cast(_unknown, s), do: {:noreply, s}
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info({:EXIT, pid, reason}, %{pid: pid} = s) do
@@ -59,7 +59,7 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
     end
   end
 
-  def handle_info(_unknown, s), do: {:noreply, s}
+  def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def terminate(_reason, %{pid: nil}), do: :ok

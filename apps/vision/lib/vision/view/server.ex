@@ -5,6 +5,7 @@ defmodule Vision.View.Server do
   the camera or ffmpeg.
   """
   use GenServer
+  alias Hal.{Frame, HardenedServer}
   alias Hal.Device.Words
   alias Vision.View.{EncoderControl, Subscribers}
 
@@ -44,7 +45,8 @@ defmodule Vision.View.Server do
   def handle_call({:looks, ref}, {pid, _tag}, s),
     do: {:reply, match?(%{^ref => {^pid, _monitor}}, s.people), s}
 
-  def handle_call({:subscribe, ref, every_ms}, {pid, _tag}, s) do
+  def handle_call({:subscribe, ref, every_ms}, {pid, _tag}, s)
+      when is_reference(ref) and is_integer(every_ms) and every_ms > 0 do
     case join(s, ref, every_ms) do
       {:ok, s} ->
         people = Map.put(s.people, ref, {pid, Process.monitor(pid)})
@@ -66,8 +68,10 @@ defmodule Vision.View.Server do
     end
   end
 
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
+
   @impl GenServer
-  def handle_cast({:frame, frame}, s), do: {:noreply, s |> begin(frame) |> look()}
+  def handle_cast({:frame, %Frame{} = frame}, s), do: {:noreply, s |> begin(frame) |> look()}
   def handle_cast({:camera, condition}, s), do: {:noreply, %{s | camera: condition}}
   def handle_cast({:unsubscribe, ref}, s), do: {:noreply, s |> leave(ref) |> look()}
 
@@ -77,6 +81,8 @@ defmodule Vision.View.Server do
   # Tried again at the next request.
   def handle_cast(:no_frames, s),
     do: {:noreply, refuse(s, "this camera gives coloured blobs, and no pictures")}
+
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info(:look, s), do: {:noreply, look(%{s | timer: nil})}

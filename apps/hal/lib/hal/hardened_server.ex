@@ -1,0 +1,70 @@
+defmodule Hal.HardenedServer do
+  @moduledoc """
+  The process of a `GenServer` module that must not end because of a message that it does not know.
+
+  It calls the same callbacks as `GenServer`, and takes the same calls and casts. The difference is
+  in what OTP's loop takes for granted, and what ends any `GenServer`, supervisor or `gen_statem`
+  if it is not so:
+
+    * a call counts only if its caller is `{pid, tag}`: the answer to any other cannot be sent;
+    * a system message (`:sys`) counts only if it comes from a process of this node and is one that
+      `:sys` sends. Everything else in its shape is dropped, also while the process is suspended.
+
+  What a module itself does not know, it hands to `drop/1`, in the last clauses of its callbacks.
+  What is dropped is counted, and the event `[:hal, :server, :dropped]` reports it, at most once a
+  minute for each process.
+
+  It does not protect against whoever sends exactly what a process expects: with the cookie of a
+  fleet one may run any code (`docs/security.md`). An `{:EXIT, parent, reason}` that names the real
+  parent, for example, ends the process, as the parent's own would.
+
+  Differences for the module: there is no hibernation (`:hibernate` waits as usual), and no
+  change of code while suspended.
+  """
+  alias Hal.HardenedServer.{Drops, Loop}
+
+  @doc """
+  Whether a term is an `{m, f, a}`, for callbacks that apply one.
+
+      iex> import Hal.HardenedServer, only: [is_mfa: 1]
+      iex> for term <- [{Kernel, :send, [self()]}, {Kernel, :send}, nil], do: is_mfa(term)
+      [true, false, false]
+  """
+  defguard is_mfa(term)
+           when is_tuple(term) and tuple_size(term) == 3 and is_atom(elem(term, 0)) and
+                  is_atom(elem(term, 1)) and is_list(elem(term, 2))
+
+  @doc """
+  Starts the process of `module`, as `GenServer.start_link/3` does. Options: `:name`,
+  `:spawn_opt`, `:timeout`.
+  """
+  @spec start_link(module(), arg :: term(), keyword()) :: GenServer.on_start()
+  def start_link(module, arg, options \\ []) do
+    {name, options} = Keyword.pop(options, :name)
+
+    case name do
+      nil ->
+        :gen.start(Loop, :link, module, arg, options)
+
+      name when is_atom(name) ->
+        :gen.start(Loop, :link, {:local, name}, module, arg, options)
+
+      {:via, _, _} ->
+        :gen.start(Loop, :link, name, module, arg, options)
+    end
+  end
+
+  @doc """
+  The end of a callback for a message that the module does not know: it is counted, and nothing
+  else happens.
+  """
+  @spec drop(state) :: {:noreply, state} when state: term()
+  def drop(state) do
+    Drops.add()
+    {:noreply, state}
+  end
+
+  @doc "How many messages the calling process has dropped so far."
+  @spec dropped() :: non_neg_integer()
+  defdelegate dropped, to: Drops, as: :count
+end
