@@ -52,11 +52,14 @@ defmodule System.NodesLauncherTest do
       port = start("--robots 2 --duration 45", env)
       said = await(port, ~r/elected +\w+ leads/)
       processes = for name <- ["mag1", "min1", "world"], do: pid(said, name)
+      [_line, folder] = Regex.run(~r/HOME=(\S+) iex/, said)
+      assert File.ls!(folder) == [".erlang.cookie"]
       {:os_pid, script} = Port.info(port, :os_pid)
       kill("#{script}")
       deadline = System.monotonic_time(:millisecond) + 15_000
       ended(processes, deadline)
       unmapped(env, deadline)
+      removed(folder, deadline)
     end
   end
 end

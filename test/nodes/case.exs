@@ -89,6 +89,14 @@ defmodule Nodes.Case do
     end
   end
 
+  @doc "Waits until this folder is gone."
+  def removed(folder, deadline) do
+    if File.exists?(folder) do
+      assert System.monotonic_time(:millisecond) < deadline, "#{folder} is still there"
+      removed(folder, deadline)
+    end
+  end
+
   @doc "Waits until these processes are gone."
   def ended(processes, deadline) do
     case Enum.filter(processes, &there?/1) do

@@ -79,6 +79,15 @@ defmodule Mesh.Secret do
   end
 
   @doc """
+  A secret that is in no file, for a fleet that lives no longer than the process that started it.
+
+      iex> Mesh.Secret.random().fingerprint == Mesh.Secret.random().fingerprint
+      false
+  """
+  @spec random() :: t()
+  def random, do: derive("", :crypto.strong_rand_bytes(32))
+
+  @doc """
   Gives this node the fleet's cookie, whatever cookie it was started with. If it was another one,
   all connected nodes are disconnected, because they connected with a cookie that is not ours.
   """

@@ -1,10 +1,22 @@
 defmodule Sim.Fleet.Folder do
   @moduledoc """
-  A run's own temporary folder, which only this user can read. It is removed with the run; the
-  next run removes what killed runs left behind.
+  A run's own temporary folder, which only this user can read. It is removed with the process that
+  made it, however that ends, by a signal to all of the VM or by its crash: a shell holds the other
+  end of a pipe, and removes the folder when the pipe is closed. Should the shell be killed as
+  well, the next run removes what is left.
   """
 
-  @doc "Creates a folder."
+  # It reads until the VM has ended in any way, or the process whose port this is. What other
+  # processes, which end at the same time, may still write is removed a second later.
+  @keeper """
+  trap '' INT TERM HUP QUIT
+  read -r _nothing
+  rm -rf -- "$1"
+  sleep 1
+  rm -rf -- "$1"
+  """
+
+  @doc "Creates a folder, for as long as the calling process runs."
   @spec make() :: {:ok, Path.t()} | {:error, line :: String.t()}
   def make do
     sweep(System.tmp_dir!())
@@ -12,6 +24,7 @@ defmodule Sim.Fleet.Folder do
     folder = Path.join(System.tmp_dir!(), "convoy-#{System.pid()}-#{number}")
 
     with :ok <- File.mkdir(folder), :ok <- File.chmod(folder, 0o700) do
+      keep(folder)
       System.at_exit(fn _status -> File.rm_rf(folder) end)
       {:ok, folder}
     else
@@ -24,6 +37,11 @@ defmodule Sim.Fleet.Folder do
   def remove(folder) do
     _ = File.rm_rf(folder)
     :ok
+  end
+
+  defp keep(folder) do
+    sh = System.find_executable("sh")
+    Port.open({:spawn_executable, sh}, [:hide, args: ["-c", @keeper, "keeper", folder]])
   end
 
   # The name contains the number of the process.

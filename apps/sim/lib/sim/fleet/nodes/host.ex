@@ -3,9 +3,10 @@ defmodule Sim.Fleet.Nodes.Host do
   Makes this process of the operating system the node that starts others, on the loopback
   interface, with a mesh of its own through which it hears them.
 
-  The secret of a run is random. Nodes get it on their standard input, and for people who want to
-  attach, its cookie is in a folder that only this user can read; so it is neither on a command
-  line nor in an environment.
+  The secret of a run is random and in no file. Nodes get it on their standard input; for people
+  who want to attach, its cookie is in a folder that only this user can read, and that goes with
+  the run however it ends (`Sim.Fleet.Folder`). So it is neither on a command line nor in an
+  environment.
   """
   alias Sim.Fleet.Folder
   alias Sim.Fleet.Nodes.PortMapper
@@ -36,7 +37,8 @@ defmodule Sim.Fleet.Nodes.Host do
   def start(fleet, nodes) do
     with :ok <- alone(),
          {:ok, home} <- Folder.make(),
-         {:ok, secret} <- secret(home),
+         secret = Secret.random(),
+         :ok <- cookie(home, secret),
          {:ok, named} <- become_node() do
       with {:error, line} <- meshed(home, secret, fleet, nodes, named) do
         unname(named)
@@ -148,13 +150,15 @@ defmodule Sim.Fleet.Nodes.Host do
       else: {:error, "no UDP port is free on #{@host} for each of #{length(nodes)} nodes"}
   end
 
-  defp secret(home) do
-    cookie = Path.join(home, ".erlang.cookie")
+  # The folder is this user's alone before there is anything in it.
+  defp cookie(home, secret) do
+    path = Path.join(home, ".erlang.cookie")
 
-    with {:ok, secret} <- Secret.create(Path.join(home, "secret")) do
-      File.write!(cookie, Atom.to_string(secret.cookie))
-      File.chmod!(cookie, 0o400)
-      {:ok, secret}
+    with :ok <- File.write(path, Atom.to_string(secret.cookie)),
+         :ok <- File.chmod(path, 0o400) do
+      :ok
+    else
+      {:error, reason} -> {:error, "#{path} cannot be written: #{:file.format_error(reason)}"}
     end
   end
 end
