@@ -10,13 +10,18 @@ defmodule Console.Demo do
 
   @doc """
   Runs `options` with a trial module (`Sim.Trial`) and returns the exit status: 0 if the fleet
-  ended in formation, 2 if it did not, 1 if the run cannot be made. Among the `hooks`, `lines`
-  returns lines to print about the trial before it runs, and `stop` ends what it leaves behind.
+  ended in formation, 2 if it did not, 1 if the run cannot be made, or ended before its time. Among
+  the `hooks`, `lines` returns lines to print about the trial before it runs, `ended` says why it
+  ended before its time (or `nil`), and `stop` ends what it leaves behind.
   """
-  @spec run(Options.t(), module(), lines: (term() -> [String.t()]), stop: (term() -> :ok)) ::
-          0 | 1 | 2
+  @spec run(Options.t(), module(),
+          lines: (term() -> [String.t()]),
+          ended: (term() -> String.t() | nil),
+          stop: (term() -> :ok)
+        ) :: 0 | 1 | 2
   def run(%Options{} = options, trial_module, hooks \\ []) do
     lines = Keyword.get(hooks, :lines, fn _trial -> [] end)
+    ended = Keyword.get(hooks, :ended, fn _trial -> nil end)
     stop = Keyword.get(hooks, :stop, fn _trial -> :ok end)
 
     # With `--json -` only the report is written to standard output.
@@ -44,13 +49,18 @@ defmodule Console.Demo do
 
         Output.finish(output)
         status = finish(run, options, (System.monotonic_time(:millisecond) - started) / 1000)
+        line = ended.(run.trial)
         stop.(run.trial)
-        status
+        if line, do: refuse(line), else: status
 
       {:error, line} ->
-        IO.puts(:stderr, "demo: #{line}")
-        1
+        refuse(line)
     end
+  end
+
+  defp refuse(line) do
+    IO.puts(:stderr, "demo: #{line}")
+    1
   end
 
   @doc "The first line of a run: the robots, the map, the seed and the formation."
@@ -119,8 +129,7 @@ defmodule Console.Demo do
         if formed?, do: 0, else: 2
 
       {:error, line} ->
-        IO.puts(:stderr, "demo: #{line}")
-        1
+        refuse(line)
     end
   end
 end

@@ -25,6 +25,9 @@ defmodule Console.Live do
   @doc "Its processes of the operating system, and how to reach them, one line each."
   @callback lines(live :: term()) :: [String.t()]
 
+  @doc "Why the run has ended before its time, in one line; `nil` if it has not."
+  @callback ended(live :: term()) :: String.t() | nil
+
   @doc "The result for the report, as `Sim.Trial.result/1` returns it."
   @callback result(live :: term()) :: map()
 

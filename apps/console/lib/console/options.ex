@@ -76,7 +76,7 @@ defmodule Console.Options do
       bin/demo --hardware 1                                 the first robot has the real drivers
 
     Exit status: 0 the fleet ended in formation, or a person at a terminal has quit; 2 it did
-    not; 1 something was wrong with the input.
+    not; 1 something was wrong with the input, or the run ended before its time.
     """
   end
 

@@ -32,6 +32,24 @@ defmodule Console.DemoTest do
   end
 
   @tag :tmp_dir
+  test "a run that ended before its time is reported, and ends with 1", %{tmp_dir: folder} do
+    json = Path.join(folder, "run.json")
+    options = Runs.options("--json #{json}")
+    test = self()
+    hooks = [ended: fn _trial -> "the world is gone" end, stop: &send(test, {:stopped, &1})]
+
+    told =
+      capture_io(:stderr, fn ->
+        capture_io(fn -> send(test, {:status, Demo.run(options, FakeTrial, hooks)}) end)
+      end)
+
+    assert_received {:status, 1}
+    assert_received {:stopped, _trial}
+    assert told == "demo: the world is gone\n"
+    assert File.read!(json) =~ ~s({"version":")
+  end
+
+  @tag :tmp_dir
   test "writes report and picture", %{tmp_dir: folder} do
     json = Path.join(folder, "run.json")
     svg = Path.join(folder, "run.svg")

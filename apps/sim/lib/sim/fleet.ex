@@ -76,7 +76,14 @@ defmodule Sim.Fleet do
   @spec server(GenServer.server()) :: pid() | nil
   def server(fleet), do: GenServer.call(fleet, :server)
 
-  @doc "Whether the run is over, as defined by `Sim.Trial.Termination`."
+  @doc """
+  Why the run has ended before its time, in one line, such as a world that ends again and again;
+  `nil` as long as it has not. What was known then can still be asked.
+  """
+  @spec ended(GenServer.server()) :: String.t() | nil
+  def ended(fleet), do: GenServer.call(fleet, :ended, :infinity)
+
+  @doc "Whether the run is over, as defined by `Sim.Trial.Termination`, or has ended before."
   @spec done?(GenServer.server()) :: boolean()
   def done?(fleet), do: GenServer.call(fleet, :done?, :infinity)
 
@@ -113,6 +120,7 @@ defmodule Sim.Fleet do
       script: Scenario.new(options.moves, options.kills),
       run_log: RunLog.new(),
       said: [],
+      ended: nil,
       ticker: Ticker.start(:tick, @period_ms, @period_ms)
     }
   end
@@ -130,8 +138,16 @@ defmodule Sim.Fleet do
   def handle_call(:server, _from, s), do: {:reply, ask(s, :server), s}
   def handle_call(:lines, _from, s), do: {:reply, ask(s, :lines), s}
 
+  def handle_call(:ended, _from, %{ended: nil} = s), do: {:reply, nil, s}
+  def handle_call(:ended, _from, %{ended: {line, _at_ms}} = s), do: {:reply, line, s}
+  def handle_call(:done?, _from, %{ended: {_line, _at_ms}} = s), do: {:reply, true, s}
+
   def handle_call(:done?, _from, s),
     do: {:reply, s |> run() |> Map.put(:script, s.script) |> Termination.reached?(), s}
+
+  def handle_call({what, _which}, _from, %{ended: {line, _at_ms}} = s)
+      when what in [:kill, :move],
+      do: {:reply, {:error, "the run has ended: #{line}"}, s}
 
   def handle_call({:kill, :leader}, from, s) do
     case RunLog.leader(s.run_log) do
@@ -157,15 +173,17 @@ defmodule Sim.Fleet do
   end
 
   @impl GenServer
+  def handle_info(:tick, %{ended: {_line, _at_ms}} = s), do: {:noreply, s}
+
   def handle_info(:tick, s) do
-    now = now(s.epoch_ms)
+    now = now(s)
     claims = ask(s, :claims)
     worst = fn leader -> s |> run() |> Evaluation.worst(leader) end
     followers = fn -> s |> run() |> Evaluation.followers() end
     {told, said} = Said.look(s.said, claims)
     run_log = s.run_log |> RunLog.note(now, claims) |> RunLog.judge(now, claims, worst)
     run_log = run_log |> RunLog.watch(now, followers) |> tell(now, told)
-    {events, script} = Scenario.due(s.script, now(s.epoch_ms), RunLog.leader(run_log))
+    {events, script} = Scenario.due(s.script, now(s), RunLog.leader(run_log))
     s = Enum.reduce(events, %{s | run_log: run_log, said: said, script: script}, &play/2)
     {:noreply, schedule(s)}
   end
@@ -174,6 +192,9 @@ defmodule Sim.Fleet do
     case module.hear(backend, message) do
       {:ok, events, backend} ->
         {:noreply, Enum.reduce(events, %{s | backend: {module, backend}}, &note/2)}
+
+      {:ended, line, backend} ->
+        {:noreply, %{s | backend: {module, backend}, ended: s.ended || {line, now(s)}}}
 
       {:stop, reason} ->
         {:stop, reason, s}
@@ -206,7 +227,7 @@ defmodule Sim.Fleet do
   defp note({:stage, stage, id, facts}, s) do
     if Said.waits?(stage),
       do: %{s | said: Said.hear(s.said, {stage, id, facts})},
-      else: %{s | run_log: RunLog.stage(s.run_log, now(s.epoch_ms), stage, id, facts)}
+      else: %{s | run_log: RunLog.stage(s.run_log, now(s), stage, id, facts)}
   end
 
   # At the same time as the claims that show them.
@@ -218,7 +239,7 @@ defmodule Sim.Fleet do
 
   defp run(s) do
     %{
-      at_ms: now(s.epoch_ms),
+      at_ms: now(s),
       options: s.setup.options,
       world: ask(s, :world),
       run_log: s.run_log,
@@ -227,7 +248,9 @@ defmodule Sim.Fleet do
     }
   end
 
-  defp now(epoch_ms), do: System.monotonic_time(:millisecond) - epoch_ms
+  # The time of a run stands still when it has ended.
+  defp now(%{ended: {_line, at_ms}}), do: at_ms
+  defp now(%{epoch_ms: epoch_ms}), do: System.monotonic_time(:millisecond) - epoch_ms
 
   defp ask(%{backend: {module, backend}}, what), do: apply(module, what, [backend])
 

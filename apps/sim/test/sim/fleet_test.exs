@@ -43,6 +43,38 @@ defmodule Sim.FleetTest do
     eventually(fn -> Swarm.tell(:mag71, "ping") |> elem(1) =~ "no robot" end)
   end
 
+  defmodule Ending do
+    @moduledoc "A backend whose run cannot go on once it is told so."
+    alias Sim.Fleet.Local
+    def hear(backend, :over), do: {:ended, "the world is gone", backend}
+    defdelegate living(backend), to: Local
+    defdelegate claims(backend), to: Local
+    defdelegate world(backend), to: Local
+    defdelegate messages(backend), to: Local
+    defdelegate stop(backend), to: Local
+  end
+
+  test "a run that cannot go on is over, and tells what is known of it" do
+    fleet = fleet(%{robots: [:mag78], landmark: :none, mission: false})
+    assert Fleet.ended(fleet) == nil
+    refute Fleet.done?(fleet)
+
+    :sys.replace_state(fleet, fn %{backend: {_local, backend}} = s ->
+      %{s | backend: {Ending, backend}}
+    end)
+
+    send(fleet, :over)
+    assert Fleet.ended(fleet) == "the world is gone"
+    assert Fleet.done?(fleet)
+    %{at_ms: at_ms} = Fleet.scene(fleet)
+    assert %{robots: 1} = Fleet.result(fleet)
+    assert Fleet.kill(fleet, :mag78) == {:error, "the run has ended: the world is gone"}
+    assert Fleet.move_landmark(fleet, nil) == Fleet.kill(fleet, :leader)
+    send(fleet, :tick)
+    assert Fleet.scene(fleet).at_ms == at_ms
+    stop(fleet)
+  end
+
   test "three robots search, agree on a leader, and heal when it dies; stops reach all" do
     ids = [:mag81, :mag82, :min81]
     fleet = fleet(%{robots: ids})

@@ -1,6 +1,7 @@
 defmodule Sim.NodesTest do
   @moduledoc "The pure parts of fleets whose robots are processes of their own."
   use ExUnit.Case, async: true
+  alias Sim.Fleet.Nodes
   alias Sim.Fleet.Nodes.{Child, Command}
   alias Sim.Node.Config
   doctest Sim.Fleet.Nodes.Command
@@ -41,6 +42,26 @@ defmodule Sim.NodesTest do
       assert {:error, told} = Config.read(junk)
       assert told =~ "fleet of nodes"
     end
+  end
+
+  test "a world that ends for the sixth time ends the run, which can still be asked" do
+    {:ok, setup} = Sim.Trial.Setup.new(robots: [:mag1], map: "hall")
+    [port | _] = Port.list()
+    world = Child.said(%Child{node: :"world@127.0.0.1", port: port, pid: 1}, "Killed\n")
+
+    backend = %Nodes{
+      setup: setup,
+      host: nil,
+      name: :w,
+      world: setup.world,
+      children: %{world: world},
+      world_starts: 5
+    }
+
+    assert {:ended, line, backend} = Nodes.hear(backend, {port, {:exit_status, 137}})
+    assert line == "world@127.0.0.1 has ended 6 times, last: Killed"
+    assert Nodes.server(backend) == nil
+    assert Nodes.world(backend) == setup.world
   end
 
   test "the end of a node's output is kept, and its last line reported" do

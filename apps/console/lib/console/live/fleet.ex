@@ -16,6 +16,9 @@ defmodule Console.Live.Fleet do
   def scene(live), do: Fleet.scene(live)
 
   @impl Console.Live
+  def ended(live), do: Fleet.ended(live)
+
+  @impl Console.Live
   def result(live), do: Fleet.result(live)
 
   @impl Console.Live

@@ -26,6 +26,10 @@ defmodule Console.Live.Paced do
   @spec done?(pid()) :: boolean()
   defdelegate done?(fleet), to: Fleet
 
+  @doc "Why the run has ended before its time, in one line; `nil` if it has not."
+  @spec ended(pid()) :: String.t() | nil
+  defdelegate ended(fleet), to: Fleet
+
   @doc "The current scene of the fleet."
   @spec scene(pid()) :: Sim.Scene.t()
   defdelegate scene(fleet), to: Fleet

@@ -25,6 +25,10 @@ defmodule Console.Live.Trial do
   @impl Console.Live
   def command(live, command), do: GenServer.call(live, {:command, command}, :infinity)
 
+  # In lockstep nothing can be killed from outside.
+  @impl Console.Live
+  def ended(_live), do: nil
+
   @impl Console.Live
   def result(live), do: GenServer.call(live, :result, :infinity)
 

@@ -26,6 +26,7 @@ defmodule Console.Terminal.Session do
                 status_s: 0,
                 track: nil,
                 started_ms: 0,
+                ended: nil,
                 redraw?: false
               ]
 
@@ -128,11 +129,16 @@ defmodule Console.Terminal.Session do
         scene = session.module.scene(live)
         session = %{session | scene: scene} |> draw(scene) |> tell(scene) |> track(scene)
 
-        if session.until_s && scene.at_ms >= session.until_s * 1000 do
-          session
-        else
-          Process.send_after(self(), :draw, @draw_ms)
-          loop(session)
+        cond do
+          line = session.module.ended(live) ->
+            %{session | ended: line}
+
+          session.until_s && scene.at_ms >= session.until_s * 1000 ->
+            session
+
+          true ->
+            Process.send_after(self(), :draw, @draw_ms)
+            loop(session)
         end
 
       {:key, key} ->
@@ -147,9 +153,6 @@ defmodule Console.Terminal.Session do
 
       :quit ->
         session
-
-      {:EXIT, ^live, {:shutdown, line}} when is_binary(line) ->
-        refuse(line)
 
       {:EXIT, ^live, reason} ->
         exit({:fleet_died, reason})
@@ -276,6 +279,7 @@ defmodule Console.Terminal.Session do
     session.module.stop(session.live)
 
     case Report.write(options, Report.json(result, wall_s), drawing, session.output) do
+      :ok when session.ended != nil -> refuse(session.ended) |> finish(options)
       :ok -> if formed? or session.until_s == nil, do: 0, else: 2
       {:error, line} -> refuse(line) |> finish(options)
     end

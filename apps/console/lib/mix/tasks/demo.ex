@@ -8,7 +8,7 @@ defmodule Mix.Tasks.Demo do
   hardware.
 
   Exit status: 0 if the fleet ended in formation, or a person at a terminal has quit; 2 if it did
-  not; 1 if the input was wrong.
+  not; 1 if the input was wrong, or the run ended before its time.
   """
   use Mix.Task
   alias Console.{Demo, Live, Options, Report}
@@ -73,7 +73,8 @@ defmodule Mix.Tasks.Demo do
     end
   end
 
-  defp paced, do: [lines: &Live.Paced.lines/1, stop: &Live.Paced.stop/1]
+  defp paced,
+    do: [lines: &Live.Paced.lines/1, ended: &Live.Paced.ended/1, stop: &Live.Paced.stop/1]
 
   defp warn(%{nodes: true, robots: robots}),
     do: warn("processes", length(robots), @nodes_a_processor)

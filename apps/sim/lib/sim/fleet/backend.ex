@@ -45,9 +45,14 @@ defmodule Sim.Fleet.Backend do
   @doc "How to reach the processes of the operating system, one line each."
   @callback lines(backend()) :: [String.t()]
 
-  @doc "Handles any message to the fleet that the fleet itself does not know."
+  @doc """
+  Handles any message to the fleet that the fleet itself does not know. `:ended` says, in one line,
+  why the run cannot go on; what is known of it can still be asked.
+  """
   @callback hear(backend(), message :: term()) ::
-              {:ok, [event()], backend()} | {:stop, reason :: term()}
+              {:ok, [event()], backend()}
+              | {:ended, line :: String.t(), backend()}
+              | {:stop, reason :: term()}
 
   @doc "Ends world and robots."
   @callback stop(backend()) :: term()

@@ -5,7 +5,8 @@ defmodule Sim.Fleet.Nodes do
 
   A robot whose process ends, whoever killed it, is dead. One that sends nothing, perhaps because
   it is frozen, is `:silent` until it sends again. When the world's process ends, it is started
-  again from its last snapshot, and the robots, which stood meanwhile, go on.
+  again from its last snapshot, and the robots, which stood meanwhile, go on;
+  when it ends for the sixth time, so does the run.
   """
   @behaviour Sim.Fleet.Backend
   alias Sim.Fleet.Hardware
@@ -179,8 +180,12 @@ defmodule Sim.Fleet.Nodes do
 
   def hear(backend, {:late, :world, pid}) do
     case backend.children[:world] do
-      %{pid: ^pid, up: nil} -> {:stop, {:shutdown, late(backend, :world)}}
-      _up -> {:ok, [], backend}
+      %{pid: ^pid, up: nil} = child ->
+        Child.kill(child)
+        ended(backend, late(backend, :world))
+
+      _up ->
+        {:ok, [], backend}
     end
   end
 
@@ -225,8 +230,10 @@ defmodule Sim.Fleet.Nodes do
   defp wreck(backend, id),
     do: change(%{backend | children: Map.delete(backend.children, id)}, {:kill, id})
 
-  defp world_again(%{world_starts: @world_starts}, child),
-    do: {:stop, {:shutdown, "#{child.node} ends again and again: #{Child.last_line(child)}"}}
+  defp world_again(%{world_starts: @world_starts} = backend, child) do
+    line = "#{child.node} has ended #{@world_starts + 1} times, last: #{Child.last_line(child)}"
+    ended(backend, line)
+  end
 
   defp world_again(backend, _child) do
     backend = %{backend | world_starts: backend.world_starts + 1}
@@ -236,10 +243,13 @@ defmodule Sim.Fleet.Nodes do
         Process.send_after(self(), {:late, :world, backend.children.world.pid}, @up_ms)
         {:ok, [{:stage, :world_lost, nil, %{}}], backend}
 
-      {:error, line, _crew} ->
-        {:stop, {:shutdown, line}}
+      {:error, line, backend} ->
+        ended(backend, line)
     end
   end
+
+  defp ended(backend, line),
+    do: {:ended, line, %{backend | children: Map.delete(backend.children, :world)}}
 
   defp with_child(backend, port, change) do
     case Enum.find(backend.children, fn {_id, child} -> child.port == port end) do
