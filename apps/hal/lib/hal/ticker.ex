@@ -37,13 +37,17 @@ defmodule Hal.Ticker do
   end
 
   @doc """
-  When the tick after that of `last_ms` is due: a period later, or now, if that has passed.
+  When the tick after that of `last_ms` is due: a period later, or now, if that has passed, and
+  never later than a period from now, however many ticks somebody else sent.
 
       iex> {Hal.Ticker.due(1_000, 50, 1_020), Hal.Ticker.due(1_000, 50, 1_170)}
       {1_050, 1_170}
+      iex> Hal.Ticker.due(9_000, 50, 1_020)
+      1_070
   """
   @spec due(last_ms :: integer(), period_ms :: pos_integer(), now_ms :: integer()) :: integer()
-  def due(last_ms, period_ms, now_ms), do: max(last_ms + period_ms, now_ms)
+  def due(last_ms, period_ms, now_ms),
+    do: (last_ms + period_ms) |> max(now_ms) |> min(now_ms + period_ms)
 
   defp now, do: System.monotonic_time(:millisecond)
 end

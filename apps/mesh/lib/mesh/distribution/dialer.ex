@@ -7,7 +7,7 @@ defmodule Mesh.Distribution.Dialer do
   This does not decide whether a node is alive: datagrams do (`Mesh.Protocol.NodeTable`).
   """
   use GenServer
-  alias Hal.{Event, HardenedServer}
+  alias Hal.{Event, HardenedServer, Ticker}
   alias Mesh.{Backoff, Options}
   alias Mesh.Protocol.Roster
   alias Mesh.Distribution.Topology
@@ -43,14 +43,15 @@ defmodule Mesh.Distribution.Dialer do
     fleet = MapSet.new(Map.values(Roster.new(node(), options.fleet).nodes))
 
     {:ok,
-     schedule(%{
+     %{
        options: options,
        fleet: fleet,
        known: known,
        dialling: %{},
        chance: chance,
-       ticks: 1
-     })}
+       ticks: 1,
+       ticker: Ticker.start(:tick, @tick_ms, @tick_ms)
+     }}
   end
 
   # It has a name that connected nodes can send to, so anything may arrive here.
@@ -69,7 +70,8 @@ defmodule Mesh.Distribution.Dialer do
   @impl GenServer
   def handle_info(:tick, s) do
     if rem(s.ticks, @introduce_every) == 0, do: introduce()
-    {:noreply, schedule(dial(%{s | ticks: s.ticks + 1}))}
+    s = dial(%{s | ticks: s.ticks + 1})
+    {:noreply, %{s | ticker: Ticker.next(s.ticker)}}
   end
 
   def handle_info({:nodeup, node}, s) when is_atom(node) do
@@ -138,11 +140,6 @@ defmodule Mesh.Distribution.Dialer do
         chance: state,
         dialling: Map.put(s.dialling, monitor, node)
     }
-  end
-
-  defp schedule(s) do
-    Process.send_after(self(), :tick, @tick_ms)
-    s
   end
 
   defp now, do: System.monotonic_time(:millisecond)

@@ -30,7 +30,8 @@ defmodule Swarm.Blackboard.Server do
       owners: %{},
       rivals: %{},
       unsaid: [],
-      dropped: 0
+      dropped: 0,
+      timer: nil
     }
 
     # A board that starts again among others asks at once for what it has lost.
@@ -270,10 +271,11 @@ defmodule Swarm.Blackboard.Server do
 
   defp schedule(%{repair_ms: :never} = s), do: s
 
-  # So that not all nodes send at the same time.
+  # So that not all nodes send at the same time. One timer, however often somebody asks.
   defp schedule(s) do
+    if s.timer, do: Process.cancel_timer(s.timer)
     {part, rand} = :rand.uniform_s(s.rand)
-    Process.send_after(self(), :repair, round(s.repair_ms * (0.75 + 0.5 * part)))
-    %{s | rand: rand}
+    timer = Process.send_after(self(), :repair, round(s.repair_ms * (0.75 + 0.5 * part)))
+    %{s | rand: rand, timer: timer}
   end
 end

@@ -9,7 +9,7 @@ defmodule Swarm.Directory.Presence do
   certain.
   """
   use GenServer
-  alias Hal.HardenedServer
+  alias Hal.{HardenedServer, Ticker}
   alias Mesh.Nonblocking
   alias Swarm.Directory
   alias Swarm.Directory.RobotInfo
@@ -44,9 +44,8 @@ defmodule Swarm.Directory.Presence do
 
   @impl GenServer
   def init([]) do
-    Process.send_after(self(), :look, @look_ms)
-
     empty = %{
+      ticker: Ticker.start(:look, @look_ms, @look_ms),
       ref: nil,
       scope: nil,
       pids: %{},
@@ -101,7 +100,7 @@ defmodule Swarm.Directory.Presence do
 
   def handle_info({ref, _what, _group, _pids}, %{ref: ref} = s), do: {:noreply, s}
   def handle_info(:look, s), do: {:noreply, look(s)}
-  def handle_info(:enter, s), do: {:noreply, enter(s)}
+  def handle_info(:enter, %{scope: nil} = s), do: {:noreply, enter(s)}
   def handle_info(:settled, s), do: {:noreply, all(s, :left)}
 
   # That the directory is gone does not mean that the robots are.
@@ -129,7 +128,7 @@ defmodule Swarm.Directory.Presence do
   end
 
   defp look(s) do
-    Process.send_after(self(), :look, @look_ms)
+    s = %{s | ticker: Ticker.next(s.ticker)}
     heard = Mesh.robots()
     certain = now() - @certain_ms
     doubt = Map.filter(s.doubt, fn {_robot, since_ms} -> since_ms > certain end)

@@ -15,7 +15,7 @@ defmodule Swarm.Host.Systemd do
   function in place of `Swarm.Host.HealthCheck.of/1`.
   """
   use GenServer
-  alias Hal.HardenedServer
+  alias Hal.{HardenedServer, Ticker}
   alias Swarm.Host.HealthCheck
 
   @period_ms 1_000
@@ -48,11 +48,13 @@ defmodule Swarm.Host.Systemd do
     Process.flag(:priority, :high)
     {:ok, socket} = :gen_udp.open(0, [:local, active: false])
 
+    period_ms = options[:period_ms] || @period_ms
+
     s = %{
       socket: socket,
       to: {:local, address(options[:socket])},
       robot: options[:robot],
-      period_ms: options[:period_ms] || @period_ms,
+      ticker: Ticker.start(:look, period_ms, period_ms),
       pulse: options[:pulse] || (&HealthCheck.of/1),
       ready?: false
     }
@@ -74,7 +76,7 @@ defmodule Swarm.Host.Systemd do
   def handle_info(_other, s), do: HardenedServer.drop(s)
 
   defp look(s) do
-    Process.send_after(self(), :look, s.period_ms)
+    s = %{s | ticker: Ticker.next(s.ticker)}
     {well?, words} = if s.robot, do: s.pulse.(s.robot), else: {true, "a node without a robot"}
     tell(s, words, well?)
     %{s | ready?: s.ready? or well?}
