@@ -66,6 +66,8 @@ defmodule Hal.Device do
 
   # On a busy machine a device is slow, not gone; and the callers wait for half a second at most.
   @call_ms 400
+  # It must come to an order to arm so much earlier that its answer is in time.
+  @answer_ms 100
 
   @type kind :: :drive | :ptz | :camera
   @type status :: {:online | {:offline, reason :: term()}, since_ms :: integer()}
@@ -91,10 +93,11 @@ defmodule Hal.Device do
   @doc """
   Lets the wheels turn. The error says why they may not: what is missing, or that nobody has
   acknowledged. Only for a device of this node. If the drive does not answer within 400 ms, that
-  is an error, and a device that comes to the request later does not arm.
+  is an error, and a device that comes to the request more than 300 ms after it does not arm.
   """
   @spec arm(GenServer.server()) :: :ok | {:error, line :: String.t()}
-  def arm(device), do: order(device, {:arm, System.monotonic_time(:millisecond) + @call_ms})
+  def arm(device),
+    do: order(device, {:arm, System.monotonic_time(:millisecond) + @call_ms - @answer_ms})
 
   @doc """
   Stops the wheels until `arm/1`. The error says that the line was lost, so that they cannot be

@@ -14,7 +14,7 @@ defmodule Hal.Visca.Queue do
   | nothing at all heard for 1 s, though something was sent | `:no_answer` |
   | both sockets are busy, and a command waits | cancels the older one if it has become pointless, or an unknown one, or waits |
   | a drive during another move | cancels the move first: the D30 refuses the drive otherwise |
-  | `:full` | the command waits again, 50 ms at least (a relative step or a toggle is dropped); an unknown command in a socket is cancelled |
+  | `:full` | the command waits again, 50 ms at least (a relative step or a toggle fails: the answer may be to one before it); an unknown command in a socket is cancelled |
   | `:cancelled`, `:no_socket` | the socket is free |
   | no completion for 10 s | the socket counts as free: `:no_completion` |
   | other errors | `{:failed, command, reason}` |
@@ -157,8 +157,8 @@ defmodule Hal.Visca.Queue do
     do: {[:cleared], %{free(queue) | sockets: Sockets.new()}}
 
   defp answer(:network_change, queue, _now_ms) do
-    queue = %{queue | sockets: Sockets.new(), full_ms: nil}
-    {[:network_change], again(queue)}
+    {effects, queue} = again(%{queue | sockets: Sockets.new(), full_ms: nil}, :no_answer)
+    {[:network_change | effects], queue}
   end
 
   defp answer({:error, socket, reason}, %{asked: {{:cancel, socket}, _, _}} = queue, _now_ms)
@@ -174,9 +174,12 @@ defmodule Hal.Visca.Queue do
   end
 
   defp answer({:error, _socket, :full}, %{asked: {command, _, _}} = queue, now_ms) do
-    if Command.immediate?(command),
-      do: {[{:failed, command, :full}], free(queue)},
-      else: {[], %{again(queue) | sockets: Sockets.full(queue.sockets, now_ms), full_ms: now_ms}}
+    if Command.immediate?(command) do
+      {[{:failed, command, :full}], free(queue)}
+    else
+      {effects, queue} = again(queue, :full)
+      {effects, %{queue | sockets: Sockets.full(queue.sockets, now_ms), full_ms: now_ms}}
+    end
   end
 
   # A damaged command gives a syntax error too: it is sent again, as if it had not been heard.
@@ -270,15 +273,20 @@ defmodule Hal.Visca.Queue do
 
   defp free(queue), do: %{queue | asked: nil}
 
-  # Back to the front, unless a newer one waits.
-  defp again(%{asked: nil} = queue), do: queue
+  # Back to the front, unless a newer one waits. One that must not be sent twice fails.
+  defp again(%{asked: nil} = queue, _reason), do: {[], queue}
 
-  defp again(%{asked: {command, _, _}} = queue) do
-    pointless? = Enum.any?(queue.waiting, &CommandClass.overrides?(&1, command))
+  defp again(%{asked: {command, _, _}} = queue, reason) do
+    cond do
+      Enum.any?(queue.waiting, &CommandClass.overrides?(&1, command)) ->
+        {[], free(queue)}
 
-    if pointless? or not CommandClass.repeatable?(command),
-      do: free(queue),
-      else: %{free(queue) | waiting: [command | queue.waiting]}
+      CommandClass.repeatable?(command) ->
+        {[], %{free(queue) | waiting: [command | queue.waiting]}}
+
+      true ->
+        {[{:failed, command, reason}], free(queue)}
+    end
   end
 
   defp occupy(queue, socket, command, now_ms),

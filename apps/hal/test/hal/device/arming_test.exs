@@ -97,6 +97,25 @@ defmodule Hal.Device.ArmingTest do
     assert Device.arm(pid) == :ok
   end
 
+  test "an order to arm lapses before its caller gives up, so that nothing is armed without an answer" do
+    test = self()
+
+    device =
+      start_supervised!(
+        {Task,
+         fn ->
+           receive do
+             {:"$gen_call", from, {:arm, until_ms}} ->
+               send(test, {:left_ms, until_ms - System.monotonic_time(:millisecond)})
+               GenServer.reply(from, :ok)
+           end
+         end}
+      )
+
+    assert Device.arm(device) == :ok
+    assert_received {:left_ms, left_ms} when left_ms <= 300
+  end
+
   test "who hands an order on does not wait, and the device answers for it, but for one that is too late" do
     pid = drive([], arm: :manual)
     :ok = :sys.suspend(pid)

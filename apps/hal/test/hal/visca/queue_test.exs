@@ -159,6 +159,18 @@ defmodule Hal.Visca.QueueTest do
     assert effects == [{:say, look(1)}, {:accepted, look(1)}]
   end
 
+  test "full, or a camera that was switched on: what must not be said twice fails" do
+    for command <- [{:step, 9, 0, 24, 20}, {:screen, :toggle}] do
+      {effects, queue} = run([push(0, command), heard(20, {:error, 0, :full})])
+      assert [{:say, ^command}, {:failed, ^command, :full} | _cancel] = effects
+      assert queue.waiting == []
+
+      {effects, queue} = run([push(0, command), heard(20, :network_change)])
+      assert effects == [{:say, command}, :network_change, {:failed, command, :no_answer}]
+      assert queue.waiting == []
+    end
+  end
+
   test "a damaged command is said again; what is not executable, or really wrong, fails" do
     {effects, _} = run([push(0, look(1)), heard(20, {:error, 0, :syntax})])
     assert effects == [{:say, look(1)}, {:say, look(1)}]

@@ -59,13 +59,20 @@ defmodule Robot.Behaviour.Escape do
   def tick(percept, state) do
     pressed = percept.bumpers
 
-    if by_hand?(percept) do
-      idle(%{state | held: [], known: pressed})
-    else
-      # `held` are bumpers pressed ever since they were touched, `known` those pressed ever since
-      # a person is assumed to have seen them.
-      state = %{state | held: common(state.held, pressed), known: common(state.known, pressed)}
-      act(percept, pressed -- (state.held ++ state.known), state)
+    cond do
+      by_hand?(percept) ->
+        idle(%{state | held: [], known: pressed})
+
+      # A base that is silent says nothing of its bumpers either: that is not a release, after
+      # which the same bumper would be a new touch.
+      percept.odometry == nil ->
+        {:running, nil, {__MODULE__, state}}
+
+      true ->
+        # `held` are bumpers pressed ever since they were touched, `known` those pressed ever since
+        # a person is assumed to have seen them.
+        state = %{state | held: common(state.held, pressed), known: common(state.known, pressed)}
+        act(percept, pressed -- (state.held ++ state.known), state)
     end
   end
 
@@ -74,7 +81,6 @@ defmodule Robot.Behaviour.Escape do
 
   defp common(some, pressed), do: Enum.filter(some, &(&1 in pressed))
 
-  defp act(%{odometry: nil}, _touched, state), do: {:running, nil, {__MODULE__, state}}
   defp act(_percept, [], %{phase: :idle} = state), do: idle(state)
   defp act(_percept, [], %{phase: :fault, held: []} = state), do: idle(state)
   defp act(_percept, [], %{phase: :fault} = state), do: stand(state)

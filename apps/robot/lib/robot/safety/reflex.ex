@@ -19,12 +19,15 @@ defmodule Robot.Safety.Reflex do
   | `:near` | slow enough to stop 0.15 m before what the sonars see in the direction of motion |
   | `:corner` | a robot longer than wide does not turn a corner into what the sonars see |
   | `:fence` | stops before its fence (`Robot.Safety.Reflex.Fence`); no driving without a place |
-  | `:blind` | no sonar reading for 500 ms, although it has sonars: at most 0.1 m/s |
+  | `:blind` | no sonar reading for 500 ms, although it has sonars: at most 0.1 m/s, also for the corners of a robot longer than wide that turns |
   | `:acceleration` | the profile's accelerations; braking may be twice as hard |
 
   `:estop`, `:disarmed`, `:dead_man`, `:refused` and `:bumper` set the speed to zero immediately:
   how hard the wheels then brake depends on the base. All other limits pass through the ramp of
   `:acceleration`.
+
+  A reading of the bumpers holds until the next one: bases report changes, and a base that falls
+  silent is stopped by its device (`Hal.Device.Reports`).
   """
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.Safety.Reflex.{Body, Fence, Limits}

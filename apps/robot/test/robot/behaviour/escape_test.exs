@@ -37,6 +37,14 @@ defmodule Robot.Behaviour.EscapeTest do
     end
   end
 
+  test "a base that is silent for a while does not make a pressed bumper a new touch" do
+    {body, _way, _turned} = way(body(), @minute, press([0]))
+    {body, _way, _turned} = way(body, 5, &%{&1 | bumpers: [], odometry: nil})
+    {body, way, turned} = way(body, 100, press([0]))
+    assert way == 0.0 and turned == 0.0
+    assert Controller.fault(body.controller) == "bumper 0 stays pressed"
+  end
+
   test "it stands whatever its mission wants" do
     goal = &%{&1 | controller: Controller.goal(&1.controller, 1, {Move, linear: 0.3, turn: 0.5})}
     {body, way, turned} = way(goal.(body()), @minute, press([0]))

@@ -179,6 +179,22 @@ defmodule Robot.Safety.ReflexTest do
     assert twist.linear == 0.5
   end
 
+  test "without fresh sonars a robot longer than wide turns so that its corners creep, too" do
+    mini = Profile.atrv_mini()
+
+    for {profile, most} <- [{mini, 0.1 / mini.radius}, {Profile.magellan(), 0.5}] do
+      {reflex, _} = profile |> Reflex.new() |> Reflex.sense({:sonar, Body.silence(profile)}, 0)
+
+      {twist, limits, _reflex} =
+        Enum.reduce(12..72, {nil, [], reflex}, fn k, {_, _, reflex} ->
+          reflex |> Reflex.wish(Twist.new(0, 0.5), 50 * k) |> Reflex.step(50 * k)
+        end)
+
+      assert_in_delta twist.turn, most, 1.0e-9
+      assert :blind in limits == most < 0.5
+    end
+  end
+
   test "the arbiter never beats the gate" do
     numbers = [
       0.0,

@@ -111,6 +111,20 @@ defmodule Robot.Safety.Reflex.Body do
     :math.sqrt(2 * profile.max_turn_acceleration * max(free - 0.1, 0.0))
   end
 
+  @doc """
+  The turn rate (rad/s) at which the corners of a body longer than wide move at this speed (m/s);
+  no limit for any other, which turns on the spot without reaching further.
+
+      iex> Robot.Safety.Reflex.Body.turn_at(Hal.Profile.magellan(), 0.1) > 10
+      true
+      iex> mini = Hal.Profile.atrv_mini()
+      iex> Robot.Safety.Reflex.Body.turn_at(mini, 0.1) * mini.radius
+      0.1
+  """
+  @spec turn_at(Profile.t(), speed :: float()) :: float()
+  def turn_at(%Profile{length: length, width: width}, _speed) when length == width, do: 1.0e6
+  def turn_at(%Profile{radius: radius}, speed), do: speed / radius
+
   # How far (radians) a corner may turn in this direction before it reaches the angle.
   defp swing(corner, angle, turn) do
     ahead = if turn > 0, do: angle - corner, else: corner - angle

@@ -25,7 +25,7 @@ defmodule Robot.Safety.Reflex.Limits do
     %{profile: profile, twist: last} = reflex
     {linear, turn, limits} = speed(linear, turn, profile, [])
     {safe_linear, limits} = linear |> near(reflex, at_ms, limits)
-    {safe_turn, limits} = corner(turn, reflex, limits)
+    {safe_turn, limits} = corner(turn, reflex, at_ms, limits)
     {safe_linear, limits} = fence(safe_linear, safe_turn, reflex, at_ms, limits)
     seconds = step_s(reflex.at_ms, at_ms)
 
@@ -55,8 +55,15 @@ defmodule Robot.Safety.Reflex.Limits do
   defp blind?(%{sonar_at_ms: nil}, _at_ms), do: true
   defp blind?(%{sonar_at_ms: sonar_at_ms}, at_ms), do: at_ms - sonar_at_ms > @blind_ms
 
-  defp corner(turn, reflex, limits),
-    do: lower(turn, Body.free_turn(reflex.profile, reflex.sonar, turn), :corner, limits)
+  # What was seen last still counts, but not as all that there is.
+  defp corner(turn, reflex, at_ms, limits) do
+    free = Body.free_turn(reflex.profile, reflex.sonar, turn)
+    {turn, limits} = lower(turn, free, :corner, limits)
+
+    if blind?(reflex, at_ms),
+      do: lower(turn, Body.turn_at(reflex.profile, @blind_speed), :blind, limits),
+      else: {turn, limits}
+  end
 
   defp fence(linear, _turn, %{fence: nil}, _at_ms, limits), do: {linear, limits}
 
@@ -86,7 +93,9 @@ defmodule Robot.Safety.Reflex.Limits do
   end
 
   defp lower(value, limit, name, limits) do
-    if abs(value) > limit, do: {clamp(value, limit), [name | limits]}, else: {value, limits}
+    if abs(value) > limit,
+      do: {clamp(value, limit), [name | List.delete(limits, name)]},
+      else: {value, limits}
   end
 
   # Braking may be twice as hard as speeding up, because obstacles are detected with a delay.
