@@ -154,6 +154,7 @@ defmodule Hal.HardenedServer.Loop do
   def system_continue(_parent, debug, {p, ms}), do: loop(%{p | debug: debug}, ms)
 
   @doc false
+  @spec system_terminate(term(), pid(), term(), {map(), timeout()}) :: no_return()
   def system_terminate(reason, _parent, debug, {p, _ms}),
     do: Exit.asked(reason, :terminate, %{p | debug: debug})
 
