@@ -14,13 +14,12 @@ defmodule Mesh.ForgedSequenceTest do
       now_ms = from_ms + 100 * n
 
       with false <- ReplayProtection.copy?(guard, "b@lab", 9, sequence),
-           {:ok, guard} <- ReplayProtection.admit(guard, stamp(sequence, now_ms), nil, now_ms),
-           do: {guard, times ++ [now_ms]},
-           else:
-             (
-               {:error, _why, guard} -> {guard, times}
-               true -> {guard, times}
-             )
+           {:ok, guard} <- ReplayProtection.admit(guard, stamp(sequence, now_ms), nil, now_ms) do
+        {guard, times ++ [now_ms]}
+      else
+        {:error, _why, guard} -> {guard, times}
+        true -> {guard, times}
+      end
     end)
   end
 

@@ -27,9 +27,10 @@ defmodule Robot.Control.Executive do
   of a goal, as `{:outcome, tag, integer}`, to the sink: `apply(m, f, a ++ [event])`.
   """
   @spec start_link({Config.t(), sink :: Config.call()}) :: GenServer.on_start()
-  def start_link({%Config{} = config, {_m, _f, _a} = sink}),
-    do:
-      HardenedServer.start_link(__MODULE__, {config, sink}, name: Names.via(config.id, :executive))
+  def start_link({%Config{} = config, {_m, _f, _a} = sink}) do
+    name = Names.via(config.id, :executive)
+    HardenedServer.start_link(__MODULE__, {config, sink}, name: name)
+  end
 
   @doc """
   Sets, changes or (`nil`) drops the goal, as in `Robot.Control.Controller.goal/3`. The error is a
