@@ -43,6 +43,8 @@ defmodule Hal.HardenedSupervisor do
   def init({inner, start}) do
     case inner.init(start) do
       {:ok, state} -> {:ok, {inner, state}}
+      # Newer OTPs let a supervisor hibernate once its children have started.
+      {:ok, state, then} -> {:ok, {inner, state}, then}
       other -> other
     end
   end
@@ -99,7 +101,12 @@ defmodule Hal.HardenedSupervisor do
   defp request?(_inner, _unknown), do: false
 
   defp handled({:noreply, state}, inner), do: {:noreply, {inner, state}}
+  defp handled({:noreply, state, then}, inner), do: {:noreply, {inner, state}, then}
   defp handled({:reply, answer, state}, inner), do: {:reply, answer, {inner, state}}
+
+  defp handled({:reply, answer, state, then}, inner),
+    do: {:reply, answer, {inner, state}, then}
+
   defp handled({:stop, reason, state}, inner), do: {:stop, reason, {inner, state}}
 
   defp handled({:stop, reason, answer, state}, inner),
