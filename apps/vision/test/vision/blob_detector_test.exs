@@ -142,25 +142,30 @@ defmodule Vision.BlobDetectorTest do
       {Hal.Device,
        kind: :camera,
        driver:
-         {Hal.Camera.FFmpeg, source: "lavfi:color=color=0xDCCD5A:size=32x24:rate=25:duration=1"},
+         {Hal.Camera.FFmpeg, source: "lavfi:color=color=0xDCCD5A:size=32x24:rate=25:duration=5"},
        sinks: [{BlobDetector, :frame, [detector]}]}
     )
 
-    seen =
-      for _ <- 1..10 do
-        assert_receive {:detections, %{blobs: [_]} = detections}, 10_000
-        detections
-      end
-
+    seen = until_turned([])
     :timer.cancel(timer)
-    assert List.last(seen).pan > List.first(seen).pan + 0.1
 
     for detections <- seen, do: assert_in_delta(detections.field_of_view, 0.8, 1.0e-9)
 
     # A busy machine hands some readings on late; with the newest reading instead of the direction
     # between two, half of the pictures would be wrong by more than 0.0125 rad.
     wrong = for %{pan: told, at_ms: at_ms} <- seen, do: abs(told - pan.(at_ms))
-    assert Enum.at(Enum.sort(wrong), 5) < 0.01
+    assert Enum.at(Enum.sort(wrong), div(length(wrong), 2)) < 0.01
+  end
+
+  # The pictures, ten at least, until the unit has turned by 0.1 rad. A busy machine delivers the
+  # first ones together.
+  defp until_turned(seen) do
+    assert_receive {:detections, %{blobs: [_], pan: pan} = detections}, 10_000
+    seen = seen ++ [detections]
+
+    if length(seen) >= 10 and pan > hd(seen).pan + 0.1,
+      do: seen,
+      else: until_turned(seen)
   end
 
   test "wrong options are named", %{colours: colours} do
