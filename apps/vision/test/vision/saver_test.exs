@@ -162,12 +162,24 @@ defmodule Vision.SaverTest do
     assert %{saved: saved, why: ^line} = Saver.status(saver)
     assert saved in 1..8
     assert File.ls!(folder) |> Enum.filter(&String.ends_with?(&1, ".part")) == []
+    # A smaller picture might still fit, and the next one be told anew: nothing fits now.
+    {:error, :enospc} = File.write(Path.join(folder, "rest"), :binary.copy("x", 400_000))
+    %{saved: saved} = eventually(saver, &(&1.why == line))
+    flush()
     # Tried in vain meanwhile, and told once.
     refute_receive {:failed, _}, 1_500
     File.rm!(ballast)
     assert_receive {:healed, _}, 10_000
     assert %{why: nil} = eventually(saver, &(&1.saved > saved))
     stop_supervised!(Saver)
+  end
+
+  defp flush do
+    receive do
+      {told, _about} when told in [:failed, :healed] -> flush()
+    after
+      0 -> :ok
+    end
   end
 
   test "a view that falls is looked through again", %{tmp_dir: folder} do
