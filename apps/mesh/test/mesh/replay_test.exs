@@ -1,43 +1,10 @@
 defmodule Mesh.ReplayTest do
-  # What an attacker in radio range does with datagrams that the fleet has signed, on real sockets: the node's own mesh
-  # listens, and the one that it hears, `b`, is the protocol on a socket of the test's.
-  use ExUnit.Case, async: false
-  import Mesh.SocketPeer, only: [until: 2, act: 2, keep_back: 2, now: 0]
-  alias Mesh.{Air, FakeConsumer, Options, Protocol, SocketPeer}
+  # What an attacker in radio range does with datagrams that the fleet has signed, on real sockets.
+  use Mesh.PeerCase, async: false
 
-  @loopback {127, 0, 0, 1}
   @foreign {127, 0, 0, 2}
   @elsewhere {127, 0, 0, 3}
   @hour_ms 3_600_000
-
-  # This node is of the fleet by whatever name it has.
-  defp fleet, do: [own(0), :a, :b]
-  defp other, do: :"b@#{own(1)}"
-  defp own(part), do: "#{node()}" |> String.split("@") |> Enum.at(part) |> String.to_atom()
-
-  setup do
-    Process.register(self(), FakeConsumer)
-    {_socket, address} = place = SocketPeer.open()
-
-    {:ok, options} =
-      Options.new(
-        secret: Air.secret(),
-        fleet: fleet(),
-        interface: @loopback,
-        port: 0,
-        multicast: false,
-        peers: [address],
-        dist_port: 0
-      )
-
-    start_supervised!({Mesh.Supervisor, {options, FakeConsumer}})
-    name = "#{node()}"
-    peer = SocketPeer.new(other(), fleet(), place)
-
-    peer = until(peer, &(Mesh.alive() == [other()] and &1.protocol.node_table.nodes[name] != nil))
-
-    %{peer: peer}
-  end
 
   # What `b` made an hour ago, while nobody could hear it: 300 heartbeats.
   defp tape(peer) do

@@ -1,36 +1,5 @@
 defmodule Mesh.ServerTest do
-  # The mesh of this VM has names; the node that it hears is the protocol on a socket of the test's.
-  use ExUnit.Case, async: false
-  import Mesh.SocketPeer, only: [until: 2, act: 2, now: 0]
-  alias Mesh.{Air, FakeConsumer, Options, Protocol, SocketPeer}
-
-  @loopback {127, 0, 0, 1}
-
-  # This node is of the fleet by whatever name it has.
-  defp fleet, do: [own(0), :a, :b]
-  defp other, do: :"b@#{own(1)}"
-  defp own(part), do: "#{node()}" |> String.split("@") |> Enum.at(part) |> String.to_atom()
-
-  setup do
-    Process.register(self(), FakeConsumer)
-    {_socket, address} = place = SocketPeer.open()
-
-    {:ok, options} =
-      Options.new(
-        secret: Air.secret(),
-        fleet: fleet(),
-        interface: @loopback,
-        port: 0,
-        multicast: false,
-        peers: [address],
-        dist_port: 0
-      )
-
-    start_supervised!({Mesh.Supervisor, {options, FakeConsumer}})
-    %{peer: until(SocketPeer.new(other(), fleet(), place), fn _ -> met?() end)}
-  end
-
-  defp met?, do: Mesh.alive() == [other()]
+  use Mesh.PeerCase, async: false
 
   test "what it hears goes to the consumer that it was given, and into the table", %{peer: peer} do
     {node, other} = {node(), other()}

@@ -165,6 +165,8 @@ defmodule Sim.Hardware.LineTest do
     id = real(context, :line_held)
     listen(id, [:robot, :fault])
     eventually(fn -> Swarm.arm(id) == :ok end)
+    # A bumper that is pressed while the pilot still believes the wheels disarmed is no new touch.
+    eventually(fn -> :disarmed not in limits(id) end)
     start = place(context)
     :ok = Emulator.change(emulator, :hold, [[0]])
     assert_receive {[:robot, :fault], %{line: "bumper 0 stays pressed"}}, 5_000

@@ -2,7 +2,7 @@ defmodule Mesh.Distribution.Access.Refusals do
   @moduledoc """
   Counts the distribution connections that were refused, and logs the first of each address in a minute:
 
-      refused a node at 10.0.0.66: not an address of the fleet (12,604 attempts in the minute before)
+      refused a node at 10.0.0.66: not an address of the fleet (12604 more attempts since the last such line)
 
   with the event `[:mesh, :refused]`. At most 20 addresses are logged in a minute; those of others are only counted. So
   a flood costs a counter for each attempt, and neither memory nor disk.
