@@ -1,3 +1,5 @@
+Code.require_file("lines.exs", __DIR__)
+
 defmodule Demo.Case do
   @moduledoc "The demo as a command: what people type, what they get, and how it ends."
   use ExUnit.CaseTemplate
@@ -142,53 +144,86 @@ defmodule System.DemoEndsTest do
   end
 end
 
-defmodule System.DemoTest do
+defmodule System.DemoRefusesTest do
   use Demo.Case, async: true
 
-  defp without_wall_time(json), do: String.replace(json, ~r/"wall_s":[^,]+,/, "")
+  # A VM for all but the first.
+  @lines [
+    "--help",
+    "--headless --map mix.exs.png:10x10",
+    "--headless --map FOLDER/floor.png:10x10",
+    "--headless --landmark 500,0",
+    "--kill mag9@3",
+    "--robots 2 --hardware min:2"
+  ]
 
-  test "the help names the options and ends well" do
-    assert {help, "", 0} = demo("--help")
+  setup_all do
+    folder = Path.join(System.tmp_dir!(), "convoy-refuses-#{System.pid()}")
+    File.mkdir_p!(folder)
+    on_exit(fn -> File.rm_rf!(folder) end)
+    File.write!(Path.join(folder, "floor.png"), "not a picture")
+
+    lines =
+      for line <- @lines,
+          do: ["demo" | line |> String.replace("FOLDER", folder) |> OptionParser.split()]
+
+    %{answers: Map.new(Enum.zip(@lines, Lines.run(lines, cd: @root)))}
+  end
+
+  test "the help names the options and ends well", %{answers: answers} do
+    assert {help, "", 0} = answers["--help"]
     assert help =~ "--leader-change"
     assert help =~ "Exit status"
   end
 
-  # As many as one run complains of at once.
-  for {line, complaints} <- [
-        {"--robots 0 --robots -3 --robots 1e9 --map moon --loss nan --headles --hardwear 1 " <>
-           "--picture /no/such/place/a.svg",
-         [
-           ~s(--robots cannot be "0": a whole number from 1 to 100 is allowed),
-           ~s(--robots cannot be "-3": a whole number),
-           ~s(--robots cannot be "1e9": a whole number),
-           ~s(--map cannot be "moon": hall, hospital, arena or FILE.png:WIDTHxHEIGHT is allowed),
-           ~s(--loss cannot be "nan": a number from 0 to 1 is allowed),
-           "did you mean --headless?",
-           "did you mean --hardware?",
-           "a folder that exists"
-         ]},
-        {"--headless --map mix.exs.png:10x10", ["mix.exs.png"]},
-        {"--headless --landmark 500,0", ["landmark"]},
-        {"--kill mag9@3", [~s("mag9")]},
-        {"--robots 2 --hardware min:2", ["--hardware min2 is more than there are"]}
-      ] do
-    test "refuses #{line} in clear words" do
-      assert {"", told, 1} = demo(unquote(line))
-      for complaint <- unquote(complaints), do: assert(told =~ complaint)
-      for line <- String.split(told, "\n", trim: true), do: assert(line =~ ~r/^demo: /)
-      refute told =~ "** ("
-      refute told =~ ".ex:"
-    end
+  defp refused({output, told, status}, complaints) do
+    assert {output, status} == {"", 1}
+    for complaint <- complaints, do: assert(told =~ complaint)
+    for line <- String.split(told, "\n", trim: true), do: assert(line =~ ~r/^demo: /)
+    refute told =~ "** ("
+    refute told =~ ".ex:"
   end
 
-  @tag :tmp_dir
-  test "a PNG that is no PNG is refused", %{tmp_dir: folder} do
-    File.write!(Path.join(folder, "floor.png"), "not a picture")
-    path = Path.join(folder, "floor.png")
-    assert {"", told, 1} = demo("--headless --map #{path}:10x10")
+  # As many as one run complains of at once.
+  test "refuses all that is wrong with its options, in clear words" do
+    line =
+      "--robots 0 --robots -3 --robots 1e9 --map moon --loss nan --headles --hardwear 1 " <>
+        "--picture /no/such/place/a.svg"
+
+    refused(demo(line), [
+      ~s(--robots cannot be "0": a whole number from 1 to 100 is allowed),
+      ~s(--robots cannot be "-3": a whole number),
+      ~s(--robots cannot be "1e9": a whole number),
+      ~s(--map cannot be "moon": hall, hospital, arena or FILE.png:WIDTHxHEIGHT is allowed),
+      ~s(--loss cannot be "nan": a number from 0 to 1 is allowed),
+      "did you mean --headless?",
+      "did you mean --hardware?",
+      "a folder that exists"
+    ])
+  end
+
+  for {line, complaint} <- [
+        {"--headless --map mix.exs.png:10x10", "mix.exs.png"},
+        {"--headless --landmark 500,0", "landmark"},
+        {"--kill mag9@3", ~s("mag9")},
+        {"--robots 2 --hardware min:2", "--hardware min2 is more than there are"}
+      ] do
+    test("refuses #{line} in clear words", %{answers: answers},
+      do: refused(answers[unquote(line)], [unquote(complaint)])
+    )
+  end
+
+  test "a PNG that is no PNG is refused", %{answers: answers} do
+    assert {"", told, 1} = answers["--headless --map FOLDER/floor.png:10x10"]
     assert told =~ "floor.png"
     refute told =~ "** ("
   end
+end
+
+defmodule System.DemoTest do
+  use Demo.Case, async: true
+
+  defp without_wall_time(json), do: String.replace(json, ~r/"wall_s":[^,]+,/, "")
 
   test "one seed, run twice: the same report to the byte, but for the wall time; another seed is another run" do
     line = "--headless --robots 3 --duration 20 --json - --seed "
