@@ -1,5 +1,5 @@
-for file <- ~w(reader shown sandbox looked_at checks),
-    do: Code.require_file("docs/#{file}.exs", __DIR__)
+for file <- ~w(lines docs/reader docs/shown docs/sandbox docs/looked_at docs/checks),
+    do: Code.require_file("#{file}.exs", __DIR__)
 
 defmodule Docs.Case do
   @moduledoc """

@@ -22,9 +22,9 @@ defmodule Lines do
     options = [stderr_to_stdout: true] ++ options
 
     try do
-      command = ~w(60 mix run --no-start #{script} #{told})
-      {printed, status} = System.cmd("timeout", command, options)
-      status == 0 || raise "#{Enum.join(command, " ")}: status #{status}: #{printed}"
+      command = "exec timeout 60 mix run --no-start #{script} #{told} </dev/null"
+      {printed, status} = System.cmd("sh", ["-c", command], options)
+      status == 0 || raise "#{command}: status #{status}: #{printed}"
       told |> File.read!() |> :erlang.binary_to_term()
     after
       File.rm!(told)

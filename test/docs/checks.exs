@@ -144,20 +144,31 @@ defmodule Docs.Checks do
   @doc "What is wrong with the commands, which are typed in the folder unless they are listed above."
   @spec commands([Reader.item()], Path.t()) :: [String.t()]
   def commands(items, folder) do
-    for {kind, n, text, answer} <- items,
-        kind in [:shell, :prompt, :file],
-        wrong = wrong(kind, text, answer, folder),
-        do: "line #{n}: #{text}: #{wrong}"
+    items
+    |> Enum.filter(fn {kind, _n, _text, _answer} -> kind in [:shell, :prompt, :file] end)
+    |> Enum.chunk_by(&(elem(&1, 0) == :shell))
+    |> Enum.flat_map(&all(&1, folder))
+    |> Enum.reject(fn {_item, wrong} -> wrong == nil end)
+    |> Enum.map(fn {{_kind, n, text, _answer}, wrong} -> "line #{n}: #{text}: #{wrong}" end)
   end
 
-  defp wrong(:prompt, text, _answer, _folder), do: LookedAt.prompt(text)
-  defp wrong(:file, path, text, folder), do: Sandbox.write(path, text, folder)
+  defp all([{:shell, _n, _text, _answer} | _] = items, folder) do
+    {run, looked_at} = Enum.split_with(items, fn {_kind, _n, text, _answer} -> run?(text) end)
+    lines = for {:shell, _n, text, answer} <- run, do: {text, answer}
 
-  defp wrong(:shell, text, answer, folder) do
-    if is_map_key(@not_run, command(text)) or lacking(text) != nil,
-      do: LookedAt.command(Reader.words(text), folder),
-      else: Sandbox.run(text, answer, folder)
+    looked_at =
+      for {_kind, _n, text, _answer} = item <- looked_at,
+          do: {item, LookedAt.command(Reader.words(text), folder)}
+
+    Enum.sort_by(Enum.zip(run, Sandbox.run(lines, folder)) ++ looked_at, &elem(elem(&1, 0), 1))
   end
+
+  defp all(items, folder), do: for(item <- items, do: {item, wrong(item, folder)})
+
+  defp wrong({:prompt, _n, text, _answer}, _folder), do: LookedAt.prompt(text)
+  defp wrong({:file, _n, path, text}, folder), do: Sandbox.write(path, text, folder)
+
+  defp run?(text), do: not is_map_key(@not_run, command(text)) and lacking(text) == nil
 
   # Programs that a machine may do without (bin/setup).
   defp lacking(text) do

@@ -10,6 +10,8 @@ defmodule Docs.Sandbox do
   @left_out ~w(_build deps tmp .git convoy.secret certs)
   # Nothing here meets another fleet of this machine, nor finds a camera.
   @environment [{"CONVOY_INTERFACE", "127.0.0.1"}]
+  # The Mix tasks that leave all else of their VM as it is.
+  @tasks ~w(blobs calibrate fleet.certs fleet.secret robot.check robot.import)
 
   @doc "Makes the folder, with what was built in it. Where Mix builds all again, this takes as long as that."
   @spec prepare(Path.t(), String.t()) :: Path.t()
@@ -103,11 +105,51 @@ defmodule Docs.Sandbox do
          else: (:ok -> nil)
   end
 
-  @doc "Runs a line in the folder's shell; `nil`, or what is wrong with what came."
-  @spec run(String.t(), String.t(), Path.t()) :: String.t() | nil
-  def run(line, answer, folder) do
-    {printed, status} = command(line, folder)
+  @doc """
+  Runs lines in the folder's shell, one after the other; of each, `nil`, or what is wrong with what came. Where several
+  tasks of Mix come one behind the other, they share a VM.
+  """
+  @spec run([{line :: String.t(), answer :: String.t()}], Path.t()) :: [String.t() | nil]
+  def run(lines, folder) do
+    lines
+    |> Enum.chunk_by(fn {line, _answer} -> shared?(line) end)
+    |> Enum.flat_map(fn chunk ->
+      Enum.zip(chunk, answers(Enum.map(chunk, &elem(&1, 0)), folder))
+    end)
+    |> Enum.map(fn {{line, answer}, came} -> wrong(line, answer, came) end)
+  end
 
+  defp answers(lines, folder) do
+    if Enum.count(lines, &task?/1) > 1,
+      do: together(lines, folder),
+      else: Enum.map(lines, &command(&1, folder))
+  end
+
+  defp together(lines, folder) do
+    options = [cd: folder, env: @environment, stderr_to_stdout: true]
+
+    for {printed, "", status} <- Lines.run(Enum.map(lines, &words/1), options),
+        do: {printed, status}
+  end
+
+  # Our tasks, without anything that only a shell understands, and what is not a program of ours.
+  defp shared?(line), do: task?(line) or not (line =~ ~r/\b(mix|bin)\b/)
+
+  defp task?(line) do
+    case Regex.run(~r/^mix ([a-z.]+)[^;|&<>$`'"]*$/, plain(line)) do
+      [_all, task] -> task in @tasks
+      nil -> false
+    end
+  end
+
+  defp words(line) do
+    if task?(line), do: line |> plain() |> OptionParser.split() |> tl(), else: line
+  end
+
+  # Without the remark.
+  defp plain(line), do: line |> String.replace("\\\n", " ") |> String.replace(~r/\s#.*$/, "")
+
+  defp wrong(line, answer, {printed, status}) do
     # A remark such as `# 2: no landmark` behind `echo $?` tells the status.
     told = with [_all, told] <- Regex.run(~r/echo \$\?\s+# (\d+):/, line), do: told
 
