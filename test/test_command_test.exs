@@ -12,7 +12,9 @@ defmodule System.TestCommandTest do
     script(folder, "bin/setup", "exit 0")
     script(folder, "bin/test-c", "echo all well")
     script(folder, "bin/opencv-data", "exit 0")
-    File.cp!(Path.join(@root, "bin/test"), Path.join(folder, "bin/test"))
+
+    for name <- ~w(bin/test bin/build),
+        do: File.cp!(Path.join(@root, name), Path.join(folder, name))
 
     for {app, calls} <- [upper: "[{:lower, in_umbrella: true}]", lower: "[]"] do
       path = Path.join(folder, "apps/#{app}/mix.exs")
