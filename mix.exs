@@ -4,11 +4,18 @@ defmodule Convoy.MixProject do
   def project do
     [
       apps_path: "apps",
+      apps: apps(System.get_env("CONVOY_BUILD")),
       version: "0.1.0",
       start_permanent: Mix.env() == :prod,
       releases: releases(),
       deps: []
     ]
+  end
+
+  # With CONVOY_BUILD=robot, say, only what that release holds is built; else all apps are.
+  defp apps(release) do
+    with {_name, options} <- Enum.find(releases(), &(Atom.to_string(elem(&1, 0)) == release)),
+         do: for({app, _mode} <- options[:applications], File.dir?("apps/#{app}"), do: app)
   end
 
   # `robot` is for real hardware; `fleet` holds robots, worlds and the view of people. Both have ssl, for

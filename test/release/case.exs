@@ -30,7 +30,7 @@ defmodule Release.Case do
   end
 
   defp build do
-    environment = [{"MIX_ENV", "prod"}, {"MIX_TARGET", nil}]
+    environment = [{"MIX_ENV", "prod"}, {"MIX_TARGET", nil}, {"CONVOY_BUILD", "robot"}]
     arguments = ["release", "robot", "--overwrite", "--quiet"]
     options = [cd: @root, env: environment, stderr_to_stdout: true]
     System.cmd("mix", arguments, options)
