@@ -228,10 +228,7 @@ defmodule Robot.Localiser.Belief do
 
   @doc "The variance of a quantity of the pose with these derivatives by x, y and heading."
   @spec variance(t(), {float(), float(), float()}) :: float()
-  def variance(belief, {a, b, c}) do
-    {_v, variance} = Covariance.project(belief.covariance, [a, b, c])
-    variance
-  end
+  def variance(belief, {a, b, c}), do: Covariance.variance(belief.covariance, [a, b, c])
 
   @doc """
   The variance of a quantity between the pose and the reported place of a mark, without the error
@@ -240,10 +237,11 @@ defmodule Robot.Localiser.Belief do
   """
   @spec variance(t(), {float(), float(), float()}, Anchors.mark()) :: float()
   def variance(belief, {a, b, c}, %{sd: spread, common: {x, y}}) do
-    {v, own} = Covariance.project(belief.covariance, [a, b, c])
+    own = Covariance.variance(belief.covariance, [a, b, c])
+    shared = Covariance.project_state(belief.covariance, @common, [a, b, c])
     way = max(:math.sqrt(a * a + b * b), @no_way)
     told = way * way * Anchors.variance(spread, {a / way, b / way})
-    max(own + told - 2 * (a * x + b * y) * Enum.at(v, @common), 0.0)
+    max(own + told - 2 * (a * x + b * y) * shared, 0.0)
   end
 
   @doc """

@@ -29,7 +29,8 @@ defmodule Robot.Localiser.Covariance do
   @spec carry(t(), (t() -> t())) :: t()
   def carry(p, rows), do: p |> rows.() |> transpose() |> rows.()
 
-  defp transpose(rows), do: Enum.zip_with(rows, & &1)
+  defp transpose([[] | _rows]), do: []
+  defp transpose(rows), do: [Enum.map(rows, &hd/1) | transpose(Enum.map(rows, &tl/1))]
 
   @doc """
   The matrix with these variances added to its first states.
@@ -110,6 +111,28 @@ defmodule Robot.Localiser.Covariance do
     v = Enum.map(p, &dot(&1, slope))
     {v, dot(v, slope)}
   end
+
+  @doc """
+  H P H' alone, for `slope` H as in `project/2`: only the rows are computed for which H has a
+  derivative.
+
+      iex> Robot.Localiser.Covariance.variance([[2.0, 1.0], [1.0, 3.0]], [1.0])
+      2.0
+  """
+  @spec variance(t(), slope :: [float()]) :: float()
+  def variance(p, slope), do: dot(rows(p, slope, slope), slope)
+
+  defp rows([row | rows], slope, [_x | xs]), do: [dot(row, slope) | rows(rows, slope, xs)]
+  defp rows(_rows, _slope, []), do: []
+
+  @doc """
+  The element of P H' for one state, for `slope` H as in `project/2`.
+
+      iex> Robot.Localiser.Covariance.project_state([[2.0, 1.0], [1.0, 3.0]], 1, [1.0])
+      1.0
+  """
+  @spec project_state(t(), index :: non_neg_integer(), slope :: [float()]) :: float()
+  def project_state(p, index, slope), do: p |> Enum.at(index) |> dot(slope)
 
   @doc "P - v v' / s: the covariance after a measurement (`project/2`) of innovation variance s."
   @spec reduce(t(), [float()], float()) :: t()

@@ -24,7 +24,6 @@ defmodule Sim.World.Blobs do
     map
     |> Compute.look(sight, poles)
     |> Enum.filter(fn {_, kind, _, _, luma} -> luma >= Palette.least_luma(kind) end)
-    |> Enum.chunk_by(&elem(&1, 0))
     |> regions()
     |> Enum.with_index()
     |> Enum.map(fn {region, k} -> blob(region, sight, noise, k) end)
@@ -32,42 +31,69 @@ defmodule Sim.World.Blobs do
     |> Enum.sort_by(&{&1.colour != "YellowLandmark", -&1.area, &1.left, &1.top})
   end
 
-  # Parts that touch from column to column, or in one column, are one region.
-  defp regions(columns) do
-    {open, closed, _last} =
-      Enum.reduce(columns, {[], [], nil}, fn [{column, _, _, _, _} | _] = pieces,
-                                             {open, closed, last} ->
-        {open, closed} = if last == column - 1, do: {open, closed}, else: {[], open ++ closed}
-        {next, still} = Enum.reduce(pieces, {[], open}, &join/2)
-        {next, closed ++ still, column}
+  # Parts that touch from column to column, or in one column, are one region. A region is `{kind, its rows in the
+  # newest column, its sums}`; `next` are those of this column, `open` those that end in the column before.
+  defp regions(pieces) do
+    {_column, next, open, closed} =
+      Enum.reduce(pieces, {nil, [], [], []}, fn
+        {column, _, _, _, _} = piece, {column, next, open, closed} ->
+          {next, open} = join(piece, next, open)
+          {column, next, open, closed}
+
+        {column, _, _, _, _} = piece, {last, next, still, closed} ->
+          closed = closed ++ still
+          {open, closed} = if last == column - 1, do: {next, closed}, else: {[], next ++ closed}
+          {next, open} = join(piece, [], open)
+          {column, next, open, closed}
       end)
 
-    for {kind, _edge, pieces} <- open ++ closed, do: {kind, pieces}
+    for {kind, _rows, sums} <- next ++ closed ++ open, do: {kind, sums}
   end
 
-  # A region is `{kind, its rows in the newest column, all its {column, first, last}}`.
-  defp join({column, kind, top, bottom, _luma}, {next, open}) do
-    touches? = fn {k, rows, _}, gap ->
-      k == kind and Enum.any?(rows, fn {t, b} -> t <= bottom + gap and b >= top - gap end)
-    end
-
-    {beside, open} = Enum.split_with(open, &touches?.(&1, 0))
-    {above, next} = Enum.split_with(next, &touches?.(&1, 1))
+  defp join({column, kind, top, bottom, _luma}, next, open) do
+    {beside, open} = touching(open, kind, top, bottom)
+    {above, next} = touching(next, kind, top - 1, bottom + 1)
     rows = [{top, bottom} | Enum.flat_map(above, &elem(&1, 1))]
-    pieces = Enum.flat_map(beside ++ above, &elem(&1, 2))
-    {[{kind, rows, [{column, top, bottom} | pieces]} | next], open}
+    {[{kind, rows, sums(beside, sums(above, sums(column, top, bottom)))} | next], open}
   end
 
-  defp area(pieces),
-    do: Enum.reduce(pieces, 0, fn {_, top, bottom}, sum -> sum + bottom - top + 1 end)
+  # The regions of this kind that have one of these rows, and the others.
+  defp touching([], _kind, _top, _bottom), do: {[], []}
 
-  defp blob({kind, pieces}, sight, noise, k) do
-    exact = area(pieces)
-    {left, right} = pieces |> Enum.map(&elem(&1, 0)) |> Enum.min_max()
-    top = pieces |> Enum.map(&elem(&1, 1)) |> Enum.min()
-    bottom = pieces |> Enum.map(&elem(&1, 2)) |> Enum.max()
-    x = Enum.reduce(pieces, 0, fn {c, t, b}, sum -> sum + c * (b - t + 1) end) / exact
-    y = Enum.reduce(pieces, 0, fn {_, t, b}, sum -> sum + (t + b) * (b - t + 1) / 2 end) / exact
+  defp touching([{kind, rows, _} = region | rest], kind, top, bottom) do
+    {touching, others} = touching(rest, kind, top, bottom)
+
+    if meet?(rows, top, bottom),
+      do: {[region | touching], others},
+      else: {touching, [region | others]}
+  end
+
+  defp touching([region | rest], kind, top, bottom) do
+    {touching, others} = touching(rest, kind, top, bottom)
+    {touching, [region | others]}
+  end
+
+  defp meet?([], _top, _bottom), do: false
+  defp meet?([{t, b} | _rest], top, bottom) when t <= bottom and b >= top, do: true
+  defp meet?([_rows | rest], top, bottom), do: meet?(rest, top, bottom)
+
+  # All that a blob needs of its pieces: area, left, right, top, bottom, the sum of the columns of its pixels, and
+  # twice the sum of their rows. They are whole numbers, so that their order does not matter.
+  defp sums(column, top, bottom) do
+    area = bottom - top + 1
+    {area, column, column, top, bottom, column * area, (top + bottom) * area}
+  end
+
+  defp sums([], sums), do: sums
+
+  defp sums([{_, _, {a, l, r, t, b, x, y}} | rest], {area, left, right, top, bottom, sx, sy}) do
+    box = {area + a, min(left, l), max(right, r), min(top, t), max(bottom, b), sx + x, sy + y}
+    sums(rest, box)
+  end
+
+  defp blob({kind, {exact, left, right, top, bottom, columns, rows}}, sight, noise, k) do
+    x = columns / exact
+    y = rows / 2 / exact
     area = max(round(exact * (1 + 0.01 * draw(noise, 3 * k))), 1)
     share = area / (sight.width * sight.height)
 
