@@ -9,6 +9,7 @@ defmodule Vision.CalibrationTest do
   doctest Vision.Calibration.Sample
   doctest Vision.Colours.Edit
 
+  @photos ~w(smarties.png)
   @none elem(Colours.new([%{name: "None", y: {0, 0}, u: {0, 0}, v: {0, 0}}]), 1)
 
   # Discs on a ground, RGB, with noise of so many values of each channel.
@@ -51,6 +52,18 @@ defmodule Vision.CalibrationTest do
     {:ok, colours} = Colours.new([class], min_area: min_area)
     {:ok, blobs} = Vision.blobs(frame, colours)
     blobs
+  end
+
+  # The photograph, and what it is in other light: once for all tests.
+  setup_all do
+    if Photos.tags(@photos)[:skip], do: :ok, else: photograph()
+  end
+
+  defp photograph do
+    me = self()
+    {:ok, _} = Blobs.run(Photos.path("smarties.png"), @none, &send(me, {:frame, &1.frame}))
+    assert_received {:frame, frame}
+    %{frame: frame, lit: for(gain <- [0.85, 1.0, 1.15], do: {gain, lit(frame, gain)})}
   end
 
   @yellow {220, 205, 90}
@@ -215,7 +228,7 @@ defmodule Vision.CalibrationTest do
   end
 
   describe "photographs" do
-    @describetag Photos.tags(~w(smarties.png))
+    @describetag Photos.tags(@photos)
 
     # Middles of one sweet each, and of all of its colour that are whole, read off the picture by eye.
     @sweets %{
@@ -226,24 +239,16 @@ defmodule Vision.CalibrationTest do
       "Brown" => {{152, 272}, [{152, 272}]}
     }
 
-    setup do
-      me = self()
-      {:ok, _} = Blobs.run(Photos.path("smarties.png"), @none, &send(me, {:frame, &1.frame}))
-      assert_received {:frame, frame}
-      %{frame: frame}
-    end
-
     for {name, _} <- @sweets do
-      test "one #{name} sweet shows what all #{name} sweets look like, in changed light too", %{
-        frame: frame
-      } do
+      test "one #{name} sweet shows what all #{name} sweets look like, in changed light too",
+           %{frame: frame, lit: lit} do
         name = unquote(name)
         {{x, y}, places} = @sweets[name]
         {:ok, found} = Calibration.find([frame], [{:box, {x - 14, y - 14, 28, 28}}], name)
         assert found.match.hit / found.match.inside > 0.85
 
-        for gain <- [0.85, 1.0, 1.15] do
-          whole = Filter.least_area(blobs(lit(frame, gain), found.class, 400), 1000)
+        for {gain, frame} <- lit do
+          whole = Filter.least_area(blobs(frame, found.class, 400), 1000)
           places_found = for blob <- whole, do: {blob.x, blob.y}
           assert length(whole) == length(places), "#{name} at #{gain}: #{inspect(places_found)}"
 
