@@ -39,23 +39,23 @@ defmodule Swarm.CommandsTest do
   test "single commands work from idle and replace each other" do
     id = robot(:door1, eyes())
     standing([id])
-    assert Swarm.goto(id, {2.0, 1}) == :ok
+    assert order(fn -> Swarm.goto(id, {2.0, 1}) end) == :ok
     assert state(id) == {Robot.Mission.Manual, :goto}
     eventually(fn -> doing(id) == :goto end)
 
-    assert Swarm.tell("door1", "MOVE:0.1:0") == :ok
+    assert order(fn -> Swarm.tell("door1", "MOVE:0.1:0") end) == :ok
     eventually(fn -> doing(id) == :move end)
 
     assert %Swarm.Status{state: :move, robot: :door1} = Swarm.status(id)
-    assert Swarm.stop(id) == :ok
+    assert order(fn -> Swarm.stop(id) end) == :ok
     assert state(id) == :idle
     eventually(fn -> doing(id) == :rest end)
 
-    assert Swarm.tell([id], "findblob:Yellow") == :ok
-    assert Swarm.tell(id, "lead") == :ok
+    assert order(fn -> Swarm.tell([id], "findblob:Yellow") end) == :ok
+    assert order(fn -> Swarm.tell(id, "lead") end) == :ok
     assert {:ok, "door1 on " <> _} = Swarm.tell(id, "ping")
-    assert Swarm.goto(id, {1, 2, 1.5}) == :ok
-    assert Swarm.goto(id, Pose.new(1, 2)) == :ok
+    assert order(fn -> Swarm.goto(id, {1, 2, 1.5}) end) == :ok
+    assert order(fn -> Swarm.goto(id, Pose.new(1, 2)) end) == :ok
   end
 
   test "an unknown colour is refused with the colours that the robot looks for" do
@@ -67,9 +67,9 @@ defmodule Swarm.CommandsTest do
              {:error, ~s(command_sees does not know the colour "Blue"; it looks for Yellow, Red)}
 
     assert state(id) == :idle
-    assert Swarm.tell(id, "findblob") == :ok
+    assert order(fn -> Swarm.tell(id, "findblob") end) == :ok
     assert Swarm.tell(blind, "findblob") == {:error, "command_blind has no camera to look with"}
-    assert Swarm.tell(id, "findblob:Red") == :ok
+    assert order(fn -> Swarm.tell(id, "findblob:Red") end) == :ok
     assert state(id) == {Robot.Mission.Manual, :find_blob}
     # A full turn shows nothing.
     :ok = stop_supervised({:wheels, [id, blind]})
@@ -81,8 +81,8 @@ defmodule Swarm.CommandsTest do
     [a, b, c] = for k <- 1..3, do: robot(:"command_follow#{k}")
     standing([a, b, c])
     assert line(Swarm.follow(a, a)) =~ "itself"
-    assert Swarm.follow(a, b) == :ok
-    assert Swarm.follow(b, c) == :ok
+    assert order(fn -> Swarm.follow(a, b) end) == :ok
+    assert order(fn -> Swarm.follow(b, c) end) == :ok
 
     leader = fn id, of ->
       match?({:ok, %{beat: %{leader: ^of}}, _}, Board.fetch(Board.find!(c), {:peer, id}, 1_000))
@@ -91,48 +91,48 @@ defmodule Swarm.CommandsTest do
     eventually(fn -> leader.(a, b) and leader.(b, c) end)
     assert line(Swarm.follow(c, a)) =~ "command_follow1 -> command_follow2 -> command_follow3"
     assert line(Swarm.tell(c, "followtheleader:nobody")) =~ "nobody"
-    assert Swarm.stop([a, b]) == :ok
+    assert order(fn -> Swarm.stop([a, b]) end) == :ok
     eventually(fn -> leader.(a, nil) end)
-    assert Swarm.follow(c, a) == :ok
+    assert order(fn -> Swarm.follow(c, a) end) == :ok
   end
 
   test "the mission starts, takes a formation, stops, and a robot that is sent elsewhere leaves it" do
     id = robot(:command_group)
     assert line(Swarm.formation(:wedge)) =~ "start it first"
-    assert Swarm.start(robots: [id], formation: :line) == :ok
+    assert order(fn -> Swarm.start(robots: [id], formation: :line) end) == :ok
     assert {Missions.Landmark, _} = state(id)
     standing([id])
     eventually(fn -> state(id) != {Missions.Landmark, :idle} end)
-    assert Swarm.formation(:wedge, spacing: 1.2) == :ok
-    assert Swarm.formation("column") == :ok
-    assert Swarm.stop(id) == :ok
+    assert order(fn -> Swarm.formation(:wedge, spacing: 1.2) end) == :ok
+    assert order(fn -> Swarm.formation("column") end) == :ok
+    assert order(fn -> Swarm.stop(id) end) == :ok
     assert state(id) == :idle
-    assert Swarm.start() == :ok
+    assert order(fn -> Swarm.start() end) == :ok
     assert {Missions.Landmark, _} = state(id)
     eventually(fn -> state(id) != {Missions.Landmark, :idle} end)
     # The last requested shape.
     assert {:column, 1.0} = mission(id).formation
-    assert Swarm.goto(id, {1, 1}) == :ok
+    assert order(fn -> Swarm.goto(id, {1, 1}) end) == :ok
     assert state(id) == {Robot.Mission.Manual, :goto}
-    assert Swarm.start() == :ok
+    assert order(fn -> Swarm.start() end) == :ok
     assert {Missions.Landmark, _} = state(id)
   end
 
   test "a formation is :ok only when all on the mission have it; a robot that does not answer is named" do
     for id <- [:shape1, :shape2, :shape3], do: robot(id)
     standing([:shape1, :shape2, :shape3])
-    assert Swarm.start(robots: [:shape1, :shape2]) == :ok
+    assert order(fn -> Swarm.start(robots: [:shape1, :shape2]) end) == :ok
     # The third is not on a mission.
-    assert Swarm.formation(:wedge) == :ok
+    assert order(fn -> Swarm.formation(:wedge) end) == :ok
     comms = Names.whereis(:shape2, :comms)
     :ok = :sys.suspend(comms)
     told = "shape2 does not answer; the others accepted it"
     assert Swarm.formation(:column) == {:error, told}
     :ok = :sys.resume(comms)
-    assert Swarm.estop() == :ok
+    assert order(fn -> Swarm.estop() end) == :ok
     assert {:error, line} = Swarm.formation(:wedge)
     assert line =~ "shape1 is held by the emergency stop; reset it first; shape2 is held by"
-    assert Swarm.reset() == :ok
+    assert order(fn -> Swarm.reset() end) == :ok
   end
 
   test "wrong input is one line that says what is allowed, and never raises" do
@@ -193,7 +193,7 @@ defmodule Swarm.CommandsTest do
     assert took in 450_000..700_000
     assert Enum.any?(Swarm.status(), &match?(%{robot: :command_deaf, state: :no_answer}, &1))
     # A stop does not go through the comms process.
-    assert Swarm.stop(id) == :ok
+    assert order(fn -> Swarm.stop(id) end) == :ok
     :ok = :sys.resume(Names.whereis(id, :comms))
     assert %Swarm.Status{} = Swarm.status(id)
     refute_received {_alias, :command_deaf, _answer}

@@ -72,7 +72,7 @@ defmodule Swarm.OrdersTest do
     test "is refused with an error, and nobody leaves a mission for it" do
       [id, other] = for id <- [:orders_talk, :orders_other], do: robot(id)
       standing([id, other])
-      assert Swarm.start(robots: [id, other]) == :ok
+      assert order(fn -> Swarm.start(robots: [id, other]) end) == :ok
       before = state(id)
 
       for text <- ~w(subscribe:orders_other unsubscribe:orders_other position:1:2:3
@@ -93,7 +93,7 @@ defmodule Swarm.OrdersTest do
       standing([id, other])
       assert {:ok, line} = Swarm.tell(id, "ping")
       assert line =~ ~r/^orders_ping on #{node()}, up for \d+ s, idle for \d+ s$/
-      assert Swarm.goto(id, {1, 1}) == :ok
+      assert order(fn -> Swarm.goto(id, {1, 1}) end) == :ok
       assert {:ok, line} = Swarm.tell(id, "Ping")
       assert line =~ ~r/, up for \d+ s, goto for \d+ s$/
       assert state(id) == {Robot.Mission.Manual, :goto}
@@ -104,10 +104,10 @@ defmodule Swarm.OrdersTest do
       assert {:error, line} = Swarm.tell([id, other], "ping")
       assert line =~ ~r/^orders_pong does not answer; orders_ping on /
       :ok = :sys.resume(Names.whereis(other, :comms))
-      assert Swarm.estop() == :ok
+      assert order(fn -> Swarm.estop() end) == :ok
       held = ~r/^orders_ping .*, idle for \d+ s, E-STOP$/
       eventually(fn -> elem(Swarm.tell(id, "ping"), 1) =~ held end)
-      assert Swarm.reset() == :ok
+      assert order(fn -> Swarm.reset() end) == :ok
     end
   end
 
@@ -146,7 +146,7 @@ defmodule Swarm.OrdersTest do
   test "a reset of robots that are not held stops nobody" do
     id = robot(:orders_free)
     standing([id])
-    assert Swarm.tell(id, "move:0.2:0") == :ok
+    assert order(fn -> Swarm.tell(id, "move:0.2:0") end) == :ok
     rolls(id)
     assert Swarm.ask(id, :reset) == :ok
     assert state(id) == {Robot.Mission.Manual, :move}
@@ -155,7 +155,7 @@ defmodule Swarm.OrdersTest do
   test "a start right after a stop that is still on its way starts the mission again" do
     id = robot(:orders_late)
     standing([id])
-    assert Swarm.start(robots: [id], formation: :wedge) == :ok
+    assert order(fn -> Swarm.start(robots: [id], formation: :wedge) end) == :ok
     pilot = Names.whereis(id, :pilot)
     :ok = :sys.suspend(pilot)
     Pilot.halt(id)
@@ -196,7 +196,7 @@ defmodule Swarm.OrdersTest do
     assert inspect(status) =~ ~r/, HUNG in Robot\.Acts\.Hang \d+ s ago, started again,/
     # Nothing is left of the order that was not answered.
     stands(id)
-    assert Swarm.goto(id, {1, 1}) == :ok
+    assert order(fn -> Swarm.goto(id, {1, 1}) end) == :ok
   end
 
   test "a mission that hangs is reported in status, row and log; orders are refused with it, and it recovers" do
@@ -236,7 +236,7 @@ defmodule Swarm.OrdersTest do
     status = Swarm.status(id)
     assert %{state: :idle, hung: {:hung, ^where, _ago_ms}} = status
     stands(id)
-    assert Swarm.goto(id, {1, 1}) == :ok
+    assert order(fn -> Swarm.goto(id, {1, 1}) end) == :ok
   end
 
   describe "stop" do
@@ -251,7 +251,7 @@ defmodule Swarm.OrdersTest do
             fn -> Swarm.tell([id], " STOP ") end,
             fn -> Swarm.disarm(id) end
           ] do
-        assert Swarm.arm(id) == :ok
+        assert order(fn -> Swarm.arm(id) end) == :ok
         :ok = Pilot.start(id, Deaf, goal: @roll)
         rolls(id)
         assert stop.() == :ok
@@ -265,7 +265,7 @@ defmodule Swarm.OrdersTest do
       standing([id])
       Executive.goal(id, :roll, @roll)
       rolls(id)
-      assert Swarm.stop(id) == :ok
+      assert order(fn -> Swarm.stop(id) end) == :ok
       stands(id)
     end
 
@@ -306,10 +306,10 @@ defmodule Swarm.OrdersTest do
     test "keeps what people asked of the group's mission" do
       id = robot(:orders_shape)
       standing([id])
-      assert Swarm.start(robots: [id], formation: :line) == :ok
-      assert Swarm.formation(:wedge, spacing: 1.2) == :ok
-      assert Swarm.stop(id) == :ok
-      assert Swarm.start(robots: [id]) == :ok
+      assert order(fn -> Swarm.start(robots: [id], formation: :line) end) == :ok
+      assert order(fn -> Swarm.formation(:wedge, spacing: 1.2) end) == :ok
+      assert order(fn -> Swarm.stop(id) end) == :ok
+      assert order(fn -> Swarm.start(robots: [id]) end) == :ok
       {_state, %{runner: %{mission: mission}}} = :sys.get_state(Names.whereis(id, :pilot))
       assert mission.formation == {:wedge, 1.2}
     end

@@ -48,31 +48,31 @@ defmodule Swarm.ArmingTest do
           do: assert({text, Swarm.tell(id, text)} == {text, refusal})
 
       assert Swarm.start(robots: [id]) == refusal
-      assert Swarm.arm(id) == :ok
+      assert order(fn -> Swarm.arm(id) end) == :ok
       assert %Status{state: :idle} = Swarm.status(id)
       eventually(fn -> Swarm.status(id).limits == [] end)
     end)
 
-    assert Swarm.tell(id, "move:0.2:0") == :ok
+    assert order(fn -> Swarm.tell(id, "move:0.2:0") end) == :ok
     told(id, &(&1 > 0))
     refute line(id) =~ "DISARMED"
 
-    assert Swarm.disarm(id) == :ok
+    assert order(fn -> Swarm.disarm(id) end) == :ok
     shows(id, "DISARMED")
 
     # Its order has ended: armed again, it stands.
-    assert Swarm.tell("arm_hand", "Arm") == :ok
+    assert order(fn -> Swarm.tell("arm_hand", "Arm") end) == :ok
     eventually(fn -> match?(%Status{arming: :armed, state: :idle}, Swarm.status(id)) end)
-    assert Swarm.tell(id, "disarm") == :ok
+    assert order(fn -> Swarm.tell(id, "disarm") end) == :ok
     eventually(fn -> match?(%Status{arming: :disarmed}, Swarm.status(id)) end)
   end
 
   test "disarming stops wheels in motion" do
     id = robot(:arm_stop)
     standing([id])
-    assert Swarm.tell(id, "move:0.2:0") == :ok
+    assert order(fn -> Swarm.tell(id, "move:0.2:0") end) == :ok
     told(id, &(&1 > 0.1))
-    assert Swarm.disarm() == :ok
+    assert order(fn -> Swarm.disarm() end) == :ok
     told(id, &(&1 == 0))
     shows(id, "DISARMED")
     stands_while(id, fn -> eventually(fn -> Swarm.status(id).limits == [:disarmed] end) end)
@@ -89,8 +89,8 @@ defmodule Swarm.ArmingTest do
   test "a line lost in motion stays an error, even on a new line, until a person acknowledges" do
     id = robot(:arm_lost, arm: :manual)
     standing([id])
-    assert Swarm.arm(id) == :ok
-    assert Swarm.tell(id, "move:0.2:0") == :ok
+    assert order(fn -> Swarm.arm(id) end) == :ok
+    assert order(fn -> Swarm.tell(id, "move:0.2:0") end) == :ok
     told(id, &(&1 > 0))
     send(Names.whereis(id, :drive), {:fail, :unplugged})
     shows(id, "LINE LOST (acknowledge it)")
@@ -100,18 +100,18 @@ defmodule Swarm.ArmingTest do
 
     stands_while(id, fn ->
       eventually(fn -> Swarm.status(id).limits == [:disarmed] end)
-      assert Swarm.acknowledge(id) == :ok
+      assert order(fn -> Swarm.acknowledge(id) end) == :ok
       shows(id, "DISARMED")
     end)
 
     # Its order had ended with the line.
     stands_while(id, fn ->
-      assert Swarm.arm(id) == :ok
+      assert order(fn -> Swarm.arm(id) end) == :ok
       assert %Status{state: :idle} = Swarm.status(id)
       eventually(fn -> match?(%Status{limits: [], by: :rest}, Swarm.status(id)) end)
     end)
 
-    assert Swarm.tell(id, "move:0.2:0") == :ok
+    assert order(fn -> Swarm.tell(id, "move:0.2:0") end) == :ok
     told(id, &(&1 > 0))
   end
 
@@ -120,8 +120,8 @@ defmodule Swarm.ArmingTest do
     drive = [test: self(), device: :drive, open: fn -> Agent.get(line, & &1) end]
     id = robot(:arm_unheard, arm: :manual, drive: {Hal.FakeDrive, drive})
     standing([id])
-    assert Swarm.arm(id) == :ok
-    assert Swarm.tell(id, "move:0.2:0") == :ok
+    assert order(fn -> Swarm.arm(id) end) == :ok
+    assert order(fn -> Swarm.tell(id, "move:0.2:0") end) == :ok
     told(id, &(&1 > 0))
     Agent.update(line, fn _ -> {:error, :enoent} end)
     send(Names.whereis(id, :drive), {:fail, :unplugged})
@@ -137,13 +137,13 @@ defmodule Swarm.ArmingTest do
     end
 
     assert Board.latched?(Board.find!(id))
-    assert Swarm.reset() == :ok
+    assert order(fn -> Swarm.reset() end) == :ok
     # A line that is opened again starts with a stop.
     Agent.update(line, fn _ -> :ok end)
     eventually(fn -> Swarm.status(id).health[:drive] == :online end)
     shows(id, "LINE LOST (acknowledge it)")
-    assert Swarm.stop(id) == :ok
-    assert Swarm.disarm(id) == :ok
+    assert order(fn -> Swarm.stop(id) end) == :ok
+    assert order(fn -> Swarm.disarm(id) end) == :ok
   end
 
   test "while the line is lost, and while it is away, the reason is the answer" do
@@ -151,7 +151,7 @@ defmodule Swarm.ArmingTest do
     drive = [test: self(), device: :drive, open: fn -> Agent.get(line, & &1) end]
     id = robot(:arm_away, arm: :manual, drive: {Hal.FakeDrive, drive})
     standing([id])
-    assert Swarm.arm(id) == :ok
+    assert order(fn -> Swarm.arm(id) end) == :ok
     # It stands, so nobody needs to acknowledge.
     Agent.update(line, fn _ -> {:error, :enoent} end)
     send(Names.whereis(id, :drive), {:fail, :unplugged})
@@ -159,15 +159,15 @@ defmodule Swarm.ArmingTest do
     assert {:error, "arm_away: its drive is offline (:" <> _} = Swarm.goto(id, {1, 1})
     assert {:error, "arm_away: its drive is offline (:" <> _} = Swarm.start(robots: [id])
     # Stops and questions are always accepted.
-    assert Swarm.stop(id) == :ok
-    assert Swarm.disarm(id) == :ok
+    assert order(fn -> Swarm.stop(id) end) == :ok
+    assert order(fn -> Swarm.disarm(id) end) == :ok
     assert {:ok, _said} = Swarm.tell(id, "ping")
     Agent.update(line, fn _ -> :ok end)
     eventually(fn -> Swarm.status(id).health[:drive] == :online end)
     assert {:error, "arm_away: its wheels are disarmed" <> _} = Swarm.goto(id, {1, 1})
 
-    assert Swarm.arm(id) == :ok
-    assert Swarm.tell(id, "move:0.2:0") == :ok
+    assert order(fn -> Swarm.arm(id) end) == :ok
+    assert order(fn -> Swarm.tell(id, "move:0.2:0") end) == :ok
     told(id, &(&1 > 0))
     send(Names.whereis(id, :drive), {:fail, :unplugged})
     shows(id, "LINE LOST")
@@ -188,8 +188,8 @@ defmodule Swarm.ArmingTest do
     id = robot(:arm_past, arm: :manual)
     standing([id])
     drive = Names.whereis(id, :drive)
-    assert Swarm.arm(id) == :ok
-    assert Swarm.tell(id, "move:0.2:0") == :ok
+    assert order(fn -> Swarm.arm(id) end) == :ok
+    assert order(fn -> Swarm.tell(id, "move:0.2:0") end) == :ok
     told(id, &(&1 > 0))
     assert Hal.Device.disarm(drive) == :ok
     eventually(fn -> match?(%Status{state: :idle, by: :rest}, Swarm.status(id)) end)
@@ -201,7 +201,7 @@ defmodule Swarm.ArmingTest do
     eventually(fn -> match?(%Status{by: :rest}, Swarm.status(id)) end)
 
     stands_while(id, fn ->
-      assert Swarm.arm(id) == :ok
+      assert order(fn -> Swarm.arm(id) end) == :ok
       eventually(fn -> Swarm.status(id).limits == [] end)
     end)
   end
@@ -209,22 +209,22 @@ defmodule Swarm.ArmingTest do
   test "in a dry run every order is accepted: nothing moves" do
     id = robot(:arm_dry, arm: :manual, dry_run: true)
     standing([id])
-    assert Swarm.tell(id, "move:0.2:0") == :ok
+    assert order(fn -> Swarm.tell(id, "move:0.2:0") end) == :ok
     eventually(fn -> Swarm.status(id).by == :move end)
   end
 
   test "the emergency stop is stronger: the robot refuses to be armed, and arming does not release it" do
     id = robot(:arm_estop, arm: :manual)
-    assert Swarm.arm(id) == :ok
-    assert Swarm.estop() == :ok
+    assert order(fn -> Swarm.arm(id) end) == :ok
+    assert order(fn -> Swarm.estop() end) == :ok
     assert {:error, line} = Swarm.arm(id)
     assert line == "arm_estop is held by the emergency stop; reset it first"
-    assert Swarm.acknowledge(id) == :ok
-    assert Swarm.disarm(id) == :ok
-    assert Swarm.reset() == :ok
+    assert order(fn -> Swarm.acknowledge(id) end) == :ok
+    assert order(fn -> Swarm.disarm(id) end) == :ok
+    assert order(fn -> Swarm.reset() end) == :ok
     # The reset does not arm.
     shows(id, "DISARMED")
-    assert Swarm.arm(id) == :ok
+    assert order(fn -> Swarm.arm(id) end) == :ok
   end
 
   test "a robot is disarmed even if its comms process hangs, and by an order of any age; armed only in time" do
@@ -240,10 +240,10 @@ defmodule Swarm.ArmingTest do
     end
 
     shows(id, "DISARMED")
-    assert Swarm.arm(id) == :ok
+    assert order(fn -> Swarm.arm(id) end) == :ok
     comms = Names.whereis(id, :comms)
     :ok = :sys.suspend(comms)
-    assert Swarm.disarm(id) == :ok
+    assert order(fn -> Swarm.disarm(id) end) == :ok
     eventually(fn -> Hal.Device.arming(Names.whereis(id, :drive)).state == :disarmed end)
     :ok = :sys.resume(comms)
   end

@@ -1,7 +1,7 @@
 defmodule Swarm.Mesh.FloodTest do
   # A real socket, a real robot in a VM of its own, and a flood.
   use ExUnit.Case, async: false
-  import Swarm.Case, only: [eventually: 1]
+  import Swarm.Case, only: [eventually: 1, order: 1]
   alias Swarm.MeshNodes
   alias Mesh.Protocol.Packet
   @moduletag :slow
@@ -75,7 +75,7 @@ defmodule Swarm.Mesh.FloodTest do
       # During the flood the robot's controller goes on, and people are answered.
       tick_ms = state(one).tick_ms
       assert eventually(fn -> state(one).tick_ms > tick_ms + 500 end)
-      assert :ok = MeshNodes.call(one, Swarm, :stop, [one.name])
+      assert order(fn -> MeshNodes.call(one, Swarm, :stop, [one.name]) end) == :ok
       assert %{not_ours: _, throttled: _} = MeshNodes.call(one, Mesh, :rejected, [])
       state(one)
     end
