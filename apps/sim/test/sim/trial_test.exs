@@ -5,6 +5,12 @@ defmodule Sim.TrialTest do
   alias Sim.Trial
   @moduletag :slow
 
+  # The first formation of seed 1, from which several tests go on; a trial is a value.
+  setup_all do
+    {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct})
+    %{formed: until(trial, &Trial.formed?/1)}
+  end
+
   defp stages(trial), do: Enum.map(Trial.result(trial).stages, & &1.stage)
 
   defp assert_formed(trial) do
@@ -83,17 +89,14 @@ defmodule Sim.TrialTest do
     assert second > first
   end
 
-  test "a shape asked for just before the leader dies is the next leader's shape" do
-    {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct})
-    trial = until(trial, &Trial.formed?/1)
+  test "a shape asked for just before the leader dies is the next leader's shape",
+       %{formed: trial} do
     trial = trial |> Trial.command(:all, {:formation, :wedge, 1.2}) |> Trial.kill(:leader)
     result = trial |> to_the_end() |> assert_formed() |> Trial.result()
     assert {result.formation.kind, result.formation.spacing_m} == {:wedge, 1.2}
   end
 
-  test "a gap in the middle closes, without a new election" do
-    {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct, kills: []})
-    trial = until(trial, &Trial.formed?/1)
+  test "a gap in the middle closes, without a new election", %{formed: trial} do
     leader = Sim.Trial.RunLog.leader(trial.run_log)
     second = Enum.at(trial.members[leader].runner.mission.order, 1)
     trial = trial |> Trial.kill(second) |> to_the_end() |> assert_formed()
