@@ -41,8 +41,13 @@ defmodule Robot.Case do
     id
   end
 
-  @doc "Waits until the base of a robot has reported: nobody arms it before."
-  def online(id), do: health(id, :online)
+  @doc "Waits until the base of a robot has reported, and has been armed if it arms by itself."
+  def online(id) do
+    health(id, :online)
+    # In the step in which it writes that it is online it then writes whether it is armed.
+    _state = id |> Robot.Names.whereis(:drive) |> :sys.get_state(30_000)
+    id
+  end
 
   @doc "Waits until the drive of a robot is in this health."
   def health(id, wanted, left \\ 2_000) do
