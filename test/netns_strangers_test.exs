@@ -1,6 +1,6 @@
 Code.require_file("netns/load.exs", __DIR__)
 modules = :persistent_term.get(:netns_modules)
-why_not = Netns.Net.why_not()
+why_not = Vm.Net.why_not()
 
 defmodule System.NetnsStrangersTest do
   @moduledoc """
@@ -11,7 +11,8 @@ defmodule System.NetnsStrangersTest do
   import Swarm.Case, only: [eventually: 1]
   alias Hal.Pose
   alias Mesh.Distribution.{Certs, Epmd}
-  alias Netns.{Caller, Fleet, Net}
+  alias Netns.{Caller, Fleet}
+  alias Vm.Net
 
   @moduletag timeout: 600_000
   @moduletag skip: why_not

@@ -1,6 +1,6 @@
 Code.require_file("netns/load.exs", __DIR__)
 modules = :persistent_term.get(:netns_modules)
-why_not = Netns.Net.why_not()
+why_not = Vm.Net.why_not()
 if why_not, do: IO.puts("the tests in network namespaces are skipped: #{why_not}")
 
 defmodule System.NetnsTest do
@@ -19,7 +19,8 @@ defmodule System.NetnsTest do
   use ExUnit.Case, async: false
   import Swarm.Case, only: [order: 1]
   alias Hal.Pose
-  alias Netns.{Fleet, Log, Net, Story}
+  alias Netns.{Fleet, Log, Story}
+  alias Vm.Net
 
   @moduletag timeout: 120_000
   @moduletag skip: why_not

@@ -18,5 +18,5 @@ defmodule Vm.MixProject do
     ]
   end
 
-  def application, do: [extra_applications: []]
+  def application, do: [extra_applications: [:crypto]]
 end

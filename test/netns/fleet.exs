@@ -4,7 +4,8 @@ defmodule Netns.Fleet do
   them: their nodes, and what their logs say.
   """
   use Agent
-  alias Netns.{Log, Net, Story}
+  alias Netns.{Log, Story}
+  alias Vm.Net
   alias Mesh.Secret
   alias Mesh.Distribution.Epmd
 

@@ -39,6 +39,20 @@ defmodule Mix.Tasks.Bench do
     with {:error, lines} <- Bench.Stop.Main.run(arguments), do: refuse(lines)
   end
 
+  def run(["soak" | arguments]) do
+    Build.update()
+
+    case Bench.Soak.Main.arguments(arguments) do
+      {:ok, what} ->
+        status = Bench.Soak.Main.run(what, Path.join(Mix.Project.build_path(), "soak"))
+        if status > 0, do: exit({:shutdown, status})
+
+      {:error, line} ->
+        IO.puts(:stderr, "soak: #{line}; bin/soak --help explains it")
+        exit({:shutdown, 2})
+    end
+  end
+
   def run(arguments) when arguments in [["--help"], ["-h"]], do: help()
 
   def run(_other),

@@ -1,14 +1,14 @@
-defmodule Netns.Net do
+defmodule Vm.Net do
   @moduledoc """
   A network of our own on this machine: a namespace with two bridges (the switch), and one for
   each robot, with a cable to the switch. Nothing of it is seen outside, and it goes with whoever
   made it, however that ends. Guests have namespaces and cables as robots do, and belong to nobody's fleet.
 
-      net = Netns.Net.create([:mag1, :mag2, :mag3], folder)
-      Netns.Net.split(net, [[:mag1, :mag2], [:mag3]])
-      Netns.Net.block(net, :mag1, :mag2)
-      Netns.Net.lose(net, 0.2)
-      Netns.Net.heal(net)
+      net = Vm.Net.create([:mag1, :mag2, :mag3], folder)
+      Vm.Net.split(net, [[:mag1, :mag2], [:mag3]])
+      Vm.Net.block(net, :mag1, :mag2)
+      Vm.Net.lose(net, 0.2)
+      Vm.Net.heal(net)
   """
 
   @enforce_keys [:prefix, :robots, :guard]

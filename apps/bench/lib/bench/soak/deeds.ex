@@ -1,0 +1,190 @@
+defmodule Bench.Soak.Deeds do
+  @moduledoc """
+  Does to a fleet what a schedule says (`Bench.Soak.Schedule`), and notes it for the judge before it takes effect.
+  What is not possible now, such as to freeze a node that is down, is left out, and the journal says so.
+  """
+  alias Bench.Soak.{Junk, Network, Node, Recorder, Runner, WorldHost}
+
+  @order_ms 8_000
+  # Between so many datagrams of a flood others get their turn.
+  @burst 200
+
+  @doc "Does it, or begins it."
+  @spec carry_out(Runner.t(), tuple() | atom()) :: Runner.t()
+  def carry_out(s, {:process, robot, chance} = deed) do
+    with_node(s, robot, deed, fn s, vm ->
+      aside(s, fn -> {robot, Vm.call(vm, Node, :kill, [chance], @order_ms)} end, fn {robot, words} ->
+        "killed on #{robot}: #{words || "nothing, there is no robot"}"
+      end)
+
+      s = %{s | processes: Map.put(s.processes, robot, now())}
+      s |> count(:process) |> Runner.note({now(), :soak, :process, robot})
+    end)
+  end
+
+  def carry_out(s, {:node, robot} = deed), do: with_node(s, robot, deed, &kill(&1, robot, &2, :node))
+  def carry_out(s, :world), do: with_node(s, :world, :world, &kill(&1, :world, &2, :world))
+
+  def carry_out(s, {:freeze, robot, ms} = deed) do
+    with_node(s, robot, deed, fn s, vm ->
+      :ok = Vm.signal(vm, "STOP")
+      Process.send_after(self(), {:later, {:thaw, robot, vm}}, ms)
+      s = %{s | frozen: MapSet.put(s.frozen, robot)}
+
+      s
+      |> count(:freeze)
+      |> Runner.note({now(), :soak, :freeze, robot})
+      |> Runner.write("frozen for #{ms} ms: #{robot}")
+    end)
+  end
+
+  def carry_out(s, {kind, _what, ms} = deed) when kind in [:split, :loss], do: network(s, kind, ms, deed)
+  def carry_out(s, {:block, _a, _b, ms} = deed), do: network(s, :block, ms, deed)
+
+  def carry_out(s, {:junk, robot, kind, size, seed}) do
+    shout(s, robot, Junk.datagrams(kind, size, seed, Enum.reverse(s.recorded)))
+    s |> count(:junk) |> Runner.write("#{size} datagrams of junk (#{kind}, #{length(s.recorded)} recorded) to #{robot}")
+  end
+
+  def carry_out(s, {:flood, robot, size, seed}) do
+    mixed = Enum.flat_map([:random, :mutated], &Junk.datagrams(&1, 100, seed, Enum.reverse(s.recorded)))
+    shout(s, robot, mixed |> Stream.cycle() |> Stream.take(size))
+    s |> count(:flood) |> Runner.write("flood of #{size} datagrams to #{robot}")
+  end
+
+  def carry_out(s, {:formation, kind}),
+    do: %{s | formation: kind} |> order({:formation, [kind]}) |> Runner.write("formation: #{kind}")
+
+  def carry_out(s, {:landmark, place}) do
+    with_node(s, :world, {:landmark, place}, fn s, vm ->
+      aside(s, fn -> Vm.call(vm, WorldHost, :move, [place], @order_ms) end, fn :ok -> "the landmark moves" end)
+      s
+    end)
+  end
+
+  def carry_out(s, {:estop, robot}) do
+    case [robot | s.fleet.robots] |> Enum.find(&(s.vms[&1] && &1 not in s.frozen)) do
+      nil ->
+        Runner.write(s, "no e-stop: nobody is here")
+
+      from ->
+        s = %{s | reset?: false} |> count(:estop) |> Runner.note({now(), :soak, :estop, from})
+        s |> call(from, {:estop, []}) |> Runner.write("e-stop ordered on #{from}")
+    end
+  end
+
+  def carry_out(s, :reset) do
+    %{s | reset?: true} |> Runner.note({now(), :soak, :reset, nil}) |> order({:reset, []}) |> Runner.write("reset")
+  end
+
+  def carry_out(s, :start) do
+    s = Runner.note(%{s | start_until_us: now() + 15_000_000}, {now(), :soak, :start, nil})
+    Runner.write(s, "start of the mission, where it does not run")
+  end
+
+  def carry_out(s, :calm), do: Runner.write(%{s | start_until_us: now() + 30_000_000}, "calm")
+
+  @doc "Ends what lasts."
+  @spec end_of(Runner.t(), tuple()) :: Runner.t()
+  def end_of(s, {:thaw, robot, vm}) do
+    :ok = Vm.signal(vm, "CONT")
+
+    case s.vms[robot] do
+      ^vm -> Runner.note(%{s | frozen: MapSet.delete(s.frozen, robot)}, {now(), :soak, :thaw, robot})
+      _another_life -> s
+    end
+  end
+
+  def end_of(s, :network) do
+    :ok = Network.heal(s.fleet.network)
+    s |> Runner.note({now(), :soak, :heal, nil}) |> Runner.write("the network is whole")
+  end
+
+  @doc "Gives an order on the first node that is there; nobody waits for the answer."
+  @spec order(Runner.t(), {atom(), list()}) :: Runner.t()
+  def order(s, order) do
+    case Enum.find(s.fleet.robots, &(s.vms[&1] && &1 not in s.frozen)) do
+      nil -> s
+      from -> call(s, from, order)
+    end
+  end
+
+  defp call(s, from, {function, arguments}) do
+    vm = s.vms[from]
+    aside(s, fn -> Vm.call(vm, Swarm, function, arguments, @order_ms) end, &"#{from}: #{function} #{words(&1)}")
+    s
+  end
+
+  defp words(:ok), do: "ok"
+  defp words({:error, line}), do: line
+
+  defp kill(s, name, vm, kind) do
+    s = %{s | ended: Map.put(s.ended, name, :killed)}
+    s = s |> count(kind) |> Runner.write("kill -9 of #{name}")
+    :ok = Vm.signal(vm, "KILL")
+    s
+  end
+
+  defp network(s, kind, ms, deed) do
+    # Nobody waits for the last cut beyond the end of the run.
+    Process.send_after(self(), {:later, :network}, ms)
+    pairs = Network.change(s.fleet.network, deed)
+    event = if pairs == [], do: {now(), :soak, :network, :loss}, else: {now(), :soak, :cut, pairs}
+    s |> count(kind) |> Runner.note(event) |> Runner.write(text(deed))
+  end
+
+  defp text({:block, a, b, ms}), do: "the link of #{a} and #{b} is cut for #{ms} ms"
+  defp text({:loss, share, ms}), do: "#{round(100 * share)} % of all packets are lost for #{ms} ms"
+
+  defp text({:split, parts, ms}),
+    do: "cut in two for #{ms} ms: " <> Enum.map_join(parts, " | ", &Enum.join(&1, " "))
+
+  defp with_node(s, name, deed, do_it) do
+    case s.vms[name] do
+      vm when vm != nil -> if name in s.frozen, do: skip(s, deed), else: do_it.(s, vm)
+      nil -> skip(s, deed)
+    end
+  end
+
+  defp skip(s, deed), do: Runner.write(s, "left out, its node is not there: #{inspect(deed)}")
+
+  defp shout(%{stranger: nil}, _robot, _datagrams), do: :ok
+
+  defp shout(s, robot, datagrams) do
+    {address, port} = Network.address(s.fleet.network, robot)
+
+    spawn(fn ->
+      for burst <- Stream.chunk_every(datagrams, @burst) do
+        for datagram <- burst, do: _ = :gen_udp.send(s.stranger, address, port, datagram)
+
+        receive do
+        after
+          10 -> :ok
+        end
+      end
+    end)
+
+    :ok
+  end
+
+  # A node may be killed, or freeze, while it answers.
+  defp aside(_s, ask, say) do
+    runner = self()
+
+    spawn(fn ->
+      words =
+        try do
+          say.(ask.())
+        catch
+          :exit, _reason -> "no answer"
+        end
+
+      send(runner, {:said, words})
+    end)
+
+    :ok
+  end
+
+  defp count(s, kind), do: %{s | counts: Map.update(s.counts, kind, 1, &(&1 + 1))}
+  defp now, do: Recorder.now()
+end

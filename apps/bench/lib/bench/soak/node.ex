@@ -1,0 +1,105 @@
+defmodule Bench.Soak.Node do
+  @moduledoc """
+  What runs on a robot's node of `bin/soak`: the applications as in a release, whose end ends the node, one
+  robot in the world of `Bench.Soak.WorldHost`, and the log of its doings (`Bench.Soak.Recorder`).
+  """
+  alias Bench.Soak.{Recorder, WorldHost, WorldLink}
+  alias Robot.Names
+  alias Sim.Trial.Setup
+  alias Sim.World
+
+  @doc """
+  Starts the robot. `about` holds its `id`, its `start` (a pose), the options of its `mesh`, the missions of
+  this build, and the `folder` of the run.
+  """
+  @spec main(map()) :: :ok
+  def main(%{id: id, folder: folder} = about) do
+    # Together, so that the missions are there when the mesh begins: it must know their atoms.
+    config = [logger: [level: :none], swarm: [missions: about.missions, mesh: about.mesh]]
+    Application.put_all_env(config)
+    {:ok, _apps} = Application.ensure_all_started(:sim, :permanent)
+
+    children = [
+      World.Directory,
+      {WorldLink, {:soak, WorldHost.path(folder, id), id}},
+      {Recorder, {folder, id}}
+    ]
+
+    {:ok, parts} = Supervisor.start_link(children, strategy: :one_for_one, max_restarts: 1_000)
+    Process.unlink(parts)
+    {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, config(about), :permanent)
+    :ok
+  end
+
+  defp config(%{id: id, start: start, missions: [{_name, mission} | _]}) do
+    device = [world: :soak, robot: id]
+
+    Robot.Config.new!(
+      id: id,
+      profile: Setup.profile(id),
+      start: start,
+      drive: {Sim.Device.Drive, device},
+      ptz: {Sim.Device.Ptz, device},
+      camera: {Sim.Device.Camera, device ++ [blobs: :direct]},
+      colours: World.colours(),
+      mission: {mission, []}
+    )
+    |> Swarm.Comms.join()
+  end
+
+  @doc "The processes of swarm and robot, by what they are, sorted. Two that are the same have the same words."
+  @spec processes() :: [{String.t(), pid()}]
+  def processes do
+    roles = Map.new(Names.all(), fn {{_robot, role}, pid} -> {pid, inspect(role)} end)
+
+    case top() do
+      nil -> []
+      top -> Enum.sort(for pid <- Process.list(), words = words(pid, top, roles), do: {words, pid})
+    end
+  end
+
+  # The supervisor below the application's master.
+  defp top do
+    with master when is_pid(master) <- :application_controller.get_master(:swarm),
+         {pid, _module} when is_pid(pid) <- :application_master.get_child(master),
+         do: pid,
+         else: (_ended -> nil)
+  end
+
+  defp words(top, top, _roles), do: "Swarm.Supervisor"
+
+  defp words(pid, top, roles) do
+    with {:dictionary, dictionary} <- Process.info(pid, :dictionary),
+         ancestors when is_list(ancestors) <- dictionary[:"$ancestors"],
+         true <- top in ancestors,
+         {:registered_name, name} <- Process.info(pid, :registered_name) do
+      cond do
+        role = roles[pid] -> role
+        name != [] -> inspect(name)
+        true -> call(dictionary[:"$initial_call"])
+      end
+    else
+      _another -> nil
+    end
+  end
+
+  defp call({module, _function, _arity}), do: inspect(module)
+  defp call(_other), do: "a process"
+
+  @doc """
+  Kills the process that a number from 0 to 1 chooses among those of swarm and robot. Says what it was,
+  `nil` if there is none.
+  """
+  @spec kill(float()) :: String.t() | nil
+  def kill(chance) do
+    case processes() do
+      [] ->
+        nil
+
+      all ->
+        {words, pid} = Enum.at(all, trunc(chance * length(all)))
+        Process.exit(pid, :kill)
+        words
+    end
+  end
+end
