@@ -60,7 +60,7 @@ defmodule Bench.Soak.Fleet do
 
   defp world(%{world: world, folder: folder}) do
     main = fn vm -> Vm.call(vm, WorldHost, :main, [world, folder], @boot_ms) end
-    options = [flags: Vm.fleet_flags() ++ ~w(-kernel logger_level none), through: words(folder, :world)]
+    options = [flags: Vm.fleet_flags() ++ ~w(-kernel logger_level none)]
     %{name: :world, options: options, main: main}
   end
 
@@ -74,23 +74,7 @@ defmodule Bench.Soak.Fleet do
     }
 
     main = fn vm -> Vm.call(vm, Node, :main, [about], @boot_ms) end
-    options = Keyword.update!(Network.vm(network, robot), :through, &(words(folder, robot) ++ &1))
-    %{name: robot, options: options, main: main}
-  end
-
-  # What a node says on its standard error is kept, and does not spoil the terminal.
-  defp words(folder, name),
-    do: ["sh", "-c", "words=$1; shift; exec \"$@\" 2>>\"$words\"", "sh", Path.join(folder, "#{name}.words")]
-
-  @doc "The last line that a node has printed."
-  @spec last_words(t(), atom()) :: String.t()
-  def last_words(fleet, name) do
-    with {:ok, text} <- File.read(Path.join(fleet.folder, "#{name}.words")),
-         line when is_binary(line) <- text |> String.split("\n", trim: true) |> List.last() do
-      String.slice(line, 0, 300)
-    else
-      _none -> "none"
-    end
+    %{name: robot, options: Network.vm(network, robot), main: main}
   end
 
   @doc "Ends the keepers, and so the nodes."

@@ -58,7 +58,8 @@ defmodule Bench.Soak.Judge do
 
   defp take(judge, us, :soak, :up, robot) do
     judge = %{judge | links: Links.come(judge.links, robot, us), growth: Growth.start(judge.growth, robot, us)}
-    {[], touch(judge, [robot], us)}
+    # Its time to heal began when it went down.
+    if is_map_key(judge.health.touched, robot), do: {[], judge}, else: {[], touch(judge, [robot], us)}
   end
 
   defp take(judge, us, :soak, :down, robot), do: {[], judge |> gone(robot, us) |> touch([robot], us)}

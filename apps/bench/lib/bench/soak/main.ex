@@ -62,8 +62,8 @@ defmodule Bench.Soak.Main do
 
     cond do
       output.columns -> if rem(s.ticks, 5) == 0, do: Output.progress(output, Progress.line(ms / 1000, duration_ms / 1000, line, output.columns - 1))
-      # Once in each minute.
-      ms > 0 and div(ms, @minute_ms) > div(ms - 200, @minute_ms) -> Output.line(output, "soak: #{div(ms, @minute_ms)} min: #{line}")
+      # A tick is 200 ms: once in each minute.
+      rem(s.ticks, 300) == 0 and ms > 0 -> Output.line(output, "soak: #{div(ms, 1000)} of #{div(duration_ms, 1000)} s: #{line}")
       true -> :ok
     end
   end

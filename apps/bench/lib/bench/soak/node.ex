@@ -21,7 +21,7 @@ defmodule Bench.Soak.Node do
 
     children = [
       World.Directory,
-      {WorldLink, {:soak, WorldHost.path(folder, id), id}},
+      {WorldLink, {{:soak, id}, WorldHost.path(folder, id), id}},
       {Recorder, {folder, id}}
     ]
 
@@ -32,7 +32,8 @@ defmodule Bench.Soak.Node do
   end
 
   defp config(%{id: id, start: start, missions: [{_name, mission} | _]}) do
-    device = [world: :soak, robot: id]
+    # By a name of its own: connected nodes share their directories.
+    device = [world: {:soak, id}, robot: id]
 
     Robot.Config.new!(
       id: id,

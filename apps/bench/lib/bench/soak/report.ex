@@ -30,12 +30,12 @@ defmodule Bench.Soak.Report do
       "| all one group again after, at most | #{ms(judge.health.worst_us.all)} |",
       "| robots past their restart budget, told and started again | #{s.gave_up} |",
       "| nodes started again | #{s.restarts} |",
-      "| looks of the judge | #{judge.checks} |",
+      "| looks of the judge, all whole in one group | #{judge.checks}, #{round(100 * judge.health.whole / max(judge.health.looks, 1))} % |",
       "| processors, mean | #{decimals(cores(s, elapsed_ms), 2)} |"
     ]
 
     sizes =
-      for robot <- s.fleet.robots, %{first: first, last: last} = judge.growth.told[robot] do
+      for {robot, %{first: first, last: last}} <- Enum.sort(judge.growth.told) do
         "| #{robot} | #{megabytes(first.bytes)} | #{megabytes(last.bytes)} | #{first.atoms} | #{last.atoms} |"
       end
 

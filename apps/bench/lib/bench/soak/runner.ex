@@ -74,7 +74,10 @@ defmodule Bench.Soak.Runner do
     :ok = Fleet.start(s.fleet)
     Process.send_after(self(), :tick, @tick_ms)
     s = await_up(s, Recorder.now() + @up_ms * 1000)
+    if s.signal || s.violations != [], do: s, else: begin(s)
+  end
 
+  defp begin(s) do
     stranger =
       case Network.stranger(s.fleet.network) do
         {:ok, socket} -> socket
@@ -86,12 +89,15 @@ defmodule Bench.Soak.Runner do
 
   defp await_up(s, until) do
     cond do
-      s.signal -> s
+      s.signal || s.violations != [] -> s
       map_size(s.vms) == length(s.fleet.robots) + 1 -> s
       Recorder.now() > until -> violation(s, "not all nodes are up within #{div(@up_ms, 1000)} s: only #{inspect(Map.keys(s.vms))}")
       true -> await_up(heard(s), until)
     end
   end
+
+  # What has not started cannot be judged.
+  defp loop(%{begun_us: nil} = s), do: s
 
   defp loop(%{signal: nil} = s) do
     if elapsed_ms(s) < s.duration_ms, do: s |> heard() |> loop(), else: s
@@ -193,24 +199,27 @@ defmodule Bench.Soak.Runner do
   end
 
   defp kept(s, :world, {:up, vm, us}), do: s |> there(:world, vm) |> note({us, :soak, :world, :up})
-  defp kept(s, :world, {:down, us}), do: s |> gone(:world) |> note({us, :soak, :world, :down})
+  defp kept(s, :world, {:down, _words, us}), do: s |> gone(:world) |> note({us, :soak, :world, :down})
   defp kept(s, name, {:up, vm, us}), do: s |> there(name, vm) |> note({us, :soak, :up, name})
 
-  defp kept(s, name, {:down, us}) do
+  defp kept(s, name, {:down, words, us}) do
     s = s |> gone(name) |> note({us, :soak, :down, name})
-    killed? = s.ended[name] == :killed
+    killed? = is_map_key(s.ended, name)
     broken? = us - Map.get(s.processes, name, 0) < @given_up_us
     s = %{s | ended: Map.delete(s.ended, name), restarts: s.restarts + 1}
 
     cond do
       killed? -> s
-      broken? -> write(%{s | gave_up: s.gave_up + 1}, "#{name} has given up, past its restart budget: its node has ended")
-      true -> violation(s, "the node of #{name} has ended by itself; its last words: #{Fleet.last_words(s.fleet, name)}")
+      broken? -> write(%{s | gave_up: s.gave_up + 1}, "#{name} has given up, past its restart budget: its node has ended (#{words})")
+      true -> violation(s, "the node of #{name} has ended by itself; its last words: #{words}")
     end
   end
 
   defp kept(s, name, {:orphans, lines, us}), do: note(s, {us, :soak, :orphans, {name, lines}})
-  defp kept(s, name, {:failed, reason, _us}), do: write(s, "#{name} has not started: #{inspect(reason, limit: 20)}")
+  defp kept(s, name, {:failed, reason, _us}) do
+    s = %{s | ended: Map.put(s.ended, name, :failed)}
+    violation(s, "#{name} has not started: #{inspect(reason, limit: 10, printable_limit: 200)}")
+  end
 
   defp there(s, name, vm), do: write(%{s | vms: Map.put(s.vms, name, vm)}, "#{name} is up, pid #{vm.pid}")
 

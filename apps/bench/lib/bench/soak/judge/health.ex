@@ -12,11 +12,11 @@ defmodule Bench.Soak.Judge.Health do
   @all_us 25_000_000
   @stale_us 3_000_000
 
-  defstruct robots: [], probes: %{}, expected: %{}, touched: %{}, open: %{}, worst_us: %{self: 0, all: 0}
+  defstruct robots: [], probes: %{}, expected: %{}, touched: %{}, open: %{}, worst_us: %{self: 0, all: 0}, looks: 0, whole: 0
 
   @typedoc """
   `touched` is when a robot was last disturbed, `open` who has not healed since; `expected` is what ran when all was well
-  for the first time.
+  for the first time. Of so many `looks` at all, all were one whole group in `whole`.
   """
   @type t :: %__MODULE__{}
 
@@ -51,6 +51,7 @@ defmodule Bench.Soak.Judge.Health do
     group = Enum.flat_map(health.robots, &apart(health, &1)) ++ for(robot <- held, do: "#{robot} is held") ++ split(health, claims)
     whole = if Enum.all?(selves, fn {_robot, faults, _us} -> faults == [] end), do: group, else: ["not all are well"]
 
+    health = %{health | looks: health.looks + 1, whole: health.whole + if(whole == [], do: 1, else: 0)}
     Enum.reduce([{:all, whole, @all_us} | selves], {[], health}, &judged(&1, &2, now))
   end
 
