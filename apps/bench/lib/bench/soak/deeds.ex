@@ -22,7 +22,9 @@ defmodule Bench.Soak.Deeds do
     end)
   end
 
-  def carry_out(s, {:node, robot} = deed), do: with_node(s, robot, deed, &kill(&1, robot, &2, :node))
+  def carry_out(s, {:node, robot} = deed),
+    do: with_node(s, robot, deed, &kill(&1, robot, &2, :node))
+
   def carry_out(s, :world), do: with_node(s, :world, :world, &kill(&1, :world, &2, :world))
 
   def carry_out(s, {:freeze, robot, ms} = deed) do
@@ -38,26 +40,39 @@ defmodule Bench.Soak.Deeds do
     end)
   end
 
-  def carry_out(s, {kind, _what, ms} = deed) when kind in [:split, :loss], do: network(s, kind, ms, deed)
+  def carry_out(s, {kind, _what, ms} = deed) when kind in [:split, :loss],
+    do: network(s, kind, ms, deed)
+
   def carry_out(s, {:block, _a, _b, ms} = deed), do: network(s, :block, ms, deed)
 
   def carry_out(s, {:junk, robot, kind, size, seed}) do
     shout(s, robot, Junk.datagrams(kind, size, seed, Enum.reverse(s.recorded)))
-    s |> count(:junk) |> Runner.write("#{size} datagrams of junk (#{kind}, #{length(s.recorded)} recorded) to #{robot}")
+
+    s
+    |> count(:junk)
+    |> Runner.write(
+      "#{size} datagrams of junk (#{kind}, #{length(s.recorded)} recorded) to #{robot}"
+    )
   end
 
   def carry_out(s, {:flood, robot, size, seed}) do
-    mixed = Enum.flat_map([:random, :mutated], &Junk.datagrams(&1, 100, seed, Enum.reverse(s.recorded)))
+    mixed =
+      Enum.flat_map([:random, :mutated], &Junk.datagrams(&1, 100, seed, Enum.reverse(s.recorded)))
+
     shout(s, robot, mixed |> Stream.cycle() |> Stream.take(size))
     s |> count(:flood) |> Runner.write("flood of #{size} datagrams to #{robot}")
   end
 
   def carry_out(s, {:formation, kind}),
-    do: %{s | formation: kind} |> order({:formation, [kind]}) |> Runner.write("formation: #{kind}")
+    do:
+      %{s | formation: kind} |> order({:formation, [kind]}) |> Runner.write("formation: #{kind}")
 
   def carry_out(s, {:landmark, place}) do
     with_node(s, :world, {:landmark, place}, fn s, vm ->
-      aside(s, fn -> Vm.call(vm, WorldHost, :move, [place], @order_ms) end, fn :ok -> "the landmark moves" end)
+      aside(s, fn -> Vm.call(vm, WorldHost, :move, [place], @order_ms) end, fn :ok ->
+        "the landmark moves"
+      end)
+
       s
     end)
   end
@@ -74,7 +89,10 @@ defmodule Bench.Soak.Deeds do
   end
 
   def carry_out(s, :reset) do
-    %{s | reset?: true} |> Runner.note({now(), :soak, :reset, nil}) |> order({:reset, []}) |> Runner.write("reset")
+    %{s | reset?: true}
+    |> Runner.note({now(), :soak, :reset, nil})
+    |> order({:reset, []})
+    |> Runner.write("reset")
   end
 
   def carry_out(s, :start) do
@@ -90,8 +108,11 @@ defmodule Bench.Soak.Deeds do
     :ok = Vm.signal(vm, "CONT")
 
     case s.vms[robot] do
-      ^vm -> Runner.note(%{s | frozen: MapSet.delete(s.frozen, robot)}, {now(), :soak, :thaw, robot})
-      _another_life -> s
+      ^vm ->
+        Runner.note(%{s | frozen: MapSet.delete(s.frozen, robot)}, {now(), :soak, :thaw, robot})
+
+      _another_life ->
+        s
     end
   end
 
@@ -111,7 +132,13 @@ defmodule Bench.Soak.Deeds do
 
   defp call(s, from, {function, arguments}) do
     vm = s.vms[from]
-    aside(s, fn -> Vm.call(vm, Swarm, function, arguments, @order_ms) end, &"#{from}: #{function} #{words(&1)}")
+
+    aside(
+      s,
+      fn -> Vm.call(vm, Swarm, function, arguments, @order_ms) end,
+      &"#{from}: #{function} #{words(&1)}"
+    )
+
     s
   end
 
@@ -134,7 +161,9 @@ defmodule Bench.Soak.Deeds do
   end
 
   defp text({:block, a, b, ms}), do: "the link of #{a} and #{b} is cut for #{ms} ms"
-  defp text({:loss, share, ms}), do: "#{round(100 * share)} % of all packets are lost for #{ms} ms"
+
+  defp text({:loss, share, ms}),
+    do: "#{round(100 * share)} % of all packets are lost for #{ms} ms"
 
   defp text({:split, parts, ms}),
     do: "cut in two for #{ms} ms: " <> Enum.map_join(parts, " | ", &Enum.join(&1, " "))

@@ -1,7 +1,8 @@
 defmodule Bench.Soak.Fleet do
   @moduledoc """
   The nodes of a run and what they have in common: one for each robot, one for the world, each with a keeper
-  (`Bench.Soak.Keeper`). The robots stand abreast before the landmark.
+  (`Bench.Soak.Keeper`). The robots stand abreast before the landmark. The first has the real drivers of a
+  Magellan, on emulated devices behind serial lines, so that there are port programs to be left behind.
   """
   alias Bench.Soak.{Keeper, Network, Node, WorldHost}
   alias Hal.Pose
@@ -23,7 +24,10 @@ defmodule Bench.Soak.Fleet do
     File.chmod!(folder, 0o700)
     starts = for {robot, n} <- Enum.with_index(robots), do: {robot, place(n)}
     {:ok, map} = Sim.Floorplan.open("hall", length(robots))
-    bodies = for {robot, pose} <- starts, do: %{id: robot, profile: Setup.profile(robot), pose: pose}
+
+    bodies =
+      for {robot, pose} <- starts, do: %{id: robot, profile: Setup.profile(robot), pose: pose}
+
     world = World.new!(map: map, robots: bodies, landmark: {0.0, 0.0}, seed: seed)
     network = Network.create(robots, folder, namespaces?)
 
@@ -65,16 +69,30 @@ defmodule Bench.Soak.Fleet do
   end
 
   defp robot(%{network: network, folder: folder} = fleet, robot) do
+    hardware? = robot == hd(fleet.robots)
+
     about = %{
       id: robot,
-      start: fleet.starts[robot],
+      hardware?: hardware?,
       folder: folder,
       mesh: Network.mesh(network, robot),
       missions: Application.fetch_env!(:swarm, :missions)
     }
 
-    main = fn vm -> Vm.call(vm, Node, :main, [about], @boot_ms) end
+    main = fn vm ->
+      start = if hardware?, do: pose(fleet, robot), else: fleet.starts[robot]
+      Vm.call(vm, Node, :main, [Map.put(about, :start, start)], @boot_ms)
+    end
+
     %{name: robot, options: Network.vm(network, robot), main: main}
+  end
+
+  # The wheels of a real base begin to count when it is switched on; those in the world have counted all the time.
+  defp pose(fleet, robot) do
+    case WorldHost.read(fleet.folder) do
+      {:ok, _at_us, snapshot} -> WorldHost.pose(snapshot, fleet.world, robot)
+      {:error, _none_yet} -> fleet.starts[robot]
+    end
   end
 
   @doc "Ends the keepers, and so the nodes."

@@ -53,16 +53,26 @@ defmodule Bench.Soak.Judge do
 
   defp fresh(judge, wrong) do
     new = for {line, key} <- wrong, not MapSet.member?(judge.told, key), do: {line, key}
-    {for({line, _key} <- new, do: line), %{judge | told: MapSet.union(judge.told, MapSet.new(new, &elem(&1, 1)))}}
+
+    {for({line, _key} <- new, do: line),
+     %{judge | told: MapSet.union(judge.told, MapSet.new(new, &elem(&1, 1)))}}
   end
 
   defp take(judge, us, :soak, :up, robot) do
-    judge = %{judge | links: Links.come(judge.links, robot, us), growth: Growth.start(judge.growth, robot, us)}
+    judge = %{
+      judge
+      | links: Links.come(judge.links, robot, us),
+        growth: Growth.start(judge.growth, robot, us)
+    }
+
     # Its time to heal began when it went down.
-    if is_map_key(judge.health.touched, robot), do: {[], judge}, else: {[], touch(judge, [robot], us)}
+    if is_map_key(judge.health.touched, robot),
+      do: {[], judge},
+      else: {[], touch(judge, [robot], us)}
   end
 
-  defp take(judge, us, :soak, :down, robot), do: {[], judge |> gone(robot, us) |> touch([robot], us)}
+  defp take(judge, us, :soak, :down, robot),
+    do: {[], judge |> gone(robot, us) |> touch([robot], us)}
 
   defp take(judge, us, :soak, :freeze, robot),
     do: {[], touch(%{judge | links: Links.go(judge.links, robot)}, [robot], us)}
@@ -89,12 +99,18 @@ defmodule Bench.Soak.Judge do
     do: {[], touch(%{judge | stops: Stops.release(judge.stops)}, judge.links.robots, us)}
 
   defp take(judge, _us, :soak, :collisions, count) do
-    wrong = if count > judge.collisions, do: [{"#{count - judge.collisions} new collisions", {:collisions, count}}], else: []
+    wrong =
+      if count > judge.collisions,
+        do: [{"#{count - judge.collisions} new collisions", {:collisions, count}}],
+        else: []
+
     {wrong, %{judge | collisions: count}}
   end
 
   defp take(judge, us, :soak, :orphans, {node, lines}),
-    do: {[{"#{node} has left processes behind: #{Enum.join(lines, ", ")}", {:orphans, node, us}}], judge}
+    do:
+      {[{"#{node} has left processes behind: #{Enum.join(lines, ", ")}", {:orphans, node, us}}],
+       judge}
 
   defp take(judge, us, robot, :claim, claim) do
     leaders = Leaders.note(judge.leaders, robot, claim, us)

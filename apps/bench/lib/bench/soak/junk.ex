@@ -12,7 +12,9 @@ defmodule Bench.Soak.Junk do
       iex> Bench.Soak.Junk.datagrams(:mutated, 2, 7, ["abcdef"]) == Bench.Soak.Junk.datagrams(:mutated, 2, 7, ["abcdef"])
       true
   """
-  @spec datagrams(:random | :recorded | :mutated, non_neg_integer(), integer(), [binary()]) :: [binary()]
+  @spec datagrams(:random | :recorded | :mutated, non_neg_integer(), integer(), [binary()]) :: [
+          binary()
+        ]
   def datagrams(kind, count, seed, recorded) do
     kind = if recorded == [], do: :random, else: kind
     recorded = List.to_tuple(recorded)

@@ -15,7 +15,13 @@ defmodule Bench.Soak.Keeper do
   @orphan_ms 3_000
 
   @typedoc "`options` are those of `Vm.start_one/1`, `main` is called with the new VM."
-  @type start :: %{name: atom(), mark: String.t(), options: Vm.options(), main: (Vm.t() -> :ok), owner: pid()}
+  @type start :: %{
+          name: atom(),
+          mark: String.t(),
+          options: Vm.options(),
+          main: (Vm.t() -> :ok),
+          owner: pid()
+        }
 
   @doc "Starts the keeper, and then the node."
   @spec start_link(start()) :: GenServer.on_start()

@@ -71,7 +71,9 @@ defmodule Bench.Soak.Links do
     if robot in reached do
       spread(links, rest, reached)
     else
-      spread(links, for(other <- links.robots, met(links, robot, other), do: other) ++ rest, [robot | reached])
+      spread(links, for(other <- links.robots, met(links, robot, other), do: other) ++ rest, [
+        robot | reached
+      ])
     end
   end
 

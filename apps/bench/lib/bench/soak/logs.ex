@@ -29,7 +29,8 @@ defmodule Bench.Soak.Logs do
     end
   end
 
-  defp pread(file, offset), do: with({:ok, text} <- :file.pread(file, offset, @most_bytes), do: text)
+  defp pread(file, offset),
+    do: with({:ok, text} <- :file.pread(file, offset, @most_bytes), do: text)
 
   # A node that is killed while it writes leaves half a line, to which the next life adds its first.
   defp parse(line) do

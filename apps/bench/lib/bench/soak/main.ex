@@ -17,12 +17,18 @@ defmodule Bench.Soak.Main do
     main = self()
 
     for {signal, status} <- [sigterm: 143, sighup: 129],
-        do: {:ok, _id} = System.trap_signal(signal, fn -> send(main, {:signal, status}) && :ok end)
+        do:
+          {:ok, _id} = System.trap_signal(signal, fn -> send(main, {:signal, status}) && :ok end)
 
     output = Output.to(:stdio)
     why_not = Vm.Net.why_not()
     path = Path.join(where, "soak-#{seed}-#{System.pid()}.log")
-    Output.line(output, "soak: #{minutes} min with seed #{seed}; what is done is written to #{path}")
+
+    Output.line(
+      output,
+      "soak: #{minutes} min with seed #{seed}; what is done is written to #{path}"
+    )
+
     if why_not, do: Output.line(output, "soak: on loopback, without cut links: #{why_not}")
     duration_ms = round(minutes * @minute_ms)
 
@@ -61,10 +67,20 @@ defmodule Bench.Soak.Main do
     line = Report.line(s, ms)
 
     cond do
-      output.columns -> if rem(s.ticks, 5) == 0, do: Output.progress(output, Progress.line(ms / 1000, duration_ms / 1000, line, output.columns - 1))
+      output.columns ->
+        if rem(s.ticks, 5) == 0,
+          do:
+            Output.progress(
+              output,
+              Progress.line(ms / 1000, duration_ms / 1000, line, output.columns - 1)
+            )
+
       # A tick is 200 ms: once in each minute.
-      rem(s.ticks, 300) == 0 and ms > 0 -> Output.line(output, "soak: #{div(ms, 1000)} of #{div(duration_ms, 1000)} s: #{line}")
-      true -> :ok
+      rem(s.ticks, 300) == 0 and ms > 0 ->
+        Output.line(output, "soak: #{div(ms, 1000)} of #{div(duration_ms, 1000)} s: #{line}")
+
+      true ->
+        :ok
     end
   end
 
@@ -101,8 +117,12 @@ defmodule Bench.Soak.Main do
 
   defp seed(text) do
     case Integer.parse(text) do
-      {seed, ""} when seed in 0..1_000_000_000 -> {:ok, seed}
-      _other -> {:error, "SEED cannot be #{inspect(text)}; a whole number from 0 to 1000000000 is allowed"}
+      {seed, ""} when seed in 0..1_000_000_000 ->
+        {:ok, seed}
+
+      _other ->
+        {:error,
+         "SEED cannot be #{inspect(text)}; a whole number from 0 to 1000000000 is allowed"}
     end
   end
 end

@@ -20,7 +20,12 @@ defmodule Bench.Soak.Network do
   @doc "Makes the network; with namespaces the folder goes with it."
   @spec create([atom()], Path.t(), namespaces? :: boolean()) :: t()
   def create(robots, folder, true),
-    do: %__MODULE__{robots: robots, secret: Secret.random(), net: Net.create(robots, folder, [:stranger]), ports: %{}}
+    do: %__MODULE__{
+      robots: robots,
+      secret: Secret.random(),
+      net: Net.create(robots, folder, [:stranger]),
+      ports: %{}
+    }
 
   def create(robots, _folder, false),
     do: %__MODULE__{robots: robots, secret: Secret.random(), net: nil, ports: ports(robots)}
@@ -60,7 +65,13 @@ defmodule Bench.Soak.Network do
           {{0, 0, 0, 0}, [], ["ip", "netns", "exec", Net.space(net, robot)]}
       end
 
-    [name: robot, host: "convoy", flags: Vm.fleet_flags(listen) ++ flags, env: env, through: through]
+    [
+      name: robot,
+      host: "convoy",
+      flags: Vm.fleet_flags(listen) ++ flags,
+      env: env,
+      through: through
+    ]
   end
 
   @doc "The options of a robot's mesh."
@@ -69,11 +80,13 @@ defmodule Bench.Soak.Network do
     {{udp, tcp}, others} = Map.pop!(ports, robot)
     peers = for {_robot, {port, _tcp}} <- Enum.sort(others), do: {@loopback, port}
 
-    [interface: @loopback, port: udp, dist_port: tcp, multicast: false, peers: peers] ++ same(network)
+    [interface: @loopback, port: udp, dist_port: tcp, multicast: false, peers: peers] ++
+      same(network)
   end
 
   def mesh(network, robot),
-    do: [port: @udp, dist_port: Epmd.default_port("#{robot}"), multicast: @gossip] ++ same(network)
+    do:
+      [port: @udp, dist_port: Epmd.default_port("#{robot}"), multicast: @gossip] ++ same(network)
 
   defp same(network), do: [secret: network.secret, fleet: network.robots]
 

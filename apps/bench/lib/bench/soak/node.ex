@@ -5,12 +5,13 @@ defmodule Bench.Soak.Node do
   """
   alias Bench.Soak.{Recorder, WorldHost, WorldLink}
   alias Robot.Names
+  alias Sim.Fleet.Hardware
   alias Sim.Trial.Setup
   alias Sim.World
 
   @doc """
-  Starts the robot. `about` holds its `id`, its `start` (a pose), the options of its `mesh`, the missions of
-  this build, and the `folder` of the run.
+  Starts the robot. `about` holds its `id`, its `start` (a pose), whether it has the real drivers
+  (`hardware?`), the options of its `mesh`, the missions of this build, and the `folder` of the run.
   """
   @spec main(map()) :: :ok
   def main(%{id: id, folder: folder} = about) do
@@ -19,11 +20,9 @@ defmodule Bench.Soak.Node do
     Application.put_all_env(config)
     {:ok, _apps} = Application.ensure_all_started(:sim, :permanent)
 
-    children = [
-      World.Directory,
-      {WorldLink, {{:soak, id}, WorldHost.path(folder, id), id}},
-      {Recorder, {folder, id}}
-    ]
+    children =
+      [World.Directory, {WorldLink, {world(id), WorldHost.path(folder, id), id}}] ++
+        Hardware.parts([robot(about)], world(id), folder) ++ [{Recorder, {folder, id}}]
 
     {:ok, parts} = Supervisor.start_link(children, strategy: :one_for_one, max_restarts: 1_000)
     Process.unlink(parts)
@@ -31,19 +30,29 @@ defmodule Bench.Soak.Node do
     :ok
   end
 
-  defp config(%{id: id, start: start, missions: [{_name, mission} | _]}) do
-    # By a name of its own: connected nodes share their directories.
-    device = [world: {:soak, id}, robot: id]
+  # By a name of its own: connected nodes share their directories.
+  defp world(id), do: {:soak, id}
+
+  defp robot(%{id: id, hardware?: hardware?}),
+    do: %{id: id, profile: Setup.profile(id), hardware?: hardware?}
+
+  defp config(%{id: id, start: start, missions: [{_name, mission} | _]} = about) do
+    device = [world: world(id), robot: id]
+
+    drivers =
+      if about.hardware?,
+        do: Hardware.drivers(robot(about), about.folder),
+        else: [drive: {Sim.Device.Drive, device}, ptz: {Sim.Device.Ptz, device}]
 
     Robot.Config.new!(
-      id: id,
-      profile: Setup.profile(id),
-      start: start,
-      drive: {Sim.Device.Drive, device},
-      ptz: {Sim.Device.Ptz, device},
-      camera: {Sim.Device.Camera, device ++ [blobs: :direct]},
-      colours: World.colours(),
-      mission: {mission, []}
+      [
+        id: id,
+        profile: Setup.profile(id),
+        start: start,
+        camera: {Sim.Device.Camera, device ++ [blobs: :direct]},
+        colours: World.colours(),
+        mission: {mission, []}
+      ] ++ drivers
     )
     |> Swarm.Comms.join()
   end
@@ -54,8 +63,11 @@ defmodule Bench.Soak.Node do
     roles = Map.new(Names.all(), fn {{_robot, role}, pid} -> {pid, inspect(role)} end)
 
     case top() do
-      nil -> []
-      top -> Enum.sort(for pid <- Process.list(), words = words(pid, top, roles), do: {words, pid})
+      nil ->
+        []
+
+      top ->
+        Enum.sort(for pid <- Process.list(), words = words(pid, top, roles), do: {words, pid})
     end
   end
 

@@ -63,7 +63,8 @@ defmodule Bench.Soak.Recorder do
 
   defp claim(robot), do: robot |> Sim.Fleet.Robot.claim() |> Map.take([:phase, :leader, :epoch])
 
-  defp held(robot), do: with({:ok, board} <- Board.find(robot), do: Board.latched?(board), else: (:error -> nil))
+  defp held(robot),
+    do: with({:ok, board} <- Board.find(robot), do: Board.latched?(board), else: (:error -> nil))
 
   defp probe(robot) do
     processes = Node.processes()

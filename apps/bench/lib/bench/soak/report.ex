@@ -6,6 +6,7 @@ defmodule Bench.Soak.Report do
   @spec line(Runner.t(), elapsed_ms :: non_neg_integer()) :: String.t()
   def line(s, elapsed_ms) do
     here = for({_name, _vm} <- s.vms, do: 1) |> length()
+
     "#{disturbed(s)} disturbances, #{here} of #{length(s.fleet.robots) + 1} nodes up, #{length(s.violations)} violations, " <>
       "#{decimals(cores(s, elapsed_ms), 2)} cores"
   end
@@ -44,7 +45,8 @@ defmodule Bench.Soak.Report do
         counts ++
         ["", "| check | |", "|---|---|"] ++
         checks ++
-        ["", "| robot | MB first | MB last | atoms first | atoms last |", "|---|---|---|---|---|"] ++ sizes,
+        ["", "| robot | MB first | MB last | atoms first | atoms last |", "|---|---|---|---|---|"] ++
+        sizes,
       "\n"
     ) <> "\n"
   end
@@ -55,7 +57,12 @@ defmodule Bench.Soak.Report do
 
   def first(%{violations: [{at_ms, line, before} | _]}, seed) do
     lines = for {ms, words} <- Enum.reverse(before), do: Journal.line(ms, words)
-    Enum.join(["The first violation, with seed #{seed}; before it:" | lines] ++ [Journal.line(at_ms, line)], "\n")
+
+    Enum.join(
+      ["The first violation, with seed #{seed}; before it:" | lines] ++
+        [Journal.line(at_ms, line)],
+      "\n"
+    )
   end
 
   defp ms(us), do: "#{div(us, 1000)} ms"

@@ -3,7 +3,19 @@ defmodule Bench.Soak.Runner do
   Carries out a run of `bin/soak`: starts the nodes, does what the schedule says, reads the logs, and asks the
   judge. One process; what could block it (orders to nodes that may be frozen) is done by others.
   """
-  alias Bench.Soak.{Deeds, Fleet, Journal, Judge, Logs, Network, Processes, Recorder, Schedule, WorldHost}
+  alias Bench.Soak.{
+    Deeds,
+    Fleet,
+    Journal,
+    Judge,
+    Logs,
+    Network,
+    Processes,
+    Recorder,
+    Schedule,
+    WorldHost
+  }
+
   alias Bench.Soak.Keeper
 
   @tick_ms 200
@@ -39,8 +51,9 @@ defmodule Bench.Soak.Runner do
               ]
 
   @type t :: %__MODULE__{}
-  @typedoc "`progress` is called each tick with the state."
+  @typedoc "`progress` is called each tick with the state; a `plan` takes the place of the seed's."
   @type options :: %{
+          optional(:plan) => [Schedule.deed()],
           seed: integer(),
           duration_ms: pos_integer(),
           robots: [atom(), ...],
@@ -56,12 +69,16 @@ defmodule Bench.Soak.Runner do
     mark = "#{System.pid()}-#{System.unique_integer([:positive])}"
     fleet = Fleet.create(options.robots, options.seed, options.namespaces?, mark)
 
+    plan =
+      options[:plan] ||
+        Schedule.new(options.seed, options.duration_ms, options.robots, options.namespaces?)
+
     s = %__MODULE__{
       fleet: fleet,
       mark: mark,
       journal: Journal.open(options.journal),
       judge: Judge.new(options.robots),
-      plan: Schedule.new(options.seed, options.duration_ms, options.robots, options.namespaces?),
+      plan: plan,
       duration_ms: options.duration_ms,
       progress: options.progress
     }
@@ -89,10 +106,20 @@ defmodule Bench.Soak.Runner do
 
   defp await_up(s, until) do
     cond do
-      s.signal || s.violations != [] -> s
-      map_size(s.vms) == length(s.fleet.robots) + 1 -> s
-      Recorder.now() > until -> violation(s, "not all nodes are up within #{div(@up_ms, 1000)} s: only #{inspect(Map.keys(s.vms))}")
-      true -> await_up(heard(s), until)
+      s.signal || s.violations != [] ->
+        s
+
+      map_size(s.vms) == length(s.fleet.robots) + 1 ->
+        s
+
+      Recorder.now() > until ->
+        violation(
+          s,
+          "not all nodes are up within #{div(@up_ms, 1000)} s: only #{inspect(Map.keys(s.vms))}"
+        )
+
+      true ->
+        await_up(heard(s), until)
     end
   end
 
@@ -143,10 +170,17 @@ defmodule Bench.Soak.Runner do
     now = Recorder.now()
 
     cond do
-      now < next -> s
-      s.reset? and Enum.any?(s.judge.stops.held, &match?({_robot, true}, &1)) -> Deeds.order(again(s, now), {:reset, []})
-      now > until or s.judge.stops.order != nil -> s
-      true -> start_idle(again(s, now))
+      now < next ->
+        s
+
+      s.reset? and Enum.any?(s.judge.stops.held, &match?({_robot, true}, &1)) ->
+        Deeds.order(again(s, now), {:reset, []})
+
+      now > until or s.judge.stops.order != nil ->
+        s
+
+      true ->
+        start_idle(again(s, now))
     end
   end
 
@@ -198,8 +232,12 @@ defmodule Bench.Soak.Runner do
     %{s | cpu: Map.merge(s.cpu, Map.put(used, System.pid(), Processes.cpu_s(System.pid())))}
   end
 
-  defp kept(s, :world, {:up, vm, us}), do: s |> there(:world, vm) |> note({us, :soak, :world, :up})
-  defp kept(s, :world, {:down, _words, us}), do: s |> gone(:world) |> note({us, :soak, :world, :down})
+  defp kept(s, :world, {:up, vm, us}),
+    do: s |> there(:world, vm) |> note({us, :soak, :world, :up})
+
+  defp kept(s, :world, {:down, _words, us}),
+    do: s |> gone(:world) |> note({us, :soak, :world, :down})
+
   defp kept(s, name, {:up, vm, us}), do: s |> there(name, vm) |> note({us, :soak, :up, name})
 
   defp kept(s, name, {:down, words, us}) do
@@ -209,22 +247,36 @@ defmodule Bench.Soak.Runner do
     s = %{s | ended: Map.delete(s.ended, name), restarts: s.restarts + 1}
 
     cond do
-      killed? -> s
-      broken? -> write(%{s | gave_up: s.gave_up + 1}, "#{name} has given up, past its restart budget: its node has ended (#{words})")
-      true -> violation(s, "the node of #{name} has ended by itself; its last words: #{words}")
+      killed? ->
+        s
+
+      broken? ->
+        write(
+          %{s | gave_up: s.gave_up + 1},
+          "#{name} has given up, past its restart budget: its node has ended (#{words})"
+        )
+
+      true ->
+        violation(s, "the node of #{name} has ended by itself; its last words: #{words}")
     end
   end
 
   defp kept(s, name, {:orphans, lines, us}), do: note(s, {us, :soak, :orphans, {name, lines}})
+
   defp kept(s, name, {:failed, reason, _us}) do
     s = %{s | ended: Map.put(s.ended, name, :failed)}
     violation(s, "#{name} has not started: #{inspect(reason, limit: 10, printable_limit: 200)}")
   end
 
-  defp there(s, name, vm), do: write(%{s | vms: Map.put(s.vms, name, vm)}, "#{name} is up, pid #{vm.pid}")
+  defp there(s, name, vm),
+    do: write(%{s | vms: Map.put(s.vms, name, vm)}, "#{name} is up, pid #{vm.pid}")
 
   defp gone(s, name),
-    do: write(%{s | vms: Map.delete(s.vms, name), frozen: MapSet.delete(s.frozen, name)}, "#{name} is down")
+    do:
+      write(
+        %{s | vms: Map.delete(s.vms, name), frozen: MapSet.delete(s.frozen, name)},
+        "#{name} is down"
+      )
 
   defp recorded(s, datagram), do: %{s | recorded: Enum.take([datagram | s.recorded], 200)}
 
@@ -233,7 +285,12 @@ defmodule Bench.Soak.Runner do
     s = cpu(s)
     Fleet.stop(s.fleet)
     left = await_gone(s.mark, Recorder.now() + @gone_ms * 1000)
-    s = if left == [], do: s, else: violation(s, "left at the end: #{Enum.map_join(left, ", ", &elem(&1, 1))}")
+
+    s =
+      if left == [],
+        do: s,
+        else: violation(s, "left at the end: #{Enum.map_join(left, ", ", &elem(&1, 1))}")
+
     for {pid, _words} <- left, do: Vm.signal(pid, "KILL")
     if s.stranger, do: :gen_udp.close(s.stranger)
     Fleet.delete(s.fleet)

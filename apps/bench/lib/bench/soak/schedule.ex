@@ -74,7 +74,10 @@ defmodule Bench.Soak.Schedule do
   defp cycle(from, length_ms, robots, cuts?, random) do
     busy = round(@busy * length_ms)
     share = min(length_ms / @cycle_ms, 1.0)
-    {single, random} = Enum.map_reduce(@kinds, random, &several(&1, &2, {from, busy, share, robots}))
+
+    {single, random} =
+      Enum.map_reduce(@kinds, random, &several(&1, &2, {from, busy, share, robots}))
+
     {net, random} = if cuts?, do: network(from, from + busy, robots, random), else: {[], random}
     {stop, random} = stop(from, busy, robots, random)
     {[single, net, stop, {from, :start}, {from + busy, :start}, {from + busy, :calm}], random}
@@ -147,9 +150,14 @@ defmodule Bench.Soak.Schedule do
 
     deed =
       case kind do
-        :block -> {:block, a, b, ms}
-        :split -> {:split, mixed |> Enum.split(size) |> Tuple.to_list() |> Enum.map(&Enum.sort/1), ms}
-        :loss -> {:loss, Float.round(0.1 + 0.3 * share, 2), ms}
+        :block ->
+          {:block, a, b, ms}
+
+        :split ->
+          {:split, mixed |> Enum.split(size) |> Tuple.to_list() |> Enum.map(&Enum.sort/1), ms}
+
+        :loss ->
+          {:loss, Float.round(0.1 + 0.3 * share, 2), ms}
       end
 
     if at + ms > until do

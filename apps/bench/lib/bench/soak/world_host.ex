@@ -18,8 +18,13 @@ defmodule Bench.Soak.WorldHost do
   @spec main(World.t(), Path.t()) :: :ok
   def main(world, folder) do
     {:ok, _apps} = Application.ensure_all_started(:sim)
-    world = with {:ok, _at_us, last} <- read(folder), do: Snapshot.onto(world, last), else: (_ -> world)
-    lines = for robot <- world.order, do: %{id: {:line, robot}, start: {__MODULE__, :listen, [folder, robot]}}
+
+    world =
+      with {:ok, _at_us, last} <- read(folder), do: Snapshot.onto(world, last), else: (_ -> world)
+
+    lines =
+      for robot <- world.order,
+          do: %{id: {:line, robot}, start: {__MODULE__, :listen, [folder, robot]}}
 
     children =
       [World.Directory, {World.Server, name: :soak, world: world}] ++
@@ -47,6 +52,10 @@ defmodule Bench.Soak.WorldHost do
   @spec collisions(Snapshot.t(), World.t()) :: non_neg_integer()
   def collisions(snapshot, begun), do: Snapshot.onto(begun, snapshot).collisions
 
+  @doc "Where a robot's body was then."
+  @spec pose(Snapshot.t(), World.t(), atom()) :: Hal.Pose.t()
+  def pose(snapshot, begun, robot), do: Snapshot.onto(begun, snapshot).robots[robot].pose
+
   @doc "Moves the landmark of this node's world."
   @spec move({float(), float()}) :: :ok
   def move(place) do
@@ -62,7 +71,8 @@ defmodule Bench.Soak.WorldHost do
   def start_link(folder), do: GenServer.start_link(__MODULE__, folder)
 
   @impl GenServer
-  def init(folder), do: {:ok, %{folder: folder, ticker: Ticker.start(:write, @period_ms, @period_ms)}}
+  def init(folder),
+    do: {:ok, %{folder: folder, ticker: Ticker.start(:write, @period_ms, @period_ms)}}
 
   @impl GenServer
   def handle_info(:write, s) do
@@ -76,7 +86,8 @@ defmodule Bench.Soak.WorldHost do
 
   @doc false
   @spec listen(Path.t(), atom()) :: {:ok, pid()}
-  def listen(folder, robot), do: Task.start_link(__MODULE__, :accept, [path(folder, robot), robot])
+  def listen(folder, robot),
+    do: Task.start_link(__MODULE__, :accept, [path(folder, robot), robot])
 
   @doc false
   @spec accept(Path.t(), atom()) :: no_return()
@@ -107,7 +118,12 @@ defmodule Bench.Soak.WorldHost do
   defp relay(socket, server, robot, stands) do
     receive do
       {:tcp, ^socket, bytes} ->
-        relay(socket, server, robot, carry_out(:erlang.binary_to_term(bytes), server, robot, stands))
+        relay(
+          socket,
+          server,
+          robot,
+          carry_out(:erlang.binary_to_term(bytes), server, robot, stands)
+        )
 
       {:say, kind, what} ->
         _ = :gen_tcp.send(socket, :erlang.term_to_binary({kind, what}))

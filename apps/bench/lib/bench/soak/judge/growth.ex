@@ -19,7 +19,8 @@ defmodule Bench.Soak.Judge.Growth do
 
   @doc "A node has started."
   @spec start(t(), atom(), integer()) :: t()
-  def start(growth, robot, us), do: put_in(growth.lives[robot], %{since: us, minute: nil, first: nil})
+  def start(growth, robot, us),
+    do: put_in(growth.lives[robot], %{since: us, minute: nil, first: nil})
 
   @doc "A robot's node has told its figures. What is wrong with them."
   @spec note(t(), atom(), map(), integer()) :: {[{String.t(), term()}], t()}
@@ -52,7 +53,8 @@ defmodule Bench.Soak.Judge.Growth do
 
   defp grown(robot, first, least, since) do
     for {key, bound} <- [bytes: @bytes, atoms: @atoms], least[key] - first[key] > bound do
-      {"#{robot} has grown from #{first[key]} to #{least[key]} #{key}", {:growth, robot, key, since}}
+      {"#{robot} has grown from #{first[key]} to #{least[key]} #{key}",
+       {:growth, robot, key, since}}
     end
   end
 end

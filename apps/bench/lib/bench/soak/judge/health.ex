@@ -12,7 +12,14 @@ defmodule Bench.Soak.Judge.Health do
   @all_us 25_000_000
   @stale_us 3_000_000
 
-  defstruct robots: [], probes: %{}, expected: %{}, touched: %{}, open: %{}, worst_us: %{self: 0, all: 0}, looks: 0, whole: 0
+  defstruct robots: [],
+            probes: %{},
+            expected: %{},
+            touched: %{},
+            open: %{},
+            worst_us: %{self: 0, all: 0},
+            looks: 0,
+            whole: 0
 
   @typedoc """
   `touched` is when a robot was last disturbed, `open` who has not healed since; `expected` is what ran when all was well
@@ -39,19 +46,32 @@ defmodule Bench.Soak.Judge.Health do
   def note(health, robot, probe, us) do
     health = put_in(health.probes[robot], {probe, us})
     # What ran when it was well and whole for the first time.
-    if not is_map_key(health.expected, robot) and match?({true, _}, probe.well) and probe.offline == [],
-      do: put_in(health.expected[robot], probe.processes),
-      else: health
+    if not is_map_key(health.expected, robot) and match?({true, _}, probe.well) and
+         probe.offline == [],
+       do: put_in(health.expected[robot], probe.processes),
+       else: health
   end
 
   @doc "What is wrong now; `held` is who is held though no stop is in force, `claims` what robots claim."
   @spec judge(t(), [atom()], %{atom() => map()}, integer()) :: {[{String.t(), term()}], t()}
   def judge(health, held, claims, now) do
     selves = for robot <- health.robots, do: {robot, faults(health, robot, now), @self_us}
-    group = Enum.flat_map(health.robots, &apart(health, &1)) ++ for(robot <- held, do: "#{robot} is held") ++ split(health, claims)
-    whole = if Enum.all?(selves, fn {_robot, faults, _us} -> faults == [] end), do: group, else: ["not all are well"]
 
-    health = %{health | looks: health.looks + 1, whole: health.whole + if(whole == [], do: 1, else: 0)}
+    group =
+      Enum.flat_map(health.robots, &apart(health, &1)) ++
+        for(robot <- held, do: "#{robot} is held") ++ split(health, claims)
+
+    whole =
+      if Enum.all?(selves, fn {_robot, faults, _us} -> faults == [] end),
+        do: group,
+        else: ["not all are well"]
+
+    health = %{
+      health
+      | looks: health.looks + 1,
+        whole: health.whole + if(whole == [], do: 1, else: 0)
+    }
+
     Enum.reduce([{:all, whole, @all_us} | selves], {[], health}, &judged(&1, &2, now))
   end
 
@@ -59,7 +79,7 @@ defmodule Bench.Soak.Judge.Health do
     since = health.touched[who]
 
     cond do
-      since == nil or not is_map_key(health.open, who) and faults == [] ->
+      since == nil or (not is_map_key(health.open, who) and faults == []) ->
         {wrong, health}
 
       faults == [] ->
@@ -68,7 +88,9 @@ defmodule Bench.Soak.Judge.Health do
         {wrong, %{health | open: Map.delete(health.open, who), worst_us: worst}}
 
       now - since > bound_us ->
-        line = "#{who}, #{div(now - since, 1_000_000)} s after the last disturbance: #{Enum.join(faults, "; ")}"
+        line =
+          "#{who}, #{div(now - since, 1_000_000)} s after the last disturbance: #{Enum.join(faults, "; ")}"
+
         {[{line, {:health, who, since}} | wrong], health}
 
       true ->
@@ -98,7 +120,9 @@ defmodule Bench.Soak.Judge.Health do
       {probe, _us} ->
         deaf = health.robots -- [robot | probe.peers]
         blind = health.robots -- probe.listed
-        for(other <- deaf, do: "#{robot} does not hear #{other}") ++ for(other <- blind, do: "#{robot} does not list #{other}")
+
+        for(other <- deaf, do: "#{robot} does not hear #{other}") ++
+          for(other <- blind, do: "#{robot} does not list #{other}")
 
       nil ->
         []
@@ -106,7 +130,11 @@ defmodule Bench.Soak.Judge.Health do
   end
 
   defp split(health, claims) do
-    groups = for robot <- health.robots, claim = Map.get(claims, robot, %{}), do: {claim[:leader], claim[:epoch]}
+    groups =
+      for robot <- health.robots,
+          claim = Map.get(claims, robot, %{}),
+          do: {claim[:leader], claim[:epoch]}
+
     alone = for robot <- health.robots, claims[robot][:phase] not in [:lead, :follow], do: robot
 
     case {alone, Enum.uniq(groups)} do

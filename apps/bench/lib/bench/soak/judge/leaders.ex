@@ -29,30 +29,39 @@ defmodule Bench.Soak.Judge.Leaders do
     end
   end
 
-  def note(leaders, robot, _another, _us), do: %{leaders | leading: Map.delete(leaders.leading, robot)}
+  def note(leaders, robot, _another, _us),
+    do: %{leaders | leading: Map.delete(leaders.leading, robot)}
 
   @doc "What is wrong now."
   @spec judge(t(), Links.t(), integer()) :: {[{String.t(), term()}], t()}
   def judge(leaders, links, now) do
     pairs =
-      for {a, one} <- leaders.leading, {b, other} <- leaders.leading, a < b, met = Links.met(links, a, b) do
+      for {a, one} <- leaders.leading,
+          {b, other} <- leaders.leading,
+          a < b,
+          met = Links.met(links, a, b) do
         {a, b, one, other, met + @known_us}
       end
 
-    late = for {_a, _b, {from, _}, {since, _}, known} <- pairs, do: now - Enum.max([from, since, known])
+    late =
+      for {_a, _b, {from, _}, {since, _}, known} <- pairs,
+          do: now - Enum.max([from, since, known])
+
     wrong = Enum.flat_map(pairs, &wrong(&1, now))
     {wrong, %{leaders | worst_us: Enum.max([leaders.worst_us | late])}}
   end
 
-  defp wrong({a, b, {from, epoch}, {since, epoch}, known}, _now) when known < from and known < since,
-    do: [{"#{a} and #{b} both lead in epoch #{epoch}", {:epoch, a, b, epoch}}]
+  defp wrong({a, b, {from, epoch}, {since, epoch}, known}, _now)
+       when known < from and known < since,
+       do: [{"#{a} and #{b} both lead in epoch #{epoch}", {:epoch, a, b, epoch}}]
 
   defp wrong({a, b, {from, one}, {since, other}, known}, now) do
     late_us = now - Enum.max([from, since, known])
 
     if late_us > @lease_us + @slack_us,
       do: [
-        {"#{a} (epoch #{one}) and #{b} (epoch #{other}) have both led for #{div(late_us, 1000)} ms", {:two, a, b, from, since}}
+        {"#{a} (epoch #{one}) and #{b} (epoch #{other}) have both led for #{div(late_us, 1000)} ms",
+         {:two, a, b, from, since}}
       ],
       else: []
   end

@@ -31,7 +31,9 @@ defmodule Bench.Soak.Judge.Stops do
   def note(%{order: {_from, at_us}} = stops, robot, true, us, links) do
     stops = put_in(stops.held[robot], true)
     # How long it took those that nothing kept from hearing it.
-    if calm?(links, robot, at_us), do: %{stops | worst_us: max(stops.worst_us, us - at_us)}, else: stops
+    if calm?(links, robot, at_us),
+      do: %{stops | worst_us: max(stops.worst_us, us - at_us)},
+      else: stops
   end
 
   def note(stops, robot, held, _us, _links), do: put_in(stops.held[robot], held)
@@ -49,8 +51,11 @@ defmodule Bench.Soak.Judge.Stops do
     told = [from | for({robot, true} <- stops.held, do: robot)]
     begun = if links.here[from], do: told, else: tl(told)
 
-    for robot <- Links.reach(links, begun), stops.held[robot] != true, late?(links, robot, at_us, now) do
-      {"#{robot} is not held #{div(now - at_us, 1000)} ms after the e-stop on #{from}", {:stop, robot, at_us}}
+    for robot <- Links.reach(links, begun),
+        stops.held[robot] != true,
+        late?(links, robot, at_us, now) do
+      {"#{robot} is not held #{div(now - at_us, 1000)} ms after the e-stop on #{from}",
+       {:stop, robot, at_us}}
     end
   end
 
