@@ -79,22 +79,27 @@ defmodule Bench.Soak.Node do
          else: (_ended -> nil)
   end
 
+  defp words(nil, _top, _roles), do: nil
   defp words(top, top, _roles), do: "Swarm.Supervisor"
 
   defp words(pid, top, roles) do
     with {:dictionary, dictionary} <- Process.info(pid, :dictionary),
-         ancestors when is_list(ancestors) <- dictionary[:"$ancestors"],
+         [parent | _] = ancestors <- dictionary[:"$ancestors"],
          true <- top in ancestors,
          {:registered_name, name} <- Process.info(pid, :registered_name) do
       cond do
         role = roles[pid] -> role
         name != [] -> inspect(name)
-        true -> call(dictionary[:"$initial_call"])
+        # All supervisors begin alike.
+        true -> "#{call(dictionary[:"$initial_call"])} of #{words(pid(parent), top, roles)}"
       end
     else
       _another -> nil
     end
   end
+
+  defp pid(name) when is_atom(name), do: Process.whereis(name)
+  defp pid(pid), do: pid
 
   defp call({module, _function, _arity}), do: inspect(module)
   defp call(_other), do: "a process"
