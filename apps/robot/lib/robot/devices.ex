@@ -26,12 +26,16 @@ defmodule Robot.Devices do
   alias Robot.Control.Pilot
   alias Robot.Safety.Gate
 
+  @roles [:blob_detector, :view, :saver, :drive, :ptz, :camera]
+  @patience_ms 5_000
+
   @doc "Starts the devices of a robot whose board is running."
   @spec start_link(Config.t()) :: Supervisor.on_start()
   def start_link(%Config{} = config), do: HardenedSupervisor.start_link(__MODULE__, config)
 
   @impl Supervisor
   def init(%Config{id: id} = config) do
+    for role <- @roles, pid = Names.whereis(id, role), do: :ok = await_end(pid)
     board = Board.find!(id)
     write = fn writer -> {Board, :sense, [board, writer]} end
     to_detector = {Vision.BlobDetector, :frame, [Names.via(id, :blob_detector)]}
@@ -52,6 +56,20 @@ defmodule Robot.Devices do
         device(config, board, :camera, [{__MODULE__, :health, [board]}, to_detector, to_view])
 
     Supervisor.init(children, strategy: :one_for_one, max_restarts: 200, max_seconds: 5)
+  end
+
+  # If a former supervisor was killed, its children end by themselves, a device after its last words, and have their
+  # names till then. Without patience the few restarts of the robot's supervisor were used up meanwhile.
+  defp await_end(pid) do
+    ref = Process.monitor(pid)
+
+    receive do
+      {:DOWN, ^ref, :process, ^pid, _reason} -> :ok
+    after
+      @patience_ms ->
+        Process.exit(pid, :kill)
+        receive do: ({:DOWN, ^ref, :process, ^pid, _reason} -> :ok)
+    end
   end
 
   @doc """

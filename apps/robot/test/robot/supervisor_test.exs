@@ -371,6 +371,33 @@ defmodule Robot.SupervisorTest do
     assert parts(id, [:gate | @above]) == parts
   end
 
+  test "the devices' supervisor is killed: they end as they always do, and all above restarts once" do
+    id = rolling(:fall16)
+    rolls()
+    robot = Names.whereis(id, :robot)
+    before = parts(id, [:drive, :gate | @above])
+
+    {_id, devices, _type, _modules} =
+      List.keyfind(Supervisor.which_children(robot), Robot.Devices, 0)
+
+    drive = Names.whereis(id, :drive)
+    monitor = Process.monitor(devices)
+    listen(id)
+    # It is about to end with its supervisor, and takes its time.
+    true = :erlang.suspend_process(drive)
+    Process.exit(devices, :kill)
+    assert_receive {:DOWN, ^monitor, _, _, :killed}
+    Process.send_after(self(), :on, 500)
+    assert_receive :on
+    true = :erlang.resume_process(drive)
+    idle?(id)
+    assert Names.whereis(id, :robot) == robot
+
+    assert Enum.all?(Enum.zip(before, parts(id, [:drive, :gate | @above])), fn {a, b} ->
+             a != b
+           end)
+  end
+
   test "the board is killed: all starts afresh" do
     id = rolling(:fall11)
     rolls()
