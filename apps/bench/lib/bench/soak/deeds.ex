@@ -3,22 +3,23 @@ defmodule Bench.Soak.Deeds do
   Does to a fleet what a schedule says (`Bench.Soak.Schedule`), and notes it for the judge before it takes effect.
   What is not possible now, such as to freeze a node that is down, is left out, and the journal says so.
   """
-  alias Bench.Soak.{Junk, Network, Node, Recorder, Runner, WorldHost}
+  alias Bench.Soak.{Junk, Network, Orders, Recorder, State, Tree, WorldHost}
 
   @order_ms 8_000
   # Between so many datagrams of a flood others get their turn.
   @burst 200
 
   @doc "Does it, or begins it."
-  @spec carry_out(Runner.t(), tuple() | atom()) :: Runner.t()
+  @spec carry_out(State.t(), tuple() | atom()) :: State.t()
   def carry_out(s, {:process, robot, chance} = deed) do
     with_node(s, robot, deed, fn s, vm ->
-      aside(s, fn -> {robot, Vm.call(vm, Node, :kill, [chance], @order_ms)} end, fn {robot, words} ->
+      Orders.aside(fn -> {robot, Vm.call(vm, Tree, :kill, [chance], @order_ms)} end, fn {robot,
+                                                                                         words} ->
         "killed on #{robot}: #{words || "nothing, there is no robot"}"
       end)
 
       s = %{s | processes: Map.put(s.processes, robot, now())}
-      s |> count(:process) |> Runner.note({now(), :soak, :process, robot})
+      s |> State.count(:process) |> State.note({now(), :soak, :process, robot})
     end)
   end
 
@@ -34,9 +35,9 @@ defmodule Bench.Soak.Deeds do
       s = %{s | frozen: MapSet.put(s.frozen, robot)}
 
       s
-      |> count(:freeze)
-      |> Runner.note({now(), :soak, :freeze, robot})
-      |> Runner.write("frozen for #{ms} ms: #{robot}")
+      |> State.count(:freeze)
+      |> State.note({now(), :soak, :freeze, robot})
+      |> State.write("frozen for #{ms} ms: #{robot}")
     end)
   end
 
@@ -49,8 +50,8 @@ defmodule Bench.Soak.Deeds do
     shout(s, robot, Junk.datagrams(kind, size, seed, Enum.reverse(s.recorded)))
 
     s
-    |> count(:junk)
-    |> Runner.write(
+    |> State.count(:junk)
+    |> State.write(
       "#{size} datagrams of junk (#{kind}, #{length(s.recorded)} recorded) to #{robot}"
     )
   end
@@ -60,16 +61,18 @@ defmodule Bench.Soak.Deeds do
       Enum.flat_map([:random, :mutated], &Junk.datagrams(&1, 100, seed, Enum.reverse(s.recorded)))
 
     shout(s, robot, mixed |> Stream.cycle() |> Stream.take(size))
-    s |> count(:flood) |> Runner.write("flood of #{size} datagrams to #{robot}")
+    s |> State.count(:flood) |> State.write("flood of #{size} datagrams to #{robot}")
   end
 
   def carry_out(s, {:formation, kind}),
     do:
-      %{s | formation: kind} |> order({:formation, [kind]}) |> Runner.write("formation: #{kind}")
+      %{s | formation: kind}
+      |> Orders.order({:formation, [kind]})
+      |> State.write("formation: #{kind}")
 
   def carry_out(s, {:landmark, place}) do
     with_node(s, :world, {:landmark, place}, fn s, vm ->
-      aside(s, fn -> Vm.call(vm, WorldHost, :move, [place], @order_ms) end, fn :ok ->
+      Orders.aside(fn -> Vm.call(vm, WorldHost, :move, [place], @order_ms) end, fn :ok ->
         "the landmark moves"
       end)
 
@@ -78,38 +81,40 @@ defmodule Bench.Soak.Deeds do
   end
 
   def carry_out(s, {:estop, robot}) do
-    case [robot | s.fleet.robots] |> Enum.find(&(s.vms[&1] && &1 not in s.frozen)) do
+    case [robot | s.fleet.robots] |> Enum.find(&State.here?(s, &1)) do
       nil ->
-        Runner.write(s, "no e-stop: nobody is here")
+        State.write(s, "no e-stop: nobody is here")
 
       from ->
-        s = %{s | reset?: false} |> count(:estop) |> Runner.note({now(), :soak, :estop, from})
-        s |> call(from, {:estop, []}) |> Runner.write("e-stop ordered on #{from}")
+        s =
+          %{s | reset?: false} |> State.count(:estop) |> State.note({now(), :soak, :estop, from})
+
+        s |> Orders.call(from, {:estop, []}) |> State.write("e-stop ordered on #{from}")
     end
   end
 
   def carry_out(s, :reset) do
     %{s | reset?: true}
-    |> Runner.note({now(), :soak, :reset, nil})
-    |> order({:reset, []})
-    |> Runner.write("reset")
+    |> State.note({now(), :soak, :reset, nil})
+    |> Orders.order({:reset, []})
+    |> State.write("reset")
   end
 
   def carry_out(s, :start) do
-    s = Runner.note(%{s | start_until_us: now() + 15_000_000}, {now(), :soak, :start, nil})
-    Runner.write(s, "start of the mission, where it does not run")
+    s = State.note(%{s | start_until_us: now() + 15_000_000}, {now(), :soak, :start, nil})
+    State.write(s, "start of the mission, where it does not run")
   end
 
-  def carry_out(s, :calm), do: Runner.write(%{s | start_until_us: now() + 30_000_000}, "calm")
+  def carry_out(s, :calm), do: State.write(%{s | start_until_us: now() + 30_000_000}, "calm")
 
   @doc "Ends what lasts."
-  @spec end_of(Runner.t(), tuple()) :: Runner.t()
+  @spec end_of(State.t(), tuple()) :: State.t()
   def end_of(s, {:thaw, robot, vm}) do
     :ok = Vm.signal(vm, "CONT")
 
     case s.vms[robot] do
       ^vm ->
-        Runner.note(%{s | frozen: MapSet.delete(s.frozen, robot)}, {now(), :soak, :thaw, robot})
+        State.note(%{s | frozen: MapSet.delete(s.frozen, robot)}, {now(), :soak, :thaw, robot})
 
       _another_life ->
         s
@@ -118,36 +123,12 @@ defmodule Bench.Soak.Deeds do
 
   def end_of(s, :network) do
     :ok = Network.heal(s.fleet.network)
-    s |> Runner.note({now(), :soak, :heal, nil}) |> Runner.write("the network is whole")
+    s |> State.note({now(), :soak, :heal, nil}) |> State.write("the network is whole")
   end
-
-  @doc "Gives an order on the first node that is there; nobody waits for the answer."
-  @spec order(Runner.t(), {atom(), list()}) :: Runner.t()
-  def order(s, order) do
-    case Enum.find(s.fleet.robots, &(s.vms[&1] && &1 not in s.frozen)) do
-      nil -> s
-      from -> call(s, from, order)
-    end
-  end
-
-  defp call(s, from, {function, arguments}) do
-    vm = s.vms[from]
-
-    aside(
-      s,
-      fn -> Vm.call(vm, Swarm, function, arguments, @order_ms) end,
-      &"#{from}: #{function} #{words(&1)}"
-    )
-
-    s
-  end
-
-  defp words(:ok), do: "ok"
-  defp words({:error, line}), do: line
 
   defp kill(s, name, vm, kind) do
     s = %{s | ended: Map.put(s.ended, name, :killed)}
-    s = s |> count(kind) |> Runner.write("kill -9 of #{name}")
+    s = s |> State.count(kind) |> State.write("kill -9 of #{name}")
     :ok = Vm.signal(vm, "KILL")
     s
   end
@@ -157,7 +138,7 @@ defmodule Bench.Soak.Deeds do
     Process.send_after(self(), {:later, :network}, ms)
     pairs = Network.change(s.fleet.network, deed)
     event = if pairs == [], do: {now(), :soak, :network, :loss}, else: {now(), :soak, :cut, pairs}
-    s |> count(kind) |> Runner.note(event) |> Runner.write(text(deed))
+    s |> State.count(kind) |> State.note(event) |> State.write(text(deed))
   end
 
   defp text({:block, a, b, ms}), do: "the link of #{a} and #{b} is cut for #{ms} ms"
@@ -175,7 +156,7 @@ defmodule Bench.Soak.Deeds do
     end
   end
 
-  defp skip(s, deed), do: Runner.write(s, "left out, its node is not there: #{inspect(deed)}")
+  defp skip(s, deed), do: State.write(s, "left out, its node is not there: #{inspect(deed)}")
 
   defp shout(%{stranger: nil}, _robot, _datagrams), do: :ok
 
@@ -196,24 +177,5 @@ defmodule Bench.Soak.Deeds do
     :ok
   end
 
-  # A node may be killed, or freeze, while it answers.
-  defp aside(_s, ask, say) do
-    runner = self()
-
-    spawn(fn ->
-      words =
-        try do
-          say.(ask.())
-        catch
-          :exit, _reason -> "no answer"
-        end
-
-      send(runner, {:said, words})
-    end)
-
-    :ok
-  end
-
-  defp count(s, kind), do: %{s | counts: Map.update(s.counts, kind, 1, &(&1 + 1))}
   defp now, do: Recorder.now()
 end

@@ -1,6 +1,6 @@
 defmodule Bench.Soak.Main do
   @moduledoc "The command `bin/soak`: reads its arguments, runs, prints the table."
-  alias Bench.Soak.{Report, Runner}
+  alias Bench.Soak.{Report, Runner, State}
   alias Console.Cli.{Output, Progress}
 
   @minute_ms 60_000
@@ -43,7 +43,7 @@ defmodule Bench.Soak.Main do
       })
 
     Output.finish(output)
-    IO.write("\n" <> Report.table(s, Runner.elapsed_ms(s)))
+    IO.write("\n" <> Report.table(s, State.elapsed_ms(s)))
     tell(s, seed)
   end
 
@@ -63,7 +63,7 @@ defmodule Bench.Soak.Main do
   end
 
   defp progress(output, s, duration_ms) do
-    ms = Runner.elapsed_ms(s)
+    ms = State.elapsed_ms(s)
     line = Report.line(s, ms)
 
     cond do

@@ -12,7 +12,7 @@ defmodule Bench.Soak.Recorder do
   | `:probe` | each second: `t:probe/0` |
   """
   use GenServer
-  alias Bench.Soak.Node
+  alias Bench.Soak.Tree
   alias Hal.Ticker
   alias Robot.Board
   alias Swarm.Host.HealthCheck
@@ -67,7 +67,7 @@ defmodule Bench.Soak.Recorder do
     do: with({:ok, board} <- Board.find(robot), do: Board.latched?(board), else: (:error -> nil))
 
   defp probe(robot) do
-    processes = Node.processes()
+    processes = Tree.processes()
     node_wide = if processes == [], do: [], else: Swarm.Directory.robots()
 
     %{

@@ -1,9 +1,9 @@
 defmodule Bench.Soak.Report do
   @moduledoc "What `bin/soak` prints of a run, as text. Pure."
-  alias Bench.Soak.{Journal, Runner, Schedule}
+  alias Bench.Soak.{Journal, Schedule, State}
 
   @doc "One line on how it stands."
-  @spec line(Runner.t(), elapsed_ms :: non_neg_integer()) :: String.t()
+  @spec line(State.t(), elapsed_ms :: non_neg_integer()) :: String.t()
   def line(s, elapsed_ms) do
     here = for({_name, _vm} <- s.vms, do: 1) |> length()
 
@@ -14,11 +14,11 @@ defmodule Bench.Soak.Report do
   defp disturbed(s), do: Enum.sum(for kind <- Schedule.kinds(), do: Map.get(s.counts, kind, 0))
 
   @doc "How many processors it has kept busy."
-  @spec cores(Runner.t(), non_neg_integer()) :: float()
+  @spec cores(State.t(), non_neg_integer()) :: float()
   def cores(s, elapsed_ms), do: Enum.sum(Map.values(s.cpu)) * 1000 / max(elapsed_ms, 1)
 
   @doc "The table at the end."
-  @spec table(Runner.t(), elapsed_ms :: non_neg_integer()) :: String.t()
+  @spec table(State.t(), elapsed_ms :: non_neg_integer()) :: String.t()
   def table(s, elapsed_ms) do
     judge = s.judge
     counts = for kind <- Schedule.kinds(), do: "| #{kind} | #{Map.get(s.counts, kind, 0)} |"
@@ -52,7 +52,7 @@ defmodule Bench.Soak.Report do
   end
 
   @doc "The first violation: when, what, and what was done just before."
-  @spec first(Runner.t(), seed :: integer()) :: String.t() | nil
+  @spec first(State.t(), seed :: integer()) :: String.t() | nil
   def first(%{violations: []}, _seed), do: nil
 
   def first(%{violations: [{at_ms, line, before} | _]}, seed) do

@@ -9,6 +9,8 @@ defmodule Bench.Soak.Schedule do
   cycle of a run that is no multiple of 75 s is shorter in both its parts.
   """
 
+  alias Bench.Soak.Draw
+
   @cycle_ms 75_000
   @busy 0.6
 
@@ -84,67 +86,22 @@ defmodule Bench.Soak.Schedule do
   end
 
   defp several({kind, {least, most}}, random, {from, busy, share, robots}) do
-    {n, random} = whole(random, round(least * share), max(round(most * share), 1))
+    {n, random} = Draw.whole(random, round(least * share), max(round(most * share), 1))
 
     Enum.map_reduce(List.duplicate(kind, n), random, fn kind, random ->
-      {at, random} = whole(random, 500, busy)
-      {deed, random} = one(kind, robots, random)
+      {at, random} = Draw.whole(random, 500, busy)
+      {deed, random} = Draw.one(kind, robots, random)
       {{from + at, deed}, random}
     end)
   end
 
-  defp one(:world, _robots, random), do: {:world, random}
-
-  defp one(:process, robots, random) do
-    {robot, random} = pick(random, robots)
-    {chance, random} = :rand.uniform_s(random)
-    {{:process, robot, chance}, random}
-  end
-
-  defp one(:node, robots, random) do
-    {robot, random} = pick(random, robots)
-    {{:node, robot}, random}
-  end
-
-  defp one(:freeze, robots, random) do
-    {robot, random} = pick(random, robots)
-    {ms, random} = whole(random, 200, 5_000)
-    {{:freeze, robot, ms}, random}
-  end
-
-  defp one(:junk, robots, random) do
-    {robot, random} = pick(random, robots)
-    {kind, random} = pick(random, [:random, :recorded, :mutated])
-    {count, random} = whole(random, 10, 300)
-    {seed, random} = whole(random, 0, 1_000_000)
-    {{:junk, robot, kind, count, seed}, random}
-  end
-
-  defp one(:flood, robots, random) do
-    {robot, random} = pick(random, robots)
-    {count, random} = whole(random, 5_000, 20_000)
-    {seed, random} = whole(random, 0, 1_000_000)
-    {{:flood, robot, count, seed}, random}
-  end
-
-  defp one(:formation, _robots, random) do
-    {kind, random} = pick(random, [:line, :wedge, :triangle, :diamond, :circle, :column])
-    {{:formation, kind}, random}
-  end
-
-  defp one(:landmark, _robots, random) do
-    {x, random} = :rand.uniform_s(random)
-    {y, random} = :rand.uniform_s(random)
-    {{:landmark, {x - 0.5, y - 0.5}}, random}
-  end
-
   # One after the other, with time between them, and none beyond the end.
   defp network(at, until, robots, random) do
-    {pause, random} = whole(random, 1_000, 15_000)
-    {ms, random} = whole(random, 500, 12_000)
-    {kind, random} = pick(random, [:block, :block, :split, :loss])
-    {[a, b | _] = mixed, random} = shuffle(random, robots)
-    {size, random} = whole(random, 1, max(length(robots) - 1, 1))
+    {pause, random} = Draw.whole(random, 1_000, 15_000)
+    {ms, random} = Draw.whole(random, 500, 12_000)
+    {kind, random} = Draw.pick(random, [:block, :block, :split, :loss])
+    {[a, b | _] = mixed, random} = Draw.shuffle(random, robots)
+    {size, random} = Draw.whole(random, 1, max(length(robots) - 1, 1))
     {share, random} = :rand.uniform_s(random)
     at = at + pause
 
@@ -171,32 +128,12 @@ defmodule Bench.Soak.Schedule do
   # Every other cycle, held for a third of the disturbances.
   defp stop(from, busy, robots, random) do
     {chance, random} = :rand.uniform_s(random)
-    {robot, random} = pick(random, robots)
-    {at, random} = whole(random, div(busy, 10), div(busy, 2))
+    {robot, random} = Draw.pick(random, robots)
+    {at, random} = Draw.whole(random, div(busy, 10), div(busy, 2))
     reset = from + at + div(busy, 3)
 
     if chance < 0.5,
       do: {[{from + at, {:estop, robot}}, {reset, :reset}, {reset + 500, :start}], random},
       else: {[], random}
-  end
-
-  defp whole(random, from, to) do
-    {n, random} = :rand.uniform_s(to - from + 1, random)
-    {from + n - 1, random}
-  end
-
-  defp pick(random, all) do
-    {n, random} = whole(random, 0, length(all) - 1)
-    {Enum.at(all, n), random}
-  end
-
-  defp shuffle(random, all) do
-    {keyed, random} =
-      Enum.map_reduce(all, random, fn one, random ->
-        {key, random} = :rand.uniform_s(random)
-        {{key, one}, random}
-      end)
-
-    {for({_key, one} <- Enum.sort(keyed), do: one), random}
   end
 end

@@ -1,13 +1,13 @@
 defmodule Bench.Soak.WorldHost do
   @moduledoc """
   The world in a process of the operating system of its own: `Sim.World.Server`, and for each robot a line
-  over a socket of the file system (`Bench.Soak.WorldLink`). A line stands in for the robot's devices: it
-  attaches processes of its own, which end with it.
+  over a socket of the file system (`Bench.Soak.WorldLine`).
 
   Five times a second it writes what has changed since the start of the run (`Sim.World.Snapshot`) to a file,
   whole or not at all; from that the world is started again after a `kill -9`.
   """
   use GenServer
+  alias Bench.Soak.WorldLine
   alias Hal.Ticker
   alias Sim.World
   alias Sim.World.Snapshot
@@ -24,7 +24,7 @@ defmodule Bench.Soak.WorldHost do
 
     lines =
       for robot <- world.order,
-          do: %{id: {:line, robot}, start: {__MODULE__, :listen, [folder, robot]}}
+          do: %{id: {:line, robot}, start: {WorldLine, :start_link, [path(folder, robot), robot]}}
 
     children =
       [World.Directory, {World.Server, name: :soak, world: world}] ++
@@ -82,91 +82,5 @@ defmodule Bench.Soak.WorldHost do
     File.write!(aside, :erlang.term_to_binary(term))
     File.rename!(aside, file(s.folder))
     {:noreply, %{s | ticker: Ticker.next(s.ticker)}}
-  end
-
-  @doc false
-  @spec listen(Path.t(), atom()) :: {:ok, pid()}
-  def listen(folder, robot),
-    do: Task.start_link(__MODULE__, :accept, [path(folder, robot), robot])
-
-  @doc false
-  @spec accept(Path.t(), atom()) :: no_return()
-  def accept(path, robot) do
-    _ = File.rm(path)
-    options = [:binary, packet: 4, active: false, ifaddr: {:local, path}]
-    {:ok, listener} = :gen_tcp.listen(0, options)
-    again(listener, robot)
-  end
-
-  defp again(listener, robot) do
-    {:ok, socket} = :gen_tcp.accept(listener)
-    line = spawn(__MODULE__, :line, [socket, robot])
-    :ok = :gen_tcp.controlling_process(socket, line)
-    send(line, :yours)
-    again(listener, robot)
-  end
-
-  @doc false
-  @spec line(:gen_tcp.socket(), atom()) :: :ok
-  def line(socket, robot) do
-    receive do: (:yours -> :ok)
-    :ok = :inet.setopts(socket, active: true)
-    relay(socket, World.Directory.find(:soak), robot, %{})
-  end
-
-  # A robot that is frozen reads nothing: then this process waits, and no other.
-  defp relay(socket, server, robot, stands) do
-    receive do
-      {:tcp, ^socket, bytes} ->
-        relay(
-          socket,
-          server,
-          robot,
-          carry_out(:erlang.binary_to_term(bytes), server, robot, stands)
-        )
-
-      {:say, kind, what} ->
-        _ = :gen_tcp.send(socket, :erlang.term_to_binary({kind, what}))
-        relay(socket, server, robot, stands)
-
-      {:tcp_closed, ^socket} ->
-        exit(:closed)
-
-      {:tcp_error, ^socket, _reason} ->
-        exit(:closed)
-    end
-  end
-
-  defp carry_out({:attach, kind}, server, robot, stands) do
-    stands = drop(stands, kind)
-    line = self()
-    stand = spawn_link(fn -> stand(line, kind) end)
-    GenServer.cast(server, {:attach, robot, kind, stand})
-    Map.put(stands, kind, stand)
-  end
-
-  defp carry_out({:detach, kind}, _server, _robot, stands), do: drop(stands, kind)
-
-  defp carry_out({:request, request}, server, _robot, stands) do
-    GenServer.cast(server, request)
-    stands
-  end
-
-  # The server sees it end.
-  defp drop(stands, kind) do
-    {stand, stands} = Map.pop(stands, kind)
-    if stand, do: send(stand, :end)
-    stands
-  end
-
-  defp stand(line, kind) do
-    receive do
-      {:world, _server, what} ->
-        send(line, {:say, kind, what})
-        stand(line, kind)
-
-      :end ->
-        :ok
-    end
   end
 end

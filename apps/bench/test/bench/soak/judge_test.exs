@@ -88,7 +88,7 @@ defmodule Bench.Soak.JudgeTest do
     end
 
     test "one whose node was killed leads no more" do
-      assert judged(up() ++ [lead(10, :a, 1), {11, :soak, :down, :a}, lead(13, :b, 2)], 13..25) ==
+      assert judged(up() ++ [lead(10, :a, 1), {11, :soak, :down, :a}, lead(13, :b, 2)], 13..19) ==
                []
     end
   end
