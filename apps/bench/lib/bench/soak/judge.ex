@@ -13,7 +13,7 @@ defmodule Bench.Soak.Judge do
   | `:network` | packets are lost from then on, or no more |
   | `:estop`, `:reset` | the robot; `nil` |
   | `:start` | a start of the mission was ordered |
-  | `:collisions` | how many there have been in the world |
+  | `:collisions` | how many there have been in the world, and which go on |
   | `:orphans` | `{node, lines}` |
   """
   alias Bench.Soak.Links
@@ -98,12 +98,9 @@ defmodule Bench.Soak.Judge do
   defp take(judge, us, :soak, :reset, _value),
     do: {[], touch(%{judge | stops: Stops.release(judge.stops)}, judge.links.robots, us)}
 
-  defp take(judge, _us, :soak, :collisions, count) do
-    wrong =
-      if count > judge.collisions,
-        do: [{"#{count - judge.collisions} new collisions", {:collisions, count}}],
-        else: []
-
+  defp take(judge, _us, :soak, :collisions, {count, words}) do
+    new = count - judge.collisions
+    wrong = if new > 0, do: [{"#{new} new collisions: #{words}", {:collisions, count}}], else: []
     {wrong, %{judge | collisions: count}}
   end
 

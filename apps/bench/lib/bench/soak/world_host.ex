@@ -48,9 +48,22 @@ defmodule Bench.Soak.WorldHost do
     end
   end
 
-  @doc "How many collisions there had been by then."
-  @spec collisions(Snapshot.t(), World.t()) :: non_neg_integer()
-  def collisions(snapshot, begun), do: Snapshot.onto(begun, snapshot).collisions
+  @doc "How many collisions there had been by then, and who touched whom or what, in words."
+  @spec collisions(Snapshot.t(), World.t()) :: {non_neg_integer(), String.t()}
+  def collisions(snapshot, begun) do
+    world = Snapshot.onto(begun, snapshot)
+    {world.collisions, Enum.map_join(world.together, "; ", &contact(world, &1))}
+  end
+
+  defp contact(world, {i, :wall}), do: "#{body(world, i)} and a wall"
+  defp contact(world, {i, j}), do: "#{body(world, i)} and #{body(world, j)}"
+
+  defp body(world, index) do
+    id = Enum.at(world.order, index)
+    %{pose: pose, wanted: wanted} = world.robots[id]
+    [x, y] = for metres <- [pose.x, pose.y], do: Float.round(metres, 2)
+    "#{id} at (#{x}, #{y}), told #{Float.round(wanted.linear, 2)} m/s"
+  end
 
   @doc "Where a robot's body was then."
   @spec pose(Snapshot.t(), World.t(), atom()) :: Hal.Pose.t()

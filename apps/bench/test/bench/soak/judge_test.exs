@@ -202,10 +202,11 @@ defmodule Bench.Soak.JudgeTest do
   end
 
   test "collisions and processes that were left behind are found" do
-    assert judged(
-             [{1, :soak, :collisions, 0}, {2, :soak, :collisions, 2}, {3, :soak, :collisions, 2}],
-             []
-           ) == ["2 new collisions"]
+    counts =
+      for {at, count} <- [{1, 0}, {2, 2}, {3, 2}],
+          do: {at, :soak, :collisions, {count, "a and b"}}
+
+    assert judged(counts, []) == ["2 new collisions: a and b"]
 
     assert ["a has left processes behind: 17 erl"] =
              judged([{1, :soak, :orphans, {:a, ["17 erl"]}}], [])
