@@ -80,7 +80,7 @@ defmodule Bench.Soak.Fleet do
     }
 
     main = fn vm ->
-      start = if hardware?, do: pose(fleet, robot), else: fleet.starts[robot]
+      start = start(fleet, robot, if(hardware?, do: :zero, else: :on))
       Vm.call(vm, Node, :main, [Map.put(about, :start, start)], @boot_ms)
     end
 
@@ -88,9 +88,9 @@ defmodule Bench.Soak.Fleet do
   end
 
   # The wheels of a real base begin to count when it is switched on; those in the world have counted all the time.
-  defp pose(fleet, robot) do
+  defp start(fleet, robot, wheels) do
     case WorldHost.read(fleet.folder) do
-      {:ok, _at_us, snapshot} -> WorldHost.pose(snapshot, fleet.world, robot)
+      {:ok, _at_us, snapshot} -> WorldHost.start(snapshot, fleet.world, robot, wheels)
       {:error, _none_yet} -> fleet.starts[robot]
     end
   end

@@ -8,7 +8,7 @@ defmodule Bench.Soak.WorldHost do
   """
   use GenServer
   alias Bench.Soak.WorldLine
-  alias Hal.Ticker
+  alias Hal.{Pose, Ticker}
   alias Sim.World
   alias Sim.World.Snapshot
 
@@ -65,9 +65,16 @@ defmodule Bench.Soak.WorldHost do
     "#{id} at (#{x}, #{y}), told #{Float.round(wanted.linear, 2)} m/s"
   end
 
-  @doc "Where a robot's body was then."
-  @spec pose(Snapshot.t(), World.t(), atom()) :: Hal.Pose.t()
-  def pose(snapshot, begun, robot), do: Snapshot.onto(begun, snapshot).robots[robot].pose
+  @doc """
+  Where the wheels of a robot would have begun to count, by where its body was then: what a person tells a robot
+  that is switched on again. With `:zero` its wheels count from nothing.
+  """
+  @spec start(Snapshot.t(), World.t(), atom(), :zero | :on) :: Pose.t()
+  def start(snapshot, begun, robot, wheels) do
+    %{pose: pose, odometry: odometry} = Snapshot.onto(begun, snapshot).robots[robot]
+    zero = Pose.new(0.0, 0.0)
+    if wheels == :zero, do: pose, else: Pose.compose(pose, Pose.relative(odometry, zero))
+  end
 
   @doc "Moves the landmark of this node's world."
   @spec move({float(), float()}) :: :ok
