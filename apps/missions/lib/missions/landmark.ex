@@ -35,9 +35,6 @@ defmodule Missions.Landmark do
 
   @behaviour Robot.Mission
 
-  # Without reports of where things are, a robot must not correct its pose by where they were.
-  @unled [anchors: %Anchors{}]
-
   @doc """
   A robot's mission, with options that `options/2` has checked (`Missions.Landmark.Options`).
   """
@@ -110,13 +107,26 @@ defmodule Missions.Landmark do
     {mission, letters} = Rounds.tick(mission)
     {mission, stages} = step(mission)
     {mission, effects} = act(Transitions.activity(mission.phase), mission)
-    effects = if :lists.keymember(:anchors, 1, effects), do: effects, else: effects ++ @unled
+
+    effects =
+      if :lists.keymember(:anchors, 1, effects),
+        do: effects,
+        else: effects ++ [anchors: unled(mission)]
+
     # What is passed on are others' own words, not what this robot makes of them.
     {mission, beats} = relay_beats(mission, percept)
     {mission, refused} = EpochFilter.tell(mission)
     effects = letters ++ beats ++ stages ++ refused ++ effects
     {mission.phase, mission, effects ++ [{:claim, Claim.claim(mission)}]}
   end
+
+  # Without reports of where things are, a robot must not correct its pose by where they were. Until
+  # it leads for the first time, nobody has taken its places from it.
+  defp unled(%{phase: phase, lead: %{sequence: 0}, colour: colour})
+       when phase in [:search, :agree],
+       do: %Anchors{standing: colour}
+
+  defp unled(_mission), do: %Anchors{}
 
   @impl Robot.Mission
   # The formation, and the numbers of the group's last round and epoch.

@@ -12,7 +12,7 @@ defmodule Robot.Localiser do
   have been counted.
   """
   alias Hal.{Odometry, Pose}
-  alias Robot.Localiser.{Anchors, Belief, Frame, History, Sightings}
+  alias Robot.Localiser.{Anchors, Belief, Frame, History, Sightings, TurnCheck}
   alias Robot.Percept
 
   # Odometry that begins farther from zero than this (metres, radians) was counting before.
@@ -28,7 +28,8 @@ defmodule Robot.Localiser do
                 seen_ms: nil,
                 anchors: %Anchors{},
                 frame: nil,
-                frame_no: nil
+                frame_no: nil,
+                turn_check: nil
               ]
 
   # Frame numbers are sent to other robots, which accept none above half a billion.
@@ -48,7 +49,8 @@ defmodule Robot.Localiser do
           seen_ms: integer() | nil,
           anchors: Anchors.t(),
           frame: Anchors.frame() | nil,
-          frame_no: non_neg_integer() | nil
+          frame_no: non_neg_integer() | nil,
+          turn_check: TurnCheck.t()
         }
 
   @doc "The localiser of a robot whose odometry reads zero at the pose `start`."
@@ -196,10 +198,20 @@ defmodule Robot.Localiser do
         localiser
 
       back ->
+        localiser = check(localiser, percept, back)
         belief = Sightings.correct(localiser.belief, localiser.anchors.marks, percept, back)
         %{localiser | seen_ms: at_ms, belief: belief}
     end
   end
+
+  # A robot that was never led: nobody knows better how it has turned.
+  defp check(%{frame: nil, anchors: %{standing: colour}} = localiser, percept, back) do
+    %{turn_check: check, belief: belief, odometry: odometry} = localiser
+    {check, belief} = TurnCheck.see(check, belief, percept, colour, odometry, back)
+    %{localiser | turn_check: check, belief: belief}
+  end
+
+  defp check(localiser, _percept, _back), do: %{localiser | turn_check: nil}
 
   defp remember(localiser, at_ms),
     do: %{localiser | history: History.note(localiser.history, at_ms, localiser.odometry)}

@@ -10,7 +10,7 @@ defmodule Robot.Localiser.Anchors do
   """
   alias Hal.Pose
 
-  defstruct frame: nil, marks: []
+  defstruct frame: nil, marks: [], standing: nil
 
   # Standard deviations count as at least this much, and places nearer to each other than this as
   # the same; in metres.

@@ -337,6 +337,21 @@ defmodule Robot.Localiser.Belief do
       else: believe(belief, v, error / s, reduce(belief.covariance, v, s))
   end
 
+  @doc """
+  The belief after a measurement, of this variance, that in turns of a sum of `turned` radians the
+  heading has changed by `more` than by odometry.
+  """
+  @spec turned(t(), more :: float(), turned :: float(), noise :: float()) :: t()
+  def turned(belief, more, turned, noise) do
+    {v, variance} = Covariance.project(belief.covariance, [0.0, 0.0, 0.0, turned])
+    error = more - belief.slip * turned
+    s = variance + noise + @turn_variance * turned
+
+    if error * error > @gate * s,
+      do: belief,
+      else: believe(belief, v, error / s, reduce(belief.covariance, v, s))
+  end
+
   # The gain of the common error is zero: its covariances shrink, its variance does not.
   defp reduce(covariance, v, s) do
     covariance
