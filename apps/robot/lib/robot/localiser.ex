@@ -171,6 +171,7 @@ defmodule Robot.Localiser do
       | odometry_frame: frame,
         odometry: nil,
         history: History.new(),
+        turn_check: nil,
         belief: Belief.doubt(localiser.belief)
     }
 

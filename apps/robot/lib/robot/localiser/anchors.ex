@@ -120,5 +120,13 @@ defmodule Robot.Localiser.Anchors do
     {ux * size, uy * size}
   end
 
-  @type t :: %__MODULE__{frame: frame() | nil, marks: [mark()]}
+  @typedoc """
+  `standing` is the colour of the one object that a robot in its own frame may take for standing
+  still at a place that nobody knows (`Robot.Localiser.TurnCheck`).
+  """
+  @type t :: %__MODULE__{
+          frame: frame() | nil,
+          marks: [mark()],
+          standing: String.t() | nil
+        }
 end
