@@ -13,6 +13,7 @@ defmodule Robot.Localiser do
   """
   alias Hal.{Odometry, Pose}
   alias Robot.Localiser.{Anchors, Belief, Frame, History, Sightings, TurnCheck}
+  alias Robot.Localiser.Belief.Marks
   alias Robot.Percept
 
   # Odometry that begins farther from zero than this (metres, radians) was counting before.
@@ -101,7 +102,7 @@ defmodule Robot.Localiser do
 
     belief =
       localiser.belief
-      |> Belief.forget()
+      |> Marks.forget()
       |> Frame.reframe(frame.at, position, heading)
       |> Frame.led(frame.slip)
 

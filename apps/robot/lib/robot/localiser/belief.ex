@@ -33,8 +33,7 @@ defmodule Robot.Localiser.Belief do
   # the leader's slip, and the common error.
   @slip_sd 0.055
   @start_sd [0.03, 0.03, 0.02, @slip_sd, 0.06, 0.08, 0.0, 1.0]
-  @own length(@start_sd)
-  @common @own - 1
+  @common length(@start_sd) - 1
   # Variances of odometry: per metre driven, of the position (m2, in x and in y) and of the
   # heading (rad2), and per radian turned, of the heading. The sum does not depend on the number
   # of steps in which a way is reported.
@@ -51,15 +50,8 @@ defmodule Robot.Localiser.Belief do
   # The pose is doubted when a counter reaches this: a picture that contradicts the pose as a
   # whole adds one, a consistent one subtracts one.
   @contradictions 6
-  # With this many marks, a new one replaces the one that was used least recently.
-  @marks 6
-  # A mark whose reported place moves by more than this (metres) counts as another object.
-  @elsewhere 1.0
   # Prevents division by zero for a measurement that does not depend on the position.
   @no_way 1.0e-9
-  # A mark starts anew if its reported standard deviation falls below this share of the former
-  # one.
-  @surer 0.75
 
   @enforce_keys [:pose, :covariance]
   defstruct @enforce_keys ++
@@ -245,83 +237,7 @@ defmodule Robot.Localiser.Belief do
   end
 
   @doc """
-  The estimated place of a mark that was reported at `at`, with the uncertainty `spread`, of which
-  all robots share `common` (`Robot.Localiser.Anchors.common/3`): the reported place at first, and
-  then that place corrected by its sightings. Adds the mark to the states if it is new.
-  """
-  @spec meet(t(), key :: term(), Pose.point(), Anchors.spread(), common :: Pose.point()) ::
-          {t(), Pose.point()}
-  def meet(belief, key, {x, y} = at, spread, common \\ {0.0, 0.0}) do
-    {worst, least, _direction} = spread
-    sd = :math.sqrt((worst * worst + least * least) / 2)
-
-    case Enum.find_index(belief.marks, &(&1.key == key)) do
-      nil ->
-        {add(belief, key, at, spread, sd, common), at}
-
-      index ->
-        mark = Enum.at(belief.marks, index)
-        moved = Pose.distance(mark.told, at)
-
-        if moved > @elsewhere or sd < @surer * mark.sd do
-          {belief |> drop(index) |> add(key, at, spread, sd, common), at}
-        else
-          {tell(belief, index, mark, at, sd, moved * moved), shift({x, y}, mark.off)}
-        end
-    end
-  end
-
-  # If the reported place moved or became less certain, the offset may be larger by that much.
-  defp tell(belief, index, mark, at, sd, moved) do
-    less_sure = sd * sd > 2 * mark.sd * mark.sd
-    more = if less_sure, do: sd * sd - mark.sd * mark.sd, else: 0.0
-    mark = %{mark | told: at, sd: if(less_sure, do: sd, else: mark.sd), used: belief.uses}
-
-    %{
-      belief
-      | covariance:
-          Covariance.add(belief.covariance, [moved + more, moved + more], @own + 2 * index),
-        marks: List.replace_at(belief.marks, index, mark),
-        uses: belief.uses + 1
-    }
-  end
-
-  defp add(%{marks: marks} = belief, key, at, spread, sd, common)
-       when length(marks) >= @marks do
-    {_mark, index} = marks |> Enum.with_index() |> Enum.min_by(fn {mark, _} -> mark.used end)
-    belief |> drop(index) |> add(key, at, spread, sd, common)
-  end
-
-  defp add(belief, key, at, spread, sd, {common_x, common_y}) do
-    {xx, xy, yy} = Anchors.covariance(spread)
-    mark = %{key: key, told: at, sd: sd, off: {0.0, 0.0}, used: belief.uses}
-
-    %{
-      belief
-      | covariance:
-          Covariance.append(belief.covariance, [[xx, xy], [xy, yy]], @common, [common_x, common_y]),
-        marks: belief.marks ++ [mark],
-        uses: belief.uses + 1
-    }
-  end
-
-  defp drop(belief, index) do
-    %{
-      belief
-      | covariance: Covariance.drop(belief.covariance, @own + 2 * index, 2),
-        marks: List.delete_at(belief.marks, index)
-    }
-  end
-
-  @doc "The belief without marks, and without correlation with their common error."
-  @spec forget(t()) :: t()
-  def forget(%__MODULE__{marks: []} = belief),
-    do: %{belief | covariance: Covariance.replace(belief.covariance, @common, 1.0)}
-
-  def forget(belief), do: belief |> drop(length(belief.marks) - 1) |> forget()
-
-  @doc """
-  The belief corrected by one measurement of a mark (`meet/5`): the innovation `error` (measured
+  The belief corrected by one measurement of a mark (`Robot.Localiser.Belief.Marks`): the innovation `error` (measured
   minus expected value), the derivatives of the expected value, and the variance of the noise.
   K = P H' / S, x + K e, P - K S K'.
   """

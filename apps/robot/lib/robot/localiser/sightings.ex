@@ -10,6 +10,7 @@ defmodule Robot.Localiser.Sightings do
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief, Consistency, Matching, Silhouettes}
+  alias Robot.Localiser.Belief.Marks
   alias Robot.Percept
   alias Robot.Percept.Sighting
 
@@ -135,7 +136,7 @@ defmodule Robot.Localiser.Sightings do
   # The vector from the place at which the picture was taken to the estimated place of the object.
   defp meet(belief, {_percept, back}, mark, far) do
     exposed = exposed(belief, back)
-    {belief, {x, y}} = Belief.meet(belief, mark.key, mark.at, place_sd(mark, far), mark.common)
+    {belief, {x, y}} = Marks.meet(belief, mark.key, mark.at, place_sd(mark, far), mark.common)
     {dx, dy} = {x - exposed.x, y - exposed.y}
     {belief, exposed, {dx, dy, max(:math.sqrt(dx * dx + dy * dy), 0.1)}}
   end

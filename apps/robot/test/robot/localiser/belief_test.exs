@@ -6,6 +6,7 @@ defmodule Robot.Localiser.BeliefTest do
   doctest Robot.Localiser.History
   alias Hal.Pose
   alias Robot.Localiser.{Belief, Covariance, Frame}
+  alias Robot.Localiser.Belief.Marks
 
   # Numbers that look random, and are the same in every run.
   defp draws(seed), do: :rand.seed_s(:exsss, seed)
@@ -70,17 +71,17 @@ defmodule Robot.Localiser.BeliefTest do
   end
 
   test "a mark that was told to be elsewhere is less sure, one far off is another one" do
-    {belief, at} = Belief.meet(Belief.new(Pose.new(0, 0)), :mag2, {2.0, 0.0}, all_round(0.1))
+    {belief, at} = Marks.meet(Belief.new(Pose.new(0, 0)), :mag2, {2.0, 0.0}, all_round(0.1))
     assert at == {2.0, 0.0}
     variance = fn belief -> belief.covariance |> List.last() |> List.last() end
     assert_in_delta variance.(belief), 0.01, 1.0e-9
-    {belief, _} = Belief.meet(belief, :mag2, {2.0, 0.1}, all_round(0.1))
+    {belief, _} = Marks.meet(belief, :mag2, {2.0, 0.1}, all_round(0.1))
     assert_in_delta variance.(belief), 0.02, 1.0e-9
-    {less, _} = Belief.meet(belief, :mag2, {2.0, 0.1}, all_round(0.3))
+    {less, _} = Marks.meet(belief, :mag2, {2.0, 0.1}, all_round(0.3))
     assert_in_delta variance.(less), 0.02 + 0.08, 1.0e-9
-    {surer, _} = Belief.meet(belief, :mag2, {2.0, 0.1}, all_round(0.05))
+    {surer, _} = Marks.meet(belief, :mag2, {2.0, 0.1}, all_round(0.05))
     assert_in_delta variance.(surer), 0.0025, 1.0e-9
-    {other, at} = Belief.meet(belief, :mag2, {5.0, 0.0}, all_round(0.1))
+    {other, at} = Marks.meet(belief, :mag2, {5.0, 0.0}, all_round(0.1))
     assert at == {5.0, 0.0}
     assert [%{told: ^at}] = other.marks
     assert_in_delta variance.(other), 0.01, 1.0e-9
@@ -89,16 +90,16 @@ defmodule Robot.Localiser.BeliefTest do
   test "there are never more marks than a filter can carry; the one seen least lately goes" do
     belief =
       Enum.reduce(1..20, Belief.new(Pose.new(0, 0)), fn k, belief ->
-        {belief, _} = Belief.meet(belief, :first, {1.0, 0.0}, all_round(0.1))
-        {belief, _} = Belief.meet(belief, k, {1.0 * k, 1.0}, all_round(0.1))
+        {belief, _} = Marks.meet(belief, :first, {1.0, 0.0}, all_round(0.1))
+        {belief, _} = Marks.meet(belief, k, {1.0 * k, 1.0}, all_round(0.1))
         belief
       end)
 
     assert Enum.map(belief.marks, & &1.key) |> Enum.sort() == [16, 17, 18, 19, 20, :first]
     assert length(belief.covariance) == 8 + 2 * 6
     assert Enum.all?(belief.covariance, &(length(&1) == 20))
-    assert Belief.forget(belief).marks == []
-    assert length(Belief.forget(belief).covariance) == 8
+    assert Marks.forget(belief).marks == []
+    assert length(Marks.forget(belief).covariance) == 8
   end
 
   test "robots that are wrong alike are no independent witnesses, however many are seen" do
@@ -108,7 +109,7 @@ defmodule Robot.Localiser.BeliefTest do
     # Twenty robots, so that each is forgotten and told anew many times, seen ten times each.
     see = fn common ->
       Enum.reduce(1..200, start, fn k, belief ->
-        {belief, _} = Belief.meet(belief, rem(k, 20), {2.0, 0.0}, all_round(0.1), common)
+        {belief, _} = Marks.meet(belief, rem(k, 20), {2.0, 0.0}, all_round(0.1), common)
         Belief.correct(belief, rem(k, 20), 0.0, {{0.0, 1.0, 0.0}, {0.0, 0.0}}, 1.0e-4)
       end)
     end
@@ -130,7 +131,7 @@ defmodule Robot.Localiser.BeliefTest do
                     1.0e-9
 
     # In another frame it has nothing in common with anybody.
-    apart = Belief.variance(Belief.forget(see.({0.0, 0.08})), {0.0, 1.0, 0.0}, mark)
+    apart = Belief.variance(Marks.forget(see.({0.0, 0.08})), {0.0, 1.0, 0.0}, mark)
     assert :math.sqrt(apart) > 0.12
   end
 
@@ -197,7 +198,7 @@ defmodule Robot.Localiser.BeliefTest do
   defp see(truth, belief, told, key, state) do
     {noise, state} = normal(state, 0.015)
     seen = Pose.bearing(truth, @places[key]) + noise
-    {belief, {x, y}} = Belief.meet(belief, key, told[key], all_round(0.1))
+    {belief, {x, y}} = Marks.meet(belief, key, told[key], all_round(0.1))
     {dx, dy} = {x - belief.pose.x, y - belief.pose.y}
     square = dx * dx + dy * dy
     error = Pose.wrap(seen - Pose.bearing(belief.pose, {x, y}))
