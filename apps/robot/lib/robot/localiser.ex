@@ -103,7 +103,7 @@ defmodule Robot.Localiser do
     belief =
       localiser.belief
       |> Marks.forget()
-      |> Frame.reframe(frame.at, position, heading)
+      |> Frame.joined(frame.at, position, heading)
       |> Frame.led(frame.slip)
 
     renumber(%{localiser | frame: frame, belief: belief})
@@ -140,14 +140,16 @@ defmodule Robot.Localiser do
     {%{percept | pose: localiser.belief.pose, uncertainty: uncertainty(localiser)}, localiser}
   end
 
-  defp uncertainty(%{belief: belief, frame: frame, frame_no: number}) do
-    {position, _across, heading} = Belief.sd(belief)
+  defp uncertainty(%{belief: belief, frame: frame, frame_no: number} = localiser) do
+    {_worst, _least, heading} = Belief.sd(belief)
+    spread = spread(localiser)
+    position = elem(spread, 0)
     {square, turn} = if frame, do: frame.start, else: {0.0, 0.0}
 
     %{
-      radius: Belief.radius(belief),
+      radius: Anchors.radius(spread),
       position: position,
-      spread: Belief.spread(belief),
+      spread: spread,
       heading: heading,
       frame: frame && frame.key,
       frame_no: number,
@@ -155,6 +157,16 @@ defmodule Robot.Localiser do
       drift: belief.drift,
       slip: Belief.slip_sd(belief)
     }
+  end
+
+  # The filter takes the errors of the robots ahead for less common than they are: at the end of a
+  # long column it would be surer of the direction of the column than those at its beginning.
+  defp spread(%{belief: belief, anchors: %{frame: frame} = anchors}) do
+    spread = Belief.spread(belief)
+
+    if frame,
+      do: Anchors.swung(spread, Pose.point(belief.pose), frame.at, Anchors.direction_sd(anchors)),
+      else: spread
   end
 
   defp numbered(%{frame_no: nil} = localiser, at_ms),

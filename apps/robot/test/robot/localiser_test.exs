@@ -99,7 +99,9 @@ defmodule Robot.LocaliserTest do
     {percept, sure} = Localiser.update(localiser, again)
     assert percept.pose == before.pose
     assert percept.detections.pose == nil
-    assert Belief.radius(sure.belief) > Belief.radius(localiser.belief) + 0.3
+
+    assert Anchors.radius(Belief.spread(sure.belief)) >
+             Anchors.radius(Belief.spread(localiser.belief)) + 0.3
 
     {percept, _} = Localiser.update(sure, framed.(Pose.new(0.5, 0), other, 1_000))
     assert percept.pose == Pose.new(4.5, 2)
@@ -295,6 +297,29 @@ defmodule Robot.LocaliserTest do
     # And by how much each of the arcs so far bends.
     bend = 0.75 * 100 * (3 * 0.01 * 0.01 + 0.01 * 0.01 + 0.03 * 0.03)
     assert_in_delta sd.(strange), :math.sqrt(4.0 + 0.06 + 0.5 + 3.0 + bend), 0.01
+  end
+
+  test "a robot at the end of a column knows its direction at most twice as well as those ahead of it" do
+    {_, localiser} = Localiser.update(Localiser.new(Pose.new(0, 0)), percept(Pose.new(0, 0), 0))
+    ahead = %{@leader | key: :mag3, at: {5.0, 0.0}, sd: {0.2, 0.05, :math.pi() / 2}}
+    frame = frame({:mag2, 1}, @there, 0.0, 0.0)
+
+    radius = fn marks ->
+      {seen, _} =
+        localiser |> told(marks, frame) |> Localiser.update(percept(Pose.new(0, 0), 100))
+
+      seen.uncertainty.radius
+    end
+
+    # 0.2 m across at 5 m from the leader are 0.4 m at 10 m.
+    assert_in_delta radius.([ahead]), Anchors.radius({0.4 / 2, 0.03, 0.0}), 0.01
+    assert radius.([]) < 0.15
+    # What is not a reference tells nothing, nor does one beside the leader.
+    assert radius.([%{ahead | reference?: false}]) < 0.15
+    assert radius.([%{ahead | at: {9.0, 0.0}}]) < 0.15
+    # One that claims to know better does not make up for the other.
+    better = %{ahead | key: :mag4, at: {8.0, 0.0}, sd: {0.02, 0.02, 0.0}}
+    assert radius.([ahead, better]) == radius.([ahead])
   end
 
   test "a leader that slips turns its followers by as much in each radian, and they find out by what they see" do

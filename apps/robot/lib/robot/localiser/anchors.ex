@@ -86,9 +86,44 @@ defmodule Robot.Localiser.Anchors do
     {w * c * c + l * s * s, (w - l) * c * s, w * s * s + l * c * c}
   end
 
-  # The square of this is the coefficient of correlation between the errors of two robots across
-  # the line from the leader.
+  @doc """
+  The spread of a place with this covariance: the inverse of `covariance/1`.
+
+      iex> Robot.Localiser.Anchors.spread({0.25, 0.0, 0.0625})
+      {0.5, 0.25, 0.0}
+  """
+  @spec spread({xx :: float(), xy :: float(), yy :: float()}) :: spread()
+  def spread({xx, xy, yy}) do
+    half = (xx + yy) / 2
+    root = :math.sqrt((xx - yy) * (xx - yy) / 4 + xy * xy)
+    {root(half + root), root(half - root), :math.atan2(2 * xy, xx - yy) / 2}
+  end
+
+  @doc """
+  The radius (metres) round a place within which the object is in 95 of 100 cases: 1.96 standard
+  deviations if the error has one direction only, 2.45 if it is equal in all directions, and in
+  between a fit to the table of circular errors.
+
+      iex> Float.round(Robot.Localiser.Anchors.radius({0.03, 0.03, 0.0}), 3)
+      0.073
+  """
+  @spec radius(spread()) :: float()
+  def radius({worst, least, _direction}) do
+    roundness = if worst > 0.0, do: least / worst, else: 1.0
+    worst * (1.96 + 0.488 * :math.pow(roundness, 2.5))
+  end
+
+  # Rounding may make a variance of zero negative.
+  defp root(variance), do: :math.sqrt(max(variance, 0.0))
+
   @common_share 0.8
+
+  @doc """
+  The share of a robot's standard deviation across the line from the leader that all robots have
+  in common; its square is the coefficient of correlation of two robots' errors.
+  """
+  @spec common_share() :: float()
+  def common_share, do: @common_share
 
   @doc """
   The part of a robot's position error that the robots ahead share, as a vector of one standard
@@ -118,6 +153,67 @@ defmodule Robot.Localiser.Anchors do
     # still a covariance.
     size = @common_share / :math.sqrt(along * along + across * across)
     {ux * size, uy * size}
+  end
+
+  @doc """
+  The spread of a place at `at`, with at least this standard deviation (radians) of its direction
+  from the leader.
+
+      iex> Robot.Localiser.Anchors.swung({0.1, 0.1, 0.0}, {-10.0, 0.0}, {0.0, 0.0}, 0.005)
+      {0.1, 0.1, 0.0}
+      iex> {worst, least, _} = Robot.Localiser.Anchors.swung({0.1, 0.1, 0.0}, {-10.0, 0.0}, {0.0, 0.0}, 0.02)
+      iex> {Float.round(worst, 3), Float.round(least, 3)}
+      {0.2, 0.1}
+  """
+  @spec swung(spread(), at :: Pose.point(), leader :: Pose.point(), sd :: float()) :: spread()
+  def swung(spread, {x, y}, {leader_x, leader_y}, sd) do
+    {dx, dy} = {leader_y - y, x - leader_x}
+    square = dx * dx + dy * dy
+    distance = :math.sqrt(square)
+
+    more =
+      if distance < @same_place,
+        do: 0.0,
+        else: sd * sd * square - variance(spread, {dx / distance, dy / distance})
+
+    if more <= 0.0 do
+      spread
+    else
+      {xx, xy, yy} = covariance(spread)
+      k = more / square
+      spread({xx + k * dx * dx, xy + k * dx * dy, yy + k * dy * dy})
+    end
+  end
+
+  # What one robot knows of the direction of the column may be better than what another does by
+  # this factor. Nearer than this to the leader (metres), the direction of a place is mostly that
+  # of its own small errors.
+  @direction_share 0.5
+  @near 1.5
+
+  @doc """
+  The standard deviation (radians) that the direction from the leader has at least for a robot that
+  finds its place by these references; zero if there are none. If they are turned about the
+  leader, it is, too: it may know that turn better than they do, but not by any factor.
+
+      iex> mark = &%{kind: :robot, reference?: true, at: {&1, 0.0}, sd: {&2, 0.01, 1.5707963267948966}}
+      iex> marks = [mark.(-1.0, 0.05), mark.(-2.0, 0.06), mark.(-5.0, 0.1)]
+      iex> anchors = %Robot.Localiser.Anchors{frame: %{at: {0.0, 0.0}}, marks: marks}
+      iex> Float.round(Robot.Localiser.Anchors.direction_sd(anchors), 3)
+      0.015
+  """
+  @spec direction_sd(t()) :: float()
+  def direction_sd(%__MODULE__{frame: nil}), do: 0.0
+
+  def direction_sd(%__MODULE__{frame: %{at: {x, y} = leader}, marks: marks}) do
+    sds =
+      for %{kind: :robot, reference?: true, at: {mx, my} = at, sd: spread} <- marks,
+          distance = Pose.distance(at, leader),
+          distance > @near do
+        root(variance(spread, {(y - my) / distance, (mx - x) / distance})) / distance
+      end
+
+    @direction_share * Enum.max(sds, fn -> 0.0 end)
   end
 
   @typedoc """

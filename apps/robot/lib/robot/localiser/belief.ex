@@ -115,11 +115,8 @@ defmodule Robot.Localiser.Belief do
   it, in metres, and that direction (radians, in the frame).
   """
   @spec spread(t()) :: Anchors.spread()
-  def spread(%__MODULE__{covariance: [[xx, xy | _], [_, yy | _] | _]}) do
-    half = (xx + yy) / 2
-    root = :math.sqrt((xx - yy) * (xx - yy) / 4 + xy * xy)
-    {root(half + root), root(half - root), :math.atan2(2 * xy, xx - yy) / 2}
-  end
+  def spread(%__MODULE__{covariance: [[xx, xy | _], [_, yy | _] | _]}),
+    do: Anchors.spread({xx, xy, yy})
 
   defp root(square), do: :math.sqrt(max(square, 0.0))
 
@@ -132,21 +129,6 @@ defmodule Robot.Localiser.Belief do
   @spec slip_sd(t()) :: float()
   def slip_sd(%__MODULE__{covariance: [_x, _y, _heading, [_, _, _, variance | _] | _]}),
     do: root(variance)
-
-  @doc """
-  The radius (metres) round the estimate within which the robot is in 95 of 100 cases, by the
-  filter's covariance: 1.96 standard deviations if the error has one direction only, 2.45 if it is
-  equal in all directions, and in between a fit to the table of circular errors.
-
-      iex> Float.round(Robot.Localiser.Belief.radius(Robot.Localiser.Belief.new(Hal.Pose.new(1, 0))), 3)
-      0.073
-  """
-  @spec radius(t()) :: float()
-  def radius(belief) do
-    {worst, least, _heading} = sd(belief)
-    roundness = if worst > 0.0, do: least / worst, else: 1.0
-    worst * (1.96 + 0.488 * :math.pow(roundness, 2.5))
-  end
 
   @doc """
   The belief moved by a step of odometry, given in the robot's own frame.
@@ -209,11 +191,13 @@ defmodule Robot.Localiser.Belief do
 
   @doc """
   The belief after a measurement, with this standard deviation, that the position is `way` metres
-  farther in the direction of a unit vector.
+  farther in the direction of a unit vector, relative to robots whose places are off in that
+  direction by `common` metres for one standard deviation of the common error.
   """
-  @spec shifted(t(), {float(), float()}, way :: float(), sd :: float()) :: t()
-  def shifted(belief, {x, y}, way, sd) do
-    {v, variance} = Covariance.project(belief.covariance, [x, y])
+  @spec shifted(t(), {float(), float()}, way :: float(), sd :: float(), common :: float()) :: t()
+  def shifted(belief, {x, y}, way, sd, common) do
+    slope = List.replace_at([x, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], @common, -common)
+    {v, variance} = Covariance.project(belief.covariance, slope)
     s = variance + sd * sd
     believe(belief, v, way / s, reduce(belief.covariance, v, s))
   end

@@ -4,7 +4,7 @@ defmodule Robot.Localiser.Frame do
   Pure.
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Belief, Covariance}
+  alias Robot.Localiser.{Anchors, Belief, Covariance}
 
   # Greater standard deviations mean that the pose is unknown, and the linear model would not
   # hold: metres, radians. Distances from the leader are limited to the last value (metres).
@@ -24,32 +24,47 @@ defmodule Robot.Localiser.Frame do
   # change in a radian turned.
   @leader_slip 6
   @slip_change 0.005
+  # The index of the error that the places of all robots share.
+  @common 7
 
   @doc """
-  The same pose in the frame of a leader at `at` whose own pose has these variances (m2, rad2):
-  its frame may have moved, and turned about the leader.
+  The pose of a robot that comes into the frame of a leader at `at` whose own pose has these
+  variances (m2, rad2). The frame is turned about the leader by the same unknown angle for all
+  robots that come into it: if one is off to the left, all are, and none is an independent witness
+  of the others' places. So a share of the turn is the error that all robots have in common
+  (`Robot.Localiser.Anchors.common/3`).
   """
-  @spec reframe(
-          Belief.t(),
-          at :: Pose.point(),
-          position :: float(),
-          heading :: float()
-        ) :: Belief.t()
-  def reframe(belief, at, position, heading) do
+  @spec joined(Belief.t(), at :: Pose.point(), position :: float(), heading :: float()) ::
+          Belief.t()
+  def joined(belief, at, position, heading),
+    do: reframe(belief, at, position, heading, Anchors.common_share())
+
+  @doc """
+  The same pose in the frame of a leader at `at` whose own pose has got these variances (m2, rad2)
+  more: its frame may have moved, and turned about the leader.
+  """
+  @spec reframe(Belief.t(), at :: Pose.point(), position :: float(), heading :: float()) ::
+          Belief.t()
+  def reframe(belief, at, position, heading), do: reframe(belief, at, position, heading, 0.0)
+
+  defp reframe(belief, at, position, heading, share) do
     position = min(position, @lost_position * @lost_position)
     heading = min(heading, @lost_heading * @lost_heading)
-    turn = swing(belief.pose, at)
-    [a, b, c | rest] = belief.covariance
+    [dx, dy, 1.0] = turn = swing(belief.pose, at)
+    angle = share * :math.sqrt(heading)
+    alone = (1 - share * share) * heading
+
+    [a, b, c | rest] =
+      Covariance.carry(belief.covariance, &swung(&1, @common, dx * angle, dy * angle, angle))
 
     rows =
       for {row, g} <- Enum.zip([a, b, c], turn) do
         {own, others} = Enum.split(row, 3)
-        for({p, k} <- Enum.zip(own, turn), do: p + heading * g * k) ++ others
+        for({p, k} <- Enum.zip(own, turn), do: p + alone * g * k) ++ others
       end
 
     # The second-order term of the turn, because an arc is not a line; the mean is not moved, so
     # its error counts as variance.
-    {dx, dy, 1.0} = List.to_tuple(turn)
     bend = 0.75 * heading * heading * (dx * dx + dy * dy)
     more = position + bend
     %{belief | covariance: Covariance.add(rows ++ rest, [more, more])}
@@ -82,15 +97,16 @@ defmodule Robot.Localiser.Frame do
 
     covariance =
       belief.covariance
-      |> Covariance.carry(&swung(&1, -turned * gx, -turned * gy, -turned))
+      |> Covariance.carry(&swung(&1, @leader_slip, -turned * gx, -turned * gy, -turned))
       |> Covariance.add(slips)
 
     %{belief | pose: pose, covariance: covariance}
   end
 
-  defp swung([x, y, heading | rest], a, b, c) do
-    slip = Enum.at(rest, @leader_slip - 3)
-    [plus(x, a, slip), plus(y, b, slip), plus(heading, c, slip) | rest]
+  # Adds multiples of the row of a state to those of the pose.
+  defp swung([x, y, heading | rest], index, a, b, c) do
+    row = Enum.at(rest, index - 3)
+    [plus(x, a, row), plus(y, b, row), plus(heading, c, row) | rest]
   end
 
   defp plus([], _k, []), do: []

@@ -15,7 +15,7 @@ defmodule Robot.Localiser.Silhouettes do
   alias Robot.Percept
 
   # With a standard deviation below this (metres) no search is needed.
-  @sure 0.25
+  @sure 0.2
   # The search covers this many standard deviations to each side, in steps of about this many
   # metres, but at most this many steps.
   @reach 2.5
@@ -75,16 +75,22 @@ defmodule Robot.Localiser.Silhouettes do
       belief
     else
       pose = moved(belief.pose, axis, turn, at)
-      Belief.shifted(belief, axis, at, found_sd(robots, pose))
+      {sd, common} = found(robots, pose, axis)
+      Belief.shifted(belief, axis, at, sd, common)
     end
   end
 
   defp moved(%Pose{} = pose, {x, y}, turn, way),
     do: Pose.new(pose.x + way * x, pose.y + way * y, pose.heading + way * turn)
 
-  defp found_sd(robots, pose) do
-    %{sd: {sd, _least, _direction}} = Enum.min_by(robots, &Pose.distance(pose, &1.at))
-    :math.sqrt(@found_sd * @found_sd + sd * sd)
+  # The place found is as wrong as that of the nearest robot. The part of that error which all
+  # robots share does not become less by another picture.
+  defp found(robots, pose, {x, y}) do
+    %{sd: {sd, _least, _direction}, common: {cx, cy}} =
+      Enum.min_by(robots, &Pose.distance(pose, &1.at))
+
+    common = x * cx + y * cy
+    {:math.sqrt(@found_sd * @found_sd + max(sd * sd - common * common, 0.0)), common}
   end
 
   # The columns that robots would fill, and those that a robot at an unknown place may fill.

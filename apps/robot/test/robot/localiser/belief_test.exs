@@ -5,7 +5,7 @@ defmodule Robot.Localiser.BeliefTest do
   doctest Robot.Localiser.Covariance
   doctest Robot.Localiser.History
   alias Hal.Pose
-  alias Robot.Localiser.{Belief, Covariance, Frame}
+  alias Robot.Localiser.{Anchors, Belief, Covariance, Frame}
   alias Robot.Localiser.Belief.Marks
 
   # Numbers that look random, and are the same in every run.
@@ -25,7 +25,7 @@ defmodule Robot.Localiser.BeliefTest do
         | covariance: Covariance.diagonal([1.0, least, 0.1, 0.0, 0.0, 0.0, 0.0])
       }
 
-      radius = Belief.radius(belief)
+      radius = Anchors.radius(Belief.spread(belief))
 
       {within, _state} =
         Enum.reduce(1..20_000, {0, draws(7)}, fn _, {within, state} ->
@@ -40,7 +40,7 @@ defmodule Robot.Localiser.BeliefTest do
 
   test "one that knows all is within no radius at all" do
     sure = %{Belief.new(Pose.new(0, 0)) | covariance: Covariance.diagonal(List.duplicate(0.0, 7))}
-    assert Belief.radius(sure) == 0.0
+    assert Anchors.radius(Belief.spread(sure)) == 0.0
   end
 
   test "what it is unsure of grows with the way and the turns, and is carried along by them" do
@@ -133,6 +133,25 @@ defmodule Robot.Localiser.BeliefTest do
     # In another frame it has nothing in common with anybody.
     apart = Belief.variance(Marks.forget(see.({0.0, 0.08})), {0.0, 1.0, 0.0}, mark)
     assert :math.sqrt(apart) > 0.12
+  end
+
+  test "a frame that is turned is turned for all who come into it: their places do not correct each other's" do
+    leader = {6.0, 0.0}
+    # Two robots beside each other, of which one has told its place; each knows its own as badly.
+    join = &Frame.joined(Belief.new(Pose.new(0, 0)), leader, 0.0, &1 * &1)
+    told = Belief.spread(join.(0.1))
+    alike = Anchors.common(told, {0.0, 0.5}, leader)
+
+    see = fn belief, common ->
+      {belief, _} = Marks.meet(belief, :other, {0.0, 0.5}, told, common)
+      Belief.correct(belief, :other, 0.0, {{0.0, 1.0, 0.0}, {0.0, 0.0}}, 1.0e-4)
+    end
+
+    sd = fn belief -> :math.sqrt(Belief.variance(belief, {0.0, 1.0, 0.0})) end
+    independent = Frame.reframe(Belief.new(Pose.new(0, 0)), leader, 0.0, 0.01)
+    assert_in_delta sd.(independent), sd.(join.(0.1)), 1.0e-9
+    assert sd.(see.(independent, {0.0, 0.0})) < 0.75 * sd.(independent)
+    assert sd.(see.(join.(0.1), alike)) > 0.85 * sd.(independent)
   end
 
   test "what turns about somebody moves on an arc: that is unsure towards it, too" do

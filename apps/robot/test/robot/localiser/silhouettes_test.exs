@@ -95,7 +95,7 @@ defmodule Robot.Localiser.SilhouettesTest do
 
   test "one that is sure enough, sees nobody, or is told of nobody stays where it is" do
     picture = picture(@column, turned(0.1))
-    sure = unsure(0.05)
+    sure = unsure(0.045)
     assert Silhouettes.align(sure, @column, picture, @here) == sure
     unsure = unsure(0.1)
     empty = put_in(picture.detections.blobs, [])
