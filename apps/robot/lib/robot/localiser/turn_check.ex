@@ -29,9 +29,11 @@ defmodule Robot.Localiser.TurnCheck do
   @still_ms 800
   # Pictures farther apart than this (milliseconds) may show another object.
   @gap_ms 500
-  # The standard deviation of the difference of two bearings, in radians: measured in painted
-  # pictures of 320 columns it is 0.002, of which a camera's lens makes more.
+  # The standard deviation of the difference of two bearings: in radians (in painted pictures of 320
+  # columns it is 0.002), and as a share of the difference, because a camera's field of view is known
+  # to some two per cent only.
   @bearing_sd 0.005
+  @lens_share 0.02
 
   @typedoc """
   A picture that shows the object: its time, the pose by odometry at that time, the sum of all
@@ -84,9 +86,11 @@ defmodule Robot.Localiser.TurnCheck do
 
   defp measure(belief, first, last) do
     turned = last.turned - first.turned
+    lens = @lens_share * Pose.wrap(last.bearing - first.bearing)
+    noise = @bearing_sd * @bearing_sd + lens * lens
 
     if turned >= @least_turn,
-      do: Belief.turned(belief, unexplained(first, last), turned, @bearing_sd * @bearing_sd),
+      do: Belief.turned(belief, unexplained(first, last), turned, noise),
       else: belief
   end
 

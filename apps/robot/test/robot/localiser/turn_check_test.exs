@@ -12,13 +12,13 @@ defmodule Robot.Localiser.TurnCheckTest do
   @standing %Anchors{standing: "Y"}
 
   # A picture from the true pose, and the odometry that goes with it.
-  defp percept(odometry, truth, pole, at_ms) do
+  defp percept(odometry, truth, pole, at_ms, view) do
     %Percept{
       robot: :mag1,
       at_ms: at_ms,
       profile: Profile.magellan(),
       odometry: %Odometry{pose: odometry, twist: Twist.zero()},
-      ptz: %{pan: 0.0, tilt: 0.0, field_of_view: @view},
+      ptz: %{pan: 0.0, tilt: 0.0, field_of_view: view},
       detections: %Detections{at_ms: at_ms, blobs: blobs(truth, pole)}
     }
   end
@@ -58,6 +58,7 @@ defmodule Robot.Localiser.TurnCheckTest do
     anchors = Keyword.get(options, :anchors, @standing)
     way = Keyword.get(options, :way, 0.0)
     drift = Keyword.get(options, :drift, 0.0)
+    view = Keyword.get(options, :view, @view)
     more = 1 + side * slip
     target = side * 1.2 * more
 
@@ -71,7 +72,7 @@ defmodule Robot.Localiser.TurnCheckTest do
       {_percept, localiser} =
         localiser
         |> Localiser.anchors(anchors)
-        |> Localiser.update(percept(Pose.new(at, 0, angle), truth, pole, 100 * k))
+        |> Localiser.update(percept(Pose.new(at, 0, angle), truth, pole, 100 * k, view))
 
       localiser
     end).belief
@@ -81,16 +82,23 @@ defmodule Robot.Localiser.TurnCheckTest do
     test "turning #{name} by odometry, it finds that it slips by #{slip}" do
       {side, slip} = {unquote(side), unquote(slip)}
       belief = search(side, slip)
-      assert_in_delta belief.slip, slip, 0.02
-      assert Belief.slip_sd(belief) < 0.03
+      assert_in_delta belief.slip, slip, Belief.slip_sd(belief)
+      assert Belief.slip_sd(belief) < 0.04
 
-      # Its heading is that of before the turns, too.
+      # So it knows its heading, too, which would be off by the slip of the whole turn.
       truth = side * 1.2 * (1 + side * slip)
       error = Pose.wrap(belief.pose.heading - truth)
       {_worst, _least, sd} = Belief.sd(belief)
-      assert abs(error) < 0.025
+      assert abs(error) < 0.4 * 1.2 * abs(slip) + 0.005
       assert abs(error) < 1.5 * sd
-      assert sd < 0.04
+      assert sd < 0.05
+    end
+  end
+
+  test "a lens that is not quite what was said does not make it surer than it is" do
+    for share <- [0.97, 1.03] do
+      belief = search(1, 0.0, view: share * @view)
+      assert abs(belief.slip) < 1.0 * Belief.slip_sd(belief)
     end
   end
 
