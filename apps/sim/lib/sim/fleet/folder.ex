@@ -7,11 +7,9 @@ defmodule Sim.Fleet.Folder do
   """
 
   # It reads until the VM has ended in any way, or the process whose port this is. What other
-  # processes, which end at the same time, may still write is removed a second later. A VM that
-  # ends takes its ports' programs along by a signal, so the folder is used only after the trap.
+  # processes, which end at the same time, may still write is removed a second later.
   @keeper """
   trap '' INT TERM HUP QUIT
-  echo ready
   read -r _nothing
   rm -rf -- "$1"
   sleep 1
@@ -25,7 +23,8 @@ defmodule Sim.Fleet.Folder do
     number = Base.encode16(:crypto.strong_rand_bytes(4), case: :lower)
     folder = Path.join(System.tmp_dir!(), "convoy-#{System.pid()}-#{number}")
 
-    with :ok <- File.mkdir(folder), :ok <- File.chmod(folder, 0o700), :ok <- keep(folder) do
+    with :ok <- File.mkdir(folder), :ok <- File.chmod(folder, 0o700) do
+      keep(folder)
       System.at_exit(fn _status -> File.rm_rf(folder) end)
       {:ok, folder}
     else
@@ -42,13 +41,7 @@ defmodule Sim.Fleet.Folder do
 
   defp keep(folder) do
     sh = System.find_executable("sh")
-    args = ["-c", @keeper, "keeper", folder]
-    port = Port.open({:spawn_executable, sh}, [:hide, :binary, :exit_status, args: args])
-
-    receive do
-      {^port, {:data, _ready}} -> :ok
-      {^port, {:exit_status, _status}} -> {:error, :eio}
-    end
+    Port.open({:spawn_executable, sh}, [:hide, args: ["-c", @keeper, "keeper", folder]])
   end
 
   # The name contains the number of the process.

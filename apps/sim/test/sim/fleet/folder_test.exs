@@ -15,11 +15,20 @@ defmodule Sim.Fleet.FolderTest do
     folder
   end
 
+  # Whether this program, and so those that it starts, ignore the signal of that number.
+  defp ignored?(number) do
+    [_all, mask] = Regex.run(~r/^SigIgn:\t([0-9a-f]+)$/m, File.read!("/proc/self/status"))
+    Bitwise.band(String.to_integer(mask, 16), Bitwise.bsl(1, number - 1)) != 0
+  end
+
   test "the folder of a run is removed when the run is killed, ends or crashes" do
     [killed, ended, hung_up] = Vm.start(for _ <- 1..3, do: [])
     folders = for vm <- [killed, ended, hung_up], do: folder(vm)
 
-    for {vm, signal} <- [{killed, "KILL"}, {ended, "TERM"}, {hung_up, "HUP"}],
+    # Under nohup all programs ignore that their terminal has gone.
+    hang_up = if ignored?(1), do: "TERM", else: "HUP"
+
+    for {vm, signal} <- [{killed, "KILL"}, {ended, "TERM"}, {hung_up, hang_up}],
         do: Vm.signal(vm, signal)
 
     for folder <- folders, do: assert(eventually(fn -> not File.exists?(folder) end))
