@@ -221,8 +221,9 @@ defmodule Robot.Localiser.Belief do
   end
 
   @doc """
-  The belief corrected by one measurement of a mark (`Robot.Localiser.Belief.Marks`): the innovation `error` (measured
-  minus expected value), the derivatives of the expected value, and the variance of the noise.
+  The belief corrected by one measurement of a mark (`Robot.Localiser.Belief.Marks`): the
+  innovation `error` (measured minus expected value), the derivatives of the expected value, and
+  the variance of the noise.
   K = P H' / S, x + K e, P - K S K'.
   """
   @spec correct(t(), key :: term(), float(), slope(), noise :: float()) :: t()
