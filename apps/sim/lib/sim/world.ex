@@ -8,7 +8,7 @@ defmodule Sim.World do
   high, and solid, too.
 
   `collisions` counts new contacts of a robot with a robot (even a dead one) or a wall; a contact
-  lasts until the two are more than 1 cm apart. `min_separation` is the least gap between two
+  lasts until the two are more than 1 cm apart; `contacts` tells of the newest ones. `min_separation` is the least gap between two
   robots so far, edge to edge, `nil` with fewer than two.
   """
   alias Hal.{Options, Pose, Twist}
@@ -33,11 +33,16 @@ defmodule Sim.World do
                 landmark: nil,
                 goal: nil,
                 collisions: 0,
+                contacts: [],
                 min_separation: nil,
                 together: MapSet.new()
               ]
 
   @type id :: atom()
+
+  @typedoc "When a contact began, and whose: each with its place, and its speed in m/s as wanted."
+  @type contact ::
+          {at_ms :: integer(), [{id(), Pose.point(), float()}], :robots | :wall}
   @type t :: %__MODULE__{
           map: Floorplan.t(),
           seed: integer(),
@@ -49,6 +54,7 @@ defmodule Sim.World do
           landmark: Pose.point() | nil,
           goal: Pose.point() | nil,
           collisions: non_neg_integer(),
+          contacts: [contact()],
           min_separation: float() | nil,
           together: MapSet.t(Sim.World.Contact.pair())
         }

@@ -13,7 +13,7 @@ defmodule Bench.Soak.Judge do
   | `:network` | packets are lost from then on, or no more |
   | `:estop`, `:reset` | the robot; `nil` |
   | `:start` | a start of the mission was ordered |
-  | `:collisions` | how many there have been in the world, and which go on |
+  | `:collisions` | how many there have been in the world, and the newest of them in words, newest first |
   | `:orphans` | `{node, lines}` |
   """
   alias Bench.Soak.Links
@@ -100,7 +100,8 @@ defmodule Bench.Soak.Judge do
 
   defp take(judge, _us, :soak, :collisions, {count, words}) do
     new = count - judge.collisions
-    wrong = if new > 0, do: [{"#{new} new collisions: #{words}", {:collisions, count}}], else: []
+    newest = words |> Enum.take(max(new, 0)) |> Enum.reverse() |> Enum.join("; ")
+    wrong = if new > 0, do: [{"#{new} new collisions: #{newest}", {:collisions, count}}], else: []
     {wrong, %{judge | collisions: count}}
   end
 

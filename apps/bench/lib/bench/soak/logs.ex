@@ -17,6 +17,18 @@ defmodule Bench.Soak.Logs do
     {Enum.sort_by(events, &elem(&1, 0)), offsets}
   end
 
+  @doc "Keeps the logs of a run beside its journal, in a folder of the same name without `.log`; returns it."
+  @spec keep(Path.t(), journal :: Path.t()) :: Path.t()
+  def keep(folder, journal) do
+    kept = Path.rootname(journal)
+    File.mkdir_p!(kept)
+
+    for path <- Path.wildcard(Path.join(folder, "*.log")),
+        do: File.cp!(path, Path.join(kept, Path.basename(path)))
+
+    kept
+  end
+
   # Only what is new in the file, and of that only whole lines.
   defp news(path, offset) do
     with {:ok, file} <- :file.open(path, [:read, :raw, :binary]) do

@@ -59,6 +59,7 @@ defmodule Bench.Soak.Main do
 
   defp tell(s, seed) do
     IO.puts("\n#{length(s.violations)} violations. " <> Report.first(s, seed))
+    IO.puts("\nWhat the nodes wrote is in #{s.kept}.")
     1
   end
 

@@ -9,6 +9,7 @@ defmodule Bench.Soak.Recorder do
   | `:boot` | the number of the process of the operating system |
   | `:claim` | when it changes: phase, leader and epoch, as the robot's heartbeats claim them |
   | `:held` | when it changes: whether the emergency stop is latched; `nil` without a robot |
+  | `:where` | twice a second: where it believes to be (x, y, heading), how surely (m), its goal; `nil` without a robot |
   | `:probe` | each second: `t:probe/0` |
   """
   use GenServer
@@ -18,6 +19,7 @@ defmodule Bench.Soak.Recorder do
   alias Swarm.Host.HealthCheck
 
   @look_ms 100
+  @where_every 5
   @probe_every 10
 
   @typedoc """
@@ -57,6 +59,7 @@ defmodule Bench.Soak.Recorder do
   @impl GenServer
   def handle_info(:look, s) do
     s = s |> change(:claim, claim(s.robot)) |> change(:held, held(s.robot))
+    s = if rem(s.ticks, @where_every) == 0, do: write(s, :where, where(s.robot)), else: s
     s = if rem(s.ticks, @probe_every) == 0, do: write(s, :probe, probe(s.robot)), else: s
     {:noreply, %{s | ticks: s.ticks + 1, ticker: Ticker.next(s.ticker)}}
   end
@@ -65,6 +68,18 @@ defmodule Bench.Soak.Recorder do
 
   defp held(robot),
     do: with({:ok, board} <- Board.find(robot), do: Board.latched?(board), else: (:error -> nil))
+
+  # For people who look for the cause of a violation; the judge does not read it.
+  defp where(robot) do
+    with {:ok, board} <- Board.find(robot),
+         {:ok, pose, _at_ms} <- Board.fetch(board, :pose, :infinity),
+         {:ok, %{radius: radius}, _at_ms} <- Board.fetch(board, :uncertainty, :infinity),
+         {:ok, goal, _at_ms} <- Board.fetch(board, :goal, :infinity) do
+      {{pose.x, pose.y, pose.heading}, radius, goal}
+    else
+      _not_yet -> nil
+    end
+  end
 
   defp probe(robot) do
     processes = Tree.processes()

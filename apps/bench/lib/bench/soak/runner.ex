@@ -36,6 +36,7 @@ defmodule Bench.Soak.Runner do
       fleet: fleet,
       mark: mark,
       journal: Journal.open(options.journal),
+      journal_path: options.journal,
       judge: Judge.new(options.robots),
       plan: plan,
       duration_ms: options.duration_ms,
@@ -150,6 +151,7 @@ defmodule Bench.Soak.Runner do
 
     for {pid, _words} <- left, do: Vm.signal(pid, "KILL")
     if s.stranger, do: :gen_udp.close(s.stranger)
+    s = if s.violations == [], do: s, else: %{s | kept: Logs.keep(s.fleet.folder, s.journal_path)}
     Fleet.delete(s.fleet)
     Journal.close(s.journal)
     s

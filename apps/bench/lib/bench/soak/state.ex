@@ -2,7 +2,7 @@ defmodule Bench.Soak.State do
   @moduledoc "The state of a run of `bin/soak`, and what is noted in it."
   alias Bench.Soak.{Journal, Judge, Recorder}
 
-  @enforce_keys [:fleet, :journal, :judge, :plan, :duration_ms, :mark, :progress]
+  @enforce_keys [:fleet, :journal, :journal_path, :judge, :plan, :duration_ms, :mark, :progress]
   defstruct @enforce_keys ++
               [
                 begun_us: nil,
@@ -24,12 +24,14 @@ defmodule Bench.Soak.State do
                 restarts: 0,
                 cpu: %{},
                 signal: nil,
+                kept: nil,
                 ticks: 0
               ]
 
   @typedoc """
   `vms` are the nodes that are up, `ended` those that were killed by us and have not been seen to end,
-  `processes` when a process of a node was killed last, `recent` the last lines of the journal.
+  `processes` when a process of a node was killed last, `recent` the last lines of the journal, `kept` where
+  the logs of the nodes are after a violation.
   """
   @type t :: %__MODULE__{}
 

@@ -48,21 +48,21 @@ defmodule Bench.Soak.WorldHost do
     end
   end
 
-  @doc "How many collisions there had been by then, and who touched whom or what, in words."
-  @spec collisions(Snapshot.t(), World.t()) :: {non_neg_integer(), String.t()}
+  @doc "How many collisions there had been by then, and the newest of them in words, newest first."
+  @spec collisions(Snapshot.t(), World.t()) :: {non_neg_integer(), [String.t()]}
   def collisions(snapshot, begun) do
     world = Snapshot.onto(begun, snapshot)
-    {world.collisions, Enum.map_join(world.together, "; ", &contact(world, &1))}
+    {world.collisions, Enum.map(world.contacts, &contact/1)}
   end
 
-  defp contact(world, {i, :wall}), do: "#{body(world, i)} and a wall"
-  defp contact(world, {i, j}), do: "#{body(world, i)} and #{body(world, j)}"
+  defp contact({at_ms, parties, with_what}) do
+    wall = if with_what == :wall, do: " and a wall", else: ""
+    "at #{at_ms} ms of the world " <> Enum.map_join(parties, " and ", &party/1) <> wall
+  end
 
-  defp body(world, index) do
-    id = Enum.at(world.order, index)
-    %{pose: pose, wanted: wanted} = world.robots[id]
-    [x, y] = for metres <- [pose.x, pose.y], do: Float.round(metres, 2)
-    "#{id} at (#{x}, #{y}), told #{Float.round(wanted.linear, 2)} m/s"
+  defp party({id, {x, y}, linear}) do
+    [x, y, linear] = for metres <- [x, y, linear], do: Float.round(metres, 2)
+    "#{id} at (#{x}, #{y}), told #{linear} m/s"
   end
 
   @doc """

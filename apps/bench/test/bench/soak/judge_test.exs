@@ -204,9 +204,9 @@ defmodule Bench.Soak.JudgeTest do
   test "collisions and processes that were left behind are found" do
     counts =
       for {at, count} <- [{1, 0}, {2, 2}, {3, 2}],
-          do: {at, :soak, :collisions, {count, "a and b"}}
+          do: {at, :soak, :collisions, {count, ["b and c", "a and b", "an old one"]}}
 
-    assert judged(counts, []) == ["2 new collisions: a and b"]
+    assert judged(counts, []) == ["2 new collisions: a and b; b and c"]
 
     assert ["a has left processes behind: 17 erl"] =
              judged([{1, :soak, :orphans, {:a, ["17 erl"]}}], [])

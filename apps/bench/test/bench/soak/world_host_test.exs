@@ -20,6 +20,6 @@ defmodule Bench.Soak.WorldHostTest do
     known = Pose.compose(WorldHost.start(snapshot, begun, :mag1, :on), odometry)
     assert Pose.distance(known, pose) < 1.0e-9
     assert abs(Pose.wrap(known.heading - pose.heading)) < 1.0e-9
-    assert WorldHost.collisions(snapshot, begun) == {0, ""}
+    assert WorldHost.collisions(snapshot, begun) == {0, []}
   end
 end

@@ -3,6 +3,9 @@ defmodule Sim.World.Touch do
   alias Sim.World.{Body, Contact}
   alias Sim.World.Bodies
 
+  # So many contacts are told of.
+  @kept 8
+
   @doc """
   Updates the world's contacts, the count of new ones, the least gap, and the pressed bumpers.
   """
@@ -23,7 +26,7 @@ defmodule Sim.World.Touch do
     # The landmark is the last disc: touching it presses bumpers but is not a collision.
     now = MapSet.new(at_wall ++ for({_, j} = pair <- touching, j < count, do: pair))
     near = MapSet.new(near_wall ++ together)
-    new = now |> MapSet.difference(world.together) |> MapSet.size()
+    new = now |> MapSet.difference(world.together) |> Enum.sort()
     places = Map.new(discs)
 
     bodies =
@@ -32,10 +35,19 @@ defmodule Sim.World.Touch do
 
     %{
       Bodies.put(world, bodies)
-      | collisions: world.collisions + new,
+      | collisions: world.collisions + length(new),
+        contacts: Enum.take(Enum.map(new, &contact(world, &1)) ++ world.contacts, @kept),
         together: world.together |> MapSet.union(now) |> MapSet.intersection(near),
         min_separation: least
     }
+  end
+
+  defp contact(world, {i, :wall}), do: {world.at_ms, [party(world, i)], :wall}
+  defp contact(world, {i, j}), do: {world.at_ms, [party(world, i), party(world, j)], :robots}
+
+  defp party(world, index) do
+    %{id: id, pose: pose, wanted: wanted} = world.robots[Enum.at(world.order, index)]
+    {id, {pose.x, pose.y}, wanted.linear}
   end
 
   # The directions of the others that a body touches: discs touch on the line between their
