@@ -12,6 +12,15 @@ defmodule Hal.Lines do
     folder
   end
 
+  @doc """
+  A new pseudo-terminal's far end. A line does not write what is older than its `keep_alive_ms`; here nothing is to
+  be lost because the machine is busy.
+  """
+  def far!(link) do
+    {:ok, far} = Serial.open(pty: link, keep_alive_ms: 60_000)
+    far
+  end
+
   @doc "The next `size` bytes."
   def read(line, size, had \\ <<>>) when byte_size(had) <= size do
     if byte_size(had) == size do

@@ -1,5 +1,6 @@
 defmodule Hal.RFlex.DriverTest do
   use ExUnit.Case, async: true
+  import Hal.Lines, only: [far!: 1]
   alias Hal.{Pose, RFlexBase, Serial, Twist}
   alias Hal.RFlex.Driver
   @moduletag :slow
@@ -23,7 +24,7 @@ defmodule Hal.RFlex.DriverTest do
   # A driver in this process, and the far end of its line too: `heard` are the commands that came
   # there, `readings` what the driver said, both oldest first.
   defp open(link, options \\ []) do
-    {:ok, far} = Serial.open(pty: link)
+    far = far!(link)
     driver = Keyword.merge([port: link, conversions: @conversions], options)
     {:ok, state} = Driver.init(driver)
     %{far: far, driver: state, bytes: <<>>, heard: [], at: [], readings: [], error: nil}
@@ -277,7 +278,7 @@ defmodule Hal.RFlex.DriverTest do
   end
 
   test "a driver that is killed: the stop and the brake are on the line", %{link: link} do
-    {:ok, far} = Serial.open(pty: link)
+    far = far!(link)
     test = self()
 
     owner =
@@ -467,7 +468,7 @@ defmodule Hal.RFlex.DriverTest do
   end
 
   test "the console's phrase is all that is said there", %{link: link} do
-    {:ok, far} = Serial.open(pty: link)
+    far = far!(link)
     assert Hal.RFlex.PowerSwitch.halt(port: link, phrase: "System halted") == :ok
     assert read(far, <<>>, 17) == "\r\nSystem halted\r\n"
     Serial.close(far)

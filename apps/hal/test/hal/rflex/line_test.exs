@@ -11,7 +11,7 @@ defmodule Hal.RFlex.LineTest do
   setup do
     Process.flag(:trap_exit, true)
     link = Path.join(folder(), "line")
-    {:ok, far} = Serial.open(pty: link)
+    far = far!(link)
     {:ok, link: link, far: far}
   end
 

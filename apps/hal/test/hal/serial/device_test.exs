@@ -21,7 +21,7 @@ defmodule Hal.Serial.DeviceTest do
   end
 
   defp plug_in(link) do
-    {:ok, far} = Serial.open(pty: link)
+    far = far!(link)
     forget()
     reports(far)
   end
@@ -84,7 +84,7 @@ defmodule Hal.Serial.DeviceTest do
   end
 
   test "waits for a line that another one has", %{link: link, settings: settings} do
-    {:ok, far} = Serial.open(pty: link)
+    far = far!(link)
     {:ok, other} = Serial.open(port: link)
     start_supervised!({Device, settings})
     assert_receive {:health, :drive, {{:offline, :ebusy}, _}}

@@ -9,7 +9,7 @@ defmodule Hal.Serial.LastWordsTest do
   setup do
     Process.flag(:trap_exit, true)
     link = Path.join(folder(), "line")
-    {:ok, far} = Serial.open(pty: link)
+    far = far!(link)
     {:ok, link: link, far: far}
   end
 

@@ -12,8 +12,8 @@ defmodule Hal.Serial.NativeTest do
   end
 
   defp pair(link, options \\ []) do
-    {:ok, far} = Serial.open(pty: link)
-    {:ok, near} = Serial.open([port: link] ++ options)
+    far = far!(link)
+    {:ok, near} = Serial.open(Keyword.merge([port: link, keep_alive_ms: 60_000], options))
     {near, far}
   end
 
@@ -153,7 +153,7 @@ defmodule Hal.Serial.NativeTest do
     end
 
     test "permission denied", %{link: link} do
-      {:ok, _far} = Serial.open(pty: link)
+      _far = far!(link)
       File.chmod!(link, 0o600)
       assert nobody_opens(link) == "eacces"
     end
@@ -194,8 +194,8 @@ defmodule Hal.Serial.NativeTest do
 
       File.rm!(link)
       File.ln_s!("/dev/pts/none", link)
-      {:ok, far} = Serial.open(pty: link <> "_2")
-      {:ok, other} = Serial.open(pty: link)
+      far = far!(link <> "_2")
+      other = far!(link)
       :ok = Serial.close(other)
       assert {:ok, "/dev/pts/" <> _} = File.read_link(link <> "_2")
       :ok = Serial.close(far)
@@ -204,12 +204,12 @@ defmodule Hal.Serial.NativeTest do
 
     test "leaves alone the link of who has got its number since", %{link: link} do
       for _ <- 1..5 do
-        {:ok, old} = Serial.open(pty: link)
+        old = far!(link)
         program = os_pid(old)
         kill(:TERM, program)
         assert next(old) == {:error, :terminated}
         # The old program is still there; its pty is not.
-        {:ok, new} = Serial.open(pty: link)
+        new = far!(link)
         :ok = Serial.close(old)
         ended!(program)
         assert {:ok, "/dev/pts/" <> _} = File.read_link(link)
@@ -218,7 +218,7 @@ defmodule Hal.Serial.NativeTest do
     end
 
     test "leaves a link alone that is no longer its own", %{link: link} do
-      {:ok, far} = Serial.open(pty: link)
+      far = far!(link)
       pid = os_pid(far)
       File.rm!(link)
       File.ln_s!("/elsewhere", link)
@@ -230,10 +230,10 @@ defmodule Hal.Serial.NativeTest do
     test "goes on when its user comes and goes, who hears only what is said meanwhile", %{
       link: link
     } do
-      {:ok, far} = Serial.open(pty: link)
+      far = far!(link)
 
       for k <- 1..20 do
-        {:ok, near} = Serial.open(port: link)
+        {:ok, near} = Serial.open(port: link, keep_alive_ms: 60_000)
         :ok = Serial.write(near, "here #{k}.")
         read_until(far, "here #{k}.")
         :ok = Serial.write(far, "hello #{k}.")

@@ -1,5 +1,6 @@
 defmodule Hal.Visca.DriverTest do
   use ExUnit.Case, async: true
+  import Hal.Lines, only: [far!: 1]
   alias Hal.{Device, Serial, ViscaToy}
   alias Hal.Visca.{Driver, Options}
   @moduletag :slow
@@ -21,7 +22,7 @@ defmodule Hal.Visca.DriverTest do
 
   # The other end of a real pseudo-terminal, answered by the toy at the speed of the real clock.
   defp camera(link, toy \\ %ViscaToy{}) do
-    {:ok, far} = Serial.open(pty: link)
+    far = far!(link)
     %{far: far, toy: toy, begun_ms: System.monotonic_time(:millisecond) - toy.now_ms}
   end
 
