@@ -97,6 +97,15 @@ defmodule Sim.World.ServerTest do
     assert x(server) < -1.5
   end
 
+  test "a world that goes on from where another was killed has nobody at the wheels", %{
+    world: world,
+    name: name
+  } do
+    moving = world |> World.drive(:mag1, Twist.new(0.5, 0.3)) |> World.step(50)
+    server = serve(name, moving)
+    assert World.Server.world(server).robots.mag1.wanted == Twist.zero()
+  end
+
   test "a camera paints its pictures, or finds blobs without painting", %{
     world: world,
     name: name
