@@ -90,8 +90,10 @@ defmodule System.ReleaseTest do
     assert {"", 0} = robot(["daemon"], environment)
     pid = pid(ask.(["pid"]))
     # Where it is, its wheels have said.
-    here = ~r/^#mag1 idle \(0\.00, 0\.00, 0 deg\) .* DISARMED/
+    here = ~r/^#mag1 idle \(0\.00, 0\.00, 0 deg\) ±0\.\d+ m.* DISARMED/
     until(here, ask.(["status"]))
+    left_start = Path.join(folder, "mag1.departed")
+    refute File.exists?(left_start)
 
     # It moves only once a person has armed it.
     move = ~s|Swarm.tell(:mag1, "move:0.2:0")|
@@ -101,6 +103,7 @@ defmodule System.ReleaseTest do
     assert speed(server) == 0.0
     until(~r/^{:ok, :ok}$/m, ask.(["rpc", "{Swarm.arm(:mag1), #{move}}"]))
     wait(fn -> speed(server) > 0.1 end)
+    wait(fn -> File.exists?(left_start) end)
 
     {_, 0} = System.cmd("kill", ["-KILL", pid])
     wait(fn -> speed(server) == 0.0 end)
@@ -109,12 +112,14 @@ defmodule System.ReleaseTest do
     assert {"", 0} = robot(["daemon"], environment)
     again = pid(ask.(["pid"]))
     assert again != pid
-    until(here, ask.(["status"]))
+    # Its wheels count from zero again, but it knows that it has left its start pose.
+    until(~r/^#mag1 idle \(0\.00, 0\.00, 0 deg\) ±\d\d\.\d+ m.* DISARMED/, ask.(["status"]))
     # An order from before does not wait for it, nor does one that comes now.
     assert {said, 0} = robot(["rpc", move], environment)
     assert said == refused <> "\n"
     assert {"", 0} = robot(["stop"], environment)
     wait(fn -> not there?(again) end)
+    refute File.exists?(left_start)
     assert speed(server) == 0.0
 
     # The same words whatever Elixir's are.

@@ -29,6 +29,7 @@ defmodule Robot.Config do
     * `:dry_run` - whether the robot only prints what it would do (`Robot.Safety.DryRun`), default
       `false`
     * `:estop_file` - a file in which the e-stop latch survives a restart of the machine, or `nil`
+    * `:departure_file` - a file that remembers that the robot has left its start pose (`Robot.Departure`), or `nil`
     * `:trace` - `{m, f, a}` that gets all inputs and effects, see `Robot.Control.Trace`, or `nil`
   """
   alias Hal.{Options, Pose, Profile}
@@ -56,6 +57,7 @@ defmodule Robot.Config do
                 fence: nil,
                 dry_run: false,
                 estop_file: nil,
+                departure_file: nil,
                 trace: nil
               ]
 
@@ -82,6 +84,7 @@ defmodule Robot.Config do
           fence: Fence.t() | nil,
           dry_run: boolean(),
           estop_file: Path.t() | nil,
+          departure_file: Path.t() | nil,
           trace: call() | nil
         }
 
@@ -148,6 +151,7 @@ defmodule Robot.Config do
       fence: [Fence.type(), default: nil],
       dry_run: :boolean,
       estop_file: [{:path, "the path of a file"}, default: nil],
+      departure_file: [{:path, "the path of a file"}, default: nil],
       trace: [:mfa, default: nil]
     ]
   end

@@ -12,16 +12,15 @@ defmodule Robot.Localiser do
   have been counted.
   """
   alias Hal.{Odometry, Pose}
+  alias Robot.Departure
   alias Robot.Localiser.{Anchors, Belief, Frame, History, Sightings, TurnCheck}
   alias Robot.Localiser.Belief.Marks
   alias Robot.Percept
 
-  # Odometry that begins farther from zero than this (metres, radians) was counting before.
-  @put_down 0.1
-
   @enforce_keys [:start]
   defstruct @enforce_keys ++
               [
+                departed: nil,
                 odometry: nil,
                 odometry_frame: nil,
                 belief: nil,
@@ -43,6 +42,7 @@ defmodule Robot.Localiser do
   """
   @type t :: %__MODULE__{
           start: Pose.t(),
+          departed: Departure.frame() | nil,
           odometry: Pose.t() | nil,
           odometry_frame: reference() | nil,
           belief: Belief.t() | nil,
@@ -54,9 +54,12 @@ defmodule Robot.Localiser do
           turn_check: TurnCheck.t()
         }
 
-  @doc "The localiser of a robot whose odometry reads zero at the pose `start`."
-  @spec new(Pose.t()) :: t()
-  def new(%Pose{} = start), do: %__MODULE__{start: start}
+  @doc """
+  The localiser of a robot whose odometry reads zero at the pose `start`. If it has `departed` from there, that is so
+  only in this frame of its odometry (`Robot.Departure`); in another one, it could be anywhere.
+  """
+  @spec new(Pose.t(), Departure.frame() | nil) :: t()
+  def new(%Pose{} = start, departed \\ nil), do: %__MODULE__{start: start, departed: departed}
 
   @doc """
   Sets the references from now on. In a new frame, the pose's uncertainty grows by that of the
@@ -191,7 +194,15 @@ defmodule Robot.Localiser do
   defp move(%{odometry: nil, belief: nil} = localiser, odometry) do
     belief = Belief.new(Pose.compose(localiser.start, odometry))
     way = Pose.distance(odometry, {0.0, 0.0})
-    belief = if driven?(odometry, way), do: Frame.lost(belief, way), else: belief
+
+    belief =
+      cond do
+        another_frame?(localiser) -> Frame.lost(belief)
+        # Started again on its way: its way there and its corrections are lost.
+        Departure.left?(odometry) -> Frame.lost(belief, way)
+        true -> belief
+      end
+
     %{localiser | odometry: odometry, belief: belief}
   end
 
@@ -201,6 +212,9 @@ defmodule Robot.Localiser do
     step = Pose.relative(localiser.odometry, odometry)
     %{localiser | odometry: odometry, belief: Belief.move(localiser.belief, step)}
   end
+
+  defp another_frame?(%{departed: departed, odometry_frame: frame}),
+    do: departed != nil and departed != Departure.frame(frame)
 
   # Every picture counts once. It was taken a moment ago, and the body may have turned since then.
   defp see(localiser, %Percept{detections: nil}), do: localiser
@@ -240,7 +254,4 @@ defmodule Robot.Localiser do
     back = History.back(localiser.history, localiser.odometry, at_ms)
     back && Pose.compose(belief.pose, back)
   end
-
-  # Whether the robot was started again on its way: its way there and its corrections are lost.
-  defp driven?(%Pose{heading: heading}, way), do: way > @put_down or abs(heading) > @put_down
 end

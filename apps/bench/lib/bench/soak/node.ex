@@ -25,7 +25,10 @@ defmodule Bench.Soak.Node do
 
     {:ok, parts} = Supervisor.start_link(children, strategy: :one_for_one, max_restarts: 1_000)
     Process.unlink(parts)
-    {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, config(about), :permanent)
+    config = config(about)
+    # Whoever starts the node says where the robot stands.
+    if config.departure_file, do: Robot.Departure.forget(config.departure_file)
+    {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, config, :permanent)
     :ok
   end
 

@@ -47,13 +47,13 @@ defmodule Robot.Control.Controller do
         }
 
   @doc """
-  A controller without a goal. Options: `profile` (required), and `start`, the pose in the map
-  frame at which the odometry reads zero; with it the controller estimates the percept's pose by
-  `Robot.Localiser`.
+  A controller without a goal. Options: `profile` (required), `start`, the pose in the map
+  frame at which the odometry reads zero, with which the controller estimates the percept's pose by
+  `Robot.Localiser`, and `departed`, see there.
   """
   @spec new(keyword()) :: t()
   def new(options) do
-    options = Keyword.validate!(options, [:profile, start: nil])
+    options = Keyword.validate!(options, [:profile, start: nil, departed: nil])
 
     case options[:profile] do
       %Profile{} = profile ->
@@ -61,7 +61,7 @@ defmodule Robot.Control.Controller do
           profile: profile,
           escape: Escape.new([]),
           rest: Rest.new([]),
-          localiser: options[:start] && Localiser.new(options[:start])
+          localiser: options[:start] && Localiser.new(options[:start], options[:departed])
         }
 
       other ->

@@ -13,8 +13,8 @@ defmodule Robot.Control.Executive do
   """
   use GenServer
   import Hal.HardenedServer, only: [is_mfa: 1]
-  alias Hal.{Device, Event, HardenedServer, Ticker}
-  alias Robot.{Behaviour, Board, Config, Mission, Names, Percept}
+  alias Hal.{Device, Event, HardenedServer, Odometry, Ticker}
+  alias Robot.{Behaviour, Board, Config, Departure, Mission, Names, Percept}
   alias Robot.Control.{Controller, Trace}
   alias Robot.Localiser.Anchors
   alias Robot.Safety.{DryRun, Gate}
@@ -85,12 +85,16 @@ defmodule Robot.Control.Executive do
     Board.put(board, :executive, :doing, doing, at_ms)
     Board.put(board, :executive, :goal, nil, at_ms)
     Event.execute([:robot, :executive, :start], %{at_ms: at_ms}, %{robot: id})
+    departed = Departure.noted(config.departure_file)
 
     s = %{
       config: config,
       board: board,
       sink: sink,
-      controller: Controller.new(profile: config.profile, start: config.start),
+      controller:
+        Controller.new(profile: config.profile, start: config.start, departed: departed),
+      departed: departed,
+      zero: nil,
       told: nil,
       held?: false,
       tick: 0,
@@ -188,8 +192,34 @@ defmodule Robot.Control.Executive do
     # The outcome comes first, so that the mission knows it when it handles the percept.
     with {tag, outcome} <- outcome, do: tell(s, {:outcome, tag, outcome}, at_ms)
     tell(s, {:tick, percept}, at_ms)
+    s = depart(s, percept.odometry)
     %{s | controller: controller, tick: doing.tick}
   end
+
+  # Once: the robot has left its start pose, or was started again away from it.
+  defp depart(%{config: %{departure_file: nil}} = s, _odometry), do: s
+  defp depart(%{departed: :told} = s, _odometry), do: s
+
+  defp depart(%{departed: departed, config: config} = s, %Odometry{pose: pose, frame: frame}) do
+    frame = Departure.frame(frame)
+
+    cond do
+      departed not in [nil, frame] ->
+        measured = %{at_ms: Config.now(config)}
+        Event.execute([:robot, :executive, :away], measured, %{robot: config.id})
+        %{s | departed: :told}
+
+      departed == nil and Departure.left?(pose) ->
+        # Of counters that jump, nobody knows where their zero is. The disk is not waited for.
+        spawn(Departure, :note_for, [config.id, config.departure_file, s.zero || frame])
+        %{s | departed: :told}
+
+      true ->
+        %{s | zero: frame}
+    end
+  end
+
+  defp depart(s, nil), do: s
 
   defp place(board, %{pose: pose, uncertainty: uncertainty}, at_ms) do
     Board.put(board, :executive, :pose, pose, at_ms)

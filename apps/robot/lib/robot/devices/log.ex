@@ -18,6 +18,8 @@ defmodule Robot.Devices.Log do
     [:robot, :fault],
     [:robot, :stage],
     [:robot, :estop_file, :error],
+    [:robot, :departure_file, :failed],
+    [:robot, :executive, :away],
     [:vision, :saver, :failed],
     [:vision, :saver, :healed],
     [:swarm, :comms, :duplicate_id],
@@ -96,6 +98,17 @@ defmodule Robot.Devices.Log do
   def line(:dropped, %{name: name, count: count}) do
     {:warning,
      "#{process(name)} was sent what it does not know; so far it has dropped #{count} messages"}
+  end
+
+  def line(:failed, %{robot: robot, file: file, reason: reason}) do
+    {:error,
+     "#{robot}: cannot note in #{file} that it has left its start pose (#{:file.format_error(reason)}): if it " <>
+       "restarts on its way, it will believe to stand there"}
+  end
+
+  def line(:away, %{robot: robot}) do
+    {:warning,
+     "#{robot} was started again away from its start pose: it does not know where it is until it sees others"}
   end
 
   def line(:failed, %{line: line}), do: {:warning, line}

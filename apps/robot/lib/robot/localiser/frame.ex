@@ -125,6 +125,14 @@ defmodule Robot.Localiser.Frame do
     {pose.x + share * (x - pose.x), pose.y + share * (y - pose.y)}
   end
 
+  @doc "The same pose with the uncertainty of a robot that could be anywhere."
+  @spec lost(Belief.t()) :: Belief.t()
+  def lost(%Belief{} = belief) do
+    position = @lost_position * @lost_position
+    variances = [position, position, @lost_heading * @lost_heading]
+    %{belief | covariance: Covariance.add(belief.covariance, variances)}
+  end
+
   @doc """
   The same pose with the uncertainty of a robot that was started when its odometry had already
   counted `way` metres, in a straight line from its zero; the turns on this way are unknown.

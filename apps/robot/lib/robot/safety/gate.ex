@@ -20,7 +20,7 @@ defmodule Robot.Safety.Gate do
   use GenServer
   import Hal.HardenedServer, only: [is_mfa: 1]
   alias Hal.{Device, Event, HardenedServer, Ticker, Twist}
-  alias Robot.{Board, Config, Names}
+  alias Robot.{Board, Config, Departure, Names}
   alias Robot.Control.Trace
   alias Robot.Safety.{DryRun, Reflex}
 
@@ -102,7 +102,7 @@ defmodule Robot.Safety.Gate do
           armed?: armed?(board, config),
           fence: config.fence,
           start: config.start,
-          frame: frame(board)
+          frame: frame(board, config)
         ),
       told: nil,
       limits: nil,
@@ -189,10 +189,13 @@ defmodule Robot.Safety.Gate do
     %{s | reflex: reflex}
   end
 
-  defp frame(board) do
-    case Board.fetch(board, :frame, :infinity) do
+  defp frame(board, config) do
+    with :error <- Board.fetch(board, :frame, :infinity),
+         departed when departed != nil <- Departure.noted(config.departure_file) do
+      {:was, departed}
+    else
       {:ok, frame, _at_ms} -> frame
-      :error -> nil
+      nil -> nil
     end
   end
 

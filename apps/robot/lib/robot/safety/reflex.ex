@@ -30,6 +30,7 @@ defmodule Robot.Safety.Reflex do
   silent is stopped by its device (`Hal.Device.Reports`).
   """
   alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Robot.Departure
   alias Robot.Safety.Reflex.{Body, Fence, Limits}
 
   @dead_man_ms 200
@@ -70,12 +71,15 @@ defmodule Robot.Safety.Reflex do
           armed?: boolean(),
           fence: Fence.t() | nil,
           start: Pose.t() | nil,
-          frame: {:is, reference() | nil} | nil,
+          frame: fence_frame(),
           place: {Pose.t(), integer()} | nil,
           twist: Twist.t(),
           at_ms: integer() | nil,
           before: {Twist.t(), integer() | nil}
         }
+
+  @typedoc "The odometry frame of the fence; `:was` before the first reading, if the robot has left its start pose in it."
+  @type fence_frame :: {:is, reference() | nil} | {:was, Departure.frame()} | nil
 
   @typedoc "Whether the next `step/2` is due now, or with the next period."
   @type urgency :: :now | :later
@@ -125,7 +129,7 @@ defmodule Robot.Safety.Reflex do
   end
 
   @doc "The odometry frame of the fence; `nil` before the first reading, and without a fence."
-  @spec frame(t()) :: {:is, reference() | nil} | nil
+  @spec frame(t()) :: fence_frame()
   def frame(%__MODULE__{frame: frame}), do: frame
 
   @doc "Takes a wish, any term; one without sensible numbers counts as a wish to stop."
@@ -194,13 +198,11 @@ defmodule Robot.Safety.Reflex do
   defp note(reflex, {:bumpers, pressed}, _at_ms), do: %{reflex | bumpers: pressed}
 
   defp note(%{fence: %Fence{}} = reflex, {:odometry, %Odometry{} = odometry}, at_ms) do
-    case reflex.frame || {:is, odometry.frame} do
-      {:is, frame} when frame == odometry.frame ->
-        place = {Pose.compose(reflex.start, odometry.pose), at_ms}
-        %{reflex | frame: {:is, frame}, place: place}
-
-      _another ->
-        %{reflex | place: nil}
+    if fences?(reflex.frame, odometry.frame) do
+      place = {Pose.compose(reflex.start, odometry.pose), at_ms}
+      %{reflex | frame: {:is, odometry.frame}, place: place}
+    else
+      %{reflex | place: nil}
     end
   end
 
@@ -213,6 +215,10 @@ defmodule Robot.Safety.Reflex do
   end
 
   defp note(reflex, _reading, _at_ms), do: reflex
+
+  defp fences?(nil, _frame), do: true
+  defp fences?({:is, frame}, odometry), do: frame == odometry
+  defp fences?({:was, text}, frame), do: text == Departure.frame(frame)
 
   @doc "Latches the emergency stop and drops the wish."
   @spec estop(t()) :: t()

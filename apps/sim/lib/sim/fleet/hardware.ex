@@ -58,14 +58,18 @@ defmodule Sim.Fleet.Hardware do
     %{id: id, start: {Emulator, :start_link, [[core: core, link: link, body: body]]}}
   end
 
-  @doc "The devices of such a robot in place of simulated ones: drive and camera head."
+  @doc """
+  The devices of such a robot in place of simulated ones, drive and camera head; and, because its wheels count from
+  zero when its driver starts again, the file by which it knows that it has left its start pose (`Robot.Departure`).
+  """
   @spec drivers(Setup.robot(), Path.t()) :: keyword()
   def drivers(%{profile: profile} = robot, folder) do
     [
       drive:
         {Hal.RFlex.Driver,
          [port: base_link(folder, robot), profile: profile] ++ base(profile.name)},
-      ptz: {Hal.Visca.Driver, port: camera_link(folder, robot), lens: lens(profile)}
+      ptz: {Hal.Visca.Driver, port: camera_link(folder, robot), lens: lens(profile)},
+      departure_file: Path.join(folder, "#{robot.id}.departed")
     ]
   end
 

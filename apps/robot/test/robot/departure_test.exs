@@ -1,0 +1,116 @@
+defmodule Robot.DepartureTest do
+  @moduledoc "A robot that has left its start pose, and what is started again on the way."
+  use Robot.Case, async: false
+  doctest Robot.Departure
+  alias Hal.{Odometry, Pose, Profile}
+  alias Robot.{Departure, Localiser, Percept}
+  alias Robot.Safety.Reflex
+
+  setup do
+    folder =
+      Path.join(System.tmp_dir!(), "convoy_departure_#{System.unique_integer([:positive])}")
+
+    File.mkdir_p!(folder)
+    on_exit(fn -> File.rm_rf!(folder) end)
+    %{path: Path.join(folder, "mag1.departed")}
+  end
+
+  test "a note counts until it is deleted, and not after the machine was booted", %{path: path} do
+    assert Departure.noted(nil) == nil
+    assert Departure.noted(path) == nil
+    frame = Departure.frame(make_ref())
+    assert Departure.note(path, frame) == :ok
+    assert Departure.noted(path) == frame
+    assert File.ls!(Path.dirname(path)) == ["mag1.departed"]
+    File.write!(path, "another boot\n#{frame}\n")
+    assert Departure.noted(path) == nil
+    assert Departure.note(path, frame) == :ok
+    assert Departure.forget(path) == :ok
+    assert Departure.noted(path) == nil
+    assert Departure.forget(path) == :ok
+    assert Departure.note(Path.join(path, "x"), frame) == {:error, :enoent}
+  end
+
+  defp radius(departed, frame, odometry) do
+    percept = %Percept{
+      robot: :mag1,
+      at_ms: 0,
+      profile: Profile.magellan(),
+      odometry: %Odometry{pose: odometry, twist: Twist.zero(), frame: frame}
+    }
+
+    {percept, _localiser} = Localiser.update(Localiser.new(Pose.new(1, 2), departed), percept)
+    percept.uncertainty.radius
+  end
+
+  test "wheels that count from zero again say nothing of the start pose" do
+    frame = make_ref()
+    zero = Pose.new(0, 0)
+    assert radius(nil, frame, zero) < 0.2
+    assert radius(Departure.frame(frame), frame, zero) < 0.2
+    assert radius(Departure.frame(make_ref()), frame, zero) > 5.0
+    # Wheels that have counted on know how far it is from there.
+    on = radius(Departure.frame(frame), frame, Pose.new(1, 0))
+    assert on > 0.5 and on < 5.0
+  end
+
+  test "nor do they say where a fence is" do
+    {:ok, fence} = Reflex.Fence.new({{-50, -50}, {50, 50}})
+    frame = make_ref()
+    reading = {:odometry, %Odometry{pose: Pose.new(0, 0), twist: Twist.zero(), frame: frame}}
+
+    place = fn departed ->
+      reflex = Reflex.new(Profile.magellan(), fence: fence, frame: {:was, departed})
+      {reflex, _urgency} = Reflex.sense(reflex, reading, 0)
+      reflex.place
+    end
+
+    assert {%Pose{}, 0} = place.(Departure.frame(frame))
+    assert place.(Departure.frame(make_ref())) == nil
+  end
+
+  test "a robot of which everything falls on its way knows that it does not know its place", %{
+    path: path
+  } do
+    id = :departure1
+    {:ok, fence} = Reflex.Fence.new({{-50, -50}, {50, 50}})
+    robot(id, departure_file: path, fence: fence)
+    frame = make_ref()
+    count(id, frame, Pose.new(0, 0))
+    assert eventually(fn -> radius(id) end) < 0.2
+    refute File.exists?(path)
+    count(id, frame, Pose.new(0.5, 0))
+    assert eventually(fn -> Departure.noted(path) end) == Departure.frame(frame)
+
+    listen(id, [:robot, :executive, :start])
+    listen(id, [:robot, :executive, :away])
+    kill(id, :board)
+    assert_receive {[:robot, :executive, :start], _}
+    count(id, make_ref(), Pose.new(0, 0))
+    assert_receive {[:robot, :executive, :away], _}
+    assert eventually(fn -> radius(id) end) > 5.0
+    assert %{reflex: %{place: nil}} = :sys.get_state(Names.via(id, :gate))
+  end
+
+  # As if the base had said it.
+  defp count(id, frame, pose) do
+    online(id)
+    odometry = %Odometry{pose: pose, twist: Twist.zero(), frame: frame}
+    send(Names.whereis(id, :drive), {:readings, [{:odometry, odometry}]})
+  end
+
+  defp radius(id) do
+    with {:ok, board} <- Board.find(id),
+         {:ok, %{radius: radius}, _at_ms} <- Board.fetch(board, :uncertainty, :infinity),
+         do: radius,
+         else: (_not_yet -> nil)
+  end
+
+  defp eventually(look, left \\ 2_000) do
+    case look.() do
+      nil when left == 0 -> flunk("it did not come to pass")
+      nil -> receive(do: (:never -> nil), after: (5 -> eventually(look, left - 1)))
+      found -> found
+    end
+  end
+end
