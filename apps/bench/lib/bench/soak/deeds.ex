@@ -3,11 +3,11 @@ defmodule Bench.Soak.Deeds do
   Does to a fleet what a schedule says (`Bench.Soak.Schedule`), and notes it for the judge before it takes effect.
   What is not possible now, such as to freeze a node that is down, is left out, and the journal says so.
   """
-  alias Bench.Soak.{Junk, Network, Orders, Recorder, State, Tree, WorldHost}
+  alias Bench.Soak.{Junk, Orders, Recorder, State, WorldHost}
+  alias Bench.Soak.Deeds.Shout
+  alias Bench.Soak.Fleet.{Network, Tree}
 
   @order_ms 8_000
-  # Between so many datagrams of a flood others get their turn.
-  @burst 200
 
   @doc "Does it, or begins it."
   @spec carry_out(State.t(), tuple() | atom()) :: State.t()
@@ -47,7 +47,7 @@ defmodule Bench.Soak.Deeds do
   def carry_out(s, {:block, _a, _b, ms} = deed), do: network(s, :block, ms, deed)
 
   def carry_out(s, {:junk, robot, kind, size, seed}) do
-    shout(s, robot, Junk.datagrams(kind, size, seed, Enum.reverse(s.recorded)))
+    Shout.at(s, robot, Junk.datagrams(kind, size, seed, Enum.reverse(s.recorded)))
 
     s
     |> State.count(:junk)
@@ -60,7 +60,7 @@ defmodule Bench.Soak.Deeds do
     mixed =
       Enum.flat_map([:random, :mutated], &Junk.datagrams(&1, 100, seed, Enum.reverse(s.recorded)))
 
-    shout(s, robot, mixed |> Stream.cycle() |> Stream.take(size))
+    Shout.at(s, robot, mixed |> Stream.cycle() |> Stream.take(size))
     s |> State.count(:flood) |> State.write("flood of #{size} datagrams to #{robot}")
   end
 
@@ -157,25 +157,6 @@ defmodule Bench.Soak.Deeds do
   end
 
   defp skip(s, deed), do: State.write(s, "left out, its node is not there: #{inspect(deed)}")
-
-  defp shout(%{stranger: nil}, _robot, _datagrams), do: :ok
-
-  defp shout(s, robot, datagrams) do
-    {address, port} = Network.address(s.fleet.network, robot)
-
-    spawn(fn ->
-      for burst <- Stream.chunk_every(datagrams, @burst) do
-        for datagram <- burst, do: _ = :gen_udp.send(s.stranger, address, port, datagram)
-
-        receive do
-        after
-          10 -> :ok
-        end
-      end
-    end)
-
-    :ok
-  end
 
   defp now, do: Recorder.now()
 end

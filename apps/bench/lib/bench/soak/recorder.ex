@@ -13,7 +13,7 @@ defmodule Bench.Soak.Recorder do
   | `:probe` | each second: `t:probe/0` |
   """
   use GenServer
-  alias Bench.Soak.Tree
+  alias Bench.Soak.Fleet.Tree
   alias Hal.Ticker
   alias Robot.Board
   alias Swarm.Host.HealthCheck

@@ -3,8 +3,9 @@ defmodule Bench.Soak.Runner do
   Carries out a run of `bin/soak`: starts the nodes, does what the schedule says, reads the logs, and asks the
   judge. One process; what could block it (orders to nodes that may be frozen) is done by others.
   """
-  alias Bench.Soak.{Deeds, Fleet, Journal, Judge, Keeper, Logs, Network, Nodes, Orders}
-  alias Bench.Soak.{Processes, Recorder, Schedule, State, WorldHost}
+  alias Bench.Soak.{Deeds, Fleet, Journal, Judge, Logs, Orders, Recorder, Schedule, State}
+  alias Bench.Soak.Fleet.{Keeper, Network, Nodes, Processes}
+  alias Bench.Soak.WorldHost
 
   @tick_ms 200
   @up_ms 120_000
@@ -122,11 +123,8 @@ defmodule Bench.Soak.Runner do
 
   defp collisions(s) do
     with {:ok, at_us, snapshot} <- WorldHost.read(s.fleet.folder),
-         do:
-           State.note(
-             s,
-             {at_us, :soak, :collisions, WorldHost.collisions(snapshot, s.fleet.world)}
-           ),
+         told = WorldHost.collisions(snapshot, s.fleet.world),
+         do: State.note(s, {at_us, :soak, :collisions, told}),
          else: ({:error, _none_yet} -> s)
   end
 
@@ -142,35 +140,14 @@ defmodule Bench.Soak.Runner do
   defp finish(s) do
     s = cpu(s)
     Fleet.stop(s.fleet)
-    left = await_gone(s.mark, Recorder.now() + @gone_ms * 1000)
-
-    s =
-      if left == [],
-        do: s,
-        else: State.violation(s, "left at the end: #{Enum.map_join(left, ", ", &elem(&1, 1))}")
-
+    left = Processes.await_gone(s.mark, @gone_ms)
+    words = Enum.map_join(left, ", ", &elem(&1, 1))
+    s = if left == [], do: s, else: State.violation(s, "left at the end: #{words}")
     for {pid, _words} <- left, do: Vm.signal(pid, "KILL")
     if s.stranger, do: :gen_udp.close(s.stranger)
     s = if s.violations == [], do: s, else: %{s | kept: Logs.keep(s.fleet.folder, s.journal_path)}
     Fleet.delete(s.fleet)
     Journal.close(s.journal)
     s
-  end
-
-  defp await_gone(mark, until) do
-    case Processes.marked(mark) do
-      [] ->
-        []
-
-      left ->
-        if Recorder.now() > until do
-          left
-        else
-          receive do
-          after
-            100 -> await_gone(mark, until)
-          end
-        end
-    end
   end
 end

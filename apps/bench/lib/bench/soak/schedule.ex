@@ -9,7 +9,7 @@ defmodule Bench.Soak.Schedule do
   cycle of a run that is no multiple of 75 s is shorter in both its parts.
   """
 
-  alias Bench.Soak.Draw
+  alias Bench.Soak.Schedule.Draw
 
   @cycle_ms 75_000
   @busy 0.6

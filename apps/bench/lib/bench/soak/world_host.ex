@@ -1,13 +1,13 @@
 defmodule Bench.Soak.WorldHost do
   @moduledoc """
   The world in a process of the operating system of its own: `Sim.World.Server`, and for each robot a line
-  over a socket of the file system (`Bench.Soak.WorldLine`).
+  over a socket of the file system (`Bench.Soak.WorldHost.Line`).
 
   Five times a second it writes what has changed since the start of the run (`Sim.World.Snapshot`) to a file,
   whole or not at all; from that the world is started again after a `kill -9`.
   """
   use GenServer
-  alias Bench.Soak.WorldLine
+  alias Bench.Soak.WorldHost.Line
   alias Hal.{Pose, Ticker}
   alias Sim.World
   alias Sim.World.Snapshot
@@ -24,7 +24,7 @@ defmodule Bench.Soak.WorldHost do
 
     lines =
       for robot <- world.order,
-          do: %{id: {:line, robot}, start: {WorldLine, :start_link, [path(folder, robot), robot]}}
+          do: %{id: {:line, robot}, start: {Line, :start_link, [path(folder, robot), robot]}}
 
     children =
       [World.Directory, {World.Server, name: :soak, world: world}] ++

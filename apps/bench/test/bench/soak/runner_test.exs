@@ -1,7 +1,8 @@
 defmodule Bench.Soak.RunnerTest do
   @moduledoc "A whole soak of some seconds: two robots on loopback."
   use ExUnit.Case, async: true
-  alias Bench.Soak.{Processes, Report, Runner}
+  alias Bench.Soak.Fleet.Processes
+  alias Bench.Soak.{Report, Runner}
 
   @moduletag :slow
 

@@ -1,4 +1,4 @@
-defmodule Bench.Soak.Tree do
+defmodule Bench.Soak.Fleet.Tree do
   @moduledoc "The processes of a node's swarm and robot: what runs, and the death of one of them."
   alias Robot.Names
 

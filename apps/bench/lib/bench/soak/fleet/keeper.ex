@@ -1,4 +1,4 @@
-defmodule Bench.Soak.Keeper do
+defmodule Bench.Soak.Fleet.Keeper do
   @moduledoc """
   Keeps a node of `bin/soak` running, as systemd does (`rel/convoy.service`): whoever ended it, it is started again 2 s later,
   for ever. After each end it looks for processes of the operating system that the node has left behind, by a
@@ -8,7 +8,8 @@ defmodule Bench.Soak.Keeper do
   or `{:failed, reason, at_us}` when a start did not come about.
   """
   use GenServer
-  alias Bench.Soak.{Processes, Recorder}
+  alias Bench.Soak.Fleet.Processes
+  alias Bench.Soak.Recorder
 
   @restart_ms 2_000
   # The kernel tells each child of the death of its parent at once; a busy machine takes its time.

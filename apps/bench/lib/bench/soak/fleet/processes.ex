@@ -1,4 +1,4 @@
-defmodule Bench.Soak.Processes do
+defmodule Bench.Soak.Fleet.Processes do
   @moduledoc "Looks at processes of the operating system, where there is /proc; elsewhere it finds none."
 
   @doc "Those with this mark in their environment, as `{number, line}`: by `CONVOY_SOAK`, the whole value or its beginning."
@@ -12,6 +12,21 @@ defmodule Bench.Soak.Processes do
           do: {name, "#{name} #{command(name)}"}
     else
       {:error, _none} -> []
+    end
+  end
+
+  @doc "Waits until there are none, at most so long; returns those that are left."
+  @spec await_gone(String.t(), left_ms :: integer()) :: [{pid :: String.t(), line :: String.t()}]
+  def await_gone(mark, left_ms) do
+    left = marked(mark)
+
+    if left == [] or left_ms <= 0 do
+      left
+    else
+      receive do
+      after
+        100 -> await_gone(mark, left_ms - 100)
+      end
     end
   end
 

@@ -1,9 +1,9 @@
-defmodule Bench.Soak.Node do
+defmodule Bench.Soak.Fleet.Node do
   @moduledoc """
   What runs on a robot's node of `bin/soak`: the applications as in a release, whose end ends the node, one
   robot in the world of `Bench.Soak.WorldHost`, and the log of its doings (`Bench.Soak.Recorder`).
   """
-  alias Bench.Soak.{Recorder, WorldHost, WorldLink}
+  alias Bench.Soak.{Recorder, WorldHost}
   alias Sim.Fleet.Hardware
   alias Sim.Trial.Setup
   alias Sim.World
@@ -20,7 +20,7 @@ defmodule Bench.Soak.Node do
     {:ok, _apps} = Application.ensure_all_started(:sim, :permanent)
 
     children =
-      [World.Directory, {WorldLink, {world(id), WorldHost.path(folder, id), id}}] ++
+      [World.Directory, {WorldHost.Link, {world(id), WorldHost.path(folder, id), id}}] ++
         Hardware.parts([robot(about)], world(id), folder) ++ [{Recorder, {folder, id}}]
 
     {:ok, parts} = Supervisor.start_link(children, strategy: :one_for_one, max_restarts: 1_000)

@@ -1,4 +1,4 @@
-defmodule Bench.Soak.WorldLink do
+defmodule Bench.Soak.WorldHost.Link do
   @moduledoc """
   A robot's end of its line to the world, which runs in a process of the operating system of its own
   (`Bench.Soak.WorldHost`). The line is a socket of the file system, so no cut of the network touches

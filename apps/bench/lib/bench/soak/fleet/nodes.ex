@@ -1,4 +1,4 @@
-defmodule Bench.Soak.Nodes do
+defmodule Bench.Soak.Fleet.Nodes do
   @moduledoc "What it means for a run of `bin/soak` that a node has come up or ended. No process."
   alias Bench.Soak.State
 

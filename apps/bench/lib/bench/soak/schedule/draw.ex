@@ -1,4 +1,4 @@
-defmodule Bench.Soak.Draw do
+defmodule Bench.Soak.Schedule.Draw do
   @moduledoc "Draws deeds of `bin/soak`, and what they are made of, from a state of `:rand`. Pure."
 
   @type random :: :rand.state()

@@ -1,7 +1,7 @@
-defmodule Bench.Soak.WorldLine do
+defmodule Bench.Soak.WorldHost.Line do
   @moduledoc """
   The world's end of a robot's line to it, over a socket of the file system; the robot's end is
-  `Bench.Soak.WorldLink`. It stands in for the robot's devices: it attaches processes of its own to the world's
+  `Bench.Soak.WorldHost.Link`. It stands in for the robot's devices: it attaches processes of its own to the world's
   server, which end with it.
   """
   alias Sim.World
