@@ -12,8 +12,9 @@ defmodule Sim.World.Server do
   Devices may be on other nodes. The server never waits for a device once it is attached: what
   cannot be sent at once is lost, and what arrives late counts as old (`Sim.Lateness`).
 
-  Wheels stop when the process of their drive ends, and also when no speed has come for 500 ms:
-  that is the body's own watchdog, for a robot that is frozen and can send nothing any more.
+  Wheels stop when the process of their drive ends, and also when no speed has come for 200 ms: a
+  robot that is frozen can send nothing any more, and on a real one the port program of the serial line, whose
+  keep-alive this is, writes its last words then.
 
   Steps are scheduled at absolute times, so the pace does not drift. A late step is not made up
   for: then the world is slow, and reports it by the event `[:sim, :server, :late]` with
@@ -26,7 +27,7 @@ defmodule Sim.World.Server do
 
   @step_ms 50
   @late_ms 50
-  @watchdog_steps 10
+  @watchdog_steps 4
 
   @enforce_keys [:name, :world, :ticker]
   defstruct @enforce_keys ++

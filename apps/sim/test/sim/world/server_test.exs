@@ -97,6 +97,24 @@ defmodule Sim.World.ServerTest do
     assert x(server) < -1.5
   end
 
+  test "wheels stand 200 ms after the last speed: a robot that is frozen says nothing", %{
+    world: world,
+    name: name
+  } do
+    server = serve(name, world)
+    World.Server.drive(server, :mag1, Twist.new(0.3, 0))
+    %{step: told, robots: robots} = World.Server.world(server)
+    assert robots.mag1.wanted == Twist.new(0.3, 0)
+    # In the time of the world, however late its steps are.
+    stood = stood(server)
+    assert (stood - told) in 3..5
+  end
+
+  defp stood(server, before \\ nil) do
+    %{step: step, robots: %{mag1: %{wanted: wanted}}} = World.Server.world(server)
+    if Twist.zero?(wanted), do: before || step, else: stood(server, step)
+  end
+
   test "a world that goes on from where another was killed has nobody at the wheels", %{
     world: world,
     name: name
