@@ -79,7 +79,7 @@
     max_linear: 0.3
   ],
 
-  # Where it is switched on, in the map that all robots share.
+  # Where it is switched on and started, in the map that all robots share.
   start: {0.0, 0.0, deg(0)},
 
   # :manual: its wheels stand until a person arms them. :auto: they turn as soon as they are told.

@@ -27,7 +27,7 @@ defmodule Hal.Event do
   | `[:robot, :gate, :limits]` | `at_ms` | `robot`, `limits`: the reasons to limit the speed have changed |
   | `[:robot, :gate, :estop]`, `[:robot, :gate, :reset]` | `at_ms` | `robot` |
   | `[:robot, :estop_file, :error]` | | `robot`, `file`, `reason`: the latch is set as ordered, but would not survive a restart of the board |
-  | `[:robot, :departure_file, :failed]` | | `robot`, `file`, `reason`: it cannot be noted that the robot has left its start pose |
+  | `[:robot, :departure_file, :failed]` | | `robot`, `file`: it cannot be noted that the robot has left its start pose; it is tried again each second |
   | `[:robot, :executive, :away]` | `at_ms` | `robot`: it was started again away from its start pose, and does not know where it is |
   | `[:robot, :executive, :start]` | `at_ms` | `robot`: the robot is idle |
   | `[:robot, :executive, :slow]` | `at_ms`, `duration_ms` | `robot`: a tick took over 50 ms |

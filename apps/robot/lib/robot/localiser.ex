@@ -17,6 +17,9 @@ defmodule Robot.Localiser do
   alias Robot.Localiser.Belief.Marks
   alias Robot.Percept
 
+  # Odometry that begins farther from zero than this (metres, radians) was counting before.
+  @put_down 0.1
+
   @enforce_keys [:start]
   defstruct @enforce_keys ++
               [
@@ -197,9 +200,8 @@ defmodule Robot.Localiser do
 
     belief =
       cond do
-        another_frame?(localiser) -> Frame.lost(belief)
-        # Started again on its way: its way there and its corrections are lost.
-        Departure.left?(odometry) -> Frame.lost(belief, way)
+        not Departure.start?(localiser.departed, localiser.odometry_frame) -> Frame.lost(belief)
+        driven?(odometry, way) -> Frame.lost(belief, way)
         true -> belief
       end
 
@@ -212,9 +214,6 @@ defmodule Robot.Localiser do
     step = Pose.relative(localiser.odometry, odometry)
     %{localiser | odometry: odometry, belief: Belief.move(localiser.belief, step)}
   end
-
-  defp another_frame?(%{departed: departed, odometry_frame: frame}),
-    do: departed != nil and departed != Departure.frame(frame)
 
   # Every picture counts once. It was taken a moment ago, and the body may have turned since then.
   defp see(localiser, %Percept{detections: nil}), do: localiser
@@ -254,4 +253,7 @@ defmodule Robot.Localiser do
     back = History.back(localiser.history, localiser.odometry, at_ms)
     back && Pose.compose(belief.pose, back)
   end
+
+  # Whether the robot was started again on its way: its way there and its corrections are lost.
+  defp driven?(%Pose{heading: heading}, way), do: way > @put_down or abs(heading) > @put_down
 end

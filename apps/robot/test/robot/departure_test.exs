@@ -24,6 +24,13 @@ defmodule Robot.DepartureTest do
     assert File.ls!(Path.dirname(path)) == ["mag1.departed"]
     File.write!(path, "another boot\n#{frame}\n")
     assert Departure.noted(path) == nil
+
+    for half <- ["", "\n", "another boot\n", "another boot\n#{frame}", <<255, 0>>] do
+      File.write!(path, half)
+      refute Departure.start?(Departure.noted(path), make_ref())
+    end
+
+    refute Departure.start?(Departure.noted(Path.dirname(path)), make_ref())
     assert Departure.note(path, frame) == :ok
     assert Departure.forget(path) == :ok
     assert Departure.noted(path) == nil
@@ -52,6 +59,11 @@ defmodule Robot.DepartureTest do
     # Wheels that have counted on know how far it is from there.
     on = radius(Departure.frame(frame), frame, Pose.new(1, 0))
     assert on > 0.5 and on < 5.0
+  end
+
+  test "of wheels without frames nobody knows, once it was left, where their zero is" do
+    assert radius(nil, nil, Pose.new(0, 0)) < 0.2
+    assert radius(Departure.frame(nil), nil, Pose.new(0, 0)) > 5.0
   end
 
   test "nor do they say where a fence is" do
@@ -90,6 +102,50 @@ defmodule Robot.DepartureTest do
     assert_receive {[:robot, :executive, :away], _}
     assert eventually(fn -> radius(id) end) > 5.0
     assert %{reflex: %{place: nil}} = :sys.get_state(Names.via(id, :gate))
+  end
+
+  test "what cannot be written is told once, and tried again", %{path: path} do
+    id = :departure2
+    path = Path.join(path, "mag1.departed")
+    listen(id, [:robot, :departure_file, :failed])
+    robot(id, departure_file: path)
+    frame = make_ref()
+    count(id, frame, Pose.new(0, 0))
+    assert eventually(fn -> radius(id) end) < 0.2
+    count(id, frame, Pose.new(0.5, 0))
+    assert_receive {[:robot, :departure_file, :failed], _}
+    File.mkdir_p!(Path.dirname(path))
+
+    noted = fn ->
+      count(id, frame, Pose.new(0.5, 0))
+      Departure.noted(path)
+    end
+
+    assert eventually(noted) == Departure.frame(frame)
+    refute_received {[:robot, :departure_file, :failed], _}
+  end
+
+  test "an executive that starts again knows its place, and tells nothing else later", %{
+    path: path
+  } do
+    id = :departure3
+    robot(id, departure_file: path)
+    frame = make_ref()
+    count(id, frame, Pose.new(0, 0))
+    assert eventually(fn -> radius(id) end) < 0.2
+    count(id, frame, Pose.new(0.5, 0))
+    assert eventually(fn -> Departure.noted(path) end)
+    listen(id, [:robot, :executive, :start])
+    listen(id, [:robot, :executive, :away])
+    kill(id, :executive)
+    assert_receive {[:robot, :executive, :start], _}
+    count(id, frame, Pose.new(0.5, 0))
+    known = eventually(fn -> if(radius(id) > 1.0, do: radius(id)) end)
+    assert known < 2.0
+    # A driver that starts again while its executive goes on is another matter.
+    count(id, make_ref(), Pose.new(0, 0))
+    assert eventually(fn -> if(radius(id) > known, do: radius(id)) end) < 5.0
+    refute_received {[:robot, :executive, :away], _}
   end
 
   # As if the base had said it.

@@ -4,9 +4,8 @@ defmodule Swarm.Application do
   require Logger
   alias Mesh.{Log, Options}
   alias Mesh.Distribution.ConnectionLog
-  alias Robot.Departure
   alias Swarm.MemberSpec
-  alias Swarm.Host.{ReleaseBoot, Systemd}
+  alias Swarm.Host.{DepartureFile, ReleaseBoot, Systemd}
 
   # With `config :swarm, boot: true`, as in a release, the node is the robot that its environment
   # names.
@@ -20,24 +19,21 @@ defmodule Swarm.Application do
          machine = machine(robot, environment),
          {:ok, supervisor} <- Swarm.Supervisor.start_link(mesh ++ machine),
          :ok <- begin(robot) do
-      {:ok, supervisor, robot}
+      {:ok, supervisor}
     end
   end
-
-  # After an end that somebody asked for, the next start is at the start pose; after a crash, it is not.
-  @impl Application
-  def stop({_file, %{departure_file: path}}) when path != nil do
-    if match?({:stopping, _how}, :init.get_status()), do: Departure.forget(path), else: :ok
-  end
-
-  def stop(_robot), do: :ok
 
   defp robot(false, _environment), do: {:ok, :none}
 
   defp robot(true, environment) do
     case ReleaseBoot.robot(environment) do
       {:ok, {file, config}} ->
-        {:ok, {file, %{config | departure_file: departure_file(file.id, environment)}}}
+        {:ok,
+         {file,
+          %{
+            config
+            | departure_file: DepartureFile.prepare(DepartureFile.of(file.id, environment))
+          }}}
 
       {:ok, nil} ->
         {:ok, nil}
@@ -47,10 +43,6 @@ defmodule Swarm.Application do
         {:error, hd(lines)}
     end
   end
-
-  # systemd keeps the folder when it restarts the service, and deletes it when it stops it (rel/convoy.service).
-  defp departure_file(id, environment),
-    do: Path.join(environment["RELEASE_TMP"] || System.tmp_dir!(), "#{id}.departed")
 
   defp mesh(false, _robot), do: {:ok, []}
 

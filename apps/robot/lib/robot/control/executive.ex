@@ -21,6 +21,8 @@ defmodule Robot.Control.Executive do
 
   @period_ms 100
   @slow_us 50_000
+  # Ticks.
+  @note_again 10
 
   @doc """
   Starts the executive of a robot. It passes each percept, as `{:tick, percept}`, and each outcome
@@ -93,8 +95,8 @@ defmodule Robot.Control.Executive do
       sink: sink,
       controller:
         Controller.new(profile: config.profile, start: config.start, departed: departed),
-      departed: departed,
-      zero: nil,
+      departure: if(departed, do: {:was, departed}, else: {:near, nil}),
+      note_at_tick: 0,
       told: nil,
       held?: false,
       tick: 0,
@@ -196,30 +198,44 @@ defmodule Robot.Control.Executive do
     %{s | controller: controller, tick: doing.tick}
   end
 
-  # Once: the robot has left its start pose, or was started again away from it.
+  # By the first reading of the odometry the localiser knows whether the start pose is its zero.
+  defp depart(s, nil), do: s
   defp depart(%{config: %{departure_file: nil}} = s, _odometry), do: s
-  defp depart(%{departed: :told} = s, _odometry), do: s
+  defp depart(%{departure: :noted} = s, _odometry), do: s
 
-  defp depart(%{departed: departed, config: config} = s, %Odometry{pose: pose, frame: frame}) do
-    frame = Departure.frame(frame)
-
-    cond do
-      departed not in [nil, frame] ->
-        measured = %{at_ms: Config.now(config)}
-        Event.execute([:robot, :executive, :away], measured, %{robot: config.id})
-        %{s | departed: :told}
-
-      departed == nil and Departure.left?(pose) ->
-        # Of counters that jump, nobody knows where their zero is. The disk is not waited for.
-        spawn(Departure, :note_for, [config.id, config.departure_file, s.zero || frame])
-        %{s | departed: :told}
-
-      true ->
-        %{s | zero: frame}
+  defp depart(%{departure: {:was, noted}} = s, %Odometry{frame: frame}) do
+    if not Departure.start?(noted, frame) do
+      measured = %{at_ms: Config.now(s.config)}
+      Event.execute([:robot, :executive, :away], measured, %{robot: s.config.id})
     end
+
+    %{s | departure: :noted}
   end
 
-  defp depart(s, nil), do: s
+  # Of counters that jump away from zero nobody knows where it is: noted is the frame of the last reading near zero.
+  defp depart(%{departure: {:near, frame}} = s, %Odometry{pose: pose} = odometry) do
+    if Departure.left?(pose),
+      do: note(s, frame || Departure.frame(nil)),
+      else: %{s | departure: {:near, Departure.frame(odometry.frame)}}
+  end
+
+  # Written here, because what comes after a crash must find it: a line, not synced, to a folder in memory. A disk that
+  # hangs meets the gate's dead man's switch. What fails is tried again once a second.
+  defp note(%{config: %{id: id, departure_file: path}} = s, frame) do
+    cond do
+      s.note_at_tick > s.tick ->
+        s
+
+      Departure.note(path, frame) == :ok ->
+        %{s | departure: :noted}
+
+      true ->
+        if s.note_at_tick == 0,
+          do: Event.execute([:robot, :departure_file, :failed], %{}, %{robot: id, file: path})
+
+        %{s | note_at_tick: s.tick + @note_again}
+    end
+  end
 
   defp place(board, %{pose: pose, uncertainty: uncertainty}, at_ms) do
     Board.put(board, :executive, :pose, pose, at_ms)

@@ -100,15 +100,16 @@ defmodule Robot.Devices.Log do
      "#{process(name)} was sent what it does not know; so far it has dropped #{count} messages"}
   end
 
-  def line(:failed, %{robot: robot, file: file, reason: reason}) do
+  def line(:failed, %{robot: robot, file: file}) do
     {:error,
-     "#{robot}: cannot note in #{file} that it has left its start pose (#{:file.format_error(reason)}): if it " <>
-       "restarts on its way, it will believe to stand there"}
+     "#{robot}: cannot write to #{file} that it has left its start pose: if it crashes on its way, it will believe " <>
+       "to stand there"}
   end
 
   def line(:away, %{robot: robot}) do
     {:warning,
-     "#{robot} was started again away from its start pose: it does not know where it is until it sees others"}
+     "#{robot} started again after it had left its start pose, and does not know where it is until it sees others; " <>
+       "or stop it, put it at its start pose, and start it"}
   end
 
   def line(:failed, %{line: line}), do: {:warning, line}

@@ -190,12 +190,11 @@ defmodule Robot.Safety.Gate do
   end
 
   defp frame(board, config) do
-    with :error <- Board.fetch(board, :frame, :infinity),
-         departed when departed != nil <- Departure.noted(config.departure_file) do
-      {:was, departed}
+    with :error <- Board.fetch(board, :frame, :infinity) do
+      noted = Departure.noted(config.departure_file)
+      if noted, do: {:was, noted}
     else
       {:ok, frame, _at_ms} -> frame
-      nil -> nil
     end
   end
 

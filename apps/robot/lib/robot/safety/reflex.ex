@@ -78,7 +78,7 @@ defmodule Robot.Safety.Reflex do
           before: {Twist.t(), integer() | nil}
         }
 
-  @typedoc "The odometry frame of the fence; `:was` before the first reading, if the robot has left its start pose in it."
+  @typedoc "The odometry frame of the fence: `:was`, that in which the robot has left its start pose, before it is read."
   @type fence_frame :: {:is, reference() | nil} | {:was, Departure.frame()} | nil
 
   @typedoc "Whether the next `step/2` is due now, or with the next period."
@@ -218,7 +218,7 @@ defmodule Robot.Safety.Reflex do
 
   defp fences?(nil, _frame), do: true
   defp fences?({:is, frame}, odometry), do: frame == odometry
-  defp fences?({:was, text}, frame), do: text == Departure.frame(frame)
+  defp fences?({:was, noted}, frame), do: Departure.start?(noted, frame)
 
   @doc "Latches the emergency stop and drops the wish."
   @spec estop(t()) :: t()
