@@ -19,11 +19,14 @@ defmodule Robot.Localiser do
 
   # Odometry that begins farther from zero than this (metres, radians) was counting before.
   @put_down 0.1
+  # A robot that was started again on its way has found its place when it knows it by this (m).
+  @found_radius 1.0
 
   @enforce_keys [:start]
   defstruct @enforce_keys ++
               [
                 departed: nil,
+                lost?: false,
                 odometry: nil,
                 odometry_frame: nil,
                 belief: nil,
@@ -46,6 +49,7 @@ defmodule Robot.Localiser do
   @type t :: %__MODULE__{
           start: Pose.t(),
           departed: Departure.frame() | nil,
+          lost?: boolean(),
           odometry: Pose.t() | nil,
           odometry_frame: reference() | nil,
           belief: Belief.t() | nil,
@@ -141,10 +145,16 @@ defmodule Robot.Localiser do
       |> move(odometry.pose)
       |> remember(percept.at_ms)
       |> see(percept)
+      |> found()
 
     percept = exposed(percept, localiser)
     {%{percept | pose: localiser.belief.pose, uncertainty: uncertainty(localiser)}, localiser}
   end
+
+  defp found(%{lost?: false} = localiser), do: localiser
+
+  defp found(localiser),
+    do: %{localiser | lost?: Anchors.radius(spread(localiser)) > @found_radius}
 
   defp uncertainty(%{belief: belief, frame: frame, frame_no: number} = localiser) do
     {_worst, _least, heading} = Belief.sd(belief)
@@ -154,6 +164,7 @@ defmodule Robot.Localiser do
 
     %{
       radius: Anchors.radius(spread),
+      lost?: localiser.lost?,
       position: position,
       spread: spread,
       heading: heading,
@@ -198,14 +209,18 @@ defmodule Robot.Localiser do
     belief = Belief.new(Pose.compose(localiser.start, odometry))
     way = Pose.distance(odometry, {0.0, 0.0})
 
-    belief =
-      cond do
-        not Departure.start?(localiser.departed, localiser.odometry_frame) -> Frame.lost(belief)
-        driven?(odometry, way) -> Frame.lost(belief, way)
-        true -> belief
-      end
+    localiser = %{localiser | odometry: odometry}
 
-    %{localiser | odometry: odometry, belief: belief}
+    cond do
+      not Departure.start?(localiser.departed, localiser.odometry_frame) ->
+        %{localiser | belief: Frame.lost(belief), lost?: true}
+
+      driven?(odometry, way) ->
+        %{localiser | belief: Frame.lost(belief, way), lost?: true}
+
+      true ->
+        %{localiser | belief: belief}
+    end
   end
 
   defp move(%{odometry: nil} = localiser, odometry), do: %{localiser | odometry: odometry}

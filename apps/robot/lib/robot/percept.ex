@@ -45,7 +45,8 @@ defmodule Robot.Percept do
 
   @typedoc """
   The uncertainty of the pose. By the filter's estimate, the error is within `radius` metres in 95
-  of 100 cases. `position` (along the direction of greatest uncertainty, metres; see also
+  of 100 cases. It is `lost?` if it was started again on its way and has not found its place since.
+  `position` (along the direction of greatest uncertainty, metres; see also
   `spread`) and `heading` (radians) are standard deviations. `frame` is the key of the frame of
   the pose (`Robot.Localiser.Anchors`), `nil` for the frame of the start poses; `start` are the
   pose's variances (m2, rad2) in the frame of the start poses. `frame_no` is the number of the
@@ -55,6 +56,7 @@ defmodule Robot.Percept do
   """
   @type uncertainty :: %{
           radius: float(),
+          lost?: boolean(),
           position: float(),
           spread: Robot.Localiser.Anchors.spread(),
           heading: float(),

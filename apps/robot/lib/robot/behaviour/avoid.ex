@@ -19,7 +19,16 @@ defmodule Robot.Behaviour.Avoid do
   alias Robot.{Behaviour, Percept, Wish}
   alias Robot.Navigation.{Orca, Steering}
   alias Robot.Behaviour.Avoid
-  alias Robot.Behaviour.Avoid.{Brake, Clearance, GiveWay, Neighbours, Preference, Progress}
+
+  alias Robot.Behaviour.Avoid.{
+    Brake,
+    Caution,
+    Clearance,
+    GiveWay,
+    Neighbours,
+    Preference,
+    Progress
+  }
 
   # A robot this near (metres) to the place beside an occupied goal has arrived.
   @beside 0.08
@@ -54,15 +63,22 @@ defmodule Robot.Behaviour.Avoid do
 
   @impl Behaviour
   def tick(percept, state) do
-    case Behaviour.tick(state.inner, percept) do
+    careful = Caution.percept(percept)
+
+    case Behaviour.tick(state.inner, careful) do
       {:running, wish, inner} ->
-        {wish, state} = safe(wish, percept, %{state | inner: inner})
+        {wish, state} = safe(slowed(wish, percept, careful), careful, %{state | inner: inner})
         {:running, wish, {__MODULE__, state}}
 
       done ->
         done
     end
   end
+
+  # What a robot may do that knows where it is, is for the gate to limit.
+  defp slowed(nil, _percept, _careful), do: nil
+  defp slowed(wish, percept, percept), do: wish
+  defp slowed(wish, _percept, careful), do: Caution.wish(wish, careful)
 
   defp safe(nil, _percept, state), do: {nil, state}
   defp safe(wish, %Percept{pose: nil}, state), do: {wish, state}
