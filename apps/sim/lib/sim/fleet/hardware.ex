@@ -9,15 +9,22 @@ defmodule Sim.Fleet.Hardware do
   """
   alias Sim.{Device, Emulator}
   alias Sim.Emulator.{RFlexController, ViscaCamera}
-  alias Sim.Trial.Setup
 
   # Only our own bugs crash a device; the others go on.
   @restarts 100
 
+  @typedoc "What matters of a robot (`t:Sim.Trial.Setup.robot/0`)."
+  @type robot :: %{
+          :id => atom(),
+          :profile => Hal.Profile.t(),
+          :hardware? => boolean(),
+          optional(atom()) => term()
+        }
+
   @doc """
   The part of a fleet's supervision tree for the robots with real drivers; none if there are none.
   """
-  @spec parts([Setup.robot()], world :: term(), Path.t()) :: [Supervisor.child_spec()]
+  @spec parts([robot()], world :: term(), Path.t()) :: [Supervisor.child_spec()]
   def parts(robots, world, folder) do
     case for(
            %{hardware?: true} = robot <- robots,
@@ -62,7 +69,7 @@ defmodule Sim.Fleet.Hardware do
   The devices of such a robot in place of simulated ones, drive and camera head; and, because its wheels count from
   zero when its driver starts again, the file by which it knows that it has left its start pose (`Robot.Departure`).
   """
-  @spec drivers(Setup.robot(), Path.t()) :: keyword()
+  @spec drivers(robot(), Path.t()) :: keyword()
   def drivers(%{profile: profile} = robot, folder) do
     [
       drive:
@@ -74,7 +81,7 @@ defmodule Sim.Fleet.Hardware do
   end
 
   @doc "Where their serial lines are, for people, one line per robot."
-  @spec lines([Setup.robot()], Path.t()) :: [String.t()]
+  @spec lines([robot()], Path.t()) :: [String.t()]
   def lines(robots, folder) do
     for %{hardware?: true} = robot <- robots do
       "#{robot.id} has real drivers: its base on #{base_link(folder, robot)}, its camera's head on " <>
