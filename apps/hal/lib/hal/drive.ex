@@ -67,5 +67,11 @@ defmodule Hal.Drive do
   @doc "The options that the driver takes; `mix robot.check` checks robot files against them."
   @callback option_table() :: Hal.Options.table()
 
-  @optional_callbacks explain: 2, ready: 1, judge: 1, option_table: 0
+  @doc """
+  How long the sonars take until each has fired once, in seconds, by the options; these have a `profile:` here. The
+  gate allows for a robot that has moved on meanwhile. Without this callback all fire at once.
+  """
+  @callback sonar_round_s(keyword()) :: float()
+
+  @optional_callbacks explain: 2, ready: 1, judge: 1, option_table: 0, sonar_round_s: 1
 end

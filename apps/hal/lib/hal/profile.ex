@@ -5,6 +5,9 @@ defmodule Hal.Profile do
 
   Sources: the thesis (R69 to R72) and the public rFLEX sample configurations. The accelerations
   are our choice: 0.5 m/s2 and 1 rad/s2 for both bases, unless configured.
+
+  `sonar_round_s` is how long the sonars take until each has fired once, in seconds: so old may a range be. It is 0 if all
+  fire at once; a driver that knows better says so (`c:Hal.Drive.sonar_round_s/1`).
   """
   alias Hal.Pose
 
@@ -17,6 +20,7 @@ defmodule Hal.Profile do
                 sonar_min: 0.15,
                 sonar_max: 5.1,
                 sonar_cone: :math.pi() / 6,
+                sonar_round_s: 0.0,
                 irs: [],
                 ir_max: 0.8,
                 bumpers: 16,
@@ -47,6 +51,7 @@ defmodule Hal.Profile do
           sonar_min: float(),
           sonar_max: float(),
           sonar_cone: float(),
+          sonar_round_s: float(),
           irs: [Pose.t()],
           ir_max: float(),
           bumpers: 0..16,

@@ -168,7 +168,7 @@ defmodule Robot.Config do
   defp check(%{profile: profile, limits: limits} = config) do
     case Enum.find(limits, fn {name, value} -> value > Map.fetch!(profile, name) end) do
       nil ->
-        {:ok, %{config | profile: struct!(profile, limits)}}
+        {:ok, %{config | profile: profile |> struct!(limits) |> with_sonars(config.drive)}}
 
       {name, value} ->
         most = Map.fetch!(profile, name)
@@ -176,5 +176,14 @@ defmodule Robot.Config do
         {:error,
          "robot option limits.#{name} cannot be #{value}: a #{profile.name} can do #{most} at most"}
     end
+  end
+
+  defp with_sonars(profile, {driver, options}) do
+    if Code.ensure_loaded?(driver) and function_exported?(driver, :sonar_round_s, 1),
+      do: %{
+        profile
+        | sonar_round_s: driver.sonar_round_s(Keyword.put_new(options, :profile, profile))
+      },
+      else: profile
   end
 end

@@ -123,6 +123,23 @@ defmodule Hal.RFlex.Driver do
   end
 
   @doc """
+  Its sonars fire one after the other (`:sonar_times`).
+
+      iex> Hal.RFlex.Driver.sonar_round_s(port: "/dev/ttyR0")
+      0.5
+  """
+  @impl Hal.Drive
+  def sonar_round_s(given) do
+    with {:ok, %{sonar_banks: banks, sonar_times: {echo_us, ping_us, set_us}}} <-
+           Options.new(given) do
+      (Enum.sum(banks) * (echo_us + ping_us) + set_us) / 1.0e6
+    else
+      # A driver with such options does not start.
+      {:error, _line} -> 0.0
+    end
+  end
+
+  @doc """
   Describes an error in words.
 
       iex> Hal.RFlex.Driver.explain(:silent, port: "/dev/ttyR0", speed: 9600)

@@ -47,7 +47,7 @@ defmodule Robot.Safety.Reflex.Body do
   @doc """
   The greatest speed (m/s) in the direction of `linear` from which the body can stop before the
   points in its way. It keeps 0.15 m from a point straight ahead, and less from one that it would
-  only graze.
+  only graze. A point may have been seen as long ago as the sonars take for a round.
 
       iex> profile = Hal.Profile.magellan()
       iex> Robot.Safety.Reflex.Body.free_speed(profile, [{0.35, 0.0}], 0.5)
@@ -56,14 +56,21 @@ defmodule Robot.Safety.Reflex.Body do
       true
       iex> Robot.Safety.Reflex.Body.free_speed(profile, [{0.3, 0.5}], 0.5) > 10
       true
+      iex> slow = %{profile | sonar_round_s: 0.5}
+      iex> for p <- [profile, slow], do: Float.round(Robot.Safety.Reflex.Body.free_speed(p, [{0.6, 0.0}], 0.5), 2)
+      [0.43, 0.27]
   """
   @spec free_speed(Profile.t(), [point()], float()) :: float()
   def free_speed(%Profile{max_acceleration: braking} = profile, points, linear) do
     sign = if linear < 0, do: -1.0, else: 1.0
     free = Enum.reduce(points, 1.0e6, fn {x, y}, free -> min(free, gap(profile, sign * x, y)) end)
-    # The way before it brakes, v * reaction, counts as well; solved for v.
-    lost = braking * @reaction_s
-    :math.sqrt(2 * braking * max(free, 0.0) + lost * lost) - lost
+    fastest(braking, max(free, 0.0), @reaction_s + profile.sonar_round_s)
+  end
+
+  # The way before it brakes, v * reaction, counts as well; solved for v.
+  defp fastest(braking, free, reaction_s) do
+    lost = braking * reaction_s
+    :math.sqrt(2 * braking * free + lost * lost) - lost
   end
 
   # How far the body may go before it must stand. Every body counts as the circle round its
@@ -108,7 +115,7 @@ defmodule Robot.Safety.Reflex.Body do
           Enum.reduce(corners, free, &min(&2, swing(&1, angle, turn)))
       end
 
-    :math.sqrt(2 * profile.max_turn_acceleration * max(free - 0.1, 0.0))
+    fastest(profile.max_turn_acceleration, max(free - 0.1, 0.0), profile.sonar_round_s)
   end
 
   @doc """
