@@ -6,8 +6,8 @@ defmodule Robot.Behaviour.Avoid.Caution do
   alias Hal.Twist
   alias Robot.{Percept, Wish}
 
-  # Up to this speed (m/s) the gate's limits alone keep robots apart. Six that drive across each other's ways without
-  # looking touched 28 times in 2.7 hours of each with 0.5 m/s, 3 times with 0.3, and never with 0.2.
+  # Up to this speed (m/s) the gate's limits alone keep robots apart that drive across each other's ways without looking
+  # (`Sim.GateAloneTest`; docs/results.md, section 6).
   @speed 0.2
 
   @doc "The percept of a robot that shall go no faster than what it knows allows."
