@@ -68,8 +68,8 @@ defmodule Hal.Drive do
   @callback option_table() :: Hal.Options.table()
 
   @doc """
-  How long the sonars take until each has fired once, in seconds, by the options; these have a `profile:` here. The
-  gate allows for a robot that has moved on meanwhile. Without this callback all fire at once.
+  How long the sonars take until each has fired and was reported, in seconds, 0.0 to 2.0, by the options; these have a
+  `profile:` here. The gate allows for a robot that has moved on meanwhile. Without this callback all fire at once.
   """
   @callback sonar_round_s(keyword()) :: float()
 

@@ -6,8 +6,8 @@ defmodule Hal.Profile do
   Sources: the thesis (R69 to R72) and the public rFLEX sample configurations. The accelerations
   are our choice: 0.5 m/s2 and 1 rad/s2 for both bases, unless configured.
 
-  `sonar_round_s` is how long the sonars take until each has fired once, in seconds: so old may a range be. It is 0 if all
-  fire at once; a driver that knows better says so (`c:Hal.Drive.sonar_round_s/1`).
+  `sonar_round_s` is how long the sonars take until each has fired and was reported, in seconds: so old is a range at most
+  while none is lost. It is 0 if all fire at once; a driver that knows better says so (`c:Hal.Drive.sonar_round_s/1`).
   """
   alias Hal.Pose
 

@@ -38,6 +38,9 @@ defmodule Robot.Config do
   @limits for key <- [:max_linear, :max_turn, :max_acceleration, :max_turn_acceleration],
               do: {key, {:number, 1.0e-6, 100.0}}
 
+  # Ranges that are older do not count (`Hal.RFlex.Sensors.Sonar`).
+  @longest_round_s 2.0
+
   @enforce_keys [:id, :profile, :drive]
   defstruct @enforce_keys ++
               [
@@ -168,7 +171,7 @@ defmodule Robot.Config do
   defp check(%{profile: profile, limits: limits} = config) do
     case Enum.find(limits, fn {name, value} -> value > Map.fetch!(profile, name) end) do
       nil ->
-        {:ok, %{config | profile: profile |> struct!(limits) |> with_sonars(config.drive)}}
+        with_sonars(%{config | profile: struct!(profile, limits)})
 
       {name, value} ->
         most = Map.fetch!(profile, name)
@@ -178,12 +181,19 @@ defmodule Robot.Config do
     end
   end
 
-  defp with_sonars(profile, {driver, options}) do
+  # Without the callback all sonars fire at once.
+  defp with_sonars(%{drive: {driver, options}, profile: profile} = config) do
     if Code.ensure_loaded?(driver) and function_exported?(driver, :sonar_round_s, 1),
-      do: %{
-        profile
-        | sonar_round_s: driver.sonar_round_s(Keyword.put_new(options, :profile, profile))
-      },
-      else: profile
+      do: round(config, driver.sonar_round_s(Keyword.put_new(options, :profile, profile))),
+      else: {:ok, config}
+  end
+
+  defp round(config, seconds)
+       when is_float(seconds) and seconds >= 0.0 and seconds <= @longest_round_s,
+       do: {:ok, %{config | profile: %{config.profile | sonar_round_s: seconds}}}
+
+  defp round(_config, seconds) do
+    {:error,
+     "robot option drive: its sonars take #{inspect(seconds)} s for a round; 0.0 to #{@longest_round_s} s are allowed"}
   end
 end

@@ -48,4 +48,31 @@ defmodule Robot.ConfigTest do
     assert {:error, line} = Config.new(id: :mag1, profile: Hal.Profile.magellan())
     assert line =~ "option drive is missing: {module, options}"
   end
+
+  defmodule Slow do
+    def sonar_round_s(options), do: options[:round]
+  end
+
+  test "the body knows how long its driver's sonars take for a round" do
+    config = fn drive ->
+      Robot.Config.new(id: :mag1, profile: Hal.Profile.magellan(), drive: drive)
+    end
+
+    assert {:ok, %{profile: %{sonar_round_s: 0.0}}} = config.({Some.Drive, []})
+
+    assert {:ok, %{profile: %{sonar_round_s: 0.59375}}} =
+             config.({Hal.RFlex.Driver, [port: "/dev/ttyR0"]})
+
+    assert {:ok, %{profile: %{sonar_round_s: 1.5}}} = config.({Slow, [round: 1.5]})
+
+    for wrong <- [nil, -0.1, 2.1, 1, "1.0"] do
+      assert {:error, line} = config.({Slow, [round: wrong]})
+      assert line =~ "its sonars take #{inspect(wrong)} s for a round; 0.0 to 2.0 s are allowed"
+    end
+
+    slow = [port: "/dev/ttyR0", sonar_times: {1_000_000, 1_000_000, 0}]
+
+    assert {:error, "robot option drive: its sonars take 38.0 s" <> _} =
+             config.({Hal.RFlex.Driver, slow})
+  end
 end

@@ -80,18 +80,7 @@ defmodule Bench.Soak.Deeds do
     end)
   end
 
-  def carry_out(s, {:estop, robot}) do
-    case [robot | s.fleet.robots] |> Enum.find(&State.here?(s, &1)) do
-      nil ->
-        State.write(s, "no e-stop: nobody is here")
-
-      from ->
-        s =
-          %{s | reset?: false} |> State.count(:estop) |> State.note({now(), :soak, :estop, from})
-
-        s |> Orders.call(from, {:estop, []}) |> State.write("e-stop ordered on #{from}")
-    end
-  end
+  def carry_out(s, {:estop, robot}), do: estop(s, [robot | s.fleet.robots -- [robot]])
 
   def carry_out(s, :reset) do
     %{s | reset?: true}
@@ -107,8 +96,34 @@ defmodule Bench.Soak.Deeds do
 
   def carry_out(s, :calm), do: State.write(%{s | start_until_us: now() + 30_000_000}, "calm")
 
-  @doc "Ends what lasts."
+  defp estop(s, robots) do
+    case Enum.drop_while(robots, &(not State.here?(s, &1))) do
+      [] ->
+        State.write(s, "no e-stop: nobody is here")
+
+      [from | others] ->
+        s =
+          %{s | reset?: false} |> State.count(:estop) |> State.note({now(), :soak, :estop, from})
+
+        s
+        |> Orders.call(from, {:estop, []}, {:estop_answer, from, others})
+        |> State.write("e-stop ordered on #{from}")
+    end
+  end
+
+  @doc "Ends what lasts, and hears the answer to an e-stop."
   @spec end_of(State.t(), tuple()) :: State.t()
+  # Who is told that it was not carried out, and sees nobody held, presses another robot's.
+  def end_of(s, {{:estop_answer, from, others}, {:error, _line}}) do
+    held? = Enum.any?(s.judge.stops.held, &match?({_robot, true}, &1))
+
+    if held? or s.judge.stops.order == nil,
+      do: s,
+      else: s |> State.note({now(), :soak, :estop_refused, from}) |> estop(others)
+  end
+
+  def end_of(s, {{:estop_answer, _from, _others}, _ok}), do: s
+
   def end_of(s, {:thaw, robot, vm}) do
     :ok = Vm.signal(vm, "CONT")
 

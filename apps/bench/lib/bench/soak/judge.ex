@@ -12,6 +12,7 @@ defmodule Bench.Soak.Judge do
   | `:cut`, `:heal` | the pairs that are parted; `nil` |
   | `:network` | packets are lost from then on, or no more |
   | `:estop`, `:reset` | the robot; `nil` |
+  | `:estop_refused` | the robot, which answered that the e-stop was not carried out, while nobody was held |
   | `:start` | a start of the mission was ordered |
   | `:collisions` | how many there have been in the world, and the newest of them in words, newest first |
   | `:orphans` | `{node, lines}` |
@@ -94,6 +95,9 @@ defmodule Bench.Soak.Judge do
 
   defp take(judge, us, :soak, :estop, robot),
     do: {[], touch(%{judge | stops: Stops.order(judge.stops, robot, us)}, judge.links.robots, us)}
+
+  defp take(judge, us, :soak, :estop_refused, _robot),
+    do: {[], touch(%{judge | stops: Stops.refuse(judge.stops)}, judge.links.robots, us)}
 
   defp take(judge, us, :soak, :reset, _value),
     do: {[], touch(%{judge | stops: Stops.release(judge.stops)}, judge.links.robots, us)}

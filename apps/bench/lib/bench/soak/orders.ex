@@ -46,13 +46,18 @@ defmodule Bench.Soak.Orders do
     end
   end
 
-  @doc "Gives an order on this node."
-  @spec call(State.t(), atom(), {atom(), list()}) :: State.t()
-  def call(s, from, {function, arguments}) do
+  @doc "Gives an order on this node. With a `tag` the run gets the answer, if there is one, as `{:later, {tag, answer}}`."
+  @spec call(State.t(), atom(), {atom(), list()}, tag :: term()) :: State.t()
+  def call(s, from, {function, arguments}, tag \\ nil) do
     vm = s.vms[from]
+    runner = self()
 
     aside(
-      fn -> Vm.call(vm, Swarm, function, arguments, @order_ms) end,
+      fn ->
+        answer = Vm.call(vm, Swarm, function, arguments, @order_ms)
+        if tag, do: send(runner, {:later, {tag, answer}})
+        answer
+      end,
       &"#{from}: #{function} #{words(&1)}"
     )
 

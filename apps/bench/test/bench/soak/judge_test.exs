@@ -126,6 +126,13 @@ defmodule Bench.Soak.JudgeTest do
       assert judged([{26, :c, :held, true} | healed], [27, 28, 29]) == []
     end
 
+    test "one that was answered not to have been carried out holds nobody; the next one does" do
+      refused = up() ++ [{10, :soak, :estop, :a}, {10.1, :soak, :estop_refused, :a}]
+      assert judged(refused, [12, 20]) == []
+      next = [{10.1, :soak, :estop, :b}, {10.3, :b, :held, true}, {10.3, :a, :held, true}]
+      assert ["c is not held 1900 ms after the e-stop on b"] = judged(refused ++ next, [12])
+    end
+
     test "that is not released everywhere is found" do
       stopped = [{5, :soak, :estop, :a}, {5.1, :c, :held, true}, {10, :soak, :reset, nil}]
 

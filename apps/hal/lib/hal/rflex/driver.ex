@@ -67,6 +67,8 @@ defmodule Hal.RFlex.Driver do
   @no_wheels_ms 500
   @again_ms 1_000
   @silent_ms 2_000
+  # The echoes that a report may hold.
+  @reported 4
 
   @enforce_keys [:options, :line, :ref, :queue, :ramp, :senses, :heard_ms, :bytes_ms, :stepped_ms]
   defstruct @enforce_keys ++
@@ -123,16 +125,16 @@ defmodule Hal.RFlex.Driver do
   end
 
   @doc """
-  Its sonars fire one after the other (`:sonar_times`).
+  Its sonars fire one after the other (`:sonar_times`), and a report may hold the last four.
 
       iex> Hal.RFlex.Driver.sonar_round_s(port: "/dev/ttyR0")
-      0.5
+      0.59375
   """
   @impl Hal.Drive
   def sonar_round_s(given) do
     with {:ok, %{sonar_banks: banks, sonar_times: {echo_us, ping_us, set_us}}} <-
            Options.new(given) do
-      (Enum.sum(banks) * (echo_us + ping_us) + set_us) / 1.0e6
+      ((Enum.sum(banks) + @reported - 1) * (echo_us + ping_us) + set_us) / 1.0e6
     else
       # A driver with such options does not start.
       {:error, _line} -> 0.0

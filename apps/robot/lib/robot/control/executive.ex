@@ -215,13 +215,15 @@ defmodule Robot.Control.Executive do
   # Of counters that jump away from zero nobody knows where it is: noted is the frame of the last reading near zero.
   defp depart(%{departure: {:near, frame}} = s, %Odometry{pose: pose} = odometry) do
     if Departure.left?(pose),
-      do: note(s, frame || Departure.frame(nil)),
+      do: note(%{s | departure: {:left, frame || Departure.frame(nil)}}),
       else: %{s | departure: {:near, Departure.frame(odometry.frame)}}
   end
 
+  defp depart(%{departure: {:left, _frame}} = s, _odometry), do: note(s)
+
   # Written here, because what comes after a crash must find it: a line, not synced, to a folder in memory. A disk that
   # hangs meets the gate's dead man's switch. What fails is tried again once a second.
-  defp note(%{config: %{id: id, departure_file: path}} = s, frame) do
+  defp note(%{config: %{id: id, departure_file: path}, departure: {:left, frame}} = s) do
     cond do
       s.note_at_tick > s.tick ->
         s

@@ -35,7 +35,7 @@ defmodule Robot.Behaviour.CautionTest do
       assert speed(inner, percept(true, %{})) > 0.3
     end
 
-    assert speed(roll.(-0.5), percept(true, far)) == -0.2
+    assert speed(roll.(-0.5), percept(true, far)) == -0.1
     assert speed(roll.(0.1), percept(true, far)) == 0.1
   end
 end

@@ -14,7 +14,8 @@ defmodule Sim.World.Server do
 
   Wheels stop when the process of their drive ends, and also when no speed has come for 200 ms: a
   robot that is frozen can send nothing any more, and on a real one the port program of the serial line, whose
-  keep-alive this is, writes its last words then.
+  keep-alive this is, writes its last words then. (If only the gate of a real robot hangs, its driver goes on for 500 ms
+  until the watchdog of its device; here it stands sooner.)
 
   Steps are scheduled at absolute times, so the pace does not drift. A late step is not made up
   for: then the world is slow, and reports it by the event `[:sim, :server, :late]` with

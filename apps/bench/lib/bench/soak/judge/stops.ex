@@ -22,6 +22,10 @@ defmodule Bench.Soak.Judge.Stops do
   @spec order(t(), atom(), integer()) :: t()
   def order(stops, robot, us), do: %{stops | order: {robot, us}, count: stops.count + 1}
 
+  @doc "It was answered that the stop was not carried out."
+  @spec refuse(t()) :: t()
+  def refuse(stops), do: %{stops | order: nil, count: stops.count - 1}
+
   @doc "The stop was released, or is about to be."
   @spec release(t()) :: t()
   def release(stops), do: %{stops | order: nil}

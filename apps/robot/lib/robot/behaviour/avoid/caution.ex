@@ -6,9 +6,10 @@ defmodule Robot.Behaviour.Avoid.Caution do
   alias Hal.Twist
   alias Robot.{Percept, Wish}
 
-  # Up to this speed (m/s) the gate's limits alone keep robots apart that drive across each other's ways without looking
-  # (`Sim.GateAloneTest`; docs/results.md, section 6).
+  # Up to this speed (m/s) the gate's limits alone kept robots apart that all drove so across each other's ways without
+  # looking (`Sim.GateAloneTest`; docs/results.md, section 6). A base may have few sonars behind.
   @speed 0.2
+  @backwards 0.1
 
   @doc "The percept of a robot that shall go no faster than what it knows allows."
   @spec percept(Percept.t()) :: Percept.t()
@@ -23,12 +24,10 @@ defmodule Robot.Behaviour.Avoid.Caution do
   def wish(%Wish{twist: twist, velocity: velocity} = wish, %Percept{profile: %{max_linear: most}}) do
     %{
       wish
-      | twist: Twist.new(clamp(twist.linear, most), twist.turn),
+      | twist: Twist.new(twist.linear |> min(most) |> max(-@backwards), twist.turn),
         velocity: shorten(velocity, most)
     }
   end
-
-  defp clamp(speed, most), do: speed |> min(most) |> max(-most)
 
   defp shorten(nil, _most), do: nil
 
