@@ -58,12 +58,14 @@ defmodule Robot.ConfigTest do
       Robot.Config.new(id: :mag1, profile: Hal.Profile.magellan(), drive: drive)
     end
 
-    assert {:ok, %{profile: %{sonar_round_s: 0.0}}} = config.({Some.Drive, []})
+    round = fn drive ->
+      assert {:ok, %{profile: profile}} = config.(drive)
+      profile.sonar_round_s
+    end
 
-    assert {:ok, %{profile: %{sonar_round_s: 0.59375}}} =
-             config.({Hal.RFlex.Driver, [port: "/dev/ttyR0"]})
-
-    assert {:ok, %{profile: %{sonar_round_s: 1.5}}} = config.({Slow, [round: 1.5]})
+    assert round.({Some.Drive, []}) == 0.0
+    assert round.({Hal.RFlex.Driver, [port: "/dev/ttyR0"]}) == 0.59375
+    assert round.({Slow, [round: 1.5]}) == 1.5
 
     for wrong <- [nil, -0.1, 2.1, 1, "1.0"] do
       assert {:error, line} = config.({Slow, [round: wrong]})
