@@ -193,13 +193,20 @@ defmodule Swarm do
   Emergency stop: all robots stop and are held until `reset/0`. It is sent at once by all
   available ways, and repeated for a second; each robot that hears of it tells the others, so that
   it also reaches those that this node does not reach. `:ok` when all robots that are known here
-  have answered that they are held. The hardware's own emergency stop stays the last resort: this
-  one is software.
+  have answered that they are held; an error where none is known, because none has answered then.
+  The hardware's own emergency stop stays the last resort: this one is software.
   """
   @spec estop() :: answer()
   def estop do
     call = Broadcaster.sound()
-    with {:ok, robots} <- Commands.robots(:all), do: Commands.tell(robots, {:estop, call})
+
+    case Commands.robots(:all) do
+      {:ok, robots} ->
+        Commands.tell(robots, {:estop, call})
+
+      {:error, _none} ->
+        {:error, "the stop was sent, but no robot is known here to be held by it"}
+    end
   end
 
   @doc """

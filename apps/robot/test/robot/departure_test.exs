@@ -16,26 +16,26 @@ defmodule Robot.DepartureTest do
   end
 
   test "a note counts until it is deleted, and not after the machine was booted", %{path: path} do
-    assert Departure.noted(nil) == nil
-    assert Departure.noted(path) == nil
+    assert Departure.Note.read(nil) == nil
+    assert Departure.Note.read(path) == nil
     frame = Departure.frame(make_ref())
-    assert Departure.note(path, frame) == :ok
-    assert Departure.noted(path) == frame
+    assert Departure.Note.write(path, frame) == :ok
+    assert Departure.Note.read(path) == frame
     assert File.ls!(Path.dirname(path)) == ["mag1.departed"]
     File.write!(path, "another boot\n#{frame}\n")
-    assert Departure.noted(path) == nil
+    assert Departure.Note.read(path) == nil
 
     for half <- ["", "\n", "another boot\n", "another boot\n#{frame}", <<255, 0>>] do
       File.write!(path, half)
-      refute Departure.start?(Departure.noted(path), make_ref())
+      refute Departure.start?(Departure.Note.read(path), make_ref())
     end
 
-    refute Departure.start?(Departure.noted(Path.dirname(path)), make_ref())
-    assert Departure.note(path, frame) == :ok
-    assert Departure.forget(path) == :ok
-    assert Departure.noted(path) == nil
-    assert Departure.forget(path) == :ok
-    assert Departure.note(Path.join(path, "x"), frame) == {:error, :enoent}
+    refute Departure.start?(Departure.Note.read(Path.dirname(path)), make_ref())
+    assert Departure.Note.write(path, frame) == :ok
+    assert Departure.Note.delete(path) == :ok
+    assert Departure.Note.read(path) == nil
+    assert Departure.Note.delete(path) == :ok
+    assert Departure.Note.write(Path.join(path, "x"), frame) == {:error, :enoent}
   end
 
   defp radius(departed, frame, odometry) do
@@ -92,7 +92,7 @@ defmodule Robot.DepartureTest do
     assert eventually(fn -> radius(id) end) < 0.2
     refute File.exists?(path)
     count(id, frame, Pose.new(0.5, 0))
-    assert eventually(fn -> Departure.noted(path) end) == Departure.frame(frame)
+    assert eventually(fn -> Departure.Note.read(path) end) == Departure.frame(frame)
 
     listen(id, [:robot, :executive, :start])
     listen(id, [:robot, :executive, :away])
@@ -121,7 +121,7 @@ defmodule Robot.DepartureTest do
 
     noted = fn ->
       count(id, another, Pose.new(0, 0))
-      Departure.noted(path)
+      Departure.Note.read(path)
     end
 
     assert eventually(noted) == Departure.frame(frame)
@@ -137,7 +137,7 @@ defmodule Robot.DepartureTest do
     count(id, frame, Pose.new(0, 0))
     assert eventually(fn -> radius(id) end) < 0.2
     count(id, frame, Pose.new(0.5, 0))
-    assert eventually(fn -> Departure.noted(path) end)
+    assert eventually(fn -> Departure.Note.read(path) end)
     listen(id, [:robot, :executive, :start])
     listen(id, [:robot, :executive, :away])
     kill(id, :executive)

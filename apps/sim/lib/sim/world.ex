@@ -8,8 +8,9 @@ defmodule Sim.World do
   high, and solid, too.
 
   `collisions` counts new contacts of a robot with a robot (even a dead one) or a wall; a contact
-  lasts until the two are more than 1 cm apart; `contacts` tells of the newest ones. `min_separation` is the least gap between two
-  robots so far, edge to edge, `nil` with fewer than two.
+  lasts until the two are more than 1 cm apart; `contacts` are the newest of these, newest first.
+  `min_separation` is the least gap between two robots so far, edge to edge, `nil` with fewer than
+  two.
   """
   alias Hal.{Options, Pose, Twist}
   alias Sim.{Compute, Floorplan, World}

@@ -12,7 +12,7 @@ defmodule Bench.Soak.Judge do
   | `:cut`, `:heal` | the pairs that are parted; `nil` |
   | `:network` | packets are lost from then on, or no more |
   | `:estop`, `:reset` | the robot; `nil` |
-  | `:estop_refused` | the robot, which answered that the e-stop was not carried out, while nobody was held |
+  | `:estop_refused` | the robot whose node answered that it knows of no robot that could be held |
   | `:start` | a start of the mission was ordered |
   | `:collisions` | how many there have been in the world, and the newest of them in words, newest first |
   | `:orphans` | `{node, lines}` |

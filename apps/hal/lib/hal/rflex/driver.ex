@@ -67,7 +67,7 @@ defmodule Hal.RFlex.Driver do
   @no_wheels_ms 500
   @again_ms 1_000
   @silent_ms 2_000
-  # The echoes that a report may hold.
+  # The echoes in a report: our assumption, because no source gives their number.
   @reported 4
 
   @enforce_keys [:options, :line, :ref, :queue, :ramp, :senses, :heard_ms, :bytes_ms, :stepped_ms]
@@ -125,7 +125,7 @@ defmodule Hal.RFlex.Driver do
   end
 
   @doc """
-  Its sonars fire one after the other (`:sonar_times`), and a report may hold the last four.
+  Its sonars fire one after the other (`:sonar_times`); a report is assumed to hold four echoes.
 
       iex> Hal.RFlex.Driver.sonar_round_s(port: "/dev/ttyR0")
       0.59375

@@ -63,22 +63,18 @@ defmodule Robot.Behaviour.Avoid do
 
   @impl Behaviour
   def tick(percept, state) do
-    careful = Caution.percept(percept)
+    percept = Caution.percept(percept)
 
-    case Behaviour.tick(state.inner, careful) do
+    case Behaviour.tick(state.inner, percept) do
       {:running, wish, inner} ->
-        {wish, state} = safe(slowed(wish, percept, careful), careful, %{state | inner: inner})
-        {:running, wish, {__MODULE__, state}}
+        # Before, because a velocity is bent as it is; and after, because the way round something may go backwards.
+        {wish, state} = safe(Caution.wish(wish, percept), percept, %{state | inner: inner})
+        {:running, Caution.wish(wish, percept), {__MODULE__, state}}
 
       done ->
         done
     end
   end
-
-  # What a robot may do that knows where it is, is for the gate to limit.
-  defp slowed(nil, _percept, _careful), do: nil
-  defp slowed(wish, percept, percept), do: wish
-  defp slowed(wish, _percept, careful), do: Caution.wish(wish, careful)
 
   defp safe(nil, _percept, state), do: {nil, state}
   defp safe(wish, %Percept{pose: nil}, state), do: {wish, state}

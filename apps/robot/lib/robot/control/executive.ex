@@ -87,7 +87,7 @@ defmodule Robot.Control.Executive do
     Board.put(board, :executive, :doing, doing, at_ms)
     Board.put(board, :executive, :goal, nil, at_ms)
     Event.execute([:robot, :executive, :start], %{at_ms: at_ms}, %{robot: id})
-    departed = Departure.noted(config.departure_file)
+    departed = Departure.Note.read(config.departure_file)
 
     s = %{
       config: config,
@@ -228,7 +228,7 @@ defmodule Robot.Control.Executive do
       s.note_at_tick > s.tick ->
         s
 
-      Departure.note(path, frame) == :ok ->
+      Departure.Note.write(path, frame) == :ok ->
         %{s | departure: :noted}
 
       true ->

@@ -191,7 +191,7 @@ defmodule Robot.Safety.Gate do
 
   defp frame(board, config) do
     with :error <- Board.fetch(board, :frame, :infinity) do
-      noted = Departure.noted(config.departure_file)
+      noted = Departure.Note.read(config.departure_file)
       if noted, do: {:was, noted}
     else
       {:ok, frame, _at_ms} -> frame

@@ -78,7 +78,7 @@ defmodule Robot.Safety.Reflex do
           before: {Twist.t(), integer() | nil}
         }
 
-  @typedoc "The odometry frame of the fence: `:was`, that in which the robot has left its start pose, before it is read."
+  @typedoc "The odometry frame of the fence; `:was` that in which the robot left its start pose, until odometry comes."
   @type fence_frame :: {:is, reference() | nil} | {:was, Departure.frame()} | nil
 
   @typedoc "Whether the next `step/2` is due now, or with the next period."

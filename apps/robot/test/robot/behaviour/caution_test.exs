@@ -38,4 +38,52 @@ defmodule Robot.Behaviour.CautionTest do
     assert speed(roll.(-0.5), percept(true, far)) == -0.1
     assert speed(roll.(0.1), percept(true, far)) == 0.1
   end
+
+  defmodule Aside do
+    @behaviour Robot.Behaviour
+    @impl Robot.Behaviour
+    def new(options), do: {__MODULE__, options[:velocity]}
+    @impl Robot.Behaviour
+    def update(_options, velocity), do: {__MODULE__, velocity}
+    @impl Robot.Behaviour
+    def tick(_percept, velocity) do
+      wish = %Robot.Wish{
+        by: :aside,
+        weight: 1.0,
+        twist: Twist.new(0.0, 0.0),
+        velocity: velocity,
+        goal: {2.0, 0.0}
+      }
+
+      {:running, %{wish | reverse?: true}, {__MODULE__, velocity}}
+    end
+  end
+
+  # The least of a second, in which one comes towards it.
+  defp backwards(percept) do
+    coming = %{
+      pose: Pose.new(0.7, 0.05, 3.14),
+      twist: Twist.new(0.3, 0.0),
+      radius: 0.2,
+      at_ms: 0,
+      mode: :moving
+    }
+
+    percept = %{percept | peers: %{mag2: coming}}
+
+    {speeds, _state} =
+      Enum.map_reduce(1..10, Avoid.new(inner: Aside.new(velocity: {-0.15, 0.1})), fn n, state ->
+        {:running, wish, state} = Behaviour.tick(state, %{percept | at_ms: 100 * n})
+        {wish.twist.linear, state}
+      end)
+
+    Enum.min(speeds)
+  end
+
+  test "nor is the way out of another's way faster backwards; a slow body is no exception" do
+    lost = percept(true, %{})
+    slow = %{lost | profile: %{lost.profile | max_linear: 0.2}}
+    for percept <- [lost, slow], do: assert(backwards(percept) == -0.1)
+    assert backwards(percept(false, %{})) < -0.15
+  end
 end

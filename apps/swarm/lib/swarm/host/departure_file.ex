@@ -40,7 +40,7 @@ defmodule Swarm.Host.DepartureFile do
     # A folder that cannot be made shows when the robot leaves its start pose.
     _made = File.mkdir_p(Path.dirname(path))
 
-    with :person <- by, {:error, reason} <- Departure.forget(path) do
+    with :person <- by, {:error, reason} <- Departure.Note.delete(path) do
       reason = :file.format_error(reason)
       Logger.error("#{path} cannot be deleted (#{reason}): the robot will not know where it is")
     end

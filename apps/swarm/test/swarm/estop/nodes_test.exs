@@ -35,6 +35,12 @@ defmodule Swarm.EStop.NodesTest do
     Process.exit(stands, :kill)
   end
 
+  test "a stop is not said to hold anybody where no robot is known" do
+    [base] = Cluster.start_nodes(1)
+    assert {:error, line} = :erpc.call(base, Swarm, :estop, [])
+    assert line == "the stop was sent, but no robot is known here to be held by it"
+  end
+
   test "commands that were queued for a frozen robot are not obeyed when it goes on, except the stop" do
     [far] = Cluster.start_nodes(1)
     id = robot_on(far, :estop_frozen)

@@ -17,11 +17,11 @@ defmodule Swarm.Host.DepartureFileTest do
     path = Path.join(folder, "mag1.departed")
     assert DepartureFile.prepare(nil) == nil
     assert DepartureFile.prepare({path, :person}) == path
-    assert Departure.note(path, "a frame") == :ok
+    assert Departure.Note.write(path, "a frame") == :ok
     assert DepartureFile.prepare({path, :service}) == path
-    assert Departure.noted(path) == "a frame"
+    assert Departure.Note.read(path) == "a frame"
     assert DepartureFile.prepare({path, :person}) == path
-    assert Departure.noted(path) == nil
+    assert Departure.Note.read(path) == nil
 
     File.mkdir_p!(path)
 

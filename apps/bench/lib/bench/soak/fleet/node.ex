@@ -27,7 +27,7 @@ defmodule Bench.Soak.Fleet.Node do
     Process.unlink(parts)
     config = config(about)
     # Whoever starts the node says where the robot stands.
-    if config.departure_file, do: Robot.Departure.forget(config.departure_file)
+    if config.departure_file, do: Robot.Departure.Note.delete(config.departure_file)
     {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, config, :permanent)
     :ok
   end

@@ -22,7 +22,7 @@ defmodule Bench.Soak.Judge.Stops do
   @spec order(t(), atom(), integer()) :: t()
   def order(stops, robot, us), do: %{stops | order: {robot, us}, count: stops.count + 1}
 
-  @doc "It was answered that the stop was not carried out."
+  @doc "The node answered that it knows of no robot: nobody was said to be held."
   @spec refuse(t()) :: t()
   def refuse(stops), do: %{stops | order: nil, count: stops.count - 1}
 

@@ -11,22 +11,28 @@ defmodule Robot.Behaviour.Avoid.Caution do
   @speed 0.2
   @backwards 0.1
 
-  @doc "The percept of a robot that shall go no faster than what it knows allows."
+  @doc "The percept, with the greatest speed that such a robot may have among others."
   @spec percept(Percept.t()) :: Percept.t()
-  def percept(%Percept{uncertainty: %{lost?: true}, peers: peers, profile: profile} = percept)
-      when peers != %{},
-      do: %{percept | profile: %{profile | max_linear: min(profile.max_linear, @speed)}}
+  def percept(%Percept{profile: profile} = percept) do
+    if lost?(percept),
+      do: %{percept | profile: %{profile | max_linear: min(profile.max_linear, @speed)}},
+      else: percept
+  end
 
-  def percept(percept), do: percept
+  defp lost?(%Percept{uncertainty: %{lost?: true}, peers: peers}), do: peers != %{}
+  defp lost?(_percept), do: false
 
-  @doc "The wish at no more than the speed of the percept's profile."
-  @spec wish(Wish.t(), Percept.t()) :: Wish.t()
-  def wish(%Wish{twist: twist, velocity: velocity} = wish, %Percept{profile: %{max_linear: most}}) do
-    %{
+  @doc "The wish, at no more than that speed, and slower backwards; what another robot may do, its gate limits."
+  @spec wish(Wish.t() | nil, Percept.t()) :: Wish.t() | nil
+  def wish(nil, _percept), do: nil
+
+  def wish(%Wish{twist: twist, velocity: velocity} = wish, percept) do
+    if lost?(percept) do
+      linear = twist.linear |> min(@speed) |> max(-@backwards)
+      %{wish | twist: Twist.new(linear, twist.turn), velocity: shorten(velocity, @speed)}
+    else
       wish
-      | twist: Twist.new(twist.linear |> min(most) |> max(-@backwards), twist.turn),
-        velocity: shorten(velocity, most)
-    }
+    end
   end
 
   defp shorten(nil, _most), do: nil
