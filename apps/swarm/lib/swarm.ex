@@ -198,7 +198,8 @@ defmodule Swarm do
   """
   @spec estop() :: answer()
   def estop do
-    call = Broadcaster.sound()
+    call = Broadcaster.call()
+    :ok = Broadcaster.sound(call)
 
     case Commands.robots(:all) do
       {:ok, robots} ->

@@ -100,7 +100,7 @@ defmodule Swarm.Member do
   end
 
   def step(member, {:command, :estop, at_ms}),
-    do: latch(member, EStop.State.press(member.stop), at_ms)
+    do: latch(member, EStop.State.press(member.stop, {member.id, 0, at_ms}), at_ms)
 
   def step(member, {:command, :reset, _at_ms}) do
     stop = EStop.State.reset(member.stop)

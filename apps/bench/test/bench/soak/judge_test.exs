@@ -126,6 +126,26 @@ defmodule Bench.Soak.JudgeTest do
       assert judged([{26, :c, :held, true} | healed], [27, 28, 29]) == []
     end
 
+    test "is asked of a robot that has forgotten it only where another one knows it" do
+      cut = [
+        {5, :soak, :cut, [{:a, :b}, {:a, :c}]},
+        {10, :soak, :estop, :a},
+        {10.2, :a, :held, true}
+      ]
+
+      again = [
+        {11, :soak, :down, :a},
+        {11, :a, :held, nil},
+        {12, :soak, :heal, nil},
+        {15, :soak, :up, :a},
+        {15.1, :a, :held, false}
+      ]
+
+      assert judged(up() ++ cut ++ again, [20, 30]) == []
+      knows = [{14, :b, :held, true}]
+      assert [_a, _c] = judged(up() ++ cut ++ again ++ knows, [30])
+    end
+
     test "one that was answered not to have been carried out holds nobody; the next one does" do
       refused = up() ++ [{10, :soak, :estop, :a}, {10.1, :soak, :estop_refused, :a}]
       assert judged(refused, [12, 20]) == []

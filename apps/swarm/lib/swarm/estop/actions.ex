@@ -89,7 +89,7 @@ defmodule Swarm.EStop.Actions do
   end
 
   defp answer(:estop, s) do
-    s = press(s, EStop.State.press(s.stop))
+    s = press(s, &EStop.State.press/2)
     {EStop.Answer.stopped(s.id, s.board), s}
   end
 
@@ -127,14 +127,15 @@ defmodule Swarm.EStop.Actions do
 
   # Robots hear of a stop from their neighbours' heartbeats, too; but only a call says when it was
   # made, and a robot that is being reset at this moment must know that.
-  defp press(%{stop: before} = s, stop) do
-    s = become(pressed(s), stop)
+  defp press(%{stop: before} = s, press) do
+    call = Broadcaster.call()
+    s = become(pressed(s), press.(before, call))
 
     # A button that is pressed again and again is one stop to the others.
     if before.latched? and s.sounded_us != nil and now_us() - s.sounded_us < @anew_us do
       s
     else
-      call = Broadcaster.sound()
+      :ok = Broadcaster.sound(call)
       write(%{s | stop: EStop.State.late(s.stop, call), sounded_us: now_us()})
     end
   end
@@ -223,7 +224,7 @@ defmodule Swarm.EStop.Actions do
     s = %{s | presses: Gate.presses(s.board)}
 
     if Board.latched?(s.board),
-      do: press(s, EStop.State.follow(s.stop, true)),
+      do: press(s, &EStop.State.follow(&1, true, &2)),
       else: reset(s, now_us())
   end
 

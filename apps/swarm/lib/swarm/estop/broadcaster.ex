@@ -2,7 +2,7 @@ defmodule Swarm.EStop.Broadcaster do
   @moduledoc """
   Broadcasts the emergency stop; one process on each node, also on a node without a robot.
 
-  `sound/0` sends a call to stop to every robot's e-stop process in the directory and, by signed
+  `sound/1` sends a call to stop to every robot's e-stop process in the directory and, by signed
   datagrams, to every node. That happens at once, in the caller; this process then repeats it, ten
   times in all, every 100 ms, even if the caller has ended. Every call has an identity
   (`t:Swarm.EStop.Calls.call/0`), so that a robot obeys it once, and an age, which each holder
@@ -27,13 +27,15 @@ defmodule Swarm.EStop.Broadcaster do
   @spec start_link(term()) :: GenServer.on_start()
   def start_link(_options), do: HardenedServer.start_link(__MODULE__, [], name: __MODULE__)
 
-  @doc "Calls all robots to stop, and returns the call's identity."
-  @spec sound() :: Calls.call()
-  def sound do
-    call = {node(), boot(), System.unique_integer([:positive, :monotonic])}
+  @doc "The identity of a new call."
+  @spec call() :: Calls.call()
+  def call, do: {node(), boot(), System.unique_integer([:positive, :monotonic])}
+
+  @doc "Calls all robots to stop."
+  @spec sound(Calls.call()) :: :ok
+  def sound(call) do
     send_out(call, 0)
     GenServer.cast(__MODULE__, {:repeat, call, @times - 1})
-    call
   end
 
   @doc "Passes on a call that was heard; a call of this node is being repeated anyway."

@@ -4,7 +4,7 @@ defmodule Swarm.Membership.Heartbeat do
   hears, and the one that it follows. Whole numbers only: mm, mrad, mm/s, mrad/s, millionths of a
   picture.
 
-  `estop` is the number of the last emergency stop that it knows, 0 for none, and `latched` says
+  `estop` is the highest number of an emergency stop that it knows, 0 for none, and `latched` says
   whether its own latch is set (`Swarm.EStop.State`). `sight` is its newest view of the landmark:
   relative size and estimated distance, `nil` if it does not see it. Only the leader's heartbeats
   contain `anchor`. `in_place` says that a follower is in its slot, `unsure` that it believes so
@@ -59,9 +59,9 @@ defmodule Swarm.Membership.Heartbeat do
           anchor: Swarm.Formation.Reference.t() | nil
         }
 
-  # Boot numbers may be times in ms, or, on finer clocks, in ns. Nobody can make the numbers of
-  # stops run so far, because they are taken in steps (`Swarm.EStop.State`).
-  @latest 0xFFFFFFFFFFFFFFFF
+  # Of 16 bits of tag, and of counts that nobody can make run so far, because they are taken in steps
+  # (`Swarm.EStop.State`).
+  @last_stop 0xFFFFFFFFFFFFFFFFFFFF
 
   # Five a second. Ticks come every 100 ms, some of them a little early.
   @period_ms 200
@@ -159,7 +159,7 @@ defmodule Swarm.Membership.Heartbeat do
       Enum.all?(
         [beat.standing, beat.in_place, beat.unsure, beat.blocked, beat.formed, beat.latched],
         &is_boolean/1
-      ) and beat.estop in 0..@latest and
+      ) and beat.estop in 0..@last_stop and
       (beat.anchor == nil or Swarm.Formation.Reference.valid?(beat.anchor))
   end
 

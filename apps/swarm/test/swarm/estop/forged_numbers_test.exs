@@ -5,7 +5,11 @@ defmodule Swarm.EStop.ForgedNumbersTest do
   alias Swarm.EStop.{Calls, State}
 
   @last 0xFFFFFFFFFFFFFFFF
+  # A number is a count with a tag of 16 bits.
+  @tags 65_536
+  @last_number 0xFFFFFFFFFFFFFFFFFFFF
   @boot 1_700_000_000_000
+  @call {:base@hall, @boot, 1}
 
   # All hear each other's heartbeats, several times.
   defp beats(stops, times \\ 10) do
@@ -22,10 +26,10 @@ defmodule Swarm.EStop.ForgedNumbersTest do
   defp all(stops, function), do: Enum.map(stops, function)
 
   test "a latched heartbeat stops, whatever its number, and leaves room for later ones" do
-    for number <- [1, 100_001, 1_000_000, 500_000_000, @last] do
+    for number <- [1, 100_001 * @tags, 1_000_000 * @tags, 500_000_000 * @tags, @last_number] do
       stop = State.hear(State.new(), number, true)
       assert stop.latched?
-      assert stop.known <= 1_000_000
+      assert stop.known <= 1_000_000 * @tags
       refute State.hear(State.reset(stop), stop.known, true).latched?
     end
   end
@@ -33,14 +37,14 @@ defmodule Swarm.EStop.ForgedNumbersTest do
   test "after one heartbeat with the last number the fleet is stopped and reset as before" do
     for latched? <- [true, false], hearers <- [1, 2, 3] do
       {some, others} = Enum.split(List.duplicate(State.new(), 3), hearers)
-      stops = beats(all(some, &State.hear(&1, @last, latched?)) ++ others)
+      stops = beats(all(some, &State.hear(&1, @last_number, latched?)) ++ others)
       assert latched(stops) == List.duplicate(latched?, 3)
       stops = stops |> all(&State.reset/1) |> beats()
       assert latched(stops) == [false, false, false]
       [first | rest] = stops
-      stops = beats([State.press(first) | rest])
+      stops = beats([State.press(first, @call) | rest])
       assert latched(stops) == [true, true, true]
-      assert Enum.all?(stops, &(&1.known < 10_000_000))
+      assert Enum.all?(stops, &(&1.known < 10_000_000 * @tags))
       # A person resets one after the other, while the others are still latched.
       stops =
         for n <- 0..2, reduce: stops do
@@ -52,7 +56,12 @@ defmodule Swarm.EStop.ForgedNumbersTest do
   end
 
   test "a robot that is new to a fleet with a high number is stopped by it at once" do
-    fleet = List.duplicate(%State{known: 7_000_000, cleared: 6_999_999, latched?: true}, 2)
+    fleet =
+      List.duplicate(
+        %State{known: 7_000_000 * @tags, cleared: 6_999_999 * @tags, latched?: true},
+        2
+      )
+
     [new | _fleet] = beats([State.new() | fleet], 1)
     assert new.latched?
     stops = [State.new() | fleet] |> beats(100) |> all(&State.reset/1) |> beats()
@@ -60,8 +69,8 @@ defmodule Swarm.EStop.ForgedNumbersTest do
   end
 
   test "a stop pressed by such a robot reaches the fleet by heartbeats alone" do
-    fleet = List.duplicate(%State{known: 700_000, cleared: 700_000}, 2)
-    assert latched(beats([State.press(State.new()) | fleet], 20)) == [true, true, true]
+    fleet = List.duplicate(%State{known: 700_000 * @tags, cleared: 700_000 * @tags}, 2)
+    assert latched(beats([State.press(State.new(), @call) | fleet], 20)) == [true, true, true]
   end
 
   test "a call with the last counter, or the last boot, does not hide the later calls of its node" do

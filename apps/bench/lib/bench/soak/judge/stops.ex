@@ -52,8 +52,9 @@ defmodule Bench.Soak.Judge.Stops do
   def judge(%{order: nil}, _links, _now), do: []
 
   def judge(%{order: {from, at_us}} = stops, links, now) do
-    told = [from | for({robot, true} <- stops.held, do: robot)]
-    begun = if links.here[from], do: told, else: tl(told)
+    held = for {robot, true} <- stops.held, do: robot
+    # A robot that has started again since has forgotten it, if no other one has told it.
+    begun = if (links.here[from] || now) <= at_us, do: [from | held], else: held
 
     for robot <- Links.reach(links, begun),
         stops.held[robot] != true,
