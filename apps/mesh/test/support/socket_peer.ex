@@ -52,7 +52,7 @@ defmodule Mesh.SocketPeer do
         peer
 
       turns == 0 ->
-        flunk("it did not come to pass")
+        flunk("it did not come to pass; it was told #{inspect(peer.told)}")
 
       true ->
         peer
