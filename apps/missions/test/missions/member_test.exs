@@ -164,12 +164,12 @@ defmodule Swarm.MemberTest do
 
   test "an emergency stop spreads by heartbeats, and its own echo does not bring it back" do
     {one, _} = Member.step(member(), {:command, :estop, 0})
-    assert one.stop.latched?
+    assert [_tag] = one.stop.held
 
-    pressed = Message.new(:mag2, :heartbeat, %{@beat | estop: one.stop.known, latched: true})
+    pressed = Message.new(:mag2, :heartbeat, %{@beat | estop: one.stop.held})
 
     two = hear(member(:mag3), pressed)
-    assert {two.stop.known, two.stop.latched?} == {one.stop.known, true}
+    assert two.stop.held == one.stop.held
     assert sense(two, 100).runner.phase == :idle
     {_, [{:drive, twist}]} = Member.step(two, {:reflex, 100})
     assert Twist.zero?(twist)
@@ -177,11 +177,12 @@ defmodule Swarm.MemberTest do
     # A person resets it; the neighbour, not reset yet, repeats the old number.
     {two, _} = Member.step(two, {:command, :reset, 200})
     two = hear(two, put_in(pressed.body.sequence, 2), 300)
-    refute two.stop.latched?
+    assert two.stop.held == []
 
-    # The next stop has a higher number, and counts.
+    # The next stop is another one, and counts.
     {two, _} = Member.step(two, {:command, :estop, 400})
-    assert two.stop.known > one.stop.known
+    assert [tag] = two.stop.held
+    assert tag not in one.stop.held
   end
 
   defmodule Deaf do

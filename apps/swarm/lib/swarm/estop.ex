@@ -65,11 +65,11 @@ defmodule Swarm.EStop do
   would change the state of the stop; otherwise it is dropped in the caller.
   """
   @spec heard(robot :: atom(), Board.t(), Heartbeat.t()) :: :ok
-  def heard(robot, board, %Heartbeat{estop: number, latched: latched?}) do
+  def heard(robot, board, %Heartbeat{estop: tags}) do
     stop = written(board)
 
-    if EStop.State.hear(stop, number, latched?) != stop,
-      do: GenServer.cast(Names.via(robot, :estop), {:beat, number, latched?})
+    if EStop.State.hear(stop, tags) != stop,
+      do: GenServer.cast(Names.via(robot, :estop), {:beat, tags})
 
     :ok
   end
@@ -93,8 +93,7 @@ defmodule Swarm.EStop do
   end
 
   @doc """
-  The state of the stop that the e-stop process published; before the first did, from the gate's
-  latch.
+  The state of the stop that the e-stop process published.
   """
   @spec written(Board.t()) :: EStop.State.t()
   defdelegate written(board), to: EStop.Actions

@@ -108,7 +108,7 @@ defmodule Swarm.Member do
   end
 
   # A command that is accepted while all robots are stopped would begin with the reset.
-  def step(%{stop: %{latched?: true}} = member, {:command, command, _at_ms})
+  def step(%{stop: %{held: [_ | _]}} = member, {:command, command, _at_ms})
       when command != :stop,
       do: {member, []}
 
@@ -175,7 +175,7 @@ defmodule Swarm.Member do
   defp heard(member, :nothing, _at_ms), do: {member, []}
 
   defp heard(member, {:heartbeat, _id, beat}, at_ms),
-    do: latch(member, EStop.State.hear(member.stop, beat.estop, beat.latched), at_ms)
+    do: latch(member, EStop.State.hear(member.stop, beat.estop), at_ms)
 
   defp react(member, :later, _at_ms), do: {member, []}
 
@@ -208,8 +208,8 @@ defmodule Swarm.Member do
   # An e-stop spreads with every heartbeat. The mission ends with it: after the reset nothing
   # moves until somebody gives a command.
   defp latch(
-         %{stop: %{latched?: false}} = member,
-         %{latched?: true} = stop,
+         %{stop: %{held: []}} = member,
+         %{held: [_ | _]} = stop,
          at_ms
        ) do
     member = %{member | reflex: Reflex.estop(member.reflex), stop: stop}

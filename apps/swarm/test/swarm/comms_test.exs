@@ -278,19 +278,27 @@ defmodule Swarm.CommsTest do
     until(:comms16, &is_map_key(Board.peers(&1), :comms15))
     :ok = Gate.estop(:comms15)
     for id <- ids, do: until(id, &Board.latched?/1)
-    assert Swarm.reset() == :ok
 
-    # A heartbeat from before the reset may still be under way, and would stop a newcomer.
-    for [id, other] <- [ids, Enum.reverse(ids)] do
-      cleared? = &match?(%{^other => %{beat: %{estop: n, latched: false}}} when n > 0, &1)
-      until(id, &cleared?.(Board.peers(&1)))
+    says = fn id, other, held? ->
+      until(id, fn board ->
+        case Board.peers(board) do
+          %{^other => %{beat: %{estop: tags}}} -> tags != [] == held?
+          _not_heard -> false
+        end
+      end)
     end
 
+    pairs = [ids, Enum.reverse(ids)]
+    for [id, other] <- pairs, do: says.(id, other, true)
+    assert Swarm.reset() == :ok
+    # A heartbeat from before the reset may still be under way, and would stop a newcomer.
+    for [id, other] <- pairs, do: says.(id, other, false)
+
     talking(:comms17)
-    until(:comms17, &match?(%{comms15: %{beat: %{estop: n}}} when n > 0, Board.peers(&1)))
+    until(:comms17, &is_map_key(Board.peers(&1), :comms15))
     refute Board.latched?(Board.find!(:comms17))
 
-    # It has the same number as the others, so that its own stop is new to them.
+    # Its own stop is new to the others.
     assert Swarm.ask(:comms17, :estop) == :ok
     assert Board.latched?(Board.find!(:comms17))
     for id <- ids, do: until(id, &Board.latched?/1)

@@ -155,10 +155,6 @@ defmodule Swarm.MessageTest do
     near = %{@letter | id: {7, 1, :mag2}, view: [:mag1, :mag2]}
     assert Round.hear(round, :mag2, near, 0).id == near.id
 
-    # A stop is obeyed whatever its number, which is taken only in steps.
-    far = Swarm.EStop.State.hear(Swarm.EStop.State.new(), 1_000_000 * 65_536, true)
-    assert {far.latched?, far.known} == {true, 100_000 * 65_536}
-
     # A wrong sequence number of a robot is forgotten with the robot.
     peers =
       Swarm.Membership.Peers.hear(
@@ -180,7 +176,7 @@ defmodule Swarm.MessageTest do
       calls |> Enum.reduce(EStop.State.new(), &EStop.State.call(&2, &1)) |> EStop.State.reset()
 
     assert Enum.reduce(calls ++ calls, stop, &EStop.State.call(&2, &1)) == stop
-    assert EStop.State.call(stop, {:base@hall, 5, 3}).latched?
-    assert EStop.State.call(stop, {:base@hall, 8, 1}).latched?
+    assert EStop.State.held?(EStop.State.call(stop, {:base@hall, 5, 3}))
+    assert EStop.State.held?(EStop.State.call(stop, {:base@hall, 8, 1}))
   end
 end

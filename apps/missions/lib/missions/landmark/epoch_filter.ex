@@ -52,9 +52,9 @@ defmodule Missions.Landmark.EpochFilter do
   end
 
   defp idle(%{beat: beat} = peer) do
-    %{heard: heard, estop: estop, latched: latched, standing: standing} = beat
+    %{heard: heard, estop: estop, standing: standing} = beat
     said = struct!(Heartbeat, Map.take(beat, [:boot, :sequence, :pose, :twist, :radius]))
-    beat = %{said | heard: heard, estop: estop, latched: latched, standing: standing}
+    beat = %{said | heard: heard, estop: estop, standing: standing}
     %{peer | beat: beat}
   end
 

@@ -12,12 +12,12 @@ defmodule Swarm.Comms.Sender do
 
   @urgent_ticks 10
 
-  @enforce_keys [:config, :board, :transport, :boot, :latched?]
+  @enforce_keys [:config, :board, :transport, :boot, :held]
   defstruct @enforce_keys ++
               [sequence: 0, ticks: 0, beat_ms: nil, urgent: 0, sent: 0, silent?: false]
 
   @typedoc """
-  `sequence` is the number of its last heartbeat, `latched?` what it last sent about the emergency
+  `sequence` is the number of its last heartbeat, `held` what it last sent about the emergency
   stop, `urgent` how many faster heartbeats are left.
   """
   @type t :: %__MODULE__{
@@ -25,7 +25,7 @@ defmodule Swarm.Comms.Sender do
           board: Board.t(),
           transport: Config.call(),
           boot: integer(),
-          latched?: boolean(),
+          held: [EStop.State.tag()],
           sequence: non_neg_integer(),
           ticks: non_neg_integer(),
           beat_ms: integer() | nil,
@@ -42,7 +42,7 @@ defmodule Swarm.Comms.Sender do
       board: board,
       transport: transport,
       boot: boot,
-      latched?: EStop.written(board).latched?
+      held: EStop.written(board).held
     }
 
   @doc "Sends a message to these robots, or to all; a robot that has fallen silent does not."
@@ -76,9 +76,9 @@ defmodule Swarm.Comms.Sender do
   defp notice(%{config: %{pace: :manual}} = sender), do: sender
 
   defp notice(sender) do
-    case EStop.written(sender.board).latched? do
-      same when same == sender.latched? -> sender
-      latched? -> %{sender | latched?: latched?, urgent: @urgent_ticks}
+    case EStop.written(sender.board).held do
+      same when same == sender.held -> sender
+      held -> %{sender | held: held, urgent: @urgent_ticks}
     end
   end
 

@@ -34,16 +34,27 @@ defmodule Swarm.EStop.Actions do
           optional(atom()) => term()
         }
 
-  @doc """
-  The state of the stop that the e-stop process published; before the first did, from the gate's
-  latch.
-  """
+  @doc "The state of the stop that the e-stop process published."
   @spec written(Board.t()) :: EStop.State.t()
-  def written(board) do
-    case Board.fetch(board, :estop, :infinity) do
-      {:ok, stop, _at_ms} -> stop
-      :error -> EStop.State.new(Board.latched?(board))
+  def written(board), do: published(board) || EStop.State.new()
+
+  @doc """
+  The state with which an e-stop process begins: what the one before it published; before the first did, the gate's
+  latch, which has survived a restart, is a stop of its own.
+  """
+  @spec begin(Board.t()) :: EStop.State.t()
+  def begin(board) do
+    cond do
+      stop = published(board) -> stop
+      Board.latched?(board) -> EStop.State.press(EStop.State.new(), Broadcaster.call())
+      true -> EStop.State.new()
     end
+  end
+
+  defp published(board) do
+    with {:ok, stop, _at_ms} <- Board.fetch(board, :estop, :infinity),
+         do: stop,
+         else: (:error -> nil)
   end
 
   @doc """
@@ -66,7 +77,7 @@ defmodule Swarm.EStop.Actions do
     s
   end
 
-  def obey(%{stop: %{latched?: true}} = s, :reset, about) do
+  def obey(%{stop: %{held: [_ | _]}} = s, :reset, about) do
     halt(s, {EStop.Answer, :release, [s.id, s.pressed, about]})
     s
   end
@@ -89,14 +100,14 @@ defmodule Swarm.EStop.Actions do
   end
 
   defp answer(:estop, s) do
-    s = press(s, &EStop.State.press/2)
+    s = press(s)
     {EStop.Answer.stopped(s.id, s.board), s}
   end
 
   defp answer({:estop, call}, s) do
     s = called(s, call, 0)
 
-    if s.stop.latched?,
+    if EStop.State.held?(s.stop),
       do: {EStop.Answer.stopped(s.id, s.board), s},
       else: {{:error, "#{s.id} was reset meanwhile"}, s}
   end
@@ -127,25 +138,25 @@ defmodule Swarm.EStop.Actions do
 
   # Robots hear of a stop from their neighbours' heartbeats, too; but only a call says when it was
   # made, and a robot that is being reset at this moment must know that.
-  defp press(%{stop: before} = s, press) do
+  defp press(%{stop: before} = s) do
     call = Broadcaster.call()
-    s = become(pressed(s), press.(before, call))
+    s = become(pressed(s), EStop.State.press(before, call))
 
-    # A button that is pressed again and again is one stop to the others.
-    if before.latched? and s.sounded_us != nil and now_us() - s.sounded_us < @anew_us do
+    # A button that is pressed again and again is one call to the others; heartbeats tell the rest.
+    if EStop.State.held?(before) and s.sounded_us != nil and now_us() - s.sounded_us < @anew_us do
       s
     else
       :ok = Broadcaster.sound(call)
-      write(%{s | stop: EStop.State.late(s.stop, call), sounded_us: now_us()})
+      %{s | sounded_us: now_us()}
     end
   end
 
-  @doc "A neighbour's heartbeat carries the number of its stop, and whether it is latched."
-  @spec heard(t(), non_neg_integer(), boolean()) :: t()
-  def heard(%{stop: before} = s, number, latched?) do
-    stop = EStop.State.hear(before, number, latched?)
+  @doc "A neighbour's heartbeat carries the tags of the stops that hold it."
+  @spec heard(t(), [EStop.State.tag()]) :: t()
+  def heard(%{stop: before} = s, tags) do
+    stop = EStop.State.hear(before, tags)
     # A reset that was given before this is not meant for it.
-    s = if stop.latched? and not before.latched?, do: pressed(s), else: s
+    s = if stop != before, do: pressed(s), else: s
     become(s, stop)
   end
 
@@ -201,7 +212,7 @@ defmodule Swarm.EStop.Actions do
     s = hold(write(%{s | stop: stop}))
 
     # The mission ends with it: after the reset nothing moves until somebody gives a command.
-    if stop.latched? and not before.latched?, do: halt(s, nil)
+    if EStop.State.held?(stop) and not EStop.State.held?(before), do: halt(s, nil)
 
     GenServer.cast(Names.via(s.id, :comms), :stop)
     s
@@ -210,7 +221,9 @@ defmodule Swarm.EStop.Actions do
   @doc "Latches the gate if the stop is set and the gate is not latched."
   @spec hold(t()) :: t()
   def hold(s) do
-    if s.stop.latched? and not Board.latched?(s.board), do: :ok = Gate.estop(s.id, tell: false)
+    if EStop.State.held?(s.stop) and not Board.latched?(s.board),
+      do: :ok = Gate.estop(s.id, tell: false)
+
     s
   end
 
@@ -220,12 +233,14 @@ defmodule Swarm.EStop.Actions do
   given before that.
   """
   @spec follow(t()) :: t()
-  def follow(s) do
+  def follow(%{presses: before} = s) do
     s = %{s | presses: Gate.presses(s.board)}
 
-    if Board.latched?(s.board),
-      do: press(s, &EStop.State.follow(&1, true, &2)),
-      else: reset(s, now_us())
+    cond do
+      not Board.latched?(s.board) -> reset(s, now_us())
+      s.presses != before or not EStop.State.held?(s.stop) -> press(s)
+      true -> s
+    end
   end
 
   @doc "Records the state of the stop."

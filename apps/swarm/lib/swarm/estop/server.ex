@@ -19,7 +19,7 @@ defmodule Swarm.EStop.Server do
       config: config,
       id: id,
       board: board,
-      stop: EStop.Actions.written(board),
+      stop: EStop.Actions.begin(board),
       life: System.system_time(:nanosecond),
       group: nil,
       name: nil,
@@ -38,7 +38,11 @@ defmodule Swarm.EStop.Server do
     # A stop that the previous e-stop process recorded may not have reached the gate; and what was
     # pressed on the gate since then has reached nobody.
     s = EStop.Actions.hold(s)
-    s = if Board.latched?(s.board) == s.stop.latched?, do: s, else: EStop.Actions.follow(s)
+
+    s =
+      if Board.latched?(s.board) == EStop.State.held?(s.stop),
+        do: s,
+        else: EStop.Actions.follow(s)
 
     {:noreply,
      %{
@@ -54,9 +58,8 @@ defmodule Swarm.EStop.Server do
   def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
-  def handle_cast({:beat, number, latched?}, s)
-      when is_integer(number) and number >= 0 and is_boolean(latched?),
-      do: {:noreply, EStop.Actions.heard(s, number, latched?)}
+  def handle_cast({:beat, tags}, s),
+    do: {:noreply, if(EStop.State.tags?(tags), do: EStop.Actions.heard(s, tags), else: s)}
 
   # The latch as it is now, not when the gate reported it: this process may have set it again
   # since.

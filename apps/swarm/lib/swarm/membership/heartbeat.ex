@@ -4,8 +4,7 @@ defmodule Swarm.Membership.Heartbeat do
   hears, and the one that it follows. Whole numbers only: mm, mrad, mm/s, mrad/s, millionths of a
   picture.
 
-  `estop` is the highest number of an emergency stop that it knows, 0 for none, and `latched` says
-  whether its own latch is set (`Swarm.EStop.State`). `sight` is its newest view of the landmark:
+  `estop` has the tags of the emergency stops that hold it (`Swarm.EStop.State`). `sight` is its newest view of the landmark:
   relative size and estimated distance, `nil` if it does not see it. Only the leader's heartbeats
   contain `anchor`. `in_place` says that a follower is in its slot, `unsure` that it believes so
   but is not sure enough. `sd` is the uncertainty of its place in its leader's frame, `nil`
@@ -29,8 +28,7 @@ defmodule Swarm.Membership.Heartbeat do
                 unsure: false,
                 blocked: false,
                 formed: false,
-                estop: 0,
-                latched: false,
+                estop: [],
                 anchor: nil
               ]
 
@@ -54,14 +52,9 @@ defmodule Swarm.Membership.Heartbeat do
           unsure: boolean(),
           blocked: boolean(),
           formed: boolean(),
-          estop: non_neg_integer(),
-          latched: boolean(),
+          estop: [Swarm.EStop.State.tag()],
           anchor: Swarm.Formation.Reference.t() | nil
         }
-
-  # Of 16 bits of tag, and of counts that nobody can make run so far, because they are taken in steps
-  # (`Swarm.EStop.State`).
-  @last_stop 0xFFFFFFFFFFFFFFFFFFFF
 
   # Five a second. Ticks come every 100 ms, some of them a little early.
   @period_ms 200
@@ -130,8 +123,7 @@ defmodule Swarm.Membership.Heartbeat do
       twist: {round(twist.linear * 1000), round(twist.turn * 1000)},
       radius: round(body.profile.radius * 1000),
       heard: NameSet.new(heard),
-      estop: stop.known,
-      latched: stop.latched?
+      estop: stop.held
     }
 
     # These fields are for people, who ask the robot itself. So are any others that a user's
@@ -157,9 +149,9 @@ defmodule Swarm.Membership.Heartbeat do
       WireTypes.counter?(beat.epoch) and (beat.leader == nil or WireTypes.name?(beat.leader)) and
       NameSet.valid?(beat.heard) and sight?(beat.sight) and
       Enum.all?(
-        [beat.standing, beat.in_place, beat.unsure, beat.blocked, beat.formed, beat.latched],
+        [beat.standing, beat.in_place, beat.unsure, beat.blocked, beat.formed],
         &is_boolean/1
-      ) and beat.estop in 0..@last_stop and
+      ) and Swarm.EStop.State.tags?(beat.estop) and
       (beat.anchor == nil or Swarm.Formation.Reference.valid?(beat.anchor))
   end
 

@@ -7,7 +7,7 @@ defmodule Swarm.EStop.NodesTest do
   @moduletag :cluster
   @moduletag :capture_log
 
-  defp latched?(node, id), do: match?(%{latched?: true}, entry(node, id, :estop))
+  defp latched?(node, id), do: match?(%{held: [_ | _]}, entry(node, id, :estop))
 
   test "a stop from a node without a robot reaches all, outlives its sender, and stops newcomers" do
     [base, one, two] = Cluster.start_nodes(3)

@@ -15,12 +15,9 @@ defmodule Swarm.EStop.OwnerTest do
     stop
   end
 
-  # How many stops were counted, without the tag of who pressed.
-  defp count(stop), do: Bitwise.bsr(stop.known, 16)
-
-  defp beat(number, latched?) do
+  defp beat(tags) do
     beat = %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
-    Message.new(:owner_far, :heartbeat, %{beat | estop: number, latched: latched?})
+    Message.new(:owner_far, :heartbeat, %{beat | estop: tags})
   end
 
   # Everything that was sent to these processes so far has been handled, in this order.
@@ -34,10 +31,9 @@ defmodule Swarm.EStop.OwnerTest do
     comms = Names.whereis(id, :comms)
     :ok = :sys.suspend(comms)
     :ok = Gate.estop(id)
-    eventually(fn -> count(stop_of(id)) == 1 and stop_of(id).latched? end)
+    eventually(fn -> match?(%{held: [_tag]}, stop_of(id)) end)
     :ok = Gate.reset(id)
-    eventually(fn -> not stop_of(id).latched? end)
-    assert stop_of(id).cleared == stop_of(id).known
+    eventually(fn -> match?(%{held: [], cleared: [_tag]}, stop_of(id)) end)
     :ok = :sys.resume(comms)
   end
 
@@ -48,10 +44,10 @@ defmodule Swarm.EStop.OwnerTest do
     for press <- [:estop, :reset, :estop], do: :ok = apply(Gate, press, [id])
     :ok = :sys.resume(estop)
     settled(id, [:estop])
-    assert count(stop_of(id)) == 1 and stop_of(id).latched?
+    assert %{held: [_tag]} = stop_of(id)
     assert latched?(id)
     assert Swarm.ask(id, :reset) == :ok
-    refute latched?(id) or stop_of(id).latched?
+    refute latched?(id) or EStop.State.held?(stop_of(id))
   end
 
   test "what was pressed on the gate while there was no e-stop process is followed by the next one" do
@@ -60,7 +56,7 @@ defmodule Swarm.EStop.OwnerTest do
     :ok = :sys.suspend(estop)
     :ok = Gate.estop(id)
     ^estop = kill(id, :estop)
-    eventually(fn -> count(stop_of(id)) == 1 and stop_of(id).latched? end)
+    eventually(fn -> match?(%{held: [_tag]}, stop_of(id)) end)
     assert latched?(id)
   end
 
@@ -69,26 +65,26 @@ defmodule Swarm.EStop.OwnerTest do
     standing([id])
     estop = Names.whereis(id, :estop)
     # What the board already says is not passed on.
-    Comms.hear(id, beat(0, false))
+    Comms.hear(id, beat([]))
     settled(id, [:comms])
     :ok = :sys.suspend(estop)
-    Comms.hear(id, beat(0, false))
-    Comms.hear(id, beat(3, true))
+    Comms.hear(id, beat([]))
+    Comms.hear(id, beat([3]))
     for _ <- 1..8, do: assert_receive({:carried, ^id, %Message{kind: :heartbeat}})
     assert {:ok, _line} = Swarm.ask(id, :ping)
     refute latched?(id)
 
     {:messages, queued} = Process.info(estop, :messages)
     beats = for {:"$gen_cast", cast} <- queued, elem(cast, 0) == :beat, do: cast
-    assert beats == [{:beat, 3, true}]
+    assert beats == [{:beat, [3]}]
 
     :ok = :sys.resume(estop)
     eventually(fn -> latched?(id) end)
-    assert stop_of(id).known == 3
-    assert_receive {:carried, ^id, %Message{body: %Heartbeat{latched: true, estop: 3}}}
+    assert stop_of(id).held == [3]
+    assert_receive {:carried, ^id, %Message{body: %Heartbeat{estop: [3]}}}
     # A neighbour that nobody has reset yet does not set the stop again.
     assert Swarm.ask(id, :reset) == :ok
-    Comms.hear(id, put_in(beat(3, true).body.sequence, 2))
+    Comms.hear(id, put_in(beat([3]).body.sequence, 2))
     settled(id, [:comms, :estop])
     refute latched?(id)
   end
@@ -176,7 +172,7 @@ defmodule Swarm.EStop.OwnerTest do
     assert {:error, line} = Task.await(asked)
     assert line =~ "stopped again meanwhile"
     settled(id, [:estop])
-    assert latched?(id) and stop_of(id).latched?
+    assert latched?(id) and EStop.State.held?(stop_of(id))
     assert Swarm.ask(id, :reset) == :ok
   end
 
@@ -185,7 +181,7 @@ defmodule Swarm.EStop.OwnerTest do
     estop = Names.whereis(id, :estop)
     GenServer.cast(estop, {:stamp, ref = :erlang.alias([:reply])})
     assert_receive {^ref, stamp}
-    Comms.hear(id, beat(3, true))
+    Comms.hear(id, beat([3]))
     eventually(fn -> latched?(id) end)
     GenServer.cast(estop, {:command, :reset, ref = :erlang.alias([:reply]), stamp})
     assert_receive {^ref, {:error, line}}
@@ -198,11 +194,11 @@ defmodule Swarm.EStop.OwnerTest do
   test "it keeps up with neighbours that report one stop after the other, and a reset holds" do
     id = robot(:owner_flooded)
     comms = Names.whereis(id, :comms)
-    for number <- 1..20_000, do: GenServer.cast(comms, {:hear, beat(number, true)})
+    for number <- 1..20_000, do: GenServer.cast(comms, {:hear, beat([number])})
     eventually(fn -> Process.info(comms, :message_queue_len) == {:message_queue_len, 0} end)
     settled(id, [:comms, :estop])
     assert latched?(id)
-    assert stop_of(id).known > 0
+    assert length(stop_of(id).held) == 16
     assert Swarm.ask(id, :reset) == :ok
     refute latched?(id)
   end

@@ -1,40 +1,44 @@
 defmodule Swarm.EStop.StateTest do
-  @moduledoc "The spreading of an emergency stop among robots that restart, and are cut off from each other."
+  @moduledoc "The spreading of emergency stops among robots that restart, and are cut off from each other."
   use ExUnit.Case, async: true
   alias Swarm.EStop.State
 
   doctest State
 
   @robots 0..3
+  @all Enum.to_list(@robots)
 
   test "a stop pressed on a robot that has just started, and was cut off, reaches those that cleared one before" do
-    fleet = quiet(press(fleet(), 1, 1))
-    fleet = quiet(reset(fleet, @robots))
-
-    # Two of the others have started again since then, and have heard how far the fleet has counted.
+    fleet = fleet() |> press(1, 1) |> quiet() |> reset(@robots) |> quiet()
+    # Two of the others have started again since then.
     fleet = quiet(%{fleet | 2 => State.new(), 3 => State.new()})
     fleet = press(%{fleet | 0 => State.new()}, 0, 2)
-    # Those that know no better hear it first.
-    fleet = fleet |> beat(0, 2) |> beat(2, 0) |> beat(0, 3)
-    assert stopped(quiet(fleet)) == Enum.to_list(@robots)
+    # Those that have forgotten hear it first.
+    assert fleet |> beat(0, 2) |> beat(2, 0) |> beat(0, 3) |> quiet() |> held() == @all
   end
 
-  test "two stops of the same count, pressed in two parts of a fleet, are not the same stop" do
-    for call <- 1..50 do
-      one = %{fleet() | 0 => State.press(State.new(), call(call))}
-      others = reset(quiet(press(fleet(), 1, call + 100), 1..3), 1..3)
-      both = %{others | 0 => one[0]}
+  test "a robot that is held by one stop is held by the next, too, and passes it on" do
+    one = fleet() |> press(1, 1) |> beat(1, 0) |> reset([1])
+    assert one |> press(0, 2) |> beat(0, 1) |> held() == [0, 1]
+    assert one |> hear_call(0, 2) |> beat(0, 1) |> held() == [0, 1]
+    # Two stops meet in a robot that passes both on.
+    two =
+      fleet()
+      |> press(0, 1)
+      |> beat(0, 1)
+      |> reset([1])
+      |> press(3, 2)
+      |> beat(3, 2)
+      |> reset([3])
 
-      for order <- [both |> beat(0, 1), both |> beat(1, 0)],
-          do: assert(stopped(quiet(order)) == [0, 1, 2, 3])
-    end
+    assert two |> beat(0, 2) |> beat(2, 0) |> quiet() |> held() == @all
   end
 
   test "robots that are reset one after the other do not stop each other again" do
     for seed <- 1..300 do
       {fleet, random} = run({fleet(), :rand.seed_s(:exsss, seed)}, 30)
-      fleet = quiet(press(fleet, 0, 1_000 + seed))
-      assert stopped(fleet) == Enum.to_list(@robots)
+      fleet = fleet |> press(0, 1_000) |> quiet()
+      assert held(fleet) == @all
 
       {fleet, _random} =
         Enum.reduce(@robots, {fleet, random}, fn robot, {fleet, random} ->
@@ -45,31 +49,22 @@ defmodule Swarm.EStop.StateTest do
           end)
         end)
 
-      assert stopped(quiet(fleet)) == []
+      assert fleet |> quiet() |> held() == []
     end
   end
 
-  test "robots that have counted differently, and hear one call, do not stop each other again" do
-    counted = for robot <- @robots, do: {robot, State.number(robot + 1, call(robot))}
-
-    fleet =
-      Map.new(counted, fn {robot, known} -> {robot, %State{known: known, cleared: known}} end)
-
-    fleet = Map.new(fleet, fn {robot, stop} -> {robot, State.call(stop, call(9))} end)
-    fleet = reset(fleet, [3])
-    assert stopped(quiet(fleet)) == [0, 1, 2]
-    assert stopped(quiet(reset(quiet(fleet), 0..2))) == []
-  end
-
-  test "whatever happens, a robot that hears a stopped one stands, unless that stop was cleared there" do
-    for seed <- 1..2_000 do
-      random = :rand.seed_s(:exsss, seed)
-      {fleet, random} = run({fleet(), random}, 10)
-
-      # The last stop is pressed, somewhere, and the fleet is connected again. It has been cleared nowhere.
+  test "whatever happens, the robots that hear each other are held by every stop that none of them has cleared" do
+    for seed <- 1..3_000 do
+      {fleet, random} = run({fleet(), :rand.seed_s(:exsss, seed)}, 12)
       {robot, _random} = draw(random, 4)
-      fleet = quiet(press(fleet, robot, 10_000 + seed))
-      assert {seed, stopped(fleet)} == {seed, Enum.to_list(@robots)}
+      before = fleet
+      fleet = quiet(fleet)
+
+      for {robot, stop} <- fleet, {_other, %{held: tags}} <- before do
+        assert {seed, robot, (tags -- stop.held) -- stop.cleared} == {seed, robot, []}
+      end
+
+      assert {seed, fleet |> press(robot, 1_000) |> quiet() |> held()} == {seed, @all}
     end
   end
 
@@ -79,34 +74,34 @@ defmodule Swarm.EStop.StateTest do
   defp press(fleet, robot, counter),
     do: Map.update!(fleet, robot, &State.press(&1, call(counter)))
 
+  defp hear_call(fleet, robot, counter),
+    do: Map.update!(fleet, robot, &State.call(&1, call(counter)))
+
   defp reset(fleet, robots),
     do: Enum.reduce(robots, fleet, &Map.update!(&2, &1, fn stop -> State.reset(stop) end))
 
-  defp beat(fleet, from, to) when from == to, do: fleet
+  defp beat(fleet, same, same), do: fleet
+  defp beat(fleet, from, to), do: Map.update!(fleet, to, &State.hear(&1, fleet[from].held))
+  defp held(fleet), do: for(robot <- @robots, State.held?(fleet[robot]), do: robot)
 
-  defp beat(fleet, from, to) do
-    stop = State.hear(fleet[to], fleet[from].known, fleet[from].latched?)
-    # What is known is never forgotten.
-    assert stop.known >= fleet[to].known
-    %{fleet | to => stop}
+  # They tell each other until nothing changes any more, which takes two rounds.
+  defp quiet(fleet) do
+    [one, two] = Enum.take(Stream.iterate(tell(fleet), &tell/1), 2)
+    assert one == two
+    one
   end
 
-  defp stopped(fleet), do: for(robot <- @robots, fleet[robot].latched?, do: robot)
+  defp tell(fleet),
+    do:
+      for(
+        _twice <- 1..2,
+        from <- @robots,
+        to <- @robots,
+        reduce: fleet,
+        do: (fleet -> beat(fleet, from, to))
+      )
 
-  # They tell each other until nothing changes any more, which it must within a few heartbeats of each.
-  defp quiet(fleet, robots \\ @robots) do
-    Enum.reduce_while(1..12, fleet, fn round, fleet ->
-      assert round < 12
-
-      told =
-        for(from <- robots, to <- robots, do: {from, to})
-        |> Enum.reduce(fleet, fn {from, to}, fleet -> beat(fleet, from, to) end)
-
-      if told == fleet, do: {:halt, fleet}, else: {:cont, told}
-    end)
-  end
-
-  # Presses, resets, restarts and heartbeats, in any order.
+  # Presses, calls that some hear, resets, restarts and heartbeats, in any order.
   defp run(start, steps) do
     Enum.reduce(1..steps, start, fn step, {fleet, random} ->
       {kind, random} = draw(random, 10)
@@ -115,8 +110,9 @@ defmodule Swarm.EStop.StateTest do
 
       case kind do
         0 -> {press(fleet, robot, step), random}
-        1 -> {reset(fleet, [robot]), random}
-        2 -> {%{fleet | robot => State.new()}, random}
+        1 -> {fleet |> hear_call(robot, step) |> hear_call(other, step), random}
+        2 -> {reset(fleet, [robot]), random}
+        3 -> {%{fleet | robot => State.new()}, random}
         _ -> {beat(fleet, robot, other), random}
       end
     end)
