@@ -16,6 +16,7 @@ defmodule Robot.Board do
   | `{:peer, id}` | `:comms` | as in `Robot.Percept` |
   | `:estop` | `:estop` | the state of the emergency stop (1) |
   | `:stopped` | `:estop` | when it was last stopped (2) |
+  | `:followed` | `:estop` | the last of the `:presses` that it has made a stop of |
   | `:radio` | `:comms` | counts of messages sent, received, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
   | `:presses` | `:gate` | how often its own button was pressed |
@@ -28,8 +29,8 @@ defmodule Robot.Board do
   | `:uncertainty` | `:executive` | that of the pose: `t:Robot.Percept.uncertainty/0` |
   | `:mission` | `:pilot` | the state of the mission and its claim (6) |
 
-    1. As its one owner publishes it: the last number known, the last one cleared here, whether it
-       is latched, and the calls heard.
+    1. As its one owner publishes it: the tags of the stops that hold the robot, those that were
+       cleared here, and the calls heard.
     2. By any kind of stop: `System.monotonic_time/1`, microseconds.
     3. `%{by: behaviour, weight: w, outcome: {tag, integer} or nil, fault: line or nil,
        tick: count}`
@@ -99,6 +100,7 @@ defmodule Robot.Board do
     asking: :pilot,
     estop: :estop,
     stopped: :estop,
+    followed: :estop,
     radio: :comms
   }
 

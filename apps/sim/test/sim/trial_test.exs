@@ -72,11 +72,17 @@ defmodule Sim.TrialTest do
     end
   end
 
-  test "every shape forms" do
-    for kind <- Swarm.Formation.kinds() do
-      trial = assert_formed(run(%{seed: 1, formation: {kind, 1.0}}))
-      assert Trial.result(trial).formation.kind == kind
+  # The column forms in other tests.
+  for {kinds, tags} <- [{[:wedge, :circle], []}, {Swarm.Formation.kinds(), [long: true]}] do
+    @tag tags
+    test "every shape forms: #{inspect(kinds)}" do
+      for kind <- unquote(kinds), do: forms(kind)
     end
+  end
+
+  defp forms(kind) do
+    trial = assert_formed(run(%{seed: 1, formation: {kind, 1.0}}))
+    assert Trial.result(trial).formation.kind == kind
   end
 
   test "the fleet elects another leader when its leader is killed" do

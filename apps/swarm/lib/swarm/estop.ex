@@ -65,6 +65,8 @@ defmodule Swarm.EStop do
   would change the state of the stop; otherwise it is dropped in the caller.
   """
   @spec heard(robot :: atom(), Board.t(), Heartbeat.t()) :: :ok
+  def heard(_robot, _board, %Heartbeat{estop: []}), do: :ok
+
   def heard(robot, board, %Heartbeat{estop: tags}) do
     stop = written(board)
 

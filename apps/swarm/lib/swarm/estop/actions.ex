@@ -14,8 +14,9 @@ defmodule Swarm.EStop.Actions do
   # The caller waits for half a second (`Swarm.Commands.Client`): a robot whose release nobody
   # would hear of stays held.
   @release_us 400_000
-  # For so long a button that is pressed while the robot is stopped makes no further call.
-  @anew_us 1_000_000
+  # For so long a button that is pressed while the robot is stopped makes no further call. Nobody resets another robot
+  # in that time.
+  @anew_us 100_000
 
   @typedoc """
   `pressed` identifies the last time that somebody stopped it, at `pressed_us`; `reset_us` is when
@@ -39,16 +40,27 @@ defmodule Swarm.EStop.Actions do
   def written(board), do: published(board) || EStop.State.new()
 
   @doc """
-  The state with which an e-stop process begins: what the one before it published; before the first did, the gate's
-  latch, which has survived a restart, is a stop of its own.
+  The state with which an e-stop process begins, and the press of the gate's button that it has followed: what the one
+  before it recorded; before the first did, the gate's latch, which has survived a restart, is a stop of its own.
   """
-  @spec begin(Board.t()) :: EStop.State.t()
+  @spec begin(Board.t()) :: {EStop.State.t(), presses :: non_neg_integer()}
   def begin(board) do
     cond do
-      stop = published(board) -> stop
-      Board.latched?(board) -> EStop.State.press(EStop.State.new(), Broadcaster.call())
-      true -> EStop.State.new()
+      stop = published(board) ->
+        {stop, followed(board)}
+
+      Board.latched?(board) ->
+        {EStop.State.press(EStop.State.new(), Broadcaster.call()), Gate.presses(board)}
+
+      true ->
+        {EStop.State.new(), Gate.presses(board)}
     end
+  end
+
+  defp followed(board) do
+    with {:ok, presses, _at_ms} <- Board.fetch(board, :followed, :infinity),
+         do: presses,
+         else: (:error -> 0)
   end
 
   defp published(board) do
@@ -236,17 +248,29 @@ defmodule Swarm.EStop.Actions do
   def follow(%{presses: before} = s) do
     s = %{s | presses: Gate.presses(s.board)}
 
-    cond do
-      not Board.latched?(s.board) -> reset(s, now_us())
-      s.presses != before or not EStop.State.held?(s.stop) -> press(s)
-      true -> s
-    end
+    s =
+      cond do
+        Board.latched?(s.board) and s.presses == before and EStop.State.held?(s.stop) -> s
+        Board.latched?(s.board) -> press(s)
+        EStop.State.held?(s.stop) -> reset(s, now_us())
+        true -> s
+      end
+
+    # Only now: one that ends before this lets the next one press again.
+    record(s)
   end
 
   @doc "Records the state of the stop."
   @spec write(t()) :: t()
   def write(s) do
     Board.put(s.board, :estop, :estop, s.stop, Config.now(s.config))
+    s
+  end
+
+  @doc "Records which press of the gate's button was followed."
+  @spec record(t()) :: t()
+  def record(s) do
+    Board.put(s.board, :estop, :followed, s.presses, Config.now(s.config))
     s
   end
 end

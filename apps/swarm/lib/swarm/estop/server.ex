@@ -14,23 +14,24 @@ defmodule Swarm.EStop.Server do
   @impl GenServer
   def init(%Config{id: id} = config) do
     board = Board.find!(id)
+    {stop, presses} = EStop.Actions.begin(board)
 
     s = %{
       config: config,
       id: id,
       board: board,
-      stop: EStop.Actions.begin(board),
+      stop: stop,
       life: System.system_time(:nanosecond),
       group: nil,
       name: nil,
       pressed: make_ref(),
       pressed_us: nil,
-      presses: Gate.presses(board),
+      presses: presses,
       sounded_us: nil,
       reset_us: nil
     }
 
-    {:ok, EStop.Actions.write(s), {:continue, :enter}}
+    {:ok, s |> EStop.Actions.write() |> EStop.Actions.record(), {:continue, :enter}}
   end
 
   @impl GenServer
@@ -39,10 +40,11 @@ defmodule Swarm.EStop.Server do
     # pressed on the gate since then has reached nobody.
     s = EStop.Actions.hold(s)
 
-    s =
-      if Board.latched?(s.board) == EStop.State.held?(s.stop),
-        do: s,
-        else: EStop.Actions.follow(s)
+    followed? =
+      Board.latched?(s.board) == EStop.State.held?(s.stop) and
+        Gate.presses(s.board) == s.presses
+
+    s = if followed?, do: s, else: EStop.Actions.follow(s)
 
     {:noreply,
      %{

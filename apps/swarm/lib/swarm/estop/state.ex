@@ -68,7 +68,9 @@ defmodule Swarm.EStop.State do
   @spec press(t(), Calls.call()) :: t()
   def press(%__MODULE__{} = stop, call) do
     tag = tag(call)
-    %{late(stop, call) | held: Enum.take([tag | List.delete(stop.held, tag)], @most_held)}
+    {held, over} = Enum.split([tag | List.delete(stop.held, tag)], @most_held)
+    # What others still say of those that are too many is not another stop.
+    clear(%{late(stop, call) | held: held}, over)
   end
 
   @doc """
@@ -115,14 +117,18 @@ defmodule Swarm.EStop.State do
   @spec hear(t(), [tag()]) :: t()
   def hear(%__MODULE__{} = stop, tags) do
     # Those that hold it stay, so that robots which hear each other agree at last, whatever they hear.
-    case (tags -- stop.cleared) -- stop.held do
+    case (Enum.uniq(tags) -- stop.cleared) -- stop.held do
       [] -> stop
-      new -> %{stop | held: Enum.take(stop.held ++ Enum.uniq(new), @most_held)}
+      new -> %{stop | held: Enum.take(stop.held ++ new, @most_held)}
     end
   end
 
   @doc "A person clears what holds this robot."
   @spec reset(t()) :: t()
-  def reset(%__MODULE__{held: held, cleared: cleared} = stop),
-    do: %{stop | held: [], cleared: Enum.take(held ++ (cleared -- held), @most_cleared)}
+  def reset(%__MODULE__{held: held} = stop), do: clear(%{stop | held: []}, held)
+
+  defp clear(stop, []), do: stop
+
+  defp clear(%{cleared: cleared} = stop, tags),
+    do: %{stop | cleared: Enum.take(tags ++ (cleared -- tags), @most_cleared)}
 end

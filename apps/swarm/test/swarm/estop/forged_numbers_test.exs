@@ -65,6 +65,23 @@ defmodule Swarm.EStop.ForgedNumbersTest do
     end
   end
 
+  test "a stop that is said twice in a heartbeat is the same stop, also after a reset" do
+    stop = State.hear(State.new(), [7, 7, 8])
+    assert stop.held == [7, 8]
+    refute State.held?(State.hear(State.reset(stop), [7, 8, 7, 7]))
+  end
+
+  test "who is pressed more often than can be told is not stopped again by what the others still say" do
+    [one, other] =
+      for n <- 1..40, reduce: [State.new(), State.new()] do
+        [one, other] ->
+          one = State.press(one, {:base@hall, @boot, n})
+          [one, State.hear(other, one.held)]
+      end
+
+    refute State.held?(State.hear(State.reset(one), other.held))
+  end
+
   test "what was cleared is remembered up to a limit, the last first" do
     stop =
       for tag <- 1..10_000, reduce: State.new() do

@@ -60,6 +60,24 @@ defmodule Swarm.EStop.OwnerTest do
     assert latched?(id)
   end
 
+  test "a press on a robot that is held already, which an e-stop process left undone, is one more for the next one" do
+    id = robot(:owner_undone)
+    assert Swarm.ask(id, :estop) == :ok
+    assert %{held: [first]} = stop_of(id)
+    estop = Names.whereis(id, :estop)
+    :ok = :sys.suspend(estop)
+    :ok = Gate.estop(id)
+    ^estop = kill(id, :estop)
+    eventually(fn -> match?(%{held: [_second, ^first]}, stop_of(id)) end)
+    # What was followed is not followed again.
+    held = stop_of(id).held
+    estop = Names.whereis(id, :estop)
+    ^estop = kill(id, :estop)
+    eventually(fn -> Names.whereis(id, :estop) not in [nil, estop] end)
+    settled(id, [:estop])
+    assert stop_of(id).held == held
+  end
+
   test "the comms process does not wait for an e-stop process that hangs, and passes on only changes" do
     id = robot(:owner_hangs, comms: [transport: {__MODULE__, :carry, [self()]}])
     standing([id])
