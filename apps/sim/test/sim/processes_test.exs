@@ -109,7 +109,8 @@ defmodule Sim.ProcessesTest do
   defp script(run, 200), do: input(run, @me, {:command, {:formation, :wedge, 1.2}, run.at_ms})
   defp script(run, 260), do: input(run, @me, {:command, :stop, run.at_ms})
   defp script(run, 275), do: input(run, @me, {:command, :start, run.at_ms})
-  defp script(run, 300), do: input(run, @me, {:command, :estop, run.at_ms})
+  # By a call of the test's: those that processes make have numbers of their own.
+  defp script(run, 300), do: input(run, @me, {:command, {:estop, {:base@hall, 1, 1}}, run.at_ms})
 
   defp script(run, 320) do
     run = Enum.reduce(@ids, run, &input(&2, &1, {:command, :reset, run.at_ms}))

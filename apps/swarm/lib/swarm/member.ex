@@ -102,6 +102,9 @@ defmodule Swarm.Member do
   def step(member, {:command, :estop, at_ms}),
     do: latch(member, EStop.State.press(member.stop, {member.id, 0, at_ms}), at_ms)
 
+  def step(member, {:command, {:estop, call}, at_ms}),
+    do: latch(member, EStop.State.call(member.stop, call), at_ms)
+
   def step(member, {:command, :reset, _at_ms}) do
     stop = EStop.State.reset(member.stop)
     {%{member | reflex: Reflex.reset(member.reflex), stop: stop}, []}

@@ -36,7 +36,14 @@ defmodule Sim.Hardware.LineTest do
          do: health
   end
 
-  defp limits(id), do: Swarm.status(id).limits
+  # A robot that gets no processor for half a second does not answer.
+  defp limits(id) do
+    case Swarm.status(id) do
+      %{limits: limits} -> limits
+      {:error, _busy} -> limits(id)
+    end
+  end
+
   defp place(context), do: World.Server.world(context.server).robots.body.pose
   defp still?(context), do: World.Server.world(context.server).robots.body.speed == {0.0, 0.0}
 
