@@ -15,7 +15,7 @@ defmodule Swarm.EStop.NodesTest do
     robot_on(two, :estop_n2)
     eventually(fn -> length(:erpc.call(base, Directory, :members, [:estops])) == 2 end)
     # It has heard no heartbeat, so it asks how old its command may be.
-    assert :erpc.call(base, Swarm, :goto, [:estop_n1, {1, 1}]) == :ok
+    assert order(fn -> :erpc.call(base, Swarm, :goto, [:estop_n1, {1, 1}]) end) == :ok
     assert entry(one, :estop_n1, :mission).state == {Manual, :goto}
 
     assert :erpc.call(base, Swarm, :estop, []) == :ok
