@@ -18,7 +18,8 @@ defmodule Docs.Case do
   using options do
     quote do
       alias Docs.{Checks, LookedAt, Reader, Sandbox, Shown}
-      @moduletag timeout: 180_000
+      # Each of its commands has a minute.
+      @moduletag timeout: 600_000
 
       for document <- unquote(options[:documents]) do
         @document document

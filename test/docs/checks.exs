@@ -23,7 +23,7 @@ defmodule Docs.Checks do
     "bin/test-on bookworm --fresh" => @tests,
     "bin/test-on trixie --fresh" => @tests,
     "bin/setup" => @system,
-    "bin/soak 36 1" => @long,
+    "bin/soak 46 1" => @long,
     "bin/demo --nodes" => @live,
     "bin/demo --nodes --robots 4" => @live,
     "bin/demo --map floor.png:16x12 --landmark 2,1" => @live,
