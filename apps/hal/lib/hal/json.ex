@@ -67,12 +67,23 @@ defmodule Hal.Json do
   defp key_text(key), do: raise(ArgumentError, "no JSON key: #{inspect(key)}")
 
   defp string(text) do
-    if String.valid?(text) do
-      [?", escape(text), ?"]
-    else
-      raise(ArgumentError, "no JSON string, because it is not UTF-8: #{inspect(text)}")
+    cond do
+      plain?(text) ->
+        [?", text, ?"]
+
+      String.valid?(text) ->
+        [?", escape(text), ?"]
+
+      true ->
+        raise(ArgumentError, "no JSON string, because it is not UTF-8: #{inspect(text)}")
     end
   end
+
+  # Nearly all names and words: nothing of them is to be escaped.
+  defp plain?(<<byte, rest::binary>>) when byte in 0x20..0x7E and byte not in [?", ?\\],
+    do: plain?(rest)
+
+  defp plain?(rest), do: rest == ""
 
   defp escape(text), do: for(<<byte <- text>>, do: escaped(byte))
 
