@@ -57,7 +57,10 @@ defmodule Convoy.MixProject do
     tls = [ssl: :permanent, runtime_tools: :permanent]
 
     robot =
-      Keyword.new([:hal, :vision, :robot, :mesh, :swarm, :missions, :agents], &{&1, :permanent})
+      Keyword.new(
+        [:hal, :vision, :robot, :mesh, :swarm, :missions, :agents, :mcap],
+        &{&1, :permanent}
+      )
 
     fleet = robot ++ [sim: :permanent, console: :permanent]
 

@@ -20,7 +20,6 @@ defmodule Mix.Tasks.Compile.Native do
   def run(_arguments) do
     native = Mix.Project.config()[:native] || []
     priv = Path.join(Mix.Project.app_path(), "priv")
-    headers = Path.wildcard("c_src/*.h")
 
     nifs =
       for {name, sources} <- native[:nifs] || [],
@@ -30,7 +29,7 @@ defmodule Mix.Tasks.Compile.Native do
       for {name, sources} <- native[:programs] || [],
           do: {Path.join(priv, "#{name}"), sources, []}
 
-    results = Enum.map(nifs ++ programs, &build(&1, headers))
+    results = Enum.map(nifs ++ programs, &build/1)
 
     cond do
       :error in results -> {:error, []}
@@ -39,8 +38,11 @@ defmodule Mix.Tasks.Compile.Native do
     end
   end
 
-  defp build({target, sources, flags}, headers) do
+  # A source may be another app's: "../../vision/c_src/blobs.c".
+  defp build({target, sources, flags}) do
     sources = Enum.map(sources, &Path.join("c_src", &1))
+    folders = sources |> Enum.map(&Path.dirname/1) |> Enum.uniq()
+    headers = Enum.flat_map(folders, &Path.wildcard(Path.join(&1, "*.h")))
 
     if Mix.Utils.stale?(sources ++ headers ++ [__ENV__.file], [target]) do
       File.mkdir_p!(Path.dirname(target))

@@ -1,3 +1,6 @@
+Code.require_file("../../support.exs", __DIR__)
+Code.require_file("../../packages.exs", __DIR__)
+
 defmodule Agents.MixProject do
   use Mix.Project
 
@@ -10,18 +13,12 @@ defmodule Agents.MixProject do
       deps_path: "../../deps",
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
-      elixirc_paths: elixirc_paths(Mix.env()),
+      compilers: Convoy.Support.compilers([:packages | Mix.compilers()], Mix.env()),
+      test_ignore_filters: Convoy.Support.files(),
       start_permanent: Mix.env() == :prod,
-      deps: [{:swarm, in_umbrella: true} | packages(Mix.target())]
+      deps: [{:swarm, in_umbrella: true} | Convoy.Packages.list(phoenix_pubsub: "~> 2.1")]
     ]
   end
 
   def application, do: [extra_applications: [:logger, :crypto]]
-
-  # Adapters for packages from Hex, with MIX_TARGET=robot. Nothing here needs them.
-  defp packages(:host), do: []
-  defp packages(_target), do: [{:phoenix_pubsub, "~> 2.1"}]
-
-  defp elixirc_paths(:test), do: ["lib", "test/support"]
-  defp elixirc_paths(_env), do: ["lib"]
 end

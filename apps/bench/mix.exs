@@ -1,3 +1,5 @@
+Code.require_file("../../native.exs", __DIR__)
+
 defmodule Bench.MixProject do
   use Mix.Project
 
@@ -10,7 +12,8 @@ defmodule Bench.MixProject do
       deps_path: "../../deps",
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
-      elixirc_paths: elixirc_paths(Mix.env()),
+      compilers: [:native | Mix.compilers()],
+      native: [nifs: [kernel: ["../../vision/c_src/blobs.c", "kernel_nif.c"]]],
       start_permanent: Mix.env() == :prod,
       deps: [
         {:agents, in_umbrella: true},
@@ -21,7 +24,4 @@ defmodule Bench.MixProject do
   end
 
   def application, do: [extra_applications: [:logger, :crypto]]
-
-  defp elixirc_paths(:test), do: ["lib", "test/support"]
-  defp elixirc_paths(_env), do: ["lib"]
 end

@@ -1,3 +1,5 @@
+Code.require_file("../../support.exs", __DIR__)
+
 defmodule Console.MixProject do
   use Mix.Project
 
@@ -10,7 +12,8 @@ defmodule Console.MixProject do
       deps_path: "../../deps",
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
-      elixirc_paths: elixirc_paths(Mix.env()),
+      compilers: Convoy.Support.compilers(Mix.compilers(), Mix.env()),
+      test_ignore_filters: Convoy.Support.files(),
       start_permanent: Mix.env() == :prod,
       deps: [{:sim, in_umbrella: true}]
     ]
@@ -21,7 +24,4 @@ defmodule Console.MixProject do
   # Mix hides applications of OTP that are not listed. The tests read the pictures' XML.
   defp for_tests(:test), do: [:xmerl]
   defp for_tests(_env), do: []
-
-  defp elixirc_paths(:test), do: ["lib", "test/support"]
-  defp elixirc_paths(_env), do: ["lib"]
 end

@@ -1,4 +1,6 @@
+Code.require_file("../../support.exs", __DIR__)
 Code.require_file("../../native.exs", __DIR__)
+Code.require_file("../../packages.exs", __DIR__)
 
 defmodule Hal.MixProject do
   use Mix.Project
@@ -12,25 +14,20 @@ defmodule Hal.MixProject do
       deps_path: "../../deps",
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
-      compilers: [:native | Mix.compilers()],
+      compilers: Convoy.Support.compilers([:native, :packages | Mix.compilers()], Mix.env()),
+      test_ignore_filters: Convoy.Support.files(),
       native: [
         programs: [
           newest_frame: ["newest_frame.c", "y4m.c"],
           serial: ["serial.c", "serial_main.c"]
         ]
       ],
-      elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
-      deps: [{:vm, in_umbrella: true, only: :test} | packages(Mix.target())]
+      deps: [
+        {:vm, in_umbrella: true, only: :test} | Convoy.Packages.list(circuits_uart: "~> 1.5.5")
+      ]
     ]
   end
 
   def application, do: [mod: {Hal.Application, []}, extra_applications: [:logger, :crypto]]
-
-  # Adapters for what Hex has; with MIX_TARGET=hex, say. Nothing here needs them.
-  defp packages(:host), do: []
-  defp packages(_target), do: [{:circuits_uart, "~> 1.5.5"}]
-
-  defp elixirc_paths(:test), do: ["lib", "test/support"]
-  defp elixirc_paths(_env), do: ["lib"]
 end

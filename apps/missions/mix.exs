@@ -1,3 +1,5 @@
+Code.require_file("../../support.exs", __DIR__)
+
 defmodule Missions.MixProject do
   use Mix.Project
 
@@ -10,14 +12,12 @@ defmodule Missions.MixProject do
       deps_path: "../../deps",
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
-      elixirc_paths: elixirc_paths(Mix.env()),
+      compilers: Convoy.Support.compilers(Mix.compilers(), Mix.env()),
+      test_ignore_filters: Convoy.Support.files(),
       start_permanent: Mix.env() == :prod,
       deps: [{:swarm, in_umbrella: true}]
     ]
   end
 
   def application, do: [extra_applications: [:logger]]
-
-  defp elixirc_paths(:test), do: ["lib", "test/support"]
-  defp elixirc_paths(_env), do: ["lib"]
 end

@@ -10,14 +10,10 @@ defmodule Player.MixProject do
       deps_path: "../../deps",
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
-      elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
       deps: [{:robot, in_umbrella: true}]
     ]
   end
 
   def application, do: [extra_applications: [:logger, :crypto]]
-
-  defp elixirc_paths(:test), do: ["lib", "test/support"]
-  defp elixirc_paths(_env), do: ["lib"]
 end

@@ -1,3 +1,6 @@
+Code.require_file("../../support.exs", __DIR__)
+Code.require_file("../../native.exs", __DIR__)
+
 defmodule Robot.MixProject do
   use Mix.Project
 
@@ -10,14 +13,15 @@ defmodule Robot.MixProject do
       deps_path: "../../deps",
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
-      elixirc_paths: elixirc_paths(Mix.env()),
+      compilers: Convoy.Support.compilers([:native | Mix.compilers()], Mix.env()),
+      test_ignore_filters: Convoy.Support.files(),
+      native: [
+        nifs: [grid: ["grid.c", "grid_nif.c"], occupancy: ["occupancy.c", "occupancy_nif.c"]]
+      ],
       start_permanent: Mix.env() == :prod,
-      deps: [{:hal, in_umbrella: true}, {:vision, in_umbrella: true}]
+      deps: [{:hal, in_umbrella: true}, {:vision, in_umbrella: true}, {:mcap, in_umbrella: true}]
     ]
   end
 
   def application, do: [extra_applications: [:logger, :crypto]]
-
-  defp elixirc_paths(:test), do: ["lib", "test/support"]
-  defp elixirc_paths(_env), do: ["lib"]
 end

@@ -1,3 +1,4 @@
+Code.require_file("../../support.exs", __DIR__)
 Code.require_file("../../native.exs", __DIR__)
 
 defmodule Sim.MixProject do
@@ -12,18 +13,15 @@ defmodule Sim.MixProject do
       deps_path: "../../deps",
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
-      compilers: [:native | Mix.compilers()],
+      compilers: Convoy.Support.compilers([:native | Mix.compilers()], Mix.env()),
+      test_ignore_filters: Convoy.Support.files(),
       native: [
         nifs: [kernel: ["rays.c", "paint.c", "kernel_nif.c"]]
       ],
-      elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
-      deps: [{:missions, in_umbrella: true}, {:vm, in_umbrella: true}]
+      deps: [{:missions, in_umbrella: true}, {:mcap, in_umbrella: true}, {:vm, in_umbrella: true}]
     ]
   end
 
   def application, do: [extra_applications: [:logger, :crypto]]
-
-  defp elixirc_paths(:test), do: ["lib", "test/support"]
-  defp elixirc_paths(_env), do: ["lib"]
 end

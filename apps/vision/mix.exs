@@ -1,4 +1,6 @@
+Code.require_file("../../support.exs", __DIR__)
 Code.require_file("../../native.exs", __DIR__)
+Code.require_file("../../packages.exs", __DIR__)
 
 defmodule Vision.MixProject do
   use Mix.Project
@@ -12,16 +14,15 @@ defmodule Vision.MixProject do
       deps_path: "../../deps",
       lockfile: "../../mix.lock",
       elixir: "~> 1.14",
-      compilers: [:native | Mix.compilers()],
+      compilers: Convoy.Support.compilers([:native, :packages | Mix.compilers()], Mix.env()),
+      test_ignore_filters: Convoy.Support.files(),
       native: [nifs: [blobs: ["blobs.c", "blobs_nif.c"]]],
-      elixirc_paths: elixirc_paths(Mix.env()),
       start_permanent: Mix.env() == :prod,
-      deps: [{:hal, in_umbrella: true}]
+      deps: [
+        {:hal, in_umbrella: true} | Convoy.Packages.list(nx: "~> 0.6", evision: "~> 0.2.10")
+      ]
     ]
   end
 
   def application, do: [extra_applications: [:logger, :crypto]]
-
-  defp elixirc_paths(:test), do: ["lib", "test/support"]
-  defp elixirc_paths(_env), do: ["lib"]
 end

@@ -4,12 +4,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define NONE SIZE_MAX
-#define LARGEST 32768u          /* pixels per side, so that areas fit into 32 bits */
+#define NONE UINT32_MAX
+#define LARGEST 32768u          /* pixels per side, so that areas and labels fit into 32 bits */
+#define FEWEST 256u             /* regions for which there is room at least */
 
-struct run {
+/* Inlined into one loop over the rows they are slower by a quarter: there are not enough registers. */
+#define NOINLINE __attribute__((noinline))
+
+struct blobs_run {
     uint32_t start, end, mask;  /* end is exclusive */
-    size_t label;
+    uint32_t label;
 };
 
 int blobs_lay(int format, uint32_t width, uint32_t height, const uint8_t *bytes, size_t size,
@@ -46,7 +50,7 @@ int blobs_lay(int format, uint32_t width, uint32_t height, const uint8_t *bytes,
 }
 
 /* Finds the classes that the chroma of each pair of pixels allows; returns those of the row. */
-static uint32_t allow_chroma(const struct blobs_picture *picture, uint32_t row,
+static NOINLINE uint32_t allow_chroma(const struct blobs_picture *picture, uint32_t row,
                              const uint32_t *tables, uint32_t *restrict pairs)
 {
     size_t step = picture->chroma_step, at = row / picture->chroma_rows * picture->chroma_row;
@@ -64,7 +68,7 @@ static inline __attribute__((always_inline)) size_t find_runs_by(size_t step, co
                                                                   uint32_t width,
                                                                   const uint32_t *y_table,
                                                                   const uint32_t *pairs,
-                                                                  struct run *runs)
+                                                                  struct blobs_run *runs)
 {
     size_t count = 0;
     uint32_t open = 0;
@@ -87,13 +91,13 @@ static inline __attribute__((always_inline)) size_t find_runs_by(size_t step, co
             if (open)
                 runs[count - 1].end = x;
             if (left)
-                runs[count++] = (struct run){ .start = x, .mask = left, .label = NONE };
+                runs[count++] = (struct blobs_run){ .start = x, .mask = left, .label = NONE };
         }
         if (right != left) {
             if (left)
                 runs[count - 1].end = x + 1;
             if (right)
-                runs[count++] = (struct run){ .start = x + 1, .mask = right, .label = NONE };
+                runs[count++] = (struct blobs_run){ .start = x + 1, .mask = right, .label = NONE };
         }
         open = right;
     }
@@ -102,8 +106,8 @@ static inline __attribute__((always_inline)) size_t find_runs_by(size_t step, co
     return count;
 }
 
-static size_t find_runs(const struct blobs_picture *picture, uint32_t row, const uint32_t *y_table,
-                        const uint32_t *pairs, struct run *runs)
+static NOINLINE size_t find_runs(const struct blobs_picture *picture, uint32_t row, const uint32_t *y_table,
+                        const uint32_t *pairs, struct blobs_run *runs)
 {
     const uint8_t *luma = picture->y + row * picture->y_row;
 
@@ -113,22 +117,22 @@ static size_t find_runs(const struct blobs_picture *picture, uint32_t row, const
 }
 
 /* The root of a label; halves the path for the next time. */
-static size_t root(struct blobs_region *regions, size_t label)
+static uint32_t root(struct blobs_region *regions, uint32_t label)
 {
     while (regions[label].parent != label)
         label = regions[label].parent = regions[regions[label].parent].parent;
     return label;
 }
 
-/* Joins two regions. The older root stays, so roots keep the order of their first pixels. */
-static size_t unite(struct blobs_region *regions, size_t a, size_t b)
+/* Joins two regions. */
+static uint32_t unite(struct blobs_region *regions, uint32_t a, uint32_t b)
 {
     a = root(regions, a);
     b = root(regions, b);
     if (a == b)
         return a;
     if (b < a) {
-        size_t other = a;
+        uint32_t other = a;
 
         a = b;
         b = other;
@@ -139,6 +143,8 @@ static size_t unite(struct blobs_region *regions, size_t a, size_t b)
     into->area += from->area;
     into->sum_x += from->sum_x;
     into->sum_y += from->sum_y;
+    if (from->top < into->top || (from->top == into->top && from->first < into->first))
+        into->first = from->first;
     into->left = from->left < into->left ? from->left : into->left;
     into->right = from->right > into->right ? from->right : into->right;
     into->top = from->top < into->top ? from->top : into->top;
@@ -146,61 +152,93 @@ static size_t unite(struct blobs_region *regions, size_t a, size_t b)
     return a;
 }
 
-static void add_run(struct blobs_region *region, const struct run *run, uint32_t row)
+/* Adds a run of the lowest row so far, or of the one above it. */
+static void add_run(struct blobs_region *region, const struct blobs_run *run, uint32_t row)
 {
     uint64_t length = run->end - run->start;
 
     region->area += (uint32_t)length;
     region->sum_x += length * ((uint64_t)run->start + run->end - 1) / 2;
     region->sum_y += length * row;
+    if (row == region->top && run->start < region->first)
+        region->first = run->start;
     region->left = run->start < region->left ? run->start : region->left;
     region->right = run->end - 1 > region->right ? run->end - 1 : region->right;
-    region->bottom = row;
+    region->bottom = row > region->bottom ? row : region->bottom;
 }
 
-static size_t new_region(struct blobs_regions *regions, const struct run *run, uint32_t row)
+static int set_room(struct blobs_scratch *scratch, size_t room)
 {
-    if (regions->count == regions->room) {
-        size_t room = regions->room ? 2 * regions->room : 256;
-        struct blobs_region *at = NULL;
+    struct blobs_region *at = NULL;
 
-        if (room <= SIZE_MAX / sizeof *at)
-            at = realloc(regions->at, room * sizeof *at);
-        if (at == NULL)
-            return NONE;
-        regions->at = at;
-        regions->room = room;
-    }
-    regions->at[regions->count] = (struct blobs_region){
-        .mask = run->mask, .left = run->start, .top = row, .parent = regions->count
-    };
-    return regions->count++;
+    if (room <= SIZE_MAX / sizeof *at)
+        at = realloc(scratch->regions, room * sizeof *at);
+    if (at == NULL)
+        return -1;
+    scratch->regions = at;
+    scratch->room = room;
+    return 0;
 }
 
-/* Gives each run of a row its region: that of the runs that it touches above, or a new one. */
-static int join_rows(const struct run *above, size_t above_count, struct run *here, size_t here_count,
-                     uint32_t row, struct blobs_regions *regions)
+static int new_region(struct blobs_scratch *scratch, struct blobs_run *run, uint32_t row)
+{
+    if (scratch->count == scratch->room &&
+        set_room(scratch, scratch->room ? 2 * scratch->room : FEWEST) != 0)
+        return -1;
+    run->label = (uint32_t)scratch->count++;
+    scratch->regions[run->label] = (struct blobs_region){
+        .mask = run->mask, .left = run->start, .top = row, .first = run->start, .parent = run->label
+    };
+    add_run(scratch->regions + run->label, run, row);
+    return 0;
+}
+
+/* A run that has touched nothing is a region if it is large enough. In noise few are. */
+static int end_run(struct blobs_scratch *scratch, struct blobs_run *run, uint32_t row, uint32_t min_area)
+{
+    if (run->label != NONE || run->end - run->start < min_area)
+        return 0;
+    return new_region(scratch, run, row);
+}
+
+/* Joins a run to one that it touches in the row above. */
+static int join(struct blobs_scratch *scratch, struct blobs_run *above, struct blobs_run *run, uint32_t row)
+{
+    if (above->label == NONE) {
+        if (run->label != NONE) {
+            add_run(scratch->regions + run->label, above, row - 1);
+            above->label = run->label;
+            return 0;
+        }
+        if (new_region(scratch, above, row - 1) != 0)
+            return -1;
+    }
+    if (run->label != NONE) {
+        run->label = unite(scratch->regions, run->label, above->label);
+    } else {
+        run->label = root(scratch->regions, above->label);
+        add_run(scratch->regions + run->label, run, row);
+    }
+    return 0;
+}
+
+/* Gives the runs of a row the regions that they touch above; ends those above that touch nothing. */
+static int join_rows(struct blobs_run *above, size_t above_count, struct blobs_run *here,
+                     size_t here_count, uint32_t row, uint32_t min_area, struct blobs_scratch *scratch)
 {
     size_t first = 0;
 
-    for (struct run *run = here; run < here + here_count; run++) {
-        while (first < above_count && above[first].end <= run->start)
-            first++;
-        size_t label = NONE;
-
-        for (size_t k = first; k < above_count && above[k].start < run->end; k++) {
-            if (above[k].mask != run->mask)
-                continue;
-            label = label == NONE ? root(regions->at, above[k].label)
-                                  : unite(regions->at, label, above[k].label);
-        }
-        if (label == NONE)
-            label = new_region(regions, run, row);
-        if (label == NONE)
-            return -1;
-        run->label = label;
-        add_run(regions->at + label, run, row);
+    for (struct blobs_run *run = here; run < here + here_count; run++) {
+        for (; first < above_count && above[first].end <= run->start; first++)
+            if (end_run(scratch, above + first, row - 1, min_area) != 0)
+                return -1;
+        for (size_t k = first; k < above_count && above[k].start < run->end; k++)
+            if (above[k].mask == run->mask && join(scratch, above + k, run, row) != 0)
+                return -1;
     }
+    for (; first < above_count; first++)
+        if (end_run(scratch, above + first, row - 1, min_area) != 0)
+            return -1;
     return 0;
 }
 
@@ -217,48 +255,135 @@ static int compare(const void *one, const void *two)
         return a->top < b->top ? -1 : 1;
     if (a->left != b->left)
         return a->left < b->left ? -1 : 1;
-    return a->parent < b->parent ? -1 : a->parent > b->parent;
+    return a->first < b->first ? -1 : a->first > b->first;
 }
 
-static void keep_and_sort(struct blobs_regions *regions, uint32_t min_area, uint32_t max_area)
+static void keep(struct blobs_scratch *scratch, uint32_t min_area, uint32_t max_area)
 {
     size_t kept = 0;
 
-    for (size_t k = 0; k < regions->count; k++) {
-        const struct blobs_region *region = regions->at + k;
+    for (size_t k = 0; k < scratch->count; k++) {
+        const struct blobs_region *region = scratch->regions + k;
 
         if (region->parent == k && region->area >= min_area && (max_area == 0 || region->area <= max_area))
-            regions->at[kept++] = *region;
+            scratch->regions[kept++] = *region;
     }
-    regions->count = kept;
-    if (kept > 1)
-        qsort(regions->at, kept, sizeof *regions->at, compare);
+    scratch->count = kept;
 }
 
-int blobs_find(const struct blobs_picture *picture, const uint32_t tables[768], uint32_t min_area,
-               uint32_t max_area, struct blobs_regions *found)
+static int make_rows(struct blobs_scratch *scratch, size_t width)
 {
-    size_t width = picture->width, above_count = 0;
-    uint32_t *pairs = malloc(width / 2 * sizeof *pairs), any = 0;
-    struct run *runs = malloc(2 * width * sizeof *runs), *above = runs, *here = runs + width;
-    int result = pairs && runs ? 0 : -1;
+    if (width <= scratch->width)
+        return 0;
+    struct blobs_run *runs = realloc(scratch->runs, 2 * width * sizeof *runs);
 
-    *found = (struct blobs_regions){ 0 };
-    for (uint32_t row = 0; result == 0 && row < picture->height; row++) {
+    if (runs == NULL)
+        return -1;
+    scratch->runs = runs;
+    uint32_t *pairs = realloc(scratch->pairs, width / 2 * sizeof *pairs);
+
+    if (pairs == NULL)
+        return -1;
+    scratch->pairs = pairs;
+    scratch->width = width;
+    return 0;
+}
+
+/* Gives room back that many pictures in a row did not need. A realloc that fails keeps it. */
+static void give_back(struct blobs_scratch *scratch)
+{
+    if (scratch->count > scratch->most)
+        scratch->most = scratch->count;
+    if (++scratch->pictures < BLOBS_LOOK)
+        return;
+    size_t room = scratch->most < FEWEST / 2 ? FEWEST : 2 * scratch->most;
+
+    if (room < scratch->room / 2)
+        (void)set_room(scratch, room);
+    scratch->most = 0;
+    scratch->pictures = 0;
+}
+
+/* Searches the rows that are left. */
+static enum blobs_result find_rows(const struct blobs_picture *picture, const uint32_t tables[768],
+                                   uint32_t min_area, struct blobs_scratch *scratch,
+                                   blobs_pause *pause, void *context)
+{
+    size_t width = picture->width, searched = 0, above_count = scratch->above_count;
+    uint32_t row = scratch->row, any = scratch->any;
+    enum blobs_result result = BLOBS_DONE;
+
+    for (; result == BLOBS_DONE && row < picture->height; row++, searched += width) {
+        if (pause && searched >= BLOBS_STEP) {
+            searched = 0;
+            if (pause(context)) {
+                result = BLOBS_PAUSED;
+                break;
+            }
+        }
+        struct blobs_run *here = scratch->runs + row % 2 * width;
+        struct blobs_run *above = scratch->runs + (row + 1) % 2 * width;
+
         if (row % picture->chroma_rows == 0)
-            any = allow_chroma(picture, row, tables, pairs);
-        size_t here_count = any ? find_runs(picture, row, tables, pairs, here) : 0;
+            any = allow_chroma(picture, row, tables, scratch->pairs);
+        size_t here_count = any ? find_runs(picture, row, tables, scratch->pairs, here) : 0;
 
-        result = join_rows(above, above_count, here, here_count, row, found);
-        struct run *spent = above;
-
-        above = here;
+        if (join_rows(above, above_count, here, here_count, row, min_area, scratch) != 0)
+            result = BLOBS_MEMORY;
         above_count = here_count;
-        here = spent;
     }
-    if (result == 0)
-        keep_and_sort(found, min_area, max_area);
-    free(pairs);
-    free(runs);
+    /* The lowest row is above an empty one. */
+    if (result == BLOBS_DONE &&
+        join_rows(scratch->runs + (row + 1) % 2 * width, above_count, NULL, 0, row, min_area, scratch) != 0)
+        result = BLOBS_MEMORY;
+    scratch->row = row;
+    scratch->any = any;
+    scratch->above_count = above_count;
     return result;
+}
+
+enum blobs_result blobs_find(const struct blobs_picture *picture, const uint32_t tables[768],
+                             uint32_t min_area, uint32_t max_area, struct blobs_scratch *scratch,
+                             blobs_pause *pause, void *context)
+{
+    enum blobs_result result = BLOBS_DONE;
+
+    if (scratch->stage == BLOBS_IDLE) {
+        scratch->count = scratch->above_count = 0;
+        scratch->row = scratch->any = 0;
+        if (make_rows(scratch, picture->width) != 0)
+            return BLOBS_MEMORY;
+        scratch->stage = BLOBS_ROWS;
+    }
+    if (scratch->stage == BLOBS_ROWS) {
+        result = find_rows(picture, tables, min_area, scratch, pause, context);
+        if (result == BLOBS_PAUSED)
+            return result;
+        give_back(scratch);
+        if (result == BLOBS_DONE)
+            keep(scratch, min_area, max_area);
+        else
+            scratch->count = 0;
+        scratch->stage = BLOBS_KEPT;
+        if (pause && scratch->count > BLOBS_MANY)
+            return BLOBS_PAUSED;
+    }
+    if (scratch->count > 1)
+        qsort(scratch->regions, scratch->count, sizeof *scratch->regions, compare);
+    scratch->stage = BLOBS_IDLE;
+    return result;
+}
+
+void blobs_release(struct blobs_scratch *scratch)
+{
+    free(scratch->regions);
+    free(scratch->runs);
+    free(scratch->pairs);
+    *scratch = (struct blobs_scratch){ 0 };
+}
+
+size_t blobs_held(const struct blobs_scratch *scratch)
+{
+    return scratch->room * sizeof *scratch->regions + scratch->width * (2 * sizeof *scratch->runs) +
+           scratch->width / 2 * sizeof *scratch->pairs;
 }

@@ -1,6 +1,7 @@
 // sources: ../c_src/blobs.c
-/* Random pictures through the blob finder, each compared with a flood fill, under sanitizers.
-   The bytes are in blocks of exactly their size, so that a read beyond them is seen. */
+/* Random pictures of all sizes through the blob finder, one after the other in the same scratch, each
+   compared with a flood fill, under sanitizers. The bytes are in blocks of exactly their size, so that
+   a read beyond them is seen. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -68,13 +69,20 @@ static void flood(const struct blobs_picture *p, const uint32_t *tables, uint32_
     free(open);
 }
 
+static struct blobs_scratch scratch;
+
+static int sometimes(void *context)
+{
+    (void)context;
+    return random_below(3) == 0;
+}
+
 static void one_picture(int format, uint32_t width, uint32_t height, uint32_t levels)
 {
     size_t size = format == BLOBS_YUYV ? 2u * width * height : 3u * width * height / 2;
     uint8_t *bytes = malloc(size);
     uint32_t tables[768], min_area = 1 + random_below(5);
     struct blobs_picture picture;
-    struct blobs_regions found;
     uint64_t totals[3], sums[3] = { 0 };
 
     for (size_t k = 0; k < size; k++)
@@ -87,11 +95,11 @@ static void one_picture(int format, uint32_t width, uint32_t height, uint32_t le
         blobs_lay(format, width + 1, height, bytes, size, &picture) == 0)
         fail("a wrong size was taken");
     blobs_lay(format, width, height, bytes, size, &picture);
-    if (blobs_find(&picture, tables, min_area, 0, &found) != 0)
+    if (blobs_find(&picture, tables, min_area, 0, &scratch, NULL, NULL) != 0)
         fail("no memory");
     flood(&picture, tables, min_area, totals);
-    for (size_t k = 0; k < found.count; k++) {
-        struct blobs_region *r = found.at + k;
+    for (size_t k = 0; k < scratch.count; k++) {
+        struct blobs_region *r = scratch.regions + k;
 
         if (r->left > r->right || r->right >= width || r->top > r->bottom || r->bottom >= height)
             fail("a box lies outside");
@@ -103,8 +111,61 @@ static void one_picture(int format, uint32_t width, uint32_t height, uint32_t le
     }
     if (memcmp(sums, totals, sizeof sums) != 0)
         fail("not what the flood found");
-    free(found.at);
+    /* In memory that nobody used before, and with pauses, it finds the same. */
+    struct blobs_scratch fresh = { 0 };
+    enum blobs_result result;
+
+    do
+        result = blobs_find(&picture, tables, min_area, 0, &fresh, sometimes, NULL);
+    while (result == BLOBS_PAUSED);
+    if (result != BLOBS_DONE || fresh.count != scratch.count)
+        fail("not the same in fresh memory");
+    for (size_t k = 0; k < fresh.count; k++)
+        if (memcmp(fresh.regions + k, scratch.regions + k, sizeof *fresh.regions) != 0)
+            fail("not the same in fresh memory");
+    blobs_release(&fresh);
     free(bytes);
+}
+
+/* A frame of noise makes the scratch grow; when the noise is over, it becomes small again. */
+static void memory_over_time(void)
+{
+    uint32_t width = 640, height = 480, size = 2 * width * height, tables[768];
+    uint8_t *noise = malloc(size), *calm = calloc(size, 1);
+    struct blobs_scratch own = { 0 };
+    struct blobs_picture picture;
+
+    for (uint32_t k = 0; k < 768; k++)
+        tables[k] = k < 256 ? k & 3 : 0xFF;
+    for (uint32_t k = 0; k < size; k++)
+        noise[k] = (uint8_t)random_below(251);
+    blobs_lay(BLOBS_YUYV, width, height, calm, size, &picture);
+    blobs_find(&picture, tables, 20, 0, &own, NULL, NULL);
+    size_t small = blobs_held(&own);
+
+    blobs_lay(BLOBS_YUYV, width, height, noise, size, &picture);
+    blobs_find(&picture, tables, 20, 0, &own, NULL, NULL);
+    size_t large = blobs_held(&own);
+    struct blobs_region *at = own.regions;
+
+    for (uint32_t k = 0; k < 3 * BLOBS_LOOK; k++)
+        blobs_find(&picture, tables, 20, 0, &own, NULL, NULL);
+    if (large < 10 * small || large > (size_t)width * height * sizeof *at)
+        fail("noise holds more or less than it needs");
+    if (blobs_held(&own) != large || own.regions != at)
+        fail("memory moves from picture to picture");
+
+    blobs_lay(BLOBS_YUYV, width, height, calm, size, &picture);
+    for (uint32_t k = 0; k < 2 * BLOBS_LOOK; k++)
+        blobs_find(&picture, tables, 20, 0, &own, NULL, NULL);
+    if (blobs_held(&own) != small + 256 * sizeof *at)
+        fail("memory is not given back after the noise");
+    blobs_release(&own);
+    blobs_release(&own);
+    if (blobs_held(&own) != 0)
+        fail("an empty scratch holds memory");
+    free(noise);
+    free(calm);
 }
 
 int main(void)
@@ -118,5 +179,9 @@ int main(void)
     }
     one_picture(BLOBS_YUYV, 640, 480, 2);
     one_picture(BLOBS_I420, 640, 480, 256);
+    one_picture(BLOBS_NV12, 2, 2, 256);
+    one_picture(BLOBS_YUYV, 32768, 4, 256);
+    memory_over_time();
+    blobs_release(&scratch);
     return 0;
 }

@@ -53,6 +53,39 @@ defmodule VisionTest do
     assert Vision.blobs(other, colours) == {:error, {:format, :yuyv}}
   end
 
+  defmodule Remembering do
+    @moduledoc "Finds as many regions as it has searched frames with its scratch."
+    @behaviour Vision.Backend
+
+    @impl Vision.Backend
+    def reads?(_format), do: true
+
+    @impl Vision.Backend
+    def regions(_frame, _colours), do: {:ok, []}
+
+    @impl Vision.Backend
+    def scratch, do: :counters.new(1, [])
+
+    @impl Vision.Backend
+    def regions(_frame, _colours, counter) do
+      :counters.add(counter, 1, 1)
+      {:ok, List.duplicate({0, 1, 0, 0, 0, 0, 0, 0}, :counters.get(counter, 1))}
+    end
+  end
+
+  test "a backend gets its own scratch, frame after frame, and never another's" do
+    {:ok, frame} = Frame.new(:yuyv, 2, 1, <<0::32>>, 0)
+    {:ok, colours} = Colours.new([@yellow], backend: Remembering)
+    scratch = Vision.scratch(colours)
+    assert {:ok, [_]} = Vision.blobs(frame, colours, nil, scratch)
+    assert {:ok, [_, _]} = Vision.blobs(frame, colours, nil, scratch)
+    assert {:ok, []} = Vision.blobs(frame, colours)
+    assert {:ok, []} = Vision.blobs(frame, colours, nil, Vision.scratch(colours, Native))
+    assert {:ok, []} = Vision.blobs(frame, colours, Reference, scratch)
+    assert Vision.scratch(colours, Reference) == nil
+    assert Vision.scratch(colours, Corner) == nil
+  end
+
   defp drawing do
     for y <- 0..239 do
       for x <- 0..319 do

@@ -5,8 +5,10 @@ defmodule Agents.PubSubTest do
   # The same tests for each adapter; one that is not installed is skipped, and says why.
   for carrier <- [Agents.PubSub.Local, Agents.PubSub.Phoenix] do
     describe inspect(carrier) do
-      unless Code.ensure_loaded?(carrier) do
-        @describetag skip: "phoenix_pubsub is not installed"
+      if carrier == Agents.PubSub.Phoenix do
+        @describetag adapter: :phoenix_pubsub
+        unless Code.ensure_loaded?(carrier),
+          do: @describetag(skip: "phoenix_pubsub is not installed")
       end
 
       setup context do

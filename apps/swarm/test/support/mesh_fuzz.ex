@@ -97,7 +97,7 @@ defmodule Swarm.MeshNodes.Fuzz do
           {:dictionary, dictionary} <- [Process.info(pid, :dictionary)],
           # The other one is OTP's own, like those of its applications.
           start = dictionary[:"$initial_call"],
-          start != {:application_master, :init, 4},
+          not match?({:application_master, :init, _arity}, start),
           do: {{start, List.keyfind(dictionary, {Hal.HardenedServer.Drops, :who}, 0)}, pid}
 
     Enum.sort(named ++ roles ++ others)

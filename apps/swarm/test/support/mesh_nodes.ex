@@ -10,7 +10,8 @@ defmodule Swarm.MeshNodes do
 
   `start/2` takes `mesh: false` for nodes without a mesh, mesh options under `mesh: [...]`, further
   arguments of the VM under `args:`, `robots: true` for a robot with fake wheels on each node, of the node's name,
-  `one_by_one: true` for nodes that join the fleet in their order, not all at once.
+  `one_by_one: true` for nodes that join the fleet in their order, not all at once, `host: "127.0.0.1"` for long names
+  with that part.
   """
   alias Mesh.Secret
 
@@ -77,9 +78,9 @@ defmodule Swarm.MeshNodes do
   defp boot(names, options) do
     flags = Vm.fleet_flags() ++ Keyword.get(options, :args, [])
 
-    for {name, vm} <-
-          Enum.zip(names, Vm.start(for name <- names, do: [name: name, flags: flags])),
-        do: %__MODULE__{vm: vm, node: vm.node, name: name}
+    place = if host = options[:host], do: [host: host, longnames: true], else: []
+    vms = Vm.start(for name <- names, do: [name: name, flags: flags] ++ place)
+    for {name, vm} <- Enum.zip(names, vms), do: %__MODULE__{vm: vm, node: vm.node, name: name}
   end
 
   defp prepare(node, mesh, options) do

@@ -104,29 +104,35 @@ defmodule Swarm.Case do
   end
 
   defp busy?({:error, line}),
-    do: Enum.any?([" hangs in ", " does not answer", "; repeat it"], &String.contains?(line, &1))
+    do: Enum.any?([" hangs in ", " does not answer", "; repeat "], &String.contains?(line, &1))
 
   defp busy?(_answer), do: false
 
-  @doc "Waits until a function returns something, and returns it."
+  @doc """
+  Waits until a function returns something, and returns it. It looks less often the longer it waits: what it asks
+  costs the robots that it waits for processor time.
+  """
   def eventually(function, ms \\ 30_000) do
-    deadline = System.monotonic_time(:millisecond) + ms
-    wait(function, deadline)
+    now = System.monotonic_time(:millisecond)
+    wait(function, now, now + ms)
   end
 
-  defp wait(function, deadline) do
+  defp wait(function, began, deadline) do
+    value = function.()
+    now = System.monotonic_time(:millisecond)
+
     cond do
-      value = function.() -> value
-      System.monotonic_time(:millisecond) > deadline -> ExUnit.Assertions.flunk("waited in vain")
-      true -> pause(function, deadline)
+      value -> value
+      now > deadline -> ExUnit.Assertions.flunk("waited in vain")
+      true -> pause(min(5 + div(now - began, 10), 50), function, began, deadline)
     end
   end
 
-  defp pause(function, deadline) do
+  defp pause(ms, function, began, deadline) do
     receive do
       :never -> :ok
     after
-      5 -> wait(function, deadline)
+      ms -> wait(function, began, deadline)
     end
   end
 end

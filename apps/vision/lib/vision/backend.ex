@@ -1,7 +1,8 @@
 defmodule Vision.Backend do
   @moduledoc """
   A way to find the regions of a frame. `Vision.Backend.Reference` defines the answer, in plain
-  Elixir; `Vision.Backend.Native` gives the same answer, faster.
+  Elixir; `Vision.Backend.Native` gives the same answer, faster. `Vision.Backend.Nx` and
+  `Vision.Backend.Evision` give it where their packages are (docs/packages.md).
 
   A backend of your own may give this answer in yet another way, or find something else, such as
   lamps. The option `:backend` of `Vision.Colours` selects it. The colours then name what it
@@ -16,6 +17,13 @@ defmodule Vision.Backend do
 
   The regions are ordered by class, then by area (largest first), then by the top and the left
   side of their box, then by their first pixel. The number of regions and runs is not limited.
+
+  ## From frame to frame
+
+  A backend that takes memory for its search may also have `c:scratch/0` and `c:regions/3`. A
+  process that looks at one frame after another (`Vision.BlobDetector`) then makes a scratch once
+  and passes it along with each frame, so that the memory is not taken and freed each time. The
+  answer does not depend on it.
   """
 
   @typedoc """
@@ -30,7 +38,17 @@ defmodule Vision.Backend do
   @doc "Whether this backend runs on this machine and reads this format."
   @callback reads?(Hal.Frame.format()) :: boolean()
 
+  @type answer ::
+          {:ok, [region()]} | {:error, :memory | {:size, {pos_integer(), pos_integer()}}}
+
   @doc "Finds the regions of a frame whose byte count has been checked."
-  @callback regions(Hal.Frame.t(), Vision.Colours.t()) ::
-              {:ok, [region()]} | {:error, :memory | {:size, {pos_integer(), pos_integer()}}}
+  @callback regions(Hal.Frame.t(), Vision.Colours.t()) :: answer()
+
+  @doc "What the process that calls this keeps from frame to frame; garbage collection frees it."
+  @callback scratch() :: term()
+
+  @doc "As `c:regions/2`, in the memory of a scratch."
+  @callback regions(Hal.Frame.t(), Vision.Colours.t(), scratch :: term()) :: answer()
+
+  @optional_callbacks scratch: 0, regions: 3
 end

@@ -9,7 +9,7 @@ defmodule Vision.BlobDetector do
     * `:sink` - `{m, f, a}`; for each frame that was read it calls
       `apply(m, f, a ++ [{:detections, detections}])` with the frame's `Vision.Detections`, even
       if there are no blobs
-    * `:backend` - a `Vision.Backend`; by default the one that `Vision.blobs/3` selects
+    * `:backend` - a `Vision.Backend`; by default the one that `Vision.blobs/4` selects
     * `:ptz` - `true`: the camera is on a pan-tilt unit, whose readings are passed to `aim/2`
     * `:clock` - `{m, f, a}` that returns integer milliseconds, by the clock of the frames
     * `:name` - as in `GenServer`
@@ -71,7 +71,10 @@ defmodule Vision.BlobDetector do
   @impl GenServer
   def init(options) do
     counts = %{read: 0, dropped: 0, wrong: 0, last_error: nil}
-    {:ok, Map.merge(Map.new(options), %{counts: counts, aim: Ptz.History.new()})}
+    scratch = Vision.scratch(options[:colours], options[:backend])
+
+    {:ok,
+     Map.merge(Map.new(options), %{counts: counts, aim: Ptz.History.new(), scratch: scratch})}
   end
 
   @impl GenServer
@@ -132,7 +135,9 @@ defmodule Vision.BlobDetector do
 
   defp direct(frame, _state), do: {:ok, frame}
 
-  defp read(%Frame{} = frame, state), do: Vision.blobs(frame, state.colours, state.backend)
+  defp read(%Frame{} = frame, state),
+    do: Vision.blobs(frame, state.colours, state.backend, state.scratch)
+
   defp read(_other, _state), do: {:error, :no_frame}
 
   defp count(state, what, n), do: update_in(state, [:counts, what], &(&1 + n))

@@ -51,6 +51,7 @@ defmodule Vision.Blobs do
 
     case FFmpeg.init(source: job.source, every: every_frame?, unsafe: job.unsafe) do
       {:ok, camera} ->
+        job = Map.put(job, :scratch, Vision.scratch(job.colours))
         next(camera, job, %{number: 0, start_ms: nil, summary: %{frames: 0, blobs: 0, last: nil}})
 
       {:error, reason} ->
@@ -92,7 +93,7 @@ defmodule Vision.Blobs do
     further = %{progress | number: number + 1, start_ms: start_ms}
 
     if rem(number, job.every) == 0 do
-      {:ok, blobs} = Vision.blobs(frame, job.colours)
+      {:ok, blobs} = Vision.blobs(frame, job.colours, nil, job.scratch)
       seen = %{number: number, at_s: (frame.at_ms - start_ms) / 1000, frame: frame, blobs: blobs}
 
       case job.report.(seen) do

@@ -6,7 +6,7 @@ defmodule Vision.Detections do
 
     * `at_ms` - when the frame was taken, in milliseconds by the robot's clock; it distinguishes
       the frames
-    * `blobs` - the `Vision.Blob`s in the order of `Vision.blobs/3`; `[]` means that nothing was
+    * `blobs` - the `Vision.Blob`s in the order of `Vision.blobs/4`; `[]` means that nothing was
       seen. Each of them has the size of the frame
     * `pan`, `tilt` - where the camera looked then, relative to the robot's body: radians, left
       and up positive

@@ -1,6 +1,7 @@
 defmodule Vision.BlobDetectorTest do
   use ExUnit.Case, async: true
   alias Hal.Frame
+  alias Vision.Backend.Native
   alias Vision.{BlobDetector, Colours, Detections}
   @moduletag :slow
 
@@ -33,6 +34,19 @@ defmodule Vision.BlobDetectorTest do
     assert_receive {:detections, %{at_ms: 20}}
     assert %{read: 1, dropped: 19} = BlobDetector.status(detector)
     refute_received {:detections, _}
+  end
+
+  test "it searches all its frames in the same memory", %{detector: detector} do
+    {Native, scratch} = :sys.get_state(detector).scratch
+    assert Native.held(scratch) == 0
+    {:ok, wide} = Frame.new(:yuyv, 64, 1, String.duplicate(<<200, 70, 200, 140>>, 32), 1)
+
+    for frame <- [wide, frame(2), wide] do
+      BlobDetector.frame(detector, frame)
+      assert_receive {:detections, %{blobs: [_]}}
+      assert {Native, ^scratch} = :sys.get_state(detector).scratch
+      assert Native.held(scratch) >= 64 * 34
+    end
   end
 
   test "wrong frames are counted and give nothing", %{detector: detector} do

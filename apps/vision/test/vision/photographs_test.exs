@@ -1,7 +1,7 @@
 defmodule Vision.PhotographsTest do
   @moduledoc "Real photographs and a real recording, with what a person sees in them."
   use ExUnit.Case, async: true
-  alias Vision.{Blobs, Colours, Filter, Photos}
+  alias Vision.{Backend, Blobs, Colours, Filter, Photos}
   @moduletag :slow
 
   @moduletag Photos.tags(~w(smarties.png fruits.jpg vtest.avi))
@@ -51,11 +51,15 @@ defmodule Vision.PhotographsTest do
     end
   end
 
-  test "the native backend and the reference agree on photographs" do
+  test "every backend that is there agrees with the reference on photographs" do
+    others = Enum.filter([Backend.Nx, Backend.Evision], &Code.ensure_loaded?/1)
+
     for {photo, file} <- [{"smarties.png", "smarties.txt"}, {"fruits.jpg", "fruits.txt"}] do
       colours = colours(file, min_area: 1)
       %{last: %{frame: frame, blobs: blobs}} = look(photo, colours)
-      assert {:ok, ^blobs} = Vision.blobs(frame, colours, Vision.Backend.Reference)
+
+      for backend <- [Backend.Reference, Backend.Native | others],
+          do: assert({:ok, ^blobs} = Vision.blobs(frame, colours, backend))
     end
   end
 
