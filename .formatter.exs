@@ -1,6 +1,6 @@
 [
   inputs: [
-    "{mix,native,.formatter}.exs",
+    "{mix,native,packages,.formatter}.exs",
     "config/**/*.exs",
     "test/**/*.exs",
     "apps/*/{mix,.formatter}.exs",

@@ -43,6 +43,7 @@ defmodule Golden do
 
   defp line(line) do
     [_digest, text] = String.split(line, "  ", parts: 2)
+    Sim.Trial.Memory.prepare()
     {:ok, options} = text |> String.split() |> Options.parse()
     {:ok, trial} = options |> Options.trial() |> Sim.Trial.new()
     report = trial |> play() |> Sim.Trial.result() |> Report.json(0.0)

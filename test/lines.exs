@@ -4,6 +4,8 @@ defmodule Lines do
   and its status, as a process of its own would; it takes most of a second of processor time to start. The others are
   given to `sh`.
   """
+  @seconds 60
+
   @typedoc "The words of a Mix task, or a line for `sh`."
   @type line :: [String.t(), ...] | String.t()
 
@@ -22,7 +24,8 @@ defmodule Lines do
     options = [stderr_to_stdout: true] ++ options
 
     try do
-      command = "exec timeout 60 mix run --no-start #{script} #{told} </dev/null"
+      seconds = @seconds * length(lines)
+      command = "exec timeout #{seconds} mix run --no-start #{script} #{told} </dev/null"
       {printed, status} = System.cmd("sh", ["-c", command], options)
       status == 0 || raise "#{command}: status #{status}: #{printed}"
       told |> File.read!() |> :erlang.binary_to_term()

@@ -57,6 +57,7 @@ defmodule System.NetnsStrangersTest do
         do: {:module, _} = Vm.call(vm, :code, :load_binary, [module, ~c"test", code])
   end
 
+  @calm_ms 3_000
   # Ten times as many as the atoms that a robot's own life may make meanwhile.
   @some 5_000
 
@@ -86,15 +87,14 @@ defmodule System.NetnsStrangersTest do
     port = Epmd.default_port("mag2")
     assert Vm.call(stranger, Caller, :call, [target, port]) == :refused
 
-    calm = ticks_per_second(fleet, 3_000)
+    calm = ticks_per_second(fleet, @calm_ms)
     before = state(fleet)
-    began = now()
     arguments = [target, port, times, @at_once]
     calls = Task.async(fn -> Vm.call(stranger, Caller, :call, arguments, 500_000) end)
 
     {refused, met} = meet_until(fleet, calls, [])
-    took = now() - began
     afterwards = state(fleet)
+    took = afterwards.at_ms - before.at_ms
     ticks = (afterwards.tick - before.tick) * 1_000 / took
 
     if System.get_env("FIGURES") do
@@ -110,7 +110,10 @@ defmodule System.NetnsStrangersTest do
     assert afterwards.atoms - before.atoms < @own_atoms
     assert afterwards.bytes - before.bytes < @own_bytes
     assert afterwards.ports <= before.ports + 2
-    # One more, because the first and the last are counted between two ticks.
+
+    # Other tests may have taken the processors meanwhile: that is no stranger's doing. One tick more and less, because
+    # the first and the last are counted between two ticks.
+    calm = min(calm, ticks_per_second(fleet, @calm_ms)) - 1_000 / @calm_ms
     assert ticks + 1_000 / took > 0.95 * calm
     assert Enum.max(met) < 10_000
     assert %{stranger: counted} = Fleet.call(fleet, :mag2, Mesh, :refused, [])
@@ -156,22 +159,25 @@ defmodule System.NetnsStrangersTest do
   end
 
   defp ticks_per_second(fleet, ms) do
-    before = {state(fleet).tick, now()}
+    before = state(fleet)
     Process.send_after(self(), :over, ms)
     assert_receive :over, 10 * ms
-    {tick, at} = before
-    (state(fleet).tick - tick) * 1_000 / (now() - at)
+    afterwards = state(fleet)
+    (afterwards.tick - before.tick) * 1_000 / (afterwards.at_ms - before.at_ms)
   end
 
   defp state(fleet) do
     board = Fleet.call(fleet, :mag2, Robot.Board, :find!, [:mag2])
     {:ok, doing, _ms} = Fleet.call(fleet, :mag2, Robot.Board, :fetch, [board, :doing, :infinity])
+    # The time of the tick, not of the end of what follows, which takes a busy machine longer.
+    at_ms = now()
 
     for pid <- Fleet.call(fleet, :mag2, Process, :list, []),
         do: Fleet.call(fleet, :mag2, :erlang, :garbage_collect, [pid])
 
     %{
       tick: doing.tick,
+      at_ms: at_ms,
       atoms: Fleet.call(fleet, :mag2, :erlang, :system_info, [:atom_count]),
       bytes: Fleet.call(fleet, :mag2, :erlang, :memory, [:total]),
       ports: length(Fleet.call(fleet, :mag2, Port, :list, [])),

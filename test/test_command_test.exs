@@ -12,6 +12,7 @@ defmodule System.TestCommandTest do
     script(folder, "bin/setup", "exit 0")
     script(folder, "bin/test-c", "echo all well")
     script(folder, "bin/opencv-data", "exit 0")
+    script(folder, "bin/mcap-python", "exit 0")
 
     for name <- ~w(bin/test bin/build),
         do: File.cp!(Path.join(@root, name), Path.join(folder, name))

@@ -82,6 +82,10 @@
   # Where it is switched on and started, in the map that all robots share.
   start: {0.0, 0.0, deg(0)},
 
+  # The floor plan of its building, as map_server writes it: a description in YAML, searched beside this file, and the
+  # PNG or PGM that it names. Then it drives round walls and through doors. nil for none.
+  # map: "building.yaml",
+
   # :manual: its wheels stand until a person arms them. :auto: they turn as soon as they are told.
   # arm: :manual,
 
@@ -94,6 +98,10 @@
 
   # Here an e-stop outlives a restart of the machine; the folder must be there.
   # estop_file: "/var/lib/convoy/estop",
+
+  # Records what it is told and does, for `mix replay` and Foxglove: numbered files in this folder, of which the
+  # oldest are deleted before they exceed limit_mb, 4 or more. An hour on a mission takes about 40 MB. nil for none.
+  # record: [folder: "/var/lib/convoy/runs", limit_mb: 500, pictures: 1],
 
   # For `robot halt`, the last thing that this machine does: the controller reads the phrase on the machine's
   # serial console and cuts the power. Without it, or nil, there is no such command.

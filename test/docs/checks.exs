@@ -12,6 +12,8 @@ defmodule Docs.Checks do
   @robot "it needs a robot"
   @release "it needs a release, which test/release_test.exs builds, and runs"
   @device "it needs a camera"
+  @sources "it needs the sources of packages"
+  @drawing "it needs a drawing of others"
   @ssh "it needs another machine"
   @system "it changes this system"
   @node "its iex> lines run in such a node"
@@ -27,7 +29,11 @@ defmodule Docs.Checks do
     "bin/demo --nodes" => @live,
     "bin/demo --nodes --robots 4" => @live,
     "bin/demo --map floor.png:16x12 --landmark 2,1" => @live,
+    "bin/demo --map building.yaml" => @live,
+    "bin/demo --headless --map hospital.png:110x42 --robots 5" => @drawing,
     "bin/demo --hardware 1" => @live,
+    "mix demo --record live.mcap" => @live,
+    "mix demo --headless --hardware 2 --record live.mcap" => @long,
     "bin/demo --hardware mag:1,min:1" => @live,
     "bin/node mag1" => @node,
     "bin/node mag2" => @node,
@@ -38,8 +44,11 @@ defmodule Docs.Checks do
       @long,
     "mix bench demo --seeds 1-20 --maps hall --cases slip,same,chain,twelve-chain,line,wedge,triangle,diamond,circle" =>
       @long,
+    "mix chaos" => @long,
+    "mix chaos --runs 1000 --keep failures" => @long,
     "mix bench swarm --nodes 3,10 --robots-in-one-node 100" => @long,
     "mix bench swarm --nodes 30 --robots-in-one-node 0" => @long,
+    "mix bench vision --beside CMVision" => "it needs a program of others",
     "mix blobs /dev/video0 --colours landmark.txt --picture out.png" => @device,
     "mix calibrate colour /dev/video0 --box 140,90,40,60 --name YellowLandmark --picture look.png" =>
       @device,
@@ -50,6 +59,8 @@ defmodule Docs.Checks do
     "MIX_ENV=prod mix release fleet" => @release,
     "MIX_TARGET=robot mix deps.get" => "it needs Hex",
     "MIX_TARGET=robot MIX_ENV=prod mix release robot" => "it needs Hex",
+    "CONVOY_DEPS=../deps MIX_TARGET=robot MIX_ENV=prod mix release robot" => @sources,
+    "bin/adapters ../deps" => @sources,
     "ROBOT=base CONVOY_SECRET_FILE=$PWD/convoy.secret _build/prod/rel/fleet/bin/fleet start_iex" =>
       @release,
     "ROBOT=mag1 bin/robot check" => @release,
@@ -83,6 +94,10 @@ defmodule Docs.Checks do
 
   # How blocks begin that nobody types.
   @shown [
+    "51.1 s replayed: all decisions on",
+    "live.mcap: 2 live robots",
+    "wishes, the strongest first:",
+    "   40.0 s  FAILED  {:formed, by_s: 40}",
     "console -> sim -> missions -> swarm",
     "console --> sim --> missions --> swarm",
     "Swarm.Supervisor (rest_for_one",
@@ -95,9 +110,11 @@ defmodule Docs.Checks do
     # One line of a status.
     "#min1 follow (1.20",
     "#mag1 follow (-4.69",
+    "{:error, \"mag1 cannot go to",
     # Flags and settings.
     "-kernel prevent_overlapping_partitions",
     "config :swarm, mesh: [multicast",
+    "config :swarm, mesh: [topologies",
     "-pa _build/dev/lib/mesh/ebin",
     # What programs print that are not run here.
     "Active: active (running)",
@@ -106,11 +123,16 @@ defmodule Docs.Checks do
     "sample   784 pixels",
     "Assumed; check whether",
     "config/robots/mag1.exs:7: limits.max_liner",
+    "config/robots/mag1.exs:9: map: /home",
     "refused mag3 at",
     "mag1  pid 3308",
     "mag1 has real drivers",
     # Files.
+    "map: \"building.yaml\",",
+    "image: building.png ",
     "#!/bin/sh",
+    "defmodule Lab.FleetFeed do",
+    "defmodule LabWeb.FleetLive do",
     "[Colors]"
   ]
 

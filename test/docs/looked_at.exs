@@ -6,7 +6,7 @@ defmodule Docs.LookedAt do
   import ExUnit.CaptureIO, only: [capture_io: 1]
   alias Docs.Sandbox
 
-  @ours ~w(Hal Vision Robot Mesh Swarm Missions Sim Console Vm Mix)
+  @ours ~w(Hal Vision Robot Mesh Swarm Missions Sim Console Mcap Vm Mix)
 
   @doc "Of a command's words."
   @spec command([String.t()], Path.t()) :: String.t() | nil
@@ -129,7 +129,7 @@ defmodule Docs.LookedAt do
   defp loaded,
     do:
       Enum.flat_map(
-        [:hal, :vision, :robot, :mesh, :swarm, :missions, :agents, :player, :sim, :vm],
+        [:hal, :vision, :robot, :mesh, :swarm, :missions, :agents, :player, :sim, :mcap, :vm],
         &Application.spec(&1, :modules)
       )
 

@@ -21,7 +21,7 @@ defmodule Docs.Reader do
            text :: String.t(), answer :: String.t()}
           | {:file, line :: pos_integer(), path :: Path.t(), text :: String.t()}
 
-  @programs ~w(cd mix iex apt-get ssh scp cp sed erl ffmpeg nft robot kill mkdir)
+  @programs ~w(cd mix iex apt-get ssh scp cp sed erl ffmpeg nft robot kill mkdir printf)
 
   @doc "All items of a document, in order."
   @spec items(String.t()) :: [item()]

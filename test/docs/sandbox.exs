@@ -11,7 +11,7 @@ defmodule Docs.Sandbox do
   # Nothing here meets another fleet of this machine, nor finds a camera.
   @environment [{"CONVOY_INTERFACE", "127.0.0.1"}]
   # The Mix tasks that leave all else of their VM as it is.
-  @tasks ~w(blobs calibrate fleet.certs fleet.secret robot.check robot.import)
+  @tasks ~w(blobs calibrate chaos demo fleet.certs fleet.secret replay robot.check robot.import scenario)
 
   @doc "Makes the folder, with what was built in it. Where Mix builds all again, this takes as long as that."
   @spec prepare(Path.t(), String.t()) :: Path.t()
@@ -25,7 +25,9 @@ defmodule Docs.Sandbox do
 
     for name <- File.ls!(folder), name != "_build", do: File.rm_rf!(Path.join(folder, name))
 
-    copy(root, folder, File.ls!(root) -- @left_out)
+    copy(root, folder, File.ls!(root) -- ["apps" | @left_out])
+    for app <- File.ls!(Path.join(root, "apps")), do: copy_folder(root, folder, "apps/#{app}")
+    same_time(root, folder, "apps")
     built(root, folder)
     given(document, folder)
     folder
@@ -64,6 +66,20 @@ defmodule Docs.Sandbox do
       {printed, status} = System.cmd(Path.join(folder, "bin/build"), [], stderr_to_stdout: true)
       status == 0 || raise "bin/build in #{folder}: status #{status}: #{printed}"
     end
+  end
+
+  # Without what the tests of an app have in their folder for temporary files: it comes and goes meanwhile, and is more
+  # than all the rest.
+  defp copy_folder(root, folder, name) do
+    [from, to] = for top <- [root, folder], do: Path.join(top, name)
+    File.mkdir_p!(to)
+    copy(from, to, File.ls!(from) -- @left_out)
+    same_time(root, folder, name)
+  end
+
+  defp same_time(root, folder, name) do
+    [from, to] = for top <- [root, folder], do: Path.join(top, name)
+    {_, 0} = System.cmd("touch", ["-r", from, to])
   end
 
   # With their times, so that nothing is built again.

@@ -108,7 +108,8 @@ defmodule Netns.Fleet do
 
       System.monotonic_time(:millisecond) > deadline ->
         now = inspect(Story.now(lines), pretty: true)
-        raise "the logs do not tell that #{what}; they end so: #{now}"
+        troubles = Enum.join(Story.troubles(lines), "\n")
+        raise "the logs do not tell that #{what}; they end so: #{now}\nTroubles:\n#{troubles}"
 
       true ->
         receive do

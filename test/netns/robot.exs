@@ -12,6 +12,15 @@ defmodule Netns.Log do
 
   @look_ms 100
 
+  # What explains that a robot does not do as it should: processes that hang, crash or start again.
+  @troubles for(
+              part <- [:gate, :executive, :pilot],
+              what <- [:silent, :hung, :again],
+              do: [:robot, part, what]
+            ) ++
+              [[:robot, :gate, :start], [:robot, :executive, :start], [:swarm, :part, :fell]] ++
+              [[:swarm, :comms, :duplicate_id], [:swarm, :comms, :unique_id]]
+
   @doc "Starts the log of a node."
   def start_link({path, robot}),
     do: GenServer.start_link(__MODULE__, {path, robot}, name: __MODULE__)
@@ -33,6 +42,14 @@ defmodule Netns.Log do
     for event <- [[:robot, :gate, :estop], [:robot, :gate, :reset], [:robot, :pilot, :phase]],
         do: :ok = Event.attach({__MODULE__, event}, event, &__MODULE__.event/4, nil)
 
+    for event <- @troubles,
+        do: :ok = Event.attach({__MODULE__, event}, event, &__MODULE__.trouble/4, nil)
+
+    # Nothing is printed; what crashes is in the log.
+    _ = :logger.remove_handler(:default)
+    :ok = :logger.set_primary_config(:level, :error)
+    :ok = :logger.add_handler(__MODULE__, __MODULE__, %{level: :error})
+
     {:ok, _timer} = :timer.send_interval(@look_ms, :look)
     {:ok, write(%{file: file, robot: robot, last: %{}}, now(), :boot, :os.getpid())}
   end
@@ -45,6 +62,14 @@ defmodule Netns.Log do
     unless match?({Netns.Watched, _phase}, state), do: change(:claim, nil)
     change(:doing, if(is_tuple(state), do: elem(state, 0), else: state))
   end
+
+  @doc false
+  def log(%{msg: message}, _config),
+    do: note(:trouble, {:error, inspect(message, limit: 15, printable_limit: 1_000)})
+
+  @doc false
+  def trouble([_app, part, what], _measurements, about, nil),
+    do: note(:trouble, {part, what, inspect(about, limit: 20, printable_limit: 200)})
 
   @impl GenServer
   def handle_cast({:note, us, kind, value}, s), do: {:noreply, write(s, us, kind, value)}

@@ -35,6 +35,15 @@ defmodule Netns.Story do
   @spec now([line()]) :: now()
   def now(lines), do: lines |> scan() |> List.last() |> elem(1)
 
+  @doc "What explains why robots do not do as they should, for people: one line each."
+  @spec troubles([line()]) :: [String.t()]
+  def troubles(lines) do
+    for {us, who, kind, value} <- lines,
+        kind in [:trouble, :doing, :killed, :boot, :estop, :reset] do
+      "#{div(us, 1_000)} ms #{who} #{kind} #{inspect(value)}"
+    end
+  end
+
   defp step({_us, who, :claim, nil}, now), do: %{now | claims: Map.delete(now.claims, who)}
   defp step({_us, who, :claim, claim}, now), do: put_in(now.claims[who], claim)
   defp step({_us, who, :boot, _pid}, now), do: %{now | claims: Map.delete(now.claims, who)}

@@ -74,15 +74,17 @@ defmodule Bench do
   def choose(text), do: Parse.named(text, cases())
 
   @doc """
-  The time within which the fleet should be in formation (again). In the hospital a fresh fleet
-  has longer.
+  The time within which the fleet should be in formation (again). Where there are doors and corners
+  a fresh fleet has longer.
 
       iex> {:ok, [six]} = Bench.choose("six")
       iex> {Bench.limit_s(six, "hall"), Bench.limit_s(six, "hospital")}
       {120, 180}
   """
   @spec limit_s(case(), String.t()) :: number()
-  def limit_s(%{deed: nil, limit_s: 120}, "hospital"), do: 180
+  def limit_s(%{deed: nil, limit_s: 120}, map),
+    do: trunc(Console.Options.duration_s(%Console.Options{map: map}))
+
   def limit_s(%{limit_s: limit_s}, _map), do: limit_s
 
   @doc "The options of `Sim.Trial.new/1` for a case, a map and a seed."

@@ -546,6 +546,14 @@ defmodule PlayerTest do
     assert line =~ "num_sonars: has an impossible value"
   end
 
+  test "boards without infrareds have no order, whatever poses there are" do
+    text = String.replace(@new, "rflex_banks [2]", "rflex_banks [0]")
+
+    assert {:ok, result} = Player.import(text, colours: &colours/1)
+    options = options(again(result.text))
+    assert options[:ir_order] == nil and options[:ir_banks] == nil
+  end
+
   test "random damage never raises, and what is imported is always a robot" do
     bytes = ~c"[](),\"#.-+ \n\t0159azAZ_:" ++ [0, 200, 255]
 

@@ -169,16 +169,35 @@ defmodule Vm do
   end
 
   # The code of this build: what runs here runs there. Erlang's own it has itself, unless all is in one place: a
-  # release.
+  # release. Consolidated protocols are found before the others. Then come the folders that most of our modules are
+  # from: one that is loaded is looked for in each, and a robot's VM loads some 300.
   defp paths do
     all = Enum.map(:code.get_path(), &to_string/1)
     own = Path.join(to_string(:code.root_dir()), "lib")
 
-    case Enum.reject(all, &String.starts_with?(&1, own)) do
-      [_, _ | _] = ours -> ["-pa" | ours]
-      _release -> ["-pa" | all]
+    case Enum.split_with(all, &String.starts_with?(&1, own)) do
+      {erlang, [_, _ | _] = ours} ->
+        loaded = Enum.frequencies_by(:code.all_loaded(), &folder/1)
+        used = Enum.filter(erlang, &is_map_key(loaded, &1))
+        {tools, ours} = Enum.split_with(ours, &tool?/1)
+        {protocols, ours} = Enum.split_with(ours, &(Path.basename(&1) == "consolidated"))
+
+        first =
+          protocols ++ Enum.sort_by(Enum.reverse(ours) ++ used, &Map.get(loaded, &1, 0), :desc)
+
+        # `erl` turns the order of -pa round.
+        ["-pa" | Enum.reverse(first)] ++ ["-pz" | tools]
+
+      {_erlang, _release} ->
+        ["-pa" | all]
     end
   end
+
+  defp folder({_module, [_ | _] = file}), do: Path.dirname(to_string(file))
+  defp folder(_without_file), do: nil
+
+  # What is loaded here because this VM builds and tests.
+  defp tool?(folder), do: folder =~ ~r"/(mix|ex_unit|iex|eex)/ebin$"
 
   # The settings of our own VM are not for others.
   defp variables(env) do

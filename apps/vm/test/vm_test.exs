@@ -26,6 +26,10 @@ defmodule VmTest do
     :ok = Vm.start_apps(vm, [:logger], logger: [level: :error])
     assert Vm.call(vm, Logger, :level, []) == :error
     assert Vm.call(vm, :code, :which, [Vm]) == :code.which(Vm)
+
+    # Also the protocols as this build consolidated them: what looks for others asks all folders each time.
+    assert Protocol.consolidated?(Enumerable)
+    assert Vm.call(vm, :code, :which, [Enumerable]) == :code.which(Enumerable)
     assert Vm.call(vm, :os, :getpid, []) == to_charlist(vm.pid)
     assert Vm.stop(vm) == :ok
     assert state(vm.pid) == "gone"

@@ -2,9 +2,11 @@ defmodule Console.Demo do
   @moduledoc """
   The demo without a view: the run in lockstep, its stages as lines, then report, picture and summary.
   """
-  alias Console.{Fleet, Options, Picture, Report}
+  alias Console.{Fleet, Options, Picture, Report, Tables}
   alias Console.Cli.{Format, Output, Progress}
   alias Console.Picture.RunTrack
+  alias Sim.{Recorder, Trial}
+  alias Sim.Recording.Pictures
 
   @progress_ms 100
 
@@ -27,11 +29,11 @@ defmodule Console.Demo do
     # With `--json -` only the report is written to standard output.
     output = Output.to(if(options.json == "-", do: :stderr, else: :stdio))
 
-    case trial_module.new(Options.trial(options)) do
-      {:ok, trial} ->
-        Enum.each([heading(options) | lines.(trial)], &Output.line(output, &1))
-        started = System.monotonic_time(:millisecond)
+    case begin(trial_module, options) do
+      {:ok, trial, recorder, tables} ->
         scene = trial_module.scene(trial)
+        Enum.each([heading(options, scene) | lines.(trial)], &Output.line(output, &1))
+        started = System.monotonic_time(:millisecond)
 
         run =
           play(
@@ -39,6 +41,9 @@ defmodule Console.Demo do
               module: trial_module,
               trial: trial,
               track: track(options, scene),
+              recorder: recorder,
+              pictures: options.record_pictures,
+              tables: tables,
               told: 0,
               drawn_ms: started,
               output: output,
@@ -49,7 +54,7 @@ defmodule Console.Demo do
 
         Output.finish(output)
         status = finish(run, options, (System.monotonic_time(:millisecond) - started) / 1000)
-        line = ended.(run.trial)
+        line = ended.(run.trial) || recorded(run, options, output)
         stop.(run.trial)
         if line, do: refuse(line), else: status
 
@@ -58,19 +63,72 @@ defmodule Console.Demo do
     end
   end
 
+  defp begin(module, %Options{record: nil, csv: nil} = options) do
+    with {:ok, trial} <- module.new(Options.trial(options)), do: {:ok, trial, nil, nil}
+  end
+
+  # Only what runs in lockstep is recorded (`Console.Options`).
+  defp begin(Trial, options) do
+    with {:ok, setup} <- Trial.setup(Options.trial(options)),
+         {:ok, recorder} <- named("--record", options.record, &recorder(&1, setup, options)),
+         {:ok, tables} <- named("--csv", options.csv, &Tables.open/1) do
+      {:ok, Trial.begin(setup, record: true), recorder, tables}
+    end
+  end
+
+  defp recorder(path, setup, options),
+    do: Recorder.start_link(path, setup, pictures: options.record_pictures != nil)
+
+  defp named(_option, nil, _open), do: {:ok, nil}
+
+  defp named(option, path, open),
+    do: with({:error, line} <- open.(path), do: {:error, "#{option} #{line}"})
+
+  # Why what was wanted of the run is not whole, or `nil`.
+  defp recorded(run, options, output) do
+    kept = [
+      {"--record", options.record, run.recorder && fn -> Recorder.close(run.recorder) end},
+      {"--csv", options.csv, run.tables && fn -> Tables.close(run.tables) end}
+    ]
+
+    Enum.find_value(kept, fn
+      {_option, _path, nil} ->
+        nil
+
+      {option, path, close} ->
+        case close.() do
+          :ok ->
+            Output.line(output, "Wrote #{path}")
+            nil
+
+          {:error, line} ->
+            "#{option} #{line}"
+        end
+    end)
+  end
+
   defp refuse(line) do
     IO.puts(:stderr, "demo: #{line}")
     1
   end
 
-  @doc "The first line of a run: the robots, the map, the seed and the formation."
-  @spec heading(Options.t()) :: String.t()
-  def heading(options) do
+  @doc """
+  The first line of a run: the robots, the map, the seed and the formation; and where the landmark
+  stands, if that was chosen and is not the origin.
+  """
+  @spec heading(Options.t(), Sim.Scene.t()) :: String.t()
+  def heading(options, scene) do
     {kind, spacing} = options.formation
 
     "#{Format.count(length(options.robots), "robot")} (#{Fleet.describe(options.robots)}) in " <>
-      "#{options.map}, seed #{options.seed}, #{kind} with #{Format.decimals(spacing, 1)} m spacing"
+      "#{options.map}, seed #{options.seed}, #{kind} with #{Format.decimals(spacing, 1)} m spacing" <>
+      landmark(options.landmark, scene.landmark)
   end
+
+  defp landmark(:default, {x, y}) when x != 0.0 or y != 0.0,
+    do: "; the landmark stands at #{Format.decimals(x, 2)},#{Format.decimals(y, 2)}"
+
+  defp landmark(_asked, _place), do: ""
 
   # Paths are kept only if a picture is wanted.
   defp track(%Options{picture: nil}, _scene), do: nil
@@ -82,10 +140,25 @@ defmodule Console.Demo do
     if run.module.done?(run.trial) do
       run
     else
-      trial = run.module.step(run.trial)
+      before = run.trial
+      trial = run.module.step(before)
       scene = run.module.scene(trial)
+      {trial, run} = record(run, before, trial, scene)
       play(%{run | trial: trial, track: run.track && RunTrack.add(run.track, scene)}, scene)
     end
+  end
+
+  defp record(%{recorder: nil, tables: nil} = run, _before, trial, _scene), do: {trial, run}
+
+  defp record(run, before, trial, scene) do
+    {entries, trial} = Trial.take_entries(trial)
+
+    if run.recorder do
+      frames = Pictures.due(before, run.pictures)
+      :ok = Recorder.tick(run.recorder, {scene.at_ms, entries}, scene, frames)
+    end
+
+    {trial, %{run | tables: run.tables && Tables.tick(run.tables, entries, scene)}}
   end
 
   defp tell(run, scene) do

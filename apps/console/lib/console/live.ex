@@ -15,12 +15,16 @@ defmodule Console.Live do
           | {:tell, target(), String.t()}
           | :estop
           | :reset
+          | {:pace, Console.Live.Pace.command()}
 
   @doc "The fleet as it is now."
   @callback scene(live :: term()) :: Sim.Scene.t()
 
   @doc "Carries a command out; the error says in one line why not."
   @callback command(live :: term(), command()) :: {:ok, String.t()} | {:error, String.t()}
+
+  @doc "How fast it goes, for people; `nil` for one that goes by the real clock."
+  @callback pace(live :: term()) :: String.t() | nil
 
   @doc "Its processes of the operating system, and how to reach them, one line each."
   @callback lines(live :: term()) :: [String.t()]

@@ -4,8 +4,10 @@ defmodule Console.Options do
   and makes the help text.
   """
   alias Console.{Cli, Fleet}
-  alias Console.Cli.Parse
+  alias Console.Cli.{MapName, Parse}
+  alias Console.Live.Pace
   alias Hal.Options.Suggest
+  alias Sim.Floorplan.Maps
 
   defstruct robots: nil,
             seed: 1,
@@ -21,16 +23,23 @@ defmodule Console.Options do
             leader_change: true,
             duration_s: nil,
             blobs: :painted,
+            plan: :none,
             headless: false,
+            speed: nil,
             nodes: false,
             hardware: [],
             json: nil,
             picture: nil,
+            record: nil,
+            record_pictures: nil,
+            trace: nil,
+            csv: nil,
             help: false
 
   @type t :: %__MODULE__{}
 
-  @maps ~w(hall hospital arena)
+  # The maps without doors and corners, where a fleet needs less time.
+  @short ~w(hall arena)
 
   @doc """
   Options from a command's arguments, or one line for each error in them. Names of files are
@@ -52,6 +61,8 @@ defmodule Console.Options do
       |> Enum.reduce(options, &put/2)
       |> check_kills()
       |> check_hardware()
+      |> check_record()
+      |> check_speed()
     end
   end
 
@@ -71,6 +82,8 @@ defmodule Console.Options do
       bin/demo --headless --kill leader@40 --seed 7         what happens when the leader dies?
       bin/demo --headless --move 3,2@40 --picture run.svg   the landmark moves away; see the paths
       bin/demo --headless --map hospital --json -           a report for another program
+      bin/demo --map hospital --landmark 0,10.9 --plan known   a landmark in another room: through the doors
+      bin/demo --speed 5                                    five times as fast; pause, step, speed max
       bin/demo --nodes --robots 4                           five processes: kill -9 one of them
       bin/demo --nodes --headless --kill leader@40 --json - the same with a report
       bin/demo --hardware 1                                 the first robot has the real drivers
@@ -85,10 +98,11 @@ defmodule Console.Options do
   def trial(%__MODULE__{} = options) do
     options
     |> Map.take(
-      ~w(robots seed map start landmark moves kills loss noise formation assign leader_change blobs hardware)a
+      ~w(robots seed map start landmark moves kills loss noise formation assign leader_change blobs plan hardware)a
     )
     |> Map.put(:duration_s, duration_s(options))
     |> Map.merge(if options.nodes, do: %{nodes: true}, else: %{})
+    |> Map.merge(if options.trace, do: %{trace: options.trace}, else: %{})
   end
 
   @doc """
@@ -105,8 +119,9 @@ defmodule Console.Options do
       180.0
   """
   @spec duration_s(t()) :: float()
-  def duration_s(%__MODULE__{duration_s: nil, map: "hospital"}), do: 180.0
-  def duration_s(%__MODULE__{duration_s: nil}), do: 120.0
+  def duration_s(%__MODULE__{duration_s: nil, map: map}),
+    do: if(map in (Maps.names() -- @short), do: 180.0, else: 120.0)
+
   def duration_s(%__MODULE__{duration_s: duration_s}), do: duration_s
 
   defp table(folder) do
@@ -115,12 +130,14 @@ defmodule Console.Options do
       {"fleet", "mag:N,min:N", &Fleet.parse/1, "or how many of each kind"},
       {"seed", "S", &Parse.whole(&1, 0..4_294_967_295),
        "of all randomness; the same seed gives the same run (1)"},
-      {"map", "NAME", &map(&1, folder),
-       "hall, hospital, arena, or FILE.png:WIDTHxHEIGHT in metres (hall)"},
+      {"map", "NAME", &MapName.parse(&1, folder),
+       "#{MapName.names()},\nor FILE.yaml, or FILE.png:WIDTHxHEIGHT in metres (hall)"},
+      {"plan", "HOW", &Parse.choice(&1, none: :none, known: :known, sonar: :sonar),
+       "whether robots have the floor plan (known), remember walls that their\nsonars saw (sonar), or do neither: known, sonar, none (none)"},
       {"start", "HOW", &Parse.choice(&1, spread: :spread, same: :same),
        "spread over the map, or all switched on at one pose: same (spread)"},
       {"landmark", "X,Y|none", &landmark/1,
-       "where the landmark stands, in metres from the map's centre"},
+       "where the landmark stands, in metres (the middle, or the nearest\nroom that takes the fleet)"},
       {"move", "X,Y@T", &Parse.at(&1, fn text -> Parse.point(text) end, "X,Y@T"),
        "the landmark glides there from second T; repeatable"},
       {"kill", "WHO@T", &Parse.at(&1, fn text -> who(text) end, "leader@T or NAME@T"),
@@ -135,9 +152,12 @@ defmodule Console.Options do
       {"leader-change", "on|off", &Parse.choice(&1, on: true, off: false),
        "whether another robot takes over when it sees better (on)"},
       {"duration", "S", &Parse.number(&1, 1, 3600),
-       "simulated seconds at most (120, hospital 180;\nlive on a terminal: until you quit)"},
+       "simulated seconds at most (120 in hall, arena and a FILE,\n180 in other maps; live on a terminal: until you quit)"},
       {"headless", nil, nil,
        "no view, as fast as it goes (with --nodes or --hardware in real time)"},
+      {"speed", "X|max", &Pace.speed/1,
+       "live in lockstep, at X times real time (0.1 to 100) or as fast as it goes;
+the prompt then takes pause, step, speed"},
       {"nodes", nil, nil,
        "each robot and the world in a process of its own, a node\nto attach to, to kill -9 and to kill -STOP"},
       {"hardware", "N|mag:N,min:N", &hardware/1,
@@ -145,6 +165,12 @@ defmodule Console.Options do
       {"json", "FILE|-", &file(&1, "", folder), "write the report (- is standard output)"},
       {"picture", "FILE.svg", &file(&1, ".svg", folder),
        "draw the paths and the formation error"},
+      {"record", "FILE.mcap", &file(&1, ".mcap", folder),
+       "record the run, for mix replay, Foxglove and others\n(not with --nodes)"},
+      {"record-pictures", "RATE", &pictures/1,
+       "also what the cameras see: RATE pictures a second of each robot,\n0.1 to 5 (none; with --record, needs ffmpeg)"},
+      {"csv", "DIR", &Parse.folder(&1, folder),
+       "write poses, errors, messages and ticks as tables\n(with --headless, in lockstep)"},
       {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
        "paint camera pictures, or skip the painting (painted)"},
       {"help", nil, nil, "this text"}
@@ -156,6 +182,7 @@ defmodule Console.Options do
   defp put({"move", move}, options), do: %{options | moves: options.moves ++ [move]}
   defp put({"kill", kill}, options), do: %{options | kills: options.kills ++ [kill]}
   defp put({"leader-change", on?}, options), do: %{options | leader_change: on?}
+  defp put({"record-pictures", rate}, options), do: %{options | record_pictures: rate}
   defp put({"duration", duration_s}, options), do: %{options | duration_s: duration_s}
 
   defp put({name, value}, options),
@@ -210,6 +237,33 @@ defmodule Console.Options do
 
   defp check_hardware(error), do: error
 
+  # A recorder hears the robots of its own process only; tables are made from the world of a run in lockstep.
+  defp check_record({:ok, %{record: record, csv: csv} = options}) do
+    lines =
+      for {line, true} <- [
+            {"--record cannot be used with --nodes: robots in processes of their own are not recorded",
+             record != nil and options.nodes},
+            {"--record-pictures needs --record FILE.mcap",
+             options.record_pictures != nil and record == nil},
+            {"--csv needs --headless, without --nodes and --hardware",
+             csv != nil and (not options.headless or real_time?(options))}
+          ],
+          do: line
+
+    if lines == [], do: {:ok, options}, else: {:error, lines}
+  end
+
+  defp check_record(other), do: other
+
+  # Headless is as fast as it goes; lines and other processes go by the real clock.
+  defp check_speed({:ok, %{speed: speed} = options}) do
+    if speed == nil or not (options.headless or real_time?(options)),
+      do: {:ok, options},
+      else: {:error, ["--speed is for a live run, without --headless, --nodes and --hardware"]}
+  end
+
+  defp check_speed(other), do: other
+
   defp too_much_hardware(asked, robots) do
     {:error,
      ["--hardware #{asked} is more than there are: the fleet is #{Fleet.describe(robots)}"]}
@@ -233,37 +287,22 @@ defmodule Console.Options do
   defp who(""), do: {:error, "a name"}
   defp who(text), do: {:ok, text}
 
+  defp pictures(text) do
+    {lowest, highest} = Sim.Recording.Pictures.rates()
+    Parse.number(text, lowest, highest)
+  end
+
   defp landmark("none"), do: {:ok, :none}
 
   defp landmark(text) do
     with {:error, allowed} <- Parse.point(text), do: {:error, allowed <> ", or none"}
   end
 
-  defp map(name, _folder) when name in @maps, do: {:ok, name}
-
-  defp map(text, folder) do
-    case Regex.run(~r/^(.+\.(?:png|pgm)):(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)$/i, text) do
-      [_, file, width, height] ->
-        sized(from(file, folder), width, height)
-
-      nil ->
-        {:error, {"hall, hospital, arena or FILE.png:WIDTHxHEIGHT", Suggest.hint(text, @maps)}}
-    end
-  end
-
-  defp sized(file, width, height) do
-    with {:ok, _} <- Parse.number(width, 2, 1000), {:ok, _} <- Parse.number(height, 2, 1000) do
-      {:ok, "#{file}:#{width}x#{height}"}
-    else
-      _ -> {:error, "FILE.png:WIDTHxHEIGHT with sides from 2 to 1000 metres"}
-    end
-  end
-
   defp file("-", "", _folder), do: {:ok, "-"}
   defp file("", _extension, _folder), do: {:error, "the name of a file"}
 
   defp file(text, extension, folder) do
-    path = from(text, folder)
+    path = MapName.from(text, folder)
 
     cond do
       not String.ends_with?(path, extension) -> {:error, "a file whose name ends in #{extension}"}
@@ -272,7 +311,4 @@ defmodule Console.Options do
       true -> {:ok, path}
     end
   end
-
-  defp from(path, "."), do: path
-  defp from(path, folder), do: Path.expand(path, folder)
 end

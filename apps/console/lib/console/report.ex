@@ -12,7 +12,7 @@ defmodule Console.Report do
 
   @keys ~w(version seed map robots simulated_s wall_s stages leader leaders_at_once_max
            leader_changes formation claims stuck landmark_distance_m collisions min_separation_m messages fleet)a
-  @stage ~w(stage at_s robot epoch size_ppm)a
+  @stage ~w(stage at_s robot epoch size_ppm as asked followers)a
   @formation ~w(kind spacing_m error_mean_m error_max_m share_of_time_formed)a
   @claim ~w(at_s robot worst_m worst_5s_m)a
   @messages ~w(sent lost)a
@@ -47,6 +47,7 @@ defmodule Console.Report do
   def summary(result, formed?, wall_s) do
     [
       outcome(result, formed?) <>
+        no_room(result.stages, formed?) <>
         wrong(result.claims) <> blocked(result.fleet) <> unsure(result.fleet),
       safety(result),
       leadership(result),
@@ -103,18 +104,38 @@ defmodule Console.Report do
   defp outcome(%{formation: formation} = result, true) do
     living = Enum.count(result.fleet, & &1.alive)
 
-    "In formation: #{formation.kind} of #{living} led by #{result.leader}" <>
+    "In formation: #{shape(formation, result.stages)} of #{living} led by #{result.leader}" <>
       error(formation) <> distance(result.landmark_distance_m) <> "."
   end
 
   defp outcome(%{formation: formation} = result, false),
     do: "Not in formation: #{formation.kind} led by #{result.leader}#{error(formation)}."
 
+  # The one that was asked for, unless there was no room for it.
+  defp shape(formation, stages) do
+    case Enum.find(Enum.reverse(stages), &(&1.stage == :formed)) do
+      %{as: :cluster} -> "a cluster"
+      %{as: :column} -> "a column along its leader's way"
+      %{as: how} -> "#{formation.kind}, #{how},"
+      _as_asked -> "#{formation.kind}"
+    end
+  end
+
   defp error(%{error_mean_m: nil}), do: ""
 
   defp error(formation) do
     ", off their places by #{Format.decimals(formation.error_mean_m, 2)} m on average" <>
       " and #{Format.decimals(formation.error_max_m, 2)} m at most"
+  end
+
+  # What the leader last said of its shape.
+  defp no_room(_stages, true), do: ""
+
+  defp no_room(stages, false) do
+    case Enum.find(Enum.reverse(stages), &(&1.stage in [:formed, :cannot_form])) do
+      %{stage: :cannot_form} = stage -> " #{String.capitalize(Format.meaning(stage), :ascii)}."
+      _formed_or_never_said -> ""
+    end
   end
 
   defp wrong(claims) do

@@ -13,16 +13,23 @@ defmodule Console.Terminal do
 
   @try "Try:  kill leader  ·  formation wedge 1.2  ·  landmark 3,2  ·  help  ·  quit"
 
-  defstruct columns: 80, rows: 24, editor: %Editor{}, messages: [], overlay: nil, floor: nil
+  defstruct columns: 80,
+            rows: 24,
+            editor: %Editor{},
+            messages: [],
+            overlay: nil,
+            floor: nil,
+            pace: nil
 
-  @typedoc "What the view keeps besides the scene; `messages` are answers, the newest first."
+  @typedoc "What the view keeps besides the scene; `messages` are answers, the newest first; `pace` is how fast the run goes."
   @type t :: %__MODULE__{
           columns: pos_integer(),
           rows: pos_integer(),
           editor: Editor.t(),
           messages: [{String.t(), atom()}],
           overlay: [String.t()] | nil,
-          floor: Canvas.floor() | nil
+          floor: Canvas.floor() | nil,
+          pace: String.t() | nil
         }
 
   @doc "The escape sequence that switches the terminal to a screen of our own."
@@ -61,14 +68,14 @@ defmodule Console.Terminal do
     {body, view} = body(scene, view, body_rows)
 
     rows =
-      [header(scene, view.columns)] ++
+      [header(scene, view.columns, view.pace)] ++
         body ++
         happened(scene, happened) ++ answers(view, answers) ++ [[{@try, :dim}], prompt(view)]
 
     {Enum.take(rows, -view.rows), view}
   end
 
-  defp header(scene, columns) do
+  defp header(scene, columns, pace) do
     {kind, spacing} = scene.formation
     ground = Floorplan.of(scene.map)
     name = Path.basename(ground.name)
@@ -82,6 +89,7 @@ defmodule Console.Terminal do
     [
       {" Convoy ", :title},
       {" #{place}  #{Format.decimals(scene.at_ms / 1000, 1)} s ", :bar},
+      {if(pace, do: " #{pace} ", else: ""), :bar},
       {" #{kind} #{Format.decimals(spacing, 1)} m ", :bar},
       {" #{leader(scene)} ", :bar},
       {" #{error(scene)} ", :bar}

@@ -19,6 +19,20 @@ defmodule Console.DemoTest do
     refute text =~ "\e["
   end
 
+  test "the first line says where the landmark stands if that was chosen, off the origin" do
+    first = fn line ->
+      options = Runs.options(line <> " --robots 1 --duration 1 --blobs direct --noise off")
+      {_status, text} = with_io(fn -> Demo.run(options, Sim.Trial) end)
+      text |> String.split("\n") |> hd()
+    end
+
+    assert first.("--map ring") =~
+             ~r/1.0 m spacing; the landmark stands at -?\d+\.\d\d,-?\d+\.\d\d$/
+
+    for line <- ["--map hall", "--map ring --landmark 0,7"],
+        do: assert(first.(line) =~ ~r/1.0 m spacing$/)
+  end
+
   test "ends with 2 when there is no formation" do
     assert {2, text} = demo("--landmark none --duration 10")
     assert text =~ "No formation"

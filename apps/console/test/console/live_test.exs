@@ -1,5 +1,6 @@
 defmodule Console.LiveTest do
   use ExUnit.Case, async: true
+  doctest Console.Live.Pace
   alias Console.{FakeTrial, Live, Options, Runs}
 
   defp start(line) do
@@ -22,6 +23,43 @@ defmodule Console.LiveTest do
     assert {:error, line} = Live.Trial.command(live, {:tell, :all, "goto:1:2"})
     assert line =~ "goto:1:2"
     assert Live.Trial.result(live).robots == 3
+  end
+
+  # What a run shows once it has paused by itself, or is ahead.
+  defp until(live, shows?) do
+    pace = Live.Trial.pace(live)
+    scene = Live.Trial.scene(live)
+    if shows?.(scene, pace), do: scene, else: until(live, shows?)
+  end
+
+  test "it pauses, steps, and goes on at another speed; the run is the same" do
+    options = Options.trial(Runs.options("--robots 3 --seed 4"))
+    {:ok, live} = Live.Trial.start_link(FakeTrial, options, Live.Pace.new(:max))
+    _ahead = until(live, fn scene, _pace -> scene.at_ms >= 1_000 end)
+    assert {:ok, "paused" <> _} = Live.Trial.command(live, {:pace, :pause})
+    paused = Live.Trial.scene(live)
+    assert {:ok, "7 steps left"} = Live.Trial.command(live, {:pace, {:step, 7}})
+    stepped = until(live, fn _scene, pace -> pace =~ "paused" end)
+    assert stepped.at_ms == paused.at_ms + 700
+    assert {:ok, "paused, then 10.0x"} = Live.Trial.command(live, {:pace, {:speed, 10.0}})
+    assert {:ok, "10.0x asked"} = Live.Trial.command(live, {:pace, :resume})
+    _on = until(live, fn scene, _pace -> scene.at_ms >= stepped.at_ms + 500 end)
+    assert {:ok, "paused, then 10.0x"} = Live.Trial.command(live, {:pace, :pause})
+    scene = Live.Trial.scene(live)
+
+    {:ok, straight} = FakeTrial.new(options)
+    steps = div(scene.at_ms, 100)
+
+    assert scene ==
+             FakeTrial.scene(Enum.reduce(1..steps, straight, fn _, t -> FakeTrial.step(t) end))
+  end
+
+  test "a pace that is asked for twice, or steps of a run that goes on, are refused" do
+    live = start("--robots 2")
+    assert {:error, "it is not paused"} = Live.Trial.command(live, {:pace, :resume})
+    assert {:error, "it goes on" <> _} = Live.Trial.command(live, {:pace, {:step, 1}})
+    assert {:ok, "paused"} = Live.Trial.command(live, {:pace, :pause})
+    assert {:error, "it is paused already"} = Live.Trial.command(live, {:pace, :pause})
   end
 
   test "a run that cannot be made says why" do

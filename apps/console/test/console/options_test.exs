@@ -3,6 +3,7 @@ defmodule Console.OptionsTest do
   alias Console.Options
 
   doctest Console.Cli.Arguments
+  doctest Console.Cli.MapName
   doctest Console.Cli.Parse
   doctest Console.Fleet
   doctest Console.Options
@@ -19,7 +20,7 @@ defmodule Console.OptionsTest do
       parse(
         "--fleet mag:4,min:2 --seed 7 --map hospital --start same --landmark=-2,1 --move -3,2@40 " <>
           "--move 0,0@60 --kill leader@30 --kill min2@50.5 --loss 0.2 --noise slip --formation wedge:1.2 " <>
-          "--assign chain --leader-change off --duration 200 --headless --nodes --hardware mag:1 --json - --picture a.svg --blobs direct"
+          "--assign chain --leader-change off --duration 200 --headless --nodes --hardware mag:1 --json - --picture a.svg --blobs direct --plan known"
       )
 
     assert options.headless and options.nodes
@@ -42,6 +43,7 @@ defmodule Console.OptionsTest do
              leader_change: false,
              duration_s: 200.0,
              blobs: :direct,
+             plan: :known,
              hardware: [:mag1],
              nodes: true
            }
@@ -93,9 +95,12 @@ defmodule Console.OptionsTest do
                "--loss cannot be #{inspect(loss)}: a number from 0 to 1 is allowed"
     end
 
-    assert error("--map moon") =~ "hall, hospital, arena or FILE.png:WIDTHxHEIGHT"
+    assert error("--map moon") =~ "hall, hospital, arena, clinic, "
+    assert error("--map moon") =~ "doorway, FILE.yaml or FILE.png:WIDTHxHEIGHT is allowed"
+    assert error("--map ofices") =~ "did you mean offices"
     assert error("--map hospitel") =~ "did you mean hospital"
     assert error("--map a.png:1x12") =~ "sides from 2 to 1000"
+    assert error("--map a.yaml:9x12") =~ "FILE.yaml or FILE.png:WIDTHxHEIGHT"
     assert error("--formation wegde") =~ "did you mean wedge"
     assert error("--formation wedge:0.5") =~ "0.8 to 5"
     assert error("--landmark 1") =~ "X,Y in metres"

@@ -8,6 +8,20 @@ defmodule Console.PictureTest do
   doctest Console.Picture
   doctest Console.Picture.Colours
 
+  @sheet Path.expand("../../../../docs/images/maps.svg", __DIR__)
+
+  test "the sheet of maps in the user guide shows the maps as they are" do
+    drawn = IO.iodata_to_binary(Picture.MapSheet.draw())
+
+    assert File.read!(@sheet) == drawn,
+           "write it anew: mix run --no-start -e " <>
+             ~s|'File.write!("docs/images/maps.svg", Console.Picture.MapSheet.draw())'|
+
+    document = parse(drawn)
+    for name <- Sim.Floorplan.Maps.names(), do: assert(drawn =~ ">#{name}, ")
+    assert count(document, "//path") == length(Sim.Floorplan.Maps.names())
+  end
+
   # Raises on anything that is not well-formed XML.
   defp parse(drawing) do
     {document, []} =

@@ -30,7 +30,7 @@ defmodule Hal.Serial do
   | `:speed` | baud, 1 to 20,000,000 | `115_200` |
   | `:last_words` | binary of at most 1024 bytes | `<<>>`: none |
   | `:keep_alive_ms` | 10 to 60,000 | `200` |
-  | `:module` | `Hal.Serial.Native` or `Hal.Serial.Circuits` (only `:port`) | `Hal.Serial.Native` |
+  | `:module` | `Hal.Serial.Native`, or `Hal.Serial.Circuits`: only `:port`, and **no last words** when the VM is killed, frozen or has crashed | `Hal.Serial.Native` |
 
   ## Last words
 

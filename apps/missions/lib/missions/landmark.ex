@@ -65,6 +65,9 @@ defmodule Missions.Landmark do
   defdelegate option_table, to: Landmark.Options, as: :table
 
   @impl Robot.Mission
+  defdelegate explain(mission), to: Landmark.Explanation, as: :lines
+
+  @impl Robot.Mission
   def handle({:command, :start}, mission), do: still(%{mission | started?: true})
 
   def handle({:command, {:formation, kind, spacing}}, mission) do

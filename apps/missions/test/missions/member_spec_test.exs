@@ -139,7 +139,7 @@ defmodule Swarm.MemberSpecTest do
     template = File.read!(Path.join(@robots, "template.exs"))
     guide = File.read!(Path.expand("../../../../docs/robots.md", __DIR__))
 
-    context = %{fleet: Schema.fleet(), colours: nil, tables: MemberSpec.tables()}
+    context = %{fleet: Schema.fleet(), colours: nil, map: nil, tables: MemberSpec.tables()}
     missions = [:mission | Keyword.keys(Landmark.option_table())]
 
     for key <- all_keys(Schema.table(context)) ++ missions do
@@ -163,10 +163,12 @@ defmodule Swarm.MemberSpecTest do
     assert length(examples) > 25
     {:ok, colours} = Vision.Colours.read(Path.join(@robots, "landmark.txt"))
     read = fn "landmark.txt", _options -> {:ok, colours} end
+    grid = Robot.Navigation.Grid.new(<<0>>, {1, 1}, 1.0, {-0.5, -0.5})
+    map = fn file -> {:ok, %Robot.Navigation.MapFile{file: file, grid: grid}} end
 
     for {line, example} <- examples do
       changed = String.replace(text, line, example)
-      options = [colours: read, tables: MemberSpec.tables()]
+      options = [colours: read, map: map, tables: MemberSpec.tables()]
       assert {:ok, _robot} = Robot.File.parse(changed, options), example
     end
   end

@@ -70,6 +70,9 @@ defmodule Player.Boards do
       nil ->
         unplaced(state, Player.Defaults.value(state, [:drive, :ir_banks]), body)
 
+      [] ->
+        state |> boardless() |> calibrated(0)
+
       irs ->
         state =
           Player.Defaults.keep(state, 1, "poses", [
@@ -109,13 +112,22 @@ defmodule Player.Boards do
         state
 
       true ->
-        state
-        |> Player.Defaults.leave(
-          &match?({[:drive, :ir_banks], _, _, _}, &1),
-          "is not for #{irs} infrareds"
-        )
-        |> boarded(irs)
+        state |> unboarded(irs) |> boarded(irs)
     end
+  end
+
+  # Boards of none say nothing; others contradict the poses.
+  defp boardless(state) do
+    none? = &match?({[:drive, :ir_banks], [_ | _], _, _}, &1)
+
+    if Enum.sum(Player.Defaults.value(state, [:drive, :ir_banks]) || []) == 0,
+      do: %{state | values: Enum.reject(state.values, none?)},
+      else: unboarded(state, 0)
+  end
+
+  defp unboarded(state, irs) do
+    banks? = &match?({[:drive, :ir_banks], _, _, _}, &1)
+    Player.Defaults.leave(state, banks?, "is not for #{irs} infrareds")
   end
 
   defp boards(irs) when irs <= 8, do: [irs]

@@ -23,7 +23,15 @@ defmodule Robot.Behaviour do
   @doc "The running behaviour with some options changed, such as a target that moves every tick."
   @callback update(keyword(), state :: term()) :: t()
 
-  @optional_callbacks update: 2
+  @typedoc "What is left of the way to a goal (metres), or that walls leave none."
+  @type route :: {:left, float()} | :no_way
+
+  @doc """
+  Told at each tick, after `c:tick/2`, of the way to the goal that the behaviour wished for (`Robot.Behaviour.Avoid`).
+  """
+  @callback routed(route(), Percept.t(), state :: term()) :: t()
+
+  @optional_callbacks update: 2, routed: 3
 
   @doc """
   Checks a goal, `{module, options}` or `nil` for none: whether the module is a behaviour that
@@ -102,4 +110,25 @@ defmodule Robot.Behaviour do
     # The module is loaded: its `new/1` returned the pair.
     if function_exported?(module, :update, 2), do: module.update(options, state), else: behaviour
   end
+
+  @doc "Tells a behaviour of its way; one without `c:routed/3` stays as it is."
+  @spec routed(t(), route(), Percept.t()) :: t()
+  def routed({module, state} = behaviour, route, percept) do
+    if function_exported?(module, :routed, 3),
+      do: module.routed(route, percept, state),
+      else: behaviour
+  end
+
+  @doc """
+  Whether these options change nothing, for `c:update/2`: a mission repeats its goal at each tick, and need not be
+  checked again. `keys` are the options that the behaviour keeps in its state.
+
+      iex> state = %{near: 1.5, mode: :going}
+      iex> for options <- [[near: 1.5], [near: 1.6], [mode: :going]],
+      ...>     do: Robot.Behaviour.same?(options, state, [:near])
+      [true, false, false]
+  """
+  @spec same?(keyword(), map(), [atom()]) :: boolean()
+  def same?(options, state, keys),
+    do: Enum.all?(options, fn {key, value} -> key in keys and state[key] == value end)
 end

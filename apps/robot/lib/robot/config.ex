@@ -24,6 +24,8 @@ defmodule Robot.Config do
     * `:pace` - `:clock`, or `:manual`: gate and executive do not tick by themselves, but when
       they are sent `:step` and `:tick`, so that a test determines the order
     * `:arm` - `:auto` (the default), or `:manual`: the wheels stand until a person arms them
+    * `:plan` - the walls of the building, `%Robot.Navigation.Grid{}` in the `map` frame, an empty
+      `Robot.Navigation.OccupancyGrid` for those that the sonars will have seen, or `nil` (the default) for none
     * `:fence` - a fence that the robot must not cross, `{{x, y}, {x, y}}` or `[{x, y}, …]`, see
       `Robot.Safety.Reflex.Fence`, or `nil`
     * `:dry_run` - whether the robot only prints what it would do (`Robot.Safety.DryRun`), default
@@ -57,6 +59,7 @@ defmodule Robot.Config do
                 clock: {System, :monotonic_time, [:millisecond]},
                 pace: :clock,
                 arm: :auto,
+                plan: nil,
                 fence: nil,
                 dry_run: false,
                 estop_file: nil,
@@ -84,6 +87,7 @@ defmodule Robot.Config do
           clock: call(),
           pace: :clock | :manual,
           arm: :auto | :manual,
+          plan: Robot.Navigation.Grid.t() | Robot.Navigation.OccupancyGrid.t() | nil,
           fence: Fence.t() | nil,
           dry_run: boolean(),
           estop_file: Path.t() | nil,
@@ -151,6 +155,7 @@ defmodule Robot.Config do
       clock: :mfa,
       pace: {:one_of, [:clock, :manual]},
       arm: {:one_of, [:auto, :manual]},
+      plan: [{:check, &plan?/1, "walls"}, default: nil],
       fence: [Fence.type(), default: nil],
       dry_run: :boolean,
       estop_file: [{:path, "the path of a file"}, default: nil],
@@ -158,6 +163,9 @@ defmodule Robot.Config do
       trace: [:mfa, default: nil]
     ]
   end
+
+  defp plan?(%module{}), do: module in [Robot.Navigation.Grid, Robot.Navigation.OccupancyGrid]
+  defp plan?(plan), do: plan == nil
 
   defp id?(id), do: is_atom(id) and id not in [nil, true, false]
 

@@ -20,6 +20,7 @@ defmodule Robot.File do
   alias Hal.{Pose, Profile}
   alias Robot.Config
   alias Robot.File.{CrossChecks, Device, Reader, Schema, Terms}
+  alias Robot.Navigation.MapFile
 
   @enforce_keys [:id, :profile, :drive]
   defstruct @enforce_keys ++
@@ -30,11 +31,13 @@ defmodule Robot.File do
                 save_pictures: nil,
                 limits: [],
                 start: nil,
+                map: nil,
                 arm: :manual,
                 fence: nil,
                 dry_run: false,
                 estop_file: nil,
                 console: nil,
+                record: nil,
                 network: [],
                 policies: []
               ]
@@ -49,11 +52,13 @@ defmodule Robot.File do
           save_pictures: keyword() | nil,
           limits: keyword(float()),
           start: Pose.t(),
+          map: Robot.Navigation.MapFile.t() | nil,
           arm: :manual | :auto,
           fence: Robot.Safety.Reflex.Fence.t() | nil,
           dry_run: boolean(),
           estop_file: Path.t() | nil,
           console: keyword() | nil,
+          record: keyword() | nil,
           network: keyword(),
           policies: keyword()
         }
@@ -77,7 +82,7 @@ defmodule Robot.File do
   ]
 
   @doc """
-  The robot of the file at `path`, or the problems with it. The path of a colour file is relative
+  The robot of the file at `path`, or the problems with it. The paths of a colour file and of a map are relative
   to the robot file's folder. `fleet:` are the allowed names (default
   `Robot.File.Schema.fleet/0`). `tables:` are the types (`Hal.Options.Type`) of the keys that an
   app above this one defines (`network:` and `policies:`, see `Swarm.MemberSpec.load/1`); such a
@@ -97,7 +102,8 @@ defmodule Robot.File do
         Vision.Colours.read(Path.expand(file, folder), options)
       end
 
-      parse(text, Keyword.merge([file: path, colours: read], options))
+      map = &MapFile.open(Path.expand(&1, folder))
+      parse(text, Keyword.merge([file: path, colours: read, map: map], options))
     else
       {:ok, %File.Stat{type: :regular}} ->
         {:error, ["#{path}: no robot file is larger than #{div(@largest, 1024)} kB"]}
@@ -113,7 +119,7 @@ defmodule Robot.File do
   @doc """
   The robot that a text describes. Options: `file:`, its name in error messages; `fleet:` and
   `tables:` as in `load/2`; `colours:`, a function of path and options that reads a colour file
-  (`t:Robot.File.Colours.reader/0`).
+  (`t:Robot.File.Colours.reader/0`); `map:`, a function of a path that reads a map (`t:Robot.File.Map.reader/0`).
 
       iex> Robot.File.parse("[id: :mag1, profile: :magellan, drive: {Hal.RFlex.Driver, port: \\"/dev/ttyR0\\"}, arm: :manaul]", file: "mag1.exs")
       {:error, [
@@ -126,7 +132,9 @@ defmodule Robot.File do
     context = %{
       fleet: Keyword.get_lazy(options, :fleet, &Schema.fleet/0),
       tables: Keyword.get(options, :tables, []),
-      colours: Keyword.get(options, :colours, fn _path, _options -> {:error, "no files here"} end)
+      colours:
+        Keyword.get(options, :colours, fn _path, _options -> {:error, "no files here"} end),
+      map: Keyword.get(options, :map, fn _path -> {:error, "no files here"} end)
     }
 
     with {:ok, {_line, value} = tree} <- Reader.read(text),
@@ -151,7 +159,9 @@ defmodule Robot.File do
   """
   @spec config(t()) :: {:ok, Config.t()} | {:error, String.t()}
   def config(%__MODULE__{} = robot) do
-    with {:ok, config} <- robot |> Map.take(@config) |> Map.to_list() |> Config.new(),
+    options = robot |> Map.take(@config) |> Map.put(:plan, robot.map && robot.map.grid)
+
+    with {:ok, config} <- options |> Map.to_list() |> Config.new(),
          {:ok, drive} <- Device.fit(robot.drive, config.profile),
          do: {:ok, %{config | drive: drive}}
   end

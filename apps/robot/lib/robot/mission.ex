@@ -69,5 +69,11 @@ defmodule Robot.Mission do
   """
   @callback option_table() :: Hal.Options.table()
 
-  @optional_callbacks halted: 1, options: 2, option_table: 0
+  @doc """
+  What the mission knows and has decided, in lines with labels, for people who ask why a robot did
+  something (`mix replay --why`).
+  """
+  @callback explain(mission :: term()) :: [{label :: String.t(), text :: String.t()}]
+
+  @optional_callbacks halted: 1, options: 2, option_table: 0, explain: 1
 end

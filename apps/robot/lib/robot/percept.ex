@@ -23,7 +23,8 @@ defmodule Robot.Percept do
                 ptz: nil,
                 detections: nil,
                 peers: %{},
-                driving: nil
+                driving: nil,
+                grid: nil
               ]
 
   @typedoc """
@@ -69,7 +70,8 @@ defmodule Robot.Percept do
 
   @typedoc """
   `detections` are the blobs of the newest picture. `driving` is the speed that the gate last let
-  through, and the limits that it applied.
+  through, and the limits that it applied. `grid` is what the robot knows of
+  walls, by a floor plan or by its sonars (`Robot.Navigation.OccupancyGrid`), `nil` for nothing.
   """
   @type t :: %__MODULE__{
           robot: atom(),
@@ -85,6 +87,7 @@ defmodule Robot.Percept do
           ptz: %{pan: float(), tilt: float(), field_of_view: float()} | nil,
           detections: Vision.Detections.t() | nil,
           peers: %{atom() => peer()},
-          driving: %{twist: Twist.t(), limits: [atom()]} | nil
+          driving: %{twist: Twist.t(), limits: [atom()]} | nil,
+          grid: Robot.Navigation.Grid.t() | nil
         }
 end

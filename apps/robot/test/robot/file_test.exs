@@ -138,7 +138,7 @@ defmodule Robot.FileTest do
     body: [radius: 90]
     """
 
-    {:keys, table} = Schema.table(%{fleet: Schema.fleet(), colours: nil, tables: []})
+    {:keys, table} = Schema.table(%{fleet: Schema.fleet(), colours: nil, map: nil, tables: []})
     keys = table |> Keyword.keys() |> Enum.join(", ")
 
     assert lines(text) == [
@@ -392,6 +392,29 @@ defmodule Robot.FileTest do
         {:error, [_ | _] = lines} -> assert Enum.all?(lines, &is_binary/1)
       end
     end
+  end
+
+  test "record: says where and how much is recorded; wrong values name key and what is allowed" do
+    assert {:ok, robot} = parse(~s(record: [folder: "/tmp/runs"]))
+    assert robot.record == [folder: "/tmp/runs"]
+    assert {:ok, %{record: nil}} = parse("record: nil")
+
+    assert lines("record: [folder: 7, limit_mb: 1, limits: 3]") == [
+             "mag1.exs:2: record.limits: is not known: allowed are folder, limit_mb, pictures; did you mean limit_mb?",
+             "mag1.exs:2: record.folder: cannot be 7: the path of a folder is allowed",
+             "mag1.exs:2: record.limit_mb: cannot be 1: a whole number from 4 to 1000000 MB is allowed"
+           ]
+
+    assert lines("record: [limit_mb: 8]") == [
+             "mag1.exs:2: record.folder: is missing: the path of a folder is allowed"
+           ]
+
+    report = &Robot.File.Summary.report("mag1.exs", robot, fn _device -> true end, &1)
+    said = Enum.join(report.(fn "/tmp/runs" -> true end), "\n")
+    assert said =~ ~r"records +the newest 500 MB in /tmp/runs, for mix replay"
+    refute said =~ "cannot be written"
+    said = Enum.join(report.(fn "/tmp/runs" -> false end), "\n")
+    assert said =~ "record.folder: /tmp/runs cannot be written on this machine"
   end
 
   test "the robots that come along are well, and so is the template" do

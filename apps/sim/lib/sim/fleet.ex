@@ -11,7 +11,7 @@ defmodule Sim.Fleet do
   alias Hal.{Pose, Ticker}
   alias Sim.Fleet.{Local, Mission, Nodes, Said}
   alias Sim.Scene
-  alias Sim.Trial.{Evaluation, RunLog, Scenario, Setup, Termination}
+  alias Sim.Trial.{Evaluation, RunLog, Script, Setup, Termination}
 
   @period_ms 100
 
@@ -35,6 +35,7 @@ defmodule Sim.Fleet do
     backend = if own[:nodes], do: Nodes, else: Local
 
     with {:ok, setup} <- Setup.new(options),
+         :ok <- unscripted(setup.options),
          {:ok, setup, begin?} <-
            Mission.choose(setup, Map.get(own, :mission, true), backend == Nodes),
          :ok <- free(setup.options.robots) do
@@ -50,6 +51,12 @@ defmodule Sim.Fleet do
       end
     end
   end
+
+  # Events such as a freeze are done to real processes by other means (`Bench.Soak`).
+  defp unscripted(%{script: []}), do: :ok
+
+  defp unscripted(_options),
+    do: {:error, "no run in real time can have a script: only one in lockstep carries it out"}
 
   @doc "The current scene for viewers."
   @spec scene(GenServer.server()) :: Scene.t()
@@ -117,7 +124,7 @@ defmodule Sim.Fleet do
       setup: setup,
       backend: backend,
       epoch_ms: epoch_ms,
-      script: Scenario.new(options.moves, options.kills),
+      script: Script.new(options.moves, options.kills),
       run_log: RunLog.new(),
       said: [],
       ended: nil,
@@ -183,7 +190,7 @@ defmodule Sim.Fleet do
     {told, said} = Said.look(s.said, claims)
     run_log = s.run_log |> RunLog.note(now, claims) |> RunLog.judge(now, claims, worst)
     run_log = run_log |> RunLog.watch(now, followers) |> tell(now, told)
-    {events, script} = Scenario.due(s.script, now(s), RunLog.leader(run_log))
+    {events, script} = Script.due(s.script, now(s), RunLog.leader(run_log))
     s = Enum.reduce(events, %{s | run_log: run_log, said: said, script: script}, &play/2)
     {:noreply, schedule(s)}
   end

@@ -5,9 +5,10 @@ defmodule Sim.Floorplan do
 
   `field` has one byte per cell, rows from the lowest y: the distance to the nearest wall in
   cells, counted as a king moves in chess and at most 255; 0 is wall. Rays and bodies use it to
-  jump over free space. `room` is the rectangle around the origin where a fleet starts.
+  jump over free space. `room` is the rectangle where a fleet starts.
   """
-  alias Sim.Floorplan.{Clearance, Drawing, Image, Starts}
+  alias Robot.Navigation.Grid
+  alias Sim.Floorplan.{Cells, Clearance, Image, Landmark, Maps, Places, Starts}
 
   @enforce_keys [:name, :width, :height, :cell, :field, :room]
   defstruct @enforce_keys
@@ -24,26 +25,37 @@ defmodule Sim.Floorplan do
         }
 
   @doc """
-  A map by its name, with room for a fleet of this size: `"hall"`, `"hospital"`, `"arena"`, or a
-  bitmap with its size in metres, such as `"floor.png:16x12"`.
+  A map by its name, with room for a fleet of this size: one of `Sim.Floorplan.Maps`, a bitmap with
+  its size in metres, such as `"floor.png:16x12"`, or a description as map_server writes it,
+  `"floor.yaml"`.
 
       iex> {:ok, map} = Sim.Floorplan.open("hall", 6)
       iex> Sim.Floorplan.size(map)
       {18.0, 18.0}
-      iex> Sim.Floorplan.open("mars", 6)
-      {:error, "unknown map mars: hall, hospital, arena or FILE.png:WIDTHxHEIGHT in metres"}
+      iex> {:error, line} = Sim.Floorplan.open("mars", 6)
+      iex> line =~ "unknown map mars: hall, hospital, arena, "
+      true
   """
   @spec open(String.t(), pos_integer()) :: {:ok, t()} | {:error, String.t()}
-  def open(name, fleet) when name in ["hall", "hospital", "arena"] and fleet > 0,
-    do: {:ok, struct!(__MODULE__, Drawing.draw(name, fleet))}
+  def open(name, fleet) when fleet > 0 do
+    with fields when is_map(fields) <- Maps.draw(name, fleet) || Image.open(name) |> fields(),
+         do: {:ok, struct!(__MODULE__, fields)}
+  end
 
-  def open(name, _fleet),
-    do: with({:ok, fields} <- Image.open(name), do: {:ok, struct!(__MODULE__, fields)})
+  defp fields({:ok, fields}), do: fields
+  defp fields(error), do: error
+
+  @doc "The walls as robots know them that have the floor plan."
+  @spec grid(t()) :: Robot.Navigation.Grid.t()
+  def grid(%__MODULE__{} = map) do
+    cells = for <<steps <- map.field>>, into: <<>>, do: if(steps == 0, do: <<1>>, else: <<0>>)
+    corner = {-map.width * map.cell / 2, -map.height * map.cell / 2}
+    Grid.plan(cells, {map.width, map.height}, map.cell, corner)
+  end
 
   @doc "Width and height in metres."
   @spec size(t()) :: {float(), float()}
-  def size(%__MODULE__{} = map),
-    do: {Float.round(map.width * map.cell, 6), Float.round(map.height * map.cell, 6)}
+  def size(%__MODULE__{} = map), do: Cells.size(map)
 
   @doc """
   Whether there is a wall at this point.
@@ -95,6 +107,22 @@ defmodule Sim.Floorplan do
     do: Starts.spread(map, robots, seed, landmark)
 
   @doc """
+  Where the landmark stands and where the robots start. Places that are given are taken: a
+  landmark, or `nil` for none. With `:default` the landmark stands in the middle of the map, or where the fleet
+  has room (`Sim.Floorplan.Places`). Every robot has a free way to it. The same seed gives the same
+  places; the error is one line that says what would fit.
+
+      iex> {:ok, map} = Sim.Floorplan.open("ring", 2)
+      iex> {:ok, landmark, [_mag1, _mag2]} = Sim.Floorplan.places(map, [mag1: 0.2, mag2: 0.2], 1, :default)
+      iex> Sim.Floorplan.free?(map, landmark, 1.0)
+      true
+  """
+  @spec places(t(), [{atom(), float()}], integer(), point() | :default | nil) ::
+          {:ok, point() | nil, [Hal.Pose.t()]} | {:error, String.t()}
+  def places(%__MODULE__{} = map, robots, seed, landmark),
+    do: Places.choose(map, robots, seed, landmark)
+
+  @doc """
   Whether the landmark, 0.15 m in radius, can stand here.
 
       iex> {:ok, map} = Sim.Floorplan.open("hall", 6)
@@ -102,19 +130,5 @@ defmodule Sim.Floorplan do
       {:error, "the landmark cannot stand at 9.0,0.0 of map hall: there is a wall"}
   """
   @spec check_landmark(t(), point()) :: :ok | {:error, String.t()}
-  def check_landmark(%__MODULE__{} = map, {x, y}) do
-    {right, high} = size(map)
-
-    cond do
-      abs(x) > right / 2 or abs(y) > high / 2 ->
-        {:error,
-         "the landmark cannot stand at #{x},#{y}: map #{map.name} is #{right} x #{high} m around its centre"}
-
-      free?(map, {x * 1.0, y * 1.0}, 0.15) ->
-        :ok
-
-      true ->
-        {:error, "the landmark cannot stand at #{x},#{y} of map #{map.name}: there is a wall"}
-    end
-  end
+  def check_landmark(%__MODULE__{} = map, place), do: Landmark.check(map, place)
 end

@@ -57,6 +57,11 @@ defmodule Sim.Radio do
   @spec cut_ways(t(), [{from :: id(), to :: id()}]) :: t()
   def cut_ways(%__MODULE__{} = radio, ways), do: %{radio | cut: MapSet.new(ways)}
 
+  @doc "Loses this share of the copies sent from now on, 0 to 1."
+  @spec lose(t(), number()) :: t()
+  def lose(%__MODULE__{} = radio, share) when share >= 0 and share <= 1,
+    do: %{radio | loss: share * 1.0}
+
   @doc """
   The parts into which the cuts divide these robots, ignoring loss: within a part all can reach
   each other, if necessary by way of others.

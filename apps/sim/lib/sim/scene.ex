@@ -44,7 +44,10 @@ defmodule Sim.Scene do
           required(:at_s) => number(),
           optional(:robot) => atom() | nil,
           optional(:epoch) => integer() | nil,
-          optional(:size_ppm) => integer() | nil
+          optional(:size_ppm) => integer() | nil,
+          optional(:as) => atom(),
+          optional(:asked) => String.t(),
+          optional(:followers) => non_neg_integer()
         }
 
   @type t :: %__MODULE__{

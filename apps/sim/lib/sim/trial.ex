@@ -4,28 +4,59 @@ defmodule Sim.Trial do
   identical to the byte for the same seed. No process, no clock.
 
   Every 50 ms, in this order: radio, sense, think (every 100 ms, with a new picture), reflex, act.
-  `step/1` is 100 ms. `Sim.Trial.Scenario` schedules interventions (landmark moved, robots
-  killed); `Sim.Trial.RunLog` records a run.
+  `step/1` is 100 ms. `Sim.Trial.Script` schedules interventions (`Sim.Trial.Event`), which
+  `Sim.Trial.Interventions` carries out; `Sim.Trial.RunLog` records a run.
   """
   alias Hal.Pose
   alias Sim.{Radio, Scene, World}
-  alias Sim.Trial.{Cuts, Evaluation, RunLog, Scenario, Setup, Termination}
-  alias Swarm.Member
-  alias Vision.Detections
 
-  @half_ms 50
+  alias Sim.Trial.{
+    Evaluation,
+    Faults,
+    Interventions,
+    Mechanics,
+    RunLog,
+    Script,
+    Setup,
+    Termination
+  }
+
+  alias Swarm.Member
 
   @enforce_keys [:options, :map, :world, :radio, :members, :script, :run_log, :colours]
-  defstruct @enforce_keys ++ [at_ms: 0]
+  defstruct @enforce_keys ++
+              [at_ms: 0, faults: %Faults{}, severed: nil, entries: nil]
 
-  @type t :: %__MODULE__{at_ms: non_neg_integer()}
+  @typedoc "`entries` holds what happened since it was last taken, newest first; `nil`: not recorded."
+  @type t :: %__MODULE__{at_ms: non_neg_integer(), entries: [entry()] | nil}
+
+  @typedoc """
+  What a recording holds: each input of a robot (`t:Swarm.Member.input/0`) with the effects that
+  it had, in the order in which they happened, and each intervention in the world.
+  """
+  @type entry ::
+          {:step, atom(), Member.input(), [Member.effect()]}
+          | {:world, at_ms :: non_neg_integer(), Sim.Trial.Event.t()}
 
   @doc """
   A trial with the options of `Sim.Trial.Setup`. Errors are one line.
   """
   @spec new(map()) :: {:ok, t()} | {:error, String.t()}
-  def new(options) do
-    with {:ok, setup} <- Setup.new(options), :ok <- timeless(setup), do: {:ok, build(setup)}
+  def new(options), do: with({:ok, setup} <- setup(options), do: {:ok, begin(setup)})
+
+  @doc "The checked start of a trial, for `begin/2`."
+  @spec setup(map()) :: {:ok, Setup.t()} | {:error, String.t()}
+  def setup(options),
+    do: with({:ok, setup} <- Setup.new(options), :ok <- timeless(setup), do: {:ok, setup})
+
+  @doc """
+  The trial with that start. With `record: true` it keeps what happens, until `take_entries/1` takes it.
+  """
+  @spec begin(Setup.t(), record: boolean()) :: t()
+  def begin(%Setup{} = setup, options \\ []) do
+    trial = still(setup)
+    trial = if options[:record], do: %{trial | entries: []}, else: trial
+    command(trial, :all, :start)
   end
 
   defp timeless(%Setup{options: %{hardware: []}}), do: :ok
@@ -35,23 +66,53 @@ defmodule Sim.Trial do
      "no run in lockstep can have #{Enum.join(ids, ", ")} as hardware: serial lines have a time of their own"}
   end
 
+  @doc "The trial before anybody has told its robots to start."
+  @spec still(Setup.t()) :: t()
+  def still(%Setup{options: options} = setup) do
+    members = for spec <- Setup.members(setup), into: %{}, do: {spec[:id], Member.new(spec)}
+
+    %__MODULE__{
+      options: options,
+      map: setup.map,
+      world: setup.world,
+      radio:
+        Radio.new(
+          seed: options.seed,
+          loss: options.loss,
+          duplicates: options.duplicates,
+          delay_ms: options.delay_ms
+        ),
+      members: members,
+      script: Script.new(options.moves, options.kills, options.script),
+      run_log: RunLog.new(),
+      colours: World.colours()
+    }
+  end
+
+  @doc "What was recorded since the last call, oldest first."
+  @spec take_entries(t()) :: {[entry()], t()}
+  def take_entries(%__MODULE__{entries: nil} = trial), do: {[], trial}
+
+  def take_entries(%__MODULE__{entries: entries} = trial),
+    do: {Enum.reverse(entries), %{trial | entries: []}}
+
   @doc "Advances the trial by 100 ms."
   @spec step(t()) :: t()
   def step(%__MODULE__{} = trial) do
     trial
     |> play()
-    |> cut()
+    |> Mechanics.settle()
     |> hear()
     |> sense()
     |> look()
     |> inputs(&{:tick, &1})
     |> inputs(&{:reflex, &1})
-    |> write()
-    |> act()
+    |> Mechanics.observe()
+    |> Mechanics.act()
     |> hear()
     |> sense()
     |> inputs(&{:reflex, &1})
-    |> act()
+    |> Mechanics.act()
   end
 
   @doc """
@@ -67,191 +128,116 @@ defmodule Sim.Trial do
 
   @doc "The current scene for viewers."
   @spec scene(t()) :: Scene.t()
-  def scene(trial), do: trial |> run() |> Evaluation.scene()
+  def scene(trial), do: trial |> Mechanics.run() |> Evaluation.scene()
+
+  @doc "What happened to the fleet so far, the newest last."
+  @spec stages(t()) :: [Scene.stage()]
+  def stages(trial), do: RunLog.stages(trial.run_log)
+
+  @doc "A robot that has not been killed, or `nil`."
+  @spec robot(t(), atom()) :: Member.t() | nil
+  def robot(trial, id), do: trial.members[id]
 
   @doc "The report of the run, without its wall time."
   @spec result(t()) :: map()
-  def result(trial), do: trial |> run() |> Evaluation.result()
+  def result(trial), do: trial |> Mechanics.run() |> Evaluation.result()
 
   @doc "Moves the landmark there from now on, as if a person pushed it."
   @spec move(t(), Pose.point()) :: {:ok, t()} | {:error, String.t()}
   def move(trial, place) do
     with :ok <- Setup.check_landmarks(trial.map, [place]),
-         do: {:ok, %{trial | script: Scenario.add_move(trial.script, place, trial.at_ms)}}
+         do: {:ok, %{trial | script: Script.add_move(trial.script, place, trial.at_ms)}}
   end
 
   @doc "Kills a robot, or the leader, now."
   @spec kill(t(), :leader | atom()) :: t()
-  def kill(trial, who), do: %{trial | script: Scenario.add_kill(trial.script, who, trial.at_ms)}
+  def kill(trial, who), do: %{trial | script: Script.add_kill(trial.script, who, trial.at_ms)}
 
-  @doc "Sends a command to one living robot or to all."
+  @doc "Sends a command to one living robot or to all; a frozen one does not get it."
   @spec command(t(), atom() | :all, term()) :: t()
   def command(trial, to, command) do
-    Enum.reduce(living(trial), trial, fn id, trial ->
+    Enum.reduce(awake(trial), trial, fn id, trial ->
       if to in [:all, id], do: input(trial, id, {:command, command, trial.at_ms}), else: trial
     end)
   end
 
   @doc "The robots that have not been killed, in the order of the fleet."
   @spec living(t()) :: [atom()]
-  def living(trial), do: Enum.filter(trial.options.robots, &is_map_key(trial.members, &1))
+  defdelegate living(trial), to: Mechanics
 
-  @doc """
-  What each living robot claims about itself, and, whatever its mission is, how certain its pose
-  is.
-  """
+  @doc "What each living robot claims about itself, and how certain its pose is."
   @spec claims(t()) :: [{atom(), map()}]
-  def claims(trial), do: for(id <- living(trial), do: {id, claim(trial.members[id])})
-
-  defp claim(member),
-    do: Map.put_new(Member.claim(member), :uncertainty, Member.uncertainty(member))
-
-  defp run(trial) do
-    %{
-      at_ms: trial.at_ms,
-      options: trial.options,
-      world: trial.world,
-      run_log: trial.run_log,
-      claims: Map.new(claims(trial)),
-      messages: %{sent: trial.radio.sent, lost: trial.radio.lost}
-    }
-  end
-
-  defp build(%Setup{options: options} = setup) do
-    members =
-      Map.new(setup.robots, fn robot ->
-        member = [{:mission, setup.mission} | robot |> Map.delete(:hardware?) |> Map.to_list()]
-        {robot.id, Member.new(member)}
-      end)
-
-    trial = %__MODULE__{
-      options: options,
-      map: setup.map,
-      world: setup.world,
-      radio:
-        Radio.new(
-          seed: options.seed,
-          loss: options.loss,
-          duplicates: options.duplicates,
-          delay_ms: options.delay_ms
-        ),
-      members: members,
-      script: Scenario.new(options.moves, options.kills),
-      run_log: RunLog.new(),
-      colours: World.colours()
-    }
-
-    command(trial, :all, :start)
-  end
+  defdelegate claims(trial), to: Mechanics
 
   defp play(trial) do
-    {events, script} = Scenario.due(trial.script, trial.at_ms, RunLog.leader(trial.run_log))
-    Enum.reduce(events, %{trial | script: script}, &play_one/2)
+    {events, script} = Script.due(trial.script, trial.at_ms, RunLog.leader(trial.run_log))
+    Enum.reduce(events, %{trial | script: script}, &intervene(&2, &1))
   end
 
-  defp play_one({:kill, id}, trial) do
-    if is_map_key(trial.members, id) do
-      %{
-        trial
-        | world: World.kill(trial.world, id),
-          members: Map.delete(trial.members, id),
-          run_log: RunLog.stage(trial.run_log, trial.at_ms, :killed, id, %{})
-      }
-    else
-      trial
-    end
+  defp intervene(trial, event) do
+    {trial, commands} = trial |> note(fn -> {:world, trial.at_ms, event} end) |> happen(event)
+    Enum.reduce(commands, trial, fn {to, command}, trial -> command(trial, to, command) end)
   end
 
-  defp play_one({:move, place}, trial) do
-    %{
-      trial
-      | world: World.move_landmark(trial.world, place),
-        run_log: RunLog.stage(trial.run_log, trial.at_ms, :landmark_moved, nil, %{})
-    }
-  end
+  @doc """
+  An event of the script happens; also returns the commands to robots that are part of it,
+  `{robot | :all, command}`.
+  """
+  @spec happen(t(), Sim.Trial.Event.t()) :: {t(), [{atom(), term()}]}
+  def happen(trial, event), do: Interventions.carry_out(event, trial)
 
-  defp cut(%{options: %{cuts: []}} = trial), do: trial
-
-  defp cut(%{options: options, at_ms: at_ms} = trial) do
-    ways = Cuts.ways(options.cuts, options.robots, at_ms)
-    %{trial | radio: Radio.cut_ways(trial.radio, ways)}
-  end
+  defp note(%{entries: nil} = trial, _entry), do: trial
+  defp note(%{entries: entries} = trial, entry), do: %{trial | entries: [entry.() | entries]}
 
   defp hear(trial) do
     {letters, radio} = Radio.receive(trial.radio, trial.at_ms)
 
     Enum.reduce(letters, %{trial | radio: radio}, fn {to, _from, message}, trial ->
-      input(trial, to, {:message, message, trial.at_ms})
+      if Faults.any?(trial.faults, [:frozen, :deaf], to, trial.at_ms),
+        do: trial,
+        else: input(trial, to, {:message, message, trial.at_ms})
     end)
   end
 
   defp sense(trial) do
     each(trial, fn id, trial ->
-      trial.world
-      |> World.readings(id)
+      trial
+      |> Mechanics.readings(id)
       |> Enum.reduce(trial, &input(&2, id, {:reading, &1, trial.at_ms}))
-    end)
-  end
-
-  defp look(%{options: %{blobs: :direct}} = trial) do
-    each(trial, fn id, trial ->
-      input(trial, id, {:detections, World.detections(trial.world, id)})
     end)
   end
 
   defp look(trial) do
     each(trial, fn id, trial ->
-      frame = World.frame(trial.world, id)
-      {:ok, blobs} = Vision.blobs(frame, trial.colours)
-      input(trial, id, {:detections, Detections.new(frame, blobs)})
+      if Faults.any?(trial.faults, [:blind], id, trial.at_ms),
+        do: trial,
+        else: input(trial, id, {:detections, Mechanics.detections(trial, id)})
     end)
   end
 
   defp inputs(trial, make),
     do: each(trial, fn id, trial -> input(trial, id, make.(trial.at_ms)) end)
 
-  defp write(trial) do
-    claims = claims(trial)
-    parts = Radio.parts(trial.radio, Enum.map(claims, &elem(&1, 0)))
-    standing = for {id, member} <- trial.members, Member.stands?(member), do: id
+  defp each(trial, function), do: Enum.reduce(awake(trial), trial, function)
 
-    run_log = RunLog.note(trial.run_log, trial.at_ms, claims, parts, standing)
-    worst = fn leader -> trial |> run() |> Evaluation.worst(leader) end
-    run_log = RunLog.judge(run_log, trial.at_ms, claims, worst)
-    followers = fn -> Evaluation.followers(%{run(trial) | run_log: run_log}) end
-    %{trial | run_log: RunLog.watch(run_log, trial.at_ms, followers)}
+  defp awake(trial) do
+    Enum.reject(living(trial), &Faults.any?(trial.faults, [:frozen], &1, trial.at_ms))
   end
-
-  defp act(trial) do
-    world = World.step(trial.world, @half_ms)
-    %{trial | world: world, at_ms: trial.at_ms + @half_ms}
-  end
-
-  defp each(trial, function), do: Enum.reduce(living(trial), trial, function)
 
   defp input(trial, id, input) do
     case trial.members do
       %{^id => member} ->
         {member, effects} = Member.step(member, input)
-        trial = %{trial | members: %{trial.members | id => member}}
-        Enum.reduce(effects, trial, &effect(&1, id, &2))
+
+        trial =
+          note(%{trial | members: %{trial.members | id => member}}, fn ->
+            {:step, id, input, effects}
+          end)
+
+        Enum.reduce(effects, trial, &Mechanics.effect(&1, id, &2))
 
       _dead ->
         trial
     end
   end
-
-  defp effect({:drive, twist}, id, trial),
-    do: %{trial | world: World.drive(trial.world, id, twist)}
-
-  defp effect({:look, pan, tilt}, id, trial),
-    do: %{trial | world: World.look(trial.world, id, pan, tilt)}
-
-  defp effect({:send, to, message}, id, trial) do
-    to = if to == :all, do: List.delete(trial.options.robots, id), else: List.wrap(to)
-    %{trial | radio: Radio.send(trial.radio, trial.at_ms, id, to, message)}
-  end
-
-  defp effect({:stage, name, facts}, id, trial),
-    do: %{trial | run_log: RunLog.stage(trial.run_log, trial.at_ms, name, id, facts)}
 end

@@ -2,7 +2,7 @@ defmodule Sim.CalibrationTest do
   @moduledoc """
   Errors that are put into simulated wheels are found again by what a person would do and measure.
   """
-  use ExUnit.Case, async: true
+  use Sim.LockstepCase, async: true
   alias Robot.Calibration
   alias Sim.Calibration, as: Simulated
   @moduletag :slow

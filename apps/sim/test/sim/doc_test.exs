@@ -5,10 +5,14 @@ defmodule Sim.DocTest do
   doctest Sim.World.Contact
   doctest Sim.Lateness
   doctest Sim.Floorplan
-  doctest Sim.Floorplan.Pgm
+  doctest Sim.Floorplan.Cells
+  doctest Sim.Floorplan.Maps
+  doctest Sim.Floorplan.Rooms
+  doctest Sim.Floorplan.Shape
   doctest Sim.Noise
   doctest Sim.World.Palette
   doctest Sim.Trial.Cuts
+  doctest Sim.Trial.Memory
   doctest Sim.Scene
   doctest Sim.Radio
   doctest Sim.Trial.Options

@@ -80,7 +80,8 @@ defmodule Sim.FleetTest do
     fleet = fleet(%{robots: ids})
     eventually(fn -> Fleet.scene(fleet).leader end)
     scene = Fleet.scene(fleet)
-    assert [:search, :elected] = stages(fleet)
+    # The run looks at its robots ten times a second, and the scene is of now.
+    eventually(fn -> [:search, :elected] == stages(fleet) end)
     leader = scene.leader
     assert Enum.find(scene.robots, & &1.leader?).id == leader
     eventually(fn -> Enum.any?(Fleet.scene(fleet).robots, & &1.slot) end)

@@ -2,7 +2,7 @@ defmodule Sim.FloorplanTest do
   use ExUnit.Case, async: true
   alias Hal.Pose
   alias Sim.Floorplan
-  alias Sim.Floorplan.Png
+  alias Robot.Navigation.MapFile.Png
 
   @moduletag :tmp_dir
   @signature <<0x89, "PNG\r\n", 0x1A, "\n">>
@@ -108,6 +108,7 @@ defmodule Sim.FloorplanTest do
       clearance = Floorplan.clearance(map, point, limit)
       assert clearance == exact or (clearance >= limit and exact >= limit)
       assert Floorplan.wall?(map, point) == (exact == 0.0)
+      assert Floorplan.Clearance.at_least?(map, point, limit) == clearance >= limit
     end
   end
 
@@ -138,7 +139,8 @@ defmodule Sim.FloorplanTest do
         end)
 
       bytes = png({width, height, depth, type}, data, palette: palette)
-      assert {:ok, {^width, ^height, walls}} = Png.decode(bytes, 1_000)
+      assert {:ok, {^width, ^height, greys}} = Png.decode(bytes, 1_000)
+      walls = for row <- greys, do: for(<<grey <- row>>, into: <<>>, do: <<div(255 - grey, 128)>>)
 
       assert walls ==
                Enum.map(rows, &expected(:binary.list_to_bin(&1), depth, type, palette, width))

@@ -4,7 +4,7 @@ defmodule Sim.GateAloneTest do
   (`Robot.Safety.Reflex`) between their wishes and their wheels. `FIGURES=1 mix test --only long` prints what is in
   docs/results.md.
   """
-  use ExUnit.Case, async: true
+  use Sim.LockstepCase, async: true
   alias Hal.{Pose, Twist}
   alias Robot.Safety.Reflex
   alias Sim.Trial.Setup
@@ -104,7 +104,8 @@ defmodule Sim.GateAloneTest do
   end
 
   @tag :long
-  @tag timeout: 300_000
+  # It shares two processors with a hundred random missions and their replays, and goes last.
+  @tag timeout: 1_800_000
   test "so it is over many seeds" do
     figures =
       for {at_once?, round_s} <- [{true, 0.0}, {false, 0.0}, {false, 0.5}],

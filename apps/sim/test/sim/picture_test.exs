@@ -1,5 +1,5 @@
 defmodule Sim.PictureTest do
-  use ExUnit.Case, async: true
+  use Sim.LockstepCase, async: true
   alias Hal.{Pose, Profile}
   alias Sim.{Floorplan, World}
 

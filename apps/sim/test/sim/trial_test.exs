@@ -1,6 +1,6 @@
 defmodule Sim.TrialTest do
   @moduledoc "Whole missions in lockstep: every layer except the processes."
-  use ExUnit.Case, async: true
+  use Sim.LockstepCase, async: true
   import Sim.TrialRuns
   alias Sim.Trial
   @moduletag :slow

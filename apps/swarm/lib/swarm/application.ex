@@ -16,7 +16,7 @@ defmodule Swarm.Application do
 
     with {:ok, robot} <- robot(Application.get_env(:swarm, :boot, false), environment),
          {:ok, mesh} <- mesh(Application.get_env(:swarm, :mesh, false), robot),
-         machine = machine(robot, environment),
+         machine = machine(robot, environment) ++ recorder(robot),
          {:ok, supervisor} <- Swarm.Supervisor.start_link(mesh ++ machine),
          :ok <- begin(robot) do
       {:ok, supervisor}
@@ -66,6 +66,11 @@ defmodule Swarm.Application do
       options -> [machine: options]
     end
   end
+
+  defp recorder({file, _config}),
+    do: for(recorder <- List.wrap(MemberSpec.recorder(file)), do: {:recorder, recorder})
+
+  defp recorder(_none), do: []
 
   defp begin({_file, config}) do
     with {:ok, _robot} <- Robot.Fleet.start_robot(Robot.Fleet, config, :permanent) do

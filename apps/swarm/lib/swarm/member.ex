@@ -18,12 +18,18 @@ defmodule Swarm.Member do
   alias Hal.{Pose, Profile, Twist}
   alias Robot.Percept
   alias Robot.Control.Controller
-  alias Robot.Mission.Runner
+  alias Robot.Mission.{Manual, Runner}
   alias Robot.Safety.Reflex
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message.Receiver
   import Robot.Mission, only: [is_order: 1]
+
+  # Orders for one robot alone (`Robot.Command`), which leaves the group's mission for them.
+  defguardp is_alone(command)
+            when command == :lead or
+                   (is_tuple(command) and
+                      elem(command, 0) in [:goto, :move, :follow, :follow_the_leader, :find_blob])
 
   @enforce_keys [:id, :profile, :boot, :mission, :runner, :controller, :reflex, :receiver]
   defstruct @enforce_keys ++ [stop: %EStop.State{}, entries: %{}, sequence: 0, beat_ms: nil]
@@ -64,13 +70,16 @@ defmodule Swarm.Member do
 
   @doc """
   A member. Options: `id`, `profile`, `start` (`Hal.Pose`, where the odometry reads zero),
-  `mission` (`{module, options}`), `boot` (a number that grows with every start, default 1).
+  `mission` (`{module, options}`), `boot` (a number that grows with every start, default 1), `plan` (the walls of a floor
+  plan, `Robot.Navigation.Grid`, or a `Robot.Navigation.OccupancyGrid` for those that its sonars will have seen).
   """
   @spec new(keyword()) :: t()
   def new(options) do
-    options = Keyword.validate!(options, [:id, :profile, :start, :mission, boot: 1])
+    options = Keyword.validate!(options, [:id, :profile, :start, :mission, boot: 1, plan: nil])
     {module, mission_options} = options[:mission]
-    {runner, []} = options[:id] |> Runner.new() |> Runner.start(module, mission_options)
+    controller = Controller.new(Keyword.take(options, [:profile, :start, :plan]))
+    runner = Runner.new(options[:id], Controller.walls(controller))
+    {runner, []} = Runner.start(runner, module, mission_options)
 
     %__MODULE__{
       id: options[:id],
@@ -78,7 +87,7 @@ defmodule Swarm.Member do
       boot: options[:boot],
       mission: options[:mission],
       runner: runner,
-      controller: Controller.new(profile: options[:profile], start: options[:start]),
+      controller: controller,
       reflex: Reflex.new(options[:profile]),
       receiver: Receiver.new(options[:id])
     }
@@ -118,27 +127,32 @@ defmodule Swarm.Member do
   # The mission does not get to interpret it, as in `Robot.Control.Pilot`.
   def step(member, {:command, :stop, at_ms}), do: halt(member, at_ms)
 
-  def step(%{runner: %{module: nil}} = member, {:command, :start, _at_ms}) do
-    {module, options} = member.mission
-
-    {runner, begun} =
-      case Runner.resume(member.runner) do
-        {:ok, runner} -> {runner, []}
-        {:error, :idle} -> Runner.start(member.runner, module, options)
-      end
-
-    {member, begun} = carry_out(begun, %{member | runner: runner})
-    {member, effects} = handle(member, {:command, :start})
-    {member, begun ++ effects}
+  def step(%{runner: %{module: running}} = member, {:command, :start, _at_ms})
+      when running in [nil, Manual] do
+    case Runner.resume(member.runner) do
+      {:ok, runner} -> handle(%{member | runner: runner}, {:command, :start})
+      {:error, :idle} -> begin(member, member.mission, :start)
+    end
   end
 
+  def step(%{runner: %{module: Manual}} = member, {:command, command, _at_ms})
+      when is_alone(command),
+      do: handle(member, {:command, command})
+
+  def step(member, {:command, command, _at_ms}) when is_alone(command),
+    do: begin(member, {Manual, []}, command)
+
+  # It has no formation.
+  def step(%{runner: %{module: Manual}} = member, {:command, _command, _at_ms}), do: {member, []}
   def step(member, {:command, command, _at_ms}), do: handle(member, {:command, command})
 
   def step(member, {:tick, at_ms}) do
     {wish, outcome, controller} = Controller.tick(member.controller, percept(member, at_ms))
     reflex = Reflex.wish(member.reflex, wish.twist, at_ms)
-    member = %{member | controller: controller, reflex: reflex}
+    runner = Runner.walls(member.runner, Controller.walls(controller))
+    member = %{member | controller: controller, reflex: reflex, runner: runner}
     {member, done} = ended(member, outcome)
+    # The walls that the runner has just got are what {:walls, packed} tells a pilot.
     {member, effects} = handle(member, {:tick, Controller.percept(controller)})
     {member, beats} = beat(member, at_ms)
     {member, look(wish.look) ++ done ++ effects ++ beats}
@@ -174,6 +188,15 @@ defmodule Swarm.Member do
   @spec stands?(t()) :: boolean()
   def stands?(member), do: Runner.state(member.runner) == :idle or member.controller.tag == :stand
 
+  # Replaces the mission that runs, if any; the ways are those of `Swarm.Comms.CommandHandler`.
+  defp begin(member, {module, options}, command) do
+    {runner, begun} = Runner.start(member.runner, module, options)
+    controller = Controller.stand(member.controller)
+    {member, begun} = carry_out(begun, %{member | runner: runner, controller: controller})
+    {member, effects} = handle(member, {:command, command})
+    {member, begun ++ effects}
+  end
+
   defp heard(member, {:message, message}, _at_ms), do: handle(member, {:message, message})
   defp heard(member, :nothing, _at_ms), do: {member, []}
 
@@ -191,7 +214,11 @@ defmodule Swarm.Member do
   defp put(member, key, value, at_ms),
     do: %{member | entries: Map.put(member.entries, key, {value, at_ms})}
 
-  defp percept(member, at_ms) do
+  @doc """
+  What the robot knows for a tick at this time, before it has estimated its pose.
+  """
+  @spec percept(t(), integer()) :: Percept.t()
+  def percept(member, at_ms) do
     Percept.Snapshot.build(
       %Percept{
         robot: member.id,

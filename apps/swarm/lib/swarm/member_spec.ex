@@ -71,9 +71,18 @@ defmodule Swarm.MemberSpec do
   def config(%Robot.File{} = file) do
     with {:ok, mission} <- mission(file.policies),
          {:ok, config} <- Robot.File.config(file) do
-      {:ok, Comms.join(%{config | mission: mission})}
+      {:ok, file.record |> recorded(config) |> Map.put(:mission, mission) |> Comms.join()}
     end
   end
+
+  # Its recorder is a part of the node (`recorder/1`).
+  defp recorded(nil, config), do: config
+  defp recorded(_options, config), do: Robot.Recorder.join(config)
+
+  @doc "The robot's recorder for `Swarm.Supervisor`; `nil` if it is not recorded."
+  @spec recorder(Robot.File.t()) :: {robot :: atom(), keyword()} | nil
+  def recorder(%Robot.File{record: nil}), do: nil
+  def recorder(%Robot.File{id: id, record: options}), do: {id, options}
 
   @doc "The options of the node's mesh (`Mesh.Options`) that the file gives."
   @spec mesh(Robot.File.t()) :: keyword()

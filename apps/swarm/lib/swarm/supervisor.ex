@@ -10,7 +10,8 @@ defmodule Swarm.Supervisor do
       |   |-- Swarm.Directory.Presence  notifies of robots that join and leave
       |   |-- Swarm.EStop.Broadcaster   calls all robots to stop
       |   |-- Mesh.Supervisor           the other nodes, where there is a mesh; Swarm.MeshConsumer hears it
-      |   `-- Swarm.Host.Systemd        tells systemd, where there is one
+      |   |-- Swarm.Host.Systemd        tells systemd, where there is one
+      |   `-- Robot.Recorder            records the robot, if its file says so
       `-- Robot.Fleet                   the robots
 
   Robots can do without these parts: they drive on, and enter a new directory by themselves.
@@ -35,12 +36,13 @@ defmodule Swarm.Supervisor do
       mesh = for mesh <- List.wrap(options[:mesh]), do: {Mesh.Supervisor, {mesh, MeshConsumer}}
 
       machine = for {:machine, machine} <- options, do: {Swarm.Host.Systemd, machine}
+      recorder = for {:recorder, recorder} <- options, do: {Robot.Recorder, recorder}
 
       children = [
         Swarm.Directory,
         Swarm.Blackboard,
         Swarm.Directory.Presence,
-        Swarm.EStop.Broadcaster | mesh ++ machine
+        Swarm.EStop.Broadcaster | mesh ++ machine ++ recorder
       ]
 
       tireless = for child <- children, do: {BackoffSupervisor, child}
@@ -50,7 +52,7 @@ defmodule Swarm.Supervisor do
 
   @doc """
   Starts the parts of the node, without a robot; `mesh` comes from `Mesh.Options.prepare/1`,
-  `machine` are the options of `Swarm.Host.Systemd`.
+  `machine` are the options of `Swarm.Host.Systemd`, `recorder` a robot with those of its recorder.
   """
   @spec start_link(keyword()) :: Supervisor.on_start()
   def start_link(options), do: HardenedSupervisor.start_link(__MODULE__, options)

@@ -53,6 +53,46 @@ defmodule Swarm.CommsTest do
     end
   end
 
+  test "a robot that remembers walls by sonar is sent anywhere: it proves nothing beforehand" do
+    plan = Robot.Navigation.OccupancyGrid.new()
+    id = talking(:comms_sonar, plan: plan, start: Pose.new(1.0, 1.0))
+    until(id, &match?({:ok, %Pose{}, _at_ms}, Board.fetch(&1, :pose, :infinity)))
+    assert Swarm.goto(id, {3.0, 1.0}) == :ok
+  end
+
+  test "a robot with a floor plan refuses at once to go where it cannot" do
+    # Two rooms of 2 x 2 m without a door, and a third that is a cupboard.
+    cells =
+      for j <- 0..19, i <- 0..49, into: <<>> do
+        wall? = i in [0, 20, 21, 42, 49] or j in [0, 19]
+        if wall?, do: <<1>>, else: <<0>>
+      end
+
+    plan = Robot.Navigation.Grid.new(cells, {50, 20}, 0.1, {0.0, 0.0})
+    id = talking(:comms_plan, plan: plan, start: Pose.new(1.0, 1.0))
+    until(id, &match?({:ok, %Pose{}, _at_ms}, Board.fetch(&1, :pose, :infinity)))
+
+    for {place, why} <- [
+          {{2.05, 1.0}, "there is a wall"},
+          {{-3, 1.0}, "it is outside of the map"},
+          {{0.2, 1.0}, "a wall is too near to it"},
+          {{3.0, 1.0}, "no way leads there"}
+        ] do
+      {x, y} = place
+      assert Swarm.goto(id, place) == {:error, "#{id} cannot go to #{x / 1},#{y}: #{why}"}
+    end
+
+    assert Swarm.status(id).state == :idle
+    assert Swarm.goto(id, {1.4, 1.0}) == :ok
+
+    assert Swarm.tell(id, "goto:3:1") ==
+             {:error, "#{id} cannot go to 3.0,1.0: no way leads there"}
+
+    # Refused, it goes on with what it was told before.
+    assert Swarm.status(id).state == :goto
+    rolls_of(id)
+  end
+
   test "robots hear each other, and see silent ones grow old" do
     for id <- [:comms1, :comms2], do: talking(id, start: Pose.new(1, 2))
 

@@ -1,21 +1,28 @@
 defmodule Mix.Tasks.Bench do
-  @shortdoc "Measures the demo over many seeds, the swarm beside bare OTP, and how fast robots stop"
+  @shortdoc "Measures the demo over many seeds, the swarm beside bare OTP, how fast robots stop and see"
   @moduledoc """
   `mix bench demo` runs the cases of the landmark mission over many seeds and prints a table in
   Markdown.
 
   Two runs go at a time. All figures except the speed are the same on every machine.
 
+  `mix bench goto` measures how well a robot with the floor plan gets from anywhere to anywhere.
+
   `mix bench swarm` measures robots that are nodes of their own on this machine, beside bare OTP:
   how long it takes to ask all, to find each other, to notice a death.
 
   `mix bench stop` measures how long it takes from a crash, a freeze, a bumper or an emergency
-  stop to the stop on the serial line of a base. All have `--help`. Exit status: 0 if all was
+  stop to the stop on the serial line of a base.
+
+  `mix bench vision` measures how long a frame takes in the native backend, with and without the
+  call from Elixir, beside a copy of the frame and the other backends.
+
+  `mix bench recording` measures what a recording costs a run. All have `--help`. Exit status: 0 if all was
   measured, 1 if the input was wrong or a run could not be made.
   """
   use Mix.Task
   alias Console.Cli
-  alias Console.Cli.{Build, Output, Parse, Progress}
+  alias Console.Cli.{Build, MapName, Output, Parse, Progress}
 
   @impl Mix.Task
   def run(["demo" | arguments]) do
@@ -25,6 +32,12 @@ defmodule Mix.Tasks.Bench do
       {:ok, pairs} -> pairs |> Map.new() |> measure()
       {:error, lines} -> refuse(lines)
     end
+  end
+
+  def run(["goto" | arguments]) do
+    Build.update()
+
+    with {:error, lines} <- Bench.Goto.Main.run(arguments), do: refuse(lines)
   end
 
   def run(["swarm" | arguments]) do
@@ -37,6 +50,18 @@ defmodule Mix.Tasks.Bench do
     Build.update()
 
     with {:error, lines} <- Bench.Stop.Main.run(arguments), do: refuse(lines)
+  end
+
+  def run(["vision" | arguments]) do
+    Build.update()
+
+    with {:error, lines} <- Bench.Vision.Main.run(arguments), do: refuse(lines)
+  end
+
+  def run(["recording" | arguments]) do
+    Build.update()
+
+    with {:error, lines} <- Bench.Recording.Main.run(arguments), do: refuse(lines)
   end
 
   def run(["soak" | arguments]) do
@@ -58,7 +83,8 @@ defmodule Mix.Tasks.Bench do
   def run(_other),
     do:
       refuse([
-        "mix bench needs a command: mix bench demo [options], mix bench swarm [options], mix bench stop [options]"
+        "mix bench needs a command: mix bench demo [options], mix bench goto [options], " <>
+          "mix bench swarm [options], mix bench stop [options], mix bench vision [options], mix bench recording [options]"
       ])
 
   defp measure(%{"help" => true}), do: help()
@@ -96,7 +122,10 @@ defmodule Mix.Tasks.Bench do
     if failed != [], do: refuse(failed)
   end
 
-  defp job({case, map, seed}, blobs), do: Bench.Run.run(case, map, seed, blobs, Sim.Trial)
+  defp job({case, map, seed}, blobs) do
+    Sim.Trial.Memory.prepare()
+    Bench.Run.run(case, map, seed, blobs, Sim.Trial)
+  end
 
   defp rows(results, cases, maps) do
     for case <- cases,
@@ -117,7 +146,8 @@ defmodule Mix.Tasks.Bench do
     [
       {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds (1-40)"},
       {"cases", "NAME,NAME", &Bench.choose/1, "which cases (all)"},
-      {"maps", "NAME,NAME", &maps/1, "which maps (hall,hospital)"},
+      {"maps", "NAME,NAME", &maps/1,
+       "which maps: names, FILE.yaml or FILE.png:WIDTHxHEIGHT\n(hall,hospital)"},
       {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
        "painted or direct (painted)"},
       {"markdown", "FILE", &{:ok, &1}, "write the table there too"},
@@ -126,11 +156,18 @@ defmodule Mix.Tasks.Bench do
   end
 
   defp maps(text) do
-    maps = String.split(text, ",")
+    maps = for name <- String.split(text, ","), do: MapName.parse(name, ".")
 
-    if maps -- ["hall", "hospital", "arena"] == [],
-      do: {:ok, maps},
-      else: {:error, "some of hall, hospital, arena, with commas between"}
+    case Enum.find(maps, &(elem(&1, 0) == :error)) do
+      nil ->
+        {:ok, for({:ok, map} <- maps, do: map)}
+
+      {:error, {allowed, hint}} ->
+        {:error, {"some of " <> allowed <> ", with commas between,", hint}}
+
+      {:error, allowed} ->
+        {:error, allowed}
+    end
   end
 
   defp help do

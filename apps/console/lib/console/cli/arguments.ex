@@ -39,6 +39,34 @@ defmodule Console.Cli.Arguments do
     end
   end
 
+  @doc """
+  Splits arguments into words that stand alone and options with their values, for a command that takes files.
+
+      iex> options = [{"record", "DIR", &{:ok, &1}, ""}, {"quiet", nil, nil, ""}]
+      iex> Console.Cli.Arguments.words(~w(a.exs --record out --quiet b.exs --record=c d.exs), options)
+      {~w(a.exs b.exs d.exs), ~w(--record out --quiet --record=c)}
+  """
+  @spec words([String.t()], [option()]) :: {words :: [String.t()], rest :: [String.t()]}
+  def words(arguments, options), do: words(arguments, options, [], [])
+
+  defp words(["--" <> name = option, value | rest], options, words, others) do
+    case List.keyfind(options, name, 0) do
+      {_name, hint, _check, _help} when hint != nil ->
+        words(rest, options, words, [value, option | others])
+
+      _switch_or_unknown ->
+        words([value | rest], options, words, [option | others])
+    end
+  end
+
+  defp words(["-" <> _ = option | rest], options, words, others),
+    do: words(rest, options, words, [option | others])
+
+  defp words([word | rest], options, words, others),
+    do: words(rest, options, [word | words], others)
+
+  defp words([], _options, words, others), do: {Enum.reverse(words), Enum.reverse(others)}
+
   @doc "The options as aligned lines for a help text."
   @spec help([option()]) :: String.t()
   def help(options) do

@@ -1,6 +1,17 @@
 defmodule Console.Cli.Format do
   @moduledoc "Formats events and figures of a fleet for people. Pure."
 
+  # What is done to a run by its script (`Sim.Trial.Interventions`).
+  @done %{
+    landmark_removed: "the landmark is taken away",
+    estop: "somebody presses the emergency stop of ROBOT",
+    reset: "somebody clears the emergency stop of every robot",
+    radio_cut: "the radio is cut",
+    radio_whole: "the radio is whole again",
+    displaced: "ROBOT is lifted to another place",
+    not_displaced: "ROBOT cannot be put there: somebody stands in the way"
+  }
+
   @doc """
   One stage as a line of text.
 
@@ -20,10 +31,25 @@ defmodule Console.Cli.Format do
 
       iex> Console.Cli.Format.meaning(%{stage: :killed, at_s: 40, robot: :mag1})
       "mag1 is dead"
+      iex> Console.Cli.Format.meaning(%{stage: :formed, at_s: 40, robot: :mag1, as: :turned, asked: "line 2.0"})
+      "every robot says that it stands in its place, turned: no room for line 2.0"
+      iex> Console.Cli.Format.meaning(%{stage: :cannot_form, at_s: 40, robot: :mag1, asked: "line 2.0", followers: 4})
+      "where mag1 stands there is no room for line 2.0, nor for 4 followers in any other shape"
   """
   @spec meaning(Sim.Scene.stage()) :: String.t()
   def meaning(%{stage: :search}), do: "every robot looks around for the landmark"
   def meaning(%{stage: :elected} = stage), do: "#{stage.robot} leads" <> why(stage)
+
+  def meaning(%{stage: :formed, as: shape, asked: asked}),
+    do: "every robot says that it stands in its place, #{shape(shape)}: no room for #{asked}"
+
+  def meaning(%{stage: :cannot_form, robot: robot, asked: asked, followers: count}) do
+    "where #{robot} stands there is no room for #{asked}, nor for #{count(count, "follower")} in any other shape"
+  end
+
+  def meaning(%{stage: :given_up, robot: robot, x: x, y: y, blocked_by: why}),
+    do: "#{robot} gives up its way to #{x},#{y}: blocked by #{why}"
+
   def meaning(%{stage: :formed}), do: "every robot says that it stands in its place"
   def meaning(%{stage: :landmark_moved}), do: "the landmark starts to move"
   def meaning(%{stage: :killed, robot: robot}), do: "#{robot} is dead"
@@ -37,7 +63,22 @@ defmodule Console.Cli.Format do
   def meaning(%{stage: :refused, robot: robot, from: from, epoch: epoch}),
     do: "#{robot} does not believe #{from}, which says epoch #{epoch}"
 
+  def meaning(%{stage: :told, command: command} = stage),
+    do: "#{stage.robot || "every robot"} is told #{told(command)}"
+
+  def meaning(%{stage: :radio_loss, share: share}),
+    do: "#{decimals(share * 100, 0)} % of the messages are lost from now on"
+
+  def meaning(%{stage: stage, for_s: for_s, robot: robot}),
+    do: "#{robot} is #{stage} for #{decimals(for_s, 1)} s"
+
+  def meaning(%{stage: stage, robot: robot}) when is_map_key(@done, stage),
+    do: String.replace(@done[stage], "ROBOT", "#{robot}")
+
   def meaning(%{stage: name}), do: name |> to_string() |> String.replace("_", " ")
+
+  defp told({:formation, kind, spacing}), do: "to form a #{kind} with #{decimals(spacing, 1)} m"
+  defp told(command), do: to_string(command)
 
   @doc """
   A number with a fixed count of decimals, never "-0.0".
@@ -169,6 +210,11 @@ defmodule Console.Cli.Format do
       parts -> " (#{Enum.join(parts, ", ")})"
     end
   end
+
+  defp shape(:turned), do: "turned"
+  defp shape(:closer), do: "closer together"
+  defp shape(:column), do: "in a column along its leader's way"
+  defp shape(:cluster), do: "in the nearest free places"
 
   defp subject(stage), do: Map.get(stage, :robot) || "the leader"
 end

@@ -197,4 +197,23 @@ defmodule Console.Cli.Parse do
       _ -> :error
     end
   end
+
+  @doc """
+  A folder, which is made if it does not exist; relative to `from`.
+
+      iex> Console.Cli.Parse.folder("tables", "/tmp")
+      {:ok, "/tmp/tables"}
+      iex> Console.Cli.Parse.folder("", "/tmp")
+      {:error, "the name of a folder"}
+  """
+  @spec folder(String.t(), Path.t()) :: {:ok, Path.t()} | {:error, String.t()}
+  def folder("", _from), do: {:error, "the name of a folder"}
+
+  def folder(text, from) do
+    path = if from == ".", do: text, else: Path.expand(text, from)
+
+    if File.exists?(path) and not File.dir?(path),
+      do: {:error, "a folder, not a file"},
+      else: {:ok, path}
+  end
 end

@@ -22,6 +22,9 @@ defmodule Console.Live.Fleet do
   def result(live), do: Fleet.result(live)
 
   @impl Console.Live
+  def pace(_live), do: nil
+
+  @impl Console.Live
   def lines(live), do: Fleet.lines(live)
 
   @impl Console.Live
@@ -50,6 +53,11 @@ defmodule Console.Live.Fleet do
 
   defp carry_out(:estop, _live), do: Swarm.estop()
   defp carry_out(:reset, _live), do: Swarm.reset()
+
+  defp carry_out({:pace, _command}, _live),
+    do:
+      {:error,
+       "these robots are processes that go by the real clock; with --speed 1 the demo runs in lockstep, and can be paused"}
 
   # Another shape keeps the current spacing of the robots.
   defp carry_out({:formation, {kind, spacing}}, live) do

@@ -1,22 +1,35 @@
 defmodule Console.Live.Trial do
   @moduledoc """
-  A trial in real time: the lockstep run, one step of 100 ms each 100 ms.
+  A trial that a person watches: the lockstep run, at the pace that the person wants
+  (`Console.Live.Pace`), at first one step of 100 ms each 100 ms.
 
   It never runs faster to make up for lost time: on a machine too slow for its fleet the run is
-  slow, and an answer may take as long as a step.
+  slow, and an answer may take as long as a step. Whatever the pace, the same commands at the same
+  steps give the same run.
   """
   use GenServer
-  alias Hal.Ticker
+  alias Console.Live.Pace
+  alias Sim.{Recorder, Trial}
+  alias Sim.Recording.Pictures
   @behaviour Console.Live
 
-  @step_ms 100
-
   @doc "Starts the run of a new trial; the error says in one line what is wrong with its options."
-  @spec start_link(module(), map()) :: {:ok, pid()} | {:error, String.t()}
-  def start_link(module, options) do
+  @spec start_link(module(), map(), Pace.t()) :: {:ok, pid()} | {:error, String.t()}
+  def start_link(module, options, pace \\ Pace.new()) do
     with {:ok, trial} <- module.new(options) do
-      GenServer.start_link(__MODULE__, {module, trial})
+      GenServer.start_link(__MODULE__, {module, trial, pace, nil})
     end
+  end
+
+  @doc """
+  Starts the run with this start, which a recorder records step by step (`Sim.Recorder`), with so
+  many pictures a second of each robot (`nil`: none).
+  """
+  @spec start_recorded(Sim.Trial.Setup.t(), Pace.t(), recorder :: pid(), number() | nil) ::
+          {:ok, pid()}
+  def start_recorded(setup, pace, recorder, pictures \\ nil) do
+    trial = Trial.begin(setup, record: true)
+    GenServer.start_link(__MODULE__, {Trial, trial, pace, {recorder, pictures}})
   end
 
   @impl Console.Live
@@ -30,6 +43,9 @@ defmodule Console.Live.Trial do
   def ended(_live), do: nil
 
   @impl Console.Live
+  def pace(live), do: GenServer.call(live, :pace, :infinity)
+
+  @impl Console.Live
   def result(live), do: GenServer.call(live, :result, :infinity)
 
   @impl Console.Live
@@ -39,13 +55,33 @@ defmodule Console.Live.Trial do
   def stop(live), do: GenServer.stop(live)
 
   @impl GenServer
-  def init({module, trial}) do
-    {:ok, %{module: module, trial: trial, ticker: Ticker.start(:step, @step_ms, 0)}}
+  def init({module, trial, pace, recorder}) do
+    Sim.Trial.Memory.prepare()
+    # Steps that were ordered at another pace are not made: theirs is another tick.
+    s = %{
+      module: module,
+      trial: trial,
+      pace: pace,
+      recorder: recorder,
+      tick: 0,
+      due_ms: now_ms()
+    }
+
+    {:ok, schedule(s, s.due_ms)}
   end
 
   @impl GenServer
   def handle_call(:scene, _from, state), do: {:reply, state.module.scene(state.trial), state}
   def handle_call(:result, _from, state), do: {:reply, state.module.result(state.trial), state}
+
+  def handle_call(:pace, _from, state), do: {:reply, Pace.words(state.pace), state}
+
+  def handle_call({:command, {:pace, command}}, _from, state) do
+    case Pace.command(state.pace, command) do
+      {:ok, pace} -> {:reply, {:ok, Pace.words(pace)}, schedule(%{state | pace: pace}, now_ms())}
+      {:error, line} -> {:reply, {:error, line}, state}
+    end
+  end
 
   def handle_call({:command, command}, _from, state) do
     case carry_out(command, state) do
@@ -55,10 +91,37 @@ defmodule Console.Live.Trial do
   end
 
   @impl GenServer
-  def handle_info(:step, state) do
-    trial = state.module.step(state.trial)
-    {:noreply, %{state | trial: trial, ticker: Ticker.next(state.ticker)}}
+  def handle_info({:step, tick}, %{tick: tick} = state) do
+    trial = state.trial |> state.module.step() |> record(state.trial, state.recorder)
+    state = %{state | trial: trial, pace: Pace.stepped(state.pace, now_ms())}
+    {:noreply, schedule(state, state.due_ms)}
   end
+
+  def handle_info({:step, _former}, state), do: {:noreply, state}
+
+  defp record(trial, _before, nil), do: trial
+
+  defp record(trial, before, {recorder, pictures}) do
+    {entries, trial} = Trial.take_entries(trial)
+    frames = Pictures.due(before, pictures)
+    :ok = Recorder.tick(recorder, {trial.at_ms, entries}, Trial.scene(trial), frames)
+    trial
+  end
+
+  # A message for each step, so that commands come between two of them, however fast it goes.
+  defp schedule(%{tick: tick} = state, last_ms) do
+    case Pace.wait_ms(state.pace) do
+      :never ->
+        %{state | tick: tick + 1}
+
+      wait_ms ->
+        due_ms = max(last_ms + wait_ms, now_ms())
+        _timer = Process.send_after(self(), {:step, tick + 1}, due_ms, abs: true)
+        %{state | tick: tick + 1, due_ms: due_ms}
+    end
+  end
+
+  defp now_ms, do: System.monotonic_time(:millisecond)
 
   defp carry_out({:kill, :leader}, %{module: module, trial: trial}) do
     case module.scene(trial).leader do

@@ -7,10 +7,11 @@ defmodule Console.Terminal.Prompt do
   alias Console.Fleet
   alias Console.Cli
   alias Console.Cli.Parse
+  alias Console.Live.Pace
   alias Hal.Options.Suggest
   alias Robot.Command
 
-  @words ~w(kill formation landmark move goto follow stop estop reset start status nodes tell help quit)
+  @words ~w(kill formation landmark move goto follow stop estop reset start pause resume step speed status nodes tell help quit)
 
   # Far more than any command needs.
   @most_bytes 500
@@ -27,6 +28,10 @@ defmodule Console.Terminal.Prompt do
       {:ok, {:tell, [:mag1], "goto:1.0:2.0"}}
       iex> Console.Terminal.Prompt.parse("fromation wedge", [:mag1])
       {:error, ~s(unknown command "fromation"; did you mean formation?)}
+      iex> Console.Terminal.Prompt.parse("step 10", [:mag1])
+      {:ok, {:pace, {:step, 10}}}
+      iex> Console.Terminal.Prompt.parse("speed 1000", [:mag1])
+      {:error, ~s(speed cannot be "1000": a number from 0.1 to 100, or max, is allowed)}
   """
   @spec parse(String.t(), [atom()]) :: {:ok, parsed()} | {:error, String.t()}
   def parse(text, _robots) when byte_size(text) > @most_bytes,
@@ -62,6 +67,7 @@ defmodule Console.Terminal.Prompt do
       ["landmark"] -> ["none"]
       ["follow", _follower] -> names
       ["tell"] -> ["all" | names]
+      ["speed"] -> ["0.1", "1", "10", "max"]
       [word] when word in ["goto", "follow", "stop", "start", "status"] -> names
       _other -> []
     end
@@ -81,6 +87,9 @@ defmodule Console.Terminal.Prompt do
       "start, start mag2             starts the mission again, from the search",
       "estop, reset                  emergency stop of all, until the reset",
       "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all",
+      "pause, resume                 the run stops, and goes on (in lockstep: --speed)",
+      "step, step 10                 so many steps of 0.1 s while it is paused",
+      "speed 0.5, speed max          0.1 to 100 times real time, or as fast as it goes",
       "status, status mag2           what all robots do",
       "nodes                         the processes, and how to attach to one",
       "quit                          ends the demo, as Ctrl-C does; Tab completes"
@@ -145,6 +154,17 @@ defmodule Console.Terminal.Prompt do
 
   defp command("estop", [], _robots), do: {:ok, :estop}
   defp command("reset", [], _robots), do: {:ok, :reset}
+
+  defp command(word, [], _robots) when word in ["pause", "resume"],
+    do: {:ok, {:pace, if(word == "pause", do: :pause, else: :resume)}}
+
+  defp command("step", [], _robots), do: {:ok, {:pace, {:step, 1}}}
+  defp command("step", [count], _robots), do: paced("step", :step, count, &Pace.steps/1)
+  defp command("speed", [speed], _robots), do: paced("speed", :speed, speed, &Pace.speed/1)
+
+  defp command("speed", _rest, _robots),
+    do: {:error, "speed needs one value: speed 0.5, speed max"}
+
   defp command("status", [], _robots), do: {:ok, :status}
   defp command("nodes", [], _robots), do: {:ok, :nodes}
   defp command("status", [name], robots), do: with_robot(name, robots, &{:status, &1})
@@ -158,6 +178,13 @@ defmodule Console.Terminal.Prompt do
       word in ["all" | Enum.map(robots, &to_string/1)] and rest != [] -> tell(word, rest, robots)
       word in @words -> {:error, "#{word} is used in another way; see help"}
       true -> unknown(word, robots)
+    end
+  end
+
+  defp paced(word, kind, text, parse) do
+    case parse.(text) do
+      {:ok, value} -> {:ok, {:pace, {kind, value}}}
+      {:error, allowed} -> Cli.Arguments.refuse(word, text, allowed)
     end
   end
 

@@ -91,7 +91,7 @@ defmodule Console.Terminal.Session do
   end
 
   defp begin(session, options, lines) do
-    Enum.each([Demo.heading(options) | lines], &Output.line(session.output, &1))
+    Enum.each([Demo.heading(options, session.scene) | lines], &Output.line(session.output, &1))
     Output.line(session.output, Terminal.hint())
   end
 
@@ -127,6 +127,7 @@ defmodule Console.Terminal.Session do
     receive do
       :draw ->
         scene = session.module.scene(live)
+        session = put_in(session.view.pace, session.module.pace(live))
         session = %{session | scene: scene} |> draw(scene) |> tell(scene) |> track(scene)
 
         cond do

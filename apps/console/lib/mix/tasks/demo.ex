@@ -53,9 +53,15 @@ defmodule Mix.Tasks.Demo do
     warn(options)
 
     cond do
-      options.headless and Options.real_time?(options) -> Demo.run(options, Live.Paced, paced())
-      options.headless -> Demo.run(options, Sim.Trial)
-      true -> live(options)
+      options.headless and Options.real_time?(options) ->
+        recorded(options, &Demo.run(&1, Live.Paced, paced()))
+
+      options.headless ->
+        Sim.Trial.Memory.prepare()
+        Demo.run(options, Sim.Trial)
+
+      true ->
+        live(options)
     end
   rescue
     error in ErlangError ->
@@ -75,6 +81,21 @@ defmodule Mix.Tasks.Demo do
 
   defp paced,
     do: [lines: &Live.Paced.lines/1, ended: &Live.Paced.ended/1, stop: &Live.Paced.stop/1]
+
+  defp lockstep(%{record: nil} = options, pace),
+    do: Session.run(options, Live.Trial, &Live.Trial.start_link(Sim.Trial, &1, pace))
+
+  defp lockstep(options, pace) do
+    Live.Recording.lockstep(options, fn options, setup, recorder ->
+      start = fn _trial ->
+        Live.Trial.start_recorded(setup, pace, recorder, options.record_pictures)
+      end
+
+      Session.run(options, Live.Trial, start)
+    end)
+  end
+
+  defp recorded(options, play), do: Live.Recording.run(options, play)
 
   defp warn(%{nodes: true, robots: robots}),
     do: warn("processes", length(robots), @nodes_a_processor)
@@ -96,9 +117,14 @@ defmodule Mix.Tasks.Demo do
   end
 
   defp live(options) do
-    if Options.real_time?(options) or
-         length(options.robots) <= @robots_a_processor * System.schedulers_online(),
-       do: Session.run(options, Live.Fleet, &Live.Fleet.start_link/1),
-       else: Session.run(options, Live.Trial, &Live.Trial.start_link(Sim.Trial, &1))
+    if Options.real_time?(options) or (options.speed == nil and few?(options.robots)),
+      do:
+        recorded(
+          options,
+          &Session.run(&1, Live.Fleet, fn trial -> Live.Fleet.start_link(trial) end)
+        ),
+      else: lockstep(options, Live.Pace.new(options.speed || 1.0))
   end
+
+  defp few?(robots), do: length(robots) <= @robots_a_processor * System.schedulers_online()
 end

@@ -19,6 +19,8 @@ defmodule Console.Terminal.SessionTest do
     @impl Console.Live
     def lines(_live), do: []
     @impl Console.Live
+    def pace(_live), do: nil
+    @impl Console.Live
     def stop(live), do: Agent.stop(live)
   end
 

@@ -139,25 +139,34 @@ defmodule Hal.Options.Type do
   defp takes?(_type, _value), do: false
 
   defp keys(table, given) do
-    given = for {key, value} <- given, do: {to_string(key), value}
-    names = for {key, _type} <- table, do: Atom.to_string(key)
+    given = for {key, value} <- given, do: {known(key, table), value}
 
     unknown =
-      for {name, _value} <- given, name not in names do
-        {[name],
-         "is not known: allowed are #{Enum.join(names, ", ")}#{Suggest.hint(name, names)}"}
-      end
+      for {key, _value} <- given, not List.keymember?(table, key, 0), do: strange(key, table)
 
     found =
-      for {key, type} <- table, name = Atom.to_string(key) do
-        values = for {^name, value} <- given, do: value
-        {key, under(name, find(List.wrap(type), values))}
+      for {key, type} <- table do
+        values = for {^key, value} <- given, do: value
+        {key, under(key, find(List.wrap(type), values))}
       end
 
     case Enum.uniq(unknown) ++ for({_key, {:error, some}} <- found, one <- some, do: one) do
       [] -> {:ok, for({key, {:ok, value}} <- found, do: {key, value})}
       problems -> {:error, problems}
     end
+  end
+
+  # A key that is text is that of the table with this name; no text becomes an atom.
+  defp known(key, _table) when is_atom(key), do: key
+
+  defp known(text, table),
+    do:
+      Enum.find_value(table, text, fn {key, _type} -> if Atom.to_string(key) == text, do: key end)
+
+  defp strange(key, table) do
+    names = for {key, _type} <- table, do: Atom.to_string(key)
+    name = to_string(key)
+    {[name], "is not known: allowed are #{Enum.join(names, ", ")}#{Suggest.hint(name, names)}"}
   end
 
   defp find([type | settings], []) do

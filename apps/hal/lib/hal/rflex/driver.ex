@@ -6,7 +6,7 @@ defmodule Hal.RFlex.Driver do
   |---|---|---|
   | `:port` | the line's device | required, unless `serial: [pty: LINK]` is given |
   | `:speed` | baud | `115_200` |
-  | `:serial` | `pty:`, `module:` of `Hal.Serial`; `keep_alive_ms:`, 100 to 300 | `[]` |
+  | `:serial` | `pty:`, `module:` of `Hal.Serial` (only `Hal.Serial.Native` stops the wheels when the VM is killed); `keep_alive_ms:`, 100 to 300 | `[]` |
   | `:profile` | `:magellan`, `:atrv_mini` or a `Hal.Profile` | `:magellan` |
   | `:conversions` | `distance:` units per metre, `angle:` per radian, `wheel_ratio:` 0.8 to 1.25, `range:` per metre of sonar, `ir_a:`, `ir_b:` (`Hal.RFlex.Conversions`) | none: the drive does not arm |
   | `:limits` | `max_linear:` m/s, `max_turn:` rad/s, `max_acceleration:` m/s2, `max_turn_acceleration:` rad/s2, none above the profile's; `max_braking:`, `max_turn_braking:` up to 10 | the profile's; braking twice the acceleration |
@@ -292,11 +292,13 @@ defmodule Hal.RFlex.Driver do
 
   defp write(s, bytes, at_ms) do
     case Serial.write(s.line, bytes) do
-      :ok -> pump(s, at_ms)
+      :ok -> s |> written() |> pump(at_ms)
       {:error, :overrun} -> pump(%{s | overruns: s.overruns + 1}, at_ms)
       {:error, reason} -> {:error, reason, s}
     end
   end
+
+  defp written(s), do: %{s | queue: Queue.written(s.queue, now(s))}
 
   defp wait(%{pump: nil} = s, ms),
     do: %{s | pump: Process.send_after(self(), {__MODULE__, s.ref, :pump}, ms)}

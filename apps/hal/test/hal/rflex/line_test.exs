@@ -146,8 +146,16 @@ defmodule Hal.RFlex.LineTest do
     t = till(%{t | heard: []}, battery, &({List.last(&1.health), List.last(&1.arming)} == off))
     assert {:error, line} = Device.arm(t.device)
     assert line =~ "wheels"
-    # Long after the watchdog of a gate that drives on, nothing but stops.
-    assert moves(play(%{t | heard: []}, 300, fn _ -> nil end)) == []
+
+    # Long after the watchdog of a gate that drives on, nothing but stops. What was on the line before is read late on a
+    # busy machine.
+    t = play(t, 300, fn _ -> nil end)
+
+    stopped =
+      Enum.drop_while(t.heard, &(not match?({what, 0, _} when what in [:move, :turn], &1)))
+
+    assert [_stop | _] = stopped
+    assert moves(%{t | heard: stopped}) == []
     t = till(%{t | heard: []}, reports, &(List.last(&1.health) == :online))
     assert moves(play(t, 200, reports)) == []
     assert Device.arm(t.device) == :ok

@@ -5,11 +5,7 @@ defmodule Hal.Serial.ContractTest do
   alias Hal.Serial
 
   @stop "\eSTOP\r"
-  @modules [Serial.Native] ++
-             if(Code.ensure_loaded?(Circuits.UART),
-               do: [Module.concat(Serial, Circuits)],
-               else: []
-             )
+  @modules [Serial.Native, Serial.Circuits]
 
   setup do
     Process.flag(:trap_exit, true)
@@ -37,9 +33,33 @@ defmodule Hal.Serial.ContractTest do
     hear(near, size - byte_size(bytes), had <> bytes)
   end
 
+  # A sign of life, or a packet, that is older than 50 ms before the port program gets a processor counts for nothing,
+  # and must not; then there is another one.
+  defp comes(far, size, sign) do
+    assert sign.() == :ok
+    if begun = begins(far), do: read(far, size, begun), else: comes(far, size, sign)
+  end
+
+  defp begins(%{line: %{port: port}} = far) do
+    receive do
+      {^port, _} = message ->
+        with :unknown <- Serial.handle(far, message),
+             do: begins(far),
+             else: ({:data, bytes} -> bytes)
+    after
+      2_000 -> nil
+    end
+  end
+
   for module <- @modules do
     describe "#{inspect(module)}" do
       @describetag carrier: module
+
+      if module == Serial.Circuits do
+        @describetag adapter: :circuits_uart
+        unless Code.ensure_loaded?(module),
+          do: @describetag(skip: "circuits_uart is not installed")
+      end
 
       test "all bytes both ways, then the last words", %{carrier: module, link: link, far: far} do
         near = open(module, link)
@@ -90,10 +110,8 @@ defmodule Hal.Serial.ContractTest do
       test "last words in silence, once", %{carrier: module, link: link, far: far} do
         near = open(module, link, keep_alive_ms: 50)
         assert read(far, 6) == @stop
-        :ok = Serial.keep_alive(near)
-        assert read(far, 6) == @stop
-        :ok = Serial.write(near, "going\r")
-        assert read(far, 12) == "going\r" <> @stop
+        assert comes(far, 6, fn -> Serial.keep_alive(near) end) == @stop
+        assert comes(far, 12, fn -> Serial.write(near, "going\r") end) == "going\r" <> @stop
       end
 
       test "unplugged", %{carrier: module, link: link, far: far} do

@@ -33,9 +33,12 @@ defmodule Missions.Landmark.Follower do
   @reach 2.0
   @clear 0.1
   # Wherever it is, a robot that has come no nearer to one slot of one shape for this long makes
-  # no progress.
+  # no progress. To have come nearer, it must have gained more than it may be mistaken by, or a metre.
   @late_ms 15_000
-  @elsewhere 1.0
+  @most_gain 1.0
+  # A slot that has moved farther than this is another one. Whoever judges from outside takes a metre, and this robot sees
+  # its slot move by what its pose is corrected by, too.
+  @elsewhere 1.2
 
   defstruct in_place?: false,
             unsure?: false,
@@ -54,8 +57,8 @@ defmodule Missions.Landmark.Follower do
   `told` is the epoch and sequence number of the anchor that was last passed on, `landmark` is
   where the landmark stood when this robot was last in place. `best` is the least distance to
   `slot` so far, and `best_ms` when it was reached; something unknown has stood in the slot since
-  `obstacle_ms`. `late` is the same, ignoring small moves of the slot: shape, slot, least
-  distance, and when that was reached. `blocker` is what blocks a blocked robot.
+  `obstacle_ms`. `late` is the same, ignoring small moves of the slot: shape, slot, the
+  distance at which the robot has come nearer, and since when it has not. `blocker` is what blocks a blocked robot.
   """
   @type t :: %__MODULE__{
           in_place?: boolean(),
@@ -169,21 +172,27 @@ defmodule Missions.Landmark.Follower do
 
   defp late(attend, %{anchor: anchor, now_ms: now} = mission, slot, error) do
     shape = {anchor.leader, anchor.formation}
-    late = patience(attend.late, shape, slot, error, now)
+    nearer = error - gain(mission.percept)
+    late = patience(attend.late, shape, slot, {error, nearer}, now)
     {_shape, _slot, _best, since_ms} = late
     blocked? = attend.blocked? or now - since_ms >= @late_ms
     %{attend | late: late, blocked?: blocked?, blocker: blocker(attend, mission, slot, blocked?)}
   end
 
-  defp patience({shape, place, best, since_ms}, shape, slot, error, now) do
+  defp patience({shape, place, least, since_ms}, shape, slot, {error, nearer}, now) do
     cond do
-      Pose.distance(place, slot) > @elsewhere -> {shape, slot, error, now}
-      error < best - @progress -> {shape, place, error, now}
-      true -> {shape, place, best, since_ms}
+      Pose.distance(place, slot) > @elsewhere -> {shape, slot, nearer, now}
+      error < least -> {shape, place, nearer, now}
+      true -> {shape, place, least, since_ms}
     end
   end
 
-  defp patience(_none_or_other, shape, slot, error, now), do: {shape, slot, error, now}
+  defp patience(_none_or_other, shape, slot, {_error, nearer}, now),
+    do: {shape, slot, nearer, now}
+
+  # While its pose is corrected, a robot seems to come nearer that stands still.
+  defp gain(%{uncertainty: %{radius: radius}}), do: radius |> max(@progress) |> min(@most_gain)
+  defp gain(_percept), do: @progress
 
   # The blocker is determined once, when the robot gives up: what passes by while it waits is not
   # the cause.

@@ -32,6 +32,7 @@ defmodule Missions.Landmark.Leader do
             bad_ms: nil,
             formed?: false,
             lost?: false,
+            no_room?: false,
             heard_ms: nil,
             shape: %Shape{}
 
@@ -45,6 +46,7 @@ defmodule Missions.Landmark.Leader do
           bad_ms: integer() | nil,
           formed?: boolean(),
           lost?: boolean(),
+          no_room?: boolean(),
           heard_ms: integer() | nil,
           shape: Shape.t()
         }
@@ -91,14 +93,19 @@ defmodule Missions.Landmark.Leader do
     if mission.percept.pose, do: lead(mission), else: blind(mission)
   end
 
-  # A leader that does not know where it is cannot tell others where to stand; they soon stop.
-  defp blind(mission),
-    do: {%{mission | anchor: nil}, [{:goal, :stand, {Behaviour.Stop, []}}, {:look, 0.0}]}
+  # A leader that does not know where it is cannot tell others where to stand; they soon stop. Nor does it know that
+  # they stand where they should.
+  defp blind(mission) do
+    lead = %{mission.lead | formed?: false, good_ms: nil, bad_ms: nil}
+    mission = %{mission | anchor: nil, lead: lead}
+    {mission, [{:goal, :stand, {Behaviour.Stop, []}}, {:look, 0.0}]}
+  end
 
   defp lead(mission) do
     mission = mission |> Slots.update() |> Announcement.update()
     {mission, formed} = judge(mission)
     {mission, lost} = miss(mission)
+    {mission, no_room} = room(mission)
     told = told(mission)
 
     place =
@@ -106,7 +113,8 @@ defmodule Missions.Landmark.Leader do
         do: [],
         else: [{:send, told, Message.new(mission.me, :place, mission.anchor)}]
 
-    {mission, formed ++ lost ++ place ++ [goal(mission), {:look, 0.0}, {:anchors, %Anchors{}}]}
+    {mission,
+     formed ++ lost ++ no_room ++ place ++ [goal(mission), {:look, 0.0}, {:anchors, %Anchors{}}]}
   end
 
   # When enough followers for a majority last reported that they hear this leader.
@@ -160,8 +168,7 @@ defmodule Missions.Landmark.Leader do
 
     cond do
       not lead.formed? and good? and now - lead.good_ms >= @formed_ms ->
-        {%{mission | lead: %{lead | formed?: true}},
-         [{:stage, :formed, %{epoch: mission.epoch, size_ppm: mission.sight.size_ppm}}]}
+        {%{mission | lead: %{lead | formed?: true}}, [{:stage, :formed, formed(mission)}]}
 
       lead.formed? and not good? and now - lead.bad_ms >= @unformed_ms ->
         {%{mission | lead: %{lead | formed?: false}}, []}
@@ -170,6 +177,22 @@ defmodule Missions.Landmark.Leader do
         {%{mission | lead: lead}, []}
     end
   end
+
+  # If there was no room for the shape that was asked for, which one it is instead.
+  defp formed(%{lead: %{shape: %{rung: rung}}} = mission) do
+    facts = %{epoch: mission.epoch, size_ppm: mission.sight.size_ppm}
+    if rung == :asked, do: facts, else: Map.merge(facts, %{as: rung, asked: asked(mission)})
+  end
+
+  defp asked(%{formation: {kind, spacing}}), do: "#{kind} #{spacing}"
+
+  # There is no shape in which all followers have room where the leader stands; said once, until there is one.
+  defp room(%{lead: %{shape: %{rung: nil}, no_room?: false}} = mission) do
+    facts = %{epoch: mission.epoch, asked: asked(mission), followers: length(mission.order)}
+    {put_in(mission.lead.no_room?, true), [{:stage, :cannot_form, facts}]}
+  end
+
+  defp room(mission), do: {put_in(mission.lead.no_room?, mission.lead.shape.rung == nil), []}
 
   defp in_place?(mission, id) do
     case mission.percept.peers do

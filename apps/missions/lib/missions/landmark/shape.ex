@@ -7,10 +7,14 @@ defmodule Missions.Landmark.Shape do
   in theirs, the shape closes up step by step: spacing down to 0.8 m, then a column along the
   leader's trail. Once the leader has moved on, or a person asks for a shape, the requested shape
   is tried again.
+
+  A leader that knows of walls chooses by `Swarm.Formation.Ladder`: the best rung that fits where it stands, a lower one
+  each time that followers cannot get in. While it drives, it keeps the requested shape where that fits, and is followed in a
+  column along its trail where it does not.
   """
   alias Hal.Pose
   alias Swarm.Formation
-  alias Swarm.Formation.{FreeSlots, Trail}
+  alias Swarm.Formation.{FreeSlots, Ladder, Space, Trail}
   alias Swarm.Membership.Peers
   alias Missions.Landmark
   alias Missions.Landmark.LandmarkTrack
@@ -19,13 +23,37 @@ defmodule Missions.Landmark.Shape do
   @step 0.1
   @elsewhere 1.0
 
-  defstruct formation: nil, trail?: false, room: nil, squeeze: 0, squeezed_ms: nil, at: nil
+  # A leader that has moved this far (metres) chooses again when it stands, and one whose shape has not fitted for
+  # this long while it drives.
+  @moved 0.15
+  @unfit_ms 1_000
+  @on_the_way [:asked, :column]
 
+  defstruct formation: nil,
+            trail?: false,
+            room: nil,
+            squeeze: 0,
+            squeezed_ms: nil,
+            at: nil,
+            rung: :asked,
+            spots: nil,
+            chosen: nil,
+            fit_ms: nil
+
+  @typedoc """
+  `rung` is that of `Swarm.Formation.Ladder`, `nil` if there is none; `spots` are the poses of the followers if they are not
+  slots of the formation. The choice was made for `chosen`: the request, the number of followers, how often they could not
+  get in, and where the leader was. A shape that does not fit any more last did at `fit_ms`.
+  """
   @type t :: %__MODULE__{
           formation: Formation.t() | nil,
           trail?: boolean(),
           room: FreeSlots.t() | nil,
-          squeeze: non_neg_integer()
+          squeeze: non_neg_integer(),
+          rung: Ladder.rung() | nil,
+          spots: [Pose.t()] | nil,
+          chosen: {Formation.t(), non_neg_integer(), non_neg_integer(), Pose.point()} | nil,
+          fit_ms: integer() | nil
         }
 
   @doc "No shape yet: the next update chooses the requested one."
@@ -38,6 +66,85 @@ defmodule Missions.Landmark.Shape do
   @spec update(t(), Landmark.State.t(), distance :: float()) :: t()
   def update(shape, mission, distance) do
     shape = shape |> relax(mission) |> squeeze(mission)
+
+    if mission.percept.grid,
+      do: fit(shape, mission, distance),
+      else: open(shape, mission, distance)
+  end
+
+  defp fit(shape, mission, distance) do
+    %{percept: %{pose: pose}, now_ms: now} = mission
+    slow? = Landmark.State.slow?(mission.percept, 0.02)
+    asked = {mission.formation, length(mission.order), shape.squeeze}
+    here = %{pose: pose, distance: distance, trail: mission.trail}
+    space = %Space{bodies: bodies(mission), radius: radius(mission), grid: mission.percept.grid}
+
+    case shape.chosen do
+      {formation, followers, squeeze, at} when {formation, followers, squeeze} == asked ->
+        moved = Pose.distance(at, pose)
+        fits? = fits?(shape, here, space)
+        shape = if fits?, do: %{shape | fit_ms: now}, else: shape
+
+        cond do
+          slow? and (moved > @moved or not fits?) ->
+            choose(shape, asked, here, space, rungs(shape), now)
+
+          slow? or moved <= @moved ->
+            shape
+
+          fits? and shape.spots == nil ->
+            shape
+
+          now - (shape.fit_ms || now) < @unfit_ms and shape.spots == nil ->
+            shape
+
+          true ->
+            choose(shape, asked, here, space, @on_the_way, now)
+        end
+
+      _none_or_for_another ->
+        choose(shape, asked, here, space, rungs(shape), now)
+    end
+  end
+
+  defp rungs(%{squeeze: squeeze}), do: Enum.drop(Ladder.rungs(), min(squeeze, 4))
+
+  defp fits?(%{rung: nil}, _here, _space), do: false
+
+  defp fits?(%{spots: nil} = shape, here, space),
+    do: Ladder.choose([:asked], shape.formation, length(elem(shape.room, 1)), here, space) != nil
+
+  defp fits?(%{spots: spots}, _here, space), do: Enum.all?(spots, &Space.free?(space, &1))
+
+  defp choose(shape, {asked, followers, _squeeze} = whom, here, space, rungs, now) do
+    choice = Ladder.choose(rungs, asked, followers, here, space)
+
+    cond do
+      choice != nil -> chosen(shape, choice, whom, here, now)
+      # A leader on its way may find room again.
+      rungs == @on_the_way -> shape
+      # The request stays, so that whoever is told that it cannot be knows what.
+      true -> chosen(shape, none(asked, followers), whom, here, now)
+    end
+  end
+
+  defp none(asked, followers),
+    do: %{rung: nil, formation: asked, room: FreeSlots.whole(followers), spots: nil}
+
+  defp chosen(shape, choice, {asked, followers, squeeze}, here, now) do
+    %{
+      shape
+      | formation: choice.formation,
+        room: choice.room,
+        spots: choice.spots,
+        rung: choice.rung,
+        trail?: choice.spots != nil,
+        chosen: {asked, followers, squeeze, Pose.point(here.pose)},
+        fit_ms: now
+    }
+  end
+
+  defp open(shape, mission, distance) do
     {formation, trail?} = formation(mission.formation, shape.squeeze)
     followers = length(mission.order)
 
@@ -69,9 +176,12 @@ defmodule Missions.Landmark.Shape do
     Enum.all?(places, &FreeSlots.free?(Pose.compose(pose, elem(slots, &1 - 1)), bodies, radius))
   end
 
-  @doc "The poses along the leader's trail if that is the shape, else `nil`."
+  @doc "The poses of the followers, one by one, if they are not slots of the formation, else `nil`."
   @spec trail(t(), Landmark.State.t()) :: [{integer(), integer(), integer()}] | nil
   def trail(%{trail?: false}, _mission), do: nil
+
+  def trail(%{spots: [_ | _] = spots}, _mission),
+    do: Enum.map(spots, &Landmark.State.millimetres/1)
 
   def trail(%{formation: {_kind, spacing}}, mission) do
     bodies = bodies(mission)
@@ -107,14 +217,15 @@ defmodule Missions.Landmark.Shape do
   defp squeeze(shape, mission) do
     due? = mission.now_ms - (shape.squeezed_ms || mission.since_ms) >= @step_ms
 
-    if due? and blocked?(mission) and not shape.trail?,
-      do: %{
-        shape
-        | squeeze: shape.squeeze + 1,
-          squeezed_ms: mission.now_ms,
-          at: Pose.point(mission.percept.pose)
-      },
-      else: shape
+    if due? and blocked?(mission) and
+         (not shape.trail? or shape.rung not in [nil, :cluster, :asked]),
+       do: %{
+         shape
+         | squeeze: shape.squeeze + 1,
+           squeezed_ms: mission.now_ms,
+           at: Pose.point(mission.percept.pose)
+       },
+       else: shape
   end
 
   # A robot reports that it is blocked, and all others have come to rest in their places: as long

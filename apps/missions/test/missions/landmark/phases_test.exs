@@ -287,6 +287,11 @@ defmodule Missions.Landmark.PhasesTest do
     {:lead, _mission, effects} = Landmark.handle({:tick, lost}, mission(leading))
     assert {:goal, :stand, {Behaviour.Stop, []}} in effects
     assert [] = for({:send, _to, %Message{kind: :place}} <- effects, do: :place)
+
+    # Nor does it claim any longer that all stand where they should.
+    formed = put_in(mission(leading).lead.formed?, true)
+    {:lead, _mission, effects} = Landmark.handle({:tick, lost}, formed)
+    assert [%{formed: false, anchor: nil}] = for({:claim, claim} <- effects, do: claim)
   end
 
   test "a challenge: nearer by 0.5 m for 2 s, but not in the first 10 s" do

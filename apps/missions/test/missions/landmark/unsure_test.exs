@@ -27,7 +27,10 @@ defmodule Missions.Landmark.UnsureTest do
   end
 
   # A follower that is never moved, `off` metres from its slot, for `seconds`; it is in its leader's frame.
-  defp stand(off, radius, seconds) do
+  defp stand(off, radius, seconds), do: watch(fn _seconds -> off end, radius, seconds)
+
+  # The same of one that comes nearer by its own estimate: `off` is a function of the seconds.
+  defp watch(off, radius, seconds) do
     mission = mission(phase: :follow, leader: :mag1, epoch: 1, attend: Follower.new())
 
     uncertainty = %{
@@ -44,7 +47,7 @@ defmodule Missions.Landmark.UnsureTest do
         leader: :mag1,
         epoch: 1,
         sequence: tick + 1,
-        pose: {round(off * 1000) + 1000, 0, 0},
+        pose: {round(off.(tick / 10) * 1000) + 1000, 0, 0},
         twist: {0, 0},
         formation: @column,
         order: [:mag2],
@@ -100,6 +103,19 @@ defmodule Missions.Landmark.UnsureTest do
       )
 
     Shape.update(Shape.new(), mission, 1.6).squeeze
+  end
+
+  test "an estimate that comes nearer by less than it may be mistaken by is no progress" do
+    off = fn seconds -> Enum.at([0.9, 0.75, 0.6], trunc(seconds / 6)) end
+    assert %{blocked?: false} = watch(off, 1.3, 14)
+    assert %{blocked?: true, in_place?: false, unsure?: false} = watch(off, 1.3, 16)
+    # A robot that is sure has come nearer twice.
+    assert %{blocked?: false} = watch(off, 0.1, 16)
+  end
+
+  test "a robot that drives is not blocked, however unsure it is of its place" do
+    for seconds <- 1..25,
+        do: assert(%{blocked?: false} = watch(&(6.0 - 0.2 * &1), 12.0, seconds))
   end
 
   test "the shape does not close up for an unsure robot, and closes up for a blocked one in spite of it" do

@@ -32,6 +32,8 @@ defmodule Robot.Behaviour.Avoid do
 
   # A robot this near (metres) to the place beside an occupied goal has arrived.
   @beside 0.08
+  # An echo so near to a wall of the floor plan (metres) may be that wall's, seen in the wide cone of a sonar.
+  @wall 0.3
   # The speed (m/s) of a robot that makes way.
   @aside 0.2
 
@@ -63,13 +65,17 @@ defmodule Robot.Behaviour.Avoid do
 
   @impl Behaviour
   def tick(percept, state) do
-    percept = Caution.percept(percept)
+    if Caution.needed?(percept, state.discs),
+      do: drive(Caution.percept(percept), state, &Caution.wish/1),
+      else: drive(percept, state, & &1)
+  end
 
+  defp drive(percept, state, limit) do
     case Behaviour.tick(state.inner, percept) do
       {:running, wish, inner} ->
         # Before, because a velocity is bent as it is; and after, because the way round something may go backwards.
-        {wish, state} = safe(Caution.wish(wish, percept), percept, %{state | inner: inner})
-        {:running, Caution.wish(wish, percept), {__MODULE__, state}}
+        {wish, state} = safe(limit.(wish), percept, %{state | inner: inner})
+        {:running, limit.(wish), {__MODULE__, state}}
 
       done ->
         done
@@ -130,8 +136,10 @@ defmodule Robot.Behaviour.Avoid do
     leave = if state.blocked?, do: 2 * @beside, else: @beside
 
     if distance < leave do
+      left = {:left, Pose.distance(percept.pose, wish.goal)}
+      inner = Behaviour.routed(state.inner, left, percept)
       wish = %{wish | by: :blocked, twist: Twist.zero(), velocity: {0.0, 0.0}}
-      {wish, %{state | blocked?: true, progress: nil, velocity: nil, way: nil}}
+      {wish, %{state | inner: inner, blocked?: true, progress: nil, velocity: nil, way: nil}}
     else
       {x, y} = near
       speed = min(speed, Steering.approach(distance, percept.profile)) / distance
@@ -146,7 +154,10 @@ defmodule Robot.Behaviour.Avoid do
     {all, standing} = percept |> Neighbours.robots() |> Neighbours.steady(state.standing)
     robots = Neighbours.near(all)
     bodies = Enum.map(all, fn %{at: {x, y}, radius: radius} -> {x, y, radius} end)
-    things = Neighbours.unknown(percept, bodies ++ state.discs)
+
+    things =
+      percept |> Neighbours.unknown(bodies ++ state.discs) |> doubt(percept, state.progress)
+
     fixed = things ++ Clearance.standing(state.discs, percept)
     way = wish.goal && Avoid.Route.round(state.way, wish.goal, percept, all, state.discs)
     corners = way && way.corners
@@ -177,7 +188,8 @@ defmodule Robot.Behaviour.Avoid do
 
     state = %{
       state
-      | progress: Progress.hindered(progress, hindered?),
+      | inner: tell(state.inner, way, percept),
+        progress: Progress.hindered(progress, hindered?),
         standing: standing,
         way: way,
         velocity: velocity,
@@ -185,6 +197,24 @@ defmodule Robot.Behaviour.Avoid do
     }
 
     {braked, state}
+  end
+
+  # A robot that does not get on, as in a door whose posts its sonars see in its way, tries it by the floor plan; one that
+  # does not get on by that either, because it is not where it believes to be, by its sonars again.
+  defp doubt(things, percept, %Progress{tries: tries}) when rem(tries, 2) == 1,
+    do: Neighbours.but_walls(things, percept, @wall)
+
+  defp doubt(things, _percept, _progress), do: things
+
+  defp tell(inner, nil, _percept), do: inner
+
+  # What sonars have seen is doubtful, and forgotten in time: only a floor plan proves that no way leads there.
+  defp tell(inner, %{way?: false}, %{grid: %{closed?: true}} = percept),
+    do: Behaviour.routed(inner, :no_way, percept)
+
+  defp tell(inner, way, percept) do
+    left = Avoid.Route.left(way, Pose.point(percept.pose))
+    Behaviour.routed(inner, {:left, left}, percept)
   end
 
   defp twist(wish, velocity, preferred, percept, backing?) do

@@ -13,7 +13,7 @@ defmodule Robot.Behaviour.Follow do
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
-  alias Robot.Wish
+  alias Robot.{Behaviour, Wish}
   alias Robot.Navigation.Steering
 
   # Nearer than this (metres) it may drive backwards instead of turning round.
@@ -49,6 +49,12 @@ defmodule Robot.Behaviour.Follow do
 
   @impl Robot.Behaviour
   def update(options, state) do
+    if Behaviour.same?(options, state, @options),
+      do: {__MODULE__, state},
+      else: change(options, state)
+  end
+
+  defp change(options, state) do
     {_, fresh} = new(state |> Map.take(@options) |> Map.to_list() |> Keyword.merge(options))
     {__MODULE__, Map.merge(state, Map.take(fresh, @options))}
   end

@@ -7,11 +7,15 @@ defmodule Robot.Behaviour.Goto do
   Options: `x`, `y` (map frame, metres, required), `heading` (radians, default none), `tolerance`
   (metres, default 0.1), `heading_tolerance` (radians, default 0.05), `speed` (m/s, default the
   profile's). Outcome 1: arrived. Without a pose it stands and waits.
+
+  It gives up with outcome 0 if the walls that it knows leave no place or no way (`Robot.Navigation.Reach`), and with 2 if
+  it has come no nearer for 15 s (`Robot.Behaviour.Patience`), which it learns from `Robot.Behaviour.Avoid`.
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
+  alias Robot.Behaviour.Patience
   alias Robot.Wish
-  alias Robot.Navigation.Steering
+  alias Robot.Navigation.{Reach, Steering}
 
   @points_there 0.09
   @points_aside 0.26
@@ -27,7 +31,12 @@ defmodule Robot.Behaviour.Goto do
       speed: [{:number, 0.01, 10.0, "m/s"}, default: nil]
     ]
 
-    {__MODULE__, Enum.into(Options.check!(options, table, "goto"), %{mode: :turning})}
+    {__MODULE__,
+     Enum.into(Options.check!(options, table, "goto"), %{
+       mode: :turning,
+       patience: nil,
+       way?: true
+     })}
   end
 
   @impl Robot.Behaviour
@@ -40,26 +49,54 @@ defmodule Robot.Behaviour.Goto do
   @impl Robot.Behaviour
   def tick(%{pose: nil}, state), do: {:running, stand(), {__MODULE__, state}}
 
-  def tick(%{pose: pose, profile: profile}, state) do
+  def tick(%{pose: pose, profile: profile} = percept, state) do
     distance = Pose.distance(pose, {state.x, state.y})
     # A robot that has arrived and only turns must not drive again because its pose fluctuates.
     near = if state.mode == :aligning, do: 2 * state.tolerance, else: state.tolerance
 
-    if distance < near,
-      do: arrive(pose, profile, state),
-      else: approach(pose, profile, distance, state)
+    cond do
+      distance < near -> arrive(percept, state)
+      not state.way? or not place?(percept, state) -> {:done, 0, stand()}
+      Patience.late?(state.patience, profile.max_turn) -> {:done, 2, stand()}
+      true -> approach(pose, profile, distance, wait(state, percept))
+    end
   end
 
-  defp arrive(_pose, _profile, %{heading: nil}), do: {:done, 1, stand()}
+  defp wait(%{mode: :aligning} = state, _percept), do: %{state | patience: nil}
 
-  defp arrive(pose, profile, state) do
+  defp wait(state, %{at_ms: at_ms}),
+    do: %{state | patience: Patience.wait(state.patience, at_ms)}
+
+  @impl Robot.Behaviour
+  def routed(:no_way, _percept, state), do: {__MODULE__, %{state | way?: false}}
+
+  def routed({:left, metres}, %{at_ms: at_ms}, state),
+    do: {__MODULE__, %{state | patience: Patience.note(state.patience, metres, at_ms)}}
+
+  # Only a floor plan proves it: what sonars have seen may be something else, and may go away.
+  defp place?(%{grid: %{closed?: true} = grid, profile: profile}, state),
+    do: Reach.place(grid, {state.x, state.y}, profile.radius) == :ok
+
+  defp place?(_without_plan, _state), do: true
+
+  defp arrive(_percept, %{heading: nil}), do: {:done, 1, stand()}
+
+  defp arrive(%{pose: pose, profile: profile, at_ms: at_ms}, state) do
     error = Steering.turn_error(state.heading - pose.heading)
+    before = if state.mode == :aligning, do: state.patience
+    # Radians are as good as metres here.
+    patience = Patience.note(before, abs(error), at_ms)
 
-    if abs(error) < state.heading_tolerance do
-      {:done, 1, stand()}
-    else
-      wish = Wish.new(:goto, Twist.new(0, Steering.turn_rate(error, profile)), 0.5)
-      {:running, wish, {__MODULE__, %{state | mode: :aligning}}}
+    cond do
+      abs(error) < state.heading_tolerance ->
+        {:done, 1, stand()}
+
+      Patience.late?(patience, profile.max_turn) ->
+        {:done, 2, stand()}
+
+      true ->
+        wish = Wish.new(:goto, Twist.new(0, Steering.turn_rate(error, profile)), 0.5)
+        {:running, wish, {__MODULE__, %{state | mode: :aligning, patience: patience}}}
     end
   end
 

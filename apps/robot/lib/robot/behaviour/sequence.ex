@@ -25,6 +25,10 @@ defmodule Robot.Behaviour.Sequence do
     end
   end
 
+  @impl Behaviour
+  def routed(route, percept, %{steps: [step | rest]} = state),
+    do: {__MODULE__, %{state | steps: [Behaviour.routed(step, route, percept) | rest]}}
+
   # The next step runs within the same tick, so that no tick is lost between two steps.
   defp next(outcome, wish, [], _percept, _state), do: {:done, outcome, wish}
 

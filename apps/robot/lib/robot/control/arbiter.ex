@@ -26,6 +26,13 @@ defmodule Robot.Control.Arbiter do
     |> Enum.max_by(&weight(&1, last_by), &>=/2, fn -> nil end)
   end
 
-  defp weight(%Wish{by: by, weight: weight}, by), do: weight * @stubbornness
-  defp weight(%Wish{weight: weight}, _last_by), do: weight
+  @doc """
+  The weight with which a wish is compared, after the behaviour `last_by` won.
+
+      iex> Robot.Control.Arbiter.weight(Robot.Wish.new(:goto, Hal.Twist.zero(), 0.5), :rest)
+      0.5
+  """
+  @spec weight(Wish.t(), last_by :: atom()) :: float()
+  def weight(%Wish{by: by, weight: weight}, by), do: weight * @stubbornness
+  def weight(%Wish{weight: weight}, _last_by), do: weight
 end

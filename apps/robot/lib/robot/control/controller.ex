@@ -17,6 +17,7 @@ defmodule Robot.Control.Controller do
   alias Hal.Profile
   alias Robot.{Behaviour, Localiser, Mission, Percept, Wish}
   alias Robot.Control.Arbiter
+  alias Robot.Navigation.{Grid, OccupancyGrid}
   alias Robot.Behaviour.{Avoid, Escape, Rest}
 
   @enforce_keys [:profile, :escape, :rest]
@@ -29,7 +30,9 @@ defmodule Robot.Control.Controller do
                 localiser: nil,
                 percept: nil,
                 look: nil,
-                behaviour_looks?: false
+                behaviour_looks?: false,
+                plan: nil,
+                discs: []
               ]
 
   @type t :: %__MODULE__{
@@ -43,17 +46,21 @@ defmodule Robot.Control.Controller do
           localiser: Localiser.t() | nil,
           percept: Percept.t() | nil,
           look: float() | nil,
-          behaviour_looks?: boolean()
+          behaviour_looks?: boolean(),
+          plan: Grid.t() | OccupancyGrid.t() | nil,
+          discs: [{x :: float(), y :: float(), radius :: float()}]
         }
 
   @doc """
   A controller without a goal. Options: `profile` (required), `start`, the pose in the map
   frame at which the odometry reads zero, with which the controller estimates the percept's pose by
-  `Robot.Localiser`, and `departed`, see there.
+  `Robot.Localiser`, and `departed`, see there; `plan`, the walls of a floor plan
+  (`Robot.Navigation.Grid`) in the map frame, or an empty `Robot.Navigation.OccupancyGrid` for those that its sonars will
+  have seen; without either it knows none.
   """
   @spec new(keyword()) :: t()
   def new(options) do
-    options = Keyword.validate!(options, [:profile, start: nil, departed: nil])
+    options = Keyword.validate!(options, [:profile, start: nil, departed: nil, plan: nil])
 
     case options[:profile] do
       %Profile{} = profile ->
@@ -61,7 +68,8 @@ defmodule Robot.Control.Controller do
           profile: profile,
           escape: Escape.new([]),
           rest: Rest.new([]),
-          localiser: options[:start] && Localiser.new(options[:start], options[:departed])
+          localiser: options[:start] && Localiser.new(options[:start], options[:departed]),
+          plan: options[:plan]
         }
 
       other ->
@@ -83,12 +91,16 @@ defmodule Robot.Control.Controller do
       do: controller
 
   def goal(%__MODULE__{tag: tag, module: module} = controller, tag, {module, options}),
-    do: %{controller | goal: Behaviour.update(controller.goal, options)}
+    do: %{
+      controller
+      | goal: Behaviour.update(controller.goal, options),
+        discs: Keyword.get(options, :discs, controller.discs)
+    }
 
   def goal(%__MODULE__{} = controller, tag, {module, options}) do
     {discs, options} = Keyword.pop(options, :discs, [])
     goal = Avoid.new(inner: module.new(options), discs: discs)
-    %{controller | tag: tag, module: module, goal: goal}
+    %{controller | tag: tag, module: module, goal: goal, discs: discs}
   end
 
   @doc "Sets the references for the estimate of the pose."
@@ -126,6 +138,25 @@ defmodule Robot.Control.Controller do
   @spec percept(t()) :: Percept.t() | nil
   def percept(%__MODULE__{percept: percept}), do: percept
 
+  @doc """
+  What a tick tells the mission: the walls that the robot knows, if they are others than `before`, packed
+  (`Robot.Navigation.Grid.Packed`); then the percept without them, because they are large and seldom change: the
+  mission's runner keeps them (`Robot.Mission.Runner`).
+  """
+  @spec report(before :: t(), now :: t()) :: [
+          {:walls, Grid.Packed.t() | nil} | {:tick, Percept.t()}
+        ]
+  def report(%__MODULE__{} = before, %__MODULE__{percept: %Percept{} = percept} = now) do
+    walls = walls(now)
+    tick = {:tick, %{percept | grid: nil}}
+    if walls == walls(before), do: [tick], else: [{:walls, Grid.Packed.pack(walls)}, tick]
+  end
+
+  @doc "What the robot knows of walls, as the percept of the last tick has it; `nil` for nothing."
+  @spec walls(t()) :: Grid.t() | nil
+  def walls(%__MODULE__{plan: %OccupancyGrid{} = sensed}), do: OccupancyGrid.grid(sensed)
+  def walls(%__MODULE__{plan: plan}), do: plan
+
   @doc "The fault for which the robot stands, in one line for people; `nil` without one."
   @spec fault(t()) :: String.t() | nil
   def fault(%__MODULE__{escape: {Escape, state}}), do: Escape.fault(state)
@@ -158,13 +189,37 @@ defmodule Robot.Control.Controller do
     {wish, outcome && {controller.tag, outcome}, controller}
   end
 
+  @doc """
+  What `tick/2` chooses from on this percept: all wishes, by the weight with which the arbiter
+  compares them, the chosen one first.
+  """
+  @spec wishes(t(), Percept.t()) :: [{Wish.t(), weight :: float()}]
+  def wishes(%__MODULE__{} = controller, %Percept{} = percept) do
+    {percept, controller} = locate(controller, percept)
+
+    for(
+      behaviour <- [controller.escape, controller.goal, controller.rest],
+      {%Wish{} = wish, _next, _outcome} <- [run(behaviour, percept)],
+      do: {wish, Arbiter.weight(wish, controller.last_by)}
+    )
+    |> Enum.sort_by(&elem(&1, 1), :desc)
+  end
+
   defp locate(%{localiser: nil} = controller, percept),
     do: {percept, %{controller | percept: percept}}
 
   defp locate(controller, percept) do
     {percept, localiser} = Localiser.update(controller.localiser, percept)
-    {percept, %{controller | localiser: localiser, percept: percept}}
+    plan = sense(controller.plan, percept, controller.discs)
+    controller = %{controller | localiser: localiser, plan: plan}
+    percept = %{percept | grid: walls(controller)}
+    {percept, %{controller | percept: percept}}
   end
+
+  defp sense(%OccupancyGrid{} = sensed, percept, discs),
+    do: OccupancyGrid.update(sensed, percept, discs)
+
+  defp sense(plan, _percept, _discs), do: plan
 
   defp run(nil, _percept), do: {nil, nil, nil}
 

@@ -25,8 +25,9 @@ defmodule Robot.Control.Executive do
   @note_again 10
 
   @doc """
-  Starts the executive of a robot. It passes each percept, as `{:tick, percept}`, and each outcome
-  of a goal, as `{:outcome, tag, integer}`, to the sink: `apply(m, f, a ++ [event])`.
+  Starts the executive of a robot. It passes each percept, as `{:tick, percept}`, the walls that it knows when they
+  change, as `{:walls, packed}`, and each outcome of a goal, as `{:outcome, tag, integer}`, to the sink:
+  `apply(m, f, a ++ [event])`.
   """
   @spec start_link({Config.t(), sink :: Config.call()}) :: GenServer.on_start()
   def start_link({%Config{} = config, {_m, _f, _a} = sink}) do
@@ -94,7 +95,12 @@ defmodule Robot.Control.Executive do
       board: board,
       sink: sink,
       controller:
-        Controller.new(profile: config.profile, start: config.start, departed: departed),
+        Controller.new(
+          profile: config.profile,
+          start: config.start,
+          departed: departed,
+          plan: config.plan
+        ),
       departure: if(departed, do: {:was, departed}, else: {:near, nil}),
       note_at_tick: 0,
       told: nil,
@@ -103,6 +109,7 @@ defmodule Robot.Control.Executive do
       ticker: Config.ticker(config, :tick, @period_ms)
     }
 
+    Trace.begin(config, :executive, state(s), at_ms)
     {:ok, s}
   end
 
@@ -161,6 +168,9 @@ defmodule Robot.Control.Executive do
 
   def handle_info(_other, s), do: HardenedServer.drop(s)
 
+  defp state(%{config: config} = s),
+    do: {s.controller, %{looks: config.ptz != nil and not config.dry_run}}
+
   defp drop(s, then) do
     Trace.input(s.config, :executive, :stand, Config.now(s.config))
     Gate.forget(s.config.id, then)
@@ -178,6 +188,7 @@ defmodule Robot.Control.Executive do
 
   defp tick(%{config: config, board: board} = s, at_ms) do
     raw = Percept.Snapshot.take(board, config.profile, at_ms)
+    Trace.checkpoint(config, :executive, fn -> state(s) end, at_ms)
     Trace.input(config, :executive, {:tick, raw}, at_ms)
     {wish, outcome, controller} = Controller.tick(s.controller, raw)
     percept = Controller.percept(controller)
@@ -193,7 +204,7 @@ defmodule Robot.Control.Executive do
 
     # The outcome comes first, so that the mission knows it when it handles the percept.
     with {tag, outcome} <- outcome, do: tell(s, {:outcome, tag, outcome}, at_ms)
-    tell(s, {:tick, percept}, at_ms)
+    for event <- Controller.report(s.controller, controller), do: tell(s, event, at_ms)
     s = depart(s, percept.odometry)
     %{s | controller: controller, tick: doing.tick}
   end

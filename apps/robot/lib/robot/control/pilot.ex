@@ -25,6 +25,7 @@ defmodule Robot.Control.Pilot do
   alias Robot.Control.{Delivery, Executive}
   alias Robot.Control.Pilot.{Effects, Journal}
   alias Robot.Mission.Runner
+  alias Robot.Navigation.Grid
 
   # Generous, because a pilot may be slow on a busy machine.
   @call_ms 5_000
@@ -82,11 +83,11 @@ defmodule Robot.Control.Pilot do
   end
 
   @doc """
-  Passes an event of `Robot.Mission` to the mission: a tick or an outcome from the executive, or a
+  Passes an event of `Robot.Mission` to the mission: a tick, new walls or an outcome from the executive, or a
   message from another robot, which the sender of this event has checked. Of several waiting ticks
   only the newest is handled.
   """
-  @spec hear(robot :: atom(), Robot.Mission.event()) :: :ok
+  @spec hear(robot :: atom(), Robot.Mission.event() | {:walls, Grid.Packed.t() | nil}) :: :ok
   def hear(robot, event), do: GenServer.cast(Names.via(robot, :pilot), event)
 
   @doc "A sink for the drive: passes on whether the wheels may turn."
@@ -103,17 +104,22 @@ defmodule Robot.Control.Pilot do
     data = %{
       config: config,
       board: Board.find!(config.id),
-      runner: Runner.new(config.id),
+      runner: Runner.new(config.id, plan(config)),
       since_ms: Config.now(config)
     }
 
     # The former pilot may have crashed within a callback, and the executive may still have its
     # goal, or wait for the end of a mission that has ended so.
     Journal.answered(data.board)
+    Journal.begun(data)
     Effects.rest(config)
     Executive.stand(config.id)
     {:ok, {:idle, Journal.told(:idle, %{}, data)}}
   end
+
+  # Walls that the sonars see come from the executive.
+  defp plan(%{plan: %Grid{} = plan}), do: plan
+  defp plan(_sonar_or_none), do: nil
 
   @impl GenServer
   def handle_call(:start, _from, {_state, %{config: %{mission: nil}}} = s),
@@ -155,6 +161,7 @@ defmodule Robot.Control.Pilot do
   # A mission is told only what `Robot.Mission` promises it.
   def handle_cast({:tick, %Percept{at_ms: at_ms}} = event, {_state, data} = s)
       when is_integer(at_ms) do
+    Journal.checkpoint(elem(s, 0), data)
     event = newest(event)
     if old?(event, data.config), do: {:noreply, s}, else: {:noreply, hand(event, s)}
   end
@@ -164,6 +171,17 @@ defmodule Robot.Control.Pilot do
 
   def handle_cast({:outcome, _tag, outcome} = event, s) when is_integer(outcome),
     do: {:noreply, hand(event, s)}
+
+  def handle_cast({:walls, packed} = event, {state, data} = s) do
+    case Grid.Packed.unpack(packed) do
+      {:ok, walls} ->
+        Journal.heard(event, data)
+        {:noreply, {state, %{data | runner: Runner.walls(data.runner, walls)}}}
+
+      :error ->
+        HardenedServer.drop(s)
+    end
+  end
 
   def handle_cast({:command, _command} = event, s), do: {:noreply, hand(event, s)}
   def handle_cast(_unknown, s), do: HardenedServer.drop(s)
@@ -219,8 +237,10 @@ defmodule Robot.Control.Pilot do
     do: event |> handle(data) |> follow(state, data)
 
   defp go(:resume, event, state, data) do
-    with {:ok, runner} <- Runner.resume(data.runner),
-         do: go({:hand, runner.module}, event, state, %{data | runner: runner})
+    with {:ok, runner} <- Runner.resume(data.runner) do
+      Journal.heard(:resume, data)
+      go({:hand, runner.module}, event, state, %{data | runner: runner})
+    end
   end
 
   defp go({:start, module, options}, event, state, data) do

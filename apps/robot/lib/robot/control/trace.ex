@@ -1,7 +1,7 @@
 defmodule Robot.Control.Trace do
   @moduledoc """
   Records the inputs and effects of a robot's processes, so that the same inputs can be fed to the
-  pure functions behind them, and the outputs compared.
+  pure functions behind them, and the outputs compared (`Robot.Replay`).
 
   The config's `:trace` is called as `apply(m, f, a ++ [{role, kind, what, at_ms}])`, in the
   process of that role. The inputs (`:input`) and effects (`:effect`) are
@@ -9,14 +9,26 @@ defmodule Robot.Control.Trace do
     * `:gate` - in: `{:wish, twist}`, `{:sense, reading}`, `:forget`, `:estop`, `:reset`, `:step`;
       out: `{:drive, twist, limits}`
     * `:executive` - in: `{:goal, tag, goal}`, `:stand`, `{:anchors, anchors}`, `{:look, pan}`,
-      `{:tick, raw percept}`; out: `{:wish, wish}`, `{:look, pan}`, `{:tick, percept}`,
+      `{:tick, raw percept}`; out: `{:wish, wish}`, `{:look, pan}`, `{:walls, packed}`, `{:tick, percept}`,
       `{:outcome, tag, integer}`
-    * `:pilot` - in: `{:start, module, options}`, `:stop`, and the events of `Robot.Mission`;
-      out: `{:phase, state}` and the effects of `Robot.Mission`
+    * `:pilot` - in: `{:start, module, options}`, `:stop`, `:resume`, `{:walls, packed}`, and the events of
+      `Robot.Mission`; out: `{:phase, state}` and the effects of `Robot.Mission`
+
+  An entry of the kind `:begin` has `{state, facts}`: with what the process starts, also after a
+  crash. One of the kind `:checkpoint` has a function that returns the same, of now. It is offered
+  at each tick or step, between two inputs; whoever wants one calls the function at once, in the
+  process that offers it. The states are `Robot.Safety.Reflex`, `Robot.Control.Controller` and
+  `Robot.Mission.Runner`; the facts say what else the effects depend on:
+
+    * `:gate` - `dry_run`: whether the wheels are only told to stand
+    * `:executive` - `looks`: whether there is a head that may turn
+    * `:pilot` - `state`: what it published last, `:idle` or `{mission, phase}`; `nil` at a start
   """
   alias Robot.Config
 
-  @type entry :: {role :: atom(), :input | :effect, what :: term(), at_ms :: integer()}
+  @type kind :: :begin | :checkpoint | :input | :effect
+  @type entry :: {role :: atom(), kind(), what :: term(), at_ms :: integer()}
+  @type state :: {Robot.Safety.Reflex.t() | Robot.Control.Controller.t() | struct(), map()}
 
   @doc "Records an input of the process in this role."
   @spec input(Config.t(), atom(), term(), integer()) :: :ok
@@ -25,6 +37,15 @@ defmodule Robot.Control.Trace do
   @doc "Records an effect of the process in this role."
   @spec effect(Config.t(), atom(), term(), integer()) :: :ok
   def effect(config, role, what, at_ms), do: write(config.trace, {role, :effect, what, at_ms})
+
+  @doc "Records the state with which the process in this role starts, before anything else."
+  @spec begin(Config.t(), atom(), state(), integer()) :: :ok
+  def begin(config, role, state, at_ms), do: write(config.trace, {role, :begin, state, at_ms})
+
+  @doc "Offers the state of the process in this role, between two inputs."
+  @spec checkpoint(Config.t(), atom(), (... -> state()), integer()) :: :ok
+  def checkpoint(config, role, state, at_ms),
+    do: write(config.trace, {role, :checkpoint, state, at_ms})
 
   defp write(nil, _entry), do: :ok
 

@@ -2,7 +2,7 @@ defmodule Robot.Devices.Log do
   @moduledoc """
   Writes a robot's log: a line when a device goes offline, with the reason in words, and when it
   is back, when armed wheels are disarmed for a reason, when a bumper stays pressed, when the
-  gate, a behaviour or a mission hangs, when pictures cannot be saved, when the emergency stop
+  gate, a behaviour or a mission hangs, when pictures cannot be saved or nothing can be recorded, when the emergency stop
   would not survive a restart of the machine, when another robot has the same name, and when one
   is not believed because its numbers are impossible. The events report changes, so retries of a device are not logged.
   """
@@ -22,6 +22,8 @@ defmodule Robot.Devices.Log do
     [:robot, :executive, :away],
     [:vision, :saver, :failed],
     [:vision, :saver, :healed],
+    [:robot, :recorder, :failed],
+    [:robot, :recorder, :healed],
     [:swarm, :comms, :duplicate_id],
     [:swarm, :comms, :unique_id]
   ]
@@ -63,6 +65,8 @@ defmodule Robot.Devices.Log do
       {:info, "mag1: drive online again"}
       iex> Robot.Devices.Log.line(:silent, %{robot: :mag1, line: "its mission Patrol"})
       {:warning, "mag1 hangs in its mission Patrol"}
+      iex> Robot.Devices.Log.line(:stage, %{stage: :given_up, robot: :mag1, x: 2.0, y: 1.0, blocked_by: "mag2"})
+      {:warning, "mag1 gives up its way to 2.0,1.0: blocked by mag2"}
   """
   @spec line(atom(), map()) :: {Logger.level(), String.t()} | nil
   def line(:offline, %{line: line} = about), do: {:warning, "#{name(about)} offline: #{line}"}
@@ -100,6 +104,9 @@ defmodule Robot.Devices.Log do
      "#{process(name)} was sent what it does not know; so far it has dropped #{count} messages"}
   end
 
+  def line(:failed, %{robots: [robot | _], line: line}),
+    do: {:warning, "#{robot}: nothing can be recorded: #{line}"}
+
   def line(:failed, %{robot: robot, file: file}) do
     {:error,
      "#{robot}: cannot write to #{file} that it has left its start pose: if it crashes on its way, it will believe " <>
@@ -113,6 +120,10 @@ defmodule Robot.Devices.Log do
   end
 
   def line(:failed, %{line: line}), do: {:warning, line}
+
+  def line(:healed, %{robots: [robot | _], file: file}),
+    do: {:info, "#{robot}: recorded again, in #{file}"}
+
   def line(:healed, %{folder: folder}), do: {:info, "pictures are saved in #{folder} again"}
 
   def line(:duplicate_id, %{robot: robot, other: other}) do
@@ -130,6 +141,9 @@ defmodule Robot.Devices.Log do
      "#{robot}: #{from} says epoch #{epoch}, which no leadership can have reached; at most #{allowed} is " <>
        "allowed now; #{from} is left out of the mission"}
   end
+
+  def line(:stage, %{stage: :given_up, robot: robot, x: x, y: y, blocked_by: why}),
+    do: {:warning, "#{robot} gives up its way to #{x},#{y}: blocked by #{why}"}
 
   def line(:stage, _told_by_others), do: nil
 

@@ -11,6 +11,7 @@ defmodule Robot.File.CrossChecks do
         named(robot, file),
         seen(robot),
         kept(robot),
+        placed(robot),
         colour(robot) | limits(robot) ++ driven(robot)
       ],
       &(&1 == nil)
@@ -37,6 +38,10 @@ defmodule Robot.File.CrossChecks do
     do: {["save_pictures"], "is for a robot with a camera, and it has none"}
 
   defp kept(_robot), do: nil
+
+  defp placed(%{map: map, start: start}) do
+    with line when line != nil <- Robot.File.Map.start(map, start), do: {["start"], line}
+  end
 
   defp colour(%{colours: nil}), do: nil
 

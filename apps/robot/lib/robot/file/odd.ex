@@ -6,6 +6,7 @@ defmodule Robot.File.Odd do
   """
   alias Hal.{Pose, Profile}
   alias Robot.File.Device
+  alias Robot.Navigation.Grid
 
   # The robots of the thesis reach full speed within 1 s.
   @slow_s 5.0
@@ -26,7 +27,9 @@ defmodule Robot.File.Odd do
   """
   @spec lines(Robot.File.t(), (Path.t() -> boolean())) :: [String.t()]
   def lines(%Robot.File{} = robot, there?) do
-    limits(robot) ++ drive(robot) ++ poses(robot.profile) ++ devices(robot, there?)
+    limits(robot) ++
+      narrow(robot) ++
+      drive(robot) ++ words(robot.drive) ++ poses(robot.profile) ++ devices(robot, there?)
   end
 
   defp limits(%{profile: kind} = robot) do
@@ -51,10 +54,38 @@ defmodule Robot.File.Odd do
           "at full speed; #{Map.fetch!(kind, acceleration)} is usual"
   end
 
+  # The grid may say less than the map shows, by a cell.
+  defp narrow(%{map: nil}), do: []
+
+  defp narrow(%{map: map, start: start, profile: %{radius: radius}}) do
+    room = Grid.clearance(map.grid, Pose.point(start)) + map.grid.cell
+
+    if room < radius,
+      do: [
+        "start: by the map a wall is within #{metres(room)} m, and the body's radius is #{metres(radius)} m; a " <>
+          "place where the body fits is usual"
+      ],
+      else: []
+  end
+
   defp drive(robot) do
     case Device.judge(robot.drive, robot.profile) do
       nil -> []
       %{odd: odd} -> for line <- odd, do: "drive: " <> line
+    end
+  end
+
+  # The driver that was named need not be ours, nor its options.
+  defp words({_driver, options}) do
+    with [_ | _] = serial <- options[:serial],
+         true <- Keyword.keyword?(serial),
+         Hal.Serial.Circuits <- serial[:module] do
+      [
+        "drive.serial.module: Hal.Serial.Circuits says no last words when the VM is killed, frozen or has crashed, " <>
+          "and the wheels go on; Hal.Serial.Native is usual"
+      ]
+    else
+      _other -> []
     end
   end
 

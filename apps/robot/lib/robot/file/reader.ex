@@ -46,7 +46,21 @@ defmodule Robot.File.Reader do
       {:error, {2, "a comma or a value is missing before arm:"}}
   """
   @spec read(String.t()) :: {:ok, tree()} | {:error, problem()}
-  def read(text) do
+  def read(text), do: read(text, "robot file")
+
+  @doc """
+  The same for another kind of file in this notation, which messages call `what`.
+
+      iex> Robot.File.Reader.read("halt()", "scenario")
+      {:error, {1, "a scenario is one list, [key: value, …]"}}
+  """
+  @spec read(String.t(), what :: String.t()) :: {:ok, tree()} | {:error, problem()}
+  def read(text, what) do
+    with {:error, {line, words}} <- tree(text),
+         do: {:error, {line, String.replace(words, "robot file", what)}}
+  end
+
+  defp tree(text) do
     case quoted(text) do
       {:ok, {:literal, _meta, list} = quoted} when is_list(list) -> {:ok, node(quoted, 0)}
       {:ok, {:__block__, _meta, []}} -> {:error, {1, "is empty"}}

@@ -13,13 +13,14 @@ defmodule Robot.File.Schema do
   @fleet for kind <- ~w(mag min), n <- 1..100, do: :"#{kind}#{n}"
 
   @typedoc """
-  What the table needs from its caller: the names of the fleet, a function that reads a colour
-  file, and the types of the keys that an app above this one defines.
+  What the table needs from its caller: the names of the fleet, functions that read a colour
+  file and a map, and the types of the keys that an app above this one defines.
   """
   @type context :: %{
           fleet: [atom(), ...],
           tables: [{:network | :policies, Type.t()}],
-          colours: (Path.t(), keyword() -> {:ok, struct()} | {:error, String.t()})
+          colours: Colours.reader(),
+          map: Robot.File.Map.reader()
         }
 
   @doc "The names that a robot can have by default: `mag1` to `mag100`, `min1` to `min100`."
@@ -40,11 +41,13 @@ defmodule Robot.File.Schema do
      save_pictures: {:or, nil, {:keys, Vision.Saver.Options.table()}},
      limits: limits(),
      start: pose(@farthest),
+     map: {:or, nil, Robot.File.Map.type(context.map)},
      arm: {:one_of, [:manual, :auto]},
      fence: {:or, nil, Fence.type()},
      dry_run: :boolean,
      estop_file: {:or, nil, {:path, "the path of a file"}},
      console: {:or, nil, {:keys, Keyword.take(PowerSwitch.table(), [:port, :speed, :phrase])}},
+     record: {:or, nil, {:keys, Robot.Recorder.Options.table()}},
      network: extension(:network, context.tables),
      policies: extension(:policies, context.tables)}
   end

@@ -1,9 +1,10 @@
 defmodule Robot.File.Summary do
   @moduledoc """
   Summarises a robot file for a person, to be read before the robot moves. Pure, except that
-  `report/3` looks for device files unless told how.
+  `report/4` looks for device files and a folder unless told how.
   """
   alias Hal.{Pose, Profile}
+  alias Robot.Recorder
   alias Robot.File.{Device, Odd}
 
   @kinds %{magellan: "a Magellan Pro", atrv_mini: "an ATRV mini"}
@@ -13,11 +14,22 @@ defmodule Robot.File.Summary do
 
   @doc """
   The report on a file without errors: a title with the number of warnings (`Robot.File.Odd`), the
-  lines of `lines/1`, and the warnings. `there?` reports whether a device exists on this machine.
+  lines of `lines/1`, and the warnings. `there?` reports whether a device exists on this machine,
+  `writable?` whether a recording can be written into a folder.
   """
-  @spec report(Path.t(), Robot.File.t(), (Path.t() -> boolean())) :: [String.t(), ...]
-  def report(path, %Robot.File{} = robot, there? \\ &File.exists?/1) do
-    odd = Odd.lines(robot, there?)
+  @spec report(
+          Path.t(),
+          Robot.File.t(),
+          (Path.t() -> boolean()),
+          (Path.t() -> boolean())
+        ) :: [String.t(), ...]
+  def report(
+        path,
+        %Robot.File{} = robot,
+        there? \\ &File.exists?/1,
+        writable? \\ &Robot.Recorder.Options.writable?/1
+      ) do
+    odd = Odd.lines(robot, there?) ++ unwritable(robot.record, writable?)
 
     title =
       case length(odd) do
@@ -58,7 +70,9 @@ defmodule Robot.File.Summary do
         camera: robot.camera && device(robot.camera),
         "looks for": colours(robot.colours),
         keeps: pictures(robot.save_pictures),
+        records: recording(robot.record),
         starts: start(robot.start),
+        knows: map(robot.map),
         arms: arms(robot),
         stays: fence(robot.fence),
         "e-stop": estop(robot.estop_file),
@@ -104,6 +118,27 @@ defmodule Robot.File.Summary do
 
     "the newest #{all[:files]} pictures or #{all[:megabytes]} MB in #{all[:folder]}, " <>
       "#{all[:rate]} a second"
+  end
+
+  defp recording(nil), do: nil
+
+  defp recording(options) do
+    {:ok, all} = Recorder.Options.check(options)
+    pictures = if all[:pictures], do: ", with #{all[:pictures]} pictures a second", else: ""
+    "the newest #{all[:limit_mb]} MB in #{all[:folder]}, for mix replay#{pictures}"
+  end
+
+  defp unwritable(nil, _writable?), do: []
+
+  defp unwritable(options, writable?) do
+    folder = options[:folder]
+
+    if writable?.(folder),
+      do: [],
+      else: [
+        "record.folder: #{folder} cannot be written on this machine; it must be on the robot's, " <>
+          "or the folder that it is in"
+      ]
   end
 
   defp device({module, options}) do
@@ -166,6 +201,14 @@ defmodule Robot.File.Summary do
 
   defp start(%Pose{x: x, y: y, heading: heading}),
     do: "at x #{metres(x)}, y #{metres(y)}, heading #{degrees(heading)}"
+
+  defp map(nil), do: nil
+
+  defp map(%{file: file, grid: grid}) do
+    [right, high] = [grid.left + grid.width * grid.cell, grid.low + grid.height * grid.cell]
+
+    "the walls of #{file}: x from #{metres(grid.left)} to #{metres(right)}, y from #{metres(grid.low)} to #{metres(high)}"
+  end
 
   defp arms(%{dry_run: true}), do: "never: a dry run, which prints what it would do"
   defp arms(%{arm: :manual}), do: "by hand: its wheels stand until a person arms them"

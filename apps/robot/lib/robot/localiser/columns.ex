@@ -4,6 +4,7 @@ defmodule Robot.Localiser.Columns do
 
   A set is an integer, one bit for each column; bit 0 is the leftmost.
   """
+  # A robot that is unsure tries thousands of spans a tick. Up to OTP 25, `max` and `min` are calls; comparisons are not.
   import Bitwise
   alias Hal.Pose
   alias Robot.Percept
@@ -17,30 +18,43 @@ defmodule Robot.Localiser.Columns do
 
   @type t :: non_neg_integer()
 
+  @typedoc "The camera's direction (radians, from the robot's heading), and its focal length in columns."
+  @type camera :: {pan :: float(), focal :: float()}
+
+  @doc "The camera with which the percept's picture was taken."
+  @spec camera(Percept.t()) :: camera()
+  def camera(%Percept{} = percept) do
+    view = Sighting.field_of_view(percept)
+    {percept.detections.pan, @columns / 2 / :math.tan(view / 2)}
+  end
+
   @doc """
   The columns that a disc fills whose middle is in direction `bearing` (radians, from the robot's
   heading) and whose apparent width is twice `half` (radians).
 
       iex> picture = %Vision.Detections{at_ms: 0, blobs: []}
       iex> percept = %Robot.Percept{profile: Hal.Profile.magellan(), at_ms: 0, detections: picture}
-      iex> Robot.Localiser.Columns.count(Robot.Localiser.Columns.span(0.0, 0.1, percept))
+      iex> camera = Robot.Localiser.Columns.camera(percept)
+      iex> Robot.Localiser.Columns.count(Robot.Localiser.Columns.span(0.0, 0.1, camera))
       11
   """
-  @spec span(bearing :: float(), half :: float(), Percept.t()) :: t()
-  def span(bearing, half, percept) do
-    bearing = Pose.wrap(bearing - percept.detections.pan)
+  @spec span(bearing :: float(), half :: float(), camera()) :: t()
+  def span(bearing, half, {pan, focal}) do
+    bearing = Pose.wrap(bearing - pan)
 
     if abs(bearing) - half > @aside,
       do: 0,
-      else: project(bearing + half, bearing - half, Sighting.field_of_view(percept))
+      else: project(bearing + half, bearing - half, focal)
   end
 
   # The left border has the greater bearing.
-  defp project(left, right, view) do
-    focal = @columns / 2 / :math.tan(view / 2)
-    column = fn bearing -> round(@columns / 2 - focal * :math.tan(bearing)) end
-    between(column.(min(left, @aside)), column.(max(right, -@aside)) - 1)
+  defp project(left, right, focal) do
+    left = if left < @aside, do: left, else: @aside
+    right = if right > -@aside, do: right, else: -@aside
+    between(column(left, focal), column(right, focal) - 1)
   end
+
+  defp column(bearing, focal), do: round(@columns / 2 - focal * :math.tan(bearing))
 
   @doc "The columns that the blobs of these colours fill."
   @spec seen([Blob.t()], colours :: [String.t()]) :: t()
@@ -54,7 +68,8 @@ defmodule Robot.Localiser.Columns do
     do: between(round(left * @columns / width), round((right + 1) * @columns / width) - 1)
 
   defp between(left, right) do
-    {left, right} = {max(left, 0), min(right, @columns - 1)}
+    left = if left < 0, do: 0, else: left
+    right = if right > @columns - 1, do: @columns - 1, else: right
     if right < left, do: 0, else: (1 <<< (right + 1)) - (1 <<< left)
   end
 

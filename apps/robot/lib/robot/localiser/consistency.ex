@@ -39,7 +39,8 @@ defmodule Robot.Localiser.Consistency do
 
     seen = Columns.seen(showing, colours(robots))
     covered = Columns.union(seen, Columns.seen(hiding, Enum.map(hiding, & &1.colour)))
-    spans = Enum.map(robots, &spans(&1, belief, exposed, percept))
+    camera = Columns.camera(percept)
+    spans = Enum.map(robots, &spans(&1, belief, exposed, camera))
 
     cond do
       stranger?(seen, spans) or missing?(covered, spans) -> :contradicted
@@ -62,7 +63,7 @@ defmodule Robot.Localiser.Consistency do
   end
 
   # The columns that a robot may fill, and those that it must fill.
-  defp spans(mark, belief, exposed, percept) do
+  defp spans(mark, belief, exposed, camera) do
     distance = max(Pose.distance(exposed, mark.at), mark.radius)
     half = :math.asin(mark.radius / distance)
     bearing = Pose.bearing(exposed, mark.at)
@@ -70,9 +71,9 @@ defmodule Robot.Localiser.Consistency do
     core = half - doubt
 
     must =
-      if core > 0.0 and distance < @in_sight, do: Columns.span(bearing, core, percept), else: 0
+      if core > 0.0 and distance < @in_sight, do: Columns.span(bearing, core, camera), else: 0
 
-    {Columns.span(bearing, half + doubt, percept), must}
+    {Columns.span(bearing, half + doubt, camera), must}
   end
 
   # The uncertainty of a direction is that of both places across the line between them.

@@ -29,8 +29,20 @@ defmodule Robot.Localiser.Covariance do
   @spec carry(t(), (t() -> t())) :: t()
   def carry(p, rows), do: p |> rows.() |> transpose() |> rows.()
 
+  # One pass for each column: this is the most frequent work of a filter.
   defp transpose([[] | _rows]), do: []
-  defp transpose(rows), do: [Enum.map(rows, &hd/1) | transpose(Enum.map(rows, &tl/1))]
+
+  defp transpose(rows) do
+    {column, rest} = split(rows)
+    [column | transpose(rest)]
+  end
+
+  defp split([]), do: {[], []}
+
+  defp split([[x | xs] | rows]) do
+    {column, rest} = split(rows)
+    {[x | column], [xs | rest]}
+  end
 
   @doc """
   The matrix with these variances added to its first states.
@@ -120,6 +132,14 @@ defmodule Robot.Localiser.Covariance do
       2.0
   """
   @spec variance(t(), slope :: [float()]) :: float()
+  # That of a pose, which is asked for most, in the order of `dot/2`.
+  def variance([[xx, xy, xh | _], [yx, yy, yh | _], [hx, hy, hh | _] | _], [a, b, c]) do
+    x = xx * a + (xy * b + (xh * c + 0.0))
+    y = yx * a + (yy * b + (yh * c + 0.0))
+    h = hx * a + (hy * b + (hh * c + 0.0))
+    x * a + (y * b + (h * c + 0.0))
+  end
+
   def variance(p, slope), do: dot(rows(p, slope, slope), slope)
 
   defp rows([row | rows], slope, [_x | xs]), do: [dot(row, slope) | rows(rows, slope, xs)]

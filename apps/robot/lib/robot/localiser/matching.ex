@@ -50,8 +50,11 @@ defmodule Robot.Localiser.Matching do
   def pairs(robots, blobs, belief, exposed, pan, view) do
     candidates =
       for mark <- robots,
-          blob <- blobs,
-          c = candidate(mark, blob, belief, exposed, pan, view),
+          alike = Enum.filter(blobs, &(&1.colour == mark.colour)),
+          alike != [],
+          expected = expected(mark, belief, exposed),
+          blob <- alike,
+          c = candidate(expected, blob, pan, view),
           do: c
 
     for %{mark: mark, blob: blob} = one <- candidates,
@@ -75,39 +78,48 @@ defmodule Robot.Localiser.Matching do
   # Whether a blob touches the left or right border; it may be cut off above and below.
   defp cut?(blob), do: blob.left == 0 or blob.right == blob.width - 1
 
-  defp candidate(%{colour: colour} = mark, %{colour: colour} = blob, belief, exposed, pan, view) do
+  # How a robot should look from there, for all blobs; `nil` for one that cannot be seen from within.
+  defp expected(mark, belief, exposed) do
     distance = Pose.distance(exposed, mark.at)
-    width = Sighting.width(mark.radius, distance, blob.width, view)
-
-    if width != nil do
-      share = (blob.right - blob.left + 1) / width
-      half = :math.asin(mark.radius / distance)
-      expected = Pose.bearing(exposed, mark.at)
-      seen = Sighting.bearing(blob, pan, view)
-      {bearing_sd, distance_sd} = sds(mark, distance, belief, exposed)
-      # If the distance is uncertain, so is the expected width of the blob.
-      doubt = 2 * max(distance_sd - @surely, 0.0) / distance
-      slack = abs(share - 1) * half
-      off = max(abs(Pose.wrap(seen - expected)) - slack, 0.0)
-      cost = cost(off, bearing_sd, :math.log(share), doubt)
-
-      if off < max(3 * bearing_sd, @narrow) and cost < @unlike do
-        %{
-          mark: mark,
-          blob: blob,
-          distance: distance,
-          expected: expected,
-          half: half,
-          slack: slack,
-          width: abs(:math.log(share)),
-          cost: cost,
-          sure?: doubt < @doubt
-        }
-      end
-    end
+    if distance > mark.radius, do: expected(mark, distance, belief, exposed)
   end
 
-  defp candidate(_mark, _blob_of_another_colour, _belief, _exposed, _pan, _view), do: nil
+  defp expected(mark, distance, belief, exposed) do
+    {bearing_sd, distance_sd} = sds(mark, distance, belief, exposed)
+
+    %{
+      mark: mark,
+      distance: distance,
+      bearing: Pose.bearing(exposed, mark.at),
+      bearing_sd: bearing_sd,
+      # If the distance is uncertain, so is the expected width of the blob.
+      doubt: 2 * max(distance_sd - @surely, 0.0) / distance
+    }
+  end
+
+  defp candidate(%{mark: mark} = expected, blob, pan, view) do
+    width = Sighting.width(mark.radius, expected.distance, blob.width, view)
+    share = (blob.right - blob.left + 1) / width
+    half = :math.asin(mark.radius / expected.distance)
+    seen = Sighting.bearing(blob, pan, view)
+    slack = abs(share - 1) * half
+    off = max(abs(Pose.wrap(seen - expected.bearing)) - slack, 0.0)
+    cost = cost(off, expected.bearing_sd, :math.log(share), expected.doubt)
+
+    if off < max(3 * expected.bearing_sd, @narrow) and cost < @unlike do
+      %{
+        mark: mark,
+        blob: blob,
+        distance: expected.distance,
+        expected: expected.bearing,
+        half: half,
+        slack: slack,
+        width: abs(:math.log(share)),
+        cost: cost,
+        sure?: expected.doubt < @doubt
+      }
+    end
+  end
 
   # The sum of the squared deviations in direction and width, each in standard deviations.
   defp cost(off, bearing_sd, width, doubt) do

@@ -33,6 +33,8 @@ defmodule Robot.Localiser.Silhouettes do
   # may fill any column within `@wide` standard deviations.
   @strange 0.5
   @wide 2.0
+  # Half of the apparent width of a robot at this robot's own place (radians).
+  @quarter :math.asin(1.0)
   # The standard deviation of a place that was found (metres), without that of the nearest robot.
   @found_sd 0.15
 
@@ -55,12 +57,13 @@ defmodule Robot.Localiser.Silhouettes do
     axis = {:math.cos(direction), :math.sin(direction)}
     turn = Belief.turn_along(belief, axis)
     count = min(ceil(@reach * worst / @step), @steps)
+    camera = Columns.camera(percept)
 
     tried =
       for k <- -count..count do
         way = k * @reach * worst / count
         pose = belief.pose |> moved(axis, turn, way) |> Pose.compose(back)
-        {filled, unknown} = filled(robots, pose, percept)
+        {filled, unknown} = filled(robots, pose, camera)
         wrong = filled |> Columns.difference(seen) |> Columns.without(unknown) |> Columns.count()
         clear = seen |> Columns.without(unknown) |> Columns.count()
         {way * way / (worst * worst) + @wrong * wrong, way, wrong, clear}
@@ -94,17 +97,17 @@ defmodule Robot.Localiser.Silhouettes do
   end
 
   # The columns that robots would fill, and those that a robot at an unknown place may fill.
-  defp filled(robots, pose, percept) do
+  defp filled(robots, pose, camera) do
     Enum.reduce(robots, {0, 0}, fn %{sd: {sd, _, _}} = mark, {known, unknown} ->
       distance = Pose.distance(pose, mark.at)
-      half = :math.asin(mark.radius / max(distance, mark.radius))
+      half = if distance > mark.radius, do: :math.asin(mark.radius / distance), else: @quarter
       bearing = Pose.bearing(pose, mark.at)
 
       if sd > @strange do
         wide = half + @wide * sd / max(distance, 0.1)
-        {known, Columns.union(unknown, Columns.span(bearing, wide, percept))}
+        {known, Columns.union(unknown, Columns.span(bearing, wide, camera))}
       else
-        {Columns.union(known, Columns.span(bearing, half, percept)), unknown}
+        {Columns.union(known, Columns.span(bearing, half, camera)), unknown}
       end
     end)
   end

@@ -7,7 +7,8 @@ defmodule Robot.Mission.Manual do
   In its heartbeats the robot stays `:idle`, so that no group waits for it, and names the robot
   that it follows, so that a command that would close a circle of followers can be refused.
 
-  Its phase is the command's name, then `:done`; for `find_blob`, `:found` or `:not_found`.
+  Its phase is the command's name, then `:done`; for `find_blob`, `:found` or `:not_found`. A `goto` that the robot gives up
+  (`Robot.Behaviour.Goto`) ends as `:given_up`: the stage of this name, and the claim's `blocked_by`, say why.
 
   A robot that is followed need not do anything: its heartbeats are the position updates that a
   subscription asks for (R27, R35), so robots refuse a subscription. A follower keeps 1 m behind
@@ -16,6 +17,8 @@ defmodule Robot.Mission.Manual do
   """
   alias Hal.{Pose, Twist}
   alias Robot.{Behaviour, Command, Percept}
+  alias Robot.Behaviour.Blocker
+  alias Robot.Navigation.{Grid, Reach}
 
   @behaviour Robot.Mission
 
@@ -23,13 +26,14 @@ defmodule Robot.Mission.Manual do
   @silent_ms 1_000
 
   @enforce_keys [:me]
-  defstruct @enforce_keys ++ [count: 0, command: nil, result: nil]
+  defstruct @enforce_keys ++ [count: 0, command: nil, result: nil, why: nil]
 
   @type t :: %__MODULE__{
           me: atom(),
           count: non_neg_integer(),
           command: Command.t() | nil,
-          result: integer() | nil
+          result: integer() | nil,
+          why: String.t() | nil
         }
 
   @impl Robot.Mission
@@ -38,7 +42,7 @@ defmodule Robot.Mission.Manual do
 
   @impl Robot.Mission
   def handle({:command, command}, mission) do
-    mission = %{mission | command: command, count: mission.count + 1, result: nil}
+    mission = %{mission | command: command, count: mission.count + 1, result: nil, why: nil}
     goal = {:goal, {:command, mission.count}, goal(command, nil)}
     result(mission, [goal, {:look, 0.0}, {:claim, claim(mission)}])
   end
@@ -46,6 +50,18 @@ defmodule Robot.Mission.Manual do
   # The robot's status reports the outcome of a command (R12) by its phase.
   def handle({:outcome, {:command, count}, outcome}, %{count: count} = mission),
     do: result(%{mission | result: outcome}, [{:claim, %{phase: :idle, standing: true}}])
+
+  # What is in the way is known from the percept that comes right after the outcome.
+  def handle(
+        {:tick, %Percept{pose: %Pose{}} = percept},
+        %{command: {:goto, x, y, _heading}, result: failed, why: nil} = mission
+      )
+      when failed in [0, 2] do
+    why = blocker(failed, percept, {x, y})
+    gone = {:stage, :given_up, %{x: x, y: y, blocked_by: why}}
+    claim = {:claim, %{phase: :idle, standing: true, blocked_by: why}}
+    result(%{mission | why: why}, [gone, claim])
+  end
 
   # The followed robot moves, and its heartbeats may end.
   def handle({:tick, percept}, %{command: {:follow_the_leader, _leader} = command} = mission),
@@ -61,7 +77,26 @@ defmodule Robot.Mission.Manual do
   defp result(%{command: {:find_blob, _colour}} = mission, effects),
     do: {if(mission.result == 1, do: :found, else: :not_found), mission, effects}
 
+  defp result(%{command: {:goto, _x, _y, _heading}, result: failed} = mission, effects)
+       when failed in [0, 2],
+       do: {:given_up, mission, effects}
+
   defp result(mission, effects), do: {:done, mission, effects}
+
+  # Walls first, then what stands on the first stretch of the way round them.
+  defp blocker(failed, %{grid: grid, pose: pose, profile: profile} = percept, goal) do
+    case Reach.check(grid, Pose.point(pose), goal, profile.radius) do
+      {:error, :no_way} -> Blocker.words(:no_way)
+      {:error, _place} -> "a wall at its goal"
+      :ok when failed == 0 -> Blocker.words(:no_way)
+      :ok -> percept |> Blocker.find(next(grid, pose, goal, profile.radius)) |> Blocker.words()
+    end
+  end
+
+  defp next(nil, _pose, goal, _radius), do: goal
+
+  defp next(grid, pose, goal, radius),
+    do: hd(Grid.Way.find(grid, Pose.point(pose), goal, Reach.room(radius)) || [goal])
 
   defp phase(command) when is_atom(command), do: command
   defp phase(command), do: elem(command, 0)

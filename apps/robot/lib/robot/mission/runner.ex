@@ -6,16 +6,26 @@ defmodule Robot.Mission.Runner do
   Events for an idle robot are dropped. The caller carries out the effects, in their order, except
   `{:claim, map}`: the mission's claim is kept here until the mission is halted.
   """
-  alias Robot.{Behaviour, Mission}
+  alias Robot.{Behaviour, Mission, Percept}
+  alias Robot.Navigation.Grid
 
   @enforce_keys [:robot]
   defstruct @enforce_keys ++
-              [module: nil, mission: nil, phase: :idle, claim: %{}, ticked_ms: nil, halted: nil]
+              [
+                module: nil,
+                mission: nil,
+                phase: :idle,
+                claim: %{},
+                ticked_ms: nil,
+                halted: nil,
+                grid: nil
+              ]
 
   @typedoc """
   `module` is `nil` while the robot is idle; `halted` is the mission that the last stop left for
   `resume/1`. `ticked_ms` is the time of the last percept that the mission handled: its claim is
-  as old as that, whatever else it has heard since.
+  as old as that, whatever else it has heard since. `grid` is what the robot knows of walls: each percept gets it on its
+  way to the mission.
   """
   @type t :: %__MODULE__{
           robot: atom(),
@@ -24,14 +34,19 @@ defmodule Robot.Mission.Runner do
           phase: atom(),
           claim: map(),
           ticked_ms: integer() | nil,
-          halted: {module(), mission :: term()} | nil
+          halted: {module(), mission :: term()} | nil,
+          grid: Grid.t() | nil
         }
 
   @type state :: :idle | {module(), phase :: atom()}
 
-  @doc "The runner of an idle robot."
-  @spec new(robot :: atom()) :: t()
-  def new(robot), do: %__MODULE__{robot: robot}
+  @doc "The runner of an idle robot that knows these walls (`walls/2` changes them)."
+  @spec new(robot :: atom(), Grid.t() | nil) :: t()
+  def new(robot, grid \\ nil), do: %__MODULE__{robot: robot, grid: grid}
+
+  @doc "Sets what the robot knows of walls from now on."
+  @spec walls(t(), Grid.t() | nil) :: t()
+  def walls(%__MODULE__{} = runner, grid), do: %{runner | grid: grid}
 
   @doc "Starts a mission; it replaces any other, and the mission that a stop has left."
   @spec start(t(), module(), keyword()) :: {t(), [Mission.effect()]}
@@ -58,10 +73,22 @@ defmodule Robot.Mission.Runner do
   def handle(%__MODULE__{module: nil} = runner, _event), do: {runner, []}
 
   def handle(%__MODULE__{module: module, mission: mission} = runner, event),
-    do: runner |> note_tick(event) |> follow(module.handle(event, mission))
+    do: runner |> note_tick(event) |> follow(module.handle(walled(event, runner), mission))
+
+  defp walled({:tick, %Percept{} = percept}, %{grid: grid}) when grid != nil,
+    do: {:tick, %{percept | grid: grid}}
+
+  defp walled(event, _runner), do: event
 
   defp note_tick(runner, {:tick, %{at_ms: at_ms}}), do: %{runner | ticked_ms: at_ms}
   defp note_tick(runner, _event), do: runner
+
+  @doc "What the mission says of itself (`c:Robot.Mission.explain/1`); `[]` for one that says nothing."
+  @spec explain(t()) :: [{label :: String.t(), text :: String.t()}]
+  def explain(%__MODULE__{module: nil}), do: []
+
+  def explain(%__MODULE__{module: module, mission: mission}),
+    do: if(function_exported?(module, :explain, 1), do: module.explain(mission), else: [])
 
   @doc "Ends the mission and keeps what it leaves for `resume/1` (`c:Robot.Mission.halted/1`)."
   @spec halt(t()) :: t()
@@ -69,7 +96,7 @@ defmodule Robot.Mission.Runner do
 
   def halt(%__MODULE__{module: module, mission: mission} = runner) do
     left = if function_exported?(module, :halted, 1), do: module.halted(mission)
-    %{new(runner.robot) | halted: left && {module, left}}
+    %{new(runner.robot, runner.grid) | halted: left && {module, left}}
   end
 
   @doc "The mission and its phase, or `:idle`."

@@ -109,6 +109,7 @@ defmodule Robot.Safety.Gate do
       ticker: Config.ticker(config, :step, @period_ms)
     }
 
+    Trace.begin(config, :gate, state(s), at_ms)
     {:ok, step(s, at_ms)}
   end
 
@@ -168,8 +169,15 @@ defmodule Robot.Safety.Gate do
   end
 
   @impl GenServer
-  def handle_info(:step, s), do: {:noreply, s |> step(Config.now(s.config)) |> schedule()}
+  def handle_info(:step, s) do
+    at_ms = Config.now(s.config)
+    Trace.checkpoint(s.config, :gate, fn -> state(s) end, at_ms)
+    {:noreply, s |> step(at_ms) |> schedule()}
+  end
+
   def handle_info(_other, s), do: HardenedServer.drop(s)
+
+  defp state(s), do: {s.reflex, %{dry_run: s.config.dry_run}}
 
   # In a dry run the drive is never armed, but the report shows what an armed robot would do.
   defp armed?(_board, %{dry_run: true}), do: true

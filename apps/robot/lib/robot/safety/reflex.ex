@@ -17,6 +17,7 @@ defmodule Robot.Safety.Reflex do
   | `:speed` | the profile's greatest speeds |
   | `:bumper` | no driving toward a touched side; driving away and turning are allowed |
   | `:near` | slow enough to stop 0.15 m before what the sonars see in the direction of motion |
+  | `:beside` | slowly past what the sonars see less than 0.15 m beside its way |
   | `:corner` | a robot longer than wide does not turn a corner into what the sonars see |
   | `:fence` | stops before its fence (`Robot.Safety.Reflex.Fence`); no driving without a place |
   | `:blind` | no sonar reading for 500 ms, although it has sonars: at most 0.1 m/s, also for the corners of a robot longer than wide that turns |
@@ -92,6 +93,7 @@ defmodule Robot.Safety.Reflex do
           | :speed
           | :bumper
           | :near
+          | :beside
           | :corner
           | :fence
           | :blind

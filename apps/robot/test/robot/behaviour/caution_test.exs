@@ -39,6 +39,41 @@ defmodule Robot.Behaviour.CautionTest do
     assert speed(roll.(0.1), percept(true, far)) == 0.1
   end
 
+  test "among others it slows down for what it cannot explain, if one is silent or its own place is not sure" do
+    index = Enum.find_index(Profile.magellan().sonars, &(abs(&1.heading - 1.5708) < 0.01))
+    echo = List.replace_at(List.duplicate(5.1, 16), index, 0.8)
+    there = Pose.new(0.0, 1.2)
+
+    peers = fn mode, pose ->
+      %{mag2: %{pose: pose, twist: Twist.zero(), radius: 0.2, at_ms: -5_000, mode: mode}}
+    end
+
+    # Whence it may have come meanwhile, and where it may be though it tells another place; and too far for both.
+    far = Pose.new(0.0, 3.5)
+    too_far = Pose.new(0.0, 9.0)
+    inner = Goto.new(x: 5.0, y: 0.0)
+    sees = fn percept, sonar -> %{percept | sonar: sonar} end
+    sure = put_in(percept(false, %{}).uncertainty.radius, 0.3)
+
+    slow = [
+      sees.(%{sure | peers: peers.(:dead, far)}, echo),
+      sees.(percept(false, peers.(:moving, far)), echo)
+    ]
+
+    fast = [
+      sees.(%{sure | peers: peers.(:moving, far)}, echo),
+      sees.(%{sure | peers: peers.(:dead, too_far)}, echo),
+      sees.(percept(false, peers.(:moving, too_far)), echo),
+      # What it sees is the silent robot, where it was last heard.
+      sees.(%{sure | peers: peers.(:dead, there)}, echo),
+      sees.(%{sure | peers: peers.(:dead, far)}, List.duplicate(5.1, 16)),
+      sees.(percept(false, %{}), echo)
+    ]
+
+    for percept <- slow, do: assert(speed(inner, percept) == 0.2)
+    for percept <- fast, do: assert(speed(inner, percept) > 0.3)
+  end
+
   defmodule Aside do
     @behaviour Robot.Behaviour
     @impl Robot.Behaviour

@@ -87,10 +87,10 @@ defmodule Robot.Control.TraceTest do
     {[{:drive, twist, limits}], reflex}
   end
 
-  defp executive({:tick, percept}, _at_ms, controller) do
-    {wish, outcome, controller} = Controller.tick(controller, percept)
+  defp executive({:tick, percept}, _at_ms, before) do
+    {wish, outcome, controller} = Controller.tick(before, percept)
     outcomes = for {tag, outcome} <- List.wrap(outcome), do: {:outcome, tag, outcome}
-    said = outcomes ++ [{:tick, Controller.percept(controller)}]
+    said = outcomes ++ Controller.report(before, controller)
     {[{:wish, wish}] ++ looks(wish.look) ++ said, controller}
   end
 

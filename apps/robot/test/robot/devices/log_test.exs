@@ -46,6 +46,7 @@ defmodule Robot.Devices.LogTest do
     for event <- [
           [:robot, :estop_file, :error],
           [:vision, :saver, :failed],
+          [:robot, :recorder, :failed],
           [:swarm, :comms, :duplicate_id],
           [:swarm, :comms, :unique_id]
         ],

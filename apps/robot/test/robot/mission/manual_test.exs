@@ -68,4 +68,47 @@ defmodule Robot.Mission.ManualTest do
     assert {:follow_the_leader, _, [{:goal, ^tag, {Follow, _}}]} =
              Manual.handle({:tick, percept(1_600, %{mag2: %{peer | at_ms: 1_550}})}, mission)
   end
+
+  test "a way that the robot gives up is told with what blocks it, once, and is forgotten with the next command" do
+    there = Map.put(percept(100, %{}), :pose, Pose.new(0, 0))
+    peer = %{pose: Pose.new(0.6, 0.3), twist: Twist.new(0, 0), radius: 0.2, at_ms: 0, mode: :dead}
+
+    for {outcome, peers, why} <- [
+          {2, %{mag2: peer}, "mag2"},
+          {2, %{}, "no way"},
+          {0, %{}, "no way"}
+        ] do
+      {:goto, mission, [{:goal, tag, _} | _]} = tell(new(), "goto:2:1")
+
+      assert {:given_up, mission, [{:claim, %{standing: true}}]} =
+               Manual.handle({:outcome, tag, outcome}, mission)
+
+      # Without a pose nothing can be said about what is in the way.
+      assert {:given_up, ^mission, []} = Manual.handle({:tick, percept(100, peers)}, mission)
+
+      assert {:given_up, mission, [stage, {:claim, claim}]} =
+               Manual.handle({:tick, %{there | peers: peers}}, mission)
+
+      assert stage == {:stage, :given_up, %{x: 2.0, y: 1.0, blocked_by: why}}
+      assert claim == %{phase: :idle, standing: true, blocked_by: why}
+      assert {:given_up, ^mission, []} = Manual.handle({:tick, %{there | peers: peers}}, mission)
+
+      assert {:goto, _mission, [_goal, _look, {:claim, claim}]} = tell(mission, "goto:3:1")
+      refute is_map_key(claim, :blocked_by)
+    end
+  end
+
+  test "a wall where a robot was sent is named" do
+    cells =
+      for j <- 0..9, i <- 0..29, into: <<>>, do: if(i > 20 and j < 5, do: <<1>>, else: <<0>>)
+
+    grid = Robot.Navigation.Grid.new(cells, {30, 10}, 0.1, {0.0, 0.0})
+    {:goto, mission, [{:goal, tag, _} | _]} = tell(new(), "goto:2.5:0.2")
+    {:given_up, mission, _claim} = Manual.handle({:outcome, tag, 0}, mission)
+    percept = %{percept(100, %{}) | pose: Pose.new(0.5, 0.5), grid: grid}
+
+    assert {:given_up, _mission,
+            [{:stage, :given_up, %{blocked_by: "a wall at its goal"}}, _claim]} =
+             Manual.handle({:tick, percept}, mission)
+  end
 end

@@ -167,6 +167,29 @@ defmodule Robot.Safety.ReflexTest do
     end
   end
 
+  test "passes slowly what is close beside its way, and freely what is behind or farther off" do
+    profile = Profile.magellan()
+    left = Enum.find_index(profile.sonars, &(abs(&1.heading - :math.pi() / 4) < 0.01))
+
+    speed = fn range, wish ->
+      sonar = List.replace_at(Body.silence(profile), left, range)
+
+      {twist, limits, _reflex} =
+        Enum.reduce(0..20, {nil, [], Reflex.new(profile)}, fn k, {_, _, reflex} ->
+          {reflex, _urgency} = Reflex.sense(reflex, {:sonar, sonar}, 50 * k)
+          reflex |> Reflex.wish(Twist.new(wish, 0.0), 50 * k) |> Reflex.step(50 * k)
+        end)
+
+      {twist.linear, :beside in limits}
+    end
+
+    # 0.27 m and 0.39 m to the left of the way of a body of 0.2 m.
+    assert {slow, true} = speed.(0.182, 0.5)
+    assert_in_delta slow, 0.1 + 4.0 * (0.382 * :math.sqrt(0.5) - 0.23), 1.0e-6
+    assert speed.(0.35, 0.5) == {0.5, false}
+    assert speed.(0.182, -0.5) == {-0.5, false}
+  end
+
   test "without fresh sonars it creeps; a robot that has none does not" do
     {twist, limits, _} =
       Enum.reduce(0..40, {nil, [], gate()}, fn k, {_, _, reflex} ->

@@ -42,6 +42,7 @@ defmodule Sim.Fleet.Local do
       transport: transport,
       blobs: setup.options.blobs,
       mission: setup.mission,
+      plan: setup.plan,
       trace: options[:trace],
       folder: folder
     }

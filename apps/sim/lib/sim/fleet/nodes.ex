@@ -280,6 +280,7 @@ defmodule Sim.Fleet.Nodes do
        world: backend.name,
        blobs: options.blobs,
        mission: setup.mission,
+       plan: setup.plan,
        folder: backend.host.home,
        loss: options.loss,
        seed: options.seed + index

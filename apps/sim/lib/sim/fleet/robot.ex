@@ -8,11 +8,11 @@ defmodule Sim.Fleet.Robot do
   alias Swarm.Membership.Heartbeat
 
   # The timeout of a command to a single robot.
-  @over [:ready, :done, :found, :not_found]
+  @over [:ready, :done, :given_up, :found, :not_found]
 
   @typedoc """
   What all robots of a fleet have in common: the name of their world, their clock and radio, the
-  kind of blobs, their mission, the trace of inputs and outputs (`{m, f, a}`, called with the id
+  kind of blobs, their mission, the walls that they know, the trace of inputs and outputs (`{m, f, a}`, called with the id
   first), and the run's folder, which holds the serial lines of robots with real drivers.
   """
   @type common :: %{
@@ -21,6 +21,8 @@ defmodule Sim.Fleet.Robot do
           transport: Config.call(),
           blobs: :painted | :direct,
           mission: Config.module_options(),
+          plan:
+            Elixir.Robot.Navigation.Grid.t() | Elixir.Robot.Navigation.OccupancyGrid.t() | nil,
           trace: Config.call() | nil,
           folder: Path.t() | nil
         }
@@ -96,6 +98,7 @@ defmodule Sim.Fleet.Robot do
         camera: {Sim.Device.Camera, device ++ [blobs: common.blobs, clock: common.clock]},
         colours: World.colours(),
         mission: common.mission,
+        plan: common.plan,
         trace: trace(common.trace, id)
       ] ++ drivers(robot, device, common.folder)
     )

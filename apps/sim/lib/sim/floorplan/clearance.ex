@@ -16,6 +16,17 @@ defmodule Sim.Floorplan.Clearance do
     end
   end
 
+  @doc "Whether the nearest wall is at least so far, as `of/3` would say, but mostly sooner."
+  @spec at_least?(Sim.Floorplan.t(), Sim.Floorplan.point(), number()) :: boolean()
+  def at_least?(map, point, limit) do
+    case steps(map, point) do
+      # Somewhere in a square around the point's cell there is wall.
+      steps when steps * map.cell * 1.4143 < limit -> limit <= 0
+      steps when (steps - 1) * map.cell >= limit -> true
+      _near -> near(map, point, limit) == []
+    end
+  end
+
   @doc "See `Sim.Floorplan.near/3`."
   @spec near(Sim.Floorplan.t(), Sim.Floorplan.point(), number()) :: [
           {float(), Sim.Floorplan.point()}

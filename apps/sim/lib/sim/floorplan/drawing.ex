@@ -1,136 +1,36 @@
 defmodule Sim.Floorplan.Drawing do
-  @moduledoc """
-  The built-in maps, drawn with cells of 5 cm for a fleet of a certain size. Pure.
-
-  Each has free space around its centre for a column of the whole fleet at 1 m spacing in any
-  direction, and 3 m to drive around its end.
-  """
-  alias Sim.{Compute, Trig}
+  @moduledoc "Draws a map from shapes, with cells of 5 cm. Pure."
+  alias Sim.Compute
+  alias Sim.Floorplan.Shape
 
   @cell 0.05
-  @wall 0.2
-  @corridor 2.5
-  @door 1.4
 
-  @typedoc "A rectangle or a disc of wall, or a rectangle cut free again, in metres."
-  @type shape ::
-          {:wall | :free, left :: float(), low :: float(), right :: float(), high :: float()}
-          | {:pillar, x :: float(), y :: float(), radius :: float()}
+  @doc "The length of a cell's side in metres."
+  @spec cell() :: float()
+  def cell, do: @cell
 
-  @doc "The fields of the map of this name."
-  @spec draw(String.t(), pos_integer()) :: map()
-  def draw("hall", fleet) do
-    {x, y} = half(fleet)
-    {w, h} = {round(2 * x / @cell), round(2 * y / @cell)}
-    # Without inner walls the field needs no sweep: rows farther inside than a byte can count are
-    # alike.
-    rows = Map.new(1..255, fn most -> {most, open_row(w, most)} end)
-    field = for j <- 0..(h - 1), into: <<>>, do: rows[Enum.min([j + 1, h - j, 255])]
-
-    %{name: "hall", width: w, height: h, cell: @cell, field: field, room: {-x, -y, x, y}}
-  end
-
-  def draw("hospital", fleet) do
-    {x, y} = half(fleet)
-
-    # A large room in the middle, a corridor around it, rooms along the outer side of the
-    # corridor.
-    {cx, cy} = {x + @wall + @corridor, y + @wall + @corridor}
-    {ox, oy} = {cx + 8.0, cy + 4.5}
-
-    shapes =
-      frame(x + @wall, y + @wall) ++
-        cross(x, y) ++
-        frame(cx + @wall, cy + @wall) ++
-        ward(ox, cy, oy, fn a, b, c, d -> {a, b, c, d} end) ++
-        ward(ox, cy, oy, fn a, b, c, d -> {a, -d, c, -b} end) ++
-        ward(cy + @wall, cx, ox, fn a, b, c, d -> {b, a, d, c} end) ++
-        ward(cy + @wall, cx, ox, fn a, b, c, d -> {-d, a, -b, c} end) ++
-        frame(ox, oy)
-
-    plan("hospital", {2 * ox, 2 * oy}, {-x, -y, x, y}, shapes)
-  end
-
-  def draw("arena", fleet) do
-    {free, _} = half(fleet)
-    half = free + 4.0
-    thin = for k <- 0..11, do: pillar(k / 12, free + 1.5, 0.25 + 0.15 * rem(k, 2))
-    thick = for k <- 0..3, do: pillar((2 * k + 1) / 8, 1.25 * half, 0.6)
-    # A square that lies in the free circle.
-    room = 0.7 * free
-
-    plan(
-      "arena",
-      {2 * half, 2 * half},
-      {-room, -room, room, room},
-      thin ++ thick ++ frame(half, half)
-    )
-  end
-
-  defp half(fleet), do: {max(8.0, fleet + 3.0), max(6.0, fleet + 3.0)}
-
-  defp open_row(w, most),
-    do: for(i <- 0..(w - 1), into: <<>>, do: <<Enum.min([i + 1, w - i, most])>>)
-
-  # Four walls whose outer edges are this far from the centre.
-  defp frame(x, y) do
-    [
-      {:wall, -x, -y, x, @wall - y},
-      {:wall, -x, y - @wall, x, y},
-      {:wall, -x, -y, @wall - x, y},
-      {:wall, x - @wall, -y, x, y}
-    ]
-  end
-
-  # A door in the middle of each wall of the large room.
-  defp cross(x, y) do
-    half = @door / 2
-
-    [
-      {:free, -x - @wall, -half, @wall - x, half},
-      {:free, x - @wall, -half, x + @wall, half},
-      {:free, -half, -y - @wall, half, @wall - y},
-      {:free, -half, y - @wall, half, y + @wall}
-    ]
-  end
-
-  # Rooms about 5 m wide side by side, from -half to half, `low` to `high`; `turn` places them on
-  # their side.
-  defp ward(half, low, high, turn) do
-    count = max(round(2 * half / 5), 1)
-    width = 2 * half / count
-
-    doors =
-      for k <- 0..(count - 1), middle = -half + (k + 0.5) * width do
-        {:free, middle - @door / 2, low - @wall, middle + @door / 2, low + 2 * @wall}
-      end
-
-    walls =
-      for k <- 1..(count - 1)//1, edge = -half + k * width do
-        {:wall, edge - @wall / 2, low, edge + @wall / 2, high}
-      end
-
-    for {what, left, low, right, high} <- walls ++ doors do
-      {left, low, right, high} = turn.(left, low, right, high)
-      {what, left, low, right, high}
-    end
-  end
-
-  defp pillar(turn, distance, radius) do
-    {c, s} = Trig.cos_sin(turn * 2 * :math.pi())
-    {:pillar, distance * c, distance * s, radius}
-  end
-
-  # Later shapes cover earlier ones; the centre of a cell decides what it is.
-  defp plan(name, {width, height}, room, shapes) do
+  @doc """
+  The fields of a map of this name and size in metres, with its shapes. Later shapes cover earlier
+  ones; where there is none, it is `ground`. The centre of a cell decides what it is. `room` is
+  where a fleet starts.
+  """
+  @spec plan(
+          String.t(),
+          {float(), float()},
+          Sim.Floorplan.rectangle(),
+          [Shape.t()],
+          :free | :wall
+        ) ::
+          map()
+  def plan(name, {width, height}, room, shapes, ground \\ :free) do
     {w, h} = {round(width / @cell), round(height / @cell)}
 
     {rows, _drawn} =
       Enum.map_reduce(0..(h - 1), %{}, fn j, drawn ->
         y = (j + 0.5 - h / 2) * @cell
-        spans = for shape <- shapes, span = span(shape, y), do: span
+        spans = for {ink, outline} <- shapes, span = Shape.span(outline, y), do: {ink, span}
         # Rows that are crossed by the same shapes in the same way are drawn once.
-        drawn = Map.put_new_lazy(drawn, spans, fn -> row(spans, w) end)
+        drawn = Map.put_new_lazy(drawn, spans, fn -> row(spans, w, ground) end)
         {drawn[spans], drawn}
       end)
 
@@ -138,24 +38,17 @@ defmodule Sim.Floorplan.Drawing do
     %{name: name, width: w, height: h, cell: @cell, field: field, room: room}
   end
 
-  defp span({:pillar, x, middle, radius}, y) do
-    rest = radius * radius - (y - middle) * (y - middle)
-    if rest > 0.0, do: {1, x - :math.sqrt(rest), x + :math.sqrt(rest)}
-  end
-
-  defp span({what, left, low, right, high}, y) when y >= low and y < high,
-    do: {if(what == :wall, do: 1, else: 0), left, right}
-
-  defp span(_shape, _y), do: nil
-
-  defp row(spans, w) do
+  defp row(spans, w, ground) do
     spans = Enum.reverse(spans)
 
     for i <- 0..(w - 1), x = (i + 0.5 - w / 2) * @cell, into: <<>> do
-      case Enum.find(spans, fn {_, left, right} -> x >= left and x < right end) do
-        {value, _, _} -> <<value>>
-        nil -> <<0>>
+      case Enum.find(spans, fn {_ink, {left, right}} -> x >= left and x < right end) do
+        {ink, _span} -> byte(ink)
+        nil -> byte(ground)
       end
     end
   end
+
+  defp byte(:wall), do: <<1>>
+  defp byte(:free), do: <<0>>
 end

@@ -1,99 +1,124 @@
 defmodule Sim.Floorplan.Image do
   @moduledoc """
-  Maps from bitmaps: `FILE:WIDTHxHEIGHT` with a PNG or PGM file and its size in metres. Pixels
-  darker than half are wall. The picture is divided into cells of 5 cm; a cell is wall if any of
-  its pixels is, so that thin walls have no gaps.
+  Maps from files: a PNG or PGM picture with its size in metres, `FILE:WIDTHxHEIGHT`, whose middle
+  is the origin; or a description in YAML as map_server writes it, `FILE.yaml`, which names the
+  picture and says where the origin is.
   """
+  alias Robot.Navigation.MapFile
+  alias Robot.Navigation.MapFile.Picture
   alias Sim.Compute
-  alias Sim.Floorplan.{Pgm, Png}
+  alias Sim.Floorplan.Maps
 
-  @cell 0.05
   @most_cells 64_000_000
+  # Metres: what a picture may have, with as much beside it.
+  @widest 2000.0
 
-  @doc "The fields of the map `FILE:WIDTHxHEIGHT`; the error is one line."
+  @doc "The fields of the map of this name; the error is one line."
   @spec open(String.t()) :: {:ok, map()} | {:error, String.t()}
   def open(name) do
-    case Regex.run(~r/\A(.+):([^:]*)\z/s, name) do
-      [_, file, size] ->
-        with {:ok, size} <- size(name, size),
-             {:ok, bytes} <- read(file),
-             {:ok, picture} <- decode(file, bytes),
-             do: {:ok, lay(name, picture, size)}
-
-      nil ->
-        {:error, "unknown map #{name}: hall, hospital, arena or FILE.png:WIDTHxHEIGHT in metres"}
+    cond do
+      name =~ ~r/\.ya?ml\z/i -> described(name)
+      match = Regex.run(~r/\A(.+):([^:]*)\z/s, name) -> sized(name, match)
+      true -> {:error, "unknown map #{name}: #{Maps.allowed()} in metres"}
     end
   end
 
-  defp size(name, text) do
+  defp sized(name, [_, file, size]) do
+    with {:ok, {width, height} = size} <- size(size, "map #{name}"),
+         :ok <- few("map #{name}", size),
+         {:ok, picture} <- picture(file) do
+      plan(name, picture, Picture.shades(picture), size, {-width / 2, -height / 2})
+    end
+  end
+
+  defp described(file) do
+    with {:ok, description} <- file |> MapFile.description() |> about(),
+         {:ok, picture} <- picture(description.image) do
+      {width, height, _rows} = picture
+      {width, height} = {width * description.resolution, height * description.resolution}
+      {x, y} = description.origin
+
+      # The plan has its origin in the middle, so what the picture does not cover is added as wall.
+      whole = {2 * max(-x, x + width), 2 * max(-y, y + height)}
+
+      with :ok <- large_enough(file, {width, height}),
+           :ok <- around(file, description.origin, whole),
+           do: plan(file, picture, description.shades, {width, height}, description.origin)
+    end
+  end
+
+  defp about({:error, line}), do: {:error, "map file #{line}"}
+  defp about(ok), do: ok
+
+  defp large_enough(_file, {width, height}) when width >= 1.0 and height >= 1.0, do: :ok
+
+  defp large_enough(file, {width, height}) do
+    size = Enum.map_join([width, height], " x ", &:erlang.float_to_binary(&1, decimals: 2))
+    {:error, "map #{file}: it is #{size} m; each side must be at least 1 m: see its resolution"}
+  end
+
+  defp around(file, {x, y}, {width, height} = whole) do
+    if Enum.all?([width, height], &(&1 > 0 and &1 <= @widest)) and few(file, whole) == :ok,
+      do: :ok,
+      else:
+        {:error,
+         "map #{file}: its origin [#{x}, #{y}] is too far from 0,0, which must be in the picture or near it"}
+  end
+
+  defp size(text, what) do
     with [_, width, height] <- Regex.run(~r/\A(\d{1,9}\.?\d{0,9})x(\d{1,9}\.?\d{0,9})\z/, text),
          {width, _} <- Float.parse(width),
          {height, _} <- Float.parse(height),
          true <- width >= 1.0 and height >= 1.0 do
-      if width * height / (@cell * @cell) <= @most_cells,
-        do: {:ok, {width, height}},
-        else:
-          {:error,
-           "map #{name}: too large, at most #{div(@most_cells, 1_000_000)} million cells of 5 cm are allowed"}
+      {:ok, {width, height}}
     else
       _ ->
         {:error,
-         "map #{name}: its size must be WIDTHxHEIGHT in metres, each at least 1, such as 16x12"}
+         "#{what}: its size must be WIDTHxHEIGHT in metres, each at least 1, such as 16x12"}
     end
   end
 
-  # Reading a device or a pipe would never end.
-  defp read(file) do
-    with {:ok, %File.Stat{type: :regular}} <- File.stat(file),
-         {:ok, bytes} <- File.read(file) do
-      {:ok, bytes}
-    else
-      {:ok, %File.Stat{type: type}} -> {:error, "map file #{file}: is a #{type}, not a file"}
-      {:error, reason} -> {:error, "map file #{file}: #{:file.format_error(reason)}"}
-    end
+  defp few(what, {width, height}) do
+    if width * height / (Picture.cell() * Picture.cell()) <= @most_cells,
+      do: :ok,
+      else:
+        {:error,
+         "#{what}: too large, at most #{div(@most_cells, 1_000_000)} million cells of 5 cm are allowed"}
   end
 
-  defp decode(file, bytes) do
-    result =
-      case bytes do
-        <<0x89, "PNG\r\n", 0x1A, "\n", chunks::binary>> -> Png.decode(chunks, @most_cells)
-        <<"P", kind, rest::binary>> when kind in [?2, ?5] -> Pgm.decode(kind, rest, @most_cells)
-        _ -> {:error, "is neither a PNG nor a PGM (P2, P5) picture"}
-      end
+  defp picture(file), do: file |> MapFile.picture(@most_cells) |> about()
 
-    with {:error, reason} <- result, do: {:error, "map file #{file}: #{reason}"}
+  # `corner` is where the lower left corner of the picture lies.
+  defp plan(name, picture, shades, {width, height} = size, {x, y}) do
+    {columns, rows} = Picture.cells(size)
+    {w, right} = middle(columns, x, width)
+    {h, up} = middle(rows, y, height)
+    walls = Picture.walls(picture, shades, size)
+    field = walls |> surround({w, h}, {columns, rows}, {right, up}) |> Compute.field(w, h)
+    cell = Picture.cell()
+    {left, low} = {(right - w / 2) * cell, (up - h / 2) * cell}
+    room = {left, low, left + columns * cell, low + rows * cell}
+    {:ok, %{name: name, width: w, height: h, cell: cell, field: field, room: room}}
   end
 
-  defp lay(name, {width, height, rows}, {metres_x, metres_y}) do
-    {w, h} = {max(round(metres_x / @cell), 1), max(round(metres_y / @cell), 1)}
-    rows = List.to_tuple(rows)
-    columns = for i <- 0..(w - 1), do: part(i, w, width)
+  # How many cells the plan needs along an axis, and how many of them come before the picture.
+  defp middle(cells, low, length) when low == -length / 2, do: {cells, 0}
 
-    {cells, _last} =
-      Enum.map_reduce((h - 1)..0//-1, {nil, nil}, fn j, {last, row} ->
-        case part(j, h, height) do
-          ^last -> {row, {last, row}}
-          part -> part |> squeeze(rows, columns) |> then(&{&1, {part, &1}})
-        end
-      end)
-
-    field = cells |> IO.iodata_to_binary() |> Compute.field(w, h)
-    {x, y} = {w * @cell / 2, h * @cell / 2}
-    %{name: name, width: w, height: h, cell: @cell, field: field, room: {-x, -y, x, y}}
+  defp middle(cells, low, _length) do
+    before = round(-low / Picture.cell())
+    half = max(before, cells - before)
+    {2 * half, half - before}
   end
 
-  # The pixels in cell `i` of `cells`: the first, and their number.
-  defp part(i, cells, pixels) do
-    first = div(i * pixels, cells)
-    {first, max(div((i + 1) * pixels + cells - 1, cells) - first, 1)}
-  end
+  # What the picture does not cover is wall.
+  defp surround(walls, {w, h}, {columns, rows}, {right, up}) do
+    fill = &:binary.copy(<<1>>, &1)
+    {left, rest} = {fill.(right), fill.(w - right - columns)}
 
-  defp squeeze({first, count}, rows, columns) do
-    rows = for k <- first..(first + count - 1), do: elem(rows, k)
-
-    for {column, width} <- columns, into: <<>> do
-      wall? = Enum.any?(rows, &(:binary.match(&1, <<1>>, scope: {column, width}) != :nomatch))
-      if wall?, do: <<1>>, else: <<0>>
-    end
+    IO.iodata_to_binary([
+      fill.(up * w),
+      Enum.map(walls, &[left, &1, rest]),
+      fill.((h - up - rows) * w)
+    ])
   end
 end

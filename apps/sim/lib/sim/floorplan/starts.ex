@@ -7,7 +7,7 @@ defmodule Sim.Floorplan.Starts do
   of it.
   """
   alias Hal.Pose
-  alias Sim.Floorplan.Clearance
+  alias Sim.Floorplan.{Clearance, Cells}
   alias Sim.Noise
 
   @between 1.0
@@ -43,10 +43,11 @@ defmodule Sim.Floorplan.Starts do
   end
 
   # A few robots start where they can see each other, however large the hall; at least 4 m2 each.
-  defp middle({left, low, right, high}, count) do
+  defp middle({left, low, right, high} = room, count) do
+    {x, y} = Cells.middle(room)
     grow = :math.sqrt(max(1.0, count / 40))
-    {x, y} = {8.0 * grow, 6.0 * grow}
-    inset({max(left, -x), max(low, -y), min(right, x), min(high, y)})
+    {w, h} = {8.0 * grow, 6.0 * grow}
+    inset({max(left, x - w), max(low, y - h), min(right, x + w), min(high, y + h)})
   end
 
   defp inset({left, low, right, high}),
@@ -63,7 +64,7 @@ defmodule Sim.Floorplan.Starts do
 
     if Enum.all?(poses, &(Pose.distance(&1, place) >= @between)) and
          (landmark == nil or Pose.distance(landmark, place) >= @from_landmark) and
-         Clearance.of(map, place, @from_wall) >= @from_wall and
+         Clearance.at_least?(map, place, @from_wall) and
          reachable?(map, place, Enum.map(poses, &Pose.point/1) ++ List.wrap(landmark)) do
       {x, y} = place
       Pose.new(x, y, (draw.(2) - 0.5) * 2 * :math.pi())
@@ -75,11 +76,11 @@ defmodule Sim.Floorplan.Starts do
 
   defp way?(map, {ax, ay} = a, {bx, by} = b) do
     steps = ceil(Pose.distance(a, b) / @stride)
+    wide = wide(map, b)
 
     Enum.all?(1..steps//1, fn k ->
       share = k / steps
-      wide = wide(map, b)
-      Clearance.of(map, {ax + share * (bx - ax), ay + share * (by - ay)}, wide) >= wide
+      Clearance.at_least?(map, {ax + share * (bx - ax), ay + share * (by - ay)}, wide)
     end)
   end
 

@@ -8,7 +8,7 @@ defmodule Sim.Node.Robot do
       |-- Sim.Fleet.Hardware  emulated devices, if it has the real drivers
       `-- Robot.Fleet    the robot
 
-  Options: `robot` as in `Sim.Trial.Setup`, `world`, `blobs`, `mission`, `folder` as in
+  Options: `robot` as in `Sim.Trial.Setup`, `world`, `blobs`, `mission`, `plan`, `folder` as in
   `Sim.Fleet.Robot`, `loss` and `seed` of the radio.
   """
   @behaviour Sim.Node
@@ -32,6 +32,7 @@ defmodule Sim.Node.Robot do
       transport: transport,
       blobs: options.blobs,
       mission: options.mission,
+      plan: options.plan,
       trace: nil,
       folder: options.folder
     }

@@ -3,7 +3,7 @@ defmodule Sim.Trial.Options do
   alias Hal.Options
   alias Hal.Options.Type
   alias Missions.Landmark
-  alias Sim.Trial.Cuts
+  alias Sim.Trial.{Cuts, Event}
 
   @place {:tuple, [{:number, -1.0e4, 1.0e4, "m"}, {:number, -1.0e4, 1.0e4, "m"}],
           "{x, y} in metres"}
@@ -15,19 +15,21 @@ defmodule Sim.Trial.Options do
     ],
     seed: [:integer, default: 1],
     map: [
-      {:path, ~s("hall", "hospital", "arena" or "FILE.png:WIDTHxHEIGHT")},
+      {:path, ~s(the name of a map, "FILE.yaml" or "FILE.png:WIDTHxHEIGHT")},
       default: "hall"
     ],
     start: [{:one_of, [:spread, :same]}, default: :spread],
     landmark: [{:or, :default, {:or, :none, @place}}, default: :default],
     moves: [{:check, &__MODULE__.moves?/1, "[{{x, y}, at_s}]"}, default: []],
     kills: [{:check, &__MODULE__.kills?/1, "[{robot, at_s}]"}, default: []],
+    script: [Event.script_type(), default: []],
     loss: [{:number, 0, 1}, default: 0.0],
     duplicates: [{:number, 0, 1}, default: 0.0],
     delay_ms: [{:span, 0, 3_600_000, "whole ms"}, default: {5, 50}],
     cuts: [{:check, &Type.list?/1, "[{from_s, to_s, [[:mag1], [:mag2]]}]"}, default: []],
     noise: [{:one_of, [:off, :default, :slip]}, default: :default],
     duration_s: [{:check, &__MODULE__.duration?/1, "seconds, 0 to 1000000,"}, default: 120],
+    plan: [{:one_of, [:none, :known, :sonar]}, default: :none],
     blobs: [{:one_of, [:painted, :direct]}, default: :painted],
     hardware: [
       {:check, &__MODULE__.ids?/1, "a list of robots of this run, [:mag1],"},
@@ -56,12 +58,17 @@ defmodule Sim.Trial.Options do
   def check(asked) when is_map(asked), do: asked |> Map.to_list() |> check()
 
   def check(asked) do
-    with {:ok, options} <- Options.check(asked, @table ++ mission(), "trial"),
+    with {:ok, options} <- Options.check(asked, table(), "trial"),
          options = Map.merge(Map.new(@mission), Map.new(options)),
          :ok <- cuts(options),
+         :ok <- script(options),
          :ok <- hardware(options),
          do: {:ok, options}
   end
+
+  @doc "The table of all options: what is allowed."
+  @spec table() :: Options.table()
+  def table, do: @table ++ mission()
 
   defp mission, do: Keyword.take(Landmark.Options.table(), Keyword.keys(@mission))
 
@@ -75,6 +82,13 @@ defmodule Sim.Trial.Options do
           "[{from_s, to_s, [[:mag1], [:mag2]]}] or " <>
             "[{from_s, :end, {:link, :mag1, :mag2}}], with robots of this run,"
         )
+  end
+
+  defp script(%{script: script, robots: robots}) do
+    case Event.problems(script, robots) do
+      [] -> :ok
+      problems -> {:error, Options.line(problems, "trial")}
+    end
   end
 
   defp hardware(%{hardware: ids, robots: robots}) do

@@ -8,7 +8,7 @@ defmodule Sim.Trial.Setup do
   alias Sim.World
 
   @enforce_keys [:options, :map, :world, :robots, :mission]
-  defstruct @enforce_keys
+  defstruct @enforce_keys ++ [plan: nil]
 
   @typedoc """
   `start` is the pose where a robot's wheels begin to count; `hardware?` says whether it uses the
@@ -20,13 +20,14 @@ defmodule Sim.Trial.Setup do
           map: Sim.Floorplan.t(),
           world: World.t(),
           robots: [robot()],
-          mission: {module(), keyword()}
+          mission: {module(), keyword()},
+          plan: Robot.Navigation.Grid.t() | Robot.Navigation.OccupancyGrid.t() | nil
         }
 
   @doc """
   A setup. Options (a keyword list or a map; all have defaults): `robots` (ids that begin with `mag` or `min`), `seed`,
   `map`, `start` (`:spread` or `:same`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
-  (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `loss` (0 to 1), `noise` (`:off`,
+  (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `script` (`[{at_s, event}]`, `Sim.Trial.Event`, in lockstep only), `loss` (0 to 1), `noise` (`:off`,
   `:default`, `:slip`), `formation` (`kind` or `{kind, spacing}`), `assign` (`:chain` or `:cost`),
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
   (`:stop`, `:hold` or `:continue`), `duration_s`, `blobs` (`:painted` or `:direct`), `hardware` (robots with the real drivers, in real time only); of the radio in
@@ -40,13 +41,27 @@ defmodule Sim.Trial.Setup do
   defp set_up(options) do
     bodies = for id <- options.robots, do: {id, profile(id).radius}
     landmark = landmark(options.landmark)
-    places = [landmark | Enum.map(options.moves, &elem(&1, 0))]
+    places = for {_x, _y} = place <- [landmark | Enum.map(options.moves, &elem(&1, 0))], do: place
 
     with {:ok, map} <- Sim.Floorplan.open(options.map, length(options.robots)),
          :ok <- check_landmarks(map, places),
-         {:ok, starts} <- Sim.Floorplan.starts(map, bodies, options.seed, landmark) do
+         :ok <- check_script(map, options),
+         {:ok, landmark, starts} <- Sim.Floorplan.places(map, bodies, options.seed, landmark) do
       {:ok, build(options, map, Enum.zip(options.robots, starts), landmark)}
     end
+  end
+
+  @doc "The options of `Swarm.Member.new/1`, one list a robot, in the order of the fleet."
+  @spec members(t()) :: [keyword()]
+  def members(%__MODULE__{robots: robots, mission: mission, plan: plan}) do
+    for robot <- robots,
+        do: [
+          id: robot.id,
+          profile: robot.profile,
+          start: robot.start,
+          mission: mission,
+          plan: plan
+        ]
   end
 
   @doc "Checks that the landmark can stand at all these places (`nil`: no landmark)."
@@ -58,6 +73,23 @@ defmodule Sim.Trial.Setup do
         _fine -> nil
       end
     end)
+  end
+
+  # Places that a script names, which depend on the map.
+  defp check_script(map, options) do
+    Enum.find_value(options.script, :ok, fn
+      {_at_s, {:move, place}} -> with :ok <- check_landmarks(map, [place]), do: nil
+      {_at_s, {:displace, who, {x, y, _deg}}} -> check_place(map, who, {x, y}, options.robots)
+      _anywhere -> nil
+    end)
+  end
+
+  defp check_place(map, who, {x, y} = place, robots) do
+    ids = if who == :leader, do: robots, else: [who]
+    radius = ids |> Enum.map(&profile(&1).radius) |> Enum.max()
+
+    unless Sim.Floorplan.free?(map, place, radius),
+      do: {:error, "#{who} cannot be put at #{x},#{y} of map #{map.name}: there is a wall"}
   end
 
   @doc """
@@ -105,7 +137,21 @@ defmodule Sim.Trial.Setup do
         %{id: id, profile: profile(id), start: common || pose, hardware?: hardware?}
       end
 
-    %__MODULE__{options: options, map: map, world: world, robots: robots, mission: mission}
+    plan =
+      case options.plan do
+        :known -> Sim.Floorplan.grid(map)
+        :sonar -> Robot.Navigation.OccupancyGrid.new()
+        :none -> nil
+      end
+
+    %__MODULE__{
+      options: options,
+      map: map,
+      world: world,
+      robots: robots,
+      mission: mission,
+      plan: plan
+    }
   end
 
   # R66: all robots are switched on at the first one's place, and then driven by hand to their
@@ -121,7 +167,7 @@ defmodule Sim.Trial.Setup do
     Pose.new(x * scale, y * scale, heading * (1 + share * sign.(:turn)))
   end
 
-  defp landmark(:default), do: {0.0, 0.0}
+  defp landmark(:default), do: :default
   defp landmark(:none), do: nil
   defp landmark({x, y}), do: {x * 1.0, y * 1.0}
 end

@@ -1,6 +1,6 @@
 defmodule Sim.Trial.Termination do
   @moduledoc "Decides when a run is over, in lockstep or live. Pure."
-  alias Sim.Trial.{Cuts, RunLog, Scenario}
+  alias Sim.Trial.{Cuts, RunLog, Script}
 
   @calm_ms 5_000
 
@@ -11,7 +11,7 @@ defmodule Sim.Trial.Termination do
   @spec reached?(%{
           :at_ms => non_neg_integer(),
           :options => map(),
-          :script => Scenario.t(),
+          :script => Script.t(),
           :run_log => RunLog.t(),
           :world => Sim.World.t(),
           optional(atom()) => term()
@@ -20,8 +20,8 @@ defmodule Sim.Trial.Termination do
     calm_ms = RunLog.calm_since_ms(run.run_log)
 
     run.at_ms >= run.options.duration_s * 1000 or
-      (Scenario.over?(run.script, run.world) and calm_ms != nil and
-         run.at_ms - Enum.max([calm_ms, Scenario.last_ms(run.script), healed_ms(run)]) >= @calm_ms)
+      (Script.over?(run.script, run.world) and calm_ms != nil and
+         run.at_ms - Enum.max([calm_ms, Script.last_ms(run.script), healed_ms(run)]) >= @calm_ms)
   end
 
   defp healed_ms(%{options: %{cuts: cuts}}),

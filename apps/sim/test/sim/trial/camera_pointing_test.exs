@@ -1,6 +1,6 @@
 defmodule Sim.Trial.CameraPointingTest do
   @moduledoc "When the landmark moves a little, only the cameras of a formation turn."
-  use ExUnit.Case, async: true
+  use Sim.LockstepCase, async: true
   alias Hal.Pose
   alias Sim.Trial
   @moduletag :slow

@@ -1,5 +1,5 @@
 defmodule Sim.Trial.ClaimsTest do
-  use ExUnit.Case, async: true
+  use Sim.LockstepCase, async: true
   import Sim.TrialRuns
   alias Sim.Trial
   alias Sim.Trial.Claims

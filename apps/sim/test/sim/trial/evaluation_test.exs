@@ -1,6 +1,6 @@
 defmodule Sim.Trial.EvaluationTest do
   @moduledoc "What a scene and a report say about a robot's own estimates."
-  use ExUnit.Case, async: true
+  use Sim.LockstepCase, async: true
   alias Sim.Trial
   alias Sim.Trial.Evaluation
 

@@ -1,6 +1,6 @@
 defmodule Sim.Trial.PartitionTest do
   @moduledoc "Whole missions in lockstep while the radio is cut and mended."
-  use ExUnit.Case, async: true
+  use Sim.LockstepCase, async: true
   import Sim.TrialRuns
   alias Sim.Trial
   alias Sim.Trial.{AgreementMetrics, Cuts}

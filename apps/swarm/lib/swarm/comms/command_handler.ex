@@ -18,13 +18,15 @@ defmodule Swarm.Comms.CommandHandler do
 
   While the emergency stop holds a robot, it refuses to be armed and all commands that would move
   it. The latter are also refused, with the reason, while its drive is offline or not armed
-  (`Robot.Safety.Readiness`); otherwise the motion would begin later, when somebody arms it.
+  (`Robot.Safety.Readiness`); otherwise the motion would begin later, when somebody arms it. A `goto` to a place that the
+  robot cannot reach by what it knows of walls is refused, too (`Robot.Navigation.Reach`).
   """
-  alias Hal.Device
+  alias Hal.{Device, Pose}
   alias Robot.{Board, Config, Names}
   alias Robot.Control.{Delivery, Pilot}
   alias Robot.Safety.{LivenessMonitor, Readiness}
   alias Robot.Mission.Manual
+  alias Robot.Navigation.{Grid, Reach}
   alias Mesh.Nonblocking
   alias Swarm.{Missions, Status}
   alias Swarm.Commands.{Freshness, Order}
@@ -68,7 +70,7 @@ defmodule Swarm.Comms.CommandHandler do
     with {:ok, request} <- checked(request, config),
          :ok <- well(config, board),
          :ok <- ready(request, config, board),
-         :ok <- possible(request, config, receiver),
+         :ok <- possible(request, config, board, receiver),
          {:ok, ways} <- ways(request, config),
          do: {:mission, ways, command(request)}
   end
@@ -157,11 +159,28 @@ defmodule Swarm.Comms.CommandHandler do
     with {:error, line} <- Readiness.of(config, board), do: {:error, "#{config.id}: #{line}"}
   end
 
-  defp possible({:follow_the_leader, leader}, %{id: id} = config, receiver),
+  defp possible(
+         {:goto, x, y, _heading},
+         %{plan: %Grid{} = plan, profile: profile, id: id},
+         board,
+         _receiver
+       ) do
+    with {:error, why} <- Reach.check(plan, place(board), {x, y}, profile.radius),
+         do: {:error, "#{id} cannot go to #{x},#{y}: #{Reach.words(why)}"}
+  end
+
+  defp possible({:follow_the_leader, leader}, %{id: id} = config, _board, receiver),
     do: Order.follow(id, leader, Receiver.leaders(receiver, Config.now(config)))
 
-  defp possible({:find_blob, colour}, config, _receiver), do: known(colour, config)
-  defp possible(_request, _config, _receiver), do: :ok
+  defp possible({:find_blob, colour}, config, _board, _receiver), do: known(colour, config)
+  defp possible(_request, _config, _board, _receiver), do: :ok
+
+  defp place(board) do
+    case Board.fetch(board, :pose, :infinity) do
+      {:ok, %Pose{} = pose, _at_ms} -> Pose.point(pose)
+      _unknown -> nil
+    end
+  end
 
   defp known(_colour, %{camera: nil, id: id}), do: {:error, "#{id} has no camera to look with"}
   defp known(nil, _config), do: :ok

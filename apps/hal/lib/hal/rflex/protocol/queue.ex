@@ -58,4 +58,16 @@ defmodule Hal.RFlex.Protocol.Queue do
 
   def take(%__MODULE__{waiting: [{_key, bytes} | waiting]} = queue, at_ms),
     do: {:send, bytes, %{queue | waiting: waiting, free_ms: at_ms + queue.pace_ms}}
+
+  @doc """
+  The command that was taken has been written at this time: the pace counts from then, because a busy machine may have
+  taken the processor away in between.
+
+      iex> alias Hal.RFlex.Protocol.Queue
+      iex> {:send, "1", queue} = Queue.new(12) |> Queue.put(:a, "1") |> Queue.take(0)
+      iex> queue |> Queue.put(:b, "2") |> Queue.written(7) |> Queue.take(12)
+      {:wait, 7}
+  """
+  @spec written(t(), integer()) :: t()
+  def written(%__MODULE__{} = queue, at_ms), do: %{queue | free_ms: at_ms + queue.pace_ms}
 end

@@ -37,11 +37,13 @@ defmodule Missions.Landmark.Leader.Slots do
   # If the shape has changed, `:cost` assigns its slots again.
   defp shape(%{lead: lead} = mission) do
     shape = Shape.update(lead.shape, mission, landmark_distance(mission))
-    new? = {shape.formation, shape.room} != {lead.shape.formation, lead.shape.room}
+    new? = told(shape) != told(lead.shape)
     mission = %{mission | lead: %{lead | shape: shape}}
     dealt? = lead.shape.room == nil and mission.now_ms == mission.since_ms and all_free?(mission)
     if new? and not dealt? and mission.assign == :cost, do: deal(mission), else: mission
   end
+
+  defp told(shape), do: {shape.formation, shape.room, shape.spots}
 
   # Then the round's record has assigned them; it does not know where there is no room.
   defp all_free?(%{order: order, lead: %{shape: %{room: {size, places}}}}) do
@@ -54,22 +56,21 @@ defmodule Missions.Landmark.Leader.Slots do
 
   defp landmark_distance(_mission), do: @near
 
+  defp used(_mission, %{spots: [_ | _] = spots}) do
+    for spot <- spots, {x, y, _heading} = Landmark.State.millimetres(spot), do: {x, y}
+  end
+
+  defp used(mission, %{formation: formation, room: {size, places}}) do
+    slots = Rounds.slots(formation, mission.percept.pose, size, landmark_distance(mission))
+    for place <- places, do: Enum.at(slots, place - 1)
+  end
+
   # Assigns the slots by squared distance from where the robots say they are.
   defp deal(mission) do
     beats = Peers.taking_part(mission.percept.peers, mission.now_ms)
     followers = for id <- mission.order, {x, y, _heading} = beats[id].pose, do: {id, {x, y}}
     {x, y, _heading} = Landmark.State.millimetres(mission.percept.pose)
-    {size, places} = mission.lead.shape.room
-
-    slots =
-      Rounds.slots(
-        mission.lead.shape.formation,
-        mission.percept.pose,
-        size,
-        landmark_distance(mission)
-      )
-
-    used = for place <- places, do: Enum.at(slots, place - 1)
+    used = used(mission, mission.lead.shape)
     %{mission | order: Assignment.order(:cost, followers, {x, y}, used)}
   end
 end

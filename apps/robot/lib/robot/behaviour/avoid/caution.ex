@@ -1,38 +1,83 @@
 defmodule Robot.Behaviour.Avoid.Caution do
   @moduledoc """
-  Slows a robot down that was started again on its way and has not found its place since: it cannot avoid the others by
-  what they tell of theirs, only by its own sonars. Pure.
+  Slows down a robot that cannot avoid the others by what they tell of their places, only by its own sonars. Pure.
+
+  That is a robot that was started again on its way and has not found its place since; and one whose sonars see something
+  that it cannot explain, but that may be another robot: because it is not sure of its own place among the others, or no
+  longer hears one of them, which may have driven on since.
   """
-  alias Hal.Twist
+  alias Hal.{Pose, Twist}
   alias Robot.{Percept, Wish}
+  alias Robot.Behaviour.Avoid.Neighbours
 
   # Up to this speed (m/s) the gate's limits alone kept robots apart that all drove so across each other's ways without
   # looking (`Sim.GateAloneTest`; docs/results.md, section 6). A base may have few sonars behind.
   @speed 0.2
   @backwards 0.1
+  # A robot whose place is not known better than this (metres, 95 of 100 cases) may meet others beside where they tell
+  # that they are.
+  @unsure 0.5
+  # How far (metres) from where it tells a robot may be by its own mistake, and how fast (m/s) one that is silent may
+  # have driven since.
+  @astray 0.5
+  @driven 0.5
 
-  @doc "The percept, with the greatest speed that such a robot may have among others."
-  @spec percept(Percept.t()) :: Percept.t()
-  def percept(%Percept{profile: profile} = percept) do
-    if lost?(percept),
-      do: %{percept | profile: %{profile | max_linear: min(profile.max_linear, @speed)}},
-      else: percept
+  @doc """
+  Whether it must slow down; `discs` are further bodies `{x, y, radius}` that explain echoes, in the map frame.
+
+      iex> percept = %Robot.Percept{robot: :mag1, profile: Hal.Profile.magellan(), at_ms: 0, pose: Hal.Pose.new(0, 0)}
+      iex> ahead = List.replace_at(List.duplicate(5.1, 16), 11, 1.0)
+      iex> silent = %{mode: :dead, pose: Hal.Pose.new(4, 0), twist: Hal.Twist.zero(), radius: 0.2, at_ms: -5000}
+      iex> alone = %{percept | sonar: ahead}
+      iex> one_silent = %{alone | peers: %{mag2: silent}}
+      iex> stands_there = put_in(one_silent.peers.mag2.pose, Hal.Pose.new(1.4, 0))
+      iex> Enum.map([alone, one_silent, stands_there], &Robot.Behaviour.Avoid.Caution.needed?(&1, []))
+      [false, true, false]
+  """
+  @spec needed?(Percept.t(), [{float(), float(), float()}]) :: boolean()
+  def needed?(%Percept{uncertainty: %{lost?: true}, peers: peers}, _discs) when peers != %{},
+    do: true
+
+  def needed?(%Percept{pose: nil}, _discs), do: false
+
+  def needed?(%Percept{peers: peers} = percept, discs) do
+    own = astray(percept)
+
+    doubtful =
+      for {_id, peer} <- peers, peer.mode == :dead or own > @unsure, do: spot(peer, own, percept)
+
+    doubtful != [] and
+      percept
+      |> Neighbours.unknown(bodies(percept) ++ discs)
+      |> Enum.any?(fn %{at: at} -> Enum.any?(doubtful, &within?(&1, at)) end)
   end
 
-  defp lost?(%Percept{uncertainty: %{lost?: true}, peers: peers}), do: peers != %{}
-  defp lost?(_percept), do: false
+  defp astray(%Percept{uncertainty: %{radius: radius}}), do: radius
+  defp astray(_percept), do: 0.0
+
+  # Where it may be: a disc.
+  defp spot(%{pose: pose, radius: radius, mode: mode, at_ms: at_ms}, own, percept) do
+    driven = if mode == :dead, do: @driven * max(percept.at_ms - at_ms, 0) / 1000, else: 0.0
+    {Pose.point(pose), radius + own + @astray + driven}
+  end
+
+  defp within?({place, reach}, at), do: Pose.distance(place, at) <= reach
+
+  defp bodies(percept),
+    do: for(%{at: {x, y}, radius: radius} <- Neighbours.robots(percept), do: {x, y, radius})
+
+  @doc "The percept, with the greatest speed that such a robot may have."
+  @spec percept(Percept.t()) :: Percept.t()
+  def percept(%Percept{profile: profile} = percept),
+    do: %{percept | profile: %{profile | max_linear: min(profile.max_linear, @speed)}}
 
   @doc "The wish, at no more than that speed, and slower backwards; what another robot may do, its gate limits."
-  @spec wish(Wish.t() | nil, Percept.t()) :: Wish.t() | nil
-  def wish(nil, _percept), do: nil
+  @spec wish(Wish.t() | nil) :: Wish.t() | nil
+  def wish(nil), do: nil
 
-  def wish(%Wish{twist: twist, velocity: velocity} = wish, percept) do
-    if lost?(percept) do
-      linear = twist.linear |> min(@speed) |> max(-@backwards)
-      %{wish | twist: Twist.new(linear, twist.turn), velocity: shorten(velocity, @speed)}
-    else
-      wish
-    end
+  def wish(%Wish{twist: twist, velocity: velocity} = wish) do
+    linear = twist.linear |> min(@speed) |> max(-@backwards)
+    %{wish | twist: Twist.new(linear, twist.turn), velocity: shorten(velocity, @speed)}
   end
 
   defp shorten(nil, _most), do: nil

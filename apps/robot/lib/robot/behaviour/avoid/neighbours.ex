@@ -4,6 +4,7 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   obstacles that the sonars see and that are not known robots or discs. Pure.
   """
   alias Hal.{Pose, Twist}
+  alias Robot.Navigation.Grid
   alias Robot.Percept
   alias Robot.Safety.Reflex
 
@@ -125,6 +126,17 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
       }
     end
   end
+
+  @doc """
+  Those that are farther than this (metres) from all walls of the floor plan; all without one. A sonar's echo may come from
+  anywhere in its cone, so that in a door the posts seem to stand in the way; a way keeps clear of walls that are known,
+  and the gate of what the sonars see.
+  """
+  @spec but_walls([t()], Percept.t(), float()) :: [t()]
+  def but_walls(things, %Percept{grid: %{closed?: true} = grid}, far),
+    do: Enum.filter(things, &(Grid.clearance(grid, &1.at) >= far))
+
+  def but_walls(things, _without_plan, _far), do: things
 
   defp explains?({cx, cy, radius}, x, y) do
     limit = radius + @explained

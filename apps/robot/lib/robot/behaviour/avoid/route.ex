@@ -6,13 +6,23 @@ defmodule Robot.Behaviour.Avoid.Route do
   """
   alias Hal.Pose
   alias Robot.Percept
-  alias Robot.Navigation.PathPlanner
+  alias Robot.Navigation.{Grid, PathPlanner}
   alias Robot.Behaviour.Avoid.Neighbours
 
   @enforce_keys [:corners, :goal, :at_ms]
-  defstruct @enforce_keys
+  defstruct @enforce_keys ++ [way?: true, rough?: false]
 
-  @type t :: %__MODULE__{corners: [Pose.point(), ...], goal: Pose.point(), at_ms: integer()}
+  @typedoc """
+  `way?` is `false` if walls leave no way, whatever else stands about; this route ignores them then. `rough?`: a wall is on it as it was found, because the
+  robot or its goal is too near to one.
+  """
+  @type t :: %__MODULE__{
+          corners: [Pose.point(), ...],
+          goal: Pose.point(),
+          at_ms: integer(),
+          way?: boolean(),
+          rough?: boolean()
+        }
 
   # Clearance between the bodies (metres): the preferred one, the fallback, and the least one.
   @roomy 0.2
@@ -23,8 +33,14 @@ defmodule Robot.Behaviour.Avoid.Route do
   # A new route must be this much shorter (metres) than the old one; one is searched this often.
   @better 0.5
   @again_ms 800
+  # Where there was none it is searched less often, because that takes longest.
+  @walled_ms 2_000
   # A goal that moved farther than this (metres) needs a new route.
   @same_goal 0.4
+  # Walls are known better than bodies: a line may pass them at this distance (metres), and a way keeps that one, if
+  # there is one so wide.
+  @by_wall 0.03
+  @from_wall 0.08
 
   @doc """
   The place at which to stand if a body that will not move occupies the goal (a dead or holding
@@ -60,25 +76,74 @@ defmodule Robot.Behaviour.Avoid.Route do
     bodies = fn fixed? -> for r <- robots, r.standing?, r.fixed? or not fixed?, do: body(r) end
     grown = fn list, margin -> Enum.map(list, &grow(&1, own, margin, from, goal)) end
     all = bodies.(false) ++ discs
-    kept = keep(old, goal, from, grown.(all, @tightest))
+    kept = keep(old, goal, from, grown.(all, @tightest), percept)
 
-    if kept != nil and percept.at_ms - kept.at_ms < @again_ms do
+    if kept != nil and percept.at_ms - kept.at_ms < again_ms(kept) do
       kept
     else
-      corners =
+      fixed = bodies.(true) ++ discs
+
+      past_bodies =
         roomy(from, goal, grown.(all, @roomy), fn ->
           PathPlanner.way(from, goal, grown.(all, @tight))
         end) ||
           PathPlanner.way(from, goal, grown.(all, @tightest)) ||
-          PathPlanner.way(from, goal, grown.(bodies.(true) ++ discs, @tight)) || [goal]
+          PathPlanner.way(from, goal, grown.(fixed, @tight)) || [goal]
 
-      better(kept, %__MODULE__{corners: corners, goal: goal, at_ms: percept.at_ms}, from)
+      bodies = [grown.(all, @tight), grown.(fixed, @tightest), []]
+      corners = past_walls(past_bodies, from, goal, percept, bodies)
+
+      new = %__MODULE__{
+        corners: corners || past_bodies,
+        goal: goal,
+        at_ms: percept.at_ms,
+        way?: corners != nil,
+        rough?: corners == nil or not no_wall?(corners, from, percept)
+      }
+
+      better(kept, new, from)
     end
   end
+
+  defp again_ms(%{way?: way?}), do: if(way?, do: @again_ms, else: @walled_ms)
+
+  # The way past the bodies, if no wall stands in it; else one past walls and bodies, or past the walls and those bodies
+  # that do not move, or past the walls alone; `nil` if there is none.
+  defp past_walls(corners, from, goal, %{grid: grid} = percept, bodies) do
+    own = percept.profile.radius
+
+    if no_wall?(corners, from, percept) do
+      corners
+    else
+      way = fn discs, margin -> Grid.Way.find(grid, from, goal, own + margin, discs) end
+
+      # Most places that cannot be reached are behind walls: one search tells.
+      with [_ | _] = loosest <- way.([], @by_wall) do
+        Enum.find_value(
+          for(discs <- Enum.uniq(bodies), margin <- [@from_wall, @by_wall], do: {discs, margin}),
+          fn
+            {[], @by_wall} -> loosest
+            {discs, margin} -> way.(discs, margin)
+          end
+        )
+      end
+    end
+  end
+
+  defp no_wall?(_corners, _from, %{grid: nil}), do: true
+
+  defp no_wall?([place | rest], from, %{grid: grid, profile: profile} = percept) do
+    Grid.passes?(grid, from, place, profile.radius + @by_wall) and
+      no_wall?(rest, place, percept)
+  end
+
+  defp no_wall?([], _from, _percept), do: true
 
   defp body(%{at: {x, y}, radius: radius}), do: {x, y, radius}
 
   defp better(nil, new, _from), do: new
+  defp better(%{rough?: true}, new, _from), do: new
+  defp better(kept, %{way?: false} = new, _from), do: %{kept | at_ms: new.at_ms}
 
   defp better(kept, new, from) do
     if left(kept, from) > left(new, from) + @better, do: new, else: %{kept | at_ms: new.at_ms}
@@ -89,21 +154,25 @@ defmodule Robot.Behaviour.Avoid.Route do
   def left(%__MODULE__{corners: corners}, from), do: length_of(corners, from)
 
   # The old route from here, if it is still free: a corner is passed when the next one is in view.
-  defp keep(nil, _goal, _from, _discs), do: nil
+  defp keep(nil, _goal, _from, _discs, _percept), do: nil
 
-  defp keep(old, goal, from, discs) do
+  defp keep(old, goal, from, discs, percept) do
     if Pose.distance(old.goal, goal) < @same_goal do
       corners = List.replace_at(old.corners, -1, goal)
-      corners = prune(corners, from, discs)
-      if free?(corners, from, discs), do: %{old | corners: corners}
+      corners = prune(corners, from, discs, percept)
+
+      if free?(corners, from, discs) and (old.rough? or no_wall?(corners, from, percept)),
+        do: %{old | corners: corners}
     end
   end
 
-  defp prune([_ | [next | _] = rest] = corners, from, discs) do
-    if PathPlanner.blocker(from, next, discs) == nil, do: prune(rest, from, discs), else: corners
+  defp prune([_ | [next | _] = rest] = corners, from, discs, percept) do
+    if PathPlanner.blocker(from, next, discs) == nil and no_wall?([next], from, percept),
+      do: prune(rest, from, discs, percept),
+      else: corners
   end
 
-  defp prune(corners, _from, _discs), do: corners
+  defp prune(corners, _from, _discs, _percept), do: corners
 
   defp free?([], _from, _discs), do: true
 

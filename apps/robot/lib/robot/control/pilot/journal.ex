@@ -28,6 +28,17 @@ defmodule Robot.Control.Pilot.Journal do
     :ok
   end
 
+  @doc "Records the start of a pilot in the trace."
+  @spec begun(data()) :: :ok
+  def begun(%{config: config, runner: runner} = data),
+    do: Trace.begin(config, :pilot, {runner, %{state: nil}}, data.since_ms)
+
+  @doc "Offers the pilot's state to the trace."
+  @spec checkpoint(state(), data()) :: :ok
+  def checkpoint(state, %{config: config, runner: runner}) do
+    Trace.checkpoint(config, :pilot, fn -> {runner, %{state: state}} end, Config.now(config))
+  end
+
   @doc """
   Calls a callback of a mission, with an entry on the board while it runs; `nil` for no mission,
   with no entry. Each call has another entry.

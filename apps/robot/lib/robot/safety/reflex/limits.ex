@@ -46,9 +46,13 @@ defmodule Robot.Safety.Reflex.Limits do
   end
 
   defp near(linear, reflex, at_ms, limits) do
-    if blind?(reflex, at_ms),
-      do: lower(linear, @blind_speed, :blind, limits),
-      else: lower(linear, Body.free_speed(reflex.profile, reflex.sonar, linear), :near, limits)
+    if blind?(reflex, at_ms) do
+      lower(linear, @blind_speed, :blind, limits)
+    else
+      %{profile: profile, sonar: points} = reflex
+      {linear, limits} = lower(linear, Body.free_speed(profile, points, linear), :near, limits)
+      lower(linear, Body.passing_speed(profile, points, linear), :beside, limits)
+    end
   end
 
   defp blind?(%{profile: %{sonars: []}}, _at_ms), do: false

@@ -1,10 +1,9 @@
-defmodule Sim.Floorplan.Png do
+defmodule Robot.Navigation.MapFile.Png do
   @moduledoc """
-  Reads PNG pictures as walls: grey of 1, 2, 4 or 8 bits, grey with alpha, RGB, RGBA of 8 bits a channel, and
-  palettes; not interlaced. What is transparent is white. Pure.
+  Reads PNG pictures: grey of 1, 2, 4 or 8 bits, grey with alpha, RGB, RGBA of 8 bits a channel, and
+  palettes; not interlaced. Colours become greys, what is transparent white. Pure.
   """
-  @typedoc "Rows from the top, one byte per pixel, 1 is wall."
-  @type picture :: {width :: pos_integer(), height :: pos_integer(), rows :: [binary()]}
+  alias Robot.Navigation.MapFile.Picture
 
   @damaged {:error, "the picture is damaged"}
 
@@ -12,7 +11,7 @@ defmodule Sim.Floorplan.Png do
   Reads the picture in the chunks after the signature; it may have at most `most` pixels. Beside
   the answer it holds no more than a few rows at a time.
   """
-  @spec decode(binary(), pos_integer()) :: {:ok, picture()} | {:error, String.t()}
+  @spec decode(binary(), pos_integer()) :: {:ok, Picture.t()} | {:error, String.t()}
   def decode(chunks, most) do
     with {:ok, [{"IHDR", header} | chunks]} <- chunks(chunks, []),
          {:ok, {width, height, _, _} = header} <- header(header, most),
@@ -103,7 +102,7 @@ defmodule Sim.Floorplan.Png do
     for {<<rgb::binary-size(3)>>, k} <-
           Enum.with_index(for <<c::binary-size(3) <- colours>>, do: c),
         into: %{},
-        do: {k, dark(rgb, Enum.at(alphas, k, 255))}
+        do: {k, grey(rgb, Enum.at(alphas, k, 255))}
   end
 
   # Takes the whole rows; returns the bytes of the one that has only begun.
@@ -111,8 +110,8 @@ defmodule Sim.Floorplan.Png do
        when left > 0 and byte_size(bytes) > stride do
     <<filter, row::binary-size(stride), rest::binary>> = bytes
     row = unfilter(filter, :binary.bin_to_list(row), scan.above, scan.pixel)
-    walls = walls(row, scan.header, scan.palette)
-    rows(rest, %{scan | above: row, left: left - 1, rows: [walls | scan.rows]})
+    greys = greys(row, scan.header, scan.palette)
+    rows(rest, %{scan | above: row, left: left - 1, rows: [greys | scan.rows]})
   end
 
   defp rows(bytes, scan), do: {bytes, scan}
@@ -162,35 +161,25 @@ defmodule Sim.Floorplan.Png do
     defp samples(bytes, unquote(depth)), do: for(<<s::size(unquote(depth)) <- bytes>>, do: s)
   end
 
-  defp walls(row, {width, _, depth, type}, palette) do
+  defp greys(row, {width, _, depth, type}, palette) do
     bytes = :binary.list_to_bin(row)
 
     case type do
-      0 ->
-        for grey <- samples(bytes, depth),
-            into: <<>>,
-            do: wall(2 * grey < Bitwise.bsl(1, depth))
-
-      2 ->
-        for <<rgb::binary-size(3) <- bytes>>, into: <<>>, do: wall(dark(rgb, 255))
-
-      3 ->
-        for k <- samples(bytes, depth), into: <<>>, do: wall(Map.get(palette, k, true))
-
-      4 ->
-        for <<grey, alpha <- bytes>>, into: <<>>, do: wall(dark(<<grey, grey, grey>>, alpha))
-
-      6 ->
-        for <<rgb::binary-size(3), alpha <- bytes>>, into: <<>>, do: wall(dark(rgb, alpha))
+      0 when depth == 8 -> bytes
+      0 -> for s <- samples(bytes, depth), into: <<>>, do: <<div(255 * s, white(depth))>>
+      2 -> for <<rgb::binary-size(3) <- bytes>>, into: <<>>, do: <<grey(rgb, 255)>>
+      # A colour that the palette does not have is black.
+      3 -> for k <- samples(bytes, depth), into: <<>>, do: <<Map.get(palette, k, 0)>>
+      4 -> for <<g, alpha <- bytes>>, into: <<>>, do: <<grey(<<g, g, g>>, alpha)>>
+      6 -> for <<rgb::binary-size(3), alpha <- bytes>>, into: <<>>, do: <<grey(rgb, alpha)>>
     end
     # The last byte of a row may hold more pixels than the row has.
     |> binary_part(0, width)
   end
 
-  defp wall(true), do: <<1>>
-  defp wall(false), do: <<0>>
+  defp white(depth), do: Bitwise.bsl(1, depth) - 1
 
-  # Darker than half on a white background.
-  defp dark(<<r, g, b>>, alpha),
-    do: 255 * 1000 * 255 - alpha * (255_000 - (299 * r + 587 * g + 114 * b)) < 128_000 * 255
+  # On a white background.
+  defp grey(<<r, g, b>>, alpha),
+    do: div(255 * 255_000 - alpha * (255_000 - (299 * r + 587 * g + 114 * b)), 255_000)
 end

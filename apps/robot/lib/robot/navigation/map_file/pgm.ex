@@ -1,19 +1,18 @@
-defmodule Sim.Floorplan.Pgm do
-  @moduledoc "Reads PGM pictures as walls, plain (P2) and raw (P5), of up to 255 greys. Pure."
-  @typedoc "Rows from the top, one byte per pixel, 1 is wall."
-  @type picture :: {width :: pos_integer(), height :: pos_integer(), rows :: [binary()]}
+defmodule Robot.Navigation.MapFile.Pgm do
+  @moduledoc "Reads PGM pictures, plain (P2) and raw (P5), of up to 255 greys. Pure."
+  alias Robot.Navigation.MapFile.Picture
 
   @damaged {:error, "the picture is damaged"}
 
   @doc """
   Reads the picture after the two letters of its kind; it may have at most so many pixels.
 
-      iex> Sim.Floorplan.Pgm.decode(?2, "\\n# a comment\\n3 2\\n255\\n0 255 255\\n255 255 100\\n", 99)
-      {:ok, {3, 2, [<<1, 0, 0>>, <<0, 0, 1>>]}}
-      iex> Sim.Floorplan.Pgm.decode(?5, "\\n3 2\\n255\\nabc", 99)
+      iex> Robot.Navigation.MapFile.Pgm.decode(?2, "\\n# a comment\\n3 2\\n255\\n0 255 255\\n255 255 100\\n", 99)
+      {:ok, {3, 2, [<<0, 255, 255>>, <<255, 255, 100>>]}}
+      iex> Robot.Navigation.MapFile.Pgm.decode(?5, "\\n3 2\\n255\\nabc", 99)
       {:error, "the picture is damaged"}
   """
-  @spec decode(?2 | ?5, binary(), pos_integer()) :: {:ok, picture()} | {:error, String.t()}
+  @spec decode(?2 | ?5, binary(), pos_integer()) :: {:ok, Picture.t()} | {:error, String.t()}
   def decode(kind, bytes, most_pixels) do
     with {:ok, width, bytes} <- number(bytes),
          {:ok, height, bytes} <- number(bytes),
@@ -37,8 +36,12 @@ defmodule Sim.Floorplan.Pgm do
   end
 
   defp pixels(?5, bytes, width, height, most) when byte_size(bytes) >= width * height do
+    pixels = binary_part(bytes, 0, width * height)
+
     pixels =
-      for <<grey <- binary_part(bytes, 0, width * height)>>, into: <<>>, do: wall(grey, most)
+      if most == 255,
+        do: pixels,
+        else: for(<<grey <- pixels>>, into: <<>>, do: <<shade(grey, most)>>)
 
     {:ok, {width, height, cut(pixels, width)}}
   end
@@ -56,7 +59,7 @@ defmodule Sim.Floorplan.Pgm do
 
   defp plain(bytes, left, most, done) do
     case number(bytes) do
-      {:ok, grey, bytes} -> plain(bytes, left - 1, most, [wall(grey, most) | done])
+      {:ok, grey, bytes} -> plain(bytes, left - 1, most, [shade(grey, most) | done])
       :error -> :error
     end
   end
@@ -66,8 +69,7 @@ defmodule Sim.Floorplan.Pgm do
         do: binary_part(pixels, row * width, width)
   end
 
-  defp wall(grey, most) when grey * 255 < 128 * most, do: <<1>>
-  defp wall(_grey, _most), do: <<0>>
+  defp shade(grey, most), do: min(div(grey * 255, most), 255)
 
   defp number(<<blank, rest::binary>>) when blank in ~c" \t\r\n", do: number(rest)
 

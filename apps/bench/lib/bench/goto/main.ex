@@ -1,0 +1,130 @@
+defmodule Bench.Goto.Main do
+  @moduledoc "The command `mix bench goto`: reads its options, measures, prints the table."
+  alias Bench.{Goto, Table}
+  alias Console.Cli
+  alias Console.Cli.{Format, MapName, Output, Parse, Progress}
+
+  @maps ~w(offices hospital clinic lab cave ring doorway openplan)
+
+  @doc "Runs the command; each error is one line."
+  @spec run([String.t()]) :: :ok | {:error, [String.t()]}
+  def run(arguments) do
+    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
+      given = Map.new(pairs)
+      if given["help"], do: help(), else: measure(given)
+    end
+  end
+
+  defp measure(given) do
+    output = Output.to(:stderr)
+    maps = given["maps"] || @maps
+    jobs = for map <- maps, seed <- given["seeds"] || 1..50, do: {map, seed}
+
+    results =
+      jobs
+      |> Task.async_stream(&{&1, draw(&1)}, max_concurrency: 2, timeout: :infinity)
+      |> Enum.with_index(1)
+      |> Enum.map(fn {{:ok, {{map, seed}, _} = result}, done} ->
+        note = "#{map}, seed #{seed}"
+        line = Progress.line(done, length(jobs), note, (output.columns || 80) - 1)
+        Output.progress(output, line)
+        result
+      end)
+
+    Output.finish(output)
+    measured = for {_job, {:ok, measured}} <- results, do: measured
+    IO.write(draw_table(maps, measured) <> failures(measured))
+
+    case for {{map, seed}, {:error, line}} <- results, do: "#{map}, seed #{seed}: #{line}" do
+      [] -> :ok
+      lines -> {:error, lines}
+    end
+  end
+
+  defp draw({map, seed}) do
+    Sim.Trial.Memory.prepare()
+    Goto.run(map, seed)
+  end
+
+  @heads [
+    "map",
+    "draws",
+    "arrived",
+    "time / time of the shortest way: median / 90 % / max",
+    "way: median / max (m)",
+    "truly off: median / 90 % / max (m)",
+    "given up",
+    "silent",
+    "collisions"
+  ]
+
+  defp draw_table(maps, measured) do
+    rows =
+      for map <- maps,
+          some = Enum.filter(measured, &(&1.map == map)),
+          some != [],
+          do: row(map, some)
+
+    all = if length(rows) > 1, do: [row("all", measured)], else: []
+
+    [@heads, Enum.map(@heads, fn _head -> "---" end) | rows ++ all]
+    |> Enum.map_join(&("| " <> Enum.join(&1, " | ") <> " |\n"))
+  end
+
+  defp row(map, some) do
+    there = Enum.filter(some, &Goto.arrived?/1)
+
+    [
+      map,
+      length(some),
+      "#{length(there)} (#{Format.decimals(100 * length(there) / length(some), 1)} %)",
+      figures(for(m <- there, do: m.took_s / m.way_s), [0.5, 0.9, 1.0]),
+      figures(Enum.map(some, & &1.way_m), [0.5, 1.0]),
+      figures(for(%{ended: :done} = m <- some, do: m.off_m), [0.5, 0.9, 1.0]),
+      Enum.count(some, &match?({:given_up, _why}, &1.ended)),
+      Enum.count(some, &(&1.ended == :silent)),
+      some |> Enum.map(& &1.collisions) |> Enum.sum()
+    ]
+  end
+
+  defp figures([], _shares), do: "–"
+
+  defp figures(values, shares),
+    do: Enum.map_join(shares, " / ", &Format.decimals(Table.quantile(values, &1), 2))
+
+  # Every draw that did not arrive, so that it can be repeated.
+  defp failures(measured) do
+    for m <- measured, not Goto.arrived?(m), into: "" do
+      {x, y} = m.goal
+      place = fn {x, y} -> "#{Format.decimals(x, 2)},#{Format.decimals(y, 2)}" end
+
+      "#{m.map}, seed #{m.seed}: from #{place.({m.from.x, m.from.y})} to #{place.({x, y})}, #{Format.decimals(m.way_m, 1)} m: " <>
+        "#{ended(m.ended)} after #{Format.decimals(m.took_s, 1)} s, truly #{Format.decimals(m.off_m, 2)} m off\n"
+    end
+  end
+
+  defp ended(:done), do: "says that it is there,"
+  defp ended(:silent), do: "says nothing"
+  defp ended({:given_up, why}), do: "given up, blocked by #{why},"
+
+  defp table do
+    [
+      {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds, one draw each (1-50)"},
+      {"maps", "NAME,NAME", &maps/1,
+       "which maps: names, FILE.yaml or FILE.png:WIDTHxHEIGHT\n(#{Enum.join(@maps, ",")})"},
+      {"help", nil, nil, "this text"}
+    ]
+  end
+
+  defp maps(text) do
+    maps = for name <- String.split(text, ","), do: MapName.parse(name, ".")
+
+    case Enum.find(maps, &(elem(&1, 0) == :error)) do
+      nil -> {:ok, for({:ok, map} <- maps, do: map)}
+      {:error, {allowed, _hint}} -> {:error, "some of " <> allowed <> ", with commas between,"}
+      {:error, allowed} -> {:error, allowed}
+    end
+  end
+
+  defp help, do: IO.puts("  mix bench goto [options]\n\n#{Cli.Arguments.help(table())}")
+end

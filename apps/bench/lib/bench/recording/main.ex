@@ -1,0 +1,107 @@
+defmodule Bench.Recording.Main do
+  @moduledoc "The command `mix bench recording`: reads its options, measures, prints the table."
+  alias Bench.{Load, Recording}
+  alias Console.Cli
+  alias Console.Cli.{Output, Parse, Progress}
+
+  @doc "Runs the command; each error is one line."
+  @spec run([String.t()]) :: :ok | {:error, [String.t()]}
+  def run(arguments) do
+    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
+      given = Map.new(pairs)
+      if given["help"], do: help(), else: measure(given)
+    end
+  end
+
+  defp measure(given) do
+    output = Output.to(:stderr)
+
+    folder =
+      Path.join(System.tmp_dir!(), "convoy-recording-#{System.unique_integer([:positive])}")
+
+    File.mkdir_p!(folder)
+    rounds = Map.get(given, "rounds", 7)
+
+    jobs =
+      for robots <- given["robots"] || [6, 12], seed <- given["seeds"] || 1..5, do: {robots, seed}
+
+    before = Load.now()
+
+    try do
+      results =
+        for {{robots, seed}, n} <- Enum.with_index(jobs) do
+          note = "#{robots} robots, seed #{seed}"
+          line = Progress.line(n, length(jobs), note, (output.columns || 80) - 1)
+          Output.progress(output, line)
+          Recording.measure(robots, seed, rounds, folder)
+        end
+
+      Output.finish(output)
+      measured = for {:ok, measured} <- results, do: measured
+      IO.write(draw(measured))
+
+      IO.puts(
+        "#{rounds} runs of each seed, by turns without and with recording; medians; of what recording " <>
+          "adds, the quartiles and the median of all pairs. Processor time is the VM's.\nLoad of the machine (1 min): #{before || "?"} before, #{Load.now() || "?"} after."
+      )
+
+      case for({:error, line} <- results, do: line) do
+        [] -> :ok
+        lines -> {:error, lines}
+      end
+    after
+      File.rm_rf!(folder)
+    end
+  end
+
+  @heads [
+    "robots",
+    "seeds",
+    "processor time (s)",
+    "recording adds (%)",
+    "wall time (s)",
+    "recording adds (%)",
+    "MB a robot-minute: mean / most"
+  ]
+
+  defp draw(measured) do
+    rows =
+      for {robots, some} <- measured |> Enum.group_by(& &1.robots) |> Enum.sort() do
+        figures = Recording.figures(some)
+
+        [
+          robots,
+          length(some),
+          figures.cpu_s,
+          added(figures.cpu_percent),
+          figures.wall_s,
+          added(figures.wall_percent),
+          "#{figures.mb} / #{figures.most_mb}"
+        ]
+      end
+
+    [@heads, Enum.map(@heads, fn _head -> "---" end) | rows]
+    |> Enum.map_join(&("| " <> Enum.join(&1, " | ") <> " |\n"))
+  end
+
+  defp added({low, middle, high}), do: "#{low} / #{middle} / #{high}"
+
+  defp table do
+    [
+      {"robots", "N,N", &numbers/1, "how many robots (6,12)"},
+      {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds (1-5)"},
+      {"rounds", "N", &Parse.whole(&1, 1..1_000), "how often each is measured (7)"},
+      {"help", nil, nil, "this text"}
+    ]
+  end
+
+  defp numbers(text) do
+    results = for number <- String.split(text, ","), do: Parse.whole(number, 1..100)
+
+    if Enum.all?(results, &match?({:ok, _number}, &1)),
+      do: {:ok, for({:ok, number} <- results, do: number)},
+      else: {:error, "whole numbers from 1 to 100, with commas between"}
+  end
+
+  defp help, do: IO.puts("  mix bench recording [options]\n\n#{Cli.Arguments.help(table())}")
+end

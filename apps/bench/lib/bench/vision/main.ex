@@ -1,0 +1,110 @@
+defmodule Bench.Vision.Main do
+  @moduledoc "The command `mix bench vision`: reads its options, measures, prints the table."
+  alias Bench.{Load, Vision}
+  alias Console.Cli
+  alias Console.Cli.{Output, Parse, Progress}
+
+  @doc "Runs the command; each error is one line."
+  @spec run([String.t()]) :: :ok | {:error, [String.t()]}
+  def run(arguments) do
+    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
+      given = Map.new(pairs)
+      if given["help"], do: help(), else: measure(given)
+    end
+  end
+
+  defp measure(given) do
+    output = Output.to(:stderr)
+    folder = Path.join(System.tmp_dir!(), "convoy-vision-#{System.unique_integer([:positive])}")
+    File.mkdir_p!(folder)
+    rounds = Map.get(given, "rounds", 40)
+    kinds = Map.get(given, "frames", Keyword.keys(Vision.kinds()))
+    plan = Map.merge(plan(given["beside"]), %{rounds: rounds, folder: folder})
+    photo = Map.get_lazy(given, "photo", &photo/0)
+    before = Load.now()
+
+    try do
+      measured =
+        for {kind, n} <- Enum.with_index(kinds) do
+          note = &progress(output, kind, n * rounds + &1, length(kinds) * rounds)
+          {kind, one(kind, photo, plan, note)}
+        end
+
+      Output.finish(output)
+      about = %{load_before: before, load_after: Load.now(), rounds: rounds}
+      IO.write(Vision.Report.draw(plan.ways, measured))
+      IO.puts("\n" <> words(about))
+      json = Output.json(given["json"], Vision.Report.term(plan.ways, measured, about))
+      failed = failed(measured, given["frames"] || given["photo"])
+      if failed == [], do: json, else: {:error, failed}
+    after
+      File.rm_rf!(folder)
+    end
+  end
+
+  defp one(kind, photo, plan, note) do
+    case Vision.work(kind, photo) do
+      {:ok, work} ->
+        Vision.Runner.run(work, plan.ways, plan.programs, plan.folder, plan.rounds, note)
+
+      {:error, why} ->
+        {:absent, why}
+    end
+  end
+
+  # What was asked for by name; a photograph that is not there is left out otherwise.
+  defp failed(measured, asked?) do
+    frames = for {kind, {:absent, why}} <- measured, asked?, do: "#{kind}: #{why}"
+    frames ++ for {kind, %{beside: {:absent, why}}} <- measured, do: "--beside, #{kind}: #{why}"
+  end
+
+  defp progress(output, kind, done, all) do
+    note = "frames: #{Vision.kinds()[kind]}"
+    Output.progress(output, Progress.line(done, all, note, (output.columns || 80) - 1))
+  end
+
+  defp plan(nil), do: %{ways: Vision.ways(), programs: %{opencv: Vision.Beside.opencv()}}
+
+  defp plan(program) do
+    plan = plan(nil)
+    way = %{name: :beside, says: Path.basename(program), pace: :slow}
+    %{ways: plan.ways ++ [way], programs: Map.put(plan.programs, :beside, {program, []})}
+  end
+
+  defp photo, do: Path.join(System.get_env("CONVOY_PHOTOS", "_build/opencv-doc"), "fruits.jpg")
+
+  defp words(about) do
+    {width, height, copies} = Vision.Frames.size()
+
+    "#{width}x#{height} yuyv, eight classes, #{copies} rolled copies in turn; the median of #{about.rounds} rounds, in each " <>
+      "of which each way searches all copies. Ratios to the kernel in the same round.\nLoad of the machine (1 min): " <>
+      "#{about.load_before || "?"} before, #{about.load_after || "?"} after."
+  end
+
+  defp table do
+    kinds = for {kind, _says} <- Vision.kinds(), do: %{name: kind}
+
+    [
+      {"rounds", "N", &Parse.whole(&1, 1..10_000), "how often each is measured (40)"},
+      {"frames", "NAME,NAME", &kinds(&1, kinds), "which frames (easy,speckle,photograph)"},
+      {"photo", "FILE", &{:ok, &1}, "the photograph (fruits.jpg of bin/opencv-data)"},
+      {"beside", "PROGRAM", &program/1,
+       "a program that searches the same frames: PROGRAM FRAMES LIMITS WIDTH\nHEIGHT COUNT prints a line of microseconds for each"},
+      {"json", "FILE", &{:ok, &1}, "write the figures there too"},
+      {"help", nil, nil, "this text"}
+    ]
+  end
+
+  defp kinds(text, kinds) do
+    with {:ok, chosen} <- Parse.named(text, kinds), do: {:ok, Enum.map(chosen, & &1.name)}
+  end
+
+  defp program(text) do
+    case System.find_executable(text) do
+      nil -> {:error, "the path of a program"}
+      path -> {:ok, path}
+    end
+  end
+
+  defp help, do: IO.puts("  mix bench vision [options]\n\n#{Cli.Arguments.help(table())}")
+end

@@ -1,0 +1,51 @@
+defmodule Console.Cli.MapName do
+  @moduledoc "A map on a command line: a built-in one by name, a description, or a picture with its size. Pure."
+  alias Console.Cli.Parse
+  alias Hal.Options.Suggest
+  alias Sim.Floorplan.Maps
+
+  @doc """
+  The map as `Sim.Floorplan.open/2` takes it; a file is relative to `folder`.
+
+      iex> Console.Cli.MapName.parse("floor.png:16x12", "/maps")
+      {:ok, "/maps/floor.png:16x12"}
+      iex> Console.Cli.MapName.parse("floor.yaml", ".")
+      {:ok, "floor.yaml"}
+      iex> {:error, {_allowed, hint}} = Console.Cli.MapName.parse("ofices", ".")
+      iex> hint
+      "; did you mean offices?"
+  """
+  @spec parse(String.t(), Path.t()) ::
+          {:ok, String.t()} | {:error, String.t() | {String.t(), hint :: String.t()}}
+  def parse(text, folder) do
+    cond do
+      text in Maps.names() -> {:ok, text}
+      text =~ ~r/.\.ya?ml$/i -> {:ok, from(text, folder)}
+      true -> picture(text, folder)
+    end
+  end
+
+  @doc "The names of the built-in maps in lines, for a help text."
+  @spec names() :: String.t()
+  def names, do: Maps.names() |> Enum.chunk_every(7) |> Enum.map_join(",\n", &Enum.join(&1, ", "))
+
+  defp picture(text, folder) do
+    case Regex.run(~r/^(.+\.(?:png|pgm)):(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)$/i, text) do
+      [_, file, width, height] -> sized(from(file, folder), width, height)
+      nil -> {:error, {Maps.allowed(), Suggest.hint(text, Maps.names())}}
+    end
+  end
+
+  defp sized(file, width, height) do
+    with {:ok, _} <- Parse.number(width, 2, 1000), {:ok, _} <- Parse.number(height, 2, 1000) do
+      {:ok, "#{file}:#{width}x#{height}"}
+    else
+      _ -> {:error, "FILE.png:WIDTHxHEIGHT with sides from 2 to 1000 metres"}
+    end
+  end
+
+  @doc "A path, relative to a folder."
+  @spec from(Path.t(), Path.t()) :: Path.t()
+  def from(path, "."), do: path
+  def from(path, folder), do: Path.expand(path, folder)
+end

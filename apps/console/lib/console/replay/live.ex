@@ -1,0 +1,134 @@
+defmodule Console.Replay.Live do
+  @moduledoc """
+  Replays a recording of robots of processes (`Robot.Recorder`) for people: whether they decide
+  the same again, how they were at a time, and why.
+  """
+  alias Console.Cli.{Format, Output, Progress}
+  alias Console.Replay.{LiveText, Options}
+  alias Hal.Options.Suggest
+  alias Robot.Recording.File
+  alias Robot.Replay
+
+  @progress_ms 100
+  # So many differences are shown; the first ones explain the others.
+  @shown 3
+
+  @doc """
+  Replays the file of the options: the exit status as of `Console.Replay.run/1`; `:other` for a
+  file that is no such recording. The error is one line.
+  """
+  @spec run(Options.t()) :: {:live, 0 | 2} | :other | {:error, line :: String.t()}
+  def run(%Options{} = options) do
+    Sim.Recording.File.know()
+
+    with {:ok, file} <- File.open(options.file),
+         :ok <- check(options, file),
+         do: {:live, replay(options, file)}
+  end
+
+  defp check(options, file) do
+    names = Enum.map(File.ids(file), &Atom.to_string/1)
+    last_s = (file.end_ms - file.start_ms) / 1000
+
+    with :ok <- only_lockstep(options),
+         :ok <- known("--robot", options.robot, names),
+         :ok <- known("--why", options.why, names),
+         :ok <- within("--at", options.at_s, last_s),
+         do: within("--until", options.until_s, last_s)
+  end
+
+  defp only_lockstep(options) do
+    asked = [{"--against", options.against}, {"--csv", options.csv}, {"--step", options.step}]
+
+    Enum.find_value(asked, :ok, fn
+      {_option, no} when no in [nil, false] ->
+        nil
+
+      {option, _} ->
+        {:error, "#{option} needs a recording of a run in lockstep; this is one of live robots"}
+    end)
+  end
+
+  defp known(option, name, names) do
+    if name == nil or name in names do
+      :ok
+    else
+      {:error,
+       "#{option} names no robot of the recording: #{name}; allowed are " <>
+         Enum.join(names, ", ") <> Suggest.hint(name, names)}
+    end
+  end
+
+  defp within(option, at_s, last_s) when at_s != nil and at_s > last_s,
+    do:
+      {:error,
+       "#{option} #{at_s} is after the end of the recording, #{Format.decimals(last_s, 1)} s"}
+
+  defp within(_option, _at_s, _last_s), do: :ok
+
+  defp replay(options, file) do
+    output = Output.to(:stdio)
+    Output.line(output, LiveText.heading(file))
+    until_s = options.at_s || options.until_s
+    until = if until_s, do: [until_ms: file.start_ms + round(until_s * 1000)], else: []
+
+    run =
+      file
+      |> File.entries(until)
+      |> Stream.filter(&asked?(&1, options.robot))
+      |> Enum.reduce(
+        %{
+          file: file,
+          replay: Replay.new(),
+          found: [],
+          count: 0,
+          last_ms: 0,
+          drawn_ms: now(),
+          output: output
+        },
+        &step/2
+      )
+
+    {replay, last} = Replay.finish(run.replay)
+    run = %{run | replay: replay, found: run.found ++ last, count: run.count + length(last)}
+    Output.finish(output)
+    at_s = until_s || run.last_ms / 1000
+    Enum.each(LiveText.moment(options, file, replay, at_s), &IO.puts/1)
+
+    Enum.each(
+      LiveText.verdict(file, replay, run.last_ms, Enum.take(run.found, @shown), run.count),
+      &IO.puts/1
+    )
+
+    if run.count == 0 and LiveText.whole?(replay), do: 0, else: 2
+  end
+
+  defp asked?(_entry, nil), do: true
+  defp asked?({id, _entry}, name), do: Atom.to_string(id) == name
+
+  defp step({id, {_role, _kind, _what, at_ms}} = entry, run) do
+    {replay, difference} = Replay.step(run.replay, entry)
+    last_ms = max(run.last_ms, File.since_start_ms(run.file, id, at_ms))
+    draw(note(%{run | replay: replay, last_ms: last_ms}, difference))
+  end
+
+  defp note(run, nil), do: run
+
+  defp note(run, difference),
+    do: %{run | found: Enum.take(run.found ++ [difference], @shown), count: run.count + 1}
+
+  defp draw(%{output: %Output{columns: nil}} = run), do: run
+
+  defp draw(run) do
+    if now() - run.drawn_ms >= @progress_ms do
+      whole_s = (run.file.end_ms - run.file.start_ms) / 1000
+      line = Progress.line(run.last_ms / 1000, whole_s, "replayed", run.output.columns - 1)
+      Output.progress(run.output, line)
+      %{run | drawn_ms: now()}
+    else
+      run
+    end
+  end
+
+  defp now, do: System.monotonic_time(:millisecond)
+end

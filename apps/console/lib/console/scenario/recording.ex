@@ -1,0 +1,47 @@
+defmodule Console.Scenario.Recording do
+  @moduledoc """
+  Records the run of a scenario for `mix replay`. The run is made again: the same scenario gives the same run, so
+  nothing is recorded of runs that nobody wants to look at.
+  """
+  alias Sim.{Recorder, Scenario, Trial}
+  alias Sim.Scenario.Runner
+
+  @doc "Writes the recording of the whole run; the error is one line."
+  @spec record(Scenario.t(), Path.t()) :: :ok | {:error, String.t()}
+  def record(%Scenario{} = scenario, path) do
+    with {:ok, setup} <- Trial.setup(Scenario.trial(scenario)),
+         {:ok, recorder} <- Recorder.start_link(path, setup) do
+      scenario |> Runner.begin(Trial.begin(setup, record: true)) |> play(recorder)
+      Recorder.close(recorder)
+    end
+  end
+
+  defp play(run, recorder) do
+    unless Runner.done?(run) do
+      run = Runner.step(run)
+      {entries, trial} = Trial.take_entries(run.trial)
+      :ok = Recorder.tick(recorder, {trial.at_ms, entries}, Trial.scene(trial))
+      play(%{run | trial: trial}, recorder)
+    end
+  end
+
+  @doc """
+  The recordings' names of these scenarios, in their order; of two files of one name in different folders, the second gets
+  another one.
+
+      iex> Console.Scenario.Recording.names(["a/cut.exs", "kill.exs", "b/cut.exs"])
+      ["cut.mcap", "kill.mcap", "cut-2.mcap"]
+  """
+  @spec names([Path.t()]) :: [String.t()]
+  def names(files) do
+    {names, _counts} =
+      Enum.map_reduce(files, %{}, fn file, counts ->
+        name = file |> Path.basename() |> Path.rootname()
+        count = Map.get(counts, name, 0) + 1
+        number = if count > 1, do: "-#{count}", else: ""
+        {name <> number <> ".mcap", Map.put(counts, name, count)}
+      end)
+
+    names
+  end
+end

@@ -1,0 +1,72 @@
+defmodule Console.Scenario.Report do
+  @moduledoc "What `mix scenario` prints about a run, as lines. Pure."
+  alias Console.Cli.Format
+  alias Console.Fleet
+  alias Sim.Scenario
+  alias Sim.Scenario.{Runner, Text}
+
+  @doc "The first lines: the file, what it is for, and the robots."
+  @spec heading(Path.t(), Scenario.t(), Sim.Trial.t()) :: [String.t()]
+  def heading(file, scenario, %{options: options}) do
+    robots = Format.count(length(options.robots), "robot")
+    about = if scenario.about == "", do: "", else: ": " <> scenario.about
+
+    [
+      "#{file}#{about}",
+      "#{robots} (#{Fleet.describe(options.robots)}) in #{options.map}, seed #{options.seed}"
+    ]
+  end
+
+  @doc "One line for each expectation."
+  @spec verdicts([Runner.verdict()]) :: [String.t()]
+  def verdicts(verdicts), do: Enum.map(verdicts, &verdict/1)
+
+  @doc """
+  The line of an expectation: whether it held, when that was decided, and the figures.
+
+      iex> Console.Scenario.Report.verdict(%{expectation: {:formed, [by_s: 60.0]}, held?: false, at_s: 60.0, figures: "nobody leads"})
+      "   60.0 s  FAILED  {:formed, by_s: 60}: nobody leads"
+  """
+  @spec verdict(Runner.verdict()) :: String.t()
+  def verdict(verdict) do
+    at_s = verdict.at_s |> Format.decimals(1) |> String.pad_leading(7)
+    word = if verdict.held?, do: "held  ", else: "FAILED"
+    "#{at_s} s  #{word}  #{Text.form(verdict.expectation)}: #{verdict.figures}"
+  end
+
+  @doc """
+  The last line about one file.
+
+      iex> Console.Scenario.Report.summary("a.exs", 61.25, [%{held?: true}, %{held?: false}])
+      "a.exs: 1 of 2 expectations failed, after 61.3 s"
+  """
+  @spec summary(Path.t(), float(), [%{:held? => boolean(), optional(atom()) => term()}]) ::
+          String.t()
+  def summary(file, at_s, verdicts) do
+    count = length(verdicts)
+    seconds = Format.decimals(at_s, 1)
+
+    case Enum.count(verdicts, &(not &1.held?)) do
+      _any when count == 0 -> "#{file}: nothing was expected, after #{seconds} s"
+      0 -> "#{file}: #{expectations(count)} held, after #{seconds} s"
+      failed -> "#{file}: #{failed} of #{expectations(count)} failed, after #{seconds} s"
+    end
+  end
+
+  defp expectations(1), do: "1 expectation"
+  defp expectations(count), do: "#{count} expectations"
+
+  @doc """
+  The last line about several files.
+
+      iex> Console.Scenario.Report.total(20, ["a.exs"])
+      "1 of 20 scenarios failed: a.exs"
+      iex> Console.Scenario.Report.total(20, [])
+      "All 20 scenarios held."
+  """
+  @spec total(pos_integer(), failed :: [Path.t()]) :: String.t()
+  def total(count, []), do: "All #{count} scenarios held."
+
+  def total(count, failed),
+    do: "#{length(failed)} of #{count} scenarios failed: #{Enum.join(failed, ", ")}"
+end

@@ -1,0 +1,56 @@
+defmodule Mix.Tasks.Replay do
+  @shortdoc "Replays a recorded run, compares it, and says why a robot did what it did"
+  @moduledoc """
+  Replays a run that `mix demo --record` has recorded; `mix replay --help` lists the options.
+
+  Exit status: 0 all is the same; 2 something differs, or could not be compared because it was
+  not recorded; 1 something was wrong with the input.
+  """
+  use Mix.Task
+  alias Console.Cli.{Build, Output}
+  alias Console.Replay
+  alias Console.Replay.Options
+
+  @impl Mix.Task
+  def run(arguments) do
+    Build.update()
+
+    status =
+      case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
+        {:ok, %Options{help: true}} ->
+          IO.write(Options.help())
+          0
+
+        {:ok, options} ->
+          replay(options)
+
+        {:error, lines} ->
+          Enum.each(lines, &IO.puts(:stderr, "replay: #{&1}"))
+          IO.puts(:stderr, "replay: --help lists all options")
+          1
+      end
+
+    if status > 0, do: exit({:shutdown, status})
+  end
+
+  # The status that a shell reports for a program whose output nobody reads any more, such as that of `head`.
+  @unread 141
+
+  defp replay(options) do
+    Replay.run(options)
+  rescue
+    error in ErlangError ->
+      if error.original == :terminated, do: unread(), else: reraise(error, __STACKTRACE__)
+  end
+
+  defp unread do
+    case Output.lost() do
+      :unread ->
+        @unread
+
+      {:error, reason} ->
+        IO.puts(:stderr, "replay: the output cannot be written: #{:file.format_error(reason)}")
+        1
+    end
+  end
+end

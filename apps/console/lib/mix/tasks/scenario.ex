@@ -1,0 +1,58 @@
+defmodule Mix.Tasks.Scenario do
+  @shortdoc "Runs scenarios of a fleet, and says whether what they expect holds"
+  @moduledoc """
+  Runs scenarios in lockstep; `mix scenario --help` shows how. docs/scenarios.md shows how one is
+  written.
+
+  Exit status: 0 if all expectations hold; 2 if one failed; 1 if the input was wrong.
+  """
+  use Mix.Task
+  alias Console.Cli.{Build, Output}
+  alias Console.Scenario.{Options, Session}
+
+  # The status that a shell reports for a program whose output nobody reads any more.
+  @unread 141
+
+  @impl Mix.Task
+  def run(arguments) do
+    Build.update()
+    status = scenario(arguments)
+    if is_integer(status) and status > 0, do: exit({:shutdown, status})
+  end
+
+  defp scenario(arguments) do
+    case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
+      :help -> IO.write(Options.help())
+      {:ok, options} -> play(options)
+      {:error, lines} -> refuse(lines)
+    end
+  end
+
+  defp play(options) do
+    with {:error, lines} <- Session.run(options), do: refuse(lines)
+  rescue
+    error in ErlangError ->
+      if error.original == :terminated, do: unread(), else: reraise(error, __STACKTRACE__)
+  end
+
+  defp refuse(lines) do
+    Enum.each(lines, &IO.puts(:stderr, "scenario: #{&1}"))
+    IO.puts(:stderr, "scenario: --help shows how it is used")
+    1
+  end
+
+  defp unread do
+    case Output.lost() do
+      :unread ->
+        @unread
+
+      {:error, reason} ->
+        IO.puts(
+          :stderr,
+          "scenario: the output cannot be written: #{:file.format_error(reason)}"
+        )
+
+        1
+    end
+  end
+end

@@ -1,0 +1,109 @@
+defmodule Console.ChaosTest do
+  use ExUnit.Case, async: true
+  import ExUnit.CaptureIO
+  alias Console.Chaos
+  alias Console.Chaos.{Options, Report}
+  alias Sim.Chaos.Violation
+
+  doctest Console.Chaos.Options
+  doctest Console.Cli.Progress
+
+  # Two robots for a few seconds; every third run cannot be made.
+  defp draw(_seed, number) when rem(number, 3) == 0, do: [robots: [:mag1], duration_s: :long]
+
+  defp draw(seed, _number),
+    do: [robots: [:mag1, :mag2], seed: seed, blobs: :direct, duration_s: 2]
+
+  defp chaos(line) do
+    {:ok, options} = line |> OptionParser.split() |> Options.parse()
+    with_io(fn -> Chaos.run(options, draw: &draw/2) end)
+  end
+
+  test "every option is understood" do
+    assert {:ok, options} =
+             Options.parse(
+               ~w(--run 17 --seed 9 --attempts 0 --jobs 2 --json - --keep fresh-folder)
+             )
+
+    assert %Options{run: 17, seed: 9, attempts: 0, jobs: 2, json: "-", keep: "fresh-folder"} =
+             options
+
+    assert Options.numbers(options) == 17..17
+    assert {:ok, %Options{help: true}} = Options.parse(["-h"])
+
+    for option <- ~w(runs seed run attempts jobs json keep),
+        do: assert(Options.help() =~ "--#{option} ")
+  end
+
+  test "what is wrong with the input is one line each, with what may have been meant" do
+    assert {:error, lines} = Options.parse(~w(--rusn 3 --seed x --json no/such/folder/a.json))
+
+    assert lines == [
+             "unknown option --rusn; did you mean --runs?",
+             ~s(--seed cannot be "x": a whole number from 0 to 4294967295 is allowed),
+             ~s(--json cannot be "no/such/folder/a.json": a file in a folder that exists is allowed)
+           ]
+  end
+
+  test "clean runs end with 0 and a table" do
+    assert {0, text} = chaos("--runs 2")
+    assert text =~ "| runs | 2 |"
+    assert text =~ "| collision | none |"
+    refute text =~ "\e["
+  end
+
+  @tag :tmp_dir
+  test "a violation ends with 2, one line, a scenario and its place in the report", %{
+    tmp_dir: folder
+  } do
+    json = Path.join(folder, "chaos.json")
+    assert {2, text} = chaos("--runs 3 --attempts 2 --json #{json}")
+    assert [line] = text |> String.split("\n") |> Enum.filter(&(&1 =~ ~r/^run /))
+
+    assert line =~
+             "run 3: crash at 0.0 s, the run: not a run: trial option duration_s cannot be :long"
+
+    assert line =~ "(mix chaos --seed 1 --run 3)"
+    assert text =~ "| crash | runs 3 |"
+    assert File.read!(json) =~ ~s("clean":false)
+    assert File.read!(json) =~ ~s("runs":3)
+  end
+
+  test "a file that cannot be written ends with 1 before anything is played" do
+    error =
+      capture_io(:stderr, fn ->
+        assert Chaos.run(%Options{runs: 1, json: "/proc/none/a.json"}, draw: &draw/2) == 1
+      end)
+
+    assert error =~ ~r/^chaos: --json \/proc\/none\/a.json cannot be written: .*\n$/
+  end
+
+  test "with --json - only the report goes to standard output" do
+    told = capture_io(:stderr, fn -> send(self(), chaos("--runs 1 --json -")) end)
+    assert_received {0, text}
+    assert [json] = String.split(text, "\n", trim: true)
+    assert json =~ ~s("figures":)
+    assert told =~ "| runs | 1 |"
+  end
+
+  test "a failure says how small it became" do
+    violation = Violation.new(:stuck, 45_000, [:min1], "1.20 m off")
+
+    failure = %{
+      number: 4,
+      violation: violation,
+      smallest: [
+        robots: [:mag1, :min1],
+        kills: [],
+        cuts: [{1, 2, {:link, :mag1, :min1}}],
+        duration_s: 46
+      ],
+      again: violation,
+      attempts: 12
+    }
+
+    assert Report.failure(7, failure) ==
+             "run 4: stuck at 45.0 s, min1: 1.20 m off (mix chaos --seed 7 --run 4); " <>
+               "shrunk to 2 robots, 1 event, 46 s"
+  end
+end

@@ -1,0 +1,129 @@
+defmodule Robot.Navigation.MapFile do
+  @moduledoc """
+  A floor plan as map_server writes it: a description in YAML (`.Description`) and the picture that it names, PNG or PGM
+  (`.Picture`). It gives a robot the walls of its building (`Robot.Navigation.Grid`) in the frame of the map, in which the
+  description says where the picture lies.
+
+  What the picture does not cover is wall; so only the part of it with floor becomes the grid, and only that must not be
+  larger than a robot can search for a way ten times a second.
+  """
+  alias Robot.Navigation.Grid
+  alias Robot.Navigation.MapFile.{Description, Pgm, Picture, Png}
+
+  # A picture of 4000 x 4000 pixels, which some mappers always write, is read within seconds.
+  @most_pixels 16_000_000
+  # Cells of `Picture.cell/0`: 500 m.
+  @most_side 10_000
+  # Cells of the grid, 10 cm wide: 100 x 100 m.
+  @most_grid 1_000_000
+
+  @enforce_keys [:file, :grid]
+  defstruct @enforce_keys
+
+  @type t :: %__MODULE__{file: Path.t(), grid: Grid.t()}
+
+  @doc """
+  The map that a description in YAML describes; the error is one line.
+
+      iex> Robot.Navigation.MapFile.open("no/such.yaml")
+      {:error, "no/such.yaml: no such file or directory"}
+  """
+  @spec open(Path.t()) :: {:ok, t()} | {:error, line :: String.t()}
+  def open(file) do
+    with {:ok, description} <- description(file),
+         {:ok, {width, height, _rows} = picture} <- picture(description.image, @most_pixels),
+         size = {width * description.resolution, height * description.resolution},
+         :ok <- size(file, Picture.cells(size)),
+         {:ok, grid} <- grid(file, Picture.walls(picture, description.shades, size), description),
+         do: {:ok, %__MODULE__{file: file, grid: grid}}
+  end
+
+  @doc "What a file describes; the path of its picture is complete. The error is one line that names the file."
+  @spec description(Path.t()) :: {:ok, Description.t()} | {:error, line :: String.t()}
+  def description(file) do
+    with {:ok, bytes} <- read(file),
+         {:ok, description} <- Description.parse(bytes) do
+      {:ok, %{description | image: Path.expand(description.image, Path.dirname(file))}}
+    else
+      {:error, reason} -> {:error, "#{file}: #{reason}"}
+    end
+  end
+
+  @doc "The picture in a file, of at most so many pixels; the error is one line that names the file."
+  @spec picture(Path.t(), pos_integer()) :: {:ok, Picture.t()} | {:error, line :: String.t()}
+  def picture(file, most_pixels) do
+    with {:ok, bytes} <- read(file),
+         {:ok, picture} <- decode(bytes, most_pixels) do
+      {:ok, picture}
+    else
+      {:error, reason} -> {:error, "#{file}: #{reason}"}
+    end
+  end
+
+  # Reading a device or a pipe would never end.
+  defp read(file) do
+    with {:ok, %File.Stat{type: :regular}} <- File.stat(file),
+         {:ok, bytes} <- File.read(file) do
+      {:ok, bytes}
+    else
+      {:ok, %File.Stat{type: type}} -> {:error, "is a #{type}, not a file"}
+      {:error, reason} -> {:error, :file.format_error(reason)}
+    end
+  end
+
+  defp decode(<<0x89, "PNG\r\n", 0x1A, "\n", chunks::binary>>, most), do: Png.decode(chunks, most)
+
+  defp decode(<<"P", kind, rest::binary>>, most) when kind in [?2, ?5],
+    do: Pgm.decode(kind, rest, most)
+
+  defp decode(_bytes, _most), do: {:error, "is neither a PNG nor a PGM (P2, P5) picture"}
+
+  defp size(_file, {w, h}) when w in 2..@most_side//1 and h in 2..@most_side//1, do: :ok
+
+  defp size(file, {w, h}) do
+    [w, h] = for cells <- [w, h], do: Float.round(cells * Picture.cell(), 2)
+
+    {:error,
+     "#{file}: is #{w} x #{h} m: 0.1 to 500 m are allowed for each side; see its resolution"}
+  end
+
+  defp grid(file, rows, %{origin: {x, y}}) do
+    case floor_of(rows) do
+      nil ->
+        {:error,
+         "#{file}: shows no floor: light pixels are floor, unless its negate says otherwise"}
+
+      {rows, {left, low}} ->
+        {w, h} = {byte_size(hd(rows)), length(rows)}
+        cell = Picture.cell()
+        corner = {x + left * cell, y + low * cell}
+
+        if w * h * cell * cell <= @most_grid * Grid.plan_cell() * Grid.plan_cell(),
+          do: {:ok, Grid.plan(IO.iodata_to_binary(rows), {w, h}, cell, corner)},
+          else:
+            {:error,
+             "#{file}: has floor on #{round(w * cell)} x #{round(h * cell)} m: up to 100 x 100 m, or as large an " <>
+               "area, are allowed"}
+    end
+  end
+
+  # The rows without what surrounds all floor, and the place of their lower left cell.
+  defp floor_of(rows) do
+    width = byte_size(hd(rows))
+    wall = :binary.copy(<<1>>, width)
+    low = Enum.find_index(rows, &(&1 != wall))
+
+    if low do
+      rows =
+        rows
+        |> Enum.drop(low)
+        |> Enum.reverse()
+        |> Enum.drop_while(&(&1 == wall))
+        |> Enum.reverse()
+
+      left = rows |> Enum.map(&:binary.longest_common_prefix([&1, wall])) |> Enum.min()
+      right = rows |> Enum.map(&:binary.longest_common_suffix([&1, wall])) |> Enum.min()
+      {Enum.map(rows, &binary_part(&1, left, width - left - right)), {left, low}}
+    end
+  end
+end

@@ -1,0 +1,280 @@
+defmodule Robot.Navigation.OccupancyGrid do
+  @moduledoc """
+  The walls that a robot's sonars have seen: evidence for the cells of a square window of 20 m that follows the robot
+  (Moravec and Elfes 1985). Pure.
+
+  An echo raises the cells on its arc and lowers those before it; no echo only lowers. What another robot or a
+  known disc explains is no wall, and where a body stands there is none. Evidence goes slowly, so that the errors of
+  odometry do not add up for ever. Cells that no reading has reached are free: a robot tries ways that it has not seen.
+
+  The window lies in the frame of the odometry, which never jumps. `grid/1` is what is surely wall, several echoes and not
+  one, in the map frame, as it was at most a second ago; a correction of the pose moves it as a whole. Odometry that
+  begins again in another frame begins a new window.
+
+  The kernels are in C, with a reference in Elixir (`.Reference`) that gives the same bytes.
+  """
+  alias Hal.{Odometry, Pose}
+  alias Robot.Navigation.{Grid, OccupancyGrid}
+  alias Robot.Percept
+
+  @cell 0.1
+  @size 200
+  # The window follows when the robot is this far from its middle (metres).
+  @follow 2.0
+  # Ranges (metres): echoes from farther away say too little of where on the arc the wall is. Seen through is what is
+  # before an echo, by a margin; less where nothing answered, which may be a wall that throws the echo elsewhere.
+  @heard 1.5
+  @through 2.5
+  @silent 2.0
+  @margin 0.15
+  # The arc lies behind the surface that sent the echo, and is as deep as lets no cell slip through (cells).
+  @behind 0.5
+  @thick 0.75
+  # Evidence from which on a cell is surely wall.
+  @sure 30
+  # Readings are taken this often (ms), and this often while the robot stands (metres, radians): the same
+  # reading again says little that is new.
+  @every_ms 200
+  @standing_ms 1_000
+  @moved 0.03
+  @turned 0.05
+  # Sonars of a robot that turns faster than this within a round of them point elsewhere by then (radians).
+  @blurred 0.2
+  # Evidence goes by 1 in this time (ms).
+  @decay_ms 3_000
+  # What is surely wall is told this often (ms), if cells changed or the frame moved by this much (metres, radians).
+  @told_ms 1_000
+  @shifted 0.05
+  @swung 0.01
+  # An echo this near (metres) to a known body is its echo.
+  @explained 0.3
+
+  defstruct cells: nil,
+            left: 0,
+            low: 0,
+            frame: nil,
+            pose: nil,
+            at_ms: nil,
+            decayed_ms: nil,
+            changes: 0,
+            grid: nil,
+            told_ms: nil,
+            map: nil
+
+  @typedoc """
+  `cells` are signed bytes, rows from the lowest y, `nil` before the first reading; `left` and `low` are the cell of the
+  odometry's frame that is in the lower left corner; `pose` is where the robot was at the last reading. `changes` counts
+  cells that became surely wall, or ceased to be, since `grid` was built, at `told_ms`, with `map` as the pose of the
+  odometry's frame in the map's.
+  """
+  @type t :: %__MODULE__{
+          cells: binary() | nil,
+          left: integer(),
+          low: integer(),
+          frame: reference() | nil,
+          pose: Pose.t() | nil,
+          at_ms: integer() | nil,
+          decayed_ms: integer() | nil,
+          changes: non_neg_integer(),
+          grid: Grid.t() | nil,
+          told_ms: integer() | nil,
+          map: Pose.t() | nil
+        }
+
+  @type disc :: {x :: float(), y :: float(), radius :: float()}
+
+  @doc "A grid of which nothing is known."
+  @spec new() :: t()
+  def new, do: %__MODULE__{}
+
+  @doc "What is surely wall, in the map frame; `nil` if nothing is."
+  @spec grid(t()) :: Grid.t() | nil
+  def grid(%__MODULE__{grid: grid}), do: grid
+
+  @doc """
+  Takes the readings of a percept with a pose. `discs` are standing things that are known besides the other robots
+  (map frame, metres).
+  """
+  @spec update(t(), Percept.t(), [disc()]) :: t()
+  def update(grid, %Percept{pose: pose, odometry: odometry} = percept, _discs)
+      when pose == nil or odometry == nil,
+      do: tell(grid, percept)
+
+  def update(grid, percept, discs) do
+    grid = if grid.frame == percept.odometry.frame, do: grid, else: begin(percept)
+    grid = if due?(grid, percept), do: add(grid, percept, discs), else: grid
+    tell(grid, percept)
+  end
+
+  defp begin(%{odometry: %Odometry{frame: frame}}), do: %__MODULE__{frame: frame}
+
+  defp due?(_grid, %{sonar: nil}), do: false
+  defp due?(%{at_ms: nil}, _percept), do: true
+
+  defp due?(grid, %{odometry: odometry, profile: profile} = percept) do
+    passed = percept.at_ms - grid.at_ms
+    turn = abs(odometry.twist.turn) * (profile.sonar_round_s + 0.1)
+
+    passed >= @every_ms and turn < @blurred and
+      (passed >= @standing_ms or moved?(grid.pose, odometry.pose, @moved, @turned))
+  end
+
+  defp moved?(before, now, way, turn),
+    do: Pose.distance(before, now) > way or abs(Pose.wrap(before.heading - now.heading)) > turn
+
+  defp add(grid, %{odometry: %{pose: pose}} = percept, discs) do
+    grid = if grid.cells, do: grid, else: middle(grid, pose, percept.at_ms)
+    {right, up} = moves = follow(grid, pose)
+    {left, low} = {grid.left + right, grid.low + up}
+    decay = div(percept.at_ms - grid.decayed_ms, @decay_ms)
+    known = known(percept, discs)
+
+    {cells, changes} =
+      kernel().add(
+        grid.cells,
+        @size,
+        right,
+        up,
+        min(decay, 127),
+        cones(percept, known, {left, low}),
+        :math.tan(percept.profile.sonar_cone / 2),
+        @thick,
+        packed([{pose.x, pose.y, percept.profile.radius} | known], {left, low}),
+        @sure
+      )
+
+    # What leaves the window or is too old is not counted.
+    lost = if moves != {0, 0} or decay > 0, do: 1, else: 0
+
+    %{
+      grid
+      | cells: cells,
+        left: left,
+        low: low,
+        pose: pose,
+        at_ms: percept.at_ms,
+        decayed_ms: grid.decayed_ms + decay * @decay_ms,
+        changes: grid.changes + changes + lost
+    }
+  end
+
+  defp middle(grid, pose, at_ms) do
+    %{
+      grid
+      | cells: <<0::size(@size * @size)-unit(8)>>,
+        left: floor(pose.x / @cell) - div(@size, 2),
+        low: floor(pose.y / @cell) - div(@size, 2),
+        decayed_ms: at_ms
+    }
+  end
+
+  defp follow(grid, pose), do: {follow(grid.left, pose.x, 0), follow(grid.low, pose.y, 0)}
+
+  defp follow(corner, at, 0) do
+    off = floor(at / @cell) - div(@size, 2) - corner
+    if abs(off) * @cell > @follow, do: off, else: 0
+  end
+
+  # Bodies that are known, in the frame of the odometry.
+  defp known(percept, discs) do
+    robots = for {_id, peer} <- percept.peers, do: {peer.pose.x, peer.pose.y, peer.radius}
+    {map, zero} = {map(percept), Pose.new(0, 0)}
+    back = Pose.relative(map, zero)
+
+    for {x, y, radius} <- Enum.sort(robots) ++ discs do
+      {x, y} = Pose.place(back, {x, y})
+      {x, y, radius}
+    end
+    |> Enum.take(100)
+  end
+
+  # The pose of the odometry's frame in the map's.
+  defp map(%{pose: pose, odometry: odometry}),
+    do: Pose.compose(pose, Pose.relative(odometry.pose, Pose.new(0, 0)))
+
+  defp cones(%{odometry: %{pose: pose}, profile: profile, sonar: ranges}, known, corner) do
+    tangent = :math.tan(profile.sonar_cone / 2)
+
+    for {sonar, range} <- Enum.zip(profile.sonars, ranges),
+        is_number(range) and range > profile.sonar_min + 0.005,
+        into: <<>> do
+      {x, y} = Pose.place(pose, {sonar.x, sonar.y})
+      heading = pose.heading + sonar.heading
+      {c, s} = {:math.cos(heading), :math.sin(heading)}
+
+      {clear, echo} =
+        reading(range, profile, Enum.any?(known, &sent?(&1, x, y, c, s, range, tangent)))
+
+      {px, py} = in_cells({x, y}, corner)
+
+      <<px::float-native, py::float-native, c::float-native, s::float-native,
+        clear / @cell::float-native, range / @cell + @behind::float-native, echo::float-native>>
+    end
+  end
+
+  # How far is seen through, and whether there is an echo of something unknown.
+  defp reading(range, %{sonar_max: most}, _known?) when range >= most, do: {@silent, 0.0}
+  defp reading(range, _profile, true), do: {min(range - @explained, @through), 0.0}
+
+  defp reading(range, _profile, false),
+    do: {min(range - @margin, @through), if(range <= @heard, do: 1.0, else: 0.0)}
+
+  # Whether an echo of this range can come from a disc.
+  defp sent?({dx, dy, radius}, x, y, c, s, range, tangent) do
+    {dx, dy} = {dx - x, dy - y}
+    along = dx * c + dy * s
+    side = abs(dy * c - dx * s)
+
+    along > -radius and side < max(along, 0.0) * tangent + radius + @explained and
+      abs(:math.sqrt(dx * dx + dy * dy) - radius - range) < @explained
+  end
+
+  defp packed(discs, corner) do
+    for {x, y, radius} <- discs, into: <<>> do
+      {px, py} = in_cells({x, y}, corner)
+      <<px::float-native, py::float-native, radius / @cell::float-native>>
+    end
+  end
+
+  defp in_cells({x, y}, {left, low}), do: {x / @cell - left, y / @cell - low}
+
+  # Builds anew what is surely wall, if enough changed.
+  defp tell(%{cells: nil} = grid, _percept), do: grid
+  defp tell(grid, %{pose: pose, odometry: odometry}) when pose == nil or odometry == nil, do: grid
+
+  defp tell(grid, percept) do
+    due? = grid.told_ms == nil or percept.at_ms - grid.told_ms >= @told_ms
+    if due?, do: tell(grid, percept, map(percept)), else: grid
+  end
+
+  defp tell(grid, percept, map) do
+    if grid.changes > 0 or (grid.grid && moved?(grid.map, map, @shifted, @swung)),
+      do: %{grid | grid: build(grid, percept, map), map: map, told_ms: percept.at_ms, changes: 0},
+      else: grid
+  end
+
+  # A window of the map about the robot, each of whose cells is looked up.
+  defp build(grid, percept, map) do
+    {left, low} = {corner(percept.pose.x), corner(percept.pose.y)}
+    first = {(left + 0.5) * @cell, (low + 0.5) * @cell}
+    back = Pose.relative(map, Pose.new(0, 0))
+    {x, y} = back |> Pose.place(first) |> in_cells({grid.left, grid.low})
+    at = {x, y, :math.cos(back.heading), :math.sin(back.heading)}
+
+    case kernel().walls(grid.cells, @size, at, @sure) do
+      {_walls, 0} ->
+        nil
+
+      {walls, _count} ->
+        Grid.new(walls, {@size, @size}, @cell, {left * @cell, low * @cell}, closed?: false)
+    end
+  end
+
+  defp corner(at), do: floor(at / @cell) - div(@size, 2)
+
+  @doc false
+  @spec kernel() :: module()
+  def kernel,
+    do:
+      if(OccupancyGrid.Native.loaded?(), do: OccupancyGrid.Native, else: OccupancyGrid.Reference)
+end

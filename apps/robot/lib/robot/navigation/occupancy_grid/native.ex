@@ -1,0 +1,38 @@
+defmodule Robot.Navigation.OccupancyGrid.Native do
+  @moduledoc false
+  # The kernels in C; `Robot.Navigation.OccupancyGrid.Reference` documents them. The C code checks every size: wrong terms
+  # raise ArgumentError.
+  @on_load :load
+
+  @doc false
+  @spec load() :: :ok
+  def load do
+    # Without the library the stubs remain, and the reference does the work.
+    _ = :erlang.load_nif(to_charlist(Application.app_dir(:robot, "priv/occupancy")), 0)
+    :ok
+  end
+
+  @spec loaded?() :: boolean()
+  # The library replaces this. From a plain `false`, compilers that infer types would conclude
+  # that it is never loaded.
+  def loaded?, do: not function_exported?(__MODULE__, :loaded?, 0)
+
+  @spec add(
+          binary(),
+          pos_integer(),
+          right :: integer(),
+          up :: integer(),
+          decay :: non_neg_integer(),
+          cones :: binary(),
+          tangent :: float(),
+          thick :: float(),
+          discs :: binary(),
+          sure :: pos_integer()
+        ) :: {binary(), changes :: non_neg_integer()}
+  def add(_cells, _size, _right, _up, _decay, _cones, _tangent, _thick, _discs, _sure),
+    do: :erlang.nif_error(:nif_not_loaded)
+
+  @spec walls(binary(), pos_integer(), {float(), float(), float(), float()}, pos_integer()) ::
+          {binary(), count :: non_neg_integer()}
+  def walls(_cells, _size, _at, _sure), do: :erlang.nif_error(:nif_not_loaded)
+end

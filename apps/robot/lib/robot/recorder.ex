@@ -1,0 +1,310 @@
+defmodule Robot.Recorder do
+  @moduledoc """
+  Records robots of processes into an MCAP file, or into the numbered files of a folder within a
+  limit (`Mcap.FileWriter`): each second what their processes told and did, so that `Robot.Replay`
+  can say whether they would do so again (`Robot.Recording`), and what other tools show
+  (`Robot.Recording.Topics`).
+
+      {:ok, recorder} = Robot.Recorder.start_link(robots: [:mag1], file: [path: "run.mcap"])
+      config = %{config | trace: {Robot.Recorder, :trace, [:mag1]}}
+      :ok = Robot.Recorder.close(recorder)
+
+  Nothing that goes wrong here concerns a robot: its processes send to this one without waiting,
+  and only so much (`Robot.Recorder.Queue`); what is too much is lost, counted and recorded as lost.
+  Without this process, nothing is sent. If the file cannot be written, the events
+  `[:robot, :recorder, :failed]` and `[:robot, :recorder, :healed]` say so; a folder is tried again
+  every 10 s. A crash is up to its supervisor; the next recorder begins a new file.
+
+  Each file begins with a checkpoint of each role, and has one each minute.
+  """
+  use GenServer
+  alias Hal.{Event, HardenedServer}
+  alias Robot.{Config, Names}
+  alias Robot.Recorder.{Options, Output, Pictures, Queue}
+
+  @roles Queue.roles()
+  @write_ms 1_000
+  @again_ms 10_000
+  @checkpoint_ms 60_000
+  # What comes in faster is written sooner.
+  @most_entries 5_000
+  @call_ms 60_000
+  # Two readings of a clock that stands still by the other one.
+  @same_ms 100
+
+  @doc """
+  Starts it. Options: `robots` (ids), `file` (options of `Mcap.FileWriter`), `pictures` of their
+  cameras a second (`nil`: none); for tests `bound`, of
+  the entries under way, and `again_ms`, until a folder is tried again. It starts even if the file cannot be made (`status/1`).
+  """
+  @spec start_link(keyword()) :: GenServer.on_start()
+  def start_link(options), do: HardenedServer.start_link(__MODULE__, Map.new(options))
+
+  @doc "The child spec of the recorder of one robot, from its id and its file's `record:`."
+  @spec child_spec({robot :: atom(), keyword()} | keyword()) :: Supervisor.child_spec()
+  def child_spec({robot, options}) when is_atom(robot),
+    do: child_spec(robots: [robot], file: Options.file(options), pictures: options[:pictures])
+
+  def child_spec(options),
+    do: %{id: __MODULE__, start: {__MODULE__, :start_link, [options]}, shutdown: @call_ms}
+
+  @doc "Makes a robot of this config hand what goes in and out of it to its recorder."
+  @spec join(Config.t()) :: Config.t()
+  def join(%Config{id: id} = config), do: %{config | trace: {__MODULE__, :trace, [id]}}
+
+  @doc "Sends an entry of a robot's trace to its recorder, if there is one. Never waits."
+  @spec trace(robot :: atom(), Robot.Control.Trace.entry()) :: :ok
+  def trace(robot, entry) do
+    case Names.lookup(robot, :recorder) do
+      {recorder, %Queue{} = queue} -> Queue.send_entry(queue, recorder, robot, entry)
+      nil -> :ok
+    end
+  end
+
+  @doc """
+  Which file it writes, and why none (`failed`, one line); how many entries it has written, and
+  how many were lost.
+  """
+  @spec status(GenServer.server()) :: %{
+          file: Path.t() | nil,
+          failed: String.t() | nil,
+          entries: non_neg_integer(),
+          lost: non_neg_integer()
+        }
+  def status(recorder), do: GenServer.call(recorder, :status, @call_ms)
+
+  @doc "Writes what it has, and ends the file and this process; the error is one line."
+  @spec close(GenServer.server()) :: :ok | {:error, line :: String.t()}
+  def close(recorder) do
+    result = GenServer.call(recorder, :close, @call_ms)
+    :ok = GenServer.stop(recorder)
+    result
+  end
+
+  @impl GenServer
+  def init(%{robots: ids, file: file} = options) do
+    # To end the file in order.
+    Process.flag(:trap_exit, true)
+    queues = Map.new(ids, &{&1, Queue.new(Map.get(options, :bound, 2_000))})
+    now_ms = System.monotonic_time(:millisecond)
+
+    s = %{
+      ids: ids,
+      again_ms: Map.get(options, :again_ms, @again_ms),
+      file: file,
+      queues: queues,
+      robots: Map.new(ids, &{&1, %{offset_ms: nil, profile: nil}}),
+      rate: Map.get(options, :pictures),
+      pictures: nil,
+      shots: [],
+      output: nil,
+      failed: nil,
+      entries: [],
+      count: 0,
+      written: 0,
+      lost: 0,
+      # The machine's clock may be set; times in a file must not go back.
+      unix_ms: System.os_time(:millisecond) - now_ms,
+      asked_ms: now_ms,
+      tried_ms: now_ms
+    }
+
+    case Enum.find_value(queues, :ok, &registered/1) do
+      :ok ->
+        # A disk that hangs must not hold up whoever starts this.
+        send(self(), :open)
+        if s.rate, do: send(self(), :look)
+        {:ok, later(s)}
+
+      {:error, {:already_registered, pid}} ->
+        {:stop, {:already_started, pid}}
+    end
+  end
+
+  defp registered({id, queue}) do
+    with :ok <- Names.register(id, :recorder, queue), do: nil
+  end
+
+  @impl GenServer
+  def handle_call(:status, _from, s) do
+    file = if s.output, do: s.output.file
+
+    lost =
+      s.lost + (s.queues |> Enum.map(fn {_id, queue} -> Queue.untold(queue) end) |> Enum.sum())
+
+    {:reply, %{file: file, failed: s.failed, entries: s.written, lost: lost}, s}
+  end
+
+  def handle_call(:close, _from, s) do
+    s = s |> arrived() |> missed() |> write()
+    {:reply, closed(s), %{s | output: nil, failed: s.failed || "is closed"}}
+  end
+
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
+
+  @impl GenServer
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
+
+  @impl GenServer
+  def handle_info({:entry, id, {role, _kind, _what, at_ms} = entry, now_ms}, s)
+      when is_map_key(s.queues, id) and role in @roles and is_integer(at_ms) and
+             is_integer(now_ms) do
+    Queue.taken(s.queues[id], role)
+    s = take(s, id, entry, now_ms)
+    {:noreply, if(s.count >= @most_entries, do: write(s), else: s)}
+  end
+
+  def handle_info(:open, s), do: {:noreply, open(s)}
+
+  def handle_info(:look, s) do
+    {:ok, pictures} = Pictures.start_link(s.ids, s.rate)
+    {:noreply, %{s | pictures: pictures}}
+  end
+
+  # There are at most five a second of each robot, and nobody waits for the disk.
+  def handle_info({:picture, id, picture}, %{pictures: pictures} = s)
+      when pictures != nil and is_map_key(s.robots, id) do
+    Pictures.taken(pictures, id)
+    {:noreply, %{s | shots: [{id, picture} | s.shots]}}
+  end
+
+  def handle_info(:write, s), do: {:noreply, s |> write() |> minute() |> again() |> later()}
+
+  def handle_info({:EXIT, writer, reason}, %{output: %Output{writer: writer}} = s),
+    do: {:noreply, fail(s, "the writer of its file has ended: #{inspect(reason)}")}
+
+  def handle_info({:EXIT, pictures, _reason}, %{pictures: pictures} = s) when pictures != nil do
+    _ = Process.send_after(self(), :look, @again_ms)
+    {:noreply, %{s | pictures: nil}}
+  end
+
+  def handle_info({:EXIT, _other, _reason}, s), do: {:noreply, s}
+  def handle_info(_unknown, s), do: HardenedServer.drop(s)
+
+  @impl GenServer
+  def terminate(_reason, s) do
+    _ = s |> arrived() |> missed() |> write() |> closed()
+    :ok
+  end
+
+  defp later(s) do
+    _ = Process.send_after(self(), :write, @write_ms)
+    s
+  end
+
+  # What was sent before this process was told to end.
+  defp arrived(s) do
+    receive do
+      {:entry, id, {role, _kind, _what, at_ms} = entry, now_ms}
+      when is_map_key(s.queues, id) and role in @roles and is_integer(at_ms) and
+             is_integer(now_ms) ->
+        Queue.taken(s.queues[id], role)
+        arrived(take(s, id, entry, now_ms))
+    after
+      0 -> s
+    end
+  end
+
+  # What was lost last has no entry after it that could tell it.
+  defp missed(s) do
+    for {id, queue} <- Enum.sort_by(s.queues, &elem(&1, 0)),
+        {role, lost} <- Queue.take_untold(queue),
+        reduce: s do
+      s ->
+        offset_ms = s.robots[id].offset_ms || s.unix_ms
+        take(s, id, {role, :lost, lost, now_ms() + s.unix_ms - offset_ms}, now_ms())
+    end
+  end
+
+  defp take(s, id, {_role, :lost, count, _at_ms} = entry, _now_ms),
+    do: add(%{s | lost: s.lost + count}, id, entry)
+
+  defp take(s, id, {_role, kind, {state, _facts}, at_ms} = entry, now_ms)
+       when kind in [:begin, :checkpoint],
+       do: s |> know(id, state, now_ms + s.unix_ms - at_ms) |> add(id, entry)
+
+  defp take(s, id, entry, _now_ms), do: add(s, id, entry)
+
+  # Entries that nobody can write are nothing to wait with.
+  defp add(%{output: nil, failed: failed} = s, _id, _entry) when failed != nil, do: s
+  defp add(s, id, entry), do: %{s | entries: [{id, entry} | s.entries], count: s.count + 1}
+
+  # A state tells the body, and the time at which it was sent the offset of the robot's clock.
+  defp know(s, id, state, offset_ms) do
+    robot = s.robots[id]
+    profile = robot.profile || Map.get(state, :profile)
+    known? = robot.offset_ms != nil and abs(robot.offset_ms - offset_ms) < @same_ms
+    offset_ms = if known?, do: robot.offset_ms, else: offset_ms
+    put_in(s.robots[id], %{offset_ms: offset_ms, profile: profile})
+  end
+
+  defp open(s) do
+    case Output.open(s.file, s.ids, s.rate != nil) do
+      {:ok, output} ->
+        Enum.each(s.queues, fn {_id, queue} -> Queue.ask(queue) end)
+        if s.failed, do: tell(s, :healed, %{file: output.file})
+        %{s | output: output, failed: nil}
+
+      {:error, line} ->
+        fail(s, line)
+    end
+  end
+
+  # The first error is told, and its successors only when it was over meanwhile.
+  defp fail(s, line) do
+    if s.failed == nil, do: tell(s, :failed, %{line: line})
+    if s.output, do: Output.abandon(s.output)
+
+    %{
+      s
+      | output: nil,
+        failed: s.failed || line,
+        entries: [],
+        count: 0,
+        shots: [],
+        tried_ms: System.monotonic_time(:millisecond)
+    }
+  end
+
+  defp tell(s, what, about) do
+    about = Map.merge(%{robots: s.ids, robot: hd(s.ids)}, about)
+    Event.execute([:robot, :recorder, what], %{at_ms: now_ms()}, about)
+  end
+
+  defp write(%{output: nil} = s), do: %{s | entries: [], count: 0, shots: []}
+
+  defp write(s) do
+    ns = (now_ms() + s.unix_ms) * 1_000_000
+
+    {entries, shots} = {Enum.reverse(s.entries), Enum.reverse(s.shots)}
+
+    case Output.write(s.output, entries, shots, s.robots, ns) do
+      {:ok, output, turned?} ->
+        s = %{s | output: output, entries: [], count: 0, shots: [], written: s.written + s.count}
+        if turned?, do: ask(s), else: s
+
+      {:error, line} ->
+        fail(s, line)
+    end
+  end
+
+  defp closed(%{output: nil, failed: nil}), do: :ok
+  defp closed(%{output: nil, failed: line}), do: {:error, line}
+  defp closed(%{output: output}), do: Output.close(output)
+
+  defp minute(s), do: if(now_ms() - s.asked_ms >= @checkpoint_ms, do: ask(s), else: s)
+
+  defp ask(s) do
+    Enum.each(s.queues, fn {_id, queue} -> Queue.ask(queue) end)
+    %{s | asked_ms: now_ms()}
+  end
+
+  # Of a single file there is a part already, which is not overwritten.
+  defp again(%{output: nil, failed: failed} = s) when failed != nil do
+    if s.file[:limit_bytes] != nil and now_ms() - s.tried_ms >= s.again_ms, do: open(s), else: s
+  end
+
+  defp again(s), do: s
+
+  defp now_ms, do: System.monotonic_time(:millisecond)
+end

@@ -1,0 +1,138 @@
+defmodule Robot.Replay.Roles do
+  @moduledoc """
+  What the processes of a robot do on an input (`Robot.Control.Trace`), as functions of their
+  state: the same pure functions that they call, and the order in which they carry out the effects.
+  Pure if the mission is.
+  """
+  alias Robot.Control.Controller
+  alias Robot.Mission.Runner
+  alias Robot.Navigation.Grid
+  alias Robot.Safety.Reflex
+  import Robot.Mission, only: [is_order: 1]
+
+  @typedoc "The state of a role, and what it needs to know besides (`Robot.Control.Trace`)."
+  @type t :: {struct(), map()}
+  @type result :: {t(), effects :: [term()]}
+
+  @doc "The roles that can be replayed."
+  @spec all() :: [atom()]
+  def all, do: [:gate, :executive, :pilot]
+
+  @states [
+    gate: {Reflex, :dry_run},
+    executive: {Controller, :looks},
+    pilot: {Runner, :state}
+  ]
+
+  @doc """
+  Whether a replay can do something with an entry of this role, kind and content: a state must have
+  the form that it has in this version of the program.
+
+      iex> alias Robot.Replay.Roles
+      iex> {Roles.entry?(:gate, :input, :step), Roles.entry?(:head, :input, :step)}
+      {true, false}
+      iex> {Roles.entry?(:gate, :lost, 2), Roles.entry?(:gate, :begin, {%{}, %{}})}
+      {true, false}
+  """
+  @spec entry?(term(), term(), term()) :: boolean()
+  def entry?(role, kind, what) when is_map_key(%{gate: 1, executive: 1, pilot: 1}, role) do
+    case kind do
+      kind when kind in [:input, :effect] -> true
+      :lost -> is_integer(what) and what > 0
+      kind when kind in [:begin, :checkpoint] -> state?(@states[role], what)
+      _unknown -> false
+    end
+  end
+
+  def entry?(_role, _kind, _what), do: false
+
+  defp state?({module, fact}, {%module{} = state, facts}) when is_map_key(facts, fact),
+    do: Map.keys(state) == Map.keys(struct(module))
+
+  defp state?(_role, _other), do: false
+
+  @doc "The state with which a role starts, and the effects that it has then."
+  @spec begin(atom(), t()) :: result()
+  def begin(:pilot, {%Runner{} = runner, %{state: nil}}) do
+    state = Runner.state(runner)
+    {{runner, %{state: state}}, [{:phase, state}]}
+  end
+
+  def begin(:pilot, {%Runner{}, %{state: _state}} = state), do: {state, []}
+  def begin(:gate, {%Reflex{}, %{dry_run: _}} = state), do: {state, []}
+  def begin(:executive, {%Controller{}, %{looks: _}} = state), do: {state, []}
+
+  @doc "What a role does on an input at this time of the robot's clock."
+  @spec input(atom(), t(), term(), at_ms :: integer()) :: result()
+  def input(:gate, {reflex, facts}, what, at_ms) do
+    {reflex, effects} = gate(what, reflex, facts, at_ms)
+    {{reflex, facts}, effects}
+  end
+
+  def input(:executive, {controller, facts}, what, _at_ms) do
+    {controller, effects} = executive(what, controller, facts)
+    {{controller, facts}, effects}
+  end
+
+  def input(:pilot, {runner, facts}, what, _at_ms), do: pilot(what, runner, facts)
+
+  defp gate({:wish, twist}, reflex, _facts, at_ms), do: {Reflex.wish(reflex, twist, at_ms), []}
+  defp gate(:forget, reflex, _facts, _at_ms), do: {elem(Reflex.forget(reflex), 0), []}
+  defp gate(:estop, reflex, _facts, _at_ms), do: {Reflex.estop(reflex), []}
+  defp gate(:reset, reflex, _facts, _at_ms), do: {Reflex.reset(reflex), []}
+
+  # That a reading asks for a step at once is seen by the step that follows.
+  defp gate({:sense, reading}, reflex, _facts, at_ms),
+    do: {elem(Reflex.sense(reflex, reading, at_ms), 0), []}
+
+  defp gate(:step, reflex, facts, at_ms) do
+    {twist, limits, reflex} = Reflex.step(reflex, at_ms)
+
+    if facts.dry_run,
+      do: {reflex, [{:drive, Hal.Twist.zero(), [:dry_run | limits]}]},
+      else: {reflex, [{:drive, twist, limits}]}
+  end
+
+  defp executive({:tick, percept}, before, facts) do
+    {wish, outcome, controller} = Controller.tick(before, percept)
+    ended = with {tag, outcome} <- outcome, do: {:outcome, tag, outcome}
+    told = List.wrap(ended) ++ Controller.report(before, controller)
+    {controller, [{:wish, wish} | look(wish.look, facts)] ++ told}
+  end
+
+  defp executive(:stand, controller, _facts), do: {Controller.stand(controller), []}
+
+  defp executive(order, controller, facts) when is_order(order) do
+    {controller, pan} = Controller.obey(controller, order)
+    {controller, look(pan, facts)}
+  end
+
+  defp look(nil, _facts), do: []
+  defp look(pan, facts), do: if(facts.looks, do: [{:look, pan}], else: [])
+
+  defp pilot({:start, module, options}, runner, facts),
+    do: runner |> Runner.start(module, options) |> follow(facts)
+
+  defp pilot(:stop, runner, facts),
+    do: {{Runner.halt(runner), %{state: :idle}}, phase(facts.state, :idle)}
+
+  defp pilot(:resume, runner, facts) do
+    {:ok, runner} = Runner.resume(runner)
+    {{runner, facts}, []}
+  end
+
+  defp pilot({:walls, packed}, runner, facts) do
+    {:ok, walls} = Grid.Packed.unpack(packed)
+    {{Runner.walls(runner, walls), facts}, []}
+  end
+
+  defp pilot(event, runner, facts), do: runner |> Runner.handle(event) |> follow(facts)
+
+  defp follow({runner, effects}, facts) do
+    state = Runner.state(runner)
+    {{runner, %{state: state}}, effects ++ phase(facts.state, state)}
+  end
+
+  defp phase(state, state), do: []
+  defp phase(_before, state), do: [{:phase, state}]
+end

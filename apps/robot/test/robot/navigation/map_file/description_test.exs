@@ -1,0 +1,71 @@
+defmodule Robot.Navigation.MapFile.DescriptionTest do
+  use ExUnit.Case, async: true
+  alias Robot.Navigation.MapFile.Description
+  doctest Description
+
+  @yaml """
+  image: floor.pgm
+  mode: trinary
+  resolution: 0.050000   # metres
+  origin: [-1.000000, -3.0, 0]
+  negate: 0
+  occupied_thresh: 0.65
+  free_thresh: 0.196
+  """
+
+  defp with_line(key, line),
+    do: String.replace(@yaml, ~r/^#{key}:.*$/m, line)
+
+  test "what map_server writes is read, also with quotes, remarks, a list of lines and \\r\\n" do
+    assert {:ok, %{image: "floor.pgm", resolution: 0.05, origin: {-1.0, -3.0}}} =
+             Description.parse(@yaml)
+
+    for yaml <- [
+          String.replace(@yaml, "\n", "\r\n"),
+          "# a map\n\nmaker: {name: someone}\n" <> @yaml,
+          with_line("image", "image: \"floor.pgm\""),
+          with_line("image", "image: 'floor.pgm'  # the picture"),
+          with_line("origin", "origin:\n- -1.0\n- -3.0\n- 0.0"),
+          with_line("resolution", "resolution: 5e-2"),
+          with_line("mode", "")
+        ] do
+      assert Description.parse(yaml) == Description.parse(@yaml)
+    end
+  end
+
+  test "what is not surely free is wall" do
+    walls = fn yaml ->
+      {:ok, %{shades: shades}} = Description.parse(yaml)
+      for grey <- 0..255, elem(shades, grey), do: grey
+    end
+
+    assert walls.(@yaml) == Enum.to_list(0..205)
+    assert walls.(with_line("free_thresh", "free_thresh: 0.25")) == Enum.to_list(0..191) ++ [205]
+    assert walls.(with_line("free_thresh", "")) == Enum.to_list(0..205)
+    assert walls.(with_line("negate", "negate: 1")) == Enum.to_list(50..255)
+  end
+
+  test "each mistake is one line that says what is allowed" do
+    for {yaml, pattern} <- [
+          {"", ~r/^image is missing; needed are image, resolution, origin$/},
+          {<<0xFF, 0xFE>>, ~r/^is not text$/},
+          {with_line("image", "image:"), ~r/^image must be the name/},
+          {with_line("resolution", "resolution: fine"), ~r/^resolution cannot be fine: a number/},
+          {with_line("resolution", "resolution: 0"),
+           ~r/^resolution cannot be 0: a number from 0.001/},
+          {with_line("resolution", "resolution: 1e99"), ~r/^resolution cannot be 1e99/},
+          {with_line("resolution", "resolution: 1e-99"), ~r/^resolution cannot be 1e-99/},
+          {with_line("origin", "origin: 3"), ~r/^origin cannot be 3: \[x, y, 0.0\]/},
+          {with_line("origin", "origin: [1.0]"), ~r/^origin cannot be/},
+          {with_line("origin", "origin: [a, b, c]"), ~r/^origin cannot be/},
+          {with_line("origin", "origin: [0, 0, 1.57]"), ~r/^origin .* is turned/},
+          {with_line("occupied_thresh", "occupied_thresh: 7"), ~r/^occupied_thresh cannot be 7/},
+          {with_line("negate", "negate: 2"), ~r/^negate cannot be 2: 0 or 1/},
+          {with_line("mode", "mode: raw"), ~r/^mode cannot be raw/}
+        ] do
+      assert {:error, line} = Description.parse(yaml)
+      assert line =~ pattern
+      refute line =~ "\n"
+    end
+  end
+end

@@ -1,0 +1,258 @@
+defmodule Robot.ReplayTest do
+  use ExUnit.Case, async: true
+  alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Robot.Behaviour.Move
+  alias Robot.Control.Controller
+  alias Robot.Mission.{Manual, Runner}
+  alias Robot.{Percept, Recording, Replay}
+  alias Robot.Replay.Roles
+  alias Robot.Safety.Reflex
+  doctest Robot.Replay
+  doctest Robot.Replay.Roles
+  doctest Robot.Recording
+  doctest Robot.Recording.Terms
+
+  defmodule Fragile do
+    @moduledoc false
+    def init(_robot, []), do: {:ready, 0, [{:claim, %{}}]}
+    def handle({:command, :break}, _count), do: raise("broken")
+    def handle(_event, count), do: {:ready, count + 1, [{:stage, :heard, %{count: count}}]}
+  end
+
+  defp reflex, do: Reflex.new(Profile.magellan())
+
+  # What a process of this role records for these inputs, one a 50 ms.
+  defp recorded(role, state, inputs, from_ms \\ 0) do
+    {state, effects} = Roles.begin(role, state)
+
+    {entries, {state, at_ms}} =
+      Enum.flat_map_reduce(inputs, {state, from_ms}, fn input, {state, at_ms} ->
+        {state, effects} = Roles.input(role, state, input, at_ms)
+
+        {[{role, :input, input, at_ms} | for(e <- effects, do: {role, :effect, e, at_ms})],
+         {state, at_ms + 50}}
+      end)
+
+    {for(e <- effects, do: {role, :effect, e, from_ms}) ++ entries, state, at_ms}
+  end
+
+  defp replay(entries) do
+    {replay, found} =
+      Enum.reduce(entries, {Replay.new(), []}, fn entry, {replay, found} ->
+        {replay, difference} = Replay.step(replay, {:mag1, entry})
+        {replay, List.wrap(difference) ++ found}
+      end)
+
+    {replay, last} = Replay.finish(replay)
+    {Map.new(Replay.counts(replay)), Enum.reverse(found) ++ last, replay}
+  end
+
+  defp gate do
+    near = List.duplicate(5.1, 16) |> List.replace_at(11, 0.4)
+
+    inputs =
+      [:step, {:wish, Twist.new(0.3, 0.1)}, :step, {:sense, {:sonar, near}}, :step] ++
+        [{:wish, Twist.new(0.3, 0.0)}, :step, :estop, :step, :reset, :forget, :step]
+
+    begin = {reflex(), %{dry_run: false}}
+    {entries, state, at_ms} = recorded(:gate, begin, inputs)
+    {[{:gate, :begin, begin, 0} | entries], state, at_ms}
+  end
+
+  test "what is as recorded is counted, and what is not is named" do
+    {entries, _state, _at_ms} = gate()
+    assert {%{{:mag1, :gate} => counts}, [], _replay} = replay(entries)
+    assert %{inputs: 12, decisions: 6, begun: 1, skipped: 0, lost: 0} = counts
+
+    drives? = &match?({:gate, :effect, {:drive, %Twist{linear: v}, _}, _} when v > 0, &1)
+    at = Enum.find_index(entries, drives?)
+    {:gate, :effect, {:drive, twist, limits}, at_ms} = Enum.at(entries, at)
+    other = {:drive, %{twist | linear: twist.linear + 1.0e-15}, limits}
+    changed = List.replace_at(entries, at, {:gate, :effect, other, at_ms})
+    assert {%{{:mag1, :gate} => counts}, [difference], _replay} = replay(changed)
+
+    assert %{robot: :mag1, role: :gate, at_ms: ^at_ms, input: :step, recorded: [^other]} =
+             difference
+
+    assert difference.replayed == [{:drive, twist, limits}]
+    # After that its state is not known any more, and nothing is called equal.
+    assert counts.skipped > 0
+  end
+
+  test "an effect that is missing, or one too many, differs" do
+    {entries, _state, _at_ms} = gate()
+    [first | _] = for {{:gate, :effect, _, _}, n} <- Enum.with_index(entries), do: n
+    assert {_, [%{recorded: [], replayed: [_]}], _} = replay(List.delete_at(entries, first))
+    twice = List.insert_at(entries, first, Enum.at(entries, first))
+    assert {_, [%{recorded: [_, _], replayed: [_]}], _} = replay(twice)
+    # The end of a file may be missing.
+    assert {_, [], _} = replay(Enum.drop(entries, -1))
+  end
+
+  test "without a state nothing is compared, from a checkpoint on everything" do
+    {entries, state, at_ms} = gate()
+    {more, _state, _at_ms} = recorded(:gate, state, [:step, :step], at_ms)
+    checkpoint = {:gate, :checkpoint, state, at_ms}
+    assert {%{{:mag1, :gate} => counts}, [], _} = replay(entries ++ [checkpoint | more])
+    assert %{checked: 1, decisions: 8, skipped: 0} = counts
+
+    middle = Enum.drop(entries, 5) ++ [checkpoint | more]
+    assert {%{{:mag1, :gate} => counts}, [], _} = replay(middle)
+    assert %{checked: 0, decisions: 2, early: early, skipped: 0} = counts
+    assert early == length(entries) - 5
+
+    # Without any state it is not the time before a recording.
+    assert {%{{:mag1, :gate} => counts}, [], _} = replay(Enum.drop(entries, 5))
+    assert %{decisions: 0, early: 0, skipped: ^early} = counts
+  end
+
+  test "a checkpoint with another state than the replay's differs in what is named" do
+    {entries, {reflex, facts}, at_ms} = gate()
+    other = {%{reflex | bumpers: [3]}, facts}
+    {more, _state, _at_ms} = recorded(:gate, other, [:step], at_ms)
+
+    assert {%{{:mag1, :gate} => counts}, [difference], _} =
+             replay(entries ++ [{:gate, :checkpoint, other, at_ms} | more])
+
+    assert %{input: :checkpoint, recorded: [bumpers: [3]], replayed: [bumpers: []]} = difference
+    assert counts.checked == 0 and counts.skipped == 0
+  end
+
+  test "lost entries are counted, and what follows waits for a state" do
+    {entries, state, at_ms} = gate()
+    {first, [_lost, _lost_too | rest]} = Enum.split(entries, 6)
+    {more, _state, _at_ms} = recorded(:gate, state, [:step], at_ms)
+
+    all = first ++ [{:gate, :lost, 2, 100}] ++ rest ++ [{:gate, :checkpoint, state, at_ms} | more]
+    assert {%{{:mag1, :gate} => counts}, [], _} = replay(all)
+    assert %{lost: 2, skipped: skipped} = counts
+    assert skipped == length(rest)
+  end
+
+  test "in a dry run, and without a head, other effects are right" do
+    {entries, _, _} = recorded(:gate, {reflex(), %{dry_run: true}}, [:step])
+
+    assert [_, {:gate, :effect, {:drive, twist, [:dry_run, :dead_man]}, 0}] = entries
+    assert twist == Twist.zero()
+
+    controller = Controller.new(profile: Profile.magellan(), start: Pose.new(0, 0))
+
+    for {looks, count} <- [{true, 1}, {false, 0}] do
+      {entries, _, _} = recorded(:executive, {controller, %{looks: looks}}, [{:look, 0.3}])
+      assert Enum.count(entries, &match?({:executive, :effect, {:look, _}, _}, &1)) == count
+    end
+  end
+
+  test "why: what was perceived, all wishes, and the mission's phase" do
+    profile = Profile.magellan()
+    controller = Controller.new(profile: profile, start: Pose.new(1, 2))
+    odometry = %Odometry{pose: Pose.new(0, 0), twist: Twist.zero()}
+    percept = %Percept{robot: :mag1, at_ms: 0, profile: profile, odometry: odometry}
+    begin = {controller, %{looks: true}}
+    goal = {:goal, :go, {Move, linear: 0.2, turn: 0.0}}
+    {entries, _, _} = recorded(:executive, begin, [goal, {:tick, percept}])
+
+    pilot = {Runner.new(:mag1), %{state: nil}}
+    {told, _, _} = recorded(:pilot, pilot, [{:start, Manual, []}, :stop])
+    all = [{:executive, :begin, begin, 0} | entries] ++ [{:pilot, :begin, pilot, 0} | told]
+
+    assert {counts, [], replay} = replay(all)
+    assert counts[{:mag1, :pilot}].decisions > 2
+    reasons = Replay.Moment.reasons(Replay.moment(replay, :mag1))
+    assert reasons.percept.pose == Pose.new(1, 2)
+    assert [{%{by: _chosen}, first} | rest] = reasons.wishes
+    assert Enum.all?(rest, fn {_wish, weight} -> weight <= first end)
+    assert Runner.state(Replay.state(replay, :mag1, :pilot)) == :idle
+  end
+
+  test "the walls that the sonars see go to the pilot once each time that they change, and are replayed" do
+    profile = Profile.magellan()
+    plan = Robot.Navigation.OccupancyGrid.new()
+    begin = {Controller.new(profile: profile, start: Pose.new(1, 2), plan: plan), %{looks: true}}
+
+    # Along a wall at its left.
+    ranges = %{5 => 1.2, 6 => 0.87, 7 => 0.8, 8 => 0.87, 9 => 1.2}
+
+    ticks =
+      for k <- 0..60 do
+        odometry = %Odometry{pose: Pose.new(k * 0.03, 0), twist: Twist.new(0.3, 0.0)}
+        sonar = for at <- 0..15, do: Map.get(ranges, at, profile.sonar_max)
+        shared = %Percept{robot: :mag1, at_ms: k * 100, profile: profile}
+        {:tick, %{shared | odometry: odometry, sonar: sonar}}
+      end
+
+    {entries, {controller, _facts}, _} = recorded(:executive, begin, ticks)
+    told = for {:executive, :effect, {:walls, _} = walls, _} <- entries, do: walls
+    assert length(told) in 2..7
+    assert Enum.all?(told, &(byte_size(:erlang.term_to_binary(&1)) < 2_000))
+    assert for({_, _, {:tick, percept}, _} <- entries, percept.grid, do: percept) == []
+    assert {_, [], _} = replay([{:executive, :begin, begin, 0} | entries])
+
+    pilot = {Runner.new(:mag1), %{state: nil}}
+    {heard, {runner, _facts}, _} = recorded(:pilot, pilot, told)
+    assert %Robot.Navigation.Grid{} = grid = runner.grid
+    assert grid == Controller.walls(controller)
+    assert {_, [], replay} = replay([{:pilot, :begin, pilot, 0} | heard])
+    assert Replay.state(replay, :mag1, :pilot).grid == grid
+  end
+
+  test "a mission that crashed crashes again, and one that did not is named" do
+    begin = {Runner.new(:mag1), %{state: nil}}
+    {entries, state, at_ms} = recorded(:pilot, begin, [{:start, Fragile, []}, {:command, :a}])
+    entries = [{:pilot, :begin, begin, 0} | entries]
+    broken = {:pilot, :input, {:command, :break}, at_ms}
+    again = [{:pilot, :begin, begin, at_ms}, {:pilot, :effect, {:phase, :idle}, at_ms}]
+
+    assert {%{{:mag1, :pilot} => %{begun: 2}}, [], _} = replay(entries ++ [broken | again])
+
+    next = {:pilot, :input, {:command, :b}, at_ms + 50}
+    assert {_, [difference], _} = replay(entries ++ [broken, next])
+    assert difference.crash =~ "broken"
+    checkpoint = {:pilot, :checkpoint, state, at_ms}
+    assert {_, [%{crash: "" <> _}], _} = replay(entries ++ [broken, checkpoint])
+  end
+
+  test "entries pass through a file unchanged, with the marks of a profile and of references" do
+    profile = Profile.magellan()
+    odometry = %Odometry{pose: Pose.new(0, 0), twist: Twist.zero(), frame: make_ref()}
+    percept = %Percept{robot: :mag1, at_ms: 5, profile: profile}
+
+    entries = [
+      {:mag1, {:gate, :input, {:sense, {:odometry, odometry}}, 5}},
+      {:mag1, {:executive, :input, {:tick, percept}, 5}}
+    ]
+
+    robots = %{mag1: %{offset_ms: 7, profile: profile}}
+    bytes = Recording.trace(entries, robots)
+    assert Recording.read_trace(bytes, robots) == {:ok, entries}
+    assert Recording.read_robots(Recording.robots(robots)) == {:ok, robots}
+    assert byte_size(bytes) < div(byte_size(:erlang.term_to_binary(entries)), 2)
+
+    assert {:error, "is a recording of version 99; this program reads version 1"} =
+             Recording.read_robots(:erlang.term_to_binary({:convoy_robots, 99, %{}}))
+
+    # Of a program whose states had other parts, or a file that somebody made.
+    {reflex, facts} = {reflex(), %{dry_run: false}}
+    old = {reflex |> Map.delete(:bumpers), facts}
+
+    for {kind, what} <- [begin: old, checkpoint: {reflex, %{}}, lost: -1, begin: 1, other: 1] do
+      bytes = :erlang.term_to_binary([{:mag1, {:gate, kind, what, 0}}])
+      assert {:error, "has entries that" <> _} = Recording.read_trace(bytes, %{})
+    end
+
+    for robots <- [
+          %{1 => %{offset_ms: 0, profile: nil}},
+          %{mag1: 1},
+          %{mag1: %{offset_ms: 0.5, profile: nil}}
+        ] do
+      assert {:error, "begins with something" <> _} =
+               Recording.read_robots(:erlang.term_to_binary({:convoy_robots, 1, robots}))
+    end
+
+    junk = [<<>>, "junk", <<131, 80, 0xFFFFFFFF::32, 0>>, :erlang.term_to_binary([{:mag1, 3}])]
+    for bytes <- junk, do: assert({:error, _line} = Recording.read_trace(bytes, %{}))
+
+    none = [{:mag1, {:gate, :input, {:"$convoy_reference", "x"}, 1}}]
+    assert {:error, _line} = Recording.read_trace(:erlang.term_to_binary(none), %{})
+  end
+end

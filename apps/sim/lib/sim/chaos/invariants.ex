@@ -1,0 +1,196 @@
+defmodule Sim.Chaos.Invariants do
+  @moduledoc """
+  Judges a run in lockstep at every tick, from outside. Pure.
+
+  | invariant | judged by |
+  |---|---|
+  | `two_leaders`, `same_epoch`, `two_majorities`, `not_together`, `no_leader` | `Sim.Chaos.Invariants.Leaders` |
+  | `same_slot`, `bad_anchor` | `Sim.Chaos.Invariants.Slots` |
+  | `too_fast`, `too_abrupt`, `stop_ignored` | `Sim.Chaos.Invariants.Limits` |
+  | `stop_lost` | `Sim.Chaos.Invariants.Stops` |
+  | `collision` | contacts of `Sim.World`: a robot with a robot, alive or dead, or with a wall |
+  | `stuck` | `Sim.Trial.Stuck`: short of its slot for 20 s without a word |
+  | `false_claim` | `Sim.Trial.Claims`: `formed`, and the worst robot more than 0.5 m off then or 5 s later |
+
+  `false_claim` is a promise in probability: a follower is in place if that is true in 95 of 100 cases,
+  and the published goal is 99 % of all claims. Each false claim is told; whether many runs together
+  violate it is decided by `goal/0` (`Sim.Chaos.Runner`).
+
+  A frozen robot is not asked anything: what it claimed last is old, and it cannot report that it is
+  stuck. A robot that hears nothing, or whose camera is blind, is.
+
+  Only the first violation of each invariant by the same robots is kept.
+  """
+  alias Sim.Chaos.Invariants.{Leaders, Limits, Slots, Stops, Withdrawals}
+  alias Sim.Chaos.Violation
+  alias Sim.{Radio, Trial}
+  alias Sim.Trial.{Claims, Faults, Stuck}
+
+  @names [:two_leaders, :same_epoch, :two_majorities, :not_together, :no_leader] ++
+           [:same_slot, :bad_anchor, :too_fast, :too_abrupt, :stop_ignored, :stop_lost] ++
+           [:collision, :stuck, :false_claim, :crash]
+  @goal 0.99
+
+  @enforce_keys [:leaders, :slots, :stops, :withdrawals]
+  defstruct @enforce_keys ++ [limits: Limits.new(), collisions: 0, stuck: 0, told: %{}]
+
+  @type t :: %__MODULE__{
+          leaders: Leaders.t(),
+          slots: Slots.t(),
+          stops: Stops.t(),
+          withdrawals: Withdrawals.t(),
+          limits: Limits.t(),
+          collisions: non_neg_integer(),
+          stuck: non_neg_integer(),
+          told: %{{atom(), [atom()]} => Violation.t()}
+        }
+
+  @doc "All invariants, in the order of the report; `crash` is a run that raised."
+  @spec names() :: [atom(), ...]
+  def names, do: @names
+
+  @doc "The share of the claims of many runs that must be true."
+  @spec goal() :: float()
+  def goal, do: @goal
+
+  @doc "The judge at the beginning of a trial."
+  @spec new(Trial.t()) :: t()
+  def new(%Trial{options: options}) do
+    %__MODULE__{
+      leaders: Leaders.new(options),
+      slots: Slots.new(options),
+      stops: Stops.new(options),
+      withdrawals: Withdrawals.new(options)
+    }
+  end
+
+  @doc "One tick: the trial after a step."
+  @spec note(t(), Trial.t()) :: t()
+  def note(judge, %Trial{at_ms: at_ms, world: world} = trial) do
+    # What a frozen robot claimed last is nothing that it says or does now.
+    frozen? = &Faults.any?(trial.faults, [:frozen], &1, at_ms - 1)
+    claims = for {id, _claim} = row <- Trial.claims(trial), not frozen?.(id), do: row
+    ids = for {id, _claim} <- claims, do: id
+    parts = Radio.parts(trial.radio, ids)
+    stops = for id <- ids, into: %{}, do: {id, trial.members[id].stop}
+    held = for {id, %{held: [_ | _]}} <- stops, do: id
+    missions = for id <- ids, mission = trial.members[id].runner.mission, do: {id, mission}
+    bodies = for id <- ids, do: world.robots[id]
+
+    {led, leaders} = Leaders.note(judge.leaders, at_ms, claims, parts)
+    {placed, slots} = Slots.note(judge.slots, at_ms, missions)
+    {driven, limits} = Limits.note(judge.limits, at_ms, bodies, held)
+    {stopped, stops} = Stops.note(judge.stops, at_ms, stops, parts)
+    withdrawals = Withdrawals.note(judge.withdrawals, at_ms, claims)
+
+    judge = %{
+      judge
+      | leaders: leaders,
+        slots: slots,
+        limits: limits,
+        stops: stops,
+        withdrawals: withdrawals
+    }
+
+    {touched, judge} = contacts(judge, world)
+    {silent, judge} = silences(judge, trial)
+    tell(judge, led ++ placed ++ driven ++ stopped ++ touched ++ silent)
+  end
+
+  @doc "The end of the run, with its report (`Sim.Trial.result/1`): its claims can be judged now."
+  @spec finish(t(), map()) :: t()
+  def finish(judge, %{claims: claims}) do
+    wrong =
+      for %{robot: leader, at_s: at_s} = claim <- claims, right?(judge, claim) == false do
+        Violation.new(:false_claim, round(at_s * 1000), [leader], metres(claim))
+      end
+
+    tell(judge, wrong)
+  end
+
+  @doc """
+  Whether a claim was true (`Sim.Trial.Claims.right?/1`), `nil` if there is nothing to judge. One that
+  was being withdrawn when it was judged again is judged by its beginning alone
+  (`Sim.Chaos.Invariants.Withdrawals`).
+  """
+  @spec right?(t(), Claims.claim()) :: boolean() | nil
+  def right?(judge, claim) do
+    if Withdrawals.withdrawn?(judge.withdrawals, claim),
+      do: Claims.right?(%{claim | worst_5s_m: nil}),
+      else: Claims.right?(claim)
+  end
+
+  @doc "The violations up to now, by time."
+  @spec violations(t()) :: [Violation.t()]
+  def violations(judge),
+    do: judge.told |> Map.values() |> Enum.sort_by(&{&1.at_ms, &1.invariant, &1.robots})
+
+  @doc "Whether this invariant was violated up to now."
+  @spec violated?(t(), atom()) :: boolean()
+  def violated?(judge, invariant),
+    do: Enum.any?(judge.told, fn {{name, _robots}, _violation} -> name == invariant end)
+
+  # The world keeps the newest contacts.
+  defp contacts(%{collisions: known} = judge, %{collisions: known}), do: {[], judge}
+
+  defp contacts(judge, world) do
+    wrong =
+      for {at_ms, parties, with} <- Enum.take(world.contacts, world.collisions - judge.collisions) do
+        ids = for {id, _place, _speed} <- parties, do: id
+
+        speeds =
+          Enum.map_join(parties, ", ", fn {id, {x, y}, speed} ->
+            "#{id} at #{figure(x)},#{figure(y)} with #{figure(speed)} m/s"
+          end)
+
+        Violation.new(
+          :collision,
+          at_ms,
+          ids,
+          if(with == :wall, do: "wall, " <> speeds, else: speeds)
+        )
+      end
+
+    {Enum.reverse(wrong), %{judge | collisions: world.collisions}}
+  end
+
+  # A robot that was frozen meanwhile could not report it.
+  defp silences(%{stuck: known} = judge, %{at_ms: at_ms} = trial) do
+    told = Stuck.report(trial.run_log.stuck)
+
+    wrong =
+      for %{robot: id, at_s: at_s, error_m: error_m} <- Enum.drop(told, known),
+          not frozen_since?(trial.faults, id, round(at_s * 1000)) do
+        figures =
+          "#{figure(error_m)} m off since #{Violation.decimals(at_s, 1)} s, and says nothing"
+
+        Violation.new(:stuck, at_ms, [id], figures)
+      end
+
+    {wrong, %{judge | stuck: length(told)}}
+  end
+
+  defp frozen_since?(faults, id, since_ms) do
+    Enum.any?(faults.all, fn {kind, robot, _from_ms, to_ms} ->
+      {kind, robot} == {:frozen, id} and to_ms > since_ms
+    end)
+  end
+
+  defp metres(%{worst_m: then, worst_5s_m: later}) do
+    "worst robot " <>
+      Enum.map_join([{"then", then}, {"5 s later", later}], ", ", fn {when?, metres} ->
+        "#{if metres, do: figure(metres), else: "?"} m #{when?}"
+      end)
+  end
+
+  defp tell(judge, violations) do
+    told =
+      Enum.reduce(violations, judge.told, fn violation, told ->
+        Map.put_new(told, {violation.invariant, violation.robots}, violation)
+      end)
+
+    %{judge | told: told}
+  end
+
+  defp figure(number), do: Violation.decimals(number, 2)
+end

@@ -1,0 +1,134 @@
+defmodule Sim.Chaos.Runner do
+  @moduledoc """
+  Plays many runs side by side, and shrinks each violation. The result does not depend on how many
+  are played at once.
+  """
+  alias Sim.Chaos.{Draw, Invariants, Isolated, Run, Shrink, Violation}
+
+  # A run that violates many invariants mostly has one cause.
+  @most_shrunk 2
+
+  @typedoc """
+  A violation of a run, and the smallest run that still violates this invariant, by which violation,
+  after so many attempts.
+  """
+  @type failure :: %{
+          number: pos_integer(),
+          violation: Violation.t(),
+          smallest: keyword(),
+          again: Violation.t(),
+          attempts: non_neg_integer()
+        }
+
+  @type played :: %{number: pos_integer(), outcome: Run.outcome() | nil, failures: [failure()]}
+
+  @typedoc "The runs by number, and whether they are clean together."
+  @type report :: %{seed: integer(), runs: [played()], clean?: boolean()}
+
+  @doc """
+  Plays these runs of a seed. Options: `jobs` (how many at once, default one a scheduler), `attempts`
+  (to shrink a violation, default 40), `done` (called with each `t:played/0` in the order in which
+  they end), `draw` (default `Sim.Chaos.Draw.options/2`).
+  """
+  @spec run(integer(), Enumerable.t(), keyword()) :: report()
+  def run(seed, numbers, options \\ []) do
+    options =
+      Keyword.validate!(options,
+        jobs: System.schedulers_online(),
+        attempts: 40,
+        done: fn _played -> :ok end,
+        draw: &Draw.options/2
+      )
+
+    runs =
+      numbers
+      |> Task.async_stream(&play(seed, &1, options),
+        max_concurrency: options[:jobs],
+        timeout: :infinity,
+        ordered: false
+      )
+      |> Enum.map(fn {:ok, played} ->
+        options[:done].(played)
+        played
+      end)
+      |> Enum.sort_by(& &1.number)
+
+    %{seed: seed, runs: runs, clean?: clean?(runs)}
+  end
+
+  @doc """
+  Whether runs are clean together: no violation, but for false claims, of which the goal of
+  `Sim.Chaos.Invariants.goal/0` allows some among many.
+  """
+  @spec clean?([played()]) :: boolean()
+  def clean?(runs) do
+    {claims, true_claims} = claims(runs)
+
+    true_claims >= Invariants.goal() * claims and
+      Enum.all?(runs, fn run -> Enum.all?(found(run), &(&1.invariant == :false_claim)) end)
+  end
+
+  @doc "How many claims of `formed` could be judged in these runs, and how many of them were true."
+  @spec claims([played()]) :: {non_neg_integer(), non_neg_integer()}
+  def claims(runs) do
+    outcomes = for %{outcome: outcome} when outcome != nil <- runs, do: outcome
+    {Enum.sum(Enum.map(outcomes, & &1.claims)), Enum.sum(Enum.map(outcomes, & &1.true_claims))}
+  end
+
+  @doc "The violations of a run."
+  @spec found(played()) :: [Violation.t()]
+  def found(%{outcome: nil, failures: failures}), do: Enum.map(failures, & &1.violation)
+  def found(%{outcome: outcome}), do: outcome.violations
+
+  defp play(seed, number, options) do
+    run = options[:draw].(seed, number)
+    {outcome, violations} = attempt(run)
+
+    failures =
+      violations
+      |> Enum.uniq_by(& &1.invariant)
+      |> Enum.take(@most_shrunk)
+      |> Enum.map(&failure(&1, number, run, options[:attempts]))
+
+    %{number: number, outcome: outcome, failures: failures}
+  end
+
+  defp attempt(run) do
+    case Isolated.call(fn -> Run.play(run) end) do
+      {:ok, {:ok, outcome}} -> {outcome, outcome.violations}
+      {:ok, {:error, line}} -> {nil, [Violation.new(:crash, 0, [], "not a run: " <> line)]}
+      {:exit, line} -> {nil, [Violation.new(:crash, 0, [], line)]}
+    end
+  end
+
+  defp failure(violation, number, run, attempts) do
+    judge = fn run ->
+      with %Violation{at_ms: at_ms} <- again(run, violation.invariant), do: at_ms
+    end
+
+    {smallest, needed} = Shrink.shrink(run, judge, attempts)
+
+    %{
+      number: number,
+      violation: violation,
+      smallest: smallest,
+      again: if(smallest == run, do: violation, else: again(smallest, violation.invariant)),
+      attempts: needed
+    }
+  end
+
+  # When a run raised is not known, so its time is not shortened.
+  defp again(run, :crash) do
+    case Isolated.call(fn -> Run.play(run) end) do
+      {:exit, line} -> Violation.new(:crash, run[:duration_s] * 1000, [], line)
+      {:ok, _no_crash} -> nil
+    end
+  end
+
+  defp again(run, invariant) do
+    case Isolated.call(fn -> Run.first(run, invariant) end) do
+      {:ok, violation} -> violation
+      {:exit, _another_fault} -> nil
+    end
+  end
+end

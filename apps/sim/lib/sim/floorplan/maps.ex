@@ -1,0 +1,50 @@
+defmodule Sim.Floorplan.Maps do
+  @moduledoc "The built-in maps by name. Pure."
+  alias Sim.Floorplan.Maps.{Corridors, Halls, Rough, Wide}
+
+  @maps [
+    {"hall", Halls, "one empty room, larger for larger fleets"},
+    {"hospital", Halls, "a large room, a corridor around it, and wards along the corridor"},
+    {"arena", Halls, "a square with a circle of pillars"},
+    {"clinic", Corridors, "two wings across a main corridor, wards with beds, a lobby"},
+    {"offices", Corridors, "thirteen rooms with desks along a corridor"},
+    {"openplan", Wide, "one room with pillars, desks and a booth"},
+    {"lab", Rough, "a room with diagonal walls and benches"},
+    {"cave", Rough, "six chambers without a straight wall"},
+    {"ring", Wide, "a round corridor; the centre is wall"},
+    {"doorway", Corridors, "two rooms and a door of 0.9 m"}
+  ]
+
+  @doc """
+  Their names, and what each shows in a few words.
+
+      iex> {"hall", about} = hd(Sim.Floorplan.Maps.list())
+      iex> about
+      "one empty room, larger for larger fleets"
+  """
+  @spec list() :: [{String.t(), about :: String.t()}]
+  def list, do: for({name, _module, about} <- @maps, do: {name, about})
+
+  @doc """
+  Their names.
+
+      iex> Enum.join(Sim.Floorplan.Maps.names(), " ")
+      "hall hospital arena clinic offices openplan lab cave ring doorway"
+  """
+  @spec names() :: [String.t()]
+  def names, do: for({name, _module, _about} <- @maps, do: name)
+
+  @doc "Whether one of them has this name."
+  @spec built_in?(String.t()) :: boolean()
+  def built_in?(name), do: List.keymember?(@maps, name, 0)
+
+  @doc "What a map may be, in words."
+  @spec allowed() :: String.t()
+  def allowed, do: Enum.join(names(), ", ") <> ", FILE.yaml or FILE.png:WIDTHxHEIGHT"
+
+  @doc "The fields of the map of this name for a fleet of this size; `nil` if there is none."
+  @spec draw(String.t(), pos_integer()) :: map() | nil
+  def draw(name, fleet) do
+    with {^name, module, _about} <- List.keyfind(@maps, name, 0), do: module.draw(name, fleet)
+  end
+end

@@ -1,0 +1,83 @@
+defmodule Sim.Scenario.Check do
+  @moduledoc """
+  Judges one expectation tick by tick. Pure.
+
+  | status | meaning |
+  |---|---|
+  | `:open` | not decided |
+  | `:holding` | not violated, which is enough if the run ends now |
+  | `{:held, at_s, figures}`, `{:failed, at_s, figures}` | decided |
+
+  An expectation is of one of two kinds. What must come about (`:reach`) holds as soon as it does, and
+  fails when its time is up. What must be so all the time (`:keep`) fails as soon as it is not, and
+  holds when its time is up, or the run. `Sim.Scenario.Check.Fleet` and `.Bodies` know which.
+  """
+  alias Sim.Scenario.{Expectation, View}
+  alias Sim.Scenario.Check.{Bodies, Fleet}
+  alias Sim.Trial
+
+  @enforce_keys [:expectation, :window]
+  defstruct @enforce_keys ++ [memory: nil, status: :open]
+
+  @type status ::
+          :open
+          | :holding
+          | {:held | :failed, at_s :: float(), figures :: String.t()}
+
+  @type t :: %__MODULE__{
+          expectation: Expectation.t(),
+          window: {number(), number() | :end},
+          memory: term(),
+          status: status()
+        }
+
+  @typedoc """
+  An answer at one tick within the window: whether it is so now, the figures, and what to remember
+  until the next tick.
+  """
+  @type answer :: {:reach | :keep, so? :: boolean(), figures :: String.t(), memory :: term()}
+
+  @bodies [:at, :in_slot, :still, :moves, :turned, :sees_distance] ++
+            [:speed_at_most, :separation_at_least, :no_collision]
+
+  @doc "The check of an expectation, before the first tick."
+  @spec new(Expectation.t()) :: t()
+  def new(expectation),
+    do: %__MODULE__{expectation: expectation, window: Expectation.window(expectation)}
+
+  @doc "One tick of 100 ms. What is decided stays."
+  @spec tick(t(), Trial.t()) :: t()
+  def tick(%__MODULE__{status: {_decided, _at_s, _figures}} = check, _trial), do: check
+
+  def tick(%__MODULE__{window: {from_s, to_s}, expectation: expectation} = check, trial) do
+    at_s = View.at_s(trial)
+
+    if at_s < from_s do
+      check
+    else
+      module = if elem(expectation, 0) in @bodies, do: Bodies, else: Fleet
+      {kind, so?, figures, memory} = module.judge(expectation, trial, check.memory)
+      over? = to_s != :end and at_s >= to_s
+      %{check | memory: memory, status: status(kind, so?, over?, at_s, figures)}
+    end
+  end
+
+  defp status(:reach, true, _over?, at_s, figures), do: {:held, at_s, figures}
+  defp status(:reach, false, true, at_s, figures), do: {:failed, at_s, figures}
+  defp status(:reach, false, false, _at_s, _figures), do: :open
+  defp status(:keep, false, _over?, at_s, figures), do: {:failed, at_s, figures}
+  defp status(:keep, true, true, at_s, figures), do: {:held, at_s, figures}
+  defp status(:keep, true, false, _at_s, _figures), do: :holding
+
+  @doc "The end of the run: what was not violated holds, what did not come about fails."
+  @spec finish(t(), Trial.t()) :: t()
+  def finish(check, trial) do
+    at_s = View.at_s(trial)
+
+    case check.status do
+      :holding -> %{check | status: {:held, at_s, "to the end of the run"}}
+      :open -> %{check | status: {:failed, at_s, "the run ended before that was decided"}}
+      _decided -> check
+    end
+  end
+end

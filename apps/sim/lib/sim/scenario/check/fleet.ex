@@ -1,0 +1,154 @@
+defmodule Sim.Scenario.Check.Fleet do
+  @moduledoc """
+  Judges expectations about the fleet: who leads, what robots claim, in which phase they are. Pure;
+  answers are those of `Sim.Scenario.Check`.
+  """
+  alias Sim.Scenario.{Check, Expectation, View}
+  alias Sim.Trial
+  alias Sim.Trial.{Claims, RunLog}
+
+  @doc "The answer at this tick; `memory` is what the last one returned, at first `nil`."
+  @spec judge(Expectation.t(), Trial.t(), memory :: term()) :: Check.answer()
+  def judge({:formed, _by}, trial, _),
+    do: reach(RunLog.formed?(trial.run_log), fn so? -> formation(so?, trial) end)
+
+  def judge({:not_formed}, trial, _), do: unformed(trial)
+  def judge({:not_formed, _window}, trial, _), do: unformed(trial)
+
+  # Whether the formation was left in this window. One that was never left is enough at its end.
+  def judge({:formed_again, within}, trial, left?) do
+    now? = RunLog.formed?(trial.run_log)
+    left? = left? == true or not now?
+    last? = View.at_s(trial) >= within[:after_s] + within[:within_s]
+    {:reach, now? and (left? or last?), formation(now?, trial), left?}
+  end
+
+  def judge({:leader, _by}, trial, _),
+    do: reach(View.leader(trial) != nil, fn _ -> leader(trial) end)
+
+  def judge({:leader_changed, _within}, trial, first) do
+    first = first || {:at_first, View.leader(trial)}
+    {:at_first, before} = first
+    now = View.leader(trial)
+
+    {:reach, now not in [nil, before], "#{leader(trial)}, at first #{before || "nobody"} did",
+     first}
+  end
+
+  def judge({:same_leader, _window}, trial, first) do
+    first = first || {:at_first, View.leader(trial)}
+    {:at_first, before} = first
+    so? = before != nil and View.leader(trial) == before
+    {:keep, so?, "#{leader(trial)}, at first #{before || "nobody"} did", first}
+  end
+
+  def judge({:one_leader, _window}, trial, _) do
+    wrong = for {_part, leaders} = row <- View.leaders(trial), length(leaders) != 1, do: row
+    keep(wrong == [], fn -> Enum.map_join(wrong, "; ", &leads/1) end, "one in each part")
+  end
+
+  def judge({:at_most_one_leader, grace}, trial, _) do
+    worst_s = trial.run_log.accord.rivals_worst_ms / 1000
+    {:keep, worst_s <= grace[:grace_s], "two leaders in one part for #{worst_s} s at most", nil}
+  end
+
+  def judge({:agreed, _by}, trial, _) do
+    named = for {id, claim} <- Trial.claims(trial), do: {id, claim[:leader], claim[:epoch]}
+    views = Enum.uniq(for {_id, leader, epoch} <- named, do: {leader, epoch})
+    so? = match?([{leader, _epoch}] when leader != nil, views)
+    reach(so?, fn _ -> Enum.map_join(named, ", ", &view/1) end)
+  end
+
+  def judge({:rest, _by}, trial, _), do: phase(:all, :rest, trial)
+  def judge({:phase, who, phase, _by}, trial, _), do: phase(who, phase, trial)
+  def judge({:never_phase, who, phase}, trial, _), do: never(who, phase, trial)
+  def judge({:never_phase, who, phase, _window}, trial, _), do: never(who, phase, trial)
+
+  def judge({:says, who, word, _by}, trial, _) do
+    robots = View.who(trial, who) -- if who == :all, do: [View.leader(trial)], else: []
+    claims = for {id, claim} <- Trial.claims(trial), id in robots, do: {id, claim}
+    so? = claims != [] and Enum.all?(claims, fn {_id, claim} -> claim[word] == true end)
+    reach(so?, fn _ -> Enum.map_join(claims, ", ", &says/1) end)
+  end
+
+  # The report judges claims that still stand too, so only those whose time is over count here.
+  def judge({:claims_true}, trial, _) do
+    %{standing: standing, told: told} = trial.run_log.claims
+    claims = told ++ for({_id, {_since, claim}} <- standing, do: claim)
+    wrong = Enum.filter(claims, &(Claims.right?(&1) == false))
+    told = fn -> wrong |> Enum.sort_by(&{&1.at_s, &1.robot}) |> Enum.map_join("; ", &claim/1) end
+    keep(wrong == [], told, "#{length(claims)} claims")
+  end
+
+  def judge({:never_stuck}, trial, _) do
+    stuck = Sim.Trial.Stuck.report(trial.run_log.stuck)
+
+    told = fn ->
+      Enum.map_join(stuck, "; ", &"#{&1.robot} since #{&1.at_s} s, #{m(&1.error_m)} off its slot")
+    end
+
+    keep(stuck == [], told, "none was")
+  end
+
+  def judge({:slots_unique}, trial, _), do: unique(trial)
+  def judge({:slots_unique, _window}, trial, _), do: unique(trial)
+
+  defp reach(so?, figures), do: {:reach, so?, figures.(so?), nil}
+  defp keep(true, _wrong, figures), do: {:keep, true, figures, nil}
+  defp keep(false, wrong, _figures), do: {:keep, false, wrong.(), nil}
+
+  defp unformed(trial) do
+    now? = RunLog.formed?(trial.run_log)
+    {:keep, not now?, formation(now?, trial), nil}
+  end
+
+  defp formation(true, trial), do: "in formation, #{leader(trial)}"
+
+  defp formation(false, trial),
+    do: "not in formation: #{leader(trial)}; #{phases(trial, Trial.living(trial))}"
+
+  defp leader(trial), do: "#{View.leader(trial) || "nobody"} leads"
+
+  defp leads({part, []}), do: "nobody leads #{Enum.join(part, ", ")}"
+  defp leads({part, leaders}), do: "#{Enum.join(leaders, " and ")} lead #{Enum.join(part, ", ")}"
+
+  defp view({id, nil, epoch}), do: "#{id} follows nobody (epoch #{epoch || 0})"
+  defp view({id, leader, epoch}), do: "#{id} names #{leader} (epoch #{epoch})"
+
+  defp phase(who, phase, trial) do
+    robots = View.who(trial, who)
+    so? = robots != [] and Enum.all?(robots, &(View.phase(trial, &1) == phase))
+    reach(so?, fn _ -> phases(trial, robots) end)
+  end
+
+  defp never(who, phase, trial) do
+    there = Enum.filter(View.who(trial, who), &(View.phase(trial, &1) == phase))
+    keep(there == [], fn -> phases(trial, there) end, "never #{phase}")
+  end
+
+  defp phases(trial, robots), do: Enum.map_join(robots, ", ", &"#{&1} #{View.phase(trial, &1)}")
+
+  defp says({id, claim}) do
+    case for word <- [:in_place, :unsure, :blocked], claim[word] == true, do: word do
+      [] -> "#{id} says nothing of its place"
+      words -> "#{id} says #{Enum.join(words, " and ")}"
+    end
+  end
+
+  defp claim(claim) do
+    later = if claim.worst_5s_m, do: ", #{m(claim.worst_5s_m)} 5 s later", else: ""
+    "#{claim.robot} claimed at #{claim.at_s} s, with a robot #{m(claim.worst_m)} off#{later}"
+  end
+
+  defp m(metres), do: "#{Float.round(metres * 1.0, 2)} m"
+
+  defp unique(trial) do
+    wrong =
+      for {leader, anchor} <- View.anchors(trial),
+          anchor.places != Enum.uniq(anchor.places) or anchor.order != Enum.uniq(anchor.order) or
+            leader in anchor.order,
+          do: "#{leader} gives #{inspect(Enum.zip(anchor.order, anchor.places))}"
+
+    keep(wrong == [], fn -> Enum.join(wrong, "; ") end, "one slot for each")
+  end
+end

@@ -1,0 +1,127 @@
+defmodule Sim.Scenario.File do
+  @moduledoc """
+  Reads and writes scenarios as files: one list of keys in Elixir's notation, which is parsed and
+  never executed (`Robot.File.Reader`), and makes no atoms.
+
+      [
+        about: "The leader dies; the others elect another one and form again.",
+        robots: 6,
+        seed: 1,
+        script: [{40, {:kill, :leader}}],
+        expect: [{:formed, by_s: 40}, {:formed_again, after_s: 40, within_s: 40}]
+      ]
+
+  A file that does not parse gives its first problem; otherwise each problem is a line with the
+  file, the line and the key. Wrong names of robots, and times after the end of the run, are found
+  once each key by itself is right.
+  """
+  alias Hal.Options.Wording
+  alias Robot.File.{Reader, Terms}
+  alias Sim.Scenario
+  alias Sim.Scenario.{Expectation, Names, Text}
+
+  @largest 65_536
+  @most_lines 20
+
+  @doc """
+  The scenario of the file at `path`, or the problems with it.
+
+      iex> Sim.Scenario.File.load("no/such.exs")
+      {:error, ["no/such.exs: no such file or directory"]}
+  """
+  @spec load(Path.t()) :: {:ok, Scenario.t()} | {:error, [String.t(), ...]}
+  def load(path) do
+    # Reading a pipe or a device might never end.
+    with {:ok, %File.Stat{type: :regular, size: size}} when size <= @largest <- File.stat(path),
+         {:ok, text} <- File.read(path) do
+      parse(text, path)
+    else
+      {:ok, %File.Stat{type: :regular}} ->
+        {:error, ["#{path}: no scenario is larger than #{div(@largest, 1024)} kB"]}
+
+      {:ok, %File.Stat{type: type}} ->
+        {:error, ["#{path}: is a #{type}, where a file is needed"]}
+
+      {:error, reason} ->
+        {:error, ["#{path}: #{:file.format_error(reason)}"]}
+    end
+  end
+
+  @doc """
+  The scenario of a text; `name` is the file's in messages.
+
+      iex> {:ok, scenario} = Sim.Scenario.File.parse("[robots: 1, expect: [{:formed, by_s: 60}]]")
+      iex> scenario.expect
+      [{:formed, [by_s: 60.0]}]
+      iex> Sim.Scenario.File.parse("[robots: 1,\\n script: [{5, {:kil, :mag1}}]]", "a.exs")
+      {:error, ["a.exs:2: script.1: cannot be {:kil, :mag1}: an event is one of kill, move, remove_landmark, tell, " <>
+        "estop, reset, cut, join, loss, freeze, displace, blind, deaf; did you mean kill?"]}
+  """
+  @spec parse(String.t(), name :: String.t()) :: {:ok, Scenario.t()} | {:error, [String.t(), ...]}
+  def parse(text, name \\ "scenario") do
+    # Loads the modules whose names a file may use, which are found among existing atoms only.
+    table = Scenario.table()
+    _names = {Names.all(), Expectation.phases(), Swarm.Formation.kinds()}
+
+    with {:ok, {_line, value} = tree} <- Reader.read(text, "scenario"),
+         :ok <- keys(value),
+         {:ok, values} <- Terms.check(tree, {:keys, table}),
+         [] <- Terms.at(Scenario.problems(values), tree) do
+      {:ok, Scenario.build(values)}
+    else
+      {:error, {line, words}} -> {:error, ["#{name}:#{line}: #{words}"]}
+      {:error, problems} -> {:error, lines(problems, name)}
+      problems -> {:error, lines(problems, name)}
+    end
+  end
+
+  defp keys({:keys, _keys}), do: :ok
+  defp keys({:list, []}), do: :ok
+  defp keys(_other), do: {:error, {1, "a scenario is one list, [key: value, …]"}}
+
+  defp lines(problems, name) do
+    more = length(problems) - @most_lines
+    lines = problems |> Enum.take(@most_lines) |> Enum.map(&line(&1, name))
+    if more > 0, do: lines ++ ["#{name}: and #{more} problems more"], else: lines
+  end
+
+  defp line({line, [], words}, name), do: "#{name}:#{line}: #{words}"
+  defp line({line, path, words}, name), do: "#{name}:#{line}: #{Wording.path(path)}: #{words}"
+
+  @doc """
+  Writes a scenario into a file.
+
+  The reason of an error is one of `t:File.posix/0`.
+  """
+  @spec write(Path.t(), Scenario.t()) :: :ok | {:error, File.posix()}
+  def write(path, scenario), do: File.write(path, text(scenario))
+
+  @doc """
+  The text of a scenario, formatted; `parse/2` gives the same scenario.
+
+      iex> {:ok, scenario} = Sim.Scenario.new(about: "Two robots.", options: [robots: 2, loss: 0.1], script: [{5, {:kill, :mag1}}])
+      iex> text = Sim.Scenario.File.text(scenario)
+      iex> text
+      ~s([\\n  about: "Two robots.",\\n  robots: 2,\\n  loss: 0.1,\\n  script: [\\n    {5, {:kill, :mag1}}\\n  ]\\n]\\n)
+      iex> Sim.Scenario.File.parse(text) == {:ok, scenario}
+      true
+  """
+  @spec text(Scenario.t()) :: String.t()
+  def text(%Scenario{} = scenario) do
+    about = if scenario.about != "", do: ["about: " <> Text.option(scenario.about)], else: []
+    options = for {key, value} <- scenario.options, do: "#{key}: #{option(key, value)}"
+    script = list("script", scenario.script)
+    keys = Enum.join(about ++ options ++ script ++ list("expect", scenario.expect), ",\n")
+    IO.iodata_to_binary([Code.format_string!("[\n#{keys}\n]", line_length: 98), "\n"])
+  end
+
+  defp option(:robots, robots) do
+    count = length(robots)
+    if count <= 100 and robots == Names.fleet(count), do: "#{count}", else: Text.option(robots)
+  end
+
+  defp option(_key, value), do: Text.option(value)
+
+  defp list(_key, []), do: []
+  defp list(key, values), do: ["#{key}: [\n#{Enum.map_join(values, ",\n", &Text.form/1)}\n]"]
+end

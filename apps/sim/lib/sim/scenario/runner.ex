@@ -1,0 +1,83 @@
+defmodule Sim.Scenario.Runner do
+  @moduledoc """
+  Runs a scenario in lockstep and judges what it expects, as a fold. Pure.
+
+  A run ends when all expectations are decided, when those that are left concern the whole run and
+  the fleet is calm (`Sim.Trial.done?/1`), or when its time is up.
+  """
+  alias Sim.{Scenario, Trial}
+  alias Sim.Scenario.{Check, Expectation, View}
+
+  @enforce_keys [:scenario, :trial, :checks]
+  defstruct @enforce_keys
+
+  @type t :: %__MODULE__{scenario: Scenario.t(), trial: Trial.t(), checks: [Check.t()]}
+
+  @typedoc "Whether an expectation held, when that was decided, and the figures."
+  @type verdict :: %{
+          expectation: Expectation.t(),
+          held?: boolean(),
+          at_s: float(),
+          figures: String.t()
+        }
+
+  @doc "A run at its beginning; the error is one line."
+  @spec new(Scenario.t()) :: {:ok, t()} | {:error, line :: String.t()}
+  def new(%Scenario{} = scenario) do
+    with {:ok, trial} <- Trial.new(Scenario.trial(scenario)), do: {:ok, begin(scenario, trial)}
+  end
+
+  @doc "The same with a trial that was made of the scenario's options, as one that is recorded."
+  @spec begin(Scenario.t(), Trial.t()) :: t()
+  def begin(%Scenario{} = scenario, trial) do
+    checks = Enum.map(scenario.expect, &Check.new/1)
+    %__MODULE__{scenario: scenario, trial: trial, checks: checks}
+  end
+
+  @doc "Advances the run by 100 ms."
+  @spec step(t()) :: t()
+  def step(%__MODULE__{} = run) do
+    trial = Trial.step(run.trial)
+    %{run | trial: trial, checks: Enum.map(run.checks, &Check.tick(&1, trial))}
+  end
+
+  @doc "Whether the run is over."
+  @spec done?(t()) :: boolean()
+  def done?(%__MODULE__{trial: trial, checks: checks} = run) do
+    left = for %Check{status: status} <- checks, status in [:open, :holding], do: status
+
+    cond do
+      View.at_s(trial) >= Scenario.duration_s(run.scenario) -> true
+      checks != [] and left == [] -> true
+      :open in left -> false
+      true -> Trial.done?(trial)
+    end
+  end
+
+  @doc "The verdicts if the run ended now, in the order of the expectations."
+  @spec verdicts(t()) :: [verdict()]
+  def verdicts(%__MODULE__{trial: trial, checks: checks}) do
+    for check <- checks do
+      %Check{status: {word, at_s, figures}} = Check.finish(check, trial)
+      %{expectation: check.expectation, held?: word == :held, at_s: at_s, figures: figures}
+    end
+  end
+
+  @doc """
+  A whole run: the report (`Sim.Trial.result/1`) and the verdicts.
+
+      iex> {:ok, scenario} = Sim.Scenario.new(options: [robots: 1, duration_s: 1], expect: [:no_collision, {:formed, by_s: 0.5}])
+      iex> {:ok, result, [safe, formed]} = Sim.Scenario.Runner.run(scenario)
+      iex> {result.simulated_s, safe.held?, formed.held?, formed.at_s, formed.figures}
+      {1.0, true, false, 0.5, "not in formation: nobody leads; mag1 search"}
+  """
+  @spec run(Scenario.t()) :: {:ok, result :: map(), [verdict()]} | {:error, line :: String.t()}
+  def run(%Scenario{} = scenario) do
+    with {:ok, run} <- new(scenario) do
+      run = finish(run)
+      {:ok, Trial.result(run.trial), verdicts(run)}
+    end
+  end
+
+  defp finish(run), do: if(done?(run), do: run, else: run |> step() |> finish())
+end

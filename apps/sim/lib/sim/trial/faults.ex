@@ -1,0 +1,60 @@
+defmodule Sim.Trial.Faults do
+  @moduledoc """
+  What robots of a run lack for a time: their processor, their camera, their ears. Pure; times in
+  milliseconds.
+  """
+
+  # A real base stops its wheels when no speed has come for so long (`Sim.World.Server`).
+  @wheels_ms 200
+
+  defstruct all: []
+
+  @type kind :: :frozen | :blind | :deaf
+  @type t :: %__MODULE__{
+          all: [{kind(), robot :: atom(), from_ms :: integer(), to_ms :: integer()}]
+        }
+
+  @doc "Adds a fault."
+  @spec add(t(), kind(), atom(), integer(), integer()) :: t()
+  def add(faults, kind, robot, from_ms, to_ms),
+    do: %{faults | all: [{kind, robot, from_ms, to_ms} | faults.all]}
+
+  @doc """
+  Whether a robot has a fault of one of these kinds.
+
+      iex> faults = Sim.Trial.Faults.add(%Sim.Trial.Faults{}, :blind, :mag1, 1_000, 2_000)
+      iex> for at_ms <- [999, 1_000, 2_000], do: Sim.Trial.Faults.any?(faults, [:blind], :mag1, at_ms)
+      [false, true, false]
+  """
+  @spec any?(t(), [kind()], atom(), integer()) :: boolean()
+  def any?(faults, kinds, robot, at_ms) do
+    Enum.any?(faults.all, fn {kind, id, from_ms, to_ms} ->
+      id == robot and kind in kinds and from_ms <= at_ms and at_ms < to_ms
+    end)
+  end
+
+  @doc "The robots whose wheels stand because they are frozen."
+  @spec halted(t(), integer()) :: [atom()]
+  def halted(faults, at_ms) do
+    for {:frozen, id, from_ms, to_ms} <- faults.all,
+        from_ms + @wheels_ms <= at_ms and at_ms < to_ms,
+        uniq: true,
+        do: id
+  end
+
+  @doc """
+  The directions of the radio that faults cut: a frozen robot neither hears nor sends, a deaf one
+  does not hear.
+
+      iex> faults = Sim.Trial.Faults.add(%Sim.Trial.Faults{}, :deaf, :mag1, 0, 2_000)
+      iex> Sim.Trial.Faults.ways(faults, [:mag1, :mag2, :mag3], 500)
+      [mag2: :mag1, mag3: :mag1]
+  """
+  @spec ways(t(), [atom()], integer()) :: [{from :: atom(), to :: atom()}]
+  def ways(faults, robots, at_ms) do
+    for to <- robots, from <- robots, from != to, cut?(faults, from, to, at_ms), do: {from, to}
+  end
+
+  defp cut?(faults, from, to, at_ms),
+    do: any?(faults, [:frozen, :deaf], to, at_ms) or any?(faults, [:frozen], from, at_ms)
+end

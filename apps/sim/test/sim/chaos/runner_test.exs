@@ -1,0 +1,116 @@
+defmodule Sim.Chaos.RunnerTest do
+  use Sim.LockstepCase, async: true
+  import ExUnit.CaptureLog
+  alias Sim.Chaos.{Draw, Runner, ScenarioFile, Violation}
+  alias Sim.Scenario
+
+  doctest Sim.Chaos.Isolated
+
+  # Small fleets for a short time, so that a dozen runs take seconds.
+  defp small(seed, number) do
+    run = Draw.options(seed, number)
+
+    [
+      robots: Enum.take(run[:robots], 2),
+      seed: run[:seed],
+      script: Enum.reject(run[:script], fn {at_s, event} -> at_s > 20 or named?(event) end),
+      loss: run[:loss],
+      noise: run[:noise],
+      blobs: :direct,
+      duration_s: 25
+    ]
+  end
+
+  defp named?(event), do: Sim.Trial.Event.robot(event) not in [nil, :all, :leader]
+
+  test "a dozen runs give the same report, however many are played at once" do
+    alone = Runner.run(5, 1..12, draw: &small/2, jobs: 1, attempts: 0)
+    assert alone == Runner.run(5, 1..12, draw: &small/2, jobs: 4, attempts: 0)
+    assert alone.clean? and length(alone.runs) == 12
+    assert Enum.map(alone.runs, & &1.number) == Enum.to_list(1..12)
+    assert Enum.any?(alone.runs, &(&1.outcome.elections > 0))
+    # Each by itself is the same run.
+    assert [one] = Runner.run(5, 7..7, draw: &small/2).runs
+    assert one == Enum.at(alone.runs, 6)
+  end
+
+  test "each run is told when it ends" do
+    test = self()
+    done = &send(test, {:done, &1.number})
+    Runner.run(1, 1..3, draw: &small/2, done: done)
+    for number <- 1..3, do: assert_received({:done, ^number})
+  end
+
+  defp broken(_seed, _number), do: [robots: [:mag1], kills: [{:mag1, :soon}], duration_s: 5]
+
+  test "a run that is refused is a violation, not the end" do
+    assert %{clean?: false, runs: [run]} = Runner.run(1, [1], draw: &broken/2)
+    assert [%Violation{invariant: :crash, figures: "not a run: " <> _}] = Runner.found(run)
+  end
+
+  # A span of delays that ends before it begins is refused by the radio alone, which raises.
+  defp raising(seed, number),
+    do: Keyword.merge(small(seed, number), start: :same, delay_ms: {50, 5})
+
+  test "a run that raises is a violation, with the function" do
+    capture_log(fn ->
+      assert %{clean?: false, runs: [run]} = Runner.run(1, [1], draw: &raising/2, attempts: 2)
+      assert [%Violation{invariant: :crash}] = Runner.found(run)
+    end)
+  end
+
+  test "some false claims among many are within the goal, other violations never" do
+    outcome = %{
+      claims: 200,
+      true_claims: 199,
+      violations: [Violation.new(:false_claim, 1, [], "")]
+    }
+
+    run = %{number: 1, outcome: outcome, failures: []}
+    assert Runner.clean?([run])
+    refute Runner.clean?([put_in(run.outcome.true_claims, 197)])
+    stuck = Violation.new(:stuck, 1, [:mag1], "")
+    refute Runner.clean?([put_in(run.outcome.violations, [stuck])])
+    assert Runner.clean?([])
+  end
+
+  test "a failure becomes a scenario, which can be read again" do
+    violation = Violation.new(:collision, 12_300, [:mag1, :mag2], "mag1 at 0.00,0.00")
+    smallest = Draw.options(1, 8)
+
+    failure = %{
+      number: 8,
+      violation: violation,
+      smallest: smallest,
+      again: violation,
+      attempts: 4
+    }
+
+    assert {:ok, "chaos-1-8-collision.exs", text} = ScenarioFile.text(1, failure)
+    assert {:ok, scenario} = Scenario.File.parse(text)
+    assert scenario.about =~ "Run 8 of seed 1: collision at 12.3 s, mag1 mag2"
+    assert scenario.expect == [{:no_collision}]
+
+    given = for {key, value} <- smallest, key != :script, value not in [nil, []], do: {key, value}
+    assert Enum.sort(scenario.options) == Enum.sort(given)
+    assert length(scenario.script) == length(smallest[:script])
+  end
+
+  # The goal is that 99 % of all claims are true, and `mix chaos` judges by it. It is missed by little (docs/results.md,
+  # section 14); here it must not get worse.
+  @tag :long
+  @tag timeout: :infinity
+  test "a hundred runs as drawn: nothing is violated but that a few claims are false" do
+    %{runs: runs} = Runner.run(1, 1..100, attempts: 0)
+
+    found =
+      for run <- runs,
+          %{invariant: what} <- Runner.found(run),
+          what != :false_claim,
+          do: {run.number, what}
+
+    assert found == []
+    count = fn key -> runs |> Enum.map(&Map.fetch!(&1.outcome, key)) |> Enum.sum() end
+    assert count.(:true_claims) >= 0.97 * count.(:claims)
+  end
+end

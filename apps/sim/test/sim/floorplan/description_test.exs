@@ -1,0 +1,87 @@
+defmodule Sim.Floorplan.DescriptionTest do
+  use ExUnit.Case, async: true
+  alias Sim.Floorplan
+
+  @moduletag :tmp_dir
+
+  @yaml """
+  image: floor.pgm
+  mode: trinary
+  resolution: 0.050000   # metres
+  origin: [-1.000000, -3.0, 0]
+  negate: 0
+  occupied_thresh: 0.65
+  free_thresh: 0.196
+  """
+
+  defp with_line(key, line),
+    do: String.replace(@yaml, ~r/^#{key}:.*$/m, line)
+
+  # 4 x 3 m of floor with a wall in the lower left corner.
+  defp picture do
+    "P5 80 60 255\n" <>
+      for(
+        y <- 0..59,
+        x <- 0..79,
+        into: <<>>,
+        do: if(x < 20 and y >= 50, do: <<0>>, else: <<254>>)
+      )
+  end
+
+  test "places are counted from the origin of the description", %{tmp_dir: dir} do
+    File.write!(Path.join(dir, "floor.pgm"), picture())
+    file = Path.join(dir, "map.yaml")
+
+    for {{x, y}, size} <- [
+          {{-2.0, -1.5}, {4.0, 3.0}},
+          {{-1.0, -3.0}, {6.0, 6.0}},
+          {{0.0, 0.0}, {8.0, 6.0}},
+          {{0.5, -0.25}, {9.0, 5.5}}
+        ] do
+      File.write!(file, with_line("origin", "origin: [#{x}, #{y}, 0.0]"))
+      assert {:ok, map} = Floorplan.open(file, 2)
+      assert Floorplan.size(map) == size
+      {left, low, right, high} = map.room
+
+      for {a, b} <- [{left, x}, {low, y}, {right, x + 4}, {high, y + 3}],
+          do: assert_in_delta(a, b, 1.0e-9)
+
+      for {i, j, wall?} <- [
+            {0.5, 0.25, true},
+            {1.5, 0.25, false},
+            {0.5, 0.75, false},
+            {-0.1, 1.0, true}
+          ] do
+        assert Floorplan.wall?(map, {x + i, y + j}) == wall?
+      end
+
+      assert {:ok, {lx, ly}, [_, _]} =
+               Floorplan.places(map, [mag1: 0.2, min1: 0.292], 1, :default)
+
+      assert lx > x and lx < x + 4 and ly > y and ly < y + 3
+    end
+  end
+
+  test "a description that cannot be opened is one line", %{tmp_dir: dir} do
+    File.write!(Path.join(dir, "floor.pgm"), picture())
+    file = Path.join(dir, "map.yaml")
+
+    for {yaml, pattern} <- [
+          {"resolution: 0.05\n", ~r/map.yaml: image is missing/},
+          {with_line("image", "image: other.pgm"), ~r/other.pgm: no such file/},
+          {with_line("image", "image: map.yaml"), ~r/neither a PNG nor a PGM/},
+          {with_line("resolution", "resolution: 0.01"),
+           ~r/it is 0.80 x 0.60 m; each side must be at least 1 m/},
+          {with_line("origin", "origin: [-1, 9000, 0]"), ~r/origin .* is too far from 0,0/},
+          {with_line("origin", "origin: [-9000, -9000, 0]"), ~r/origin .* is too far from 0,0/}
+        ] do
+      File.write!(file, yaml)
+      assert {:error, line} = Floorplan.open(file, 2)
+      assert line =~ pattern
+      refute line =~ "\n"
+    end
+
+    assert {:error, line} = Floorplan.open(Path.join(dir, "none.yml"), 2)
+    assert line =~ "no such file"
+  end
+end

@@ -1,0 +1,89 @@
+defmodule Sim.Recording.FileTest do
+  use Sim.LockstepCase, async: true
+  alias Sim.{Recorder, Recording, Replay, Trial}
+  @moduletag :tmp_dir
+
+  defp write(path, ticks) do
+    {:ok, setup} = Trial.setup(%{robots: [:mag1, :mag2], seed: 5, blobs: :direct})
+    {:ok, recorder} = Recorder.start_link(path, setup)
+
+    trial =
+      Enum.reduce(1..ticks, Trial.begin(setup, record: true), fn _tick, trial ->
+        {entries, trial} = trial |> Trial.step() |> Trial.take_entries()
+        :ok = Recorder.tick(recorder, {trial.at_ms, entries}, Trial.scene(trial))
+        trial
+      end)
+
+    {Recorder.close(recorder), setup, trial}
+  end
+
+  test "a run from a file replays, and one seed gives one file", %{tmp_dir: folder} do
+    [one, other] = for name <- ["one", "other"], do: Path.join(folder, name <> ".mcap")
+    assert {:ok, setup, trial} = write(one, 60)
+    assert {:ok, _setup, _trial} = write(other, 60)
+    assert File.read!(one) == File.read!(other)
+
+    assert {:ok, file} = Recording.File.open(one)
+    assert {file.whole?, file.setup, Recording.File.last_ms(file)} == {true, setup, 6_000}
+
+    replay =
+      Enum.reduce(Recording.File.ticks(file), Replay.new(file.setup), fn tick, replay ->
+        assert {replay, []} = Replay.step(replay, tick)
+        replay
+      end)
+
+    assert Replay.trial(replay).world == trial.world
+    assert [{2_100, _entries} | _] = Enum.to_list(Recording.File.ticks(file, from_ms: 2_100))
+  end
+
+  test "a file that was cut is read as far as it is whole", %{tmp_dir: folder} do
+    path = Path.join(folder, "run.mcap")
+    {:ok, _setup, _trial} = write(path, 50)
+    bytes = File.read!(path)
+    {:ok, file} = Recording.File.open(path)
+    all = Enum.to_list(Recording.File.ticks(file))
+
+    cut = Path.join(folder, "cut.mcap")
+    File.write!(cut, binary_part(bytes, 0, 1_000))
+    assert {:error, _line} = Recording.File.open(cut)
+
+    # After the start and the floor plan.
+    for share <- [0.6, 0.7, 0.8, 0.9] do
+      File.write!(cut, binary_part(bytes, 0, round(share * byte_size(bytes))))
+      assert {:ok, %{whole?: false} = file} = Recording.File.open(cut)
+      ticks = Enum.to_list(Recording.File.ticks(file))
+      assert ticks == Enum.take(all, length(ticks))
+      assert length(ticks) in 1..49
+    end
+  end
+
+  test "what is not a recording of a run is refused in one line", %{tmp_dir: folder} do
+    path = Path.join(folder, "other.mcap")
+
+    for bytes <- ["", "no recording", :binary.copy(<<0>>, 10_000)] do
+      File.write!(path, bytes)
+      assert {:error, line} = Recording.File.open(path)
+      assert line =~ path and not (line =~ "\n")
+    end
+
+    {writer, head} = Mcap.Writer.new()
+    {id, writer} = Mcap.Writer.channel(writer, "/other", "json", nil)
+    {writer, bytes} = Mcap.Writer.message(writer, id, 0, "{}")
+    File.write!(path, [head, bytes, Mcap.Writer.finish(writer)])
+    assert {:error, line} = Recording.File.open(path)
+    assert line == "#{path} is not a recording of a run: it has no topic /convoy/start"
+
+    assert {:error, line} = Recording.File.open(Path.join(folder, "none.mcap"))
+    assert line =~ "none.mcap"
+  end
+
+  test "a place that cannot be written is an error, before or at the end", %{tmp_dir: folder} do
+    {:ok, setup} = Trial.setup(%{robots: [:mag1], seed: 5, blobs: :direct})
+    missing = Path.join([folder, "none", "run.mcap"])
+    line = "#{missing} cannot be written: no such file or directory"
+    assert Recorder.start_link(missing, setup) == {:error, line}
+
+    assert {{:error, line}, _setup, _trial} = write("/dev/full", 30)
+    assert line == "/dev/full cannot be written: no space left on device"
+  end
+end

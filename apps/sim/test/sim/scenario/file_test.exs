@@ -1,0 +1,157 @@
+defmodule Sim.Scenario.FileTest do
+  use ExUnit.Case, async: true
+  alias Sim.Scenario
+  doctest Sim.Scenario
+  doctest Sim.Scenario.Expectation
+  doctest Sim.Scenario.File
+  doctest Sim.Scenario.Names
+  doctest Sim.Scenario.Runner
+  doctest Sim.Scenario.Text
+  doctest Sim.Trial.Event
+  doctest Sim.Trial.Faults
+  doctest Sim.Trial.Form
+  doctest Sim.Trial.Script
+
+  defp line(text) do
+    assert {:error, [line]} = Scenario.File.parse(text, "a.exs")
+    line
+  end
+
+  # Text, what the line begins with, what it says.
+  @bad [
+    {"", "a.exs:1: ", "is empty"},
+    {"[robots: 2", "a.exs:1: ", "missing terminator"},
+    {"[robots: halt()]", "a.exs:1: ", "a scenario holds values only"},
+    {"{1, 2}", "a.exs:1: ", "a scenario is one list"},
+    {"[robot: 2]", "a.exs:1: robot: ", "did you mean robots?"},
+    {"[robots: 0]", "a.exs:1: robots: ", "a number of robots, 1 to 100, or a list"},
+    {"[robots: [:mag1, :mag1]]", "a.exs:1: robots: ", "cannot be [:mag1, :mag1]"},
+    {"[robots: [:nobody_knows_him]]", "a.exs:1: robots: ", "[:nobody_knows_him]"},
+    {"[noise: :of]", "a.exs:1: noise: ", "did you mean :off?"},
+    {"[\n script: 5]", "a.exs:2: script: ", "cannot be 5"},
+    {"[script: [\n {:reset}]]", "a.exs:2: script.1: ", "{at_s, event}"},
+    {"[script: [{5, {:kil, :mag1}}]]", "a.exs:1: script.1: ", "did you mean kill?"},
+    {"[script: [{5, {:kill}}]]", "a.exs:1: script.1: ", "{:kill, robot} is allowed"},
+    {"[script: [{5, {:kill, :mag9}}]]", "a.exs:1: script.1: ", "a robot of this run, or :leader"},
+    {"[script: [{5, {:kill, 5}}]]", "a.exs:1: script.1.robot: ", "a robot of this run"},
+    {"[script: [{-5, {:reset}}]]", "a.exs:1: script.1.at_s: ", "a number from 0"},
+    {"[script: [{500, {:reset}}]]", "a.exs:1: script.1: ", "the run ends after 120 s"},
+    {"[script: [{5, {:loss, 2}}]]", "a.exs:1: script.1.share: ", "a number from 0 to 1"},
+    {"[script: [{5, {:move, 3}}]]", "a.exs:1: script.1.place: ", "{x, y} in metres"},
+    {"[script: [{5, {:freeze, :mag1, 0}}]]", "a.exs:1: script.1.for_s: ", "from 0.1"},
+    {"[script: [{5, {:cut, [[:mag1], [:mag9]]}}]]", "a.exs:1: script.1: ", "groups of robots"},
+    {"[script: [{5, {:cut, {:link, :mag1, :mag1}}}]]", "a.exs:1: script.1: ", "groups of robots"},
+    {"[script: [{5, {:tell, :mag1, \"goto:1\"}}]]", "a.exs:1: script.1.command: ",
+     "y is missing"},
+    {"[script: [{5, {:tell, :mag1, \"ping\"}}]]", "a.exs:1: script.1.command: ", "one of move"},
+    {"[script: [{5, {:tell, :mag1, \"followtheleader:mag9\"}}]]", "a.exs:1: script.1: ",
+     "one of mag1"},
+    {"[script: [{5, {:tell, :mag1, {:formation, :lin, 1}}}]]",
+     "a.exs:1: script.1.command.formation: ", "did you mean :line?"},
+    {"[expect: [{:formd, by_s: 5}]]", "a.exs:1: expect.1: ", "did you mean formed?"},
+    {"[expect: [{:formed}]]", "a.exs:1: expect.1.by_s: ", "is missing"},
+    {"[expect: [{:formed, by: 5}]]", "a.exs:1: expect.1.by: ", "did you mean by_s?"},
+    {"[expect: [{:formed, by_s: 500}]]", "a.exs:1: expect.1: ", "the run ends after 120 s"},
+    {"[expect: [{:formed, by_s: 5, after_s: 9}]]", "a.exs:1: expect.1: ", "after its beginning"},
+    {"[expect: [{:still, :mag9, from_s: 1, to_s: 2}]]", "a.exs:1: expect.1: ",
+     ":mag9 is no robot of this run; did you mean :mag"},
+    {"[expect: [{:at, :all, {1, 1}, within_m: 1, by_s: 2}]]", "a.exs:1: expect.1.robot: ",
+     "a robot of this run"},
+    {"[expect: [{:phase, :all, :laed, by_s: 2}]]", "a.exs:1: expect.1.phase: ",
+     "did you mean :lead?"}
+  ]
+
+  for {text, begins, says} <- @bad do
+    test "#{text} is refused in one line" do
+      {text, begins, says} = unquote(Macro.escape({text, begins, says}))
+
+      case Scenario.File.parse(text, "a.exs") do
+        {:error, [line | _]} ->
+          assert String.starts_with?(line, begins), line
+          assert line =~ says
+          refute line =~ "robot file"
+
+        other ->
+          flunk("#{text} was read: #{inspect(other)}")
+      end
+    end
+  end
+
+  test "a key that is given twice, and a file that is none, are named" do
+    assert line("[seed: 1,\n seed: 2]") =~ "a.exs:2: seed: is given twice"
+    assert {:error, [line]} = Scenario.File.load(System.tmp_dir!())
+    assert line =~ "is a directory"
+  end
+
+  test "no file makes an atom" do
+    for n <- 1..50, do: Scenario.File.parse("[robots: [:mag#{1000 + n}x], frob#{n}: :zork#{n}]")
+
+    # Not by their number: what other tests load makes some meanwhile.
+    for n <- 1..50,
+        name <- ["mag#{1000 + n}x", "frob#{n}", "zork#{n}"],
+        do: assert_raise(ArgumentError, fn -> String.to_existing_atom(name) end)
+  end
+
+  # Each scenario has some of everything that a file can say.
+  test "what is written is read back as it was" do
+    for _ <- 1..200 do
+      count = Enum.random(1..12)
+      robots = Enum.take(Scenario.Names.all(), count)
+      robot = Enum.random(robots)
+
+      scenario = [
+        about: Enum.random(["", "A \"word\" and a \\ and \#{this}", "größer"]),
+        options:
+          Enum.take_random(
+            [
+              seed: :rand.uniform(1000),
+              loss: :rand.uniform(),
+              noise: :slip,
+              landmark: Enum.random([:none, {1, 2.5}]),
+              formation: {:wedge, 1.25},
+              lost_link: :hold,
+              moves: [{{1, 2.0}, 3}],
+              cuts: [{1, :end, [[robot], []]}]
+            ],
+            3
+          ) ++ [robots: Enum.random([count, robots]), duration_s: 100],
+        script:
+          Enum.take_random(
+            [
+              {1, {:kill, :leader}},
+              {:rand.uniform() * 100, {:displace, robot, {1.5, -2, 90}}},
+              {2, :reset},
+              {2, {:tell, :all, {:formation, :line, 2}}},
+              {3.25, {:tell, robot, "goto:1:2"}},
+              {4, {:cut, {:way, :mag1, robot}}},
+              {5, {:freeze, robot, 2}}
+            ],
+            3
+          )
+          |> Enum.reject(&match?({_, {:cut, {:way, r, r}}}, &1)),
+        expect:
+          Enum.take_random(
+            [
+              :no_collision,
+              {:formed, by_s: 60},
+              {:at, robot, {1, 2}, within_m: 0.25, by_s: 50},
+              {:never_phase, :all, :lead},
+              {:speed_at_most, 1, to_s: 5}
+            ],
+            3
+          )
+      ]
+
+      case Scenario.new(scenario) do
+        {:ok, scenario} ->
+          text = Scenario.File.text(scenario)
+          assert Scenario.File.parse(text) == {:ok, scenario}
+          assert text == text |> Code.format_string!() |> IO.iodata_to_binary() |> Kernel.<>("\n")
+
+        # One of the robots may be too few.
+        {:error, line} ->
+          assert line =~ "cannot be"
+      end
+    end
+  end
+end

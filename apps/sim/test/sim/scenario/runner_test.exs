@@ -1,0 +1,152 @@
+defmodule Sim.Scenario.RunnerTest do
+  use Sim.LockstepCase, async: true
+  alias Sim.{Scenario, Trial, World}
+  alias Sim.Scenario.{Runner, View}
+
+  defp run(options, script, expect) do
+    {:ok, scenario} =
+      Scenario.new(options: [{:blobs, :direct} | options], script: script, expect: expect)
+
+    assert {:ok, result, verdicts} = Runner.run(scenario)
+    {result, verdicts}
+  end
+
+  defp held(options, script, expect),
+    do: for(verdict <- elem(run(options, script, expect), 1), do: verdict.held?)
+
+  # A robot alone that drives from where it stands, for a few seconds.
+  @alone [robots: [:mag1], landmark: :none, noise: :off, duration_s: 8]
+  @drive [{0, {:displace, :mag1, {-3, 0, 0}}}, {0, {:tell, :mag1, "move:0.3:0"}}]
+
+  test "each expectation about a body can hold, and can fail" do
+    expect = [
+      {:moves, :mag1, by_s: 3},
+      {:moves, :mag1, by_s: 0.1},
+      {:still, :mag1, from_s: 0, to_s: 8},
+      {:at, :mag1, {-2, 0}, within_m: 0.1, by_s: 8},
+      {:at, :mag1, {2, 2}, within_m: 0.1, by_s: 8},
+      {:speed_at_most, 0.31},
+      {:speed_at_most, 0.2},
+      {:turned, :mag1, 0, within_deg: 1, by_s: 5},
+      {:turned, :mag1, 90, within_deg: 1, by_s: 5},
+      {:phase, :mag1, :move, by_s: 1},
+      {:phase, :mag1, :lead, by_s: 8},
+      {:never_phase, :mag1, :lead},
+      {:never_phase, :mag1, :move}
+    ]
+
+    assert held(@alone, @drive, expect) ==
+             [true, false, false, true, false, true, false, true, false, true, false, true, false]
+  end
+
+  test "a verdict names the time and the figures" do
+    {_result, [verdict]} = run(@alone, @drive, [{:speed_at_most, 0.2}])
+    assert verdict.at_s > 0.2 and verdict.at_s < 3
+    assert verdict.figures =~ ~r"mag1 at 0\.2\d* m/s"
+  end
+
+  test "a robot that touches the wall is found" do
+    script = [{0, {:displace, :mag1, {7, 0, 0}}}, {0, {:tell, :mag1, "move:0.3:0"}}]
+    {_result, [verdict]} = run(@alone, script, [:no_collision])
+    assert verdict.held?, "the gate stops it: #{verdict.figures}"
+  end
+
+  test "a stop ends a command, a start begins the group's mission again" do
+    script = @drive ++ [{2, {:tell, :mag1, :stop}}, {5, {:tell, :mag1, :start}}]
+
+    assert held(@alone, script, [
+             {:phase, :mag1, :idle, after_s: 2, by_s: 3},
+             {:still, :mag1, from_s: 4, to_s: 5},
+             {:phase, :mag1, :search, after_s: 5, by_s: 6}
+           ]) == [true, true, true]
+
+    # And from a command, without a stop between.
+    assert held(@alone, @drive ++ [{2, {:tell, :mag1, :start}}], [
+             {:phase, :mag1, :search, after_s: 2, by_s: 3}
+           ]) == [true]
+  end
+
+  test "a frozen robot stands, sends nothing and gets no commands" do
+    script = @drive ++ [{2, {:freeze, :mag1, 3}}, {3, {:tell, :mag1, :stop}}]
+
+    assert held(@alone, script, [
+             {:moves, :mag1, by_s: 2},
+             {:still, :mag1, from_s: 4, to_s: 5},
+             {:moves, :mag1, after_s: 5, by_s: 8}
+           ]) == [true, true, true]
+  end
+
+  test "the emergency stop of one robot stops all, a reset moves nobody" do
+    options = [robots: 3, duration_s: 12]
+    script = [{3, {:estop, :mag2}}, {6, :reset}]
+
+    assert held(options, script, [
+             {:phase, :all, :search, by_s: 3},
+             {:still, :all, from_s: 5, to_s: 12},
+             {:phase, :all, :idle, after_s: 11, by_s: 12}
+           ]) == [true, true, true]
+  end
+
+  defp stepped(options, script, seconds) do
+    {:ok, trial} = Trial.new(Map.new([{:blobs, :direct}, {:script, script} | options]))
+    Enum.reduce(1..round(seconds * 10), trial, fn _, trial -> Trial.step(trial) end)
+  end
+
+  test "the radio is cut, joined, lossy, and deaf in one direction" do
+    robots = [:mag1, :mag2, :min1]
+
+    parts = fn script, at_s ->
+      stepped([robots: robots], script, at_s) |> View.leaders() |> Enum.map(&elem(&1, 0))
+    end
+
+    cut = [{1, {:cut, [[:mag1], [:mag2, :min1]]}}]
+    assert parts.(cut, 0.5) == [robots]
+    assert parts.(cut, 2) == [[:mag1], [:mag2, :min1]]
+    assert parts.(cut ++ [{2, {:join}}], 3) == [robots]
+    assert parts.([{1, {:deaf, :min1, 1}}], 1.5) == [[:mag1, :mag2], [:min1]]
+    assert parts.([{1, {:deaf, :min1, 1}}], 2.5) == [robots]
+    assert parts.([{1, {:freeze, :mag2, 1}}], 1.5) == [[:mag1, :min1], [:mag2]]
+
+    lossy = stepped([robots: robots], [{0, {:loss, 1}}], 3)
+    assert lossy.radio.lost == lossy.radio.sent
+  end
+
+  test "the landmark is moved, removed, and put there again" do
+    script = [{1, {:remove_landmark}}, {2, {:move, {3, 1}}}]
+    assert stepped([robots: 1 |> Scenario.Names.fleet()], script, 1.5).world.landmark == nil
+    assert stepped([robots: [:mag1]], script, 2.5).world.landmark == {3.0, 1.0}
+  end
+
+  test "a robot is lifted where there is room only" do
+    robots = [:mag1, :mag2]
+    {x, y} = stepped([robots: robots], [], 0.1).world |> World.truth(:mag2) |> Hal.Pose.point()
+    trial = stepped([robots: robots], [{0, {:displace, :mag1, {x, y, 0}}}], 0.2)
+    assert [%{stage: :not_displaced, robot: :mag1} | _] = Trial.result(trial).stages
+
+    assert {:error, line} =
+             Trial.new(%{robots: robots, script: [{0, {:displace, :mag1, {99, 0, 0}}}]})
+
+    assert line == "mag1 cannot be put at 99.0,0.0 of map hall: there is a wall"
+    assert {:error, line} = Trial.new(%{robots: robots, script: [{0, {:move, {99, 0}}}]})
+    assert line =~ "the landmark cannot stand at 99.0,0.0"
+  end
+
+  test "a blind robot finds nothing" do
+    alone = [robots: [:mag1], duration_s: 20]
+    script = [{0, {:displace, :mag1, {3, 0, 170}}}, {0, {:tell, :mag1, "findblob"}}]
+    expect = [{:phase, :mag1, :found, by_s: 20}]
+    assert held(alone, script, expect) == [true]
+    assert held(alone, [{0, {:blind, :mag1, 20}} | script], expect) == [false]
+  end
+
+  test "the same scenario gives the same run" do
+    script = [{3, {:freeze, :mag1, 2}}, {6, {:displace, :min1, {4, 3, 0}}}, {7, {:kill, :mag2}}]
+    run = fn -> run([robots: 3, duration_s: 12], script, [:no_collision, {:formed, by_s: 12}]) end
+    assert :erlang.term_to_binary(run.()) == :erlang.term_to_binary(run.())
+  end
+
+  test "a fleet in real time has no script" do
+    assert {:error, line} = Sim.Fleet.start_link(robots: [:mag91], script: [{1, {:reset}}])
+    assert line =~ "no run in real time can have a script"
+  end
+end

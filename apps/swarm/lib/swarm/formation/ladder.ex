@@ -1,0 +1,195 @@
+defmodule Swarm.Formation.Ladder do
+  @moduledoc """
+  The shape that fits where the leader stands, by one ladder, the best first. Pure.
+
+  | rung | the shape |
+  |---|---|
+  | `:asked` | as asked for; slots that a body takes are left out |
+  | `:turned` | turned about the leader, in steps of 15 degrees, by as little as it needs |
+  | `:closer` | the same with less spacing, down to 0.8 m |
+  | `:column` | a column along the leader's trail |
+  | `:cluster` | the nearest free places round the leader, behind one another where they must be |
+
+  Each robot of a shape can drive straight from its place to the leader's, or to that of a robot before it, so that no shape
+  extends behind a wall; and none stands between the leader and the landmark.
+  """
+  alias Hal.Pose
+  alias Swarm.Formation
+  alias Swarm.Formation.{FreeSlots, Space, Trail}
+
+  @rungs [:asked, :turned, :closer, :column, :cluster]
+  @turns for k <- 1..12, sign <- [1, -1], k != 12 or sign == 1, do: sign * k * :math.pi() / 12
+  @closer 0.1
+  # The half of the angle in which nobody may stand before the leader, and how far beyond the landmark.
+  @ahead 0.5
+  @beyond 0.4
+  # Places are looked for along a trail in steps of this share of the spacing, and up to this many.
+  @stride 0.5
+  @strides 60
+  # The gap between robots of a cluster, from edge to edge, and how many places round the leader are tried.
+  @apart 0.4
+  @most 400
+
+  @type rung :: :asked | :turned | :closer | :column | :cluster
+
+  @typedoc """
+  What is to be formed: the rung, the formation as it is told, the slots of it that are used (`:asked`), or the poses in
+  the map frame, one for each follower.
+  """
+  @type choice :: %{
+          rung: rung(),
+          formation: Formation.t(),
+          room: FreeSlots.t(),
+          spots: [Pose.t()] | nil
+        }
+
+  @typedoc """
+  Where the leader is, how far ahead of it the landmark stands (metres), and where it came from.
+  """
+  @type here :: %{pose: Pose.t(), distance: float(), trail: Trail.t()}
+
+  @doc "All rungs, the best first."
+  @spec rungs() :: [rung(), ...]
+  def rungs, do: @rungs
+
+  @doc """
+  The first of these rungs on which so many followers have room; `nil` if there is none.
+
+      iex> here = %{pose: Hal.Pose.new(0, 0), distance: 1.6, trail: []}
+      iex> space = %Swarm.Formation.Space{radius: 0.2}
+      iex> Swarm.Formation.Ladder.choose([:asked], {:column, 1.0}, 2, here, space)
+      %{rung: :asked, formation: {:column, 1.0}, room: {3, [1, 2]}, spots: nil}
+      iex> choice = Swarm.Formation.Ladder.choose([:turned], {:column, 1.0}, 1, here, space)
+      iex> choice.spots |> hd() |> Hal.Pose.distance({0.0, 0.0}) |> Float.round(6)
+      1.0
+  """
+  @spec choose([rung()], Formation.t(), non_neg_integer(), here(), Space.t()) :: choice() | nil
+  def choose(rungs, asked, followers, here, space) do
+    Enum.find_value(rungs, fn rung ->
+      with {formation, room, spots} <- rung(rung, asked, followers, here, space),
+           do: %{rung: rung, formation: formation, room: room, spots: spots}
+    end)
+  end
+
+  defp rung(:asked, asked, followers, here, space) do
+    fits? = &Space.free?(space, &1)
+    {size, places} = room = FreeSlots.places(asked, followers, here.pose, here.distance, fits?)
+    slots = asked |> Formation.slots(size, here.distance) |> List.to_tuple()
+    spots = for place <- places, do: Pose.compose(here.pose, elem(slots, place - 1))
+    if Enum.all?(spots, fits?) and linked?(spots, here, space), do: {asked, room, nil}
+  end
+
+  # A ring is about the landmark.
+  defp rung(rung, {:circle, _spacing}, _followers, _here, _space) when rung in [:turned, :closer],
+    do: nil
+
+  defp rung(:turned, asked, followers, here, space),
+    do: turned(@turns, asked, followers, here, space)
+
+  defp rung(:closer, {kind, spacing}, followers, here, space) do
+    least = Formation.least_spacing()
+
+    spacings =
+      Stream.iterate(spacing - @closer, &(&1 - @closer))
+      |> Enum.take_while(&(&1 > least - 1.0e-9))
+
+    Enum.find_value(spacings, fn closer ->
+      turned([0.0 | @turns], {kind, Float.round(closer, 3)}, followers, here, space)
+    end)
+  end
+
+  defp rung(:column, {_kind, spacing}, followers, here, space) do
+    spacing = min(spacing, 1.0)
+
+    spots =
+      1..@strides
+      |> Stream.map(&(spacing * (1 + (&1 - 1) * @stride)))
+      |> Enum.reduce_while({[], 0.0}, fn way, {spots, last} ->
+        place = Trail.behind(here.trail, here.pose, way)
+        due? = way - last >= spacing - 1.0e-9
+
+        cond do
+          length(spots) == followers -> {:halt, {spots, last}}
+          due? and fits?(place, spots, here, space) -> {:cont, {[place | spots], way}}
+          true -> {:cont, {spots, last}}
+        end
+      end)
+      |> elem(0)
+
+    if length(spots) == followers, do: told({:column, spacing}, Enum.reverse(spots))
+  end
+
+  defp rung(:cluster, asked, followers, here, space) do
+    start = Pose.point(here.pose)
+    step = 2 * space.radius + @apart
+    found = flood(:gb_sets.singleton({0.0, {0, 0}}), MapSet.new([{0, 0}]), [], step, here, space)
+
+    spots =
+      for point <- found |> Enum.reverse() |> List.delete(start) |> Enum.take(followers),
+          do: facing(point, here)
+
+    if length(spots) == followers, do: told(asked, spots)
+  end
+
+  defp turned(turns, asked, followers, here, space) do
+    slots = Formation.slots(asked, followers + 1, here.distance)
+
+    Enum.find_value(turns, fn turn ->
+      base = Pose.new(here.pose.x, here.pose.y, here.pose.heading + turn)
+      spots = for slot <- slots, do: base |> Pose.compose(slot) |> Pose.point() |> facing(here)
+
+      if Enum.all?(spots, &(Space.free?(space, &1) and not hides?(&1, here))) and
+           linked?(spots, here, space),
+         do: told(asked, spots)
+    end)
+  end
+
+  defp told(formation, spots), do: {formation, FreeSlots.whole(length(spots)), spots}
+  defp facing({x, y}, here), do: Pose.new(x, y, here.pose.heading)
+
+  defp fits?(place, spots, here, space) do
+    Space.free?(space, place) and not hides?(place, here) and
+      Space.joined?(space, place, List.first(spots) || here.pose)
+  end
+
+  # Each in its turn sees the leader, or one before it.
+  defp linked?(spots, here, space) do
+    {linked?, _before} =
+      Enum.reduce(spots, {true, [here.pose]}, fn spot, {linked?, before} ->
+        {linked? and Enum.any?(before, &Space.joined?(space, spot, &1)), [spot | before]}
+      end)
+
+    linked?
+  end
+
+  defp hides?(place, %{pose: pose, distance: distance}),
+    do:
+      abs(Pose.bearing(pose, place)) < @ahead and Pose.distance(pose, place) < distance + @beyond
+
+  # Places of a triangular lattice round the leader, in the order of the length of way to them: from each that is free
+  # to those beside it. Places that are not free are passed, where a robot can drive through.
+  defp flood(open, seen, found, step, here, space) do
+    if :gb_sets.is_empty(open) or MapSet.size(seen) > @most do
+      found
+    else
+      {{way, cell}, open} = :gb_sets.take_smallest(open)
+      at = lattice(cell, step, here)
+      free? = cell == {0, 0} or (Space.free?(space, at) and not hides?(at, here))
+
+      {open, seen} =
+        for {i, j} <- [{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}],
+            next = {elem(cell, 0) + i, elem(cell, 1) + j},
+            not MapSet.member?(seen, next),
+            Space.joined?(space, at, lattice(next, step, here)),
+            reduce: {open, seen} do
+          {open, seen} -> {:gb_sets.add({way + step, next}, open), MapSet.put(seen, next)}
+        end
+
+      flood(open, seen, if(free?, do: [at | found], else: found), step, here, space)
+    end
+  end
+
+  defp lattice({i, j}, step, %{pose: pose}) do
+    Pose.place(pose, {-step * (i + j / 2), step * j * :math.sqrt(3) / 2})
+  end
+end

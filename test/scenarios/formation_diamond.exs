@@ -1,0 +1,14 @@
+[
+  about: "A diamond of six.",
+  robots: 6,
+  seed: 3,
+  duration_s: 110,
+  formation: {:diamond, 1.0},
+  expect: [
+    {:formed, by_s: 100},
+    {:in_slot, :all, within_m: 0.5, by_s: 100},
+    {:slots_unique},
+    {:claims_true},
+    {:no_collision}
+  ]
+]
