@@ -44,7 +44,7 @@ defmodule System.NetnsTest do
   # How far from its place a body may stand: 0.25 m by its own judgement, and what it errs itself.
   @place_m 0.35
   # Till then what is judged by the logs' times has happened on the busiest machine.
-  @patience_ms 30_000
+  @patience_ms 60_000
   @modules modules
 
   setup do

@@ -1,6 +1,6 @@
 # The tests of the whole system. Fails when a test fails, and when there was none.
 #
-#   mix run --no-start test/run.exs [FILE...] [--except WORD] [--long]
+#   mix run --no-start test/run.exs [FILE | FILE:LINE...] [--except WORD] [--long]
 #
 # `--except` leaves out the files with that word in their names, `--long` all but the tests tagged `:long`.
 {options, files} = OptionParser.parse!(System.argv(), strict: [except: :string, long: :boolean])
@@ -16,6 +16,17 @@ ExUnit.configure(max_cases: 2 * System.schedulers_online())
 # Everything is built by now. Newer Mix tells commands that run side by side to wait for each other's
 # look at the build, and what they print is compared.
 System.put_env("MIX_OS_CONCURRENCY_LOCK", "0")
+
+# Elixir 1.14 parses one path at a time, and knows the lines of all files as one list.
+{files, only} =
+  if function_exported?(ExUnit.Filters, :parse_paths, 1) do
+    apply(ExUnit.Filters, :parse_paths, [files])
+  else
+    {files, only} = files |> Enum.map(&ExUnit.Filters.parse_path/1) |> Enum.unzip()
+    {files, Enum.find(only, [], &(&1 != []))}
+  end
+
+ExUnit.configure(only)
 
 files =
   if files == [],
