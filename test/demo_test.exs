@@ -38,6 +38,7 @@ end
 
 defmodule System.DemoHardwareTest do
   use Demo.Case, async: true
+  @moduletag :realtime
 
   test "robots with real drivers find their place among the others, in real time" do
     line = "--headless --robots 2 --hardware mag:1,min:1 --blobs direct --seed 1"
@@ -57,12 +58,14 @@ end
 
 defmodule System.DemoEndsTest do
   use Demo.Case, async: true
+  @moduletag :realtime
 
   # The errors are read beside the output that ends, and among it.
   test "who reads no further is told nothing more" do
     for line <- ["--headless --robots 2 --duration 20", "--robots 2 --duration 20"] do
-      command = "{ mix demo #{line} 2>&3 | head -n 1 >&4; } 3>&1 4>#{first = first()}"
-      assert {"", 0} = System.cmd("sh", ["-c", command], cd: @root)
+      command = ~s({ mix demo #{line} 2>&3 | head -n 1 >&4; } 3>&1 4>"$1")
+      first = first()
+      assert {"", 0} = System.cmd("sh", ["-c", command, "sh", first], cd: @root)
       assert File.read!(first) =~ "2 robots (mag1, min1) in hall"
       File.rm!(first)
     end
@@ -88,16 +91,16 @@ defmodule System.DemoEndsTest do
     file = Path.join(folder, "out")
 
     script = """
-    #{demo} --robots 2 --duration 60 >#{file} 2>&1 </dev/null &
+    "$1" --robots 2 --duration 60 >"$2" 2>&1 </dev/null &
     p=$!; n=0
-    until grep -qs 'looks around' #{file}; do sleep 0.1; n=$((n + 1)); [ $n -lt 900 ] || exit 1; done
+    until grep -qs 'looks around' "$2"; do sleep 0.1; n=$((n + 1)); [ $n -lt 900 ] || exit 1; done
     demo=$(cat /proc/$p/task/$p/children)
     kill -TERM $p; wait $p; echo $?
     for d in $demo; do kill -0 $d 2>/dev/null && echo "$d is left"; done
     exit 0
     """
 
-    assert {"143\n", 0} = System.cmd("sh", ["-c", script])
+    assert {"143\n", 0} = System.cmd("sh", ["-c", script, "sh", demo, file])
     refute File.read!(file) =~ "SIGTERM"
   end
 
@@ -168,7 +171,10 @@ defmodule System.DemoRefusesTest do
 
     lines =
       for line <- @lines,
-          do: ["demo" | line |> String.replace("FOLDER", folder) |> OptionParser.split()]
+          do: [
+            "demo"
+            | line |> OptionParser.split() |> Enum.map(&String.replace(&1, "FOLDER", folder))
+          ]
 
     %{answers: Map.new(Enum.zip(@lines, Lines.run(lines, cd: @root)))}
   end
@@ -268,6 +274,7 @@ defmodule System.DemoTest do
     assert output =~ "No formation"
   end
 
+  @tag :realtime
   test "live without a terminal: plain lines, commands from standard input" do
     {output, _told, _status} =
       demo("--robots 2 --blobs direct --duration 30", input: "staus\nstatus\nkill mag1\nquit\n")
@@ -279,6 +286,7 @@ defmodule System.DemoTest do
     refute output =~ "\e["
   end
 
+  @tag :realtime
   test "bin/demo says what it cannot read, needs no home, and keeps standard input" do
     demo = Path.join(@root, "bin/demo")
     assert {"", told, 1} = run(demo, ["--map", <<0xFF>>], [])

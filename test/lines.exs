@@ -25,8 +25,8 @@ defmodule Lines do
 
     try do
       seconds = @seconds * length(lines)
-      command = "exec timeout #{seconds} mix run --no-start #{script} #{told} </dev/null"
-      {printed, status} = System.cmd("sh", ["-c", command], options)
+      command = ~s(exec timeout #{seconds} mix run --no-start "$@" </dev/null)
+      {printed, status} = System.cmd("sh", ["-c", command, "sh", script, told], options)
       status == 0 || raise "#{command}: status #{status}: #{printed}"
       told |> File.read!() |> :erlang.binary_to_term()
     after

@@ -8,6 +8,7 @@ defmodule System.NetnsStrangersTest do
   robot, each time by another name; the other robot is the one that calls it, by the order of their names. With `FIGURES=1` each test prints what it has measured.
   """
   use ExUnit.Case, async: false
+  @moduletag :realtime
   import Swarm.Case, only: [eventually: 1]
   alias Hal.Pose
   alias Mesh.Distribution.{Certs, Epmd}
@@ -71,13 +72,13 @@ defmodule System.NetnsStrangersTest do
     knock(context, @some)
   end
 
-  @tag :long
+  @tag long: true, realtime: :long
   @tag :tls
   test "with TLS 20,000 calls of a stranger leave nothing behind, and disturb nobody", context do
     knock(context, 20_000)
   end
 
-  @tag :long
+  @tag long: true, realtime: :long
   test "a million calls of a stranger leave nothing behind, and disturb nobody", context do
     knock(context, 1_000_000)
   end

@@ -17,6 +17,7 @@ defmodule System.NetnsTest do
   is measured is how they agree, and not how far they drive. With `FIGURES=1` each test prints what it has measured.
   """
   use ExUnit.Case, async: false
+  @moduletag :realtime
   import Swarm.Case, only: [order: 1]
   alias Hal.Pose
   alias Netns.{Fleet, Log, Story}

@@ -4,6 +4,7 @@ Code.require_file("nodes/case.exs", __DIR__)
 defmodule System.NodesLeaderTest do
   @moduledoc "`bin/demo --nodes` from outside: its leader's process is killed as a person would, by its number."
   use Nodes.Case, async: true
+  @moduletag :realtime
 
   test "kill -9 of the leader's process: another leads, and the report tells", %{environment: env} do
     port = start("--robots 3 --duration 45", env)
@@ -29,6 +30,7 @@ end
 defmodule System.NodesWorldTest do
   @moduledoc "`bin/demo --nodes` from outside: the process of its world is killed."
   use Nodes.Case, async: true
+  @moduletag :realtime
 
   test "kill -9 of the world's process: it comes back, and robots go on", %{environment: env} do
     port = start("--robots 2 --duration 45", env)
@@ -46,6 +48,7 @@ end
 defmodule System.NodesLauncherTest do
   @moduledoc "`bin/demo --nodes` from outside: what was started is killed."
   use Nodes.Case, async: true
+  @moduletag :realtime
 
   test "kill -9 of what was started: all that it started ends with it", %{environment: env} do
     if match?({_, 0}, System.cmd("sh", ["-c", "setpriv --pdeathsig TERM true 2>&1"])) do

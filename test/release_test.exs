@@ -18,6 +18,7 @@ defmodule System.ReleaseTest do
   real driver on an emulated base.
   """
   use Release.Case, async: true
+  @moduletag :realtime
   alias Hal.{Pose, Profile}
   alias Sim.{Emulator, World}
 
@@ -259,6 +260,7 @@ end
 defmodule System.ReleaseAgainTest do
   @moduledoc "The release of real robots, started twice, and again right after it was stopped."
   use Release.Case, async: true
+  @moduletag :realtime
   @moduletag skip: why_not
 
   test "a question may take long; a second start, and one right after a stop, are said in words",
@@ -311,6 +313,7 @@ end
 defmodule System.DeployTest do
   @moduledoc "The release of real robots, deployed to a bare machine."
   use Release.Case, async: true
+  @moduletag :realtime
   alias Release.Machine
   @moduletag skip: why_not
   @root Path.expand("..", __DIR__)

@@ -1,6 +1,7 @@
 defmodule System.RobotCommandTest do
   @moduledoc "What `bin/robot` makes of a release that does not do as it should."
   use ExUnit.Case, async: true
+  @moduletag :realtime
 
   @robot Path.expand("../bin/robot", __DIR__)
 

@@ -1,14 +1,18 @@
 # The tests of the whole system. Fails when a test fails, and when there was none.
 #
-#   mix run --no-start test/run.exs [FILE | FILE:LINE...] [--except WORD] [--long]
+#   mix run --no-start test/run.exs [FILE | FILE:LINE...] [--only TAG | --exclude TAG]
 #
-# `--except` leaves out the files with that word in their names, `--long` all but the tests tagged `:long`.
-{options, files} = OptionParser.parse!(System.argv(), strict: [except: :string, long: :boolean])
+# The tags are those of `mix test`.
+{options, files} = OptionParser.parse!(System.argv(), strict: [only: :string, exclude: :string])
 
 ExUnit.start(autorun: false)
 Code.require_file("start.exs", __DIR__)
 
-if options[:long], do: ExUnit.configure(include: [:long], exclude: [:test])
+case options do
+  [only: tag] -> ExUnit.configure(include: ExUnit.Filters.parse([tag]), exclude: [:test])
+  [exclude: tag] -> ExUnit.configure(exclude: [:long | ExUnit.Filters.parse([tag])])
+  [] -> :ok
+end
 
 # Most of these tests wait for programs that they have started.
 ExUnit.configure(max_cases: 2 * System.schedulers_online())
@@ -33,9 +37,7 @@ files =
     do: __DIR__ |> Path.join("**/*_test.exs") |> Path.wildcard() |> Enum.sort(),
     else: Enum.map(files, &Path.expand/1)
 
-for file <- files,
-    options[:except] == nil or not String.contains?(Path.basename(file), options[:except]),
-    do: Code.require_file(file)
+for file <- files, do: Code.require_file(file)
 
 case ExUnit.run() do
   %{total: total, excluded: total} ->

@@ -1,6 +1,7 @@
 defmodule System.SoakTest do
   @moduledoc "The command `bin/soak` from outside; what it judges by, the tests of `bench` show."
   use ExUnit.Case, async: true
+  @moduletag :realtime
   @moduletag timeout: 400_000
   @command Path.expand("../bin/soak", __DIR__)
 
@@ -15,7 +16,7 @@ defmodule System.SoakTest do
     assert said =~ ~s(soak: SEED cannot be "x"; a whole number from 0 to 1000000000 is allowed)
   end
 
-  @tag :long
+  @tag long: true, realtime: :long
   test "six robots hold out for two minutes, and nothing is left of them" do
     assert {said, 0} = soak(["2", "5"])
     assert said =~ "All that was checked held."

@@ -1,11 +1,11 @@
 # How every suite of the project starts, of the apps and of the whole system.
-Code.require_file("skipped.exs", __DIR__)
+for file <- ~w(skipped.exs failed.exs), do: Code.require_file(file, __DIR__)
 
 # On a busy machine a message may take its time; nothing waits longer than it must. Tests tagged `:long` are
-# for `bin/test long`, those tagged `:slow` are left out by `bin/test quick`.
+# for `bin/test long`; those tagged `:slow` or `:realtime` are left out by `bin/test quick`.
 ExUnit.start(
   assert_receive_timeout: 10_000,
   timeout: 180_000,
   exclude: [:long],
-  formatters: [ExUnit.CLIFormatter, Convoy.Skipped]
+  formatters: [ExUnit.CLIFormatter, Convoy.Skipped, Convoy.Failed]
 )

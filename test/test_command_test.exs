@@ -1,6 +1,7 @@
 defmodule System.TestCommandTest do
   @moduledoc "What `bin/test` makes of steps that fail, hang or hold no test; the steps are programs of our own making."
   use ExUnit.Case, async: true
+  @moduletag :realtime
 
   @moduletag :tmp_dir
   @root Path.expand("..", __DIR__)
@@ -50,22 +51,80 @@ defmodule System.TestCommandTest do
   } do
     assert {said, 0} = bin_test(folder, [], ~s(echo "mix $*"; echo "5 tests, 0 failures"))
     assert said =~ ~r/== lower: tests\nmix test.*\n5 tests.*\n\n== upper: tests\nmix test/
-    assert said =~ ~r/== how long each step took.*\d s  lower: tests\n.*\d s  in all\n$/s
-    assert said =~ "mix run --no-start test/run.exs --except netns"
+    assert said =~ ~r/== how long each step took.*\d s  lower: tests\n.*\d s +in all\n$/s
+    assert said =~ "mix run --no-start test/run.exs --exclude realtime"
+    # In real time one at a time, after the rest.
+    assert said =~ ~r/test\/run.exs --exclude realtime.*test\/run.exs --only realtime:true/s
   end
 
-  test "the first failure is told with all that it said, and which step it was", %{
+  test "a failure ends nothing: all are told at the end, with all that they said", %{
     tmp_dir: folder
   } do
-    mix =
-      ~S|case "$PWD $1" in */lower\ test) echo "not so"; exit 3 ;; esac; echo "1 test, 0 failures"|
+    mix = """
+    case "$PWD $*" in
+      */lower\\ test*) echo "not so"; exit 3 ;;
+      *--only*realtime*) echo "nor that"; exit 4 ;;
+    esac
+    echo "1 test, 0 failures"
+    """
 
     assert {said, 1} = bin_test(folder, [], mix)
+
+    assert said =~ ~r/ s  lower: tests: FAILED with status 3\n/
+    assert said =~ ~r/ s  upper: tests: done\n/
 
     assert said =~
              ~r/== lower: tests: FAILED after \d+ s with status 3. All that it said:\nnot so\n/
 
-    assert said =~ "bin/test: FAILED: lower: tests"
+    assert said =~ "nor that\n"
+    assert said =~ "bin/test: FAILED: lower: tests; the whole system: in real time\n"
+  end
+
+  describe "a test that fails" do
+    # A suite of the app `lower` whose steps fail so; run again, the test ends with that status.
+    defp failing(folder, kind, again) do
+      File.mkdir_p!(Path.join(folder, "apps/lower/test"))
+      File.write!(Path.join(folder, "apps/lower/test/a_test.exs"), "@moduletag :realtime")
+      File.mkdir_p!(Path.join(folder, "docs"))
+      File.write!(Path.join(folder, "docs/unstable.md"), "")
+
+      bin_test(folder, [], """
+      case "$PWD $*" in
+        */lower*--only*realtime*)
+          printf '#{kind}\\tapps/lower/test/a_test.exs:7\\ttest it (A)\\ttoo late\\n' >>"$CONVOY_FAILED"
+          echo "it was late"; exit 2 ;;
+        */lower*test/a_test.exs:7) echo "1 test, some"; exit #{again} ;;
+      esac
+      echo "1 test, 0 failures"
+      """)
+    end
+
+    test "in real time, and passes alone, is unstable; the second time docs/unstable.md has it",
+         %{
+           tmp_dir: folder
+         } do
+      line = "unstable: test it (A) (apps/lower/test/a_test.exs:7), too late\n"
+      assert {said, 0} = failing(folder, "realtime", 0)
+      assert said =~ "it was late\n"
+      assert String.ends_with?(said, line)
+      assert File.read!(Path.join(folder, "docs/unstable.md")) == ""
+      assert {_said, 0} = failing(folder, "realtime", 0)
+
+      assert File.read!(Path.join(folder, "docs/unstable.md")) =~
+               ~r/^\| `apps\/lower\/test\/a_test.exs:7` \| test it \(A\) \| \d{4}-\d\d-\d\d \| too late \|\n$/
+    end
+
+    test "in real time and again alone fails the run", %{tmp_dir: folder} do
+      assert {said, 1} = failing(folder, "realtime", 2)
+      assert said =~ "bin/test: FAILED: lower: in real time\n"
+      refute said =~ "unstable:"
+    end
+
+    test "without a clock is not repeated", %{tmp_dir: folder} do
+      assert {said, 1} = failing(folder, "reckoned", 0)
+      refute said =~ "once more"
+      assert said =~ "bin/test: FAILED: lower: in real time\n"
+    end
   end
 
   test "a suite without a test fails", %{tmp_dir: folder} do
@@ -102,7 +161,7 @@ defmodule System.TestCommandTest do
         script(
           folder,
           "path/mix",
-          "echo $TMPDIR >#{child}; setsid sleep 60 & echo up >#{mkfifo}; wait"
+          ~s(echo "$TMPDIR" >"#{child}"; setsid sleep 60 & echo up >"#{mkfifo}"; wait)
         )
 
         program = Path.join(folder, "bin/test")

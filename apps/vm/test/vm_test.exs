@@ -1,6 +1,6 @@
 defmodule VmTest do
   use ExUnit.Case, async: true
-  @moduletag :slow
+  @moduletag :realtime
 
   # How a process of the operating system is: running, stopped, or gone.
   defp state(pid) do

@@ -3,7 +3,7 @@ defmodule Swarm.ConversationNodesTest do
   alias Agents.{Conversation, Envelope}
   alias Agents.Answerers
   alias Swarm.Cluster
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :cluster
 
   defp question(content), do: Envelope.new(:query, :asker, content)

@@ -4,7 +4,7 @@ defmodule Agents.PubSubNodesTest do
   import Swarm.Case, only: [eventually: 1]
   alias Agents.FarBus
   alias Swarm.MeshNodes
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag adapter: :phoenix_pubsub
 
   unless Code.ensure_loaded?(Phoenix.PubSub),

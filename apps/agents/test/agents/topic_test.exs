@@ -3,7 +3,7 @@ defmodule Agents.TopicTest do
   alias Agents.{Conversation, Envelope, Responder, Topic}
   alias Agents.Answerers
   alias Swarm.Cluster
-  @moduletag :slow
+  @moduletag :realtime
 
   defp members(topic, count),
     do: eventually(fn -> length(Directory.members({:topic, topic})) == count end)

@@ -3,7 +3,7 @@ defmodule Bench.StopTest do
   alias Bench.Stop
   alias Bench.Stop.Reader
   alias Hal.RFlex.Protocol.Command
-  @moduletag :slow
+  @moduletag :realtime
   doctest Bench.Stop
   doctest Bench.Stop.Reader
   doctest Bench.Stop.Report

@@ -10,7 +10,7 @@ defmodule Console.CalibrateOdometryTest do
   alias Console.Cli.Diff
   alias Hal.{Pose, Profile}
   alias Sim.{Emulator, World}
-  @moduletag :slow
+  @moduletag :realtime
 
   doctest Console.Cli.Diff
   doctest Console.Calibrate.Options

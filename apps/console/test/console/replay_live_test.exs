@@ -4,7 +4,7 @@ defmodule Console.ReplayLiveTest do
   import ExUnit.CaptureIO
   alias Console.{Demo, Live, Options, Replay, Runs}
   alias Robot.Recording
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :tmp_dir
   @moduletag :capture_log
 

@@ -2,7 +2,7 @@ defmodule Hal.DeviceTest do
   use ExUnit.Case, async: true
   import ExUnit.CaptureLog
   alias Hal.{Device, Frame, Twist}
-  @moduletag :slow
+  @moduletag :realtime
 
   doctest Hal.Device.Liveness
   doctest Hal.Device.Words

@@ -152,7 +152,7 @@ defmodule Mcap.FileWriterTest do
       bytes
     end
 
-    @tag :slow
+    @tag :realtime
     test "the oldest files are deleted, and the folder never exceeds it", %{tmp_dir: dir} do
       dir = Path.join(dir, "runs")
       options = [path: dir, limit_bytes: @limit]
@@ -202,7 +202,7 @@ defmodule Mcap.FileWriterTest do
       assert File.read!(Path.join(dir, "notes")) == "of somebody"
     end
 
-    @tag :slow
+    @tag :realtime
     test "large messages of many channels, notes between", %{tmp_dir: dir} do
       {:ok, recorder} = FileWriter.start_link(path: dir, limit_bytes: @limit)
 

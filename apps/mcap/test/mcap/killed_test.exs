@@ -4,7 +4,7 @@ defmodule Mcap.KilledTest do
   alias Mcap.{EndlessRecorder, Reader}
 
   @moduletag :tmp_dir
-  @moduletag :slow
+  @moduletag :realtime
 
   # Kills it when it has said this many lines, and returns how many messages it said that it had flushed.
   defp flushed_before_kill(path, lines) do
@@ -63,7 +63,7 @@ defmodule Mcap.KilledTest do
     for lines <- [1, 7, 31], do: check(dir, lines)
   end
 
-  @tag :long
+  @tag long: true, realtime: :long
   test "at 50 moments", %{tmp_dir: dir} do
     {moments, _state} = Enum.map_reduce(1..50, :rand.seed_s(:exsss, 1), &draw/2)
     for lines <- moments, do: check(dir, lines)

@@ -1,6 +1,6 @@
 defmodule Swarm.CommandsTest do
   use Swarm.Case, async: false
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
 
   defp line({:error, line}) do

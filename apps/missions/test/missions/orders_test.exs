@@ -1,7 +1,7 @@
 defmodule Swarm.OrdersTest do
   @moduledoc "The answer to an order says what became of it."
   use Swarm.Case, async: false
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
   import ExUnit.CaptureLog
   alias Robot.Acts

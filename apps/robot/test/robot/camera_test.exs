@@ -1,7 +1,7 @@
 defmodule Robot.CameraTest do
   @moduledoc "What the robot sees, and that it drives on when it does not."
   use Robot.Case, async: false
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
 
   defp seeing(id, more \\ []) do

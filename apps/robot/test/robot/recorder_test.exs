@@ -5,7 +5,7 @@ defmodule Robot.RecorderTest do
   alias Robot.{Recorder, Recording, Replay}
   alias Robot.Recorder.Queue
   doctest Robot.Recorder.Options
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :tmp_dir
   @moduletag :capture_log
 

@@ -1,7 +1,7 @@
 defmodule Robot.SupervisorTest do
   @moduledoc "Who falls, and what happens: each row of the architecture's table within one robot."
   use Robot.Case, async: false
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
   import ExUnit.CaptureLog
   alias Robot.Behaviour

@@ -4,7 +4,7 @@ defmodule Sim.EmulatorTest do
   import Swarm.Case, only: [eventually: 1]
   alias Hal.{Pose, Profile, Serial}
   alias Sim.{Emulator, World}
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :tmp_dir
 
   @on "1b0202002208000186a0000000030c1b03"

@@ -5,7 +5,7 @@ defmodule Sim.FleetTest do
   alias Hal.Pose
   alias Robot.{Board, Names}
   alias Sim.{Fleet, World}
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
 
   defp fleet(options) do

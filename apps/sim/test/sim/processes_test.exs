@@ -8,7 +8,7 @@ defmodule Sim.ProcessesTest do
   alias Hal.Profile
   alias Sim.{Radio, World}
   alias Swarm.{Comms, Directory, Member}
-  @moduletag :slow
+  @moduletag :realtime
 
   @ids [:mag1, :mag2, :min1]
   @me :mag1

@@ -1,6 +1,6 @@
 defmodule Swarm.ArmingTest do
   use Swarm.Case, async: false
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
   alias Swarm.Status
 

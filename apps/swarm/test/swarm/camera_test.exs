@@ -2,7 +2,7 @@ defmodule Swarm.CameraTest do
   use Swarm.Case, async: false
   alias Swarm.{Camera, Cluster}
   alias Vision.View.Picture
-  @moduletag :slow
+  @moduletag :realtime
 
   @moduletag if(System.find_executable("ffmpeg"), do: [], else: [skip: "ffmpeg is missing"])
   @camera {Hal.Camera.FFmpeg, source: "lavfi:testsrc=size=64x48:rate=50"}

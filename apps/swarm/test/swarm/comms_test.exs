@@ -1,6 +1,6 @@
 defmodule Swarm.CommsTest do
   use Robot.Case, async: false
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
   alias Hal.{Odometry, Pose}
   alias Swarm.{Comms, Directory, Message}
@@ -268,7 +268,7 @@ defmodule Swarm.CommsTest do
     assert {true, _name} = NameClaim.rival(name, {0, :twin@far}, nil, 100_000)
   end
 
-  @tag :long
+  @tag long: true, realtime: :long
   test "a robot of which a forged heartbeat said that it was there before speaks again after ten seconds" do
     id = talking(:comms21, comms: [boot: 1_000])
     comms = Names.whereis(id, :comms)

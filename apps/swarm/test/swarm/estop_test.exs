@@ -1,6 +1,6 @@
 defmodule Swarm.EStopTest do
   use Swarm.Case, async: false
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
   alias Swarm.EStop
   alias Swarm.EStop.Broadcaster

@@ -3,7 +3,7 @@ defmodule Vision.BlobDetectorTest do
   alias Hal.Frame
   alias Vision.Backend.Native
   alias Vision.{BlobDetector, Colours, Detections}
-  @moduletag :slow
+  @moduletag :realtime
 
   setup do
     {:ok, colours} =

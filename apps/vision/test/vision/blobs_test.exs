@@ -1,6 +1,6 @@
 defmodule Vision.BlobsTest do
   use ExUnit.Case, async: true
-  @moduletag :slow
+  @moduletag :realtime
   doctest Vision.Blobs.Options
   doctest Vision.Blobs.Report
   alias Vision.Blobs

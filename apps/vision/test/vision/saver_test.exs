@@ -1,6 +1,6 @@
 defmodule Vision.SaverTest do
   use ExUnit.Case, async: true
-  @moduletag :slow
+  @moduletag :realtime
   doctest Vision.Saver.Options
   doctest Vision.Saver.Retention
   alias Vision.{Saver, View}

@@ -3,7 +3,7 @@ defmodule Vision.ViewTest do
   alias Hal.Frame
   alias Vision.View
   alias Vision.View.{EncoderControl, Picture, Subscribers}
-  @moduletag :slow
+  @moduletag :realtime
 
   @moduletag if(System.find_executable("ffmpeg"), do: [], else: [skip: "ffmpeg is missing"])
   @full "scale=in_range=full:out_range=full:in_color_matrix=bt601:out_color_matrix=bt601"

@@ -3,7 +3,7 @@ defmodule Agents.ContractNet.NodesTest do
   alias Agents.ContractNet
   alias Agents.Answerers
   alias Swarm.Cluster
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :cluster
 
   defp bidders(nodes, bids) do

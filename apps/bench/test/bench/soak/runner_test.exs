@@ -4,7 +4,7 @@ defmodule Bench.Soak.RunnerTest do
   alias Bench.Soak.Fleet.Processes
   alias Bench.Soak.{Report, Runner}
 
-  @moduletag :slow
+  @moduletag :realtime
 
   @plan [
     {0, :start},

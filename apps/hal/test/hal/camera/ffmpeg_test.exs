@@ -1,6 +1,6 @@
 defmodule Hal.Camera.FFmpegTest do
   use ExUnit.Case, async: true
-  @moduletag :slow
+  @moduletag :realtime
   doctest Hal.Camera.Source
   doctest Hal.Camera.Options
   doctest Hal.Camera.FFmpeg

@@ -2,7 +2,7 @@ defmodule Hal.Device.ArmingTest do
   use ExUnit.Case, async: true
   alias Hal.{Device, Odometry, Pose, Twist}
   alias Hal.Device.Arming
-  @moduletag :slow
+  @moduletag :realtime
   doctest Hal.Device.Arming
 
   @zero Twist.zero()

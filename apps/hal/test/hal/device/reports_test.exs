@@ -2,7 +2,7 @@ defmodule Hal.Device.ReportsTest do
   use ExUnit.Case, async: true
   alias Hal.{Device, Odometry, Pose, Twist}
   alias Hal.Device.Reports
-  @moduletag :slow
+  @moduletag :realtime
   doctest Hal.Device.Reports
 
   @zero Twist.zero()

@@ -3,7 +3,7 @@ defmodule Hal.RFlex.DriverTest do
   import Hal.Lines, only: [far!: 1]
   alias Hal.{Pose, RFlexBase, Serial, Twist}
   alias Hal.RFlex.Driver
-  @moduletag :slow
+  @moduletag :realtime
   doctest Hal.RFlex.Driver
 
   @conversions [distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0]

@@ -3,7 +3,7 @@ defmodule Hal.RFlex.LineTest do
   use ExUnit.Case, async: true
   import Hal.Lines
   alias Hal.{Device, RFlexBase, Serial, Twist}
-  @moduletag :slow
+  @moduletag :realtime
 
   @conversions [distance: 31_387.0, angle: 4654.2, range: 1474.0]
   @on {:reports, 100_000, 3}

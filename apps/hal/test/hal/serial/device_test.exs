@@ -2,7 +2,7 @@ defmodule Hal.Serial.DeviceTest do
   use ExUnit.Case, async: true
   import Hal.Lines
   alias Hal.{Device, Serial, Twist}
-  @moduletag :slow
+  @moduletag :realtime
 
   @stop "\eSTOP\r"
 

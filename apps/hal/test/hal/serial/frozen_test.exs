@@ -3,7 +3,7 @@ defmodule Hal.Serial.FrozenTest do
   use ExUnit.Case, async: true
   import Hal.Lines
   alias Hal.{Device, RFlexBase, Serial, Twist}
-  @moduletag :slow
+  @moduletag :realtime
 
   @stop "\eSTOP\r"
 

@@ -2,7 +2,7 @@ defmodule Hal.Serial.LastWordsTest do
   use ExUnit.Case, async: true
   import Hal.Lines
   alias Hal.{LineHolder, Serial}
-  @moduletag :slow
+  @moduletag :realtime
 
   @stop "\eSTOP\r"
 

@@ -2,7 +2,7 @@ defmodule Hal.Serial.NativeTest do
   use ExUnit.Case, async: true
   import Hal.Lines
   alias Hal.Serial
-  @moduletag :slow
+  @moduletag :realtime
 
   @all :binary.list_to_bin(Enum.to_list(0..255))
 

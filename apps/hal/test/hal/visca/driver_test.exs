@@ -3,7 +3,7 @@ defmodule Hal.Visca.DriverTest do
   import Hal.Lines, only: [far!: 1]
   alias Hal.{Device, Serial, ViscaToy}
   alias Hal.Visca.{Driver, Options}
-  @moduletag :slow
+  @moduletag :realtime
   doctest Hal.Visca.Options
 
   setup do

@@ -6,7 +6,7 @@ defmodule Mesh.Distribution.CarriersTest do
   # Each node has a name and a port of its own.
   use ExUnit.Case, async: true
   alias Mesh.Distribution.{Access, Certs}
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :tmp_dir
 
   unless System.find_executable("openssl"), do: @moduletag(skip: "openssl is missing")

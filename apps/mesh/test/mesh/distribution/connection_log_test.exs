@@ -2,7 +2,7 @@ defmodule Mesh.Distribution.ConnectionLogTest do
   @moduledoc "Real nodes with certificates: one listens, others knock."
   use ExUnit.Case, async: false
   alias Mesh.Distribution.{Certs, ConnectionLog}
-  @moduletag :slow
+  @moduletag :realtime
 
   @moduletag :tmp_dir
   unless System.find_executable("openssl"), do: @moduletag(skip: "openssl is missing")

@@ -1,7 +1,7 @@
 defmodule Mesh.Distribution.EpmdTest do
   use ExUnit.Case, async: false
   alias Mesh.Distribution.Epmd
-  @moduletag :slow
+  @moduletag :realtime
   doctest Epmd
 
   # Ports that no robot has by default; node names whose host does not exist.

@@ -1,6 +1,6 @@
 defmodule Robot.Control.PilotTest do
   use Robot.Case, async: false
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
 
   defp flown(id, options \\ []) do

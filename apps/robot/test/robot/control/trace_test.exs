@@ -5,7 +5,7 @@ defmodule Robot.Control.TraceTest do
   alias Robot.Control.Controller
   alias Robot.Mission.Runner
   alias Robot.Safety.Reflex
-  @moduletag :slow
+  @moduletag :realtime
 
   test "gate, executive and pilot do what the pure functions do on the same input" do
     profile = Hal.Profile.magellan()

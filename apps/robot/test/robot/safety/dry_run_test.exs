@@ -2,7 +2,7 @@ defmodule Robot.Safety.DryRunTest do
   use Robot.Case, async: false
   import ExUnit.CaptureLog
   alias Robot.Safety.DryRun
-  @moduletag :slow
+  @moduletag :realtime
   doctest Robot.Safety.DryRun
 
   @moduletag :capture_log

@@ -1,6 +1,6 @@
 defmodule Robot.Safety.GateTest do
   use Robot.Case, async: false
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
 
   @zero Twist.zero()

@@ -3,7 +3,7 @@ defmodule Sim.Fleet.FolderTest do
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1]
   alias Sim.Fleet.Folder
-  @moduletag :slow
+  @moduletag :realtime
 
   # An agent of that VM makes it, as a fleet's process does.
   defp folder(vm) do

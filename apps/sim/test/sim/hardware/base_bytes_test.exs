@@ -1,7 +1,7 @@
 defmodule Sim.Hardware.BaseBytesTest do
   @moduledoc "The driver of real bases: its pauses between commands, escaped bytes, and counters at their ends."
   use Sim.BaseCase, async: true
-  @moduletag :slow
+  @moduletag :realtime
 
   # When they are written is looked at, not when they arrive: a busy machine hands the emulator the bytes of a pause at
   # once, however well they were spaced, and then it loses some.

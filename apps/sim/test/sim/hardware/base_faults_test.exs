@@ -1,9 +1,13 @@
 defmodule Sim.Hardware.BaseFaultsTest do
   @moduledoc "The driver of real bases on a line that loses, duplicates and changes bytes."
   use Sim.BaseCase, async: true
-  @moduletag :slow
+  @moduletag :realtime
 
-  for {seed, tags} <- [{1, []}, {2, [long: true]}, {3, [long: true]}] do
+  for {seed, tags} <- [
+        {1, []},
+        {2, [long: true, realtime: :long]},
+        {3, [long: true, realtime: :long]}
+      ] do
     @tag tags
     @tag wire: [drop: 0.01, double: 0.005, flip: 0.005, seed: seed]
     test "with 2 % of faulty bytes it drives, and never faster than its limit (#{seed})",

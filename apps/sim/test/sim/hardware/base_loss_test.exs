@@ -1,7 +1,7 @@
 defmodule Sim.Hardware.BaseLossTest do
   @moduledoc "The driver of real bases when the line, or the controller, is gone for a while."
   use Sim.BaseCase, async: true
-  @moduletag :slow
+  @moduletag :realtime
 
   test "unplugged in motion, the body stops; plugged in, it goes on, and knows where it is",
        context do

@@ -3,7 +3,7 @@ defmodule Sim.Hardware.BaseTest do
   The driver of real bases: its commands to the controller, and the reports that it gets.
   """
   use Sim.BaseCase, async: true
-  @moduletag :slow
+  @moduletag :realtime
 
   test "it drives, turns and stops, and its odometry matches the body's motion", context do
     {fastest, _} = drive(context, Twist.new(0.3, 0.0), &(&1.pose.x > -3.0))

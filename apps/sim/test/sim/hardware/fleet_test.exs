@@ -5,7 +5,7 @@ defmodule Sim.Hardware.FleetTest do
   alias Hal.Pose
   alias Robot.Board
   alias Sim.{Fleet, Trial, World}
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
 
   test "a robot with real drivers goes where it is sent, and leaves nothing behind" do

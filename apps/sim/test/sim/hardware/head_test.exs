@@ -7,7 +7,7 @@ defmodule Sim.Hardware.HeadTest do
   import Swarm.Case, only: [eventually: 1]
   alias Hal.{Device, Pose, Profile}
   alias Sim.{Emulator, World}
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :tmp_dir
 
   setup %{tmp_dir: folder} = context do

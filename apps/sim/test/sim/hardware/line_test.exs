@@ -4,7 +4,7 @@ defmodule Sim.Hardware.LineTest do
   import ExUnit.CaptureLog
   alias Hal.Profile
   alias Sim.{Emulator, World}
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :tmp_dir
   @moduletag :capture_log
 

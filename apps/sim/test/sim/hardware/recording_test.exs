@@ -7,7 +7,7 @@ defmodule Sim.Hardware.RecordingTest do
   import Swarm.Case, only: [eventually: 1, order: 1]
   alias Robot.{Recorder, Recording, Replay}
   alias Sim.Fleet
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
   @moduletag :tmp_dir
 
@@ -82,7 +82,7 @@ defmodule Sim.Hardware.RecordingTest do
     assert [%{robot: :mag71, role: :gate, at_ms: ^at_ms}] = found
   end
 
-  @tag :long
+  @tag long: true, realtime: :long
   @tag timeout: 900_000
   test "so do ten missions, in which robots are stopped, commanded and killed", %{tmp_dir: folder} do
     deeds = [

@@ -10,7 +10,7 @@ defmodule Sim.Recording.JudgedTest do
   alias Sim.{Fleet, Recorder, Recording, Replay, Trial}
   alias Sim.Recording.Pictures
   doctest Sim.Recording.Pictures
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
 
   @robots [:mag81, :min81]

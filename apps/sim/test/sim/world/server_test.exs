@@ -1,7 +1,7 @@
 defmodule Sim.World.ServerTest do
   @moduledoc "A world in real time, and the devices that find it by its name."
   use ExUnit.Case, async: false
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
   import Swarm.Case, only: [eventually: 1]
   alias Hal.{Device, Pose, Profile, Twist}

@@ -8,7 +8,7 @@ defmodule Swarm.Blackboard.MeshTest do
   alias Swarm.Directory.RobotInfo
   alias Swarm.MeshNodes, as: Cluster
   alias Swarm.MeshNodes.Listener
-  @moduletag :slow
+  @moduletag :realtime
 
   defp get(node, robot, key),
     do: Cluster.call(node, Blackboard, :get, [robot, key, :infinity])

@@ -1,6 +1,6 @@
 defmodule Swarm.Directory.RobotInfoTest do
   use Swarm.Case, async: false
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :capture_log
   alias Swarm.{Blackboard, Status}
   alias Swarm.Directory.RobotInfo

@@ -4,7 +4,7 @@ defmodule Swarm.EStop.DatagramsTest do
   import Swarm.Case, only: [eventually: 1]
   alias Robot.Board
   alias Swarm.MeshNodes
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :cluster
 
   defp latched?(node) do

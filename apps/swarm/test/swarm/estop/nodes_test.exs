@@ -3,7 +3,7 @@ defmodule Swarm.EStop.NodesTest do
   alias Mesh.Nonblocking
   alias Robot.Mission.Manual
   alias Swarm.Cluster
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :cluster
   @moduletag :capture_log
 

@@ -1,6 +1,6 @@
 defmodule Swarm.Host.HealthCheckTest do
   use ExUnit.Case, async: true
-  @moduletag :slow
+  @moduletag :realtime
   use Swarm.Case
   alias Swarm.Host.HealthCheck
 

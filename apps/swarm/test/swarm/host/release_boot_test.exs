@@ -2,7 +2,7 @@ defmodule Swarm.Host.ReleaseBootTest do
   use ExUnit.Case, async: true
   alias Swarm.Host.ReleaseBoot
   alias Mesh.Secret
-  @moduletag :slow
+  @moduletag :realtime
 
   doctest ReleaseBoot
 

@@ -4,7 +4,7 @@ defmodule Swarm.Mesh.AbsurdTest do
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes
-  @moduletag :slow
+  @moduletag :realtime
 
   @parts [
     Mesh.Server,

@@ -4,7 +4,7 @@ defmodule Swarm.Mesh.FloodTest do
   import Swarm.Case, only: [eventually: 1, order: 1]
   alias Swarm.MeshNodes
   alias Mesh.Protocol.Packet
-  @moduletag :slow
+  @moduletag :realtime
 
   @datagrams 100_000
 

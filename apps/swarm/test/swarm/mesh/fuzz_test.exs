@@ -4,7 +4,7 @@ defmodule Swarm.Mesh.FuzzTest do
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes
   alias Swarm.MeshNodes.Fuzz
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag :tmp_dir
 
   test "no process of a node ends because of a message, and none is left behind", context do

@@ -5,7 +5,7 @@ defmodule Swarm.Mesh.JunkTest do
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes
   alias Swarm.MeshNodes.Junk
-  @moduletag :slow
+  @moduletag :realtime
 
   test "nothing that is sent to a node crashes anything or makes it grow" do
     [one, two] = MeshNodes.start(2, robots: true)

@@ -3,7 +3,7 @@ defmodule Swarm.Mesh.LibclusterTest do
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes, as: Cluster
-  @moduletag :slow
+  @moduletag :realtime
   @moduletag adapter: :libcluster
 
   unless Code.ensure_loaded?(Elixir.Cluster.Supervisor),

@@ -4,7 +4,7 @@ defmodule Swarm.MeshSizeTest do
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes, as: Cluster
-  @moduletag :slow
+  @moduletag :realtime
 
   defp linked(node), do: Cluster.call(node, Node, :list, [])
   defp full?(nodes), do: Enum.all?(nodes, &(met?(&1, nodes) and joined?(&1, nodes)))

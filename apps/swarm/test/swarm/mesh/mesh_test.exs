@@ -4,7 +4,7 @@ defmodule Swarm.MeshTest do
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.MeshNodes, as: Cluster
-  @moduletag :slow
+  @moduletag :realtime
 
   # Those that see each other fall silent and come back; whoever ends one for good has others of its own.
   setup_all do

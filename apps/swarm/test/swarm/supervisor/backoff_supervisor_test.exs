@@ -3,7 +3,7 @@ defmodule Swarm.Supervisor.BackoffSupervisorTest do
   import Swarm.Case, only: [eventually: 1]
   alias Hal.Event
   alias Swarm.Supervisor.BackoffSupervisor
-  @moduletag :slow
+  @moduletag :realtime
 
   defp keep(options \\ []) do
     name = :"part#{System.unique_integer([:positive])}"
