@@ -9,6 +9,9 @@ defmodule Docs.Case do
   Each document has a copy of the project to itself, where its commands run in their order, and then one VM for
   its `iex>` lines. Nothing that a reader types may change a file that came along. The modules that use this run side by
   side, each in a place of its own; the documents of one run one after the other.
+
+  `bin/test` types what the README says; what the other documents say is typed in `bin/test long`, and only looked at
+  else.
   """
   use ExUnit.CaseTemplate
   alias Docs.{Checks, Reader, Sandbox}
@@ -20,6 +23,7 @@ defmodule Docs.Case do
       alias Docs.{Checks, LookedAt, Reader, Sandbox, Shown}
       # Each of its commands has a minute.
       @moduletag timeout: 600_000
+      @moduletag unquote(options[:tags] || [])
 
       for document <- unquote(options[:documents]) do
         @document document
@@ -45,6 +49,13 @@ defmodule Docs.Case do
         |> Enum.map(&Path.relative_to(&1, @root))
     ]
 
+  @doc "All in the document is known; commands that nobody types have the words and options of their programs."
+  def look(document) do
+    items = Reader.items(File.read!(Path.join(@root, document)))
+    assert Checks.unknown(items) == []
+    assert Checks.looked_at(items, @root) ++ Checks.mentions(items, @root) == []
+  end
+
   @doc "All is as the document says."
   def check(document, place) do
     items = Reader.items(File.read!(Path.join(@root, document)))
@@ -62,16 +73,26 @@ defmodule System.DocsReadmeTest do
 end
 
 defmodule System.DocsExtendingTest do
-  use Docs.Case, async: true, documents: ["docs/extending.md"]
+  use Docs.Case, async: true, documents: ["docs/extending.md"], tags: [long: true]
+end
+
+defmodule System.DocsTypedTest do
+  use Docs.Case,
+    async: true,
+    documents: Docs.Case.documents() -- ["README.md", "docs/extending.md"],
+    tags: [long: true]
 end
 
 defmodule System.DocsTest do
-  use Docs.Case,
-    async: true,
-    documents: Docs.Case.documents() -- ["README.md", "docs/extending.md"]
+  use Docs.Case, async: true, documents: []
 
   @root Path.expand("..", __DIR__)
   @documents Docs.Case.documents()
+
+  for document <- @documents do
+    @document document
+    test("#{document} says nothing unknown", do: Docs.Case.look(@document))
+  end
 
   test "a lie is seen", %{place: place} do
     lies = """

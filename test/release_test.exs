@@ -414,6 +414,7 @@ defmodule System.DeployTest do
       end
     end
 
+    @tag long: true, realtime: :long
     test "from a bare machine to a robot that runs; a wrong file changes nothing; and back",
          context do
       assert {said, 0} = to_machine(context)

@@ -1,9 +1,11 @@
 # The tests of the whole system. Fails when a test fails, and when there was none.
 #
-#   mix run --no-start test/run.exs [FILE | FILE:LINE...] [--only TAG | --exclude TAG]
+#   mix run --no-start test/run.exs [FILE | FILE:LINE...] [--only TAG | --exclude TAG] [--except WORD]
 #
-# The tags are those of `mix test`.
-{options, files} = OptionParser.parse!(System.argv(), strict: [only: :string, exclude: :string])
+# The tags are those of `mix test`; `--except` leaves out the files with that word in their names.
+strict = [only: :string, exclude: :string, except: :string]
+{options, files} = OptionParser.parse!(System.argv(), strict: strict)
+{except, options} = Keyword.pop(options, :except)
 
 ExUnit.start(autorun: false)
 Code.require_file("start.exs", __DIR__)
@@ -37,7 +39,9 @@ files =
     do: __DIR__ |> Path.join("**/*_test.exs") |> Path.wildcard() |> Enum.sort(),
     else: Enum.map(files, &Path.expand/1)
 
-for file <- files, do: Code.require_file(file)
+for file <- files,
+    except == nil or not String.contains?(Path.basename(file), except),
+    do: Code.require_file(file)
 
 case ExUnit.run() do
   %{total: total, excluded: total} ->

@@ -175,6 +175,15 @@ defmodule Docs.Checks do
     |> Enum.map(fn {{_kind, n, text, _answer}, wrong} -> "line #{n}: #{text}: #{wrong}" end)
   end
 
+  @doc "What is wrong with words and options of the commands that are not run."
+  @spec looked_at([Reader.item()], Path.t()) :: [String.t()]
+  def looked_at(items, folder) do
+    for {:shell, n, text, _answer} <- items,
+        not run?(text),
+        wrong = LookedAt.command(Reader.words(text), folder),
+        do: "line #{n}: #{text}: #{wrong}"
+  end
+
   defp all([{:shell, _n, _text, _answer} | _] = items, folder) do
     {run, looked_at} = Enum.split_with(items, fn {_kind, _n, text, _answer} -> run?(text) end)
     lines = for {:shell, _n, text, answer} <- run, do: {text, answer}

@@ -1,5 +1,8 @@
 defmodule Sim.Chaos.ReplayTest do
-  @moduledoc "Recordings of runs that were drawn at random replay to the byte. With `FIGURES=1` it prints what was replayed."
+  @moduledoc """
+  Recordings of runs that were drawn at random replay to the byte. `CHAOS_REPLAYS=100` plays more, and with `FIGURES=1` it
+  prints what was replayed.
+  """
   use Sim.LockstepCase, async: true
   alias Sim.Chaos.Draw
   alias Sim.{Recording, Replay, Trial}
@@ -48,8 +51,8 @@ defmodule Sim.Chaos.ReplayTest do
     }
   end
 
-  test "a hundred recordings of runs that were drawn at random replay to the byte" do
-    last = String.to_integer(System.get_env("CHAOS_REPLAYS", "100"))
+  test "thirty recordings of runs that were drawn at random replay to the byte" do
+    last = String.to_integer(System.get_env("CHAOS_REPLAYS", "30"))
 
     replayed =
       1..last

@@ -97,11 +97,12 @@ defmodule Sim.Chaos.RunnerTest do
   end
 
   # The goal is that 99 % of all claims are true, and `mix chaos` judges by it. It is missed by little (docs/results.md,
-  # section 14); here it must not get worse.
+  # section 14); here it must not get worse. `CHAOS_RUNS=100` plays more.
   @tag :long
   @tag timeout: :infinity
-  test "a hundred runs as drawn: nothing is violated but that a few claims are false" do
-    %{runs: runs} = Runner.run(1, 1..100, attempts: 0)
+  test "forty runs as drawn: nothing is violated but that a few claims are false" do
+    last = String.to_integer(System.get_env("CHAOS_RUNS", "40"))
+    %{runs: runs} = Runner.run(1, 1..last, attempts: 0)
 
     found =
       for run <- runs,

@@ -45,9 +45,10 @@ defmodule Swarm.Comms.FloodTest do
         )
 
         {:reductions, before} = Process.info(self(), :reductions)
-        assert LoadShedder.relieve([]) == count - 500
+        dropped = LoadShedder.relieve([])
         {:reductions, later} = Process.info(self(), :reductions)
-        assert {:message_queue_len, 500} = Process.info(self(), :message_queue_len)
+        assert {:message_queue_len, left} = Process.info(self(), :message_queue_len)
+        assert dropped + left == count and dropped > left
         drain()
         later - before
       end
