@@ -71,7 +71,12 @@ defmodule Bench.VisionTest do
   @tag :tmp_dir
   test "a run has figures of what is here, and says what is not", %{easy: easy, tmp_dir: folder} do
     program = Path.join(folder, "beside")
-    File.write!(program, "#!/bin/sh\n[ -s $1 ] && [ $(wc -l <$2) = 8 ] && echo 20 && echo $5\n")
+
+    File.write!(
+      program,
+      "#!/bin/sh\n[ -s \"$1\" ] && [ $(wc -l <\"$2\") = 8 ] && echo 20 && echo $5\n"
+    )
+
     File.chmod!(program, 0o755)
     beside = %{name: :beside, says: "another", pace: :slow}
     broken = %{name: :broken, says: "broken", pace: :slow}

@@ -14,8 +14,8 @@ defmodule Console.ChaosTest do
   defp draw(seed, _number),
     do: [robots: [:mag1, :mag2], seed: seed, blobs: :direct, duration_s: 2]
 
-  defp chaos(line) do
-    {:ok, options} = line |> OptionParser.split() |> Options.parse()
+  defp chaos(line, words \\ []) do
+    {:ok, options} = Options.parse(OptionParser.split(line) ++ words)
     with_io(fn -> Chaos.run(options, draw: &draw/2) end)
   end
 
@@ -57,7 +57,7 @@ defmodule Console.ChaosTest do
     tmp_dir: folder
   } do
     json = Path.join(folder, "chaos.json")
-    assert {2, text} = chaos("--runs 3 --attempts 2 --json #{json}")
+    assert {2, text} = chaos("--runs 3 --attempts 2", ["--json", json])
     assert [line] = text |> String.split("\n") |> Enum.filter(&(&1 =~ ~r/^run /))
 
     assert line =~

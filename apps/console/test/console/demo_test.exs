@@ -3,8 +3,8 @@ defmodule Console.DemoTest do
   import ExUnit.CaptureIO
   alias Console.{Demo, FakeTrial, Runs}
 
-  defp demo(line) do
-    {status, text} = with_io(fn -> Demo.run(Runs.options(line), FakeTrial) end)
+  defp demo(line, words \\ []) do
+    {status, text} = with_io(fn -> Demo.run(Runs.options(line, words), FakeTrial) end)
     {status, text}
   end
 
@@ -48,7 +48,7 @@ defmodule Console.DemoTest do
   @tag :tmp_dir
   test "a run that ended before its time is reported, and ends with 1", %{tmp_dir: folder} do
     json = Path.join(folder, "run.json")
-    options = Runs.options("--json #{json}")
+    options = Runs.options("", ["--json", json])
     test = self()
     hooks = [ended: fn _trial -> "the world is gone" end, stop: &send(test, {:stopped, &1})]
 
@@ -67,7 +67,7 @@ defmodule Console.DemoTest do
   test "writes report and picture", %{tmp_dir: folder} do
     json = Path.join(folder, "run.json")
     svg = Path.join(folder, "run.svg")
-    assert {0, text} = demo("--json #{json} --picture #{svg}")
+    assert {0, text} = demo("", ["--json", json, "--picture", svg])
     assert text =~ "Wrote #{json}"
     assert File.read!(json) =~ ~s({"version":")
     assert File.read!(svg) =~ "<svg"

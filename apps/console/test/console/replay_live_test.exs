@@ -15,13 +15,13 @@ defmodule Console.ReplayLiveTest do
     {status, text, errors}
   end
 
-  defp replay(line) do
-    {:ok, options} = line |> String.split() |> Replay.Options.parse()
+  defp replay(path, line \\ "") do
+    {:ok, options} = Replay.Options.parse([path | String.split(line)])
     heard(fn -> Replay.run(options) end)
   end
 
   defp record(path) do
-    options = Runs.options("--headless --hardware 1 --robots 2 --duration 3 --record #{path}")
+    options = Runs.options("--headless --hardware 1 --robots 2 --duration 3", ["--record", path])
     assert Options.real_time?(options)
     stop = [stop: &Live.Paced.stop/1]
     heard(fn -> Live.Recording.run(options, &Demo.run(&1, Live.Paced, stop)) end)
@@ -44,11 +44,11 @@ defmodule Console.ReplayLiveTest do
     assert text =~
              ~r/ s of mag1, min1 replayed: all \d+ decisions on \d+ inputs are as recorded\.$/m
 
-    assert {0, text, ""} = replay("#{path} --robot min1 --until 1")
+    assert {0, text, ""} = replay(path, "--robot min1 --until 1")
     assert text =~ ~r/ s of min1 replayed: all/
     refute text =~ "mag1   "
 
-    assert {0, text, ""} = replay("#{path} --at 2 --why mag1")
+    assert {0, text, ""} = replay(path, "--at 2 --why mag1")
     assert text =~ ~r/^mag1: search of Missions.Landmark; at \(/m
     assert text =~ "mag1 at 2.0 s"
     for title <- ~w(perceived wishes gate mission), do: assert(text =~ ~r/^#{title}.*:$/m)
@@ -62,7 +62,7 @@ defmodule Console.ReplayLiveTest do
           {"--robot mag", "--robot names no robot of the recording: mag"},
           {"--at 99", "--at 99.0 is after the end of the recording"}
         ] do
-      assert {1, "", "replay: " <> error} = replay("#{path} #{line}")
+      assert {1, "", "replay: " <> error} = replay(path, "#{line}")
       assert error =~ said
       assert length(String.split(error, "\n", trim: true)) == 1
     end
@@ -80,7 +80,7 @@ defmodule Console.ReplayLiveTest do
     tmp_dir: folder
   } do
     path = Path.join(folder, "live.mcap")
-    options = Runs.options("--headless --hardware 1 --robots 1 --duration 1 --record #{path}")
+    options = Runs.options("--headless --hardware 1 --robots 1 --duration 1", ["--record", path])
 
     play = fn %{robots: [robot]} ->
       {recorder, _queue} = Robot.Names.lookup(robot, :recorder)
@@ -100,7 +100,7 @@ defmodule Console.ReplayLiveTest do
     tmp_dir: folder
   } do
     path = Path.join(folder, "lockstep.mcap")
-    options = Runs.options("--robots 3 --speed max --duration 20 --record #{path}")
+    options = Runs.options("--robots 3 --speed max --duration 20", ["--record", path])
 
     play = fn _options, setup, recorder ->
       {:ok, live} = Live.Trial.start_recorded(setup, Live.Pace.new(:max), recorder)

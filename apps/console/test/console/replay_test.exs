@@ -8,15 +8,15 @@ defmodule Console.ReplayTest do
 
   @moduletag :tmp_dir
 
-  defp record(folder, name, line) do
+  defp record(folder, name, line, words \\ []) do
     path = Path.join(folder, name)
-    options = Runs.options("--headless --blobs direct --record #{path} #{line}")
+    options = Runs.options("--headless --blobs direct " <> line, ["--record", path | words])
     {_status, _text} = with_io(fn -> Demo.run(options, Sim.Trial) end)
     path
   end
 
-  defp replay(line) do
-    {:ok, options} = line |> String.split() |> Replay.Options.parse()
+  defp replay(path, line \\ "", words \\ []) do
+    {:ok, options} = Replay.Options.parse([path | String.split(line)] ++ words)
     test = self()
 
     errors =
@@ -33,17 +33,17 @@ defmodule Console.ReplayTest do
     assert text =~ ~r/ killed .* is dead/
     assert text =~ ~r/25.0 s replayed: all decisions on \d+ inputs, .* are as recorded/
 
-    assert {0, text, ""} = replay("#{path} --until 5")
+    assert {0, text, ""} = replay(path, "--until 5")
     assert text =~ "5.0 s replayed"
     refute text =~ "killed"
 
     # How the fleet stood, and why.
-    assert {0, text, ""} = replay("#{path} --at 14 --robot mag1")
+    assert {0, text, ""} = replay(path, "--at 14 --robot mag1")
     assert text =~ "   14.0 s  3 robots"
     assert text =~ ~r/^mag1: /m
     refute text =~ ~r/^mag2: /m
 
-    assert {0, text, ""} = replay("#{path} --at 14 --why leader")
+    assert {0, text, ""} = replay(path, "--at 14 --why leader")
     assert text =~ ~r/^m\w+ at 13.9 s$/m
 
     for title <- ["perceived", "wishes", "gate", "mission", "did"],
@@ -53,14 +53,14 @@ defmodule Console.ReplayTest do
     assert text =~ ~r/leads epoch 1, elected with/
     assert text =~ ~r/round .*: committed, among mag1, mag2, min1/
 
-    assert {0, text, ""} = replay("#{path} --why mag1 --at 0")
+    assert {0, text, ""} = replay(path, "--why mag1 --at 0")
     assert text =~ "Nothing had been decided yet."
 
     assert {1, "", "replay: --why names no robot of the recording: leadr; " <> line} =
-             replay("#{path} --why leadr")
+             replay(path, "--why leadr")
 
     assert line == "allowed are leader, mag1, mag2, min1; did you mean leader?\n"
-    assert {1, "", line} = replay("#{path} --at 99")
+    assert {1, "", line} = replay(path, "--at 99")
     assert line == "replay: --at 99.0 is after the end of the recording, 25.0 s\n"
   end
 
@@ -121,17 +121,17 @@ defmodule Console.ReplayTest do
     one = record(folder, "one.mcap", "--robots 2 --duration 6 --landmark 1,1")
     same = record(folder, "same.mcap", "--robots 2 --duration 6 --landmark 1,1")
     other = record(folder, "other.mcap", "--robots 2 --duration 6 --landmark 1,1 --kill mag1@4")
-    assert {0, text, ""} = replay("#{one} --against #{same}")
+    assert {0, text, ""} = replay(one, "", ["--against", same])
     assert text == "The two are the same, 6.0 s of them.\n"
 
-    assert {2, text, ""} = replay("#{one} --against #{other}")
+    assert {2, text, ""} = replay(one, "", ["--against", other])
     assert text =~ "The two begin differently: kills [] and [mag1: 4.0]"
   end
 
   test "the tables of a run are those of its replay", %{tmp_dir: folder} do
     [run, again] = for name <- ["run", "again"], do: Path.join(folder, name)
-    path = record(folder, "run.mcap", "--robots 3 --duration 12 --kill mag1@9 --csv #{run}")
-    assert {0, _text, ""} = replay("#{path} --csv #{again}")
+    path = record(folder, "run.mcap", "--robots 3 --duration 12 --kill mag1@9", ["--csv", run])
+    assert {0, _text, ""} = replay(path, "", ["--csv", again])
 
     for name <- ~w(poses errors ticks messages events) do
       text = File.read!(Path.join(run, name <> ".csv"))
@@ -153,7 +153,7 @@ defmodule Console.ReplayTest do
     File.write!(file, "")
     assert {:error, [line]} = Replay.Options.parse([path, "--csv", file])
     assert line =~ ~r/^--csv cannot be ".*: a folder, not a file is allowed$/
-    assert {1, "", line} = replay("#{path} --csv /proc/none/tables")
+    assert {1, "", line} = replay(path, "--csv /proc/none/tables")
     assert line =~ ~r{^replay: --csv /proc/none/tables cannot be written: .*\n$}
   end
 

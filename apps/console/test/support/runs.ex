@@ -3,10 +3,10 @@ defmodule Console.Runs do
   alias Console.{FakeTrial, Options}
   alias Console.Picture.RunTrack
 
-  @doc "Options from one command line."
-  @spec options(String.t()) :: Options.t()
-  def options(line) do
-    {:ok, options} = line |> OptionParser.split() |> Options.parse()
+  @doc "Options from one command line, and words that follow it as they are, such as paths."
+  @spec options(String.t(), [String.t()]) :: Options.t()
+  def options(line, words \\ []) do
+    {:ok, options} = Options.parse(OptionParser.split(line) ++ words)
     options
   end
 

@@ -30,13 +30,13 @@ defmodule Mesh.SecretTest do
       path = file(folder, random(), mode)
       assert {:error, line} = Secret.load(path)
       assert line =~ "may be read by others (mode 0#{Integer.to_string(mode, 8)}, must be 0600)"
-      assert line =~ "chmod 600 #{path}"
+      assert line =~ "chmod 600 #{quoted(path)}"
     end
   end
 
   test "what is no secret is refused in one line with the command", %{tmp_dir: folder} do
     assert {:error, line} = Secret.load(folder)
-    assert line =~ "#{folder} is not a file; make one: mix fleet.secret #{folder} --force"
+    assert line =~ "#{folder} is not a file; make one: mix fleet.secret #{quoted(folder)} --force"
 
     for {text, problem} <- [
           {"", "is empty"},
@@ -50,7 +50,7 @@ defmodule Mesh.SecretTest do
       path = file(folder, text)
       assert {:error, line} = Secret.load(path)
       assert line =~ "the fleet's secret #{path} #{problem}"
-      assert String.ends_with?(line, "; make one: mix fleet.secret #{path} --force")
+      assert String.ends_with?(line, "; make one: mix fleet.secret #{quoted(path)} --force")
       refute line =~ "\n"
     end
   end
@@ -103,6 +103,12 @@ defmodule Mesh.SecretTest do
     # One of its own: other tests give theirs a name.
     refused = Vm.call(Vm.start_one(), Secret, :apply_cookie, [secret])
     assert {:error, "this node has no name" <> _rest} = refused
+  end
+
+  # As a shell takes it for one word.
+  defp quoted(path) do
+    "mix fleet.secret " <> quoted = Secret.command(path, true, false)
+    quoted
   end
 
   defp make(command, path) do

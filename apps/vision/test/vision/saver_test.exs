@@ -13,7 +13,7 @@ defmodule Vision.SaverTest do
   @mounts (
             folder = Path.join(System.tmp_dir!(), "saver-#{System.unique_integer([:positive])}")
             File.mkdir_p!(folder)
-            words = ~w(-t tmpfs none #{folder})
+            words = ["-t", "tmpfs", "none", folder]
 
             mounts =
               System.find_executable("mount") != nil and
@@ -103,7 +103,13 @@ defmodule Vision.SaverTest do
     assert times == Enum.sort(times) and times == Enum.uniq(times)
 
     for name <- pictures do
-      words = ~w(-v error -i #{Path.join(folder, name)} -f rawvideo -pix_fmt gray pipe:1)
+      words = [
+        "-v",
+        "error",
+        "-i",
+        Path.join(folder, name) | ~w(-f rawvideo -pix_fmt gray pipe:1)
+      ]
+
       {gray, 0} = System.cmd("ffmpeg", words)
       assert byte_size(gray) == 320 * 240
     end
@@ -152,7 +158,7 @@ defmodule Vision.SaverTest do
   test "a full disk is told once, leaves no half pictures, and heals when there is room", %{
     tmp_dir: folder
   } do
-    {_, 0} = System.cmd("mount", ~w(-t tmpfs -o size=400k none #{folder}))
+    {_, 0} = System.cmd("mount", ~w(-t tmpfs -o size=400k none) ++ [folder])
     on_exit(fn -> System.cmd("umount", ["-l", folder]) end)
     ballast = Path.join(folder, "ballast")
     File.write!(ballast, :binary.copy("x", 300_000))

@@ -75,7 +75,7 @@ defmodule Vision.ViewTest do
 
       File.write!(jpeg, picture.jpeg)
 
-      again = ffmpeg!(~w(-i #{jpeg} -vf #{@full},format=#{raw[format]} -f rawvideo pipe:1))
+      again = ffmpeg!(["-i", jpeg] ++ ~w(-vf #{@full},format=#{raw[format]} -f rawvideo pipe:1))
 
       assert byte_size(again) == byte_size(bytes)
       assert psnr(bytes, again) > 35.0, "#{format}: #{psnr(bytes, again)} dB"

@@ -10,13 +10,13 @@ defmodule Swarm.Host.CrashDumpTest do
     line = before <> "exec erl -noshell -eval 'erlang:halt(\"on purpose\")'"
     env = [{"ERL_CRASH_DUMP_SECONDS", given}, {"RELEASE_COMMAND", "version"}]
     options = [cd: folder, env: env, stderr_to_stdout: true]
-    {_said, status} = System.cmd("sh", ["-euc", line], options)
+    {_said, status} = System.cmd("sh", ["-euc", line, @root], options)
     assert status != 0
     File.ls!(folder)
   end
 
   test "a robot's release writes none, unless it is told to", %{tmp_dir: folder} do
-    release = ". #{@root}/rel/env.sh.eex; "
+    release = ~s(. "$0/rel/env.sh.eex"; )
     assert crash(folder, nil, release) == []
     assert crash(folder, "-1", release) == ["erl_crash.dump"]
   end
