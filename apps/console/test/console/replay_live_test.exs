@@ -15,8 +15,8 @@ defmodule Console.ReplayLiveTest do
     {status, text, errors}
   end
 
-  defp replay(path, line \\ "") do
-    {:ok, options} = Replay.Options.parse([path | String.split(line)])
+  defp replay(path, words \\ []) do
+    {:ok, options} = Replay.Options.parse([path | words])
     heard(fn -> Replay.run(options) end)
   end
 
@@ -44,25 +44,25 @@ defmodule Console.ReplayLiveTest do
     assert text =~
              ~r/ s of mag1, min1 replayed: all \d+ decisions on \d+ inputs are as recorded\.$/m
 
-    assert {0, text, ""} = replay(path, "--robot min1 --until 1")
+    assert {0, text, ""} = replay(path, ~w(--robot min1 --until 1))
     assert text =~ ~r/ s of min1 replayed: all/
     refute text =~ "mag1   "
 
-    assert {0, text, ""} = replay(path, "--at 2 --why mag1")
+    assert {0, text, ""} = replay(path, ~w(--at 2 --why mag1))
     assert text =~ ~r/^mag1: search of Missions.Landmark; at \(/m
     assert text =~ "mag1 at 2.0 s"
     for title <- ~w(perceived wishes gate mission), do: assert(text =~ ~r/^#{title}.*:$/m)
     assert text =~ "<- chosen"
 
-    for {line, said} <- [
-          {"--csv #{folder}", "--csv needs a recording of a run in lockstep"},
-          {"--against #{path}", "--against needs a recording of a run in lockstep"},
-          {"--why leader",
+    for {words, said} <- [
+          {["--csv", folder], "--csv needs a recording of a run in lockstep"},
+          {["--against", path], "--against needs a recording of a run in lockstep"},
+          {~w(--why leader),
            "--why names no robot of the recording: leader; allowed are mag1, min1"},
-          {"--robot mag", "--robot names no robot of the recording: mag"},
-          {"--at 99", "--at 99.0 is after the end of the recording"}
+          {~w(--robot mag), "--robot names no robot of the recording: mag"},
+          {~w(--at 99), "--at 99.0 is after the end of the recording"}
         ] do
-      assert {1, "", "replay: " <> error} = replay(path, "#{line}")
+      assert {1, "", "replay: " <> error} = replay(path, words)
       assert error =~ said
       assert length(String.split(error, "\n", trim: true)) == 1
     end

@@ -64,8 +64,8 @@ defmodule Console.ReplayTest do
     assert line == "replay: --at 99.0 is after the end of the recording, 25.0 s\n"
   end
 
-  defp step_through(line, typed) do
-    {:ok, options} = line |> String.split() |> Replay.Options.parse()
+  defp step_through(path, line, typed) do
+    {:ok, options} = Replay.Options.parse([path | String.split(line)])
     test = self()
     text = capture_io(typed, fn -> send(test, {:status, Replay.run(options)}) end)
     assert_received {:status, status}
@@ -76,7 +76,7 @@ defmodule Console.ReplayTest do
     path = record(folder, "run.mcap", "--robots 3 --kill leader@15 --duration 25")
 
     assert {0, text} =
-             step_through("#{path} --step --at 14", """
+             step_through(path, "--step --at 14", """
              why
              step 2
 
@@ -109,7 +109,7 @@ defmodule Console.ReplayTest do
     assert text =~ "The recording ends here.\n"
     assert text =~ "next, previous    to the next event"
 
-    assert {0, text} = step_through("#{path} --step", "b\nwhy\nq\n")
+    assert {0, text} = step_through(path, "--step", "b\nwhy\nq\n")
     assert text =~ "    0.0 s  3 robots"
     assert text =~ "Nothing had been decided yet."
 

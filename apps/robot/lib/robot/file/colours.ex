@@ -8,7 +8,7 @@ defmodule Robot.File.Colours do
   @keys {
     :keys,
     # `Vision.Colours` checks whether the module is a backend.
-    file: [{:text, "the path of a colour file"}, required: true],
+    file: [{:path, "the path of a colour file"}, required: true],
     distance: {:check, &__MODULE__.distances/1, "%{\"Colour\" => share seen from 1 m}"},
     min_area: {:integer, 1, 16_777_216},
     max_area: {:integer, 0, 16_777_216},
