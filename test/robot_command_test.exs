@@ -32,8 +32,8 @@ defmodule System.RobotCommandTest do
     looks = Path.join(folder, "looks")
 
     slow = """
-    echo "$1" >>#{looks}
-    [ "$1" = daemon ] || [ "$(grep -c rpc #{looks})" -ge 3 ]
+    echo "$1" >>"#{looks}"
+    [ "$1" = daemon ] || [ "$(grep -c rpc "#{looks}")" -ge 3 ]
     """
 
     assert {"", 0} = robot(folder, slow, ["daemon"])

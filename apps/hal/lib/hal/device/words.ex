@@ -13,14 +13,26 @@ defmodule Hal.Device.Words do
       ":odd"
       iex> Hal.Device.Words.offline({Hal.RFlex.Driver, port: "/dev/ttyR0"}, :fell)
       "its process crashed, and is started again"
+      iex> long = Hal.Device.Words.offline({Hal.RFlex.Driver, port: String.duplicate("/dir", 99)}, :enoent)
+      iex> {String.length(long), String.ends_with?(long, "…" <> String.slice(long, -119, 119)), long =~ "no such device"}
+      {239, true, true}
   """
   @spec offline({driver :: module() | nil, options :: keyword()}, reason :: term()) :: String.t()
   def offline(_driver, :fell), do: "its process crashed, and is started again"
 
   def offline({driver, options}, reason) do
     if driver != nil and Code.ensure_loaded?(driver) and function_exported?(driver, :explain, 2),
-      do: reason |> driver.explain(options) |> String.slice(0, @longest),
+      do: reason |> driver.explain(options) |> shorten(),
       else: plain(reason)
+  end
+
+  # Both ends stay: a driver names its line first, and then what is wrong with it.
+  defp shorten(text) do
+    half = div(@longest - 1, 2)
+
+    if String.length(text) > @longest,
+      do: String.slice(text, 0, half) <> "…" <> String.slice(text, -half, half),
+      else: text
   end
 
   defp plain(:mute), do: "it is open, and nothing comes from it"

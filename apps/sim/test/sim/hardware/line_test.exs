@@ -121,7 +121,9 @@ defmodule Sim.Hardware.LineTest do
     rolls(context, id)
   end
 
-  defp line(id), do: inspect(Swarm.status(id))
+  # Long paths are shortened in words; how they end is told.
+  defp line(id), do: id |> Swarm.status() |> inspect() |> by_name()
+  defp by_name(words), do: String.replace(words, ~r"(?<=[:(])( ?)/.*base(?=: )", "\\1base")
 
   # On a busy machine base and port program may get no processor for so long that the line is silent: then the wheels
   # are disarmed, and an unplugged line is none that is lost on the way.
@@ -150,7 +152,7 @@ defmodule Sim.Hardware.LineTest do
   defp loses_line(context, emulator, id) do
     rolls(context, id)
     :ok = Emulator.unplug(emulator)
-    eventually(fn -> line(id) =~ "drive offline (#{context.link}: no such device)" end)
+    eventually(fn -> line(id) =~ "drive offline (base: no such device)" end)
 
     unless line(id) =~ "LINE LOST (acknowledge it)" do
       plugged_in(emulator, id)
@@ -166,15 +168,14 @@ defmodule Sim.Hardware.LineTest do
   test "log and status say in words what is wrong with the line, once per change", context do
     Logger.put_module_level(Robot.Devices.Log, :info)
     on_exit(fn -> Logger.delete_module_level(Robot.Devices.Log) end)
-    link = context.link
 
     log =
       capture_log(fn ->
         id = real(context, :line_words)
-        eventually(fn -> line(id) =~ "drive offline (#{link}: no such device)" end)
+        eventually(fn -> line(id) =~ "drive offline (base: no such device)" end)
         emulator = base(context, :all)
 
-        eventually(fn -> line(id) =~ "drive offline (#{link}: the base does not report" end)
+        eventually(fn -> line(id) =~ "drive offline (base: the base does not report" end)
 
         assert line(id) =~ "DISARMED (its base has not reported its wheels yet)"
         # During several of the driver's attempts. On a busy machine the port program may get no
@@ -196,15 +197,15 @@ defmodule Sim.Hardware.LineTest do
     said =
       for line <- String.split(log, "\n"),
           [_, words] <- [String.split(line, "line_words: ")],
-          do: words
+          do: by_name(words)
 
     wanted = [
-      "drive offline: #{link}: no such device",
-      "drive offline: #{link}: the base does not report",
+      "drive offline: base: no such device",
+      "drive offline: base: the base does not report",
       "drive online again",
-      "drive offline: #{link}: unplugged",
-      "drive: LINE LOST while the wheels turned (#{link}: unplugged)",
-      "drive offline: #{link}: no such device",
+      "drive offline: base: unplugged",
+      "drive: LINE LOST while the wheels turned (base: unplugged)",
+      "drive offline: base: no such device",
       "drive online again"
     ]
 
