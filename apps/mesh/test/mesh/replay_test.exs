@@ -1,6 +1,7 @@
 defmodule Mesh.ReplayTest do
   # What an attacker in radio range does with datagrams that the fleet has signed, on real sockets.
   use Mesh.PeerCase, async: false
+  @moduletag :realtime
 
   @foreign {127, 0, 0, 2}
   @elsewhere {127, 0, 0, 3}

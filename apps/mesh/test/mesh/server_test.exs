@@ -1,5 +1,6 @@
 defmodule Mesh.ServerTest do
   use Mesh.PeerCase, async: false
+  @moduletag :realtime
 
   test "what it hears goes to the consumer that it was given, and into the table", %{peer: peer} do
     {node, other} = {node(), other()}

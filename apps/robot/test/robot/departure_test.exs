@@ -1,6 +1,7 @@
 defmodule Robot.DepartureTest do
   @moduledoc "A robot that has left its start pose, and what is started again on the way."
   use Robot.Case, async: false
+  @moduletag :realtime
   doctest Robot.Departure
   alias Hal.{Odometry, Pose, Profile}
   alias Robot.{Departure, Localiser, Percept}

@@ -5,6 +5,7 @@ defmodule Sim.GateAloneTest do
   docs/results.md.
   """
   use Sim.LockstepCase, async: true
+  @moduletag :slow
   alias Hal.{Pose, Twist}
   alias Robot.Safety.Reflex
   alias Sim.Trial.Setup

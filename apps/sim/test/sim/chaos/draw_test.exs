@@ -1,5 +1,6 @@
 defmodule Sim.Chaos.DrawTest do
   use Sim.LockstepCase, async: true
+  @moduletag :slow
   alias Sim.Chaos.{Draw, Random}
   alias Sim.Trial.{Options, Setup}
 

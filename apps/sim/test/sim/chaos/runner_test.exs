@@ -1,5 +1,6 @@
 defmodule Sim.Chaos.RunnerTest do
   use Sim.LockstepCase, async: true
+  @moduletag :slow
   import ExUnit.CaptureLog
   alias Sim.Chaos.{Draw, Runner, ScenarioFile, Violation}
   alias Sim.Scenario

@@ -1,5 +1,6 @@
 defmodule Sim.Trial.ClaimsTest do
   use Sim.LockstepCase, async: true
+  @moduletag :slow
   import Sim.TrialRuns
   alias Sim.Trial
   alias Sim.Trial.Claims

@@ -1,6 +1,7 @@
 defmodule Sim.Trial.WallsTest do
   @moduledoc "Fleets in rooms that nobody tuned anything to, most with the floor plan."
   use Sim.LockstepCase, async: true
+  @moduletag :slow
   import Sim.TrialRuns
   alias Sim.{Floorplan, Trial}
   @moduletag :tmp_dir

@@ -4,6 +4,7 @@ defmodule Swarm.Comms.WaitingTest do
   line.
   """
   use Swarm.Case, async: false
+  @moduletag :realtime
   @moduletag :capture_log
 
   @doc false

@@ -3,6 +3,7 @@ defmodule Swarm.EStop.OwnerTest do
   One process owns the state of the emergency stop: what reaches it, and who does not wait for it.
   """
   use Swarm.Case, async: false
+  @moduletag :realtime
   @moduletag :capture_log
   alias Swarm.EStop
 
