@@ -47,7 +47,9 @@ defmodule Mcap.Judges do
   @spec read!(Path.t(), integer(), integer()) :: [String.t()]
   def read!(path, from_ns \\ 0, to_ns \\ 1) do
     {said, status} =
-      System.cmd(python(), [@script, path, "#{from_ns}", "#{to_ns}"], stderr_to_stdout: true)
+      System.cmd(python(), ["-W", "ignore", @script, path, "#{from_ns}", "#{to_ns}"],
+        stderr_to_stdout: true
+      )
 
     assert {status, said} == {0, said}
     String.split(said, "\n", trim: true)

@@ -154,7 +154,7 @@ defmodule Hal.Serial.NativeTest do
 
     test "permission denied", %{link: link} do
       _far = far!(link)
-      File.chmod!(link, 0o600)
+      File.chmod!(link, 0o000)
       assert nobody_opens(link) == "eacces"
     end
 
