@@ -19,9 +19,11 @@ defmodule Console.MixProject do
     ]
   end
 
-  def application, do: [extra_applications: [:logger, :crypto | for_tests(Mix.env())]]
+  def application,
+    do: [extra_applications: [:logger, :crypto] ++ for_tests(Mix.env()) ++ [mochiweb: :optional]]
 
-  # Mix hides applications of OTP that are not listed. The tests read the pictures' XML.
-  defp for_tests(:test), do: [:xmerl]
+  # Mix hides applications of OTP that are not listed. mochiweb serves the page, where it is. The tests read the
+  # pictures' XML.
+  defp for_tests(:test), do: [:xmerl, :inets]
   defp for_tests(_env), do: []
 end

@@ -6,6 +6,7 @@ defmodule Console.Options do
   alias Console.{Cli, Fleet}
   alias Console.Cli.{MapName, Parse}
   alias Console.Live.Pace
+  alias Console.Page.Access
   alias Hal.Options.Suggest
   alias Sim.Floorplan.Maps
 
@@ -23,6 +24,9 @@ defmodule Console.Options do
             leader_change: true,
             duration_s: nil,
             blobs: :painted,
+            page: 0,
+            page_address: {127, 0, 0, 1},
+            page_token: nil,
             plan: :none,
             headless: false,
             speed: nil,
@@ -63,6 +67,7 @@ defmodule Console.Options do
       |> check_hardware()
       |> check_record()
       |> check_speed()
+      |> check_page()
     end
   end
 
@@ -171,6 +176,11 @@ the prompt then takes pause, step, speed"},
        "also what the cameras see: RATE pictures a second of each robot,\n0.1 to 5 (none; with --record, needs ffmpeg)"},
       {"csv", "DIR", &Parse.folder(&1, folder),
        "write poses, errors, messages and ticks as tables\n(with --headless, in lockstep)"},
+      {"page", "PORT|off", &page/1,
+       "live, also in a browser: the port of the page, or none\n(any that is free)"},
+      {"page-address", "A", &address/1,
+       "where the page is reached, such as 0.0.0.0, by other machines too (127.0.0.1)"},
+      {"page-token", "T", &token/1, "what others must know to use the page: ?token=T"},
       {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
        "paint camera pictures, or skip the painting (painted)"},
       {"help", nil, nil, "this text"}
@@ -182,6 +192,8 @@ the prompt then takes pause, step, speed"},
   defp put({"move", move}, options), do: %{options | moves: options.moves ++ [move]}
   defp put({"kill", kill}, options), do: %{options | kills: options.kills ++ [kill]}
   defp put({"leader-change", on?}, options), do: %{options | leader_change: on?}
+  defp put({"page-address", address}, options), do: %{options | page_address: address}
+  defp put({"page-token", token}, options), do: %{options | page_token: token}
   defp put({"record-pictures", rate}, options), do: %{options | record_pictures: rate}
   defp put({"duration", duration_s}, options), do: %{options | duration_s: duration_s}
 
@@ -263,6 +275,37 @@ the prompt then takes pause, step, speed"},
   end
 
   defp check_speed(other), do: other
+
+  # Who reaches the page may move robots.
+  defp check_page({:ok, %{page_address: address, page_token: nil} = options}) do
+    if Access.loopback?(address),
+      do: {:ok, options},
+      else:
+        {:error,
+         [
+           "--page-address of other machines needs --page-token: whoever knows it may command the robots"
+         ]}
+  end
+
+  defp check_page(other), do: other
+
+  defp page("off"), do: {:ok, :off}
+
+  defp page(text) do
+    with {:error, _allowed} <- Parse.whole(text, 0..65_535),
+         do: {:error, "a port from 0 to 65535, or off,"}
+  end
+
+  defp address(text) do
+    with {:error, _reason} <- :inet.parse_ipv4strict_address(String.to_charlist(text)),
+         do: {:error, "an IPv4 address of this machine"}
+  end
+
+  defp token(text) do
+    if text =~ ~r/\A[A-Za-z0-9_-]{8,100}\z/,
+      do: {:ok, text},
+      else: {:error, "8 to 100 letters, digits, - and _"}
+  end
 
   defp too_much_hardware(asked, robots) do
     {:error,

@@ -6,7 +6,7 @@ defmodule Console.Terminal.Session do
   decides nothing: `Console.Terminal` draws, `Console.Terminal.Prompt` checks, `Console.Live`
   acts.
   """
-  alias Console.{Demo, Options, Picture, Report, Terminal}
+  alias Console.{Demo, Options, Page, Picture, Report, Terminal}
   alias Console.Cli.{Format, Output}
   alias Console.Picture.RunTrack
   alias Console.Terminal.{Prompt, Tty}
@@ -76,12 +76,30 @@ defmodule Console.Terminal.Session do
       started_ms: System.monotonic_time(:millisecond)
     }
 
-    begin(session, options, if(Options.real_time?(options), do: module.lines(live), else: []))
+    told = page(session, options)
+    lines = if(Options.real_time?(options), do: module.lines(live), else: [])
+    begin(session, options, lines ++ told)
+
+    session =
+      if mode == :screen, do: Enum.reduce(told, session, &answer(&2, &1, :dim)), else: session
+
     send(self(), :draw)
     session = loop(session)
     Process.unlink(reader)
     Process.exit(reader, :kill)
     session
+  end
+
+  # The page is a second view; without it the demo goes on.
+  defp page(_session, %{page: :off}), do: []
+
+  defp page(%{module: module, live: live}, options) do
+    where = [port: options.page, address: options.page_address, token: options.page_token]
+
+    case Page.start_link([module: module, live: live, robots: options.robots] ++ where) do
+      {:ok, _page, url} -> ["Page:  " <> url]
+      {:error, line} -> ["no page: " <> line]
+    end
   end
 
   # Before the full screen, so that they can still be read after it.

@@ -1,0 +1,114 @@
+defmodule Console.Page do
+  @moduledoc """
+  A page in the browser that shows a live fleet and commands it, beside the terminal and by the same behaviour,
+  `Console.Live`. No robot knows it: whether it falls, or a hundred slow browsers look, changes nothing for them.
+
+      {:ok, _page, url} = Console.Page.start_link(module: Console.Live.Fleet, live: fleet, robots: [:mag1, :mag2])
+
+  Debian's mochiweb serves it. Its tree:
+
+      Console.Page (one_for_one)
+      |-- Console.Page.Feed    asks for the scene ten times a second while somebody looks
+      `-- mochiweb             a process for each connection
+          `-- of a WebSocket: Console.Page.Client carries out what is typed and clicked, and stops what it drives
+              when 300 ms have passed without a word; a pusher writes the newest scene, as fast as the browser takes it
+
+  Who may look and command is decided by `Console.Page.Access`.
+  """
+  use Supervisor
+  # Debian's package; without it there is no page.
+  @compile {:no_warn_undefined, [:mochiweb_http, :mochiweb_socket_server]}
+  alias Console.Page.{Access, Feed, Request}
+
+  # Connections at once; one browser takes a few while it loads.
+  @most 200
+
+  @typedoc """
+  `module` and `live` as in `Console.Live`; `robots` are those of the fleet; `address` (loopback) and `port` (any that is
+  free) to listen on; `token` is demanded where the address is not the loopback's.
+  """
+  @type option ::
+          {:module, module()}
+          | {:live, term()}
+          | {:robots, [atom()]}
+          | {:address, :inet.ip_address()}
+          | {:port, :inet.port_number()}
+          | {:token, String.t() | nil}
+
+  @doc """
+  Starts it, and says where it is, such as `http://127.0.0.1:40123/`; the error says in one line why there is no page,
+  such as a port that is taken.
+  """
+  @spec start_link([option()]) :: {:ok, pid(), url :: String.t()} | {:error, line :: String.t()}
+  def start_link(options) do
+    options = Map.new([address: {127, 0, 0, 1}, port: 0, token: nil] ++ options)
+
+    with :ok <- server(),
+         :ok <- guarded(options),
+         :ok <- free(options),
+         {:ok, page} <- Supervisor.start_link(__MODULE__, options) do
+      {:ok, page, url(options.address, :mochiweb_socket_server.get(child(page, :server), :port))}
+    end
+  end
+
+  # Whoever asks from here need not know the address of the machine.
+  defp url({0, 0, 0, 0}, port), do: url({127, 0, 0, 1}, port)
+  defp url(address, port), do: "http://#{:inet.ntoa(address)}:#{port}/"
+
+  defp server do
+    case Application.ensure_all_started(:mochiweb) do
+      {:ok, _started} -> :ok
+      {:error, _reason} -> {:error, "mochiweb is not installed (on Debian: erlang-mochiweb)"}
+    end
+  end
+
+  defp guarded(%{address: address, token: token}) do
+    if token != nil or Access.loopback?(address),
+      do: :ok,
+      else: {:error, "on #{:inet.ntoa(address)} others can reach the page: it needs a token"}
+  end
+
+  # The server says of a port that is taken only that it fell.
+  defp free(%{address: address, port: port}) do
+    case :gen_tcp.listen(port, ip: address, reuseaddr: true) do
+      {:ok, socket} ->
+        :gen_tcp.close(socket)
+
+      {:error, reason} ->
+        {:error, "no page on #{:inet.ntoa(address)}:#{port}: #{:inet.format_error(reason)}"}
+    end
+  end
+
+  @impl Supervisor
+  def init(options) do
+    request = {Request, :answer, [%{robots: options.robots, token: options.token, page: self()}]}
+
+    server = %{
+      id: :server,
+      start:
+        {:mochiweb_http, :start_link,
+         [
+           [
+             ip: options.address,
+             port: options.port,
+             name: :undefined,
+             max: @most,
+             nodelay: true,
+             loop: request
+           ]
+         ]}
+    }
+
+    feed = {Feed, Map.take(options, [:module, :live])}
+    Supervisor.init([feed, server], strategy: :one_for_one)
+  end
+
+  @doc false
+  @spec feed(pid()) :: pid()
+  def feed(page), do: child(page, Feed)
+
+  defp child(page, id) do
+    {^id, pid, _type, _modules} = List.keyfind(Supervisor.which_children(page), id, 0)
+    pid
+  end
+end

@@ -1,0 +1,124 @@
+defmodule Console.Page.Client do
+  @moduledoc """
+  Carries out what a person types and clicks on the page, one after the other, and holds the dead man's switch: a robot
+  that is driven by keyboard is stopped 300 ms after the last word, or when the page is gone.
+  """
+  use GenServer
+  alias Console.Cli.Format
+  alias Console.Page.{Feed, State}
+  alias Console.Terminal.Prompt
+
+  @dead_man_ms 300
+  # Of a simulated robot; its gate limits what is asked of it.
+  @most 1.0
+
+  @doc "Starts it for the connection of the caller; `reply` writes text to the browser."
+  @spec start(pid(), [atom()], (String.t() -> term())) :: {:ok, pid()}
+  def start(feed, robots, reply), do: GenServer.start(__MODULE__, {self(), feed, robots, reply})
+
+  @doc "Carries out a line; its answer goes to the browser."
+  @spec obey(pid(), String.t()) :: :ok
+  def obey(client, line), do: GenServer.cast(client, {:obey, line})
+
+  @doc """
+  A word of the keyboard: the robot, its speed forward and its turn, as parts of the greatest (-1 to 1).
+
+      iex> Console.Page.Client.drive("drive mag1 1 -0.5", [:mag1])
+      {:ok, :mag1, {1.0, -0.5}}
+      iex> Console.Page.Client.drive("drive mag1 9 x", [:mag1])
+      {:error, "drive needs a robot and two numbers from -1 to 1: drive mag1 0.5 0"}
+  """
+  @spec drive(String.t(), [atom()]) ::
+          {:ok, atom(), {float(), float()}} | {:error, String.t()} | :other
+  def drive("drive" <> rest, robots) do
+    with [name, ahead, turn] <- String.split(rest),
+         robot when robot != nil <- Enum.find(robots, &(Atom.to_string(&1) == name)),
+         {ahead, ""} when abs(ahead) <= @most <- Float.parse(ahead),
+         {turn, ""} when abs(turn) <= @most <- Float.parse(turn) do
+      {:ok, robot, {ahead, turn}}
+    else
+      _wrong -> {:error, "drive needs a robot and two numbers from -1 to 1: drive mag1 0.5 0"}
+    end
+  end
+
+  def drive(_line, _robots), do: :other
+
+  @impl GenServer
+  def init({connection, feed, robots, reply}) do
+    ref = Process.monitor(connection)
+    {module, live} = Feed.source(feed)
+    s = %{connection: ref, module: module, live: live, robots: robots, reply: reply}
+    {:ok, Map.merge(s, %{driven: nil, timer: nil})}
+  end
+
+  @impl GenServer
+  def handle_cast({:obey, line}, s) do
+    case drive(line, s.robots) do
+      {:ok, robot, speed} -> {:noreply, driven(s, robot, speed)}
+      :other -> {:noreply, answer(s, line, carry_out(line, s))}
+      error -> {:noreply, answer(s, line, error)}
+    end
+  end
+
+  @impl GenServer
+  def handle_info({:dead_man, ref}, %{timer: ref} = s), do: {:noreply, halt(s)}
+  def handle_info({:dead_man, _former}, s), do: {:noreply, s}
+
+  def handle_info({:DOWN, ref, :process, _pid, _reason}, %{connection: ref} = s),
+    do: {:stop, :normal, halt(s)}
+
+  # The gate limits speeds; half a metre a second and a radian a second are the page's own.
+  defp driven(s, robot, {ahead, turn}) do
+    s = if s.driven in [nil, robot], do: s, else: halt(s)
+    command = {:tell, [robot], "move:#{ahead / 2}:#{turn * 1.0}"}
+
+    with {:error, line} <- s.module.command(s.live, command),
+         do: answer(s, "drive", {:error, line})
+
+    ref = make_ref()
+    _timer = Process.send_after(self(), {:dead_man, ref}, @dead_man_ms)
+    %{s | driven: robot, timer: ref}
+  end
+
+  defp halt(%{driven: nil} = s), do: s
+
+  defp halt(s) do
+    with {:error, line} <- s.module.command(s.live, {:tell, [s.driven], "stop"}),
+         do: answer(s, "stop", {:error, line})
+
+    %{s | driven: nil, timer: nil}
+  end
+
+  defp answer(s, line, answer) do
+    s.reply.(State.answer(line, answer))
+    s
+  end
+
+  defp carry_out(line, s) do
+    case Prompt.parse(line, s.robots) do
+      {:ok, :nothing} ->
+        {:error, "type a command; help lists them"}
+
+      {:ok, :quit} ->
+        {:error, "the page is closed in the browser; quit in the terminal ends the demo"}
+
+      {:ok, :help} ->
+        {:ok, Prompt.help()}
+
+      {:ok, :nodes} ->
+        {:ok, s.module.lines(s.live)}
+
+      {:ok, :status} ->
+        {:ok, Format.everybody(s.module.scene(s.live))}
+
+      {:ok, {:status, name}} ->
+        {:ok, Format.one(s.module.scene(s.live), name)}
+
+      {:ok, command} ->
+        s.module.command(s.live, command)
+
+      {:error, line} ->
+        {:error, line}
+    end
+  end
+end

@@ -1,0 +1,61 @@
+defmodule Console.Page.Feed do
+  @moduledoc """
+  Asks for the scene ten times a second while somebody looks, and gives it as JSON to those who are ready for it.
+
+  A pusher that is still writing gets the newest scene when it asks again, so that a slow browser sees fewer of them, and
+  nothing queues.
+  """
+  use GenServer
+  alias Console.Page.State
+
+  @period_ms 100
+
+  @doc false
+  @spec start_link(%{module: module(), live: term()}) :: GenServer.on_start()
+  def start_link(source), do: GenServer.start_link(__MODULE__, source)
+
+  @doc "The map, as JSON: what does not change."
+  @spec map(pid()) :: String.t()
+  def map(feed), do: GenServer.call(feed, :map)
+
+  @doc "Whom to command: the module and the fleet (`Console.Live`)."
+  @spec source(pid()) :: {module(), term()}
+  def source(feed), do: GenServer.call(feed, :source)
+
+  @doc "Asks for the next scene, which comes as `{:scene, json}`."
+  @spec next(pid()) :: :ok
+  def next(feed), do: GenServer.cast(feed, {:next, self()})
+
+  @impl GenServer
+  def init(%{module: module, live: live}) do
+    {:ok, %{module: module, live: live, map: nil, waiting: [], ticking?: false}}
+  end
+
+  @impl GenServer
+  def handle_call(:map, _from, %{map: nil} = s) do
+    map = State.map(s.module.scene(s.live))
+    {:reply, map, %{s | map: map}}
+  end
+
+  def handle_call(:map, _from, s), do: {:reply, s.map, s}
+  def handle_call(:source, _from, s), do: {:reply, {s.module, s.live}, s}
+
+  @impl GenServer
+  def handle_cast({:next, pusher}, s), do: {:noreply, tick(%{s | waiting: [pusher | s.waiting]})}
+
+  @impl GenServer
+  def handle_info(:tick, %{waiting: []} = s), do: {:noreply, %{s | ticking?: false}}
+
+  def handle_info(:tick, s) do
+    json = State.scene(s.module.scene(s.live), s.module.pace(s.live))
+    for pusher <- s.waiting, do: send(pusher, {:scene, json})
+    {:noreply, tick(%{s | waiting: [], ticking?: false})}
+  end
+
+  defp tick(%{ticking?: true} = s), do: s
+
+  defp tick(s) do
+    _timer = Process.send_after(self(), :tick, @period_ms)
+    %{s | ticking?: true}
+  end
+end

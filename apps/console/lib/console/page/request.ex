@@ -1,0 +1,163 @@
+defmodule Console.Page.Request do
+  @moduledoc """
+  Answers the requests of browsers: the files of the page, and `/live`, a WebSocket on which the page gets the map and the
+  scenes as JSON and says its lines (`Console.Page.Client`). Runs in mochiweb's processes, one a connection.
+  """
+  # Debian's package; without it there is no page.
+  @compile {:no_warn_undefined, [:mochiweb_request, :mochiweb_websocket]}
+  alias Console.Page
+  alias Console.Page.{Access, Client, Feed, State}
+  alias Console.Terminal.Prompt
+
+  @folder Path.expand("../../../priv/page", __DIR__)
+  @types %{
+    ".html" => "text/html; charset=utf-8",
+    ".js" => "text/javascript",
+    ".css" => "text/css",
+    ".svg" => "image/svg+xml"
+  }
+
+  @files for path <- Path.wildcard(Path.join(@folder, "*")),
+             into: %{},
+             do: {"/" <> Path.basename(path), path}
+  for {_name, path} <- @files, do: @external_resource(path)
+
+  @bodies Map.new(@files, fn {name, path} ->
+            {name, {@types[Path.extname(path)], File.read!(path)}}
+          end)
+
+  @headers [
+    {"Server", "Convoy"},
+    {"Cache-Control", "no-store"},
+    {"X-Content-Type-Options", "nosniff"},
+    {"Referrer-Policy", "no-referrer"},
+    {"Content-Security-Policy", "default-src 'self'; frame-ancestors 'none'"}
+  ]
+
+  # How long a browser may take to read what was sent before its connection is closed.
+  @send_timeout_ms 10_000
+
+  @doc "Answers one request; `page` has the robots and the token."
+  @spec answer(term(), map()) :: term()
+  def answer({:mochiweb_request, _state} = request, page) do
+    path = request |> get(:path) |> List.to_string()
+
+    with "GET" <- request |> get(:method) |> to_string(),
+         :ok <- Access.check(asked(request), page.token) do
+      serve(path, request, page)
+    else
+      {status, line} -> say(request, status, line)
+      method -> say(request, 405, "#{method} is not understood here; GET is")
+    end
+  end
+
+  defp asked(request) do
+    %{
+      host: header(request, "Host"),
+      origin: header(request, "Origin"),
+      token: query(request, "token") || cookie(request)
+    }
+  end
+
+  defp serve("/live", request, page) do
+    if header(request, "Sec-WebSocket-Key"),
+      do: live(request, page),
+      else: say(request, 426, "a WebSocket lives here")
+  end
+
+  defp serve(path, request, page) do
+    name = if path == "/", do: "/index.html", else: path
+
+    case @bodies[name] do
+      nil ->
+        say(request, 404, "there is no such page; the page is /")
+
+      {type, body} ->
+        respond(request, 200, [{"Content-Type", type} | entered(request, page)], body)
+    end
+  end
+
+  # The token in the address is needed once.
+  defp entered(_request, %{token: nil}), do: []
+
+  defp entered(request, %{token: token}) do
+    if query(request, "token"),
+      do: [
+        {"Set-Cookie", "token=#{URI.encode_www_form(token)}; HttpOnly; SameSite=Strict; Path=/"}
+      ],
+      else: []
+  end
+
+  defp live(request, %{page: page, robots: robots}) do
+    feed = Page.feed(page)
+    socket = get(request, :socket)
+
+    _closed_or_not =
+      :inet.setopts(socket, send_timeout: @send_timeout_ms, send_timeout_close: true)
+
+    {reentry, reply} = :mochiweb_websocket.upgrade_connection(request, &hear/3)
+    reply.(Feed.map(feed))
+    {:ok, client} = Client.start(feed, robots, reply)
+    _pusher = spawn_link(fn -> push(feed, reply) end)
+    reentry.(%{client: client, source: Feed.source(feed)})
+  end
+
+  # Ends with the connection.
+  defp push(feed, reply) do
+    :ok = Feed.next(feed)
+
+    receive do
+      {:scene, json} ->
+        with :ok <- reply.(json), do: push(feed, reply), else: (error -> exit({:shutdown, error}))
+    end
+  end
+
+  defp hear(frames, s, reply) do
+    Enum.each(frames, &line(&1, s, reply))
+    s
+  end
+
+  # An emergency stop waits for no order before it.
+  defp line("estop", %{source: {module, live}}, reply),
+    do: reply.(State.answer("estop", module.command(live, :estop)))
+
+  defp line(line, s, reply) do
+    cond do
+      byte_size(line) > Prompt.most_bytes() or not String.printable?(line) ->
+        reply.(
+          State.answer(
+            "",
+            {:error, "this is no line of text of at most #{Prompt.most_bytes()} bytes"}
+          )
+        )
+
+      line == "" ->
+        :ok
+
+      true ->
+        Client.obey(s.client, line)
+    end
+  end
+
+  defp say(request, status, line),
+    do: respond(request, status, [{"Content-Type", "text/plain; charset=utf-8"}], line <> "\n")
+
+  defp respond(request, status, headers, body),
+    do: :mochiweb_request.respond({status, headers ++ @headers, body}, request)
+
+  defp get(request, what), do: :mochiweb_request.get(what, request)
+
+  defp header(request, name) do
+    case :mochiweb_request.get_header_value(String.to_charlist(name), request) do
+      :undefined -> nil
+      value -> to_string(value)
+    end
+  end
+
+  defp query(request, name), do: found(:mochiweb_request.parse_qs(request), name)
+  defp cookie(request), do: found(:mochiweb_request.parse_cookie(request), "token")
+
+  defp found(pairs, name) do
+    with {_name, value} <- List.keyfind(pairs, String.to_charlist(name), 0), do: to_string(value)
+  end
+end

@@ -1,0 +1,108 @@
+defmodule Console.Page.State do
+  @moduledoc "What the page is told of a fleet, as JSON. Pure; metres and radians, to millimetres and milliradians."
+  alias Console.Cli.Format
+  alias Console.Picture.Floorplan
+  alias Hal.Json
+  alias Sim.Scene
+
+  # Of the stages the newest are told; the page keeps those before.
+  @stages 40
+  # Cells of the map that is sent, in metres.
+  @cell 0.1
+
+  @doc "The map: its name, its size, and its walls as rectangles `[x, y, width, height]`, rows of equal cells."
+  @spec map(Scene.t()) :: String.t()
+  def map(%Scene{map: map}) do
+    ground = Floorplan.of(map)
+    {columns, rows} = {cells(ground.width), cells(ground.height)}
+
+    walls =
+      for row <- 0..(rows - 1)//1,
+          {from, count} <- runs(ground, row, columns),
+          do: [from, row, count]
+
+    Json.encode!(%{
+      t: "map",
+      name: Path.basename(ground.name),
+      width: round3(ground.width),
+      height: round3(ground.height),
+      cell: @cell,
+      walls: walls
+    })
+  end
+
+  defp cells(metres), do: max(round(metres / @cell), 1)
+
+  # The runs of wall in a row of cells, from the left: `{first, count}`.
+  defp runs(ground, row, columns) do
+    y = -ground.height / 2 + (row + 0.5) * @cell
+
+    0..(columns - 1)//1
+    |> Enum.chunk_by(&ground.wall?.(-ground.width / 2 + (&1 + 0.5) * @cell, y))
+    |> Enum.filter(fn [first | _] ->
+      ground.wall?.(-ground.width / 2 + (first + 0.5) * @cell, y)
+    end)
+    |> Enum.map(&{hd(&1), length(&1)})
+  end
+
+  @doc "The scene, with the pace of a run in lockstep (`nil`: real time)."
+  @spec scene(Scene.t(), String.t() | nil) :: String.t()
+  def scene(%Scene{} = scene, pace) do
+    {kind, spacing} = scene.formation
+    told = length(scene.stages)
+
+    Json.encode!(%{
+      t: "scene",
+      at_s: scene.at_ms / 1000,
+      pace: pace,
+      leader: scene.leader,
+      epoch: scene.epoch,
+      formation: [kind, spacing],
+      error: scene.error && Enum.map(Tuple.to_list(scene.error), &round3/1),
+      formed: scene.formed?,
+      landmark: point(scene.landmark),
+      robots: Enum.map(scene.robots, &robot/1),
+      told: told,
+      stages: scene.stages |> Enum.take(-@stages) |> Enum.map(&stage/1)
+    })
+  end
+
+  defp robot(robot) do
+    %{
+      id: robot.id,
+      x: round3(robot.pose.x),
+      y: round3(robot.pose.y),
+      a: round3(robot.pose.heading),
+      r: robot.radius,
+      alive: robot.alive,
+      state: robot.state,
+      slot: point(robot.slot),
+      off: round3(Scene.slot_error(robot)),
+      unsure: round3(robot.uncertainty),
+      leader: robot.leader?
+    }
+  end
+
+  defp stage(stage), do: %{at_s: stage.at_s, stage: stage.stage, line: Format.stage(stage)}
+
+  defp point(nil), do: nil
+  defp point({x, y}), do: [round3(x), round3(y)]
+
+  defp round3(nil), do: nil
+  defp round3(number), do: Float.round(number * 1.0, 3)
+
+  @doc """
+  An answer to what was typed or clicked.
+
+      iex> Console.Page.State.answer("kill mag1", {:ok, "done"})
+      ~S({"ok":true,"t":"answer","text":"kill mag1: done"})
+  """
+  @spec answer(String.t(), {:ok, String.t() | [String.t()]} | {:error, String.t()}) :: String.t()
+  def answer(_line, {:ok, lines}) when is_list(lines),
+    do: Json.encode!(%{t: "answer", ok: true, text: Enum.join(lines, "\n")})
+
+  def answer(line, {:ok, text}),
+    do: Json.encode!(%{t: "answer", ok: true, text: "#{line}: #{text}"})
+
+  def answer(_line, {:error, text}), do: Json.encode!(%{t: "answer", ok: false, text: text})
+end

@@ -1,0 +1,264 @@
+// The map: what is drawn of a scene, and what a pointer does to it. Metres, x right, y up.
+
+// Okabe and Ito's colours, which the colour-blind tell apart.
+const COLOURS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#999933", "#882255"];
+const TRAIL = 600;
+const NEAR = 14; // pixels round what is pointed at
+
+export const colour = (index) => COLOURS[index % COLOURS.length];
+
+export class FloorView {
+  constructor(canvas, on) {
+    this.canvas = canvas;
+    this.on = on; // {choose(id), send(x, y), landmark(x, y)}
+    this.map = null;
+    this.scene = null;
+    this.chosen = null;
+    this.follow = false;
+    this.trails = true;
+    this.paths = new Map();
+    this.view = null; // {x, y, scale}: the middle of the picture, pixels a metre
+    this.dragged = null;
+    canvas.addEventListener("pointerdown", (e) => this.down(e));
+    canvas.addEventListener("pointermove", (e) => this.move(e));
+    canvas.addEventListener("pointerup", (e) => this.up(e));
+    canvas.addEventListener("pointercancel", () => (this.dragged = null));
+    canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
+    canvas.addEventListener("keydown", (e) => this.key(e));
+    new ResizeObserver(() => this.draw()).observe(canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+  }
+
+  setMap(map) {
+    this.map = map;
+    this.view = null;
+    this.paths.clear();
+    this.walls = null;
+    this.draw();
+  }
+
+  setScene(scene) {
+    const back = this.scene && scene.at_s < this.scene.at_s;
+    if (back) this.paths.clear();
+    this.scene = scene;
+    for (const r of scene.robots) {
+      const path = this.paths.get(r.id) ?? [];
+      const last = path.at(-1);
+      if (!last || Math.hypot(last[0] - r.x, last[1] - r.y) > 0.03) path.push([r.x, r.y]);
+      if (path.length > TRAIL) path.shift();
+      this.paths.set(r.id, path);
+    }
+    this.draw();
+  }
+
+  zoom(factor) {
+    if (factor === 0) this.view = null;
+    else if (this.fit()) this.view.scale = Math.min(400, Math.max(2, this.view.scale * factor));
+    this.draw();
+  }
+
+  // The picture's size, and a view of the whole map where there is none yet.
+  fit() {
+    const { clientWidth: w, clientHeight: h } = this.canvas;
+    if (!this.map || w === 0 || h === 0) return false;
+    const dots = devicePixelRatio || 1;
+    if (this.canvas.width !== Math.round(w * dots) || this.canvas.height !== Math.round(h * dots)) {
+      this.canvas.width = Math.round(w * dots);
+      this.canvas.height = Math.round(h * dots);
+    }
+    this.size = { w, h, dots };
+    this.view ??= { x: 0, y: 0, scale: 0.95 * Math.min(w / this.map.width, h / this.map.height) };
+    const r = this.follow && this.robot(this.chosen);
+    if (r) [this.view.x, this.view.y] = [r.x, r.y];
+    return true;
+  }
+
+  robot(id) {
+    return this.scene?.robots.find((r) => r.id === id);
+  }
+
+  toPixel(x, y) {
+    const { view, size } = this;
+    return [size.w / 2 + (x - view.x) * view.scale, size.h / 2 - (y - view.y) * view.scale];
+  }
+
+  toFloor(e) {
+    const box = this.canvas.getBoundingClientRect();
+    const { view, size } = this;
+    return [
+      view.x + (e.clientX - box.left - size.w / 2) / view.scale,
+      view.y - (e.clientY - box.top - size.h / 2) / view.scale,
+    ];
+  }
+
+  draw() {
+    if (this.asked) return;
+    this.asked = true;
+    requestAnimationFrame(() => {
+      this.asked = false;
+      if (this.fit()) this.paint();
+    });
+  }
+
+  paint() {
+    const c = this.canvas.getContext("2d");
+    const style = getComputedStyle(document.documentElement);
+    const ink = (name) => style.getPropertyValue(name).trim();
+    const { map, scene, view, size } = this;
+    c.setTransform(size.dots, 0, 0, size.dots, 0, 0);
+    c.clearRect(0, 0, size.w, size.h);
+
+    const [left, top] = this.toPixel(-map.width / 2, map.height / 2);
+    c.fillStyle = ink("--panel");
+    c.fillRect(left, top, map.width * view.scale, map.height * view.scale);
+    c.strokeStyle = ink("--wall");
+    c.strokeRect(left, top, map.width * view.scale, map.height * view.scale);
+    c.fillStyle = ink("--wall");
+    const cell = map.cell * view.scale;
+    const bottom = top + map.height * view.scale;
+    for (const [from, row, count] of map.walls)
+      c.fillRect(left + from * cell, bottom - (row + 1) * cell, count * cell + 0.5, cell + 0.5);
+    if (!scene) return;
+
+    if (this.trails) for (const [k, r] of scene.robots.entries()) this.trail(c, r, colour(k));
+    for (const [k, r] of scene.robots.entries()) this.slot(c, r, colour(k));
+    for (const [k, r] of scene.robots.entries()) this.body(c, r, colour(k), ink);
+    this.landmark(c, this.dragged?.landmark ?? scene.landmark, ink);
+  }
+
+  trail(c, r, ink) {
+    const path = this.paths.get(r.id);
+    if (path.length < 2) return;
+    c.beginPath();
+    for (const [x, y] of path) c.lineTo(...this.toPixel(x, y));
+    c.strokeStyle = ink;
+    c.globalAlpha = 0.45;
+    c.lineWidth = 1.5;
+    c.stroke();
+    c.globalAlpha = 1;
+  }
+
+  slot(c, r, ink) {
+    if (!r.slot || !r.alive) return;
+    const [x, y] = this.toPixel(...r.slot);
+    c.strokeStyle = ink;
+    c.setLineDash([3, 3]);
+    c.beginPath();
+    c.arc(x, y, r.r * this.view.scale, 0, 7);
+    c.moveTo(...this.toPixel(r.x, r.y));
+    c.lineTo(x, y);
+    c.stroke();
+    c.setLineDash([]);
+  }
+
+  body(c, r, ink, theme) {
+    const [x, y] = this.toPixel(r.x, r.y);
+    const radius = Math.max(4, r.r * this.view.scale);
+    if (r.unsure && r.alive) {
+      c.globalAlpha = 0.13;
+      c.fillStyle = ink;
+      c.beginPath();
+      c.arc(x, y, r.unsure * this.view.scale, 0, 7);
+      c.fill();
+      c.globalAlpha = 1;
+    }
+    c.globalAlpha = r.alive ? 1 : 0.35;
+    c.fillStyle = ink;
+    c.beginPath();
+    c.arc(x, y, radius, 0, 7);
+    c.fill();
+    c.strokeStyle = theme("--text");
+    c.lineWidth = r.leader ? 3 : 1;
+    c.stroke();
+    c.lineWidth = 2;
+    c.beginPath();
+    c.moveTo(x, y);
+    c.lineTo(x + radius * Math.cos(r.a), y - radius * Math.sin(r.a));
+    c.strokeStyle = "#fff";
+    c.stroke();
+    if (r.id === this.chosen) {
+      c.strokeStyle = theme("--accent");
+      c.beginPath();
+      c.arc(x, y, radius + 5, 0, 7);
+      c.stroke();
+    }
+    c.fillStyle = theme("--text");
+    c.font = "12px system-ui, sans-serif";
+    c.textAlign = "center";
+    c.fillText(r.id + (r.leader ? " ★" : "") + (r.alive ? "" : " ✕"), x, y - radius - 6);
+    c.globalAlpha = 1;
+  }
+
+  landmark(c, place, theme) {
+    if (!place) return;
+    const [x, y] = this.toPixel(...place);
+    c.fillStyle = "#f0e442";
+    c.strokeStyle = theme("--text");
+    c.lineWidth = 1.5;
+    c.beginPath();
+    for (const [dx, dy] of [[0, -10], [9, 7], [-9, 7]]) c.lineTo(x + dx, y + dy);
+    c.closePath();
+    c.fill();
+    c.stroke();
+  }
+
+  at(e) {
+    const box = this.canvas.getBoundingClientRect();
+    const near = ([x, y], reach) =>
+      Math.hypot(e.clientX - box.left - x, e.clientY - box.top - y) < reach;
+    if (!this.scene || !this.fit()) return {};
+    if (this.scene.landmark && near(this.toPixel(...this.scene.landmark), NEAR)) return { landmark: true };
+    const robot = this.scene.robots.find((r) =>
+      near(this.toPixel(r.x, r.y), Math.max(NEAR, r.r * this.view.scale)));
+    return { robot };
+  }
+
+  down(e) {
+    if (!this.fit()) return;
+    const { landmark, robot } = this.at(e);
+    this.canvas.setPointerCapture(e.pointerId);
+    this.dragged = { from: [e.clientX, e.clientY], view: { ...this.view }, robot, moved: false };
+    if (landmark) this.dragged.landmark = this.toFloor(e);
+  }
+
+  move(e) {
+    const d = this.dragged;
+    if (!d) return;
+    const [dx, dy] = [e.clientX - d.from[0], e.clientY - d.from[1]];
+    if (Math.hypot(dx, dy) > 4) d.moved = true;
+    if (d.landmark) d.landmark = this.toFloor(e);
+    else if (d.moved && !this.follow)
+      Object.assign(this.view, { x: d.view.x - dx / d.view.scale, y: d.view.y + dy / d.view.scale });
+    this.draw();
+  }
+
+  up(e) {
+    const d = this.dragged;
+    this.dragged = null;
+    if (!d) return;
+    if (d.landmark && d.moved) this.on.landmark(...this.toFloor(e));
+    else if (d.robot) this.on.choose(d.robot.id);
+    else if (!d.moved && !d.landmark) this.on.send(...this.toFloor(e));
+    this.draw();
+  }
+
+  wheel(e) {
+    e.preventDefault();
+    this.zoom(e.deltaY < 0 ? 1.15 : 0.87);
+  }
+
+  key(e) {
+    if (!this.fit()) return;
+    const step = 40 / this.view.scale;
+    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[e.key];
+    if (way && !this.driving) {
+      this.view.x += way[0] * step;
+      this.view.y += way[1] * step;
+    } else if (e.key === "+") this.zoom(1.3);
+    else if (e.key === "-") this.zoom(0.77);
+    else if (e.key === "0") this.zoom(0);
+    else return;
+    e.preventDefault();
+    this.draw();
+  }
+}

@@ -1,0 +1,167 @@
+// The page: a WebSocket to the fleet, the map, and the panels beside it. Text from the fleet is only ever set as text.
+import { FloorView, colour } from "./map.js";
+
+const by = (id) => document.getElementById(id);
+const DRIVE_MS = 100; // how often the keyboard says a word; the server stops after 300 ms without one
+let socket, chosen, scene, told = 0, tries = 0, keys = new Set(), driving = false, timer;
+
+// Reachable for tests and the curious.
+const floor = window.floor = new FloorView(by("map"), {
+  choose,
+  send: (x, y) => chosen && say(`goto ${chosen} ${x.toFixed(2)},${y.toFixed(2)}`),
+  landmark: (x, y) => say(`landmark ${x.toFixed(2)},${y.toFixed(2)}`),
+});
+
+function connect() {
+  socket = new WebSocket(`ws://${location.host}/live`);
+  socket.onopen = () => (tries = 0);
+  socket.onmessage = ({ data }) => hear(JSON.parse(data));
+  socket.onclose = () => {
+    lost();
+    setTimeout(connect, Math.min(5000, 250 * 2 ** tries++));
+  };
+}
+
+function lost() {
+  const fleet = by("fleet");
+  fleet.textContent = "No connection to the fleet. What you see is old, and the buttons reach nobody.";
+  fleet.className = "lost";
+  drive(false);
+}
+
+function say(line) {
+  if (socket?.readyState === WebSocket.OPEN) socket.send(line);
+  else answer({ ok: false, text: `not sent, because there is no connection: ${line}` });
+}
+
+function hear(message) {
+  if (message.t === "map") {
+    told = 0;
+    by("stages").replaceChildren();
+    floor.setMap(message);
+  } else if (message.t === "scene") show(message);
+  else if (message.t === "answer") answer(message);
+}
+
+function answer({ ok, text }) {
+  const output = by("answer");
+  output.textContent = text;
+  output.className = ok ? "good" : "bad";
+}
+
+function show(next) {
+  scene = next;
+  floor.setScene(scene);
+  const fleet = by("fleet");
+  const parts = [
+    `${scene.at_s.toFixed(1)} s`,
+    scene.pace,
+    `${scene.formation[0]} ${scene.formation[1].toFixed(1)} m`,
+    scene.leader ? `${scene.leader} leads, epoch ${scene.epoch}` : "no leader",
+    scene.error && `${scene.formed ? "formed" : "off by"} ${scene.error.map((e) => e.toFixed(2)).join("/")} m`,
+  ];
+  fleet.textContent = parts.filter(Boolean).join(" · ");
+  fleet.className = "";
+  by("pace").hidden = scene.pace === null;
+  scene.robots.forEach(row);
+  one();
+  stages();
+}
+
+// A row for each robot, made once, so that it keeps the focus.
+function row(robot, index) {
+  let tr = document.querySelector(`tr[data-id="${robot.id}"]`);
+  if (!tr) {
+    tr = document.createElement("tr");
+    tr.dataset.id = robot.id;
+    const mark = Object.assign(document.createElement("span"), { className: "mark" });
+    mark.style.background = colour(index);
+    const button = Object.assign(document.createElement("button"), { type: "button", textContent: robot.id });
+    button.onclick = () => choose(robot.id);
+    const cells = [0, 1, 2, 3].map(() => document.createElement("td"));
+    cells[0].append(mark, button);
+    tr.append(...cells);
+    by("robots").append(tr);
+  }
+  const metres = (m) => (m === null ? "" : `${m.toFixed(2)} m`);
+  tr.children[1].textContent = robot.alive ? robot.state + (robot.leader ? " ★" : "") : "dead";
+  tr.children[2].textContent = robot.alive ? metres(robot.off) : "";
+  tr.children[3].textContent = robot.alive && robot.unsure !== null ? `±${metres(robot.unsure)}` : "";
+  tr.className = robot.alive ? "" : "dead";
+  tr.setAttribute("aria-selected", robot.id === chosen);
+}
+
+function choose(id) {
+  drive(false);
+  chosen = chosen === id ? null : id;
+  floor.chosen = chosen;
+  if (scene) show(scene);
+}
+
+function one() {
+  const robot = scene.robots.find((r) => r.id === chosen);
+  by("one").hidden = !robot;
+  if (!robot) return;
+  by("chosen").textContent = robot.id;
+  by("doing").textContent = robot.alive
+    ? `${robot.state}, at ${robot.x.toFixed(2)}, ${robot.y.toFixed(2)}, ${Math.round((robot.a * 180) / Math.PI)}°`
+    : "dead";
+}
+
+function stages() {
+  const list = by("stages");
+  const fresh = Math.min(scene.told - told, scene.stages.length);
+  for (const { line } of scene.stages.slice(scene.stages.length - Math.max(fresh, 0)))
+    list.append(Object.assign(document.createElement("li"), { textContent: line }));
+  if (fresh > 0) list.scrollTop = list.scrollHeight;
+  told = scene.told;
+}
+
+// Driving: a word every 100 ms while the mode is on.
+const WAYS = { w: [1, 0], s: [-1, 0], a: [0, 1], d: [0, -1],
+  ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1] };
+
+function drive(on) {
+  if (on === driving) return;
+  driving = floor.driving = on;
+  by("drive").setAttribute("aria-pressed", on);
+  keys.clear();
+  clearInterval(timer);
+  if (on) timer = setInterval(word, DRIVE_MS);
+}
+
+function word() {
+  const sum = [...keys].map((k) => WAYS[k]).reduce(([a, b], [c, d]) => [a + c, b + d], [0, 0]);
+  const [ahead, turn] = sum.map((n) => Math.max(-1, Math.min(1, n)));
+  if (keys.size > 0) say(`drive ${chosen} ${ahead} ${turn}`);
+}
+
+addEventListener("keydown", (e) => {
+  const key = e.key.length === 1 ? e.key.toLowerCase() : e.key;
+  if (e.key === "Escape") drive(false);
+  if (!driving || !WAYS[key] || /INPUT|SELECT/.test(e.target.tagName)) return;
+  keys.add(key);
+  e.preventDefault();
+});
+addEventListener("keyup", (e) => keys.delete(e.key.length === 1 ? e.key.toLowerCase() : e.key));
+addEventListener("blur", () => keys.clear());
+
+by("estop").onclick = () => say("estop");
+by("reset").onclick = () =>
+  confirm("Reset the emergency stop? Robots may move again when they are started.") && say("reset");
+by("form").onclick = () => say(`formation ${by("shape").value} ${by("spacing").value}`);
+by("speed").onchange = () => say(`speed ${by("speed").value}`);
+by("drive").onclick = () => drive(!driving);
+by("follow").onchange = (e) => ((floor.follow = e.target.checked), floor.draw());
+by("trails").onchange = (e) => ((floor.trails = e.target.checked), floor.draw());
+for (const b of document.querySelectorAll("[data-line]")) b.onclick = () => say(b.dataset.line);
+for (const b of document.querySelectorAll("[data-one]")) b.onclick = () => say(`${b.dataset.one} ${chosen}`);
+for (const b of document.querySelectorAll("[data-zoom]")) b.onclick = () => floor.zoom(Number(b.dataset.zoom));
+by("command").onsubmit = (e) => {
+  e.preventDefault();
+  const line = by("line");
+  if (line.value.trim()) say(line.value.trim());
+  line.value = "";
+};
+
+connect();

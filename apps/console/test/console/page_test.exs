@@ -1,0 +1,271 @@
+defmodule Console.PageTest do
+  @moduledoc "The page as browsers and strangers see it; with a real browser, where there is one."
+  use ExUnit.Case, async: true
+  alias Console.{Browser, Live, Options, Page}
+  alias Console.Page.{Access, Client, State}
+  @moduletag :realtime
+  @moduletag :capture_log
+
+  doctest Access
+  doctest Client
+  doctest State
+
+  @server (case Application.ensure_all_started(:mochiweb) do
+             {:ok, _apps} -> nil
+             _absent -> "erlang-mochiweb is not installed"
+           end)
+  @moduletag skip: @server
+
+  defp options(line) do
+    {:ok, options} = line |> OptionParser.split() |> Options.parse()
+    options
+  end
+
+  # As fast as it goes, in lockstep.
+  defp trial(line \\ "--robots 3 --seed 4 --blobs direct") do
+    options = options(line)
+    start = {Live.Trial, :start_link, [Sim.Trial, Options.trial(options), Live.Pace.new(:max)]}
+    {options, start_supervised!(%{id: make_ref(), start: start})}
+  end
+
+  defp page(options, module, live, more \\ []) do
+    {:ok, page, url} =
+      Page.start_link([module: module, live: live, robots: options.robots] ++ more)
+
+    {page, url}
+  end
+
+  # The status and the text of an answer to a request with these lines.
+  defp ask(url, request, headers \\ []) do
+    %URI{port: port} = URI.parse(url)
+    {:ok, socket} = :gen_tcp.connect({127, 0, 0, 1}, port, [:binary, active: false])
+
+    headers =
+      Map.merge(%{"Host" => "127.0.0.1:#{port}", "Connection" => "close"}, Map.new(headers))
+
+    lines = for {name, value} <- headers, value != nil, do: "#{name}: #{value}\r\n"
+    :ok = :gen_tcp.send(socket, [request, " HTTP/1.1\r\n", lines, "\r\n"])
+    [head, body] = socket |> all("") |> String.split("\r\n\r\n", parts: 2)
+    [_all, status] = Regex.run(~r/^HTTP\/1.1 (\d+)/, head)
+    {String.to_integer(status), head, body}
+  end
+
+  defp all(socket, said) do
+    case :gen_tcp.recv(socket, 0, 10_000) do
+      {:ok, more} -> all(socket, said <> more)
+      {:error, :closed} -> said
+    end
+  end
+
+  describe "requests" do
+    setup do
+      {options, live} = trial()
+      {_page, url} = page(options, Live.Trial, live)
+      %{url: url, options: options, live: live}
+    end
+
+    test "the files of the page, and nothing else; whatever else is asked is refused in a line",
+         %{
+           url: url
+         } do
+      assert {200, head, "<!doctype html>" <> _} = ask(url, "GET /")
+      assert head =~ "Content-Security-Policy: default-src 'self'"
+      assert {200, _head, _body} = ask(url, "GET /map.js")
+
+      for {request, status} <- [
+            {"GET /../mix.exs", 404},
+            {"GET /%2e%2e/%2e%2e/mix.exs", 404},
+            {"GET /nope", 404},
+            {"GET /live", 426},
+            {"POST /", 405},
+            {"DELETE /live", 405}
+          ] do
+        assert {^status, _head, line} = ask(url, request)
+        assert [_one_line] = String.split(line, "\n", trim: true)
+      end
+    end
+
+    test "pages and names of others are refused", %{url: url} do
+      "http://" <> here = String.trim_trailing(url, "/")
+      assert {200, _, _} = ask(url, "GET /", [{"Origin", "http://" <> here}])
+      assert {403, _, line} = ask(url, "GET /live", [{"Origin", "http://evil.example"}])
+      assert line =~ "evil.example may not use this one"
+      assert {403, _, _} = ask(url, "GET /", [{"Host", "rebound.example"}])
+      assert {400, _, _} = ask(url, "GET /", [{"Host", nil}])
+    end
+
+    test "a token is demanded, and kept in a cookie", %{options: options, live: live} do
+      {_page, url} = page(options, Live.Trial, live, token: "a-secret-token")
+      assert {401, _, "a token is needed" <> _} = ask(url, "GET /")
+      assert {401, _, _} = ask(url, "GET /?token=another-token")
+      assert {200, head, _} = ask(url, "GET /?token=a-secret-token")
+      assert head =~ "Set-Cookie: token=a-secret-token; HttpOnly; SameSite=Strict"
+      assert {426, _, _} = ask(url, "GET /live", [{"Cookie", "token=a-secret-token"}])
+      assert {401, _, _} = ask(url, "GET /live", [{"Cookie", "token=other"}])
+    end
+
+    test "a port that is taken is said in a line; so is an address without a token", %{
+      url: url,
+      options: options,
+      live: live
+    } do
+      source = [module: Live.Trial, live: live, robots: options.robots]
+      %URI{port: port} = URI.parse(url)
+      assert {:error, line} = Page.start_link(source ++ [port: port])
+      assert line == "no page on 127.0.0.1:#{port}: address already in use"
+      assert {:error, line} = Page.start_link(source ++ [address: {0, 0, 0, 0}])
+      assert line =~ "it needs a token"
+      assert {:error, [line]} = Options.parse(~w(--page-address 0.0.0.0))
+      assert line =~ "--page-token"
+    end
+  end
+
+  describe "in a browser" do
+    @describetag skip: @server || Browser.why_not()
+    @describetag timeout: 180_000
+
+    defp open(url, size \\ {1280, 800}) do
+      browser = Browser.open(size)
+      Browser.go(browser, url)
+      browser
+    end
+
+    defp fleet(browser),
+      do: Browser.run(browser, "return document.getElementById('fleet').textContent")
+
+    # Where a place of the map is in the window.
+    defp pixel(browser, {x, y}) do
+      [px, py] =
+        Browser.run(browser, """
+        const box = document.getElementById('map').getBoundingClientRect();
+        const [x, y] = window.floor.toPixel(#{x}, #{y});
+        return [x + box.left, y + box.top];
+        """)
+
+      {px, py}
+    end
+
+    test "it shows the fleet without an error; the landmark is dragged; a killed leader is followed by another" do
+      {options, live} = trial()
+      {_page, url} = page(options, Live.Trial, live)
+      browser = open(url)
+      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 3")
+
+      Browser.await(
+        browser,
+        "return document.getElementById('fleet').textContent.includes('formed')"
+      )
+
+      {x, y} = Live.Trial.scene(live).landmark
+
+      Browser.drag(browser, [
+        pixel(browser, {x, y}),
+        pixel(browser, {x + 0.5, y}),
+        pixel(browser, {x + 2.0, y + 1.0})
+      ])
+
+      Browser.await(
+        browser,
+        "return document.getElementById('answer').textContent.startsWith('landmark ')"
+      )
+
+      Browser.await(
+        browser,
+        "return Math.hypot(window.floor.scene.landmark[0] - #{x + 2.0}, window.floor.scene.landmark[1] - #{y + 1.0}) < 0.1"
+      )
+
+      leader = Live.Trial.scene(live).leader
+      Browser.run(browser, "document.querySelector('[data-line=\"kill leader\"]').click()")
+
+      Browser.await(
+        browser,
+        "return document.querySelector('tr.dead')?.dataset.id === '#{leader}'"
+      )
+
+      Browser.await(
+        browser,
+        "const s = window.floor.scene; return s.leader && s.leader !== '#{leader}' && s.formed"
+      )
+
+      assert fleet(browser) =~ "epoch"
+
+      # What is typed is answered, good or bad.
+      type =
+        "const l = document.getElementById('line'); l.value = arguments0; l.form.requestSubmit();"
+
+      Browser.run(browser, String.replace(type, "arguments0", "'formatoin wedge'"))
+
+      Browser.await(
+        browser,
+        "return document.getElementById('answer').textContent.includes('did you mean formation?')"
+      )
+
+      assert Browser.errors(browser) == []
+      Browser.close(browser)
+    end
+
+    test "one click stops all; a page that is loaded again, or whose server was away, goes on" do
+      {options, live} = trial("--robots 2 --seed 2 --blobs direct")
+      {page, url} = page(options, Live.Trial, live)
+      browser = open(url, {390, 844})
+      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2")
+      Browser.run(browser, "document.getElementById('estop').click()")
+
+      Browser.await(
+        browser,
+        "return document.getElementById('answer').textContent === 'estop: done'"
+      )
+
+      Browser.await(
+        browser,
+        "const s = window.floor.scene; return s.robots.every((r) => r.state === 'idle')"
+      )
+
+      Browser.run(browser, "location.reload()")
+      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2")
+
+      Process.unlink(page)
+      :ok = Supervisor.stop(page)
+      Browser.await(browser, "return document.getElementById('fleet').className === 'lost'")
+      %URI{port: port} = URI.parse(url)
+      {_page, ^url} = page(options, Live.Trial, live, port: port)
+      Browser.await(browser, "return document.getElementById('fleet').className === ''")
+      Browser.close(browser)
+    end
+
+    test "a robot that is driven stands soon after the key was let go, and when the page is gone" do
+      options = options("--robots 1 --blobs direct --landmark none")
+      {:ok, live} = Live.Fleet.start_link(Options.trial(options))
+      {_page, url} = page(options, Live.Fleet, live)
+      browser = open(url)
+      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 1")
+
+      Browser.run(
+        browser,
+        "document.querySelector('#robots button').click(); document.getElementById('drive').click()"
+      )
+
+      [%{id: id}] = Live.Fleet.scene(live).robots
+
+      for ending <- [
+            fn -> Browser.key(browser, :keyUp, "w") end,
+            fn -> Browser.close(browser) end
+          ] do
+        Browser.key(browser, :keyDown, "w")
+        wait(fn -> Swarm.status(id).speed > 0.1 end)
+        ending.()
+        wait(fn -> Swarm.status(id).speed == 0.0 end)
+      end
+
+      Live.Fleet.stop(live)
+    end
+
+    defp wait(true?, left \\ 600) do
+      cond do
+        true?.() -> :ok
+        left == 0 -> flunk("in vain")
+        true -> receive(do: (:never -> :ok), after: (50 -> wait(true?, left - 1)))
+      end
+    end
+  end
+end

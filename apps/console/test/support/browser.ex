@@ -1,0 +1,131 @@
+defmodule Console.Browser do
+  @moduledoc "A real browser for tests: Debian's chromium, by its driver, in the words of W3C's WebDriver."
+  alias Hal.Json
+
+  @enforce_keys [:port, :session]
+  defstruct @enforce_keys
+
+  @flags ~w(--headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage --force-prefers-reduced-motion)
+
+  @doc "Why there is no browser here, or `nil`."
+  @spec why_not() :: String.t() | nil
+  def why_not do
+    Enum.find_value(~w(chromium chromedriver), fn name ->
+      unless System.find_executable(name), do: "#{name} is not installed"
+    end)
+  end
+
+  @doc "A browser with a window of this size; it ends with the test's process."
+  @spec open({pos_integer(), pos_integer()}, [String.t()]) :: %__MODULE__{}
+  def open({width, height}, flags \\ []) do
+    {:ok, _apps} = Application.ensure_all_started(:inets)
+    port = driver()
+
+    options = %{
+      "args" => ["--window-size=#{width},#{height}" | flags] ++ @flags,
+      "binary" => System.find_executable("chromium")
+    }
+
+    wanted = %{"goog:chromeOptions" => options, "goog:loggingPrefs" => %{"browser" => "ALL"}}
+
+    %{"sessionId" => session} =
+      ask(port, :post, "/session", %{capabilities: %{alwaysMatch: wanted}})
+
+    %__MODULE__{port: port, session: session}
+  end
+
+  # It ends when its standard input does.
+  defp driver do
+    script = ~s(chromedriver --port=0 & p=$!; read _end; kill $p)
+    args = ["-c", script]
+    port = Port.open({:spawn_executable, "/bin/sh"}, [:binary, :stderr_to_stdout, args: args])
+    listening(port, "")
+  end
+
+  defp listening(port, said) do
+    receive do
+      {^port, {:data, more}} ->
+        said = said <> more
+
+        case Regex.run(~r/started successfully on port (\d+)/, said) do
+          [_all, number] -> number
+          nil -> listening(port, said)
+        end
+    after
+      30_000 -> raise "chromedriver does not start: #{said}"
+    end
+  end
+
+  @doc "Ends it."
+  def close(browser), do: command(browser, :delete, "", nil)
+
+  @doc "Opens a page."
+  def go(browser, url), do: command(browser, :post, "/url", %{url: url})
+
+  @doc "What a piece of JavaScript returns."
+  def run(browser, script),
+    do: command(browser, :post, "/execute/sync", %{script: script, args: []})
+
+  @doc "What the page and the browser have complained of since the last look."
+  def errors(browser) do
+    for %{"level" => "SEVERE", "message" => message} <-
+          command(browser, :post, "/se/log", %{type: "browser"}),
+        do: message
+  end
+
+  @doc "A picture of the window, as PNG."
+  def picture(browser), do: browser |> command(:get, "/screenshot", nil) |> Base.decode64!()
+
+  @doc "Presses the pointer at the first place, moves it over the others, and lets go; pixels from the window's corner."
+  def drag(browser, [{x, y} | places]) do
+    move = &%{type: "pointerMove", duration: 50, x: round(elem(&1, 0)), y: round(elem(&1, 1))}
+
+    deeds =
+      [move.({x, y}), %{type: "pointerDown", button: 0}] ++
+        Enum.map(places, move) ++ [%{type: "pointerUp", button: 0}]
+
+    command(browser, :post, "/actions", %{
+      actions: [%{type: "pointer", id: "mouse", actions: deeds}]
+    })
+  end
+
+  @doc "Holds a key down, or lets it go."
+  def key(browser, kind, key) when kind in [:keyDown, :keyUp],
+    do:
+      command(browser, :post, "/actions", %{
+        actions: [%{type: "key", id: "keys", actions: [%{type: kind, value: key}]}]
+      })
+
+  @doc "Waits until a piece of JavaScript returns something true; returns that."
+  def await(browser, script, left \\ 300) do
+    case run(browser, script) do
+      nothing when nothing in [nil, false] and left > 0 ->
+        receive(do: (:never -> :ok), after: (50 -> await(browser, script, left - 1)))
+
+      nothing when nothing in [nil, false] ->
+        raise "in vain: #{script}; the page says: #{run(browser, "return document.body.innerText")}"
+
+      value ->
+        value
+    end
+  end
+
+  defp command(%{port: port, session: session}, method, path, body),
+    do: ask(port, method, "/session/#{session}" <> path, body)
+
+  defp ask(port, method, path, body) do
+    url = String.to_charlist("http://127.0.0.1:#{port}#{path}")
+    request = if body, do: {url, [], ~c"application/json", Json.encode!(body)}, else: {url, []}
+
+    {:ok, {{_http, status, _reason}, _headers, text}} =
+      :httpc.request(method, request, [timeout: 60_000], body_format: :binary)
+
+    %{"value" => value} = text |> Mcap.Json.decode!() |> plain()
+    status == 200 || raise "#{method} #{path}: #{status}: #{inspect(value)}"
+    value
+  end
+
+  defp plain({:object, pairs}), do: Map.new(pairs, fn {key, value} -> {key, plain(value)} end)
+  defp plain(values) when is_list(values), do: Enum.map(values, &plain/1)
+  defp plain(value), do: value
+end
