@@ -59,10 +59,31 @@ defmodule Agents.ContractNet.AuctionTest do
     test = self()
     first = Task.async(fn -> auction({:carry, {:tell, test}}, [peer]) end)
     assert_receive {:working, :bid_one, worker}
-    assert auction({:carry, 1}, [peer], bid_ms: 20, rounds: 2) == {:error, :no_bids}
+    assert auction({:carry, 1}, [peer], wait_ms: 100) == {:error, :busy}
     send(worker, :go_on)
     assert {:ok, ^peer, _} = Task.await(first)
     assert {:ok, ^peer, _} = auction({:carry, 1}, [peer])
+  end
+
+  test "twenty auctions at once are all done within 5 s, and both bidders are used" do
+    peers = [bidder(:bid_many1, 1), bidder(:bid_many2, 2)]
+    test = self()
+    begun_ms = System.monotonic_time(:millisecond)
+
+    auctions = for _ <- 1..20, do: Task.async(fn -> auction({:carry, {:tell, test}}, peers) end)
+
+    # While one works, the other is used.
+    assert_receive {:working, first, worker}
+    assert_receive {:working, second, other} when second != first
+    for pid <- [worker, other], do: send(pid, :go_on)
+
+    for _ <- 3..20 do
+      assert_receive {:working, _robot, worker}
+      send(worker, :go_on)
+    end
+
+    assert Enum.all?(Task.await_many(auctions), &match?({:ok, _, {:carried_by, _}}, &1))
+    assert System.monotonic_time(:millisecond) - begun_ms < 5_000
   end
 
   test "a winner that dies or falls silent loses the task to the next" do
