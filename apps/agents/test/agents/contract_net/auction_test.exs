@@ -18,6 +18,7 @@ defmodule Agents.ContractNet.AuctionTest do
 
   test "the cheapest does the task; if nobody can, an error says why" do
     peers = [bidder(:bid_a, 5), bidder(:bid_b, 2), bidder(:bid_c, :infinite)]
+    idle = [messages: [], monitored_by: elem(Process.info(self(), :monitored_by), 1)]
     assert auction({:carry, 1}, peers) == {:ok, {:bid_b, :tasks}, {:carried_by, :bid_b}}
     # All of them are free again at once.
     assert {:ok, {:bid_b, :tasks}, _} = auction({:carry, 1}, peers)
@@ -30,8 +31,6 @@ defmodule Agents.ContractNet.AuctionTest do
              {:error, :given_up},
              {:error, :no_bids}
            ]
-
-    idle = [messages: [], monitored_by: elem(Process.info(self(), :monitored_by), 1)]
 
     for {options, peers} <- [
           {[], peers},
@@ -51,7 +50,7 @@ defmodule Agents.ContractNet.AuctionTest do
     end
 
     # Nothing is left of what was started.
-    assert Process.info(self(), [:messages, :monitored_by]) == idle
+    eventually(fn -> Process.info(self(), [:messages, :monitored_by]) == idle end)
   end
 
   test "a robot does one task at a time" do
