@@ -180,10 +180,10 @@ defmodule Missions.Landmark.Follower do
   defp patience({place, patience}, slot, error, now) do
     if Pose.distance(place, slot) > @elsewhere,
       do: patience(nil, slot, error, now),
-      else: {place, Patience.note(patience, error, now)}
+      else: {place, Patience.note(patience, error, now, :straight)}
   end
 
-  defp patience(nil, slot, error, now), do: {slot, Patience.note(nil, error, now)}
+  defp patience(nil, slot, error, now), do: {slot, Patience.note(nil, error, now, :straight)}
 
   # While its pose is corrected, a robot seems to come nearer that stands still.
   defp gain(%{uncertainty: %{radius: radius}}), do: radius |> max(@progress) |> min(@most_gain)

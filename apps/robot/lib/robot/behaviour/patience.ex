@@ -37,11 +37,14 @@ defmodule Robot.Behaviour.Patience do
           others: non_neg_integer()
         }
 
-  @doc "Takes what is left of the way (metres)."
-  @spec note(t() | nil, left :: float(), at_ms :: integer()) :: t()
-  def note(nil, left, at_ms), do: %__MODULE__{best: left, at_ms: at_ms, past: [{0, left}]}
+  @doc "Takes what is left (metres): of a `:way`, or of the `:straight` line, which has no other ways."
+  @spec note(t() | nil, left :: float(), at_ms :: integer(), :way | :straight) :: t()
+  def note(patience, left, at_ms, line \\ :way)
 
-  def note(%__MODULE__{} = patience, left, at_ms) do
+  def note(nil, left, at_ms, _line),
+    do: %__MODULE__{best: left, at_ms: at_ms, past: [{0, left}]}
+
+  def note(%__MODULE__{} = patience, left, at_ms, line) do
     passed_ms = (at_ms - patience.at_ms) |> max(0) |> min(@tick_ms)
     patience = %{patience | at_ms: at_ms, clock_ms: patience.clock_ms + passed_ms}
 
@@ -49,7 +52,7 @@ defmodule Robot.Behaviour.Patience do
       left < patience.best ->
         %{patience | best: left, past: remember(patience.past, patience.clock_ms, left)}
 
-      left > patience.best + @other and patience.others < @others ->
+      line == :way and left > patience.best + @other and patience.others < @others ->
         %{note(nil, left, at_ms) | others: patience.others + 1}
 
       true ->

@@ -32,6 +32,13 @@ defmodule Robot.Behaviour.PatienceTest do
 
   test "another way begins the time again, ten times at most" do
     assert_in_delta late_at(120, fn s -> if s < 14, do: 3.0, else: 6.0 end), 29.0, 0.11
+    # A straight line has no other ways: going round something is no approach either.
+    straight =
+      Enum.reduce(0..150, nil, fn n, patience ->
+        Patience.note(patience, if(n < 40, do: 3.0, else: 6.0), 100 * n, :straight)
+      end)
+
+    assert Patience.late?(straight, 1.0)
     ways = fn s -> 3.0 + 1.5 * trunc(s / 10) end
     assert_in_delta late_at(400, ways), 115.0, 1.0
   end
