@@ -53,7 +53,8 @@
        ]
      ]},
 
-  # The camera's head: {Hal.Visca.Driver, port: "/dev/ttyS2"}, or nil for a camera that looks ahead.
+  # The camera's head, a Sony EVI-D30, D31, D70 or D100: {Hal.Visca.Driver, port: "/dev/ttyS2"}, or nil for
+  # a camera that looks ahead. With model: :d30 (:d70, :d100) any other is taken for that one.
   ptz: nil,
 
   # The camera: {Hal.Camera.FFmpeg, source: "/dev/video0", size: {320, 240}}, or nil for none. A frame

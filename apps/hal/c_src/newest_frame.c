@@ -10,8 +10,15 @@
 
        'F' chroma:8 width:32 height:32 rate:32 per:32 number:64 age_us:64 bytes
 
-   (chroma 0: i420, 1: yuyv; the number counts all pictures from 0, dropped ones too) and, once,
-   the end: 'E' status:8 pictures:64 and the end of what PROGRAM wrote to its standard error.
+   (chroma 0: i420, 1: yuyv; the number counts all pictures from 0, dropped ones too), a change of
+   the source's size, which ffmpeg would hide by scaling,
+
+       'S' old_width:32 old_height:32 width:32 height:32
+
+   and, once, the end: 'E' status:8 pictures:64 and the end of what PROGRAM complained of.
+
+   PROGRAM writes each line of its standard error with its level (ffmpeg -loglevel level+info): the
+   sizes of its filter showinfo, and errors, are read; all other lines are dropped.
 
    PROGRAM ends with this program, and this program with its standard input, so nothing outlives
    the VM. */
@@ -30,6 +37,7 @@
 #include "y4m.h"
 
 #define LONGEST_LINE 256
+#define LONGEST_WORDS 512
 #define STATUS_NOT_RUN 127      /* as in shells */
 #define STATUS_NOT_UNDERSTOOD 255
 
@@ -56,8 +64,11 @@ static struct {
     uint64_t count, credit;
     uint8_t credit_head[4];     /* of the incoming packet */
     uint32_t credit_have, credit_skip;
-    char words[512];
+    char words[LONGEST_WORDS];
     size_t words_length;
+    char said[LONGEST_WORDS];   /* the line of PROGRAM's errors that has only begun */
+    size_t said_length;
+    uint32_t width, height;     /* of the source; 0 before the first picture */
     int not_understood;
 } s = { .pictures_fd = -1, .words_fd = -1 };
 
@@ -240,7 +251,71 @@ static void turn_over(void)
     s.phase = FRAME;
 }
 
-/* Keeps the end of what PROGRAM writes to its standard error. */
+/* Keeps the end of what PROGRAM complains of. */
+static void keep_words(const char *words, size_t n)
+{
+    size_t most = sizeof s.words - n;
+
+    if (s.words_length > most) {
+        memmove(s.words, s.words + s.words_length - most, most);
+        s.words_length = most;
+    }
+    memcpy(s.words + s.words_length, words, n);
+    s.words_length += n;
+}
+
+/* The source's size in a line of showinfo, "... s:640x360 ..."; 0 if there is none. */
+static int size_in(const char *line, uint32_t *width, uint32_t *height)
+{
+    const char *at = strstr(line, " s:");
+    char *end;
+
+    if (!strstr(line, "showinfo") || !at)
+        return 0;
+    *width = (uint32_t)strtoul(at + 3, &end, 10);
+    if (*end != 'x')
+        return 0;
+    *height = (uint32_t)strtoul(end + 1, &end, 10);
+    return *width > 0 && *height > 0 && *end == ' ';
+}
+
+static void note_size(uint32_t width, uint32_t height)
+{
+    uint8_t head[32], *at = head;
+
+    if (s.width > 0 && (width != s.width || height != s.height)) {
+        *at++ = 'S';
+        at = put(at, s.width, 4);
+        at = put(at, s.height, 4);
+        at = put(at, width, 4);
+        at = put(at, height, 4);
+        send_packet(head, (size_t)(at - head), NULL, 0);
+    }
+    s.width = width;
+    s.height = height;
+}
+
+/* A whole line; it ends with its line end and a zero. */
+static void end_of_words(char *line, size_t length)
+{
+    static const char *const levels[] = { "[error] ", "[fatal] ", "[panic] " };
+    uint32_t width, height;
+
+    for (size_t k = 0; k < sizeof levels / sizeof *levels; k++) {
+        char *level = strstr(line, levels[k]);
+
+        if (level) {
+            size_t size = strlen(levels[k]), before = (size_t)(level - line);
+
+            memmove(level, level + size, length - before - size);
+            keep_words(line, length - size);
+            return;
+        }
+    }
+    if (size_in(line, &width, &height))
+        note_size(width, height);
+}
+
 static void read_words(void)
 {
     char words[256];
@@ -251,16 +326,19 @@ static void read_words(void)
     if (n <= 0) {
         close(s.words_fd);
         s.words_fd = -1;
-        return;
+        words[0] = '\n';
+        n = 1;
     }
-    size_t most = sizeof s.words - (size_t)n;
-
-    if (s.words_length > most) {
-        memmove(s.words, s.words + s.words_length - most, most);
-        s.words_length = most;
+    /* Of a line that is too long the beginning counts. */
+    for (ssize_t k = 0; k < n; k++) {
+        if (words[k] != 0 && (words[k] == '\n' || s.said_length < sizeof s.said - 2))
+            s.said[s.said_length++] = words[k];
+        if (words[k] == '\n') {
+            s.said[s.said_length] = 0;
+            end_of_words(s.said, s.said_length);
+            s.said_length = 0;
+        }
     }
-    memcpy(s.words + s.words_length, words, (size_t)n);
-    s.words_length += (size_t)n;
 }
 
 static void read_credit(void)

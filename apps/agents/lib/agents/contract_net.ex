@@ -56,8 +56,8 @@ defmodule Agents.ContractNet do
   work goes on, and nobody receives the result.
 
   Options: `:from` (who asks; required), and those of `Agents.ContractNet.Manager`. Errors:
-  `:nobody` (no peer is there, or left), `:no_bids` (none can or will), `:given_up` (every try
-  failed).
+  `:nobody` (no peer is there, or left), `:no_bids` (none can or will), `:busy` (those that can were
+  doing something else for `:wait_ms`, 5 s unless given), `:given_up` (every try failed).
   """
   @spec auction(task :: term(), [Conversation.peer()], keyword()) :: Manager.outcome()
   def auction(task, peers, options) do
@@ -72,7 +72,7 @@ defmodule Agents.ContractNet do
 
     outcome =
       task
-      |> Manager.start(Map.keys(found), options, now())
+      |> Manager.start(Map.keys(found), options, now(), letter.conversation)
       |> send_all(found, letter)
       |> run(found, refs, letter)
 

@@ -136,7 +136,7 @@ defmodule Console.Options do
       {"seed", "S", &Parse.whole(&1, 0..4_294_967_295),
        "of all randomness; the same seed gives the same run (1)"},
       {"map", "NAME", &MapName.parse(&1, folder),
-       "#{MapName.names()},\nor FILE.yaml, or FILE.png:WIDTHxHEIGHT in metres (hall)"},
+       "#{MapName.names()},\nor FILE.yaml, or FILE.png:WIDTHxHEIGHT (or FILE.pgm) in metres (hall)"},
       {"plan", "HOW", &Parse.choice(&1, none: :none, known: :known, sonar: :sonar),
        "whether robots have the floor plan (known), remember walls that their\nsonars saw (sonar), or do neither: known, sonar, none (none)"},
       {"start", "HOW", &Parse.choice(&1, spread: :spread, same: :same),

@@ -96,11 +96,21 @@ defmodule Console.OptionsTest do
     end
 
     assert error("--map moon") =~ "hall, hospital, arena, clinic, "
-    assert error("--map moon") =~ "doorway, FILE.yaml or FILE.png:WIDTHxHEIGHT is allowed"
+
+    assert error("--map moon") =~
+             "doorway, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT is allowed"
+
     assert error("--map ofices") =~ "did you mean offices"
     assert error("--map hospitel") =~ "did you mean hospital"
     assert error("--map a.png:1x12") =~ "sides from 2 to 1000"
-    assert error("--map a.yaml:9x12") =~ "FILE.yaml or FILE.png:WIDTHxHEIGHT"
+
+    assert error("--map a.yaml:9x12") ==
+             "--map cannot be \"a.yaml:9x12\": FILE.yaml is allowed; its description says how large the map is"
+
+    assert error("--map a.png") =~ "such as a.png:16x12, is allowed; its size is missing"
+    assert error("--map a.pgm:9,12") =~ "FILE.pgm:WIDTHxHEIGHT in metres"
+    assert error("--map a.pgm:9,12") =~ "9,12 is not a size"
+    assert error("--map a.jpg") =~ ".jpg is not read: save the picture as PNG"
     assert error("--formation wegde") =~ "did you mean wedge"
     assert error("--formation wedge:0.5") =~ "0.8 to 5"
     assert error("--landmark 1") =~ "X,Y in metres"

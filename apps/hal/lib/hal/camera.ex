@@ -6,9 +6,15 @@ defmodule Hal.Camera do
   """
 
   @typedoc """
-  A picture or, from a camera that detects blobs itself, its detections (`Vision.Detections`).
+  A picture or, from a camera that detects blobs itself, its detections (`Vision.Detections`); and
+  what it refuses or has done, as in `Hal.Device.Obedience`.
   """
-  @type reading :: {:frame, Hal.Frame.t()} | {:detections, struct()}
+  @type reading ::
+          {:frame, Hal.Frame.t()}
+          | {:detections, struct()}
+          | {:refused, request :: atom(), line :: String.t()}
+          | {:obeyed, request :: atom()}
+          | {:odd, line :: String.t()}
 
   @doc "Opens the source."
   @callback init(keyword()) :: {:ok, state :: term()} | {:error, reason :: term()}

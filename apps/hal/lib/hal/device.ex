@@ -29,6 +29,13 @@ defmodule Hal.Device do
   reading for 10 s, and a pan-tilt unit without one in its first 10 s, is offline (`:mute`) and is
   reopened (`Hal.Device.Liveness`).
 
+  ## Refused
+
+  What the device refuses (`{:refused, request, line}` from its driver) is counted, and an event. A
+  device that answers, and obeys nothing, is offline, although its driver stays open
+  (`Hal.Device.Obedience`): one that refuses the same request again and again, a head that does
+  not turn, wheels that stand while they are told to turn.
+
   ## When a driver fails
 
   An error that a driver *returns* is expected: the device reports it, closes the driver, and

@@ -20,6 +20,9 @@ defmodule Hal.Drive do
   because `Hal.Device.Reports` takes them for signs of life. A driver that receives a report but
   cannot make such a reading of it, because a conversion or the other half of the report is
   missing, gives `{:report, :wheels}` or `{:report, :sonar}`.
+
+  What the base refuses is `{:refused, :drive, line}`, with the reason in one line; what it has
+  done, `{:obeyed, :drive}`: `Hal.Device.Obedience` counts these, and tells them.
   """
   @type reading ::
           {:odometry, Hal.Odometry.t()}
@@ -31,6 +34,9 @@ defmodule Hal.Drive do
           | {:joystick, %{x: integer(), y: integer(), buttons: byte()}}
           | {:home, heading :: float()}
           | {:report, :wheels | :sonar}
+          | {:refused, request :: atom(), line :: String.t()}
+          | {:obeyed, request :: atom()}
+          | {:odd, line :: String.t()}
 
   @doc "Opens the line and stops the motors."
   @callback init(keyword()) :: {:ok, state :: term()} | {:error, reason :: term()}

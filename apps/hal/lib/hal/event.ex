@@ -16,6 +16,8 @@ defmodule Hal.Event do
   | `[:hal, :rflex, :lost]` | `at_ms`, and counters (`Hal.RFlex.Driver.counts/1`) | `port`: more was lost or refused on this line; checked every 10 s |
   | `[:hal, :device, :arming]` | `at_ms` | `device`, `driver`, `state`, `why`, `was` (the state before), `line` (how the line was lost, in words, or `nil`): the drive's arming, or the reason for it, has changed (`Hal.Device.Arming`) |
   | `[:hal, :device, :refused]` | `at_ms`, `refused` (how many so far) | `device`, `driver`: a speed came for wheels that are not armed |
+  | `[:hal, :device, :refusal]` | `at_ms`, `count` (so far) | `device`, `driver`, `request`, `line`: the device itself refused what it was told, such as `:look`; the first in a row, and every 10 s (`Hal.Device.Obedience`) |
+  | `[:hal, :device, :odd]` | `at_ms` | `device`, `driver`, `line`: something about the device is unusual, such as a camera that is taken for another model |
   | `[:hal, :server, :dropped]` | `at_ms`, `count` (so far) | `server` (the module), `name` (of its process, or its pid): it dropped a message that it does not know; at most once a minute for each process (`Hal.HardenedServer`) |
   | `[:hal, :event, :failure]` | | `handler`, `event`, `kind`, `reason`: a handler failed and was detached |
   | `[:vision, :view, :failed]` | `at_ms` | `view`, `reason`, `line`: the encoder of the pictures failed, and is restarted |

@@ -2,8 +2,9 @@ defmodule Hal.ViscaToy do
   @moduledoc """
   As much of an EVI-D30 as the tests of its head need: bytes in, bytes out, in milliseconds. Pure.
 
-  Fields to set: `at`, `zoom`, `on?`, `delay_ms`, `slow` (its share of the full speed), `lose` (a
-  function of a reply that says whether it gets lost).
+  Fields to set: `at`, `zoom`, `on?`, `model`, `ends` (of pan and tilt), `address`, `delay_ms`, `slow`
+  (its share of the full speed), `lose` (a function of a reply that says whether it gets lost),
+  `refuse` (one of a message, that says whether it is a syntax error).
   """
   import Bitwise
 
@@ -11,6 +12,9 @@ defmodule Hal.ViscaToy do
             zoom: 0,
             on?: true,
             model: 0x0402,
+            ends: {-880..880, -300..300},
+            address: 1,
+            refuse: nil,
             delay_ms: 16,
             slow: 1.0,
             rest: <<>>,
@@ -37,7 +41,13 @@ defmodule Hal.ViscaToy do
     {said, %{toy | out: later}}
   end
 
-  defp message(bytes, toy), do: obey(bytes, %{toy | heard: [{toy.now_ms, bytes} | toy.heard]})
+  defp message(bytes, toy) do
+    toy = %{toy | heard: [{toy.now_ms, bytes} | toy.heard]}
+
+    if toy.refuse && toy.refuse.(bytes),
+      do: say(toy, <<0x90, 0x60, 0x02, 0xFF>>),
+      else: obey(bytes, toy)
+  end
 
   defp obey(<<0x88, 0x30, 0x01>>, toy), do: say(toy, <<0x88, 0x30, 0x02, 0xFF>>)
 
@@ -78,10 +88,11 @@ defmodule Hal.ViscaToy do
 
   defp obey(_wrong, toy), do: say(toy, <<0x90, 0x60, 0x02, 0xFF>>)
 
-  defp look(toy, pan, tilt) when abs(pan) <= 880 and abs(tilt) <= 300,
-    do: start(toy, {:look, pan, tilt})
-
-  defp look(toy, _pan, _tilt), do: say(toy, <<0x90, 0x60, 0x02, 0xFF>>)
+  defp look(%{ends: {pans, tilts}} = toy, pan, tilt) do
+    if pan in pans and tilt in tilts,
+      do: start(toy, {:look, pan, tilt}),
+      else: say(toy, <<0x90, 0x60, 0x02, 0xFF>>)
+  end
 
   defp start(toy, what) do
     case Enum.find([1, 2], &(not is_map_key(toy.work, &1))) do
@@ -122,7 +133,12 @@ defmodule Hal.ViscaToy do
   defp towards(from, to, most) when to > from, do: from + most
   defp towards(from, _to, most), do: from - most
 
+  defp say(toy, <<0x90, rest::binary>>) when toy.address != 1,
+    do: say(%{toy | address: 1}, <<0x80 + 16 * toy.address, rest::binary>>, toy.address)
+
   defp say(toy, bytes), do: %{toy | out: [{toy.now_ms + toy.delay_ms, bytes} | toy.out]}
+
+  defp say(toy, bytes, address), do: %{say(toy, bytes) | address: address}
 
   defp nibbles(n) do
     <<a::4, b::4, c::4, d::4>> = <<n::16>>

@@ -13,7 +13,13 @@ defmodule Vision.Blobs do
           frame: Frame.t(),
           blobs: [Blob.t()]
         }
-  @type summary :: %{frames: non_neg_integer(), blobs: non_neg_integer(), last: seen() | nil}
+  @typedoc "`odd` are remarks about the source, one line each, such as that its pictures have changed their size."
+  @type summary :: %{
+          frames: non_neg_integer(),
+          blobs: non_neg_integer(),
+          last: seen() | nil,
+          odd: [String.t()]
+        }
 
   @patience_ms 10_000
 
@@ -47,17 +53,21 @@ defmodule Vision.Blobs do
   defp look(job) do
     # A killed port program is then an error to report, and does not end this process.
     Process.flag(:trap_exit, true)
+    job = Map.put(job, :scratch, Vision.scratch(job.colours))
+    summary = %{frames: 0, blobs: 0, last: nil, odd: []}
+    open(job, %{number: 0, start_ms: nil, summary: summary})
+  end
+
+  defp open(job, progress) do
     every_frame? = Source.kind(job.source) in [:file, :generator]
 
     case FFmpeg.init(source: job.source, every: every_frame?, unsafe: job.unsafe) do
-      {:ok, camera} ->
-        job = Map.put(job, :scratch, Vision.scratch(job.colours))
-        next(camera, job, %{number: 0, start_ms: nil, summary: %{frames: 0, blobs: 0, last: nil}})
-
-      {:error, reason} ->
-        {:error, explain(job, reason)}
+      {:ok, camera} -> next(camera, job, progress)
+      {:error, reason} -> {:error, explain(job, reason)}
     end
   end
+
+  defp odd(progress, line), do: update_in(progress.summary.odd, &Enum.uniq(&1 ++ [line]))
 
   defp next(camera, %{frames: limit}, %{summary: %{frames: limit} = summary}) do
     FFmpeg.terminate(camera)
@@ -76,10 +86,24 @@ defmodule Vision.Blobs do
 
       message ->
         case FFmpeg.handle_message(message, camera) do
-          {:ok, [], camera} -> wait(camera, job, progress)
-          {:ok, [{:frame, frame}], camera} -> take(frame, camera, job, progress)
-          {:error, :eof, _camera} -> {:ok, progress.summary}
-          {:error, reason, _camera} -> {:error, explain(job, reason)}
+          {:ok, [], camera} ->
+            wait(camera, job, progress)
+
+          {:ok, [{:frame, frame}], camera} ->
+            take(frame, camera, job, progress)
+
+          {:ok, [{:odd, line}], camera} ->
+            wait(camera, job, odd(progress, line))
+
+          {:error, :eof, _camera} ->
+            {:ok, progress.summary}
+
+          {:error, {:resized, _old, _new} = reason, camera} ->
+            FFmpeg.terminate(camera)
+            open(job, odd(progress, FFmpeg.explain(reason)))
+
+          {:error, reason, _camera} ->
+            {:error, explain(job, reason)}
         end
     after
       job.patience_ms ->
@@ -106,7 +130,12 @@ defmodule Vision.Blobs do
   end
 
   defp add(summary, seen) do
-    %{frames: summary.frames + 1, blobs: summary.blobs + length(seen.blobs), last: seen}
+    %{
+      summary
+      | frames: summary.frames + 1,
+        blobs: summary.blobs + length(seen.blobs),
+        last: seen
+    }
   end
 
   defp explain(job, reason), do: "#{job.source}: #{FFmpeg.explain(reason)}"

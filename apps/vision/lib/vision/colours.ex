@@ -16,7 +16,7 @@ defmodule Vision.Colours do
   and is consumed, so a **blank line between the sections is required**, and a comment within a
   section cuts it short. Unknown sections are skipped. Where CMVision would go on with classes
   that can never be seen, this reader reports an error instead: thresholds that are missing or
-  surplus, limits outside 0 to 255 (CMVision clamps them, which hides typing errors) or the wrong
+  surplus, a colour without a name, two of one name, limits outside 0 to 255 (CMVision clamps them, which hides typing errors) or the wrong
   way round, broken numbers, lines above 255 bytes.
 
   Options of `parse/2`, `read/2` and `new/2`:
@@ -122,6 +122,7 @@ defmodule Vision.Colours do
     names = Enum.map(classes, & &1.name)
 
     with :ok <- check_count(length(classes)),
+         :ok <- check_names(names),
          :ok <- check_area(:min_area, options[:min_area], 1),
          :ok <- check_area(:max_area, options[:max_area], 0),
          :ok <- check_distances(options[:distance], names),
@@ -170,6 +171,13 @@ defmodule Vision.Colours do
   defp check_count(0), do: {:error, "no colours: 1 to #{@most} are allowed"}
   defp check_count(n) when n <= @most, do: :ok
   defp check_count(n), do: {:error, "#{n} colours: 1 to #{@most} are allowed"}
+
+  defp check_names(names) do
+    case names -- Enum.uniq(names) do
+      [] -> :ok
+      [name | _] -> {:error, "two colours are named #{name}: each needs a name of its own"}
+    end
+  end
 
   defp check_area(_option, area, least) when area in least..@largest_area//1, do: :ok
 

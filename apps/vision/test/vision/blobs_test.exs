@@ -34,6 +34,27 @@ defmodule Vision.BlobsTest do
     assert summary.frames == 2
   end
 
+  @tag :tmp_dir
+  test "a file whose pictures change their size is searched to its end, and that is remarked", %{
+    colours: colours,
+    tmp_dir: folder
+  } do
+    parts =
+      for size <- ["32x24", "64x36"] do
+        file = Path.join(folder, "#{size}.ts")
+        source = "color=color=0xDCCD5A:size=#{size}:rate=10:duration=1"
+        arguments = ~w(-v error -f lavfi -i #{source} -c:v mpeg2video -bf 0 -f mpegts #{file})
+        {"", 0} = System.cmd("ffmpeg", arguments, stderr_to_stdout: true)
+        File.read!(file)
+      end
+
+    file = Path.join(folder, "both.ts")
+    File.write!(file, parts)
+    assert {:ok, %{frames: frames, odd: [line]}} = Blobs.run(file, colours, fn _ -> :ok end)
+    assert frames >= 15
+    assert line == "its pictures are 64 x 36 now, and are scaled to the 32 x 24 of the first"
+  end
+
   test "a report may halt the run", %{colours: colours} do
     assert Blobs.run("testsrc", colours, fn _seen -> :halt end) == :halted
   end

@@ -1,6 +1,7 @@
 defmodule Vision.ColoursTest do
   use ExUnit.Case, async: true
   doctest Vision.Colours
+  doctest Vision.Colours.Line
   alias Vision.Colours
 
   @good """
@@ -73,6 +74,53 @@ defmodule Vision.ColoursTest do
     text = String.replace(@good, ") 0.500000 10 ", ").5 +10 ")
     assert {:ok, %{classes: [%{merge: 0.5, expected: 10}, _]}} = Colours.parse(text)
     assert {:ok, _} = @good |> String.replace(" 1 1 ", " 1. 1 ") |> Colours.parse()
+  end
+
+  test "a colour without a name is none, and no number is read twice" do
+    for line <- [
+          "(255,255,0) 0.5 10",
+          "(255,255,0) 0.5 10   ",
+          "(255,255,0) 0.5 10 # the landmark",
+          "(255,255,0) 0.5 Yellow",
+          "(255,255,0) 10",
+          "(255,255,0)",
+          "(255,255,0 0.5 10 Yellow",
+          "(255,255,0) . 10 Yellow",
+          "(255,255,0) 0.5.5 10 Yellow",
+          "(2 55,255,0) 0.5 10 Yellow"
+        ] do
+      text = String.replace(@good, "(255,255,0) 0.500000 10 YellowLandmark", line)
+
+      assert error(text) ==
+               "f:3: #{inspect(line)} is not of the form (R,G,B) merge expected Name " <>
+                 "with R, G, B from 0 to 255"
+    end
+
+    for limits <- ["(170:240, 60: 90,130:14 5)", "(170:240,60:90,130:145", "(170:240,60:90,130:)"] do
+      text = String.replace(@good, "(170:240, 60: 90,130:145)", limits)
+      assert error(text) =~ "f:8: #{inspect(limits)} is not of the form (Ylo:Yhi"
+    end
+  end
+
+  test "what C reads is read: no blank before a name, remarks behind a line, exponents" do
+    for line <- [
+          "(255,255,0) 5e-1 10YellowLandmark",
+          "(255,255,0)0.5\t10 YellowLandmark # the landmark",
+          "( 255,\t255, 0 ) 0.5 10 YellowLandmark"
+        ] do
+      text = String.replace(@good, "(255,255,0) 0.500000 10 YellowLandmark", line)
+
+      assert {:ok, %{classes: [%{name: "YellowLandmark", merge: 0.5, expected: 10}, _]}} =
+               Colours.parse(text)
+    end
+  end
+
+  test "two colours of one name are refused, in a file and without one" do
+    assert error(String.replace(@good, "RedRobot", "YellowLandmark")) ==
+             "f:4: a second colour is named YellowLandmark: each needs a name of its own"
+
+    red = %{name: "Red", y: {20, 170}, u: {80, 120}, v: {150, 240}}
+    assert {:error, "two colours are named Red" <> _} = Colours.new([red, %{red | y: {1, 2}}])
   end
 
   test "limits out of range, the wrong way round or broken are named" do

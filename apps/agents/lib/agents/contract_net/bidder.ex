@@ -32,11 +32,11 @@ defmodule Agents.ContractNet.Bidder do
     bidder = expire(bidder, now_ms)
 
     cond do
-      bidder.job ->
-        {bidder, {:refuse, :busy}}
-
       not is_number(cost) ->
         {bidder, {:refuse, :infeasible}}
+
+      bidder.job ->
+        {bidder, {:refuse, :busy}}
 
       bidder.lock && bidder.lock.key == key ->
         {bidder, {:propose, bidder.lock.cost}}

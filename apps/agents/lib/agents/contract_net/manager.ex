@@ -4,26 +4,38 @@ defmodule Agents.ContractNet.Manager do
 
       announce --all have bid, or 0.5 s--> award --done--> over
          ^                                   |
-         '--- nobody bid, winner gone, ------'
-              failed, or silent for 5 s
+         |--- nobody bid, winner gone, ------|
+         |    failed, or silent for 5 s      |
+         '--- all that can are busy: pause --'
 
   The smallest `{cost, peer}` wins, so that nothing depends on who answered first. Each
   announcement is a *round* with a number, which all its letters carry. A winner that failed is
-  not asked again. If a winner that was given up reports after all, it is told to stop; if it has
+  not asked again.
+
+  Peers that are busy, or bound by a bid to another manager, are asked again after a pause, which differs
+  from one manager to the next and grows: managers that began at once would otherwise meet again each
+  time. This goes on for `:wait_ms`, and does not count among the rounds; then the outcome is `:busy`.
+
+  If a winner that was given up reports after all, it is told to stop; if it has
   done the task, the task is done, and whoever is doing it now is told to stop. A task may be done
   twice, but never not at all while somebody can do it: do not auction what must happen at most
   once.
 
-  `start/4` takes `:bid_ms` (500), `:silence_ms` (5000) and `:rounds` (3), the number of
-  announcements. Functions return the letters to send, `{peer, performative, content}`.
+  `start/5` takes `:bid_ms` (500), `:silence_ms` (5000), `:rounds` (3), the number of announcements, and
+  `:wait_ms` (5000). Functions return the letters to send, `{peer, performative, content}`.
   """
   alias Swarm.Message.WireTypes
 
-  @enforce_keys [:task, :peers, :bid_ms, :silence_ms, :rounds]
+  # The range that a pause is drawn from, ms: it doubles with each pause.
+  @pause_ms 40
+  @longest_pause_ms 320
+
+  @enforce_keys [:task, :peers, :bid_ms, :silence_ms, :rounds, :wait_ms, :until_ms, :salt]
   defstruct @enforce_keys ++
               [
                 phase: :bidding,
                 round: 0,
+                pauses: 0,
                 bids: %{},
                 winner: nil,
                 awarded: [],
@@ -34,10 +46,13 @@ defmodule Agents.ContractNet.Manager do
   @type peer :: term()
   @type letter :: {peer(), Agents.Envelope.performative(), content :: term()}
   @type outcome ::
-          {:ok, winner :: peer(), result :: term()} | {:error, :nobody | :no_bids | :given_up}
+          {:ok, winner :: peer(), result :: term()}
+          | {:error, :nobody | :no_bids | :busy | :given_up}
   @typedoc """
-  `due_ms` is when time alone changes something; `bids` holds a cost or `:refused` for each peer;
-  `awarded` lists all who ever won.
+  `due_ms` is when time alone changes something; `bids` holds a cost, `:refused` or `:busy` for each
+  peer; `awarded` lists all who ever won; `round` counts the announcements, and `pauses` those of them
+  that followed a pause; until `until_ms` busy peers are asked again; `salt` makes the pauses of one
+  manager differ from those of others.
   """
   @type t :: %__MODULE__{
           task: term(),
@@ -45,26 +60,33 @@ defmodule Agents.ContractNet.Manager do
           bid_ms: pos_integer(),
           silence_ms: pos_integer(),
           rounds: pos_integer(),
-          phase: :bidding | :working | :over,
+          wait_ms: pos_integer(),
+          until_ms: integer(),
+          salt: term(),
+          phase: :bidding | :pausing | :working | :over,
           round: non_neg_integer(),
-          bids: %{peer() => number() | :refused},
+          pauses: non_neg_integer(),
+          bids: %{peer() => number() | :refused | :busy},
           winner: peer() | nil,
           awarded: [peer()],
           due_ms: integer(),
           outcome: outcome() | nil
         }
 
-  @doc "Announces a task."
-  @spec start(term(), [peer()], keyword(), integer()) :: {t(), [letter()]}
-  def start(task, peers, options, now_ms) do
-    fields = [task: task, peers: Enum.sort(Enum.uniq(peers))]
-    announce(struct!(__MODULE__, fields ++ options!(options)), :nobody, now_ms)
+  @doc "Announces a task; `salt` is a term that no other manager has, such as its conversation."
+  @spec start(term(), [peer()], keyword(), integer(), salt :: term()) :: {t(), [letter()]}
+  def start(task, peers, options, now_ms, salt \\ nil) do
+    options = options!(options)
+    fields = [task: task, peers: Enum.sort(Enum.uniq(peers)), salt: salt]
+    fields = fields ++ [until_ms: now_ms + options[:wait_ms]] ++ options
+    announce(struct!(__MODULE__, fields), :nobody, now_ms)
   end
 
   @doc "Fills in the options of a manager; wrong ones raise `ArgumentError`."
   @spec options!(keyword()) :: keyword()
   def options!(options) do
-    options = Keyword.validate!(options, bid_ms: 500, silence_ms: 5_000, rounds: 3)
+    defaults = [bid_ms: 500, silence_ms: 5_000, rounds: 3, wait_ms: 5_000]
+    options = Keyword.validate!(options, defaults)
 
     for {option, value} <- options, not (WireTypes.ms?(value) and value > 0) do
       raise ArgumentError,
@@ -82,6 +104,10 @@ defmodule Agents.ContractNet.Manager do
 
   # The peer waits for an answer, and without one its bid would bind it for nothing.
   def hear(m, peer, :propose, {round, _cost}, _now_ms), do: {m, [{peer, :reject, round}]}
+
+  def hear(%{phase: :bidding, round: round} = m, peer, :refuse, {round, why}, now_ms)
+      when why in [:busy, :locked],
+      do: bid(m, peer, :busy, now_ms)
 
   def hear(%{phase: :bidding, round: round} = m, peer, :refuse, {round, _why}, now_ms),
     do: bid(m, peer, :refused, now_ms)
@@ -141,10 +167,13 @@ defmodule Agents.ContractNet.Manager do
 
   def tick(%{phase: :bidding} = m, now_ms) do
     case best(m) do
-      nil -> announce(m, :no_bids, now_ms)
+      nil -> if busy?(m), do: pause(m, now_ms), else: announce(m, :no_bids, now_ms)
       winner -> award(m, winner, now_ms)
     end
   end
+
+  def tick(%{phase: :pausing} = m, now_ms),
+    do: announce(%{m | pauses: m.pauses + 1}, :busy, now_ms)
 
   def tick(%{phase: :working, winner: winner} = m, now_ms) do
     cancel = {winner, :cancel, m.round}
@@ -158,14 +187,16 @@ defmodule Agents.ContractNet.Manager do
       else: {m, []}
   end
 
-  # Bidding closes before the deadline only if all have answered and somebody bids: peers that are
-  # busy now may be free in the next round.
+  # Bidding closes before the deadline only if all have answered, and somebody bids or is busy: what nobody can do now
+  # somebody may be able to do in the next round.
   defp decide(%{phase: :bidding} = m, now_ms) do
     winner = best(m)
 
     cond do
       m.peers == [] -> over(m, :nobody)
-      winner && Enum.all?(m.peers, &is_map_key(m.bids, &1)) -> award(m, winner, now_ms)
+      not Enum.all?(m.peers, &is_map_key(m.bids, &1)) -> {m, []}
+      winner != nil -> award(m, winner, now_ms)
+      busy?(m) -> pause(m, now_ms)
       true -> {m, []}
     end
   end
@@ -177,6 +208,17 @@ defmodule Agents.ContractNet.Manager do
     with {_cost, peer} <- Enum.min(bids, fn -> nil end), do: peer
   end
 
+  defp busy?(m), do: Enum.any?(m.bids, fn {_peer, cost} -> cost == :busy end)
+
+  defp pause(m, now_ms) do
+    range_ms = min(@pause_ms * 2 ** min(m.pauses, 8), @longest_pause_ms)
+    due_ms = now_ms + div(range_ms, 4) + :erlang.phash2({m.salt, m.round}, range_ms)
+
+    if due_ms > m.until_ms,
+      do: over(m, :busy),
+      else: {%{m | phase: :pausing, due_ms: due_ms}, []}
+  end
+
   defp award(m, winner, now_ms) do
     others =
       for {peer, cost} <- m.bids, is_number(cost), peer != winner, do: {peer, :reject, m.round}
@@ -186,7 +228,10 @@ defmodule Agents.ContractNet.Manager do
     {m, [{winner, :accept, m.round} | others]}
   end
 
-  defp announce(%{round: round, rounds: round} = m, why, _now_ms), do: over(m, why)
+  defp announce(%{round: round, rounds: rounds, pauses: pauses} = m, why, _now_ms)
+       when round - pauses >= rounds,
+       do: over(m, why)
+
   defp announce(%{peers: []} = m, _why, _now_ms), do: over(m, :nobody)
 
   defp announce(m, _why, now_ms) do

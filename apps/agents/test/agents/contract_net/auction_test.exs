@@ -18,6 +18,7 @@ defmodule Agents.ContractNet.AuctionTest do
 
   test "the cheapest does the task; if nobody can, an error says why" do
     peers = [bidder(:bid_a, 5), bidder(:bid_b, 2), bidder(:bid_c, :infinite)]
+    idle = [messages: [], monitored_by: elem(Process.info(self(), :monitored_by), 1)]
     assert auction({:carry, 1}, peers) == {:ok, {:bid_b, :tasks}, {:carried_by, :bid_b}}
     # All of them are free again at once.
     assert {:ok, {:bid_b, :tasks}, _} = auction({:carry, 1}, peers)
@@ -30,8 +31,6 @@ defmodule Agents.ContractNet.AuctionTest do
              {:error, :given_up},
              {:error, :no_bids}
            ]
-
-    idle = [messages: [], monitored_by: elem(Process.info(self(), :monitored_by), 1)]
 
     for {options, peers} <- [
           {[], peers},
@@ -51,7 +50,7 @@ defmodule Agents.ContractNet.AuctionTest do
     end
 
     # Nothing is left of what was started.
-    assert Process.info(self(), [:messages, :monitored_by]) == idle
+    eventually(fn -> Process.info(self(), [:messages, :monitored_by]) == idle end)
   end
 
   test "a robot does one task at a time" do
@@ -59,10 +58,31 @@ defmodule Agents.ContractNet.AuctionTest do
     test = self()
     first = Task.async(fn -> auction({:carry, {:tell, test}}, [peer]) end)
     assert_receive {:working, :bid_one, worker}
-    assert auction({:carry, 1}, [peer], bid_ms: 20, rounds: 2) == {:error, :no_bids}
+    assert auction({:carry, 1}, [peer], wait_ms: 100) == {:error, :busy}
     send(worker, :go_on)
     assert {:ok, ^peer, _} = Task.await(first)
     assert {:ok, ^peer, _} = auction({:carry, 1}, [peer])
+  end
+
+  test "twenty auctions at once are all done within 5 s, and both bidders are used" do
+    peers = [bidder(:bid_many1, 1), bidder(:bid_many2, 2)]
+    test = self()
+    begun_ms = System.monotonic_time(:millisecond)
+
+    auctions = for _ <- 1..20, do: Task.async(fn -> auction({:carry, {:tell, test}}, peers) end)
+
+    # While one works, the other is used.
+    assert_receive {:working, first, worker}
+    assert_receive {:working, second, other} when second != first
+    for pid <- [worker, other], do: send(pid, :go_on)
+
+    for _ <- 3..20 do
+      assert_receive {:working, _robot, worker}
+      send(worker, :go_on)
+    end
+
+    assert Enum.all?(Task.await_many(auctions), &match?({:ok, _, {:carried_by, _}}, &1))
+    assert System.monotonic_time(:millisecond) - begun_ms < 5_000
   end
 
   test "a winner that dies or falls silent loses the task to the next" do

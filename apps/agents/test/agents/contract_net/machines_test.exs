@@ -51,7 +51,7 @@ defmodule Agents.ContractNet.MachinesTest do
 
   test "a task without bids is announced again, then given up; without peers it is over at once" do
     {m, _} = start([:a], rounds: 2)
-    {m, []} = Manager.hear(m, :a, :refuse, {1, :busy}, 10)
+    {m, []} = Manager.hear(m, :a, :refuse, {1, :infeasible}, 10)
     {m, [{:a, :cfp, {2, :task, 500}}]} = Manager.tick(m, 500)
     {m, []} = Manager.tick(m, 1_000)
     assert m.outcome == {:error, :no_bids}
@@ -61,6 +61,56 @@ defmodule Agents.ContractNet.MachinesTest do
 
     assert_raise ArgumentError, ~r/rounds cannot be 0/, fn -> start([:a], rounds: 0) end
     assert_raise ArgumentError, fn -> start([:a], speed: 1) end
+  end
+
+  # Refuses whenever it is asked; returns the times of the announcements, and the outcome.
+  defp refuse(salt, why, options) do
+    {m, _} = Manager.start(:task, [:a], options, 0, salt)
+    refuse(m, why, 0, [0])
+  end
+
+  defp refuse(%{outcome: nil} = m, why, at_ms, times) do
+    {m, []} = Manager.hear(m, :a, :refuse, {m.round, why}, at_ms + 1)
+
+    case Manager.tick(m, m.due_ms) do
+      {m, [{:a, :cfp, _}]} -> refuse(m, why, m.due_ms - m.bid_ms, [m.due_ms - m.bid_ms | times])
+      {m, []} -> {Enum.reverse(times), m.outcome}
+    end
+  end
+
+  defp refuse(m, _why, _at_ms, times), do: {Enum.reverse(times), m.outcome}
+
+  test "busy peers are asked again for 5 s, after pauses that differ and grow; then that is the error" do
+    for why <- [:busy, :locked] do
+      {times, outcome} = refuse(:one, why, [])
+      assert outcome == {:error, :busy}
+      pauses = Enum.zip_with(tl(times), times, &(&1 - &2))
+      assert Enum.all?(pauses, &(&1 in 10..401))
+      assert hd(pauses) <= 51
+      assert List.last(times) in 4_500..5_000
+    end
+
+    firsts = for salt <- 1..20, {[0, first | _], _} = refuse(salt, :locked, []), do: first
+    assert length(Enum.uniq(firsts)) >= 10
+    assert {_, {:error, :no_bids}} = refuse(:one, :infeasible, [])
+    assert {[0, 500, 1000], _} = refuse(:one, :infeasible, [])
+    assert {times, {:error, :busy}} = refuse(:one, :busy, wait_ms: 100)
+    assert List.last(times) <= 100
+  end
+
+  test "a peer that is busy is not waited for where another bids; one that cannot does not end the wait" do
+    {m, _} = start([:a, :b])
+
+    assert {_, [{:b, :accept, 1}]} =
+             heard(m, [{:a, :refuse, {1, :busy}, 1}, {:b, :propose, {1, 9}, 2}])
+
+    {m, []} = heard(m, [{:a, :refuse, {1, :busy}, 1}, {:b, :refuse, {1, :infeasible}, 2}])
+    assert m.phase == :pausing
+    # What comes meanwhile is too late, and whoever is gone is not asked again.
+    assert {^m, [{:b, :reject, 1}]} = Manager.hear(m, :b, :propose, {1, 1}, 3)
+    {m, []} = Manager.gone(m, :b, 4)
+    assert {m, [{:a, :cfp, {2, :task, 500}}]} = Manager.tick(m, m.due_ms)
+    assert {%{outcome: {:error, :nobody}}, []} = Manager.gone(m, :a, 900)
   end
 
   test "if the winner is gone, fails, or is no longer bound, the others are asked again" do
@@ -112,6 +162,10 @@ defmodule Agents.ContractNet.MachinesTest do
     {working, {:start, :task}} = Bidder.accepted(locked, :k1, 700)
     assert {^working, :working} = Bidder.accepted(working, :k1, 99_000)
     assert {^working, {:refuse, :busy}} = Bidder.announced(working, :k2, :task, 3, 500, 99_000)
+    # Whoever cannot do it need not be asked again.
+    assert {^working, {:refuse, :infeasible}} =
+             Bidder.announced(working, :k2, :task, :infinite, 500, 99_000)
+
     assert {^working, :nothing} = Bidder.cancelled(working, :k2)
     assert {^free, :stop} = Bidder.cancelled(working, :k1)
     assert Bidder.finished(working) == free

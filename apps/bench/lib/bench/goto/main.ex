@@ -111,7 +111,7 @@ defmodule Bench.Goto.Main do
     [
       {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds, one draw each (1-50)"},
       {"maps", "NAME,NAME", &maps/1,
-       "which maps: names, FILE.yaml or FILE.png:WIDTHxHEIGHT\n(#{Enum.join(@maps, ",")})"},
+       "which maps: names, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:…\n(#{Enum.join(@maps, ",")})"},
       {"help", nil, nil, "this text"}
     ]
   end

@@ -147,7 +147,7 @@ defmodule Mix.Tasks.Bench do
       {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds (1-40)"},
       {"cases", "NAME,NAME", &Bench.choose/1, "which cases (all)"},
       {"maps", "NAME,NAME", &maps/1,
-       "which maps: names, FILE.yaml or FILE.png:WIDTHxHEIGHT\n(hall,hospital)"},
+       "which maps: names, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:…\n(hall,hospital)"},
       {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
        "painted or direct (painted)"},
       {"markdown", "FILE", &{:ok, &1}, "write the table there too"},

@@ -111,7 +111,7 @@ defmodule Console.Calibrate.ColourOptions do
   end
 
   defp name(text) do
-    if text =~ ~r/^[^\s[:cntrl:]]{1,60}$/u,
+    if text =~ ~r/\A[^\s#[:cntrl:]][^\s[:cntrl:]]{0,59}\z/u,
       do: {:ok, text},
       else: {:error, "one word of up to 60 letters"}
   end

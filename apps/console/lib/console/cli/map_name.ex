@@ -1,7 +1,6 @@
 defmodule Console.Cli.MapName do
   @moduledoc "A map on a command line: a built-in one by name, a description, or a picture with its size. Pure."
   alias Console.Cli.Parse
-  alias Hal.Options.Suggest
   alias Sim.Floorplan.Maps
 
   @doc """
@@ -20,7 +19,7 @@ defmodule Console.Cli.MapName do
   def parse(text, folder) do
     cond do
       text in Maps.names() -> {:ok, text}
-      text =~ ~r/.\.ya?ml$/i -> {:ok, from(text, folder)}
+      text =~ ~r/.\.ya?ml\z/i -> {:ok, from(text, folder)}
       true -> picture(text, folder)
     end
   end
@@ -30,9 +29,13 @@ defmodule Console.Cli.MapName do
   def names, do: Maps.names() |> Enum.chunk_every(7) |> Enum.map_join(",\n", &Enum.join(&1, ", "))
 
   defp picture(text, folder) do
-    case Regex.run(~r/^(.+\.(?:png|pgm)):(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)$/i, text) do
-      [_, file, width, height] -> sized(from(file, folder), width, height)
-      nil -> {:error, {Maps.allowed(), Suggest.hint(text, Maps.names())}}
+    # What kind of picture it is, the file itself says.
+    with [_, file, width, height] <-
+           Regex.run(~r/\A(.+):(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)\z/is, text),
+         false <- file =~ ~r/\.ya?ml\z/i do
+      sized(from(file, folder), width, height)
+    else
+      _no_picture -> {:error, Maps.fault(text)}
     end
   end
 
@@ -40,7 +43,7 @@ defmodule Console.Cli.MapName do
     with {:ok, _} <- Parse.number(width, 2, 1000), {:ok, _} <- Parse.number(height, 2, 1000) do
       {:ok, "#{file}:#{width}x#{height}"}
     else
-      _ -> {:error, "FILE.png:WIDTHxHEIGHT with sides from 2 to 1000 metres"}
+      _ -> {:error, "FILE:WIDTHxHEIGHT with sides from 2 to 1000 metres"}
     end
   end
 

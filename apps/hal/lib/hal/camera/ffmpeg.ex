@@ -36,15 +36,24 @@ defmodule Hal.Camera.FFmpeg do
   The process that calls `init/1` receives the messages and is linked to the port program. It must
   trap exits, as `Hal.Device` does, to see the killing of the port program as an error.
 
+  ffmpeg scales all pictures to the size of the first, if no `:size` is given. So a stream whose size
+  changes is an error, `{:resized, old, new}`, after which the device opens it again in its new size;
+  of a file it is told, once, that its later pictures are scaled.
+
   Errors: `:no_ffmpeg`, `:enoent` (no such file or device), `:eacces`, `:eisdir`, `:eof` (the
   source ended after at least one frame), `{:unreadable, what ffmpeg says}`, `{:exit, status}`.
   """
   @behaviour Hal.Camera
 
-  @enforce_keys [:port, :format, :every]
+  @enforce_keys [:port, :format, :every, :kind]
   defstruct @enforce_keys
 
-  @opaque t :: %__MODULE__{port: port(), format: Frame.format(), every: boolean()}
+  @opaque t :: %__MODULE__{
+            port: port(),
+            format: Frame.format(),
+            every: boolean(),
+            kind: Source.kind()
+          }
 
   @doc """
   Checks the options and adds the defaults; the error is one line that says what is wrong.
@@ -72,7 +81,8 @@ defmodule Hal.Camera.FFmpeg do
       program = Application.app_dir(:hal, "priv/newest_frame")
       settings = [:binary, :exit_status, packet: 4, args: arguments]
       port = Port.open({:spawn_executable, program}, settings)
-      {:ok, %__MODULE__{port: port, format: options[:format], every: options[:every]}}
+      kind = Source.kind(options[:source])
+      {:ok, %__MODULE__{port: port, format: options[:format], every: options[:every], kind: kind}}
     end
   end
 
@@ -87,6 +97,12 @@ defmodule Hal.Camera.FFmpeg do
   @impl Hal.Camera
   def handle_message({port, {:data, <<?F, picture::binary>>}}, %__MODULE__{port: port} = state),
     do: {:ok, [{:frame, frame(picture, state)}], state}
+
+  def handle_message(
+        {port, {:data, <<?S, w::32, h::32, width::32, height::32>>}},
+        %__MODULE__{port: port} = state
+      ),
+      do: resized({w, h}, {width, height}, state)
 
   def handle_message(
         {port, {:data, <<?E, status, count::64, words::binary>>}},
@@ -122,12 +138,29 @@ defmodule Hal.Camera.FFmpeg do
   def explain(:eof), do: "ended"
   def explain(:mute), do: "is open, and gives no picture"
   def explain({:unreadable, words}), do: "not a readable picture, video or stream (#{words})"
+
+  def explain({:resized, old, new}),
+    do: "its pictures were #{pixels(old)} and are #{pixels(new)} now; it is opened again"
+
   def explain({:exit, reason}), do: "the reader ended (#{inspect(reason)})"
   def explain(other), do: inspect(other, limit: 5, printable_limit: 40)
 
   @doc "The same, with the name of the source in front."
   @impl Hal.Camera
   def explain(reason, options), do: "#{options[:source]}: #{explain(reason)}"
+
+  defp resized(old, new, %{kind: kind} = state) when kind in [:stream, :device],
+    do: {:error, {:resized, old, new}, state}
+
+  # It would begin from its beginning.
+  defp resized(old, new, state) do
+    line =
+      "its pictures are #{pixels(new)} now, and are scaled to the #{pixels(old)} of the first"
+
+    {:ok, [{:odd, line}], state}
+  end
+
+  defp pixels({width, height}), do: "#{width} x #{height}"
 
   defp frame(picture, state) do
     <<_chroma, width::32, height::32, rate::32, per::32, number::64, age_us::64, bytes::binary>> =

@@ -124,12 +124,15 @@ defmodule Hal.Camera.Source do
   """
   @spec arguments(String.t(), keyword()) :: [String.t()]
   def arguments(source, options) do
-    ~w(-nostdin -hide_banner -loglevel error) ++
+    ["-nostdin", "-hide_banner", "-loglevel", level(options)] ++
       pace(kind(source), options) ++
       input(kind(source), source, options) ++
       ~w(-map 0:v:0 -vf) ++
-      [filters(options)] ++ ~w(-fps_mode passthrough -f yuv4mpegpipe pipe:1)
+      [filters(options)] ++ ~w(-nostats -fps_mode passthrough -f yuv4mpegpipe pipe:1)
   end
+
+  # The port program reads the level of each line, and the sizes that showinfo tells.
+  defp level(options), do: if(options[:size], do: "level+error", else: "level+info")
 
   # A file takes the place of a camera, so it runs in real time unless every frame is wanted.
   defp pace(kind, options) when kind in [:file, :generator],
@@ -184,7 +187,7 @@ defmodule Hal.Camera.Source do
     size =
       case options[:size] do
         {width, height} -> "scale=#{width}:#{height}"
-        nil -> crop(options[:format])
+        nil -> "showinfo=checksum=0," <> crop(options[:format])
       end
 
     "#{size},scale=out_color_matrix=bt601:out_range=full,format=#{pixel_format(options[:format])}"

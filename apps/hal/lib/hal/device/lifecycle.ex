@@ -5,7 +5,7 @@ defmodule Hal.Device.Lifecycle do
   """
   alias Hal.Twist
   alias Hal.Device.Arming
-  alias Hal.Device.{Liveness, Publisher, State, Watchdog}
+  alias Hal.Device.{Liveness, Obedience, Publisher, State, Watchdog}
 
   @retry_ms 100
   @longest_retry_ms 5_000
@@ -18,7 +18,8 @@ defmodule Hal.Device.Lifecycle do
     case s.driver.init(s.options) do
       {:ok, inner} ->
         signs = Liveness.new(s.kind, s.sonar?, State.now(s))
-        %{s | inner: {:open, inner}, signs: signs} |> judge() |> listen()
+        s = %{s | inner: {:open, inner}, signs: signs, obedience: Obedience.opened(s.obedience)}
+        s |> judge() |> listen()
 
       {:error, reason} ->
         s |> Publisher.health({:offline, reason}) |> Publisher.arming() |> retry()
@@ -46,6 +47,28 @@ defmodule Hal.Device.Lifecycle do
   def done(s, {:error, reason, inner}), do: fail(s, reason, inner)
 
   @doc """
+  Takes what readings say of the device itself: what it refuses or has done, and what is odd about
+  it; returns the others. Refusals and oddities are published.
+  """
+  @spec remarks(State.t(), [term()]) :: {[term()], State.t()}
+  def remarks(%{inner: {:open, inner}} = s, readings) do
+    {odd, readings} = Enum.split_with(readings, &match?({:odd, line} when is_binary(line), &1))
+    s = Enum.reduce(odd, s, fn {:odd, line}, s -> Publisher.odd(s, line) end)
+
+    {readings, told, obedience} =
+      Obedience.heard(s.obedience, readings, reach(s, inner), State.now(s))
+
+    s = %{s | obedience: obedience}
+    for request <- told, do: Publisher.refusal(s, request, obedience.refusals[request])
+    {readings, s}
+  end
+
+  defp reach(%{kind: :ptz, driver: driver}, inner),
+    do: if(function_exported?(driver, :reach, 1), do: driver.reach(inner))
+
+  defp reach(_s, _inner), do: nil
+
+  @doc """
   Takes readings: updates the signs of life and the measured speed, and resets the wait after the
   next failure to the shortest one.
   """
@@ -63,7 +86,7 @@ defmodule Hal.Device.Lifecycle do
   @spec judge(State.t()) :: State.t()
   def judge(%{inner: {:open, inner}} = s) do
     case {Liveness.judge(s.signs, State.now(s)), s.kind} do
-      {:online, _kind} -> s |> Publisher.health(:online) |> ready()
+      {:online, _kind} -> s |> Publisher.health(obeys(s)) |> ready()
       {:waiting, _kind} -> ready(s)
       {{:offline, :silent}, :drive} -> s |> ready() |> silent()
       {{:offline, reason}, _kind} -> fail(s, reason, inner)
@@ -71,6 +94,13 @@ defmodule Hal.Device.Lifecycle do
   end
 
   def judge(s), do: s
+
+  defp obeys(s) do
+    case Obedience.judge(s.obedience, s.kind) do
+      :ok -> :online
+      {:error, fault} -> {:offline, fault}
+    end
+  end
 
   # The stop may have failed, and closed the driver.
   defp silent(%{inner: {:open, _}} = s), do: Publisher.health(s, {:offline, :silent})
@@ -141,8 +171,12 @@ defmodule Hal.Device.Lifecycle do
     s = Watchdog.guard(s, twist)
 
     case s.driver.drive(twist, inner) do
-      {:ok, inner} -> %{s | inner: {:open, inner}, arming: Arming.told(s.arming, twist)}
-      {:error, reason, inner} -> fail(s, reason, inner)
+      {:ok, inner} ->
+        obedience = Obedience.told(s.obedience, twist)
+        %{s | inner: {:open, inner}, arming: Arming.told(s.arming, twist), obedience: obedience}
+
+      {:error, reason, inner} ->
+        fail(s, reason, inner)
     end
   end
 end

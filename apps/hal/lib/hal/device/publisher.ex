@@ -5,7 +5,7 @@ defmodule Hal.Device.Publisher do
   """
   alias Hal.Event
   alias Hal.Device.Arming
-  alias Hal.Device.{State, Words}
+  alias Hal.Device.{Obedience, State, Words}
 
   @doc "Passes a reading to all sinks."
   @spec hand_on(State.t(), tuple()) :: :ok
@@ -68,6 +68,23 @@ defmodule Hal.Device.Publisher do
   def refused(s, %{refused: refused}) do
     measured = %{at_ms: State.now(s), refused: refused}
     Event.execute([:hal, :device, :refused], measured, about(s))
+  end
+
+  @doc "Emits an event: the device refused a request."
+  @spec refusal(State.t(), Obedience.request(), Obedience.refusal()) :: :ok
+  def refusal(s, request, %{count: count, line: line}) do
+    measured = %{at_ms: State.now(s), count: count}
+    about = Map.merge(about(s), %{request: request, line: line})
+    Event.execute([:hal, :device, :refusal], measured, about)
+  end
+
+  @doc "Emits an event, once for each line: something about the device is odd."
+  @spec odd(State.t(), line :: String.t()) :: State.t()
+  def odd(%{odd: line} = s, line), do: s
+
+  def odd(s, line) do
+    event(s, :odd, State.now(s), %{line: line})
+    %{s | odd: line}
   end
 
   @doc "Emits an event: the watchdog stops the wheels."

@@ -93,13 +93,9 @@ defmodule Hal.Device.Server do
 
   def handle_info(message, %{inner: {:open, inner}} = s) do
     case s.driver.handle_message(message, inner) do
-      {:ok, [], inner} ->
-        {:noreply, Lifecycle.judge(%{s | inner: {:open, inner}})}
-
       {:ok, readings, inner} ->
-        for reading <- readings, do: Publisher.hand_on(s, reading)
-        s = Lifecycle.measured(%{s | inner: {:open, inner}}, readings)
-        {:noreply, s |> Lifecycle.judge() |> Wishes.ask()}
+        {readings, s} = Lifecycle.remarks(%{s | inner: {:open, inner}}, readings)
+        {:noreply, take(s, readings)}
 
       {:error, reason, inner} ->
         {:noreply, Lifecycle.fail(s, reason, inner)}
@@ -108,6 +104,13 @@ defmodule Hal.Device.Server do
 
   # For a driver that is closed by now.
   def handle_info(_late, s), do: {:noreply, s}
+
+  defp take(s, []), do: Lifecycle.judge(s)
+
+  defp take(s, readings) do
+    for reading <- readings, do: Publisher.hand_on(s, reading)
+    s |> Lifecycle.measured(readings) |> Lifecycle.judge() |> Wishes.ask()
+  end
 
   # Whoever asked has been told by then that nothing was done, and may stand in front of the
   # robot.

@@ -10,10 +10,10 @@ defmodule Hal.Device.State do
   | `Hal.Device.Wishes` | requests to a camera or a pan-tilt unit |
   | `Hal.Device.Watchdog` | stops wheels that receive no further speed |
   | `Hal.Device.Publisher` | reports changes to sinks and events |
-  | `Hal.Device.Liveness`, `Hal.Device.Arming` | pure: whether it shows signs of life; whether wheels may turn |
+  | `Hal.Device.Liveness`, `Hal.Device.Obedience`, `Hal.Device.Arming` | pure: whether it shows signs of life; whether it does what it is told; whether wheels may turn |
   """
   alias Hal.Device.Arming
-  alias Hal.Device.{Liveness, Options}
+  alias Hal.Device.{Liveness, Obedience, Options}
 
   @enforce_keys [:kind, :device, :driver, :options, :sinks, :clock]
   defstruct @enforce_keys ++
@@ -30,6 +30,8 @@ defmodule Hal.Device.State do
                 about: %{},
                 sonar?: false,
                 signs: nil,
+                obedience: Obedience.new(),
+                odd: nil,
                 listening: nil
               ]
 
@@ -57,6 +59,8 @@ defmodule Hal.Device.State do
           about: map(),
           sonar?: boolean(),
           signs: Liveness.t() | nil,
+          obedience: Obedience.t(),
+          odd: String.t() | nil,
           listening: reference() | nil
         }
 

@@ -3,7 +3,7 @@ defmodule Hal.Device.Wishes do
   Requests to a device other than speeds: the direction and zoom of a pan-tilt unit, and a
   camera's next picture. The last direction and zoom are kept, and repeated to a reopened driver.
   """
-  alias Hal.Device.{Lifecycle, State}
+  alias Hal.Device.{Lifecycle, Obedience, State}
 
   @doc "Keeps a request, and passes it to the driver if that is open and has this callback."
   @spec wish(State.t(), callback :: atom(), arguments :: list()) :: State.t()
@@ -25,9 +25,14 @@ defmodule Hal.Device.Wishes do
     arguments = s.wishes[callback] ++ [inner]
 
     if function_exported?(s.driver, callback, length(arguments)),
-      do: Lifecycle.done(s, apply(s.driver, callback, arguments)),
+      do: s |> told(callback) |> Lifecycle.done(apply(s.driver, callback, arguments)),
       else: s
   end
 
   defp carry_out(s, _callback), do: s
+
+  defp told(%{wishes: %{look: [pan, tilt]}} = s, :look),
+    do: %{s | obedience: Obedience.told(s.obedience, {pan, tilt})}
+
+  defp told(s, _callback), do: s
 end

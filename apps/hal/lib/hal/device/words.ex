@@ -16,9 +16,22 @@ defmodule Hal.Device.Words do
       iex> long = Hal.Device.Words.offline({Hal.RFlex.Driver, port: String.duplicate("/dir", 99)}, :enoent)
       iex> {String.length(long), String.ends_with?(long, "…" <> String.slice(long, -119, 119)), long =~ "no such device"}
       {239, true, true}
+      iex> Hal.Device.Words.offline({Some.Driver, []}, {:refuses, :look, "it does not know the command"})
+      "it refuses every look: it does not know the command"
   """
   @spec offline({driver :: module() | nil, options :: keyword()}, reason :: term()) :: String.t()
   def offline(_driver, :fell), do: "its process crashed, and is started again"
+
+  def offline(_driver, {:refuses, request, line}) when is_binary(line),
+    do: String.slice("it refuses every #{request}: #{line}", 0, @longest)
+
+  def offline(_driver, {:stands, :head}),
+    do: "it stood still when it was told to look elsewhere"
+
+  def offline(_driver, {:stands, :wheels}) do
+    "its wheels stood still when they were told to turn (is an emergency button pressed, a brake set, or the way " <>
+      "blocked?)"
+  end
 
   def offline({driver, options}, reason) do
     if driver != nil and Code.ensure_loaded?(driver) and function_exported?(driver, :explain, 2),

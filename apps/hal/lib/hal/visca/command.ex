@@ -1,7 +1,8 @@
 defmodule Hal.Visca.Command do
   @moduledoc """
   Commands to a VISCA camera, in the camera's own units, and their bytes (fact sheet, sections 2
-  and 4). Pure; `Hal.Visca.Units` converts radians to these numbers.
+  and 4). Pure; `Hal.Visca.Units` converts radians to these numbers. The ranges are the widest of
+  the models (`Hal.Visca.Model`).
 
   | command | meaning |
   |---|---|
@@ -14,7 +15,7 @@ defmodule Hal.Visca.Command do
   | `{:drive, {:left, n}, {:up, n}}` | until the next command; also `:right`, `:down`, `{:stop, 0}` |
   | `:home`, `:reset` | to 0, 0; find the mechanical stops again, then 0, 0 |
   | `{:zoom, :tele}` | also `:wide`, `:stop`; `{:zoom, :tele, 2..7}` with a speed |
-  | `{:zoom_to, 0..1023}` | |
+  | `{:zoom_to, 0..0x4000}` | |
   | `{:focus, :auto}`, `:manual` | |
   | `{:limit, :up_right, pan, tilt}` | also `:down_left`; `{:limit_clear, corner}` |
   | `{:screen, :on}` | the camera's own text in the picture; `:off`, `:toggle` |
@@ -45,7 +46,7 @@ defmodule Hal.Visca.Command do
           | :reset
           | {:zoom, :tele | :wide | :stop}
           | {:zoom, :tele | :wide, 2..7}
-          | {:zoom_to, 0..1023}
+          | {:zoom_to, 0..0x4000}
           | {:focus, :auto | :manual}
           | {:limit, corner(), integer(), integer()}
           | {:limit_clear, corner()}
@@ -53,8 +54,8 @@ defmodule Hal.Visca.Command do
           | {:memory, :reset | :set | :recall, 0..5}
           | {:ask, inquiry()}
 
-  defguardp pan?(n) when n in -880..880
-  defguardp tilt?(n) when n in -300..300
+  defguardp pan?(n) when n in -2267..2267
+  defguardp tilt?(n) when n in -400..1200
 
   @doc """
   The bytes of a command to camera 1 to 7. An unknown command raises `ArgumentError`.
@@ -87,7 +88,7 @@ defmodule Hal.Visca.Command do
   defp payload({:zoom, :wide}), do: <<0x01, 0x04, 0x07, 0x03>>
   defp payload({:zoom, :tele, p}) when p in 2..7, do: <<0x01, 0x04, 0x07, 0x20 + p>>
   defp payload({:zoom, :wide, p}) when p in 2..7, do: <<0x01, 0x04, 0x07, 0x30 + p>>
-  defp payload({:zoom_to, z}) when z in 0..1023, do: <<0x01, 0x04, 0x47, nibbles(z)::binary>>
+  defp payload({:zoom_to, z}) when z in 0..0x4000, do: <<0x01, 0x04, 0x47, nibbles(z)::binary>>
   defp payload({:focus, :auto}), do: <<0x01, 0x04, 0x38, 0x02>>
   defp payload({:focus, :manual}), do: <<0x01, 0x04, 0x38, 0x03>>
   defp payload(:home), do: <<0x01, 0x06, 0x04>>
@@ -99,7 +100,7 @@ defmodule Hal.Visca.Command do
 
   # From one end to the other is twice the range.
   defp payload({:step, pan, tilt, v, w})
-       when pan in -1760..1760 and tilt in -600..600 and v in 1..24 and w in 1..20,
+       when pan in -4534..4534 and tilt in -1600..1600 and v in 1..24 and w in 1..20,
        do: <<0x01, 0x06, 0x03, v, w, nibbles(pan)::binary, nibbles(tilt)::binary>>
 
   defp payload({:drive, {pan, v}, {tilt, w}} = command) do

@@ -66,7 +66,7 @@ defmodule Hal.Visca.CommandClass do
 
       at ->
         {:step, before, before_tilt, _, _} = Enum.at(waiting, at)
-        sum = {:step, limit(before + pan, 1760), limit(before_tilt + tilt, 600), v, w}
+        sum = {:step, limit(before + pan, 4534), limit(before_tilt + tilt, 1600), v, w}
         List.replace_at(waiting, at, sum)
     end
   end

@@ -13,14 +13,15 @@ defmodule Hal.Visca.Decoder do
   @longest 15
 
   @enforce_keys [:camera]
-  defstruct [:camera, rest: <<>>, garbage: 0, others: 0]
+  defstruct [:camera, rest: <<>>, garbage: 0, others: 0, other: nil]
 
-  @typedoc "`garbage` counts bytes, `others` messages."
+  @typedoc "`garbage` counts bytes, `others` messages; `other` is the camera that sent the last of these."
   @type t :: %__MODULE__{
           camera: 1..7,
           rest: binary(),
           garbage: non_neg_integer(),
-          others: non_neg_integer()
+          others: non_neg_integer(),
+          other: 1..7 | nil
         }
 
   @doc "A decoder of this camera's replies, and of broadcasts."
@@ -52,8 +53,8 @@ defmodule Hal.Visca.Decoder do
       {camera, reply, skipped} when camera in [0, decoder.camera] ->
         {[reply | replies], count(decoder, skipped)}
 
-      {_camera, _reply, skipped} ->
-        {replies, count(%{decoder | others: decoder.others + 1}, skipped)}
+      {camera, _reply, skipped} ->
+        {replies, count(%{decoder | others: decoder.others + 1, other: camera}, skipped)}
 
       nil ->
         {replies, count(decoder, byte_size(bytes) + 1)}

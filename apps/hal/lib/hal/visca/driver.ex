@@ -1,7 +1,7 @@
 defmodule Hal.Visca.Driver do
   @moduledoc """
-  The driver of the pan-tilt-zoom unit of a Sony EVI-D30 or D31 on a serial line, run by
-  `Hal.Device`.
+  The driver of the pan-tilt-zoom unit of a Sony EVI-D30, D31, D70 or D100 (`Hal.Visca.Model`) on a
+  serial line, run by `Hal.Device`.
 
       {Hal.Device, kind: :ptz, driver: {Hal.Visca.Driver, port: "/dev/ttyS2"}, sinks: [...]}
 
@@ -26,17 +26,17 @@ defmodule Hal.Visca.Driver do
 
   ## Readings
 
-  `{:ptz, %{pan:, tilt:, field_of_view:, age_ms:}}` as in `Hal.Ptz`, one for each position.
+  `{:ptz, %{pan:, tilt:, field_of_view:, age_ms:}}` as in `Hal.Ptz`, one for each position; and what
+  the camera refuses or has done (`:look`, `:zoom`, `:switch_on`).
 
   ## Errors
 
-  Those of `Hal.Serial`, at the opening and later, and those of `Hal.Visca.Session`: `:no_answer`,
-  `{:cameras, n}`, `{:model, code}`. After each of them the device closes the line and opens it
-  again.
+  Those of `Hal.Serial`, at the opening and later, and those of `Hal.Visca.Session`. After each of
+  them the device closes the line and opens it again.
   """
   @behaviour Hal.Ptz
   alias Hal.Serial
-  alias Hal.Visca.{Options, Session}
+  alias Hal.Visca.{Model, Options, Session}
 
   @enforce_keys [:line, :head]
   defstruct @enforce_keys ++ [timer: nil, wake: nil]
@@ -66,18 +66,65 @@ defmodule Hal.Visca.Driver do
     end
   end
 
-  @doc "Describes an error in words."
+  @doc """
+  Describes an error in words.
+
+      iex> Hal.Visca.Driver.explain({:model, 0x0411}, port: "/dev/ttyS2")
+      "/dev/ttyS2: a camera FCB-EX780 (0x0411) answers: EVI-D30, EVI-D70 or EVI-D100 is allowed; model: in the robot file overrides this"
+  """
   @impl Hal.Ptz
-  def explain(reason, options) when reason in [:no_answer, :mute],
-    do: "#{options[:port]}: no camera answers"
+  def explain(reason, options), do: "#{options[:port]}: #{words(reason, options)}"
 
-  def explain({:cameras, n}, options),
-    do: "#{options[:port]}: camera #{options[:camera] || 1} is not there; its cable has #{n}"
+  defp words(:no_answer, _options), do: "no camera answers"
+  defp words(:mute, _options), do: "the camera does not say where it looks"
 
-  def explain({:model, model}, options),
-    do: "#{options[:port]}: a camera of an unknown model (#{inspect(model)}) answers"
+  defp words({:cameras, n}, options),
+    do: "camera #{number(options)} is not there; its cable has #{n}"
 
-  def explain(reason, options), do: Serial.explain(reason, "#{options[:port]}")
+  defp words({:address, n}, options),
+    do: "camera #{n} answers, and camera #{number(options)} does not (camera: in the robot file)"
+
+  defp words({:model, nil}, _options),
+    do: "the camera refuses to say its model; model: in the robot file names it"
+
+  defp words({:model, code}, _options) do
+    "a camera #{Model.words(code)} answers: #{allowed()} is allowed; model: in the robot file overrides this"
+  end
+
+  defp words({:zoom, zoom, key}, _options) do
+    model = Model.get(key)
+
+    "the camera says that its zoom is #{Model.hex(zoom)}, and that of an #{model.name} ends at " <>
+      "#{Model.hex(model.zoom)} (is it another model, or its digital zoom on?)"
+  end
+
+  defp words({:position, pan, tilt, key}, _options) do
+    "the camera says that it is at pan #{pan}, tilt #{tilt}, where an #{Model.get(key).name} cannot be (is it " <>
+      "another model?)"
+  end
+
+  defp words({:opening, step, refusal}, _options),
+    do: "the camera answers, but #{stuck(step)}#{if refusal, do: " (#{refusal})"}"
+
+  defp words(reason, options) do
+    port = "#{options[:port]}"
+    reason |> Serial.explain(port) |> String.replace_prefix(port <> ": ", "")
+  end
+
+  defp stuck(:switch_on), do: "does not switch on"
+  defp stuck(:power), do: "does not say whether it is on"
+  defp stuck(:version), do: "does not say its model"
+  defp stuck(_look_round), do: "does not say where it looks"
+
+  defp number(options), do: options[:camera] || 1
+
+  defp allowed do
+    {names, [last]} = Model.keys() |> Enum.map(&Model.get(&1).name) |> Enum.split(-1)
+    Enum.join(names, ", ") <> " or " <> last
+  end
+
+  @impl Hal.Ptz
+  def reach(state), do: Session.reach(state.head)
 
   @impl Hal.Ptz
   def look(pan, tilt, state), do: outward(Session.look(state.head, pan, tilt, now()), state)
@@ -108,7 +155,10 @@ defmodule Hal.Visca.Driver do
 
   defp open(line, options) do
     {effects, head} =
-      Session.open(Keyword.take(options, [:camera, :lens, :poll_ms, :field_of_view]), now())
+      Session.open(
+        Keyword.take(options, [:camera, :model, :lens, :poll_ms, :field_of_view]),
+        now()
+      )
 
     case carry_out({effects, head}, %__MODULE__{line: line, head: head}) do
       {:ok, [], state} ->

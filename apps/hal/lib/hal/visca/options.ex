@@ -8,23 +8,21 @@ defmodule Hal.Visca.Options do
   | `:speed` | baud, 1 to 20,000,000 | `9600`, that of the camera |
   | `:serial` | `:module` and `:keep_alive_ms` of `Hal.Serial.open/1` | `[]` |
   | `:camera` | 1 to 7: its place on the cable | `1` |
-  | `:lens` | `{tele, wide}`: horizontal fields of view in radians, above 0, ascending, below pi | 4.4 and 48.8 degrees |
+  | `:model` | `:d30`, `:d70` or `:d100`: taken for this model, whatever it says that it is, with a warning if it says another | `nil`: what it says |
+  | `:lens` | `{tele, wide}`: horizontal fields of view in radians, above 0, ascending, below pi | that of the model: 4.4 and 48.8 degrees for a D30 |
   | `:field_of_view` | radians to zoom to at the opening, above 0 and below pi; `nil`: leave it unchanged | `nil` |
   | `:poll_ms` | 50 to 400: interval between inquiries of the position | `100` |
   """
   alias Hal.{Options, Serial}
 
-  @degree :math.pi() / 180
   @lens "{tele, wide}, fields of view in radians, ascending, between 0 and pi,"
   @table [
     port: [:path, required: true],
     speed: [{:integer, 1, 20_000_000, "baud"}, default: 9_600],
     serial: [{:keys, Keyword.take(Serial.table(), [:module, :keep_alive_ms])}, default: []],
     camera: [{:integer, 1, 7}, default: 1],
-    lens: [
-      {:check, &__MODULE__.lens?/1, @lens},
-      default: {4.4 * @degree, 48.8 * @degree}
-    ],
+    model: [{:one_of, [:d30, :d70, :d100]}, default: nil],
+    lens: [{:check, &__MODULE__.lens?/1, @lens}, default: nil],
     field_of_view: [
       {:check, &__MODULE__.angle?/1, "a number of radians between 0 and pi"},
       default: nil

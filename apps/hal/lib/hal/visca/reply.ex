@@ -71,13 +71,32 @@ defmodule Hal.Visca.Reply do
   defp reason(code), do: {:code, code}
 
   @doc """
+  Why a command came to nothing, in words, for the reasons of `Hal.Visca.Queue` too.
+
+      iex> Hal.Visca.Reply.refusal(:syntax)
+      "it does not know the command (syntax error)"
+      iex> Hal.Visca.Reply.refusal({:code, 0x42})
+      "error 42"
+  """
+  @spec refusal(reason() | :no_answer | :no_completion | :malformed) :: String.t()
+  def refusal(:syntax), do: "it does not know the command (syntax error)"
+  def refusal(:length), do: "it finds the message too long"
+  def refusal(:full), do: "it is busy"
+  def refusal(:not_executable), do: "it cannot do that now (not executable)"
+  def refusal(:no_answer), do: "it does not answer to that"
+  def refusal(:no_completion), do: "it accepted the command, and never said that it was done"
+  def refusal(:malformed), do: "its answer cannot be read"
+  def refusal({:code, code}), do: "error #{Integer.to_string(code, 16)}"
+  def refusal(reason), do: "#{reason}"
+
+  @doc """
   Reads the bytes of a result as the answer to an inquiry; `:error` if they cannot be one.
 
   | inquiry | value |
   |---|---|
-  | `:version` | `%{vendor:, model:, rom:, sockets:}`; the D30 and D31 are model 0x0402 |
+  | `:version` | `%{vendor:, model:, rom:, sockets:}`; the models: `Hal.Visca.Model` |
   | `:power` | `true` or `false` |
-  | `:zoom` | as the camera reports it, which should be 0 to 1023 |
+  | `:zoom` | as the camera reports it, for a D30 0 to 1023 |
   | `:position` | `{pan, tilt}`, signed |
   | `:max_speed` | `{pan, tilt}` |
   | `:status` | 16 bits |

@@ -1,6 +1,7 @@
 defmodule Hal.Visca.Units do
   @moduledoc """
-  Converts between radians and the numbers of a Sony EVI-D30 (fact sheet, section 5). Pure.
+  Converts between radians and the numbers of a camera (`Hal.Visca.Model`; fact sheet, section 5).
+  Pure. The numbers here are those of an EVI-D30, the default:
 
   | what | here | in the camera |
   |---|---|---|
@@ -15,10 +16,9 @@ defmodule Hal.Visca.Units do
   it is not (the sheet says so, and has no better source).
   """
 
+  alias Hal.Visca.Model
+
   @degree :math.pi() / 180
-  @pan_max 880
-  @tilt_max 300
-  @zoom_max 1023
 
   @typedoc "Fields of view, tele and wide, in radians."
   @type lens :: {tele :: float(), wide :: float()}
@@ -31,8 +31,9 @@ defmodule Hal.Visca.Units do
       iex> Hal.Visca.Units.pan(-9.0)
       880
   """
-  @spec pan(float()) :: -880..880
-  def pan(radians) when is_number(radians), do: steps(-radians, 8.8, @pan_max)
+  @spec pan(float(), Model.t()) :: integer()
+  def pan(radians, model \\ Model.get(:d30)) when is_number(radians),
+    do: steps(-radians, model.pan_degree, model.pan)
 
   @doc """
   The camera's tilt for an angle in radians.
@@ -40,8 +41,9 @@ defmodule Hal.Visca.Units do
       iex> Hal.Visca.Units.tilt(-:math.pi() / 18)
       -120
   """
-  @spec tilt(float()) :: -300..300
-  def tilt(radians) when is_number(radians), do: steps(radians, 12, @tilt_max)
+  @spec tilt(float(), Model.t()) :: integer()
+  def tilt(radians, model \\ Model.get(:d30)) when is_number(radians),
+    do: steps(radians, model.tilt_degree, model.tilt)
 
   @doc """
   A pan and a tilt of the camera in radians.
@@ -50,10 +52,10 @@ defmodule Hal.Visca.Units do
       iex> {Float.round(pan, 4), Float.round(tilt, 4)}
       {0.5236, 0.1745}
   """
-  @spec angles(pan :: integer(), tilt :: integer()) :: {float(), float()}
+  @spec angles(pan :: integer(), tilt :: integer(), Model.t()) :: {float(), float()}
   # Subtracted from zero, not negated: a zero with a sign is of no use.
-  def angles(pan, tilt) when is_integer(pan) and is_integer(tilt),
-    do: {(0 - pan) / 8.8 * @degree, tilt / 12 * @degree}
+  def angles(pan, tilt, model \\ Model.get(:d30)) when is_integer(pan) and is_integer(tilt),
+    do: {(0 - pan) / model.pan_degree * @degree, tilt / model.tilt_degree * @degree}
 
   @doc """
   Whether the camera can have this position, with a degree to spare.
@@ -63,8 +65,14 @@ defmodule Hal.Visca.Units do
       iex> Hal.Visca.Units.position?(0, 4000)
       false
   """
-  @spec position?(integer(), integer()) :: boolean()
-  def position?(pan, tilt), do: abs(pan) <= @pan_max + 9 and abs(tilt) <= @tilt_max + 12
+  @spec position?(integer(), integer(), Model.t()) :: boolean()
+  def position?(pan, tilt, model \\ Model.get(:d30)) do
+    within?(pan, model.pan, ceil(model.pan_degree)) and
+      within?(tilt, model.tilt, ceil(model.tilt_degree))
+  end
+
+  defp within?(units, {least, greatest}, spare),
+    do: units >= least - spare and units <= greatest + spare
 
   @doc """
   The camera's pan speed nearest to this rate in rad/s, at least 1 (the slowest).
@@ -106,10 +114,11 @@ defmodule Hal.Visca.Units do
       iex> Hal.Visca.Units.zoom(9.0, {3 * degree, 30 * degree})
       0
   """
-  @spec zoom(float(), lens()) :: 0..1023
-  def zoom(angle, {tele, wide}) when is_number(angle) and 0 < tele and tele < wide do
+  @spec zoom(float(), lens(), Model.t()) :: 0..0x4000
+  def zoom(angle, {tele, wide}, model \\ Model.get(:d30))
+      when is_number(angle) and 0 < tele and tele < wide do
     angle = angle |> max(tele) |> min(wide)
-    min(round(1024 * (wide - angle) / (wide - tele)), @zoom_max)
+    min(round(model.zoom_span * (wide - angle) / (wide - tele)), model.zoom)
   end
 
   @doc """
@@ -120,16 +129,17 @@ defmodule Hal.Visca.Units do
       iex> Float.round(angle / degree, 2)
       15.02
   """
-  @spec field_of_view(integer(), lens()) :: float()
-  def field_of_view(zoom, {tele, wide}) when is_integer(zoom) and 0 < tele and tele < wide do
-    zoom = zoom |> max(0) |> min(@zoom_max)
-    wide - zoom / 1024 * (wide - tele)
+  @spec field_of_view(integer(), lens(), Model.t()) :: float()
+  def field_of_view(zoom, {tele, wide}, model \\ Model.get(:d30))
+      when is_integer(zoom) and 0 < tele and tele < wide do
+    zoom = zoom |> max(0) |> min(model.zoom)
+    wide - zoom / model.zoom_span * (wide - tele)
   end
 
   # Limited before the conversion to an integer: a huge float would make a huge integer.
-  defp steps(radians, per_degree, most) do
-    limit = most / per_degree * @degree
-    round((radians |> max(-limit) |> min(limit)) / @degree * per_degree)
+  defp steps(radians, per_degree, {least, greatest}) do
+    unit = @degree / per_degree
+    round((radians |> max(least * unit) |> min(greatest * unit)) / unit)
   end
 
   defp speed(rate, step, most) do

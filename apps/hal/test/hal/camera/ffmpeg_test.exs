@@ -135,8 +135,96 @@ defmodule Hal.Camera.FFmpegTest do
     assert take(open(source: "testsrc", ffmpeg: "/bin/echo")) |> elem(0) == :unreadable
   end
 
+  # Two seconds of pictures of this size, as a broadcaster sends them.
+  defp recording(folder, {width, height}) do
+    file = Path.join(folder, "#{width}.ts")
+    source = "testsrc=size=#{width}x#{height}:rate=10:duration=2"
+    arguments = ~w(-v error -y -f lavfi -i #{source} -c:v mpeg2video -bf 0 -f mpegts #{file})
+    {"", 0} = System.cmd("ffmpeg", arguments, stderr_to_stdout: true)
+    File.read!(file)
+  end
+
+  # Whoever connects first gets the first part, several times, and the second when this process is told to; whoever comes
+  # later gets the second.
+  defp broadcast(first, second) do
+    {:ok, listener} = :gen_tcp.listen(0, [:binary, ip: {127, 0, 0, 1}, active: false])
+    {:ok, port} = :inet.port(listener)
+
+    sender =
+      start_supervised!(
+        {Task,
+         fn ->
+           {:ok, socket} = :gen_tcp.accept(listener)
+           for _ <- 1..10, do: :gen_tcp.send(socket, first)
+           receive do: (:go_on -> :ok)
+           for _ <- 1..10, do: :gen_tcp.send(socket, second)
+           {:ok, socket} = :gen_tcp.accept(listener)
+           for _ <- 1..1_000, do: :gen_tcp.send(socket, second)
+         end}
+      )
+
+    {sender, "tcp://127.0.0.1:#{port}"}
+  end
+
+  @tag :tmp_dir
+  test "a stream that changes its size is followed, and told", %{tmp_dir: folder} do
+    {sender, source} = broadcast(recording(folder, {320, 240}), recording(folder, {640, 360}))
+
+    start_supervised!(
+      {Hal.Device,
+       kind: :camera, driver: {FFmpeg, source: source}, sinks: [{Kernel, :send, [self()]}]}
+    )
+
+    assert_receive {:frame, %{width: 320, height: 240}}, 20_000
+    send(sender, :go_on)
+    resized = {:resized, {320, 240}, {640, 360}}
+    assert_receive {:health, :camera, {{:offline, ^resized}, _}}, 20_000
+
+    assert Hal.Device.Words.offline({FFmpeg, source: source}, resized) ==
+             "#{source}: its pictures were 320 x 240 and are 640 x 360 now; it is opened again"
+
+    assert_receive {:frame, %{width: 640, height: 360}}, 20_000
+    assert_receive {:health, :camera, {:online, _}}, 20_000
+  end
+
+  @tag :tmp_dir
+  test "a file whose size changes is scaled, and told once; with a given size that is asked for",
+       %{
+         tmp_dir: folder
+       } do
+    file = Path.join(folder, "both.ts")
+    File.write!(file, [recording(folder, {320, 240}), recording(folder, {640, 360})])
+
+    {frames, told, :eof} = everything(open(source: file, every: true))
+    assert frames |> Enum.map(&{&1.width, &1.height}) |> Enum.uniq() == [{320, 240}]
+    assert length(frames) > 30
+    assert ["its pictures are 640 x 360 now, and are scaled to the 320 x 240 of the first"] = told
+
+    assert {_frames, [], :eof} = everything(open(source: file, every: true, size: {64, 48}))
+  end
+
+  # All frames, and what was odd.
+  defp everything(camera, frames \\ [], told \\ []) do
+    {:ok, camera} = FFmpeg.next(camera)
+    everything_heard(camera, frames, told)
+  end
+
+  defp everything_heard(camera, frames, told) do
+    assert_receive message, 10_000
+
+    case FFmpeg.handle_message(message, camera) do
+      {:ok, [], camera} -> everything_heard(camera, frames, told)
+      {:ok, [odd: line], camera} -> everything_heard(camera, frames, [line | told])
+      {:ok, [{:frame, frame}], camera} -> everything(camera, [frame | frames], told)
+      {:error, reason, _camera} -> {Enum.reverse(frames), Enum.reverse(told), reason}
+    end
+  end
+
   test "every reason has words" do
-    for reason <- [:enoent, :eacces, :eisdir, :no_ffmpeg, :eof, {:unreadable, "x"}, {:exit, 1}] do
+    resized = {:resized, {320, 240}, {640, 360}}
+
+    for reason <-
+          [:enoent, :eacces, :eisdir, :no_ffmpeg, :eof, resized, {:unreadable, "x"}, {:exit, 1}] do
       assert FFmpeg.explain(reason) =~ ~r/^[^\n]+$/
     end
   end
@@ -155,7 +243,10 @@ defmodule Hal.Camera.FFmpegTest do
     device = fn options ->
       {:ok, options} = FFmpeg.options([source: "/dev/video0"] ++ options)
       line = Enum.join(Source.arguments("/dev/video0", options), " ")
-      [_, asked] = Regex.run(~r/^-nostdin -hide_banner -loglevel error (.*) -map 0:v:0 /, line)
+
+      [_, asked] =
+        Regex.run(~r/^-nostdin -hide_banner -loglevel level\+[a-z]+ (.*) -map 0:v:0 /, line)
+
       asked
     end
 

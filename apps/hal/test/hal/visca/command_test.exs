@@ -3,6 +3,7 @@ defmodule Hal.Visca.CommandTest do
   alias Hal.Visca.{Command, Reply, Units}
   doctest Hal.Visca.Command
   doctest Hal.Visca.Units
+  doctest Hal.Visca.Model
 
   @degree :math.pi() / 180
 
@@ -79,14 +80,14 @@ defmodule Hal.Visca.CommandTest do
 
   test "what is not a command, or out of range, is refused by name" do
     for wrong <- [
-          {:look, 881, 0, 24, 20},
-          {:look, 0, 301, 24, 20},
+          {:look, 2268, 0, 24, 20},
+          {:look, 0, -401, 24, 20},
           {:look, 0.5, 0, 24, 20},
           {:look, 0, 0, 0, 20},
           {:drive, {:left, 0}, {:stop, 0}},
           {:drive, {:up, 1}, {:stop, 0}},
           {:drive, {:stop, 0}, {:down, 21}},
-          {:zoom_to, 1024},
+          {:zoom_to, 0x4001},
           {:cancel, 3},
           {:memory, :set, 6},
           {:ask, :weather},
@@ -107,6 +108,30 @@ defmodule Hal.Visca.CommandTest do
     assert look.(100, 25) == {-880, 300}
     assert look.(-100, -25) == {880, -300}
     assert look.(1.0e300, -1.0e300) == {-880, -300}
+  end
+
+  test "each model has its own units, and its own ends" do
+    look = fn key, pan, tilt ->
+      model = Hal.Visca.Model.get(key)
+      {Units.pan(pan * @degree, model), Units.tilt(tilt * @degree, model)}
+    end
+
+    # Sony's tables: FA60 and 0168; F725, 04B0 and FE70.
+    assert look.(:d100, 100, 25) == {-1440, 360}
+    assert look.(:d100, 50, -30) == {-720, -360}
+    assert look.(:d70, 170, 90) == {-2267, 1200}
+    assert look.(:d70, -999, -999) == {2267, -400}
+    assert look.(:d70, 45, 0) == {-600, 0}
+
+    for key <- Hal.Visca.Model.keys(),
+        model = Hal.Visca.Model.get(key),
+        pan <- [-1.7, -0.3, 0.9] do
+      {seen, _} = model |> then(&Units.angles(Units.pan(pan, &1), 0, &1))
+      assert abs(seen - pan) <= 0.5 / model.pan_degree * @degree + 1.0e-9
+      {tele, wide} = model.lens
+      assert Units.zoom(wide, model.lens, model) == 0
+      assert Units.zoom(tele, model.lens, model) == model.zoom
+    end
   end
 
   test "what was asked for is read back within half a step, over the whole range" do

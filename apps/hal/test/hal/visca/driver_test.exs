@@ -5,6 +5,7 @@ defmodule Hal.Visca.DriverTest do
   alias Hal.Visca.{Driver, Options}
   @moduletag :realtime
   doctest Hal.Visca.Options
+  doctest Hal.Visca.Driver
 
   setup do
     Process.flag(:trap_exit, true)
@@ -96,6 +97,52 @@ defmodule Hal.Visca.DriverTest do
     assert Enum.all?([opened, cleared, told], &is_integer/1)
     assert opened < cleared and cleared < told
     Serial.close(camera.far)
+  end
+
+  test "a head that answers, and refuses every look, is not online; one that obeys again is", %{
+    link: link
+  } do
+    looks? = fn bytes -> match?(<<0x81, 0x01, 0x06, 0x02, _::binary>>, bytes) end
+    camera = camera(link, %ViscaToy{refuse: looks?})
+    test = self()
+
+    tell = fn _, measured, about, _ ->
+      if about.driver == Driver, do: send(test, {:told, measured.count, about.line})
+    end
+
+    :ok = Hal.Event.attach({test, :refusal}, [:hal, :device, :refusal], tell, nil)
+    on_exit(fn -> Hal.Event.detach({test, :refusal}) end)
+
+    pid = device(link)
+    Device.look(pid, 0.5, 0.0)
+    {_, camera} = play(camera, &match?({:told, 1, "it does not know the command" <> _}, &1))
+    refuses? = &match?({:health, :ptz, {{:offline, {:refuses, :look, _}}, _}}, &1)
+    {{:health, :ptz, {{:offline, reason}, _}}, camera} = play(camera, refuses?)
+
+    assert Hal.Device.Words.offline({Driver, port: link}, reason) ==
+             "it refuses every look: it does not know the command (syntax error)"
+
+    {_, camera} = play(put_in(camera.toy.refuse, nil), &match?({:health, :ptz, {:online, _}}, &1))
+    {_, camera} = play(camera, pan?(0.5))
+    Serial.close(camera.far)
+  end
+
+  test "errors are told as what they are" do
+    for {reason, words} <- [
+          {{:model, 0x0510},
+           "a camera of the unknown model 0x0510 answers: EVI-D30, EVI-D70 or EVI-D100 is allowed"},
+          {{:model, nil}, "refuses to say its model"},
+          {{:address, 2}, "camera 2 answers, and camera 1 does not"},
+          {{:zoom, 0x2000, :d30}, "its zoom is 0x2000, and that of an EVI-D30 ends at 0x03FF"},
+          {{:position, 1200, 0, :d30}, "pan 1200, tilt 0, where an EVI-D30 cannot be"},
+          {{:opening, :switch_on, "not now"}, "answers, but does not switch on (not now)"},
+          {:no_answer, "no camera answers"},
+          {:enoent, "/dev/ttyS2: no such device"}
+        ],
+        line = Driver.explain(reason, port: "/dev/ttyS2") do
+      assert line =~ words
+      assert String.starts_with?(line, "/dev/ttyS2: ")
+    end
   end
 
   test "the line unplugged, and plugged in again", %{link: link} do

@@ -7,6 +7,7 @@ defmodule Hal.Visca.SessionTest do
   doctest Hal.Visca.Session.OutlierFilter
 
   @degree :math.pi() / 180
+  @looks <<0x81, 0x01, 0x06, 0x02>>
 
   # A head and a toy camera on one line, a millisecond at a time. `wire` spoils what passes.
   defp start(options \\ []) do
@@ -21,6 +22,7 @@ defmodule Hal.Visca.SessionTest do
       now_ms: 0,
       seen: [],
       off: [],
+      told: [],
       error: nil
     })
   end
@@ -57,6 +59,12 @@ defmodule Hal.Visca.SessionTest do
       {:write, bytes}, state ->
         %{state | toy: ViscaToy.hear(state.toy, state.wire.(bytes))}
 
+      {:reading, {what, _, _} = reading}, state when what == :refused ->
+        %{state | told: [reading | state.told]}
+
+      {:reading, {what, _} = reading}, state when what in [:obeyed, :odd] ->
+        %{state | told: [reading | state.told]}
+
       {:reading, {:ptz, %{pan: pan}} = reading}, state ->
         off = abs(pan / @degree + elem(state.toy.at, 0) / 8.8)
         %{state | seen: [{state.now_ms, reading} | state.seen], off: [off | state.off]}
@@ -78,8 +86,6 @@ defmodule Hal.Visca.SessionTest do
         String.starts_with?(bytes, prefix),
         do: ms
       )
-
-  @looks <<0x81, 0x01, 0x06, 0x02>>
 
   test "opens, says where it is ten times a second, and goes where it is told" do
     state = run(start(), 1_000)
@@ -187,8 +193,85 @@ defmodule Hal.Visca.SessionTest do
     deaf = fn bytes -> match?(<<0x88, _::binary>>, bytes) end
     state = run(start(toy: %ViscaToy{lose: deaf}), 2_000)
     assert {state.error, length(state.seen) > 5} == {nil, true}
-    assert run(start(toy: %ViscaToy{model: 0x040D}), 500).error == {:model, 0x040D}
     assert run(start(camera: 2), 500).error == {:cameras, 1}
+  end
+
+  test "a model of unknown units is refused, by what it says twice; the file may name one" do
+    for code <- [0x0411, 0x0412, 0x0510, 0x0401],
+        do: assert(run(start(toy: %ViscaToy{model: code}), 500).error == {:model, code})
+
+    state = run(start(toy: %ViscaToy{model: 0x0510}, model: :d30), 1_000)
+    assert {state.error, state.seen != []} == {nil, true}
+
+    assert state.told == [
+             odd:
+               "it says that it is a camera of the unknown model 0x0510, and is taken for an EVI-D30, because of model: in its file"
+           ]
+
+    assert run(start(toy: %ViscaToy{}, model: :d30), 1_000).told == []
+  end
+
+  test "a camera that refuses to say its model is refused, unless the file names it; one that is off may be" do
+    mum = fn bytes -> match?(<<0x81, 0x09, 0, 2>>, bytes) end
+    assert run(start(toy: %ViscaToy{refuse: mum}), 3_000).error == {:model, nil}
+    state = run(start(toy: %ViscaToy{refuse: mum}, model: :d30), 1_000)
+    assert {state.error, state.seen != []} == {nil, true}
+  end
+
+  test "a D70 and a D100 are driven in their own units" do
+    ends = {-2267..2267, -400..1200}
+    state = start(toy: %ViscaToy{model: 0x040E, ends: ends}) |> look(150 * @degree, 80 * @degree)
+    state = run(state, 5_000)
+    assert state.toy.at == {-2000, 1067}
+    {pan, tilt} = now_at(state)
+    assert_in_delta pan, 150, 0.1
+    assert_in_delta tilt, 80, 0.1
+    assert [{_, {:ptz, %{field_of_view: view}}} | _] = state.seen
+    assert_in_delta view / @degree, 48, 0.01
+
+    ends = {-1440..1440, -360..360}
+    state = start(toy: %ViscaToy{model: 0x040D, ends: ends}, field_of_view: 6.6 * @degree)
+    state = state |> look(90 * @degree, -20 * @degree) |> run(4_000)
+    assert {state.toy.at, state.toy.zoom} == {{-1296, -288}, 0x4000}
+  end
+
+  test "an answer from another address, and numbers that the model cannot have, are told as these" do
+    assert run(start(toy: %ViscaToy{address: 2}), 2_000).error == {:address, 2}
+    assert run(start(toy: %ViscaToy{zoom: 0x2000}), 2_000).error == {:zoom, 0x2000, :d30}
+    assert run(start(toy: %ViscaToy{at: {1200, 0}}), 4_000).error == {:position, 1200, 0, :d30}
+
+    state = run(start(), 1_000)
+    state = run(put_in(state.toy.zoom, 0x400), 3_000)
+    assert state.error == {:zoom, 0x400, :d30}
+  end
+
+  test "what the camera refuses is told, each time, and what it does" do
+    looks? = fn bytes -> match?(<<@looks, _::binary>>, bytes) end
+    state = start(toy: %ViscaToy{refuse: looks?}) |> look(0.5) |> run(6_000)
+    assert state.error == nil
+    assert length(state.told) in 3..6
+    line = "it does not know the command (syntax error)"
+    assert Enum.uniq(state.told) == [{:refused, :look, line}]
+
+    state = run(put_in(state.toy.refuse, nil), 3_000)
+    assert hd(state.told) == {:obeyed, :look}
+
+    zooms? = fn bytes -> match?(<<0x81, 0x01, 0x04, 0x47, _::binary>>, bytes) end
+    state = run(start(toy: %ViscaToy{refuse: zooms?}, field_of_view: 0.3), 3_000)
+    assert state.told == [{:refused, :zoom, line}]
+  end
+
+  test "a camera that cannot be opened, although it answers, says at what: within 9 s" do
+    for {wrong, toy, step, line} <- [
+          {<<0x81, 0x01, 0x04, 0, 2>>, %ViscaToy{on?: false}, :switch_on, "it does not know"},
+          {<<0x81, 0x09, 0x04, 0>>, %ViscaToy{}, :power, "the inquiry of its power"},
+          {<<0x81, 0x09, 0x04, 0x47>>, %ViscaToy{}, :look_round, "the inquiry of its zoom"}
+        ] do
+      state = run(start(toy: %{toy | refuse: &(&1 == wrong)}), 9_500)
+      assert {:opening, at, refusal} = state.error
+      assert at in [step, :power]
+      assert refusal =~ line
+    end
   end
 
   test "a hand that turns it is answered, once a second at most" do

@@ -13,6 +13,7 @@ defmodule Missions.Landmark.Follower do
   alias Robot.Behaviour
   alias Robot.Percept.CameraPointing
   alias Robot.Behaviour.Avoid.Neighbours
+  alias Robot.Behaviour.Patience
   alias Swarm.Message
   alias Swarm.Formation.Chain
   alias Missions.Landmark
@@ -32,8 +33,8 @@ defmodule Missions.Landmark.Follower do
   @progress 0.1
   @reach 2.0
   @clear 0.1
-  # Wherever it is, a robot that has come no nearer to one slot of one shape for this long makes
-  # no progress. To have come nearer, it must have gained more than it may be mistaken by, or a metre.
+  # Wherever it is, a robot that has come no nearer to one slot for this long makes no progress, whatever shape the slot
+  # belongs to. To have come nearer, it must have gained more than it may be mistaken by, or a metre.
   @late_ms 15_000
   @most_gain 1.0
   # A slot that has moved farther than this is another one. Whoever judges from outside takes a metre, and this robot sees
@@ -57,8 +58,8 @@ defmodule Missions.Landmark.Follower do
   `told` is the epoch and sequence number of the anchor that was last passed on, `landmark` is
   where the landmark stood when this robot was last in place. `best` is the least distance to
   `slot` so far, and `best_ms` when it was reached; something unknown has stood in the slot since
-  `obstacle_ms`. `late` is the same, ignoring small moves of the slot: shape, slot, the
-  distance at which the robot has come nearer, and since when it has not. `blocker` is what blocks a blocked robot.
+  `obstacle_ms`. `late` is the same, ignoring small moves of the slot: where it was, and how the robot has come nearer.
+  `blocker` is what blocks a blocked robot.
   """
   @type t :: %__MODULE__{
           in_place?: boolean(),
@@ -66,7 +67,7 @@ defmodule Missions.Landmark.Follower do
           holding?: boolean(),
           blocked?: boolean(),
           blocker: Blocker.t() | nil,
-          late: {shape :: term(), Pose.t(), float(), integer()} | nil,
+          late: {Pose.t(), Patience.t()} | nil,
           told: {non_neg_integer(), non_neg_integer()},
           landmark: {integer(), integer()} | nil,
           slot: Pose.t() | nil,
@@ -170,25 +171,19 @@ defmodule Missions.Landmark.Follower do
        when in_place? or unsure?,
        do: %{attend | late: nil, blocker: nil}
 
-  defp late(attend, %{anchor: anchor, now_ms: now} = mission, slot, error) do
-    shape = {anchor.leader, anchor.formation}
-    nearer = error - gain(mission.percept)
-    late = patience(attend.late, shape, slot, {error, nearer}, now)
-    {_shape, _slot, _best, since_ms} = late
-    blocked? = attend.blocked? or now - since_ms >= @late_ms
+  defp late(attend, %{now_ms: now} = mission, slot, error) do
+    {_place, patience} = late = patience(attend.late, slot, error, now)
+    blocked? = attend.blocked? or Patience.stale?(patience, gain(mission.percept), @late_ms)
     %{attend | late: late, blocked?: blocked?, blocker: blocker(attend, mission, slot, blocked?)}
   end
 
-  defp patience({shape, place, least, since_ms}, shape, slot, {error, nearer}, now) do
-    cond do
-      Pose.distance(place, slot) > @elsewhere -> {shape, slot, nearer, now}
-      error < least -> {shape, place, nearer, now}
-      true -> {shape, place, least, since_ms}
-    end
+  defp patience({place, patience}, slot, error, now) do
+    if Pose.distance(place, slot) > @elsewhere,
+      do: patience(nil, slot, error, now),
+      else: {place, Patience.note(patience, error, now, :straight)}
   end
 
-  defp patience(_none_or_other, shape, slot, {_error, nearer}, now),
-    do: {shape, slot, nearer, now}
+  defp patience(nil, slot, error, now), do: {slot, Patience.note(nil, error, now, :straight)}
 
   # While its pose is corrected, a robot seems to come nearer that stands still.
   defp gain(%{uncertainty: %{radius: radius}}), do: radius |> max(@progress) |> min(@most_gain)

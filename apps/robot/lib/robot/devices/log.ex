@@ -1,7 +1,7 @@
 defmodule Robot.Devices.Log do
   @moduledoc """
   Writes a robot's log: a line when a device goes offline, with the reason in words, and when it
-  is back, when armed wheels are disarmed for a reason, when a bumper stays pressed, when the
+  is back, when it refuses what it is told, when armed wheels are disarmed for a reason, when a bumper stays pressed, when the
   gate, a behaviour or a mission hangs, when pictures cannot be saved or nothing can be recorded, when the emergency stop
   would not survive a restart of the machine, when another robot has the same name, and when one
   is not believed because its numbers are impossible. The events report changes, so retries of a device are not logged.
@@ -14,6 +14,8 @@ defmodule Robot.Devices.Log do
     [:hal, :device, :online],
     [:hal, :device, :offline],
     [:hal, :device, :arming],
+    [:hal, :device, :refusal],
+    [:hal, :device, :odd],
     [:hal, :server, :dropped],
     [:robot, :fault],
     [:robot, :stage],
@@ -63,6 +65,8 @@ defmodule Robot.Devices.Log do
       {:warning, "mag1: drive offline: /dev/ttyR0: no such device"}
       iex> Robot.Devices.Log.line(:online, %{robot: :mag1, device: :drive, again?: true})
       {:info, "mag1: drive online again"}
+      iex> Robot.Devices.Log.line(:refusal, %{robot: :mag1, device: :ptz, request: :look, line: "not now", count: 4})
+      {:warning, "mag1: ptz refuses to look: not now (4 so far)"}
       iex> Robot.Devices.Log.line(:silent, %{robot: :mag1, line: "its mission Patrol"})
       {:warning, "mag1 hangs in its mission Patrol"}
       iex> Robot.Devices.Log.line(:stage, %{stage: :given_up, robot: :mag1, x: 2.0, y: 1.0, blocked_by: "mag2"})
@@ -73,6 +77,11 @@ defmodule Robot.Devices.Log do
 
   def line(:online, %{again?: true} = about), do: {:info, "#{name(about)} online again"}
   def line(:online, about), do: {:debug, "#{name(about)} online"}
+
+  def line(:refusal, %{request: request, line: line, count: count} = about),
+    do: {:warning, "#{name(about)} refuses to #{request}: #{line} (#{count} so far)"}
+
+  def line(:odd, %{line: line} = about), do: {:warning, "#{name(about)}: #{line}"}
 
   def line(:arming, %{state: {:error, _reason}, line: line} = about) do
     {:error,

@@ -76,7 +76,23 @@ defmodule Robot.Navigation.MapFile do
   defp decode(<<"P", kind, rest::binary>>, most) when kind in [?2, ?5],
     do: Pgm.decode(kind, rest, most)
 
-  defp decode(_bytes, _most), do: {:error, "is neither a PNG nor a PGM (P2, P5) picture"}
+  defp decode(bytes, _most) do
+    what = if kind = kind(bytes), do: "is #{kind}", else: "is no picture that is known"
+    {:error, "#{what}: PNG and PGM (P2, P5) are read; save it as PNG"}
+  end
+
+  defp kind(<<0xFF, 0xD8, 0xFF, _::binary>>), do: "a JPEG picture"
+  defp kind(<<"GIF8", _::binary>>), do: "a GIF picture"
+  defp kind(<<"BM", _::binary>>), do: "a BMP picture"
+  defp kind(<<"RIFF", _size::32, "WEBP", _::binary>>), do: "a WebP picture"
+  defp kind(<<"II*", 0, _::binary>>), do: "a TIFF picture"
+  defp kind(<<"MM", 0, "*", _::binary>>), do: "a TIFF picture"
+  defp kind(<<"P", n, _::binary>>) when n in [?1, ?4], do: "a PBM picture"
+  defp kind(<<"P", n, _::binary>>) when n in [?3, ?6], do: "a PPM picture"
+  defp kind(<<"%PDF", _::binary>>), do: "a PDF document"
+  defp kind(<<"<", _::binary>>), do: "XML, as an SVG drawing is"
+  defp kind(<<>>), do: "empty"
+  defp kind(_other), do: nil
 
   defp size(_file, {w, h}) when w in 2..@most_side//1 and h in 2..@most_side//1, do: :ok
 

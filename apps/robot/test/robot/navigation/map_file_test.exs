@@ -66,7 +66,8 @@ defmodule Robot.Navigation.MapFileTest do
 
     for {changes, pattern} <- [
           {[image: "none.png"], ~r/none.png: no such file or directory$/},
-          {[image: "text.png"], ~r/text.png: is neither a PNG nor a PGM/},
+          {[image: "text.png"],
+           ~r/text.png: is no picture that is known: PNG and PGM \(P2, P5\) are read/},
           {[image: "huge.pgm"], ~r/huge.pgm: 5000 x 5000 pixels are too many/},
           {[image: "dark.pgm"], ~r/map.yaml: shows no floor/},
           {[image: "wide.pgm", resolution: "1.0"],

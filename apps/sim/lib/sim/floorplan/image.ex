@@ -19,8 +19,13 @@ defmodule Sim.Floorplan.Image do
     cond do
       name =~ ~r/\.ya?ml\z/i -> described(name)
       match = Regex.run(~r/\A(.+):([^:]*)\z/s, name) -> sized(name, match)
-      true -> {:error, "unknown map #{name}: #{Maps.allowed()} in metres"}
+      true -> unknown(name)
     end
+  end
+
+  defp unknown(name) do
+    {allowed, hint} = Maps.fault(name)
+    {:error, "unknown map #{name}: #{allowed} is allowed#{hint}"}
   end
 
   defp sized(name, [_, file, size]) do

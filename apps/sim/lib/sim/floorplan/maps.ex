@@ -1,6 +1,9 @@
 defmodule Sim.Floorplan.Maps do
   @moduledoc "The built-in maps by name. Pure."
+  alias Hal.Options.Suggest
   alias Sim.Floorplan.Maps.{Corridors, Halls, Rough, Wide}
+
+  @picture "FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT"
 
   @maps [
     {"hall", Halls, "one empty room, larger for larger fleets"},
@@ -40,7 +43,44 @@ defmodule Sim.Floorplan.Maps do
 
   @doc "What a map may be, in words."
   @spec allowed() :: String.t()
-  def allowed, do: Enum.join(names(), ", ") <> ", FILE.yaml or FILE.png:WIDTHxHEIGHT"
+  def allowed, do: Enum.join(names(), ", ") <> ", FILE.yaml, #{@picture}"
+
+  @doc """
+  What is wrong with the name of a map: what is allowed there, and more about it.
+
+      iex> Sim.Floorplan.Maps.fault("floor.png")
+      {"FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT in metres, such as floor.png:16x12,", "; its size is missing"}
+      iex> Sim.Floorplan.Maps.fault("floor.png:16,12")
+      {"FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT in metres, such as floor.png:16x12,", "; 16,12 is not a size"}
+      iex> {_allowed, hint} = Sim.Floorplan.Maps.fault("floor.jpg")
+      iex> hint
+      "; .jpg is not read: save the picture as PNG"
+      iex> {_allowed, hint} = Sim.Floorplan.Maps.fault("ofices")
+      iex> hint
+      "; did you mean offices?"
+  """
+  @spec fault(String.t()) :: {allowed :: String.t(), hint :: String.t()}
+  def fault(name) do
+    {file, size} = parts(name)
+    kind = file |> Path.extname() |> String.downcase()
+
+    cond do
+      kind in [".png", ".pgm"] and size == nil -> {sized(file), "; its size is missing"}
+      kind in [".png", ".pgm"] -> {sized(file), "; #{size} is not a size"}
+      kind in [".yaml", ".yml"] -> {"FILE.yaml", "; its description says how large the map is"}
+      kind != "" -> {"FILE.yaml, #{@picture}", "; #{kind} is not read: save the picture as PNG"}
+      true -> {allowed(), Suggest.hint(name, names())}
+    end
+  end
+
+  defp parts(name) do
+    case name |> String.split(":") |> Enum.split(-1) do
+      {[], [file]} -> {file, nil}
+      {file, [size]} -> {Enum.join(file, ":"), size}
+    end
+  end
+
+  defp sized(file), do: "#{@picture} in metres, such as #{Path.basename(file)}:16x12,"
 
   @doc "The fields of the map of this name for a fleet of this size; `nil` if there is none."
   @spec draw(String.t(), pos_integer()) :: map() | nil

@@ -113,11 +113,10 @@ defmodule Sim.Trial.Evaluation do
   @spec followers(run()) :: [Stuck.row()]
   def followers(run) do
     leader = RunLog.leader(run.run_log)
-    shape = {leader, formation(run, leader)}
 
     for {id, {_place, slot}} <- slots(run, leader), claim = run.claims[id], claim != nil do
       error_m = Pose.distance(World.truth(run.world, id), slot)
-      %{id: id, claim: claim, error_m: error_m, slot: slot, shape: shape}
+      %{id: id, claim: claim, error_m: error_m, slot: slot}
     end
   end
 

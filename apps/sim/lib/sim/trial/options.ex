@@ -15,7 +15,8 @@ defmodule Sim.Trial.Options do
     ],
     seed: [:integer, default: 1],
     map: [
-      {:path, ~s(the name of a map, "FILE.yaml" or "FILE.png:WIDTHxHEIGHT")},
+      {:path,
+       ~s(the name of a map, "FILE.yaml", "FILE.png:WIDTHxHEIGHT" or "FILE.pgm:WIDTHxHEIGHT")},
       default: "hall"
     ],
     start: [{:one_of, [:spread, :same]}, default: :spread],

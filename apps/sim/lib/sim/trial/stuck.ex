@@ -4,8 +4,8 @@ defmodule Sim.Trial.Stuck do
   says so. Pure; fed once a second.
 
   A follower that claims neither to be in place, nor to be blocked, nor to be unsure of its place
-  must have come nearer to its slot within 20 s. The time starts again when the slot or the shape
-  changes.
+  must have come nearer to its slot within 20 s, whatever shape the slot belongs to. The time starts
+  again when the slot moves by more than a metre.
   """
 
   @silent_ms 20_000
@@ -15,13 +15,12 @@ defmodule Sim.Trial.Stuck do
 
   defstruct next_ms: 0, open: %{}, told: []
 
-  @typedoc "A follower under way: what it claims, its true error in metres, its slot and the shape."
+  @typedoc "A follower under way: what it claims, its true error in metres, and its slot."
   @type row :: %{
           id: atom(),
           claim: map(),
           error_m: float(),
-          slot: Hal.Pose.t(),
-          shape: term()
+          slot: Hal.Pose.t()
         }
   @typedoc """
   A robot that stood short of its slot without reporting it: since when, which robot, how far off
@@ -59,17 +58,15 @@ defmodule Sim.Trial.Stuck do
   defp go_on(nil, row, at_ms), do: begin(row, at_ms)
 
   defp go_on(state, row, at_ms) do
-    other? = Hal.Pose.distance(state.slot, row.slot) > @other_slot_m or state.shape != row.shape
-
     cond do
-      other? -> begin(row, at_ms)
+      Hal.Pose.distance(state.slot, row.slot) > @other_slot_m -> begin(row, at_ms)
       row.error_m < state.best - @nearer_m -> %{state | best: row.error_m, since_ms: at_ms}
       true -> state
     end
   end
 
   defp begin(row, at_ms),
-    do: %{slot: row.slot, shape: row.shape, best: row.error_m, since_ms: at_ms, told?: false}
+    do: %{slot: row.slot, best: row.error_m, since_ms: at_ms, told?: false}
 
   defp tell(%{told?: false} = state, row, at_ms, told)
        when at_ms - state.since_ms >= @silent_ms do

@@ -69,7 +69,7 @@ defmodule Sim.Floorplan.DescriptionTest do
     for {yaml, pattern} <- [
           {"resolution: 0.05\n", ~r/map.yaml: image is missing/},
           {with_line("image", "image: other.pgm"), ~r/other.pgm: no such file/},
-          {with_line("image", "image: map.yaml"), ~r/neither a PNG nor a PGM/},
+          {with_line("image", "image: map.yaml"), ~r/is no picture that is known: PNG and PGM/},
           {with_line("resolution", "resolution: 0.01"),
            ~r/it is 0.80 x 0.60 m; each side must be at least 1 m/},
           {with_line("origin", "origin: [-1, 9000, 0]"), ~r/origin .* is too far from 0,0/},

@@ -55,6 +55,7 @@ defmodule Mix.Tasks.Blobs do
          {:ok, output} <- open(options.json),
          {:ok, summary} <- output |> looked(options, colours) |> close(output, options.json),
          :ok <- draw(options.picture, summary.last, colours) do
+      for line <- summary.odd, do: Mix.shell().error("blobs: #{options.source}: #{line}")
       conclude(options, summary)
     end
   end

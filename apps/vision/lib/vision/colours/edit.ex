@@ -25,7 +25,7 @@ defmodule Vision.Colours.Edit do
   end
 
   defp name(name) do
-    if name =~ ~r/^[^\s[:cntrl:]]{1,60}$/u,
+    if name =~ ~r/\A[^\s#[:cntrl:]][^\s[:cntrl:]]{0,59}\z/u,
       do: :ok,
       else:
         {:error,

@@ -2,11 +2,14 @@ defmodule Vision.Colours.Text do
   @moduledoc false
   # CMVision's reader is a machine with three states: it looks for a header, or it is inside one
   # of the two sections. This is that machine; it also remembers which line ended a section, to
-  # be able to say why something is missing.
+  # be able to say why something is missing. The lines themselves `Vision.Colours.Line` reads.
+  alias Vision.Colours.Line
 
   @longest 255
-  @colour_form "(R,G,B) merge expected Name with R, G, B from 0 to 255"
-  @threshold_form "(Ylo:Yhi,Ulo:Uhi,Vlo:Vhi) with whole numbers"
+  @forms %{
+    colours: "(R,G,B) merge expected Name with R, G, B from 0 to 255",
+    thresholds: "(Ylo:Yhi,Ulo:Uhi,Vlo:Vhi) with whole numbers"
+  }
 
   @type line_error :: {pos_integer(), String.t()} | String.t()
 
@@ -60,36 +63,22 @@ defmodule Vision.Colours.Text do
     end
   end
 
-  defp read_line(line, number, %{section: :colours} = scan) do
-    case Regex.run(
-           ~r/^\(\s*([+-]?\d+),\s*([+-]?\d+),\s*([+-]?\d+)\)\s*([\d.]+(?:[eE][+-]?\d+)?)\s+([+-]?\d+)\s*([^\s[:cntrl:]]+)/,
-           line
-         ) do
-      [_, r, g, b, merge, expected, name] -> colour(scan, {r, g, b}, merge, expected, name)
-      nil -> leave(scan, line, number, @colour_form)
+  # A line that begins with a bracket was meant for the section: a broken one must not count as its end.
+  defp read_line("(" <> rest = line, _number, %{section: section} = scan) do
+    case Line.read(section, rest) do
+      {:ok, read} when section == :colours -> colour(scan, read)
+      {:ok, read} -> thresholds(scan, read)
+      :error -> {:error, "#{inspect(line)} is not of the form #{@forms[section]}"}
     end
   end
 
-  defp read_line(line, number, %{section: :thresholds} = scan) do
-    case Regex.run(
-           ~r/^\(\s*([+-]?\d+):\s*([+-]?\d+),\s*([+-]?\d+):\s*([+-]?\d+),\s*([+-]?\d+):\s*([+-]?\d+)/,
-           line
-         ) do
-      [_ | numbers] -> thresholds(scan, Enum.map(numbers, &String.to_integer/1))
-      nil -> leave(scan, line, number, @threshold_form)
-    end
-  end
+  defp read_line(line, number, scan), do: leave(scan, line, number)
 
   defp enter(scan, section, _number), do: %{scan | section: section, seen: [section | scan.seen]}
 
   defp again(section), do: {:error, "a second #{title(section)} section: one is allowed"}
 
-  # A line that begins with a bracket was meant for the section: a broken one must not count as
-  # its end.
-  defp leave(_scan, "(" <> _ = line, _number, form),
-    do: {:error, "#{inspect(line)} is not of the form #{form}"}
-
-  defp leave(scan, line, number, _form) do
+  defp leave(scan, line, number) do
     ended = Map.put(scan.ended, scan.section, number)
     swallowed = scan.swallowed || (header(line) && {number, header(line)})
     %{scan | section: nil, ended: ended, swallowed: swallowed}
@@ -105,16 +94,16 @@ defmodule Vision.Colours.Text do
     end
   end
 
-  defp colour(scan, {r, g, b}, merge, expected, name) do
-    rgb = {String.to_integer(r), String.to_integer(g), String.to_integer(b)}
+  defp colour(scan, %{name: name, rgb: rgb} = colour) do
+    cond do
+      not Enum.all?(Tuple.to_list(rgb), &(&1 in 0..255)) ->
+        {:error, "the colour #{name} is not of the form #{@forms.colours}"}
 
-    with true <- Enum.all?(Tuple.to_list(rgb), &(&1 in 0..255)),
-         # As C reads them: also "5." and ".5".
-         {merge, rest} when rest in ["", "."] <- Float.parse("0" <> merge) do
-      colour = %{name: name, rgb: rgb, merge: merge, expected: String.to_integer(expected)}
-      %{scan | colours: [colour | scan.colours]}
-    else
-      _other -> {:error, "the colour #{name} is not of the form #{@colour_form}"}
+      Enum.any?(scan.colours, &(&1.name == name)) ->
+        {:error, "a second colour is named #{name}: each needs a name of its own"}
+
+      true ->
+        %{scan | colours: [colour | scan.colours]}
     end
   end
 

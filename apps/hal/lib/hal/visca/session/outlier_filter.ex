@@ -3,29 +3,38 @@ defmodule Hal.Visca.Session.OutlierFilter do
   Rejects positions that a camera's head cannot have reached. Pure; the camera's units.
 
   On a line without checksums a single wrong bit turns one position into another. The head turns
-  at 80 degrees/s at most (tilt: 50), so a position further away than it can have moved since the
-  last one is doubted, until the next one is about the same.
+  at 80 degrees/s at most (tilt: 50; other models: `Hal.Visca.Model`), so a position further away
+  than it can have moved since the last one is doubted, until the next one is about the same.
   """
+  alias Hal.Visca.Model
 
-  # Units per millisecond, with a fifth to spare, and two degrees.
-  @pan_rate 80 * 8.8 * 1.2 / 1000
-  @tilt_rate 50 * 12 * 1.2 / 1000
-  @pan_slack 18
-  @tilt_slack 24
-
-  defstruct believed: nil, doubted: nil, doubts: 0
+  @enforce_keys [:pan, :tilt]
+  defstruct @enforce_keys ++ [believed: nil, doubted: nil, doubts: 0]
 
   @type seen :: {pan :: integer(), tilt :: integer(), at_ms :: integer()}
-  @typedoc "`doubts` counts the positions that were doubted when they came."
+  @typedoc """
+  `doubts` counts the positions that were doubted when they came; `pan` and `tilt` are what is
+  allowed, `{units per ms, units}`.
+  """
   @type t :: %__MODULE__{
+          pan: {float(), float()},
+          tilt: {float(), float()},
           believed: seen() | nil,
           doubted: seen() | nil,
           doubts: non_neg_integer()
         }
 
-  @doc "A filter that has seen no position."
-  @spec new() :: t()
-  def new, do: %__MODULE__{}
+  @doc "A filter that has seen no position of a camera of this model."
+  @spec new(Model.t()) :: t()
+  def new(model \\ Model.get(:d30)) do
+    %__MODULE__{
+      pan: allowed(model.pan_rate, model.pan_degree),
+      tilt: allowed(model.tilt_rate, model.tilt_degree)
+    }
+  end
+
+  # With a fifth to spare, and two degrees.
+  defp allowed(rate, degree), do: {rate * degree * 1.2 / 1000, 2 * degree}
 
   @doc """
   Takes a position; returns whether it is believed.
@@ -41,16 +50,18 @@ defmodule Hal.Visca.Session.OutlierFilter do
   def hear(%__MODULE__{} = outliers, {pan, tilt}, now_ms) do
     seen = {pan, tilt, now_ms}
 
-    if outliers.believed == nil or near?(outliers.believed, seen) or
-         near?(outliers.doubted, seen),
+    if outliers.believed == nil or near?(outliers, outliers.believed, seen) or
+         near?(outliers, outliers.doubted, seen),
        do: {true, %{outliers | believed: seen, doubted: nil}},
        else: {false, %{outliers | doubted: seen, doubts: outliers.doubts + 1}}
   end
 
-  defp near?(nil, _seen), do: false
+  defp near?(_outliers, nil, _seen), do: false
 
-  defp near?({pan, tilt, before_ms}, {p, t, at_ms}) do
+  defp near?(%{pan: pans, tilt: tilts}, {pan, tilt, before_ms}, {p, t, at_ms}) do
     ms = at_ms - before_ms
-    abs(p - pan) <= @pan_slack + @pan_rate * ms and abs(t - tilt) <= @tilt_slack + @tilt_rate * ms
+    abs(p - pan) <= most(pans, ms) and abs(t - tilt) <= most(tilts, ms)
   end
+
+  defp most({rate, slack}, ms), do: slack + rate * ms
 end

@@ -6,20 +6,22 @@ defmodule Hal.Visca.Session.Target do
   A new target is due at once. A target that was sent is due again when the head has stood still
   for 0.5 s, more than a degree away from it, and 1 s has passed since it was last sent.
   """
-  # A degree each.
-  @pan_off 9
-  @tilt_off 12
+  alias Hal.Visca.Model
+
   @still_ms 500
   @again_ms 1_000
 
-  defstruct wanted: nil, said: nil, said_ms: nil, at: nil, since_ms: nil, now_ms: nil
+  @enforce_keys [:off]
+  defstruct @enforce_keys ++
+              [wanted: nil, said: nil, said_ms: nil, at: nil, since_ms: nil, now_ms: nil]
 
   @type position :: {pan :: integer(), tilt :: integer()}
   @typedoc """
   `at` is the position of the head, which has been there since `since_ms` and was last seen at
-  `now_ms`.
+  `now_ms`; `off` is a degree of pan and of tilt.
   """
   @type t :: %__MODULE__{
+          off: {pos_integer(), pos_integer()},
           wanted: position() | nil,
           said: position() | nil,
           said_ms: integer() | nil,
@@ -28,9 +30,10 @@ defmodule Hal.Visca.Session.Target do
           now_ms: integer() | nil
         }
 
-  @doc "No target yet."
-  @spec new() :: t()
-  def new, do: %__MODULE__{}
+  @doc "No target yet for a camera of this model."
+  @spec new(Model.t()) :: t()
+  def new(model \\ Model.get(:d30)),
+    do: %__MODULE__{off: {ceil(model.pan_degree), ceil(model.tilt_degree)}}
 
   @doc "Sets the target."
   @spec want(t(), position()) :: t()
@@ -65,8 +68,8 @@ defmodule Hal.Visca.Session.Target do
 
   defp astray?(%{at: nil}, _now_ms), do: false
 
-  defp astray?(%{at: {pan, tilt}, wanted: {p, t}} = target, now_ms) do
-    (abs(pan - p) > @pan_off or abs(tilt - t) > @tilt_off) and
+  defp astray?(%{at: {pan, tilt}, wanted: {p, t}, off: {pan_off, tilt_off}} = target, now_ms) do
+    (abs(pan - p) > pan_off or abs(tilt - t) > tilt_off) and
       target.now_ms - target.since_ms >= @still_ms and now_ms - target.said_ms >= @again_ms
   end
 end

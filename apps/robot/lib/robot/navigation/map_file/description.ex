@@ -51,40 +51,83 @@ defmodule Robot.Navigation.MapFile.Description do
   end
 
   defp keys(bytes) do
-    if String.valid?(bytes) do
-      # An origin may also be written as a list of lines that begin with a dash.
-      text = Regex.replace(~r/^origin:\s*\r?\n((?:\s*-\s+\S+[ \t]*\r?\n?)+)/m, bytes, &flow/2)
-
-      keys =
-        for line <- String.split(text, ["\n", "\r"]),
-            [_, key, value] <- [Regex.run(~r/^(\w+)\s*:\s*(.*?)\s*$/, plain(line))],
-            key in @known,
-            into: %{},
-            do: {key, value}
-
+    with true <- String.valid?(bytes),
+         lines = bytes |> String.split(["\r\n", "\n", "\r"]) |> Enum.map(&plain/1),
+         {:ok, keys} <- entries(lines, []) do
       case @needed -- Map.keys(keys) do
         [] -> {:ok, keys}
         [key | _] -> {:error, "#{key} is missing; needed are #{Enum.join(@needed, ", ")}"}
       end
     else
-      {:error, "is not text"}
+      false -> {:error, "is not text"}
+      {:error, _line} = error -> error
     end
   end
 
-  defp flow(_whole, items) do
-    numbers = for [_, item] <- Regex.scan(~r/-\s+(\S+)/, items), do: item
-    "origin: [#{Enum.join(numbers, ", ")}]\n"
+  defp entries([], done), do: {:ok, Map.new(done)}
+
+  defp entries([line | rest], done) do
+    with [key, value] <- :binary.split(line, ":"),
+         key = String.trim_trailing(key),
+         true <- key in @known do
+      {value, rest} = value(key, String.trim(value), rest)
+
+      if List.keymember?(done, key, 0),
+        do: {:error, "#{key} is given twice"},
+        else: entries(rest, [{key, value} | done])
+    else
+      _another_line -> entries(rest, done)
+    end
   end
 
-  # Without its remark.
-  defp plain(line), do: Regex.replace(~r/(^|\s)#.*$/, line, "")
+  # An origin may also be written as a list of lines that begin with a dash.
+  defp value("origin", "", lines) do
+    {items, rest} = Enum.split_while(lines, &(item(&1) != nil or String.trim(&1) == ""))
+    {"[#{items |> Enum.map(&item/1) |> Enum.filter(& &1) |> Enum.join(", ")}]", rest}
+  end
+
+  defp value(_key, text, lines), do: {text, lines}
+
+  defp item(line) do
+    case String.trim(line) do
+      "- " <> item -> String.trim(item)
+      _other -> nil
+    end
+  end
+
+  # Without its remark, which begins with a # behind a blank, but not in a quoted value.
+  defp plain(line) do
+    with [key, value] <- :binary.split(line, ":"),
+         <<quote, rest::binary>> when quote in ~c"\"'" <- String.trim_leading(value),
+         [quoted, rest] <- :binary.split(rest, <<quote>>),
+         do: key <> ":" <> <<quote>> <> quoted <> <<quote>> <> remarkless(rest),
+         else: (_unquoted -> remarkless(line))
+  end
+
+  defp remarkless("#" <> _remark), do: ""
+
+  defp remarkless(text) do
+    case :binary.match(text, [" #", "\t#"]) do
+      {at, _length} -> binary_part(text, 0, at)
+      :nomatch -> text
+    end
+  end
 
   defp image(%{"image" => text}) do
-    case Regex.run(~r/^(["']?)(.+)\1$/, text) do
-      [_, _quote, file] -> {:ok, file}
-      nil -> {:error, "image must be the name of a PNG or PGM file"}
+    case unquoted(text) do
+      {:ok, file} when file != "" -> {:ok, file}
+      _none -> {:error, "image must be the name of a PNG or PGM file"}
     end
   end
+
+  defp unquoted(<<c, rest::binary>>) when c in ~c"\"'" do
+    case :binary.split(rest, <<c>>) do
+      [file, ""] -> {:ok, file}
+      _open_or_more -> :error
+    end
+  end
+
+  defp unquoted(text), do: {:ok, text}
 
   defp number(keys, key, default, least, most) do
     case parsed(Map.get(keys, key)) do

@@ -1,5 +1,5 @@
 defmodule Robot.Navigation.MapFile.Pgm do
-  @moduledoc "Reads PGM pictures, plain (P2) and raw (P5), of up to 255 greys. Pure."
+  @moduledoc "Reads PGM pictures, plain (P2) and raw (P5), of up to 65,535 greys. Pure."
   alias Robot.Navigation.MapFile.Picture
 
   @damaged {:error, "the picture is damaged"}
@@ -24,8 +24,8 @@ defmodule Robot.Navigation.MapFile.Pgm do
         width * height > most_pixels ->
           {:error, "#{width} x #{height} pixels are too many"}
 
-        most > 255 ->
-          {:error, "more than 255 greys are not supported; save it with 8 bits"}
+        most > 65_535 ->
+          @damaged
 
         true ->
           pixels(kind, bytes, width, height, most)
@@ -35,7 +35,15 @@ defmodule Robot.Navigation.MapFile.Pgm do
     end
   end
 
-  defp pixels(?5, bytes, width, height, most) when byte_size(bytes) >= width * height do
+  defp pixels(?5, bytes, width, height, most)
+       when most > 255 and byte_size(bytes) >= 2 * width * height do
+    pixels = binary_part(bytes, 0, 2 * width * height)
+    greys = for <<grey::16 <- pixels>>, into: <<>>, do: <<shade(grey, most)>>
+    {:ok, {width, height, cut(greys, width)}}
+  end
+
+  defp pixels(?5, bytes, width, height, most)
+       when most <= 255 and byte_size(bytes) >= width * height do
     pixels = binary_part(bytes, 0, width * height)
 
     pixels =

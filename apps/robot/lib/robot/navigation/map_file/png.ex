@@ -1,9 +1,9 @@
 defmodule Robot.Navigation.MapFile.Png do
   @moduledoc """
-  Reads PNG pictures: grey of 1, 2, 4 or 8 bits, grey with alpha, RGB, RGBA of 8 bits a channel, and
-  palettes; not interlaced. Colours become greys, what is transparent white. Pure.
+  Reads PNG pictures: grey of 1, 2, 4, 8 or 16 bits, grey with alpha, RGB, RGBA of 8 or 16 bits a channel, and palettes;
+  also interlaced ones (`Robot.Navigation.MapFile.Adam7`). Colours become greys, what is transparent white. Pure.
   """
-  alias Robot.Navigation.MapFile.Picture
+  alias Robot.Navigation.MapFile.{Adam7, Picture}
 
   @damaged {:error, "the picture is damaged"}
 
@@ -14,7 +14,7 @@ defmodule Robot.Navigation.MapFile.Png do
   @spec decode(binary(), pos_integer()) :: {:ok, Picture.t()} | {:error, String.t()}
   def decode(chunks, most) do
     with {:ok, [{"IHDR", header} | chunks]} <- chunks(chunks, []),
-         {:ok, {width, height, _, _} = header} <- header(header, most),
+         {:ok, %{width: width, height: height} = header} <- header(header, most),
          {:ok, rows} <- inflate(for({"IDAT", data} <- chunks, do: data), header, palette(chunks)) do
       if Enum.all?(rows, &(byte_size(&1) == width)),
         do: {:ok, {width, height, rows}},
@@ -42,36 +42,46 @@ defmodule Robot.Navigation.MapFile.Png do
   @channels %{0 => 1, 2 => 3, 3 => 1, 4 => 2, 6 => 4}
 
   defp header(<<width::32, height::32, depth, type, 0, 0, interlace>>, most)
-       when is_map_key(@channels, type) and width > 0 and height > 0 do
+       when is_map_key(@channels, type) and width > 0 and height > 0 and interlace in 0..1 do
     cond do
-      interlace != 0 -> {:error, "interlaced PNGs are not supported; save it without interlacing"}
-      depth == 16 -> {:error, "16 bits per channel are not supported; save it with 8"}
-      depth not in [1, 2, 4, 8] or (depth < 8 and type not in [0, 3]) -> @damaged
-      width * height > most -> {:error, "#{width} x #{height} pixels are too many"}
-      true -> {:ok, {width, height, depth, type}}
+      depth not in [1, 2, 4, 8, 16] or (depth < 8 and type not in [0, 3]) ->
+        @damaged
+
+      depth == 16 and type == 3 ->
+        @damaged
+
+      width * height > most ->
+        {:error, "#{width} x #{height} pixels are too many"}
+
+      true ->
+        {:ok, %{width: width, height: height, depth: depth, type: type, interlace: interlace}}
     end
   end
 
   defp header(_other, _most), do: @damaged
 
-  defp stride({width, _height, depth, type}), do: div(width * depth * @channels[type] + 7, 8)
+  # An interlaced picture consists of smaller ones, each filtered on its own.
+  defp passes(%{interlace: 0, width: width, height: height}), do: [{width, height}]
+  defp passes(%{width: width, height: height}), do: Adam7.sizes(width, height)
+
+  defp stride(width, %{depth: depth, type: type}), do: div(width * depth * @channels[type] + 7, 8)
 
   # Row by row as they come out, and never more than the header says, however much the data would
   # unpack to.
-  defp inflate(data, {_, height, depth, type} = header, palette) do
+  defp inflate(data, %{depth: depth, type: type} = header, palette) do
     z = :zlib.open()
     :ok = :zlib.inflateInit(z)
-    stride = stride(header)
 
-    scan = %{
-      stride: stride,
-      pixel: max(div(depth * @channels[type], 8), 1),
-      header: header,
-      palette: palette,
-      above: List.duplicate(0, stride),
-      left: height,
-      rows: []
-    }
+    scan =
+      pass(%{
+        pixel: max(div(depth * @channels[type], 8), 1),
+        header: header,
+        palette: palette,
+        passes: passes(header),
+        left: 0,
+        rows: [],
+        done: []
+      })
 
     try do
       inflate(z, :zlib.safeInflate(z, data), <<>>, scan)
@@ -82,11 +92,37 @@ defmodule Robot.Navigation.MapFile.Png do
     end
   end
 
+  # Begins the next of the pictures, if the last one is complete; empty ones have no rows.
+  defp pass(%{left: 0, passes: [{width, height} | passes]} = scan) do
+    stride = stride(width, scan.header)
+    done = if scan[:width], do: [Enum.reverse(scan.rows) | scan.done], else: scan.done
+
+    pass(
+      Map.merge(scan, %{
+        passes: passes,
+        width: width,
+        stride: stride,
+        above: List.duplicate(0, stride),
+        left: if(width == 0, do: 0, else: height),
+        rows: [],
+        done: done
+      })
+    )
+  end
+
+  defp pass(scan), do: scan
+
+  defp whole(%{header: %{interlace: 0}, rows: rows}), do: Enum.reverse(rows)
+
+  defp whole(%{header: header, rows: rows, done: done}) do
+    [Enum.reverse(rows) | done] |> Enum.reverse() |> Adam7.weave(header.height)
+  end
+
   defp inflate(z, {state, output}, rest, scan) do
     {rest, scan} = rows(IO.iodata_to_binary([rest | output]), scan)
 
     cond do
-      scan.left == 0 -> {:ok, Enum.reverse(scan.rows)}
+      scan.left == 0 -> {:ok, whole(scan)}
       state == :finished -> @damaged
       # Data that ends too early would return nothing for ever.
       output == [] -> @damaged
@@ -110,8 +146,8 @@ defmodule Robot.Navigation.MapFile.Png do
        when left > 0 and byte_size(bytes) > stride do
     <<filter, row::binary-size(stride), rest::binary>> = bytes
     row = unfilter(filter, :binary.bin_to_list(row), scan.above, scan.pixel)
-    greys = greys(row, scan.header, scan.palette)
-    rows(rest, %{scan | above: row, left: left - 1, rows: [greys | scan.rows]})
+    greys = greys(row, scan.width, scan.header, scan.palette)
+    rows(rest, pass(%{scan | above: row, left: left - 1, rows: [greys | scan.rows]}))
   end
 
   defp rows(bytes, scan), do: {bytes, scan}
@@ -140,6 +176,8 @@ defmodule Robot.Navigation.MapFile.Png do
   defp left([_, a | _], 2), do: a
   defp left([_, _, a | _], 3), do: a
   defp left([_, _, _, a | _], 4), do: a
+  defp left([_, _, _, _, _, a | _], 6), do: a
+  defp left([_, _, _, _, _, _, _, a | _], 8), do: a
 
   defp guess(1, a, _b, _c), do: a
   defp guess(3, a, b, _c), do: div(a + b, 2)
@@ -157,15 +195,15 @@ defmodule Robot.Navigation.MapFile.Png do
   # An unknown filter is ignored: the picture will look wrong, but nothing crashes.
   defp guess(_unknown, _a, _b, _c), do: 0
 
-  for depth <- [1, 2, 4, 8, 16] do
+  for depth <- [1, 2, 4, 8] do
     defp samples(bytes, unquote(depth)), do: for(<<s::size(unquote(depth)) <- bytes>>, do: s)
   end
 
-  defp greys(row, {width, _, depth, type}, palette) do
-    bytes = :binary.list_to_bin(row)
+  defp greys(row, width, %{depth: depth, type: type}, palette) do
+    bytes = row |> :binary.list_to_bin() |> upper(depth)
 
     case type do
-      0 when depth == 8 -> bytes
+      0 when depth >= 8 -> bytes
       0 -> for s <- samples(bytes, depth), into: <<>>, do: <<div(255 * s, white(depth))>>
       2 -> for <<rgb::binary-size(3) <- bytes>>, into: <<>>, do: <<grey(rgb, 255)>>
       # A colour that the palette does not have is black.
@@ -176,6 +214,10 @@ defmodule Robot.Navigation.MapFile.Png do
     # The last byte of a row may hold more pixels than the row has.
     |> binary_part(0, width)
   end
+
+  # Of 16 bits the upper eight.
+  defp upper(bytes, 16), do: for(<<high, _low <- bytes>>, into: <<>>, do: <<high>>)
+  defp upper(bytes, _depth), do: bytes
 
   defp white(depth), do: Bitwise.bsl(1, depth) - 1
 

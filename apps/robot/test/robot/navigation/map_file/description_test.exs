@@ -26,11 +26,27 @@ defmodule Robot.Navigation.MapFile.DescriptionTest do
           with_line("image", "image: \"floor.pgm\""),
           with_line("image", "image: 'floor.pgm'  # the picture"),
           with_line("origin", "origin:\n- -1.0\n- -3.0\n- 0.0"),
+          with_line("origin", "origin: # of the corner\n  - -1.0 # left\n  - -3.0\n\n  - 0.0"),
           with_line("resolution", "resolution: 5e-2"),
           with_line("mode", "")
         ] do
       assert Description.parse(yaml) == Description.parse(@yaml)
     end
+  end
+
+  test "a quote belongs to a name only where it opens and closes it; a # in it is no remark" do
+    for {written, file} <- [
+          {"image: \"floor #2.pgm\" # the second", "floor #2.pgm"},
+          {"image: 'a \"b\".pgm'", "a \"b\".pgm"},
+          {"image: bob's floor.pgm # his", "bob's floor.pgm"},
+          {"image: floor#2.pgm", "floor#2.pgm"}
+        ] do
+      assert {:ok, %{image: ^file}} = Description.parse(with_line("image", written))
+    end
+
+    for written <- ["image: \"floor.pgm", "image: 'floor.pgm\"", "image: ''", "image: \"a\" b"],
+        do:
+          assert({:error, "image must be" <> _} = Description.parse(with_line("image", written)))
   end
 
   test "what is not surely free is wall" do
@@ -61,7 +77,11 @@ defmodule Robot.Navigation.MapFile.DescriptionTest do
           {with_line("origin", "origin: [0, 0, 1.57]"), ~r/^origin .* is turned/},
           {with_line("occupied_thresh", "occupied_thresh: 7"), ~r/^occupied_thresh cannot be 7/},
           {with_line("negate", "negate: 2"), ~r/^negate cannot be 2: 0 or 1/},
-          {with_line("mode", "mode: raw"), ~r/^mode cannot be raw/}
+          {with_line("mode", "mode: raw"), ~r/^mode cannot be raw/},
+          {@yaml <> "resolution: 0.1\n", ~r/^resolution is given twice$/},
+          {@yaml <> "origin:\n- 0\n- 0\n", ~r/^origin is given twice$/},
+          {with_line("origin", "origin:\n- -1.0 -3.0\n- 0.0"), ~r/^origin cannot be/},
+          {with_line("origin", "origin:"), ~r/^origin cannot be \[\]/}
         ] do
       assert {:error, line} = Description.parse(yaml)
       assert line =~ pattern
