@@ -43,9 +43,9 @@ defmodule System.NetnsCardsTest do
   end
 
   # Nodes with a mesh, each in the space of its name, or of another one.
-  defp nodes(net, names \\ @names, options \\ [], space \\ & &1) do
+  defp nodes(net, names \\ @names, options \\ [], space \\ & &1, env \\ []) do
     flags =
-      Vm.fleet_flags({0, 0, 0, 0}) ++
+      ~w(-proto_dist Elixir.Mesh.Distribution.Tcp -kernel connect_all false -kernel dist_auto_connect never) ++
         ~w(-start_epmd false -epmd_module Elixir.Mesh.Distribution.Epmd -kernel logger_level none) ++
         ["-setcookie", net.prefix]
 
@@ -56,6 +56,7 @@ defmodule System.NetnsCardsTest do
               name: name,
               host: "convoy",
               flags: flags,
+              env: env,
               through: ["ip", "netns", "exec", Net.space(net, space.(name))]
             ]
       )
@@ -199,6 +200,64 @@ defmodule System.NetnsCardsTest do
   test "what nobody can be sent is told where multicast is off", %{net: net} do
     [one] = nodes(net, [:mag1], multicast: false, peers: ["192.168.77.7:4370"])
     assert eventually(fn -> fault(one) end) == "nothing can be sent: network is unreachable"
+  end
+
+  test "a node with a card is heard and connected by that one, also by its next address", %{
+    net: net
+  } do
+    Net.ip(net, :mag1, ~w(link add eth1 type veth peer name nobody))
+    for card <- ~w(eth1 nobody), do: Net.ip(net, :mag1, ~w(link set #{card} up))
+    Net.ip(net, :mag1, ~w(addr add 10.78.0.1/24 dev eth1))
+    Net.ip(net, :mag1, ~w(route add default via 10.78.0.2))
+    [two] = nodes(net, [:mag2])
+    [one] = with_interface(net, "eth0")
+    met = fn -> meet?([one, two]) and Vm.call(two, Node, :list, []) == [one.node] end
+    eventually(met)
+    assert addresses(one) == [{10, 77, 0, 1}]
+
+    Net.move(net, :mag1)
+    eventually(fn -> addresses(one) == [Net.moved(net, :mag1)] end)
+    for {a, b} <- [{one, two}, {two, one}], do: Vm.call(a, :erlang, :disconnect_node, [b.node])
+    eventually(met)
+
+    # Who calls another address is refused, though it is a fellow.
+    Net.ip(net, :mag2, ~w(route add 10.78.0.0/24 via #{:inet.ntoa(Net.moved(net, :mag1))}))
+    port = Epmd.default_port("mag1")
+    {:ok, _socket} = Vm.call(two, :gen_tcp, :connect, [{10, 78, 0, 1}, port, []])
+    eventually(fn -> match?(%{elsewhere: 1}, Vm.call(one, Mesh, :refused, [])) end)
+  end
+
+  test "an interface that is absent is waited for, in words", %{net: net} do
+    [two] = nodes(net, [:mag2])
+
+    for {interface, line, comes} <- [
+          {"10.77.0.9",
+           "waits for 10.77.0.9, which no card has; there are eth0 10.77.0.1, lo 127.0.0.1",
+           ~w(addr add 10.77.0.9/24 dev eth0)},
+          {"wlan0", "waits for wlan0, which is no card of this machine; there are eth0, lo",
+           ~w(link set eth0 name wlan0)}
+        ] do
+      [one] = with_interface(net, interface)
+      assert eventually(fn -> fault(one) end) == line
+      if interface == "wlan0", do: Net.ip(net, :mag1, ~w(link set eth0 down))
+      Net.ip(net, :mag1, comes)
+      if interface == "wlan0", do: Net.ip(net, :mag1, ~w(link set wlan0 up))
+      eventually(fn -> meet?([one, two]) and Vm.call(two, Node, :list, []) == [one.node] end)
+      eventually(fn -> fault(one) == nil end)
+      Vm.stop(one)
+      eventually(fn -> alive(two) == [] end)
+      if interface == "10.77.0.9", do: Net.ip(net, :mag1, ~w(addr del 10.77.0.9/24 dev eth0))
+    end
+  end
+
+  # As `bin/node` and releases give it: to the distribution by the environment, to the mesh as an option.
+  defp with_interface(net, interface),
+    do: nodes(net, [:mag1], [interface: interface], & &1, [{"CONVOY_INTERFACE", interface}])
+
+  # Of the datagrams of a node.
+  defp addresses(node) do
+    protocol = Vm.call(node, :sys, :get_state, [Mesh.Server]).protocol
+    for {ip, _port} <- protocol.addresses, do: ip
   end
 
   # The log of a node, as a file.

@@ -138,7 +138,8 @@ defmodule Mesh do
 
   @doc """
   How many distribution connections were refused since the start, by reason: `stranger`, an address that is not the
-  fleet's; `too_often`; and `new_names`, too many names that this node did not know. Empty on a node that was started
+  fleet's; `too_often`; `new_names`, too many names that this node did not know; and `elsewhere`, who called another
+  address of this machine than that of its interface. Empty on a node that was started
   without a carrier of the mesh (`Mesh.Distribution.Access`).
   """
   @spec refused() :: %{Access.refusal() => non_neg_integer()}

@@ -18,6 +18,11 @@ defmodule Mesh.Interface do
   # That of `:inet` says of a card without a cable that it runs.
   def machine, do: with({:ok, rows} <- :net.getifaddrs(:all), do: {:ok, cards(rows)})
 
+  @doc "The same; a machine that does not tell has nothing."
+  @spec machine_or_none() :: machine()
+  def machine_or_none,
+    do: with({:ok, machine} <- machine(), do: machine, else: ({:error, _reason} -> []))
+
   defp cards(rows) do
     names = rows |> Enum.map(& &1.name) |> Enum.uniq()
 
