@@ -8,7 +8,7 @@ defmodule Mesh.Distribution.Listener do
   OTP accepts with the priority `max`, so that on a robot with one processor a flood would leave none to the others.
   From the first refusal until it lets somebody in, it therefore accepts with the priority `normal`.
   """
-  alias Mesh.Distribution.{Access, Epmd}
+  alias Mesh.Distribution.{Access, Epmd, Preload}
   alias Mesh.Distribution.Access.{Networks, Refusals}
   alias Mesh.Interface
 
@@ -19,6 +19,7 @@ defmodule Mesh.Distribution.Listener do
   """
   @spec open() :: :ok
   def open do
+    :ok = Preload.load()
     :ok = Refusals.open()
     peers = for {_node, ip, _port} <- Epmd.Peers.parse(environment(~c"CONVOY_PEERS")), do: ip
     allowed = String.split(environment(~c"CONVOY_ALLOW"), [",", " "], trim: true)
