@@ -14,11 +14,7 @@ if name = robot || System.get_env("CONVOY_NODE") do
 
   words = fn name -> name |> System.get_env("") |> String.split([",", " "], trim: true) end
 
-  interface =
-    case :inet.parse_ipv4strict_address(to_charlist(System.get_env("CONVOY_INTERFACE", ""))) do
-      {:ok, ip} -> [interface: ip]
-      {:error, :einval} -> []
-    end
+  interface = for text <- words.("CONVOY_INTERFACE"), do: {:interface, text}
 
   dist_port = number.("CONVOY_DIST_PORT", Mesh.Distribution.Epmd.default_port(name))
 

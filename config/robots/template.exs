@@ -111,7 +111,7 @@
   # How it meets the others.
   network: [
     # secret_file: "/etc/convoy/secret",   # stands above CONVOY_SECRET_FILE; best left out
-    # interface: "10.0.0.11",              # the address to listen on; all, unless given
+    # interface: "wlan0",                  # the network card, or the address as "10.0.0.11", to use; all, unless given
     # port: 4370,                          # UDP
     # multicast: {"239.255.67.86", 4371},  # false where it is blocked; then name some:
     # peers: ["10.0.0.12:4370"],

@@ -85,7 +85,7 @@ defmodule Docs.Checks do
     "nft add rule inet filter input ip saddr != 10.0.0.0/24 udp dport 4370-4371 drop" => @system,
     "erl … -proto_dist Elixir.Mesh.Distribution.Tls -ssl_dist_optfile certs/mag1/ssl_dist.conf" =>
       "it is a part of a command; apps/mesh/test/mesh/distribution/connection_log_test.exs runs such nodes",
-    ~S(iex --sname rem-1@lab --hidden --cookie "$COOKIE" --remsh mag1@lab --erl "-start_epmd false -kernel net_ticktime 8 -epmd_module Elixir.Mesh.Distribution.Epmd -pa _build/dev/lib/mesh/ebin") =>
+    ~S(iex --sname rem-1@lab --hidden --cookie "$COOKIE" --remsh mag1@lab --erl "-start_epmd false -kernel net_ticktime 8 -epmd_module Elixir.Mesh.Distribution.Epmd -pa _build/dev/lib/hal/ebin _build/dev/lib/mesh/ebin") =>
       @robot
   }
 
@@ -115,7 +115,7 @@ defmodule Docs.Checks do
     "-kernel prevent_overlapping_partitions",
     "config :swarm, mesh: [multicast",
     "config :swarm, mesh: [topologies",
-    "-pa _build/dev/lib/mesh/ebin",
+    "-pa _build/dev/lib/hal/ebin _build/dev/lib/mesh/ebin",
     # What programs print that are not run here.
     "Active: active (running)",
     "Now 3.00 m straight ahead.",

@@ -130,8 +130,16 @@ defmodule Mesh do
   def rejected, do: Table.value(:rejected, %{})
 
   @doc """
+  Why this node reaches nobody, on one line, such as `"wlan0 is not connected"`: a fault of the network that has lasted
+  for 3 s in which nobody was heard. `nil` if there is none, and on a node without a mesh.
+  """
+  @spec fault() :: String.t() | nil
+  def fault, do: Table.value(:fault, nil)
+
+  @doc """
   How many distribution connections were refused since the start, by reason: `stranger`, an address that is not the
-  fleet's; `too_often`; and `new_names`, too many names that this node did not know. Empty on a node that was started
+  fleet's; `too_often`; `new_names`, too many names that this node did not know; and `elsewhere`, who called another
+  address of this machine than that of its interface. Empty on a node that was started
   without a carrier of the mesh (`Mesh.Distribution.Access`).
   """
   @spec refused() :: %{Access.refusal() => non_neg_integer()}

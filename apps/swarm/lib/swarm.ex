@@ -193,7 +193,8 @@ defmodule Swarm do
   Emergency stop: all robots stop and are held until `reset/0`. It is sent at once by all
   available ways, and repeated for a second; each robot that hears of it tells the others, so that
   it also reaches those that this node does not reach. `:ok` when all robots that are known here
-  have answered that they are held; an error where none is known, because none has answered then.
+  have answered that they are held; an error where none is known, because none has answered then, and where this
+  machine has no network (`Mesh.fault/0`), although the robots here are held then.
   The hardware's own emergency stop stays the last resort: this one is software.
   """
   @spec estop() :: answer()
@@ -203,12 +204,23 @@ defmodule Swarm do
 
     case Commands.robots(:all) do
       {:ok, robots} ->
-        Commands.tell(robots, {:estop, call})
+        with :ok <- Commands.tell(robots, {:estop, call}), do: reached(robots)
 
       {:error, _none} ->
-        {:error, "the stop was sent, but no robot is known here to be held by it"}
+        {:error, "the stop was sent, but no robot is known here to be held by it#{why_not()}"}
     end
   end
+
+  # Those beyond a network that is gone are not known here.
+  defp reached(robots) do
+    if Mesh.fault(),
+      do:
+        {:error,
+         "#{Enum.join(robots, ", ")} held, but robots elsewhere are not reached#{why_not()}"},
+      else: :ok
+  end
+
+  defp why_not, do: if(line = Mesh.fault(), do: " (no network: #{line})", else: "")
 
   @doc """
   Releases the emergency stop. The stop ended the missions and orders of the robots: they stand

@@ -51,7 +51,8 @@ defmodule Hal.Event do
   | `[:mesh, :connected]`, `[:mesh, :disconnected]` | `at_ms` | `node`, by Erlang's distribution |
   | `[:mesh, :unknown_node]` | `at_ms` | `name`, `address`: a node has the secret, but is not in the roster |
   | `[:mesh, :duplicate_node]` | `at_ms` | `node`: another node uses this node's name |
-  | `[:mesh, :no_network]` | | `reason`, `interface`, `port`: no socket; tried again |
+  | `[:mesh, :no_network]` | `at_ms` | `line`: nobody was heard for 3 s, and this is why (`Mesh.fault/0`); once for each reason |
+  | `[:mesh, :network]` | `at_ms` | that is over |
   | `[:mesh, :libcluster]` | `at_ms` | `reason`: libcluster ended, and is restarted |
   | `[:swarm, :responder, :failure]` | | `robot`, `service`, `kind`, `reason`: the code of a service failed |
   | `[:swarm, :blackboard, :rival]` | | `robot`, `incarnation`, `node`: rows of another robot of this name came from that node |

@@ -12,6 +12,7 @@ defmodule Mesh.Log do
     :connected,
     :disconnected,
     :no_network,
+    :network,
     :unknown_node,
     :foreign,
     :duplicate_node,
@@ -47,10 +48,10 @@ defmodule Mesh.Log do
   def line(:connected, %{node: node}), do: {:debug, "mesh: connected to #{node}"}
   def line(:disconnected, %{node: node}), do: {:debug, "mesh: not connected to #{node} any more"}
 
-  def line(:no_network, %{reason: reason, interface: ip, port: port}) do
-    {:warning,
-     "mesh: no UDP on #{:inet.ntoa(ip)}, port #{port}: #{:inet.format_error(reason)}; trying again"}
-  end
+  def line(:no_network, %{line: line}),
+    do: {:warning, "mesh: no network, other robots are neither heard nor reached: #{line}"}
+
+  def line(:network, _about), do: {:info, "mesh: the network is there again"}
 
   def line(:unknown_node, %{name: name, address: {ip, _port}}) do
     {:warning,

@@ -6,7 +6,7 @@ defmodule Mesh.Options do
   |---|---|
   | `secret_file` | the fleet's secret (`mix fleet.secret` makes one), or `secret`, as loaded; default: where `Mesh.Secret` looks |
   | `fleet` | the names of all possible robots; default `mag1` to `mag100`, `min1` to `min100` |
-  | `interface` | the address to listen on and to send from; default all |
+  | `interface` | the address, or the network card, to listen on and to send from (`Mesh.Interface`); default all |
   | `port` | the UDP port; default 4370, 0 takes any |
   | `multicast` | group and port of the gossip, default `{{239, 255, 67, 86}, 4371}`; `false` for none |
   | `peers` | addresses to try, `["10.0.0.7:4370"]`, if multicast is blocked |
@@ -19,7 +19,7 @@ defmodule Mesh.Options do
   | `degree` | above that, each is connected to about this many others, 2 to 30; default 8 |
   """
   alias Hal.Options
-  alias Mesh.{Secret, Strategy}
+  alias Mesh.{Interface, Secret, Strategy}
   alias Mesh.Distribution.Access.Networks
   alias Mesh.Protocol.Roster
 
@@ -27,7 +27,7 @@ defmodule Mesh.Options do
   # The strategies check addresses.
   @table [
     secret_file: [{:path, "the path of the fleet's secret"}, default: nil],
-    interface: [:ipv4, default: {0, 0, 0, 0}],
+    interface: [{:check, &Interface.read/1, Interface.allowed()}, default: {0, 0, 0, 0}],
     port: [{:integer, 0, 65_535}, default: 4370],
     dist_port: [{:integer, 0, 65_535}, default: nil],
     allow: [
@@ -83,7 +83,7 @@ defmodule Mesh.Options do
           secret: Secret.t(),
           secret_file: Path.t() | nil,
           fleet: [atom(), ...],
-          interface: :inet.ip4_address(),
+          interface: Interface.t(),
           port: :inet.port_number(),
           multicast: Strategy.address() | false,
           peers: [Strategy.address() | String.t()],

@@ -4,12 +4,13 @@ defmodule Mesh.Server do
   What others ask often is in a table that all processes can read (`Mesh.Table`). What it hears
   goes to the consumer that it gets at its start (`Mesh.Consumer`).
 
-  Sockets that cannot be opened are tried again with back-off; a robot without a network drives on.
+  It follows the cards and addresses of the machine, five times a second (`Mesh.Interface`). Sockets that cannot be
+  opened are tried again with back-off; a robot without a network drives on, and says so (`Mesh.fault/0`).
   """
   use GenServer
   alias Hal.{Event, HardenedServer}
-  alias Mesh.{Backoff, Nonblocking, Options, Protocol, Sockets, Table}
-  alias Mesh.Protocol.{NodeTable, Roster, WireTerm}
+  alias Mesh.{Backoff, Fault, Interface, Nonblocking, Options, Protocol, Sockets, Table}
+  alias Mesh.Protocol.{NodeTable, Packet, Roster, WireTerm}
   alias Mesh.Distribution.{Access, Dialer, Epmd}
 
   @tick_ms 200
@@ -47,8 +48,12 @@ defmodule Mesh.Server do
       consumer: consumer,
       services: services,
       protocol: protocol,
+      machine: machine([]),
       sockets: nil,
+      closed: nil,
       backoff: Backoff.new(now()),
+      fault: %Fault{},
+      lately: :nothing,
       written: written,
       chance: :rand.seed_s(:exsss, session),
       ticks: 0,
@@ -57,7 +62,7 @@ defmodule Mesh.Server do
       next: now()
     }
 
-    {:ok, s |> open() |> locate() |> publish() |> schedule()}
+    {:ok, s |> connect() |> publish() |> schedule()}
   end
 
   # Heartbeats go to each node by its address, and also by multicast, because either way may be
@@ -117,44 +122,100 @@ defmodule Mesh.Server do
 
   def handle_info(:tick, s) do
     {chance, state} = :rand.uniform_s(s.chance)
-    s = locate(open(%{s | chance: state, ticks: s.ticks + 1}))
-    if s.sockets && rem(s.ticks, @rejoin_every) == 0, do: Sockets.rejoin(s.sockets)
+    s = connect(%{s | chance: state, ticks: s.ticks + 1, machine: machine(s.machine)})
     s = run(s, Protocol.tick(s.protocol, Dialer.links(), now(), chance))
-    {:noreply, s |> publish() |> schedule()}
+    {:noreply, s |> judge() |> publish() |> schedule()}
   end
 
   # A reset of the network shows as an error on the socket.
   def handle_info({:udp_error, _socket, _reason}, s), do: {:noreply, s}
   def handle_info(_other, s), do: HardenedServer.drop(s)
 
-  defp open(%{sockets: nil} = s) do
-    if Backoff.due?(s.backoff, now()), do: try_open(s), else: s
+  # Cards and addresses come and go at any time. If the system does not tell, they are as before.
+  defp machine(before) do
+    case Interface.machine() do
+      {:ok, machine} -> machine
+      {:error, _reason} -> before
+    end
   end
 
-  defp open(s), do: s
+  defp connect(s) do
+    on = Interface.addresses(s.options.interface, s.machine)
+    s |> open(bound(s.options.interface, on)) |> follow(on)
+  end
 
-  defp try_open(s) do
-    case Sockets.open(s.options) do
+  # The address that the node's own socket is bound to; `nil` while it is absent.
+  defp bound({0, 0, 0, 0} = all, _on), do: all
+  defp bound(_interface, on), do: List.first(on)
+
+  defp open(%{sockets: nil} = s, nil), do: s
+
+  defp open(%{sockets: nil} = s, ip),
+    do: if(Backoff.due?(s.backoff, now()), do: try_open(s, ip), else: s)
+
+  defp open(%{sockets: %{ip: ip}} = s, ip), do: s
+
+  defp open(s, ip) do
+    :ok = Sockets.close(s.sockets)
+    open(%{s | sockets: nil, backoff: Backoff.new(now())}, ip)
+  end
+
+  defp try_open(s, ip) do
+    case Sockets.open(s.options, ip) do
       {:ok, sockets} ->
-        %{s | sockets: sockets}
+        %{s | sockets: sockets, closed: nil}
 
       {:error, reason} ->
-        about = %{reason: reason, interface: s.options.interface, port: s.options.port}
-        Event.execute([:mesh, :no_network], %{}, about)
         {chance, state} = :rand.uniform_s(s.chance)
-        %{s | chance: state, backoff: Backoff.tried(s.backoff, now(), chance)}
+        closed = "no UDP on #{Interface.text(ip)}, port #{s.options.port}: #{words(reason)}"
+        %{s | closed: closed, chance: state, backoff: Backoff.tried(s.backoff, now(), chance)}
     end
   end
 
-  # The addresses of this machine may change at any time.
-  defp locate(%{sockets: nil} = s), do: s
+  defp follow(%{sockets: nil} = s, _on), do: s
 
-  defp locate(s) do
-    case Sockets.addresses(s.sockets, s.options) do
-      {:ok, addresses} -> %{s | protocol: Protocol.locate(s.protocol, addresses)}
-      {:error, _reason} -> s
-    end
+  defp follow(s, on) do
+    again? = rem(s.ticks, @rejoin_every) == 0
+    sockets = if again?, do: Sockets.rejoin(s.sockets), else: s.sockets
+    addresses = Sockets.addresses(sockets, s.options, s.machine)
+    # What came from an address that a datagram does not name would be refused.
+    named = for {ip, _port} <- Enum.take(addresses, Packet.most_addresses()), ip in on, do: ip
+
+    %{
+      s
+      | sockets: Sockets.follow(sockets, named),
+        protocol: Protocol.locate(s.protocol, addresses)
+    }
   end
+
+  # Whoever is heard shows that there is a network.
+  defp judge(s) do
+    heard? = NodeTable.addresses(s.protocol.node_table) != []
+    {fault, news} = Fault.tick(s.fault, if(heard?, do: nil, else: trouble(s)), now())
+
+    case news do
+      {:fault, line} -> Event.execute([:mesh, :no_network], %{at_ms: now()}, %{line: line})
+      :healed -> Event.execute([:mesh, :network], %{at_ms: now()}, %{})
+      nil -> :ok
+    end
+
+    %{s | fault: fault, lately: if(s.lately == :sent, do: :nothing, else: s.lately)}
+  end
+
+  defp trouble(s) do
+    Interface.trouble(s.options.interface, s.machine) || (s.sockets == nil && s.closed) ||
+      deaf(s.sockets) || lost(s.lately)
+  end
+
+  defp deaf(%{deaf: reason, multicast: {_group, port}}) when reason != nil,
+    do: "no multicast is heard on UDP port #{port}: #{words(reason)}"
+
+  defp deaf(_listening), do: nil
+
+  defp lost({:error, reason}), do: "nothing can be sent: #{words(reason)}"
+  defp lost(_sent), do: nil
+
+  defp words(reason), do: reason |> :inet.format_error() |> List.to_string()
 
   defp run(s, {protocol, effects}) do
     changed? = Enum.any?(effects, &match?({:node, _, _}, &1))
@@ -166,8 +227,11 @@ defmodule Mesh.Server do
 
   defp carry_out({:send, address, datagram}, s) do
     # What the network does not accept now is lost, as any datagram may be.
-    _ = Sockets.send(s.sockets, address, datagram)
-    %{s | sent: s.sent + 1}
+    case {Sockets.send(s.sockets, address, datagram), s.lately} do
+      {:ok, _lately} -> %{s | sent: s.sent + 1, lately: :sent}
+      {{:error, _reason}, :sent} -> %{s | sent: s.sent + 1}
+      {{:error, reason}, _lately} -> %{s | sent: s.sent + 1, lately: {:error, reason}}
+    end
   end
 
   defp carry_out({:beat, robot, node, beat}, s) do
@@ -205,7 +269,8 @@ defmodule Mesh.Server do
   # For processes that read it without asking.
   defp publish(%{protocol: %{node_table: node_table, roster: roster, rejected: rejected}} = s) do
     :ok = Access.heard(for({ip, _port} <- NodeTable.addresses(node_table), do: ip), now())
-    %{s | written: Table.write(s.written, node_table, roster, rejected, now())}
+    written = Table.write(s.written, node_table, roster, rejected, s.fault.told, now())
+    %{s | written: written}
   end
 
   # The address that the connection to a node goes to.

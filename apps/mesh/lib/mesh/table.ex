@@ -9,7 +9,7 @@ defmodule Mesh.Table do
   | `{{:robot, robot}, node, boot, sequence, at_ms}` | a robot's newest heartbeat, and its node |
   | `{{:node, node}, heard_ms, onward, hears}` | when a node was last heard, to which nodes it has a working connection, and which nodes it hears |
   | `{:beyond, robots}` | robots on nodes that other nodes hear and this one does not |
-  | `{:number, number}`, `{:rejected, counts}` | as in `t:Mesh.view/0` and `Mesh.rejected/0` |
+  | `{:number, number}`, `{:rejected, counts}`, `{:fault, line}` | as in `t:Mesh.view/0`, `Mesh.rejected/0` and `Mesh.fault/0` |
 
   The table ends with the server that owns it. Until the next one starts, it reads as empty.
   """
@@ -35,12 +35,19 @@ defmodule Mesh.Table do
     do: :ets.insert(@table, {{:robot, robot}, node, boot, sequence, now_ms})
 
   @doc "Writes what has changed since the last write."
-  @spec write(written(), NodeTable.t(), Roster.t(), %{atom() => pos_integer()}, integer()) ::
-          written()
-  def write(written, node_table, roster, rejected, now_ms) do
+  @spec write(
+          written(),
+          NodeTable.t(),
+          Roster.t(),
+          %{atom() => pos_integer()},
+          fault :: String.t() | nil,
+          integer()
+        ) :: written()
+  def write(written, node_table, roster, rejected, fault, now_ms) do
     :ets.insert(@table, [
       {:number, node_table.number},
       {:rejected, rejected},
+      {:fault, fault},
       {:beyond, Routing.beyond(node_table, now_ms)}
     ])
 
@@ -71,7 +78,7 @@ defmodule Mesh.Table do
   @spec there?() :: boolean()
   def there?, do: :ets.whereis(@table) != :undefined
 
-  @doc "The value of a row with two fields: `:server`, `:beyond`, `:number` or `:rejected`."
+  @doc "The value of a row with two fields: `:server`, `:beyond`, `:number`, `:rejected` or `:fault`."
   @spec value(atom(), default :: term()) :: term()
   def value(key, default) do
     case SafeTable.lookup(@table, key) do

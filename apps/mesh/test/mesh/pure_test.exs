@@ -6,6 +6,8 @@ defmodule Mesh.PureTest do
   alias Mesh.Distribution.Topology
 
   doctest Mesh.Backoff
+  doctest Mesh.Fault
+  doctest Mesh.Interface
   doctest Mesh.Protocol.Beacon
   doctest Mesh.Protocol.Challenge
   doctest Mesh.Protocol.ClockOffset
@@ -110,7 +112,8 @@ defmodule Mesh.PureTest do
           {[peers: :all], "mesh option peers cannot be :all: a list of addresses such as"},
           {[allow: ["10.0.1.7/24"]],
            ~s(mesh option allow.1 cannot be "10.0.1.7/24": an address or a network)},
-          {[interface: "eth0"], ~s(mesh option interface cannot be "eth0": an IPv4 address)},
+          {[interface: "300.1.2.3"],
+           ~s(mesh option interface cannot be "300.1.2.3": an IPv4 address such as "10.0.0.7", or the name of a network card)},
           {[multicast: nil], "mesh option multicast cannot be nil"},
           {[fleet: []], "mesh option fleet cannot be []"},
           {[fleet: [:"mag1\n"]], "mesh option fleet.1 cannot be"},

@@ -4,9 +4,9 @@ defmodule Mesh.SocketsTest do
 
   defp open(options) do
     {:ok, options} = Options.new([secret: Air.secret(), port: 0, multicast: false] ++ options)
-    {:ok, sockets} = Sockets.open(options)
-    {:ok, addresses} = Sockets.addresses(sockets, options)
-    {addresses, sockets.port}
+    {:ok, machine} = Mesh.Interface.machine()
+    {:ok, sockets} = Sockets.open(options, options.interface)
+    {Sockets.addresses(sockets, options, machine), sockets.port}
   end
 
   test "a node that listens on all interfaces has all addresses of the machine, the loopback's last" do

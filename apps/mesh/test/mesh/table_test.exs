@@ -32,7 +32,7 @@ defmodule Mesh.TableTest do
   test "who is there, and who is not, each by a row of its own" do
     now_ms = now()
     roster = Roster.new(:a@lab, [:a, :b, :c, :d])
-    written = Table.write(Table.new(), torn(now_ms), roster, %{unsigned: 2}, now_ms)
+    written = Table.write(Table.new(), torn(now_ms), roster, %{unsigned: 2}, nil, now_ms)
     Table.beat(:b, :b@lab, {5, 9}, now_ms)
     Table.beat(:c, :c@lab, {1, 1}, now_ms - 3_000)
 
@@ -55,7 +55,7 @@ defmodule Mesh.TableTest do
 
     # `c` speaks again: it is not beyond any more.
     {table, _up} = NodeTable.hear(torn(now_ms), "c@lab", @address, now_ms)
-    assert Table.write(written, table, roster, %{}, now_ms) == written
+    assert Table.write(written, table, roster, %{}, nil, now_ms) == written
     assert {Mesh.beyond(), Mesh.silent?(:c@lab)} == {[], false}
   end
 
@@ -74,7 +74,7 @@ defmodule Mesh.TableTest do
             NodeTable.beacon(node_table, text, beacon, now())
           end)
 
-        Table.write(Table.new(), node_table, roster, %{}, now())
+        Table.write(Table.new(), node_table, roster, %{}, nil, now())
         Table.beat(:r1, :r1@lab, {1, 1}, now())
         looked_up = [Table.robot(:r1), Table.heard_ms(:r1@lab), Table.value(:beyond, [])]
         :ets.delete(Table)

@@ -5,12 +5,13 @@ defmodule Swarm.Application do
   alias Mesh.{Log, Options}
   alias Mesh.Distribution.ConnectionLog
   alias Swarm.MemberSpec
-  alias Swarm.Host.{DepartureFile, ReleaseBoot, Systemd}
+  alias Swarm.Host.{DepartureFile, ReleaseBoot, Resolver, Systemd}
 
   # With `config :swarm, boot: true`, as in a release, the node is the robot that its environment
   # names.
   @impl Application
   def start(_type, _arguments) do
+    :ok = Resolver.open()
     environment = System.get_env()
     :ok = Robot.Devices.Log.attach()
 
@@ -22,6 +23,9 @@ defmodule Swarm.Application do
       {:ok, supervisor}
     end
   end
+
+  @impl Application
+  def stop(_state), do: Resolver.close()
 
   defp robot(false, _environment), do: {:ok, :none}
 

@@ -28,6 +28,8 @@ defmodule Swarm.Status do
   (`Swarm.Membership.Peers`). The line names the robots that it knows only by way of others as not
   heard. `Swarm.matrix/0` shows the same for all robots as a table.
 
+  A robot whose machine has no network says `NO NETWORK`, and why (`network`; `Mesh.fault/0`).
+
   The status of a robot that does not answer comes from its row on the blackboard (`from: :row`),
   with that age: `…, age 1240 ms by its row`.
   """
@@ -66,6 +68,7 @@ defmodule Swarm.Status do
                 hears: [],
                 view: nil,
                 rejected: %{},
+                network: nil,
                 age_ms: nil
               ]
 
@@ -95,6 +98,7 @@ defmodule Swarm.Status do
           hears: [atom()],
           view: view() | nil,
           rejected: %{atom() => pos_integer()},
+          network: String.t() | nil,
           age_ms: non_neg_integer() | nil
         }
 
@@ -139,6 +143,7 @@ defmodule Swarm.Status do
       hears: Peers.heard(receiver.peers, now_ms),
       view: {Peers.view_number(receiver.peers, now_ms), Peers.view(receiver.peers, now_ms)},
       rejected: receiver.rejected,
+      network: Mesh.fault(),
       age_ms: age(entries)
     }
   end
@@ -228,6 +233,7 @@ defmodule Swarm.Status do
         status.leader && "leader #{status.leader}",
         status.view && "view #{elem(status.view, 0)}",
         "hears #{length(status.hears)}" <> deaf(status),
+        status.network && "NO NETWORK (#{status.network})",
         dropped > 0 && "dropped #{dropped} messages",
         "age #{status.age_ms || "?"} ms" <> if(status.from == :row, do: " by its row", else: "")
       ]

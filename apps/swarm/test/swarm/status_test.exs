@@ -15,6 +15,9 @@ defmodule Swarm.StatusTest do
 
     assert line.(blocked_by: "the landmark", leader: :min1) =~
              ", BLOCKED by the landmark, leader min1,"
+
+    assert line.(network: "wlan0 is not connected") =~
+             ", hears 0, NO NETWORK (wlan0 is not connected), age"
   end
 
   test "a robot's row says what blocks it, as text of limited length" do

@@ -1,7 +1,7 @@
 defmodule Vm.Net do
   @moduledoc """
   A network of our own on this machine: a namespace with two bridges (the switch), and one for
-  each robot, with a cable to the switch. Nothing of it is seen outside, and it goes with whoever
+  each robot, with a cable to the switch and no route but that to its network. Nothing of it is seen outside, and it goes with whoever
   made it, however that ends. Guests have namespaces and cables as robots do, and belong to nobody's fleet.
 
       net = Vm.Net.create([:mag1, :mag2, :mag3], folder)
@@ -96,7 +96,6 @@ defmodule Vm.Net do
     ip(~w(-n #{there} addr add #{text(address(net, robot))}/24 dev eth0))
     ip(~w(-n #{there} link set lo up))
     ip(~w(-n #{there} link set eth0 up))
-    ip(~w(-n #{there} route add 224.0.0.0/4 dev eth0))
   end
 
   @doc "Ends it, and waits until its names are free."
@@ -132,6 +131,10 @@ defmodule Vm.Net do
   @spec address(t(), atom()) :: :inet.ip4_address()
   def address(net, robot), do: {10, 77, 0, number(net, robot)}
 
+  @doc "Runs the program `ip` with these arguments in the namespace of a robot or guest, for cards and routes of its own."
+  @spec ip(t(), atom(), [String.t()]) :: :ok
+  def ip(net, who, arguments), do: ip(["-n", space(net, who) | arguments])
+
   @doc "Cuts it in two: the second group's cables go into the other bridge."
   @spec split(t(), [[atom()]]) :: :ok
   def split(net, [_stay, go]) do
@@ -154,7 +157,6 @@ defmodule Vm.Net do
     there = space(net, robot)
     ip(~w(-n #{there} addr flush dev eth0))
     ip(~w(-n #{there} addr add #{text(moved(net, robot))}/24 dev eth0))
-    ip(~w(-n #{there} route replace 224.0.0.0/4 dev eth0))
   end
 
   @doc "The address of a robot that has moved."

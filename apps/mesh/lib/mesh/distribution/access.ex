@@ -10,6 +10,8 @@ defmodule Mesh.Distribution.Access do
   | from which signed datagrams came | for 10 minutes after the last one |
   | any other | never |
 
+  A node with an `interface` (`Mesh.Interface`) lets in who has called that, or the loopback, and nobody else.
+
   Each of these has a rate, too: this machine, each configured network and each address that was heard may call 20 times
   at once, and 10 times a second in the long run. Without TLS, names that this node has no atom for have another rate:
   20 at once, and then one a second from this machine and from all configured networks, where shells come from, but one
@@ -20,7 +22,7 @@ defmodule Mesh.Distribution.Access do
   leaves nothing in the table. Without a carrier there is no table, nobody asks, and what is told here is dropped.
   """
   alias Mesh.Distribution.Access.{Bucket, Networks}
-  alias Mesh.SafeTable
+  alias Mesh.{Interface, SafeTable}
 
   @table __MODULE__
   @heard_ms 600_000
@@ -33,16 +35,20 @@ defmodule Mesh.Distribution.Access do
   # More rows than a fleet has addresses: each has one because it was heard, and one for its attempts.
   @most 4_096
 
-  @typedoc "Why an address is refused: it is not one of the fleet's, or has called, or by new names, too often."
-  @type refusal :: :stranger | :too_often | :new_names
+  @typedoc """
+  Why an address is refused: it is not one of the fleet's, or has called, or by new names, too often; or it has called
+  an address of this machine that is not that of its interface.
+  """
+  @type refusal :: :stranger | :too_often | :new_names | :elsewhere
 
-  @doc "Creates the table, with the networks of the environment; the calling process owns it."
-  @spec open([Networks.t()]) :: :ok
-  def open(environment) do
+  @doc "Creates the table, with the interface and the networks of the environment; the calling process owns it."
+  @spec open(Interface.t(), [Networks.t()]) :: :ok
+  def open(interface, environment) do
     # That of a distribution that was stopped may still be there.
     if there?(), do: :ets.delete(@table)
     @table = :ets.new(@table, [:named_table, :public, read_concurrency: true])
-    true = :ets.insert(@table, [{:environment, environment}, {:options, []}])
+    rows = [interface: interface, environment: environment, options: []]
+    true = :ets.insert(@table, rows)
     :ok
   end
 
@@ -75,7 +81,17 @@ defmodule Mesh.Distribution.Access do
   def check(ip, called, now_ms) do
     case origin(ip, called, now_ms) do
       nil -> {:error, :stranger}
-      {_kind, who} -> take({:attempts, who}, @attempts, :too_often, now_ms)
+      {_kind, who} -> take_if(called?(called), {:attempts, who}, @attempts, :too_often, now_ms)
+    end
+  end
+
+  defp take_if(true, key, per_minute, why, now_ms), do: take(key, per_minute, why, now_ms)
+  defp take_if(false, _key, _per_minute, _why, _now_ms), do: {:error, :elsewhere}
+
+  defp called?(ip) do
+    case SafeTable.lookup(@table, :interface) do
+      [interface: interface] -> Interface.called?(interface, ip, &Interface.machine_or_none/0)
+      [] -> true
     end
   end
 
@@ -100,8 +116,8 @@ defmodule Mesh.Distribution.Access do
   # Who it is that calls, and so whose rates count: all addresses of this machine are one, and all of a network.
   defp origin(ip, called, now_ms) do
     cond do
-      # The kernel drops what comes from elsewhere with an address of this machine.
-      ip == called or loopback?(ip) -> {:local, :local}
+      # The kernel drops what comes from elsewhere with an address of this machine, or to its loopback.
+      ip == called or loopback?(ip) or loopback?(called) -> {:local, :local}
       heard?(ip, now_ms) -> {:heard, ip}
       network = configured(:options, ip) || configured(:environment, ip) -> {:configured, network}
       true -> nil

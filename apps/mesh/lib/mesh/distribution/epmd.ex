@@ -21,6 +21,7 @@ defmodule Mesh.Distribution.Epmd do
   table accepts no more names. No text becomes an atom here.
   """
   alias Mesh.Distribution.Epmd.Peers
+  alias Mesh.Distribution.Preload
 
   @table __MODULE__
   @most 1_024
@@ -60,7 +61,10 @@ defmodule Mesh.Distribution.Epmd do
 
   @doc false
   @spec start_link() :: GenServer.on_start()
-  def start_link, do: :proc_lib.start_link(__MODULE__, :init, [self()])
+  def start_link do
+    :ok = Preload.load()
+    :proc_lib.start_link(__MODULE__, :init, [self()])
+  end
 
   @doc false
   @spec init(pid()) :: no_return()

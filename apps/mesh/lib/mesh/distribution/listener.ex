@@ -8,32 +8,61 @@ defmodule Mesh.Distribution.Listener do
   OTP accepts with the priority `max`, so that on a robot with one processor a flood would leave none to the others.
   From the first refusal until it lets somebody in, it therefore accepts with the priority `normal`.
   """
-  alias Mesh.Distribution.{Access, Epmd}
+  alias Mesh.Distribution.{Access, Epmd, Preload}
   alias Mesh.Distribution.Access.{Networks, Refusals}
+  alias Mesh.Interface
 
   @doc """
-  Creates the tables of who may connect, from `CONVOY_ALLOW` and `CONVOY_PEERS`. The calling process, `:net_kernel`,
-  owns them. A node that listens on one address only also calls from there, since that is where others hear it.
+  Creates the tables of who may connect, from `CONVOY_INTERFACE`, `CONVOY_ALLOW` and `CONVOY_PEERS`. The calling
+  process, `:net_kernel`, owns them. A node with an interface listens on all addresses, because that of its interface
+  may come later and change, and refuses who has called another (`Mesh.Distribution.Access`).
   """
   @spec open() :: :ok
   def open do
-    :ok = call_from(:application.get_env(:kernel, :inet_dist_use_interface))
+    :ok = Preload.load()
     :ok = Refusals.open()
     peers = for {_node, ip, _port} <- Epmd.Peers.parse(environment(~c"CONVOY_PEERS")), do: ip
     allowed = String.split(environment(~c"CONVOY_ALLOW"), [",", " "], trim: true)
 
     Access.open(
-      for text <- peers ++ allowed, {:ok, network} <- [Networks.read(text)], do: network
+      interface(),
+      for(text <- peers ++ allowed, {:ok, network} <- [Networks.read(text)], do: network)
     )
   end
 
-  defp call_from({:ok, ip}) do
+  defp interface do
+    case Interface.read(environment(~c"CONVOY_INTERFACE")) do
+      {:ok, interface} -> interface
+      :error -> {0, 0, 0, 0}
+    end
+  end
+
+  @doc """
+  Before a connection is made: a node that listens on one address only, or has an interface, calls from there, since
+  that is where others hear it.
+  """
+  @spec call_from() :: :ok
+  def call_from do
+    case {:application.get_env(:kernel, :inet_dist_use_interface), interface()} do
+      {{:ok, ip}, _interface} -> call_from(ip)
+      {:undefined, {0, 0, 0, 0}} -> :ok
+      {:undefined, interface} -> interface |> own() |> call_from()
+    end
+  end
+
+  # While it is absent nobody can be called: the loopback has no way to them.
+  defp own(interface) do
+    case Interface.addresses(interface, Interface.machine_or_none()) do
+      [ip | _others] -> ip
+      [] -> {127, 0, 0, 1}
+    end
+  end
+
+  defp call_from(ip) do
     options = :application.get_env(:kernel, :inet_dist_connect_options, [])
     options = [{:ip, ip} | List.keydelete(options, :ip, 0)]
     :application.set_env(:kernel, :inet_dist_connect_options, options)
   end
-
-  defp call_from(:undefined), do: :ok
 
   @doc """
   Whether this node may connect to that one, judged by the address that it would be called at. One that does not

@@ -33,7 +33,10 @@ defmodule Mesh.Distribution.Tcp_dist do
 
   @doc false
   @spec setup(node(), term(), node(), :longnames | :shortnames, timeout()) :: pid()
-  def setup(node, type, me, names, ms), do: :inet_tcp_dist.setup(node, type, me, names, ms)
+  def setup(node, type, me, names, ms) do
+    :ok = Listener.call_from()
+    :inet_tcp_dist.setup(node, type, me, names, ms)
+  end
 
   @doc false
   @spec close(port()) :: :ok

@@ -46,7 +46,10 @@ defmodule Mesh.Distribution.Tls_dist do
 
   @doc false
   @spec setup(node(), term(), node(), :longnames | :shortnames, timeout()) :: pid()
-  def setup(node, type, me, names, ms), do: otp(:setup, [node, type, me, names, ms])
+  def setup(node, type, me, names, ms) do
+    :ok = Listener.call_from()
+    otp(:setup, [node, type, me, names, ms])
+  end
 
   @doc false
   @spec close(port()) :: :ok

@@ -14,7 +14,7 @@ defmodule Mesh.Distribution.AccessTest do
 
   setup do
     :ok = Refusals.open()
-    :ok = Access.open([])
+    :ok = Access.open({0, 0, 0, 0}, [])
   end
 
   defp networks(texts) do
@@ -38,8 +38,22 @@ defmodule Mesh.Distribution.AccessTest do
     assert Access.check(@stranger, @own, 3) == {:error, :stranger}
   end
 
+  test "with an interface, only who has called that, or the loopback, may connect" do
+    for interface <- [@own, "no-card"] do
+      :ok = Access.open(interface, [])
+      :ok = Access.heard([@fellow], 0)
+      there? = interface == @own
+      assert Access.check(@fellow, @own, 1) == :ok == there?
+      assert Access.check(@fellow, {10, 0, 1, 1}, 1) == {:error, :elsewhere}
+      assert Access.check({10, 0, 1, 1}, {10, 0, 1, 1}, 1) == {:error, :elsewhere}
+      # A shell on this machine, whatever address it calls from.
+      assert Access.check({10, 0, 1, 1}, {127, 0, 0, 1}, 1) == :ok
+      assert Access.check({10, 0, 0, 77}, @own, 1) == {:error, :stranger}
+    end
+  end
+
   test "what the environment names stays, whatever the options say" do
-    :ok = Access.open(networks(["10.0.0.66"]))
+    :ok = Access.open({0, 0, 0, 0}, networks(["10.0.0.66"]))
     :ok = Access.configure([])
     assert Access.check(@stranger, @own, 0) == :ok
     assert Access.reachable?(@stranger, 0)
@@ -142,11 +156,11 @@ defmodule Mesh.Distribution.AccessTest do
         refute_receive %{address: _}, 50
       end)
 
-    assert Refusals.counts() == %{stranger: 1_041, too_often: 1, new_names: 0}
+    assert Refusals.counts() == %{stranger: 1_041, too_often: 1, new_names: 0, elsewhere: 0}
     assert log =~ "refused a node at 10.0.0.66: not an address of the fleet\n"
     assert log =~ "10.0.0.66: not an address of the fleet (999 more attempts since"
     assert log =~ "10.0.0.2: it calls too often"
-    assert :ets.info(Refusals, :size) <= 23
+    assert :ets.info(Refusals, :size) <= 24
   end
 
   test "the listener reads the name of both handshakes, and lets all other messages pass" do

@@ -5,7 +5,7 @@ defmodule Mesh.Distribution.CarriersTest do
   """
   # Each node has a name and a port of its own.
   use ExUnit.Case, async: true
-  alias Mesh.Distribution.{Access, Certs}
+  alias Mesh.Distribution.{Access, Certs, ConnectionLog, Preload, Tcp_dist, Tls_dist}
   @moduletag :realtime
   @moduletag :tmp_dir
 
@@ -71,6 +71,46 @@ defmodule Mesh.Distribution.CarriersTest do
       assert Vm.call(first, Mesh, :refused, []).too_often in 1..(5 * @at_once)
 
       assert Hal.Lines.eventually(fn -> Vm.call(second, Node, :connect, [first.node]) end)
+    end
+  end
+
+  test "a node whose code is not found yet lets in and refuses as ever", %{tmp_dir: tmp} do
+    for {[port, other | _], flags, _otp} <- carriers(tmp) do
+      [first, second] = for port <- [port, other], do: node(port, flags)
+
+      # As while Mix starts, which goes from folder to folder, and so away from a path that begins nowhere.
+      paths = Vm.call(first, :code, :get_path, [])
+      others = Enum.reject(paths, &("#{&1}" =~ ~r"/lib/(hal|mesh)/ebin$"))
+      assert length(others) == length(paths) - 2
+      true = Vm.call(first, :code, :set_path, [others])
+      :ok = Vm.call(first, :erl_prim_loader, :set_path, [[]])
+
+      assert Vm.call(second, Node, :connect, [first.node])
+      calls = for _ <- 1..(3 * @at_once), do: Task.async(fn -> say_hello(port, "x@y") end)
+      Task.await_many(calls, 60_000)
+      assert %{too_often: refused} = Vm.call(first, Access.Refusals, :counts, [])
+      assert refused > 0
+      assert Vm.call(first, :code, :is_loaded, [Hal.Event])
+      assert Vm.call(second, Node, :disconnect, [first.node])
+      assert Hal.Lines.eventually(fn -> Vm.call(second, Node, :connect, [first.node]) end)
+    end
+  end
+
+  test "all that the distribution runs is loaded first" do
+    entries = [Mesh.Distribution.Epmd, Tcp_dist, Tls_dist, ConnectionLog, ConnectionLog.Peer]
+    called = called(entries, []) -- [Tcp_dist, Tls_dist]
+    assert Enum.sort(called -- [Preload]) == Enum.sort(Preload.modules())
+  end
+
+  # The modules of this project that are called from these, directly or not, and these.
+  defp called([], seen), do: seen
+
+  defp called([module | rest], seen) do
+    if module in seen or not String.starts_with?("#{module}", ["Elixir.Mesh.", "Elixir.Hal."]) do
+      called(rest, seen)
+    else
+      {:ok, {_module, imports: calls}} = :beam_lib.chunks(:code.which(module), [:imports])
+      called(Enum.uniq(for({called, _, _} <- calls, do: called)) ++ rest, [module | seen])
     end
   end
 

@@ -233,6 +233,7 @@ defmodule Robot.File.Summary do
 
   defp network(options) do
     Enum.map_join(options, ", ", fn
+      {:interface, card} when is_binary(card) -> "on #{card}"
       {:interface, ip} -> "on #{:inet.ntoa(ip)}"
       {:multicast, false} -> "no multicast"
       {:multicast, {ip, port}} -> "multicast #{:inet.ntoa(ip)}:#{port}"

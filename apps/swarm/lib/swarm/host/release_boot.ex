@@ -13,8 +13,8 @@ defmodule Swarm.Host.ReleaseBoot do
   name without a file is a base station, a node without a robot.
   """
   alias Robot.File.Summary
-  alias Swarm.Host.PowerOff
-  alias Mesh.Secret
+  alias Swarm.Host.{Machine, PowerOff}
+  alias Mesh.{Interface, Secret}
   alias Mesh.Distribution.Epmd
   alias Swarm.MemberSpec
 
@@ -66,7 +66,7 @@ defmodule Swarm.Host.ReleaseBoot do
 
   @doc """
   What a shell must know to start the robot or to reach it: the path of the secret, the cookie
-  derived from it, the port of distribution, and the address that it listens on, `nil` for all.
+  derived from it, the port of distribution, and its interface as text, `nil` for all.
   The robot file takes precedence over the environment.
   """
   @spec settings(environment(), Robot.File.t() | nil) ::
@@ -88,7 +88,7 @@ defmodule Swarm.Host.ReleaseBoot do
          secret_file: secret.path,
          cookie: Atom.to_string(secret.cookie),
          dist_port: network[:dist_port] || dist_port(environment),
-         interface: interface(network[:interface]) || value(environment, "CONVOY_INTERFACE")
+         interface: text(network[:interface]) || value(environment, "CONVOY_INTERFACE")
        }}
     end
   end
@@ -106,7 +106,7 @@ defmodule Swarm.Host.ReleaseBoot do
 
   @doc """
   The answer to `rel/env.sh.eex`: status and lines of standard output and standard error. For
-  `check` they say what the robot is, for `halt` that its controller was told to cut the power
+  `check` they say what the robot is, and what this machine lacks for it, for `halt` that its controller was told to cut the power
   (`Swarm.Host.PowerOff`), else they are the settings. Commands that only reach a running robot,
   for example to stop it, work even if its file has become wrong since. Nothing starts if the port
   of its distribution is taken for longer than `patience_ms`; a robot that was told to stop may
@@ -181,25 +181,22 @@ defmodule Swarm.Host.ReleaseBoot do
   defp begins(environment, settings, file, patience_ms) do
     port = settings.dist_port
 
-    if free?(port, settings.interface, patience_ms),
-      do: shell(settings, file),
-      else:
-        {:error,
-         "#{environment["ROBOT"]} does not start: its TCP port #{port} is in use. Either it runs here already " <>
-           "(robot status tells how it is, robot stop ends it), or another program has the port (ss -ltnp), " <>
-           "and dist_port: of its file, or CONVOY_DIST_PORT, names another"}
+    with {:ok, _interface} <- interface(settings) do
+      if free?(port, patience_ms),
+        do: shell(settings, file),
+        else:
+          {:error,
+           "#{environment["ROBOT"]} does not start: its TCP port #{port} is in use. Either it runs here already " <>
+             "(robot status tells how it is, robot stop ends it), or another program has the port (ss -ltnp), " <>
+             "and dist_port: of its file, or CONVOY_DIST_PORT, names another"}
+    end
   end
 
   # In the same way as Erlang's distribution will listen.
-  defp free?(port, interface, left_ms) do
-    ip =
-      with {:ok, ip} <- :inet.parse_address(to_charlist(interface || "")),
-           do: [ip: ip],
-           else: (_ -> [])
-
-    case :gen_tcp.listen(port, [reuseaddr: true] ++ ip) do
+  defp free?(port, left_ms) do
+    case :gen_tcp.listen(port, reuseaddr: true) do
       {:error, :eaddrinuse} when left_ms > 0 ->
-        receive(do: (:never -> :ok), after: (100 -> free?(port, interface, left_ms - 100)))
+        receive(do: (:never -> :ok), after: (100 -> free?(port, left_ms - 100)))
 
       {:error, :eaddrinuse} ->
         false
@@ -215,11 +212,26 @@ defmodule Swarm.Host.ReleaseBoot do
 
   defp shell(s, _file), do: [s.cookie, s.secret_file, to_string(s.dist_port), s.interface || ""]
 
-  defp about(environment, _settings, nil), do: ["#{environment["ROBOT"]}: a node without a robot"]
+  defp about(environment, settings, file) do
+    with {:ok, interface} <- interface(settings),
+         do: words(environment, file) ++ Machine.lacks(interface)
+  end
 
-  defp about(environment, _settings, file) do
+  defp words(environment, nil), do: ["#{environment["ROBOT"]}: a node without a robot"]
+
+  defp words(environment, file) do
     {:ok, path} = place(environment)
     Summary.report(path, file)
+  end
+
+  # That of the file was checked with it.
+  defp interface(%{interface: nil}), do: {:ok, {0, 0, 0, 0}}
+
+  defp interface(%{interface: text}) do
+    with :error <- Interface.read(text),
+         do:
+           {:error,
+            "CONVOY_INTERFACE cannot be #{inspect(text)}: #{Interface.allowed()} is allowed"}
   end
 
   defp file({file, _config}), do: file
@@ -241,8 +253,8 @@ defmodule Swarm.Host.ReleaseBoot do
     end
   end
 
-  defp interface(nil), do: nil
-  defp interface(ip), do: ip |> :inet.ntoa() |> to_string()
+  defp text(nil), do: nil
+  defp text(interface), do: Interface.text(interface)
 
   defp value(environment, name) do
     case environment do

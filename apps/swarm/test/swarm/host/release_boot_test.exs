@@ -5,6 +5,7 @@ defmodule Swarm.Host.ReleaseBootTest do
   @moduletag :realtime
 
   doctest ReleaseBoot
+  doctest Swarm.Host.Machine
 
   @moduletag :tmp_dir
 
@@ -112,6 +113,36 @@ defmodule Swarm.Host.ReleaseBootTest do
                 dist_port: 9500,
                 interface: "10.0.0.2"
               }}
+  end
+
+  test "an interface is an address or the name of a card, for check and start alike", %{
+    tmp_dir: folder
+  } do
+    environment = machine(folder, file(), %{"CONVOY_DIST_PORT" => "9499"})
+    with_interface = &Map.put(environment, "CONVOY_INTERFACE", &1)
+
+    for wrong <- ["300.1.2.3", "10.0.0.7/24", "fe80::1", "wlan 0"],
+        command <- ~w(check start daemon) do
+      assert {1, [], [line]} = ReleaseBoot.answer(command, with_interface.(wrong), 0)
+      assert line =~ ~s(CONVOY_INTERFACE cannot be "#{wrong}": an IPv4 address such as)
+    end
+
+    # Who runs already, is reached.
+    assert {0, [_cookie | _], []} = ReleaseBoot.answer("rpc", with_interface.("300.1.2.3"))
+
+    for absent <- ["203.0.113.9", "no-card"] do
+      assert {0, lines, []} = ReleaseBoot.answer("check", with_interface.(absent))
+      assert Enum.any?(lines, &(&1 =~ "no network here; waits for #{absent}, which "))
+      assert {0, [_, _, _, ^absent], []} = ReleaseBoot.answer("start", with_interface.(absent), 0)
+    end
+
+    network = ~s(, network: [interface: "no-card"])
+    File.write!(environment["CONVOY_ROBOT_FILE"], file(network))
+    assert {0, lines, []} = ReleaseBoot.answer("check", environment)
+    assert Enum.any?(lines, &(&1 =~ ~r/network +on no-card/))
+    File.write!(environment["CONVOY_ROBOT_FILE"], file(~s(, network: [interface: "10.0.0.300"])))
+    assert {1, [], [line]} = ReleaseBoot.answer("check", environment)
+    assert line =~ ~s(mag1.exs:1: network.interface: cannot be "10.0.0.300": an IPv4 address)
   end
 
   test "the robots of the release use the secret of the environment", %{tmp_dir: folder} do

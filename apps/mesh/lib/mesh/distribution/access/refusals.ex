@@ -15,7 +15,7 @@ defmodule Mesh.Distribution.Access.Refusals do
   @table __MODULE__
   @minute_ms 60_000
   @lines 20
-  @reasons [:stranger, :too_often, :new_names]
+  @reasons [:stranger, :too_often, :new_names, :elsewhere]
 
   @doc "Creates the table; the calling process owns it."
   @spec open() :: :ok
@@ -74,6 +74,7 @@ defmodule Mesh.Distribution.Access.Refusals do
   end
 
   defp why(:stranger), do: "not an address of the fleet"
+  defp why(:elsewhere), do: "it called another address than that of the interface of this node"
   defp why(:too_often), do: "it calls too often"
   defp why(:new_names), do: "it calls by too many names that are not known"
 
