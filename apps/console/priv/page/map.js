@@ -122,6 +122,7 @@ export class FloorView {
 
     if (this.trails) for (const [k, r] of scene.robots.entries()) this.trail(c, r, colour(k));
     for (const [k, r] of scene.robots.entries()) this.slot(c, r, colour(k));
+    if (this.sonar && this.about) this.cones(c, this.robot(this.about.id), ink);
     for (const [k, r] of scene.robots.entries()) this.body(c, r, colour(k), ink);
     this.landmark(c, this.dragged?.landmark ?? scene.landmark, ink);
   }
@@ -135,6 +136,25 @@ export class FloorView {
     c.globalAlpha = 0.45;
     c.lineWidth = 1.5;
     c.stroke();
+    c.globalAlpha = 1;
+  }
+
+  // What the sonars of the chosen robot see, as cones of 15 degrees to each side.
+  cones(c, r, theme) {
+    if (!r?.alive) return;
+    const half = Math.PI / 12;
+    const [cos, sin] = [Math.cos(r.a), Math.sin(r.a)];
+    c.fillStyle = theme("--accent");
+    c.globalAlpha = 0.15;
+    for (const [dx, dy, heading, range] of this.about.sonar) {
+      const [x, y] = this.toPixel(r.x + dx * cos - dy * sin, r.y + dx * sin + dy * cos);
+      const angle = -(r.a + heading);
+      c.beginPath();
+      c.moveTo(x, y);
+      c.arc(x, y, range * this.view.scale, angle - half, angle + half);
+      c.closePath();
+      c.fill();
+    }
     c.globalAlpha = 1;
   }
 

@@ -14,7 +14,10 @@ const floor = window.floor = new FloorView(by("map"), {
 
 function connect() {
   socket = new WebSocket(`ws://${location.host}/live`);
-  socket.onopen = () => (tries = 0);
+  socket.onopen = () => {
+    tries = 0;
+    if (chosen) say(`look ${chosen}`);
+  };
   socket.onmessage = ({ data }) => hear(JSON.parse(data));
   socket.onclose = () => {
     lost();
@@ -40,6 +43,7 @@ function hear(message) {
     by("stages").replaceChildren();
     floor.setMap(message);
   } else if (message.t === "scene") show(message);
+  else if (message.t === "about") about(message);
   else if (message.t === "answer") answer(message);
 }
 
@@ -93,8 +97,12 @@ function row(robot, index) {
 
 function choose(id) {
   drive(false);
+  camera(false);
   chosen = chosen === id ? null : id;
   floor.chosen = chosen;
+  floor.about = null;
+  by("about").replaceChildren();
+  say(`look ${chosen ?? ""}`);
   if (scene) show(scene);
 }
 
@@ -106,6 +114,73 @@ function one() {
   by("doing").textContent = robot.alive
     ? `${robot.state}, at ${robot.x.toFixed(2)}, ${robot.y.toFixed(2)}, ${Math.round((robot.a * 180) / Math.PI)}°`
     : "dead";
+}
+
+// Without the minus of -0.00.
+const decimals = (number) => (Math.round(number * 100) / 100 + 0).toFixed(2);
+
+// Why it does what it does: its wish, what the gate limits, its devices.
+function about(told) {
+  if (told.id !== chosen) return;
+  floor.about = told;
+  const rows = [
+    ["wish", told.by && `${told.by}, weight ${told.weight.toFixed(2)}`],
+    ["speed", `${decimals(told.speed)} m/s, ${decimals(told.turn)} rad/s`],
+    ["limited by", told.limits.join(", ")],
+    ["fault", told.fault],
+    ["stopped", told.estop && "emergency stop, until it is reset"],
+    ["offline", told.offline.join(", ")],
+    ["battery", told.power !== null && `${told.power.toFixed(1)} V`],
+  ].filter(([, text]) => text);
+  const made = (tag, textContent) => Object.assign(document.createElement(tag), { textContent });
+  by("about").replaceChildren(...rows.flatMap(([term, text]) => [made("dt", term), made("dd", text)]));
+  by("camera").hidden = !told.camera;
+  floor.draw();
+}
+
+// At most five pictures a second, and only while somebody looks; each is asked for when the one before is there.
+const LOOK_MS = 200;
+let looking = false;
+
+function camera(on) {
+  if (looking === on) return;
+  looking = on;
+  by("camera").setAttribute("aria-pressed", on);
+  by("picture").hidden = !on;
+  if (on) picture(chosen);
+}
+
+async function picture(id) {
+  while (looking && id === chosen) {
+    const begun = performance.now();
+    try {
+      const answer = await fetch(`/camera/${id}`);
+      if (!answer.ok) throw new Error(await answer.text());
+      paint(await createImageBitmap(await answer.blob()));
+    } catch (error) {
+      hear({ t: "answer", ok: false, text: String(error.message) });
+      return camera(false);
+    }
+    await new Promise((go) => setTimeout(go, Math.max(0, LOOK_MS - (performance.now() - begun))));
+  }
+}
+
+function paint(bitmap) {
+  const canvas = by("picture");
+  const c = canvas.getContext("2d");
+  [canvas.width, canvas.height] = [bitmap.width, bitmap.height];
+  c.drawImage(bitmap, 0, 0);
+  const seen = floor.about?.seen;
+  if (!seen) return;
+  const [sx, sy] = [bitmap.width / seen.width, bitmap.height / seen.height];
+  c.lineWidth = 2;
+  c.strokeStyle = "#d55e00";
+  c.fillStyle = "#d55e00";
+  c.font = "11px system-ui, sans-serif";
+  for (const [name, left, top, right, bottom] of seen.boxes) {
+    c.strokeRect(left * sx, top * sy, (right - left + 1) * sx, (bottom - top + 1) * sy);
+    c.fillText(name, left * sx, Math.max(10, top * sy - 3));
+  }
 }
 
 function stages() {
@@ -152,6 +227,12 @@ by("reset").onclick = () =>
 by("form").onclick = () => say(`formation ${by("shape").value} ${by("spacing").value}`);
 by("speed").onchange = () => say(`speed ${by("speed").value}`);
 by("drive").onclick = () => drive(!driving);
+by("camera").onclick = () => camera(!looking);
+by("sonar").onclick = (e) => {
+  floor.sonar = !floor.sonar;
+  e.target.setAttribute("aria-pressed", floor.sonar);
+  floor.draw();
+};
 by("follow").onchange = (e) => ((floor.follow = e.target.checked), floor.draw());
 by("trails").onchange = (e) => ((floor.trails = e.target.checked), floor.draw());
 for (const b of document.querySelectorAll("[data-line]")) b.onclick = () => say(b.dataset.line);

@@ -247,6 +247,15 @@ defmodule Console.PageTest do
 
       [%{id: id}] = Live.Fleet.scene(live).robots
 
+      # What it does, and what its camera sees; the blobs in it are drawn on the page.
+      Browser.await(
+        browser,
+        "return document.getElementById('about').textContent.includes('m/s')"
+      )
+
+      assert {200, _head, <<0xFF, 0xD8, _jpeg::binary>>} = ask(url, "GET /camera/#{id}")
+      assert {404, _head, _line} = ask(url, "GET /camera/mag99")
+
       for ending <- [
             fn -> Browser.key(browser, :keyUp, "w") end,
             fn -> Browser.close(browser) end

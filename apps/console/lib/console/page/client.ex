@@ -5,12 +5,13 @@ defmodule Console.Page.Client do
   """
   use GenServer
   alias Console.Cli.Format
-  alias Console.Page.{Feed, State}
+  alias Console.Page.{About, Feed, State}
   alias Console.Terminal.Prompt
 
   @dead_man_ms 300
-  # Of a simulated robot; its gate limits what is asked of it.
   @most 1.0
+  # How often the page is told of the robot that it looks at.
+  @about_ms 200
 
   @doc "Starts it for the connection of the caller; `reply` writes text to the browser."
   @spec start(pid(), [atom()], (String.t() -> term())) :: {:ok, pid()}
@@ -48,10 +49,17 @@ defmodule Console.Page.Client do
     ref = Process.monitor(connection)
     {module, live} = Feed.source(feed)
     s = %{connection: ref, module: module, live: live, robots: robots, reply: reply}
-    {:ok, Map.merge(s, %{driven: nil, timer: nil})}
+    {:ok, Map.merge(s, %{driven: nil, timer: nil, looked: nil})}
   end
 
+  # `look mag1`, and `look` for nobody.
   @impl GenServer
+  def handle_cast({:obey, "look" <> name}, s) do
+    robot = Enum.find(s.robots, &(Atom.to_string(&1) == String.trim(name)))
+    if robot && s.looked == nil, do: send(self(), :about)
+    {:noreply, %{s | looked: robot}}
+  end
+
   def handle_cast({:obey, line}, s) do
     case drive(line, s.robots) do
       {:ok, robot, speed} -> {:noreply, driven(s, robot, speed)}
@@ -61,6 +69,14 @@ defmodule Console.Page.Client do
   end
 
   @impl GenServer
+  def handle_info(:about, %{looked: nil} = s), do: {:noreply, s}
+
+  def handle_info(:about, s) do
+    with json when json != nil <- About.json(s.looked), do: s.reply.(json)
+    _timer = Process.send_after(self(), :about, @about_ms)
+    {:noreply, s}
+  end
+
   def handle_info({:dead_man, ref}, %{timer: ref} = s), do: {:noreply, halt(s)}
   def handle_info({:dead_man, _former}, s), do: {:noreply, s}
 

@@ -6,7 +6,7 @@ defmodule Console.Page.Request do
   # Debian's package; without it there is no page.
   @compile {:no_warn_undefined, [:mochiweb_request, :mochiweb_websocket]}
   alias Console.Page
-  alias Console.Page.{Access, Client, Feed, State}
+  alias Console.Page.{About, Access, Client, Feed, State}
   alias Console.Terminal.Prompt
 
   @folder Path.expand("../../../priv/page", __DIR__)
@@ -65,6 +65,13 @@ defmodule Console.Page.Request do
       else: say(request, 426, "a WebSocket lives here")
   end
 
+  defp serve("/camera/" <> name, request, page) do
+    case Enum.find(page.robots, &(Atom.to_string(&1) == name)) do
+      nil -> say(request, 404, "there is no robot #{inspect(name)}")
+      robot -> picture(About.picture(robot), request)
+    end
+  end
+
   defp serve(path, request, page) do
     name = if path == "/", do: "/index.html", else: path
 
@@ -76,6 +83,11 @@ defmodule Console.Page.Request do
         respond(request, 200, [{"Content-Type", type} | entered(request, page)], body)
     end
   end
+
+  defp picture({:ok, jpeg}, request),
+    do: respond(request, 200, [{"Content-Type", "image/jpeg"}], jpeg)
+
+  defp picture({:error, line}, request), do: say(request, 503, line)
 
   # The token in the address is needed once.
   defp entered(_request, %{token: nil}), do: []

@@ -1,0 +1,73 @@
+defmodule Console.Page.About do
+  @moduledoc """
+  What a robot of this node knows and does, for the page: the wish that it carries out, what the gate limits, its devices,
+  what its sonars and its camera see. Read from its board, so that no process of the robot is asked.
+  """
+  alias Hal.{Json, Pose}
+  alias Robot.{Board, Names}
+  alias Sim.Trial.Setup
+  alias Vision.View
+
+  # Readings that are older tell nothing of now.
+  @recent_ms 1_000
+
+  @doc "As JSON; `nil` for a robot that is not on this node, or is dead."
+  @spec json(atom()) :: String.t() | nil
+  def json(robot) do
+    with {:ok, board} <- Board.find(robot) do
+      entries = Board.entries(board)
+      driving = recent(entries, :driving) || %{twist: Hal.Twist.zero(), limits: []}
+      doing = recent(entries, :doing) || %{by: nil, weight: nil, fault: nil}
+
+      Json.encode!(%{
+        t: "about",
+        id: robot,
+        by: doing.by,
+        weight: doing.weight,
+        fault: doing.fault,
+        speed: driving.twist.linear,
+        turn: driving.twist.turn,
+        limits: driving.limits,
+        power: recent(entries, :power, 60_000),
+        offline: for({{:health, device}, {{:offline, _reason}, _age}} <- entries, do: device),
+        estop: Board.latched?(board),
+        sonar: sonar(robot, recent(entries, :sonar)),
+        seen: seen(recent(entries, :detections)),
+        camera: Names.whereis(robot, :view) != nil
+      })
+    else
+      :error -> nil
+    end
+  end
+
+  @doc "A new picture of its camera as JPEG, or why there is none."
+  @spec picture(atom()) :: {:ok, binary()} | {:error, line :: String.t()}
+  def picture(robot) do
+    case Names.whereis(robot, :view) do
+      nil -> {:error, "#{robot} has no camera on this node"}
+      view -> with {:ok, picture} <- View.snapshot(view), do: {:ok, picture.jpeg}
+    end
+  end
+
+  defp recent(entries, key, ms \\ @recent_ms) do
+    case entries do
+      %{^key => {value, age_ms}} when age_ms <= ms -> value
+      _none_or_old -> nil
+    end
+  end
+
+  # Where each sonar is on the body, where it looks, and how far the nearest thing is: metres and radians.
+  defp sonar(_robot, nil), do: []
+
+  defp sonar(robot, ranges) do
+    for {%Pose{} = at, range} <- Enum.zip(Setup.profile(robot).sonars, ranges),
+        do: [at.x, at.y, at.heading, range]
+  end
+
+  defp seen(%{blobs: [first | _] = blobs}) do
+    boxes = for blob <- blobs, do: [blob.colour, blob.left, blob.top, blob.right, blob.bottom]
+    %{width: first.width, height: first.height, boxes: boxes}
+  end
+
+  defp seen(_nothing), do: nil
+end
