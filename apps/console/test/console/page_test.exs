@@ -234,7 +234,7 @@ defmodule Console.PageTest do
     end
 
     test "a robot that is driven stands soon after the key was let go, and when the page is gone" do
-      options = options("--robots 1 --blobs direct --landmark none")
+      options = options("--robots 1 --landmark none")
       {:ok, live} = Live.Fleet.start_link(Options.trial(options))
       {_page, url} = page(options, Live.Fleet, live)
       browser = open(url)
