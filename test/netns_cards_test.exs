@@ -87,7 +87,7 @@ defmodule System.NetnsCardsTest do
   defp fault(node), do: Vm.call(node, Mesh, :fault, [])
   defp meet?(nodes), do: Enum.all?(nodes, &(length(alive(&1)) == length(nodes) - 1))
 
-  defp eventually(true?, left_ms \\ 20_000) do
+  defp eventually(true?, left_ms \\ 40_000) do
     value = true?.()
 
     cond do

@@ -14,14 +14,15 @@ defmodule Mesh.Distribution.Preload do
     Mesh.Distribution.ConnectionLog,
     Mesh.Distribution.ConnectionLog.Peer,
     Mesh.Distribution.ConnectionLog.Reasons,
-    Mesh.Distribution.Epmd,
     Mesh.Distribution.Epmd.Peers,
-    Mesh.Distribution.Listener,
     Mesh.Interface,
     Mesh.SafeTable
   ]
 
-  @doc "Those modules: what the carriers, `Mesh.Distribution.Epmd` and the filter of the log call, and what that calls."
+  @doc """
+  Those modules: what the carriers, `Mesh.Distribution.Epmd` and the filter of the log call, and what that calls, besides
+  `Epmd` and `Listener`, which run when they ask for it.
+  """
   @spec modules() :: [module(), ...]
   def modules, do: @modules
 
