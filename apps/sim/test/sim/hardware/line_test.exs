@@ -239,23 +239,43 @@ defmodule Sim.Hardware.LineTest do
     end
   end
 
+  # Where it stands. A line that was silent meanwhile, on a busy machine, has disarmed the wheels, which ends the fault:
+  # then once more.
+  defp stands_after_one_way_back(context, emulator, id) do
+    start = holds_bumper(context, emulator, id)
+    eventually(fn -> line(id) =~ "FAULT (bumper 0 stays pressed)" and still?(context) end)
+    stood = place(context)
+    # It moves neither by itself nor by an order, until somebody has checked it.
+    _refused_or_not = Swarm.tell(id, "move:-0.1:0")
+    never(3_000, fn -> Pose.distance(stood, place(context)) > 0.01 end)
+
+    if :disarmed in limits(id) do
+      :ok = Emulator.change(emulator, :hold, [[]])
+      flush_faults()
+      stands_after_one_way_back(context, emulator, id)
+    else
+      # How far it rolls on beyond 0.15 m depends on how busy the machine is. A second way back would end the fault first.
+      assert Pose.distance(start, stood) > 0.1
+      assert_in_delta stood.heading, start.heading, 0.1
+      refute_received {[:robot, :fault], _again}
+      stood
+    end
+  end
+
+  defp flush_faults do
+    receive do
+      {[:robot, :fault], _about} -> flush_faults()
+    after
+      0 -> :ok
+    end
+  end
+
   test "an armed, idle robot whose bumper is held down backs off once, stands, and says so",
        context do
     emulator = base(context, [])
     id = real(context, :line_held)
     listen(id, [:robot, :fault])
-    start = holds_bumper(context, emulator, id)
-    eventually(fn -> line(id) =~ "FAULT (bumper 0 stays pressed)" and still?(context) end)
-    stood = place(context)
-
-    # How far it rolls on beyond 0.15 m depends on how busy the machine is. A second way back would end the fault first.
-    assert Pose.distance(start, stood) > 0.1
-    refute_received {[:robot, :fault], %{line: nil}}
-    assert_in_delta stood.heading, start.heading, 0.1
-    # It moves neither by itself nor by an order, until somebody has checked it.
-    _refused_or_not = Swarm.tell(id, "move:-0.1:0")
-    never(3_000, fn -> Pose.distance(stood, place(context)) > 0.01 end)
-    refute_received {[:robot, :fault], _again}
+    stood = stands_after_one_way_back(context, emulator, id)
 
     assert order(fn -> Swarm.disarm(id) end) == :ok
     assert_receive {[:robot, :fault], %{line: nil}}
