@@ -103,10 +103,6 @@ defmodule Console.Page do
     Supervisor.init([feed, server], strategy: :one_for_one)
   end
 
-  @doc false
-  @spec feed(pid()) :: pid()
-  def feed(page), do: child(page, Feed)
-
   defp child(page, id) do
     {^id, pid, _type, _modules} = List.keyfind(Supervisor.which_children(page), id, 0)
     pid

@@ -14,6 +14,15 @@ defmodule Console.Page.Feed do
   @spec start_link(%{module: module(), live: term()}) :: GenServer.on_start()
   def start_link(source), do: GenServer.start_link(__MODULE__, source)
 
+  @doc "The feed of a page."
+  @spec of(page :: pid()) :: pid()
+  def of(page) do
+    {__MODULE__, feed, _type, _modules} =
+      page |> Supervisor.which_children() |> List.keyfind(__MODULE__, 0)
+
+    feed
+  end
+
   @doc "The map, as JSON: what does not change."
   @spec map(pid()) :: String.t()
   def map(feed), do: GenServer.call(feed, :map)

@@ -5,7 +5,6 @@ defmodule Console.Page.Request do
   """
   # Debian's package; without it there is no page.
   @compile {:no_warn_undefined, [:mochiweb_request, :mochiweb_websocket]}
-  alias Console.Page
   alias Console.Page.{About, Access, Client, Feed, State}
   alias Console.Terminal.Prompt
 
@@ -101,7 +100,7 @@ defmodule Console.Page.Request do
   end
 
   defp live(request, %{page: page, robots: robots}) do
-    feed = Page.feed(page)
+    feed = Feed.of(page)
     socket = get(request, :socket)
 
     _closed_or_not =
