@@ -2,7 +2,7 @@ Code.require_file("release/case.exs", __DIR__)
 why_not = Vm.Net.why_not()
 if why_not, do: IO.puts("commands without a name server are not tested: #{why_not}")
 
-defmodule System.NetnsReleaseTest do
+defmodule System.ReleaseNamesTest do
   @moduledoc """
   The commands of a robot on a machine whose network is not as it should be, in a namespace: a name server that never
   answers, an interface that is absent or nonsense.
