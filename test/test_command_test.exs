@@ -80,6 +80,18 @@ defmodule System.TestCommandTest do
     assert said =~ "bin/test: FAILED: lower: tests; the whole system: in real time\n"
   end
 
+  test "what does not compile ends the run; bad format does not, and is told at the end", %{
+    tmp_dir: folder
+  } do
+    failing = &~s|case "$*" in #{&1}*) echo "bad $1"; exit 1 ;; esac; echo "1 test, 0 failures"|
+    assert {said, 1} = bin_test(folder, [], failing.("compile"))
+    assert said =~ "bin/test: FAILED: compile without warnings\n"
+    refute said =~ "lower: tests"
+    assert {said, 1} = bin_test(folder, [], failing.("format"))
+    assert said =~ "lower: tests: done"
+    assert said =~ "bad format\n\nbin/test: FAILED: format\n"
+  end
+
   describe "a test that fails" do
     # A suite of the app `lower` whose steps fail so; run again, the test ends with that status.
     defp failing(folder, kind, again) do

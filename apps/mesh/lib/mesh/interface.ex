@@ -111,7 +111,7 @@ defmodule Mesh.Interface do
   Whether a connection that was made to this address of the machine was made to the interface. The loopback always is:
   only the machine itself can call it.
   """
-  @spec called?(t(), :inet.ip_address(), (() -> machine())) :: boolean()
+  @spec called?(t(), :inet.ip_address(), (... -> machine())) :: boolean()
   def called?(@all, _ip, _machine), do: true
   def called?(_interface, {127, _, _, _}, _machine), do: true
   def called?(ip, called, _machine) when is_tuple(ip), do: ip == called
