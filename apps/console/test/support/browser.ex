@@ -117,8 +117,9 @@ defmodule Console.Browser do
     url = String.to_charlist("http://127.0.0.1:#{port}#{path}")
     request = if body, do: {url, [], ~c"application/json", Json.encode!(body)}, else: {url, []}
 
+    # Without certificates of its own, a system makes newer Erlang fall at its default for `ssl`.
     {:ok, {{_http, status, _reason}, _headers, text}} =
-      :httpc.request(method, request, [timeout: 60_000], body_format: :binary)
+      :httpc.request(method, request, [timeout: 60_000, ssl: []], body_format: :binary)
 
     %{"value" => value} = text |> Mcap.Json.decode!() |> plain()
     status == 200 || raise "#{method} #{path}: #{status}: #{inspect(value)}"

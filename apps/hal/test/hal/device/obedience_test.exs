@@ -12,7 +12,7 @@ defmodule Hal.Device.ObedienceTest do
   end
 
   # The same reading ten times a second.
-  defp hear(obedience, reading, from_ms..to_ms, reach \\ nil) do
+  defp hear(obedience, reading, from_ms..to_ms//_, reach \\ nil) do
     Enum.reduce(from_ms..to_ms//100, obedience, fn at_ms, obedience ->
       {_, _, obedience} = Obedience.heard(obedience, [reading], reach, at_ms)
       obedience
