@@ -3,7 +3,8 @@ import { FloorView, colour } from "./map.js";
 
 const by = (id) => document.getElementById(id);
 const DRIVE_MS = 100; // how often the keyboard says a word; the server stops after 300 ms without one
-let socket, chosen, scene, told = 0, tries = 0, keys = new Set(), driving = false, timer;
+const OLD_MS = 2000; // a scene comes ten times a second
+let heard, socket, chosen, scene, told = 0, tries = 0, keys = new Set(), driving = false, timer;
 
 // Reachable for tests and the curious.
 const floor = window.floor = new FloorView(by("map"), {
@@ -42,8 +43,10 @@ function hear(message) {
     told = 0;
     by("stages").replaceChildren();
     floor.setMap(message);
-  } else if (message.t === "scene") show(message);
-  else if (message.t === "about") about(message);
+  } else if (message.t === "scene") {
+    heard = performance.now();
+    show(message);
+  } else if (message.t === "about") about(message);
   else if (message.t === "answer") answer(message);
 }
 
@@ -52,6 +55,9 @@ function answer({ ok, text }) {
   output.textContent = text;
   output.className = ok ? "good" : "bad";
 }
+
+// What is shown is old also where the connection stands and nothing comes.
+setInterval(() => performance.now() - heard > OLD_MS && lost(), 500);
 
 function show(next) {
   scene = next;

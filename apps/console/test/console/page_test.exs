@@ -224,6 +224,18 @@ defmodule Console.PageTest do
       Browser.run(browser, "location.reload()")
       Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2")
 
+      # Nobody tells the page anything: it must not pass for the present.
+      :sys.suspend(Page.Feed.of(page))
+      Browser.await(browser, "return document.getElementById('fleet').className === 'lost'")
+      :sys.resume(Page.Feed.of(page))
+      Browser.await(browser, "return document.getElementById('fleet').className === ''")
+      Process.exit(Page.Feed.of(page), :kill)
+
+      Browser.await(
+        browser,
+        "const was = window.was ??= window.floor.scene.at_s; return window.floor.scene.at_s > was + 20"
+      )
+
       Process.unlink(page)
       :ok = Supervisor.stop(page)
       Browser.await(browser, "return document.getElementById('fleet').className === 'lost'")

@@ -113,13 +113,24 @@ defmodule Console.Page.Request do
     reentry.(%{client: client, source: Feed.source(feed)})
   end
 
-  # Ends with the connection.
+  # Ends with the connection, and the connection with the feed: the page then says that what it shows is old, and asks
+  # again.
   defp push(feed, reply) do
+    _ref = Process.monitor(feed)
+    pushed(feed, reply)
+  end
+
+  defp pushed(feed, reply) do
     :ok = Feed.next(feed)
 
     receive do
       {:scene, json} ->
-        with :ok <- reply.(json), do: push(feed, reply), else: (error -> exit({:shutdown, error}))
+        with :ok <- reply.(json),
+             do: pushed(feed, reply),
+             else: (error -> exit({:shutdown, error}))
+
+      {:DOWN, _ref, :process, ^feed, _reason} ->
+        exit({:shutdown, :no_feed})
     end
   end
 
