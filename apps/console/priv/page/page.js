@@ -131,7 +131,7 @@ function about(told) {
   floor.about = told;
   const rows = [
     ["wish", told.by && `${told.by}, weight ${told.weight.toFixed(2)}`],
-    ["speed", `${decimals(told.speed)} m/s, ${decimals(told.turn)} rad/s`],
+    ["speed", told.speed === null ? "unknown" : `${decimals(told.speed)} m/s, ${decimals(told.turn)} rad/s`],
     ["limited by", told.limits.join(", ")],
     ["fault", told.fault],
     ["stopped", told.estop && "emergency stop, until it is reset"],

@@ -98,8 +98,10 @@ defmodule Missions.Landmark do
   def handle({:message, _other}, mission), do: still(mission)
 
   def handle({:tick, percept}, mission) do
+    awake = Rounds.wake(mission, percept.at_ms)
+
     mission = %{
-      mission
+      awake
       | percept: percept,
         now_ms: percept.at_ms,
         sight: LandmarkTrack.update(mission.sight, percept, mission.colour),

@@ -7,7 +7,7 @@ defmodule Robot.Devices do
       |-- Vision.View          frames to pictures while somebody looks (only with a camera)
       |-- Vision.Saver         keeps such pictures in a folder (only if told to)
       |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and what reflexes need
-      |                        --> gate; whether the wheels may turn --> pilot
+      |                        --> gate; whether the wheels may turn --> executive and pilot
       |-- Hal.Device :ptz      --> board, and where the camera looked --> blob detector
       `-- Hal.Device :camera   --> blob detector --> board, and --> view
 
@@ -23,7 +23,7 @@ defmodule Robot.Devices do
   use Supervisor
   alias Hal.HardenedSupervisor
   alias Robot.{Board, Config, Names}
-  alias Robot.Control.Pilot
+  alias Robot.Control.{Executive, Pilot}
   alias Robot.Safety.Gate
 
   @roles [:blob_detector, :view, :saver, :drive, :ptz, :camera]
@@ -50,6 +50,7 @@ defmodule Robot.Devices do
         device(config, board, :drive, [
           write.(:drive),
           {Gate, :sense, [id]},
+          {Executive, :sense, [id]},
           {Pilot, :sense, [id]}
         ]) ++
         device(config, board, :ptz, [write.(:ptz) | if(config.camera, do: [to_aim], else: [])]) ++

@@ -292,16 +292,19 @@ defmodule Robot.SupervisorTest do
 
   test "a missing drive is retried; nobody else falls" do
     open = open_of([{:error, :enoent}, {:error, :enoent}, :ok])
-    id = rolling(:fall7, drive: {Hal.FakeDrive, test: self(), device: :drive, open: open})
+    drive = {Hal.FakeDrive, test: self(), device: :drive, open: open}
+    roll = {Acts.Roll, twist: Twist.new(0.1, 0.0)}
+    id = robot(:fall7, drive: drive, mission: {Acts.Mission, effects: [{:goal, :roll, roll}]})
     parts = parts(id, [:gate | @above])
 
     health(id, {:offline, :enoent})
+    online(id)
+    assert Pilot.start(id) == :ok
     rolls()
-    assert {:ok, :online, _} = Board.fetch(Board.find!(id), {:health, :drive}, :infinity)
     assert parts(id, [:gate | @above]) == parts
   end
 
-  test "a drive that reports an error is opened again alone, and rolls on" do
+  test "a drive that reports an error is opened again alone, and stands" do
     id = rolling(:fall8)
     rolls()
     [drive | _] = parts = parts(id, [:drive, :gate | @above])
@@ -309,11 +312,14 @@ defmodule Robot.SupervisorTest do
     assert_receive {:drive, :terminate, ^drive}
     forget_drives()
     assert_receive {:drive, :init, ^drive}
+    online(id)
+    stands(250)
+    assert Pilot.start(id) == :ok
     rolls()
     assert parts(id, [:drive, :gate | @above]) == parts
   end
 
-  test "a drive that crashes restarts alone; its start stops the motors before a speed comes" do
+  test "a drive that crashes restarts alone; its start stops the motors, and no speed comes" do
     id = rolling(:fall9)
     rolls()
     [drive | parts] = parts(id, [:drive, :gate | @above])
@@ -324,7 +330,8 @@ defmodule Robot.SupervisorTest do
       forget_drives()
       assert_receive {:drive, first, again} when again != drive
       assert first == :init
-      rolls()
+      online(id)
+      stands(250)
     end)
 
     assert parts(id, [:gate | @above]) == parts

@@ -75,6 +75,7 @@ defmodule Sim.ProcessesTest do
     transport = {__MODULE__, :carry, [self()]}
     config = Comms.join(config, transport: transport, boot: 1)
     start_supervised!({Robot.Supervisor, config})
+    online(id)
     :ok = Pilot.start(id)
   end
 

@@ -22,7 +22,10 @@ defmodule Swarm.Status do
   A follower that does not get to its place is `BLOCKED by the landmark`, by another robot, by something
   unknown or by `no way` (`Missions.Landmark.Blocker`).
 
-  `age_ms` is the age of its newest reading; `rejected` counts malformed messages by kind. `hears`
+  `speed` (m/s) is what its wheels report, not what they are told: a robot that was stopped shows how
+  fast it still rolls. It is as old as `age_ms` says, and `nil`, `speed unknown`, before the first report.
+
+  `age_ms` is the age of the newest report of its wheels; `rejected` counts malformed messages by kind. `hears`
   are the robots that it hears itself, `view` those that it considers present (including itself),
   with the view's number, which grows with each robot that comes or goes
   (`Swarm.Membership.Peers`). The line names the robots that it knows only by way of others as not
@@ -34,7 +37,7 @@ defmodule Swarm.Status do
   with that age: `…, age 1240 ms by its row`.
   """
   alias Hal.Device.Words
-  alias Hal.Pose
+  alias Hal.{Odometry, Pose, Twist}
   alias Robot.{Board, Config}
   alias Robot.Safety.LivenessMonitor
   alias Swarm.Message.Receiver
@@ -81,7 +84,7 @@ defmodule Swarm.Status do
           by: atom() | String.t(),
           pose: Pose.t() | nil,
           uncertainty: float() | nil,
-          speed: float(),
+          speed: float() | nil,
           limits: [atom() | String.t()],
           estop: boolean(),
           arming: Hal.Device.Arming.state() | nil,
@@ -119,7 +122,7 @@ defmodule Swarm.Status do
       fault: entries |> value(:doing) |> field(:fault),
       pose: value(entries, :pose),
       uncertainty: entries |> value(:uncertainty) |> field(:radius),
-      speed: if(driving, do: driving.twist.linear, else: 0.0),
+      speed: entries |> value(:odometry) |> linear(),
       limits: field(driving, :limits) || [],
       estop: Board.latched?(board),
       arming: entries |> value(:arming) |> field(:state),
@@ -185,6 +188,9 @@ defmodule Swarm.Status do
   defp state(%{state: {_module, phase}}), do: phase
   defp state(_idle), do: :idle
 
+  defp linear(%Odometry{twist: %Twist{linear: linear}}), do: linear
+  defp linear(_no_wheels), do: nil
+
   defp age(%{odometry: {_value, age_ms}}), do: age_ms
   defp age(_no_wheels), do: nil
 
@@ -214,6 +220,8 @@ defmodule Swarm.Status do
 
     defp unsure(%{uncertainty: metres}),
       do: "in its slot, but NOT SURE of its place (#{within(metres)})"
+
+    defp speed(%{speed: nil}), do: "speed unknown"
 
     defp speed(status),
       do: "#{fixed(status.speed)} m/s" <> if(status.by, do: " by #{status.by}", else: "")

@@ -20,6 +20,26 @@ defmodule Swarm.StatusTest do
              ", hears 0, NO NETWORK (wlan0 is not connected), age"
   end
 
+  test "the speed is what the wheels report, with its age, whatever they are told" do
+    id = robot(:status_speed)
+    report = fn v -> {:odometry, %Hal.Odometry{pose: Pose.new(0, 0), twist: Twist.new(v, 0)}} end
+    send(Names.whereis(id, :drive), {:readings, [report.(0.38)]})
+    eventually(fn -> Swarm.status(id).speed == 0.38 end)
+    # The gate has told them to stand.
+    assert {:ok, %{twist: told}, _} = Board.fetch(Board.find!(id), :driving, :infinity)
+    assert Twist.zero?(told)
+    assert order(fn -> Swarm.stop(id) end) == :ok
+    assert %Status{speed: 0.38, age_ms: age_ms} = status = Swarm.status(id)
+    assert is_integer(age_ms)
+    assert inspect(status) =~ ~r/ 0\.38 m\/s by \w+, .*age \d+ ms/
+    send(Names.whereis(id, :drive), {:readings, [report.(0.0)]})
+    eventually(fn -> Swarm.status(id).speed == 0.0 end)
+
+    unknown = %{status | speed: nil}
+    assert inspect(unknown) =~ "speed unknown"
+    assert {:ok, %{speed: nil}} = Status.Row.decode(id, Status.Row.encode(unknown), 10)
+  end
+
   test "a robot's row says what blocks it, as text of limited length" do
     status = %Status{robot: :mag1, node: node(), by: :follow, blocked_by: "mag2", age_ms: 5}
     row = Status.Row.encode(status)

@@ -3,7 +3,7 @@ defmodule Console.Page.About do
   What a robot of this node knows and does, for the page: the wish that it carries out, what the gate limits, its devices,
   what its sonars and its camera see. Read from its board, so that no process of the robot is asked.
   """
-  alias Hal.{Json, Pose}
+  alias Hal.{Json, Odometry, Pose}
   alias Robot.{Board, Names}
   alias Sim.Trial.Setup
   alias Vision.View
@@ -16,7 +16,8 @@ defmodule Console.Page.About do
   def json(robot) do
     with {:ok, board} <- Board.find(robot) do
       entries = Board.entries(board)
-      driving = recent(entries, :driving) || %{twist: Hal.Twist.zero(), limits: []}
+      driving = recent(entries, :driving) || %{limits: []}
+      wheels = wheels(recent(entries, :odometry))
       doing = recent(entries, :doing) || %{by: nil, weight: nil, fault: nil}
 
       Json.encode!(%{
@@ -25,8 +26,8 @@ defmodule Console.Page.About do
         by: doing.by,
         weight: doing.weight,
         fault: doing.fault,
-        speed: driving.twist.linear,
-        turn: driving.twist.turn,
+        speed: wheels.linear,
+        turn: wheels.turn,
         limits: driving.limits,
         power: recent(entries, :power, 60_000),
         offline: for({{:health, device}, {{:offline, _reason}, _age}} <- entries, do: device),
@@ -48,6 +49,10 @@ defmodule Console.Page.About do
       view -> with {:ok, picture} <- View.snapshot(view), do: {:ok, picture.jpeg}
     end
   end
+
+  # What they report, not what they are told.
+  defp wheels(%Odometry{twist: twist}), do: twist
+  defp wheels(nil), do: %{linear: nil, turn: nil}
 
   defp recent(entries, key, ms \\ @recent_ms) do
     case entries do

@@ -9,6 +9,10 @@ defmodule Hal.Device.Lifecycle do
 
   @retry_ms 100
   @longest_retry_ms 5_000
+  # So much later than it was due, this process has been asleep, as when its machine was frozen.
+  @asleep_ms 100
+  # Time for what was sent meanwhile, and is old, and for the first new report.
+  @patience_ms 250
 
   @doc """
   Opens the driver; after an error it schedules another attempt, by a message `{:open, ref}`.
@@ -19,7 +23,7 @@ defmodule Hal.Device.Lifecycle do
       {:ok, inner} ->
         signs = Liveness.new(s.kind, s.sonar?, State.now(s))
         s = %{s | inner: {:open, inner}, signs: signs, obedience: Obedience.opened(s.obedience)}
-        s |> judge() |> listen()
+        %{s | due_ms: nil, patient_ms: nil} |> judge() |> listen()
 
       {:error, reason} ->
         s |> Publisher.health({:offline, reason}) |> Publisher.arming() |> retry()
@@ -81,10 +85,28 @@ defmodule Hal.Device.Lifecycle do
 
   @doc """
   Judges whether the device is online, and whether a drive's wheels may turn. Wheels that may no
-  longer turn are stopped before anything is published.
+  longer turn are stopped before anything is published. A process that was asleep itself cannot say that
+  its device was silent: it then listens for a moment before it judges.
   """
   @spec judge(State.t()) :: State.t()
-  def judge(%{inner: {:open, inner}} = s) do
+  def judge(%{inner: {:open, _}} = s) do
+    now_ms = System.monotonic_time(:millisecond)
+
+    cond do
+      s.due_ms != nil and now_ms - s.due_ms > @asleep_ms ->
+        listen(%{s | patient_ms: now_ms + @patience_ms})
+
+      s.patient_ms != nil and now_ms < s.patient_ms ->
+        s
+
+      true ->
+        judged(%{s | patient_ms: nil})
+    end
+  end
+
+  def judge(s), do: s
+
+  defp judged(%{inner: {:open, inner}} = s) do
     case {Liveness.judge(s.signs, State.now(s)), s.kind} do
       {:online, _kind} -> s |> Publisher.health(obeys(s)) |> ready()
       {:waiting, _kind} -> ready(s)
@@ -92,8 +114,6 @@ defmodule Hal.Device.Lifecycle do
       {{:offline, reason}, _kind} -> fail(s, reason, inner)
     end
   end
-
-  def judge(s), do: s
 
   defp obeys(s) do
     case Obedience.judge(s.obedience, s.kind) do
@@ -117,8 +137,11 @@ defmodule Hal.Device.Lifecycle do
   def listen(%{inner: {:open, _}} = s) do
     ref = make_ref()
     at_ms = State.now(s)
-    Process.send_after(self(), {:listen, ref}, Liveness.next_ms(s.signs, at_ms) - at_ms)
-    %{s | listening: ref}
+    now_ms = System.monotonic_time(:millisecond)
+    wait_ms = Liveness.next_ms(s.signs, at_ms) - at_ms
+    wait_ms = if s.patient_ms, do: max(s.patient_ms - now_ms, 1), else: wait_ms
+    Process.send_after(self(), {:listen, ref}, wait_ms)
+    %{s | listening: ref, due_ms: now_ms + wait_ms}
   end
 
   def listen(s), do: s

@@ -17,13 +17,15 @@ defmodule Hal.Device.Server do
     {:ok, succeed(s), {:continue, :open}}
   end
 
-  # The last status that the sinks know of the previous process, which may have been killed.
+  # The last status that the sinks know of the previous process, which may have been killed: whatever
+  # it was, its wheels are disarmed now.
   defp succeed(%{was: nil} = s), do: s
 
   defp succeed(%{was: {m, f, a}} = s) do
     case apply(m, f, a) do
       {:online, _since_ms} = health -> Publisher.fallen(%{s | health: health})
-      health -> %{s | health: health}
+      nil -> s
+      health -> Publisher.arming(%{s | health: health})
     end
   end
 

@@ -32,13 +32,16 @@ defmodule Hal.Device.State do
                 signs: nil,
                 obedience: Obedience.new(),
                 odd: nil,
-                listening: nil
+                listening: nil,
+                due_ms: nil,
+                patient_ms: nil
               ]
 
   @typedoc """
   `inner` is the driver's own state; `health` and `armed_as` are what was last published;
   `retry_ms` is the wait after the next failure; `retry`, `watchdog` and `listening` identify the
-  timers that still count.
+  timers that still count. `due_ms` is when it is to judge next, and until `patient_ms` silence does
+  not count, because it has been asleep itself (`System.monotonic_time/1`, ms).
   """
   @type t :: %__MODULE__{
           kind: Hal.Device.kind(),
@@ -61,7 +64,9 @@ defmodule Hal.Device.State do
           signs: Liveness.t() | nil,
           obedience: Obedience.t(),
           odd: String.t() | nil,
-          listening: reference() | nil
+          listening: reference() | nil,
+          due_ms: integer() | nil,
+          patient_ms: integer() | nil
         }
 
   @doc """

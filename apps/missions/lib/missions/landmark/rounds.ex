@@ -33,6 +33,29 @@ defmodule Missions.Landmark.Rounds do
     do:
       rescan? or (round.phase == :collect and round.purpose == :search and round.report == :busy)
 
+  # Others may have elected another leader since, as after `Swarm.Membership.Heartbeat.timely/2`.
+  @slept_ms 1_000
+
+  @doc """
+  Before a tick at this time: a robot that has slept since its last one, for example because it was
+  frozen, leaves the round that it was in, whatever it has heard for it since. With letters that waited
+  for it the round could still commit, and the robot would lead in an epoch that is over.
+  """
+  @spec wake(Landmark.State.t(), at_ms :: integer()) :: Landmark.State.t()
+  def wake(%{now_ms: then_ms, round: round} = mission, at_ms) when at_ms - then_ms > @slept_ms do
+    if Round.open?(round) or mission.verdict != nil do
+      # Others may have all digests of the round, and count on this robot.
+      mission =
+        if round.phase == :digest, do: Policy.vow(%{mission | now_ms: at_ms}, nil), else: mission
+
+      %{mission | round: Round.leave(round), verdict: nil, since_ms: at_ms}
+    else
+      mission
+    end
+  end
+
+  def wake(mission, _at_ms), do: mission
+
   @doc """
   One tick: returns the letters to send, as effects, and the verdict of a round that has
   committed.

@@ -46,6 +46,32 @@ defmodule Missions.Landmark.FreezeTest do
     end
   end
 
+  test "two hundred freezes of the one that is being elected: it never says that it leads before it has looked" do
+    {_group, agreeing} =
+      Enum.reduce(1..200, {fleet(@ids), 0}, fn _, {group, agreeing} ->
+        before = leader(group)
+
+        next =
+          group.robots |> Map.delete(before) |> Enum.max_by(fn {_, r} -> r.share end) |> elem(0)
+
+        group = group |> Group.run(1) |> Group.freeze(before, 3_500 + :rand.uniform(600))
+        # In each state of the round that elects the next one.
+        elects? = fn group -> group.robots[next].mission.phase == :agree end
+        {_elects?, group} = Group.until(group, 4, elects?)
+        group = Enum.reduce(1..:rand.uniform(8), group, fn _, group -> Group.run(group, 0.1) end)
+        agreeing = if elects?.(group), do: agreeing + 1, else: agreeing
+        group = Group.freeze(group, next, 1_799 + :rand.uniform(601))
+        group = Group.run(group, 5)
+        assert group.rival_words == []
+        assert group.worst_both_ms == 0
+        assert {true, group} = Group.until(group, 15, &Group.one?(&1, @ids))
+        {group, agreeing}
+      end)
+
+    # Many met it while it was not elected yet.
+    assert agreeing > 20
+  end
+
   test "a freeze of any length, of any robot" do
     Enum.reduce(1..100, fleet(@ids), fn _, group ->
       group = Group.run(group, :rand.uniform(10) / 10)

@@ -25,9 +25,11 @@ defmodule Robot.Control.Delivery do
 
   @typedoc """
   Why a command reached no mission: no way was open; there is no such mission; the emergency stop
-  holds the robot; it was stopped after the request; it is later than `until_ms`.
+  holds the robot; it was stopped after the request; it is later than `until_ms`; or, as a line, why
+  the wheels may not turn (`Robot.Safety.Readiness`).
   """
-  @type refusal :: {:error, :idle | :no_mission | :held | :stopped | :late}
+  @type refusal ::
+          {:error, :idle | :no_mission | :held | :stopped | :late | (line :: String.t())}
 
   @typedoc """
   `until_ms` is when the requester stops waiting (`System.monotonic_time/1`, ms): a later command

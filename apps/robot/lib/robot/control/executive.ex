@@ -8,6 +8,9 @@ defmodule Robot.Control.Executive do
   A behaviour that hangs blocks the executive. `Robot.Safety.LivenessMonitor` detects that and
   kills it.
 
+  A goal is for now: while the wheels may not turn it is refused (`Robot.Safety.Readiness`), and when
+  they are disarmed, by whatever, it is dropped, so that arming starts nothing.
+
   It starts idle: its state contains the goal, which a crash loses. At its start it makes the gate
   drop the wish of its predecessor.
   """
@@ -17,12 +20,13 @@ defmodule Robot.Control.Executive do
   alias Robot.{Behaviour, Board, Config, Departure, Mission, Names, Percept}
   alias Robot.Control.{Controller, Trace}
   alias Robot.Localiser.Anchors
-  alias Robot.Safety.{DryRun, Gate}
+  alias Robot.Safety.{DryRun, Gate, Readiness}
 
   @period_ms 100
   @slow_us 50_000
   # Ticks.
   @note_again 10
+  @call_ms 400
 
   @doc """
   Starts the executive of a robot. It passes each percept, as `{:tick, percept}`, the walls that it knows when they
@@ -38,17 +42,23 @@ defmodule Robot.Control.Executive do
   @doc """
   Sets, changes or (`nil`) drops the goal, as in `Robot.Control.Controller.goal/3`. The error is a
   line: no such robot runs on this node, the goal is not a behaviour, or it does not accept these
-  options. `:ok` means that the goal was sent: one that comes while the executive is held (`hold/1`)
-  is dropped.
+  options, the wheels may not turn now, a mission is being ended (`hold/1`), or the executive has not
+  answered within 400 ms.
   """
   @spec goal(robot :: atom(), tag :: term(), {module(), keyword()} | nil) ::
           :ok | {:error, line :: String.t()}
   def goal(robot, tag, goal) do
     with :ok <- Behaviour.check(goal) do
       if Names.whereis(robot, :executive),
-        do: obey(robot, {:goal, tag, goal}),
+        do: ask(robot, {:goal, tag, goal}),
         else: {:error, "no robot #{inspect(robot)} runs on this node"}
     end
+  end
+
+  defp ask(robot, order) do
+    GenServer.call(Names.via(robot, :executive), order, @call_ms)
+  catch
+    :exit, {_timeout_or_gone, {GenServer, :call, _call}} -> {:error, "#{robot} does not answer"}
   end
 
   @doc "Sends an order of the mission; its goals have been checked (`Robot.Mission.Runner`)."
@@ -76,6 +86,11 @@ defmodule Robot.Control.Executive do
   """
   @spec stand(robot :: atom(), then :: Config.call() | nil) :: :ok
   def stand(robot, then \\ nil), do: cast(robot, {:stand, then})
+
+  @doc "A sink for the drive: holds the executive (`hold/1`) when the wheels are disarmed."
+  @spec sense(robot :: atom(), reading :: tuple()) :: :ok
+  def sense(robot, {:arming, %{state: state}}) when state != :armed, do: cast(robot, :disarmed)
+  def sense(_robot, _reading), do: :ok
 
   defp cast(robot, message), do: GenServer.cast(Names.via(robot, :executive), message)
 
@@ -114,17 +129,25 @@ defmodule Robot.Control.Executive do
   end
 
   @impl GenServer
+  def handle_call({:goal, _tag, _goal} = order, _from, s) do
+    cond do
+      not order?(order) -> HardenedServer.drop(s)
+      refusal = refusal(order, s) -> {:reply, refusal, s}
+      true -> {:reply, :ok, obeyed(s, order)}
+    end
+  end
+
   def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
-  # From a mission that has not ended yet, although a stop has ended it.
-  def handle_cast({:obey, {:goal, _tag, {_module, _options}}}, %{held?: true} = s),
-    do: {:noreply, s}
-
   def handle_cast({:confirm, _then}, %{held?: true} = s), do: {:noreply, s}
 
   def handle_cast({:obey, order}, s) do
-    if order?(order), do: {:noreply, obeyed(s, order)}, else: HardenedServer.drop(s)
+    cond do
+      not order?(order) -> HardenedServer.drop(s)
+      refusal(order, s) -> {:noreply, s}
+      true -> {:noreply, obeyed(s, order)}
+    end
   end
 
   def handle_cast({:confirm, {m, f, a} = then}, s) when is_mfa(then) do
@@ -132,12 +155,26 @@ defmodule Robot.Control.Executive do
     {:noreply, s}
   end
 
-  def handle_cast(:hold, s), do: {:noreply, %{drop(s, nil) | held?: true}}
+  def handle_cast(:hold, s), do: {:noreply, hold_on(s)}
+  def handle_cast(:disarmed, %{config: %{dry_run: true}} = s), do: {:noreply, s}
+  # The pilot, which is told too, ends the mission; one that hangs may still set a goal meanwhile.
+  def handle_cast(:disarmed, s), do: {:noreply, hold_on(s)}
 
   def handle_cast({:stand, then}, s) when then == nil or is_mfa(then),
     do: {:noreply, %{drop(s, then) | held?: false}}
 
   def handle_cast(_unknown, s), do: HardenedServer.drop(s)
+
+  defp hold_on(s), do: %{drop(s, nil) | held?: true}
+
+  defp refusal({:goal, _tag, {_module, _options}}, %{held?: true}),
+    do: {:error, "its mission is being ended"}
+
+  defp refusal({:goal, _tag, {_module, _options}}, s) do
+    with :ok <- Readiness.armed(s.config, s.board), do: nil
+  end
+
+  defp refusal(_order, _s), do: nil
 
   defp order?({:goal, _tag, nil}), do: true
   defp order?({:goal, _tag, {module, options}}), do: is_atom(module) and is_list(options)

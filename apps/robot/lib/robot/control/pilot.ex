@@ -14,9 +14,9 @@ defmodule Robot.Control.Pilot do
   The mission's callbacks may be foreign code. While one runs, the board has an entry `:asking`,
   so that `Robot.Safety.LivenessMonitor` detects one that does not return, and kills the pilot.
 
-  If a person arms the wheels (`arm: :manual`), every change of arming ends the mission: when the
-  wheels are disarmed or their connection is lost, and when they are armed again, so that arming
-  does not start a motion.
+  Wheels that are disarmed end the mission, whoever disarms them and whoever arms them again
+  (`arm: :manual` or `:auto`), and while they may not turn none starts (`Robot.Safety.Readiness`).
+  So arming starts no motion.
   """
   use GenServer
   import Hal.HardenedServer, only: [is_mfa: 1]
@@ -25,6 +25,7 @@ defmodule Robot.Control.Pilot do
   alias Robot.Control.{Delivery, Executive}
   alias Robot.Control.Pilot.{Effects, Journal}
   alias Robot.Mission.Runner
+  alias Robot.Safety.Readiness
   alias Robot.Navigation.Grid
 
   # Generous, because a pilot may be slow on a busy machine.
@@ -37,12 +38,16 @@ defmodule Robot.Control.Pilot do
   def start_link(%Config{} = config),
     do: HardenedServer.start_link(__MODULE__, config, name: Names.via(config.id, :pilot))
 
-  @doc "Starts the mission of the robot's config; it replaces a running one."
-  @spec start(robot :: atom()) :: :ok | {:error, :no_mission}
+  @doc """
+  Starts the mission of the robot's config; it replaces a running one. If the wheels may not turn now,
+  the error says why, in a line that does not name the robot.
+  """
+  @spec start(robot :: atom()) :: :ok | {:error, :no_mission | (line :: String.t())}
   def start(robot), do: call(robot, :start)
 
-  @doc "Starts a mission; it replaces a running one."
-  @spec start(robot :: atom(), module(), keyword()) :: :ok | {:error, :no_mission}
+  @doc "Starts this mission, as `start/1` does."
+  @spec start(robot :: atom(), module(), keyword()) ::
+          :ok | {:error, :no_mission | (line :: String.t())}
   def start(robot, module, options), do: call(robot, {:start, module, options})
 
   @doc "Ends the mission. When this returns, the gate has dropped the wish; no older one follows."
@@ -59,9 +64,10 @@ defmodule Robot.Control.Pilot do
 
   @doc """
   Resumes the mission that the last stop ended, from its beginning, with the commands that it had
-  kept (`c:Robot.Mission.halted/1`). `{:error, :idle}` if there is none, or if a mission runs.
+  kept (`c:Robot.Mission.halted/1`). `{:error, :idle}` if there is none, or if a mission runs; a line
+  as of `start/1`.
   """
-  @spec resume(robot :: atom()) :: :ok | {:error, :idle}
+  @spec resume(robot :: atom()) :: :ok | {:error, :idle | (line :: String.t())}
   def resume(robot), do: call(robot, :resume)
 
   @doc "Hands a command to the mission. `:ok` means that the mission got it, not that it is done."
@@ -90,10 +96,10 @@ defmodule Robot.Control.Pilot do
   @spec hear(robot :: atom(), Robot.Mission.event() | {:walls, Grid.Packed.t() | nil}) :: :ok
   def hear(robot, event), do: GenServer.cast(Names.via(robot, :pilot), event)
 
-  @doc "A sink for the drive: passes on whether the wheels may turn."
+  @doc "A sink for the drive: ends the mission when the wheels are disarmed."
   @spec sense(robot :: atom(), reading :: tuple()) :: :ok
-  def sense(robot, {:arming, %{state: state}}),
-    do: GenServer.cast(Names.via(robot, :pilot), {:arming, state})
+  def sense(robot, {:arming, %{state: state}}) when state != :armed,
+    do: GenServer.cast(Names.via(robot, :pilot), :disarmed)
 
   def sense(_robot, _reading), do: :ok
 
@@ -152,11 +158,8 @@ defmodule Robot.Control.Pilot do
   def handle_cast({:halt, then}, s) when then == nil or is_mfa(then),
     do: {:noreply, idle(s, then)}
 
-  def handle_cast({:arming, _state}, {_, %{config: config}} = s) do
-    if config.arm == :manual and not config.dry_run,
-      do: {:noreply, idle(s, nil)},
-      else: {:noreply, s}
-  end
+  def handle_cast(:disarmed, {_, %{config: %{dry_run: true}}} = s), do: {:noreply, s}
+  def handle_cast(:disarmed, s), do: {:noreply, idle(s, nil)}
 
   # A mission is told only what `Robot.Mission` promises it.
   def handle_cast({:tick, %Percept{at_ms: at_ms}} = event, {_state, data} = s)
@@ -237,7 +240,8 @@ defmodule Robot.Control.Pilot do
     do: event |> handle(data) |> follow(state, data)
 
   defp go(:resume, event, state, data) do
-    with {:ok, runner} <- Runner.resume(data.runner) do
+    with {:ok, runner} <- Runner.resume(data.runner),
+         :ok <- Readiness.of(data.config, data.board) do
       Journal.heard(:resume, data)
       go({:hand, runner.module}, event, state, %{data | runner: runner})
     end
@@ -249,14 +253,18 @@ defmodule Robot.Control.Pilot do
   end
 
   defp begin(module, options, state, data) do
-    if Code.ensure_loaded?(module) and function_exported?(module, :init, 2) do
+    with :ok <- mission(module), :ok <- Readiness.of(data.config, data.board) do
       Journal.heard({:start, module, options}, data)
       Effects.rest(data.config)
       result = Journal.asking(module, data, fn -> Runner.start(data.runner, module, options) end)
       follow(result, state, data)
-    else
-      {:error, :no_mission}
     end
+  end
+
+  defp mission(module) do
+    if Code.ensure_loaded?(module) and function_exported?(module, :init, 2),
+      do: :ok,
+      else: {:error, :no_mission}
   end
 
   # The board says idle before the answer. The mission is called last, because it cannot prevent

@@ -2,10 +2,8 @@ defmodule Robot.Safety.Readiness do
   @moduledoc """
   Decides whether an order that can move a robot would be carried out now, and whether a stop
   reaches its wheels, by the drive's entries on the board. An order is for now: it must not begin
-  to move the robot later, when somebody arms it.
-
-  A drive that arms by itself (`arm: :auto`) and has not reported anything yet is assumed to be
-  starting, and counts as ready. In a dry run nothing moves, and every order is accepted.
+  to move the robot later, when it is armed, whoever arms it: a person, or, with `arm: :auto`, the
+  drive itself. In a dry run nothing moves, and every order is accepted.
   """
   alias Hal.Device.Words
   alias Robot.{Board, Config}
@@ -14,56 +12,63 @@ defmodule Robot.Safety.Readiness do
   @type arming :: %{state: Hal.Device.Arming.state(), why: String.t() | nil} | nil
   @type health :: :online | {:offline, reason :: term()} | nil
 
-  @doc "Judges a robot of this node by its config and its board (`judge/3`)."
+  @doc "Judges a robot of this node by its config and its board (`judge/2`)."
   @spec of(Config.t(), Board.t()) :: :ok | {:error, line :: String.t()}
   def of(%Config{dry_run: true}, _board), do: :ok
 
-  def of(%Config{arm: policy, drive: drive}, board) do
+  def of(%Config{drive: drive}, board) do
     case entry(board, {:health, :drive}) do
       {:offline, reason} ->
-        judge(policy, entry(board, :arming), {:offline, Words.offline(drive, reason)})
+        judge(entry(board, :arming), {:offline, Words.offline(drive, reason)})
 
       health ->
-        judge(policy, entry(board, :arming), health)
+        judge(entry(board, :arming), health)
     end
   end
+
+  @doc """
+  The same of the wheels alone: a drive that is armed and has gone offline because it does not obey
+  is told again and again, until it does.
+  """
+  @spec armed(Config.t(), Board.t()) :: :ok | {:error, line :: String.t()}
+  def armed(%Config{dry_run: true}, _board), do: :ok
+  def armed(%Config{}, board), do: judge(entry(board, :arming), nil)
 
   @doc """
   `:ok`, or the reason as a line that does not name the robot. If the reason why the drive is
   offline is a text, it is used unchanged.
 
-      iex> Robot.Safety.Readiness.judge(:manual, %{state: :armed, why: nil}, :online)
+      iex> Robot.Safety.Readiness.judge(%{state: :armed, why: nil}, :online)
       :ok
-      iex> Robot.Safety.Readiness.judge(:manual, %{state: :disarmed, why: nil}, :online)
+      iex> Robot.Safety.Readiness.judge(%{state: :disarmed, why: nil}, :online)
       {:error, "its wheels are disarmed; arm it first"}
-      iex> Robot.Safety.Readiness.judge(:auto, %{state: :disarmed, why: "conversion distance is missing"}, :online)
+      iex> Robot.Safety.Readiness.judge(%{state: :disarmed, why: "conversion distance is missing"}, :online)
       {:error, "its wheels are disarmed (conversion distance is missing)"}
-      iex> Robot.Safety.Readiness.judge(:auto, %{state: :disarmed, why: nil}, {:offline, :enoent})
+      iex> Robot.Safety.Readiness.judge(%{state: :disarmed, why: nil}, {:offline, :enoent})
       {:error, "its drive is offline (:enoent)"}
-      iex> Robot.Safety.Readiness.judge(:manual, %{state: {:error, :eio}, why: nil}, :online)
+      iex> Robot.Safety.Readiness.judge(%{state: {:error, :eio}, why: nil}, :online)
       {:error, "its line was lost (:eio) while the wheels turned; look, acknowledge, and arm it"}
-      iex> for policy <- [:auto, :manual], do: Robot.Safety.Readiness.judge(policy, nil, nil)
-      [:ok, {:error, "its drive is not open yet"}]
+      iex> Robot.Safety.Readiness.judge(nil, nil)
+      {:error, "its drive is not open yet"}
   """
-  @spec judge(:auto | :manual, arming(), health()) :: :ok | {:error, line :: String.t()}
-  def judge(_policy, %{state: {:error, reason}}, _health),
+  @spec judge(arming(), health()) :: :ok | {:error, line :: String.t()}
+  def judge(%{state: {:error, reason}}, _health),
     do:
       {:error,
        "its line was lost (#{brief(reason)}) while the wheels turned; look, acknowledge, and arm it"}
 
-  def judge(_policy, _arming, {:offline, reason}),
+  def judge(_arming, {:offline, reason}),
     do: {:error, "its drive is offline (#{brief(reason)})"}
 
-  def judge(_policy, %{state: :armed}, _health), do: :ok
+  def judge(%{state: :armed}, _health), do: :ok
 
-  def judge(_policy, %{state: :disarmed, why: nil}, _health),
+  def judge(%{state: :disarmed, why: nil}, _health),
     do: {:error, "its wheels are disarmed; arm it first"}
 
-  def judge(_policy, %{state: :disarmed, why: why}, _health),
+  def judge(%{state: :disarmed, why: why}, _health),
     do: {:error, "its wheels are disarmed (#{why})"}
 
-  def judge(:auto, nil, _health), do: :ok
-  def judge(:manual, nil, _health), do: {:error, "its drive is not open yet"}
+  def judge(nil, _health), do: {:error, "its drive is not open yet"}
 
   @doc """
   Whether a stop that the gate has carried out can have reached the wheels. It cannot if the

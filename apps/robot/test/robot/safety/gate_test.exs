@@ -120,11 +120,12 @@ defmodule Robot.Safety.GateTest do
   end
 
   test "a gate that starts again knows that its drive is not armed" do
-    id = rolling(:gate5, arm: :manual)
+    mission = {Acts.Mission, effects: [{:goal, :roll, {Acts.Roll, twist: Twist.new(0.1, 0.0)}}]}
+    id = robot(:gate5, arm: :manual, mission: mission)
+    assert Pilot.start(id) == {:error, "its wheels are disarmed; arm it first"}
     eventually_limits(id, [:disarmed])
     stands(250)
     :ok = Hal.Device.arm(Names.whereis(id, :drive))
-    # What it was told before is forgotten.
     stands(250)
     :ok = Pilot.start(id)
     rolls()

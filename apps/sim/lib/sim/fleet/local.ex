@@ -14,9 +14,6 @@ defmodule Sim.Fleet.Local do
   alias Sim.Fleet.{Folder, Hardware, RadioServer, Robot}
   alias Sim.World
 
-  @armed_ms 5_000
-  @look_ms 10
-
   @enforce_keys [:supervisor, :server, :air, :order, :pids, :robots, :folder]
   defstruct @enforce_keys
 
@@ -54,7 +51,9 @@ defmodule Sim.Fleet.Local do
         {pid, robot.id}
       end
 
-    await_armed(Map.values(pids), System.monotonic_time(:millisecond) + @armed_ms)
+    # So that it takes the first order of a person who has just started the fleet. A robot that cannot
+    # arm does not delay the others for long.
+    Robot.await_armed(Map.values(pids))
 
     %__MODULE__{
       supervisor: supervisor,
@@ -65,18 +64,6 @@ defmodule Sim.Fleet.Local do
       robots: setup.robots,
       folder: folder
     }
-  end
-
-  # Drives arm by themselves once they have reported. Until then a robot refuses what would move
-  # it, also the first order of a person who has just started the fleet. A robot that cannot arm
-  # does not delay the others for long.
-  defp await_armed(ids, until_ms) do
-    late = Enum.reject(ids, &Robot.armed?/1)
-
-    if late != [] and System.monotonic_time(:millisecond) < until_ms do
-      Process.sleep(@look_ms)
-      await_armed(late, until_ms)
-    end
   end
 
   @doc false

@@ -7,6 +7,9 @@ defmodule Sim.Fleet.Robot do
   alias Robot.Mission.Manual
   alias Swarm.Membership.Heartbeat
 
+  @armed_ms 5_000
+  @look_ms 10
+
   # The timeout of a command to a single robot.
   @over [:ready, :done, :given_up, :found, :not_found]
 
@@ -42,16 +45,35 @@ defmodule Sim.Fleet.Robot do
   @spec now(integer()) :: non_neg_integer()
   def now(epoch_ms), do: System.monotonic_time(:millisecond) - epoch_ms
 
-  @doc "Starts its mission."
-  @spec begin(atom()) :: :ok
+  @doc """
+  Starts its mission, once its drive has armed itself; waits 5 s for that. The error says in a line why
+  its wheels may not turn.
+  """
+  @spec begin(atom()) :: :ok | {:error, line :: String.t()}
   def begin(id) do
-    :ok = Pilot.start(id)
-    :ok = Pilot.command(id, :start)
+    :ok = await_armed([id])
+    with :ok <- Pilot.start(id), do: Pilot.command(id, :start)
   end
 
-  @doc "Whether its wheels may turn: its drive is online, has reported, and is armed."
-  @spec armed?(atom()) :: boolean()
-  def armed?(id) do
+  @doc """
+  Waits until all of them are armed, 5 s at most: drives arm by themselves once they have reported, and
+  till then a robot refuses what would move it.
+  """
+  @spec await_armed([atom()]) :: :ok
+  def await_armed(ids), do: await_armed(ids, System.monotonic_time(:millisecond) + @armed_ms)
+
+  defp await_armed(ids, until_ms) do
+    late = Enum.reject(ids, &armed?/1)
+
+    if late != [] and System.monotonic_time(:millisecond) < until_ms do
+      Process.sleep(@look_ms)
+      await_armed(late, until_ms)
+    else
+      :ok
+    end
+  end
+
+  defp armed?(id) do
     with {:ok, board} <- Board.find(id),
          {:ok, %{state: :armed}, _at_ms} <- Board.fetch(board, :arming, :infinity),
          do: true,

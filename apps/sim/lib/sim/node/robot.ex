@@ -43,7 +43,11 @@ defmodule Sim.Node.Robot do
   end
 
   @impl Sim.Node
-  def begin(options), do: Robot.begin(options.robot.id)
+  def begin(options) do
+    # One that cannot arm says why in its status.
+    _started = Robot.begin(options.robot.id)
+    :ok
+  end
 
   @doc "What the robot claims about itself, and how many messages it sent."
   @spec report(atom(), pid() | RadioServer.counter()) :: {map(), map()}

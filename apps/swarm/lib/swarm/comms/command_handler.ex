@@ -116,6 +116,8 @@ defmodule Swarm.Comms.CommandHandler do
   defp answer({:error, :idle}, id, _formation), do: shapeless(id)
   defp answer({:error, :no_mission}, id, _start), do: {:error, "#{id} has no such mission"}
 
+  defp answer({:error, line}, id, _command) when is_binary(line), do: {:error, "#{id}: #{line}"}
+
   defp answer({:error, :late}, id, _command),
     do: {:error, "#{id} answers too late; repeat the command"}
 
