@@ -121,6 +121,17 @@ defmodule Hal.Device do
   def disarm_later(device, then \\ nil), do: GenServer.cast(device, {:disarm, then})
 
   @doc """
+  Asks whether what the drive was told before this has a base behind it, on behalf of another process; the caller does
+  not wait. The device applies `reply` with the outcome: `:reported` at the base's next report of its wheels, `:silent`
+  if none comes within so many ms (5,000 at most), `:closed` when its driver is not open. A device that hangs or is gone
+  does not reply.
+  """
+  @spec confirm(GenServer.server(), within_ms :: 1..5_000, reply :: {module(), atom(), list()}) ::
+          :ok
+  def confirm(device, within_ms, {_m, _f, _a} = reply) when within_ms in 1..5_000,
+    do: GenServer.cast(device, {:confirm, within_ms, reply})
+
+  @doc """
   A person confirms having checked why the line was lost while the wheels turned. The drive may
   then be armed.
   """

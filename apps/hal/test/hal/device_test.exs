@@ -48,6 +48,32 @@ defmodule Hal.DeviceTest do
     assert_receive {:drive, {:drive, ^twist}, ^pid}
   end
 
+  test "a confirmation is the next report of the wheels, or that none came, or that nobody could report" do
+    {:ok, reports} = Agent.start_link(fn -> [:wheels, :sonar] end)
+    open = answers([:ok, {:error, :enoent}])
+    pid = armed(device(:drive, open: open, reports: fn -> Agent.get(reports, & &1) end))
+    confirm = fn tag, ms -> Device.confirm(pid, ms, {__MODULE__, :tell, [self(), tag]}) end
+    confirm.(:fresh, 2_000)
+    assert_receive {:fresh, :reported}
+
+    Agent.update(reports, fn _ -> [:sonar] end)
+    # What was reported before that.
+    confirm.(:first, 150)
+    assert_receive {:first, _outcome}
+    confirm.(:none, 150)
+    assert_receive {:none, :silent}
+
+    confirm.(:lost, 5_000)
+    send(pid, {:fail, :unplugged})
+    assert_receive {:lost, :closed}
+    confirm.(:away, 150)
+    assert_receive {:away, :closed}
+    assert_raise FunctionClauseError, fn -> confirm.(:long, 5_001) end
+  end
+
+  @doc false
+  def tell(test, tag, outcome), do: send(test, {tag, outcome})
+
   test "a drive that hears no more speeds stops its wheels, once" do
     pid = armed(device(:drive))
     twist = Twist.new(0.3, 0.0)

@@ -16,9 +16,9 @@ defmodule Swarm.EStop do
 
   A stop goes to gate, executive and pilot at once, so that one that hangs does not delay the
   others. The last of them, the gate, answers when the mission has ended and no older wish can
-  follow (`Robot.Control.Pilot.halt/2`); if that does not happen, nobody answers. If nothing
-  reaches the wheels, the answer says so (`Robot.Safety.Readiness.stopped/1`), for stop, disarm
-  and e-stop alike.
+  follow (`Robot.Control.Pilot.halt/2`); if that does not happen, nobody answers. It
+  is `:ok` once the base has reported since; if nothing reaches the wheels, or nobody can say whether it does, the answer
+  says so, for stop, disarm and e-stop alike (`Swarm.EStop.Answer`).
 
   A reset first goes the same way: the gate is released once the robot's mission or order has
   ended, unless somebody stops it again meanwhile.

@@ -5,7 +5,7 @@ defmodule Hal.Device.Lifecycle do
   """
   alias Hal.Twist
   alias Hal.Device.Arming
-  alias Hal.Device.{Liveness, Obedience, Publisher, State, Watchdog}
+  alias Hal.Device.{Confirmation, Liveness, Obedience, Publisher, State, Watchdog}
 
   @retry_ms 100
   @longest_retry_ms 5_000
@@ -35,7 +35,8 @@ defmodule Hal.Device.Lifecycle do
   def fail(s, reason, inner) do
     s.driver.terminate(inner)
     s = Publisher.health(%{Watchdog.unguard(s) | inner: :closed}, {:offline, reason})
-    retry(if s.arming, do: become(s, Arming.lost(s.arming, reason)), else: s)
+    s = if s.arming, do: become(s, Arming.lost(s.arming, reason)), else: s
+    s |> Confirmation.closed() |> retry()
   end
 
   defp retry(s) do

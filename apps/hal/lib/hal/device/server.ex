@@ -5,7 +5,7 @@ defmodule Hal.Device.Server do
   """
   use GenServer
   import Hal.HardenedServer, only: [is_mfa: 1]
-  alias Hal.Device.{Lifecycle, Publisher, State, Wishes}
+  alias Hal.Device.{Confirmation, Lifecycle, Publisher, State, Wishes}
   alias Hal.{HardenedServer, Twist}
 
   @rest_ms 500
@@ -69,6 +69,10 @@ defmodule Hal.Device.Server do
     {:noreply, s}
   end
 
+  def handle_cast({:confirm, within_ms, reply}, %{kind: :drive} = s)
+      when is_integer(within_ms) and within_ms in 1..5_000 and is_mfa(reply),
+      do: {:noreply, Confirmation.ask(s, within_ms, reply)}
+
   def handle_cast({:look, pan, tilt}, %{kind: :ptz} = s) when is_float(pan) and is_float(tilt),
     do: {:noreply, Wishes.wish(s, :look, [pan, tilt])}
 
@@ -87,6 +91,8 @@ defmodule Hal.Device.Server do
   end
 
   def handle_info({:watchdog, _old}, s), do: {:noreply, s}
+
+  def handle_info({:unconfirmed, ref}, s), do: {:noreply, Confirmation.late(s, ref)}
 
   def handle_info({:listen, ref}, %{listening: ref, inner: {:open, _}} = s),
     do: {:noreply, s |> Lifecycle.judge() |> Lifecycle.listen()}
@@ -111,7 +117,12 @@ defmodule Hal.Device.Server do
 
   defp take(s, readings) do
     for reading <- readings, do: Publisher.hand_on(s, reading)
-    s |> Lifecycle.measured(readings) |> Lifecycle.judge() |> Wishes.ask()
+
+    s
+    |> Confirmation.heard(readings)
+    |> Lifecycle.measured(readings)
+    |> Lifecycle.judge()
+    |> Wishes.ask()
   end
 
   # Whoever asked has been told by then that nothing was done, and may stand in front of the

@@ -34,14 +34,16 @@ defmodule Hal.Device.State do
                 odd: nil,
                 listening: nil,
                 due_ms: nil,
-                patient_ms: nil
+                patient_ms: nil,
+                confirmations: %{}
               ]
 
   @typedoc """
   `inner` is the driver's own state; `health` and `armed_as` are what was last published;
   `retry_ms` is the wait after the next failure; `retry`, `watchdog` and `listening` identify the
   timers that still count. `due_ms` is when it is to judge next, and until `patient_ms` silence does
-  not count, because it has been asleep itself (`System.monotonic_time/1`, ms).
+  not count, because it has been asleep itself (`System.monotonic_time/1`, ms). `confirmations` are the timers and replies of
+  those who wait for a report.
   """
   @type t :: %__MODULE__{
           kind: Hal.Device.kind(),
@@ -66,7 +68,8 @@ defmodule Hal.Device.State do
           odd: String.t() | nil,
           listening: reference() | nil,
           due_ms: integer() | nil,
-          patient_ms: integer() | nil
+          patient_ms: integer() | nil,
+          confirmations: %{reference() => {reference(), Hal.Device.Confirmation.reply()}}
         }
 
   @doc """

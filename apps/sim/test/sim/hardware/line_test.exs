@@ -103,6 +103,37 @@ defmodule Sim.Hardware.LineTest do
     rolls(context, id)
   end
 
+  test "a stop that a frozen port program has not passed on is not said to have reached the wheels",
+       context do
+    base(context, [])
+    id = real(context, :line_frozen)
+    rolls(context, id)
+    program = port_program(id)
+    # Whatever becomes of the test, nobody is left behind frozen.
+    on_exit(fn -> System.cmd("kill", ["-CONT", program], stderr_to_stdout: true) end)
+    {_said, 0} = System.cmd("kill", ["-STOP", program])
+    eventually(fn -> File.read!("/proc/#{program}/stat") =~ ") T " end)
+    # What it had sent before.
+    :sys.get_state(Names.whereis(id, :drive))
+
+    for stop <- [&Swarm.stop/1, &Swarm.disarm/1, &Swarm.ask(&1, :estop)] do
+      assert {:error, line} = stop.(id)
+      assert line =~ ~r/nobody can say/
+      assert line =~ "use the robot's own emergency stop"
+    end
+
+    {_said, 0} = System.cmd("kill", ["-CONT", program])
+    eventually(fn -> still?(context) and Swarm.stop(id) == :ok end)
+    assert order(&Swarm.reset/0) == :ok
+  end
+
+  defp port_program(id) do
+    drive = Names.whereis(id, :drive)
+    port = Enum.find(Port.list(), &(Port.info(&1, :connected) == {:connected, drive}))
+    {:os_pid, program} = Port.info(port, :os_pid)
+    "#{program}"
+  end
+
   test "if sonars are no longer reported, the robot is slow after 0.5 s, stopped and disarmed after 2 s",
        context do
     emulator = base(context, [])

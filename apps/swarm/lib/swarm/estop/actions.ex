@@ -105,29 +105,28 @@ defmodule Swarm.EStop.Actions do
     end
   end
 
-  def obey(s, request, {ref, _given_us}) do
-    {answer, s} = answer(request, s)
-    Nonblocking.answer(ref, answer)
+  def obey(s, :estop, {ref, _given_us}) do
+    s = press(s)
+    EStop.Answer.stood(s.id, ref)
     s
   end
 
-  defp answer(:estop, s) do
-    s = press(s)
-    {EStop.Answer.stopped(s.id, s.board), s}
-  end
-
-  defp answer({:estop, call}, s) do
+  def obey(s, {:estop, call}, {ref, _given_us}) do
     s = called(s, call, 0)
 
     if EStop.State.held?(s.stop),
-      do: {EStop.Answer.stopped(s.id, s.board), s},
-      else: {{:error, "#{s.id} was reset meanwhile"}, s}
+      do: EStop.Answer.stood(s.id, ref),
+      else: Nonblocking.answer(ref, {:error, "#{s.id} was reset meanwhile"})
+
+    s
   end
 
-  defp answer(other, s),
-    do:
-      {{:error, "#{inspect(other, limit: 5)} does not stop #{s.id}; stop, disarm and estop do"},
-       s}
+  def obey(s, other, {ref, _given_us}) do
+    line = "#{inspect(other, limit: 5)} does not stop #{s.id}; stop, disarm and estop do"
+
+    Nonblocking.answer(ref, {:error, line})
+    s
+  end
 
   @doc "Handles a call to stop, from any source."
   @spec called(t(), call :: term(), age_ms :: term()) :: t()
