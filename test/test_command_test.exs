@@ -77,7 +77,9 @@ defmodule System.TestCommandTest do
              ~r/== lower: tests: FAILED after \d+ s with status 3. All that it said:\nnot so\n/
 
     assert said =~ "nor that\n"
-    assert said =~ "bin/test: FAILED: lower: tests; the whole system: in real time\n"
+
+    assert said =~
+             "bin/test: FAILED: lower: tests; the whole system: releases; the whole system: in real time\n"
   end
 
   test "what does not compile ends the run; bad format does not, and is told at the end", %{
