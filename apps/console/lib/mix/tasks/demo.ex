@@ -32,9 +32,14 @@ defmodule Mix.Tasks.Demo do
 
     status =
       case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
-        {:ok, %Options{help: true}} -> IO.write(Options.help())
-        {:ok, options} -> with :ok <- Report.check(options), do: play(options)
-        {:error, lines} -> {:error, lines}
+        {:ok, %Options{help: true}} ->
+          IO.write(Options.help())
+
+        {:ok, options} ->
+          with :ok <- Report.check(options), :ok <- doors(options), do: play(options)
+
+        {:error, lines} ->
+          {:error, lines}
       end
 
     status =
@@ -46,6 +51,16 @@ defmodule Mix.Tasks.Demo do
 
     if is_integer(status) and status > 0, do: exit({:shutdown, status})
   end
+
+  # What a node lets in is decided when its Erlang starts.
+  defp doors(%{nodes: true}) do
+    if :init.get_argument(:proto_dist) == :error,
+      do:
+        {:error, "--nodes needs bin/demo, which starts Erlang so that not everybody may connect"},
+      else: :ok
+  end
+
+  defp doors(_one_process), do: :ok
 
   # The reader of our output may stop reading, as `head` does; then we end silently. A full disk
   # is an error.
