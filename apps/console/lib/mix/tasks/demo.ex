@@ -12,7 +12,7 @@ defmodule Mix.Tasks.Demo do
   """
   use Mix.Task
   alias Console.{Demo, Live, Options, Report}
-  alias Console.Cli.{Build, Output}
+  alias Console.Cli.Build
   alias Console.Terminal.Session
 
   # Twenty robots take a third of a processor, fifty a whole one, because all hear all.
@@ -21,11 +21,10 @@ defmodule Mix.Tasks.Demo do
   # A node needs a thirtieth of a processor, and more with every other node.
   @nodes_a_processor 15
 
-  # The status that a shell reports for a program whose output nobody reads any more.
-  @unread 141
-
   @impl Mix.Task
-  def run(arguments) do
+  def run(arguments), do: Hal.CommandOutput.run("demo", fn -> demo(arguments) end)
+
+  defp demo(arguments) do
     Build.update()
     # Robots are killed here on purpose, and reports of their supervisors would spoil the screen.
     Logger.configure(level: :none)
@@ -62,8 +61,6 @@ defmodule Mix.Tasks.Demo do
 
   defp doors(_one_process), do: :ok
 
-  # The reader of our output may stop reading, as `head` does; then we end silently. A full disk
-  # is an error.
   defp play(options) do
     warn(options)
 
@@ -77,20 +74,6 @@ defmodule Mix.Tasks.Demo do
 
       true ->
         live(options)
-    end
-  rescue
-    error in ErlangError ->
-      if error.original == :terminated, do: unread(), else: reraise(error, __STACKTRACE__)
-  end
-
-  defp unread do
-    case Output.lost() do
-      :unread ->
-        @unread
-
-      {:error, reason} ->
-        IO.puts(:stderr, "demo: the output cannot be written: #{:file.format_error(reason)}")
-        1
     end
   end
 
