@@ -66,3 +66,44 @@ defmodule System.NodesLauncherTest do
     end
   end
 end
+
+defmodule System.NodesDoorsTest do
+  @moduledoc "`bin/demo --nodes` from outside: what it lets in, and what it leaves when it crashes."
+  use Nodes.Case, async: true
+  @moduletag :realtime
+  @root Path.expand("..", __DIR__)
+
+  test "its nodes take few names of strangers, and a crash leaves no dump", %{environment: env} do
+    port = start("--robots 2 --duration 45", env)
+    said = await(port, ~r/elected +\w+ leads/)
+    ports = listening(env)
+    assert ports |> Map.keys() |> Enum.sort() == ["demo", "mag1", "min1", "world"]
+
+    for name <- ["demo", "mag1", "world"] do
+      greeted = Enum.count(1..60, &greeted?(ports[name], "stranger#{&1}@127.0.0.1"))
+      assert {name, greeted in 1..40} == {name, true}
+    end
+
+    before = dumps()
+    {_text, 0} = System.cmd("kill", ["-USR1", main(said)])
+    {_said, status} = ending(port, said)
+    assert status != 0
+    assert dumps() == before
+  end
+
+  test "`mix demo --nodes` without bin/demo has other doors, and is refused" do
+    {said, status} =
+      System.cmd("mix", ["demo", "--nodes"],
+        cd: @root,
+        stderr_to_stdout: true,
+        env: [{"ELIXIR_ERL_OPTIONS", ""}]
+      )
+
+    assert {status, said =~ "demo: --nodes needs bin/demo"} == {1, true}
+  end
+
+  # Its folder bears its number.
+  defp main(said), do: ~r/HOME=\S+convoy-(\d+)-/ |> Regex.run(said) |> List.last()
+
+  defp dumps, do: Path.wildcard(Path.join(@root, "**/erl_crash.dump*"))
+end

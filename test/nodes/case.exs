@@ -72,6 +72,32 @@ defmodule Nodes.Case do
     pid
   end
 
+  @doc "The ports at which the nodes of the run listen, by their names, as its port mapper has them."
+  def listening(env) do
+    {names, 0} = System.cmd("epmd", ["-names"], env: env)
+
+    for [_line, name, port] <- Regex.scan(~r/^name (\w+) at port (\d+)$/m, names),
+        into: %{},
+        do: {name, String.to_integer(port)}
+  end
+
+  @doc "Whether a node that listens there answers a caller of this name, which it must make an atom for."
+  def greeted?(port, name) do
+    # The message that opens the handshake, its flags those of OTP 23 and later.
+    hello = <<?N, 0xD07FBD::64, 1::32, byte_size(name)::16, name::binary>>
+
+    # One that is refused may be reset before we know that it was accepted.
+    with {:ok, socket} <-
+           :gen_tcp.connect({127, 0, 0, 1}, port, [:binary, packet: 2, active: false]) do
+      :gen_tcp.send(socket, hello)
+      answer = :gen_tcp.recv(socket, 0, 5_000)
+      :gen_tcp.close(socket)
+      match?({:ok, <<?s, _::binary>>}, answer)
+    else
+      {:error, _refused} -> false
+    end
+  end
+
   @doc "Ends a process, as `kill -9` does."
   def kill(pid), do: {_text, 0} = System.cmd("kill", ["-KILL", pid])
   @doc "Whether there is such a process."

@@ -24,15 +24,31 @@ defmodule Hal.HardenedServer do
   alias Hal.HardenedServer.{Drops, Loop}
 
   @doc """
-  Whether a term is an `{m, f, a}`, for callbacks that apply one.
+  Whether a term is an `{m, f, a}` that can be applied with `more` further arguments: a function that
+  its module exports, and a proper list. For callbacks that apply one.
 
-      iex> import Hal.HardenedServer, only: [is_mfa: 1]
-      iex> for term <- [{Kernel, :send, [self()]}, {Kernel, :send}, nil], do: is_mfa(term)
-      [true, false, false]
+      iex> alias Hal.HardenedServer
+      iex> for call <- [{Kernel, :send, [self(), 1]}, {Kernel, :send, [self()]}, {Kernel, :send, [1 | 2]}, {:a, :b, []}],
+      ...>     do: HardenedServer.callable?(call)
+      [true, false, false, false]
+      iex> {HardenedServer.callable?({Kernel, :send, [self()]}, 1), HardenedServer.callable?(nil)}
+      {true, false}
   """
-  defguard is_mfa(term)
-           when is_tuple(term) and tuple_size(term) == 3 and is_atom(elem(term, 0)) and
-                  is_atom(elem(term, 1)) and is_list(elem(term, 2))
+  @spec callable?(term(), more :: non_neg_integer()) :: boolean()
+  def callable?(call, more \\ 0)
+
+  # `length/1` fails for an improper list.
+  def callable?({module, function, arguments}, more)
+      when is_atom(module) and is_atom(function) and length(arguments) >= 0,
+      do:
+        Code.ensure_loaded?(module) and
+          function_exported?(module, function, length(arguments) + more)
+
+  def callable?(_other, _more), do: false
+
+  @doc "Whether a term is `callable?/1`, or `nil` for nothing to apply."
+  @spec then?(term()) :: boolean()
+  def then?(then), do: then == nil or callable?(then)
 
   @doc """
   Starts the process of `module`, as `GenServer.start_link/3` does. Options: `:name`,

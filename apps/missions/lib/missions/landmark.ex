@@ -87,15 +87,8 @@ defmodule Missions.Landmark do
 
   def handle({:outcome, _tag, _result}, mission), do: still(mission)
 
-  def handle({:message, %Message{kind: :round, from: from, body: letter} = message}, mission) do
-    {mission, relays} = relay_letter(mission, message)
-    {mission.phase, Rounds.hear(mission, from, letter), relays}
-  end
-
-  def handle({:message, %Message{kind: :place, body: anchor}}, mission),
-    do: still(ReferenceInbox.anchor(mission, anchor))
-
-  def handle({:message, _other}, mission), do: still(mission)
+  # The receiver has checked it, but on its way to here anybody on this node may have put another.
+  def handle({:message, message}, mission), do: hear(Message.check(message), mission)
 
   def handle({:tick, percept}, mission) do
     awake = Rounds.wake(mission, percept.at_ms)
@@ -132,6 +125,16 @@ defmodule Missions.Landmark do
        do: %Anchors{standing: colour}
 
   defp unled(_mission), do: %Anchors{}
+
+  defp hear({:ok, %Message{kind: :round, from: from, body: letter} = message}, mission) do
+    {mission, relays} = relay_letter(mission, message)
+    {mission.phase, Rounds.hear(mission, from, letter), relays}
+  end
+
+  defp hear({:ok, %Message{kind: :place, body: anchor}}, mission),
+    do: still(ReferenceInbox.anchor(mission, anchor))
+
+  defp hear(_other, mission), do: still(mission)
 
   @impl Robot.Mission
   # The formation, and the numbers of the group's last round and epoch.

@@ -25,7 +25,9 @@ defmodule Mix.Tasks.Bench do
   alias Console.Cli.{Build, MapName, Output, Parse, Progress}
 
   @impl Mix.Task
-  def run(["demo" | arguments]) do
+  def run(arguments), do: Hal.CommandOutput.run("bench", fn -> bench(arguments) end)
+
+  defp bench(["demo" | arguments]) do
     Build.update()
 
     case Cli.Arguments.parse(arguments, table()) do
@@ -34,37 +36,37 @@ defmodule Mix.Tasks.Bench do
     end
   end
 
-  def run(["goto" | arguments]) do
+  defp bench(["goto" | arguments]) do
     Build.update()
 
     with {:error, lines} <- Bench.Goto.Main.run(arguments), do: refuse(lines)
   end
 
-  def run(["swarm" | arguments]) do
+  defp bench(["swarm" | arguments]) do
     Build.update()
 
     with {:error, lines} <- Bench.Mesh.Main.run(arguments), do: refuse(lines)
   end
 
-  def run(["stop" | arguments]) do
+  defp bench(["stop" | arguments]) do
     Build.update()
 
     with {:error, lines} <- Bench.Stop.Main.run(arguments), do: refuse(lines)
   end
 
-  def run(["vision" | arguments]) do
+  defp bench(["vision" | arguments]) do
     Build.update()
 
     with {:error, lines} <- Bench.Vision.Main.run(arguments), do: refuse(lines)
   end
 
-  def run(["recording" | arguments]) do
+  defp bench(["recording" | arguments]) do
     Build.update()
 
     with {:error, lines} <- Bench.Recording.Main.run(arguments), do: refuse(lines)
   end
 
-  def run(["soak" | arguments]) do
+  defp bench(["soak" | arguments]) do
     Build.update()
 
     case Bench.Soak.Main.arguments(arguments) do
@@ -78,9 +80,9 @@ defmodule Mix.Tasks.Bench do
     end
   end
 
-  def run(arguments) when arguments in [["--help"], ["-h"]], do: help()
+  defp bench(arguments) when arguments in [["--help"], ["-h"]], do: help()
 
-  def run(_other),
+  defp bench(_other),
     do:
       refuse([
         "mix bench needs a command: mix bench demo [options], mix bench goto [options], " <>

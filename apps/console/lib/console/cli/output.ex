@@ -39,22 +39,6 @@ defmodule Console.Cli.Output do
   @spec finish(t()) :: :ok
   def finish(output), do: progress(output, "")
 
-  @doc """
-  Why standard output has ended: nobody reads it any more, or nothing more can be written to it.
-  """
-  @spec lost() :: :unread | {:error, File.posix()}
-  def lost do
-    # A pipe without a reader would keep us waiting.
-    with {:ok, %File.Stat{type: type}} when type in [:regular, :device] <-
-           File.stat("/dev/stdout"),
-         {:error, reason} when reason != :badarg <-
-           File.write("/dev/stdout", "\n", [:append, :raw]) do
-      {:error, reason}
-    else
-      _pipe_or_written -> :unread
-    end
-  end
-
   @doc "Writes a term to the file that `--json` names, if any; the error is for people."
   @spec json(Path.t() | nil, term()) :: :ok | {:error, [String.t()]}
   def json(nil, _term), do: :ok

@@ -16,18 +16,12 @@ defmodule Mix.Tasks.Calibrate do
 
   @words ["odometry", "colour"]
 
-  # The status that a shell reports for a program whose output nobody reads any more.
-  @unread 141
-
   @impl Mix.Task
   def run(arguments) do
-    Build.update()
-    calibrate(arguments)
-  rescue
-    error in ErlangError ->
-      if error.original == :terminated,
-        do: exit({:shutdown, @unread}),
-        else: reraise(error, __STACKTRACE__)
+    Hal.CommandOutput.run("calibrate", fn ->
+      Build.update()
+      calibrate(arguments)
+    end)
   end
 
   defp calibrate(arguments) do

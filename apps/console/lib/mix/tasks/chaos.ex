@@ -11,7 +11,9 @@ defmodule Mix.Tasks.Chaos do
   alias Console.Cli.Build
 
   @impl Mix.Task
-  def run(arguments) do
+  def run(arguments), do: Hal.CommandOutput.run("chaos", fn -> chaos(arguments) end)
+
+  defp chaos(arguments) do
     Build.update()
     # A run that raises is a finding, and told in its line.
     Logger.configure(level: :none)

@@ -12,7 +12,7 @@ defmodule Mix.Tasks.Demo do
   """
   use Mix.Task
   alias Console.{Demo, Live, Options, Report}
-  alias Console.Cli.{Build, Output}
+  alias Console.Cli.Build
   alias Console.Terminal.Session
 
   # Twenty robots take a third of a processor, fifty a whole one, because all hear all.
@@ -21,20 +21,24 @@ defmodule Mix.Tasks.Demo do
   # A node needs a thirtieth of a processor, and more with every other node.
   @nodes_a_processor 15
 
-  # The status that a shell reports for a program whose output nobody reads any more.
-  @unread 141
-
   @impl Mix.Task
-  def run(arguments) do
+  def run(arguments), do: Hal.CommandOutput.run("demo", fn -> demo(arguments) end)
+
+  defp demo(arguments) do
     Build.update()
     # Robots are killed here on purpose, and reports of their supervisors would spoil the screen.
     Logger.configure(level: :none)
 
     status =
       case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
-        {:ok, %Options{help: true}} -> IO.write(Options.help())
-        {:ok, options} -> with :ok <- Report.check(options), do: play(options)
-        {:error, lines} -> {:error, lines}
+        {:ok, %Options{help: true}} ->
+          IO.write(Options.help())
+
+        {:ok, options} ->
+          with :ok <- Report.check(options), :ok <- doors(options), do: play(options)
+
+        {:error, lines} ->
+          {:error, lines}
       end
 
     status =
@@ -47,8 +51,16 @@ defmodule Mix.Tasks.Demo do
     if is_integer(status) and status > 0, do: exit({:shutdown, status})
   end
 
-  # The reader of our output may stop reading, as `head` does; then we end silently. A full disk
-  # is an error.
+  # What a node lets in is decided when its Erlang starts.
+  defp doors(%{nodes: true}) do
+    if :init.get_argument(:proto_dist) == :error,
+      do:
+        {:error, "--nodes needs bin/demo, which starts Erlang so that not everybody may connect"},
+      else: :ok
+  end
+
+  defp doors(_one_process), do: :ok
+
   defp play(options) do
     warn(options)
 
@@ -62,20 +74,6 @@ defmodule Mix.Tasks.Demo do
 
       true ->
         live(options)
-    end
-  rescue
-    error in ErlangError ->
-      if error.original == :terminated, do: unread(), else: reraise(error, __STACKTRACE__)
-  end
-
-  defp unread do
-    case Output.lost() do
-      :unread ->
-        @unread
-
-      {:error, reason} ->
-        IO.puts(:stderr, "demo: the output cannot be written: #{:file.format_error(reason)}")
-        1
     end
   end
 

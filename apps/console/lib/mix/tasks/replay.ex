@@ -7,12 +7,14 @@ defmodule Mix.Tasks.Replay do
   not recorded; 1 something was wrong with the input.
   """
   use Mix.Task
-  alias Console.Cli.{Build, Output}
+  alias Console.Cli.Build
   alias Console.Replay
   alias Console.Replay.Options
 
   @impl Mix.Task
-  def run(arguments) do
+  def run(arguments), do: Hal.CommandOutput.run("replay", fn -> replay(arguments) end)
+
+  defp replay(arguments) do
     Build.update()
 
     status =
@@ -22,7 +24,7 @@ defmodule Mix.Tasks.Replay do
           0
 
         {:ok, options} ->
-          replay(options)
+          Replay.run(options)
 
         {:error, lines} ->
           Enum.each(lines, &IO.puts(:stderr, "replay: #{&1}"))
@@ -31,26 +33,5 @@ defmodule Mix.Tasks.Replay do
       end
 
     if status > 0, do: exit({:shutdown, status})
-  end
-
-  # The status that a shell reports for a program whose output nobody reads any more, such as that of `head`.
-  @unread 141
-
-  defp replay(options) do
-    Replay.run(options)
-  rescue
-    error in ErlangError ->
-      if error.original == :terminated, do: unread(), else: reraise(error, __STACKTRACE__)
-  end
-
-  defp unread do
-    case Output.lost() do
-      :unread ->
-        @unread
-
-      {:error, reason} ->
-        IO.puts(:stderr, "replay: the output cannot be written: #{:file.format_error(reason)}")
-        1
-    end
   end
 end

@@ -7,17 +7,16 @@ defmodule Mix.Tasks.Scenario do
   Exit status: 0 if all expectations hold; 2 if one failed; 1 if the input was wrong.
   """
   use Mix.Task
-  alias Console.Cli.{Build, Output}
+  alias Console.Cli.Build
   alias Console.Scenario.{Options, Session}
-
-  # The status that a shell reports for a program whose output nobody reads any more.
-  @unread 141
 
   @impl Mix.Task
   def run(arguments) do
-    Build.update()
-    status = scenario(arguments)
-    if is_integer(status) and status > 0, do: exit({:shutdown, status})
+    Hal.CommandOutput.run("scenario", fn ->
+      Build.update()
+      status = scenario(arguments)
+      if is_integer(status) and status > 0, do: exit({:shutdown, status})
+    end)
   end
 
   defp scenario(arguments) do
@@ -30,29 +29,11 @@ defmodule Mix.Tasks.Scenario do
 
   defp play(options) do
     with {:error, lines} <- Session.run(options), do: refuse(lines)
-  rescue
-    error in ErlangError ->
-      if error.original == :terminated, do: unread(), else: reraise(error, __STACKTRACE__)
   end
 
   defp refuse(lines) do
     Enum.each(lines, &IO.puts(:stderr, "scenario: #{&1}"))
     IO.puts(:stderr, "scenario: --help shows how it is used")
     1
-  end
-
-  defp unread do
-    case Output.lost() do
-      :unread ->
-        @unread
-
-      {:error, reason} ->
-        IO.puts(
-          :stderr,
-          "scenario: the output cannot be written: #{:file.format_error(reason)}"
-        )
-
-        1
-    end
   end
 end

@@ -4,11 +4,12 @@ defmodule Hal.Device.Server do
   which `Hal.Device.Lifecycle` and `Hal.Device.Wishes` do.
   """
   use GenServer
-  import Hal.HardenedServer, only: [is_mfa: 1]
   alias Hal.Device.{Confirmation, Lifecycle, Publisher, State, Wishes}
   alias Hal.{HardenedServer, Twist}
 
   @rest_ms 500
+  # Nothing drives so fast (m/s, rad/s): drivers may calculate with what is below.
+  @senseless 1.0e6
 
   @impl GenServer
   def init(%State{} = s) do
@@ -51,27 +52,39 @@ defmodule Hal.Device.Server do
 
   @impl GenServer
   def handle_cast({:drive, %Twist{linear: linear, turn: turn} = twist}, %{kind: :drive} = s)
-      when is_number(linear) and is_number(turn) do
+      when is_number(linear) and is_number(turn) and abs(linear) < @senseless and
+             abs(turn) < @senseless do
     # A speed is valid only now.
     if s.inner == :closed, do: {:noreply, s}, else: {:noreply, Lifecycle.drive(s, twist)}
   end
 
-  def handle_cast({:disarm, then}, %{kind: :drive} = s) when then == nil or is_mfa(then) do
-    {_answer, s} = Lifecycle.order(s, :disarm)
-    with {m, f, a} <- then, do: apply(m, f, a)
-    {:noreply, s}
+  def handle_cast({:disarm, then}, %{kind: :drive} = s) do
+    if HardenedServer.then?(then) do
+      {_answer, s} = Lifecycle.order(s, :disarm)
+      with {m, f, a} <- then, do: apply(m, f, a)
+      {:noreply, s}
+    else
+      HardenedServer.drop(s)
+    end
   end
 
   def handle_cast({:order, order, until_ms, {m, f, a} = reply}, s)
-      when order in [:arm, :disarm, :acknowledge] and is_integer(until_ms) and is_mfa(reply) do
-    {answer, s} = order(s, order, until_ms)
-    apply(m, f, a ++ [answer])
-    {:noreply, s}
+      when order in [:arm, :disarm, :acknowledge] and is_integer(until_ms) do
+    if HardenedServer.callable?(reply, 1) do
+      {answer, s} = order(s, order, until_ms)
+      apply(m, f, a ++ [answer])
+      {:noreply, s}
+    else
+      HardenedServer.drop(s)
+    end
   end
 
   def handle_cast({:confirm, within_ms, reply}, %{kind: :drive} = s)
-      when is_integer(within_ms) and within_ms in 1..5_000 and is_mfa(reply),
-      do: {:noreply, Confirmation.ask(s, within_ms, reply)}
+      when is_integer(within_ms) and within_ms in 1..5_000 do
+    if HardenedServer.callable?(reply, 1),
+      do: {:noreply, Confirmation.ask(s, within_ms, reply)},
+      else: HardenedServer.drop(s)
+  end
 
   def handle_cast({:look, pan, tilt}, %{kind: :ptz} = s) when is_float(pan) and is_float(tilt),
     do: {:noreply, Wishes.wish(s, :look, [pan, tilt])}

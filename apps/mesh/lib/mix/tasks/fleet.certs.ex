@@ -25,7 +25,9 @@ defmodule Mix.Tasks.Fleet.Certs do
   @longest 65_536
 
   @impl Mix.Task
-  def run(words) do
+  def run(words), do: Hal.CommandOutput.run("fleet.certs", fn -> command(words) end)
+
+  defp command(words) do
     case OptionParser.parse(words, strict: @switches) do
       {_options, _names, [{word, _value} | _]} ->
         refuse("#{word} is not an option; --help lists them")

@@ -17,7 +17,9 @@ defmodule Mix.Tasks.Fleet.Secret do
   alias Mesh.Secret
 
   @impl Mix.Task
-  def run(words) do
+  def run(words), do: Hal.CommandOutput.run("fleet.secret", fn -> command(words) end)
+
+  defp command(words) do
     case OptionParser.parse(words, strict: [force: :boolean, help: :boolean]) do
       {_options, _files, [{word, _value} | _]} ->
         refuse("#{word} is not an option; --help lists them")

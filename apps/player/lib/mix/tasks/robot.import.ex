@@ -38,7 +38,9 @@ defmodule Mix.Tasks.Robot.Import do
   @largest 1_048_576
 
   @impl Mix.Task
-  def run(words) do
+  def run(words), do: Hal.CommandOutput.run("robot.import", fn -> command(words) end)
+
+  defp command(words) do
     case OptionParser.parse(words, strict: @switches, aliases: [o: :out]) do
       {_options, _files, [{word, nil} | _]} ->
         refuse("#{word} is not an option; --help lists them")

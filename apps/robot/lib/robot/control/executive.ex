@@ -15,11 +15,9 @@ defmodule Robot.Control.Executive do
   drop the wish of its predecessor.
   """
   use GenServer
-  import Hal.HardenedServer, only: [is_mfa: 1]
   alias Hal.{Device, Event, HardenedServer, Odometry, Ticker}
   alias Robot.{Behaviour, Board, Config, Departure, Mission, Names, Percept}
-  alias Robot.Control.{Controller, Trace}
-  alias Robot.Localiser.Anchors
+  alias Robot.Control.{Controller, Inbox, Trace}
   alias Robot.Safety.{DryRun, Gate, Readiness}
 
   @period_ms 100
@@ -131,7 +129,7 @@ defmodule Robot.Control.Executive do
   @impl GenServer
   def handle_call({:goal, _tag, _goal} = order, _from, s) do
     cond do
-      not order?(order) -> HardenedServer.drop(s)
+      not Inbox.order?(order) -> HardenedServer.drop(s)
       refusal = refusal(order, s) -> {:reply, refusal, s}
       true -> {:reply, :ok, obeyed(s, order)}
     end
@@ -144,15 +142,19 @@ defmodule Robot.Control.Executive do
 
   def handle_cast({:obey, order}, s) do
     cond do
-      not order?(order) -> HardenedServer.drop(s)
+      not Inbox.order?(order) -> HardenedServer.drop(s)
       refusal(order, s) -> {:noreply, s}
       true -> {:noreply, obeyed(s, order)}
     end
   end
 
-  def handle_cast({:confirm, {m, f, a} = then}, s) when is_mfa(then) do
-    apply(m, f, a)
-    {:noreply, s}
+  def handle_cast({:confirm, {m, f, a} = then}, s) do
+    if HardenedServer.callable?(then) do
+      apply(m, f, a)
+      {:noreply, s}
+    else
+      HardenedServer.drop(s)
+    end
   end
 
   def handle_cast(:hold, s), do: {:noreply, hold_on(s)}
@@ -160,8 +162,11 @@ defmodule Robot.Control.Executive do
   # The pilot, which is told too, ends the mission; one that hangs may still set a goal meanwhile.
   def handle_cast(:disarmed, s), do: {:noreply, hold_on(s)}
 
-  def handle_cast({:stand, then}, s) when then == nil or is_mfa(then),
-    do: {:noreply, %{drop(s, then) | held?: false}}
+  def handle_cast({:stand, then}, s) do
+    if HardenedServer.then?(then),
+      do: {:noreply, %{drop(s, then) | held?: false}},
+      else: HardenedServer.drop(s)
+  end
 
   def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
@@ -175,12 +180,6 @@ defmodule Robot.Control.Executive do
   end
 
   defp refusal(_order, _s), do: nil
-
-  defp order?({:goal, _tag, nil}), do: true
-  defp order?({:goal, _tag, {module, options}}), do: is_atom(module) and is_list(options)
-  defp order?({:anchors, %Anchors{}}), do: true
-  defp order?({:look, pan}), do: pan == nil or is_number(pan)
-  defp order?(_unknown), do: false
 
   defp obeyed(s, order) do
     at_ms = Config.now(s.config)
@@ -306,7 +305,7 @@ defmodule Robot.Control.Executive do
     do: %{s | told: DryRun.tell(s.config.id, {:look, pan}, s.told, at_ms)}
 
   defp look(%{config: config} = s, pan, at_ms) do
-    Device.look(Names.via(config.id, :ptz), pan, 0.0)
+    Device.look(Names.via(config.id, :ptz), pan * 1.0, 0.0)
     Trace.effect(config, :executive, {:look, pan}, at_ms)
     s
   end

@@ -19,10 +19,9 @@ defmodule Robot.Control.Pilot do
   So arming starts no motion.
   """
   use GenServer
-  import Hal.HardenedServer, only: [is_mfa: 1]
   alias Hal.HardenedServer
   alias Robot.{Board, Config, Names, Percept}
-  alias Robot.Control.{Delivery, Executive}
+  alias Robot.Control.{Delivery, Executive, Inbox}
   alias Robot.Control.Pilot.{Effects, Journal}
   alias Robot.Mission.Runner
   alias Robot.Safety.Readiness
@@ -155,18 +154,24 @@ defmodule Robot.Control.Pilot do
   defp answer(error, s), do: {:reply, error, s}
 
   @impl GenServer
-  def handle_cast({:halt, then}, s) when then == nil or is_mfa(then),
-    do: {:noreply, idle(s, then)}
+  def handle_cast({:halt, then}, s) do
+    if HardenedServer.then?(then), do: {:noreply, idle(s, then)}, else: HardenedServer.drop(s)
+  end
 
   def handle_cast(:disarmed, {_, %{config: %{dry_run: true}}} = s), do: {:noreply, s}
   def handle_cast(:disarmed, s), do: {:noreply, idle(s, nil)}
 
   # A mission is told only what `Robot.Mission` promises it.
-  def handle_cast({:tick, %Percept{at_ms: at_ms}} = event, {_state, data} = s)
+  def handle_cast({:tick, %Percept{at_ms: at_ms}} = event, {state, data} = s)
       when is_integer(at_ms) do
-    Journal.checkpoint(elem(s, 0), data)
-    event = newest(event)
-    if old?(event, data.config), do: {:noreply, s}, else: {:noreply, hand(event, s)}
+    Journal.checkpoint(state, data)
+    {:tick, percept} = event = newest(event)
+
+    cond do
+      old?(event, data.config) -> {:noreply, s}
+      Inbox.percept?(percept) -> {:noreply, hand(event, s)}
+      true -> HardenedServer.drop(s)
+    end
   end
 
   def handle_cast({:message, message} = event, s) when is_map(message),
@@ -197,9 +202,13 @@ defmodule Robot.Control.Pilot do
   end
 
   @impl GenServer
-  def handle_info({:deliver, %Delivery{} = delivery, {:command, _} = event}, {state, data} = s) do
-    {m, f, a} = delivery.reply
+  def handle_info({:deliver, delivery, {:command, _command} = event}, s) do
+    if Inbox.delivery?(delivery), do: delivered(delivery, event, s), else: HardenedServer.drop(s)
+  end
 
+  def handle_info(_unknown, s), do: HardenedServer.drop(s)
+
+  defp delivered(%Delivery{reply: {m, f, a}} = delivery, event, {state, data} = s) do
     with :ok <- timely(delivery, data),
          {:ok, way} <- Delivery.way(delivery, state, data.runner.halted),
          {:ok, state, data} <- go(way, event, state, data) do
@@ -212,8 +221,6 @@ defmodule Robot.Control.Pilot do
         {:noreply, s}
     end
   end
-
-  def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
   # A command is refused if its requester no longer waits, or if the robot is stopped or was
   # stopped after the request.
@@ -253,7 +260,8 @@ defmodule Robot.Control.Pilot do
   end
 
   defp begin(module, options, state, data) do
-    with :ok <- mission(module), :ok <- Readiness.of(data.config, data.board) do
+    with {:ok, options} <- mission(module, options, data),
+         :ok <- Readiness.of(data.config, data.board) do
       Journal.heard({:start, module, options}, data)
       Effects.rest(data.config)
       result = Journal.asking(module, data, fn -> Runner.start(data.runner, module, options) end)
@@ -261,10 +269,21 @@ defmodule Robot.Control.Pilot do
     end
   end
 
-  defp mission(module) do
-    if Code.ensure_loaded?(module) and function_exported?(module, :init, 2),
-      do: :ok,
-      else: {:error, :no_mission}
+  defp mission(module, options, data) do
+    cond do
+      not (HardenedServer.callable?({module, :init, []}, 2) and
+               function_exported?(module, :handle, 2)) ->
+        {:error, :no_mission}
+
+      not Keyword.keyword?(options) ->
+        {:error, "#{inspect(options, limit: 5)} are not options: [key: value] is allowed"}
+
+      function_exported?(module, :options, 2) ->
+        Journal.asking(module, data, fn -> module.options(options, nil) end)
+
+      true ->
+        {:ok, options}
+    end
   end
 
   # The board says idle before the answer. The mission is called last, because it cannot prevent

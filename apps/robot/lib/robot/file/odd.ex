@@ -24,6 +24,11 @@ defmodule Robot.File.Odd do
       iex> Robot.File.Odd.lines(robot, fn _device -> false end)
       ["limits.max_turn_acceleration: with 0.017 rad/s2 it takes 59 s to turn at full speed; 1.0 is usual",
        "/dev/ttyS9 is not on this machine; it must be on the robot's"]
+      iex> robot = %{robot | drive: {Some.Drive, [port: "/run/base"]}, limits: []}
+      iex> Robot.File.Odd.lines(robot, &(&1 == "/dev/base"))
+      ["/run/base is not on this machine; it must be on the robot's"]
+      iex> Robot.File.Odd.lines(%{robot | drive: {Some.Drive, [port: "base"]}}, &(&1 == "/dev/base"))
+      []
   """
   @spec lines(Robot.File.t(), (Path.t() -> boolean())) :: [String.t()]
   def lines(%Robot.File{} = robot, there?) do
@@ -133,11 +138,20 @@ defmodule Robot.File.Odd do
     if twice > 0, do: "#{twice} of the #{length(poses)} poses are given twice; each has its own"
   end
 
+  # A serial line may be anywhere, or a name in /dev; a source may be a file, a stream or a generator.
+  defp paths(options) do
+    case {options[:port], options[:source]} do
+      {port, _source} when is_binary(port) -> [port]
+      {_port, "/dev/" <> _ = source} -> [source]
+      _neither -> []
+    end
+  end
+
   defp devices(robot, there?) do
     named =
       for {_module, options} <- [robot.drive, robot.ptz, robot.camera],
-          "/dev/" <> _ = path <- [options[:port] || options[:source]],
-          not there?.(path),
+          path <- paths(options),
+          not there?.(path) and not there?.(Path.expand(path, "/dev")),
           do: path
 
     case Enum.uniq(named) do

@@ -42,9 +42,13 @@ defmodule Robot.Mission.Manual do
 
   @impl Robot.Mission
   def handle({:command, command}, mission) do
-    mission = %{mission | command: command, count: mission.count + 1, result: nil, why: nil}
-    goal = {:goal, {:command, mission.count}, goal(command, nil)}
-    result(mission, [goal, {:look, 0.0}, {:claim, claim(mission)}])
+    with {_module, _options} = goal <- goal(command, nil), :ok <- Behaviour.check(goal) do
+      mission = %{mission | command: command, count: mission.count + 1, result: nil, why: nil}
+      goal = {:goal, {:command, mission.count}, goal}
+      result(mission, [goal, {:look, 0.0}, {:claim, claim(mission)}])
+    else
+      _no_command -> result(mission, [])
+    end
   end
 
   # The robot's status reports the outcome of a command (R12) by its phase.
@@ -122,6 +126,7 @@ defmodule Robot.Mission.Manual do
 
   # A coloured object that is carried before its camera leads it, and others follow (R35).
   defp goal(:lead, _percept), do: {Behaviour.TrackBlob, []}
+  defp goal(_unknown, nil), do: nil
 
   defp behind(%{pose: pose, twist: %Twist{linear: linear}}) do
     velocity = {linear * :math.cos(pose.heading), linear * :math.sin(pose.heading)}

@@ -18,7 +18,6 @@ defmodule Robot.Safety.Gate do
   commanded.
   """
   use GenServer
-  import Hal.HardenedServer, only: [is_mfa: 1]
   alias Hal.{Device, Event, HardenedServer, Ticker, Twist}
   alias Robot.{Board, Config, Departure, Names}
   alias Robot.Control.Trace
@@ -119,12 +118,10 @@ defmodule Robot.Safety.Gate do
     {:noreply, %{s | reflex: Reflex.wish(s.reflex, twist, at_ms)}}
   end
 
-  def handle_cast({:forget, then}, s) when then == nil or is_mfa(then) do
-    at_ms = heard(s, :forget)
-    {reflex, urgency} = Reflex.forget(s.reflex)
-    s = react(%{s | reflex: reflex}, urgency, at_ms)
-    with {m, f, a} <- then, do: apply(m, f, a)
-    {:noreply, s}
+  def handle_cast({:forget, then}, s) do
+    if HardenedServer.then?(then),
+      do: {:noreply, forgotten(s, then)},
+      else: HardenedServer.drop(s)
   end
 
   def handle_cast({:sense, {:arming, _state}}, %{config: %{dry_run: true}} = s),
@@ -159,6 +156,14 @@ defmodule Robot.Safety.Gate do
   end
 
   def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
+
+  defp forgotten(s, then) do
+    at_ms = heard(s, :forget)
+    {reflex, urgency} = Reflex.forget(s.reflex)
+    s = react(%{s | reflex: reflex}, urgency, at_ms)
+    with {m, f, a} <- then, do: apply(m, f, a)
+    s
+  end
 
   defp cleared(s, tell?) do
     at_ms = heard(s, :reset)

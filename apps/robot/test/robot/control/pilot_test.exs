@@ -40,11 +40,15 @@ defmodule Robot.Control.PilotTest do
     now = System.monotonic_time(:millisecond)
 
     for at_ms <- [now - 2_000, now - 1_050, now],
-        do: Pilot.hear(id, {:tick, %Robot.Percept{robot: id, at_ms: at_ms, profile: nil}})
+        do:
+          Pilot.hear(
+            id,
+            {:tick, %Robot.Percept{robot: id, at_ms: at_ms, profile: Hal.Profile.magellan()}}
+          )
 
     # One after the other, so that the last one does not replace the others.
     assert_receive {:mission, {:tick, %{at_ms: ^now}}}
-    old = %Robot.Percept{robot: id, at_ms: now - 1_050, profile: nil}
+    old = %Robot.Percept{robot: id, at_ms: now - 1_050, profile: Hal.Profile.magellan()}
     Pilot.hear(id, {:tick, old})
     Pilot.hear(id, {:message, %{after: :tick}})
     assert_receive {:mission, {:message, %{after: :tick}}}
@@ -92,7 +96,10 @@ defmodule Robot.Control.PilotTest do
     [pilot, executive] = parts(id, [:pilot, :executive])
     :ok = :sys.suspend(executive)
     :ok = :sys.suspend(pilot)
-    ticks = for n <- 1..9, do: %Robot.Percept{robot: id, at_ms: n, profile: nil}
+
+    ticks =
+      for n <- 1..9, do: %Robot.Percept{robot: id, at_ms: n, profile: Hal.Profile.magellan()}
+
     Enum.each(ticks, &Pilot.hear(id, {:tick, &1}))
     :ok = :sys.resume(pilot)
     assert_receive {:mission, {:tick, %{at_ms: 9}}}

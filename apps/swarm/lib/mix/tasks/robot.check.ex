@@ -19,7 +19,9 @@ defmodule Mix.Tasks.Robot.Check do
   alias Swarm.MemberSpec
 
   @impl Mix.Task
-  def run(words) do
+  def run(words), do: Hal.CommandOutput.run("robot.check", fn -> command(words) end)
+
+  defp command(words) do
     case OptionParser.parse(words, strict: [help: :boolean]) do
       {_options, _files, [{word, _value} | _]} ->
         refuse(["#{word} is not an option; --help lists them"])

@@ -40,7 +40,9 @@ defmodule Mix.Tasks.Blobs do
   alias Vision.{Blobs, Colours, Picture}
 
   @impl Mix.Task
-  def run(words) do
+  def run(words), do: Hal.CommandOutput.run("blobs", fn -> command(words) end)
+
+  defp command(words) do
     case Options.parse(words) do
       {:ok, options} -> options |> find() |> finish()
       {:error, line} -> refuse(line)

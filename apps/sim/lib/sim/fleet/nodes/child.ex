@@ -26,7 +26,7 @@ defmodule Sim.Fleet.Nodes.Child do
   def start(%Config{} = config, home) do
     arguments = Command.arguments(Application.get_env(:swarm, :formations, []))
 
-    case Vm.open(arguments, [{"HOME", home}, {"ERL_CRASH_DUMP_BYTES", "0"}]) do
+    case Vm.open(arguments, [{"HOME", home}, {"ERL_CRASH_DUMP_SECONDS", "0"}]) do
       {:ok, port, pid} ->
         true = Port.command(port, Config.line(config))
         {:ok, %__MODULE__{node: config.node, port: port, pid: pid}}

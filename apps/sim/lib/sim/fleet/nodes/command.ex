@@ -4,7 +4,8 @@ defmodule Sim.Fleet.Nodes.Command do
   """
 
   @doc """
-  The arguments of `erl` for a node, with the formations that this build adds.
+  The arguments of `erl` for a node, with the carrier of robots (`Mesh.Distribution.Access`) and the formations that
+  this build adds.
 
       iex> Sim.Fleet.Nodes.Command.arguments([]) |> Enum.take(-3)
       ["-s", "Elixir.Sim.Node", "main"]
@@ -15,6 +16,7 @@ defmodule Sim.Fleet.Nodes.Command do
   def arguments(formations),
     do:
       ["-noshell" | Vm.fleet_flags()] ++
+        ["-proto_dist", "Elixir.Mesh.Distribution.Tcp"] ++
         formations(formations) ++ ["-s", "Elixir.Sim.Node", "main"]
 
   defp formations([]), do: []

@@ -1,0 +1,70 @@
+defmodule Hal.CommandOutput do
+  @moduledoc """
+  The standard output of a command that people start, which may be lost: a disk is full, or nobody reads any more.
+
+  Erlang writes later, and tells nobody what became of it; only the next one that writes learns it. A command
+  that prints once and ends would say that all went well.
+  """
+
+  # The status that a shell reports for a program whose output nobody reads any more, such as that of `head`.
+  @unread 141
+
+  @doc """
+  Runs a command, and returns what it returns. If its standard output was lost, the process exits with
+  `{:shutdown, status}`, which Mix makes the exit status: 1 and a line of this `name` if it could not be written, 141
+  and nothing said if nobody reads it. An exit `{:shutdown, status}` of the command passes otherwise.
+  """
+  @spec run(name :: String.t(), (... -> result)) :: result when result: term()
+  def run(name, command) do
+    ended = outcome(command)
+    flush()
+    # If the output was lost, whoever writes has been told by now, and this is refused.
+    IO.write("")
+
+    case ended do
+      {:returned, result} -> result
+      {:exited, status} -> exit({:shutdown, status})
+    end
+  rescue
+    error in ErlangError ->
+      if error.original == :terminated,
+        do: exit({:shutdown, lost(name)}),
+        else: reraise(error, __STACKTRACE__)
+  end
+
+  defp outcome(command) do
+    {:returned, command.()}
+  catch
+    :exit, {:shutdown, status} when is_integer(status) -> {:exited, status}
+  end
+
+  # The port of standard output answers when it has tried all that came before.
+  defp flush do
+    with user when is_pid(user) <- Process.whereis(:user),
+         {:links, links} <- Process.info(user, :links),
+         do: for(port <- links, is_port(port), do: drain(port))
+  end
+
+  defp drain(port) do
+    case :erlang.port_info(port, :queue_size) do
+      {:queue_size, bytes} when bytes > 0 ->
+        receive(do: (:never -> :ok), after: (1 -> drain(port)))
+
+      _empty_or_closed ->
+        :ok
+    end
+  end
+
+  # A pipe without a reader would keep us waiting.
+  defp lost(name) do
+    with {:ok, %File.Stat{type: type}} when type in [:regular, :device] <-
+           File.stat("/dev/stdout"),
+         {:error, reason} when reason != :badarg <-
+           File.write("/dev/stdout", "\n", [:append, :raw]) do
+      IO.puts(:stderr, "#{name}: the output cannot be written: #{:file.format_error(reason)}")
+      1
+    else
+      _pipe_or_written -> @unread
+    end
+  end
+end

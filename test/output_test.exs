@@ -1,0 +1,43 @@
+defmodule System.OutputTest do
+  @moduledoc "Commands whose standard output is lost say so, also if they print once, at their end."
+  use ExUnit.Case, async: true
+  @moduletag timeout: 300_000
+  @moduletag :tmp_dir
+  @root Path.expand("..", __DIR__)
+
+  test "a full disk is a line and status 1, whatever the command prints", %{tmp_dir: folder} do
+    for command <- [
+          "robot.check",
+          "robot.check --help",
+          "demo --headless --robots 2 --duration 3 --json -",
+          "demo --help",
+          "fleet.secret #{Path.join(folder, "secret")}",
+          "fleet.certs --help",
+          "robot.import --help",
+          "blobs --help",
+          "calibrate odometry --help",
+          "chaos --help",
+          "bench vision --help",
+          "replay --help",
+          "scenario --help"
+        ] do
+      name = command |> String.split() |> hd()
+      line = "#{name}: the output cannot be written: no space left on device\n1\n"
+      told = sh("mix #{command} 2>&1 >/dev/full; echo $?")
+      # With `--json -` the demo tells the rest there.
+      assert {command, told} == {command, line} or
+               (name == "demo" and String.ends_with?(told, line)),
+             told
+    end
+  end
+
+  test "who reads no further is told nothing more" do
+    assert sh("{ mix robot.check; echo $? >&2; } 2>&1 >/dev/null | cat") == "0\n"
+    assert sh("mix robot.check 2>&1 | true") == ""
+  end
+
+  defp sh(script) do
+    {told, 0} = System.cmd("sh", ["-c", script], cd: @root)
+    told
+  end
+end
