@@ -24,13 +24,14 @@ defmodule Console.Page do
   @most 200
 
   @typedoc """
-  `module` and `live` as in `Console.Live`; `robots` are those of the fleet; `address` (loopback) and `port` (any that is
+  `module` and `live` as in `Console.Live`; `robots` are those of the fleet, or a function without arguments that says
+  which these are now; `address` (loopback) and `port` (any that is
   free) to listen on; `token` is demanded where the address is not the loopback's.
   """
   @type option ::
           {:module, module()}
           | {:live, term()}
-          | {:robots, [atom()]}
+          | {:robots, [atom()] | (... -> [atom()])}
           | {:address, :inet.ip_address()}
           | {:port, :inet.port_number()}
           | {:token, String.t() | nil}
@@ -81,7 +82,9 @@ defmodule Console.Page do
 
   @impl Supervisor
   def init(options) do
-    request = {Request, :answer, [%{robots: options.robots, token: options.token, page: self()}]}
+    robots = options.robots
+    robots = if is_list(robots), do: fn -> robots end, else: robots
+    request = {Request, :answer, [%{robots: robots, token: options.token, page: self()}]}
 
     server = %{
       id: :server,

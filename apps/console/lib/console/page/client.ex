@@ -4,7 +4,6 @@ defmodule Console.Page.Client do
   that is driven by keyboard is stopped 300 ms after the last word, or when the page is gone.
   """
   use GenServer
-  alias Console.Cli.Format
   alias Console.Page.{About, Feed, State}
   alias Console.Terminal.Prompt
 
@@ -14,7 +13,7 @@ defmodule Console.Page.Client do
   @about_ms 200
 
   @doc "Starts it for the connection of the caller; `reply` writes text to the browser."
-  @spec start(pid(), [atom()], (String.t() -> term())) :: {:ok, pid()}
+  @spec start(pid(), (... -> [atom()]), (String.t() -> term())) :: {:ok, pid()}
   def start(feed, robots, reply), do: GenServer.start(__MODULE__, {self(), feed, robots, reply})
 
   @doc "Carries out a line; its answer goes to the browser."
@@ -55,13 +54,13 @@ defmodule Console.Page.Client do
   # `look mag1`, and `look` for nobody.
   @impl GenServer
   def handle_cast({:obey, "look" <> name}, s) do
-    robot = Enum.find(s.robots, &(Atom.to_string(&1) == String.trim(name)))
+    robot = Enum.find(s.robots.(), &(Atom.to_string(&1) == String.trim(name)))
     if robot && s.looked == nil, do: send(self(), :about)
     {:noreply, %{s | looked: robot}}
   end
 
   def handle_cast({:obey, line}, s) do
-    case drive(line, s.robots) do
+    case drive(line, s.robots.()) do
       {:ok, robot, speed} -> {:noreply, driven(s, robot, speed)}
       :other -> {:noreply, answer(s, line, carry_out(line, s))}
       error -> {:noreply, answer(s, line, error)}
@@ -72,7 +71,9 @@ defmodule Console.Page.Client do
   def handle_info(:about, %{looked: nil} = s), do: {:noreply, s}
 
   def handle_info(:about, s) do
-    with json when json != nil <- About.json(s.looked), do: s.reply.(json)
+    with %{} = about <- s.module.about(s.live, s.looked),
+         do: s.reply.(About.json(s.looked, about))
+
     _timer = Process.send_after(self(), :about, @about_ms)
     {:noreply, s}
   end
@@ -111,7 +112,7 @@ defmodule Console.Page.Client do
   end
 
   defp carry_out(line, s) do
-    case Prompt.parse(line, s.robots) do
+    case Prompt.parse(line, s.robots.()) do
       {:ok, :nothing} ->
         {:error, "type a command; help lists them"}
 
@@ -119,16 +120,16 @@ defmodule Console.Page.Client do
         {:error, "the page is closed in the browser; quit in the terminal ends the demo"}
 
       {:ok, :help} ->
-        {:ok, Prompt.help()}
+        {:ok, Prompt.help(s.module.offers(s.live))}
 
       {:ok, :nodes} ->
         {:ok, s.module.lines(s.live)}
 
       {:ok, :status} ->
-        {:ok, Format.everybody(s.module.scene(s.live))}
+        {:ok, s.module.status(s.live, :all)}
 
       {:ok, {:status, name}} ->
-        {:ok, Format.one(s.module.scene(s.live), name)}
+        {:ok, s.module.status(s.live, name)}
 
       {:ok, command} ->
         s.module.command(s.live, command)

@@ -65,7 +65,7 @@ defmodule Console.Page.Request do
   end
 
   defp serve("/camera/" <> name, request, page) do
-    case Enum.find(page.robots, &(Atom.to_string(&1) == name)) do
+    case Enum.find(page.robots.(), &(Atom.to_string(&1) == name)) do
       nil -> say(request, 404, "there is no robot #{inspect(name)}")
       robot -> picture(About.picture(robot), request)
     end
