@@ -10,8 +10,8 @@ defmodule Console.Page do
       Console.Page (one_for_one)
       |-- Console.Page.Feed    asks for the scene ten times a second while somebody looks
       `-- mochiweb             a process for each connection
-          `-- of a WebSocket: Console.Page.Client carries out what is typed and clicked, and stops what it drives
-              when 300 ms have passed without a word; a pusher writes the newest scene, as fast as the browser takes it
+          `-- of a WebSocket: Console.Page.Client carries out what is typed and clicked; a pusher writes the newest
+              scene, as fast as the browser takes it; all three end together, and the page connects again
 
   Who may look and command is decided by `Console.Page.Access`.
   """

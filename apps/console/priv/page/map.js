@@ -3,6 +3,7 @@
 // Okabe and Ito's colours, which the colour-blind tell apart.
 const COLOURS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#999933", "#882255"];
 const TRAIL = 600;
+const JUMP = 1; // metres from one scene to the next
 const AROUND = 2; // metres round robots without a map
 const NEAR = 14; // pixels round what is pointed at
 
@@ -46,7 +47,9 @@ export class FloorView {
       if (r.x === null) continue;
       const path = this.paths.get(r.id) ?? [];
       const last = path.at(-1);
-      if (!last || Math.hypot(last[0] - r.x, last[1] - r.y) > 0.03) path.push([r.x, r.y]);
+      const way = last ? Math.hypot(last[0] - r.x, last[1] - r.y) : JUMP;
+      // In real time what has jumped was not driven: its pose is told in another frame now.
+      if (way > 0.03) path.push([r.x, r.y, way >= JUMP && !this.map?.width]);
       if (path.length > TRAIL) path.shift();
       this.paths.set(r.id, path);
     }
@@ -172,7 +175,7 @@ export class FloorView {
     const path = this.paths.get(r.id);
     if (path.length < 2) return;
     c.beginPath();
-    for (const [x, y] of path) c.lineTo(...this.toPixel(x, y));
+    for (const [x, y, jumped] of path) c[jumped ? "moveTo" : "lineTo"](...this.toPixel(x, y));
     c.strokeStyle = ink;
     c.globalAlpha = 0.45;
     c.lineWidth = 1.5;

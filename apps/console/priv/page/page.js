@@ -44,6 +44,7 @@ function hear(message) {
     by("stages").replaceChildren();
     by("robots").replaceChildren();
     for (const b of document.querySelectorAll("[data-offer]")) b.hidden = !message.offers.includes(b.dataset.offer);
+    by("off").hidden = !message.width;
     floor.setMap(message);
   } else if (message.t === "scene") {
     heard = performance.now();
@@ -66,7 +67,7 @@ function show(next) {
   floor.setScene(scene);
   const fleet = by("fleet");
   const parts = [
-    `${scene.at_s.toFixed(1)} s`,
+    scene.formation && `${scene.at_s.toFixed(1)} s`,
     scene.pace,
     scene.formation && `${scene.formation[0]} ${scene.formation[1].toFixed(1)} m`,
     scene.formation ? null : `${scene.robots.filter((r) => r.alive).length} robots heard`,
@@ -96,6 +97,7 @@ function row(robot, index) {
     tr.append(...cells);
     by("robots").append(tr);
   }
+  tr.children[2].hidden = scene.formation === null;
   const metres = (m) => (m === null ? "" : `${m.toFixed(2)} m`);
   tr.children[1].textContent = (robot.alive ? robot.state : away(robot)) + (robot.alive && robot.leader ? " ★" : "");
   tr.children[2].textContent = robot.alive ? metres(robot.off) : "";
@@ -147,6 +149,7 @@ function about(told) {
   const made = (tag, textContent) => Object.assign(document.createElement(tag), { textContent });
   by("about").replaceChildren(...rows.flatMap(([term, text]) => [made("dt", term), made("dd", text)]));
   by("camera").hidden = !told.camera;
+  by("sonar").hidden = told.sonar.length === 0;
   floor.draw();
 }
 

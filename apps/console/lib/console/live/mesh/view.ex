@@ -69,6 +69,7 @@ defmodule Console.Live.Mesh.View do
   defp changes(view, id, status) do
     before = unless id in view.gone, do: view.statuses[id]
     heard = if before, do: [], else: ["is heard"]
+    status = if before, do: known(before, status), else: status
 
     heard ++
       for {{key, now, none}, {key, was, _none}} <- Enum.zip(facts(status), facts(before)),
@@ -95,6 +96,7 @@ defmodule Console.Live.Mesh.View do
     ]
   end
 
+  defp state(%{state: :no_answer}), do: "does not answer"
   defp state(%{state: state, leader: nil}), do: "#{state}"
   defp state(%{state: state, leader: id, robot: id}), do: "#{state}"
   defp state(%{state: state, leader: leader}), do: "#{state}, leader #{leader}"
