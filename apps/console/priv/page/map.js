@@ -149,6 +149,7 @@ export class FloorView {
     const placed = [...scene.robots.entries()].filter(([, r]) => r.x !== null);
     if (this.trails) for (const [k, r] of placed) this.trail(c, r, colour(k));
     for (const [k, r] of placed) this.slot(c, r, colour(k));
+    for (const [k, r] of placed) this.leash(c, r, colour(k));
     if (this.sonar && this.about) this.cones(c, this.robot(this.about.id), ink);
     for (const [k, r] of placed) this.body(c, r, colour(k), ink);
     this.landmark(c, this.dragged?.landmark ?? scene.landmark, ink);
@@ -211,6 +212,20 @@ export class FloorView {
     c.arc(x, y, r.r * this.view.scale, 0, 7);
     c.moveTo(...this.toPixel(r.x, r.y));
     c.lineTo(x, y);
+    c.stroke();
+    c.setLineDash([]);
+  }
+
+  // From a follower to its leader, where its place is not known.
+  leash(c, r, ink) {
+    const leader = r.follows && this.robot(r.follows);
+    if (!r.alive || !leader?.alive || leader.x === null) return;
+    c.strokeStyle = ink;
+    c.lineWidth = 1;
+    c.setLineDash([3, 3]);
+    c.beginPath();
+    c.moveTo(...this.toPixel(r.x, r.y));
+    c.lineTo(...this.toPixel(leader.x, leader.y));
     c.stroke();
     c.setLineDash([]);
   }
