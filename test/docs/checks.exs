@@ -35,6 +35,7 @@ defmodule Docs.Checks do
     "mix demo --record live.mcap" => @live,
     "mix demo --headless --hardware 2 --record live.mcap" => @long,
     "bin/demo --hardware mag:1,min:1" => @live,
+    "bin/console --connect mag1@convoy" => @live,
     "bin/node mag1" => @node,
     "bin/node mag2" => @node,
     "mix demo --headless --hardware mag:1,min:1 --seed 1" => @long,

@@ -23,6 +23,11 @@ defmodule Console.Live do
   @doc "Carries a command out; the error says in one line why not."
   @callback command(live :: term(), command()) :: {:ok, String.t()} | {:error, String.t()}
 
+  @typedoc """
+  What only some fleets can do: simulated ones kill a robot and move the landmark; real ones are armed and disarmed.
+  """
+  @type offer :: :kill | :landmark | :arm
+
   @doc "How fast it goes, for people; `nil` for one that goes by the real clock."
   @callback pace(live :: term()) :: String.t() | nil
 
@@ -37,4 +42,20 @@ defmodule Console.Live do
 
   @doc "Ends the fleet, and returns when nothing of it is left."
   @callback stop(live :: term()) :: :ok
+
+  # What the page needs besides.
+
+  @doc "What a person can do to it that cannot be done to every fleet."
+  @callback offers(live :: term()) :: [offer()]
+
+  @doc "What a person should know before all else, in one line, such as that no robot is heard; `nil` for nothing."
+  @callback notice(live :: term()) :: String.t() | nil
+
+  @doc "Status lines of all its robots, or of one."
+  @callback status(live :: term(), :all | atom()) :: [String.t()]
+
+  @doc "What one robot knows and does, as the page shows it (`Console.Page.About`); `nil` if that is not known here."
+  @callback about(live :: term(), atom()) :: map() | nil
+
+  @optional_callbacks offers: 1, notice: 1, status: 2, about: 2
 end

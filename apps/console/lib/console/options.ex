@@ -3,10 +3,9 @@ defmodule Console.Options do
   The options of `mix demo`, checked once when it starts. Pure. One table describes the options
   and makes the help text.
   """
-  alias Console.{Cli, Fleet}
+  alias Console.{Cli, Fleet, Page}
   alias Console.Cli.{MapName, Parse}
   alias Console.Live.Pace
-  alias Console.Page.Access
   alias Hal.Options.Suggest
   alias Sim.Floorplan.Maps
 
@@ -177,14 +176,14 @@ the prompt then takes pause, step, speed"},
       {"csv", "DIR", &Parse.folder(&1, folder),
        "write poses, errors, messages and ticks as tables\n(with --headless, in lockstep)"},
       {"page", "PORT|off", &page/1,
-       "live, also in a browser: the port of the page, or none\n(any that is free)"},
-      {"page-address", "A", &address/1,
-       "where the page is reached, such as 0.0.0.0, by other machines too (127.0.0.1)"},
-      {"page-token", "T", &token/1, "what others must know to use the page: ?token=T"},
-      {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
-       "paint camera pictures, or skip the painting (painted)"},
-      {"help", nil, nil, "this text"}
-    ]
+       "live, also in a browser: the port of the page, or none\n(any that is free)"}
+    ] ++
+      Page.Options.table() ++
+      [
+        {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
+         "paint camera pictures, or skip the painting (painted)"},
+        {"help", nil, nil, "this text"}
+      ]
   end
 
   defp put({"fleet", _robots}, options), do: options
@@ -276,15 +275,10 @@ the prompt then takes pause, step, speed"},
 
   defp check_speed(other), do: other
 
-  # Who reaches the page may move robots.
-  defp check_page({:ok, %{page_address: address, page_token: nil} = options}) do
-    if Access.loopback?(address),
-      do: {:ok, options},
-      else:
-        {:error,
-         [
-           "--page-address of other machines needs --page-token: whoever knows it may command the robots"
-         ]}
+  defp check_page({:ok, options}) do
+    with {:error, line} <- Page.Options.check(options.page_address, options.page_token),
+         do: {:error, [line]},
+         else: (:ok -> {:ok, options})
   end
 
   defp check_page(other), do: other
@@ -292,19 +286,7 @@ the prompt then takes pause, step, speed"},
   defp page("off"), do: {:ok, :off}
 
   defp page(text) do
-    with {:error, _allowed} <- Parse.whole(text, 0..65_535),
-         do: {:error, "a port from 0 to 65535, or off,"}
-  end
-
-  defp address(text) do
-    with {:error, _reason} <- :inet.parse_ipv4strict_address(String.to_charlist(text)),
-         do: {:error, "an IPv4 address of this machine"}
-  end
-
-  defp token(text) do
-    if text =~ ~r/\A[A-Za-z0-9_-]{8,100}\z/,
-      do: {:ok, text},
-      else: {:error, "8 to 100 letters, digits, - and _"}
+    with {:error, allowed} <- Page.Options.port(text), do: {:error, allowed <> ", or off,"}
   end
 
   defp too_much_hardware(asked, robots) do

@@ -10,8 +10,8 @@ defmodule Console.Page do
       Console.Page (one_for_one)
       |-- Console.Page.Feed    asks for the scene ten times a second while somebody looks
       `-- mochiweb             a process for each connection
-          `-- of a WebSocket: Console.Page.Client carries out what is typed and clicked, and stops what it drives
-              when 300 ms have passed without a word; a pusher writes the newest scene, as fast as the browser takes it
+          `-- of a WebSocket: Console.Page.Client carries out what is typed and clicked; a pusher writes the newest
+              scene, as fast as the browser takes it; all three end together, and the page connects again
 
   Who may look and command is decided by `Console.Page.Access`.
   """
@@ -24,13 +24,14 @@ defmodule Console.Page do
   @most 200
 
   @typedoc """
-  `module` and `live` as in `Console.Live`; `robots` are those of the fleet; `address` (loopback) and `port` (any that is
+  `module` and `live` as in `Console.Live`; `robots` are those of the fleet, or a function without arguments that says
+  which these are now; `address` (loopback) and `port` (any that is
   free) to listen on; `token` is demanded where the address is not the loopback's.
   """
   @type option ::
           {:module, module()}
           | {:live, term()}
-          | {:robots, [atom()]}
+          | {:robots, [atom()] | (... -> [atom()])}
           | {:address, :inet.ip_address()}
           | {:port, :inet.port_number()}
           | {:token, String.t() | nil}
@@ -81,7 +82,9 @@ defmodule Console.Page do
 
   @impl Supervisor
   def init(options) do
-    request = {Request, :answer, [%{robots: options.robots, token: options.token, page: self()}]}
+    robots = options.robots
+    robots = if is_list(robots), do: fn -> robots end, else: robots
+    request = {Request, :answer, [%{robots: robots, token: options.token, page: self()}]}
 
     server = %{
       id: :server,

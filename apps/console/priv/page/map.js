@@ -3,6 +3,8 @@
 // Okabe and Ito's colours, which the colour-blind tell apart.
 const COLOURS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#999933", "#882255"];
 const TRAIL = 600;
+const JUMP = 1; // metres from one scene to the next
+const AROUND = 2; // metres round robots without a map
 const NEAR = 14; // pixels round what is pointed at
 
 export const colour = (index) => COLOURS[index % COLOURS.length];
@@ -33,7 +35,7 @@ export class FloorView {
     this.map = map;
     this.view = null;
     this.paths.clear();
-    this.walls = null;
+    this.floor = map.width ? [-map.width / 2, -map.height / 2, map.width / 2, map.height / 2] : null;
     this.draw();
   }
 
@@ -42,16 +44,35 @@ export class FloorView {
     if (back) this.paths.clear();
     this.scene = scene;
     for (const r of scene.robots) {
+      if (r.x === null) continue;
       const path = this.paths.get(r.id) ?? [];
       const last = path.at(-1);
-      if (!last || Math.hypot(last[0] - r.x, last[1] - r.y) > 0.03) path.push([r.x, r.y]);
+      const way = last ? Math.hypot(last[0] - r.x, last[1] - r.y) : JUMP;
+      // In real time what has jumped was not driven: its pose is told in another frame now.
+      if (way > 0.03) path.push([r.x, r.y, way >= JUMP && !this.map?.width]);
       if (path.length > TRAIL) path.shift();
       this.paths.set(r.id, path);
     }
+    if (this.map && !this.map.width) this.grow();
     this.draw();
   }
 
+  // Without a map there is an empty floor, of whole metres, that holds all places where robots were.
+  grow() {
+    const were = this.floor;
+    let [left, bottom, right, top] = were ?? [Infinity, Infinity, -Infinity, -Infinity];
+    for (const { x, y } of this.scene.robots) {
+      if (x === null) continue;
+      [left, right] = [Math.min(left, Math.floor(x - AROUND)), Math.max(right, Math.ceil(x + AROUND))];
+      [bottom, top] = [Math.min(bottom, Math.floor(y - AROUND)), Math.max(top, Math.ceil(y + AROUND))];
+    }
+    if (left > right) return;
+    this.floor = [left, bottom, right, top];
+    if (!this.mine && String(this.floor) !== String(were)) this.view = null;
+  }
+
   zoom(factor) {
+    this.mine = factor !== 0;
     if (factor === 0) this.view = null;
     else if (this.fit()) this.view.scale = Math.min(400, Math.max(2, this.view.scale * factor));
     this.draw();
@@ -60,16 +81,19 @@ export class FloorView {
   // The picture's size, and a view of the whole map where there is none yet.
   fit() {
     const { clientWidth: w, clientHeight: h } = this.canvas;
-    if (!this.map || w === 0 || h === 0) return false;
+    if (!this.map || !this.floor || w === 0 || h === 0) return false;
     const dots = devicePixelRatio || 1;
     if (this.canvas.width !== Math.round(w * dots) || this.canvas.height !== Math.round(h * dots)) {
       this.canvas.width = Math.round(w * dots);
       this.canvas.height = Math.round(h * dots);
     }
     this.size = { w, h, dots };
-    this.view ??= { x: 0, y: 0, scale: 0.95 * Math.min(w / this.map.width, h / this.map.height) };
+    const [left, bottom, right, top] = this.floor;
+    this.view ??= {
+      x: (left + right) / 2, y: (bottom + top) / 2, scale: 0.95 * Math.min(w / (right - left), h / (top - bottom)),
+    };
     const r = this.follow && this.robot(this.chosen);
-    if (r) [this.view.x, this.view.y] = [r.x, r.y];
+    if (r && r.x !== null) [this.view.x, this.view.y] = [r.x, r.y];
     return true;
   }
 
@@ -108,30 +132,51 @@ export class FloorView {
     c.setTransform(size.dots, 0, 0, size.dots, 0, 0);
     c.clearRect(0, 0, size.w, size.h);
 
-    const [left, top] = this.toPixel(-map.width / 2, map.height / 2);
+    const [left, top] = this.toPixel(this.floor[0], this.floor[3]);
+    const [right, bottom] = this.toPixel(this.floor[2], this.floor[1]);
     c.fillStyle = ink("--panel");
-    c.fillRect(left, top, map.width * view.scale, map.height * view.scale);
-    c.strokeStyle = ink("--wall");
-    c.strokeRect(left, top, map.width * view.scale, map.height * view.scale);
+    c.fillRect(left, top, right - left, bottom - top);
+    c.lineWidth = 1;
+    if (!map.width) this.metres(c, ink("--line"));
+    c.strokeStyle = ink(map.width ? "--wall" : "--line");
+    c.strokeRect(left, top, right - left, bottom - top);
     c.fillStyle = ink("--wall");
     const cell = map.cell * view.scale;
-    const bottom = top + map.height * view.scale;
     for (const [from, row, count] of map.walls)
       c.fillRect(left + from * cell, bottom - (row + 1) * cell, count * cell + 0.5, cell + 0.5);
     if (!scene) return;
 
-    if (this.trails) for (const [k, r] of scene.robots.entries()) this.trail(c, r, colour(k));
-    for (const [k, r] of scene.robots.entries()) this.slot(c, r, colour(k));
+    const placed = [...scene.robots.entries()].filter(([, r]) => r.x !== null);
+    if (this.trails) for (const [k, r] of placed) this.trail(c, r, colour(k));
+    for (const [k, r] of placed) this.slot(c, r, colour(k));
+    for (const [k, r] of placed) this.leash(c, r, colour(k));
     if (this.sonar && this.about) this.cones(c, this.robot(this.about.id), ink);
-    for (const [k, r] of scene.robots.entries()) this.body(c, r, colour(k), ink);
+    for (const [k, r] of placed) this.body(c, r, colour(k), ink);
     this.landmark(c, this.dragged?.landmark ?? scene.landmark, ink);
+  }
+
+  // A line for each metre, and their length once, where they are not too close.
+  metres(c, ink) {
+    const [left, bottom, right, top] = this.floor;
+    const step = [1, 5, 10, 50, 100].find((m) => m * this.view.scale > 12) ?? 1000;
+    c.strokeStyle = ink;
+    c.beginPath();
+    for (let x = Math.ceil(left / step) * step; x <= right; x += step) {
+      c.moveTo(...this.toPixel(x, bottom));
+      c.lineTo(...this.toPixel(x, top));
+    }
+    for (let y = Math.ceil(bottom / step) * step; y <= top; y += step) {
+      c.moveTo(...this.toPixel(left, y));
+      c.lineTo(...this.toPixel(right, y));
+    }
+    c.stroke();
   }
 
   trail(c, r, ink) {
     const path = this.paths.get(r.id);
     if (path.length < 2) return;
     c.beginPath();
-    for (const [x, y] of path) c.lineTo(...this.toPixel(x, y));
+    for (const [x, y, jumped] of path) c[jumped ? "moveTo" : "lineTo"](...this.toPixel(x, y));
     c.strokeStyle = ink;
     c.globalAlpha = 0.45;
     c.lineWidth = 1.5;
@@ -171,6 +216,20 @@ export class FloorView {
     c.setLineDash([]);
   }
 
+  // From a follower to its leader, where its place is not known.
+  leash(c, r, ink) {
+    const leader = r.follows && this.robot(r.follows);
+    if (!r.alive || !leader?.alive || leader.x === null) return;
+    c.strokeStyle = ink;
+    c.lineWidth = 1;
+    c.setLineDash([3, 3]);
+    c.beginPath();
+    c.moveTo(...this.toPixel(r.x, r.y));
+    c.lineTo(...this.toPixel(leader.x, leader.y));
+    c.stroke();
+    c.setLineDash([]);
+  }
+
   body(c, r, ink, theme) {
     const [x, y] = this.toPixel(r.x, r.y);
     const radius = Math.max(4, r.r * this.view.scale);
@@ -205,7 +264,7 @@ export class FloorView {
     c.fillStyle = theme("--text");
     c.font = "12px system-ui, sans-serif";
     c.textAlign = "center";
-    c.fillText(r.id + (r.leader ? " ★" : "") + (r.alive ? "" : " ✕"), x, y - radius - 6);
+    c.fillText(r.id + (r.leader ? " ★" : "") + (r.alive ? "" : r.state === "not_heard" ? " ?" : " ✕"), x, y - radius - 6);
     c.globalAlpha = 1;
   }
 
@@ -227,8 +286,8 @@ export class FloorView {
     const near = ([x, y], reach) =>
       Math.hypot(e.clientX - box.left - x, e.clientY - box.top - y) < reach;
     if (!this.scene || !this.fit()) return {};
-    if (this.scene.landmark && near(this.toPixel(...this.scene.landmark), NEAR)) return { landmark: true };
-    const robot = this.scene.robots.find((r) =>
+    if (this.map.offers.includes("landmark") && this.scene.landmark && near(this.toPixel(...this.scene.landmark), NEAR)) return { landmark: true };
+    const robot = this.scene.robots.find((r) => r.x !== null &&
       near(this.toPixel(r.x, r.y), Math.max(NEAR, r.r * this.view.scale)));
     return { robot };
   }
@@ -247,7 +306,7 @@ export class FloorView {
     const [dx, dy] = [e.clientX - d.from[0], e.clientY - d.from[1]];
     if (Math.hypot(dx, dy) > 4) d.moved = true;
     if (d.landmark) d.landmark = this.toFloor(e);
-    else if (d.moved && !this.follow)
+    else if (d.moved && !this.follow && (this.mine = true))
       Object.assign(this.view, { x: d.view.x - dx / d.view.scale, y: d.view.y + dy / d.view.scale });
     this.draw();
   }
@@ -272,6 +331,7 @@ export class FloorView {
     const step = 40 / this.view.scale;
     const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[e.key];
     if (way && !this.driving) {
+      this.mine = true;
       this.view.x += way[0] * step;
       this.view.y += way[1] * step;
     } else if (e.key === "+") this.zoom(1.3);

@@ -42,6 +42,9 @@ function hear(message) {
   if (message.t === "map") {
     told = 0;
     by("stages").replaceChildren();
+    by("robots").replaceChildren();
+    for (const b of document.querySelectorAll("[data-offer]")) b.hidden = !message.offers.includes(b.dataset.offer);
+    by("off").hidden = !message.width;
     floor.setMap(message);
   } else if (message.t === "scene") {
     heard = performance.now();
@@ -64,14 +67,15 @@ function show(next) {
   floor.setScene(scene);
   const fleet = by("fleet");
   const parts = [
-    `${scene.at_s.toFixed(1)} s`,
+    scene.formation && `${scene.at_s.toFixed(1)} s`,
     scene.pace,
-    `${scene.formation[0]} ${scene.formation[1].toFixed(1)} m`,
-    scene.leader ? `${scene.leader} leads, epoch ${scene.epoch}` : "no leader",
+    scene.formation && `${scene.formation[0]} ${scene.formation[1].toFixed(1)} m`,
+    scene.formation ? null : `${scene.robots.filter((r) => r.alive).length} robots heard`,
+    scene.leader ? `${scene.leader} leads` + (scene.epoch === null ? "" : `, epoch ${scene.epoch}`) : "no leader",
     scene.error && `${scene.formed ? "formed" : "off by"} ${scene.error.map((e) => e.toFixed(2)).join("/")} m`,
   ];
-  fleet.textContent = parts.filter(Boolean).join(" · ");
-  fleet.className = "";
+  fleet.textContent = scene.notice ?? parts.filter(Boolean).join(" · ");
+  fleet.className = scene.notice ? "lost" : "";
   by("pace").hidden = scene.pace === null;
   scene.robots.forEach(row);
   one();
@@ -93,13 +97,16 @@ function row(robot, index) {
     tr.append(...cells);
     by("robots").append(tr);
   }
+  tr.children[2].hidden = scene.formation === null;
   const metres = (m) => (m === null ? "" : `${m.toFixed(2)} m`);
-  tr.children[1].textContent = robot.alive ? robot.state + (robot.leader ? " ★" : "") : "dead";
+  tr.children[1].textContent = (robot.alive ? robot.state : away(robot)) + (robot.alive && robot.leader ? " ★" : "");
   tr.children[2].textContent = robot.alive ? metres(robot.off) : "";
   tr.children[3].textContent = robot.alive && robot.unsure !== null ? `±${metres(robot.unsure)}` : "";
   tr.className = robot.alive ? "" : "dead";
   tr.setAttribute("aria-selected", robot.id === chosen);
 }
+
+const away = (robot) => (robot.state === "not_heard" ? "not heard" : "dead");
 
 function choose(id) {
   drive(false);
@@ -117,9 +124,9 @@ function one() {
   by("one").hidden = !robot;
   if (!robot) return;
   by("chosen").textContent = robot.id;
-  by("doing").textContent = robot.alive
-    ? `${robot.state}, at ${robot.x.toFixed(2)}, ${robot.y.toFixed(2)}, ${Math.round((robot.a * 180) / Math.PI)}°`
-    : "dead";
+  const where = robot.x === null ? "pose unknown"
+    : `at ${robot.x.toFixed(2)}, ${robot.y.toFixed(2)}, ${Math.round((robot.a * 180) / Math.PI)}°`;
+  by("doing").textContent = robot.alive ? `${robot.state}, ${where}` : `${away(robot)}, last ${where}`;
 }
 
 // Without the minus of -0.00.
@@ -130,10 +137,11 @@ function about(told) {
   if (told.id !== chosen) return;
   floor.about = told;
   const rows = [
-    ["wish", told.by && `${told.by}, weight ${told.weight.toFixed(2)}`],
-    ["speed", told.speed === null ? "unknown" : `${decimals(told.speed)} m/s, ${decimals(told.turn)} rad/s`],
+    ["wish", told.by && told.by + (told.weight === null ? "" : `, weight ${told.weight.toFixed(2)}`)],
+    ["speed", told.speed === null ? "unknown" : `${decimals(told.speed)} m/s` + (told.turn === null ? "" : `, ${decimals(told.turn)} rad/s`)],
     ["limited by", told.limits.join(", ")],
     ["fault", told.fault],
+    ["note", told.notes.join("; ")],
     ["stopped", told.estop && "emergency stop, until it is reset"],
     ["offline", told.offline.join(", ")],
     ["battery", told.power !== null && `${told.power.toFixed(1)} V`],
@@ -141,6 +149,7 @@ function about(told) {
   const made = (tag, textContent) => Object.assign(document.createElement(tag), { textContent });
   by("about").replaceChildren(...rows.flatMap(([term, text]) => [made("dt", term), made("dd", text)]));
   by("camera").hidden = !told.camera;
+  by("sonar").hidden = told.sonar.length === 0;
   floor.draw();
 }
 
@@ -242,7 +251,8 @@ by("sonar").onclick = (e) => {
 by("follow").onchange = (e) => ((floor.follow = e.target.checked), floor.draw());
 by("trails").onchange = (e) => ((floor.trails = e.target.checked), floor.draw());
 for (const b of document.querySelectorAll("[data-line]")) b.onclick = () => say(b.dataset.line);
-for (const b of document.querySelectorAll("[data-one]")) b.onclick = () => say(`${b.dataset.one} ${chosen}`);
+for (const b of document.querySelectorAll("[data-one]")) 
+  b.onclick = () => (!b.dataset.ask || confirm(`${b.dataset.ask} ${chosen}?`)) && say(`${b.dataset.one} ${chosen}`);
 for (const b of document.querySelectorAll("[data-zoom]")) b.onclick = () => floor.zoom(Number(b.dataset.zoom));
 by("command").onsubmit = (e) => {
   e.preventDefault();

@@ -281,6 +281,43 @@ defmodule Console.PageTest do
       Live.Fleet.stop(live)
     end
 
+    test "a client that is killed while a key is held stops the robot, and the page connects again" do
+      options = options("--robots 1 --landmark none")
+      {:ok, live} = Live.Fleet.start_link(Options.trial(options))
+      {_page, url} = page(options, Live.Fleet, live)
+      browser = open(url)
+      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 1")
+
+      Browser.run(
+        browser,
+        "document.querySelector('#robots button').click(); document.getElementById('drive').click()"
+      )
+
+      [%{id: id}] = Live.Fleet.scene(live).robots
+      Browser.key(browser, :keyDown, "w")
+      wait(fn -> Swarm.status(id).speed > 0.1 end)
+      [client] = clients(live)
+      Process.exit(client, :kill)
+      killed_ms = System.monotonic_time(:millisecond)
+      # From then on it brakes, as hard as its base does.
+      wait(fn -> Swarm.status(id).by != :move end)
+      assert System.monotonic_time(:millisecond) - killed_ms < 1_000
+      wait(fn -> Swarm.status(id).speed == 0.0 end)
+      wait(fn -> match?([other] when other != client, clients(live)) end)
+      Browser.await(browser, "return document.getElementById('fleet').className === ''")
+      assert Swarm.status(id).speed == 0.0
+      Browser.close(browser)
+      Live.Fleet.stop(live)
+    end
+
+    defp clients(live) do
+      for pid <- Process.list(),
+          {:dictionary, about} <- [Process.info(pid, :dictionary)],
+          about[:"$initial_call"] == {Client, :init, 1},
+          :sys.get_state(pid).live == live,
+          do: pid
+    end
+
     defp wait(true?, left \\ 600) do
       cond do
         true?.() -> :ok

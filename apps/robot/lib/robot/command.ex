@@ -7,7 +7,7 @@ defmodule Robot.Command do
   | text | command |
   |---|---|
   | `stop` | `:stop` |
-  | `move:V:W` | `{:move, v, w}`, m/s and rad/s |
+  | `move:V:W` or `move:V:W:S` | `{:move, v, w}`, m/s and rad/s; `{:move, v, w, s}` for that many seconds only |
   | `goto:X:Y` or `goto:X:Y:THETA` | `{:goto, x, y, theta or nil}`, metres, radians |
   | `followtheleader:NAME` | `{:follow_the_leader, id}` |
   | `findblob` or `findblob:COLOUR` | `{:find_blob, colour or nil}` |
@@ -32,6 +32,7 @@ defmodule Robot.Command do
           | :disarm
           | :acknowledge
           | {:move, float(), float()}
+          | {:move, float(), float(), for_s :: float()}
           | {:goto, float(), float(), float() | nil}
           | {:follow_the_leader, atom()}
           | {:find_blob, String.t() | nil}
@@ -44,7 +45,7 @@ defmodule Robot.Command do
   # Keyword, required arguments, optional arguments.
   @grammar [
     {"stop", [], []},
-    {"move", [:v, :w], []},
+    {"move", [:v, :w], [:seconds]},
     {"goto", [:x, :y], [:theta]},
     {"followtheleader", [:name], []},
     {"findblob", [], [:colour]},
@@ -76,6 +77,8 @@ defmodule Robot.Command do
 
       iex> Robot.Command.parse("GoTo:2.0:-1", [:mag1])
       {:ok, {:goto, 2.0, -1.0, nil}}
+      iex> Robot.Command.parse("move:0.5:0:0.3", [])
+      {:ok, {:move, 0.5, 0.0, 0.3}}
       iex> Robot.Command.parse("followtheleader:mag1", [:mag1, :min1])
       {:ok, {:follow_the_leader, :mag1}}
       iex> Robot.Command.parse("goto:abc:1", [])
@@ -159,6 +162,7 @@ defmodule Robot.Command do
   defp build("disarm", []), do: :disarm
   defp build("acknowledge", []), do: :acknowledge
   defp build("move", [v, w]), do: {:move, v, w}
+  defp build("move", [v, w, for_s]), do: {:move, v, w, for_s}
   defp build("goto", [x, y]), do: {:goto, x, y, nil}
   defp build("goto", [x, y, theta]), do: {:goto, x, y, theta}
   defp build("followtheleader", [id]), do: {:follow_the_leader, id}
@@ -183,6 +187,7 @@ defmodule Robot.Command do
   @spec to_text(t()) :: String.t()
   def to_text(word) when word in @bare, do: Atom.to_string(word)
   def to_text({:move, v, w}), do: join("move", [v, w])
+  def to_text({:move, v, w, for_s}), do: join("move", [v, w, for_s])
   def to_text({:goto, x, y, nil}), do: join("goto", [x, y])
   def to_text({:goto, x, y, theta}), do: join("goto", [x, y, theta])
   def to_text({:follow_the_leader, id}), do: join("followtheleader", [id])

@@ -21,6 +21,8 @@ defmodule Console.Cli.Format do
       "    0.0 s  search          every robot looks around for the landmark"
   """
   @spec stage(Sim.Scene.stage()) :: String.t()
+  def stage(%{clock: clock, line: line}), do: "#{clock}  #{line}"
+
   def stage(%{stage: name, at_s: at_s} = stage) do
     String.pad_leading(decimals(at_s, 1), 7) <>
       " s  " <> String.pad_trailing(to_string(name), 16) <> meaning(stage)

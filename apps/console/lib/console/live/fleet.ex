@@ -5,6 +5,7 @@ defmodule Console.Live.Fleet do
   """
   @behaviour Console.Live
   alias Console.Cli.Format
+  alias Console.Page.About
   alias Robot.Command
   alias Sim.Fleet
 
@@ -29,6 +30,19 @@ defmodule Console.Live.Fleet do
 
   @impl Console.Live
   def stop(live), do: Fleet.stop(live)
+
+  @impl Console.Live
+  def offers(_live), do: [:kill, :landmark]
+
+  @impl Console.Live
+  def notice(live), do: ended(live)
+
+  @impl Console.Live
+  def status(live, :all), do: live |> scene() |> Format.everybody()
+  def status(live, robot), do: live |> scene() |> Format.one(robot)
+
+  @impl Console.Live
+  def about(_live, robot), do: About.of(robot)
 
   @impl Console.Live
   def command(live, command) do

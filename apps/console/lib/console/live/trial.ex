@@ -8,6 +8,7 @@ defmodule Console.Live.Trial do
   steps give the same run.
   """
   use GenServer
+  alias Console.Cli.Format
   alias Console.Live.Pace
   alias Sim.{Recorder, Trial}
   alias Sim.Recording.Pictures
@@ -53,6 +54,20 @@ defmodule Console.Live.Trial do
 
   @impl Console.Live
   def stop(live), do: GenServer.stop(live)
+
+  @impl Console.Live
+  def offers(_live), do: [:kill, :landmark]
+
+  @impl Console.Live
+  def notice(_live), do: nil
+
+  @impl Console.Live
+  def status(live, :all), do: live |> scene() |> Format.everybody()
+  def status(live, robot), do: live |> scene() |> Format.one(robot)
+
+  # In lockstep no robot has a board.
+  @impl Console.Live
+  def about(_live, _robot), do: nil
 
   @impl GenServer
   def init({module, trial, pace, recorder}) do

@@ -6,23 +6,22 @@ defmodule Console.Page.About do
   alias Hal.{Json, Odometry, Pose}
   alias Robot.{Board, Names}
   alias Sim.Trial.Setup
+  alias Swarm.Status
   alias Vision.View
 
   # Readings that are older tell nothing of now.
   @recent_ms 1_000
 
-  @doc "As JSON; `nil` for a robot that is not on this node, or is dead."
-  @spec json(atom()) :: String.t() | nil
-  def json(robot) do
+  @doc "For the page; `nil` for a robot that is not on this node, or is dead."
+  @spec of(atom()) :: map() | nil
+  def of(robot) do
     with {:ok, board} <- Board.find(robot) do
       entries = Board.entries(board)
       driving = recent(entries, :driving) || %{limits: []}
       wheels = wheels(recent(entries, :odometry))
       doing = recent(entries, :doing) || %{by: nil, weight: nil, fault: nil}
 
-      Json.encode!(%{
-        t: "about",
-        id: robot,
+      %{
         by: doing.by,
         weight: doing.weight,
         fault: doing.fault,
@@ -34,12 +33,52 @@ defmodule Console.Page.About do
         estop: Board.latched?(board),
         sonar: sonar(robot, recent(entries, :sonar)),
         seen: seen(recent(entries, :detections)),
-        camera: Names.whereis(robot, :view) != nil
-      })
+        camera: Names.whereis(robot, :view) != nil,
+        notes: []
+      }
     else
       :error -> nil
     end
   end
+
+  @doc """
+  The same of a robot anywhere, from its status, which knows neither weights nor what sonars and cameras see. `notes` are
+  what its status remarks, as in `iex`.
+  """
+  @spec of_status(Status.t()) :: map()
+  def of_status(%Status{} = status) do
+    %{
+      by: status.by,
+      weight: nil,
+      fault: status.fault,
+      speed: status.speed,
+      turn: nil,
+      limits: status.limits,
+      power: status.power,
+      offline: for({device, {:offline, _reason}} <- status.health, do: device),
+      estop: status.estop,
+      sonar: [],
+      seen: nil,
+      camera: Names.whereis(status.robot, :view) != nil,
+      notes: notes(status)
+    }
+  end
+
+  defp notes(status) do
+    Enum.filter(
+      [
+        Status.arming(status),
+        status.blocked_by && "blocked by #{status.blocked_by}",
+        status.network && "no network (#{status.network})",
+        status.from == :row && "does not answer; this is from the blackboard"
+      ],
+      & &1
+    )
+  end
+
+  @doc "What is known of a robot, as JSON."
+  @spec json(atom(), map()) :: String.t()
+  def json(robot, about), do: about |> Map.merge(%{t: "about", id: robot}) |> Json.encode!()
 
   @doc "A new picture of its camera as JPEG, or why there is none."
   @spec picture(atom()) :: {:ok, binary()} | {:error, line :: String.t()}

@@ -1,10 +1,12 @@
 defmodule Console.Page.Client do
   @moduledoc """
-  Carries out what a person types and clicks on the page, one after the other, and holds the dead man's switch: a robot
-  that is driven by keyboard is stopped 300 ms after the last word, or when the page is gone.
+  Carries out what a person types and clicks on the page, one after the other.
+
+  The dead man's switch of a robot that is driven by keyboard is the robot's own: each word of the page is an order to move
+  for 300 ms. Whatever is gone then, the keyboard, the browser, this process, its node or the network, the robot stands.
+  A word that has waited here for longer is not passed on.
   """
   use GenServer
-  alias Console.Cli.Format
   alias Console.Page.{About, Feed, State}
   alias Console.Terminal.Prompt
 
@@ -13,13 +15,17 @@ defmodule Console.Page.Client do
   # How often the page is told of the robot that it looks at.
   @about_ms 200
 
-  @doc "Starts it for the connection of the caller; `reply` writes text to the browser."
-  @spec start(pid(), [atom()], (String.t() -> term())) :: {:ok, pid()}
-  def start(feed, robots, reply), do: GenServer.start(__MODULE__, {self(), feed, robots, reply})
+  @doc """
+  Starts it for the connection of the caller, and linked to it: without one of them the other is of no use, and the page
+  connects again. `reply` writes text to the browser.
+  """
+  @spec start_link(pid(), (... -> [atom()]), (String.t() -> term())) :: {:ok, pid()}
+  def start_link(feed, robots, reply),
+    do: GenServer.start_link(__MODULE__, {self(), feed, robots, reply})
 
   @doc "Carries out a line; its answer goes to the browser."
   @spec obey(pid(), String.t()) :: :ok
-  def obey(client, line), do: GenServer.cast(client, {:obey, line})
+  def obey(client, line), do: GenServer.cast(client, {:obey, line, now_ms()})
 
   @doc """
   A word of the keyboard: the robot, its speed forward and its turn, as parts of the greatest (-1 to 1).
@@ -49,20 +55,20 @@ defmodule Console.Page.Client do
     ref = Process.monitor(connection)
     {module, live} = Feed.source(feed)
     s = %{connection: ref, module: module, live: live, robots: robots, reply: reply}
-    {:ok, Map.merge(s, %{driven: nil, timer: nil, looked: nil})}
+    {:ok, Map.put(s, :looked, nil)}
   end
 
   # `look mag1`, and `look` for nobody.
   @impl GenServer
-  def handle_cast({:obey, "look" <> name}, s) do
-    robot = Enum.find(s.robots, &(Atom.to_string(&1) == String.trim(name)))
+  def handle_cast({:obey, "look" <> name, _said_ms}, s) do
+    robot = Enum.find(s.robots.(), &(Atom.to_string(&1) == String.trim(name)))
     if robot && s.looked == nil, do: send(self(), :about)
     {:noreply, %{s | looked: robot}}
   end
 
-  def handle_cast({:obey, line}, s) do
-    case drive(line, s.robots) do
-      {:ok, robot, speed} -> {:noreply, driven(s, robot, speed)}
+  def handle_cast({:obey, line, said_ms}, s) do
+    case drive(line, s.robots.()) do
+      {:ok, robot, speed} -> {:noreply, drive(s, robot, speed, now_ms() - said_ms)}
       :other -> {:noreply, answer(s, line, carry_out(line, s))}
       error -> {:noreply, answer(s, line, error)}
     end
@@ -72,37 +78,27 @@ defmodule Console.Page.Client do
   def handle_info(:about, %{looked: nil} = s), do: {:noreply, s}
 
   def handle_info(:about, s) do
-    with json when json != nil <- About.json(s.looked), do: s.reply.(json)
+    with %{} = about <- s.module.about(s.live, s.looked),
+         do: s.reply.(About.json(s.looked, about))
+
     _timer = Process.send_after(self(), :about, @about_ms)
     {:noreply, s}
   end
 
-  def handle_info({:dead_man, ref}, %{timer: ref} = s), do: {:noreply, halt(s)}
-  def handle_info({:dead_man, _former}, s), do: {:noreply, s}
-
+  # A connection that ends as it should takes no linked process along.
   def handle_info({:DOWN, ref, :process, _pid, _reason}, %{connection: ref} = s),
-    do: {:stop, :normal, halt(s)}
+    do: {:stop, :normal, s}
+
+  defp drive(s, _robot, _speed, waited_ms) when waited_ms > @dead_man_ms, do: s
 
   # The gate limits speeds; half a metre a second and a radian a second are the page's own.
-  defp driven(s, robot, {ahead, turn}) do
-    s = if s.driven in [nil, robot], do: s, else: halt(s)
-    command = {:tell, [robot], "move:#{ahead / 2}:#{turn * 1.0}"}
+  defp drive(s, robot, {ahead, turn}, _waited_ms) do
+    command = {:tell, [robot], "move:#{ahead / 2}:#{turn * 1.0}:#{@dead_man_ms / 1_000}"}
 
-    with {:error, line} <- s.module.command(s.live, command),
-         do: answer(s, "drive", {:error, line})
-
-    ref = make_ref()
-    _timer = Process.send_after(self(), {:dead_man, ref}, @dead_man_ms)
-    %{s | driven: robot, timer: ref}
-  end
-
-  defp halt(%{driven: nil} = s), do: s
-
-  defp halt(s) do
-    with {:error, line} <- s.module.command(s.live, {:tell, [s.driven], "stop"}),
-         do: answer(s, "stop", {:error, line})
-
-    %{s | driven: nil, timer: nil}
+    case s.module.command(s.live, command) do
+      {:ok, _accepted} -> s
+      {:error, line} -> answer(s, "drive", {:error, line})
+    end
   end
 
   defp answer(s, line, answer) do
@@ -111,24 +107,24 @@ defmodule Console.Page.Client do
   end
 
   defp carry_out(line, s) do
-    case Prompt.parse(line, s.robots) do
+    case Prompt.parse(line, s.robots.()) do
       {:ok, :nothing} ->
         {:error, "type a command; help lists them"}
 
       {:ok, :quit} ->
-        {:error, "the page is closed in the browser; quit in the terminal ends the demo"}
+        {:error, "the page is closed in the browser, its program in the terminal"}
 
       {:ok, :help} ->
-        {:ok, Prompt.help()}
+        {:ok, Prompt.help(s.module.offers(s.live))}
 
       {:ok, :nodes} ->
         {:ok, s.module.lines(s.live)}
 
       {:ok, :status} ->
-        {:ok, Format.everybody(s.module.scene(s.live))}
+        {:ok, s.module.status(s.live, :all)}
 
       {:ok, {:status, name}} ->
-        {:ok, Format.one(s.module.scene(s.live), name)}
+        {:ok, s.module.status(s.live, name)}
 
       {:ok, command} ->
         s.module.command(s.live, command)
@@ -137,4 +133,6 @@ defmodule Console.Page.Client do
         {:error, line}
     end
   end
+
+  defp now_ms, do: System.monotonic_time(:millisecond)
 end

@@ -42,7 +42,7 @@ defmodule Console.Page.Feed do
 
   @impl GenServer
   def handle_call(:map, _from, %{map: nil} = s) do
-    map = State.map(s.module.scene(s.live))
+    map = State.map(s.module.scene(s.live), s.module.offers(s.live))
     {:reply, map, %{s | map: map}}
   end
 
@@ -56,7 +56,7 @@ defmodule Console.Page.Feed do
   def handle_info(:tick, %{waiting: []} = s), do: {:noreply, %{s | ticking?: false}}
 
   def handle_info(:tick, s) do
-    json = State.scene(s.module.scene(s.live), s.module.pace(s.live))
+    json = State.scene(s.module.scene(s.live), s.module.pace(s.live), s.module.notice(s.live))
     for pusher <- s.waiting, do: send(pusher, {:scene, json})
     {:noreply, tick(%{s | waiting: [], ticking?: false})}
   end

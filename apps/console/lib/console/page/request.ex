@@ -65,7 +65,7 @@ defmodule Console.Page.Request do
   end
 
   defp serve("/camera/" <> name, request, page) do
-    case Enum.find(page.robots, &(Atom.to_string(&1) == name)) do
+    case Enum.find(page.robots.(), &(Atom.to_string(&1) == name)) do
       nil -> say(request, 404, "there is no robot #{inspect(name)}")
       robot -> picture(About.picture(robot), request)
     end
@@ -108,7 +108,7 @@ defmodule Console.Page.Request do
 
     {reentry, reply} = :mochiweb_websocket.upgrade_connection(request, &hear/3)
     reply.(Feed.map(feed))
-    {:ok, client} = Client.start(feed, robots, reply)
+    {:ok, client} = Client.start_link(feed, robots, reply)
     _pusher = spawn_link(fn -> push(feed, reply) end)
     reentry.(%{client: client, source: Feed.source(feed)})
   end

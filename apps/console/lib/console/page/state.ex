@@ -10,9 +10,17 @@ defmodule Console.Page.State do
   # Cells of the map that is sent, in metres.
   @cell 0.1
 
-  @doc "The map: its name, its size, and its walls as rectangles `[x, y, width, height]`, rows of equal cells."
-  @spec map(Scene.t()) :: String.t()
-  def map(%Scene{map: map}) do
+  @doc """
+  What does not change: what the fleet offers, and the map, its name, its size, and its walls as rectangles
+  `[x, y, width, height]`, rows of equal cells. Where there is no map, its size is 0.
+  """
+  @spec map(Scene.t(), [Console.Live.offer()]) :: String.t()
+  def map(%Scene{map: map}, offers),
+    do: map |> ground() |> Map.merge(%{t: "map", offers: offers, cell: @cell}) |> Json.encode!()
+
+  defp ground(nil), do: %{name: nil, width: 0, height: 0, walls: []}
+
+  defp ground(map) do
     ground = Floorplan.of(map)
     {columns, rows} = {cells(ground.width), cells(ground.height)}
 
@@ -21,14 +29,12 @@ defmodule Console.Page.State do
           {from, count} <- runs(ground, row, columns),
           do: [from, row, count]
 
-    Json.encode!(%{
-      t: "map",
+    %{
       name: Path.basename(ground.name),
       width: round3(ground.width),
       height: round3(ground.height),
-      cell: @cell,
       walls: walls
-    })
+    }
   end
 
   defp cells(metres), do: max(round(metres / @cell), 1)
@@ -45,45 +51,56 @@ defmodule Console.Page.State do
     |> Enum.map(&{hd(&1), length(&1)})
   end
 
-  @doc "The scene, with the pace of a run in lockstep (`nil`: real time)."
-  @spec scene(Scene.t(), String.t() | nil) :: String.t()
-  def scene(%Scene{} = scene, pace) do
-    {kind, spacing} = scene.formation
-    told = length(scene.stages)
-
+  @doc """
+  The scene, with the pace of a run in lockstep (`nil`: real time), and what a person should know before all else. A
+  robot of a real fleet may have no known pose.
+  """
+  @spec scene(Scene.t(), String.t() | nil, String.t() | nil) :: String.t()
+  def scene(%Scene{} = scene, pace, notice) do
     Json.encode!(%{
       t: "scene",
       at_s: scene.at_ms / 1000,
       pace: pace,
+      notice: notice,
       leader: scene.leader,
       epoch: scene.epoch,
-      formation: [kind, spacing],
+      formation: scene.formation && Tuple.to_list(scene.formation),
       error: scene.error && Enum.map(Tuple.to_list(scene.error), &round3/1),
       formed: scene.formed?,
       landmark: point(scene.landmark),
       robots: Enum.map(scene.robots, &robot/1),
-      told: told,
+      told: told(scene.stages),
       stages: scene.stages |> Enum.take(-@stages) |> Enum.map(&stage/1)
     })
+  end
+
+  # A fleet that forgets its oldest stages numbers them.
+  defp told(stages) do
+    case List.last(stages) do
+      %{n: n} -> n
+      _none_or_all -> length(stages)
+    end
   end
 
   defp robot(robot) do
     %{
       id: robot.id,
-      x: round3(robot.pose.x),
-      y: round3(robot.pose.y),
-      a: round3(robot.pose.heading),
+      x: robot.pose && round3(robot.pose.x),
+      y: robot.pose && round3(robot.pose.y),
+      a: robot.pose && round3(robot.pose.heading),
       r: robot.radius,
       alive: robot.alive,
       state: robot.state,
       slot: point(robot.slot),
-      off: round3(Scene.slot_error(robot)),
+      off: robot.slot && round3(Scene.slot_error(robot)),
       unsure: round3(robot.uncertainty),
-      leader: robot.leader?
+      leader: robot.leader?,
+      follows: robot[:follows]
     }
   end
 
-  defp stage(stage), do: %{at_s: stage.at_s, stage: stage.stage, line: Format.stage(stage)}
+  defp stage(stage),
+    do: %{at_s: stage.at_s, stage: stage.stage, line: Format.stage(stage), robot: stage[:robot]}
 
   defp point(nil), do: nil
   defp point({x, y}), do: [round3(x), round3(y)]

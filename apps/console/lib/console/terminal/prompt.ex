@@ -11,7 +11,7 @@ defmodule Console.Terminal.Prompt do
   alias Hal.Options.Suggest
   alias Robot.Command
 
-  @words ~w(kill formation landmark move goto follow stop estop reset start pause resume step speed status nodes tell help quit)
+  @words ~w(kill formation landmark move goto follow stop estop reset start arm disarm acknowledge pause resume step speed status nodes tell help quit)
 
   # Far more than any command needs.
   @most_bytes 500
@@ -68,32 +68,47 @@ defmodule Console.Terminal.Prompt do
       ["follow", _follower] -> names
       ["tell"] -> ["all" | names]
       ["speed"] -> ["0.1", "1", "10", "max"]
+      [word] when word in ["arm", "disarm", "acknowledge"] -> ["all" | names]
       [word] when word in ["goto", "follow", "stop", "start", "status"] -> names
       _other -> []
     end
   end
 
-  @doc "The help, one command a line."
-  @spec help() :: [String.t()]
-  def help do
-    [
-      "kill leader, kill mag2        that robot dies",
-      "formation wedge 1.2           column, line, wedge, triangle, diamond or",
-      "                              circle, and a spacing of 0.8 to 5 m",
-      "landmark 3,2, landmark none   the landmark glides there, or is removed",
-      "goto mag2 1,2                 one robot drives to a place",
-      "follow min1 mag2              one robot follows another",
-      "stop, stop mag2               the fleet or one robot stops and stands",
-      "start, start mag2             starts the mission again, from the search",
-      "estop, reset                  emergency stop of all, until the reset",
-      "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all",
-      "pause, resume                 the run stops, and goes on (in lockstep: --speed)",
-      "step, step 10                 so many steps of 0.1 s while it is paused",
-      "speed 0.5, speed max          0.1 to 100 times real time, or as fast as it goes",
-      "status, status mag2           what all robots do",
-      "nodes                         the processes, and how to attach to one",
-      "quit                          ends the demo, as Ctrl-C does; Tab completes"
-    ]
+  @doc "The help, one command a line; of what only some fleets can do, what this one offers."
+  @spec help([Console.Live.offer()]) :: [String.t()]
+  def help(offers \\ [:kill, :landmark]) do
+    when_offered = fn offer, lines -> if offer in offers, do: lines, else: [] end
+
+    when_offered.(:kill, ["kill leader, kill mag2        that robot dies"]) ++
+      [
+        "formation wedge 1.2           column, line, wedge, triangle, diamond or",
+        "                              circle, and a spacing of 0.8 to 5 m"
+      ] ++
+      when_offered.(:landmark, [
+        "landmark 3,2, landmark none   the landmark glides there, or is removed"
+      ]) ++
+      [
+        "goto mag2 1,2                 one robot drives to a place",
+        "follow min1 mag2              one robot follows another",
+        "stop, stop mag2               the fleet or one robot stops and stands",
+        "start, start mag2             starts the mission again, from the search",
+        "estop, reset                  emergency stop of all, until the reset",
+        "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all"
+      ] ++
+      when_offered.(:arm, [
+        "arm mag2, disarm mag2         lets its wheels turn, or keeps them still; or all",
+        "acknowledge mag2              somebody has checked why its line was lost"
+      ]) ++
+      when_offered.(:kill, [
+        "pause, resume                 the run stops, and goes on (in lockstep: --speed)",
+        "step, step 10                 so many steps of 0.1 s while it is paused",
+        "speed 0.5, speed max          0.1 to 100 times real time, or as fast as it goes"
+      ]) ++
+      [
+        "status, status mag2           what all robots do",
+        "nodes                         the processes, and how to attach to one",
+        "quit                          ends the demo, as Ctrl-C does; Tab completes"
+      ]
   end
 
   defp command("kill", ["leader"], _robots), do: {:ok, {:kill, :leader}}
@@ -151,6 +166,12 @@ defmodule Console.Terminal.Prompt do
 
   defp command(word, [name], robots) when word in ["stop", "start"],
     do: with_robot(name, robots, &{:tell, [&1], word})
+
+  defp command(word, [name], robots) when word in ["arm", "disarm", "acknowledge"],
+    do: tell(name, [word], robots)
+
+  defp command(word, _rest, _robots) when word in ["arm", "disarm", "acknowledge"],
+    do: {:error, "#{word} needs one name, or all: #{word} mag1, #{word} all"}
 
   defp command("estop", [], _robots), do: {:ok, :estop}
   defp command("reset", [], _robots), do: {:ok, :reset}

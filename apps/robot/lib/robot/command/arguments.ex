@@ -31,9 +31,9 @@ defmodule Robot.Command.Arguments do
   def value(:found, "1", _known), do: {:ok, true}
   def value(:found, _text, _known), do: {:error, "0 or 1 is allowed"}
 
-  def value(:size, text, _known) do
+  def value(name, text, _known) when name in [:size, :seconds] do
     case number(text) do
-      {:ok, size} when size < 0 -> {:error, "a number from 0 is allowed"}
+      {:ok, least} when least < 0 -> {:error, "a number from 0 is allowed"}
       other -> other
     end
   end

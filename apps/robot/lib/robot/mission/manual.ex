@@ -109,6 +109,10 @@ defmodule Robot.Mission.Manual do
   defp claim(_command), do: %{phase: :idle, standing: false}
 
   defp goal({:move, linear, turn}, _percept), do: {Behaviour.Move, linear: linear, turn: turn}
+  # What somebody who steers says again and again: it ends by itself when the words do.
+  defp goal({:move, linear, turn, for_s}, _percept),
+    do: {Behaviour.Move, linear: linear, turn: turn, for_ms: for_s * 1_000}
+
   defp goal({:goto, x, y, nil}, _percept), do: {Behaviour.Goto, x: x, y: y}
   defp goal({:goto, x, y, heading}, _percept), do: {Behaviour.Goto, x: x, y: y, heading: heading}
   defp goal({:follow, %Pose{} = place}, _percept), do: {Behaviour.Follow, target: place}

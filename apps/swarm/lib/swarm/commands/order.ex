@@ -11,6 +11,8 @@ defmodule Swarm.Commands.Order do
   # Farther than any floor, and faster than any robot: larger numbers are typing errors.
   @farthest 10_000
   @fastest 10
+  # Seconds.
+  @longest_s 600
 
   @typedoc "What a person may ask of a robot: a command for it alone, or one for its group."
   @type t ::
@@ -26,6 +28,8 @@ defmodule Swarm.Commands.Order do
       {:error, "goto cannot take :far: a number from -10000 to 10000 is allowed"}
       iex> Swarm.Commands.Order.check({:move, 99, 0})
       {:error, "move cannot take 99: a number from -10 to 10 is allowed"}
+      iex> Swarm.Commands.Order.check({:move, 0.5, 0, -1})
+      {:error, "move cannot take -1 seconds: a number from 0 to 600 is allowed"}
   """
   @spec check(term()) :: {:ok, t()} | {:error, line :: String.t()}
   def check({:goto, x, y, nil}), do: numbers(:goto, [x, y], @farthest, &{:goto, &1, &2, nil})
@@ -34,6 +38,12 @@ defmodule Swarm.Commands.Order do
     do: numbers(:goto, [x, y, h], @farthest, &{:goto, &1, &2, turn(&3)})
 
   def check({:move, v, w}), do: numbers(:move, [v, w], @fastest, &{:move, &1, &2})
+
+  def check({:move, v, w, for_s}) do
+    with {:ok, {:move, v, w}} <- check({:move, v, w}),
+         {:ok, for_s} <- within(:move, for_s, 0, @longest_s),
+         do: {:ok, {:move, v, w, for_s}}
+  end
 
   def check({:follow, %Pose{x: x, y: y, heading: h}}),
     do: numbers(:follow, [x, y, h], @farthest, &{:follow, Pose.new(&1, &2, &3)})
@@ -70,6 +80,15 @@ defmodule Swarm.Commands.Order do
   defp brief(term), do: inspect(term, limit: 5, printable_limit: 40)
 
   defp turn(heading), do: Pose.wrap(heading)
+
+  defp within(_word, number, least, most)
+       when is_number(number) and number >= least and number <= most,
+       do: {:ok, number * 1.0}
+
+  defp within(word, wrong, least, most),
+    do:
+      {:error,
+       "#{word} cannot take #{brief(wrong)} seconds: a number from #{least} to #{most} is allowed"}
 
   # Elixir has neither NaN nor infinities, so they cannot occur.
   defp numbers(word, list, most, build) do

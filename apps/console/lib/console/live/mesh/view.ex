@@ -1,0 +1,153 @@
+defmodule Console.Live.Mesh.View do
+  @moduledoc """
+  What is shown of the robots of a mesh, from one look at their status to the next: a scene without a map, and what has
+  changed as lines. Pure.
+
+  Poses are those of the status: a follower's is in its leader's frame, any other robot's in its own.
+  """
+  alias Sim.Scene
+  alias Sim.Trial.Setup
+  alias Swarm.Status
+
+  # Older lines are forgotten.
+  @most_stages 200
+
+  defstruct statuses: %{}, order: [], gone: MapSet.new(), stages: [], told: 0
+
+  @type t :: %__MODULE__{
+          statuses: %{atom() => Status.t()},
+          order: [atom()],
+          gone: MapSet.t(atom()),
+          stages: [map()],
+          told: non_neg_integer()
+        }
+
+  @doc "Nobody was heard yet."
+  @spec new() :: t()
+  def new, do: %__MODULE__{}
+
+  @doc """
+  The next look: of robots that are not in it the last status is kept, and that they are gone. `clock` is the time of day as
+  people read it.
+
+      iex> alias Console.Live.Mesh.View
+      iex> mag1 = %Swarm.Status{robot: :mag1, state: :lead}
+      iex> view = View.new() |> View.update([mag1], "14:00:01", 0) |> View.update([], "14:00:02", 1_000)
+      iex> {View.robots(view), View.living(view), Enum.map(view.stages, & &1.line)}
+      {[:mag1], [], ["mag1 is heard", "mag1: lead", "mag1 is no longer heard"]}
+  """
+  @spec update(t(), [Status.t()], clock :: String.t(), at_ms :: integer()) :: t()
+  def update(view, statuses, clock, at_ms) do
+    present = Map.new(statuses, &{&1.robot, &1})
+    gone = view.statuses |> Map.keys() |> Enum.reject(&is_map_key(present, &1)) |> MapSet.new()
+
+    lines =
+      for({id, status} <- Enum.sort(present), line <- changes(view, id, status), do: {id, line}) ++
+        for id <- Enum.sort(MapSet.difference(gone, view.gone)), do: {id, "is no longer heard"}
+
+    kept = Map.merge(view.statuses, present, fn _id, before, now -> known(before, now) end)
+    order = view.order ++ (kept |> Map.keys() |> Enum.sort() |> Kernel.--(view.order))
+
+    Enum.reduce(
+      lines,
+      %{view | statuses: kept, order: order, gone: gone},
+      &tell(&1, &2, clock, at_ms)
+    )
+  end
+
+  # Of a robot that does not answer, and has no row, only this is new.
+  defp known(before, %Status{state: :no_answer}), do: %{before | state: :no_answer}
+  defp known(_before, now), do: now
+
+  defp tell({id, line}, view, clock, at_ms) do
+    n = view.told + 1
+    line = if String.starts_with?(line, "is "), do: "#{id} #{line}", else: "#{id}: #{line}"
+    stage = %{stage: :mesh, n: n, at_s: at_ms / 1000, clock: clock, robot: id, line: line}
+    %{view | told: n, stages: Enum.take(view.stages ++ [stage], -@most_stages)}
+  end
+
+  defp changes(view, id, status) do
+    before = unless id in view.gone, do: view.statuses[id]
+    heard = if before, do: [], else: ["is heard"]
+    status = if before, do: known(before, status), else: status
+
+    heard ++
+      for {{key, now, none}, {key, was, _none}} <- Enum.zip(facts(status), facts(before)),
+          now != was,
+          do: now || none
+  end
+
+  # What is worth a line when it changes, as text, and what to say when there is no such thing any more.
+  defp facts(nil), do: facts(%Status{robot: nil, state: nil})
+
+  defp facts(status) do
+    offline = for {device, {:offline, _reason}} <- status.health, do: "#{device}"
+
+    [
+      {:state, status.state && state(status), "does nothing"},
+      {:estop, if(status.estop, do: "is held by the emergency stop"),
+       "is released from the emergency stop"},
+      {:arming, Status.arming(status), "its wheels may turn"},
+      {:fault, status.fault && "fault: #{status.fault}", "the fault is gone"},
+      {:blocked, status.blocked_by && "blocked by #{status.blocked_by}", "its way is free"},
+      {:offline, if(offline != [], do: "offline: #{Enum.join(Enum.sort(offline), ", ")}"),
+       "all devices are online"},
+      {:network, status.network && "no network: #{status.network}", "the network is back"}
+    ]
+  end
+
+  defp state(%{state: :no_answer}), do: "does not answer"
+  defp state(%{state: state, leader: nil}), do: "#{state}"
+  defp state(%{state: state, leader: id, robot: id}), do: "#{state}"
+  defp state(%{state: state, leader: leader}), do: "#{state}, leader #{leader}"
+
+  @doc "All robots that were ever heard; the first is always the first, so that its colour stays."
+  @spec robots(t()) :: [atom()]
+  def robots(view), do: view.order
+
+  @doc "Those that are heard now."
+  @spec living(t()) :: [atom()]
+  def living(view), do: Enum.reject(robots(view), &(&1 in view.gone))
+
+  @doc "The last status of each that is heard now."
+  @spec statuses(t()) :: [Status.t()]
+  def statuses(view), do: Enum.map(living(view), &view.statuses[&1])
+
+  @doc "What is drawn; `at_ms` is how long this has been looking."
+  @spec scene(t(), non_neg_integer()) :: Scene.t()
+  def scene(view, at_ms) do
+    robots = for id <- robots(view), do: robot(view.statuses[id], id in view.gone)
+
+    %Scene{
+      at_ms: at_ms,
+      map: nil,
+      robots: robots,
+      leader: Enum.find_value(robots, &(&1.alive and &1.leader? and &1.id)) || nil,
+      epoch: nil,
+      formation: nil,
+      stages: view.stages
+    }
+  end
+
+  defp robot(status, gone?) do
+    %{
+      id: status.robot,
+      pose: status.pose,
+      radius: Setup.profile(status.robot).radius,
+      alive: not gone?,
+      state: if(gone?, do: :not_heard, else: shown(status)),
+      slot: nil,
+      leader?: "#{status.state}" == "lead",
+      follows: if(status.leader != status.robot, do: status.leader),
+      uncertainty: status.uncertainty,
+      size_ppm: nil
+    }
+  end
+
+  # What keeps it from moving comes before what it would do.
+  defp shown(%{estop: true}), do: "E-STOP"
+  defp shown(%{arming: :disarmed}), do: "disarmed"
+  defp shown(%{arming: {:error, _reason}}), do: "line lost"
+  defp shown(%{state: :no_answer}), do: "no answer"
+  defp shown(%{state: state}), do: state
+end

@@ -1,0 +1,110 @@
+defmodule Mix.Tasks.Console do
+  @shortdoc "Shows and commands the robots of a running mesh, in the browser"
+  @moduledoc """
+  Serves the page for a mesh that is running; `bin/console` starts a node of the mesh for it, with what a Mix task cannot
+  set itself. `bin/console --help` lists the options.
+
+  Exit status: 1 if the input was wrong, or there can be no page.
+  """
+  use Mix.Task
+  alias Console.{Cli, Live, Page}
+
+  @look_ms 500
+
+  @impl Mix.Task
+  def run(arguments) do
+    arguments = Enum.map(arguments, &if(&1 == "-h", do: "--help", else: &1))
+
+    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
+      options =
+        Map.merge(%{"page-address" => {127, 0, 0, 1}, "page-token" => nil}, Map.new(pairs))
+
+      if options["help"], do: IO.write(help()), else: options |> serve() |> refused()
+    else
+      {:error, lines} -> refused({:error, lines ++ ["--help lists all options"]})
+    end
+  end
+
+  defp table do
+    [
+      {"connect", "NAME@HOST", &connect/1,
+       "the node that must be heard, such as mag1@convoy; or its machine,\nwhere multicast is blocked: mag1@10.0.0.7 (all that are heard)"},
+      {"page", "PORT", &Page.Options.port/1, "the port of the page (any that is free)"}
+    ] ++ Page.Options.table() ++ [{"help", nil, nil, "this text"}]
+  end
+
+  defp help do
+    """
+    Shows the robots of a running mesh in the browser, and commands them.
+
+      bin/console [options]
+
+    #{Cli.Arguments.help(table())}
+
+    The fleet's secret is read from CONVOY_SECRET_FILE (convoy.secret); bin/node --help lists more.
+    """
+  end
+
+  # A name is compared only: no text becomes an atom.
+  defp connect(text) do
+    if text =~ ~r/\A[a-z0-9_]+@[A-Za-z0-9.-]+(:\d+)?\z/,
+      do: {:ok, text},
+      else: {:error, "a node such as mag1@convoy"}
+  end
+
+  defp serve(options) do
+    Mix.Task.run("app.start", ["--no-compile"])
+
+    with :ok <- Page.Options.check(options["page-address"], options["page-token"]),
+         :ok <- mesh(),
+         {:ok, live} <- Live.Mesh.start_link(connect: expected(options["connect"])),
+         {:ok, _page, url} <- Page.start_link(page(options, live)) do
+      IO.puts("Page:  " <> url)
+      watch(live, nil)
+    end
+  end
+
+  defp page(options, live) do
+    [
+      module: Live.Mesh,
+      live: live,
+      robots: fn -> Live.Mesh.robots(live) end,
+      port: Map.get(options, "page", 0),
+      address: options["page-address"],
+      token: options["page-token"]
+    ]
+  end
+
+  defp mesh do
+    if Node.alive?() and Mesh.running?(),
+      do: :ok,
+      else: {:error, "this is no node of a mesh; bin/console starts one"}
+  end
+
+  # Given by the address of its machine, it has the fleet's host in its name.
+  defp expected(nil), do: nil
+
+  defp expected(connect) do
+    [name, host] = String.split(connect, "@")
+    [_own, fleet] = String.split(Atom.to_string(node()), "@")
+    if host =~ ~r/\A\d+\.\d+\.\d+\.\d+(:\d+)?\z/, do: "#{name}@#{fleet}", else: connect
+  end
+
+  # The page goes on until somebody ends this program.
+  defp watch(live, told) do
+    notice = Live.Mesh.notice(live)
+
+    if notice != told,
+      do: IO.puts(notice || "heard: #{Enum.join(Live.Mesh.robots(live), ", ")}")
+
+    receive do
+    after
+      @look_ms -> watch(live, notice)
+    end
+  end
+
+  defp refused({:error, lines}) do
+    lines |> List.wrap() |> Enum.each(&IO.puts(:stderr, "console: #{&1}"))
+    exit({:shutdown, 1})
+  end
+end

@@ -1,0 +1,160 @@
+defmodule Console.PageMeshTest do
+  @moduledoc """
+  The page of robots that somebody else has started, reached by `Swarm` alone. What it commands, all robots of this VM
+  obey: no other test runs meanwhile.
+  """
+  use ExUnit.Case, async: false
+  alias Console.{Browser, Live, Page}
+  alias Console.Live.Mesh.{Notice, View}
+  alias Swarm.Status
+  @moduletag :capture_log
+
+  doctest Notice
+  doctest View
+
+  test "a robot is shown from when it is heard, keeps its place in the list, and what changes is told" do
+    at = fn view, second, statuses ->
+      View.update(view, statuses, "14:00:0#{second}", second * 1_000)
+    end
+
+    mag2 = %Status{robot: :mag2, state: :follow, leader: :mag1}
+    view = View.new() |> at.(0, [mag2])
+    mag1 = %Status{robot: :mag1, state: "lead", leader: :mag1, estop: true}
+    view = view |> at.(1, [mag1, mag2]) |> at.(2, [mag1, mag2])
+
+    assert [%{id: :mag2}, %{id: :mag1, state: "E-STOP", leader?: true}] =
+             View.scene(view, 0).robots
+
+    assert View.scene(view, 0).leader == :mag1
+
+    view =
+      at.(view, 3, [
+        %{mag1 | estop: false, arming: :disarmed},
+        %Status{robot: :mag2, state: :no_answer}
+      ])
+
+    assert Enum.map(view.stages, &{&1.clock, &1.line}) == [
+             {"14:00:00", "mag2 is heard"},
+             {"14:00:00", "mag2: follow, leader mag1"},
+             {"14:00:01", "mag1 is heard"},
+             {"14:00:01", "mag1: lead"},
+             {"14:00:01", "mag1 is held by the emergency stop"},
+             {"14:00:03", "mag1 is released from the emergency stop"},
+             {"14:00:03", "mag1: DISARMED"},
+             {"14:00:03", "mag2: does not answer"}
+           ]
+
+    # Old lines are forgotten, and are not told again.
+    full = Enum.reduce(1..300, view, &at.(&2, 4, [%{mag1 | fault: "fault #{&1}"}, mag2]))
+    assert length(full.stages) == 200
+    assert List.last(full.stages).n == full.told
+  end
+
+  test "other secrets are told of while they are heard, and only where no robot is" do
+    seen = %{robots: 0, nodes: [], unsigned: 1, fault: nil}
+    notice = Notice.look(Notice.new("mag1@convoy"), seen, 0)
+    assert notice.line =~ "another secret"
+    assert Notice.look(notice, seen, 20_000).line =~ "mag1@convoy is not heard, nor"
+    heard = %{seen | robots: 1, nodes: ["mag2@convoy"], unsigned: 2}
+
+    assert Notice.look(notice, heard, 0).line ==
+             "mag1@convoy is not heard; it is shown as soon as it is"
+
+    assert Notice.look(notice, %{heard | nodes: ["mag1@convoy"]}, 0).line == nil
+
+    assert Notice.look(notice, %{heard | fault: "wlan0 is gone"}, 0).line ==
+             "no network: wlan0 is gone"
+  end
+
+  describe "in a browser" do
+    @describetag :realtime
+    @describetag skip:
+                   (case Application.ensure_all_started(:mochiweb) do
+                      {:ok, _apps} -> Browser.why_not()
+                      _absent -> "erlang-mochiweb is not installed"
+                    end)
+
+    test "robots come by themselves; armed, driven, stopped there; nothing of a simulation is offered" do
+      # Those of the tests before are heard for a while.
+      until(fn -> Swarm.status() == [] end)
+      {:ok, live} = Live.Mesh.start_link()
+      robots = fn -> Live.Mesh.robots(live) end
+      {:ok, _page, url} = Page.start_link(module: Live.Mesh, live: live, robots: robots)
+      browser = Browser.open({1280, 800})
+      Browser.go(browser, url)
+      Browser.await(browser, "return window.floor.scene?.robots.length === 0")
+      assert text(browser, "fleet") =~ "no robot is heard"
+
+      {:ok, fleet} = Sim.Fleet.start_link(robots: [:mag41, :min41], mission: false)
+      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2")
+      Browser.await(browser, "return window.floor.scene.robots.every((r) => r.x !== null)")
+      Browser.await(browser, "return document.getElementById('fleet').className === ''")
+      assert shown(browser, "[data-line='kill leader'], [data-one='kill'], #pace") == 0
+      assert shown(browser, "[data-line='disarm all']") == 1
+
+      Browser.run(browser, "document.querySelector('#robots button').click()")
+
+      Browser.await(
+        browser,
+        "return document.getElementById('about').textContent.includes('m/s')"
+      )
+
+      Browser.run(browser, "document.querySelector('[data-one=disarm]').click()")
+      Browser.await(browser, "return window.floor.scene.robots[0].state === 'disarmed'")
+      assert {:error, _disarmed} = Swarm.tell(:mag41, "move:0.2:0")
+
+      Browser.run(
+        browser,
+        "window.confirm = () => true; document.querySelector('[data-one=arm]').click()"
+      )
+
+      Browser.await(browser, "return window.floor.scene.robots[0].state === 'idle'")
+
+      Browser.run(browser, "document.getElementById('drive').click()")
+      Browser.key(browser, :keyDown, "w")
+      Browser.await(browser, "return window.floor.scene.robots[0].state === 'move'")
+      Browser.key(browser, :keyUp, "w")
+      Browser.await(browser, "return window.floor.scene.robots[0].state === 'done'")
+
+      Browser.run(browser, "document.getElementById('estop').click()")
+
+      Browser.await(
+        browser,
+        "return window.floor.scene.robots.every((r) => r.state === 'E-STOP')"
+      )
+
+      assert Swarm.status(:min41).estop
+      Browser.run(browser, "document.getElementById('reset').click()")
+
+      Browser.await(
+        browser,
+        "return window.floor.scene.robots.every((r) => r.state !== 'E-STOP')"
+      )
+
+      Sim.Fleet.stop(fleet)
+      Browser.await(browser, "return document.querySelectorAll('tr.dead').length === 2")
+      assert text(browser, "robots") =~ "not heard"
+      assert text(browser, "stages") =~ "mag41 is no longer heard"
+      assert Browser.errors(browser) == []
+      Browser.close(browser)
+    end
+
+    defp until(true?, left \\ 100) do
+      cond do
+        true?.() -> :ok
+        left == 0 -> flunk("in vain")
+        true -> receive(do: (:never -> :ok), after: (50 -> until(true?, left - 1)))
+      end
+    end
+
+    defp text(browser, id),
+      do: Browser.run(browser, "return document.getElementById('#{id}').textContent")
+
+    defp shown(browser, selector) do
+      Browser.run(
+        browser,
+        "return [...document.querySelectorAll(\"#{selector}\")].filter((e) => e.checkVisibility()).length"
+      )
+    end
+  end
+end

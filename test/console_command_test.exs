@@ -1,0 +1,131 @@
+defmodule ConsoleCommandTest do
+  @moduledoc "bin/console beside a node of a mesh, in a real browser, and where it cannot be."
+  use ExUnit.Case, async: true
+  alias Console.Browser
+  @moduletag :tmp_dir
+  @moduletag :realtime
+  @moduletag skip: Browser.why_not()
+
+  @root Path.expand("..", __DIR__)
+  @robots """
+  Logger.configure(level: :none)
+  {:ok, _fleet} = Sim.Fleet.start_link(robots: [:mag1, :min1], mission: false)
+  receive(do: (:never -> :ok))
+  """
+
+  # A fleet of their own, on ports of their own, that others of this machine do not hear.
+  setup %{tmp_dir: folder} do
+    [here, there] = udp_ports()
+    secret = Path.join(folder, "convoy.secret")
+    {_, 0} = System.cmd("mix", ["fleet.secret", secret], cd: @root, stderr_to_stdout: true)
+    File.write!(Path.join(folder, "robots.exs"), @robots)
+
+    environment = [
+      {"MIX_ENV", "#{Mix.env()}"},
+      {"CONVOY_SECRET_FILE", secret},
+      {"CONVOY_INTERFACE", "127.0.0.1"},
+      {"CONVOY_HOST", "h#{:erlang.unique_integer([:positive])}"},
+      {"CONVOY_UDP_PEERS", "127.0.0.1:#{here} 127.0.0.1:#{there}"}
+    ]
+
+    %{environment: environment, here: here, there: there}
+  end
+
+  test "it says whom it does not hear, shows robots when they come, and stops them",
+       context do
+    host = Map.new(context.environment)["CONVOY_HOST"]
+    console = program(~w(bin/console --connect mag1@#{host}), context, context.here)
+
+    [_all, url] =
+      told(console, ~r"Page:  (http://\S+)\nmag1@#{host} is not heard, nor is any other")
+
+    robots =
+      program(
+        ["bin/node", "mag1", Path.join(context.tmp_dir, "robots.exs")],
+        context,
+        context.there
+      )
+
+    browser = Browser.open({1280, 800})
+    Browser.go(browser, url)
+    Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2", 600)
+    told(console, ~r/heard: mag1, min1/)
+
+    Browser.run(browser, "document.getElementById('estop').click()")
+
+    Browser.await(
+      browser,
+      "return document.getElementById('answer').textContent === 'estop: accepted'"
+    )
+
+    Browser.await(browser, "return window.floor.scene.robots.every((r) => r.state === 'E-STOP')")
+    assert Browser.errors(browser) == []
+    Browser.close(browser)
+    Port.close(robots)
+    told(console, ~r/mag1@#{host} is not heard, nor is any other node/)
+    Port.close(console)
+  end
+
+  test "what is wrong is one line", context do
+    for {arguments, line} <- [
+          {~w(--connect mag1),
+           ~s(--connect cannot be "mag1": a node such as mag1@convoy is allowed)},
+          {~w(--page 70000), ~s(--page cannot be "70000": a port from 0 to 65535 is allowed)},
+          {~w(--page-address 0.0.0.0), "--page-address of other machines needs --page-token"}
+        ] do
+      environment = [{"CONVOY_DIST_PORT", "#{tcp_port()}"} | context.environment]
+      options = [cd: @root, env: environment, stderr_to_stdout: true]
+      assert {said, 1} = System.cmd(Path.join(@root, "bin/console"), arguments, options)
+      assert said =~ "console: " <> line
+    end
+  end
+
+  # It ends with its input.
+  defp program([name | arguments], context, udp) do
+    environment = [
+      {"CONVOY_UDP_PORT", "#{udp}"},
+      {"CONVOY_DIST_PORT", "#{tcp_port()}"} | context.environment
+    ]
+
+    Port.open({:spawn_executable, "/bin/sh"}, [
+      :binary,
+      :stderr_to_stdout,
+      cd: @root,
+      env: for({key, value} <- environment, do: {to_charlist(key), to_charlist(value)}),
+      args: [
+        "-c",
+        ~s("$@" </dev/null & p=$!; read _end; kill $p),
+        "sh",
+        Path.join(@root, name) | arguments
+      ]
+    ])
+  end
+
+  defp told(port, pattern, said \\ "") do
+    case Regex.run(pattern, said) do
+      nil ->
+        receive do
+          {^port, {:data, more}} -> told(port, pattern, said <> more)
+        after
+          30_000 -> flunk("in vain: #{inspect(pattern)} in #{said}")
+        end
+
+      found ->
+        found
+    end
+  end
+
+  defp udp_ports do
+    sockets = for _two <- 1..2, do: elem({:ok, _} = :gen_udp.open(0), 1)
+    ports = for socket <- sockets, do: elem({:ok, _} = :inet.port(socket), 1)
+    Enum.each(sockets, &:gen_udp.close/1)
+    ports
+  end
+
+  defp tcp_port do
+    {:ok, socket} = :gen_tcp.listen(0, [])
+    {:ok, port} = :inet.port(socket)
+    :gen_tcp.close(socket)
+    port
+  end
+end
