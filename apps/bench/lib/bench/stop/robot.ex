@@ -69,9 +69,7 @@ defmodule Bench.Stop.Robot do
     :persistent_term.put({__MODULE__, :raise?}, false)
     # It may have crashed just now.
     until(fn -> Names.whereis(@id, :pilot) != nil end)
-
-    # Its base reports that it stands, whatever it is told: for a second after that it takes no order.
-    until(fn -> Pilot.start(@id, __MODULE__.Mission, speed: speed) == :ok end)
+    :ok = Pilot.start(@id, __MODULE__.Mission, speed: speed)
   end
 
   @doc "Makes the next tick of its behaviour raise; returns when it did."

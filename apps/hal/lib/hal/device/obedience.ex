@@ -8,7 +8,7 @@ defmodule Hal.Device.Obedience do
   | a driver reports `{:refused, request, line}` | it is counted, and told when it is the first in a row, and every 10 s |
   | 3 such in a row of one request, over 2 s at least | offline, until `{:obeyed, request}` or, for `:look` and `:drive`, until the device moves |
   | a head stands still more than 5 degrees from where it is told to look, for 5 s | offline, until it moves |
-  | wheels stand still, told to do 0.1 m/s or 0.3 rad/s at least, for 3 s | offline, until they turn, or have been told to stand for 1 s: then nobody knows, and an order tries them again |
+  | wheels stand still, told to do 0.1 m/s or 0.3 rad/s at least, for 3 s | offline, until they turn |
 
   A head whose reach is not known (`c:Hal.Ptz.reach/1`) is judged by where it stands only until it
   has moved for the first time: later it may be at its end.
@@ -28,9 +28,8 @@ defmodule Hal.Device.Obedience do
   @moved_m 0.01
   @moved_turn 0.02
   @wheels_ms 3_000
-  @rest_ms 1_000
 
-  defstruct refusals: %{}, wanted: nil, stood: nil, moved?: false, stuck?: false, rest_ms: nil
+  defstruct refusals: %{}, wanted: nil, stood: nil, moved?: false, stuck?: false
 
   @type request :: :look | :zoom | :drive | atom()
   @type refusal :: %{
@@ -43,15 +42,14 @@ defmodule Hal.Device.Obedience do
         }
   @typedoc """
   `wanted` is where a head is to look, or the speed that the wheels were given; `stood` where the
-  device stands since when, while it should move; `rest_ms` since when wheels that stood still are told to stand.
+  device stands since when, while it should move.
   """
   @type t :: %__MODULE__{
           refusals: %{request() => refusal()},
           wanted: {pan :: float(), tilt :: float()} | Twist.t() | nil,
           stood: {place :: term(), since_ms :: integer()} | nil,
           moved?: boolean(),
-          stuck?: boolean(),
-          rest_ms: integer() | nil
+          stuck?: boolean()
         }
   @typedoc "The ranges of a head, in radians, `{least, greatest}` each; `nil` if they are not known."
   @type reach :: {pan :: {float(), float()}, tilt :: {float(), float()}} | nil
@@ -151,21 +149,12 @@ defmodule Hal.Device.Obedience do
         %{obedience | stood: {place, at_ms}, moved?: true, stuck?: false}
 
       not due? ->
-        rest(%{obedience | stood: {from, at_ms}}, request, at_ms)
+        %{obedience | stood: {from, at_ms}}
 
       true ->
-        %{obedience | rest_ms: nil, stuck?: obedience.stuck? or at_ms - since_ms >= limit}
+        %{obedience | stuck?: obedience.stuck? or at_ms - since_ms >= limit}
     end
   end
-
-  # Nobody knows whether wheels that are told nothing would still stand still: the next order tries them.
-  defp rest(%{stuck?: true, rest_ms: nil} = obedience, :drive, at_ms),
-    do: %{obedience | rest_ms: at_ms}
-
-  defp rest(%{stuck?: true, rest_ms: rest_ms} = obedience, :drive, at_ms),
-    do: %{obedience | stuck?: at_ms - rest_ms < @rest_ms}
-
-  defp rest(obedience, _request, _at_ms), do: obedience
 
   defp far?(nil, _place, _reach), do: false
 

@@ -95,13 +95,6 @@ defmodule Hal.Device.ObedienceTest do
     assert Obedience.judge(stuck, :drive) == {:error, {:stands, :wheels}}
     assert stuck |> hear(wheels(0.0, 0.1), 3_100..3_100) |> Obedience.judge(:drive) == :ok
     assert stuck |> hear(wheels(0.02), 3_100..3_100) |> Obedience.judge(:drive) == :ok
-    # Told to stand, nobody knows any more after a second: else no order could ever try it again.
-    resting = Obedience.told(stuck, Hal.Twist.zero())
-
-    assert resting |> hear(wheels(0.0), 3_100..4_000) |> Obedience.judge(:drive) ==
-             {:error, {:stands, :wheels}}
-
-    assert resting |> hear(wheels(0.0), 3_100..4_100) |> Obedience.judge(:drive) == :ok
 
     slow = Obedience.told(Obedience.new(), Twist.new(0.05, 0.1))
     assert slow |> hear(wheels(0.0), 0..9_000) |> Obedience.judge(:drive) == :ok

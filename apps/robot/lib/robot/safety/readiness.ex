@@ -18,6 +18,10 @@ defmodule Robot.Safety.Readiness do
 
   def of(%Config{drive: drive}, board) do
     case entry(board, {:health, :drive}) do
+      # It is told again and again; an order may turn them.
+      {:offline, {:stands, :wheels}} ->
+        judge(entry(board, :arming), nil)
+
       {:offline, reason} ->
         judge(entry(board, :arming), {:offline, Words.offline(drive, reason)})
 

@@ -112,6 +112,15 @@ defmodule Robot.Safety.ArmingTest do
     assert Twist.zero?(twist)
   end
 
+  test "armed wheels that have stood still, told to turn, take the next order" do
+    {id, _reports} = armable(:stuck, :manual)
+    board = Board.find!(id)
+    Board.put(board, :drive, {:health, :drive}, {:offline, {:stands, :wheels}}, Board.now(board))
+    assert Pilot.start(id, Late, test: self(), goal: @roll) == :ok
+    Board.put(board, :drive, {:health, :drive}, {:offline, :eio}, Board.now(board))
+    assert {:error, "its drive is offline" <> _} = Pilot.start(id)
+  end
+
   for policy <- [:auto, :manual], cause <- [:silence, :loss, :crash, :kill, :person] do
     @tag policy: policy, cause: cause
     test "#{policy}: after #{cause} a mission, or a goal without one, is gone when it is armed again",
