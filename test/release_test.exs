@@ -51,6 +51,26 @@ defmodule System.ReleaseTest do
     end
   end
 
+  defp root?, do: System.cmd("id", ["-u"]) == {"0\n", 0}
+
+  defp dist_port(file) do
+    [_, port] = Regex.run(~r/dist_port: (\d+)/, File.read!(file))
+    String.to_integer(port)
+  end
+
+  defp flood(port, n) do
+    name = "flood-#{n}@nowhere"
+    hello = <<?N, 0x0D07F7FBD::64, 1::32, byte_size(name)::16, name::binary>>
+
+    with {:ok, socket} <-
+           :gen_tcp.connect({127, 0, 0, 1}, port, [:binary, packet: 2, active: false]) do
+      with :ok <- :gen_tcp.send(socket, hello), do: :gen_tcp.recv(socket, 0, 10_000)
+      :gen_tcp.close(socket)
+    end
+
+    flood(port, n + 2)
+  end
+
   test "it is lean, and its programs may be run" do
     apps = for path <- File.ls!(Path.join(release(), "lib")), do: hd(String.split(path, "-"))
     for app <- ~w(hal vision robot mesh swarm missions agents), do: assert(app in apps)
@@ -95,6 +115,11 @@ defmodule System.ReleaseTest do
     until(here, ask.(["status"]))
     left_start = Path.join(folder, "mag1.departed")
     refute File.exists?(left_start)
+
+    # However often other programs of this machine call, and by how many names.
+    flood = for n <- 1..2, do: Task.async(fn -> flood(dist_port(file), n) end)
+    if root?(), do: for(_ <- 1..3, do: assert({"1\n", 0} = robot(["rpc", "1"], environment)))
+    Enum.each(flood, &Task.shutdown(&1, :brutal_kill))
 
     # It moves only once a person has armed it.
     move = ~s|Swarm.tell(:mag1, "move:0.2:0")|

@@ -61,6 +61,15 @@ defmodule Mesh.Interface do
 
   def read(_other), do: :error
 
+  @doc "That of the environment, `CONVOY_INTERFACE`; all addresses if it names none."
+  @spec of_environment() :: t()
+  def of_environment do
+    case read(to_string(:os.getenv(~c"CONVOY_INTERFACE", ~c""))) do
+      {:ok, interface} -> interface
+      :error -> {0, 0, 0, 0}
+    end
+  end
+
   @doc "What `read/1` accepts, in words."
   @spec allowed() :: String.t()
   def allowed,

@@ -38,7 +38,7 @@ defmodule Swarm.Directory do
   def enter(pid, groups) do
     Enum.each(groups, &(:ok = :pg.join(__MODULE__, &1, pid)))
   catch
-    :exit, {:noproc, _call} -> {:error, :down}
+    :exit, {_why, {:gen_server, :call, _arguments}} -> {:error, :down}
   end
 
   @doc "Removes a local process from groups."
@@ -46,7 +46,7 @@ defmodule Swarm.Directory do
   def leave(pid, groups) do
     Enum.each(groups, &:pg.leave(__MODULE__, &1, pid))
   catch
-    :exit, {:noproc, _call} -> {:error, :down}
+    :exit, {_why, {:gen_server, :call, _arguments}} -> {:error, :down}
   end
 
   @doc """

@@ -12,10 +12,14 @@ defmodule Mesh.Distribution.Access do
 
   A node with an `interface` (`Mesh.Interface`) lets in who has called that, or the loopback, and nobody else.
 
-  Each of these has a rate, too: this machine, each configured network and each address that was heard may call 20 times
-  at once, and 10 times a second in the long run. Without TLS, names that this node has no atom for have another rate:
-  20 at once, and then one a second from this machine and from all configured networks, where shells come from, but one
-  a minute from all addresses that were heard, since the names of robots are known.
+  Each of these has a rate, too: root of this machine, all others of this machine, each configured network and each
+  address that was heard may call 20 times at once, and 10 times a second in the long run. Who calls from a port below
+  1024 of this machine is root, since the kernel gives these to nobody else; the shells of releases do
+  (`Mesh.Distribution.CallingAddress`), so that whoever operates a robot is let in however often others call.
+
+  Without TLS, names that this node has no atom for have another rate: 20 at once, and then one a second from root,
+  from all others of this machine and from all configured networks, where shells come from, but one a minute from all
+  addresses that were heard, since the names of robots are known.
 
   What is known is in a public table of the process that listens, so that it outlives the mesh: `Mesh.Server` writes
   what it hears, and the carrier (`Mesh.Distribution.Listener`) asks. A question costs a few lookups, and a stranger
@@ -29,7 +33,8 @@ defmodule Mesh.Distribution.Access do
   @at_once 20
   # A minute.
   @attempts 600
-  @names %{local: 60, configured: 60, heard: 1}
+  @reserved 1_024
+  @names %{root: 60, local: 60, configured: 60, heard: 1}
   # After so long without an attempt an address has all of them again.
   @full_ms div(60_000 * @at_once, @attempts)
   # More rows than a fleet has addresses: each has one because it was heard, and one for its attempts.
@@ -72,14 +77,16 @@ defmodule Mesh.Distribution.Access do
     :ok
   end
 
+  @typedoc "The address and the port that a connection comes from."
+  @type from :: {:inet.ip_address(), :inet.port_number()}
+
   @doc """
-  Whether a connection from this address may go on, which is then one of its attempts. `called` is the address of this
+  Whether a connection from there may go on, which is then one of its attempts. `called` is the address of this
   node that it called.
   """
-  @spec check(:inet.ip_address(), called :: :inet.ip_address(), integer()) ::
-          :ok | {:error, refusal()}
-  def check(ip, called, now_ms) do
-    case origin(ip, called, now_ms) do
+  @spec check(from(), called :: :inet.ip_address(), integer()) :: :ok | {:error, refusal()}
+  def check(from, called, now_ms) do
+    case origin(from, called, now_ms) do
       nil -> {:error, :stranger}
       {_kind, who} -> take_if(called?(called), {:attempts, who}, @attempts, :too_often, now_ms)
     end
@@ -96,13 +103,13 @@ defmodule Mesh.Distribution.Access do
   end
 
   @doc "Whether a caller that was let in may give this name, which then may become an atom."
-  @spec name(charlist(), :inet.ip_address(), called :: :inet.ip_address(), integer()) ::
+  @spec name(charlist(), from(), called :: :inet.ip_address(), integer()) ::
           :ok | {:error, refusal()}
-  def name(name, ip, called, now_ms) do
+  def name(name, from, called, now_ms) do
     if known?(name) do
       :ok
     else
-      case origin(ip, called, now_ms) do
+      case origin(from, called, now_ms) do
         nil -> {:error, :stranger}
         {kind, _who} -> take({:names, kind}, @names[kind], :new_names, now_ms)
       end
@@ -111,18 +118,21 @@ defmodule Mesh.Distribution.Access do
 
   @doc "Whether the address is loopback, configured or heard: one that this node may connect to."
   @spec reachable?(:inet.ip_address(), integer()) :: boolean()
-  def reachable?(ip, now_ms), do: origin(ip, nil, now_ms) != nil
+  def reachable?(ip, now_ms), do: origin({ip, @reserved}, nil, now_ms) != nil
 
   # Who it is that calls, and so whose rates count: all addresses of this machine are one, and all of a network.
-  defp origin(ip, called, now_ms) do
+  defp origin({ip, port}, called, now_ms) do
     cond do
       # The kernel drops what comes from elsewhere with an address of this machine, or to its loopback.
-      ip == called or loopback?(ip) or loopback?(called) -> {:local, :local}
+      ip == called or loopback?(ip) or loopback?(called) -> local(port)
       heard?(ip, now_ms) -> {:heard, ip}
       network = configured(:options, ip) || configured(:environment, ip) -> {:configured, network}
       true -> nil
     end
   end
+
+  defp local(port) when port < @reserved, do: {:root, :root}
+  defp local(_port), do: {:local, :local}
 
   defp loopback?({127, _, _, _}), do: true
   defp loopback?(_other), do: false

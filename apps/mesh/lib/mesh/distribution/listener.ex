@@ -25,43 +25,9 @@ defmodule Mesh.Distribution.Listener do
     allowed = String.split(environment(~c"CONVOY_ALLOW"), [",", " "], trim: true)
 
     Access.open(
-      interface(),
+      Interface.of_environment(),
       for(text <- peers ++ allowed, {:ok, network} <- [Networks.read(text)], do: network)
     )
-  end
-
-  defp interface do
-    case Interface.read(environment(~c"CONVOY_INTERFACE")) do
-      {:ok, interface} -> interface
-      :error -> {0, 0, 0, 0}
-    end
-  end
-
-  @doc """
-  Before a connection is made: a node that listens on one address only, or has an interface, calls from there, since
-  that is where others hear it.
-  """
-  @spec call_from() :: :ok
-  def call_from do
-    case {:application.get_env(:kernel, :inet_dist_use_interface), interface()} do
-      {{:ok, ip}, _interface} -> call_from(ip)
-      {:undefined, {0, 0, 0, 0}} -> :ok
-      {:undefined, interface} -> interface |> own() |> call_from()
-    end
-  end
-
-  # While it is absent nobody can be called: the loopback has no way to them.
-  defp own(interface) do
-    case Interface.addresses(interface, Interface.machine_or_none()) do
-      [ip | _others] -> ip
-      [] -> {127, 0, 0, 1}
-    end
-  end
-
-  defp call_from(ip) do
-    options = :application.get_env(:kernel, :inet_dist_connect_options, [])
-    options = [{:ip, ip} | List.keydelete(options, :ip, 0)]
-    :application.set_env(:kernel, :inet_dist_connect_options, options)
   end
 
   @doc """
@@ -150,13 +116,13 @@ defmodule Mesh.Distribution.Listener do
   defp ok?(socket, ask) do
     now = now()
 
-    with {:ok, {ip, _port}} <- :inet.peername(socket),
+    with {:ok, {ip, _port} = from} <- :inet.peername(socket),
          {:ok, {called, _port}} <- :inet.sockname(socket),
-         {{:error, why}, ip} <- {ask.(ip, called, now), ip} do
+         {:error, why} <- ask.(from, called, now) do
       Refusals.note(ip, why, now)
       false
     else
-      {:ok, _ip} -> true
+      :ok -> true
       {:error, _gone} -> false
     end
   end

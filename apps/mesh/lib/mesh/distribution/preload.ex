@@ -11,6 +11,7 @@ defmodule Mesh.Distribution.Preload do
     Mesh.Distribution.Access.Bucket,
     Mesh.Distribution.Access.Networks,
     Mesh.Distribution.Access.Refusals,
+    Mesh.Distribution.CallingAddress,
     Mesh.Distribution.ConnectionLog,
     Mesh.Distribution.ConnectionLog.Peer,
     Mesh.Distribution.ConnectionLog.Reasons,

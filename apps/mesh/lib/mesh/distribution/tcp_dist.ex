@@ -7,7 +7,7 @@ defmodule Mesh.Distribution.Tcp_dist do
   On the wire it is OTP's own: a node with this carrier and one without connect. All is done by `:inet_tcp_dist`, which
   accepts with the socket module `Mesh.Distribution.Listener`. Erlang adds the ending `_dist` to the name of a carrier.
   """
-  alias Mesh.Distribution.Listener
+  alias Mesh.Distribution.{CallingAddress, Listener}
 
   # The callbacks that Erlang expects of a carrier.
 
@@ -34,7 +34,7 @@ defmodule Mesh.Distribution.Tcp_dist do
   @doc false
   @spec setup(node(), term(), node(), :longnames | :shortnames, timeout()) :: pid()
   def setup(node, type, me, names, ms) do
-    :ok = Listener.call_from()
+    :ok = CallingAddress.set()
     :inet_tcp_dist.setup(node, type, me, names, ms)
   end
 

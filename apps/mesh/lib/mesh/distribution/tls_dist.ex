@@ -8,7 +8,7 @@ defmodule Mesh.Distribution.Tls_dist do
   On the wire it is OTP's own. All is done by `:inet_tls_dist`, which accepts with the socket module
   `Mesh.Distribution.Listener`. Erlang adds the ending `_dist` to the name of a carrier.
   """
-  alias Mesh.Distribution.Listener
+  alias Mesh.Distribution.{CallingAddress, Listener}
 
   # The callbacks that Erlang expects of a carrier.
 
@@ -47,7 +47,7 @@ defmodule Mesh.Distribution.Tls_dist do
   @doc false
   @spec setup(node(), term(), node(), :longnames | :shortnames, timeout()) :: pid()
   def setup(node, type, me, names, ms) do
-    :ok = Listener.call_from()
+    :ok = CallingAddress.set()
     otp(:setup, [node, type, me, names, ms])
   end
 

@@ -24,18 +24,22 @@ defmodule Mesh.Distribution.AccessTest do
     end
   end
 
+  # From a port that anybody may open.
+  defp check(ip, called, ms), do: Access.check({ip, 1_024}, called, ms)
+  defp name(name, ip, called, ms), do: Access.name(name, {ip, 1_024}, called, ms)
+
   test "only this machine may call, until addresses are heard or configured" do
-    assert Access.check({127, 0, 0, 1}, {127, 0, 0, 1}, 0) == :ok
-    assert Access.check(@own, @own, 0) == :ok
-    assert Access.check(@fellow, @own, 0) == {:error, :stranger}
+    assert check({127, 0, 0, 1}, {127, 0, 0, 1}, 0) == :ok
+    assert check(@own, @own, 0) == :ok
+    assert check(@fellow, @own, 0) == {:error, :stranger}
     :ok = Access.heard([@fellow], 0)
-    assert Access.check(@fellow, @own, 1) == :ok
-    assert Access.check(@stranger, @own, 1) == {:error, :stranger}
-    assert Access.check({0, 0, 0, 0, 0, 0xFFFF, 0x0A00, 0x0002}, @own, 1) == {:error, :stranger}
+    assert check(@fellow, @own, 1) == :ok
+    assert check(@stranger, @own, 1) == {:error, :stranger}
+    assert check({0, 0, 0, 0, 0, 0xFFFF, 0x0A00, 0x0002}, @own, 1) == {:error, :stranger}
     :ok = Access.configure(networks(["10.0.0.64/28"]))
-    assert Access.check(@stranger, @own, 2) == :ok
+    assert check(@stranger, @own, 2) == :ok
     :ok = Access.configure([])
-    assert Access.check(@stranger, @own, 3) == {:error, :stranger}
+    assert check(@stranger, @own, 3) == {:error, :stranger}
   end
 
   test "with an interface, only who has called that, or the loopback, may connect" do
@@ -43,50 +47,62 @@ defmodule Mesh.Distribution.AccessTest do
       :ok = Access.open(interface, [])
       :ok = Access.heard([@fellow], 0)
       there? = interface == @own
-      assert Access.check(@fellow, @own, 1) == :ok == there?
-      assert Access.check(@fellow, {10, 0, 1, 1}, 1) == {:error, :elsewhere}
-      assert Access.check({10, 0, 1, 1}, {10, 0, 1, 1}, 1) == {:error, :elsewhere}
+      assert check(@fellow, @own, 1) == :ok == there?
+      assert check(@fellow, {10, 0, 1, 1}, 1) == {:error, :elsewhere}
+      assert check({10, 0, 1, 1}, {10, 0, 1, 1}, 1) == {:error, :elsewhere}
       # A shell on this machine, whatever address it calls from.
-      assert Access.check({10, 0, 1, 1}, {127, 0, 0, 1}, 1) == :ok
-      assert Access.check({10, 0, 0, 77}, @own, 1) == {:error, :stranger}
+      assert check({10, 0, 1, 1}, {127, 0, 0, 1}, 1) == :ok
+      assert check({10, 0, 0, 77}, @own, 1) == {:error, :stranger}
     end
   end
 
   test "what the environment names stays, whatever the options say" do
     :ok = Access.open({0, 0, 0, 0}, networks(["10.0.0.66"]))
     :ok = Access.configure([])
-    assert Access.check(@stranger, @own, 0) == :ok
+    assert check(@stranger, @own, 0) == :ok
     assert Access.reachable?(@stranger, 0)
     refute Access.reachable?(@fellow, 0)
   end
 
   test "an address that is not heard for ten minutes is a stranger's again" do
     :ok = Access.heard([@fellow], 0)
-    assert Access.check(@fellow, @own, 10 * @minutes - 1) == :ok
-    assert Access.check(@fellow, @own, 10 * @minutes) == {:error, :stranger}
+    assert check(@fellow, @own, 10 * @minutes - 1) == :ok
+    assert check(@fellow, @own, 10 * @minutes) == {:error, :stranger}
   end
 
   test "each address may call 20 times at once, and ten times a second" do
     :ok = Access.heard([@fellow], 0)
-    attempts = fn ip, ms -> Enum.count(1..100, fn _ -> Access.check(ip, @own, ms) == :ok end) end
+    attempts = fn ip, ms -> Enum.count(1..100, fn _ -> check(ip, @own, ms) == :ok end) end
     assert attempts.(@fellow, 0) == 20
-    assert Access.check(@fellow, @own, 0) == {:error, :too_often}
+    assert check(@fellow, @own, 0) == {:error, :too_often}
     assert attempts.(@own, 0) == 20
     assert attempts.(@fellow, 500) == 5
     assert attempts.(@fellow, 60_000) == 20
     # However often it calls in vain.
-    in_vain = for ms <- 60_001..61_000, do: Access.check(@fellow, @own, ms)
+    in_vain = for ms <- 60_001..61_000, do: check(@fellow, @own, ms)
     assert Enum.count(in_vain, &(&1 == :ok)) == 10
   end
 
   test "this machine has one rate, whatever address it calls from, and a network has one" do
     :ok = Access.configure(networks(["10.0.0.64/28", "10.0.0.20"]))
-    local = for n <- 1..100, do: Access.check({127, 1, 2, n}, {127, 0, 0, 1}, 0)
+    local = for n <- 1..100, do: check({127, 1, 2, n}, {127, 0, 0, 1}, 0)
     assert Enum.count(local, &(&1 == :ok)) == 20
-    assert Access.check(@own, @own, 0) == {:error, :too_often}
-    network = for n <- 1..100, do: Access.check({10, 0, 0, 64 + rem(n, 16)}, @own, 0)
+    assert check(@own, @own, 0) == {:error, :too_often}
+    network = for n <- 1..100, do: check({10, 0, 0, 64 + rem(n, 16)}, @own, 0)
     assert Enum.count(network, &(&1 == :ok)) == 20
-    assert Access.check({10, 0, 0, 20}, @own, 0) == :ok
+    assert check({10, 0, 0, 20}, @own, 0) == :ok
+  end
+
+  test "root of this machine has a rate of its own, but not that of another" do
+    :ok = Access.heard([@fellow], 0)
+    for ip <- [@own, @fellow], _ <- 1..100, do: check(ip, @own, 0)
+    for n <- 1..100, do: name(~c"not-root-#{n}@nowhere", @own, @own, 0)
+    root = fn ip -> Enum.count(1..100, &(Access.check({ip, 511 + &1}, @own, 0) == :ok)) end
+    assert root.(@own) == 20
+    assert root.({127, 0, 0, 1}) == 0
+    assert root.(@fellow) == 0
+    name = &Access.name(~c"root-#{&1}@nowhere", {@own, 1_023}, @own, 0)
+    assert Enum.count(1..100, &(name.(&1) == :ok)) == 20
   end
 
   test "names that have no atom are few, and fewest from fellows' addresses" do
@@ -95,7 +111,7 @@ defmodule Mesh.Distribution.AccessTest do
     :ok = Access.configure(networks(["10.8.0.0/16"]))
 
     new = fn ips, ms ->
-      Enum.count(ips, &(Access.name(~c"new-#{inspect(&1)}-#{ms}@nowhere", &1, @own, ms) == :ok))
+      Enum.count(ips, &(name(~c"new-#{inspect(&1)}-#{ms}@nowhere", &1, @own, ms) == :ok))
     end
 
     assert new.(others, 0) == 20
@@ -105,11 +121,11 @@ defmodule Mesh.Distribution.AccessTest do
     assert new.(others, @minutes) == 1
     assert new.([{127, 0, 0, 1}], @minutes) == 1
     [fellow | _] = others
-    assert Access.name(~c"new@nowhere", fellow, @own, @minutes) == {:error, :new_names}
-    assert Access.name(~c"new@nowhere", @stranger, @own, @minutes) == {:error, :stranger}
-    assert Access.name(Atom.to_charlist(:known@nowhere), fellow, @own, @minutes) == :ok
-    assert Access.name(List.duplicate(?x, 300), fellow, @own, @minutes) == {:error, :new_names}
-    assert Access.name([255, 0, 8_364], fellow, @own, @minutes) == {:error, :new_names}
+    assert name(~c"new@nowhere", fellow, @own, @minutes) == {:error, :new_names}
+    assert name(~c"new@nowhere", @stranger, @own, @minutes) == {:error, :stranger}
+    assert name(Atom.to_charlist(:known@nowhere), fellow, @own, @minutes) == :ok
+    assert name(List.duplicate(?x, 300), fellow, @own, @minutes) == {:error, :new_names}
+    assert name([255, 0, 8_364], fellow, @own, @minutes) == {:error, :new_names}
   end
 
   test "the table is bounded, and what is out of date makes room" do
@@ -118,12 +134,12 @@ defmodule Mesh.Distribution.AccessTest do
     :ok = Access.heard(addresses.(1, 10_000), 0)
     assert size.() <= 10
     :ok = Access.heard(addresses.(1, 3_000), 0)
-    for ip <- addresses.(1, 3_000), do: Access.check(ip, @own, 0)
+    for ip <- addresses.(1, 3_000), do: check(ip, @own, 0)
     assert size.() <= 4_096
-    assert Access.check({10, 1, 11, 184}, @own, 0) == {:error, :too_often}
-    assert Access.check({10, 1, 11, 184}, @own, @minutes) == :ok
+    assert check({10, 1, 11, 184}, @own, 0) == {:error, :too_often}
+    assert check({10, 1, 11, 184}, @own, @minutes) == :ok
     :ok = Access.heard(addresses.(2, 4_000), 20 * @minutes)
-    assert Access.check({10, 2, 0, 1}, @own, 20 * @minutes) == :ok
+    assert check({10, 2, 0, 1}, @own, 20 * @minutes) == :ok
     assert size.() <= 4_096
   end
 
@@ -133,7 +149,7 @@ defmodule Mesh.Distribution.AccessTest do
     assert Access.heard([@fellow], 0) == :ok
     assert Access.configure([]) == :ok
     refute Access.reachable?(@fellow, 0)
-    assert Access.check(@fellow, @own, 0) == {:error, :stranger}
+    assert check(@fellow, @own, 0) == {:error, :stranger}
   end
 
   test "refusals are counted, and logged once a minute for each address" do

@@ -74,6 +74,31 @@ defmodule Mesh.Distribution.CarriersTest do
     end
   end
 
+  # Whoever is not root may not open the ports by which it is known.
+  @tag skip: System.cmd("id", ["-u"]) != {"0\n", 0} && "it takes root"
+  test "root's shell is let in at once, however often and by how many names others call", %{
+    tmp_dir: tmp
+  } do
+    for {[port, other | _], flags, _otp} <- carriers(tmp) do
+      first = node(port, flags)
+      shell = node(other, flags ++ ~w(-mesh_shell true))
+      flood = for n <- 1..2, do: Task.async(fn -> flood(port, n) end)
+      assert Hal.Lines.eventually(fn -> Vm.call(first, Mesh, :refused, []).too_often > 100 end)
+
+      for _ <- 1..5 do
+        assert Vm.call(shell, Node, :connect, [first.node])
+        assert Vm.call(shell, Node, :disconnect, [first.node])
+      end
+
+      Enum.each(flood, &Task.shutdown(&1, :brutal_kill))
+    end
+  end
+
+  defp flood(port, n) do
+    say_hello(port, "flood-#{n}@nowhere")
+    flood(port, n + 2)
+  end
+
   test "a node whose code is not found yet lets in and refuses as ever", %{tmp_dir: tmp} do
     for {[port, other | _], flags, _otp} <- carriers(tmp) do
       [first, second] = for port <- [port, other], do: node(port, flags)

@@ -122,7 +122,7 @@ defmodule Swarm.Directory.Presence do
     Process.send_after(self(), :settled, @settle_ms)
     joined
   catch
-    :exit, {:noproc, _call} ->
+    :exit, {_why, {:gen_server, :call, _arguments}} ->
       Process.send_after(self(), :enter, @look_ms)
       s
   end

@@ -39,4 +39,19 @@ defmodule Swarm.Directory.MembershipTest do
     assert Directory.Membership.arrived(out, {:DOWN, nil, :process, self(), :killed}) == :other
     assert Directory.Membership.arrived(out, :junk) == :other
   end
+
+  test "a directory that ends while it is asked is down" do
+    scope = Process.whereis(Directory)
+    :ok = :sys.suspend(scope)
+
+    asked =
+      for function <- [:enter, :leave],
+          do: spawn_monitor(fn -> exit(apply(Directory, function, [self(), [group()]])) end)
+
+    assert Swarm.Case.eventually(fn -> Process.info(scope, :message_queue_len) |> elem(1) >= 2 end)
+
+    Process.exit(scope, :kill)
+    for {pid, ref} <- asked, do: assert_receive({:DOWN, ^ref, :process, ^pid, {:error, :down}})
+    assert Swarm.Case.eventually(fn -> Process.whereis(Directory) end)
+  end
 end
