@@ -124,14 +124,16 @@ defmodule Robot.Behaviour.Avoid do
   end
 
   defp bend(wish, speed, percept, state) do
-    case Avoid.Route.taken(wish.goal, percept, Neighbours.robots(percept), state.discs) do
-      nil -> bend_round(wish, speed, percept, state)
-      near -> beside(wish, near, speed, percept, state)
+    all = Neighbours.robots(percept)
+
+    case Avoid.Route.taken(wish.goal, percept, all, state.discs) do
+      nil -> bend_round(wish, speed, percept, all, state)
+      near -> beside(wish, near, speed, percept, all, state)
     end
   end
 
   # The goal is occupied, so the nearest place beside it becomes the goal.
-  defp beside(wish, near, speed, percept, state) do
+  defp beside(wish, near, speed, percept, all, state) do
     distance = Pose.distance(percept.pose, near)
     leave = if state.blocked?, do: 2 * @beside, else: @beside
 
@@ -146,12 +148,12 @@ defmodule Robot.Behaviour.Avoid do
       velocity = {speed * (x - percept.pose.x), speed * (y - percept.pose.y)}
       twist = Steering.twist(velocity, percept.pose.heading, percept.profile)
       wish = %{wish | goal: near, velocity: velocity, twist: twist, reverse?: false}
-      bend_round(wish, speed * distance, percept, %{state | blocked?: false})
+      bend_round(wish, speed * distance, percept, all, %{state | blocked?: false})
     end
   end
 
-  defp bend_round(wish, speed, percept, state) do
-    {all, standing} = percept |> Neighbours.robots() |> Neighbours.steady(state.standing)
+  defp bend_round(wish, speed, percept, all, state) do
+    {all, standing} = Neighbours.steady(all, state.standing)
     robots = Neighbours.near(all)
     bodies = Enum.map(all, fn %{at: {x, y}, radius: radius} -> {x, y, radius} end)
 

@@ -34,10 +34,9 @@ defmodule Robot.Localiser.Consistency do
   def judge(belief, robots, %Percept{} = percept, %Pose{} = back) do
     exposed = Pose.compose(belief.pose, back)
 
-    {hiding, showing} =
-      Enum.split_with(percept.detections.blobs, &(&1.colour not in colours(robots)))
-
-    seen = Columns.seen(showing, colours(robots))
+    colours = robots |> Enum.map(& &1.colour) |> Enum.uniq()
+    {hiding, showing} = Enum.split_with(percept.detections.blobs, &(&1.colour not in colours))
+    seen = Columns.seen(showing, colours)
     covered = Columns.union(seen, Columns.seen(hiding, Enum.map(hiding, & &1.colour)))
     camera = Columns.camera(percept)
     spans = Enum.map(robots, &spans(&1, belief, exposed, camera))
@@ -48,8 +47,6 @@ defmodule Robot.Localiser.Consistency do
       true -> :consistent
     end
   end
-
-  defp colours(robots), do: robots |> Enum.map(& &1.colour) |> Enum.uniq()
 
   defp stranger?(seen, spans) do
     possible = Enum.reduce(spans, 0, fn {may, _must}, set -> Columns.union(set, may) end)

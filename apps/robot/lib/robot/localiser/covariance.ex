@@ -152,7 +152,7 @@ defmodule Robot.Localiser.Covariance do
       1.0
   """
   @spec project_state(t(), index :: non_neg_integer(), slope :: [float()]) :: float()
-  def project_state(p, index, slope), do: p |> Enum.at(index) |> dot(slope)
+  def project_state(p, index, slope), do: index |> Kernel.+(1) |> :lists.nth(p) |> dot(slope)
 
   @doc "P - v v' / s: the covariance after a measurement (`project/2`) of innovation variance s."
   @spec reduce(t(), [float()], float()) :: t()

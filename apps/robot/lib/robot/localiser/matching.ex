@@ -48,13 +48,15 @@ defmodule Robot.Localiser.Matching do
   @spec pairs([Anchors.mark()], [Blob.t()], Belief.t(), Pose.t(), pan :: float(), view :: float()) ::
           [pair()]
   def pairs(robots, blobs, belief, exposed, pan, view) do
+    looks = for blob <- blobs, do: {blob.colour, blob, Sighting.bearing(blob, pan, view)}
+
     candidates =
       for mark <- robots,
-          alike = Enum.filter(blobs, &(&1.colour == mark.colour)),
-          alike != [],
-          expected = expected(mark, belief, exposed),
-          blob <- alike,
-          c = candidate(expected, blob, pan, view),
+          alike = Enum.filter(looks, &(elem(&1, 0) == mark.colour)),
+          [{_colour, %{width: picture}, _seen} | _] <- [alike],
+          expected = expected(mark, belief, exposed, {picture, view}),
+          {_colour, blob, seen} <- alike,
+          c = candidate(expected, blob, seen),
           do: c
 
     for %{mark: mark, blob: blob} = one <- candidates,
@@ -79,17 +81,19 @@ defmodule Robot.Localiser.Matching do
   defp cut?(blob), do: blob.left == 0 or blob.right == blob.width - 1
 
   # How a robot should look from there, for all blobs; `nil` for one that cannot be seen from within.
-  defp expected(mark, belief, exposed) do
+  defp expected(mark, belief, exposed, camera) do
     distance = Pose.distance(exposed, mark.at)
-    if distance > mark.radius, do: expected(mark, distance, belief, exposed)
+    if distance > mark.radius, do: expected(mark, distance, belief, exposed, camera)
   end
 
-  defp expected(mark, distance, belief, exposed) do
+  defp expected(mark, distance, belief, exposed, {picture, view}) do
     {bearing_sd, distance_sd} = sds(mark, distance, belief, exposed)
 
     %{
       mark: mark,
       distance: distance,
+      width: Sighting.width(mark.radius, distance, picture, view),
+      half: :math.asin(mark.radius / distance),
       bearing: Pose.bearing(exposed, mark.at),
       bearing_sd: bearing_sd,
       # If the distance is uncertain, so is the expected width of the blob.
@@ -97,25 +101,22 @@ defmodule Robot.Localiser.Matching do
     }
   end
 
-  defp candidate(%{mark: mark} = expected, blob, pan, view) do
-    width = Sighting.width(mark.radius, expected.distance, blob.width, view)
-    share = (blob.right - blob.left + 1) / width
-    half = :math.asin(mark.radius / expected.distance)
-    seen = Sighting.bearing(blob, pan, view)
+  defp candidate(%{half: half, bearing_sd: bearing_sd} = expected, blob, seen) do
+    share = (blob.right - blob.left + 1) / expected.width
     slack = abs(share - 1) * half
     off = max(abs(Pose.wrap(seen - expected.bearing)) - slack, 0.0)
-    cost = cost(off, expected.bearing_sd, :math.log(share), expected.doubt)
 
-    if off < max(3 * expected.bearing_sd, @narrow) and cost < @unlike do
+    if (off < @narrow or off < 3 * bearing_sd) and
+         cost(off, bearing_sd, :math.log(share), expected.doubt) < @unlike do
       %{
-        mark: mark,
+        mark: expected.mark,
         blob: blob,
         distance: expected.distance,
         expected: expected.bearing,
         half: half,
         slack: slack,
         width: abs(:math.log(share)),
-        cost: cost,
+        cost: cost(off, bearing_sd, :math.log(share), expected.doubt),
         sure?: expected.doubt < @doubt
       }
     end

@@ -58,12 +58,13 @@ defmodule Robot.Localiser.Silhouettes do
     turn = Belief.turn_along(belief, axis)
     count = min(ceil(@reach * worst / @step), @steps)
     camera = Columns.camera(percept)
+    bodies = for %{at: {x, y}, radius: radius, sd: {sd, _, _}} <- robots, do: {x, y, radius, sd}
 
     tried =
       for k <- -count..count do
         way = k * @reach * worst / count
         pose = belief.pose |> moved(axis, turn, way) |> Pose.compose(back)
-        {filled, unknown} = filled(robots, pose, camera)
+        {filled, unknown} = filled(bodies, pose, camera)
         wrong = filled |> Columns.difference(seen) |> Columns.without(unknown) |> Columns.count()
         clear = seen |> Columns.without(unknown) |> Columns.count()
         {way * way / (worst * worst) + @wrong * wrong, way, wrong, clear}
@@ -97,18 +98,34 @@ defmodule Robot.Localiser.Silhouettes do
   end
 
   # The columns that robots would fill, and those that a robot at an unknown place may fill.
-  defp filled(robots, pose, camera) do
-    Enum.reduce(robots, {0, 0}, fn %{sd: {sd, _, _}} = mark, {known, unknown} ->
-      distance = Pose.distance(pose, mark.at)
-      half = if distance > mark.radius, do: :math.asin(mark.radius / distance), else: @quarter
-      bearing = Pose.bearing(pose, mark.at)
+  defp filled(bodies, pose, {pan, _focal} = camera) do
+    axis = {:math.cos(pose.heading + pan), :math.sin(pose.heading + pan)}
+    bodies |> Enum.reject(&behind?(&1, pose, axis)) |> filled(pose, camera, 0, 0)
+  end
 
-      if sd > @strange do
-        wide = half + @wide * sd / max(distance, 0.1)
-        {known, Columns.union(unknown, Columns.span(bearing, wide, camera))}
-      else
-        {Columns.union(known, Columns.span(bearing, half, camera)), unknown}
-      end
-    end)
+  # Whether a known robot that is not very near is behind the camera, and so fills no column; half
+  # of them are, and need no angles.
+  defp behind?({_x, _y, _radius, sd}, _pose, _axis) when sd > @strange, do: false
+
+  defp behind?({x, y, radius, _sd}, pose, {ax, ay}) do
+    {dx, dy} = {x - pose.x, y - pose.y}
+    dx * ax + dy * ay < 0.0 and dx * dx + dy * dy > 16 * radius * radius
+  end
+
+  defp filled([], _pose, _camera, known, unknown), do: {known, unknown}
+
+  defp filled([{x, y, radius, sd} | bodies], pose, camera, known, unknown) do
+    distance = Pose.distance(pose, {x, y})
+    half = if distance > radius, do: :math.asin(radius / distance), else: @quarter
+    bearing = Pose.bearing(pose, {x, y})
+
+    if sd > @strange do
+      wide = half + @wide * sd / if(distance > 0.1, do: distance, else: 0.1)
+      span = Columns.span(bearing, wide, camera)
+      filled(bodies, pose, camera, known, Columns.union(unknown, span))
+    else
+      span = Columns.span(bearing, half, camera)
+      filled(bodies, pose, camera, Columns.union(known, span), unknown)
+    end
   end
 end

@@ -8,6 +8,8 @@ defmodule Sim.World.Blobs do
   alias Vision.Blob
 
   @least_area 20
+  @robot_luma Palette.least_luma(:robot)
+  @landmark_luma Palette.least_luma(:landmark)
 
   @doc """
   The blobs of these poles in a camera's picture, in the order of the blob finder. `noise` is
@@ -23,7 +25,6 @@ defmodule Sim.World.Blobs do
   def see(map, %CameraFrustum{} = sight, poles, noise) do
     map
     |> Compute.look(sight, poles)
-    |> Enum.filter(fn {_, kind, _, _, luma} -> luma >= Palette.least_luma(kind) end)
     |> regions()
     |> Enum.with_index()
     |> Enum.map(fn {region, k} -> blob(region, sight, noise, k) end)
@@ -36,6 +37,12 @@ defmodule Sim.World.Blobs do
   defp regions(pieces) do
     {_column, next, open, closed} =
       Enum.reduce(pieces, {nil, [], [], []}, fn
+        # Too dark to be found.
+        {_column, kind, _, _, luma}, state
+        when (kind == :robot and luma < @robot_luma) or
+               (kind == :landmark and luma < @landmark_luma) ->
+          state
+
         {column, _, _, _, _} = piece, {column, next, open, closed} ->
           {next, open} = join(piece, next, open)
           {column, next, open, closed}
@@ -53,7 +60,7 @@ defmodule Sim.World.Blobs do
   defp join({column, kind, top, bottom, _luma}, next, open) do
     {beside, open} = touching(open, kind, top, bottom)
     {above, next} = touching(next, kind, top - 1, bottom + 1)
-    rows = [{top, bottom} | Enum.flat_map(above, &elem(&1, 1))]
+    rows = [{top, bottom} | if(above == [], do: [], else: Enum.flat_map(above, &elem(&1, 1)))]
     {[{kind, rows, sums(beside, sums(above, sums(column, top, bottom)))} | next], open}
   end
 
@@ -86,9 +93,13 @@ defmodule Sim.World.Blobs do
 
   defp sums([], sums), do: sums
 
+  # Up to OTP 25, `max` and `min` are calls; comparisons are not.
   defp sums([{_, _, {a, l, r, t, b, x, y}} | rest], {area, left, right, top, bottom, sx, sy}) do
-    box = {area + a, min(left, l), max(right, r), min(top, t), max(bottom, b), sx + x, sy + y}
-    sums(rest, box)
+    left = if l < left, do: l, else: left
+    right = if r > right, do: r, else: right
+    top = if t < top, do: t, else: top
+    bottom = if b > bottom, do: b, else: bottom
+    sums(rest, {area + a, left, right, top, bottom, sx + x, sy + y})
   end
 
   defp blob({kind, {exact, left, right, top, bottom, columns, rows}}, sight, noise, k) do

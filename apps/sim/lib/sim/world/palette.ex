@@ -19,6 +19,8 @@ defmodule Sim.World.Palette do
   # A pole of 0.3 x 1 m at 1 m would fill 0.3 of the picture, but its dark edges are lost (R43).
   @landmark_constant 0.25
   @robot_constant 0.2
+  @landmark_luma 170
+  @robot_luma 30
 
   @doc """
   The colour of a kind of thing.
@@ -32,7 +34,7 @@ defmodule Sim.World.Palette do
       name: "YellowLandmark",
       paint: {205, 75, 137},
       rgb: {218, 216, 111},
-      thresholds: {{170, 240}, {60, 90}, {130, 145}},
+      thresholds: {{@landmark_luma, 240}, {60, 90}, {130, 145}},
       constant: @landmark_constant
     }
   end
@@ -42,7 +44,7 @@ defmodule Sim.World.Palette do
       name: "RedRobot",
       paint: {100, 100, 210},
       rgb: {215, 51, 50},
-      thresholds: {{30, 160}, {80, 122}, {165, 240}},
+      thresholds: {{@robot_luma, 160}, {80, 122}, {165, 240}},
       constant: @robot_constant
     }
   end
@@ -66,7 +68,8 @@ defmodule Sim.World.Palette do
 
   @doc "The lowest brightness at which a kind is still found."
   @spec least_luma(kind()) :: byte()
-  def least_luma(kind), do: of(kind).thresholds |> elem(0) |> elem(0)
+  def least_luma(:landmark), do: @landmark_luma
+  def least_luma(:robot), do: @robot_luma
 
   @doc """
   All colours, for the blob finder.
