@@ -57,7 +57,13 @@ defmodule System.ReleaseTest do
 
   # What the process does instead, and the end of its log.
   defp stopped({said, _status}, pid, folder) do
-    {log, _} = System.cmd("sh", ["-c", "head -5 /proc/#{pid}/status; tail -n 20 #{folder}/log/*"])
+    shell = """
+    kill -USR1 #{pid}; sleep 5
+    grep -aE '^=proc:|^Name:|^Spawned as|^State:|^Program counter|^Message queue length: [1-9]|^=init|^=port|^Current call' #{folder}/dump | head -1500
+    tail -n 20 #{folder}/log/*
+    """
+
+    {log, _} = System.cmd("sh", ["-c", shell])
     flunk(said <> log)
   end
 
@@ -107,7 +113,9 @@ defmodule System.ReleaseTest do
       {"ROBOT", "mag1"},
       {"CONVOY_ROBOT_FILE", file},
       {"CONVOY_SECRET_FILE", Path.join(folder, "secret")},
-      {"RELEASE_TMP", folder}
+      {"RELEASE_TMP", folder},
+      {"ERL_CRASH_DUMP_SECONDS", "-1"},
+      {"ERL_CRASH_DUMP", Path.join(folder, "dump")}
     ]
 
     ask = fn arguments -> fn -> robot(arguments, environment) end end

@@ -14,7 +14,7 @@ defmodule Robot.FleetTest do
       drive = {Hal.FakeDrive, test: self(), device: id}
       mission = {Acts.Mission, effects: [goal]}
       assert {:ok, _} = Fleet.start_robot(fleet, config(id, drive: drive, mission: mission))
-      assert :ok = Pilot.start(id)
+      assert :ok = id |> online() |> Pilot.start()
     end
 
     assert ids -- Names.robots() == []

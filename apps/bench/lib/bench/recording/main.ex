@@ -88,19 +88,11 @@ defmodule Bench.Recording.Main do
 
   defp table do
     [
-      {"robots", "N,N", &numbers/1, "how many robots (6,12)"},
+      {"robots", "N,N", &Parse.wholes(&1, 1..100), "how many robots (6,12)"},
       {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds (1-5)"},
       {"rounds", "N", &Parse.whole(&1, 1..1_000), "how often each is measured (7)"},
       {"help", nil, nil, "this text"}
     ]
-  end
-
-  defp numbers(text) do
-    results = for number <- String.split(text, ","), do: Parse.whole(number, 1..100)
-
-    if Enum.all?(results, &match?({:ok, _number}, &1)),
-      do: {:ok, for({:ok, number} <- results, do: number)},
-      else: {:error, "whole numbers from 1 to 100, with commas between"}
   end
 
   defp help, do: IO.puts("  mix bench recording [options]\n\n#{Cli.Arguments.help(table())}")

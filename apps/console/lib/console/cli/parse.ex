@@ -34,6 +34,23 @@ defmodule Console.Cli.Parse do
   end
 
   @doc """
+  Whole numbers within bounds, with commas between.
+
+      iex> Console.Cli.Parse.wholes("6,20", 1..100)
+      {:ok, [6, 20]}
+      iex> Console.Cli.Parse.wholes("6,200", 1..100)
+      {:error, "whole numbers from 1 to 100, with commas between"}
+  """
+  @spec wholes(String.t(), Range.t()) :: {:ok, [integer(), ...]} | {:error, String.t()}
+  def wholes(text, bounds) do
+    results = for number <- String.split(text, ","), do: whole(number, bounds)
+
+    if Enum.all?(results, &match?({:ok, _number}, &1)),
+      do: {:ok, for({:ok, number} <- results, do: number)},
+      else: {:error, "whole numbers from #{bounds.first} to #{bounds.last}, with commas between"}
+  end
+
+  @doc """
   A number between two bounds.
 
       iex> Console.Cli.Parse.number("-0.5", -1, 1)

@@ -1,0 +1,108 @@
+defmodule Bench.Scale do
+  @moduledoc """
+  Measures what a robot costs in fleets of different sizes: `mix bench scale`. A run in lockstep, from the search on and in a
+  process of its own, is measured in what all robots together took, divided by their number and that of the steps (100 ms).
+  """
+  alias Sim.Trial
+
+  @typedoc """
+  Of one fleet: the reductions of the VM and the processor time for a robot in a step, the speed against real time, and
+  the memory of the run at its end.
+  """
+  @type measured :: %{
+          robots: pos_integer(),
+          reductions: float(),
+          cpu_us: float(),
+          speed: float(),
+          bytes: pos_integer()
+        }
+
+  @doc "Measures one fleet for so many simulated seconds; the error is one line of `Sim.Trial.new/1`."
+  @spec measure(pos_integer(), :painted | :direct, pos_integer()) ::
+          {:ok, measured()} | {:error, line :: String.t()}
+  def measure(robots, blobs, seconds) do
+    options = %{robots: Console.Fleet.of(robots), seed: 1, blobs: blobs, duration_s: 10_000}
+
+    with {:ok, setup} <- Trial.setup(options) do
+      {:ok, fn -> run(setup, 10 * seconds) end |> Task.async() |> Task.await(:infinity)}
+    end
+  end
+
+  defp run(setup, steps) do
+    Trial.Memory.prepare()
+    robots = length(setup.options.robots)
+    before = {work(), cpu_ms(), System.monotonic_time(:microsecond)}
+    trial = Enum.reduce(1..steps, Trial.begin(setup), fn _step, trial -> Trial.step(trial) end)
+    measured = figures(before, robots, steps)
+    # Alive until here.
+    _living = Trial.living(trial)
+    measured
+  end
+
+  defp figures({work, cpu_ms, since_us}, robots, steps) do
+    {:memory, bytes} = Process.info(self(), :memory)
+    wall_us = System.monotonic_time(:microsecond) - since_us
+
+    %{
+      robots: robots,
+      reductions: (work() - work) / (robots * steps),
+      cpu_us: 1_000 * (cpu_ms() - cpu_ms) / (robots * steps),
+      speed: 100_000 * steps / wall_us,
+      bytes: bytes
+    }
+  end
+
+  defp work do
+    {:reductions, count} = Process.info(self(), :reductions)
+    count
+  end
+
+  defp cpu_ms do
+    {ms, _since_last} = :erlang.statistics(:runtime)
+    ms
+  end
+
+  @heads [
+    "robots",
+    "times real time",
+    "processor time a robot-step (us)",
+    "against the smallest fleet",
+    "reductions a robot-step",
+    "against the smallest fleet",
+    "memory (MB)"
+  ]
+
+  @doc "The table in Markdown, and the processor time of a robot-step as bars; the smallest fleet first."
+  @spec draw([measured(), ...]) :: String.t()
+  def draw([least | _] = all) do
+    rows =
+      for one <- all do
+        [
+          one.robots,
+          decimals(one.speed, 2),
+          decimals(one.cpu_us, 0),
+          decimals(one.cpu_us / max(least.cpu_us, 1.0), 2),
+          decimals(one.reductions, 0),
+          decimals(one.reductions / least.reductions, 2),
+          decimals(one.bytes / 1.0e6, 0)
+        ]
+      end
+
+    table =
+      Enum.map_join([@heads, Enum.map(@heads, fn _ -> "---" end) | rows], fn row ->
+        "| " <> Enum.join(row, " | ") <> " |\n"
+      end)
+
+    table <> "\n" <> Enum.map_join(all, &bar(&1, Enum.max(Enum.map(all, fn a -> a.cpu_us end))))
+  end
+
+  @bar 50
+
+  defp bar(one, most) do
+    length = max(round(@bar * one.cpu_us / max(most, 1.0)), 1)
+
+    "#{String.pad_leading("#{one.robots}", 5)} robots #{String.duplicate("█", length)} #{decimals(one.cpu_us, 0)} us\n"
+  end
+
+  defp decimals(number, count), do: Console.Cli.Format.decimals(number, count)
+end

@@ -1,0 +1,55 @@
+defmodule Bench.Scale.Main do
+  @moduledoc "The command `mix bench scale`: reads its options, measures, prints table and bars."
+  alias Bench.{Load, Scale}
+  alias Console.Cli
+  alias Console.Cli.{Output, Parse, Progress}
+
+  @doc "Runs the command; each error is one line."
+  @spec run([String.t()]) :: :ok | {:error, [String.t()]}
+  def run(arguments) do
+    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
+      given = Map.new(pairs)
+      if given["help"], do: help(), else: measure(given)
+    end
+  end
+
+  defp measure(given) do
+    output = Output.to(:stderr)
+    fleets = given |> Map.get("robots", [6, 20, 50]) |> Enum.sort()
+    blobs = Map.get(given, "blobs", :painted)
+    seconds = Map.get(given, "seconds", 20)
+    before = Load.now()
+
+    results =
+      for {robots, n} <- Enum.with_index(fleets) do
+        line = Progress.line(n, length(fleets), "#{robots} robots", (output.columns || 80) - 1)
+        Output.progress(output, line)
+        Scale.measure(robots, blobs, seconds)
+      end
+
+    Output.finish(output)
+
+    with [] <- for({:error, line} <- results, do: line) do
+      IO.write(Scale.draw(for {:ok, measured} <- results, do: measured))
+
+      IO.puts(
+        "\nThe first #{seconds} s of seed 1 in the hall, blobs #{blobs}, in one process. Load of the machine (1 min): " <>
+          "#{before || "?"} before, #{Load.now() || "?"} after."
+      )
+    else
+      lines -> {:error, lines}
+    end
+  end
+
+  defp table do
+    [
+      {"robots", "N,N", &Parse.wholes(&1, 1..100), "how many robots (6,20,50)"},
+      {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
+       "pictures that are painted, or blobs by geometry: painted, direct (painted)"},
+      {"seconds", "S", &Parse.whole(&1, 1..10_000), "how long, in simulated seconds (20)"},
+      {"help", nil, nil, "this text"}
+    ]
+  end
+
+  defp help, do: IO.puts("  mix bench scale [options]\n\n#{Cli.Arguments.help(table())}")
+end

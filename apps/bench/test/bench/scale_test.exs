@@ -1,0 +1,39 @@
+defmodule Bench.ScaleTest do
+  use ExUnit.Case, async: true
+  alias Bench.Scale
+
+  # What a robot costs in a step, in reductions, on the release of OTP that they were counted with: they are the same on
+  # each machine. Whoever changes them by more than a tenth says why, here and in the commit.
+  @otp "25"
+  @reductions %{6 => 10_140, 20 => 23_970, 50 => 63_560}
+  @seconds 12
+
+  @tag :long
+  @tag timeout: 600_000
+  @tag skip: unless(System.otp_release() == @otp, do: "they were counted with OTP #{@otp}")
+  test "a robot costs no more than it did, in fleets of 6, 20 and 50" do
+    for {robots, before} <- @reductions do
+      {:ok, %{reductions: now}} = Scale.measure(robots, :direct, @seconds)
+
+      assert_in_delta now,
+                      before,
+                      before / 10,
+                      "#{robots} robots: #{round(now)} reductions a robot-step, #{before} before"
+    end
+  end
+
+  test "the table compares with the smallest fleet, and bars show it" do
+    one = fn robots, cpu_us ->
+      %{robots: robots, reductions: 10.0 * cpu_us, cpu_us: cpu_us, speed: 2.0, bytes: 4_000_000}
+    end
+
+    text = Scale.draw([one.(6, 100.0), one.(50, 250.0)])
+    assert text =~ "| 50 | 2.00 | 250 | 2.50 | 2500 | 2.50 | 4 |"
+    assert text =~ "    6 robots #{String.duplicate("█", 20)} 100 us\n"
+  end
+
+  test "a measurement is of all robots and steps" do
+    assert {:ok, %{robots: 2, reductions: work, speed: speed}} = Scale.measure(2, :direct, 1)
+    assert work > 1_000 and speed > 0
+  end
+end
