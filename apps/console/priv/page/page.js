@@ -78,8 +78,17 @@ function show(next) {
   fleet.className = scene.notice ? "lost" : "";
   by("pace").hidden = scene.pace === null;
   scene.robots.forEach(row);
+  apart();
   one();
   stages();
+}
+
+// Who is not on the map, because nobody knows where it is to those that are.
+function apart() {
+  const others = scene.robots.filter((r) => r.x !== null && r.frame !== floor.frame).map((r) => r.id);
+  by("apart").hidden = others.length === 0;
+  const text = `Not on this map, because their places on it are not known: ${others.join(", ")}. Choose one to see its own.`;
+  if (by("apart").textContent !== text) by("apart").textContent = text;
 }
 
 // A row for each robot, made once, so that it keeps the focus.
@@ -102,7 +111,7 @@ function row(robot, index) {
   tr.children[1].textContent = (robot.alive ? robot.state : away(robot)) + (robot.alive && robot.leader ? " ★" : "");
   tr.children[2].textContent = robot.alive ? metres(robot.off) : "";
   tr.children[3].textContent = robot.alive && robot.unsure !== null ? `±${metres(robot.unsure)}` : "";
-  tr.className = robot.alive ? "" : "dead";
+  tr.className = [!robot.alive && "dead", robot.frame !== floor.frame && "apart"].filter(Boolean).join(" ");
   tr.setAttribute("aria-selected", robot.id === chosen);
 }
 
@@ -126,7 +135,8 @@ function one() {
   by("chosen").textContent = robot.id;
   const where = robot.x === null ? "pose unknown"
     : `at ${robot.x.toFixed(2)}, ${robot.y.toFixed(2)}, ${Math.round((robot.a * 180) / Math.PI)}°`;
-  by("doing").textContent = robot.alive ? `${robot.state}, ${where}` : `${away(robot)}, last ${where}`;
+  by("doing").textContent = (robot.alive ? `${robot.state}, ${where}` : `${away(robot)}, last ${where}`)
+    + (robot.apart === null ? "" : `, in a frame of its own: ${robot.apart}`);
 }
 
 // Without the minus of -0.00.

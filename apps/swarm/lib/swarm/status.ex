@@ -6,8 +6,9 @@ defmodule Swarm.Status do
 
   The number after the pose is its uncertainty: in 95 of 100 cases the robot is no farther from it
   (`uncertainty`, metres; `Robot.Percept`). A follower's pose is in its leader's frame, any other
-  robot's in its own. A robot that stands in its slot by its own estimate, but is not certain
-  enough to say so, is `in its slot, but NOT SURE of its place (±0.62 m)` (`unsure`).
+  robot's in that of its start pose (`frame`; `Swarm.Status.Frame`). A robot that stands in its slot by its own estimate,
+  but is not certain enough to say so, is `in its slot, but NOT SURE of its place (±0.62 m)` (`unsure`). `epoch` counts the
+  elections that its mission knows of.
 
   If the wheels may not turn, it says `DISARMED`, with what is missing, or `LINE LOST` until a
   person acknowledges (`Hal.Device.Arming`; `arming` and `why`). For a device that is offline it
@@ -42,6 +43,7 @@ defmodule Swarm.Status do
   alias Robot.Safety.LivenessMonitor
   alias Swarm.Message.Receiver
   alias Swarm.Membership.Peers
+  alias Swarm.Status.Frame
 
   @recently_ms 60_000
 
@@ -54,6 +56,7 @@ defmodule Swarm.Status do
                 by: nil,
                 pose: nil,
                 uncertainty: nil,
+                frame: nil,
                 speed: 0.0,
                 limits: [],
                 estop: false,
@@ -61,6 +64,7 @@ defmodule Swarm.Status do
                 why: nil,
                 hung: nil,
                 leader: nil,
+                epoch: nil,
                 unsure: false,
                 blocked_by: nil,
                 power: nil,
@@ -84,6 +88,7 @@ defmodule Swarm.Status do
           by: atom() | String.t(),
           pose: Pose.t() | nil,
           uncertainty: float() | nil,
+          frame: Frame.t() | :lost | nil,
           speed: float() | nil,
           limits: [atom() | String.t()],
           estop: boolean(),
@@ -91,6 +96,7 @@ defmodule Swarm.Status do
           why: String.t() | nil,
           hung: {:silent | :hung, behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
           leader: atom() | String.t() | nil,
+          epoch: non_neg_integer() | nil,
           unsure: boolean(),
           blocked_by: String.t() | nil,
           power: float() | nil,
@@ -122,6 +128,7 @@ defmodule Swarm.Status do
       fault: entries |> value(:doing) |> field(:fault),
       pose: value(entries, :pose),
       uncertainty: entries |> value(:uncertainty) |> field(:radius),
+      frame: Frame.of(config, value(entries, :uncertainty)),
       speed: entries |> value(:odometry) |> linear(),
       limits: field(driving, :limits) || [],
       estop: Board.latched?(board),
@@ -129,6 +136,7 @@ defmodule Swarm.Status do
       why: entries |> value(:arming) |> field(:why),
       hung: hung(entries),
       leader: mission |> field(:claim) |> field(:leader),
+      epoch: mission |> field(:claim) |> field(:epoch),
       unsure: mission |> field(:claim) |> field(:unsure) == true,
       blocked_by: mission |> field(:claim) |> field(:blocked_by),
       power: value(entries, :power),
