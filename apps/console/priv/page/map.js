@@ -159,6 +159,7 @@ export class FloorView {
     if (this.trails) for (const [k, r] of placed) this.trail(c, r, colour(k));
     for (const [k, r] of placed) this.slot(c, r, colour(k));
     for (const [k, r] of placed) this.leash(c, r, colour(k));
+    if (this.about && placed.some(([, r]) => r.id === this.about.id)) this.way(c, ink("--accent"));
     if (this.sonar && this.about) this.cones(c, this.robot(this.about.id), ink);
     for (const [k, r] of placed) this.body(c, r, colour(k), ink);
     this.landmark(c, this.dragged?.landmark ?? scene.landmark, ink);
@@ -210,6 +211,22 @@ export class FloorView {
       c.fill();
     }
     c.globalAlpha = 1;
+  }
+
+  // The way that the chosen robot takes now, from where it believes to be.
+  way(c, ink) {
+    const { pose, way } = this.about;
+    if (!pose || way.length === 0) return;
+    c.strokeStyle = c.fillStyle = ink;
+    c.lineWidth = 2;
+    c.beginPath();
+    for (const place of [pose, ...way]) c.lineTo(...this.toPixel(...place));
+    c.stroke();
+    for (const place of way) {
+      c.beginPath();
+      c.arc(...this.toPixel(...place), 3.5, 0, 7);
+      c.fill();
+    }
   }
 
   slot(c, r, ink) {

@@ -2,11 +2,12 @@ defmodule Console.PageTest do
   @moduledoc "The page as browsers and strangers see it; with a real browser, where there is one."
   use ExUnit.Case, async: true
   alias Console.{Browser, Live, Options, Page}
-  alias Console.Page.{Access, Client, State}
+  alias Console.Page.{Access, Changes, Client, State}
   @moduletag :realtime
   @moduletag :capture_log
 
   doctest Access
+  doctest Changes
   doctest Client
   doctest State
 
@@ -203,6 +204,47 @@ defmodule Console.PageTest do
       assert Browser.errors(browser) == []
       Browser.close(browser)
     end
+
+    test "of the chosen robot it shows all who wished, its way and what it did; and who leads" do
+      for {line, module, start} <- [
+            {"--robots 3 --seed 4 --blobs direct", Live.Trial, &slow/1},
+            {"--robots 3 --seed 4", Live.Fleet, &Live.Fleet.start_link(Options.trial(&1))}
+          ] do
+        options = options(line)
+        {:ok, live} = start.(options)
+        {_page, url} = page(options, module, live)
+        browser = open(url)
+
+        Browser.await(
+          browser,
+          "return / leads epoch 1; \\w+, \\w+ follow\\./.test(document.getElementById('leads').textContent)"
+        )
+
+        follower = Enum.find(module.scene(live).robots, &(&1.state == :follow))
+        choose = "document.querySelector('[data-id=#{follower.id}] button').click()"
+        Browser.run(browser, choose)
+        # A follower on its way: it would also rest, if it had nothing to do.
+        Browser.await(
+          browser,
+          "return /wishesfollow \\d\\.\\d\\d, rest \\d\\.\\d\\dway\\d/.test(document.getElementById('about').textContent)"
+        )
+
+        Browser.await(browser, "return window.floor.about.way.length > 0")
+
+        Browser.await(
+          browser,
+          "return /\\d s  agree.*\\d s  follow/.test(document.getElementById('events').textContent)"
+        )
+
+        assert Browser.errors(browser) == []
+        Browser.close(browser)
+        module.stop(live)
+      end
+    end
+
+    # In lockstep, in real time.
+    defp slow(options),
+      do: Live.Trial.start_link(Sim.Trial, Options.trial(options), Live.Pace.new(1.0))
 
     test "one click stops all; a page that is loaded again, or whose server was away, goes on" do
       {options, live} = trial("--robots 2 --seed 2 --blobs direct")

@@ -10,6 +10,10 @@ defmodule Swarm.Status do
   but is not certain enough to say so, is `in its slot, but NOT SURE of its place (±0.62 m)` (`unsure`). `epoch` counts the
   elections that its mission knows of.
 
+  `weights` are all behaviours that wished for something, with the weights by which they were compared, the chosen one
+  (`by`) first; `way` are the corners of the way that it takes round what stands about, the goal last, in the frame of its
+  pose. A row has neither.
+
   If the wheels may not turn, it says `DISARMED`, with what is missing, or `LINE LOST` until a
   person acknowledges (`Hal.Device.Arming`; `arming` and `why`). For a device that is offline it
   says why: `drive offline (/dev/ttyR0: no such device)` (`offline`: texts by device). A robot
@@ -54,6 +58,8 @@ defmodule Swarm.Status do
                 node: nil,
                 state: :idle,
                 by: nil,
+                weights: [],
+                way: [],
                 pose: nil,
                 uncertainty: nil,
                 frame: nil,
@@ -86,6 +92,8 @@ defmodule Swarm.Status do
           node: node() | String.t() | nil,
           state: atom() | String.t(),
           by: atom() | String.t(),
+          weights: [{by :: atom(), weight :: float()}],
+          way: [Pose.point()],
           pose: Pose.t() | nil,
           uncertainty: float() | nil,
           frame: Frame.t() | :lost | nil,
@@ -125,6 +133,8 @@ defmodule Swarm.Status do
       node: node(),
       state: state(mission),
       by: entries |> value(:doing) |> field(:by),
+      weights: entries |> value(:doing) |> field(:weights) || [],
+      way: entries |> value(:doing) |> field(:way) || [],
       fault: entries |> value(:doing) |> field(:fault),
       pose: value(entries, :pose),
       uncertainty: entries |> value(:uncertainty) |> field(:radius),
