@@ -28,6 +28,7 @@ export class FloorView {
     canvas.addEventListener("pointercancel", () => (this.dragged = null));
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     canvas.addEventListener("keydown", (e) => this.key(e));
+    for (const name of ["focus", "blur"]) canvas.addEventListener(name, () => this.draw());
     new ResizeObserver(() => this.draw()).observe(canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
@@ -163,6 +164,20 @@ export class FloorView {
     if (this.sonar && this.about) this.cones(c, this.robot(this.about.id), ink);
     for (const [k, r] of placed) this.body(c, r, colour(k), ink);
     this.landmark(c, this.dragged?.landmark ?? scene.landmark, ink);
+    if (this.canvas.matches(":focus-visible")) this.cross(c, ink("--text"));
+  }
+
+  // Where the keyboard points: the middle of the view.
+  cross(c, ink) {
+    const [x, y] = [this.size.w / 2, this.size.h / 2];
+    c.strokeStyle = ink;
+    c.lineWidth = 1.5;
+    c.beginPath();
+    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+      c.moveTo(x + 4 * dx, y + 4 * dy);
+      c.lineTo(x + 14 * dx, y + 14 * dy);
+    }
+    c.stroke();
   }
 
   // A line for each metre, and their length once, where they are not too close.
@@ -359,7 +374,9 @@ export class FloorView {
       this.mine = true;
       this.view.x += way[0] * step;
       this.view.y += way[1] * step;
-    } else if (e.key === "+") this.zoom(1.3);
+    } else if (e.key === "Enter") this.on.send(this.view.x, this.view.y);
+    else if (e.key === "l" && this.map.offers.includes("landmark")) this.on.landmark(this.view.x, this.view.y);
+    else if (e.key === "+") this.zoom(1.3);
     else if (e.key === "-") this.zoom(0.77);
     else if (e.key === "0") this.zoom(0);
     else return;

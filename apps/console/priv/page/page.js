@@ -9,7 +9,7 @@ let heard, socket, chosen, scene, told = 0, tries = 0, keys = new Set(), driving
 // Reachable for tests and the curious.
 const floor = window.floor = new FloorView(by("map"), {
   choose,
-  send: (x, y) => chosen && say(`goto ${chosen} ${x.toFixed(2)},${y.toFixed(2)}`),
+  send: (x, y) => (chosen ? say(`goto ${chosen} ${x.toFixed(2)},${y.toFixed(2)}`) : answer({ ok: false, text: "choose a robot first" })),
   landmark: (x, y) => say(`landmark ${x.toFixed(2)},${y.toFixed(2)}`),
 });
 
@@ -262,8 +262,18 @@ function word() {
   if (keys.size > 0) say(`drive ${chosen} ${ahead} ${turn}`);
 }
 
+// The stop goes first; who drove does not drive on, and says nothing after it.
+function estop() {
+  say("estop");
+  drive(false);
+}
+
 addEventListener("keydown", (e) => {
   const key = e.key.length === 1 ? e.key.toLowerCase() : e.key;
+  if (e.key === "F8") {
+    estop();
+    e.preventDefault();
+  }
   if (e.key === "Escape") drive(false);
   if (!driving || !WAYS[key] || /INPUT|SELECT/.test(e.target.tagName)) return;
   keys.add(key);
@@ -272,7 +282,7 @@ addEventListener("keydown", (e) => {
 addEventListener("keyup", (e) => keys.delete(e.key.length === 1 ? e.key.toLowerCase() : e.key));
 addEventListener("blur", () => keys.clear());
 
-by("estop").onclick = () => say("estop");
+by("estop").onclick = estop;
 by("reset").onclick = () =>
   confirm("Reset the emergency stop? Robots may move again when they are started.") && say("reset");
 by("form").onclick = () => say(`formation ${by("shape").value} ${by("spacing").value}`);
