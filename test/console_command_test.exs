@@ -66,7 +66,33 @@ defmodule ConsoleCommandTest do
     Port.close(console)
   end
 
+  test "two on one machine have a name and a page each", context do
+    # By the ports of their names, and any for datagrams.
+    pages =
+      for _two <- 1..2 do
+        console = start(["bin/console"], context.environment)
+        [_all, url] = told(console, ~r"Page:  (http://\S+)\n")
+        {console, url}
+      end
+
+    assert [{_one, url}, {_two, other}] = pages
+    assert url != other
+    for {console, _url} <- pages, do: Port.close(console)
+  end
+
   test "what is wrong is one line", context do
+    {:ok, held} = :gen_tcp.listen(0, reuseaddr: true)
+    {:ok, port} = :inet.port(held)
+
+    for program <- [["bin/console"], ~w(bin/node mag1)] do
+      environment = [{"CONVOY_DIST_PORT", "#{port}"} | context.environment]
+      options = [cd: @root, env: environment, stderr_to_stdout: true]
+      [name | arguments] = program
+      assert {said, 1} = System.cmd(Path.join(@root, name), arguments, options)
+      assert [line] = String.split(said, "\n", trim: true)
+      assert line =~ ~r/^bin\/node: TCP port #{port} of (base|mag1) is in use\. If /
+    end
+
     for {arguments, line} <- [
           {~w(--connect mag1),
            ~s(--connect cannot be "mag1": a node such as mag1@convoy is allowed)},
@@ -80,13 +106,17 @@ defmodule ConsoleCommandTest do
     end
   end
 
-  # It ends with its input.
-  defp program([name | arguments], context, udp) do
+  defp program(words, context, udp) do
     environment = [
       {"CONVOY_UDP_PORT", "#{udp}"},
       {"CONVOY_DIST_PORT", "#{tcp_port()}"} | context.environment
     ]
 
+    start(words, environment)
+  end
+
+  # It ends with its input.
+  defp start([name | arguments], environment) do
     Port.open({:spawn_executable, "/bin/sh"}, [
       :binary,
       :stderr_to_stdout,

@@ -19,6 +19,7 @@ export class FloorView {
     this.follow = false;
     this.trails = true;
     this.paths = new Map();
+    this.frame = 0; // that of the robots that are drawn: where others are to these is not known
     this.view = null; // {x, y, scale}: the middle of the picture, pixels a metre
     this.dragged = null;
     canvas.addEventListener("pointerdown", (e) => this.down(e));
@@ -27,6 +28,7 @@ export class FloorView {
     canvas.addEventListener("pointercancel", () => (this.dragged = null));
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     canvas.addEventListener("keydown", (e) => this.key(e));
+    for (const name of ["focus", "blur"]) canvas.addEventListener(name, () => this.draw());
     new ResizeObserver(() => this.draw()).observe(canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
@@ -43,9 +45,13 @@ export class FloorView {
     const back = this.scene && scene.at_s < this.scene.at_s;
     if (back) this.paths.clear();
     this.scene = scene;
+    const frame = this.robot(this.chosen)?.frame ?? 0;
+    if (frame !== this.frame && !this.map?.width) [this.floor, this.view] = [null, null];
+    this.frame = frame;
     for (const r of scene.robots) {
       if (r.x === null) continue;
-      const path = this.paths.get(r.id) ?? [];
+      let path = this.paths.get(r.id) ?? [];
+      if (path.frame !== r.frame) path = Object.assign([], { frame: r.frame });
       const last = path.at(-1);
       const way = last ? Math.hypot(last[0] - r.x, last[1] - r.y) : JUMP;
       // In real time what has jumped was not driven: its pose is told in another frame now.
@@ -61,8 +67,7 @@ export class FloorView {
   grow() {
     const were = this.floor;
     let [left, bottom, right, top] = were ?? [Infinity, Infinity, -Infinity, -Infinity];
-    for (const { x, y } of this.scene.robots) {
-      if (x === null) continue;
+    for (const { x, y } of this.here()) {
       [left, right] = [Math.min(left, Math.floor(x - AROUND)), Math.max(right, Math.ceil(x + AROUND))];
       [bottom, top] = [Math.min(bottom, Math.floor(y - AROUND)), Math.max(top, Math.ceil(y + AROUND))];
     }
@@ -99,6 +104,11 @@ export class FloorView {
 
   robot(id) {
     return this.scene?.robots.find((r) => r.id === id);
+  }
+
+  // Those whose places on this floor are known.
+  here() {
+    return this.scene.robots.filter((r) => r.x !== null && r.frame === this.frame);
   }
 
   toPixel(x, y) {
@@ -146,13 +156,28 @@ export class FloorView {
       c.fillRect(left + from * cell, bottom - (row + 1) * cell, count * cell + 0.5, cell + 0.5);
     if (!scene) return;
 
-    const placed = [...scene.robots.entries()].filter(([, r]) => r.x !== null);
+    const placed = this.here().map((r) => [scene.robots.indexOf(r), r]);
     if (this.trails) for (const [k, r] of placed) this.trail(c, r, colour(k));
     for (const [k, r] of placed) this.slot(c, r, colour(k));
     for (const [k, r] of placed) this.leash(c, r, colour(k));
+    if (this.about && placed.some(([, r]) => r.id === this.about.id)) this.way(c, ink("--accent"));
     if (this.sonar && this.about) this.cones(c, this.robot(this.about.id), ink);
     for (const [k, r] of placed) this.body(c, r, colour(k), ink);
     this.landmark(c, this.dragged?.landmark ?? scene.landmark, ink);
+    if (this.canvas.matches(":focus-visible")) this.cross(c, ink("--text"));
+  }
+
+  // Where the keyboard points: the middle of the view.
+  cross(c, ink) {
+    const [x, y] = [this.size.w / 2, this.size.h / 2];
+    c.strokeStyle = ink;
+    c.lineWidth = 1.5;
+    c.beginPath();
+    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+      c.moveTo(x + 4 * dx, y + 4 * dy);
+      c.lineTo(x + 14 * dx, y + 14 * dy);
+    }
+    c.stroke();
   }
 
   // A line for each metre, and their length once, where they are not too close.
@@ -203,6 +228,22 @@ export class FloorView {
     c.globalAlpha = 1;
   }
 
+  // The way that the chosen robot takes now, from where it believes to be.
+  way(c, ink) {
+    const { pose, way } = this.about;
+    if (!pose || way.length === 0) return;
+    c.strokeStyle = c.fillStyle = ink;
+    c.lineWidth = 2;
+    c.beginPath();
+    for (const place of [pose, ...way]) c.lineTo(...this.toPixel(...place));
+    c.stroke();
+    for (const place of way) {
+      c.beginPath();
+      c.arc(...this.toPixel(...place), 3.5, 0, 7);
+      c.fill();
+    }
+  }
+
   slot(c, r, ink) {
     if (!r.slot || !r.alive) return;
     const [x, y] = this.toPixel(...r.slot);
@@ -219,7 +260,7 @@ export class FloorView {
   // From a follower to its leader, where its place is not known.
   leash(c, r, ink) {
     const leader = r.follows && this.robot(r.follows);
-    if (!r.alive || !leader?.alive || leader.x === null) return;
+    if (!r.alive || !leader?.alive || !this.here().includes(leader)) return;
     c.strokeStyle = ink;
     c.lineWidth = 1;
     c.setLineDash([3, 3]);
@@ -287,8 +328,7 @@ export class FloorView {
       Math.hypot(e.clientX - box.left - x, e.clientY - box.top - y) < reach;
     if (!this.scene || !this.fit()) return {};
     if (this.map.offers.includes("landmark") && this.scene.landmark && near(this.toPixel(...this.scene.landmark), NEAR)) return { landmark: true };
-    const robot = this.scene.robots.find((r) => r.x !== null &&
-      near(this.toPixel(r.x, r.y), Math.max(NEAR, r.r * this.view.scale)));
+    const robot = this.here().find((r) => near(this.toPixel(r.x, r.y), Math.max(NEAR, r.r * this.view.scale)));
     return { robot };
   }
 
@@ -334,7 +374,9 @@ export class FloorView {
       this.mine = true;
       this.view.x += way[0] * step;
       this.view.y += way[1] * step;
-    } else if (e.key === "+") this.zoom(1.3);
+    } else if (e.key === "Enter") this.on.send(this.view.x, this.view.y);
+    else if (e.key === "l" && this.map.offers.includes("landmark")) this.on.landmark(this.view.x, this.view.y);
+    else if (e.key === "+") this.zoom(1.3);
     else if (e.key === "-") this.zoom(0.77);
     else if (e.key === "0") this.zoom(0);
     else return;

@@ -9,7 +9,7 @@ let heard, socket, chosen, scene, told = 0, tries = 0, keys = new Set(), driving
 // Reachable for tests and the curious.
 const floor = window.floor = new FloorView(by("map"), {
   choose,
-  send: (x, y) => chosen && say(`goto ${chosen} ${x.toFixed(2)},${y.toFixed(2)}`),
+  send: (x, y) => (chosen ? say(`goto ${chosen} ${x.toFixed(2)},${y.toFixed(2)}`) : answer({ ok: false, text: "choose a robot first" })),
   landmark: (x, y) => say(`landmark ${x.toFixed(2)},${y.toFixed(2)}`),
 });
 
@@ -78,8 +78,28 @@ function show(next) {
   fleet.className = scene.notice ? "lost" : "";
   by("pace").hidden = scene.pace === null;
   scene.robots.forEach(row);
+  leads();
+  apart();
   one();
   stages();
+}
+
+// Who leads, and who follows: of a divided fleet each part has a leader.
+function leads() {
+  const text = scene.robots.filter((r) => r.alive && r.leader).map(({ id }) => {
+    const others = scene.robots.filter((r) => r.alive && (r.follows === id || (r.slot && id === scene.leader)));
+    const epoch = id === scene.leader && scene.epoch !== null ? ` epoch ${scene.epoch}` : "";
+    return `${id} leads${epoch}; ${others.length === 0 ? "nobody follows" : `${others.map((r) => r.id).join(", ")} follow`}.`;
+  }).join(" ") || "Nobody leads.";
+  if (by("leads").textContent !== text) by("leads").textContent = text;
+}
+
+// Who is not on the map, because nobody knows where it is to those that are.
+function apart() {
+  const others = scene.robots.filter((r) => r.x !== null && r.frame !== floor.frame).map((r) => r.id);
+  by("apart").hidden = others.length === 0;
+  const text = `Not on this map, because their places on it are not known: ${others.join(", ")}. Choose one to see its own.`;
+  if (by("apart").textContent !== text) by("apart").textContent = text;
 }
 
 // A row for each robot, made once, so that it keeps the focus.
@@ -99,10 +119,10 @@ function row(robot, index) {
   }
   tr.children[2].hidden = scene.formation === null;
   const metres = (m) => (m === null ? "" : `${m.toFixed(2)} m`);
-  tr.children[1].textContent = (robot.alive ? robot.state : away(robot)) + (robot.alive && robot.leader ? " ★" : "");
+  tr.children[1].textContent = (robot.alive ? words(robot.state) : away(robot)) + (robot.alive && robot.leader ? " ★" : "");
   tr.children[2].textContent = robot.alive ? metres(robot.off) : "";
   tr.children[3].textContent = robot.alive && robot.unsure !== null ? `±${metres(robot.unsure)}` : "";
-  tr.className = robot.alive ? "" : "dead";
+  tr.className = [!robot.alive && "dead", robot.frame !== floor.frame && "apart"].filter(Boolean).join(" ");
   tr.setAttribute("aria-selected", robot.id === chosen);
 }
 
@@ -115,6 +135,7 @@ function choose(id) {
   floor.chosen = chosen;
   floor.about = null;
   by("about").replaceChildren();
+  by("events").replaceChildren();
   say(`look ${chosen ?? ""}`);
   if (scene) show(scene);
 }
@@ -126,20 +147,34 @@ function one() {
   by("chosen").textContent = robot.id;
   const where = robot.x === null ? "pose unknown"
     : `at ${robot.x.toFixed(2)}, ${robot.y.toFixed(2)}, ${Math.round((robot.a * 180) / Math.PI)}°`;
-  by("doing").textContent = robot.alive ? `${robot.state}, ${where}` : `${away(robot)}, last ${where}`;
+  by("doing").textContent = (robot.alive ? `${words(robot.state)}, ${where}` : `${away(robot)}, last ${where}`)
+    + (robot.apart === null ? "" : `, in a frame of its own: ${robot.apart}`);
 }
+
+// Lines of a list, which is left alone while they are the same.
+function list(id, lines) {
+  const all = by(id);
+  if (all.childElementCount === lines.length && all.lastChild?.textContent === lines.at(-1)) return;
+  all.replaceChildren(...lines.map((textContent) => Object.assign(document.createElement("li"), { textContent })));
+  all.scrollTop = all.scrollHeight;
+}
+
+const words = (name) => name.replaceAll("_", " ");
+const length = (way) => way.slice(1).reduce((sum, [x, y], k) => sum + Math.hypot(x - way[k][0], y - way[k][1]), 0);
 
 // Without the minus of -0.00.
 const decimals = (number) => (Math.round(number * 100) / 100 + 0).toFixed(2);
 
-// Why it does what it does: its wish, what the gate limits, its devices.
+// Why it does what it does: who wished, the chosen one first, what the gate limits, its way, its devices, and what it did.
 function about(told) {
   if (told.id !== chosen) return;
   floor.about = told;
   const rows = [
-    ["wish", told.by && told.by + (told.weight === null ? "" : `, weight ${told.weight.toFixed(2)}`)],
+    ["does", told.by && words(told.by)],
+    ["wishes", told.wishes.map(([by, weight]) => `${words(by)} ${weight.toFixed(2)}`).join(", ")],
+    ["way", told.way.length > 0 && `${length([told.pose, ...told.way]).toFixed(1)} m, by ${told.way.length} ${told.way.length === 1 ? "place" : "places"}`],
     ["speed", told.speed === null ? "unknown" : `${decimals(told.speed)} m/s` + (told.turn === null ? "" : `, ${decimals(told.turn)} rad/s`)],
-    ["limited by", told.limits.join(", ")],
+    ["limited by", told.limits.map(words).join(", ")],
     ["fault", told.fault],
     ["note", told.notes.join("; ")],
     ["stopped", told.estop && "emergency stop, until it is reset"],
@@ -148,6 +183,7 @@ function about(told) {
   ].filter(([, text]) => text);
   const made = (tag, textContent) => Object.assign(document.createElement(tag), { textContent });
   by("about").replaceChildren(...rows.flatMap(([term, text]) => [made("dt", term), made("dd", text)]));
+  list("events", told.events);
   by("camera").hidden = !told.camera;
   by("sonar").hidden = told.sonar.length === 0;
   floor.draw();
@@ -226,8 +262,18 @@ function word() {
   if (keys.size > 0) say(`drive ${chosen} ${ahead} ${turn}`);
 }
 
+// The stop goes first; who drove does not drive on, and says nothing after it.
+function estop() {
+  say("estop");
+  drive(false);
+}
+
 addEventListener("keydown", (e) => {
   const key = e.key.length === 1 ? e.key.toLowerCase() : e.key;
+  if (e.key === "F8") {
+    estop();
+    e.preventDefault();
+  }
   if (e.key === "Escape") drive(false);
   if (!driving || !WAYS[key] || /INPUT|SELECT/.test(e.target.tagName)) return;
   keys.add(key);
@@ -236,7 +282,7 @@ addEventListener("keydown", (e) => {
 addEventListener("keyup", (e) => keys.delete(e.key.length === 1 ? e.key.toLowerCase() : e.key));
 addEventListener("blur", () => keys.clear());
 
-by("estop").onclick = () => say("estop");
+by("estop").onclick = estop;
 by("reset").onclick = () =>
   confirm("Reset the emergency stop? Robots may move again when they are started.") && say("reset");
 by("form").onclick = () => say(`formation ${by("shape").value} ${by("spacing").value}`);

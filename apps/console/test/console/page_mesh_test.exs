@@ -5,10 +5,11 @@ defmodule Console.PageMeshTest do
   """
   use ExUnit.Case, async: false
   alias Console.{Browser, Live, Page}
-  alias Console.Live.Mesh.{Notice, View}
+  alias Console.Live.Mesh.{Frames, Notice, View}
   alias Swarm.Status
   @moduletag :capture_log
 
+  doctest Frames
   doctest Notice
   doctest View
 
@@ -48,6 +49,35 @@ defmodule Console.PageMeshTest do
     full = Enum.reduce(1..300, view, &at.(&2, 4, [%{mag1 | fault: "fault #{&1}"}, mag2]))
     assert length(full.stages) == 200
     assert List.last(full.stages).n == full.told
+  end
+
+  test "only robots of one frame have the same number" do
+    status = fn id, within, own, x ->
+      frame = %Status.Frame{within: within, own: own, start: {x, 0.0}}
+      %Status{robot: id, state: :follow, frame: frame}
+    end
+
+    # mag1 led mag2, and has gone; mag3 leads now: mag2 is still in the frame of mag1, which mag3 was in, too.
+    old = {:mag1, 7}
+    mag1 = %{status.(:mag1, :start, 7, 0.0) | state: :not_heard}
+    mag2 = status.(:mag2, old, 8, 0.0)
+    mag3 = %{status.(:mag3, old, 9, 0.0) | state: "lead"}
+    min1 = status.(:min1, {:mag3, 9}, 3, 0.0)
+    # That of a former life of mag3 is another frame.
+    min2 = status.(:min2, {:mag3, 4}, 3, 0.0)
+    lost = %{status.(:min3, :start, 1, 9.0) | frame: :lost}
+    old = %{lost | robot: :min4, frame: nil}
+    far = status.(:min5, :start, 2, 20.0)
+    near = status.(:min6, :start, 2, 25.0)
+
+    places = Frames.places([lost, far, mag1, mag2, min1, old, mag3, min2, near])
+    assert for({id, {0, nil}} <- places, do: id) |> Enum.sort() == [:mag1, :mag2, :mag3, :min1]
+    assert {1, "it has met nobody of the others"} = places.min5
+    assert places.min6 == places.min5
+    assert {_own, "it was started again on its way, and is lost"} = places.min3
+    assert {_own, "it does not say in which frame it is"} = places.min4
+    assert {_own, "it follows mag3"} = places.min2
+    assert places |> Map.values() |> Enum.uniq() |> length() == 5
   end
 
   test "other secrets are told of while they are heard, and only where no robot is" do
@@ -137,6 +167,34 @@ defmodule Console.PageMeshTest do
       assert text(browser, "stages") =~ "mag41 is no longer heard"
       assert Browser.errors(browser) == []
       Browser.close(browser)
+    end
+
+    test "robots whose places to each other are not known are not drawn together" do
+      until(fn -> Swarm.status() == [] end)
+      {:ok, live} = Live.Mesh.start_link()
+      robots = fn -> Live.Mesh.robots(live) end
+      {:ok, _page, url} = Page.start_link(module: Live.Mesh, live: live, robots: robots)
+      {:ok, fleet} = Sim.Fleet.start_link(robots: [:mag42, :min42], start: :same, mission: false)
+      browser = Browser.open({1280, 800})
+      Browser.go(browser, url)
+
+      Browser.await(
+        browser,
+        "return window.floor.scene?.robots.filter((r) => r.x !== null).length === 2"
+      )
+
+      here = fn id ->
+        Browser.await(browser, "return window.floor.here().map((r) => r.id).join() === '#{id}'")
+      end
+
+      here.("mag42")
+      assert text(browser, "apart") =~ "min42"
+      Browser.run(browser, "document.querySelector('[data-id=min42] button').click()")
+      here.("min42")
+      assert text(browser, "doing") =~ "it was started again on its way, and is lost"
+      assert Browser.errors(browser) == []
+      Browser.close(browser)
+      Sim.Fleet.stop(fleet)
     end
 
     defp until(true?, left \\ 100) do

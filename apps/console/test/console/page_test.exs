@@ -2,11 +2,12 @@ defmodule Console.PageTest do
   @moduledoc "The page as browsers and strangers see it; with a real browser, where there is one."
   use ExUnit.Case, async: true
   alias Console.{Browser, Live, Options, Page}
-  alias Console.Page.{Access, Client, State}
+  alias Console.Page.{Access, Changes, Client, State}
   @moduletag :realtime
   @moduletag :capture_log
 
   doctest Access
+  doctest Changes
   doctest Client
   doctest State
 
@@ -202,6 +203,129 @@ defmodule Console.PageTest do
 
       assert Browser.errors(browser) == []
       Browser.close(browser)
+    end
+
+    test "of the chosen robot it shows all who wished, its way and what it did; and who leads" do
+      for {line, module, start} <- [
+            {"--robots 3 --seed 4 --blobs direct", Live.Trial, &slow/1},
+            {"--robots 3 --seed 4", Live.Fleet, &Live.Fleet.start_link(Options.trial(&1))}
+          ] do
+        options = options(line)
+        {:ok, live} = start.(options)
+        {_page, url} = page(options, module, live)
+        browser = open(url)
+
+        Browser.await(
+          browser,
+          "return / leads epoch 1; \\w+, \\w+ follow\\./.test(document.getElementById('leads').textContent)"
+        )
+
+        follower = Enum.find(module.scene(live).robots, &(&1.state == :follow))
+        choose = "document.querySelector('[data-id=#{follower.id}] button').click()"
+        Browser.run(browser, choose)
+        # A follower on its way: it would also rest, if it had nothing to do.
+        Browser.await(
+          browser,
+          "return /wishesfollow \\d\\.\\d\\d, rest \\d\\.\\d\\dway\\d/.test(document.getElementById('about').textContent)"
+        )
+
+        Browser.await(browser, "return window.floor.about.way.length > 0")
+
+        Browser.await(
+          browser,
+          "return /\\d s  agree.*\\d s  follow/.test(document.getElementById('events').textContent)"
+        )
+
+        assert Browser.errors(browser) == []
+        Browser.close(browser)
+        module.stop(live)
+      end
+    end
+
+    # In lockstep, in real time.
+    defp slow(options),
+      do: Live.Trial.start_link(Sim.Trial, Options.trial(options), Live.Pace.new(1.0))
+
+    test "by keyboard alone one comes to everything in order, and can do all of it" do
+      options = options("--robots 2 --landmark none")
+      {:ok, live} = Live.Fleet.start_link(Options.trial(options))
+      {_page, url} = page(options, Live.Fleet, live)
+      browser = open(url)
+      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2")
+
+      # From the top of the page to its end; each that has the focus shows it.
+      order =
+        for _stop <- 1..20 do
+          Browser.press(browser, [:tab])
+
+          Browser.run(browser, """
+          const e = document.activeElement, ring = getComputedStyle(e).outlineStyle;
+          return (ring === 'solid' ? '' : 'no ring: ') + (e.id || e.dataset.zoom || e.dataset.line || e.textContent);
+          """)
+        end
+
+      assert order ==
+               ~w(estop reset map 1.3 0.77 0 follow trails start stop) ++
+                 ["kill leader", "shape", "spacing", "form", "mag1", "min1", "line", "Send"] ++
+                 Enum.drop(order, 18)
+
+      answered = fn text ->
+        Browser.await(
+          browser,
+          "return document.getElementById('answer').textContent.startsWith('#{text}')"
+        )
+      end
+
+      # Chosen, then sent to where the cross is.
+      to = fn selector ->
+        Browser.run(browser, "document.activeElement.blur()")
+
+        Enum.find(1..40, fn _press ->
+          Browser.press(browser, [:tab])
+          Browser.run(browser, "return document.activeElement.matches(\"#{selector}\")")
+        end) || flunk("no way to #{selector}")
+      end
+
+      to.("[data-id=min1] button")
+      Browser.press(browser, [:enter])
+      Browser.await(browser, "return document.getElementById('chosen').textContent === 'min1'")
+      to.("#map")
+      Browser.press(browser, [:left, :down, :enter])
+      answered.("goto min1 -")
+      wait(fn -> Swarm.status(:min1).state == :goto end)
+
+      to.("[data-one=stop]")
+      Browser.press(browser, [" "])
+      answered.("stop min1: accepted")
+      wait(fn -> Swarm.status(:min1).state != :goto end)
+      to.("[data-line=start]")
+      Browser.press(browser, [:enter])
+      answered.("start: accepted")
+      to.("[data-line=stop]")
+      Browser.press(browser, [:enter])
+      answered.("stop: accepted")
+
+      to.("#drive")
+      Browser.press(browser, [:enter])
+      Browser.key(browser, :keyDown, "w")
+      wait(fn -> Swarm.status(:min1).by == :move end)
+
+      # Wherever the focus is, also where text is typed.
+      to.("#line")
+      Browser.press(browser, [:f8])
+      wait(fn -> Swarm.status(:min1).estop and Swarm.status(:mag1).estop end)
+      Browser.await(browser, "return document.getElementById('drive').ariaPressed === 'false'")
+      Browser.key(browser, :keyUp, "w")
+      Browser.run(browser, "window.confirm = () => true")
+      to.("#reset")
+      Browser.press(browser, [:enter])
+      answered.("reset: accepted")
+      to.("#line")
+      Browser.press(browser, String.graphemes("status mag1") ++ [:enter])
+      answered.("mag1")
+      assert Browser.errors(browser) == []
+      Browser.close(browser)
+      Live.Fleet.stop(live)
     end
 
     test "one click stops all; a page that is loaded again, or whose server was away, goes on" do

@@ -96,6 +96,20 @@ defmodule Console.Browser do
         actions: [%{type: "key", id: "keys", actions: [%{type: kind, value: key}]}]
       })
 
+  # As WebDriver writes them.
+  @keys %{tab: "\uE004", enter: "\uE007", left: "\uE012", down: "\uE015", f8: "\uE038"}
+
+  @doc "Presses keys one after the other: letters, or `:tab`, `:enter`, `:left`, `:down`, `:f8`."
+  @spec press(%__MODULE__{}, [String.t() | atom()]) :: term()
+  def press(browser, keys) do
+    actions =
+      for key <- keys,
+          type <- [:keyDown, :keyUp],
+          do: %{type: type, value: Map.get(@keys, key, key)}
+
+    command(browser, :post, "/actions", %{actions: [%{type: "key", id: "keys", actions: actions}]})
+  end
+
   @doc "Waits until a piece of JavaScript returns something true; returns that."
   def await(browser, script, left \\ 300) do
     case run(browser, script) do

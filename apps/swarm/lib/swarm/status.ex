@@ -6,8 +6,13 @@ defmodule Swarm.Status do
 
   The number after the pose is its uncertainty: in 95 of 100 cases the robot is no farther from it
   (`uncertainty`, metres; `Robot.Percept`). A follower's pose is in its leader's frame, any other
-  robot's in its own. A robot that stands in its slot by its own estimate, but is not certain
-  enough to say so, is `in its slot, but NOT SURE of its place (±0.62 m)` (`unsure`).
+  robot's in that of its start pose (`frame`; `Swarm.Status.Frame`). A robot that stands in its slot by its own estimate,
+  but is not certain enough to say so, is `in its slot, but NOT SURE of its place (±0.62 m)` (`unsure`). `epoch` counts the
+  elections that its mission knows of.
+
+  `weights` are all behaviours that wished for something, with the weights by which they were compared, the chosen one
+  (`by`) first; `way` are the corners of the way that it takes round what stands about, the goal last, in the frame of its
+  pose. A row has neither.
 
   If the wheels may not turn, it says `DISARMED`, with what is missing, or `LINE LOST` until a
   person acknowledges (`Hal.Device.Arming`; `arming` and `why`). For a device that is offline it
@@ -42,6 +47,7 @@ defmodule Swarm.Status do
   alias Robot.Safety.LivenessMonitor
   alias Swarm.Message.Receiver
   alias Swarm.Membership.Peers
+  alias Swarm.Status.Frame
 
   @recently_ms 60_000
 
@@ -52,8 +58,11 @@ defmodule Swarm.Status do
                 node: nil,
                 state: :idle,
                 by: nil,
+                weights: [],
+                way: [],
                 pose: nil,
                 uncertainty: nil,
+                frame: nil,
                 speed: 0.0,
                 limits: [],
                 estop: false,
@@ -61,6 +70,7 @@ defmodule Swarm.Status do
                 why: nil,
                 hung: nil,
                 leader: nil,
+                epoch: nil,
                 unsure: false,
                 blocked_by: nil,
                 power: nil,
@@ -82,8 +92,11 @@ defmodule Swarm.Status do
           node: node() | String.t() | nil,
           state: atom() | String.t(),
           by: atom() | String.t(),
+          weights: [{by :: atom(), weight :: float()}],
+          way: [Pose.point()],
           pose: Pose.t() | nil,
           uncertainty: float() | nil,
+          frame: Frame.t() | :lost | nil,
           speed: float() | nil,
           limits: [atom() | String.t()],
           estop: boolean(),
@@ -91,6 +104,7 @@ defmodule Swarm.Status do
           why: String.t() | nil,
           hung: {:silent | :hung, behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
           leader: atom() | String.t() | nil,
+          epoch: non_neg_integer() | nil,
           unsure: boolean(),
           blocked_by: String.t() | nil,
           power: float() | nil,
@@ -119,9 +133,12 @@ defmodule Swarm.Status do
       node: node(),
       state: state(mission),
       by: entries |> value(:doing) |> field(:by),
+      weights: entries |> value(:doing) |> field(:weights) || [],
+      way: entries |> value(:doing) |> field(:way) || [],
       fault: entries |> value(:doing) |> field(:fault),
       pose: value(entries, :pose),
       uncertainty: entries |> value(:uncertainty) |> field(:radius),
+      frame: Frame.of(config, value(entries, :uncertainty)),
       speed: entries |> value(:odometry) |> linear(),
       limits: field(driving, :limits) || [],
       estop: Board.latched?(board),
@@ -129,6 +146,7 @@ defmodule Swarm.Status do
       why: entries |> value(:arming) |> field(:why),
       hung: hung(entries),
       leader: mission |> field(:claim) |> field(:leader),
+      epoch: mission |> field(:claim) |> field(:epoch),
       unsure: mission |> field(:claim) |> field(:unsure) == true,
       blocked_by: mission |> field(:claim) |> field(:blocked_by),
       power: value(entries, :power),

@@ -1,6 +1,9 @@
 defmodule Swarm.StatusTest do
   use Swarm.Case, async: false
   alias Swarm.Status
+  alias Swarm.Status.Frame
+
+  doctest Frame
 
   test "the line shows the view's number, and names robots that it does not hear" do
     line = fn fields -> inspect(struct!(%Status{robot: :mag1, age_ms: 5}, fields)) end
@@ -48,6 +51,21 @@ defmodule Swarm.StatusTest do
 
     for junk <- [:landmark, String.duplicate("x", 81)],
         do: assert(Status.Row.decode(:mag1, %{row | blocked_by: junk}, 10) == :error)
+  end
+
+  test "a robot's row says in which frame its pose is, and which epoch it knows" do
+    frame = %Frame{within: {:mag1, 399_000_000}, own: 12, start: {-1.5, 2.0}}
+    status = %Status{robot: :mag1, node: node(), by: :follow, frame: frame, epoch: 3, age_ms: 5}
+    row = Status.Row.encode(status)
+    assert {:ok, %{frame: ^frame, epoch: 3}} = Status.Row.decode(:mag1, row, 10)
+    # Of a robot that does not say it, or whose leader nobody here has heard of, it is not known.
+    assert {:ok, %{frame: nil, epoch: nil}} =
+             Status.Row.decode(:mag1, Map.drop(row, [:frame, :epoch]), 10)
+
+    for frame <- [{"nobody of this name", 1, 2, 3, 4}, {"mag1", 1, 2, 3, :far}, "found"],
+        do: assert({:ok, %{frame: nil}} = Status.Row.decode(:mag1, %{row | frame: frame}, 10))
+
+    assert Status.Row.decode(:mag1, %{row | epoch: "3"}, 10) == :error
   end
 
   test "a robot's row says what it hangs in" do

@@ -10,6 +10,7 @@ defmodule Console.Live.Trial do
   use GenServer
   alias Console.Cli.Format
   alias Console.Live.Pace
+  alias Console.Page.About
   alias Sim.{Recorder, Trial}
   alias Sim.Recording.Pictures
   @behaviour Console.Live
@@ -65,9 +66,8 @@ defmodule Console.Live.Trial do
   def status(live, :all), do: live |> scene() |> Format.everybody()
   def status(live, robot), do: live |> scene() |> Format.one(robot)
 
-  # In lockstep no robot has a board.
   @impl Console.Live
-  def about(_live, _robot), do: nil
+  def about(live, robot), do: GenServer.call(live, {:about, robot}, :infinity)
 
   @impl GenServer
   def init({module, trial, pace, recorder}) do
@@ -87,6 +87,12 @@ defmodule Console.Live.Trial do
 
   @impl GenServer
   def handle_call(:scene, _from, state), do: {:reply, state.module.scene(state.trial), state}
+
+  def handle_call({:about, robot}, _from, state) do
+    member = state.module.robot(state.trial, robot)
+    {:reply, member && About.of_member(member), state}
+  end
+
   def handle_call(:result, _from, state), do: {:reply, state.module.result(state.trial), state}
 
   def handle_call(:pace, _from, state), do: {:reply, Pace.words(state.pace), state}

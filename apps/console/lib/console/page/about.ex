@@ -1,33 +1,38 @@
 defmodule Console.Page.About do
   @moduledoc """
-  What a robot of this node knows and does, for the page: the wish that it carries out, what the gate limits, its devices,
-  what its sonars and its camera see. Read from its board, so that no process of the robot is asked.
+  What a robot knows and does, for the page: who wished, what the gate limits, its way, its devices, what its sonars and its
+  camera see. Of a robot of this node it is read from its board, so that no process of the robot is asked.
   """
   alias Hal.{Json, Odometry, Pose}
-  alias Robot.{Board, Names}
+  alias Robot.{Board, Names, Percept}
+  alias Robot.Control.Controller
   alias Sim.Trial.Setup
-  alias Swarm.Status
+  alias Swarm.{Member, Status}
   alias Vision.View
 
   # Readings that are older tell nothing of now.
   @recent_ms 1_000
 
+  @typedoc """
+  `wishes` are all behaviours that wished, with their weights, the chosen one first; `way` are the corners of the way that
+  it takes, and `pose` where it believes to be: `[x, y]` in metres.
+  """
+  @type t :: %{atom() => term()}
+
   @doc "For the page; `nil` for a robot that is not on this node, or is dead."
-  @spec of(atom()) :: map() | nil
+  @spec of(atom()) :: t() | nil
   def of(robot) do
     with {:ok, board} <- Board.find(robot) do
       entries = Board.entries(board)
-      driving = recent(entries, :driving) || %{limits: []}
-      wheels = wheels(recent(entries, :odometry))
-      doing = recent(entries, :doing) || %{by: nil, weight: nil, fault: nil}
+      doing = recent(entries, :doing) || %{by: nil, weights: [], way: [], fault: nil}
 
       %{
         by: doing.by,
-        weight: doing.weight,
+        wishes: wishes(doing.weights),
+        way: points(doing.way),
+        pose: entries |> recent(:pose) |> point(),
         fault: doing.fault,
-        speed: wheels.linear,
-        turn: wheels.turn,
-        limits: driving.limits,
+        limits: (recent(entries, :driving) || %{limits: []}).limits,
         power: recent(entries, :power, 60_000),
         offline: for({{:health, device}, {{:offline, _reason}, _age}} <- entries, do: device),
         estop: Board.latched?(board),
@@ -36,20 +41,48 @@ defmodule Console.Page.About do
         camera: Names.whereis(robot, :view) != nil,
         notes: []
       }
+      |> Map.merge(wheels(recent(entries, :odometry)))
     else
       :error -> nil
     end
   end
 
+  @doc "The same of a robot in lockstep, by what it perceived last; it has no devices and no camera pictures to look at."
+  @spec of_member(Member.t()) :: t() | nil
+  def of_member(%Member{controller: controller} = member) do
+    with %Percept{} = percept <- Controller.percept(controller) do
+      weights = Controller.weights(controller)
+
+      %{
+        by: List.first(for {by, _weight} <- weights, do: by),
+        wishes: wishes(weights),
+        way: points(Controller.way(controller)),
+        pose: point(percept.pose),
+        fault: Controller.fault(controller),
+        limits: (percept.driving || %{limits: []}).limits,
+        power: percept.power,
+        offline: [],
+        estop: member.stop.held != [],
+        sonar: sonar(member.id, percept.sonar),
+        seen: nil,
+        camera: false,
+        notes: []
+      }
+      |> Map.merge(wheels(percept.odometry))
+    end
+  end
+
   @doc """
-  The same of a robot anywhere, from its status, which knows neither weights nor what sonars and cameras see. `notes` are
-  what its status remarks, as in `iex`.
+  The same of a robot anywhere, from its status, which does not know what sonars and cameras see. `notes` are what its
+  status remarks, as in `iex`.
   """
-  @spec of_status(Status.t()) :: map()
+  @spec of_status(Status.t()) :: t()
   def of_status(%Status{} = status) do
     %{
       by: status.by,
-      weight: nil,
+      wishes: wishes(status.weights),
+      way: points(status.way),
+      pose: point(status.pose),
       fault: status.fault,
       speed: status.speed,
       turn: nil,
@@ -63,6 +96,11 @@ defmodule Console.Page.About do
       notes: notes(status)
     }
   end
+
+  defp wishes(weights), do: for({by, weight} <- weights, do: [by, weight])
+  defp points(places), do: for({x, y} <- places, do: [x, y])
+  defp point(nil), do: nil
+  defp point(%Pose{x: x, y: y}), do: [x, y]
 
   defp notes(status) do
     Enum.filter(
@@ -90,8 +128,8 @@ defmodule Console.Page.About do
   end
 
   # What they report, not what they are told.
-  defp wheels(%Odometry{twist: twist}), do: twist
-  defp wheels(nil), do: %{linear: nil, turn: nil}
+  defp wheels(%Odometry{twist: twist}), do: %{speed: twist.linear, turn: twist.turn}
+  defp wheels(nil), do: %{speed: nil, turn: nil}
 
   defp recent(entries, key, ms \\ @recent_ms) do
     case entries do

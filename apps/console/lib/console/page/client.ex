@@ -54,7 +54,7 @@ defmodule Console.Page.Client do
   def init({connection, feed, robots, reply}) do
     ref = Process.monitor(connection)
     {module, live} = Feed.source(feed)
-    s = %{connection: ref, module: module, live: live, robots: robots, reply: reply}
+    s = %{connection: ref, feed: feed, module: module, live: live, robots: robots, reply: reply}
     {:ok, Map.put(s, :looked, nil)}
   end
 
@@ -78,8 +78,10 @@ defmodule Console.Page.Client do
   def handle_info(:about, %{looked: nil} = s), do: {:noreply, s}
 
   def handle_info(:about, s) do
-    with %{} = about <- s.module.about(s.live, s.looked),
-         do: s.reply.(About.json(s.looked, about))
+    with %{} = about <- s.module.about(s.live, s.looked) do
+      about = Map.put(about, :events, Feed.events(s.feed, s.looked))
+      s.reply.(About.json(s.looked, about))
+    end
 
     _timer = Process.send_after(self(), :about, @about_ms)
     {:noreply, s}

@@ -6,7 +6,7 @@ defmodule Console.Page.Feed do
   nothing queues.
   """
   use GenServer
-  alias Console.Page.State
+  alias Console.Page.{Changes, State}
 
   @period_ms 100
 
@@ -31,13 +31,26 @@ defmodule Console.Page.Feed do
   @spec source(pid()) :: {module(), term()}
   def source(feed), do: GenServer.call(feed, :source)
 
+  @doc "What happened to a robot while somebody looked, and what the fleet tells of it: lines, the last the newest."
+  @spec events(pid(), atom()) :: [String.t()]
+  def events(feed, robot), do: GenServer.call(feed, {:events, robot})
+
   @doc "Asks for the next scene, which comes as `{:scene, json}`."
   @spec next(pid()) :: :ok
   def next(feed), do: GenServer.cast(feed, {:next, self()})
 
   @impl GenServer
   def init(%{module: module, live: live}) do
-    {:ok, %{module: module, live: live, map: nil, waiting: [], ticking?: false}}
+    {:ok,
+     %{
+       module: module,
+       live: live,
+       map: nil,
+       scene: nil,
+       changes: %Changes{},
+       waiting: [],
+       ticking?: false
+     }}
   end
 
   @impl GenServer
@@ -49,6 +62,11 @@ defmodule Console.Page.Feed do
   def handle_call(:map, _from, s), do: {:reply, s.map, s}
   def handle_call(:source, _from, s), do: {:reply, {s.module, s.live}, s}
 
+  def handle_call({:events, _robot}, _from, %{scene: nil} = s), do: {:reply, [], s}
+
+  def handle_call({:events, robot}, _from, s),
+    do: {:reply, Changes.of(s.changes, s.scene, robot), s}
+
   @impl GenServer
   def handle_cast({:next, pusher}, s), do: {:noreply, tick(%{s | waiting: [pusher | s.waiting]})}
 
@@ -56,8 +74,10 @@ defmodule Console.Page.Feed do
   def handle_info(:tick, %{waiting: []} = s), do: {:noreply, %{s | ticking?: false}}
 
   def handle_info(:tick, s) do
-    json = State.scene(s.module.scene(s.live), s.module.pace(s.live), s.module.notice(s.live))
+    scene = s.module.scene(s.live)
+    json = State.scene(scene, s.module.pace(s.live), s.module.notice(s.live))
     for pusher <- s.waiting, do: send(pusher, {:scene, json})
+    s = %{s | scene: scene, changes: Changes.note(s.changes, scene)}
     {:noreply, tick(%{s | waiting: [], ticking?: false})}
   end
 

@@ -53,7 +53,8 @@ defmodule Console.Page.State do
 
   @doc """
   The scene, with the pace of a run in lockstep (`nil`: real time), and what a person should know before all else. A
-  robot of a real fleet may have no known pose.
+  robot of a real fleet may have no known pose. Only robots of one `frame` are drawn together; `apart` says why one is not
+  in that of most.
   """
   @spec scene(Scene.t(), String.t() | nil, String.t() | nil) :: String.t()
   def scene(%Scene{} = scene, pace, notice) do
@@ -95,7 +96,9 @@ defmodule Console.Page.State do
       off: robot.slot && round3(Scene.slot_error(robot)),
       unsure: round3(robot.uncertainty),
       leader: robot.leader?,
-      follows: robot[:follows]
+      follows: robot[:follows],
+      frame: robot[:frame] || 0,
+      apart: robot[:apart]
     }
   end
 

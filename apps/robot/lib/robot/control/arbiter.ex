@@ -35,4 +35,17 @@ defmodule Robot.Control.Arbiter do
   @spec weight(Wish.t(), last_by :: atom()) :: float()
   def weight(%Wish{by: by, weight: weight}, by), do: weight * @stubbornness
   def weight(%Wish{weight: weight}, _last_by), do: weight
+
+  @doc """
+  Who wished, with the weights by which they are compared, the winner first.
+
+      iex> wish = fn by, weight -> Robot.Wish.new(by, Hal.Twist.zero(), weight) end
+      iex> Robot.Control.Arbiter.weights([nil, wish.(:rest, 0.1), wish.(:goto, 0.5)], nil)
+      [goto: 0.5, rest: 0.1]
+  """
+  @spec weights([Wish.t() | nil], last_by :: atom()) :: [{by :: atom(), weight :: float()}]
+  def weights(wishes, last_by) do
+    for(%Wish{by: by} = wish <- wishes, do: {by, weight(wish, last_by)})
+    |> Enum.sort_by(&elem(&1, 1), :desc)
+  end
 end

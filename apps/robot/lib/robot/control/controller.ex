@@ -20,6 +20,8 @@ defmodule Robot.Control.Controller do
   alias Robot.Navigation.{Grid, OccupancyGrid}
   alias Robot.Behaviour.{Avoid, Escape, Rest}
 
+  @most_corners 50
+
   @enforce_keys [:profile, :escape, :rest]
   defstruct @enforce_keys ++
               [
@@ -27,6 +29,7 @@ defmodule Robot.Control.Controller do
                 module: nil,
                 goal: nil,
                 last_by: nil,
+                weights: [],
                 localiser: nil,
                 percept: nil,
                 look: nil,
@@ -43,6 +46,7 @@ defmodule Robot.Control.Controller do
           module: module() | nil,
           goal: Behaviour.t() | nil,
           last_by: atom(),
+          weights: [{by :: atom(), weight :: float()}],
           localiser: Localiser.t() | nil,
           percept: Percept.t() | nil,
           look: float() | nil,
@@ -172,7 +176,9 @@ defmodule Robot.Control.Controller do
     {resting, rest, nil} = run(controller.rest, percept)
     {wanted, goal, outcome} = run(controller.goal, percept)
 
-    wish = Arbiter.choose([escaping, wanted, resting], controller.last_by)
+    wishes = [escaping, wanted, resting]
+    wish = Arbiter.choose(wishes, controller.last_by)
+    weights = Arbiter.weights(wishes, controller.last_by)
     wish = if wish.look == nil and wanted != nil, do: %{wish | look: wanted.look}, else: wish
     looks? = wish.look != nil
     wish = %{wish | look: wish.look || controller.look}
@@ -183,11 +189,29 @@ defmodule Robot.Control.Controller do
         rest: rest,
         goal: goal,
         last_by: wish.by,
+        weights: weights,
         behaviour_looks?: looks?
     }
 
     {wish, outcome && {controller.tag, outcome}, controller}
   end
+
+  @doc """
+  The behaviours that wished for something at the last tick, with the weights by which the arbiter compared them; the
+  chosen one first.
+  """
+  @spec weights(t()) :: [{by :: atom(), weight :: float()}]
+  def weights(%__MODULE__{weights: weights}), do: weights
+
+  @doc """
+  The corners of the way that its goal takes round what stands about (map frame, metres), the goal last and #{@most_corners}
+  at most; none where it takes no such way.
+  """
+  @spec way(t()) :: [Hal.Pose.point()]
+  def way(%__MODULE__{goal: {Avoid, %{way: %Avoid.Route{corners: corners}}}}),
+    do: Enum.take(corners, @most_corners)
+
+  def way(%__MODULE__{}), do: []
 
   @doc """
   What `tick/2` chooses from on this percept: all wishes, by the weight with which the arbiter

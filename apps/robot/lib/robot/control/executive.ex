@@ -97,7 +97,7 @@ defmodule Robot.Control.Executive do
     Gate.forget(id)
     board = Board.find!(id)
     at_ms = Config.now(config)
-    doing = %{by: :idle, weight: 0.0, outcome: nil, fault: nil, tick: 0}
+    doing = %{by: :idle, weights: [], way: [], outcome: nil, fault: nil, tick: 0}
     Board.put(board, :executive, :doing, doing, at_ms)
     Board.put(board, :executive, :goal, nil, at_ms)
     Event.execute([:robot, :executive, :start], %{at_ms: at_ms}, %{robot: id})
@@ -234,7 +234,16 @@ defmodule Robot.Control.Executive do
     s = look(s, wish.look, at_ms)
 
     fault = fault(s, Controller.fault(controller), at_ms)
-    doing = %{by: wish.by, weight: wish.weight, outcome: outcome, fault: fault, tick: s.tick + 1}
+
+    doing = %{
+      by: wish.by,
+      weights: Controller.weights(controller),
+      way: Controller.way(controller),
+      outcome: outcome,
+      fault: fault,
+      tick: s.tick + 1
+    }
+
     Board.put(board, :executive, :doing, doing, at_ms)
     if percept.pose, do: place(board, percept, at_ms)
 

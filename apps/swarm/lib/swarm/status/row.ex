@@ -38,10 +38,12 @@ defmodule Swarm.Status.Row do
     }
     |> arming(status.arming)
     |> offline(status)
-    |> fault(status.fault)
-    |> blocked(status.blocked_by)
+    |> given(:fault, status.fault)
+    |> given(:blocked_by, status.blocked_by)
     |> hung(status.hung)
     |> uncertain(status.uncertainty)
+    |> given(:frame, status.frame && Status.Frame.encode(status.frame))
+    |> given(:epoch, status.epoch)
     |> unsure(status.unsure)
   end
 
@@ -55,11 +57,11 @@ defmodule Swarm.Status.Row do
   defp uncertain(row, metres),
     do: Map.put(row, :uncertainty, min(mm(metres), @unsure_mm))
 
+  defp given(row, _key, nil), do: row
+  defp given(row, key, value), do: Map.put(row, key, value)
+
   defp unsure(row, true), do: Map.put(row, :unsure, true)
   defp unsure(row, false), do: row
-
-  defp fault(row, nil), do: row
-  defp fault(row, line), do: Map.put(row, :fault, line)
 
   defp offline(row, %{offline: lines}) when lines == %{}, do: row
 
@@ -72,9 +74,6 @@ defmodule Swarm.Status.Row do
   defp arming(row, :disarmed), do: Map.put(row, :arming, "disarmed")
   defp arming(row, {:error, _reason}), do: Map.put(row, :arming, "error")
   defp arming(row, _armed_or_unknown), do: row
-
-  defp blocked(row, nil), do: row
-  defp blocked(row, words), do: Map.put(row, :blocked_by, words)
 
   defp pose(nil), do: nil
   defp pose(pose), do: {mm(pose.x), mm(pose.y), mm(pose.heading)}
@@ -95,6 +94,8 @@ defmodule Swarm.Status.Row do
          {:ok, hung} <- hangs(Map.get(row, :hung), age_ms),
          {:ok, uncertainty} <- metres(Map.get(row, :uncertainty)),
          unsure = Map.get(row, :unsure, false),
+         epoch = Map.get(row, :epoch),
+         true <- epoch == nil or WireTypes.number?(epoch),
          true <- is_boolean(unsure),
          true <- Enum.all?([limits, offline, members, deaf_to, words], &texts?/1),
          true <- Enum.all?([node, state], &is_binary/1),
@@ -115,6 +116,8 @@ defmodule Swarm.Status.Row do
          by: by && Blackboard.Codec.word(by),
          pose: pose && place(pose),
          uncertainty: uncertainty,
+         frame: Status.Frame.decode(Map.get(row, :frame)),
+         epoch: epoch,
          speed: speed && speed / 1000,
          limits: Enum.map(limits, &Blackboard.Codec.word/1),
          estop: estop,

@@ -3,8 +3,10 @@ defmodule Console.Live.Mesh.View do
   What is shown of the robots of a mesh, from one look at their status to the next: a scene without a map, and what has
   changed as lines. Pure.
 
-  Poses are those of the status: a follower's is in its leader's frame, any other robot's in its own.
+  Poses are those of the status, each with the number of its frame (`Console.Live.Mesh.Frames`): robots of different ones
+  are not drawn on one floor.
   """
+  alias Console.Live.Mesh.Frames
   alias Sim.Scene
   alias Sim.Trial.Setup
   alias Swarm.Status
@@ -12,12 +14,13 @@ defmodule Console.Live.Mesh.View do
   # Older lines are forgotten.
   @most_stages 200
 
-  defstruct statuses: %{}, order: [], gone: MapSet.new(), stages: [], told: 0
+  defstruct statuses: %{}, order: [], gone: MapSet.new(), places: %{}, stages: [], told: 0
 
   @type t :: %__MODULE__{
           statuses: %{atom() => Status.t()},
           order: [atom()],
           gone: MapSet.t(atom()),
+          places: %{atom() => Frames.place()},
           stages: [map()],
           told: non_neg_integer()
         }
@@ -48,12 +51,14 @@ defmodule Console.Live.Mesh.View do
     kept = Map.merge(view.statuses, present, fn _id, before, now -> known(before, now) end)
     order = view.order ++ (kept |> Map.keys() |> Enum.sort() |> Kernel.--(view.order))
 
-    Enum.reduce(
-      lines,
-      %{view | statuses: kept, order: order, gone: gone},
-      &tell(&1, &2, clock, at_ms)
-    )
+    places = Frames.places(for id <- order, do: heard(kept[id], id in gone))
+    view = %{view | statuses: kept, order: order, gone: gone, places: places}
+    Enum.reduce(lines, view, &tell(&1, &2, clock, at_ms))
   end
+
+  # Nobody is led by one that has gone.
+  defp heard(status, true), do: %{status | state: :not_heard}
+  defp heard(status, false), do: status
 
   # Of a robot that does not answer, and has no row, only this is new.
   defp known(before, %Status{state: :no_answer}), do: %{before | state: :no_answer}
@@ -116,20 +121,24 @@ defmodule Console.Live.Mesh.View do
   @doc "What is drawn; `at_ms` is how long this has been looking."
   @spec scene(t(), non_neg_integer()) :: Scene.t()
   def scene(view, at_ms) do
-    robots = for id <- robots(view), do: robot(view.statuses[id], id in view.gone)
+    robots =
+      for id <- robots(view),
+          do: robot(view.statuses[id], id in view.gone, Map.fetch!(view.places, id))
+
+    leader = Enum.find(robots, &(&1.alive and &1.leader?))
 
     %Scene{
       at_ms: at_ms,
       map: nil,
       robots: robots,
-      leader: Enum.find_value(robots, &(&1.alive and &1.leader? and &1.id)) || nil,
-      epoch: nil,
+      leader: leader && leader.id,
+      epoch: leader && view.statuses[leader.id].epoch,
       formation: nil,
       stages: view.stages
     }
   end
 
-  defp robot(status, gone?) do
+  defp robot(status, gone?, {frame, apart}) do
     %{
       id: status.robot,
       pose: status.pose,
@@ -140,7 +149,9 @@ defmodule Console.Live.Mesh.View do
       leader?: "#{status.state}" == "lead",
       follows: if(status.leader != status.robot, do: status.leader),
       uncertainty: status.uncertainty,
-      size_ppm: nil
+      size_ppm: nil,
+      frame: frame,
+      apart: apart
     }
   end
 
