@@ -27,9 +27,16 @@ defmodule Swarm.Member do
 
   # Orders for one robot alone (`Robot.Command`), which leaves the group's mission for them.
   defguardp is_alone(command)
-            when command == :lead or
+            when command in [:lead, :wander, :rest] or
                    (is_tuple(command) and
-                      elem(command, 0) in [:goto, :move, :follow, :follow_the_leader, :find_blob])
+                      elem(command, 0) in [
+                        :goto,
+                        :move,
+                        :follow,
+                        :follow_the_leader,
+                        :find_blob,
+                        :square
+                      ])
 
   @enforce_keys [:id, :profile, :boot, :mission, :runner, :controller, :reflex, :receiver]
   defstruct @enforce_keys ++ [stop: %EStop.State{}, entries: %{}, sequence: 0, beat_ms: nil]
@@ -134,6 +141,9 @@ defmodule Swarm.Member do
       {:error, :idle} -> begin(member, member.mission, :start)
     end
   end
+
+  def step(member, {:command, {:start, module, options}, _at_ms}),
+    do: begin(member, {module, options}, :start)
 
   def step(%{runner: %{module: Manual}} = member, {:command, command, _at_ms})
       when is_alone(command),
