@@ -10,7 +10,8 @@ defmodule Robot.Mission do
 
   @type event ::
           {:tick, Robot.Percept.t()}
-          | {:message, struct()}
+          | {:message,
+             %{:from => atom(), :kind => atom(), :body => term(), optional(atom()) => term()}}
           | {:outcome, tag :: term(), integer()}
           | {:command, command :: term()}
 
@@ -20,12 +21,17 @@ defmodule Robot.Mission do
     * `{:anchors, anchors}` - the references for the pose (`Robot.Localiser.Anchors`)
     * `{:look, pan}` - where the camera looks, radians, left positive, unless the behaviour
       decides
-    * `{:send, to, message}` - sends a message to one robot, to several, or to `:all`
-    * `{:claim, map}` - what the robot reports about itself until the next claim
-    * `{:stage, name, map}` - reports an event to people
+    * `{:tell, to, kind, fields}` - sends a message of the mission's own (`c:messages/0`) to one robot, to
+      several, or to `:all`
+    * `{:send, to, message}` - sends a message that all robots share (`Swarm.Message`) likewise
+    * `{:claim, map}` - what the robot reports about itself until the next claim: `phase:`, `standing:` and the other fields
+      of `Swarm.Membership.Heartbeat` go to all robots; for people there are `blocked_by:` and `says:`, each a line or `nil`, which
+      stand in its status, and `formed:`, that it has what the mission wants, which ends a run of the demo
+    * `{:stage, name, map}` - reports an event to people; `says:` is how it is told, after the robot's name
   """
   @type effect ::
           order()
+          | {:tell, to :: atom() | [atom()] | :all, kind :: atom(), fields :: keyword()}
           | {:send, to :: atom() | [atom()] | :all, struct()}
           | {:claim, map()}
           | {:stage, atom(), map()}
@@ -76,7 +82,26 @@ defmodule Robot.Mission do
   """
   @callback explain(mission :: term()) :: [{label :: String.t(), text :: String.t()}]
 
-  @optional_callbacks halted: 1, options: 2, option_table: 0, explain: 1
+  @typedoc """
+  The version of a mission's messages, and what it hears: a table for each kind of its own, `:shared` for
+  a kind that all robots share (`Swarm.Message`).
+  """
+  @type messages :: {version :: pos_integer(), [{kind :: atom(), Hal.Options.table() | :shared}]}
+
+  @doc """
+  The messages that the mission hears, and says by `{:tell, to, kind, fields}` (`Robot.Mission.Letter`). Robots
+  whose missions have another version here do not hear each other. A mission without this callback has
+  no messages of its own.
+  """
+  @callback messages() :: messages()
+
+  @doc """
+  The names of the commands for a running mission that it understands, beside `:start`, such as `[:formation]`. People are
+  told that a robot does not take the others. A mission without this callback gets every command.
+  """
+  @callback commands() :: [atom()]
+
+  @optional_callbacks halted: 1, options: 2, option_table: 0, explain: 1, messages: 0, commands: 0
 
   @doc """
   Whether a module is a mission: it is part of this build and declares this behaviour.
@@ -92,6 +117,11 @@ defmodule Robot.Mission do
         key == :behaviour and __MODULE__ in value
       end)
   end
+
+  @doc "Whether a mission takes this command while it runs (`c:commands/0`)."
+  @spec understands?(module(), command :: atom()) :: boolean()
+  def understands?(module, command),
+    do: not function_exported?(module, :commands, 0) or command in module.commands()
 
   @doc "Whether a mission says what its options are."
   @spec checks?(module()) :: boolean()

@@ -11,6 +11,7 @@ defmodule Swarm.Missions do
   """
   alias Hal.Options
   alias Hal.Options.{Suggest, Type, Wording}
+  alias Robot.File.Terms
   alias Robot.Mission
 
   @typedoc "How people name a mission: by its name, also as text, or by its module; with options or without."
@@ -103,11 +104,9 @@ defmodule Swarm.Missions do
   defp named?(nil), do: true
 
   defp named?({name, options} = named) when is_atom(name) and name != nil do
-    with {:ok, module} <- fetch(name) do
-      case option_table(module) do
-        nil -> with {:ok, _checked} <- choose(named, nil), do: true
-        table -> with {:ok, read} <- Type.read({:keys, table}, options), do: {:ok, {name, read}}
-      end
+    case fetch(name) do
+      {:ok, module} -> within(option_table(module), named, options)
+      {:error, _line} -> refuse(name)
     end
   end
 
@@ -116,6 +115,17 @@ defmodule Swarm.Missions do
   defp named?(name) do
     known? = is_atom(name) and (Keyword.has_key?(known(), name) or Mission.mission?(name))
     if known?, do: true, else: refuse(name)
+  end
+
+  defp within([_ | _] = table, named, options),
+    do:
+      with({:ok, read} <- Type.read({:keys, table}, options), do: {:ok, put_elem(named, 1, read)})
+
+  defp within(_no_table, named, options) do
+    case Terms.strange(options) do
+      nil -> with {:ok, _checked} <- choose(named, nil), do: true
+      name -> Wording.refuse("a name that this build knows", name)
+    end
   end
 
   # A name that is no atom, as a robot file has it, is shown as it was written.

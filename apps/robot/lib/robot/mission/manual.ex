@@ -73,6 +73,10 @@ defmodule Robot.Mission.Manual do
 
   def handle(_event, mission), do: result(mission, [])
 
+  # A person's commands for this robot alone, of which a formation is none.
+  @impl Robot.Mission
+  def commands, do: []
+
   defp result(%{command: nil} = mission, effects), do: {:ready, mission, effects}
 
   defp result(%{result: nil} = mission, effects),

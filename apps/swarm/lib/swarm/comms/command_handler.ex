@@ -218,7 +218,7 @@ defmodule Swarm.Comms.CommandHandler do
     do: with({:ok, anew} <- begin(options, config), do: {:ok, [anew]})
 
   defp ways({:start, module, options}, _config), do: {:ok, [{:start, module, options}]}
-  defp ways({:formation, _kind, _spacing}, _config), do: {:ok, [{:hand, {:except, Manual}}]}
+  defp ways({:formation, _kind, _spacing}, _config), do: {:ok, [{:hand, {:taking, :formation}}]}
   defp ways(_alone, _config), do: {:ok, [{:hand, {:only, Manual}}, {:start, Manual, []}]}
 
   defp begin(options, config) do
