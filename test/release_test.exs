@@ -225,17 +225,17 @@ defmodule System.ReleaseTest do
 
     assert {said, 0} = check.("mission: :landmark, formation: {:echelon, 1.2}")
     assert said =~ ~r/mission +landmark, in echelon of 1.20 m$/m
-    assert {said, 0} = check.("mission: :patrol")
-    assert said =~ ~r/mission +patrol$/m
+    assert {said, 0} = check.("mission: :sentry")
+    assert said =~ ~r/mission +sentry$/m
     assert {said, 1} = check.("mission: :landmark, formation: {:echeln, 1.2}")
 
     assert said =~
              ~r/mag1.exs:\d+: policies.formation: .*or :echelon is allowed; did you mean :echelon\?/
 
-    assert {said, 1} = check.("mission: :patorl")
+    assert {said, 1} = check.("mission: :sentyr")
 
     assert said =~
-             ~r/mag1.exs:\d+: policies.mission: .*or :patrol is allowed; did you mean :patrol\?/
+             ~r/mag1.exs:\d+: policies.mission: .*or :sentry is allowed; did you mean :sentry\?/
   end
 
   # The same release as a build has made it whose configuration names a mission and a formation of its own.
@@ -263,7 +263,7 @@ defmodule System.ReleaseTest do
             def slot(rank, _robots), do: {-0.8 * rank, 0.8 * rank}
           end
 
-          defmodule Mine.Patrol do
+          defmodule Mine.Sentry do
             @behaviour Robot.Mission
             def init(_robot, _options), do: {:idle, :idle, []}
             def handle(_event, mission), do: {:idle, mission, []}
@@ -275,7 +275,7 @@ defmodule System.ReleaseTest do
     {:ok, [settings]} = :file.consult(path)
 
     words = [
-      missions: &(&1 ++ [patrol: Mine.Patrol]),
+      missions: &(&1 ++ [sentry: Mine.Sentry]),
       formations: fn _ -> [echelon: Mine.Echelon] end
     ]
 

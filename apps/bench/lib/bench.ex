@@ -87,6 +87,20 @@ defmodule Bench do
 
   def limit_s(%{limit_s: limit_s}, _map), do: limit_s
 
+  @doc """
+  The cases that another mission than the landmark's can be measured in: those that name no
+  shape, no landmark and no leader. A robot in the middle of a formation is one of its robots then.
+
+      iex> names = for case <- Bench.of_any_mission(Bench.cases()), do: case.name
+      iex> {"six" in names, "loss" in names, "wedge" in names, "kill-leader" in names}
+      {true, true, false, false}
+  """
+  @spec of_any_mission([case()]) :: [case()]
+  def of_any_mission(cases) do
+    own = [:formation, :assign, :landmark, :leader_change]
+    for case <- cases, case.deed == nil, Map.take(case.options, own) == %{}, do: case
+  end
+
   @doc "The options of `Sim.Trial.new/1` for a case, a map and a seed."
   @spec options(case(), String.t(), integer(), :painted | :direct) :: map()
   def options(case, map, seed, blobs) do

@@ -32,11 +32,14 @@ defmodule Swarm do
   alias Swarm.Comms.Transport
   alias Swarm.EStop.Broadcaster
   alias Swarm.Membership.Matrix
+  alias Swarm.Missions.Text
   alias Swarm.Directory.{Presence, Search}
 
   alias Swarm.Status.Report
 
   @type robot :: atom() | String.t()
+  @typedoc "A mission by its name, also as text, or by its module (`Swarm.Missions`)."
+  @type mission :: atom() | String.t()
   @type answer :: :ok | {:error, line :: String.t()}
 
   @doc """
@@ -69,9 +72,10 @@ defmodule Swarm do
   end
 
   @doc """
-  Starts the group's mission: find the landmark, elect who leads, follow in formation. Options:
-  `formation` (`:wedge` or `{:wedge, 1.2}`), `assign` (`:chain` or `:cost`), `leader_change`
-  (whether another robot may take over), `robots` (who takes part, default `:all`), `policy`
+  Starts the group's mission: that of each robot's file, else the first that is configured, which finds the landmark,
+  elects who leads, and follows in formation. Options: `robots` (who takes part, default `:all`), and those of the
+  landmark mission: `formation` (`:wedge` or `{:wedge, 1.2}`), `assign` (`:chain` or `:cost`), `leader_change`
+  (whether another robot may take over), `policy`
   (`:available`, the default: each part of a divided fleet leads itself, or `:majority`: only more
   than half of the fleet, whose size is the number of `robots` unless `of` says another),
   `lost_link` (`:stop`, `:hold` or `:continue`: what a robot does when it no longer hears anybody;
@@ -79,11 +83,31 @@ defmodule Swarm do
 
       Swarm.start()
       Swarm.start(formation: {:diamond, 1.0}, robots: [:mag1, :mag2, :min1])
+
+  A name instead of options starts that mission (`start/2`).
   """
-  @spec start(keyword()) :: answer()
-  def start(options \\ []) do
-    with {:ok, robots, options} <- Commands.start(options),
-         do: Commands.tell(robots, {:start, options})
+  @spec start(keyword() | mission()) :: answer()
+  def start(options \\ [])
+
+  def start(mission) when (is_atom(mission) and mission != nil) or is_binary(mission),
+    do: start(mission, [])
+
+  def start(options), do: begin(nil, options)
+
+  @doc """
+  Starts the mission of this name (`Swarm.Missions`), or of this module, on all robots or on `robots:`; the other
+  options are those of the mission. It replaces what the robots do.
+
+      Swarm.start(:patrol)
+      Swarm.start(:patrol, period: 90, robots: [:mag1, :mag2])
+      Swarm.start(MyApp.Dance, [])
+  """
+  @spec start(mission(), keyword()) :: answer()
+  def start(mission, options), do: begin(mission, options)
+
+  defp begin(mission, options) do
+    with {:ok, robots, request} <- Commands.start(mission, options),
+         do: Commands.tell(robots, request)
   end
 
   @doc """
@@ -110,6 +134,8 @@ defmodule Swarm do
       Swarm.tell(:mag1, "goto:2.0:1.0")
       Swarm.tell([:mag1, :mag2], "move:0.2:0.1")
       Swarm.tell(:all, "stop")
+      Swarm.tell(:all, "start:patrol:period=90")
+      Swarm.tell(:mag1, "wander")
 
   `"ping"` is a question: a robot answers with its name, how long it has been up, and its state
   and for how long it has been in it.
@@ -275,6 +301,7 @@ defmodule Swarm do
 
   defp command(to, request) do
     with {:ok, robots} <- Commands.robots(to),
+         {:ok, request} <- Text.request(request, length(robots)),
          {:ok, request} <- Commands.Order.check(request),
          do: Commands.tell(robots, request)
   end

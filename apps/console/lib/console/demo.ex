@@ -113,15 +113,22 @@ defmodule Console.Demo do
   end
 
   @doc """
-  The first line of a run: the robots, the map, the seed and the formation; and where the landmark
+  The first line of a run: the robots, the map, the seed and the formation, or the mission; and where the landmark
   stands, if that was chosen and is not the origin.
   """
   @spec heading(Options.t(), Sim.Scene.t()) :: String.t()
   def heading(options, scene) do
-    {kind, spacing} = options.formation
-
     "#{Format.count(length(options.robots), "robot")} (#{Fleet.describe(options.robots)}) in " <>
-      "#{options.map}, seed #{options.seed}, #{kind} with #{Format.decimals(spacing, 1)} m spacing" <>
+      "#{options.map}, seed #{options.seed}, " <> task(options, scene)
+  end
+
+  defp task(%{mission: {module, _own}}, _scene) when module != Missions.Landmark,
+    do: Swarm.Missions.name(module)
+
+  defp task(options, scene) do
+    {kind, spacing} = scene.formation
+
+    "#{kind} with #{Format.decimals(spacing, 1)} m spacing" <>
       landmark(options.landmark, scene.landmark)
   end
 

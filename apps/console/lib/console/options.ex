@@ -8,6 +8,7 @@ defmodule Console.Options do
   alias Console.Live.Pace
   alias Hal.Options.Suggest
   alias Sim.Floorplan.Maps
+  alias Swarm.Missions
 
   defstruct robots: nil,
             seed: 1,
@@ -18,6 +19,7 @@ defmodule Console.Options do
             kills: [],
             loss: 0.0,
             noise: :default,
+            mission: nil,
             formation: {:column, 1.0},
             assign: :cost,
             leader_change: true,
@@ -63,6 +65,7 @@ defmodule Console.Options do
       pairs
       |> Enum.reduce(options, &put/2)
       |> check_kills()
+      |> check_mission()
       |> check_hardware()
       |> check_record()
       |> check_speed()
@@ -74,7 +77,8 @@ defmodule Console.Options do
   @spec help() :: String.t()
   def help do
     """
-    A fleet of robots searches for a landmark, elects a leader and follows it in formation.
+    A fleet of robots searches for a landmark, elects a leader and follows it in formation,
+    or carries out another mission.
 
       bin/demo [options]        (or: mix demo [options])
 
@@ -83,6 +87,7 @@ defmodule Console.Options do
     Examples
       bin/demo                                              six robots, live in the terminal
       bin/demo --robots 12 --formation wedge:1.2            twelve of them in a V
+      bin/demo --robots 4 --mission patrol:period=90        four of them visit points for ever
       bin/demo --headless --kill leader@40 --seed 7         what happens when the leader dies?
       bin/demo --headless --move 3,2@40 --picture run.svg   the landmark moves away; see the paths
       bin/demo --headless --map hospital --json -           a report for another program
@@ -92,7 +97,7 @@ defmodule Console.Options do
       bin/demo --nodes --headless --kill leader@40 --json - the same with a report
       bin/demo --hardware 1                                 the first robot has the real drivers
 
-    Exit status: 0 the fleet ended in formation, or a person at a terminal has quit; 2 it did
+    Exit status: 0 the fleet ended in formation (or as its mission wants it), or a person at a terminal has quit; 2 it did
     not; 1 something was wrong with the input, or the run ended before its time.
     """
   end
@@ -105,6 +110,7 @@ defmodule Console.Options do
       ~w(robots seed map start landmark moves kills loss noise formation assign leader_change blobs plan hardware)a
     )
     |> Map.put(:duration_s, duration_s(options))
+    |> Map.merge(if options.mission, do: %{mission: options.mission}, else: %{})
     |> Map.merge(if options.nodes, do: %{nodes: true}, else: %{})
     |> Map.merge(if options.trace, do: %{trace: options.trace}, else: %{})
   end
@@ -149,6 +155,8 @@ defmodule Console.Options do
       {"loss", "P", &Parse.number(&1, 0, 1), "share of radio messages lost, 0 to 1 (0)"},
       {"noise", "HOW", &Parse.choice(&1, off: :off, default: :default, slip: :slip),
        "of wheels and pictures: off, default, slip (default)"},
+      {"mission", "NAME[:KEY=VALUE,…]", &{:ok, &1},
+       "#{Parse.either(Missions.names())}, with options of it\n(#{hd(Missions.names() ++ ["none"])})"},
       {"formation", "KIND[:SPACING]", &Parse.formation/1,
        "column, line, wedge, triangle, diamond or circle;\nspacing 0.8 to 5 m (column:1)"},
       {"assign", "HOW", &Parse.choice(&1, chain: :chain, cost: :cost),
@@ -217,6 +225,18 @@ the prompt then takes pause, step, speed"},
       lines -> {:error, lines}
     end
   end
+
+  # How many robots there are is known by now.
+  defp check_mission({:ok, %{mission: nil}} = fine), do: fine
+
+  defp check_mission({:ok, %{mission: text} = options}) do
+    case Missions.Text.read(text, length(options.robots)) do
+      {:ok, mission} -> {:ok, %{options | mission: mission}}
+      {:error, line} -> {:error, ["--mission: #{line}"]}
+    end
+  end
+
+  defp check_mission(error), do: error
 
   defp named({"leader", at_s}, _robots), do: {:ok, {:leader, at_s}}
 

@@ -12,7 +12,7 @@ defmodule Console.Report do
 
   @keys ~w(version seed map robots simulated_s wall_s stages leader leaders_at_once_max
            leader_changes formation claims stuck landmark_distance_m collisions min_separation_m messages fleet)a
-  @stage ~w(stage at_s robot epoch size_ppm as asked followers)a
+  @stage ~w(stage at_s robot epoch size_ppm as asked followers says)a
   @formation ~w(kind spacing_m error_mean_m error_max_m share_of_time_formed)a
   @claim ~w(at_s robot worst_m worst_5s_m)a
   @messages ~w(sent lost)a
@@ -35,7 +35,7 @@ defmodule Console.Report do
       messages: object(result.messages, @messages),
       fleet: Enum.map(result.fleet, &object(&1, @robot))
     })
-    |> object(@keys)
+    |> object(if(result.mission, do: [:mission | @keys], else: @keys))
   end
 
   @doc "The report as JSON: one line with a newline at its end."
@@ -97,6 +97,13 @@ defmodule Console.Report do
   # -0.0 and 0.0 are the same number and must be the same text.
   defp tidy(zero) when zero == 0.0, do: 0.0
   defp tidy(float), do: float
+
+  defp outcome(%{leader: nil, mission: mission} = result, formed?)
+       when mission not in [nil, "landmark"] do
+    does = if formed?, do: "has what it wants", else: "does not have what it wants"
+    living = Enum.count(result.fleet, & &1.alive)
+    "The #{mission} of #{Format.count(living, "robot")} #{does}."
+  end
 
   defp outcome(%{leader: nil} = result, _formed?),
     do: "No formation: #{Format.count(result.robots, "robot")}, and none of them leads."

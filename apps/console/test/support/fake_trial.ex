@@ -115,6 +115,7 @@ defmodule Console.FakeTrial do
       leader: trial.leader,
       leaders_at_once_max: if(trial.leader, do: 1, else: 0),
       leader_changes: max(0, trial.epoch - 1),
+      mission: nil,
       formation: %{
         kind: kind,
         spacing_m: spacing,

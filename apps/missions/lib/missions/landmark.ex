@@ -65,6 +65,12 @@ defmodule Missions.Landmark do
   defdelegate option_table, to: Landmark.Options, as: :table
 
   @impl Robot.Mission
+  def messages, do: {1, round: :shared, place: :shared}
+
+  @impl Robot.Mission
+  def commands, do: [:formation]
+
+  @impl Robot.Mission
   defdelegate explain(mission), to: Landmark.Explanation, as: :lines
 
   @impl Robot.Mission

@@ -118,6 +118,52 @@ defmodule Swarm.CommandsTest do
     assert {Missions.Landmark, _} = state(id)
   end
 
+  test "a mission is started by its name, in words, or by its module; a wrong name starts nothing" do
+    id = robot(:command_named)
+    standing([id])
+    assert order(fn -> Swarm.start(:landmark, formation: :wedge) end) == :ok
+    assert %{formation: {:wedge, 1.0}} = mission(id)
+    assert order(fn -> Swarm.tell(id, "start:landmark:formation=line:1.5") end) == :ok
+    assert %{formation: {:line, 1.5}} = mission(id)
+    assert order(fn -> Swarm.start(Robot.Mission.Manual, robots: [id]) end) == :ok
+    assert {Robot.Mission.Manual, _} = state(id)
+    assert order(fn -> Swarm.start("landmark") end) == :ok
+    assert {Missions.Landmark, _} = state(id)
+
+    for wrong <- [
+          Swarm.start(:landmrk),
+          Swarm.start("landmrk", robots: [id]),
+          Swarm.tell(id, "start:landmrk")
+        ],
+        do:
+          assert(
+            line(wrong) =~ ~r/^mission :?"?landmrk"? is not known; .* did you mean :?landmark\?$/
+          )
+
+    assert line(Swarm.start(:landmark, formatoin: :line)) =~ "did you mean formation?"
+    assert line(Swarm.start(:landmark, 5)) =~ "5"
+    # Even if it is sent past the public interface.
+    assert line(Swarm.ask(id, {:start, Enum, []})) =~ "mission Enum is not known"
+    assert line(Swarm.ask(id, {:start, :landmark, [assign: :luck]})) =~ "assign cannot be :luck"
+    assert line(Swarm.ask(id, {:start, "landmark", []})) =~ "not a command"
+    assert {Missions.Landmark, _} = state(id)
+  end
+
+  test "behaviours drive one robot by their names" do
+    id = robot(:command_behaves)
+    standing([id])
+
+    for {text, name} <- [{"wander", :wander}, {"square:0.5", :goto}, {"rest", :rest}] do
+      assert order(fn -> Swarm.tell(id, text) end) == :ok
+      eventually(fn -> doing(id) == name end)
+    end
+
+    assert line(Swarm.tell(id, "square:50")) ==
+             "square cannot take 50.0: a side from 0.2 to 10.0 m is allowed"
+
+    assert line(Swarm.tell(id, "wandr")) =~ "did you mean wander?"
+  end
+
   test "a formation is :ok only when all on the mission have it; a robot that does not answer is named" do
     for id <- [:shape1, :shape2, :shape3], do: robot(id)
     standing([:shape1, :shape2, :shape3])

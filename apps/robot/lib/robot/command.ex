@@ -14,7 +14,9 @@ defmodule Robot.Command do
   | `subscribe:NAME`, `unsubscribe:NAME` | `{:subscribe, id}`, `{:unsubscribe, id}`; see below |
   | `position:X:Y:THETA`, `follow:X:Y:THETA` | `{:position, pose}`, `{:follow, pose}` |
   | `blob:X:Y:THETA:SIZE:FOUND` | `{:blob, pose, size, found?}`; FOUND is 0 or 1 |
+  | `wander`, `rest`, `square` or `square:SIDE` | `:wander`, `:rest`, `{:square, metres or nil}` (`Robot.Behaviour`) |
   | `lead`, `start`, `ping` | `:lead`, `:start`, `:ping` |
+  | `start:MISSION` or `start:MISSION:OPTIONS` | `{:start, text}`, a mission and its options in words (`Swarm.Missions.Text`) |
   | `arm`, `disarm`, `acknowledge` | `:arm`, `:disarm`, `:acknowledge` (`Hal.Device.Arming`) |
 
   Robots refuse subscriptions, because all robots report their poses to all others anyway.
@@ -27,6 +29,10 @@ defmodule Robot.Command do
           :stop
           | :lead
           | :start
+          | {:start, mission :: String.t()}
+          | :wander
+          | :rest
+          | {:square, side :: float() | nil}
           | :ping
           | :arm
           | :disarm
@@ -55,14 +61,17 @@ defmodule Robot.Command do
     {"blob", [:x, :y, :theta, :size, :found], []},
     {"follow", [:x, :y, :theta], []},
     {"lead", [], []},
-    {"start", [], []},
+    {"wander", [], []},
+    {"rest", [], []},
+    {"square", [], [:side]},
+    {"start", [], [:mission, :options]},
     {"ping", [], []},
     {"arm", [], []},
     {"disarm", [], []},
     {"acknowledge", [], []}
   ]
 
-  @bare [:stop, :lead, :start, :ping, :arm, :disarm, :acknowledge]
+  @bare [:stop, :lead, :start, :wander, :rest, :ping, :arm, :disarm, :acknowledge]
   @keywords Enum.map(@grammar, &elem(&1, 0))
   # No valid command is longer.
   @longest 500
@@ -79,6 +88,8 @@ defmodule Robot.Command do
       {:ok, {:goto, 2.0, -1.0, nil}}
       iex> Robot.Command.parse("move:0.5:0:0.3", [])
       {:ok, {:move, 0.5, 0.0, 0.3}}
+      iex> Robot.Command.parse("start:patrol:period=90", [])
+      {:ok, {:start, "patrol:period=90"}}
       iex> Robot.Command.parse("followtheleader:mag1", [:mag1, :min1])
       {:ok, {:follow_the_leader, :mag1}}
       iex> Robot.Command.parse("goto:abc:1", [])
@@ -106,6 +117,8 @@ defmodule Robot.Command do
 
   defp command([word | arguments], known) do
     keyword = word |> String.trim() |> String.downcase()
+    # The options of a mission may hold colons, too.
+    arguments = if keyword == "start", do: joined(arguments), else: arguments
 
     case List.keyfind(@grammar, keyword, 0) do
       nil ->
@@ -118,6 +131,9 @@ defmodule Robot.Command do
              do: {:ok, build(keyword, values)}
     end
   end
+
+  defp joined([mission | [_ | _] = options]), do: [mission, Enum.join(options, ":")]
+  defp joined(arguments), do: arguments
 
   defp arguments(keyword, must, may, arguments, known) do
     names = must ++ may
@@ -157,6 +173,11 @@ defmodule Robot.Command do
   defp build("stop", []), do: :stop
   defp build("lead", []), do: :lead
   defp build("start", []), do: :start
+  defp build("start", words), do: {:start, Enum.join(words, ":")}
+  defp build("wander", []), do: :wander
+  defp build("rest", []), do: :rest
+  defp build("square", []), do: {:square, nil}
+  defp build("square", [side]), do: {:square, side}
   defp build("ping", []), do: :ping
   defp build("arm", []), do: :arm
   defp build("disarm", []), do: :disarm
@@ -186,6 +207,9 @@ defmodule Robot.Command do
   """
   @spec to_text(t()) :: String.t()
   def to_text(word) when word in @bare, do: Atom.to_string(word)
+  def to_text({:start, mission}), do: join("start", [mission])
+  def to_text({:square, nil}), do: "square"
+  def to_text({:square, side}), do: join("square", [side])
   def to_text({:move, v, w}), do: join("move", [v, w])
   def to_text({:move, v, w, for_s}), do: join("move", [v, w, for_s])
   def to_text({:goto, x, y, nil}), do: join("goto", [x, y])

@@ -10,7 +10,8 @@ defmodule Robot.Mission do
 
   @type event ::
           {:tick, Robot.Percept.t()}
-          | {:message, struct()}
+          | {:message,
+             %{:from => atom(), :kind => atom(), :body => term(), optional(atom()) => term()}}
           | {:outcome, tag :: term(), integer()}
           | {:command, command :: term()}
 
@@ -20,12 +21,17 @@ defmodule Robot.Mission do
     * `{:anchors, anchors}` - the references for the pose (`Robot.Localiser.Anchors`)
     * `{:look, pan}` - where the camera looks, radians, left positive, unless the behaviour
       decides
-    * `{:send, to, message}` - sends a message to one robot, to several, or to `:all`
-    * `{:claim, map}` - what the robot reports about itself until the next claim
-    * `{:stage, name, map}` - reports an event to people
+    * `{:tell, to, kind, fields}` - sends a message of the mission's own (`c:messages/0`) to one robot, to
+      several, or to `:all`
+    * `{:send, to, message}` - sends a message that all robots share (`Swarm.Message`) likewise
+    * `{:claim, map}` - what the robot reports about itself until the next claim: `phase:`, `standing:` and the other fields
+      of `Swarm.Membership.Heartbeat` go to all robots; for people there are `blocked_by:` and `says:`, each a line or `nil`, which
+      stand in its status, and `formed:`, that it has what the mission wants, which ends a run of the demo
+    * `{:stage, name, map}` - reports an event to people; `says:` is how it is told, after the robot's name
   """
   @type effect ::
           order()
+          | {:tell, to :: atom() | [atom()] | :all, kind :: atom(), fields :: keyword()}
           | {:send, to :: atom() | [atom()] | :all, struct()}
           | {:claim, map()}
           | {:stage, atom(), map()}
@@ -57,15 +63,16 @@ defmodule Robot.Mission do
   @doc """
   Checks and completes the options of a start as people write them. `robots` is how many robots
   start together, `nil` if that is not known. Options that were checked before must pass
-  unchanged. A mission without this callback takes no options.
+  unchanged. Only for what a table cannot say: a mission without this callback takes the options
+  of its `c:option_table/0`, and none without a table.
   """
   @callback options(keyword(), robots :: pos_integer() | nil) ::
               {:ok, keyword()} | {:error, line :: String.t()}
 
   @doc """
-  The options that a robot file may give the mission (`policies:`), as a table, so that
-  `mix robot.check` and the robot's start can name the line and the key of an error. For a mission
-  without this callback only `c:options/2` is called.
+  The options of the mission as a table. From it people can give them as text
+  (`bin/demo --mission patrol:period=90`), and `mix robot.check` can name the line and the key of an
+  error in a robot file. For a mission without this callback only `c:options/2` is called.
   """
   @callback option_table() :: Hal.Options.table()
 
@@ -75,5 +82,94 @@ defmodule Robot.Mission do
   """
   @callback explain(mission :: term()) :: [{label :: String.t(), text :: String.t()}]
 
-  @optional_callbacks halted: 1, options: 2, option_table: 0, explain: 1
+  @typedoc """
+  The version of a mission's messages, and what it hears: a table for each kind of its own, `:shared` for
+  a kind that all robots share (`Swarm.Message`).
+  """
+  @type messages :: {version :: pos_integer(), [{kind :: atom(), Hal.Options.table() | :shared}]}
+
+  @doc """
+  The messages that the mission hears, and says by `{:tell, to, kind, fields}` (`Robot.Mission.Letter`). Robots
+  whose missions have another version here do not hear each other. A mission without this callback has
+  no messages of its own.
+  """
+  @callback messages() :: messages()
+
+  @doc """
+  The names of the commands for a running mission that it understands, beside `:start`, such as `[:formation]`. People are
+  told that a robot does not take the others. A mission without this callback gets every command.
+  """
+  @callback commands() :: [atom()]
+
+  @optional_callbacks halted: 1, options: 2, option_table: 0, explain: 1, messages: 0, commands: 0
+
+  @doc """
+  Whether a module is a mission: it is part of this build and declares this behaviour.
+
+      iex> for module <- [Robot.Mission.Manual, Robot.Percept, :no_such_module],
+      ...>   do: Robot.Mission.mission?(module)
+      [true, false, false]
+  """
+  @spec mission?(module()) :: boolean()
+  def mission?(module) do
+    Code.ensure_loaded?(module) and
+      Enum.any?(module.module_info(:attributes), fn {key, value} ->
+        key == :behaviour and __MODULE__ in value
+      end)
+  end
+
+  @doc "Whether a mission takes this command while it runs (`c:commands/0`)."
+  @spec understands?(module(), command :: atom()) :: boolean()
+  def understands?(module, command),
+    do: not function_exported?(module, :commands, 0) or command in module.commands()
+
+  @doc "Whether a mission says what its options are."
+  @spec checks?(module()) :: boolean()
+  def checks?(module),
+    do: function_exported?(module, :options, 2) or function_exported?(module, :option_table, 0)
+
+  @doc """
+  The options of a start, checked and completed by the mission, or else by its table; the error is
+  one line.
+
+      iex> Robot.Mission.check_options(Robot.Mission.Manual, [speed: 1], nil)
+      {:error, "manual takes no options"}
+  """
+  @spec check_options(module(), keyword(), robots :: pos_integer() | nil) ::
+          {:ok, keyword()} | {:error, line :: String.t()}
+  def check_options(module, options, robots) do
+    cond do
+      function_exported?(module, :options, 2) ->
+        checked(module, module.options(options, robots))
+
+      function_exported?(module, :option_table, 0) ->
+        Hal.Options.check(options, module.option_table(), subject(module))
+
+      options == [] ->
+        {:ok, []}
+
+      true ->
+        {:error, "#{subject(module)} takes no options"}
+    end
+  end
+
+  defp checked(_module, {:error, line} = error) when is_binary(line), do: error
+
+  defp checked(module, answer) do
+    with {:ok, options} <- answer, true <- Keyword.keyword?(options) do
+      {:ok, options}
+    else
+      _other -> {:error, "#{inspect(module)}.options/2 returned neither options nor an error"}
+    end
+  end
+
+  @doc """
+  What messages call a mission whose name nobody has configured.
+
+      iex> Robot.Mission.subject(Robot.Mission.Manual)
+      "manual"
+  """
+  @spec subject(module()) :: String.t()
+  def subject(module),
+    do: module |> inspect() |> String.split(".") |> List.last() |> Macro.underscore()
 end

@@ -213,7 +213,7 @@ defmodule Sim.FleetTest do
     for {mission, nodes?, word} <- [
           {{NoSuchModule, []}, false, "NoSuchModule is not a Robot.Mission"},
           {{Turn, [1]}, false, "options"},
-          {:patrol, false, "true, false or"},
+          {5, false, "true, false, a name or"},
           {{Turn, rate: 0.3}, true, "with nodes"}
         ] do
       options = %{robots: [:mag76], map: "hall", mission: mission, nodes: nodes?}

@@ -50,15 +50,27 @@ defmodule Swarm.Commands do
       Suggest.hint(word, Enum.map(known, &Atom.to_string/1))
   end
 
-  @doc "Checks the options of a start: which robots take part, and the options of the mission."
-  @spec start(term()) :: {:ok, [atom()], keyword()} | {:error, String.t()}
-  def start(options) do
+  @doc """
+  Checks a start: which mission (`nil`: that of each robot's file), which robots take part, and the
+  options of the mission. Returns the request for these robots.
+  """
+  @spec start(term(), term()) :: {:ok, [atom()], request :: tuple()} | {:error, String.t()}
+  def start(mission, options) do
     with {:ok, options} <- keyword(options),
          {:ok, robots} <- robots(Keyword.get(options, :robots, :all)),
-         {:ok, mission} <- Missions.default(),
-         options = Keyword.delete(options, :robots),
-         {:ok, options} <- Missions.options(mission, options, length(robots)),
-         do: {:ok, robots, options}
+         {:ok, request} <- request(mission, Keyword.delete(options, :robots), length(robots)),
+         do: {:ok, robots, request}
+  end
+
+  defp request(nil, options, count) do
+    with {:ok, mission} <- Missions.default(),
+         {:ok, options} <- Missions.options(mission, options, count),
+         do: {:ok, {:start, options}}
+  end
+
+  defp request(mission, options, count) do
+    with {:ok, {module, options}} <- Missions.choose({mission, options}, count),
+         do: {:ok, {:start, module, options}}
   end
 
   defp keyword(options) do

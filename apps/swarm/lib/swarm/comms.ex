@@ -28,6 +28,7 @@ defmodule Swarm.Comms do
   """
   use GenServer
   alias Hal.{Event, HardenedServer, Ticker}
+  alias Robot.Mission.Letter
   alias Robot.{Board, Config, Names}
   alias Robot.Control.Pilot
   alias Mesh.Nonblocking
@@ -82,7 +83,9 @@ defmodule Swarm.Comms do
   `:all` those that are known here (`Swarm.Comms.Transport.robots/0`). It waits for nobody, and
   nobody confirms the message.
   """
-  @spec say(robot :: atom(), to :: atom() | [atom()] | :all, Message.t()) :: [atom()]
+  @spec say(robot :: atom(), to :: atom() | [atom()] | :all, Message.t() | Letter.t()) :: [atom()]
+  def say(robot, to, %Letter{} = letter), do: say(robot, to, Message.new(robot, :mission, letter))
+
   def say(robot, to, message) do
     ids = List.delete(addressed(to), robot)
     GenServer.cast(Names.via(robot, :comms), {:say, ids, message})

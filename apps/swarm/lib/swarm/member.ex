@@ -16,9 +16,9 @@ defmodule Swarm.Member do
   Effects: `{:drive, twist}`, `{:look, pan, tilt}`, `{:send, to, message}`, `{:stage, name, map}`.
   """
   alias Hal.{Pose, Profile, Twist}
-  alias Robot.Percept
+  alias Robot.{Mission, Percept}
   alias Robot.Control.Controller
-  alias Robot.Mission.{Manual, Runner}
+  alias Robot.Mission.{Letter, Manual, Runner}
   alias Robot.Safety.Reflex
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
@@ -27,9 +27,16 @@ defmodule Swarm.Member do
 
   # Orders for one robot alone (`Robot.Command`), which leaves the group's mission for them.
   defguardp is_alone(command)
-            when command == :lead or
+            when command in [:lead, :wander, :rest] or
                    (is_tuple(command) and
-                      elem(command, 0) in [:goto, :move, :follow, :follow_the_leader, :find_blob])
+                      elem(command, 0) in [
+                        :goto,
+                        :move,
+                        :follow,
+                        :follow_the_leader,
+                        :find_blob,
+                        :square
+                      ])
 
   @enforce_keys [:id, :profile, :boot, :mission, :runner, :controller, :reflex, :receiver]
   defstruct @enforce_keys ++ [stop: %EStop.State{}, entries: %{}, sequence: 0, beat_ms: nil]
@@ -135,6 +142,9 @@ defmodule Swarm.Member do
     end
   end
 
+  def step(member, {:command, {:start, module, options}, _at_ms}),
+    do: begin(member, {module, options}, :start)
+
   def step(%{runner: %{module: Manual}} = member, {:command, command, _at_ms})
       when is_alone(command),
       do: handle(member, {:command, command})
@@ -142,7 +152,13 @@ defmodule Swarm.Member do
   def step(member, {:command, command, _at_ms}) when is_alone(command),
     do: begin(member, {Manual, []}, command)
 
-  # It has no formation.
+  def step(%{runner: %{module: module}} = member, {:command, {name, _, _} = command, _at_ms})
+      when name == :formation do
+    if module != nil and Mission.understands?(module, name),
+      do: handle(member, {:command, command}),
+      else: {member, []}
+  end
+
   def step(%{runner: %{module: Manual}} = member, {:command, _command, _at_ms}), do: {member, []}
   def step(member, {:command, command, _at_ms}), do: handle(member, {:command, command})
 
@@ -279,6 +295,10 @@ defmodule Swarm.Member do
 
   # The runner has it.
   defp carry_out_one({:claim, _claim}, member), do: {[], member}
+
+  defp carry_out_one({:send, to, %Letter{} = letter}, member),
+    do: {[{:send, to, Message.new(member.id, :mission, letter)}], member}
+
   defp carry_out_one(effect, member), do: {[effect], member}
 
   defp look(pan), do: for(pan <- List.wrap(pan), do: {:look, pan, 0.0})

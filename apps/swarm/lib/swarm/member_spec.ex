@@ -44,6 +44,14 @@ defmodule Swarm.MemberSpec do
 
   defp policies(named, [], _mission) when named in [[], [mission: nil]], do: {:ok, named}
 
+  defp policies([mission: {_name, _own}] = named, [], _mission) do
+    with {:ok, _mission} <- Missions.choose(named[:mission], nil), do: {:ok, named}
+  end
+
+  defp policies([mission: {name, _own}], [{key, _value} | _], _mission) do
+    {:error, [{["#{key}"], "is not allowed beside {#{inspect(name)}, …}: write it in there"}]}
+  end
+
   defp policies(named, options, mission) do
     with {:ok, module} <- module(named[:mission]),
          {:ok, values} <- options(Missions.option_table(module), named, options, mission),
@@ -90,13 +98,9 @@ defmodule Swarm.MemberSpec do
 
   defp mission(policies) do
     case Keyword.pop(policies, :mission) do
-      {nil, _options} ->
-        {:ok, nil}
-
-      {name, options} ->
-        with {:ok, module} <- Missions.fetch(name),
-             {:ok, options} <- Missions.options(module, options, nil),
-             do: {:ok, {module, options}}
+      {nil, _options} -> {:ok, nil}
+      {{_name, _own} = mission, []} -> Missions.choose(mission, nil)
+      {name, options} -> Missions.choose({name, options}, nil)
     end
   end
 end

@@ -12,6 +12,7 @@ defmodule Swarm.Message do
   | `:heartbeat` | `Swarm.Membership.Heartbeat` |
   | `:round` | one `Swarm.Agreement.Round` letter |
   | `:place` | `Swarm.Formation.Reference`: a parent tells its child where the leader is supposed to be |
+  | `:mission` | `Robot.Mission.Letter`, a message of a mission's own; the mission's table checks what it says |
   | `:relay` | a whole heartbeat or letter of another robot, for one that does not hear it (`Swarm.Comms.Forwarder`) |
 
   `hops` counts the robots that have passed a message on, at most three.
@@ -26,11 +27,11 @@ defmodule Swarm.Message do
   @enforce_keys [:from, :kind, :body]
   defstruct @enforce_keys ++ [hops: 0]
 
-  @type kind :: :heartbeat | :round | :place | :relay
+  @type kind :: :heartbeat | :round | :place | :mission | :relay
   @type t :: %__MODULE__{
           from: atom(),
           kind: kind(),
-          body: Heartbeat.t() | Round.Letter.t() | Reference.t() | t(),
+          body: Heartbeat.t() | Round.Letter.t() | Reference.t() | Robot.Mission.Letter.t() | t(),
           hops: 0..3
         }
 
@@ -41,7 +42,11 @@ defmodule Swarm.Message do
       iex> Swarm.Message.new(:mag1, :heartbeat, beat).kind
       :heartbeat
   """
-  @spec new(atom(), kind(), Heartbeat.t() | Round.Letter.t() | Reference.t() | t()) :: t()
+  @spec new(
+          atom(),
+          kind(),
+          Heartbeat.t() | Round.Letter.t() | Reference.t() | Robot.Mission.Letter.t() | t()
+        ) :: t()
   def new(from, kind, body), do: %__MODULE__{from: from, kind: kind, body: body}
 
   @doc """
@@ -69,7 +74,7 @@ defmodule Swarm.Message do
   """
   @spec check(term()) :: {:ok, t()} | {:error, :not_a_message | kind()}
   def check(%__MODULE__{from: from, kind: kind, body: body} = message)
-      when kind in [:heartbeat, :round, :place, :relay] do
+      when kind in [:heartbeat, :round, :place, :mission, :relay] do
     cond do
       not (WireTypes.whole?(message, __MODULE__) and WireTypes.name?(from)) ->
         {:error, :not_a_message}
@@ -90,6 +95,7 @@ defmodule Swarm.Message do
   defp valid?(:heartbeat, body), do: Heartbeat.valid?(body)
   defp valid?(:round, body), do: Round.Letter.valid?(body)
   defp valid?(:place, body), do: Reference.valid?(body)
+  defp valid?(:mission, body), do: Robot.Mission.Letter.valid?(body)
 
   # Nothing else is passed on, and nothing is wrapped twice.
   defp valid?(:relay, %__MODULE__{kind: kind} = inner) when kind in [:heartbeat, :round],

@@ -3,43 +3,142 @@ defmodule Swarm.Missions do
   The missions for groups that this node knows, by name. They live in apps above this
   one, so the configuration lists them:
 
-      config :swarm, missions: [landmark: Missions.Landmark]
+      config :swarm, missions: [landmark: Missions.Landmark, patrol: Missions.Patrol]
 
-  A robot whose file names no mission starts the first of them. `c:Robot.Mission.option_table/0`
-  of a mission defines the options that a robot file may give it.
+  A name reaches a mission everywhere: in `Swarm.start/2`, in a robot's file, in text commands
+  (`start:patrol`), in `bin/demo --mission`. A module that declares `Robot.Mission` may stand where a
+  name may. A robot that is told no mission starts that of its file, or else the first of the list.
   """
+  alias Hal.Options
+  alias Hal.Options.{Suggest, Type, Wording}
+  alias Robot.File.Terms
+  alias Robot.Mission
 
-  @doc "The mission of this name; an error is one line."
-  @spec fetch(atom()) :: {:ok, module()} | {:error, line :: String.t()}
+  @typedoc "How people name a mission: by its name, also as text, or by its module; with options or without."
+  @type named ::
+          atom() | String.t() | {atom() | String.t(), keyword()} | {module(), keyword()}
+
+  @doc """
+  The mission of this name, which may be text or a module; an error is one line that suggests what
+  may have been meant.
+  """
+  @spec fetch(atom() | String.t()) :: {:ok, module()} | {:error, line :: String.t()}
   def fetch(name) do
     known = known()
 
-    case Keyword.fetch(known, name) do
-      {:ok, module} -> loaded(module)
-      :error -> {:error, "mission #{inspect(name)} is not known; #{allowed(known)}"}
+    case Enum.find(known, fn {key, _module} -> key == name or Atom.to_string(key) == name end) do
+      {_name, module} ->
+        loaded(module)
+
+      nil ->
+        if is_atom(name) and name != nil and Mission.mission?(name),
+          do: {:ok, name},
+          else: unknown(name, known)
+    end
+  end
+
+  defp unknown(name, known) do
+    shown = Wording.show(name)
+    # In the notation of the one who asks.
+    names = if is_binary(name), do: names(), else: Keyword.keys(known)
+    {:error, "mission #{shown} is not known; #{allowed(names)}#{Suggest.hint(shown, names)}"}
+  end
+
+  @doc "The names of all missions, in their order."
+  @spec names() :: [String.t()]
+  def names, do: Enum.map(known(), fn {name, _module} -> Atom.to_string(name) end)
+
+  @doc "What people call a mission: its name, or its module if it has none."
+  @spec name(module()) :: String.t()
+  def name(module) do
+    case List.keyfind(known(), module, 1) do
+      {name, ^module} -> Atom.to_string(name)
+      nil -> inspect(module)
     end
   end
 
   @doc """
-  The type of a mission's name, or `nil`, in a table of `Hal.Options`. It asks all missions for
-  their options, so that the names of the options exist as atoms even for a reader that creates
-  none.
+  The module of a mission that people have named, and its checked options. `robots` is how many start
+  together, `nil` if that is not known. The error is one line.
   """
-  @spec type() :: Hal.Options.Type.t()
+  @spec choose(named() | term(), robots :: pos_integer() | nil) ::
+          {:ok, {module(), keyword()}} | {:error, line :: String.t()}
+  def choose({name, options}, robots) when is_atom(name) or is_binary(name) do
+    with {:ok, module} <- fetch(name),
+         {:keys, true} <- {:keys, Keyword.keyword?(options)},
+         {:ok, options} <- options(module, options, robots) do
+      {:ok, {module, options}}
+    else
+      {:keys, false} -> {:error, "mission #{said(name)} options #{not_keys(options)}"}
+      error -> error
+    end
+  end
+
+  def choose(name, robots) when is_atom(name) or is_binary(name), do: choose({name, []}, robots)
+
+  def choose(other, _robots) do
+    {:error,
+     "mission cannot be #{Wording.show(other)}: a name, or {name, [key: value, …]}, is allowed"}
+  end
+
+  defp not_keys(options) do
+    {:error, [{[], text}]} = Wording.refuse("[key: value, …]", options)
+    text
+  end
+
+  @doc """
+  A mission as robot files and other Elixir terms name it, for tables of `Hal.Options`: `nil`, a name,
+  or a name or module with options, `{:patrol, period: 90}`, `{:patrol, [period: 90]}`. It asks all missions for their
+  options, so that the names of the options exist as atoms even for a reader that creates none.
+  """
+  @spec type() :: Type.t()
   def type do
     known = known()
     Enum.each(known, fn {_name, module} -> option_table(module) || options(module, [], nil) end)
 
     if known == [],
-      do: {:check, &(&1 == nil), "nil (#{allowed([])})"},
-      else: {:one_of, [nil | Keyword.keys(known)]}
+      do: {:check, &named?/1, "nil (#{allowed([])})"},
+      else: {:check, &named?/1, "#{Enum.map_join(known, ", ", &inspect(elem(&1, 0)))} or nil"}
+  end
+
+  defp named?(nil), do: true
+
+  defp named?({name, options} = named) when is_atom(name) and name != nil do
+    case fetch(name) do
+      {:ok, module} -> within(option_table(module), named, options)
+      {:error, _line} -> refuse(name)
+    end
+  end
+
+  defp named?({name, _options}), do: refuse(name)
+
+  defp named?(name) do
+    known? = is_atom(name) and (Keyword.has_key?(known(), name) or Mission.mission?(name))
+    if known?, do: true, else: refuse(name)
+  end
+
+  defp within([_ | _] = table, named, options),
+    do:
+      with({:ok, read} <- Type.read({:keys, table}, options), do: {:ok, put_elem(named, 1, read)})
+
+  defp within(_no_table, named, options) do
+    case Terms.strange(options) do
+      nil -> with {:ok, _checked} <- choose(named, nil), do: true
+      name -> Wording.refuse("a name that this build knows", name)
+    end
+  end
+
+  # A name that is no atom, as a robot file has it, is shown as it was written.
+  defp refuse(name) do
+    {:error, [{[], text}]} = Wording.refuse({:one_of, [nil | Keyword.keys(known())]}, name)
+    {:error, text}
   end
 
   @doc """
-  The options that a robot file may give a mission (`c:Robot.Mission.option_table/0`); `nil` if
+  The options of a mission as a table (`c:Robot.Mission.option_table/0`); `nil` if
   the mission does not define them.
   """
-  @spec option_table(module()) :: Hal.Options.table() | nil
+  @spec option_table(module()) :: Options.table() | nil
   def option_table(module) do
     if Code.ensure_loaded?(module) and function_exported?(module, :option_table, 0),
       do: module.option_table()
@@ -55,28 +154,15 @@ defmodule Swarm.Missions do
   end
 
   @doc """
-  Checks the options of a start by the mission (`c:Robot.Mission.options/2`). `robots` is how many
-  start together, `nil` if that is not known. A mission without that callback takes no options.
+  Checks the options of a start by the mission (`Robot.Mission.check_options/3`). `robots` is how many
+  start together, `nil` if that is not known.
   """
   @spec options(module(), keyword(), pos_integer() | nil) ::
           {:ok, keyword()} | {:error, line :: String.t()}
   def options(module, options, robots) do
-    cond do
-      not Code.ensure_loaded?(module) -> {:error, "#{inspect(module)} is not part of this build"}
-      function_exported?(module, :options, 2) -> checked(module, module.options(options, robots))
-      options == [] -> {:ok, []}
-      true -> {:error, "#{inspect(module)} takes no options"}
-    end
-  end
-
-  defp checked(_module, {:error, line} = error) when is_binary(line), do: error
-
-  defp checked(module, answer) do
-    with {:ok, options} <- answer, true <- Keyword.keyword?(options) do
-      {:ok, options}
-    else
-      _other -> {:error, "#{inspect(module)}.options/2 returned neither options nor an error"}
-    end
+    if Code.ensure_loaded?(module),
+      do: Mission.check_options(module, options, robots),
+      else: {:error, "#{inspect(module)} is not part of this build"}
   end
 
   @doc "The applications that contain these missions, loaded."
@@ -107,5 +193,9 @@ defmodule Swarm.Missions do
   end
 
   defp allowed([]), do: "no mission is configured (config :swarm, missions: …)"
-  defp allowed(known), do: "#{Enum.map_join(known, ", ", &inspect(elem(&1, 0)))} is allowed"
+
+  defp allowed([name]), do: "#{said(name)} is allowed"
+  defp allowed(names), do: "one of #{Enum.map_join(names, ", ", &said/1)} is allowed"
+
+  defp said(name), do: if(is_binary(name), do: name, else: inspect(name))
 end

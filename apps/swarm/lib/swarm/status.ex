@@ -27,6 +27,8 @@ defmodule Swarm.Status do
   A follower that does not get to its place is `BLOCKED by the landmark`, by another robot, by something
   unknown or by `no way` (`Missions.Landmark.Blocker`).
 
+  What its mission says in words of its own (`says`) stands there as it is.
+
   `speed` (m/s) is what its wheels report, not what they are told: a robot that was stopped shows how
   fast it still rolls. It is as old as `age_ms` says, and `nil`, `speed unknown`, before the first report.
 
@@ -73,6 +75,7 @@ defmodule Swarm.Status do
                 epoch: nil,
                 unsure: false,
                 blocked_by: nil,
+                says: nil,
                 power: nil,
                 health: %{},
                 offline: %{},
@@ -107,6 +110,7 @@ defmodule Swarm.Status do
           epoch: non_neg_integer() | nil,
           unsure: boolean(),
           blocked_by: String.t() | nil,
+          says: String.t() | nil,
           power: float() | nil,
           health: %{(atom() | String.t()) => :online | {:offline, term()}},
           offline: %{(atom() | String.t()) => String.t()},
@@ -149,6 +153,7 @@ defmodule Swarm.Status do
       epoch: mission |> field(:claim) |> field(:epoch),
       unsure: mission |> field(:claim) |> field(:unsure) == true,
       blocked_by: mission |> field(:claim) |> field(:blocked_by),
+      says: mission |> field(:claim) |> field(:says),
       power: value(entries, :power),
       health: Map.new(health),
       offline:
@@ -256,6 +261,7 @@ defmodule Swarm.Status do
         hung(status.hung),
         unsure(status),
         status.blocked_by && "BLOCKED by #{status.blocked_by}",
+        is_binary(status.says) && status.says,
         status.leader && "leader #{status.leader}",
         status.view && "view #{elem(status.view, 0)}",
         "hears #{length(status.hears)}" <> deaf(status),

@@ -32,8 +32,10 @@ defmodule Mix.Tasks.Bench do
   defp bench(["demo" | arguments]) do
     Build.update()
 
-    case Cli.Arguments.parse(arguments, table()) do
-      {:ok, pairs} -> pairs |> Map.new() |> measure()
+    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()),
+         {:ok, given} <- of_mission(Map.new(pairs)) do
+      measure(given)
+    else
       {:error, lines} -> refuse(lines)
     end
   end
@@ -97,6 +99,32 @@ defmodule Mix.Tasks.Bench do
           "mix bench swarm [options], mix bench stop [options], mix bench vision [options], mix bench scale [options], mix bench recording [options]"
       ])
 
+  defp of_mission(%{"mission" => mission} = given) do
+    cases = Bench.of_any_mission(Map.get(given, "cases", Bench.cases()))
+
+    if cases == [] do
+      names = Bench.cases() |> Bench.of_any_mission() |> Enum.map_join(", ", & &1.name)
+      {:error, ["--cases names none that a mission of your own can be measured in: #{names}"]}
+    else
+      with {:ok, mission} <- mission(mission, cases) do
+        cases = for case <- cases, do: put_in(case.options[:mission], mission)
+        {:ok, Map.put(given, "cases", cases)}
+      end
+    end
+  end
+
+  defp of_mission(given), do: {:ok, given}
+
+  # Each case checks the options again, with its own number of robots.
+  defp mission(text, cases) do
+    fewest = cases |> Enum.map(&Map.get(&1.options, :robots, 6)) |> Enum.min()
+
+    case Swarm.Missions.Text.read(text, fewest) do
+      {:ok, mission} -> {:ok, mission}
+      {:error, line} -> {:error, ["--mission: #{line}"]}
+    end
+  end
+
   defp measure(%{"help" => true}), do: help()
 
   defp measure(given) do
@@ -156,6 +184,8 @@ defmodule Mix.Tasks.Bench do
     [
       {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds (1-40)"},
       {"cases", "NAME,NAME", &Bench.choose/1, "which cases (all)"},
+      {"mission", "NAME[:KEY=VALUE,…]", &{:ok, &1},
+       "#{Parse.either(Swarm.Missions.names())}: measured is when each robot first claims that it has\nwhat its mission wants (#{hd(Swarm.Missions.names() ++ ["none"])})"},
       {"maps", "NAME,NAME", &maps/1,
        "which maps: names, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:…\n(hall,hospital)"},
       {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),

@@ -39,6 +39,8 @@ defmodule Console.Cli.Format do
       "where mag1 stands there is no room for line 2.0, nor for 4 followers in any other shape"
   """
   @spec meaning(Sim.Scene.stage()) :: String.t()
+  # A mission's own words.
+  def meaning(%{says: says, robot: robot}), do: "#{robot} #{says}"
   def meaning(%{stage: :search}), do: "every robot looks around for the landmark"
   def meaning(%{stage: :elected} = stage), do: "#{stage.robot} leads" <> why(stage)
 
@@ -79,6 +81,7 @@ defmodule Console.Cli.Format do
 
   def meaning(%{stage: name}), do: name |> to_string() |> String.replace("_", " ")
 
+  defp told({:start, module, _options}), do: "to start #{Swarm.Missions.name(module)}"
   defp told({:formation, kind, spacing}), do: "to form a #{kind} with #{decimals(spacing, 1)} m"
   defp told(command), do: to_string(command)
 

@@ -13,6 +13,7 @@ defmodule Console.Live.Trial do
   alias Console.Page.About
   alias Sim.{Recorder, Trial}
   alias Sim.Recording.Pictures
+  alias Swarm.Missions.Text
   @behaviour Console.Live
 
   @doc "Starts the run of a new trial; the error says in one line what is wrong with its options."
@@ -171,6 +172,11 @@ defmodule Console.Live.Trial do
   defp carry_out({:tell, target, "stop"}, state), do: tell(target, :stop, state)
   defp carry_out({:tell, target, "start"}, state), do: tell(target, :start, state)
   defp carry_out(latch, state) when latch in [:estop, :reset], do: tell(:all, latch, state)
+
+  defp carry_out({:tell, target, "start:" <> text}, %{module: module, trial: trial} = state) do
+    with {:ok, {mission, options}} <- Text.read(text, length(module.living(trial))),
+         do: tell(target, {:start, mission, options}, state)
+  end
 
   defp carry_out({:tell, _target, text}, _state),
     do: {:error, "in lockstep robots accept stop and start, not #{text}"}

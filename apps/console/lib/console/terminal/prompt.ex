@@ -10,6 +10,7 @@ defmodule Console.Terminal.Prompt do
   alias Console.Live.Pace
   alias Hal.Options.Suggest
   alias Robot.Command
+  alias Swarm.Missions
 
   @words ~w(kill formation landmark move goto follow stop estop reset start arm disarm acknowledge pause resume step speed status nodes tell help quit)
 
@@ -69,7 +70,9 @@ defmodule Console.Terminal.Prompt do
       ["tell"] -> ["all" | names]
       ["speed"] -> ["0.1", "1", "10", "max"]
       [word] when word in ["arm", "disarm", "acknowledge"] -> ["all" | names]
-      [word] when word in ["goto", "follow", "stop", "start", "status"] -> names
+      ["start"] -> Missions.names() ++ names
+      ["start", name] -> if name in names, do: Missions.names(), else: []
+      [word] when word in ["goto", "follow", "stop", "status"] -> names
       _other -> []
     end
   end
@@ -92,6 +95,8 @@ defmodule Console.Terminal.Prompt do
         "follow min1 mag2              one robot follows another",
         "stop, stop mag2               the fleet or one robot stops and stands",
         "start, start mag2             starts the mission again, from the search",
+        "start patrol:period=90        starts another mission: #{Enum.join(Missions.names(), ", ")}",
+        "mag2 wander, rest, square:2   one robot roams, rests, drives a square",
         "estop, reset                  emergency stop of all, until the reset",
         "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all"
       ] ++
@@ -164,8 +169,13 @@ defmodule Console.Terminal.Prompt do
   defp command(word, ["all"], _robots) when word in ["stop", "start"],
     do: {:ok, {:tell, :all, word}}
 
-  defp command(word, [name], robots) when word in ["stop", "start"],
-    do: with_robot(name, robots, &{:tell, [&1], word})
+  defp command("start", [mission | rest], robots) when length(rest) < 2 do
+    if mission in ["all" | Enum.map(robots, &to_string/1)],
+      do: mission_of(mission, rest, robots),
+      else: mission_of("all", [mission | rest], robots)
+  end
+
+  defp command("stop", [name], robots), do: with_robot(name, robots, &{:tell, [&1], "stop"})
 
   defp command(word, [name], robots) when word in ["arm", "disarm", "acknowledge"],
     do: tell(name, [word], robots)
@@ -208,6 +218,21 @@ defmodule Console.Terminal.Prompt do
       {:error, allowed} -> Cli.Arguments.refuse(word, text, allowed)
     end
   end
+
+  # start mag2, start patrol, start patrol:period=90, start mag2 patrol
+  defp mission_of(who, [], robots), do: tell(who, ["start"], robots)
+
+  defp mission_of(who, [mission], robots) do
+    case Missions.Text.read(mission, length(robots)) do
+      {:ok, _mission} -> tell(who, ["start", mission], robots)
+      {:error, line} -> {:error, line <> or_robot(mission, robots)}
+    end
+  end
+
+  defp mission_of(_who, [_mission, extra], _robots),
+    do: {:error, "start: #{inspect(extra)} is too much: start NAME MISSION is allowed"}
+
+  defp or_robot(word, robots), do: Suggest.hint(word, Enum.map(robots, &to_string/1))
 
   defp tell("all", text, robots), do: checked(:all, Enum.join(text, ":"), robots)
 

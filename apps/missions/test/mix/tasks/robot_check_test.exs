@@ -170,7 +170,7 @@ defmodule Mix.Tasks.Robot.CheckTest do
   describe "a mission and a formation of this build" do
     setup %{tmp_dir: folder} do
       missions = Application.fetch_env!(:swarm, :missions)
-      Application.put_env(:swarm, :missions, missions ++ [patrol: Patrol, guard: Guard])
+      Application.put_env(:swarm, :missions, missions ++ [sentry: Patrol, guard: Guard])
       Application.put_env(:swarm, :formations, echelon: Echelon)
 
       on_exit(fn ->
@@ -200,8 +200,13 @@ defmodule Mix.Tasks.Robot.CheckTest do
       for {policies, told} <- [
             {"mission: :landmark, formation: {:echelon, 1.2}", "landmark, in echelon of 1.20 m"},
             {"formation: {:echelon, 1.2}", "none until it is told one"},
-            {"mission: :patrol, rounds_of_patrol: 3", "patrol"},
-            {"mission: :patrol", "patrol"},
+            {"mission: :sentry, rounds_of_patrol: 3", "sentry"},
+            {"mission: :sentry", "sentry"},
+            {"mission: {:sentry, rounds_of_patrol: 3}", "sentry, rounds_of_patrol 3"},
+            {"mission: {:sentry, []}", "sentry"},
+            {"mission: {#{inspect(Patrol)}, rounds_of_patrol: 3}",
+             "#{inspect(Patrol)}, rounds_of_patrol 3"},
+            {"mission: #{inspect(Patrol)}", inspect(Patrol)},
             {"mission: :guard, gate_of_guard: :north", "guard"}
           ] do
         write(path, policies)
@@ -213,21 +218,35 @@ defmodule Mix.Tasks.Robot.CheckTest do
         assert Enum.map(answer, &String.trim/1) == Enum.map(lines, &String.trim/1)
       end
 
-      write(path, "mission: :patrol, rounds_of_patrol: 3")
+      write(path, "mission: :sentry, rounds_of_patrol: 3")
       assert {:ok, {_file, config}} = ReleaseBoot.robot(machine)
       assert config.mission == {Patrol, rounds_of_patrol: 3}
+      write(path, "mission: {#{inspect(Patrol)}, rounds_of_patrol: 3}")
+      assert {:ok, {_file, ^config}} = ReleaseBoot.robot(machine)
     end
 
     test "are suggested for a typo", %{path: path, machine: machine} do
       for {policies, line} <- [
             {"mission: :landmark, formation: {:echeln, 1.2}",
              "policies.formation: cannot be :echeln: :column, :line, :wedge, :triangle, :diamond, :circle or :echelon is allowed; did you mean :echelon?"},
-            {"mission: :patorl, rounds_of_patrol: 3",
-             "policies.mission: cannot be :patorl: nil, :landmark, :patrol or :guard is allowed; did you mean :patrol?"},
-            {"mission: :patrol, rounds_of_patorl: 3",
+            {"mission: :sentyr, rounds_of_patrol: 3",
+             "policies.mission: cannot be :sentyr: nil, :landmark, :patrol, :sentry or :guard is allowed; did you mean :sentry?"},
+            {"mission: :sentry, rounds_of_patorl: 3",
              "policies.rounds_of_patorl: is not known: allowed are mission, rounds_of_patrol; did you mean rounds_of_patrol?"},
-            {"mission: :patrol, formation: {:echelon, 1.2}",
+            {"mission: :sentry, formation: {:echelon, 1.2}",
              "policies.formation: is not known: allowed are mission, rounds_of_patrol"},
+            {"mission: {:sentyr, rounds_of_patrol: 3}",
+             "policies.mission: cannot be :sentyr: nil, :landmark, :patrol, :sentry or :guard is allowed; did you mean :sentry?"},
+            {"mission: {:sentry, rounds_of_patorl: 3}",
+             "policies.mission.rounds_of_patorl: is not known: allowed are rounds_of_patrol; did you mean rounds_of_patrol?"},
+            {"mission: {:sentry, rounds_of_patrol: 0}",
+             "policies.mission.rounds_of_patrol: cannot be 0: a whole number from 1 to 99 is allowed"},
+            {"mission: {:sentry, rounds_of_patrol: 3}, formation: {:echelon, 1.2}",
+             "policies.formation: is not allowed beside {:sentry, …}: write it in there"},
+            {"mission: {:guard, gate_of_guard: :no_name_of_any_gate}",
+             "policies.mission: cannot be :no_name_of_any_gate: a name that this build knows is allowed"},
+            {"mission: {:guard, gate_of_guard: :patrol}",
+             "policies.mission: only gate_of_guard: :north is allowed"},
             {"mission: :guard, gate_of_guard: :patrol",
              "policies: only gate_of_guard: :north is allowed"},
             {"mission: :guard, gate_of_guard: :no_name_of_any_gate",

@@ -27,6 +27,9 @@ defmodule Robot.Command.Arguments do
 
   def value(:colour, "", _known), do: {:error, "a colour's name is allowed"}
   def value(:colour, text, _known), do: {:ok, text}
+  def value(:mission, "", _known), do: {:error, "a mission's name is allowed"}
+  def value(:mission, text, _known), do: {:ok, text}
+  def value(:options, text, _known), do: {:ok, text}
   def value(:found, "0", _known), do: {:ok, false}
   def value(:found, "1", _known), do: {:ok, true}
   def value(:found, _text, _known), do: {:error, "0 or 1 is allowed"}

@@ -8,15 +8,18 @@ defmodule Robot.Control.Delivery do
   |---|---|---|
   | `{:hand, {:only, module}}` | while this mission runs | it gets the command |
   | `{:hand, {:except, module}}` | while another mission runs | that mission gets the command |
+  | `{:hand, {:taking, name}}` | while a mission runs that takes commands of this name (`c:Robot.Mission.commands/0`) | that mission gets the command |
   | `:resume` | while none runs and the last stop left one | it is resumed and gets the command |
   | `{:start, module, options}` | always | it replaces a running mission and gets the command |
   """
+
+  alias Robot.Mission
 
   @enforce_keys [:ways, :until_ms, :reply]
   defstruct @enforce_keys ++ [asked: nil]
 
   @type way ::
-          {:hand, {:only | :except, module()}}
+          {:hand, {:only | :except, module()} | {:taking, command :: atom()}}
           | :resume
           | {:start, module(), options :: keyword()}
 
@@ -72,6 +75,9 @@ defmodule Robot.Control.Delivery do
 
   defp open({:hand, {:except, other}}, {module, _phase}, _halted) when module != other,
     do: {:hand, module}
+
+  defp open({:hand, {:taking, command}}, {module, _phase}, _halted),
+    do: if(Mission.understands?(module, command), do: {:hand, module})
 
   defp open(:resume, :idle, {_module, _left}), do: :resume
   defp open({:start, _module, _options} = start, _state, _halted), do: start

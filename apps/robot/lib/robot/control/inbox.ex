@@ -212,7 +212,7 @@ defmodule Robot.Control.Inbox do
 
   def delivery?(_other), do: false
 
-  defp way?({:hand, {kind, module}}), do: kind in [:only, :except] and is_atom(module)
+  defp way?({:hand, {kind, name}}), do: kind in [:only, :except, :taking] and is_atom(name)
   defp way?({:start, module, _options}), do: is_atom(module)
   defp way?(way), do: way == :resume
 

@@ -20,7 +20,7 @@ defmodule Robot.Control.Pilot do
   """
   use GenServer
   alias Hal.HardenedServer
-  alias Robot.{Board, Config, Names, Percept}
+  alias Robot.{Board, Config, Mission, Names, Percept}
   alias Robot.Control.{Delivery, Executive, Inbox}
   alias Robot.Control.Pilot.{Effects, Journal}
   alias Robot.Mission.Runner
@@ -278,9 +278,10 @@ defmodule Robot.Control.Pilot do
       not Keyword.keyword?(options) ->
         {:error, "#{inspect(options, limit: 5)} are not options: [key: value] is allowed"}
 
-      function_exported?(module, :options, 2) ->
-        Journal.asking(module, data, fn -> module.options(options, nil) end)
+      Mission.checks?(module) ->
+        Journal.asking(module, data, fn -> Mission.check_options(module, options, nil) end)
 
+      # Programs start it, such as a calibration; people are refused earlier.
       true ->
         {:ok, options}
     end

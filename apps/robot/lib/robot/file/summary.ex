@@ -244,10 +244,19 @@ defmodule Robot.File.Summary do
 
   defp mission(policies) do
     case policies[:mission] do
-      nil -> "none until it is told one"
-      mission -> "#{mission}#{formation(policies[:formation])}#{lost(policies[:lost_link])}"
+      nil ->
+        "none until it is told one"
+
+      {name, own} ->
+        Enum.join([named(name) | Enum.map(own, &one/1)], ", ")
+
+      mission ->
+        "#{named(mission)}#{formation(policies[:formation])}#{lost(policies[:lost_link])}"
     end
   end
+
+  defp named(name), do: name |> inspect() |> String.trim_leading(":")
+  defp one({key, value}), do: "#{key} #{inspect(value)}"
 
   # Other missions may use these names for options of another shape.
   defp formation({kind, spacing}) when is_atom(kind) and is_number(spacing),

@@ -73,6 +73,10 @@ defmodule Robot.Mission.Manual do
 
   def handle(_event, mission), do: result(mission, [])
 
+  # A person's commands for this robot alone, of which a formation is none.
+  @impl Robot.Mission
+  def commands, do: []
+
   defp result(%{command: nil} = mission, effects), do: {:ready, mission, effects}
 
   defp result(%{result: nil} = mission, effects),
@@ -116,6 +120,10 @@ defmodule Robot.Mission.Manual do
   defp goal({:goto, x, y, nil}, _percept), do: {Behaviour.Goto, x: x, y: y}
   defp goal({:goto, x, y, heading}, _percept), do: {Behaviour.Goto, x: x, y: y, heading: heading}
   defp goal({:follow, %Pose{} = place}, _percept), do: {Behaviour.Follow, target: place}
+  defp goal(:wander, _percept), do: {Behaviour.Wander, []}
+  defp goal(:rest, _percept), do: {Behaviour.Rest, []}
+  defp goal({:square, nil}, _percept), do: {Behaviour.Square, []}
+  defp goal({:square, side}, _percept), do: {Behaviour.Square, side: side}
   defp goal({:find_blob, colour}, _percept), do: {Behaviour.FindBlob, colour: colour}
 
   # Stands until the next percept contains the followed robot.

@@ -7,6 +7,7 @@ defmodule Robot.Mission.Runner do
   `{:claim, map}`: the mission's claim is kept here until the mission is halted.
   """
   alias Robot.{Behaviour, Mission, Percept}
+  alias Robot.Mission.Letter
   alias Robot.Navigation.Grid
 
   @enforce_keys [:robot]
@@ -18,13 +19,15 @@ defmodule Robot.Mission.Runner do
                 claim: %{},
                 ticked_ms: nil,
                 halted: nil,
-                grid: nil
+                grid: nil,
+                refused: 0
               ]
 
   @typedoc """
   `module` is `nil` while the robot is idle; `halted` is the mission that the last stop left for
   `resume/1`. `ticked_ms` is the time of the last percept that the mission handled: its claim is
-  as old as that, whatever else it has heard since. `grid` is what the robot knows of walls: each percept gets it on its
+  as old as that, whatever else it has heard since. `refused` counts the messages that were not for it
+  (`Robot.Mission.Letter`). `grid` is what the robot knows of walls: each percept gets it on its
   way to the mission.
   """
   @type t :: %__MODULE__{
@@ -35,7 +38,8 @@ defmodule Robot.Mission.Runner do
           claim: map(),
           ticked_ms: integer() | nil,
           halted: {module(), mission :: term()} | nil,
-          grid: Grid.t() | nil
+          grid: Grid.t() | nil,
+          refused: non_neg_integer()
         }
 
   @type state :: :idle | {module(), phase :: atom()}
@@ -72,6 +76,13 @@ defmodule Robot.Mission.Runner do
   @spec handle(t(), Mission.event()) :: {t(), [Mission.effect()]}
   def handle(%__MODULE__{module: nil} = runner, _event), do: {runner, []}
 
+  def handle(%__MODULE__{module: module} = runner, {:message, message}) do
+    case Letter.open(module, message) do
+      {:ok, message} -> follow(runner, module.handle({:message, message}, runner.mission))
+      :refused -> {%{runner | refused: runner.refused + 1}, []}
+    end
+  end
+
   def handle(%__MODULE__{module: module, mission: mission} = runner, event),
     do: runner |> note_tick(event) |> follow(module.handle(walled(event, runner), mission))
 
@@ -106,8 +117,12 @@ defmodule Robot.Mission.Runner do
 
   defp follow(runner, {phase, mission, effects}) when is_atom(phase) and is_list(effects) do
     runner = %{runner | phase: phase, mission: mission}
+    effects = Enum.map(effects, &said(&1, runner.module))
     {Enum.reduce(effects, runner, &note/2), effects}
   end
+
+  defp said({:tell, to, kind, fields}, module), do: {:send, to, Letter.new!(module, kind, fields)}
+  defp said(effect, _module), do: effect
 
   defp note({:claim, claim}, runner) when is_map(claim), do: %{runner | claim: claim}
 

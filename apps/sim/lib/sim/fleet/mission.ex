@@ -1,9 +1,11 @@
 defmodule Sim.Fleet.Mission do
   @moduledoc """
   The option `mission:` of a fleet: `true` starts the mission of its setup, `false` does not start
-  it, `{module, options}` starts another `Robot.Mission`. Pure, except that it loads the module.
+  it; a name (`Swarm.Missions`), with options or without, or `{module, options}` starts another `Robot.Mission`.
+  Pure, except that it loads the module.
   """
   alias Sim.Trial.Setup
+  alias Swarm.Missions
 
   # The apps that are available in a robot's own process of the operating system.
   @apps [:hal, :vision, :robot, :mesh, :swarm, :missions, :sim]
@@ -13,15 +15,25 @@ defmodule Sim.Fleet.Mission do
 
       iex> Sim.Fleet.Mission.choose(%{mission: nil}, {NoSuchModule, []}, false)
       {:error, "mission cannot be {NoSuchModule, []}: NoSuchModule is not a Robot.Mission (init/2 and handle/2)"}
-      iex> Sim.Fleet.Mission.choose(%{mission: nil}, :patrol, false)
-      {:error, "mission cannot be :patrol: true, false or {module, options} is allowed"}
+      iex> {:error, line} = Sim.Fleet.Mission.choose(%{mission: nil, robots: [:mag1]}, :landmrk, false)
+      iex> line =~ ~r/^mission :landmrk is not known; .*landmark.* allowed; did you mean :landmark\?$/
+      true
   """
   @spec choose(Setup.t(), term(), nodes? :: boolean()) ::
           {:ok, Setup.t(), begin? :: boolean()} | {:error, line :: String.t()}
   def choose(setup, begin?, _nodes?) when is_boolean(begin?), do: {:ok, setup, begin?}
 
-  def choose(setup, {module, options} = mission, nodes?) when is_atom(module) do
+  def choose(setup, name, nodes?) when is_atom(name) or is_binary(name),
+    do: choose(setup, {name, []}, nodes?)
+
+  def choose(setup, {module, options} = mission, nodes?)
+      when is_atom(module) or is_binary(module) do
     cond do
+      # A name is no module, and a wrong one has a better explanation.
+      is_binary(module) or not String.starts_with?(Atom.to_string(module), "Elixir.") ->
+        with {:ok, chosen} <- Missions.choose(mission, length(setup.robots)),
+             do: choose(setup, chosen, nodes?)
+
       not Keyword.keyword?(options) ->
         {:error, "mission cannot be #{brief(mission)}: its options must be [key: value]"}
 
@@ -41,7 +53,9 @@ defmodule Sim.Fleet.Mission do
   end
 
   def choose(_setup, other, _nodes?),
-    do: {:error, "mission cannot be #{brief(other)}: true, false or {module, options} is allowed"}
+    do:
+      {:error,
+       "mission cannot be #{brief(other)}: true, false, a name or {module, options} is allowed"}
 
   defp mission?(module) do
     Code.ensure_loaded?(module) and function_exported?(module, :init, 2) and

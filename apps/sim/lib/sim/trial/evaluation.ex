@@ -75,6 +75,7 @@ defmodule Sim.Trial.Evaluation do
       leader: leader,
       leaders_at_once_max: run.run_log.leaders_at_once_max,
       leader_changes: max(run.run_log.elections - 1, 0),
+      mission: mission(run.options),
       formation: %{
         kind: kind,
         spacing_m: spacing,
@@ -94,6 +95,10 @@ defmodule Sim.Trial.Evaluation do
       fleet: for(r <- scene.robots, do: row(r, Map.get(slots, r.id), run.claims[r.id]))
     }
   end
+
+  # The one that was asked for by its name, if any.
+  defp mission(%{mission: {module, _options}}), do: Swarm.Missions.name(module)
+  defp mission(_default), do: nil
 
   @doc """
   How far the worst living robot of a leader's shape is from its slot, in metres; `nil` if it

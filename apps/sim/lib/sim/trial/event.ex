@@ -28,7 +28,7 @@ defmodule Sim.Trial.Event do
   @type entry :: {at_s :: number(), t()}
 
   # What a robot carries out itself; the others are for the wheels' person, or are never accepted.
-  @alone ~w(move goto followtheleader findblob follow lead)
+  @alone ~w(move goto followtheleader findblob follow lead wander rest square start)
   @longest_s 1_000_000
 
   @doc "The type of a script, in a table of `Hal.Options`."
@@ -44,7 +44,7 @@ defmodule Sim.Trial.Event do
       {:ok, {20.0, {:freeze, :mag1, 3.0}}}
       iex> Sim.Trial.Event.read({20, {:tell, :mag1, "goot:1:2"}})
       {:error, [{["command"], "cannot be \\"goot:1:2\\": :start, :stop, {:formation, kind, spacing} or a text " <>
-        "with one of move, goto, followtheleader, findblob, follow, lead is allowed; did you mean goto?"}]}
+        "with one of move, goto, followtheleader, findblob, follow, lead, wander, rest, square, start is allowed; did you mean goto?"}]}
   """
   @spec read(term()) :: Type.result() | false
   def read({at_s, event}) do
@@ -110,6 +110,7 @@ defmodule Sim.Trial.Event do
     word = text |> String.split(":") |> hd() |> String.trim() |> String.downcase()
 
     cond do
+      word == "start" -> start(text)
       word not in @alone -> refuse(text, Suggest.hint(word, @alone))
       # Which names there are is known later.
       word == "followtheleader" -> true
@@ -118,6 +119,12 @@ defmodule Sim.Trial.Event do
   end
 
   defp command(other), do: refuse(other, "")
+
+  defp start(text) do
+    with {:ok, command} <- Command.parse(text, []),
+         {:ok, _request} <- Swarm.Missions.Text.request(command, nil),
+         do: true
+  end
 
   defp refuse(value, hint) do
     {:error,

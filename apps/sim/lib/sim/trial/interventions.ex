@@ -8,6 +8,7 @@ defmodule Sim.Trial.Interventions do
   alias Sim.{Radio, World}
   alias Sim.Trial.{Event, Faults, RunLog}
   alias Sim.World.Bodies
+  alias Swarm.Missions.Text
 
   @type trial :: %{
           :at_ms => integer(),
@@ -96,6 +97,7 @@ defmodule Sim.Trial.Interventions do
   # Checked when the options were, but for names of robots, which may have been killed since.
   defp parsed("" <> text, trial) do
     {:ok, command} = Command.parse(text, trial.options.robots)
+    {:ok, command} = Text.request(command, length(trial.options.robots))
     command
   end
 

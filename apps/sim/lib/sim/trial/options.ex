@@ -4,6 +4,7 @@ defmodule Sim.Trial.Options do
   alias Hal.Options.Type
   alias Missions.Landmark
   alias Sim.Trial.{Cuts, Event}
+  alias Swarm.Missions
 
   @place {:tuple, [{:number, -1.0e4, 1.0e4, "m"}, {:number, -1.0e4, 1.0e4, "m"}],
           "{x, y} in metres"}
@@ -61,6 +62,7 @@ defmodule Sim.Trial.Options do
   def check(asked) do
     with {:ok, options} <- Options.check(asked, table(), "trial"),
          options = Map.merge(Map.new(@mission), Map.new(options)),
+         {:ok, options} <- named(options),
          :ok <- cuts(options),
          :ok <- script(options),
          :ok <- hardware(options),
@@ -69,9 +71,19 @@ defmodule Sim.Trial.Options do
 
   @doc "The table of all options: what is allowed."
   @spec table() :: Options.table()
-  def table, do: @table ++ mission()
+  def table, do: @table ++ mission() ++ [mission: [Missions.type(), default: nil]]
 
   defp mission, do: Keyword.take(Landmark.Options.table(), Keyword.keys(@mission))
+
+  # What its options say counts for all that looks at the run, too.
+  defp named(%{mission: nil} = options), do: {:ok, options}
+
+  defp named(%{mission: mission, robots: robots} = options) do
+    with {:ok, {module, own} = mission} <- Missions.choose(mission, length(robots)) do
+      shared = if module == Landmark, do: Map.new(Keyword.take(own, Keyword.keys(@mission)))
+      {:ok, Map.merge(%{options | mission: mission}, shared || %{})}
+    end
+  end
 
   defp cuts(%{cuts: cuts, robots: robots}) do
     if Cuts.valid?(cuts, robots),

@@ -78,7 +78,11 @@ defmodule Sim.Trial.RunLog do
     parts = parts || [for({id, _claim} <- claims, do: id)]
     leaders = for {id, %{phase: :lead} = claim} <- claims, do: {id, claim}
     phases = for {_id, claim} <- claims, do: claim[:phase]
-    formed? = Enum.any?(leaders, fn {_id, claim} -> claim[:formed] == true end)
+    # A mission without a leader has what it wants when every robot says so.
+    formed? =
+      Enum.any?(leaders, fn {_id, claim} -> claim[:formed] == true end) or
+        (claims != [] and Enum.all?(claims, fn {_id, claim} -> claim[:formed] == true end))
+
     elected? = run_log.elections > 0
 
     %{

@@ -30,7 +30,8 @@ defmodule Sim.Trial.Setup do
   (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `script` (`[{at_s, event}]`, `Sim.Trial.Event`, in lockstep only), `loss` (0 to 1), `noise` (`:off`,
   `:default`, `:slip`), `formation` (`kind` or `{kind, spacing}`), `assign` (`:chain` or `:cost`),
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
-  (`:stop`, `:hold` or `:continue`), `duration_s`, `blobs` (`:painted` or `:direct`), `hardware` (robots with the real drivers, in real time only); of the radio in
+  (`:stop`, `:hold` or `:continue`), `mission` (another one than the landmark's, by `Swarm.Missions`: `:patrol`,
+  `{:patrol, period: 90}`), `duration_s`, `blobs` (`:painted` or `:direct`), `hardware` (robots with the real drivers, in real time only); of the radio in
   lockstep also `cuts` (`Sim.Trial.Cuts`), `duplicates` (0 to 1) and `delay_ms` (`{5, 50}`). Errors are one line.
   """
   @spec new(keyword() | map()) :: {:ok, t()} | {:error, String.t()}
@@ -121,16 +122,6 @@ defmodule Sim.Trial.Setup do
           end
       )
 
-    mission =
-      {Missions.Landmark,
-       [
-         formation: options.formation,
-         assign: options.assign,
-         leader_change: options.leader_change,
-         policy: options.policy,
-         of: options.of || length(options.robots)
-       ] ++ if(options.lost_link, do: [lost_link: options.lost_link], else: [])}
-
     robots =
       for {id, pose} <- robots do
         hardware? = id in options.hardware
@@ -149,9 +140,26 @@ defmodule Sim.Trial.Setup do
       map: map,
       world: world,
       robots: robots,
-      mission: mission,
+      mission: mission(options),
       plan: plan
     }
+  end
+
+  defp mission(%{mission: {module, own}}) when module != Missions.Landmark, do: {module, own}
+
+  defp mission(options) do
+    {_module, own} = options.mission || {Missions.Landmark, []}
+
+    shared =
+      [
+        formation: options.formation,
+        assign: options.assign,
+        leader_change: options.leader_change,
+        policy: options.policy,
+        of: options.of || length(options.robots)
+      ] ++ if(options.lost_link, do: [lost_link: options.lost_link], else: [])
+
+    {Missions.Landmark, Keyword.merge(own, shared)}
   end
 
   # R66: all robots are switched on at the first one's place, and then driven by hand to their

@@ -13,10 +13,16 @@ defmodule Swarm.Commands.Order do
   @fastest 10
   # Seconds.
   @longest_s 600
+  # Metres, as `Robot.Behaviour.Square` takes them.
+  @least_side 0.2
+  @most_side 10.0
 
   @typedoc "What a person may ask of a robot: a command for it alone, or one for its group."
   @type t ::
-          Command.t() | {:start, keyword()} | {:formation, Formation.kind(), spacing :: float()}
+          Command.t()
+          | {:start, keyword()}
+          | {:start, module(), keyword()}
+          | {:formation, Formation.kind(), spacing :: float()}
 
   @doc """
   Checks that the numbers of a person's command make sense; the error is one line that names the
@@ -45,6 +51,16 @@ defmodule Swarm.Commands.Order do
          do: {:ok, {:move, v, w, for_s}}
   end
 
+  def check({:square, nil}), do: {:ok, {:square, nil}}
+
+  def check({:square, side}) do
+    if is_number(side) and side >= @least_side and side <= @most_side,
+      do: {:ok, {:square, side * 1.0}},
+      else:
+        {:error,
+         "square cannot take #{brief(side)}: a side from #{@least_side} to #{@most_side} m is allowed"}
+  end
+
   def check({:follow, %Pose{x: x, y: y, heading: h}}),
     do: numbers(:follow, [x, y, h], @farthest, &{:follow, Pose.new(&1, &2, &3)})
 
@@ -70,11 +86,12 @@ defmodule Swarm.Commands.Order do
       else: {:error, "#{brief(command)} is not a command; those of Robot.Command are allowed"}
   end
 
-  defp known?(word) when word in [:stop, :lead, :start, :ping], do: true
+  defp known?(word) when word in [:stop, :lead, :start, :ping, :wander, :rest], do: true
   defp known?({:follow_the_leader, robot}), do: WireTypes.name?(robot)
   defp known?({:find_blob, colour}), do: colour == nil or is_binary(colour)
   defp known?({:formation, kind, spacing}), do: Formation.valid?({kind, spacing})
   defp known?({:start, options}), do: Keyword.keyword?(options)
+  defp known?({:start, module, options}), do: is_atom(module) and Keyword.keyword?(options)
   defp known?(_other), do: false
 
   defp brief(term), do: inspect(term, limit: 5, printable_limit: 40)

@@ -12,6 +12,7 @@ defmodule Swarm.Comms.CommandHandler do
   | `:status` | `Swarm.Status` |
   | `:ping` | `{:ok, line}`: name, uptime and state (`Swarm.Comms.PingReply`) |
   | `:start`, `{:start, options}` | the group's mission starts; with options it starts again |
+  | `{:start, mission, options}` | that mission starts, whatever runs (`Swarm.Missions`) |
   | `{:formation, kind, spacing}` | for the running mission |
   | a `Robot.Command` | for this robot alone, which leaves the group's mission for it |
   | `:arm`, `:acknowledge` | for the wheels (`Hal.Device`): done, or why not |
@@ -138,6 +139,12 @@ defmodule Swarm.Comms.CommandHandler do
          do: {:ok, {:start, options}}
   end
 
+  defp checked({:start, mission, options}, _config) do
+    with {:ok, _order} <- Order.check({:start, mission, options}),
+         {:ok, {module, options}} <- Missions.choose({mission, options}, nil),
+         do: {:ok, {:start, module, options}}
+  end
+
   defp checked(request, _config), do: Order.check(request)
 
   # A pilot that hangs would not answer, and the caller would not know why. A gate that hangs is
@@ -210,7 +217,8 @@ defmodule Swarm.Comms.CommandHandler do
   defp ways({:start, options}, config),
     do: with({:ok, anew} <- begin(options, config), do: {:ok, [anew]})
 
-  defp ways({:formation, _kind, _spacing}, _config), do: {:ok, [{:hand, {:except, Manual}}]}
+  defp ways({:start, module, options}, _config), do: {:ok, [{:start, module, options}]}
+  defp ways({:formation, _kind, _spacing}, _config), do: {:ok, [{:hand, {:taking, :formation}}]}
   defp ways(_alone, _config), do: {:ok, [{:hand, {:only, Manual}}, {:start, Manual, []}]}
 
   defp begin(options, config) do
@@ -224,5 +232,6 @@ defmodule Swarm.Comms.CommandHandler do
   defp mission(%{mission: mission}), do: {:ok, mission}
 
   defp command({:start, _options}), do: :start
+  defp command({:start, _module, _options}), do: :start
   defp command(request), do: request
 end

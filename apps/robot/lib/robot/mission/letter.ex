@@ -1,0 +1,94 @@
+defmodule Robot.Mission.Letter do
+  @moduledoc """
+  A message of a mission's own kind, and the door through which messages reach a mission. Pure.
+
+  A mission names the messages that it hears, with a table of `Hal.Options` for each kind of its own
+  (`c:Robot.Mission.messages/0`). It says one by the effect `{:tell, to, kind, fields}`, and hears
+  `{:message, %{from: robot, kind: kind, body: fields}}`: what comes from another mission or version, has
+  another kind, or does not fit its table never reaches it, and is counted (`Robot.Mission.Runner`).
+  """
+  alias Hal.Options
+  alias Robot.Mission
+
+  # What one letter may take on the wire, in bytes.
+  @most_bytes 8_000
+  @latest 65_535
+
+  @enforce_keys [:mission, :version, :kind, :fields]
+  defstruct @enforce_keys
+
+  @type t :: %__MODULE__{
+          mission: module(),
+          version: 1..65_535,
+          kind: atom(),
+          fields: keyword()
+        }
+
+  @doc """
+  A letter of this mission. Raises `ArgumentError` if its own table does not allow it: that is the
+  mission's fault, as an invalid goal is.
+  """
+  @spec new!(module(), kind :: atom(), fields :: keyword()) :: t()
+  def new!(mission, kind, fields) do
+    {version, kinds} = messages(mission)
+
+    case List.keyfind(kinds, kind, 0) do
+      {^kind, table} when is_list(table) ->
+        fields = Options.check!(fields, table, "message #{inspect(kind)}")
+        %__MODULE__{mission: mission, version: version, kind: kind, fields: fields}
+
+      _other ->
+        raise ArgumentError, "#{inspect(mission)} has no message of its own #{inspect(kind)}"
+    end
+  end
+
+  @doc """
+  Whether a term from outside has the shape of a letter: no mission has looked at its fields yet.
+
+      iex> letter = %Robot.Mission.Letter{mission: Some.Mission, version: 1, kind: :seen, fields: [point: 3]}
+      iex> for term <- [letter, %{letter | fields: [1]}, %{letter | version: 0}, :junk],
+      ...>   do: Robot.Mission.Letter.valid?(term)
+      [true, false, false, false]
+  """
+  @spec valid?(term()) :: boolean()
+  def valid?(%{__struct__: __MODULE__, mission: mission, version: version, kind: kind} = letter) do
+    is_map_key(letter, :fields) and map_size(letter) == 5 and name?(mission) and name?(kind) and
+      version in 1..@latest and :erlang.external_size(letter) <= @most_bytes and
+      Keyword.keyword?(letter.fields)
+  end
+
+  def valid?(_other), do: false
+
+  defp name?(term), do: is_atom(term) and term not in [nil, true, false]
+
+  @doc """
+  The message as its mission hears it, or `:refused`. A mission that names no messages hears those that
+  all robots share (`Swarm.Message`), and must look at them itself.
+  """
+  @spec open(module(), message :: map()) :: {:ok, map()} | :refused
+  def open(mission, %{body: %{__struct__: __MODULE__} = letter, from: from} = message) do
+    {version, kinds} = messages(mission)
+
+    with true <- name?(from) and valid?(letter),
+         %{mission: ^mission, version: ^version, kind: kind, fields: fields} <- letter,
+         {^kind, table} when is_list(table) <- List.keyfind(kinds, kind, 0),
+         {:ok, fields} <- Options.check(fields, table, "message") do
+      {:ok, %{message | kind: kind, body: fields}}
+    else
+      _not_ours -> :refused
+    end
+  end
+
+  def open(mission, message) do
+    cond do
+      not function_exported?(mission, :messages, 0) -> {:ok, message}
+      {Map.get(message, :kind), :shared} in elem(mission.messages(), 1) -> {:ok, message}
+      true -> :refused
+    end
+  end
+
+  @doc "The version and the messages of a mission."
+  @spec messages(module()) :: Mission.messages()
+  def messages(mission),
+    do: if(function_exported?(mission, :messages, 0), do: mission.messages(), else: {1, []})
+end

@@ -1,0 +1,117 @@
+defmodule Swarm.Missions.Text do
+  @moduledoc """
+  Missions as people type them, `patrol` or `patrol:period=90,loop=square`: a name, and the options of its
+  table (`c:Robot.Mission.option_table/0`). A value is a word (`square`, `on`), a number, `kind:number` (a formation's
+  `wedge:1.2`), or Elixir's notation (`[{1,2},{3,4}]`). Pure; no text becomes an atom.
+  """
+  alias Hal.Options.Type
+  alias Robot.File.{Reader, Terms}
+  alias Swarm.Missions
+
+  @doc """
+  The module of a mission and its checked options; `robots` is how many start together, `nil` if that
+  is not known. The error is one line.
+  """
+  @spec read(String.t(), robots :: pos_integer() | nil) ::
+          {:ok, {module(), keyword()}} | {:error, line :: String.t()}
+  def read(text, robots) do
+    {name, options} = split(text)
+
+    with {:ok, module} <- Missions.fetch(name),
+         {:ok, options} <- options(module, options),
+         {:ok, options} <- Missions.options(module, options, robots),
+         do: {:ok, {module, options}}
+  end
+
+  @doc """
+  The request of a text command (`Robot.Command`): a start that names its mission in words becomes
+  `{:start, module, options}`; any other stays as it is.
+  """
+  @spec request(Robot.Command.t(), robots :: pos_integer() | nil) ::
+          {:ok, term()} | {:error, line :: String.t()}
+  def request({:start, text}, robots) do
+    with {:ok, {module, options}} <- read(text, robots), do: {:ok, {:start, module, options}}
+  end
+
+  def request(command, _robots), do: {:ok, command}
+
+  defp split(text) do
+    case String.split(text, ":", parts: 2) do
+      [name] -> {String.trim(name), ""}
+      [name, options] -> {String.trim(name), String.trim(options)}
+    end
+  end
+
+  defp options(_module, ""), do: {:ok, []}
+
+  defp options(module, text) do
+    case Missions.option_table(module) do
+      nil ->
+        {:error, "#{Missions.name(module)} takes no options as text"}
+
+      table ->
+        pairs = text |> parts() |> Enum.map(&pair(&1, table))
+
+        case Enum.find(pairs, &is_binary/1) do
+          nil ->
+            {:ok, pairs}
+
+          wrong ->
+            {:error,
+             "#{Missions.name(module)}: #{inspect(wrong)} is no option: KEY=VALUE,… is allowed"}
+        end
+    end
+  end
+
+  defp pair(part, table) do
+    case String.split(part, "=", parts: 2) do
+      [key, value] -> key |> String.trim() |> keyed(String.trim(value), table)
+      _no_value -> part
+    end
+  end
+
+  # An unknown key stays text, for `Hal.Options` to name.
+  defp keyed(key, value, table) do
+    case Enum.find(table, fn {name, _type} -> Atom.to_string(name) == key end) do
+      {name, type} -> {name, value(value, hd(List.wrap(type)))}
+      nil -> {key, value}
+    end
+  end
+
+  # What the type accepts first; else what it refuses is shown as it was understood.
+  defp value(text, type) do
+    candidates = [term(text), text]
+    Enum.find(candidates, hd(candidates), &match?({:ok, _value}, Type.read(type, &1)))
+  end
+
+  defp term("on"), do: true
+  defp term("off"), do: false
+
+  defp term(text) do
+    with {:ok, {_line, {:list, [node]}}} <- Reader.read("[" <> notation(text) <> "]", "value"),
+         term = Terms.term(node),
+         nil <- Terms.strange(term) do
+      term
+    else
+      _no_term -> text
+    end
+  end
+
+  @word ~S"[a-z_]\w*"
+
+  defp notation(text) do
+    cond do
+      text in ["true", "false", "nil"] -> text
+      text =~ ~r/\A#{@word}\z/ -> ":" <> text
+      text =~ ~r/\A#{@word}:[^:]+\z/ -> "{:" <> String.replace(text, ":", ", ") <> "}"
+      true -> text
+    end
+  end
+
+  # At commas that are in no brackets and no quotes.
+  defp parts(text) do
+    ~r/(?:\[[^\]]*\]|\{[^}]*\}|"[^"]*"|[^,])+/
+    |> Regex.scan(text)
+    |> Enum.map(fn [part] -> part end)
+  end
+end
