@@ -117,7 +117,8 @@ defmodule Sim.Radio do
       Enum.reduce(copies, radio, fn copy, radio ->
         delay = least + trunc(draw(radio, number, copy) * (most - least + 1))
         entry = {at_ms + delay, 2 * number + copy, to, from, message}
-        %{radio | queue: :gb_sets.add(entry, radio.queue)}
+        # No other has its number.
+        %{radio | queue: :gb_sets.insert(entry, radio.queue)}
       end)
     end
   end

@@ -16,7 +16,7 @@ defmodule Sim.Fleet.Mission do
       iex> Sim.Fleet.Mission.choose(%{mission: nil}, {NoSuchModule, []}, false)
       {:error, "mission cannot be {NoSuchModule, []}: NoSuchModule is not a Robot.Mission (init/2 and handle/2)"}
       iex> {:error, line} = Sim.Fleet.Mission.choose(%{mission: nil, robots: [:mag1]}, :landmrk, false)
-      iex> line =~ ~r/^mission :landmrk is not known; .*landmark.* allowed; did you mean :landmark\?$/
+      iex> line =~ ~r/^mission :landmrk is not known; .*landmark.* allowed; did you mean :landmark\\?$/
       true
   """
   @spec choose(Setup.t(), term(), nodes? :: boolean()) ::

@@ -47,11 +47,15 @@ defmodule Swarm.Message.WireTypes do
   @doc """
   Whether the elements of a list are all different.
 
-      iex> for list <- [[:mag1, :mag2], [:mag1, :mag1]], do: Swarm.Message.WireTypes.distinct?(list)
-      [true, false]
+      iex> for list <- [[:mag1, :mag2], [:mag2, :mag1], [:mag1, :mag1]], do: Swarm.Message.WireTypes.distinct?(list)
+      [true, true, false]
   """
   @spec distinct?(list()) :: boolean()
-  def distinct?(list), do: Enum.uniq(list) == list
+  def distinct?(list), do: ascending?(list) or Enum.uniq(list) == list
+
+  # As the lists of robots are.
+  defp ascending?([a | [b | _] = rest]), do: a < b and ascending?(rest)
+  defp ascending?(_one_or_none), do: true
 
   @doc """
   Whether a term is a list of such terms, no longer than the largest fleet.
