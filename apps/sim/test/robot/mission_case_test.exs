@@ -59,7 +59,9 @@ defmodule Robot.MissionCaseTest do
           {:random, ~r/the second run of the same seed was another/},
           {:claims, ~r/it sends a heartbeat that is not whole/}
         ] do
-      assert [_ | _] = lines = MissionCase.problems({Wrong, fault: fault}, seeds: [1], seconds: 12)
+      assert [_ | _] =
+               lines = MissionCase.problems({Wrong, fault: fault}, seeds: [1], seconds: 12)
+
       assert Enum.any?(lines, &(&1 =~ line)), inspect(lines)
     end
 
