@@ -125,7 +125,7 @@
 
   # What it does with the others.
   policies: [
-    # mission: :landmark,                  # nil: none until it is told one
+    # mission: :landmark,                  # nil: none until it is told one; or {:patrol, period: 90}
     # formation: {:column, 1.0},           # :column :line :wedge :triangle :diamond :circle; 0.8 to 5 m
     # assign: :chain,                      # or :cost
     # leader_change: true,

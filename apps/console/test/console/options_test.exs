@@ -148,4 +148,21 @@ defmodule Console.OptionsTest do
       assert Options.help() =~ "--#{name}"
     end
   end
+
+  test "a mission is read with its options, for the fleet that it is for" do
+    {:ok, options} = parse("--robots 4 --mission patrol:loop=line,period=90")
+    assert {Missions.Patrol, own} = options.mission
+    assert {own[:loop], own[:period]} == {:line, 90.0}
+    assert Options.trial(options).mission == options.mission
+    {:ok, options} = parse("--robots 4 --mission landmark:policy=majority")
+    assert options.mission == {Missions.Landmark, of: 4, policy: :majority}
+
+    assert error("--mission patorl") ==
+             ~s(--mission: mission "patorl" is not known; one of landmark, patrol is allowed; did you mean patrol?)
+
+    assert error("--mission patrol:period=5") ==
+             "--mission: patrol option period cannot be 5: a number from 10 to 3600 s is allowed"
+
+    assert Options.help() =~ ~r/--mission NAME\[:KEY=VALUE,…\] +landmark or patrol/
+  end
 end

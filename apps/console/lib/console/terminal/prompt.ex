@@ -229,8 +229,9 @@ defmodule Console.Terminal.Prompt do
     end
   end
 
-  defp mission_of(_who, [_mission, extra], _robots),
-    do: {:error, "start: #{inspect(extra)} is too much: start NAME MISSION is allowed"}
+  defp mission_of(_all, [name, mission], robots) do
+    with {:ok, _robot} <- robot(name, robots), do: mission_of(name, [mission], robots)
+  end
 
   defp or_robot(word, robots), do: Suggest.hint(word, Enum.map(robots, &to_string/1))
 

@@ -30,6 +30,18 @@ defmodule Console.Terminal.PromptTest do
     assert ok("stop") == {:tell, :all, "stop"}
     assert ok("stop min1") == {:tell, [:min1], "stop"}
     assert ok("start") == {:tell, :all, "start"}
+    assert ok("start all") == {:tell, :all, "start"}
+    assert ok("start mag2") == {:tell, [:mag2], "start"}
+
+    assert ok("start patrol:period=90,loop=line") ==
+             {:tell, :all, "start:patrol:period=90,loop=line"}
+
+    assert ok("start mag2 landmark:formation=wedge:1.2") ==
+             {:tell, [:mag2], "start:landmark:formation=wedge:1.2"}
+
+    assert ok("start:patrol") == {:tell, :all, "start:patrol"}
+    assert ok("mag2 wander") == {:tell, [:mag2], "wander"}
+    assert ok("all square:2") == {:tell, :all, "square:2.0"}
     assert ok("mag2 move:0.2:0.1") == {:tell, [:mag2], "move:0.2:0.1"}
     assert ok("mag2 MOVE 0.2 0.1") == {:tell, [:mag2], "move:0.2:0.1"}
     assert ok("all findblob") == {:tell, :all, "findblob"}
@@ -44,6 +56,11 @@ defmodule Console.Terminal.PromptTest do
 
   test "errors name what is wrong and what is allowed" do
     assert error("kil leader") =~ "did you mean kill?"
+    assert error("start patorl") =~ "one of landmark, patrol is allowed; did you mean patrol?"
+    assert error("start mga2") =~ "did you mean mag2?"
+    assert error("start patrol:perod=9") =~ "did you mean period?"
+    assert error("start mag2 patorl") =~ "did you mean patrol?"
+    assert error("start mag9 patrol") =~ "there are mag1 to mag2, min1"
     assert error("kill mag9") =~ "there are mag1 to mag2, min1"
     assert error("kill") =~ "kill leader"
     assert error("formation vee") =~ "column, line, wedge"
@@ -75,5 +92,12 @@ defmodule Console.Terminal.PromptTest do
     assert {{:line, line}, after_it} = Editor.key(typed, "\r")
     assert error(line) =~ "too long"
     assert after_it.most == Prompt.most_bytes()
+  end
+
+  test "names of missions are completed, and the help has them" do
+    assert Prompt.completions(["start"], [:mag1]) == ["landmark", "patrol", "mag1"]
+    assert Prompt.completions(["start", "mag1"], [:mag1]) == ["landmark", "patrol"]
+    assert Prompt.completions(["start", "patrol"], [:mag1]) == []
+    assert Enum.join(Prompt.help(), "\n") =~ "starts another mission: landmark, patrol"
   end
 end
