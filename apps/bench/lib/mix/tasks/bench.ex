@@ -17,6 +17,8 @@ defmodule Mix.Tasks.Bench do
   `mix bench vision` measures how long a frame takes in the native backend, with and without the
   call from Elixir, beside a copy of the frame and the other backends.
 
+  `mix bench page` measures what the page costs a fleet, with browsers that read and with some that do not.
+
   `mix bench recording` measures what a recording costs a run. All have `--help`. Exit status: 0 if all was
   measured, 1 if the input was wrong or a run could not be made.
   """
@@ -60,6 +62,12 @@ defmodule Mix.Tasks.Bench do
     with {:error, lines} <- Bench.Vision.Main.run(arguments), do: refuse(lines)
   end
 
+  defp bench(["page" | arguments]) do
+    Build.update()
+
+    with {:error, lines} <- Bench.Page.Main.run(arguments), do: refuse(lines)
+  end
+
   defp bench(["recording" | arguments]) do
     Build.update()
 
@@ -86,7 +94,7 @@ defmodule Mix.Tasks.Bench do
     do:
       refuse([
         "mix bench needs a command: mix bench demo [options], mix bench goto [options], " <>
-          "mix bench swarm [options], mix bench stop [options], mix bench vision [options], mix bench recording [options]"
+          "mix bench swarm [options], mix bench stop [options], mix bench vision [options], mix bench page [options], mix bench recording [options]"
       ])
 
   defp measure(%{"help" => true}), do: help()
