@@ -1,6 +1,8 @@
 # Makes the pictures of the page for README and guide, in a real browser: docs/images/page*.png.
 #
-#   MIX_ENV=test mix run --no-start test/screenshots.exs
+#   MIX_ENV=test mix run --no-start test/screenshots.exs [FOLDER]
+#
+# With a folder, all sizes and colours go there, to look at.
 #
 # Six robots in the hospital, by processes and so in real time: no two pictures are the same to the byte.
 alias Console.{Browser, Live, Options, Page}
@@ -15,7 +17,20 @@ if why_not, do: Mix.raise("no pictures: " <> why_not)
 
 dark = ["--force-dark-mode", "--blink-settings=preferredColorScheme=0"]
 
-for {name, size, flags} <- [{"page", {1280, 860}, []}, {"page-dark-phone", {500, 1100}, dark}] do
+pictures = [{"page", {1280, 860}, []}, {"page-dark-phone", {390, 844}, dark}]
+
+all =
+  for {size, pixels} <- [wide: {1280, 720}, phone: {390, 844}],
+      {shade, flags} <- [light: [], dark: dark],
+      do: {"#{size}-#{shade}", pixels, flags}
+
+{folder, pictures} =
+  case System.argv() do
+    [] -> {"docs/images", pictures}
+    [folder] -> {folder, all}
+  end
+
+for {name, size, flags} <- pictures do
   browser = Browser.open(size, flags)
   Browser.go(browser, url)
   Browser.await(browser, "return window.floor.scene?.robots.filter((r) => r.slot).length >= 4")
@@ -37,10 +52,10 @@ for {name, size, flags} <- [{"page", {1280, 860}, []}, {"page-dark-phone", {500,
     "return new Promise((go) => setTimeout(() => go(true), 1500))"
   )
 
-  File.write!("docs/images/#{name}.png", Browser.picture(browser))
+  File.write!(Path.join(folder, name <> ".png"), Browser.picture(browser))
   [] = Browser.errors(browser)
   Browser.close(browser)
-  IO.puts("docs/images/#{name}.png")
+  IO.puts(Path.join(folder, name <> ".png"))
 end
 
 Live.Fleet.stop(live)

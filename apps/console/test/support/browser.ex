@@ -15,6 +15,9 @@ defmodule Console.Browser do
     end)
   end
 
+  # No window is narrower; a page that shall be is shown as on a phone.
+  @narrowest 500
+
   @doc "A browser with a window of this size; it ends with the test's process."
   @spec open({pos_integer(), pos_integer()}, [String.t()]) :: %__MODULE__{}
   def open({width, height}, flags \\ []) do
@@ -25,6 +28,13 @@ defmodule Console.Browser do
       "args" => ["--window-size=#{width},#{height}" | flags] ++ @flags,
       "binary" => System.find_executable("chromium")
     }
+
+    metrics = %{"width" => width, "height" => height, "pixelRatio" => 1}
+
+    options =
+      if width < @narrowest,
+        do: Map.put(options, "mobileEmulation", %{"deviceMetrics" => metrics}),
+        else: options
 
     wanted = %{"goog:chromeOptions" => options, "goog:loggingPrefs" => %{"browser" => "ALL"}}
 

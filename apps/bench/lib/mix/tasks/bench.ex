@@ -19,6 +19,8 @@ defmodule Mix.Tasks.Bench do
 
   `mix bench scale` measures what a robot costs in fleets of different sizes, as a table and as bars.
 
+  `mix bench page` measures what the page costs a fleet, with browsers that read and with some that do not.
+
   `mix bench recording` measures what a recording costs a run. All have `--help`. Exit status: 0 if all was
   measured, 1 if the input was wrong or a run could not be made.
   """
@@ -64,6 +66,12 @@ defmodule Mix.Tasks.Bench do
     with {:error, lines} <- Bench.Vision.Main.run(arguments), do: refuse(lines)
   end
 
+  defp bench(["page" | arguments]) do
+    Build.update()
+
+    with {:error, lines} <- Bench.Page.Main.run(arguments), do: refuse(lines)
+  end
+
   defp bench(["recording" | arguments]) do
     Build.update()
 
@@ -96,7 +104,7 @@ defmodule Mix.Tasks.Bench do
     do:
       refuse([
         "mix bench needs a command: mix bench demo [options], mix bench goto [options], " <>
-          "mix bench swarm [options], mix bench stop [options], mix bench vision [options], mix bench scale [options], mix bench recording [options]"
+          "mix bench swarm [options], mix bench stop [options], mix bench vision [options], mix bench scale [options], mix bench page [options], mix bench recording [options]"
       ])
 
   defp of_mission(%{"mission" => mission} = given) do

@@ -1,0 +1,57 @@
+defmodule Bench.Page.Main do
+  @moduledoc "The command `mix bench page`: reads its options, measures, prints the table."
+  alias Bench.{Load, Page}
+  alias Console.Cli
+  alias Console.Cli.{Output, Parse}
+
+  @defaults %{robots: 30, clients: 20, slow: 100, seconds: 15, rounds: 5}
+
+  @doc "Runs the command; each error is one line."
+  @spec run([String.t()]) :: :ok | {:error, [String.t()]}
+  def run(arguments) do
+    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
+      given = Map.new(pairs)
+      if given["help"], do: help(), else: measure(given)
+    end
+  end
+
+  defp measure(given) do
+    output = Output.to(:stderr)
+    note = &Output.progress(output, "bench: " <> &1)
+    given = Map.new(@defaults, fn {key, most} -> {key, Map.get(given, "#{key}", most)} end)
+    Logger.configure(level: :none)
+    before = Load.now()
+
+    with {:ok, turns} <- Page.measure(given, note) do
+      Output.finish(output)
+      IO.puts(Page.draw(turns))
+
+      IO.puts(
+        "\n#{given.robots} robots; #{given.clients} readers, #{given.slow} deaf; #{given.rounds} turns of " <>
+          "#{given.seconds} s each, medians. Processor time without the robots' own. Load of the machine (1 min): #{before || "?"} before, " <>
+          "#{Load.now() || "?"} after; #{System.schedulers_online()} processors."
+      )
+    else
+      {:error, line} -> {:error, [line]}
+    end
+  end
+
+  defp table do
+    [
+      {"robots", "N", &Parse.whole(&1, 1..100), "robots, all as processes (30)"},
+      {"clients", "N", &Parse.whole(&1, 1..200), "browsers that read (20)"},
+      {"slow", "N", &Parse.whole(&1, 1..200), "browsers that read nothing (100)"},
+      {"seconds", "S", &Parse.whole(&1, 1..600), "of each turn (15)"},
+      {"rounds", "N", &Parse.whole(&1, 1..100), "how often each is measured (5)"},
+      {"help", nil, nil, "this text"}
+    ]
+  end
+
+  defp help do
+    IO.puts("""
+      mix bench page [options]
+
+    #{Cli.Arguments.help(table())}
+    """)
+  end
+end
