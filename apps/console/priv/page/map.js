@@ -162,8 +162,8 @@ export class FloorView {
     for (const [k, r] of placed) this.leash(c, r, colour(k));
     if (this.about && placed.some(([, r]) => r.id === this.about.id)) this.way(c, ink("--accent"));
     if (this.sonar && this.about) this.cones(c, this.robot(this.about.id), ink);
-    for (const [k, r] of placed) this.body(c, r, colour(k), ink);
     this.landmark(c, this.dragged?.landmark ?? scene.landmark, ink);
+    for (const [k, r] of placed) this.body(c, r, colour(k), ink);
     if (this.canvas.matches(":focus-visible")) this.cross(c, ink("--text"));
   }
 
@@ -305,7 +305,12 @@ export class FloorView {
     c.fillStyle = theme("--text");
     c.font = "12px system-ui, sans-serif";
     c.textAlign = "center";
-    c.fillText(r.id + (r.leader ? " ★" : "") + (r.alive ? "" : r.state === "not_heard" ? " ?" : " ✕"), x, y - radius - 6);
+    // Over whatever is behind it.
+    const label = [r.id + (r.leader ? " ★" : "") + (r.alive ? "" : r.state === "not_heard" ? " ?" : " ✕"), x, y - radius - 6];
+    c.strokeStyle = theme("--panel");
+    c.lineWidth = 3;
+    c.strokeText(...label);
+    c.fillText(...label);
     c.globalAlpha = 1;
   }
 
