@@ -33,5 +33,13 @@ defmodule Mesh.Protocol.WireTerm do
       [true, false, false]
   """
   @spec names?(term()) :: boolean()
-  def names?(term), do: list?(term, &name?/1)
+  def names?(term), do: names?(term, @most)
+
+  defp names?([], _left), do: true
+
+  defp names?([name | rest], left)
+       when left > 0 and is_atom(name) and name not in [nil, true, false],
+       do: names?(rest, left - 1)
+
+  defp names?(_other, _left), do: false
 end

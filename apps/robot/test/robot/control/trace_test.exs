@@ -106,6 +106,9 @@ defmodule Robot.Control.TraceTest do
   defp pilot({:start, module, options}, _at_ms, nil),
     do: :trace1 |> Runner.new() |> Runner.start(module, options) |> told()
 
+  # Its wheels were disarmed when its drive was opened.
+  defp pilot(:stop, _at_ms, nil), do: {[], nil}
+
   defp pilot(event, _at_ms, runner), do: runner |> Runner.handle(event) |> told()
 
   defp told({runner, effects}), do: {effects, runner}
