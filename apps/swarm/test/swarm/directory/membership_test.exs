@@ -48,7 +48,8 @@ defmodule Swarm.Directory.MembershipTest do
       for function <- [:enter, :leave],
           do: spawn_monitor(fn -> exit(apply(Directory, function, [self(), [group()]])) end)
 
-    assert Swarm.Case.eventually(fn -> Process.info(scope, :message_queue_len) |> elem(1) >= 2 end)
+    asked? = fn -> elem(Process.info(scope, :message_queue_len), 1) >= 2 end
+    assert Swarm.Case.eventually(asked?)
 
     Process.exit(scope, :kill)
     for {pid, ref} <- asked, do: assert_receive({:DOWN, ^ref, :process, ^pid, {:error, :down}})
