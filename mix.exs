@@ -1,3 +1,5 @@
+Code.require_file("release.exs", __DIR__)
+
 defmodule Convoy.MixProject do
   use Mix.Project
 
@@ -54,8 +56,6 @@ defmodule Convoy.MixProject do
   # `robot` is for real hardware; `fleet` holds robots, worlds and the view of people. Both have ssl, for
   # distribution by TLS (rel/env.sh.eex). Neither has benchmarks or the importer of Player's files.
   defp releases do
-    tls = [ssl: :permanent, runtime_tools: :permanent]
-
     robot =
       Keyword.new(
         [:hal, :vision, :robot, :mesh, :swarm, :missions, :agents, :mcap],
@@ -64,41 +64,10 @@ defmodule Convoy.MixProject do
 
     fleet = robot ++ [sim: :permanent, console: :permanent]
 
-    # No cookie is made at build time: a robot's comes from its fleet's secret. `h` in a robot's shell
-    # needs the documentation that is in the code.
-    common = [
-      cookie: "none",
-      include_executables_for: [:unix],
-      strip_beams: [keep: ["Docs"]],
-      steps: [:assemble, &add_robots/1, &write_system/1]
-    ]
-
     [
-      robot: [applications: robot ++ tls] ++ common,
-      fleet: [applications: fleet ++ tls] ++ common
+      robot: Convoy.Release.options(applications: robot),
+      fleet: Convoy.Release.options(applications: fleet)
     ]
-  end
-
-  # The robot files of this folder go along; rel/deploy replaces the robot's own by the newest.
-  defp add_robots(release) do
-    robots = Path.join(release.path, "robots")
-    File.rm_rf!(robots)
-    File.cp_r!("config/robots", robots)
-    release
-  end
-
-  # Where it was built, for rel/install: a release runs on that system only. The first line is what
-  # os-release and uname say there, the second what people call it.
-  defp write_system(release) do
-    script = """
-    [ ! -r /etc/os-release ] || . /etc/os-release
-    echo "${ID:-$(uname -s)} ${VERSION_ID:-${VERSION_CODENAME:-}} $(uname -m)"
-    echo "${PRETTY_NAME:-$(uname -sr)}"
-    """
-
-    {system, 0} = System.cmd("sh", ["-c", script])
-    File.write!(Path.join(release.path, "system"), system)
-    release
   end
 
   # The commands read files and print reports; they run in the everyday build.

@@ -6,6 +6,7 @@ defmodule Docs.Checks do
   """
   alias Docs.{LookedAt, Reader, Sandbox}
 
+  @example "test/example_test.exs builds and runs it"
   @live "it goes on until somebody ends it"
   @tests "it is the tests"
   @long "it takes longer than 10 s"
@@ -25,6 +26,9 @@ defmodule Docs.Checks do
     "bin/test-on bookworm --fresh" => @tests,
     "bin/test-on trixie --fresh" => @tests,
     "bin/setup" => @system,
+    "cp -r examples/gather ../ours" => @example,
+    "cd ../ours && export CONVOY=../convoy && mix demo --mission gather --landmark none" =>
+      @example,
     "bin/soak 46 1" => @long,
     "bin/demo --nodes" => @live,
     "bin/demo --nodes --robots 4" => @live,

@@ -26,13 +26,14 @@ defmodule Mix.Tasks.Bench do
   """
   use Mix.Task
   alias Console.Cli
-  alias Console.Cli.{Build, MapName, Output, Parse, Progress}
+  alias Console.Cli.{MapName, Output, Parse, Progress}
+  alias Hal.CommandBuild
 
   @impl Mix.Task
   def run(arguments), do: Hal.CommandOutput.run("bench", fn -> bench(arguments) end)
 
   defp bench(["demo" | arguments]) do
-    Build.update()
+    CommandBuild.update()
 
     with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()),
          {:ok, given} <- of_mission(Map.new(pairs)) do
@@ -43,49 +44,49 @@ defmodule Mix.Tasks.Bench do
   end
 
   defp bench(["goto" | arguments]) do
-    Build.update()
+    CommandBuild.update()
 
     with {:error, lines} <- Bench.Goto.Main.run(arguments), do: refuse(lines)
   end
 
   defp bench(["swarm" | arguments]) do
-    Build.update()
+    CommandBuild.update()
 
     with {:error, lines} <- Bench.Mesh.Main.run(arguments), do: refuse(lines)
   end
 
   defp bench(["stop" | arguments]) do
-    Build.update()
+    CommandBuild.update()
 
     with {:error, lines} <- Bench.Stop.Main.run(arguments), do: refuse(lines)
   end
 
   defp bench(["vision" | arguments]) do
-    Build.update()
+    CommandBuild.update()
 
     with {:error, lines} <- Bench.Vision.Main.run(arguments), do: refuse(lines)
   end
 
   defp bench(["page" | arguments]) do
-    Build.update()
+    CommandBuild.update()
 
     with {:error, lines} <- Bench.Page.Main.run(arguments), do: refuse(lines)
   end
 
   defp bench(["recording" | arguments]) do
-    Build.update()
+    CommandBuild.update()
 
     with {:error, lines} <- Bench.Recording.Main.run(arguments), do: refuse(lines)
   end
 
   defp bench(["scale" | arguments]) do
-    Build.update()
+    CommandBuild.update()
 
     with {:error, lines} <- Bench.Scale.Main.run(arguments), do: refuse(lines)
   end
 
   defp bench(["soak" | arguments]) do
-    Build.update()
+    CommandBuild.update()
 
     case Bench.Soak.Main.arguments(arguments) do
       {:ok, what} ->

@@ -11,7 +11,7 @@ defmodule Mix.Tasks.Calibrate do
   Exit status: 0 if all went well, 1 if the input or a measurement was wrong.
   """
   use Mix.Task
-  alias Console.Cli.Build
+  alias Hal.CommandBuild
   alias Hal.Options.Suggest
 
   @words ["odometry", "colour"]
@@ -19,7 +19,7 @@ defmodule Mix.Tasks.Calibrate do
   @impl Mix.Task
   def run(arguments) do
     Hal.CommandOutput.run("calibrate", fn ->
-      Build.update()
+      CommandBuild.update()
       calibrate(arguments)
     end)
   end

@@ -8,13 +8,13 @@ defmodule Mix.Tasks.Chaos do
   use Mix.Task
   alias Console.Chaos
   alias Console.Chaos.Options
-  alias Console.Cli.Build
+  alias Hal.CommandBuild
 
   @impl Mix.Task
   def run(arguments), do: Hal.CommandOutput.run("chaos", fn -> chaos(arguments) end)
 
   defp chaos(arguments) do
-    Build.update()
+    CommandBuild.update()
     # A run that raises is a finding, and told in its line.
     Logger.configure(level: :none)
 

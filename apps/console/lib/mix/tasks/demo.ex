@@ -12,7 +12,7 @@ defmodule Mix.Tasks.Demo do
   """
   use Mix.Task
   alias Console.{Demo, Live, Options, Report}
-  alias Console.Cli.Build
+  alias Hal.CommandBuild
   alias Console.Terminal.Session
 
   # Twenty robots take a third of a processor, fifty a whole one, because all hear all.
@@ -25,7 +25,7 @@ defmodule Mix.Tasks.Demo do
   def run(arguments), do: Hal.CommandOutput.run("demo", fn -> demo(arguments) end)
 
   defp demo(arguments) do
-    Build.update()
+    CommandBuild.update()
     # Robots are killed here on purpose, and reports of their supervisors would spoil the screen.
     Logger.configure(level: :none)
 

@@ -7,7 +7,7 @@ defmodule Mix.Tasks.Replay do
   not recorded; 1 something was wrong with the input.
   """
   use Mix.Task
-  alias Console.Cli.Build
+  alias Hal.CommandBuild
   alias Console.Replay
   alias Console.Replay.Options
 
@@ -15,7 +15,7 @@ defmodule Mix.Tasks.Replay do
   def run(arguments), do: Hal.CommandOutput.run("replay", fn -> replay(arguments) end)
 
   defp replay(arguments) do
-    Build.update()
+    CommandBuild.update()
 
     status =
       case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do

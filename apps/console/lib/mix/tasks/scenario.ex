@@ -7,13 +7,13 @@ defmodule Mix.Tasks.Scenario do
   Exit status: 0 if all expectations hold; 2 if one failed; 1 if the input was wrong.
   """
   use Mix.Task
-  alias Console.Cli.Build
+  alias Hal.CommandBuild
   alias Console.Scenario.{Options, Session}
 
   @impl Mix.Task
   def run(arguments) do
     Hal.CommandOutput.run("scenario", fn ->
-      Build.update()
+      CommandBuild.update()
       status = scenario(arguments)
       if is_integer(status) and status > 0, do: exit({:shutdown, status})
     end)

@@ -40,6 +40,8 @@ defmodule Mix.Tasks.Robot.Check do
   defp files([]), do: refuse(["no robot file is in config/robots; name one"])
 
   defp files(files) do
+    # Their drivers and missions may be the project's own.
+    Hal.CommandBuild.update()
     problems = Enum.flat_map(files, &check/1)
     if problems != [], do: refuse(problems)
   end

@@ -43,6 +43,9 @@ defmodule Mix.Tasks.Blobs do
   def run(words), do: Hal.CommandOutput.run("blobs", fn -> command(words) end)
 
   defp command(words) do
+    # The backend may be the project's own.
+    Hal.CommandBuild.update()
+
     case Options.parse(words) do
       {:ok, options} -> options |> find() |> finish()
       {:error, line} -> refuse(line)

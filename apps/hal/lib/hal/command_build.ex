@@ -1,7 +1,10 @@
-defmodule Console.Cli.Build do
+defmodule Hal.CommandBuild do
   @moduledoc "Updates the build from within a Mix task, without output on standard output."
 
-  @doc "Compiles what has changed; Mix itself would run a task of an umbrella from an old build."
+  @doc """
+  Compiles what has changed. Mix itself would run a task of an umbrella from an old build, and one of a dependency
+  without the project's own modules.
+  """
   @spec update() :: :ok
   def update do
     shell = Mix.shell()
