@@ -19,9 +19,13 @@ defmodule Console.Terminal do
             messages: [],
             overlay: nil,
             floor: nil,
-            pace: nil
+            pace: nil,
+            driving: nil
 
-  @typedoc "What the view keeps besides the scene; `messages` are answers, the newest first; `pace` is how fast the run goes."
+  @typedoc """
+  What the view keeps besides the scene; `messages` are answers, the newest first; `pace` is how fast the run goes;
+  `driving` stands in place of the prompt while keys drive a robot.
+  """
   @type t :: %__MODULE__{
           columns: pos_integer(),
           rows: pos_integer(),
@@ -29,7 +33,8 @@ defmodule Console.Terminal do
           messages: [{String.t(), atom()}],
           overlay: [String.t()] | nil,
           floor: Canvas.floor() | nil,
-          pace: String.t() | nil
+          pace: String.t() | nil,
+          driving: String.t() | nil
         }
 
   @doc "The escape sequence that switches the terminal to a screen of our own."
@@ -151,6 +156,8 @@ defmodule Console.Terminal do
   end
 
   # A line longer than the screen scrolls, so that the cursor stays visible.
+  defp prompt(%{driving: hint}) when is_binary(hint), do: [{hint, :title}]
+
   defp prompt(view),
     do: [{"> ", :prompt}, {String.slice(Editor.text(view.editor), shift(view)..-1//1), :plain}]
 

@@ -164,6 +164,7 @@ export class FloorView {
     if (this.sonar && this.about) this.cones(c, this.robot(this.about.id), ink);
     this.landmark(c, this.dragged?.landmark ?? scene.landmark, ink);
     for (const [k, r] of placed) this.body(c, r, colour(k), ink);
+    this.labels(c, placed.map(([, r]) => r), ink);
     if (this.canvas.matches(":focus-visible")) this.cross(c, ink("--text"));
   }
 
@@ -302,15 +303,28 @@ export class FloorView {
       c.arc(x, y, radius + 5, 0, 7);
       c.stroke();
     }
-    c.fillStyle = theme("--text");
+    c.globalAlpha = 1;
+  }
+
+  // Names above the robots, over whatever is behind them; below, where there is a name already.
+  labels(c, robots, theme) {
     c.font = "12px system-ui, sans-serif";
     c.textAlign = "center";
-    // Over whatever is behind it.
-    const label = [r.id + (r.leader ? " ★" : "") + (r.alive ? "" : r.state === "not_heard" ? " ?" : " ✕"), x, y - radius - 6];
     c.strokeStyle = theme("--panel");
+    c.fillStyle = theme("--text");
     c.lineWidth = 3;
-    c.strokeText(...label);
-    c.fillText(...label);
+    const taken = [];
+    for (const r of robots) {
+      const text = r.id + (r.leader ? " ★" : "") + (r.alive ? "" : r.state === "not_heard" ? " ?" : " ✕");
+      const [x, y] = this.toPixel(r.x, r.y);
+      const [half, out] = [c.measureText(text).width / 2, Math.max(4, r.r * this.view.scale) + 6];
+      const free = (at) => !taken.some((t) => Math.abs(t.x - x) < t.half + half && Math.abs(t.at - at) < 13);
+      const at = free(y - out) ? y - out : y + out + 9;
+      taken.push({ x, at, half });
+      c.globalAlpha = r.alive ? 1 : 0.35;
+      c.strokeText(text, x, at);
+      c.fillText(text, x, at);
+    }
     c.globalAlpha = 1;
   }
 

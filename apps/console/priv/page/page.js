@@ -45,6 +45,8 @@ function hear(message) {
     by("robots").replaceChildren();
     for (const b of document.querySelectorAll("[data-offer]")) b.hidden = !message.offers.includes(b.dataset.offer);
     by("off").hidden = !message.width;
+    const same = by("mission").options[0];
+    by("mission").replaceChildren(same, ...message.missions.map((name) => new Option(name)));
     floor.setMap(message);
   } else if (message.t === "scene") {
     heard = performance.now();
@@ -296,6 +298,7 @@ by("sonar").onclick = (e) => {
 };
 by("follow").onchange = (e) => ((floor.follow = e.target.checked), floor.draw());
 by("trails").onchange = (e) => ((floor.trails = e.target.checked), floor.draw());
+by("start").onclick = () => say(`start ${by("mission").value}`.trim());
 for (const b of document.querySelectorAll("[data-line]")) b.onclick = () => say(b.dataset.line);
 for (const b of document.querySelectorAll("[data-one]")) 
   b.onclick = () => (!b.dataset.ask || confirm(`${b.dataset.ask} ${chosen}?`)) && say(`${b.dataset.one} ${chosen}`);

@@ -29,6 +29,18 @@ defmodule Console.LiveFleetTest do
         answer = Swarm.Case.order(fn -> Live.Fleet.command(live, command) end),
         do: assert({command, {:ok, "accepted"}} == {command, answer})
 
+    # A hand on a robot: it drives while there are words, waits when they end, and keeps its mission.
+    assert {:ok, "accepted"} = Live.Fleet.command(live, {:tell, [:min61], "start:teleop"})
+    word = Console.Teleop.order(:min61, {0.4, 0.0}, :terminal)
+    state = fn -> Swarm.status(:min61).state end
+
+    Swarm.Case.eventually(fn ->
+      {:ok, "accepted"} = Live.Fleet.command(live, word)
+      Swarm.status(:min61).says == "driven: 0.20 m/s, 0.00 rad/s" and state.() == :driven
+    end)
+
+    Swarm.Case.eventually(fn -> state.() == :wait end)
+
     assert {:ok, "done"} = Live.Fleet.command(live, {:kill, :mag61})
 
     # What a robot's processes log when they are cut off belongs to this test.

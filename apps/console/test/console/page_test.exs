@@ -255,7 +255,7 @@ defmodule Console.PageTest do
 
       # From the top of the page to its end; each that has the focus shows it.
       order =
-        for _stop <- 1..20 do
+        for _stop <- 1..21 do
           Browser.press(browser, [:tab])
 
           Browser.run(browser, """
@@ -265,9 +265,9 @@ defmodule Console.PageTest do
         end
 
       assert order ==
-               ~w(estop reset map 1.3 0.77 0 follow trails start stop) ++
+               ~w(estop reset map 1.3 0.77 0 follow trails start mission stop) ++
                  ["kill leader", "shape", "spacing", "form", "mag1", "min1", "line", "Send"] ++
-                 Enum.drop(order, 18)
+                 Enum.drop(order, 19)
 
       answered = fn text ->
         Browser.await(
@@ -298,9 +298,12 @@ defmodule Console.PageTest do
       Browser.press(browser, [" "])
       answered.("stop min1: accepted")
       wait(fn -> Swarm.status(:min1).state != :goto end)
-      to.("[data-line=start]")
+      to.("#mission")
+      Browser.press(browser, ["p"])
+      to.("#start")
       Browser.press(browser, [:enter])
-      answered.("start: accepted")
+      answered.("start patrol: accepted")
+      wait(fn -> Swarm.status(:mag1).state in [:watch, :visit] end)
       to.("[data-line=stop]")
       Browser.press(browser, [:enter])
       answered.("stop: accepted")

@@ -198,6 +198,16 @@ defmodule Robot.Command do
     do: {:blob, Pose.new(x, y, theta), size, found}
 
   @doc """
+  What a command is called.
+
+      iex> Robot.Command.name({:move, 0.5, 0.0})
+      :move
+  """
+  @spec name(t()) :: atom()
+  def name(command) when is_atom(command), do: command
+  def name(command), do: elem(command, 0)
+
+  @doc """
   The text of a command; `parse/2` turns it into the command again.
 
       iex> Robot.Command.to_text({:goto, 2.0, 1.0, nil})

@@ -97,7 +97,8 @@ defmodule Robot.Mission do
 
   @doc """
   The names of the commands for a running mission that it understands, beside `:start`, such as `[:formation]`. People are
-  told that a robot does not take the others. A mission without this callback gets every command.
+  told that a robot does not take the others. A mission without this callback gets every command. One that names a command
+  for one robot, such as `:move` (`Robot.Command`), gets that, too; without that the robot leaves the mission for it.
   """
   @callback commands() :: [atom()]
 
@@ -123,6 +124,16 @@ defmodule Robot.Mission do
   def understands?(module, command),
     do: not function_exported?(module, :commands, 0) or command in module.commands()
 
+  @doc """
+  Whether a mission names this command among its own.
+
+      iex> Robot.Mission.names?(Robot.Mission.Manual, :move)
+      false
+  """
+  @spec names?(module(), command :: atom()) :: boolean()
+  def names?(module, command),
+    do: function_exported?(module, :commands, 0) and command in module.commands()
+
   @doc "Whether a mission says what its options are."
   @spec checks?(module()) :: boolean()
   def checks?(module),
@@ -138,6 +149,8 @@ defmodule Robot.Mission do
   @spec check_options(module(), keyword(), robots :: pos_integer() | nil) ::
           {:ok, keyword()} | {:error, line :: String.t()}
   def check_options(module, options, robots) do
+    _loaded? = Code.ensure_loaded?(module)
+
     cond do
       function_exported?(module, :options, 2) ->
         checked(module, module.options(options, robots))

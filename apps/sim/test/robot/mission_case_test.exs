@@ -7,6 +7,9 @@ defmodule Robot.MissionCaseTest do
     assert MissionCase.problems(:landmark, seeds: 1..2, seconds: 30) == []
   end
 
+  test "the mission of a robot that a person drives",
+    do: assert(MissionCase.problems(:teleop, seeds: [1], seconds: 10) == [])
+
   test "the patrol, which never has more than one robot's own points in its hand" do
     distinct = fn trial ->
       points =

@@ -145,12 +145,14 @@ defmodule Swarm.Member do
   def step(member, {:command, {:start, module, options}, _at_ms}),
     do: begin(member, {module, options}, :start)
 
-  def step(%{runner: %{module: Manual}} = member, {:command, command, _at_ms})
-      when is_alone(command),
-      do: handle(member, {:command, command})
+  def step(%{runner: %{module: module}} = member, {:command, command, _at_ms})
+      when is_alone(command) do
+    own? = module != nil and Mission.names?(module, Robot.Command.name(command))
 
-  def step(member, {:command, command, _at_ms}) when is_alone(command),
-    do: begin(member, {Manual, []}, command)
+    if own? or module == Manual,
+      do: handle(member, {:command, command}),
+      else: begin(member, {Manual, []}, command)
+  end
 
   def step(%{runner: %{module: module}} = member, {:command, {name, _, _} = command, _at_ms})
       when name == :formation do

@@ -8,9 +8,9 @@ defmodule Console.Page.Client do
   """
   use GenServer
   alias Console.Page.{About, Feed, State}
+  alias Console.Teleop
   alias Console.Terminal.Prompt
 
-  @dead_man_ms 300
   @most 1.0
   # How often the page is told of the robot that it looks at.
   @about_ms 200
@@ -91,16 +91,11 @@ defmodule Console.Page.Client do
   def handle_info({:DOWN, ref, :process, _pid, _reason}, %{connection: ref} = s),
     do: {:stop, :normal, s}
 
-  defp drive(s, _robot, _speed, waited_ms) when waited_ms > @dead_man_ms, do: s
-
-  # The gate limits speeds; half a metre a second and a radian a second are the page's own.
-  defp drive(s, robot, {ahead, turn}, _waited_ms) do
-    command = {:tell, [robot], "move:#{ahead / 2}:#{turn * 1.0}:#{@dead_man_ms / 1_000}"}
-
-    case s.module.command(s.live, command) do
-      {:ok, _accepted} -> s
-      {:error, line} -> answer(s, "drive", {:error, line})
-    end
+  defp drive(s, robot, stick, waited_ms) do
+    with true <- waited_ms <= Teleop.word_ms(:page),
+         {:error, line} <- s.module.command(s.live, Teleop.order(robot, stick, :page)),
+         do: answer(s, "drive", {:error, line}),
+         else: (_late_or_accepted -> s)
   end
 
   defp answer(s, line, answer) do
@@ -115,6 +110,9 @@ defmodule Console.Page.Client do
 
       {:ok, :quit} ->
         {:error, "the page is closed in the browser, its program in the terminal"}
+
+      {:ok, {hand, _whom}} when hand in [:drive, :gamepad] ->
+        {:error, "#{hand} is for the terminal; here the keys drive by the button Drive by keys"}
 
       {:ok, :help} ->
         {:ok, Prompt.help(s.module.offers(s.live))}

@@ -55,7 +55,7 @@ defmodule Console.Page.Feed do
 
   @impl GenServer
   def handle_call(:map, _from, %{map: nil} = s) do
-    map = State.map(s.module.scene(s.live), s.module.offers(s.live))
+    map = State.map(s.module.scene(s.live), s.module.offers(s.live), Swarm.Missions.names())
     {:reply, map, %{s | map: map}}
   end
 

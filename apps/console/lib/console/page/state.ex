@@ -11,12 +11,14 @@ defmodule Console.Page.State do
   @cell 0.1
 
   @doc """
-  What does not change: what the fleet offers, and the map, its name, its size, and its walls as rectangles
+  What does not change: what the fleet offers, the missions that it may start, and the map, its name, its size, and its walls as rectangles
   `[x, y, width, height]`, rows of equal cells. Where there is no map, its size is 0.
   """
-  @spec map(Scene.t(), [Console.Live.offer()]) :: String.t()
-  def map(%Scene{map: map}, offers),
-    do: map |> ground() |> Map.merge(%{t: "map", offers: offers, cell: @cell}) |> Json.encode!()
+  @spec map(Scene.t(), [Console.Live.offer()], missions :: [String.t()]) :: String.t()
+  def map(%Scene{map: map}, offers, missions) do
+    told = %{t: "map", offers: offers, missions: missions, cell: @cell}
+    map |> ground() |> Map.merge(told) |> Json.encode!()
+  end
 
   defp ground(nil), do: %{name: nil, width: 0, height: 0, walls: []}
 

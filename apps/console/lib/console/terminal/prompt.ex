@@ -12,13 +12,23 @@ defmodule Console.Terminal.Prompt do
   alias Robot.Command
   alias Swarm.Missions
 
-  @words ~w(kill formation landmark move goto follow stop estop reset start arm disarm acknowledge pause resume step speed status nodes tell help quit)
+  @words ~w(kill formation landmark move goto follow drive gamepad stop estop reset start arm disarm acknowledge pause resume step speed status nodes tell help quit)
 
+  # Linux's name of the first gamepad.
+  @gamepad "/dev/input/js0"
   # Far more than any command needs.
   @most_bytes 500
 
   @type parsed ::
-          Console.Live.command() | :help | :nodes | :status | {:status, atom()} | :quit | :nothing
+          Console.Live.command()
+          | {:drive, atom()}
+          | {:gamepad, {atom(), Path.t()} | :off}
+          | :help
+          | :nodes
+          | :status
+          | {:status, atom()}
+          | :quit
+          | :nothing
 
   @doc """
   A command, or one line that says what is allowed.
@@ -72,7 +82,8 @@ defmodule Console.Terminal.Prompt do
       [word] when word in ["arm", "disarm", "acknowledge"] -> ["all" | names]
       ["start"] -> Missions.names() ++ names
       ["start", name] -> if name in names, do: Missions.names(), else: []
-      [word] when word in ["goto", "follow", "stop", "status"] -> names
+      ["gamepad"] -> ["off" | names]
+      [word] when word in ["goto", "follow", "drive", "stop", "status"] -> names
       _other -> []
     end
   end
@@ -93,6 +104,8 @@ defmodule Console.Terminal.Prompt do
       [
         "goto mag2 1,2                 one robot drives to a place",
         "follow min1 mag2              one robot follows another",
+        "drive mag2                    drives it by the keys of this terminal",
+        "gamepad mag2, gamepad off     drives it by #{@gamepad}, or by another path",
         "stop, stop mag2               the fleet or one robot stops and stands",
         "start, start mag2             starts the mission again, from the search",
         "start patrol:period=90        starts another mission: #{Enum.join(Missions.names(), ", ")}",
@@ -163,6 +176,17 @@ defmodule Console.Terminal.Prompt do
   end
 
   defp command("follow", _rest, _robots), do: {:error, "follow needs two names: follow min1 mag1"}
+
+  defp command("drive", [name], robots), do: with_robot(name, robots, &{:drive, &1})
+  defp command("drive", _rest, _robots), do: {:error, "drive needs one name: drive mag1"}
+  defp command("gamepad", ["off"], _robots), do: {:ok, {:gamepad, :off}}
+  defp command("gamepad", [name], robots), do: command("gamepad", [name, @gamepad], robots)
+
+  defp command("gamepad", [name, path], robots),
+    do: with_robot(name, robots, &{:gamepad, {&1, path}})
+
+  defp command("gamepad", _rest, _robots),
+    do: {:error, "gamepad needs one name, or off: gamepad mag1, gamepad mag1 /dev/input/js1"}
 
   defp command(word, [], _robots) when word in ["stop", "start"], do: {:ok, {:tell, :all, word}}
 

@@ -6,7 +6,7 @@ defmodule Console.Terminal.Session do
   decides nothing: `Console.Terminal` draws, `Console.Terminal.Prompt` checks, `Console.Live`
   acts.
   """
-  alias Console.{Demo, Options, Page, Picture, Report, Terminal}
+  alias Console.{Demo, Options, Page, Picture, Report, Teleop, Terminal}
   alias Console.Cli.{Format, Output}
   alias Console.Picture.RunTrack
   alias Console.Terminal.{Prompt, Tty}
@@ -27,7 +27,9 @@ defmodule Console.Terminal.Session do
                 track: nil,
                 started_ms: 0,
                 ended: nil,
-                redraw?: false
+                redraw?: false,
+                keys: nil,
+                gamepad: nil
               ]
 
   @doc "Runs until the time is up or somebody quits; returns the exit status."
@@ -170,11 +172,17 @@ defmodule Console.Terminal.Session do
       {:line, line} ->
         session |> obey(line) |> continue()
 
+      {:gamepad, line} ->
+        session |> answer(line, :bad) |> continue()
+
       :quit ->
         session
 
       {:EXIT, ^live, reason} ->
         exit({:fleet_died, reason})
+
+      {:EXIT, pad, _reason} when pad == session.gamepad ->
+        loop(%{session | gamepad: nil})
 
       {:EXIT, _reader, _reason} ->
         loop(session)
@@ -183,6 +191,19 @@ defmodule Console.Terminal.Session do
 
   defp continue({:quit, session}), do: session
   defp continue(session), do: loop(session)
+
+  # While a robot is driven its keys are no text.
+  defp key(%{keys: %Teleop.Keys{}} = session, key) do
+    {event, keys} = Teleop.Keys.key(session.keys, key)
+    session = drive(session, keys)
+
+    case event do
+      nil -> session
+      :speed -> redraw(session)
+      :leave -> session |> drive(nil) |> word(keys.robot, {0.0, 0.0}) |> redraw()
+      {:word, stick} -> session |> word(keys.robot, stick) |> redraw()
+    end
+  end
 
   defp key(session, key) do
     {event, editor} = Editor.key(session.view.editor, key)
@@ -193,6 +214,33 @@ defmodule Console.Terminal.Session do
       :quit -> {:quit, session}
       {:choices, words} -> session |> answer(Enum.join(words, "  "), :dim) |> redraw()
       {:line, line} -> %{session | view: %{session.view | overlay: nil}} |> obey(line) |> redraw()
+    end
+  end
+
+  defp drive(session, keys),
+    do: put_in(%{session | keys: keys}.view.driving, keys && Teleop.Keys.hint(keys))
+
+  # Only a refusal is told: words come ten times a second.
+  defp word(session, robot, stick) do
+    case session.module.command(session.live, Teleop.order(robot, stick, :terminal)) do
+      {:ok, _accepted} -> session
+      {:error, line} -> answer(session, line, :bad)
+    end
+  end
+
+  defp gamepad(%{gamepad: pad} = session, :off) do
+    if pad, do: GenServer.stop(pad)
+    {%{session | gamepad: nil}, if(pad, do: "off", else: "there was none")}
+  end
+
+  defp gamepad(session, {robot, path}) do
+    {session, _off} = gamepad(session, :off)
+    me = self()
+    told = [robot: robot, path: path, tell: &send(me, {:gamepad, &1})]
+
+    case Teleop.Gamepad.start_link([module: session.module, live: session.live] ++ told) do
+      {:ok, pad} -> {%{session | gamepad: pad}, "hold a shoulder button, and drive by the stick"}
+      {:error, line} -> {:error, line}
     end
   end
 
@@ -241,6 +289,18 @@ defmodule Console.Terminal.Session do
 
       {:ok, :help} ->
         show(session, Prompt.help())
+
+      {:ok, {:drive, robot}} when session.mode == :screen ->
+        drive(session, Teleop.Keys.new(robot))
+
+      {:ok, {:drive, _robot}} ->
+        answer(session, "drive needs a terminal", :bad)
+
+      {:ok, {:gamepad, whom}} ->
+        case gamepad(session, whom) do
+          {:error, error} -> answer(session, error, :bad)
+          {session, text} -> answer(session, "#{String.trim(line)}: #{text}", :good)
+        end
 
       {:ok, :nodes} ->
         show(session, session.module.lines(session.live))

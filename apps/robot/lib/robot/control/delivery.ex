@@ -8,6 +8,7 @@ defmodule Robot.Control.Delivery do
   |---|---|---|
   | `{:hand, {:only, module}}` | while this mission runs | it gets the command |
   | `{:hand, {:except, module}}` | while another mission runs | that mission gets the command |
+  | `{:hand, {:naming, name}}` | while a mission runs that names this command for one robot among its own | that mission gets the command |
   | `{:hand, {:taking, name}}` | while a mission runs that takes commands of this name (`c:Robot.Mission.commands/0`) | that mission gets the command |
   | `:resume` | while none runs and the last stop left one | it is resumed and gets the command |
   | `{:start, module, options}` | always | it replaces a running mission and gets the command |
@@ -19,7 +20,7 @@ defmodule Robot.Control.Delivery do
   defstruct @enforce_keys ++ [asked: nil]
 
   @type way ::
-          {:hand, {:only | :except, module()} | {:taking, command :: atom()}}
+          {:hand, {:only | :except, module()} | {:taking | :naming, command :: atom()}}
           | :resume
           | {:start, module(), options :: keyword()}
 
@@ -78,6 +79,9 @@ defmodule Robot.Control.Delivery do
 
   defp open({:hand, {:taking, command}}, {module, _phase}, _halted),
     do: if(Mission.understands?(module, command), do: {:hand, module})
+
+  defp open({:hand, {:naming, command}}, {module, _phase}, _halted),
+    do: if(Mission.names?(module, command), do: {:hand, module})
 
   defp open(:resume, :idle, {_module, _left}), do: :resume
   defp open({:start, _module, _options} = start, _state, _halted), do: start

@@ -212,7 +212,9 @@ defmodule Robot.Control.Inbox do
 
   def delivery?(_other), do: false
 
-  defp way?({:hand, {kind, name}}), do: kind in [:only, :except, :taking] and is_atom(name)
+  defp way?({:hand, {kind, name}}),
+    do: kind in [:only, :except, :taking, :naming] and is_atom(name)
+
   defp way?({:start, module, _options}), do: is_atom(module)
   defp way?(way), do: way == :resume
 

@@ -219,7 +219,12 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp ways({:start, module, options}, _config), do: {:ok, [{:start, module, options}]}
   defp ways({:formation, _kind, _spacing}, _config), do: {:ok, [{:hand, {:taking, :formation}}]}
-  defp ways(_alone, _config), do: {:ok, [{:hand, {:only, Manual}}, {:start, Manual, []}]}
+
+  # A mission may name such a command as one of its own.
+  defp ways(alone, _config) do
+    own = {:hand, {:naming, Robot.Command.name(alone)}}
+    {:ok, [own, {:hand, {:only, Manual}}, {:start, Manual, []}]}
+  end
 
   defp begin(options, config) do
     with {:ok, {module, defaults}} <- mission(config),
