@@ -163,6 +163,6 @@ defmodule Console.OptionsTest do
     assert error("--mission patrol:period=5") ==
              "--mission: patrol option period cannot be 5: a number from 10 to 3600 s is allowed"
 
-    assert Options.help() =~ ~r/--mission NAME\[:KEY=VALUE,…\] +landmark or patrol/
+    assert Options.help() =~ ~r/--mission NAME\[:KEY=VALUE,…\] +landmark, patrol or teleop/
   end
 end
