@@ -1,5 +1,6 @@
 defmodule HalTest do
   use ExUnit.Case, async: true
+  doctest Hal
   doctest Hal.Pose
   doctest Hal.Twist
   doctest Hal.Drive.Wheels

@@ -1,5 +1,6 @@
 defmodule Agents.TemplateTest do
   use ExUnit.Case, async: true
+  doctest Agents
   doctest Agents.Template
   alias Agents.{Envelope, Template}
 

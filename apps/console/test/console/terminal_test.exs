@@ -4,6 +4,7 @@ defmodule Console.TerminalTest do
   alias Console.Picture.MapView
   alias Console.Terminal.{Canvas, Editor, Style}
 
+  doctest Console
   doctest Console.Terminal.Prompt
   doctest Console.Cli.Progress
   doctest Console.Terminal.Canvas

@@ -3,6 +3,7 @@ defmodule Missions.PureTest do
   alias Missions.Landmark
   alias Swarm.Formation.Reference
   alias Swarm.Message
+  doctest Missions
   doctest Landmark.Options
   doctest Landmark.Policy
   doctest Landmark.Transitions

@@ -1,5 +1,6 @@
 defmodule Robot.PureTest do
   use ExUnit.Case, async: true
+  doctest Robot
   doctest Robot.Wish
   doctest Robot.Behaviour
   doctest Robot.Safety.LivenessMonitor

@@ -1,0 +1,4 @@
+defmodule SimTest do
+  use ExUnit.Case, async: true
+  doctest Sim
+end
