@@ -190,7 +190,9 @@ defmodule Mesh.ProtocolTest do
     assert Enum.any?(air.out, &match?({_, "twin", {:event, :duplicate_node, _}}, &1))
   end
 
+  # Ten in a row are lost once in some two hundred such minutes: of this one it is known.
   test "loss of a third of all datagrams makes nobody suspect for long" do
+    :rand.seed(:exsss, 1)
     air = Air.new(loss: 0.33) |> Air.join("a") |> Air.join("b") |> Air.run(3_000)
     air = Air.run(%{air | out: []}, 60_000)
     refute Enum.any?(changes(air, "a"), &match?({_, :gone, _}, &1))
