@@ -1,7 +1,7 @@
 defmodule Missions.Patrol do
   @moduledoc """
   The patrol: points that are visited for ever by a fleet without a leader, by ALLIANCE's motivations (R97,
-  `Missions.Patrol.Motivation`). Pure; written with the interface of `Robot.Mission` alone.
+  `Missions.Patrol.Motivation`) or by auction (`Missions.Patrol.Auction`). Pure; written with the interface of `Robot.Mission` alone.
 
   A point is due when nobody has seen it for a quarter of the `period`; whoever is within 0.5 m of it sees it. Each robot
   tells the others once a second, and at once when that changes, at which point it is, and how long ago every point was
@@ -12,7 +12,7 @@ defmodule Missions.Patrol do
   within the period. Options: `Missions.Patrol.Options`.
   """
   alias Hal.Pose
-  alias Missions.Patrol.{Motivation, Options}
+  alias Missions.Patrol.{Ages, Auction, Motivation, Options}
   alias Robot.Behaviour
 
   @behaviour Robot.Mission
@@ -29,7 +29,7 @@ defmodule Missions.Patrol do
   @day_ms 86_400_000
   @longest_step_ms 1_000
 
-  @enforce_keys [:me, :points, :plan, :period_ms]
+  @enforce_keys [:me, :points, :plan, :period_ms, :by]
   defstruct @enforce_keys ++
               [
                 now_ms: nil,
@@ -54,6 +54,7 @@ defmodule Missions.Patrol do
           points: %{non_neg_integer() => Pose.point()},
           plan: non_neg_integer(),
           period_ms: pos_integer(),
+          by: :motivation | :auction,
           now_ms: integer() | nil,
           seen: %{non_neg_integer() => integer()},
           aside: %{non_neg_integer() => integer()},
@@ -92,7 +93,8 @@ defmodule Missions.Patrol do
       me: robot,
       points: points |> Enum.with_index() |> Map.new(fn {point, number} -> {number, point} end),
       plan: :erlang.phash2(points, 0x10000000),
-      period_ms: round(options[:period] * 1_000)
+      period_ms: round(options[:period] * 1_000),
+      by: options[:by]
     }
 
     {:idle, mission, []}
@@ -100,7 +102,7 @@ defmodule Missions.Patrol do
 
   @impl Robot.Mission
   def halted(mission) do
-    kept = [:me, :points, :plan, :period_ms]
+    kept = [:me, :points, :plan, :period_ms, :by]
     struct!(__MODULE__, mission |> Map.take(kept) |> Map.to_list())
   end
 
@@ -127,16 +129,7 @@ defmodule Missions.Patrol do
     mission = %{mission | now_ms: percept.at_ms} |> look(percept.pose) |> prune()
     tasks = tasks(mission, percept.pose)
 
-    motivation =
-      Motivation.tick(
-        mission.motivation,
-        mission.me,
-        tasks,
-        mission.peers,
-        percept.at_ms,
-        step_ms
-      )
-
+    motivation = choose(mission, tasks, percept, step_ms)
     mission = taken(%{mission | motivation: motivation}, before)
     {mission, told} = tell(mission, percept.pose)
     stages = if motivation.active != before, do: taken_over(mission), else: []
@@ -147,7 +140,7 @@ defmodule Missions.Patrol do
 
   @impl Robot.Mission
   def explain(mission) do
-    ages = for {number, _point} <- mission.points, do: age_s(mission, number)
+    ages = for {n, _point} <- mission.points, do: Ages.words(mission.seen, n, mission.now_ms)
     m = for {number, m} <- mission.motivation.m, m > 0, do: "#{number + 1}: #{round(m)}"
 
     [
@@ -175,9 +168,7 @@ defmodule Missions.Patrol do
         busy_ms: said.busy_ms
       }
 
-      seen =
-        ages |> Enum.with_index() |> Enum.reduce(mission.seen, &newer(&1, &2, mission.now_ms))
-
+      seen = Ages.hear(mission.seen, ages, mission.now_ms)
       %{mission | peers: Map.put(mission.peers, from, peer), seen: seen}
     else
       mission
@@ -186,15 +177,8 @@ defmodule Missions.Patrol do
 
   defp hear(mission, _from, _of_others), do: mission
 
-  defp newer({nil, _number}, seen, _now_ms), do: seen
-
-  defp newer({age, number}, seen, now_ms),
-    do: Map.update(seen, number, now_ms - age, &max(&1, now_ms - age))
-
-  defp look(mission, pose) do
-    here = for {number, point} <- mission.points, Pose.distance(pose, point) < @seen, do: number
-    %{mission | seen: Enum.reduce(here, mission.seen, &Map.put(&2, &1, mission.now_ms))}
-  end
+  defp look(mission, pose),
+    do: %{mission | seen: Ages.look(mission.seen, mission.points, pose, @seen, mission.now_ms)}
 
   defp prune(mission) do
     peers =
@@ -211,22 +195,20 @@ defmodule Missions.Patrol do
     end
   end
 
+  defp choose(%{by: :motivation, motivation: m} = mission, tasks, %{at_ms: at_ms}, step_ms),
+    do: Motivation.tick(m, mission.me, tasks, mission.peers, at_ms, step_ms)
+
+  defp choose(%{motivation: m} = mission, tasks, %{at_ms: at_ms, peers: places}, _step_ms) do
+    bids =
+      for {id, _said} <- mission.peers, %{pose: pose} <- [places[id]], into: %{} do
+        {id, Map.new(mission.points, fn {n, point} -> {n, Pose.distance(pose, point)} end)}
+      end
+
+    Auction.tick(m, mission.me, tasks, mission.peers, at_ms, bids)
+  end
+
   # A point that nobody has ever seen has been due for ever.
-  defp age_ms(mission, number) do
-    case mission.seen do
-      %{^number => at_ms} -> mission.now_ms - at_ms
-      _never -> @day_ms
-    end
-  end
-
-  defp age_s(%{now_ms: nil}, _number), do: "never"
-
-  defp age_s(mission, number) do
-    case age_ms(mission, number) do
-      @day_ms -> "never"
-      ms -> "#{div(ms, 1_000)}"
-    end
-  end
+  defp age_ms(mission, number), do: Ages.of(mission.seen, number, mission.now_ms)
 
   defp give_up(mission, point, outcome) do
     why =
@@ -275,13 +257,8 @@ defmodule Missions.Patrol do
           else: 0
         ),
       busy_ms: if(active, do: min(mission.now_ms - since_ms, @day_ms), else: 0),
-      ages: for({number, _point} <- Enum.sort(mission.points), do: told_age(mission, number))
+      ages: Ages.told(mission.seen, mission.points, mission.now_ms)
     ]
-  end
-
-  defp told_age(mission, number) do
-    age_ms = age_ms(mission, number)
-    if age_ms < @day_ms, do: age_ms
   end
 
   defp goal(%{motivation: %{active: nil}}), do: {:goal, :stand, {Behaviour.Stop, []}}

@@ -6,6 +6,8 @@ defmodule Missions.PatrolTest do
   alias Robot.Mission.{Letter, Runner}
   alias Robot.Percept
   doctest Motivation
+  doctest Patrol.Ages
+  doctest Patrol.Auction
   doctest Patrol.Options
 
   @tau_ms 5_000
@@ -61,6 +63,22 @@ defmodule Missions.PatrolTest do
     assert %{active: nil} = run(at_it, 30_100, [task(0)], farther)
     assert %{active: 0} = run(at_it, 60_000, [task(0)], fn _now -> %{} end)
     assert %{active: nil} = run(at_it, 60_100, [task(0)], fn _now -> %{} end)
+  end
+
+  test "by auction each takes what it is nearest to, and what is taken is not sold twice" do
+    alias Missions.Patrol.Auction
+    tasks = [task(0, far: 3.0), task(1, far: 4.0)]
+    bids = %{mag2: %{0 => 1.0, 1 => 9.0}}
+    free = %{mag2: peer(nil)}
+    tick = fn m, peers, bids, now -> Auction.tick(m, :mag1, tasks, peers, now, bids).active end
+    assert tick.(%Motivation{}, free, bids, 0) == 1
+
+    # One whose place is not known bids nothing; one that is silent is not there; one that has a point bids for none.
+    assert tick.(%Motivation{}, free, %{}, 0) == 0
+    assert tick.(%Motivation{}, free, bids, @tau_ms) == 0
+    assert tick.(%Motivation{}, %{mag2: peer(0)}, bids, 0) == 1
+    # What two took at once is the nearer one's.
+    assert tick.(%Motivation{active: 0}, %{mag2: peer(0, far: 1.0)}, bids, 0) == 1
   end
 
   defp patrol(options \\ []) do

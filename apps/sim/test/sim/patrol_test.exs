@@ -35,12 +35,13 @@ defmodule Sim.PatrolTest do
     end)
   end
 
-  for {map, noise, loss, seed} <- [
-        {"hall", :off, 0.0, 1},
-        {"hall", :default, 0.0, 2},
-        {"arena", :default, 0.2, 3}
+  for {map, noise, loss, seed, by} <- [
+        {"hall", :off, 0.0, 1, :motivation},
+        {"hall", :default, 0.0, 2, :motivation},
+        {"arena", :default, 0.2, 3, :motivation},
+        {"arena", :default, 0.2, 3, :auction}
       ] do
-    test "4 robots see every point each 120 s in #{map}, seed #{seed}, noise #{noise}, loss #{loss}, also when one dies" do
+    test "4 robots see every point each 120 s in #{map}, seed #{seed}, noise #{noise}, loss #{loss}, by #{by}, also when one dies" do
       kills = [{:mag2, 125}]
 
       trial =
@@ -49,6 +50,7 @@ defmodule Sim.PatrolTest do
           noise: unquote(noise),
           loss: unquote(loss),
           seed: unquote(seed),
+          mission: {:patrol, by: unquote(by)},
           kills: kills
         )
 

@@ -76,7 +76,7 @@ defmodule Missions.Patrol.Motivation do
   @spec tick(t(), atom(), [task()], %{atom() => peer()}, integer(), non_neg_integer()) :: t()
   def tick(motivation, me, tasks, peers, now_ms, step_ms) do
     peers = for {id, peer} <- peers, heard?(peer, now_ms), do: {id, peer}
-    motivation = motivation |> go_on(me, tasks, peers, now_ms) |> forget(tasks)
+    motivation = motivation |> keep(me, tasks, peers, now_ms) |> forget(tasks)
 
     {m, known} =
       Enum.map_reduce(
@@ -98,9 +98,14 @@ defmodule Missions.Patrol.Motivation do
   @spec leave(t()) :: t()
   def leave(motivation), do: %{motivation | active: nil}
 
-  defp go_on(%{active: nil} = motivation, _me, _tasks, _peers, _now_ms), do: motivation
+  @doc """
+  Whether the robot goes on with its task: it leaves one that is done, one that it gets nowhere with, and one at which a
+  nearer robot is, of `peers` that are heard.
+  """
+  @spec keep(t(), atom(), [task()], [{atom(), peer()}], integer()) :: t()
+  def keep(%{active: nil} = motivation, _me, _tasks, _peers, _now_ms), do: motivation
 
-  defp go_on(%{active: active} = motivation, me, tasks, peers, now_ms) do
+  def keep(%{active: active} = motivation, me, tasks, peers, now_ms) do
     task = Enum.find(tasks, &(&1.number == active))
     for_ms = now_ms - motivation.since_ms
     others = for {id, %{doing: ^active} = peer} <- peers, do: {id, peer}

@@ -9,6 +9,7 @@ defmodule Missions.Patrol.Options do
   | `centre:` | where its middle is | `{0.0, 0.0}` |
   | `points:` | up to 64 points instead of a loop, `[{1, 2}, {3, 4}]` | none |
   | `period:` | within which each point is to be seen | 120.0 |
+  | `by:` | who visits which: `:motivation` (`Missions.Patrol.Motivation`), `:auction` (`Missions.Patrol.Auction`) | `:motivation` |
   """
   alias Hal.Options
 
@@ -24,7 +25,8 @@ defmodule Missions.Patrol.Options do
       side: [{:number, 1, 100, "m"}, default: 4.0],
       centre: [@place, default: {0.0, 0.0}],
       points: [{:list, @place, @most}, default: []],
-      period: [{:number, 10, 3_600, "s"}, default: 120.0]
+      period: [{:number, 10, 3_600, "s"}, default: 120.0],
+      by: [{:one_of, [:motivation, :auction]}, default: :motivation]
     ]
   end
 
