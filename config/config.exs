@@ -12,7 +12,8 @@ end
 config :logger, level: if(config_env() == :test, do: :warning, else: :info)
 
 # The missions by name; the first is that of a robot whose file names none.
-config :swarm, missions: [landmark: Missions.Landmark, patrol: Missions.Patrol]
+config :swarm,
+  missions: [landmark: Missions.Landmark, patrol: Missions.Patrol, flock: Missions.Flock]
 
 # What a build adds of its own (docs/extending.md).
 if File.exists?(Path.join(__DIR__, "extensions.exs")), do: import_config("extensions.exs")

@@ -56,7 +56,7 @@ defmodule Console.Terminal.PromptTest do
 
   test "errors name what is wrong and what is allowed" do
     assert error("kil leader") =~ "did you mean kill?"
-    assert error("start patorl") =~ "one of landmark, patrol is allowed; did you mean patrol?"
+    assert error("start patorl") =~ "one of landmark, patrol, flock is allowed; did you mean patrol?"
     assert error("start mga2") =~ "did you mean mag2?"
     assert error("start patrol:perod=9") =~ "did you mean period?"
     assert error("start mag2 patorl") =~ "did you mean patrol?"
@@ -95,9 +95,9 @@ defmodule Console.Terminal.PromptTest do
   end
 
   test "names of missions are completed, and the help has them" do
-    assert Prompt.completions(["start"], [:mag1]) == ["landmark", "patrol", "mag1"]
-    assert Prompt.completions(["start", "mag1"], [:mag1]) == ["landmark", "patrol"]
+    assert Prompt.completions(["start"], [:mag1]) == ["landmark", "patrol", "flock", "mag1"]
+    assert Prompt.completions(["start", "mag1"], [:mag1]) == ["landmark", "patrol", "flock"]
     assert Prompt.completions(["start", "patrol"], [:mag1]) == []
-    assert Enum.join(Prompt.help(), "\n") =~ "starts another mission: landmark, patrol"
+    assert Enum.join(Prompt.help(), "\n") =~ "starts another mission: landmark, patrol, flock"
   end
 end
