@@ -13,7 +13,12 @@ config :logger, level: if(config_env() == :test, do: :warning, else: :info)
 
 # The missions by name; the first is that of a robot whose file names none.
 config :swarm,
-  missions: [landmark: Missions.Landmark, patrol: Missions.Patrol, teleop: Missions.Teleop]
+  missions: [
+    landmark: Missions.Landmark,
+    patrol: Missions.Patrol,
+    flock: Missions.Flock,
+    teleop: Missions.Teleop
+  ]
 
 # What a build adds of its own (docs/extending.md).
 if File.exists?(Path.join(__DIR__, "extensions.exs")), do: import_config("extensions.exs")

@@ -58,7 +58,7 @@ defmodule Console.Terminal.PromptTest do
     assert error("kil leader") =~ "did you mean kill?"
 
     assert error("start patorl") =~
-             "one of landmark, patrol, teleop is allowed; did you mean patrol?"
+             "one of landmark, patrol, flock, teleop is allowed; did you mean patrol?"
 
     assert error("start mga2") =~ "did you mean mag2?"
     assert error("start patrol:perod=9") =~ "did you mean period?"
@@ -98,9 +98,22 @@ defmodule Console.Terminal.PromptTest do
   end
 
   test "names of missions are completed, and the help has them" do
-    assert Prompt.completions(["start"], [:mag1]) == ["landmark", "patrol", "teleop", "mag1"]
-    assert Prompt.completions(["start", "mag1"], [:mag1]) == ["landmark", "patrol", "teleop"]
+    assert Prompt.completions(["start"], [:mag1]) == [
+             "landmark",
+             "patrol",
+             "flock",
+             "teleop",
+             "mag1"
+           ]
+
+    assert Prompt.completions(["start", "mag1"], [:mag1]) == [
+             "landmark",
+             "patrol",
+             "flock",
+             "teleop"
+           ]
+
     assert Prompt.completions(["start", "patrol"], [:mag1]) == []
-    assert Enum.join(Prompt.help(), "\n") =~ "starts another mission: landmark, patrol"
+    assert Enum.join(Prompt.help(), "\n") =~ "starts another mission: landmark, patrol, flock"
   end
 end

@@ -1,0 +1,70 @@
+defmodule Missions.Flock.Members do
+  @moduledoc """
+  The members of the flock that a robot hears: who they are, how far they have come, where they tell that they are. Pure.
+
+  Each tells once a second which course it has and its leg. Its pose comes with its heartbeats, 5 times a second, in the
+  peers of the percept; a robot that is there and tells nothing, or has another course, is no member, but an obstacle.
+  """
+  alias Hal.{Pose, Twist}
+  alias Missions.Flock.Field
+  alias Robot.Percept
+
+  # Who has told nothing for so long is no member; a pose is carried on for so long; so many are remembered.
+  @silent_ms 3_500
+  @carry_s 0.5
+  @most 256
+
+  @typedoc "When a member was last heard, by its name."
+  @type t :: %{atom() => at_ms :: integer()}
+  @type agent :: %{
+          id: atom(),
+          at: Pose.point(),
+          velocity: Field.vector(),
+          radius: float()
+        }
+
+  @doc "A member was heard; one more than 256 is not."
+  @spec hear(t(), atom(), integer()) :: t()
+  def hear(heard, from, at_ms) when is_map_key(heard, from) or map_size(heard) < @most,
+    do: Map.put(heard, from, at_ms)
+
+  def hear(heard, _from, _at_ms), do: heard
+
+  @doc "Without those that have been silent for 3.5 s."
+  @spec present(t(), integer()) :: t()
+  def present(heard, now_ms),
+    do: :maps.filter(fn _id, at_ms -> now_ms - at_ms < @silent_ms end, heard)
+
+  @doc "Where the members are now, by their poses and speeds, in the order of their names."
+  @spec agents(t(), Percept.t()) :: [agent()]
+  def agents(heard, %Percept{peers: peers, at_ms: at_ms}) do
+    for {id, %{mode: :moving} = peer} <- Enum.sort(peers), is_map_key(heard, id) do
+      %{pose: pose, twist: %Twist{linear: linear}} = peer
+      carry_s = min(max(at_ms - peer.at_ms, 0) / 1_000, @carry_s)
+      {vx, vy} = {linear * :math.cos(pose.heading), linear * :math.sin(pose.heading)}
+      at = {pose.x + carry_s * vx, pose.y + carry_s * vy}
+      %{id: id, at: at, velocity: {vx, vy}, radius: peer.radius}
+    end
+  end
+
+  @doc """
+  Whether these points hang together, each within `far` metres of another.
+
+      iex> Missions.Flock.Members.together?([{0.0, 0.0}, {2.0, 0.0}, {1.0, 0.0}], 1.2)
+      true
+      iex> Missions.Flock.Members.together?([{0.0, 0.0}, {2.0, 0.0}], 1.2)
+      false
+  """
+  @spec together?([Pose.point()], float()) :: boolean()
+  def together?([], _far), do: true
+  def together?([first | rest], far), do: spread([first], rest, far) == []
+
+  @doc "Those that do not hang together with the first."
+  @spec spread([Pose.point()], [Pose.point()], float()) :: [Pose.point()]
+  def spread([], rest, _far), do: rest
+
+  def spread([point | more], rest, far) do
+    {near, rest} = Enum.split_with(rest, &(Pose.distance(point, &1) <= far))
+    spread(near ++ more, rest, far)
+  end
+end

@@ -1,0 +1,196 @@
+defmodule Missions.FlockTest do
+  use ExUnit.Case, async: true
+  alias Hal.{Odometry, Options, Pose, Profile, Twist}
+  alias Missions.Flock
+  alias Missions.Flock.{Field, Members}
+  alias Robot.Mission.{Letter, Runner}
+  alias Robot.Percept
+  doctest Field
+  doctest Members
+
+  @spacing 1.2
+
+  # Agents that are points, by the formulas alone, `seconds` long.
+  defp settle(agents, seconds) do
+    Enum.reduce(1..(seconds * 20), agents, fn _step, agents ->
+      for %{at: {x, y} = at, velocity: {vx, vy} = own} = agent <- agents do
+        {ux, uy} = Field.neighbours(at, own, agents -- [agent], @spacing)
+        # Friction, which the guide has: without it a lattice swings for long.
+        {vx, vy} = {vx + 0.05 * (ux - vx), vy + 0.05 * (uy - vy)}
+        %{agent | at: {x + 0.05 * vx, y + 0.05 * vy}, velocity: {vx, vy}}
+      end
+    end)
+  end
+
+  defp agent(x, y, velocity \\ {0.0, 0.0}), do: %{at: {x, y}, velocity: velocity}
+
+  test "two settle at the spacing, from nearer and from farther" do
+    for far <- [0.5, 0.9, 1.5] do
+      [one, other] = settle([agent(0.0, 0.0), agent(far, 0.0)], 30)
+      assert_in_delta Pose.distance(one.at, other.at), @spacing, 0.01
+    end
+  end
+
+  test "what neighbours do to each other is equal and opposite, so that a flock does not move itself" do
+    agents = [agent(0.0, 0.0, {0.3, 0.1}), agent(0.8, 0.1), agent(1.1, 1.0, {0.0, -0.2})]
+
+    forces =
+      for agent <- agents,
+          do: Field.neighbours(agent.at, agent.velocity, agents -- [agent], @spacing)
+
+    assert_in_delta forces |> Enum.map(&elem(&1, 0)) |> Enum.sum(), 0.0, 1.0e-9
+    assert_in_delta forces |> Enum.map(&elem(&1, 1)) |> Enum.sum(), 0.0, 1.0e-9
+    assert Enum.any?(forces, fn {ux, uy} -> abs(ux) + abs(uy) > 0.01 end)
+  end
+
+  test "who is farther than its reach counts for nothing, however fast" do
+    far = Field.reach(@spacing) + 0.01
+
+    assert Field.neighbours({0.0, 0.0}, {0.1, 0.0}, [agent(far, 0.0, {9.0, 0.0})], @spacing) ==
+             {0.0, 0.0}
+  end
+
+  test "a robot at the very place of another has no direction, and no error" do
+    assert Field.neighbours({1.0, 1.0}, {0.0, 0.0}, [agent(1.0, 1.0)], @spacing) == {0.0, 0.0}
+    assert {_ux, _uy} = Field.obstacles({1.0, 1.0}, {0.0, 0.0}, [{1.0, 1.0}], 1.0)
+  end
+
+  defp flock(options \\ []) do
+    {:ok, options} = Options.check(options, Flock.option_table(), "flock")
+    {runner, []} = Runner.start(Runner.new(:mag1), Flock, options)
+    {runner, []} = Runner.handle(runner, {:command, :start})
+    runner
+  end
+
+  defp tick(runner, at_ms, peers \\ %{}, pose \\ Pose.new(0, 0)) do
+    still = %Odometry{pose: pose, twist: Twist.zero()}
+
+    Runner.handle(
+      runner,
+      {:tick,
+       %Percept{
+         robot: :mag1,
+         at_ms: at_ms,
+         profile: Profile.magellan(),
+         pose: pose,
+         odometry: still,
+         peers: peers
+       }}
+    )
+  end
+
+  defp peer(x, y, at_ms, mode \\ :moving),
+    do: %{pose: Pose.new(x, y), twist: Twist.zero(), radius: 0.2, at_ms: at_ms, mode: mode}
+
+  defp letter(options \\ [], fields \\ []) do
+    {_runner, effects} = tick(flock(options), 0)
+    {:send, :all, %Letter{} = letter} = List.keyfind(effects, :send, 0)
+    %{letter | fields: Keyword.merge(letter.fields, fields)}
+  end
+
+  defp hear(runner, from, letter),
+    do: elem(Runner.handle(runner, {:message, %{from: from, kind: :mission, body: letter}}), 0)
+
+  defp velocity(effects) do
+    {:goal, :flock, {Robot.Behaviour.Velocity, velocity: velocity}} =
+      List.keyfind(effects, :goal, 0)
+
+    velocity
+  end
+
+  test "it keeps to members alone: who tells nothing, stands by itself, or has another course is none" do
+    beside = fn mode -> %{mag2: peer(1.5, 0.0, 100, mode)} end
+    {runner, _effects} = tick(flock(), 0)
+
+    pulled? = fn runner, peers ->
+      runner |> tick(100, peers) |> elem(1) |> velocity() |> elem(0) > 0
+    end
+
+    assert pulled?.(hear(runner, :mag2, letter()), beside.(:moving))
+    refute pulled?.(runner, beside.(:moving))
+    refute pulled?.(hear(runner, :mag2, letter()), beside.(:holding))
+    refute pulled?.(hear(runner, :mag2, letter()), beside.(:dead))
+    refute pulled?.(hear(runner, :mag2, letter(course: [{1, 1}])), beside.(:moving))
+    refute pulled?.(hear(runner, :mag2, letter(spacing: 2)), beside.(:moving))
+  end
+
+  test "the greatest leg that anybody tells counts, one beyond the course does not, and junk is refused" do
+    options = [course: [{0, 0}, {4, 0}]]
+    {runner, _effects} = tick(flock(options), 0)
+    on = hear(runner, :mag2, letter(options, leg: 2))
+    assert {on.mission.leg, Runner.state(on)} == {2, {Flock, :flock}}
+    assert hear(on, :mag3, letter(options, leg: 1)).mission.leg == 2
+    assert hear(on, :mag3, letter(options, leg: 4)).mission.leg == 2
+    assert hear(on, :mag3, letter(options, leg: 3)).mission.leg == 3
+
+    fresh = letter(options)
+
+    for junk <- [
+          put_in(fresh.fields[:leg], -1),
+          put_in(fresh.fields[:leg], 66),
+          put_in(fresh.fields[:leg], 1.0),
+          put_in(fresh.fields[:plan], :here),
+          %{fresh | fields: []},
+          %{fresh | fields: [1 | 2]},
+          %{fresh | version: 2},
+          %{fresh | mission: Missions.Patrol}
+        ] do
+      refused = hear(runner, :mag2, junk)
+      assert {refused.mission, refused.refused} == {runner.mission, 1}, inspect(junk)
+    end
+  end
+
+  test "it waits while the flock does not hang together, and says so" do
+    options = [course: [{0, 0}, {9, 0}]]
+    told = letter(options, leg: 2)
+    {runner, _effects} = tick(flock(options), 0)
+    runner = runner |> hear(:mag2, told) |> hear(:mag3, told)
+
+    go = fn x ->
+      peers = %{mag2: peer(1.2, 0.0, 600), mag3: peer(x, 0.0, 600)}
+      {runner, effects} = tick(runner, 600, peers)
+      {runner.claim.says, runner.mission.pace, velocity(effects)}
+    end
+
+    assert {"on the way to point 2 of 2, 3 robots together", 1.0, {vx, _vy}} = go.(-1.2)
+    assert vx > 0.01
+    assert {"on the way to point 2 of 2, 3 robots together", 0.5, _slower} = go.(-1.5)
+    assert {"on the way to point 2 of 2, 3 robots, not together", +0.0, _waits} = go.(-2.0)
+  end
+
+  test "a member that fell silent is waited for no longer" do
+    {runner, _effects} = tick(flock(), 0)
+    heard = hear(runner, :mag2, letter())
+    {still, _effects} = tick(heard, 3_400)
+    assert still.mission.heard == %{mag2: 0}
+    {alone, _effects} = tick(heard, 3_500)
+    assert alone.mission.heard == %{}
+  end
+
+  test "however many robots speak, it remembers a bounded number" do
+    {runner, _effects} = tick(flock(), 0)
+    letter = letter()
+    crowd = Enum.reduce(1..400, runner, &hear(&2, :"crowd#{&1}", letter))
+    assert map_size(crowd.mission.heard) == 256
+  end
+
+  test "alone, or without a course, it arrives by itself" do
+    for options <- [[], [course: []]] do
+      {runner, stages} =
+        Enum.reduce(0..120, {flock(options), []}, fn n, {runner, stages} ->
+          {runner, effects} = tick(runner, n * 100)
+          {runner, stages ++ for({:stage, name, %{says: says}} <- effects, do: {name, says})}
+        end)
+
+      assert runner.claim.formed and runner.claim.phase == :arrived
+      assert {:gathered, "says that 1 robot keeps together"} = hd(stages)
+    end
+  end
+
+  test "a stop leaves it ready for the next start, from the first leg" do
+    runner = hear(elem(tick(flock(), 0), 0), :mag2, letter([], leg: 1))
+    assert {:ok, resumed} = runner |> Runner.halt() |> Runner.resume()
+    {resumed, []} = Runner.handle(resumed, {:command, :start})
+    assert {Runner.state(resumed), resumed.mission.heard} == {{Flock, :gather}, %{}}
+  end
+end
