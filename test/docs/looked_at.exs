@@ -61,7 +61,7 @@ defmodule Docs.LookedAt do
   @doc "Of what is typed at the prompt of the demo."
   @spec prompt(String.t()) :: String.t() | nil
   def prompt(text) do
-    with {:ok, _command} <- Console.Terminal.Prompt.parse(text, [:mag1, :mag2, :mag3, :min1]),
+    with {:ok, _command} <- Console.Prompt.parse(text, [:mag1, :mag2, :mag3, :min1]),
          do: nil,
          else: ({:error, line} -> line)
   end

@@ -259,7 +259,7 @@ end
 defmodule Netns.Order do
   @moduledoc "An order in two steps, as `Swarm.Commands.Client` gives it, so that the network may be cut between them."
   alias Mesh.Nonblocking
-  alias Swarm.Commands.Freshness
+  alias Swarm.Order.Freshness
   alias Swarm.Directory
 
   @answer_ms 5_000

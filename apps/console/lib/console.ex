@@ -3,11 +3,11 @@ defmodule Console do
   What people see and type: the demo and its terminal, the page in the browser, reports, pictures, scenarios, replays.
 
   A view knows a fleet only by `Console.Live`: it asks for the scene, and passes on commands that
-  `Console.Terminal.Prompt` has checked. No robot knows a view, and no view decides anything.
+  `Console.Prompt` has checked. No robot knows a view, and no view decides anything.
 
-      iex> Console.Terminal.Prompt.parse("goto mag1 1,2", [:mag1])
+      iex> Console.Prompt.parse("goto mag1 1,2", [:mag1])
       {:ok, {:tell, [:mag1], "goto:1.0:2.0"}}
-      iex> Console.Terminal.Prompt.parse("fromation wedge", [:mag1])
+      iex> Console.Prompt.parse("fromation wedge", [:mag1])
       {:error, ~s(unknown command "fromation"; did you mean formation?)}
 
   A live run:

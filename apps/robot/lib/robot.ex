@@ -9,7 +9,7 @@ defmodule Robot do
   Of two wishes the heavier one wins, and the one that won last counts a tenth more:
 
       iex> wishes = for {by, weight} <- [rest: 0.05, goto: 0.5], do: Robot.Wish.new(by, Hal.Twist.new(0.2, 0), weight)
-      iex> Robot.Control.Arbiter.choose(wishes, nil).by
+      iex> Robot.Behaviour.Arbiter.choose(wishes, nil).by
       :goto
 
   A person's text is a command, or one line that says what is allowed:

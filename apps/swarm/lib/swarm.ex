@@ -29,13 +29,13 @@ defmodule Swarm do
   """
   alias Robot.Command
   alias Swarm.{Commands, Formation, Status}
-  alias Swarm.Comms.Transport
+  alias Swarm.Transport
   alias Swarm.EStop.Broadcaster
   alias Swarm.Membership.Matrix
   alias Swarm.Missions.Text
-  alias Swarm.Directory.{Presence, Search}
+  alias Swarm.Discovery.{Presence, Search}
 
-  alias Swarm.Status.Report
+  alias Swarm.Commands.StatusReport
 
   @type robot :: atom() | String.t()
   @typedoc "A mission by its name, also as text, or by its module (`Swarm.Missions`)."
@@ -161,7 +161,7 @@ defmodule Swarm do
   hears (`Swarm.Status`).
   """
   @spec status() :: [Status.t()]
-  def status, do: Report.all()
+  def status, do: StatusReport.all()
 
   @doc """
   The status of one robot; if it does not answer, from its row on the blackboard, however old.
@@ -170,7 +170,7 @@ defmodule Swarm do
       Swarm.status(:mag1).rejected
   """
   @spec status(robot()) :: Status.t() | {:error, String.t()}
-  def status(robot), do: Report.one(robot)
+  def status(robot), do: StatusReport.one(robot)
 
   @doc "Which robot hears which, as a table in `iex`."
   @spec matrix() :: Matrix.t()
@@ -191,7 +191,7 @@ defmodule Swarm do
 
   @doc """
   Notifies the calling process, or the given one, of robots that join and leave, by messages
-  `{:swarm, {:join, robot, about}}` (`Swarm.Directory.RobotInfo`) and
+  `{:swarm, {:join, robot, about}}` (`Swarm.Discovery.RobotInfo`) and
   `{:swarm, {:leave, robot, reason}}` (`:left`, `:nodedown`, or `:silent` for 2 s). Returns the
   robots that are present now.
 
@@ -302,7 +302,7 @@ defmodule Swarm do
   defp command(to, request) do
     with {:ok, robots} <- Commands.robots(to),
          {:ok, request} <- Text.request(request, length(robots)),
-         {:ok, request} <- Commands.Order.check(request),
+         {:ok, request} <- Swarm.Order.check(request),
          do: Commands.tell(robots, request)
   end
 end

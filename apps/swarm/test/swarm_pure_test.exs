@@ -9,9 +9,9 @@ defmodule SwarmPureTest do
   doctest Swarm.Agreement.Round.Record
   doctest Swarm.Agreement.Round.Epochs
   doctest Swarm.Agreement.Round.Precedence
-  doctest Swarm.Message.CounterGuard
+  doctest Swarm.Wire.CounterGuard
   doctest Swarm.Message
   doctest Swarm.Membership.Heartbeat
   doctest Swarm.Formation.Reference
-  doctest Swarm.Commands.Order
+  doctest Swarm.Order
 end

@@ -31,7 +31,7 @@ defmodule Agents.ContractNet do
   alias Agents.ContractNet.{Cost, Manager}
   alias Agents.{Conversation, Envelope}
   alias Swarm.Directory.RemoteMonitor
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   @doc """
   What a task would cost this robot; `:infinite` if it cannot do it, or does not know it. It must
@@ -82,7 +82,7 @@ defmodule Agents.ContractNet do
   end
 
   defp begin(options) do
-    unless Keyword.keyword?(options) and WireTypes.name?(options[:from]) do
+    unless Keyword.keyword?(options) and Wire.name?(options[:from]) do
       raise ArgumentError, "an auction needs from: the name of who asks, an atom such as :mag1"
     end
 

@@ -17,7 +17,7 @@ defmodule Agents.Conversation do
   alias Agents.Envelope
   alias Swarm.Directory
   alias Swarm.Directory.RemoteMonitor
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   # Most answers arrive long before this. Only then is it worth asking the runtime whether the
   # others are alive: between nodes that costs more than the question.
@@ -110,7 +110,7 @@ defmodule Agents.Conversation do
   # A mistake here is the calling program's own, and raises; the mistakes of others are returned.
   @spec patience!(term()) :: :ok
   def patience!(ms) do
-    if WireTypes.ms?(ms),
+    if Wire.ms?(ms),
       do: :ok,
       else: raise(ArgumentError, "the timeout cannot be #{brief(ms)}: whole ms, up to a day")
   end

@@ -20,7 +20,7 @@ defmodule Agents.Envelope do
   | `class` | `:telemetry` is dropped first, then `:data`; `:urgent` is handled first (`Agents.Mailbox`) |
   | `content` | any term |
   """
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   @performatives [
     :inform,
@@ -39,7 +39,7 @@ defmodule Agents.Envelope do
   @classes [:telemetry, :data, :urgent]
   @options [:conversation, :reply_to, :in_reply_to, :epoch, :topic, :class]
   @longest_topic 255
-  # The same as `Swarm.Message.WireTypes.counter?/1`, which is not a guard.
+  # The same as `Swarm.Wire.counter?/1`, which is not a guard.
   @highest 0xFFFFFFFFFFFFFFFF
 
   @enforce_keys [:performative, :from, :conversation]
@@ -194,7 +194,7 @@ defmodule Agents.Envelope do
 
   # The rarer cases, and the wrong ones.
   def check(term) do
-    if WireTypes.whole?(term, __MODULE__) do
+    if Wire.whole?(term, __MODULE__) do
       case Enum.find(Map.keys(term), &(not valid?(&1, Map.fetch!(term, &1)))) do
         nil -> {:ok, term}
         field -> {:error, field}
@@ -214,20 +214,20 @@ defmodule Agents.Envelope do
   def topic?(topic) when is_binary(topic),
     do: byte_size(topic) in 1..@longest_topic and String.valid?(topic)
 
-  def topic?(topic), do: WireTypes.name?(topic)
+  def topic?(topic), do: Wire.name?(topic)
 
   defp valid?(:performative, performative), do: performative in @performatives
-  defp valid?(:from, from), do: WireTypes.name?(from)
+  defp valid?(:from, from), do: Wire.name?(from)
 
   defp valid?(:conversation, {name, counter}),
-    do: WireTypes.name?(name) and WireTypes.count?(counter)
+    do: Wire.name?(name) and Wire.count?(counter)
 
   defp valid?(:conversation, conversation), do: is_reference(conversation)
 
   defp valid?(field, address) when field in [:reply_to, :in_reply_to],
     do: address == nil or is_pid(address) or is_reference(address)
 
-  defp valid?(:epoch, epoch), do: epoch == nil or WireTypes.counter?(epoch)
+  defp valid?(:epoch, epoch), do: epoch == nil or Wire.counter?(epoch)
   defp valid?(:topic, topic), do: topic == nil or topic?(topic)
   defp valid?(:class, class), do: class in @classes
   defp valid?(field, _anything) when field in [:__struct__, :content], do: true

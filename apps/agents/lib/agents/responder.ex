@@ -29,7 +29,7 @@ defmodule Agents.Responder do
   alias Robot.{Config, Names}
   alias Agents.{Conversation, Envelope, Inbox}
   alias Swarm.Directory
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   @behaviour Robot.Companion
 
@@ -74,7 +74,7 @@ defmodule Agents.Responder do
     options = Keyword.validate!(options, allowed)
     _would_be = Inbox.new(Keyword.take(options, [:limit, :template]))
 
-    unless WireTypes.name?(name) and WireTypes.name?(options[:service]),
+    unless Wire.name?(name) and Wire.name?(options[:service]),
       do: raise(ArgumentError, "a responder needs a name and a :service, both atoms")
 
     unless is_list(options[:topics]) and not List.improper?(options[:topics]) and

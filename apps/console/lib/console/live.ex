@@ -3,7 +3,7 @@ defmodule Console.Live do
   The behaviour of a fleet that can be watched and commanded while it runs.
 
   A view asks for the `scene/1` whenever it wants to draw, and passes on what people type as a
-  command that `Console.Terminal.Prompt` has checked.
+  command that `Console.Prompt` has checked.
   """
   alias Hal.Pose
 

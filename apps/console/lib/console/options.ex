@@ -3,7 +3,8 @@ defmodule Console.Options do
   The options of `mix demo`, checked once when it starts. Pure. One table describes the options
   and makes the help text.
   """
-  alias Console.{Cli, Fleet, Page}
+  alias Console.{Cli, Fleet}
+  alias Console.Options.Page
   alias Console.Cli.{MapName, Parse}
   alias Console.Live.Pace
   alias Hal.Options.Suggest
@@ -186,7 +187,7 @@ the prompt then takes pause, step, speed"},
       {"page", "PORT|off", &page/1,
        "live, also in a browser: the port of the page, or none\n(any that is free)"}
     ] ++
-      Page.Options.table() ++
+      Page.table() ++
       [
         {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
          "paint camera pictures, or skip the painting (painted)"},
@@ -296,7 +297,7 @@ the prompt then takes pause, step, speed"},
   defp check_speed(other), do: other
 
   defp check_page({:ok, options}) do
-    with {:error, line} <- Page.Options.check(options.page_address, options.page_token),
+    with {:error, line} <- Page.check(options.page_address, options.page_token),
          do: {:error, [line]},
          else: (:ok -> {:ok, options})
   end
@@ -306,7 +307,7 @@ the prompt then takes pause, step, speed"},
   defp page("off"), do: {:ok, :off}
 
   defp page(text) do
-    with {:error, allowed} <- Page.Options.port(text), do: {:error, allowed <> ", or off,"}
+    with {:error, allowed} <- Page.port(text), do: {:error, allowed <> ", or off,"}
   end
 
   defp too_much_hardware(asked, robots) do

@@ -5,7 +5,7 @@ defmodule Console.TerminalTest do
   alias Console.Terminal.{Canvas, Editor, Style}
 
   doctest Console
-  doctest Console.Terminal.Prompt
+  doctest Console.Prompt
   doctest Console.Cli.Progress
   doctest Console.Terminal.Canvas
   doctest Console.Terminal.Editor

@@ -27,15 +27,15 @@ defmodule Robot.Config do
     * `:plan` - the walls of the building, `%Robot.Navigation.Grid{}` in the `map` frame, an empty
       `Robot.Navigation.OccupancyGrid` for those that the sonars will have seen, or `nil` (the default) for none
     * `:fence` - a fence that the robot must not cross, `{{x, y}, {x, y}}` or `[{x, y}, …]`, see
-      `Robot.Safety.Reflex.Fence`, or `nil`
+      `Robot.Fence`, or `nil`
     * `:dry_run` - whether the robot only prints what it would do (`Robot.Safety.DryRun`), default
       `false`
     * `:estop_file` - a file in which the e-stop latch survives a restart of the machine, or `nil`
     * `:departure_file` - a file that remembers that the robot has left its start pose (`Robot.Departure`), or `nil`
-    * `:trace` - `{m, f, a}` that gets all inputs and effects, see `Robot.Control.Trace`, or `nil`
+    * `:trace` - `{m, f, a}` that gets all inputs and effects, see `Robot.Trace`, or `nil`
   """
   alias Hal.{Options, Pose, Profile}
-  alias Robot.Safety.Reflex.Fence
+  alias Robot.Fence
 
   @limits for key <- [:max_linear, :max_turn, :max_acceleration, :max_turn_acceleration],
               do: {key, {:number, 1.0e-6, 100.0}}

@@ -54,7 +54,7 @@ defmodule Robot.File do
           start: Pose.t(),
           map: Robot.Navigation.MapFile.t() | nil,
           arm: :manual | :auto,
-          fence: Robot.Safety.Reflex.Fence.t() | nil,
+          fence: Robot.Fence.t() | nil,
           dry_run: boolean(),
           estop_file: Path.t() | nil,
           console: keyword() | nil,

@@ -53,7 +53,7 @@ defmodule Robot.Recorder do
   def join(%Config{id: id} = config), do: %{config | trace: {__MODULE__, :trace, [id]}}
 
   @doc "Sends an entry of a robot's trace to its recorder, if there is one. Never waits."
-  @spec trace(robot :: atom(), Robot.Control.Trace.entry()) :: :ok
+  @spec trace(robot :: atom(), Robot.Trace.entry()) :: :ok
   def trace(robot, entry) do
     case Names.lookup(robot, :recorder) do
       {recorder, %Queue{} = queue} -> Queue.send_entry(queue, recorder, robot, entry)

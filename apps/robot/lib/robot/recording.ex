@@ -8,7 +8,7 @@ defmodule Robot.Recording do
   | topic | message |
   |---|---|
   | `/convoy/robot` | the version, the profile of each robot, and the offset of its clock; at the beginning of a file, and when one of them changes |
-  | `/convoy/trace` | each second: what went into and out of the robots' processes, in order (`Robot.Control.Trace`) |
+  | `/convoy/trace` | each second: what went into and out of the robots' processes, in order (`Robot.Trace`) |
 
   References and processes are written as text (`Robot.Recording.Terms`), and the profile of its
   robot, which is in each percept, as a mark.

@@ -12,7 +12,7 @@ defmodule Robot.Replay do
   The effects of an input are compared when the next entry of its role shows that there are no
   more of them; those of the last one by `finish/1`.
   """
-  alias Robot.Control.Trace
+  alias Robot.Trace
   alias Robot.Replay.{Moment, Roles}
 
   @enforce_keys [:parts, :moments]

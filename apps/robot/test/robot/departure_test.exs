@@ -68,7 +68,7 @@ defmodule Robot.DepartureTest do
   end
 
   test "nor do they say where a fence is" do
-    {:ok, fence} = Reflex.Fence.new({{-50, -50}, {50, 50}})
+    {:ok, fence} = Robot.Fence.new({{-50, -50}, {50, 50}})
     frame = make_ref()
     reading = {:odometry, %Odometry{pose: Pose.new(0, 0), twist: Twist.zero(), frame: frame}}
 
@@ -86,7 +86,7 @@ defmodule Robot.DepartureTest do
     path: path
   } do
     id = :departure1
-    {:ok, fence} = Reflex.Fence.new({{-50, -50}, {50, 50}})
+    {:ok, fence} = Robot.Fence.new({{-50, -50}, {50, 50}})
     robot(id, departure_file: path, fence: fence)
     frame = make_ref()
     count(id, frame, Pose.new(0, 0))

@@ -5,7 +5,7 @@ defmodule Robot.PureTest do
   doctest Robot.Behaviour
   doctest Robot.Safety.LivenessMonitor
   doctest Robot.Safety.Readiness
-  doctest Robot.Control.Arbiter
+  doctest Robot.Behaviour.Arbiter
   doctest Robot.Navigation.Steering
   doctest Robot.Safety.Reflex.Body
 end

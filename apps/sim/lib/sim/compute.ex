@@ -6,7 +6,8 @@ defmodule Sim.Compute do
   """
   alias Sim.Compute
   alias Sim.Compute.Reference
-  alias Sim.World.{CameraFrustum, Palette}
+  alias Sim.Compute.Palette
+  alias Sim.World.CameraFrustum
 
   @typedoc "What noise is drawn for; `nil` for none."
   @type noise :: {seed :: integer(), step :: integer(), robot :: non_neg_integer()} | nil

@@ -3,14 +3,15 @@ defmodule Sim.Node do
   The main program of an operating-system process that runs one robot, or the world, of a
   `Sim.Fleet.Nodes`.
 
-  The first line of its standard input is its whole configuration (`Sim.Node.Config`), so that
+  The first line of its standard input is its whole configuration (`Sim.Fleet.Nodes.Config`), so that
   nothing of it is on a command line. With it the process becomes a node, starts its part, and
   tells the launcher, a process on another node. It ends when standard input closes, because then
   nobody needs it any more.
 
   Its messages to the launcher go through `Sim.Node.Reporter`.
   """
-  alias Sim.Node.{Config, Reporter}
+  alias Sim.Fleet.Nodes.Config
+  alias Sim.Node.Reporter
 
   @doc "A part of a fleet in a node of its own: a robot or the world."
   @callback start(options :: map()) ::

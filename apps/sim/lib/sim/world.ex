@@ -214,7 +214,7 @@ defmodule Sim.World do
 
   @doc "The colours of the landmark, `YellowLandmark`, and of robots, `RedRobot`."
   @spec colours() :: Vision.Colours.t()
-  defdelegate colours, to: Sim.World.Palette
+  defdelegate colours, to: Sim.Compute.Palette
 
   @doc "The true pose of a robot."
   @spec truth(t(), id()) :: Pose.t()

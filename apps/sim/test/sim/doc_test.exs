@@ -10,7 +10,7 @@ defmodule Sim.DocTest do
   doctest Sim.Floorplan.Rooms
   doctest Sim.Floorplan.Shape
   doctest Sim.Noise
-  doctest Sim.World.Palette
+  doctest Sim.Compute.Palette
   doctest Sim.Trial.Cuts
   doctest Sim.Trial.Memory
   doctest Sim.Scene

@@ -3,9 +3,9 @@ defmodule Sim.NodesTest do
   use ExUnit.Case, async: true
   alias Sim.Fleet.Nodes
   alias Sim.Fleet.Nodes.{Child, Command}
-  alias Sim.Node.Config
+  alias Sim.Fleet.Nodes.Config
   doctest Sim.Fleet.Nodes.Command
-  doctest Sim.Node.Config
+  doctest Sim.Fleet.Nodes.Config
 
   test "a node listens on loopback only, dials nobody by itself, and has no secret on its command line" do
     arguments = Command.arguments([])

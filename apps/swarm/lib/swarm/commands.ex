@@ -4,9 +4,7 @@ defmodule Swarm.Commands do
   alias Hal.Options
   alias Hal.Options.Suggest
   alias Swarm.{Formation, Missions}
-  alias Swarm.Comms.Transport
-  alias Swarm.Commands
-  alias Swarm.Comms.CommandHandler
+  alias Swarm.{Commands, Order, Transport}
 
   @doc "The ids of the given robots if all exist; the error is one line."
   @spec robots(term()) :: {:ok, [atom(), ...]} | {:error, String.t()}
@@ -119,7 +117,7 @@ defmodule Swarm.Commands do
   def any(robots, request) do
     answers = Commands.Client.ask(robots, request)
     {taken, others} = Enum.split_with(robots, &(answers[&1] == :ok))
-    others = Enum.reject(others, &(answers[&1] == CommandHandler.shapeless(&1)))
+    others = Enum.reject(others, &(answers[&1] == Order.shapeless(&1)))
     lines = others |> Enum.map(&refusal(&1, answers[&1])) |> Enum.uniq()
 
     case {taken, lines} do

@@ -16,14 +16,14 @@ defmodule Swarm.Comms do
   | `Swarm.Message.Receiver` | checks and sorts incoming messages |
   | `Swarm.Comms.PeerWriter` | writes the peers to the board |
   | `Swarm.Comms.Sender` | sends messages and heartbeats |
-  | `Swarm.Comms.CommandHandler` | answers people's commands that are not too old (`Swarm.Commands.Freshness`), or passes them on |
+  | `Swarm.Comms.CommandHandler` | answers people's commands that are not too old (`Swarm.Order.Freshness`), or passes them on |
   | `Swarm.Comms.LoadShedder` | keeps the mailbox short |
 
   `join/2` makes a config with a comms process. Its options:
 
     * `:transport` - `{m, f, a}`; a message goes to `apply(m, f, a ++ [from, to, message])`, with `to` a list of
       robots or, for heartbeats, `:all`, and
-      arrives by `hear/2`. Default: `Swarm.Comms.Transport.transmit/3`
+      arrives by `hear/2`. Default: `Swarm.Transport.transmit/3`
     * `:boot` - a number that grows with every start; by default the time of day
   """
   use GenServer
@@ -33,10 +33,11 @@ defmodule Swarm.Comms do
   alias Robot.Control.Pilot
   alias Mesh.Nonblocking
   alias Swarm.{EStop, Message}
-  alias Swarm.Commands.Freshness
-  alias Swarm.Comms.Transport
-  alias Swarm.Directory.RobotInfo
-  alias Swarm.Message.{Receiver, WireTypes}
+  alias Swarm.Order.Freshness
+  alias Swarm.Transport
+  alias Swarm.Discovery.RobotInfo
+  alias Swarm.Message.Receiver
+  alias Swarm.Wire
   alias Swarm.Comms.{CommandHandler, LoadShedder, NameClaim, PeerWriter, Sender}
 
   @behaviour Robot.Companion
@@ -80,7 +81,7 @@ defmodule Swarm.Comms do
 
   @doc """
   Sends a message to one robot, to several, or to all others, and returns the addressees: for
-  `:all` those that are known here (`Swarm.Comms.Transport.robots/0`). It waits for nobody, and
+  `:all` those that are known here (`Swarm.Transport.robots/0`). It waits for nobody, and
   nobody confirms the message.
   """
   @spec say(robot :: atom(), to :: atom() | [atom()] | :all, Message.t() | Letter.t()) :: [atom()]
@@ -136,7 +137,7 @@ defmodule Swarm.Comms do
 
   @impl GenServer
   def handle_cast({:say, ids, %Message{} = message}, s) do
-    if WireTypes.names?(ids),
+    if Wire.names?(ids),
       do: {:noreply, %{s | sender: Sender.speak(s.sender, ids, message)}},
       else: {:noreply, reject(s)}
   end

@@ -24,7 +24,7 @@ defmodule Swarm.EStop do
   ended, unless somebody stops it again meanwhile.
 
   A stop is obeyed however old it is; a reset from another node bears a stamp
-  (`Swarm.Commands.Freshness`), which is requested here.
+  (`Swarm.Order.Freshness`), which is requested here.
 
   This module is the interface; the process is `Swarm.EStop.Server`, its actions are in
   `Swarm.EStop.Actions`.
@@ -107,7 +107,7 @@ defmodule Swarm.EStop do
 
   @doc """
   Passes a request to the e-stop process from the robot's comms process, which has determined when
-  it was given (`Swarm.Commands.Freshness`).
+  it was given (`Swarm.Order.Freshness`).
   """
   @spec take(robot :: atom(), request :: term(), {reference(), given_us :: integer()}) :: :ok
   def take(robot, request, {ref, given_us}),

@@ -4,7 +4,7 @@ defmodule Swarm.MeshConsumer do
   comms processes, the terms of services go to the blackboard and the emergency stop.
   """
   alias Robot.Names
-  alias Swarm.Commands.Freshness
+  alias Swarm.Order.Freshness
   alias Swarm.{Blackboard, Comms, EStop, Message, Missions}
 
   @behaviour Mesh.Consumer

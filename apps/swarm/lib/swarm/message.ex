@@ -20,7 +20,7 @@ defmodule Swarm.Message do
   alias Swarm.Agreement.Round
   alias Swarm.Formation.Reference
   alias Swarm.Membership.Heartbeat
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   @most_hops 3
 
@@ -76,7 +76,7 @@ defmodule Swarm.Message do
   def check(%__MODULE__{from: from, kind: kind, body: body} = message)
       when kind in [:heartbeat, :round, :place, :mission, :relay] do
     cond do
-      not (WireTypes.whole?(message, __MODULE__) and WireTypes.name?(from)) ->
+      not (Wire.whole?(message, __MODULE__) and Wire.name?(from)) ->
         {:error, :not_a_message}
 
       message.hops not in 0..@most_hops ->

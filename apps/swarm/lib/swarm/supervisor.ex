@@ -7,7 +7,7 @@ defmodule Swarm.Supervisor do
       |-- Swarm.Supervisor.Parts (one_for_one), each in the care of a Swarm.Supervisor.BackoffSupervisor
       |   |-- Swarm.Directory           finds robots on all nodes
       |   |-- Swarm.Blackboard          what robots publish about themselves, and for each other
-      |   |-- Swarm.Directory.Presence  notifies of robots that join and leave
+      |   |-- Swarm.Discovery.Presence  notifies of robots that join and leave
       |   |-- Swarm.EStop.Broadcaster   calls all robots to stop
       |   |-- Mesh.Supervisor           the other nodes, where there is a mesh; Swarm.MeshConsumer hears it
       |   |-- Swarm.Host.Systemd        tells systemd, where there is one
@@ -41,7 +41,7 @@ defmodule Swarm.Supervisor do
       children = [
         Swarm.Directory,
         Swarm.Blackboard,
-        Swarm.Directory.Presence,
+        Swarm.Discovery.Presence,
         Swarm.EStop.Broadcaster | mesh ++ machine ++ recorder
       ]
 

@@ -11,7 +11,7 @@ defmodule Swarm.MeshNodes.Junk do
     Mesh.Distribution.Dialer,
     Mesh.Server,
     Swarm.EStop.Broadcaster,
-    Swarm.Directory.Presence,
+    Swarm.Discovery.Presence,
     Swarm.Blackboard
   ]
 

@@ -7,9 +7,10 @@ defmodule Swarm.MessageTest do
   alias Swarm.Membership.Heartbeat
   alias Swarm.Message.Receiver
   doctest Swarm.EStop.State
-  doctest Swarm.Commands.Freshness
+  doctest Swarm.Order.Freshness
   doctest Swarm.Comms.NameClaim
-  doctest Swarm.Message.WireTypes
+  doctest Swarm.Wire
+  doctest Swarm.Wire.StopTags
   doctest Receiver
   doctest Swarm.Comms.PingReply
 

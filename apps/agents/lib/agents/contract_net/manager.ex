@@ -24,7 +24,7 @@ defmodule Agents.ContractNet.Manager do
   `start/5` takes `:bid_ms` (500), `:silence_ms` (5000), `:rounds` (3), the number of announcements, and
   `:wait_ms` (5000). Functions return the letters to send, `{peer, performative, content}`.
   """
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   # The range that a pause is drawn from, ms: it doubles with each pause.
   @pause_ms 40
@@ -88,7 +88,7 @@ defmodule Agents.ContractNet.Manager do
     defaults = [bid_ms: 500, silence_ms: 5_000, rounds: 3, wait_ms: 5_000]
     options = Keyword.validate!(options, defaults)
 
-    for {option, value} <- options, not (WireTypes.ms?(value) and value > 0) do
+    for {option, value} <- options, not (Wire.ms?(value) and value > 0) do
       raise ArgumentError,
             "#{option} cannot be #{inspect(value, limit: 5)}: a whole number above 0, ms up to a day"
     end

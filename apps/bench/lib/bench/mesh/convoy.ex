@@ -167,7 +167,7 @@ defmodule Bench.Mesh.Convoy do
   end
 
   @doc false
-  @spec trace(:counters.counters_ref(), pos_integer(), Robot.Control.Trace.entry()) :: :ok
+  @spec trace(:counters.counters_ref(), pos_integer(), Robot.Trace.entry()) :: :ok
   def trace(counters, index, {:executive, :effect, {:tick, _percept}, _at_ms}),
     do: :counters.add(counters, index, 1)
 

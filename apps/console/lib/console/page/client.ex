@@ -9,7 +9,7 @@ defmodule Console.Page.Client do
   use GenServer
   alias Console.Page.{About, Feed, State}
   alias Console.Teleop
-  alias Console.Terminal.Prompt
+  alias Console.Prompt
 
   @most 1.0
   # How often the page is told of the robot that it looks at.

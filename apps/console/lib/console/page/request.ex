@@ -6,7 +6,7 @@ defmodule Console.Page.Request do
   # Debian's package; without it there is no page.
   @compile {:no_warn_undefined, [:mochiweb_request, :mochiweb_websocket]}
   alias Console.Page.{About, Access, Client, Feed, State}
-  alias Console.Terminal.Prompt
+  alias Console.Prompt
 
   @folder Path.expand("../../../priv/page", __DIR__)
   @types %{

@@ -3,13 +3,14 @@ defmodule Console.Terminal.Session do
   Shows a live fleet to a person: full screen on a terminal, plain lines elsewhere.
 
   One process waits for keys or lines and for the time to draw; the fleet runs beside it. It
-  decides nothing: `Console.Terminal` draws, `Console.Terminal.Prompt` checks, `Console.Live`
+  decides nothing: `Console.Terminal` draws, `Console.Prompt` checks, `Console.Live`
   acts.
   """
   alias Console.{Demo, Options, Page, Picture, Report, Teleop, Terminal}
   alias Console.Cli.{Format, Output}
   alias Console.Picture.RunTrack
-  alias Console.Terminal.{Prompt, Tty}
+  alias Console.Prompt
+  alias Console.Terminal.Tty
   alias Console.Terminal.Editor
 
   @draw_ms 100

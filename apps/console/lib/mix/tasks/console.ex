@@ -29,8 +29,8 @@ defmodule Mix.Tasks.Console do
     [
       {"connect", "NAME@HOST", &connect/1,
        "the node that must be heard, such as mag1@convoy; or its machine,\nwhere multicast is blocked: mag1@10.0.0.7 (all that are heard)"},
-      {"page", "PORT", &Page.Options.port/1, "the port of the page (any that is free)"}
-    ] ++ Page.Options.table() ++ [{"help", nil, nil, "this text"}]
+      {"page", "PORT", &Console.Options.Page.port/1, "the port of the page (any that is free)"}
+    ] ++ Console.Options.Page.table() ++ [{"help", nil, nil, "this text"}]
   end
 
   defp help do
@@ -55,7 +55,7 @@ defmodule Mix.Tasks.Console do
   defp serve(options) do
     Mix.Task.run("app.start", ["--no-compile"])
 
-    with :ok <- Page.Options.check(options["page-address"], options["page-token"]),
+    with :ok <- Console.Options.Page.check(options["page-address"], options["page-token"]),
          :ok <- mesh(),
          {:ok, live} <- Live.Mesh.start_link(connect: expected(options["connect"])),
          {:ok, _page, url} <- Page.start_link(page(options, live)) do

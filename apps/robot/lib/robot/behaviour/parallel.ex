@@ -9,7 +9,7 @@ defmodule Robot.Behaviour.Parallel do
   """
   @behaviour Robot.Behaviour
   alias Robot.Behaviour
-  alias Robot.Control.Arbiter
+  alias Robot.Behaviour.Arbiter
   alias Hal.Options
 
   @impl Behaviour

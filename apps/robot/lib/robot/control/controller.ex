@@ -16,7 +16,7 @@ defmodule Robot.Control.Controller do
   """
   alias Hal.Profile
   alias Robot.{Behaviour, Localiser, Mission, Percept, Wish}
-  alias Robot.Control.Arbiter
+  alias Robot.Behaviour.Arbiter
   alias Robot.Navigation.{Grid, OccupancyGrid}
   alias Robot.Behaviour.{Avoid, Escape, Rest}
 

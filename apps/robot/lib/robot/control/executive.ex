@@ -17,7 +17,8 @@ defmodule Robot.Control.Executive do
   use GenServer
   alias Hal.{Device, Event, HardenedServer, Odometry, Ticker}
   alias Robot.{Behaviour, Board, Config, Departure, Mission, Names, Percept}
-  alias Robot.Control.{Controller, Inbox, Trace}
+  alias Robot.Control.{Controller, Inbox}
+  alias Robot.Trace
   alias Robot.Safety.{DryRun, Gate, Readiness}
 
   @period_ms 100

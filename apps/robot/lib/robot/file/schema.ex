@@ -7,7 +7,7 @@ defmodule Robot.File.Schema do
   alias Hal.Options.Type
   alias Hal.RFlex.PowerSwitch
   alias Robot.File.{Colours, Device}
-  alias Robot.Safety.Reflex.Fence
+  alias Robot.Fence
 
   @farthest 10_000
   @fleet for kind <- ~w(mag min), n <- 1..100, do: :"#{kind}#{n}"

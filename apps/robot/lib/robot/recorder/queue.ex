@@ -7,7 +7,7 @@ defmodule Robot.Recorder.Queue do
   Each role has its own counters, which only its own process and the recorder write: what a role
   lost is told before its next entry.
   """
-  alias Robot.Control.Trace
+  alias Robot.Trace
 
   @enforce_keys [:counters, :bound]
   defstruct @enforce_keys

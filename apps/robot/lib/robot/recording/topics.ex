@@ -85,7 +85,7 @@ defmodule Robot.Recording.Topics do
   defp unix_ns(at_ms, offset_ms), do: max((at_ms + offset_ms) * 1_000_000, 0)
 
   @doc "What an entry of a robot says, as messages with their times (ns since 1970)."
-  @spec entry(t(), atom(), Robot.Control.Trace.entry(), offset_ms :: integer()) ::
+  @spec entry(t(), atom(), Robot.Trace.entry(), offset_ms :: integer()) ::
           {t(), [{key(), ns :: non_neg_integer(), iodata()}]}
   def entry(%__MODULE__{} = topics, id, {role, kind, what, at_ms}, offset_ms) do
     robot = Map.get(topics.robots, id, @new)

@@ -1,6 +1,6 @@
 defmodule Robot.Replay.Roles do
   @moduledoc """
-  What the processes of a robot do on an input (`Robot.Control.Trace`), as functions of their
+  What the processes of a robot do on an input (`Robot.Trace`), as functions of their
   state: the same pure functions that they call, and the order in which they carry out the effects.
   Pure if the mission is.
   """
@@ -10,7 +10,7 @@ defmodule Robot.Replay.Roles do
   alias Robot.Safety.Reflex
   import Robot.Mission, only: [is_order: 1]
 
-  @typedoc "The state of a role, and what it needs to know besides (`Robot.Control.Trace`)."
+  @typedoc "The state of a role, and what it needs to know besides (`Robot.Trace`)."
   @type t :: {struct(), map()}
   @type result :: {t(), effects :: [term()]}
 

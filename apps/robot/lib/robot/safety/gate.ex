@@ -20,7 +20,7 @@ defmodule Robot.Safety.Gate do
   use GenServer
   alias Hal.{Device, Event, HardenedServer, Ticker, Twist}
   alias Robot.{Board, Config, Departure, Names}
-  alias Robot.Control.Trace
+  alias Robot.Trace
   alias Robot.Safety.{DryRun, Reflex}
 
   @period_ms 50

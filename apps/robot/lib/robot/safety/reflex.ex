@@ -19,7 +19,7 @@ defmodule Robot.Safety.Reflex do
   | `:near` | slow enough to stop 0.15 m before what the sonars see in the direction of motion |
   | `:beside` | slowly past what the sonars see less than 0.15 m beside its way |
   | `:corner` | a robot longer than wide does not turn a corner into what the sonars see |
-  | `:fence` | stops before its fence (`Robot.Safety.Reflex.Fence`); no driving without a place |
+  | `:fence` | stops before its fence (`Robot.Fence`); no driving without a place |
   | `:blind` | no sonar reading for 500 ms, although it has sonars: at most 0.1 m/s, also for the corners of a robot longer than wide that turns |
   | `:acceleration` | the profile's accelerations; braking may be twice as hard |
 
@@ -32,7 +32,8 @@ defmodule Robot.Safety.Reflex do
   """
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.Departure
-  alias Robot.Safety.Reflex.{Body, Fence, Limits}
+  alias Robot.Fence
+  alias Robot.Safety.Reflex.{Body, Limits}
 
   @dead_man_ms 200
   # No base drives or turns this fast: a wish with such a number is an error.
@@ -102,7 +103,7 @@ defmodule Robot.Safety.Reflex do
   @doc """
   The state of a robot that stands. Options: `latched?` (default false), for a latch that survived
   a restart; `armed?` (default true), until a reading `{:arming, …}` says otherwise; `fence`
-  (`Robot.Safety.Reflex.Fence`, default none), with `start`, the pose at which the odometry reads
+  (`Robot.Fence`, default none), with `start`, the pose at which the odometry reads
   zero (default the origin), and `frame`, the result of `frame/1` before a restart.
 
   A fence uses odometry of one frame only, the first (`Hal.Odometry`). In another frame, zero is

@@ -97,7 +97,7 @@ defmodule Robot.Safety.GateTest do
   end
 
   test "a gate that starts again does not lay its fence in another frame of odometry" do
-    {:ok, fence} = Robot.Safety.Reflex.Fence.new({{-50, -50}, {50, 50}})
+    {:ok, fence} = Robot.Fence.new({{-50, -50}, {50, 50}})
     id = rolling(:gate6, fence: fence)
     board = Board.find!(id)
 

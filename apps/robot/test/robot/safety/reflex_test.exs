@@ -2,7 +2,7 @@ defmodule Robot.Safety.ReflexTest do
   use ExUnit.Case, async: true
   alias Hal.{Profile, Twist}
   alias Robot.{Body, Wish}
-  alias Robot.Control.Arbiter
+  alias Robot.Behaviour.Arbiter
   alias Robot.Safety.Reflex
 
   defp gate(profile \\ Profile.magellan()),

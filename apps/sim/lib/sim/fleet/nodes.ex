@@ -13,7 +13,8 @@ defmodule Sim.Fleet.Nodes do
   alias Sim.Fleet.Nodes.{Child, Command, Host}
   alias Sim.World
   alias Sim.World.Snapshot
-  alias Sim.Node.{Config, Reporter}
+  alias Sim.Fleet.Nodes.Config
+  alias Sim.Node.Reporter
 
   # On a busy machine a start takes several seconds.
   @up_ms 20_000

@@ -7,7 +7,7 @@ defmodule Sim.Fleet.RadioServer do
   alias Robot.Names
   alias Sim.Radio
   alias Swarm.Comms
-  alias Swarm.Comms.Transport
+  alias Swarm.Transport
 
   @poll_ms 5
 

@@ -4,7 +4,8 @@ defmodule Sim.World.Blobs do
   fleets; tests compare it with painting. Pure.
   """
   alias Sim.{Compute, Noise}
-  alias Sim.World.{CameraFrustum, Palette}
+  alias Sim.Compute.Palette
+  alias Sim.World.CameraFrustum
   alias Vision.Blob
 
   @least_area 20

@@ -23,7 +23,8 @@ defmodule Sim.World.CameraFrustum do
         }
 
   @typedoc "Something upright and round: place, radius, height, and what it is."
-  @type pole :: {float(), float(), radius :: float(), height :: float(), Sim.World.Palette.kind()}
+  @type pole ::
+          {float(), float(), radius :: float(), height :: float(), Sim.Compute.Palette.kind()}
 
   @doc "The camera of a body, with pictures of the profile's size."
   @spec of(Sim.World.Body.t()) :: t()

@@ -16,7 +16,7 @@ defmodule Swarm.Agreement.Round do
   found, the counter grows with each new try.
   """
   alias Swarm.Agreement.Round.{Epochs, Letter, Precedence, Record, Tally}
-  alias Swarm.Message.CounterGuard
+  alias Swarm.Wire.CounterGuard
 
   # Letters are repeated every 100 ms, less often in a large group, because all-to-all traffic
   # grows with its square.

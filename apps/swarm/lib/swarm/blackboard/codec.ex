@@ -16,14 +16,14 @@ defmodule Swarm.Blackboard.Codec do
   `{writer, check}`; a deleted hint has an empty payload.
   """
   alias Swarm.Blackboard.{AntiEntropy, Rows}
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   # The size of a datagram's payload; larger terms are sent alone.
   @datagram 1_200
   # Compressed terms may be far larger than their bytes.
   @compressed 80
   @ids 4_294_967_296
-  # No count of hints gets as far (`Swarm.Message.CounterGuard`).
+  # No count of hints gets as far (`Swarm.Wire.CounterGuard`).
   @counts 6_000_000_000_000_000_000
   # Higher than any time of day: even if a wrong number is as high as one can be, there is a higher
   # one to outbid it (`Swarm.Blackboard.Rows.possible?/2`).
@@ -48,9 +48,9 @@ defmodule Swarm.Blackboard.Codec do
   """
   @spec key?(term()) :: boolean()
   def key?({name, of}),
-    do: WireTypes.name?(name) and (WireTypes.name?(of) or WireTypes.number?(of))
+    do: Wire.name?(name) and (Wire.name?(of) or Wire.number?(of))
 
-  def key?(name), do: WireTypes.name?(name)
+  def key?(name), do: Wire.name?(name)
 
   @doc "The number of a key, the same on every machine."
   @spec id(key()) :: id()
@@ -181,7 +181,7 @@ defmodule Swarm.Blackboard.Codec do
   def read(_other), do: :error
 
   defp each(list, read) do
-    if WireTypes.list?(list, fn _any -> true end) do
+    if Wire.list?(list, fn _any -> true end) do
       good = for term <- list, {:ok, good} <- [read.(term)], do: good
       {:ok, good, length(list) - length(good)}
     else
@@ -247,7 +247,7 @@ defmodule Swarm.Blackboard.Codec do
   @spec robot(term()) :: {:ok, atom()} | :error
   def robot(name) when is_binary(name) and byte_size(name) in 1..255 do
     robot = String.to_existing_atom(name)
-    if WireTypes.name?(robot), do: {:ok, robot}, else: :error
+    if Wire.name?(robot), do: {:ok, robot}, else: :error
   rescue
     ArgumentError -> :error
   end

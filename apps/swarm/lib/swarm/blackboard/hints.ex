@@ -14,7 +14,7 @@ defmodule Swarm.Blackboard.Hints do
   """
   alias Mesh.{Nonblocking, SafeTable}
   alias Swarm.Blackboard.{Codec, Rows}
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   @board Swarm.Blackboard
 
@@ -29,7 +29,7 @@ defmodule Swarm.Blackboard.Hints do
 
   defp write(board, robot, key, payload) do
     cond do
-      not WireTypes.name?(robot) ->
+      not Wire.name?(robot) ->
         {:error, "#{inspect(robot)} is not a robot, which could write a hint"}
 
       not Codec.key?(key) ->

@@ -7,7 +7,7 @@ defmodule Swarm.Blackboard.Server do
   alias Hal.Event
   alias Swarm.Blackboard
   alias Swarm.Blackboard.{AntiEntropy, Rows}
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   # The number of nodes that get each digest.
   @peers 2
@@ -75,7 +75,7 @@ defmodule Swarm.Blackboard.Server do
 
   @impl GenServer
   def handle_cast({:note, owner, robot, boot, pairs}, s) when is_owner(owner, robot, boot) do
-    if WireTypes.list?(pairs, &match?({_key, payload} when is_binary(payload), &1)),
+    if Wire.list?(pairs, &match?({_key, payload} when is_binary(payload), &1)),
       do: {:noreply, s |> enter(owner, robot, boot) |> put_all(robot, pairs)},
       else: {:noreply, drop(s, 1)}
   end

@@ -15,7 +15,7 @@ defmodule Swarm.Blackboard.State do
   a value.
   """
   alias Swarm.Blackboard.{Expiry, Incarnation, Rows}
-  alias Swarm.Message.CounterGuard
+  alias Swarm.Wire.CounterGuard
 
   @limits %{robots: 256, keys: 32, bytes: 59_000, hints: 256, hint_bytes: 1_000}
 

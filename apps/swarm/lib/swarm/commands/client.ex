@@ -2,10 +2,10 @@ defmodule Swarm.Commands.Client do
   @moduledoc false
   # Sends requests to robots, wherever they are, and gathers their answers. Commands that stop a
   # robot go to its e-stop process, all others to its comms process. Before an order to another
-  # node, the robot is asked for a stamp (`Swarm.Commands.Freshness`).
+  # node, the robot is asked for a stamp (`Swarm.Order.Freshness`).
   alias Mesh.Nonblocking
   alias Swarm.{Directory, EStop}
-  alias Swarm.Commands.Freshness
+  alias Swarm.Order.Freshness
 
   @answer_ms 500
 

@@ -30,7 +30,8 @@ defmodule Swarm.Comms.CommandHandler do
   alias Robot.Navigation.{Grid, Reach}
   alias Mesh.Nonblocking
   alias Swarm.{Missions, Status}
-  alias Swarm.Commands.{Freshness, Order}
+  alias Swarm.Order
+  alias Swarm.Order.Freshness
   alias Swarm.Comms.PingReply
   alias Swarm.Message.Receiver
 
@@ -114,7 +115,7 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp answer(:ok, _id, _command), do: :ok
   defp answer({:error, :held}, id, _command), do: held(id)
-  defp answer({:error, :idle}, id, _formation), do: shapeless(id)
+  defp answer({:error, :idle}, id, _formation), do: Order.shapeless(id)
   defp answer({:error, :no_mission}, id, _start), do: {:error, "#{id} has no such mission"}
 
   defp answer({:error, line}, id, _command) when is_binary(line), do: {:error, "#{id}: #{line}"}
@@ -125,11 +126,6 @@ defmodule Swarm.Comms.CommandHandler do
   defp answer({:error, :stopped}, id, _command), do: Freshness.refusal(id, :stopped)
 
   defp held(id), do: {:error, "#{id} is held by the emergency stop; reset it first"}
-
-  @doc "The answer of a robot to a formation if its mission has none."
-  @spec shapeless(atom()) :: {:error, line :: String.t()}
-  def shapeless(id),
-    do: {:error, "#{id} is not on a mission that has a formation; start it first"}
 
   # People use `Swarm`, which has checked everything; but anybody may send something here.
   defp checked({:start, options}, config) do

@@ -10,7 +10,7 @@ defmodule Swarm.Directory.Scope do
     * the end of a process, unless that process is alive or is still monitored.
   """
   use GenServer
-  import Swarm.Message.WireTypes, only: [list?: 2]
+  import Swarm.Wire, only: [list?: 2]
   alias Hal.HardenedServer
 
   @doc "Starts the scope with this name."

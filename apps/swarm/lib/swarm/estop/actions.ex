@@ -199,7 +199,7 @@ defmodule Swarm.EStop.Actions do
   # The gate stops at once. The goal is dropped even if the pilot is stuck in its mission, and
   # again when the mission has ended, because it may have set another one meanwhile.
   defp halt(%{id: id} = s, then) do
-    # Requests from before this stop begin nothing after it (`Swarm.Commands.Freshness`,
+    # Requests from before this stop begin nothing after it (`Swarm.Order.Freshness`,
     # `Robot.Control.Pilot`).
     Board.put(s.board, :estop, :stopped, now_us(), Config.now(s.config))
     :ok = Gate.forget(id)

@@ -8,7 +8,7 @@ defmodule Swarm.EStop.Calls do
   is remembered beside it, so that a wrong counter, however high, hides no later call: at worst a
   robot stops once more. At most 64 are remembered in all.
   """
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   @most 64
   @window 64
@@ -56,7 +56,7 @@ defmodule Swarm.EStop.Calls do
   """
   @spec call?(term()) :: boolean()
   def call?({node, boot, counter}),
-    do: WireTypes.name?(node) and number?(boot) and number?(counter)
+    do: Wire.name?(node) and number?(boot) and number?(counter)
 
   def call?(_other), do: false
 
@@ -66,7 +66,7 @@ defmodule Swarm.EStop.Calls do
 
   @doc "Whether a term from outside is a list of calls that were heard."
   @spec heard?(term()) :: boolean()
-  def heard?(term), do: WireTypes.list?(term, &match?({_node, {_boot, _counter}}, &1))
+  def heard?(term), do: Wire.list?(term, &match?({_node, {_boot, _counter}}, &1))
 
   defp number?(number), do: is_integer(number) and number in 0..@latest
 end

@@ -9,7 +9,8 @@ defmodule Swarm.EStop.Server do
   alias Swarm.EStop
   alias Mesh.Nonblocking
   alias Swarm.Directory
-  alias Swarm.Commands.Freshness
+  alias Swarm.Order.Freshness
+  alias Swarm.Wire.StopTags
 
   @impl GenServer
   def init(%Config{id: id} = config) do
@@ -61,7 +62,7 @@ defmodule Swarm.EStop.Server do
 
   @impl GenServer
   def handle_cast({:beat, tags}, s),
-    do: {:noreply, if(EStop.State.tags?(tags), do: EStop.Actions.heard(s, tags), else: s)}
+    do: {:noreply, if(StopTags.tags?(tags), do: EStop.Actions.heard(s, tags), else: s)}
 
   # The latch as it is now, not when the gate reported it: this process may have set it again
   # since.

@@ -15,15 +15,13 @@ defmodule Swarm.EStop.State do
   what a person has reset.
   """
   alias Swarm.EStop.Calls
+  alias Swarm.Wire.StopTags
 
-  @most_held 16
   @most_cleared 256
-  @last_tag 0xFFFFFFFF
 
   defstruct held: [], cleared: [], calls: []
 
-  @typedoc "A stop's tag, of 32 bits."
-  @type tag :: 0..0xFFFFFFFF
+  @type tag :: StopTags.tag()
 
   @type t :: %__MODULE__{held: [tag()], cleared: [tag()], calls: Calls.t()}
 
@@ -39,24 +37,11 @@ defmodule Swarm.EStop.State do
   The tag of the stop that a call makes.
 
       iex> tags = for counter <- 1..2, do: Swarm.EStop.State.tag({:base@hall, 1_700_000_000_000, counter})
-      iex> {Enum.uniq(tags) == tags, Swarm.EStop.State.tags?(tags)}
+      iex> {Enum.uniq(tags) == tags, Swarm.Wire.StopTags.tags?(tags)}
       {true, true}
   """
   @spec tag(Calls.call()) :: tag()
-  def tag(call), do: :erlang.phash2(call, @last_tag + 1)
-
-  @doc """
-  Whether a term from outside can be what a heartbeat says of the stops that hold its robot.
-
-      iex> for term <- [[], [1, 2], [-1], [1 | 2], Enum.to_list(1..17)], do: Swarm.EStop.State.tags?(term)
-      [true, true, false, false, false]
-  """
-  @spec tags?(term()) :: boolean()
-  def tags?(term), do: tags?(term, @most_held)
-
-  defp tags?([], _left), do: true
-  defp tags?([tag | tags], left) when left > 0 and tag in 0..@last_tag, do: tags?(tags, left - 1)
-  defp tags?(_other, _left), do: false
+  def tag(call), do: :erlang.phash2(call, StopTags.count())
 
   @doc """
   Somebody stops the fleet here; the call, which is sent to the others, is remembered.
@@ -68,7 +53,7 @@ defmodule Swarm.EStop.State do
   @spec press(t(), Calls.call()) :: t()
   def press(%__MODULE__{} = stop, call) do
     tag = tag(call)
-    {held, over} = Enum.split([tag | List.delete(stop.held, tag)], @most_held)
+    {held, over} = Enum.split([tag | List.delete(stop.held, tag)], StopTags.most())
     # What others still say of those that are too many is not another stop.
     clear(%{late(stop, call) | held: held}, over)
   end
@@ -119,7 +104,7 @@ defmodule Swarm.EStop.State do
     # Those that hold it stay, so that robots which hear each other agree at last, whatever they hear.
     case (Enum.uniq(tags) -- stop.cleared) -- stop.held do
       [] -> stop
-      new -> %{stop | held: Enum.take(stop.held ++ new, @most_held)}
+      new -> %{stop | held: Enum.take(stop.held ++ new, StopTags.most())}
     end
   end
 

@@ -20,7 +20,7 @@ defmodule Swarm.Formation.Reference do
   anybody to lead, 0 if none is required (`Missions.Landmark.Policy`).
   """
   alias Swarm.Formation
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   @enforce_keys [:leader, :epoch, :sequence, :pose, :twist, :formation, :order, :size, :places]
   defstruct @enforce_keys ++
@@ -89,22 +89,22 @@ defmodule Swarm.Formation.Reference do
   @doc "Whether a term from outside is an anchor with sane numbers."
   @spec valid?(term()) :: boolean()
   def valid?(%__MODULE__{twist: {v, w}, order: order, places: places} = anchor) do
-    WireTypes.whole?(anchor, __MODULE__) and WireTypes.pose?(anchor.pose) and WireTypes.number?(v) and
-      WireTypes.number?(w) and WireTypes.name?(anchor.leader) and WireTypes.counter?(anchor.epoch) and
-      anchor.epoch > 0 and WireTypes.counter?(anchor.sequence) and
+    Wire.whole?(anchor, __MODULE__) and Wire.pose?(anchor.pose) and Wire.number?(v) and
+      Wire.number?(w) and Wire.name?(anchor.leader) and Wire.counter?(anchor.epoch) and
+      anchor.epoch > 0 and Wire.counter?(anchor.sequence) and
       Formation.valid?(anchor.formation) and
       (anchor.asked == nil or Formation.valid?(anchor.asked)) and
-      WireTypes.counter?(anchor.asked_no) and
-      WireTypes.names?(order) and WireTypes.distinct?(order) and anchor.leader not in order and
+      Wire.counter?(anchor.asked_no) and
+      Wire.names?(order) and Wire.distinct?(order) and anchor.leader not in order and
       anchor.size in 1..@most and
-      WireTypes.list?(places, &(&1 in 1..@most and &1 < anchor.size)) and
-      length(places) == length(order) and WireTypes.distinct?(places) and
+      Wire.list?(places, &(&1 in 1..@most and &1 < anchor.size)) and
+      length(places) == length(order) and Wire.distinct?(places) and
       sizes?(anchor.sd, 2) and sizes?(anchor.start_sd, 2) and sizes?(anchor.drift, 3) and
-      size?(anchor.slip) and WireTypes.count?(anchor.frame) and base?(anchor.base) and
+      size?(anchor.slip) and Wire.count?(anchor.frame) and base?(anchor.base) and
       landmark?(anchor.landmark) and is_boolean(anchor.still) and
       is_integer(anchor.of) and anchor.of in 0..@most and
       (anchor.trail == nil or
-         (WireTypes.list?(anchor.trail, &WireTypes.pose?/1) and
+         (Wire.list?(anchor.trail, &Wire.pose?/1) and
             length(anchor.trail) == length(order)))
   end
 
@@ -115,18 +115,18 @@ defmodule Swarm.Formation.Reference do
 
   defp sizes?(_other, _count), do: false
 
-  defp size?(term), do: WireTypes.number?(term) and term >= 0
+  defp size?(term), do: Wire.number?(term) and term >= 0
 
   defp base?(nil), do: true
 
   defp base?({name, boot, number}),
     do:
-      WireTypes.name?(name) and (boot == nil or WireTypes.boot?(boot)) and
-        WireTypes.count?(number)
+      Wire.name?(name) and (boot == nil or Wire.boot?(boot)) and
+        Wire.count?(number)
 
   defp base?(_other), do: false
 
   defp landmark?(nil), do: true
-  defp landmark?({x, y}), do: WireTypes.number?(x) and WireTypes.number?(y)
+  defp landmark?({x, y}), do: Wire.number?(x) and Wire.number?(y)
   defp landmark?(_other), do: false
 end

@@ -11,7 +11,8 @@ defmodule Swarm.Membership.Heartbeat do
   outside it. `boot` is the number of its life, which grows with every start.
   """
   alias Swarm.Membership.NameSet
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
+  alias Swarm.Wire.StopTags
 
   @enforce_keys [:boot, :sequence, :pose, :twist]
   defstruct @enforce_keys ++
@@ -52,7 +53,7 @@ defmodule Swarm.Membership.Heartbeat do
           unsure: boolean(),
           blocked: boolean(),
           formed: boolean(),
-          estop: [Swarm.EStop.State.tag()],
+          estop: [StopTags.tag()],
           anchor: Swarm.Formation.Reference.t() | nil
         }
 
@@ -109,7 +110,7 @@ defmodule Swarm.Membership.Heartbeat do
           body(),
           claim :: map() | :idle,
           [atom()],
-          Swarm.EStop.State.t()
+          %{:held => [StopTags.tag()], optional(atom()) => term()}
         ) ::
           t()
   def new({boot, sequence}, %{pose: pose} = body, claim, heard, stop) do
@@ -141,17 +142,17 @@ defmodule Swarm.Membership.Heartbeat do
   """
   @spec valid?(term()) :: boolean()
   def valid?(%__MODULE__{twist: {linear, turn}} = beat) do
-    WireTypes.whole?(beat, __MODULE__) and WireTypes.pose?(beat.pose) and
-      WireTypes.number?(linear) and
-      WireTypes.number?(turn) and WireTypes.boot?(beat.boot) and
-      WireTypes.counter?(beat.sequence) and beat.radius in 50..2000 and
-      sd?(beat.sd) and WireTypes.name?(beat.phase) and
-      WireTypes.counter?(beat.epoch) and (beat.leader == nil or WireTypes.name?(beat.leader)) and
+    Wire.whole?(beat, __MODULE__) and Wire.pose?(beat.pose) and
+      Wire.number?(linear) and
+      Wire.number?(turn) and Wire.boot?(beat.boot) and
+      Wire.counter?(beat.sequence) and beat.radius in 50..2000 and
+      sd?(beat.sd) and Wire.name?(beat.phase) and
+      Wire.counter?(beat.epoch) and (beat.leader == nil or Wire.name?(beat.leader)) and
       NameSet.valid?(beat.heard) and sight?(beat.sight) and
       Enum.all?(
         [beat.standing, beat.in_place, beat.unsure, beat.blocked, beat.formed],
         &is_boolean/1
-      ) and Swarm.EStop.State.tags?(beat.estop) and
+      ) and StopTags.tags?(beat.estop) and
       (beat.anchor == nil or Swarm.Formation.Reference.valid?(beat.anchor))
   end
 

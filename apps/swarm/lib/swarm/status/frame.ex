@@ -9,7 +9,7 @@ defmodule Swarm.Status.Frame do
   alias Hal.Pose
   alias Robot.Config
   alias Swarm.Blackboard
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   @enforce_keys [:within, :own, :start]
   defstruct @enforce_keys
@@ -60,7 +60,7 @@ defmodule Swarm.Status.Frame do
   def decode("lost"), do: :lost
 
   def decode({leader, number, own, x, y}) when is_binary(leader) do
-    with true <- Enum.all?([number, own, x, y], &WireTypes.number?/1),
+    with true <- Enum.all?([number, own, x, y], &Wire.number?/1),
          {:ok, frame} <- named(leader, number) do
       %__MODULE__{within: frame, own: own, start: {x / 1000, y / 1000}}
     else

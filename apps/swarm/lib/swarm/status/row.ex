@@ -6,7 +6,7 @@ defmodule Swarm.Status.Row do
   """
   alias Hal.Pose
   alias Swarm.Status
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
   alias Swarm.Blackboard
 
   # Longer than any name: text from outside is not printed at any length.
@@ -95,16 +95,16 @@ defmodule Swarm.Status.Row do
          {:ok, uncertainty} <- metres(Map.get(row, :uncertainty)),
          unsure = Map.get(row, :unsure, false),
          epoch = Map.get(row, :epoch),
-         true <- epoch == nil or WireTypes.number?(epoch),
+         true <- epoch == nil or Wire.number?(epoch),
          true <- is_boolean(unsure),
          true <- Enum.all?([limits, offline, members, deaf_to, words], &texts?/1),
          true <- Enum.all?([node, state], &is_binary/1),
          true <- Enum.all?([by, leader, fault], &(&1 == nil or is_binary(&1))),
-         true <- Enum.all?([rejected, number], &WireTypes.number?/1) and is_boolean(estop),
-         true <- speed == nil or WireTypes.number?(speed),
-         true <- pose == nil or WireTypes.pose?(pose),
+         true <- Enum.all?([rejected, number], &Wire.number?/1) and is_boolean(estop),
+         true <- speed == nil or Wire.number?(speed),
+         true <- pose == nil or Wire.pose?(pose),
          true <- power == nil or is_number(power),
-         true <- was_ms == nil or WireTypes.number?(was_ms) do
+         true <- was_ms == nil or Wire.number?(was_ms) do
       members = names(members)
 
       {:ok,
@@ -168,7 +168,7 @@ defmodule Swarm.Status.Row do
   defp metres(mm) when is_integer(mm) and mm in 0..@unsure_mm, do: {:ok, mm / 1000}
   defp metres(_other), do: :error
 
-  defp texts?(list), do: WireTypes.list?(list, &is_binary/1)
+  defp texts?(list), do: Wire.list?(list, &is_binary/1)
 
   defp names(texts),
     do: for(text <- texts, {:ok, name} <- [Blackboard.Codec.robot(text)], do: name)

@@ -5,7 +5,7 @@ defmodule Swarm.Blackboard.MeshTest do
   import Swarm.Case, only: [eventually: 1]
   alias Swarm.{Blackboard, Status}
   alias Swarm.Blackboard.Hints
-  alias Swarm.Directory.RobotInfo
+  alias Swarm.Discovery.RobotInfo
   alias Swarm.MeshNodes, as: Cluster
   alias Swarm.MeshNodes.Listener
   @moduletag :realtime

@@ -11,7 +11,7 @@ defmodule Swarm.Mesh.AbsurdTest do
     Mesh.Distribution.Dialer,
     Swarm.EStop.Broadcaster,
     Swarm.Blackboard,
-    Swarm.Directory.Presence
+    Swarm.Discovery.Presence
   ]
 
   defp parts(%{name: name} = node) do

@@ -8,7 +8,7 @@ defmodule Swarm.Mesh.CrashesTest do
 
   @parts [
     Swarm.Blackboard,
-    Swarm.Directory.Presence,
+    Swarm.Discovery.Presence,
     Swarm.EStop.Broadcaster,
     Swarm.Directory,
     Mesh.CommandRelay,

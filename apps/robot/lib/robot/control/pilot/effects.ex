@@ -11,7 +11,8 @@ defmodule Robot.Control.Pilot.Effects do
   """
   alias Hal.Event
   alias Robot.Config
-  alias Robot.Control.{Executive, Trace}
+  alias Robot.Control.Executive
+  alias Robot.Trace
   alias Robot.Localiser.Anchors
   import Robot.Mission, only: [is_order: 1]
 

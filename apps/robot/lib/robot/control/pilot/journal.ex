@@ -9,7 +9,7 @@ defmodule Robot.Control.Pilot.Journal do
   """
   alias Hal.Event
   alias Robot.{Board, Config}
-  alias Robot.Control.Trace
+  alias Robot.Trace
 
   @typedoc "The part of a pilot's data that is needed here; `since_ms` is when its state began."
   @type data :: %{

@@ -7,7 +7,8 @@ defmodule Robot.Safety.Reflex.Limits do
   alias Hal.Drive.SlewLimiter
   alias Hal.Twist
   alias Robot.Safety.Reflex
-  alias Robot.Safety.Reflex.{Body, Fence}
+  alias Robot.Fence
+  alias Robot.Safety.Reflex.Body
 
   @blind_ms 500
   @blind_speed 0.1

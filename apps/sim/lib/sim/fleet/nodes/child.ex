@@ -4,7 +4,7 @@ defmodule Sim.Fleet.Nodes.Child do
   than we do, even frozen.
   """
   alias Sim.Fleet.Nodes.Command
-  alias Sim.Node.Config
+  alias Sim.Fleet.Nodes.Config
 
   @kept_bytes 4_000
   @end_ms 2_000

@@ -1,7 +1,7 @@
 defmodule Swarm.Agreement.Round.Epochs do
   @moduledoc """
   Which epochs a robot believes others: those that are no farther ahead of what it knows than a
-  fleet gets by itself (`Swarm.Message.CounterGuard`). An epoch that nobody can have reached would
+  fleet gets by itself (`Swarm.Wire.CounterGuard`). An epoch that nobody can have reached would
   leave no room for the next ones. Pure.
 
   The limit is that of the robot's round, because every leadership begins with one; what a mission
@@ -9,7 +9,7 @@ defmodule Swarm.Agreement.Round.Epochs do
   """
   alias Swarm.Agreement.Round
   alias Swarm.Agreement.Round.Letter
-  alias Swarm.Message.CounterGuard
+  alias Swarm.Wire.CounterGuard
 
   # A number that several robots say is trusted up to here: there is more room above it than below.
   @trusted 9_007_199_254_740_992

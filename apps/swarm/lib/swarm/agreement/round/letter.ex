@@ -5,7 +5,7 @@ defmodule Swarm.Agreement.Round.Letter do
   is the map of all reports that the sender holds, sent as an echo when all reports have arrived,
   or when somebody asks. `purpose` says why the round is held.
   """
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   @enforce_keys [:id, :view, :remaining_ms, :purpose]
   defstruct @enforce_keys ++ [report: nil, known: nil, digest: nil, ask: false]
@@ -35,11 +35,11 @@ defmodule Swarm.Agreement.Round.Letter do
   @doc "Whether a term from outside is a letter."
   @spec valid?(term()) :: boolean()
   def valid?(%__MODULE__{id: {epoch, counter, initiator}} = letter) do
-    WireTypes.whole?(letter, __MODULE__) and WireTypes.counter?(epoch) and epoch > 0 and
-      is_integer(counter) and counter in 1..@tries and WireTypes.name?(initiator) and
-      WireTypes.number?(letter.remaining_ms) and letter.remaining_ms <= @longest_ms and
-      letter.purpose in [:search, :change] and WireTypes.names?(letter.view) and
-      WireTypes.distinct?(letter.view) and
+    Wire.whole?(letter, __MODULE__) and Wire.counter?(epoch) and epoch > 0 and
+      is_integer(counter) and counter in 1..@tries and Wire.name?(initiator) and
+      Wire.number?(letter.remaining_ms) and letter.remaining_ms <= @longest_ms and
+      letter.purpose in [:search, :change] and Wire.names?(letter.view) and
+      Wire.distinct?(letter.view) and
       (letter.report == :busy or report?(letter.report)) and
       (letter.known == nil or known?(letter.known)) and
       (letter.digest == nil or (is_binary(letter.digest) and byte_size(letter.digest) == 32)) and
@@ -49,7 +49,7 @@ defmodule Swarm.Agreement.Round.Letter do
   def valid?(_term), do: false
 
   defp known?(known) when is_map(known) and not is_struct(known),
-    do: Enum.all?(known, fn {id, report} -> WireTypes.name?(id) and report?(report) end)
+    do: Enum.all?(known, fn {id, report} -> Wire.name?(id) and report?(report) end)
 
   defp known?(_other), do: false
 
@@ -57,7 +57,7 @@ defmodule Swarm.Agreement.Round.Letter do
 
   defp report?(%{found: found, size_ppm: size, pose: pose, led: led, of: of} = report) do
     map_size(report) == 5 and is_boolean(found) and is_integer(size) and size in 0..1_000_000 and
-      WireTypes.pose?(pose) and is_integer(led) and led in 0..@most and is_integer(of) and
+      Wire.pose?(pose) and is_integer(led) and led in 0..@most and is_integer(of) and
       of in 0..@most
   end
 

@@ -1,7 +1,7 @@
 defmodule Swarm.Commands.OrderTest do
   use ExUnit.Case, async: true
   alias Robot.Command
-  alias Swarm.Commands.Order
+  alias Swarm.Order
 
   test "valid commands of people pass unchanged" do
     for text <- ~w(goto:1:2 goto:1:2:3 move:0.1:0 findblob findblob:Red lead follow:1:2:0

@@ -1,4 +1,4 @@
-defmodule Robot.Control.Arbiter do
+defmodule Robot.Behaviour.Arbiter do
   @moduledoc """
   Chooses among wishes (R88): the one with the greatest weight wins. The weight of the behaviour
   that won last counts a tenth more, so that two behaviours of nearly equal weight do not
@@ -12,11 +12,11 @@ defmodule Robot.Control.Arbiter do
   The winning wish, or `nil` without wishes.
 
       iex> wish = fn by, weight -> Robot.Wish.new(by, Hal.Twist.zero(), weight) end
-      iex> Robot.Control.Arbiter.choose([wish.(:rest, 0.1), wish.(:goto, 0.5), nil], nil).by
+      iex> Robot.Behaviour.Arbiter.choose([wish.(:rest, 0.1), wish.(:goto, 0.5), nil], nil).by
       :goto
-      iex> Robot.Control.Arbiter.choose([wish.(:goto, 0.5), wish.(:move, 0.52)], :goto).by
+      iex> Robot.Behaviour.Arbiter.choose([wish.(:goto, 0.5), wish.(:move, 0.52)], :goto).by
       :goto
-      iex> Robot.Control.Arbiter.choose([], :goto)
+      iex> Robot.Behaviour.Arbiter.choose([], :goto)
       nil
   """
   @spec choose([Wish.t() | nil], last_by :: atom()) :: Wish.t() | nil
@@ -29,7 +29,7 @@ defmodule Robot.Control.Arbiter do
   @doc """
   The weight with which a wish is compared, after the behaviour `last_by` won.
 
-      iex> Robot.Control.Arbiter.weight(Robot.Wish.new(:goto, Hal.Twist.zero(), 0.5), :rest)
+      iex> Robot.Behaviour.Arbiter.weight(Robot.Wish.new(:goto, Hal.Twist.zero(), 0.5), :rest)
       0.5
   """
   @spec weight(Wish.t(), last_by :: atom()) :: float()
@@ -40,7 +40,7 @@ defmodule Robot.Control.Arbiter do
   Who wished, with the weights by which they are compared, the winner first.
 
       iex> wish = fn by, weight -> Robot.Wish.new(by, Hal.Twist.zero(), weight) end
-      iex> Robot.Control.Arbiter.weights([nil, wish.(:rest, 0.1), wish.(:goto, 0.5)], nil)
+      iex> Robot.Behaviour.Arbiter.weights([nil, wish.(:rest, 0.1), wish.(:goto, 0.5)], nil)
       [goto: 0.5, rest: 0.1]
   """
   @spec weights([Wish.t() | nil], last_by :: atom()) :: [{by :: atom(), weight :: float()}]

@@ -1,4 +1,4 @@
-defmodule Swarm.Message.WireTypes do
+defmodule Swarm.Wire do
   @moduledoc """
   Validates terms from outside, without trusting them in any way. Pure.
   """
@@ -15,9 +15,9 @@ defmodule Swarm.Message.WireTypes do
   Whether a struct has all fields of its kind and no others, because anything can arrive from the
   network.
 
-      iex> Swarm.Message.WireTypes.whole?(Hal.Pose.new(1, 2), Hal.Pose)
+      iex> Swarm.Wire.whole?(Hal.Pose.new(1, 2), Hal.Pose)
       true
-      iex> Swarm.Message.WireTypes.whole?(%{__struct__: Hal.Pose, x: 1}, Hal.Pose)
+      iex> Swarm.Wire.whole?(%{__struct__: Hal.Pose, x: 1}, Hal.Pose)
       false
   """
   @spec whole?(term(), module()) :: boolean()
@@ -29,7 +29,7 @@ defmodule Swarm.Message.WireTypes do
   @doc """
   Whether a term can be a robot's name.
 
-      iex> for term <- [:mag1, nil, true, "mag1"], do: Swarm.Message.WireTypes.name?(term)
+      iex> for term <- [:mag1, nil, true, "mag1"], do: Swarm.Wire.name?(term)
       [true, false, false, false]
   """
   @spec name?(term()) :: boolean()
@@ -38,7 +38,7 @@ defmodule Swarm.Message.WireTypes do
   @doc """
   Whether a term is a list of names, no longer than the largest fleet.
 
-      iex> for term <- [[:mag1], [:mag1 | :mag2], [1]], do: Swarm.Message.WireTypes.names?(term)
+      iex> for term <- [[:mag1], [:mag1 | :mag2], [1]], do: Swarm.Wire.names?(term)
       [true, false, false]
   """
   @spec names?(term()) :: boolean()
@@ -47,7 +47,7 @@ defmodule Swarm.Message.WireTypes do
   @doc """
   Whether the elements of a list are all different.
 
-      iex> for list <- [[:mag1, :mag2], [:mag2, :mag1], [:mag1, :mag1]], do: Swarm.Message.WireTypes.distinct?(list)
+      iex> for list <- [[:mag1, :mag2], [:mag2, :mag1], [:mag1, :mag1]], do: Swarm.Wire.distinct?(list)
       [true, true, false]
   """
   @spec distinct?(list()) :: boolean()
@@ -60,7 +60,7 @@ defmodule Swarm.Message.WireTypes do
   @doc """
   Whether a term is a list of such terms, no longer than the largest fleet.
 
-      iex> for term <- [[1, 2], [1, :a], [1 | 2], 1], do: Swarm.Message.WireTypes.list?(term, &is_integer/1)
+      iex> for term <- [[1, 2], [1, :a], [1 | 2], 1], do: Swarm.Wire.list?(term, &is_integer/1)
       [true, false, false, false]
   """
   @spec list?(term(), (term() -> boolean())) :: boolean()
@@ -69,7 +69,7 @@ defmodule Swarm.Message.WireTypes do
   @doc """
   Whether a term is a whole number in the range of lengths in mm, angles in mrad and counts.
 
-      iex> for term <- [-5, 1.0, 1_000_000_000], do: Swarm.Message.WireTypes.number?(term)
+      iex> for term <- [-5, 1.0, 1_000_000_000], do: Swarm.Wire.number?(term)
       [true, false, false]
   """
   @spec number?(term()) :: boolean()
@@ -78,7 +78,7 @@ defmodule Swarm.Message.WireTypes do
   @doc """
   Whether a term is a number of things that are counted, none of which anybody counts on from.
 
-      iex> for term <- [0, 7, -1, 900_000_000], do: Swarm.Message.WireTypes.count?(term)
+      iex> for term <- [0, 7, -1, 900_000_000], do: Swarm.Wire.count?(term)
       [true, true, false, false]
   """
   @spec count?(term()) :: boolean()
@@ -87,9 +87,9 @@ defmodule Swarm.Message.WireTypes do
   @doc """
   Whether a term is a number that counts up for ever: of a leadership, a heartbeat, an anchor, a
   request. Nothing counts as far as 2^64 by itself; that nobody is pushed there is the matter of
-  those who count on from what they hear (`Swarm.Message.CounterGuard`).
+  those who count on from what they hear (`Swarm.Wire.CounterGuard`).
 
-      iex> for term <- [0, 500_000_001, -1, 1.0, 18_446_744_073_709_551_616], do: Swarm.Message.WireTypes.counter?(term)
+      iex> for term <- [0, 500_000_001, -1, 1.0, 18_446_744_073_709_551_616], do: Swarm.Wire.counter?(term)
       [true, true, false, false, false]
   """
   @spec counter?(term()) :: boolean()
@@ -98,7 +98,7 @@ defmodule Swarm.Message.WireTypes do
   @doc """
   Whether a term is the number of a robot's life: the time of day at which it began, in ms.
 
-      iex> for term <- [1, 1_700_000_000_000, -1, 1.0e12], do: Swarm.Message.WireTypes.boot?(term)
+      iex> for term <- [1, 1_700_000_000_000, -1, 1.0e12], do: Swarm.Wire.boot?(term)
       [true, true, false, false]
   """
   @spec boot?(term()) :: boolean()
@@ -107,7 +107,7 @@ defmodule Swarm.Message.WireTypes do
   @doc """
   Whether a term is a waiting time in ms: up to a day.
 
-      iex> for term <- [0, 500, -1, 1.5, :infinity], do: Swarm.Message.WireTypes.ms?(term)
+      iex> for term <- [0, 500, -1, 1.5, :infinity], do: Swarm.Wire.ms?(term)
       [true, true, false, false, false]
   """
   @spec ms?(term()) :: boolean()
@@ -116,7 +116,7 @@ defmodule Swarm.Message.WireTypes do
   @doc """
   Whether a term is a pose as robots report it, `{x_mm, y_mm, mrad}`.
 
-      iex> for term <- [{1, 2, 3}, {1.0, 2, 3}, {1, 2}], do: Swarm.Message.WireTypes.pose?(term)
+      iex> for term <- [{1, 2, 3}, {1.0, 2, 3}, {1, 2}], do: Swarm.Wire.pose?(term)
       [true, false, false]
   """
   @spec pose?(term()) :: boolean()

@@ -1,8 +1,8 @@
-defmodule Swarm.Status.Report do
+defmodule Swarm.Commands.StatusReport do
   @moduledoc false
   # The status of robots (`Swarm.status`): from their answers, else from their rows.
   alias Swarm.{Blackboard, Commands, Status}
-  alias Swarm.Comms.Transport
+  alias Swarm.Transport
 
   # Robots known by way of others, heard of as recently as one that is not gone.
   @there_ms 2_000

@@ -1,4 +1,4 @@
-defmodule Swarm.Directory.RobotInfo do
+defmodule Swarm.Discovery.RobotInfo do
   @moduledoc """
   Describes a robot for those who search for one (`Swarm.find/1`): the row `{robot, :about}` of
   the blackboard, written by the robot's comms process once a second, and at once when its mission
@@ -20,7 +20,7 @@ defmodule Swarm.Directory.RobotInfo do
   alias Robot.{Board, Config}
   alias Robot.Safety.LivenessMonitor
   alias Swarm.{Blackboard, Status}
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
   alias Swarm.Message.Receiver
 
   # A comms process ticks ten times a second.
@@ -139,8 +139,8 @@ defmodule Swarm.Directory.RobotInfo do
   @doc """
   Adds to a robot of this node what only others know about it; its next row contains it.
 
-      Swarm.Directory.RobotInfo.say(:mag1, calibrated: false)
-      Swarm.Directory.RobotInfo.say(:mag1, services: [:gripper])
+      Swarm.Discovery.RobotInfo.say(:mag1, calibrated: false)
+      Swarm.Discovery.RobotInfo.say(:mag1, services: [:gripper])
   """
   @spec say(atom(), keyword()) :: :ok | {:error, line :: String.t()}
   def say(robot, facts) do
@@ -160,7 +160,7 @@ defmodule Swarm.Directory.RobotInfo do
   end
 
   defp sayable?({:calibrated, on?}), do: is_boolean(on?)
-  defp sayable?({:services, names}), do: WireTypes.names?(names)
+  defp sayable?({:services, names}), do: Wire.names?(names)
   defp sayable?(_other), do: false
 
   @doc "What is known about a robot, unless it is older than this in ms."
@@ -173,7 +173,7 @@ defmodule Swarm.Directory.RobotInfo do
   @doc """
   Reads a row, whatever it contains.
 
-      iex> Swarm.Directory.RobotInfo.read(:mag1, %{junk: 1}, 5)
+      iex> Swarm.Discovery.RobotInfo.read(:mag1, %{junk: 1}, 5)
       :error
   """
   @spec read(atom(), term(), non_neg_integer()) :: {:ok, t()} | :error
@@ -183,7 +183,7 @@ defmodule Swarm.Directory.RobotInfo do
          true <- Enum.all?([node, profile, state], &is_binary/1),
          true <- is_boolean(calibrated) and (battery == nil or is_number(battery)),
          true <-
-           (mission == nil or is_binary(mission)) and WireTypes.list?(services, &is_binary/1) do
+           (mission == nil or is_binary(mission)) and Wire.list?(services, &is_binary/1) do
       {:ok,
        %__MODULE__{
          robot: robot,

@@ -1,7 +1,7 @@
 defmodule Swarm.Commands.FreshnessTest do
   use Swarm.Case, async: false
   @moduletag :capture_log
-  alias Swarm.Commands.Freshness
+  alias Swarm.Order.Freshness
 
   defp say(id, role, request) do
     ref = :erlang.alias([:reply])

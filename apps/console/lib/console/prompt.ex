@@ -1,4 +1,4 @@
-defmodule Console.Terminal.Prompt do
+defmodule Console.Prompt do
   @moduledoc """
   Parses what people type while a fleet runs, against the fleet's names. Pure.
 
@@ -33,15 +33,15 @@ defmodule Console.Terminal.Prompt do
   @doc """
   A command, or one line that says what is allowed.
 
-      iex> Console.Terminal.Prompt.parse("kill leader", [:mag1])
+      iex> Console.Prompt.parse("kill leader", [:mag1])
       {:ok, {:kill, :leader}}
-      iex> Console.Terminal.Prompt.parse("goto mag1 1,2", [:mag1])
+      iex> Console.Prompt.parse("goto mag1 1,2", [:mag1])
       {:ok, {:tell, [:mag1], "goto:1.0:2.0"}}
-      iex> Console.Terminal.Prompt.parse("fromation wedge", [:mag1])
+      iex> Console.Prompt.parse("fromation wedge", [:mag1])
       {:error, ~s(unknown command "fromation"; did you mean formation?)}
-      iex> Console.Terminal.Prompt.parse("step 10", [:mag1])
+      iex> Console.Prompt.parse("step 10", [:mag1])
       {:ok, {:pace, {:step, 10}}}
-      iex> Console.Terminal.Prompt.parse("speed 1000", [:mag1])
+      iex> Console.Prompt.parse("speed 1000", [:mag1])
       {:error, ~s(speed cannot be "1000": a number from 0.1 to 100, or max, is allowed)}
   """
   @spec parse(String.t(), [atom()]) :: {:ok, parsed()} | {:error, String.t()}
@@ -62,9 +62,9 @@ defmodule Console.Terminal.Prompt do
   @doc """
   The words that may follow the given words.
 
-      iex> Console.Terminal.Prompt.completions(["kill"], [:mag1])
+      iex> Console.Prompt.completions(["kill"], [:mag1])
       ["leader", "mag1"]
-      iex> Console.Terminal.Prompt.completions(["goto", "mag1"], [:mag1])
+      iex> Console.Prompt.completions(["goto", "mag1"], [:mag1])
       []
   """
   @spec completions([String.t()], [atom()]) :: [String.t()]

@@ -1,4 +1,4 @@
-defmodule Console.Page.Options do
+defmodule Console.Options.Page do
   @moduledoc "Where a page is served: the options of the commands that have one. Pure."
   alias Console.Cli.Parse
   alias Console.Page.Access

@@ -1,4 +1,4 @@
-defmodule Sim.World.Palette do
+defmodule Sim.Compute.Palette do
   @moduledoc """
   The colours of simulated objects: their paint, the colour class they match, and the relation of
   their blobs to distance. Pure.
@@ -25,7 +25,7 @@ defmodule Sim.World.Palette do
   @doc """
   The colour of a kind of thing.
 
-      iex> Sim.World.Palette.of(:landmark).name
+      iex> Sim.Compute.Palette.of(:landmark).name
       "YellowLandmark"
   """
   @spec of(kind()) :: t()
@@ -54,7 +54,7 @@ defmodule Sim.World.Palette do
   @doc """
   The number of a kind in packed arguments, and the kind of a number.
 
-      iex> Sim.World.Palette.kind(Sim.World.Palette.index(:robot))
+      iex> Sim.Compute.Palette.kind(Sim.Compute.Palette.index(:robot))
       :robot
   """
   @spec index(kind()) :: byte()
@@ -74,7 +74,7 @@ defmodule Sim.World.Palette do
   @doc """
   All colours, for the blob finder.
 
-      iex> Enum.map(Sim.World.Palette.colours().classes, & &1.name)
+      iex> Enum.map(Sim.Compute.Palette.colours().classes, & &1.name)
       ["YellowLandmark", "RedRobot"]
   """
   @spec colours() :: Vision.Colours.t()
@@ -93,7 +93,7 @@ defmodule Sim.World.Palette do
   The distance, computed from the share of the picture that a blob fills; `nil` if it fills more
   than half.
 
-      iex> Sim.World.Palette.distance(:landmark, 0.6)
+      iex> Sim.Compute.Palette.distance(:landmark, 0.6)
       nil
   """
   @spec distance(kind(), float()) :: float() | nil

@@ -3,12 +3,12 @@ defmodule Swarm.Directory.RobotInfoTest do
   @moduletag :realtime
   @moduletag :capture_log
   alias Swarm.{Blackboard, Status}
-  alias Swarm.Directory.RobotInfo
-  alias Swarm.Directory.Presence
+  alias Swarm.Discovery.RobotInfo
+  alias Swarm.Discovery.Presence
 
-  doctest Swarm.Directory.RobotInfo
+  doctest Swarm.Discovery.RobotInfo
   doctest Swarm.Membership.Matrix
-  doctest Swarm.Directory.Search
+  doctest Swarm.Discovery.Search
 
   # A row as another node would send it.
   defp told(robot, key, value, age_ms \\ 0, sequence \\ 1) do

@@ -1,4 +1,4 @@
-defmodule Swarm.Commands.Freshness do
+defmodule Swarm.Order.Freshness do
   @moduledoc """
   Determines when an order was given, without a shared clock, and whether a robot should still
   obey it. Pure; times are `System.monotonic_time/1` of the robot's node, in microseconds.
@@ -12,7 +12,7 @@ defmodule Swarm.Commands.Freshness do
   An order needs two round trips within that half second: over a link whose round trip takes longer
   than some 220 ms robots can be stopped, and ordered nothing else.
 
-      iex> alias Swarm.Commands.Freshness
+      iex> alias Swarm.Order.Freshness
       iex> stamp = Freshness.stamp(7, 1_000_000)
       iex> {:ok, order} = Freshness.given(stamp, 80_000)
       iex> order
@@ -61,7 +61,7 @@ defmodule Swarm.Commands.Freshness do
   @doc """
   Whether a request needs a stamp. A stop is obeyed at any age, and questions are harmless.
 
-      iex> for request <- [:reset, :arm, :stop, :disarm], do: Swarm.Commands.Freshness.needed?(request)
+      iex> for request <- [:reset, :arm, :stop, :disarm], do: Swarm.Order.Freshness.needed?(request)
       [true, true, false, false]
   """
   @spec needed?(request :: term()) :: boolean()
@@ -78,7 +78,7 @@ defmodule Swarm.Commands.Freshness do
   needs no stamp. `stopped_us` is when the robot was last stopped, `nil` if never. `here?` says
   whether the order was given on this node; then it carries `{:asked, at_us}`.
 
-      iex> alias Swarm.Commands.Freshness
+      iex> alias Swarm.Order.Freshness
       iex> Freshness.judge(7, :start, {:asked, 1_000_000}, true, 1_200_000, 900_000)
       {:ok, 1_000_000}
       iex> Freshness.judge(7, :start, {:asked, 1_000_000}, false, 1_200_000, 900_000)

@@ -1,4 +1,4 @@
-defmodule Sim.Node.Config do
+defmodule Sim.Fleet.Nodes.Config do
   @moduledoc "The configuration of a fleet's node, encoded as one line of text and decoded. Pure."
 
   @enforce_keys [:node, :launcher, :mesh, :part]
@@ -18,10 +18,10 @@ defmodule Sim.Node.Config do
   @doc """
   Encodes a config as one line.
 
-      iex> config = %Sim.Node.Config{node: :a@b, launcher: self(), mesh: [], part: {Some.Part, %{}}}
-      iex> config |> Sim.Node.Config.line() |> Sim.Node.Config.read()
+      iex> config = %Sim.Fleet.Nodes.Config{node: :a@b, launcher: self(), mesh: [], part: {Some.Part, %{}}}
+      iex> config |> Sim.Fleet.Nodes.Config.line() |> Sim.Fleet.Nodes.Config.read()
       {:ok, config}
-      iex> Sim.Node.Config.read("junk")
+      iex> Sim.Fleet.Nodes.Config.read("junk")
       {:error, "only a fleet of nodes starts this process, and it sends the configuration"}
   """
   @spec line(t()) :: String.t()

@@ -1,4 +1,4 @@
-defmodule Swarm.Comms.Transport do
+defmodule Swarm.Transport do
   @moduledoc """
   Delivers a robot's messages to others: directly to the comms processes of robots on this node,
   and by the mesh's datagrams to those on other nodes. A node without a mesh reaches nodes that

@@ -1,4 +1,4 @@
-defmodule Swarm.Message.CounterGuard do
+defmodule Swarm.Wire.CounterGuard do
   @moduledoc """
   Bounds how far others may raise a number that everybody counts up, such as that of a leadership.
   Whoever adopts any number that it hears is at the mercy of the first wrong one: it counts on
@@ -38,7 +38,7 @@ defmodule Swarm.Message.CounterGuard do
   The highest number that is admitted now. `known` is the highest that the caller knows itself,
   0 if it relies on what this guard has admitted.
 
-      iex> alias Swarm.Message.CounterGuard
+      iex> alias Swarm.Wire.CounterGuard
       iex> CounterGuard.limit(%CounterGuard{}, 7, 0)
       1_000_007
   """
@@ -51,7 +51,7 @@ defmodule Swarm.Message.CounterGuard do
   @doc """
   Admits a number from outside, or returns the highest that is allowed.
 
-      iex> alias Swarm.Message.CounterGuard
+      iex> alias Swarm.Wire.CounterGuard
       iex> {:ok, guard} = CounterGuard.admit(%CounterGuard{}, 1_000_000, 0, 0)
       iex> CounterGuard.admit(guard, 1_000_001, 0, 999)
       {:error, 1_000_000}
@@ -72,7 +72,7 @@ defmodule Swarm.Message.CounterGuard do
   @doc """
   A refused number is heard, or heard again: the limit approaches it by one step a second.
 
-      iex> alias Swarm.Message.CounterGuard
+      iex> alias Swarm.Wire.CounterGuard
       iex> guard = CounterGuard.approach(%CounterGuard{}, 2_500_000, 0, 0)
       iex> guard = CounterGuard.approach(guard, 2_500_000, 0, 1_000)
       iex> CounterGuard.limit(guard, 0, 2_000)
@@ -85,7 +85,7 @@ defmodule Swarm.Message.CounterGuard do
   @doc """
   Trusts a number, however high, so that those up to a step above it are admitted.
 
-      iex> alias Swarm.Message.CounterGuard
+      iex> alias Swarm.Wire.CounterGuard
       iex> CounterGuard.limit(CounterGuard.trust(%CounterGuard{}, 5_000_000_000), 0, 0)
       5_001_000_000
   """

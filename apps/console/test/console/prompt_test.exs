@@ -1,6 +1,7 @@
-defmodule Console.Terminal.PromptTest do
+defmodule Console.PromptTest do
   use ExUnit.Case, async: true
-  alias Console.Terminal.{Editor, Prompt}
+  alias Console.Prompt
+  alias Console.Terminal.Editor
 
   @robots [:mag1, :mag2, :min1]
 

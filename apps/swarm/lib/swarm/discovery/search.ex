@@ -1,9 +1,9 @@
-defmodule Swarm.Directory.Search do
+defmodule Swarm.Discovery.Search do
   @moduledoc false
-  # Finds the robots that match (`Swarm.find/1`): templates over `Swarm.Directory.RobotInfo`.
+  # Finds the robots that match (`Swarm.find/1`): templates over `Swarm.Discovery.RobotInfo`.
   alias Hal.Options.Suggest
-  alias Swarm.Comms.Transport
-  alias Swarm.Directory.RobotInfo
+  alias Swarm.Transport
+  alias Swarm.Discovery.RobotInfo
 
   @max_age_ms 10_000
   @keys [:robot, :node, :profile, :battery, :calibrated, :mission, :state, :service, :max_age_ms]
@@ -26,10 +26,10 @@ defmodule Swarm.Directory.Search do
   @doc """
   Whether a robot matches.
 
-      iex> about = %Swarm.Directory.RobotInfo{robot: :mag1, profile: :magellan, battery: 12.1, services: [:camera]}
-      iex> Swarm.Directory.Search.like?({:ok, about}, service: :camera, battery: {11.5, 14})
+      iex> about = %Swarm.Discovery.RobotInfo{robot: :mag1, profile: :magellan, battery: 12.1, services: [:camera]}
+      iex> Swarm.Discovery.Search.like?({:ok, about}, service: :camera, battery: {11.5, 14})
       true
-      iex> Swarm.Directory.Search.like?({:ok, about}, battery: &(&1 > 13))
+      iex> Swarm.Discovery.Search.like?({:ok, about}, battery: &(&1 > 13))
       false
   """
   @spec like?({:ok, RobotInfo.t()} | :error, keyword()) :: boolean()

@@ -1,4 +1,4 @@
-defmodule Robot.Control.Trace do
+defmodule Robot.Trace do
   @moduledoc """
   Records the inputs and effects of a robot's processes, so that the same inputs can be fed to the
   pure functions behind them, and the outputs compared (`Robot.Replay`).

@@ -1,4 +1,4 @@
-defmodule Robot.Safety.Reflex.Fence do
+defmodule Robot.Fence do
   @moduledoc """
   A fence that a robot must not cross, as a function: real robots that run together with simulated
   ones follow leaders that do not know the real walls. Pure.
@@ -34,12 +34,12 @@ defmodule Robot.Safety.Reflex.Fence do
   A fence: two opposite corners of a rectangle, `{{x, y}, {x, y}}`, or a list of 3 to 64 corners
   of a polygon, in order, whichever way round; its sides may not cross.
 
-      iex> {:ok, fence} = Robot.Safety.Reflex.Fence.new({{-1, -1}, {3, 2}})
+      iex> {:ok, fence} = Robot.Fence.new({{-1, -1}, {3, 2}})
       iex> fence.corners
       [{-1.0, -1.0}, {3.0, -1.0}, {3.0, 2.0}, {-1.0, 2.0}]
-      iex> Robot.Safety.Reflex.Fence.new([{0, 0}, {1, 1}])
+      iex> Robot.Fence.new([{0, 0}, {1, 1}])
       {:error, "a polygon of 3 to 64 corners, or two corners {{x, y}, {x, y}} of a rectangle"}
-      iex> Robot.Safety.Reflex.Fence.new([{0, 0}, {2, 2}, {2, 0}, {0, 2}])
+      iex> Robot.Fence.new([{0, 0}, {2, 2}, {2, 0}, {0, 2}])
       {:error, "a polygon whose sides do not cross each other"}
   """
   @spec new(term()) :: {:ok, t()} | {:error, allowed :: String.t()}
@@ -81,8 +81,8 @@ defmodule Robot.Safety.Reflex.Fence do
   @doc """
   How far inside a place is (metres); negative outside.
 
-      iex> {:ok, fence} = Robot.Safety.Reflex.Fence.new({{-1, -1}, {3, 2}})
-      iex> for place <- [{0, 0}, {2.9, 0.0}, {4, 0}], do: Float.round(Robot.Safety.Reflex.Fence.clearance(fence, place), 3)
+      iex> {:ok, fence} = Robot.Fence.new({{-1, -1}, {3, 2}})
+      iex> for place <- [{0, 0}, {2.9, 0.0}, {4, 0}], do: Float.round(Robot.Fence.clearance(fence, place), 3)
       [1.0, 0.1, -1.0]
   """
   @spec clearance(t(), {number(), number()}) :: float()
@@ -97,18 +97,18 @@ defmodule Robot.Safety.Reflex.Fence do
   `turns` are the turn rates (rad/s) that it has and may have on the way; `age_s` is the age of
   the pose.
 
-      iex> {:ok, fence} = Robot.Safety.Reflex.Fence.new({{-1, -1}, {3, 2}})
+      iex> {:ok, fence} = Robot.Fence.new({{-1, -1}, {3, 2}})
       iex> profile = Hal.Profile.magellan()
-      iex> Robot.Safety.Reflex.Fence.free_speed(fence, profile, Hal.Pose.new(0, 0), 0.5, [0.0], 0.0)
+      iex> Robot.Fence.free_speed(fence, profile, Hal.Pose.new(0, 0), 0.5, [0.0], 0.0)
       0.5
-      iex> slow = Robot.Safety.Reflex.Fence.free_speed(fence, profile, Hal.Pose.new(2.6, 0), 0.5, [0.0], 0.0)
+      iex> slow = Robot.Fence.free_speed(fence, profile, Hal.Pose.new(2.6, 0), 0.5, [0.0], 0.0)
       iex> slow > 0.2 and slow < 0.4
       true
-      iex> Robot.Safety.Reflex.Fence.free_speed(fence, profile, Hal.Pose.new(2.75, 0), 0.5, [0.0], 0.0)
+      iex> Robot.Fence.free_speed(fence, profile, Hal.Pose.new(2.75, 0), 0.5, [0.0], 0.0)
       0.0
-      iex> Robot.Safety.Reflex.Fence.free_speed(fence, profile, Hal.Pose.new(2.75, 0), -0.5, [0.0], 0.0)
+      iex> Robot.Fence.free_speed(fence, profile, Hal.Pose.new(2.75, 0), -0.5, [0.0], 0.0)
       0.5
-      iex> Robot.Safety.Reflex.Fence.free_speed(fence, profile, Hal.Pose.new(3.5, 0), -0.5, [0.0], 0.0)
+      iex> Robot.Fence.free_speed(fence, profile, Hal.Pose.new(3.5, 0), -0.5, [0.0], 0.0)
       0.2
   """
   @spec free_speed(t(), Profile.t(), Pose.t(), float(), [float()], age_s :: float()) :: float()

@@ -1,4 +1,4 @@
-defmodule Swarm.Commands.Order do
+defmodule Swarm.Order do
   @moduledoc """
   Checks the orders that a person may give to a robot: at the sender, and again at the robot.
   Pure.
@@ -6,7 +6,7 @@ defmodule Swarm.Commands.Order do
   alias Hal.Pose
   alias Robot.Command
   alias Swarm.Formation
-  alias Swarm.Message.WireTypes
+  alias Swarm.Wire
 
   # Farther than any floor, and faster than any robot: larger numbers are typing errors.
   @farthest 10_000
@@ -28,13 +28,13 @@ defmodule Swarm.Commands.Order do
   Checks that the numbers of a person's command make sense; the error is one line that names the
   one that does not.
 
-      iex> Swarm.Commands.Order.check({:goto, 1, 2.0, nil})
+      iex> Swarm.Order.check({:goto, 1, 2.0, nil})
       {:ok, {:goto, 1.0, 2.0, nil}}
-      iex> Swarm.Commands.Order.check({:goto, :far, 2.0, nil})
+      iex> Swarm.Order.check({:goto, :far, 2.0, nil})
       {:error, "goto cannot take :far: a number from -10000 to 10000 is allowed"}
-      iex> Swarm.Commands.Order.check({:move, 99, 0})
+      iex> Swarm.Order.check({:move, 99, 0})
       {:error, "move cannot take 99: a number from -10 to 10 is allowed"}
-      iex> Swarm.Commands.Order.check({:move, 0.5, 0, -1})
+      iex> Swarm.Order.check({:move, 0.5, 0, -1})
       {:error, "move cannot take -1 seconds: a number from 0 to 600 is allowed"}
   """
   @spec check(term()) :: {:ok, t()} | {:error, line :: String.t()}
@@ -87,7 +87,7 @@ defmodule Swarm.Commands.Order do
   end
 
   defp known?(word) when word in [:stop, :lead, :start, :ping, :wander, :rest], do: true
-  defp known?({:follow_the_leader, robot}), do: WireTypes.name?(robot)
+  defp known?({:follow_the_leader, robot}), do: Wire.name?(robot)
   defp known?({:find_blob, colour}), do: colour == nil or is_binary(colour)
   defp known?({:formation, kind, spacing}), do: Formation.valid?({kind, spacing})
   defp known?({:start, options}), do: Keyword.keyword?(options)
@@ -123,11 +123,11 @@ defmodule Swarm.Commands.Order do
   Whether a robot may follow another: not itself, and none that follows it, directly or through
   others. `leaders` says whom each robot follows.
 
-      iex> Swarm.Commands.Order.follow(:min1, :mag1, %{mag1: nil})
+      iex> Swarm.Order.follow(:min1, :mag1, %{mag1: nil})
       :ok
-      iex> Swarm.Commands.Order.follow(:mag1, :mag1, %{})
+      iex> Swarm.Order.follow(:mag1, :mag1, %{})
       {:error, "mag1 cannot follow itself"}
-      iex> Swarm.Commands.Order.follow(:min1, :mag1, %{mag1: :mag2, mag2: :min1})
+      iex> Swarm.Order.follow(:min1, :mag1, %{mag1: :mag2, mag2: :min1})
       {:error, "min1 cannot follow mag1, who follows min1 (mag1 -> mag2 -> min1)"}
   """
   @spec follow(atom(), atom(), %{atom() => atom() | nil}) :: :ok | {:error, String.t()}
@@ -148,4 +148,9 @@ defmodule Swarm.Commands.Order do
       next -> if next in seen, do: Enum.reverse(seen), else: chain([next | seen], leaders)
     end
   end
+
+  @doc "The answer of a robot to a formation if its mission has none."
+  @spec shapeless(atom()) :: {:error, line :: String.t()}
+  def shapeless(id),
+    do: {:error, "#{id} is not on a mission that has a formation; start it first"}
 end

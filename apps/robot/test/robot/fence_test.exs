@@ -3,9 +3,9 @@ defmodule Robot.Safety.FenceTest do
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.{Body, Config}
   alias Robot.Safety.Reflex
-  alias Robot.Safety.Reflex.Fence
+  alias Robot.Fence
   @moduletag :slow
-  doctest Robot.Safety.Reflex.Fence
+  doctest Robot.Fence
 
   @step_s 0.05
 

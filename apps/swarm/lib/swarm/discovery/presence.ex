@@ -1,4 +1,4 @@
-defmodule Swarm.Directory.Presence do
+defmodule Swarm.Discovery.Presence do
   @moduledoc """
   Notifies subscribers when robots join or leave (`Swarm.subscribe/0`).
 
@@ -12,7 +12,7 @@ defmodule Swarm.Directory.Presence do
   alias Hal.{HardenedServer, Ticker}
   alias Mesh.Nonblocking
   alias Swarm.Directory
-  alias Swarm.Directory.RobotInfo
+  alias Swarm.Discovery.RobotInfo
 
   @look_ms 100
   # A killed robot's last heartbeat counts for 2 s.

@@ -1,0 +1,55 @@
+defmodule System.LayersTest do
+  @moduledoc "Inside an app, rooms call only those that docs/architecture.md names before them."
+  use ExUnit.Case, async: true
+  @root Path.expand("..", __DIR__)
+
+  # `| hal | a, b, c |` of the table, rooms by the names of their folders or files.
+  defp layers do
+    [_before, section] =
+      @root
+      |> Path.join("docs/architecture.md")
+      |> File.read!()
+      |> String.split("### Rooms", parts: 2)
+
+    [section | _after] = String.split(section, "\n## ", parts: 2)
+
+    for [_row, app, rooms] <- Regex.scan(~r/^\| `(\w+)` \| (.*) \|$/m, section),
+        do: {app, for([_all, room] <- Regex.scan(~r/`(\w+)`/, rooms), do: room)}
+  end
+
+  defp room(app, module) do
+    source = to_string(module.module_info(:compile)[:source])
+
+    with [_all, rest] <- Regex.run(~r"/apps/#{app}/lib/#{app}/(.+)\.ex$", source),
+         do: rest |> String.split("/") |> hd()
+  end
+
+  # Who is called at run time: a struct or a type that is only named ties nobody down.
+  defp calls(module) do
+    {^module, beam, _path} = :code.get_object_code(module)
+    {:ok, {^module, [imports: imports]}} = :beam_lib.chunks(beam, [:imports])
+    for {called, _f, _a} <- imports, uniq: true, do: called
+  end
+
+  test "each room calls those before it" do
+    layers = layers()
+    assert length(layers) >= 5
+
+    for {app, rooms} <- layers do
+      {:ok, modules} = :application.get_key(String.to_existing_atom(app), :modules)
+      place = rooms |> Enum.with_index() |> Map.new()
+      homes = for module <- modules, home = room(app, module), into: %{}, do: {module, home}
+
+      assert {app, Enum.sort(Enum.uniq(Map.values(homes))) -- rooms} == {app, []}
+
+      wrong =
+        for {module, home} <- homes,
+            called <- calls(module),
+            other = homes[called],
+            place[other] > place[home],
+            do: {module, called}
+
+      assert {app, Enum.sort(wrong)} == {app, []}
+    end
+  end
+end
