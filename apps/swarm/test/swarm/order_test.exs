@@ -1,4 +1,4 @@
-defmodule Swarm.Commands.OrderTest do
+defmodule Swarm.OrderTest do
   use ExUnit.Case, async: true
   alias Robot.Command
   alias Swarm.Order

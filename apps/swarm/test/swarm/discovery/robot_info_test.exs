@@ -1,4 +1,4 @@
-defmodule Swarm.Directory.RobotInfoTest do
+defmodule Swarm.Discovery.RobotInfoTest do
   use Swarm.Case, async: false
   @moduletag :realtime
   @moduletag :capture_log

@@ -1,4 +1,4 @@
-defmodule Swarm.Commands.FreshnessTest do
+defmodule Swarm.Order.FreshnessTest do
   use Swarm.Case, async: false
   @moduletag :capture_log
   alias Swarm.Order.Freshness

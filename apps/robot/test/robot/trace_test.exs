@@ -1,4 +1,4 @@
-defmodule Robot.Control.TraceTest do
+defmodule Robot.TraceTest do
   @moduledoc "What the processes do is what the functions say: recorded inputs, fed to both."
   use Robot.Case, async: false
   alias Hal.{Odometry, Pose}
