@@ -132,6 +132,7 @@ defmodule System.NetnsCardsTest do
     stop(two, one)
   end
 
+  @tag long: true, realtime: :long
   test "cards that come and go are followed, and a network that is gone is told once", %{
     net: net,
     folder: folder
@@ -183,6 +184,7 @@ defmodule System.NetnsCardsTest do
     assert lines(log, "no network") == lines.()
   end
 
+  @tag long: true, realtime: :long
   test "a cable that is pulled is told by the name of its card", %{net: net} do
     [one] = nodes(net, [:mag1])
     Net.ip(net, :switch, ~w(link set p1 down))
@@ -197,6 +199,7 @@ defmodule System.NetnsCardsTest do
     assert eventually(fn -> fault(one) end) == "no network card is up and has an IPv4 address"
   end
 
+  @tag long: true, realtime: :long
   test "what nobody can be sent is told where multicast is off", %{net: net} do
     [one] = nodes(net, [:mag1], multicast: false, peers: ["192.168.77.7:4370"])
     assert eventually(fn -> fault(one) end) == "nothing can be sent: network is unreachable"
@@ -229,6 +232,7 @@ defmodule System.NetnsCardsTest do
     eventually(fn -> match?(%{elsewhere: 1}, Vm.call(one, Mesh, :refused, [])) end)
   end
 
+  @tag long: true, realtime: :long
   test "an interface that is absent is waited for, in words", %{net: net} do
     [two] = nodes(net, [:mag2])
 

@@ -67,6 +67,7 @@ defmodule System.NetnsStrangersTest do
   end
 
   @tag :tls
+  @tag long: true, realtime: :long
   test "with TLS a stranger is refused before the handshake of TLS, and fellows are not",
        context do
     knock(context, @some)

@@ -181,6 +181,7 @@ defmodule System.NetnsTest do
     )
   end
 
+  @tag long: true, realtime: :long
   test "one link is cut for good: nothing changes, and commands go by way of others", %{
     fleet: fleet
   } do
@@ -220,6 +221,7 @@ defmodule System.NetnsTest do
     lawful(fleet, "one link cut", begun, [])
   end
 
+  @tag long: true, realtime: :long
   test "with 20 % of all packets lost they form, and stay one", %{fleet: fleet} do
     begun = start(fleet)
     lossy = Fleet.cut(fleet, [@all], &Net.lose(&1, 0.2))
@@ -236,6 +238,7 @@ defmodule System.NetnsTest do
     lawful(fleet, "20 % loss", begun, start_led: led, start_formed: formed)
   end
 
+  @tag long: true, realtime: :long
   test "a robot that gets another address goes on where it is, and is commanded there", %{
     fleet: fleet
   } do
@@ -313,6 +316,7 @@ defmodule System.NetnsTest do
     end)
   end
 
+  @tag long: true, realtime: :long
   test "under the policy of a majority only the larger part leads itself", %{fleet: fleet} do
     begun = start(fleet, policy: :majority)
     formed(fleet, begun)
