@@ -67,7 +67,8 @@ defmodule Missions.Flock do
 
   @typedoc """
   `plan` is the course in 28 bits, so that only robots with the same one are a flock; `leg` is how far it has come,
-  `done_ms` since when this leg seems done; `middle` that of the members, `near` the number of its neighbours.
+  `done_ms` since when this leg seems done; `pace` is the share of the speed with which the flock goes on, `middle` that of
+  the members, `near` the number of the robot's neighbours, `velocity` what it drives with.
   """
   @type t :: %__MODULE__{
           me: atom(),
@@ -82,10 +83,12 @@ defmodule Missions.Flock do
           heard: Members.t(),
           looked_ms: integer() | nil,
           together?: boolean(),
+          pace: float(),
           told_ms: integer() | nil,
           told: non_neg_integer() | nil,
           middle: Pose.point() | nil,
           near: non_neg_integer(),
+          velocity: Field.vector() | nil,
           started?: boolean()
         }
 

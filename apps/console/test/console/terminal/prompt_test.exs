@@ -56,7 +56,10 @@ defmodule Console.Terminal.PromptTest do
 
   test "errors name what is wrong and what is allowed" do
     assert error("kil leader") =~ "did you mean kill?"
-    assert error("start patorl") =~ "one of landmark, patrol, flock is allowed; did you mean patrol?"
+
+    assert error("start patorl") =~
+             "one of landmark, patrol, flock is allowed; did you mean patrol?"
+
     assert error("start mga2") =~ "did you mean mag2?"
     assert error("start patrol:perod=9") =~ "did you mean period?"
     assert error("start mag2 patorl") =~ "did you mean patrol?"
