@@ -4,7 +4,7 @@ defmodule Missions.Flock do
   (Olfati-Saber 2006). Pure; written with the interface of `Robot.Mission` alone.
 
   Each tick a robot takes its acceleration from its neighbours, from the echoes of its sonars that no robot explains, and
-  from the present point of the course (`Missions.Flock.Field`), and drives with the velocity that it makes of its own
+  from the present point of the course (`Missions.Flock.Field`), makes its velocity of it (`.Motion`), and drives with that
   (`Robot.Behaviour.Velocity`).
 
   How far the flock has come is a number, its leg: 0 until all members that a robot hears hang together
@@ -15,24 +15,14 @@ defmodule Missions.Flock do
   hangs together. Options: `Missions.Flock.Options`.
   """
   alias Hal.Pose
-  alias Missions.Flock.{Field, Members, Options}
+  alias Missions.Flock.{Field, Members, Motion, Options}
   alias Robot.Behaviour
-  alias Robot.Behaviour.Avoid.Neighbours
 
   @behaviour Robot.Mission
 
   @tell_ms 1_000
-  # Seconds of a tick.
-  @tick_s 0.1
-  # A robot integrates its velocity, and takes so much of what its wheels measure, so that what stops them counts.
-  @measured 0.1
   # The share of its speed with which it is drawn to the middle of the flock from its rim.
   @cohere 0.25
-  # Metres at which echoes count, and how many of the nearest.
-  @obstacle_range 1.0
-  @echoes 3
-  # How far (metres) from where it tells a robot may seem to be, if this one knew its own place exactly.
-  @told_off 0.2
   # The flock is at a point when its middle is so near (metres), and hangs together or not is asked so often.
   @there 0.5
   @look_ms 500
@@ -43,7 +33,7 @@ defmodule Missions.Flock do
   # A leg is done when it has been for so long; the robots that come later in the order of names wait for the first.
   @done_ms 2_000
   @later_ms 2_000
-  # Of members that have not been heard yet, nothing is known before.
+  # Who has just begun has not heard all members yet.
   @first_ms 5_000
 
   @enforce_keys [:me, :spacing, :speed, :course, :plan]
@@ -67,7 +57,8 @@ defmodule Missions.Flock do
 
   @typedoc """
   `plan` is the course in 28 bits, so that only robots with the same one are a flock; `leg` is how far it has come,
-  `done_ms` since when this leg seems done; `middle` that of the members, `near` the number of its neighbours.
+  `done_ms` since when this leg seems done; `pace` is the share of the speed with which the flock goes on, `middle` that of
+  the members, `near` the number of the robot's neighbours, `velocity` what it drives with.
   """
   @type t :: %__MODULE__{
           me: atom(),
@@ -82,10 +73,12 @@ defmodule Missions.Flock do
           heard: Members.t(),
           looked_ms: integer() | nil,
           together?: boolean(),
+          pace: float(),
           told_ms: integer() | nil,
           told: non_neg_integer() | nil,
           middle: Pose.point() | nil,
           near: non_neg_integer(),
+          velocity: Field.vector() | nil,
           started?: boolean()
         }
 
@@ -249,76 +242,27 @@ defmodule Missions.Flock do
        else: {mission, []}
   end
 
-  defp velocity(mission, agents, %{pose: pose} = percept) do
-    at = Pose.point(pose)
-    own = mix(mission.velocity, own_velocity(percept))
+  defp velocity(mission, agents, percept) do
+    at = Pose.point(percept.pose)
     reach = Field.reach(mission.spacing)
     near = Enum.filter(agents, &(Pose.distance(at, &1.at) < reach))
-
-    forces = [
-      Field.neighbours(at, own, near, mission.spacing),
-      Field.obstacles(at, own, echoes(percept), @obstacle_range),
-      guide(mission, at, own)
-    ]
-
-    {ux, uy} = Enum.reduce(forces, fn {ax, ay}, {bx, by} -> {ax + bx, ay + by} end)
-    {vx, vy} = own
-    velocity = clip({vx + @tick_s * ux, vy + @tick_s * uy}, mission.speed)
+    rules = %{spacing: mission.spacing, top: mission.speed, guide: guide(mission, at)}
+    velocity = Motion.velocity(mission.velocity, percept, near, rules)
     {velocity, %{mission | near: length(near), velocity: velocity}}
   end
 
-  # To the first point, each by itself; then all about the middle of the flock, which goes to the point.
-  defp guide(%{leg: 0} = mission, at, own),
-    do: Field.guide(at, own, {point(mission) || at, {0.0, 0.0}}, mission.speed, radius(mission))
+  # Each by itself to the first point; then all about the middle of the flock, which goes to the next.
+  defp guide(%{leg: 0} = mission, at),
+    do: {point(mission) || at, {0.0, 0.0}, mission.speed, radius(mission)}
 
-  defp guide(mission, at, own) do
-    velocity =
-      Field.toward(
-        mission.middle,
-        point(mission) || mission.middle,
-        mission.pace * mission.speed,
-        @slow
-      )
+  defp guide(%{middle: middle} = mission, _at) do
+    velocity = Field.toward(middle, point(mission) || middle, mission.pace * mission.speed, @slow)
 
-    speed = @cohere * mission.speed
-    Field.guide(at, own, {mission.middle, velocity}, speed, radius(mission))
+    {middle, velocity, @cohere * mission.speed, radius(mission)}
   end
 
   # About that of the flock, in metres.
   defp radius(mission), do: 0.6 * mission.spacing * :math.sqrt(map_size(mission.heard) + 1)
-
-  defp mix(nil, own), do: own
-
-  defp mix({ax, ay}, {bx, by}) do
-    {(1 - @measured) * ax + @measured * bx, (1 - @measured) * ay + @measured * by}
-  end
-
-  defp own_velocity(%{odometry: %{twist: twist}, pose: pose}),
-    do: {twist.linear * :math.cos(pose.heading), twist.linear * :math.sin(pose.heading)}
-
-  defp own_velocity(_percept), do: {0.0, 0.0}
-
-  # An echo that may be another robot, which is not quite where it tells, is no obstacle: members keep their spacing by what they
-  # tell, and `Robot.Behaviour.Avoid` looks at all echoes.
-  defp echoes(percept) do
-    off = @told_off + unsure(percept)
-    bodies = for {_id, peer} <- percept.peers, do: {peer.pose.x, peer.pose.y, peer.radius + off}
-
-    percept
-    |> Neighbours.unknown(bodies)
-    |> Enum.filter(&(&1.gap < @obstacle_range))
-    |> Enum.sort_by(& &1.gap)
-    |> Enum.take(@echoes)
-    |> Enum.map(& &1.at)
-  end
-
-  defp unsure(%{uncertainty: %{radius: radius}}), do: min(radius, 1.0)
-  defp unsure(_percept), do: 0.0
-
-  defp clip({x, y} = velocity, most) do
-    size = :math.sqrt(x * x + y * y)
-    if size > most, do: {x * most / size, y * most / size}, else: velocity
-  end
 
   defp claim(mission) do
     %{

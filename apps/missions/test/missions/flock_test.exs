@@ -140,6 +140,28 @@ defmodule Missions.FlockTest do
     end
   end
 
+  test "it keeps off what its sonars see, but not off a member that is a little beside where it tells" do
+    options = [course: [{5, 0}]]
+    {runner, _effects} = tick(flock(options), 0)
+    runner = hear(runner, :mag2, letter(options))
+
+    ahead = fn range, peers ->
+      sonar = List.replace_at(List.duplicate(5.1, 16), 11, range)
+      profile = Profile.magellan()
+      odometry = %Odometry{pose: Pose.new(0, 0), twist: Twist.zero()}
+      percept = %Percept{robot: :mag1, at_ms: 100, profile: profile, pose: Pose.new(0, 0)}
+      percept = %{percept | odometry: odometry, sonar: sonar, peers: peers}
+      {_runner, effects} = Runner.handle(runner, {:tick, percept})
+      effects |> velocity() |> elem(0)
+    end
+
+    assert ahead.(0.5, %{}) < 0 and ahead.(5.1, %{}) > 0
+    told = %{mag2: peer(1.2, 0.0, 100)}
+    # Its body begins at 1.0 m: an echo that is 0.25 m nearer is still its.
+    assert ahead.(0.55, told) == ahead.(5.1, told)
+    assert ahead.(0.3, told) < ahead.(5.1, told)
+  end
+
   test "it waits while the flock does not hang together, and says so" do
     options = [course: [{0, 0}, {9, 0}]]
     told = letter(options, leg: 2)
