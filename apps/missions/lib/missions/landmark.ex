@@ -107,6 +107,7 @@ defmodule Missions.Landmark do
         trail: if(percept.pose, do: Trail.note(mission.trail, percept.pose), else: mission.trail)
     }
 
+    mission = Landmark.State.note_beats(mission)
     mission = mission |> EpochFilter.update() |> Policy.update() |> ReferenceInbox.beats()
     {mission, letters} = Rounds.tick(mission)
     {mission, stages} = step(mission)

@@ -5,6 +5,7 @@ defmodule Missions.Landmark.State do
   """
   alias Hal.{Pose, Twist}
   alias Missions.Landmark.{EpochFilter, LandmarkTrack}
+  alias Swarm.Membership.{Heartbeat, Peers}
 
   @colour "YellowLandmark"
   @sight_ms 700
@@ -15,6 +16,7 @@ defmodule Missions.Landmark.State do
                 asked_no: 0,
                 colour: @colour,
                 percept: nil,
+                beats: nil,
                 now_ms: 0,
                 phase: :idle,
                 since_ms: 0,
@@ -51,7 +53,7 @@ defmodule Missions.Landmark.State do
               ]
 
   @typedoc """
-  `asked_no` counts the shapes that people asked for, so that an older anchor does not undo the
+  `beats` are those of `beats/1` with what they were made of. `asked_no` counts the shapes that people asked for, so that an older anchor does not undo the
   newest. `since_ms` is when the phase began, `scan` how the last turn ended, `rescan?` whether
   the next round needs a new one, `tries` how many searches found nothing, `verdict` the result of
   the last round until a phase has acted on it, `order` the followers by slot. `epoch` and
@@ -73,6 +75,7 @@ defmodule Missions.Landmark.State do
           leader_change?: boolean(),
           colour: String.t(),
           percept: Robot.Percept.t() | nil,
+          beats: {peers :: map(), now_ms :: integer(), %{atom() => Heartbeat.t()}} | nil,
           now_ms: integer(),
           phase: Missions.Landmark.Transitions.phase(),
           since_ms: integer(),
@@ -114,6 +117,16 @@ defmodule Missions.Landmark.State do
   @doc "The default colour of the landmark."
   @spec colour() :: String.t()
   def colour, do: @colour
+
+  @doc "Keeps what `beats/1` returns, which is asked for many times a tick."
+  @spec note_beats(t()) :: t()
+  def note_beats(%{percept: %{peers: peers}, now_ms: now} = mission),
+    do: %{mission | beats: {peers, now, beats(mission)}}
+
+  @doc "The newest heartbeats of all others that are not gone, by name."
+  @spec beats(t()) :: %{atom() => Heartbeat.t()}
+  def beats(%{beats: {peers, now, beats}, percept: %{peers: peers}, now_ms: now}), do: beats
+  def beats(mission), do: Peers.taking_part(mission.percept.peers, mission.now_ms)
 
   @doc "Whether the landmark is in this robot's picture."
   @spec sees?(t()) :: boolean()

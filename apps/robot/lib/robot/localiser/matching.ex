@@ -8,7 +8,7 @@ defmodule Robot.Localiser.Matching do
   direction is less certain (`slack`).
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Anchors, Belief}
+  alias Robot.Localiser.{Anchors, Belief, Glance}
   alias Robot.Percept.Sighting
   alias Vision.Blob
 
@@ -49,9 +49,13 @@ defmodule Robot.Localiser.Matching do
           [pair()]
   def pairs(robots, blobs, belief, exposed, pan, view) do
     looks = for blob <- blobs, do: {blob.colour, blob, Sighting.bearing(blob, pan, view)}
+    glance = Glance.new(belief, exposed, pan, view)
+    widest = Enum.reduce(blobs, 0.0, &max((&1.right - &1.left + 1) / &1.width, &2))
+    broad = widest * :math.tan(view / 2)
 
     candidates =
       for mark <- robots,
+          near?(mark, glance, broad),
           alike = Enum.filter(looks, &(elem(&1, 0) == mark.colour)),
           [{_colour, %{width: picture}, _seen} | _] <- [alike],
           expected = expected(mark, belief, exposed, {picture, view}),
@@ -79,6 +83,20 @@ defmodule Robot.Localiser.Matching do
 
   # Whether a blob touches the left or right border; it may be cut off above and below.
   defp cut?(blob), do: blob.left == 0 or blob.right == blob.width - 1
+
+  # Whether it can be a blob. However wide a blob is, its slack is no more than half of that width, or of the robot's.
+  defp near?(%{at: at, radius: radius} = mark, glance, broad) do
+    aside = Glance.aside(glance, at)
+
+    aside < @narrow or
+      (
+        distance = Pose.distance(glance.pose, at)
+        half = if distance > radius, do: :math.asin(radius / distance), else: :math.pi()
+        slack = if half > broad, do: half, else: broad
+        off = aside - slack
+        off < @narrow or off < 3 * (Glance.most_sd(glance, mark, distance) + @bearing_sd)
+      )
+  end
 
   # How a robot should look from there, for all blobs; `nil` for one that cannot be seen from within.
   defp expected(mark, belief, exposed, camera) do

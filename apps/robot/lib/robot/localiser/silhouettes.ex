@@ -11,8 +11,9 @@ defmodule Robot.Localiser.Silhouettes do
   wrong and no place elsewhere is nearly as good.
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Anchors, Belief, Columns}
+  alias Robot.Localiser.{Anchors, Belief, Columns, Glance}
   alias Robot.Percept
+  alias Robot.Percept.Sighting
 
   # With a standard deviation below this (metres) no search is needed.
   @sure 0.2
@@ -58,7 +59,17 @@ defmodule Robot.Localiser.Silhouettes do
     turn = Belief.turn_along(belief, axis)
     count = min(ceil(@reach * worst / @step), @steps)
     camera = Columns.camera(percept)
-    bodies = for %{at: {x, y}, radius: radius, sd: {sd, _, _}} <- robots, do: {x, y, radius, sd}
+    exposed = Pose.compose(belief.pose, back)
+    view = Sighting.field_of_view(percept)
+    glance = Glance.new(belief, exposed, percept.detections.pan, view)
+    swing = abs(turn) * @reach * worst
+    shift = @reach * worst + swing * Pose.distance(back, {0.0, 0.0})
+
+    bodies =
+      for %{at: {x, y}, radius: radius, sd: {sd, _, _}} <- robots,
+          body = {x, y, radius, sd},
+          in_sight?(body, glance, shift, swing),
+          do: body
 
     tried =
       for k <- -count..count do
@@ -82,6 +93,19 @@ defmodule Robot.Localiser.Silhouettes do
       {sd, common} = found(robots, pose, axis)
       Belief.shifted(belief, axis, at, sd, common)
     end
+  end
+
+  # Whether a robot may fill a column from any of the places, which are `shift` metres and `swing` radians away at most.
+  defp in_sight?({x, y, radius, sd}, glance, shift, swing) do
+    nearest = Pose.distance(glance.pose, {x, y}) - shift
+
+    nearest < 2 * radius or
+      (
+        half = :math.asin(radius / nearest)
+        wide = if sd > @strange, do: half + @wide * sd / nearest, else: half
+        parallax = :math.asin(shift / (nearest + shift))
+        Glance.aside(glance, {x, y}) < wide + parallax + swing
+      )
   end
 
   defp moved(%Pose{} = pose, {x, y}, turn, way),

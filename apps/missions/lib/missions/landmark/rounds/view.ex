@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.Rounds.View do
   @moduledoc "Who takes part in the landmark mission, as far as a robot hears. Pure."
   alias Missions.Landmark
-  alias Swarm.Membership.{Heartbeat, Peers}
+  alias Swarm.Membership.Heartbeat
 
   @doc "All that take part in the mission and are not gone, this robot too, sorted."
   @spec view(Landmark.State.t()) :: [atom()]
@@ -21,5 +21,5 @@ defmodule Missions.Landmark.Rounds.View do
 
   @doc "The heartbeats of the others that take part."
   @spec beats(Landmark.State.t()) :: %{atom() => Heartbeat.t()}
-  def beats(mission), do: Peers.taking_part(mission.percept.peers, mission.now_ms)
+  def beats(mission), do: Landmark.State.beats(mission)
 end
