@@ -22,16 +22,12 @@ defmodule Missions.Landmark.EpochFilter do
   @doc "One tick: the mission with a percept without the claims that are refused."
   @spec update(Landmark.State.t()) :: Landmark.State.t()
   def update(%{now_ms: now} = mission) do
-    claims =
-      for {_id, %Heartbeat{phase: phase, epoch: epoch}} <- Landmark.State.beats(mission),
-          phase != :idle,
-          do: epoch
-
+    claims = Landmark.State.company(mission).epochs
     mission = %{mission | round: Round.Epochs.hear(mission.round, claims, now)}
     allowed = Round.Epochs.allowed(mission.round, now)
 
-    if Enum.any?(claims, &(&1 > allowed)),
-      do: mission |> leave_out(allowed) |> Landmark.State.note_beats(),
+    if claims != [] and Enum.max(claims) > allowed,
+      do: mission |> leave_out(allowed) |> Landmark.State.note_company(),
       else: mission
   end
 

@@ -48,7 +48,10 @@ defmodule Robot.Localiser.Matching do
   @spec pairs([Anchors.mark()], [Blob.t()], Belief.t(), Pose.t(), pan :: float(), view :: float()) ::
           [pair()]
   def pairs(robots, blobs, belief, exposed, pan, view) do
-    looks = for blob <- blobs, do: {blob.colour, blob, Sighting.bearing(blob, pan, view)}
+    looks =
+      for(blob <- blobs, do: {blob.colour, blob, Sighting.bearing(blob, pan, view)})
+      |> Enum.group_by(&elem(&1, 0))
+
     glance = Glance.new(belief, exposed, pan, view)
     widest = Enum.reduce(blobs, 0.0, &max((&1.right - &1.left + 1) / &1.width, &2))
     broad = widest * :math.tan(view / 2)
@@ -56,8 +59,7 @@ defmodule Robot.Localiser.Matching do
     candidates =
       for mark <- robots,
           near?(mark, glance, broad),
-          alike = Enum.filter(looks, &(elem(&1, 0) == mark.colour)),
-          [{_colour, %{width: picture}, _seen} | _] <- [alike],
+          [{_colour, %{width: picture}, _seen} | _] = alike <- [Map.get(looks, mark.colour)],
           expected = expected(mark, belief, exposed, {picture, view}),
           {_colour, blob, seen} <- alike,
           c = candidate(expected, blob, seen),
