@@ -1,6 +1,7 @@
 defmodule Bench.ScaleTest do
   use ExUnit.Case, async: true
   alias Bench.Scale
+  doctest Scale
 
   # What a robot costs in a step, in reductions, on the release of OTP that they were counted with: they are the same on
   # each machine. Whoever changes them by more than a tenth says why, here and in the commit.
