@@ -16,7 +16,7 @@ defmodule Sim.MixProject do
       compilers: Convoy.Support.compilers([:native | Mix.compilers()], Mix.env()),
       test_ignore_filters: Convoy.Support.files(),
       native: [
-        nifs: [kernel: ["rays.c", "paint.c", "kernel_nif.c"]]
+        nifs: [kernel: ["rays.c", "paint.c", "regions.c", "kernel_nif.c"]]
       ],
       start_permanent: Mix.env() == :prod,
       deps: [{:missions, in_umbrella: true}, {:mcap, in_umbrella: true}, {:vm, in_umbrella: true}]

@@ -91,6 +91,30 @@ void sim_sonar(const sim_map *map, const sim_disc *discs, size_t count, const si
 size_t sim_look(const sim_map *map, const sim_sight *sight, const sim_pole *poles, size_t count,
                 const sim_scratch *scratch);
 
+/* The rows of a region in its newest column, linked; and a region: the sums of its pixels' columns, and twice that of
+ * their rows. */
+typedef struct {
+    int32_t top, bottom, next;
+} sim_row;
+
+typedef struct {
+    uint8_t kind;
+    int32_t rows, left, right, top, bottom;
+    int64_t area, columns, height;
+} sim_region;
+
+/* Room for as many of each as there are pieces. */
+typedef struct {
+    sim_region *regions;
+    sim_row *rows;
+    int32_t *next, *open;
+} sim_regions;
+
+/* Joins pieces to regions. Pieces darker than `least` of their kind (0 or 1) count for nothing. Returns how many
+ * regions there are; `order`, with room for as many as there are pieces, has their numbers. */
+size_t sim_join(const sim_piece *pieces, size_t count, const uint8_t *least, const sim_regions *all,
+                int32_t *order);
+
 /* An I420 picture of even width, at most SIM_WIDEST, and even height. `tables` are twice SIM_TABLE + SIM_WIDEST
  * bytes of noise, for luma and for chroma. */
 void sim_paint(const sim_map *map, const sim_sight *sight, const sim_pole *poles, size_t count,

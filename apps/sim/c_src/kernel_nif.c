@@ -1,4 +1,4 @@
-/* Checks the terms of Sim.Compute.Native and calls rays.c and paint.c. */
+/* Checks the terms of Sim.Compute.Native and calls rays.c, paint.c and regions.c. */
 #include <erl_nif.h>
 #include <string.h>
 
@@ -266,6 +266,54 @@ static ERL_NIF_TERM look(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
     return answer(env, result);
 }
 
+static ERL_NIF_TERM region_term(ErlNifEnv *env, const sim_region *region)
+{
+    return enif_make_tuple8(env, enif_make_int(env, region->kind), enif_make_int64(env, region->area),
+                            enif_make_int(env, region->left), enif_make_int(env, region->right),
+                            enif_make_int(env, region->top), enif_make_int(env, region->bottom),
+                            enif_make_int64(env, region->columns),
+                            enif_make_int64(env, region->height));
+}
+
+/* join(pieces, least): the regions of what look returns; `least` has the lowest brightness of kinds 0 and 1. */
+static ERL_NIF_TERM join(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
+{
+    ErlNifBinary packed, least;
+    ERL_NIF_TERM rest, result = 0;
+
+    if (argc != 2 || !enif_inspect_binary(env, argv[0], &packed) ||
+        packed.size % sizeof(sim_piece) != 0 || packed.size > SIM_WIDEST * SIM_WIDEST ||
+        !enif_inspect_binary(env, argv[1], &least) || least.size != 2)
+        return enif_make_badarg(env);
+
+    const size_t count = packed.size / sizeof(sim_piece);
+    const size_t each = sizeof(sim_piece) + sizeof(sim_region) + sizeof(sim_row) + 3 * sizeof(int32_t);
+    char *memory = enif_alloc((count + 1) * each);
+    int fine = memory != NULL;
+
+    if (fine) {
+        /* The most strictly aligned first. */
+        sim_regions all = {(sim_region *)memory, NULL, NULL, NULL};
+        sim_piece *pieces = (sim_piece *)(all.regions + count + 1);
+        all.rows = (sim_row *)(pieces + count + 1);
+        all.next = (int32_t *)(all.rows + count + 1);
+        all.open = all.next + count + 1;
+        int32_t *order = all.open + count + 1;
+
+        memcpy(pieces, packed.data, packed.size);
+        for (size_t k = 0; k < count; k++)
+            fine = fine && pieces[k].kind < 2 && pieces[k].top <= pieces[k].bottom;
+        if (fine) {
+            rest = enif_make_list(env, 0);
+            for (size_t k = sim_join(pieces, count, least.data, &all, order); k > 0; k--)
+                rest = enif_make_list_cell(env, region_term(env, all.regions + order[k - 1]), rest);
+            result = rest;
+        }
+    }
+    release(memory);
+    return answer(env, result);
+}
+
 /* paint(map, sight, poles, noise, tables) */
 static ERL_NIF_TERM paint(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
 {
@@ -299,6 +347,7 @@ static ErlNifFunc functions[] = {
     {"sonar_few", 4, sonar, 0},
     {"sonar_many", 4, sonar, ERL_NIF_DIRTY_JOB_CPU_BOUND},
     {"look", 3, look, 0},
+    {"join", 2, join, 0},
     {"paint", 5, paint, 0},
 };
 

@@ -29,8 +29,8 @@ defmodule Bench.Scale do
   end
 
   defp run(setup, steps) do
-    Trial.Memory.prepare()
     robots = length(setup.options.robots)
+    Trial.Memory.prepare(robots)
     before = {work(), cpu_ms(), System.monotonic_time(:microsecond)}
     trial = Enum.reduce(1..steps, Trial.begin(setup), fn _step, trial -> Trial.step(trial) end)
     measured = figures(before, robots, steps)
@@ -60,6 +60,39 @@ defmodule Bench.Scale do
   defp cpu_ms do
     {ms, _since_last} = :erlang.statistics(:runtime)
     ms
+  end
+
+  @doc """
+  One line about what this machine manages in real time, as measured.
+
+      iex> one = fn robots, speed -> %{robots: robots, speed: speed, reductions: 1.0, cpu_us: 1.0, bytes: 1} end
+      iex> Bench.Scale.verdict([one.(6, 41.0), one.(50, 1.1), one.(100, 0.1)])
+      "In real time this machine plays fleets of 6 and 50 robots, and not one of 100 (0.10 times)."
+      iex> Bench.Scale.verdict([one.(6, 41.0)])
+      "In real time this machine plays a fleet of 6 robots."
+  """
+  @spec verdict([measured(), ...]) :: String.t()
+  def verdict(all) do
+    {able, unable} = Enum.split_with(all, &(&1.speed >= 1.0))
+
+    played =
+      case Enum.map(able, & &1.robots) do
+        [] -> "none of these fleets"
+        [one] -> "a fleet of #{one} robots"
+        several -> "fleets of #{list(several)} robots"
+      end
+
+    missed = for one <- unable, do: "#{one.robots} (#{decimals(one.speed, 2)} times)"
+
+    "In real time this machine plays #{played}" <>
+      if(missed == [], do: "", else: ", and not one of #{list(missed)}") <> "."
+  end
+
+  defp list([one]), do: "#{one}"
+
+  defp list(several) do
+    {first, [last]} = Enum.split(several, -1)
+    Enum.join(first, ", ") <> " and #{last}"
   end
 
   @heads [

@@ -3,7 +3,9 @@ defmodule Console.Fleet do
   The robots of a fleet: `mag1`, `mag2`, … (Magellan Pro) and `min1`, `min2`, … (ATRV mini). Pure.
   """
 
+  # How many a demo may have, and how many a measurement.
   @most 100
+  @measured 1_000
 
   @doc """
   A fleet of `count` robots, half of each kind, one more Magellan when the count is odd.
@@ -11,8 +13,8 @@ defmodule Console.Fleet do
       iex> Console.Fleet.of(3)
       [:mag1, :mag2, :min1]
   """
-  @spec of(1..100) :: [atom()]
-  def of(count) when count in 1..@most do
+  @spec of(1..1_000) :: [atom()]
+  def of(count) when count in 1..@measured do
     mini = div(count, 2)
     names("mag", count - mini) ++ names("min", mini)
   end
@@ -60,6 +62,6 @@ defmodule Console.Fleet do
 
   defp names({kind, count}), do: names(kind, count)
 
-  # At most a hundred names of each kind exist, so these atoms are bounded.
+  # At most a thousand names of each kind exist, so these atoms are bounded.
   defp names(kind, count), do: for(k <- 1..count//1, do: :"#{kind}#{k}")
 end

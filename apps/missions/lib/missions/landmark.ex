@@ -94,7 +94,8 @@ defmodule Missions.Landmark do
   def handle({:outcome, _tag, _result}, mission), do: still(mission)
 
   # The receiver has checked it, but on its way to here anybody on this node may have put another.
-  def handle({:message, message}, mission), do: hear(Message.check(message), mission)
+  def handle({:message, message}, %{round: %{view: view}} = mission),
+    do: message |> Message.check(view) |> hear(mission)
 
   def handle({:tick, percept}, mission) do
     awake = Rounds.wake(mission, percept.at_ms)
@@ -107,6 +108,7 @@ defmodule Missions.Landmark do
         trail: if(percept.pose, do: Trail.note(mission.trail, percept.pose), else: mission.trail)
     }
 
+    mission = Landmark.State.note_company(mission)
     mission = mission |> EpochFilter.update() |> Policy.update() |> ReferenceInbox.beats()
     {mission, letters} = Rounds.tick(mission)
     {mission, stages} = step(mission)

@@ -72,11 +72,22 @@ defmodule Sim.Compute do
       do: {column, Palette.kind(kind), top, bottom, luma}
   end
 
+  @least <<Palette.least_luma(:landmark), Palette.least_luma(:robot)>>
+
+  @doc "What a camera sees of poles (or of `pack/1` of them), joined to regions where parts of one kind touch, dark ones left out."
+  @spec regions(Sim.Floorplan.t(), CameraFrustum.t(), [CameraFrustum.pole()] | binary()) ::
+          [Compute.Regions.t()]
+  def regions(map, %CameraFrustum{} = sight, poles) do
+    module = module()
+    map |> pack() |> module.look(pack(sight), pack(poles)) |> module.join(@least)
+  end
+
   @doc """
   The bytes of an I420 picture. Noise is N(0, 3) for luma, N(0, 2) for chroma, and salt: one luma in
   a thousand is white or black.
   """
-  @spec paint(Sim.Floorplan.t(), CameraFrustum.t(), [CameraFrustum.pole()], noise()) :: binary()
+  @spec paint(Sim.Floorplan.t(), CameraFrustum.t(), [CameraFrustum.pole()] | binary(), noise()) ::
+          binary()
   def paint(map, %CameraFrustum{} = sight, poles, noise),
     do: module().paint(pack(map), pack(sight), pack(poles), narrow(noise), tables())
 
@@ -90,12 +101,15 @@ defmodule Sim.Compute do
   def tables, do: @tables
 
   @doc "The arguments in the form that the kernels take."
-  @spec pack(Sim.Floorplan.t() | CameraFrustum.t() | [CameraFrustum.pole()]) :: tuple() | binary()
+  @spec pack(Sim.Floorplan.t() | CameraFrustum.t() | [CameraFrustum.pole()] | binary()) ::
+          tuple() | binary()
   def pack(%{field: field, width: width, height: height, cell: cell}),
     do: {field, width, height, cell}
 
   def pack(%CameraFrustum{} = s),
     do: {s.x, s.y, s.cosine, s.sine, s.eye, s.focal, s.horizon, s.width, s.height}
+
+  def pack(packed) when is_binary(packed), do: packed
 
   def pack(poles) when is_list(poles) do
     for {x, y, r, height, kind} <- poles, into: <<>> do

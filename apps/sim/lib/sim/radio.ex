@@ -19,16 +19,17 @@ defmodule Sim.Radio do
   ]
 
   @enforce_keys [:seed, :loss, :delay_ms, :duplicates]
-  defstruct @enforce_keys ++ [cut: MapSet.new(), queue: :gb_sets.new(), next: 0, sent: 0, lost: 0]
+  defstruct @enforce_keys ++ [cut: MapSet.new(), queue: %{}, next: 0, sent: 0, lost: 0]
 
   @type id :: atom()
+  @typedoc "`queue` has by the time at which they are due what is under way, the newest first."
   @type t :: %__MODULE__{
           seed: integer(),
           loss: float(),
           delay_ms: {non_neg_integer(), non_neg_integer()},
           duplicates: float(),
           cut: MapSet.t({id(), id()}),
-          queue: :gb_sets.set({integer(), non_neg_integer(), id(), id(), term()}),
+          queue: %{integer() => [{to :: id(), from :: id(), term()}, ...]},
           next: non_neg_integer(),
           sent: non_neg_integer(),
           lost: non_neg_integer()
@@ -73,6 +74,9 @@ defmodule Sim.Radio do
   @spec parts(t(), [id()]) :: [[id()]]
   def parts(%__MODULE__{}, []), do: []
 
+  # Nobody is cut off.
+  def parts(%__MODULE__{cut: cut}, ids) when cut == %MapSet{}, do: [ids]
+
   def parts(%__MODULE__{} = radio, [first | _] = ids) do
     there = reach(radio, ids, [first], &{&1, &2})
     back = reach(radio, ids, [first], &{&2, &1})
@@ -95,45 +99,55 @@ defmodule Sim.Radio do
       {2, 1}
   """
   @spec send(t(), integer(), id(), [id()], term()) :: t()
-  def send(%__MODULE__{} = radio, at_ms, from, to_ids, message),
-    do: Enum.reduce(to_ids, radio, &send_one(&2, at_ms, from, &1, message))
+  def send(%__MODULE__{} = radio, at_ms, from, to_ids, message) do
+    cuts? = MapSet.size(radio.cut) > 0
+    Enum.reduce(to_ids, radio, &send_one(&2, at_ms, from, &1, message, cuts?))
+  end
+
+  @doc "Whether nothing is under way."
+  @spec empty?(t()) :: boolean()
+  def empty?(%__MODULE__{queue: queue}), do: queue == %{}
 
   @doc """
   The messages that have arrived by now as `{to, from, message}`, and the radio without them.
   """
   @spec receive(t(), integer()) :: {[{id(), id(), term()}], t()}
-  def receive(%__MODULE__{} = radio, at_ms), do: take(radio, at_ms, [])
+  def receive(%__MODULE__{queue: queue} = radio, at_ms) do
+    due = Enum.sort(for {due_ms, _letters} <- queue, due_ms <= at_ms, do: due_ms)
+    letters = Enum.flat_map(due, &Enum.reverse(Map.fetch!(queue, &1)))
+    {letters, %{radio | queue: Map.drop(queue, due)}}
+  end
 
-  defp send_one(radio, at_ms, from, to, message) do
+  defp send_one(radio, at_ms, from, to, message, cuts?) do
     number = radio.next
-    radio = %{radio | next: number + 1, sent: radio.sent + 1}
 
-    if MapSet.member?(radio.cut, {from, to}) or draw(radio, number, 0) < radio.loss do
-      %{radio | lost: radio.lost + 1}
+    if (cuts? and MapSet.member?(radio.cut, {from, to})) or hits?(radio, number, 0, radio.loss) do
+      %{radio | next: number + 1, sent: radio.sent + 1, lost: radio.lost + 1}
     else
-      copies = if draw(radio, number, 1) < radio.duplicates, do: [2, 3], else: [2]
-      {least, most} = radio.delay_ms
+      letter = {to, from, message}
+      queue = queue(radio, number, 2, at_ms, letter)
 
-      Enum.reduce(copies, radio, fn copy, radio ->
-        delay = least + trunc(draw(radio, number, copy) * (most - least + 1))
-        entry = {at_ms + delay, 2 * number + copy, to, from, message}
-        # No other has its number.
-        %{radio | queue: :gb_sets.insert(entry, radio.queue)}
-      end)
+      # In the order of the numbers, so that each list stays in the order in which it was sent.
+      queue =
+        if hits?(radio, number, 1, radio.duplicates),
+          do: queue(%{radio | queue: queue}, number, 3, at_ms, letter),
+          else: queue
+
+      %{radio | next: number + 1, sent: radio.sent + 1, queue: queue}
     end
   end
+
+  defp queue(%{delay_ms: {least, most}, queue: queue} = radio, number, copy, at_ms, letter) do
+    due_ms = at_ms + least + trunc(draw(radio, number, copy) * (most - least + 1))
+
+    case queue do
+      %{^due_ms => letters} -> %{queue | due_ms => [letter | letters]}
+      _none_yet -> Map.put(queue, due_ms, [letter])
+    end
+  end
+
+  # A draw is not less than 0, and need not be made for that.
+  defp hits?(radio, number, use, share), do: share > 0 and draw(radio, number, use) < share
 
   defp draw(radio, number, use), do: Noise.unit(Noise.hash(radio.seed, 0x7AD10, number, use))
-
-  defp take(radio, at_ms, taken) do
-    if :gb_sets.is_empty(radio.queue) do
-      {Enum.reverse(taken), radio}
-    else
-      {{due, _number, to, from, message}, rest} = :gb_sets.take_smallest(radio.queue)
-
-      if due <= at_ms,
-        do: take(%{radio | queue: rest}, at_ms, [{to, from, message} | taken]),
-        else: {Enum.reverse(taken), radio}
-    end
-  end
 end

@@ -192,10 +192,16 @@ defmodule Sim.Trial do
   defp hear(trial) do
     {letters, radio} = Radio.receive(trial.radio, trial.at_ms)
 
-    Enum.reduce(letters, %{trial | radio: radio}, fn {to, _from, message}, trial ->
+    Enum.reduce(letters, %{trial | radio: radio}, fn {to, _from, {message, checked}}, trial ->
       if Faults.any?(trial.faults, [:frozen, :deaf], to, trial.at_ms),
         do: trial,
-        else: input(trial, to, {:message, message, trial.at_ms})
+        else:
+          input(
+            trial,
+            to,
+            {:message, message, trial.at_ms},
+            &Member.hear(&1, checked, trial.at_ms)
+          )
     end)
   end
 
@@ -207,11 +213,14 @@ defmodule Sim.Trial do
     end)
   end
 
+  # Nothing moves while all look.
   defp look(trial) do
+    scenery = World.scenery(trial.world)
+
     each(trial, fn id, trial ->
       if Faults.any?(trial.faults, [:blind], id, trial.at_ms),
         do: trial,
-        else: input(trial, id, {:detections, Mechanics.detections(trial, id)})
+        else: input(trial, id, {:detections, Mechanics.detections(trial, id, scenery)})
     end)
   end
 
@@ -224,10 +233,13 @@ defmodule Sim.Trial do
     Enum.reject(living(trial), &Faults.any?(trial.faults, [:frozen], &1, trial.at_ms))
   end
 
-  defp input(trial, id, input) do
+  defp input(trial, id, input), do: input(trial, id, input, &Member.step(&1, input))
+
+  # `step` is what the input does.
+  defp input(trial, id, input, step) do
     case trial.members do
       %{^id => member} ->
-        {member, effects} = Member.step(member, input)
+        {member, effects} = step.(member)
 
         trial =
           note(%{trial | members: %{trial.members | id => member}}, fn ->

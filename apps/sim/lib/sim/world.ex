@@ -172,21 +172,41 @@ defmodule Sim.World do
   end
 
   @doc "The blobs of a robot's picture by geometry, without painting it."
-  @spec blobs(t(), id()) :: [Vision.Blob.t()]
-  def blobs(%__MODULE__{} = world, id) do
+  @spec blobs(t(), id(), scenery() | nil) :: [Vision.Blob.t()]
+  def blobs(%__MODULE__{} = world, id, scenery \\ nil) do
     body = Elixir.Map.fetch!(world.robots, id)
     noise = if world.noise != :off, do: {world.seed, body.index, world.step}
-    World.Blobs.see(world.map, CameraFrustum.of(body), poles(world, id), noise)
+    World.Blobs.see(world.map, CameraFrustum.of(body), others(world, body, scenery), noise)
+  end
+
+  @typedoc "Everything upright that is in the world now, once for all cameras."
+  @opaque scenery :: {landmark :: binary(), robots :: binary()}
+
+  @doc "What the cameras of all robots see now, for `detections/3` and `frame/3`."
+  @spec scenery(t()) :: scenery()
+  def scenery(%__MODULE__{} = world) do
+    robots = for id <- world.order, do: pole(world.robots[id])
+    {Compute.pack(landmark_pole(world)), Compute.pack(robots)}
+  end
+
+  defp others(world, body, nil), do: poles(world, body.id)
+
+  # A robot does not see itself; the landmark comes first, as in `poles/2`.
+  defp others(world, %{index: index}, {landmark, robots}) do
+    size = div(byte_size(robots), length(world.order))
+    before = binary_part(robots, 0, index * size)
+    behind = binary_part(robots, (index + 1) * size, byte_size(robots) - (index + 1) * size)
+    landmark <> before <> behind
   end
 
   @doc "The same with the camera's current direction, as a detector would return it."
-  @spec detections(t(), id()) :: Vision.Detections.t()
-  def detections(%__MODULE__{} = world, id) do
+  @spec detections(t(), id(), scenery() | nil) :: Vision.Detections.t()
+  def detections(%__MODULE__{} = world, id, scenery \\ nil) do
     %Body{pan: pan, tilt: tilt, field_of_view: angle} = Elixir.Map.fetch!(world.robots, id)
 
     %Vision.Detections{
       at_ms: world.at_ms,
-      blobs: blobs(world, id),
+      blobs: blobs(world, id, scenery),
       pan: pan,
       tilt: tilt,
       field_of_view: angle
@@ -194,8 +214,8 @@ defmodule Sim.World do
   end
 
   @doc "The picture of a robot's camera, in its current direction."
-  @spec frame(t(), id()) :: Hal.Frame.t()
-  def frame(%__MODULE__{} = world, id) do
+  @spec frame(t(), id(), scenery() | nil) :: Hal.Frame.t()
+  def frame(%__MODULE__{} = world, id, scenery \\ nil) do
     body = Elixir.Map.fetch!(world.robots, id)
     sight = CameraFrustum.of(body)
     noise = if world.noise != :off, do: {world.seed, world.step, body.index}
@@ -204,7 +224,7 @@ defmodule Sim.World do
       format: :i420,
       width: sight.width,
       height: sight.height,
-      bytes: Compute.paint(world.map, sight, poles(world, id), noise),
+      bytes: Compute.paint(world.map, sight, others(world, body, scenery), noise),
       at_ms: world.at_ms,
       pan: body.pan,
       tilt: body.tilt,
@@ -227,17 +247,17 @@ defmodule Sim.World do
   @doc "Everything upright that robot `id` can see."
   @spec poles(t(), id()) :: [CameraFrustum.pole()]
   def poles(%__MODULE__{} = world, id) do
-    robots =
-      for other <- world.order, other != id do
-        %Body{pose: pose, profile: profile} = world.robots[other]
-        {pose.x, pose.y, profile.radius, profile.height, :robot}
-      end
-
-    case world.landmark do
-      nil -> robots
-      {x, y} -> [{x, y, Bodies.landmark_radius(), @landmark_height, :landmark} | robots]
-    end
+    robots = for other <- world.order, other != id, do: pole(world.robots[other])
+    landmark_pole(world) ++ robots
   end
+
+  defp pole(%Body{pose: pose, profile: profile}),
+    do: {pose.x, pose.y, profile.radius, profile.height, :robot}
+
+  defp landmark_pole(%{landmark: nil}), do: []
+
+  defp landmark_pole(%{landmark: {x, y}}),
+    do: [{x, y, Bodies.landmark_radius(), @landmark_height, :landmark}]
 
   defp update(world, id, change),
     do: %{world | robots: Elixir.Map.update!(world.robots, id, change)}

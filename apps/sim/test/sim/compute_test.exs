@@ -156,6 +156,29 @@ defmodule Sim.ComputeTest do
     end
   end
 
+  test "for joining pieces to regions, native and reference agree, in the same order" do
+    for _ <- 1..300 do
+      columns = Enum.sort(for _ <- 1..:rand.uniform(60), do: :rand.uniform(40))
+
+      # Within a column from below to above, as the camera sees what is behind something.
+      pieces =
+        for column <- Enum.uniq(columns), into: <<>> do
+          rows = Enum.sort(Enum.take_random(0..30, 2 * :rand.uniform(4)), :desc)
+
+          for [bottom, top] <- Enum.chunk_every(rows, 2), into: <<>> do
+            <<column::16-native, top::16-native, bottom::16-native, :rand.uniform(2) - 1,
+              :rand.uniform(255)>>
+          end
+        end
+
+      least = <<:rand.uniform(120), :rand.uniform(120)>>
+      assert Compute.Native.join(pieces, least) == Reference.join(pieces, least)
+    end
+
+    for wrong <- [<<0>>, <<0::48, 2, 0>>, <<0::16, 9::16-native, 1::16-native, 0, 0>>],
+        do: assert_raise(ArgumentError, fn -> Compute.Native.join(wrong, <<0, 0>>) end)
+  end
+
   test "for looking, native and reference agree" do
     for _ <- 1..150 do
       map = map(plan())

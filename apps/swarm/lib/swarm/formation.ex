@@ -141,23 +141,29 @@ defmodule Swarm.Formation do
   @spec slots(t(), pos_integer(), float()) :: [Pose.t()]
   def slots(formation, robots, landmark_distance \\ @least_ring)
 
-  def slots({:circle, _spacing} = formation, robots, distance) when robots > 1 do
+  def slots(formation, robots, distance),
+    do: for(k <- 1..(robots - 1)//1, do: slot_of(formation, k, robots, distance))
+
+  @doc """
+  The slot of the follower ranked `rank` (1 is the first) in a group of `robots`: one of `slots/3`, without the others.
+
+      iex> Swarm.Formation.slot_of({:column, 1.5}, 2, 3, 1.2) == Enum.at(Swarm.Formation.slots({:column, 1.5}, 3), 1)
+      true
+  """
+  @spec slot_of(t(), rank :: pos_integer(), pos_integer(), float()) :: Pose.t()
+  def slot_of({:circle, _spacing} = formation, k, robots, distance) do
     radius = ring(formation, robots)
+    # Seen from the landmark the leader is at angle pi.
+    angle = :math.pi() + 2 * :math.pi() * k / robots
 
-    for k <- 1..(robots - 1)//1 do
-      # Seen from the landmark the leader is at angle pi.
-      angle = :math.pi() + 2 * :math.pi() * k / robots
-
-      Pose.new(
-        distance + radius * :math.cos(angle),
-        radius * :math.sin(angle),
-        angle + :math.pi()
-      )
-    end
+    Pose.new(
+      distance + radius * :math.cos(angle),
+      radius * :math.sin(angle),
+      angle + :math.pi()
+    )
   end
 
-  def slots({kind, d}, robots, _distance),
-    do: for(k <- 1..(robots - 1)//1, do: slot(kind, k, robots) |> scale(d))
+  def slot_of({kind, d}, k, robots, _distance), do: kind |> slot(k, robots) |> scale(d)
 
   @doc """
   The radius of the ring of `robots` around the landmark, the leader included.

@@ -110,10 +110,7 @@ defmodule Swarm.Member do
   def step(member, {:detections, detections}),
     do: {put(member, :detections, detections, detections.at_ms), []}
 
-  def step(member, {:message, term, at_ms}) do
-    {heard, receiver} = Receiver.hear(member.receiver, term, at_ms)
-    heard(%{member | receiver: receiver}, heard, at_ms)
-  end
+  def step(member, {:message, term, at_ms}), do: hear(member, Message.check(term), at_ms)
 
   def step(member, {:command, :estop, at_ms}),
     do: latch(member, EStop.State.press(member.stop, {member.id, 0, at_ms}), at_ms)
@@ -177,6 +174,15 @@ defmodule Swarm.Member do
   end
 
   def step(member, {:reflex, at_ms}), do: react(member, :now, at_ms)
+
+  @doc """
+  The same as `step/2` for a message that was checked before (`Swarm.Message.check/1`): once for all members that hear it.
+  """
+  @spec hear(t(), {:ok, Message.t()} | {:error, atom()}, integer()) :: {t(), [effect()]}
+  def hear(member, checked, at_ms) do
+    {heard, receiver} = Receiver.take(member.receiver, checked, at_ms)
+    heard(%{member | receiver: receiver}, heard, at_ms)
+  end
 
   @doc "The robot's estimate of its pose, or `nil`."
   @spec pose(t()) :: Pose.t() | nil

@@ -65,15 +65,18 @@ defmodule Swarm.Message do
   def pass_on(_from_afar, _me), do: :error
 
   @doc """
-  Whether a term is a message that a robot may act on.
+  Whether a term is a message that a robot may act on. A letter's view that equals `known_view`, which was checked before,
+  is not checked again: each letter of a round holds the whole view.
 
       iex> Swarm.Message.check(%{junk: 1})
       {:error, :not_a_message}
       iex> Swarm.Message.check(Swarm.Message.new(:mag1, :heartbeat, :nonsense))
       {:error, :heartbeat}
   """
-  @spec check(term()) :: {:ok, t()} | {:error, :not_a_message | kind()}
-  def check(%__MODULE__{from: from, kind: kind, body: body} = message)
+  @spec check(term(), known_view :: [atom()]) :: {:ok, t()} | {:error, :not_a_message | kind()}
+  def check(term, known_view \\ [])
+
+  def check(%__MODULE__{from: from, kind: kind, body: body} = message, view)
       when kind in [:heartbeat, :round, :place, :mission, :relay] do
     cond do
       not (Wire.whole?(message, __MODULE__) and Wire.name?(from)) ->
@@ -82,7 +85,7 @@ defmodule Swarm.Message do
       message.hops not in 0..@most_hops ->
         {:error, :not_a_message}
 
-      valid?(kind, body) ->
+      valid?(kind, body, view) ->
         {:ok, message}
 
       true ->
@@ -90,16 +93,16 @@ defmodule Swarm.Message do
     end
   end
 
-  def check(_term), do: {:error, :not_a_message}
+  def check(_term, _view), do: {:error, :not_a_message}
 
-  defp valid?(:heartbeat, body), do: Heartbeat.valid?(body)
-  defp valid?(:round, body), do: Round.Letter.valid?(body)
-  defp valid?(:place, body), do: Reference.valid?(body)
-  defp valid?(:mission, body), do: Robot.Mission.Letter.valid?(body)
+  defp valid?(:heartbeat, body, _view), do: Heartbeat.valid?(body)
+  defp valid?(:round, body, view), do: Round.Letter.valid?(body, view)
+  defp valid?(:place, body, _view), do: Reference.valid?(body)
+  defp valid?(:mission, body, _view), do: Robot.Mission.Letter.valid?(body)
 
   # Nothing else is passed on, and nothing is wrapped twice.
-  defp valid?(:relay, %__MODULE__{kind: kind} = inner) when kind in [:heartbeat, :round],
-    do: inner.hops != 0 and match?({:ok, _}, check(inner))
+  defp valid?(:relay, %__MODULE__{kind: kind} = inner, view) when kind in [:heartbeat, :round],
+    do: inner.hops != 0 and match?({:ok, _}, check(inner, view))
 
-  defp valid?(:relay, _other), do: false
+  defp valid?(:relay, _other, _view), do: false
 end

@@ -30,7 +30,9 @@ defmodule Bench.Scale.Main do
     Output.finish(output)
 
     with [] <- for({:error, line} <- results, do: line) do
-      IO.write(Scale.draw(for {:ok, measured} <- results, do: measured))
+      measured = for {:ok, measured} <- results, do: measured
+      IO.puts(Scale.verdict(measured) <> "\n")
+      IO.write(Scale.draw(measured))
 
       IO.puts(
         "\nThe first #{seconds} s of seed 1 in the hall, blobs #{blobs}, in one process. Load of the machine (1 min): " <>
@@ -43,7 +45,7 @@ defmodule Bench.Scale.Main do
 
   defp table do
     [
-      {"robots", "N,N", &Parse.wholes(&1, 1..100), "how many robots (6,20,50)"},
+      {"robots", "N,N", &Parse.wholes(&1, 1..1_000), "how many robots, up to 1000 (6,20,50)"},
       {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
        "pictures that are painted, or blobs by geometry: painted, direct (painted)"},
       {"seconds", "S", &Parse.whole(&1, 1..10_000), "how long, in simulated seconds (20)"},

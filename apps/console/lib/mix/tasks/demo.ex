@@ -69,7 +69,7 @@ defmodule Mix.Tasks.Demo do
         recorded(options, &Demo.run(&1, Live.Paced, paced()))
 
       options.headless ->
-        Sim.Trial.Memory.prepare()
+        Sim.Trial.Memory.prepare(length(options.robots))
         Demo.run(options, Sim.Trial)
 
       true ->

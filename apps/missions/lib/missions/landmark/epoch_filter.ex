@@ -8,7 +8,7 @@ defmodule Missions.Landmark.EpochFilter do
   most once in 10 s for each robot. As soon as its epochs are possible, it takes part again.
   """
   alias Swarm.Agreement.Round
-  alias Swarm.Membership.{Heartbeat, Peers}
+  alias Swarm.Membership.Heartbeat
   alias Missions.Landmark
 
   @tell_ms 10_000
@@ -21,17 +21,13 @@ defmodule Missions.Landmark.EpochFilter do
 
   @doc "One tick: the mission with a percept without the claims that are refused."
   @spec update(Landmark.State.t()) :: Landmark.State.t()
-  def update(%{percept: percept, now_ms: now} = mission) do
-    claims =
-      for {_id, %Heartbeat{phase: phase, epoch: epoch}} <- Peers.taking_part(percept.peers, now),
-          phase != :idle,
-          do: epoch
-
+  def update(%{now_ms: now} = mission) do
+    claims = Landmark.State.company(mission).epochs
     mission = %{mission | round: Round.Epochs.hear(mission.round, claims, now)}
     allowed = Round.Epochs.allowed(mission.round, now)
 
-    if Enum.any?(claims, &(&1 > allowed)),
-      do: leave_out(mission, allowed),
+    if claims != [] and Enum.max(claims) > allowed,
+      do: mission |> leave_out(allowed) |> Landmark.State.note_company(),
       else: mission
   end
 

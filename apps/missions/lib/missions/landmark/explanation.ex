@@ -21,8 +21,15 @@ defmodule Missions.Landmark.Explanation do
   defp group(mission) do
     "#{mission.leader} leads epoch #{mission.epoch}" <>
       if(mission.size_ppm, do: ", elected with #{share(mission.size_ppm)}", else: "") <>
-      if(mission.order == [], do: "", else: ", places in order: #{names(mission.order)}")
+      case order(mission) do
+        [] -> ""
+        order -> ", places in order: #{names(order)}"
+      end
   end
+
+  defp order(%{leader: me, me: me, order: order}), do: order
+  defp order(%{anchor: %{order: order}}), do: order
+  defp order(_not_told), do: []
 
   defp search(%{scan: nil, tries: tries}), do: "no turn has ended; #{tries} found nothing before"
   defp search(%{scan: :found}), do: "the last turn found the landmark"

@@ -7,7 +7,7 @@ defmodule Missions.Landmark.Leader do
   alias Robot.Behaviour
   alias Robot.Localiser.Anchors
   alias Swarm.{Formation, Message}
-  alias Swarm.Membership.{NameSet, Peers}
+  alias Swarm.Membership.NameSet
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Merge, Shape}
   alias Missions.Landmark.Leader.{Announcement, Slots}
@@ -136,8 +136,8 @@ defmodule Missions.Landmark.Leader do
   # If it is alone, nobody can hear it, and a robot that comes needs time to hear it.
   defp hear(mission) do
     heard? =
-      mission.percept.peers
-      |> Peers.taking_part(mission.now_ms)
+      mission
+      |> Landmark.State.beats()
       |> Enum.any?(fn {_id, beat} -> NameSet.member?(beat.heard, mission.me) end)
 
     if heard? or mission.order == [],

@@ -46,7 +46,7 @@ defmodule Missions.Landmark.Marks do
           at: at,
           sd: spread,
           common: Anchors.common(spread, at, Pose.point(leader)),
-          reference?: id in ahead and standing?(peer) and told?(id, peer, anchor),
+          reference?: standing?(peer) and told?(id, peer, anchor) and id in ahead,
           radius: peer.radius
         }
       end

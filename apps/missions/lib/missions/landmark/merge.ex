@@ -8,7 +8,6 @@ defmodule Missions.Landmark.Merge do
   opens it a little later. A leader whom nobody follows joins a later one without a round. Meanwhile
   nobody takes the other's followers into its order.
   """
-  alias Swarm.Membership.Peers
   alias Missions.Landmark
 
   # Heartbeats come at 5 Hz: after this time all of the other part have been heard.
@@ -102,5 +101,5 @@ defmodule Missions.Landmark.Merge do
 
   defp rivals(peers), do: for({id, %{phase: :lead, epoch: epoch}} <- peers, do: {id, epoch})
   defp higher?(mission, peers), do: Enum.any?(peers, fn {_id, b} -> b.epoch > mission.epoch end)
-  defp peers(mission), do: Peers.taking_part(mission.percept.peers, mission.now_ms)
+  defp peers(mission), do: Landmark.State.beats(mission)
 end

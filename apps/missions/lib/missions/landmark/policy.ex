@@ -26,7 +26,6 @@ defmodule Missions.Landmark.Policy do
   """
   alias Swarm.Agreement.Election
   alias Swarm.Formation.Reference
-  alias Swarm.Membership.Peers
   alias Missions.Landmark
 
   # A heartbeat lists the robots that were heard in the last second.
@@ -105,7 +104,7 @@ defmodule Missions.Landmark.Policy do
   @doc "Whether this robot hears anybody."
   @spec company?(Landmark.State.t()) :: boolean()
   def company?(mission),
-    do: Peers.taking_part(mission.percept.peers, mission.now_ms) != %{}
+    do: Landmark.State.beats(mission) != %{}
 
   @doc "What this robot does when the link is lost, depending on its last role."
   @spec lost_link(Landmark.State.t()) :: :stop | :hold | :continue

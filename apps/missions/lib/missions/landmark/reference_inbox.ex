@@ -20,7 +20,10 @@ defmodule Missions.Landmark.ReferenceInbox do
   only once.
   """
   @spec beats(Landmark.State.t()) :: Landmark.State.t()
-  def beats(%{now_ms: now} = mission) do
+  def beats(mission),
+    do: if(Landmark.State.company(mission).anchored?, do: anchors(mission), else: mission)
+
+  defp anchors(%{now_ms: now} = mission) do
     Enum.reduce(mission.percept.peers, mission, fn
       {_id, %{at_ms: at_ms, beat: %{anchor: %Reference{} = anchor}}}, mission
       when now - at_ms < @news_ms ->

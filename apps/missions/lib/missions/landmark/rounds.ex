@@ -105,7 +105,7 @@ defmodule Missions.Landmark.Rounds do
           | verdict: {:leader, leader},
             epoch: epoch,
             size_ppm: record.reports[leader].size_ppm,
-            order: plan(mission, record.reports, leader),
+            order: if(leader == mission.me, do: plan(mission, record.reports, leader), else: []),
             rescan?: false,
             anchor: nil,
             anchor_ms: nil
@@ -130,7 +130,7 @@ defmodule Missions.Landmark.Rounds do
 
   defp conclude(nil, mission), do: mission
 
-  # All robots compute the same order from the same record.
+  # By the leader alone: the others hear of it with its anchor.
   defp plan(mission, reports, leader) do
     present = for {id, report} <- Enum.sort(reports), report != nil, do: {id, report.pose}
     {x, y, heading} = reports[leader].pose

@@ -15,7 +15,6 @@ defmodule Missions.Landmark.Shape do
   alias Hal.Pose
   alias Swarm.Formation
   alias Swarm.Formation.{FreeSlots, Ladder, Space, Trail}
-  alias Swarm.Membership.Peers
   alias Missions.Landmark
   alias Missions.Landmark.LandmarkTrack
 
@@ -232,7 +231,7 @@ defmodule Missions.Landmark.Shape do
   # as some are under way, one of them may be the blocker. A robot that is not sure of its place
   # counts as at rest, too.
   defp blocked?(mission) do
-    beats = Peers.taking_part(mission.percept.peers, mission.now_ms)
+    beats = Landmark.State.beats(mission)
     followers = for id <- mission.order, beat = beats[id], do: beat
 
     Enum.any?(followers, & &1.blocked) and

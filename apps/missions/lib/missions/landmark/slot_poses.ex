@@ -56,10 +56,8 @@ defmodule Missions.Landmark.SlotPoses do
   end
 
   defp slot_at(anchor, index, age_ms) do
-    slot =
-      anchor.formation
-      |> Formation.slots(anchor.size, landmark_distance(anchor))
-      |> Enum.at(Enum.at(anchor.places, index) - 1)
+    rank = Enum.at(anchor.places, index)
+    slot = Formation.slot_of(anchor.formation, rank, anchor.size, landmark_distance(anchor))
 
     {pose, twist} = leader(anchor, age_ms)
     place = Pose.compose(pose, slot)

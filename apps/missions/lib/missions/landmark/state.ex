@@ -4,7 +4,7 @@ defmodule Missions.Landmark.State do
   ask of it. Pure. The parts' own states are under `lead`, `attend`, `round`, `sight`.
   """
   alias Hal.{Pose, Twist}
-  alias Missions.Landmark.{EpochFilter, LandmarkTrack}
+  alias Missions.Landmark.{Company, EpochFilter, LandmarkTrack}
 
   @colour "YellowLandmark"
   @sight_ms 700
@@ -15,6 +15,7 @@ defmodule Missions.Landmark.State do
                 asked_no: 0,
                 colour: @colour,
                 percept: nil,
+                company: nil,
                 now_ms: 0,
                 phase: :idle,
                 since_ms: 0,
@@ -51,7 +52,7 @@ defmodule Missions.Landmark.State do
               ]
 
   @typedoc """
-  `asked_no` counts the shapes that people asked for, so that an older anchor does not undo the
+  `company` is that of `company/1`, with what it was made of. `asked_no` counts the shapes that people asked for, so that an older anchor does not undo the
   newest. `since_ms` is when the phase began, `scan` how the last turn ended, `rescan?` whether
   the next round needs a new one, `tries` how many searches found nothing, `verdict` the result of
   the last round until a phase has acted on it, `order` the followers by slot. `epoch` and
@@ -73,6 +74,7 @@ defmodule Missions.Landmark.State do
           leader_change?: boolean(),
           colour: String.t(),
           percept: Robot.Percept.t() | nil,
+          company: {peers :: map(), now_ms :: integer(), Company.t()} | nil,
           now_ms: integer(),
           phase: Missions.Landmark.Transitions.phase(),
           since_ms: integer(),
@@ -114,6 +116,22 @@ defmodule Missions.Landmark.State do
   @doc "The default colour of the landmark."
   @spec colour() :: String.t()
   def colour, do: @colour
+
+  @doc "Keeps what `company/1` returns, which is asked for many times a tick."
+  @spec note_company(t()) :: t()
+  def note_company(%{percept: %{peers: peers}, now_ms: now} = mission),
+    do: %{mission | company: {peers, now, company(mission)}}
+
+  @doc "The others that are not gone."
+  @spec company(t()) :: Company.t()
+  def company(%{company: {peers, now, company}, percept: %{peers: peers}, now_ms: now}),
+    do: company
+
+  def company(%{me: me, percept: %{peers: peers}, now_ms: now}), do: Company.of(me, peers, now)
+
+  @doc "The newest heartbeats of all others that are not gone, by name."
+  @spec beats(t()) :: %{atom() => Swarm.Membership.Heartbeat.t()}
+  def beats(mission), do: company(mission).beats
 
   @doc "Whether the landmark is in this robot's picture."
   @spec sees?(t()) :: boolean()

@@ -51,10 +51,9 @@ defmodule Robot.Localiser.Columns do
   defp project(left, right, focal) do
     left = if left < @aside, do: left, else: @aside
     right = if right > -@aside, do: right, else: -@aside
-    between(column(left, focal), column(right, focal) - 1)
+    left = round(@columns / 2 - focal * :math.tan(left))
+    between(left, round(@columns / 2 - focal * :math.tan(right)) - 1)
   end
-
-  defp column(bearing, focal), do: round(@columns / 2 - focal * :math.tan(bearing))
 
   @doc "The columns that the blobs of these colours fill."
   @spec seen([Blob.t()], colours :: [String.t()]) :: t()
@@ -95,8 +94,13 @@ defmodule Robot.Localiser.Columns do
 
   @doc "How many columns a set has."
   @spec count(t()) :: non_neg_integer()
-  def count(set), do: count(set, 0)
-
-  defp count(0, count), do: count
-  defp count(set, count), do: count(set &&& set - 1, count + 1)
+  # By twos, fours, eights and so on, in small integers throughout.
+  def count(set) do
+    set = set - (set >>> 1 &&& 0x555555555555555)
+    set = (set &&& 0x333333333333333) + (set >>> 2 &&& 0x333333333333333)
+    set = set + (set >>> 4) &&& 0xF0F0F0F0F0F0F0F
+    set = set + (set >>> 8)
+    set = set + (set >>> 16)
+    set + (set >>> 32) &&& 0x7F
+  end
 end

@@ -10,8 +10,9 @@ defmodule Robot.Localiser.Consistency do
   `Robot.Localiser.Belief.weigh/2` counts such pictures.
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Anchors, Belief, Columns}
+  alias Robot.Localiser.{Anchors, Belief, Columns, Glance}
   alias Robot.Percept
+  alias Robot.Percept.Sighting
 
   @sds 2.5
   # The standard deviation of a blob's border, in radians.
@@ -38,39 +39,49 @@ defmodule Robot.Localiser.Consistency do
     {hiding, showing} = Enum.split_with(percept.detections.blobs, &(&1.colour not in colours))
     seen = Columns.seen(showing, colours)
     covered = Columns.union(seen, Columns.seen(hiding, Enum.map(hiding, & &1.colour)))
-    camera = Columns.camera(percept)
-    spans = Enum.map(robots, &spans(&1, belief, exposed, camera))
+    view = Sighting.field_of_view(percept)
+    glance = Glance.new(belief, exposed, percept.detections.pan, view)
+    look = {belief, exposed, Columns.camera(percept), glance}
 
     cond do
-      stranger?(seen, spans) or missing?(covered, spans) -> :contradicted
+      contradicted?(robots, look, covered, seen) -> :contradicted
       Columns.empty?(seen) -> :unknown
       true -> :consistent
     end
   end
 
-  defp stranger?(seen, spans) do
-    possible = Enum.reduce(spans, 0, fn {may, _must}, set -> Columns.union(set, may) end)
-    Columns.count(Columns.without(seen, possible)) >= @columns
-  end
+  # Strangers are the columns that none of the robots so far may fill. One that is far need not be looked at when they
+  # are too few already.
+  defp contradicted?([], _look, _covered, strangers), do: Columns.count(strangers) >= @columns
 
-  defp missing?(covered, spans) do
-    Enum.any?(spans, fn {_may, must} ->
-      Columns.count(must) >= @columns and Columns.disjoint?(must, covered)
-    end)
+  defp contradicted?([mark | robots], {_, exposed, _, _} = look, covered, strangers) do
+    distance = Pose.distance(exposed, mark.at)
+
+    if distance >= @in_sight and Columns.count(strangers) < @columns do
+      contradicted?(robots, look, covered, strangers)
+    else
+      {may, must} = spans(mark, distance, look)
+
+      (Columns.count(must) >= @columns and Columns.disjoint?(must, covered)) or
+        contradicted?(robots, look, covered, Columns.without(strangers, may))
+    end
   end
 
   # The columns that a robot may fill, and those that it must fill.
-  defp spans(mark, belief, exposed, camera) do
-    distance = max(Pose.distance(exposed, mark.at), mark.radius)
-    half = :math.asin(mark.radius / distance)
-    bearing = Pose.bearing(exposed, mark.at)
-    doubt = @sds * bearing_sd(belief, exposed, mark) + @border_sd
-    core = half - doubt
+  defp spans(mark, distance, {belief, exposed, camera, glance}) do
+    near = if distance > mark.radius, do: distance, else: mark.radius
+    half = :math.asin(mark.radius / near)
+    most = half + @sds * Glance.most_sd(glance, mark, distance) + @border_sd
 
-    must =
-      if core > 0.0 and distance < @in_sight, do: Columns.span(bearing, core, camera), else: 0
-
-    {Columns.span(bearing, half + doubt, camera), must}
+    if Glance.aside(glance, mark.at) > most do
+      {0, 0}
+    else
+      bearing = Pose.bearing(exposed, mark.at)
+      doubt = @sds * bearing_sd(belief, exposed, mark) + @border_sd
+      core = half - doubt
+      must = if core > 0.0 and near < @in_sight, do: Columns.span(bearing, core, camera), else: 0
+      {Columns.span(bearing, half + doubt, camera), must}
+    end
   end
 
   # The uncertainty of a direction is that of both places across the line between them.

@@ -152,6 +152,10 @@ defmodule Robot.Localiser.Covariance do
       1.0
   """
   @spec project_state(t(), index :: non_neg_integer(), slope :: [float()]) :: float()
+  # That of the common error with a pose, which is asked for most.
+  def project_state([_, _, _, _, _, _, _, [x, y, h | _] | _], 7, [a, b, c]),
+    do: x * a + (y * b + (h * c + 0.0))
+
   def project_state(p, index, slope), do: index |> Kernel.+(1) |> :lists.nth(p) |> dot(slope)
 
   @doc "P - v v' / s: the covariance after a measurement (`project/2`) of innovation variance s."

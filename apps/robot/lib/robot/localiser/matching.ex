@@ -8,7 +8,7 @@ defmodule Robot.Localiser.Matching do
   direction is less certain (`slack`).
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Anchors, Belief}
+  alias Robot.Localiser.{Anchors, Belief, Glance}
   alias Robot.Percept.Sighting
   alias Vision.Blob
 
@@ -48,15 +48,21 @@ defmodule Robot.Localiser.Matching do
   @spec pairs([Anchors.mark()], [Blob.t()], Belief.t(), Pose.t(), pan :: float(), view :: float()) ::
           [pair()]
   def pairs(robots, blobs, belief, exposed, pan, view) do
-    looks = for blob <- blobs, do: {blob.colour, blob, Sighting.bearing(blob, pan, view)}
+    looks =
+      for(blob <- blobs, do: {blob.colour, blob, Sighting.bearing(blob, pan, view)})
+      |> Enum.group_by(&elem(&1, 0))
+
+    glance = Glance.new(belief, exposed, pan, view)
+    widest = Enum.reduce(blobs, 0.0, &max((&1.right - &1.left + 1) / &1.width, &2))
+    broad = widest * :math.tan(view / 2)
 
     candidates =
       for mark <- robots,
-          alike = Enum.filter(looks, &(elem(&1, 0) == mark.colour)),
-          [{_colour, %{width: picture}, _seen} | _] <- [alike],
+          near?(mark, glance, broad),
+          [{_colour, %{width: picture}, _seen} | _] = alike <- [Map.get(looks, mark.colour)],
           expected = expected(mark, belief, exposed, {picture, view}),
-          {_colour, blob, seen} <- alike,
-          c = candidate(expected, blob, seen),
+          beside = beside(expected, alike),
+          c <- candidates(expected, beside, belief, exposed),
           do: c
 
     for %{mark: mark, blob: blob} = one <- candidates,
@@ -80,44 +86,69 @@ defmodule Robot.Localiser.Matching do
   # Whether a blob touches the left or right border; it may be cut off above and below.
   defp cut?(blob), do: blob.left == 0 or blob.right == blob.width - 1
 
+  # Whether it can be a blob. However wide a blob is, its slack is no more than half of that width, or of the robot's.
+  defp near?(%{at: at, radius: radius} = mark, glance, broad) do
+    aside = Glance.aside(glance, at)
+
+    aside < @narrow or
+      (
+        distance = Pose.distance(glance.pose, at)
+        half = if distance > radius, do: :math.asin(radius / distance), else: :math.pi()
+        slack = if half > broad, do: half, else: broad
+        off = aside - slack
+        off < @narrow or off < 3 * (Glance.most_sd(glance, mark, distance) + @bearing_sd)
+      )
+  end
+
   # How a robot should look from there, for all blobs; `nil` for one that cannot be seen from within.
-  defp expected(mark, belief, exposed, camera) do
+  defp expected(mark, belief, exposed, {picture, view}) do
     distance = Pose.distance(exposed, mark.at)
-    if distance > mark.radius, do: expected(mark, distance, belief, exposed, camera)
-  end
 
-  defp expected(mark, distance, belief, exposed, {picture, view}) do
-    {bearing_sd, distance_sd} = sds(mark, distance, belief, exposed)
-
-    %{
-      mark: mark,
-      distance: distance,
-      width: Sighting.width(mark.radius, distance, picture, view),
-      half: :math.asin(mark.radius / distance),
-      bearing: Pose.bearing(exposed, mark.at),
-      bearing_sd: bearing_sd,
-      # If the distance is uncertain, so is the expected width of the blob.
-      doubt: 2 * max(distance_sd - @surely, 0.0) / distance
-    }
-  end
-
-  defp candidate(%{half: half, bearing_sd: bearing_sd} = expected, blob, seen) do
-    share = (blob.right - blob.left + 1) / expected.width
-    slack = abs(share - 1) * half
-    off = max(abs(Pose.wrap(seen - expected.bearing)) - slack, 0.0)
-
-    if (off < @narrow or off < 3 * bearing_sd) and
-         cost(off, bearing_sd, :math.log(share), expected.doubt) < @unlike do
+    if distance > mark.radius do
       %{
-        mark: expected.mark,
+        mark: mark,
+        distance: distance,
+        width: Sighting.width(mark.radius, distance, picture, view),
+        half: :math.asin(mark.radius / distance),
+        bearing: Pose.bearing(exposed, mark.at),
+        bearing_sd: bearing_sd(mark, distance, belief, exposed)
+      }
+    end
+  end
+
+  # The blobs in whose direction a robot may be, each with the share of its width and how far it is off.
+  defp beside(expected, looks) do
+    %{width: width, half: half, bearing: bearing, bearing_sd: bearing_sd} = expected
+
+    for {_colour, blob, seen} <- looks,
+        share = (blob.right - blob.left + 1) / width,
+        slack = abs(share - 1) * half,
+        off = max(abs(Pose.wrap(seen - bearing)) - slack, 0.0),
+        off < @narrow or off < 3 * bearing_sd,
+        do: {blob, share, slack, off}
+  end
+
+  # How certain its distance is, is asked only of a robot that is beside a blob.
+  defp candidates(_expected, [], _belief, _exposed), do: []
+
+  defp candidates(%{mark: mark, distance: distance} = expected, beside, belief, exposed) do
+    # If the distance is uncertain, so is the expected width of the blob.
+    doubt = 2 * max(distance_sd(mark, distance, belief, exposed) - @surely, 0.0) / distance
+
+    for {blob, share, slack, off} <- beside,
+        log = :math.log(share),
+        cost = cost(off, expected.bearing_sd, log, doubt),
+        cost < @unlike do
+      %{
+        mark: mark,
         blob: blob,
-        distance: expected.distance,
+        distance: distance,
         expected: expected.bearing,
-        half: half,
+        half: expected.half,
         slack: slack,
-        width: abs(:math.log(share)),
-        cost: cost(off, bearing_sd, :math.log(share), expected.doubt),
-        sure?: expected.doubt < @doubt
+        width: abs(log),
+        cost: cost,
+        sure?: doubt < @doubt
       }
     end
   end
@@ -130,18 +161,20 @@ defmodule Robot.Localiser.Matching do
     bearing * bearing + width * width
   end
 
-  # The standard deviations of the direction and the distance in which the robot is seen.
-  defp sds(%{at: {x, y}} = mark, distance, belief, exposed) do
+  # The standard deviation of the direction in which the robot is seen. However uncertain the place is, it stays within
+  # half a turn.
+  defp bearing_sd(%{at: {x, y}} = mark, distance, belief, exposed) do
     {dx, dy} = {x - exposed.x, y - exposed.y}
     square = max(distance * distance, 0.09)
-    length = max(distance, 0.01)
-    {x, y} = {dx / length, dy / length}
     across = Belief.variance(belief, {dy / square, -dx / square, -1.0}, mark)
-    along = Belief.variance(belief, {-x, -y, 0.0}, mark)
-    bearing = across + @bearing_sd * @bearing_sd / 4
+    :math.atan(root(across + @bearing_sd * @bearing_sd / 4))
+  end
 
-    # However uncertain the place is, the direction stays within half a turn.
-    {:math.atan(root(bearing)), root(along)}
+  # The same of its distance.
+  defp distance_sd(%{at: {x, y}} = mark, distance, belief, exposed) do
+    length = max(distance, 0.01)
+    {x, y} = {(x - exposed.x) / length, (y - exposed.y) / length}
+    root(Belief.variance(belief, {-x, -y, 0.0}, mark))
   end
 
   # Rounding may make a variance of zero negative.

@@ -11,8 +11,9 @@ defmodule Robot.Localiser.Silhouettes do
   wrong and no place elsewhere is nearly as good.
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Anchors, Belief, Columns}
+  alias Robot.Localiser.{Anchors, Belief, Columns, Glance}
   alias Robot.Percept
+  alias Robot.Percept.Sighting
 
   # With a standard deviation below this (metres) no search is needed.
   @sure 0.2
@@ -58,7 +59,17 @@ defmodule Robot.Localiser.Silhouettes do
     turn = Belief.turn_along(belief, axis)
     count = min(ceil(@reach * worst / @step), @steps)
     camera = Columns.camera(percept)
-    bodies = for %{at: {x, y}, radius: radius, sd: {sd, _, _}} <- robots, do: {x, y, radius, sd}
+    exposed = Pose.compose(belief.pose, back)
+    view = Sighting.field_of_view(percept)
+    glance = Glance.new(belief, exposed, percept.detections.pan, view)
+    swing = abs(turn) * @reach * worst
+    shift = @reach * worst + swing * Pose.distance(back, {0.0, 0.0})
+
+    bodies =
+      for %{at: {x, y}, radius: radius, sd: {sd, _, _}} <- robots,
+          body = {x, y, radius, sd},
+          in_sight?(body, glance, shift, swing),
+          do: body
 
     tried =
       for k <- -count..count do
@@ -84,6 +95,19 @@ defmodule Robot.Localiser.Silhouettes do
     end
   end
 
+  # Whether a robot may fill a column from any of the places, which are `shift` metres and `swing` radians away at most.
+  defp in_sight?({x, y, radius, sd}, glance, shift, swing) do
+    nearest = Pose.distance(glance.pose, {x, y}) - shift
+
+    nearest < 2 * radius or
+      (
+        half = :math.asin(radius / nearest)
+        wide = if sd > @strange, do: half + @wide * sd / nearest, else: half
+        parallax = :math.asin(shift / (nearest + shift))
+        Glance.aside(glance, {x, y}) < wide + parallax + swing
+      )
+  end
+
   defp moved(%Pose{} = pose, {x, y}, turn, way),
     do: Pose.new(pose.x + way * x, pose.y + way * y, pose.heading + way * turn)
 
@@ -97,35 +121,43 @@ defmodule Robot.Localiser.Silhouettes do
     {:math.sqrt(@found_sd * @found_sd + max(sd * sd - common * common, 0.0)), common}
   end
 
-  # The columns that robots would fill, and those that a robot at an unknown place may fill.
-  defp filled(bodies, pose, {pan, _focal} = camera) do
-    axis = {:math.cos(pose.heading + pan), :math.sin(pose.heading + pan)}
-    bodies |> Enum.reject(&behind?(&1, pose, axis)) |> filled(pose, camera, 0, 0)
+  # The columns that robots would fill, and those that a robot at an unknown place may fill. A robot is tried from dozens of
+  # places, so all is computed here that `Hal.Pose` could, in the same order.
+  defp filled(bodies, %Pose{x: x, y: y, heading: heading}, {pan, _focal} = camera) do
+    axis = {:math.cos(heading + pan), :math.sin(heading + pan)}
+    filled(bodies, {x, y, heading}, axis, camera, 0, 0)
   end
 
-  # Whether a known robot that is not very near is behind the camera, and so fills no column; half
-  # of them are, and need no angles.
-  defp behind?({_x, _y, _radius, sd}, _pose, _axis) when sd > @strange, do: false
+  defp filled([], _from, _axis, _camera, known, unknown), do: {known, unknown}
 
-  defp behind?({x, y, radius, _sd}, pose, {ax, ay}) do
-    {dx, dy} = {x - pose.x, y - pose.y}
-    dx * ax + dy * ay < 0.0 and dx * dx + dy * dy > 16 * radius * radius
-  end
+  defp filled(
+         [{bx, by, radius, sd} | bodies],
+         {x, y, heading} = from,
+         axis,
+         camera,
+         known,
+         unknown
+       ) do
+    {dx, dy} = {bx - x, by - y}
+    square = dx * dx + dy * dy
+    {ax, ay} = axis
 
-  defp filled([], _pose, _camera, known, unknown), do: {known, unknown}
-
-  defp filled([{x, y, radius, sd} | bodies], pose, camera, known, unknown) do
-    distance = Pose.distance(pose, {x, y})
-    half = if distance > radius, do: :math.asin(radius / distance), else: @quarter
-    bearing = Pose.bearing(pose, {x, y})
-
-    if sd > @strange do
-      wide = half + @wide * sd / if(distance > 0.1, do: distance, else: 0.1)
-      span = Columns.span(bearing, wide, camera)
-      filled(bodies, pose, camera, known, Columns.union(unknown, span))
+    # A known robot that is not very near and behind the camera fills no column; half of them are, and need no angles.
+    if sd <= @strange and dx * ax + dy * ay < 0.0 and square > 16 * radius * radius do
+      filled(bodies, from, axis, camera, known, unknown)
     else
-      span = Columns.span(bearing, half, camera)
-      filled(bodies, pose, camera, Columns.union(known, span), unknown)
+      distance = :math.sqrt(square)
+      half = if distance > radius, do: :math.asin(radius / distance), else: @quarter
+      bearing = Pose.wrap(:math.atan2(dy, dx) - heading)
+
+      if sd > @strange do
+        wide = half + @wide * sd / if(distance > 0.1, do: distance, else: 0.1)
+        span = Columns.span(bearing, wide, camera)
+        filled(bodies, from, axis, camera, known, Columns.union(unknown, span))
+      else
+        span = Columns.span(bearing, half, camera)
+        filled(bodies, from, axis, camera, Columns.union(known, span), unknown)
+      end
     end
   end
 end

@@ -79,6 +79,10 @@ defmodule Sim.Compute.Reference do
         do: <<column::16-native, top::16-native, bottom::16-native, kind, luma>>
   end
 
+  @doc "See `Sim.Compute.Regions`."
+  @spec join(binary(), <<_::16>>) :: [Sim.Compute.Regions.t()]
+  defdelegate join(pieces, least), to: Sim.Compute.Regions
+
   @doc "See `Sim.Compute.paint/4`."
   @spec paint(tuple(), tuple(), binary(), Sim.Compute.noise(), binary()) :: binary()
   def paint(map, {_, _, _, _, _, _, _, width, height} = sight, poles, noise, tables) do

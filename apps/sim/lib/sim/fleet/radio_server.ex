@@ -87,7 +87,7 @@ defmodule Sim.Fleet.RadioServer do
   defp poll(%{polling?: true} = s), do: s
 
   defp poll(s) do
-    if :gb_sets.is_empty(s.radio.queue) do
+    if Radio.empty?(s.radio) do
       s
     else
       Process.send_after(self(), :poll, @poll_ms)

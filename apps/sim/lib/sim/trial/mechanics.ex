@@ -6,7 +6,7 @@ defmodule Sim.Trial.Mechanics do
   alias Hal.Twist
   alias Sim.{Radio, World}
   alias Sim.Trial.{Cuts, Evaluation, Faults, Memory, RunLog}
-  alias Swarm.Member
+  alias Swarm.{Member, Message}
   alias Vision.Detections
 
   @half_ms 50
@@ -78,13 +78,18 @@ defmodule Sim.Trial.Mechanics do
   @spec readings(trial(), atom()) :: [Hal.Drive.reading() | Hal.Ptz.reading()]
   def readings(trial, id), do: World.readings(trial.world, id)
 
-  @doc "What a robot's camera shows now: in a painted picture, or by geometry, as the options say."
-  @spec detections(trial(), atom()) :: Detections.t()
-  def detections(%{options: %{blobs: :direct}} = trial, id),
-    do: World.detections(trial.world, id)
+  @doc """
+  What a robot's camera shows now: in a painted picture, or by geometry, as the options say; with what all cameras can see
+  (`Sim.World.scenery/1`), or without, for one robot alone.
+  """
+  @spec detections(trial(), atom(), World.scenery() | nil) :: Detections.t()
+  def detections(trial, id, scenery \\ nil)
 
-  def detections(trial, id) do
-    frame = frame(trial, id)
+  def detections(%{options: %{blobs: :direct}} = trial, id, scenery),
+    do: World.detections(trial.world, id, scenery)
+
+  def detections(trial, id, scenery) do
+    frame = World.frame(trial.world, id, scenery)
     {:ok, blobs} = Vision.blobs(frame, trial.colours, nil, Memory.scratch())
     Detections.new(frame, blobs)
   end
@@ -124,7 +129,9 @@ defmodule Sim.Trial.Mechanics do
 
   def effect({:send, to, message}, id, trial) do
     to = if to == :all, do: List.delete(trial.options.robots, id), else: List.wrap(to)
-    %{trial | radio: Radio.send(trial.radio, trial.at_ms, id, to, message)}
+    # Checked once, and not by each that hears it.
+    letter = {message, Message.check(message)}
+    %{trial | radio: Radio.send(trial.radio, trial.at_ms, id, to, letter)}
   end
 
   def effect({:stage, name, facts}, id, trial),

@@ -19,16 +19,18 @@ defmodule Swarm.Comms.Forwarder do
   @alive_ms 1_000
   @relays 2
 
-  defstruct missing: %{}, beats: %{}, letters: %{}
+  defstruct missing: %{}, beats: %{}, letters: %{}, heard: {[], <<>>}
 
   @typedoc """
-  `missing` says since when a robot (the second of the pair) has not heard another; `beats` and
+  `heard` has the robots that are heard now, sorted, and the set of these and of this one; it seldom changes. `missing`
+  says since when a robot (the second of the pair) has not heard another; `beats` and
   `letters` say what was last forwarded from which robot to which.
   """
   @type t :: %__MODULE__{
           missing: %{{atom(), atom()} => integer()},
           beats: %{{atom(), atom()} => {integer(), integer()}},
-          letters: %{{atom(), atom()} => {non_neg_integer(), integer()}}
+          letters: %{{atom(), atom()} => {non_neg_integer(), integer()}},
+          heard: {[atom()], NameSet.t()}
         }
 
   @typedoc "The peers of a percept."
@@ -41,19 +43,44 @@ defmodule Swarm.Comms.Forwarder do
   @doc "The heartbeats to forward now, as `{:send, [to], message}`."
   @spec beats(t(), atom(), peers(), integer()) :: {t(), [{:send, [atom()], Message.t()}]}
   def beats(relay, me, peers, now_ms) do
-    alive = for {id, %{beat: %Heartbeat{}} = peer} <- peers, alive?(peer, now_ms), do: {id, peer}
-    alive = Enum.sort(alive)
-    names = Enum.map(alive, &elem(&1, 0))
-    all = NameSet.new([me | names])
+    {names, all} = heard = heard(relay.heard, me, peers, now_ms)
 
     pairs =
-      for {to, %{beat: %{heard: heard}}} <- alive,
-          not NameSet.all_but?(heard, all, to),
-          NameSet.member?(heard, me),
-          from <- names -- NameSet.names(heard),
+      for to <- names,
+          %{^to => %{beat: %{heard: roll}}} = peers,
+          not NameSet.all_but?(roll, all, to),
+          NameSet.member?(roll, me),
+          from <- names -- NameSet.names(roll),
           from != to,
           do: {from, to}
 
+    if pairs == [] and relay.missing == %{},
+      do: {%{relay | heard: heard}, []},
+      else: forward(%{relay | heard: heard}, me, peers, pairs, now_ms)
+  end
+
+  # Those that are heard now, and the set of these and of this robot: mostly the same as before.
+  defp heard({names, _all} = before, me, peers, now_ms) do
+    ids = for {id, peer} <- Map.to_list(peers), alive?(peer, now_ms), do: id
+
+    if length(ids) == length(names) and Enum.all?(names, &known?(peers, &1, now_ms)) do
+      before
+    else
+      names = Enum.sort(ids)
+      {names, NameSet.new([me | names])}
+    end
+  end
+
+  defp known?(peers, id, now_ms) do
+    case peers do
+      %{^id => peer} -> alive?(peer, now_ms)
+      _never_heard -> false
+    end
+  end
+
+  defp forward(relay, me, peers, pairs, now_ms) do
+    {names, _all} = relay.heard
+    alive = Map.take(peers, names)
     missing = Map.new(pairs, &{&1, Map.get(relay.missing, &1, now_ms)})
 
     relay = %{
@@ -63,13 +90,11 @@ defmodule Swarm.Comms.Forwarder do
         letters: Map.take(relay.letters, pairs)
     }
 
-    known = Map.new(alive)
-
     for {from, to} = pair <- pairs,
         now_ms - missing[pair] >= @patience_ms,
-        mine?(me, from, to, known, now_ms),
+        mine?(me, from, to, alive, now_ms),
         reduce: {relay, []} do
-      {relay, sent} -> beat(relay, me, pair, known[from], sent)
+      {relay, sent} -> beat(relay, me, pair, alive[from], sent)
     end
   end
 

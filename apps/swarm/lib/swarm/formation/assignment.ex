@@ -52,64 +52,67 @@ defmodule Swarm.Formation.Assignment do
     costs = rows |> Enum.map(&List.to_tuple/1) |> List.to_tuple()
     zero = Map.new(0..n, &{&1, 0})
 
-    {owner, _u, _v} =
-      Enum.reduce(1..n, {%{}, zero, zero}, fn row, potentials ->
-        augment(row, potentials, costs, n)
-      end)
+    {owner, _u, _v} = Enum.reduce(1..n, {%{}, zero, zero}, &augment(&1, &2, costs, n))
 
     owner = for {column, row} <- owner, column > 0, do: {row, column - 1}
     owner |> Enum.sort() |> Enum.map(&elem(&1, 1))
   end
 
-  # Rows and columns count from 1; the path starts at column 0.
+  # Rows and columns count from 1; the path starts at column 0. A free column is `{column, potential, way, from}`: the
+  # shortest way to it so far, `nil` for none, and the column before it.
   defp augment(row, {owner, u, v}, costs, n) do
-    least = Map.new(1..n, &{&1, {nil, 0}})
-
-    {last, owner, u, v, way} =
-      grow(0, Map.put(owner, 0, row), u, v, least, [], Enum.to_list(1..n), costs)
-
-    {flip(last, owner, way), u, v}
-  end
-
-  # One step of Dijkstra's search: `used` columns are settled, `least` holds the reduced cost of
-  # the free ones and from which column it was reached.
-  defp grow(column, owner, u, v, least, used, free, costs) do
-    row = Map.fetch!(owner, column)
-    used = [column | used]
-
-    least =
-      Enum.reduce(free, least, fn j, least ->
-        cost = elem(elem(costs, row - 1), j - 1) - Map.fetch!(u, row) - Map.fetch!(v, j)
-
-        case Map.fetch!(least, j) do
-          {known, _from} when is_integer(known) and known <= cost -> least
-          _dearer -> Map.put(least, j, {cost, column})
-        end
-      end)
-
-    next = Enum.min_by(free, &{elem(Map.fetch!(least, &1), 0), &1})
-    {delta, _from} = Map.fetch!(least, next)
+    owner = Map.put(owner, 0, row)
+    free = for j <- 1..n, do: {j, Map.fetch!(v, j), nil, 0}
+    {last, length, settled, from} = grow(0, 0, free, [], %{}, {owner, u, costs})
 
     {u, v} =
-      Enum.reduce(used, {u, v}, fn j, {u, v} ->
-        {Map.update!(u, Map.fetch!(owner, j), &(&1 + delta)), Map.update!(v, j, &(&1 - delta))}
+      Enum.reduce(settled, {u, v}, fn {j, at}, {u, v} ->
+        i = Map.fetch!(owner, j)
+        more = length - at
+        {%{u | i => Map.fetch!(u, i) + more}, %{v | j => Map.fetch!(v, j) - more}}
       end)
 
-    least =
-      Enum.reduce(free, least, fn j, least ->
-        Map.update!(least, j, fn {cost, from} -> {cost - delta, from} end)
-      end)
-
-    if Map.has_key?(owner, next),
-      do: grow(next, owner, u, v, least, used, List.delete(free, next), costs),
-      else: {next, owner, u, v, least}
+    {flip(last, owner, from), u, v}
   end
 
-  defp flip(0, owner, _way), do: owner
+  # One step of Dijkstra's search, from a column that is settled at the end of a way of this length.
+  defp grow(column, length, free, settled, from, {owner, u, costs} = graph) do
+    row = Map.fetch!(owner, column)
+    base = length - Map.fetch!(u, row)
+    free = relax(free, elem(costs, row - 1), base, column)
+    {next, _potential, way, before} = nearest = nearest(free)
+    settled = [{column, length} | settled]
+    from = Map.put(from, next, before)
 
-  defp flip(column, owner, way) do
-    {_cost, from} = Map.fetch!(way, column)
-    flip(from, Map.put(owner, column, Map.fetch!(owner, from)), way)
+    if is_map_key(owner, next),
+      do: grow(next, way, List.delete(free, nearest), settled, from, graph),
+      else: {next, way, settled, from}
+  end
+
+  defp relax([{j, potential, known, _from} = column | free], row, base, by) do
+    way = base + elem(row, j - 1) - potential
+
+    if known != nil and known <= way,
+      do: [column | relax(free, row, base, by)],
+      else: [{j, potential, way, by} | relax(free, row, base, by)]
+  end
+
+  defp relax([], _row, _base, _by), do: []
+
+  # The first of the nearest.
+  defp nearest([column | free]), do: nearest(free, column)
+
+  defp nearest([{_, _, way, _} = column | free], {_, _, least, _}) when way < least,
+    do: nearest(free, column)
+
+  defp nearest([_column | free], best), do: nearest(free, best)
+  defp nearest([], best), do: best
+
+  defp flip(0, owner, _from), do: owner
+
+  defp flip(column, owner, from) do
+    before = Map.fetch!(from, column)
+    flip(before, Map.put(owner, column, Map.fetch!(owner, before)), from)
   end
 
   defp squared({ax, ay}, {bx, by}), do: (ax - bx) * (ax - bx) + (ay - by) * (ay - by)

@@ -51,17 +51,20 @@ defmodule Swarm.Membership.NameSet do
   @spec all_but?(t(), all :: t(), atom()) :: boolean()
   def all_but?(roll, all, id) do
     case :binary.match(all, entry(id)) do
-      {at, length} ->
-        front = binary_part(all, 0, at)
-        back = binary_part(all, at + length, byte_size(all) - at - length)
-
-        if roll == <<>>,
-          do: front == <<>> and back == <<>>,
-          else: roll == <<front::binary, 0, back::binary>>
-
-      :nomatch ->
-        roll == all
+      {at, length} -> all_but_at?(roll, all, at, length)
+      :nomatch -> roll == all
     end
+  end
+
+  defp all_but_at?(<<>>, all, _at, length), do: byte_size(all) == length
+
+  # Front, one zero, back: compared as they are, not put together first.
+  defp all_but_at?(roll, all, at, length) do
+    back = byte_size(all) - at - length
+
+    byte_size(roll) == at + 1 + back and
+      binary_part(roll, 0, at + 1) == binary_part(all, 0, at + 1) and
+      binary_part(roll, at + 1, back) == binary_part(all, at + length, back)
   end
 
   @doc """

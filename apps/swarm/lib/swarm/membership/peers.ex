@@ -21,18 +21,25 @@ defmodule Swarm.Membership.Peers do
   @gone_ms 2_000
 
   @enforce_keys [:me]
-  defstruct @enforce_keys ++ [rows: %{}, changes: 0]
+  defstruct @enforce_keys ++ [rows: %{}, changes: 0, shown: %{}, oldest_ms: nil, looked_ms: nil]
 
   @typedoc """
   `at_ms` is when the robot was last heard of, `direct_ms` when it was last heard itself, `nil`
   for never.
   """
   @type row :: %{beat: Heartbeat.t(), at_ms: integer(), direct_ms: integer() | nil}
-  @typedoc "`changes` counts those who came, came back or restarted, up to the last heartbeat."
+  @typedoc """
+  `changes` counts those who came, came back or restarted, up to the last heartbeat. `shown` has all as a percept shows
+  them while nobody is gone, which nobody can be for whom less than that has passed since `oldest_ms`, the time before
+  which no row is from; it was looked for at `looked_ms`.
+  """
   @type t :: %__MODULE__{
           me: atom(),
           rows: %{atom() => row()},
-          changes: non_neg_integer()
+          changes: non_neg_integer(),
+          shown: %{atom() => Robot.Percept.peer()},
+          oldest_ms: integer() | nil,
+          looked_ms: integer() | nil
         }
   @type status :: :alive | :suspect | :gone
 
@@ -56,15 +63,31 @@ defmodule Swarm.Membership.Peers do
         direct_ms = if direct?, do: now_ms, else: old && old.direct_ms
         row = %{beat: beat, at_ms: now_ms, direct_ms: direct_ms}
         changes = peers.changes + change(old, beat, now_ms)
-        %{peers | rows: Map.put(peers.rows, from, row), changes: changes}
+        note(%{peers | changes: changes}, from, row, now_ms)
 
       # The same heartbeat by the direct way, which was overtaken.
       direct? and same?(old.beat, beat) and old.direct_ms != old.at_ms ->
-        %{peers | rows: Map.put(peers.rows, from, %{old | direct_ms: old.at_ms})}
+        note(peers, from, %{old | direct_ms: old.at_ms}, now_ms)
 
       true ->
         peers
     end
+  end
+
+  # What it shows is made once a heartbeat, not once a tick.
+  defp note(%{rows: rows, shown: shown} = peers, from, row, now_ms) do
+    shown = Map.put(shown, from, percept(row, row.at_ms))
+    look(%{peers | rows: Map.put(rows, from, row), shown: shown}, now_ms)
+  end
+
+  defp look(%{oldest_ms: oldest, looked_ms: looked} = peers, now_ms)
+       when oldest != nil and now_ms >= oldest and
+              (now_ms - oldest < @suspect_ms or now_ms - looked < @suspect_ms),
+       do: peers
+
+  defp look(peers, now_ms) do
+    oldest = Enum.reduce(peers.rows, now_ms, fn {_id, %{at_ms: at_ms}}, o -> min(o, at_ms) end)
+    %{peers | oldest_ms: oldest, looked_ms: now_ms}
   end
 
   # A robot that comes counts one; one that was away counts one for leaving and one for returning.
@@ -157,6 +180,10 @@ defmodule Swarm.Membership.Peers do
 
   @doc "The peers as a percept shows them, for the avoidance."
   @spec percepts(t(), integer()) :: %{atom() => Robot.Percept.peer()}
+  def percepts(%{oldest_ms: oldest, shown: shown}, now_ms)
+      when oldest != nil and now_ms - oldest < @gone_ms,
+      do: shown
+
   def percepts(peers, now_ms),
     do: Map.new(peers.rows, fn {id, row} -> {id, percept(row, now_ms)} end)
 

@@ -39,7 +39,12 @@ defmodule Swarm.Message.Receiver do
   def hear(%__MODULE__{} = receiver, term, now_ms),
     do: take(receiver, Message.check(term), now_ms)
 
-  defp take(%{me: me} = receiver, checked, now_ms) do
+  @doc """
+  The same for what was checked before (`Swarm.Message.check/1`), on this node and not by whoever sent it: once for all
+  robots that hear it.
+  """
+  @spec take(t(), {:ok, Message.t()} | {:error, atom()}, integer()) :: {heard(), t()}
+  def take(%__MODULE__{me: me} = receiver, checked, now_ms) do
     case checked do
       # From another robot of this name: another module decides which of the two gives way.
       {:ok, %Message{from: ^me}} ->

@@ -11,6 +11,25 @@ defmodule Swarm.Membership.PeersTest do
 
   defp newest(peers), do: elem(peers.rows.mag2.beat.pose, 0)
 
+  test "percepts are those of the newest heartbeats at any time, whoever falls silent, and if the clock jumps" do
+    for _ <- 1..50 do
+      Enum.reduce(1..60, {Peers.new(:me), 0}, fn sequence, {peers, now_ms} ->
+        now_ms = now_ms + Enum.random([10, 200, 700, 1_500, 2_500, -100])
+        from = Enum.random([:mag1, :mag2, :mag3, :min1])
+
+        peers =
+          Peers.hear(peers, from, beat(1, sequence, sequence), now_ms, Enum.random([true, false]))
+
+        for later_ms <- [0, 150, 1_999, 2_000], at_ms = now_ms + later_ms do
+          one_by_one = for id <- Map.keys(peers.rows), do: {id, Peers.percept(peers, id, at_ms)}
+          assert Peers.percepts(peers, at_ms) == Map.new(one_by_one)
+        end
+
+        {peers, now_ms}
+      end)
+    end
+  end
+
   test "a peer is suspect after 1 s, gone after 2 s, and stays an obstacle" do
     peers = hear(Peers.new(:mag1), 1, 1, 0)
 

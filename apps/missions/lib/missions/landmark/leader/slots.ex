@@ -5,7 +5,6 @@ defmodule Missions.Landmark.Leader.Slots do
   alias Missions.Landmark
   alias Missions.Landmark.{Merge, Rounds, Shape}
   alias Swarm.Formation.{Assignment, Chain}
-  alias Swarm.Membership.Peers
 
   # Metres: nearer than 1.4 m the landmark's foot leaves the picture, and then its size is unknown.
   @near 1.5
@@ -67,7 +66,7 @@ defmodule Missions.Landmark.Leader.Slots do
 
   # Assigns the slots by squared distance from where the robots say they are.
   defp deal(mission) do
-    beats = Peers.taking_part(mission.percept.peers, mission.now_ms)
+    beats = Landmark.State.beats(mission)
     followers = for id <- mission.order, {x, y, _heading} = beats[id].pose, do: {id, {x, y}}
     {x, y, _heading} = Landmark.State.millimetres(mission.percept.pose)
     used = used(mission, mission.lead.shape)

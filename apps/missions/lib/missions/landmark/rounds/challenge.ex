@@ -6,7 +6,6 @@ defmodule Missions.Landmark.Rounds.Challenge do
   and as long as the landmark has not moved, a robot that passes it on the way to its slot does
   not challenge the leader. Pure.
   """
-  alias Swarm.Membership.Peers
   alias Missions.Landmark
 
   @dwell_ms 2_000
@@ -37,7 +36,7 @@ defmodule Missions.Landmark.Rounds.Challenge do
   defp since(_other, _reason, now_ms), do: now_ms
 
   defp reason(mission) do
-    peers = Peers.taking_part(mission.percept.peers, mission.now_ms)
+    peers = Landmark.State.beats(mission)
 
     with true <- Landmark.State.sees?(mission),
          %{distance: mine} when mine != nil <- mission.sight,

@@ -68,6 +68,8 @@ defmodule Missions.Landmark.Rounds.Opening do
 
   # A round would wait in vain for a member that is gone, and leave out one that came. A robot
   # that has only just been switched on has heard nobody yet, but then nobody is gone.
+  defp reopen(%{round: %{view: view}} = mission, view, _since), do: mission
+
   defp reopen(%{round: round} = mission, view, since) do
     gone? = since >= @settle_ms and Enum.any?(round.view, &(&1 not in view))
     came? = round.phase == :collect and hd(view) == mission.me and view -- round.view != []

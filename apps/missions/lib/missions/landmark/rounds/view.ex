@@ -1,25 +1,17 @@
 defmodule Missions.Landmark.Rounds.View do
   @moduledoc "Who takes part in the landmark mission, as far as a robot hears. Pure."
   alias Missions.Landmark
-  alias Swarm.Membership.{Heartbeat, Peers}
+  alias Swarm.Membership.Heartbeat
 
   @doc "All that take part in the mission and are not gone, this robot too, sorted."
   @spec view(Landmark.State.t()) :: [atom()]
-  def view(mission) do
-    others = for {id, beat} <- beats(mission), beat.phase != :idle, do: id
-
-    Enum.sort([mission.me | others])
-  end
+  def view(mission), do: Landmark.State.company(mission).view
 
   @doc "The highest epoch of the leaders that are heard; -1 without one."
   @spec leading_epoch(Landmark.State.t()) :: integer()
-  def leading_epoch(mission) do
-    for {_id, %{phase: :lead, epoch: epoch}} <- beats(mission), reduce: -1 do
-      highest -> max(highest, epoch)
-    end
-  end
+  def leading_epoch(mission), do: Landmark.State.company(mission).leading_epoch
 
-  @doc "The heartbeats of the others that take part."
+  @doc "The heartbeats of the others that are not gone."
   @spec beats(Landmark.State.t()) :: %{atom() => Heartbeat.t()}
-  def beats(mission), do: Peers.taking_part(mission.percept.peers, mission.now_ms)
+  def beats(mission), do: Landmark.State.beats(mission)
 end

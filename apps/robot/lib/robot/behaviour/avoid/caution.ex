@@ -44,7 +44,9 @@ defmodule Robot.Behaviour.Avoid.Caution do
     own = astray(percept)
 
     doubtful =
-      for {_id, peer} <- peers, peer.mode == :dead or own > @unsure, do: spot(peer, own, percept)
+      for peer <- Map.values(peers),
+          peer.mode == :dead or own > @unsure,
+          do: spot(peer, own, percept)
 
     doubtful != [] and
       percept

@@ -42,9 +42,9 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   @doc "All other robots, nearest first, extrapolated to the present time."
   @spec robots(Percept.t()) :: [t()]
   def robots(%Percept{pose: pose} = percept) do
-    percept.peers
-    |> Enum.map(fn {id, peer} -> disc(id, peer, pose, percept) end)
-    |> Enum.sort_by(& &1.gap)
+    # `keysort` keeps the order of what is equally near.
+    discs = for {id, peer} <- Map.to_list(percept.peers), do: disc(id, peer, pose, percept)
+    for {_gap, disc} <- :lists.keysort(1, Enum.map(discs, &{&1.gap, &1})), do: disc
   end
 
   @doc """

@@ -59,7 +59,18 @@ defmodule Swarm.Agreement.Round.Epochs do
       6_000_000
   """
   @spec hear(Round.t(), [non_neg_integer()], integer()) :: Round.t()
+  def hear(round, [], _now_ms), do: round
+
+  # If the highest is admitted, the others change nothing after it.
   def hear(round, claims, now_ms) do
+    highest = Enum.max(claims)
+
+    if highest <= allowed(round, now_ms),
+      do: admitted(round, highest, now_ms),
+      else: hear_each(round, claims, now_ms)
+  end
+
+  defp hear_each(round, claims, now_ms) do
     round = trust(round, Enum.sort(claims, :desc), allowed(round, now_ms))
     allowed = allowed(round, now_ms)
 

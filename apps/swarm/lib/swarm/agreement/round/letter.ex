@@ -32,21 +32,24 @@ defmodule Swarm.Agreement.Round.Letter do
   @spec tries() :: pos_integer()
   def tries, do: @tries
 
-  @doc "Whether a term from outside is a letter."
-  @spec valid?(term()) :: boolean()
-  def valid?(%__MODULE__{id: {epoch, counter, initiator}} = letter) do
+  @doc "Whether a term from outside is a letter; its view is not checked again if it equals one that was."
+  @spec valid?(term(), known_view :: [atom()]) :: boolean()
+  def valid?(term, known_view \\ [])
+
+  def valid?(%__MODULE__{id: {epoch, counter, initiator}} = letter, known_view) do
     Wire.whole?(letter, __MODULE__) and Wire.counter?(epoch) and epoch > 0 and
       is_integer(counter) and counter in 1..@tries and Wire.name?(initiator) and
       Wire.number?(letter.remaining_ms) and letter.remaining_ms <= @longest_ms and
-      letter.purpose in [:search, :change] and Wire.names?(letter.view) and
-      Wire.distinct?(letter.view) and
+      letter.purpose in [:search, :change] and
+      (letter.view == known_view or
+         (Wire.names?(letter.view) and Wire.distinct?(letter.view))) and
       (letter.report == :busy or report?(letter.report)) and
       (letter.known == nil or known?(letter.known)) and
       (letter.digest == nil or (is_binary(letter.digest) and byte_size(letter.digest) == 32)) and
       is_boolean(letter.ask)
   end
 
-  def valid?(_term), do: false
+  def valid?(_term, _known_view), do: false
 
   defp known?(known) when is_map(known) and not is_struct(known),
     do: Enum.all?(known, fn {id, report} -> Wire.name?(id) and report?(report) end)
