@@ -109,7 +109,11 @@ defmodule Missions.Landmark do
     }
 
     mission = Landmark.State.note_company(mission)
-    mission = mission |> EpochFilter.update() |> Policy.update() |> ReferenceInbox.beats()
+    mission = EpochFilter.update(mission, Landmark.State.company(mission).epochs)
+    # Of others, if it has left some out.
+    mission =
+      mission |> Landmark.State.note_company() |> Policy.update() |> ReferenceInbox.beats()
+
     {mission, letters} = Rounds.tick(mission)
     {mission, stages} = step(mission)
     {mission, effects} = act(Transitions.activity(mission.phase), mission)

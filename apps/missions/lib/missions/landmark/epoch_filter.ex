@@ -19,15 +19,14 @@ defmodule Missions.Landmark.EpochFilter do
   @type t :: %__MODULE__{told: %{atom() => integer()}, untold: [map()]}
   defstruct told: %{}, untold: []
 
-  @doc "One tick: the mission with a percept without the claims that are refused."
-  @spec update(Landmark.State.t()) :: Landmark.State.t()
-  def update(%{now_ms: now} = mission) do
-    claims = Landmark.State.company(mission).epochs
+  @doc "One tick, with the epochs that others claim: the mission with a percept without the claims that are refused."
+  @spec update(Landmark.State.t(), claims :: [non_neg_integer()]) :: Landmark.State.t()
+  def update(%{now_ms: now} = mission, claims) do
     mission = %{mission | round: Round.Epochs.hear(mission.round, claims, now)}
     allowed = Round.Epochs.allowed(mission.round, now)
 
     if claims != [] and Enum.max(claims) > allowed,
-      do: mission |> leave_out(allowed) |> Landmark.State.note_company(),
+      do: leave_out(mission, allowed),
       else: mission
   end
 
