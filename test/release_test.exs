@@ -349,6 +349,33 @@ defmodule System.ReleaseAgainTest do
     assert pid(ask.(["pid"])) not in [first, second]
     assert {"", 0} = robot(["stop"], environment)
   end
+
+  @tag long: true, realtime: :long
+  test "a part that hangs does not keep it from ending", %{folder: folder} do
+    file = Path.join(folder, "mag1.exs")
+    robot_file(file, Path.join(folder, "none"))
+
+    environment = [
+      {"ROBOT", "mag1"},
+      {"CONVOY_ROBOT_FILE", file},
+      {"CONVOY_SECRET_FILE", Path.join(folder, "secret")},
+      {"RELEASE_TMP", folder}
+    ]
+
+    assert {"", 0} = robot(["daemon"], environment)
+    pid = pid(fn -> robot(["pid"], environment) end)
+
+    hangs = """
+    hang = fn -> Process.flag(:trap_exit, true); receive(do: (:never -> :ok)) end
+    part = %{id: :hung, start: {Task, :start_link, [hang]}, shutdown: :infinity}
+    {:ok, _pid} = DynamicSupervisor.start_child(Robot.Fleet, part)
+    :hangs
+    """
+
+    assert {":hangs\n", 0} = robot(["rpc", hangs], environment)
+    assert {"", 0} = robot(["stop"], environment)
+    refute there?(pid)
+  end
 end
 
 defmodule System.DeployTest do

@@ -16,7 +16,11 @@ defmodule Robot.MixProject do
       compilers: Convoy.Support.compilers([:native | Mix.compilers()], Mix.env()),
       test_ignore_filters: Convoy.Support.files(),
       native: [
-        nifs: [grid: ["grid.c", "grid_nif.c"], occupancy: ["occupancy.c", "occupancy_nif.c"]]
+        nifs: [
+          grid: ["grid.c", "grid_nif.c"],
+          occupancy: ["occupancy.c", "occupancy_nif.c"],
+          silhouettes: ["silhouettes.c", "silhouettes_nif.c"]
+        ]
       ],
       start_permanent: Mix.env() == :prod,
       deps: [{:hal, in_umbrella: true}, {:vision, in_umbrella: true}, {:mcap, in_umbrella: true}]

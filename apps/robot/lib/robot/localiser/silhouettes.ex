@@ -12,6 +12,7 @@ defmodule Robot.Localiser.Silhouettes do
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief, Columns, Glance}
+  alias Robot.Localiser.Silhouettes.{Native, Reference}
   alias Robot.Percept
   alias Robot.Percept.Sighting
 
@@ -30,12 +31,10 @@ defmodule Robot.Localiser.Silhouettes do
   @same 0.25
   @most 3
   @share 0.15
-  # The place of a robot with a greater standard deviation (metres) counts as unknown: the robot
-  # may fill any column within `@wide` standard deviations.
+  # As in `Robot.Localiser.Silhouettes.Reference`.
   @strange 0.5
   @wide 2.0
-  # Half of the apparent width of a robot at this robot's own place (radians).
-  @quarter :math.asin(1.0)
+  @most_bodies 1024
   # The standard deviation of a place that was found (metres), without that of the nearest robot.
   @found_sd 0.15
 
@@ -67,19 +66,19 @@ defmodule Robot.Localiser.Silhouettes do
 
     bodies =
       for %{at: {x, y}, radius: radius, sd: {sd, _, _}} <- robots,
-          body = {x, y, radius, sd},
-          in_sight?(body, glance, shift, swing),
-          do: body
+          in_sight?({x, y, radius, sd}, glance, shift, swing),
+          into: <<>>,
+          do: floats([x, y, radius, sd])
+
+    ways = for k <- -count..count, do: k * @reach * worst / count
+    search = search(belief.pose, back, axis, turn, camera)
 
     tried =
-      for k <- -count..count do
-        way = k * @reach * worst / count
-        pose = belief.pose |> moved(axis, turn, way) |> Pose.compose(back)
-        {filled, unknown} = filled(bodies, pose, camera)
-        wrong = filled |> Columns.difference(seen) |> Columns.without(unknown) |> Columns.count()
-        clear = seen |> Columns.without(unknown) |> Columns.count()
+      Enum.zip_with(ways, kernel(bodies).fits(search, seen, bodies, floats(ways)), fn way,
+                                                                                      {wrong,
+                                                                                       clear} ->
         {way * way / (worst * worst) + @wrong * wrong, way, wrong, clear}
-      end
+      end)
 
     {least, at, wrong, clear} = Enum.min(tried)
 
@@ -121,43 +120,14 @@ defmodule Robot.Localiser.Silhouettes do
     {:math.sqrt(@found_sd * @found_sd + max(sd * sd - common * common, 0.0)), common}
   end
 
-  # The columns that robots would fill, and those that a robot at an unknown place may fill. A robot is tried from dozens of
-  # places, so all is computed here that `Hal.Pose` could, in the same order.
-  defp filled(bodies, %Pose{x: x, y: y, heading: heading}, {pan, _focal} = camera) do
-    axis = {:math.cos(heading + pan), :math.sin(heading + pan)}
-    filled(bodies, {x, y, heading}, axis, camera, 0, 0)
-  end
+  defp search(pose, back, {x, y}, turn, {pan, focal}),
+    do:
+      floats([pose.x, pose.y, pose.heading, back.x, back.y, back.heading, x, y, turn, pan, focal])
 
-  defp filled([], _from, _axis, _camera, known, unknown), do: {known, unknown}
+  defp floats(numbers), do: for(number <- numbers, into: <<>>, do: <<number::float-native>>)
 
-  defp filled(
-         [{bx, by, radius, sd} | bodies],
-         {x, y, heading} = from,
-         axis,
-         camera,
-         known,
-         unknown
-       ) do
-    {dx, dy} = {bx - x, by - y}
-    square = dx * dx + dy * dy
-    {ax, ay} = axis
-
-    # A known robot that is not very near and behind the camera fills no column; half of them are, and need no angles.
-    if sd <= @strange and dx * ax + dy * ay < 0.0 and square > 16 * radius * radius do
-      filled(bodies, from, axis, camera, known, unknown)
-    else
-      distance = :math.sqrt(square)
-      half = if distance > radius, do: :math.asin(radius / distance), else: @quarter
-      bearing = Pose.wrap(:math.atan2(dy, dx) - heading)
-
-      if sd > @strange do
-        wide = half + @wide * sd / if(distance > 0.1, do: distance, else: 0.1)
-        span = Columns.span(bearing, wide, camera)
-        filled(bodies, from, axis, camera, known, Columns.union(unknown, span))
-      else
-        span = Columns.span(bearing, half, camera)
-        filled(bodies, from, axis, camera, Columns.union(known, span), unknown)
-      end
-    end
+  # The kernel in C takes no more; no fleet is as large.
+  defp kernel(bodies) do
+    if Native.loaded?() and byte_size(bodies) <= @most_bodies * 32, do: Native, else: Reference
   end
 end

@@ -10,6 +10,53 @@ defmodule Robot.Localiser.SilhouettesTest do
   @here Pose.new(0, 0)
   @radius 0.2
 
+  defp draw(low, high), do: low + :rand.uniform() * (high - low)
+  defp floats(numbers), do: for(number <- numbers, into: <<>>, do: <<number::float-native>>)
+
+  test "the kernel in C gives what the reference gives, near and far, sure and unsure" do
+    alias Silhouettes.{Native, Reference}
+    assert Native.loaded?()
+
+    for _ <- 1..300 do
+      bodies =
+        for _ <- 1..:rand.uniform(12),
+            into: <<>>,
+            do: floats([draw(-3, 3), draw(-3, 3), draw(0, 0.4), draw(0, 1)])
+
+      poses = for _ <- 1..2, do: [draw(-1, 1), draw(-1, 1), draw(-7, 7)]
+      line = [draw(-1, 1), draw(-1, 1), draw(-2, 2), draw(-1.5, 1.5), draw(20, 80)]
+      search = floats(List.flatten([poses, line]))
+      seen = :rand.uniform(1_048_576) * :rand.uniform(524_288)
+      ways = floats(for k <- -5..5, do: k * draw(0, 0.5))
+      arguments = [search, seen, bodies, ways]
+      assert apply(Native, :fits, arguments) == apply(Reference, :fits, arguments)
+    end
+  end
+
+  test "the kernel refuses what is not of its sizes" do
+    good = [floats(List.duplicate(1.0, 11)), 5, floats([1, 2, 3, 4]), floats([0.5])]
+    assert [{_wrong, _clear}] = apply(Silhouettes.Native, :fits, good)
+    nan = <<0, 0, 0, 0, 0, 0, 0xF8, 0x7F>>
+
+    for {at, bad} <- [
+          {0, floats([1.0])},
+          {0, 5},
+          {1, -1},
+          {1, 0x800000000000000},
+          {1, 1.0},
+          {2, floats([1, 2, 3])},
+          {2, nan <> floats([1, 2, 3])},
+          {2, floats(List.duplicate(1.0, 4 * 1_025))},
+          {3, <<1>>},
+          {3, floats([1.0e10])},
+          {3, floats(List.duplicate(1.0, 257))}
+        ],
+        do:
+          assert_raise(ArgumentError, fn ->
+            apply(Silhouettes.Native, :fits, List.replace_at(good, at, bad))
+          end)
+  end
+
   # A column ahead of a robot that believes to stand behind it.
   @column for n <- 1..4,
               do: %{
