@@ -200,7 +200,7 @@ defmodule System.DemoRefusesTest do
         "--picture /no/such/place/a.svg"
 
     refused(demo(line), [
-      ~s(--robots cannot be "0": a whole number from 1 to 100 is allowed),
+      ~s(--robots cannot be "0": a whole number from 1 to 1000 is allowed),
       ~s(--robots cannot be "-3": a whole number),
       ~s(--robots cannot be "1e9": a whole number),
       ~s(--map cannot be "moon": hall, hospital, arena, clinic, ),

@@ -32,7 +32,8 @@ defmodule Console.Demo do
     case begin(trial_module, options) do
       {:ok, trial, recorder, tables} ->
         scene = trial_module.scene(trial)
-        Enum.each([heading(options, scene) | lines.(trial)], &Output.line(output, &1))
+        heading = heading(options, scene) <> slow(trial_module, trial)
+        Enum.each([heading | lines.(trial)], &Output.line(output, &1))
         started = System.monotonic_time(:millisecond)
 
         run =
@@ -62,6 +63,22 @@ defmodule Console.Demo do
         refuse(line)
     end
   end
+
+  # What the machine does not manage in real time: the second of two steps of a large fleet in lockstep is timed. They are
+  # made again in the run.
+  @large 20
+  @step_us 100_000
+
+  defp slow(Trial, trial) do
+    trial = if length(Trial.living(trial)) > @large, do: Trial.step(trial)
+    {us, _trial} = if trial, do: :timer.tc(fn -> Trial.step(trial) end), else: {0, nil}
+
+    if us > @step_us,
+      do: "; at first they go at #{Format.decimals(@step_us / us, 2)} times real time here",
+      else: ""
+  end
+
+  defp slow(_real_time, _trial), do: ""
 
   defp begin(module, %Options{record: nil, csv: nil} = options) do
     with {:ok, trial} <- module.new(Options.trial(options)), do: {:ok, trial, nil, nil}

@@ -3,9 +3,7 @@ defmodule Console.Fleet do
   The robots of a fleet: `mag1`, `mag2`, … (Magellan Pro) and `min1`, `min2`, … (ATRV mini). Pure.
   """
 
-  # How many a demo may have, and how many a measurement.
-  @most 100
-  @measured 1_000
+  @most 1_000
 
   @doc """
   A fleet of `count` robots, half of each kind, one more Magellan when the count is odd.
@@ -14,7 +12,7 @@ defmodule Console.Fleet do
       [:mag1, :mag2, :min1]
   """
   @spec of(1..1_000) :: [atom()]
-  def of(count) when count in 1..@measured do
+  def of(count) when count in 1..@most do
     mini = div(count, 2)
     names("mag", count - mini) ++ names("min", mini)
   end
@@ -25,7 +23,7 @@ defmodule Console.Fleet do
       iex> Console.Fleet.parse("mag:2,min:1")
       {:ok, [:mag1, :mag2, :min1]}
       iex> Console.Fleet.parse("dog:2")
-      {:error, "such as mag:4,min:2 (kinds mag and min), 1 to 100 robots together"}
+      {:error, "such as mag:4,min:2 (kinds mag and min), 1 to 1000 robots together"}
   """
   @spec parse(String.t()) :: {:ok, [atom()]} | {:error, String.t()}
   def parse(text) do

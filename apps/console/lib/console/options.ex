@@ -42,6 +42,9 @@ defmodule Console.Options do
             csv: nil,
             help: false
 
+  # The names of a mesh's nodes end there.
+  @most_nodes 100
+
   @type t :: %__MODULE__{}
 
   # The maps without doors and corners, where a fleet needs less time.
@@ -55,7 +58,7 @@ defmodule Console.Options do
       iex> {options.robots, options.landmark}
       {[:mag1, :mag2, :min1], {-2.0, 1.0}}
       iex> Console.Options.parse(~w(--robots -3))
-      {:error, [~s(--robots cannot be "-3": a whole number from 1 to 100 is allowed)]}
+      {:error, [~s(--robots cannot be "-3": a whole number from 1 to 1000 is allowed)]}
   """
   @spec parse([String.t()], Path.t()) :: {:ok, t()} | {:error, [String.t()]}
   def parse(arguments, folder \\ ".") do
@@ -137,7 +140,7 @@ defmodule Console.Options do
 
   defp table(folder) do
     [
-      {"robots", "N", &Parse.whole(&1, 1..100), "how many robots, 1 to 100 (6)"},
+      {"robots", "N", &Parse.whole(&1, 1..1_000), "how many robots, 1 to 1000 (6)"},
       {"fleet", "mag:N,min:N", &Fleet.parse/1, "or how many of each kind"},
       {"seed", "S", &Parse.whole(&1, 0..4_294_967_295),
        "of all randomness; the same seed gives the same run (1)"},
@@ -275,6 +278,8 @@ the prompt then takes pause, step, speed"},
       for {line, true} <- [
             {"--record cannot be used with --nodes: robots in processes of their own are not recorded",
              record != nil and options.nodes},
+            {"--nodes takes at most #{@most_nodes} robots, each in a process of its own",
+             options.nodes and length(options.robots) > @most_nodes},
             {"--record-pictures needs --record FILE.mcap",
              options.record_pictures != nil and record == nil},
             {"--csv needs --headless, without --nodes and --hardware",

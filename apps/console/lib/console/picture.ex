@@ -1,7 +1,7 @@
 defmodule Console.Picture do
   @moduledoc """
   A run as one drawing (SVG): the floor with each robot's path, a legend, and below it the
-  formation error over time. Pure; no fonts or files are needed to show it.
+  formation error over time, if there is a landmark or there was a formation. Pure; no fonts or files are needed to show it.
   """
   alias Console.Cli.Format
   alias Console.Picture.{RunTrack, Svg}
@@ -24,7 +24,8 @@ defmodule Console.Picture do
     height = (top - bottom) * scale
     floor_height = max(height, legend_height(track))
     plot_y = 56 + floor_height + 50
-    total = plot_y + @plot_height + 52
+    plot? = track.landmark != [] or track.errors != []
+    total = if plot?, do: plot_y + @plot_height + 52, else: plot_y - 16
 
     [
       ~s(<?xml version="1.0" encoding="UTF-8"?>\n),
@@ -51,14 +52,18 @@ defmodule Console.Picture do
             [transform: "translate(#{@width - @margin - @legend} 56)"],
             legend(track)
           ),
-          Svg.group(
-            [transform: "translate(#{@margin + 52} #{round(plot_y)})"],
-            Plot.draw(track, @width - 2.0 * @margin - 56, @plot_height * 1.0)
-          )
+          if(plot?, do: plot(track, plot_y), else: [])
         ]
       ),
       "\n"
     ]
+  end
+
+  defp plot(track, y) do
+    Svg.group(
+      [transform: "translate(#{@margin + 52} #{round(y)})"],
+      Plot.draw(track, @width - 2.0 * @margin - 56, @plot_height * 1.0)
+    )
   end
 
   @doc """
@@ -120,7 +125,7 @@ defmodule Console.Picture do
         [
           transform: "translate(0 #{30 + 20 * min(length(track.last.robots), @robots_shown + 1)})"
         ],
-        signs()
+        signs(track)
       )
     ]
   end
@@ -150,9 +155,10 @@ defmodule Console.Picture do
   defp note(%{slot: nil, state: state}), do: words(state)
   defp note(robot), do: "#{Format.decimals(Sim.Scene.slot_error(robot), 2)} m off its place"
 
-  defp signs do
+  # Those that the drawing has.
+  defp signs(%{last: last, landmark: landmark}) do
     rows = [
-      {"start",
+      {"start", true,
        &Svg.element(:circle,
          cx: 15,
          cy: &1,
@@ -161,7 +167,7 @@ defmodule Console.Picture do
          stroke: "#5B616B",
          stroke_width: 1.5
        )},
-      {"place in the formation",
+      {"place in the formation", Enum.any?(last.robots, & &1.slot),
        &Svg.element(:circle,
          cx: 15,
          cy: &1,
@@ -171,15 +177,17 @@ defmodule Console.Picture do
          stroke_width: 1,
          stroke_dasharray: "3 3"
        )},
-      {"leader at the end",
+      {"leader at the end", Enum.any?(last.robots, & &1.leader?),
        &[
          Svg.element(:circle, cx: 15, cy: &1, r: 8, fill: "none", stroke: @ink, stroke_width: 2),
          Svg.element(:circle, cx: 15, cy: &1, r: 4.5, fill: "#5B616B")
        ]},
-      {"landmark", &Floor.diamond(15.0, &1, 7.0)}
+      {"landmark", landmark != [], &Floor.diamond(15.0, &1, 7.0)}
     ]
 
-    for {{name, sign}, k} <- Enum.with_index(rows) do
+    drawn = for {name, true, sign} <- rows, do: {name, sign}
+
+    for {{name, sign}, k} <- Enum.with_index(drawn) do
       y = 14.0 + 22 * k
       [sign.(y - 4), Svg.text(name, 50, y, font_size: 12, fill: @ink)]
     end

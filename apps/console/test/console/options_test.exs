@@ -85,9 +85,9 @@ defmodule Console.OptionsTest do
   end
 
   test "a wrong value is named, with what is allowed" do
-    for count <- ~w(0 -3 1e9 101 six 6.5 99999999999999999999) do
+    for count <- ~w(0 -3 1e9 1001 six 6.5 99999999999999999999) do
       assert error("--robots #{count}") ==
-               "--robots cannot be #{inspect(count)}: a whole number from 1 to 100 is allowed"
+               "--robots cannot be #{inspect(count)}: a whole number from 1 to 1000 is allowed"
     end
 
     for loss <- ~w(nan NaN inf -inf Infinity 1.1 -0.1 1e400 .5 0,2) do
@@ -121,8 +121,9 @@ defmodule Console.OptionsTest do
     assert error("--json /no/such/folder/a.json") =~ "a folder that exists"
     assert error("--duration 0") =~ "from 1 to 3600"
     assert error("--seed -1") =~ "whole number"
-    assert error("--fleet mag:0,min:0") =~ "1 to 100 robots"
-    assert error("--fleet mag:101") =~ "1 to 100 robots"
+    assert error("--fleet mag:0,min:0") =~ "1 to 1000 robots"
+    assert error("--nodes --robots 101") =~ "--nodes takes at most 100 robots"
+    assert error("--fleet mag:1001") =~ "1 to 1000 robots"
     assert error("--robots 3 --fleet mag:3") =~ "exclude each other"
   end
 

@@ -220,7 +220,9 @@ defmodule Console.PageTest do
           "return / leads epoch 1; \\w+, \\w+ follow\\./.test(document.getElementById('leads').textContent)"
         )
 
-        follower = Enum.find(module.scene(live).robots, &(&1.state == :follow))
+        following = fn -> Enum.find(module.scene(live).robots, &(&1.state == :follow)) end
+        wait(following)
+        follower = following.()
         choose = "document.querySelector('[data-id=#{follower.id}] button').click()"
         Browser.run(browser, choose)
         # A follower on its way: it would also rest, if it had nothing to do.

@@ -56,6 +56,18 @@ defmodule Console.PictureTest do
     end
   end
 
+  test "a mission without a formation has neither its plot nor its signs" do
+    texts = fn line ->
+      document = line |> Runs.track() |> Picture.draw("") |> parse()
+
+      for text <- ["start", "place in the formation", "landmark", "formation error (m)"],
+          do: count(document, "//text[.='#{text}']")
+    end
+
+    assert texts.("--mission patrol --landmark none --duration 10") == [1, 0, 0, 0]
+    assert texts.("--duration 60") == [1, 1, 1, 1]
+  end
+
   test "long waits add no points to a path" do
     short = Runs.track("--landmark none --duration 10")
     assert Enum.all?(Map.values(short.ways), &(length(&1) < 5))

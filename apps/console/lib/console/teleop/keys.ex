@@ -35,7 +35,9 @@ defmodule Console.Teleop.Keys do
   What a character says: a word for the robot, another speed, the end, or nothing yet (arrows are three characters).
 
       iex> keys = Console.Teleop.Keys.new(:mag1)
-      iex> {{:word, {0.6, 0.0}}, _keys} = Console.Teleop.Keys.key(keys, "w")
+      iex> {word, _keys} = Console.Teleop.Keys.key(keys, "w")
+      iex> word
+      {:word, {0.6, 0.0}}
       iex> {nil, keys} = Console.Teleop.Keys.key(keys, "\\e")
       iex> {nil, keys} = Console.Teleop.Keys.key(keys, "[")
       iex> {word, _keys} = Console.Teleop.Keys.key(keys, "D")
