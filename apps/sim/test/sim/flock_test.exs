@@ -121,8 +121,8 @@ defmodule Sim.FlockTest do
   end
 
   test "what holds for every mission holds" do
-    assert Robot.MissionCase.problems({:flock, course: [{0, 0}, {2, 0}]}, seeds: 1..2, seconds: 30) ==
-             []
+    flock = {:flock, course: [{0, 0}, {2, 0}]}
+    assert Robot.MissionCase.problems(flock, seeds: 1..2, seconds: 30) == []
   end
 
   test "a wrong option is one line" do
