@@ -40,7 +40,7 @@ defmodule Console.TeleopTest do
     assert {_speeds, %{share: share} = slow} = typed.("------", keys)
     assert_in_delta share, 0.2, 1.0e-9
     assert Keys.hint(slow) =~ "at 20 %"
-    assert {[:leave], _keys} = typed.("q", keys)
+    assert {[:estop, :leave], _keys} = typed.("eq", keys)
   end
 
   describe "a gamepad" do
@@ -69,8 +69,12 @@ defmodule Console.TeleopTest do
       :ok = :file.write(device, event(1, 4, 0))
       assert_receive {:told, {:tell, [:mag1], "move:0.0:0.0:0.3"}}
 
+      # One that is pulled out while it drives is let go.
+      :ok = :file.write(device, event(1, 4, 1))
+      assert_receive {:told, {:tell, [:mag1], "move:0.5:" <> _}}
       ref = Process.monitor(pad)
       :ok = :file.close(device)
+      assert_receive {:told, {:tell, [:mag1], "move:0.0:0.0:0.3"}}
       assert_receive {:line, "the gamepad at " <> _}
       assert_receive {:DOWN, ^ref, :process, ^pad, :normal}
     end

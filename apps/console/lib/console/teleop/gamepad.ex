@@ -1,7 +1,7 @@
 defmodule Console.Teleop.Gamepad do
   @moduledoc """
   Drives a robot by a gamepad: ten words a second while a shoulder button is held (`Console.Teleop.Joystick`), one word to stand
-  when it is let go, and none when the gamepad is gone, after which the robot stands by itself.
+  when it is let go or the gamepad is gone.
 
   Debian's `cat` reads the device, so that no thread of the VM waits in it.
   """
@@ -60,7 +60,8 @@ defmodule Console.Teleop.Gamepad do
   end
 
   def handle_info({port, {:exit_status, _status}}, %{port: port} = s) do
-    s.tell.("the gamepad at #{s.path} is gone; #{s.robot} stands")
+    s = if s.driving?, do: word(%{s | pad: %Joystick{}}), else: s
+    s.tell.("the gamepad at #{s.path} is gone; it drives #{s.robot} no more")
     {:stop, :normal, s}
   end
 

@@ -9,6 +9,7 @@ defmodule Console.Teleop.Keys do
   | `a`, left; `d`, right | turns |
   | `+`, `-` | faster, slower |
   | space | stands |
+  | `e` | emergency stop of all robots |
   | `q`, Enter, Ctrl-C | drives no more |
   """
 
@@ -29,7 +30,7 @@ defmodule Console.Teleop.Keys do
   @spec hint(t()) :: String.t()
   def hint(%__MODULE__{robot: robot, share: share}),
     do:
-      "driving #{robot} at #{round(share * 100)} %: w s a d or arrows, + and -, space stands, q ends"
+      "driving #{robot} at #{round(share * 100)} %: w s a d or arrows, + and -, space stands, e stops ALL, q ends"
 
   @doc """
   What a character says: a word for the robot, another speed, the end, or nothing yet (arrows are three characters).
@@ -45,7 +46,7 @@ defmodule Console.Teleop.Keys do
       {:word, {0.0, 0.6}}
   """
   @spec key(t(), String.t()) ::
-          {nil | {:word, Console.Teleop.stick()} | :speed | :leave, t()}
+          {nil | {:word, Console.Teleop.stick()} | :speed | :estop | :leave, t()}
   def key(%{escape: escape} = keys, char) when (escape <> char) in ["\e", "\e[", "\eO"],
     do: {nil, %{keys | escape: escape <> char}}
 
@@ -66,6 +67,7 @@ defmodule Console.Teleop.Keys do
       "a" -> {{:word, {0.0, share}}, keys}
       "d" -> {{:word, {0.0, -share}}, keys}
       " " -> {{:word, {0.0, 0.0}}, keys}
+      "e" -> {:estop, keys}
       "+" -> {:speed, %{keys | share: min(share + @step, 1.0)}}
       "-" -> {:speed, %{keys | share: max(share - @step, @step)}}
       leave when leave in ["q", "\r", "\n", <<3>>, <<4>>] -> {:leave, keys}

@@ -201,6 +201,7 @@ defmodule Console.Terminal.Session do
     case event do
       nil -> session
       :speed -> redraw(session)
+      :estop -> session |> drive(nil) |> obey("estop") |> redraw()
       :leave -> session |> drive(nil) |> word(keys.robot, {0.0, 0.0}) |> redraw()
       {:word, stick} -> session |> word(keys.robot, stick) |> redraw()
     end
@@ -230,7 +231,7 @@ defmodule Console.Terminal.Session do
   end
 
   defp gamepad(%{gamepad: pad} = session, :off) do
-    if pad, do: GenServer.stop(pad)
+    if pad, do: Process.exit(pad, :shutdown)
     {%{session | gamepad: nil}, if(pad, do: "off", else: "there was none")}
   end
 
