@@ -99,8 +99,13 @@ defmodule Release.Case do
     end
   end
 
-  @doc "Whether there is such a process."
-  def there?(pid), do: match?({_, 0}, System.cmd("kill", ["-0", pid], stderr_to_stdout: true))
+  @doc "Whether there is such a process, and it has not ended: one that its parent has not seen end has."
+  def there?(pid) do
+    case File.read("/proc/#{pid}/status") do
+      {:ok, status} -> not (status =~ ~r/^State:\tZ/m)
+      {:error, gone} when gone in [:enoent, :esrch] -> false
+    end
+  end
 
   @doc "The number of the robot's process, which ends with the test."
   def pid(ask) do

@@ -7,17 +7,17 @@ defmodule Mesh.Distribution.ConnectionLog do
       refused mag3 at 10.0.0.13:53312: its certificate is of another fleet (unknown CA)
 
   and the event `[:mesh, :refused]`. The filter runs in the process that reports, which holds the
-  connection, so the address is known there. At most five lines a second are logged, so that
+  connection, so the address is known there; or it was when the certificate came (`Peer`), if the
+  other side has hung up since. At most five lines a second are logged, so that
   connection attempts cannot fill a disk; the events of the others are dropped with them.
 
   A node without TLS that is called by one with TLS hangs up silently; the caller logs it.
   """
   alias Hal.Event
   alias Mesh.Distribution.ConnectionLog
-  alias Mesh.Distribution.ConnectionLog.Peer
+  alias Mesh.Distribution.ConnectionLog.{Address, Peer}
 
   @per_second 5
-  @hops 3
 
   @doc "Puts the filter before all handlers of the logger. Repeated calls change nothing."
   @spec install() :: :ok
@@ -38,7 +38,7 @@ defmodule Mesh.Distribution.ConnectionLog do
   end
 
   defp say(event, {whom, who, why}) do
-    address = address()
+    address = Address.find() || Peer.address()
     now = System.monotonic_time(:millisecond)
     about = %{refused: whom, who: who, address: address, why: why}
     Event.execute([:mesh, :refused], %{at_ms: now}, about)
@@ -59,35 +59,4 @@ defmodule Mesh.Distribution.ConnectionLog do
     if :atomics.exchange(state, 1, second) != second, do: :atomics.put(state, 2, 0)
     :atomics.add_get(state, 2, 1) <= @per_second
   end
-
-  # The socket belongs to this process, or with TLS to one that is linked to it through a few
-  # others of the same connection. Named processes belong to all connections and are skipped.
-  defp address do
-    case self() |> ports([], @hops) |> Enum.uniq() do
-      [address] -> address
-      _none_or_many -> nil
-    end
-  end
-
-  defp ports(pid, from, hops) do
-    case Process.info(pid, [:links, :registered_name]) do
-      [links: links, registered_name: name] when name == [] or pid == self() ->
-        Enum.flat_map(links -- from, &linked(&1, [pid | from], hops))
-
-      _named_or_gone ->
-        []
-    end
-  end
-
-  defp linked(port, _from, _hops) when is_port(port) do
-    case :inet.peername(port) do
-      {:ok, {ip, number}} -> ["#{:inet.ntoa(ip)}:#{number}"]
-      _no_connection -> []
-    end
-  end
-
-  defp linked(pid, from, hops) when is_pid(pid) and node(pid) == node() and hops > 0,
-    do: ports(pid, from, hops - 1)
-
-  defp linked(_other, _from, _hops), do: []
 end

@@ -13,6 +13,7 @@ defmodule Mesh.Distribution.Preload do
     Mesh.Distribution.Access.Refusals,
     Mesh.Distribution.CallingAddress,
     Mesh.Distribution.ConnectionLog,
+    Mesh.Distribution.ConnectionLog.Address,
     Mesh.Distribution.ConnectionLog.Peer,
     Mesh.Distribution.ConnectionLog.Reasons,
     Mesh.Distribution.Epmd.Peers,

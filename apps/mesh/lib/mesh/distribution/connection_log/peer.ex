@@ -1,8 +1,9 @@
 defmodule Mesh.Distribution.ConnectionLog.Peer do
   @moduledoc """
-  Finds the peer of a TLS handshake: the name in its certificate, for the log. Erlang calls
-  `verify/3` in the process of the connection, which keeps the name until it ends.
+  Finds the peer of a TLS handshake, for the log: the name in its certificate, and its address, which is gone once it has
+  hung up. Erlang calls `verify/3` in the process of the connection, which keeps both until it ends.
   """
+  alias Mesh.Distribution.ConnectionLog.Address
 
   @doc """
   The `verify_fun` of `ssl_dist.conf`: decides as OTP does, except for host names, and remembers
@@ -14,7 +15,7 @@ defmodule Mesh.Distribution.ConnectionLog.Peer do
   def verify(_certificate, {:bad_cert, :hostname_check_failed}, state), do: {:valid, state}
 
   def verify(certificate, {:bad_cert, _reason} = problem, _state) do
-    Process.put(__MODULE__, {name(certificate), problem})
+    remember(certificate, problem)
     {:fail, problem}
   end
 
@@ -22,13 +23,25 @@ defmodule Mesh.Distribution.ConnectionLog.Peer do
   def verify(_certificate, :valid, state), do: {:valid, state}
 
   def verify(certificate, :valid_peer, state) do
-    Process.put(__MODULE__, {name(certificate), nil})
+    remember(certificate, nil)
     {:valid, state}
   end
 
   @doc "The name and the problem of the certificate that this process has seen."
   @spec seen() :: {name :: String.t() | nil, problem :: term()}
-  def seen, do: Process.get(__MODULE__, {nil, nil})
+  def seen do
+    {name, problem, _address} = remembered()
+    {name, problem}
+  end
+
+  @doc "The address from which that certificate came (`Mesh.Distribution.ConnectionLog.Address`)."
+  @spec address() :: String.t() | nil
+  def address, do: elem(remembered(), 2)
+
+  defp remember(certificate, problem),
+    do: Process.put(__MODULE__, {name(certificate), problem, Address.find()})
+
+  defp remembered, do: Process.get(__MODULE__, {nil, nil, nil})
 
   # The common name in an `#OTPCertificate{}`, whose records are not Elixir's.
   defp name(certificate) do
