@@ -19,7 +19,7 @@ defmodule Mesh.Protocol do
   # Without a heartbeat of a robot of its own a node shows as often by beacons that it is there.
   @beat_ms 200
 
-  @enforce_keys [:secret, :roster, :name, :session, :guard, :node_table, :strategies, :port] ++
+  @enforce_keys [:secret, :roster, :name, :session, :replay, :node_table, :strategies, :port] ++
                   [:consumer, :services]
   defstruct @enforce_keys ++
               [
@@ -56,7 +56,7 @@ defmodule Mesh.Protocol do
           roster: Roster.t(),
           name: String.t(),
           session: non_neg_integer(),
-          guard: ReplayProtection.t(),
+          replay: ReplayProtection.t(),
           node_table: NodeTable.t(),
           strategies: [{module(), state :: term()}],
           port: :inet.port_number(),
@@ -85,7 +85,7 @@ defmodule Mesh.Protocol do
     %{roster: roster, session: session} = Map.new(options)
     name = Atom.to_string(roster.me)
 
-    own = [name: name, guard: ReplayProtection.new(session), node_table: NodeTable.new(name)]
+    own = [name: name, replay: ReplayProtection.new(session), node_table: NodeTable.new(name)]
     struct!(__MODULE__, options ++ own)
   end
 
@@ -127,7 +127,7 @@ defmodule Mesh.Protocol do
   defp renew(protocol, now_ms) do
     old =
       for {name, %{status: status, address: address}} <- protocol.node_table.nodes,
-          status != :gone and ReplayProtection.due?(protocol.guard, name, now_ms),
+          status != :gone and ReplayProtection.due?(protocol.replay, name, now_ms),
           do: address
 
     Outbox.clock(protocol, :challenge, nil, old, now_ms)

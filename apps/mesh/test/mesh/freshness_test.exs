@@ -150,7 +150,7 @@ defmodule Mesh.FreshnessTest do
     assert Enum.all?(sent, &(byte_size(&1) == 256 and kind(&1) == :challenge))
     protocol = a.stations["a"]
 
-    assert {map_size(protocol.challenged), protocol.guard.senders, protocol.node_table.nodes} ==
+    assert {map_size(protocol.challenged), protocol.replay.senders, protocol.node_table.nodes} ==
              {2, %{}, %{}}
 
     {protocol, _sent} = Protocol.tick(protocol, [], Air.time(a, "a") + 2_000, 0.5)

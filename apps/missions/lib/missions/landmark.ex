@@ -49,8 +49,8 @@ defmodule Missions.Landmark do
       leader_change?: Keyword.get(options, :leader_change, true),
       colour: Keyword.get(options, :colour, Landmark.State.colour()),
       round: Round.new(robot),
-      lead: Leader.new(),
-      attend: Follower.new(),
+      leadership: Leader.new(),
+      follower: Follower.new(),
       of: of,
       lost_link: lost_link
     }
@@ -132,7 +132,7 @@ defmodule Missions.Landmark do
 
   # Without reports of where things are, a robot must not correct its pose by where they were. Until
   # it leads for the first time, nobody has taken its places from it.
-  defp unled(%{phase: phase, lead: %{sequence: 0}, colour: colour})
+  defp unled(%{phase: phase, leadership: %{sequence: 0}, colour: colour})
        when phase in [:search, :agree],
        do: %Anchors{standing: colour}
 
@@ -156,8 +156,10 @@ defmodule Missions.Landmark do
   defp relay_beats(%{phase: :idle} = mission, _percept), do: {mission, []}
 
   defp relay_beats(mission, percept) do
-    {relay, beats} = Forwarder.beats(mission.relay, mission.me, percept.peers, mission.now_ms)
-    {%{mission | relay: relay}, beats}
+    {forwarder, beats} =
+      Forwarder.beats(mission.forwarder, mission.me, percept.peers, mission.now_ms)
+
+    {%{mission | forwarder: forwarder}, beats}
   end
 
   defp relay_letter(%{percept: percept, phase: phase} = mission, _message)
@@ -165,10 +167,10 @@ defmodule Missions.Landmark do
        do: {mission, []}
 
   defp relay_letter(%{percept: percept} = mission, message) do
-    {relay, letters} =
-      Forwarder.letter(mission.relay, mission.me, percept.peers, message, mission.now_ms)
+    {forwarder, letters} =
+      Forwarder.letter(mission.forwarder, mission.me, percept.peers, message, mission.now_ms)
 
-    {%{mission | relay: relay}, letters}
+    {%{mission | forwarder: forwarder}, letters}
   end
 
   defp still(mission), do: {mission.phase, mission, []}

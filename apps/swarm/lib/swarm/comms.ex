@@ -115,7 +115,7 @@ defmodule Swarm.Comms do
       id: id,
       board: board,
       receiver: Receiver.new(id),
-      chart: PeerWriter.new(board),
+      peer_writer: PeerWriter.new(board),
       sender: Sender.new(config, board, transport, boot),
       name: NameClaim.new(id, {boot, node()}),
       unseen: 0,
@@ -192,7 +192,7 @@ defmodule Swarm.Comms do
 
   defp heard(s, {:heartbeat, id, beat}, at_ms) do
     EStop.heard(s.id, s.board, beat)
-    %{s | chart: PeerWriter.heard(s.chart, s.receiver.peers, id, at_ms)}
+    %{s | peer_writer: PeerWriter.heard(s.peer_writer, s.receiver.peers, id, at_ms)}
   end
 
   defp heard(s, {:message, message}, _at_ms) do
@@ -204,7 +204,7 @@ defmodule Swarm.Comms do
 
   defp tick(s, at_ms) do
     s = note(s)
-    s = %{s | chart: PeerWriter.grow_old(s.chart, s.receiver.peers, at_ms)}
+    s = %{s | peer_writer: PeerWriter.grow_old(s.peer_writer, s.receiver.peers, at_ms)}
     counts = %{sent: s.sender.sent, heard: s.receiver.heard, rejected: s.receiver.rejected}
     Board.put(s.board, :comms, :radio, counts, at_ms)
     s = %{s | sender: Sender.tick(s.sender, s.receiver, at_ms)}

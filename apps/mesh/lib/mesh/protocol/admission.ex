@@ -40,14 +40,14 @@ defmodule Mesh.Protocol.Admission do
   end
 
   defp judge(protocol, packet, node, body, address, now_ms) do
-    case ReplayProtection.admit(protocol.guard, packet, echo(body), now_ms) do
-      {:ok, guard} ->
-        new? = ReplayProtection.session(protocol.guard, packet.sender) != packet.session
+    case ReplayProtection.admit(protocol.replay, packet, echo(body), now_ms) do
+      {:ok, replay} ->
+        new? = ReplayProtection.session(protocol.replay, packet.sender) != packet.session
 
         {node_table, changes} =
           NodeTable.hear(protocol.node_table, packet.sender, address, now_ms)
 
-        protocol = %{protocol | guard: guard, node_table: node_table}
+        protocol = %{protocol | replay: replay, node_table: node_table}
         {protocol, taken} = take(protocol, packet, node, body, address, now_ms)
 
         # Those who have just been let in need this node's word as soon.
@@ -56,19 +56,19 @@ defmodule Mesh.Protocol.Admission do
 
         {protocol, Roster.changes(protocol.roster, changes) ++ taken ++ sent}
 
-      {:error, :stranger, guard} ->
-        protocol = Rejections.strange(%{protocol | guard: guard})
+      {:error, :stranger, replay} ->
+        protocol = Rejections.strange(%{protocol | replay: replay})
         challenge(protocol, packet, body, address, now_ms)
 
-      {:error, :stale, guard} ->
+      {:error, :stale, replay} ->
         {protocol, taken} =
-          take_late(%{protocol | guard: guard}, packet, node, body, :stale, address, now_ms)
+          take_late(%{protocol | replay: replay}, packet, node, body, :stale, address, now_ms)
 
         {protocol, sent} = challenge(protocol, packet, body, address, now_ms)
         {protocol, taken ++ sent}
 
-      {:error, reason, guard} ->
-        Rejections.reject(%{protocol | guard: guard}, reason, address)
+      {:error, reason, replay} ->
+        Rejections.reject(%{protocol | replay: replay}, reason, address)
     end
   end
 
@@ -79,10 +79,10 @@ defmodule Mesh.Protocol.Admission do
   defp take_late(protocol, packet, node, body, why, address, now_ms) do
     with {:service, service, _term} <- body,
          true <- service in protocol.late,
-         {:ok, guard} <- ReplayProtection.admit_late(protocol.guard, packet, now_ms) do
-      take(%{protocol | guard: guard}, packet, node, body, address, now_ms)
+         {:ok, replay} <- ReplayProtection.admit_late(protocol.replay, packet, now_ms) do
+      take(%{protocol | replay: replay}, packet, node, body, address, now_ms)
     else
-      {:error, reason, guard} -> Rejections.reject(%{protocol | guard: guard}, reason, address)
+      {:error, reason, replay} -> Rejections.reject(%{protocol | replay: replay}, reason, address)
       _not_late -> Rejections.reject(protocol, why, address)
     end
   end

@@ -24,11 +24,11 @@ defmodule Missions.Landmark.Claim do
       standing: standing?(mission),
       sd: Marks.told(mission),
       uncertainty: uncertainty(mission.percept),
-      in_place: mission.phase == :follow and mission.attend.in_place?,
-      unsure: mission.phase == :follow and mission.attend.unsure?,
-      blocked: mission.phase == :follow and mission.attend.blocked?,
-      blocked_by: if(mission.phase == :follow, do: Blocker.words(mission.attend.blocker)),
-      formed: leading? and mission.lead.formed?,
+      in_place: mission.phase == :follow and mission.follower.in_place?,
+      unsure: mission.phase == :follow and mission.follower.unsure?,
+      blocked: mission.phase == :follow and mission.follower.blocked?,
+      blocked_by: if(mission.phase == :follow, do: Blocker.words(mission.follower.blocker)),
+      formed: leading? and mission.leadership.formed?,
       anchor: if(leading?, do: mission.anchor)
     }
   end
@@ -37,7 +37,7 @@ defmodule Missions.Landmark.Claim do
   defp uncertainty(_no_pose), do: nil
 
   defp standing?(%{phase: :lead, percept: percept}), do: Landmark.State.slow?(percept, 0.05)
-  defp standing?(%{phase: :follow} = mission), do: mission.attend.holding?
+  defp standing?(%{phase: :follow} = mission), do: mission.follower.holding?
   defp standing?(%{phase: :hold, percept: percept}), do: Landmark.State.slow?(percept, 0.05)
   defp standing?(%{phase: phase}), do: phase in [:idle, :search, :agree, :rest, :wait, :halt]
 end

@@ -82,7 +82,7 @@ defmodule Missions.Landmark.Follower do
 
   @doc "The state at the beginning of following."
   @spec begin(Landmark.State.t()) :: Landmark.State.t()
-  def begin(mission), do: %{mission | attend: new(), scan: nil}
+  def begin(mission), do: %{mission | follower: new(), scan: nil}
 
   @doc "One tick of following."
   @spec act(Landmark.State.t()) :: {Landmark.State.t(), [tuple()]}
@@ -91,20 +91,20 @@ defmodule Missions.Landmark.Follower do
     place = mission.anchor && SlotPoses.slot(mission.anchor, mission.me, age_ms)
 
     if place == nil or age_ms > @lease_ms or mission.percept.pose == nil do
-      {%{mission | attend: wait(mission.attend, age_ms)},
+      {%{mission | follower: wait(mission.follower, age_ms)},
        [{:goal, :stand, {Behaviour.Stop, []}}, {:look, look_out(mission)}]}
     else
-      attend(mission, place, age_ms)
+      follow(mission, place, age_ms)
     end
   end
 
   # If a leader is silent for longer than a lease, its followers stay where they are.
-  defp wait(attend, age_ms) do
+  defp wait(follower, age_ms) do
     silent? = age_ms >= @late_ms
     blocker = if silent?, do: :no_anchor
 
     %{
-      attend
+      follower
       | in_place?: false,
         unsure?: false,
         holding?: true,
@@ -113,7 +113,7 @@ defmodule Missions.Landmark.Follower do
     }
   end
 
-  defp attend(mission, {slot, velocity}, age_ms) do
+  defp follow(mission, {slot, velocity}, age_ms) do
     error = Pose.distance(mission.percept.pose, slot)
     slow? = Landmark.State.slow?(mission.percept, @slow)
     {vx, vy} = velocity
@@ -126,8 +126,8 @@ defmodule Missions.Landmark.Follower do
     mission = %{
       mission
       | place: slot,
-        attend: %{
-          mission.attend
+        follower: %{
+          mission.follower
           | in_place?: there? and sure?,
             unsure?: there? and not sure?,
             holding?: resting? and error <= @near,
@@ -138,7 +138,7 @@ defmodule Missions.Landmark.Follower do
         }
     }
 
-    mission = %{mission | attend: mission |> block(slot, error) |> late(mission, slot, error)}
+    mission = %{mission | follower: mission |> block(slot, error) |> late(mission, slot, error)}
     options = [target: slot, velocity: velocity, discs: discs(mission.anchor)]
     goal = {:goal, {:slot, mission.epoch}, {Behaviour.Follow, options}}
 
@@ -146,35 +146,45 @@ defmodule Missions.Landmark.Follower do
   end
 
   # A robot that stands where it should, as far as it knows, is not blocked.
-  defp block(%{attend: %{in_place?: in_place?, unsure?: unsure?} = attend} = mission, slot, error)
+  defp block(
+         %{follower: %{in_place?: in_place?, unsure?: unsure?} = follower} = mission,
+         slot,
+         error
+       )
        when in_place? or unsure?,
-       do: fresh(attend, slot, error, mission.now_ms)
+       do: fresh(follower, slot, error, mission.now_ms)
 
-  defp block(%{attend: attend, now_ms: now} = mission, slot, error) do
+  defp block(%{follower: follower, now_ms: now} = mission, slot, error) do
     cond do
-      attend.slot == nil or Pose.distance(attend.slot, slot) > 0.2 ->
-        fresh(attend, slot, error, now)
+      follower.slot == nil or Pose.distance(follower.slot, slot) > 0.2 ->
+        fresh(follower, slot, error, now)
 
-      error < attend.best - @progress ->
-        %{watch(attend, mission, slot, error) | best: error, best_ms: now}
+      error < follower.best - @progress ->
+        %{watch(follower, mission, slot, error) | best: error, best_ms: now}
 
       true ->
-        attend = watch(attend, mission, slot, error)
-        obstacle? = attend.obstacle_ms != nil and now - attend.obstacle_ms >= @obstacle_ms
-        stuck? = error < @reach and now - attend.best_ms >= @stuck_ms
-        %{attend | blocked?: obstacle? or stuck?}
+        follower = watch(follower, mission, slot, error)
+        obstacle? = follower.obstacle_ms != nil and now - follower.obstacle_ms >= @obstacle_ms
+        stuck? = error < @reach and now - follower.best_ms >= @stuck_ms
+        %{follower | blocked?: obstacle? or stuck?}
     end
   end
 
   # Farther away, or if the slot trembles, only time shows that a robot makes no progress.
-  defp late(%{in_place?: in_place?, unsure?: unsure?} = attend, _mission, _slot, _error)
+  defp late(%{in_place?: in_place?, unsure?: unsure?} = follower, _mission, _slot, _error)
        when in_place? or unsure?,
-       do: %{attend | late: nil, blocker: nil}
+       do: %{follower | late: nil, blocker: nil}
 
-  defp late(attend, %{now_ms: now} = mission, slot, error) do
-    {_place, patience} = late = patience(attend.late, slot, error, now)
-    blocked? = attend.blocked? or Patience.stale?(patience, gain(mission.percept), @late_ms)
-    %{attend | late: late, blocked?: blocked?, blocker: blocker(attend, mission, slot, blocked?)}
+  defp late(follower, %{now_ms: now} = mission, slot, error) do
+    {_place, patience} = late = patience(follower.late, slot, error, now)
+    blocked? = follower.blocked? or Patience.stale?(patience, gain(mission.percept), @late_ms)
+
+    %{
+      follower
+      | late: late,
+        blocked?: blocked?,
+        blocker: blocker(follower, mission, slot, blocked?)
+    }
   end
 
   defp patience({place, patience}, slot, error, now) do
@@ -196,16 +206,16 @@ defmodule Missions.Landmark.Follower do
   defp blocker(%{blocker: nil}, mission, slot, true),
     do: Blocker.find(mission.percept, slot, SlotPoses.landmark(mission.anchor))
 
-  defp blocker(attend, _mission, _slot, true), do: attend.blocker
+  defp blocker(follower, _mission, _slot, true), do: follower.blocker
 
-  defp fresh(attend, slot, error, now) do
-    %{attend | slot: slot, best: error, best_ms: now, obstacle_ms: nil, blocked?: false}
+  defp fresh(follower, slot, error, now) do
+    %{follower | slot: slot, best: error, best_ms: now, obstacle_ms: nil, blocked?: false}
   end
 
-  defp watch(attend, mission, slot, error) do
+  defp watch(follower, mission, slot, error) do
     if error < @reach and obstacle?(mission, slot),
-      do: %{attend | obstacle_ms: attend.obstacle_ms || mission.now_ms},
-      else: %{attend | obstacle_ms: nil}
+      do: %{follower | obstacle_ms: follower.obstacle_ms || mission.now_ms},
+      else: %{follower | obstacle_ms: nil}
   end
 
   # Something that the sonars see where this robot should stand, and that nobody has reported.
@@ -217,17 +227,17 @@ defmodule Missions.Landmark.Follower do
     |> Enum.any?(&(Pose.distance(slot, &1.at) < percept.profile.radius + @clear))
   end
 
-  defp landmark(%{anchor: anchor, attend: attend}, in_place?),
-    do: if(in_place? or attend.landmark == nil, do: anchor.landmark, else: attend.landmark)
+  defp landmark(%{anchor: anchor, follower: follower}, in_place?),
+    do: if(in_place? or follower.landmark == nil, do: anchor.landmark, else: follower.landmark)
 
   # From parent to child: n - 1 messages for the whole group (R28, R53).
-  defp pass_on(%{anchor: anchor, attend: attend} = mission) do
+  defp pass_on(%{anchor: anchor, follower: follower} = mission) do
     news = {anchor.epoch, anchor.sequence}
     child = Chain.child([anchor.leader | anchor.order], mission.me)
 
-    if news != attend.told and child != nil,
+    if news != follower.told and child != nil,
       do: {news, [{:send, [child], Message.new(mission.me, :place, anchor)}]},
-      else: {attend.told, []}
+      else: {follower.told, []}
   end
 
   # Nobody drives through the landmark.

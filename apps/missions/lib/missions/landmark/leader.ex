@@ -60,7 +60,7 @@ defmodule Missions.Landmark.Leader do
   def begin(mission) do
     %{
       mission
-      | lead: %__MODULE__{sequence: mission.lead.sequence, heard_ms: mission.now_ms},
+      | leadership: %__MODULE__{sequence: mission.leadership.sequence, heard_ms: mission.now_ms},
         scan: nil,
         anchor: nil
     }
@@ -71,8 +71,15 @@ defmodule Missions.Landmark.Leader do
   """
   @spec reshape(Landmark.State.t()) :: Landmark.State.t()
   def reshape(mission) do
-    lead = %{mission.lead | formed?: false, good_ms: nil, bad_ms: nil, shape: Shape.new()}
-    %{mission | lead: lead}
+    leadership = %{
+      mission.leadership
+      | formed?: false,
+        good_ms: nil,
+        bad_ms: nil,
+        shape: Shape.new()
+    }
+
+    %{mission | leadership: leadership}
   end
 
   @doc """
@@ -83,7 +90,7 @@ defmodule Missions.Landmark.Leader do
   def deposed?(mission) do
     Merge.yields?(mission) or
       ((mission.order != [] or mission.of > 0) and
-         mission.now_ms - mission.lead.heard_ms >= @unheard_ms)
+         mission.now_ms - mission.leadership.heard_ms >= @unheard_ms)
   end
 
   @doc "One tick of leading."
@@ -96,8 +103,8 @@ defmodule Missions.Landmark.Leader do
   # A leader that does not know where it is cannot tell others where to stand; they soon stop. Nor does it know that
   # they stand where they should.
   defp blind(mission) do
-    lead = %{mission.lead | formed?: false, good_ms: nil, bad_ms: nil}
-    mission = %{mission | anchor: nil, lead: lead}
+    leadership = %{mission.leadership | formed?: false, good_ms: nil, bad_ms: nil}
+    mission = %{mission | anchor: nil, leadership: leadership}
     {mission, [{:goal, :stand, {Behaviour.Stop, []}}, {:look, 0.0}]}
   end
 
@@ -127,10 +134,10 @@ defmodule Missions.Landmark.Leader do
     heard_ms =
       case div(of, 2) do
         0 -> mission.now_ms
-        others -> told |> Enum.sort(:desc) |> Enum.at(others - 1, mission.lead.heard_ms)
+        others -> told |> Enum.sort(:desc) |> Enum.at(others - 1, mission.leadership.heard_ms)
       end
 
-    put_in(mission.lead.heard_ms, max(heard_ms, mission.lead.heard_ms))
+    put_in(mission.leadership.heard_ms, max(heard_ms, mission.leadership.heard_ms))
   end
 
   # If it is alone, nobody can hear it, and a robot that comes needs time to hear it.
@@ -141,7 +148,7 @@ defmodule Missions.Landmark.Leader do
       |> Enum.any?(fn {_id, beat} -> NameSet.member?(beat.heard, mission.me) end)
 
     if heard? or mission.order == [],
-      do: put_in(mission.lead.heard_ms, mission.now_ms),
+      do: put_in(mission.leadership.heard_ms, mission.now_ms),
       else: mission
   end
 
@@ -159,27 +166,28 @@ defmodule Missions.Landmark.Leader do
         Enum.all?(mission.order, &in_place?(mission, &1))
 
     now = mission.now_ms
-    lead = mission.lead
+    leadership = mission.leadership
 
-    lead =
+    leadership =
       if good?,
-        do: %{lead | good_ms: lead.good_ms || now, bad_ms: nil},
-        else: %{lead | bad_ms: lead.bad_ms || now, good_ms: nil}
+        do: %{leadership | good_ms: leadership.good_ms || now, bad_ms: nil},
+        else: %{leadership | bad_ms: leadership.bad_ms || now, good_ms: nil}
 
     cond do
-      not lead.formed? and good? and now - lead.good_ms >= @formed_ms ->
-        {%{mission | lead: %{lead | formed?: true}}, [{:stage, :formed, formed(mission)}]}
+      not leadership.formed? and good? and now - leadership.good_ms >= @formed_ms ->
+        {%{mission | leadership: %{leadership | formed?: true}},
+         [{:stage, :formed, formed(mission)}]}
 
-      lead.formed? and not good? and now - lead.bad_ms >= @unformed_ms ->
-        {%{mission | lead: %{lead | formed?: false}}, []}
+      leadership.formed? and not good? and now - leadership.bad_ms >= @unformed_ms ->
+        {%{mission | leadership: %{leadership | formed?: false}}, []}
 
       true ->
-        {%{mission | lead: lead}, []}
+        {%{mission | leadership: leadership}, []}
     end
   end
 
   # If there was no room for the shape that was asked for, which one it is instead.
-  defp formed(%{lead: %{shape: %{rung: rung}}} = mission) do
+  defp formed(%{leadership: %{shape: %{rung: rung}}} = mission) do
     facts = %{epoch: mission.epoch, size_ppm: mission.sight.size_ppm}
     if rung == :asked, do: facts, else: Map.merge(facts, %{as: rung, asked: asked(mission)})
   end
@@ -187,12 +195,13 @@ defmodule Missions.Landmark.Leader do
   defp asked(%{formation: {kind, spacing}}), do: "#{kind} #{spacing}"
 
   # There is no shape in which all followers have room where the leader stands; said once, until there is one.
-  defp room(%{lead: %{shape: %{rung: nil}, no_room?: false}} = mission) do
+  defp room(%{leadership: %{shape: %{rung: nil}, no_room?: false}} = mission) do
     facts = %{epoch: mission.epoch, asked: asked(mission), followers: length(mission.order)}
-    {put_in(mission.lead.no_room?, true), [{:stage, :cannot_form, facts}]}
+    {put_in(mission.leadership.no_room?, true), [{:stage, :cannot_form, facts}]}
   end
 
-  defp room(mission), do: {put_in(mission.lead.no_room?, mission.lead.shape.rung == nil), []}
+  defp room(mission),
+    do: {put_in(mission.leadership.no_room?, mission.leadership.shape.rung == nil), []}
 
   defp in_place?(mission, id) do
     case mission.percept.peers do
@@ -209,11 +218,11 @@ defmodule Missions.Landmark.Leader do
     lost? = mission.now_ms - max(seen_ms, mission.since_ms) >= @lost_ms
 
     stage =
-      if lost? and not mission.lead.lost?,
+      if lost? and not mission.leadership.lost?,
         do: [{:stage, :lost, %{epoch: mission.epoch}}],
         else: []
 
-    {put_in(mission.lead.lost?, lost?), stage}
+    {put_in(mission.leadership.lost?, lost?), stage}
   end
 
   # A leader that has not seen the landmark for long looks all around for it. A new leader may

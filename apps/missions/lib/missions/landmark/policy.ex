@@ -53,11 +53,11 @@ defmodule Missions.Landmark.Policy do
   @doc "Notes once a tick whether this robot has company."
   @spec update(Landmark.State.t()) :: Landmark.State.t()
   def update(%{phase: :idle} = mission),
-    do: %{mission | met?: false, vow: nil, gather_ms: mission.now_ms + @gather_ms}
+    do: %{mission | met?: false, promise: nil, gather_ms: mission.now_ms + @gather_ms}
 
   def update(mission) do
     mission = %{mission | met?: mission.met? or company?(mission)}
-    if tells?(mission), do: vow(mission, mission.leader), else: mission
+    if tells?(mission), do: promise(mission, mission.leader), else: mission
   end
 
   # Whether its heartbeats say that it follows this leader and hears it.
@@ -74,8 +74,8 @@ defmodule Missions.Landmark.Policy do
   end
 
   @doc "Notes that this leader, or `nil` for one that is not known, may count on this robot from now on."
-  @spec vow(Landmark.State.t(), atom()) :: Landmark.State.t()
-  def vow(mission, leader), do: %{mission | vow: {leader, mission.now_ms}}
+  @spec promise(Landmark.State.t(), atom()) :: Landmark.State.t()
+  def promise(mission, leader), do: %{mission | promise: {leader, mission.now_ms}}
 
   @doc "Notes how large the fleet is, of which a majority is needed, by an anchor of its leader."
   @spec told(Landmark.State.t(), Reference.t()) :: Landmark.State.t()
@@ -92,9 +92,9 @@ defmodule Missions.Landmark.Policy do
 
   @doc "Whether a leader who is not among these may still count on this robot."
   @spec bound?(Landmark.State.t(), [atom()]) :: boolean()
-  def bound?(%{of: of, vow: vow}, _view) when of == 0 or vow == nil, do: false
+  def bound?(%{of: of, promise: promise}, _view) when of == 0 or promise == nil, do: false
 
-  def bound?(%{vow: {leader, at_ms}} = mission, view),
+  def bound?(%{promise: {leader, at_ms}} = mission, view),
     do: leader not in view and mission.now_ms - at_ms < @vow_ms
 
   @doc "Whether this robot was with others, and no longer hears anybody."

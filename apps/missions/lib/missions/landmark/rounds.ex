@@ -46,7 +46,9 @@ defmodule Missions.Landmark.Rounds do
     if Round.open?(round) or mission.verdict != nil do
       # Others may have all digests of the round, and count on this robot.
       mission =
-        if round.phase == :digest, do: Policy.vow(%{mission | now_ms: at_ms}, nil), else: mission
+        if round.phase == :digest,
+          do: Policy.promise(%{mission | now_ms: at_ms}, nil),
+          else: mission
 
       %{mission | round: Round.leave(round), verdict: nil, since_ms: at_ms}
     else
@@ -84,13 +86,13 @@ defmodule Missions.Landmark.Rounds do
   # The robot that has all digests leads, with those that sent them.
   defp promise({:commit, record}, mission, _phase) do
     case Election.leader(record.reports) do
-      {:ok, leader} -> Policy.vow(mission, leader)
+      {:ok, leader} -> Policy.promise(mission, leader)
       _none -> mission
     end
   end
 
   # Another robot may have them all when this one does not.
-  defp promise({:failed, _reason}, mission, :digest), do: Policy.vow(mission, nil)
+  defp promise({:failed, _reason}, mission, :digest), do: Policy.promise(mission, nil)
   defp promise(_event, mission, _phase), do: mission
 
   defp conclude({:commit, record}, mission) do

@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.State do
   @moduledoc """
   The state of the landmark mission in one robot, and the questions that all parts of the mission
-  ask of it. Pure. The parts' own states are under `lead`, `attend`, `round`, `sight`.
+  ask of it. Pure. The parts' own states are under `leadership`, `follower`, `round`, `sight`.
   """
   alias Hal.{Pose, Twist}
   alias Missions.Landmark.{Company, EpochFilter, LandmarkTrack}
@@ -33,8 +33,8 @@ defmodule Missions.Landmark.State do
                 anchor: nil,
                 anchor_ms: nil,
                 trail: [],
-                lead: nil,
-                attend: nil,
+                leadership: nil,
+                follower: nil,
                 challenge: nil,
                 of: 0,
                 of_told: nil,
@@ -42,12 +42,12 @@ defmodule Missions.Landmark.State do
                 role: :searcher,
                 met?: false,
                 gather_ms: 0,
-                vow: nil,
+                promise: nil,
                 place: nil,
                 led: 0,
                 rival_ms: nil,
                 higher_ms: nil,
-                relay: %Swarm.Comms.Forwarder{},
+                forwarder: %Swarm.Comms.Forwarder{},
                 refused: %EpochFilter{}
               ]
 
@@ -61,7 +61,7 @@ defmodule Missions.Landmark.State do
 
   `of` is the size of the fleet of which a majority is needed, 0 for none; `of_told` a greater one
   that the leader says, and the number of its next anchor that says it. `role` is the robot's last
-  role, `met?` whether it has been with others, `vow` which leader may count on it, and when
+  role, `met?` whether it has been with others, `promise` which leader may count on it, and when
   it last could, `place` where it was last told to stand. `led` is how many robots it leads, or
   led when the round began; it has heard another leader since `rival_ms`, and a later epoch since
   `higher_ms`.
@@ -92,8 +92,8 @@ defmodule Missions.Landmark.State do
           anchor: Swarm.Formation.Reference.t() | nil,
           anchor_ms: integer() | nil,
           trail: Swarm.Formation.Trail.t(),
-          lead: Missions.Landmark.Leader.t() | nil,
-          attend: Missions.Landmark.Follower.t() | nil,
+          leadership: Missions.Landmark.Leader.t() | nil,
+          follower: Missions.Landmark.Follower.t() | nil,
           challenge: :open | {:nearer | :blind, since_ms :: integer()} | nil,
           of: non_neg_integer(),
           of_told:
@@ -104,12 +104,12 @@ defmodule Missions.Landmark.State do
           role: :searcher | :leader | :follower,
           met?: boolean(),
           gather_ms: integer(),
-          vow: {leader :: atom(), at_ms :: integer()} | nil,
+          promise: {leader :: atom(), at_ms :: integer()} | nil,
           place: Pose.t() | nil,
           led: non_neg_integer(),
           rival_ms: integer() | nil,
           higher_ms: integer() | nil,
-          relay: Swarm.Comms.Forwarder.t(),
+          forwarder: Swarm.Comms.Forwarder.t(),
           refused: EpochFilter.t()
         }
 

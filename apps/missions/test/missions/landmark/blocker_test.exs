@@ -57,7 +57,7 @@ defmodule Missions.Landmark.BlockerTest do
       phase: :follow,
       leader: :mag1,
       epoch: 1,
-      attend: Follower.new()
+      follower: Follower.new()
     }
 
     sure = %{radius: 0.1, position: 0.05, heading: 0.02, frame: {:mag1, nil, 0}}
@@ -88,17 +88,17 @@ defmodule Missions.Landmark.BlockerTest do
   end
 
   test "a follower that gets no nearer for 15 s is blocked, wherever it is, and names the blocker" do
-    refute stand(3.0, 14, nil).attend.blocked?
-    assert %{blocked?: true, blocker: :no_way} = stand(3.0, 16, nil).attend
-    assert %{blocked?: true, blocker: :landmark} = stand(3.0, 16, {500, 0}).attend
+    refute stand(3.0, 14, nil).follower.blocked?
+    assert %{blocked?: true, blocker: :no_way} = stand(3.0, 16, nil).follower
+    assert %{blocked?: true, blocker: :landmark} = stand(3.0, 16, {500, 0}).follower
   end
 
   test "a slot that trembles by decimetres does not hide the block" do
-    assert %{blocked?: true, blocker: :landmark} = stand(3.0, 16, {500, 0}, 150).attend
+    assert %{blocked?: true, blocker: :landmark} = stand(3.0, 16, {500, 0}, 150).follower
   end
 
   test "a follower in its place is not blocked" do
-    assert %{blocked?: false, blocker: nil, in_place?: true} = stand(0.1, 30, nil).attend
+    assert %{blocked?: false, blocker: nil, in_place?: true} = stand(0.1, 30, nil).follower
   end
 
   test "heartbeats say that a robot is blocked, but not by what" do

@@ -289,7 +289,7 @@ defmodule Missions.Landmark.PhasesTest do
     assert [] = for({:send, _to, %Message{kind: :place}} <- effects, do: :place)
 
     # Nor does it claim any longer that all stand where they should.
-    formed = put_in(mission(leading).lead.formed?, true)
+    formed = put_in(mission(leading).leadership.formed?, true)
     {:lead, _mission, effects} = Landmark.handle({:tick, lost}, formed)
     assert [%{formed: false, anchor: nil}] = for({:claim, claim} <- effects, do: claim)
   end
@@ -328,7 +328,7 @@ defmodule Missions.Landmark.PhasesTest do
     # The landmark may show how the wheels slip, until others take the robot's pose for their frame.
     assert {:anchors, %Anchors{standing: "YellowLandmark"}} in effects
 
-    led = put_in(mission(group).lead.sequence, 1)
+    led = put_in(mission(group).leadership.sequence, 1)
     {:search, _mission, effects} = Landmark.handle({:tick, percept}, led)
     assert {:anchors, %Anchors{}} in effects
   end

@@ -31,7 +31,7 @@ defmodule Missions.Landmark.UnsureTest do
 
   # The same of one that comes nearer by its own estimate: `off` is a function of the seconds.
   defp watch(off, radius, seconds) do
-    mission = mission(phase: :follow, leader: :mag1, epoch: 1, attend: Follower.new())
+    mission = mission(phase: :follow, leader: :mag1, epoch: 1, follower: Follower.new())
 
     uncertainty = %{
       radius: radius,
@@ -61,7 +61,7 @@ defmodule Missions.Landmark.UnsureTest do
       mission = %{mission | anchor: anchor, anchor_ms: now, percept: percept, now_ms: now}
       {mission, _effects} = Follower.act(mission)
       mission
-    end).attend
+    end).follower
   end
 
   test "it reports unsure, and neither in place nor blocked" do

@@ -40,10 +40,10 @@ defmodule Sim.Trial.AgreementMetrics do
   because the mission says so.
   """
   @spec note(t(), integer(), [{atom(), map()}], [[atom()]], [atom()]) :: t()
-  def note(accord, at_ms, claims, parts, standing) do
+  def note(agreement, at_ms, claims, parts, standing) do
     leaders = for {id, %{phase: :lead}} <- claims, do: id
 
-    accord
+    agreement
     |> rivals(at_ms, parts, leaders)
     |> heal(at_ms, length(parts), leaders)
     |> follow(at_ms, parts, claims, standing)
@@ -51,11 +51,11 @@ defmodule Sim.Trial.AgreementMetrics do
 
   @doc "For the report: seconds, oldest first."
   @spec report(t()) :: map()
-  def report(accord) do
+  def report(agreement) do
     %{
-      rivals_max_s: accord.rivals_worst_ms / 1000,
+      rivals_max_s: agreement.rivals_worst_ms / 1000,
       heals:
-        for heal <- Enum.reverse(accord.heals) do
+        for heal <- Enum.reverse(agreement.heals) do
           %{
             at_s: heal.at_ms / 1000,
             leaders: heal.leaders,
@@ -70,17 +70,17 @@ defmodule Sim.Trial.AgreementMetrics do
   defp seconds(nil), do: nil
   defp seconds(ms), do: ms / 1000
 
-  defp rivals(accord, at_ms, parts, leaders) do
+  defp rivals(agreement, at_ms, parts, leaders) do
     if Enum.any?(parts, fn part -> Enum.count(leaders, &(&1 in part)) > 1 end) do
-      since = accord.rivals_ms || at_ms
-      worst = max(accord.rivals_worst_ms, at_ms - since + 100)
-      %{accord | rivals_ms: since, rivals_worst_ms: worst}
+      since = agreement.rivals_ms || at_ms
+      worst = max(agreement.rivals_worst_ms, at_ms - since + 100)
+      %{agreement | rivals_ms: since, rivals_worst_ms: worst}
     else
-      %{accord | rivals_ms: nil}
+      %{agreement | rivals_ms: nil}
     end
   end
 
-  defp heal(%{parts: before} = accord, at_ms, parts, leaders)
+  defp heal(%{parts: before} = agreement, at_ms, parts, leaders)
        when before != nil and parts < before do
     heal = %{
       at_ms: at_ms,
@@ -91,20 +91,20 @@ defmodule Sim.Trial.AgreementMetrics do
       stands_ms: nil
     }
 
-    %{accord | parts: parts, heals: [heal | accord.heals]}
+    %{agreement | parts: parts, heals: [heal | agreement.heals]}
   end
 
-  defp heal(accord, _at_ms, parts, _leaders), do: %{accord | parts: parts}
+  defp heal(agreement, _at_ms, parts, _leaders), do: %{agreement | parts: parts}
 
-  defp follow(%{heals: []} = accord, _at_ms, _parts, _claims, _standing), do: accord
+  defp follow(%{heals: []} = agreement, _at_ms, _parts, _claims, _standing), do: agreement
 
-  defp follow(%{heals: [heal | older]} = accord, at_ms, parts, claims, standing) do
+  defp follow(%{heals: [heal | older]} = agreement, at_ms, parts, claims, standing) do
     one? = length(parts) == 1 and one?(claims)
     formed? = one? and Enum.any?(claims, fn {_id, claim} -> claim[:formed] == true end)
     past = at_ms - heal.at_ms
     heal = if one?, do: %{heal | one_ms: heal.one_ms || past}, else: heal
     heal = if formed?, do: %{heal | formed_ms: heal.formed_ms || past}, else: heal
-    %{accord | heals: [stand(heal, at_ms, standing) | older]}
+    %{agreement | heals: [stand(heal, at_ms, standing) | older]}
   end
 
   # From the first time that a robot stands after the parts were joined until none does.

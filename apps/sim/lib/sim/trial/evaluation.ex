@@ -91,7 +91,7 @@ defmodule Sim.Trial.Evaluation do
       claims: Claims.report(run.run_log.claims, run.at_ms, &worst(run, &1)),
       stuck: Stuck.report(run.run_log.stuck),
       messages: run.messages,
-      agreement: AgreementMetrics.report(run.run_log.accord),
+      agreement: AgreementMetrics.report(run.run_log.agreement),
       fleet: for(r <- scene.robots, do: row(r, Map.get(slots, r.id), run.claims[r.id]))
     }
   end

@@ -16,7 +16,7 @@ defmodule Sim.Trial.RunLog do
             formed_ticks: 0,
             formed_ms: nil,
             rest_ms: nil,
-            accord: %Sim.Trial.AgreementMetrics{},
+            agreement: %Sim.Trial.AgreementMetrics{},
             claims: %Sim.Trial.Claims{},
             stuck: %Sim.Trial.Stuck{}
 
@@ -44,7 +44,7 @@ defmodule Sim.Trial.RunLog do
           formed_ticks: non_neg_integer(),
           formed_ms: integer() | nil,
           rest_ms: integer() | nil,
-          accord: Sim.Trial.AgreementMetrics.t(),
+          agreement: Sim.Trial.AgreementMetrics.t(),
           claims: Sim.Trial.Claims.t(),
           stuck: Sim.Trial.Stuck.t()
         }
@@ -91,7 +91,7 @@ defmodule Sim.Trial.RunLog do
         epoch:
           Enum.reduce(claims, run_log.epoch, fn {_id, claim}, e -> max(e, claim[:epoch] || 0) end),
         leaders_at_once_max: max(run_log.leaders_at_once_max, at_once(leaders, parts)),
-        accord: AgreementMetrics.note(run_log.accord, at_ms, claims, parts, standing),
+        agreement: AgreementMetrics.note(run_log.agreement, at_ms, claims, parts, standing),
         searching?: :search in phases,
         ticks: run_log.ticks + if(elected?, do: 1, else: 0),
         formed_ticks: run_log.formed_ticks + if(elected? and formed?, do: 1, else: 0),

@@ -103,7 +103,7 @@ defmodule Sim.Trial.PartitionTest do
       for id <- [:a, :b], do: {id, %{phase: if(id in ids, do: :lead, else: :follow)}}
     end
 
-    accord =
+    agreement =
       [
         {[:a, :b], [[:a], [:b]]},
         {[:a, :b], [[:a, :b]]},
@@ -111,10 +111,10 @@ defmodule Sim.Trial.PartitionTest do
         {[:a], [[:a, :b]]}
       ]
       |> Enum.with_index()
-      |> Enum.reduce(%AgreementMetrics{}, fn {{leaders, parts}, n}, accord ->
-        AgreementMetrics.note(accord, n * 100, lead.(leaders), parts, [])
+      |> Enum.reduce(%AgreementMetrics{}, fn {{leaders, parts}, n}, agreement ->
+        AgreementMetrics.note(agreement, n * 100, lead.(leaders), parts, [])
       end)
 
-    assert AgreementMetrics.report(accord).rivals_max_s == 0.2
+    assert AgreementMetrics.report(agreement).rivals_max_s == 0.2
   end
 end

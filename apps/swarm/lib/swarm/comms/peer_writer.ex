@@ -20,23 +20,23 @@ defmodule Swarm.Comms.PeerWriter do
   second, so only its row is written.
   """
   @spec heard(t(), Peers.t(), atom(), integer()) :: t()
-  def heard(%__MODULE__{} = chart, peers, id, at_ms) do
-    show(chart, peers, id, at_ms)
-    %{chart | gone: MapSet.delete(chart.gone, id)}
+  def heard(%__MODULE__{} = writer, peers, id, at_ms) do
+    show(writer, peers, id, at_ms)
+    %{writer | gone: MapSet.delete(writer.gone, id)}
   end
 
   @doc "Writes which robots are gone, because nothing arrives from them that would."
   @spec grow_old(t(), Peers.t(), integer()) :: t()
-  def grow_old(%__MODULE__{} = chart, peers, at_ms) do
-    for id <- Peers.gone(peers, at_ms), id not in chart.gone, reduce: chart do
-      chart ->
-        show(chart, peers, id, at_ms)
-        %{chart | gone: MapSet.put(chart.gone, id)}
+  def grow_old(%__MODULE__{} = writer, peers, at_ms) do
+    for id <- Peers.gone(peers, at_ms), id not in writer.gone, reduce: writer do
+      writer ->
+        show(writer, peers, id, at_ms)
+        %{writer | gone: MapSet.put(writer.gone, id)}
     end
   end
 
-  defp show(chart, peers, id, at_ms) do
+  defp show(writer, peers, id, at_ms) do
     peer = Peers.percept(peers, id, at_ms)
-    Board.put(chart.board, :comms, {:peer, id}, peer, peer.at_ms)
+    Board.put(writer.board, :comms, {:peer, id}, peer, peer.at_ms)
   end
 end

@@ -31,7 +31,7 @@ defmodule Mesh.Protocol.Packet.Filter do
   @spec read(Mesh.Protocol.t(), binary(), Mesh.Strategy.address()) ::
           {:ok, Packet.t(), node(), body()} | {:error, refusal()}
   def read(protocol, datagram, address) do
-    with :ok <- original(Packet.peek(datagram), protocol.guard),
+    with :ok <- original(Packet.peek(datagram), protocol.replay),
          :ok <- patience(protocol, address),
          {:ok, packet} <- Packet.open(datagram, protocol.secret.key),
          :ok <- foreign(packet, protocol),
@@ -63,8 +63,8 @@ defmodule Mesh.Protocol.Packet.Filter do
 
   # Half of all datagrams are copies, one by multicast and one by address: these cost no signature
   # check.
-  defp original({:ok, {name, session, sequence}}, guard) do
-    if ReplayProtection.copy?(guard, name, session, sequence), do: {:error, :doubled}, else: :ok
+  defp original({:ok, {name, session, sequence}}, replay) do
+    if ReplayProtection.copy?(replay, name, session, sequence), do: {:error, :doubled}, else: :ok
   end
 
   defp original(:error, _guard), do: :ok

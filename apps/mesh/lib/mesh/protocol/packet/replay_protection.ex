@@ -57,26 +57,26 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
 
       iex> alias Mesh.Protocol.Packet.ReplayProtection
       iex> stamp = fn sequence, time_ms -> %{sender: "min1@lab", session: 99, sequence: sequence, time_ms: time_ms} end
-      iex> guard = ReplayProtection.new(7)
-      iex> {:error, :stranger, guard} = ReplayProtection.admit(guard, stamp.(1, 5_000), nil, 0)
-      iex> {:ok, guard} = ReplayProtection.admit(guard, stamp.(2, 5_010), {7, 0}, 20)
-      iex> {:ok, guard} = ReplayProtection.admit(guard, stamp.(3, 5_020), nil, 30)
-      iex> {:error, :doubled, guard} = ReplayProtection.admit(guard, stamp.(3, 5_020), nil, 40)
-      iex> {:error, :stale, _guard} = ReplayProtection.admit(guard, stamp.(4, 5_040), nil, 3_000)
+      iex> replay = ReplayProtection.new(7)
+      iex> {:error, :stranger, replay} = ReplayProtection.admit(replay, stamp.(1, 5_000), nil, 0)
+      iex> {:ok, replay} = ReplayProtection.admit(replay, stamp.(2, 5_010), {7, 0}, 20)
+      iex> {:ok, replay} = ReplayProtection.admit(replay, stamp.(3, 5_020), nil, 30)
+      iex> {:error, :doubled, replay} = ReplayProtection.admit(replay, stamp.(3, 5_020), nil, 40)
+      iex> {:error, :stale, _guard} = ReplayProtection.admit(replay, stamp.(4, 5_040), nil, 3_000)
   """
   @spec admit(t(), stamp(), Challenge.echo() | nil, integer()) ::
           {:ok, t()} | {:error, refusal(), t()}
-  def admit(%__MODULE__{} = guard, stamp, echo, now_ms) do
+  def admit(%__MODULE__{} = replay, stamp, echo, now_ms) do
     %{sender: name, session: session} = stamp
-    sender = Map.get(guard.senders, name) || stranger(now_ms)
-    measured = measure(guard, stamp, echo, now_ms)
+    sender = Map.get(replay.senders, name) || stranger(now_ms)
+    measured = measure(replay, stamp, echo, now_ms)
 
     cond do
-      sender.session == session -> known(guard, stamp, sender, measured, now_ms)
-      session in sender.retired -> {:error, :replayed, guard}
-      measured == :error -> {:error, :stranger, guard}
-      alive?(sender, now_ms) -> {:error, :stranger, guard}
-      true -> known(guard, stamp, begin(sender, stamp, now_ms), measured, now_ms)
+      sender.session == session -> known(replay, stamp, sender, measured, now_ms)
+      session in sender.retired -> {:error, :replayed, replay}
+      measured == :error -> {:error, :stranger, replay}
+      alive?(sender, now_ms) -> {:error, :stranger, replay}
+      true -> known(replay, stamp, begin(sender, stamp, now_ms), measured, now_ms)
     end
   end
 
@@ -85,14 +85,14 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   does not show that its sender is there.
   """
   @spec admit_late(t(), stamp(), integer()) :: {:ok, t()} | {:error, refusal(), t()}
-  def admit_late(guard, %{sender: name, session: session} = stamp, now_ms) do
-    case guard.senders do
+  def admit_late(replay, %{sender: name, session: session} = stamp, now_ms) do
+    case replay.senders do
       %{^name => %{session: ^session, heard_ms: heard_ms} = sender} ->
-        with {:ok, guard} <- counted(guard, stamp, sender, now_ms),
-             do: {:ok, put_in(guard.senders[name].heard_ms, heard_ms)}
+        with {:ok, replay} <- counted(replay, stamp, sender, now_ms),
+             do: {:ok, put_in(replay.senders[name].heard_ms, heard_ms)}
 
       _unknown ->
-        {:error, :stranger, guard}
+        {:error, :stranger, replay}
     end
   end
 
@@ -101,8 +101,8 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   it. Most are, because what arrives by multicast arrives by address, too.
   """
   @spec copy?(t(), String.t(), non_neg_integer(), non_neg_integer()) :: boolean()
-  def copy?(guard, name, session, sequence) do
-    case guard.senders do
+  def copy?(replay, name, session, sequence) do
+    case replay.senders do
       # What is behind the window is judged by its time.
       %{^name => %{session: ^session, window: window}} ->
         SequenceWindow.seen?(window, sequence) and not SequenceWindow.behind?(window, sequence)
@@ -114,8 +114,8 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
 
   @doc "The accepted session of this name now, or `nil`."
   @spec session(t(), String.t()) :: non_neg_integer() | nil
-  def session(guard, name) do
-    case guard.senders do
+  def session(replay, name) do
+    case replay.senders do
       %{^name => %{session: session}} -> session
       _unknown -> nil
     end
@@ -123,8 +123,8 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
 
   @doc "Whether it is time to challenge this node again: what is known of its clock has grown old."
   @spec due?(t(), String.t(), integer()) :: boolean()
-  def due?(guard, name, now_ms) do
-    case guard.senders do
+  def due?(replay, name, now_ms) do
+    case replay.senders do
       %{^name => %{clock: clock}} -> ClockOffset.due?(clock, now_ms)
       _unknown -> false
     end
@@ -160,13 +160,13 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
 
   # An answer is fresh by itself. The newest measurement is the right one: after a computer was
   # suspended, older ones are wrong.
-  defp known(guard, stamp, sender, {:ok, clock}, now_ms),
-    do: counted(guard, stamp, anew(%{sender | clock: clock}, stamp, now_ms), now_ms)
+  defp known(replay, stamp, sender, {:ok, clock}, now_ms),
+    do: counted(replay, stamp, anew(%{sender | clock: clock}, stamp, now_ms), now_ms)
 
-  defp known(guard, stamp, sender, :error, now_ms) do
+  defp known(replay, stamp, sender, :error, now_ms) do
     if ClockOffset.fresh?(sender.clock, stamp.time_ms, now_ms),
-      do: counted(guard, stamp, anew(sender, stamp, now_ms), now_ms),
-      else: {:error, :stale, guard}
+      do: counted(replay, stamp, anew(sender, stamp, now_ms), now_ms),
+      else: {:error, :stale, replay}
   end
 
   defp anew(%{heard_ms: heard_ms} = sender, %{sequence: sequence}, now_ms)
@@ -175,16 +175,16 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
 
   defp anew(sender, _stamp, _now_ms), do: sender
 
-  defp counted(guard, %{sender: name, sequence: sequence}, sender, now_ms) do
+  defp counted(replay, %{sender: name, sequence: sequence}, sender, now_ms) do
     second = div(now_ms, 1_000)
     count = if second == sender.second, do: sender.count + 1, else: 1
 
     with true <- count <= @per_second || :too_fast,
          {:ok, window} <- SequenceWindow.take(sender.window, sequence) do
       sender = %{sender | window: window, heard_ms: now_ms, second: second, count: count}
-      {:ok, %{guard | senders: Map.put(guard.senders, name, sender)}}
+      {:ok, %{replay | senders: Map.put(replay.senders, name, sender)}}
     else
-      reason -> {:error, reason, guard}
+      reason -> {:error, reason, replay}
     end
   end
 end

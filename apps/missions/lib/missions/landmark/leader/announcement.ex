@@ -15,8 +15,8 @@ defmodule Missions.Landmark.Leader.Announcement do
 
   @doc "The anchor of this tick, in `anchor`."
   @spec update(Landmark.State.t()) :: Landmark.State.t()
-  def update(%{percept: percept, lead: lead} = mission) do
-    sequence = lead.sequence + 1
+  def update(%{percept: percept, leadership: leadership} = mission) do
+    sequence = leadership.sequence + 1
     place = mission.sight && mission.sight.place
 
     anchor = %Reference{
@@ -31,19 +31,19 @@ defmodule Missions.Landmark.Leader.Announcement do
       slip: min(ceil(percept.uncertainty.slip * 1000), @lost),
       frame: percept.uncertainty.frame_no,
       base: percept.uncertainty.frame,
-      formation: lead.shape.formation,
+      formation: leadership.shape.formation,
       asked: mission.formation,
       asked_no: mission.asked_no,
       order: mission.order,
-      size: elem(lead.shape.room, 0),
-      places: elem(lead.shape.room, 1),
-      trail: Shape.trail(lead.shape, mission),
+      size: elem(leadership.shape.room, 0),
+      places: elem(leadership.shape.room, 1),
+      trail: Shape.trail(leadership.shape, mission),
       of: mission.of,
       landmark: place && point(place),
       still: LandmarkTrack.still?(mission.sight, mission.now_ms, @still_ms)
     }
 
-    %{mission | anchor: anchor, lead: %{lead | sequence: sequence}}
+    %{mission | anchor: anchor, leadership: %{leadership | sequence: sequence}}
   end
 
   defp sd(%{position: position, heading: heading}),

@@ -34,18 +34,21 @@ defmodule Missions.Landmark.Leader.Slots do
   end
 
   # If the shape has changed, `:cost` assigns its slots again.
-  defp shape(%{lead: lead} = mission) do
-    shape = Shape.update(lead.shape, mission, landmark_distance(mission))
-    new? = told(shape) != told(lead.shape)
-    mission = %{mission | lead: %{lead | shape: shape}}
-    dealt? = lead.shape.room == nil and mission.now_ms == mission.since_ms and all_free?(mission)
+  defp shape(%{leadership: leadership} = mission) do
+    shape = Shape.update(leadership.shape, mission, landmark_distance(mission))
+    new? = told(shape) != told(leadership.shape)
+    mission = %{mission | leadership: %{leadership | shape: shape}}
+
+    dealt? =
+      leadership.shape.room == nil and mission.now_ms == mission.since_ms and all_free?(mission)
+
     if new? and not dealt? and mission.assign == :cost, do: deal(mission), else: mission
   end
 
   defp told(shape), do: {shape.formation, shape.room, shape.spots}
 
   # Then the round's record has assigned them; it does not know where there is no room.
-  defp all_free?(%{order: order, lead: %{shape: %{room: {size, places}}}}) do
+  defp all_free?(%{order: order, leadership: %{shape: %{room: {size, places}}}}) do
     count = length(order)
     size == count + 1 and Enum.sort(places) == Enum.to_list(1..count//1)
   end
@@ -69,7 +72,7 @@ defmodule Missions.Landmark.Leader.Slots do
     beats = Landmark.State.beats(mission)
     followers = for id <- mission.order, {x, y, _heading} = beats[id].pose, do: {id, {x, y}}
     {x, y, _heading} = Landmark.State.millimetres(mission.percept.pose)
-    used = used(mission, mission.lead.shape)
+    used = used(mission, mission.leadership.shape)
     %{mission | order: Assignment.order(:cost, followers, {x, y}, used)}
   end
 end

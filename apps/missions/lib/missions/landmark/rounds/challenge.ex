@@ -43,7 +43,7 @@ defmodule Missions.Landmark.Rounds.Challenge do
          %{phase: :lead} = leader <- peers[mission.leader],
          mine = round(mine * 1000),
          true <- nearest?(mine, mission.me, peers),
-         true <- mission.attend.in_place? or moved?(mission) or leader.sight == nil do
+         true <- mission.follower.in_place? or moved?(mission) or leader.sight == nil do
       case leader.sight do
         nil -> :blind
         %{distance: nil} -> nil
@@ -54,7 +54,7 @@ defmodule Missions.Landmark.Rounds.Challenge do
     end
   end
 
-  defp moved?(%{attend: %{landmark: place}, anchor: %{landmark: now}})
+  defp moved?(%{follower: %{landmark: place}, anchor: %{landmark: now}})
        when place != nil and now != nil do
     {x, y} = place
     {nx, ny} = now

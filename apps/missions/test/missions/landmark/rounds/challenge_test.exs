@@ -24,7 +24,7 @@ defmodule Missions.Landmark.Rounds.ChallengeTest do
       phase: :follow,
       leader: :mag1,
       since_ms: since_ms,
-      attend: %{in_place?: true, landmark: nil},
+      follower: %{in_place?: true, landmark: nil},
       sight: %{distance: metres, size_ppm: 20_000, at_ms: 0},
       percept: %{peers: %{mag1: %{at_ms: 0, beat: beat}}}
     }

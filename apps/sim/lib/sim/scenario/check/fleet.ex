@@ -48,7 +48,7 @@ defmodule Sim.Scenario.Check.Fleet do
   end
 
   def judge({:at_most_one_leader, grace}, trial, _) do
-    worst_s = trial.run_log.accord.rivals_worst_ms / 1000
+    worst_s = trial.run_log.agreement.rivals_worst_ms / 1000
     {:keep, worst_s <= grace[:grace_s], "two leaders in one part for #{worst_s} s at most", nil}
   end
 
