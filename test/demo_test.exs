@@ -93,7 +93,9 @@ defmodule System.DemoEndsTest do
     script = """
     "$1" --robots 2 --duration 60 >"$2" 2>&1 </dev/null &
     p=$!; n=0
-    until grep -qs 'looks around' "$2"; do sleep 0.1; n=$((n + 1)); [ $n -lt 900 ] || exit 1; done
+    until grep -qs 'landmark in sight' "$2"; do
+      sleep 0.1; n=$((n + 1)); [ $n -lt 900 ] || { cat "$2"; exit 1; }
+    done
     demo=$(cat /proc/$p/task/$p/children)
     kill -TERM $p; wait $p; echo $?
     for d in $demo; do kill -0 $d 2>/dev/null && echo "$d is left"; done

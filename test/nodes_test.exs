@@ -32,6 +32,7 @@ defmodule System.NodesWorldTest do
   use Nodes.Case, async: true
   @moduletag :realtime
 
+  @tag long: true, realtime: :long
   test "kill -9 of the world's process: it comes back, and robots go on", %{environment: env} do
     port = start("--robots 2 --duration 45", env)
     said = await(port, ~r/elected +\w+ leads/)

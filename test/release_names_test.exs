@@ -9,7 +9,7 @@ defmodule System.ReleaseNamesTest do
   """
   use Release.Case, async: true
   alias Vm.Net
-  @moduletag :realtime
+  @moduletag long: true, realtime: :long
   @moduletag skip: why_not
   @root Path.expand("..", __DIR__)
 
