@@ -11,7 +11,7 @@ defmodule Missions.Landmark do
   | `Rounds` | when a round is opened, what is reported in it, what comes of it |
   | `Leader` | what the leader tells: the anchor, the order, whether the shape is formed |
   | `Shape` | a shape that there is room for |
-  | `Claim` | what the heartbeat reports about the mission |
+  | `SelfReport`, `Claim` | what it claims of itself: to people, and to the others |
   | `Follower` | what a follower does: its slot, its gaze, its child |
   | `Marks` | what it finds its pose by, and whether it is sure of its place |
   | `Blocker` | what keeps it from its slot |
@@ -29,8 +29,8 @@ defmodule Missions.Landmark do
   alias Swarm.Comms.Forwarder
   alias Swarm.Formation.Trail
   alias Missions.Landmark
-  alias Missions.Landmark.{Claim, EpochFilter, Follower, LandmarkTrack, Leader, Policy}
-  alias Missions.Landmark.{ReferenceInbox, Rounds, Transitions}
+  alias Missions.Landmark.{EpochFilter, Follower, LandmarkTrack, Leader, Policy}
+  alias Missions.Landmark.{ReferenceInbox, Rounds, SelfReport, Transitions}
   alias Missions.Landmark.Transitions.{Conditions, Entry}
 
   @behaviour Robot.Mission
@@ -66,6 +66,12 @@ defmodule Missions.Landmark do
 
   @impl Robot.Mission
   def messages, do: {1, round: :shared, place: :shared}
+
+  @impl Robot.Mission
+  def claims, do: {1, Landmark.Claim}
+
+  @impl Robot.Mission
+  defdelegate stale(claim), to: Landmark.Claim
 
   @impl Robot.Mission
   def commands, do: [:formation]
@@ -127,7 +133,7 @@ defmodule Missions.Landmark do
     {mission, beats} = relay_beats(mission, percept)
     {mission, refused} = EpochFilter.tell(mission)
     effects = letters ++ beats ++ stages ++ refused ++ effects
-    {mission.phase, mission, effects ++ [{:claim, Claim.claim(mission)}]}
+    {mission.phase, mission, effects ++ [{:claim, SelfReport.claim(mission)}]}
   end
 
   # Without reports of where things are, a robot must not correct its pose by where they were. Until

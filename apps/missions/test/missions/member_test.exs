@@ -3,11 +3,12 @@ defmodule Swarm.MemberTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Swarm.{Member, Message}
+  alias Missions.Landmark.Beat
   alias Swarm.Agreement.Round
   alias Swarm.Formation.Reference
   alias Swarm.Membership.Heartbeat
 
-  @beat %Heartbeat{boot: 1, sequence: 1, pose: {900, 0, 0}, twist: {0, 0}, phase: :search}
+  @beat Beat.new(pose: {900, 0, 0}, phase: :search)
   @anchor %Reference{
     leader: :mag2,
     epoch: 1,
@@ -98,6 +99,9 @@ defmodule Swarm.MemberTest do
   end
 
   # Damages something inside a field.
+  defp nest(%Robot.Mission.Claim{fields: fields} = claim),
+    do: if(:rand.uniform(2) == 1, do: spoil(claim), else: %{claim | fields: nest(fields)})
+
   defp nest(tuple) when is_tuple(tuple) and tuple != {},
     do: put_elem(tuple, :rand.uniform(tuple_size(tuple)) - 1, junk())
 
@@ -114,7 +118,7 @@ defmodule Swarm.MemberTest do
         {kind, body} =
           Enum.random(
             heartbeat: %{@beat | sequence: n},
-            heartbeat: %{@beat | sequence: n, phase: :lead, epoch: 1, anchor: @anchor},
+            heartbeat: Beat.new(sequence: n, phase: :lead, epoch: 1, anchor: @anchor),
             place: %{@anchor | sequence: n},
             round: @letter
           )
@@ -144,7 +148,7 @@ defmodule Swarm.MemberTest do
           {Message.new(:mag2, :place, @beat), :place},
           {Message.new(:mag2, :round, @anchor), :round},
           {Message.new(:mag2, :heartbeat, @letter), :heartbeat},
-          {Message.new(:mag2, :heartbeat, %{@beat | epoch: Bitwise.bsl(1, 64)}), :heartbeat},
+          {Message.new(:mag2, :heartbeat, Beat.new(epoch: Bitwise.bsl(1, 64))), :heartbeat},
           {Message.new(:mag2, :place, %{@anchor | order: [:mag1, :mag1]}), :place},
           {Message.new(:mag2, :place, %{@anchor | places: [1, 1]}), :place},
           {Message.new(:mag2, :round, %{@letter | view: [:mag1 | :mag2]}), :round},

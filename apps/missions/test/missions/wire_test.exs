@@ -18,15 +18,8 @@ defmodule Missions.WireTest do
       places: []
     }
 
-    beat = %Swarm.Membership.Heartbeat{
-      boot: 1,
-      sequence: 1,
-      pose: {0, 0, 0},
-      twist: {0, 0},
-      phase: :lead,
-      sight: %{size_ppm: 9_000, distance: 3_000},
-      anchor: anchor
-    }
+    sight = %{size_ppm: 9_000, distance: 3_000}
+    beat = Missions.Landmark.Beat.new(phase: :lead, sight: sight, anchor: anchor)
 
     letters =
       for phase <- Missions.Landmark.Transitions.phases(),

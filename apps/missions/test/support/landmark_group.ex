@@ -7,6 +7,7 @@ defmodule Missions.Landmark.Group do
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.{Behaviour, Percept}
   alias Robot.Localiser.Anchors
+  alias Robot.Mission.Claim
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Missions.Landmark
@@ -280,8 +281,8 @@ defmodule Missions.Landmark.Group do
     sender = {robot.boot, robot.sequence + 1}
     heard = Peers.heard(robot.peers, group.now)
     # As `Swarm.Comms.OwnHeartbeat` does.
-    claim = Heartbeat.timely(robot.claim, group.now - robot.mission.now_ms)
-    beat = Heartbeat.new(sender, percept(group, id), claim, heard, EStop.State.new())
+    claim = Claim.timely(Landmark, robot.claim, group.now - robot.mission.now_ms)
+    beat = Heartbeat.new(sender, percept(group, id), {Landmark, claim}, heard, EStop.State.new())
     group = put_in(group.robots[id].sequence, robot.sequence + 1)
     group = if beat.phase == :lead, do: note_rivals(group, id), else: group
     carry_out({:send, :all, Message.new(id, :heartbeat, beat)}, id, group)
@@ -292,7 +293,7 @@ defmodule Missions.Landmark.Group do
       for {other, %{claim: claim, mission: %{now_ms: ticked_ms}}} <- group.robots,
           other != id,
           not frozen?(group, other),
-          match?(%{phase: :lead}, Heartbeat.timely(claim, group.now - ticked_ms)),
+          match?(%{phase: :lead}, Claim.timely(Landmark, claim, group.now - ticked_ms)),
           Enum.any?(parts(group), &(id in &1 and other in &1)),
           do: {group.now, id, other}
 

@@ -24,8 +24,8 @@ defmodule Robot.Mission do
     * `{:tell, to, kind, fields}` - sends a message of the mission's own (`c:messages/0`) to one robot, to
       several, or to `:all`
     * `{:send, to, message}` - sends a message that all robots share (`Swarm.Message`) likewise
-    * `{:claim, map}` - what the robot reports about itself until the next claim: `phase:`, `standing:` and the other fields
-      of `Swarm.Membership.Heartbeat` go to all robots; for people there are `blocked_by:` and `says:`, each a line or `nil`, which
+    * `{:claim, map}` - what the robot reports about itself until the next claim: `phase:`, `standing:`, `leader:` and the fields
+      of `c:claims/0` go to all robots; for people there are `blocked_by:` and `says:`, each a line or `nil`, which
       stand in its status, and `formed:`, that it has what the mission wants, which ends a run of the demo
     * `{:stage, name, map}` - reports an event to people; `says:` is how it is told, after the robot's name
   """
@@ -95,6 +95,25 @@ defmodule Robot.Mission do
   """
   @callback messages() :: messages()
 
+  @typedoc """
+  The version of what a mission claims, and the module of the struct that it is. Its `valid?/1` says whether one from outside,
+  which has the right keys, makes sense.
+  """
+  @type claims :: {version :: pos_integer(), struct :: module()}
+
+  @doc """
+  What every heartbeat of a robot says of this mission beside its phase, whether it stands, and whom it follows
+  (`Robot.Mission.Claim`). Others hear it in `percept.peers` as `peer.beat.claim`. A mission without this callback has nothing
+  more to say.
+  """
+  @callback claims() :: claims()
+
+  @doc """
+  What the mission may still claim when it has decided nothing for more than a second, as after a freeze. Without this callback:
+  what it claimed last.
+  """
+  @callback stale(claim :: map()) :: map()
+
   @doc """
   The names of the commands for a running mission that it understands, beside `:start`, such as `[:formation]`. People are
   told that a robot does not take the others. A mission without this callback gets every command. One that names a command
@@ -102,7 +121,14 @@ defmodule Robot.Mission do
   """
   @callback commands() :: [atom()]
 
-  @optional_callbacks halted: 1, options: 2, option_table: 0, explain: 1, messages: 0, commands: 0
+  @optional_callbacks halted: 1,
+                      options: 2,
+                      option_table: 0,
+                      explain: 1,
+                      messages: 0,
+                      claims: 0,
+                      stale: 1,
+                      commands: 0
 
   @doc """
   Whether a module is a mission: it is part of this build and declares this behaviour.

@@ -203,7 +203,7 @@ defmodule Swarm.Member do
   end
 
   @doc """
-  What the robot's mission claims: its phase and the fields of `Swarm.Membership.Heartbeat`.
+  What the robot's mission claims (`t:Robot.Mission.effect/0`).
   """
   @spec claim(t()) :: map()
   def claim(member), do: member.runner.claim
@@ -316,7 +316,12 @@ defmodule Swarm.Member do
          %Percept{pose: %Pose{}} = percept <- Controller.percept(member.controller) do
       heard = Peers.heard(member.receiver.peers, at_ms)
       sender = {member.boot, member.sequence + 1}
-      claim = if Runner.state(member.runner) == :idle, do: :idle, else: claim(member)
+
+      claim =
+        if Runner.state(member.runner) == :idle,
+          do: :idle,
+          else: {member.runner.module, claim(member)}
+
       beat = Heartbeat.new(sender, percept, claim, heard, member.stop)
 
       {%{member | sequence: member.sequence + 1, beat_ms: at_ms},

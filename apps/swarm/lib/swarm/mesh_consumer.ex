@@ -15,7 +15,7 @@ defmodule Swarm.MeshConsumer do
   @impl Mesh.Consumer
   def services do
     modules =
-      for app <- [:hal, :mesh, :swarm | Missions.apps()],
+      for app <- [:hal, :mesh, :robot, :swarm | Missions.apps()],
           module <- Application.spec(app, :modules) || [],
           do: module
 

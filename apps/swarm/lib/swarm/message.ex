@@ -85,24 +85,27 @@ defmodule Swarm.Message do
       message.hops not in 0..@most_hops ->
         {:error, :not_a_message}
 
-      valid?(kind, body, view) ->
-        {:ok, message}
-
       true ->
-        {:error, kind}
+        case body(kind, body, view) do
+          {:ok, body} -> {:ok, %{message | body: body}}
+          false -> {:error, kind}
+        end
     end
   end
 
   def check(_term, _view), do: {:error, :not_a_message}
 
-  defp valid?(:heartbeat, body, _view), do: Heartbeat.valid?(body)
-  defp valid?(:round, body, view), do: Round.Letter.valid?(body, view)
-  defp valid?(:place, body, _view), do: Reference.valid?(body)
-  defp valid?(:mission, body, _view), do: Robot.Mission.Letter.valid?(body)
+  defp body(:heartbeat, body, _view),
+    do: with(:error <- Heartbeat.check(body), do: false)
+
+  defp body(:round, body, view), do: Round.Letter.valid?(body, view) && {:ok, body}
+  defp body(:place, body, _view), do: Reference.valid?(body) && {:ok, body}
+  defp body(:mission, body, _view), do: Robot.Mission.Letter.valid?(body) && {:ok, body}
 
   # Nothing else is passed on, and nothing is wrapped twice.
-  defp valid?(:relay, %__MODULE__{kind: kind} = inner, view) when kind in [:heartbeat, :round],
-    do: inner.hops != 0 and match?({:ok, _}, check(inner, view))
+  defp body(:relay, %__MODULE__{kind: kind, hops: hops} = inner, view)
+       when kind in [:heartbeat, :round] and hops != 0,
+       do: with({:error, _reason} <- check(inner, view), do: false)
 
-  defp valid?(:relay, _other, _view), do: false
+  defp body(:relay, _other, _view), do: false
 end

@@ -6,8 +6,7 @@ defmodule Swarm.Status do
 
   The number after the pose is its uncertainty: in 95 of 100 cases the robot is no farther from it
   (`uncertainty`, metres; `Robot.Percept`). A follower's pose is in its leader's frame, any other
-  robot's in that of its start pose (`frame`; `Swarm.Status.Frame`). A robot that stands in its slot by its own estimate,
-  but is not certain enough to say so, is `in its slot, but NOT SURE of its place (±0.62 m)` (`unsure`). `epoch` counts the
+  robot's in that of its start pose (`frame`; `Swarm.Status.Frame`). `epoch` counts the
   elections that its mission knows of.
 
   `weights` are all behaviours that wished for something, with the weights by which they were compared, the chosen one
@@ -73,7 +72,6 @@ defmodule Swarm.Status do
                 hung: nil,
                 leader: nil,
                 epoch: nil,
-                unsure: false,
                 blocked_by: nil,
                 says: nil,
                 power: nil,
@@ -108,7 +106,6 @@ defmodule Swarm.Status do
           hung: {:silent | :hung, behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
           leader: atom() | String.t() | nil,
           epoch: non_neg_integer() | nil,
-          unsure: boolean(),
           blocked_by: String.t() | nil,
           says: String.t() | nil,
           power: float() | nil,
@@ -151,7 +148,6 @@ defmodule Swarm.Status do
       hung: hung(entries),
       leader: mission |> field(:claim) |> field(:leader),
       epoch: mission |> field(:claim) |> field(:epoch),
-      unsure: mission |> field(:claim) |> field(:unsure) == true,
       blocked_by: mission |> field(:claim) |> field(:blocked_by),
       says: mission |> field(:claim) |> field(:says),
       power: value(entries, :power),
@@ -238,12 +234,6 @@ defmodule Swarm.Status do
 
     defp within(metres), do: "±#{fixed(metres)} m"
 
-    defp unsure(%{unsure: false}), do: nil
-    defp unsure(%{uncertainty: nil}), do: "in its slot, but NOT SURE of its place"
-
-    defp unsure(%{uncertainty: metres}),
-      do: "in its slot, but NOT SURE of its place (#{within(metres)})"
-
     defp speed(%{speed: nil}), do: "speed unknown"
 
     defp speed(status),
@@ -259,7 +249,6 @@ defmodule Swarm.Status do
         status.fault && "FAULT (#{status.fault})",
         Enum.any?(status.limits, &("#{&1}" == "blind")) && "BLIND (no sonar; slow)",
         hung(status.hung),
-        unsure(status),
         status.blocked_by && "BLOCKED by #{status.blocked_by}",
         is_binary(status.says) && status.says,
         status.leader && "leader #{status.leader}",

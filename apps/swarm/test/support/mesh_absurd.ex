@@ -65,7 +65,7 @@ defmodule Swarm.MeshNodes.Absurd do
     }
 
     letter = %Round.Letter{id: {1, 1, me}, view: [me], remaining_ms: 900, purpose: :search}
-    beat = %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}, anchor: anchor}
+    beat = %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
     [heartbeat: beat, round: letter, place: anchor]
   end
 

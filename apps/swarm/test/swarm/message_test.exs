@@ -15,6 +15,7 @@ defmodule Swarm.MessageTest do
   doctest Swarm.Comms.PingReply
 
   @beat %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
+  @claim %Robot.Mission.Claim{mission: Some.Mission, version: 1, fields: %{}}
   @anchor %Reference{
     leader: :mag1,
     epoch: 1,
@@ -72,7 +73,7 @@ defmodule Swarm.MessageTest do
       {kind, whole} =
         Enum.random(
           heartbeat: @beat,
-          heartbeat: %{@beat | anchor: @anchor},
+          heartbeat: %{@beat | claim: @claim},
           place: @anchor,
           round: @letter
         )
@@ -113,6 +114,13 @@ defmodule Swarm.MessageTest do
     end
   end
 
+  test "of a mission that this build does not have, only the robot's body is heard" do
+    beat = %{@beat | claim: %{@claim | fields: %{more: :binary.copy("x", 1_000_000)}}}
+    assert {:ok, %{body: @beat}} = Message.check(Message.new(:mag1, :heartbeat, beat))
+    {:ok, relayed} = Message.pass_on(Message.new(:mag1, :heartbeat, beat), :mag2)
+    assert {:ok, %{body: %{body: @beat}}} = Message.check(relayed)
+  end
+
   test "sizes are bounded, and names must be names" do
     many = List.duplicate(1, 1_000_000)
     names = List.duplicate(:mag1, 1_001)
@@ -128,7 +136,8 @@ defmodule Swarm.MessageTest do
           heartbeat: %{@beat | heard: [:mag1]},
           heartbeat: %{@beat | sequence: Integer.pow(10, 1_000)},
           heartbeat: %{@beat | boot: Integer.pow(10, 1_000)},
-          heartbeat: %{@beat | sight: %{size_ppm: 1, distance: 1, more: large}},
+          heartbeat: %{@beat | claim: %{@claim | fields: large}},
+          heartbeat: %{@beat | claim: Map.put(@claim, :more, large)},
           round: %{@letter | view: names},
           round: %{@letter | digest: large},
           round: %{@letter | report: Map.put(report, :more, large)},

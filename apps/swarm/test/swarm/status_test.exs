@@ -95,23 +95,21 @@ defmodule Swarm.StatusTest do
 
     assert line.(uncertainty: 0.1234) =~ "#mag1 idle (pose unknown) 0.00 m/s, hears"
 
-    assert line.(pose: pose, uncertainty: 0.62, unsure: true, leader: :min1) =~
-             " m/s, in its slot, but NOT SURE of its place (±0.62 m), leader min1,"
-
-    assert line.(unsure: true) =~ " m/s, in its slot, but NOT SURE of its place, hears"
+    assert line.(pose: pose, says: "as its mission puts it", leader: :min1) =~
+             " m/s, as its mission puts it, leader min1,"
   end
 
-  test "a robot's row says how sure its pose is, in whole mm" do
+  test "a robot's row says how sure its pose is, in whole mm, and what its mission says" do
     status = %Status{robot: :mag1, node: node(), by: :follow, age_ms: 5}
-    sure = %{status | uncertainty: 0.12345, unsure: true}
+    sure = %{status | uncertainty: 0.12345, says: "point 2 of 4"}
     row = Status.Row.encode(sure)
     assert row.uncertainty == 123
-    assert {:ok, %{uncertainty: 0.123, unsure: true}} = Status.Row.decode(:mag1, row, 10)
+    assert {:ok, %{uncertainty: 0.123, says: "point 2 of 4"}} = Status.Row.decode(:mag1, row, 10)
 
     # A robot that does not know says nothing, as older versions do.
     none = Status.Row.encode(status)
-    refute is_map_key(none, :uncertainty) or is_map_key(none, :unsure)
-    assert {:ok, %{uncertainty: nil, unsure: false}} = Status.Row.decode(:mag1, none, 10)
+    refute is_map_key(none, :uncertainty) or is_map_key(none, :says)
+    assert {:ok, %{uncertainty: nil, says: nil}} = Status.Row.decode(:mag1, none, 10)
 
     for zero <- [0, 0.0],
         do: assert(%{uncertainty: 0} = Status.Row.encode(%{sure | uncertainty: zero}))
@@ -123,15 +121,19 @@ defmodule Swarm.StatusTest do
     for junk <- [-1, 0.5, 100_000_001, 10 ** 40, "123", :far, {1}, [1]],
         do: assert(Status.Row.decode(:mag1, %{row | uncertainty: junk}, 10) == :error)
 
-    for junk <- [nil, 1, "true", :maybe],
-        do: assert(Status.Row.decode(:mag1, %{row | unsure: junk}, 10) == :error)
+    for junk <- [1, :maybe, String.duplicate("x", 1_000)],
+        do: assert(Status.Row.decode(:mag1, %{row | says: junk}, 10) == :error)
+
+    # However long it is, some of it is told.
+    long = Status.Row.encode(%{status | says: String.duplicate("ä", 1_000)})
+    assert {:ok, %{says: "ä" <> _}} = Status.Row.decode(:mag1, long, 10)
   end
 
   test "a robot without a mission says how sure it is of its pose" do
     id = robot(:st_sure)
     assert eventually(fn -> is_float(Swarm.status(id).uncertainty) end)
     status = Swarm.status(id)
-    assert status.uncertainty >= 0.0 and not status.unsure
+    assert status.uncertainty >= 0.0
     assert inspect(status) =~ ~r/ deg\) ±\d+\.\d\d m, 0\.00 m\/s/
   end
 

@@ -1,43 +1,92 @@
 defmodule Missions.Landmark.Claim do
   @moduledoc """
-  What a robot's heartbeat reports about its landmark mission (`Swarm.Membership.Heartbeat`). Pure.
+  What a robot says of its landmark mission to all others, with its heartbeats (`Robot.Mission.Claim`). Pure.
+
+  `epoch` is that of the election which it knows; `sight` its newest view of the landmark, relative size in millionths and
+  estimated distance in mm, `nil` if it does not see it; `sd` the uncertainty of its place in its leader's frame, `nil` outside
+  it. `in_place` says that a follower is in its slot, `unsure` that it believes so but is not sure enough, `blocked` that it
+  does not get there, `formed` that all do. Only a leader has an `anchor`.
   """
-  alias Missions.Landmark
-  alias Missions.Landmark.{Blocker, Marks}
+  alias Swarm.Formation.Reference
+  alias Swarm.Membership.Heartbeat
+  alias Swarm.Wire
 
-  @doc "The claim of this tick."
-  @spec claim(Landmark.State.t()) :: map()
-  def claim(mission) do
-    leading? = mission.phase == :lead
+  @typedoc "Standard deviations of a place in mm, along the worst direction and across it, and that direction in mrad."
+  @type spread :: {worst :: non_neg_integer(), least :: non_neg_integer(), direction :: integer()}
 
-    %{
-      phase: mission.phase,
-      epoch: mission.epoch,
-      leader: mission.leader,
-      sight:
-        if(Landmark.State.sees?(mission),
-          do: %{
-            size_ppm: mission.sight.size_ppm,
-            distance: mission.sight.distance && round(mission.sight.distance * 1000)
-          }
-        ),
-      standing: standing?(mission),
-      sd: Marks.told(mission),
-      uncertainty: uncertainty(mission.percept),
-      in_place: mission.phase == :follow and mission.follower.in_place?,
-      unsure: mission.phase == :follow and mission.follower.unsure?,
-      blocked: mission.phase == :follow and mission.follower.blocked?,
-      blocked_by: if(mission.phase == :follow, do: Blocker.words(mission.follower.blocker)),
-      formed: leading? and mission.leadership.formed?,
-      anchor: if(leading?, do: mission.anchor)
-    }
+  defstruct epoch: 0,
+            sight: nil,
+            sd: nil,
+            in_place: false,
+            unsure: false,
+            blocked: false,
+            formed: false,
+            anchor: nil
+
+  @typedoc "What heartbeats carry."
+  @type t :: %__MODULE__{
+          epoch: non_neg_integer(),
+          sight: %{size_ppm: non_neg_integer(), distance: non_neg_integer() | nil} | nil,
+          sd: spread() | nil,
+          in_place: boolean(),
+          unsure: boolean(),
+          blocked: boolean(),
+          formed: boolean(),
+          anchor: Reference.t() | nil
+        }
+
+  @doc """
+  What a robot claims of this mission by its heartbeat; one without it claims nothing.
+
+      iex> beat = %Swarm.Membership.Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
+      iex> Missions.Landmark.Claim.of(beat).epoch
+      0
+  """
+  @spec of(Heartbeat.t()) :: t()
+  def of(%{claim: %{fields: %__MODULE__{} = claim}}), do: claim
+  def of(_without), do: %__MODULE__{}
+
+  @doc """
+  Whether the numbers of one from outside are sane.
+
+      iex> for epoch <- [3, -1], do: Missions.Landmark.Claim.valid?(%Missions.Landmark.Claim{epoch: epoch})
+      [true, false]
+  """
+  @spec valid?(t()) :: boolean()
+  def valid?(%__MODULE__{} = claim) do
+    Wire.counter?(claim.epoch) and sight?(claim.sight) and spread?(claim.sd) and
+      Enum.all?([claim.in_place, claim.unsure, claim.blocked, claim.formed], &is_boolean/1) and
+      (claim.anchor == nil or Reference.valid?(claim.anchor))
   end
 
-  defp uncertainty(%{uncertainty: %{radius: radius}}), do: radius
-  defp uncertainty(_no_pose), do: nil
+  defp spread?(nil), do: true
 
-  defp standing?(%{phase: :lead, percept: percept}), do: Landmark.State.slow?(percept, 0.05)
-  defp standing?(%{phase: :follow} = mission), do: mission.follower.holding?
-  defp standing?(%{phase: :hold, percept: percept}), do: Landmark.State.slow?(percept, 0.05)
-  defp standing?(%{phase: phase}), do: phase in [:idle, :search, :agree, :rest, :wait, :halt]
+  defp spread?({worst, least, direction}),
+    do: worst in 0..100_000 and least in 0..100_000 and direction in -4_000..4_000
+
+  defp spread?(_other), do: false
+
+  defp sight?(nil), do: true
+
+  defp sight?(%{size_ppm: size, distance: distance} = sight) do
+    map_size(sight) == 2 and size in 0..1_000_000 and
+      (distance == nil or distance in 0..1_000_000)
+  end
+
+  defp sight?(_other), do: false
+
+  @doc """
+  A leadership lapses after a second of silence: others may have elected another leader by then. An anchor is good for as long,
+  so nobody follows a leader that has decided nothing since.
+
+      iex> Missions.Landmark.Claim.stale(%{phase: :lead, leader: :mag1, epoch: 3, formed: true, anchor: nil})
+      %{phase: :agree, leader: nil, epoch: 3, formed: false, anchor: nil}
+      iex> Missions.Landmark.Claim.stale(%{phase: :follow, leader: :mag2})
+      %{phase: :follow, leader: :mag2}
+  """
+  @spec stale(map()) :: map()
+  def stale(%{phase: :lead} = claim),
+    do: Map.merge(claim, %{phase: :agree, leader: nil, formed: false, anchor: nil})
+
+  def stale(claim), do: claim
 end

@@ -2,6 +2,7 @@ defmodule Missions.Landmark.Company do
   @moduledoc """
   The other robots that are not gone, looked through once a tick for all that the mission asks of them. Pure.
   """
+  alias Missions.Landmark.Claim
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Formation.Reference
 
@@ -24,7 +25,9 @@ defmodule Missions.Landmark.Company do
   @doc """
   The company of a robot among the peers of its percept.
 
-      iex> peers = %{mag2: %{at_ms: 0, beat: %Swarm.Membership.Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}, phase: :lead, epoch: 3}}}
+      iex> claim = Robot.Mission.Claim.new(Missions.Landmark, %{epoch: 3})
+      iex> beat = %Swarm.Membership.Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}, phase: :lead, claim: claim}
+      iex> peers = %{mag2: %{at_ms: 0, beat: beat}}
       iex> company = Missions.Landmark.Company.of(:mag1, peers, 100)
       iex> {company.view, company.epochs, company.leading_epoch, Missions.Landmark.Company.of(:mag1, peers, 2_000).view}
       {[:mag1, :mag2], [3], 3, [:mag1]}
@@ -43,23 +46,25 @@ defmodule Missions.Landmark.Company do
     }
   end
 
-  defp look([{_id, %{phase: :idle, anchor: nil}} | beats], view, epochs, leading, anchored?),
-    do: look(beats, view, epochs, leading, anchored?)
-
   defp look(
-         [{id, %{phase: phase, epoch: epoch} = beat} | beats],
+         [{id, %{phase: phase, claim: %{fields: %Claim{} = claim}}} | beats],
          view,
          epochs,
          leading,
          anchored?
        ) do
+    %{epoch: epoch, anchor: anchor} = claim
     leading = if phase == :lead and epoch > leading, do: epoch, else: leading
-    anchored? = anchored? or is_struct(beat.anchor, Reference)
+    anchored? = anchored? or is_struct(anchor, Reference)
 
     if phase == :idle,
       do: look(beats, view, epochs, leading, anchored?),
       else: look(beats, [id | view], [epoch | epochs], leading, anchored?)
   end
+
+  # Of another mission, or of none.
+  defp look([_other | beats], view, epochs, leading, anchored?),
+    do: look(beats, view, epochs, leading, anchored?)
 
   defp look([], view, epochs, leading, anchored?), do: {view, epochs, leading, anchored?}
 end

@@ -10,6 +10,7 @@ defmodule Missions.Landmark.EpochFilter do
   alias Swarm.Agreement.Round
   alias Swarm.Membership.Heartbeat
   alias Missions.Landmark
+  alias Missions.Landmark.Claim
 
   @tell_ms 10_000
   # More than any fleet has: whoever invents names does not fill the memory.
@@ -32,8 +33,8 @@ defmodule Missions.Landmark.EpochFilter do
 
   defp leave_out(%{percept: percept} = mission, allowed) do
     beyond =
-      for {id, %{beat: %Heartbeat{epoch: epoch}} = peer} <- percept.peers,
-          epoch > allowed,
+      for {id, %{beat: %Heartbeat{} = beat} = peer} <- percept.peers,
+          Claim.of(beat).epoch > allowed,
           do: {id, peer}
 
     peers =
@@ -42,7 +43,7 @@ defmodule Missions.Landmark.EpochFilter do
     beyond
     |> Enum.sort_by(&elem(&1, 0))
     |> Enum.reduce(%{mission | percept: %{percept | peers: peers}}, fn {id, peer}, mission ->
-      refuse(mission, id, peer.beat.epoch)
+      refuse(mission, id, Claim.of(peer.beat).epoch)
     end)
   end
 

@@ -9,7 +9,7 @@ defmodule Missions.Landmark.Leader do
   alias Swarm.{Formation, Message}
   alias Swarm.Membership.NameSet
   alias Missions.Landmark
-  alias Missions.Landmark.{LandmarkTrack, Merge, Shape}
+  alias Missions.Landmark.{Claim, LandmarkTrack, Merge, Shape}
   alias Missions.Landmark.Leader.{Announcement, Slots}
 
   # A landmark farther off than this is driven after, to `Slots.near/0`.
@@ -206,7 +206,8 @@ defmodule Missions.Landmark.Leader do
   defp in_place?(mission, id) do
     case mission.percept.peers do
       %{^id => %{beat: beat, at_ms: at_ms}} ->
-        beat.in_place and beat.epoch == mission.epoch and mission.now_ms - at_ms < 1_000
+        claim = Claim.of(beat)
+        claim.in_place and claim.epoch == mission.epoch and mission.now_ms - at_ms < 1_000
 
       _unknown ->
         false

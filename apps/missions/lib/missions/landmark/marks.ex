@@ -10,7 +10,7 @@ defmodule Missions.Landmark.Marks do
   alias Hal.Pose
   alias Robot.Localiser.Anchors
   alias Missions.Landmark
-  alias Missions.Landmark.{LandmarkTrack, SlotPoses}
+  alias Missions.Landmark.{Claim, LandmarkTrack, SlotPoses}
 
   @robot_colour "RedRobot"
   # How far a robot may have moved since it was heard, and the uncertainty of the place of a robot
@@ -91,8 +91,8 @@ defmodule Missions.Landmark.Marks do
   # A robot that is not in the leader's frame yet cannot say where it is there.
   defp told?(leader, _peer, %{leader: leader}), do: true
 
-  defp told?(_id, %{beat: %{sd: sd, leader: leader, epoch: epoch}}, anchor),
-    do: sd != nil and leader == anchor.leader and epoch == anchor.epoch
+  defp told?(_id, %{beat: %{leader: leader} = beat}, %{leader: leader, epoch: epoch}),
+    do: match?(%{sd: {_, _, _}, epoch: ^epoch}, Claim.of(beat))
 
   defp told?(_id, _peer, _anchor), do: false
 
@@ -100,7 +100,7 @@ defmodule Missions.Landmark.Marks do
 
   defp spread(id, peer, anchor) do
     if told?(id, peer, anchor) do
-      {worst, least, mrad} = peer.beat.sd
+      {worst, least, mrad} = Claim.of(peer.beat).sd
       since = if standing?(peer), do: 0.0, else: @moved_sd
       {worst / 1000 + since, least / 1000 + since, mrad / 1000}
     else
@@ -138,7 +138,7 @@ defmodule Missions.Landmark.Marks do
   deviation of its position along the worst direction and across it (mm), and that direction
   (mrad); `nil` if it is not in that frame yet, or has none.
   """
-  @spec told(Landmark.State.t()) :: Swarm.Membership.Heartbeat.spread() | nil
+  @spec told(Landmark.State.t()) :: Claim.spread() | nil
   def told(%{anchor: %{}, percept: %{uncertainty: %{frame: frame, spread: spread}}} = mission) do
     {worst, least, direction} = spread
 

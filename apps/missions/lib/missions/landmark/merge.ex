@@ -9,6 +9,7 @@ defmodule Missions.Landmark.Merge do
   nobody takes the other's followers into its order.
   """
   alias Missions.Landmark
+  alias Missions.Landmark.Claim
 
   # Heartbeats come at 5 Hz: after this time all of the other part have been heard.
   @settle_ms 300
@@ -84,8 +85,8 @@ defmodule Missions.Landmark.Merge do
 
   defp led(mission, peers) do
     told =
-      for {_id, %{leader: leader, epoch: epoch}} <- peers,
-          leader == mission.me and epoch == mission.epoch,
+      for {_id, %{leader: leader} = beat} <- peers,
+          leader == mission.me and Claim.of(beat).epoch == mission.epoch,
           reduce: 1 do
         count -> count + 1
       end
@@ -99,7 +100,10 @@ defmodule Missions.Landmark.Merge do
     Enum.count(peers, fn {_id, beat} -> beat.phase == :follow and beat.leader == leader end)
   end
 
-  defp rivals(peers), do: for({id, %{phase: :lead, epoch: epoch}} <- peers, do: {id, epoch})
-  defp higher?(mission, peers), do: Enum.any?(peers, fn {_id, b} -> b.epoch > mission.epoch end)
+  defp rivals(peers), do: for({id, %{phase: :lead} = b} <- peers, do: {id, Claim.of(b).epoch})
+
+  defp higher?(mission, peers),
+    do: Enum.any?(peers, fn {_id, beat} -> Claim.of(beat).epoch > mission.epoch end)
+
   defp peers(mission), do: Landmark.State.beats(mission)
 end

@@ -5,7 +5,7 @@ defmodule Missions.Landmark.ReferenceInbox do
   alias Swarm.Agreement.Round
   alias Swarm.Formation.Reference
   alias Missions.Landmark
-  alias Missions.Landmark.{EpochFilter, Policy}
+  alias Missions.Landmark.{Claim, EpochFilter, Policy}
 
   # No people ask this often for another shape unheard; accepting such a number would leave no
   # room for later ones.
@@ -25,7 +25,8 @@ defmodule Missions.Landmark.ReferenceInbox do
 
   defp anchors(%{now_ms: now} = mission) do
     Enum.reduce(mission.percept.peers, mission, fn
-      {_id, %{at_ms: at_ms, beat: %{anchor: %Reference{} = anchor}}}, mission
+      {_id, %{at_ms: at_ms, beat: %{claim: %{fields: %Claim{anchor: %Reference{} = anchor}}}}},
+      mission
       when now - at_ms < @news_ms ->
         anchor(mission, anchor)
 

@@ -33,7 +33,7 @@ defmodule Missions.Landmark.Rounds do
     do:
       rescan? or (round.phase == :collect and round.purpose == :search and round.report == :busy)
 
-  # Others may have elected another leader since, as after `Swarm.Membership.Heartbeat.timely/2`.
+  # Others may have elected another leader since, as after `Robot.Mission.Claim.timely/3`.
   @slept_ms 1_000
 
   @doc """

@@ -16,7 +16,7 @@ defmodule Missions.Landmark.Shape do
   alias Swarm.Formation
   alias Swarm.Formation.{FreeSlots, Ladder, Space, Trail}
   alias Missions.Landmark
-  alias Missions.Landmark.LandmarkTrack
+  alias Missions.Landmark.{Claim, LandmarkTrack}
 
   @step_ms 3_000
   @step 0.1
@@ -232,7 +232,7 @@ defmodule Missions.Landmark.Shape do
   # counts as at rest, too.
   defp blocked?(mission) do
     beats = Landmark.State.beats(mission)
-    followers = for id <- mission.order, beat = beats[id], do: beat
+    followers = for id <- mission.order, beat = beats[id], do: Claim.of(beat)
 
     Enum.any?(followers, & &1.blocked) and
       Enum.all?(followers, &(&1.blocked or &1.in_place or &1.unsure))

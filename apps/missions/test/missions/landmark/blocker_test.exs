@@ -103,7 +103,8 @@ defmodule Missions.Landmark.BlockerTest do
 
   test "heartbeats say that a robot is blocked, but not by what" do
     claim = %{phase: :follow, blocked: true, blocked_by: :landmark}
-    beat = Heartbeat.new({1, 1}, percept([]), claim, [], EStop.State.new())
-    assert beat.blocked and Heartbeat.valid?(beat)
+    beat = Heartbeat.new({1, 1}, percept([]), {Landmark, claim}, [], EStop.State.new())
+    assert beat.claim.fields.blocked and Heartbeat.check(beat) == {:ok, beat}
+    refute is_map_key(beat.claim.fields, :blocked_by)
   end
 end

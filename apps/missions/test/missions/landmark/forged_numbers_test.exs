@@ -6,7 +6,6 @@ defmodule Missions.Landmark.ForgedNumbersTest do
   alias Missions.Landmark.Group
   alias Swarm.Agreement.Round.Letter
   alias Swarm.Formation.Reference
-  alias Swarm.Membership.Heartbeat
   alias Swarm.Message
 
   @ids [:mag1, :mag2, :mag3]
@@ -34,8 +33,7 @@ defmodule Missions.Landmark.ForgedNumbersTest do
     end
   end
 
-  defp beat(fields),
-    do: struct!(%Heartbeat{boot: 1, sequence: 1, pose: {9_000, 0, 0}, twist: {0, 0}}, fields)
+  defp beat(fields), do: Missions.Landmark.Beat.new([pose: {9_000, 0, 0}] ++ fields)
 
   # Without its leader, the rest has to elect another.
   defp assert_elects(group, seconds \\ 12) do

@@ -1,21 +1,10 @@
 defmodule Missions.Landmark.MergeTest do
   @moduledoc "Which robots a leader leaves to another one when two parts of a fleet meet."
   use ExUnit.Case, async: true
-  alias Swarm.Membership.Heartbeat
   alias Missions.Landmark
-  alias Missions.Landmark.Merge
+  alias Missions.Landmark.{Beat, Merge}
 
-  defp beat(phase, leader) do
-    %Heartbeat{
-      boot: 1,
-      sequence: 1,
-      pose: {0, 0, 0},
-      twist: {0, 0},
-      phase: phase,
-      leader: leader,
-      epoch: 2
-    }
-  end
+  defp beat(phase, leader), do: Beat.new(phase: phase, leader: leader, epoch: 2)
 
   # What mag1, which leads, hears of the others.
   defp theirs(beats) do

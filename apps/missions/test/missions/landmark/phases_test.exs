@@ -3,11 +3,10 @@ defmodule Missions.Landmark.PhasesTest do
   use ExUnit.Case, async: true
   alias Robot.Behaviour
   alias Robot.Localiser.Anchors
-  alias Missions.Landmark.Group
+  alias Missions.Landmark.{Beat, Group}
   alias Swarm.Message
   alias Swarm.Agreement.Round
   alias Swarm.Formation.Reference
-  alias Swarm.Membership.Heartbeat
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Transitions}
 
@@ -26,8 +25,8 @@ defmodule Missions.Landmark.PhasesTest do
 
   defp beat(group, id, fields) do
     fields = Keyword.put_new(fields, :phase, :search)
-    plain = [boot: 1, sequence: group.now, pose: {3000, 0, 0}, twist: {0, 0}]
-    Group.hear(group, :mag2, id, Message.new(id, :heartbeat, struct!(Heartbeat, plain ++ fields)))
+    plain = [sequence: group.now, pose: {3000, 0, 0}]
+    Group.hear(group, :mag2, id, Message.new(id, :heartbeat, Beat.new(plain ++ fields)))
   end
 
   # Time passes while another robot sends this heartbeat five times a second.

@@ -76,11 +76,13 @@ defmodule Missions.Landmark.UnsureTest do
   end
 
   test "heartbeats carry the word unsure, and no other value in its place" do
-    beat =
-      Heartbeat.new({1, 1}, percept([]), %{phase: :follow, unsure: true}, [], EStop.State.new())
+    claim = %{phase: :follow, unsure: true}
+    beat = Heartbeat.new({1, 1}, percept([]), {Landmark, claim}, [], EStop.State.new())
 
-    assert beat.unsure and Heartbeat.valid?(beat)
-    for junk <- [nil, 1, "true"], do: refute(Heartbeat.valid?(%{beat | unsure: junk}))
+    assert beat.claim.fields.unsure and Heartbeat.check(beat) == {:ok, beat}
+
+    for junk <- [nil, 1, "true"],
+        do: assert(Heartbeat.check(put_in(beat.claim.fields.unsure, junk)) == :error)
   end
 
   # What the leader concludes from its followers' reports, long after it began to lead.
@@ -88,7 +90,7 @@ defmodule Missions.Landmark.UnsureTest do
     peers =
       for {id, word} <- words, into: %{} do
         claim = Map.merge(%{phase: :follow, standing: true}, word)
-        beat = Heartbeat.new({1, 1}, percept([]), claim, [], EStop.State.new())
+        beat = Heartbeat.new({1, 1}, percept([]), {Landmark, claim}, [], EStop.State.new())
         pose = Pose.new(5.0, 5.0)
         twist = Twist.zero()
         {id, %{pose: pose, twist: twist, radius: 0.2, at_ms: 0, mode: :holding, beat: beat}}

@@ -4,8 +4,7 @@ defmodule Sim.Fleet.Robot do
   alias Robot.Control.Pilot
   alias Sim.Fleet.Hardware
   alias Sim.World
-  alias Robot.Mission.Manual
-  alias Swarm.Membership.Heartbeat
+  alias Robot.Mission.{Claim, Manual}
 
   @armed_ms 5_000
   @look_ms 10
@@ -89,7 +88,7 @@ defmodule Sim.Fleet.Robot do
     with {:ok, board} <- Board.find(id),
          {:ok, %{state: state, claim: claim, ticked_ms: ticked_ms}, at_ms} <-
            Board.fetch(board, :mission, :infinity) do
-      claim = Heartbeat.timely(claim, Board.now(board) - (ticked_ms || at_ms))
+      claim = timely(state, claim, Board.now(board) - (ticked_ms || at_ms))
       claim = Map.put_new_lazy(claim, :uncertainty, fn -> uncertainty(board) end)
 
       case state do
@@ -101,6 +100,9 @@ defmodule Sim.Fleet.Robot do
       :error -> %{}
     end
   end
+
+  defp timely({mission, _phase}, claim, age_ms), do: Claim.timely(mission, claim, age_ms)
+  defp timely(:idle, claim, _age_ms), do: claim
 
   defp uncertainty(board) do
     with {:ok, %{radius: radius}, _at_ms} <- Board.fetch(board, :uncertainty, :infinity),

@@ -3,6 +3,7 @@ defmodule Swarm.Comms.OwnHeartbeat do
   Makes the heartbeat of a live robot from its board. `Swarm.Member` makes the same in lockstep.
   """
   alias Robot.{Board, Config}
+  alias Robot.Mission.Claim
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message.Receiver
@@ -37,11 +38,11 @@ defmodule Swarm.Comms.OwnHeartbeat do
       {:ok, %{state: :idle}, _at_ms} ->
         :idle
 
-      {:ok, %{claim: claim, ticked_ms: ticked_ms}, written_ms} ->
-        Heartbeat.timely(claim, at_ms - (ticked_ms || written_ms))
+      {:ok, %{state: {mission, _phase}, claim: claim, ticked_ms: ticked_ms}, written_ms} ->
+        {mission, Claim.timely(mission, claim, at_ms - (ticked_ms || written_ms))}
 
       :error ->
-        %{}
+        {nil, %{}}
     end
   end
 end

@@ -44,7 +44,7 @@ defmodule Swarm.Status.Row do
     |> uncertain(status.uncertainty)
     |> given(:frame, status.frame && Status.Frame.encode(status.frame))
     |> given(:epoch, status.epoch)
-    |> unsure(status.unsure)
+    |> given(:says, status.says && short(status.says))
   end
 
   defp hung(row, nil), do: row
@@ -57,11 +57,14 @@ defmodule Swarm.Status.Row do
   defp uncertain(row, metres),
     do: Map.put(row, :uncertainty, min(mm(metres), @unsure_mm))
 
+  # A mission's own words may be as long as it likes.
+  defp short(text) when is_binary(text),
+    do: text |> String.codepoints() |> Enum.take(@words) |> Enum.join()
+
+  defp short(_other), do: nil
+
   defp given(row, _key, nil), do: row
   defp given(row, key, value), do: Map.put(row, key, value)
-
-  defp unsure(row, true), do: Map.put(row, :unsure, true)
-  defp unsure(row, false), do: row
 
   defp offline(row, %{offline: lines}) when lines == %{}, do: row
 
@@ -93,10 +96,9 @@ defmodule Swarm.Status.Row do
          {:ok, blocked_by} <- text(Map.get(row, :blocked_by)),
          {:ok, hung} <- hangs(Map.get(row, :hung), age_ms),
          {:ok, uncertainty} <- metres(Map.get(row, :uncertainty)),
-         unsure = Map.get(row, :unsure, false),
+         {:ok, says} <- text(Map.get(row, :says), 4 * @words),
          epoch = Map.get(row, :epoch),
          true <- epoch == nil or Wire.number?(epoch),
-         true <- is_boolean(unsure),
          true <- Enum.all?([limits, offline, members, deaf_to, words], &texts?/1),
          true <- Enum.all?([node, state], &is_binary/1),
          true <- Enum.all?([by, leader, fault], &(&1 == nil or is_binary(&1))),
@@ -123,7 +125,7 @@ defmodule Swarm.Status.Row do
          estop: estop,
          arming: arming,
          leader: leader && Blackboard.Codec.word(leader),
-         unsure: unsure,
+         says: says,
          blocked_by: blocked_by,
          hung: hung,
          power: power,
@@ -150,9 +152,10 @@ defmodule Swarm.Status.Row do
   defp armed("error"), do: {:ok, {:error, :unknown}}
   defp armed(_other), do: :error
 
-  defp text(nil), do: {:ok, nil}
-  defp text(text) when is_binary(text) and byte_size(text) <= @words, do: {:ok, text}
-  defp text(_other), do: :error
+  defp text(text, most \\ @words)
+  defp text(nil, _most), do: {:ok, nil}
+  defp text(text, most) when is_binary(text) and byte_size(text) <= most, do: {:ok, text}
+  defp text(_other, _most), do: :error
 
   defp hangs(nil, _age_ms), do: {:ok, nil}
 

@@ -5,6 +5,13 @@ defmodule Swarm.Comms.OwnHeartbeatTest do
   alias Swarm.Comms.OwnHeartbeat
   alias Swarm.Message.Receiver
 
+  defmodule Leading do
+    @moduledoc false
+    defstruct epoch: 0, formed: false
+    def claims, do: {1, __MODULE__}
+    def stale(claim), do: Map.merge(claim, %{phase: :agree, leader: nil, formed: false})
+  end
+
   # A leader was frozen, or its mission hangs, while its comms process speaks.
   test "the first heartbeats after a freeze do not claim a leadership that others may have by then" do
     unless Process.whereis(Robot.Names), do: start_supervised!(Robot.Names)
@@ -15,7 +22,7 @@ defmodule Swarm.Comms.OwnHeartbeatTest do
     Board.put(board, :executive, :pose, Pose.new(0, 0), 10_000)
     claim = %{phase: :lead, leader: id, epoch: 3, formed: true, standing: true}
 
-    entry = %{state: {Some.Mission, :lead}, claim: claim, since_ms: 0, ticked_ms: 10_000}
+    entry = %{state: {Leading, :lead}, claim: claim, since_ms: 0, ticked_ms: 10_000}
 
     # A message that the mission heard later does not make its claim newer.
     for {written_ms, at_ms, phase} <- [
@@ -27,9 +34,11 @@ defmodule Swarm.Comms.OwnHeartbeatTest do
       Board.put(board, :pilot, :mission, entry, written_ms)
       {:ok, message} = OwnHeartbeat.message(config, board, Receiver.new(id), {1, 1}, at_ms)
       beat = message.body
-      assert {beat.phase, beat.epoch, beat.standing} == {phase, 3, true}
-      assert {beat.leader, beat.formed} == if(phase == :lead, do: {id, true}, else: {nil, false})
-      assert beat.anchor == nil
+      %{mission: Leading, version: 1, fields: fields} = beat.claim
+      assert {beat.phase, fields.epoch, beat.standing} == {phase, 3, true}
+
+      assert {beat.leader, fields.formed} ==
+               if(phase == :lead, do: {id, true}, else: {nil, false})
     end
   end
 end

@@ -7,6 +7,7 @@ defmodule Missions.Landmark.Rounds.Challenge do
   not challenge the leader. Pure.
   """
   alias Missions.Landmark
+  alias Missions.Landmark.Claim
 
   @dwell_ms 2_000
   @blind_ms 3_000
@@ -41,10 +42,11 @@ defmodule Missions.Landmark.Rounds.Challenge do
     with true <- Landmark.State.sees?(mission),
          %{distance: mine} when mine != nil <- mission.sight,
          %{phase: :lead} = leader <- peers[mission.leader],
+         sight = Claim.of(leader).sight,
          mine = round(mine * 1000),
          true <- nearest?(mine, mission.me, peers),
-         true <- mission.follower.in_place? or moved?(mission) or leader.sight == nil do
-      case leader.sight do
+         true <- mission.follower.in_place? or moved?(mission) or sight == nil do
+      case sight do
         nil -> :blind
         %{distance: nil} -> nil
         %{distance: theirs} -> if mine < theirs - max(@least, theirs * @share), do: :nearer
@@ -65,9 +67,15 @@ defmodule Missions.Landmark.Rounds.Challenge do
 
   # If several could ask, the nearest does.
   defp nearest?(mine, me, peers) do
-    Enum.all?(peers, fn {id, beat} ->
-      beat.phase != :follow or beat.sight == nil or beat.sight.distance == nil or
-        {mine, me} < {beat.sight.distance, id}
+    Enum.all?(peers, fn
+      {id, %{phase: :follow} = beat} ->
+        case Claim.of(beat).sight do
+          %{distance: distance} when distance != nil -> {mine, me} < {distance, id}
+          _unknown -> true
+        end
+
+      _other ->
+        true
     end)
   end
 end

@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.Rounds.Opening do
   @moduledoc "When a robot opens a round of the landmark mission, and when it leaves one. Pure."
   alias Missions.Landmark
-  alias Missions.Landmark.{Merge, Policy}
+  alias Missions.Landmark.{Claim, Merge, Policy}
   alias Missions.Landmark.Rounds.View
   alias Swarm.Agreement.Round
   alias Swarm.Membership.NameSet
@@ -96,7 +96,7 @@ defmodule Missions.Landmark.Rounds.Opening do
   defp begin(mission, view, purpose) do
     length = if purpose == :search, do: @search_ms, else: @change_ms
     same? = Round.open?(mission.round)
-    known = for {_id, beat} <- View.beats(mission), do: beat.epoch
+    known = for {_id, beat} <- View.beats(mission), do: Claim.of(beat).epoch
     epoch = if same?, do: elem(mission.round.id, 0), else: Enum.max([mission.epoch | known]) + 1
     round = Round.open(mission.round, epoch, view, purpose, length, mission.now_ms)
     %{mission | round: round, challenge: nil}

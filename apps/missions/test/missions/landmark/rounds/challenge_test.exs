@@ -1,20 +1,13 @@
 defmodule Missions.Landmark.Rounds.ChallengeTest do
   @moduledoc "A follower asks for a new leader when it is clearly nearer, for long enough, and not at once."
   use ExUnit.Case, async: true
-  alias Swarm.Membership.Heartbeat
   alias Missions.Landmark
+  alias Missions.Landmark.Beat
   alias Missions.Landmark.Rounds.Challenge
 
   # A follower in its place since `since_ms`, this far from the landmark; its leader is 3 m from it.
   defp follower(metres, since_ms, leader_sight \\ %{size_ppm: 9_000, distance: 3_000}) do
-    beat = %Heartbeat{
-      boot: 1,
-      sequence: 1,
-      pose: {0, 0, 0},
-      twist: {0, 0},
-      phase: :lead,
-      sight: leader_sight
-    }
+    beat = Beat.new(phase: :lead, sight: leader_sight)
 
     %Landmark.State{
       me: :mag2,

@@ -1,0 +1,13 @@
+defmodule Missions.Landmark.Beat do
+  @moduledoc "Heartbeats of robots that run the landmark mission."
+  alias Missions.Landmark
+  alias Robot.Mission.Claim
+  alias Swarm.Membership.Heartbeat
+
+  @doc "One with these fields, of the body and of the mission's claim."
+  def new(fields \\ []) do
+    {claim, body} = Keyword.split(fields, Map.keys(%Landmark.Claim{}))
+    plain = [boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}]
+    struct!(Heartbeat, plain ++ [claim: Claim.new(Landmark, Map.new(claim))] ++ body)
+  end
+end

@@ -1,0 +1,78 @@
+defmodule Robot.Mission.Claim do
+  @moduledoc """
+  What a mission says of itself to all other robots, five times a second, with their heartbeats. Pure.
+
+  A mission names a struct for it (`c:Robot.Mission.claims/0`); the fields' values come from its
+  effect `{:claim, map}`, or are the struct's defaults. Who runs the same version of the same mission hears them; everybody else
+  hears the robot's body alone.
+  """
+  alias Robot.Mission
+
+  # A mission that has decided nothing for so long may have been frozen.
+  @stale_ms 1_000
+  @latest 65_535
+
+  @enforce_keys [:mission, :version, :fields]
+  defstruct @enforce_keys
+
+  @type t :: %__MODULE__{mission: module(), version: 1..65_535, fields: struct()}
+
+  @doc "What others hear of what this mission claims; `nil` of one that has nothing more to say."
+  @spec new(module(), claim :: map()) :: t() | nil
+  def new(mission, claim) do
+    case claims(mission) do
+      nil ->
+        nil
+
+      {version, said} ->
+        %__MODULE__{mission: mission, version: version, fields: struct(said, claim)}
+    end
+  end
+
+  @doc """
+  What a claim from outside is worth: itself, if its mission's own checks allow it; `nil`, if this build has no such mission or
+  another version of it.
+
+      iex> claim = %Robot.Mission.Claim{mission: Some.Mission, version: 1, fields: %{}}
+      iex> for term <- [nil, claim, %{claim | version: 0}, %{claim | fields: []}, :junk],
+      ...>   do: Robot.Mission.Claim.check(term)
+      [{:ok, nil}, {:ok, nil}, :error, :error, :error]
+  """
+  @spec check(term()) :: {:ok, t() | nil} | :error
+  def check(nil), do: {:ok, nil}
+
+  def check(%{__struct__: __MODULE__, mission: mission, version: version, fields: fields} = claim)
+      when map_size(claim) == 4 and is_atom(mission) and version in 1..@latest and is_map(fields) do
+    case claims(mission) do
+      {^version, said} -> if fits?(fields, said), do: {:ok, claim}, else: :error
+      _unknown -> {:ok, nil}
+    end
+  end
+
+  def check(_term), do: :error
+
+  # Of this struct, with all of its keys and no others.
+  defp fits?(%{__struct__: said} = fields, said) do
+    whole = said.__struct__()
+
+    map_size(fields) == map_size(whole) and
+      Enum.all?(Map.keys(whole), &is_map_key(fields, &1)) and
+      said.valid?(fields)
+  end
+
+  defp fits?(_fields, _said), do: false
+
+  @doc """
+  What a mission may still claim that claimed this so long ago: it may have been frozen or hung, and what it says before it has
+  looked at the clock must not contradict what others have decided meanwhile (`c:Robot.Mission.stale/1`).
+  """
+  @spec timely(module(), claim :: map(), age_ms :: integer()) :: map()
+  def timely(mission, claim, age_ms) do
+    if age_ms > @stale_ms and function_exported?(mission, :stale, 1),
+      do: mission.stale(claim),
+      else: claim
+  end
+
+  @spec claims(module()) :: Mission.claims() | nil
+  defp claims(mission), do: if(function_exported?(mission, :claims, 0), do: mission.claims())
+end
