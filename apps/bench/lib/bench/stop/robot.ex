@@ -69,7 +69,8 @@ defmodule Bench.Stop.Robot do
     :persistent_term.put({__MODULE__, :raise?}, false)
     # It may have crashed just now.
     until(fn -> Names.whereis(@id, :pilot) != nil end)
-    :ok = Pilot.start(@id, __MODULE__.Mission, speed: speed)
+    # A base whose process had no processor for half a second is offline for as long.
+    until(fn -> Pilot.start(@id, __MODULE__.Mission, speed: speed) == :ok end)
   end
 
   @doc "Makes the next tick of its behaviour raise; returns when it did."
