@@ -64,7 +64,7 @@ defmodule Swarm.Replacement.Code do
       {:ok, mission, Enum.sort(code)}
     else
       {:error, line} when is_binary(line) -> {:error, line}
-      _unreadable -> {:error, "the code of #{inspect(named)} cannot be read"}
+      _unreadable -> {:error, "the code cannot be read: it is no object code"}
     end
   end
 
