@@ -14,19 +14,14 @@ defmodule Swarm.Replacement do
   code. On real robots it is off unless their file says `replace: true`.
   """
   alias Hal.Options.Wording
-  alias Mesh.{Nonblocking, Secret}
   alias Robot.{Board, Config}
   alias Swarm.{Missions, Replacement}
   alias Swarm.Replacement.Order
 
-  @doc "The process of a node, for its supervisor; without a mesh orders come from this node alone."
-  @spec child_spec(Secret.t() | nil) :: Supervisor.child_spec()
-  def child_spec(secret),
-    do: %{id: __MODULE__, start: {__MODULE__, :start_link, [secret]}}
-
-  @doc "Starts that process."
-  @spec start_link(Secret.t() | nil) :: GenServer.on_start()
-  def start_link(secret), do: Replacement.Server.start_link(secret || Secret.random())
+  @doc "The process of a node, for its supervisor."
+  @spec child_spec(term()) :: Supervisor.child_spec()
+  def child_spec(options),
+    do: %{id: __MODULE__, start: {Replacement.Server, :start_link, [options]}}
 
   @doc """
   The content of an order to these robots: a mission as `Swarm.start/2` takes it, `:patrol`, `{:patrol, period: 60}` or
@@ -67,7 +62,7 @@ defmodule Swarm.Replacement do
   @doc "The request to this robot, signed by the key of this node, for the stamp that the robot has given; `nil` without a key."
   @spec seal(content :: binary(), robot :: atom(), Order.stamp()) :: tuple() | nil
   def seal(content, robot, stamp) do
-    case Nonblocking.call(Replacement.Server, {:sign, robot, stamp, content}, "the key") do
+    case Replacement.Server.sign(Order.signed_bytes(robot, stamp, content)) do
       {:ok, mac} -> {:replace, content, mac}
       {:error, _line} -> nil
     end

@@ -44,15 +44,12 @@ defmodule Swarm.Supervisor do
         Swarm.Blackboard,
         Swarm.Discovery.Presence,
         Swarm.EStop.Broadcaster,
-        {Swarm.Replacement, secret(options[:mesh])} | mesh ++ machine ++ recorder
+        Swarm.Replacement | mesh ++ machine ++ recorder
       ]
 
       tireless = for child <- children, do: {BackoffSupervisor, child}
       Supervisor.init(tireless, strategy: :one_for_one, max_restarts: 5, max_seconds: 5)
     end
-
-    defp secret(nil), do: nil
-    defp secret(%{secret: secret}), do: secret
   end
 
   @doc """

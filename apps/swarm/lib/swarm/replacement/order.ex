@@ -7,7 +7,7 @@ defmodule Swarm.Replacement.Order do
   byte of it becomes an atom before the signature was checked, and names of options only after the code that
   knows them was loaded.
 
-  The signature is an HMAC-SHA256, by a key derived from the fleet's secret, over the robot's name, the stamp that this
+  The signature (`Mesh.sign/2`) is an HMAC-SHA256, by a key derived from the fleet's secret, over the robot's name, the stamp that this
   robot has given for this order (`Swarm.Order.Freshness`), and a digest of the content. So it is good for one robot,
   for half a second, and a robot takes one of each time.
   """
@@ -35,7 +35,7 @@ defmodule Swarm.Replacement.Order do
   @typedoc "The stamp of the order, or the time on the same node (`Swarm.Commands.Client`)."
   @type stamp :: Freshness.stamp() | {:asked, integer()}
 
-  @doc "The label under which the key of the signature is derived (`Mesh.Secret.subkey/2`)."
+  @doc "The label under which the key of the signature is derived."
   @spec label() :: String.t()
   def label, do: @label
 
@@ -91,20 +91,15 @@ defmodule Swarm.Replacement.Order do
   defp code?({name, code}), do: name?(name) and is_binary(code)
   defp code?(_other), do: false
 
-  @doc "The signature of an order for this robot."
-  @spec sign(key :: binary(), robot :: atom(), stamp(), content :: binary()) :: <<_::256>>
-  def sign(key, robot, {life, at_us}, content) do
-    about = "#{@label}\0#{robot}\0#{life}\0#{at_us}\0"
-    :crypto.mac(:hmac, :sha256, key, [about, :crypto.hash(:sha256, content)])
-  end
+  @doc "The bytes that are signed: this content, for this robot, at this time."
+  @spec signed_bytes(robot :: atom(), stamp(), content :: binary()) :: binary()
+  def signed_bytes(robot, {life, at_us}, content),
+    do: "#{robot}\0#{life}\0#{at_us}\0" <> :crypto.hash(:sha256, content)
 
-  @doc "Whether a term is that signature."
-  @spec signed?(key :: binary(), robot :: atom(), stamp(), content :: binary(), term()) ::
-          boolean()
-  def signed?(key, robot, stamp, content, mac) do
-    is_binary(mac) and byte_size(mac) == 32 and
-      :crypto.hash_equals(sign(key, robot, stamp, content), mac)
-  end
+  @doc "Whether a term from outside is this signature; it takes equally long whichever byte differs."
+  @spec same?(<<_::256>>, term()) :: boolean()
+  def same?(mac, given),
+    do: is_binary(given) and byte_size(given) == 32 and :crypto.hash_equals(mac, given)
 
   @doc "The digest of an order's code that people compare, 8 hexadecimal digits; `nil` without code."
   @spec digest(t()) :: String.t() | nil

@@ -20,10 +20,20 @@ defmodule Swarm.Replacement.Server do
   @rest_linear 0.02
   @rest_turn 0.05
 
-  @doc "Starts the process of this node, with the secret whose key signs orders."
-  @spec start_link(Secret.t()) :: GenServer.on_start()
-  def start_link(%Secret{} = secret),
-    do: HardenedServer.start_link(__MODULE__, secret, name: __MODULE__)
+  @doc "Starts the process of this node."
+  @spec start_link(term()) :: GenServer.on_start()
+  def start_link(_options), do: HardenedServer.start_link(__MODULE__, [], name: __MODULE__)
+
+  @doc """
+  Signs bytes as this node's robots demand it: by the key of the fleet, or on a node without a mesh by one
+  of its own, which no other node has.
+  """
+  @spec sign(binary()) :: {:ok, <<_::256>>} | {:error, line :: String.t()}
+  def sign(bytes) do
+    if Mesh.running?(),
+      do: Mesh.sign(Order.label(), bytes),
+      else: Nonblocking.call(__MODULE__, {:sign, bytes}, "what signs orders")
+  end
 
   @doc "Called by the gate of a robot whose mission a job has ended."
   @spec stood(id :: binary(), robot :: atom()) :: :ok
@@ -34,9 +44,9 @@ defmodule Swarm.Replacement.Server do
   def started(id, robot, result), do: GenServer.cast(__MODULE__, {:started, id, robot, result})
 
   @impl GenServer
-  def init(secret) do
+  def init([]) do
     s = %{
-      secret: secret,
+      secret: Secret.random(),
       kept: %{},
       loaded: %{},
       release: %{},
@@ -67,9 +77,9 @@ defmodule Swarm.Replacement.Server do
   end
 
   @impl GenServer
-  def handle_call({:sign, robot, {_life, at_us} = stamp, content}, _from, s)
-      when is_atom(robot) and is_integer(at_us) and is_binary(content),
-      do: {:reply, {:ok, Order.sign(key(s), robot, stamp, content)}, s}
+  def handle_call({:sign, bytes}, {caller, _tag}, s)
+      when is_binary(bytes) and node(caller) == node(),
+      do: {:reply, {:ok, own(bytes, s)}, s}
 
   def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
@@ -115,13 +125,18 @@ defmodule Swarm.Replacement.Server do
 
   def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
-  defp key(%{secret: secret}), do: Secret.subkey(secret, Order.label())
+  defp own(bytes, s),
+    do: :crypto.mac(:hmac, :sha256, Secret.subkey(s.secret, Order.label()), bytes)
+
+  defp signature(bytes, s),
+    do: if(Mesh.running?(), do: Mesh.sign(Order.label(), bytes), else: {:ok, own(bytes, s)})
 
   # Nothing of the content is looked at before the signature.
   defp judge(robot, content, mac, {_life, at_us} = stamp, s) do
     with :ok <- allowed(robot),
          :ok <- small(content),
-         {:signed, true} <- {:signed, Order.signed?(key(s), robot, stamp, content, mac)},
+         {:ok, right} <- signature(Order.signed_bytes(robot, stamp, content), s),
+         {:signed, true} <- {:signed, Order.same?(right, mac)},
          {:new, true} <- {:new, at_us > Map.get(s.taken, robot, at_us - 1)},
          {:ok, order} <- Order.decode(content),
          true <- Atom.to_string(robot) in order.to do

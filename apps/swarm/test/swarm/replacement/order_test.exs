@@ -74,20 +74,25 @@ defmodule Swarm.Replacement.OrderTest do
              {:error, "Ours.Gather: its code takes 128 kB; 128 kB are allowed"}
   end
 
-  test "a signature is good for one key, robot, time and content" do
+  test "what is signed differs by robot, time and content, and only the whole signature is one" do
     {:ok, content} = Order.encode(new())
-    mac = Order.sign(@key, :mag1, {7, 1_000}, content)
-    assert Order.signed?(@key, :mag1, {7, 1_000}, content, mac)
+    bytes = Order.signed_bytes(:mag1, {7, 1_000}, content)
 
-    refute Order.signed?(:crypto.strong_rand_bytes(32), :mag1, {7, 1_000}, content, mac)
-    refute Order.signed?(@key, :mag2, {7, 1_000}, content, mac)
-    refute Order.signed?(@key, :mag1, {8, 1_000}, content, mac)
-    refute Order.signed?(@key, :mag1, {7, 1_001}, content, mac)
-    refute Order.signed?(@key, :mag1, {:asked, 1_000}, content, mac)
-    refute Order.signed?(@key, :mag1, {7, 1_000}, content <> "a", mac)
+    others = [
+      Order.signed_bytes(:mag2, {7, 1_000}, content),
+      Order.signed_bytes(:mag1, {8, 1_000}, content),
+      Order.signed_bytes(:mag1, {7, 1_001}, content),
+      Order.signed_bytes(:mag1, {:asked, 1_000}, content),
+      Order.signed_bytes(:mag1, {7, 1_000}, content <> "a")
+    ]
 
-    for wrong <- [nil, "", binary_part(mac, 0, 31), mac <> "a", 7, <<1::1>>],
-        do: refute(Order.signed?(@key, :mag1, {7, 1_000}, content, wrong))
+    assert length(Enum.uniq([bytes | others])) == 6
+    mac = :crypto.mac(:hmac, :sha256, @key, bytes)
+    assert Order.same?(mac, mac)
+    other = :crypto.mac(:hmac, :sha256, @key, hd(others))
+
+    for wrong <- [other, nil, "", binary_part(mac, 0, 31), mac <> "a", 7, <<1::1>>],
+        do: refute(Order.same?(mac, wrong))
   end
 
   test "the digest is that of what is executed, whatever the order of the modules" do
