@@ -8,6 +8,7 @@ defmodule Swarm.Replacement do
   | `Swarm.Replacement.Order` | the order as bytes, and its signature by the fleet's key |
   | `Swarm.Replacement.Code` | which code may come, and how it is loaded and brought back |
   | `Swarm.Replacement.Job` | one replacement on one node, as a function |
+  | `Swarm.Replacement.Admission`, `.Entries` | whether an order is carried out; what is read on the boards of robots, and noted there |
   | `Swarm.Replacement.Server` | the process of a node |
 
   The release stays as it is: nothing is written to a disk, and a robot that starts again has its own mission, and its own

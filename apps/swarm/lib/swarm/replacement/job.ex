@@ -8,18 +8,21 @@ defmodule Swarm.Replacement.Job do
   | `:standing` | all that were on a mission have ended it, by way of their gates, and their wheels rest; 3 s at most | the code is loaded |
   | `:loading` | the code is loaded | the mission is tried: its options are checked, and a state is made and thrown away |
   | `:trying` | that has gone well; 2 s at most | those that were on a mission start it |
+  | `:waiting` | a person starts the mission, because no robot was on one | it is watched |
   | `:watching` | 10 s have passed | it stays |
   | `:returning` | all have ended it, 3 s at most | code and missions are as before, and robots go on |
 
   What goes wrong up to the end of `:watching` leads back for all robots of the node, because they share its code. A robot
-  that a person stops meanwhile stays where it is, and nothing starts it again.
+  that a person stops meanwhile stays where it is, and nothing starts it again; nor does anything start one that was on no
+  mission, and went back.
 
   | effect | |
   |---|---|
   | `{:stand, id}` | end its mission; `{:stood, id}` when its gate has confirmed that |
   | `:load`, `:restore` | load the code (`{:loaded, result}`), or what was there before |
   | `:try` | `{:tried, result}` |
-  | `{:start, id, mission}` | `{:started, id, result}`; from then on `{:crashed, id}` if its pilot ends |
+  | `{:start, id, mission}` | `{:started, id, result}`, and as below |
+  | `{:watch, id}` | from now on `{:crashed, id}` if its pilot ends |
   | `{:note, what, line}` | tell of all its robots that they are `:changing`, `:replaced`, `:kept` or `:back` |
   """
 
@@ -38,7 +41,7 @@ defmodule Swarm.Replacement.Job do
   @type t :: %__MODULE__{
           robots: %{atom() => %{was: mission() | nil, stands?: boolean()}},
           mission: mission(),
-          phase: :standing | :loading | :trying | :watching | :returning | :done,
+          phase: :standing | :loading | :trying | :waiting | :watching | :returning | :done,
           since_ms: integer(),
           asked_ms: integer(),
           why: String.t() | nil
@@ -50,6 +53,7 @@ defmodule Swarm.Replacement.Job do
           | {:loaded, :ok | {:error, String.t()}}
           | {:tried, {:ok, keyword()} | {:error, String.t()}}
           | {:started, atom(), :ok | {:error, term()}}
+          | {:runs, atom()}
           | {:crashed, atom(), why :: String.t()}
           | {:gone, atom()}
           | {:tick, turning :: [atom()]}
@@ -60,6 +64,7 @@ defmodule Swarm.Replacement.Job do
           | :restore
           | :try
           | {:start, atom(), mission()}
+          | {:watch, atom()}
           | {:note, :changing | :replaced | :kept | :back, String.t() | nil}
 
   @doc "For how long a new version is watched."
@@ -94,8 +99,21 @@ defmodule Swarm.Replacement.Job do
 
   def step(%{phase: :trying} = job, {:tried, {:ok, options}}, now_ms) do
     {module, _options} = job.mission
-    job = at(%{job | mission: {module, options}}, :watching, now_ms)
+    phase = if on(job) == [], do: :waiting, else: :watching
+    job = at(%{job | mission: {module, options}}, phase, now_ms)
     {job, [{:note, :replaced, nil} | for(id <- on(job), do: {:start, id, job.mission})]}
+  end
+
+  def step(%{phase: :waiting, robots: robots} = job, {:runs, id}, now_ms)
+      when is_map_key(robots, id),
+      do: {at(job, :watching, now_ms), [{:watch, id}]}
+
+  # Those that were on a mission are watched already.
+  def step(%{phase: :watching} = job, {:runs, id}, _now_ms) do
+    case job.robots do
+      %{^id => %{was: nil}} -> {job, [{:watch, id}]}
+      _watched_or_gone -> {job, []}
+    end
   end
 
   # Nobody has started it, so all still stand.
@@ -170,7 +188,9 @@ defmodule Swarm.Replacement.Job do
   end
 
   # Of robots that have all ended.
-  defp undo(%{phase: phase}) when phase in [:trying, :watching, :returning], do: [:restore]
+  defp undo(%{phase: phase}) when phase in [:trying, :waiting, :watching, :returning],
+    do: [:restore]
+
   defp undo(_nothing_loaded), do: []
 
   defp done(job, effects), do: {%{job | phase: :done}, effects}

@@ -7,18 +7,14 @@ defmodule Swarm.Replacement.Server do
   use GenServer
   alias Hal.{Event, HardenedServer}
   alias Mesh.{Nonblocking, Secret}
-  alias Robot.{Board, Mission, Names}
+  alias Robot.{Mission, Names}
   alias Robot.Control.{Delivery, Pilot}
-  alias Robot.Mission.Manual
-  alias Swarm.Missions
-  alias Swarm.Replacement.{Code, Job, Order}
+  alias Swarm.Replacement.{Admission, Code, Entries, Job, Order}
 
   @tick_ms 50
-  @watch_s div(Job.watch_ms(), 1_000)
   @start_ms 2_000
-  # Slower wheels rest.
-  @rest_linear 0.02
-  @rest_turn 0.05
+  # Twice as long as an order is believed.
+  @seen_ms 1_000
 
   @doc "Starts the process of this node."
   @spec start_link(term()) :: GenServer.on_start()
@@ -43,8 +39,18 @@ defmodule Swarm.Replacement.Server do
   @spec started(id :: binary(), robot :: atom(), :ok | Delivery.refusal()) :: :ok
   def started(id, robot, result), do: GenServer.cast(__MODULE__, {:started, id, robot, result})
 
+  @doc false
+  @spec phase(Event.name(), map(), map(), pid()) :: term()
+  def phase(_event, _measured, %{robot: robot, state: {module, _phase}}, server),
+    do: send(server, {:runs, robot, module})
+
+  def phase(_event, _measured, _idle, _server), do: :ok
+
   @impl GenServer
   def init([]) do
+    # That of a predecessor.
+    Event.detach(__MODULE__)
+
     s = %{
       secret: Secret.random(),
       kept: %{},
@@ -52,6 +58,7 @@ defmodule Swarm.Replacement.Server do
       release: %{},
       jobs: %{},
       taken: %{},
+      seen: %{},
       monitors: %{},
       fallen: %{},
       tick: nil
@@ -63,16 +70,15 @@ defmodule Swarm.Replacement.Server do
   # A predecessor may have left missions, and code, that nobody watches any more.
   @impl GenServer
   def handle_continue(:forget, s) do
-    left = for id <- Names.robots(), board = board(id), noted(board) != nil, do: {id, board}
+    left = Enum.filter(Names.robots(), &Entries.noted/1)
 
-    for {id, board} <- left do
-      Pilot.halt_at_once(id, nil)
-      says = "has its own mission again: #{inspect(__MODULE__)} was started again"
-      put(board, %{mission: nil, changing?: false, says: says})
+    for robot <- left do
+      Pilot.halt_at_once(robot, nil)
+      Entries.forget(robot, "#{inspect(__MODULE__)} was started again")
     end
 
     if left != [], do: Code.revert()
-    allowed? = Enum.any?(Names.robots(), &(allowed(&1) == :ok))
+    allowed? = Enum.any?(Names.robots(), &(Entries.allowed(&1) == :ok))
     {:noreply, if(allowed?, do: %{s | kept: Code.keep()}, else: s)}
   end
 
@@ -92,7 +98,9 @@ defmodule Swarm.Replacement.Server do
   def handle_cast({:take, robot, {:replace, content, mac}, {_life, at_us} = stamp, ref}, s)
       when is_atom(robot) and is_binary(content) and is_integer(at_us) and is_reference(ref) do
     {answer, s} =
-      case judge(robot, content, mac, stamp, s) do
+      case Admission.read(robot, {content, mac}, stamp, s.taken[robot], &signature(&1, s)) do
+        # To another robot of this node before.
+        {:ok, %{id: id}} when is_map_key(s.seen, id) -> {:ok, put_in(s.taken[robot], at_us)}
         {:ok, order} -> admit(order, put_in(s.taken[robot], at_us), at_us)
         {:error, line} -> {{:error, "#{robot}: #{line}"}, s}
       end
@@ -111,10 +119,14 @@ defmodule Swarm.Replacement.Server do
 
   @impl GenServer
   def handle_info({:tick, tick}, %{tick: tick} = s) when tick != nil do
-    turning = Enum.filter(Names.robots(), &turns?/1)
     s = Enum.reduce(s.fallen, s, &fallen/2)
-    s = Enum.reduce(Map.keys(s.jobs), s, &step(&2, &1, {:tick, turning}))
+    s = Enum.reduce(s.jobs, s, fn {id, entry}, s -> step(s, id, {:tick, turning(entry.job)}) end)
     {:noreply, schedule(%{s | tick: nil})}
+  end
+
+  def handle_info({:runs, robot, module}, s) when is_atom(robot) do
+    of = for {id, %{job: %{mission: {^module, _}}}} <- s.jobs, do: id
+    {:noreply, schedule(Enum.reduce(of, s, &step(&2, &1, {:runs, robot})))}
   end
 
   def handle_info({:DOWN, monitor, :process, _pid, reason}, s)
@@ -125,110 +137,48 @@ defmodule Swarm.Replacement.Server do
 
   def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
+  defp turning(%{phase: :standing, robots: robots}),
+    do: robots |> Map.keys() |> Enum.filter(&Entries.turns?/1)
+
+  defp turning(_on_its_way), do: []
+
   defp own(bytes, s),
     do: :crypto.mac(:hmac, :sha256, Secret.subkey(s.secret, Order.label()), bytes)
 
   defp signature(bytes, s),
     do: if(Mesh.running?(), do: Mesh.sign(Order.label(), bytes), else: {:ok, own(bytes, s)})
 
-  # Nothing of the content is looked at before the signature.
-  defp judge(robot, content, mac, {_life, at_us} = stamp, s) do
-    with :ok <- allowed(robot),
-         :ok <- small(content),
-         {:ok, right} <- signature(Order.signed_bytes(robot, stamp, content), s),
-         {:signed, true} <- {:signed, Order.same?(right, mac)},
-         {:new, true} <- {:new, at_us > Map.get(s.taken, robot, at_us - 1)},
-         {:ok, order} <- Order.decode(content),
-         true <- Atom.to_string(robot) in order.to do
-      {:ok, order}
-    else
-      {:signed, false} -> {:error, "this order is not signed by its fleet's key"}
-      {:new, false} -> {:error, "this order was given before; repeat it"}
-      {:error, line} -> {:error, line}
-      _no_order_for_it -> {:error, "this order is malformed"}
-    end
-  end
-
-  defp allowed(robot) do
-    case release(board(robot)) do
-      %{replace: true} ->
-        :ok
-
-      _off ->
-        {:error, "its mission cannot be replaced: its file does not say replace: true"}
-    end
-  end
-
-  defp small(content) do
-    if byte_size(content) <= Order.most_bytes(),
-      do: :ok,
-      else: {:error, "this order is larger than #{div(Order.most_bytes(), 1024)} kB"}
-  end
-
-  # The same order to the next robot of this node.
-  defp admit(%{id: id}, s, _at_us) when is_map_key(s.jobs, id), do: {:ok, s}
-
   defp admit(order, s, at_us) do
-    robots = for id <- Names.robots(), Atom.to_string(id) in order.to, do: id
+    case Admission.admit(order, Map.values(s.jobs), s.loaded, s.kept) do
+      {:ok, robots, module, modules, earlier} ->
+        # The same order to the next robot of this node comes within half a second.
+        s = put_in(s.seen, recent(s.seen, order.id))
+        {:ok, begin(order, robots, {module, modules, earlier}, at_us, s)}
 
-    with :ok <- each(robots, &free(&1, s)),
-         {:ok, module, modules, earlier} <- Code.check(order, s.loaded, s.kept),
-         :ok <- alone(modules, robots, s) do
-      {:ok, begin(order, robots, {module, modules, earlier}, at_us, s)}
-    else
-      {:error, line} -> {{:error, line}, s}
+      {:error, line} ->
+        {{:error, line}, s}
     end
   end
 
-  defp each(robots, check) do
-    Enum.find_value(robots, :ok, fn id ->
-      with {:error, line} <- check.(id), do: {:error, "#{id}: #{line}"}
-    end)
-  end
-
-  defp free(id, s) do
-    cond do
-      match?({:error, _line}, allowed(id)) ->
-        allowed(id)
-
-      Board.latched?(board(id)) ->
-        {:error, "it is held by the emergency stop; reset it first"}
-
-      Enum.any?(s.jobs, fn {_id, job} -> is_map_key(job.job.robots, id) end) ->
-        {:error, "what it was given last is watched for #{@watch_s} s first"}
-
-      true ->
-        :ok
-    end
-  end
-
-  # Code is the node's: who runs it now, and is not meant, would go on with a state that the new code does not know.
-  defp alone(modules, robots, s) do
-    names = for {module, _beam} <- modules, do: module
-    busy = Enum.find(s.jobs, fn {_id, job} -> Enum.any?(job.modules, &(elem(&1, 0) in names)) end)
-
-    others =
-      for id <- Names.robots() -- robots, {module, _} <- [running(board(id))], do: {id, module}
-
-    other = Enum.find(others, fn {_id, module} -> module in names end)
-
-    cond do
-      busy ->
-        {:error, "the same code was given to others, and is watched for #{@watch_s} s first"}
-
-      other ->
-        {:error,
-         "#{elem(other, 0)} runs #{inspect(elem(other, 1))} on this node, too, and they share its code: give it to both"}
-
-      true ->
-        :ok
-    end
+  defp recent(seen, id) do
+    now_ms = now()
+    seen |> Map.filter(fn {_id, at_ms} -> now_ms - at_ms < @seen_ms end) |> Map.put(id, now_ms)
   end
 
   defp begin(order, robots, {module, modules, earlier}, at_us, s) do
+    names = Keyword.keys(modules)
+
+    waiting =
+      for {id, entry} <- s.jobs,
+          not Admission.busy?(entry),
+          Admission.meets?(entry, robots, names),
+          do: id
+
+    s = Enum.reduce(waiting, s, &finish(&2, &1))
+    if s.jobs == %{}, do: listen()
     s = Enum.reduce(robots, s, &watch/2)
-    on = Map.new(robots, &{&1, running(board(&1))})
-    before = Map.new(robots, &{&1, noted(board(&1))})
+    on = Map.new(robots, &{&1, Entries.running(&1)})
+    before = Map.new(robots, &{&1, Entries.noted(&1)})
     {job, effects} = Job.new(on, {module, []}, now())
 
     entry = %{
@@ -242,6 +192,9 @@ defmodule Swarm.Replacement.Server do
 
     schedule(carry_out(effects, order.id, put_in(s.jobs[order.id], entry)))
   end
+
+  defp listen,
+    do: :ok = Event.attach(__MODULE__, [:robot, :pilot, :phase], &__MODULE__.phase/4, self())
 
   defp step(s, id, event) do
     case s.jobs do
@@ -263,7 +216,9 @@ defmodule Swarm.Replacement.Server do
       with {:try, ^id, pid} <- what, do: Process.exit(pid, :kill)
     end
 
-    forsaken(%{s | jobs: Map.delete(s.jobs, id), monitors: Map.new(monitors)})
+    s = %{s | jobs: Map.delete(s.jobs, id), monitors: Map.new(monitors)}
+    if s.jobs == %{}, do: Event.detach(__MODULE__)
+    forsaken(s)
   end
 
   defp carry_out(effects, id, s), do: Enum.reduce(effects, s, &effect(&1, id, s.jobs[id], &2))
@@ -297,8 +252,11 @@ defmodule Swarm.Replacement.Server do
     put_in(s.monitors[monitor], {:try, id, pid})
   end
 
+  defp effect({:watch, robot}, id, _entry, s),
+    do: monitor(s, Names.whereis(robot, :pilot), {:pilot, id, robot})
+
   defp effect({:start, robot, {module, options}}, id, entry, s) do
-    s = monitor(s, Names.whereis(robot, :pilot), {:pilot, id, robot})
+    s = effect({:watch, robot}, id, entry, s)
 
     Pilot.deliver(robot, :start, %Delivery{
       ways: [{:start, module, options}],
@@ -310,40 +268,11 @@ defmodule Swarm.Replacement.Server do
     s
   end
 
-  defp effect({:note, what, why}, _id, entry, s) do
-    for robot <- Map.keys(entry.job.robots), board = board(robot) do
-      note(what, why, robot, board, entry)
-    end
+  defp effect({:note, what, why}, _id, %{order: order, job: job, before: before}, s) do
+    for robot <- Map.keys(job.robots),
+        do: Entries.note(robot, {what, why}, order, job, before[robot])
 
     s
-  end
-
-  defp note(what, why, robot, board, entry) do
-    mission =
-      if what in [:replaced, :kept],
-        do: entry.job.mission,
-        else: with(%{mission: mission} <- entry.before[robot], do: mission)
-
-    says = says(what, why, entry)
-    put(board, %{mission: mission, changing?: what == :changing, says: says})
-    code = Order.digest(entry.order)
-    about = %{robot: robot, stage: :replacement, what: what, from: entry.order.from, code: code}
-    Event.execute([:robot, :stage], %{at_ms: Board.now(board)}, Map.put(about, :says, says))
-  end
-
-  defp put(board, replaced),
-    do: Board.put(board, :replacement, :replaced, replaced, Board.now(board))
-
-  defp says(what, why, %{order: order, job: %{mission: {module, _options}}}) do
-    code = if digest = Order.digest(order), do: " (code #{digest})", else: ""
-    mission = Missions.name(module) <> code
-
-    case what do
-      :changing -> "is given #{mission} by #{order.from}"
-      :replaced -> "was given #{mission} by #{order.from}"
-      :kept -> "keeps #{mission}, given by #{order.from}"
-      :back -> "went back from #{mission}, given by #{order.from}: #{why}"
-    end
   end
 
   defp try_out(module, order, robots) do
@@ -390,17 +319,18 @@ defmodule Swarm.Replacement.Server do
   end
 
   # A robot that starts again has the mission of its release, and its code once no other uses what came in its place.
-  defp forsaken(%{jobs: jobs} = s) when jobs == %{} do
-    used? = fn id ->
-      board = board(id)
-      noted = with %{mission: mission} <- noted(board), do: mission
-      Enum.any?([noted, running(board)], &(&1 != nil and is_map_key(s.release, elem(&1, 0))))
-    end
+  defp forsaken(s) do
+    coming? = Enum.any?(s.jobs, fn {_id, entry} -> entry.modules != [] end)
 
-    if Enum.any?(Names.robots(), used?), do: s, else: restore(Map.to_list(s.release), s)
+    if coming? or Enum.any?(Names.robots(), &uses?(&1, s.release)),
+      do: s,
+      else: restore(Map.to_list(s.release), s)
   end
 
-  defp forsaken(s), do: s
+  defp uses?(robot, release) do
+    noted = with %{mission: mission} <- Entries.noted(robot), do: mission
+    Enum.any?([noted, Entries.running(robot)], &(&1 != nil and is_map_key(release, elem(&1, 0))))
+  end
 
   defp restore(earlier, s) do
     Code.restore(earlier)
@@ -423,53 +353,18 @@ defmodule Swarm.Replacement.Server do
   defp monitor(s, nil, _what), do: s
   defp monitor(s, pid, what), do: put_in(s.monitors[Process.monitor(pid)], what)
 
-  # `nil` for an order that a person gave to this robot alone: that goes on.
-  defp running(board) do
-    case entry(board, :mission) do
-      %{state: {module, _phase}, options: options} when module != Manual -> {module, options}
-      _idle_or_alone -> nil
-    end
-  end
-
-  defp turns?(id) do
-    case entry(board(id), :odometry) do
-      %{twist: %{linear: linear, turn: turn}} ->
-        abs(linear) > @rest_linear or abs(turn) > @rest_turn
-
-      _no_wheels ->
-        false
-    end
-  end
-
-  defp release(board), do: entry(board, :release)
-  defp noted(board), do: entry(board, :replaced)
-
-  defp board(id) do
-    case Board.find(id) do
-      {:ok, board} -> board
-      :error -> nil
-    end
-  end
-
-  defp entry(nil, _key), do: nil
-
-  defp entry(board, key) do
-    case Board.fetch(board, key, :infinity) do
-      {:ok, value, _at_ms} -> value
-      :error -> nil
-    end
-  end
-
   defp brief({%{__exception__: true} = error, _stack}), do: Exception.message(error)
   defp brief({reason, [_ | _]}), do: brief(reason)
   defp brief(reason), do: inspect(reason, limit: 5, printable_limit: 60)
 
-  defp schedule(%{jobs: jobs} = s) when jobs == %{}, do: %{s | tick: nil}
-
   defp schedule(%{tick: nil} = s) do
-    tick = make_ref()
-    Process.send_after(self(), {:tick, tick}, @tick_ms)
-    %{s | tick: tick}
+    if Enum.any?(Map.values(s.jobs), &Admission.busy?/1) do
+      tick = make_ref()
+      Process.send_after(self(), {:tick, tick}, @tick_ms)
+      %{s | tick: tick}
+    else
+      s
+    end
   end
 
   defp schedule(s), do: s

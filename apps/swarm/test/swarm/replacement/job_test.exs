@@ -64,7 +64,18 @@ defmodule Swarm.Replacement.JobTest do
 
     {job, effects} = run(job, [{{:loaded, :ok}, 10}, {{:tried, {:ok, []}}, 20}])
     assert effects == [:try, {:note, :replaced, nil}]
-    assert {%{phase: :done}, [{:note, :kept, nil}]} = run(job, [{{:tick, []}, 10_020}])
+
+    # Its first ten seconds begin with its first start.
+    assert {job, []} = run(job, [{{:tick, []}, 60_000}])
+    assert {job, [{:watch, :mag1}]} = run(job, [{{:runs, :mag1}, 70_000}])
+
+    assert {%{phase: :done}, [{:note, :kept, nil}]} =
+             run(job, [{{:tick, []}, 79_999}, {{:tick, []}, 80_000}])
+
+    # Nobody starts what went back, because nothing ran before.
+    assert {%{phase: :done}, effects} = run(job, [{{:crashed, :mag1, "boom"}, 72_000}])
+    why = "it ended on mag1 after 2.0 s (boom)"
+    assert effects == [{:note, :changing, nil}, :restore, {:note, :back, why}]
   end
 
   test "a version that ends within ten seconds takes all robots of the node back" do

@@ -116,6 +116,28 @@ defmodule Swarm.Replacement.VersionTest do
     end
   end
 
+  test "what came while a robot stood is watched from its first start, and gives way until then" do
+    [good, crash] =
+      for {n, kind} <- [{1, :good}, {2, :crash}], do: Versions.code(Ours.Version6, n, kind)
+
+    id = replaceable(:vers_later)
+    listen(id, [:robot, :stage])
+    assert order(fn -> Swarm.stop(id) end) == :ok
+    given(id, {:code, good})
+    assert_receive {_stage, %{what: :replaced}}, 10_000
+    given(id, {:code, crash})
+    assert_receive {_stage, %{what: :replaced}}, 10_000
+    assert mission(id).state == :idle
+
+    assert order(fn -> Swarm.tell(id, "start") end) == :ok
+    [says] = went_back([id])
+    assert says =~ "(version 2 is wrong)"
+    # Nothing ran before, so nothing is started; the next start is of what came first.
+    assert mission(id).state == :idle
+    assert order(fn -> Swarm.tell(id, "start") end) == :ok
+    eventually(fn -> says(id) == "version 1" end)
+  end
+
   test "options that the new code does not take, or does not know, leave all as it is" do
     code = Versions.code(Ours.Version3, 1)
     id = replaceable(:vers_opts)
