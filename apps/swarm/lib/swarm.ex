@@ -165,6 +165,7 @@ defmodule Swarm do
       Swarm.tell([:mag1, :mag2], "move:0.2:0.1")
       Swarm.tell(:all, "stop")
       Swarm.tell(:all, "start:patrol:period=90")
+      Swarm.tell(:all, "replace:patrol:period=90")
       Swarm.tell(:mag1, "wander")
 
   `"ping"` is a question: a robot answers with its name, how long it has been up, and its state
@@ -177,6 +178,8 @@ defmodule Swarm do
   every heartbeat carries what they would bring.
   """
   @spec tell(robot() | [robot()] | :all, String.t()) :: answer() | {:ok, line :: String.t()}
+  def tell(to, "replace:" <> mission), do: replace(to, mission)
+
   def tell(to, text) when is_binary(text) do
     with {:ok, command} <- Command.parse(text, Transport.robots()), do: command(to, command)
   end
