@@ -43,7 +43,7 @@ defmodule Sim.ReplacementTest do
 
   defp told(what, ids \\ @ids) do
     for id <- ids do
-      assert_receive {^what, ^id, speed, says}, 15_000
+      assert_receive {^what, ^id, speed, says}, 30_000
       {speed, says}
     end
   end

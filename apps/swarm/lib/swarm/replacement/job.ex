@@ -131,7 +131,8 @@ defmodule Swarm.Replacement.Job do
   def step(%{phase: :watching} = job, {:started, id, {:error, _why}}, _now_ms),
     do: {put(job, id, :was, nil), []}
 
-  def step(%{phase: :watching} = job, {:crashed, id, why}, now_ms) do
+  def step(%{phase: :watching, robots: robots} = job, {:crashed, id, why}, now_ms)
+      when is_map_key(robots, id) do
     seconds = :erlang.float_to_binary((now_ms - job.since_ms) / 1_000, decimals: 1)
     return(job, "it ended on #{id} after #{seconds} s (#{why})", now_ms)
   end

@@ -95,8 +95,9 @@ defmodule Swarm.Replacement.Server do
 
   def handle_cast(:keep, s), do: {:noreply, s}
 
-  def handle_cast({:take, robot, {:replace, content, mac}, {_life, at_us} = stamp, ref}, s)
-      when is_atom(robot) and is_binary(content) and is_integer(at_us) and is_reference(ref) do
+  def handle_cast({:take, robot, {:replace, content, mac}, {life, at_us} = stamp, ref}, s)
+      when is_atom(robot) and is_binary(content) and (is_integer(life) or life == :asked) and
+             is_integer(at_us) and is_reference(ref) do
     {answer, s} =
       case Admission.read(robot, {content, mac}, stamp, s.taken[robot], &signature(&1, s)) do
         # To another robot of this node before.

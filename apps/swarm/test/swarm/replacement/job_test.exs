@@ -141,7 +141,9 @@ defmodule Swarm.Replacement.JobTest do
     assert {_job, [:load]} = run(job, [{{:tick, []}, 30}])
     assert {%{phase: :done}, []} = run(job, [{{:gone, :mag2}, 30}])
 
-    {job, _effects} = started(%{mag1: @was})
+    {job, _effects} = started(%{mag1: @was, mag2: @was})
+    # Its pilot, too, has ended with it.
+    assert {job, []} = run(job, [{{:gone, :mag2}, 500}, {{:crashed, :mag2, "boom"}, 510}])
     assert {%{phase: :done}, [:restore]} = run(job, [{{:gone, :mag1}, 500}])
   end
 

@@ -28,7 +28,7 @@ defmodule Swarm.Replacement.VersionTest do
 
   defp went_back(ids) do
     for id <- ids do
-      assert_receive {_stage, %{stage: :replacement, what: :back, robot: ^id, says: says}}, 15_000
+      assert_receive {_stage, %{stage: :replacement, what: :back, robot: ^id, says: says}}, 30_000
       says
     end
   end
@@ -41,7 +41,7 @@ defmodule Swarm.Replacement.VersionTest do
 
   # The ten seconds are over.
   defp kept(id) do
-    assert_receive {_stage, %{stage: :replacement, what: :kept, robot: ^id}}, 15_000
+    assert_receive {_stage, %{stage: :replacement, what: :kept, robot: ^id}}, 30_000
   end
 
   test "new code comes, a newer one replaces it, a wrong one goes back to it, and a restart to the release" do
