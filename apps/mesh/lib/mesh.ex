@@ -70,6 +70,18 @@ defmodule Mesh do
       else: tell({:serve, service, to, term})
   end
 
+  @doc """
+  Signs bytes by the key of this node's fleet for the purpose that `label` names (`Mesh.Secret.subkey/2`), by
+  HMAC-SHA256. The error says in one line that this node has no mesh, or that it does not answer.
+  """
+  @spec sign(label :: String.t(), binary()) :: {:ok, <<_::256>>} | {:error, line :: String.t()}
+  def sign(label, bytes) when is_binary(label) and is_binary(bytes) do
+    case Table.value(:server, nil) do
+      nil -> {:error, "this node has no mesh"}
+      pid -> Nonblocking.call(pid, {:sign, label, bytes}, "the mesh of this node")
+    end
+  end
+
   @doc "Tells a connected node the address of this one, so that both hear each other."
   @spec introduce(node()) :: :ok
   def introduce(node), do: tell({:introduce, node})

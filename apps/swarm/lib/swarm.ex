@@ -28,7 +28,7 @@ defmodule Swarm do
   is sent somewhere leaves the group's mission, which goes on without it until the next start.
   """
   alias Robot.Command
-  alias Swarm.{Commands, Formation, Status}
+  alias Swarm.{Commands, Formation, Replacement, Status}
   alias Swarm.Transport
   alias Swarm.EStop.Broadcaster
   alias Swarm.Membership.Matrix
@@ -111,6 +111,36 @@ defmodule Swarm do
   end
 
   @doc """
+  Gives a robot, a list of them, or `:all` another mission, or new code of one, while they are under way: each that is on a
+  mission is told to stand, its wheels come to rest, it changes, and goes on with the new one from its beginning; one that
+  stands stays so, and begins with it at its next start. If the new one ends within 10 s, all robots of that node go
+  back to what they had. `:ok` means that the robots have checked the order and are told to stand; their status says what
+  came of it (`replaced`).
+
+      Swarm.replace(:all, :flock)
+      Swarm.replace([:mag1, :mag2], {:patrol, period: 60})
+      Swarm.replace(:all, {:code, Ours.Gather, radius: 2})
+      Swarm.replace(:mag1, {:code, Code.compile_file("gather.ex"), radius: 2})
+
+  With `:code`, the object code of the mission and of modules below its name goes along, at most 128 kB: of
+  the files of this node's build, as they are now, or as it is given. A robot takes only what the fleet's key has signed
+  (`Swarm.Replacement.Order`), code only of missions (`Swarm.Replacement.Code`), and all that only if its file says
+  `replace: true`; simulated robots do. A restart of the robot returns to its release.
+  """
+  @spec replace(
+          robot() | [robot()] | :all,
+          mission()
+          | {mission(), keyword()}
+          | {:code, module() | [{module(), binary()}]}
+          | {:code, module() | [{module(), binary()}], keyword()}
+        ) :: answer()
+  def replace(to, mission) do
+    with {:ok, robots} <- Commands.robots(to),
+         {:ok, content} <- Replacement.order(robots, mission),
+         do: Commands.tell(robots, {:replace, content})
+  end
+
+  @doc """
   Changes the formation of the running mission: `:ok` when all robots on a mission have it. The
   error names robots that do not answer or refuse, because one of them may be the leader; the
   others keep the new shape. Options: `spacing` (0.8 to 5 m, default 1), `length` of a line,
@@ -135,6 +165,7 @@ defmodule Swarm do
       Swarm.tell([:mag1, :mag2], "move:0.2:0.1")
       Swarm.tell(:all, "stop")
       Swarm.tell(:all, "start:patrol:period=90")
+      Swarm.tell(:all, "replace:patrol:period=90")
       Swarm.tell(:mag1, "wander")
 
   `"ping"` is a question: a robot answers with its name, how long it has been up, and its state
@@ -147,6 +178,8 @@ defmodule Swarm do
   every heartbeat carries what they would bring.
   """
   @spec tell(robot() | [robot()] | :all, String.t()) :: answer() | {:ok, line :: String.t()}
+  def tell(to, "replace:" <> mission), do: replace(to, mission)
+
   def tell(to, text) when is_binary(text) do
     with {:ok, command} <- Command.parse(text, Transport.robots()), do: command(to, command)
   end

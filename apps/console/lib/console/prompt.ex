@@ -12,7 +12,7 @@ defmodule Console.Prompt do
   alias Robot.Command
   alias Swarm.Missions
 
-  @words ~w(kill formation landmark move goto follow drive gamepad stop estop reset start arm disarm acknowledge pause resume step speed status nodes tell help quit)
+  @words ~w(kill formation landmark move goto follow drive gamepad stop estop reset start replace arm disarm acknowledge pause resume step speed status nodes tell help quit)
 
   # Linux's name of the first gamepad.
   @gamepad "/dev/input/js0"
@@ -82,6 +82,8 @@ defmodule Console.Prompt do
       [word] when word in ["arm", "disarm", "acknowledge"] -> ["all" | names]
       ["start"] -> Missions.names() ++ names
       ["start", name] -> if name in names, do: Missions.names(), else: []
+      ["replace"] -> Missions.names() ++ ["all" | names]
+      ["replace", name] -> if name in ["all" | names], do: Missions.names(), else: []
       ["gamepad"] -> ["off" | names]
       [word] when word in ["goto", "follow", "drive", "stop", "status"] -> names
       _other -> []
@@ -109,6 +111,8 @@ defmodule Console.Prompt do
         "stop, stop mag2               the fleet or one robot stops and stands",
         "start, start mag2             starts the mission again, from the search",
         "start patrol:period=90        starts another mission: #{Enum.join(Missions.names(), ", ")}",
+        "replace flock                 they stand, change to another mission, and go on;",
+        "replace mag2 patrol           what ends within 10 s goes back (not in lockstep)",
         "mag2 wander, rest, square:2   one robot roams, rests, drives a square",
         "estop, reset                  emergency stop of all, until the reset",
         "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all"
@@ -199,6 +203,12 @@ defmodule Console.Prompt do
       else: mission_of("all", [mission | rest], robots)
   end
 
+  defp command("replace", [mission], robots), do: replace("all", mission, robots)
+  defp command("replace", [who, mission], robots), do: replace(who, mission, robots)
+
+  defp command("replace", _rest, _robots),
+    do: {:error, "replace needs a mission: replace flock, replace mag1 patrol:period=90"}
+
   defp command("stop", [name], robots), do: with_robot(name, robots, &{:tell, [&1], "stop"})
 
   defp command(word, [name], robots) when word in ["arm", "disarm", "acknowledge"],
@@ -257,6 +267,11 @@ defmodule Console.Prompt do
     with {:ok, _robot} <- robot(name, robots), do: mission_of(name, [mission], robots)
   end
 
+  defp replace(who, mission, robots) do
+    with {:ok, _mission} <- Missions.Text.read(mission, length(robots)),
+         do: tell(who, ["replace", mission], robots)
+  end
+
   defp or_robot(word, robots), do: Suggest.hint(word, Enum.map(robots, &to_string/1))
 
   defp tell("all", text, robots), do: checked(:all, Enum.join(text, ":"), robots)
@@ -264,6 +279,8 @@ defmodule Console.Prompt do
   defp tell(name, text, robots) do
     with {:ok, robot} <- robot(name, robots), do: checked([robot], Enum.join(text, ":"), robots)
   end
+
+  defp checked(target, "replace:" <> _mission = text, _robots), do: {:ok, {:tell, target, text}}
 
   defp checked(target, text, robots) do
     with {:ok, command} <- Command.parse(text, robots),

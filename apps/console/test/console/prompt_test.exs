@@ -41,6 +41,10 @@ defmodule Console.PromptTest do
              {:tell, [:mag2], "start:landmark:formation=wedge:1.2"}
 
     assert ok("start:patrol") == {:tell, :all, "start:patrol"}
+    assert ok("replace flock") == {:tell, :all, "replace:flock"}
+    assert ok("replace all flock") == {:tell, :all, "replace:flock"}
+    assert ok("replace mag2 patrol:period=90") == {:tell, [:mag2], "replace:patrol:period=90"}
+    assert ok("mag2 replace:flock") == {:tell, [:mag2], "replace:flock"}
     assert ok("mag2 wander") == {:tell, [:mag2], "wander"}
     assert ok("all square:2") == {:tell, :all, "square:2.0"}
     assert ok("mag2 move:0.2:0.1") == {:tell, [:mag2], "move:0.2:0.1"}
@@ -65,6 +69,9 @@ defmodule Console.PromptTest do
     assert error("start patrol:perod=9") =~ "did you mean period?"
     assert error("start mag2 patorl") =~ "did you mean patrol?"
     assert error("start mag9 patrol") =~ "there are mag1 to mag2, min1"
+    assert error("replace patorl") =~ "did you mean patrol?"
+    assert error("replace mag9 patrol") =~ "there are mag1 to mag2, min1"
+    assert error("replace") =~ "replace mag1 patrol:period=90"
     assert error("kill mag9") =~ "there are mag1 to mag2, min1"
     assert error("kill") =~ "kill leader"
     assert error("formation vee") =~ "column, line, wedge"

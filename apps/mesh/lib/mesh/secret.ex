@@ -88,6 +88,17 @@ defmodule Mesh.Secret do
   def random, do: derive("", :crypto.strong_rand_bytes(32))
 
   @doc """
+  A key of 32 bytes for one more purpose, which reveals neither the secret nor another key. `label` names the
+  purpose and its version.
+
+      iex> secret = Mesh.Secret.random()
+      iex> {byte_size(Mesh.Secret.subkey(secret, "a 1")), Mesh.Secret.subkey(secret, "a 1") == secret.key}
+      {32, false}
+  """
+  @spec subkey(t(), label :: String.t()) :: <<_::256>>
+  def subkey(%Secret{key: key}, label), do: hmac(key, label)
+
+  @doc """
   Gives this node the fleet's cookie, whatever cookie it was started with. If it was another one,
   all connected nodes are disconnected, because they connected with a cookie that is not ours.
   """

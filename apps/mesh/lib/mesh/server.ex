@@ -9,7 +9,7 @@ defmodule Mesh.Server do
   """
   use GenServer
   alias Hal.{Event, HardenedServer}
-  alias Mesh.{Backoff, Fault, Interface, Nonblocking, Options, Protocol, Sockets, Table}
+  alias Mesh.{Backoff, Fault, Interface, Nonblocking, Options, Protocol, Secret, Sockets, Table}
   alias Mesh.Protocol.{NodeTable, Packet, Roster, WireTerm}
   alias Mesh.Distribution.{Access, Dialer, Epmd}
 
@@ -103,6 +103,12 @@ defmodule Mesh.Server do
   def handle_call(:counts, _from, s) do
     counts = %{sent: s.sent, heard: s.heard, rejected: s.protocol.rejected}
     {:reply, Map.put(counts, :port, s.sockets && s.sockets.port), s}
+  end
+
+  def handle_call({:sign, label, bytes}, {caller, _tag}, s)
+      when is_binary(label) and is_binary(bytes) and node(caller) == node() do
+    key = Secret.subkey(s.options.secret, label)
+    {:reply, {:ok, :crypto.mac(:hmac, :sha256, key, bytes)}, s}
   end
 
   def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)

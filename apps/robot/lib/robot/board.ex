@@ -28,6 +28,8 @@ defmodule Robot.Board do
   | `:asking` | `:pilot` | while a callback of the mission runs (5) |
   | `:uncertainty` | `:executive` | that of the pose: `t:Robot.Percept.uncertainty/0` |
   | `:mission` | `:pilot` | the state of the mission and its claim (6) |
+  | `:release` | `:comms` | `%{mission: mission of its config, replace: whether it may be replaced}` |
+  | `:replaced` | `:replacement` | what has been put in the place of that (7) |
 
     1. As its one owner publishes it: the tags of the stops that hold the robot, those that were
        cleared here, and the calls heard.
@@ -39,7 +41,10 @@ defmodule Robot.Board do
        gate); `{:hung, module}` once it was killed for that.
     5. `{module, integer}`, with another number for each call.
     6. `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state,
-       ticked_ms: the time of the last percept that the mission handled}`
+       ticked_ms: the time of the last percept that the mission handled, options: with which it
+       was started}`
+    7. `%{mission: {module, options} or nil, changing?: while it is being replaced, says: line for
+       people}` (`Swarm.Replacement`)
 
   This process owns the tables and does nothing else, so that they survive a crash of their
   writers. All of it is lost with the board, on purpose, with one exception.
@@ -72,6 +77,7 @@ defmodule Robot.Board do
           | :camera
           | :blob_detector
           | :comms
+          | :replacement
           | :estop
           | :gate
           | :watch
@@ -102,7 +108,9 @@ defmodule Robot.Board do
     estop: :estop,
     stopped: :estop,
     followed: :estop,
-    radio: :comms
+    radio: :comms,
+    release: :comms,
+    replaced: :replacement
   }
 
   @doc "Starts the board of a robot."

@@ -35,6 +35,7 @@ defmodule Robot.File do
                 arm: :manual,
                 fence: nil,
                 dry_run: false,
+                replace: false,
                 estop_file: nil,
                 console: nil,
                 record: nil,
@@ -56,6 +57,7 @@ defmodule Robot.File do
           arm: :manual | :auto,
           fence: Robot.Fence.t() | nil,
           dry_run: boolean(),
+          replace: boolean(),
           estop_file: Path.t() | nil,
           console: keyword() | nil,
           record: keyword() | nil,
@@ -78,6 +80,7 @@ defmodule Robot.File do
     :arm,
     :fence,
     :dry_run,
+    :replace,
     :estop_file
   ]
 

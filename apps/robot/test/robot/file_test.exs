@@ -69,6 +69,7 @@ defmodule Robot.FileTest do
     arm: :auto,
     fence: [{-2, -2}, {2, -2}, {0, 2.5}],
     dry_run: true,
+    replace: true,
     estop_file: "/tmp/estop",
     network: [interface: "10.0.0.7"],
     policies: [formation: {:wedge, 1}, colour: "YellowLandmark"]
@@ -93,10 +94,11 @@ defmodule Robot.FileTest do
     assert config.estop_file == "/tmp/estop"
     assert config.fence.corners == [{-2.0, -2.0}, {2.0, -2.0}, {0.0, 2.5}]
     assert config.dry_run
+    assert config.replace
 
     assert {:ok, %{fence: fence}} = parse("fence: {{-1, -1}, {2, 3}}")
     assert length(fence.corners) == 4
-    assert {:ok, %{fence: nil, dry_run: false}} = parse("fence: nil")
+    assert {:ok, %{fence: nil, dry_run: false, replace: false}} = parse("fence: nil")
   end
 
   test "pictures to keep" do

@@ -32,7 +32,7 @@ defmodule Swarm.Comms do
   alias Robot.{Board, Config, Names}
   alias Robot.Control.Pilot
   alias Mesh.Nonblocking
-  alias Swarm.{EStop, Message}
+  alias Swarm.{EStop, Message, Replacement}
   alias Swarm.Order.Freshness
   alias Swarm.Transport
   alias Swarm.Discovery.RobotInfo
@@ -124,6 +124,7 @@ defmodule Swarm.Comms do
     }
 
     EStop.present(id, true)
+    Replacement.present(config, board)
     {:ok, s, {:continue, :enter}}
   end
 
@@ -237,9 +238,11 @@ defmodule Swarm.Comms do
 
     case Freshness.judge(s.sender.boot, request, order, here?, now_us(), stopped) do
       {:ok, asked} ->
-        if EStop.takes?(request),
-          do: EStop.take(s.id, request, {ref, asked}),
-          else: CommandHandler.take(request, {ref, asked}, s.config, s.board, s.receiver)
+        cond do
+          EStop.takes?(request) -> EStop.take(s.id, request, {ref, asked})
+          Replacement.takes?(request) -> Replacement.take(s.id, request, order, ref)
+          true -> CommandHandler.take(request, {ref, asked}, s.config, s.board, s.receiver)
+        end
 
         s
 

@@ -28,6 +28,8 @@ defmodule Swarm.Status do
 
   What its mission says in words of its own (`says`) stands there as it is.
 
+  A robot whose mission was replaced says which it was given, by whom, and why it went back (`replaced`; `Swarm.replace/2`).
+
   `speed` (m/s) is what its wheels report, not what they are told: a robot that was stopped shows how
   fast it still rolls. It is as old as `age_ms` says, and `nil`, `speed unknown`, before the first report.
 
@@ -78,6 +80,7 @@ defmodule Swarm.Status do
                 health: %{},
                 offline: %{},
                 fault: nil,
+                replaced: nil,
                 peers: %{},
                 hears: [],
                 view: nil,
@@ -112,6 +115,7 @@ defmodule Swarm.Status do
           health: %{(atom() | String.t()) => :online | {:offline, term()}},
           offline: %{(atom() | String.t()) => String.t()},
           fault: String.t() | nil,
+          replaced: String.t() | nil,
           peers: %{atom() => Peers.status()},
           hears: [atom()],
           view: view() | nil,
@@ -137,6 +141,7 @@ defmodule Swarm.Status do
       weights: entries |> value(:doing) |> field(:weights) || [],
       way: entries |> value(:doing) |> field(:way) || [],
       fault: entries |> value(:doing) |> field(:fault),
+      replaced: entries |> value(:replaced) |> field(:says),
       pose: value(entries, :pose),
       uncertainty: entries |> value(:uncertainty) |> field(:radius),
       frame: Frame.of(config, value(entries, :uncertainty)),
@@ -251,6 +256,7 @@ defmodule Swarm.Status do
         hung(status.hung),
         status.blocked_by && "BLOCKED by #{status.blocked_by}",
         is_binary(status.says) && status.says,
+        status.replaced,
         status.leader && "leader #{status.leader}",
         status.view && "view #{elem(status.view, 0)}",
         "hears #{length(status.hears)}" <> deaf(status),

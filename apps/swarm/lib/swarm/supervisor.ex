@@ -9,6 +9,7 @@ defmodule Swarm.Supervisor do
       |   |-- Swarm.Blackboard          what robots publish about themselves, and for each other
       |   |-- Swarm.Discovery.Presence  notifies of robots that join and leave
       |   |-- Swarm.EStop.Broadcaster   calls all robots to stop
+      |   |-- Swarm.Replacement         gives the robots of this node other missions
       |   |-- Mesh.Supervisor           the other nodes, where there is a mesh; Swarm.MeshConsumer hears it
       |   |-- Swarm.Host.Systemd        tells systemd, where there is one
       |   `-- Robot.Recorder            records the robot, if its file says so
@@ -42,7 +43,8 @@ defmodule Swarm.Supervisor do
         Swarm.Directory,
         Swarm.Blackboard,
         Swarm.Discovery.Presence,
-        Swarm.EStop.Broadcaster | mesh ++ machine ++ recorder
+        Swarm.EStop.Broadcaster,
+        Swarm.Replacement | mesh ++ machine ++ recorder
       ]
 
       tireless = for child <- children, do: {BackoffSupervisor, child}

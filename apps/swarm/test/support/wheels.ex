@@ -8,21 +8,18 @@ defmodule Swarm.MeshNodes.Wheels do
 
   @period_ms 100
 
-  @doc "Starts a robot on this node, under its fleet."
-  @spec robot(atom(), keyword()) :: :ok
-  def robot(id, comms \\ []) do
-    {:ok, _wheels} = GenServer.start(__MODULE__, {id, comms})
+  @doc "Starts a robot on this node, under its fleet; options of its comms process, and of its config."
+  @spec robot(atom(), keyword(), keyword()) :: :ok
+  def robot(id, comms \\ [], options \\ []) do
+    {:ok, _wheels} = GenServer.start(__MODULE__, {id, comms, options})
     :ok
   end
 
   @impl GenServer
-  def init({id, comms}) do
-    config =
-      Robot.Config.new!(
-        id: id,
-        profile: Hal.Profile.magellan(),
-        drive: {Hal.FakeDrive, test: self(), device: :drive}
-      )
+  def init({id, comms, options}) do
+    drive = {Hal.FakeDrive, test: self(), device: :drive}
+    own = [id: id, profile: Hal.Profile.magellan(), drive: drive]
+    config = Robot.Config.new!(own ++ options)
 
     {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, Swarm.Comms.join(config, comms))
     {:ok, _timer} = :timer.send_interval(@period_ms, :stand)

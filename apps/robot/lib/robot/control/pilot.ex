@@ -24,7 +24,7 @@ defmodule Robot.Control.Pilot do
   alias Robot.Control.{Delivery, Executive, Inbox}
   alias Robot.Control.Pilot.{Effects, Journal}
   alias Robot.Mission.Runner
-  alias Robot.Safety.Readiness
+  alias Robot.Safety.{Gate, Readiness}
   alias Robot.Navigation.Grid
 
   # Generous, because a pilot may be slow on a busy machine.
@@ -60,6 +60,18 @@ defmodule Robot.Control.Pilot do
   @spec halt(robot :: atom(), then :: Config.call() | nil) :: :ok
   def halt(robot, then \\ nil),
     do: GenServer.cast(Names.via(robot, :pilot), {:halt, then})
+
+  @doc """
+  Tells gate, executive and pilot at once to end what the robot does, so that one that hangs does not
+  delay the others; `then` as in `halt/2`. The goal is dropped even if the pilot is stuck in its mission,
+  and again when the mission has ended, because it may have set another one meanwhile.
+  """
+  @spec halt_at_once(robot :: atom(), then :: Config.call() | nil) :: :ok
+  def halt_at_once(robot, then) do
+    :ok = Gate.forget(robot)
+    :ok = Executive.hold(robot)
+    halt(robot, then)
+  end
 
   @doc """
   Resumes the mission that the last stop ended, from its beginning, with the commands that it had
@@ -110,6 +122,7 @@ defmodule Robot.Control.Pilot do
       config: config,
       board: Board.find!(config.id),
       runner: Runner.new(config.id, plan(config)),
+      options: [],
       since_ms: Config.now(config)
     }
 
@@ -265,7 +278,7 @@ defmodule Robot.Control.Pilot do
       Journal.heard({:start, module, options}, data)
       Effects.rest(data.config)
       result = Journal.asking(module, data, fn -> Runner.start(data.runner, module, options) end)
-      follow(result, state, data)
+      follow(result, state, %{data | options: options})
     end
   end
 

@@ -3,8 +3,8 @@ defmodule Robot.Devices.Log do
   Writes a robot's log: a line when a device goes offline, with the reason in words, and when it
   is back, when it refuses what it is told, when armed wheels are disarmed for a reason, when a bumper stays pressed, when the
   gate, a behaviour or a mission hangs, when pictures cannot be saved or nothing can be recorded, when the emergency stop
-  would not survive a restart of the machine, when another robot has the same name, and when one
-  is not believed because its numbers are impossible. The events report changes, so retries of a device are not logged.
+  would not survive a restart of the machine, when another robot has the same name, when one
+  is not believed because its numbers are impossible, and when the mission is replaced. The events report changes, so retries of a device are not logged.
   """
   require Logger
   alias Hal.Event
@@ -153,6 +153,9 @@ defmodule Robot.Devices.Log do
 
   def line(:stage, %{stage: :given_up, robot: robot, x: x, y: y, blocked_by: why}),
     do: {:warning, "#{robot} gives up its way to #{x},#{y}: blocked by #{why}"}
+
+  def line(:stage, %{stage: :replacement, what: what, robot: robot, says: says}),
+    do: {if(what == :back, do: :warning, else: :info), "#{robot} #{says}"}
 
   def line(:stage, _told_by_others), do: nil
 

@@ -78,7 +78,8 @@ defmodule Robot.File.Summary do
         "e-stop": estop(robot.estop_file),
         power: power(robot.console),
         network: network(robot.network),
-        mission: mission(robot.policies)
+        mission: mission(robot.policies),
+        replace: replaceable(robot)
       )
   end
 
@@ -110,6 +111,11 @@ defmodule Robot.File.Summary do
 
   defp short(word),
     do: if(String.length(word) > @wide, do: String.slice(word, 0, @wide - 1) <> "…", else: word)
+
+  defp replaceable(%{replace: false}), do: nil
+
+  defp replaceable(%{replace: true}),
+    do: "whoever has the fleet's secret may give it another mission, and its code, on its way"
 
   defp pictures(nil), do: nil
 

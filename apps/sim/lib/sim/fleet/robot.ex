@@ -123,6 +123,7 @@ defmodule Sim.Fleet.Robot do
         colours: World.colours(),
         mission: common.mission,
         plan: common.plan,
+        replace: true,
         trace: trace(common.trace, id)
       ] ++ drivers(robot, device, common.folder)
     )

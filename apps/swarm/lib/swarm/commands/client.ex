@@ -4,7 +4,7 @@ defmodule Swarm.Commands.Client do
   # robot go to its e-stop process, all others to its comms process. Before an order to another
   # node, the robot is asked for a stamp (`Swarm.Order.Freshness`).
   alias Mesh.Nonblocking
-  alias Swarm.{Directory, EStop}
+  alias Swarm.{Directory, EStop, Replacement}
   alias Swarm.Order.Freshness
 
   @answer_ms 500
@@ -106,6 +106,12 @@ defmodule Swarm.Commands.Client do
 
   defp post(id, to, :stamp), do: cast(id, to, {:stamp}, {:stamp, id})
   defp post(id, to, request, nil), do: cast(id, to, {:command, request}, {:command, id})
+
+  # Signed for this robot and this time.
+  defp post(id, to, {:replace, content}, order) do
+    with {:replace, _content, _mac} = request <- Replacement.seal(content, id, order),
+         do: post(id, to, request, order)
+  end
 
   defp post(id, to, request, order),
     do: cast(id, to, {:command, request, order}, {:command, id})

@@ -29,7 +29,7 @@ defmodule Swarm.Comms.CommandHandler do
   alias Robot.Mission.Manual
   alias Robot.Navigation.{Grid, Reach}
   alias Mesh.Nonblocking
-  alias Swarm.{Missions, Status}
+  alias Swarm.{Missions, Replacement, Status}
   alias Swarm.Order
   alias Swarm.Order.Freshness
   alias Swarm.Comms.PingReply
@@ -47,6 +47,8 @@ defmodule Swarm.Comms.CommandHandler do
   @spec take(term(), {reference(), asked :: integer()}, Config.t(), Board.t(), Receiver.t()) ::
           :ok
   def take(request, {ref, asked}, config, board, receiver) do
+    config = Replacement.config(config, board)
+
     case judge(request, config, board, receiver) do
       {:drive, order} -> drive(order, config.id, ref, asked)
       {:mission, ways, command} -> deliver(ways, command, config.id, ref, asked)
@@ -151,9 +153,10 @@ defmodule Swarm.Comms.CommandHandler do
           {:ok, {:silent, module}, _at_ms} <- [Board.fetch(board, {:hung, part}, :infinity)],
           do: LivenessMonitor.words(part, module)
 
-    case hangs do
-      [] -> :ok
-      [where | _] -> {:error, "#{id} hangs in #{where}; it restarts by itself"}
+    cond do
+      hangs != [] -> {:error, "#{id} hangs in #{hd(hangs)}; it restarts by itself"}
+      Replacement.changing?(board) -> {:error, "#{id} is being given another mission; repeat it"}
+      true -> :ok
     end
   end
 

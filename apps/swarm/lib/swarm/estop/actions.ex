@@ -5,7 +5,7 @@ defmodule Swarm.EStop.Actions do
   """
   alias Hal.Device
   alias Robot.{Board, Config, Names}
-  alias Robot.Control.{Executive, Pilot}
+  alias Robot.Control.Pilot
   alias Robot.Safety.Gate
   alias Mesh.Nonblocking
   alias Swarm.EStop
@@ -196,15 +196,11 @@ defmodule Swarm.EStop.Actions do
   @spec waits?(given_us :: integer()) :: boolean()
   def waits?(given_us), do: now_us() - given_us < @release_us
 
-  # The gate stops at once. The goal is dropped even if the pilot is stuck in its mission, and
-  # again when the mission has ended, because it may have set another one meanwhile.
   defp halt(%{id: id} = s, then) do
     # Requests from before this stop begin nothing after it (`Swarm.Order.Freshness`,
     # `Robot.Control.Pilot`).
     Board.put(s.board, :estop, :stopped, now_us(), Config.now(s.config))
-    :ok = Gate.forget(id)
-    :ok = Executive.hold(id)
-    :ok = Pilot.halt(id, then)
+    :ok = Pilot.halt_at_once(id, then)
   end
 
   # The call was made before a person reset this robot: somebody far away was heard only now.

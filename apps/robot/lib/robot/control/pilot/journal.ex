@@ -2,8 +2,8 @@ defmodule Robot.Control.Pilot.Journal do
   @moduledoc """
   What a pilot publishes about itself: on the board, in events and in the trace.
 
-  The board's entry `:mission` contains the mission, its phase and its claim, and the time of the
-  percept from which the mission made that claim. The entry `:asking`
+  The board's entry `:mission` contains the mission, its phase and its claim, the time of the
+  percept from which the mission made that claim, and the options with which it was started. The entry `:asking`
   exists while a callback of the mission runs, so that `Robot.Safety.LivenessMonitor` detects one
   that does not return.
   """
@@ -17,6 +17,7 @@ defmodule Robot.Control.Pilot.Journal do
           required(:board) => Board.t(),
           required(:since_ms) => integer(),
           required(:runner) => Robot.Mission.Runner.t(),
+          required(:options) => keyword(),
           optional(atom()) => term()
         }
   @type state :: :idle | {mission :: module(), phase :: atom()}
@@ -84,7 +85,8 @@ defmodule Robot.Control.Pilot.Journal do
       state: state,
       claim: claim,
       since_ms: data.since_ms,
-      ticked_ms: data.runner.ticked_ms
+      ticked_ms: data.runner.ticked_ms,
+      options: data.options
     }
 
     Board.put(data.board, :pilot, :mission, entry, Config.now(data.config))

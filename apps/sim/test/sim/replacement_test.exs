@@ -1,0 +1,139 @@
+defmodule Sim.ReplacementTest do
+  @moduledoc "A live fleet is given other missions, and new code of one of the box, while it drives."
+  use ExUnit.Case, async: false
+  import Swarm.Case, only: [eventually: 1, order: 1]
+  alias Hal.Event
+  alias Robot.Board
+  alias Sim.Fleet
+  @moduletag :realtime
+  @moduletag :capture_log
+
+  @ids [:mag61, :mag62, :min61]
+  @source Path.expand("../../../missions/lib/missions/patrol.ex", __DIR__)
+
+  # A version of the patrol with this in its place of that; the release's is loaded again.
+  defp version(old, new) do
+    source = File.read!(@source)
+    assert source =~ old
+    before = Code.get_compiler_option(:ignore_module_conflict)
+    Code.put_compiler_option(:ignore_module_conflict, true)
+    code = source |> String.replace(old, new) |> Code.compile_string(@source)
+    Code.put_compiler_option(:ignore_module_conflict, before)
+    for {module, _beam} <- code, do: release(module)
+    code
+  end
+
+  defp release(module) do
+    :code.purge(module)
+    {:module, ^module} = :code.load_file(module)
+    :code.purge(module)
+  end
+
+  @doc false
+  def stage(_event, _measured, %{stage: :replacement, robot: id, what: what} = about, test),
+    do: send(test, {what, id, speed(id), about.says})
+
+  def stage(_event, _measured, _about, _test), do: :ok
+
+  # What its wheels reported last, m/s.
+  defp speed(id) do
+    {:ok, %{twist: twist}, _at_ms} = Board.fetch(Board.find!(id), :odometry, :infinity)
+    abs(twist.linear)
+  end
+
+  defp told(what, ids \\ @ids) do
+    for id <- ids do
+      assert_receive {^what, ^id, speed, says}, 30_000
+      {speed, says}
+    end
+  end
+
+  defp states, do: for(id <- @ids, do: Swarm.status(id))
+  defp drive?, do: Enum.any?(@ids, &(speed(&1) > 0.1))
+
+  setup do
+    handler = {__MODULE__, self()}
+    :ok = Event.attach(handler, [:robot, :stage], &__MODULE__.stage/4, self())
+
+    options = [
+      robots: @ids,
+      landmark: :none,
+      map: "hall",
+      seed: 3,
+      mission: {:patrol, period: 60}
+    ]
+
+    {:ok, fleet} = Fleet.start_link(options)
+
+    on_exit(fn ->
+      Event.detach(handler)
+      monitor = Process.monitor(fleet)
+      assert_receive {:DOWN, ^monitor, _, _, _}, 5_000
+    end)
+
+    eventually(&drive?/0)
+    %{fleet: fleet}
+  end
+
+  test "all stand, change, and go on with another mission of the release", %{fleet: fleet} do
+    assert order(fn -> Swarm.replace(:all, {:flock, spacing: 1.2}) end) == :ok
+    assert Enum.any?(told(:changing), fn {speed, _says} -> speed > 0.05 end)
+    for {speed, _says} <- told(:replaced), do: assert(speed <= 0.02)
+
+    for id <- @ids,
+        do: eventually(fn -> Swarm.status(id).state in [:gather, :flock, :arrived] end)
+
+    eventually(&drive?/0)
+
+    assert Enum.map(told(:kept), &elem(&1, 1)) |> Enum.uniq() == [
+             "keeps flock, given by #{node()}"
+           ]
+
+    # People see it among the stages of the run.
+    assert %{stages: stages} = Fleet.scene(fleet)
+    assert Enum.any?(stages, &(&1.stage == :replacement))
+    assert Fleet.result(fleet).collisions == 0
+    Fleet.stop(fleet)
+  end
+
+  test "new code of the patrol comes while it drives; a wrong version goes back on all; the fleet's end returns to the release",
+       %{fleet: fleet} do
+    Fleet.stop(fleet)
+    # Compiled while no robot runs it.
+    second = version(~S("point #{active), ~S("second point #{active))
+    tick = "def handle({:tick, percept}, %{started?: true} = mission) do\n"
+    wrong = version(tick, tick <> "if mission.peers != %{}, do: raise(\"third is wrong\")\n")
+    md5 = Missions.Patrol.module_info(:md5)
+
+    options = [
+      robots: @ids,
+      landmark: :none,
+      map: "hall",
+      seed: 3,
+      mission: {:patrol, period: 60}
+    ]
+
+    {:ok, fleet} = Fleet.start_link(options)
+    eventually(&drive?/0)
+
+    assert order(fn -> Swarm.replace(:all, {:code, second, period: 50}) end) == :ok
+    for {speed, _says} <- told(:replaced), do: assert(speed <= 0.02)
+    eventually(fn -> Enum.any?(states(), &match?(%{says: "second " <> _}, &1)) end)
+    eventually(&drive?/0)
+    told(:kept)
+
+    assert order(fn -> Swarm.replace(:all, {:code, wrong, period: 40}) end) == :ok
+    told(:replaced)
+
+    for {speed, says} <- told(:back),
+        do: assert({speed <= 0.5, says =~ "third is wrong"} == {true, true})
+
+    eventually(fn -> Enum.any?(states(), &match?(%{says: "second " <> _}, &1)) end)
+    eventually(&drive?/0)
+    assert Fleet.result(fleet).collisions == 0
+
+    assert Missions.Patrol.module_info(:md5) != md5
+    Fleet.stop(fleet)
+    eventually(fn -> Missions.Patrol.module_info(:md5) == md5 end)
+  end
+end

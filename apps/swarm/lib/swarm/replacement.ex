@@ -1,0 +1,107 @@
+defmodule Swarm.Replacement do
+  @moduledoc """
+  Another mission, or new code of one, for robots that are under way (`Swarm.replace/2`): they stand, change, and go on;
+  what ends in its first 10 s goes back by itself.
+
+  | part | what it does |
+  |---|---|
+  | `Swarm.Replacement.Order` | the order as bytes, and its signature by the fleet's key |
+  | `Swarm.Replacement.Code` | which code may come, and how it is loaded and brought back |
+  | `Swarm.Replacement.Job` | one replacement on one node, as a function |
+  | `Swarm.Replacement.Admission`, `.Entries` | whether an order is carried out; what is read on the boards of robots, and noted there |
+  | `Swarm.Replacement.Server` | the process of a node |
+
+  The release stays as it is: nothing is written to a disk, and a robot that starts again has its own mission, and its own
+  code. On real robots it is off unless their file says `replace: true`.
+  """
+  alias Hal.Options.Wording
+  alias Robot.{Board, Config}
+  alias Swarm.{Missions, Replacement}
+  alias Swarm.Replacement.Order
+
+  @doc "The process of a node, for its supervisor."
+  @spec child_spec(term()) :: Supervisor.child_spec()
+  def child_spec(options),
+    do: %{id: __MODULE__, start: {Replacement.Server, :start_link, [options]}}
+
+  @doc """
+  The content of an order to these robots: a mission as `Swarm.start/2` takes it, `:patrol`, `{:patrol, period: 60}` or
+  `"patrol:period=60"`, or `{:code, module, options}` with the code of this node's files (`Swarm.Replacement.Code.read/1`).
+  The error is one line.
+  """
+  @spec order([atom()], term()) :: {:ok, content :: binary()} | {:error, line :: String.t()}
+  def order(robots, given) do
+    with {:ok, {module, options}, code} <- mission(given, length(robots)) do
+      Order.encode(%Order{
+        id: :crypto.strong_rand_bytes(16),
+        from: Atom.to_string(node()),
+        to: Enum.map(robots, &Atom.to_string/1),
+        mission: Atom.to_string(module),
+        options: Order.encode_options(options),
+        code: code
+      })
+    end
+  end
+
+  defp mission({:code, source}, count), do: mission({:code, source, []}, count)
+
+  defp mission({:code, source, options}, _count) do
+    if Keyword.keyword?(options) do
+      with {:ok, module, code} <- Replacement.Code.read(source),
+           do: {:ok, {module, options}, code}
+    else
+      {:error, "options cannot be #{Wording.show(options)}: [key: value, …] is allowed"}
+    end
+  end
+
+  defp mission(text, count) when is_binary(text),
+    do: with({:ok, mission} <- Missions.Text.read(text, count), do: {:ok, mission, []})
+
+  defp mission(named, count),
+    do: with({:ok, mission} <- Missions.choose(named, count), do: {:ok, mission, []})
+
+  @doc "The request to this robot, signed by the key of this node, for the stamp that the robot has given; `nil` without a key."
+  @spec seal(content :: binary(), robot :: atom(), Order.stamp()) :: tuple() | nil
+  def seal(content, robot, stamp) do
+    case Replacement.Server.sign(Order.signed_bytes(robot, stamp, content)) do
+      {:ok, mac} -> {:replace, content, mac}
+      {:error, _line} -> nil
+    end
+  end
+
+  @doc "Whether a request is for the process of this module."
+  @spec takes?(request :: term()) :: boolean()
+  def takes?({:replace, _content, _mac}), do: true
+  def takes?(_other), do: false
+
+  @doc "Passes on a request to this robot from its comms process, which has judged its stamp."
+  @spec take(robot :: atom(), request :: tuple(), Order.stamp(), reference()) :: :ok
+  def take(robot, request, stamp, ref),
+    do: GenServer.cast(Replacement.Server, {:take, robot, request, stamp, ref})
+
+  @doc "Writes on the robot's board what its config says; called by its comms process at its start."
+  @spec present(Config.t(), Board.t()) :: :ok
+  def present(config, board) do
+    about = %{mission: config.mission, replace: config.replace}
+    :ok = Board.put(board, :comms, :release, about, Config.now(config))
+    if config.replace, do: GenServer.cast(Replacement.Server, :keep), else: :ok
+  end
+
+  @doc "The config with the mission that was put in the place of its own, if any."
+  @spec config(Config.t(), Board.t()) :: Config.t()
+  def config(config, board) do
+    case Board.fetch(board, :replaced, :infinity) do
+      {:ok, %{mission: {_module, _options} = mission}, _at_ms} -> %{config | mission: mission}
+      _own -> config
+    end
+  end
+
+  @doc "Whether a robot is just being given another mission; then it takes no orders that would move it."
+  @spec changing?(Board.t()) :: boolean()
+  def changing?(board) do
+    case Board.fetch(board, :replaced, :infinity) do
+      {:ok, %{changing?: changing?}, _at_ms} -> changing?
+      :error -> false
+    end
+  end
+end

@@ -1,0 +1,130 @@
+defmodule Swarm.Replacement.Order do
+  @moduledoc """
+  The order that replaces a mission, as bytes, and its signature. Pure.
+
+  Its content is the same for all robots that it is meant for: an identity, who gave it, to whom, the mission with its
+  options, and, where the code of the mission comes along, object code by the names of its modules. Names are text: no
+  byte of it becomes an atom before the signature was checked, and names of options only after the code that
+  knows them was loaded.
+
+  The signature (`Mesh.sign/2`) is an HMAC-SHA256, by a key derived from the fleet's secret, over the robot's name, the stamp that this
+  robot has given for this order (`Swarm.Order.Freshness`), and a digest of the content. So it is good for one robot,
+  for half a second, and a robot takes one of each time.
+  """
+  alias Swarm.Order.Freshness
+  alias Swarm.Wire
+
+  @label "convoy replacement 1"
+  # An order must arrive within half a second. The largest mission in the box takes a third of it.
+  @most_bytes 131_072
+  @most_name 255
+
+  @enforce_keys [:id, :from, :to, :mission, :options]
+  defstruct @enforce_keys ++ [code: []]
+
+  @typedoc "`options` are encoded (`options/1`); `code` is object code by the names of its modules."
+  @type t :: %__MODULE__{
+          id: binary(),
+          from: String.t(),
+          to: [String.t()],
+          mission: String.t(),
+          options: binary(),
+          code: [{module :: String.t(), binary()}]
+        }
+
+  @typedoc "The stamp of the order, or the time on the same node (`Swarm.Commands.Client`)."
+  @type stamp :: Freshness.stamp() | {:asked, integer()}
+
+  @doc "The label under which the key of the signature is derived."
+  @spec label() :: String.t()
+  def label, do: @label
+
+  @doc "The most bytes that an order may have."
+  @spec most_bytes() :: pos_integer()
+  def most_bytes, do: @most_bytes
+
+  @doc "The order as bytes; the error is one line that says how large it is."
+  @spec encode(t()) :: {:ok, binary()} | {:error, line :: String.t()}
+  def encode(%__MODULE__{} = order) do
+    term = {1, order.id, order.from, order.to, order.mission, order.options, order.code}
+    content = :erlang.term_to_binary(term, [:compressed])
+
+    if byte_size(content) <= @most_bytes,
+      do: {:ok, content},
+      else:
+        {:error,
+         "#{name(order.mission)}: its code takes #{div(byte_size(content), 1024)} kB; #{div(@most_bytes, 1024)} kB are allowed"}
+  end
+
+  @doc "The order of bytes whose signature was checked; `:error` for anything else."
+  @spec decode(binary()) :: {:ok, t()} | :error
+  def decode(content) do
+    with {1, <<_::128>> = id, from, to, mission, options, code} <- term(content),
+         true <- name?(from) and name?(mission) and is_binary(options),
+         true <- Wire.list?(to, &name?/1) and Wire.list?(code, &code?/1) do
+      {:ok,
+       %__MODULE__{id: id, from: from, to: to, mission: mission, options: options, code: code}}
+    else
+      _other -> :error
+    end
+  end
+
+  @doc "Options as an order carries them."
+  @spec encode_options(keyword()) :: binary()
+  def encode_options(options), do: :erlang.term_to_binary(options)
+
+  @doc "The options of an order; `:error` if they name what this node does not know."
+  @spec options(t()) :: {:ok, keyword()} | :error
+  def options(%__MODULE__{options: encoded}) do
+    options = term(encoded)
+    if Keyword.keyword?(options), do: {:ok, options}, else: :error
+  end
+
+  defp term(bytes) do
+    :erlang.binary_to_term(bytes, [:safe])
+  rescue
+    # An atom that is not known here, or no term.
+    ArgumentError -> :error
+  end
+
+  defp name?(text), do: is_binary(text) and byte_size(text) in 1..@most_name
+  defp code?({name, code}), do: name?(name) and is_binary(code)
+  defp code?(_other), do: false
+
+  @doc "The bytes that are signed: this content, for this robot, at this time."
+  @spec signed_bytes(robot :: atom(), stamp(), content :: binary()) :: binary()
+  def signed_bytes(robot, {life, at_us}, content),
+    do: "#{robot}\0#{life}\0#{at_us}\0" <> :crypto.hash(:sha256, content)
+
+  @doc "Whether a term from outside is this signature; it takes equally long whichever byte differs."
+  @spec same?(<<_::256>>, term()) :: boolean()
+  def same?(mac, given),
+    do: is_binary(given) and byte_size(given) == 32 and :crypto.hash_equals(mac, given)
+
+  @doc "The digest of an order's code that people compare, 8 hexadecimal digits; `nil` without code."
+  @spec digest(t()) :: String.t() | nil
+  def digest(%__MODULE__{code: []}), do: nil
+
+  def digest(%__MODULE__{code: code}) do
+    md5s = for {_name, beam} <- Enum.sort(code), do: md5(beam)
+    md5s |> :erlang.md5() |> Base.encode16(case: :lower) |> binary_part(0, 8)
+  end
+
+  # Of what is executed, without debug information.
+  defp md5(beam) do
+    case :beam_lib.md5(beam) do
+      {:ok, {_module, md5}} -> md5
+      {:error, :beam_lib, _reason} -> :erlang.md5(beam)
+    end
+  end
+
+  @doc """
+  A module's name for people.
+
+      iex> Swarm.Replacement.Order.name("Elixir.Ours.Gather")
+      "Ours.Gather"
+  """
+  @spec name(String.t()) :: String.t()
+  def name("Elixir." <> name), do: name
+  def name(name), do: name
+end

@@ -1,0 +1,73 @@
+defmodule Swarm.Replacement.NodesTest do
+  @moduledoc "Robots on nodes of their own, and a person on a node without one."
+  use Swarm.Case, async: false
+  alias Swarm.{Cluster, MeshNodes, StandMission, Versions}
+  alias Swarm.MeshNodes.Wheels
+  @moduletag :realtime
+  @moduletag :cluster
+  @moduletag :capture_log
+
+  defp start(node, options),
+    do: :ok = MeshNodes.call(node, Wheels, :robot, [node.name, [], options])
+
+  defp ask(node, function, arguments), do: MeshNodes.call(node, Swarm, function, arguments)
+  defp state(node), do: ask(node, :status, [node.name])
+
+  defp says(node, says), do: eventually(fn -> match?(%{says: ^says}, state(node)) end)
+
+  defp replaced(node, what),
+    do:
+      eventually(fn ->
+        match?(%{replaced: <<^what::binary-size(byte_size(what)), _::binary>>}, state(node))
+      end)
+
+  test "new code reaches all that allow it, a wrong version goes back on each, and who starts again has the release" do
+    [base, one, two, shut] = nodes = MeshNodes.start(4)
+
+    [good, crash] =
+      for {n, kind} <- [{1, :good}, {2, :crash}], do: Versions.code(Ours.Nodes1, n, kind)
+
+    for node <- [one, two], do: start(node, replace: true)
+    start(shut, [])
+    names = for node <- [one, two, shut], do: node.name
+    for node <- nodes, do: eventually(fn -> names -- ask(node, :find, []) == [] end)
+    assert order(fn -> ask(base, :start, [StandMission, []]) end) == :ok
+
+    refused = "#{shut.name}: its mission cannot be replaced: its file does not say replace: true"
+
+    assert order(fn -> ask(base, :replace, [:all, {:code, good, [speed: 0.3]}]) end) ==
+             {:error, refused}
+
+    for node <- [one, two], do: says(node, "version 1")
+    assert %{replaced: nil, state: :stand} = state(shut)
+    for node <- [one, two], do: replaced(node, "keeps Ours.Nodes1 (code ")
+    assert state(one).replaced =~ "given by #{base.node}"
+
+    assert order(fn -> ask(base, :replace, [[one.name, two.name], {:code, crash}]) end) == :ok
+    for node <- [one, two], do: replaced(node, "went back from Ours.Nodes1 (code ")
+    for node <- [one, two], do: says(node, "version 1")
+
+    MeshNodes.signal(two, "KILL")
+    two = MeshNodes.join(nodes, two.name)
+    start(two, replace: true)
+    refute MeshNodes.call(two, :erlang, :module_loaded, [Ours.Nodes1])
+    eventually(fn -> two.name in ask(base, :find, []) end)
+    assert order(fn -> ask(base, :tell, [two.name, "start"]) end) == :ok
+
+    assert MeshNodes.call(two, Swarm.Case, :entry, [two.node, two.name, :mission]).state ==
+             {StandMission, :stand}
+
+    says(one, "version 1")
+  end
+
+  test "a node with another key is refused, although it is connected" do
+    # Without a mesh each node has a key of its own.
+    [base, there] = Cluster.start_nodes(2)
+    id = robot_on(there, :repl_far, replace: true)
+    give = fn node -> order(fn -> :erpc.call(node, Swarm, :replace, [id, StandMission]) end) end
+    eventually(fn -> :erpc.call(base, Directory, :whereis, [id]) end)
+    assert give.(base) == {:error, "repl_far: this order is not signed by its fleet's key"}
+    assert entry(there, id, :replaced) == nil
+    assert give.(there) == :ok
+  end
+end
