@@ -96,6 +96,7 @@ defmodule Sim.ReplacementTest do
     Fleet.stop(fleet)
   end
 
+  @tag long: true, realtime: :long
   test "new code of the patrol comes while it drives; a wrong version goes back on all; the fleet's end returns to the release",
        %{fleet: fleet} do
     Fleet.stop(fleet)

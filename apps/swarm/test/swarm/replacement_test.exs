@@ -5,6 +5,7 @@ defmodule Swarm.ReplacementTest do
   alias Swarm.{Replacement, StandMission}
   alias Swarm.Replacement.Order
   @moduletag :capture_log
+  @moduletag :realtime
 
   defp replaceable(id, options \\ []) do
     robot(id, [replace: true, comms: [boot: 7]] ++ options)

@@ -167,8 +167,8 @@ defmodule Swarm.Replacement.Code do
   defp declared(mission),
     do: if(mission?(mission), do: :ok, else: {:error, "#{shown(mission)} is not a Robot.Mission"})
 
-  # Its signature was checked, and its object code bears this name.
-  defp module(name), do: String.to_atom(name)
+  # Its object code, which bears this name, was read.
+  defp module(name), do: String.to_existing_atom(name)
 
   defp existing(name) do
     {:ok, String.to_existing_atom(name)}

@@ -44,6 +44,7 @@ defmodule Swarm.Replacement.VersionTest do
     assert_receive {_stage, %{stage: :replacement, what: :kept, robot: ^id}}, 30_000
   end
 
+  @tag long: true, realtime: :long
   test "new code comes, a newer one replaces it, a wrong one goes back to it, and a restart to the release" do
     [first, second, crash] =
       for {n, kind} <- [{1, :good}, {2, :good}, {3, :crash}],
@@ -149,6 +150,7 @@ defmodule Swarm.Replacement.VersionTest do
     refute :erlang.module_loaded(Ours.Version3)
   end
 
+  @tag long: true, realtime: :long
   test "new code of what another robot of the node runs goes to both, or to none" do
     [first, second] = for n <- 1..2, do: Versions.code(Ours.Version4, n)
     [a, b] = ids = for n <- 1..2, do: replaceable(:"vers_two#{n}")
