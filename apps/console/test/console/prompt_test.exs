@@ -59,7 +59,7 @@ defmodule Console.PromptTest do
     assert error("kil leader") =~ "did you mean kill?"
 
     assert error("start patorl") =~
-             "one of landmark, patrol, flock, teleop is allowed; did you mean patrol?"
+             "one of landmark, patrol, flock, explore, teleop is allowed; did you mean patrol?"
 
     assert error("start mga2") =~ "did you mean mag2?"
     assert error("start patrol:perod=9") =~ "did you mean period?"
@@ -103,6 +103,7 @@ defmodule Console.PromptTest do
              "landmark",
              "patrol",
              "flock",
+             "explore",
              "teleop",
              "mag1"
            ]
@@ -111,10 +112,13 @@ defmodule Console.PromptTest do
              "landmark",
              "patrol",
              "flock",
+             "explore",
              "teleop"
            ]
 
     assert Prompt.completions(["start", "patrol"], [:mag1]) == []
-    assert Enum.join(Prompt.help(), "\n") =~ "starts another mission: landmark, patrol, flock"
+
+    assert Enum.join(Prompt.help(), "\n") =~
+             "starts another mission: landmark, patrol, flock, explore"
   end
 end
