@@ -4,7 +4,7 @@ defmodule Bench.Explore do
   lockstep with default noise; all of it follows from map, number of robots and seed.
 
   The area is where the middle of a Magellan can come to from the robots' starts, on the true floor plan, in cells of 10 cm. A
-  cell is seen when the chart of a robot knows it, by the poses that the robots estimate; the robot that has seen most counts.
+  cell is seen when the chart of a robot knows it, by the poses that the robots estimate; the robot whose chart has most counts.
   """
   alias Hal.Pose
   alias Missions.Explore
@@ -53,7 +53,7 @@ defmodule Bench.Explore do
     with {:ok, setup} <- Trial.setup(options) do
       plan = Sim.Floorplan.grid(setup.map)
       area = area(plan, Enum.map(setup.robots, &Pose.point(&1.start)))
-      run = %{area: area, count: MapSet.size(area), seen_s: nil, share: 0.0}
+      run = %{area: masks(area), count: MapSet.size(area), seen_s: nil, share: 0.0}
       {trial, run} = setup |> Trial.begin() |> go(run)
       {:ok, measure(trial, run, plan, options)}
     end
@@ -65,26 +65,48 @@ defmodule Bench.Explore do
   end
 
   defp look(trial, run) do
-    share = trial |> charts() |> Enum.map(&seen(&1, run.area)) |> Enum.max()
-    share = share / run.count
+    share = seen(fullest(trial), run.area) / run.count
     seen_s = run.seen_s || if(share >= @share, do: trial.at_ms / 1_000)
     %{run | share: share, seen_s: seen_s}
   end
 
-  defp charts(trial) do
-    for id <- Trial.living(trial),
-        %{mission: %Explore{chart: chart}} <- [Trial.robot(trial, id).runner],
-        do: chart
+  defp fullest(trial) do
+    charts =
+      for id <- Trial.living(trial),
+          %{mission: %Explore{chart: chart}} <- [Trial.robot(trial, id).runner],
+          do: chart
+
+    Enum.max_by(charts, & &1.free)
   end
 
-  defp seen(%Chart{tiles: tiles}, area) do
+  defp seen(%Chart{tiles: tiles}, area),
+    do: for({at, states} <- tiles, mask = area[at], reduce: 0, do: (n -> both(states, mask, n)))
+
+  defp both(<<0, states::binary>>, <<_, mask::binary>>, n), do: both(states, mask, n)
+  defp both(<<_, states::binary>>, <<1, mask::binary>>, n), do: both(states, mask, n + 1)
+  defp both(<<_, states::binary>>, <<_, mask::binary>>, n), do: both(states, mask, n)
+  defp both(<<>>, <<>>, n), do: n
+
+  # By tile, a byte for each cell: 1 belongs to the area.
+  defp masks(area) do
     tile = Survey.tile()
 
-    for {{i, j}, states} <- tiles,
-        {state, k} when state != 0 <- states |> :binary.bin_to_list() |> Enum.with_index(),
-        MapSet.member?(area, {i * tile + rem(k, tile), j * tile + div(k, tile)}),
-        reduce: 0,
-        do: (count -> count + 1)
+    cells =
+      Enum.group_by(area, fn {i, j} ->
+        {Integer.floor_div(i, tile), Integer.floor_div(j, tile)}
+      end)
+
+    Map.new(cells, fn {{i, j} = at, cells} ->
+      cells = MapSet.new(cells)
+
+      mask =
+        for k <- 0..(tile * tile - 1), into: <<>> do
+          cell = {i * tile + rem(k, tile), j * tile + div(k, tile)}
+          if MapSet.member?(cells, cell), do: <<1>>, else: <<0>>
+        end
+
+      {at, mask}
+    end)
   end
 
   # Cells by column and row from the origin, over which a disc can move from these points.
@@ -109,7 +131,7 @@ defmodule Bench.Explore do
   defp cell({x, y}), do: {floor(x / Survey.cell()), floor(y / Survey.cell())}
 
   defp measure(trial, run, plan, options) do
-    chart = trial |> charts() |> Enum.max_by(&seen(&1, run.area))
+    chart = fullest(trial)
     ready? = Trial.formed?(trial)
 
     off =

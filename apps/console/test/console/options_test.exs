@@ -164,6 +164,12 @@ defmodule Console.OptionsTest do
     assert error("--mission patrol:period=5") ==
              "--mission: patrol option period cannot be 5: a number from 10 to 3600 s is allowed"
 
+    assert error("--save-map found.yaml --mission explore") ==
+             "--save-map needs --headless, without --nodes and --hardware"
+
+    assert error("--save-map found.yaml --headless --mission patrol") ==
+             "--save-map needs a mission that makes a map, such as --mission explore"
+
     assert Options.help() =~
              ~r/--mission NAME\[:KEY=VALUE,…\] +landmark, patrol, flock, explore or teleop/
   end

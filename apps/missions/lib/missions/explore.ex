@@ -106,6 +106,9 @@ defmodule Missions.Explore do
     do: struct!(__MODULE__, mission |> Map.take([:me, :within, :chart, :home]) |> Map.to_list())
 
   @impl Robot.Mission
+  def map(mission), do: Chart.map(mission.chart)
+
+  @impl Robot.Mission
   def handle({:command, :start}, mission), do: result(%{mission | started?: true}, [])
 
   def handle({:message, %{kind: :seen, from: from, body: body}}, %{now_ms: now_ms} = mission)

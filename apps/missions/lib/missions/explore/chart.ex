@@ -82,7 +82,9 @@ defmodule Missions.Explore.Chart do
 
   defp merge(chart, at) do
     before = Map.get(chart.tiles, at, @unknown)
-    now = join(Survey.states(chart.survey, at), Map.get(chart.told, at))
+    seen = join(Survey.states(chart.survey, at), Map.get(chart.told, at))
+    # What was known once is not unknown again, however the evidence wavers.
+    now = join(seen, before)
 
     if now == before,
       do: chart,
@@ -145,6 +147,10 @@ defmodule Missions.Explore.Chart do
     chart = merge(%{chart | told: Map.put(chart.told, at, told)}, at)
     if chart.tiles[at] == states, do: %{chart | news: List.delete(chart.news, at)}, else: chart
   end
+
+  @doc "All that is known, for a file."
+  @spec map(t()) :: Robot.Navigation.MapFile.Writer.chart()
+  def map(chart), do: chart |> raster() |> Map.put(:cell, Survey.cell())
 
   @doc "All that is known."
   @spec raster(t()) :: raster()
