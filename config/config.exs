@@ -17,6 +17,7 @@ config :swarm,
     landmark: Missions.Landmark,
     patrol: Missions.Patrol,
     flock: Missions.Flock,
+    explore: Missions.Explore,
     teleop: Missions.Teleop
   ]
 

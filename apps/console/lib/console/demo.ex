@@ -5,6 +5,8 @@ defmodule Console.Demo do
   alias Console.{Fleet, Options, Picture, Report, Tables}
   alias Console.Cli.{Format, Output, Progress}
   alias Console.Picture.RunTrack
+  alias Robot.Mission.Runner
+  alias Robot.Navigation.MapFile
   alias Sim.{Recorder, Trial}
   alias Sim.Recording.Pictures
 
@@ -221,12 +223,32 @@ defmodule Console.Demo do
     title = Picture.title(length(options.robots), options.map, options.seed)
     drawing = run.track && fn -> Picture.draw(run.track, title) end
 
-    case Report.write(options, Report.json(result, wall_s), drawing, run.output) do
+    written =
+      with :ok <- Report.write(options, Report.json(result, wall_s), drawing, run.output),
+           do: save_map(run, options)
+
+    case written do
       :ok ->
         if formed?, do: 0, else: 2
 
       {:error, line} ->
         refuse(line)
+    end
+  end
+
+  # That of the robot that knows most: what another one has told last may not have reached all.
+  defp save_map(_run, %Options{save_map: nil}), do: :ok
+
+  defp save_map(run, %Options{save_map: file}) do
+    maps = for id <- Trial.living(run.trial), do: Runner.map(Trial.robot(run.trial, id).runner)
+    known = fn %{cells: cells} -> for(<<state <- cells>>, state != 0, do: state) |> length() end
+
+    with map when map != nil <- Enum.max_by(maps, known, fn -> nil end),
+         :ok <- named("--save-map", file, &MapFile.save(&1, map)) do
+      Output.line(run.output, "Wrote #{file}")
+    else
+      nil -> {:error, "--save-map #{file} cannot be written: no robot is left that has a map"}
+      error -> error
     end
   end
 end

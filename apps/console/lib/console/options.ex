@@ -36,6 +36,7 @@ defmodule Console.Options do
             hardware: [],
             json: nil,
             picture: nil,
+            save_map: nil,
             record: nil,
             record_pictures: nil,
             trace: nil,
@@ -181,6 +182,8 @@ the prompt then takes pause, step, speed"},
       {"json", "FILE|-", &file(&1, "", folder), "write the report (- is standard output)"},
       {"picture", "FILE.svg", &file(&1, ".svg", folder),
        "draw the paths and the formation error"},
+      {"save-map", "FILE.yaml", &file(&1, ".yaml", folder),
+       "write the map that the mission has made, as map_server does, with FILE.pgm\n(explore; with --headless, in lockstep)"},
       {"record", "FILE.mcap", &file(&1, ".mcap", folder),
        "record the run, for mix replay, Foxglove and others\n(not with --nodes)"},
       {"record-pictures", "RATE", &pictures/1,
@@ -205,6 +208,7 @@ the prompt then takes pause, step, speed"},
   defp put({"leader-change", on?}, options), do: %{options | leader_change: on?}
   defp put({"page-address", address}, options), do: %{options | page_address: address}
   defp put({"page-token", token}, options), do: %{options | page_token: token}
+  defp put({"save-map", file}, options), do: %{options | save_map: file}
   defp put({"record-pictures", rate}, options), do: %{options | record_pictures: rate}
   defp put({"duration", duration_s}, options), do: %{options | duration_s: duration_s}
 
@@ -273,7 +277,7 @@ the prompt then takes pause, step, speed"},
   defp check_hardware(error), do: error
 
   # A recorder hears the robots of its own process only; tables are made from the world of a run in lockstep.
-  defp check_record({:ok, %{record: record, csv: csv} = options}) do
+  defp check_record({:ok, %{record: record, csv: csv, save_map: save_map} = options}) do
     lines =
       for {line, true} <- [
             {"--record cannot be used with --nodes: robots in processes of their own are not recorded",
@@ -283,7 +287,11 @@ the prompt then takes pause, step, speed"},
             {"--record-pictures needs --record FILE.mcap",
              options.record_pictures != nil and record == nil},
             {"--csv needs --headless, without --nodes and --hardware",
-             csv != nil and (not options.headless or real_time?(options))}
+             csv != nil and (not options.headless or real_time?(options))},
+            {"--save-map needs --headless, without --nodes and --hardware",
+             save_map != nil and (not options.headless or real_time?(options))},
+            {"--save-map needs a mission that makes a map, such as --mission explore",
+             save_map != nil and not maps?(options.mission)}
           ],
           do: line
 
@@ -291,6 +299,9 @@ the prompt then takes pause, step, speed"},
   end
 
   defp check_record(other), do: other
+
+  defp maps?({module, _own}), do: function_exported?(module, :map, 1)
+  defp maps?(nil), do: false
 
   # Headless is as fast as it goes; lines and other processes go by the real clock.
   defp check_speed({:ok, %{speed: speed} = options}) do

@@ -60,7 +60,8 @@ defmodule Console.Report do
   @spec check(Console.Options.t()) :: :ok | {:error, String.t()}
   def check(options) do
     with :ok <- OutFile.check("--json", options.json),
-         do: OutFile.check("--picture", options.picture)
+         :ok <- OutFile.check("--picture", options.picture),
+         do: OutFile.check("--save-map", options.save_map)
   end
 
   @doc """

@@ -73,6 +73,32 @@ defmodule Console.DemoTest do
     assert File.read!(svg) =~ "<svg"
   end
 
+  @tag :tmp_dir
+  test "a map that robots have made is one in which the next ones drive", %{tmp_dir: folder} do
+    words = ["--save-map", Path.join(folder, "found.yaml")]
+
+    line = "--headless --robots 1 --map doorway --landmark none --mission explore --duration 30"
+    options = Runs.options(line <> " --blobs direct", words)
+    {_status, text} = with_io(fn -> Demo.run(options, Sim.Trial) end)
+    assert text =~ "Wrote #{options.save_map}"
+
+    assert {:ok, %{grid: grid}} = Robot.Navigation.MapFile.open(options.save_map)
+    assert {:ok, true_map} = Sim.Floorplan.open("doorway", 1)
+    assert {:ok, found} = Sim.Floorplan.open(options.save_map, 1)
+    {width, height} = Sim.Floorplan.size(true_map)
+
+    free =
+      for x <- 1..round(width * 5),
+          y <- 1..round(height * 5),
+          at = {x / 5 - width / 2, y / 5 - height / 2},
+          Robot.Navigation.Grid.clearance(grid, at) > 0.3,
+          do: at
+
+    assert length(free) > 100
+    assert Enum.all?(free, &(not Sim.Floorplan.wall?(true_map, &1)))
+    assert Enum.all?(free, &(not Sim.Floorplan.wall?(found, &1)))
+  end
+
   test "with --json - only the report goes to standard output" do
     told = capture_io(:stderr, fn -> send(self(), demo("--json -")) end)
     assert_received {0, text}

@@ -159,11 +159,18 @@ defmodule Console.OptionsTest do
     assert options.mission == {Missions.Landmark, of: 4, policy: :majority}
 
     assert error("--mission patorl") ==
-             ~s(--mission: mission "patorl" is not known; one of landmark, patrol, flock, teleop is allowed; did you mean patrol?)
+             ~s(--mission: mission "patorl" is not known; one of landmark, patrol, flock, explore, teleop is allowed; did you mean patrol?)
 
     assert error("--mission patrol:period=5") ==
              "--mission: patrol option period cannot be 5: a number from 10 to 3600 s is allowed"
 
-    assert Options.help() =~ ~r/--mission NAME\[:KEY=VALUE,…\] +landmark, patrol, flock or teleop/
+    assert error("--save-map found.yaml --mission explore") ==
+             "--save-map needs --headless, without --nodes and --hardware"
+
+    assert error("--save-map found.yaml --headless --mission patrol") ==
+             "--save-map needs a mission that makes a map, such as --mission explore"
+
+    assert Options.help() =~
+             ~r/--mission NAME\[:KEY=VALUE,…\] +landmark, patrol, flock, explore or teleop/
   end
 end

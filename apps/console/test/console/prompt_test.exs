@@ -63,7 +63,7 @@ defmodule Console.PromptTest do
     assert error("kil leader") =~ "did you mean kill?"
 
     assert error("start patorl") =~
-             "one of landmark, patrol, flock, teleop is allowed; did you mean patrol?"
+             "one of landmark, patrol, flock, explore, teleop is allowed; did you mean patrol?"
 
     assert error("start mga2") =~ "did you mean mag2?"
     assert error("start patrol:perod=9") =~ "did you mean period?"
@@ -110,6 +110,7 @@ defmodule Console.PromptTest do
              "landmark",
              "patrol",
              "flock",
+             "explore",
              "teleop",
              "mag1"
            ]
@@ -118,10 +119,13 @@ defmodule Console.PromptTest do
              "landmark",
              "patrol",
              "flock",
+             "explore",
              "teleop"
            ]
 
     assert Prompt.completions(["start", "patrol"], [:mag1]) == []
-    assert Enum.join(Prompt.help(), "\n") =~ "starts another mission: landmark, patrol, flock"
+
+    assert Enum.join(Prompt.help(), "\n") =~
+             "starts another mission: landmark, patrol, flock, explore"
   end
 end

@@ -86,7 +86,7 @@ defmodule Swarm.MemberSpecTest do
            ]
 
     assert lines("policies: [mission: :landmrk, formation: 3]") == [
-             "mag1.exs:2: policies.mission: cannot be :landmrk: nil, :landmark, :patrol, :flock or :teleop is allowed; did you mean :landmark?"
+             "mag1.exs:2: policies.mission: cannot be :landmrk: nil, :landmark, :patrol, :flock, :explore or :teleop is allowed; did you mean :landmark?"
            ]
 
     assert [line] = lines("policies: [policy: :majority]")

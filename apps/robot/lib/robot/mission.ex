@@ -121,6 +121,9 @@ defmodule Robot.Mission do
   """
   @callback commands() :: [atom()]
 
+  @doc "The map that the mission has made so far, for a file (`Robot.Navigation.MapFile.save/2`)."
+  @callback map(mission :: term()) :: Robot.Navigation.MapFile.Writer.chart()
+
   @optional_callbacks halted: 1,
                       options: 2,
                       option_table: 0,
@@ -128,7 +131,8 @@ defmodule Robot.Mission do
                       messages: 0,
                       claims: 0,
                       stale: 1,
-                      commands: 0
+                      commands: 0,
+                      map: 1
 
   @doc """
   Whether a module is a mission: it is part of this build and declares this behaviour.

@@ -8,6 +8,8 @@ defmodule Mix.Tasks.Bench do
 
   `mix bench goto` measures how well a robot with the floor plan gets from anywhere to anywhere.
 
+  `mix bench explore` measures how long robots take to see a building that they do not know, one and four.
+
   `mix bench swarm` measures robots that are nodes of their own on this machine, beside bare OTP:
   how long it takes to ask all, to find each other, to notice a death.
 
@@ -47,6 +49,12 @@ defmodule Mix.Tasks.Bench do
     CommandBuild.update()
 
     with {:error, lines} <- Bench.Goto.Main.run(arguments), do: refuse(lines)
+  end
+
+  defp bench(["explore" | arguments]) do
+    CommandBuild.update()
+
+    with {:error, lines} <- Bench.Explore.Main.run(arguments), do: refuse(lines)
   end
 
   defp bench(["swarm" | arguments]) do
@@ -104,7 +112,7 @@ defmodule Mix.Tasks.Bench do
   defp bench(_other),
     do:
       refuse([
-        "mix bench needs a command: mix bench demo [options], mix bench goto [options], " <>
+        "mix bench needs a command: mix bench demo [options], mix bench goto [options], mix bench explore [options], " <>
           "mix bench swarm [options], mix bench stop [options], mix bench vision [options], mix bench scale [options], mix bench page [options], mix bench recording [options]"
       ])
 

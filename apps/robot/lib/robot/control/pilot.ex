@@ -81,6 +81,10 @@ defmodule Robot.Control.Pilot do
   @spec resume(robot :: atom()) :: :ok | {:error, :idle | (line :: String.t())}
   def resume(robot), do: call(robot, :resume)
 
+  @doc "The map that the mission has made, also one that was stopped; `nil` of one that makes none."
+  @spec map(robot :: atom()) :: Robot.Navigation.MapFile.Writer.chart() | nil
+  def map(robot), do: call(robot, :map)
+
   @doc "Hands a command to the mission. `:ok` means that the mission got it, not that it is done."
   @spec command(robot :: atom(), command :: term()) :: :ok | {:error, :idle}
   def command(robot, command), do: call(robot, {:command, command})
@@ -154,6 +158,11 @@ defmodule Robot.Control.Pilot do
 
   def handle_call(:resume, _from, {state, data} = s),
     do: answer(go(:resume, {:command, :start}, state, data), s)
+
+  def handle_call(:map, _from, {_state, data} = s) do
+    map = Journal.asking(data.runner.module, data, fn -> Runner.map(data.runner) end)
+    {:reply, map, s}
+  end
 
   def handle_call({:command, _command}, _from, {:idle, _data} = s),
     do: {:reply, {:error, :idle}, s}

@@ -101,6 +101,15 @@ defmodule Robot.Mission.Runner do
   def explain(%__MODULE__{module: module, mission: mission}),
     do: if(function_exported?(module, :explain, 1), do: module.explain(mission), else: [])
 
+  @doc "The map that the mission has made, also one that a stop has left; `nil` of one that makes none."
+  @spec map(t()) :: Robot.Navigation.MapFile.Writer.chart() | nil
+  def map(%__MODULE__{module: nil, halted: nil}), do: nil
+  def map(%__MODULE__{module: nil, halted: {module, mission}}), do: map(module, mission)
+  def map(%__MODULE__{module: module, mission: mission}), do: map(module, mission)
+
+  defp map(module, mission),
+    do: if(function_exported?(module, :map, 1), do: module.map(mission))
+
   @doc "Ends the mission and keeps what it leaves for `resume/1` (`c:Robot.Mission.halted/1`)."
   @spec halt(t()) :: t()
   def halt(%__MODULE__{module: nil} = runner), do: runner

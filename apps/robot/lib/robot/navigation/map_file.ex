@@ -8,7 +8,7 @@ defmodule Robot.Navigation.MapFile do
   larger than a robot can search for a way ten times a second.
   """
   alias Robot.Navigation.Grid
-  alias Robot.Navigation.MapFile.{Description, Pgm, Picture, Png}
+  alias Robot.Navigation.MapFile.{Description, Pgm, Picture, Png, Writer}
 
   # A picture of 4000 x 4000 pixels, which some mappers always write, is read within seconds.
   @most_pixels 16_000_000
@@ -36,6 +36,24 @@ defmodule Robot.Navigation.MapFile do
          :ok <- size(file, Picture.cells(size)),
          {:ok, grid} <- grid(file, Picture.walls(picture, description.shades, size), description),
          do: {:ok, %__MODULE__{file: file, grid: grid}}
+  end
+
+  @doc """
+  Writes a map that robots have made (`c:Robot.Mission.map/1`): `FILE.yaml`, and the picture `FILE.pgm` beside it. The error is
+  one line.
+  """
+  @spec save(Path.t(), Writer.chart()) :: :ok | {:error, line :: String.t()}
+  def save(file, map) do
+    image = Path.rootname(file) <> ".pgm"
+    {yaml, pgm} = Writer.encode(map, Path.basename(image))
+
+    with {:pgm, :ok} <- {:pgm, File.write(image, pgm)},
+         {:yaml, :ok} <- {:yaml, File.write(file, yaml)} do
+      :ok
+    else
+      {:pgm, {:error, reason}} -> {:error, "#{image}: #{:file.format_error(reason)}"}
+      {:yaml, {:error, reason}} -> {:error, "#{file}: #{:file.format_error(reason)}"}
+    end
   end
 
   @doc "What a file describes; the path of its picture is complete. The error is one line that names the file."

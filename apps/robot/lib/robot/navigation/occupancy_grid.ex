@@ -15,39 +15,21 @@ defmodule Robot.Navigation.OccupancyGrid do
   """
   alias Hal.{Odometry, Pose}
   alias Robot.Navigation.{Grid, OccupancyGrid}
+  alias Robot.Navigation.OccupancyGrid.Cones
   alias Robot.Percept
 
-  @cell 0.1
+  @cell Cones.cell()
   @size 200
   # The window follows when the robot is this far from its middle (metres).
   @follow 2.0
-  # Ranges (metres): echoes from farther away say too little of where on the arc the wall is. Seen through is what is
-  # before an echo, by a margin; less where nothing answered, which may be a wall that throws the echo elsewhere.
-  @heard 1.5
-  @through 2.5
-  @silent 2.0
-  @margin 0.15
-  # The arc lies behind the surface that sent the echo, and is as deep as lets no cell slip through (cells).
-  @behind 0.5
-  @thick 0.75
   # Evidence from which on a cell is surely wall.
   @sure 30
-  # Readings are taken this often (ms), and this often while the robot stands (metres, radians): the same
-  # reading again says little that is new.
-  @every_ms 200
-  @standing_ms 1_000
-  @moved 0.03
-  @turned 0.05
-  # Sonars of a robot that turns faster than this within a round of them point elsewhere by then (radians).
-  @blurred 0.2
   # Evidence goes by 1 in this time (ms).
   @decay_ms 3_000
   # What is surely wall is told this often (ms), if cells changed or the frame moved by this much (metres, radians).
   @told_ms 1_000
   @shifted 0.05
   @swung 0.01
-  # An echo this near (metres) to a known body is its echo.
-  @explained 0.3
 
   defstruct cells: nil,
             left: 0,
@@ -102,25 +84,12 @@ defmodule Robot.Navigation.OccupancyGrid do
 
   def update(grid, percept, discs) do
     grid = if grid.frame == percept.odometry.frame, do: grid, else: begin(percept)
-    grid = if due?(grid, percept), do: add(grid, percept, discs), else: grid
+    due? = Cones.due?(percept, grid.at_ms, grid.pose)
+    grid = if due?, do: add(grid, percept, discs), else: grid
     tell(grid, percept)
   end
 
   defp begin(%{odometry: %Odometry{frame: frame}}), do: %__MODULE__{frame: frame}
-
-  defp due?(_grid, %{sonar: nil}), do: false
-  defp due?(%{at_ms: nil}, _percept), do: true
-
-  defp due?(grid, %{odometry: odometry, profile: profile} = percept) do
-    passed = percept.at_ms - grid.at_ms
-    turn = abs(odometry.twist.turn) * (profile.sonar_round_s + 0.1)
-
-    passed >= @every_ms and turn < @blurred and
-      (passed >= @standing_ms or moved?(grid.pose, odometry.pose, @moved, @turned))
-  end
-
-  defp moved?(before, now, way, turn),
-    do: Pose.distance(before, now) > way or abs(Pose.wrap(before.heading - now.heading)) > turn
 
   defp add(grid, %{odometry: %{pose: pose}} = percept, discs) do
     grid = if grid.cells, do: grid, else: middle(grid, pose, percept.at_ms)
@@ -136,10 +105,10 @@ defmodule Robot.Navigation.OccupancyGrid do
         right,
         up,
         min(decay, 127),
-        cones(percept, known, {left, low}),
+        Cones.pack(percept, pose, known, {left, low}),
         :math.tan(percept.profile.sonar_cone / 2),
-        @thick,
-        packed([{pose.x, pose.y, percept.profile.radius} | known], {left, low}),
+        Cones.thick(),
+        Cones.discs([{pose.x, pose.y, percept.profile.radius} | known], {left, low}),
         @sure
       )
 
@@ -192,52 +161,6 @@ defmodule Robot.Navigation.OccupancyGrid do
   defp map(%{pose: pose, odometry: odometry}),
     do: Pose.compose(pose, Pose.relative(odometry.pose, Pose.new(0, 0)))
 
-  defp cones(%{odometry: %{pose: pose}, profile: profile, sonar: ranges}, known, corner) do
-    tangent = :math.tan(profile.sonar_cone / 2)
-
-    for {sonar, range} <- Enum.zip(profile.sonars, ranges),
-        is_number(range) and range > profile.sonar_min + 0.005,
-        into: <<>> do
-      {x, y} = Pose.place(pose, {sonar.x, sonar.y})
-      heading = pose.heading + sonar.heading
-      {c, s} = {:math.cos(heading), :math.sin(heading)}
-
-      {clear, echo} =
-        reading(range, profile, Enum.any?(known, &sent?(&1, x, y, c, s, range, tangent)))
-
-      {px, py} = in_cells({x, y}, corner)
-
-      <<px::float-native, py::float-native, c::float-native, s::float-native,
-        clear / @cell::float-native, range / @cell + @behind::float-native, echo::float-native>>
-    end
-  end
-
-  # How far is seen through, and whether there is an echo of something unknown.
-  defp reading(range, %{sonar_max: most}, _known?) when range >= most, do: {@silent, 0.0}
-  defp reading(range, _profile, true), do: {min(range - @explained, @through), 0.0}
-
-  defp reading(range, _profile, false),
-    do: {min(range - @margin, @through), if(range <= @heard, do: 1.0, else: 0.0)}
-
-  # Whether an echo of this range can come from a disc.
-  defp sent?({dx, dy, radius}, x, y, c, s, range, tangent) do
-    {dx, dy} = {dx - x, dy - y}
-    along = dx * c + dy * s
-    side = abs(dy * c - dx * s)
-
-    along > -radius and side < max(along, 0.0) * tangent + radius + @explained and
-      abs(:math.sqrt(dx * dx + dy * dy) - radius - range) < @explained
-  end
-
-  defp packed(discs, corner) do
-    for {x, y, radius} <- discs, into: <<>> do
-      {px, py} = in_cells({x, y}, corner)
-      <<px::float-native, py::float-native, radius / @cell::float-native>>
-    end
-  end
-
-  defp in_cells({x, y}, {left, low}), do: {x / @cell - left, y / @cell - low}
-
   # Builds anew what is surely wall, if enough changed.
   defp tell(%{cells: nil} = grid, _percept), do: grid
   defp tell(grid, %{pose: pose, odometry: odometry}) when pose == nil or odometry == nil, do: grid
@@ -248,7 +171,7 @@ defmodule Robot.Navigation.OccupancyGrid do
   end
 
   defp tell(grid, percept, map) do
-    if grid.changes > 0 or (grid.grid && moved?(grid.map, map, @shifted, @swung)),
+    if grid.changes > 0 or (grid.grid && Cones.moved?(grid.map, map, @shifted, @swung)),
       do: %{grid | grid: build(grid, percept, map), map: map, told_ms: percept.at_ms, changes: 0},
       else: grid
   end
@@ -258,7 +181,7 @@ defmodule Robot.Navigation.OccupancyGrid do
     {left, low} = {corner(percept.pose.x), corner(percept.pose.y)}
     first = {(left + 0.5) * @cell, (low + 0.5) * @cell}
     back = Pose.relative(map, Pose.new(0, 0))
-    {x, y} = back |> Pose.place(first) |> in_cells({grid.left, grid.low})
+    {x, y} = back |> Pose.place(first) |> Cones.in_cells({grid.left, grid.low})
     at = {x, y, :math.cos(back.heading), :math.sin(back.heading)}
 
     case kernel().walls(grid.cells, @size, at, @sure) do

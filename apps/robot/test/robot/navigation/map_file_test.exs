@@ -2,6 +2,7 @@ defmodule Robot.Navigation.MapFileTest do
   use ExUnit.Case, async: true
   alias Robot.Navigation.{Grid, MapFile}
   doctest MapFile
+  doctest MapFile.Writer
   doctest Robot.File.Map
 
   @moduletag :tmp_dir
@@ -52,6 +53,32 @@ defmodule Robot.Navigation.MapFileTest do
 
     assert [{x, y}] = Grid.Way.find(grid, {-0.5, 7.5}, {2.5, 7.5}, 0.2)
     assert {x, y} == {2.5, 7.5}
+  end
+
+  test "a map that robots made is read as it was written", %{tmp_dir: dir} do
+    # 5.1 x 2 m with a wall of one cell; what is unknown is wall for who reads it.
+    cells =
+      for j <- 0..19, i <- 0..50, into: <<>> do
+        cond do
+          i == 0 or j == 0 or i == 50 or j == 19 -> <<0>>
+          i == 20 and j < 10 -> <<2>>
+          true -> <<1>>
+        end
+      end
+
+    map = %{cells: cells, width: 51, height: 20, left: -37, low: 12, cell: 0.1}
+    file = Path.join(dir, "found.yaml")
+    assert MapFile.save(file, map) == :ok
+    assert {:ok, %MapFile{grid: grid}} = MapFile.open(file)
+
+    for j <- 0..19, i <- 0..50 do
+      free? = Grid.clearance(grid, {(i - 36.5) * 0.1, (j + 12.5) * 0.1}) > 0.0
+      assert free? == (:binary.at(cells, j * 51 + i) == 1), inspect({i, j})
+    end
+
+    nowhere = Path.join([dir, "none", "found.yaml"])
+    assert {:error, line} = MapFile.save(nowhere, map)
+    assert line =~ "none/found.pgm: no such file or directory"
   end
 
   test "a map that will not do is one line that names the file and what is allowed", %{

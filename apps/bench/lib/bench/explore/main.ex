@@ -1,0 +1,133 @@
+defmodule Bench.Explore.Main do
+  @moduledoc "The command `mix bench explore`: reads its options, measures, prints the table."
+  alias Bench.Explore
+  alias Console.Cli
+  alias Console.Cli.{Format, MapName, Output, Parse, Progress}
+
+  @maps ~w(hall openplan offices)
+  @fleets [1, 4]
+  @limit_s 1_800
+
+  @doc "Runs the command; each error is one line."
+  @spec run([String.t()]) :: :ok | {:error, [String.t()]}
+  def run(arguments) do
+    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
+      given = Map.new(pairs)
+      if given["help"], do: help(), else: measure(given)
+    end
+  end
+
+  defp measure(given) do
+    output = Output.to(:stderr)
+    maps = given["maps"] || @maps
+    limit_s = given["duration"] || @limit_s
+
+    jobs =
+      for map <- maps, robots <- @fleets, seed <- given["seeds"] || 1..5, do: {map, robots, seed}
+
+    results =
+      jobs
+      |> Task.async_stream(&{&1, one(&1, limit_s)}, max_concurrency: 2, timeout: :infinity)
+      |> Enum.with_index(1)
+      |> Enum.map(fn {{:ok, {{map, robots, seed}, _} = result}, done} ->
+        note = "#{Format.count(robots, "robot")} in #{map}, seed #{seed}"
+        line = Progress.line(done, length(jobs), note, (output.columns || 80) - 1)
+        Output.progress(output, line)
+        result
+      end)
+
+    Output.finish(output)
+    measured = for {_job, {:ok, measured}} <- results, do: measured
+    IO.write(draw(maps, measured))
+
+    case for {{map, robots, seed}, {:error, line}} <- results,
+             do: "#{map}, #{robots} robots, seed #{seed}: #{line}" do
+      [] -> :ok
+      lines -> {:error, lines}
+    end
+  end
+
+  defp one({map, robots, seed}, limit_s) do
+    Sim.Trial.Memory.prepare()
+    Explore.run(map, robots, seed, limit_s)
+  end
+
+  @heads [
+    "map",
+    "area (m²)",
+    "robots",
+    "95 % seen (s), each run",
+    "median (s)",
+    "of one robot's",
+    "all say that they are ready: median (s)",
+    "seen in the end: least",
+    "walls that are there: median",
+    "off its place at the end: worst (m)",
+    "collisions"
+  ]
+
+  defp draw(maps, measured) do
+    rows =
+      for map <- maps,
+          robots <- @fleets,
+          some = Enum.filter(measured, &(&1.map == map and &1.robots == robots)),
+          some != [],
+          do: row(map, robots, some, Enum.filter(measured, &(&1.map == map and &1.robots == 1)))
+
+    [@heads, Enum.map(@heads, fn _head -> "---" end) | rows]
+    |> Enum.map_join(&("| " <> Enum.join(&1, " | ") <> " |\n"))
+  end
+
+  defp row(map, robots, some, alone) do
+    seen = some |> Enum.map(& &1.seen_s) |> Enum.sort()
+
+    [
+      map,
+      some |> Enum.map(& &1.area_m2) |> median() |> Format.decimals(0),
+      robots,
+      Enum.map_join(seen, ", ", &seconds/1),
+      seconds(median(seen)),
+      share(median(seen), median(for one <- alone, do: one.seen_s)),
+      some |> Enum.map(& &1.ready_s) |> median() |> seconds(),
+      percent(some |> Enum.map(& &1.share) |> Enum.min()),
+      percent(some |> Enum.map(& &1.walls) |> median()),
+      Format.decimals(some |> Enum.map(& &1.off_m) |> Enum.max(), 2),
+      some |> Enum.map(& &1.collisions) |> Enum.sum()
+    ]
+  end
+
+  # `nil`, never, is after all numbers.
+  defp median(values), do: values |> Enum.sort() |> Enum.at(div(length(values), 2))
+
+  defp seconds(nil), do: "never"
+  defp seconds(s), do: Format.decimals(s, 0)
+
+  defp share(some, alone) when is_number(some) and is_number(alone) and alone > 0,
+    do: Format.decimals(some / alone, 2)
+
+  defp share(_some, _alone), do: "–"
+
+  defp percent(share), do: "#{Format.decimals(100 * share, 1)} %"
+
+  defp table do
+    [
+      {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds, one run each (1-5)"},
+      {"maps", "NAME,NAME", &maps/1,
+       "which maps: names, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:…\n(#{Enum.join(@maps, ",")})"},
+      {"duration", "S", &Parse.whole(&1, 1..100_000), "simulated seconds at most (#{@limit_s})"},
+      {"help", nil, nil, "this text"}
+    ]
+  end
+
+  defp maps(text) do
+    maps = for name <- String.split(text, ","), do: MapName.parse(name, ".")
+
+    case Enum.find(maps, &(elem(&1, 0) == :error)) do
+      nil -> {:ok, for({:ok, map} <- maps, do: map)}
+      {:error, {allowed, _hint}} -> {:error, "some of " <> allowed <> ", with commas between,"}
+      {:error, allowed} -> {:error, allowed}
+    end
+  end
+
+  defp help, do: IO.puts("  mix bench explore [options]\n\n#{Cli.Arguments.help(table())}")
+end

@@ -1,0 +1,243 @@
+defmodule Missions.Explore do
+  @moduledoc """
+  The exploration: robots that see all of a building that they do not know, and make its map together (R92). Pure; written
+  with the interface of `Robot.Mission` alone.
+
+  Each robot keeps a chart of what its sonars have seen and of what others tell (`Missions.Explore.Chart`), by the poses that
+  they estimate. Once a second it looks for the frontiers of what is known (`.Frontiers`), chooses one (`.Choice`), and tells
+  the others to where it goes, how far that is, and what it has seen. Its ways are those of its chart, whatever floor plan it
+  has been given.
+
+  Its phases are `:explore`, and `:explored` while no frontier is left that it can reach; then it claims `formed`. A place to
+  which it came no nearer is left alone for a while, and for ever the second time. Options: `Missions.Explore.Options`.
+  """
+  alias Hal.Pose
+  alias Missions.Explore.{Chart, Choice, Frontiers, Options}
+  alias Robot.Behaviour
+
+  @behaviour Robot.Mission
+
+  @plan_ms 1_000
+  # It has seen enough to say anything after so long.
+  @first_ms 3_000
+  # A robot that was silent for so long goes nowhere; so many are remembered.
+  @silent_ms 3_500
+  @most_peers 256
+  # A robot that has not moved by so many metres within this time comes no nearer.
+  @moved 0.3
+  @stuck_ms 10_000
+  # The frontiers within so many metres of a place that it gave up are left alone for so long at first; so many are remembered.
+  @aside 0.8
+  @aside_ms 30_000
+  @most_aside 64
+  @ever_ms 86_400_000
+  @tolerance 0.2
+
+  @enforce_keys [:me, :within]
+  defstruct @enforce_keys ++
+              [
+                chart: Chart.new(),
+                home: nil,
+                now_ms: nil,
+                since_ms: nil,
+                planned_ms: nil,
+                peers: %{},
+                target: nil,
+                ahead: nil,
+                goal: 0,
+                still: nil,
+                aside: [],
+                done?: false,
+                why: nil,
+                started?: false
+              ]
+
+  @typedoc """
+  `target` is the frontier to which it goes and `ahead` the point of the way there for which it goes now, by goal number
+  `goal`. `still` is where it was when it last had moved, and since when; `aside` are places that it gave up, and until
+  when. `peers` are what others told last: when, to where they go, and how far that is.
+  """
+  @type t :: %__MODULE__{
+          me: atom(),
+          within: float(),
+          chart: Chart.t(),
+          home: Pose.point() | nil,
+          now_ms: integer() | nil,
+          since_ms: integer() | nil,
+          planned_ms: integer() | nil,
+          peers: %{atom() => {at_ms :: integer(), Choice.goal() | nil}},
+          target: Frontiers.frontier() | nil,
+          ahead: Pose.point() | nil,
+          goal: non_neg_integer(),
+          still: {Pose.point(), integer()} | nil,
+          aside: [{Pose.point(), until_ms :: integer()}],
+          done?: boolean(),
+          why: String.t() | nil,
+          started?: boolean()
+        }
+
+  @impl Robot.Mission
+  defdelegate option_table, to: Options, as: :table
+
+  @impl Robot.Mission
+  def commands, do: []
+
+  @place {:tuple,
+          [{:integer, -10_000_000, 10_000_000, "mm"}, {:integer, -10_000_000, 10_000_000, "mm"}],
+          "{x, y} in mm"}
+
+  @impl Robot.Mission
+  def messages do
+    {1,
+     seen: [
+       goal: [{:or, nil, @place}, required: true],
+       far_mm: [{:integer, 0, 10_000_000, "mm"}, required: true],
+       tiles: [{:check, &Chart.told?/1, "tiles of a chart"}, required: true]
+     ]}
+  end
+
+  @impl Robot.Mission
+  def init(robot, options),
+    do: {:idle, %__MODULE__{me: robot, within: options[:within] * 1.0}, []}
+
+  # The chart is what a stop must not lose.
+  @impl Robot.Mission
+  def halted(mission),
+    do: struct!(__MODULE__, mission |> Map.take([:me, :within, :chart, :home]) |> Map.to_list())
+
+  @impl Robot.Mission
+  def map(mission), do: Chart.map(mission.chart)
+
+  @impl Robot.Mission
+  def handle({:command, :start}, mission), do: result(%{mission | started?: true}, [])
+
+  def handle({:message, %{kind: :seen, from: from, body: body}}, %{now_ms: now_ms} = mission)
+      when now_ms != nil,
+      do: result(hear(mission, from, Map.new(body)), [])
+
+  def handle({:outcome, {:go, n}, outcome}, %{goal: n} = mission) do
+    mission = %{mission | goal: n + 1}
+    result(if(outcome == 1, do: mission, else: give_up(mission)), [])
+  end
+
+  def handle({:tick, %{pose: nil}}, mission), do: result(mission, [])
+
+  def handle({:tick, percept}, %{started?: true} = mission) do
+    mission = %{
+      mission
+      | now_ms: percept.at_ms,
+        since_ms: mission.since_ms || percept.at_ms,
+        home: mission.home || Pose.point(percept.pose),
+        chart: Chart.look(mission.chart, percept)
+    }
+
+    {mission, effects} = mission |> move(Pose.point(percept.pose)) |> plan(percept)
+    result(mission, effects ++ [goal(mission), {:look, 0.0}, {:claim, claim(mission)}])
+  end
+
+  def handle(_event, mission), do: result(mission, [])
+
+  defp result(%{started?: false} = mission, effects), do: {:idle, mission, effects}
+  defp result(mission, effects), do: {phase(mission), mission, effects}
+
+  defp phase(%{done?: true}), do: :explored
+  defp phase(_mission), do: :explore
+
+  defp hear(mission, from, said) do
+    chart = Chart.hear(mission.chart, said.tiles)
+
+    if is_map_key(mission.peers, from) or map_size(mission.peers) < @most_peers do
+      goal = with {x, y} <- said.goal, do: {from, {x / 1_000, y / 1_000}, said.far_mm / 1_000}
+      %{mission | chart: chart, peers: Map.put(mission.peers, from, {mission.now_ms, goal})}
+    else
+      %{mission | chart: chart}
+    end
+  end
+
+  defp move(%{target: nil, now_ms: now_ms} = mission, at), do: %{mission | still: {at, now_ms}}
+
+  defp move(%{still: {before, since_ms}, now_ms: now_ms} = mission, at) do
+    cond do
+      Pose.distance(before, at) > @moved -> %{mission | still: {at, now_ms}}
+      now_ms - since_ms > @stuck_ms -> give_up(mission)
+      true -> mission
+    end
+  end
+
+  defp give_up(%{target: nil} = mission), do: mission
+
+  defp give_up(%{target: %{at: at}} = mission) do
+    again? = Enum.any?(mission.aside, fn {place, _until} -> Pose.distance(place, at) < @aside end)
+    until_ms = mission.now_ms + if(again?, do: @ever_ms, else: @aside_ms)
+    aside = Enum.take([{at, until_ms} | mission.aside], @most_aside)
+    %{mission | aside: aside, target: nil, ahead: nil, planned_ms: nil, still: nil}
+  end
+
+  defp plan(%{planned_ms: planned_ms, now_ms: now_ms} = mission, _percept)
+       when planned_ms != nil and now_ms - planned_ms < @plan_ms,
+       do: {mission, []}
+
+  defp plan(%{now_ms: now_ms} = mission, percept) do
+    from = Pose.point(percept.pose)
+    peers = for {id, {at_ms, goal}} <- mission.peers, now_ms - at_ms < @silent_ms, do: {id, goal}
+    field = mission.chart |> Chart.raster() |> Frontiers.find(from, percept.profile.radius)
+    open = if field, do: Enum.filter(field.found, &open?(mission, &1)), else: []
+    goals = for {_id, goal} <- Enum.sort(peers), goal != nil, do: goal
+    target = Choice.of(open, mission.me, mission.target && mission.target.at, goals)
+    done? = field != nil and open == [] and now_ms - mission.since_ms >= @first_ms
+    first? = Enum.all?(peers, fn {id, _goal} -> mission.me < id end)
+
+    stages =
+      if done? and not mission.done? and first?,
+        do: [{:stage, :explored, %{says: "says that #{area(mission)} are explored"}}],
+        else: []
+
+    mission = %{
+      mission
+      | planned_ms: now_ms,
+        target: target,
+        ahead: target && Frontiers.ahead(field, target, from),
+        still: mission.still || {from, now_ms},
+        done?: done?
+    }
+
+    {told, chart} = Chart.tell(mission.chart)
+    {%{mission | chart: chart}, stages ++ [{:tell, :all, :seen, said(target, told)}]}
+  end
+
+  defp open?(%{home: {hx, hy}} = mission, %{at: {x, y} = at}) do
+    abs(x - hx) <= mission.within and abs(y - hy) <= mission.within and
+      not Enum.any?(mission.aside, fn {place, until_ms} ->
+        until_ms > mission.now_ms and Pose.distance(place, at) < @aside
+      end)
+  end
+
+  defp said(nil, tiles), do: [goal: nil, far_mm: 0, tiles: tiles]
+
+  defp said(%{at: {x, y}, far: far}, tiles),
+    do: [goal: {round(x * 1_000), round(y * 1_000)}, far_mm: round(far * 1_000), tiles: tiles]
+
+  defp goal(%{ahead: nil}), do: {:goal, :stand, {Behaviour.Stop, []}}
+
+  defp goal(%{ahead: {x, y}, goal: n}),
+    do: {:goal, {:go, n}, {Behaviour.Goto, x: x, y: y, tolerance: @tolerance}}
+
+  defp claim(mission) do
+    %{
+      phase: phase(mission),
+      standing: mission.target == nil,
+      formed: mission.done?,
+      says: says(mission)
+    }
+  end
+
+  defp says(%{target: nil, done?: true} = mission),
+    do: "#{area(mission)} explored, no frontier is left"
+
+  defp says(%{target: nil} = mission), do: "#{area(mission)} explored, looks for a frontier"
+
+  defp says(%{target: %{far: far}} = mission),
+    do: "#{area(mission)} explored, going to a frontier #{Float.round(far, 1)} m away"
+
+  defp area(mission), do: "#{round(Chart.area(mission.chart))} m²"
+end

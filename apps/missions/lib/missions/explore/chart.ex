@@ -1,0 +1,182 @@
+defmodule Missions.Explore.Chart do
+  @moduledoc """
+  The map of the fleet as one robot has it: what its own sonars have seen (`Robot.Navigation.Survey`), and where these say
+  nothing, what others told last. Pure.
+
+  Robots tell each other tiles of 1.6 x 1.6 m, two bits a cell: those in which they have seen something new, and in turn a few
+  of all that they know, of whomever. So who missed a message, or came later, has all of it after a while, and what a robot
+  has told is not lost with it.
+  """
+  alias Hal.Pose
+  alias Robot.Navigation.Survey
+  alias Robot.Percept
+
+  @tile Survey.tile()
+  @bytes 4 + div(@tile * @tile, 4)
+  @unknown <<0::size(@tile * @tile)-unit(8)>>
+  # So many tiles are told at once, so many of them again.
+  @most 14
+  @again 3
+  # Tiles each way from that in which the robot began, 48 m; others are not heard.
+  @far 30
+
+  @enforce_keys [:survey]
+  defstruct @enforce_keys ++ [home: nil, told: %{}, tiles: %{}, news: [], last: nil, free: 0]
+
+  @typedoc """
+  `told` and `tiles`, which is all that is known, are states by tile; `news` are the tiles that are to be told, `last` is the
+  one that was told again last, `free` the number of free cells, `home` the tile in which the robot began.
+  """
+  @type t :: %__MODULE__{
+          survey: Survey.t(),
+          home: Survey.tile() | nil,
+          told: %{Survey.tile() => Survey.states()},
+          tiles: %{Survey.tile() => Survey.states()},
+          news: [Survey.tile()],
+          last: Survey.tile() | nil,
+          free: non_neg_integer()
+        }
+
+  @typedoc """
+  The known part as one rectangle of states, rows from the lowest y; `left` and `low` are the numbers of the lower left
+  cell, counted from the origin of the map.
+  """
+  @type raster :: %{
+          cells: binary(),
+          width: non_neg_integer(),
+          height: non_neg_integer(),
+          left: integer(),
+          low: integer()
+        }
+
+  @doc "A chart on which nothing is."
+  @spec new() :: t()
+  def new, do: %__MODULE__{survey: Survey.new()}
+
+  @doc "The free area, m2."
+  @spec area(t()) :: float()
+  def area(%__MODULE__{free: free}), do: free * Survey.cell() * Survey.cell()
+
+  @doc "The greatest distance from where a robot began at which it knows anything, metres."
+  @spec far() :: float()
+  def far, do: @far * @tile * Survey.cell()
+
+  @doc "Takes what the robot's sonars have seen."
+  @spec look(t(), Percept.t()) :: t()
+  def look(chart, %Percept{pose: pose} = percept) do
+    chart = %{chart | home: chart.home || Survey.tile_of(Pose.point(pose))}
+    {survey, changed} = Survey.update(chart.survey, percept)
+
+    changed
+    |> Enum.filter(&near?(chart, &1))
+    |> Enum.reduce(%{chart | survey: survey}, fn at, chart ->
+      case merge(chart, at) do
+        ^chart -> chart
+        other -> %{other | news: if(at in other.news, do: other.news, else: other.news ++ [at])}
+      end
+    end)
+  end
+
+  defp near?(%{home: {i, j}}, {column, row}),
+    do: abs(column - i) <= @far and abs(row - j) <= @far
+
+  defp merge(chart, at) do
+    before = Map.get(chart.tiles, at, @unknown)
+    seen = join(Survey.states(chart.survey, at), Map.get(chart.told, at))
+    # What was known once is not unknown again, however the evidence wavers.
+    now = join(seen, before)
+
+    if now == before,
+      do: chart,
+      else: %{
+        chart
+        | tiles: Map.put(chart.tiles, at, now),
+          free: chart.free - free(before) + free(now)
+      }
+  end
+
+  defp join(states, nil), do: states
+  defp join(over, under), do: join(over, under, <<>>)
+  defp join(<<0, a::binary>>, <<s, b::binary>>, done), do: join(a, b, <<done::binary, s>>)
+  defp join(<<s, a::binary>>, <<_, b::binary>>, done), do: join(a, b, <<done::binary, s>>)
+  defp join(<<>>, <<>>, done), do: done
+
+  defp free(states), do: for(<<1 <- states>>, reduce: 0, do: (count -> count + 1))
+
+  @doc "What is to be told now."
+  @spec tell(t()) :: {binary(), t()}
+  def tell(%__MODULE__{news: news, tiles: tiles} = chart) do
+    {now, later} = Enum.split(news, @most - @again)
+    known = tiles |> Map.keys() |> Enum.sort()
+    {before, rest} = Enum.split_while(known, &(chart.last != nil and &1 <= chart.last))
+    again = (rest ++ before) |> Enum.take(@most - length(now)) |> Enum.take(3 * @again)
+    packed = for at <- Enum.uniq(now ++ again), into: <<>>, do: pack(at, tiles[at])
+    {packed, %{chart | news: later, last: List.last(again)}}
+  end
+
+  defp pack({i, j}, states) do
+    cells = for <<state <- states>>, into: <<>>, do: <<state::2>>
+    <<i::signed-16, j::signed-16, cells::binary>>
+  end
+
+  @doc """
+  Whether a term is what `tell/1` may return.
+
+      iex> for term <- [<<>>, <<0::544>>, <<0>>, :junk, <<0::8160>>], do: Missions.Explore.Chart.told?(term)
+      [true, true, false, false, false]
+  """
+  @spec told?(term()) :: boolean()
+  def told?(term),
+    do:
+      is_binary(term) and rem(byte_size(term), @bytes) == 0 and byte_size(term) <= @most * @bytes
+
+  @doc "Takes what another robot told. Tiles that are too far away are not taken, nor any before the robot knows its place."
+  @spec hear(t(), binary()) :: t()
+  def hear(%__MODULE__{home: nil} = chart, _packed), do: chart
+
+  def hear(chart, packed) do
+    for <<i::signed-16, j::signed-16, cells::binary-size(@bytes - 4) <- packed>>,
+        near?(chart, {i, j}),
+        reduce: chart do
+      chart -> hear(chart, {i, j}, for(<<state::2 <- cells>>, into: <<>>, do: <<rem(state, 3)>>))
+    end
+  end
+
+  defp hear(chart, at, states) do
+    told = join(states, Map.get(chart.told, at))
+    chart = merge(%{chart | told: Map.put(chart.told, at, told)}, at)
+    if chart.tiles[at] == states, do: %{chart | news: List.delete(chart.news, at)}, else: chart
+  end
+
+  @doc "All that is known, for a file."
+  @spec map(t()) :: Robot.Navigation.MapFile.Writer.chart()
+  def map(chart), do: chart |> raster() |> Map.put(:cell, Survey.cell())
+
+  @doc "All that is known."
+  @spec raster(t()) :: raster()
+  def raster(%__MODULE__{tiles: tiles}) when tiles == %{},
+    do: %{cells: <<>>, width: 0, height: 0, left: 0, low: 0}
+
+  def raster(%__MODULE__{tiles: tiles}) do
+    {left, right} = tiles |> Map.keys() |> Enum.map(&elem(&1, 0)) |> Enum.min_max()
+    {low, high} = tiles |> Map.keys() |> Enum.map(&elem(&1, 1)) |> Enum.min_max()
+
+    cells =
+      for j <- low..high, into: <<>> do
+        row = for i <- left..right, do: Map.get(tiles, {i, j}, @unknown)
+
+        for k <- 0..(@tile - 1),
+            tile <- row,
+            into: <<>>,
+            do: binary_part(tile, k * @tile, @tile)
+      end
+
+    %{
+      cells: cells,
+      width: (right - left + 1) * @tile,
+      height: (high - low + 1) * @tile,
+      left: left * @tile,
+      low: low * @tile
+    }
+  end
+end

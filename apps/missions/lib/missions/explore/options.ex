@@ -1,0 +1,15 @@
+defmodule Missions.Explore.Options do
+  @moduledoc """
+  The options of the exploration. Pure.
+
+  | option | meaning | default |
+  |---|---|---|
+  | `within:` | how far from where it began a robot explores, metres to each side | 48 |
+  """
+  alias Hal.Options
+  alias Missions.Explore.Chart
+
+  @doc "The table of the options: what is allowed."
+  @spec table() :: Options.table()
+  def table, do: [within: [{:number, 3, Chart.far(), "m"}, default: Chart.far()]]
+end

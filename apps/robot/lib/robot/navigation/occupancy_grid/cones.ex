@@ -1,0 +1,117 @@
+defmodule Robot.Navigation.OccupancyGrid.Cones do
+  @moduledoc """
+  The readings of a ring of sonars as the kernels of `Robot.Navigation.OccupancyGrid` take them: for each a cone, in cells
+  of 10 cm. Pure.
+  """
+  alias Hal.Pose
+  alias Robot.Percept
+
+  @cell 0.1
+  # Ranges (metres): echoes from farther away say too little of where on the arc the wall is. Seen through is what is
+  # before an echo, by a margin; less where nothing answered, which may be a wall that throws the echo elsewhere.
+  @heard 1.5
+  @through 2.5
+  @silent 2.0
+  @margin 0.15
+  # The arc lies behind the surface that sent the echo, and is as deep as lets no cell slip through (cells).
+  @behind 0.5
+  @thick 0.75
+  # Readings are taken this often (ms), and this often while the robot stands (metres, radians): the same
+  # reading again says little that is new.
+  @every_ms 200
+  @standing_ms 1_000
+  @moved 0.03
+  @turned 0.05
+  # Sonars of a robot that turns faster than this within a round of them point elsewhere by then (radians).
+  @blurred 0.2
+  # An echo this near (metres) to a known body is its echo.
+  @explained 0.3
+
+  @type disc :: {x :: float(), y :: float(), radius :: float()}
+  @typedoc "The numbers of the cell in a grid's lower left corner, from that of the frame's origin."
+  @type corner :: {integer(), integer()}
+
+  @doc "The width of a cell, metres."
+  @spec cell() :: float()
+  def cell, do: @cell
+
+  @doc "Half the depth of an arc, in cells."
+  @spec thick() :: float()
+  def thick, do: @thick
+
+  @doc "How far a cone reaches at most, metres."
+  @spec reach() :: float()
+  def reach, do: @through
+
+  @doc "Whether the readings of a percept say something new after those of `last_ms`, which were taken at this odometry."
+  @spec due?(Percept.t(), last_ms :: integer() | nil, Pose.t() | nil) :: boolean()
+  def due?(%Percept{sonar: nil}, _last_ms, _last), do: false
+  def due?(_percept, nil, _last), do: true
+
+  def due?(%Percept{odometry: odometry, profile: profile} = percept, last_ms, last) do
+    passed = percept.at_ms - last_ms
+    turn = abs(odometry.twist.turn) * (profile.sonar_round_s + 0.1)
+
+    passed >= @every_ms and turn < @blurred and
+      (passed >= @standing_ms or moved?(last, odometry.pose, @moved, @turned))
+  end
+
+  @doc "Whether a pose differs from another one by more than so many metres or radians."
+  @spec moved?(Pose.t(), Pose.t(), way :: float(), turn :: float()) :: boolean()
+  def moved?(before, now, way, turn),
+    do: Pose.distance(before, now) > way or abs(Pose.wrap(before.heading - now.heading)) > turn
+
+  @doc """
+  The cones of a robot at this pose. An echo that one of the `known` bodies explains is no wall; `off` is how far
+  (metres) that may be from where it is supposed to be.
+  """
+  @spec pack(Percept.t(), Pose.t(), [disc()], corner(), off :: float()) :: binary()
+  def pack(%Percept{profile: profile, sonar: ranges}, pose, known, corner, off \\ 0.0) do
+    tangent = :math.tan(profile.sonar_cone / 2)
+    near = @explained + off
+
+    for {sonar, range} <- Enum.zip(profile.sonars, ranges),
+        is_number(range) and range > profile.sonar_min + 0.005,
+        into: <<>> do
+      {x, y} = Pose.place(pose, {sonar.x, sonar.y})
+      heading = pose.heading + sonar.heading
+      {c, s} = {:math.cos(heading), :math.sin(heading)}
+      known? = Enum.any?(known, &sent?(&1, x, y, c, s, range, tangent, near))
+      {clear, echo} = reading(range, profile, known?)
+      {px, py} = in_cells({x, y}, corner)
+
+      <<px::float-native, py::float-native, c::float-native, s::float-native,
+        clear / @cell::float-native, range / @cell + @behind::float-native, echo::float-native>>
+    end
+  end
+
+  # How far is seen through, and whether there is an echo of something unknown.
+  defp reading(range, %{sonar_max: most}, _known?) when range >= most, do: {@silent, 0.0}
+  defp reading(range, _profile, true), do: {min(range - @explained, @through), 0.0}
+
+  defp reading(range, _profile, false),
+    do: {min(range - @margin, @through), if(range <= @heard, do: 1.0, else: 0.0)}
+
+  # Whether an echo of this range can come from a disc.
+  defp sent?({dx, dy, radius}, x, y, c, s, range, tangent, near) do
+    {dx, dy} = {dx - x, dy - y}
+    along = dx * c + dy * s
+    side = abs(dy * c - dx * s)
+
+    along > -radius and side < max(along, 0.0) * tangent + radius + near and
+      abs(:math.sqrt(dx * dx + dy * dy) - radius - range) < near
+  end
+
+  @doc "Discs as the kernels take them."
+  @spec discs([disc()], corner()) :: binary()
+  def discs(discs, corner) do
+    for {x, y, radius} <- discs, into: <<>> do
+      {px, py} = in_cells({x, y}, corner)
+      <<px::float-native, py::float-native, radius / @cell::float-native>>
+    end
+  end
+
+  @doc "A point in cells from a corner."
+  @spec in_cells(Pose.point(), corner()) :: {float(), float()}
+  def in_cells({x, y}, {left, low}), do: {x / @cell - left, y / @cell - low}
+end
