@@ -110,10 +110,10 @@ defmodule Swarm.Replacement.Server do
     {:noreply, s}
   end
 
-  def handle_cast({:stood, id, robot}, s) when is_map_key(s.jobs, id),
-    do: {:noreply, step(s, id, {:stood, robot})}
+  # Also of jobs that are over: who was slow has no fault.
+  def handle_cast({:stood, id, robot}, s), do: {:noreply, step(s, id, {:stood, robot})}
 
-  def handle_cast({:started, id, robot, result}, s) when is_map_key(s.jobs, id),
+  def handle_cast({:started, id, robot, result}, s),
     do: {:noreply, step(s, id, {:started, robot, result})}
 
   def handle_cast(_unknown, s), do: HardenedServer.drop(s)
