@@ -28,6 +28,15 @@ defmodule Robot.MissionCaseTest do
     @moduledoc "A mission with the fault that its option names."
     @behaviour Robot.Mission
 
+    defmodule Said do
+      @moduledoc "What its heartbeats say."
+      defstruct count: 0
+      def valid?(%{count: count}), do: is_integer(count) and count >= 0
+    end
+
+    @impl Robot.Mission
+    def claims, do: {1, Said}
+
     @impl Robot.Mission
     def option_table, do: [fault: {:one_of, [:grows, :random, :gullible, :claims, :none, :lost]}]
 
@@ -51,7 +60,7 @@ defmodule Robot.MissionCaseTest do
       do: {:go, {:random, state}, [{:tell, :all, :word, text: inspect(make_ref())}]}
 
     def handle({:tick, _percept}, {:claims, state}),
-      do: {:go, {:claims, state}, [{:claim, %{epoch: -1}}]}
+      do: {:go, {:claims, state}, [{:claim, %{count: -1}}]}
 
     def handle(_event, mission), do: {:go, mission, [{:claim, %{phase: :go, standing: true}}]}
   end
