@@ -117,6 +117,12 @@ defmodule Netns.Watched do
   defdelegate options(options, robots), to: Landmark
 
   @impl Robot.Mission
+  defdelegate claims, to: Landmark
+
+  @impl Robot.Mission
+  defdelegate stale(claim), to: Landmark
+
+  @impl Robot.Mission
   def handle(event, mission) do
     {phase, next, effects} = Landmark.handle(event, mission)
     with {:command, command} <- event, do: Log.note(:command, command)

@@ -38,7 +38,11 @@ defmodule Swarm.MeshNodes.Fuzz do
 
     {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, Swarm.Comms.join(config))
     Swarm.Case.stand(id, Pose.new(0, 0))
-    Robot.Control.Pilot.start(id, Swarm.StandMission, [])
+    # Its drive has still to take what its wheels report.
+    true =
+      Swarm.Case.eventually(fn -> Robot.Control.Pilot.start(id, Swarm.StandMission, []) == :ok end)
+
+    :ok
   end
 
   defp colours do
