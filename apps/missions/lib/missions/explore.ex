@@ -189,7 +189,10 @@ defmodule Missions.Explore do
 
     stages =
       if done? and not mission.done? and first?,
-        do: [{:stage, :explored, %{says: "says that #{area(mission)} are explored"}}],
+        do: [
+          {:stage, :explored,
+           %{says: "says that #{area(mission)} are explored; #{left(mission)}"}}
+        ],
         else: []
 
     mission = %{
@@ -232,12 +235,20 @@ defmodule Missions.Explore do
   end
 
   defp says(%{target: nil, done?: true} = mission),
-    do: "#{area(mission)} explored, no frontier is left"
+    do: "#{area(mission)} explored, #{left(mission)}"
 
   defp says(%{target: nil} = mission), do: "#{area(mission)} explored, looks for a frontier"
 
   defp says(%{target: %{far: far}} = mission),
     do: "#{area(mission)} explored, going to a frontier #{Float.round(far, 1)} m away"
+
+  # What it did not get to may be behind a door.
+  defp left(%{aside: aside, now_ms: now_ms}) do
+    case Enum.count(aside, fn {_place, until_ms} -> until_ms > now_ms end) do
+      0 -> "no frontier is left"
+      count -> "no frontier is left but #{count} that it did not reach"
+    end
+  end
 
   defp area(mission), do: "#{round(Chart.area(mission.chart))} m²"
 end

@@ -18,14 +18,13 @@ defmodule Robot.Mission.Claim do
   @type t :: %__MODULE__{mission: module(), version: 1..65_535, fields: struct()}
 
   @doc "What others hear of what this mission claims; `nil` of one that has nothing more to say."
-  @spec new(module(), claim :: map()) :: t() | nil
+  @spec new(module() | nil, claim :: map()) :: t() | nil
   def new(mission, claim) do
-    case claims(mission) do
-      nil ->
-        nil
-
-      {version, said} ->
-        %__MODULE__{mission: mission, version: version, fields: struct(said, claim)}
+    with true <- loaded?(mission),
+         {version, said} <- claims(mission) do
+      %__MODULE__{mission: mission, version: version, fields: struct(said, claim)}
+    else
+      _nothing_more -> nil
     end
   end
 
@@ -68,10 +67,14 @@ defmodule Robot.Mission.Claim do
   """
   @spec timely(module(), claim :: map(), age_ms :: integer()) :: map()
   def timely(mission, claim, age_ms) do
-    if age_ms > @stale_ms and function_exported?(mission, :stale, 1),
+    if age_ms > @stale_ms and loaded?(mission) and function_exported?(mission, :stale, 1),
       do: mission.stale(claim),
       else: claim
   end
+
+  # A mission from outside is not loaded for that: whoever invents names would keep the code server busy.
+  defp loaded?(nil), do: false
+  defp loaded?(mission), do: Code.ensure_loaded?(mission)
 
   @spec claims(module()) :: Mission.claims() | nil
   defp claims(mission), do: if(function_exported?(mission, :claims, 0), do: mission.claims())
