@@ -39,9 +39,8 @@ defmodule Swarm.MeshNodes.Fuzz do
     {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, Swarm.Comms.join(config))
     Swarm.Case.stand(id, Pose.new(0, 0))
     # Its drive has still to take what its wheels report.
-    true =
-      Swarm.Case.eventually(fn -> Robot.Control.Pilot.start(id, Swarm.StandMission, []) == :ok end)
-
+    start = fn -> Robot.Control.Pilot.start(id, Swarm.StandMission, []) == :ok end
+    true = Swarm.Case.eventually(start)
     :ok
   end
 
