@@ -4,8 +4,9 @@ defmodule Missions.Landmark.Marks do
   leader reports, and the robots ahead of it in the order at their reported places, each with its
   reported uncertainty. Also decides when the pose is sure enough to claim a slot. Pure.
 
-  Only robots ahead in the order count, so that corrections run one way, from the leader down. All
-  others may be seen, too, and must not be mistaken for one of these.
+  Only robots ahead in the order count, so that corrections run one way, from the leader down. Others
+  may be seen, too, and must not be mistaken for one of these. In a fleet of more than eleven only the leader and the
+  nearest are looked for: ten of all, and ten of those ahead.
   """
   alias Hal.Pose
   alias Robot.Localiser.Anchors
@@ -24,6 +25,8 @@ defmodule Missions.Landmark.Marks do
   @landmark_across {0.005, 0.005}
   # A robot slower than this stands still, in m/s and rad/s.
   @slow 0.05
+  # Of so many of the nearest robots, and so many of the nearest ahead, the picture is asked.
+  @nearest 10
   # A robot in place is at most this far from its slot in 95 of 100 cases, in metres.
   @tolerance 0.5
 
@@ -35,7 +38,7 @@ defmodule Missions.Landmark.Marks do
 
     # In an order that does not depend on the VM, because each correction changes the next.
     robots =
-      for {id, peer} <- Enum.sort(percept.peers) do
+      for {id, peer} <- Enum.sort(neighbours(percept, ahead)) do
         at = Pose.point(if id == anchor.leader, do: leader, else: peer.pose)
         spread = spread(id, peer, anchor)
 
@@ -52,6 +55,18 @@ defmodule Missions.Landmark.Marks do
       end
 
     %Anchors{frame: frame(mission, leader), marks: landmark(mission) ++ robots}
+  end
+
+  defp neighbours(%{peers: peers}, _ahead) when map_size(peers) <= @nearest, do: peers
+
+  defp neighbours(%{peers: peers, pose: pose}, [leader | _] = ahead) do
+    nearest =
+      peers
+      |> Enum.sort_by(fn {id, peer} -> {Pose.distance(pose, peer.pose), id} end)
+      |> Enum.map(&elem(&1, 0))
+
+    led = nearest |> Stream.filter(&(&1 in ahead)) |> Enum.take(@nearest)
+    Map.take(peers, [leader | Enum.take(nearest, @nearest)] ++ led)
   end
 
   # A moving landmark is somewhere else by now.
