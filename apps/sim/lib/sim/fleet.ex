@@ -40,6 +40,8 @@ defmodule Sim.Fleet do
            Mission.choose(setup, Map.get(own, :mission, true), backend == Nodes),
          :ok <- free(setup.options.robots) do
       {:ok, _apps} = Application.ensure_all_started(:swarm)
+      # Else a hundred robots ask for them one by one, each in a callback of its mission.
+      :ok = Swarm.Missions.load([:vision, :sim])
       answer = make_ref()
       start = {setup, backend, Map.put(own, :mission, begin?), {self(), answer}}
 

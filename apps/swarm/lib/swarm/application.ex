@@ -5,6 +5,7 @@ defmodule Swarm.Application do
   alias Mesh.{Log, Options}
   alias Mesh.Distribution.ConnectionLog
   alias Swarm.MemberSpec
+  alias Swarm.Message.Checked
   alias Swarm.Host.{DepartureFile, ReleaseBoot, Resolver, Systemd}
 
   # With `config :swarm, boot: true`, as in a release, the node is the robot that its environment
@@ -12,6 +13,7 @@ defmodule Swarm.Application do
   @impl Application
   def start(_type, _arguments) do
     :ok = Resolver.open()
+    :ok = Checked.begin()
     environment = System.get_env()
     :ok = Robot.Devices.Log.attach()
 

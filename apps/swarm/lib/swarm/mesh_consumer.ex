@@ -5,7 +5,7 @@ defmodule Swarm.MeshConsumer do
   """
   alias Robot.Names
   alias Swarm.Order.Freshness
-  alias Swarm.{Blackboard, Comms, EStop, Message, Missions}
+  alias Swarm.{Blackboard, Comms, EStop, Message, Missions, Transport}
 
   @behaviour Mesh.Consumer
 
@@ -14,14 +14,7 @@ defmodule Swarm.MeshConsumer do
   # understand what a leader sends.
   @impl Mesh.Consumer
   def services do
-    modules =
-      for app <- [:hal, :mesh, :robot, :swarm | Missions.apps()],
-          module <- Application.spec(app, :modules) || [],
-          do: module
-
-    # Together, because the VM then brings them in at once, in a quarter of the time.
-    :ok = :code.ensure_modules_loaded(modules)
-
+    :ok = Missions.load()
     %{rows: {Blackboard, :hear, []}, stop: {EStop, :hear, []}}
   end
 
@@ -45,13 +38,11 @@ defmodule Swarm.MeshConsumer do
   @impl Mesh.Consumer
   def deliver(:all, node, message) do
     rival(message, node)
-    for comms <- Names.all(:comms), do: GenServer.cast(comms, {:hear, message})
-    :ok
+    Transport.hear(Names.all(:comms), message)
   end
 
   def deliver(ids, _node, message) do
-    for id <- ids, comms = Names.whereis(id, :comms), do: GenServer.cast(comms, {:hear, message})
-    :ok
+    Transport.hear(for(id <- ids, comms = Names.whereis(id, :comms), do: comms), message)
   end
 
   # A robot on another node has the name of one of this node.

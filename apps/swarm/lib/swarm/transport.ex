@@ -7,6 +7,7 @@ defmodule Swarm.Transport do
   alias Robot.Names
   alias Mesh.Nonblocking
   alias Swarm.{Directory, Message}
+  alias Swarm.Message.Checked
 
   @doc """
   All robots that can be reached, sorted: those in the directory, those heard through the mesh
@@ -33,13 +34,13 @@ defmodule Swarm.Transport do
 
   defp by_mesh(from, :all, message) do
     own = Names.whereis(from, :comms)
-    for comms <- Names.all(:comms), comms != own, do: GenServer.cast(comms, {:hear, message})
+    hear(for(comms <- Names.all(:comms), comms != own, do: comms), message)
     Mesh.speak(:all, message)
   end
 
   defp by_mesh(_from, ids, message) do
     {here, there} = Enum.split_with(ids, &(Names.whereis(&1, :comms) != nil))
-    for id <- here, do: GenServer.cast(Names.via(id, :comms), {:hear, message})
+    hear(for(id <- here, comms = Names.whereis(id, :comms), do: comms), message)
     if there != [], do: Mesh.speak(there, message), else: :ok
   end
 
@@ -47,10 +48,20 @@ defmodule Swarm.Transport do
     do: by_distribution(from, List.delete(Directory.robots(), from), message)
 
   defp by_distribution(_from, ids, message) do
-    for id <- ids,
-        comms <- Directory.members({:robot, id}),
-        do: Nonblocking.cast(comms, {:hear, message})
+    {here, there} =
+      Enum.split_with(Enum.flat_map(ids, &Directory.members({:robot, &1})), &(node(&1) == node()))
 
+    for comms <- there, do: Nonblocking.cast(comms, {:hear, message})
+    hear(here, message)
+  end
+
+  @doc "Passes a message to comms processes of this node, checked once for all of them."
+  @spec hear([pid()], Message.t()) :: :ok
+  def hear([], _message), do: :ok
+
+  def hear(here, message) do
+    checked = Checked.mark(message)
+    for comms <- here, do: GenServer.cast(comms, {:hear, checked})
     :ok
   end
 end

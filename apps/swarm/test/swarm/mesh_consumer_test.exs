@@ -1,6 +1,7 @@
 defmodule Swarm.MeshConsumerTest do
   use Swarm.Case, async: true
   alias Swarm.Agreement.Round.Letter
+  alias Swarm.Message.Checked
   alias Swarm.MeshConsumer
 
   defp beat(id) do
@@ -34,7 +35,8 @@ defmodule Swarm.MeshConsumerTest do
   test "messages and commands reach the comms process of a robot, and no other" do
     :ok = Names.register(:consumer1, :comms, nil)
     assert MeshConsumer.deliver([:consumer1, :consumer_away], :b@lab, beat(:mag1)) == :ok
-    assert_received {:"$gen_cast", {:hear, %Message{from: :mag1}}}
+    assert_received {:"$gen_cast", {:hear, heard}}
+    assert {:ok, %Message{from: :mag1}} = Checked.open(heard)
     ref = make_ref()
 
     for request <- [{:stamp, ref}, {:command, :stop, ref}, {:command, :start, ref, {7, 5}}] do

@@ -5,12 +5,13 @@ defmodule Swarm.MessageTest do
   alias Swarm.Agreement.Round
   alias Swarm.Formation.Reference
   alias Swarm.Membership.Heartbeat
-  alias Swarm.Message.Receiver
+  alias Swarm.Message.{Checked, Receiver}
   doctest Swarm.EStop.State
   doctest Swarm.Order.Freshness
   doctest Swarm.Comms.NameClaim
   doctest Swarm.Wire
   doctest Swarm.Wire.StopTags
+  doctest Checked
   doctest Receiver
   doctest Swarm.Comms.PingReply
 
@@ -28,6 +29,20 @@ defmodule Swarm.MessageTest do
     places: [1]
   }
   @letter %Round.Letter{id: {1, 1, :mag1}, view: [:mag1], remaining_ms: 10, purpose: :search}
+
+  test "a message is checked once a node, and only what this node has marked is believed" do
+    message = Message.new(:mag1, :heartbeat, @beat)
+    assert {mark, ^message} = marked = Checked.mark(message)
+    assert is_reference(mark)
+    assert Checked.open(marked) == {:ok, message}
+
+    wrong = Message.new(:mag1, :heartbeat, %{@beat | pose: :here})
+    assert Checked.mark(wrong) == wrong
+    assert Checked.open(wrong) == {:error, :heartbeat}
+
+    for mark <- [make_ref(), nil],
+        do: assert(Checked.open({mark, wrong}) == {:error, :not_a_message})
+  end
 
   defp junk do
     Enum.random([

@@ -11,8 +11,6 @@ defmodule Missions.Landmark.UnsureTest do
   alias Missions.Landmark
   alias Missions.Landmark.{Follower, Shape}
 
-  doctest Missions.Landmark.Marks
-
   @column {:column, 1.0}
 
   defp percept(fields) do

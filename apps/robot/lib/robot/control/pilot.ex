@@ -35,7 +35,11 @@ defmodule Robot.Control.Pilot do
   @doc "Starts the pilot of a robot."
   @spec start_link(Config.t()) :: GenServer.on_start()
   def start_link(%Config{} = config),
-    do: HardenedServer.start_link(__MODULE__, config, name: Names.via(config.id, :pilot))
+    do:
+      HardenedServer.start_link(__MODULE__, config,
+        name: Names.via(config.id, :pilot),
+        spawn_opt: [message_queue_data: :off_heap]
+      )
 
   @doc """
   Starts the mission of the robot's config; it replaces a running one. If the wheels may not turn now,

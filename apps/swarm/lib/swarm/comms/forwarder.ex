@@ -128,8 +128,8 @@ defmodule Swarm.Comms.Forwarder do
     for to <- letter.view,
         to not in [me, from],
         is_map_key(relay.missing, {from, to}),
-        mine?(me, from, to, peers, now_ms),
         fresh?(relay.letters[{from, to}], content, now_ms),
+        mine?(me, from, to, peers, now_ms),
         {:ok, relayed} <- [Message.pass_on(message, me)],
         reduce: {relay, []} do
       {relay, sent} ->
@@ -144,15 +144,15 @@ defmodule Swarm.Comms.Forwarder do
   # none, all robots that have the message by a relay do.
   defp mine?(me, from, to, peers, now_ms) do
     ways =
-      for {id, peer} <- peers,
-          id not in [from, to],
-          alive?(peer, now_ms),
-          NameSet.member?(peer.beat.heard, from) and NameSet.member?(peers[to].beat.heard, id),
-          do: id
+      Stream.filter(peers, fn {id, peer} ->
+        id not in [from, to] and alive?(peer, now_ms) and
+          NameSet.member?(peer.beat.heard, from) and NameSet.member?(peers[to].beat.heard, id)
+      end)
 
+    # Not all ways are looked for: in a large group nearly everybody is one.
     if heard?(peers[from], now_ms),
-      do: me in Enum.take(Enum.sort([me | ways]), @relays),
-      else: ways == [] and is_map_key(peers, from)
+      do: Enum.count(Stream.take(Stream.filter(ways, &(elem(&1, 0) < me)), @relays)) < @relays,
+      else: Enum.empty?(ways) and is_map_key(peers, from)
   end
 
   defp heard?(%{direct_ms: at_ms}, now_ms) when at_ms != nil, do: now_ms - at_ms < @alive_ms

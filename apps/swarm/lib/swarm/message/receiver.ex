@@ -5,6 +5,7 @@ defmodule Swarm.Message.Receiver do
   """
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message
+  alias Swarm.Message.Checked
 
   @enforce_keys [:me, :peers]
   defstruct @enforce_keys ++ [heard: 0, rejected: %{}]
@@ -29,7 +30,7 @@ defmodule Swarm.Message.Receiver do
   def new(me), do: %__MODULE__{me: me, peers: Peers.new(me)}
 
   @doc """
-  Hears a term from outside, whatever it is.
+  Hears a term from outside, whatever it is; a message that was checked on this node is not checked again.
 
       iex> {heard, receiver} = Swarm.Message.Receiver.hear(Swarm.Message.Receiver.new(:mag1), "junk", 0)
       iex> {heard, receiver.rejected}
@@ -37,7 +38,7 @@ defmodule Swarm.Message.Receiver do
   """
   @spec hear(t(), term(), integer()) :: {heard(), t()}
   def hear(%__MODULE__{} = receiver, term, now_ms),
-    do: take(receiver, Message.check(term), now_ms)
+    do: take(receiver, Checked.open(term), now_ms)
 
   @doc """
   The same for what was checked before (`Swarm.Message.check/1`), on this node and not by whoever sent it: once for all
