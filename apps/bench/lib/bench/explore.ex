@@ -4,22 +4,22 @@ defmodule Bench.Explore do
   lockstep with default noise; all of it follows from map, number of robots and seed.
 
   The area is where the middle of a Magellan can come to from the robots' starts, on the true floor plan, in cells of 10 cm. A
-  cell is seen when the chart of a robot knows it, by the poses that the robots estimate; the robot whose chart has most counts.
+  cell is seen when the map of a robot knows it, by the poses that the robots estimate; the robot whose map has most counts.
   """
   alias Hal.Pose
   alias Missions.Explore
-  alias Missions.Explore.Chart
+  alias Missions.Explore.SharedMap
   alias Robot.Navigation.{Grid, Reach, Survey}
   alias Sim.Trial
 
   @share 0.95
   @radius Hal.Profile.magellan().radius
-  # A wall on the chart that is so near to a true one (metres) is one.
+  # A wall on the map that is so near to a true one (metres) is one.
   @near_m 0.3
 
   @typedoc """
   When 95 % of the area were seen, and when all robots said that they are ready (seconds, `nil` for never); the share that
-  was seen in the end; how many of the chart's cells of wall are within 0.3 m of a true wall; how far the worst robot was
+  was seen in the end; how many of the map's cells of wall are within 0.3 m of a true wall; how far the worst robot was
   from where it believed to be at the end.
   """
   @type measured :: %{
@@ -71,15 +71,15 @@ defmodule Bench.Explore do
   end
 
   defp fullest(trial) do
-    charts =
+    maps =
       for id <- Trial.living(trial),
-          %{mission: %Explore{chart: chart}} <- [Trial.robot(trial, id).runner],
-          do: chart
+          %{mission: %Explore{map: map}} <- [Trial.robot(trial, id).runner],
+          do: map
 
-    Enum.max_by(charts, & &1.free)
+    Enum.max_by(maps, & &1.free)
   end
 
-  defp seen(%Chart{tiles: tiles}, area),
+  defp seen(%SharedMap{tiles: tiles}, area),
     do: for({at, states} <- tiles, mask = area[at], reduce: 0, do: (n -> both(states, mask, n)))
 
   defp both(<<0, states::binary>>, <<_, mask::binary>>, n), do: both(states, mask, n)
@@ -131,7 +131,7 @@ defmodule Bench.Explore do
   defp cell({x, y}), do: {floor(x / Survey.cell()), floor(y / Survey.cell())}
 
   defp measure(trial, run, plan, options) do
-    chart = fullest(trial)
+    map = fullest(trial)
     ready? = Trial.formed?(trial)
 
     off =
@@ -148,13 +148,13 @@ defmodule Bench.Explore do
       seen_s: run.seen_s,
       ready_s: if(ready?, do: trial.at_ms / 1_000),
       share: run.share,
-      walls: walls(chart, plan),
+      walls: walls(map, plan),
       off_m: Enum.max(off),
       collisions: Trial.result(trial).collisions
     }
   end
 
-  defp walls(%Chart{tiles: tiles}, plan) do
+  defp walls(%SharedMap{tiles: tiles}, plan) do
     tile = Survey.tile()
 
     near =

@@ -122,7 +122,7 @@ defmodule Robot.Mission do
   @callback commands() :: [atom()]
 
   @doc "The map that the mission has made so far, for a file (`Robot.Navigation.MapFile.save/2`)."
-  @callback map(mission :: term()) :: Robot.Navigation.MapFile.Writer.chart()
+  @callback map(mission :: term()) :: Robot.Navigation.MapFile.Writer.raster()
 
   @optional_callbacks halted: 1,
                       options: 2,

@@ -203,28 +203,13 @@ defmodule Mix.Tasks.Bench do
       {"cases", "NAME,NAME", &Bench.choose/1, "which cases (all)"},
       {"mission", "NAME[:KEY=VALUE,…]", &{:ok, &1},
        "#{Parse.either(Swarm.Missions.names())}: measured is when each robot first claims that it has\nwhat its mission wants (#{hd(Swarm.Missions.names() ++ ["none"])})"},
-      {"maps", "NAME,NAME", &maps/1,
+      {"maps", "NAME,NAME", &MapName.list/1,
        "which maps: names, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:…\n(hall,hospital)"},
       {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
        "painted or direct (painted)"},
       {"markdown", "FILE", &{:ok, &1}, "write the table there too"},
       {"help", nil, nil, "this text"}
     ]
-  end
-
-  defp maps(text) do
-    maps = for name <- String.split(text, ","), do: MapName.parse(name, ".")
-
-    case Enum.find(maps, &(elem(&1, 0) == :error)) do
-      nil ->
-        {:ok, for({:ok, map} <- maps, do: map)}
-
-      {:error, {allowed, hint}} ->
-        {:error, {"some of " <> allowed <> ", with commas between,", hint}}
-
-      {:error, allowed} ->
-        {:error, allowed}
-    end
   end
 
   defp help do
