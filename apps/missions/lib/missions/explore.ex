@@ -223,7 +223,7 @@ defmodule Missions.Explore do
   defp goal(%{ahead: nil}), do: {:goal, :stand, {Behaviour.Stop, []}}
 
   defp goal(%{ahead: {x, y}, goal: n}),
-    do: {:goal, {:go, n}, {Behaviour.Goto, x: x, y: y, tolerance: @tolerance}}
+    do: {:goal, {:go, n}, {Behaviour.Goto, x: x, y: y, tolerance: @tolerance, unmapped: true}}
 
   defp claim(mission) do
     %{
