@@ -48,6 +48,7 @@ defmodule Missions.Explore do
                 still: nil,
                 aside: [],
                 done?: false,
+                told?: false,
                 why: nil,
                 started?: false
               ]
@@ -55,7 +56,7 @@ defmodule Missions.Explore do
   @typedoc """
   `target` is the frontier to which it goes and `ahead` the point of the way there for which it goes now, by goal number
   `goal`. `still` is where it was when it last had moved, and since when; `aside` are places that it gave up, and until
-  when. `peers` are what others told last: when, to where they go, and how far that is.
+  when; `told?` that it has said that all is explored. `peers` are what others told last: when, to where they go, and how far that is.
   """
   @type t :: %__MODULE__{
           me: atom(),
@@ -72,6 +73,7 @@ defmodule Missions.Explore do
           still: {Pose.point(), integer()} | nil,
           aside: [{Pose.point(), until_ms :: integer()}],
           done?: boolean(),
+          told?: boolean(),
           why: String.t() | nil,
           started?: boolean()
         }
@@ -188,7 +190,7 @@ defmodule Missions.Explore do
     first? = Enum.all?(peers, fn {id, _goal} -> mission.me < id end)
 
     stages =
-      if done? and not mission.done? and first?,
+      if done? and not mission.told? and first?,
         do: [
           {:stage, :explored,
            %{says: "says that #{area(mission)} are explored; #{left(mission)}"}}
@@ -201,7 +203,8 @@ defmodule Missions.Explore do
         target: target,
         ahead: target && Frontiers.ahead(field, target, from),
         still: mission.still || {from, now_ms},
-        done?: done?
+        done?: done?,
+        told?: mission.told? or stages != []
     }
 
     {told, map} = SharedMap.tell(mission.map)
