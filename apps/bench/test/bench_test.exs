@@ -46,6 +46,11 @@ defmodule BenchTest do
     assert pooled =~ "at most 0.5 m off, at the claim and 5 s later: 3 of 4 (75.0 %)"
     assert pooled =~ "Least in one case: slip, in hall, 1 of 2 (50.0 %)"
     assert pooled =~ "without a word: 0 (goal 0)"
+
+    # A mission without a leader has no places.
+    unled = [{"six", "hall", 120, [%{run.([]) | leaders: 0}]}]
+    assert Bench.Table.pooled(unled) =~ "nobody had a place"
+    refute Bench.Table.pooled(unled) =~ "without a word"
     assert "slip" in Enum.map(Bench.cases(), & &1.name)
   end
 

@@ -72,6 +72,15 @@ defmodule Bench.Table do
   """
   @spec pooled([{String.t(), String.t(), number(), [Bench.Run.measured()]}]) :: String.t()
   def pooled(rows) do
+    led? = Enum.any?(rows, fn {_, _, _, runs} -> Enum.any?(runs, &(&1.leaders > 0)) end)
+
+    if led?,
+      do: reliable(rows),
+      else:
+        "Nobody led, so nobody had a place in a shape: there is none to claim, or to be short of.\n"
+  end
+
+  defp reliable(rows) do
     judged =
       for {says, map, _limit_s, runs} <- rows,
           {_right, all} = counts = true_claims(runs),

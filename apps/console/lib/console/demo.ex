@@ -5,10 +5,11 @@ defmodule Console.Demo do
   alias Console.{Fleet, Options, Picture, Report, Tables}
   alias Console.Cli.{Format, Output, Progress}
   alias Console.Picture.RunTrack
-  alias Robot.Mission.Runner
+  alias Hal.Pose
   alias Robot.Navigation.MapFile
   alias Sim.{Recorder, Trial}
   alias Sim.Recording.Pictures
+  alias Sim.Trial.Coverage
 
   @progress_ms 100
 
@@ -48,6 +49,7 @@ defmodule Console.Demo do
               pictures: options.record_pictures,
               tables: tables,
               told: 0,
+              starts: for(robot <- scene.robots, do: Pose.point(robot.pose)),
               drawn_ms: started,
               output: output,
               duration_s: Options.duration_s(options)
@@ -216,7 +218,7 @@ defmodule Console.Demo do
     do: "#{scene.leader} leads, formation error #{Format.decimals(mean, 2)} m"
 
   defp finish(run, options, wall_s) do
-    result = run.module.result(run.trial)
+    result = run.trial |> run.module.result() |> Map.put(:seen, seen(run))
     formed? = run.module.scene(run.trial).formed?
     Enum.each(Report.summary(result, formed?, wall_s), &Output.line(run.output, &1))
 
@@ -236,14 +238,14 @@ defmodule Console.Demo do
     end
   end
 
+  defp seen(%{module: Trial} = run), do: Coverage.of(run.trial, run.starts)
+  defp seen(_real_time), do: nil
+
   # That of the robot that knows most: what another one has told last may not have reached all.
   defp save_map(_run, %Options{save_map: nil}), do: :ok
 
   defp save_map(run, %Options{save_map: file}) do
-    maps = for id <- Trial.living(run.trial), do: Runner.map(Trial.robot(run.trial, id).runner)
-    known = fn %{cells: cells} -> for(<<state <- cells>>, state != 0, do: state) |> length() end
-
-    with map when map != nil <- Enum.max_by(maps, known, fn -> nil end),
+    with map when map != nil <- Coverage.fullest(run.trial),
          :ok <- named("--save-map", file, &MapFile.save(&1, map)) do
       Output.line(run.output, "Wrote #{file}")
     else

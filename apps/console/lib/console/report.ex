@@ -17,6 +17,9 @@ defmodule Console.Report do
   @claim ~w(at_s robot worst_m worst_5s_m)a
   @messages ~w(sent lost)a
   @stuck ~w(at_s robot error_m)a
+  # So many robots that are not done are named.
+  @told 4
+
   @robot ~w(name alive state blocked_by x y theta slot error_m uncertainty_m size_ppm)a
 
   @doc """
@@ -48,7 +51,7 @@ defmodule Console.Report do
     [
       outcome(result, formed?) <>
         no_room(result.stages, formed?) <>
-        wrong(result.claims) <> blocked(result.fleet) <> unsure(result.fleet),
+        wrong(result.claims) <> blocked(result.fleet) <> unsure(result.fleet) <> seen(result),
       safety(result),
       leadership(result),
       "#{Format.decimals(result.simulated_s, 1)} s simulated in #{Format.decimals(wall_s, 1)} s" <>
@@ -101,9 +104,12 @@ defmodule Console.Report do
 
   defp outcome(%{leader: nil, mission: mission} = result, formed?)
        when mission not in [nil, "landmark"] do
-    does = if formed?, do: "has what it wants", else: "does not have what it wants"
-    living = Enum.count(result.fleet, & &1.alive)
-    "The #{mission} of #{Format.count(living, "robot")} #{does}."
+    living = Enum.filter(result.fleet, & &1.alive)
+    fleet = "The #{mission} of #{Format.count(length(living), "robot")}"
+
+    if formed?,
+      do: "#{fleet} has what it wants.",
+      else: "#{fleet} does not have what it wants" <> short(Enum.reject(living, & &1.formed?))
   end
 
   defp outcome(%{leader: nil} = result, _formed?),
@@ -118,6 +124,24 @@ defmodule Console.Report do
 
   defp outcome(%{formation: formation} = result, false),
     do: "Not in formation: #{formation.kind} led by #{result.leader}#{error(formation)}."
+
+  # Who does not claim `formed`, in the mission's own words.
+  defp short([]), do: "."
+
+  defp short(robots) do
+    {told, others} = Enum.split(robots, @told)
+    more = if others == [], do: "", else: "; and #{length(others)} more"
+
+    ": " <>
+      Enum.map_join(told, "; ", &"#{&1.name} is not done (#{&1.says || &1.state})") <> more <> "."
+  end
+
+  defp seen(%{seen: %{area_m2: area_m2, share: share}}) do
+    " Seen: #{Format.decimals(share * area_m2, 0)} of the #{Format.decimals(area_m2, 0)} m² " <>
+      "that a robot can come to (#{Format.decimals(100 * share, 1)} %)."
+  end
+
+  defp seen(_without_a_map), do: ""
 
   # The one that was asked for, unless there was no room for it.
   defp shape(formation, stages) do

@@ -81,6 +81,14 @@ defmodule Console.DemoTest do
     options = Runs.options(line <> " --blobs direct", words)
     {_status, text} = with_io(fn -> Demo.run(options, Sim.Trial) end)
     assert text =~ "Wrote #{options.save_map}"
+    assert text =~ ~r/does not have what it wants: mag1 is not done \(\d+ m² explored, .+\)\./
+
+    assert [_, seen, all, percent] =
+             Regex.run(~r/ Seen: (\d+) of the (\d+) m² .+ \((.+) %\)/, text)
+
+    assert_in_delta String.to_float(percent),
+                    100 * String.to_integer(seen) / String.to_integer(all),
+                    1.0
 
     assert {:ok, %{grid: grid}} = Robot.Navigation.MapFile.open(options.save_map)
     assert {:ok, true_map} = Sim.Floorplan.open("doorway", 1)

@@ -3,16 +3,16 @@ defmodule Missions.Explore do
   The exploration: robots that see all of a building that they do not know, and make its map together (R92). Pure; written
   with the interface of `Robot.Mission` alone.
 
-  Each robot keeps a chart of what its sonars have seen and of what others tell (`Missions.Explore.Chart`), by the poses that
+  Each robot keeps a map of what its sonars have seen and of what others tell (`Missions.Explore.SharedMap`), by the poses that
   they estimate. Once a second it looks for the frontiers of what is known (`.Frontiers`), chooses one (`.Choice`), and tells
-  the others to where it goes, how far that is, and what it has seen. Its ways are those of its chart, whatever floor plan it
+  the others to where it goes, how far that is, and what it has seen. Its ways are those of its map, whatever floor plan it
   has been given.
 
   Its phases are `:explore`, and `:explored` while no frontier is left that it can reach; then it claims `formed`. A place to
   which it came no nearer is left alone for a while, and for ever the second time. Options: `Missions.Explore.Options`.
   """
   alias Hal.Pose
-  alias Missions.Explore.{Chart, Choice, Frontiers, Options}
+  alias Missions.Explore.{Choice, Frontiers, Options, SharedMap}
   alias Robot.Behaviour
 
   @behaviour Robot.Mission
@@ -36,7 +36,7 @@ defmodule Missions.Explore do
   @enforce_keys [:me, :within]
   defstruct @enforce_keys ++
               [
-                chart: Chart.new(),
+                map: SharedMap.new(),
                 home: nil,
                 now_ms: nil,
                 since_ms: nil,
@@ -48,6 +48,7 @@ defmodule Missions.Explore do
                 still: nil,
                 aside: [],
                 done?: false,
+                told?: false,
                 why: nil,
                 started?: false
               ]
@@ -55,12 +56,12 @@ defmodule Missions.Explore do
   @typedoc """
   `target` is the frontier to which it goes and `ahead` the point of the way there for which it goes now, by goal number
   `goal`. `still` is where it was when it last had moved, and since when; `aside` are places that it gave up, and until
-  when. `peers` are what others told last: when, to where they go, and how far that is.
+  when; `told?` that it has said that all is explored. `peers` are what others told last: when, to where they go, and how far that is.
   """
   @type t :: %__MODULE__{
           me: atom(),
           within: float(),
-          chart: Chart.t(),
+          map: SharedMap.t(),
           home: Pose.point() | nil,
           now_ms: integer() | nil,
           since_ms: integer() | nil,
@@ -72,6 +73,7 @@ defmodule Missions.Explore do
           still: {Pose.point(), integer()} | nil,
           aside: [{Pose.point(), until_ms :: integer()}],
           done?: boolean(),
+          told?: boolean(),
           why: String.t() | nil,
           started?: boolean()
         }
@@ -92,7 +94,7 @@ defmodule Missions.Explore do
      seen: [
        goal: [{:or, nil, @place}, required: true],
        far_mm: [{:integer, 0, 10_000_000, "mm"}, required: true],
-       tiles: [{:check, &Chart.told?/1, "tiles of a chart"}, required: true]
+       tiles: [{:check, &SharedMap.told?/1, "tiles of a map"}, required: true]
      ]}
   end
 
@@ -100,13 +102,13 @@ defmodule Missions.Explore do
   def init(robot, options),
     do: {:idle, %__MODULE__{me: robot, within: options[:within] * 1.0}, []}
 
-  # The chart is what a stop must not lose.
+  # The map is what a stop must not lose.
   @impl Robot.Mission
   def halted(mission),
-    do: struct!(__MODULE__, mission |> Map.take([:me, :within, :chart, :home]) |> Map.to_list())
+    do: struct!(__MODULE__, mission |> Map.take([:me, :within, :map, :home]) |> Map.to_list())
 
   @impl Robot.Mission
-  def map(mission), do: Chart.map(mission.chart)
+  def map(mission), do: SharedMap.raster(mission.map)
 
   @impl Robot.Mission
   def handle({:command, :start}, mission), do: result(%{mission | started?: true}, [])
@@ -128,7 +130,7 @@ defmodule Missions.Explore do
       | now_ms: percept.at_ms,
         since_ms: mission.since_ms || percept.at_ms,
         home: mission.home || Pose.point(percept.pose),
-        chart: Chart.look(mission.chart, percept)
+        map: SharedMap.look(mission.map, percept)
     }
 
     {mission, effects} = mission |> move(Pose.point(percept.pose)) |> plan(percept)
@@ -144,13 +146,13 @@ defmodule Missions.Explore do
   defp phase(_mission), do: :explore
 
   defp hear(mission, from, said) do
-    chart = Chart.hear(mission.chart, said.tiles)
+    map = SharedMap.hear(mission.map, said.tiles)
 
     if is_map_key(mission.peers, from) or map_size(mission.peers) < @most_peers do
       goal = with {x, y} <- said.goal, do: {from, {x / 1_000, y / 1_000}, said.far_mm / 1_000}
-      %{mission | chart: chart, peers: Map.put(mission.peers, from, {mission.now_ms, goal})}
+      %{mission | map: map, peers: Map.put(mission.peers, from, {mission.now_ms, goal})}
     else
-      %{mission | chart: chart}
+      %{mission | map: map}
     end
   end
 
@@ -180,7 +182,7 @@ defmodule Missions.Explore do
   defp plan(%{now_ms: now_ms} = mission, percept) do
     from = Pose.point(percept.pose)
     peers = for {id, {at_ms, goal}} <- mission.peers, now_ms - at_ms < @silent_ms, do: {id, goal}
-    field = mission.chart |> Chart.raster() |> Frontiers.find(from, percept.profile.radius)
+    field = mission.map |> SharedMap.raster() |> Frontiers.find(from, percept.profile.radius)
     open = if field, do: Enum.filter(field.found, &open?(mission, &1)), else: []
     goals = for {_id, goal} <- Enum.sort(peers), goal != nil, do: goal
     target = Choice.of(open, mission.me, mission.target && mission.target.at, goals)
@@ -188,7 +190,7 @@ defmodule Missions.Explore do
     first? = Enum.all?(peers, fn {id, _goal} -> mission.me < id end)
 
     stages =
-      if done? and not mission.done? and first?,
+      if done? and not mission.told? and first?,
         do: [
           {:stage, :explored,
            %{says: "says that #{area(mission)} are explored; #{left(mission)}"}}
@@ -201,11 +203,12 @@ defmodule Missions.Explore do
         target: target,
         ahead: target && Frontiers.ahead(field, target, from),
         still: mission.still || {from, now_ms},
-        done?: done?
+        done?: done?,
+        told?: mission.told? or stages != []
     }
 
-    {told, chart} = Chart.tell(mission.chart)
-    {%{mission | chart: chart}, stages ++ [{:tell, :all, :seen, said(target, told)}]}
+    {told, map} = SharedMap.tell(mission.map)
+    {%{mission | map: map}, stages ++ [{:tell, :all, :seen, said(target, told)}]}
   end
 
   defp open?(%{home: {hx, hy}} = mission, %{at: {x, y} = at}) do
@@ -223,7 +226,7 @@ defmodule Missions.Explore do
   defp goal(%{ahead: nil}), do: {:goal, :stand, {Behaviour.Stop, []}}
 
   defp goal(%{ahead: {x, y}, goal: n}),
-    do: {:goal, {:go, n}, {Behaviour.Goto, x: x, y: y, tolerance: @tolerance}}
+    do: {:goal, {:go, n}, {Behaviour.Goto, x: x, y: y, tolerance: @tolerance, unmapped: true}}
 
   defp claim(mission) do
     %{
@@ -250,5 +253,5 @@ defmodule Missions.Explore do
     end
   end
 
-  defp area(mission), do: "#{round(Chart.area(mission.chart))} m²"
+  defp area(mission), do: "#{round(SharedMap.area(mission.map))} m²"
 end

@@ -2,16 +2,16 @@ defmodule Missions.ExploreTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Options, Pose, Profile, Twist}
   alias Missions.Explore
-  alias Missions.Explore.{Chart, Choice, Frontiers}
+  alias Missions.Explore.{Choice, Frontiers, SharedMap}
   alias Robot.Mission.{Letter, Runner}
   alias Robot.Navigation.Survey
   alias Robot.Percept
-  doctest Chart
+  doctest SharedMap
   doctest Choice
 
   @tile Survey.tile()
 
-  # A chart drawn from the top, a letter for 40 cm: . free, # wall, blank unknown. Its lower left corner is the origin.
+  # A map drawn from the top, a letter for 40 cm: . free, # wall, blank unknown. Its lower left corner is the origin.
   defp drawn(rows) do
     wide = rows |> hd() |> String.length()
 
@@ -52,7 +52,7 @@ defmodule Missions.ExploreTest do
     closed = for row <- @room, do: String.replace(row, " ", "#")
     assert find(closed).found == []
     assert find(closed, {9.0, 9.0}) == nil
-    assert Frontiers.find(Chart.raster(Chart.new()), {0.0, 0.0}, 0.2) == nil
+    assert Frontiers.find(SharedMap.raster(SharedMap.new()), {0.0, 0.0}, 0.2) == nil
   end
 
   test "a way round a corner goes for what the robot sees of it" do
@@ -101,39 +101,40 @@ defmodule Missions.ExploreTest do
   end
 
   defp looked(pose),
-    do: Enum.reduce(0..3, Chart.new(), &Chart.look(&2, percept(&1 * 1_000, pose)))
+    do: Enum.reduce(0..3, SharedMap.new(), &SharedMap.look(&2, percept(&1 * 1_000, pose)))
 
-  defp tell_all(chart, times),
-    do: Enum.map_reduce(1..times, chart, fn _, chart -> Chart.tell(chart) end) |> elem(0)
+  defp tell_all(map, times),
+    do: Enum.map_reduce(1..times, map, fn _, map -> SharedMap.tell(map) end) |> elem(0)
 
   test "what one has seen the other knows in the end, whatever was lost, also from a third one" do
     one = looked(Pose.new(0, 0))
     other = looked(Pose.new(6, 0))
-    assert Chart.area(one) > 5.0
+    assert SharedMap.area(one) > 5.0
 
-    joined = one |> tell_all(12) |> Enum.drop_every(2) |> Enum.reduce(other, &Chart.hear(&2, &1))
+    joined =
+      one |> tell_all(12) |> Enum.drop_every(2) |> Enum.reduce(other, &SharedMap.hear(&2, &1))
 
     assert Map.take(joined.tiles, Map.keys(one.tiles)) |> map_size() == map_size(one.tiles)
-    assert_in_delta Chart.area(joined), Chart.area(one) + Chart.area(other), 0.5
-    third = joined |> tell_all(24) |> Enum.reduce(looked(Pose.new(3, 9)), &Chart.hear(&2, &1))
+    assert_in_delta SharedMap.area(joined), SharedMap.area(one) + SharedMap.area(other), 0.5
+    third = joined |> tell_all(24) |> Enum.reduce(looked(Pose.new(3, 9)), &SharedMap.hear(&2, &1))
 
     assert Map.take(third.tiles, Map.keys(one.tiles)) ==
              Map.take(joined.tiles, Map.keys(one.tiles))
   end
 
   test "its own eyes count for more than what it is told, and what was told last for more than what before" do
-    chart = looked(Pose.new(0, 0))
+    map = looked(Pose.new(0, 0))
     at = Survey.tile_of({0.0, 0.0})
     tile = fn state -> for(_ <- 1..(@tile * @tile), into: <<>>, do: <<state::2>>) end
     told = fn {i, j}, state -> <<i::signed-16, j::signed-16, tile.(state)::binary>> end
 
-    assert :binary.match(Chart.hear(chart, told.(at, 2)).tiles[at], <<1>>) != :nomatch
+    assert :binary.match(SharedMap.hear(map, told.(at, 2)).tiles[at], <<1>>) != :nomatch
     far = {9, 9}
-    heard = chart |> Chart.hear(told.(far, 2)) |> Chart.hear(told.(far, 1))
+    heard = map |> SharedMap.hear(told.(far, 2)) |> SharedMap.hear(told.(far, 1))
     assert heard.tiles[far] == :binary.copy(<<1>>, @tile * @tile)
     # What is unknown to another one is not forgotten, and what is too far away is not heard.
-    assert Chart.hear(heard, told.(far, 0)).tiles == heard.tiles
-    assert Chart.hear(heard, told.({31, 0}, 1)).tiles == heard.tiles
+    assert SharedMap.hear(heard, told.(far, 0)).tiles == heard.tiles
+    assert SharedMap.hear(heard, told.({31, 0}, 1)).tiles == heard.tiles
   end
 
   defp explore(options \\ []) do
@@ -214,10 +215,10 @@ defmodule Missions.ExploreTest do
     assert map_size(crowd.mission.peers) == 256
   end
 
-  test "a stop keeps the chart for the next start" do
+  test "a stop keeps the map for the next start" do
     {runner, _effects} = ticks(explore(), 0..20, Pose.new(0, 0))
     {:ok, resumed} = runner |> Runner.halt() |> Runner.resume()
-    assert resumed.mission.chart == runner.mission.chart
+    assert resumed.mission.map == runner.mission.map
     {resumed, []} = Runner.handle(resumed, {:command, :start})
     assert Runner.state(resumed) == {Explore, :explore}
   end

@@ -62,6 +62,7 @@ defmodule Missions.NamedTest do
           {"tabled:loop=cross,period=90", [loop: :cross, period: 90.0]},
           {"tabled: back = on , say=hello", [back: true, say: "hello"]},
           {"tabled:back=off,say=5", [back: false, say: "5"]},
+          {"tabled:say=a nice loop=", [say: "a nice loop="]},
           {"tabled:points=[{1,2},{3.5,-4}],loop=square", [points: [{1.0, 2.0}, {3.5, -4.0}]]}
         ] do
       assert {:ok, {Tabled, read}} = Text.read(text, 4)
@@ -79,6 +80,12 @@ defmodule Missions.NamedTest do
           {"tabled:lop=square",
            "tabled option lop is not known: allowed are loop, period, points, say, back; did you mean loop?"},
           {"tabled:period=90,period=80", "tabled option period is given twice"},
+          {"tabled:points=[{1,2}]:period=90",
+           ~s(tabled: options are separated by a comma, not by ":": …,period=…)},
+          {"tabled:period=90 loop=cross",
+           ~s(tabled: options are separated by a comma, not by " ": …,loop=…)},
+          {"tabled:period=90;loop=cross",
+           ~s(tabled: options are separated by a comma, not by ";": …,loop=…)},
           {"tabled:period", ~s(tabled: "period" is no option: KEY=VALUE,… is allowed)},
           {"tabled:period=halt()",
            "tabled option period cannot be \"halt()\": a number from 10 to 600 s is allowed"}

@@ -45,6 +45,8 @@ defmodule Robot.Behaviour do
       {:error, "Robot.Behaviour.Goto: goto option x cannot be :far: a number from -1.0e6 to 1.0e6 m is allowed"}
       iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: 1.0, y: 2.0, discs: :junk})
       {:error, "option discs cannot be :junk: [{x, y, radius}] in metres is allowed"}
+      iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: 1.0, y: 2.0, unmapped: 1})
+      {:error, "option unmapped cannot be 1: true or false is allowed"}
       iex> {:error, line} = Robot.Behaviour.check({Robot.Behaviour.Follow, target: %Hal.Pose{x: :far, y: 0.0, heading: 0.0}})
       iex> line =~ "option target cannot be %Hal.Pose{" and line =~ ": a %Hal.Pose{} in metres and radians is allowed"
       true
@@ -59,7 +61,9 @@ defmodule Robot.Behaviour do
 
       Code.ensure_loaded?(module) and function_exported?(module, :new, 1) and
           function_exported?(module, :tick, 2) ->
-        with :ok <- discs(options), do: made(module, Keyword.delete(options, :discs))
+        with :ok <- discs(options),
+             :ok <- unmapped(options[:unmapped]),
+             do: made(module, Keyword.drop(options, [:discs, :unmapped]))
 
       true ->
         {:error,
@@ -70,7 +74,7 @@ defmodule Robot.Behaviour do
   def check(other),
     do: {:error, "#{brief(other)} is not a goal: {module, options} or nil is allowed"}
 
-  # Every goal accepts this option in addition to its own (`Robot.Behaviour.Avoid`).
+  # Every goal accepts these options in addition to its own (`Robot.Behaviour.Avoid`).
   defp discs(options) do
     discs = Keyword.get(options, :discs, [])
 
@@ -79,6 +83,11 @@ defmodule Robot.Behaviour do
       else:
         {:error, "option discs cannot be #{brief(discs)}: [{x, y, radius}] in metres is allowed"}
   end
+
+  defp unmapped(unmapped?) when unmapped? in [nil, true, false], do: :ok
+
+  defp unmapped(other),
+    do: {:error, "option unmapped cannot be #{brief(other)}: true or false is allowed"}
 
   @doc "Whether a term is a list of discs to avoid: `[{x, y, radius}]` in the map frame, metres."
   @spec discs?(term()) :: boolean()

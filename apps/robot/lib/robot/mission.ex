@@ -99,7 +99,7 @@ defmodule Robot.Mission do
   The version of what a mission claims, and the module of the struct that it is. Its `valid?/1` says whether one from outside,
   which has the right keys, makes sense.
   """
-  @type claims :: {version :: pos_integer(), struct :: module()}
+  @type claims :: {version :: 1..65_535, struct :: module()}
 
   @doc """
   What every heartbeat of a robot says of this mission beside its phase, whether it stands, and whom it follows
@@ -122,7 +122,7 @@ defmodule Robot.Mission do
   @callback commands() :: [atom()]
 
   @doc "The map that the mission has made so far, for a file (`Robot.Navigation.MapFile.save/2`)."
-  @callback map(mission :: term()) :: Robot.Navigation.MapFile.Writer.chart()
+  @callback map(mission :: term()) :: Robot.Navigation.MapFile.Writer.raster()
 
   @optional_callbacks halted: 1,
                       options: 2,
@@ -171,7 +171,7 @@ defmodule Robot.Mission do
 
   @doc """
   The options of a start, checked and completed by the mission, or else by its table; the error is
-  one line.
+  one line. A mission whose claims no robot could check is refused as well (`Robot.Mission.Claim.fault/1`).
 
       iex> Robot.Mission.check_options(Robot.Mission.Manual, [speed: 1], nil)
       {:error, "manual takes no options"}
@@ -180,8 +180,12 @@ defmodule Robot.Mission do
           {:ok, keyword()} | {:error, line :: String.t()}
   def check_options(module, options, robots) do
     _loaded? = Code.ensure_loaded?(module)
+    fault = Robot.Mission.Claim.fault(module)
 
     cond do
+      fault != nil ->
+        {:error, "#{subject(module)} #{fault}"}
+
       function_exported?(module, :options, 2) ->
         checked(module, module.options(options, robots))
 

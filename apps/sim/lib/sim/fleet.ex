@@ -111,9 +111,10 @@ defmodule Sim.Fleet do
 
     case module.start(setup, Keyword.take(Map.to_list(own), [:trace])) do
       {:ok, backend} ->
-        epoch_ms = System.monotonic_time(:millisecond)
-
-        {:ok, begun(setup, {module, backend}, epoch_ms), {:continue, {:begin, own.mission}}}
+        s = begun(setup, {module, backend}, System.monotonic_time(:millisecond))
+        # Before anybody can order something else: this start would take its place.
+        if own.mission, do: ask(s, :begin)
+        {:ok, s}
 
       {:error, line} ->
         send(caller, {answer, line})
@@ -132,12 +133,6 @@ defmodule Sim.Fleet do
       ended: nil,
       ticker: Ticker.start(:tick, @period_ms, @period_ms)
     }
-  end
-
-  @impl GenServer
-  def handle_continue({:begin, mission?}, s) do
-    if mission?, do: ask(s, :begin)
-    {:noreply, s}
   end
 
   @impl GenServer

@@ -122,9 +122,9 @@ defmodule Sim.Trial do
   @spec done?(t()) :: boolean()
   def done?(%__MODULE__{} = trial), do: Termination.reached?(trial)
 
-  @doc "Whether the fleet is in formation now, by its own judgement."
+  @doc "Whether the fleet has what its mission wants now, by its own judgement: a leader says so, or all robots do."
   @spec formed?(t()) :: boolean()
-  def formed?(trial), do: Enum.any?(claims(trial), fn {_id, claim} -> claim[:formed] == true end)
+  def formed?(trial), do: RunLog.formed?(trial.run_log)
 
   @doc "The current scene for viewers."
   @spec scene(t()) :: Scene.t()

@@ -96,6 +96,21 @@ defmodule Sim.ReplacementTest do
     Fleet.stop(fleet)
   end
 
+  test "who orders another mission as soon as the fleet is there is not overtaken by its first start",
+       %{fleet: fleet} do
+    Fleet.stop(fleet)
+    {:ok, fleet} = Fleet.start_link(robots: @ids, landmark: :none, mission: :patrol)
+    assert order(fn -> Swarm.replace(:all, :flock) end) == :ok
+    told(:replaced)
+
+    for id <- @ids,
+        do: eventually(fn -> Swarm.status(id).state in [:gather, :flock, :arrived] end)
+
+    told(:kept)
+    for id <- @ids, do: assert(Swarm.status(id).state in [:gather, :flock, :arrived])
+    Fleet.stop(fleet)
+  end
+
   @tag long: true, realtime: :long
   test "new code of the patrol comes while it drives; a wrong version goes back on all; the fleet's end returns to the release",
        %{fleet: fleet} do

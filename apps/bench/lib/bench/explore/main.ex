@@ -112,21 +112,11 @@ defmodule Bench.Explore.Main do
   defp table do
     [
       {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds, one run each (1-5)"},
-      {"maps", "NAME,NAME", &maps/1,
+      {"maps", "NAME,NAME", &MapName.list/1,
        "which maps: names, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:…\n(#{Enum.join(@maps, ",")})"},
       {"duration", "S", &Parse.whole(&1, 1..100_000), "simulated seconds at most (#{@limit_s})"},
       {"help", nil, nil, "this text"}
     ]
-  end
-
-  defp maps(text) do
-    maps = for name <- String.split(text, ","), do: MapName.parse(name, ".")
-
-    case Enum.find(maps, &(elem(&1, 0) == :error)) do
-      nil -> {:ok, for({:ok, map} <- maps, do: map)}
-      {:error, {allowed, _hint}} -> {:error, "some of " <> allowed <> ", with commas between,"}
-      {:error, allowed} -> {:error, allowed}
-    end
   end
 
   defp help, do: IO.puts("  mix bench explore [options]\n\n#{Cli.Arguments.help(table())}")

@@ -146,7 +146,7 @@ defmodule Mix.Tasks.Bench do
 
   defp measure(given) do
     output = Output.to(:stderr)
-    cases = Map.get(given, "cases", Bench.cases())
+    cases = given |> Map.get("cases", Bench.cases()) |> without_landmark(given["landmark"])
     maps = Map.get(given, "maps", ["hall", "hospital"])
     seeds = Map.get(given, "seeds", 1..40)
     blobs = Map.get(given, "blobs", :painted)
@@ -177,6 +177,9 @@ defmodule Mix.Tasks.Bench do
     if failed != [], do: refuse(failed)
   end
 
+  defp without_landmark(cases, nil), do: cases
+  defp without_landmark(cases, :none), do: Enum.map(cases, &put_in(&1.options[:landmark], :none))
+
   defp job({case, map, seed}, blobs) do
     Sim.Trial.Memory.prepare()
     Bench.Run.run(case, map, seed, blobs, Sim.Trial)
@@ -203,28 +206,15 @@ defmodule Mix.Tasks.Bench do
       {"cases", "NAME,NAME", &Bench.choose/1, "which cases (all)"},
       {"mission", "NAME[:KEY=VALUE,…]", &{:ok, &1},
        "#{Parse.either(Swarm.Missions.names())}: measured is when each robot first claims that it has\nwhat its mission wants (#{hd(Swarm.Missions.names() ++ ["none"])})"},
-      {"maps", "NAME,NAME", &maps/1,
+      {"landmark", "none", &Parse.choice(&1, none: :none),
+       "none stands anywhere (it stands in the middle, or in the nearest room\nthat takes the fleet, and is an obstacle)"},
+      {"maps", "NAME,NAME", &MapName.list/1,
        "which maps: names, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:…\n(hall,hospital)"},
       {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
        "painted or direct (painted)"},
       {"markdown", "FILE", &{:ok, &1}, "write the table there too"},
       {"help", nil, nil, "this text"}
     ]
-  end
-
-  defp maps(text) do
-    maps = for name <- String.split(text, ","), do: MapName.parse(name, ".")
-
-    case Enum.find(maps, &(elem(&1, 0) == :error)) do
-      nil ->
-        {:ok, for({:ok, map} <- maps, do: map)}
-
-      {:error, {allowed, hint}} ->
-        {:error, {"some of " <> allowed <> ", with commas between,", hint}}
-
-      {:error, allowed} ->
-        {:error, allowed}
-    end
   end
 
   defp help do

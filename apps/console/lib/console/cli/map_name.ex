@@ -24,6 +24,29 @@ defmodule Console.Cli.MapName do
     end
   end
 
+  @doc """
+  Several of them, with commas between.
+
+      iex> Console.Cli.MapName.list("hall,floor.png:16x12")
+      {:ok, ["hall", "floor.png:16x12"]}
+  """
+  @spec list(String.t()) ::
+          {:ok, [String.t()]} | {:error, String.t() | {String.t(), hint :: String.t()}}
+  def list(text) do
+    maps = for name <- String.split(text, ","), do: parse(name, ".")
+
+    case Enum.find(maps, &(elem(&1, 0) == :error)) do
+      nil ->
+        {:ok, for({:ok, map} <- maps, do: map)}
+
+      {:error, {allowed, hint}} ->
+        {:error, {"some of " <> allowed <> ", with commas between,", hint}}
+
+      {:error, allowed} ->
+        {:error, allowed}
+    end
+  end
+
   @doc "The names of the built-in maps in lines, for a help text."
   @spec names() :: String.t()
   def names, do: Maps.names() |> Enum.chunk_every(7) |> Enum.map_join(",\n", &Enum.join(&1, ", "))

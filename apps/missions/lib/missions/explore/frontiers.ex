@@ -11,8 +11,8 @@ defmodule Missions.Explore.Frontiers do
   that a door seems too narrow until the robot stands before it and looks through.
   """
   alias Hal.Pose
-  alias Missions.Explore.Chart
   alias Robot.Navigation.{Grid, Reach, Survey}
+  alias Robot.Navigation.MapFile.Writer
 
   # A square has two cells a side.
   @square 2 * Survey.cell()
@@ -62,8 +62,8 @@ defmodule Missions.Explore.Frontiers do
           found: [frontier()]
         }
 
-  @doc "All frontiers of a robot that is there; `nil` if it has no room on the chart."
-  @spec find(Chart.raster(), Pose.point(), radius :: float()) :: t() | nil
+  @doc "All frontiers of a robot that is there; `nil` if it has no room on the map."
+  @spec find(Writer.raster(), Pose.point(), radius :: float()) :: t() | nil
   def find(%{width: 0}, _from, _radius), do: nil
 
   def find(raster, from, radius) do

@@ -7,9 +7,9 @@ defmodule Missions.Explore.Options do
   | `within:` | how far from where it began a robot explores, metres to each side | 48 |
   """
   alias Hal.Options
-  alias Missions.Explore.Chart
+  alias Missions.Explore.SharedMap
 
   @doc "The table of the options: what is allowed."
   @spec table() :: Options.table()
-  def table, do: [within: [{:number, 3, Chart.far(), "m"}, default: Chart.far()]]
+  def table, do: [within: [{:number, 3, SharedMap.far(), "m"}, default: SharedMap.far()]]
 end

@@ -12,7 +12,8 @@ defmodule Robot.Behaviour.Avoid do
   `by: :blocked`. If nothing is near, a wish within the profile's speed passes unchanged.
 
   Options: `inner`, the behaviour (required); `discs`, further standing obstacles,
-  `[{x, y, radius}]` in the map frame, metres.
+  `[{x, y, radius}]` in the map frame, metres; `unmapped`, that the robot is where walls are that nobody has told of
+  (`.Caution`).
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
@@ -24,6 +25,7 @@ defmodule Robot.Behaviour.Avoid do
     Brake,
     Caution,
     Clearance,
+    Echoes,
     GiveWay,
     Neighbours,
     Preference,
@@ -41,8 +43,11 @@ defmodule Robot.Behaviour.Avoid do
   def new(options) do
     table = [
       inner: [{:check, &match?({_, _}, &1), "a behaviour"}, required: true],
-      discs: [{:check, &Behaviour.discs?/1, "[{x, y, radius}]"}, default: []]
+      discs: [{:check, &Behaviour.discs?/1, "[{x, y, radius}]"}, default: []],
+      unmapped: [:boolean, default: false]
     ]
+
+    {unmapped?, options} = options |> Options.check!(table, "avoid") |> Keyword.pop!(:unmapped)
 
     state = %{
       progress: nil,
@@ -51,21 +56,26 @@ defmodule Robot.Behaviour.Avoid do
       standing: %{},
       backing?: false,
       velocity: nil,
-      yield: nil
+      yield: nil,
+      echoes: if(unmapped?, do: %Echoes{})
     }
 
-    {__MODULE__, Enum.into(Options.check!(options, table, "avoid"), state)}
+    {__MODULE__, Enum.into(options, state)}
   end
 
   @impl Behaviour
   def update(options, state) do
-    {discs, inner_options} = Keyword.pop(options, :discs, state.discs)
+    {discs, options} = Keyword.pop(options, :discs, state.discs)
+    inner_options = Keyword.delete(options, :unmapped)
     {__MODULE__, %{state | discs: discs, inner: Behaviour.update(state.inner, inner_options)}}
   end
 
   @impl Behaviour
   def tick(percept, state) do
-    if Caution.needed?(percept, state.discs),
+    {slow?, echoes} = Caution.check(percept, state.discs, state.echoes)
+    state = %{state | echoes: echoes}
+
+    if slow?,
       do: drive(Caution.percept(percept), state, &Caution.wish/1),
       else: drive(percept, state, & &1)
   end

@@ -12,7 +12,8 @@ defmodule Robot.Control.Controller do
   else where the mission last ordered it.
 
   In addition to its behaviour's own options a goal takes `discs: [{x, y, radius}]`: standing
-  obstacles to avoid, in the map frame, metres.
+  obstacles to avoid, in the map frame, metres; and `unmapped: true`, that an echo which stays where it is may be a wall that
+  nobody knows (`Robot.Behaviour.Avoid`).
   """
   alias Hal.Profile
   alias Robot.{Behaviour, Localiser, Mission, Percept, Wish}
@@ -102,9 +103,9 @@ defmodule Robot.Control.Controller do
     }
 
   def goal(%__MODULE__{} = controller, tag, {module, options}) do
-    {discs, options} = Keyword.pop(options, :discs, [])
-    goal = Avoid.new(inner: module.new(options), discs: discs)
-    %{controller | tag: tag, module: module, goal: goal, discs: discs}
+    {own, options} = Keyword.split(options, [:discs, :unmapped])
+    goal = Avoid.new([inner: module.new(options)] ++ own)
+    %{controller | tag: tag, module: module, goal: goal, discs: own[:discs] || []}
   end
 
   @doc "Sets the references for the estimate of the pose."

@@ -86,7 +86,7 @@ defmodule Robot.Control.Pilot do
   def resume(robot), do: call(robot, :resume)
 
   @doc "The map that the mission has made, also one that was stopped; `nil` of one that makes none."
-  @spec map(robot :: atom()) :: Robot.Navigation.MapFile.Writer.chart() | nil
+  @spec map(robot :: atom()) :: Robot.Navigation.MapFile.Writer.raster() | nil
   def map(robot), do: call(robot, :map)
 
   @doc "Hands a command to the mission. `:ok` means that the mission got it, not that it is done."

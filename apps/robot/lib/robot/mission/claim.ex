@@ -29,6 +29,34 @@ defmodule Robot.Mission.Claim do
   end
 
   @doc """
+  What is wrong with what a mission names for its claims: others could not check it. `nil` if nothing is.
+
+      iex> Robot.Mission.Claim.fault(Robot.Mission.Manual)
+      nil
+  """
+  @spec fault(module()) :: String.t() | nil
+  def fault(mission) do
+    case claims(mission) do
+      nil -> nil
+      {version, said} when version in 1..@latest and is_atom(said) -> struct_fault(said)
+      other -> "claims/0 returned #{inspect(other)}: {version, module of a struct} is allowed"
+    end
+  end
+
+  defp struct_fault(said) do
+    cond do
+      not loaded?(said) or not function_exported?(said, :__struct__, 0) ->
+        "claims #{inspect(said)}, which is no struct of this build"
+
+      not function_exported?(said, :valid?, 1) ->
+        "claims #{inspect(said)}, which lacks valid?/1: whether one from outside makes sense"
+
+      true ->
+        nil
+    end
+  end
+
+  @doc """
   What a claim from outside is worth: itself, if its mission's own checks allow it; `nil`, if this build has no such mission or
   another version of it.
 

@@ -102,7 +102,7 @@ defmodule Robot.Mission.Runner do
     do: if(function_exported?(module, :explain, 1), do: module.explain(mission), else: [])
 
   @doc "The map that the mission has made, also one that a stop has left; `nil` of one that makes none."
-  @spec map(t()) :: Robot.Navigation.MapFile.Writer.chart() | nil
+  @spec map(t()) :: Robot.Navigation.MapFile.Writer.raster() | nil
   def map(%__MODULE__{module: nil, halted: nil}), do: nil
   def map(%__MODULE__{module: nil, halted: {module, mission}}), do: map(module, mission)
   def map(%__MODULE__{module: module, mission: mission}), do: map(module, mission)

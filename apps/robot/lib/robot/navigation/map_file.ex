@@ -42,7 +42,7 @@ defmodule Robot.Navigation.MapFile do
   Writes a map that robots have made (`c:Robot.Mission.map/1`): `FILE.yaml`, and the picture `FILE.pgm` beside it. The error is
   one line.
   """
-  @spec save(Path.t(), Writer.chart()) :: :ok | {:error, line :: String.t()}
+  @spec save(Path.t(), Writer.raster()) :: :ok | {:error, line :: String.t()}
   def save(file, map) do
     image = Path.rootname(file) <> ".pgm"
     {yaml, pgm} = Writer.encode(map, Path.basename(image))

@@ -5,6 +5,8 @@ defmodule Robot.Behaviour.CautionTest do
   alias Robot.{Acts, Behaviour, Percept}
   alias Robot.Behaviour.{Avoid, Goto}
 
+  doctest Robot.Behaviour.Avoid.Echoes
+
   defp percept(lost?, peers) do
     %Percept{
       robot: :mag1,
@@ -72,6 +74,38 @@ defmodule Robot.Behaviour.CautionTest do
 
     for percept <- slow, do: assert(speed(inner, percept) == 0.2)
     for percept <- fast, do: assert(speed(inner, percept) > 0.3)
+  end
+
+  test "where walls are that nobody has told of, what has stayed where it is slows it down no longer" do
+    index = Enum.find_index(Profile.magellan().sonars, &(abs(&1.heading - 1.5708) < 0.01))
+    echo = fn range -> List.replace_at(List.duplicate(5.1, 16), index, range) end
+    peer = %{pose: Pose.new(0, 3), twist: Twist.zero(), radius: 0.2, at_ms: 0, mode: :moving}
+    percept = percept(false, %{mag2: peer})
+
+    # The speeds at the end of so many ticks of 100 ms with these ranges.
+    last = fn ranges, options ->
+      avoid = Avoid.new([inner: Goto.new(x: 90.0, y: 0.0)] ++ options)
+
+      {speeds, _state} =
+        ranges
+        |> Enum.with_index()
+        |> Enum.map_reduce(avoid, fn {range, n}, state ->
+          percept = %{percept | sonar: echo.(range), at_ms: 100 * n}
+          {:running, wish, state} = Behaviour.tick(state, percept)
+          {wish.twist.linear, state}
+        end)
+
+      List.last(speeds)
+    end
+
+    wall = List.duplicate(1.0, 17)
+    assert last.(wall, unmapped: true) > 0.3
+    assert last.(wall, []) == 0.2
+    assert last.(Enum.take(wall, 14), unmapped: true) == 0.2
+
+    # What comes nearer by 0.3 m/s does not stay where it is; nor does what was not there in between.
+    assert last.(for(n <- 0..16, do: 1.3 - 0.03 * n), unmapped: true) == 0.2
+    assert last.(Enum.map(0..16, &if(&1 in 6..11, do: 3.0, else: 1.0)), unmapped: true) == 0.2
   end
 
   defmodule Aside do

@@ -145,6 +145,37 @@ defmodule Robot.Control.PilotTest do
     assert Pilot.resume(id) == {:error, :idle}
   end
 
+  defmodule Mapper do
+    @behaviour Robot.Mission
+    @impl Robot.Mission
+    def init(_robot, []), do: {:ready, 3, []}
+    @impl Robot.Mission
+    def handle(_event, width), do: {:ready, width, []}
+    @impl Robot.Mission
+    def halted(width), do: width
+    @impl Robot.Mission
+    def map(width),
+      do: %{
+        cells: :binary.copy(<<1>>, width),
+        width: width,
+        height: 1,
+        left: 0,
+        low: 0,
+        cell: 0.1
+      }
+  end
+
+  test "the map that a mission has made can be had, also after a stop; of one that makes none there is none" do
+    id = robot(:pilot8)
+    assert Pilot.map(id) == nil
+    assert Pilot.start(id, Acts.Mission, test: self()) == :ok
+    assert Pilot.map(id) == nil
+    assert Pilot.start(id, Mapper, []) == :ok
+    assert %{cells: <<1, 1, 1>>, width: 3} = Pilot.map(id)
+    assert Pilot.stop(id) == :ok
+    assert %{cells: <<1, 1, 1>>} = Pilot.map(id)
+  end
+
   test "another mission takes the place of a running one" do
     id = flown(:pilot5)
     goal = {:goal, :roll, {Acts.Roll, twist: Twist.new(0.1, 0.0)}}

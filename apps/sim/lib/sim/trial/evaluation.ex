@@ -131,6 +131,8 @@ defmodule Sim.Trial.Evaluation do
       alive: robot.alive,
       state: robot.state,
       blocked_by: claim[:blocked_by],
+      formed?: claim[:formed] == true,
+      says: claim[:says],
       x: robot.pose.x,
       y: robot.pose.y,
       theta: robot.pose.heading,

@@ -52,16 +52,28 @@ defmodule Swarm.Missions.Text do
       table ->
         pairs = text |> parts() |> Enum.map(&pair(&1, table))
 
-        case Enum.find(pairs, &is_binary/1) do
-          nil ->
-            {:ok, pairs}
-
-          wrong ->
-            {:error,
-             "#{Missions.name(module)}: #{inspect(wrong)} is no option: KEY=VALUE,… is allowed"}
+        case Enum.find(pairs, &is_binary/1) || Enum.find_value(pairs, &joined(&1, table)) do
+          nil -> {:ok, pairs}
+          wrong -> {:error, "#{Missions.name(module)}: #{fault(wrong)}"}
         end
     end
   end
+
+  defp fault({sign, next}),
+    do: "options are separated by a comma, not by #{inspect(sign)}: …,#{next}=…"
+
+  defp fault(wrong), do: "#{inspect(wrong)} is no option: KEY=VALUE,… is allowed"
+
+  # A value that its type refuses, and in which another option begins.
+  defp joined({key, value}, table) when is_atom(key) and is_binary(value) do
+    with {:error, _problems} <- table[key] |> List.wrap() |> hd() |> Type.read(value),
+         [_, sign, next] <- Regex.run(~r/\s*([:;&+|]|\s)\s*([a-z_]\w*)\s*=/, value),
+         true <- Enum.any?(table, fn {name, _type} -> Atom.to_string(name) == next end),
+         do: {sign, next},
+         else: (_none -> nil)
+  end
+
+  defp joined(_pair, _table), do: nil
 
   defp pair(part, table) do
     case String.split(part, "=", parts: 2) do

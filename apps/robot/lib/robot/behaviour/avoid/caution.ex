@@ -4,11 +4,12 @@ defmodule Robot.Behaviour.Avoid.Caution do
 
   That is a robot that was started again on its way and has not found its place since; and one whose sonars see something
   that it cannot explain, but that may be another robot: because it is not sure of its own place among the others, or no
-  longer hears one of them, which may have driven on since.
+  longer hears one of them, which may have driven on since. Where walls are that nobody has told of, what has stood still for a
+  while is not what it must beware of (`.Echoes`).
   """
   alias Hal.{Pose, Twist}
   alias Robot.{Percept, Wish}
-  alias Robot.Behaviour.Avoid.Neighbours
+  alias Robot.Behaviour.Avoid.{Echoes, Neighbours}
 
   # Up to this speed (m/s) the gate's limits alone kept robots apart that all drove so across each other's ways without
   # looking (`Sim.GateAloneTest`; docs/results.md, section 6). A base may have few sonars behind.
@@ -23,7 +24,8 @@ defmodule Robot.Behaviour.Avoid.Caution do
   @driven 0.5
 
   @doc """
-  Whether it must slow down; `discs` are further bodies `{x, y, radius}` that explain echoes, in the map frame.
+  Whether it must slow down, and what it has seen; `discs` are further bodies `{x, y, radius}` that explain echoes, in the map
+  frame. `echoes` is what it returned at the last tick, `nil` where what stands still counts, too.
 
       iex> percept = %Robot.Percept{robot: :mag1, profile: Hal.Profile.magellan(), at_ms: 0, pose: Hal.Pose.new(0, 0)}
       iex> ahead = List.replace_at(List.duplicate(5.1, 16), 11, 1.0)
@@ -31,16 +33,22 @@ defmodule Robot.Behaviour.Avoid.Caution do
       iex> alone = %{percept | sonar: ahead}
       iex> one_silent = %{alone | peers: %{mag2: silent}}
       iex> stands_there = put_in(one_silent.peers.mag2.pose, Hal.Pose.new(1.4, 0))
-      iex> Enum.map([alone, one_silent, stands_there], &Robot.Behaviour.Avoid.Caution.needed?(&1, []))
-      [false, true, false]
+      iex> check = &Robot.Behaviour.Avoid.Caution.check(&1, [], &2)
+      iex> for percept <- [alone, one_silent, stands_there], do: check.(percept, nil)
+      [{false, nil}, {true, nil}, {false, nil}]
+      iex> {true, echoes} = check.(one_silent, %Robot.Behaviour.Avoid.Echoes{})
+      iex> check.(%{one_silent | at_ms: 1_500}, echoes) |> elem(0)
+      false
   """
-  @spec needed?(Percept.t(), [{float(), float(), float()}]) :: boolean()
-  def needed?(%Percept{uncertainty: %{lost?: true}, peers: peers}, _discs) when peers != %{},
-    do: true
+  @spec check(Percept.t(), [{float(), float(), float()}], Echoes.t() | nil) ::
+          {boolean(), Echoes.t() | nil}
+  def check(%Percept{uncertainty: %{lost?: true}, peers: peers}, _discs, echoes)
+      when peers != %{},
+      do: {true, echoes}
 
-  def needed?(%Percept{pose: nil}, _discs), do: false
+  def check(%Percept{pose: nil}, _discs, echoes), do: {false, echoes}
 
-  def needed?(%Percept{peers: peers} = percept, discs) do
+  def check(%Percept{peers: peers, at_ms: at_ms} = percept, discs, echoes) do
     own = astray(percept)
 
     doubtful =
@@ -48,10 +56,21 @@ defmodule Robot.Behaviour.Avoid.Caution do
           peer.mode == :dead or own > @unsure,
           do: spot(peer, own, percept)
 
-    doubtful != [] and
-      percept
-      |> Neighbours.unknown(bodies(percept) ++ discs)
-      |> Enum.any?(fn %{at: at} -> Enum.any?(doubtful, &within?(&1, at)) end)
+    if doubtful == [] do
+      {false, echoes}
+    else
+      echoes = echoes && Echoes.note(echoes, percept)
+
+      needed? =
+        percept
+        |> Neighbours.unknown(bodies(percept) ++ discs)
+        |> Enum.any?(fn %{at: at} ->
+          Enum.any?(doubtful, &within?(&1, at)) and
+            not (echoes != nil and Echoes.stands?(echoes, at, at_ms))
+        end)
+
+      {needed?, echoes}
+    end
   end
 
   defp astray(%Percept{uncertainty: %{radius: radius}}), do: radius

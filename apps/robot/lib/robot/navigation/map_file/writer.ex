@@ -8,7 +8,7 @@ defmodule Robot.Navigation.MapFile.Writer do
   `cells` have a byte each, rows from the lowest y: 0 unknown, 1 free, 2 wall. `left` and `low` are the numbers of the
   lower left cell, counted from the origin of the map, `cell` is the width of a cell in metres.
   """
-  @type chart :: %{
+  @type raster :: %{
           cells: binary(),
           width: non_neg_integer(),
           height: non_neg_integer(),
@@ -28,7 +28,7 @@ defmodule Robot.Navigation.MapFile.Writer do
       iex> {description.image, description.resolution, description.origin}
       {"found.pgm", 0.1, {-1.0, 0.5}}
   """
-  @spec encode(chart(), image :: String.t()) :: {yaml :: iodata(), pgm :: iodata()}
+  @spec encode(raster(), image :: String.t()) :: {yaml :: iodata(), pgm :: iodata()}
   def encode(%{width: width, height: height, cell: cell} = map, image) do
     yaml = [
       ["image: ", image, "\n"],

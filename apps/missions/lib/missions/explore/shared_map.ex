@@ -1,4 +1,4 @@
-defmodule Missions.Explore.Chart do
+defmodule Missions.Explore.SharedMap do
   @moduledoc """
   The map of the fleet as one robot has it: what its own sonars have seen (`Robot.Navigation.Survey`), and where these say
   nothing, what others told last. Pure.
@@ -8,6 +8,7 @@ defmodule Missions.Explore.Chart do
   has told is not lost with it.
   """
   alias Hal.Pose
+  alias Robot.Navigation.MapFile.Writer
   alias Robot.Navigation.Survey
   alias Robot.Percept
 
@@ -37,19 +38,7 @@ defmodule Missions.Explore.Chart do
           free: non_neg_integer()
         }
 
-  @typedoc """
-  The known part as one rectangle of states, rows from the lowest y; `left` and `low` are the numbers of the lower left
-  cell, counted from the origin of the map.
-  """
-  @type raster :: %{
-          cells: binary(),
-          width: non_neg_integer(),
-          height: non_neg_integer(),
-          left: integer(),
-          low: integer()
-        }
-
-  @doc "A chart on which nothing is."
+  @doc "A map on which nothing is."
   @spec new() :: t()
   def new, do: %__MODULE__{survey: Survey.new()}
 
@@ -63,15 +52,15 @@ defmodule Missions.Explore.Chart do
 
   @doc "Takes what the robot's sonars have seen."
   @spec look(t(), Percept.t()) :: t()
-  def look(chart, %Percept{pose: pose} = percept) do
-    chart = %{chart | home: chart.home || Survey.tile_of(Pose.point(pose))}
-    {survey, changed} = Survey.update(chart.survey, percept)
+  def look(map, %Percept{pose: pose} = percept) do
+    map = %{map | home: map.home || Survey.tile_of(Pose.point(pose))}
+    {survey, changed} = Survey.update(map.survey, percept)
 
     changed
-    |> Enum.filter(&near?(chart, &1))
-    |> Enum.reduce(%{chart | survey: survey}, fn at, chart ->
-      case merge(chart, at) do
-        ^chart -> chart
+    |> Enum.filter(&near?(map, &1))
+    |> Enum.reduce(%{map | survey: survey}, fn at, map ->
+      case merge(map, at) do
+        ^map -> map
         other -> %{other | news: if(at in other.news, do: other.news, else: other.news ++ [at])}
       end
     end)
@@ -80,18 +69,18 @@ defmodule Missions.Explore.Chart do
   defp near?(%{home: {i, j}}, {column, row}),
     do: abs(column - i) <= @far and abs(row - j) <= @far
 
-  defp merge(chart, at) do
-    before = Map.get(chart.tiles, at, @unknown)
-    seen = join(Survey.states(chart.survey, at), Map.get(chart.told, at))
+  defp merge(map, at) do
+    before = Map.get(map.tiles, at, @unknown)
+    seen = join(Survey.states(map.survey, at), Map.get(map.told, at))
     # What was known once is not unknown again, however the evidence wavers.
     now = join(seen, before)
 
     if now == before,
-      do: chart,
+      do: map,
       else: %{
-        chart
-        | tiles: Map.put(chart.tiles, at, now),
-          free: chart.free - free(before) + free(now)
+        map
+        | tiles: Map.put(map.tiles, at, now),
+          free: map.free - free(before) + free(now)
       }
   end
 
@@ -105,13 +94,13 @@ defmodule Missions.Explore.Chart do
 
   @doc "What is to be told now."
   @spec tell(t()) :: {binary(), t()}
-  def tell(%__MODULE__{news: news, tiles: tiles} = chart) do
+  def tell(%__MODULE__{news: news, tiles: tiles} = map) do
     {now, later} = Enum.split(news, @most - @again)
     known = tiles |> Map.keys() |> Enum.sort()
-    {before, rest} = Enum.split_while(known, &(chart.last != nil and &1 <= chart.last))
+    {before, rest} = Enum.split_while(known, &(map.last != nil and &1 <= map.last))
     again = (rest ++ before) |> Enum.take(@most - length(now)) |> Enum.take(3 * @again)
     packed = for at <- Enum.uniq(now ++ again), into: <<>>, do: pack(at, tiles[at])
-    {packed, %{chart | news: later, last: List.last(again)}}
+    {packed, %{map | news: later, last: List.last(again)}}
   end
 
   defp pack({i, j}, states) do
@@ -122,7 +111,7 @@ defmodule Missions.Explore.Chart do
   @doc """
   Whether a term is what `tell/1` may return.
 
-      iex> for term <- [<<>>, <<0::544>>, <<0>>, :junk, <<0::8160>>], do: Missions.Explore.Chart.told?(term)
+      iex> for term <- [<<>>, <<0::544>>, <<0>>, :junk, <<0::8160>>], do: Missions.Explore.SharedMap.told?(term)
       [true, true, false, false, false]
   """
   @spec told?(term()) :: boolean()
@@ -132,30 +121,26 @@ defmodule Missions.Explore.Chart do
 
   @doc "Takes what another robot told. Tiles that are too far away are not taken, nor any before the robot knows its place."
   @spec hear(t(), binary()) :: t()
-  def hear(%__MODULE__{home: nil} = chart, _packed), do: chart
+  def hear(%__MODULE__{home: nil} = map, _packed), do: map
 
-  def hear(chart, packed) do
+  def hear(map, packed) do
     for <<i::signed-16, j::signed-16, cells::binary-size(@bytes - 4) <- packed>>,
-        near?(chart, {i, j}),
-        reduce: chart do
-      chart -> hear(chart, {i, j}, for(<<state::2 <- cells>>, into: <<>>, do: <<rem(state, 3)>>))
+        near?(map, {i, j}),
+        reduce: map do
+      map -> hear(map, {i, j}, for(<<state::2 <- cells>>, into: <<>>, do: <<rem(state, 3)>>))
     end
   end
 
-  defp hear(chart, at, states) do
-    told = join(states, Map.get(chart.told, at))
-    chart = merge(%{chart | told: Map.put(chart.told, at, told)}, at)
-    if chart.tiles[at] == states, do: %{chart | news: List.delete(chart.news, at)}, else: chart
+  defp hear(map, at, states) do
+    told = join(states, Map.get(map.told, at))
+    map = merge(%{map | told: Map.put(map.told, at, told)}, at)
+    if map.tiles[at] == states, do: %{map | news: List.delete(map.news, at)}, else: map
   end
 
-  @doc "All that is known, for a file."
-  @spec map(t()) :: Robot.Navigation.MapFile.Writer.chart()
-  def map(chart), do: chart |> raster() |> Map.put(:cell, Survey.cell())
-
-  @doc "All that is known."
-  @spec raster(t()) :: raster()
+  @doc "All that is known, as one rectangle."
+  @spec raster(t()) :: Writer.raster()
   def raster(%__MODULE__{tiles: tiles}) when tiles == %{},
-    do: %{cells: <<>>, width: 0, height: 0, left: 0, low: 0}
+    do: %{cells: <<>>, width: 0, height: 0, left: 0, low: 0, cell: Survey.cell()}
 
   def raster(%__MODULE__{tiles: tiles}) do
     {left, right} = tiles |> Map.keys() |> Enum.map(&elem(&1, 0)) |> Enum.min_max()
@@ -176,7 +161,8 @@ defmodule Missions.Explore.Chart do
       width: (right - left + 1) * @tile,
       height: (high - low + 1) * @tile,
       left: left * @tile,
-      low: low * @tile
+      low: low * @tile,
+      cell: Survey.cell()
     }
   end
 end
