@@ -5,8 +5,8 @@ defmodule Missions.Landmark.Marks do
   reported uncertainty. Also decides when the pose is sure enough to claim a slot. Pure.
 
   Only robots ahead in the order count, so that corrections run one way, from the leader down. Others
-  may be seen, too, and must not be mistaken for one of these. In a fleet of more than eleven only the leader and the
-  nearest are looked for: ten of all, and ten of those ahead.
+  may be seen, too, and must not be mistaken for one of these. In a fleet of more than twenty-one only the leader and the
+  nearest are looked for: twenty of all, and twenty of those ahead.
   """
   alias Hal.Pose
   alias Robot.Localiser.Anchors
@@ -26,7 +26,7 @@ defmodule Missions.Landmark.Marks do
   # A robot slower than this stands still, in m/s and rad/s.
   @slow 0.05
   # Of so many of the nearest robots, and so many of the nearest ahead, the picture is asked.
-  @nearest 10
+  @nearest 20
   # A robot in place is at most this far from its slot in 95 of 100 cases, in metres.
   @tolerance 0.5
 

@@ -73,18 +73,18 @@ defmodule Missions.Landmark.MarksTest do
 
   defp names(numbers), do: Enum.sort(for i <- numbers, do: :"r#{i}")
 
-  test "of a large fleet the leader, the ten nearest, and the ten nearest of those ahead" do
+  test "of a large fleet the leader, the twenty nearest, and the twenty nearest of those ahead" do
     order = for i <- 1..119, do: :"r#{i}"
     assert {looked_for, references} = looked_for(120, order)
-    assert looked_for == names([0 | Enum.to_list(50..59) ++ Enum.to_list(61..65)])
+    assert looked_for == names([0 | Enum.to_list(40..59) ++ Enum.to_list(61..70)])
 
     assert Enum.sort(for %{key: {:robot, id}} <- references, do: id) ==
-             names([0 | Enum.to_list(50..59)])
+             names([0 | Enum.to_list(40..59)])
   end
 
   test "those ahead may be far away" do
     order = for i <- 1..119, do: :"r#{120 - i}"
     assert {looked_for, _references} = looked_for(120, order)
-    assert looked_for == names([0 | Enum.to_list(55..59) ++ Enum.to_list(61..70)])
+    assert looked_for == names([0 | Enum.to_list(50..59) ++ Enum.to_list(61..80)])
   end
 end
