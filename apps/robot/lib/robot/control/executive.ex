@@ -23,8 +23,6 @@ defmodule Robot.Control.Executive do
 
   @period_ms 100
   @slow_us 50_000
-  # Ticks.
-  @note_again 10
   @call_ms 400
 
   @doc """
@@ -102,7 +100,7 @@ defmodule Robot.Control.Executive do
     Board.put(board, :executive, :doing, doing, at_ms)
     Board.put(board, :executive, :goal, nil, at_ms)
     Event.execute([:robot, :executive, :start], %{at_ms: at_ms}, %{robot: id})
-    departed = Departure.Note.read(config.departure_file)
+    departed = Board.departed(board)
 
     s = %{
       config: config,
@@ -116,7 +114,6 @@ defmodule Robot.Control.Executive do
           plan: config.plan
         ),
       departure: if(departed, do: {:was, departed}, else: {:near, nil}),
-      note_at_tick: 0,
       told: nil,
       held?: false,
       tick: 0,
@@ -269,30 +266,13 @@ defmodule Robot.Control.Executive do
     %{s | departure: :noted}
   end
 
-  # Of counters that jump away from zero nobody knows where it is: noted is the frame of the last reading near zero.
+  # After a counter jump the place is unknown, so the frame of the last reading near zero is noted.
   defp depart(%{departure: {:near, frame}} = s, %Odometry{pose: pose} = odometry) do
-    if Departure.left?(pose),
-      do: note(%{s | departure: {:left, frame || Departure.frame(nil)}}),
-      else: %{s | departure: {:near, Departure.frame(odometry.frame)}}
-  end
-
-  defp depart(%{departure: {:left, _frame}} = s, _odometry), do: note(s)
-
-  # Written here, because what comes after a crash must find it: a line, not synced, to a folder in memory. A disk that
-  # hangs meets the gate's dead man's switch. What fails is tried again once a second.
-  defp note(%{config: %{id: id, departure_file: path}, departure: {:left, frame}} = s) do
-    cond do
-      s.note_at_tick > s.tick ->
-        s
-
-      Departure.Note.write(path, frame) == :ok ->
-        %{s | departure: :noted}
-
-      true ->
-        if s.note_at_tick == 0,
-          do: Event.execute([:robot, :departure_file, :failed], %{}, %{robot: id, file: path})
-
-        %{s | note_at_tick: s.tick + @note_again}
+    if Departure.left?(pose) do
+      Board.depart(s.board, frame || Departure.frame(nil))
+      %{s | departure: :noted}
+    else
+      %{s | departure: {:near, Departure.frame(odometry.frame)}}
     end
   end
 

@@ -19,7 +19,7 @@ defmodule Robot.Safety.Gate do
   """
   use GenServer
   alias Hal.{Device, Event, HardenedServer, Ticker, Twist}
-  alias Robot.{Board, Config, Departure, Names}
+  alias Robot.{Board, Config, Names}
   alias Robot.Trace
   alias Robot.Safety.{DryRun, Reflex}
 
@@ -51,9 +51,10 @@ defmodule Robot.Safety.Gate do
   def sense(_robot, _reading), do: :ok
 
   @doc """
-  Stops the robot until `reset/1`. When this returns, the latch is set and the stop has been sent
-  to the drive's device. The process that owns the state of the e-stop sets the latch with
-  `tell: false`: then the config's `:on_latch` is not applied.
+  Stops the robot until `reset/1`. When this returns, the latch is set, the stop has been sent to
+  the drive's device, and the latch is in its file (`Robot.Board.saved/2`). The process that owns
+  the state of the e-stop sets the latch with `tell: false`: then the config's `:on_latch` is not
+  applied, and this does not wait for the file.
   """
   @spec estop(robot :: atom(), tell: boolean()) :: :ok
   def estop(robot, options \\ []),
@@ -101,7 +102,7 @@ defmodule Robot.Safety.Gate do
           armed?: armed?(board, config),
           fence: config.fence,
           start: config.start,
-          frame: frame(board, config)
+          frame: frame(board)
         ),
       told: nil,
       limits: nil,
@@ -136,16 +137,19 @@ defmodule Robot.Safety.Gate do
   def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
-  def handle_call({:estop, tell?}, _from, s) when is_boolean(tell?) do
+  def handle_call({:estop, tell?}, from, s) when is_boolean(tell?) do
     at_ms = heard(s, :estop)
-    # The wheels come first: the latch may also be written to a file, and a disk may be slow.
-    Board.hold(s.board)
+    Board.latch(s.board)
     if tell?, do: Board.put(s.board, :gate, :presses, presses(s.board) + 1, at_ms)
     s = step(%{s | reflex: Reflex.estop(s.reflex)}, at_ms)
     if tell?, do: tell_latch(s)
-    Board.latch(s.board)
     Event.execute([:robot, :gate, :estop], %{at_ms: at_ms}, %{robot: s.config.id})
-    {:reply, :ok, s}
+    # Whoever pressed the button may wait for a disk; these steps do not.
+    if tell?,
+      do: Board.saved(s.board, {GenServer, :reply, [from, :ok]}),
+      else: GenServer.reply(from, :ok)
+
+    {:noreply, s}
   end
 
   def handle_call({:reset, tell?, presses}, _from, s)
@@ -202,10 +206,10 @@ defmodule Robot.Safety.Gate do
     %{s | reflex: reflex}
   end
 
-  defp frame(board, config) do
+  defp frame(board) do
     with :error <- Board.fetch(board, :frame, :infinity) do
-      noted = Departure.Note.read(config.departure_file)
-      if noted, do: {:was, noted}
+      departed = Board.departed(board)
+      if departed, do: {:was, departed}
     else
       {:ok, frame, _at_ms} -> frame
     end

@@ -107,7 +107,7 @@ defmodule Swarm.EStop.Actions do
 
   def obey(s, :estop, {ref, _given_us}) do
     s = press(s)
-    EStop.Answer.stood(s.id, ref)
+    EStop.Answer.held(s.id, ref)
     s
   end
 
@@ -115,7 +115,7 @@ defmodule Swarm.EStop.Actions do
     s = called(s, call, 0)
 
     if EStop.State.held?(s.stop),
-      do: EStop.Answer.stood(s.id, ref),
+      do: EStop.Answer.held(s.id, ref),
       else: Nonblocking.answer(ref, {:error, "#{s.id} was reset meanwhile"})
 
     s

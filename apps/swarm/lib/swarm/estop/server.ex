@@ -116,6 +116,11 @@ defmodule Swarm.EStop.Server do
   def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
+  def handle_info({:unsaved, ref}, s) when is_reference(ref) do
+    EStop.Answer.unsaved(s.id, s.board, ref)
+    {:noreply, s}
+  end
+
   def handle_info(message, s) do
     case {Directory.Membership.arrived(s.group, message),
           Directory.Membership.arrived(s.name, message)} do
