@@ -65,10 +65,10 @@ defmodule Missions.Landmark do
   defdelegate option_table, to: Landmark.Options, as: :table
 
   @impl Robot.Mission
-  def messages, do: {1, round: :shared, place: :shared}
+  def messages, do: {1, round: :shared, claim: :shared}
 
   @impl Robot.Mission
-  def claims, do: {1, Landmark.Claim}
+  def claims, do: {2, Landmark.Claim}
 
   @impl Robot.Mission
   defdelegate stale(claim), to: Landmark.Claim
@@ -149,8 +149,12 @@ defmodule Missions.Landmark do
     {mission.phase, Rounds.hear(mission, from, letter), relays}
   end
 
-  defp hear({:ok, %Message{kind: :place, body: anchor}}, mission),
-    do: still(ReferenceInbox.anchor(mission, anchor))
+  defp hear({:ok, %Message{kind: :claim, body: claim}}, mission) do
+    case Landmark.Claim.of(%{claim: claim}) do
+      %{anchor: nil} -> still(mission)
+      %{anchor: anchor} -> still(ReferenceInbox.anchor(mission, anchor))
+    end
+  end
 
   defp hear(_other, mission), do: still(mission)
 

@@ -305,6 +305,9 @@ defmodule Missions.Landmark.Group do
     Enum.reduce(to, group, &send_one(&1, id, message, &2))
   end
 
+  defp carry_out({:claim, to, %{anchor: anchor}}, id, group),
+    do: carry_out({:send, to, Missions.Landmark.Beat.pass_on(id, anchor)}, id, group)
+
   defp carry_out({:claim, claim}, id, group), do: put_in(group.robots[id].claim, claim)
 
   defp carry_out({:goal, tag, goal}, id, group) do

@@ -28,7 +28,7 @@ defmodule Swarm.Comms do
   """
   use GenServer
   alias Hal.{Event, HardenedServer, Ticker}
-  alias Robot.Mission.Letter
+  alias Robot.Mission.{Claim, Letter}
   alias Robot.{Board, Config, Names}
   alias Robot.Control.Pilot
   alias Mesh.Nonblocking
@@ -84,8 +84,10 @@ defmodule Swarm.Comms do
   `:all` those that are known here (`Swarm.Transport.robots/0`). It waits for nobody, and
   nobody confirms the message.
   """
-  @spec say(robot :: atom(), to :: atom() | [atom()] | :all, Message.t() | Letter.t()) :: [atom()]
+  @spec say(robot :: atom(), to, Message.t() | Letter.t() | Claim.t()) :: [atom()]
+        when to: atom() | [atom()] | :all
   def say(robot, to, %Letter{} = letter), do: say(robot, to, Message.new(robot, :mission, letter))
+  def say(robot, to, %Claim{} = claim), do: say(robot, to, Message.new(robot, :claim, claim))
 
   def say(robot, to, message) do
     ids = List.delete(addressed(to), robot)

@@ -14,7 +14,6 @@ defmodule Missions.Landmark.Follower do
   alias Robot.Percept.CameraPointing
   alias Robot.Behaviour.Avoid.Neighbours
   alias Robot.Behaviour.Patience
-  alias Swarm.Message
   alias Swarm.Formation.Chain
   alias Missions.Landmark
   alias Missions.Landmark.{Blocker, LandmarkTrack, Marks, SlotPoses}
@@ -236,7 +235,7 @@ defmodule Missions.Landmark.Follower do
     child = Chain.child([anchor.leader | anchor.order], mission.me)
 
     if news != follower.told and child != nil,
-      do: {news, [{:send, [child], Message.new(mission.me, :place, anchor)}]},
+      do: {news, [{:claim, [child], %{anchor: anchor}}]},
       else: {follower.told, []}
   end
 

@@ -6,7 +6,7 @@ defmodule Missions.Landmark.Leader do
   """
   alias Robot.Behaviour
   alias Robot.Localiser.Anchors
-  alias Swarm.{Formation, Message}
+  alias Swarm.Formation
   alias Swarm.Membership.NameSet
   alias Missions.Landmark
   alias Missions.Landmark.{Claim, LandmarkTrack, Merge, Shape}
@@ -118,7 +118,7 @@ defmodule Missions.Landmark.Leader do
     place =
       if told == [],
         do: [],
-        else: [{:send, told, Message.new(mission.me, :place, mission.anchor)}]
+        else: [{:claim, told, %{anchor: mission.anchor}}]
 
     {mission,
      formed ++ lost ++ no_room ++ place ++ [goal(mission), {:look, 0.0}, {:anchors, %Anchors{}}]}

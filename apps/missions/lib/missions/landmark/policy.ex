@@ -25,7 +25,7 @@ defmodule Missions.Landmark.Policy do
   to all. A robot that never met anybody cannot lose anybody.
   """
   alias Swarm.Agreement.Election
-  alias Swarm.Formation.Reference
+  alias Missions.Landmark.Reference
   alias Missions.Landmark
 
   # A heartbeat lists the robots that were heard in the last second.

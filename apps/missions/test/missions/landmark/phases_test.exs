@@ -3,10 +3,9 @@ defmodule Missions.Landmark.PhasesTest do
   use ExUnit.Case, async: true
   alias Robot.Behaviour
   alias Robot.Localiser.Anchors
-  alias Missions.Landmark.{Beat, Group}
+  alias Missions.Landmark.{Beat, Group, Reference}
   alias Swarm.Message
   alias Swarm.Agreement.Round
-  alias Swarm.Formation.Reference
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Transitions}
 
@@ -55,7 +54,7 @@ defmodule Missions.Landmark.PhasesTest do
       Group.event(
         group,
         :mag2,
-        {:message, Message.new(:mag1, :place, anchor(group, epoch, order))}
+        {:message, Beat.pass_on(:mag1, anchor(group, epoch, order))}
       )
 
   defp letter(group, id, purpose, fields \\ []) do
@@ -158,7 +157,7 @@ defmodule Missions.Landmark.PhasesTest do
     assert [:search] = entered(seen, resting)
     asked = resting |> beat(:mag1, []) |> letter({9, 1, :mag1}, :search) |> Group.run(0.1)
     assert [] = entered(asked, resting)
-    assert %{found: false} = mission(asked).round.report
+    assert %{merit: nil} = mission(asked).round.report
   end
 
   test "lead -> agree when deposed: by a later epoch at once, unheard after 1.5 s" do
@@ -263,7 +262,7 @@ defmodule Missions.Landmark.PhasesTest do
     known = mission(group).anchor
     assert mission(place(group, 2)).anchor == known
     rival = %{anchor(group, 3, [:mag2]) | leader: :aaa, sequence: 1_000_000}
-    message = Message.new(:aaa, :place, rival)
+    message = Beat.pass_on(:aaa, rival)
     assert mission(Group.event(group, :mag2, {:message, message})).anchor == known
   end
 
@@ -285,7 +284,7 @@ defmodule Missions.Landmark.PhasesTest do
 
     {:lead, _mission, effects} = Landmark.handle({:tick, lost}, mission(leading))
     assert {:goal, :stand, {Behaviour.Stop, []}} in effects
-    assert [] = for({:send, _to, %Message{kind: :place}} <- effects, do: :place)
+    assert [] = for({:claim, _to, _anchor} <- effects, do: :claim)
 
     # Nor does it claim any longer that all stand where they should.
     formed = put_in(mission(leading).leadership.formed?, true)

@@ -7,7 +7,7 @@ defmodule Robot.Mission.Runner do
   `{:claim, map}`: the mission's claim is kept here until the mission is halted.
   """
   alias Robot.{Behaviour, Mission, Percept}
-  alias Robot.Mission.Letter
+  alias Robot.Mission.{Claim, Letter}
   alias Robot.Navigation.Grid
 
   @enforce_keys [:robot]
@@ -131,6 +131,12 @@ defmodule Robot.Mission.Runner do
   end
 
   defp said({:tell, to, kind, fields}, module), do: {:send, to, Letter.new!(module, kind, fields)}
+
+  defp said({:claim, to, claim}, module) do
+    %Claim{} = claim = Claim.new(module, claim)
+    {:send, to, claim}
+  end
+
   defp said(effect, _module), do: effect
 
   defp note({:claim, claim}, runner) when is_map(claim), do: %{runner | claim: claim}

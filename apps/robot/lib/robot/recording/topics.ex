@@ -169,6 +169,7 @@ defmodule Robot.Recording.Topics do
   defp sender(_other), do: "?"
 
   defp kind(%{kind: kind}) when is_atom(kind), do: "#{kind}"
+  defp kind(%Robot.Mission.Claim{}), do: "claim"
   defp kind(_other), do: "?"
 
   defp claim(%{claimed_ms: claimed_ms} = robot, _id, _claim, at_ms)

@@ -32,11 +32,9 @@ defmodule Missions.Landmark.Rounds.Report do
 
   defp put_report(mission, found?) do
     found? = found? and mission.sight != nil
-    size = if found?, do: mission.sight.size_ppm, else: 0
 
     report = %{
-      found: found?,
-      size_ppm: size,
+      merit: if(found?, do: mission.sight.size_ppm),
       pose: Landmark.State.millimetres(mission.percept.pose),
       led: if(mission.phase in [:lead, :agree], do: mission.led, else: 0),
       of: mission.of
