@@ -13,7 +13,6 @@ defmodule Missions.Explore do
   """
   alias Hal.Pose
   alias Missions.Explore.{Chart, Choice, Frontiers, Options}
-  alias Robot.Behaviour
 
   @behaviour Robot.Mission
 
@@ -220,10 +219,10 @@ defmodule Missions.Explore do
   defp said(%{at: {x, y}, far: far}, tiles),
     do: [goal: {round(x * 1_000), round(y * 1_000)}, far_mm: round(far * 1_000), tiles: tiles]
 
-  defp goal(%{ahead: nil}), do: {:goal, :stand, {Behaviour.Stop, []}}
+  defp goal(%{ahead: nil}), do: {:goal, :stand, {Robot.Behaviour.Stop, []}}
 
   defp goal(%{ahead: {x, y}, goal: n}),
-    do: {:goal, {:go, n}, {Behaviour.Goto, x: x, y: y, tolerance: @tolerance}}
+    do: {:goal, {:go, n}, {Robot.Behaviour.Goto, x: x, y: y, tolerance: @tolerance}}
 
   defp claim(mission) do
     %{

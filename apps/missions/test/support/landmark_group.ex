@@ -5,7 +5,7 @@ defmodule Missions.Landmark.Group do
   and reorders messages, and can be cut into two. Pure except for `:rand`, which ExUnit seeds.
   """
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Robot.{Behaviour, Percept}
+  alias Robot.Percept
   alias Robot.Localiser.Anchors
   alias Robot.Mission.Claim
   alias Swarm.{EStop, Message}
@@ -261,7 +261,7 @@ defmodule Missions.Landmark.Group do
         group = put_in(group.robots[id].goal, {:over, tag})
         event(group, id, {:outcome, tag, if(robot.share, do: 1, else: 0)})
 
-      %{goal: {_tag, {Behaviour.Follow, options}}, pose: pose} = robot ->
+      %{goal: {_tag, {Robot.Behaviour.Follow, options}}, pose: pose} = robot ->
         put_in(group.robots[id], %{robot | pose: toward(pose, options[:target])})
 
       _standing ->

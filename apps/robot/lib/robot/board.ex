@@ -59,7 +59,7 @@ defmodule Robot.Board do
   use GenServer
   alias Hal.HardenedServer
   alias Robot.Board.Files
-  alias Robot.{Config, Departure, Names}
+  alias Robot.{Departure, Names}
   alias Vision.Detections
 
   @again_ms 1_000
@@ -120,8 +120,8 @@ defmodule Robot.Board do
   }
 
   @doc "Starts the board of a robot."
-  @spec start_link(Config.t()) :: GenServer.on_start()
-  def start_link(%Config{} = config), do: HardenedServer.start_link(__MODULE__, config)
+  @spec start_link(Robot.Config.t()) :: GenServer.on_start()
+  def start_link(%Robot.Config{} = config), do: HardenedServer.start_link(__MODULE__, config)
 
   @doc "The board of a robot on this node."
   @spec find(robot :: atom()) :: {:ok, t()} | :error
@@ -240,7 +240,7 @@ defmodule Robot.Board do
   end
 
   @doc "Applies `then` when the file of the latch says what the latch does, or could not be written."
-  @spec saved(t(), then :: Config.call()) :: :ok
+  @spec saved(t(), then :: Robot.Config.call()) :: :ok
   def saved(%__MODULE__{} = board, {_m, _f, _a} = then), do: cast(board, {:saved, then})
 
   @doc "Whether it does already: asked by whoever has waited long enough for `saved/2`."
@@ -267,13 +267,13 @@ defmodule Robot.Board do
     do: GenServer.cast(Names.via(robot, :board), message)
 
   @impl GenServer
-  def init(%Config{} = config) do
+  def init(%Robot.Config{} = config) do
     board = %__MODULE__{
       robot: config.id,
       table: :ets.new(__MODULE__, [:public, read_concurrency: true]),
       latch: :ets.new(__MODULE__, [:public]),
       clock: config.clock,
-      since_ms: Config.now(config)
+      since_ms: Robot.Config.now(config)
     }
 
     {files, latched?, frame} = Files.read(config)

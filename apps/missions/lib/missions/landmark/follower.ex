@@ -10,7 +10,6 @@ defmodule Missions.Landmark.Follower do
   to say so (`Missions.Landmark.Marks.sure?/2`), is `unsure?`: neither in place nor blocked.
   """
   alias Hal.Pose
-  alias Robot.Behaviour
   alias Robot.Percept.CameraPointing
   alias Robot.Behaviour.Avoid.Neighbours
   alias Robot.Behaviour.Patience
@@ -91,7 +90,7 @@ defmodule Missions.Landmark.Follower do
 
     if place == nil or age_ms > @lease_ms or mission.percept.pose == nil do
       {%{mission | follower: wait(mission.follower, age_ms)},
-       [{:goal, :stand, {Behaviour.Stop, []}}, {:look, look_out(mission)}]}
+       [{:goal, :stand, {Robot.Behaviour.Stop, []}}, {:look, look_out(mission)}]}
     else
       follow(mission, place, age_ms)
     end
@@ -139,7 +138,7 @@ defmodule Missions.Landmark.Follower do
 
     mission = %{mission | follower: mission |> block(slot, error) |> late(mission, slot, error)}
     options = [target: slot, velocity: velocity, discs: discs(mission.anchor)]
-    goal = {:goal, {:slot, mission.epoch}, {Behaviour.Follow, options}}
+    goal = {:goal, {:slot, mission.epoch}, {Robot.Behaviour.Follow, options}}
 
     {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, Marks.anchors(mission)}]}
   end

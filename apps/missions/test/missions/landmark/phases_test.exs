@@ -1,7 +1,6 @@
 defmodule Missions.Landmark.PhasesTest do
   @moduledoc "Each exit of the table, reached by events."
   use ExUnit.Case, async: true
-  alias Robot.Behaviour
   alias Robot.Localiser.Anchors
   alias Missions.Landmark.{Beat, Group, Reference}
   alias Swarm.Message
@@ -89,7 +88,7 @@ defmodule Missions.Landmark.PhasesTest do
       assert formation == mission(group).formation
       stood = Group.run(stopped, 0.1)
       assert phase(stood) == :idle
-      assert %{goal: {:stand, {Behaviour.Stop, []}}} = stood.robots.mag2
+      assert %{goal: {:stand, {Robot.Behaviour.Stop, []}}} = stood.robots.mag2
       again = stopped |> Group.event(:mag2, {:command, :start}) |> Group.run(0.1)
       assert :search in entered(again, stopped)
     end
@@ -230,9 +229,9 @@ defmodule Missions.Landmark.PhasesTest do
 
   test "the lease: without an anchor a follower stands after 1 s, and elects after 2 s" do
     group = following() |> Group.run(0.9)
-    assert {{:slot, 1}, {Behaviour.Follow, _}} = group.robots.mag2.goal
+    assert {{:slot, 1}, {Robot.Behaviour.Follow, _}} = group.robots.mag2.goal
     group = Group.run(group, 0.2)
-    assert {:stand, {Behaviour.Stop, []}} = group.robots.mag2.goal
+    assert {:stand, {Robot.Behaviour.Stop, []}} = group.robots.mag2.goal
     assert %{standing: true, in_place: false, phase: :follow} = group.robots.mag2.claim
     assert phase(Group.run(group, 0.7)) == :follow
     assert [:agree | _] = group |> Group.run(1.2) |> entered(group) |> Enum.reverse()
@@ -283,7 +282,7 @@ defmodule Missions.Landmark.PhasesTest do
     }
 
     {:lead, _mission, effects} = Landmark.handle({:tick, lost}, mission(leading))
-    assert {:goal, :stand, {Behaviour.Stop, []}} in effects
+    assert {:goal, :stand, {Robot.Behaviour.Stop, []}} in effects
     assert [] = for({:claim, _to, _anchor} <- effects, do: :claim)
 
     # Nor does it claim any longer that all stand where they should.

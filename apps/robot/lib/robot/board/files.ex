@@ -4,7 +4,7 @@ defmodule Robot.Board.Files do
   # while it is set, and the note that the robot has left its start pose. A disk may hang; so all is `:raw`, in the
   # calling process: else the node's one file server would hang with it.
   alias Hal.Event
-  alias Robot.{Config, Departure}
+  alias Robot.Departure
 
   @enforce_keys [:robot, :estop, :departure]
   defstruct @enforce_keys ++ [told?: false]
@@ -18,8 +18,8 @@ defmodule Robot.Board.Files do
         }
 
   @doc "The files of a robot, its latch, and the frame in which it has left its start pose, as they say."
-  @spec read(Config.t()) :: {t(), latched? :: boolean(), Departure.frame() | nil}
-  def read(%Config{id: robot, estop_file: estop, departure_file: departure}) do
+  @spec read(Robot.Config.t()) :: {t(), latched? :: boolean(), Departure.frame() | nil}
+  def read(%Robot.Config{id: robot, estop_file: estop, departure_file: departure}) do
     latched? = estop != nil and File.exists?(estop, [:raw])
     files = %__MODULE__{robot: robot, estop: estop, departure: departure}
     {files, latched?, Departure.Note.read(departure)}

@@ -6,7 +6,7 @@ defmodule Robot.Mission.Runner do
   Events for an idle robot are dropped. The caller carries out the effects, in their order, except
   `{:claim, map}`: the mission's claim is kept here until the mission is halted.
   """
-  alias Robot.{Behaviour, Mission, Percept}
+  alias Robot.{Mission, Percept}
   alias Robot.Mission.{Claim, Letter}
   alias Robot.Navigation.Grid
 
@@ -143,7 +143,7 @@ defmodule Robot.Mission.Runner do
 
   # An invalid goal is an error of the mission, so the mission crashes, not the controller.
   defp note({:goal, _tag, goal}, runner) do
-    with {:error, line} <- Behaviour.check(goal), do: raise(ArgumentError, line)
+    with {:error, line} <- Robot.Behaviour.check(goal), do: raise(ArgumentError, line)
     runner
   end
 

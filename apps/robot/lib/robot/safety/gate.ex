@@ -19,15 +19,15 @@ defmodule Robot.Safety.Gate do
   """
   use GenServer
   alias Hal.{Device, Event, HardenedServer, Ticker, Twist}
-  alias Robot.{Board, Config, Names}
+  alias Robot.{Board, Names}
   alias Robot.Trace
   alias Robot.Safety.{DryRun, Reflex}
 
   @period_ms 50
 
   @doc "Starts the gate of a robot; it first commands the wheels to stop."
-  @spec start_link(Config.t()) :: GenServer.on_start()
-  def start_link(%Config{} = config),
+  @spec start_link(Robot.Config.t()) :: GenServer.on_start()
+  def start_link(%Robot.Config{} = config),
     do: HardenedServer.start_link(__MODULE__, config, name: Names.via(config.id, :gate))
 
   @doc "Wishes a speed; the newest wish is valid for 200 ms."
@@ -39,7 +39,7 @@ defmodule Robot.Safety.Gate do
   or the executive was restarted. Then applies `then`, if given, to notify the process that waits
   for the stop.
   """
-  @spec forget(robot :: atom(), then :: Config.call() | nil) :: :ok
+  @spec forget(robot :: atom(), then :: Robot.Config.call() | nil) :: :ok
   def forget(robot, then \\ nil),
     do: GenServer.cast(Names.via(robot, :gate), {:forget, then})
 
@@ -81,14 +81,14 @@ defmodule Robot.Safety.Gate do
   end
 
   @impl GenServer
-  def init(%Config{id: id} = config) do
+  def init(%Robot.Config{id: id} = config) do
     # A stop must not wait for the processes that communicate; the gate's own work is short.
     Process.flag(:priority, :high)
     drive = Names.via(id, :drive)
     Device.drive(drive, Twist.zero())
     board = Board.find!(id)
     latched? = Board.latched?(board)
-    at_ms = Config.now(config)
+    at_ms = Robot.Config.now(config)
     if config.dry_run, do: DryRun.attach()
     Event.execute([:robot, :gate, :start], %{at_ms: at_ms}, %{robot: id, latched?: latched?})
 
@@ -106,7 +106,7 @@ defmodule Robot.Safety.Gate do
         ),
       told: nil,
       limits: nil,
-      ticker: Config.ticker(config, :step, @period_ms)
+      ticker: Robot.Config.ticker(config, :step, @period_ms)
     }
 
     Trace.begin(config, :gate, state(s), at_ms)
@@ -179,7 +179,7 @@ defmodule Robot.Safety.Gate do
 
   @impl GenServer
   def handle_info(:step, s) do
-    at_ms = Config.now(s.config)
+    at_ms = Robot.Config.now(s.config)
     Trace.checkpoint(s.config, :gate, fn -> state(s) end, at_ms)
     {:noreply, s |> step(at_ms) |> schedule()}
   end
@@ -246,7 +246,7 @@ defmodule Robot.Safety.Gate do
   defp tell_latch(s), do: with({m, f, a} <- s.config.on_latch, do: apply(m, f, a))
 
   defp heard(s, what) do
-    at_ms = Config.now(s.config)
+    at_ms = Robot.Config.now(s.config)
     Trace.input(s.config, :gate, what, at_ms)
     at_ms
   end

@@ -4,7 +4,7 @@ defmodule Swarm.EStop.Server do
   """
   use GenServer
   alias Hal.HardenedServer
-  alias Robot.{Board, Config, Names}
+  alias Robot.{Board, Names}
   alias Robot.Safety.Gate
   alias Swarm.EStop
   alias Mesh.Nonblocking
@@ -13,7 +13,7 @@ defmodule Swarm.EStop.Server do
   alias Swarm.Wire.StopTags
 
   @impl GenServer
-  def init(%Config{id: id} = config) do
+  def init(%Robot.Config{id: id} = config) do
     board = Board.find!(id)
     {stop, presses} = EStop.Actions.begin(board)
 
