@@ -1,6 +1,6 @@
 defmodule Robot.Mission do
   @moduledoc """
-  What a robot does over minutes: a pure state machine, run by `Robot.Control.Pilot` in real time
+  Describes what a robot does over minutes: a pure state machine, run by `Robot.Control.Pilot` in real time
   and by simulations in lockstep (`Robot.Mission.Runner`). It sends nothing, keeps no timers and
   reads no clock: deadlines are integers, compared with `percept.at_ms` at each tick.
 

@@ -1,5 +1,5 @@
 defmodule Bench.Explore.Main do
-  @moduledoc "The command `mix bench explore`: reads its options, measures, prints the table."
+  @moduledoc "Runs the command `mix bench explore`: reads its options, measures, prints the table."
   alias Bench.{Command, Explore}
   alias Console.Cli.{Format, Output, Parse, Progress}
 

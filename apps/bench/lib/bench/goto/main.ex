@@ -1,5 +1,5 @@
 defmodule Bench.Goto.Main do
-  @moduledoc "The command `mix bench goto`: reads its options, measures, prints the table."
+  @moduledoc "Runs the command `mix bench goto`: reads its options, measures, prints the table."
   alias Bench.{Command, Goto, Table}
   alias Console.Cli.{Format, Output, Parse, Progress}
 

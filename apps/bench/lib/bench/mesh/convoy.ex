@@ -1,6 +1,6 @@
 defmodule Bench.Mesh.Convoy do
   @moduledoc """
-  What runs in the measured nodes: complete robots on stationary wheels, with the real mesh; and
+  Describes what runs in the measured nodes: complete robots on stationary wheels, with the real mesh; and
   the measurement, in the node that asks. Called over standard input.
   """
   alias Bench.Mesh.{IdleDrive, Watch}

@@ -1,5 +1,5 @@
 defmodule Bench.Page.Main do
-  @moduledoc "The command `mix bench page`: reads its options, measures, prints the table."
+  @moduledoc "Runs the command `mix bench page`: reads its options, measures, prints the table."
   alias Bench.{Command, Load, Page}
   alias Console.Cli.{Output, Parse}
 

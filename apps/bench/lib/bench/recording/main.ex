@@ -1,5 +1,5 @@
 defmodule Bench.Recording.Main do
-  @moduledoc "The command `mix bench recording`: reads its options, measures, prints the table."
+  @moduledoc "Runs the command `mix bench recording`: reads its options, measures, prints the table."
   alias Bench.{Command, Load, Recording}
   alias Console.Cli.{Output, Parse, Progress}
 

@@ -1,5 +1,5 @@
 defmodule Bench.Scale.Main do
-  @moduledoc "The command `mix bench scale`: reads its options, measures, prints table and bars."
+  @moduledoc "Runs the command `mix bench scale`: reads its options, measures, prints table and bars."
   alias Bench.{Command, Load, Scale}
   alias Console.Cli.{Output, Parse, Progress}
 

@@ -1,5 +1,5 @@
 defmodule Bench.Stop.Main do
-  @moduledoc "The command `mix bench stop`: reads its options, measures, prints the table."
+  @moduledoc "Runs the command `mix bench stop`: reads its options, measures, prints the table."
   alias Console.Cli.{Output, Parse}
   alias Bench.{Command, Load, Stop}
 

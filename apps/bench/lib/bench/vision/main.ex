@@ -1,5 +1,5 @@
 defmodule Bench.Vision.Main do
-  @moduledoc "The command `mix bench vision`: reads its options, measures, prints the table."
+  @moduledoc "Runs the command `mix bench vision`: reads its options, measures, prints the table."
   alias Bench.{Command, Load, Vision}
   alias Console.Cli.{Output, Parse, Progress}
 

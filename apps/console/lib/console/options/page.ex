@@ -1,5 +1,5 @@
 defmodule Console.Options.Page do
-  @moduledoc "Where a page is served: the options of the commands that have one. Pure."
+  @moduledoc "Decides where a page is served: the options of the commands that have one. Pure."
   alias Console.Page
   alias Console.Cli.Parse
 

@@ -1,5 +1,5 @@
 defmodule Console.Replay.LiveText do
-  @moduledoc "What `mix replay` says of a recording of robots of processes, line by line. Pure."
+  @moduledoc "Describes what `mix replay` says of a recording of robots of processes, line by line. Pure."
   alias Robot.Recording
   alias Console.Cli.Format
   alias Console.Replay.{Options, Why}

@@ -1,5 +1,5 @@
 defmodule Mcap.Writer.Summary do
-  @moduledoc "What a writer remembers of what it wrote, and the end of the file that is made of it. Pure."
+  @moduledoc "Remembers what a writer wrote, and the end of the file that is made of it. Pure."
 
   defstruct counts: %{}, start_ns: nil, end_ns: nil, chunks: {0, []}, metadata: {0, []}, bytes: 0
 

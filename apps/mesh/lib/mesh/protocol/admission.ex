@@ -1,6 +1,6 @@
 defmodule Mesh.Protocol.Admission do
   @moduledoc """
-  What becomes of a packet that is signed, of the fleet and of sense: taken, answered or refused.
+  Describes what becomes of a packet that is signed, of the fleet and of sense: taken, answered or refused.
   Pure.
 
   It is refused if it comes from an address that its sender does not name as its own: somebody has

@@ -1,6 +1,6 @@
 defmodule Mesh.Protocol.Outbox do
   @moduledoc """
-  What a node sends: signed datagrams, each with the next number of its session, the time and its
+  Describes what a node sends: signed datagrams, each with the next number of its session, the time and its
   own addresses. Pure.
   """
   alias Mesh.Protocol.{Beacon, Challenge, NodeTable, Packet, Rejections}

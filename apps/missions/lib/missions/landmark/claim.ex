@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Claim do
   @moduledoc """
-  What a robot says of its landmark mission to all others, with its heartbeats (`Robot.Mission.Claim`). Pure.
+  Describes what a robot says of its landmark mission to all others, with its heartbeats (`Robot.Mission.Claim`). Pure.
 
   `epoch` is that of the election which it knows; `sight` its newest view of the landmark, relative size in millionths and
   estimated distance in mm, `nil` if it does not see it; `sd` the uncertainty of its place in its leader's frame, `nil` outside

@@ -1,5 +1,5 @@
 defmodule Missions.Landmark.Explanation do
-  @moduledoc "What the landmark mission knows and has decided, for people who ask why. Pure."
+  @moduledoc "Tells what the landmark mission knows and has decided, for people who ask why. Pure."
   alias Missions.Landmark.State
   alias Swarm.Agreement.Round
 

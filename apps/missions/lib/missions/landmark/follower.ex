@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Follower do
   @moduledoc """
-  What a follower does: it drives to its slot, watches what it can correct its pose by, and passes
+  Decides what a follower does: it drives to its slot, watches what it can correct its pose by, and passes
   the reference on to its child. Pure.
 
   Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard).

@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Leader do
   @moduledoc """
-  What the leader does besides tracking the landmark: it announces where it is supposed to be
+  Decides what the leader does besides tracking the landmark: it announces where it is supposed to be
   (`.Announcement`), maintains the order of the slots when robots leave and join (`.Slots`), and
   judges whether the shape is formed. Pure.
   """

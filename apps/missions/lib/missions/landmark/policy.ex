@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Policy do
   @moduledoc """
-  What a robot may do with the robots that it can reach. Pure.
+  Decides what a robot may do with the robots that it can reach. Pure.
 
   **Who may lead.** `policy: :available` (the default): every part of a fleet leads itself.
   `policy: :majority, of: n`: only a part with more than half of `n` robots may lead; the others

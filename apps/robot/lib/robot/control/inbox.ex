@@ -1,6 +1,6 @@
 defmodule Robot.Control.Inbox do
   @moduledoc """
-  Whether what arrives at the executive or the pilot is whole, so that one can calculate with it. Any process of a node
+  Decides whether what arrives at the executive or the pilot is whole, so that one can calculate with it. Any process of a node
   may send them anything; what only looks like a message of theirs ends neither (`docs/security.md`). Pure.
 
   Numbers count up to 1.0e9 either way, which no robot measures: there are integers too large to be made a float.

@@ -1,6 +1,6 @@
 defmodule Robot.Recording.Topics do
   @moduledoc """
-  What other tools see of a recording of robots of processes, from the same entries that a replay
+  Describes what other tools see of a recording of robots of processes, from the same entries that a replay
   reads. A robot knows no truth: all poses are its own estimates. Pure.
 
   | topic | what | schema |

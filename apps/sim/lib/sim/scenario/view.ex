@@ -1,6 +1,6 @@
 defmodule Sim.Scenario.View do
   @moduledoc """
-  What expectations look at in a run: the true state of the world, and what robots claim. Pure.
+  Describes what expectations look at in a run: the true state of the world, and what robots claim. Pure.
   """
   alias Hal.Pose
   alias Robot.Mission.Runner

@@ -1,6 +1,6 @@
 defmodule Swarm.EStop.Server do
   @moduledoc """
-  The process of `Swarm.EStop`: receives messages, which `Swarm.EStop.Actions` carries out.
+  Runs the process of `Swarm.EStop`: receives messages, which `Swarm.EStop.Actions` carries out.
   """
   use GenServer
   alias Hal.HardenedServer

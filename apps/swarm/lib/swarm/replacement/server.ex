@@ -1,6 +1,6 @@
 defmodule Swarm.Replacement.Server do
   @moduledoc """
-  The process of `Swarm.Replacement`, one on a node, because its robots share their code: checks orders, carries out
+  Runs the process of `Swarm.Replacement`, one on a node, because its robots share their code: checks orders, carries out
   the effects of `Swarm.Replacement.Job`, and remembers what the release had. If it ends, so that nobody watches any more,
   its successor brings back the release.
   """

@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Leader.Announcement do
   @moduledoc """
-  What a leader announces each tick (`Missions.Landmark.Reference`, the anchor): where it is
+  Decides what a leader announces each tick (`Missions.Landmark.Reference`, the anchor): where it is
   supposed to be and how sure of that it is, the shape and who stands where. Pure; millimetres and
   milliradians.
   """

@@ -1,5 +1,5 @@
 defmodule Missions.Landmark.Rounds.Report do
-  @moduledoc "What a robot reports in a round of the landmark mission, and when. Pure."
+  @moduledoc "Decides what a robot reports in a round of the landmark mission, and when. Pure."
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Policy}
   alias Swarm.Agreement.Round

@@ -1,6 +1,6 @@
 defmodule Robot.Control.Pilot.Journal do
   @moduledoc """
-  What a pilot publishes about itself: on the board, in events and in the trace.
+  Describes what a pilot publishes about itself: on the board, in events and in the trace.
 
   The board's entry `:mission` contains the mission, its phase and its claim, the time of the
   percept from which the mission made that claim, and the options with which it was started. The entry `:asking`

@@ -1,6 +1,6 @@
 defmodule Swarm.Agreement.Round.Record do
   @moduledoc """
-  What a round agrees on: the report of each member of its view, and a digest by which two robots
+  Describes what a round agrees on: the report of each member of its view, and a digest by which two robots
   know that they hold the same. Pure.
   """
   alias Swarm.Agreement.Election

@@ -1,6 +1,6 @@
 defmodule Swarm.Agreement.Round.Tally do
   @moduledoc """
-  What a robot has heard in a round: the reports and the digests of its view, and whether they are
+  Counts what a robot has heard in a round: the reports and the digests of its view, and whether they are
   all there and the same. Pure.
 
   The first report and the first digest of a robot in a round are final.
